@@ -25,7 +25,7 @@ def log_body(stream: rr.RecordingStream, entity: str, body: Body) -> str:
             scale = body.size / extent_of(Path(body.mesh))
             asset = rr.Asset3D(path=body.mesh)
         except (OSError, ValueError) as error:
-            remark = f"no body: {body.mesh}: {error}"
+            remark = f"{body.mesh} ({error}; a box takes its place)"
             stream.log(entity, rr.Transform3D(scale=body.size), static=True)
             stream.log(f"{entity}/box", _boxes([(0, 0, 0)], [(1, 0.6, 0.4)]), static=True)
         else:
@@ -39,6 +39,9 @@ def log_body(stream: rr.RecordingStream, entity: str, body: Body) -> str:
     return remark
 
 
+#: Height of each shape's top above its origin, in sizes: thrust has its arrow there, where nothing hides it.
+TOPS = {"lander": 0.76, "multirotor": 0.06, "fixed_wing": 0.05, "rover": 0.34, "satellite": 0.1, "mesh": 0.0}
+
 Parts = dict[str, rr.AsComponents]
 
 
@@ -51,7 +54,9 @@ def _lander() -> Parts:
     """Stands on its origin, on four legs."""
     feet = [[0.5 * np.cos(a), 0.5 * np.sin(a), 0.0] for a in np.arange(4) * np.pi / 2 + np.pi / 4]
     legs = [[[foot[0] / 2, foot[1] / 2, 0.4], foot] for foot in feet]
-    hull = rr.Cylinders3D(lengths=[0.45], radii=[0.28], centers=[[0, 0, 0.53]], colors=[_BODY_COLOUR], fill_mode="solid")
+    hull = rr.Cylinders3D(
+        lengths=[0.45], radii=[0.28], centers=[[0, 0, 0.53]], colors=[_BODY_COLOUR], fill_mode="solid"
+    )
     return {"hull": hull, "legs": rr.LineStrips3D(legs, radii=0.022, colors=[_PART_COLOUR])}
 
 

@@ -8,16 +8,19 @@ from __future__ import annotations
 
 import difflib
 import re
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, replace
+from itertools import islice
 
 from ..errors import ViewError
 from .rotation import ANGLES
-from .signals import STATUS_FIELDS, Catalogue, Signals, Value
+from .signals import STATUS_FIELDS, Catalogue, Signals, Value, whole
 from .views import CURVES_MAX, PanelView
 
 #: Most panels that the curves of one wide panel are split into, and most panels of a run that chooses none.
 PIECES_MAX, DEFAULT_PANELS = 4, 8
+#: Most elements of one array on the page of its instance.
+ELEMENTS_MAX = 64
 _QUATERNION = (4,)
 _NEAR_MATCHES = 3
 #: A comma between paths, and not between indices (`P[0, 2]`).
@@ -63,39 +66,71 @@ class Choice:
     left_out: list[str] = field(default_factory=list)
 
     def add(self, panel: Panel) -> None:
-        """Adds the panel; one with many curves becomes several, `title (1 of 3)`, PIECES_MAX at most."""
-        pieces = [panel.curves[i : i + CURVES_MAX] for i in range(0, len(panel.curves), CURVES_MAX)]
-        if len(pieces) <= 1:
-            self.panels.append(panel)
-            return
-        shown = pieces[:PIECES_MAX]
-        for number, curves in enumerate(shown, start=1):
-            title = f"{panel.title} ({number}\u00a0of\u00a0{len(shown)})".strip()
-            self.panels.append(replace(panel, title=title, curves=curves))
-        lacking = sum(map(len, pieces[PIECES_MAX:]))
+        """Adds the panel; one with many curves becomes several, PIECES_MAX at most."""
+        pieces = _pieces(panel)
+        self.panels += pieces[:PIECES_MAX]
+        lacking = sum(len(piece.curves) for piece in pieces[PIECES_MAX:])
         if lacking:
-            self.left_out.append(f"{lacking} curves of {panel.title or shown[0][0].label}")
+            self.left_out.append(f"{lacking} curves of {panel.title or panel.curves[0].label}")
+
+
+def _pieces(panel: Panel) -> list[Panel]:
+    """The panel, or several of CURVES_MAX curves: `title (1 of 3)`."""
+    parts = [panel.curves[i : i + CURVES_MAX] for i in range(0, len(panel.curves), CURVES_MAX)]
+    if len(parts) == 1:
+        return [panel]
+    numbers = [f"({number}\u00a0of\u00a0{len(parts)})" for number in range(1, len(parts) + 1)]
+    titles = [f"{panel.title} {number}".strip() for number in numbers]
+    return [replace(panel, title=title, curves=part) for title, part in zip(titles, parts, strict=True)]
+
+
+def panels_of(signals: Signals) -> list[Panel]:
+    """Panels of all values of one topic, by unit. Of longer arrays, the first ELEMENTS_MAX elements are in them."""
+    units: dict[str, list[Curve]] = {}
+    for name in signals.sizes:
+        if name in STATUS_FIELDS:
+            continue
+        value = whole(signals, name)
+        for path, element in islice(value.elements(), ELEMENTS_MAX):
+            units.setdefault(value.unit, []).append(Curve(value, element, None, "values", label_of(path)))
+    return [p for unit, curves in units.items() for p in _pieces(Panel(signals.name, unit, tuple(curves)))]
 
 
 def choose_by_views(panels: Iterable[PanelView], catalogue: Catalogue) -> Choice:
     """The panels of a `views` block. What the run does not hold is left out."""
     chosen = Choice()
     for view in panels:
-        found = [(catalogue.find(curve.path), curve) for curve in view.curves]
-        absent = [c for v, c in found if v is None or (view.angles and v.shape != _QUATERNION)]
-        there = [(v, c.role) for v, c in found if v is not None and c not in absent]
-        missing = tuple(f"{label_of(c.path, _REMARKS.get(c.role, ''))}: not recorded" for c in absent)
-        chosen.left_out += [f"{curve.path} (not recorded)" for curve in absent]
+        there, missing = list[tuple[Value, str]](), list[str]()
+        for wanted in view.curves:
+            value = catalogue.find(wanted.path)
+            why = _why_not(value, view.angles)
+            if why:
+                chosen.left_out.append(f"{wanted.path} ({why})")
+                missing.append(f"{label_of(wanted.path, _REMARKS.get(wanted.role, ''))}: {why}")
+            elif value is not None:
+                there.append((value, wanted.role))
         if there and view.angles:
-            for number, angle in enumerate(ANGLES):
-                title = f"{view.title}: {angle}" if view.title and view.title != "attitude" else angle
-                curves = tuple(
-                    Curve(v, None, number, role, label_of(v.path, _REMARKS.get(role, ""))) for v, role in there
-                )
-                chosen.add(Panel(title, "°", curves, missing))
+            for panel in _angle_panels(view.title, there, tuple(missing)):
+                chosen.add(panel)
         elif there:
-            chosen.add(_panel(view.title, there, _REMARKS, missing))
+            chosen.add(_panel(view.title, there, _REMARKS, tuple(missing)))
     return chosen
+
+
+def _why_not(value: Value | None, angles: bool) -> str:
+    """Why a panel cannot show the value; empty if it can."""
+    if value is None:
+        return "not recorded"
+    if value.signals.is_health(value.field):
+        return "a health"
+    return "no quaternion" if angles and value.shape != _QUATERNION else ""
+
+
+def _angle_panels(title: str, values: Sequence[tuple[Value, str]], missing: tuple[str, ...]) -> Iterator[Panel]:
+    """Roll, pitch and yaw of quaternions with their roles."""
+    for number, angle in enumerate(ANGLES):
+        curves = tuple(Curve(v, None, number, role, label_of(v.path, _REMARKS.get(role, ""))) for v, role in values)
+        yield Panel(f"{title}: {angle}" if title and title != "attitude" else angle, "°", curves, missing)
 
 
 def choose_by_paths(arguments: Sequence[str], catalogue: Catalogue) -> Choice:
@@ -202,8 +237,3 @@ def _common_name(fields: Sequence[str]) -> str:
         return fields[0]
     names = {field_path.rpartition(".")[2] for field_path in fields}
     return names.pop() if len(names) == 1 else ""
-
-
-def topics_of(panels: Iterable[Panel]) -> list[Signals]:
-    """The topics that the panels show, each once."""
-    return list({curve.value.signals.topic: curve.value.signals for panel in panels for curve in panel.curves}.values())

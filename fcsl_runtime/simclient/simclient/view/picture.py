@@ -63,8 +63,8 @@ def plot(
 ) -> list[str]:
     """Writes the picture of a run to `output` (.png, .svg or .pdf), complete or not at all.
 
-    It has a panel for each of `paths`, else those of `views`, else one for each name and unit. `against` is the path of
-    the horizontal axis, instead of time. Returns what is left out. Raises BagError and ViewError.
+    It has a panel for each of `paths`, else those of `views` or of the bag's own, else one for each name and unit.
+    `against` is the path of the horizontal axis, instead of time. Returns what is left out. Raises BagError and ViewError.
     """
     if Path(output).suffix.lower() not in SUFFIXES:
         raise BagError(f"{output}: the name of a picture ends in {', '.join(SUFFIXES)}")
@@ -85,12 +85,16 @@ def plot(
 
 def choose(run: RecordedRun, paths: Sequence[str] = (), views: Views | None = None) -> Choice:
     """The panels of a picture, PANELS_MAX at most. Raises ViewError if nothing of a run can be drawn."""
+    remark = ""
+    if views is None and not paths:
+        views, remark = run.views()
     if paths:
         chosen = choose_by_paths(paths, run.catalogue)
-    elif views is not None:
+    elif views is not None and views.panels:
         chosen = choose_by_views(views.panels, run.catalogue)
     else:
         chosen = choose_default(run.catalogue)
+    chosen.left_out += filter(None, [remark])
     if len(chosen.panels) > PANELS_MAX:
         chosen.left_out.append(f"{len(chosen.panels) - PANELS_MAX} more panels")
         del chosen.panels[PANELS_MAX:]

@@ -5,6 +5,7 @@ from __future__ import annotations
 
 from collections.abc import Iterable
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 
@@ -18,8 +19,11 @@ from .panels import Curve
 from .rotation import euler_deg, unjoined
 from .series import Gaps
 from .signals import FRAME_FIELDS, PARTS_OF_A_RUN, STALE, Catalogue, Signals, Value, signals_of
+from .views import Views, views_or_remark
 
 _HEALTH, _TICK = "health", "tick"
+#: Name of the signals of the machine itself.
+MACHINE = "machine"
 
 
 @dataclass(frozen=True)
@@ -59,6 +63,10 @@ class RecordedRun:
             self.signals += self._others()
         self.catalogue = Catalogue(self.signals)
 
+    def views(self) -> tuple[Views | None, str]:
+        """What the recording chooses for its pictures, or None; and a remark if that is not valid."""
+        return views_or_remark(self.bag.views(self.machine)) if self.machine else (None, "")
+
     @property
     def name(self) -> str:
         return self.machine.name if self.machine else ""
@@ -73,7 +81,7 @@ class RecordedRun:
         return [
             *(signals_in(self.bag, topic, name_of_plant(topic), True) for topic in plant),
             *(signals_in(self.bag, topic, name, False) for name, topic in own.items()),
-            Signals("machine", machine.state, False, {"state": 0}, steps=frozenset({"state"})),
+            Signals(MACHINE, machine.state, False, {"state": 0}, steps=frozenset({"state"})),
         ]
 
     def _others(self) -> list[Signals]:
@@ -132,7 +140,7 @@ class RecordedRun:
     def _decoded(self, wanted: dict[str, set[str]]) -> dict[str, Rows]:
         """Topics whose messages may vary in size. Arrays that differ in size from the first are NaN."""
         times: dict[str, list[float]] = {topic: [] for topic in wanted}
-        found: dict[str, dict[str, list[object]]] = {t: {name: [] for name in names} for t, names in wanted.items()}
+        found: dict[str, dict[str, list[Any]]] = {t: {name: [] for name in names} for t, names in wanted.items()}
         stamps, progress = Stamps(self.bag), Progress("reading", sum(self.bag.topics[t].count for t in wanted))
         for done, (topic, log_ns, data) in enumerate(self.bag.messages(wanted) if wanted else ()):
             message = self.bag.decode(topic, data)
@@ -208,7 +216,7 @@ def _foreign(bag: Bag, topic: str) -> Signals:
     return Signals(topic, topic, False, sizes)
 
 
-def _alike(numbers: list[object]) -> Array:
+def _alike(numbers: list[Any]) -> Array:
     """The values as one float64 array with a row each."""
     shape = np.shape(numbers[0]) if numbers else ()
     return np.array([n if np.shape(n) == shape else np.full(shape, np.nan) for n in numbers], dtype=np.float64)

@@ -42,7 +42,7 @@ _STEP_COLOUR = [160, 170, 190, 255]
 _MARKER_COLOUR = [255, 210, 80, 255]
 #: Width of lines outside of panels.
 _WIDTH = 1.5
-_STEP_AFTER = rr.components.InterpolationMode.StepAfter
+STEP_AFTER = rr.components.InterpolationMode.StepAfter
 _NS = 1_000_000_000
 
 
@@ -51,7 +51,7 @@ class Cast:
     """The shown topics of a run: the machine's begin with `prefix`; `states` are in the order of their colours.
 
     `signals` are outputs of instances and the plant; `inside` are their other values: `nav.inputs`, `nav.state`.
-    `views` is what the run chooses for its pictures.
+    `views` is what the run chooses for its pictures; `remark` says why it is not used, if it is not valid.
     """
 
     prefix: str
@@ -59,6 +59,7 @@ class Cast:
     states: Sequence[str]
     inside: Sequence[Signals] = ()
     views: Views | None = None
+    remark: str = ""
 
     @cached_property
     def catalogue(self) -> Catalogue:
@@ -94,6 +95,8 @@ class _Logged:
     lane: str = ""
     transitions: int = 0
     health: dict[str, int] = field(default_factory=dict)
+    #: The newest angles, by entity.
+    angles: dict[str, float] = field(default_factory=dict)
 
 
 class Scene:
@@ -113,6 +116,12 @@ class Scene:
         self.world = World(stream, cast.views.body if cast.views else None, cast.catalogue)
         self._set_up()
 
+    @property
+    def left_out(self) -> list[str]:
+        """What of the run's views is not shown, and why."""
+        chosen = self.cast.choice.left_out if self.cast.views is not None else []
+        return list(dict.fromkeys([*filter(None, [self.cast.remark]), *chosen, *self.world.remarks]))
+
     # ---- static data -----------------------------------------------------------------------------------------
 
     def _set_up(self) -> None:
@@ -126,7 +135,7 @@ class Scene:
         legend = ", ".join(f"{number} {state}" for number, state in enumerate(states))
         self._static(
             f"{prefix}/state/step",
-            rr.SeriesLines(names=[legend], colors=[_STEP_COLOUR], widths=[2.0], interpolation_mode=_STEP_AFTER),
+            rr.SeriesLines(names=[legend], colors=[_STEP_COLOUR], widths=[2.0], interpolation_mode=STEP_AFTER),
         )
         self._static(
             f"{prefix}/transitions/marker",
@@ -142,7 +151,7 @@ class Scene:
         unit = f", {signals.units[name]}" if name in signals.units else ""
         names = [f"{label}[{i}]{unit}" for i in range(size)] or [label + unit]
         colours = [rgba(COLOURS[i % len(COLOURS)]) for i in range(max(1, size))]
-        mode = _STEP_AFTER if name in signals.steps else None
+        mode = STEP_AFTER if name in signals.steps else None
         look = rr.SeriesLines(names=names, colors=colours, widths=[_WIDTH] * len(names), interpolation_mode=mode)
         self._static(f"{signals.topic}/{name}", look)
 
@@ -185,9 +194,15 @@ class Scene:
         lines = {f"{topic}/{name}": values for name, values in shown.items()}
         for value in self._quaternions.get(topic, {}).values():
             angles = euler_deg(shown[value.field][:, value.first : value.first + value.lines]).T
-            lines |= {angle_entity(value, i): unjoined(angles[i]) for i in range(len(ANGLES))}
+            lines |= {angle_entity(value, i): self._unjoined(angle_entity(value, i), a) for i, a in enumerate(angles)}
         send_lines(self._stream, t_s, lines)
         return shown
+
+    def _unjoined(self, entity: str, angles_deg: Array) -> Array:
+        """`unjoined` behind the last angle of the batch before."""
+        last = self._logged.angles.get(entity, np.nan)
+        self._logged.angles[entity] = float(angles_deg[-1]) if len(angles_deg) else last
+        return unjoined(np.r_[last, angles_deg])[1:]
 
     def _health(self, signals: Signals, t_s: Array, health: Array) -> None:
         """Logs changes only: all as lanes; changes to worse healths and recoveries also as a log."""

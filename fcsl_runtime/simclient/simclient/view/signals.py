@@ -120,7 +120,7 @@ class Catalogue:
 
     def __init__(self, all_signals: Sequence[Signals]):
         self.signals = all_signals
-        self.values = {s.path(name): _whole(s, name) for s in all_signals for name in s.sizes}
+        self.values = {s.path(name): whole(s, name) for s in all_signals for name in s.sizes}
 
     def find(self, path: str) -> Value | None:
         """The field of this path, or the part of it that its last indices select; None if there is none."""
@@ -146,7 +146,8 @@ class Catalogue:
         return [value for value in below if value.field not in STATUS_FIELDS] or below
 
 
-def _whole(signals: Signals, name: str) -> Value:
+def whole(signals: Signals, name: str) -> Value:
+    """A field of a topic."""
     size = signals.sizes[name]
     return Value(signals.path(name), signals, name, 0, signals.shapes.get(name, (size,) if size else ()))
 

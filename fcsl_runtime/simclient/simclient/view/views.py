@@ -77,6 +77,14 @@ def parse_views(text: str) -> Views:
     return _views(_json(text, "views"))
 
 
+def views_or_remark(text: str) -> tuple[Views | None, str]:
+    """The block of a recording or of telemetry, and "": None without one, and for an invalid one, with the reason."""
+    try:
+        return (parse_views(text) if text else None), ""
+    except ViewError as error:
+        return None, f"the views of the run ({error})"
+
+
 def read_views(file: str | Path) -> Views:
     """The block of a machine JSON, of a simulation JSON, or of a file that is the block itself. Raises ViewError."""
     path = Path(file)

@@ -12,7 +12,7 @@ import numpy as np
 import rerun as rr
 
 from ..bag import Array
-from .body import log_body
+from .body import TOPS, log_body
 from .lines import TIMELINE, times
 from .series import newest
 from .signals import Catalogue, Value
@@ -115,7 +115,8 @@ class World:
         if remark:
             self.remarks.append(remark)
         if self._thrust:
-            look = rr.Arrows3D.from_fields(radii=[_ARROW_RADIUS * self.size], colors=[_FORCE_COLOUR])
+            top = [0.0, 0.0, self.up * TOPS[self._body.shape] * self.size]
+            look = rr.Arrows3D.from_fields(origins=[top], radii=[_ARROW_RADIUS * self.size], colors=[_FORCE_COLOUR])
             self._stream.log(f"{ATTITUDE}/thrust", look, static=True)
 
     # ---- data over time --------------------------------------------------------------------------------------
@@ -163,7 +164,7 @@ class World:
         self._stream.send_columns(entity, indexes=[rr.TimeColumn(TIMELINE, duration=times(t_s))], columns=columns)
 
     def _translate(self, t_s: Array, position: Array) -> None:
-        known = np.isfinite(position).all(axis=1)
+        known: Array = np.isfinite(position).all(axis=1)
         self._hide(t_s, known)
         t_s, position = t_s[known], position[known]
         if not len(t_s):
@@ -197,7 +198,7 @@ class World:
             self._send(f"{ROOT}/trail", np.array(moments), rr.LineStrips3D.columns(strips=strips, **looks))
 
     def _rotate(self, t_s: Array, q: Array) -> None:
-        known = np.isfinite(q).all(axis=1) & (np.abs(q) > 0.0).any(axis=1)
+        known: Array = np.isfinite(q).all(axis=1) & (q != 0.0).any(axis=1)
         if not self._position:
             self._hide(t_s, known)
         xyzw = np.roll(q[known], -1, axis=1).astype(np.float32)
