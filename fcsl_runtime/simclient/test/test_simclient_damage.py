@@ -16,7 +16,7 @@ from simclient import AlgTwin, BagError
 from simclient.bag import Bag
 from simclient.bag.digest import digest
 from simclient.replay import replay
-from simclient.view.summary import read_summary
+from simclient.view.recorded import RecordedRun
 
 
 @pytest.fixture
@@ -30,11 +30,17 @@ def bag(probe: Path, tmp_path: Path) -> Path:
     return tmp_path / "run"
 
 
+def everything(opened: Bag) -> None:
+    """Reads all that a picture may draw."""
+    run = RecordedRun(opened)
+    run.read(run.catalogue.values.values())
+
+
 def test_damage_anywhere_is_a_message(bag: Path, probe: Path) -> None:
     file = bag / "run_0.mcap"
     whole = file.read_bytes()
     random_of = random.Random(20)
-    readers = {"story": read_summary, "digest": digest, "replay": lambda opened: replay(opened, library=str(probe))}
+    readers = {"pictures": everything, "digest": digest, "replay": lambda opened: replay(opened, library=str(probe))}
     outcomes = {name: {"read": 0, "refused": 0} for name in readers}
     for variant in range(40):
         damaged = bytearray(whole)

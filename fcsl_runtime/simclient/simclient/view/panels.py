@@ -216,14 +216,18 @@ def _by_source(values: Iterable[Value]) -> list[tuple[Value, str]]:
 def _panel(
     title: str, values: Sequence[tuple[Value, str]], remarks: Mapping[str, str], missing: tuple[str, ...] = ()
 ) -> Panel:
-    """The panel of these values and roles; where their units differ, each label has its own."""
-    units = list(dict.fromkeys(value.unit for value, _ in values if value.unit))
+    """The panel of these values and roles. Each label has its own unit where they differ, or where values of several
+    names have none.
+    """
+    units = {value.unit for value, _ in values}
+    said = sorted(units - {""})
+    in_labels = len(said) > 1 or (not title and len(units) > 1)
     curves = []
     for value, role in values:
         for path, element in value.elements():
-            unit = f", {value.unit}" if len(units) > 1 and value.unit else ""
+            unit = f", {value.unit}" if in_labels and value.unit else ""
             curves.append(Curve(value, element, None, role, label_of(path, remarks.get(role, "")) + unit))
-    return Panel(title, " | ".join(units), tuple(curves), missing)
+    return Panel(title, said[0] if said and not in_labels else "", tuple(curves), missing)
 
 
 def _plain(path: str) -> str:

@@ -7,8 +7,9 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 #: The eight-colour sequence of M. Petroff, "Accessible Color Sequences for Data Visualization" (arXiv:2107.02270): any
-#: two differ with every common colour blindness and in print. Its red comes last, because rerun's truth is red.
-COLOURS = ("#1845FB", "#FF5E02", "#86C8DD", "#C849A9", "#ADAD7D", "#578DFF", "#656364", "#C91F16")
+#: two differ with every common colour blindness and in print. Its red comes late, because rerun's truth is red. Lines
+#: take them from the front, dots from the back.
+COLOURS = ("#1845FB", "#FF5E02", "#86C8DD", "#C849A9", "#ADAD7D", "#578DFF", "#C91F16", "#656364")
 #: Truth is drawn on top of what it judges: thin, in greys from black; red in rerun, whose background may be black.
 _TRUTH = ("#000000", "#5A5A5A", "#8F8F8F", "#B5B5B5")
 _TRUTH_IN_RERUN = ("#E12D46", "#FF8FA0", "#9E1029", "#FFC7CF")
@@ -18,6 +19,10 @@ _TRUTH_IN_RERUN = ("#E12D46", "#FF8FA0", "#9E1029", "#FFC7CF")
 _WIDEST, _THINNEST, _THINNER = 2.0, 1.0, 0.3
 #: From the back to the front.
 _ORDER = ("measured", "estimate", "values", "command", "truth")
+
+
+#: Paler in rerun, where they would be too dark.
+_PALER = {"#1845FB": "#3D63FF", "#656364": "#A9A7A8"}
 
 
 @dataclass(frozen=True)
@@ -38,13 +43,22 @@ def styles(roles: Sequence[str]) -> list[Style]:
     truths = [i for i, role in enumerate(roles) if role == "truth"][: len(_TRUTH)]
     for (colour, in_rerun), i in zip(zip(_TRUTH, _TRUTH_IN_RERUN, strict=True), truths, strict=False):
         found[i] = Style(colour, in_rerun, _THINNEST, False, False, _ORDER.index("truth") + 2)
-    # Dots take the last colours, so that estimates have the same ones with and without measurements.
-    others = sorted((i for i in range(len(roles)) if i not in found), key=lambda i: roles[i] == "measured")
-    for nth, i in enumerate(others):
-        colour, role = COLOURS[nth % len(COLOURS)], roles[i]
+    lines, dots = 0, 0
+    for i, role in enumerate(roles):
+        if i in found:
+            continue
+        if role == "measured":
+            dots += 1
+            found[i] = Style(COLOURS[-dots], _in_rerun(COLOURS[-dots]), _THINNEST, True, False, _ORDER.index(role) + 2)
+            continue
+        colour, nth, lines = COLOURS[lines], lines, lines + 1
         width = _THINNEST if role in ("truth", "command") else max(_THINNEST, _WIDEST - _THINNER * nth)
-        found[i] = Style(colour, colour, width, role == "measured", role == "command", _ORDER.index(role) + 2)
+        found[i] = Style(colour, _in_rerun(colour), width, False, role == "command", _ORDER.index(role) + 2)
     return [found[i] for i in range(len(roles))]
+
+
+def _in_rerun(colour: str) -> str:
+    return _PALER.get(colour, colour)
 
 
 def rgba(colour: str) -> list[int]:

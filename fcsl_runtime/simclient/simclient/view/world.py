@@ -122,7 +122,7 @@ class World:
     # ---- data over time --------------------------------------------------------------------------------------
 
     def move(self, values: Batch) -> None:
-        """Logs pose and thrust of a batch. A vehicle whose position is not known is hidden."""
+        """Logs pose and thrust of a batch. A vehicle whose pose is not known is hidden."""
         if self._position and (moved := self._positions(values)) is not None:
             self._translate(*moved)
         if self._attitude and (turned := self._of(self._attitude, values)) is not None:
@@ -164,22 +164,20 @@ class World:
         self._stream.send_columns(entity, indexes=[rr.TimeColumn(TIMELINE, duration=times(t_s))], columns=columns)
 
     def _translate(self, t_s: Array, position: Array) -> None:
-        known: Array = np.isfinite(position).all(axis=1)
-        self._hide(t_s, known)
+        known: Array = np.asarray(np.isfinite(position).all(axis=1))
+        self._hide(VEHICLE, t_s, known)
         t_s, position = t_s[known], position[known]
         if not len(t_s):
             return
-        self._send(VEHICLE, t_s, rr.Transform3D.columns(translation=position))
+        self._send(VEHICLE, t_s, rr.Transform3D.columns(translation=position, scale=np.ones_like(position)))
         self._when, self._where = t_s, position
         self._draw_trail(t_s, position)
 
-    def _hide(self, t_s: Array, known: Array) -> None:
-        """Makes the body vanish where its position becomes unknown, and appear where it is known again."""
-        changes = np.flatnonzero(np.diff(np.r_[not self._hidden, known].astype(np.int8)))
-        for at in changes.tolist():
+    def _hide(self, entity: str, t_s: Array, known: Array) -> None:
+        """Makes the body vanish where its pose becomes unknown: nothing of size zero is drawn."""
+        for at in np.flatnonzero(np.r_[not self._hidden, known[:-1]] & ~known).tolist():
             self._stream.set_time(TIMELINE, duration=times(float(t_s[at])))
-            scale = [1.0, 1.0, 1.0] if known[at] else [0.0, 0.0, 0.0]
-            self._stream.log(ATTITUDE, rr.Transform3D.from_fields(scale=scale))
+            self._stream.log(entity, rr.Transform3D(scale=0.0))
         if len(known):
             self._hidden = not known[-1]
 
@@ -198,12 +196,13 @@ class World:
             self._send(f"{ROOT}/trail", np.array(moments), rr.LineStrips3D.columns(strips=strips, **looks))
 
     def _rotate(self, t_s: Array, q: Array) -> None:
-        known: Array = np.isfinite(q).all(axis=1) & (q != 0.0).any(axis=1)
+        known: Array = np.asarray(np.isfinite(q).all(axis=1) & (q != 0.0).any(axis=1))
         if not self._position:
-            self._hide(t_s, known)
+            self._hide(ATTITUDE, t_s, known)
         xyzw = np.roll(q[known], -1, axis=1).astype(np.float32)
         if len(xyzw):
-            self._send(ATTITUDE, t_s[known], rr.Transform3D.columns(quaternion=xyzw))
+            same_size = np.ones((len(xyzw), 3))
+            self._send(ATTITUDE, t_s[known], rr.Transform3D.columns(quaternion=xyzw, scale=same_size))
 
     def _push(self, t_s: Array, values: Array) -> None:
         values = np.nan_to_num(values, nan=0.0, posinf=0.0, neginf=0.0)
