@@ -198,9 +198,11 @@ def test_the_layout_has_a_plot_per_instance_and_unit(tmp_path: Path) -> None:
     assert kinds["transitions and health"] == "TextLog"
 
 
-VIEWS = """{"panels": [{"title": "where", "truth": ["body.outputs.position"], "estimate": ["nav.outputs.P[1]"]},
-    {"title": "none", "values": ["nav.outputs.gone"]}],
-    "body": {"shape": "rover", "position": "body.outputs.position"}}"""
+VIEWS = (
+    '{"panels": [{"title": "where", "truth": ["body.outputs.position"], "estimate": ["nav.outputs.P[1]"]}, '
+    '{"title": "none", "values": ["nav.outputs.gone"]}], '
+    '"body": {"shape": "rover", "position": "body.outputs.position"}}'
+)
 
 
 def test_the_sender_chooses_panels_and_body(tmp_path: Path) -> None:

@@ -189,7 +189,7 @@ def test_styles_and_legends_are_those_of_pictures(tmp_path: Path) -> None:
                 entity = chunk.entity_path.partition("/ViewContents/overrides/")[2]
                 looks.setdefault(entity, {})[name] = batch.column(name)[0].as_py()
     by_name = {tuple(look[name]): look for look in looks.values() for name in look if name.endswith(":names")}
-    place = next(look for names, look in by_name.items() if "nav.place[2]" in names)
+    place = by_name["", "", "nav.place[2]"]
     assert place["SeriesLines:visible_series"] == [False, False, True]
     dots = by_name[("nav.inputs.seen (measured)",)]
     assert "SeriesPoints:marker_sizes" in dots and "SeriesLines:colors" not in dots
