@@ -761,6 +761,17 @@ def channel(*channels: Mapping[str, Any]) -> str:
     return put("channels", value=[{**base, **c} for c in channels])
 
 
+def panel(*paths: str, **keys: Any) -> str:
+    """One panel with these curves."""
+    return put("views", value={"panels": [{"title": "t", "values": list(paths), **keys}]})
+
+
+def body(**keys: Any) -> str:
+    """A panel and a body."""
+    panels = [{"title": "t", "values": ["one.outputs.y"]}]
+    return put("views", value={"panels": panels, "body": {"shape": "rover", **keys}})
+
+
 def heard(source: str, direction: str = "sensor", **keys: Any) -> str:
     """Sensor v.a and actuator force, and a connection from a value of their channels to a bool."""
     channels = [
@@ -1010,6 +1021,34 @@ CONFIGS: dict[str, str] = {
     "E243 an instance of always again": put("always", value={"one": 100}),
     "E202 no schedule where always is empty": patch(lambda c: (c.update(always={}), c["states"]["A"].clear())),
     "E234 no parameter": put("instances", "one", "frozen", value=["kk"]),
+    "E100 no such mesh": body(shape="mesh", mesh="craft.glb", position="one.outputs.v"),
+    "E103 a mesh outside the folder": body(shape="mesh", mesh="../craft.glb", position="one.outputs.v"),
+    "E201 a key of a panel": panel("one.outputs.y", colour="red"),
+    "E202 a panel without title": put("views", value={"panels": [{"values": ["one.outputs.y"]}]}),
+    "E202 a body that is nowhere": body(),
+    "E205 a shape": body(shape="car", position="one.outputs.v"),
+    "E205 a format of a mesh": body(shape="mesh", mesh="alg.py", position="one.outputs.v"),
+    "E206 an instance in a panel": panel("noe.outputs.y"),
+    "E208 a path in a panel": panel(3),  # type: ignore[arg-type]
+    "E214 a shape that needs a mesh": body(shape="mesh", position="one.outputs.v"),
+    "E214 a mesh that is not asked for": body(mesh="craft.glb", position="one.outputs.v"),
+    "E215 a panel's path without record": panel("one.y"),
+    "E216 a panel's field": panel("one.outputs.yy"),
+    "E245 a struct in a panel": panel("one.state.g"),
+    "E245 a health in a panel": panel("one.outputs.health"),
+    "E245 an element that is not there": panel("one.outputs.v[3]"),
+    "E245 an angle that is no quaternion": panel("one.outputs.v", angles=True),
+    "E245 a position of two": body(position=["one.outputs.i", "two.outputs.i"]),
+    "E245 a position that is a scalar": body(position="one.outputs.y"),
+    "E245 an array as one axis": body(position=[0, 0, "one.outputs.v"]),
+    "E245 an attitude that is no quaternion": body(attitude="one.outputs.v"),
+    "E246 no curves": panel(),
+    "E246 no panels": put("views", value={"panels": []}),
+    "E246 too many panels": put("views", value={"panels": [{"title": "t", "values": ["one.outputs.y"]}] * 17}),
+    "E246 too many curves": panel("one.outputs.v", "two.outputs.v", "one.state.g.place"),
+    "E246 a title of two lines": panel("one.outputs.y", title="a\nb"),
+    "E247 a panel of two units": panel("one.outputs.i", "one.inputs.x", "two.outputs.y"),
+    "E247 a position in seconds": body(position=["one.outputs.y", 0, 0]),
     "W201 unused": patch(lambda c: c["algorithms"].update(other={"source": "alg.py", "class": "Alg"})),
     "W202 nobody asks": edge(request="GO"),
     "W209 never": guarded_in_b(["failed"]),

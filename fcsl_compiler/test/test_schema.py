@@ -16,6 +16,7 @@ from fcsl_compiler.base.diagnostics import DiagnosticError
 from fcsl_compiler.base.source import MAX_NAME
 from fcsl_compiler.cli.main import main
 from fcsl_compiler.cli.scaffold import SCHEMA, algorithm_files, machine_files
+from fcsl_compiler.config import views
 from fcsl_compiler.config.machine import MAX_TICK_HZ, RESERVED_INSTANCES
 from fcsl_compiler.driver.passes import compile_machine
 from fcsl_compiler.model.machine import CHANNEL_SOURCES, MACHINE_SOURCES
@@ -37,6 +38,7 @@ SENSOR = """class Sensor:
         "spin": "f64[3] rad/s",
         "pose": "Pose",
         "word": "f64",
+        "q": "f64[4]",
         "transition_request": "TransitionRequest",
     }
     parameters = {"gain": "f64", "on": "bool", "where": "Pose", "done": "TransitionRequest", "rows": "f64[2][2]"}
@@ -126,6 +128,28 @@ RICH: dict[str, Any] = {
         },
         {"name": "force", "id": 2, "field": "law.outputs.force", "direction": "actuator"},
     ],
+    "views": {
+        "panels": [
+            {
+                "title": "place",
+                "truth": ["sensor.outputs.pose.at"],
+                "measured": ["law.inputs.at[0]"],
+                "estimate": ["sensor.outputs.rate"],
+                "command": ["sensor.parameters.gain"],
+                "values": [],
+            },
+            {"title": "attitude", "angles": True, "estimate": ["sensor.outputs.q"]},
+        ],
+        "body": {
+            "shape": "mesh",
+            "mesh": "craft.stl",
+            "size": 0.5,
+            "position": [0, "sensor.outputs.word", 1.5],
+            "attitude": "sensor.outputs.q",
+            "thrust": "law.outputs.force",
+            "up": "-z",
+        },
+    },
 }
 
 
@@ -133,6 +157,7 @@ RICH: dict[str, Any] = {
 def folder(tmp_path: Path) -> Path:
     (tmp_path / "sensor.py").write_text(SENSOR)
     (tmp_path / "law.py").write_text(LAW)
+    (tmp_path / "craft.stl").write_text("solid\n")
     (tmp_path / "c").mkdir()
     (tmp_path / "c" / "stub.c").write_text("/* no extern is called */\n")
     return tmp_path
@@ -188,6 +213,9 @@ OBJECTS = {
     "a channel": ("$defs", "channel"),
     "`ros`": ("$defs", "ros"),
     r"target `\w+`": ("$defs", "target"),
+    "`views`": ("$defs", "views"),
+    "a panel": ("$defs", "panel"),
+    "`body`": ("$defs", "body"),
 }
 
 
@@ -229,6 +257,11 @@ def test_words_and_limits_are_the_compilers() -> None:
     sources = defs["connection"]["properties"]["from"]["anyOf"]
     assert sources[0]["enum"] == [f"machine.{n}" for n in MACHINE_SOURCES]
     assert sources[1]["pattern"].endswith(f"({'|'.join(CHANNEL_SOURCES)})$")
+    panel, body = defs["panel"]["properties"], defs["body"]["properties"]
+    assert {name for name, place in panel.items() if place.get("$ref") == "#/$defs/curves"} == set(views.ROLES)
+    assert (panel["title"]["maxLength"], body["shape"]["enum"]) == (views.MAX_TITLE, list(views.SHAPES))
+    assert defs["views"]["properties"]["panels"]["maxItems"] == views.MAX_PANELS
+    assert body["mesh"]["allOf"][1]["pattern"] == f"\\.({'|'.join(s[1:] for s in views.MESH_SUFFIXES)})$"
     assert top["tick_hz"]["maximum"] == defs["hz"]["maximum"] == MAX_TICK_HZ
 
 

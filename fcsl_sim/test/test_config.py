@@ -234,7 +234,7 @@ def test_what_is_empty_is_as_good_as_absent(load_sim: Load) -> None:
     def warnings(change: Callable[[dict[str, Any]], None]) -> list[str]:
         return [warning.splitlines()[0].split(": ", 1)[1] for warning in load_sim(change).warnings]
 
-    empty = {"events": [], "until": {}, "ros": []}
+    empty = {"events": [], "until": {}, "ros": [], "views": {}}
     assert warnings(lambda config: config.update(empty)) == []
     unconnected = warnings(edit("connections", value=[]))
     assert [text[:13] for text in unconnected] == ["warning[W801]"] + 3 * ["warning[W802]"]

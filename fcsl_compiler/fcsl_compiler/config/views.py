@@ -108,8 +108,8 @@ class Signals:
 
 def read_views(node: JsonNode | None, signals: Signals, config: Path, reader: ConfigReader) -> str:
     """The canonical text of a `views` block of the file `config`: compact JSON, keys sorted, defaults filled in. ""
-    without a block, and after reporting an error."""
-    if node is None:
+    without a block or with an empty one, and after reporting an error."""
+    if node is None or (node.kind == "object" and not node.members):
         return ""
     before = len(reader.sink.diagnostics)
     keys = reader.object(node, "`views`", ("panels",), ("body",)) or {}
@@ -117,11 +117,14 @@ def read_views(node: JsonNode | None, signals: Signals, config: Path, reader: Co
     views: dict[str, Any] = {"panels": [checker.panel(item) for item in checker.panels(keys.get("panels"))]}
     if "body" in keys:
         views["body"] = checker.body(keys["body"])
+    if len(reader.sink.diagnostics) > before:
+        return ""
     text = json.dumps(views, separators=(",", ":"), sort_keys=True)
     if len(text) > MAX_BYTES:
         message = f"`views` has {len(text)} bytes, of which {MAX_BYTES} fit into telemetry"
         reader.sink.error("E246", message, node.span, help="use fewer panels")
-    return text if len(reader.sink.diagnostics) == before else ""
+        return ""
+    return text
 
 
 class _Checker:
@@ -240,7 +243,8 @@ class _Checker:
         if found is None:
             return
         if shape_of(found[0]) not in shapes or not scalar_of(found[0]).is_number:
-            self.sink.error("E245", f"{rule}, and `{node.value}` is {found[0]}", node.span, help="name a fitting field")
+            fix = f"name {' or '.join('an f64[3]' if shape else 'an f64' for shape in shapes)}"
+            self.sink.error("E245", f"{rule}, and `{node.value}` is {found[0]}", node.span, help=fix)
         elif found[1] not in ("", unit):
             message = f"`{node.value}` is in {found[1]}, and is shown in {unit}"
             self.sink.error("E247", message, node.span, help=f"name a field in {unit}")
@@ -255,7 +259,7 @@ class _Checker:
         except SourcePathError as error:
             self.sink.error("E103", f"`{text}` cannot be a mesh", node.span, why=str(error))
             return ""
-        if path.suffix not in MESH_SUFFIXES:
+        if path.suffix.lower() not in MESH_SUFFIXES:
             fix = f"the formats are {', '.join(MESH_SUFFIXES)}"
             self.sink.error("E205", f"`{text}` is not a mesh", node.span, help=fix)
         elif not path.is_file():

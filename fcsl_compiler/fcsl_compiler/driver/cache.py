@@ -74,8 +74,8 @@ def _cache_key(config: Path, target: str, cover: bool, instances: Sequence[str] 
         return None
     if any(algorithm.file is None for algorithm in parsed.algorithms.values()):
         return None
-    # A build for coverage contains the full paths of its files.
-    name = f"{BUILD_NOTE} {config.resolve()}" if cover else config.name
+    # A build for coverage contains the full paths of its files, one with a mesh that of the mesh.
+    name = f"{BUILD_NOTE} {config.resolve()}" if cover else str(config.resolve()) if parsed.has_mesh else config.name
     parts: list[str | bytes] = [name, parsed.package, parsed.source.text, toolchain(), _identity()]
     if target in parsed.targets:
         linked = parsed.targets[target]

@@ -105,6 +105,12 @@ class ParsedMachine:
         return Path(self.source.path).parent
 
     @property
+    def has_mesh(self) -> bool:
+        """Whether `views` name the file of a mesh."""
+        body = self.keys["views"].get("body") if "views" in self.keys else None
+        return body is not None and body.get("mesh") is not None
+
+    @property
     def files(self) -> list[ParsedFile]:
         """All algorithm files, each once, in JSON order."""
         files = [file for a in self.algorithms.values() if a.file is not None for file in a.file.all]

@@ -125,6 +125,7 @@ def test_the_fields_that_are_sent_by_default() -> None:
     assert by_path["pilot.outputs.health"].labels == ("nominal", "degraded", "failed", "stale")
     assert by_path["pilot.outputs.transition_request"].labels == ("", "tr_GO", "tr_BACK")
     assert configuration.machine == "fixture" and configuration.tick_hz == 100 and configuration.every == 1
+    assert configuration.views == '{"panels":[]}'
     assert abs(configuration.wall_ns - time.time_ns()) < 60 * 10**9
 
 

@@ -4,6 +4,7 @@
 from __future__ import annotations
 
 import errno
+import json
 import os
 import resource
 import shutil
@@ -14,6 +15,7 @@ from pathlib import Path
 from types import SimpleNamespace
 
 import pytest
+from native import FIXTURE
 from supervising import ROOT, Answer, Supervisor, build_minimal, is_gone, supervising, wait_until
 
 from simclient import VarClient
@@ -34,6 +36,35 @@ def root(tmp_path_factory: pytest.TempPathFactory) -> Path:
 def supervisor(root: Path) -> Iterator[Supervisor]:
     with supervising(root, patch="from simclient.supervisor import run_status; run_status.GONE_S = 60") as supervisor:
         yield supervisor
+
+
+NAV = """class Nav:
+    outputs = {"height": "f64 m"}
+    def execute(self):
+        self.height += 0.5
+"""
+
+
+def test_a_run_tells_its_views(supervisor: Supervisor, root: Path) -> None:
+    """As an object; null where there are none, and where they cannot be drawn."""
+    panel = {"title": "height", "angles": False, "estimate": ["nav.outputs.height"]}
+    config = {
+        "tick_hz": 100,
+        "initial_state": "RUN",
+        "algorithms": {"Nav": {"source": "nav.py"}},
+        "instances": {"nav": {"algorithm": "Nav"}},
+        "states": {"RUN": {"schedule": {"nav": 100}}},
+        "views": {"panels": [panel]},
+    }
+    (root / "craft").mkdir()
+    (root / "craft/nav.py").write_text(NAV)
+    (root / "craft/craft.json").write_text(json.dumps(config))
+    shutil.copy(FIXTURE, root / "libfixture.so")  # its text has no panel
+    for file, views in (("craft/craft.json", {"panels": [panel]}), (LIBRARY, None), ("libfixture.so", None)):
+        run = supervisor.start(file, paused=True)
+        shown = supervisor.get(f"/runs/{run['id']}").json
+        assert shown["channels"] and "views" in shown and shown["views"] == views
+        supervisor.ask("DELETE", f"/runs/{run['id']}")
 
 
 def test_a_run_from_start_to_stop(supervisor: Supervisor, root: Path) -> None:

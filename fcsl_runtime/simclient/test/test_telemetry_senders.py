@@ -219,6 +219,17 @@ def test_labels_are_read_once_and_are_the_same_for_a_type() -> None:
             )
 
 
+def test_views_are_those_of_the_sender() -> None:
+    """Of any length that a text can have; what they say is for those who draw."""
+    for views in ("", "{}", "[" * 65_535):
+        collector = fed(Collector(10), *Sender(views=views).configuration())
+        assert collector.stream is not None and collector.stream.configuration.machine.views == views
+    body = bytearray(Sender(views="{}").announcement)
+    at = body.index(b"\2\0{}")
+    body[at : at + 2] = b"\xff\xff"  # longer than what is there
+    assert read_configuration(bytes(body)) is None
+
+
 def test_a_window_of_huge_packets_is_smaller() -> None:
 
     huge = Sender(channels=(Channel("a.outputs.b", 6, (2**20, 2 - 1)),), stride=60_000)
@@ -262,11 +273,22 @@ def test_no_configuration_with_the_right_crc_makes_it_raise(drawn: st.DataObject
         lambda s: replace(s, channels=()),
         lambda s: replace(s, channels=(s.channels[0], s.channels[0])),
         lambda s: replace(s, name="a\nb"),
+        lambda s: replace(s, views="{\n}"),
         lambda s: replace(s, channels=(replace(s.channels[1], path="a b"),)),
         lambda s: replace(s, channels=(replace(s.channels[1], shape=(0,)),)),
         lambda s: replace(s, channels=(replace(s.channels[1], shape=(1,) * 9),)),
     ],
-    ids=["no rate", "no ticks", "no channels", "twice", "line break", "no path", "empty array", "rank 9"],
+    ids=[
+        "no rate",
+        "no ticks",
+        "no channels",
+        "twice",
+        "line break",
+        "line break in views",
+        "no path",
+        "empty array",
+        "rank 9",
+    ],
 )
 def test_configurations_that_are_refused(broken: Callable[[Sender], Sender]) -> None:
     sender = broken(Sender())

@@ -19,8 +19,9 @@ from starlette.responses import HTMLResponse, Response
 from starlette.routing import Route
 from starlette.types import ASGIApp, Receive, Scope, Send
 
-from ..errors import TwinError
+from ..errors import TwinError, ViewError
 from ..vars.show import jsonable
+from ..view.views import parse_views
 from . import metrics, request_parameters, run_status
 from .guard import Guard
 from .http_error import HttpError
@@ -189,13 +190,24 @@ def _single(headers: Iterable[tuple[bytes, bytes]]) -> dict[str, str]:
 
 
 def _described(run: Run) -> dict[str, Any]:
-    """A run with its log and its telemetry channels."""
+    """A run with its log, its telemetry channels and its views."""
     log = run.child.log
     try:
-        channels = list(run.telemetry.channels)
+        channels, views = list(run.telemetry.channels), _views(run.telemetry.machine.views)
     except TwinError:
-        channels = []
-    return {**run.as_json(), "log": log.lines(), "log_lines_dropped": log.lines_dropped, "channels": channels}
+        channels, views = [], None
+    told = {"log": log.lines(), "log_lines_dropped": log.lines_dropped, "channels": channels, "views": views}
+    return {**run.as_json(), **told}
+
+
+def _views(text: str) -> dict[str, Any] | None:
+    """The object that a text of views holds; None for no text, and for one that is not valid."""
+    try:
+        parse_views(text)
+    except ViewError:
+        return None
+    found: dict[str, Any] = json.loads(text)
+    return found
 
 
 async def too_many(scope: Scope, receive: Receive, send: Send) -> None:
