@@ -10,7 +10,6 @@ import re
 import signal
 import subprocess
 import sys
-from collections.abc import Sequence
 from pathlib import Path
 from typing import Any
 
@@ -22,6 +21,8 @@ from hypothesis import strategies as st
 from hypothesis.extra.numpy import arrays
 from two_estimators import STEP_S, TICKS, TRACK_FROM, TRACK_UNTIL, VIEWS, fly, height, turn, write_config
 
+import simclient.plot
+import simclient.to_rerun
 from simclient import BagError
 from simclient.bag import Bag
 from simclient.errors import ViewError
@@ -147,8 +148,8 @@ def test_what_is_not_recorded_is_told_in_legend_and_text(bags: Path) -> None:
 
 def test_invalid_views_are_told_once_and_left_out(bags: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(Bag, "views", lambda *_: '{"panels": 7}')
-    axes, left_out = drawn(bags / "plain")
-    assert len(axes) > 1 and left_out == ["the views of the run (views.panels: not a list)"]
+    chosen = choose(RecordedRun(Bag(bags / "plain")))
+    assert len(chosen.panels) > 1 and chosen.left_out == ["the views of the run (views.panels: not a list)"]
 
 
 # ---- what a user chooses -----------------------------------------------------------------------------------------------
@@ -283,9 +284,8 @@ def test_thinning_keeps_every_extreme_and_every_gap(values: np.ndarray) -> None:
 # ---- the command -------------------------------------------------------------------------------------------------------
 
 
-def run_tool(tool: str, arguments: Sequence[object], folder: Path) -> subprocess.CompletedProcess[str]:
-    command = [sys.executable, "-m", f"simclient.{tool}", *map(str, arguments)]
-    return subprocess.run(command, capture_output=True, text=True, cwd=folder)
+#: main of each tool, in this process: an error is what it raises, as run_tool prints it.
+TOOLS = {"plot": simclient.plot.main, "to_rerun": simclient.to_rerun.main}
 
 
 def test_pictures_are_written_whole(bags: Path, tmp_path: Path) -> None:
@@ -297,20 +297,26 @@ def test_pictures_are_written_whole(bags: Path, tmp_path: Path) -> None:
     assert sorted(p.name for p in tmp_path.iterdir()) == ["run.png", "run.svg"]
 
 
-def test_views_of_a_file_take_the_place_of_the_bags_own(bags: Path, tmp_path: Path) -> None:
+def test_views_of_a_file_take_the_place_of_the_bags_own(
+    bags: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
     (tmp_path / "my.json").write_text(
         json.dumps({"views": {"panels": [{"title": "mine", "values": ["coarse.outputs.noise[0]", "gone.outputs.x"]}]}})
     )
-    done = run_tool("plot", [bags / "viewed", "--views", "my.json", "-o", "x.svg"], tmp_path)
-    assert done.returncode == 0 and done.stderr == "", done.stderr
-    told = done.stdout.splitlines()
+    monkeypatch.chdir(tmp_path)
+    assert simclient.plot.main([str(bags / "viewed"), "--views", "my.json", "-o", "x.svg"]) == 0
+    told = capsys.readouterr().out.splitlines()
     assert told[1:] == ["left out: gone.outputs.x (not recorded); simclient.plot BAG PATH… chooses what is drawn"]
-    done = run_tool("plot", [bags / "viewed", "a.outputs.b", "--views", "my.json", "-o", "x.svg"], tmp_path)
-    assert done.returncode == 2 and "give one of them" in done.stderr
+    with pytest.raises(SystemExit) as exited:
+        simclient.plot.main([str(bags / "viewed"), "a.outputs.b", "--views", "my.json", "-o", "x.svg"])
+    assert exited.value.code == 2 and "give one of them" in capsys.readouterr().err
 
 
 @pytest.mark.parametrize("tool", ["plot", "to_rerun"])
-def test_bad_input_leaves_nothing_behind(tool: str, bags: Path, tmp_path: Path) -> None:
+def test_bad_input_leaves_nothing_behind(
+    tool: str, bags: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.chdir(tmp_path)
     suffix = {"plot": "png", "to_rerun": "rrd"}[tool]
     run = bags / "plain"
     (tmp_path / "bad.json").write_text('{"views": {"panels": []}}')
@@ -318,7 +324,7 @@ def test_bad_input_leaves_nothing_behind(tool: str, bags: Path, tmp_path: Path) 
         (["absent", "-o", f"x.{suffix}"], "no such bag"),
         ([run, "-o", f"no/where/x.{suffix}"], "no such directory"),
         ([run, "-o", "there"], {"plot": "there: the name of a picture ends in .png", "to_rerun": "there: a dir"}[tool]),
-        ([run, "-o", f"there.{suffix}"], f"error: there.{suffix}: a directory"),
+        ([run, "-o", f"there.{suffix}"], f"there.{suffix}: a directory"),
         ([run, "-o", f"x.{suffix}", "--machine", "other"], "no machine `other`"),
         ([run, "-o", f"x.{suffix}", "--truth", "/sim/lander"], "no topic `/sim/lander`"),
         ([run, "-o", f"x.{suffix}", "--views", "bad.json"], "bad.json: views: holds neither"),
@@ -329,8 +335,9 @@ def test_bad_input_leaves_nothing_behind(tool: str, bags: Path, tmp_path: Path) 
     (tmp_path / "there").mkdir()
     (tmp_path / f"there.{suffix}").mkdir()
     for arguments, reason in cases:
-        done = run_tool(tool, arguments, tmp_path)
-        assert done.returncode == 2 and reason in done.stderr and "Traceback" not in done.stderr, done.stderr
+        with pytest.raises((BagError, ViewError)) as caught:
+            TOOLS[tool]([str(argument) for argument in arguments])
+        assert reason in str(caught.value)
     assert sorted(p.name for p in tmp_path.iterdir()) == ["bad.json", "there", f"there.{suffix}"]
 
 
