@@ -26,6 +26,7 @@ import simclient.to_rerun
 from simclient import BagError
 from simclient.bag import Bag
 from simclient.errors import ViewError
+from simclient.view.panels import PANELS_MAX
 from simclient.view.picture import choose, draw, plot, pyplot
 from simclient.view.recorded import RecordedRun
 from simclient.view.series import Gaps, newest, thinned
@@ -220,6 +221,12 @@ def test_wide_panels_become_several_up_to_a_limit(bags: Path) -> None:
     axes, left_out = drawn(bags / "plain", *["*.outputs.*"])
     assert [len(labels(axis)) for axis in axes] == [CURVES_MAX] * 4
     assert len(left_out) == 1 and re.fullmatch(r"\d+ curves of .*", left_out[0])
+
+
+def test_a_picture_has_a_limit_of_panels(bags: Path) -> None:
+    run = RecordedRun(Bag(bags / "plain"))
+    chosen = choose(run, ["coarse.outputs.noise[0]"] * (PANELS_MAX + 2))
+    assert len(chosen.panels) == PANELS_MAX and chosen.left_out == ["2 more panels"]
 
 
 def test_topics_of_other_programs(tmp_path: Path) -> None:

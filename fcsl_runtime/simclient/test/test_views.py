@@ -66,6 +66,7 @@ def with_body(**changes: Any) -> str:
         (with_panel(title="x" * 999), "title: not a text of at most"),
         (with_panel(angles=1), "angles: not true or false"),
         (with_panel(colour="red"), "no key `colour`"),
+        (with_panel(**{"\x1b[2J\n": 1}), r"no key `'\\x1b\[2J\\n'`"),
         (with_panel(command=["a.outputs.x"] * 9), "command: 9 elements"),
         (with_panel(command=["a.outputs.x"] * 6), r"panels\[0\]: 9 curves; at most 8"),
         (with_panel(truth=["x"]), r"truth\[0\]: not a path like"),

@@ -18,12 +18,12 @@ from .world import ROOT, VEHICLE, World
 
 #: Visible time range of a live run, in s.
 _LIVE_S = 30.0
-#: Most plots of the first page, and how many of them stand above each other.
-_PLOTS_ON_OVERVIEW, _PLOTS_IN_COLUMN = 24, 8
+#: How many plots of the first page stand above each other.
+_PLOTS_IN_COLUMN = 8
 #: A viewer draws one page at a time; these limits keep a page fast for machines of any size.
 _PLOTS_IN_PANEL, _PANELS_ON_PAGE, _PAGES = 4, 12, 16
 #: Radius and opacity (of 255) of measurements: rerun draws points over lines.
-_DOT, _DOT_OPACITY = 1.0, 130
+_DOT, _DOT_OPACITY = 0.6, 50
 #: Solid lines are this much broader than in pictures, so that they are seen below thin ones of truth and command.
 _BROADER = 2.0
 #: The share of a plot's width that its legend has for itself, beside the data.
@@ -65,7 +65,7 @@ class Plan:
 
     def _overview(self) -> rrb.Container:
         """The first page: states on top, the vehicle on the left, the chosen panels on the right."""
-        plots = [self._curves(panel) for panel in self._cast.choice.panels[:_PLOTS_ON_OVERVIEW]]
+        plots = [self._curves(panel) for panel in self._cast.choice.panels]
         columns = [plots[i : i + _PLOTS_IN_COLUMN] for i in range(0, len(plots), _PLOTS_IN_COLUMN)]
         left: list[Any] = [self._vehicle()] if self._world else [self._health()]
         left.append(self._log())

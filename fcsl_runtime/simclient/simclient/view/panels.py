@@ -17,8 +17,8 @@ from .rotation import ANGLES
 from .signals import STATUS_FIELDS, Catalogue, Signals, Value, whole
 from .views import CURVES_MAX, PanelView
 
-#: Most panels that the curves of one wide panel are split into, and most panels of a run that chooses none.
-PIECES_MAX, DEFAULT_PANELS = 4, 8
+#: Most panels that the curves of one wide panel are split into, of a run that chooses none, and of any picture.
+PIECES_MAX, DEFAULT_PANELS, PANELS_MAX = 4, 8, 24
 #: Most elements of one array on the page of its instance.
 ELEMENTS_MAX = 64
 _QUATERNION = (4,)
@@ -73,6 +73,13 @@ class Choice:
         if lacking:
             self.left_out.append(f"{lacking} curves of {panel.title or panel.curves[0].label}")
 
+    def limited(self) -> Choice:
+        """This choice with PANELS_MAX panels at most."""
+        if len(self.panels) > PANELS_MAX:
+            self.left_out.append(f"{len(self.panels) - PANELS_MAX} more panels")
+            del self.panels[PANELS_MAX:]
+        return self
+
 
 def _pieces(panel: Panel) -> list[Panel]:
     """The panel, or several of CURVES_MAX curves: `title (1 of 3)`."""
@@ -114,7 +121,7 @@ def choose_by_views(panels: Iterable[PanelView], catalogue: Catalogue) -> Choice
                 chosen.add(panel)
         elif there:
             chosen.add(_panel(view.title, there, _REMARKS, tuple(missing)))
-    return chosen
+    return chosen.limited()
 
 
 def _why_not(value: Value | None, angles: bool) -> str:
@@ -148,7 +155,7 @@ def choose_by_paths(arguments: Sequence[str], catalogue: Catalogue) -> Choice:
             chosen.add(_panel(title, _by_source(values.values()), _PLANT))
     if not chosen.panels:
         raise ViewError("an empty path; write for example `nav.outputs.altitude`")
-    return chosen
+    return chosen.limited()
 
 
 def demand(path: str, catalogue: Catalogue) -> list[Value]:
@@ -192,7 +199,7 @@ def choose_default(catalogue: Catalogue) -> Choice:
         chosen.add(_panel(name, _by_source(values), _PLANT))
     if len(groups) > len(shown):
         chosen.left_out.append(f"{len(groups) - len(shown)} more names of outputs")
-    return chosen
+    return chosen.limited()
 
 
 def label_of(path: str, remark: str = "") -> str:

@@ -31,7 +31,6 @@ from matplotlib import pyplot  # noqa: E402  the backend must be chosen first
 from matplotlib.patches import Patch  # noqa: E402
 
 SUFFIXES = (".png", ".svg", ".pdf")
-PANELS_MAX = 24
 _WIDTH_IN, _PANEL_IN, _HEAD_IN = 12.0, 2.1, 1.2
 _POINTS = 4000
 _STATE_COLOURS = ("#DCEBF7", "#E3F3DC", "#FCEBD2", "#F8D9DC", "#E8E0F2", "#F4F1C9", "#E3E3E3")
@@ -84,7 +83,7 @@ def plot(
 
 
 def choose(run: RecordedRun, paths: Sequence[str] = (), views: Views | None = None) -> Choice:
-    """The panels of a picture, PANELS_MAX at most. Raises ViewError if nothing of a run can be drawn."""
+    """The panels of a picture. Raises ViewError if nothing of a run can be drawn."""
     remark = ""
     if views is None and not paths:
         views, remark = run.views()
@@ -95,9 +94,6 @@ def choose(run: RecordedRun, paths: Sequence[str] = (), views: Views | None = No
     else:
         chosen = choose_default(run.catalogue)
     chosen.left_out += filter(None, [remark])
-    if len(chosen.panels) > PANELS_MAX:
-        chosen.left_out.append(f"{len(chosen.panels) - PANELS_MAX} more panels")
-        del chosen.panels[PANELS_MAX:]
     if not chosen.panels:
         why = f": {', '.join(chosen.left_out)}" if chosen.left_out else ""
         raise ViewError(f"{run.bag.path}: nothing to draw{why}; name the paths of what to draw")

@@ -119,7 +119,7 @@ class Scene:
     @property
     def left_out(self) -> list[str]:
         """What of the run's views is not shown, and why."""
-        chosen = self.cast.choice.left_out if self.cast.views is not None else []
+        chosen = self.cast.choice.left_out if self.cast.views is not None and self.cast.views.panels else []
         return list(dict.fromkeys([*filter(None, [self.cast.remark]), *chosen, *self.world.remarks]))
 
     # ---- static data -----------------------------------------------------------------------------------------
