@@ -169,7 +169,7 @@ PANELS = """{"panels": [
 def test_the_first_page_has_the_panels_of_the_views_in_order(tmp_path: Path) -> None:
     stage = Scene(rr.RecordingStream("test"), Cast("/m", VEHICLE, [], INSIDE, parse_views(PANELS)))
     shown = time_series(Plan(stage.cast, stage.world, (0.0, 1.0))._overview())
-    assert [plot.name for plot in shown] == ["height, m", "roll, °", "pitch, °", "yaw, °"]
+    assert [plot.name for plot in shown] == ["height, m", "roll, deg", "pitch, deg", "yaw, deg"]
     assert list(shown[0].contents) == ["/m/nav/inputs/seen", "/m/nav/place", "/sim/body/z"]  # back to front
     assert list(shown[3].contents) == ["/m/nav/turned/yaw_deg"]
     rows = play(tmp_path / "x.rrd", VEHICLE, [5, 55], panels=PANELS)

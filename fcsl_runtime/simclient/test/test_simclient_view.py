@@ -85,7 +85,14 @@ def only(view: dict[str, Any]) -> Views:
 
 def test_a_run_is_drawn_as_its_views_say(viewed: list[Any]) -> None:
     axes = viewed
-    assert [axis.get_ylabel() for axis in axes] == ["height, m", "roll, °", "pitch, °", "yaw, °", "valid", "seen, m"]
+    assert [axis.get_ylabel() for axis in axes] == [
+        "height, m",
+        "roll, deg",
+        "pitch, deg",
+        "yaw, deg",
+        "valid",
+        "seen, m",
+    ]
     assert labels(axes[0]) == [
         "reference.height (truth)", "coarse.pose.height", "fine.pose.height", "guide.height (command)"
     ]  # fmt: skip

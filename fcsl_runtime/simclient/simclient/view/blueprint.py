@@ -23,7 +23,7 @@ _PLOTS_IN_COLUMN = 8
 #: A viewer draws one page at a time; these limits keep a page fast for machines of any size.
 _PLOTS_IN_PANEL, _PANELS_ON_PAGE, _PAGES = 4, 12, 16
 #: Radius and opacity (of 255) of measurements: rerun draws points over lines.
-_DOT, _DOT_OPACITY = 0.6, 50
+_DOT, _DOT_OPACITY = 0.7, 80
 #: Solid lines are this much broader than in pictures, so that they are seen below thin ones of truth and command.
 _BROADER = 2.0
 #: The share of a plot's width that its legend has for itself, beside the data.

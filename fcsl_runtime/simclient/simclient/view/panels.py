@@ -137,7 +137,7 @@ def _angle_panels(title: str, values: Sequence[tuple[Value, str]], missing: tupl
     """Roll, pitch and yaw of quaternions with their roles."""
     for number, angle in enumerate(ANGLES):
         curves = tuple(Curve(v, None, number, role, label_of(v.path, _REMARKS.get(role, ""))) for v, role in values)
-        yield Panel(f"{title}: {angle}" if title and title != "attitude" else angle, "°", curves, missing)
+        yield Panel(f"{title}: {angle}" if title and title != "attitude" else angle, "deg", curves, missing)
 
 
 def choose_by_paths(arguments: Sequence[str], catalogue: Catalogue) -> Choice:
