@@ -23,7 +23,7 @@ _PLOTS_IN_COLUMN = 8
 #: A viewer draws one page at a time; these limits keep a page fast for machines of any size.
 _PLOTS_IN_PANEL, _PANELS_ON_PAGE, _PAGES = 4, 12, 16
 #: Radius and opacity (of 255) of measurements: rerun draws points over lines.
-_DOT, _DOT_OPACITY = 0.7, 80
+_DOT, _DOT_OPACITY = 1.0, 90
 #: Solid lines are this much broader than in pictures, so that they are seen below thin ones of truth and command.
 _BROADER = 2.0
 #: The share of a plot's width that its legend has for itself, beside the data.
@@ -180,8 +180,6 @@ def _look(curves: Sequence[tuple[int, str, Style, bool]], size: int) -> list[Any
             continue
         mode = STEP_AFTER if any(steps for *_, steps in curves) else None
         found.append(
-            rr.SeriesLines(
-                **said, widths=[_BROADER * s.width - _BROADER + 1.0 for s in its_styles], interpolation_mode=mode
-            )
+            rr.SeriesLines(**said, widths=[_BROADER * s.width - 0.5 for s in its_styles], interpolation_mode=mode)
         )
     return found

@@ -24,6 +24,8 @@ VEHICLE, ATTITUDE = f"{ROOT}/vehicle", f"{ROOT}/vehicle/body"
 ARROW = 1.3
 _ARROW_RADIUS, _TRAIL_RADIUS, _MARKER_RADIUS, _TRAIL_STEP = 0.03, 0.02, 0.08, 0.02
 _TRAIL_S = 0.05
+#: Size of a vehicle that is not to be seen. rerun ignores a scale of zero, and draws the vehicle.
+_VANISHED = 1e-9
 _FORCE_COLOUR = (255, 80, 60)
 _TRAIL_COLOUR = (70, 130, 200)
 _MARKER_COLOUR = (255, 210, 80)
@@ -46,7 +48,7 @@ class World:
         self._thrust = self._find(body.thrust, (), (3,)) if body else None
         self._largest = 1.0 if self._thrust and not self._thrust.shape and not self._thrust.unit else 0.0
         self._held: dict[str, tuple[Array, Array]] = {}
-        self._hidden = False
+        self._hidden: dict[str, bool] = {}
         self._last: Array | None = None
         self._last_s = -np.inf
         #: The positions of the last batch, which say where a transition was.
@@ -174,12 +176,12 @@ class World:
         self._draw_trail(t_s, position)
 
     def _hide(self, entity: str, t_s: Array, known: Array) -> None:
-        """Makes the body vanish where its pose becomes unknown: nothing of size zero is drawn."""
-        for at in np.flatnonzero(np.r_[not self._hidden, known[:-1]] & ~known).tolist():
+        """Makes the body vanish where its pose becomes unknown."""
+        for at in np.flatnonzero(np.r_[not self._hidden.get(entity), known[:-1]] & ~known).tolist():
             self._stream.set_time(TIMELINE, duration=times(float(t_s[at])))
-            self._stream.log(entity, rr.Transform3D(scale=0.0))
+            self._stream.log(entity, rr.Transform3D(scale=_VANISHED))
         if len(known):
-            self._hidden = not known[-1]
+            self._hidden[entity] = not known[-1]
 
     def _draw_trail(self, t_s: Array, position: Array) -> None:
         moments, strips = [], []
@@ -197,8 +199,7 @@ class World:
 
     def _rotate(self, t_s: Array, q: Array) -> None:
         known: Array = np.asarray(np.isfinite(q).all(axis=1) & (q != 0.0).any(axis=1))
-        if not self._position:
-            self._hide(ATTITUDE, t_s, known)
+        self._hide(ATTITUDE, t_s, known)
         xyzw = np.roll(q[known], -1, axis=1).astype(np.float32)
         if len(xyzw):
             same_size = np.ones((len(xyzw), 3))
