@@ -139,6 +139,16 @@ def test_mistakes_elsewhere_hide_nothing_and_are_told_once(tmp_path: Path) -> No
     assert sorted(d.code for d in caught.value.diagnostics) == ["E206", "E408"]
 
 
+def test_more_mistakes_than_are_kept(tmp_path: Path) -> None:
+    """Its own are then not reported, and do no harm."""
+    config = {**CONFIG, **{f"key{n}": 1 for n in range(300)}}
+    config["views"] = {"panels": [PANEL], "body": {"shape": "rover", "position": [{"a": 1}, [], None]}}
+    path = write_machine(tmp_path, "craft", config, {"nav": NAV})
+    with pytest.raises(DiagnosticError) as caught:
+        compile_machine(path, "", until="schedule")
+    assert {d.code for d in caught.value.diagnostics} == {"E201"}
+
+
 # ---- what does not depend on them -----------------------------------------------------------------------------------
 
 

@@ -108,16 +108,15 @@ class Signals:
 
 def read_views(node: JsonNode | None, signals: Signals, config: Path, reader: ConfigReader) -> str:
     """The canonical text of a `views` block of the file `config`: compact JSON, keys sorted, defaults filled in. ""
-    without a block or with an empty one, and after reporting an error."""
+    without a block or with an empty one, and after any error."""
     if node is None or (node.kind == "object" and not node.members):
         return ""
-    before = len(reader.sink.diagnostics)
     keys = reader.object(node, "`views`", ("panels",), ("body",)) or {}
     checker = _Checker(signals, config, reader)
     views: dict[str, Any] = {"panels": [checker.panel(item) for item in checker.panels(keys.get("panels"))]}
     if "body" in keys:
         views["body"] = checker.body(keys["body"])
-    if len(reader.sink.diagnostics) > before:
+    if reader.sink.failed:  # values may be of any kind
         return ""
     text = json.dumps(views, separators=(",", ":"), sort_keys=True)
     if len(text) > MAX_BYTES:
