@@ -19,6 +19,7 @@ from simclient.run import open_run
 from simclient.view.blueprint import Plan
 from simclient.view.feed import Feed
 from simclient.view.scene import Cast, Scene
+from simclient.view.views import views_or_remark
 
 from .errors import BridgeError, Stopped
 from .live_topics import LiveTopics, read_state, tick_of
@@ -123,9 +124,12 @@ class _Show:
 
     def __init__(self, viewer: Viewer, machine: Machine, topics: LiveTopics):
         self._stream = viewer.open(f"fcsl_{machine.name}")
-        cast = Cast(topics.prefix, list(topics.signals), machine.states)
+        views, remark = views_or_remark(machine.views)
+        cast = Cast(topics.prefix, list(topics.signals), machine.states, views=views, remark=remark)
         self._scene = Scene(self._stream, cast)
         self._stream.send_blueprint(Plan(cast, self._scene.world, None).blueprint())
+        if self._scene.left_out:
+            print(f"left out of the first page: {', '.join(self._scene.left_out)}", flush=True)
         self.feed = Feed(self._scene, dict(topics.layouts), topics.state_topic, read_state)
 
     def close(self) -> None:

@@ -42,7 +42,7 @@ def test_live_is_what_the_bag_shows(domain: Domain, tmp_path: Path) -> None:
     # The controller's own bag has no plant, and topics have no inputs.
     machine = {entity for entity in recorded if entity.startswith("/lander_control/") and "/inputs/" not in entity}
     machine -= {"/lander_control/health"}
-    assert machine <= set(shown) and {"/sim/lander/pos_z", "/world/lander", "/world/trail"} <= set(shown)
+    assert machine <= set(shown) and {"/sim/lander/pos_z", "/world/vehicle", "/world/trail"} <= set(shown)
     lines = [entity for entity in machine if len(recorded[entity]) > 100]
     assert len(lines) > 20
     for entity in lines:

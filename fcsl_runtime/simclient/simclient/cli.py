@@ -19,18 +19,8 @@ from .errors import BagError, MapError, TwinError, ViewError
 
 EXIT_INCOMPLETE = 1
 EXIT_BAD_INPUT = 2
-#: How viewers find a vehicle in a bag (RunSummary.named, RunSummary.quaternions); the end of their --help.
-VEHICLE_RULE = """\
-Altitude, velocity and throttle are found by unit and name:
-  altitude  in m    named pos_z, altitude or z
-  velocity  in m/s  named vel_z, velocity or climb_rate
-  throttle          named throttle or thrust, with any unit
-The first of these names that an output in that unit has is shown, for every instance and the plant, where it is in that
-unit or has none. If no output is in that unit, the first name that an output without a unit has is shown. Outputs in
-other units are not shown as such. Attitudes are arrays of 4 named q, quat, quaternion, attitude or orientation, scalar
-first. A run without any of these shows every output.
-In 3D (rerun) the position is an array of 3 in m named pos or position, else pos_x, pos_y and the altitude. The
-thrust is an array of 3 in N named thrust or force, in body axes, else the last instance's throttle as an exhaust."""
+VIEWS_HELP = """\
+machine JSON, simulation JSON or a file with a `views` block alone: its panels and body, instead of the run's own"""
 MSG_PATH_HELP = """\
 folder with <package>/msg/<name>.msg, for bags without definitions; may be repeated; before installed packages"""
 _PROGRESS_PERIOD_S = 2.0

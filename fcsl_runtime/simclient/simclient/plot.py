@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""python -m simclient.plot BAG -o run.png: one picture of a run (see simclient.view.picture).
+"""python -m simclient.plot BAG [PATH…] -o run.png: one picture of a run (see simclient.view.picture).
 
 Exit code 0: written. 1: written, but the bag is incomplete. 2: bad input, nothing written.
 """
@@ -12,30 +12,48 @@ from pathlib import Path
 
 from fcsl_compiler.base.version import add_version
 
-from .cli import VEHICLE_RULE, completeness, run_tool
+from .cli import VIEWS_HELP, completeness, run_tool
+
+_EPILOG = """\
+Each PATH is a panel; paths with commas between them share one:
+  simclient.plot flight filter.outputs.pos_z,lander.outputs.pos_z engine.outputs.throttle -o flight.png
+A PATH is that of a field or of an element, or a shell pattern ('*.outputs.pos_z'). That of a struct or of an array draws
+all its members. Other topics: '/imu/data:angular_velocity.x'. Without PATH, the bag's views are drawn; where it has
+none, a panel for each name and unit of outputs."""
 
 
 def main(arguments: Sequence[str]) -> int:
-    """Parses the arguments, writes the file; returns the exit code. Raises BagError."""
+    """Parses the arguments, writes the file; returns the exit code. Raises BagError and ViewError."""
     parser = argparse.ArgumentParser(
         prog="simclient.plot",
         description="Draws a recorded run.",
-        epilog=VEHICLE_RULE,
+        epilog=_EPILOG,
         formatter_class=argparse.RawDescriptionHelpFormatter,
     )
     add_version(parser, "simclient", __file__)
     parser.add_argument("bag", help="directory or .mcap file")
+    parser.add_argument("paths", nargs="*", metavar="PATH", help="what to draw: a panel for each")
     parser.add_argument("-o", "--output", required=True, help="picture to write: .png, .svg or .pdf")
+    parser.add_argument("--against", default="", metavar="PATH", help="the horizontal axis, instead of time")
+    parser.add_argument("--views", default="", metavar="FILE", help=VIEWS_HELP)
     parser.add_argument("--machine", default="", help="the machine, if the bag holds several")
     parser.add_argument("--truth", default="", help="topic of the plant's truth (default: all below /<namespace>/sim/)")
-    options = parser.parse_args(arguments)
+    options = parser.parse_intermixed_args(arguments)
+    if options.paths and options.views:
+        parser.error("PATH and --views both choose the panels; give one of them")
     # Imported here, because the imports take a second; inside run_tool, Ctrl-C meanwhile gives no traceback.
     from .bag import Bag
     from .view.picture import plot
+    from .view.views import read_views
 
+    views = read_views(options.views) if options.views else None
     bag = Bag(options.bag)
-    plot(bag, options.output, options.machine, options.truth)
+    left_out = plot(
+        bag, options.output, options.machine, options.truth, paths=options.paths, views=views, against=options.against
+    )
     print(f"{options.output}: {Path(options.output).stat().st_size} bytes")
+    if left_out:
+        print(f"left out: {', '.join(left_out)}; simclient.plot BAG PATH… chooses what is drawn")
     return completeness("simclient.plot", bag.truncated)
 
 

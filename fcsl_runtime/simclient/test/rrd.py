@@ -6,6 +6,7 @@ from __future__ import annotations
 from pathlib import Path
 from typing import Any
 
+import rerun.blueprint as rrb
 from rerun.chunk import RrdReader
 
 _VIEW = ("ViewBlueprint:display_name", "ViewBlueprint:class_identifier")
@@ -43,3 +44,10 @@ def views(path: Path) -> dict[str, str]:
             (name,), (kind,) = (batch.column(column)[0].as_py() for column in _VIEW)
             found[name] = kind
     return found
+
+
+def time_series(node: Any) -> list[rrb.TimeSeriesView]:
+    """The plots below a container of a blueprint, in order."""
+    if isinstance(node, rrb.Container):
+        return [plot for child in node.contents for plot in time_series(child)]
+    return [node] if isinstance(node, rrb.TimeSeriesView) else []

@@ -8,7 +8,7 @@ from pathlib import Path
 
 import pytest
 import rerun.blueprint as rrb
-from rrd import Rows, read_rrd, values, views
+from rrd import Rows, read_rrd, time_series, values, views
 from telemetry_packets import LABELS, Channel, Sender
 
 from simclient.errors import ViewError
@@ -63,13 +63,13 @@ def feed(telemetry: Telemetry, sender: Sender, sequences: list[int]) -> None:
 
 
 def told(sender: Sender, sequences: list[int], path: str) -> list[list[float]]:
-    """What the sender said of a channel; of outputs of a stale instance NaN."""
+    """What the sender said of a channel; of outputs and inputs of a stale instance NaN."""
     at = [channel.path for channel in sender.channels].index(path)
     health = [channel.path for channel in sender.channels].index("nav.outputs.health")
     rows = []
     for sequence in sequences:
         row = sender.values(sequence)
-        stale = path.startswith("nav.outputs") and row[health][0] == STALE
+        stale = path.startswith(("nav.outputs", "nav.inputs")) and row[health][0] == STALE
         rows.append([math.nan] * len(row[at]) if stale else row[at])
     return rows
 
@@ -102,7 +102,7 @@ def test_every_value_is_shown_at_its_time(tmp_path: Path) -> None:
     rows = read_rrd(tmp_path / "x.rrd")
     assert_shown(rows, SENDER, list(range(60)))
     assert (view.ticks, view.missing, view.recordings) == (60, 0, 1)
-    assert "/world/body" in rows and not any(e.endswith(("/tick", "/next_state")) for e in rows)
+    assert not any(e.endswith(("/tick", "/next_state")) or e.startswith("/world") for e in rows)
 
 
 def test_a_wide_instance_is_shown_whole(tmp_path: Path) -> None:
@@ -145,7 +145,9 @@ def test_only_the_health_of_an_instance_is_a_lane(tmp_path: Path, other: Channel
         rows = read_rrd(file)
         for at, channel in enumerate(named, start=2):
             shown = lines(rows, "/probe/" + channel.path.replace(".", "/", 2))[1]
-            assert shown[:2] + shown[3:] == [[float(v) for v in sender.values(s)[at]] for s in (0, 1, 3)]
+            for row, s in zip(shown[:2] + shown[3:], (0, 1, 3), strict=True):
+                stale = sender is right and sender.values(s)[1][0] == STALE
+                assert str(row) == str([math.nan if stale else float(v) for v in sender.values(s)[at]])
             assert all(map(math.isnan, shown[2]))
     assert values(read_rrd(tmp_path / "right.rrd"), "/probe/nav/health", STATE)
     assert not values(rows, "/probe/nav/health", STATE) and lines(rows, "/probe/nav/angle")[1]
@@ -192,8 +194,30 @@ def test_the_layout_has_a_plot_per_instance_and_unit(tmp_path: Path) -> None:
     plots = {name for name, kind in views(tmp_path / "x.rrd").items() if kind == "TimeSeries"}
     assert {"nav, rad", "nav, m", "nav", "nav.inputs, rad/s", "nav.counters", "channels", "body, m"} <= plots
     kinds = views(tmp_path / "x.rrd")
-    assert kinds["state"] == kinds["health"] == "StateTimeline" and kinds["vehicle"] == "3D"
+    assert kinds["state"] == kinds["health"] == "StateTimeline" and "3D" not in kinds.values()
     assert kinds["transitions and health"] == "TextLog"
+
+
+VIEWS = (
+    '{"panels": [{"title": "where", "truth": ["body.outputs.position"], "estimate": ["nav.outputs.P[1]"]}, '
+    '{"title": "none", "values": ["nav.outputs.gone"]}], '
+    '"body": {"shape": "rover", "position": "body.outputs.position"}}'
+)
+
+
+def test_the_sender_chooses_panels_and_body(tmp_path: Path) -> None:
+    show(tmp_path / "x.rrd", Sender(channels=CHANNELS, views=VIEWS), [0, 1])
+    rows, kinds = read_rrd(tmp_path / "x.rrd"), views(tmp_path / "x.rrd")
+    assert kinds["where, m"] == "TimeSeries" and kinds["vehicle"] == "3D" and "none" not in kinds
+    assert len(values(rows, "/world/vehicle", "Transform3D:translation")) == 2
+    notes = [text for _, text in values(rows, "/probe/telemetry", TEXT)]
+    assert notes[1:] == ["left out of the first page: nav.outputs.gone (not recorded)"]
+
+
+def test_views_that_are_none_are_told_and_ignored(tmp_path: Path) -> None:
+    show(tmp_path / "x.rrd", Sender(channels=CHANNELS, views='{"panels": 1}'), [0, 1], [2])
+    notes = [text for _, text in values(read_rrd(tmp_path / "x.rrd"), "/probe/telemetry", TEXT)]
+    assert notes[1:] == ["left out of the first page: the views of the run (views.panels: not a list)"]
 
 
 class Deaf:
@@ -201,14 +225,6 @@ class Deaf:
 
     def __getattr__(self, name: str) -> object:
         return lambda *_, **__: None
-
-
-def plots(node: object) -> list[rrb.TimeSeriesView]:
-    """Those below a container."""
-    if isinstance(node, rrb.TimeSeriesView):
-        return [node]
-    assert isinstance(node, rrb.Container)
-    return [plot for child in node.contents for plot in plots(child)]
 
 
 @pytest.mark.parametrize(("instances", "fields"), [(300, 10), (1, 3000), (3000, 1)])
@@ -219,13 +235,13 @@ def test_thousands_of_channels_have_pages_that_can_be_drawn(instances: int, fiel
     channels |= {"i0.outputs.huge": configuration.Channel("f64", (ELEMENTS_MAX + 1,), "", ())}
     found = channels_of("large", channels)
     assert sum(map(len, found.paths.values())) == 3000 and found.too_large == ["i0.outputs.huge"]
-    world = World(Deaf(), found.cast.signals, lambda _: [0, 0, 0, 0])
+    world = World(Deaf(), None, found.cast.catalogue)
     plan = Plan(found.cast, world, None)
     page = plan._part("outputs", found.cast.instances)
-    pages = [plots(child) for child in page.contents] if isinstance(page, rrb.Tabs) else [plots(page)]
+    pages = [time_series(child) for child in page.contents] if isinstance(page, rrb.Tabs) else [time_series(page)]
     assert len(pages) <= 16 and max(map(len, pages)) <= 48
     shown = [list(plot.contents) for plots_of_page in pages for plot in plots_of_page]
-    assert max(map(len, shown)) <= 24
+    assert max(map(len, shown)) <= 8
     entities = [entity for some in shown for entity in some]
     assert len(entities) == len(set(entities)) == {1: 3000, 300: 1920, 3000: 192}[instances]
 

@@ -25,7 +25,7 @@ from simclient.bag.formats import open_bag
 from simclient.bag.info import describe
 from simclient.bag.mcap_file import read_summary
 from simclient.replay import replay
-from simclient.view.summary import read_summary as read_run
+from simclient.view.recorded import RecordedRun
 
 START = 100 * 10**9
 
@@ -83,7 +83,7 @@ def test_bits_of_a_recordings_summary_in_all_tools(probe: Path, tmp_path: Path) 
         lambda: describe(open_bag(bag)),
         lambda: write(select(open_bag(bag), (), ""), str(tmp_path / "out.csv")),
         lambda: diff(open_bag(bag), open_bag(intact)),
-        lambda: read_run(Bag(bag)),
+        lambda: (run := RecordedRun(Bag(bag))).read(run.catalogue.values.values()),
         lambda: replay(bag, library=str(probe)),
     ]
     first = summary_begin(content) * 8

@@ -9,6 +9,7 @@ import sys
 from io import BytesIO
 from pathlib import Path
 
+import numpy as np
 import pytest
 from mcap.reader import make_reader
 
@@ -16,7 +17,7 @@ from simclient import AlgTwin, BagError
 from simclient.bag import Bag
 from simclient.bag.digest import digest
 from simclient.replay import replay
-from simclient.view.summary import read_summary
+from simclient.view.recorded import RecordedRun
 
 
 @pytest.fixture
@@ -30,11 +31,17 @@ def bag(probe: Path, tmp_path: Path) -> Path:
     return tmp_path / "run"
 
 
+def everything(opened: Bag) -> None:
+    """Reads all that a picture may draw."""
+    run = RecordedRun(opened)
+    run.read(run.catalogue.values.values())
+
+
 def test_damage_anywhere_is_a_message(bag: Path, probe: Path) -> None:
     file = bag / "run_0.mcap"
     whole = file.read_bytes()
     random_of = random.Random(20)
-    readers = {"story": read_summary, "digest": digest, "replay": lambda opened: replay(opened, library=str(probe))}
+    readers = {"pictures": everything, "digest": digest, "replay": lambda opened: replay(opened, library=str(probe))}
     outcomes = {name: {"read": 0, "refused": 0} for name in readers}
     for variant in range(40):
         damaged = bytearray(whole)
@@ -101,3 +108,24 @@ def test_viewers_say_that_a_bag_is_incomplete(bag: Path, tool: str, suffix: str)
     done = subprocess.run(command, capture_output=True, text=True)
     assert done.returncode == 2 and not picture.exists()
     assert "no tick of machine `probe` is in the bag (run_0.mcap lacks 0.000000000 s to " in done.stderr
+
+
+def test_a_lost_part_is_a_gap_in_pictures(probe: Path, tmp_path: Path) -> None:
+    with AlgTwin.from_library(probe) as twin:
+        twin.record(tmp_path / "run")
+        twin.tick(4000)
+    file = tmp_path / "run/run_0.mcap"
+    content = bytearray(file.read_bytes())
+    with BytesIO(content) as stream:
+        summary = make_reader(stream).get_summary()
+    assert summary is not None and len(summary.chunk_indexes) > 3
+    lost = summary.chunk_indexes[len(summary.chunk_indexes) // 2]
+    content[lost.chunk_start_offset + lost.chunk_length // 2] ^= 1
+    file.write_bytes(content)
+    run = RecordedRun(Bag(tmp_path / "run"))
+    value = run.catalogue.values["echo.outputs.count"]
+    rows = run.read([value])[value.signals.topic]
+    (gap,) = np.flatnonzero(np.isnan(rows.fields["count"])).tolist()
+    ticks = np.delete(rows.fields["count"], gap)
+    assert np.diff(ticks)[gap - 1] > 10 and (np.delete(np.diff(ticks), gap - 1) == 1).all()
+    assert rows.t_s[gap] == pytest.approx(rows.t_s[gap - 1] + 0.01)

@@ -1,139 +1,358 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Pictures: the plot and the rerun file of a run are written whole, and hold what the bag holds."""
+"""Pictures: what the run's views or the user's paths choose, with gaps, colours and legends that do not mislead."""
 
 from __future__ import annotations
 
+import json
 import math
 import os
+import re
 import signal
 import subprocess
 import sys
 from pathlib import Path
+from typing import Any
 
+import foreign_bags
 import numpy as np
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 from hypothesis.extra.numpy import arrays
+from two_estimators import STEP_S, TICKS, TRACK_FROM, TRACK_UNTIL, VIEWS, fly, height, turn, write_config
 
-from simclient import AlgTwin, BagError
-from simclient.bag import Bag, RecordedMachine
-from simclient.view.picture import choose_panels, draw, plot
-from simclient.view.signals import ALTITUDE, THROTTLE
-from simclient.view.summary import RunSummary, Source, euler_deg, read_summary, thinned
-
-
-@pytest.fixture
-def bag(probe: Path, tmp_path: Path) -> Path:
-    with AlgTwin.from_library(probe) as twin:
-        twin.record(tmp_path / "run", "car")
-        for k in range(50):
-            twin.set("source.outputs.vec", [math.sin(k / 5), 0.0, 1.0])
-            twin.set("source.outputs.quat", [math.cos(k / 100), 0.0, 0.0, math.sin(k / 100)])
-            if k == 20:
-                twin.set_state("ACTIVE")
-            twin.tick()
-    return tmp_path / "run"
+import simclient.plot
+import simclient.to_rerun
+from simclient import BagError
+from simclient.bag import Bag
+from simclient.errors import ViewError
+from simclient.view.panels import PANELS_MAX
+from simclient.view.picture import choose, draw, plot, pyplot
+from simclient.view.recorded import RecordedRun
+from simclient.view.series import Gaps, newest, thinned
+from simclient.view.styles import styles
+from simclient.view.views import CURVES_MAX, ROLES, Views, parse_views
 
 
-def test_story_has_states_and_outputs(bag: Path) -> None:
-    story = read_summary(Bag(bag))
-    spans = [(s.state, round(s.start_s, 6), round(s.end_s, 6)) for s in story.spans]
-    assert spans == [("IDLE", 0.0, 0.2), ("ACTIVE", 0.2, 0.49)]
-    assert [s.name for s in story.sources] == ["source", "echo"] and story.states == ["IDLE", "ACTIVE"]
-    assert [(s.name, n) for s, n in story.quaternions()] == [("source", "quat")]
-    yaw = euler_deg(story.sources[0].fields["quat"])[:, 2]
-    assert np.allclose(yaw, np.degrees(np.arange(50) / 50), atol=1e-12)
+@pytest.fixture(scope="module")
+def bags(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """A folder with `plain` and `viewed`: the same flight, without and with views."""
+    folder = tmp_path_factory.mktemp("pair")
+    fly(write_config(folder), folder / "plain")
+    fly(write_config(folder, VIEWS), folder / "viewed")
+    return folder
 
 
-def test_plot_shows_attitudes_else_all_outputs(bag: Path, probe: Path, tmp_path: Path) -> None:
-    titles = [panel.title for panel in choose_panels(read_summary(Bag(bag)))]
-    assert titles == ["roll, deg", "pitch, deg", "yaw, deg"]
-    figure = draw(read_summary(Bag(bag)), "a title")
-    assert [text.get_text() for text in figure.axes[0].texts] == ["IDLE", "ACTIVE"]
-    for suffix, magic in ((".png", b"\x89PNG"), (".svg", b"<?xml")):
-        plot(bag, tmp_path / f"run{suffix}")
-        assert (tmp_path / f"run{suffix}").read_bytes().startswith(magic)
-    with pytest.raises(BagError, match="run.xyz"):
-        plot(bag, tmp_path / "run.xyz")
-    assert sorted(p.name for p in tmp_path.iterdir()) == ["run", "run.png", "run.svg"]
+def drawn(bag: Path, *paths: str, views: Views | None = None, against: str = "") -> tuple[list[Any], list[str]]:
+    """The axes of a picture, and what is left out of it."""
+    run = RecordedRun(Bag(bag), foreign=any(path.startswith("/") for path in paths))
+    chosen = choose(run, paths, views)
+    figure = draw(run, chosen, "a title", against)
+    figure.canvas.draw()
+    pyplot.close(figure)
+    return figure.axes, chosen.left_out
 
 
-def source(name: str, truth: bool = False, **units: str | None) -> Source:
-    """A source with one-valued fields of these units (None: not said)."""
-    fields = {field: np.zeros(2) for field in units}
-    said = {field: unit for field, unit in units.items() if unit is not None}
-    return Source(name, f"/m/{name}", truth, np.zeros(2), fields, said)
+@pytest.fixture(scope="module")
+def viewed(bags: Path) -> list[Any]:
+    """The axes of the flight with views."""
+    axes, left_out = drawn(bags / "viewed")
+    assert left_out == []
+    return axes
+
+
+def labels(axis: Any) -> list[str]:
+    return [text.get_text() for text in axis.get_legend().get_texts()]
+
+
+def line(axis: Any, label: str) -> Any:
+    (found,) = [line for line in axis.get_lines() if line.get_label() == label]
+    return found
+
+
+def known(axis: Any, label: str) -> list[int]:
+    """The ticks in which a curve has a value."""
+    curve = line(axis, label)
+    return [round(t / STEP_S) for t, value in zip(*curve.get_data(), strict=True) if not math.isnan(value)]
+
+
+def only(view: dict[str, Any]) -> Views:
+    return parse_views(json.dumps({"panels": [view]}))
+
+
+# ---- what is drawn -----------------------------------------------------------------------------------------------------
+
+
+def test_a_run_is_drawn_as_its_views_say(viewed: list[Any]) -> None:
+    axes = viewed
+    assert [axis.get_ylabel() for axis in axes] == [
+        "height, m",
+        "roll, deg",
+        "pitch, deg",
+        "yaw, deg",
+        "valid",
+        "seen, m",
+    ]
+    assert labels(axes[0]) == [
+        "reference.height (truth)", "coarse.pose.height", "fine.pose.height", "guide.height (command)"
+    ]  # fmt: skip
+    truth, estimate, command = (line(axes[0], labels(axes[0])[i]) for i in (0, 1, 3))
+    assert np.allclose(truth.get_ydata(), [height(k) for k in range(TICKS)])
+    assert np.allclose(estimate.get_ydata(), [height(k) + 0.5 for k in range(TICKS)])
+    assert truth.get_zorder() > command.get_zorder() > estimate.get_zorder()
+    assert truth.get_color() == "#000000" and truth.get_linewidth() < estimate.get_linewidth()
+    assert (truth.get_linestyle(), command.get_linestyle()) == ("-", "--")
+    measured = line(axes[5], "fine.inputs.height (measured)")
+    assert (measured.get_linestyle(), measured.get_marker()) == ("None", ".")
+
+
+def test_angles_are_in_degrees_and_not_joined_where_they_wrap(viewed: list[Any]) -> None:
+    yaw = line(viewed[3], "reference.q (truth)").get_ydata()
+    expected = np.degrees([math.remainder(turn(k), 2 * math.pi) for k in range(TICKS)])
+    wrap = int(np.flatnonzero(np.abs(np.diff(expected)) > 180)[0]) + 1
+    assert np.isnan(yaw[wrap]) and np.allclose(np.delete(yaw, wrap), np.delete(expected, wrap))
+
+
+@pytest.mark.parametrize("label", ["fine.pose.height", "fine.inputs.height (measured)", "fine.pose.valid"])
+def test_an_instance_that_does_not_run_has_a_gap(viewed: list[Any], label: str) -> None:
+    (axis,) = [axis for axis in viewed if label in labels(axis)]
+    assert known(axis, label) == list(range(TRACK_FROM, TRACK_UNTIL))
+
+
+def test_what_never_ran_is_no_line_at_zero(bags: Path) -> None:
+    (axis,), _ = drawn(bags / "plain", "spare.outputs.pose.height,coarse.outputs.pose.height")
+    assert labels(axis) == ["spare.pose.height: no values", "coarse.pose.height"]
+    assert len(line(axis, "spare.pose.height: no values").get_xdata()) == 0
+
+
+def test_bools_are_steps_and_numbers_are_not(viewed: list[Any]) -> None:
+    assert line(viewed[4], "coarse.pose.valid").get_drawstyle() == "steps-post"
+    assert line(viewed[0], "coarse.pose.height").get_drawstyle() == "default"
+
+
+def test_healths_and_states_have_names(bags: Path) -> None:
+    (health, state), _ = drawn(bags / "plain", "fine.outputs.health", "machine.state")
+    assert [text.get_text() for text in health.get_yticklabels()] == ["nominal", "degraded", "failed", "stale"]
+    assert line(health, "fine.health").get_ydata()[TRACK_FROM - 1 : TRACK_FROM + 1].tolist() == [3, 0]
+    assert [text.get_text() for text in state.get_yticklabels()] == ["WAIT", "TRACK"]
+    assert line(state, "machine.state").get_ydata().tolist() == [0, 0, 1, 1, 0, 0]
+
+
+def test_what_is_not_recorded_is_told_in_legend_and_text(bags: Path) -> None:
+    panel = {
+        "title": "t",
+        "truth": ["lander.outputs.z"],
+        "angles": True,
+        "estimate": ["coarse.outputs.pose.q", "coarse.outputs.noise"],
+    }
+    (axis, *_), left_out = drawn(bags / "plain", views=only(panel))
+    assert left_out == ["lander.outputs.z (not recorded)", "coarse.outputs.noise (no quaternion)"]
+    assert labels(axis) == [
+        "coarse.pose.q", "lander.z (truth): not recorded", "coarse.noise: no quaternion"
+    ]  # fmt: skip
+    with pytest.raises(ViewError, match=r"nothing to draw: lander.outputs.z \(not recorded\)"):
+        drawn(bags / "plain", views=only({"title": "t", "truth": ["lander.outputs.z"]}))
+
+
+def test_invalid_views_are_told_once_and_left_out(bags: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(Bag, "views", lambda *_: '{"panels": 7}')
+    chosen = choose(RecordedRun(Bag(bags / "plain")))
+    assert len(chosen.panels) > 1 and chosen.left_out == ["the views of the run (views.panels: not a list)"]
+
+
+# ---- what a user chooses -----------------------------------------------------------------------------------------------
+
+
+def test_each_path_is_a_panel(bags: Path) -> None:
+    axes, left_out = drawn(
+        bags / "viewed",
+        "coarse.outputs.pose.height,reference.outputs.height",
+        "fine.outputs.pose",
+        "coarse.outputs.noise[2]",
+        "*.inputs.height",
+    )
+    assert [labels(axis) for axis in axes] == [
+        ["coarse.pose.height", "reference.height"],
+        [*(f"fine.pose.q[{i}]" for i in range(4)), "fine.pose.height, m", "fine.pose.valid"],
+        ["coarse.noise[2]"],
+        ["coarse.inputs.height", "fine.inputs.height", "spare.inputs.height: no values"],
+    ]
+    assert axes[0].get_ylabel() == "height, m" and left_out == []
 
 
 @pytest.mark.parametrize(
-    ("sources", "expected"),
+    ("path", "reason"),
     [
-        ([source("a", pos_z="m"), source("p", truth=True, pos_z=None)], [("p", "pos_z"), ("a", "pos_z")]),
-        ([source("a", pos_z=None), source("b", z="m")], [("b", "z")]),  # a unit says more than a better name
-        ([source("a", pos_z="rad", z=None), source("b", altitude=None)], [("b", "altitude")]),
-        ([source("a", z="m"), source("b", z="rad"), source("c", z=None)], [("a", "z"), ("c", "z")]),
-        ([source("a", pos_z="m/s", height="m")], []),
+        ("coarse.outputs.pose.heigth", "did you mean coarse.outputs.pose.height, "),
+        ("fine.outputs.height", "did you mean fine.outputs.pose.height, "),
+        ("coarse.outputs.noise[9]", r"has the elements \[0\] to \[8\]"),
+        ("coarse.outputs.noise[0][1]", "a bag holds arrays flat"),
+        ("guide.outputs.height[0]", "is no array"),
+        ("x*", "nothing of this path is recorded"),
+        ("", "an empty path"),
     ],
 )
-def test_altitude_is_found_by_unit_and_name(sources: list[Source], expected: list[tuple[str, str]]) -> None:
-    story = RunSummary(RecordedMachine("m", "/m", {}), tuple(sources), ())
-    assert [(s.name, field) for s, field in story.named(ALTITUDE)] == expected
+def test_a_wrong_path_is_a_message_that_helps(bags: Path, path: str, reason: str) -> None:
+    with pytest.raises(ViewError, match=reason):
+        drawn(bags / "plain", path)
 
 
-def test_throttle_may_be_in_any_unit() -> None:
-    story = RunSummary(RecordedMachine("m", "/m", {}), (source("a", thrust="N"), source("b", throttle="%")), ())
-    assert [(s.name, field) for s, field in story.named(THROTTLE)] == [("b", "throttle")]
+def test_a_value_against_another(bags: Path) -> None:
+    (axis,), _ = drawn(bags / "plain", "fine.outputs.pose.height", against="reference.outputs.height")
+    curve = line(axis, "fine.pose.height")
+    truth = np.array([height(k) for k in range(TICKS)])
+    assert np.allclose(curve.get_xdata(), truth) and axis.get_xlabel() == "reference.height, m"
+    shown = ~np.isnan(curve.get_ydata())
+    assert np.allclose(curve.get_ydata()[shown], truth[TRACK_FROM:TRACK_UNTIL] + 0.1)
+    assert list(axis.texts) == []  # no states: the axis is not time
+    with pytest.raises(ViewError, match=r"--against: .* selects 9 numbers"):
+        drawn(bags / "plain", "fine.outputs.stamp", against="coarse.outputs.noise")
+
+
+def test_the_newest_value_is_taken_and_none_invented() -> None:
+    at = newest(np.array([1.0, 2.0]), np.array([0.0, 1.0]), np.array([0.5, 1.0, 1.999, 2.0, 9.0]))
+    assert math.isnan(at[0]) and at[1:].tolist() == [0.0, 0.0, 1.0, 1.0]
+
+
+def test_without_views_same_names_are_compared(bags: Path) -> None:
+    axes, left_out = drawn(bags / "plain")
+    shown = {axis.get_ylabel(): labels(axis) for axis in axes}
+    assert shown["height, m"] == ["reference.height", "guide.height"]
+    assert shown["pose.height, m"] == ["coarse.pose.height", "fine.pose.height", "spare.pose.height: no values"]
+    wide = [name for name in shown if name.startswith("pose.q")]
+    assert wide == ["pose.q (1\u00a0of\u00a02)", "pose.q (2\u00a0of\u00a02)"]
+    assert all(len(names) <= CURVES_MAX for names in shown.values()) and left_out == []
+
+
+def test_wide_panels_become_several_up_to_a_limit(bags: Path) -> None:
+    axes, left_out = drawn(bags / "plain", *["*.outputs.*"])
+    assert [len(labels(axis)) for axis in axes] == [CURVES_MAX] * 4
+    assert len(left_out) == 1 and re.fullmatch(r"\d+ curves of .*", left_out[0])
+
+
+def test_a_picture_has_a_limit_of_panels(bags: Path) -> None:
+    run = RecordedRun(Bag(bags / "plain"))
+    chosen = choose(run, ["coarse.outputs.noise[0]"] * (PANELS_MAX + 2))
+    assert len(chosen.panels) == PANELS_MAX and chosen.left_out == ["2 more panels"]
+
+
+def test_topics_of_other_programs(tmp_path: Path) -> None:
+    bag = foreign_bags.write(
+        tmp_path / "robot", {"/imu": [(int(k * 1e7), foreign_bags.imu(int(k * 1e7), (k, 0, 0))) for k in range(9)]}
+    )
+    (axis,), _ = drawn(bag, "/imu:angular_velocity.*")
+    assert labels(axis) == [f"/imu:angular_velocity.{name}" for name in "xyz"]
+    assert line(axis, "/imu:angular_velocity.x").get_ydata().tolist() == list(range(9))
+    with pytest.raises(ViewError, match=r"did you mean /imu:angular_velocity.x"):
+        drawn(bag, "/imu:angular_velocty.x")
+
+
+# ---- how it is drawn ---------------------------------------------------------------------------------------------------
+
+
+@given(roles=st.lists(st.sampled_from(ROLES), min_size=1, max_size=CURVES_MAX))
+def test_no_two_curves_of_a_panel_look_alike(roles: list[str]) -> None:
+    looks = styles(roles)
+    assert len({look.colour for look in looks}) == len({look.rerun_colour for look in looks}) == len(roles)
+    for role, look in zip(roles, looks, strict=True):
+        assert (look.dots, look.dashed) == (role == "measured", role == "command")
+
+
+def test_legends_are_beside_the_data(viewed: list[Any]) -> None:
+    for axis in viewed:
+        assert axis.get_legend().get_window_extent().x0 >= axis.get_window_extent().x1
+        assert axis.get_legend().get_window_extent().x1 <= axis.figure.bbox.x1
+
+
+def test_states_have_their_names_above(viewed: list[Any]) -> None:
+    assert [text.get_text() for text in viewed[0].texts] == ["WAIT", "TRACK", "WAIT"]
+    assert viewed[0].figure.legends == []
+
+
+def test_missing_messages_are_a_gap_in_whatever_batches() -> None:
+    ticks = np.array([5, 6, 7, 10, 11, 12, 30])
+    t_s, values = ticks * 0.1, ticks * 2.0
+    whole = Gaps().insert(t_s, ticks, {"v": values, "health": np.zeros(7, np.uint8)}, "health")
+    assert whole[0].tolist() == pytest.approx([0.5, 0.6, 0.7, 0.8, 1.0, 1.1, 1.2, 1.3, 3.0])
+    assert str(whole[1]["v"].tolist()) == "[10.0, 12.0, 14.0, nan, 20.0, 22.0, 24.0, nan, 60.0]"
+    assert whole[1]["health"].tolist() == [0, 0, 0, -1, 0, 0, 0, -1, 0]
+    for cut in range(2, 7):
+        gaps = Gaps()
+        parts = [gaps.insert(t_s[some], ticks[some], {"v": values[some]}) for some in (slice(cut), slice(cut, None))]
+        assert str(np.concatenate([part[1]["v"] for part in parts])) == str(whole[1]["v"])
+        assert np.concatenate([part[0] for part in parts]).tolist() == pytest.approx(whole[0].tolist())
 
 
 @settings(deadline=None)
 @given(values=arrays(np.float64, st.integers(1, 3000), elements=st.floats(-1e6, 1e6) | st.just(math.nan)))
-def test_thinning_keeps_every_extreme(values: np.ndarray) -> None:
+def test_thinning_keeps_every_extreme_and_every_gap(values: np.ndarray) -> None:
     t, thin = thinned(np.arange(len(values)) * 0.01, values, 200)
-    assert len(t) == len(thin) <= 600 and (np.diff(t) >= 0).all()
-    if np.isnan(values).all():
-        assert np.isnan(thin).all()
-    else:
+    assert len(t) == len(thin) and (np.diff(t) > 0).all()
+    assert np.isnan(thin).sum() == np.isnan(values).sum()
+    if not np.isnan(values).any():
+        assert len(thin) <= 600
+    if not np.isnan(values).all():
         assert np.nanmin(thin) == np.nanmin(values) and np.nanmax(thin) == np.nanmax(values)
 
 
-def test_rerun_file_holds_every_output_on_sim_time(bag: Path, tmp_path: Path) -> None:
-    out = tmp_path / "run.rrd"
-    command = [sys.executable, "-m", "simclient.to_rerun", str(bag), "-o", str(out)]
-    done = subprocess.run(command, capture_output=True, text=True)
-    assert done.returncode == 0 and done.stderr == "", done.stderr
-    viewer = [sys.executable, "-m", "rerun", "rrd"]
-    env = {**os.environ, "CI": "1"}  # otherwise rerun switches its usage statistics on, in the home directory
-    verified = subprocess.run([*viewer, "verify", str(out)], capture_output=True, text=True, env=env)
-    assert verified.returncode == 0, verified.stderr
-    printed = subprocess.run([*viewer, "print", "-vv", str(out)], capture_output=True, text=True, env=env).stdout
-    for entity in ("source/vec", "source/quat/yaw_deg", "echo/sum", "echo/health", "state", "transitions"):
-        assert f"/car/probe/{entity}" in printed, entity
-    assert "/world/source/quat" in printed and "sim_time" in printed
-    assert sorted(p.name for p in tmp_path.iterdir()) == ["run", "run.rrd"]
+# ---- the command -------------------------------------------------------------------------------------------------------
+
+
+#: main of each tool, in this process: an error is what it raises, as run_tool prints it.
+TOOLS = {"plot": simclient.plot.main, "to_rerun": simclient.to_rerun.main}
+
+
+def test_pictures_are_written_whole(bags: Path, tmp_path: Path) -> None:
+    for suffix, magic in ((".png", b"\x89PNG"), (".svg", b"<?xml")):
+        plot(bags / "viewed", tmp_path / f"run{suffix}")
+        assert (tmp_path / f"run{suffix}").read_bytes().startswith(magic)
+    with pytest.raises(BagError, match="run.xyz"):
+        plot(bags / "viewed", tmp_path / "run.xyz")
+    assert sorted(p.name for p in tmp_path.iterdir()) == ["run.png", "run.svg"]
+
+
+def test_views_of_a_file_take_the_place_of_the_bags_own(
+    bags: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    (tmp_path / "my.json").write_text(
+        json.dumps({"views": {"panels": [{"title": "mine", "values": ["coarse.outputs.noise[0]", "gone.outputs.x"]}]}})
+    )
+    monkeypatch.chdir(tmp_path)
+    assert simclient.plot.main([str(bags / "viewed"), "--views", "my.json", "-o", "x.svg"]) == 0
+    told = capsys.readouterr().out.splitlines()
+    assert told[1:] == ["left out: gone.outputs.x (not recorded); simclient.plot BAG PATH… chooses what is drawn"]
+    with pytest.raises(SystemExit) as exited:
+        simclient.plot.main([str(bags / "viewed"), "a.outputs.b", "--views", "my.json", "-o", "x.svg"])
+    assert exited.value.code == 2 and "give one of them" in capsys.readouterr().err
 
 
 @pytest.mark.parametrize("tool", ["plot", "to_rerun"])
-def test_bad_input_leaves_nothing_behind(tool: str, bag: Path, tmp_path: Path) -> None:
+def test_bad_input_leaves_nothing_behind(
+    tool: str, bags: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.chdir(tmp_path)
     suffix = {"plot": "png", "to_rerun": "rrd"}[tool]
-    cases = [
+    run = bags / "plain"
+    (tmp_path / "bad.json").write_text('{"views": {"panels": []}}')
+    cases: list[tuple[list[object], str]] = [
         (["absent", "-o", f"x.{suffix}"], "no such bag"),
-        (["run", "-o", f"no/where/x.{suffix}"], "no such directory"),
-        (
-            ["run", "-o", "there"],
-            {"plot": "there: the name of a picture ends in .png", "to_rerun": "there: a dir"}[tool],
-        ),
-        (["run", "-o", f"there.{suffix}"], f"error: there.{suffix}: a directory"),
-        (["run", "-o", f"x.{suffix}", "--machine", "other"], "no machine `other`"),
-        (["run", "-o", f"x.{suffix}", "--truth", "/sim/lander"], "no topic `/sim/lander`"),
+        ([run, "-o", f"no/where/x.{suffix}"], "no such directory"),
+        ([run, "-o", "there"], {"plot": "there: the name of a picture ends in .png", "to_rerun": "there: a dir"}[tool]),
+        ([run, "-o", f"there.{suffix}"], f"there.{suffix}: a directory"),
+        ([run, "-o", f"x.{suffix}", "--machine", "other"], "no machine `other`"),
+        ([run, "-o", f"x.{suffix}", "--truth", "/sim/lander"], "no topic `/sim/lander`"),
+        ([run, "-o", f"x.{suffix}", "--views", "bad.json"], "bad.json: views: holds neither"),
+        ([run, "-o", f"x.{suffix}", "--views", "none.json"], "none.json: No such file"),
     ]
+    if tool == "plot":
+        cases.append(([run, "nothing.outputs.x", "-o", "x.png"], "`nothing.outputs.x`: nothing of this path"))
     (tmp_path / "there").mkdir()
     (tmp_path / f"there.{suffix}").mkdir()
     for arguments, reason in cases:
-        command = [sys.executable, "-m", f"simclient.{tool}", *arguments]
-        done = subprocess.run(command, capture_output=True, text=True, cwd=tmp_path)
-        assert done.returncode == 2 and reason in done.stderr and "Traceback" not in done.stderr, done.stderr
-    assert sorted(p.name for p in tmp_path.iterdir()) == ["run", "there", f"there.{suffix}"]
+        with pytest.raises((BagError, ViewError)) as caught:
+            TOOLS[tool]([str(argument) for argument in arguments])
+        assert reason in str(caught.value)
+    assert sorted(p.name for p in tmp_path.iterdir()) == ["bad.json", "there", f"there.{suffix}"]
 
 
 @pytest.mark.parametrize(("tool", "slow"), [("plot", "matplotlib"), ("to_rerun", "rerun")])

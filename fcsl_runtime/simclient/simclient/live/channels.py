@@ -10,6 +10,7 @@ from dataclasses import dataclass, field
 from ..telemetry.configuration import Channel
 from ..view.scene import Cast
 from ..view.signals import Signals
+from ..view.views import Views
 
 STATE = "machine.state"
 #: Fields that the timeline and the state lanes show already.
@@ -17,6 +18,7 @@ _MACHINE = (STATE, "machine.next_state", "machine.tick")
 _OUTPUTS = "outputs"
 #: Topic suffix, as in bags, of fields without an instance: `channels.imu.valid` is imu.valid of record/channels.
 _RECORD = "record"
+_FLOATS = ("f32", "f64")
 _PARTS = ("inputs", _OUTPUTS, "parameters", "state", "counters")
 #: Larger arrays are left out, because every element is drawn as a line.
 ELEMENTS_MAX = 1024
@@ -26,12 +28,14 @@ NAME_MAX = 100
 
 @dataclass
 class _Topic:
-    """Fields by name: number of elements (0: a scalar), unit, and the path of the channel."""
+    """Fields by name: number of elements (0: a scalar), unit, extents of arrays of arrays, and the path of the channel."""
 
     name: str
     inside: bool
     sizes: dict[str, int] = field(default_factory=dict)
     units: dict[str, str] = field(default_factory=dict)
+    shapes: dict[str, tuple[int, ...]] = field(default_factory=dict)
+    steps: set[str] = field(default_factory=set)
     paths: dict[str, str] = field(default_factory=dict)
 
 
@@ -44,8 +48,10 @@ class Channels:
     too_large: list[str]
 
 
-def channels_of(machine: str, channels: Mapping[str, Channel]) -> Channels:
-    """The topics below /<machine>, and those of the plant below /sim."""
+def channels_of(
+    machine: str, channels: Mapping[str, Channel], views: Views | None = None, remark: str = ""
+) -> Channels:
+    """The topics below /<machine>, and those of the plant below /sim; `views` and `remark` are those of Cast."""
     prefix, plant = f"/{machine[:NAME_MAX] or 'machine'}", _plant(channels)
     topics: dict[str, _Topic] = {}
     too_large = []
@@ -63,14 +69,23 @@ def channels_of(machine: str, channels: Mapping[str, Channel]) -> Channels:
             its = topics.setdefault(topic, _Topic(whose, part != _OUTPUTS))
             its.sizes[name] = elements if channel.shape else 0
             its.paths[name] = path
+            if len(channel.shape) > 1:
+                its.shapes[name] = channel.shape
+            if channel.type not in _FLOATS:
+                its.steps.add(name)
             if channel.unit:
                 its.units[name] = channel.unit
-    signals = {t: Signals(its.name, t, t.startswith("/sim/"), its.sizes, its.units) for t, its in topics.items()}
+    signals = {
+        t: Signals(its.name, t, t.startswith("/sim/"), its.sizes, its.units, frozenset(its.steps), its.shapes)
+        for t, its in topics.items()
+    }
     cast = Cast(
         prefix,
         [signals[t] for t, its in topics.items() if not its.inside],
         channels[STATE].labels if STATE in channels else (),
         [signals[t] for t, its in topics.items() if its.inside],
+        views,
+        remark,
     )
     return Channels(cast, {t: its.paths for t, its in topics.items()}, too_large)
 

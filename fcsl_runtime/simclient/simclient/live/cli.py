@@ -16,20 +16,19 @@ from urllib.parse import urlsplit
 
 from fcsl_compiler.base.version import add_version
 
-from ..cli import VEHICLE_RULE
+from ..cli import VIEWS_HELP
 from ..errors import ViewError
+from ..view.views import Views, read_views
 from . import SCHEMES, WEB_PORT, WINDOW_PORT, proxy
 
 if TYPE_CHECKING:
     from ..telemetry.receiver import Telemetry
     from .live_view import LiveView
 
-_EPILOG = f"""\
+_EPILOG = """\
 Start the sender with `--telemetry udp:HOST:PORT` of fcsl-fc or fcsl-sim. Without options the viewer opens in a window
 on this computer. Ctrl-C ends the view; a window stays open. Exit status: 0; 1 if a viewer failed or did not receive
-everything; 2 for wrong usage.
-
-{VEHICLE_RULE}"""
+everything; 2 for wrong usage."""
 #: Shortest period of updates, in s; an update that takes long extends it to this multiple of its duration.
 _PERIOD_S, _PAUSE = 0.1, 2.0
 #: Most ticks that are kept for a slow viewer.
@@ -46,6 +45,7 @@ def main(arguments: Sequence[str]) -> int:
         raise ViewError("a port is a number below 65536; --web takes one above 0 and the one after it")
     if options.connect is not None:
         _demand_viewer(options.connect)
+    views = read_views(options.views) if options.views else None
     stop = threading.Event()
     for number in (signal.SIGINT, signal.SIGTERM):
         signal.signal(number, lambda *_: stop.set())
@@ -53,7 +53,7 @@ def main(arguments: Sequence[str]) -> int:
 
     with Telemetry(options.port, options.host, _WINDOW_TICKS) as telemetry:
         _say(f"waiting for telemetry on {options.host}:{telemetry.port}")
-        well = _view(telemetry, options, stop)
+        well = _view(telemetry, options, views, stop)
     if not well:
         sys.stdout.flush()
         os._exit(EXIT_INCOMPLETE)  # otherwise rerun waits without limit for a viewer that does not read
@@ -77,14 +77,14 @@ def _demand_viewer(url: str) -> None:
         raise ViewError(f"--connect: no viewer at {url}: {why}; start it first, with `rerun`") from None
 
 
-def _view(telemetry: Telemetry, options: argparse.Namespace, stop: threading.Event) -> bool:
+def _view(telemetry: Telemetry, options: argparse.Namespace, chosen: Views | None, stop: threading.Event) -> bool:
     """Shows until a signal arrives; returns whether every viewer received everything."""
     # Imported here, because the imports take seconds; packets are received meanwhile.
     from .live_view import LiveView
     from .viewer import Viewer
 
     viewers = [Viewer(connect, save, options.web or WEB_PORT) for connect, save in _places(options)]
-    views = [LiveView(telemetry, viewer, _say if viewer is viewers[0] else str) for viewer in viewers]
+    views = [LiveView(telemetry, viewer, _say if viewer is viewers[0] else str, chosen) for viewer in viewers]
     try:
         for page in [viewer.page for viewer in viewers if viewer.page]:
             _say(f"open {page}")
@@ -154,4 +154,5 @@ def _parser() -> argparse.ArgumentParser:
     where.add_argument("--window", action="store_true", help="opens a window in addition to a file")
     where.add_argument("--connect", metavar="URL", help=f"sends to a running viewer: {proxy(WINDOW_PORT)}")
     parser.add_argument("--save", default="", metavar="FILE.rrd", help="writes a file; alone, no viewer is opened")
+    parser.add_argument("--views", default="", metavar="FILE", help=VIEWS_HELP)
     return parser

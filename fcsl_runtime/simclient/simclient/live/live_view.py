@@ -15,6 +15,7 @@ import numpy as np
 from ..bag import Array
 from ..telemetry.receiver import Telemetry
 from ..telemetry.window import Window
+from ..view.views import Views
 from .recording import PARTING_S, Recording
 from .viewer import Viewer
 
@@ -28,12 +29,18 @@ class LiveView:
     """Shows in `viewer` the telemetry that `telemetry` receives. Each session has a recording.
 
     A new recording also begins where the session's time jumps back, up to RECORDINGS_MAX; further ones are left out.
-    `notify` receives each message for the user, one line per call. Every method raises ViewError if the viewer has
-    ended.
+    `notify` receives each message for the user, one line per call. `views` takes the place of what senders choose to
+    show. Every method raises ViewError if the viewer has ended.
     """
 
-    def __init__(self, telemetry: Telemetry, viewer: Viewer, notify: Callable[[str], object] = str):
-        self._telemetry, self.viewer, self._notify = telemetry, viewer, notify
+    def __init__(
+        self,
+        telemetry: Telemetry,
+        viewer: Viewer,
+        notify: Callable[[str], object] = str,
+        views: Views | None = None,
+    ):
+        self._telemetry, self.viewer, self._notify, self._views = telemetry, viewer, notify, views
         self._last: Window | None = None
         self._recording: Recording | None = None
         self.behind, self._due_s = False, 0.0
@@ -78,7 +85,7 @@ class LiveView:
             restarted = former.session != window.session
             why = "the sender was restarted" if restarted else f"the sender went back from tick {former.tick} to {tick}"
             former.end(f"{why}: goes on in the next recording")
-        self._recording = Recording(self.viewer, window, self.recordings, why)
+        self._recording = Recording(self.viewer, window, self.recordings, why, self._views)
         self._notify(self._recording.title)
         return self._recording
 

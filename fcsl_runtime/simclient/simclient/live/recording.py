@@ -12,6 +12,7 @@ from ..telemetry.window import Window
 from ..view.blueprint import Plan
 from ..view.scene import Scene
 from ..view.signals import UNKNOWN
+from ..view.views import Views, views_or_remark
 from .channels import NAME_MAX, STATE, channels_of, is_health
 from .viewer import Viewer
 
@@ -25,10 +26,11 @@ _NOTHING = -1
 class Recording:
     """Opens a stream of `viewer` for the session of the window. Raises ViewError.
 
-    `number` counts recordings from 1; `why` is the reason that the one before it ended.
+    `number` counts recordings from 1; `why` is the reason that the one before it ended. `views` takes the place of what
+    the sender chooses to show.
     """
 
-    def __init__(self, viewer: Viewer, window: Window, number: int, why: str):
+    def __init__(self, viewer: Viewer, window: Window, number: int, why: str, views: Views | None = None):
         configuration = window.configuration
         self._machine, self._every = configuration.machine, configuration.every
         rate = f"{self._machine.tick_hz} Hz" + (f", one tick in {self._every}" if self._every > 1 else "")
@@ -36,7 +38,10 @@ class Recording:
         session = f"session {window.session:016x} of {name} at {rate}, from tick {window.tick[0]}"
         #: Notes for the beginning of the recording.
         self.title = f"{why}; {session}" if why else session
-        self._channels = channels_of(self._machine.name, configuration.channels)
+        remark = ""
+        if views is None:
+            views, remark = views_or_remark(self._machine.views)
+        self._channels = channels_of(self._machine.name, configuration.channels, views, remark)
         self._stream = viewer.open(f"fcsl_{name}", f"{name}, {number}")
         cast = self._channels.cast
         self._scene = Scene(self._stream, cast)
@@ -73,8 +78,7 @@ class Recording:
         picked = np.insert(rows, gaps, _NOTHING)
         shown_ns = np.insert(times_ns, gaps, ends_ns)
         missing = self._note_missing(ticks, sequences, gaps, ends_ns, behind) if len(gaps) else 0
-        self._outputs(window, picked, shown_ns / _NS)
-        self._states(window, picked, shown_ns)
+        self._scene.show(self._values(window, picked, shown_ns / _NS), self._states(window, picked, shown_ns))
         self.tick, self._sequence, self._time_ns = int(ticks[-1]), int(sequences[-1]), int(times_ns[-1])
         self._scene.until(self._time_ns / _NS)
         return missing
@@ -92,6 +96,8 @@ class Recording:
         if self._channels.too_large:
             paths = ", ".join(self._channels.too_large)
             self._scene.note(t_s, f"left out, because they have too many elements: {paths}", "WARN")
+        if self._scene.left_out:
+            self._scene.note(t_s, f"left out of the first page: {', '.join(self._scene.left_out)}")
 
     def _note_missing(self, ticks: Array, sequences: Array, gaps: Array, ends_ns: Array, behind: bool) -> int:
         """Notes missing ticks and the cause."""
@@ -112,28 +118,31 @@ class Recording:
         )
         return total
 
-    def _outputs(self, window: Window, picked: Array, t_s: Array) -> None:
-        nothing = picked == _NOTHING
+    def _values(self, window: Window, picked: Array, t_s: Array) -> dict[str, tuple[Array, dict[str, Array]]]:
+        """Times and fields by topic; unknown where `picked` is _NOTHING."""
+        nothing, values = picked == _NOTHING, {}
         for topic, paths in self._channels.paths.items():
             columns: dict[str, Array] = {}
             for name, path in paths.items():
-                values = window.numbers(path)
-                values = values if self._machine.fields[path].shape else values[:, 0]
+                numbers = window.numbers(path)
+                numbers = numbers if self._machine.fields[path].shape else numbers[:, 0]
                 if is_health(path):
-                    columns[name] = np.where(nothing, UNKNOWN, values[picked])
+                    columns[name] = np.where(nothing, UNKNOWN, numbers[picked])
                 else:
-                    columns[name] = values[picked].astype(np.float64)
+                    columns[name] = numbers[picked].astype(np.float64)
                     columns[name][nothing] = np.nan
-            self._scene.outputs(topic, t_s, columns)
+            values[topic] = t_s, columns
+        return values
 
-    def _states(self, window: Window, picked: Array, times_ns: Array) -> None:
+    def _states(self, window: Window, picked: Array, times_ns: Array) -> list[StateSample]:
+        """Changes of the machine's state."""
         if STATE not in self._machine.fields or self._machine.fields[STATE].type != "state":
-            return
+            return []
         numbers = np.where(picked == _NOTHING, UNKNOWN, window.numbers(STATE)[picked, 0])
         changes = np.flatnonzero(np.diff(numbers, prepend=self._state))
         names = [self._name(number) for number in numbers[changes].tolist()]
-        self._scene.states([StateSample(0, ns, n, "") for ns, n in zip(times_ns[changes].tolist(), names, strict=True)])
         self._state = int(numbers[-1])
+        return [StateSample(0, ns, n, "") for ns, n in zip(times_ns[changes].tolist(), names, strict=True)]
 
     def _name(self, number: int) -> str:
         states = self._machine.states

@@ -10,17 +10,24 @@ import rerun as rr
 import rerun.blueprint as rrb
 
 from .lines import TIMELINE
-from .scene import LINE_COLOURS, Cast, angle_entity
-from .signals import ALTITUDE, STATUS_FIELDS, THROTTLE, VELOCITY, Signals, named, quaternions
-from .summary import ANGLES
-from .world import ROOT, World
+from .panels import Panel, panels_of
+from .scene import STEP_AFTER, Cast, angle_entity
+from .signals import Signals
+from .styles import Style, rgba, styles
+from .world import ROOT, VEHICLE, World
 
 #: Visible time range of a live run, in s.
 _LIVE_S = 30.0
-#: Most instances on the first page of a machine without a vehicle.
-_MAX_PLOTS = 4
+#: How many plots of the first page stand above each other.
+_PLOTS_IN_COLUMN = 8
 #: A viewer draws one page at a time; these limits keep a page fast for machines of any size.
-_LINES_IN_PLOT, _PLOTS_IN_PANEL, _PANELS_ON_PAGE, _PAGES = 24, 4, 12, 16
+_PLOTS_IN_PANEL, _PANELS_ON_PAGE, _PAGES = 4, 12, 16
+#: Radius and opacity (of 255) of measurements: rerun draws points over lines.
+_DOT, _DOT_OPACITY = 1.0, 90
+#: Solid lines are this much broader than in pictures, so that they are seen below thin ones of truth and command.
+_BROADER = 2.0
+#: The share of a plot's width that its legend has for itself, beside the data.
+_LEGEND = 0.3
 
 
 class Plan:
@@ -31,12 +38,14 @@ class Plan:
 
     def __init__(self, cast: Cast, world: World, span: tuple[float, float] | None, reach: float = 0.0):
         self._cast, self._world, self._live, self._reach = cast, world, span is None, reach
-        boundary = rr.TimeRangeBoundary
-        if span is None:
-            sight = boundary.cursor_relative(seconds=-_LIVE_S), boundary.cursor_relative(seconds=0.0)
-        else:
-            sight = boundary.absolute(seconds=span[0]), boundary.absolute(seconds=span[1])
-        self._sight = rrb.TimeAxis(view_range=rr.TimeRange(start=sight[0], end=sight[1]))
+        boundary = rr.TimeRangeBoundary.cursor_relative if span is None else rr.TimeRangeBoundary.absolute
+        begin, end = (-_LIVE_S, 0.0) if span is None else span
+        aside = (end - begin) * _LEGEND / (1.0 - _LEGEND)
+
+        def sight(until: float) -> rrb.TimeAxis:
+            return rrb.TimeAxis(view_range=rr.TimeRange(start=boundary(seconds=begin), end=boundary(seconds=until)))
+
+        self._sight, self._sight_with_legend = sight(end), sight(end + aside)
 
     def blueprint(self) -> rrb.Blueprint:
         parts: dict[str, list[Signals]] = {"outputs": self._cast.instances, "plant": self._cast.plant}
@@ -55,28 +64,17 @@ class Plan:
     # ---- pages -----------------------------------------------------------------------------------------------
 
     def _overview(self) -> rrb.Container:
-        """The first page: states on top, the vehicle on the left, its plots on the right."""
-        plots = self._vehicle_plots() or self._first_plots()
+        """The first page: states on top, the vehicle on the left, the chosen panels on the right."""
+        plots = [self._curves(panel) for panel in self._cast.choice.panels]
+        columns = [plots[i : i + _PLOTS_IN_COLUMN] for i in range(0, len(plots), _PLOTS_IN_COLUMN)]
         left: list[Any] = [self._vehicle()] if self._world else [self._health()]
         left.append(self._log())
-        below = rrb.Horizontal(rrb.Vertical(*left, row_shares=[3, 1]), rrb.Vertical(*plots), column_shares=[2, 3])
+        below = rrb.Horizontal(
+            rrb.Vertical(*left, row_shares=[3, 1]),
+            *(rrb.Vertical(*column) for column in columns),
+            column_shares=[2, *[3] * len(columns)],
+        )
         return rrb.Vertical(self._states(), below, row_shares=[1, 6], name="overview")
-
-    def _vehicle_plots(self) -> list[rrb.TimeSeriesView]:
-        groups = (("altitude, m", ALTITUDE), ("velocity, m/s", VELOCITY), ("throttle", THROTTLE))
-        plots = []
-        for title, quantity in groups:
-            pairs = named(self._cast.signals, quantity)
-            if pairs:
-                plots.append(self._lines(title, [f"{s.topic}/{name}" for s, name in pairs]))
-        attitudes = quaternions(self._cast.signals)
-        for angle in ANGLES if attitudes else ():
-            plots.append(self._lines(f"{angle}, deg", [angle_entity(s, name, angle) for s, name in attitudes]))
-        return plots
-
-    def _first_plots(self) -> list[Any]:
-        shown = [self._panels(signals)[:1] for signals in self._cast.instances or self._cast.inside]
-        return [panel for panels in shown for panel in panels][:_MAX_PLOTS]
 
     def _part(self, name: str, all_signals: Sequence[Signals]) -> rrb.Container:
         """A page with a panel for each instance; several pages if there are many."""
@@ -98,34 +96,39 @@ class Plan:
 
     # ---- views -----------------------------------------------------------------------------------------------
 
-    def _lines(self, name: str, entities: Sequence[str], colours: Sequence[Sequence[int]] = ()) -> rrb.TimeSeriesView:
-        """A plot; with `colours` each entity has a given colour instead of its instance's."""
+    def _lines(
+        self, name: str, entities: Sequence[str], overrides: Mapping[str, Any] | None = None
+    ) -> rrb.TimeSeriesView:
         legend = rrb.PlotLegend(rrb.Corner2D.RightTop)
-        looks = {e: rr.SeriesLines(colors=[c]) for e, c in zip(entities, colours, strict=False)}
         return rrb.TimeSeriesView(
-            origin="/", contents=list(entities), name=name, plot_legend=legend, axis_x=self._sight, overrides=looks
+            origin="/",
+            contents=list(entities),
+            name=name,
+            plot_legend=legend,
+            axis_x=self._sight_with_legend,
+            overrides=overrides or {},
         )
 
+    def _curves(self, panel: Panel) -> rrb.TimeSeriesView:
+        """A plot of a panel, with the colours and styles of its curves, back to front."""
+        looks: dict[str, list[tuple[int, str, Style, bool]]] = {}
+        sizes: dict[str, int] = {}
+        ordered = list(zip(panel.curves, styles([curve.role for curve in panel.curves]), strict=True))
+        for curve, style in sorted(ordered, key=lambda pair: pair[1].order):
+            value = curve.value
+            if curve.angle is not None:
+                entity, size = angle_entity(value, curve.angle), 1
+            else:
+                entity, size = f"{value.signals.topic}/{value.field}", max(1, value.signals.sizes[value.field])
+            sizes[entity] = size
+            looks.setdefault(entity, []).append((curve.element or 0, curve.label, style, curve.steps))
+        return self._lines(panel.name, list(looks), {entity: _look(looks[entity], sizes[entity]) for entity in looks})
+
     def _panels(self, signals: Signals) -> list[Any]:
-        """A panel for an instance, or several: plots below each other."""
-        plots = self._plots(signals)
+        """A panel for an instance, or several: plots below each other, one or more for each unit."""
+        plots = [self._curves(panel) for panel in panels_of(signals)]
         parts = [plots[i : i + _PLOTS_IN_PANEL] for i in range(0, len(plots), _PLOTS_IN_PANEL)]
         return [part[0] if len(part) == 1 else rrb.Vertical(*part, name=signals.name) for part in parts]
-
-    def _plots(self, signals: Signals) -> list[rrb.TimeSeriesView]:
-        """A plot per unit, or several plots if there are many lines.
-
-        Elements of an array have separate colours already.
-        """
-        plots = []
-        for unit, names in _by_unit(signals).items():
-            title = f"{signals.name}, {unit}" if unit else signals.name
-            for some in _bunches(names, signals.sizes):
-                scalars = [f"{signals.topic}/{name}" for name in some if not signals.sizes[name]]
-                arrays = [f"{signals.topic}/{name}" for name in some if signals.sizes[name]]
-                colours = [LINE_COLOURS[i % len(LINE_COLOURS)] for i in range(len(scalars))]
-                plots.append(self._lines(title, scalars + arrays, colours))
-        return plots
 
     def _states(self) -> rrb.StateTimelineView:
         return rrb.StateTimelineView(origin=f"{self._cast.prefix}/state", name="state", time_view=self._sight)
@@ -141,15 +144,16 @@ class Plan:
         return rrb.TextLogView(origin=prefix, contents=contents, name="transitions and health", columns=columns)
 
     def _vehicle(self) -> rrb.Spatial3DView:
-        """The whole flight from the side (live: beside the vehicle) with the trail so far; attitudes from close up."""
-        if self._live and self._world.vehicle:
+        """The whole flight from the side (live: beside the vehicle) with the trail so far."""
+        size, up = self._world.size, self._world.up
+        if self._live and self._world.moves:
             beside = rrb.EyeControls3D(
-                position=[-18.0, -22.0, 10.0], look_target=[0, 0, 2], tracking_entity=self._world.vehicle
+                position=[-6 * size, -7 * size, up * 3 * size], look_target=[0, 0, 0], tracking_entity=VEHICLE
             )
         else:
-            top = max(10.0, self._reach) if self._world.vehicle else 3.0
-            middle = top / 2 if self._world.vehicle else 0.0
-            beside = rrb.EyeControls3D(position=[-0.9 * top, -1.1 * top, 0.7 * top], look_target=[0, 0, middle])
+            top = max(4 * size, self._reach) if self._world.moves else 1.5 * size
+            middle = up * top / 2 if self._world.moves else 0.0
+            beside = rrb.EyeControls3D(position=[-0.9 * top, -1.1 * top, up * 0.7 * top], look_target=[0, 0, middle])
         start, now = rr.TimeRangeBoundary.infinite(), rr.TimeRangeBoundary.cursor_relative(seconds=0.0)
         up_to_now = rrb.VisibleTimeRanges(timeline=TIMELINE, start=start, end=now)
         return rrb.Spatial3DView(
@@ -157,24 +161,25 @@ class Plan:
         )
 
 
-def _by_unit(signals: Signals) -> dict[str, list[str]]:
-    """The fields to plot, by unit."""
-    units: dict[str, list[str]] = {}
-    for name in signals.sizes:
-        if name not in STATUS_FIELDS:
-            units.setdefault(signals.units.get(name, ""), []).append(name)
-    return units
-
-
-def _bunches(names: Sequence[str], sizes: Mapping[str, int]) -> list[list[str]]:
-    """Groups of fields that share a plot: as many as stay below the limit of lines, at least one."""
-    bunches: list[list[str]] = []
-    lines = 0
-    for name in names:
-        size = max(1, sizes[name])
-        if not bunches or lines + size > _LINES_IN_PLOT:
-            bunches.append([])
-            lines = 0
-        bunches[-1].append(name)
-        lines += size
-    return bunches
+def _look(curves: Sequence[tuple[int, str, Style, bool]], size: int) -> list[Any]:
+    """Visualizers of one entity of `size` lines, for curves (element, label, style, steps): lines, dots, or both."""
+    found: list[Any] = []
+    for dots in (True, False):
+        mine = {element: (label, style) for element, label, style, _ in curves if style.dots == dots}
+        if not mine:
+            continue
+        hidden = ("", Style("#000000", "#000000", 1.0, dots, False, 0))
+        labels, its_styles = zip(*(mine.get(i, hidden) for i in range(size)), strict=True)
+        said: dict[str, Any] = {
+            "names": labels,
+            "colors": [[*rgba(style.rerun_colour)[:3], _DOT_OPACITY if dots else 255] for style in its_styles],
+            "visible_series": [i in mine for i in range(size)],
+        }
+        if dots:
+            found.append(rr.SeriesPoints(**said, markers=["circle"] * size, marker_sizes=[_DOT] * size))
+            continue
+        mode = STEP_AFTER if any(steps for *_, steps in curves) else None
+        found.append(
+            rr.SeriesLines(**said, widths=[_BROADER * s.width - 0.5 for s in its_styles], interpolation_mode=mode)
+        )
+    return found

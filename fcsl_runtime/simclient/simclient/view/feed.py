@@ -5,10 +5,11 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping
 
-from ..bag import stamps_s
+from ..bag import Array, stamps_s
 from ..bag.states import StateSample
 from ..ros.cdr import Layout
 from .scene import Scene
+from .series import Gaps
 
 
 class Feed:
@@ -25,6 +26,7 @@ class Feed:
         self._state_topic, self._read_state = state_topic, read_state
         self._waiting: dict[str, list[bytes]] = {topic: [] for topic in layouts}
         self._states: list[bytes] = []
+        self._gaps = {topic: Gaps() for topic in layouts}
         self.refused = 0
         #: Time of the last output shown, in s; 0 before the first one.
         self.now_s = 0.0
@@ -42,7 +44,8 @@ class Feed:
             self.refused += 1
 
     def flush(self) -> None:
-        """Shows the buffered messages: outputs first, so that the vehicle's position at a transition is known."""
+        """Shows the buffered messages, with gaps where messages are missing."""
+        values: dict[str, tuple[Array, dict[str, Array]]] = {}
         for topic, waiting in self._waiting.items():
             if not waiting:
                 continue
@@ -50,7 +53,7 @@ class Feed:
             waiting.clear()
             t_s = stamps_s(rows)
             self.now_s = max(self.now_s, float(t_s[-1]))
-            self._scene.outputs(topic, t_s, {name: rows[name] for name in rows.dtype.names or ()})
-        if self._states:
-            self._scene.states([self._read_state(data) for data in self._states])
-            self._states.clear()
+            columns = {name: rows[name] for name in rows.dtype.names or ()}
+            values[topic] = self._gaps[topic].insert(t_s, columns.get("tick", t_s), columns, "health")
+        self._scene.show(values, [self._read_state(data) for data in self._states])
+        self._states.clear()

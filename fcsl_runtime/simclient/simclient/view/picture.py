@@ -1,13 +1,14 @@
 # SPDX-License-Identifier: Apache-2.0
-"""One picture of a run: the output of `python -m simclient.plot`.
+"""One picture of a run: the output of `python -m simclient.plot`. panels.py chooses what is drawn.
 
-It shows altitude, velocity and throttle if the vehicle has them, and roll, pitch and yaw if it has attitudes; otherwise
-every output. Background colours are the states of the machine; values of stale instances are left out.
+Background colours are the states of the machine. Curves have gaps where the instance did not run, and where ticks are
+missing in the bag.
 """
 
 from __future__ import annotations
 
 import io
+import textwrap
 from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
@@ -18,182 +19,68 @@ import numpy as np
 
 from ..bag import Array, Bag
 from ..cli import complete_or_absent
-from ..errors import BagError
-from .signals import ALTITUDE, STATUS_FIELDS, THROTTLE, VELOCITY
-from .summary import ANGLES, RunSummary, Source, euler_deg, read_summary, thinned
+from ..errors import BagError, ViewError
+from .panels import Choice, Curve, Panel, choose_by_paths, choose_by_views, choose_default, demand, label_of
+from .recorded import RecordedRun, Rows, Span, curve
+from .series import newest, thinned
+from .signals import HEALTH
+from .styles import Style, styles
+from .views import Views
 
 matplotlib.use("Agg")
 from matplotlib import pyplot  # noqa: E402  the backend must be chosen first
+from matplotlib.patches import Patch  # noqa: E402
 
 SUFFIXES = (".png", ".svg", ".pdf")
-MAX_PANELS = 8
+_WIDTH_IN, _PANEL_IN, _HEAD_IN = 12.0, 2.1, 1.2
 _POINTS = 4000
 _DPI = 120
-_TRUTH_COLOUR = "black"
-#: Line colours (Okabe-Ito, distinguishable with colour blindness) and paler ones for states.
-LINE_COLOURS = ("#0072B2", "#D55E00", "#009E73", "#CC79A7", "#E69F00", "#56B4E9", "#7F7F7F")
-STATE_COLOURS = ("#DCEBF7", "#E3F3DC", "#FCEBD2", "#F8D9DC", "#E8E0F2", "#F4F1C9", "#E3E3E3")
+_STATE_COLOURS = ("#DCEBF7", "#E3F3DC", "#FCEBD2", "#F8D9DC", "#E8E0F2", "#F4F1C9", "#E3E3E3")
+#: A state's name is written above its band if the band has this share of the width, for each letter.
+_SHARE_PER_LETTER = 0.011
+_LABEL_LETTERS, _LABEL_LINES = 26, 3
 
 
 @dataclass(frozen=True, eq=False)
 class Line:
+    """A curve to draw: x and values of shape (N,), NaN in gaps; the role decides how it looks."""
+
     label: str
-    t_s: Array
+    x: Array
     values: Array
-    truth: bool = False
-    raw: bool = False
+    role: str = "values"
+    steps: bool = False
 
 
-@dataclass(frozen=True)
-class Panel:
-    """One set of axes; `title` is its y label."""
+def plot(
+    bag: str | Path | Bag,
+    output: str | Path,
+    machine: str = "",
+    truth: str = "",
+    *,
+    paths: Sequence[str] = (),
+    views: Views | None = None,
+    against: str = "",
+) -> list[str]:
+    """Writes the picture of a run to `output` (.png, .svg or .pdf), complete or not at all.
 
-    title: str
-    lines: tuple[Line, ...]
-
-
-def _line(source: Source, field: str, raw: bool) -> Line:
-    label = f"{source.name} (truth)" if source.truth else f"{source.name}.{field}"
-    return Line(label, source.t_s, source.running(field), source.truth, raw)
-
-
-def _vehicle_panels(summary: RunSummary) -> list[Panel]:
-    """Altitude, velocity, throttle."""
-    panels = []
-    for title, names in (("altitude, m", ALTITUDE), ("velocity, m/s", VELOCITY), ("throttle", THROTTLE)):
-        found = summary.named(names)
-        lines = tuple(_line(source, field, source.name == summary.raw) for source, field in found)
-        if lines:
-            panels.append(Panel(title, lines))
-    return panels
-
-
-def _attitude_panels(summary: RunSummary) -> list[Panel]:
-    found = [
-        (source, euler_deg(np.stack([source.fields[name][:, i] for i in range(4)], axis=1)), name)
-        for source, name in summary.quaternions()
-    ]
-    if not found:
-        return []
-    return [
-        Panel(f"{title}, deg", tuple(Line(f"{s.name}.{name}", s.t_s, unjoined(a[:, i])) for s, a, name in found))
-        for i, title in enumerate(ANGLES)
-    ]
-
-
-def unjoined(angles_deg: Array) -> Array:
-    """The angles with a gap where they wrap, so that no line is drawn across."""
-    angles = angles_deg.copy()
-    angles[1:][np.abs(np.diff(angles_deg)) > 180.0] = np.nan
-    return angles
-
-
-def _other_panels(summary: RunSummary) -> list[Panel]:
-    """One panel per output name, arrays by element; the first MAX_PANELS."""
-    panels: dict[str, list[Line]] = {}
-    for source in summary.sources:
-        for name, values in source.fields.items():
-            if name in STATUS_FIELDS:
-                continue
-            running = source.running(name)
-            columns = [("", running)] if values.ndim == 1 else [(f"[{i}]", c) for i, c in enumerate(running.T)]
-            title = f"{name}, {source.units[name]}" if name in source.units else name
-            panels.setdefault(title, []).extend(
-                Line(f"{source.name}.{name}{index}", source.t_s, column) for index, column in columns
-            )
-    return [Panel(name, tuple(lines)) for name, lines in list(panels.items())[:MAX_PANELS]]
-
-
-def choose_panels(summary: RunSummary) -> list[Panel]:
-    """The panels of a run. Raises BagError if it has no outputs."""
-    panels = _vehicle_panels(summary) + _attitude_panels(summary)
-    panels = panels or _other_panels(summary)
-    if not panels:
-        raise BagError(f"machine `{summary.machine.name}` recorded no outputs to plot")
-    return panels
-
-
-def _draw_states(axes: Sequence[Any], summary: RunSummary, colours: dict[str, str]) -> None:
-    for span in summary.spans:
-        for axis in axes:
-            axis.axvspan(span.start_s, span.end_s, color=colours[span.state], linewidth=0, zorder=0)
-    whole = summary.spans[-1].end_s - summary.spans[0].start_s
-    for i, span in enumerate(summary.spans):
-        if i:
-            for axis in axes:
-                axis.axvline(span.start_s, color="#888888", linewidth=0.6, zorder=1)
-        if span.end_s - span.start_s > 0.04 * whole:
-            axes[0].text(
-                (span.start_s + span.end_s) / 2,
-                1.03,
-                span.state,
-                transform=axes[0].get_xaxis_transform(),
-                ha="center",
-                fontsize=8,
-                color="#444444",
-            )
-
-
-def draw_panel(axis: Any, panel: Panel) -> None:
-    """Draws the lines of a panel, truth on top."""
-    plain = [line for line in panel.lines if not line.truth and not line.raw]
-    for line in panel.lines:
-        t_s, values = thinned(line.t_s, line.values, _POINTS)
-        if np.isnan(values).all():
-            continue
-        if line.truth:
-            axis.plot(t_s, values, color=_TRUTH_COLOUR, linewidth=1.6, label=line.label, zorder=4)
-        elif line.raw:
-            axis.plot(t_s, values, ".", color="#AAAAAA", markersize=1.6, label=line.label, zorder=2)
-        else:
-            # Later lines are thinner, so that coinciding lines stay visible.
-            place = plain.index(line)
-            width = 1.1 + (1.0 * (len(plain) - 1 - place) if len(plain) <= 4 else 0.0)
-            colour = LINE_COLOURS[place % len(LINE_COLOURS)]
-            axis.plot(t_s, values, color=colour, linewidth=width, label=line.label, zorder=5)
-    axis.set_ylabel(panel.title)
-    axis.grid(True, color="white", linewidth=0.8)
-    axis.legend(loc="best", fontsize=8, framealpha=0.85)
-    axis.margins(x=0)
-
-
-def new_figure(panels: int, title: str) -> tuple[Any, list[Any]]:
-    """A matplotlib figure with one set of axes per panel, one above the other, over the same time."""
-    figure, grid = pyplot.subplots(
-        panels, 1, sharex=True, squeeze=False, figsize=(11, 1.2 + 2.3 * panels), layout="constrained"
-    )
-    axes = list(grid[:, 0])
-    axes[-1].set_xlabel("time, s")
-    figure.align_ylabels(axes)
-    figure.suptitle(title, fontsize=11)
-    return figure, axes
-
-
-def draw(summary: RunSummary, title: str) -> Any:
-    """The matplotlib figure of a run."""
-    panels = choose_panels(summary)
-    figure, axes = new_figure(len(panels), title)
-    colours = {state: STATE_COLOURS[i % len(STATE_COLOURS)] for i, state in enumerate(summary.states)}
-    if summary.spans:
-        _draw_states(axes, summary, colours)
-    for axis, panel in zip(axes, panels, strict=True):
-        draw_panel(axis, panel)
-    return figure
-
-
-def plot(bag: str | Path | Bag, output: str | Path, machine: str = "", truth: str = "") -> None:
-    """Writes the picture of a run to `output` (.png, .svg or .pdf), complete or not at all. Raises BagError."""
+    It has a panel for each of `paths`, else those of `views` or of the bag's own, else one for each name and unit.
+    `against` is the path of the horizontal axis, instead of time. Returns what is left out. Raises BagError and ViewError.
+    """
     if Path(output).suffix.lower() not in SUFFIXES:
         raise BagError(f"{output}: the name of a picture ends in {', '.join(SUFFIXES)}")
     opened = bag if isinstance(bag, Bag) else Bag(bag)
-    summary = read_summary(opened, machine, truth)
-    duration = summary.spans[-1].end_s - summary.spans[0].start_s if summary.spans else 0.0
+    run = RecordedRun(opened, machine, truth, foreign=any(path.startswith("/") for path in (*paths, against)))
+    chosen = choose(run, paths, views)
+    duration = run.spans[-1].end_s - run.spans[0].start_s if run.spans else 0.0
+    what = [run.name, f"{duration:.2f} s"] if run.machine else []
     cut = " (incomplete)" if opened.truncated else ""
-    figure = draw(summary, f"{summary.machine.name}, {duration:.2f} s: {opened.path.name}{cut}")
+    figure = draw(run, chosen, f"{', '.join(what)}{': ' if what else ''}{opened.path.name}{cut}", against)
     try:
         save(figure, output)
     finally:
         pyplot.close(figure)
+    return chosen.left_out
 
 
 def save(figure: Any, output: str | Path) -> None:
@@ -205,3 +92,134 @@ def save(figure: Any, output: str | Path) -> None:
     figure.savefig(drawn, format=Path(output).suffix[1:].lower(), dpi=_DPI)
     with complete_or_absent(output) as partial:
         partial.write_bytes(drawn.getbuffer())
+
+
+def choose(run: RecordedRun, paths: Sequence[str] = (), views: Views | None = None) -> Choice:
+    """The panels of a picture. Raises ViewError if nothing of a run can be drawn."""
+    remark = ""
+    if views is None and not paths:
+        views, remark = run.views()
+    if paths:
+        chosen = choose_by_paths(paths, run.catalogue)
+    elif views is not None and views.panels:
+        chosen = choose_by_views(views.panels, run.catalogue)
+    else:
+        chosen = choose_default(run.catalogue)
+    chosen.left_out += filter(None, [remark])
+    if not chosen.panels:
+        why = f": {', '.join(chosen.left_out)}" if chosen.left_out else ""
+        raise ViewError(f"{run.bag.path}: nothing to draw{why}; name the paths of what to draw")
+    return chosen
+
+
+def draw(run: RecordedRun, chosen: Choice, title: str, against: str = "") -> Any:
+    """The matplotlib figure of a run. Raises BagError and ViewError."""
+    axis_curve = _axis_curve(run, against) if against else None
+    curves = [c for panel in chosen.panels for c in panel.curves] + ([axis_curve] if axis_curve else [])
+    rows = run.read(c.value for c in curves)
+    figure, axes = new_figure(len(chosen.panels), title, _axis_label(axis_curve))
+    if axis_curve is None and run.spans:
+        _draw_states(figure, axes, run.spans, run.states)
+    across = curve(rows, axis_curve) if axis_curve else None
+    for axis, panel in zip(axes, chosen.panels, strict=True):
+        lines = [_line(rows, c, across) for c in panel.curves]
+        draw_panel(axis, panel.name, lines, panel.missing)
+        _name_values(axis, panel, run.states)
+    return figure
+
+
+def _axis_curve(run: RecordedRun, path: str) -> Curve:
+    """The value of the horizontal axis. Raises ViewError if the path selects more than one number."""
+    found = [(value, place, element) for value in demand(path, run.catalogue) for place, element in value.elements()]
+    if len(found) != 1:
+        raise ViewError(f"--against: `{path}` selects {len(found)} numbers; choose one of them, like {found[0][1]}")
+    ((value, place, element),) = found
+    return Curve(value, element, None, "values", label_of(place))
+
+
+def _axis_label(wanted: Curve | None) -> str:
+    if wanted is None:
+        return "time, s"
+    return ", ".join(filter(None, (wanted.label, wanted.value.unit)))
+
+
+def _line(rows: dict[str, Rows], wanted: Curve, across: tuple[Array, Array] | None) -> Line:
+    t_s, values = curve(rows, wanted)
+    if across is None:
+        t_s, values = thinned(t_s, values, _POINTS)
+        return Line(wanted.label, t_s, values, wanted.role, wanted.steps)
+    return Line(wanted.label, newest(*across, t_s), values, wanted.role)
+
+
+# ---- drawing -------------------------------------------------------------------------------------------------------
+
+
+def new_figure(panels: int, title: str, horizontal: str = "time, s") -> tuple[Any, list[Any]]:
+    """A matplotlib figure with one set of axes per panel, one above the other, over the same horizontal axis."""
+    size = (_WIDTH_IN, _HEAD_IN + _PANEL_IN * panels)
+    figure, grid = pyplot.subplots(panels, 1, sharex=True, squeeze=False, figsize=size, layout="constrained")
+    axes = list(grid[:, 0])
+    axes[-1].set_xlabel(horizontal)
+    figure.align_ylabels(axes)
+    figure.suptitle(title, fontsize=11)
+    return figure, axes
+
+
+def draw_panel(axis: Any, name: str, lines: Sequence[Line], missing: Sequence[str] = ()) -> None:
+    """Draws the lines of a panel, truth on top, with a legend beside it. `missing`: remarks in the legend."""
+    for line, style in zip(lines, styles([line.role for line in lines]), strict=True):
+        _draw_line(axis, line, style)
+    for remark in missing:
+        axis.plot([], [], " ", label=remark)
+    axis.set_ylabel("\n".join(textwrap.wrap(name, _LABEL_LETTERS, max_lines=_LABEL_LINES)))
+    axis.grid(True, color="#D8D8D8", linewidth=0.6)
+    axis.set_axisbelow(True)
+    axis.legend(loc="upper left", bbox_to_anchor=(1.0, 1.0), fontsize=8, frameon=False)
+    axis.margins(x=0)
+
+
+def _draw_line(axis: Any, line: Line, style: Style) -> None:
+    known = np.isfinite(line.values) & np.isfinite(line.x)
+    if not known.any():
+        axis.plot([], [], " ", label=f"{line.label}: no values")
+        return
+    look: dict[str, Any] = {"color": style.colour, "zorder": style.order}
+    if style.dots:
+        axis.plot(line.x, line.values, ".", markersize=2.0, label=line.label, **look)
+        return
+    if line.steps:
+        look["drawstyle"] = "steps-post"
+    dashes = (0, (4, 2)) if style.dashed else "-"
+    axis.plot(line.x, line.values, linewidth=style.width, linestyle=dashes, label=line.label, **look)
+    alone = known & ~np.r_[False, known[:-1]] & ~np.r_[known[1:], False]  # a line would not show them
+    if alone.any():
+        axis.plot(line.x[alone], line.values[alone], ".", markersize=4, color=style.colour, zorder=style.order)
+
+
+def _name_values(axis: Any, panel: Panel, states: Sequence[str]) -> None:
+    """Names instead of numbers on the vertical axis of healths, and of states."""
+    fields = {(c.value.signals.part, c.value.field) for c in panel.curves}
+    names = (
+        {("outputs", "health"): HEALTH, ("", "state"): states}.get(next(iter(fields)), ()) if len(fields) == 1 else ()
+    )
+    if names:
+        axis.set_yticks(range(len(names)), names)
+        axis.set_ylim(-0.3, len(names) - 0.7)
+
+
+def _draw_states(figure: Any, axes: Sequence[Any], spans: Sequence[Span], states: Sequence[str]) -> None:
+    """A band behind all panels for each visit, and the state's name above it, or in a legend where there is no room."""
+    colours = {state: _STATE_COLOURS[i % len(_STATE_COLOURS)] for i, state in enumerate(states)}
+    ranges = [(span.start_s, span.end_s - span.start_s) for span in spans]
+    for axis in axes:
+        across = axis.get_xaxis_transform()
+        axis.broken_barh(ranges, (0, 1), transform=across, facecolors=[colours[s.state] for s in spans], zorder=0)
+        axis.vlines([span.start_s for span in spans[1:]], 0, 1, "#888888", transform=across, linewidth=0.6, zorder=1)
+    whole = spans[-1].end_s - spans[0].start_s
+    wide = [s for s in spans if s.end_s - s.start_s > whole * _SHARE_PER_LETTER * len(s.state)]
+    for span in wide:
+        middle, above = (span.start_s + span.end_s) / 2, axes[0].get_xaxis_transform()
+        axes[0].text(middle, 1.03, span.state, transform=above, ha="center", fontsize=8, color="#444444")
+    if {span.state for span in wide} != set(states):
+        patches = [Patch(facecolor=colours[state], edgecolor="#888888", label=state) for state in states]
+        figure.legend(handles=patches, loc="outside lower left", ncols=8, fontsize=8, frameon=False, title="states")

@@ -6,21 +6,21 @@ from __future__ import annotations
 import os
 import shutil
 import threading
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator
 from contextlib import contextmanager
 from pathlib import Path
 
 import rerun as rr
 
-from ..bag import Bag, RecordedMachine, has_stamps, stacks
-from ..bag.states import StateReader, visits
+from ..bag import Bag
+from ..bag.states import StateReader
 from ..cli import Progress, complete_or_absent
 from ..errors import BagError
-from ..ros.cdr import Layout
 from .blueprint import Plan
 from .feed import Feed
+from .recorded import MACHINE, RecordedRun
 from .scene import Cast, Scene
-from .signals import Signals, signals_of
+from .views import Views
 from .world import World
 
 #: Messages shown in one batch; bounds the memory.
@@ -29,36 +29,36 @@ _MESSAGES = 100_000
 _PIECE_BYTES = 1 << 20
 
 
-def to_rerun(bag: str | Path | Bag, output: str | Path, machine: str = "", truth: str = "") -> None:
-    """Writes the run to `output`, complete or not at all. Raises BagError.
+def to_rerun(
+    bag: str | Path | Bag, output: str | Path, machine: str = "", truth: str = "", *, views: Views | None = None
+) -> list[str]:
+    """Writes the run to `output`, complete or not at all. Returns what is left out. Raises BagError.
 
     `machine` selects one of several; `truth` is the plant's topic, by default every topic below /<namespace>/sim/.
+    `views` takes the place of the bag's own.
     """
     opened = bag if isinstance(bag, Bag) else Bag(bag)
-    recorded = opened.machine(machine)
-    plant = _plant_topics(opened, recorded, truth)
-    outputs = {topic: topic.rsplit("/", 1)[-1] for topic in [*plant, *recorded.outputs.values()]}
-    inside = {topic: name for name, topic in recorded.fields.items()}
-    layouts = {topic: _layout(opened, topic) for topic in [*outputs, *inside]}
-    there = visits(opened, recorded)
-    if not layouts:
-        raise BagError(f"{opened.path}: machine `{recorded.name}` recorded nothing to show")
-
-    def described(names: Mapping[str, str]) -> list[Signals]:
-        return [signals_of(n, t, t in plant, layouts[t], opened.topic(t).schema) for t, n in names.items()]
-
-    states = list(dict.fromkeys(visit.state for visit in there))
-    cast = Cast(recorded.prefix, described(outputs), states, described(inside))
+    run = RecordedRun(opened, machine, truth)
+    assert run.machine is not None
+    signals = [its for its in run.signals if its.name != MACHINE]
+    if not signals:
+        raise BagError(f"{opened.path}: machine `{run.name}` recorded nothing to show")
+    views, remark = (views, "") if views is not None else run.views()
+    outputs = [its for its in signals if its.part == "outputs"]
+    inside = [its for its in signals if its.part != "outputs"]
+    cast = Cast(run.machine.prefix, outputs, run.states, inside, views, remark)
+    layouts = {its.topic: opened.fixed_layout(its.topic) for its in signals}
     rr.set_strict_mode(True)  # otherwise rerun logs invalid data and writes the rest
     with complete_or_absent(output) as partial:
-        stream = rr.RecordingStream(f"fcsl_{recorded.name}", recording_id=opened.path.name)
+        stream = rr.RecordingStream(f"fcsl_{run.name}", recording_id=opened.path.name)
         with _saved(stream, partial):
             scene = Scene(stream, cast)
-            span = there[0].start_ns * 1e-9, there[-1].end_ns * 1e-9
+            span = run.spans[0].start_s, run.spans[-1].end_s
             # Before the data: otherwise a viewer that shows the file while loading would use a default layout.
-            stream.send_blueprint(Plan(cast, scene.world, span, _reach(opened, scene.world)).blueprint())
-            _play(opened, Feed(scene, layouts, recorded.state, StateReader(opened, recorded.state).read))
+            stream.send_blueprint(Plan(cast, scene.world, span, _reach(run, scene.world)).blueprint())
+            _play(opened, Feed(scene, layouts, run.machine.state, StateReader(opened, run.machine.state).read))
             scene.until(span[1])
+    return scene.left_out
 
 
 @contextmanager
@@ -93,29 +93,10 @@ def _copy(receiving: int, file: Path, failed: list[OSError]) -> None:
                 pass
 
 
-def _plant_topics(bag: Bag, machine: RecordedMachine, truth: str) -> list[str]:
-    if truth:
-        return [bag.topic(truth).name]
-    prefix = machine.prefix.rsplit("/", 1)[0] + "/sim/"
-    layouts = {topic: bag.layout(topic) for topic in bag.topics if topic.startswith(prefix)}
-    return [topic for topic, layout in layouts.items() if layout is not None and has_stamps(layout)]
-
-
-def _layout(bag: Bag, topic: str) -> Layout:
-    layout = bag.layout(topic)
-    if layout is None or not has_stamps(layout):
-        raise BagError(
-            f"{bag.path}: topic `{topic}` [{bag.topic(topic).type}] cannot be shown: no header or no fixed size"
-        )
-    return layout
-
-
-def _reach(bag: Bag, world: World) -> float:
+def _reach(run: RecordedRun, world: World) -> float:
     """The largest height or distance of the vehicle, in m."""
-    if not world.guide:
-        return 0.0
-    return max((world.reach({n: rows[n] for n in rows.dtype.names or ()}) for _, rows in stacks(bag, [world.guide])),
-               default=0.0)  # fmt: skip
+    rows = run.read(world.places) if world.places else {}
+    return world.reach({topic: (its.t_s, its.fields) for topic, its in rows.items()})
 
 
 def _play(bag: Bag, feed: Feed) -> None:

@@ -11,13 +11,15 @@ Entities have the names of the topics. Their timeline is `sim_time`, the stamps:
     /<ns>/<machine>/telemetry               a log of the receiver: sessions, gaps
     /<ns>/sim/<instance>/<output>           the plant's truth
     /world/…                                the vehicle in 3D (world.py)
-Values of a stale instance are left out, because they are old. Lines and lanes have a gap where values are unknown.
+A quaternion that a panel shows as angles has roll_deg, pitch_deg and yaw_deg below it. Values of a stale instance are
+left out, because they are old. Lines and lanes have a gap where values are unknown.
 """
 
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
+from functools import cached_property
 
 import numpy as np
 import rerun as rr
@@ -25,28 +27,22 @@ import rerun as rr
 from ..bag import Array
 from ..bag.states import StateSample
 from .lines import TIMELINE, send_lines, times
-from .signals import HEALTH, STALE, UNKNOWN, Signals, quaternions, raw_instance
-from .summary import ANGLES, euler_deg
-from .world import World
+from .panels import Choice, choose_by_views, choose_default
+from .rotation import ANGLES, euler_deg, unjoined
+from .series import newest
+from .signals import HEALTH, PARTS_OF_A_RUN, STALE, UNKNOWN, Catalogue, Signals, Value
+from .styles import COLOURS, rgba
+from .views import Views
+from .world import Batch, World
 
 _STATE_COLOURS = (0x4C8FD0FF, 0x6FB560FF, 0xE39A3BFF, 0x9A7FC4FF, 0xB8AC3EFF, 0xD9606BFF, 0x5FB8B8FF, 0xC08A5AFF)
 _HEALTH_COLOURS = (0x3FA65AFF, 0xE3B341FF, 0xE5484DFF, 0x55595FFF)
 _HEALTH_LEVELS = ("INFO", "WARN", "ERROR")
-_TRUTH_COLOUR = [225, 45, 70, 255]
-_RAW_COLOUR = [130, 130, 140, 160]
 _STEP_COLOUR = [160, 170, 190, 255]
 _MARKER_COLOUR = [255, 210, 80, 255]
-#: Distinguishable with colour blindness (after Okabe and Ito), on dark and light backgrounds; likewise the truth's
-#: colour.
-LINE_COLOURS = (
-    [86, 180, 233, 255],
-    [230, 159, 0, 255],
-    [0, 190, 140, 255],
-    [230, 120, 180, 255],
-    [205, 185, 30, 255],
-    [213, 94, 0, 255],
-    [120, 140, 255, 255],
-)
+#: Width of lines outside of panels.
+_WIDTH = 1.5
+STEP_AFTER = rr.components.InterpolationMode.StepAfter
 _NS = 1_000_000_000
 
 
@@ -55,12 +51,26 @@ class Cast:
     """The shown topics of a run: the machine's begin with `prefix`; `states` are in the order of their colours.
 
     `signals` are outputs of instances and the plant; `inside` are their other values: `nav.inputs`, `nav.state`.
+    `views` is what the run chooses for its pictures; `remark` says why it is not used, if it is not valid.
     """
 
     prefix: str
     signals: Sequence[Signals]
     states: Sequence[str]
     inside: Sequence[Signals] = ()
+    views: Views | None = None
+    remark: str = ""
+
+    @cached_property
+    def catalogue(self) -> Catalogue:
+        return Catalogue([*self.signals, *self.inside])
+
+    @cached_property
+    def choice(self) -> Choice:
+        """The panels of the first page."""
+        if self.views is not None and self.views.panels:
+            return choose_by_views(self.views.panels, self.catalogue)
+        return choose_default(self.catalogue)
 
     @property
     def instances(self) -> list[Signals]:
@@ -71,9 +81,9 @@ class Cast:
         return [signals for signals in self.signals if signals.truth]
 
 
-def angle_entity(signals: Signals, name: str, angle: str) -> str:
-    """The entity of an Euler angle of the quaternion `name`; angles are easier to read than elements."""
-    return f"{signals.topic}/{name}/{angle}_deg"
+def angle_entity(value: Value, angle: int) -> str:
+    """The entity of an angle (index of ANGLES) of a quaternion."""
+    return f"{value.signals.topic}/{value.name}/{ANGLES[angle]}_deg"
 
 
 @dataclass
@@ -85,6 +95,8 @@ class _Logged:
     lane: str = ""
     transitions: int = 0
     health: dict[str, int] = field(default_factory=dict)
+    #: The newest angles, by entity.
+    angles: dict[str, float] = field(default_factory=dict)
 
 
 class Scene:
@@ -95,29 +107,35 @@ class Scene:
         self._stream = stream
         self._logged = _Logged()
         self._by_topic = {signals.topic: signals for signals in (*cast.signals, *cast.inside)}
-        self._quaternions = {(s.topic, name) for s, name in quaternions(cast.signals)}
-        self._raw = raw_instance(cast.signals)
-        #: Topics whose `health` is that of the instance and not an ordinary value.
-        self._healthy = {signals.topic for signals in cast.instances}
-        self._numbers = {signals.name: number for number, signals in enumerate(cast.instances)}
-        self.world = World(stream, cast.signals, lambda signals: self._line_style(signals)[0])
+        #: Quaternions that panels show as angles, by topic.
+        self._quaternions: dict[str, dict[str, Value]] = {}
+        for curve in (c for panel in cast.choice.panels for c in panel.curves if c.angle is not None):
+            self._quaternions.setdefault(curve.value.signals.topic, {})[curve.value.path] = curve.value
+        #: Times and staleness of each instance: the newest of the last batch, and this batch.
+        self._stale: dict[str, tuple[Array, Array]] = {}
+        self.world = World(stream, cast.views.body if cast.views else None, cast.catalogue)
         self._set_up()
+
+    @property
+    def left_out(self) -> list[str]:
+        """What of the run's views is not shown, and why."""
+        chosen = self.cast.choice.left_out if self.cast.views is not None and self.cast.views.panels else []
+        return list(dict.fromkeys([*filter(None, [self.cast.remark]), *chosen, *self.world.remarks]))
 
     # ---- static data -----------------------------------------------------------------------------------------
 
     def _set_up(self) -> None:
         for signals in self._by_topic.values():
             for name, size in signals.sizes.items():
-                if name != "health" or signals.topic not in self._healthy:
+                if not signals.is_health(name):
                     self._style_lines(signals, name, size)
         prefix, states = self.cast.prefix, list(self.cast.states)
         colours = np.resize(np.array(_STATE_COLOURS, dtype=np.uint32), len(states))
         self._static(f"{prefix}/state", rr.StateConfiguration(values=states, colors=colours))
         legend = ", ".join(f"{number} {state}" for number, state in enumerate(states))
-        step = rr.components.InterpolationMode.StepAfter
         self._static(
             f"{prefix}/state/step",
-            rr.SeriesLines(names=[legend], colors=[_STEP_COLOUR], widths=[2.0], interpolation_mode=step),
+            rr.SeriesLines(names=[legend], colors=[_STEP_COLOUR], widths=[2.0], interpolation_mode=STEP_AFTER),
         )
         self._static(
             f"{prefix}/transitions/marker",
@@ -128,55 +146,63 @@ class Scene:
             self._static(f"{signals.topic}/health", health)
 
     def _style_lines(self, signals: Signals, name: str, size: int) -> None:
-        colour, width = self._line_style(signals)
+        """How a field looks where a user draws it outside of the panels."""
         label = f"{signals.name}.{name}"
         unit = f", {signals.units[name]}" if name in signals.units else ""
-        lines = max(1, size)
         names = [f"{label}[{i}]{unit}" for i in range(size)] or [label + unit]
-        colours = [LINE_COLOURS[i % len(LINE_COLOURS)] for i in range(size)] or [colour]
-        self._static(f"{signals.topic}/{name}", rr.SeriesLines(names=names, colors=colours, widths=[width] * lines))
-        for angle in ANGLES if (signals.topic, name) in self._quaternions else ():
-            look = rr.SeriesLines(names=[label], colors=[colour], widths=[width])
-            self._static(angle_entity(signals, name, angle), look)
-
-    def _line_style(self, signals: Signals) -> tuple[list[int], float]:
-        """Colour (RGBA) and width of lines. Truth is drawn last, thin, so that what it covers stays visible."""
-        if signals.truth:
-            return _TRUTH_COLOUR, 1.0
-        if signals.name == self._raw:
-            return _RAW_COLOUR, 1.0
-        # Inner values of an instance have its colour.
-        number = self._numbers.get(signals.name.partition(".")[0], 0)
-        return LINE_COLOURS[number % len(LINE_COLOURS)], 2.5
+        colours = [rgba(COLOURS[i % len(COLOURS)]) for i in range(max(1, size))]
+        mode = STEP_AFTER if name in signals.steps else None
+        look = rr.SeriesLines(names=names, colors=colours, widths=[_WIDTH] * len(names), interpolation_mode=mode)
+        self._static(f"{signals.topic}/{name}", look)
 
     def _static(self, entity: str, archetype: rr.AsComponents) -> None:
         self._stream.log(entity, archetype, static=True)
 
     # ---- data over time --------------------------------------------------------------------------------------
 
-    def outputs(self, topic: str, t_s: Array, columns: Mapping[str, Array]) -> None:
-        """Logs values of a topic at the times t_s, float64 of shape (N,); its fields of shape (N,) or (N, count).
+    def show(self, values: Batch, samples: Sequence[StateSample] = ()) -> None:
+        """Logs values by topic at their times, and changes of the machine's state.
 
-        In rows without known values, numbers are NaN and `health` is negative.
+        In rows without known values, numbers are NaN and the health of an instance is negative.
         """
+        for topic, (t_s, columns) in values.items():
+            signals = self._by_topic[topic]
+            if signals.is_health("health") and "health" in columns:
+                self._remember(signals, t_s, columns["health"])
+                self._health(signals, t_s, columns["health"])
+        shown = {topic: (t_s, self._lines(topic, t_s, columns)) for topic, (t_s, columns) in values.items()}
+        # Before the states, so that the vehicle's position at a transition is known.
+        self.world.move(shown)
+        self._states(samples)
+
+    def _remember(self, signals: Signals, t_s: Array, health: Array) -> None:
+        before_s, before = self._stale.get(signals.owner, (np.empty(0), np.empty(0, dtype=bool)))
+        self._stale[signals.owner] = np.r_[before_s[-1:], t_s], np.r_[before[-1:], health == STALE]
+
+    def _lines(self, topic: str, t_s: Array, columns: Mapping[str, Array]) -> dict[str, Array]:
+        """Logs the lines of a topic; returns their values, with NaN where the instance was stale."""
         signals = self._by_topic[topic]
-        health = columns.get("health") if topic in self._healthy else None
-        stale = None if health is None else health == STALE
+        stale = self._stale.get(signals.owner) if signals.part in PARTS_OF_A_RUN and not signals.truth else None
+        is_old = newest(*stale, t_s) == 1.0 if stale is not None else None
         shown: dict[str, Array] = {}
-        lines: dict[str, Array] = {}
         for name in signals.sizes:
-            if name == "health" and health is not None:
-                self._health(signals, t_s, health)
+            if signals.is_health(name):
                 continue
             shown[name] = values = columns[name].astype(np.float64)
-            if stale is not None:
-                values[stale] = np.nan
-            lines[f"{topic}/{name}"] = values
-            if (topic, name) in self._quaternions:
-                angles = euler_deg(values).T
-                lines |= {angle_entity(signals, name, a): angles[i] for i, a in enumerate(ANGLES)}
+            if is_old is not None:
+                values[is_old] = np.nan
+        lines = {f"{topic}/{name}": values for name, values in shown.items()}
+        for value in self._quaternions.get(topic, {}).values():
+            angles = euler_deg(shown[value.field][:, value.first : value.first + value.lines]).T
+            lines |= {angle_entity(value, i): self._unjoined(angle_entity(value, i), a) for i, a in enumerate(angles)}
         send_lines(self._stream, t_s, lines)
-        self.world.move(signals, t_s, shown)
+        return shown
+
+    def _unjoined(self, entity: str, angles_deg: Array) -> Array:
+        """`unjoined` behind the last angle of the batch before."""
+        last = self._logged.angles.get(entity, np.nan)
+        self._logged.angles[entity] = float(angles_deg[-1]) if len(angles_deg) else last
+        return unjoined(np.r_[last, angles_deg])[1:]
 
     def _health(self, signals: Signals, t_s: Array, health: Array) -> None:
         """Logs changes only: all as lanes; changes to worse healths and recoveries also as a log."""
@@ -197,7 +223,7 @@ class Scene:
             last = now
         self._logged.health[signals.topic] = last
 
-    def states(self, samples: Sequence[StateSample]) -> None:
+    def _states(self, samples: Sequence[StateSample]) -> None:
         """Logs changes of the machine's state; the first one as the start.
 
         An empty state ends the lane: unknown from here on.

@@ -211,9 +211,8 @@ def _object(value: Any, where: str, known: tuple[str, ...]) -> Mapping[str, Any]
         raise ViewError(f"{where}: not an object with {', '.join(known)}")
     for key in value:
         if key not in known:
-            raise ViewError(
-                f"{where}: no key `{key[:80]}`{did_you_mean(key[:80], known)}; there are {', '.join(known)}"
-            )
+            named = key[:80] if key[:80].isprintable() else ascii(key[:80])
+            raise ViewError(f"{where}: no key `{named}`{did_you_mean(named, known)}; there are {', '.join(known)}")
     return value
 
 
