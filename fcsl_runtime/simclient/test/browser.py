@@ -106,7 +106,11 @@ def browsing(folder: Path) -> Iterator[Page]:
     command = ["bash", "-c", redirect, "bash", CHROMIUM, *_FLAGS, f"--user-data-dir={folder}", "about:blank"]
     with open(folder / "output.txt", "w") as output:
         browser = subprocess.Popen(
-            command, pass_fds=(commands_out, answers_in), stdout=output, stderr=output, env={**os.environ, "HOME": str(folder)}
+            command,
+            pass_fds=(commands_out, answers_in),
+            stdout=output,
+            stderr=output,
+            env={**os.environ, "HOME": str(folder)},
         )
     for end in (commands_out, answers_in):
         os.close(end)

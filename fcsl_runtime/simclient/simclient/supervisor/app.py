@@ -5,7 +5,7 @@ from __future__ import annotations
 
 import json
 import time
-from collections.abc import Callable, Iterable
+from collections.abc import Callable, Iterable, Sequence
 from concurrent.futures import ThreadPoolExecutor
 from contextlib import AbstractAsyncContextManager
 from typing import Any
@@ -138,12 +138,16 @@ class _Routes:
 
     async def stream(self, request: Request) -> Response:
         name, paths, angles = request_parameters.stream(request_parameters.query(request, "run", "path", "angles"))
-        run = None if name is None else await anyio.to_thread.run_sync(self._runs.get, name)
-        feed = None if run is None else ValueFeed(run, paths, angles)
         self._streams.check()
+        feed = None if name is None else await anyio.to_thread.run_sync(self._feed, name, paths, angles)
         if request.method == "HEAD":
             return Response(media_type=EventStream.media_type)
         return EventStream(self._streams, request.scope["state"][CONNECTION], feed)
+
+    def _feed(self, name: str, paths: Sequence[str], angles: Sequence[str]) -> ValueFeed:
+        feed = ValueFeed(self._runs.get(name), paths, angles)
+        feed.check()
+        return feed
 
     def _run(self, request: Request) -> Run:
         return self._runs.get(request.path_params["id"])

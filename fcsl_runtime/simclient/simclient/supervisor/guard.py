@@ -69,4 +69,6 @@ class Guard:
 
 def _follows_a_link(method: str, headers: Headers) -> bool:
     """Whether the browser shows the answer as a page of its own, which the page with the link cannot read."""
-    return method == "GET" and headers.get("sec-fetch-mode") == "navigate" and headers.get("sec-fetch-dest") == "document"
+    return (
+        method == "GET" and headers.get("sec-fetch-mode") == "navigate" and headers.get("sec-fetch-dest") == "document"
+    )

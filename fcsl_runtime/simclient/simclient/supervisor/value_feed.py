@@ -6,6 +6,7 @@ from __future__ import annotations
 import json
 import math
 from collections.abc import Iterator, Sequence
+from contextlib import suppress
 from typing import Any
 
 import numpy as np
@@ -37,6 +38,11 @@ class ValueFeed:
         self._turned: list[Selection] = []
         self._last: Window | None = None
         self._state = -1
+
+    def check(self) -> None:
+        """Raises HttpError if telemetry does not send a path, as far as its configuration is known."""
+        with suppress(TwinError):
+            self._choose(self._run.telemetry.machine)
 
     def update(self) -> bytes | None:
         """The JSON of the ticks since the last update; first those that are kept. None if there are none.
@@ -122,7 +128,9 @@ class ValueFeed:
         if len(rows) > STREAM_POINTS:
             rows = rows[np.linspace(0, len(rows) - 1, STREAM_POINTS).astype(int)]
         names = window.machine.states
-        found = ((time_s, int(numbers[row])) for time_s, row in zip(window.time_s[rows].round(9).tolist(), rows, strict=True))
+        found = (
+            (time_s, int(numbers[row])) for time_s, row in zip(window.time_s[rows].round(9).tolist(), rows, strict=True)
+        )
         return [(time_s, names[number] if number < len(names) else "") for time_s, number in found]
 
 

@@ -86,10 +86,10 @@ def cut(telemetry: Telemetry, paths: Sequence[str], ticks: int) -> Cut:
 
 
 def channels(telemetry: Telemetry) -> dict[str, Any]:
-    """What is sent: the rate, and type, shape and unit by path. Raises HttpError."""
+    """What is sent: the rate, and type, shape, unit and names of the values 0, 1, ... by path. Raises HttpError."""
     sent = _configuration(telemetry)
     described = {
-        path: {"type": channel.type, "shape": channel.shape, "unit": channel.unit}
+        path: {"type": channel.type, "shape": channel.shape, "unit": channel.unit, "labels": channel.labels}
         for path, channel in sent.channels.items()
     }
     return {"machine": sent.machine.name, "tick_hz": sent.machine.tick_hz, "every": sent.every, "channels": described}

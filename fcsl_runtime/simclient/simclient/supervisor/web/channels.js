@@ -14,10 +14,10 @@ function indices(shape) {
 /** Every number of these channels, as curves; of very many, the first. */
 export function numbersOf(channels) {
   const found = [];
-  for (const [path, { shape, unit }] of Object.entries(channels)) {
+  for (const [path, { shape, unit, labels }] of Object.entries(channels)) {
     for (const index of indices(shape)) {
       if (found.length === NUMBERS_MAX) return found;
-      found.push({ name: path + index, unit, role: "values" });
+      found.push({ name: path + index, unit, labels, role: "values" });
     }
   }
   return found;
@@ -45,6 +45,6 @@ function angles(panel, numbers) {
   const sent = paths(panel).filter(([, path]) => numbers.some(({ name }) => name === `${path}[3]`));
   return ANGLES.map((angle) => ({
     title: `${panel.title ?? ""}: ${angle}`,
-    curves: sent.map(([role, path]) => ({ name: `${path}.${angle}`, unit: "deg", role, quaternion: path })),
+    curves: sent.map(([role, path]) => ({ name: `${path}.${angle}`, unit: "deg", labels: [], role, quaternion: path })),
   }));
 }

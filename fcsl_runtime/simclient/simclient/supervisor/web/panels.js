@@ -51,7 +51,7 @@ class Panel {
     drawCurves(this.canvas, series, this.curves, from, to);
     for (const curve of this.curves) {
       const value = series.columns.get(curve.name)?.at(-1) ?? null;
-      curve.value.textContent = value === null ? "–" : Number(value.toPrecision(6)).toString();
+      curve.value.textContent = value === null ? "–" : curve.labels[value] ?? Number(value.toPrecision(6)).toString();
     }
   }
 }
