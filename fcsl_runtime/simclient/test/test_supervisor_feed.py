@@ -107,10 +107,11 @@ def test_ticks_that_are_missing_are_gaps() -> None:
 
 
 def test_old_and_unknown_values_are_left_out() -> None:
-    feed = configured("nav.outputs.x", "nav.parameters.k")
+    feed = configured("nav.outputs.x", "nav.parameters.k", "nav.outputs.health")
     update = feed.fly(49, 50, 59, 60, 69, 70)
     assert update["values"]["nav.outputs.x"] == [49.0, None, 59.0, None, None, 70.0]
     assert update["values"]["nav.parameters.k"] == [7.0] * 6  # no execute sets it
+    assert update["values"]["nav.outputs.health"] == [NOMINAL, NOMINAL, NOMINAL, STALE, STALE, NOMINAL]
 
 
 def test_states_come_when_they_change() -> None:

@@ -26,6 +26,8 @@ from .windows import fields_below, unknown_path
 _STATE = "machine.state"
 _STALE = HEALTH_NAMES.index("stale")
 _QUATERNION = (4,)
+#: Roles of the fields that an instance leaves as they were while it is stale; its health says so itself.
+_EXECUTE_SETS = ("input", "output", "state")
 
 
 class ValueFeed:
@@ -141,7 +143,8 @@ def _health(leaf: Selection) -> str:
 def _values(window: Window, leaf: Selection) -> Array:
     """float64 of shape (rows, scalars), NaN where the instance was stale: then its values are old."""
     numbers = window.numbers(leaf.field.path)[:, leaf.element : leaf.element + leaf.count].astype(np.float64)
-    if leaf.field.role != "parameter" and _health(leaf) in window.machine.fields:
+    sets = leaf.field.role in _EXECUTE_SETS and leaf.field.type != "Health"
+    if sets and _health(leaf) in window.machine.fields:
         numbers[window.numbers(_health(leaf))[:, 0] == _STALE] = np.nan
     return numbers
 

@@ -106,7 +106,10 @@ function follow() {
   view.open(id === "" ? null : id);
 }
 
-startForm($("start"), (run) => (location.hash = run.id), showError);
+startForm($("start"), (run) => {
+  $("starting").open = false;
+  location.hash = run.id;
+}, showError);
 window.addEventListener("hashchange", follow);
 follow();
 watch();

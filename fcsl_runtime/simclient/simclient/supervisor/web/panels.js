@@ -13,6 +13,16 @@ export function element(tag, properties = {}, ...children) {
   return found;
 }
 
+/** A value with 5 digits, or its name; a request that is none has an empty one. */
+function shortest(value, labels) {
+  return labels.length > value && value >= 0 ? labels[value] || "–" : Number(value.toPrecision(5)).toString();
+}
+
+/** A path, which a narrow legend breaks after its dots. */
+function breakable(path) {
+  return path.split(/(?<=\.)/).flatMap((part) => [part, document.createElement("wbr")]);
+}
+
 class Panel {
   constructor(title, unit, onRemove) {
     this.title = title;
@@ -37,7 +47,7 @@ class Panel {
     const remove = element("button", { className: "remove", type: "button", textContent: "×", onclick: onRemove });
     remove.setAttribute("aria-label", `remove ${curve.name}`);
     const row = element("li", {}, swatch,
-      element("span", { className: "name", textContent: curve.name, title: curve.role }), value, remove);
+      element("span", { className: "name", title: curve.role }, ...breakable(curve.name)), value, remove);
     this.legend.append(row);
     this.curves.push({ ...curve, color, value, row });
   }
@@ -51,7 +61,7 @@ class Panel {
     drawCurves(this.canvas, series, this.curves, from, to);
     for (const curve of this.curves) {
       const value = series.columns.get(curve.name)?.at(-1) ?? null;
-      curve.value.textContent = value === null ? "–" : curve.labels[value] ?? Number(value.toPrecision(6)).toString();
+      curve.value.textContent = value === null ? "–" : shortest(value, curve.labels);
     }
   }
 }

@@ -10,6 +10,7 @@ import { Series } from "./series.js";
 
 const LISTED_MAX = 200, CURVES_MAX = 64;
 const RATE_S = 3;
+const NO_TELEMETRY = 409;
 
 const $ = (id) => document.getElementById(id);
 
@@ -61,7 +62,7 @@ export class RunView {
     try {
       await this.#describe(id);
     } catch (error) {
-      if (this.id === id) this.onError(error);
+      if (this.id === id && error.status !== NO_TELEMETRY) this.onError(error);
     }
   }
 

@@ -68,8 +68,7 @@ export class RunTable {
     const link = element("a", { href: `#${id}` });
     row.append(element("td", {}, link));
     for (let index = 1; index < 8; index++) row.append(element("td"));
-    row.cells[3].className = "time";
-    row.cells[7].className = "number";
+    row.cells[2].className = row.cells[4].className = "long";
     row.append(element("td", {}, stop));
     this.#rows.set(id, row);
     this.body.prepend(row);  // the newest first
