@@ -172,6 +172,27 @@ def test_views_are_shown_without_a_choice(page: Page, supervisor: Supervisor, li
     supervisor.ask("DELETE", f"/runs/{run}")
 
 
+def test_points_that_come_again_replace_those_that_are_there(page: Page) -> None:
+    """As another choice of values makes them come, or a checkpoint that puts the machine back."""
+    update = {"session": "1", "first": True, "breaks": [], "states": [[0, "RUN"]]}
+    updates = json.dumps([
+        {**update, "time_s": [0, 1, 2], "values": {"a": [0, 1, 2]}},
+        {**update, "time_s": [1, 2, 3], "values": {"a": [10, 20, 30], "b": [5, 6, 7]}, "states": [[1, "RUN"]]},
+        {**update, "time_s": [2.5], "values": {"b": [8]}, "states": [[2.5, "WAIT"]]},
+        {**update, "time_s": [9, 10], "values": {"b": [1, 2]}, "states": [[9, "WAIT"]], "breaks": [1]},
+    ])  # fmt: skip
+    found = page.run(
+        f"import('/series.js').then(({{ Series }}) => {{ const series = new Series(); {updates}.forEach((one) =>"
+        " series.add(one)); return [series.time, [...series.columns], series.gap, series.states]; })"
+    )
+    assert found == [
+        [0, 1, 2, 2.5, 9, 10],
+        [["a", [0, 10, 20, None, None, None]], ["b", [None, 5, 6, 8, 1, 2]]],
+        [False, False, False, False, True, True],
+        [[0, "RUN"], [2.5, "WAIT"]],
+    ]
+
+
 def test_a_token_is_asked_for(browser: Page, root: Path, library: str, tmp_path: Path) -> None:
     with supervising(root, "--token", str(tmp_path / "token")) as supervisor:
         browser.open(f"http://127.0.0.1:{supervisor.port}/")
