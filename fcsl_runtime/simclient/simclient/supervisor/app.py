@@ -138,7 +138,6 @@ class _Routes:
 
     async def stream(self, request: Request) -> Response:
         name, paths, angles = request_parameters.stream(request_parameters.query(request, "run", "path", "angles"))
-        self._streams.check()
         feed = None if name is None else await anyio.to_thread.run_sync(self._feed, name, paths, angles)
         if request.method == "HEAD":
             return Response(media_type=EventStream.media_type)

@@ -4,9 +4,10 @@
 from __future__ import annotations
 
 import asyncio
+import contextlib
 import json
 import time
-from collections.abc import AsyncIterator, Callable
+from collections.abc import AsyncIterator, Callable, Iterator
 from typing import Any, Protocol
 
 import anyio
@@ -42,10 +43,16 @@ class Streams:
         self._refreshing: asyncio.Task[None] | None = None
         self._summary: tuple[int, bytes] = (0, b"")
 
-    def check(self) -> None:
-        """Raises HttpError if there can be no other."""
+    @contextlib.contextmanager
+    def one(self) -> Iterator[None]:
+        """While a stream is open. Raises HttpError if there can be no other."""
         if self.open >= STREAMS:
             raise HttpError(503, "too_many_clients", f"{STREAMS} streams at a time, and all are in use", "close a page")
+        self.open += 1
+        try:
+            yield
+        finally:
+            self.open -= 1
 
     def newer_summary(self, known: int) -> tuple[int, bytes]:
         """Number and JSON of the newest summary, empty if `known` is its number. Begins the next one when it is due."""
@@ -64,7 +71,10 @@ class Streams:
 
 
 class EventStream(StreamingResponse):
-    """A stream without end. A reader that is slow gets fewer updates; one that takes nothing is dropped."""
+    """A stream without end, refused if there are too many.
+
+    A reader that is slow gets fewer updates; one that takes nothing is dropped.
+    """
 
     media_type = "text/event-stream"
 
@@ -74,12 +84,9 @@ class EventStream(StreamingResponse):
         self._streams, self._connection, self._feed = streams, connection, feed
 
     async def __call__(self, scope: Scope, receive: Receive, send: Send) -> None:
-        self._streams.open += 1
-        try:
+        with self._streams.one():
             self._connection.begin_stream()
             await super().__call__(scope, receive, send)
-        finally:
-            self._streams.open -= 1
 
     async def stream_response(self, send: Send) -> None:
         async def send_in_time(message: Any) -> None:

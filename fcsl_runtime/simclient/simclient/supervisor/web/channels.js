@@ -23,7 +23,7 @@ export function numbersOf(channels) {
   return found;
 }
 
-/** Titles and curves of a machine's views. A member that is not as docs/ describe it, and a path that is not sent, is left out. */
+/** Titles and curves of a machine's views. Paths that are not sent are left out, and members of another form. */
 export function panelsOf(views, numbers) {
   const panels = Array.isArray(views?.panels) ? views.panels : [];
   return panels.flatMap((panel) => (panel?.angles === true ? angles(panel, numbers) : [values(panel, numbers)]))

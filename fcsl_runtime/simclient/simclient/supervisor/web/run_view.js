@@ -16,6 +16,7 @@ const $ = (id) => document.getElementById(id);
 
 export class RunView {
   id = null;
+  status = "";
   #numbers = [];
   #series = new Series();
   #arrivals = [];  // of updates, ms
@@ -48,6 +49,7 @@ export class RunView {
   /** Shows a run, or none (null). */
   async open(id) {
     this.id = id;
+    this.status = "";
     this.#numbers = [];
     this.#series = new Series();
     this.#arrivals = [];
@@ -73,7 +75,7 @@ export class RunView {
     $("title").textContent = `Run ${id}: ${run.kind} ${run.file}`;
     $("log").textContent = run.log.join("\n");
     const sent = await ask("GET", `${at}/channels`);
-    if (this.id !== id) return;
+    if (this.id !== id || this.#numbers.length > 0) return;
     this.#numbers = numbersOf(sent.channels);
     for (const { title, curves } of panelsOf(run.views, this.#numbers)) {
       if (this.panels.curves.length + curves.length <= CURVES_MAX) this.panels.open(title, curves);
@@ -87,7 +89,7 @@ export class RunView {
       element("li", {}, `${name}: `, element("span", { className: healthClass(health), textContent: health })));
     $("instances").replaceChildren(...found);
     if (this.#numbers.length === 0 && run.status === "running") this.#describe(this.id).catch(() => {});
-    if (run.status === "ended" && run.status !== this.status) this.refresh();
+    if (run.status !== "ended" || run.status !== this.status) this.refresh();
     this.status = run.status;
     this.#rate();
   }
@@ -98,7 +100,8 @@ export class RunView {
     if (id === null || !$("printed").open) return;
     try {
       const { log } = await ask("GET", `/runs/${encodeURIComponent(id)}`);
-      if (this.id === id) $("log").textContent = log.join("\n");
+      const text = log.join("\n");
+      if (this.id === id && $("log").textContent !== text) $("log").textContent = text;  // keeps what is selected in it
     } catch (error) {
       this.onError(error);
     }
