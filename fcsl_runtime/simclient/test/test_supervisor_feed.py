@@ -97,6 +97,20 @@ def test_many_ticks_are_few_points_with_every_extreme_and_the_newest_value() -> 
     assert STREAM_POINTS < len(feed.fly(*range(5000))["time_s"]) <= STREAM_FIRST_POINTS
 
 
+def test_the_size_of_an_update_is_bounded() -> None:
+    """However many ticks came, with numbers as long as they can be."""
+
+    @dataclass(frozen=True)
+    class Wide(Sender):
+        def values(self, sequence: int) -> list[list[float]]:  # type: ignore[override]
+            return [[-math.pi * 1e-300 * (1 + sequence % 97)] * STREAM_VALUES]
+
+    feed = configured("wide.outputs.v", sender=Wide(channels=(Channel("wide.outputs.v", 6, (STREAM_VALUES,)),)))
+    for sequences, most in ((range(3000), 2_500_000), (range(3000, 6000), 65_000)):
+        size = len(json.dumps(feed.fly(*sequences), separators=(",", ":")))
+        assert most / 3 < size < most
+
+
 def test_ticks_that_are_missing_are_gaps() -> None:
     feed = configured("nav.outputs.x")
     assert feed.fly(0, 1, 4, 5)["breaks"] == [2]

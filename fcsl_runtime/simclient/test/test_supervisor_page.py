@@ -24,7 +24,7 @@ pytestmark = pytest.mark.skipif(CHROMIUM is None, reason="no chromium here; the 
 #: What a run can bring into the page that would be HTML, were it not text.
 HOSTILE = "<img src=x onerror=alert(1)><script>alert(2)</script>"
 #: Updates per second that a busy machine may show, of 10.
-RATE_MIN, RATE_MAX = 4.0, 14.0
+RATE_MIN, RATE_MAX = 2.0, 14.0
 #: Seconds that the newest drawn tick of a busy machine may be behind the flight.
 BEHIND_MAX_S = 3.0
 
@@ -170,6 +170,27 @@ def test_views_are_shown_without_a_choice(page: Page, supervisor: Supervisor, li
     page.click(".panel figcaption button")
     page.wait("document.querySelectorAll('.panel').length === 0 && !document.querySelector('#hint').hidden")
     supervisor.ask("DELETE", f"/runs/{run}")
+
+
+def test_views_of_attitudes_are_three_panels(page: Page) -> None:
+    channels = json.dumps({"body.outputs.q": {"shape": [4], "unit": "", "labels": []},
+                           "nav.outputs.pose.q": {"shape": [4], "unit": "", "labels": []},
+                           "nav.outputs.short": {"shape": [3], "unit": "", "labels": []}})  # fmt: skip
+    panel = {
+        "title": "attitude",
+        "angles": True,
+        "truth": ["body.outputs.q"],
+        "estimate": ["nav.outputs.pose.q", "nav.outputs.short"],
+    }
+    found = page.run(
+        f"import('/channels.js').then(({{ numbersOf, panelsOf }}) => panelsOf({json.dumps({'panels': [panel]})},"
+        f" numbersOf({channels})))"
+    )
+    assert [one["title"] for one in found] == ["attitude: roll", "attitude: pitch", "attitude: yaw"]
+    assert [(curve["name"], curve["role"], curve["quaternion"]) for curve in found[2]["curves"]] == [
+        ("body.outputs.q.yaw", "truth", "body.outputs.q"),
+        ("nav.outputs.pose.q.yaw", "estimate", "nav.outputs.pose.q"),
+    ]
 
 
 def test_points_that_come_again_replace_those_that_are_there(page: Page) -> None:

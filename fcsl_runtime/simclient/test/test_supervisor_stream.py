@@ -181,6 +181,17 @@ def test_a_reader_that_takes_nothing_is_dropped(root: Path, library: str) -> Non
         assert metric(supervisor, "fcsl_streams") == 0
 
 
+def test_a_reader_that_is_gone_before_the_answer_is_no_error(root: Path, capfd: pytest.CaptureFixture[str]) -> None:
+    slow = "import time; from simclient.supervisor import app; app._Routes._feed = lambda *_: time.sleep(0.5)"
+    with supervising(root, patch=slow) as supervisor:
+        with socket.create_connection((supervisor.address, supervisor.port)) as reader:
+            reader.sendall(f"GET /stream?run=1 HTTP/1.1\r\nHost: 127.0.0.1:{supervisor.port}\r\n\r\n".encode())
+        with streaming(supervisor, "?run=1") as stream:  # its answer begins later
+            stream.next("runs")
+        assert supervisor.stop() == 0
+    assert "Traceback" not in capfd.readouterr().err
+
+
 def test_the_page_is_for_everybody_and_shows_nothing_without_the_token(root: Path, tmp_path: Path) -> None:
     with supervising(root, "--token", str(tmp_path / "token")) as supervisor:
         for path in page.FILES:

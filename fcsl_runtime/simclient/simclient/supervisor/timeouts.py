@@ -41,6 +41,8 @@ class TimedProtocol(H11Protocol):
 
     def begin_stream(self) -> None:
         """Lifts the limit for the response. A write then waits until the kernel has taken the one before."""
+        if self.transport.is_closing():  # the client has left
+            return
         self._streams = True
         for limit in self._limits:
             limit.cancel()
