@@ -5,7 +5,7 @@ from __future__ import annotations
 
 import json
 import time
-from collections.abc import Callable, Iterable
+from collections.abc import Callable, Iterable, Sequence
 from concurrent.futures import ThreadPoolExecutor
 from contextlib import AbstractAsyncContextManager
 from typing import Any
@@ -15,20 +15,29 @@ from starlette.applications import Starlette
 from starlette.exceptions import HTTPException
 from starlette.middleware import Middleware
 from starlette.requests import Request
-from starlette.responses import HTMLResponse, Response
+from starlette.responses import Response
 from starlette.routing import Route
 from starlette.types import ASGIApp, Receive, Scope, Send
 
 from ..errors import TwinError, ViewError
 from ..vars.show import jsonable
 from ..view.views import parse_views
-from . import metrics, request_parameters, run_status
+from . import metrics, page, request_parameters, run_status
 from .guard import Guard
 from .http_error import HttpError
 from .limits import CONNECTIONS, HEAD_BYTES
-from .page import SECURITY_POLICY, page
 from .runs import STATUSES, Run, Runs
-from .windows import ARROW, cut
+from .stream import CONNECTION, EventStream, Streams
+from .value_feed import ValueFeed
+from .windows import ARROW, channels, cut
+
+#: On every answer. Pages of other origins can neither read nor embed one.
+_HEADERS = (
+    (b"x-content-type-options", b"nosniff"),
+    (b"cache-control", b"no-store"),
+    (b"cross-origin-resource-policy", b"same-origin"),
+    (b"referrer-policy", b"no-referrer"),
+)
 
 
 class Json(Response):
@@ -45,7 +54,7 @@ def make_app(runs: Runs, guard: Guard, lifespan: Callable[[Starlette], AbstractA
     on = _Routes(runs)
     return Starlette(
         routes=[
-            Route("/", on.home),
+            *(Route(path, on.page) for path in page.FILES),
             Route("/health", on.health),
             Route("/metrics", on.metrics),
             Route("/runs", on.list),
@@ -53,8 +62,10 @@ def make_app(runs: Runs, guard: Guard, lifespan: Callable[[Starlette], AbstractA
             Route("/runs/{id}", on.show),
             Route("/runs/{id}", on.stop, methods=["DELETE"]),
             Route("/runs/{id}/health", on.run_health),
+            Route("/runs/{id}/channels", on.channels),
             Route("/runs/{id}/values", on.values),
             Route("/runs/{id}/windows", on.window),
+            Route("/stream", on.stream),
         ],
         middleware=[Middleware(_Guarded, guard=guard)],
         exception_handlers={HttpError: _refused, HTTPException: _http_refused, Exception: _broken},
@@ -70,11 +81,11 @@ class _Routes:
         self._begun = time.monotonic()
         #: Starts and stops wait for a long time, so they use separate threads and block no other request.
         self._waiting = anyio.CapacityLimiter(CONNECTIONS)
+        self._streams = Streams(lambda: self._of_all(_summary))
 
-    def home(self, request: Request) -> Response:
+    def page(self, request: Request) -> Response:
         request_parameters.query(request)
-        rows = self._of_all(lambda run: (run.as_json(), run_status.health(run)))
-        return HTMLResponse(page(rows), headers={"content-security-policy": SECURITY_POLICY})
+        return page.answer(request.url.path)
 
     def health(self, request: Request) -> Response:
         request_parameters.query(request)
@@ -84,7 +95,8 @@ class _Routes:
 
     def metrics(self, request: Request) -> Response:
         request_parameters.query(request)
-        return Response(metrics.text(self._of_all(metrics.see)), headers={"content-type": metrics.CONTENT_TYPE})
+        found = metrics.text(self._of_all(metrics.see), self._streams)
+        return Response(found, headers={"content-type": metrics.CONTENT_TYPE})
 
     def list(self, request: Request) -> Response:
         request_parameters.query(request)
@@ -110,6 +122,10 @@ class _Routes:
         found = run_status.health(self._run(request))
         return Json(found, 200 if found["ok"] else 503)
 
+    def channels(self, request: Request) -> Response:
+        request_parameters.query(request)
+        return Json(channels(self._run(request).telemetry))
+
     def values(self, request: Request) -> Response:
         return Json(
             run_status.values(self._run(request), request_parameters.paths(request_parameters.query(request, "path")))
@@ -120,6 +136,18 @@ class _Routes:
         given = request_parameters.query(request, "path", "ticks")
         found = cut(self._run(request).telemetry, request_parameters.paths(given), request_parameters.ticks(given))
         return Response(found.as_arrow(), media_type=ARROW) if wants_arrow else Json(found.as_json())
+
+    async def stream(self, request: Request) -> Response:
+        name, paths, angles = request_parameters.stream(request_parameters.query(request, "run", "path", "angles"))
+        feed = None if name is None else await anyio.to_thread.run_sync(self._feed, name, paths, angles)
+        if request.method == "HEAD":
+            return Response(media_type=EventStream.media_type)
+        return EventStream(self._streams, request.scope["state"][CONNECTION], feed)
+
+    def _feed(self, name: str, paths: Sequence[str], angles: Sequence[str]) -> ValueFeed:
+        feed = ValueFeed(self._runs.get(name), paths, angles)
+        feed.check()
+        return feed
 
     def _run(self, request: Request) -> Run:
         return self._runs.get(request.path_params["id"])
@@ -152,16 +180,12 @@ class _Guarded:
 
         async def send_with_headers(message: Any) -> None:
             if message["type"] == "http.response.start":
-                message["headers"] = [
-                    *message["headers"],
-                    (b"x-content-type-options", b"nosniff"),
-                    (b"cache-control", b"no-store"),
-                ]
+                message["headers"] = [*message["headers"], *_HEADERS]
             await send(message)
 
         try:
             _bound_head(scope)
-            self._guard.check(scope["method"], _single(scope["headers"]))
+            self._guard.check(scope["method"], _single(scope["headers"]), scope["path"] in page.FILES)
         except HttpError as error:
             await _answer(error)(scope, receive, send_with_headers)
             return
@@ -208,6 +232,13 @@ def _views(text: str) -> dict[str, Any] | None:
         return None
     found: dict[str, Any] = json.loads(text)
     return found
+
+
+def _summary(run: Run) -> dict[str, Any]:
+    """A run for the list of all: without what may be long. Never raises."""
+    health = run_status.health(run)
+    found = run.as_json()
+    return {**{name: found[name] for name in ("id", "kind", "file", "status", "started", "exit")}, "health": health}
 
 
 async def too_many(scope: Scope, receive: Receive, send: Send) -> None:

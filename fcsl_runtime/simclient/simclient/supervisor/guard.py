@@ -13,6 +13,9 @@ from .http_error import HttpError
 #: Header names are in lower case; each header occurs at most once.
 Headers = Mapping[str, str]
 
+#: Values of Sec-Fetch-Site, which browsers add: the request comes from a page of another origin.
+_ELSEWHERE = ("cross-site", "same-site")
+
 
 @dataclass(frozen=True)
 class Guard:
@@ -22,15 +25,17 @@ class Guard:
     port: int
     token: str
 
-    def check(self, method: str, headers: Headers) -> None:
-        """Raises HttpError."""
+    def check(self, method: str, headers: Headers, is_public: bool = False) -> None:
+        """Raises HttpError. `is_public`: the answer is the same for everybody, so it needs no token."""
         host = headers.get("host", "")
         if not self._own(host):
             raise HttpError(403, "bad_host", f"Host {host[:80]!r} is not this service", f"use http://{self.shown}/")
         origin = headers.get("origin")
         if origin is not None and origin.lower() != f"http://{host.lower()}":
             raise HttpError(403, "bad_origin", f"Origin {origin[:80]!r}: pages of another origin have no access")
-        if self.token:
+        if headers.get("sec-fetch-site") in _ELSEWHERE and not _follows_a_link(method, headers):
+            raise HttpError(403, "bad_origin", "pages of another origin have no access")
+        if self.token and not is_public:
             scheme, _, token = headers.get("authorization", "").partition(" ")
             if scheme.lower() != "bearer" or not hmac.compare_digest(token.strip().encode(), self.token.encode()):
                 raise HttpError(
@@ -60,3 +65,10 @@ class Guard:
             return False
         own = ipaddress.ip_address(self.address)
         return own.is_unspecified or asked == own
+
+
+def _follows_a_link(method: str, headers: Headers) -> bool:
+    """Whether the browser shows the answer as a page of its own, which the page with the link cannot read."""
+    return (
+        method == "GET" and headers.get("sec-fetch-mode") == "navigate" and headers.get("sec-fetch-dest") == "document"
+    )

@@ -45,3 +45,19 @@ PATHS = 256
 PATH_BYTES = 1024
 #: ticks of a run's telemetry that are kept
 WINDOW_TICKS = 10_000
+#: streams at a time
+STREAMS = 8
+#: values of a stream: numbers of all its paths, three of each quaternion
+STREAM_VALUES = 64
+#: points of a value in an update, and changes of state
+STREAM_POINTS = 42
+#: points of a value in the first update of a stream
+STREAM_FIRST_POINTS = 1602
+#: seconds between two updates of a stream
+STREAM_PERIOD_S = 0.1
+#: seconds between two summaries of all runs
+SUMMARY_PERIOD_S = 1.0
+#: seconds after which a reader of a stream that takes nothing is dropped
+STREAM_STALL_S = 5.0
+#: bytes that a stream leaves in the kernel for its reader (which may keep twice as many)
+STREAM_SEND_BYTES = 64 * 1024

@@ -17,6 +17,7 @@ from ..vars.wire import VarError
 from . import run_status
 from .http_error import HttpError
 from .runs import STATUSES, Run
+from .stream import Streams
 
 CONTENT_TYPE = CONTENT_TYPE_PLAIN_0_0_4
 _RUN_LABELS = ("run", "kind")
@@ -91,22 +92,25 @@ def see(run: Run) -> Seen:
     return Seen(run, status, health, stats)
 
 
-def text(seen: Sequence[Seen]) -> bytes:
+def text(seen: Sequence[Seen], streams: Streams) -> bytes:
     """The page, in Prometheus' text format."""
     registry = CollectorRegistry(auto_describe=False)
-    registry.register(_Families(seen))
+    registry.register(_Families(seen, streams))
     return generate_latest(registry)
 
 
 class _Families(Collector):
-    def __init__(self, seen: Sequence[Seen]):
-        self._seen = seen
+    def __init__(self, seen: Sequence[Seen], streams: Streams):
+        self._seen, self._streams = seen, streams
 
     def collect(self) -> Iterator[Metric]:
         runs = GaugeMetricFamily("fcsl_runs", "Runs by status.", labels=("status",))
         for status in STATUSES:
             runs.add_metric((status,), sum(s.status == status for s in self._seen))
         yield runs
+        yield GaugeMetricFamily("fcsl_streams", "Open streams.", self._streams.open)
+        dropped = "Streams whose readers took nothing, and were dropped."
+        yield CounterMetricFamily("fcsl_streams_dropped", dropped, self._streams.dropped)
         live = [s for s in self._seen if s.status != "ended"]
         serving = [s for s in self._seen if s.stats]
         yield _gauge("up", "1: the run is running and answers.", ((s, bool(s.stats)) for s in self._seen))

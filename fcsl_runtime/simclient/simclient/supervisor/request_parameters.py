@@ -11,7 +11,7 @@ from typing import Any
 from starlette.requests import Request
 
 from .http_error import HttpError, nearest
-from .limits import BODY_BYTES, BODY_DEPTH, BODY_S, PATH_BYTES, PATHS
+from .limits import BODY_BYTES, BODY_DEPTH, BODY_S, PATH_BYTES, PATHS, STREAM_VALUES
 from .windows import ARROW
 
 JSON = "application/json"
@@ -33,12 +33,28 @@ def query(request: Request, *known: str) -> list[tuple[str, str]]:
 
 def paths(given: list[tuple[str, str]]) -> list[str]:
     """The `path` parameters: at least one, no duplicates."""
-    found = [value for name, value in given if name == "path"]
+    found = _each("path", given)
     if not 1 <= len(found) < PATHS:
         raise HttpError(400, "bad_request", f"expected 1 to {PATHS - 1} paths, not {len(found)}", "?path=...&path=...")
-    twice = [path for index, path in enumerate(found) if path in found[:index]]
+    return found
+
+
+def stream(given: list[tuple[str, str]]) -> tuple[str | None, list[str], list[str]]:
+    """The `run`, if any, its `path` parameters and its `angles`."""
+    runs, paths, angles = (_each(name, given) for name in ("run", "path", "angles"))
+    if len(runs) > 1 or not runs and (paths or angles):
+        raise HttpError(400, "bad_request", f"expected one run, not {len(runs)}", "/stream?run=ID&path=...")
+    if len(paths) + len(angles) > STREAM_VALUES:
+        raise HttpError(400, "bad_request", f"a stream has at most {STREAM_VALUES} paths")
+    return (runs[0] if runs else None), paths, angles
+
+
+def _each(wanted: str, given: list[tuple[str, str]]) -> list[str]:
+    """The values of this parameter, no duplicates."""
+    found = [value for name, value in given if name == wanted]
+    twice = [value for index, value in enumerate(found) if value in found[:index]]
     if twice:
-        raise HttpError(400, "bad_request", f"path {twice[0][:80]!r} is given twice")
+        raise HttpError(400, "bad_request", f"{wanted} {twice[0][:80]!r} is given twice")
     return found
 
 

@@ -12,6 +12,7 @@ from typing import Any
 from ..descriptor import Machine
 from ..errors import TwinError
 from ..paths import Selection, resolve
+from ..telemetry.configuration import Configuration
 from ..telemetry.receiver import Telemetry
 from ..telemetry.window import Window
 from .http_error import HttpError
@@ -74,23 +75,42 @@ def cut(telemetry: Telemetry, paths: Sequence[str], ticks: int) -> Cut:
     """The last `ticks` rows of these paths. Raises HttpError."""
     if not 1 <= ticks <= WINDOW_TICKS:
         raise HttpError(400, "bad_value", f"ticks: expected 1 to {WINDOW_TICKS}, not {ticks}")
+    machine = _configuration(telemetry).machine
     try:
-        machine = telemetry.machine
-    except TwinError as error:
-        raise HttpError(
-            409, "no_telemetry", f"no telemetry of this run: {error}".partition(";")[0], _NO_TELEMETRY
-        ) from None
-    try:
-        selected = {path: _below(path, machine) for path in paths}
+        selected = {path: fields_below(path, machine) for path in paths}
         leaves = [leaf for found in selected.values() for leaf in found.values()]
         _bound(leaves, ticks)
         return Cut(telemetry.window([leaf.field.path for leaf in leaves], ticks), selected)
     except TwinError as error:
-        hint = _NO_SLICES if any(map(_SLICE.search, paths)) else _WHAT_IS_SENT
-        raise HttpError(404, "unknown_path", str(error), hint) from None
+        raise unknown_path(error, paths) from None
 
 
-def _below(path: str, machine: Machine) -> dict[str, Selection]:
+def channels(telemetry: Telemetry) -> dict[str, Any]:
+    """What is sent: the rate, and type, shape, unit and names of the values 0, 1, ... by path. Raises HttpError."""
+    sent = _configuration(telemetry)
+    described = {
+        path: {"type": channel.type, "shape": channel.shape, "unit": channel.unit, "labels": channel.labels}
+        for path, channel in sent.channels.items()
+    }
+    return {"machine": sent.machine.name, "tick_hz": sent.machine.tick_hz, "every": sent.every, "channels": described}
+
+
+def _configuration(telemetry: Telemetry) -> Configuration:
+    try:
+        return telemetry.configuration
+    except TwinError as error:
+        raise HttpError(
+            409, "no_telemetry", f"no telemetry of this run: {error}".partition(";")[0], _NO_TELEMETRY
+        ) from None
+
+
+def unknown_path(error: TwinError, paths: Sequence[str]) -> HttpError:
+    """Of these paths telemetry does not send one."""
+    hint = _NO_SLICES if any(map(_SLICE.search, paths)) else _WHAT_IS_SENT
+    return HttpError(404, "unknown_path", str(error), hint)
+
+
+def fields_below(path: str, machine: Machine) -> dict[str, Selection]:
     """The sent fields that the variable server's `get` finds at a path, including groups such as an instance."""
     inside = [field for field in machine.fields if field.startswith((f"{path}.", f"{path}["))]
     parts = [resolve(found, machine) for found in inside or [path]]

@@ -39,7 +39,10 @@ def fields_at(machine: Machine, paths: Iterable[str]) -> list[Field]:
     """The fields at or below these paths, in the machine's order; all fields if `paths` is empty. Raises TwinError."""
     wanted: set[str] = set()
     for path in paths:
-        below = {p for p in machine.fields if p == path or p.startswith((f"{path}.", f"{path}["))}
+        if path in machine.fields:
+            wanted.add(path)
+            continue
+        below = {p for p in machine.fields if p.startswith((f"{path}.", f"{path}["))}
         wanted |= below or {leaf.field.path for leaf in resolve(path, machine).leaves()}
     return [f for p, f in machine.fields.items() if p in wanted] if wanted else list(machine.fields.values())
 
