@@ -2,8 +2,8 @@
 """Runs a machine on the robot's clock: one tick at each deadline of pacer.py, with the newest inputs.
 
 The thread that steps does all other work in the slack before the next deadline; no callback causes a tick. Stamps are
-ROS time at the deadline of a tick (ros_time.py); a change of the system clock is detected within a second. Tick numbers
-and the bag count steps: a missed deadline is not a tick.
+ROS time at the deadline of a tick (ros_time.py), in topics and in the bag; a change of the system clock is detected
+within a second. Tick numbers count steps: a missed deadline is not a tick.
 """
 
 from __future__ import annotations
@@ -48,6 +48,7 @@ class RealtimeLoop:
         """Publishes the latched topics; the first deadline is now."""
         self._time.start()
         self._stamp_ns = self._time.at(time.monotonic_ns())
+        self._hosted.run.record_time(self._stamp_ns)
         self._hosted.record()
         self._hosted.topics.publish_latched(self._stamp_ns)
         self._inputs.forget()
@@ -74,11 +75,11 @@ class RealtimeLoop:
     def _tick(self, now_ns: int) -> None:
         hosted = self._hosted
         tick, deadline = hosted.run.tick, self._pacer.begin(now_ns)
+        self._stamp_ns = self._time.at(deadline)
+        hosted.run.record_time(self._stamp_ns)
         self._inputs.poll(self._time.at(now_ns), hosted.dropouts.missing())
         hosted.run.step(1)
-        stamp_ns = self._time.at(deadline)
-        hosted.show(tick, stamp_ns)
-        self._stamp_ns = stamp_ns
+        hosted.show(tick, self._stamp_ns)
 
     def _diagnose(self) -> None:
         """Once per second, in the slack."""

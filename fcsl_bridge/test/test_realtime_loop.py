@@ -200,6 +200,10 @@ def test_stamps_are_ros_time(robot: Robot) -> None:
     now = robot.listener.node.get_clock().now().nanoseconds
     assert 0 <= now - (second * NS + nanosecond) < 60 * NS
     assert robot.end() == 0
+    bag = Bag(robot.bag)
+    recorded = {log_ns: data for topic, log_ns, data in bag.messages() if topic == "/rig/state"}
+    assert recorded[second * NS + nanosecond] == states[-1], "the bag has what was published, at its stamp"
+    assert all(now - 60 * NS < log_ns < now + 60 * NS for _, log_ns, _ in bag.messages())
 
 
 def test_outputs_hold_while_inactive_and_old_samples_are_forgotten(robot: Robot) -> None:

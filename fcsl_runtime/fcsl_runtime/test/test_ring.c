@@ -94,11 +94,11 @@ static void test_full(void)
     fcsl_record_t record;
     uint32_t pushed = 0;
     CHECK(fcsl_ring_open(&ring, 4096) == 0);
-    while (push_sized(&ring, 240, FCSL_RING_DROP_EARLIER)) {
+    while (push_sized(&ring, 224, FCSL_RING_DROP_EARLIER)) {
         pushed++;
     }
     CHECK(pushed == (4096 - 512) / 256);
-    while (push_sized(&ring, 240, FCSL_RING_DROP)) {
+    while (push_sized(&ring, 224, FCSL_RING_DROP)) {
         pushed++;
     }
     CHECK(pushed == 4096 / 256);
@@ -106,7 +106,7 @@ static void test_full(void)
     fcsl_ring_end(&ring);
     const uint8_t *out = NULL;
     for (uint32_t i = 0; i < pushed; i++) {
-        CHECK(fcsl_ring_front(&ring, &record, &out) == FCSL_RING_RECORD && record.size == 240);
+        CHECK(fcsl_ring_front(&ring, &record, &out) == FCSL_RING_RECORD && record.size == 224);
         fcsl_ring_pop(&ring);
     }
     CHECK(fcsl_ring_front(&ring, &record, &out) == FCSL_RING_ENDED);

@@ -72,6 +72,7 @@ _PROTOTYPES: dict[str, tuple[type | None, list[type]]] = {
     "fcsl_run_feed": (c_int, [ptr, c_char_p, c_size_t, c_char_p, c_uint64, c_uint64, _ERROR]),
     "fcsl_run_record": (c_int, [ptr, POINTER(CRecordOptions), _ERROR]),
     "fcsl_run_record_stop": (c_int, [ptr, _ERROR]),
+    "fcsl_run_record_time": (None, [ptr, c_uint64]),
     "fcsl_run_record_check": (c_int, [ptr, _ERROR]),
     "fcsl_run_record_dropped": (c_uint64, [ptr]),
     "fcsl_frame_capacity": (c_size_t, [POINTER(CMachine), c_int]),

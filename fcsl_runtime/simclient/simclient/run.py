@@ -305,6 +305,13 @@ class Run:
         for_children(self)
         self._check(self._lib.fcsl_run_record_stop(self.handle(), byref(self._error)))
 
+    def record_time(self, time_ns: int) -> None:
+        """Sets the time of the coming records and the stamp of their messages, in ns; call it before each tick.
+
+        Without it tick k is at k / tick_hz. For machines that tick on another clock, such as ROS time.
+        """
+        self._lib.fcsl_run_record_time(self.handle(), time_ns)
+
     def record_check(self) -> None:
         """Raises TwinError once the disk has failed. A recording that is not lossless reports this nowhere else."""
         self._check(self._lib.fcsl_run_record_check(self.handle(), byref(self._error)))

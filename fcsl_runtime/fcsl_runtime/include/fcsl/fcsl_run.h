@@ -215,6 +215,9 @@ typedef struct {
 int fcsl_run_record(fcsl_run_t *run, const fcsl_record_options_t *options, fcsl_error_t *error);
 /* Flushes, writes metadata.yaml, closes. Waits for the disk. */
 int fcsl_run_record_stop(fcsl_run_t *run, fcsl_error_t *error);
+/* The time of the coming records, and the stamp of their messages, in ns: for hosts whose ticks follow another clock, such as
+ * ROS time. They call it before each tick. Without it tick k is at k / tick_hz. It lasts beyond the recording. */
+void fcsl_run_record_time(fcsl_run_t *run, uint64_t time_ns);
 /* `lossless` of what comes from here on; nothing when nothing is being recorded. */
 void fcsl_run_record_lossless(fcsl_run_t *run, int lossless);
 /* -1 with the reason once writing has failed, 0 otherwise. A lossless recording that failed makes fcsl_run_step fail, too;

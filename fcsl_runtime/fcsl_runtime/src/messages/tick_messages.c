@@ -6,7 +6,6 @@
 
 #include "run/fault_place.h"
 #include "run/run_internal.h"
-#include "run/tick_time.h"
 
 /* The machine and the struct that a tick left. */
 typedef struct {
@@ -14,12 +13,11 @@ typedef struct {
     const uint8_t *data;
 } left_t;
 
-void fcsl_tick_message_begin(fcsl_cdr_t *cdr, const fcsl_machine_t *machine, uint64_t tick, uint8_t *bytes,
-                             size_t capacity)
+void fcsl_tick_message_begin(fcsl_cdr_t *cdr, fcsl_stamp_t stamp, uint8_t *bytes, size_t capacity)
 {
     fcsl_cdr_begin(cdr, bytes, capacity);
-    fcsl_cdr_header(cdr, fcsl_tick_time_ns(machine->tick_hz, tick));
-    fcsl_cdr_u64(cdr, tick);
+    fcsl_cdr_header(cdr, stamp.time_ns);
+    fcsl_cdr_u64(cdr, stamp.tick);
 }
 
 /* The state at `offset` of the struct, or null when its number is none (a struct that something else damaged). */
@@ -128,7 +126,7 @@ static void put_counters(const left_t *left, fcsl_cdr_t *cdr)
 }
 
 int64_t fcsl_tick_message_write(const fcsl_machine_t *machine, const uint8_t *data, fcsl_tick_message_t what,
-                                uint64_t tick, uint8_t *bytes, size_t capacity)
+                                fcsl_stamp_t stamp, uint8_t *bytes, size_t capacity)
 {
     const left_t left = {.machine = machine, .data = data};
     const fcsl_state_t *state = state_at(&left, machine->state_offset);
@@ -140,14 +138,14 @@ int64_t fcsl_tick_message_write(const fcsl_machine_t *machine, const uint8_t *da
         return 0;
     }
     fcsl_cdr_t cdr;
-    fcsl_tick_message_begin(&cdr, machine, tick, bytes, capacity);
+    fcsl_tick_message_begin(&cdr, stamp, bytes, capacity);
     switch (what) {
     case FCSL_TICK_STATE:
         fcsl_cdr_string(&cdr, state->name);
         fcsl_cdr_string(&cdr, next->name);
         break;
     case FCSL_TICK_TRANSITION:
-        put_transition(&left, tick, state, next, &cdr);
+        put_transition(&left, stamp.tick, state, next, &cdr);
         break;
     case FCSL_TICK_HEALTH:
         put_health(&left, &cdr);
@@ -165,5 +163,7 @@ int64_t fcsl_tick_message_write(const fcsl_machine_t *machine, const uint8_t *da
 int64_t fcsl_run_tick_message(const fcsl_run_t *run, fcsl_tick_message_t what, uint8_t *cdr, size_t capacity)
 {
     const uint64_t completed = fcsl_run_tick(run);
-    return fcsl_tick_message_write(run->machine, run->data, what, completed == 0 ? 0 : completed - 1u, cdr, capacity);
+    const uint64_t tick = completed == 0 ? 0 : completed - 1u;
+    const fcsl_stamp_t stamp = {.tick = tick, .time_ns = fcsl_run_tick_time_ns(run, tick)};
+    return fcsl_tick_message_write(run->machine, run->data, what, stamp, cdr, capacity);
 }

@@ -10,13 +10,18 @@
 #include "fcsl/fcsl_machine.h"
 #include "fcsl/fcsl_run.h"
 
-/* Begins a message of `tick` with the header and tick number that all of them begin with. */
-void fcsl_tick_message_begin(fcsl_cdr_t *cdr, const fcsl_machine_t *machine, uint64_t tick, uint8_t *bytes,
-                             size_t capacity);
+/* A tick and its time, in ns. */
+typedef struct {
+    uint64_t tick;
+    uint64_t time_ns;
+} fcsl_stamp_t;
 
-/* The message of `tick` from the machine struct `data` that it left. Of the struct only the current and the next state are
+/* Begins a message of a tick with the header and tick number that all of them begin with. */
+void fcsl_tick_message_begin(fcsl_cdr_t *cdr, fcsl_stamp_t stamp, uint8_t *bytes, size_t capacity);
+
+/* The message of a tick from the machine struct `data` that it left. Of the struct only the current and the next state are
  * read, and health, request and counters of each instance. Returns as fcsl_run_tick_message does. */
 int64_t fcsl_tick_message_write(const fcsl_machine_t *machine, const uint8_t *data, fcsl_tick_message_t what,
-                                uint64_t tick, uint8_t *bytes, size_t capacity);
+                                fcsl_stamp_t stamp, uint8_t *bytes, size_t capacity);
 
 #endif /* FCSL_TICK_MESSAGES_H */

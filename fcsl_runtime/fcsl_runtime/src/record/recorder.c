@@ -13,7 +13,6 @@
 #include <stdlib.h>
 
 #include "messages/schema.h"
-#include "run/tick_time.h"
 
 enum { TOPIC_BYTES = 1024, SCHEMA_BYTES_MAX = 1 << 20, RING_BYTES_MIN = 8 << 20, SCRATCH_BASE_BYTES = 4096 };
 
@@ -158,8 +157,10 @@ static int start_writer(fcsl_recorder_t *recorder, fcsl_error_t *error)
 static int prepare(fcsl_recorder_t *recorder, const fcsl_record_options_t *options, const char *name_space,
                    fcsl_error_t *error)
 {
-    recorder->bag =
-        fcsl_bag_open(options->bag, fcsl_tick_time_ns(recorder->machine->tick_hz, fcsl_run_tick(recorder->run)), error);
+    const fcsl_run_t *run = recorder->run;
+    const uint64_t start_ns =
+        run->record_time_ns == FCSL_TICK_TIME ? fcsl_run_tick_time_ns(run, fcsl_run_tick(run)) : run->record_time_ns;
+    recorder->bag = fcsl_bag_open(options->bag, start_ns, error);
     if (recorder->bag == NULL) {
         return -1;
     }

@@ -27,7 +27,7 @@ enum {
     FCSL_RECORD_WRITE,      /* fcsl_write_t (its `data` means nothing), then the data */
     FCSL_RECORD_FORCED,     /* two of const fcsl_state_t *: from, to */
     FCSL_RECORD_CHECKPOINT, /* the machine struct */
-    FCSL_RECORD_MESSAGE     /* + topic: a message as it is; `tick` of the record is its time, ns */
+    FCSL_RECORD_MESSAGE     /* + topic: a message as it is, at the record's time */
 };
 
 struct fcsl_recorder {

@@ -11,10 +11,9 @@
 enum { NEAR_BYTES = 32 };
 
 /* Room for one record, or null when there is none, which is counted. */
-static uint8_t *claim(fcsl_recorder_t *recorder, uint32_t kind, uint64_t tick, uint32_t size, fcsl_ring_policy_t policy)
+static uint8_t *claim(fcsl_recorder_t *recorder, const fcsl_record_t *record, fcsl_ring_policy_t policy)
 {
-    const fcsl_record_t record = {.tick = tick, .size = size, .kind = kind};
-    uint8_t *out = fcsl_ring_claim(&recorder->ring, &record, policy);
+    uint8_t *out = fcsl_ring_claim(&recorder->ring, record, policy);
     if (out == NULL) {
         const uint64_t count = atomic_load_explicit(&recorder->ring_full, memory_order_relaxed);
         atomic_store_explicit(&recorder->ring_full, count + 1u, memory_order_relaxed);
@@ -22,9 +21,17 @@ static uint8_t *claim(fcsl_recorder_t *recorder, uint32_t kind, uint64_t tick, u
     return out;
 }
 
+/* Room for a record of `tick`, at the time that the host gave. */
+static uint8_t *claim_tick(fcsl_recorder_t *recorder, uint32_t kind, uint64_t tick, uint32_t size,
+                           fcsl_ring_policy_t policy)
+{
+    const fcsl_record_t record = {.tick = tick, .time_ns = recorder->run->record_time_ns, .size = size, .kind = kind};
+    return claim(recorder, &record, policy);
+}
+
 void fcsl_recorder_tick(fcsl_recorder_t *recorder, uint64_t tick)
 {
-    uint8_t *out = claim(recorder, FCSL_RECORD_TICK, tick, recorder->range_bytes, recorder->tick_policy);
+    uint8_t *out = claim_tick(recorder, FCSL_RECORD_TICK, tick, recorder->range_bytes, recorder->tick_policy);
     if (out != NULL) {
         for (uint32_t i = 0; i < recorder->range_count; i++) {
             const fcsl_range_t range = recorder->ranges[i];
@@ -39,7 +46,8 @@ void fcsl_recorder_tick(fcsl_recorder_t *recorder, uint64_t tick)
 void fcsl_recorder_checkpoint(fcsl_recorder_t *recorder)
 {
     const uint32_t size = recorder->machine->size;
-    uint8_t *out = claim(recorder, FCSL_RECORD_CHECKPOINT, fcsl_run_tick(recorder->run), size, recorder->write_policy);
+    uint8_t *out =
+        claim_tick(recorder, FCSL_RECORD_CHECKPOINT, fcsl_run_tick(recorder->run), size, recorder->write_policy);
     if (out != NULL) {
         memcpy(out, recorder->run->data, size);
         fcsl_ring_publish(&recorder->ring);
@@ -49,7 +57,7 @@ void fcsl_recorder_checkpoint(fcsl_recorder_t *recorder)
 void fcsl_recorder_write(fcsl_recorder_t *recorder, uint64_t tick, const fcsl_write_t *write)
 {
     const uint32_t size = (uint32_t)sizeof *write + write->size;
-    uint8_t *out = claim(recorder, FCSL_RECORD_WRITE, tick, size, recorder->write_policy);
+    uint8_t *out = claim_tick(recorder, FCSL_RECORD_WRITE, tick, size, recorder->write_policy);
     if (out != NULL) {
         memcpy(out, write, sizeof *write);
         if (write->size > 0) {
@@ -62,7 +70,7 @@ void fcsl_recorder_write(fcsl_recorder_t *recorder, uint64_t tick, const fcsl_wr
 void fcsl_recorder_forced(fcsl_recorder_t *recorder, uint64_t tick, const fcsl_state_t *from, const fcsl_state_t *to)
 {
     const fcsl_state_t *states[] = {from, to};
-    uint8_t *out = claim(recorder, FCSL_RECORD_FORCED, tick, sizeof states, recorder->write_policy);
+    uint8_t *out = claim_tick(recorder, FCSL_RECORD_FORCED, tick, sizeof states, recorder->write_policy);
     if (out != NULL) {
         memcpy(out, states, sizeof states);
         fcsl_ring_publish(&recorder->ring);
@@ -82,7 +90,8 @@ int fcsl_recorder_message(fcsl_recorder_t *recorder, int topic, uint64_t time_ns
     if (fcsl_recorder_check(recorder, error) != 0) {
         return -1;
     }
-    uint8_t *out = claim(recorder, FCSL_RECORD_MESSAGE + (uint32_t)topic, time_ns, size, recorder->tick_policy);
+    const fcsl_record_t record = {.time_ns = time_ns, .size = size, .kind = FCSL_RECORD_MESSAGE + (uint32_t)topic};
+    uint8_t *out = claim(recorder, &record, recorder->tick_policy);
     if (out != NULL) {
         memcpy(out, cdr, size);
         fcsl_ring_publish(&recorder->ring);

@@ -19,26 +19,26 @@ static int put(fcsl_recorder_t *recorder, uint32_t topic, uint64_t time_ns, cons
 }
 
 /* Opens a message in the scratch with the header and tick that all of them begin with. */
-static fcsl_cdr_t begin(fcsl_recorder_t *recorder, uint64_t tick)
+static fcsl_cdr_t begin(fcsl_recorder_t *recorder, fcsl_stamp_t stamp)
 {
     fcsl_cdr_t cdr;
-    fcsl_tick_message_begin(&cdr, recorder->machine, tick, recorder->scratch, recorder->scratch_size);
+    fcsl_tick_message_begin(&cdr, stamp, recorder->scratch, recorder->scratch_size);
     return cdr;
 }
 
-static int end(fcsl_recorder_t *recorder, uint32_t topic, uint64_t tick, const fcsl_cdr_t *cdr)
+static int end(fcsl_recorder_t *recorder, uint32_t topic, fcsl_stamp_t stamp, const fcsl_cdr_t *cdr)
 {
     const size_t size = fcsl_cdr_end(cdr);
     if (size == 0) {
-        return fcsl_fail(&recorder->failure, "a message of tick %" PRIu64 " is too large", tick);
+        return fcsl_fail(&recorder->failure, "a message of tick %" PRIu64 " is too large", stamp.tick);
     }
-    return put(recorder, topic, fcsl_tick_time_ns(recorder->machine->tick_hz, tick), recorder->scratch, size);
+    return put(recorder, topic, stamp.time_ns, recorder->scratch, size);
 }
 
-static int put_checkpoint(fcsl_recorder_t *recorder, uint64_t tick, const uint8_t *data)
+static int put_checkpoint(fcsl_recorder_t *recorder, fcsl_stamp_t stamp, const uint8_t *data)
 {
     const fcsl_machine_t *machine = recorder->machine;
-    fcsl_cdr_t cdr = begin(recorder, tick);
+    fcsl_cdr_t cdr = begin(recorder, stamp);
     fcsl_cdr_string(&cdr, machine->name);
     fcsl_cdr_string(&cdr, machine->source_hash);
     fcsl_cdr_string(&cdr, machine->layout_hash);
@@ -47,14 +47,14 @@ static int put_checkpoint(fcsl_recorder_t *recorder, uint64_t tick, const uint8_
     if (bytes != NULL) {
         fcsl_copy_canonical(machine, bytes, data);
     }
-    return end(recorder, FCSL_TOPIC_CHECKPOINT, tick, &cdr);
+    return end(recorder, FCSL_TOPIC_CHECKPOINT, stamp, &cdr);
 }
 
-static int put_write(fcsl_recorder_t *recorder, uint64_t tick, const uint8_t *data)
+static int put_write(fcsl_recorder_t *recorder, fcsl_stamp_t stamp, const uint8_t *data)
 {
     fcsl_write_t write;
     memcpy(&write, data, sizeof write);
-    fcsl_cdr_t cdr = begin(recorder, tick);
+    fcsl_cdr_t cdr = begin(recorder, stamp);
     fcsl_cdr_u8(&cdr, (uint8_t)write.kind);
     fcsl_cdr_string(&cdr, write.path);
     fcsl_cdr_u32(&cdr, write.element);
@@ -64,35 +64,34 @@ static int put_write(fcsl_recorder_t *recorder, uint64_t tick, const uint8_t *da
     if (bytes != NULL && write.size > 0) {
         memcpy(bytes, data + sizeof write, write.size);
     }
-    return end(recorder, FCSL_TOPIC_WRITES, tick, &cdr);
+    return end(recorder, FCSL_TOPIC_WRITES, stamp, &cdr);
 }
 
-static int put_forced(fcsl_recorder_t *recorder, uint64_t tick, const uint8_t *data)
+static int put_forced(fcsl_recorder_t *recorder, fcsl_stamp_t stamp, const uint8_t *data)
 {
     const fcsl_state_t *states[2];
     memcpy(states, data, sizeof states);
-    fcsl_cdr_t cdr = begin(recorder, tick);
+    fcsl_cdr_t cdr = begin(recorder, stamp);
     fcsl_cdr_string(&cdr, states[0]->name);
     fcsl_cdr_string(&cdr, states[1]->name);
     fcsl_cdr_string(&cdr, "");
     fcsl_cdr_string(&cdr, "");
-    return end(recorder, FCSL_TOPIC_TRANSITIONS, tick, &cdr);
+    return end(recorder, FCSL_TOPIC_TRANSITIONS, stamp, &cdr);
 }
 
-/* Records one fcsl_msgs message of `tick`, if there is something to say. */
-static int note(fcsl_recorder_t *recorder, uint32_t topic, fcsl_tick_message_t what, uint64_t tick)
+/* Records one fcsl_msgs message of a tick, if there is something to say. */
+static int note(fcsl_recorder_t *recorder, uint32_t topic, fcsl_tick_message_t what, fcsl_stamp_t stamp)
 {
-    const fcsl_machine_t *machine = recorder->machine;
-    const int64_t size =
-        fcsl_tick_message_write(machine, recorder->data, what, tick, recorder->scratch, recorder->scratch_size);
+    const int64_t size = fcsl_tick_message_write(recorder->machine, recorder->data, what, stamp, recorder->scratch,
+                                                 recorder->scratch_size);
     if (size < 0) {
-        return fcsl_fail(&recorder->failure, "the machine struct is damaged: tick %" PRIu64 " is of no state", tick);
+        return fcsl_fail(&recorder->failure, "the machine struct is damaged: tick %" PRIu64 " is of no state",
+                         stamp.tick);
     }
-    return size == 0 ? 0
-                     : put(recorder, topic, fcsl_tick_time_ns(machine->tick_hz, tick), recorder->scratch, (size_t)size);
+    return size == 0 ? 0 : put(recorder, topic, stamp.time_ns, recorder->scratch, (size_t)size);
 }
 
-static int note_health(fcsl_recorder_t *recorder, uint64_t tick)
+static int note_health(fcsl_recorder_t *recorder, fcsl_stamp_t stamp)
 {
     const fcsl_machine_t *machine = recorder->machine;
     int changed = !recorder->told;
@@ -101,10 +100,10 @@ static int note_health(fcsl_recorder_t *recorder, uint64_t tick)
         changed = changed || health != recorder->health[i];
         recorder->health[i] = health;
     }
-    return changed ? note(recorder, FCSL_TOPIC_HEALTH, FCSL_TICK_HEALTH, tick) : 0;
+    return changed ? note(recorder, FCSL_TOPIC_HEALTH, FCSL_TICK_HEALTH, stamp) : 0;
 }
 
-static int note_counters(fcsl_recorder_t *recorder, uint64_t tick)
+static int note_counters(fcsl_recorder_t *recorder, fcsl_stamp_t stamp)
 {
     const fcsl_machine_t *machine = recorder->machine;
     int changed = !recorder->told;
@@ -118,12 +117,11 @@ static int note_counters(fcsl_recorder_t *recorder, uint64_t tick)
         recorder->overruns[i] = overruns;
         recorder->fault_places[i] = place;
     }
-    return changed ? note(recorder, FCSL_TOPIC_FAULTS, FCSL_TICK_FAULTS, tick) : 0;
+    return changed ? note(recorder, FCSL_TOPIC_FAULTS, FCSL_TICK_FAULTS, stamp) : 0;
 }
 
-static int put_tick(fcsl_recorder_t *recorder, uint64_t tick, const uint8_t *data)
+static int put_tick(fcsl_recorder_t *recorder, fcsl_stamp_t stamp, const uint8_t *data)
 {
-    const uint64_t time_ns = fcsl_tick_time_ns(recorder->machine->tick_hz, tick);
     for (uint32_t i = 0; i < recorder->range_count; i++) {
         const fcsl_range_t range = recorder->ranges[i];
         memcpy(recorder->data + range.offset, data, range.size);
@@ -131,14 +129,14 @@ static int put_tick(fcsl_recorder_t *recorder, uint64_t tick, const uint8_t *dat
     }
     for (uint32_t i = 0; i < recorder->shown_count; i++) {
         const fcsl_layout_t *layout = &recorder->shown[i].layout;
-        fcsl_layout_write(layout, recorder->data, tick, time_ns, recorder->scratch);
-        if (put(recorder, FCSL_TOPIC_FIRST_SHOWN + i, time_ns, recorder->scratch, layout->size) != 0) {
+        fcsl_layout_write(layout, recorder->data, stamp.tick, stamp.time_ns, recorder->scratch);
+        if (put(recorder, FCSL_TOPIC_FIRST_SHOWN + i, stamp.time_ns, recorder->scratch, layout->size) != 0) {
             return -1;
         }
     }
-    if (note(recorder, FCSL_TOPIC_STATE, FCSL_TICK_STATE, tick) != 0 ||
-        note(recorder, FCSL_TOPIC_TRANSITIONS, FCSL_TICK_TRANSITION, tick) != 0 || note_health(recorder, tick) != 0 ||
-        note_counters(recorder, tick) != 0) {
+    if (note(recorder, FCSL_TOPIC_STATE, FCSL_TICK_STATE, stamp) != 0 ||
+        note(recorder, FCSL_TOPIC_TRANSITIONS, FCSL_TICK_TRANSITION, stamp) != 0 || note_health(recorder, stamp) != 0 ||
+        note_counters(recorder, stamp) != 0) {
         return -1;
     }
     recorder->told = 1;
@@ -147,17 +145,22 @@ static int put_tick(fcsl_recorder_t *recorder, uint64_t tick, const uint8_t *dat
 
 static int put_record(fcsl_recorder_t *recorder, const fcsl_record_t *record, const uint8_t *data)
 {
+    const int by_tick = record->time_ns == FCSL_TICK_TIME;
+    const fcsl_stamp_t stamp = {
+        .tick = record->tick,
+        .time_ns = by_tick ? fcsl_tick_time_ns(recorder->machine->tick_hz, record->tick) : record->time_ns,
+    };
     switch (record->kind) {
     case FCSL_RECORD_TICK:
-        return put_tick(recorder, record->tick, data);
+        return put_tick(recorder, stamp, data);
     case FCSL_RECORD_WRITE:
-        return put_write(recorder, record->tick, data);
+        return put_write(recorder, stamp, data);
     case FCSL_RECORD_FORCED:
-        return put_forced(recorder, record->tick, data);
+        return put_forced(recorder, stamp, data);
     case FCSL_RECORD_CHECKPOINT:
-        return put_checkpoint(recorder, record->tick, data);
+        return put_checkpoint(recorder, stamp, data);
     default:
-        return put(recorder, record->kind - FCSL_RECORD_MESSAGE, record->tick, data, record->size);
+        return put(recorder, record->kind - FCSL_RECORD_MESSAGE, stamp.time_ns, data, record->size);
     }
 }
 

@@ -14,7 +14,7 @@
 enum { ALIGNMENT = sizeof(fcsl_record_t) };
 /* The consumer looks by itself this often, so that a producer at moderate rates never makes a system call. */
 enum { LOOK_EVERY_NS = 10000000 };
-_Static_assert(ALIGNMENT == 16, "a record header has no padding");
+_Static_assert(ALIGNMENT == 32, "the size of a record header is a power of two");
 
 /* A record of this kind only fills the rest of the ring, because the next one must be contiguous. */
 #define FILLER UINT32_MAX

@@ -13,10 +13,13 @@
 #include <stddef.h>
 #include <stdint.h>
 
+/* The ring uses `size` alone; `kind` is any but UINT32_MAX. */
 typedef struct {
-    uint64_t tick; /* or a time: the ring does not look at it, nor at `kind` (any but UINT32_MAX) */
+    uint64_t tick;
+    uint64_t time_ns;
     uint32_t size; /* of the data that follows */
     uint32_t kind;
+    uint64_t padding; /* makes the size a power of two: a header never wraps around the end */
 } fcsl_record_t;
 
 /* What each of the two threads writes lies in cache lines of its own. */

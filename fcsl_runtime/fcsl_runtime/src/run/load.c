@@ -129,6 +129,7 @@ static fcsl_run_t *begin(fcsl_run_t *run, fcsl_error_t *error)
         return NULL;
     }
     run->channels = fcsl_channel_table(run->machine);
+    run->record_time_ns = FCSL_TICK_TIME;
     return run;
 }
 

@@ -217,6 +217,11 @@ int fcsl_run_record_stop(fcsl_run_t *run, fcsl_error_t *error)
     return fcsl_recorder_close(recorder, error);
 }
 
+void fcsl_run_record_time(fcsl_run_t *run, uint64_t time_ns)
+{
+    run->record_time_ns = time_ns;
+}
+
 void fcsl_run_record_lossless(fcsl_run_t *run, int lossless)
 {
     if (run->recorder != NULL) {

@@ -10,6 +10,9 @@
 
 typedef struct fcsl_recorder fcsl_recorder_t;
 
+/* Instead of a time: tick k is at k / tick_hz. */
+#define FCSL_TICK_TIME UINT64_MAX
+
 /* What an instance's overrun verdict was before a tick, to tell a measured overrun from an injected one. */
 typedef struct {
     uint64_t overruns;
@@ -40,6 +43,7 @@ struct fcsl_run {
     uint8_t *left;
     uint64_t frames_refused;
     fcsl_recorder_t *recorder; /* null: not recording */
+    uint64_t record_time_ns;   /* of the coming records; FCSL_TICK_TIME: that of their tick */
     fcsl_trace_t *traces;      /* null: none */
 
     fcsl_hw_sim_t simulated;

@@ -12,9 +12,12 @@ import numpy as np
 from ..ros.cdr import Layout, bits
 from .bag import Array, Bag
 from .fields import flat
+from .stamps import Stamps
 
 #: Fields of a checkpoint that identify the program that recorded it.
 PROVENANCE = ("source_hash", "layout_hash", "build_hash")
+#: Of a message with a tick: hosts record the same tick at the time of their own clock.
+STAMP = ("header.stamp.sec", "header.stamp.nanosec")
 #: Shown for a field that one of two messages lacks.
 ABSENT = "absent"
 
@@ -83,8 +86,9 @@ class Comparison:
     def __init__(self, bags: tuple[Bag, Bag], topic: str, tolerance: Tolerance):
         self._bags, self._topic, self._tolerance = bags, topic, tolerance
         self._layouts = tuple(bag.layout(topic) for bag in bags)
-        ignored = topic.endswith("/record/checkpoint")
-        self._ignored = PROVENANCE if ignored else ()
+        self._ignored = (STAMP if all(Stamps(bag).ticked(topic) for bag in bags) else ()) + (
+            PROVENANCE if topic.endswith("/record/checkpoint") else ()
+        )
 
     def differences(self, pairs: Sequence[Pair]) -> tuple[int, dict[str, FieldDifference]]:
         """The number of `pairs` that differ, and the fields that differ.
@@ -107,6 +111,8 @@ class Comparison:
         found: dict[str, FieldDifference] = {}
         anywhere = np.zeros(len(pairs), dtype=bool)
         for name in dict.fromkeys([*first.leaves, *second.leaves]):
+            if name in self._ignored:
+                continue
             if name not in first.leaves or name not in second.leaves:
                 here = ["present" if name in layout.leaves else ABSENT for layout in (first, second)]
                 found[name] = FieldDifference(pairs[0], "", (here[0], here[1]), len(pairs))

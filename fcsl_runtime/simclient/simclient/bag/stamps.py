@@ -39,11 +39,15 @@ class Stamps:
             self._analyse(topic)
         return self._stamped[topic]
 
-    def tick(self, topic: str, data: bytes) -> int | None:
-        """The tick of a message that FCSL defines, which follows its header; None for other messages."""
+    def ticked(self, topic: str) -> bool:
+        """Whether messages of `topic` have a tick behind their header, as those that FCSL defines do."""
         if topic not in self._ticked:
             self._analyse(topic)
-        if not self._ticked[topic] or len(data) < _HEAD.size:
+        return self._ticked[topic]
+
+    def tick(self, topic: str, data: bytes) -> int | None:
+        """The tick of a message; None if it has none."""
+        if not self.ticked(topic) or len(data) < _HEAD.size:
             return None
         at = _HEAD.size + _HEAD.unpack_from(data)[2]
         at += (len(ENCAPSULATION) - at) % _TICK.size

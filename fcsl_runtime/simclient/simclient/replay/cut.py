@@ -1,9 +1,10 @@
 # SPDX-License-Identifier: Apache-2.0
 """Writes a part of a bag as a new bag: `python -m simclient.bag cut`.
 
-Messages are selected by time: the stamp of their header, else the time of recording. A record of FCSL is more than its
-messages: a replay starts from a checkpoint and repeats the host's writes from there. So a cut that starts after the
-first checkpoint needs a new one, which is made by replaying the bag up to there.
+Messages are selected by time: the stamp of their header, else the time of recording. All messages of a machine's first
+tick belong to the cut, too: on a robot's clock, a write before a tick has the stamp of the tick before it. A record of
+FCSL is more than its messages: a replay starts from a checkpoint and repeats the host's writes from there. So a cut
+that starts after the first checkpoint needs a new one, which is made by replaying the bag up to there.
 """
 
 from __future__ import annotations
@@ -46,10 +47,10 @@ class Cut:
 
 
 class _Head(Bag):
-    """The part of a bag before a time."""
+    """The part of a bag before a tick, for the topics of one machine."""
 
-    def __init__(self, whole: Bag, end_ns: int):
-        self._whole, self._end_ns = whole, end_ns
+    def __init__(self, whole: Bag, end_tick: int):
+        self._whole, self._end_tick = whole, end_tick
         super().__init__(whole.path)
 
     def _open(self) -> None:
@@ -58,7 +59,8 @@ class _Head(Bag):
     def messages_before_damage(self, topics: Collection[str] | None = None) -> Iterator[tuple[str, int, bytes]]:
         stamps = Stamps(self._whole)
         for topic, log_ns, data in self._whole.messages_before_damage(topics):
-            if stamps.time_ns(topic, log_ns, data) >= self._end_ns:
+            tick = stamps.tick(topic, data)
+            if tick is not None and tick >= self._end_tick:
                 return
             yield topic, log_ns, data
         self.truncated = self._whole.truncated  # damage counts only if reading reached it
@@ -77,7 +79,7 @@ def checkpoint_before(bag: Bag, machine: RecordedMachine, tick: int, time_ns: in
     first = bag.decode_own(machine.checkpoint, data, wanted)
     _check_same(bag, machine, first, run)
     progress = Progress(f"replaying up to tick {tick}", tick - first.tick)
-    verdict = Replay(_Head(bag, time_ns), machine, run).run(progress.at)
+    verdict = Replay(_Head(bag, tick), machine, run).run(progress.at)
     if not verdict.identical or run.tick != tick:
         raise BagError(f"{bag.path}: the record up to tick {tick} cannot be replayed:\n{verdict}")
     stamp = replace(first.header.stamp, sec=time_ns // _NS, nanosec=time_ns % _NS)
@@ -112,11 +114,12 @@ def cut(
 
     `replayed`: a machine and a new run of it, which make the checkpoint of the cut. Raises BagError.
     """
-    machines = {machine.prefix: _why_not(bag, machine, begin_ns, end_ns) for machine in bag.machines()}
+    firsts = {machine.prefix: _first_tick(bag, machine, begin_ns, end_ns) for machine in bag.machines()}
+    machines = {machine.prefix: _why_not(bag, machine, firsts[machine.prefix]) for machine in bag.machines()}
     opening: list[tuple[str, int, bytes]] = []
     if replayed is not None and machines[replayed[0].prefix]:
         machine, run = replayed
-        first = _first_tick(bag, machine, begin_ns, end_ns)
+        first = firsts[machine.prefix]
         if first is None:
             span = f"{seconds(begin_ns)} s to {seconds(end_ns)} s"
             raise BagError(f"{bag.path}: no tick of `{machine.name}` lies from {span}")
@@ -126,13 +129,20 @@ def cut(
     topics = [name for name, topic in bag.topics.items() if can_be_copied(topic)]
     found = Cut(0, end_ns, begin_ns, machines, [name for name in bag.topics if name not in topics])
     stamps, progress = Stamps(bag), Progress("cutting", sum(bag.topics[name].count for name in topics))
+    first_ticks = {
+        topic: first[0]
+        for prefix, first in firsts.items()
+        for topic in topics
+        if first is not None and topic.startswith(f"{prefix}/")
+    }
     with copy_of(bag, target, topics) as copy:
         for message in opening:
             copy.write(*message)
         for done, (topic, log_ns, data) in enumerate(bag.messages(set(topics))):
             progress.at(done)
             time_ns = stamps.time_ns(topic, log_ns, data)
-            if begin_ns <= time_ns <= end_ns:
+            begun = time_ns >= begin_ns or (topic in first_ticks and stamps.tick(topic, data) == first_ticks[topic])
+            if begun and time_ns <= end_ns:
                 found.first_ns, found.last_ns = min(found.first_ns, time_ns), max(found.last_ns, time_ns)
                 copy.write(topic, log_ns, data)
         found.messages = copy.messages
@@ -141,14 +151,11 @@ def cut(
     return found
 
 
-def _why_not(bag: Bag, machine: RecordedMachine, begin_ns: int, end_ns: int) -> str:
-    """The reason why the cut does not reproduce `machine`; empty if it does."""
+def _why_not(bag: Bag, machine: RecordedMachine, first: tuple[int, int] | None) -> str:
+    """The reason why the cut, whose first tick and its time are `first`, does not reproduce `machine`; else empty."""
     stamps = Stamps(bag)
-    for topic, log_ns, data in bag.messages({machine.checkpoint}):
-        time_ns = stamps.time_ns(topic, log_ns, data)
-        if time_ns > end_ns:
-            break
-        if time_ns >= begin_ns and (stamps.tick(topic, data), time_ns) == _first_tick(bag, machine, begin_ns, end_ns):
+    for topic, _, data in bag.messages({machine.checkpoint}):
+        if first is not None and stamps.tick(topic, data) == first[0]:
             return ""
     return "the checkpoint that a replay starts from lies before the cut; --config or --library puts one in"
 
