@@ -188,6 +188,22 @@ def test_a_cut_keeps_qualities_and_hashes_and_opens_in_rerun(fly: Fly, tmp_path:
     assert "/car/probe/echo" in printed.stdout
 
 
+def test_a_cut_of_a_bag_without_metadata_has_the_hashes_of_its_types(fly: Fly, tmp_path: Path) -> None:
+    import yaml
+
+    def hashes(bag: Path) -> dict[str, str]:
+        about = yaml.safe_load((bag / "metadata.yaml").read_text())["rosbag2_bagfile_information"]
+        topics = [t["topic_metadata"] for t in about["topics_with_message_count"]]
+        return {t["name"]: t["type_description_hash"] for t in topics}
+
+    bag = fly()
+    expected = hashes(bag)
+    (bag / "metadata.yaml").unlink()
+    cut(Bag(bag), tmp_path / "part", 0, 50 * TICK_NS)
+    found = hashes(tmp_path / "part")
+    assert found and found == {name: expected[name] for name in found}
+
+
 @pytest.mark.parametrize(
     ("arguments", "reason"),
     [

@@ -15,6 +15,7 @@ from __future__ import annotations
 import argparse
 import math
 import os
+import random
 import sys
 import time
 from collections.abc import Iterable
@@ -46,14 +47,18 @@ def interval(survived: int, total: int) -> tuple[float, float]:
 def tested(tree: Tree, mutants: list[Mutant], tests: list[Test], workers: int) -> dict[Mutant, str | None]:
     """What killed each mutant, or None. Raises CheckFailed when a control fails."""
     environment = tree.environment()
+    mutants = random.Random(SEED).sample(
+        mutants, len(mutants)
+    )  # so that the time left, and an interrupted run, mislead nobody
     results: dict[Mutant, str | None] = {}
     begun = time.monotonic()
-    with ThreadPoolExecutor(workers) as pool:
+    false_alarms: list[str] = []
+    pool = ThreadPoolExecutor(workers)
+    try:
         futures = {pool.submit(killer, tree, environment, tests, m.number, m.number): (m, False) for m in mutants}
         futures |= {
             pool.submit(killer, tree, environment, tests, m.number, 0): (m, True) for m in mutants[::CONTROL_EVERY]
         }
-        false_alarms: list[str] = []
         for done, future in enumerate(as_completed(futures), 1):
             (mutant, is_control), by = futures[future], future.result()
             if is_control:
@@ -67,6 +72,8 @@ def tested(tree: Tree, mutants: list[Mutant], tests: list[Test], workers: int) -
                 left = (time.monotonic() - begun) / done * (len(futures) - done)
                 alive = sum(by is None for by in results.values())
                 print(f"{done} of {len(futures)} runs, {alive} survived, {left / 60:.0f} min left", flush=True)
+    finally:
+        pool.shutdown(cancel_futures=True)
     if false_alarms:
         raise CheckFailed("tests failed with no mutant switched on, so kills mean little: " + "; ".join(false_alarms))
     return results

@@ -96,6 +96,7 @@ class Tree:
 
     def _link(self) -> None:
         self.folder.mkdir(parents=True, exist_ok=True)
+        (self.folder / "COLCON_IGNORE").touch()  # these packages are none of the workspace around it
         tracked = run(["git", "-C", str(ROOT), "ls-files"]).splitlines()
         for name in {Path(f).parts[0] for f in tracked} - {*COPIED}:
             if not (self.folder / name).is_symlink():
