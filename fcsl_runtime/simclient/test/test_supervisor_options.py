@@ -47,7 +47,7 @@ REFUSED: list[tuple[str, str, Any, str]] = [
     ("simulation", "speed", math.nan, "simulated seconds per second"),
     ("simulation", "set", [], "an object of at most 64 parameters"),
     ("simulation", "set", {f"p{n}": n for n in range(65)}, "an object of at most 64 parameters"),
-    ("simulation", "set", {"-p": 1}, "paths such as altimeter.parameters.sigma, not \"-p\""),
+    ("simulation", "set", {"-p": 1}, 'paths such as altimeter.parameters.sigma, not "-p"'),
     ("simulation", "set", {"a b": 1}, "paths such as altimeter.parameters.sigma"),
     ("simulation", "set", {"p" * 1025: 1}, "paths such as altimeter.parameters.sigma"),
     ("simulation", "set", {"p": "1"}, "finite numbers, true, false or lists of them"),

@@ -11,13 +11,9 @@ from pathlib import Path
 
 from fcsl_compiler.driver.toolchain import FLAGS, compiler, include_dirs, math_library
 
-from .size import sized
-
 BENCH = Path(__file__).resolve().parents[1]
 #: Of a program: nothing is shared, and all may be seen.
 _FLAGS = [f for f in FLAGS if f not in ("-fPIC", "-fvisibility=hidden")]
-#: Last on a compiler's line: the smallest size is not there for its times, and most of its own time is compilers'.
-LEVEL = sized((), ("-O1",))
 
 
 def compile_program(
@@ -26,7 +22,7 @@ def compile_program(
     """A program of C sources (names are of scripts/bench), with the flags of a machine and some more."""
     folders = [f"-I{d}" for d in (BENCH / "harness", BENCH / "peers", *includes, *include_dirs())]
     files = [str(BENCH / s) if isinstance(s, str) else str(s) for s in sources]
-    line = [*compiler(), *_FLAGS, *more, "-D_GNU_SOURCE=", *LEVEL, *folders, *files, str(math_library()), "-ldl", "-lm"]
+    line = [*compiler(), *_FLAGS, *more, "-D_GNU_SOURCE=", *folders, *files, str(math_library()), "-ldl", "-lm"]
     subprocess.run([*line, "-o", str(output)], check=True)
     return output
 
@@ -36,6 +32,6 @@ def code_bytes(source: Path, includes: Sequence[Path] = ()) -> int:
     folders = [f"-I{d}" for d in (source.parent, *includes, *include_dirs())]
     with tempfile.TemporaryDirectory() as folder:
         made = Path(folder) / "object.o"
-        subprocess.run([*compiler(), *FLAGS, *LEVEL, *folders, "-c", str(source), "-o", str(made)], check=True)
+        subprocess.run([*compiler(), *FLAGS, *folders, "-c", str(source), "-o", str(made)], check=True)
         table = subprocess.run(["size", "-A", str(made)], stdout=subprocess.PIPE, text=True, check=True).stdout
     return sum(int(size) for size in re.findall(r"^\.text\S*\s+(\d+)", table, re.MULTILINE))

@@ -4,7 +4,7 @@
 A fixed seed draws the same number of mutants of every source file (operators, boundaries, constants, results, deleted
 statements). All are compiled into one copy of the packages in out/verify/mutation, each behind a switch, so one build serves
 all. One run of all tests notes which test reaches which mutant. Then every mutant is switched on and meets the tests that reach
-it, the shortest first, until 45 s of them are spent: a test that fails, crashes or hangs kills it. A mutant that no test
+it, the shortest first, until 120 s of them are spent: a test that fails, crashes or hangs kills it. A mutant that no test
 reaches has survived. equivalent.toml lists mutants that no test can notice, and why; they are not drawn.
 
 As a control, some runs go the same way with no mutant switched on, and must pass.

@@ -24,7 +24,6 @@ from fcsl_compiler.driver.library import emit
 from fcsl_compiler.driver.toolchain import FLAGS, compiler, include_dirs
 from simclient import PyTwin
 
-from ...harness.native import LEVEL
 from ...harness.size import sized
 from ...peers.linear import casadi as linear_casadi
 from ...peers.linear.model import (
@@ -171,7 +170,7 @@ def _eigen(folder: Path, kernel: str, flags: list[str]) -> Path:
 def _library(command: list[str], sources: list[str], folder: Path, name: str) -> Path:
     library = folder / f"lib{name}.so"
     include = [f"-I{PEERS}", f"-I{folder}"]
-    _run([*command, *LEVEL, "-fvisibility=default", "-shared", *include, *sources, "-lm", "-o", str(library)])
+    _run([*command, "-fvisibility=default", "-shared", *include, *sources, "-lm", "-o", str(library)])
     return library
 
 

@@ -1,7 +1,7 @@
 # SPDX-License-Identifier: Apache-2.0
 """The nodes of ROS 2: a 1 kHz machine with twenty topics in controller_node, the same as a plain rclpy node, and lock-step.
 
-The package in this folder is built once below OUT. Both nodes are heard by the same listener, one after the other.
+The package in this folder is built once below out/bench_ros. Both nodes are heard by the same listener, one after the other.
 """
 
 from __future__ import annotations
@@ -28,8 +28,7 @@ from ...harness.size import SUFFIX, sized
 ROOT = Path(__file__).resolve().parents[4]
 PACKAGE = ROOT / "scripts/bench/subjects/ros"
 PLAIN_NODE = ROOT / "scripts/bench/peers/plain_node.py"
-OUT = ROOT / f"out/bench_ros{SUFFIX}"
-BUILD_TYPE = sized("Release", "Debug")
+OUT = ROOT / "out/bench_ros"
 PICTURE = ROOT / f"out/bench_ros{SUFFIX}.png"
 WARM_UP_S, WINDOW_S = sized((4.0, 10.0), (0.5, 1.0))
 LIMIT_S = 300
@@ -61,7 +60,7 @@ def build() -> None:
     if not (folder / "CMakeCache.txt").exists():
         generator = ["-G", "Ninja"] if shutil.which("ninja") else []
         configure = [*generator, "-S", PACKAGE, "-B", folder, f"-DCMAKE_INSTALL_PREFIX={OUT / 'install'}"]
-        _cmake(*configure, f"-DCMAKE_BUILD_TYPE={BUILD_TYPE}", "-DBUILD_TESTING=OFF")
+        _cmake(*configure, "-DCMAKE_BUILD_TYPE=Release", "-DBUILD_TESTING=OFF")
     _cmake("--build", folder, "--target", "install", "--parallel", str(os.cpu_count()))
 
 
