@@ -212,10 +212,12 @@ def test_many_twins_leak_nothing(probe: Path, tmp_path: Path, monkeypatch: pytes
     descriptors = len(os.listdir("/proc/self/fd"))
     threads = len(os.listdir("/proc/self/task"))
     pids = []
+    closed = []  # held, so that it is close() that returns everything, and not the garbage collector
     for _ in range(200):
         with ProcessTwin.from_library(probe) as twin:
             twin.tick()
             pids.append(twin.pid)
+        closed.append(twin)
     assert len(os.listdir("/proc/self/fd")) == descriptors and len(os.listdir("/proc/self/task")) == threads
     assert not any(Path(f"/proc/{pid}").exists() for pid in pids) and list(tmp_path.iterdir()) == []
 
