@@ -159,10 +159,12 @@ def test_what_others_hold_stays(tmp_path: Path, monkeypatch: pytest.MonkeyPatch)
     (tmp_path / "elsewhere").mkdir()
     (tmp_path / "elsewhere" / "file").touch()
     (tmp_path / "fcsl-twin-link").symlink_to(tmp_path / "elsewhere")
+    descriptors = len(os.listdir("/proc/self/fd"))
     with PrivateFolder("twin") as one, PrivateFolder("twin") as other:
         assert all(folder.path.is_dir() and folder.path.stat().st_mode & 0o777 == 0o700 for folder in (one, other))
         assert not (tmp_path / "fcsl-twin-left").exists() and (tmp_path / "elsewhere" / "file").exists()
     assert folders(tmp_path) == ["elsewhere", "fcsl-twin-link"]
+    assert len(os.listdir("/proc/self/fd")) == descriptors
 
 
 def test_a_folder_that_cannot_be_held_is_an_error(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:

@@ -79,13 +79,21 @@ def test_info_tells_topics_states_writes_and_hashes(fly: Fly) -> None:
     ]
 
 
-def test_info_of_a_damaged_bag_tells_what_is_left(fly: Fly) -> None:
+def test_every_tool_tells_of_damage_after_it_did_what_could_be_done(fly: Fly, tmp_path: Path) -> None:
     bag = fly()
     file = bag / "run_0.mcap"
     file.write_bytes(file.read_bytes()[:-100])
     done = tool("info", bag)
     assert done.returncode == 1 and "damage     run_0.mcap" in done.stdout
     assert "the bag is incomplete: run_0.mcap" in done.stderr
+    for arguments in (
+        ("cut", bag, "-o", tmp_path / "part"),
+        ("export", bag, "-o", tmp_path / "t.csv"),
+        ("digest", bag),
+    ):
+        done = tool(*arguments)
+        assert done.returncode == 1 and "the bag is incomplete: run_0.mcap" in done.stderr, arguments
+    assert Bag(tmp_path / "part").truncated == ""
 
 
 def foreign(path: Path, values: list[tuple[int, float]]) -> Path:
