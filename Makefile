@@ -27,9 +27,9 @@ test: setup lint ## lint, every package's tests, then those that cross packages;
 verify: setup ## the evidence: EVA, binaries, other processors, sanitizers, fuzzers, generated programs (installs its tools); EFFORT=full goes further
 	@FCSL_EFFORT=$(EFFORT) scripts/verify.sh
 
-bench: setup ## the figures: steps, filters, simulator, replay, ROS 2 nodes, each beside what others would write
+bench: setup ## the figures: steps, filters, simulator, replay, ROS 2 nodes, each beside what others would write; SIZE=smallest: only whether all of it runs
 	@scripts/bench/harness/setup.sh
-	@$(ENV) python3 scripts/bench
+	@$(ENV) FCSL_BENCH_SIZE=$(SIZE) python3 scripts/bench
 
 lint: setup ## ruff, mypy, clang-format; nothing is changed
 	@. scripts/underlay.sh && ruff check $(PYTHON_DIRS)

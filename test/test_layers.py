@@ -30,7 +30,20 @@ FOLDERS: dict[str, Sequence[str]] = {
     "fcsl_sim": ("",),
     "fcsl_bridge": ("",),
     "verify": (
-        *("shared", "binary", "bits", "coverage", "eva", "foxglove", "fuzz", "instructions", "pil", "sanitize", ""),
+        *(
+            "shared",
+            "binary",
+            "bits",
+            "coverage",
+            "eva",
+            "foxglove",
+            "fuzz",
+            "instructions",
+            "mutation",
+            "pil",
+            "sanitize",
+            "",
+        ),
     ),
     "bench": ("harness", "machines", "peers", "subjects", ""),
 }

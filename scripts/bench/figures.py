@@ -1,6 +1,7 @@
 # SPDX-License-Identifier: Apache-2.0
 """`make bench`: figures, measured side by side in one run. Each section is printed when it is measured, and out/bench.json
-grows with it. A section that fails is reported, and the others go on. Each subject is a file or a folder of subjects/."""
+grows with it. A section that fails is reported, and the others go on; then the exit status is 1. Each subject is a file or a
+folder of subjects/. `make verify` runs all in its smallest size (harness/size.py), for its errors and not for its figures."""
 
 from __future__ import annotations
 
@@ -15,6 +16,7 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
+from .harness.size import SUFFIX
 from .subjects.chain import chain_summary, chain_times
 from .subjects.checkpoint import checkpoint_rows, checkpoint_times
 from .subjects.edit_loop import edit_to_test
@@ -24,14 +26,14 @@ from .subjects.linear.main import linear_rows, linear_times
 from .subjects.process import process_rows, process_times
 from .subjects.record import record_rows, record_times
 from .subjects.replay_map import RATES_HZ, replay_map
-from .subjects.ros.main import DECIMATE, LOCKSTEP_DECIMATES, lockstep, realtime
+from .subjects.ros.main import DECIMATE, LOCKSTEP_DECIMATES, PICTURE, lockstep, realtime
 from .subjects.telemetry import telemetry_figures, telemetry_rows
 from .subjects.twin import twin_rows, twin_times
 from .subjects.vars.main import vars_figures, vars_rows
 from .subjects.whole.main import WHOLES, whole_rows, whole_times
 
 Rows = list[tuple[str, str]]
-OUT = ROOT / "out" / "bench.json"
+OUT = ROOT / "out" / f"bench{SUFFIX}.json"
 
 
 @dataclass(frozen=True)
@@ -180,7 +182,7 @@ def main() -> int:
             folder.mkdir()
             if not measure(section, folder, facts):
                 failed.append(section.name)
-    print(f"written: {OUT.relative_to(ROOT)}, out/bench_ros.png")
+    print(f"written: {OUT.relative_to(ROOT)}, {PICTURE.relative_to(ROOT)}")
     if failed:
         say(f"bench: failed: {', '.join(failed)}")
     return 1 if failed else 0

@@ -58,8 +58,12 @@ def tests(label: str, file: str, *arguments: str, **environment: str) -> Check:
     return Check(label, ("-m", "pytest", "-q", "-s", f"{_TESTS}/{file}", *arguments), environment)
 
 
+#: At EFFORT=full alone.
+FULL_CHECKS = scaled((), (script("mutants: tests notice small changes of the C runtime and of simclient", "mutation"),))
+
 #: The longest first, so that at the end no core waits for one of them.
 CHECKS = (
+    *FULL_CHECKS,
     tests(
         "generated programs: compiled = CPython = oracle",
         "test_generated.py",
@@ -85,6 +89,11 @@ CHECKS = (
         *("--fuzz", scaled("500", "5000"), "--fuzz-seed", "2"),
     ),
     script("processor in the loop: the lander's controller on a Cortex-M7", "pil"),
+    Check(
+        "benchmarks: every one of make bench runs, in its smallest size",
+        ("scripts/bench",),
+        {"FCSL_BENCH_SIZE": "smallest"},
+    ),
     script("recordings: Foxglove's own packages read the values that rosbags reads", "foxglove"),
 )
 

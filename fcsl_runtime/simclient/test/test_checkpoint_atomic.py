@@ -83,6 +83,13 @@ def test_kill_9_at_random_moments(tmp_path: Path) -> None:
     assert path.read_bytes() == NEW and os.listdir(tmp_path) == ["checkpoint"]
 
 
+def test_a_path_without_room_for_the_temporary_file_is_refused(tmp_path: Path) -> None:
+    longest = os.pathconf(tmp_path, "PC_PATH_MAX") - len(".tmp") - 1  # and the byte that ends it
+    for length, reason in ((longest, "File name too long|No such file"), (longest + 1, "is too long")):
+        with pytest.raises(TwinError, match=reason):
+            write_checkpoint("/" + "x" * (length - 1), b"data")
+
+
 def test_a_limit_that_does_not_kill_is_an_error(tmp_path: Path) -> None:
     path = tmp_path / "checkpoint"
     path.write_bytes(OLD)

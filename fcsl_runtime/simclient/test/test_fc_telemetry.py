@@ -365,6 +365,11 @@ def test_no_network_at_all() -> None:
     [
         (("--telemetry", "127.0.0.1:7600"), "write udp:HOST:PORT"),
         (("--telemetry", "udp:localhost:7600/0"), "write udp:HOST:PORT"),
+        (("--telemetry", "udp:localhost:"), "write udp:HOST:PORT"),
+        (("--telemetry", "udp:localhost:007600"), "write udp:HOST:PORT"),
+        (("--telemetry", "udp:localhost:65536"), "write udp:HOST:PORT"),
+        (("--telemetry", "udp::7600"), "write udp:HOST:PORT"),
+        (("--telemetry", f"udp:{'1' * 64}:7600"), "write udp:HOST:PORT"),
         (("--telemetry", "udp:localhost:7600/4294967297"), "write udp:HOST:PORT"),  # not every tick, its low 32 bits
         (
             ("--telemetry", "udp:127.0.0.1:7600", "--telemetry-fields", "pilot"),

@@ -89,6 +89,12 @@ def test_commands_in_lock_step(tmp_path: Path) -> None:
         assert client.ok("tick", count=60)["tick"] == 60
         assert client.get("channels.imu.gyro.valid") is True
         assert client.get("machine.state") == "ACTIVE"
+        here = client.ok("save")["data"]
+        assert client.ok("restore", data=here)["tick"] == 60  # the simulator is at this tick, too
+        client.ok("tick")
+        error = client.error("restore", data=here)
+        assert error["code"] == "refused" and "the checkpoint is of tick 60" in error["message"]
+        assert "is at tick 61: only one of this very tick can be restored" in error["message"]
         assert client.ok("resume")
         code, out, _ = fc.wait()
         assert sim.wait(timeout=30) == 0

@@ -159,10 +159,12 @@ def test_what_others_hold_stays(tmp_path: Path, monkeypatch: pytest.MonkeyPatch)
     (tmp_path / "elsewhere").mkdir()
     (tmp_path / "elsewhere" / "file").touch()
     (tmp_path / "fcsl-twin-link").symlink_to(tmp_path / "elsewhere")
+    descriptors = len(os.listdir("/proc/self/fd"))
     with PrivateFolder("twin") as one, PrivateFolder("twin") as other:
         assert all(folder.path.is_dir() and folder.path.stat().st_mode & 0o777 == 0o700 for folder in (one, other))
         assert not (tmp_path / "fcsl-twin-left").exists() and (tmp_path / "elsewhere" / "file").exists()
     assert folders(tmp_path) == ["elsewhere", "fcsl-twin-link"]
+    assert len(os.listdir("/proc/self/fd")) == descriptors
 
 
 def test_a_folder_that_cannot_be_held_is_an_error(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
@@ -212,10 +214,12 @@ def test_many_twins_leak_nothing(probe: Path, tmp_path: Path, monkeypatch: pytes
     descriptors = len(os.listdir("/proc/self/fd"))
     threads = len(os.listdir("/proc/self/task"))
     pids = []
+    closed = []  # held, so that it is close() that returns everything, and not the garbage collector
     for _ in range(200):
         with ProcessTwin.from_library(probe) as twin:
             twin.tick()
             pids.append(twin.pid)
+        closed.append(twin)
     assert len(os.listdir("/proc/self/fd")) == descriptors and len(os.listdir("/proc/self/task")) == threads
     assert not any(Path(f"/proc/{pid}").exists() for pid in pids) and list(tmp_path.iterdir()) == []
 

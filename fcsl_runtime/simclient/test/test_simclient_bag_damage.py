@@ -135,6 +135,19 @@ def test_definitions_of_a_bad_first_chunk_come_from_the_index(tmp_path: Path) ->
     assert len(list(open_bag(file).messages())) == 19
 
 
+def test_messages_whose_definition_is_lost_are_counted(tmp_path: Path) -> None:
+    file = small(tmp_path / "a.mcap")
+    content = bytearray(file.read_bytes())
+    first = index_of(file).chunk_indexes[0]
+    content[first.chunk_start_offset + first.chunk_length - 3] ^= 1
+    file.write_bytes(content[: summary_begin(bytes(content))])  # the index has the definitions, too
+    bag = open_bag(file)
+    assert list(bag.messages()) == []
+    assert "a.mcap has 19 messages of topics whose definitions are lost" in bag.truncated.replace(
+        "; has", "; a.mcap has"
+    )
+
+
 def test_a_bad_file_does_not_cost_the_next(tmp_path: Path) -> None:
     (tmp_path / "run").mkdir()
     one, two = (small(tmp_path / f"run/run_{n}.mcap") for n in range(2))
@@ -168,6 +181,15 @@ def test_a_file_of_chunks_that_unpack_to_too_much(tmp_path: Path, monkeypatch: p
     assert not list(bag.messages())
     assert "(a chunk that takes the file beyond 0 GiB and 0 times its size when unpacked)" in bag.truncated
     assert "; and 8 more parts, " in bag.truncated
+
+
+def test_a_chunk_may_unpack_to_the_limit_and_not_to_more(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    file = small(tmp_path / "a.mcap")
+    largest = max(chunk.uncompressed_size for chunk in index_of(file).chunk_indexes)
+    monkeypatch.setattr("simclient.bag.mcap_file.LIMIT_BYTES", largest)
+    assert len(list(open_bag(file).messages())) == 20
+    monkeypatch.setattr("simclient.bag.mcap_file.LIMIT_BYTES", largest - 1)
+    assert len(list(open_bag(file).messages())) < 20
 
 
 def test_a_bomb_takes_seconds(tmp_path: Path) -> None:

@@ -11,7 +11,9 @@ from typing import Any
 
 import pytest
 import yaml
+from foreign_bags import number, write_mcap
 from mcap.reader import make_reader
+from mcap.writer import CompressionType
 from native import FIXTURE, PROGRAM
 from rosbags.highlevel import AnyReader
 
@@ -92,6 +94,30 @@ def test_repair_of_a_bag_with_a_bad_chunk(tmp_path: Path) -> None:
     opened = Bag(bag)
     assert list(opened.messages()) == left
     assert opened.truncated.endswith(" (damaged before a repair)")  # a replay has to end there still
+
+
+@pytest.mark.parametrize(("damaged_bytes", "is_passed_over"), [(9 + 10, True), (9 + 9, False)])
+def test_damage_is_passed_over_where_a_record_has_room(
+    damaged_bytes: int, is_passed_over: bool, tmp_path: Path
+) -> None:
+    """A record's head has 9 bytes, and the mark that it is damage 10."""
+    start = 100 * 10**9
+    messages = [(start + i * 10**9, "/level", number(i)) for i in range(20)]
+    (tmp_path / "run").mkdir()
+    file = write_mcap(tmp_path / "run/run_0.mcap", messages, CompressionType.ZSTD, 50)
+    with file.open("rb") as stream:
+        summary = make_reader(stream).get_summary()
+    assert summary is not None
+    at = summary.chunk_indexes[4].chunk_start_offset
+    content = file.read_bytes()
+    file.write_bytes(content[:at] + bytes(damaged_bytes) + content[at:])
+    if not is_passed_over:
+        with pytest.raises(BagError, match=f"the damage at byte {at} is too short to be passed over; `cut` makes"):
+            repair(tmp_path / "run")
+        return
+    repair(tmp_path / "run")
+    with AnyReader([tmp_path / "run"]) as other:
+        assert sum(1 for _ in other.messages()) == len(messages)
 
 
 @pytest.mark.parametrize(("name", "reason"), [("none", "no such bag"), ("empty", "no .mcap file in it")])

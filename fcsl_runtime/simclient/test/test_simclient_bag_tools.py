@@ -79,13 +79,21 @@ def test_info_tells_topics_states_writes_and_hashes(fly: Fly) -> None:
     ]
 
 
-def test_info_of_a_damaged_bag_tells_what_is_left(fly: Fly) -> None:
+def test_every_tool_tells_of_damage_after_it_did_what_could_be_done(fly: Fly, tmp_path: Path) -> None:
     bag = fly()
     file = bag / "run_0.mcap"
     file.write_bytes(file.read_bytes()[:-100])
     done = tool("info", bag)
     assert done.returncode == 1 and "damage     run_0.mcap" in done.stdout
     assert "the bag is incomplete: run_0.mcap" in done.stderr
+    for arguments in (
+        ("cut", bag, "-o", tmp_path / "part"),
+        ("export", bag, "-o", tmp_path / "t.csv"),
+        ("digest", bag),
+    ):
+        done = tool(*arguments)
+        assert done.returncode == 1 and "the bag is incomplete: run_0.mcap" in done.stderr, arguments
+    assert Bag(tmp_path / "part").truncated == ""
 
 
 def foreign(path: Path, values: list[tuple[int, float]]) -> Path:
@@ -186,6 +194,22 @@ def test_a_cut_keeps_qualities_and_hashes_and_opens_in_rerun(fly: Fly, tmp_path:
     assert converted.returncode == 0, converted.stderr
     printed = subprocess.run([*rerun, "rrd", "print", str(out)], capture_output=True, text=True, env=env)
     assert "/car/probe/echo" in printed.stdout
+
+
+def test_a_cut_of_a_bag_without_metadata_has_the_hashes_of_its_types(fly: Fly, tmp_path: Path) -> None:
+    import yaml
+
+    def hashes(bag: Path) -> dict[str, str]:
+        about = yaml.safe_load((bag / "metadata.yaml").read_text())["rosbag2_bagfile_information"]
+        topics = [t["topic_metadata"] for t in about["topics_with_message_count"]]
+        return {t["name"]: t["type_description_hash"] for t in topics}
+
+    bag = fly()
+    expected = hashes(bag)
+    (bag / "metadata.yaml").unlink()
+    cut(Bag(bag), tmp_path / "part", 0, 50 * TICK_NS)
+    found = hashes(tmp_path / "part")
+    assert found and found == {name: expected[name] for name in found}
 
 
 @pytest.mark.parametrize(

@@ -263,6 +263,11 @@ def test_bad_files_end_the_command_with_one_message(
     (tmp_path / "map.yaml").write_bytes(b"\xff\xfe" + chart_text)
     with pytest.raises(MapError, match="not UTF-8"):
         read_map(tmp_path / "map.yaml")
+    (tmp_path / "map.yaml").write_bytes(chart_text + b" " * ((1 << 20) - len(chart_text)))
+    read_map(tmp_path / "map.yaml")
+    (tmp_path / "map.yaml").write_bytes(chart_text + b" " * ((1 << 20) + 1 - len(chart_text)))
+    with pytest.raises(MapError, match="larger than 1048576 bytes"):
+        read_map(tmp_path / "map.yaml")
 
 
 def test_stamps_that_cannot_be_right_are_refused(probe: Path, write_map: Callable[[str], Path], tmp_path: Path) -> None:

@@ -344,6 +344,16 @@ def test_one_flipped_bit_is_found_and_named(
     assert (done.returncode, done.stdout, done.stderr) == (1, report, "")
 
 
+@pytest.mark.parametrize("index", [3, NAN_AT])
+def test_bits_are_compared_and_not_values(bag: Path, probe: Path, index: int) -> None:
+    """0.0 == -0.0, and yet they divide differently; NaN != NaN, and yet nothing differs."""
+    copy = flipped(bag, ("/probe/source", index), VEC_AT + 2 * 8 + 7, bit=7)
+    found = replay(copy, library=str(probe)).divergence
+    assert found is not None and (found.tick, found.path) == (5 + index, "source.outputs.vec[2]")
+    assert (found.recorded, found.recorded_bits) == ("0.0", "0x0000000000000000")
+    assert (found.replayed, found.replayed_bits) == ("-0.0", "0x8000000000000000")
+
+
 def test_a_changed_write_or_state_is_found(bag: Path, probe: Path) -> None:
     def change(wanted: str, old: bytes, new: bytes) -> Callable[[str, int, bytes], bytes]:
         return lambda topic, i, data: data.replace(old, new, 1) if topic == wanted else data

@@ -19,6 +19,7 @@ from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 
 from simclient import AlgTwin, PyTwin, TwinError
+from simclient.library import runtime_program
 
 ROOT = Path(__file__).resolve().parents[3]
 
@@ -384,6 +385,8 @@ def test_without_an_environment_it_says_what_to_do(probe: Path, monkeypatch: pyt
     monkeypatch.setenv("AMENT_PREFIX_PATH", "")
     with pytest.raises(TwinError, match="fcsl_runtime.*setup.bash"):
         AlgTwin.from_library(probe)
+    with pytest.raises(TwinError, match="fcsl_runtime.*setup.bash"):
+        runtime_program("fcsl-fc")
 
 
 def test_importing_simclient_pulls_in_nothing_heavy() -> None:

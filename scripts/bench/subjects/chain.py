@@ -14,9 +14,10 @@ from typing import Any
 from fcsl_compiler.driver.library import build_library
 
 from ..harness.native import code_bytes, compile_program
+from ..harness.size import sized
 
-SIZES = (3, 17, 100, 1000)
-ROUNDS = 401
+SIZES = sized((3, 17, 100, 1000), (3, 17))
+ROUNDS = sized(401, 3)
 LINK = """\
 class Link:
     inputs = {"x": "f64"}

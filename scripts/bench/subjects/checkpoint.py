@@ -22,9 +22,10 @@ from simclient import AlgTwin
 from simclient.library import runtime_library
 
 from ..harness.native import compile_program
+from ..harness.size import sized
 
-ROUNDS = 201
-PYTHON_REPEATS = 50
+ROUNDS = sized(201, 3)
+PYTHON_REPEATS = sized(50, 2)
 #: 35 x 35 doubles of state and a counter: 10 kB.
 SOURCE = """
 class Large:

@@ -11,9 +11,11 @@ import tempfile
 import time
 from pathlib import Path
 
+from ..harness.size import sized
+
 CONFIG = Path(__file__).resolve().parents[3] / "examples/lander/fc/lander_control.json"
 #: Processes of which the figures are the best.
-LOOPS = 7
+LOOPS = sized(7, 1)
 _CHECK = """
 import sys, time
 from pathlib import Path

@@ -22,10 +22,12 @@ from typing import Any
 
 from fcsl_compiler.driver.cache import build_machine
 
+from ..harness.size import sized
+
 ROOT = Path(__file__).resolve().parents[3]
 VEHICLE = ROOT / "scripts/bench/machines/vehicle/vehicle.json"
 HZ = 1000
-SECONDS, ROUNDS = 10, 3
+SECONDS, ROUNDS = sized((10, 3), (1, 1))
 PRIORITY = 80
 QUANTILES = {"p50": 0.5, "p99": 0.99, "p999": 0.999}
 #: The largest latency that cyclictest keeps apart, us; later ones count as its maximum.

@@ -18,10 +18,12 @@ from fcsl_compiler.driver.cache import build_machine
 from simclient.library import runtime_program
 from simclient.twin.process_twin import ProcessTwin
 
+from ..harness.size import sized
+
 CONFIG = Path(__file__).resolve().parents[3] / "examples/lander/fc/lander_control.json"
 #: Works take turns in blocks, so that a busy computer is busy for all of them.
-BLOCKS, TRIPS = 60, 100
-MANY = 20_000
+BLOCKS, TRIPS = sized((60, 100), (1, 10))
+MANY = sized(20_000, 100)
 
 
 def process_times() -> dict[str, dict[str, float]]:

@@ -18,12 +18,13 @@ from simclient.bag import Bag
 from simclient.library import runtime_library
 
 from ..harness.native import BENCH, compile_program
+from ..harness.size import sized
 from .chain import build_chain
 from .lander import CONFIG
 
-ROUNDS = 41
-WRITE_TICKS = 150_000
-WRITE_ROUNDS = 5
+ROUNDS = sized(41, 1)
+WRITE_TICKS = sized(150_000, 2000)
+WRITE_ROUNDS = sized(5, 1)
 
 
 def _program(folder: Path) -> Path:

@@ -17,11 +17,13 @@ from rosbags.typesys import Stores, get_typestore
 
 from simclient.replay import replay_foreign
 
+from ..harness.size import sized
+
 ROOT = Path(__file__).resolve().parents[3]
 TICK_HZ = 1000
-SECONDS = 120
+SECONDS = sized(120, 2)
 RATES_HZ = (100, 200, 1000)
-REPEATS = 3
+REPEATS = sized(3, 1)
 MAP = """\
 channels:
   imu.gyro: /imu/data

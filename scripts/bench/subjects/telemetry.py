@@ -25,11 +25,12 @@ from simclient import Telemetry
 from simclient.library import runtime_library
 
 from ..harness.native import compile_program
+from ..harness.size import sized
 from .vars.main import SLOW, VEHICLE, instructions
 
 #: Of the flight whose packets are received: at 1 kHz, so about so many milliseconds.
-PACKETS = 5000
-ROUNDS, RUNS = 20, 5
+PACKETS = sized(5000, 500)
+ROUNDS, RUNS = sized((20, 5), (1, 1))
 #: What the sender sends of the vehicle.
 SENT = {"state of the machine": "machine.*", "all fields": "*"}
 

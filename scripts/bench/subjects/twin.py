@@ -19,11 +19,13 @@ from fcsl_compiler.driver.toolchain import FLAGS, compiler, include_dirs
 from simclient import AlgTwin, PyTwin
 from simclient.twin.black_box import BlackBox
 
+from ..harness.size import sized
+
 HERE = Path(__file__).resolve().parent
 CONFIG = HERE.parents[2] / "examples/lander/fc/lander_control.json"
-ROUNDS = 31
+ROUNDS = sized(31, 2)
 #: Ticks of one round, so that each takes some milliseconds.
-SINGLE, MANY, PYTHON = 5_000, 100_000, 20
+SINGLE, MANY, PYTHON = sized((5_000, 100_000, 20), (100, 1000, 2))
 
 
 def _loop(folder: Path) -> Any:

@@ -24,6 +24,7 @@ from fcsl_compiler.driver.library import emit
 from fcsl_compiler.driver.toolchain import FLAGS, compiler, include_dirs
 from simclient import PyTwin
 
+from ...harness.size import sized
 from ...peers.linear import casadi as linear_casadi
 from ...peers.linear.model import (
     GAINS,
@@ -41,8 +42,8 @@ from ...peers.linear.numba import attitude_numba, kalman_numba
 HERE = Path(__file__).resolve().parent
 #: The C of others, and what every kernel is called through (kernel.h).
 PEERS = HERE.parents[1] / "peers/linear"
-SIZES = (6, 9, 15)
-ROUNDS = 61
+SIZES = sized((6, 9, 15), (9,))
+ROUNDS = sized(61, 1)
 #: FCSL's own flags; peers get them with the contraction and the reassociation that they ship with (none).
 PORTABLE = list(FLAGS)
 NATIVE = [*FLAGS, "-march=native"]
@@ -50,7 +51,7 @@ CXX = [f.replace("c11", "c++17") for f in FLAGS if f != "-ffp-contract=off"]
 #: Beyond this the peers do not compute the same; they sum in other orders.
 MAX_APART = 1e-9
 #: Steps of the twin in CPython, which takes milliseconds for each.
-TWIN_STEPS = 50
+TWIN_STEPS = sized(50, 3)
 AT_RUN_TIME = {"kalman": "matrices set at run time", "attitude": "parameters set at run time"}
 
 Figures = dict[str, float]

@@ -3,6 +3,8 @@
 deadline in the stamp to the callback here, ticks, and the processor time that process PID used meanwhile.
 
     python3 listener.py PID WARM_UP_S WINDOW_S
+
+The warm-up begins with the first message: on a busy computer a node needs seconds to start.
 """
 
 from __future__ import annotations
@@ -23,6 +25,8 @@ from rclpy.node import Node
 from rclpy.qos import QoSProfile
 
 AXES = 20
+#: A node that published nothing by then is given up, seconds.
+FIRST_WITHIN_S = 60.0
 _NS = 1_000_000_000
 #: Encapsulation, stamp, empty frame_id, tick.
 _HEAD = struct.Struct("<4xiI8xQ")
@@ -66,6 +70,9 @@ def main() -> None:
     node = Listener()
     executor = EventsExecutor()
     executor.add_node(node)
+    given_up = time.monotonic() + FIRST_WITHIN_S
+    while not node.seen and time.monotonic() < given_up:
+        executor.spin_once(timeout_sec=1.0)
     node.spin(executor, warm_up_s)
     node.seen.clear()
     gc.disable()  # a collection here would look like a delay there

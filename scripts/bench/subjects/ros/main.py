@@ -23,11 +23,14 @@ from fcsl_bridge.domain import own_domain
 from fcsl_bridge.loopback import loopback_environment
 from fcsl_compiler.base.ament import package_prefix
 
+from ...harness.size import SUFFIX, sized
+
 ROOT = Path(__file__).resolve().parents[4]
 PACKAGE = ROOT / "scripts/bench/subjects/ros"
 PLAIN_NODE = ROOT / "scripts/bench/peers/plain_node.py"
 OUT = ROOT / "out/bench_ros"
-WARM_UP_S, WINDOW_S = 4.0, 10.0
+PICTURE = ROOT / f"out/bench_ros{SUFFIX}.png"
+WARM_UP_S, WINDOW_S = sized((4.0, 10.0), (0.5, 1.0))
 LIMIT_S = 300
 #: 1 of 10 ticks is published: 100 Hz.
 DECIMATE = 10
@@ -114,7 +117,7 @@ def realtime() -> dict[str, Any]:
 
 
 def draw(delays_us: dict[str, Any], figures: dict[str, Any]) -> None:
-    """out/bench_ros.png: both histograms of the delay, one above the other."""
+    """PICTURE: both histograms of the delay, one above the other."""
     from matplotlib.backends.backend_agg import FigureCanvasAgg
     from matplotlib.figure import Figure
 
@@ -135,7 +138,7 @@ def draw(delays_us: dict[str, Any], figures: dict[str, Any]) -> None:
         panel.set_ylabel("messages")
     axes[0].set_xscale("log")
     axes[1].set_xlabel("µs from a tick's deadline to a raw subscriber's callback (line: median, dashed: 99 %)")
-    figure.savefig(ROOT / "out/bench_ros.png", dpi=110)
+    figure.savefig(PICTURE, dpi=110)
 
 
 def lockstep() -> dict[str, Any]:

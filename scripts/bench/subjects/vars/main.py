@@ -26,11 +26,14 @@ from typing import Any
 from fcsl_compiler.driver.cache import build_machine
 
 from ...harness.native import compile_program
+from ...harness.size import sized
 
 ROOT = Path(__file__).resolve().parents[4]
 SLOW = ROOT / "scripts/bench/machines/slow/slow.json"
 VEHICLE = ROOT / "scripts/bench/machines/vehicle/vehicle.json"
-ROUND_TRIPS, TICKS, CLIENTS = 20_000, 60, 64
+ROUND_TRIPS, TICKS, CLIENTS = sized(20_000, 100), sized(60, 5), 64
+#: Of a run whose steps are timed.
+SECONDS = sized(5.0, 0.5)
 Requests = list[dict[str, Any]]
 
 LOOKING: Requests = [
@@ -165,11 +168,11 @@ def instructions(folder: Path, library: Path, program: Path, requests: Requests,
     return [int(line) for line in done.stdout.split()]
 
 
-def _step_time(folder: Path, requests: Requests, seconds: float = 5.0) -> dict[str, int]:
+def _step_time(folder: Path, requests: Requests) -> dict[str, int]:
     """The step's own histogram at 1 kHz (fcsl-fc's `stats`), of a run of a few seconds."""
     with _flying(folder, build_machine(VEHICLE).library) as (_, path), _connect(path) as client:
         with _flood(path, requests, CLIENTS - 1):  # who asks for the figures is a client, too
-            time.sleep(seconds)
+            time.sleep(SECONDS)
             client.sendall(b'{"cmd":"stats"}\n')
             reply: dict[str, Any] = json.loads(client.makefile().readline())
     return dict(reply["tick_time_ns"])

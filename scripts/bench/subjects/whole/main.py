@@ -21,6 +21,7 @@ from fcsl_compiler.model.machine import Entry, Machine
 from fcsl_compiler.model.types import Array
 
 from ...harness.native import BENCH, code_bytes, compile_program
+from ...harness.size import sized
 
 HERE = Path(__file__).resolve().parent
 ROOT = BENCH.parents[1]
@@ -28,7 +29,7 @@ ROOT = BENCH.parents[1]
 STEPPED = ROOT / "scripts/verify/instructions"
 #: Intel's Skylake family decodes a jump anew each time when it touches the end of 32 bytes of code, which is a matter of chance.
 PLACED = "-Wa,-mbranches-within-32B-boundaries"
-ROUNDS = 20_001
+ROUNDS = sized(20_001, 5)
 #: The two must be the same controller, or their times mean nothing.
 MAX_APART = 1e-9
 

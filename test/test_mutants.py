@@ -1,0 +1,80 @@
+# SPDX-License-Identifier: Apache-2.0
+"""Mutants of Python (scripts/verify/mutation): switched off the file is what it was, switched on it is what the report says."""
+
+from __future__ import annotations
+
+import sys
+import types
+from collections.abc import Callable
+from pathlib import Path
+
+import pytest
+
+sys.path.insert(0, str(Path(__file__).parents[1] / "scripts"))
+from verify.mutation.mutants import Equivalent, Mutant, draw, is_equivalent, with_switches
+from verify.mutation.python_points import points
+
+FILE = "some.py"
+SOURCE = b"""LIMIT = 3
+
+
+def total(values, limit=LIMIT):
+    found = []
+    for value in values:
+        if value < limit and not value == 1:
+            continue
+        found.append(value)
+    return (
+        len(found) * 2
+    ), found
+"""
+VALUES = [1, 2, 3, 4]
+#: Line, what became of the expression, and what `total` returns then.
+EXPECTED = [
+    (7, "value < limit or not value == 1", (0, [])),
+    (7, "value <= limit", (4, [1, 4])),
+    (7, "value >= limit", (4, [1, 2])),
+    (7, "value == 1", (6, [2, 3, 4])),
+    (7, "value != 1", (6, [2, 3, 4])),
+    (7, "2", (6, [2, 3, 4])),
+    (8, "", (8, [1, 2, 3, 4])),
+    (9, "", (0, [])),
+    (10, "None", None),
+    (11, "len(found) // 2", (1, [1, 3, 4])),
+    (11, "3", (9, [1, 3, 4])),
+]
+
+
+def total_of(mutants: list[Mutant], active: int, monkeypatch: pytest.MonkeyPatch) -> object:
+    hook = types.ModuleType("fcsl_mutants")
+    hook.mutant = lambda number: number == active  # type: ignore[attr-defined]
+    monkeypatch.setitem(sys.modules, "fcsl_mutants", hook)
+    scope: dict[str, Callable[[list[int]], object]] = {}
+    exec(with_switches(SOURCE, mutants, lambda n: f"__import__('fcsl_mutants').mutant({n})"), scope)
+    return scope["total"](VALUES)
+
+
+def test_every_mutant_is_what_it_says(monkeypatch: pytest.MonkeyPatch) -> None:
+    found = []
+    for point in points(SOURCE):
+        mutants = [Mutant(1, FILE, point)]
+        assert total_of(mutants, 0, monkeypatch) == (6, [1, 3, 4]), point
+        found.append((point.line, point.after, total_of(mutants, 1, monkeypatch)))
+    assert sorted(found, key=repr) == sorted(EXPECTED, key=repr)
+
+
+def test_drawn_mutants_are_switched_one_by_one(monkeypatch: pytest.MonkeyPatch) -> None:
+    chosen = draw(points(SOURCE), 4, "1", lambda _: True)
+    assert chosen == draw(points(SOURCE), 4, "1", lambda _: True) and len(chosen) == 4
+    mutants = [Mutant(n, FILE, point) for n, point in enumerate(chosen, 1)]
+    assert total_of(mutants, 0, monkeypatch) == (6, [1, 3, 4])
+    for m in mutants:
+        alone = total_of([Mutant(1, FILE, m.point)], 1, monkeypatch)
+        assert total_of(mutants, m.number, monkeypatch) == alone != (6, [1, 3, 4])
+
+
+def test_an_equivalent_is_known_by_the_text_of_its_line() -> None:
+    known = [Equivalent(FILE, "if value < limit and not value == 1:", "value <= limit", "an example")]
+    lines = SOURCE.decode().split("\n")
+    left = [p for p in points(SOURCE) if not is_equivalent(p, FILE, lines, known)]
+    assert [p.after for p in points(SOURCE) if p not in left] == ["value <= limit"]
