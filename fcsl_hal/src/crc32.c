@@ -5,27 +5,27 @@
  */
 #include "fcsl/fcsl_codec.h"
 
-/* A CRC is linear: an entry is the sum (^) of the entries of its bits. `v` with every choice of a to h added, in order. */
-#define BITS1(v, a)                      (v), (v) ^ (a)
-#define BITS2(v, a, b)                   BITS1(v, a), BITS1((v) ^ (b), a)
-#define BITS3(v, a, b, c)                BITS2(v, a, b), BITS2((v) ^ (c), a, b)
-#define BITS4(v, a, b, c, d)             BITS3(v, a, b, c), BITS3((v) ^ (d), a, b, c)
-#define BITS5(v, a, b, c, d, e)          BITS4(v, a, b, c, d), BITS4((v) ^ (e), a, b, c, d)
-#define BITS6(v, a, b, c, d, e, f)       BITS5(v, a, b, c, d, e), BITS5((v) ^ (f), a, b, c, d, e)
-#define BITS7(v, a, b, c, d, e, f, g)    BITS6(v, a, b, c, d, e, f), BITS6((v) ^ (g), a, b, c, d, e, f)
-#define BITS8(v, a, b, c, d, e, f, g, h) BITS7(v, a, b, c, d, e, f, g), BITS7((v) ^ (h), a, b, c, d, e, f, g)
+#include "crc_table.h"
 
 /* What byte i of eight leaves behind the eighth. The last number is the reflected polynomial; each other one follows from its
  * right neighbour (the last of a row from the first of the row below): n >> 1, ^ 0xedb88320 where n is odd. */
 static const uint32_t TABLES[8][256] = {
-    {BITS8(0u, 0xccaa009eu, 0x4225077du, 0x844a0efau, 0xd3e51bb5u, 0x7cbb312bu, 0xf9766256u, 0x299dc2edu, 0x533b85dau)},
-    {BITS8(0u, 0xa6770bb4u, 0x979f1129u, 0xf44f2413u, 0x33ef4e67u, 0x67de9cceu, 0xcfbd399cu, 0x440b7579u, 0x8816eaf2u)},
-    {BITS8(0u, 0xcb5cd3a5u, 0x4dc8a10bu, 0x9b914216u, 0xec53826du, 0x03d6029bu, 0x07ac0536u, 0x0f580a6cu, 0x1eb014d8u)},
-    {BITS8(0u, 0x3d6029b0u, 0x7ac05360u, 0xf580a6c0u, 0x30704bc1u, 0x60e09782u, 0xc1c12f04u, 0x58f35849u, 0xb1e6b092u)},
-    {BITS8(0u, 0xb8bc6765u, 0xaa09c88bu, 0x8f629757u, 0xc5b428efu, 0x5019579fu, 0xa032af3eu, 0x9b14583du, 0xed59b63bu)},
-    {BITS8(0u, 0x01c26a37u, 0x0384d46eu, 0x0709a8dcu, 0x0e1351b8u, 0x1c26a370u, 0x384d46e0u, 0x709a8dc0u, 0xe1351b80u)},
-    {BITS8(0u, 0x191b3141u, 0x32366282u, 0x646cc504u, 0xc8d98a08u, 0x4ac21251u, 0x958424a2u, 0xf0794f05u, 0x3b83984bu)},
-    {BITS8(0u, 0x77073096u, 0xee0e612cu, 0x076dc419u, 0x0edb8832u, 0x1db71064u, 0x3b6e20c8u, 0x76dc4190u, 0xedb88320u)},
+    {FCSL_CRC_TABLE(0xccaa009eu, 0x4225077du, 0x844a0efau, 0xd3e51bb5u, 0x7cbb312bu, 0xf9766256u, 0x299dc2edu,
+                    0x533b85dau)},
+    {FCSL_CRC_TABLE(0xa6770bb4u, 0x979f1129u, 0xf44f2413u, 0x33ef4e67u, 0x67de9cceu, 0xcfbd399cu, 0x440b7579u,
+                    0x8816eaf2u)},
+    {FCSL_CRC_TABLE(0xcb5cd3a5u, 0x4dc8a10bu, 0x9b914216u, 0xec53826du, 0x03d6029bu, 0x07ac0536u, 0x0f580a6cu,
+                    0x1eb014d8u)},
+    {FCSL_CRC_TABLE(0x3d6029b0u, 0x7ac05360u, 0xf580a6c0u, 0x30704bc1u, 0x60e09782u, 0xc1c12f04u, 0x58f35849u,
+                    0xb1e6b092u)},
+    {FCSL_CRC_TABLE(0xb8bc6765u, 0xaa09c88bu, 0x8f629757u, 0xc5b428efu, 0x5019579fu, 0xa032af3eu, 0x9b14583du,
+                    0xed59b63bu)},
+    {FCSL_CRC_TABLE(0x01c26a37u, 0x0384d46eu, 0x0709a8dcu, 0x0e1351b8u, 0x1c26a370u, 0x384d46e0u, 0x709a8dc0u,
+                    0xe1351b80u)},
+    {FCSL_CRC_TABLE(0x191b3141u, 0x32366282u, 0x646cc504u, 0xc8d98a08u, 0x4ac21251u, 0x958424a2u, 0xf0794f05u,
+                    0x3b83984bu)},
+    {FCSL_CRC_TABLE(0x77073096u, 0xee0e612cu, 0x076dc419u, 0x0edb8832u, 0x1db71064u, 0x3b6e20c8u, 0x76dc4190u,
+                    0xedb88320u)},
 };
 
 static uint32_t eight_bytes(uint32_t value, const uint8_t *in)

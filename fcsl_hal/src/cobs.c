@@ -1,0 +1,72 @@
+/* SPDX-License-Identifier: Apache-2.0
+ *
+ * Consistent Overhead Byte Stuffing: a block is a number n from 1 to 255 and the n - 1 bytes up to the next zero, which is left
+ * out (or n = 255, after which no zero is meant).
+ */
+#include "fcsl/fcsl_cobs.h"
+
+enum { BLOCK_MAX = 255 };
+
+size_t fcsl_cobs_encode(const uint8_t *frame, size_t size, uint8_t bytes[FCSL_COBS_BYTES_MAX])
+{
+    size_t code_at = 0;
+    size_t end = 1;
+    uint8_t code = 1;
+    for (size_t i = 0; i < size; i++) {
+        if (code == BLOCK_MAX) {
+            bytes[code_at] = code;
+            code_at = end++;
+            code = 1;
+        }
+        if (frame[i] != 0) {
+            bytes[end++] = frame[i];
+            code++;
+        } else {
+            bytes[code_at] = code;
+            code_at = end++;
+            code = 1;
+        }
+    }
+    bytes[code_at] = code;
+    bytes[end++] = 0;
+    return end;
+}
+
+static void append(fcsl_cobs_decoder_t *decoder, uint8_t byte)
+{
+    if (decoder->size == FCSL_LINK_FRAME_MAX) {
+        decoder->refused = 1;
+        return;
+    }
+    decoder->frame[decoder->size++] = byte;
+}
+
+/* A zero: the end of a frame, or of something else. */
+static size_t finish(fcsl_cobs_decoder_t *decoder)
+{
+    const size_t size = !decoder->refused && decoder->left == 0 ? decoder->size : 0;
+    decoder->garbage += size == 0 && (decoder->size > 0 || decoder->left > 0 || decoder->refused);
+    decoder->size = 0;
+    decoder->left = 0;
+    decoder->zero = 0;
+    decoder->refused = 0;
+    return size;
+}
+
+size_t fcsl_cobs_decode(fcsl_cobs_decoder_t *decoder, uint8_t byte)
+{
+    if (byte == 0) {
+        return finish(decoder);
+    }
+    if (decoder->left > 0) {
+        append(decoder, byte);
+        decoder->left--;
+        return 0;
+    }
+    if (decoder->zero) {
+        append(decoder, 0);
+    }
+    decoder->left = (uint8_t)(byte - 1u);
+    decoder->zero = byte < BLOCK_MAX;
+    return 0;
+}
