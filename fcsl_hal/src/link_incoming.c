@@ -5,7 +5,8 @@
 #include "link_bytes.h"
 #include "link_port.h"
 
-_Static_assert(FCSL_LINK_PAYLOAD_MAX + FCSL_LINK_SIZE_BYTES <= FCSL_LINK_BUFFER, "a frame's message fits an empty port");
+_Static_assert(FCSL_LINK_PAYLOAD_MAX + FCSL_LINK_SIZE_BYTES <= FCSL_LINK_BUFFER,
+               "a frame's message fits an empty port");
 
 /* The size of a message precedes it in the ring, in the order of this processor's bytes. */
 static void put_size(fcsl_link_bytes_t *ring, uint32_t offset, uint32_t size)

@@ -167,7 +167,8 @@ static void test_reliable(const faults_t *faults)
             }
             /* A host that reads little slows its peer down and loses nothing. */
             size_t size = 0;
-            for (int i = 0; i < 2 && fcsl_link_receive(ends[end], RELIABLE, received, sizeof received, &size) == 0; i++) {
+            for (int i = 0; i < 2 && fcsl_link_receive(ends[end], RELIABLE, received, sizeof received, &size) == 0;
+                 i++) {
                 fill(got[end], size_of(got[end]));
                 CHECK(size == size_of(got[end]) && memcmp(received, message, size) == 0);
                 got[end]++;

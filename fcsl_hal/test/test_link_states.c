@@ -65,12 +65,13 @@ static const fcsl_link_policy_t POLICIES[FCSL_LINK_PORTS] = {FCSL_LINK_RELIABLE}
 
 /* ---- messages ----------------------------------------------------------------------------------------------------- */
 
-/* Message `number` (from 1) of a session: of one frame, of two, of none. */
+/* Message `number` (from 1) of a session: of two frames and of one in turn, so that half a message of a session is never like
+ * the first one of the next. */
 static size_t message_of(uint16_t session, uint8_t number, uint8_t message[4])
 {
     const uint8_t bytes[4] = {number, (uint8_t)session, 0x5a, 0xa5};
     memcpy(message, bytes, sizeof bytes);
-    return number % 2 == 1 ? 3u : 2u;
+    return (number + session / ENDS) % 2 == 1 ? 3u : 2u;
 }
 
 static void read_messages(state_t *state, int end)

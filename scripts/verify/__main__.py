@@ -16,6 +16,7 @@ ALONE = {
     "fuzz_telemetry": "fuzz.telemetry",
     "instruction_table": "instructions.table",
     "instructions": "instructions.main",
+    "link": "link.main",
     "mutation": "mutation.main",
     "pil": "pil.main",
     "sanitize": "sanitize.main",

@@ -88,6 +88,7 @@ CHECKS = (
         "test_fuzz.py",
         *("--fuzz", scaled("500", "5000"), "--fuzz-seed", "2"),
     ),
+    script("link layer: every state of two small ends, with seeded defects", "link"),
     script("processor in the loop: the lander's controller on a Cortex-M7", "pil"),
     Check(
         "benchmarks: every one of make bench runs, in its smallest size",

@@ -84,9 +84,7 @@ class Frame:
         if len(body) < header.size:
             raise FrameError("malformed")
         _, second, session, sequence, to, acknowledge = (*header.unpack_from(body), 0, 0)[:6]
-        frame = Frame(
-            kind, session, sequence, to, acknowledge, second & 15, Flag(second >> 4 & 7), body[header.size :]
-        )
+        frame = Frame(kind, session, sequence, to, acknowledge, second & 15, Flag(second >> 4 & 7), body[header.size :])
         strange = second >> 4 & ~_ALLOWED.get(kind, Flag.NONE)
         empty = kind in (Kind.HELLO, Kind.ACKNOWLEDGEMENT)
         if strange or not session or len(frame.payload) > (0 if empty else PAYLOAD_MAX):

@@ -117,9 +117,7 @@ class Port:
         ends = [i for i in range(self._confirmed) if Flag.LAST in self._waiting[i][0]]
         done = ends[-1] + 1 if ends else 0
         self._pop(done)
-        self._confirmed, self._sent, self._sent_max = (
-            n - done for n in (self._confirmed, self._sent, self._sent_max)
-        )
+        self._confirmed, self._sent, self._sent_max = (n - done for n in (self._confirmed, self._sent, self._sent_max))
 
     def restart(self) -> None:
         """The peer is a new one."""
