@@ -3,20 +3,11 @@
 
 from __future__ import annotations
 
-import struct
-import zlib
-
 from simclient.descriptor import Machine
 from simclient.errors import did_you_mean
+from simclient.link.message import MessageError, without
 
 from .errors import BridgeError
-
-#: fcsl_codec.h: offset of the count of entries; the count; the bytes up to the entries; an entry's header.
-_HEAD_BYTES = 24
-_COUNT = struct.Struct("<H")
-_COUNT_OFFSET = 20
-_ENTRY = struct.Struct("<HH")
-_CRC = struct.Struct("<I")
 
 
 class Dropouts:
@@ -45,28 +36,15 @@ class Dropouts:
         self._left = {name: ticks - 1 for name, ticks in self._left.items() if ticks > 1}
         return names
 
-    def strip(self, frame: bytes) -> bytes:
-        """A sensor frame (fcsl_codec.h) without the channels that are missing in its tick.
+    def strip(self, message: bytes) -> bytes:
+        """A sensor message (docs/wire.md) without the channels that are missing in its tick.
 
         Other bytes are returned unchanged.
         """
         missing = {self._ids[name] for name in self.missing()}
         if not missing:
-            return frame
+            return message
         try:
-            return _without(frame, missing)
-        except struct.error:
-            return frame
-
-
-def _without(frame: bytes, ids: set[int]) -> bytes:
-    (count,) = _COUNT.unpack_from(frame, _COUNT_OFFSET)
-    kept, at = [], _HEAD_BYTES
-    for _ in range(count):
-        number, size = _ENTRY.unpack_from(frame, at)
-        if number not in ids:
-            kept.append(frame[at : at + _ENTRY.size + size])
-        at += _ENTRY.size + size
-    head = frame[:_COUNT_OFFSET] + _COUNT.pack(len(kept)) + frame[_COUNT_OFFSET + _COUNT.size : _HEAD_BYTES]
-    body = head + b"".join(kept)
-    return body + _CRC.pack(zlib.crc32(body))
+            return without(message, missing)
+        except MessageError:
+            return message

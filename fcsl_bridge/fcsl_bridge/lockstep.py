@@ -2,8 +2,8 @@
 """The lock-step protocol: two processes step together, tick by tick, with the results of one process.
 
     simulator end                    <machine>/lockstep/…                                controller end
-    send(k, frame)      sensors  ── TICK k, frame ──►                next() returns the frame; the machine steps k
-    answer() returns    ◄── TICK k, frame ── actuators                                   answer(frame)
+    send(k, message)      sensors  ── TICK k, message ──►                next() returns the message; the machine steps k
+    answer() returns    ◄── TICK k, message ── actuators                                   answer(message)
     alive()             sensors  ── ALIVE k ──►              next() keeps waiting: the simulator is paused, or waits for others
     (answer waits on)   ◄── ALIVE k ── actuators                 alive(): the controller is not active
     reset(), send(0, …) sensors  ── TICK 0 of run r + 1 ──►          next() reports a new run
@@ -49,7 +49,7 @@ _RUN_MASK = 0xFFFFFFFF
 _END_TIMEOUT = Duration(seconds=5)
 _NS = 1_000_000_000
 
-#: CDR: encapsulation; stamp, frame_id ("": length 1 and a NUL), tick, run, machine, kind, length of the frame.
+#: CDR: encapsulation; stamp, frame_id ("": length 1 and a NUL), tick, run, machine, kind, length of the message.
 _HEAD = struct.Struct("<4s iI IB3x Q I 4x Q B3x I".replace(" ", ""))
 _ENCAPSULATION = b"\x00\x01\x00\x00"
 _EMPTY_TEXT = (1, 0)
@@ -63,7 +63,7 @@ class Bundle:
     run: int
     machine: int
     kind: int
-    frame: bytes = b""
+    message: bytes = b""
 
 
 def pack(bundle: Bundle, time_ns: int) -> bytes:
@@ -71,7 +71,7 @@ def pack(bundle: Bundle, time_ns: int) -> bytes:
     second, nanosecond = divmod(time_ns, _NS)
     b = bundle
     stamp = (second, nanosecond, *_EMPTY_TEXT)
-    return _HEAD.pack(_ENCAPSULATION, *stamp, b.tick, b.run, b.machine, b.kind, len(b.frame)) + b.frame
+    return _HEAD.pack(_ENCAPSULATION, *stamp, b.tick, b.run, b.machine, b.kind, len(b.message)) + b.message
 
 
 def unpack(data: bytes) -> Bundle:
@@ -82,7 +82,7 @@ def unpack(data: bytes) -> Bundle:
     if magic[:2] != _ENCAPSULATION[:2] or tuple(text) != _EMPTY_TEXT or kind not in (TICK, END, ALIVE):
         raise BridgeError("a damaged bundle: not little-endian CDR with an empty frame_id and a known kind")
     if len(data) - _HEAD.size < size:
-        raise BridgeError(f"a damaged bundle: a frame of {size} bytes, of which {len(data) - _HEAD.size} are there")
+        raise BridgeError(f"a damaged bundle: a message of {size} bytes, of which {len(data) - _HEAD.size} are there")
     return Bundle(tick, run, machine, kind, data[_HEAD.size : _HEAD.size + size])
 
 
@@ -99,7 +99,7 @@ class Sensors:
     """The input of one controller tick. `first`: the first tick of a run, for which the machine restarts."""
 
     tick: int
-    frame: bytes
+    message: bytes
     first: bool
 
 
@@ -119,13 +119,13 @@ class _End:
         self._publisher = qos.publisher(node, TickBundle, f"{base}/lockstep/{self.speaks}s", qos.LOCKSTEP)
         self._said = self._deadline = self._timeout_s = 0.0
         self._hint = ""
-        self._taken = (-1, -1, b"")  # run, tick and frame of the last accepted bundle
+        self._taken = (-1, -1, b"")  # run, tick and message of the last accepted bundle
         self.due = 0  #: the tick that the next TICK bundle must carry
         self.dropped = 0  #: duplicate bundles
 
-    def _say(self, kind: int, tick: int, run: int, frame: bytes = b"") -> None:
+    def _say(self, kind: int, tick: int, run: int, message: bytes = b"") -> None:
         self._said = time.monotonic()
-        self._publisher.publish(pack(Bundle(tick, run, self._hash, kind, frame), self._machine.time_ns(tick)))
+        self._publisher.publish(pack(Bundle(tick, run, self._hash, kind, message), self._machine.time_ns(tick)))
 
     def _say_alive(self, tick: int, run: int) -> None:
         if self._silent:
@@ -173,16 +173,16 @@ class _End:
     def _drop(self, bundle: Bundle) -> None:
         """Counts a duplicate bundle. Raises BridgeError if its content differs from the first."""
         self.dropped += 1
-        if bundle.kind == TICK and (bundle.run, bundle.tick) == self._taken[:2] and bundle.frame != self._taken[2]:
+        if bundle.kind == TICK and (bundle.run, bundle.tick) == self._taken[:2] and bundle.message != self._taken[2]:
             raise BridgeError(
                 f"the {self.hears} bundle of tick {bundle.tick} arrived a second time with other content on "
                 f"{self._heard.topic}; is more than one {self.other} running?"
             )
 
     def _take(self, bundle: Bundle) -> bytes:
-        """Accepts the bundle that was due; returns its frame."""
-        self._taken = (bundle.run, bundle.tick, bundle.frame)
-        return bundle.frame
+        """Accepts the bundle that was due; returns its message."""
+        self._taken = (bundle.run, bundle.tick, bundle.message)
+        return bundle.message
 
     def _lost(self, bundle: Bundle) -> BridgeError:
         return BridgeError(f"no {self.hears} bundle of tick {self.due}: that of tick {bundle.tick} came instead")
@@ -207,24 +207,24 @@ class SimulatorEnd(_End):
     def __init__(self, node: Node, machine: Machine, serve: Callable[[], None], name_space: str = ""):
         super().__init__(node, machine, serve, name_space)
         self.run = _run_number()
-        self._sent = b""  # the frame of the last sent tick
+        self._sent = b""  # the message of the last sent tick
         self._answer: bytes | None = None  # the answer to it
 
-    def send(self, tick: int, frame: bytes) -> None:
+    def send(self, tick: int, message: bytes) -> None:
         """Sends the sensors of tick `tick`."""
         self.due = tick
-        self._sent, self._answer = frame, None
-        self._say(TICK, tick, self.run, frame)
+        self._sent, self._answer = message, None
+        self._say(TICK, tick, self.run, message)
 
     def answer(self, timeout_s: float) -> bytes:
-        """The actuator frame of the last sent tick. Raises BridgeError, and Left if the controller ends."""
+        """The actuator message of the last sent tick. Raises BridgeError, and Left if the controller ends."""
         self._expect(timeout_s)
         while self._answer is None:
             self._answer = self._judge(self._hear())
         return self._answer
 
     def _judge(self, bundle: Bundle) -> bytes | None:
-        """The bundle's frame, if it is the answer that is due."""
+        """The bundle's message, if it is the answer that is due."""
         if bundle.run > self.run:
             self._take_over(bundle)
         elif bundle.run < self.run or bundle.tick < self.due:
@@ -321,10 +321,10 @@ class ControllerEnd(_End):
             self._hint = f"; it was at tick {tick} already: reset it (service ~/reset) or start it after this node"
             self._node.get_logger().warning(f"waiting for tick 0 from the simulator{self._hint}")
 
-    def answer(self, frame: bytes) -> None:
+    def answer(self, message: bytes) -> None:
         """Answers the tick that next() returned."""
         assert self._run is not None, "answer() before next()"
-        self._say(TICK, self.due, self._run, frame)
+        self._say(TICK, self.due, self._run, message)
         self.due += 1
 
     def alive(self) -> None:

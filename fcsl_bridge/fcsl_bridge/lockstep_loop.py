@@ -50,7 +50,7 @@ class LockstepLoop:
             if sensors.first and run.tick != 0:
                 hosted.start_over()
             try:
-                run.sense(hosted.dropouts.strip(sensors.frame))
+                run.sense(hosted.dropouts.strip(sensors.message))
             except TwinError as error:
                 raise BridgeError(f"tick {sensors.tick}: {error}") from None
             run.step(1)

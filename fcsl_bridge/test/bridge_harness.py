@@ -163,9 +163,9 @@ class HandSimulator:
         self.publisher = listener.node.create_publisher(TickBundle, SENSORS, qos.LOCKSTEP)
         listener.node.create_subscription(TickBundle, ACTUATORS, self.answers.append, qos.LOCKSTEP)
 
-    def send(self, tick: int, frame: bytes, *, kind: int = 0, run: int = 1) -> None:
+    def send(self, tick: int, message: bytes, *, kind: int = 0, run: int = 1) -> None:
         machine = self.sim.machine
-        bundle = Bundle(tick, run, int(machine.source_hash[:16], 16), kind, frame)
+        bundle = Bundle(tick, run, int(machine.source_hash[:16], 16), kind, message)
         self.publisher.publish(pack(bundle, machine.time_ns(tick)))
 
     def tick(self) -> None:
@@ -174,7 +174,7 @@ class HandSimulator:
         self.send(due, self.sim.sense())
         self.listener.until(lambda: len(self.answers) > due)
         assert self.answers[due].tick == due
-        self.sim.actuate(bytes(self.answers[due].frame))
+        self.sim.actuate(bytes(self.answers[due].message))
 
     def end(self) -> None:
         self.send(self.sim.tick, b"", kind=END)

@@ -42,7 +42,7 @@ def take(bundle: TickBundle) -> None:
         bundle.tick += 1
         publisher.publish(bundle)
     elif deed == "corrupt":
-        bundle.frame[30] ^= 0x10
+        bundle.message[30] ^= 0x10
         publisher.publish(bundle)
     elif deed == "alien":
         bundle.machine = 255

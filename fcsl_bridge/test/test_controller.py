@@ -72,7 +72,7 @@ def test_a_manager_leads_the_node_through_its_states(domain: Domain) -> None:
     assert not sim.answers, "an inactive node does not tick"
     assert client.change(ACTIVATE) and client.state == "active"
     sim.listener.until(lambda: len(sim.answers) == 1)
-    sim.sim.actuate(bytes(sim.answers[0].frame))
+    sim.sim.actuate(bytes(sim.answers[0].message))
     for _ in range(50):
         sim.tick()
     assert client.change(DEACTIVATE) and client.change(ACTIVATE), "it continues at the next tick"
@@ -231,7 +231,7 @@ def fly(sim: HandSimulator, run: int, ticks: int) -> None:
     """Runs the first ticks of a run; answers of other controllers are received, too."""
 
     def answer(tick: int) -> list[bytes]:
-        return [bytes(a.frame) for a in sim.answers if (a.run, a.tick) == (run, tick)]
+        return [bytes(a.message) for a in sim.answers if (a.run, a.tick) == (run, tick)]
 
     for tick in range(ticks):
         sim.send(tick, sim.sim.sense(), run=run)

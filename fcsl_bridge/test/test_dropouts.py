@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Sensor frames without some of their channels stay valid frames."""
+"""Sensor messages without some of their channels stay valid messages."""
 
 from __future__ import annotations
 
@@ -43,13 +43,13 @@ def test_what_is_missing_grows_old_and_the_rest_does_not() -> None:
     run.close()
 
 
-@pytest.mark.parametrize("frame", [b"", b"FCSF", bytes(24), b"FCSF" + bytes(16) + b"\xff\xff" + bytes(40)])
-def test_what_is_no_frame_is_left_to_who_checks_it(frame: bytes) -> None:
+@pytest.mark.parametrize("message", [b"", b"\0\xff", bytes(24), b"\0\xff\4" + bytes(16) + b"\xff\xff" + bytes(40)])
+def test_what_is_no_message_is_left_to_who_checks_it(message: bytes) -> None:
     run = open_run(*find_machine("lander/lander_control"))
     dropouts = Dropouts(run.machine)
     dropouts.add(run.machine.channels[0].name, 3)
-    with pytest.raises(Exception, match="sensor frame refused"):
-        run.sense(dropouts.strip(frame))
+    with pytest.raises(Exception, match="sensor message refused"):
+        run.sense(dropouts.strip(message))
     with pytest.raises(BridgeError, match="no sensor channel `nothing`; there are "):
         dropouts.add("nothing", 1)
     run.close()

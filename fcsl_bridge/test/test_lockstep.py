@@ -116,7 +116,7 @@ def test_a_lost_bundle_is_named(domain: Domain, topic: str, missed: int) -> None
     ("deed", "message"),
     [
         ("skip", "no sensor bundle of tick 17: that of tick 18 came instead"),
-        ("corrupt", "tick 17: sensor frame refused"),
+        ("corrupt", "tick 17: sensor message refused"),
         ("alien", "carries bundles of machine 00000000000000ff, but this is lander_control"),
         ("name", "a damaged bundle: not little-endian CDR with an empty frame_id"),
     ],

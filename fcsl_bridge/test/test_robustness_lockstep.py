@@ -122,7 +122,7 @@ def test_a_controller_that_comes_too_late_disturbs_nobody(domain: Domain) -> Non
 
 
 def test_whatever_a_bundle_holds_is_a_bundle_or_an_error() -> None:
-    whole = pack(Bundle(17, 1, 2**63, TICK, b"frame"), 170_000_000)
+    whole = pack(Bundle(17, 1, 2**63, TICK, b"message"), 170_000_000)
     noise = random.Random(4)
     for _ in range(3000):
         data = bytearray(whole[: noise.randrange(len(whole) + 1)])
@@ -133,7 +133,7 @@ def test_whatever_a_bundle_holds_is_a_bundle_or_an_error() -> None:
             bundle = unpack(bytes(data))
         except BridgeError:
             continue
-        assert len(bundle.frame) <= len(data)
+        assert len(bundle.message) <= len(data)
 
 
 @pytest.mark.parametrize("data", [b"\x00\x01\x00\x00", b"\x00\x01\x00\x00" + b"\xff" * 4096])

@@ -941,6 +941,7 @@ CONFIGS: dict[str, str] = {
             [s["schedule"].update({n: {"every": 1} for n in s["schedule"]}) for s in c["states"].values()],
         )
     ),
+    "E204 a reserved id": channel({"id": 0xFF00}),
     "E204 no time": edge(after_s=0),
     "E204 before the beginning": edge(after_s=-1.5),
     "E204 too long a time": edge(after_s=1.1e12),

@@ -4,20 +4,20 @@
  */
 #include "fcsl/fcsl_hal.h"
 
-static fcsl_hal_status_t stub_sample(void *ctx, uint64_t tick, uint8_t *bytes, size_t capacity, fcsl_frame_t *frame)
+static fcsl_hal_status_t stub_sample(void *ctx, uint64_t tick, uint8_t *bytes, size_t capacity, fcsl_message_t *message)
 {
     (void)ctx;
     (void)tick;
     (void)bytes;
     (void)capacity;
-    (void)frame;
+    (void)message;
     return FCSL_HAL_NONE;
 }
 
-static fcsl_hal_status_t stub_actuate(void *ctx, const fcsl_frame_t *frame)
+static fcsl_hal_status_t stub_actuate(void *ctx, const fcsl_message_t *message)
 {
     (void)ctx;
-    (void)frame;
+    (void)message;
     return FCSL_HAL_OK;
 }
 

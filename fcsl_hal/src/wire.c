@@ -1,7 +1,7 @@
 /* SPDX-License-Identifier: Apache-2.0
  *
  * The controller's end of the wire. An I/O thread takes packets off the socket, checks them and fills slots; the step
- * thread takes frames out of the slots, waiting on a condition variable with a time limit, and sends without waiting.
+ * thread takes messages out of the slots, waiting on a condition variable with a time limit, and sends without waiting.
  */
 #define _GNU_SOURCE
 #include <errno.h>
@@ -26,7 +26,7 @@ enum { SLOTS = 4, TEXT_BYTES = 512, CONNECT_RETRY_MS = 20 };
 typedef enum { LINK_UP = 0, LINK_ENDED = 1, LINK_LOST = 2, LINK_INTERRUPTED = 3 } link_t;
 
 typedef struct {
-    fcsl_frame_t frame; /* its bytes are in `bytes` */
+    fcsl_message_t message; /* its bytes are in `bytes` */
     uint8_t *bytes;
 } slot_t;
 
@@ -47,7 +47,7 @@ typedef struct {
     uint32_t used;
     link_t link;
     int stopping;
-    uint64_t frames_dropped;
+    uint64_t messages_dropped;
 } wire_t;
 
 static void set_link(wire_t *wire, link_t link)
@@ -60,17 +60,17 @@ static void set_link(wire_t *wire, link_t link)
     (void)pthread_mutex_unlock(&wire->lock);
 }
 
-/* The frame with its bytes copied to `bytes`. */
-static fcsl_frame_t moved(const fcsl_frame_t *frame, uint8_t *bytes)
+/* The message with its bytes copied to `bytes`. */
+static fcsl_message_t moved(const fcsl_message_t *message, uint8_t *bytes)
 {
-    fcsl_frame_t copy = *frame;
-    memcpy(bytes, frame->bytes, frame->size);
+    fcsl_message_t copy = *message;
+    memcpy(bytes, message->bytes, message->size);
     copy.bytes = bytes;
     return copy;
 }
 
-/* Puts the frame in the inbox into a slot, waiting for a free one; the socket's own buffer holds back the peer. */
-static void store_frame(wire_t *wire, const fcsl_frame_t *frame)
+/* Puts the message in the inbox into a slot, waiting for a free one; the socket's own buffer holds back the peer. */
+static void store_message(wire_t *wire, const fcsl_message_t *message)
 {
     (void)pthread_mutex_lock(&wire->lock);
     while (wire->used == SLOTS && !wire->stopping) {
@@ -78,7 +78,7 @@ static void store_frame(wire_t *wire, const fcsl_frame_t *frame)
     }
     if (wire->used < SLOTS) {
         slot_t *slot = &wire->slots[(wire->first + wire->used) % SLOTS];
-        slot->frame = moved(frame, slot->bytes);
+        slot->message = moved(message, slot->bytes);
         wire->used++;
         (void)pthread_cond_broadcast(&wire->changed);
     }
@@ -97,18 +97,18 @@ static int receive_packet(wire_t *wire)
         return 0;
     }
     const size_t size = (size_t)got;
-    fcsl_frame_t frame;
+    fcsl_message_t message;
     fcsl_wire_packet_t packet;
     if (size <= wire->slot_bytes &&
-        fcsl_frame_check(&wire->table, FCSL_SENSOR, wire->inbox, size, &frame) == FCSL_FRAME_OK) {
-        store_frame(wire, &frame);
+        fcsl_message_check(&wire->table, FCSL_SENSOR_MESSAGE, wire->inbox, size, &message) == FCSL_MESSAGE_OK) {
+        store_message(wire, &message);
     } else if (size <= wire->slot_bytes && fcsl_wire_parse(wire->inbox, size, &packet) == 0 &&
                packet.kind == FCSL_WIRE_END) {
         set_link(wire, LINK_ENDED);
         return 0;
     } else {
         (void)pthread_mutex_lock(&wire->lock);
-        wire->frames_dropped++;
+        wire->messages_dropped++;
         (void)pthread_mutex_unlock(&wire->lock);
     }
     return 1;
@@ -129,22 +129,23 @@ static void *run_io(void *argument)
     }
 }
 
-/* Takes the frame of `tick` out of the slots if it is there; older ones are dropped. Called with the lock held. */
-static fcsl_hal_status_t take_frame(wire_t *wire, uint64_t tick, uint8_t *bytes, size_t capacity, fcsl_frame_t *frame)
+/* Takes the message of `tick` out of the slots if it is there; older ones are dropped. Called with the lock held. */
+static fcsl_hal_status_t take_message(wire_t *wire, uint64_t tick, uint8_t *bytes, size_t capacity,
+                                      fcsl_message_t *message)
 {
     while (wire->used > 0) {
         const slot_t *slot = &wire->slots[wire->first];
-        if (slot->frame.tick > tick) {
+        if (slot->message.tick > tick) {
             (void)snprintf(wire->text, sizeof wire->text,
-                           "sensor frame of tick %" PRIu64 " came while tick %" PRIu64 " was due", slot->frame.tick,
+                           "sensor message of tick %" PRIu64 " came while tick %" PRIu64 " was due", slot->message.tick,
                            tick);
             return FCSL_HAL_ERROR;
         }
-        const int wanted = slot->frame.tick == tick && slot->frame.size <= capacity;
+        const int wanted = slot->message.tick == tick && slot->message.size <= capacity;
         if (wanted) {
-            *frame = moved(&slot->frame, bytes);
+            *message = moved(&slot->message, bytes);
         } else {
-            wire->frames_dropped++;
+            wire->messages_dropped++;
         }
         wire->first = (wire->first + 1u) % SLOTS;
         wire->used--;
@@ -158,14 +159,14 @@ static fcsl_hal_status_t take_frame(wire_t *wire, uint64_t tick, uint8_t *bytes,
         return FCSL_HAL_CLOSED;
     }
     if (wire->link == LINK_LOST) {
-        (void)snprintf(wire->text, sizeof wire->text, "the simulator went away before sensor frame of tick %" PRIu64,
+        (void)snprintf(wire->text, sizeof wire->text, "the simulator went away before sensor message of tick %" PRIu64,
                        tick);
         return FCSL_HAL_ERROR;
     }
     return FCSL_HAL_NONE;
 }
 
-static fcsl_hal_status_t wire_sample(void *ctx, uint64_t tick, uint8_t *bytes, size_t capacity, fcsl_frame_t *frame)
+static fcsl_hal_status_t wire_sample(void *ctx, uint64_t tick, uint8_t *bytes, size_t capacity, fcsl_message_t *message)
 {
     wire_t *wire = ctx;
     struct timespec deadline = {0};
@@ -179,19 +180,19 @@ static fcsl_hal_status_t wire_sample(void *ctx, uint64_t tick, uint8_t *bytes, s
     int timed_out = 0;
     while (status == FCSL_HAL_NONE) {
         if (wire->link == LINK_INTERRUPTED) {
-            (void)snprintf(wire->text, sizeof wire->text, "interrupted while waiting for sensor frame of tick %" PRIu64,
-                           tick);
+            (void)snprintf(wire->text, sizeof wire->text,
+                           "interrupted while waiting for sensor message of tick %" PRIu64, tick);
             status = FCSL_HAL_CLOSED;
             break;
         }
-        status = take_frame(wire, tick, bytes, capacity, frame);
+        status = take_message(wire, tick, bytes, capacity, message);
         if (status == FCSL_HAL_NONE && timed_out) {
-            (void)snprintf(wire->text, sizeof wire->text, "no sensor frame of tick %" PRIu64 " within %" PRIu32 " ms",
+            (void)snprintf(wire->text, sizeof wire->text, "no sensor message of tick %" PRIu64 " within %" PRIu32 " ms",
                            tick, wire->timeout_ms);
-            if (wire->frames_dropped > 0) {
+            if (wire->messages_dropped > 0) {
                 const size_t length = strlen(wire->text);
                 (void)snprintf(wire->text + length, sizeof wire->text - length,
-                               " (%" PRIu64 " malformed or late frames dropped)", wire->frames_dropped);
+                               " (%" PRIu64 " malformed or late messages dropped)", wire->messages_dropped);
             }
             status = FCSL_HAL_TIMEOUT;
         } else if (status == FCSL_HAL_NONE) {
@@ -202,28 +203,28 @@ static fcsl_hal_status_t wire_sample(void *ctx, uint64_t tick, uint8_t *bytes, s
     return status;
 }
 
-static fcsl_hal_status_t wire_actuate(void *ctx, const fcsl_frame_t *frame)
+static fcsl_hal_status_t wire_actuate(void *ctx, const fcsl_message_t *message)
 {
     wire_t *wire = ctx;
-    const uint64_t tick = frame->tick;
-    /* In lock-step no more than one frame is under way, so a full buffer means that the peer is out of step. */
-    if (send(wire->fd, frame->bytes, frame->size, MSG_NOSIGNAL | MSG_DONTWAIT) >=
+    const uint64_t tick = message->tick;
+    /* In lock-step no more than one message is under way, so a full buffer means that the peer is out of step. */
+    if (send(wire->fd, message->bytes, message->size, MSG_NOSIGNAL | MSG_DONTWAIT) >=
         0) { /* a packet goes whole or not at all */
         return FCSL_HAL_OK;
     }
     if (errno != EPIPE && errno != ECONNRESET) {
-        (void)snprintf(wire->text, sizeof wire->text, "cannot send actuator frame of tick %" PRIu64 ": %s", tick,
+        (void)snprintf(wire->text, sizeof wire->text, "cannot send actuator message of tick %" PRIu64 ": %s", tick,
                        strerror(errno));
         return FCSL_HAL_ERROR;
     }
-    /* The simulator may have ended the run after its last sensor frame: let the I/O thread read what it left. */
+    /* The simulator may have ended the run after its last sensor message: let the I/O thread read what it left. */
     (void)pthread_mutex_lock(&wire->lock);
     while (wire->link == LINK_UP && wire->used < SLOTS) {
         (void)pthread_cond_wait(&wire->changed, &wire->lock);
     }
     const link_t link = wire->link;
     (void)pthread_mutex_unlock(&wire->lock);
-    (void)snprintf(wire->text, sizeof wire->text, "the simulator %s before actuator frame of tick %" PRIu64,
+    (void)snprintf(wire->text, sizeof wire->text, "the simulator %s before actuator message of tick %" PRIu64,
                    link == LINK_ENDED ? "ended the run" : "went away", tick);
     return link == LINK_ENDED || link == LINK_INTERRUPTED ? FCSL_HAL_CLOSED : FCSL_HAL_ERROR;
 }
@@ -358,8 +359,9 @@ static int open_wire(wire_t *wire, const char *socket_path, char *error, size_t 
     if (wire->fd < 0 || shake_hands(wire, deadline_ms, error, error_size) != 0) {
         return -1;
     }
-    if (fcsl_wire_size_buffers(wire->fd, fcsl_frame_capacity(wire->table.machine, FCSL_ACTUATOR)) != 0) {
-        (void)snprintf(error, error_size, "cannot make room for an actuator frame in the socket: %s", strerror(errno));
+    if (fcsl_wire_size_buffers(wire->fd, fcsl_message_capacity(wire->table.machine, FCSL_ACTUATOR_MESSAGE)) != 0) {
+        (void)snprintf(error, error_size, "cannot make room for an actuator message in the socket: %s",
+                       strerror(errno));
         return -1;
     }
     if (start_thread(wire) != 0) {
@@ -377,7 +379,7 @@ int fcsl_hal_wire_connect(const char *socket_path, const fcsl_machine_t *machine
         (void)snprintf(error, error_size, "out of memory for the wire");
         return -1;
     }
-    const size_t capacity = fcsl_frame_capacity(machine, FCSL_SENSOR);
+    const size_t capacity = fcsl_message_capacity(machine, FCSL_SENSOR_MESSAGE);
     wire->table = fcsl_channel_table(machine);
     wire->timeout_ms = timeout_ms;
     wire->fd = -1;

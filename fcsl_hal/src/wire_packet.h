@@ -3,7 +3,7 @@
  * Control packets of the wire, and waiting with a deadline; shared by its two ends.
  *
  *   offset size
- *   0      4   magic "FCSW" (channel frames begin with "FCSF")
+ *   0      4   magic "FCSW" (messages of channels begin with an id from 0xff00 on)
  *   4      2   version (1)
  *   6      1   kind
  *   7      1   zero
@@ -54,7 +54,7 @@ uint64_t fcsl_wire_now_ms(void);
 /* Waits until `fd` is readable: 1, 0 at the deadline, -1 on a caught signal or an error (errno). */
 int fcsl_wire_wait_readable(int fd, uint64_t deadline_ms);
 
-/* Makes room for frames of `bytes` in the socket's send buffer; 0, or -1 when the system does not allow that much. */
+/* Makes room for messages of `bytes` in the socket's send buffer; 0, or -1 when the system does not allow that much. */
 int fcsl_wire_size_buffers(int fd, size_t bytes);
 
 #endif /* FCSL_WIRE_PACKET_H */

@@ -22,7 +22,7 @@ struct fcsl_wire {
     fcsl_channel_table_t table;
     int listener;
     int peer;
-    uint64_t frames_dropped;
+    uint64_t messages_dropped;
     uint8_t *inbox;
     size_t inbox_size;
     char path[PATH_BYTES];
@@ -33,7 +33,7 @@ int fcsl_wire_listen(const char *socket_path, const fcsl_machine_t *machine, fcs
                      size_t error_size)
 {
     fcsl_wire_t *self = calloc(1, sizeof *self);
-    const size_t capacity = fcsl_frame_capacity(machine, FCSL_ACTUATOR);
+    const size_t capacity = fcsl_message_capacity(machine, FCSL_ACTUATOR_MESSAGE);
     const size_t inbox_size = capacity > FCSL_WIRE_PACKET_MAX ? capacity : FCSL_WIRE_PACKET_MAX;
     uint8_t *inbox = malloc(inbox_size);
     if (self == NULL || inbox == NULL) {
@@ -92,8 +92,8 @@ static fcsl_hal_status_t shake_hands(fcsl_wire_t *wire, uint64_t deadline_ms)
         (void)snprintf(wire->text, sizeof wire->text, "controller refused: %s", text);
         return FCSL_HAL_ERROR;
     }
-    if (fcsl_wire_size_buffers(wire->peer, fcsl_frame_capacity(wire->table.machine, FCSL_SENSOR)) != 0) {
-        return fail(wire, "cannot make room for a sensor frame in the socket");
+    if (fcsl_wire_size_buffers(wire->peer, fcsl_message_capacity(wire->table.machine, FCSL_SENSOR_MESSAGE)) != 0) {
+        return fail(wire, "cannot make room for a sensor message in the socket");
     }
     return fcsl_wire_send_hello(wire->peer, &wire->table) == 0 ? FCSL_HAL_OK : FCSL_HAL_CLOSED;
 }
@@ -131,32 +131,34 @@ fcsl_hal_status_t fcsl_wire_accept(fcsl_wire_t *wire, uint32_t timeout_ms)
     }
 }
 
-fcsl_hal_status_t fcsl_wire_send(fcsl_wire_t *wire, const uint8_t *frame, size_t size)
+fcsl_hal_status_t fcsl_wire_send(fcsl_wire_t *wire, const uint8_t *message, size_t size)
 {
-    if (wire->peer >= 0 && send(wire->peer, frame, size, MSG_NOSIGNAL | MSG_DONTWAIT) >= 0) { /* whole or not at all */
+    if (wire->peer >= 0 &&
+        send(wire->peer, message, size, MSG_NOSIGNAL | MSG_DONTWAIT) >= 0) { /* whole or not at all */
         return FCSL_HAL_OK;
     }
     if (wire->peer >= 0 && errno != EPIPE && errno != ECONNRESET) {
-        return fail(wire, errno == EAGAIN ? "the controller takes no sensor frames" : "cannot send the sensor frame");
+        return fail(wire,
+                    errno == EAGAIN ? "the controller takes no sensor messages" : "cannot send the sensor message");
     }
     (void)snprintf(wire->text, sizeof wire->text, "the controller is gone");
     return FCSL_HAL_CLOSED;
 }
 
-fcsl_hal_status_t fcsl_wire_receive(fcsl_wire_t *wire, uint64_t tick, uint32_t timeout_ms, fcsl_frame_t *frame)
+fcsl_hal_status_t fcsl_wire_receive(fcsl_wire_t *wire, uint64_t tick, uint32_t timeout_ms, fcsl_message_t *message)
 {
     const uint64_t deadline_ms = fcsl_wire_now_ms() + timeout_ms;
     /* Every turn takes one packet off the socket or ends. */
     for (;;) {
         const int ready = wire->peer < 0 ? 1 : fcsl_wire_wait_readable(wire->peer, deadline_ms);
         if (ready < 0) {
-            return errno == EINTR ? FCSL_HAL_NONE : fail(wire, "cannot wait for the actuator frame");
+            return errno == EINTR ? FCSL_HAL_NONE : fail(wire, "cannot wait for the actuator message");
         }
         if (ready == 0) {
             (void)snprintf(wire->text, sizeof wire->text,
-                           "no actuator frame of tick %" PRIu64 " within %" PRIu32 " ms (%" PRIu64
-                           " malformed or late frames dropped)",
-                           tick, timeout_ms, wire->frames_dropped);
+                           "no actuator message of tick %" PRIu64 " within %" PRIu32 " ms (%" PRIu64
+                           " malformed or late messages dropped)",
+                           tick, timeout_ms, wire->messages_dropped);
             return FCSL_HAL_TIMEOUT;
         }
         const ssize_t got =
@@ -166,18 +168,20 @@ fcsl_hal_status_t fcsl_wire_receive(fcsl_wire_t *wire, uint64_t tick, uint32_t t
         }
         if (got <= 0) {
             (void)snprintf(wire->text, sizeof wire->text,
-                           "the controller went away before actuator frame of tick %" PRIu64, tick);
+                           "the controller went away before actuator message of tick %" PRIu64, tick);
             return FCSL_HAL_CLOSED;
         }
         if ((size_t)got > wire->inbox_size ||
-            fcsl_frame_check(&wire->table, FCSL_ACTUATOR, wire->inbox, (size_t)got, frame) != FCSL_FRAME_OK ||
-            frame->tick < tick) {
-            wire->frames_dropped++;
+            fcsl_message_check(&wire->table, FCSL_ACTUATOR_MESSAGE, wire->inbox, (size_t)got, message) !=
+                FCSL_MESSAGE_OK ||
+            message->tick < tick) {
+            wire->messages_dropped++;
             continue;
         }
-        if (frame->tick > tick) {
+        if (message->tick > tick) {
             (void)snprintf(wire->text, sizeof wire->text,
-                           "actuator frame of tick %" PRIu64 " came while tick %" PRIu64 " was due", frame->tick, tick);
+                           "actuator message of tick %" PRIu64 " came while tick %" PRIu64 " was due", message->tick,
+                           tick);
             return FCSL_HAL_ERROR;
         }
         return FCSL_HAL_OK;
@@ -189,9 +193,9 @@ const char *fcsl_wire_explain(const fcsl_wire_t *wire)
     return wire->text;
 }
 
-uint64_t fcsl_wire_frames_dropped(const fcsl_wire_t *wire)
+uint64_t fcsl_wire_messages_dropped(const fcsl_wire_t *wire)
 {
-    return wire->frames_dropped;
+    return wire->messages_dropped;
 }
 
 void fcsl_wire_close(fcsl_wire_t *wire)

@@ -26,10 +26,24 @@ typedef struct {
     uint8_t enable[3];
 } data_t;
 
+/* Scalars, and arrays of one axis. */
 #define FIELD(path_, type_, count_, member_, size_)                                                                    \
-    {path_,  FCSL_ROLE_OUTPUT,          type_,           FCSL_FIELD_WRITABLE, 0,         NULL,                         \
-     count_, offsetof(data_t, member_), size_,           FCSL_NONE,           FCSL_NONE, "",                           \
-     "",     -(double)INFINITY,         (double)INFINITY}
+    {                                                                                                                  \
+        path_,                                                                                                         \
+        FCSL_ROLE_OUTPUT,                                                                                              \
+        type_,                                                                                                         \
+        FCSL_FIELD_WRITABLE,                                                                                           \
+        (count_) > 1,                                                                                                  \
+        (const uint32_t[]){count_},                                                                                    \
+        count_,                                                                                                        \
+        offsetof(data_t, member_),                                                                                     \
+        size_,                                                                                                         \
+        FCSL_NONE,                                                                                                     \
+        FCSL_NONE,                                                                                                     \
+        "",                                                                                                            \
+        "",                                                                                                            \
+        -(double)INFINITY,                                                                                             \
+        (double)INFINITY}
 
 static const fcsl_field_t FIELDS[] = {
     FIELD("flag", FCSL_BOOL, 1, flag, 1),       FIELD("i32", FCSL_I32, 3, i32, 12),
@@ -79,7 +93,7 @@ static const fcsl_field_t FIELDS[] = {
 /* Ids fall, and directions mix: neither order means anything. */
 static const fcsl_channel_t CHANNELS[] = {
     SENSOR("flag", 900, 0, 0),   ACTUATOR("command", 1, 8), SENSOR("i32", 800, 1, 1), SENSOR("i64", 700, 2, 2),
-    SENSOR("u32", 65535, 3, 3),  SENSOR("u64", 500, 4, 4),  SENSOR("f32", 0, 5, 5),   SENSOR("f64", 300, 6, 6),
+    SENSOR("u32", 65279, 3, 3),  SENSOR("u64", 500, 4, 4),  SENSOR("f32", 0, 5, 5),   SENSOR("f64", 300, 6, 6),
     SENSOR("health", 200, 7, 7), ACTUATOR("enable", 2, 9),
 };
 

@@ -1,16 +1,19 @@
 /* SPDX-License-Identifier: Apache-2.0
  *
- * Properties of channel frames: what goes in comes out, and nothing but a valid frame changes anything.
+ * Properties of messages: what goes in comes out, and nothing but a valid message changes anything. What the bytes are, the
+ * Python implementation checks (simclient/test/test_message_peer.py).
  */
 #include <string.h>
 
 #include "channel_fixture.h"
-#include "frames.h"
+#include "messages.h"
 #include "fcsl/fcsl_check.h"
 #include "fcsl/fcsl_codec.h"
 #include "fcsl/fcsl_scalar.h"
 
-enum { FRAME_BYTES = 512, ROUNDS = 2000 };
+enum { MESSAGE_BYTES = 1024, ROUNDS = 2000, HEAD_BYTES = 18, ARMED_AT = 21, TIME_AT = 21, CRC_BYTES = 7 };
+
+static const fcsl_message_kind_t KINDS[] = {FCSL_SENSOR_MESSAGE, FCSL_ACTUATOR_MESSAGE, FCSL_TIME_MESSAGE};
 
 static uint64_t random_state = 1;
 
@@ -41,7 +44,7 @@ static int is_fresh(const data_t *data, uint32_t channel)
     return ((const uint8_t *)data)[CHANNELS[channel].fresh_offset];
 }
 
-/* What a frame brings has no age and no stamp; what it does not bring keeps them. */
+/* What a message brings has no age and no stamp; what it does not bring keeps them. */
 static int is_of_now(const data_t *data, const data_t *before, uint32_t channel, int carried)
 {
     static const uint8_t zero[8] = {0};
@@ -69,9 +72,14 @@ static void test_crc(void)
     CHECK(fcsl_crc32(0, "", 0) == 0);
 }
 
+static fcsl_direction_t direction_of(fcsl_message_kind_t kind)
+{
+    return kind == FCSL_SENSOR_MESSAGE ? FCSL_SENSOR : FCSL_ACTUATOR;
+}
+
 static void test_round_trip(void)
 {
-    uint8_t frame[FRAME_BYTES];
+    uint8_t message[MESSAGE_BYTES];
     for (int round = 0; round < ROUNDS; round++) {
         data_t sent;
         data_t received;
@@ -80,62 +88,69 @@ static void test_round_trip(void)
         fill(&received);
         memset(received.fresh, 0, sizeof received.fresh);
         const data_t before = received;
+        const fcsl_message_kind_t kind = KINDS[round % 3];
         for (uint32_t i = 0; i < CHANNEL_COUNT; i++) {
-            select[i] = random_u64() & 1u;
+            select[i] = kind == FCSL_ACTUATOR_MESSAGE || (random_u64() & 1u);
         }
-        const fcsl_direction_t direction = round % 2 == 0 ? FCSL_SENSOR : FCSL_ACTUATOR;
         const uint64_t tick = random_u64();
-        const size_t size = encode_frame(&MACHINE, &sent, direction, tick, select, frame, sizeof frame);
-        CHECK(size > 0 && size <= fcsl_frame_capacity(&MACHINE, direction));
+        const size_t size = encode_message(&MACHINE, &sent, kind, tick, select, message, sizeof message);
+        CHECK(size > 0 && size <= fcsl_message_capacity(&MACHINE, kind));
         uint64_t got = 0;
-        CHECK(decode_frame(&MACHINE, &received, direction, frame, size, &got) == FCSL_FRAME_OK);
+        CHECK(decode_message(&MACHINE, &received, kind, message, size, &got) == FCSL_MESSAGE_OK);
         CHECK(got == tick);
         for (uint32_t i = 0; i < CHANNEL_COUNT; i++) {
-            const int carried = select[i] != 0 && CHANNELS[i].direction == (uint8_t)direction;
+            const int carried =
+                kind != FCSL_TIME_MESSAGE && select[i] != 0 && CHANNELS[i].direction == direction_of(kind);
             CHECK(same_field(&received, carried ? &sent : &before, &FIELDS[CHANNELS[i].field]));
             if (CHANNELS[i].direction == FCSL_SENSOR) {
-                CHECK(is_fresh(&received, i) == (carried && direction == FCSL_SENSOR));
+                CHECK(is_fresh(&received, i) == (carried && kind == FCSL_SENSOR_MESSAGE));
                 CHECK(is_of_now(&received, &before, i, carried));
             }
         }
     }
 }
 
-static void test_all_fit_exactly(void)
+static void test_room(void)
 {
-    uint8_t frame[FRAME_BYTES];
+    uint8_t message[MESSAGE_BYTES];
     data_t data;
     fill(&data);
-    for (int direction = FCSL_SENSOR; direction <= FCSL_ACTUATOR; direction++) {
-        const size_t capacity = fcsl_frame_capacity(&MACHINE, (fcsl_direction_t)direction);
-        CHECK(encode_frame(&MACHINE, &data, (fcsl_direction_t)direction, 3, NULL, frame, capacity) == capacity);
-        for (size_t less = 0; less < capacity; less++) {
-            CHECK(encode_frame(&MACHINE, &data, (fcsl_direction_t)direction, 3, NULL, frame, less) == 0);
+    for (size_t i = 0; i < 3; i++) {
+        const size_t size = encode_message(&MACHINE, &data, KINDS[i], 3, NULL, message, sizeof message);
+        CHECK(size + FCSL_UNKNOWN_BYTES == fcsl_message_capacity(&MACHINE, KINDS[i]));
+        for (size_t less = 0; less < size; less++) {
+            CHECK(encode_message(&MACHINE, &data, KINDS[i], 3, NULL, message, less) == 0);
         }
+        CHECK(encode_message(&MACHINE, &data, KINDS[i], 3, NULL, message, size) == size);
     }
 }
 
-/* What a machine must never see, such as a bool of 2 that a plant model has written, is in no frame. */
+/* What a machine must never see, such as a bool of 2 that a plant model has written, is in no message. */
 static void test_impossible_values(void)
 {
-    uint8_t bytes[FRAME_BYTES];
+    uint8_t bytes[MESSAGE_BYTES];
     const fcsl_channel_table_t table = fcsl_channel_table(&MACHINE);
-    fcsl_frame_t frame = {.size = 77};
+    fcsl_message_t message = {.size = 77};
     data_t data;
     fill(&data);
     data.flag = 2;
-    CHECK(fcsl_frame_encode(&table, &data, FCSL_SENSOR, 1, NULL, bytes, sizeof bytes, &frame) == FCSL_FRAME_VALUE);
+    CHECK(fcsl_message_encode_sensors(&table, &data, 1, NULL, bytes, sizeof bytes, &message) == FCSL_MESSAGE_VALUE);
     data.flag = 1;
     data.health = 4;
-    CHECK(fcsl_frame_encode(&table, &data, FCSL_SENSOR, 1, NULL, bytes, sizeof bytes, &frame) == FCSL_FRAME_VALUE);
-    CHECK(frame.size == 77);
+    CHECK(fcsl_message_encode_sensors(&table, &data, 1, NULL, bytes, sizeof bytes, &message) == FCSL_MESSAGE_VALUE);
+    CHECK(message.size == 77);
     data.health = 3;
-    CHECK(fcsl_frame_encode(&table, &data, FCSL_SENSOR, 1, NULL, bytes, sizeof bytes, &frame) == FCSL_FRAME_OK);
-    CHECK(frame.bytes == bytes && frame.tick == 1 && frame.direction == FCSL_SENSOR);
+    CHECK(fcsl_message_encode_sensors(&table, &data, 1, NULL, bytes, sizeof bytes, &message) == FCSL_MESSAGE_OK);
+    CHECK(message.bytes == bytes && message.tick == 1 && message.kind == FCSL_SENSOR_MESSAGE);
 }
 
-/* Refused, and not one byte of the data or of *tick has changed. */
-static void check_refused(const uint8_t *frame, size_t size, fcsl_frame_status_t expected)
+static void seal(uint8_t *message, size_t size)
+{
+    fcsl_put_u32(message + size - 4, fcsl_crc32(0, message, size - 4));
+}
+
+/* Refused, and not one byte of the data or of *tick has changed. FCSL_MESSAGE_OK expects any refusal. */
+static void check_refused(fcsl_message_kind_t kind, const uint8_t *message, size_t size, fcsl_message_status_t expected)
 {
     data_t data;
     uint64_t tick = 77;
@@ -143,79 +158,196 @@ static void check_refused(const uint8_t *frame, size_t size, fcsl_frame_status_t
     fill(&data);
     memset(data.fresh, 0, sizeof data.fresh);
     const data_t before = data;
-    const fcsl_frame_status_t status = decode_frame(&MACHINE, &data, FCSL_SENSOR, frame, size, &tick);
-    CHECK(status != FCSL_FRAME_OK && (expected == FCSL_FRAME_OK || status == expected));
+    const fcsl_message_status_t status = decode_message(&MACHINE, &data, kind, message, size, &tick);
+    CHECK(status != FCSL_MESSAGE_OK && (expected == FCSL_MESSAGE_OK || status == expected));
     CHECK(memcmp(&before, &data, sizeof data) == 0 && tick == 77);
-    CHECK(fcsl_frame_status_text(status)[0] != '\0');
-}
-
-static void seal(uint8_t *frame, size_t size)
-{
-    fcsl_put_u32(frame + size - 4, fcsl_crc32(0, frame, size - 4));
+    CHECK(fcsl_message_status_text(status)[0] != '\0');
 }
 
 static void test_damage(void)
 {
-    uint8_t frame[FRAME_BYTES];
-    uint8_t damaged[FRAME_BYTES];
+    uint8_t message[MESSAGE_BYTES];
+    uint8_t damaged[MESSAGE_BYTES];
     data_t data;
     fill(&data);
-    const size_t size = encode_frame(&MACHINE, &data, FCSL_SENSOR, 5, NULL, frame, sizeof frame);
-    for (size_t cut = 0; cut < size; cut++) {
-        check_refused(frame, cut, FCSL_FRAME_OK);
-    }
-    memcpy(damaged, frame, size);
-    damaged[size] = 0;
-    check_refused(damaged, size + 1, FCSL_FRAME_CRC);
-    for (size_t bit = 0; bit < 8 * size; bit++) {
-        memcpy(damaged, frame, size);
-        damaged[bit / 8] ^= (uint8_t)(1u << bit % 8);
-        check_refused(damaged, size, FCSL_FRAME_OK);
+    for (size_t i = 0; i < 3; i++) {
+        const size_t size = encode_message(&MACHINE, &data, KINDS[i], 5, NULL, message, sizeof message);
+        for (size_t cut = 0; cut < size; cut++) {
+            check_refused(KINDS[i], message, cut, FCSL_MESSAGE_OK);
+        }
+        memcpy(damaged, message, size);
+        damaged[size] = 0;
+        check_refused(KINDS[i], damaged, size + 1, FCSL_MESSAGE_SHORT);
+        for (size_t bit = 0; bit < 8 * size; bit++) {
+            memcpy(damaged, message, size);
+            damaged[bit / 8] ^= (uint8_t)(1u << bit % 8);
+            check_refused(KINDS[i], damaged, size, FCSL_MESSAGE_OK);
+        }
+        for (size_t other = 0; other < 3; other++) {
+            if (other != i) {
+                check_refused(KINDS[other], message, size, size < 29 ? FCSL_MESSAGE_OK : FCSL_MESSAGE_KIND);
+            }
+        }
     }
 }
 
-/* Frames whose checksum is right and whose content is not. */
-static void test_wrong_content(void)
+/* A message of which one byte is another one, with a right checksum. */
+static void check_changed(fcsl_message_kind_t kind, size_t at, uint8_t value, fcsl_message_status_t status)
 {
-    uint8_t frame[FRAME_BYTES];
-    uint8_t wrong[FRAME_BYTES];
+    uint8_t message[MESSAGE_BYTES];
     data_t data;
     fill(&data);
-    const size_t size = encode_frame(&MACHINE, &data, FCSL_SENSOR, 5, NULL, frame, sizeof frame);
-    const struct {
-        size_t at;
-        uint8_t value;
-        fcsl_frame_status_t status;
-    } cases[] = {
-        {0, 'X', FCSL_FRAME_MAGIC},  {4, 2, FCSL_FRAME_MAGIC},    {6, FCSL_ACTUATOR, FCSL_FRAME_DIRECTION},
-        {7, 1, FCSL_FRAME_MAGIC},    {22, 1, FCSL_FRAME_MAGIC},   {16, (uint8_t)(frame[16] + 1), FCSL_FRAME_TABLE},
-        {20, 9, FCSL_FRAME_SHORT},   {20, 7, FCSL_FRAME_SHORT},   {24, 7, FCSL_FRAME_CHANNEL},
-        {26, 2, FCSL_FRAME_CHANNEL}, {27, 255, FCSL_FRAME_SHORT}, {28, 2, FCSL_FRAME_VALUE},
+    const size_t size = encode_message(&MACHINE, &data, kind, 5, NULL, message, sizeof message);
+    CHECK(message[at] != value);
+    message[at] = value;
+    seal(message, size);
+    check_refused(kind, message, size, status);
+}
+
+/* Messages whose checksum is right and whose content is not. */
+static void test_wrong_content(void)
+{
+    const fcsl_message_kind_t sensors = FCSL_SENSOR_MESSAGE;
+    const uint8_t other = (uint8_t)(fcsl_channel_table(&MACHINE).hash + 1u);
+    check_changed(sensors, 0, 9, FCSL_MESSAGE_KIND);
+    check_changed(sensors, 2, FCSL_I64, FCSL_MESSAGE_KIND);
+    check_changed(sensors, 11, 9, FCSL_MESSAGE_ENTRY);
+    check_changed(sensors, 14, other, FCSL_MESSAGE_TABLE);
+    check_changed(FCSL_ACTUATOR_MESSAGE, 18, 5, FCSL_MESSAGE_ENTRY);
+    check_changed(FCSL_ACTUATOR_MESSAGE, ARMED_AT, 2, FCSL_MESSAGE_VALUE);
+    check_changed(FCSL_TIME_MESSAGE, 18, 4, FCSL_MESSAGE_ENTRY);
+    /* The first entry: channel 900, a bool. */
+    check_changed(sensors, HEAD_BYTES + 2, 7, FCSL_MESSAGE_TYPE);
+    check_changed(sensors, HEAD_BYTES + 2, 0x50, FCSL_MESSAGE_TYPE);
+    check_changed(sensors, HEAD_BYTES + 2, 0x41, FCSL_MESSAGE_TYPE);
+    check_changed(sensors, HEAD_BYTES + 3, 2, FCSL_MESSAGE_VALUE);
+    /* The second one: channel 800, a vector of i32; then 700, an i64. */
+    check_changed(sensors, HEAD_BYTES + 6, 0x15, FCSL_MESSAGE_TYPE);
+    check_changed(sensors, HEAD_BYTES + 6, 0x21, FCSL_MESSAGE_OK);
+}
+
+/* Writes head and end of a sensor message around the `size` bytes of entries at its offset 18; returns its size. */
+static size_t close_message(uint8_t *message, size_t size)
+{
+    uint8_t nothing[CHANNEL_COUNT] = {0};
+    data_t data;
+    uint8_t whole[MESSAGE_BYTES];
+    memset(&data, 0, sizeof data);
+    CHECK(encode_message(&MACHINE, &data, FCSL_SENSOR_MESSAGE, 5, nothing, whole, sizeof whole) ==
+          HEAD_BYTES + CRC_BYTES);
+    memcpy(message, whole, HEAD_BYTES);
+    memcpy(message + HEAD_BYTES + size, whole + HEAD_BYTES, CRC_BYTES);
+    seal(message, HEAD_BYTES + size + CRC_BYTES);
+    return HEAD_BYTES + size + CRC_BYTES;
+}
+
+typedef struct {
+    const uint8_t *bytes;
+    size_t size;
+    fcsl_message_status_t status;
+    uint32_t skipped;
+} entries_case_t;
+
+#define ENTRIES(status_, skipped_, ...)                                                                                \
+    {(const uint8_t[]){__VA_ARGS__}, sizeof((const uint8_t[]){__VA_ARGS__}), status_, skipped_}
+#define FLAG 0x84, 3, 0, 1                         /* channel 900 */
+#define U32  0xff, 0xfe, 3, 1, 2, 3, 4              /* channel 65279 */
+#define U64  0xf4, 1, 0x34, 2, 0, 1, 0, 0, 0, 0, 0, 0, 0, 2, 0, 0, 0, 0, 0, 0, 0 /* channel 500 */
+
+/* Entries in any order, of unknown ids, and wrong ones. */
+static void test_entries(void)
+{
+    const entries_case_t cases[] = {
+        ENTRIES(FCSL_MESSAGE_OK, 0, FLAG),
+        ENTRIES(FCSL_MESSAGE_OK, 0, U64, FLAG, U32),
+        ENTRIES(FCSL_MESSAGE_OK, 0, U32, U64, FLAG),
+        ENTRIES(FCSL_MESSAGE_OK, 1, 7, 0, 0x26, [34] = 0, FLAG), /* an unknown quaternion of f64 */
+        ENTRIES(FCSL_MESSAGE_OK, 4, 7, 0, 0, 9, U64, 8, 0, 0x40, 2, 0, 'h', 'i', 7, 0, 0x31, 0, 0, 6, 0xff, 0, 1),
+        ENTRIES(FCSL_MESSAGE_ENTRY, 0, FLAG, FLAG),
+        ENTRIES(FCSL_MESSAGE_ENTRY, 0, U64, U32, U64),
+        ENTRIES(FCSL_MESSAGE_ENTRY, 0, U64, FLAG, U32, FLAG),
+        ENTRIES(FCSL_MESSAGE_ENTRY, 0, 2, 0, 0x10, 1, 1, 1),                     /* an actuator's */
+        ENTRIES(FCSL_MESSAGE_ENTRY, 0, FLAG, 3, 0xff, 3, 0, 0, 0, 0),            /* a second hash */
+        ENTRIES(FCSL_MESSAGE_ENTRY, 0, FLAG, 5, 0xff, 4, 0, 0, 0, 0, 0, 0, 0, 0), /* a time */
+        ENTRIES(FCSL_MESSAGE_ENTRY, 0, 0xff, 0xff, 3, 0, 0, 0, 0),
+        ENTRIES(FCSL_MESSAGE_TYPE, 0, 0xf4, 1, 0x34, 1, 0, 1, 0, 0, 0, 0, 0, 0, 0), /* fewer elements */
+        ENTRIES(FCSL_MESSAGE_TYPE, 0, 0xff, 0xfe, 1, 1, 2, 3, 4),                   /* an i32 */
+        ENTRIES(FCSL_MESSAGE_TYPE, 0, FLAG, 7, 0, 0x0f, 1),
+        ENTRIES(FCSL_MESSAGE_TYPE, 0, FLAG, 7, 0, 0x46, 1, 0, 1),
+        ENTRIES(FCSL_MESSAGE_SHORT, 0, FLAG, 7),
+        ENTRIES(FCSL_MESSAGE_SHORT, 0, FLAG, 7, 0, 4, 1, 2, 3, 4, 5, 6, 7),
+        ENTRIES(FCSL_MESSAGE_SHORT, 0, FLAG, 7, 0, 0x36, 1),
+        ENTRIES(FCSL_MESSAGE_SHORT, 0, FLAG, 7, 0, 0x40, 0xff, 0xff, 1),
+        ENTRIES(FCSL_MESSAGE_VALUE, 0, U64, 0x84, 3, 0, 2),
+        ENTRIES(FCSL_MESSAGE_VALUE, 0, 200, 0, 1, 4, 0, 0, 0), /* a health that does not exist */
     };
+    const fcsl_channel_table_t table = fcsl_channel_table(&MACHINE);
     for (size_t i = 0; i < sizeof cases / sizeof cases[0]; i++) {
-        memcpy(wrong, frame, size);
-        wrong[cases[i].at] = cases[i].value;
-        seal(wrong, size);
-        check_refused(wrong, size, cases[i].status);
+        uint8_t bytes[MESSAGE_BYTES];
+        memcpy(bytes + HEAD_BYTES, cases[i].bytes, cases[i].size);
+        const size_t size = close_message(bytes, cases[i].size);
+        fcsl_message_t message;
+        const fcsl_message_status_t status = fcsl_message_check(&table, FCSL_SENSOR_MESSAGE, bytes, size, &message);
+        CHECK(status == cases[i].status);
+        CHECK(status != FCSL_MESSAGE_OK || message.skipped == cases[i].skipped);
+        if (status != FCSL_MESSAGE_OK) {
+            check_refused(FCSL_SENSOR_MESSAGE, bytes, size, status);
+        }
     }
-    /* The last entry is the health: an enumerator that does not exist. */
-    memcpy(wrong, frame, size);
-    wrong[size - 8] = 4;
-    seal(wrong, size);
-    check_refused(wrong, size, FCSL_FRAME_VALUE);
-    /* Twice the same channel. */
-    memcpy(wrong, frame, 24);
-    memcpy(wrong + 24, frame + 24, 5);
-    memcpy(wrong + 29, frame + 24, 5);
-    wrong[20] = 2;
-    seal(wrong, 38);
-    check_refused(wrong, 38, FCSL_FRAME_CHANNEL);
+}
+
+/* In another order an entry has the same meaning. */
+static void test_order(void)
+{
+    static const uint8_t entries[] = {U32, U64, FLAG};
+    uint8_t bytes[MESSAGE_BYTES];
+    data_t data;
+    uint64_t tick = 0;
+    memset(&data, 0, sizeof data);
+    memcpy(bytes + HEAD_BYTES, entries, sizeof entries);
+    const size_t size = close_message(bytes, sizeof entries);
+    CHECK(decode_message(&MACHINE, &data, FCSL_SENSOR_MESSAGE, bytes, size, &tick) == FCSL_MESSAGE_OK && tick == 5);
+    CHECK(data.u32 == 0x04030201u && data.flag == 1 && data.u64[0] == 1 && data.u64[1] == 2);
+    CHECK(is_fresh(&data, 0) && is_fresh(&data, 4) && is_fresh(&data, 5) && !is_fresh(&data, 3));
+}
+
+/* A command that lacks an actuator would leave it where it is: it is refused. */
+static void test_all_actuators(void)
+{
+    uint8_t message[MESSAGE_BYTES];
+    data_t data;
+    fill(&data);
+    const size_t size = encode_message(&MACHINE, &data, FCSL_ACTUATOR_MESSAGE, 5, NULL, message, sizeof message);
+    const size_t last = 6; /* `enable`, a vector of bools */
+    memmove(message + size - CRC_BYTES - last, message + size - CRC_BYTES, CRC_BYTES);
+    seal(message, size - last);
+    check_refused(FCSL_ACTUATOR_MESSAGE, message, size - last, FCSL_MESSAGE_ENTRY);
+}
+
+static void test_armed_and_time(void)
+{
+    uint8_t bytes[MESSAGE_BYTES];
+    const fcsl_channel_table_t table = fcsl_channel_table(&MACHINE);
+    fcsl_message_t message = {0};
+    data_t data;
+    fill(&data);
+    for (int armed = 0; armed < 3; armed++) {
+        CHECK(fcsl_message_encode_actuators(&table, &data, 1, armed, bytes, sizeof bytes, &message) == FCSL_MESSAGE_OK);
+        CHECK(message.armed == (armed != 0) && bytes[ARMED_AT] == (armed != 0));
+        message.armed = 9;
+        CHECK(fcsl_message_check(&table, FCSL_ACTUATOR_MESSAGE, bytes, message.size, &message) == FCSL_MESSAGE_OK);
+        CHECK(message.armed == (armed != 0) && message.time_ns == 0 && message.skipped == 0);
+    }
+    CHECK(fcsl_message_encode_time(&table, 7, UINT64_MAX - 1u, bytes, sizeof bytes, &message) == FCSL_MESSAGE_OK);
+    CHECK(fcsl_message_check(&table, FCSL_TIME_MESSAGE, bytes, message.size, &message) == FCSL_MESSAGE_OK);
+    CHECK(message.tick == 7 && message.time_ns == UINT64_MAX - 1u && message.armed == 0);
+    CHECK(fcsl_get_u64(bytes + TIME_AT) == UINT64_MAX - 1u);
 }
 
 static void test_nan_is_canonical(void)
 {
-    uint8_t frame[FRAME_BYTES];
-    uint8_t other[FRAME_BYTES];
+    uint8_t message[MESSAGE_BYTES];
+    uint8_t other[MESSAGE_BYTES];
     data_t a;
     memset(&a, 0, sizeof a);
     data_t b = a;
@@ -227,9 +359,9 @@ static void test_nan_is_canonical(void)
     memcpy(&b.f64[2], &strange, 8);
     memcpy(&a.f32[1], &quiet32, 4);
     memcpy(&b.f32[1], &strange32, 4);
-    const size_t size = encode_frame(&MACHINE, &a, FCSL_SENSOR, 1, NULL, frame, sizeof frame);
-    CHECK(encode_frame(&MACHINE, &b, FCSL_SENSOR, 1, NULL, other, sizeof other) == size);
-    CHECK(memcmp(frame, other, size) == 0);
+    const size_t size = encode_message(&MACHINE, &a, FCSL_SENSOR_MESSAGE, 1, NULL, message, sizeof message);
+    CHECK(encode_message(&MACHINE, &b, FCSL_SENSOR_MESSAGE, 1, NULL, other, sizeof other) == size);
+    CHECK(memcmp(message, other, size) == 0);
 }
 
 static void test_table_hash(void)
@@ -254,10 +386,14 @@ int main(void)
 {
     test_crc();
     test_round_trip();
-    test_all_fit_exactly();
+    test_room();
     test_impossible_values();
     test_damage();
     test_wrong_content();
+    test_entries();
+    test_order();
+    test_all_actuators();
+    test_armed_and_time();
     test_nan_is_canonical();
     test_table_hash();
     return 0;

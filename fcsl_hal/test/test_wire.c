@@ -13,13 +13,13 @@
 #include <unistd.h>
 
 #include "channel_fixture.h"
-#include "frames.h"
+#include "messages.h"
 #include "fcsl/fcsl_check.h"
 #include "fcsl/fcsl_hal.h"
 #include "fcsl/fcsl_socket.h"
 #include "fcsl/fcsl_wire.h"
 
-enum { FRAME_BYTES = 512, TEXT_BYTES = 512, TICKS = 5000, WAIT_MS = 5000 };
+enum { MESSAGE_BYTES = 512, TEXT_BYTES = 512, TICKS = 5000, WAIT_MS = 5000 };
 
 static char path[64];
 
@@ -31,12 +31,12 @@ static fcsl_wire_t *listen_here(void)
     return wire;
 }
 
-static size_t sensor_frame(uint64_t tick, uint8_t *frame)
+static size_t sensor_message(uint64_t tick, uint8_t *message)
 {
     data_t data;
     memset(&data, 0, sizeof data);
     data.i64 = (int64_t)tick * 3;
-    return encode_frame(&MACHINE, &data, FCSL_SENSOR, tick, NULL, frame, FRAME_BYTES);
+    return encode_message(&MACHINE, &data, FCSL_SENSOR_MESSAGE, tick, NULL, message, MESSAGE_BYTES);
 }
 
 /* Steps a controller that answers 2 * i64 until the run ends; returns the last status. */
@@ -44,7 +44,7 @@ static fcsl_hal_status_t fly(const fcsl_machine_t *machine, uint32_t timeout_ms,
 {
     fcsl_hal_t hal;
     data_t data;
-    uint8_t bytes[FRAME_BYTES];
+    uint8_t bytes[MESSAGE_BYTES];
     const fcsl_channel_table_t table = fcsl_channel_table(machine);
     memset(&data, 0, sizeof data);
     if (fcsl_hal_wire_connect(path, machine, timeout_ms, &hal, text, TEXT_BYTES) != 0) {
@@ -53,14 +53,14 @@ static fcsl_hal_status_t fly(const fcsl_machine_t *machine, uint32_t timeout_ms,
     CHECK(hal.paces && hal.serves);
     fcsl_hal_status_t status = FCSL_HAL_OK;
     for (uint64_t tick = 0; status == FCSL_HAL_OK; tick++) {
-        fcsl_frame_t frame;
-        status = hal.sample(hal.ctx, tick, bytes, sizeof bytes, &frame);
+        fcsl_message_t message;
+        status = hal.sample(hal.ctx, tick, bytes, sizeof bytes, &message);
         if (status == FCSL_HAL_OK) {
-            CHECK(frame.bytes == bytes && frame.tick == tick && frame.direction == FCSL_SENSOR);
-            fcsl_frame_apply(machine, &data, &frame);
+            CHECK(message.bytes == bytes && message.tick == tick && message.kind == FCSL_SENSOR_MESSAGE);
+            fcsl_message_apply(machine, &data, &message);
             data.command[0] = 2.0 * (double)data.i64;
-            CHECK(fcsl_frame_encode(&table, &data, FCSL_ACTUATOR, tick, NULL, bytes, sizeof bytes, &frame) == 0);
-            status = hal.actuate(hal.ctx, &frame);
+            CHECK(fcsl_message_encode_actuators(&table, &data, tick, 1, bytes, sizeof bytes, &message) == 0);
+            status = hal.actuate(hal.ctx, &message);
         }
     }
     (void)snprintf(text, TEXT_BYTES, "%s", hal.explain(hal.ctx));
@@ -96,15 +96,15 @@ static void join(pid_t child)
 /* The simulator's half of ticks [from, to). */
 static void simulate(fcsl_wire_t *wire, uint64_t from, uint64_t to)
 {
-    uint8_t bytes[FRAME_BYTES];
+    uint8_t bytes[MESSAGE_BYTES];
     data_t data;
     for (uint64_t tick = from; tick < to; tick++) {
-        const size_t size = sensor_frame(tick, bytes);
-        fcsl_frame_t frame;
+        const size_t size = sensor_message(tick, bytes);
+        fcsl_message_t message;
         CHECK(fcsl_wire_send(wire, bytes, size) == FCSL_HAL_OK);
-        CHECK(fcsl_wire_receive(wire, tick, WAIT_MS, &frame) == FCSL_HAL_OK);
-        CHECK(frame.tick == tick && frame.direction == FCSL_ACTUATOR);
-        fcsl_frame_apply(&MACHINE, &data, &frame);
+        CHECK(fcsl_wire_receive(wire, tick, WAIT_MS, &message) == FCSL_HAL_OK);
+        CHECK(message.tick == tick && message.kind == FCSL_ACTUATOR_MESSAGE && message.armed == 1);
+        fcsl_message_apply(&MACHINE, &data, &message);
         CHECK(data.command[0] == 6.0 * (double)tick);
     }
 }
@@ -140,12 +140,12 @@ static void test_controller_may_start_first(void)
 static void test_sensor_timeout_names_the_tick(void)
 {
     fcsl_wire_t *wire = listen_here();
-    const pid_t child = start_controller(&MACHINE, 200, FCSL_HAL_TIMEOUT, "no sensor frame of tick 17 within 200 ms");
+    const pid_t child = start_controller(&MACHINE, 200, FCSL_HAL_TIMEOUT, "no sensor message of tick 17 within 200 ms");
     CHECK(fcsl_wire_accept(wire, WAIT_MS) == FCSL_HAL_OK);
     simulate(wire, 0, 17);
     join(child);
-    fcsl_frame_t frame;
-    CHECK(fcsl_wire_receive(wire, 17, WAIT_MS, &frame) == FCSL_HAL_CLOSED);
+    fcsl_message_t message;
+    CHECK(fcsl_wire_receive(wire, 17, WAIT_MS, &message) == FCSL_HAL_CLOSED);
     CHECK(strstr(fcsl_wire_explain(wire), "tick 17") != NULL);
     fcsl_wire_close(wire);
 }
@@ -156,9 +156,9 @@ static void test_actuator_timeout_names_the_tick(void)
     const pid_t child = start_controller(&MACHINE, WAIT_MS, FCSL_HAL_CLOSED, "ended the run at tick 4");
     CHECK(fcsl_wire_accept(wire, WAIT_MS) == FCSL_HAL_OK);
     simulate(wire, 0, 4);
-    fcsl_frame_t frame;
-    CHECK(fcsl_wire_receive(wire, 4, 50, &frame) == FCSL_HAL_TIMEOUT);
-    CHECK(strstr(fcsl_wire_explain(wire), "no actuator frame of tick 4 within 50 ms") != NULL);
+    fcsl_message_t message;
+    CHECK(fcsl_wire_receive(wire, 4, 50, &message) == FCSL_HAL_TIMEOUT);
+    CHECK(strstr(fcsl_wire_explain(wire), "no actuator message of tick 4 within 50 ms") != NULL);
     fcsl_wire_close(wire);
     join(child);
 }
@@ -190,7 +190,7 @@ static void test_killed_simulator(void)
     }
     char text[TEXT_BYTES] = "";
     CHECK(fly(&MACHINE, WAIT_MS, text) == FCSL_HAL_ERROR);
-    CHECK(strstr(text, "went away before sensor frame of tick 10") != NULL);
+    CHECK(strstr(text, "went away before sensor message of tick 10") != NULL);
     CHECK(waitpid(child, NULL, 0) == child);
     /* It could not unlink its socket: the next one replaces it. */
     CHECK(access(path, F_OK) == 0);
@@ -205,11 +205,11 @@ static void test_killed_controller(void)
     simulate(wire, 0, 10);
     (void)kill(child, SIGKILL);
     CHECK(waitpid(child, NULL, 0) == child);
-    uint8_t bytes[FRAME_BYTES];
-    fcsl_frame_t frame;
-    CHECK(fcsl_wire_send(wire, bytes, sensor_frame(10, bytes)) == FCSL_HAL_CLOSED);
-    CHECK(fcsl_wire_receive(wire, 10, WAIT_MS, &frame) == FCSL_HAL_CLOSED);
-    CHECK(strstr(fcsl_wire_explain(wire), "actuator frame of tick 10") != NULL);
+    uint8_t bytes[MESSAGE_BYTES];
+    fcsl_message_t message;
+    CHECK(fcsl_wire_send(wire, bytes, sensor_message(10, bytes)) == FCSL_HAL_CLOSED);
+    CHECK(fcsl_wire_receive(wire, 10, WAIT_MS, &message) == FCSL_HAL_CLOSED);
+    CHECK(strstr(fcsl_wire_explain(wire), "actuator message of tick 10") != NULL);
     fcsl_wire_close(wire);
 }
 
@@ -249,34 +249,34 @@ static void test_stranger_is_ignored(void)
     join(child);
 }
 
-static void test_bad_frames_are_dropped(void)
+static void test_bad_messages_are_dropped(void)
 {
-    uint8_t frame[FRAME_BYTES];
+    uint8_t message[MESSAGE_BYTES];
     fcsl_wire_t *wire = listen_here();
     const pid_t child =
         start_controller(&MACHINE, 300, FCSL_HAL_TIMEOUT,
-                         "no sensor frame of tick 2 within 300 ms (3 malformed or late frames dropped)");
+                         "no sensor message of tick 2 within 300 ms (3 malformed or late messages dropped)");
     CHECK(fcsl_wire_accept(wire, WAIT_MS) == FCSL_HAL_OK);
     simulate(wire, 0, 2);
-    size_t size = sensor_frame(2, frame);
-    frame[30] ^= 1u;
-    CHECK(fcsl_wire_send(wire, frame, size) == FCSL_HAL_OK);
-    CHECK(fcsl_wire_send(wire, frame, 3) == FCSL_HAL_OK);
-    size = sensor_frame(1, frame);
-    CHECK(fcsl_wire_send(wire, frame, size) == FCSL_HAL_OK);
+    size_t size = sensor_message(2, message);
+    message[30] ^= 1u;
+    CHECK(fcsl_wire_send(wire, message, size) == FCSL_HAL_OK);
+    CHECK(fcsl_wire_send(wire, message, 3) == FCSL_HAL_OK);
+    size = sensor_message(1, message);
+    CHECK(fcsl_wire_send(wire, message, size) == FCSL_HAL_OK);
     join(child);
     fcsl_wire_close(wire);
 }
 
-static void test_frame_ahead_of_time(void)
+static void test_message_ahead_of_time(void)
 {
-    uint8_t frame[FRAME_BYTES];
+    uint8_t message[MESSAGE_BYTES];
     fcsl_wire_t *wire = listen_here();
     const pid_t child =
-        start_controller(&MACHINE, WAIT_MS, FCSL_HAL_ERROR, "sensor frame of tick 9 came while tick 2 was due");
+        start_controller(&MACHINE, WAIT_MS, FCSL_HAL_ERROR, "sensor message of tick 9 came while tick 2 was due");
     CHECK(fcsl_wire_accept(wire, WAIT_MS) == FCSL_HAL_OK);
     simulate(wire, 0, 2);
-    CHECK(fcsl_wire_send(wire, frame, sensor_frame(9, frame)) == FCSL_HAL_OK);
+    CHECK(fcsl_wire_send(wire, message, sensor_message(9, message)) == FCSL_HAL_OK);
     join(child);
     fcsl_wire_close(wire);
 }
@@ -284,18 +284,18 @@ static void test_frame_ahead_of_time(void)
 /* A simulator that runs ahead is held back by the slots and the socket's buffer, and nothing is lost. */
 static void test_slots_are_bounded(void)
 {
-    uint8_t frame[FRAME_BYTES];
+    uint8_t message[MESSAGE_BYTES];
     fcsl_wire_t *wire = listen_here();
     const pid_t child = start_controller(&MACHINE, WAIT_MS, FCSL_HAL_CLOSED, "ended the run at tick 50");
     CHECK(fcsl_wire_accept(wire, WAIT_MS) == FCSL_HAL_OK);
     for (uint64_t tick = 0; tick < 50; tick++) {
-        const size_t size = sensor_frame(tick, frame);
-        for (int tries = 0; fcsl_wire_send(wire, frame, size) != FCSL_HAL_OK; tries++) {
+        const size_t size = sensor_message(tick, message);
+        for (int tries = 0; fcsl_wire_send(wire, message, size) != FCSL_HAL_OK; tries++) {
             CHECK(tries < 1000);
             (void)usleep(1000);
         }
     }
-    fcsl_frame_t answer;
+    fcsl_message_t answer;
     for (uint64_t tick = 0; tick < 50; tick++) {
         CHECK(fcsl_wire_receive(wire, tick, WAIT_MS, &answer) == FCSL_HAL_OK);
     }
@@ -319,8 +319,8 @@ static void *accept_one(void *argument)
 static void test_interrupt(void)
 {
     char error[TEXT_BYTES];
-    uint8_t bytes[FRAME_BYTES];
-    fcsl_frame_t frame;
+    uint8_t bytes[MESSAGE_BYTES];
+    fcsl_message_t message;
     fcsl_hal_t hal;
     pthread_t thread;
     void *accepted = NULL;
@@ -329,8 +329,8 @@ static void test_interrupt(void)
     CHECK(fcsl_hal_wire_connect(path, &MACHINE, WAIT_MS, &hal, error, sizeof error) == 0);
     CHECK(pthread_join(thread, &accepted) == 0 && accepted == wire);
     CHECK(pthread_create(&thread, NULL, interrupt_soon, &hal) == 0);
-    CHECK(hal.sample(hal.ctx, 0, bytes, sizeof bytes, &frame) == FCSL_HAL_CLOSED);
-    CHECK(hal.sample(hal.ctx, 0, bytes, sizeof bytes, &frame) == FCSL_HAL_CLOSED);
+    CHECK(hal.sample(hal.ctx, 0, bytes, sizeof bytes, &message) == FCSL_HAL_CLOSED);
+    CHECK(hal.sample(hal.ctx, 0, bytes, sizeof bytes, &message) == FCSL_HAL_CLOSED);
     CHECK(pthread_join(thread, NULL) == 0);
     hal.close(hal.ctx);
     fcsl_wire_close(wire);
@@ -363,11 +363,11 @@ static void test_socket_paths(void)
 
 static void test_stub(void)
 {
-    uint8_t bytes[FRAME_BYTES] = {0};
-    fcsl_frame_t frame = {.bytes = bytes, .size = 8};
+    uint8_t bytes[MESSAGE_BYTES] = {0};
+    fcsl_message_t message = {.bytes = bytes, .size = 8};
     const fcsl_hal_t hal = fcsl_hal_stub();
-    CHECK(hal.sample(hal.ctx, 0, bytes, sizeof bytes, &frame) == FCSL_HAL_NONE);
-    CHECK(hal.actuate(hal.ctx, &frame) == FCSL_HAL_OK);
+    CHECK(hal.sample(hal.ctx, 0, bytes, sizeof bytes, &message) == FCSL_HAL_NONE);
+    CHECK(hal.actuate(hal.ctx, &message) == FCSL_HAL_OK);
     CHECK(!hal.paces && !hal.serves);
     hal.interrupt(hal.ctx);
     hal.close(hal.ctx);
@@ -390,8 +390,8 @@ int main(void)
     test_killed_controller();
     test_mismatch_is_refused();
     test_stranger_is_ignored();
-    test_bad_frames_are_dropped();
-    test_frame_ahead_of_time();
+    test_bad_messages_are_dropped();
+    test_message_ahead_of_time();
     test_slots_are_bounded();
     test_interrupt();
     CHECK(rmdir(folder) == 0);

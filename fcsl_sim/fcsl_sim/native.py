@@ -53,7 +53,7 @@ _PROTOTYPES: dict[str, tuple[type | None, list[type]]] = {
     "fcsl_sim_accept": (c_int, [ptr, _ERROR]),
     "fcsl_sim_sense": (c_int64, [ptr, ptr, c_size_t, _ERROR]),
     "fcsl_sim_actuate": (c_int, [ptr, c_char_p, c_size_t, _ERROR]),
-    "fcsl_sim_frame_capacity": (c_size_t, [ptr]),
+    "fcsl_sim_message_capacity": (c_size_t, [ptr]),
     "fcsl_sim_instance_count": (c_uint32, [ptr]),
     "fcsl_sim_instance_name": (c_char_p, [ptr, c_uint32]),
     "fcsl_sim_instance_data": (ptr, [ptr, c_uint32]),
@@ -130,7 +130,7 @@ class Simulation:
             raise SimError(_text(self._error))
         self.machine: Machine = read_machine(self._lib.fcsl_sim_machine(self._handle))
         self.ticks = int(self._lib.fcsl_sim_ticks(self._handle))
-        self._frame = ctypes.create_string_buffer(self._lib.fcsl_sim_frame_capacity(self._handle))
+        self._message = ctypes.create_string_buffer(self._lib.fcsl_sim_message_capacity(self._handle))
         self._truth = ctypes.create_string_buffer(_MAX_TRUTH_BYTES)
         count = self._lib.fcsl_sim_instance_count(self._handle)
         names = [self._lib.fcsl_sim_instance_name(self._handle, i).decode() for i in range(count)]
@@ -244,13 +244,13 @@ class Simulation:
         return {name: int(getattr(counters, name)) for name in _SENT}
 
     def sense(self) -> bytes:
-        """Advances to the next tick and returns its sensor frame."""
-        size = self._lib.fcsl_sim_sense(self.handle(), self._frame, len(self._frame), byref(self._error))
-        return ctypes.string_at(self._frame, self._check(size))
+        """Advances to the next tick and returns its sensor message."""
+        size = self._lib.fcsl_sim_sense(self.handle(), self._message, len(self._message), byref(self._error))
+        return ctypes.string_at(self._message, self._check(size))
 
-    def actuate(self, frame: bytes) -> None:
-        """Takes the actuator frame of the sensed tick, and completes the tick."""
-        self._check(self._lib.fcsl_sim_actuate(self.handle(), frame, len(frame), byref(self._error)))
+    def actuate(self, message: bytes) -> None:
+        """Takes the actuator message of the sensed tick, and completes the tick."""
+        self._check(self._lib.fcsl_sim_actuate(self.handle(), message, len(message), byref(self._error)))
 
     def channel_data(self) -> int:
         """Address of a machine struct with the channels of the last sensed tick; its other fields are undefined."""

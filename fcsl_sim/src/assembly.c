@@ -61,13 +61,13 @@ static int build_machine(fcsl_sim_t *sim, fcsl_error_t *error)
                              plan->integrator_line, (unsigned long long)machine->tick_hz);
     }
     sim->steps_per_tick = plan->integrator_hz / machine->tick_hz;
-    const size_t sensors = fcsl_frame_capacity(machine, FCSL_SENSOR);
-    const size_t actuators = fcsl_frame_capacity(machine, FCSL_ACTUATOR);
-    sim->frame_capacity = sensors > actuators ? sensors : actuators;
-    sim->frame_bytes = malloc(sim->frame_capacity);
+    const size_t sensors = fcsl_message_capacity(machine, FCSL_SENSOR_MESSAGE);
+    const size_t actuators = fcsl_message_capacity(machine, FCSL_ACTUATOR_MESSAGE);
+    sim->message_capacity = sensors > actuators ? sensors : actuators;
+    sim->message_bytes = malloc(sim->message_capacity);
     sim->image = allocate(machine->size, machine->align);
     sim->select = calloc(machine->channel_count + 1u, 1);
-    if (!sim->frame_bytes || !sim->image || !sim->select) {
+    if (!sim->message_bytes || !sim->image || !sim->select) {
         return fcsl_sim_fail(error, "no memory for the channels");
     }
     return 0;
@@ -406,6 +406,6 @@ void fcsl_assembly_free(fcsl_sim_t *sim)
     free(sim->events);
     free(sim->image);
     free(sim->select);
-    free(sim->frame_bytes);
+    free(sim->message_bytes);
     free(sim->scratch);
 }

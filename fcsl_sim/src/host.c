@@ -10,10 +10,10 @@
 #include "fcsl/fcsl_wire.h"
 #include "sim_internal.h"
 
-/* Exchanges the sensor frame for the actuator frame, which overwrites it; 0, or -1. */
-static int ask_machine(fcsl_sim_t *sim, fcsl_frame_t *frame, fcsl_error_t *error)
+/* Exchanges the sensor message for the actuator message, which overwrites it; 0, or -1. */
+static int ask_machine(fcsl_sim_t *sim, fcsl_message_t *message, fcsl_error_t *error)
 {
-    if (fcsl_run_sense_frame(sim->run, frame, error)) {
+    if (fcsl_run_sense_message(sim->run, message, error)) {
         return -1;
     }
     for (uint32_t i = 0; sim->recording && i < sim->instance_count; i++) {
@@ -27,8 +27,8 @@ static int ask_machine(fcsl_sim_t *sim, fcsl_frame_t *frame, fcsl_error_t *error
     if (fcsl_run_step(sim->run, 1, error)) {
         return -1;
     }
-    if (fcsl_run_actuate_frame(sim->run, sim->frame_bytes, sim->frame_capacity, frame) != 0) {
-        return fcsl_sim_fail(error, "no room for an actuator frame");
+    if (fcsl_run_actuate_message(sim->run, sim->message_bytes, sim->message_capacity, message) != 0) {
+        return fcsl_sim_fail(error, "no room for an actuator message");
     }
     return 0;
 }
@@ -42,15 +42,15 @@ static int wire_failed(const fcsl_sim_t *sim, fcsl_hal_status_t status, const ch
     return fcsl_sim_fail(error, "tick %llu: %s: %s", tick, doing, fcsl_wire_explain(sim->wire));
 }
 
-static int ask_wire(fcsl_sim_t *sim, fcsl_frame_t *frame, fcsl_error_t *error)
+static int ask_wire(fcsl_sim_t *sim, fcsl_message_t *message, fcsl_error_t *error)
 {
-    fcsl_hal_status_t status = fcsl_wire_send(sim->wire, frame->bytes, frame->size);
+    fcsl_hal_status_t status = fcsl_wire_send(sim->wire, message->bytes, message->size);
     if (status != FCSL_HAL_OK) {
-        return wire_failed(sim, status, "cannot send the sensor frame", error);
+        return wire_failed(sim, status, "cannot send the sensor message", error);
     }
-    status = fcsl_wire_receive(sim->wire, sim->tick, sim->wire_timeout_ms, frame);
+    status = fcsl_wire_receive(sim->wire, sim->tick, sim->wire_timeout_ms, message);
     if (status != FCSL_HAL_OK) {
-        return wire_failed(sim, status, "no actuator frame from the controller", error);
+        return wire_failed(sim, status, "no actuator message from the controller", error);
     }
     return 0;
 }
@@ -58,10 +58,10 @@ static int ask_wire(fcsl_sim_t *sim, fcsl_frame_t *frame, fcsl_error_t *error)
 int fcsl_sim_tick_once(fcsl_sim_t *sim, fcsl_error_t *error)
 {
     const uint64_t begun_ns = fcsl_sim_tick_begins(sim);
-    fcsl_frame_t frame;
-    if (fcsl_sim_sense_frame(sim, sim->frame_bytes, sim->frame_capacity, &frame, error) ||
-        (sim->wire ? ask_wire(sim, &frame, error) : ask_machine(sim, &frame, error)) ||
-        fcsl_sim_actuate_frame(sim, &frame, error)) {
+    fcsl_message_t message;
+    if (fcsl_sim_sense_message(sim, sim->message_bytes, sim->message_capacity, &message, error) ||
+        (sim->wire ? ask_wire(sim, &message, error) : ask_machine(sim, &message, error)) ||
+        fcsl_sim_actuate_message(sim, &message, error)) {
         return -1;
     }
     fcsl_sim_publish(sim);

@@ -147,7 +147,7 @@ void fcsl_sim_tick_ends(fcsl_sim_t *sim, uint64_t begun_ns)
     }
     fcsl_tick_stats_t *stats = &sim->service->stats;
     fcsl_tick_stats_put(&stats->ticks, fcsl_tick_stats_get(&stats->ticks) + 1u);
-    fcsl_tick_stats_put(&stats->frames_refused, fcsl_run_frames_refused(sim->run));
+    fcsl_tick_stats_put(&stats->messages_refused, fcsl_run_messages_refused(sim->run));
     fcsl_tick_stats_put(&stats->hardware_failures, fcsl_run_hardware_failures(sim->run));
     fcsl_tick_stats_put(&stats->records_dropped, fcsl_run_record_dropped(sim->run));
     fcsl_histogram_add(&stats->tick_time, fcsl_run_monotonic_ns(NULL) - begun_ns);

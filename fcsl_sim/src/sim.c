@@ -149,17 +149,18 @@ fcsl_sim_t *fcsl_sim_open(const char *plan, size_t size, fcsl_error_t *error)
 
 int64_t fcsl_sim_sense(fcsl_sim_t *sim, uint8_t *bytes, size_t capacity, fcsl_error_t *error)
 {
-    fcsl_frame_t frame;
-    return fcsl_sim_sense_frame(sim, bytes, capacity, &frame, error) == 0 ? (int64_t)frame.size : -1;
+    fcsl_message_t message;
+    return fcsl_sim_sense_message(sim, bytes, capacity, &message, error) == 0 ? (int64_t)message.size : -1;
 }
 
-int fcsl_sim_sense_frame(fcsl_sim_t *sim, uint8_t *bytes, size_t capacity, fcsl_frame_t *frame, fcsl_error_t *error)
+int fcsl_sim_sense_message(fcsl_sim_t *sim, uint8_t *bytes, size_t capacity, fcsl_message_t *message,
+                           fcsl_error_t *error)
 {
     if (sim->status != FCSL_SIM_RUNNING) {
         return fcsl_sim_fail(error, "the simulation is over");
     }
     if (sim->sensed) {
-        return fcsl_sim_fail(error, "tick %llu was sensed and waits for its actuator frame",
+        return fcsl_sim_fail(error, "tick %llu was sensed and waits for its actuator message",
                              (unsigned long long)sim->tick);
     }
     for (int ticked = 0; !ticked;) { /* the next tick is in the queue, with finitely many events before it */
@@ -185,13 +186,13 @@ int fcsl_sim_sense_frame(fcsl_sim_t *sim, uint8_t *bytes, size_t capacity, fcsl_
         sim->instances[i].fresh = 0;
     }
     sim->sensed = 1;
-    const fcsl_frame_status_t status = fcsl_frame_encode(fcsl_run_channels(sim->run), sim->image, FCSL_SENSOR,
-                                                         sim->tick, sim->select, bytes, capacity, frame);
-    if (status == FCSL_FRAME_SHORT) {
-        return fcsl_sim_fail(error, "no room for a sensor frame in %zu bytes", capacity);
+    const fcsl_message_status_t status = fcsl_message_encode_sensors(fcsl_run_channels(sim->run), sim->image, sim->tick,
+                                                                     sim->select, bytes, capacity, message);
+    if (status == FCSL_MESSAGE_SHORT) {
+        return fcsl_sim_fail(error, "no room for a sensor message in %zu bytes", capacity);
     }
-    if (status != FCSL_FRAME_OK) {
-        return fcsl_sim_fail(error, "sensor frame refused: %s", fcsl_frame_status_text(status));
+    if (status != FCSL_MESSAGE_OK) {
+        return fcsl_sim_fail(error, "sensor message refused: %s", fcsl_message_status_text(status));
     }
     return 0;
 }
@@ -216,27 +217,27 @@ static int until_holds(const fcsl_sim_t *sim)
 
 int fcsl_sim_actuate(fcsl_sim_t *sim, const uint8_t *bytes, size_t size, fcsl_error_t *error)
 {
-    fcsl_frame_t frame = {0};
-    const fcsl_frame_status_t status =
-        fcsl_frame_check(fcsl_run_channels(sim->run), FCSL_ACTUATOR, bytes, size, &frame);
-    if (sim->sensed && status != FCSL_FRAME_OK) {
-        return fcsl_sim_fail(error, "actuator frame of tick %llu refused: %s", (unsigned long long)sim->tick,
-                             fcsl_frame_status_text(status));
+    fcsl_message_t message = {0};
+    const fcsl_message_status_t status =
+        fcsl_message_check(fcsl_run_channels(sim->run), FCSL_ACTUATOR_MESSAGE, bytes, size, &message);
+    if (sim->sensed && status != FCSL_MESSAGE_OK) {
+        return fcsl_sim_fail(error, "actuator message of tick %llu refused: %s", (unsigned long long)sim->tick,
+                             fcsl_message_status_text(status));
     }
-    return fcsl_sim_actuate_frame(sim, &frame, error);
+    return fcsl_sim_actuate_message(sim, &message, error);
 }
 
-int fcsl_sim_actuate_frame(fcsl_sim_t *sim, const fcsl_frame_t *frame, fcsl_error_t *error)
+int fcsl_sim_actuate_message(fcsl_sim_t *sim, const fcsl_message_t *message, fcsl_error_t *error)
 {
     if (!sim->sensed) {
-        return fcsl_sim_fail(error, "an actuator frame for tick %llu, which was not sensed yet",
+        return fcsl_sim_fail(error, "an actuator message for tick %llu, which was not sensed yet",
                              (unsigned long long)sim->tick);
     }
-    if (frame->tick != sim->tick) {
-        return fcsl_sim_fail(error, "actuator frame of tick %llu where that of tick %llu is due",
-                             (unsigned long long)frame->tick, (unsigned long long)sim->tick);
+    if (message->tick != sim->tick) {
+        return fcsl_sim_fail(error, "actuator message of tick %llu where that of tick %llu is due",
+                             (unsigned long long)message->tick, (unsigned long long)sim->tick);
     }
-    fcsl_frame_apply(sim->machine, sim->image, frame);
+    fcsl_message_apply(sim->machine, sim->image, message);
     sim->sensed = 0;
     sim->tick++;
     if (sim->plan.until != FCSL_UNTIL_NONE) {
@@ -273,9 +274,9 @@ fcsl_sim_status_t fcsl_sim_status(const fcsl_sim_t *sim)
     return sim->status;
 }
 
-size_t fcsl_sim_frame_capacity(const fcsl_sim_t *sim)
+size_t fcsl_sim_message_capacity(const fcsl_sim_t *sim)
 {
-    return sim->frame_capacity;
+    return sim->message_capacity;
 }
 
 uint32_t fcsl_sim_instance_count(const fcsl_sim_t *sim)

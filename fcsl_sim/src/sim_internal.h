@@ -76,9 +76,9 @@ struct fcsl_sim {
     uint32_t sensor_count;
     fcsl_write_t *events;
     uint8_t *image;  /* the plant's copy of the machine's struct: only its channel fields are defined */
-    uint8_t *select; /* per channel: included in the next sensor frame */
-    uint8_t *frame_bytes;
-    size_t frame_capacity;
+    uint8_t *select; /* per channel: included in the next sensor message */
+    uint8_t *message_bytes;
+    size_t message_capacity;
     double *scratch;
     fcsl_event_queue_t queue;
     const uint8_t *until_field;
@@ -101,9 +101,10 @@ struct fcsl_sim {
     fcsl_error_t failure;
 };
 
-/* sim.c: fcsl_sim_sense and fcsl_sim_actuate without validation of frames. Each returns 0, or -1. */
-int fcsl_sim_sense_frame(fcsl_sim_t *sim, uint8_t *bytes, size_t capacity, fcsl_frame_t *frame, fcsl_error_t *error);
-int fcsl_sim_actuate_frame(fcsl_sim_t *sim, const fcsl_frame_t *frame, fcsl_error_t *error);
+/* sim.c: fcsl_sim_sense and fcsl_sim_actuate without validation of messages. Each returns 0, or -1. */
+int fcsl_sim_sense_message(fcsl_sim_t *sim, uint8_t *bytes, size_t capacity, fcsl_message_t *message,
+                           fcsl_error_t *error);
+int fcsl_sim_actuate_message(fcsl_sim_t *sim, const fcsl_message_t *message, fcsl_error_t *error);
 /* host.c: one tick, with the hosted or the connected controller. */
 int fcsl_sim_tick_once(fcsl_sim_t *sim, fcsl_error_t *error);
 

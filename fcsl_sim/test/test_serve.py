@@ -240,7 +240,7 @@ def test_stats_are_those_of_flights(open_sim: Callable[..., Simulation], tmp_pat
         client("tick", count=4)
         stats = client("stats")
         assert stats["ticks"] == stats["tick_time_ns"]["count"] == 29 and stats["tick_time_ns"]["p50"] > 0
-        assert stats["tick"] == 4 and stats["frames_refused"] == stats["records_dropped"] == 0
+        assert stats["tick"] == 4 and stats["messages_refused"] == stats["records_dropped"] == 0
         assert not {"deadlines_missed", "ticks_skipped", "watchdog_trips", "lateness_ns"} & stats.keys()
 
 

@@ -11,6 +11,7 @@ import pytest
 
 from fcsl_sim import SimConfig, SimError, Simulation
 from fcsl_sim.runner import run
+from simclient.link.message import Channel, Kind, Message, encode
 from simclient.run import open_run
 
 Open = Callable[..., Simulation]
@@ -54,7 +55,7 @@ def test_a_fast_sensor_gives_its_newest_sample(open_sim: Open) -> None:
         assert near(sim.machine_value("pilot.outputs.pos_z"), 0.49)
 
 
-def test_a_dropout_leaves_the_channel_out_of_the_frame(open_sim: Open) -> None:
+def test_a_dropout_leaves_the_channel_out_of_the_message(open_sim: Open) -> None:
     def change(config: dict[str, Any]) -> None:
         config["events"] = [
             {"at_s": 0.3, "set": "altimeter.parameters.dropout", "value": True},
@@ -103,52 +104,48 @@ def test_until_compares_integers_with_their_sign(
 
 
 def test_the_caller_may_be_the_controller(open_sim: Open, hopper: tuple[Path, str]) -> None:
-    """Frame by frame, the same bits as with the machine hosted by the simulator."""
+    """Message by message, the same bits as with the machine hosted by the simulator."""
     with open_sim() as hosted, open_sim() as stepped:
-        frames = []
+        messages = []
         while stepped.status == "running":
-            frames.append(stepped.sense())
-            if len(frames) == 1:
-                with pytest.raises(SimError, match="tick 0 was sensed and waits for its actuator frame"):
+            messages.append(stepped.sense())
+            if len(messages) == 1:
+                with pytest.raises(SimError, match="tick 0 was sensed and waits for its actuator message"):
                     stepped.sense()
             hosted.run(1)
-            stepped.actuate(actuator_frame(stepped, hosted))
+            stepped.actuate(actuator_message(stepped, hosted))
             assert stepped.get("ramp.state.x") == hosted.get("ramp.state.x")
         run_ = open_run(*hopper)
         run_.attach()
-        for frame in frames:
-            run_.sense(frame)
+        for message in messages:
+            run_.sense(message)
             run_.step(1)
         field = run_.machine.fields["pilot.outputs.samples"]
         assert run_.read(field.offset, field.size) == (100).to_bytes(8, "little")
         run_.close()
 
 
-def actuator_frame(stepped: Simulation, hosted: Simulation) -> bytes:
-    """The hosted machine's actuator frame, encoded by the test."""
-    import struct
-    import zlib
-
-    sense = struct.Struct("<4sHBBQI HH")
-    table = struct.pack("<HBBI", 1, 0, 6, 1) + struct.pack("<HBBI", 2, 0, 6, 1) + struct.pack("<HBBI", 16, 1, 6, 1)
-    throttle = struct.pack("<HHd", 16, 8, hosted.machine_value("pilot.outputs.throttle"))
-    body = sense.pack(b"FCSF", 1, 1, 0, stepped.tick, zlib.crc32(table), 1, 0) + throttle
-    return body + struct.pack("<I", zlib.crc32(body))
+def actuator_message(stepped: Simulation, hosted: Simulation) -> bytes:
+    """The hosted machine's actuator message, encoded by the Python implementation."""
+    f64 = 6
+    table = [Channel(1, False, f64), Channel(2, False, f64), Channel(16, True, f64)]
+    values = {16: [hosted.machine_value("pilot.outputs.throttle")]}
+    return encode(Message(Kind.ACTUATORS, stepped.tick, values, armed=True), table)
 
 
-def test_actuator_frames_are_checked(open_sim: Open) -> None:
+def test_actuator_messages_are_checked(open_sim: Open) -> None:
     with open_sim() as sim, open_sim() as hosted:
         hosted.run(1)
-        good = actuator_frame(sim, hosted)
+        good = actuator_message(sim, hosted)
         with pytest.raises(SimError, match="tick 0, which was not sensed yet"):
             sim.actuate(good)
         sim.sense()
         for size in range(len(good)):
-            with pytest.raises(SimError, match="actuator frame of tick 0 refused"):
+            with pytest.raises(SimError, match="actuator message of tick 0 refused"):
                 sim.actuate(good[:size])
         with pytest.raises(SimError, match="refused: checksum mismatch"):
             sim.actuate(good[:30] + bytes([good[30] ^ 1]) + good[31:])
         sim.actuate(good)
         sim.sense()
-        with pytest.raises(SimError, match="actuator frame of tick 0 where that of tick 1 is due"):
+        with pytest.raises(SimError, match="actuator message of tick 0 where that of tick 1 is due"):
             sim.actuate(good)

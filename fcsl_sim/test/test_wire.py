@@ -105,7 +105,7 @@ def test_a_controller_that_hangs_is_an_error_with_its_tick(load_sim: Callable[..
         flight.send_signal(signal.SIGSTOP)
         last, err = ending(server, seen)
         flight.send_signal(signal.SIGCONT)
-    assert err.startswith(f"error: tick {last}: no actuator frame from the controller: ")
+    assert err.startswith(f"error: tick {last}: no actuator message from the controller: ")
 
 
 def test_no_controller_comes(load_sim: Callable[..., SimConfig]) -> None:

@@ -23,6 +23,8 @@ _ROS_FRAME = re.compile(r"\S+")
 #: Axes of a vector; and of a rotation: target axes, source axes.
 AXES = ("enu", "ned", "flu", "frd", "enu/flu", "ned/frd", "ned/flu", "enu/frd")
 _MAX_AGE = 2**32 - 2
+#: Ids from 0xFF00 on are reserved for entries of messages that are no channels (docs/wire.md).
+MAX_ID = 0xFEFF
 
 
 def read_channels(
@@ -65,7 +67,7 @@ def _channel(
             "E203", f"`{name}` is not a channel name", keys["name"].span, help="lower case, such as imu.gyro"
         )
         name = None
-    number = reader.integer(keys.get("id"), "`id`", 0, 65535)
+    number = reader.integer(keys.get("id"), "`id`", 0, MAX_ID)
     direction = reader.choice(keys.get("direction"), "`direction`", ("sensor", "actuator"))
     age = reader.integer(keys.get("max_age_ticks"), "`max_age_ticks`", 0, _MAX_AGE)
     if direction == "actuator" and "max_age_ticks" in keys:

@@ -142,7 +142,7 @@ typedef enum { FCSL_SENSOR = 0, FCSL_ACTUATOR = 1 } fcsl_direction_t;
 
 typedef struct {
     const char *name;
-    uint16_t id; /* identifies the channel in frames */
+    uint16_t id; /* identifies the channel in messages (docs/wire.md); below 0xff00 */
     uint8_t direction; /* fcsl_direction_t */
     uint32_t field; /* index into fields */
     uint32_t max_age_ticks; /* sensors: older is invalid; UINT32_MAX: never */

@@ -1,10 +1,10 @@
 /* SPDX-License-Identifier: Apache-2.0
  *
  * The simulator's end of the wire HAL (the controller's end is fcsl_hal_wire_connect): lock-step over a Unix
- * sequenced-packet socket, one channel frame per packet. Both ends first exchange a handshake that carries the hash of
+ * sequenced-packet socket, one message per packet. Both ends first exchange a handshake that carries the hash of
  * the channel table and the tick rate; peers that differ refuse each other with a text that says how.
  *
- * Per tick the simulator sends sensor frame k and waits for actuator frame k. Single-threaded; no allocation after accept.
+ * Per tick the simulator sends sensor message k and waits for actuator message k. Single-threaded; no allocation after accept.
  * A caught signal ends a wait with FCSL_HAL_NONE, and the caller decides.
  */
 #ifndef FCSL_WIRE_H
@@ -26,17 +26,17 @@ int fcsl_wire_listen(const char *socket_path, const fcsl_machine_t *machine, fcs
  * the wait with FCSL_HAL_ERROR. */
 fcsl_hal_status_t fcsl_wire_accept(fcsl_wire_t *wire, uint32_t timeout_ms);
 
-/* Sends the sensor frame of a tick; FCSL_HAL_CLOSED when the controller is gone. Never blocks: in lock-step no more than
- * one frame is under way. */
-fcsl_hal_status_t fcsl_wire_send(fcsl_wire_t *wire, const uint8_t *frame, size_t size);
+/* Sends the sensor message of a tick; FCSL_HAL_CLOSED when the controller is gone. Never blocks: in lock-step no more than
+ * one message is under way. */
+fcsl_hal_status_t fcsl_wire_send(fcsl_wire_t *wire, const uint8_t *message, size_t size);
 
-/* Waits up to `timeout_ms` for the actuator frame of `tick`, whose bytes stay until the next call. Malformed frames and
+/* Waits up to `timeout_ms` for the actuator message of `tick`, whose bytes stay until the next call. Malformed messages and
  * those of earlier ticks are dropped and counted; FCSL_HAL_CLOSED when the controller is gone. */
-fcsl_hal_status_t fcsl_wire_receive(fcsl_wire_t *wire, uint64_t tick, uint32_t timeout_ms, fcsl_frame_t *frame);
+fcsl_hal_status_t fcsl_wire_receive(fcsl_wire_t *wire, uint64_t tick, uint32_t timeout_ms, fcsl_message_t *message);
 
 /* What the last status other than OK was about; never null. */
 const char *fcsl_wire_explain(const fcsl_wire_t *wire);
-uint64_t fcsl_wire_frames_dropped(const fcsl_wire_t *wire);
+uint64_t fcsl_wire_messages_dropped(const fcsl_wire_t *wire);
 
 /* Tells the controller that the run has ended, closes, unlinks the socket. Accepts null. */
 void fcsl_wire_close(fcsl_wire_t *wire);

@@ -28,8 +28,8 @@ int loop_open(loop_t *loop)
 {
     const fcsl_machine_t *machine = fcsl_run_machine(loop->run);
     const fcsl_part_t part = {.data = fcsl_run_data(loop->run), .size = machine->size};
-    loop->sensor_capacity = fcsl_frame_capacity(machine, FCSL_SENSOR);
-    loop->actuator_capacity = fcsl_frame_capacity(machine, FCSL_ACTUATOR);
+    loop->sensor_capacity = fcsl_message_capacity(machine, FCSL_SENSOR_MESSAGE);
+    loop->actuator_capacity = fcsl_message_capacity(machine, FCSL_ACTUATOR_MESSAGE);
     loop->sensor_bytes = calloc(1, loop->sensor_capacity);
     loop->actuator_bytes = calloc(1, loop->actuator_capacity);
     if (loop->sensor_bytes == NULL || loop->actuator_bytes == NULL ||
@@ -118,7 +118,7 @@ static void count(loop_t *loop)
 {
     fcsl_tick_stats_t *stats = &loop->stats;
     fcsl_tick_stats_put(&stats->ticks, fcsl_tick_stats_get(&stats->ticks) + 1u);
-    fcsl_tick_stats_put(&stats->frames_refused, fcsl_run_frames_refused(loop->run));
+    fcsl_tick_stats_put(&stats->messages_refused, fcsl_run_messages_refused(loop->run));
     fcsl_tick_stats_put(&stats->hardware_failures, fcsl_run_hardware_failures(loop->run));
     if (loop->recording) {
         watch_recording(loop);
@@ -132,12 +132,12 @@ static int act_on_sensors(loop_t *loop, uint64_t begun_ns)
         return 0;
     }
     count(loop);
-    fcsl_frame_t frame;
-    if (fcsl_run_actuate_frame(loop->run, loop->actuator_bytes, loop->actuator_capacity, &frame) != 0) {
-        fail(loop, "the actuator frame does not fit its buffer");
+    fcsl_message_t message;
+    if (fcsl_run_actuate_message(loop->run, loop->actuator_bytes, loop->actuator_capacity, &message) != 0) {
+        fail(loop, "the actuator message does not fit its buffer");
         return 0;
     }
-    const int on = goes_on(loop, loop->hal.actuate(loop->hal.ctx, &frame));
+    const int on = goes_on(loop, loop->hal.actuate(loop->hal.ctx, &message));
     publish(loop, begun_ns);
     return on;
 }
@@ -146,9 +146,9 @@ int loop_tick(loop_t *loop)
 {
     fcsl_error_t error;
     const uint64_t tick = fcsl_run_tick(loop->run);
-    fcsl_frame_t frame;
+    fcsl_message_t message;
     const fcsl_hal_status_t sampled =
-        loop->hal.sample(loop->hal.ctx, tick, loop->sensor_bytes, loop->sensor_capacity, &frame);
+        loop->hal.sample(loop->hal.ctx, tick, loop->sensor_bytes, loop->sensor_capacity, &message);
     if (!goes_on(loop, sampled)) {
         return 0;
     }
@@ -156,8 +156,8 @@ int loop_tick(loop_t *loop)
     fcsl_tick_stats_put(&loop->stats.tick, tick);
     fcsl_tick_stats_put(&loop->stats.begun_ns, begun_ns);
     if (sampled == FCSL_HAL_OK) {
-        /* A refused frame is counted by the run and changes nothing: the channel grows old instead. */
-        (void)fcsl_run_sense_frame(loop->run, &frame, &error);
+        /* A refused message is counted by the run and changes nothing: the channel grows old instead. */
+        (void)fcsl_run_sense_message(loop->run, &message, &error);
     }
     const int on = act_on_sensors(loop, begun_ns);
     fcsl_tick_stats_put(&loop->stats.begun_ns, 0);

@@ -24,7 +24,7 @@ typedef struct {
     int recording;
     int paused;
 
-    uint8_t *sensor_bytes; /* of the frames */
+    uint8_t *sensor_bytes; /* of the messages */
     size_t sensor_capacity;
     uint8_t *actuator_bytes;
     size_t actuator_capacity;
@@ -40,7 +40,7 @@ typedef struct {
     char failure[512]; /* empty unless something failed */
 } loop_t;
 
-/* Allocates frames and history; 0, or -1. */
+/* Allocates messages and history; 0, or -1. */
 int loop_open(loop_t *loop);
 void loop_free(loop_t *loop);
 

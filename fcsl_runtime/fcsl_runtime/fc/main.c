@@ -70,7 +70,7 @@ static int open_run(program_t *program)
     loop->ticks_max = program->options.ticks;
     loop->missed_deadline = program->options.missed_deadline;
     loop->paused = program->options.paused;
-    return loop_open(loop) == 0 ? 0 : complain("out of memory for frames");
+    return loop_open(loop) == 0 ? 0 : complain("out of memory for messages");
 }
 
 /* The socket is taken first: when it is in use, nothing else has happened yet. */

@@ -23,7 +23,7 @@ static const char USAGE[] =
     "\n"
     "  --machine NAME          which machine, when the library holds several\n"
     "  --hal stub|wire:PATH    stub: no hardware (default); wire: lock-step with the simulator that listens on PATH\n"
-    "  --timeout-ms N          how long to wait for the simulator's next frame (default 2000)\n"
+    "  --timeout-ms N          how long to wait for the simulator's next message (default 2000)\n"
     "  --board LIBRARY.so      the board that hw_* of algorithms reach (fcsl/fcsl_hw.h); default: simulated hardware\n"
     "  --ticks N               end after N ticks\n"
     "  --restore FILE          begin where the checkpoint in FILE was saved (docs/checkpoints.md), not at tick 0\n"

@@ -50,10 +50,10 @@ static void report_counters(const loop_t *loop, const uint8_t *data)
     }
     log_info("%" PRIu64 " ticks, %" PRIu64 " deadlines missed, %" PRIu64 " ticks skipped, %" PRIu64
              " watchdog trips, %" PRIu64 " faults, %" PRIu64 " overruns, %" PRIu64 " hardware failures, %" PRIu64
-             " sensor frames refused, %" PRIu64 " records dropped%s",
+             " sensor messages refused, %" PRIu64 " records dropped%s",
              fcsl_tick_stats_get(&stats->ticks), fcsl_tick_stats_get(&stats->deadlines_missed),
              fcsl_tick_stats_get(&stats->ticks_skipped), fcsl_tick_stats_get(&stats->watchdog_trips), faults, overruns,
-             fcsl_tick_stats_get(&stats->hardware_failures), fcsl_tick_stats_get(&stats->frames_refused),
+             fcsl_tick_stats_get(&stats->hardware_failures), fcsl_tick_stats_get(&stats->messages_refused),
              fcsl_tick_stats_get(&stats->records_dropped), clients);
     if (loop->telemetry != NULL) {
         report_telemetry(loop->telemetry);

@@ -71,9 +71,9 @@ static void put_counters(json_out_t *out, const fcsl_machine_t *machine, const f
                   fcsl_tick_stats_get(&stats->ticks_skipped), fcsl_tick_stats_get(&stats->watchdog_trips));
     fcsl_json_raw(out,
                   ",\"faults\":%" PRIu64 ",\"overruns\":%" PRIu64 ",\"hardware_failures\":%" PRIu64
-                  ",\"frames_refused\":%" PRIu64 ",\"records_dropped\":%" PRIu64 "}",
+                  ",\"messages_refused\":%" PRIu64 ",\"records_dropped\":%" PRIu64 "}",
                   faults, overruns, fcsl_tick_stats_get(&stats->hardware_failures),
-                  fcsl_tick_stats_get(&stats->frames_refused), fcsl_tick_stats_get(&stats->records_dropped));
+                  fcsl_tick_stats_get(&stats->messages_refused), fcsl_tick_stats_get(&stats->records_dropped));
 }
 
 static const char *state_name(const fcsl_machine_t *machine, const uint8_t *data, uint32_t offset)

@@ -13,29 +13,30 @@
 #include "fcsl/fcsl_hal.h"
 #include "fcsl/fcsl_run.h"
 
-enum { TICKS = 5000, FRAME_BYTES = 256 };
+enum { TICKS = 5000, MESSAGE_BYTES = 256 };
 
 /* One tick as a flight program makes it. */
 static void fly_tick(fcsl_run_t *run, uint64_t tick)
 {
     fcsl_error_t error;
-    uint8_t frame[FRAME_BYTES];
-    uint8_t message[FRAME_BYTES];
-    fcsl_frame_t encoded;
+    uint8_t message[MESSAGE_BYTES];
+    uint8_t ros_message[MESSAGE_BYTES];
+    fcsl_message_t encoded;
     const uint8_t armed = tick % 50 < 25;
     const int64_t count = tick % 97 == 0 ? -1 : 1;
-    CHECK(fcsl_frame_encode(fcsl_run_channels(run), fcsl_run_data(run), FCSL_SENSOR, tick, NULL, frame, sizeof frame,
-                            &encoded) == 0);
-    CHECK(fcsl_run_sense(run, frame, encoded.size, &error) == 0);
-    CHECK(fcsl_run_sense(run, frame, encoded.size - 1, &error) != 0);
-    CHECK(fcsl_run_sense_frame(run, &encoded, &error) == 0);
+    CHECK(fcsl_message_encode_sensors(fcsl_run_channels(run), fcsl_run_data(run), tick, NULL, message, sizeof message,
+                                      &encoded) == 0);
+    CHECK(fcsl_run_sense(run, message, encoded.size, &error) == 0);
+    CHECK(fcsl_run_sense(run, message, encoded.size - 1, &error) != 0);
+    CHECK(fcsl_run_sense_message(run, &encoded, &error) == 0);
     CHECK(fcsl_run_set(run, 5, 0, &armed, 1, &error) == 0);
     CHECK(fcsl_run_set(run, 6, 0, &count, 8, &error) == 0);
     if (tick % 300 == 0) {
         CHECK(fcsl_run_set_state(run, 0, &error) == 0 && fcsl_run_inject_overrun(run, 1, &error) == 0);
     }
     CHECK(fcsl_run_step(run, 1, &error) == 0);
-    CHECK(fcsl_run_actuate(run, frame, sizeof frame) > 0 && fcsl_run_message(run, 1, message, sizeof message) > 0);
+    CHECK(fcsl_run_actuate(run, message, sizeof message) > 0 &&
+          fcsl_run_message(run, 1, ros_message, sizeof ros_message) > 0);
 }
 
 static uint64_t count_allocations(const char *library, const char *bag, int lossless)

@@ -1,6 +1,6 @@
 /* SPDX-License-Identifier: Apache-2.0
  *
- * Hosting the fixture machine: loading, writing, frames, checkpoints, time. Argument: the fixture library.
+ * Hosting the fixture machine: loading, writing, messages, checkpoints, time. Argument: the fixture library.
  */
 #include <math.h>
 #include <string.h>
@@ -9,7 +9,7 @@
 #include "fcsl/fcsl_run.h"
 #include "fcsl/fcsl_scalar.h"
 
-enum { FRAME_BYTES = 256, MESSAGE_BYTES = 256 };
+enum { MESSAGE_BYTES = 256 };
 
 static const char *library;
 
@@ -226,44 +226,44 @@ static void test_checkpoint(void)
     close_run(run);
 }
 
-/* The sensor frame of `tick` with gyro[0] = value, made with the machine struct of another run. */
-static size_t frame_of(const fcsl_run_t *run, uint64_t tick, double value, uint8_t *frame)
+/* The sensor message of `tick` with gyro[0] = value, made with the machine struct of another run. */
+static size_t message_of(const fcsl_run_t *run, uint64_t tick, double value, uint8_t *message)
 {
     const fcsl_machine_t *machine = fcsl_run_machine(run);
     uint8_t *data = calloc(1, machine->size);
     CHECK(data != NULL);
     memcpy(data + machine->fields[field_of(run, "sensors.outputs.gyro")].offset, &value, 8);
-    fcsl_frame_t encoded;
-    CHECK(fcsl_frame_encode(fcsl_run_channels(run), data, FCSL_SENSOR, tick, NULL, frame, FRAME_BYTES, &encoded) == 0);
+    fcsl_message_t encoded;
+    CHECK(fcsl_message_encode_sensors(fcsl_run_channels(run), data, tick, NULL, message, MESSAGE_BYTES, &encoded) == 0);
     free(data);
     return encoded.size;
 }
 
-static void test_frames(void)
+static void test_channel_messages(void)
 {
     fcsl_error_t error;
-    uint8_t frame[FRAME_BYTES];
-    fcsl_frame_t checked;
+    uint8_t message[MESSAGE_BYTES];
+    fcsl_message_t checked;
     fcsl_run_t *run = open_fixture();
     CHECK(fcsl_run_attach(run, &error) == 0);
-    size_t size = frame_of(run, 0, 1.5, frame);
-    CHECK(fcsl_run_sense(run, frame, size, &error) == 0);
+    size_t size = message_of(run, 0, 1.5, message);
+    CHECK(fcsl_run_sense(run, message, size, &error) == 0);
     step(run, 1);
     CHECK(get_f64(run, "pilot.outputs.force") == 3.0);
     CHECK(get_i32(run, "sensors.outputs.health") == FCSL_NOMINAL);
-    const int64_t bytes = fcsl_run_actuate(run, frame, sizeof frame);
-    CHECK(bytes > 0 &&
-          fcsl_frame_check(fcsl_run_channels(run), FCSL_ACTUATOR, frame, (size_t)bytes, &checked) == FCSL_FRAME_OK);
-    CHECK(checked.tick == 0 && fcsl_run_actuate(run, frame, (size_t)bytes - 1) == -1);
+    const int64_t bytes = fcsl_run_actuate(run, message, sizeof message);
+    CHECK(bytes > 0 && fcsl_message_check(fcsl_run_channels(run), FCSL_ACTUATOR_MESSAGE, message, (size_t)bytes,
+                                          &checked) == FCSL_MESSAGE_OK);
+    CHECK(checked.tick == 0 && fcsl_run_actuate(run, message, (size_t)bytes - 1) == -1);
     /* Of another tick, damaged, and of the wrong direction: refused, counted, nothing changes. */
-    size = frame_of(run, 2, 9.0, frame);
-    check_refused(fcsl_run_sense(run, frame, size, &error), &error, "it is of tick 2, tick 1 is due");
-    size = frame_of(run, 1, 9.0, frame);
-    frame[size / 2] ^= 4u;
-    check_refused(fcsl_run_sense(run, frame, size, &error), &error, "checksum");
-    size = (size_t)fcsl_run_actuate(run, frame, sizeof frame);
-    check_refused(fcsl_run_sense(run, frame, size, &error), &error, "direction");
-    CHECK(fcsl_run_frames_refused(run) == 3);
+    size = message_of(run, 2, 9.0, message);
+    check_refused(fcsl_run_sense(run, message, size, &error), &error, "it is of tick 2, tick 1 is due");
+    size = message_of(run, 1, 9.0, message);
+    message[size / 2] ^= 4u;
+    check_refused(fcsl_run_sense(run, message, size, &error), &error, "checksum");
+    size = (size_t)fcsl_run_actuate(run, message, sizeof message);
+    check_refused(fcsl_run_sense(run, message, size, &error), &error, "it does not begin as a message of this kind");
+    CHECK(fcsl_run_messages_refused(run) == 3);
     double gyro[3];
     get(run, "sensors.outputs.gyro", gyro);
     CHECK(gyro[0] == 1.5);
@@ -349,7 +349,7 @@ int main(int argc, char **argv)
     test_set_connected_input();
     test_states();
     test_checkpoint();
-    test_frames();
+    test_channel_messages();
     test_overruns();
     test_time();
     test_message();

@@ -121,6 +121,7 @@ static void test_damage(void)
     REFUSED(transitions[1].guard_instance = 7, "transition 1");
     REFUSED(channels[1].field = 99, "channel 1");
     REFUSED(channels[1].id = channels[0].id, "channel 1");
+    REFUSED(channels[1].id = FCSL_RESERVED_ID_FIRST, "channel 1");
     REFUSED(channels[1].direction = 2, "channel 1");
     REFUSED(channels[1].fresh_offset = FCSL_NO_OFFSET, "channel 1");
     REFUSED(channels[1].sample_age_offset = machine.size - 2, "channel 1");

@@ -1,6 +1,6 @@
 /* SPDX-License-Identifier: Apache-2.0
  *
- * A simulator for tests of fcsl-fc over the wire: it hosts the same machine itself and exits 1 as soon as an actuator frame
+ * A simulator for tests of fcsl-fc over the wire: it hosts the same machine itself and exits 1 as soon as an actuator message
  * differs from its own by one bit.
  *
  *   wire_sim LIBRARY SOCKET TICKS END    END: end (say that the run is over), hang (send nothing more), die
@@ -15,37 +15,37 @@
 #include "fcsl/fcsl_run.h"
 #include "fcsl/fcsl_wire.h"
 
-enum { FRAME_BYTES = 256, WAIT_MS = 10000 };
+enum { MESSAGE_BYTES = 256, WAIT_MS = 10000 };
 
 /* Sets what the sensors say at `tick`; every seventh tick the gyro says nothing, and once for long. */
-static fcsl_frame_t sense(const fcsl_run_t *run, uint8_t *data, uint64_t tick, uint8_t *bytes)
+static fcsl_message_t sense(const fcsl_run_t *run, uint8_t *data, uint64_t tick, uint8_t *bytes)
 {
     const fcsl_machine_t *machine = fcsl_run_machine(run);
-    fcsl_frame_t frame;
+    fcsl_message_t message;
     uint8_t select[16];
     const double gyro[3] = {0.001 * (double)(tick % 1000), -0.3 / (double)(tick + 1), 0.0};
     memset(select, 1, sizeof select);
     memcpy(data + machine->fields[machine->channels[0].field].offset, gyro, sizeof gyro);
     data[machine->fields[machine->channels[1].field].offset] = tick / 40 % 2 == 1;
     select[0] = tick % 7 != 6 && (tick < 100 || tick > 120);
-    CHECK(fcsl_frame_encode(fcsl_run_channels(run), data, FCSL_SENSOR, tick, select, bytes, FRAME_BYTES, &frame) == 0);
-    return frame;
+    CHECK(fcsl_message_encode_sensors(fcsl_run_channels(run), data, tick, select, bytes, MESSAGE_BYTES, &message) == 0);
+    return message;
 }
 
 static void exchange(fcsl_wire_t *wire, fcsl_run_t *run, uint8_t *data, uint64_t tick)
 {
     fcsl_error_t error;
-    uint8_t bytes[FRAME_BYTES];
-    fcsl_frame_t answer;
-    fcsl_frame_t frame = sense(run, data, tick, bytes);
-    CHECK(fcsl_wire_send(wire, frame.bytes, frame.size) == FCSL_HAL_OK);
-    CHECK(fcsl_run_sense_frame(run, &frame, &error) == 0 && fcsl_run_step(run, 1, &error) == 0);
+    uint8_t bytes[MESSAGE_BYTES];
+    fcsl_message_t answer;
+    fcsl_message_t message = sense(run, data, tick, bytes);
+    CHECK(fcsl_wire_send(wire, message.bytes, message.size) == FCSL_HAL_OK);
+    CHECK(fcsl_run_sense_message(run, &message, &error) == 0 && fcsl_run_step(run, 1, &error) == 0);
     if (fcsl_wire_receive(wire, tick, WAIT_MS, &answer) != FCSL_HAL_OK) {
         (void)fprintf(stderr, "%s\n", fcsl_wire_explain(wire));
         exit(2);
     }
-    CHECK(fcsl_run_actuate_frame(run, bytes, sizeof bytes, &frame) == 0);
-    CHECK(frame.size == answer.size && memcmp(frame.bytes, answer.bytes, frame.size) == 0);
+    CHECK(fcsl_run_actuate_message(run, bytes, sizeof bytes, &message) == 0);
+    CHECK(message.size == answer.size && memcmp(message.bytes, answer.bytes, message.size) == 0);
 }
 
 int main(int argc, char **argv)

@@ -1,9 +1,9 @@
 # SPDX-License-Identifier: Apache-2.0
-"""ctypes structs and prototypes of fcsl_run.h, and of the frame encoder in fcsl_codec.h."""
+"""ctypes structs and prototypes of fcsl_run.h, and of the message encoder in fcsl_codec.h."""
 
 import ctypes
 import functools
-from ctypes import POINTER, Structure, c_char, c_char_p, c_int, c_int32, c_int64, c_size_t, c_uint32, c_uint64
+from ctypes import POINTER, Structure, c_char, c_char_p, c_int, c_int32, c_int64, c_size_t, c_uint8, c_uint32, c_uint64
 from ctypes import c_void_p as ptr
 from pathlib import Path
 
@@ -24,10 +24,18 @@ class CRecordOptions(Structure):
     _fields_ = [("bag", c_char_p), ("name_space", c_char_p), ("lossless", c_int), ("fields", c_char_p)]
 
 
-class CFrame(Structure):
-    """fcsl_frame_t"""
+class CMessage(Structure):
+    """fcsl_message_t"""
 
-    _fields_ = [("bytes", ptr), ("size", c_size_t), ("tick", c_uint64), ("direction", c_int)]
+    _fields_ = [
+        ("bytes", ptr),
+        ("size", c_size_t),
+        ("tick", c_uint64),
+        ("time_ns", c_uint64),
+        ("kind", c_int),
+        ("skipped", c_uint32),
+        ("armed", c_uint8),
+    ]
 
 
 _ERROR = POINTER(CError)
@@ -75,14 +83,14 @@ _PROTOTYPES: dict[str, tuple[type | None, list[type]]] = {
     "fcsl_run_record_time": (None, [ptr, c_uint64]),
     "fcsl_run_record_check": (c_int, [ptr, _ERROR]),
     "fcsl_run_record_dropped": (c_uint64, [ptr]),
-    "fcsl_frame_capacity": (c_size_t, [POINTER(CMachine), c_int]),
-    "fcsl_frame_encode": (
+    "fcsl_message_capacity": (c_size_t, [POINTER(CMachine), c_int]),
+    "fcsl_message_encode_sensors": (
         c_int,
-        [ptr, c_char_p, c_int, c_uint64, c_char_p, ptr, c_size_t, POINTER(CFrame)],
+        [ptr, c_char_p, c_uint64, c_char_p, ptr, c_size_t, POINTER(CMessage)],
     ),
-    "fcsl_frame_status_text": (c_char_p, [c_int]),
+    "fcsl_message_status_text": (c_char_p, [c_int]),
     "fcsl_run_channels": (ptr, [ptr]),
-    "fcsl_run_sense_frame": (c_int, [ptr, POINTER(CFrame), _ERROR]),
+    "fcsl_run_sense_message": (c_int, [ptr, POINTER(CMessage), _ERROR]),
     "fcsl_run_message": (c_int64, [ptr, c_uint32, ptr, c_size_t]),
     "fcsl_run_tick_message": (c_int64, [ptr, c_int, ptr, c_size_t]),
 }

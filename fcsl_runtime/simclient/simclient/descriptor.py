@@ -103,7 +103,7 @@ class Instance:
 class Channel:
     """A sensor or actuator of the machine.
 
-    `id` is its number in frames, `direction` "sensor" or "actuator", `field` the field that it carries. A sensor whose
+    `id` is its number in messages, `direction` "sensor" or "actuator", `field` the field that it carries. A sensor whose
     last sample is older than `max_age_ticks` is invalid (2**32 - 1: never). The ROS names select a part of a message
     (fcsl_machine.h); all are empty if the channel has no ROS message.
     """

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Python wrapper of fcsl_run.h and the frame encoder of fcsl_codec.h: one hosted machine. Same names and meaning."""
+"""Python wrapper of fcsl_run.h and the message encoder of fcsl_codec.h: one hosted machine. Same names and meaning."""
 
 from __future__ import annotations
 
@@ -11,7 +11,7 @@ from ctypes import c_void_p as ptr
 from pathlib import Path
 
 from .c_machine import HEALTH_NAMES, CMachine
-from .c_run import CError, CFrame, CRecordOptions, load_runtime
+from .c_run import CError, CMessage, CRecordOptions, load_runtime
 from .descriptor import Machine, read_machine
 from .errors import TwinError
 from .forks import FORKED, for_children, not_for_children
@@ -46,8 +46,8 @@ class Run:
             raise self._failure()
         self.machine: Machine = read_machine(self._lib.fcsl_run_machine(self._handle))
         descriptor = self._lib.fcsl_run_machine(self._handle)
-        self._frame_capacity = self._lib.fcsl_frame_capacity(descriptor, _SENSOR)
-        self._actuator_frame = ctypes.create_string_buffer(self._lib.fcsl_frame_capacity(descriptor, _ACTUATOR))
+        self._message_capacity = self._lib.fcsl_message_capacity(descriptor, _SENSOR)
+        self._actuator_message = ctypes.create_string_buffer(self._lib.fcsl_message_capacity(descriptor, _ACTUATOR))
         address = self._lib.fcsl_run_data(self._handle)
         self._data = memoryview((c_char * self.machine.size).from_address(address)).cast("B")
         self._message = ctypes.create_string_buffer(_MAX_MESSAGE_BYTES)
@@ -214,16 +214,16 @@ class Run:
         """Attaches sensor channel number `channel`."""
         self._check(self._lib.fcsl_run_attach_channel(self.handle(), channel, byref(self._error)))
 
-    def sense(self, frame: bytes) -> None:
-        """Takes a sensor frame (fcsl_codec.h) for the next tick."""
-        self._check(self._lib.fcsl_run_sense(self.handle(), frame, len(frame), byref(self._error)))
+    def sense(self, message: bytes) -> None:
+        """Takes a sensor message (fcsl_codec.h) for the next tick."""
+        self._check(self._lib.fcsl_run_sense(self.handle(), message, len(message), byref(self._error)))
 
     def actuate(self) -> bytes:
-        """The actuator frame of the last completed tick."""
-        size = self._lib.fcsl_run_actuate(self.handle(), self._actuator_frame, len(self._actuator_frame))
+        """The actuator message of the last completed tick."""
+        size = self._lib.fcsl_run_actuate(self.handle(), self._actuator_message, len(self._actuator_message))
         if size < 0:
-            raise TwinError(f"the actuator frame exceeds {len(self._actuator_frame)} bytes")
-        return ctypes.string_at(self._actuator_frame, size)
+            raise TwinError(f"the actuator message exceeds {len(self._actuator_message)} bytes")
+        return ctypes.string_at(self._actuator_message, size)
 
     def write_channel(self, channel: int, data: bytes, age_ticks: int = 0, stamp_ns: int = 0) -> None:
         """Writes one sensor sample for the next tick: row-major scalars, little-endian; its age in ticks, its stamp in
@@ -235,7 +235,7 @@ class Run:
         self._check(status)
 
     def write_channels(self, samples: Mapping[int, bytes]) -> None:
-        """Writes sensor samples of age 0 for the next tick as one frame: maps channel index to row-major scalars,
+        """Writes sensor samples of age 0 for the next tick as one message: maps channel index to row-major scalars,
         little-endian.
         """
         machine = self.machine
@@ -248,14 +248,14 @@ class Run:
                 raise TwinError(f"channel `{name}` takes {field.size} bytes ({field.type_text}), got {len(data)}")
             staging[field.offset : field.offset + field.size] = data
             select[index] = 1
-        room, frame = ctypes.create_string_buffer(self._frame_capacity), CFrame()
+        room, message = ctypes.create_string_buffer(self._message_capacity), CMessage()
         channels = self._lib.fcsl_run_channels(self.handle())
-        status = self._lib.fcsl_frame_encode(
-            channels, bytes(staging), _SENSOR, self.tick, bytes(select), room, len(room), byref(frame)
+        status = self._lib.fcsl_message_encode_sensors(
+            channels, bytes(staging), self.tick, bytes(select), room, len(room), byref(message)
         )
         if status != 0:
-            raise TwinError(f"sensor frame refused: {self._lib.fcsl_frame_status_text(status).decode()}")
-        self._check(self._lib.fcsl_run_sense_frame(self.handle(), byref(frame), byref(self._error)))
+            raise TwinError(f"sensor message refused: {self._lib.fcsl_message_status_text(status).decode()}")
+        self._check(self._lib.fcsl_run_sense_message(self.handle(), byref(message), byref(self._error)))
 
     def step(self, ticks: int) -> None:
         """Runs `ticks` ticks in slices, so that Ctrl-C is handled between two ticks."""

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""fcsl-fc in lock-step with a simulator over the wire. wire_sim compares every actuator frame with its own, bit by bit."""
+"""fcsl-fc in lock-step with a simulator over the wire. wire_sim compares every actuator message with its own, bit by bit."""
 
 from __future__ import annotations
 
@@ -36,7 +36,7 @@ def test_same_bits_as_in_process(tmp_path: Path) -> None:
         code, out, err = fc.wait()
         assert sim.wait(timeout=30) == 0, sim.communicate()
     assert (code, err) == (0, "") and "paced by the HAL" in out
-    assert "3000 ticks" in out and "0 overruns" in out and "0 sensor frames refused, 0 records dropped" in out
+    assert "3000 ticks" in out and "0 overruns" in out and "0 sensor messages refused, 0 records dropped" in out
     with AnyReader([bag]) as reader:
         messages = [(c.topic, reader.deserialize(d, c.msgtype)) for c, _, d in reader.messages()]
     pilot = [m for topic, m in messages if topic == "/fixture/pilot"]
@@ -56,7 +56,7 @@ def test_timeout_names_the_tick(tmp_path: Path) -> None:
         flying("--hal", f"wire:{wire}", "--record", bag, "--timeout-ms", "400") as fc,
     ):
         code, out, err = fc.wait()
-    assert code == 1 and err == "fcsl-fc: no sensor frame of tick 17 within 400 ms\n" and "17 ticks" in out
+    assert code == 1 and err == "fcsl-fc: no sensor message of tick 17 within 400 ms\n" and "17 ticks" in out
     with AnyReader([bag]) as reader:  # and the bag is whole
         assert {c.topic: c.msgcount for c in reader.connections}["/fixture/pilot"] == 17
 
@@ -65,7 +65,7 @@ def test_killed_simulator(tmp_path: Path) -> None:
     wire = tmp_path / "wire"
     with simulator(wire, 9, "die"), flying("--hal", f"wire:{wire}") as fc:
         code, _, err = fc.wait()
-    assert code == 1 and "went away before sensor frame of tick 9" in err
+    assert code == 1 and "went away before sensor message of tick 9" in err
 
 
 @pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGTERM])

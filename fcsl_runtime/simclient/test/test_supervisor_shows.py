@@ -215,7 +215,7 @@ def test_metrics(supervisor: Supervisor, library: str) -> None:
         "watchdog_trips",
         "overruns",
         "hardware_failures",
-        "frames_refused",
+        "messages_refused",
         "records_dropped",
     ):
         assert value(f"run_{name}_total", **mine) == stats[name]

@@ -42,7 +42,7 @@ typedef struct {
     uint32_t continuous_offset;
     uint32_t continuous_count;
     /* uint8_t: zero after an update without a sample (a dropout); the channels connected to this instance are then left
-     * out of the tick's sensor frame. FCSL_NO_OFFSET: every update is a sample. */
+     * out of the tick's sensor message. FCSL_NO_OFFSET: every update is a sample. */
     uint32_t sampled_offset;
 
     /* Called after parameters were written: checks them, sets states. Returns null, or an error text about a parameter. */

@@ -3,7 +3,7 @@
  * The simulator: flies a compiled machine against plant models on an integer nanosecond clock, deterministically.
  *
  * At t_k, the time of controller tick k: states have been integrated up to t_k; due models are updated; sensors are
- * sampled; the controller steps; its actuators hold from t_k on. Controller and plant meet only in channel frames
+ * sampled; the controller steps; its actuators hold from t_k on. Controller and plant meet only in messages
  * (fcsl_codec.h), whether the controller is hosted here, in another process or in a ROS 2 node: the bits are the same.
  *
  * A simulation is built from a plan: a flat text that the front end (fcsl_sim, Python) makes from a checked *.sim.json
@@ -89,17 +89,17 @@ void fcsl_sim_telemetry_stop(fcsl_sim_t *sim, fcsl_telemetry_counters_t *counter
 
 /* ---- controller driven by the caller --------------------------------------------------------------------------------- */
 
-/* Advances to the next tick and writes its sensor frame. Returns its bytes, or -1. Between sense and actuate the
+/* Advances to the next tick and writes its sensor message. Returns its bytes, or -1. Between sense and actuate the
  * truth of that tick can be read. */
-int64_t fcsl_sim_sense(fcsl_sim_t *sim, uint8_t *frame, size_t capacity, fcsl_error_t *error);
-/* The content of the last sensor frame: a machine struct of which only the channels are defined; and whether a channel
+int64_t fcsl_sim_sense(fcsl_sim_t *sim, uint8_t *message, size_t capacity, fcsl_error_t *error);
+/* The content of the last sensor message: a machine struct of which only the channels are defined; and whether a channel
  * (an index into channels) was sampled for that tick. */
 const void *fcsl_sim_channel_data(const fcsl_sim_t *sim);
 int fcsl_sim_sampled(const fcsl_sim_t *sim, uint32_t channel);
-/* Takes the actuator frame of the sensed tick, and completes the tick. */
-int fcsl_sim_actuate(fcsl_sim_t *sim, const uint8_t *frame, size_t size, fcsl_error_t *error);
-/* Bytes of the largest frame of either direction. */
-size_t fcsl_sim_frame_capacity(const fcsl_sim_t *sim);
+/* Takes the actuator message of the sensed tick, and completes the tick. */
+int fcsl_sim_actuate(fcsl_sim_t *sim, const uint8_t *message, size_t size, fcsl_error_t *error);
+/* Bytes of the largest message of either direction. */
+size_t fcsl_sim_message_capacity(const fcsl_sim_t *sim);
 
 /* ---- truth --------------------------------------------------------------------------------------------------------- */
 

@@ -37,24 +37,26 @@ _SEARCHED_S = 300
 
 TARGETS = (
     Target(
-        "frame",
-        "channel frames",
+        "message",
+        "messages of channels",
         "sockets, ROS 2 ticks",
-        Defect(f"{_HAL}/codec.c", "if (end - at - ENTRY_BYTES < size) {", "if (0) {"),
+        Defect(f"{_HAL}/codec_check.c", "if (end - at < entry->size) {", "if (0) {"),
     ),
     Target(
         "wire_controller",
         "the wire, controller's end",
         "socket",
         Defect(
-            f"{_HAL}/wire.c", "slot->frame.tick == tick && slot->frame.size <= capacity", "slot->frame.tick == tick"
+            f"{_HAL}/wire.c",
+            "slot->message.tick == tick && slot->message.size <= capacity",
+            "slot->message.tick == tick",
         ),
     ),
     Target(
         "wire_simulator",
         "the wire, simulator's end",
         "socket",
-        Defect(f"{_HAL}/wire_server.c", "if (frame->tick > tick) {", "if (0) {"),
+        Defect(f"{_HAL}/wire_server.c", "if (message->tick > tick) {", "if (0) {"),
     ),
     Target(
         "command",

@@ -1,9 +1,9 @@
 /* SPDX-License-Identifier: Apache-2.0
  *
  * A flight computer on a bare Cortex-M7: one compiled machine, its channels on a serial line. To a simulator it is what any
- * other controller on the wire is (fcsl_wire.h): it says hello, then answers each sensor frame with an actuator frame.
+ * other controller on the wire is (fcsl_wire.h): it says hello, then answers each sensor message with an actuator message.
  *
- * On the serial line every packet of the wire stands behind its size (u16, little-endian); frames carry a CRC of their own,
+ * On the serial line every packet of the wire stands behind its size (u16, little-endian); messages carry a CRC of their own,
  * and one that does not check out ends the run. When it ends, the hash over all fields of every tick is printed (../shared/stimulus.h),
  * to be compared with that of the same machine in another process.
  */
@@ -14,6 +14,7 @@
 #include "fcsl/fcsl_scalar.h"
 #include "stimulus.h"
 
+enum { ARMED_IN_SIMULATION = 1 };
 enum { MACHINE_BYTES = 1 << 20, PACKET_MAX = 1 << 12, HELLO_BYTES = 20, HELLO = 1, END = 3, KIND_AT = 6 };
 
 /* The first serial port of the board (ARM's CMSDK UART), whose receiver is interrupt 0. */
@@ -92,7 +93,7 @@ static void print_hash(uint64_t hash)
     platform_print(text);
 }
 
-/* Until the simulator ends the run. Returns 0, or the status of a frame that did not check out. */
+/* Until the simulator ends the run. Returns 0, or the status of a message that did not check out. */
 static int fly(const fcsl_channel_table_t *table)
 {
     const fcsl_machine_t *d = table->machine;
@@ -104,19 +105,20 @@ static int fly(const fcsl_channel_table_t *table)
             print_hash(hash);
             return 0;
         }
-        fcsl_frame_t frame;
-        const fcsl_frame_status_t status = fcsl_frame_check(table, FCSL_SENSOR, packet, size, &frame);
-        if (status != FCSL_FRAME_OK || frame.tick != expected) {
-            platform_print("a sensor frame was damaged, or of another tick\n");
+        fcsl_message_t message;
+        const fcsl_message_status_t status = fcsl_message_check(table, FCSL_SENSOR_MESSAGE, packet, size, &message);
+        if (status != FCSL_MESSAGE_OK || message.tick != expected) {
+            platform_print("a sensor message was damaged, or of another tick\n");
             return 10 + (int)status;
         }
-        fcsl_frame_apply(d, machine, &frame);
+        fcsl_message_apply(d, machine, &message);
         d->step(machine, &host);
         hash = stimulus_hash(d, machine, hash);
-        if (fcsl_frame_encode(table, machine, FCSL_ACTUATOR, expected, NULL, packet, sizeof packet, &frame) != 0) {
+        if (fcsl_message_encode_actuators(table, machine, expected, ARMED_IN_SIMULATION, packet, sizeof packet,
+                                          &message) != 0) {
             return 9; /* main has seen that there is room */
         }
-        send_packet(frame.size);
+        send_packet(message.size);
     }
 }
 
@@ -129,9 +131,9 @@ int main(int argc, char **argv)
     UART[CONTROL] = ENABLE_WITH_INTERRUPT;
     __asm__ volatile("cpsid i");
     *INTERRUPT_ENABLE = 1u;
-    if (d->size > sizeof machine || fcsl_frame_capacity(d, FCSL_SENSOR) > sizeof packet ||
-        fcsl_frame_capacity(d, FCSL_ACTUATOR) > sizeof packet) {
-        platform_print("no room for this machine or its frames\n");
+    if (d->size > sizeof machine || fcsl_message_capacity(d, FCSL_SENSOR_MESSAGE) > sizeof packet ||
+        fcsl_message_capacity(d, FCSL_ACTUATOR_MESSAGE) > sizeof packet) {
+        platform_print("no room for this machine or its messages\n");
         return 1;
     }
     const fcsl_channel_table_t table = fcsl_channel_table(d);

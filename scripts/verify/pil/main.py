@@ -2,7 +2,7 @@
 # SPDX-License-Identifier: Apache-2.0
 """Processor in the loop: the lander's controller on a Cortex-M7 (QEMU), its plant here; the flight is that of one process.
 
-One exchange of channel frames per tick, over a serial line and the simulator's wire (README.md). Two digests must equal
+One exchange of messages per tick, over a serial line and the simulator's wire (README.md). Two digests must equal
 those of the same simulation with the controller in its own process: of the plant's truth at every tick, and of all fields of
 the controller. The control: a controller with the last bit of one constant changed flies another trajectory.
 """
@@ -110,7 +110,7 @@ def on_target(config: SimConfig, program: Path) -> Flight:
 def flight_computer(sources: Sources, folder: str) -> Path:
     """The program for the processor: one machine, the channel codec, controller.c."""
     hal = ROOT / "fcsl_hal" / "src"
-    platform = [PIL / "controller.c", SHARED / "stimulus.c", hal / "codec.c", hal / "crc32.c"]
+    platform = [PIL / "controller.c", SHARED / "stimulus.c", hal / "codec.c", hal / "codec_check.c", hal / "crc32.c"]
     includes = Sources(sources.machines, (*sources.includes, package_prefix("fcsl_hal") / "include"))
     return build(CORTEX_M7, includes, OUT / "pil" / folder, platform)
 

@@ -69,19 +69,19 @@ int fcsl_run_restore(fcsl_run_t *run, const void *bytes, uint32_t size, fcsl_err
 int fcsl_run_attach(fcsl_run_t *run, fcsl_error_t *error);
 /* The same of one sensor channel. */
 int fcsl_run_attach_channel(fcsl_run_t *run, uint32_t channel, fcsl_error_t *error);
-/* Takes the sensor frame of the coming tick. A malformed one, or one of another tick, is refused, counted, changes nothing. */
+/* Takes the sensor message of the coming tick. A malformed one, or one of another tick, is refused, counted, changes nothing. */
 int fcsl_run_sense(fcsl_run_t *run, const uint8_t *bytes, size_t size, fcsl_error_t *error);
-/* The same of a frame that was checked already. */
-int fcsl_run_sense_frame(fcsl_run_t *run, const fcsl_frame_t *frame, fcsl_error_t *error);
+/* The same of a message that was checked already. */
+int fcsl_run_sense_message(fcsl_run_t *run, const fcsl_message_t *message, fcsl_error_t *error);
 /* Writes one sample of a sensor channel for the coming tick: `size` bytes of row-major scalars, little-endian, as in a
- * frame. `age_ticks`: how old it is in that tick; `stamp_ns`: its own time, 0 when it has none. */
+ * message. `age_ticks`: how old it is in that tick; `stamp_ns`: its own time, 0 when it has none. */
 int fcsl_run_write_channel(fcsl_run_t *run, uint32_t channel, const void *bytes, uint32_t size, uint32_t age_ticks,
                            int64_t stamp_ns, fcsl_error_t *error);
-uint64_t fcsl_run_frames_refused(const fcsl_run_t *run);
-/* Writes the actuator frame of the last tick; returns its bytes, or -1 when `capacity` is too small. */
+uint64_t fcsl_run_messages_refused(const fcsl_run_t *run);
+/* Writes the actuator message of the last tick; returns its bytes, or -1 when `capacity` is too small. */
 int64_t fcsl_run_actuate(const fcsl_run_t *run, uint8_t *bytes, size_t capacity);
-/* The same as a frame; 0, or -1. */
-int fcsl_run_actuate_frame(const fcsl_run_t *run, uint8_t *bytes, size_t capacity, fcsl_frame_t *frame);
+/* The same as a message; 0, or -1. */
+int fcsl_run_actuate_message(const fcsl_run_t *run, uint8_t *bytes, size_t capacity, fcsl_message_t *message);
 /* The channels of its machine. */
 const fcsl_channel_table_t *fcsl_run_channels(const fcsl_run_t *run);
 

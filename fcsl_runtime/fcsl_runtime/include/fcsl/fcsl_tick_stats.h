@@ -14,7 +14,7 @@ typedef struct {
     _Atomic uint64_t ticks;
     _Atomic uint64_t deadlines_missed; /* whose successor came before their tick began, or that got none */
     _Atomic uint64_t ticks_skipped; /* deadlines that got no tick */
-    _Atomic uint64_t frames_refused;
+    _Atomic uint64_t messages_refused;
     _Atomic uint64_t hardware_failures;
     _Atomic uint64_t records_dropped;
     fcsl_histogram_t lateness; /* how long after a deadline the loop came to it; of ticks that the clock paces */

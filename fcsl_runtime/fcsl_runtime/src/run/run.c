@@ -1,6 +1,6 @@
 /* SPDX-License-Identifier: Apache-2.0
  *
- * Hosting a machine: checkpoints, actuator frames, clock, ticks, messages. What a host writes between ticks: writes.c.
+ * Hosting a machine: checkpoints, actuator messages, clock, ticks, messages. What a host writes between ticks: writes.c.
  */
 #define _GNU_SOURCE
 #include <inttypes.h>
@@ -84,19 +84,22 @@ int fcsl_run_restore(fcsl_run_t *run, const void *bytes, uint32_t size, fcsl_err
     return 0;
 }
 
-int fcsl_run_actuate_frame(const fcsl_run_t *run, uint8_t *bytes, size_t capacity, fcsl_frame_t *frame)
+/* Nothing decides yet whether actuators are armed: in simulation they are. */
+enum { ARMED_IN_SIMULATION = 1 };
+
+int fcsl_run_actuate_message(const fcsl_run_t *run, uint8_t *bytes, size_t capacity, fcsl_message_t *message)
 {
     const uint64_t completed = fcsl_run_tick(run);
     const uint64_t tick = completed == 0 ? 0 : completed - 1u;
-    const fcsl_frame_status_t status =
-        fcsl_frame_encode(&run->channels, run->data, FCSL_ACTUATOR, tick, NULL, bytes, capacity, frame);
-    return status == FCSL_FRAME_OK ? 0 : -1;
+    const fcsl_message_status_t status =
+        fcsl_message_encode_actuators(&run->channels, run->data, tick, ARMED_IN_SIMULATION, bytes, capacity, message);
+    return status == FCSL_MESSAGE_OK ? 0 : -1;
 }
 
 int64_t fcsl_run_actuate(const fcsl_run_t *run, uint8_t *bytes, size_t capacity)
 {
-    fcsl_frame_t frame;
-    return fcsl_run_actuate_frame(run, bytes, capacity, &frame) == 0 ? (int64_t)frame.size : -1;
+    fcsl_message_t message;
+    return fcsl_run_actuate_message(run, bytes, capacity, &message) == 0 ? (int64_t)message.size : -1;
 }
 
 const fcsl_channel_table_t *fcsl_run_channels(const fcsl_run_t *run)

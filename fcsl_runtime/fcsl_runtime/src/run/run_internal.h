@@ -41,7 +41,7 @@ struct fcsl_run {
     uint64_t impure_executes; /* that no substitute took the place of */
     fcsl_substitute_t *impure;    /* per instance */
     uint8_t *left;
-    uint64_t frames_refused;
+    uint64_t messages_refused;
     fcsl_recorder_t *recorder; /* null: not recording */
     uint64_t record_time_ns;   /* of the coming records; FCSL_TICK_TIME: that of their tick */
     fcsl_trace_t *traces;      /* null: none */

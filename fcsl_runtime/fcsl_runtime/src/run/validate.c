@@ -8,6 +8,7 @@
 #include <math.h>
 #include <string.h>
 
+#include "fcsl/fcsl_codec.h"
 #include "fcsl/fcsl_scalar.h"
 #include "range.h"
 
@@ -109,7 +110,7 @@ static int check_channel(const fcsl_machine_t *machine, uint32_t index)
 {
     const fcsl_channel_t *channel = &machine->channels[index];
     if (!is_name(channel->name) || channel->direction > FCSL_ACTUATOR || channel->field >= machine->field_count ||
-        machine->fields[channel->field].size > UINT16_MAX) {
+        machine->fields[channel->field].size > UINT16_MAX || channel->id >= FCSL_RESERVED_ID_FIRST) {
         return -1;
     }
     for (uint32_t i = 0; i < index; i++) {

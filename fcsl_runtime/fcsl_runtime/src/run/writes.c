@@ -204,47 +204,47 @@ int fcsl_run_attach(fcsl_run_t *run, fcsl_error_t *error)
     return 0;
 }
 
-/* Records each channel that a sensor frame brought. */
-static void record_channels(fcsl_run_t *run, const fcsl_frame_t *frame)
+/* Records each channel that a sensor message brought. */
+static void record_channels(fcsl_run_t *run, const fcsl_message_t *message)
 {
-    fcsl_frame_entry_t entry = {0};
-    while (fcsl_frame_next(run->machine, frame, &entry) != 0) {
+    fcsl_message_entry_t entry = {0};
+    while (fcsl_message_next(run->machine, message, &entry) != 0) {
         fcsl_note_write(run, &(fcsl_write_t){.kind = FCSL_WRITE_CHANNEL,
                                              .path = run->machine->channels[entry.channel].name,
-                                             .data = entry.payload,
+                                             .data = entry.values,
                                              .size = entry.size});
     }
 }
 
-int fcsl_run_sense_frame(fcsl_run_t *run, const fcsl_frame_t *frame, fcsl_error_t *error)
+int fcsl_run_sense_message(fcsl_run_t *run, const fcsl_message_t *message, fcsl_error_t *error)
 {
     const uint64_t due = fcsl_run_tick(run);
-    if (frame->tick != due) {
-        run->frames_refused++;
-        return fcsl_fail(error, "sensor frame refused: it is of tick %" PRIu64 ", tick %" PRIu64 " is due", frame->tick,
-                         due);
+    if (message->tick != due) {
+        run->messages_refused++;
+        return fcsl_fail(error, "sensor message refused: it is of tick %" PRIu64 ", tick %" PRIu64 " is due",
+                         message->tick, due);
     }
-    fcsl_frame_apply(run->machine, run->data, frame);
+    fcsl_message_apply(run->machine, run->data, message);
     if (run->recorder != NULL) {
-        record_channels(run, frame);
+        record_channels(run, message);
     }
     return 0;
 }
 
 int fcsl_run_sense(fcsl_run_t *run, const uint8_t *bytes, size_t size, fcsl_error_t *error)
 {
-    fcsl_frame_t frame;
-    const fcsl_frame_status_t status = fcsl_frame_check(&run->channels, FCSL_SENSOR, bytes, size, &frame);
-    if (status != FCSL_FRAME_OK) {
-        run->frames_refused++;
-        return fcsl_fail(error, "sensor frame refused: %s", fcsl_frame_status_text(status));
+    fcsl_message_t message;
+    const fcsl_message_status_t status = fcsl_message_check(&run->channels, FCSL_SENSOR_MESSAGE, bytes, size, &message);
+    if (status != FCSL_MESSAGE_OK) {
+        run->messages_refused++;
+        return fcsl_fail(error, "sensor message refused: %s", fcsl_message_status_text(status));
     }
-    return fcsl_run_sense_frame(run, &frame, error);
+    return fcsl_run_sense_message(run, &message, error);
 }
 
-uint64_t fcsl_run_frames_refused(const fcsl_run_t *run)
+uint64_t fcsl_run_messages_refused(const fcsl_run_t *run)
 {
-    return run->frames_refused;
+    return run->messages_refused;
 }
 
 int fcsl_run_write_channel(fcsl_run_t *run, uint32_t channel, const void *bytes, uint32_t size, uint32_t age_ticks,

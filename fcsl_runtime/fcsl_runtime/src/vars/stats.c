@@ -49,7 +49,7 @@ void fcsl_vars_tick_stats(fcsl_vars_out_t *out, const fcsl_tick_stats_t *stats)
 {
     fcsl_vars_number(out, "ticks", fcsl_tick_stats_get(&stats->ticks));
     fcsl_vars_number(out, "hardware_failures", fcsl_tick_stats_get(&stats->hardware_failures));
-    fcsl_vars_number(out, "frames_refused", fcsl_tick_stats_get(&stats->frames_refused));
+    fcsl_vars_number(out, "messages_refused", fcsl_tick_stats_get(&stats->messages_refused));
     fcsl_vars_number(out, "records_dropped", fcsl_tick_stats_get(&stats->records_dropped));
     fcsl_vars_histogram(out, "tick_time_ns", &stats->tick_time);
 }

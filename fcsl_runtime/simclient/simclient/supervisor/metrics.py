@@ -35,7 +35,7 @@ _COUNTERS = (
     ("faults", "faults", "Faults of all instances."),
     ("overruns", "overruns", "Executes that took longer than max_wcet_us, of all instances."),
     ("hardware_failures", "hardware_failures", "Calls of hardware that failed."),
-    ("frames_refused", "frames_refused", "Sensor frames refused."),
+    ("messages_refused", "messages_refused", "Sensor messages refused."),
     ("records_dropped", "records_dropped", "Ticks missing in the recording."),
     ("requests", "requests", "Requests that the variable server received."),
     ("requests_refused", "requests_refused", "Requests that the variable server refused."),

@@ -185,19 +185,20 @@ static void write_fields(fcsl_run_t *run, const fcsl_machine_t *machine)
     }
 }
 
-static void exchange_frames(fcsl_run_t *run, const fcsl_machine_t *machine)
+static void exchange_messages(fcsl_run_t *run, const fcsl_machine_t *machine)
 {
     fcsl_error_t error;
-    const size_t capacity = fcsl_frame_capacity(machine, FCSL_SENSOR) + fcsl_frame_capacity(machine, FCSL_ACTUATOR);
-    uint8_t *frame = malloc(capacity);
-    FUZZ_CHECK(frame != NULL && fcsl_run_attach(run, &error) == 0);
-    fcsl_frame_t made;
-    FUZZ_CHECK(fcsl_frame_encode(fcsl_run_channels(run), fcsl_run_data(run), FCSL_SENSOR, fcsl_run_tick(run), NULL,
-                                 frame, capacity, &made) == 0);
-    FUZZ_CHECK(made.size <= fcsl_frame_capacity(machine, FCSL_SENSOR));
-    (void)fcsl_run_sense(run, frame, made.size, &error);
-    FUZZ_CHECK(fcsl_run_actuate(run, frame, capacity) > 0);
-    free(frame);
+    const size_t capacity =
+        fcsl_message_capacity(machine, FCSL_SENSOR_MESSAGE) + fcsl_message_capacity(machine, FCSL_ACTUATOR_MESSAGE);
+    uint8_t *message = malloc(capacity);
+    FUZZ_CHECK(message != NULL && fcsl_run_attach(run, &error) == 0);
+    fcsl_message_t made;
+    FUZZ_CHECK(fcsl_message_encode_sensors(fcsl_run_channels(run), fcsl_run_data(run), fcsl_run_tick(run), NULL,
+                                           message, capacity, &made) == 0);
+    FUZZ_CHECK(made.size <= fcsl_message_capacity(machine, FCSL_SENSOR_MESSAGE));
+    (void)fcsl_run_sense(run, message, made.size, &error);
+    FUZZ_CHECK(fcsl_run_actuate(run, message, capacity) > 0);
+    free(message);
 }
 
 static void host(fcsl_run_t *run, const fcsl_machine_t *machine, bytes_t *bytes)
@@ -206,7 +207,7 @@ static void host(fcsl_run_t *run, const fcsl_machine_t *machine, bytes_t *bytes)
     fcsl_error_t error;
     tick_offset = machine->tick_offset;
     write_fields(run, machine);
-    exchange_frames(run, machine);
+    exchange_messages(run, machine);
     (void)fcsl_run_step(run, 1, &error);
     for (uint32_t i = 0; i < machine->instance_count; i++) {
         (void)fcsl_run_message(run, i, message, sizeof message);

@@ -1,7 +1,7 @@
 /* SPDX-License-Identifier: Apache-2.0
  *
  * wire.c, the controller's end of the wire: packets from a simulator that sends anything. Input: operations (1 byte each,
- * some with an argument); packets are of any bytes, or frames of a tick near the one that is due with a right checksum.
+ * some with an argument); packets are of any bytes, or messages of a tick near the one that is due with a right checksum.
  */
 #include "wire.c"
 
@@ -9,44 +9,45 @@
 #include "fcsl/fcsl_scalar.h"
 #include "fuzz.h"
 
-enum { OP_RAW, OP_FRAME, OP_SAMPLE, OP_CONTROL, OP_COUNT };
+enum { OP_RAW, OP_MESSAGE, OP_SAMPLE, OP_CONTROL, OP_COUNT };
 
-/* One packet goes out at the peer's end and is taken in; a full set of slots is emptied first, as store_frame would wait. */
+/* One packet goes out at the peer's end and is taken in; a full set of slots is emptied first, as store_message would wait. */
 static void exchange(wire_t *wire, int peer, uint64_t *tick, const uint8_t *packet, size_t size)
 {
-    uint8_t frame[512];
-    fcsl_frame_t got;
+    uint8_t message[512];
+    fcsl_message_t got;
     if (wire->used == SLOTS) {
-        (void)wire_sample(wire, *tick + SLOTS, frame, sizeof frame, &got);
+        (void)wire_sample(wire, *tick + SLOTS, message, sizeof message, &got);
     }
     if (wire->used < SLOTS && size > 0 && send(peer, packet, size, MSG_NOSIGNAL | MSG_DONTWAIT) == (ssize_t)size) {
         (void)receive_packet(wire);
     }
 }
 
-static void send_frame(wire_t *wire, int peer, uint64_t *tick, bytes_t *bytes)
+static void send_message(wire_t *wire, int peer, uint64_t *tick, bytes_t *bytes)
 {
     data_t data;
     uint8_t select[CHANNEL_COUNT];
-    uint8_t frame[512];
+    uint8_t message[512];
     memset(&data, 0, sizeof data);
     const uint64_t chosen = take_number(bytes, 2);
     for (uint32_t i = 0; i < CHANNEL_COUNT; i++) {
         select[i] = (uint8_t)(chosen >> i & 1u);
     }
     const uint64_t at = *tick + take_number(bytes, 1) % 4u - 1u;
-    fcsl_frame_t made;
-    FUZZ_CHECK(fcsl_frame_encode(&wire->table, &data, FCSL_SENSOR, at, select, frame, sizeof frame, &made) == 0);
-    exchange(wire, peer, tick, frame, made.size);
+    fcsl_message_t made;
+    FUZZ_CHECK(fcsl_message_encode_sensors(&wire->table, &data, at, select, message, sizeof message, &made) == 0);
+    exchange(wire, peer, tick, message, made.size);
 }
 
 static void sample(wire_t *wire, uint64_t *tick, bytes_t *bytes)
 {
     size_t capacity = (size_t)take_number(bytes, 1) * 2u;
     uint8_t *bytes_out = malloc(capacity);
-    fcsl_frame_t frame;
-    const fcsl_hal_status_t status = wire_sample(wire, *tick, bytes_out, capacity, &frame);
-    FUZZ_CHECK(status != FCSL_HAL_OK || (frame.bytes == bytes_out && frame.size <= capacity && frame.tick == *tick));
+    fcsl_message_t message;
+    const fcsl_hal_status_t status = wire_sample(wire, *tick, bytes_out, capacity, &message);
+    FUZZ_CHECK(status != FCSL_HAL_OK ||
+               (message.bytes == bytes_out && message.size <= capacity && message.tick == *tick));
     FUZZ_CHECK(status == FCSL_HAL_OK || wire_explain(wire)[0] != '\0');
     *tick += status == FCSL_HAL_OK;
     free(bytes_out);
@@ -73,7 +74,7 @@ static void open_end(wire_t *wire, int *peer)
     FUZZ_CHECK(socketpair(AF_UNIX, SOCK_SEQPACKET | SOCK_NONBLOCK, 0, pair) == 0);
     *peer = pair[1];
     *wire = (wire_t){.table = fcsl_channel_table(&MACHINE), .fd = pair[0], .stop = -1};
-    const size_t capacity = fcsl_frame_capacity(&MACHINE, FCSL_SENSOR);
+    const size_t capacity = fcsl_message_capacity(&MACHINE, FCSL_SENSOR_MESSAGE);
     wire->slot_bytes = capacity > FCSL_WIRE_PACKET_MAX ? capacity : FCSL_WIRE_PACKET_MAX;
     wire->inbox = malloc(wire->slot_bytes);
     for (uint32_t i = 0; i < SLOTS; i++) {
@@ -100,8 +101,8 @@ int LLVMFuzzerTestOneInput(const uint8_t *data, size_t size)
             uint8_t *packet = take_copy(&bytes, &length);
             exchange(wire, peer, &tick, packet, length);
             free(packet);
-        } else if (op == OP_FRAME) {
-            send_frame(wire, peer, &tick, &bytes);
+        } else if (op == OP_MESSAGE) {
+            send_message(wire, peer, &tick, &bytes);
         } else if (op == OP_SAMPLE) {
             sample(wire, &tick, &bytes);
         } else {

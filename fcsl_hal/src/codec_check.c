@@ -1,0 +1,230 @@
+/* SPDX-License-Identifier: Apache-2.0
+ *
+ * Checks messages of channels, and takes their values.
+ */
+#include "codec_layout.h"
+
+/* An entry as it stands in a message, of a known type. */
+typedef struct {
+    uint16_t id;
+    uint8_t type;
+    const uint8_t *values;
+    size_t size; /* bytes of the values */
+    size_t end;  /* offset behind it in the message */
+} raw_entry_t;
+
+/* Reads the entry at `at`, which must end at `end` or before. */
+static fcsl_message_status_t read_entry(const uint8_t *bytes, size_t at, size_t end, raw_entry_t *entry)
+{
+    static const uint8_t counts[] = {1, 3, 4};
+    if (end - at < ENTRY_BYTES) {
+        return FCSL_MESSAGE_SHORT;
+    }
+    entry->id = fcsl_get_u16(bytes + at);
+    entry->type = bytes[at + 2];
+    at += ENTRY_BYTES;
+    const unsigned shape = entry->type >> 4;
+    const uint8_t scalar = entry->type & 15u;
+    if (shape > BLOB || scalar > FCSL_F64 || (shape == BLOB && scalar != 0u)) {
+        return FCSL_MESSAGE_TYPE;
+    }
+    size_t count = 0;
+    if (is_array(entry->type)) {
+        if (end - at < COUNT_BYTES) {
+            return FCSL_MESSAGE_SHORT;
+        }
+        count = fcsl_get_u16(bytes + at);
+        at += COUNT_BYTES;
+    } else {
+        count = counts[shape];
+    }
+    entry->size = count * fcsl_scalar_size(scalar);
+    if (end - at < entry->size) {
+        return FCSL_MESSAGE_SHORT;
+    }
+    entry->values = bytes + at;
+    entry->end = at + entry->size;
+    return FCSL_MESSAGE_OK;
+}
+
+/* The index of the channel with this id, looked for from `first` on and then from the beginning; channel_count if none. */
+static uint32_t find_channel(const fcsl_machine_t *machine, uint16_t id, uint32_t first)
+{
+    for (uint32_t i = first; i < machine->channel_count; i++) {
+        if (machine->channels[i].id == id) {
+            return i;
+        }
+    }
+    for (uint32_t i = 0; i < first && i < machine->channel_count; i++) {
+        if (machine->channels[i].id == id) {
+            return i;
+        }
+    }
+    return machine->channel_count;
+}
+
+/* True when an entry with this id stands in [at, end), which was checked. */
+static int stands_before(const uint8_t *bytes, size_t at, size_t end, uint16_t id)
+{
+    raw_entry_t entry;
+    while (at < end && read_entry(bytes, at, end, &entry) == FCSL_MESSAGE_OK) {
+        if (entry.id == id) {
+            return 1;
+        }
+        at = entry.end;
+    }
+    return 0;
+}
+
+/* Whether the entry is one of this channel in a message of this kind. */
+static fcsl_message_status_t check_channel(const fcsl_machine_t *machine, fcsl_message_kind_t kind,
+                                           const fcsl_channel_t *channel, const raw_entry_t *entry)
+{
+    const fcsl_field_t *field = &machine->fields[channel->field];
+    if (!carries(kind, channel)) {
+        return FCSL_MESSAGE_ENTRY;
+    }
+    if (entry->type != entry_type(field) || entry->size != field->size) {
+        return FCSL_MESSAGE_TYPE;
+    }
+    return fcsl_scalars_valid(machine, entry->values, field->type, field->count) ? FCSL_MESSAGE_OK : FCSL_MESSAGE_VALUE;
+}
+
+static uint32_t actuators(const fcsl_machine_t *machine)
+{
+    uint32_t count = 0;
+    for (uint32_t i = 0; i < machine->channel_count; i++) {
+        count += machine->channels[i].direction == FCSL_ACTUATOR;
+    }
+    return count;
+}
+
+/* Checks the entries in [first, end): those of channels, and those to skip. */
+static fcsl_message_status_t check_entries(const fcsl_machine_t *machine, fcsl_message_kind_t kind,
+                                           const uint8_t *bytes, size_t first, size_t end, uint32_t *skipped)
+{
+    uint32_t next = 0;   /* behind the channel of the last entry: the place of the next one in table order */
+    uint32_t behind = 0; /* behind the last channel in the table that was found */
+    uint32_t found = 0;
+    for (size_t at = first; at < end;) {
+        raw_entry_t entry;
+        fcsl_message_status_t status = read_entry(bytes, at, end, &entry);
+        if (status != FCSL_MESSAGE_OK) {
+            return status;
+        }
+        const uint32_t index = find_channel(machine, entry.id, next);
+        if (index < machine->channel_count) {
+            status = check_channel(machine, kind, &machine->channels[index], &entry);
+            if (status != FCSL_MESSAGE_OK) {
+                return status;
+            }
+            if (index < behind && stands_before(bytes, first, at, entry.id)) {
+                return FCSL_MESSAGE_ENTRY;
+            }
+            next = index + 1u;
+            behind = next > behind ? next : behind;
+            found++;
+        } else if ((entry.id >= SENSORS_ID && entry.id <= TIME_ID) || entry.id == CRC_ID) {
+            return FCSL_MESSAGE_ENTRY;
+        } else {
+            (*skipped)++;
+        }
+        at = entry.end;
+    }
+    return kind == FCSL_ACTUATOR_MESSAGE && found < actuators(machine) ? FCSL_MESSAGE_ENTRY : FCSL_MESSAGE_OK;
+}
+
+/* True when an entry of this id and type begins at `at`. */
+static int begins(const uint8_t *at, uint16_t id, uint8_t type)
+{
+    return fcsl_get_u16(at) == id && at[2] == type;
+}
+
+/* Checks the reserved entries, which stand at fixed places, and fills *message from them. */
+static fcsl_message_status_t check_reserved(const fcsl_channel_table_t *table, fcsl_message_kind_t kind,
+                                            const uint8_t *bytes, size_t size, fcsl_message_t *message)
+{
+    if (size < head_bytes(kind) + CRC_BYTES) {
+        return FCSL_MESSAGE_SHORT;
+    }
+    if (!begins(bytes, (uint16_t)(SENSORS_ID + (unsigned)kind), FCSL_U64)) {
+        return FCSL_MESSAGE_KIND;
+    }
+    const size_t crc_at = size - CRC_BYTES;
+    if (!begins(bytes + crc_at, CRC_ID, FCSL_U32)) {
+        return FCSL_MESSAGE_SHORT;
+    }
+    if (fcsl_get_u32(bytes + crc_at + ENTRY_BYTES) != fcsl_crc32(0, bytes, crc_at + ENTRY_BYTES)) {
+        return FCSL_MESSAGE_CRC;
+    }
+    if (!begins(bytes + TABLE_AT, TABLE_ID, FCSL_U32)) {
+        return FCSL_MESSAGE_ENTRY;
+    }
+    if (fcsl_get_u32(bytes + TABLE_AT + ENTRY_BYTES) != table->hash) {
+        return FCSL_MESSAGE_TABLE;
+    }
+    *message = (fcsl_message_t){.bytes = bytes, .size = size, .kind = kind, .tick = fcsl_get_u64(bytes + ENTRY_BYTES)};
+    const uint8_t *extra = bytes + EXTRA_AT;
+    if (kind == FCSL_ACTUATOR_MESSAGE) {
+        if (!begins(extra, ARMED_ID, FCSL_BOOL)) {
+            return FCSL_MESSAGE_ENTRY;
+        }
+        message->armed = extra[ENTRY_BYTES];
+        return message->armed <= 1u ? FCSL_MESSAGE_OK : FCSL_MESSAGE_VALUE;
+    }
+    if (kind == FCSL_TIME_MESSAGE) {
+        if (!begins(extra, TIME_ID, FCSL_U64)) {
+            return FCSL_MESSAGE_ENTRY;
+        }
+        message->time_ns = fcsl_get_u64(extra + ENTRY_BYTES);
+    }
+    return FCSL_MESSAGE_OK;
+}
+
+fcsl_message_status_t fcsl_message_check(const fcsl_channel_table_t *table, fcsl_message_kind_t kind,
+                                         const uint8_t *bytes, size_t size, fcsl_message_t *message)
+{
+    fcsl_message_t checked;
+    fcsl_message_status_t status = check_reserved(table, kind, bytes, size, &checked);
+    if (status == FCSL_MESSAGE_OK) {
+        status = check_entries(table->machine, kind, bytes, head_bytes(kind), size - CRC_BYTES, &checked.skipped);
+    }
+    if (status == FCSL_MESSAGE_OK) {
+        *message = checked;
+    }
+    return status;
+}
+
+int fcsl_message_next(const fcsl_machine_t *machine, const fcsl_message_t *message, fcsl_message_entry_t *entry)
+{
+    const size_t end = message->size - CRC_BYTES;
+    const uint32_t next = entry->end == 0 ? 0 : entry->channel + 1u;
+    size_t at = entry->end == 0 ? head_bytes(message->kind) : entry->end;
+    raw_entry_t raw;
+    while (at < end && read_entry(message->bytes, at, end, &raw) == FCSL_MESSAGE_OK) {
+        const uint32_t channel = find_channel(machine, raw.id, next);
+        if (channel < machine->channel_count) {
+            *entry = (fcsl_message_entry_t){
+                .end = raw.end, .channel = channel, .size = (uint32_t)raw.size, .values = raw.values};
+            return 1;
+        }
+        at = raw.end;
+    }
+    return 0;
+}
+
+void fcsl_message_apply(const fcsl_machine_t *machine, void *data, const fcsl_message_t *message)
+{
+    uint8_t *base = (uint8_t *)data;
+    fcsl_message_entry_t entry = {0};
+    while (fcsl_message_next(machine, message, &entry) != 0) {
+        const fcsl_channel_t *channel = &machine->channels[entry.channel];
+        const fcsl_field_t *field = &machine->fields[channel->field];
+        fcsl_scalars_import(base + field->offset, entry.values, field->type, field->count);
+        if (message->kind == FCSL_SENSOR_MESSAGE) { /* of the coming tick: its samples are not old, and have no stamp */
+            base[channel->fresh_offset] = 1u;
+            memset(base + channel->sample_age_offset, 0, sizeof(uint32_t));
+            memset(base + channel->stamp_offset, 0, sizeof(int64_t));
+        }
+    }
+}

@@ -1,0 +1,57 @@
+/* SPDX-License-Identifier: Apache-2.0
+ *
+ * Where what stands in a message (docs/wire.md).
+ */
+#ifndef FCSL_CODEC_LAYOUT_H
+#define FCSL_CODEC_LAYOUT_H
+
+#include "fcsl/fcsl_codec.h"
+#include "fcsl/fcsl_scalar.h"
+
+enum {
+    SENSORS_ID = 0xff00, /* the tick, and thereby the kind: SENSORS_ID + fcsl_message_kind_t */
+    TABLE_ID = 0xff03,
+    ARMED_ID = 0xff04,
+    TIME_ID = 0xff05,
+    CRC_ID = 0xffff,
+
+    ENTRY_BYTES = 3, /* id and type */
+    COUNT_BYTES = 2, /* of an array or blob */
+    TABLE_AT = ENTRY_BYTES + 8,
+    EXTRA_AT = TABLE_AT + ENTRY_BYTES + 4, /* what only this kind has */
+    CRC_BYTES = ENTRY_BYTES + 4,
+};
+
+/* The upper four bits of a type; the lower four are the scalar's fcsl_type_t, at most FCSL_F64. */
+enum { SCALAR = 0, VECTOR = 1, QUATERNION = 2, ARRAY = 3, BLOB = 4 };
+
+static inline int is_array(uint8_t type)
+{
+    return type >> 4 >= ARRAY;
+}
+
+/* The type of the entry that carries this field. Nothing declares a field to be a quaternion or a blob. */
+static inline uint8_t entry_type(const fcsl_field_t *field)
+{
+    const uint8_t scalar = field->type <= FCSL_F64 ? field->type : (uint8_t)FCSL_I32;
+    const unsigned shape = field->rank == 0 ? SCALAR : field->rank == 1 && field->count == 3u ? VECTOR : ARRAY;
+    return (uint8_t)(shape << 4 | scalar);
+}
+
+static inline size_t entry_bytes(const fcsl_field_t *field)
+{
+    return ENTRY_BYTES + (is_array(entry_type(field)) ? (size_t)COUNT_BYTES : 0u) + field->size;
+}
+
+static inline size_t head_bytes(fcsl_message_kind_t kind)
+{
+    static const uint8_t extra[] = {0, ENTRY_BYTES + 1, ENTRY_BYTES + 8};
+    return EXTRA_AT + (size_t)extra[kind];
+}
+
+static inline int carries(fcsl_message_kind_t kind, const fcsl_channel_t *channel)
+{
+    return kind == (channel->direction == FCSL_SENSOR ? FCSL_SENSOR_MESSAGE : FCSL_ACTUATOR_MESSAGE);
+}
+
+#endif /* FCSL_CODEC_LAYOUT_H */
