@@ -46,11 +46,11 @@ class MessageError(Exception):
 
 
 class Entry(NamedTuple):
-    """An entry in a message: bytes [start, end), of which the values begin at `values`."""
+    """An entry in a message: bytes [start, end), of which the values begin at `values`; `elements`: how many."""
 
     id: int
     type: int
-    count: int
+    elements: int
     start: int
     values: int
     end: int
@@ -197,7 +197,7 @@ def _channels(
             continue
         if channel is None or not _carries(kind, channel):
             raise MessageError("entry")
-        if (entry.type, entry.count) != (channel.type, channel.count):
+        if (entry.type, entry.elements) != (channel.type, channel.count):
             raise MessageError("type")
         found = _values(data, channel.scalar, channel.count, entry.values)
         if entry.id in values:
