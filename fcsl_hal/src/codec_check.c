@@ -16,7 +16,6 @@ typedef struct {
 /* Reads the entry at `at`, which must end at `end` or before. */
 static fcsl_message_status_t read_entry(const uint8_t *bytes, size_t at, size_t end, raw_entry_t *entry)
 {
-    static const uint8_t counts[] = {1, 3, 4};
     if (end - at < ENTRY_BYTES) {
         return FCSL_MESSAGE_SHORT;
     }
@@ -36,7 +35,7 @@ static fcsl_message_status_t read_entry(const uint8_t *bytes, size_t at, size_t 
         count = fcsl_get_u16(bytes + at);
         at += COUNT_BYTES;
     } else {
-        count = counts[shape];
+        count = shape == SCALAR ? 1u : shape == VECTOR ? 3u : 4u;
     }
     entry->size = count * fcsl_scalar_size(scalar);
     if (end - at < entry->size) {
@@ -76,16 +75,24 @@ static int stands_before(const uint8_t *bytes, size_t at, size_t end, uint16_t i
     return 0;
 }
 
-/* Whether the entry is one of this channel in a message of this kind. */
-static fcsl_message_status_t check_channel(const fcsl_machine_t *machine, fcsl_message_kind_t kind,
-                                           const fcsl_channel_t *channel, const raw_entry_t *entry)
+/* Whether the entry, whose values are not looked at, is one of this channel in a message of this kind. */
+static fcsl_message_status_t check_shape(const fcsl_machine_t *machine, fcsl_message_kind_t kind,
+                                         const fcsl_channel_t *channel, const raw_entry_t *entry)
 {
     const fcsl_field_t *field = &machine->fields[channel->field];
     if (!carries(kind, channel)) {
         return FCSL_MESSAGE_ENTRY;
     }
-    if (entry->type != entry_type(field) || entry->size != field->size) {
-        return FCSL_MESSAGE_TYPE;
+    return entry->type == entry_type(field) && entry->size == field->size ? FCSL_MESSAGE_OK : FCSL_MESSAGE_TYPE;
+}
+
+static fcsl_message_status_t check_channel(const fcsl_machine_t *machine, fcsl_message_kind_t kind,
+                                           const fcsl_channel_t *channel, const raw_entry_t *entry)
+{
+    const fcsl_field_t *field = &machine->fields[channel->field];
+    const fcsl_message_status_t status = check_shape(machine, kind, channel, entry);
+    if (status != FCSL_MESSAGE_OK) {
+        return status;
     }
     return fcsl_scalars_valid(machine, entry->values, field->type, field->count) ? FCSL_MESSAGE_OK : FCSL_MESSAGE_VALUE;
 }
@@ -203,7 +210,9 @@ int fcsl_message_next(const fcsl_machine_t *machine, const fcsl_message_t *messa
     raw_entry_t raw;
     while (at < end && read_entry(message->bytes, at, end, &raw) == FCSL_MESSAGE_OK) {
         const uint32_t channel = find_channel(machine, raw.id, next);
-        if (channel < machine->channel_count) {
+        /* It was checked; looked at again so that bytes changed since then cannot write beside a field. */
+        if (channel < machine->channel_count &&
+            check_shape(machine, message->kind, &machine->channels[channel], &raw) == FCSL_MESSAGE_OK) {
             *entry = (fcsl_message_entry_t){
                 .end = raw.end, .channel = channel, .size = (uint32_t)raw.size, .values = raw.values};
             return 1;

@@ -16,6 +16,7 @@
 #include "messages.h"
 #include "fcsl/fcsl_check.h"
 #include "fcsl/fcsl_hal.h"
+#include "fcsl/fcsl_scalar.h"
 #include "fcsl/fcsl_socket.h"
 #include "fcsl/fcsl_wire.h"
 
@@ -268,6 +269,34 @@ static void test_bad_messages_are_dropped(void)
     fcsl_wire_close(wire);
 }
 
+/* A peer may send more than the channel table has: a blob of its own, as large as the buffers allow for. */
+static void test_unknown_entries_are_taken(void)
+{
+    enum { CRC_BYTES = 7, UNKNOWN_ID = 77, BLOB = 0x40, HEAD = 5 };
+    uint8_t message[MESSAGE_BYTES];
+    data_t data;
+    fcsl_message_t answer;
+    fcsl_wire_t *wire = listen_here();
+    const pid_t child = start_controller(&MACHINE, WAIT_MS, FCSL_HAL_CLOSED, "ended the run at tick 1");
+    CHECK(fcsl_wire_accept(wire, WAIT_MS) == FCSL_HAL_OK);
+    size_t size = sensor_message(0, message);
+    uint8_t *entry = message + size - CRC_BYTES;
+    memmove(entry + FCSL_UNKNOWN_BYTES, entry, CRC_BYTES);
+    memset(entry, 0, FCSL_UNKNOWN_BYTES);
+    fcsl_put_u16(entry, UNKNOWN_ID);
+    entry[2] = BLOB;
+    fcsl_put_u16(entry + 3, FCSL_UNKNOWN_BYTES - HEAD);
+    size += FCSL_UNKNOWN_BYTES;
+    CHECK(size == fcsl_message_capacity(&MACHINE, FCSL_SENSOR_MESSAGE) && size <= sizeof message);
+    fcsl_put_u32(message + size - 4, fcsl_crc32(0, message, size - 4));
+    CHECK(fcsl_wire_send(wire, message, size) == FCSL_HAL_OK);
+    CHECK(fcsl_wire_receive(wire, 0, WAIT_MS, &answer) == FCSL_HAL_OK);
+    fcsl_message_apply(&MACHINE, &data, &answer);
+    CHECK(data.command[0] == 0.0);
+    fcsl_wire_close(wire);
+    join(child);
+}
+
 static void test_message_ahead_of_time(void)
 {
     uint8_t message[MESSAGE_BYTES];
@@ -391,6 +420,7 @@ int main(void)
     test_mismatch_is_refused();
     test_stranger_is_ignored();
     test_bad_messages_are_dropped();
+    test_unknown_entries_are_taken();
     test_message_ahead_of_time();
     test_slots_are_bounded();
     test_interrupt();
