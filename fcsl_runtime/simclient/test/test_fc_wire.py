@@ -4,6 +4,8 @@
 from __future__ import annotations
 
 import signal
+import socket
+import struct
 import subprocess
 import time
 from collections.abc import Iterator
@@ -13,6 +15,8 @@ from pathlib import Path
 import pytest
 from native import FIXTURE, WIRE_SIM, flying
 from rosbags.highlevel import AnyReader
+
+from simclient.link.message import Channel, Kind, Message, decode, encode, table_hash
 
 
 @contextmanager
@@ -99,3 +103,55 @@ def test_commands_in_lock_step(tmp_path: Path) -> None:
         code, out, _ = fc.wait()
         assert sim.wait(timeout=30) == 0
     assert code == 0 and "100 ticks" in out
+
+
+# ---- a simulator written from docs/wire.md ---------------------------------------------------------------------------
+
+F64, BOOL = 6, 0
+#: The channels of the fixture machine.
+TABLE = [Channel(257, False, F64, (3,)), Channel(258, False, BOOL), Channel(513, True, F64), Channel(514, True, BOOL)]
+TICK_HZ, HELLO, REFUSAL, END = 100, 1, 2, 3
+
+
+def control(kind: int, table: int = 0, tick_hz: int = 0, text: bytes = b"") -> bytes:
+    return b"FCSW" + struct.pack("<HBBIQ", 1, kind, 0, table, tick_hz) + text
+
+
+@contextmanager
+def listening(path: Path) -> Iterator[socket.socket]:
+    with socket.socket(socket.AF_UNIX, socket.SOCK_SEQPACKET) as listener:
+        listener.bind(str(path))
+        listener.listen()
+        listener.settimeout(30)
+        yield listener
+
+
+def test_a_simulator_written_from_the_page_flies_the_controller(tmp_path: Path) -> None:
+    wire, hello = tmp_path / "wire", control(HELLO, table_hash(TABLE), TICK_HZ)
+    with listening(wire) as listener, flying("--hal", f"wire:{wire}", "--timeout-ms", "30000") as fc:
+        peer, _ = listener.accept()
+        peer.settimeout(30)
+        assert peer.recv(4096) == hello
+        peer.send(hello)
+        for tick in range(20):
+            rate = 0.25 * tick
+            good = encode(Message(Kind.SENSORS, tick, {257: (rate, 0.0, 0.0), 258: (False,)}), TABLE)
+            peer.send(good[:-1] + bytes([good[-1] ^ 1]))  # dropped
+            peer.send(good)
+            answer = decode(peer.recv(4096), Kind.ACTUATORS, TABLE)
+            assert (answer.tick, answer.armed, answer.skipped) == (tick, True, 0)
+            assert answer.values[513] == (min(2.0 * rate, 10.0),)
+        peer.send(control(END))
+        code, out, err = fc.wait()
+        peer.close()
+    assert (code, err) == (0, "") and "20 ticks" in out and "0 sensor messages refused" in out
+
+
+def test_a_refusal_written_from_the_page_is_told(tmp_path: Path) -> None:
+    wire = tmp_path / "wire"
+    with listening(wire) as listener, flying("--hal", f"wire:{wire}", "--timeout-ms", "30000") as fc:
+        peer, _ = listener.accept()
+        peer.send(control(REFUSAL, text=b"another vehicle"))
+        code, _, err = fc.wait()
+        peer.close()
+    assert code != 0 and "the simulator refused: another vehicle" in err
