@@ -434,7 +434,9 @@ def test_signal_closes_the_bag(path: Path, tmp_path: Path, number: int) -> None:
             time.sleep(0.02)
         code, out, err = fc.stop(number)
     assert (code, err) == (0, "") and not path.exists()
-    times = re.findall(r"(lateness |tick time) p50 ([0-9.]+) us, p99 ([0-9.]+) us, p99.9 ([0-9.]+) us, max ([0-9.]+) us", out)
+    times = re.findall(
+        r"(lateness |tick time) p50 ([0-9.]+) us, p99 ([0-9.]+) us, p99.9 ([0-9.]+) us, max ([0-9.]+) us", out
+    )
     assert [what for what, *_ in times] == ["lateness ", "tick time"]
     assert all(sorted(map(float, row)) == list(map(float, row)) and float(row[-1]) > 0 for _, *row in times)
     assert re.search(r"[1-9]\d* requests \(0 refused\), 0 clients dropped", out)

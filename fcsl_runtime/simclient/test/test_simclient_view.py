@@ -26,10 +26,11 @@ import simclient.to_rerun
 from simclient import BagError
 from simclient.bag import Bag
 from simclient.errors import ViewError
-from simclient.view.panels import PANELS_MAX
+from simclient.view.panels import PANELS_MAX, choose_default
 from simclient.view.picture import choose, draw, plot, pyplot
 from simclient.view.recorded import RecordedRun
 from simclient.view.series import Gaps, newest, thinned
+from simclient.view.signals import Catalogue, Signals
 from simclient.view.styles import styles
 from simclient.view.views import CURVES_MAX, ROLES, Views, parse_views
 
@@ -225,6 +226,16 @@ def test_without_views_same_names_are_compared(bags: Path) -> None:
     wide = [name for name in shown if name.startswith("pose.q")]
     assert wide == ["pose.q (1\u00a0of\u00a02)", "pose.q (2\u00a0of\u00a02)"]
     assert all(len(names) <= CURVES_MAX for names in shown.values()) and left_out == []
+
+
+def test_what_can_be_compared_comes_first() -> None:
+    """Also where other instances were recorded before it, and the plant last."""
+    names = (("a", False, "one"), ("a", False, "many"), ("b", False, "many"), ("b", False, "same"), ("p", True, "same"))
+    signals = [
+        Signals(who, f"/{who}", truth, {field: 0 for of, _, field in names if of == who}, {})
+        for who, truth in (("a", False), ("b", False), ("p", True))
+    ]
+    assert [panel.title for panel in choose_default(Catalogue(signals)).panels] == ["same", "many", "one"]
 
 
 def test_wide_panels_become_several_up_to_a_limit(bags: Path) -> None:
