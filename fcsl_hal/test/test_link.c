@@ -238,6 +238,36 @@ static void test_sequenced_that_nobody_reads(void)
     CHECK(fcsl_link_send(&a, SEQUENCED, message, 1) == FCSL_LINK_FULL);
 }
 
+static void test_reliable_that_nobody_reads(void)
+{
+    const fcsl_link_port_counters_t *counters = &b.ports[RELIABLE].counters;
+    open_ends();
+    exchange(10, &NONE);
+    for (int i = 0; i < 8 * FCSL_LINK_BUFFER / FCSL_LINK_PAYLOAD_MAX; i++) {
+        (void)fcsl_link_send(&a, RELIABLE, message, FCSL_LINK_PAYLOAD_MAX);
+        exchange(1, &NONE);
+    }
+    CHECK(counters->no_room > 0 && counters->no_room < b.counters.frames_taken);
+}
+
+/* Ends that know each other and have nothing to say send nothing. */
+static void test_silence(void)
+{
+    uint8_t frame[FCSL_LINK_FRAME_MAX];
+    size_t size = 0;
+    open_ends();
+    exchange(10, &NONE);
+    CHECK(fcsl_link_send(&a, RELIABLE, "x", 1) == FCSL_LINK_OK);
+    exchange(10, &NONE);
+    CHECK(fcsl_link_receive(&b, RELIABLE, message, sizeof message, &size) == FCSL_LINK_OK && size == 1);
+    exchange(10, &NONE);
+    for (int i = 0; i < 20; i++) {
+        fcsl_link_tick(&a);
+        fcsl_link_tick(&b);
+        CHECK(fcsl_link_next_frame(&a, frame) == 0 && fcsl_link_next_frame(&b, frame) == 0);
+    }
+}
+
 static void test_latest(void)
 {
     size_t size = 0;
@@ -395,6 +425,8 @@ int main(void)
     test_sequenced(&(faults_t){.lost = 10, .repeated = 10, .late = 10, .damaged = 1});
     test_long_gap();
     test_sequenced_that_nobody_reads();
+    test_reliable_that_nobody_reads();
+    test_silence();
     test_latest();
     test_restart();
     test_restart_within_a_message();

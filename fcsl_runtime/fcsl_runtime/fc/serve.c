@@ -132,6 +132,6 @@ fcsl_vars_host_t loop_host(loop_t *loop)
 void loop_serve(loop_t *loop)
 {
     if (loop->vars != NULL) {
-        (void)fcsl_vars_serve(loop->vars);
+        fcsl_vars_serve(loop->vars);
     }
 }

@@ -77,6 +77,10 @@ static const uint32_t TWO_BY_TWO[] = {2, 2};
 
 #define W FCSL_FIELD_WRITABLE
 
+/* A row behind each table, which no host may read: whoever follows its pointers crashes. */
+#define BEHIND ((const char *)1)
+#define FAR    (FCSL_NO_OFFSET - 1u)
+
 static const fcsl_field_t FIELDS[] = {
     FIELD("machine.tick", FCSL_ROLE_MACHINE, FCSL_U64, 0, 0, NULL, 1, tick, 8, FCSL_NONE, FCSL_NONE, ""),
     FIELD("machine.state", FCSL_ROLE_MACHINE, FCSL_STATE, 0, 0, NULL, 1, state, 4, FCSL_NONE, FCSL_NONE, ""),
@@ -128,8 +132,9 @@ static const fcsl_field_t FIELDS[] = {
           FCSL_NONE, "ns"),
     FIELD("channels.panel.armed.stamp_ns", FCSL_ROLE_CHANNEL, FCSL_I64, 0, 0, NULL, 1, armed_channel.stamp_ns, 8,
           FCSL_NONE, FCSL_NONE, "ns"),
+    {.path = BEHIND, .unit = BEHIND, .doc = BEHIND, .offset = FAR},
 };
-enum { FIELD_COUNT = sizeof FIELDS / sizeof FIELDS[0] };
+#define ROWS(table) (uint32_t)(sizeof(table) / sizeof(table)[0] - 1u)
 
 static const fcsl_instance_t INSTANCES[] = {
     {"sensors", "sensors", "sensors.py", 3, 3, 9, AT(sensors_request), AT(sensors_health), AT(sensors_faults),
@@ -140,20 +145,21 @@ static const fcsl_instance_t INSTANCES[] = {
      AT(pilot_fault_place), AT(pilot_inject_overrun), AT(pilot_inject_fault), 1000, 0, "fixture/msg/FixturePilot",
      "std_msgs/Header header\nuint64 tick\nfloat64 force\nfloat32[4] matrix\nuint32 runs\nint32 sign\nuint64 checksum\n"
      "bool saturated\nint32 transition_request\nuint8 health\n"},
+    {.name = BEHIND, .algorithm = BEHIND, .message_type = BEHIND, .message_text = BEHIND, .health_offset = FAR},
 };
 
 static const fcsl_schedule_t IDLE_SCHEDULE[] = {{SENSORS, 1, 0}, {PILOT, 1, 0}};
 static const fcsl_schedule_t ACTIVE_SCHEDULE[] = {{SENSORS, 1, 0}, {PILOT, 2, 1}};
-static const fcsl_state_t STATES[] = {{"IDLE", IDLE_SCHEDULE, 2}, {"ACTIVE", ACTIVE_SCHEDULE, 2}};
-static const char *const REQUESTS[] = {"GO", "BACK"};
+static const fcsl_state_t STATES[] = {{"IDLE", IDLE_SCHEDULE, 2}, {"ACTIVE", ACTIVE_SCHEDULE, 2}, {.name = BEHIND}};
+static const char *const REQUESTS[] = {"GO", "BACK", BEHIND};
 static const fcsl_transition_t TRANSITIONS[] = {
     {IDLE, ACTIVE, GO - 1, 1, FCSL_NONE, 0},
     {ACTIVE, IDLE, FCSL_NONE, 2, PILOT, 1u << FCSL_FAILED},
     {ACTIVE, IDLE, BACK - 1, 1, FCSL_NONE, 0},
 };
 enum { INJECTED = 1, COUNT_NEGATIVE = 2 };
-static const fcsl_fault_place_t FAULT_PLACES[] = {{"", 0, 0, "injected"},
-                                                  {"pilot.py", 12, 20, "the count is negative"}};
+static const fcsl_fault_place_t FAULT_PLACES[] = {
+    {"", 0, 0, "injected"}, {"pilot.py", 12, 20, "the count is negative"}, {.file = BEHIND, .cause = BEHIND}};
 static const fcsl_channel_t CHANNELS[] = {
     {"imu.gyro", 257, FCSL_SENSOR, 3, 5, AT(gyro_channel.attached), AT(gyro_channel.fresh), AT(gyro_channel.valid),
      AT(gyro_channel.age_ticks), AT(gyro_channel.sample_age), AT(gyro_channel.stamp_ns), "sensor_msgs/Imu",
@@ -165,6 +171,7 @@ static const fcsl_channel_t CHANNELS[] = {
      FCSL_NO_OFFSET, FCSL_NO_OFFSET, "", "", "", "", "", ""},
     {"panel.saturated", 514, FCSL_ACTUATOR, 20, 0, FCSL_NO_OFFSET, FCSL_NO_OFFSET, FCSL_NO_OFFSET, FCSL_NO_OFFSET,
      FCSL_NO_OFFSET, FCSL_NO_OFFSET, "", "", "", "", "", ""},
+    {.name = BEHIND, .direction = FCSL_SENSOR, .field = UINT32_MAX, .attached_offset = FAR, .fresh_offset = FAR},
 };
 
 static int32_t initialise(void *machine)
@@ -294,19 +301,19 @@ static void step(void *machine, const fcsl_host_t *host)
      .state_offset = AT(state),                                                                                        \
      .next_state_offset = AT(next_state),                                                                              \
      .fields = FIELDS,                                                                                                 \
-     .field_count = FIELD_COUNT,                                                                                       \
+     .field_count = ROWS(FIELDS),                                                                                      \
      .instances = INSTANCES,                                                                                           \
-     .instance_count = 2,                                                                                              \
+     .instance_count = ROWS(INSTANCES),                                                                                \
      .states = STATES,                                                                                                 \
-     .state_count = 2,                                                                                                 \
+     .state_count = ROWS(STATES),                                                                                      \
      .requests = REQUESTS,                                                                                             \
-     .request_count = 2,                                                                                               \
+     .request_count = ROWS(REQUESTS),                                                                                  \
      .transitions = TRANSITIONS,                                                                                       \
      .transition_count = sizeof TRANSITIONS / sizeof TRANSITIONS[0],                                                   \
      .channels = CHANNELS,                                                                                             \
-     .channel_count = sizeof CHANNELS / sizeof CHANNELS[0],                                                            \
+     .channel_count = ROWS(CHANNELS),                                                                                  \
      .fault_places = FAULT_PLACES,                                                                                     \
-     .fault_place_count = sizeof FAULT_PLACES / sizeof FAULT_PLACES[0],                                                \
+     .fault_place_count = ROWS(FAULT_PLACES),                                                                          \
      .views = FIXTURE_VIEWS,                                                                                           \
      .init = initialise,                                                                                               \
      .step = step,                                                                                                     \

@@ -167,6 +167,36 @@ static void test_floats_round_trip(void)
     }
 }
 
+/* Digits that tell neighbours apart, and no more; always a float. */
+static void test_floats_as_text(void)
+{
+    static const struct {
+        double value;
+        const char *f64;
+        const char *f32;
+    } cases[] = {
+        {0.0, "0.0", "0.0"},
+        {-0.0, "-0.0", "-0.0"},
+        {1.0, "1.0", "1.0"},
+        {-20.5, "-20.5", "-20.5"},
+        {0.1, "0.10000000000000001", "0.100000001"},
+        {1e30, "1e+30", "1.00000002e+30"},
+        {(double)INFINITY, "\"inf\"", "\"inf\""},
+        {-(double)INFINITY, "\"-inf\"", "\"-inf\""},
+        {(double)NAN, "\"nan\"", "\"nan\""},
+    };
+    for (size_t i = 0; i < sizeof cases / sizeof cases[0]; i++) {
+        char text[64];
+        json_out_t out;
+        fcsl_json_begin(&out, text, sizeof text);
+        fcsl_json_f64(&out, cases[i].value);
+        CHECK(strcmp(text, cases[i].f64) == 0);
+        fcsl_json_begin(&out, text, sizeof text);
+        fcsl_json_f32(&out, (float)cases[i].value);
+        CHECK(strcmp(text, cases[i].f32) == 0);
+    }
+}
+
 static void test_writer_is_bounded(void)
 {
     char text[8];
@@ -236,6 +266,7 @@ int main(void)
     test_every_damage();
     test_members();
     test_floats_round_trip();
+    test_floats_as_text();
     test_writer_is_bounded();
     test_any_bytes_are_quoted();
     test_base64();

@@ -136,6 +136,43 @@ static void test_damage(void)
     REFUSED(fault_places[1].cause = "", "fault place 1");
 }
 
+/* Whichever row it is. */
+static void test_every_row(void)
+{
+    static const char *names[4];
+    char part[64];
+    for (uint32_t i = 0; i < good->field_count; i++) {
+        (void)snprintf(part, sizeof part, "field %u of", i);
+        REFUSED(fields[i].unit = NULL, part);
+    }
+    for (uint32_t i = 0; i < good->instance_count; i++) {
+        (void)snprintf(part, sizeof part, "instance %u of", i);
+        REFUSED(instances[i].algorithm = NULL, part);
+    }
+    for (uint32_t i = 0; i < good->state_count; i++) {
+        (void)snprintf(part, sizeof part, "state %u of", i);
+        REFUSED(states[i].schedule = NULL, part);
+    }
+    for (uint32_t i = 0; i < good->request_count; i++) {
+        (void)snprintf(part, sizeof part, "request %u of", i);
+        memcpy(names, good->requests, good->request_count * sizeof names[0]);
+        names[i] = "";
+        REFUSED(machine.requests = names, part);
+    }
+    for (uint32_t i = 0; i < good->transition_count; i++) {
+        (void)snprintf(part, sizeof part, "transition %u of", i);
+        REFUSED(transitions[i].from = 2, part);
+    }
+    for (uint32_t i = 0; i < good->channel_count; i++) {
+        (void)snprintf(part, sizeof part, "channel %u of", i);
+        REFUSED(channels[i].ros_type = NULL, part);
+    }
+    for (uint32_t i = 0; i < good->fault_place_count; i++) {
+        (void)snprintf(part, sizeof part, "fault place %u of", i);
+        REFUSED(fault_places[i].cause = "", part);
+    }
+}
+
 /* Bounds that values of the type can be compared with. */
 static void test_bounds(void)
 {
@@ -212,6 +249,7 @@ int main(int argc, char **argv)
     CHECK(library != NULL);
     good = *(const fcsl_machine_t *const *)dlsym(library, "fcsl_machines");
     test_damage();
+    test_every_row();
     test_bounds();
     test_message_texts();
     test_struct_texts();

@@ -57,7 +57,8 @@ def _load() -> ctypes.CDLL:
     library.fcsl_run_set.argtypes = [pointer, ctypes.c_uint32, ctypes.c_uint32, pointer, ctypes.c_uint32, pointer]
     library.fcsl_run_step.argtypes = [pointer, ctypes.c_uint64, pointer]
     library.fcsl_run_set_state.argtypes = [pointer, ctypes.c_int32, pointer]
-    library.fcsl_run_inject_overrun.argtypes = [pointer, ctypes.c_uint32, pointer]
+    for name in ("fcsl_run_inject_overrun", "fcsl_run_inject_fault"):
+        getattr(library, name).argtypes = [pointer, ctypes.c_uint32, pointer]
     library.fcsl_run_set_views.argtypes = [pointer, ctypes.c_char_p, pointer]
     library.fcsl_run_record.argtypes = [pointer, pointer, pointer]
     library.fcsl_run_record_dropped.restype = ctypes.c_uint64

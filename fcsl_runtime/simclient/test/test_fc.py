@@ -194,6 +194,11 @@ def test_real_time_and_pause(path: Path) -> None:
         ('{"cmd":"get","paths":[""]}', "unknown_path", ""),
         ('{"cmd":"get","paths":["nope"]}', "unknown_path", ""),
         ('{"cmd":"inject","instance":"pilto","what":"fault"}', "bad_value", "pilot"),
+        ('{"cmd":"inject","instance":"pilot","what":"falut"}', "bad_value", "fault"),
+        ('{"cmd":"attach","channel":"imu.gyor"}', "bad_value", "imu.gyro"),
+        ('{"cmd":"attach","channel":"cart.force"}', "bad_value", ""),
+        ('{"cmd":"attach","channel":"nowhere"}', "bad_value", ""),
+        ('{"cmd":"sample","channel":"nowhere","value":1}', "bad_value", ""),
         ('{"cmd":"gte","path":"a"}', "unknown_command", "get"),
         ('{"cmd":"set_state","state":"IDEL"}', "unknown_state", "IDLE"),
         ('{"cmd":"get"}', "bad_request", ""),
@@ -429,6 +434,12 @@ def test_signal_closes_the_bag(path: Path, tmp_path: Path, number: int) -> None:
             time.sleep(0.02)
         code, out, err = fc.stop(number)
     assert (code, err) == (0, "") and not path.exists()
+    times = re.findall(
+        r"(lateness |tick time) p50 ([0-9.]+) us, p99 ([0-9.]+) us, p99.9 ([0-9.]+) us, max ([0-9.]+) us", out
+    )
+    assert [what for what, *_ in times] == ["lateness ", "tick time"]
+    assert all(sorted(map(float, row)) == list(map(float, row)) and float(row[-1]) > 0 for _, *row in times)
+    assert re.search(r"[1-9]\d* requests \(0 refused\), 0 clients dropped", out)
     with AnyReader([bag]) as reader:
         counts = {c.topic: c.msgcount for c in reader.connections}
     assert counts["/fixture/pilot"] >= 5 and f"{counts['/fixture/pilot']} ticks" in out

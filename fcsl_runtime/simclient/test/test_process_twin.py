@@ -24,6 +24,7 @@ from kill_points import CannotTrace, calls_until_killed
 from simclient import AlgTwin, TwinError
 from simclient.private_folder import PrivateFolder
 from simclient.twin import flight_process
+from simclient.twin.process_tap import ProcessTap
 from simclient.twin.process_twin import ProcessTwin
 
 
@@ -206,6 +207,26 @@ def test_ctrl_c_stops_it_between_two_ticks(twin: ProcessTwin, monkeypatch: pytes
         signal.signal(signal.SIGALRM, before)
     done = twin.tick(0)
     assert 0 < done < 10**12 and twin.tick() == done + 1 == twin.get_value("machine.tick")
+
+
+def test_rows_of_skipped_ticks_are_not_given_as_others() -> None:
+    """Not even where the process dies before the ticks that were to follow."""
+    taps: list[ProcessTap] = []
+    tap = ProcessTap([(0, 1), (3, 2)], 3, taps)
+    for k in range(5):
+        tap.take(bytes([k, 9, 9, k + 1, k + 2]))
+    assert tap.rows() == 5 and tap.read(2, 3) == bytes([2, 3, 4, 3, 4, 5, 4, 5, 6]) and tap.read(5, 0) == b""
+    for first, count in ((1, 1), (4, 2), (5, 1), (2, -1)):
+        with pytest.raises(TwinError, match=f"rows {first} to {first + count - 1} are not kept"):
+            tap.read(first, count)
+    tap.skip(10)
+    with pytest.raises(TwinError, match="rows 14 to 14 are not kept"):
+        tap.read(14, 1)
+    tap.take(bytes(5))
+    assert tap.rows() == 16 and tap.read(15, 1) == bytes(3)
+    tap.close()
+    tap.close()
+    assert taps == []
 
 
 def test_many_twins_leak_nothing(probe: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:

@@ -131,6 +131,28 @@ def test_few_fields_still_reproduce(fields: str, tmp_path: Path) -> None:
         assert verdict.divergence is not None and verdict.divergence.path == "pilot.outputs.force"
 
 
+def test_changes_are_told_whatever_is_chosen(tmp_path: Path) -> None:
+    """Topics of states, transitions, healths and faults do not depend on the fields of a recording."""
+
+    def told(fields: str) -> list[tuple[str, int, bytes]]:
+        run = Run()
+        run.record(tmp_path / f"bag{len(fields)}", fields=fields)
+        for k in range(40):
+            run.set(ARMED, b"\1" if k % 20 > 4 else b"\0")
+            if k in (10, 20):
+                run.call("fcsl_run_inject_fault" if k == 10 else "fcsl_run_inject_overrun", 1)
+            run.step(1)
+        run.call("fcsl_run_close")
+        bag = Bag(tmp_path / f"bag{len(fields)}")
+        names = {f"/fixture/{name}" for name in ("state", "transitions", "health", "faults")}
+        return sorted((name, ns, bytes(data)) for name, ns, data in bag.messages(names))
+
+    everything = told("*")
+    counts = {name: sum(topic == f"/fixture/{name}" for topic, _, _ in everything) for name in ("health", "faults")}
+    assert counts["health"] > 4 and counts["faults"] > 2
+    assert told("sensors.outputs.armed") == everything and told("") == everything
+
+
 def test_what_is_not_chosen_costs_nothing(tmp_path: Path) -> None:
     sizes = [sum(f.stat().st_size for f in record(tmp_path / f"bag{n}", fields, 5000).iterdir())
              for n, fields in enumerate(("", "*"))]  # fmt: skip

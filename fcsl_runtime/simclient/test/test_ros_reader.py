@@ -315,3 +315,15 @@ def test_a_value_that_its_field_cannot_hold_is_not_sent() -> None:
     single = Composer(STANDARD, "std_msgs/msg/Float32", [Source("data", "f64", 1, 0)])
     sent = [single.compose([np.array([x]).ctypes.data], 0) for x in (1e39, math.inf, -math.nan)]
     assert [s and s[4:] for s in sent] == [None, np.float32(math.inf).tobytes(), b"\0\0\xc0\x7f"]
+
+
+@pytest.mark.parametrize(("count", "fits"), [(1024, True), (1025, False)])
+def test_as_many_sequences_as_there_may_be(count: int, fits: bool) -> None:
+    types = get_types_from_msg("\n".join(f"float64[] f{i}" for i in range(count)), "a_msgs/msg/A")
+    picks = [Pick(name=f"v{i}", fields=(f"f{i}[0]",), type="f64") for i in range(count)]
+    try:
+        Reader(definitions_of(types), "a_msgs/msg/A", picks)
+    except MapError as error:
+        assert not fits and "has too many parts" in str(error)
+    else:
+        assert fits

@@ -164,6 +164,27 @@ def test_a_cut_by_state_replays_with_the_machine_and_says_so_without(fly: Fly, p
     assert set(columns(str(tmp_path / "part"), "machine.state")[1]) == {"IDLE"}
 
 
+def test_a_cut_after_the_end_of_one_of_two_machines(probe: Path, tmp_path: Path) -> None:
+    parts = {"bus": 20, "car": 100}
+    for name, ticks in parts.items():
+        with AlgTwin.from_library(probe) as twin:
+            twin.record(tmp_path / name, name)
+            twin.tick(ticks)
+    whole = sorted((m for name in parts for m in read_with_rosbags(tmp_path / name)), key=lambda m: m[2])
+    with Writer(tmp_path / "both", version=9, storage_plugin=StoragePlugin.MCAP) as writer:
+        open_ = {}
+        for bag in (Bag(tmp_path / name) for name in parts):
+            for name, topic in bag.topics.items():
+                type_hash = bag.store(name).hash_rihs01(topic.type)
+                open_[name] = writer.add_connection(name, topic.type, msgdef=topic.schema, rihs01=type_hash)
+        for name, _, time_ns, data in whole:
+            writer.write(open_[name], time_ns, data)
+    done = cut(Bag(tmp_path / "both"), tmp_path / "part", 50 * TICK_NS, 60 * TICK_NS)
+    assert set(done.machines) == {"/bus/probe", "/car/probe"} and all(done.machines.values())
+    expected = sorted(m for m in whole if 50 * TICK_NS <= m[2] <= 60 * TICK_NS)
+    assert sorted(read_with_rosbags(tmp_path / "part")) == expected and len(expected) >= 22
+
+
 def test_a_cut_from_the_start_replays_by_itself(fly: Fly, probe: Path, tmp_path: Path) -> None:
     done = tool("cut", fly(), "-o", tmp_path / "head", "--to", "0.5")
     assert done.returncode == 0 and "/car/probe: replays" in done.stdout

@@ -84,6 +84,7 @@ def play(
             "turned": np.stack([np.cos(k / 50), 0 * k, np.sin(k / 50), 0 * k], axis=1),
             "push": np.stack([0.0 * k, 0.0 * k, 100.0 + 0 * k], axis=1),
             "z": 2.0 * k,
+            "level": 0.25 + 0.0 * k,
             "seen": 3.0 * k,
             "health": np.where(k % 17 == 16, STALE, np.where(k % 17 == 0, 2, 0)).astype(np.uint8),
         }
@@ -122,6 +123,14 @@ def test_pose_and_thrust_follow_the_body_of_the_views(tmp_path: Path) -> None:
     assert {tuple(round(x, 5) for x in vector) for _, vector in arrows} == {(0.0, 0.0, 0.0), (0.0, 0.0, 2.6)}
     marker = values(rows, "/world/transitions/1", "Points3D:positions")
     assert [(time, list(point)) for time, point in marker] == [(0.3, pytest.approx([0.0, 3.0, 30.0]))]
+
+
+def test_a_thrust_without_a_unit_is_a_share(tmp_path: Path) -> None:
+    throttle = Signals("throttle", "/m/throttle", False, {"level": 0}, {})
+    body = replace(NAV, thrust="throttle.outputs.level")
+    rows = play(tmp_path / "x.rrd", [VEHICLE[0], throttle], [60], body)
+    arrows = values(rows, "/world/vehicle/body/thrust", "Arrows3D:vectors")
+    assert {tuple(round(x, 5) for x in vector) for _, vector in arrows} == {(0.0, 0.0, 0.25 * 2.6)}
 
 
 @pytest.mark.parametrize("entity", ["/world/vehicle", "/world/vehicle/body"])

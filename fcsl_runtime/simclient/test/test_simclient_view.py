@@ -26,10 +26,11 @@ import simclient.to_rerun
 from simclient import BagError
 from simclient.bag import Bag
 from simclient.errors import ViewError
-from simclient.view.panels import PANELS_MAX
+from simclient.view.panels import PANELS_MAX, choose_default
 from simclient.view.picture import choose, draw, plot, pyplot
 from simclient.view.recorded import RecordedRun
 from simclient.view.series import Gaps, newest, thinned
+from simclient.view.signals import Catalogue, Signals
 from simclient.view.styles import styles
 from simclient.view.views import CURVES_MAX, ROLES, Views, parse_views
 
@@ -217,11 +218,24 @@ def test_the_newest_value_is_taken_and_none_invented() -> None:
 def test_without_views_same_names_are_compared(bags: Path) -> None:
     axes, left_out = drawn(bags / "plain")
     shown = {axis.get_ylabel(): labels(axis) for axis in axes}
+    order = list(shown)
+    assert order[0] == "height, m"  # which the plant has, too
+    assert order.index("stamp") < order.index("q")  # several instances, then one
     assert shown["height, m"] == ["reference.height", "guide.height"]
     assert shown["pose.height, m"] == ["coarse.pose.height", "fine.pose.height", "spare.pose.height: no values"]
     wide = [name for name in shown if name.startswith("pose.q")]
     assert wide == ["pose.q (1\u00a0of\u00a02)", "pose.q (2\u00a0of\u00a02)"]
     assert all(len(names) <= CURVES_MAX for names in shown.values()) and left_out == []
+
+
+def test_what_can_be_compared_comes_first() -> None:
+    """Also where other instances were recorded before it, and the plant last."""
+    names = (("a", False, "one"), ("a", False, "many"), ("b", False, "many"), ("b", False, "same"), ("p", True, "same"))
+    signals = [
+        Signals(who, f"/{who}", truth, {field: 0 for of, _, field in names if of == who}, {})
+        for who, truth in (("a", False), ("b", False), ("p", True))
+    ]
+    assert [panel.title for panel in choose_default(Catalogue(signals)).panels] == ["same", "many", "one"]
 
 
 def test_wide_panels_become_several_up_to_a_limit(bags: Path) -> None:
@@ -256,6 +270,14 @@ def test_no_two_curves_of_a_panel_look_alike(roles: list[str]) -> None:
     assert len({look.colour for look in looks}) == len({look.rerun_colour for look in looks}) == len(roles)
     for role, look in zip(roles, looks, strict=True):
         assert (look.dots, look.dashed) == (role == "measured", role == "command")
+    widths = [
+        look.width for role, look in zip(roles, looks, strict=True) if role not in ("truth", "command", "measured")
+    ]
+    # Lines that coincide stay visible: later ones are thinner, and truth on top of all is the thinnest.
+    assert widths == sorted(widths, reverse=True) and all(1.0 <= width <= 2.0 for width in widths)
+    assert all(look.width == 1.0 for role, look in zip(roles, looks, strict=True) if role in ("truth", "command"))
+    if len(widths) > 1 and "command" not in roles:
+        assert widths[0] > widths[1]
 
 
 def test_legends_are_beside_the_data(viewed: list[Any]) -> None:
@@ -353,6 +375,13 @@ def test_bad_input_leaves_nothing_behind(
             TOOLS[tool]([str(argument) for argument in arguments])
         assert reason in str(caught.value)
     assert sorted(p.name for p in tmp_path.iterdir()) == ["bad.json", "there", f"there.{suffix}"]
+
+
+@pytest.mark.parametrize("tool", TOOLS)
+def test_a_file_to_write_must_be_named(tool: str, bags: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    with pytest.raises(SystemExit) as exited:
+        TOOLS[tool]([str(bags / "plain")])
+    assert exited.value.code == 2 and "-o/--output" in capsys.readouterr().err
 
 
 @pytest.mark.parametrize(("tool", "slow"), [("plot", "matplotlib"), ("to_rerun", "rerun")])

@@ -168,6 +168,16 @@ def test_a_stream_outlives_other_answers_and_ends_with_the_supervisor(root: Path
                     stream.next("runs")
 
 
+def is_held(reader: socket.socket) -> bool:
+    """Whether the other end still has this connection open."""
+    ends = (reader.getpeername()[1], reader.getsockname()[1])
+    for line in Path("/proc/net/tcp").read_text().splitlines()[1:]:
+        local, remote, state = line.split()[1:4]
+        if (int(local.rpartition(":")[2], 16), int(remote.rpartition(":")[2], 16)) == ends:
+            return state == "01"  # established
+    return False
+
+
 def test_a_reader_that_takes_nothing_is_dropped(root: Path, library: str) -> None:
     soon = "from simclient.supervisor import stream; stream.STREAM_STALL_S = 0.3; stream.STREAM_PERIOD_S = 0.001"
     with supervising(root, patch=soon) as supervisor:
@@ -178,6 +188,7 @@ def test_a_reader_that_takes_nothing_is_dropped(root: Path, library: str) -> Non
             path = f"/stream?run={run['id']}&path=hold.state.p&path=hold.state.cube"
             reader.sendall(f"GET {path} HTTP/1.1\r\nHost: 127.0.0.1:{supervisor.port}\r\n\r\n".encode())
             wait_until(lambda: metric(supervisor, "fcsl_streams_dropped_total") == 1)  # others are served meanwhile
+            wait_until(lambda: not is_held(reader))  # whatever it did not read
         assert metric(supervisor, "fcsl_streams") == 0
 
 

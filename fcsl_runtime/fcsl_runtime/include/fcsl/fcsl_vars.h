@@ -78,8 +78,8 @@ void fcsl_vars_close(fcsl_vars_t *vars);
 /* Where it listens: as given, with the port that was taken. */
 const char *fcsl_vars_address(const fcsl_vars_t *vars);
 
-/* Step thread: acts on the waiting command, if there is one, and never waits. Returns 1 when it did. */
-int fcsl_vars_serve(fcsl_vars_t *vars);
+/* Step thread: acts on the waiting command, if there is one, and never waits. */
+void fcsl_vars_serve(fcsl_vars_t *vars);
 /* Step thread of a paused host: sleeps until a command waits, but at most until `deadline_ns` of the monotonic clock. */
 void fcsl_vars_wait(fcsl_vars_t *vars, uint64_t deadline_ns);
 /* Any thread: ends that sleep. */

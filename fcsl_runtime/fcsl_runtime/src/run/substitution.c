@@ -20,11 +20,12 @@ static int is_left(const fcsl_instance_t *instance, const fcsl_field_t *field)
 
 static int is_impure(const fcsl_machine_t *machine, const fcsl_instance_t *instance)
 {
-    uint32_t flags = 0;
     for (uint32_t i = 0; i < instance->field_count; i++) {
-        flags |= machine->fields[instance->first_field + i].flags;
+        if ((machine->fields[instance->first_field + i].flags & FCSL_FIELD_IMPURE) != 0) {
+            return 1;
+        }
     }
-    return (flags & FCSL_FIELD_IMPURE) != 0;
+    return 0;
 }
 
 int fcsl_substitution_open(fcsl_run_t *run, fcsl_error_t *error)

@@ -29,25 +29,23 @@ fcsl_trace_t *fcsl_run_trace_begin(fcsl_run_t *run, const fcsl_range_t *ranges, 
         }
         row_bytes += ranges[i].size;
     }
-    if (row_bytes == 0 || capacity == 0 || capacity > SIZE_MAX / row_bytes) {
+    const size_t head = sizeof(fcsl_trace_t) + count * sizeof *ranges;
+    if (row_bytes == 0 || capacity == 0 || capacity > (SIZE_MAX - head) / row_bytes) {
         (void)fcsl_fail(error, "a trace of %" PRIu64 " rows of %" PRIu64 " bytes is none", capacity, row_bytes);
         return NULL;
     }
-    fcsl_trace_t *trace = calloc(1, sizeof *trace + count * sizeof *ranges);
-    uint8_t *rows = malloc(capacity * row_bytes);
-    if (trace == NULL || rows == NULL) {
-        free(trace);
-        free(rows);
+    fcsl_trace_t *trace = malloc(head + capacity * row_bytes);
+    if (trace == NULL) {
         (void)fcsl_fail(error, "out of memory for a trace of %" PRIu64 " rows of %" PRIu64 " bytes", capacity,
                         row_bytes);
         return NULL;
     }
+    *trace = (fcsl_trace_t){.next = run->traces,
+                            .rows = (uint8_t *)(trace->ranges + count),
+                            .capacity = capacity,
+                            .row_bytes = row_bytes,
+                            .count = count};
     memcpy(trace->ranges, ranges, count * sizeof *ranges);
-    trace->next = run->traces;
-    trace->rows = rows;
-    trace->capacity = capacity;
-    trace->row_bytes = row_bytes;
-    trace->count = count;
     run->traces = trace;
     return trace;
 }
@@ -89,7 +87,6 @@ void fcsl_run_trace_end(fcsl_run_t *run, fcsl_trace_t *trace)
     for (fcsl_trace_t **at = &run->traces; *at != NULL; at = &(*at)->next) {
         if (*at == trace) {
             *at = trace->next;
-            free(trace->rows);
             free(trace);
             return;
         }

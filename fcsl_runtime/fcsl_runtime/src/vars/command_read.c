@@ -96,9 +96,6 @@ static int get_one(request_t *request, uint32_t token)
     const json_token_t *path = &request->json.tokens[token];
     target_t target;
     const int known = fcsl_request_target(request, token, &target) == 0;
-    if (!known && path->type != JSON_STRING) {
-        return -1;
-    }
     fcsl_json_raw(request->out, "\"%.*s\":", (int)(path->end - path->start), request->json.text + path->start);
     if (known) {
         fcsl_value_write(&target, commander->snapshot + target.at, request->out);

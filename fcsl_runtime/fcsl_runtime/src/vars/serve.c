@@ -125,17 +125,16 @@ static fcsl_vars_status_t act(fcsl_vars_t *vars, command_t *command)
     }
 }
 
-int fcsl_vars_serve(fcsl_vars_t *vars)
+void fcsl_vars_serve(fcsl_vars_t *vars)
 {
     command_t *command = fcsl_mailbox_take(&vars->mailbox);
     if (command == NULL) {
-        return 0;
+        return;
     }
     command->status = act(vars, command);
     vars->host.publish(vars->host.ctx);
     command->published = fcsl_history_published(vars->history);
     fcsl_mailbox_answer(&vars->mailbox);
-    return 1;
 }
 
 void fcsl_vars_wait(fcsl_vars_t *vars, uint64_t deadline_ns)

@@ -189,9 +189,7 @@ static const char *read_enumerator(const fcsl_machine_t *machine, const json_t *
         return "expected a name";
     }
     int32_t value = FCSL_NONE;
-    if (type == FCSL_STATE) {
-        value = fcsl_value_state(machine, text);
-    } else if (type == FCSL_HEALTH) {
+    if (type == FCSL_HEALTH) {
         for (int32_t i = 0; i <= (int32_t)FCSL_STALE; i++) {
             value = strcmp(text, fcsl_health_name(i)) == 0 ? i : value;
         }

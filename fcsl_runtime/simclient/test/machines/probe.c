@@ -97,6 +97,10 @@ static const uint32_t three[] = {3}, four[] = {4}, two_three[] = {2, 3};
 enum { FIRST_SOURCE = 3, VEC = FIRST_SOURCE, QUAT, REAL, BIG, LONG_WORD, SINGLE, GRID, SMALL, WORD, FLAG };
 enum { FIRST_ECHO = FIRST_SOURCE + 15 };
 
+/* A row behind each table, which no host may read: whoever follows its pointers crashes. */
+#define BEHIND ((const char *)1)
+#define FAR    (FCSL_NO_OFFSET - 1u)
+
 static const fcsl_field_t fields[] = {
     SCALAR("machine.tick", FCSL_ROLE_MACHINE, FCSL_U64, 0, tick, FCSL_NONE, FCSL_NONE, "", "ticks completed"),
     SCALAR("machine.state", FCSL_ROLE_MACHINE, FCSL_STATE, 0, state, FCSL_NONE, FCSL_NONE, "", ""),
@@ -135,28 +139,31 @@ static const fcsl_field_t fields[] = {
 #ifdef PROBE_EXTRA_FIELD
     SCALAR("echo.outputs.extra", FCSL_ROLE_OUTPUT, FCSL_F64, 0, echo.extra, ECHO, FCSL_NONE, "", ""),
 #endif
+    {.path = BEHIND, .unit = BEHIND, .doc = BEHIND, .offset = FAR},
 };
+#define ROWS(table) (uint32_t)(sizeof(table) / sizeof(table)[0] - 1u)
 
 static const fcsl_instance_t instances[] = {
     {"source", "block", "probe.c", 1, FIRST_SOURCE, 15, AT(source.request), AT(source.health), AT(source.faults),
      AT(source.overruns), AT(source.fault_place), FCSL_NO_OFFSET, FCSL_NO_OFFSET, 0, 1, "probe/msg/ProbeSource",
      "std_msgs/Header header\nuint64 tick\nfloat64[3] vec\nfloat64[4] quat\nfloat64 real  # m/s\nint64 big\n"
      "uint64 long_word\nfloat32 single\nfloat32[6] grid\nint32 small\nuint32 word\nbool flag\nuint8 health\n"},
-    {"echo", "echo", "probe.c", 1, FIRST_ECHO, (uint32_t)(sizeof fields / sizeof fields[0]) - FIRST_ECHO,
-     AT(echo.request), AT(echo.health), AT(echo.faults), AT(echo.overruns), AT(echo.fault_place),
-     AT(echo.inject_overrun), AT(echo.inject_fault), 100, 1, "probe/msg/ProbeEcho",
+    {"echo", "echo", "probe.c", 1, FIRST_ECHO, ROWS(fields) - FIRST_ECHO, AT(echo.request), AT(echo.health),
+     AT(echo.faults), AT(echo.overruns), AT(echo.fault_place), AT(echo.inject_overrun), AT(echo.inject_fault), 100, 1,
+     "probe/msg/ProbeEcho",
      "std_msgs/Header header\nuint64 tick\nfloat64 sum\nfloat64[3] copy\nuint64 count\n"
 #ifdef PROBE_EXTRA_FIELD
      "float64 extra\n"
 #endif
      "int32 transition_request\nuint8 health\n"},
+    {.name = BEHIND, .algorithm = BEHIND, .message_type = BEHIND, .message_text = BEHIND, .health_offset = FAR},
 };
 
 static const fcsl_schedule_t schedule[] = {{SOURCE, 1, 0}, {ECHO, 1, 0}};
 enum { INJECTED = 1 };
-static const fcsl_fault_place_t fault_places[] = {{"", 0, 0, "injected"}};
-static const fcsl_state_t states[] = {{"IDLE", schedule, 2}, {"ACTIVE", schedule, 2}};
-static const char *const requests[] = {"GO", "STOP"};
+static const fcsl_fault_place_t fault_places[] = {{"", 0, 0, "injected"}, {.file = BEHIND, .cause = BEHIND}};
+static const fcsl_state_t states[] = {{"IDLE", schedule, 2}, {"ACTIVE", schedule, 2}, {.name = BEHIND}};
+static const char *const requests[] = {"GO", "STOP", BEHIND};
 static const fcsl_transition_t transitions[] = {
     {IDLE, ACTIVE, 0, 2, FCSL_NONE, 0},
     {ACTIVE, IDLE, 1, 2, ECHO, (1u << FCSL_NOMINAL) | (1u << FCSL_DEGRADED)},
@@ -185,6 +192,7 @@ static const fcsl_channel_t channels[] = {
     CHANNEL("imu.attitude", 2, QUAT, 1),
     CHANNEL("level", 3, SMALL, 2),
     CHANNEL("switch", 4, FLAG, 3),
+    {.name = BEHIND, .direction = FCSL_SENSOR, .field = UINT32_MAX, .attached_offset = FAR, .fresh_offset = FAR},
 };
 
 static int32_t init(void *machine)
@@ -260,8 +268,6 @@ static void force_state(void *machine, int32_t state)
     m->state = m->next_state = state; /* both states schedule both instances, which go on */
 }
 
-#define COUNT(table) (uint32_t)(sizeof(table) / sizeof(table)[0])
-
 static const fcsl_machine_t probe = {
     .abi_version = FCSL_ABI_VERSION,
     .name = "probe",
@@ -276,19 +282,19 @@ static const fcsl_machine_t probe = {
     .state_offset = AT(state),
     .next_state_offset = AT(next_state),
     .fields = fields,
-    .field_count = COUNT(fields),
+    .field_count = ROWS(fields),
     .instances = instances,
-    .instance_count = COUNT(instances),
+    .instance_count = ROWS(instances),
     .states = states,
-    .state_count = COUNT(states),
+    .state_count = ROWS(states),
     .requests = requests,
-    .request_count = COUNT(requests),
+    .request_count = ROWS(requests),
     .transitions = transitions,
-    .transition_count = COUNT(transitions),
+    .transition_count = (uint32_t)(sizeof transitions / sizeof transitions[0]),
     .channels = channels,
-    .channel_count = COUNT(channels),
+    .channel_count = ROWS(channels),
     .fault_places = fault_places,
-    .fault_place_count = COUNT(fault_places),
+    .fault_place_count = ROWS(fault_places),
     .views = "",
     .init = init,
     .step = step,
