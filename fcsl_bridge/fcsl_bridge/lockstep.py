@@ -2,8 +2,8 @@
 """The lock-step protocol: two processes step together, tick by tick, with the results of one process.
 
     simulator end                    <machine>/lockstep/…                                controller end
-    send(k, message)      sensors  ── TICK k, message ──►                next() returns the message; the machine steps k
-    answer() returns    ◄── TICK k, message ── actuators                                   answer(message)
+    send(k, message)    sensors  ── TICK k, message ──►              next() returns the message; the machine steps k
+    answer() returns    ◄── TICK k, message ── actuators                                 answer(message)
     alive()             sensors  ── ALIVE k ──►              next() keeps waiting: the simulator is paused, or waits for others
     (answer waits on)   ◄── ALIVE k ── actuators                 alive(): the controller is not active
     reset(), send(0, …) sensors  ── TICK 0 of run r + 1 ──►          next() reports a new run

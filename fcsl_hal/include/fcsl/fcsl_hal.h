@@ -24,8 +24,8 @@ typedef enum {
 
 typedef struct fcsl_hal {
     void *ctx;
-    /* Puts the sensor message of `tick` into `bytes`; `capacity` is fcsl_message_capacity(machine, FCSL_SENSOR_MESSAGE) or more. The HAL
-     * has checked what came from elsewhere: the host takes *message as it is. Sets it on FCSL_HAL_OK alone. */
+    /* Puts the sensor message of `tick` into `bytes`; `capacity` is fcsl_message_capacity(machine, FCSL_SENSOR_MESSAGE) or
+     * more. The HAL has checked what came from elsewhere: the host takes *message as it is. Sets it on FCSL_HAL_OK alone. */
     fcsl_hal_status_t (*sample)(void *ctx, uint64_t tick, uint8_t *bytes, size_t capacity, fcsl_message_t *message);
     fcsl_hal_status_t (*actuate)(void *ctx, const fcsl_message_t *message);
     /* What the last status other than OK or NONE was about, for messages; never null. */

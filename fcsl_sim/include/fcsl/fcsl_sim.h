@@ -3,7 +3,7 @@
  * The simulator: flies a compiled machine against plant models on an integer nanosecond clock, deterministically.
  *
  * At t_k, the time of controller tick k: states have been integrated up to t_k; due models are updated; sensors are
- * sampled; the controller steps; its actuators hold from t_k on. Controller and plant meet only in messages
+ * sampled; the controller steps; its actuators hold from t_k on. Controller and plant meet only in messages of channels
  * (fcsl_codec.h), whether the controller is hosted here, in another process or in a ROS 2 node: the bits are the same.
  *
  * A simulation is built from a plan: a flat text that the front end (fcsl_sim, Python) makes from a checked *.sim.json
