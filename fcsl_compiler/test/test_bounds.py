@@ -96,7 +96,8 @@ def test_structs_in_structs(tmp_path: Path) -> None:
 
     held = 'class Law:\n    state = {{"s": "S{}"}}\n\n    def execute(self): ...\n'
     assert codes(craft(tmp_path, held.format(3), structs=structs(4))) == []
-    assert set(codes(craft(tmp_path, held.format(17), structs=structs(18)))) == {"E232"}
+    views = {"panels": [{"title": "large", "values": ["law.state.s.m0"]}]}
+    assert set(codes(craft(tmp_path, held.format(17), structs=structs(18), views=views))) == {"E232"}
 
 
 def test_a_c_compiler_that_does_not_end_is_ended_with_what_it_started(

@@ -26,7 +26,7 @@ def build(folder: Path, text: str) -> Crc:
     """The function of this source."""
     source, library = folder / "crc32.c", folder / "libcrc32.so"
     source.write_text(text)
-    includes = [f"-I{path}" for path in (*include_dirs(), HAL / "include")]
+    includes = [f"-I{path}" for path in (*include_dirs(), HAL / "include", HAL / "src")]
     subprocess.run(["cc", "-std=c11", "-O1", "-fPIC", "-shared", *includes, source, "-o", library], check=True)
     function = ctypes.CDLL(str(library)).fcsl_crc32
     function.restype, function.argtypes = ctypes.c_uint32, [ctypes.c_uint32, ctypes.c_void_p, ctypes.c_size_t]

@@ -8,14 +8,26 @@ from __future__ import annotations
 
 import json
 import re
-from collections.abc import Iterable, Mapping
+from collections.abc import Container, Mapping
 from pathlib import Path
 from typing import Any
 
 from ..base.diagnostics import DiagnosticSink, nearest
 from ..base.source import Span
 from ..model.ir import RECORDS
-from ..model.types import Array, Scalar, Struct, Type, count_of, element_of, leaves, scalar_of, shape_of
+from ..model.types import (
+    MAX_LEAVES,
+    Array,
+    Scalar,
+    Struct,
+    Type,
+    count_of,
+    element_of,
+    leaf_count_of,
+    leaves,
+    scalar_of,
+    shape_of,
+)
 from ..parse.json_reader import ConfigReader
 from ..parse.json_source import JsonNode
 from ..parse.source_path import SourcePathError, resolve_source
@@ -41,14 +53,19 @@ class Signals:
     incomplete: instances of which an error was reported. Paths of these are accepted.
     """
 
-    def __init__(self, ports: Mapping[str, Mapping[str, tuple[Type, str]]], incomplete: Iterable[str]):
-        self.leaves = {
-            f"{instance}.{port}{leaf.path}": (leaf.type, leaf.unit)
-            for instance, found in ports.items()
-            for port, (type_, unit) in found.items()
-            for leaf in leaves(type_, unit)
-        }
-        self.instances, self.incomplete = list(ports), incomplete
+    def __init__(self, ports: Mapping[str, Mapping[str, tuple[Type, str]]], incomplete: Container[str]):
+        self.ports, self.incomplete = ports, incomplete
+        self._leaves: dict[str, dict[str, tuple[Type, str]]] = {}
+
+    def _leaves_of(self, instance: str) -> Mapping[str, tuple[Type, str]]:
+        """Type and unit of the leaves by path. Made for instances that a view names: structs can have many leaves."""
+        if instance not in self._leaves:
+            self._leaves[instance] = {
+                f"{instance}.{port}{leaf.path}": (leaf.type, leaf.unit)
+                for port, (type_, unit) in self.ports[instance].items()
+                for leaf in leaves(type_, unit)
+            }
+        return self._leaves[instance]
 
     def find(self, node: JsonNode, sink: DiagnosticSink) -> tuple[Type, str] | None:
         """Type and unit of the number, the bool or the array of them that a path names. None after reporting an
@@ -57,18 +74,18 @@ class Signals:
         instance, _, rest = path.partition(".")
         if instance in self.incomplete:
             return None
-        if instance not in self.instances:
-            fix = f"the instances are {', '.join(self.instances) or 'none'}"
-            sink.error("E206", f"no instance `{instance}`", node.span, help=nearest(instance, self.instances) or fix)
+        if instance not in self.ports:
+            fix = f"the instances are {', '.join(self.ports) or 'none'}"
+            sink.error("E206", f"no instance `{instance}`", node.span, help=nearest(instance, list(self.ports)) or fix)
             return None
-        own = [leaf for leaf in self.leaves if leaf.startswith(f"{instance}.")]
+        own = self._leaves_of(instance)
         if rest.partition(".")[0] not in RECORDS:
             meant = [leaf for leaf in own if leaf.split(".", 2)[2] == rest]
             fix = f'write "{meant[0]}"' if meant else f'write "{instance}.outputs.<field>"'
             message = f"a view shows a field of {', '.join(RECORDS)}, not `{path}`"
             sink.error("E215", message, node.span, help=fix)
             return None
-        found = self._leaf(path)
+        found = _leaf(path, own)
         if found is None:
             self._report(node, path, own, sink)
         elif not (element := scalar_of(found[0])).is_number and element.name != "bool":
@@ -77,33 +94,37 @@ class Signals:
             return None
         return found
 
-    def _leaf(self, path: str) -> tuple[Type, str] | None:
-        """A leaf, or the part of an array that constant indices behind a leaf select."""
-        if path in self.leaves:
-            return self.leaves[path]
-        match = _INDICES.fullmatch(path)
-        leaf = self.leaves.get(match[1]) if match else None
-        if match is None or leaf is None:
-            return None
-        indices, shape = [int(i) for i in re.findall(r"[0-9]+", match[2])], shape_of(leaf[0])
-        if len(indices) > len(shape) or any(i >= n for i, n in zip(indices, shape, strict=False)):
-            return None
-        rest = shape[len(indices) :]
-        return (Array(scalar_of(leaf[0]), rest) if rest else scalar_of(leaf[0])), leaf[1]
-
-    def _report(self, node: JsonNode, path: str, own: list[str], sink: DiagnosticSink) -> None:
+    def _report(self, node: JsonNode, path: str, own: Mapping[str, tuple[Type, str]], sink: DiagnosticSink) -> None:
         members = [leaf for leaf in own if leaf.startswith((f"{path}.", f"{path}["))]
         match = _INDICES.fullmatch(path)
         if members:
             message, fix = f"`{path}` is a struct, and a view shows numbers", f'name a member, such as "{members[0]}"'
             sink.error("E245", message, node.span, help=fix)
-        elif match is not None and match[1] in self.leaves:
-            message = f"`{match[1]}` is {self.leaves[match[1]][0]} and has no element `{match[2]}`"
+        elif match is not None and match[1] in own:
+            message = f"`{match[1]}` is {own[match[1]][0]} and has no element `{match[2]}`"
             sink.error("E245", message, node.span, help="indices begin at 0")
         else:
-            fix = nearest(path, own) or f"it has {', '.join(leaf.partition('.')[2] for leaf in own[:12]) or 'no field'}"
+            fix = (
+                nearest(path, list(own))
+                or f"it has {', '.join(leaf.partition('.')[2] for leaf in list(own)[:12]) or 'no field'}"
+            )
             instance, _, rest = path.partition(".")
             sink.error("E216", f"`{instance}` has no field `{rest}`", node.span, help=fix)
+
+
+def _leaf(path: str, own: Mapping[str, tuple[Type, str]]) -> tuple[Type, str] | None:
+    """A leaf, or the part of an array that constant indices behind a leaf select."""
+    if path in own:
+        return own[path]
+    match = _INDICES.fullmatch(path)
+    leaf = own.get(match[1]) if match else None
+    if match is None or leaf is None:
+        return None
+    indices, shape = [int(i) for i in re.findall(r"[0-9]+", match[2])], shape_of(leaf[0])
+    if len(indices) > len(shape) or any(i >= n for i, n in zip(indices, shape, strict=False)):
+        return None
+    rest = shape[len(indices) :]
+    return (Array(scalar_of(leaf[0]), rest) if rest else scalar_of(leaf[0])), leaf[1]
 
 
 def read_views(node: JsonNode | None, signals: Signals, config: Path, reader: ConfigReader) -> str:
@@ -268,6 +289,8 @@ class _Checker:
 
 
 def is_partial(type_: Type) -> bool:
-    """Whether an error about a member of this type was reported."""
+    """Whether an error was reported about this type or a member of it. Does not look into types that are too large."""
+    if leaf_count_of(type_) > MAX_LEAVES:
+        return True
     element: Scalar | Struct = element_of(type_)
     return isinstance(element, Struct) and (element.partial or any(is_partial(m.type) for m in element.members))

@@ -183,7 +183,7 @@ static int prepare(fcsl_recorder_t *recorder, const fcsl_record_options_t *optio
         return -1;
     }
     if (add_fixed_topics(recorder, name_space, error) != 0 || add_shown_topics(recorder, name_space, error) != 0 ||
-        put_views(recorder, start_ns, error) != 0 || fcsl_bag_publish(recorder->bag, error) != 0 ||
+        fcsl_bag_publish(recorder->bag, error) != 0 || put_views(recorder, start_ns, error) != 0 ||
         start_writer(recorder, error) != 0) {
         fcsl_bag_abandon(recorder->bag);
         return -1;
