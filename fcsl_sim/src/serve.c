@@ -162,7 +162,7 @@ int fcsl_sim_attend(fcsl_sim_t *sim)
 {
     struct fcsl_sim_service *service = sim->service;
     if (service) {
-        (void)fcsl_vars_serve(service->vars);
+        fcsl_vars_serve(service->vars);
     }
     const uint64_t until = fcsl_sim_wait_until(sim);
     if (until == 0) {
@@ -170,7 +170,7 @@ int fcsl_sim_attend(fcsl_sim_t *sim)
     }
     if (service) {
         fcsl_vars_wait(service->vars, until);
-        (void)fcsl_vars_serve(service->vars);
+        fcsl_vars_serve(service->vars);
     } else {
         fcsl_sim_sleep_until(until);
     }

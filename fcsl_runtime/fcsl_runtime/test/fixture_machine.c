@@ -37,7 +37,6 @@ typedef struct {
     uint8_t armed;
     int64_t count;
     int32_t sensors_request;
-    int32_t sensors_health;
     uint64_t sensors_faults;
     uint64_t sensors_overruns;
     uint32_t sensors_fault_place;
@@ -52,7 +51,6 @@ typedef struct {
     uint64_t checksum;
     uint8_t saturated;
     int32_t pilot_request;
-    int32_t pilot_health;
     double integral;
     uint64_t pilot_faults;
     uint64_t pilot_overruns;
@@ -61,6 +59,11 @@ typedef struct {
     uint8_t pilot_inject_fault;
     channel_t gyro_channel;
     channel_t armed_channel;
+    /* What hosts read of an instance need not lie together. */
+    uint8_t gap[256];
+    int32_t sensors_health;
+    uint8_t another_gap[256];
+    int32_t pilot_health;
 } machine_t;
 
 #define AT(member) ((uint32_t)offsetof(machine_t, member))

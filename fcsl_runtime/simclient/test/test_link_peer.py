@@ -5,6 +5,7 @@ from __future__ import annotations
 
 import ctypes
 import random
+import re
 import subprocess
 from collections.abc import Callable, Iterator
 from pathlib import Path
@@ -26,11 +27,27 @@ RETRANSMIT_TICKS = 3
 STRUCT_BYTES = 4 << 20
 
 
+#: Where the counters of a link and of a port are.
+COUNTERS_C = """
+#include "fcsl/fcsl_link.h"
+const void *link_counters(const fcsl_link_t *link) { return &link->counters; }
+const void *port_counters(const fcsl_link_t *link, int port) { return &link->ports[port].counters; }
+"""
+
+
+def counter_names(struct: str) -> list[str]:
+    header = (HAL / "include/fcsl/fcsl_link.h").read_text()
+    (members,) = re.findall(rf"typedef struct {{([^}}]*)}} {struct};", header)
+    return re.findall(r"uint64_t (\w+);", members)
+
+
 @pytest.fixture(scope="session")
 def native(tmp_path_factory: pytest.TempPathFactory) -> ctypes.CDLL:
     """The C implementation as a library."""
-    library = tmp_path_factory.mktemp("link") / "liblink.so"
-    sources = [*sorted((HAL / "src").glob("link*.c")), HAL / "src/crc16.c", HAL / "src/cobs.c"]
+    folder = tmp_path_factory.mktemp("link")
+    library, counters = folder / "liblink.so", folder / "counters.c"
+    counters.write_text(COUNTERS_C)
+    sources = [*sorted((HAL / "src").glob("link*.c")), HAL / "src/crc16.c", HAL / "src/cobs.c", counters]
     subprocess.run(
         ["cc", "-std=c11", "-O1", "-fPIC", "-shared", "-I", HAL / "include", *sources, "-o", library], check=True
     )
@@ -38,6 +55,8 @@ def native(tmp_path_factory: pytest.TempPathFactory) -> ctypes.CDLL:
     for name in ("fcsl_link_next_frame", "fcsl_cobs_encode", "fcsl_cobs_decode"):
         getattr(loaded, name).restype = ctypes.c_size_t
     loaded.fcsl_crc16.restype = ctypes.c_uint16
+    for name in ("link_counters", "port_counters"):
+        getattr(loaded, name).restype = ctypes.POINTER(ctypes.c_uint64)
     return loaded
 
 
@@ -66,6 +85,15 @@ class CEnd:
         frame = ctypes.create_string_buffer(FRAME_MAX)
         while size := self._lib.fcsl_link_next_frame(self._link, frame):
             yield frame.raw[:size]
+
+    def counters(self) -> dict[str, int]:
+        """Of the link, and of each port behind its number."""
+        of_link = self._lib.link_counters(self._link)
+        found = {name: of_link[i] for i, name in enumerate(counter_names("fcsl_link_counters_t"))}
+        for port in POLICIES:
+            of_port = self._lib.port_counters(self._link, port)
+            found |= {f"{port} {name}": of_port[i] for i, name in enumerate(counter_names("fcsl_link_port_counters_t"))}
+        return found
 
     def take_frame(self, data: bytes) -> None:
         self._lib.fcsl_link_take_frame(self._link, data, ctypes.c_size_t(len(data)))
@@ -146,9 +174,10 @@ def test_the_newest_counts_on_one_port_and_all_do_on_the_other(pair: tuple[Ends,
 
 
 def test_both_ends_send_the_same_bytes(native: ctypes.CDLL) -> None:
-    """The same calls and the same frames lead to the same frames, byte for byte."""
+    """The same calls and the same frames lead to the same frames, byte for byte, and to the same counts."""
     draw = random.Random(3)
-    twins = [CEnd(native, 1), End(POLICIES, 1, RETRANSMIT_TICKS)]
+    in_c, in_python = CEnd(native, 1), End(POLICIES, 1, RETRANSMIT_TICKS)
+    twins = [in_c, in_python]
     other = End(POLICIES, 2, RETRANSMIT_TICKS)
     compared = 0
     for tick in range(600):
@@ -171,15 +200,26 @@ def test_both_ends_send_the_same_bytes(native: ctypes.CDLL) -> None:
         if tick % 3 == 0:
             with_room = draw.randbytes(draw.randrange(500))
             other.send(RELIABLE, with_room)
+            other.send(draw.choice((LATEST, SEQUENCED)), with_room[:200])
         if tick == 300:
             other = End(POLICIES, 3, RETRANSMIT_TICKS)
         answers = [frame for frame in other.tick() if draw.random() > 0.1]
         for end in twins:
             for frame in answers:
                 end.take_frame(frame)
+                if tick % 50 == 7:
+                    end.take_frame(frame)
+                    end.take_frame(frame[:-1] + bytes([frame[-1] ^ 1]))
             while end.receive(RELIABLE) is not None:
                 pass
     assert compared > 600
+    counted = {
+        **in_python.counters,
+        **{f"{n} {k}": v for n, p in in_python.ports.items() for k, v in p.counters.items()},
+    }
+    counts = in_c.counters()
+    assert counted.items() <= counts.items() and all(n == 0 for k, n in counts.items() if k not in counted)
+    assert {k for k, n in counts.items() if n} >= {"frames_taken", "wrong_crc", "peer_restarts", f"{RELIABLE} received"}
 
 
 @given(st.binary(max_size=300))

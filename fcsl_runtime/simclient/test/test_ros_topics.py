@@ -7,6 +7,7 @@ import gc
 import json
 import math
 from collections.abc import Iterator
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -261,6 +262,22 @@ def test_a_simulator_makes_the_topics_that_the_machine_takes(run: Run) -> None:
     assert samples.values["imu.gyro"][0].tolist() == [0.5, -0.25, 8.0]
     assert np.allclose(samples.values["imu.attitude"][0], [0.5, 0.5, -0.5, 0.5], atol=1e-15)
     assert samples.stamps[0] == 3 and not samples.status.any()
+
+
+def test_a_topic_of_another_machine_is_refused(run: Run) -> None:
+    """Whose channels this one does not have, or has otherwise."""
+    imu_topic = topic(run, "imu")
+    gyro, attitude = imu_topic.channels
+    for channels, reason in (
+        ((replace(gyro, index=99), attitude), "no sensor channel number 99"),
+        (
+            (replace(gyro, index=attitude.index), attitude),
+            "channel 'imu.attitude' has 32 bytes, its value in the message 24",
+        ),
+        ((replace(gyro, index=topic(run, "thrust").channels[0].index), attitude), "no sensor channel number"),
+    ):
+        with pytest.raises(TwinError, match=reason):
+            Inlet(run, replace(imu_topic, channels=channels))
 
 
 def test_a_closed_run_is_an_error(config: Path) -> None:

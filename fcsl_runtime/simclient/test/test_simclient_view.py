@@ -29,6 +29,7 @@ from simclient.errors import ViewError
 from simclient.view.panels import PANELS_MAX, choose_default
 from simclient.view.picture import choose, draw, plot, pyplot
 from simclient.view.recorded import RecordedRun
+from simclient.view.rotation import euler_deg
 from simclient.view.series import Gaps, newest, thinned
 from simclient.view.signals import Catalogue, Signals
 from simclient.view.styles import styles
@@ -112,6 +113,19 @@ def test_angles_are_in_degrees_and_not_joined_where_they_wrap(viewed: list[Any])
     expected = np.degrees([math.remainder(turn(k), 2 * math.pi) for k in range(TICKS)])
     wrap = int(np.flatnonzero(np.abs(np.diff(expected)) > 180)[0]) + 1
     assert np.isnan(yaw[wrap]) and np.allclose(np.delete(yaw, wrap), np.delete(expected, wrap))
+
+
+@given(st.floats(-179, 179), st.floats(-89, 89), st.floats(-179, 179))
+def test_angles_are_those_that_turn_yaw_then_pitch_then_roll(roll: float, pitch: float, yaw: float) -> None:
+    """q = q(yaw about z) q(pitch about y) q(roll about x); -q turns alike."""
+    q = np.array([1.0, 0.0, 0.0, 0.0])
+    for axis, angle in ((3, yaw), (2, pitch), (1, roll)):
+        half = math.radians(angle) / 2
+        w, v = math.cos(half), math.sin(half) * np.eye(4)[axis][1:]
+        q = np.concatenate([[q[0] * w - q[1:] @ v], q[0] * v + w * q[1:] + np.cross(q[1:], v)])
+    given_angles = euler_deg(np.array([q, -q, np.zeros(4)]))
+    assert given_angles[:2] == pytest.approx(np.array([[roll, pitch, yaw]] * 2), abs=1e-6)
+    assert np.isnan(given_angles[2]).all()
 
 
 @pytest.mark.parametrize("label", ["fine.pose.height", "fine.inputs.height (measured)", "fine.pose.valid"])
@@ -343,6 +357,10 @@ def test_views_of_a_file_take_the_place_of_the_bags_own(
     assert simclient.plot.main([str(bags / "viewed"), "--views", "my.json", "-o", "x.svg"]) == 0
     told = capsys.readouterr().out.splitlines()
     assert told[1:] == ["left out: gone.outputs.x (not recorded); simclient.plot BAG PATH… chooses what is drawn"]
+    assert simclient.to_rerun.main([str(bags / "viewed"), "--views", "my.json", "-o", "x.rrd"]) == 0
+    written, *told = capsys.readouterr().out.splitlines()
+    assert written == f"x.rrd: {(tmp_path / 'x.rrd').stat().st_size} bytes; view it with: rerun x.rrd"
+    assert told == ["left out of the first page: gone.outputs.x (not recorded)"]
     with pytest.raises(SystemExit) as exited:
         simclient.plot.main([str(bags / "viewed"), "a.outputs.b", "--views", "my.json", "-o", "x.svg"])
     assert exited.value.code == 2 and "give one of them" in capsys.readouterr().err

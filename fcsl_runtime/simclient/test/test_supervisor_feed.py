@@ -11,7 +11,7 @@ from typing import Any
 
 import numpy as np
 import pytest
-from hypothesis import given
+from hypothesis import example, given
 from hypothesis import strategies as st
 from telemetry_packets import Channel, Sender
 
@@ -176,6 +176,8 @@ def test_another_session_begins_anew() -> None:
     st.lists(st.integers(0, 5), min_size=300, max_size=300),
     st.integers(6, 50),
 )
+@example([*range(19), math.nan], [0] * 300, 6)  # the newest row is a point of its own
+@example([math.nan, *range(19)], [0] * 300, 6)
 def test_thinning(values: list[float], gaps: list[int], points: int) -> None:
     column, before = np.array(values), np.array(gaps[: len(values)])
     thinned = thin(before, points)

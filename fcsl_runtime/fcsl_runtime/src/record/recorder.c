@@ -155,7 +155,7 @@ static int start_writer(fcsl_recorder_t *recorder, fcsl_error_t *error)
     return 0;
 }
 
-/* The one message of its topic, on disk before the bag appears under its name; none where there is nothing to say. */
+/* The one message of its topic, written before the writer thread begins; none where there is nothing to say. */
 static int put_views(fcsl_recorder_t *recorder, uint64_t time_ns, fcsl_error_t *error)
 {
     const char *views = fcsl_run_views(recorder->run);
@@ -169,7 +169,7 @@ static int put_views(fcsl_recorder_t *recorder, uint64_t time_ns, fcsl_error_t *
     const int status = fcsl_bag_write(recorder->bag, FCSL_TOPIC_VIEWS, time_ns, recorder->scratch,
                                       (uint32_t)fcsl_cdr_end(&cdr), error);
     fcsl_bag_unlock(recorder->bag);
-    return status != 0 ? status : fcsl_bag_flush(recorder->bag, error);
+    return status;
 }
 
 static int prepare(fcsl_recorder_t *recorder, const fcsl_record_options_t *options, const char *name_space,
@@ -183,7 +183,7 @@ static int prepare(fcsl_recorder_t *recorder, const fcsl_record_options_t *optio
         return -1;
     }
     if (add_fixed_topics(recorder, name_space, error) != 0 || add_shown_topics(recorder, name_space, error) != 0 ||
-        put_views(recorder, start_ns, error) != 0 || fcsl_bag_publish(recorder->bag, error) != 0 ||
+        fcsl_bag_publish(recorder->bag, error) != 0 || put_views(recorder, start_ns, error) != 0 ||
         start_writer(recorder, error) != 0) {
         fcsl_bag_abandon(recorder->bag);
         return -1;

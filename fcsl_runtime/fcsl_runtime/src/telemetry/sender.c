@@ -26,7 +26,7 @@ static void count(_Atomic uint64_t *number, uint64_t more)
 
 static void continue_configuration(fcsl_telemetry_t *t, uint32_t most)
 {
-    t->configuration_at = fcsl_link_send(&t->link, &t->configuration, t->configuration_at, most);
+    t->configuration_at = fcsl_udp_send(&t->udp, &t->configuration, t->configuration_at, most);
 }
 
 /* One that is still under way serves as well. */
@@ -46,7 +46,7 @@ static void begin_configuration(fcsl_telemetry_t *t)
 /* How many of the first `completed` ticks are due. */
 static uint64_t due(const fcsl_telemetry_t *t, uint64_t completed)
 {
-    return completed / t->link.every + (completed % t->link.every != 0);
+    return completed / t->udp.every + (completed % t->udp.every != 0);
 }
 
 /* What was due between this publication and the one seen before it, if some were overtaken. Ticks that a restore jumped
@@ -70,7 +70,7 @@ static void send_data(fcsl_telemetry_t *t, uint64_t tick)
     }
     fcsl_channels_pack(&t->channels, &head, t->publication, t->body);
     count(&t->packets, 1); /* before it goes out: who has received it finds it counted */
-    (void)fcsl_link_send(&t->link, &t->data, 0, UINT32_MAX);
+    (void)fcsl_udp_send(&t->udp, &t->data, 0, UINT32_MAX);
     t->data.sequence++;
 }
 
@@ -83,7 +83,7 @@ static void see(fcsl_telemetry_t *t, uint64_t completed)
     count(&t->overwritten, overwritten_before(t, completed));
     t->overtaken = 0;
     t->completed = completed;
-    if (completed > 0 && (completed - 1u) % t->link.every == 0) {
+    if (completed > 0 && (completed - 1u) % t->udp.every == 0) {
         send_data(t, completed - 1u);
     }
 }

@@ -9,14 +9,14 @@
 
 #include "channels.h"
 #include "fcsl/fcsl_telemetry.h"
-#include "link.h"
+#include "udp.h"
 #include "resend.h"
 
 struct fcsl_telemetry {
     const fcsl_history_t *history;
     catalog_t catalog;
     channels_t channels;
-    link_t link;
+    udp_t udp;
     resend_t resend;
     packet_t configuration;    /* as it was last begun */
     uint32_t configuration_at; /* how much of it is sent */

@@ -58,7 +58,7 @@ static int prepare(fcsl_telemetry_t *t, const fcsl_telemetry_options_t *options,
     }
     const announcement_t told = {.machine = options->machine,
                                  .views = options->views != NULL ? options->views : options->machine->views,
-                                 .every = t->link.every,
+                                 .every = t->udp.every,
                                  .wall_ns = wall_of(options, moment.tick)};
     if (fcsl_channels_open(&t->channels, &t->catalog, options->fields, &told, error) != 0) {
         return -1;
@@ -96,8 +96,7 @@ fcsl_telemetry_t *fcsl_telemetry_open(const fcsl_telemetry_options_t *options, c
     t->history = history;
     t->tick_hz = options->machine->tick_hz;
     t->nap_ns = nap_of(t);
-    if (fcsl_link_open(&t->link, options->address, error) != 0 ||
-        prepare(t, options, blocks, block_count, error) != 0) {
+    if (fcsl_udp_open(&t->udp, options->address, error) != 0 || prepare(t, options, blocks, block_count, error) != 0) {
         fcsl_telemetry_close(t);
         return NULL;
     }
@@ -126,7 +125,7 @@ void fcsl_telemetry_close(fcsl_telemetry_t *telemetry)
         return;
     }
     fcsl_telemetry_stop(telemetry);
-    fcsl_link_close(&telemetry->link);
+    fcsl_udp_close(&telemetry->udp);
     fcsl_channels_close(&telemetry->channels);
     fcsl_catalog_free(&telemetry->catalog);
     free(telemetry->publication);
@@ -139,8 +138,8 @@ void fcsl_telemetry_count(const fcsl_telemetry_t *telemetry, fcsl_telemetry_coun
     *counters = (fcsl_telemetry_counters_t){
         .packets = atomic_load_explicit(&telemetry->packets, memory_order_relaxed),
         .configurations = atomic_load_explicit(&telemetry->configurations, memory_order_relaxed),
-        .datagrams = atomic_load_explicit(&telemetry->link.datagrams, memory_order_relaxed),
-        .failures = atomic_load_explicit(&telemetry->link.failures, memory_order_relaxed),
+        .datagrams = atomic_load_explicit(&telemetry->udp.datagrams, memory_order_relaxed),
+        .failures = atomic_load_explicit(&telemetry->udp.failures, memory_order_relaxed),
         .overwritten = atomic_load_explicit(&telemetry->overwritten, memory_order_relaxed)};
 }
 

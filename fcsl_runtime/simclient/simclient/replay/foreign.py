@@ -202,17 +202,17 @@ def _deliveries(channel: Channel, intake: Intake, timeout_ns: int, grid: Grid) -
     samples["payload"] = np.arange(len(ticks)) * channel.field.size
     until = np.append(ticks[1:], grid.ticks)[: len(ticks)]
     old = ticks + channel.max_age_ticks + 1
-    late = samples[:0]
     if timeout_ns:
         silent = first_ticks_at(intake.times_ns[chosen] + timeout_ns + 1, grid.first_ns, grid.tick_hz)
         too_late = silent < np.minimum(until, old)
-        late = samples[too_late].copy()
+        late = samples[too_late]
         late["tick"], late["age_ticks"] = silent[too_late], channel.max_age_ticks + 1
         old = np.minimum(old, silent)
+        samples = np.concatenate((samples, late))
     invalid = int(np.maximum(until - old, 0).sum())
     payloads = np.ascontiguousarray(intake.values[chosen]).reshape(-1).view(np.uint8)
     fate = Fate(intake.messages, coverage, intake.refused, invalid)
-    return np.concatenate((samples, late)) if len(late) else samples, payloads, fate
+    return samples, payloads, fate
 
 
 def run_foreign(

@@ -46,7 +46,8 @@ static void serve(fcsl_vars_t *vars, const char *line, size_t length)
     const serving_t serving = fcsl_commander_serve(&vars->commander, session, line, length, &out);
     FUZZ_CHECK(serving == SERVED || serving == POSTED);
     if (serving == POSTED) {
-        FUZZ_CHECK(fcsl_vars_serve(vars) == 1 && fcsl_mailbox_done(&vars->mailbox));
+        fcsl_vars_serve(vars);
+        FUZZ_CHECK(fcsl_mailbox_done(&vars->mailbox));
         vars->commander.ticks_left = 0; /* the host ends within a portion of them */
         fcsl_commander_complete(&vars->commander);
         fcsl_commander_finish(&vars->commander, session, &out);

@@ -54,7 +54,7 @@ static void run(fcsl_vars_t *vars, size_t i, const int *ends)
     if (client->fd >= 0) {
         fcsl_vars_serve_client(vars, client, entry.fd >= 0 ? entry.events : 0);
     }
-    (void)fcsl_vars_serve(vars);
+    fcsl_vars_serve(vars);
     fcsl_vars_serve_command(vars);
     fcsl_vars_stream(vars, fcsl_run_monotonic_ns(NULL));
     for (size_t c = 0; c < CLIENTS; c++) {

@@ -3,7 +3,7 @@
  * The connected UDP socket of the sender, which never waits.
  */
 #define _GNU_SOURCE
-#include "link.h"
+#include "udp.h"
 
 #include <errno.h>
 #include <netinet/in.h>
@@ -39,17 +39,17 @@ static uint32_t read_every(const char *text)
                                                                                                   : 0u;
 }
 
-static int read_address(link_t *link, const char *text, fcsl_error_t *error)
+static int read_address(udp_t *udp, const char *text, fcsl_error_t *error)
 {
     char address[ADDRESS_BYTES];
     const size_t scheme = sizeof SCHEME - 1;
     const char *slash = strchr(text, '/');
     const size_t length = slash != NULL ? (size_t)(slash - text) : strlen(text);
-    link->every = slash != NULL ? read_every(slash + 1) : 1u;
-    if (link->every > 0 && length < sizeof address && strncmp(text, SCHEME, scheme) == 0) {
+    udp->every = slash != NULL ? read_every(slash + 1) : 1u;
+    if (udp->every > 0 && length < sizeof address && strncmp(text, SCHEME, scheme) == 0) {
         memcpy(address, text, length);
         address[length] = '\0';
-        if (fcsl_address_read(address + scheme, &link->address, &link->length) == 0 && is_one(&link->address)) {
+        if (fcsl_address_read(address + scheme, &udp->address, &udp->length) == 0 && is_one(&udp->address)) {
             return 0;
         }
     }
@@ -59,33 +59,33 @@ static int read_address(link_t *link, const char *text, fcsl_error_t *error)
                      text);
 }
 
-static int try_connect(link_t *link)
+static int try_connect(udp_t *udp)
 {
-    link->connected = connect(link->fd, (const struct sockaddr *)&link->address, link->length) == 0;
-    return link->connected;
+    udp->connected = connect(udp->fd, (const struct sockaddr *)&udp->address, udp->length) == 0;
+    return udp->connected;
 }
 
-int fcsl_link_open(link_t *link, const char *address, fcsl_error_t *error)
+int fcsl_udp_open(udp_t *udp, const char *address, fcsl_error_t *error)
 {
-    memset(link, 0, sizeof *link);
-    link->fd = -1;
-    if (read_address(link, address, error) != 0) {
+    memset(udp, 0, sizeof *udp);
+    udp->fd = -1;
+    if (read_address(udp, address, error) != 0) {
         return -1;
     }
-    link->fd = socket(link->address.ss_family, SOCK_DGRAM | SOCK_CLOEXEC | SOCK_NONBLOCK, 0);
-    if (link->fd >= 0 && (try_connect(link) || errno == ENETUNREACH || errno == EHOSTUNREACH)) {
+    udp->fd = socket(udp->address.ss_family, SOCK_DGRAM | SOCK_CLOEXEC | SOCK_NONBLOCK, 0);
+    if (udp->fd >= 0 && (try_connect(udp) || errno == ENETUNREACH || errno == EHOSTUNREACH)) {
         return 0;
     }
     return fcsl_fail(error, "telemetry cannot go to '%.128s': %s", address,
                      errno == EACCES ? "it goes to one receiver, and this is a broadcast address" : strerror(errno));
 }
 
-void fcsl_link_close(link_t *link)
+void fcsl_udp_close(udp_t *udp)
 {
-    if (link->fd >= 0) {
-        (void)close(link->fd);
+    if (udp->fd >= 0) {
+        (void)close(udp->fd);
     }
-    link->fd = -1;
+    udp->fd = -1;
 }
 
 static void count(_Atomic uint64_t *number)
@@ -93,28 +93,28 @@ static void count(_Atomic uint64_t *number)
     atomic_fetch_add_explicit(number, 1, memory_order_relaxed);
 }
 
-static int try_send(const link_t *link, const uint8_t *datagram, size_t size)
+static int try_send(const udp_t *udp, const uint8_t *datagram, size_t size)
 {
-    return send(link->fd, datagram, size, MSG_NOSIGNAL) == (ssize_t)size;
+    return send(udp->fd, datagram, size, MSG_NOSIGNAL) == (ssize_t)size;
 }
 
-static void send_one(link_t *link, const uint8_t *datagram, size_t size)
+static void send_one(udp_t *udp, const uint8_t *datagram, size_t size)
 {
-    int sent = (link->connected || try_connect(link)) && try_send(link, datagram, size);
-    if (!sent && link->connected && errno == ECONNREFUSED) {
+    int sent = (udp->connected || try_connect(udp)) && try_send(udp, datagram, size);
+    if (!sent && udp->connected && errno == ECONNREFUSED) {
         /* Nobody listened to one that was sent before; this one has not been tried yet. */
-        count(&link->failures);
-        sent = try_send(link, datagram, size);
+        count(&udp->failures);
+        sent = try_send(udp, datagram, size);
     }
-    count(sent ? &link->datagrams : &link->failures);
+    count(sent ? &udp->datagrams : &udp->failures);
 }
 
-uint32_t fcsl_link_send(link_t *link, const packet_t *packet, uint32_t offset, uint32_t most)
+uint32_t fcsl_udp_send(udp_t *udp, const packet_t *packet, uint32_t offset, uint32_t most)
 {
     uint8_t datagram[DATAGRAM_BYTES];
     for (uint32_t i = 0; i < most && offset < packet->total; i++) {
         const size_t size = fcsl_datagram_write(packet, offset, datagram);
-        send_one(link, datagram, size);
+        send_one(udp, datagram, size);
         offset += (uint32_t)(size - HEADER_BYTES);
     }
     return offset;

@@ -1,0 +1,57 @@
+# SPDX-License-Identifier: Apache-2.0
+"""The runtime of the environment: found, missing, incomplete, or no runtime at all."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from ctypes import c_int
+from pathlib import Path
+
+import pytest
+
+from simclient import TwinError
+from simclient.library import RUNTIME_LIBRARY, RUNTIME_PACKAGE, bind_runtime, runtime_library, runtime_program
+
+FINDERS: dict[str, Callable[[], Path]] = {
+    f"lib/{RUNTIME_LIBRARY}": runtime_library,
+    "bin/fcsl-fc": lambda: runtime_program("fcsl-fc"),
+}
+
+
+@pytest.fixture
+def prefix(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
+    """An environment with a runtime of which nothing is there but its entry in the index."""
+    entry = tmp_path / "install/share/ament_index/resource_index/packages" / RUNTIME_PACKAGE
+    entry.parent.mkdir(parents=True)
+    entry.touch()
+    monkeypatch.setenv("AMENT_PREFIX_PATH", f"{tmp_path / 'none'}:{tmp_path / 'install'}")
+    return tmp_path / "install"
+
+
+@pytest.mark.parametrize("file", FINDERS)
+def test_what_is_installed_is_found(file: str, prefix: Path) -> None:
+    (prefix / file).parent.mkdir()
+    (prefix / file).touch()
+    assert FINDERS[file]() == prefix / file
+
+
+@pytest.mark.parametrize("file", FINDERS)
+def test_what_is_incomplete_is_said(file: str, prefix: Path) -> None:
+    (prefix / file).mkdir(parents=True)
+    with pytest.raises(TwinError, match=rf"{file} is missing: package `{RUNTIME_PACKAGE}` is installed incompletely"):
+        FINDERS[file]()
+
+
+@pytest.mark.parametrize("file", FINDERS)
+def test_without_the_package_the_remedy_is_said(file: str, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setenv("AMENT_PREFIX_PATH", "")
+    with pytest.raises(TwinError, match=f"package `{RUNTIME_PACKAGE}` is not installed in this environment; source"):
+        FINDERS[file]()
+
+
+def test_another_library_is_no_runtime(tmp_path: Path) -> None:
+    (tmp_path / "text.so").write_text("no library")
+    with pytest.raises(TwinError, match="text.so cannot be used as the FCSL runtime: "):
+        bind_runtime(tmp_path / "text.so", {})
+    with pytest.raises(TwinError, match="cannot be used as the FCSL runtime: .*fcsl_no_function"):
+        bind_runtime(runtime_library(), {"fcsl_no_function": (c_int, [])})
