@@ -16,9 +16,11 @@ from simclient.bag.digest import digest
 from simclient.replay import replay
 from simclient.replay.cut import cut
 from simclient.run import open_run
+from simclient.view.picture import choose, draw, pyplot
+from simclient.view.recorded import RecordedRun
 
 TICKS = 60
-#: 2026-11-23T08:00:00Z, and the period of the probe.
+#: 2026-11-24T08:00:00Z, and the period of the probe.
 START_NS, PERIOD_NS = 1_795_507_200_000_000_000, 10_000_000
 #: Ticks before which the host missed deadlines.
 MISSED = {20: 3, 41: 1}
@@ -96,3 +98,16 @@ def test_a_cut_has_the_writes_of_its_first_tick(
     t_s, values = columns(str(tmp_path / "part"), "source.outputs.vec")
     assert values[:, 0].tolist() == [0.5 * tick for tick in range(began, TICKS)]
     assert t_s[0] == pytest.approx(times_ns()[began] * 1e-9)
+
+
+def test_a_plot_counts_seconds_from_the_first_tick(bag: Path) -> None:
+    opened = Bag(bag)
+    recorded = RecordedRun(opened, "", "", foreign=False)
+    figure = draw(recorded, choose(recorded, ["source.outputs.vec"]), "probe")
+    try:
+        (axis,) = figure.axes
+        assert axis.get_xlabel() == "time since 2026-11-24 08:00:00.010000 UTC, s"
+        assert axis.lines[0].get_xdata()[0] == 0.0
+        assert axis.get_xlim() == pytest.approx((0.0, (times_ns()[-1] - times_ns()[0]) * 1e-9), abs=0.011)
+    finally:
+        pyplot.close(figure)

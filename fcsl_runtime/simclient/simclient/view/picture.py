@@ -10,7 +10,8 @@ from __future__ import annotations
 import io
 import textwrap
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
+from datetime import UTC, datetime
 from pathlib import Path
 from typing import Any
 
@@ -34,6 +35,8 @@ from matplotlib.patches import Patch  # noqa: E402
 SUFFIXES = (".png", ".svg", ".pdf")
 _WIDTH_IN, _PANEL_IN, _HEAD_IN = 12.0, 2.1, 1.2
 _POINTS = 4000
+#: Times beyond this are not of a run that began at 0: three years.
+_LONGEST_RUN_S = 1e8
 _DPI = 120
 _STATE_COLOURS = ("#DCEBF7", "#E3F3DC", "#FCEBD2", "#F8D9DC", "#E8E0F2", "#F4F1C9", "#E3E3E3")
 #: A state's name is written above its band if the band has this share of the width, for each letter.
@@ -117,12 +120,14 @@ def draw(run: RecordedRun, chosen: Choice, title: str, against: str = "") -> Any
     axis_curve = _axis_curve(run, against) if against else None
     curves = [c for panel in chosen.panels for c in panel.curves] + ([axis_curve] if axis_curve else [])
     rows = run.read(c.value for c in curves)
-    figure, axes = new_figure(len(chosen.panels), title, _axis_label(axis_curve))
+    origin_s = 0.0 if axis_curve else _origin_s(run, rows)
+    figure, axes = new_figure(len(chosen.panels), title, _axis_label(axis_curve, origin_s))
     if axis_curve is None and run.spans:
-        _draw_states(figure, axes, run.spans, run.states)
+        spans = [replace(s, start_s=s.start_s - origin_s, end_s=s.end_s - origin_s) for s in run.spans]
+        _draw_states(figure, axes, spans, run.states)
     across = curve(rows, axis_curve) if axis_curve else None
     for axis, panel in zip(axes, chosen.panels, strict=True):
-        lines = [_line(rows, c, across) for c in panel.curves]
+        lines = [_line(rows, c, across, origin_s) for c in panel.curves]
         draw_panel(axis, panel.name, lines, panel.missing)
         _name_values(axis, panel, run.states)
     return figure
@@ -137,17 +142,27 @@ def _axis_curve(run: RecordedRun, path: str) -> Curve:
     return Curve(value, element, None, "values", label_of(place))
 
 
-def _axis_label(wanted: Curve | None) -> str:
+def _origin_s(run: RecordedRun, rows: dict[str, Rows]) -> float:
+    """The time at which the horizontal axis begins, in s: 0, or the first time if times are those of a clock on the wall."""
+    first_s = min(
+        [its.t_s[0] for its in rows.values() if len(its.t_s)] + [span.start_s for span in run.spans], default=0.0
+    )
+    return float(first_s) if first_s > _LONGEST_RUN_S else 0.0
+
+
+def _axis_label(wanted: Curve | None, origin_s: float) -> str:
+    if wanted is None and origin_s > 0:
+        return f"time since {datetime.fromtimestamp(origin_s, UTC):%Y-%m-%d %H:%M:%S.%f} UTC, s"
     if wanted is None:
         return "time, s"
     return ", ".join(filter(None, (wanted.label, wanted.value.unit)))
 
 
-def _line(rows: dict[str, Rows], wanted: Curve, across: tuple[Array, Array] | None) -> Line:
+def _line(rows: dict[str, Rows], wanted: Curve, across: tuple[Array, Array] | None, origin_s: float) -> Line:
     t_s, values = curve(rows, wanted)
     if across is None:
         t_s, values = thinned(t_s, values, _POINTS)
-        return Line(wanted.label, t_s, values, wanted.role, wanted.steps)
+        return Line(wanted.label, t_s - origin_s, values, wanted.role, wanted.steps)
     return Line(wanted.label, newest(*across, t_s), values, wanted.role)
 
 
