@@ -134,9 +134,9 @@ def fly_as_process(library: Path) -> None:
     headline("3. fly: the same library as a flight program of its own")
     with tempfile.TemporaryDirectory(prefix="fcsl-") as folder:
         socket = Path(folder) / "wire"
-        with Background("fcsl-sim", "run", SIM, "--seed", SEED, "--controller", f"wire:{socket}") as sim:
+        with Background("fcsl-sim", "run", SIM, "--seed", SEED, "--external", f"wire:unix:{socket}") as sim:
             wait_for(socket, sim)
-            with Background("fcsl-fc", library, "--hal", f"wire:{socket}", "--record", OUT / "own_process") as fc:
+            with Background("fcsl-fc", library, "--hal", f"wire:unix:{socket}", "--record", OUT / "own_process") as fc:
                 sim.finish()
                 say(fc.finish().rstrip())
 

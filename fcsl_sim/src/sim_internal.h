@@ -58,7 +58,7 @@ typedef struct {
     uint64_t from_tick;
 } fcsl_pace_t;
 
-struct fcsl_wire;
+struct fcsl_external;
 struct fcsl_sim_service;
 struct fcsl_sim_published;
 
@@ -90,9 +90,9 @@ struct fcsl_sim {
     int sensed; /* between sense and actuate */
     fcsl_sim_status_t status;
     int recording;
-    uint8_t *truth;         /* scratch for one truth message */
-    struct fcsl_wire *wire; /* null: the machine is hosted here */
-    uint32_t wire_timeout_ms;
+    uint8_t *truth; /* scratch for one truth message */
+    struct fcsl_external *external; /* null: the machine is hosted here */
+    uint32_t external_timeout_ms;
     struct fcsl_sim_published *published; /* null: no variable server, no telemetry */
     struct fcsl_sim_service *service;     /* null: no variable server */
     fcsl_telemetry_t *telemetry;          /* null: none */
