@@ -42,6 +42,7 @@ typedef struct {
     pthread_mutex_t lock;
     fcsl_link_t link;
     int has_peer; /* the line is connected */
+    int spoken; /* the user has sent something to this peer: until then a newer connection replaces it */
     int gone; /* the peer went, which the user does not know yet */
     int stop;
     uint64_t garbage;
@@ -161,44 +162,54 @@ static void read_line(wire_t *wire, pump_t *pump)
     }
 }
 
+/* One that only holds a connection keeps nobody out. */
 static void accept_peer(wire_t *wire)
 {
+    line_drop(&wire->line);
     line_accept(&wire->line);
     (void)pthread_mutex_lock(&wire->lock);
     wire->has_peer = wire->line.fd >= 0;
+    wire->spoken = 0;
     (void)pthread_mutex_unlock(&wire->lock);
+}
+
+static int has_spoken(wire_t *wire)
+{
+    (void)pthread_mutex_lock(&wire->lock);
+    const int spoken = wire->spoken;
+    (void)pthread_mutex_unlock(&wire->lock);
+    return spoken;
 }
 
 /* Waits for the line, for the user, or for the time of the next tick. */
 static void attend(wire_t *wire, pump_t *pump)
 {
-    const int has_line = wire->line.fd >= 0 || wire->line.listener >= 0;
-    const int blocked =
-        pump->sending && !wire->line.serial; /* a serial line tells nothing of room: it is looked at again */
-    struct pollfd entries[2] = {
+    const line_t *line = &wire->line;
+    const int listens = line->listener >= 0 && (line->fd < 0 || !has_spoken(wire));
+    const int blocked = pump->sending && !line->serial; /* a serial line tells nothing of room: it is looked at again */
+    struct pollfd entries[3] = {
         {.fd = wire->wake, .events = POLLIN},
-        {.fd = wire->line.fd >= 0 ? wire->line.fd : wire->line.listener,
-         .events = (short)(POLLIN | (blocked && wire->line.fd >= 0 ? POLLOUT : 0))},
+        {.fd = line->fd, .events = (short)(POLLIN | (blocked ? POLLOUT : 0))},
+        {.fd = listens ? line->listener : -1, .events = POLLIN}, /* -1 is passed over */
     };
     uint64_t until_ns = next_tick_ns(wire, pump);
-    if (pump->sending && wire->line.serial) {
+    if (pump->sending && line->serial) {
         const uint64_t look_ns = monotonic_ns() + LOOK_NS;
         until_ns = look_ns < until_ns ? look_ns : until_ns;
     }
     const struct timespec left = time_left(until_ns);
-    if (ppoll(entries, has_line ? 2u : 1u, &left, NULL) <= 0) {
+    if (ppoll(entries, 3, &left, NULL) <= 0) {
         return;
     }
     if (entries[0].revents != 0) {
         clear(wire->wake);
         pump->asked = 1;
     }
-    if (has_line && (entries[1].revents & (POLLIN | POLLHUP | POLLERR)) != 0) {
-        if (wire->line.fd >= 0) {
-            read_line(wire, pump);
-        } else {
-            accept_peer(wire);
-        }
+    if ((entries[1].revents & (POLLIN | POLLHUP | POLLERR)) != 0) {
+        read_line(wire, pump);
+    }
+    if (entries[2].revents != 0) {
+        accept_peer(wire);
     }
 }
 
@@ -236,6 +247,7 @@ static fcsl_wire_status_t link_send(void *ctx, const uint8_t *message, size_t si
     (void)pthread_mutex_lock(&wire->lock);
     const int closed = wire->gone || (!wire->has_peer && wire->line.listener < 0);
     const fcsl_link_status_t status = closed ? FCSL_LINK_EMPTY : fcsl_link_send(&wire->link, PORT, message, size);
+    wire->spoken = 1;
     (void)pthread_mutex_unlock(&wire->lock);
     if (closed) {
         return FCSL_WIRE_CLOSED;

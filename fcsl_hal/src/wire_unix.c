@@ -27,6 +27,7 @@ typedef struct {
 typedef struct {
     int listener; /* -1: this end connected */
     int fd;       /* -1: no peer now */
+    int spoken;   /* something was sent to this peer: until then a newer one replaces it */
     size_t message_max;
     counters_t counters;
     char path[PATH_BYTES];
@@ -82,6 +83,7 @@ static fcsl_wire_status_t unix_send(void *ctx, const uint8_t *message, size_t si
     if (wire->fd < 0) {
         return FCSL_WIRE_CLOSED;
     }
+    wire->spoken = 1;
     if (send(wire->fd, message, size, MSG_NOSIGNAL | MSG_DONTWAIT) >= 0) { /* whole or not at all */
         return FCSL_WIRE_OK;
     }
@@ -92,17 +94,22 @@ static fcsl_wire_status_t unix_send(void *ctx, const uint8_t *message, size_t si
     return errno == EPIPE || errno == ECONNRESET ? FCSL_WIRE_CLOSED : fail(wire, "cannot send");
 }
 
-/* Takes the peer that waits on the listener, if it is still there. */
+/* Takes the peer that waits on the listener, if it is still there. One that only holds a connection keeps nobody out. */
 static fcsl_wire_status_t take_peer(wire_t *wire)
 {
-    wire->fd = accept4(wire->listener, NULL, NULL, SOCK_CLOEXEC);
-    if (wire->fd < 0) {
+    const int fd = accept4(wire->listener, NULL, NULL, SOCK_CLOEXEC);
+    if (fd < 0) {
         return errno == ECONNABORTED || errno == EAGAIN || errno == EINTR ? FCSL_WIRE_NONE
                                                                           : fail(wire, "cannot accept a peer");
     }
+    if (wire->fd >= 0) {
+        (void)drop_peer(wire);
+    }
+    wire->fd = fd;
+    wire->spoken = 0;
     wire->counters.peers++;
-    return size_buffer(wire->fd, wire->message_max) == 0 ? FCSL_WIRE_NONE
-                                                         : fail(wire, "cannot make room for a message in the socket");
+    return size_buffer(fd, wire->message_max) == 0 ? FCSL_WIRE_NONE
+                                                   : fail(wire, "cannot make room for a message in the socket");
 }
 
 /* Takes the packet that waits, if there is one. */
@@ -126,22 +133,23 @@ static fcsl_wire_status_t take_packet(wire_t *wire, uint8_t *message, size_t cap
 static fcsl_wire_status_t unix_receive(void *ctx, uint64_t deadline_ns, uint8_t *message, size_t capacity, size_t *size)
 {
     wire_t *wire = ctx;
-    for (;;) { /* ends at the deadline, whatever arrives */
-        const int has_peer = wire->fd >= 0;
-        if (!has_peer && wire->listener < 0) {
-            return FCSL_WIRE_CLOSED;
-        }
-        struct pollfd entry = {.fd = has_peer ? wire->fd : wire->listener, .events = POLLIN};
+    if (wire->fd < 0 && wire->listener < 0) {
+        return FCSL_WIRE_CLOSED;
+    }
+    fcsl_wire_status_t status = FCSL_WIRE_NONE;
+    do { /* ends at the deadline, whatever arrives */
+        const int listens = wire->listener >= 0 && (wire->fd < 0 || !wire->spoken);
+        struct pollfd entries[2] = {{.fd = wire->fd, .events = POLLIN},
+                                    {.fd = listens ? wire->listener : -1, .events = POLLIN}}; /* -1 is passed over */
         const struct timespec left = time_left(deadline_ns);
-        const int ready = ppoll(&entry, 1, &left, NULL);
+        const int ready = ppoll(entries, 2, &left, NULL);
         if (ready <= 0) {
             return ready == 0 || errno == EINTR ? FCSL_WIRE_NONE : fail(wire, "cannot wait for a message");
         }
-        const fcsl_wire_status_t status = has_peer ? take_packet(wire, message, capacity, size) : take_peer(wire);
-        if (status != FCSL_WIRE_NONE || (has_peer && monotonic_ns() >= deadline_ns)) {
-            return status;
-        }
-    }
+        /* What a peer has said comes before the next peer. */
+        status = entries[0].revents != 0 ? take_packet(wire, message, capacity, size) : take_peer(wire);
+    } while (status == FCSL_WIRE_NONE && monotonic_ns() < deadline_ns);
+    return status;
 }
 
 static const char *unix_explain(void *ctx)

@@ -163,7 +163,11 @@ def test_a_rig_that_sends_no_time_leaves_the_clock_to_the_controller(tmp_path: P
         while decode(peer.recv(4096), Kind.ACTUATORS, TABLE).values[513] != (3.0,):
             pass
         client = fc.client(variables)
-        assert (client.get("hal.connected"), client.get("hal.messages"), client.get("hal.messages_dropped")) == (1, 1, 0)
+        assert (client.get("hal.connected"), client.get("hal.messages"), client.get("hal.messages_dropped")) == (
+            1,
+            1,
+            0,
+        )
         peer.close()
         while client.get("hal.connected") == 1 or client.get("hal.ticks_without") < 20:
             pass
