@@ -318,7 +318,9 @@ static void wire_wait(void *ctx, uint64_t until_ns)
 static void wire_count(void *ctx)
 {
     hal_t *hal = ctx;
-    hal->wire.count(hal->wire.ctx, hal->counters.wire);
+    if (hal->has_wire) {
+        hal->wire.count(hal->wire.ctx, hal->counters.wire);
+    }
 }
 
 static const char *wire_explain(void *ctx)

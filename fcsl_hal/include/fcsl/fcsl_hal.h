@@ -44,7 +44,8 @@ typedef struct fcsl_hal {
     void (*log)(void *ctx, const char *text);
     /* The oldest line, from another thread: 1, or 0 when there is none. */
     int (*read_log)(void *ctx, char text[FCSL_LOG_BYTES]);
-    /* Brings the counters that `fields` describe up to date; they stand at `counters`. From the thread that samples. */
+    /* Brings the counters that `fields` describe up to date; they stand at `counters`. From the thread that samples; before
+     * open, too. */
     void (*count)(void *ctx);
     /* What the last status other than OK or NONE was about, for messages; never null. */
     const char *(*explain)(void *ctx);
