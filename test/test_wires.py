@@ -4,6 +4,7 @@
 from __future__ import annotations
 
 import contextlib
+import json
 import os
 import pty
 import random
@@ -14,6 +15,7 @@ import sys
 import threading
 from collections.abc import Iterator
 from pathlib import Path
+from typing import Any
 
 import pytest
 
@@ -158,3 +160,51 @@ def test_serial_line(lossy: bool, reference: str, library: Path, tmp_path: Path)
         os.close(end)
     assert flown == reference
     assert not lossy or line.lost > 50
+
+
+# ---- the model serial_link ---------------------------------------------------------------------------------------------
+
+SERIAL = SIM.with_name("lander_serial.sim.json")
+
+
+def simulate(bag: Path, *sets: str, seed: int = 1) -> dict[str, Any]:
+    """The summary of the whole flight with these parameters of the line."""
+    options = [word for text in sets for word in ("--set", f"line.parameters.{text}")]
+    line = ["fcsl-sim", "run", SERIAL, "--seed", str(seed), "--record", bag, "--json", *options]
+    summary: dict[str, Any] = json.loads(run(*line))
+    return summary
+
+
+def test_a_lossy_link_while_time_halts(tmp_path: Path) -> None:
+    """10 % of the frames are lost and 5 % damaged: the digest is that of the flight without a link."""
+    summary = simulate(tmp_path / "serial")
+    run("fcsl-sim", "run", SIM, "--record", tmp_path / "direct")
+    assert summary["truth"]["line.outputs.dropped"] > 500 and summary["truth"]["line.outputs.repeated"] > 500
+    assert digest(tmp_path / "serial") == digest(tmp_path / "direct")
+
+
+@pytest.mark.parametrize(
+    "sets",
+    [("halts=false", "reliable=false"), ("halts=false", "reliable=false", "delay_s=0.02", "baud=115200")],
+)
+def test_where_time_passes_the_lander_still_lands(sets: tuple[str, ...], tmp_path: Path) -> None:
+    """Another flight than over a link that takes no time, and the same one from the same seed."""
+    first, again, other = (simulate(tmp_path / str(seed_bag), *sets, seed=1 + seed_bag // 2) for seed_bag in range(3))
+    for summary in (first, other):
+        assert summary["truth"]["lander.outputs.landed"] and summary["truth"]["lander.outputs.touchdown_speed"] < 2.0
+    digests = [digest(tmp_path / str(number)) for number in range(3)]
+    assert digests[0] == digests[1] != digests[2] and first["truth"] == again["truth"]
+    run("fcsl-sim", "run", SIM, "--record", tmp_path / "direct")
+    assert digest(tmp_path / "direct") not in digests
+
+
+def test_hil_over_the_simulated_line(library: Path, tmp_path: Path) -> None:
+    """The flight program in a process of its own, behind the line that loses and damages: the same bits."""
+    wire = f"unix:{tmp_path / 'wire'}"
+    with subprocess.Popen(
+        ["fcsl-sim", "run", str(SERIAL), "--external", f"wire:{wire}"], stdout=subprocess.DEVNULL
+    ) as simulator:
+        run("fcsl-fc", library, "--hal", f"wire:{wire}", "--timeout-ms", "60000", "--record", tmp_path / "own")
+        assert simulator.wait(60) == 0
+    run("fcsl-sim", "run", SIM, "--record", tmp_path / "direct")
+    assert digest(tmp_path / "own") == digest(tmp_path / "direct")

@@ -92,7 +92,7 @@ static int read_hal(const char *text, options_t *options)
         options->wire = NULL;
         return 0;
     }
-    if (strncmp(text, "wire:", 5) == 0 && text[5] != '\0') {
+    if (strncmp(text, "wire:", 5) == 0) {
         char error[ERROR_BYTES];
         options->wire = text + 5;
         return fcsl_wire_check(options->wire, error, sizeof error) == 0 ? 0 : complain("--hal wire: ", error);
