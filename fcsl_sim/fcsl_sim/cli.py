@@ -19,7 +19,7 @@ from fcsl_compiler.base.diagnostics import DiagnosticError
 from fcsl_compiler.base.version import add_version
 
 from .codes import SIM_CODES
-from .config import SimConfig, load
+from .config import SERIAL_LINK, SimConfig, load
 from .errors import SimError
 from .models import Scalar
 from .output import show
@@ -239,7 +239,7 @@ def _print_summary(config: SimConfig, summary: Summary) -> None:
     why = "the stop condition held" if summary.end == "until" else "the duration is over"
     show(f"{summary.time_s:10.3f} s  end: {why}")
     for name, table in config.tables.items():
-        if table.integrated:
+        if table.integrated or table.name == SERIAL_LINK:
             for field in table.of_role("output"):
                 value = _value_text(summary.truth[f"{name}.{field.path}"])
                 show(f"  {name}.{field.path} = {value}{' ' + field.unit if field.unit else ''}")

@@ -36,7 +36,7 @@ from .wiring import MAX_HZ, MAX_SECONDS, Instance, Wiring, check_wiring, seconds
 MAX_TICKS = 10**12
 METHODS = ("euler", "rk4")
 #: The model that may stand between plant and controller.
-_SERIAL_LINK = "serial_link"
+SERIAL_LINK = "serial_link"
 #: Include folders of a plugin: the model ABI, and the machine ABI that it includes.
 _INCLUDE_PACKAGES = ("fcsl_sim", "fcsl_compiler")
 
@@ -329,13 +329,13 @@ class _Loader:
         name = self.reader.string(node, "`link`")
         if node is None or name is None:
             return None
-        links = [i.name for i in self.parts.instances.values() if i.table and i.table.name == _SERIAL_LINK]
+        links = [i.name for i in self.parts.instances.values() if i.table and i.table.name == SERIAL_LINK]
         instance = self.parts.instances.get(name)
         if name in links or (instance and instance.table is None):
             return name  # an error in its model was reported
         what = f"is of the model `{instance.table.name}`" if instance and instance.table else "is no instance"
-        fix = f"there is `{links[0]}`" if links else f"add an instance of package://fcsl_sim/models/{_SERIAL_LINK}.c"
-        self.sink.error("E806", f"`{name}` {what}, not of `{_SERIAL_LINK}`", node.span, help=fix)
+        fix = f"there is `{links[0]}`" if links else f"add an instance of package://fcsl_sim/models/{SERIAL_LINK}.c"
+        self.sink.error("E806", f"`{name}` {what}, not of `{SERIAL_LINK}`", node.span, help=fix)
         return None
 
     # ---- command line ---------------------------------------------------------------------------------------------------
