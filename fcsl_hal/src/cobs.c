@@ -5,40 +5,29 @@
  */
 #include "fcsl/fcsl_cobs.h"
 
+#include <string.h>
+
 enum { BLOCK_MAX = 255 };
 
 size_t fcsl_cobs_encode(const uint8_t *frame, size_t size, uint8_t bytes[FCSL_COBS_BYTES_MAX])
 {
     size_t code_at = 0;
     size_t end = 1;
-    uint8_t code = 1;
     for (size_t i = 0; i < size; i++) {
-        if (code == BLOCK_MAX) {
-            bytes[code_at] = code;
+        if (end - code_at == BLOCK_MAX) {
+            bytes[code_at] = BLOCK_MAX;
             code_at = end++;
-            code = 1;
         }
-        if (frame[i] != 0) {
-            bytes[end++] = frame[i];
-            code++;
-        } else {
-            bytes[code_at] = code;
-            code_at = end++;
-            code = 1;
+        bytes[end] = frame[i];
+        if (frame[i] == 0) {
+            bytes[code_at] = (uint8_t)(end - code_at);
+            code_at = end;
         }
+        end++;
     }
-    bytes[code_at] = code;
+    bytes[code_at] = (uint8_t)(end - code_at);
     bytes[end++] = 0;
     return end;
-}
-
-static void append(fcsl_cobs_decoder_t *decoder, uint8_t byte)
-{
-    if (decoder->size == FCSL_LINK_FRAME_MAX) {
-        decoder->refused = 1;
-        return;
-    }
-    decoder->frame[decoder->size++] = byte;
 }
 
 /* A zero: the end of a frame, or of something else. */
@@ -53,20 +42,38 @@ static size_t finish(fcsl_cobs_decoder_t *decoder)
     return size;
 }
 
-size_t fcsl_cobs_decode(fcsl_cobs_decoder_t *decoder, uint8_t byte)
+/* Takes bytes that are not zero. */
+static void append(fcsl_cobs_decoder_t *decoder, const uint8_t *bytes, size_t count)
 {
-    if (byte == 0) {
-        return finish(decoder);
+    size_t at = 0;
+    while (at < count && !decoder->refused) {
+        if (decoder->left == 0) {
+            if (decoder->zero && decoder->size < FCSL_LINK_FRAME_MAX) {
+                decoder->frame[decoder->size++] = 0;
+            } else if (decoder->zero) {
+                decoder->refused = 1;
+            }
+            decoder->left = (uint8_t)(bytes[at] - 1u);
+            decoder->zero = bytes[at] < BLOCK_MAX;
+            at++;
+        }
+        const size_t here = count - at < decoder->left ? count - at : decoder->left;
+        if (here > FCSL_LINK_FRAME_MAX - decoder->size) {
+            decoder->refused = 1;
+            return;
+        }
+        memcpy(decoder->frame + decoder->size, bytes + at, here);
+        decoder->size += (uint32_t)here;
+        decoder->left -= (uint8_t)here;
+        at += here;
     }
-    if (decoder->left > 0) {
-        append(decoder, byte);
-        decoder->left--;
-        return 0;
-    }
-    if (decoder->zero) {
-        append(decoder, 0);
-    }
-    decoder->left = (uint8_t)(byte - 1u);
-    decoder->zero = byte < BLOCK_MAX;
-    return 0;
+}
+
+size_t fcsl_cobs_decode(fcsl_cobs_decoder_t *decoder, const uint8_t *bytes, size_t count, size_t *size)
+{
+    const uint8_t *zero = memchr(bytes, 0, count);
+    const size_t before = zero != NULL ? (size_t)(zero - bytes) : count;
+    append(decoder, bytes, before);
+    *size = zero != NULL ? finish(decoder) : 0;
+    return zero != NULL ? before + 1u : before;
 }

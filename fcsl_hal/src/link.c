@@ -80,6 +80,9 @@ void fcsl_link_tick(fcsl_link_t *link)
     tick_session(&link->session);
     for (uint32_t i = 0; i < FCSL_LINK_PORTS; i++) {
         fcsl_link_port_t *port = &link->ports[i];
+        if (port->policy == FCSL_LINK_CLOSED) {
+            continue;
+        }
         fcsl_link_outgoing_tick(port, link->retransmit_ticks);
         if (port->in.answer == FCSL_LINK_ANSWER_SOON) {
             port->in.answer = FCSL_LINK_ANSWER_NOW;
@@ -107,6 +110,9 @@ static size_t port_frame(fcsl_link_t *link, uint32_t number, uint8_t frame[FCSL_
 {
     fcsl_link_port_t *port = &link->ports[number];
     const int reliable = port->policy == FCSL_LINK_RELIABLE;
+    if (port->policy == FCSL_LINK_CLOSED || (reliable && link->session.peer == 0)) {
+        return 0;
+    }
     fcsl_link_header_t header = {
         .kind = FCSL_LINK_ACKNOWLEDGEMENT,
         .port = (uint8_t)number,
@@ -115,9 +121,6 @@ static size_t port_frame(fcsl_link_t *link, uint32_t number, uint8_t frame[FCSL_
         .acknowledge = port->in.sequence,
     };
     size_t size = 0;
-    if (port->policy == FCSL_LINK_CLOSED || (reliable && link->session.peer == 0)) {
-        return 0;
-    }
     if (fcsl_link_outgoing_due(port)) {
         size = fcsl_link_outgoing_take(port, &header, frame);
     } else if (!reliable || port->in.answer != FCSL_LINK_ANSWER_NOW) {
