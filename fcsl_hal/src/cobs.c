@@ -13,19 +13,23 @@ size_t fcsl_cobs_encode(const uint8_t *frame, size_t size, uint8_t bytes[FCSL_CO
 {
     size_t code_at = 0;
     size_t end = 1;
+    uint8_t code = 1;
     for (size_t i = 0; i < size; i++) {
-        if (end - code_at == BLOCK_MAX) {
-            bytes[code_at] = BLOCK_MAX;
+        if (code == BLOCK_MAX) {
+            bytes[code_at] = code;
             code_at = end++;
+            code = 1;
         }
-        bytes[end] = frame[i];
-        if (frame[i] == 0) {
-            bytes[code_at] = (uint8_t)(end - code_at);
-            code_at = end;
+        if (frame[i] != 0) {
+            bytes[end++] = frame[i];
+            code++;
+        } else {
+            bytes[code_at] = code;
+            code_at = end++;
+            code = 1;
         }
-        end++;
     }
-    bytes[code_at] = (uint8_t)(end - code_at);
+    bytes[code_at] = code;
     bytes[end++] = 0;
     return end;
 }
@@ -45,35 +49,42 @@ static size_t finish(fcsl_cobs_decoder_t *decoder)
 /* Takes bytes that are not zero. */
 static void append(fcsl_cobs_decoder_t *decoder, const uint8_t *bytes, size_t count)
 {
+    uint32_t size = decoder->size;
     size_t at = 0;
     while (at < count && !decoder->refused) {
         if (decoder->left == 0) {
-            if (decoder->zero && decoder->size < FCSL_LINK_FRAME_MAX) {
-                decoder->frame[decoder->size++] = 0;
-            } else if (decoder->zero) {
-                decoder->refused = 1;
+            decoder->refused = decoder->zero && size == FCSL_LINK_FRAME_MAX;
+            if (decoder->zero && size < FCSL_LINK_FRAME_MAX) {
+                decoder->frame[size++] = 0;
             }
             decoder->left = (uint8_t)(bytes[at] - 1u);
             decoder->zero = bytes[at] < BLOCK_MAX;
             at++;
         }
-        const size_t here = count - at < decoder->left ? count - at : decoder->left;
-        if (here > FCSL_LINK_FRAME_MAX - decoder->size) {
-            decoder->refused = 1;
-            return;
+        const size_t begin = at;
+        size_t end = at + decoder->left;
+        if (end > count) {
+            end = count;
         }
-        memcpy(decoder->frame + decoder->size, bytes + at, here);
-        decoder->size += (uint32_t)here;
-        decoder->left -= (uint8_t)here;
-        at += here;
+        for (; at < end && size < FCSL_LINK_FRAME_MAX; at++) {
+            decoder->frame[size++] = bytes[at];
+        }
+        decoder->refused |= at < end;
+        decoder->left = (uint8_t)(decoder->left - (at - begin));
     }
+    decoder->size = size;
 }
 
 size_t fcsl_cobs_decode(fcsl_cobs_decoder_t *decoder, const uint8_t *bytes, size_t count, size_t *size)
 {
     const uint8_t *zero = memchr(bytes, 0, count);
-    const size_t before = zero != NULL ? (size_t)(zero - bytes) : count;
+    *size = 0;
+    if (zero == NULL) {
+        append(decoder, bytes, count);
+        return count;
+    }
+    const size_t before = (size_t)(zero - bytes);
     append(decoder, bytes, before);
-    *size = zero != NULL ? finish(decoder) : 0;
-    return zero != NULL ? before + 1u : before;
+    *size = finish(decoder);
+    return before + 1u;
 }

@@ -36,7 +36,8 @@ static fcsl_message_status_t read_entry(const uint8_t *bytes, size_t at, size_t 
     } else {
         count = shape == SCALAR ? 1u : shape == VECTOR ? 3u : 4u;
     }
-    const size_t behind = at + count * fcsl_scalar_size(scalar); /* half a MiB more than a message has: it does not wrap */
+    const size_t behind =
+        at + count * fcsl_scalar_size(scalar); /* half a MiB more than a message has: it does not wrap */
     if (behind > end) {
         return FCSL_MESSAGE_SHORT;
     }
@@ -74,25 +75,27 @@ static int stands_before(const uint8_t *bytes, size_t at, size_t end, uint16_t i
     return 0;
 }
 
-/* The values of the entry; null unless its type and count are those of the field. */
-static const uint8_t *values_of(const fcsl_field_t *field, const uint8_t *bytes, const raw_entry_t *entry)
+/* The values of the entry; null unless it is one of this channel in a message of this kind. */
+static const uint8_t *values_of(const fcsl_machine_t *machine, fcsl_message_kind_t kind, uint32_t channel,
+                                const uint8_t *bytes, const raw_entry_t *entry)
 {
-    return entry->type == entry_type(field) && entry->values + field->size == entry->end ? bytes + entry->values : NULL;
+    //@ split channel;
+    const fcsl_field_t *field = &machine->fields[machine->channels[channel].field];
+    if (!carries(kind, &machine->channels[channel]) || entry->type != entry_type(field)) {
+        return NULL;
+    }
+    return entry->values + field->size == entry->end ? bytes + entry->values : NULL;
 }
 
-/* Checks the entry of a channel. */
-static fcsl_message_status_t check_channel(const fcsl_machine_t *machine, fcsl_message_kind_t kind, uint32_t index,
+/* Checks the entry of a channel. (`split` is a word for scripts/verify/codec: each channel is analysed by itself.) */
+static fcsl_message_status_t check_channel(const fcsl_machine_t *machine, fcsl_message_kind_t kind, uint32_t channel,
                                            const uint8_t *bytes, const raw_entry_t *entry)
 {
-    //@ split index;
-    const fcsl_channel_t *channel = &machine->channels[index];
-    const fcsl_field_t *field = &machine->fields[channel->field];
-    const uint8_t *values = values_of(field, bytes, entry);
-    if (!carries(kind, channel)) {
-        return FCSL_MESSAGE_ENTRY;
-    }
+    //@ split channel;
+    const fcsl_field_t *field = &machine->fields[machine->channels[channel].field];
+    const uint8_t *values = values_of(machine, kind, channel, bytes, entry);
     if (values == NULL) {
-        return FCSL_MESSAGE_TYPE;
+        return carries(kind, &machine->channels[channel]) ? FCSL_MESSAGE_TYPE : FCSL_MESSAGE_ENTRY;
     }
     return fcsl_scalars_valid(machine, values, field->type, field->count) ? FCSL_MESSAGE_OK : FCSL_MESSAGE_VALUE;
 }
@@ -220,18 +223,24 @@ static uint32_t next_entry(const fcsl_machine_t *machine, const fcsl_message_t *
 
 int fcsl_message_next(const fcsl_machine_t *machine, const fcsl_message_t *message, fcsl_message_entry_t *entry)
 {
-    const uint32_t next = entry->end == 0 ? 0 : entry->channel + 1u;
-    const size_t at = entry->end == 0 ? head_bytes(message->kind) : entry->end;
+    uint32_t next = entry->end == 0 ? 0 : entry->channel + 1u;
+    size_t at = entry->end == 0 ? head_bytes(message->kind) : entry->end;
     raw_entry_t raw = {0};
-    const uint32_t channel = next_entry(machine, message, at, next, &raw);
-    if (channel >= machine->channel_count) {
-        return 0;
+    for (;;) {
+        const uint32_t channel = next_entry(machine, message, at, next, &raw);
+        if (channel >= machine->channel_count) {
+            return 0;
+        }
+        /* It was checked; looked at again, so that its size is the field's even if bytes changed since then. */
+        const uint8_t *values = values_of(machine, message->kind, channel, message->bytes, &raw);
+        if (values != NULL) {
+            const uint32_t size = (uint32_t)(raw.end - raw.values);
+            *entry = (fcsl_message_entry_t){.end = raw.end, .channel = channel, .size = size, .values = values};
+            return 1;
+        }
+        at = raw.end;
+        next = channel + 1u;
     }
-    *entry = (fcsl_message_entry_t){.end = raw.end,
-                                    .channel = channel,
-                                    .size = (uint32_t)(raw.end - raw.values),
-                                    .values = message->bytes + raw.values};
-    return 1;
 }
 
 /* Takes the values of a channel's entry. It was checked; looked at again so that bytes changed since then cannot write beside
@@ -242,8 +251,8 @@ static void take_channel(const fcsl_machine_t *machine, uint8_t *data, const fcs
     //@ split index;
     const fcsl_channel_t *channel = &machine->channels[index];
     const fcsl_field_t *field = &machine->fields[channel->field];
-    const uint8_t *values = values_of(field, message->bytes, entry);
-    if (values == NULL || !carries(message->kind, channel)) {
+    const uint8_t *values = values_of(machine, message->kind, index, message->bytes, entry);
+    if (values == NULL) {
         return;
     }
     fcsl_scalars_import(data + field->offset, values, field->type, field->count);
