@@ -9,27 +9,41 @@
 
 enum { BLOCK_MAX = 255 };
 
+/* Whether one of eight bytes is zero ("Hacker's Delight", 6-1). */
+static int has_zero(const uint8_t *bytes)
+{
+    uint64_t word = 0;
+    memcpy(&word, bytes, sizeof word);
+    return ((word - UINT64_C(0x0101010101010101)) & ~word & UINT64_C(0x8080808080808080)) != 0;
+}
+
 size_t fcsl_cobs_encode(const uint8_t *frame, size_t size, uint8_t bytes[FCSL_COBS_BYTES_MAX])
 {
+    enum { WORD = 8 };
     size_t code_at = 0;
     size_t end = 1;
-    uint8_t code = 1;
-    for (size_t i = 0; i < size; i++) {
-        if (code == BLOCK_MAX) {
-            bytes[code_at] = code;
-            code_at = end++;
-            code = 1;
+    for (size_t i = 0; i < size; i += WORD) {
+        const size_t count = size - i < WORD ? size - i : WORD;
+        if (count == WORD && end - code_at <= BLOCK_MAX - WORD && !has_zero(frame + i)) {
+            memcpy(bytes + end, frame + i, WORD);
+            end += WORD;
+            continue;
         }
-        if (frame[i] != 0) {
-            bytes[end++] = frame[i];
-            code++;
-        } else {
-            bytes[code_at] = code;
-            code_at = end++;
-            code = 1;
+        for (size_t j = i; j < i + count; j++) {
+            if (end - code_at == BLOCK_MAX) {
+                bytes[code_at] = BLOCK_MAX;
+                code_at = end++;
+            }
+            if (frame[j] == 0) {
+                bytes[code_at] = (uint8_t)(end - code_at);
+                code_at = end;
+            } else {
+                bytes[end] = frame[j];
+            }
+            end++;
         }
     }
-    bytes[code_at] = code;
+    bytes[code_at] = (uint8_t)(end - code_at);
     bytes[end++] = 0;
     return end;
 }

@@ -9,11 +9,14 @@
 #include "fcsl/fcsl_codec.h"
 #include "link_frame.h"
 
-enum {
-    MESSAGE_MAX = 48, /* bytes: more than any one of the entries below needs */
-    CHUNK_MAX = 24,
-    FRAME_MAX = 48
-};
+/* Bytes: of messages, capacities and frames. Each entry below fits into the longest message. */
+#ifndef SMALLEST
+#define SMALLEST 0
+#endif
+#ifndef LARGEST
+#define LARGEST 40
+#endif
+enum { STREAM_MAX = 12 }; /* in one piece */
 
 volatile uint8_t any_u8;
 volatile uint32_t any_u32;
@@ -26,32 +29,39 @@ typedef struct {
     int64_t stamp[5];
     int32_t health;
     float rate[3];
-    double position[2];
+    double position[1];
     uint64_t count;
-    double command[1];
+    float command[1];
     uint8_t enable;
 } data_t;
 
 #define FIELD(type_, member_, count_, rank_)                                                                           \
-    {                                                                                                                  \
-        .path = #member_, .type = (type_), .rank = (rank_), .count = (count_), .offset = offsetof(data_t, member_),    \
-        .size = sizeof(((data_t *)0)->member_)                                                                         \
-    }
+    {.path = #member_,                                                                                                 \
+     .type = (type_),                                                                                                  \
+     .rank = (rank_),                                                                                                  \
+     .count = (count_),                                                                                                \
+     .offset = offsetof(data_t, member_),                                                                              \
+     .size = sizeof(((data_t *)0)->member_)}
 #define SENSOR(id_, field_)                                                                                            \
-    {                                                                                                                  \
-        .name = "", .id = (id_), .direction = FCSL_SENSOR, .field = (field_),                                          \
-        .fresh_offset = offsetof(data_t, fresh) + (field_), .sample_age_offset = offsetof(data_t, age) + 4u * (field_), \
-        .stamp_offset = offsetof(data_t, stamp) + 8u * (field_)                                                        \
-    }
+    {.name = "",                                                                                                       \
+     .id = (id_),                                                                                                      \
+     .direction = FCSL_SENSOR,                                                                                         \
+     .field = (field_),                                                                                                \
+     .fresh_offset = offsetof(data_t, fresh) + (field_),                                                               \
+     .sample_age_offset = offsetof(data_t, age) + 4u * (field_),                                                       \
+     .stamp_offset = offsetof(data_t, stamp) + 8u * (field_)}
 #define ACTUATOR(id_, field_)                                                                                          \
-    {                                                                                                                  \
-        .name = "", .id = (id_), .direction = FCSL_ACTUATOR, .field = (field_), .fresh_offset = FCSL_NO_OFFSET,        \
-        .sample_age_offset = FCSL_NO_OFFSET, .stamp_offset = FCSL_NO_OFFSET                                            \
-    }
+    {.name = "",                                                                                                       \
+     .id = (id_),                                                                                                      \
+     .direction = FCSL_ACTUATOR,                                                                                       \
+     .field = (field_),                                                                                                \
+     .fresh_offset = FCSL_NO_OFFSET,                                                                                   \
+     .sample_age_offset = FCSL_NO_OFFSET,                                                                              \
+     .stamp_offset = FCSL_NO_OFFSET}
 
 static const fcsl_field_t FIELDS[] = {
-    FIELD(FCSL_BOOL, flags, 3, 1),    FIELD(FCSL_HEALTH, health, 1, 0), FIELD(FCSL_F32, rate, 3, 1),
-    FIELD(FCSL_F64, position, 2, 1),  FIELD(FCSL_U64, count, 1, 0),     FIELD(FCSL_F64, command, 1, 1),
+    FIELD(FCSL_BOOL, flags, 3, 1),   FIELD(FCSL_HEALTH, health, 1, 0), FIELD(FCSL_F32, rate, 3, 1),
+    FIELD(FCSL_F64, position, 1, 1), FIELD(FCSL_U64, count, 1, 0),     FIELD(FCSL_F32, command, 1, 1),
     FIELD(FCSL_BOOL, enable, 1, 0),
 };
 static const fcsl_channel_t CHANNELS[] = {SENSOR(900, 0), ACTUATOR(1, 5), SENSOR(800, 1), SENSOR(3, 2),
@@ -66,7 +76,7 @@ static const fcsl_machine_t MACHINE = {
     .channel_count = CHANNEL_COUNT,
 };
 
-static uint8_t memory[MESSAGE_MAX];
+static uint8_t memory[LARGEST];
 static data_t data;
 
 static void any_bytes(uint8_t *bytes, size_t size)
@@ -79,7 +89,7 @@ static void any_bytes(uint8_t *bytes, size_t size)
 /* A message of any bytes is checked, and taken if it fits; meanwhile its bytes may become any others. */
 static void receive(const fcsl_channel_table_t *table, fcsl_message_kind_t kind, size_t size)
 {
-    const uint8_t *bytes = memory + (MESSAGE_MAX - size);
+    const uint8_t *bytes = memory + (LARGEST - size);
     fcsl_message_t message = {.bytes = bytes, .size = size, .kind = kind};
     fcsl_message_entry_t entry = {0};
     any_bytes(memory, sizeof memory);
@@ -97,7 +107,7 @@ static void receive(const fcsl_channel_table_t *table, fcsl_message_kind_t kind,
 static void encode(const fcsl_channel_table_t *table, size_t capacity)
 {
     uint8_t select[CHANNEL_COUNT];
-    uint8_t *bytes = memory + (MESSAGE_MAX - capacity);
+    uint8_t *bytes = memory + (LARGEST - capacity);
     fcsl_message_t message = {0};
     any_bytes((uint8_t *)&data, sizeof data);
     any_bytes(select, sizeof select);
@@ -110,7 +120,7 @@ static void encode(const fcsl_channel_table_t *table, size_t capacity)
 static void decode_stream(size_t count)
 {
     static fcsl_cobs_decoder_t decoder;
-    static uint8_t chunk[CHUNK_MAX];
+    static uint8_t chunk[STREAM_MAX];
     size_t size = 0;
     any_bytes(chunk, sizeof chunk);
     any_bytes(decoder.frame, sizeof decoder.frame);
@@ -119,7 +129,7 @@ static void decode_stream(size_t count)
     decoder.zero = any_u8 % 2u;
     decoder.refused = any_u8 % 2u;
     decoder.garbage = any_u32;
-    const size_t taken = fcsl_cobs_decode(&decoder, chunk + (CHUNK_MAX - count), count, &size);
+    const size_t taken = fcsl_cobs_decode(&decoder, chunk + (STREAM_MAX - count), count, &size);
     //@ assert decoder.size <= FCSL_LINK_FRAME_MAX;
     //@ assert decoder.zero <= 1;
     //@ assert decoder.refused <= 1;
@@ -143,17 +153,15 @@ static void frames(size_t size)
 int main(void)
 {
     const fcsl_channel_table_t table = fcsl_channel_table(&MACHINE);
-    for (size_t size = 0; size <= MESSAGE_MAX; size++) {
+    for (size_t size = SMALLEST; size <= LARGEST; size++) {
         receive(&table, FCSL_SENSOR_MESSAGE, size);
         receive(&table, FCSL_ACTUATOR_MESSAGE, size);
         receive(&table, FCSL_TIME_MESSAGE, size);
         encode(&table, size);
-    }
-    for (size_t count = 0; count <= CHUNK_MAX; count++) {
-        decode_stream(count);
-    }
-    for (size_t size = 0; size <= FRAME_MAX; size++) {
         frames(size);
+    }
+    for (size_t count = 0; count <= STREAM_MAX; count++) {
+        decode_stream(count);
     }
     frames(FCSL_LINK_FRAME_MAX);
     return 0;

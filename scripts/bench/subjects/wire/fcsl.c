@@ -128,12 +128,28 @@ static fcsl_link_t sender;
 static fcsl_link_t receiver;
 static fcsl_cobs_decoder_t decoder;
 
+/* What the ends have to say in a tick. */
+static void exchange(fcsl_link_t *from, fcsl_link_t *to)
+{
+    uint8_t frame[FCSL_LINK_FRAME_MAX];
+    size_t size = 0;
+    fcsl_link_tick(from);
+    while ((size = fcsl_link_next_frame(from, frame)) > 0) {
+        fcsl_link_take_frame(to, frame, size);
+    }
+}
+
+/* Two ends that know each other, as most of the time. */
 static void serial_reset(void)
 {
     const fcsl_link_policy_t policies[FCSL_LINK_PORTS] = {[PORT] = FCSL_LINK_LATEST};
     (void)fcsl_link_open(&sender, policies, 1, 1);
     (void)fcsl_link_open(&receiver, policies, 2, 1);
     decoder = (fcsl_cobs_decoder_t){.size = 0};
+    for (int i = 0; i < 4 * FCSL_LINK_HELLO_TICKS; i++) {
+        exchange(&sender, &receiver);
+        exchange(&receiver, &sender);
+    }
 }
 
 static size_t serial_encode(direction_t direction, const values_t *values, uint8_t bytes[MESSAGE_MAX])
@@ -147,9 +163,7 @@ static size_t serial_encode(direction_t direction, const values_t *values, uint8
     }
     fcsl_link_tick(&sender);
     while ((size = fcsl_link_next_frame(&sender, frame)) > 0) {
-        if ((frame[0] & 15u) != 0) { /* the hellos of an end without a peer are the link's, not this message's */
-            count += fcsl_cobs_encode(frame, size, bytes + count);
-        }
+        count += fcsl_cobs_encode(frame, size, bytes + count);
     }
     return count;
 }
