@@ -26,7 +26,7 @@ BENCH = HERE.parents[1]
 HAL = BENCH.parents[1] / "fcsl_hal"
 DIALECT = BENCH / "peers/mavlink/bench.xml"
 ROUNDS = sized(400, 2)
-#: Messages under noise, and corrupted frames.
+#: Messages whose bits flip, and corrupted frames.
 MESSAGES = sized(200_000, 1000)
 FRAMES = sized(10_000_000, 100_000)
 
@@ -74,7 +74,7 @@ def wire_rows(facts: dict[str, Any]) -> list[tuple[str, str]]:
         for name, f in formats.items():
             figure = f"{f['bytes']} bytes, {f['encode_ns']:.0f} and {f['decode_ns']:.0f} ns there and back"
             rows.append((f"{direction}: {name}", figure))
-    for rate, formats in facts["noise"].items():
+    for rate, formats in facts["flipped"].items():
         for name, f in formats.items():
             figure = f"{f['delivered']:.2%} arrive, {f['wrong']} wrong"
             rows.append((f"{float(rate):.2%} of bits flipped: {name}", figure))

@@ -6,7 +6,7 @@
  * stream flip; of CORRUPTED frames how many are accepted. Prints JSON.
  */
 #include "corrupted.h"
-#include "noise.h"
+#include "flipped_bits.h"
 #include "timing.h"
 #include "values.h"
 
@@ -79,13 +79,13 @@ static void print_times(int rounds)
     }
 }
 
-static void print_noise(long messages)
+static void print_flipped(long messages)
 {
     static const double RATES[] = {0.0001, 0.001, 0.01};
     for (int r = 0; r < 3; r++) {
         printf("%s\"%g\": {", r > 0 ? ", " : "", RATES[r]);
         for (int f = 1; f < FORMATS; f++) { /* a message alone has no beginning that is found again */
-            const noise_t found = under_noise(FORMAT[f], messages, RATES[r]);
+            const flipped_t found = under_flipped_bits(FORMAT[f], messages, RATES[r]);
             printf("%s\"%s\": {\"delivered\": %.5f, \"wrong\": %ld}", f > 1 ? ", " : "", FORMAT[f]->name,
                    (double)found.delivered / (double)messages, found.wrong);
         }
@@ -102,8 +102,8 @@ int main(int argc, char **argv)
     const long frames = atol(argv[3]);
     printf("{\"times\": {");
     print_times(atoi(argv[1]));
-    printf("}, \"messages\": %ld, \"noise\": {", atol(argv[2]));
-    print_noise(atol(argv[2]));
+    printf("}, \"messages\": %ld, \"flipped\": {", atol(argv[2]));
+    print_flipped(atol(argv[2]));
     const corrupted_t found = under_corruption(frames);
     printf(
         "}, \"corrupted\": {\"frames\": %ld, \"link_crc16\": %ld, \"message_crc32\": %ld, \"link_and_message\": %ld, "

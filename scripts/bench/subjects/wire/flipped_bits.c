@@ -2,7 +2,7 @@
  *
  * A stream of messages whose bits flip.
  */
-#include "noise.h"
+#include "flipped_bits.h"
 
 #include "timing.h"
 #include "values.h"
@@ -17,12 +17,12 @@ static size_t gap(uint64_t *state, double probability)
     return (size_t)(log(uniform) / log1p(-probability));
 }
 
-noise_t under_noise(const format_t *format, long messages, double probability)
+flipped_t under_flipped_bits(const format_t *format, long messages, double probability)
 {
     uint8_t *stream = allocate((size_t)messages * MESSAGE_MAX);
     uint64_t state = 1;
     size_t size = 0;
-    noise_t found = {0};
+    flipped_t found = {0};
     format->reset();
     for (long i = 0; i < messages; i++) {
         const values_t values = values_of(FIRST_TICK + (uint64_t)i);
