@@ -7,7 +7,7 @@
 
 #include <string.h>
 
-enum { BLOCK_MAX = 255 };
+enum { BLOCK_MAX = 255, WORD = 8 };
 
 /* Whether one of eight bytes is zero ("Hacker's Delight", 6-1). */
 static int has_zero(const uint8_t *bytes)
@@ -17,30 +17,35 @@ static int has_zero(const uint8_t *bytes)
     return ((word - UINT64_C(0x0101010101010101)) & ~word & UINT64_C(0x8080808080808080)) != 0;
 }
 
+static size_t min_size(size_t a, size_t b)
+{
+    return a < b ? a : b;
+}
+
 size_t fcsl_cobs_encode(const uint8_t *frame, size_t size, uint8_t bytes[FCSL_COBS_BYTES_MAX])
 {
-    enum { WORD = 8 };
     size_t code_at = 0;
     size_t end = 1;
-    for (size_t i = 0; i < size; i += WORD) {
-        const size_t count = size - i < WORD ? size - i : WORD;
-        if (count == WORD && end - code_at <= BLOCK_MAX - WORD && !has_zero(frame + i)) {
+    size_t count = 0;
+    /* For scripts/verify/codec, which follows each round: */
+    //@ loop unroll FCSL_LINK_FRAME_MAX;
+    for (size_t i = 0; i < size; i += count) {
+        if (end - code_at == BLOCK_MAX) {
+            bytes[code_at] = BLOCK_MAX;
+            code_at = end++;
+        }
+        count = min_size(min_size(size - i, WORD), BLOCK_MAX - (end - code_at));
+        if (count == WORD && !has_zero(frame + i)) {
             memcpy(bytes + end, frame + i, WORD);
             end += WORD;
             continue;
         }
-        for (size_t j = i; j < i + count; j++) {
-            if (end - code_at == BLOCK_MAX) {
-                bytes[code_at] = BLOCK_MAX;
-                code_at = end++;
-            }
-            if (frame[j] == 0) {
+        for (size_t j = 0; j < count; j++, end++) {
+            bytes[end] = frame[i + j];
+            if (frame[i + j] == 0) {
                 bytes[code_at] = (uint8_t)(end - code_at);
                 code_at = end;
-            } else {
-                bytes[end] = frame[j];
             }
-            end++;
         }
     }
     bytes[code_at] = (uint8_t)(end - code_at);
@@ -79,6 +84,10 @@ static void append(fcsl_cobs_decoder_t *decoder, const uint8_t *bytes, size_t co
         size_t end = at + decoder->left;
         if (end > count) {
             end = count;
+        }
+        for (; at + WORD <= end && size + WORD <= FCSL_LINK_FRAME_MAX; at += WORD) {
+            memcpy(decoder->frame + size, bytes + at, WORD);
+            size += WORD;
         }
         for (; at < end && size < FCSL_LINK_FRAME_MAX; at++) {
             decoder->frame[size++] = bytes[at];

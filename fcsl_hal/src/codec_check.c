@@ -1,6 +1,8 @@
 /* SPDX-License-Identifier: Apache-2.0
  *
  * Checks messages of channels, and takes their values.
+ *
+ * `//@ split` is for scripts/verify/codec: from there on it analyses each channel by itself.
  */
 #include "codec_layout.h"
 
@@ -87,7 +89,7 @@ static const uint8_t *values_of(const fcsl_machine_t *machine, fcsl_message_kind
     return entry->values + field->size == entry->end ? bytes + entry->values : NULL;
 }
 
-/* Checks the entry of a channel. (`split` is a word for scripts/verify/codec: each channel is analysed by itself.) */
+/* Checks the entry of a channel. */
 static fcsl_message_status_t check_channel(const fcsl_machine_t *machine, fcsl_message_kind_t kind, uint32_t channel,
                                            const uint8_t *bytes, const raw_entry_t *entry)
 {

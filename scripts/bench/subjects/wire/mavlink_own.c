@@ -46,23 +46,6 @@ static int take(direction_t direction, const mavlink_message_t *message, values_
     return 0;
 }
 
-static size_t decode(direction_t direction, const uint8_t *bytes, size_t size, values_t *values, int *accepted)
-{
-    static mavlink_message_t message;
-    mavlink_status_t status;
-    for (size_t i = 0; i < size; i++) {
-        if (mavlink_parse_char(MAVLINK_COMM_1, bytes[i], &message, &status) && take(direction, &message, values)) {
-            *accepted = 1;
-            return i + 1;
-        }
-    }
-    *accepted = 0;
-    return size;
-}
-
-static void reset(void)
-{
-    mavlink_reset_channel_status(MAVLINK_COMM_1);
-}
+#include "mavlink_decode.h"
 
 const format_t MAVLINK_OWN = {"MAVLink 2, own dialect", 1, encode, decode, reset};

@@ -1,7 +1,7 @@
 /* SPDX-License-Identifier: Apache-2.0
  *
  * What MAVLink's generated headers want of a program that sends with them: a system id, and a UART. This one is a buffer.
- * Included before them, once in a program part, since all of MAVLink is static.
+ * Included before them.
  */
 #ifndef BENCH_MAVLINK_UART_H
 #define BENCH_MAVLINK_UART_H
