@@ -25,7 +25,7 @@ HERE = Path(__file__).resolve().parent
 BENCH = HERE.parents[1]
 HAL = BENCH.parents[1] / "fcsl_hal"
 DIALECT = BENCH / "peers/mavlink/bench.xml"
-ROUNDS = sized(400, 2)
+ROUNDS = sized(2000, 2)
 #: Messages whose bits flip, and corrupted frames.
 MESSAGES = sized(200_000, 1000)
 FRAMES = sized(10_000_000, 100_000)
@@ -72,7 +72,7 @@ def wire_rows(facts: dict[str, Any]) -> list[tuple[str, str]]:
     rows = []
     for direction, formats in facts["times"].items():
         for name, f in formats.items():
-            figure = f"{f['bytes']} bytes, {f['encode_ns']:.0f} and {f['decode_ns']:.0f} ns there and back"
+            figure = f"{f['bytes']} bytes, {f['encode_ns']:.0f} + {f['decode_ns']:.0f} ns"
             rows.append((f"{direction}: {name}", figure))
     for rate, formats in facts["flipped"].items():
         for name, f in formats.items():

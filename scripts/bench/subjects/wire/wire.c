@@ -60,20 +60,21 @@ static void turn(const format_t *format, direction_t direction, times_t *best)
 
 static void print_times(int rounds)
 {
+    times_t best[DIRECTIONS][FORMATS];
+    for (int i = 0; i < DIRECTIONS * FORMATS; i++) {
+        best[i / FORMATS][i % FORMATS] = (times_t){.encode_ns = 1e12, .decode_ns = 1e12};
+    }
+    for (int r = 0; r < rounds; r++) {
+        for (int i = 0; i < DIRECTIONS * FORMATS; i++) {
+            turn(FORMAT[i % FORMATS], (direction_t)(i / FORMATS), &best[i / FORMATS][i % FORMATS]);
+        }
+    }
     for (int d = 0; d < DIRECTIONS; d++) {
-        times_t best[FORMATS];
-        for (int f = 0; f < FORMATS; f++) {
-            best[f] = (times_t){.encode_ns = 1e12, .decode_ns = 1e12};
-        }
-        for (int r = 0; r < rounds; r++) {
-            for (int f = 0; f < FORMATS; f++) {
-                turn(FORMAT[f], (direction_t)d, &best[f]);
-            }
-        }
         printf("%s\"%s\": {", d > 0 ? ", " : "", DIRECTION[d]);
         for (int f = 0; f < FORMATS; f++) {
+            const times_t *found = &best[d][f];
             printf("%s\"%s\": {\"bytes\": %zu, \"encode_ns\": %.1f, \"decode_ns\": %.1f}", f > 0 ? ", " : "",
-                   FORMAT[f]->name, best[f].bytes, best[f].encode_ns, best[f].decode_ns);
+                   FORMAT[f]->name, found->bytes, found->encode_ns, found->decode_ns);
         }
         printf("}");
     }
