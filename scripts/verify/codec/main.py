@@ -5,7 +5,7 @@
     python3 scripts/verify codec
 
 program.c hands them any bytes of every size up to 40, and frames of the largest size; its memory ends where the bytes end.
-There must be no alarm.
+There must be no alarm, and what it asserts must hold.
 """
 
 from __future__ import annotations
@@ -57,6 +57,8 @@ DEFECTS = (
            (12, 12)),
     Defect("bytes that change after the check are believed", CHECK,
            "    if (values == NULL) {\n        return;\n    }\n", ""),
+    Defect("values are stored beside their field", CHECK, "import(data + field->offset,",
+           "import(data + field->offset + 1,"),
     Defect("no room is kept for the CRC", ENCODE, "entry_bytes(field) + CRC_BYTES", "entry_bytes(field)"),
     Defect("the last bytes of a message are summed as eight", "crc32.c", "i + 8u <= size", "i < size", (37, 37)),
     Defect("the last bytes of a frame are summed as eight", "crc16.c", "i + 8u <= size", "i < size"),
@@ -67,12 +69,12 @@ DEFECTS = (
 
 @dataclass(frozen=True)
 class Analysis:
-    """Of the sources under proof; `problems` for people, none if all is proven."""
+    """Of program.c and the sources; `unproven` are alarms and assertions, `silent` signs that code was not looked at."""
 
-    alarms: int
     reached: int
     statements: int
-    problems: tuple[str, ...]
+    unproven: tuple[str, ...]
+    silent: tuple[str, ...]
 
 
 def analyse(folder: Path, sources: Sequence[Path], defines: Sequence[str] = ()) -> Analysis:
@@ -91,26 +93,26 @@ def analyse(folder: Path, sources: Sequence[Path], defines: Sequence[str] = ()) 
         raise CheckFailed(f"EVA did not end within {LIMIT_S:.0f} s") from None
     if done.returncode != 0:
         raise CheckFailed(f"frama-c: exit status {done.returncode}\n{done.stdout[-3000:]}{done.stderr}")
-    alarms = count_alarms(done.stdout)
-    problems = unproven(table, alarms)
+    silent = []
     if "No errors or warnings raised during the analysis." not in done.stdout:
-        problems.append("EVA warns of more than alarms")
+        silent.append("EVA warns of more than alarms")
     if "Unreached functions" in done.stdout:
-        problems.append("EVA never reached " + done.stdout.partition("Unreached functions")[2].partition("\n[")[0])
+        silent.append("EVA never reached " + done.stdout.partition("Unreached functions")[2].partition("\n[")[0])
     counts = statements(done.stdout).values()
-    return Analysis(alarms, sum(n for n, _ in counts), sum(of for _, of in counts), tuple(problems))
+    found = unproven(table, count_alarms(done.stdout))
+    return Analysis(sum(n for n, _ in counts), sum(of for _, of in counts), tuple(found), tuple(silent))
 
 
 def prove(folder: Path) -> Analysis:
     """Raises CheckFailed where something is not proven."""
     found = analyse(folder, [SOURCES / name for name in PROVED])
-    if found.problems:
-        raise CheckFailed("\n  ".join(("not proven:", *found.problems)))
+    if found.unproven or found.silent:
+        raise CheckFailed("\n  ".join(("not proven:", *found.unproven, *found.silent)))
     return found
 
 
 def find(defect: Defect, folder: Path) -> str:
-    """The alarm that EVA gives for the defect. Raises CheckFailed if it gives none."""
+    """What EVA no longer proves. Raises CheckFailed if it proves all."""
     text = (SOURCES / defect.file).read_text()
     if text.count(defect.old) != 1:
         raise CheckFailed(f"`{defect.old}` stands {text.count(defect.old)} times in {defect.file}; change this defect")
@@ -119,9 +121,9 @@ def find(defect: Defect, folder: Path) -> str:
     sources = [folder / name if name == defect.file else SOURCES / name for name in PROVED]
     smallest, largest = defect.sizes
     found = analyse(folder, sources, (f"-DSMALLEST={smallest}", f"-DLARGEST={largest}"))
-    if found.alarms == 0:
+    if not found.unproven:
         raise CheckFailed(f"not found: {defect.what}")
-    return found.problems[0]
+    return found.unproven[0]
 
 
 def main() -> int:
@@ -138,8 +140,8 @@ def main() -> int:
                 waiting.cancel()
             print(f"codec: {error}", file=sys.stderr)
             return 1
-    print(f"{found.alarms} alarms; {found.reached} of {found.statements} statements reached", flush=True)
-    facts = {"alarms": found.alarms, "statements": found.statements, "statements_reached": found.reached}
+    print(f"0 alarms; {found.reached} of {found.statements} statements reached", flush=True)
+    facts = {"alarms": 0, "statements": found.statements, "statements_reached": found.reached}
     write_facts("codec", facts | {"defects found": len(DEFECTS)})
     return 0
 

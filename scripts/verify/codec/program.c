@@ -21,18 +21,29 @@ enum { STREAM_MAX = 12 }; /* in one piece */
 volatile uint8_t any_u8;
 volatile uint32_t any_u32;
 
-/* A channel of every way in which values are read, checked and stored. */
+/* A channel of every way in which values are read, checked and stored. Nothing writes what lies between the fields. */
+enum { GAPS = 10, GAP_BYTES = 8 };
 typedef struct {
     uint8_t flags[3];
+    uint8_t gap0[GAP_BYTES];
     uint8_t fresh[5];
+    uint8_t gap1[GAP_BYTES];
     uint32_t age[5];
+    uint8_t gap2[GAP_BYTES];
     int64_t stamp[5];
+    uint8_t gap3[GAP_BYTES];
     int32_t health;
+    uint8_t gap4[GAP_BYTES];
     float rate[3];
+    uint8_t gap5[GAP_BYTES];
     double position[1];
+    uint8_t gap6[GAP_BYTES];
     uint64_t count;
+    uint8_t gap7[GAP_BYTES];
     float command[1];
+    uint8_t gap8[GAP_BYTES];
     uint8_t enable;
+    uint8_t gap9[GAP_BYTES];
 } data_t;
 
 #define FIELD(type_, member_, count_, rank_)                                                                           \
@@ -77,12 +88,25 @@ static const fcsl_machine_t MACHINE = {
 };
 
 static uint8_t memory[LARGEST];
-static data_t data;
+static data_t data;     /* what is sent: any bytes */
+static data_t received; /* zero, but for what a message brings */
 
 static void any_bytes(uint8_t *bytes, size_t size)
 {
     for (size_t i = 0; i < size; i++) {
         bytes[i] = any_u8;
+    }
+}
+
+static void check_gaps(void)
+{
+    const uint8_t *const gaps[GAPS] = {received.gap0, received.gap1, received.gap2, received.gap3, received.gap4,
+                                       received.gap5, received.gap6, received.gap7, received.gap8, received.gap9};
+    for (int i = 0; i < GAPS; i++) {
+        for (int j = 0; j < GAP_BYTES; j++) {
+            //@ assert gaps[i][j] == 0;
+            (void)gaps[i][j];
+        }
     }
 }
 
@@ -97,7 +121,8 @@ static void receive(const fcsl_channel_table_t *table, fcsl_message_kind_t kind,
         return;
     }
     any_bytes(memory, sizeof memory);
-    fcsl_message_apply(&MACHINE, &data, &message);
+    fcsl_message_apply(&MACHINE, &received, &message);
+    check_gaps();
     while (fcsl_message_next(&MACHINE, &message, &entry) != 0 && entry.values != NULL) {
         any_u8 = entry.values[0];
     }
