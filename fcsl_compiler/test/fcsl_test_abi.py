@@ -70,6 +70,7 @@ class Channel(c.Structure):
         *[(n, c.c_uint32) for n in ("field", "max_age_ticks", "attached", "fresh", "valid", "age")],
         *[(n, c.c_uint32) for n in ("sample_age", "stamp")],
         *[(f"ros_{n}", c.c_char_p) for n in ("type", "field", "topic", "frame", "child_frame", "axes")],
+        ("safe", c.c_void_p),
     ]
 
 
@@ -136,6 +137,8 @@ class Descriptor(c.Structure):
         ("after_ticks", c.POINTER(c.c_uint64)),
         ("channels", c.POINTER(Channel)),
         ("channel_count", c.c_uint32),
+        ("arm_field", c.c_int32),
+        ("command_timeout_ns", c.c_uint64),
         ("fault_places", c.POINTER(FaultPlace)),
         ("fault_place_count", c.c_uint32),
         ("views", c.c_char_p),

@@ -70,7 +70,8 @@ static const fcsl_field_t FIELDS[] = {
      "",                                                                                                               \
      "",                                                                                                               \
      "",                                                                                                               \
-     ""}
+     "",                                                                                                               \
+     NULL}
 #define ACTUATOR(name_, id_, field_)                                                                                   \
     {name_,                                                                                                            \
      id_,                                                                                                              \
@@ -88,7 +89,8 @@ static const fcsl_field_t FIELDS[] = {
      "",                                                                                                               \
      "",                                                                                                               \
      "",                                                                                                               \
-     ""}
+     "",                                                                                                               \
+     NULL}
 
 /* Ids fall, and directions mix: neither order means anything. */
 static const fcsl_channel_t CHANNELS[] = {
@@ -109,6 +111,7 @@ static const fcsl_machine_t MACHINE = {
     .field_count = FIELD_COUNT,
     .channels = CHANNELS,
     .channel_count = CHANNEL_COUNT,
+    .arm_field = FCSL_NONE,
 };
 
 #endif /* CHANNEL_FIXTURE_H */

@@ -317,7 +317,7 @@ class DescriptorEmitter:
             ros = (c.ros.type, c.ros.field, c.ros.topic, c.ros.frame, c.ros.child_frame, c.ros.axes)
             rows.append(
                 f"{{{c_string(c.name)}, {c.id}u, FCSL_{c.direction.upper()}, {self.by_path[path]}u, {age}, {', '.join(kept)}, "
-                f"{', '.join(map(c_string, ros))}}}"
+                f"{', '.join(map(c_string, ros))}, NULL}}"
             )
         self.channels = self._table("fcsl_channel_t", f"fcsl_channels_{self.m.name}", rows)
 
@@ -340,6 +340,7 @@ class DescriptorEmitter:
             "tick_offset": self._offset("tick"),
             "state_offset": self._offset("state_"),
             "next_state_offset": self._offset("next_state_"),
+            "arm_field": "FCSL_NONE",
             "views": c_string(m.views),
         }
         for name, table, count in (

@@ -19,7 +19,7 @@ extern "C" {
 #endif
 
 /* Incremented when a struct below or in fcsl_hw.h changes its meaning or layout. A host rejects any other value. */
-#define FCSL_ABI_VERSION 7u
+#define FCSL_ABI_VERSION 8u
 
 /* Bytes of fcsl_machine_t.views. */
 #define FCSL_VIEWS_BYTES_MAX UINT16_MAX
@@ -166,6 +166,8 @@ typedef struct {
     const char *ros_frame; /* frame_id, or "" */
     const char *ros_child_frame; /* child_frame_id, or "" */
     const char *ros_axes; /* axes of the machine's value ("frd", "ned/frd"), or "": as in ROS */
+    /* Actuators: what they get while they are disarmed or no command comes, as the field holds it; null: not declared. */
+    const void *safe;
 } fcsl_channel_t;
 
 /* A place where a fault can occur, and its cause. */
@@ -216,6 +218,10 @@ typedef struct {
     const uint64_t *after_ticks; /* for each transition: minimum ticks in its state, or 0; null if all are 0 */
     const fcsl_channel_t *channels;
     uint32_t channel_count;
+    /* The output that arms the actuators, a bool: an index into fields; FCSL_NONE: they are armed in simulation, and real ones
+     * never. With an index here or a time-out, every actuator channel has its safe value. */
+    int32_t arm_field;
+    uint64_t command_timeout_ns; /* actuators that got no command for so long become safe; 0: never */
     const fcsl_fault_place_t *fault_places;
     uint32_t fault_place_count;
     /* What plots and viewers show of it: the JSON of docs/language.md, compact, at most FCSL_VIEWS_BYTES_MAX bytes; or "". No

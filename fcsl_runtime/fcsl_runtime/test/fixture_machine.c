@@ -166,14 +166,14 @@ static const fcsl_fault_place_t FAULT_PLACES[] = {
 static const fcsl_channel_t CHANNELS[] = {
     {"imu.gyro", 257, FCSL_SENSOR, 3, 5, AT(gyro_channel.attached), AT(gyro_channel.fresh), AT(gyro_channel.valid),
      AT(gyro_channel.age_ticks), AT(gyro_channel.sample_age), AT(gyro_channel.stamp_ns), "sensor_msgs/Imu",
-     "angular_velocity", "imu/data", "imu_link", "", "frd"},
+     "angular_velocity", "imu/data", "imu_link", "", "frd", NULL},
     {"panel.armed", 258, FCSL_SENSOR, 5, UINT32_MAX, AT(armed_channel.attached), AT(armed_channel.fresh),
      AT(armed_channel.valid), AT(armed_channel.age_ticks), AT(armed_channel.sample_age), AT(armed_channel.stamp_ns), "",
-     "", "", "", "", ""},
+     "", "", "", "", "", NULL},
     {"cart.force", 513, FCSL_ACTUATOR, 15, 0, FCSL_NO_OFFSET, FCSL_NO_OFFSET, FCSL_NO_OFFSET, FCSL_NO_OFFSET,
-     FCSL_NO_OFFSET, FCSL_NO_OFFSET, "", "", "", "", "", ""},
+     FCSL_NO_OFFSET, FCSL_NO_OFFSET, "", "", "", "", "", "", NULL},
     {"panel.saturated", 514, FCSL_ACTUATOR, 20, 0, FCSL_NO_OFFSET, FCSL_NO_OFFSET, FCSL_NO_OFFSET, FCSL_NO_OFFSET,
-     FCSL_NO_OFFSET, FCSL_NO_OFFSET, "", "", "", "", "", ""},
+     FCSL_NO_OFFSET, FCSL_NO_OFFSET, "", "", "", "", "", "", NULL},
     {.name = BEHIND, .direction = FCSL_SENSOR, .field = UINT32_MAX, .attached_offset = FAR, .fresh_offset = FAR},
 };
 
@@ -315,6 +315,7 @@ static void step(void *machine, const fcsl_host_t *host)
      .transition_count = sizeof TRANSITIONS / sizeof TRANSITIONS[0],                                                   \
      .channels = CHANNELS,                                                                                             \
      .channel_count = ROWS(CHANNELS),                                                                                  \
+     .arm_field = FCSL_NONE,                                                                                           \
      .fault_places = FAULT_PLACES,                                                                                     \
      .fault_place_count = ROWS(FAULT_PLACES),                                                                          \
      .views = FIXTURE_VIEWS,                                                                                           \

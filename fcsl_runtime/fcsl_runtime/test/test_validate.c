@@ -73,7 +73,12 @@ static void test_damage(void)
     machine.after_ticks = after_ticks;
     machine.ticks_in_state_offset = machine.tick_offset;
     CHECK(fcsl_validate(&machine, &error) == 0);
-    REFUSED(machine.abi_version = FCSL_ABI_VERSION + 1u, "ABI version 8");
+    channels[2].safe = channels[3].safe = "\0\0\0\0\0\0\0";
+    machine.command_timeout_ns = 1;
+    CHECK(fcsl_validate(&machine, &error) == 0);
+    machine.arm_field = 5;
+    CHECK(fcsl_validate(&machine, &error) == 0);
+    REFUSED(machine.abi_version = FCSL_ABI_VERSION + 1u, "ABI version 9");
     REFUSED(machine.name = NULL, "name");
     REFUSED(machine.layout_hash = "", "hash");
     static char views[FCSL_VIEWS_BYTES_MAX + 2u];
@@ -127,6 +132,12 @@ static void test_damage(void)
     REFUSED(channels[1].sample_age_offset = machine.size - 2, "channel 1");
     REFUSED(channels[1].stamp_offset = 4, "channel 1");
     REFUSED(channels[1].ros_axes = NULL, "channel 1");
+    REFUSED(machine.arm_field = -2, "arm field");
+    REFUSED(machine.arm_field = (int32_t)machine.field_count, "arm field");
+    REFUSED(machine.arm_field = 3, "arm field"); /* an output, of floats */
+    REFUSED((machine.arm_field = 5, fields[5].role = FCSL_ROLE_STATE), "arm field");
+    REFUSED((channels[3].safe = "", machine.arm_field = 5), "channel 2");
+    REFUSED((channels[2].safe = "", machine.command_timeout_ns = 1), "channel 3");
     REFUSED(instances[1].fault_place_offset = machine.size - 2, "instance 1");
     REFUSED(machine.fault_places = NULL, "incomplete");
     REFUSED(machine.fault_place_count = (1u << 20) + 1u, "incomplete");

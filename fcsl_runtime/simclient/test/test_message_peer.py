@@ -70,6 +70,7 @@ class Native:
             field_count=len(fields),
             channels=(CChannel * len(channels))(*channels),
             channel_count=len(channels),
+            arm_field=-1,
         )
         self._channels = lib.fcsl_channel_table(ctypes.byref(self._machine))
 

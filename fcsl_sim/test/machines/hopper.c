@@ -94,12 +94,13 @@ static const fcsl_transition_t transitions[] = {{UP, DOWN, 0, 1, FCSL_NONE, 0}};
      "",                                                                                                               \
      "",                                                                                                               \
      "",                                                                                                               \
-     ""}
+     "",                                                                                                               \
+     NULL}
 static const fcsl_channel_t channels[] = {
     SENSOR("altitude", 1, POS_Z, 0),
     SENSOR("velocity", 2, VEL_Z, 1),
     {"throttle", 16, FCSL_ACTUATOR, THROTTLE, UINT32_MAX, FCSL_NO_OFFSET, FCSL_NO_OFFSET, FCSL_NO_OFFSET,
-     FCSL_NO_OFFSET, FCSL_NO_OFFSET, FCSL_NO_OFFSET, "", "", "", "", "", ""},
+     FCSL_NO_OFFSET, FCSL_NO_OFFSET, FCSL_NO_OFFSET, "", "", "", "", "", "", NULL},
 };
 
 static int32_t init(void *machine)
@@ -171,6 +172,7 @@ static const fcsl_machine_t hopper = {
     .transition_count = COUNT(transitions),
     .channels = channels,
     .channel_count = COUNT(channels),
+    .arm_field = FCSL_NONE,
     .views = "",
     .init = init,
     .step = step,

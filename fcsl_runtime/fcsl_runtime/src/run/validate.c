@@ -123,7 +123,8 @@ static int check_channel(const fcsl_machine_t *machine, uint32_t index)
         return -1;
     }
     if (channel->direction == FCSL_ACTUATOR) {
-        return 0;
+        const int gated = machine->arm_field != FCSL_NONE || machine->command_timeout_ns > 0;
+        return gated && channel->safe == NULL ? -1 : 0;
     }
     return in_struct(machine, channel->attached_offset, 1, 1) && in_struct(machine, channel->fresh_offset, 1, 1) &&
                    in_struct(machine, channel->valid_offset, 1, 1) && in_struct(machine, channel->age_offset, 4, 4) &&
@@ -131,6 +132,19 @@ static int check_channel(const fcsl_machine_t *machine, uint32_t index)
                    in_struct(machine, channel->stamp_offset, 8, 8)
                ? 0
                : -1;
+}
+
+/* No field, or a bool output. */
+static int is_arm_field(const fcsl_machine_t *machine)
+{
+    if (machine->arm_field == FCSL_NONE) {
+        return 1;
+    }
+    if (!in_range(machine->arm_field, machine->field_count)) {
+        return 0;
+    }
+    const fcsl_field_t *field = &machine->fields[machine->arm_field];
+    return field->role == FCSL_ROLE_OUTPUT && field->type == FCSL_BOOL && field->count == 1;
 }
 
 static int check_fault_place(const fcsl_fault_place_t *place)
@@ -170,6 +184,9 @@ static int check_tables(const fcsl_machine_t *machine, fcsl_error_t *error)
         if (check_channel(machine, i) != 0) {
             return fcsl_fail(error, "machine '%s': channel %u of its descriptor is inconsistent", name, i);
         }
+    }
+    if (!is_arm_field(machine)) {
+        return fcsl_fail(error, "machine '%s': the arm field of its descriptor is no bool output", name);
     }
     for (uint32_t i = 0; i < machine->fault_place_count; i++) {
         if (check_fault_place(&machine->fault_places[i]) != 0) {

@@ -164,6 +164,7 @@ static const fcsl_machine_t bench = {
     .instance_count = COUNT(instances),
     .states = states,
     .state_count = COUNT(states),
+    .arm_field = FCSL_NONE,
     .fault_places = fault_places,
     .fault_place_count = COUNT(fault_places),
     .views = "",

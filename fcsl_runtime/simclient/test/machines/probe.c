@@ -186,7 +186,8 @@ static const fcsl_transition_t transitions[] = {
      "",                                                                                                               \
      "",                                                                                                               \
      "",                                                                                                               \
-     ""}
+     "",                                                                                                               \
+     NULL}
 static const fcsl_channel_t channels[] = {
     CHANNEL("imu.gyro", 1, VEC, 0),
     CHANNEL("imu.attitude", 2, QUAT, 1),
@@ -293,6 +294,7 @@ static const fcsl_machine_t probe = {
     .transition_count = (uint32_t)(sizeof transitions / sizeof transitions[0]),
     .channels = channels,
     .channel_count = ROWS(channels),
+    .arm_field = FCSL_NONE,
     .fault_places = fault_places,
     .fault_place_count = ROWS(fault_places),
     .views = "",
