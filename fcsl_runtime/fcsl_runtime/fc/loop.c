@@ -45,6 +45,7 @@ int loop_open(loop_t *loop)
 
 void loop_free(loop_t *loop)
 {
+    hal_topic_close(&loop->hal_topic);
     free(loop->sensor_bytes);
     free(loop->actuator_bytes);
     fcsl_history_free(&loop->history);
@@ -57,9 +58,9 @@ static uint64_t now_ns(void)
 
 static void publish(loop_t *loop, uint64_t time_ns)
 {
+    loop->hal.count(loop->hal.ctx);
     const fcsl_moment_t moment = {
         .tick = fcsl_run_tick(loop->run), .time_ns = time_ns, .paused = (uint64_t)loop->paused};
-    loop->hal.count(loop->hal.ctx);
     fcsl_history_publish(&loop->history, &moment);
 }
 
@@ -170,6 +171,9 @@ static int act_on_sensors(loop_t *loop, uint64_t begun_ns)
     }
     const int on = arm(loop, message.armed) && goes_on(loop, loop->hal.command(loop->hal.ctx, &message));
     publish(loop, begun_ns);
+    if (loop->recording) {
+        hal_topic_write(&loop->hal_topic, &loop->hal, loop->run);
+    }
     return on;
 }
 

@@ -10,6 +10,7 @@
 #include "fcsl/fcsl_hal.h"
 #include "fcsl/fcsl_telemetry.h"
 #include "fcsl/fcsl_tick_stats.h"
+#include "hal_topic.h"
 #include "pacing.h"
 
 typedef struct {
@@ -22,6 +23,7 @@ typedef struct {
     missed_deadline_t missed_deadline;
     int realtime;       /* paced by the clock; else as fast as the HAL allows */
     int recording;
+    hal_topic_t hal_topic;
     int paused;
     int armed; /* the last command */
 

@@ -154,7 +154,8 @@ static int open_record(program_t *program)
         .lossless = policy == RECORD_BY_PACE ? !loop->realtime : policy == RECORD_WAIT,
         .fields = program->options.record_fields,
     };
-    if (fcsl_run_record(loop->run, &record, &error) != 0) {
+    if (fcsl_run_record(loop->run, &record, &error) != 0 ||
+        hal_topic_open(&loop->hal_topic, &loop->hal, loop->run, record.name_space, &error) != 0) {
         return complain(error.text);
     }
     loop->recording = 1;

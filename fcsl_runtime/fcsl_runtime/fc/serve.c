@@ -93,6 +93,7 @@ static fcsl_vars_status_t stop_recording(void *ctx, fcsl_error_t *error)
     }
     loop->recording = 0;
     loop->record_by_command = 0;
+    hal_topic_close(&loop->hal_topic);
     return result(fcsl_run_record_stop(loop->run, error));
 }
 

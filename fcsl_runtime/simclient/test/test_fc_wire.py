@@ -49,6 +49,9 @@ def test_same_bits_as_in_process(tmp_path: Path) -> None:
     writes = [m for topic, m in messages if topic == "/fixture/record/writes"]
     assert {m.kind for m in writes} == {3} and {m.path for m in writes} == {"imu.gyro", "panel.armed"}
     assert len([m for m in writes if m.path == "panel.armed"]) == 3000
+    counted = [m for topic, m in messages if topic == "/hal"]
+    assert [m.tick for m in counted] == list(range(3000))
+    assert (counted[-1].messages, counted[-1].commands, counted[-1].messages_dropped) == (3000, 3000, 0)
     failed = [m.tick for topic, m in messages if topic == "/fixture/sensors" and m.health == 2]
     assert failed == list(range(105, 121))  # last sample at 99, max_age_ticks 5
 

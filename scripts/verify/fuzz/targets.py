@@ -56,13 +56,13 @@ TARGETS = (
         inputs=20_000,
     ),
     Target(
-        "hal_wire",
+        "wire_controller",
         "a wire, controller's end",
         "socket, serial line",
         Defect(f"{_HAL}/hal_wire.c", "heard.tick < tick || heard.size > capacity", "heard.tick < tick"),
     ),
     Target(
-        "external",
+        "wire_simulator",
         "a wire, simulator's end",
         "socket, serial line",
         Defect(f"{_HAL}/external.c", "if (message->tick > tick) {", "if (0) {"),

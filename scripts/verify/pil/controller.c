@@ -28,7 +28,14 @@ static volatile uint32_t *const INTERRUPT_CLEAR = (volatile uint32_t *)0xe000e28
 /* The timer of the processor: a link tick a millisecond. */
 static volatile uint32_t *const TIMER = (volatile uint32_t *)0xe000e010u;
 static volatile uint32_t *const INTERRUPT_STATE = (volatile uint32_t *)0xe000ed04u;
-enum { TIMER_CONTROL = 0, TIMER_RELOAD = 1, TIMER_VALUE = 2, TIMER_ON = 7, TIMER_PASSED = 1 << 16, TIMER_CLEAR = 1 << 25 };
+enum {
+    TIMER_CONTROL = 0,
+    TIMER_RELOAD = 1,
+    TIMER_VALUE = 2,
+    TIMER_ON = 7,
+    TIMER_PASSED = 1 << 16,
+    TIMER_CLEAR = 1 << 25
+};
 enum { CLOCK_HZ = 25000000, LINK_HZ = 1000 };
 
 static _Alignas(16) uint8_t machine[MACHINE_BYTES];
@@ -152,7 +159,8 @@ static int fly(const fcsl_channel_table_t *table)
         fcsl_message_t message;
         d->step(machine, &host);
         hash = stimulus_hash(d, machine, hash);
-        if (fcsl_message_encode_actuators(table, machine, tick, ARMED_IN_SIMULATION, bytes, sizeof bytes, &message) != 0) {
+        if (fcsl_message_encode_actuators(table, machine, tick, ARMED_IN_SIMULATION, bytes, sizeof bytes, &message) !=
+            0) {
             return 9; /* main has seen that there is room */
         }
         send_message(message.size);
