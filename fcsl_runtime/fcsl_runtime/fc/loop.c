@@ -137,6 +137,10 @@ static int act_on_sensors(loop_t *loop, uint64_t begun_ns)
         fail(loop, "the actuator message does not fit its buffer");
         return 0;
     }
+    if (fcsl_guard_command(&loop->guard, &message) != 0) {
+        fail(loop, "the actuator message does not fit the slot of fcsl-guard");
+        return 0;
+    }
     const int on = goes_on(loop, loop->hal.actuate(loop->hal.ctx, &message));
     publish(loop, begun_ns);
     return on;
