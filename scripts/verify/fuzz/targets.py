@@ -43,6 +43,13 @@ TARGETS = (
         Defect(f"{_HAL}/codec_check.c", "if (end - at < entry->size) {", "if (0) {"),
     ),
     Target(
+        "guard_slot",
+        "the slot of fcsl-guard",
+        "shared memory",
+        Defect(f"{_HAL}/guard_slot.c", "said <= server->capacity ? (size_t)said : 0u", "(size_t)said"),
+        longest=512,
+    ),
+    Target(
         "wire_controller",
         "the wire, controller's end",
         "socket",

@@ -120,7 +120,11 @@ static const fcsl_machine_t guarded = {
     .source_hash = HASH,
     .layout_hash = HASH,
     .build_hash = HASH,
+#ifdef TICK_HZ
+    .tick_hz = TICK_HZ,
+#else
     .tick_hz = 100,
+#endif
     .size = sizeof(guarded_t),
     .align = _Alignof(guarded_t),
     .current_offset = AT(current),
