@@ -84,7 +84,8 @@ void guard_period(guard_t *guard)
     const fcsl_gate_state_t before = guard->gate.state;
     take_command(guard);
     fcsl_gate_wait(&guard->gate, fcsl_run_monotonic_ns(NULL), guard->data);
-    guard->silences += guard->gate.state == FCSL_GATE_SILENT && before != FCSL_GATE_SILENT;
+    guard->changes += guard->gate.state != before;
+    guard->silences += guard->gate.state != before && guard->gate.state == FCSL_GATE_SILENT;
     (void)outputs_write(&guard->outputs, guard->data);
     guard->periods++;
     guard->turned_away += fcsl_guard_look(&guard->server) == FCSL_GUARD_REFUSED;

@@ -24,6 +24,7 @@ typedef struct {
     uint64_t commands;
     uint64_t refused; /* commands that did not check out */
     const char *refusal; /* why the last one did not */
+    uint64_t changes; /* of the gate's state */
     uint64_t silences;
     uint64_t turned_away; /* flight programs that came while another one had the slot */
 } guard_t;

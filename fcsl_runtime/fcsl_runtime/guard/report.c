@@ -8,7 +8,9 @@
 
 #include "log.h"
 
-static const uint64_t PAUSE_NS = 100000000u;
+static const uint64_t LINE_NS = 100000000u; /* what a line costs */
+static const uint64_t SAVED_NS = 2000000000u; /* what can be saved for lines */
+static const uint64_t COUNT_NS = 1000000000u; /* between two lines of a counter */
 
 static void report_state(const guard_t *guard)
 {
@@ -48,54 +50,59 @@ static void report_missed(const outputs_t *outputs)
     }
 }
 
-/* Stores `now` as told and returns 1 when it is news. */
-static int is_news(uint64_t *told, uint64_t now)
+/* Whether a counter is to be printed now. */
+static int is_due(report_count_t *count, uint64_t value, uint64_t now_ns)
 {
-    const int news = *told != now;
-    *told = now;
-    return news;
+    if (count->told == value || now_ns < count->next_ns) {
+        return 0;
+    }
+    count->told = value;
+    count->next_ns = now_ns + COUNT_NS;
+    return 1;
 }
 
-static int report_counts(report_t *report, const guard_t *guard)
+static void report_counts(report_t *report, const guard_t *guard, uint64_t now_ns)
 {
-    const int refused = is_news(&report->refused, guard->refused);
-    const int turned_away = is_news(&report->turned_away, guard->turned_away);
-    const int missed = is_news(&report->missed, outputs_missed(&guard->outputs));
-    const int late = is_news(&report->periods_missed, guard->periods_missed);
-    if (refused) {
+    if (is_due(&report->refused, guard->refused, now_ns)) {
         log_error("refused a command: %s (%" PRIu64 " so far)", guard->refusal, guard->refused);
     }
-    if (turned_away) {
+    if (is_due(&report->turned_away, guard->turned_away, now_ns)) {
         log_error("turned away a flight program: another one has the slot (%" PRIu64 " so far)", guard->turned_away);
     }
-    if (missed) {
+    if (is_due(&report->missed, outputs_missed(&guard->outputs), now_ns)) {
         report_missed(&guard->outputs);
     }
-    if (late) {
+    if (is_due(&report->periods_missed, guard->periods_missed, now_ns)) {
         log_error("woke too late: %" PRIu64 " periods missed so far", guard->periods_missed);
     }
-    return refused || turned_away || missed || late;
+}
+
+/* Whether there is time for a line, which is then paid. */
+static int pay(report_t *report, uint64_t now_ns)
+{
+    const uint64_t oldest_ns = now_ns > SAVED_NS ? now_ns - SAVED_NS : 0u;
+    if (report->paid_ns < oldest_ns) {
+        report->paid_ns = oldest_ns;
+    }
+    if (report->paid_ns + LINE_NS > now_ns) {
+        return 0;
+    }
+    report->paid_ns += LINE_NS;
+    return 1;
 }
 
 void report_changes(report_t *report, const guard_t *guard, uint64_t now_ns)
 {
-    if (now_ns < report->next_ns) {
-        return;
-    }
     const int32_t pid = guard->server.client >= 0 ? guard->server.client_pid : 0;
-    const int program = pid != report->pid;
-    const int state = guard->gate.state != report->state;
-    if (program) {
+    if (pid != report->pid && pay(report, now_ns)) {
         report_program(report->pid, pid);
         report->pid = pid;
     }
-    if (state) {
+    if (guard->changes != report->changes && pay(report, now_ns)) {
         report_state(guard);
-        report->state = guard->gate.state;
+        report->changes = guard->changes;
     }
-    if (report_counts(report, guard) || program || state) {
-        report->next_ns = now_ns + PAUSE_NS;
-    }
+    report_counts(report, guard, now_ns);
 }
 
 void report_end(const guard_t *guard)

@@ -7,18 +7,24 @@
 
 #include "guard.h"
 
-/* What was printed last. */
+/* A counter, as it was printed last. */
 typedef struct {
-    uint64_t next_ns; /* nothing is printed before: whoever sends nonsense does not fill the log */
-    fcsl_gate_state_t state;
+    uint64_t told;
+    uint64_t next_ns; /* not printed again before */
+} report_count_t;
+
+typedef struct {
+    uint64_t paid_ns; /* lines of what comes and goes are paid for with time */
+    uint64_t changes; /* of the gate's state, that were printed */
     int32_t pid; /* of the flight program; 0: none */
-    uint64_t refused;
-    uint64_t turned_away;
-    uint64_t missed;
-    uint64_t periods_missed;
+    report_count_t refused;
+    report_count_t turned_away;
+    report_count_t missed;
+    report_count_t periods_missed;
 } report_t;
 
-/* Prints what has changed, ten times a second at most. */
+/* Prints what has changed since the last call. Whoever flaps or sends nonsense does not fill the log: states and programs that
+ * come and go have 20 lines, and another one every 0.1 s; a counter is printed once a second at most. */
 void report_changes(report_t *report, const guard_t *guard, uint64_t now_ns);
 /* The counters, at the end. */
 void report_end(const guard_t *guard);

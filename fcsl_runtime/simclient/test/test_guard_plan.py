@@ -189,7 +189,7 @@ def test_a_channel_without_a_driver(library: Path, tmp_path: Path) -> None:
 
 @pytest.mark.parametrize(
     ("macro", "reason"),
-    [("NO_ARM", 'name a bool output as "arm" in its JSON'), ("NO_TIMEOUT", 'give "command_timeout_s" in its JSON')],
+    [("NO_ARM", 'name a bool output as "arm" in its JSON'), ("TIMEOUT_NS=0", 'give "command_timeout_s" in its JSON')],
 )
 def test_a_machine_that_cannot_be_guarded(
     macro: str, reason: str, build_guarded: Callable[..., Path], tmp_path: Path

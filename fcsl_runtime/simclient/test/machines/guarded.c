@@ -1,7 +1,7 @@
 /* SPDX-License-Identifier: Apache-2.0
  *
  * A machine written by hand against the ABI for fcsl-guard: a client of fcsl-fc sets what it commands and whether it is armed,
- * and can make its step hang. 100 Hz; the actuators keep a command for 0.2 s. Macros take away what fcsl-guard needs.
+ * and can make its step hang. 100 Hz; the actuators keep a command for 0.2 s. Macros change that.
  */
 #include <math.h>
 #include <string.h>
@@ -110,6 +110,12 @@ static void force_state(void *machine, int32_t state)
 }
 
 #define COUNT(table) (uint32_t)(sizeof(table) / sizeof(table)[0])
+#ifndef TIMEOUT_NS
+#define TIMEOUT_NS 200000000u
+#endif
+#ifndef TICK_HZ
+#define TICK_HZ 100
+#endif
 #ifndef HASH
 #define HASH "5555555555555555555555555555555555555555555555555555555555555555"
 #endif
@@ -120,11 +126,7 @@ static const fcsl_machine_t guarded = {
     .source_hash = HASH,
     .layout_hash = HASH,
     .build_hash = HASH,
-#ifdef TICK_HZ
     .tick_hz = TICK_HZ,
-#else
-    .tick_hz = 100,
-#endif
     .size = sizeof(guarded_t),
     .align = _Alignof(guarded_t),
     .current_offset = AT(current),
@@ -144,9 +146,7 @@ static const fcsl_machine_t guarded = {
 #else
     .arm_field = ARMED,
 #endif
-#ifndef NO_TIMEOUT
-    .command_timeout_ns = 200000000u,
-#endif
+    .command_timeout_ns = TIMEOUT_NS,
     .views = "",
     .init = init,
     .step = step,
