@@ -6,6 +6,7 @@
 #include <stdlib.h>
 #include <string.h>
 
+#include "actuators.h"
 #include "clock.h"
 #include "fail.h"
 #include "fcsl/fcsl_scalar.h"
@@ -237,7 +238,8 @@ int fcsl_sim_actuate_message(fcsl_sim_t *sim, const fcsl_message_t *message, fcs
         return fcsl_sim_fail(error, "actuator message of tick %llu where that of tick %llu is due",
                              (unsigned long long)message->tick, (unsigned long long)sim->tick);
     }
-    fcsl_message_apply(sim->machine, sim->image, message);
+    fcsl_gate_command(&sim->gate, message, (uint64_t)sim->time_ns, sim->image);
+    fcsl_actuators_update(sim);
     sim->sensed = 0;
     sim->tick++;
     if (sim->plan.until != FCSL_UNTIL_NONE) {
