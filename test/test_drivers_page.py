@@ -90,7 +90,7 @@ def test_the_motor(winch: Path, tmp_path: Path, started: list[subprocess.Popen[s
     (tmp_path / "hoist.py").write_text(HOIST)
     (tmp_path / "hoist.json").write_text(json.dumps(CONFIG))
     library, slot = str(build_machine(tmp_path / "hoist.json", "simulation").library), tmp_path / "slot"
-    program, *arguments = shlex.split(block("sh", 1).replace("/run/hoist/slot", str(slot)))
+    program, *arguments = shlex.split(block("sh", 1).replace("\\\n", "").replace("/run/hoist/slot", str(slot)))
     assert program == "fcsl-guard" and arguments[0] == "libhoist.so"
     arguments = [a.replace("/sys/class/winch/0", "0") for a in arguments[1:]]
     guard = subprocess.Popen([BIN / program, library, *arguments], cwd=winch, stdout=subprocess.PIPE, text=True)

@@ -13,7 +13,7 @@
 #include "base/error.h"
 #include "fcsl/fcsl_library.h"
 #include "log.h"
-#include "options.h"
+#include "guard_options.h"
 #include "realtime.h"
 #include "report.h"
 

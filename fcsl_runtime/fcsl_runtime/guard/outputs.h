@@ -6,7 +6,7 @@
 #define GUARD_OUTPUTS_H
 
 #include "fcsl/fcsl_driver.h"
-#include "plan.h"
+#include "output_plan.h"
 
 enum { OUTPUT_REASON_BYTES = 160 };
 

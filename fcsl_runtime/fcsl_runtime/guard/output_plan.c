@@ -2,7 +2,7 @@
  *
  * Reads the plan of outputs.
  */
-#include "plan.h"
+#include "output_plan.h"
 
 #include <stdio.h>
 #include <string.h>

@@ -2,8 +2,8 @@
  *
  * What drives which channel, as the command line says it.
  */
-#ifndef GUARD_PLAN_H
-#define GUARD_PLAN_H
+#ifndef GUARD_OUTPUT_PLAN_H
+#define GUARD_OUTPUT_PLAN_H
 
 #include "fcsl/fcsl_run.h"
 
@@ -21,4 +21,4 @@ typedef struct {
 int plan_read(const fcsl_machine_t *machine, const char *const *texts, uint32_t count, plan_entry_t *entries,
               fcsl_error_t *error);
 
-#endif /* GUARD_PLAN_H */
+#endif /* GUARD_OUTPUT_PLAN_H */

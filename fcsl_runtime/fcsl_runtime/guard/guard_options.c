@@ -3,7 +3,7 @@
  * The command line of fcsl-guard.
  */
 #define _GNU_SOURCE
-#include "options.h"
+#include "guard_options.h"
 
 #include <errno.h>
 #include <getopt.h>
