@@ -17,11 +17,10 @@ from contextlib import contextmanager
 from dataclasses import dataclass
 from pathlib import Path
 
-from native import _built
+from native import GUARD
 
 from simclient.link.message import Channel, Kind, Message, encode
 
-GUARD = _built("FCSL_TEST_GUARD", "fcsl-guard")
 #: Of machines/guarded.c.
 TABLE = [Channel(1, False, 6), Channel(513, True, 6), Channel(514, True, 0)]
 SAFE = {"number": -1.0, "flag": 1.0}

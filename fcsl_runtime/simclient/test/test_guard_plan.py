@@ -11,7 +11,8 @@ from pathlib import Path
 
 import pytest
 from conftest import CFLAGS, ROOT
-from guarding import GUARD, Slot, command, guarding, log_writes, wait_for
+from guarding import Slot, command, guarding, log_writes, wait_for
+from native import GUARD
 
 #: A library of drivers, and the defects that a macro puts into the first one. The device is a file that must exist.
 DRIVERS = """

@@ -49,7 +49,10 @@ SUITES = (
         "fcsl-fc: socket, wire, board, watchdog, signals, guard",
         # Sanitizers lock no memory.
         (
-            *(f"fcsl_runtime/simclient/test/test_{n}.py" for n in ("fc", "fc_wire", "fc_time", "fc_telemetry", "guard")),
+            *(
+                f"fcsl_runtime/simclient/test/test_{n}.py"
+                for n in ("fc", "fc_wire", "fc_time", "fc_telemetry", "guard")
+            ),
             "-k",
             "not locking and not pinned",
         ),
