@@ -12,8 +12,8 @@
 
 #include "base/error.h"
 #include "fcsl/fcsl_library.h"
-#include "log.h"
 #include "guard_options.h"
+#include "log.h"
 #include "realtime.h"
 #include "report.h"
 
@@ -87,7 +87,7 @@ static int open_outputs(program_t *program, fcsl_error_t *error)
         outputs_open(guard->machine, program->plan, options->actuator_count, &guard->outputs, error) != 0) {
         return -1;
     }
-    /* Before anybody can command anything. */
+    /* Before a flight program gets the slot. */
     (void)guard_make_safe(guard);
     return 0;
 }
@@ -100,10 +100,10 @@ static int open_all(program_t *program)
     program->realtime =
         (realtime_t){.priority = (int)options->priority, .lock_memory = options->lock_memory, .cpu = -1};
     guard->server = (fcsl_guard_server_t){.listener = -1, .client = -1, .memory = -1};
+    /* The slot before the devices: those of a guard that has it already are left alone. */
     if (realtime_begin(&program->realtime, &error) != 0 || open_machine(program, &error) != 0 ||
-        open_outputs(program, &error) != 0 ||
         fcsl_guard_listen(options->slot, guard->machine, &guard->server, error.text, sizeof error.text) != 0 ||
-        realtime_enter(&program->realtime, &error) != 0) {
+        open_outputs(program, &error) != 0 || realtime_enter(&program->realtime, &error) != 0) {
         return complain(error.text);
     }
     return 0;

@@ -220,8 +220,10 @@ def test_the_command_line(library: Path, tmp_path: Path) -> None:
 
 def test_a_slot_in_use_is_left_alone(library: Path, tmp_path: Path) -> None:
     with guarding(library, tmp_path) as guard:
-        code, err = run(library, "--slot", guard.slot, "--actuator", VALVE, "--actuator", "cart.force=none")
+        device = tmp_path / "device"
+        code, err = run(library, "--slot", guard.slot, "--actuator", VALVE, "--actuator", f"cart.force=log:{device}")
         assert code == 1 and "is in use by another process" in err
+        assert not device.exists()  # nor are the devices touched
         assert (guard.slot.stat().st_mode & 0o777) == 0o600
         Slot(guard.slot).close()
 
