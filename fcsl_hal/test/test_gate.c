@@ -155,6 +155,17 @@ static void test_any_course(void)
     CHECK(counts[FCSL_GATE_DISARMED] > 100 && counts[FCSL_GATE_ARMED] > 100 && counts[FCSL_GATE_SILENT] > 100);
 }
 
+static void test_armed(void)
+{
+    data_t data = {0};
+    fcsl_machine_t machine = MACHINE;
+    CHECK(fcsl_is_armed(&machine, &data)); /* nothing arms it */
+    machine.arm_field = 0; /* `flag` */
+    CHECK(!fcsl_is_armed(&machine, &data));
+    data.flag = 1;
+    CHECK(fcsl_is_armed(&machine, &data));
+}
+
 static void test_texts(void)
 {
     CHECK(strcmp(fcsl_gate_state_text(FCSL_GATE_DISARMED), "disarmed") == 0);
@@ -168,6 +179,7 @@ int main(void)
     test_timeout();
     test_what_is_written();
     test_any_course();
+    test_armed();
     test_texts();
     return 0;
 }

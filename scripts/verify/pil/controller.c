@@ -10,11 +10,10 @@
 #include <string.h>
 
 #include "bits.h"
-#include "fcsl/fcsl_codec.h"
+#include "fcsl/fcsl_gate.h"
 #include "fcsl/fcsl_scalar.h"
 #include "stimulus.h"
 
-enum { ARMED_IN_SIMULATION = 1 };
 enum { MACHINE_BYTES = 1 << 20, PACKET_MAX = 1 << 12, HELLO_BYTES = 20, HELLO = 1, END = 3, KIND_AT = 6 };
 
 /* The first serial port of the board (ARM's CMSDK UART), whose receiver is interrupt 0. */
@@ -114,8 +113,8 @@ static int fly(const fcsl_channel_table_t *table)
         fcsl_message_apply(d, machine, &message);
         d->step(machine, &host);
         hash = stimulus_hash(d, machine, hash);
-        if (fcsl_message_encode_actuators(table, machine, expected, ARMED_IN_SIMULATION, packet, sizeof packet,
-                                          &message) != 0) {
+        const int armed = fcsl_is_armed(d, machine);
+        if (fcsl_message_encode_actuators(table, machine, expected, armed, packet, sizeof packet, &message) != 0) {
             return 9; /* main has seen that there is room */
         }
         send_packet(message.size);

@@ -110,7 +110,8 @@ def on_target(config: SimConfig, program: Path) -> Flight:
 def flight_computer(sources: Sources, folder: str) -> Path:
     """The program for the processor: one machine, the channel codec, controller.c."""
     hal = ROOT / "fcsl_hal" / "src"
-    platform = [PIL / "controller.c", SHARED / "stimulus.c", hal / "codec.c", hal / "codec_check.c", hal / "crc32.c"]
+    codec = [hal / name for name in ("codec.c", "codec_check.c", "crc32.c", "gate.c")]
+    platform = [PIL / "controller.c", SHARED / "stimulus.c", *codec]
     includes = Sources(sources.machines, (*sources.includes, package_prefix("fcsl_hal") / "include"))
     return build(CORTEX_M7, includes, OUT / "pil" / folder, platform)
 

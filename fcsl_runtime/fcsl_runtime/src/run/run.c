@@ -7,6 +7,7 @@
 #include <stdlib.h>
 #include <time.h>
 
+#include "fcsl/fcsl_gate.h"
 #include "fcsl/fcsl_scalar.h"
 #include "substitution.h"
 #include "record/recorder.h"
@@ -84,19 +85,13 @@ int fcsl_run_restore(fcsl_run_t *run, const void *bytes, uint32_t size, fcsl_err
     return 0;
 }
 
-/* A machine without an arm field is armed in simulation; real actuators refuse it (docs/arming.md). */
-static int is_armed(const fcsl_run_t *run)
-{
-    const fcsl_machine_t *machine = run->machine;
-    return machine->arm_field == FCSL_NONE || run->data[machine->fields[machine->arm_field].offset] != 0u;
-}
-
 int fcsl_run_actuate_message(const fcsl_run_t *run, uint8_t *bytes, size_t capacity, fcsl_message_t *message)
 {
     const uint64_t completed = fcsl_run_tick(run);
     const uint64_t tick = completed == 0 ? 0 : completed - 1u;
+    const int armed = fcsl_is_armed(run->machine, run->data);
     const fcsl_message_status_t status =
-        fcsl_message_encode_actuators(&run->channels, run->data, tick, is_armed(run), bytes, capacity, message);
+        fcsl_message_encode_actuators(&run->channels, run->data, tick, armed, bytes, capacity, message);
     return status == FCSL_MESSAGE_OK ? 0 : -1;
 }
 
