@@ -89,7 +89,7 @@ def test_the_dropout_example(fly):
         assert sim.get("lander.outputs.touchdown_speed") < MAX_TOUCHDOWN_SPEED
 
 
-def test_the_engine_is_armed_until_touchdown(fly):
+def test_the_engine_is_armed_until_it_has_landed(fly):
     """From the first tick on; on the ground the valve gets the safe throttle."""
     with fly(1) as sim:
         armed = []

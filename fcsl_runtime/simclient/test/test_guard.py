@@ -14,6 +14,7 @@ from contextlib import contextmanager
 from pathlib import Path
 
 import pytest
+from conftest import ROOT
 from guarding import COMMAND, PATIENCE_S, SAFE, TIMEOUT_S, Guard, Slot, command, guarding, wait_for
 from native import Client, Fc, flying
 
@@ -238,6 +239,15 @@ def test_a_stopped_guard_knows_how_old_its_command_is(guard: Guard) -> None:
     guard.wait_line("periods missed so far")
     assert -77.0 not in {write.values["number"] for write in guard.writes()}
     slot.close()
+
+
+def test_the_page_names_tests_that_there_are() -> None:
+    page = (ROOT / "docs/guard.md").read_text()
+    named = set(re.findall(r"`(test_\w+)`", page))
+    files = (Path(__file__), Path(__file__).with_name("test_guard_plan.py"))
+    assert len(named) > 10 and named <= {
+        n for file in files for n in re.findall(r"^def (test_\w+)", file.read_text(), re.M)
+    }
 
 
 def test_without_a_guard_nothing_starts(library: Path, tmp_path: Path) -> None:

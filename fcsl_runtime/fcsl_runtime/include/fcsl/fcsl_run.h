@@ -83,6 +83,9 @@ uint64_t fcsl_run_messages_refused(const fcsl_run_t *run);
 int64_t fcsl_run_actuate(const fcsl_run_t *run, uint8_t *bytes, size_t capacity);
 /* The same as a message; 0, or -1. */
 int fcsl_run_actuate_message(const fcsl_run_t *run, uint8_t *bytes, size_t capacity, fcsl_message_t *message);
+/* A struct of the machine of which the fields of actuator channels hold what the actuators get after the last tick: its own
+ * while it is armed, and one with their safe values. */
+const void *fcsl_run_actuator_data(const fcsl_run_t *run);
 /* The channels of its machine. */
 const fcsl_channel_table_t *fcsl_run_channels(const fcsl_run_t *run);
 

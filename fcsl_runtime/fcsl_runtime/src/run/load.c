@@ -9,6 +9,7 @@
 
 #include "cover.h"
 #include "fault_place.h"
+#include "fcsl/fcsl_gate.h"
 #include "fcsl/fcsl_library.h"
 #include "fcsl/fcsl_scalar.h"
 #include "hardware.h"
@@ -86,6 +87,14 @@ static int allocate(fcsl_run_t *run, fcsl_error_t *error)
     }
     memset(run->data, 0, size);
     memset(run->staging, 0, size);
+    if (machine->arm_field != FCSL_NONE) {
+        run->safe = aligned_alloc(align, size);
+        if (run->safe == NULL) {
+            return fcsl_fail(error, "out of memory for machine '%s'", machine->name);
+        }
+        memset(run->safe, 0, size);
+        (void)fcsl_gate(machine, run->safe);
+    }
     for (uint32_t i = 0; i < machine->instance_count; i++) {
         if (fcsl_layout_build(machine, &machine->instances[i], &run->layouts[i], error) != 0) {
             return -1;
@@ -128,6 +137,7 @@ static void release(fcsl_run_t *run)
     free(run->verdicts);
     free(run->data);
     free(run->staging);
+    free(run->safe);
     free(run->views);
     if (run->library != NULL) {
         (void)dlclose(run->library);

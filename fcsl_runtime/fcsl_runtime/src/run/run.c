@@ -95,6 +95,11 @@ int fcsl_run_actuate_message(const fcsl_run_t *run, uint8_t *bytes, size_t capac
     return status == FCSL_MESSAGE_OK ? 0 : -1;
 }
 
+const void *fcsl_run_actuator_data(const fcsl_run_t *run)
+{
+    return fcsl_is_armed(run->machine, run->data) ? run->data : run->safe;
+}
+
 int64_t fcsl_run_actuate(const fcsl_run_t *run, uint8_t *bytes, size_t capacity)
 {
     fcsl_message_t message;
