@@ -19,7 +19,7 @@
 #include "fcsl/fcsl_check.h"
 #include "fcsl/fcsl_guard.h"
 
-enum { PATH_BYTES = 64, TEXT_BYTES = 512, TAKES = 20000, SECONDS_MAX = 5 };
+enum { PATH_BYTES = 64, TEXT_BYTES = 512, TAKES = 500, SECONDS_MAX = 2 };
 
 static char folder[] = "/tmp/guard_slot.XXXXXX";
 static char path[PATH_BYTES];
