@@ -10,6 +10,7 @@ ALONE = {
     "chain": "chain",
     "checkpoint": "checkpoint",
     "lateness": "lateness",
+    "link": "link.main",
     "linear": "linear.main",
     "process": "process",
     "record": "record",
