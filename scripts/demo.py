@@ -25,6 +25,7 @@ from simclient import bag as bags
 ROOT = Path(__file__).resolve().parent.parent
 OUT = ROOT / "out" / "demo"
 SIM = "examples/lander/sim/lander.sim.json"
+SERIAL_SIM = "examples/lander/sim/lander_serial.sim.json"
 CONFIG = "examples/lander/fc/lander_control.json"
 SEED = "7"
 #: A bag of a real robot is data, not part of the project: FCSL_JACKAL_BAG, or the folder where this project's data lies.
@@ -130,15 +131,29 @@ def fly_in_process() -> dict[str, Any]:
     return summary
 
 
-def fly_as_process(library: Path) -> None:
-    headline("3. fly: the same library as a flight program of its own")
+def fly_as_process(library: Path, sim_file: str, bag: Path) -> str:
+    """The flight program in a process of its own; what the simulator printed."""
     with tempfile.TemporaryDirectory(prefix="fcsl-") as folder:
         socket = Path(folder) / "wire"
-        with Background("fcsl-sim", "run", SIM, "--seed", SEED, "--controller", f"wire:{socket}") as sim:
+        with Background("fcsl-sim", "run", sim_file, "--seed", SEED, "--external", f"wire:unix:{socket}") as sim:
             wait_for(socket, sim)
-            with Background("fcsl-fc", library, "--hal", f"wire:{socket}", "--record", OUT / "own_process") as fc:
-                sim.finish()
+            with Background("fcsl-fc", library, "--hal", f"wire:unix:{socket}", "--record", bag) as fc:
+                printed = sim.finish()
                 say(fc.finish().rstrip())
+    return printed
+
+
+def fly_own_process(library: Path) -> None:
+    headline("3. fly: the same library as a flight program of its own")
+    fly_as_process(library, SIM, OUT / "own_process")
+
+
+def fly_over_lossy_line(library: Path) -> None:
+    headline("4. fly: virtual HIL over a serial line that loses 10 % of the frames and damages 5 %")
+    printed = fly_as_process(library, SERIAL_SIM, OUT / "serial_line")
+    for text in printed.splitlines():
+        if text.strip().startswith("line.outputs."):
+            say(text)
 
 
 def wait_for(path: Path, process: Background) -> None:
@@ -150,7 +165,7 @@ def wait_for(path: Path, process: Background) -> None:
 
 
 def fly_over_ros(ticks: int) -> None:
-    headline("4. fly: two ROS 2 nodes in lock-step on simulated time, a third process listening")
+    headline("5. fly: two ROS 2 nodes in lock-step on simulated time, a third process listening")
     with own_domain() as domain:  # so that no other node of this machine joins in
         counts = nodes_in_lockstep({"ROS_DOMAIN_ID": str(domain)})
     for topic, count in sorted(counts.items()):
@@ -185,25 +200,25 @@ def nodes_in_lockstep(env: dict[str, str]) -> dict[str, int]:
 
 
 def compare_bits() -> None:
-    headline("5. compare: every output, state and health of every tick, bit for bit")
+    headline("6. compare: every output, state and health of every tick, bit for bit")
     digests = {}
-    for name in ("in_process", "own_process", "ros"):
+    for name in ("in_process", "own_process", "serial_line", "ros"):
         digests[name] = run(sys.executable, "-m", "simclient.bag", "digest", OUT / name, quiet=True).split()[0]
         say(f"  {digests[name]}")
     if len(set(digests.values())) != 1:
-        raise DemoError(f"the three flights differ: {digests}")
-    say("  the three flights are the same")
+        raise DemoError(f"the flights differ: {digests}")
+    say("  the four flights are the same")
 
 
 def replay_and_look() -> None:
-    headline("6. replay the ROS flight into AlgTwin, and look at it")
+    headline("7. replay the ROS flight into AlgTwin, and look at it")
     run(sys.executable, "-m", "simclient.replay", OUT / "ros", "--config", CONFIG)
     run(sys.executable, "-m", "simclient.to_rerun", OUT / "in_process", "-o", OUT / "lander.rrd")
     run(sys.executable, "-m", "simclient.plot", OUT / "in_process", "-o", OUT / "lander.png")
 
 
 def real_robot() -> bool:
-    headline("7. a real robot's bag through the attitude filter")
+    headline("8. a real robot's bag through the attitude filter")
     if not JACKAL.is_dir():
         say(
             f"no bag at {JACKAL}: this step is left out (FCSL_JACKAL_BAG names a bag with sensor_msgs/Imu on /imu/data)"
@@ -224,7 +239,7 @@ def real_robot() -> bool:
 
 def summarise(flight: dict[str, Any], robot: bool) -> None:
     headline("done")
-    bags = ["in_process", "own_process", "ros", *(["ahrs"] if robot else [])]
+    bags = ["in_process", "own_process", "serial_line", "ros", *(["ahrs"] if robot else [])]
     for name in bags:
         size = sum(f.stat().st_size for f in (OUT / name).iterdir())
         say(f"  bag      {shown(OUT / name)}  ({size / 1e6:.1f} MB)")
@@ -233,10 +248,11 @@ def summarise(flight: dict[str, Any], robot: bool) -> None:
         say(f"  picture  {shown(OUT / (name + '.png'))}")
         say(f"  rerun    {shown(OUT / (name + '.rrd'))}   (rerun {shown(OUT / (name + '.rrd'))})")
     if not robot:
-        say("  left out: step 7, the real robot's bag")
+        say("  left out: step 8, the real robot's bag")
     speed = flight["truth"]["lander.outputs.touchdown_speed"]
     say(
-        f"  touchdown {speed:.2f} m/s, {flight['ticks']} ticks identical in one process, two processes and two ROS 2 nodes"
+        f"  touchdown {speed:.2f} m/s, {flight['ticks']} ticks identical in one process, in two, over a lossy serial line and in "
+        "two ROS 2 nodes"
     )
 
 
@@ -247,7 +263,9 @@ def main() -> int:
     try:
         compile_step()
         flight = fly_in_process()
-        fly_as_process(OUT / "build" / "liblander_control.so")
+        library = OUT / "build" / "liblander_control.so"
+        fly_own_process(library)
+        fly_over_lossy_line(library)
         fly_over_ros(flight["ticks"])
         compare_bits()
         replay_and_look()

@@ -98,14 +98,14 @@ def test_a_killed_flight_program_is_not_in_the_way(library: Path, tmp_path: Path
 
 def test_a_killed_simulator_is_not_in_the_way(library: Path, tmp_path: Path) -> None:
     moments, wire, place = random.Random(4), tmp_path / "wire", tmp_path / "socket"
-    line = ["fcsl-sim", "run", str(SIM), "--controller", f"wire:{wire}", "--socket", str(place)]
+    line = ["fcsl-sim", "run", str(SIM), "--external", f"wire:unix:{wire}", "--socket", str(place)]
     usual = whole_life(line, "waiting for a controller")
     for _ in range(5):
         killed(line, moments.uniform(0, 1.2 * usual))
     with started(line) as simulator:
         announced(simulator, "waiting for a controller")
         done = subprocess.run(
-            ["fcsl-fc", library, "--hal", f"wire:{wire}"],
+            ["fcsl-fc", library, "--hal", f"wire:unix:{wire}"],
             capture_output=True,
             text=True,
             timeout=_TIMEOUT_S,

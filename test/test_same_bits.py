@@ -37,13 +37,13 @@ def in_process(bag: Path, seed: int) -> str:
 def as_process(bag: Path, seed: int, library: Path, folder: Path) -> str:
     """The simulator listens, the flight program connects; they advance in lock-step."""
     socket = folder / "wire"
-    line = ["fcsl-sim", "run", str(SIM), "--seed", str(seed), "--controller", f"wire:{socket}"]
+    line = ["fcsl-sim", "run", str(SIM), "--seed", str(seed), "--external", f"wire:unix:{socket}"]
     with subprocess.Popen(line, stdout=subprocess.PIPE, text=True) as simulator:
         assert simulator.stdout
         assert simulator.stdout.readline().startswith("waiting for a controller")
         while not socket.exists():
             assert simulator.poll() is None
-        run("fcsl-fc", library, "--hal", f"wire:{socket}", "--record", bag)
+        run("fcsl-fc", library, "--hal", f"wire:unix:{socket}", "--record", bag)
         assert simulator.wait(timeout=60) == 0
     return digest(bag)
 

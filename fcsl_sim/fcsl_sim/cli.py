@@ -19,7 +19,7 @@ from fcsl_compiler.base.diagnostics import DiagnosticError
 from fcsl_compiler.base.version import add_version
 
 from .codes import SIM_CODES
-from .config import SimConfig, load
+from .config import SERIAL_LINK, SimConfig, load
 from .errors import SimError
 from .models import Scalar
 from .output import show
@@ -118,9 +118,10 @@ def _parser() -> argparse.ArgumentParser:
     command.add_argument("--record", type=Path, metavar="BAG", help="new directory for the bag")
     command.add_argument("--namespace", default="", help="ROS namespace of the bag's topics")
     command.add_argument(
-        "--controller",
-        metavar="wire:PATH",
-        help="the controller is another process that connects to this socket (fcsl-fc --hal)",
+        "--external",
+        metavar="wire:SPEC",
+        help="the controller is another process (fcsl-fc --hal) at the other end of a wire: unix:PATH, udp:HOST:PORT, "
+        "tcp:HOST:PORT or uart:DEVICE:BAUD",
     )
     help_speed = "limit on simulated seconds per second: 1 for real time; 0 (default): as fast as possible"
     command.add_argument("--speed", type=_speed, default=0.0, metavar="FACTOR", help=help_speed)
@@ -168,11 +169,12 @@ def _check(options: argparse.Namespace) -> int:
 
 def _run(options: argparse.Namespace) -> int:
     wire = None
-    if options.controller is not None:
-        kind, _, path = options.controller.partition(":")
-        if kind != "wire" or not path:
-            raise SimError(f"--controller {options.controller}: write wire:PATH, the path of a Unix socket")
-        wire = Path(path)
+    if options.external is not None:
+        kind, _, wire = options.external.partition(":")
+        if kind != "wire" or not wire:
+            raise SimError(
+                f"--external {options.external}: write wire:SPEC, as in wire:unix:PATH or wire:udp:127.0.0.1:7600"
+            )
     if options.socket is None and (options.paused or options.token or options.checkpoints):
         raise SimError("`--paused`, `--token` and `--checkpoints` need `--socket`: they configure the variable server")
     if options.telemetry_fields is not None and options.telemetry is None:
@@ -180,7 +182,7 @@ def _run(options: argparse.Namespace) -> int:
     if options.namespace and options.record is None:
         raise SimError("`--namespace` needs `--record`: it applies to the recorded topics")
     if options.timeout is not None and wire is None:
-        raise SimError("`--timeout` needs `--controller`: it limits the wait for the controller")
+        raise SimError("`--timeout` needs `--external`: it limits the wait for the controller")
     server = None
     if options.socket is not None:
         server = Server(options.socket, options.token, options.checkpoints, options.paused)
@@ -206,11 +208,13 @@ def _run(options: argparse.Namespace) -> int:
 class _Printer(Watcher):
     """Tells people."""
 
-    def __init__(self, config: SimConfig, wire: Path | None):
+    def __init__(self, config: SimConfig, wire: str | None):
         self._config, self._wire = config, wire
 
     def listening(self) -> None:
-        show(f"waiting for a controller: fcsl-fc {self._config.library} --hal wire:{self._wire}")
+        serial = str(self._wire).startswith("uart:")
+        end = "uart:DEVICE:BAUD with the device at the other end of the line" if serial else self._wire
+        show(f"waiting for a controller: fcsl-fc {self._config.library} --hal wire:{end}")
 
     def serving(self, address: str) -> None:
         show(f"variables on {address}")
@@ -235,7 +239,7 @@ def _print_summary(config: SimConfig, summary: Summary) -> None:
     why = "the stop condition held" if summary.end == "until" else "the duration is over"
     show(f"{summary.time_s:10.3f} s  end: {why}")
     for name, table in config.tables.items():
-        if table.integrated:
+        if table.integrated or table.name == SERIAL_LINK:
             for field in table.of_role("output"):
                 value = _value_text(summary.truth[f"{name}.{field.path}"])
                 show(f"  {name}.{field.path} = {value}{' ' + field.unit if field.unit else ''}")

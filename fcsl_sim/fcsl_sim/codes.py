@@ -64,6 +64,14 @@ SIM_CODES: dict[str, Code] = {
         '"duration": 0.015',
         '"duration": 0.02',
     ),
+    "E806": Code(
+        "a link of the controller that is none",
+        "`link` names an instance of the model serial_link, which carries the messages between plant and controller "
+        "and may lose and damage them. Its rate is that of the link ticks.",
+        Kind.SIMULATION,
+        '"controller": {"machine": "hopper.json", "link": "altimeter"}',
+        '"controller": {"machine": "hopper.json"}',
+    ),
     "W801": Code(
         "a sensor channel that nothing feeds",
         "The controller never gets a sample of it; with an age limit its instance fails. That may be what is tested.",

@@ -35,6 +35,8 @@ from .wiring import MAX_HZ, MAX_SECONDS, Instance, Wiring, check_wiring, seconds
 
 MAX_TICKS = 10**12
 METHODS = ("euler", "rk4")
+#: The model that may stand between plant and controller.
+SERIAL_LINK = "serial_link"
 #: Include folders of a plugin: the model ABI, and the machine ABI that it includes.
 _INCLUDE_PACKAGES = ("fcsl_sim", "fcsl_compiler")
 
@@ -128,6 +130,7 @@ class _Loader:
         self.file, self.sink, self.given_machine = file, sink, machine
         self.reader = ConfigReader(sink)
         self.parts = _Parts()
+        self.link_node: JsonNode | None = None
         self.foreign: list[Diagnostic] = []  # diagnostics of the machine's files
         self.overrides = self._parse_sets(sets)
 
@@ -143,6 +146,7 @@ class _Loader:
         self._read_integrator(keys.get("integrator"))
         self._read_models(keys.get("models"))
         self._read_instances(keys.get("instances"))
+        link = self._read_link(self.link_node)
         file_seed = self.reader.integer(keys.get("seed"), "`seed`", 0, 2**64 - 1)
         parts.seed = file_seed if seed is None else seed
         self._read_duration(keys.get("duration"), duration_s)
@@ -153,9 +157,9 @@ class _Loader:
         views = read_views(keys.get("views"), self._signals(), self.file, self.reader)
         if self.foreign or self.sink.failed:
             raise DiagnosticError([*self.foreign, *(d for d in self.sink.diagnostics if d.severity is Severity.ERROR)])
-        return self._finish(wiring, views)
+        return self._finish(wiring, views, link)
 
-    def _finish(self, wiring: Wiring, views: str) -> SimConfig:
+    def _finish(self, wiring: Wiring, views: str, link: str | None) -> SimConfig:
         """Assembles the result; called only without errors, so every part is present."""
         parts = self.parts
         assert parts.machine and parts.library and parts.hz and parts.ticks and parts.seed is not None
@@ -168,6 +172,7 @@ class _Loader:
             plan.statement("ticks", parts.ticks),
             *(plan.library_statement("model", name, table.library) for name, table in sorted(used.items())),
             *wiring.lines,
+            *([plan.statement("serial_link", link)] if link else []),
             *([plan.statement("views", views)] if views else []),
         ]
         return SimConfig(
@@ -186,7 +191,8 @@ class _Loader:
     # ---- controller and time ------------------------------------------------------------------------------------------
 
     def _read_controller(self, node: JsonNode | None) -> None:
-        keys = self.reader.object(node, "`controller`", ("machine",)) if node else None
+        keys = self.reader.object(node, "`controller`", ("machine",), ("link",)) if node else None
+        self.link_node = keys.get("link") if keys else None
         machine = keys.get("machine") if keys else None
         text = self.reader.string(machine, "`machine`")
         if machine is None or text is None:
@@ -317,6 +323,20 @@ class _Loader:
         for i, value in enumerate(scalars or ()):
             value_bits = plan.bits(scalar_of(target.type).name, value)
             instance.sets.append(plan.statement("set", instance.name, target.path, i, value_bits))
+
+    def _read_link(self, node: JsonNode | None) -> str | None:
+        """The instance between plant and controller; None: they meet directly, or an error was reported."""
+        name = self.reader.string(node, "`link`")
+        if node is None or name is None:
+            return None
+        links = [i.name for i in self.parts.instances.values() if i.table and i.table.name == SERIAL_LINK]
+        instance = self.parts.instances.get(name)
+        if name in links or (instance and instance.table is None):
+            return name  # an error in its model was reported
+        what = f"is of the model `{instance.table.name}`" if instance and instance.table else "is no instance"
+        fix = f"there is `{links[0]}`" if links else f"add an instance of package://fcsl_sim/models/{SERIAL_LINK}.c"
+        self.sink.error("E806", f"`{name}` {what}, not of `{SERIAL_LINK}`", node.span, help=fix)
+        return None
 
     # ---- command line ---------------------------------------------------------------------------------------------------
 

@@ -208,9 +208,9 @@ class Simulation:
     def record_stop(self) -> None:
         self._check(self._lib.fcsl_sim_record_stop(self.handle(), byref(self._error)))
 
-    def listen(self, socket_path: Path, timeout_ms: int) -> None:
-        """Opens a wire socket, to which a controller can connect from now on."""
-        status = self._lib.fcsl_sim_listen(self.handle(), str(socket_path).encode(), timeout_ms, byref(self._error))
+    def listen(self, wire: str, timeout_ms: int) -> None:
+        """Opens the wire that a SPEC of fcsl_wire.h names; a controller can connect from now on."""
+        status = self._lib.fcsl_sim_listen(self.handle(), wire.encode(), timeout_ms, byref(self._error))
         self._check(status)
 
     def accept(self) -> None:

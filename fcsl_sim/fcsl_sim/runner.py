@@ -100,7 +100,7 @@ def run(
     *,
     bag: Path | None = None,
     name_space: str = "",
-    wire: Path | None = None,
+    wire: str | None = None,
     timeout_ms: int = TIMEOUT_MS,
     speed: float = 0.0,
     server: Server | None = None,
@@ -108,7 +108,7 @@ def run(
     watcher: Watcher | None = None,
 ) -> Summary:
     """Runs to the end. bag: records controller and truth into this new directory. wire: the controller is another
-    process that connects to this socket (and records itself) and answers within `timeout_ms`. speed: limit on simulated
+    process at the other end of this wire (a SPEC of fcsl_wire.h), which records itself and answers within `timeout_ms`. speed: limit on simulated
     seconds per second; 0: as fast as possible. Raises SimError; the bag then has the ticks recorded until then, and is
     removed if there are none.
     """

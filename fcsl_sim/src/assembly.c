@@ -379,6 +379,27 @@ static int build_sensors(fcsl_sim_t *sim, fcsl_error_t *error)
     return 0;
 }
 
+/* Whether an instance is of the model whose struct this library knows. */
+static int is_serial_link(const fcsl_model_t *model)
+{
+    return strcmp(model->name, FCSL_SERIAL_LINK_NAME) == 0 && model->size == sizeof(fcsl_serial_link_t);
+}
+
+static int build_link(fcsl_sim_t *sim, fcsl_error_t *error)
+{
+    const fcsl_plan_library_t *wanted = &sim->plan.serial_link;
+    for (uint32_t i = 0; wanted->name && i < sim->instance_count; i++) {
+        fcsl_instance_state_t *instance = &sim->instances[i];
+        if (strcmp(instance->name, wanted->name) == 0 && is_serial_link(instance->model)) {
+            sim->link_instance = i;
+            sim->link = fcsl_sim_link_open(fcsl_run_channels(sim->run), (fcsl_serial_link_t *)(void *)instance->data,
+                                           &instance->noise, fcsl_sim_take_command, sim);
+            return sim->link ? 0 : fcsl_sim_fail(error, "no memory for the serial link");
+        }
+    }
+    return wanted->name ? bad(error, wanted->line, "no instance of " FCSL_SERIAL_LINK_NAME, wanted->name) : 0;
+}
+
 int fcsl_assembly_build(fcsl_sim_t *sim, fcsl_error_t *error)
 {
     if (build_machine(sim, error) || build_models(sim, error) || build_instances(sim, error)) {
@@ -387,13 +408,14 @@ int fcsl_assembly_build(fcsl_sim_t *sim, fcsl_error_t *error)
     if (build_writes(sim, error) || build_copies(sim, error) || build_sensors(sim, error)) {
         return -1;
     }
-    return fcsl_actuators_build(sim, error) || fcsl_truth_build(sim, error) ? -1 : 0;
+    return fcsl_actuators_build(sim, error) || build_link(sim, error) || fcsl_truth_build(sim, error) ? -1 : 0;
 }
 
 void fcsl_assembly_free(fcsl_sim_t *sim)
 {
     fcsl_truth_free(sim);
     fcsl_actuators_free(sim);
+    fcsl_sim_link_free(sim->link);
     for (uint32_t i = 0; i < sim->instance_count; i++) {
         free(sim->instances[i].data);
     }

@@ -1,13 +1,12 @@
 /* SPDX-License-Identifier: Apache-2.0
  *
- * The controller: a machine hosted in this process, or a process at the other end of a wire. Both
- * get the same bytes.
+ * The controller: a machine hosted in this process, or another process (an external controller). Both get the same bytes.
  */
 #include <stdlib.h>
 #include <string.h>
 
 #include "fail.h"
-#include "fcsl/fcsl_wire.h"
+#include "fcsl/fcsl_external.h"
 #include "sim_internal.h"
 
 /* The outputs of an instance into the bag, at the present time; 0, or -1. */
@@ -38,24 +37,24 @@ static int ask_machine(fcsl_sim_t *sim, fcsl_message_t *message, fcsl_error_t *e
     return 0;
 }
 
-static int wire_failed(const fcsl_sim_t *sim, fcsl_hal_status_t status, const char *doing, fcsl_error_t *error)
+static int external_failed(const fcsl_sim_t *sim, fcsl_hal_status_t status, const char *doing, fcsl_error_t *error)
 {
     const unsigned long long tick = sim->tick;
     if (status == FCSL_HAL_NONE) {
         return fcsl_sim_fail(error, "interrupted at tick %llu", tick);
     }
-    return fcsl_sim_fail(error, "tick %llu: %s: %s", tick, doing, fcsl_wire_explain(sim->wire));
+    return fcsl_sim_fail(error, "tick %llu: %s: %s", tick, doing, fcsl_external_explain(sim->external));
 }
 
-static int ask_wire(fcsl_sim_t *sim, fcsl_message_t *message, fcsl_error_t *error)
+static int ask_external(fcsl_sim_t *sim, fcsl_message_t *message, fcsl_error_t *error)
 {
-    fcsl_hal_status_t status = fcsl_wire_send(sim->wire, message->bytes, message->size);
+    fcsl_hal_status_t status = fcsl_external_send(sim->external, message, (uint64_t)sim->time_ns);
     if (status != FCSL_HAL_OK) {
-        return wire_failed(sim, status, "cannot send the sensor message", error);
+        return external_failed(sim, status, "cannot send the sensor message", error);
     }
-    status = fcsl_wire_receive(sim->wire, sim->tick, sim->wire_timeout_ms, message);
+    status = fcsl_external_receive(sim->external, sim->tick, sim->external_timeout_ms, message);
     if (status != FCSL_HAL_OK) {
-        return wire_failed(sim, status, "no actuator message from the controller", error);
+        return external_failed(sim, status, "no actuator message from the controller", error);
     }
     return 0;
 }
@@ -65,7 +64,7 @@ int fcsl_sim_tick_once(fcsl_sim_t *sim, fcsl_error_t *error)
     const uint64_t begun_ns = fcsl_sim_tick_begins(sim);
     fcsl_message_t message;
     if (fcsl_sim_sense_message(sim, sim->message_bytes, sim->message_capacity, &message, error) ||
-        (sim->wire ? ask_wire(sim, &message, error) : ask_machine(sim, &message, error)) ||
+        (sim->external ? ask_external(sim, &message, error) : ask_machine(sim, &message, error)) ||
         fcsl_sim_actuate_message(sim, &message, error)) {
         return -1;
     }
@@ -131,7 +130,7 @@ static int add_truth_topic(fcsl_sim_t *sim, fcsl_instance_state_t *instance, con
 
 int fcsl_sim_record(fcsl_sim_t *sim, const char *bag, const char *name_space, fcsl_error_t *error)
 {
-    if (sim->tick || sim->sensed || sim->wire) {
+    if (sim->tick || sim->sensed || sim->external) {
         return fcsl_sim_fail(error, "recording must begin before the first tick, with the controller in this process");
     }
     const fcsl_record_options_t options = {.bag = bag, .name_space = name_space, .lossless = 1};
@@ -159,34 +158,34 @@ int fcsl_sim_record_stop(fcsl_sim_t *sim, fcsl_error_t *error)
     return fcsl_run_record_stop(sim->run, error);
 }
 
-/* ---- wire ---------------------------------------------------------------------------------------------------------- */
+/* ---- external controller -------------------------------------------------------------------------------------------- */
 
-int fcsl_sim_listen(fcsl_sim_t *sim, const char *socket_path, uint32_t timeout_ms, fcsl_error_t *error)
+int fcsl_sim_listen(fcsl_sim_t *sim, const char *spec, uint32_t timeout_ms, fcsl_error_t *error)
 {
     char text[sizeof error->text] = "";
-    if (sim->wire || sim->tick || sim->sensed || sim->recording) {
+    if (sim->external || sim->tick || sim->sensed || sim->recording) {
         return fcsl_sim_fail(error, "a controller must connect before the first tick, once, and records itself");
     }
-    if (fcsl_wire_listen(socket_path, sim->machine, &sim->wire, text, sizeof text)) {
-        sim->wire = NULL;
+    if (fcsl_external_open(spec, sim->machine, &sim->external, text, sizeof text)) {
+        sim->external = NULL;
         return fcsl_sim_fail(error, "%s", text);
     }
-    sim->wire_timeout_ms = timeout_ms;
+    sim->external_timeout_ms = timeout_ms;
     return 0;
 }
 
 int fcsl_sim_accept(fcsl_sim_t *sim, fcsl_error_t *error)
 {
-    if (!sim->wire || sim->tick) {
+    if (!sim->external || sim->tick) {
         return fcsl_sim_fail(error, "nothing listens for a controller, or it has connected already");
     }
-    switch (fcsl_wire_accept(sim->wire, sim->wire_timeout_ms)) {
+    switch (fcsl_external_accept(sim->external, sim->external_timeout_ms)) {
     case FCSL_HAL_OK:
         return 0;
     case FCSL_HAL_NONE:
         return fcsl_sim_fail(error, "interrupted while waiting for a controller");
     default:
-        return fcsl_sim_fail(error, "no controller: %s", fcsl_wire_explain(sim->wire));
+        return fcsl_sim_fail(error, "no controller: %s", fcsl_external_explain(sim->external));
     }
 }
 
@@ -199,7 +198,7 @@ int fcsl_sim_close(fcsl_sim_t *sim, fcsl_error_t *error)
     fcsl_sim_end_service(sim);
     fcsl_telemetry_close(sim->telemetry);
     fcsl_sim_publish_end(sim);
-    fcsl_wire_close(sim->wire);
+    fcsl_external_close(sim->external);
     fcsl_event_queue_free(&sim->queue);
     fcsl_assembly_free(sim);
     if (sim->run) {

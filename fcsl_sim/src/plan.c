@@ -297,6 +297,12 @@ static int on_until(parser_t *parser)
     return 0;
 }
 
+static int on_serial_link(parser_t *parser)
+{
+    parser->plan->serial_link = (fcsl_plan_library_t){.line = parser->line, .name = parser->word[1]};
+    return is_name(parser->word[1]) ? 0 : bad(parser, "not a name");
+}
+
 static int on_views(parser_t *parser)
 {
     parser->plan->views = parser->word[1];
@@ -323,6 +329,7 @@ enum {
     SENSOR,
     ACTUATOR,
     EVENT,
+    SERIAL_LINK,
     UNTIL,
     VIEWS,
     STATEMENTS
@@ -340,6 +347,7 @@ static const statement_t statements[STATEMENTS] = {
     [SENSOR] = {"sensor", 4, 0, on_sensor, FCSL_PLAN_MAX_LINKS},
     [ACTUATOR] = {"actuator", 4, 0, on_actuator, FCSL_PLAN_MAX_LINKS},
     [EVENT] = {"event", 6, 0, on_event, FCSL_PLAN_MAX_SETS},
+    [SERIAL_LINK] = {"serial_link", 2, 0, on_serial_link, 1},
     [UNTIL] = {"until", 6, 0, on_until, 1},
     [VIEWS] = {"views", 2, 1, on_views, 1},
 };

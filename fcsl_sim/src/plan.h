@@ -14,6 +14,7 @@
  *   sensor INSTANCE FIELD CHANNEL                     from, to
  *   actuator CHANNEL INSTANCE FIELD                   from, to
  *   event TIME_NS INSTANCE FIELD ELEMENT BITS
+ *   serial_link INSTANCE                              between plant and controller (serial_link.h)
  *   until INSTANCE FIELD equals|above|below BITS TICKS
  *   views TEXT                                        to the end of the line: they replace the machine's (fcsl_run_set_views)
  *   end
@@ -93,6 +94,7 @@ typedef struct {
     uint32_t actuator_count;
     fcsl_plan_set_t *events;
     uint32_t event_count;
+    fcsl_plan_library_t serial_link; /* its instance; name null: none */
     fcsl_until_t until;
     fcsl_plan_set_t until_value;
     uint64_t until_ticks;

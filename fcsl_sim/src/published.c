@@ -82,7 +82,7 @@ static int allocate(fcsl_sim_t *sim, struct fcsl_sim_published *published)
 {
     const fcsl_machine_t *machine = sim->machine;
     const uint32_t count = sim->instance_count;
-    published->first_model = sim->wire ? 0u : 1u;
+    published->first_model = sim->external ? 0u : 1u;
     published->instance_count = count;
     published->count = count + published->first_model + (sim->actuators ? 1u : 0u);
     published->blocks = calloc(published->count + 1u, sizeof *published->blocks);
@@ -93,7 +93,7 @@ static int allocate(fcsl_sim_t *sim, struct fcsl_sim_published *published)
     if (!published->blocks || !published->parts || !published->fields || !published->writers || !published->texts) {
         return -1;
     }
-    if (!sim->wire) {
+    if (!sim->external) {
         published->blocks[0] = (fcsl_vars_block_t){
             .prefix = "", .fields = machine->fields, .field_count = machine->field_count, .machine = machine};
         published->parts[0] = (fcsl_part_t){.data = fcsl_run_data(sim->run), .size = machine->size};
@@ -120,7 +120,7 @@ static int check_names(const fcsl_sim_t *sim, fcsl_error_t *error)
     for (uint32_t i = 0; i < sim->instance_count; i++) {
         const char *name = sim->instances[i].name;
         int taken = strcmp(name, "machine") == 0 || strcmp(name, "channels") == 0;
-        for (uint32_t m = 0; m < sim->machine->instance_count && !sim->wire; m++) {
+        for (uint32_t m = 0; m < sim->machine->instance_count && !sim->external; m++) {
             taken = taken || strcmp(name, sim->machine->instances[m].name) == 0;
         }
         if (taken) {
@@ -130,7 +130,7 @@ static int check_names(const fcsl_sim_t *sim, fcsl_error_t *error)
                                  name);
         }
     }
-    for (uint32_t m = 0; m < sim->machine->instance_count && sim->actuators && !sim->wire; m++) {
+    for (uint32_t m = 0; m < sim->machine->instance_count && sim->actuators && !sim->external; m++) {
         if (strcmp(sim->machine->instances[m].name, sim->actuators->as_instance.name) == 0) {
             return fcsl_sim_fail(error,
                                  "the machine's instance `%s` is named like what the actuators get: rename it, so that "

@@ -75,6 +75,9 @@ static void do_update(fcsl_sim_t *sim, uint32_t index)
     const fcsl_model_context_t context = context_of(sim, instance);
     copy_inputs(sim, instance);
     model->update(instance->data, &context);
+    if (sim->link && index == sim->link_instance) {
+        fcsl_sim_link_tick(sim->link, sim->time_ns);
+    }
     if (model->sampled_offset == FCSL_NO_OFFSET || instance->data[model->sampled_offset]) {
         instance->fresh = 1;
     }
@@ -195,7 +198,14 @@ int fcsl_sim_sense_message(fcsl_sim_t *sim, uint8_t *bytes, size_t capacity, fcs
     if (status != FCSL_MESSAGE_OK) {
         return fcsl_sim_fail(error, "sensor message refused: %s", fcsl_message_status_text(status));
     }
-    return 0;
+    const char *wrong = sim->link ? fcsl_sim_link_sense(sim->link, message, bytes, capacity) : NULL;
+    return wrong ? fcsl_sim_fail(error, "tick %llu: %s", (unsigned long long)sim->tick, wrong) : 0;
+}
+
+void fcsl_sim_take_command(void *context, const fcsl_message_t *command)
+{
+    fcsl_sim_t *sim = context;
+    fcsl_gate_command(&sim->gate, command, (uint64_t)sim->time_ns, sim->image);
 }
 
 static int until_holds(const fcsl_sim_t *sim)
@@ -238,7 +248,14 @@ int fcsl_sim_actuate_message(fcsl_sim_t *sim, const fcsl_message_t *message, fcs
         return fcsl_sim_fail(error, "actuator message of tick %llu where that of tick %llu is due",
                              (unsigned long long)message->tick, (unsigned long long)sim->tick);
     }
-    fcsl_gate_command(&sim->gate, message, (uint64_t)sim->time_ns, sim->image);
+    fcsl_gate_wait(&sim->gate, (uint64_t)sim->time_ns, sim->image); /* a link may have delivered nothing for long */
+    const char *wrong = sim->link ? fcsl_sim_link_command(sim->link, message) : NULL;
+    if (wrong) {
+        return fcsl_sim_fail(error, "tick %llu: %s", (unsigned long long)sim->tick, wrong);
+    }
+    if (!sim->link) {
+        fcsl_sim_take_command(sim, message);
+    }
     fcsl_actuators_update(sim);
     sim->sensed = 0;
     sim->tick++;

@@ -11,6 +11,7 @@
 #include "integrate.h"
 #include "noise.h"
 #include "plan.h"
+#include "serial_link.h"
 
 /* One value copied from an output (or an actuator channel) to an input. */
 typedef struct {
@@ -67,7 +68,7 @@ typedef struct {
     uint64_t from_tick;
 } fcsl_pace_t;
 
-struct fcsl_wire;
+struct fcsl_external;
 struct fcsl_sim_service;
 struct fcsl_sim_published;
 
@@ -90,6 +91,8 @@ struct fcsl_sim {
     size_t message_capacity;
     fcsl_gate_t gate;            /* before the actuators */
     fcsl_actuators_t *actuators; /* null: the machine neither arms nor has a time-out */
+    fcsl_sim_link_t *link; /* between plant and controller; null: none */
+    uint32_t link_instance;
     double *scratch;
     fcsl_event_queue_t queue;
     const uint8_t *until_field;
@@ -101,9 +104,9 @@ struct fcsl_sim {
     int sensed; /* between sense and actuate */
     fcsl_sim_status_t status;
     int recording;
-    uint8_t *truth;         /* scratch for one truth message */
-    struct fcsl_wire *wire; /* null: the machine is hosted here */
-    uint32_t wire_timeout_ms;
+    uint8_t *truth; /* scratch for one truth message */
+    struct fcsl_external *external; /* null: the machine is hosted here */
+    uint32_t external_timeout_ms;
     struct fcsl_sim_published *published; /* null: no variable server, no telemetry */
     struct fcsl_sim_service *service;     /* null: no variable server */
     fcsl_telemetry_t *telemetry;          /* null: none */
@@ -137,6 +140,9 @@ uint64_t fcsl_sim_wait_until(fcsl_sim_t *sim);
 void fcsl_sim_sleep_until(uint64_t deadline_ns);
 /* pace.c: the next tick is due at once, later ones relative to it. */
 void fcsl_sim_pace_anew(fcsl_sim_t *sim);
+
+/* sim.c: a command arrives at the plant. */
+void fcsl_sim_take_command(void *sim, const fcsl_message_t *command);
 
 /* assembly.c: builds everything that the plan names. The plan must be parsed, the rest zero. */
 int fcsl_assembly_build(fcsl_sim_t *sim, fcsl_error_t *error);

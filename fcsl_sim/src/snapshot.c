@@ -18,6 +18,7 @@ struct fcsl_sim_snapshot {
     uint8_t *image;
     fcsl_gate_t gate;
     uint8_t *models; /* their structs, concatenated */
+    uint8_t *link;   /* null: there is none */
     fcsl_noise_t *noises;
     fcsl_event_t *events;
     uint32_t event_count;
@@ -41,9 +42,11 @@ fcsl_sim_snapshot_t *fcsl_sim_snapshot_open(const fcsl_sim_t *sim)
     snapshot->machine = malloc(sim->machine->size);
     snapshot->image = malloc(sim->machine->size);
     snapshot->models = malloc(models);
+    snapshot->link = sim->link ? malloc(fcsl_sim_link_bytes(sim->link)) : NULL;
     snapshot->noises = calloc(sim->instance_count + 1u, sizeof *snapshot->noises);
     snapshot->events = calloc(sim->queue.capacity, sizeof *snapshot->events);
-    if (!snapshot->machine || !snapshot->image || !snapshot->models || !snapshot->noises || !snapshot->events) {
+    if (!snapshot->machine || !snapshot->image || !snapshot->models || !snapshot->noises || !snapshot->events ||
+        (sim->link && !snapshot->link)) {
         fcsl_sim_snapshot_free(snapshot);
         return NULL;
     }
@@ -56,6 +59,7 @@ void fcsl_sim_snapshot_free(fcsl_sim_snapshot_t *snapshot)
         free(snapshot->machine);
         free(snapshot->image);
         free(snapshot->models);
+        free(snapshot->link);
         free(snapshot->noises);
         free(snapshot->events);
         free(snapshot);
@@ -73,6 +77,9 @@ void fcsl_sim_snapshot_take(const fcsl_sim_t *sim, fcsl_sim_snapshot_t *snapshot
         memcpy(at, instance->data, instance->model->size);
         at += instance->model->size;
         snapshot->noises[i] = instance->noise;
+    }
+    if (sim->link) {
+        fcsl_sim_link_save(sim->link, snapshot->link);
     }
     memcpy(snapshot->events, sim->queue.events, sim->queue.count * sizeof *snapshot->events);
     snapshot->event_count = sim->queue.count;
@@ -140,6 +147,9 @@ int fcsl_sim_snapshot_restore(fcsl_sim_t *sim, const fcsl_sim_snapshot_t *snapsh
         memcpy(instance->data, at, instance->model->size);
         at += instance->model->size;
         instance->noise = snapshot->noises[i];
+    }
+    if (sim->link) {
+        fcsl_sim_link_restore(sim->link, snapshot->link);
     }
     memcpy(sim->queue.events, snapshot->events, snapshot->event_count * sizeof *snapshot->events);
     sim->queue.count = snapshot->event_count;

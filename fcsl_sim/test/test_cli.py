@@ -144,13 +144,13 @@ def test_errors_of_simulation_and_machine_come_together(sim_json: Path) -> None:
     ("arguments", "message"),
     [
         (
-            ["--controller", "zenoh:x"],
-            "fcsl-sim: error: --controller zenoh:x: write wire:PATH, the path of a Unix socket",
+            ["--external", "zenoh:x"],
+            "fcsl-sim: error: --external zenoh:x: write wire:SPEC, as in wire:unix:PATH or wire:udp:127.0.0.1:7600",
         ),
         (["--record", "."], "fcsl-sim: error: .: exists already; a bag is written into a new directory"),
         (["--record", "no/such/bag"], "fcsl-sim: error: "),
         (
-            ["--record", "b", "--controller", "wire:s"],
+            ["--record", "b", "--external", "wire:unix:s"],
             "fcsl-sim: error: with an external controller the controller records",
         ),
         (["--seed", "-1"], "argument --seed: invalid seed (0 to 2^64 - 1) value: '-1'"),
@@ -160,8 +160,8 @@ def test_errors_of_simulation_and_machine_come_together(sim_json: Path) -> None:
         (["--duration", "1e99999999"], "argument --duration: 1e99999999 s is more than 1e+09 s"),
         (["--duration", "1e-99999999"], "argument --duration: 1e-99999999 s is not above zero"),
         (["--duration", "1/0"], "argument --duration: invalid number of seconds value: '1/0'"),
-        (["--controller", "wire:s", "--timeout", "0.1", "--telemetry", "udp:nowhere"], "cannot go to 'udp:nowhere'"),
-        (["--timeout", "1"], "fcsl-sim: error: `--timeout` needs `--controller`"),
+        (["--external", "wire:unix:s", "--timeout", "0.1", "--telemetry", "udp:nowhere"], "cannot go to 'udp:nowhere'"),
+        (["--timeout", "1"], "fcsl-sim: error: `--timeout` needs `--external`"),
         (["--namespace", "a"], "fcsl-sim: error: `--namespace` needs `--record`"),
         (
             ["--speed", "-1"],
@@ -212,14 +212,14 @@ def test_a_socket_in_use(sim_json: Path) -> None:
     with socket.socket(socket.AF_UNIX, socket.SOCK_SEQPACKET) as listener:
         listener.bind(str(path))
         listener.listen(1)
-        done = fcsl_sim("run", sim_json, "--controller", f"wire:{path}")
+        done = fcsl_sim("run", sim_json, "--external", f"wire:unix:{path}")
     assert done.returncode == 2 and "Traceback" not in done.stderr
     assert done.stderr.startswith("fcsl-sim: error: ") and str(path) in done.stderr
 
 
 def test_an_interrupt_while_waiting_for_a_controller(sim_json: Path) -> None:
     path = sim_json.parent / "s"
-    command = [sys.executable, str(FCSL_SIM), "run", str(sim_json), "--controller", f"wire:{path}"]
+    command = [sys.executable, str(FCSL_SIM), "run", str(sim_json), "--external", f"wire:unix:{path}"]
     with subprocess.Popen(command, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True) as process:
         assert process.stdout and process.stdout.readline().startswith("waiting for a controller: fcsl-fc ")
         deadline = time.monotonic() + 20

@@ -172,10 +172,16 @@ def everything(client: Client) -> dict[str, Any]:
     return {path: value for part in parts for path, value in part.items()}
 
 
-@pytest.mark.parametrize("before, between", [(0, 50), (7, 1), (33, 300), (600, 0)])
-def test_what_follows_a_restore_is_what_followed_the_save(before: int, between: int, tmp_path: Path) -> None:
+#: Frames are under way, and some are lost.
+LATE = [f"line.parameters.{text}" for text in ("halts=false", "delay_s=0.02", "baud=57600", "retransmit_ticks=60")]
+
+
+@pytest.mark.parametrize("before, between, serial", [(0, 50, 0), (7, 1, 0), (33, 300, 0), (600, 0, 0), (33, 300, 1)])
+def test_what_follows_a_restore_is_what_followed_the_save(
+    before: int, between: int, serial: int, tmp_path: Path
+) -> None:
     """The lander with its noise and sensors of several rates: every value of 60 ticks, bit for bit."""
-    lander = load(LANDER)
+    lander = load(LANDER.with_name("lander_serial.sim.json"), sets=LATE) if serial else load(LANDER)
 
     def flight(client: Client) -> list[dict[str, Any]]:
         return [everything(client) for _ in range(60) if client("tick")["ok"]]

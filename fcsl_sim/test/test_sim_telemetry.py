@@ -115,8 +115,8 @@ def test_a_simulation_overtakes_its_telemetry_and_says_so(receiver: Telemetry) -
 
 def test_in_lock_step_each_side_sends_what_is_its_own(receiver: Telemetry, tmp_path: Path) -> None:
     """The simulator sends the plant's values, the flight program the machine's, of the same ticks."""
-    wire = f"wire:{tmp_path / 'w'}"
-    line = [sys.executable, str(FCSL_SIM), "run", str(LANDER), "--duration", "0.5", "--controller", wire]
+    wire = f"wire:unix:{tmp_path / 'w'}"
+    line = [sys.executable, str(FCSL_SIM), "run", str(LANDER), "--duration", "0.5", "--external", wire]
     flight_receiver = Telemetry(0)
     with subprocess.Popen([*line, "--telemetry", address(receiver)], stdout=subprocess.PIPE, text=True) as simulator:
         assert simulator.stdout is not None

@@ -159,7 +159,7 @@ def test_in_lock_step(tmp_path: Path) -> None:
     flight = [sys.executable, str(FCSL_SIM), "run", str(LANDER), "--duration", "0.5", "--json"]
     alone = json.loads(subprocess.run(flight, capture_output=True, timeout=60, check=False).stdout)
     wire = tmp_path / "w"
-    external = [*flight[:-1], "--controller", f"wire:{wire}", "--speed", "2"]
+    external = [*flight[:-1], "--external", f"wire:unix:{wire}", "--speed", "2"]
     with subprocess.Popen(external, stdout=subprocess.PIPE, text=True) as simulator:
         assert simulator.stdout is not None
         command = simulator.stdout.readline().split(": ")[1].split()

@@ -19,10 +19,10 @@ SERVE = """
 import sys
 from pathlib import Path
 from fcsl_sim import SimError, Simulation
-plan, socket_path, timeout_ms = sys.argv[1:]
+plan, wire, timeout_ms = sys.argv[1:]
 with Simulation(Path(plan).read_text(), {}) as sim:
     try:
-        sim.listen(Path(socket_path), int(timeout_ms))
+        sim.listen(wire, int(timeout_ms))
         print("listening", flush=True)
         sim.accept()
         while sim.status == "running":
@@ -37,8 +37,8 @@ with Simulation(Path(plan).read_text(), {}) as sim:
 def serving(config: SimConfig, timeout_ms: int) -> Iterator[tuple[subprocess.Popen[str], str]]:
     plan = config.path.with_suffix(".plan")
     plan.write_text(config.plan)
-    wire = config.path.parent / "wire"
-    command = [sys.executable, "-c", SERVE, str(plan), str(wire), str(timeout_ms)]
+    wire = f"unix:{config.path.parent / 'wire'}"
+    command = [sys.executable, "-c", SERVE, str(plan), wire, str(timeout_ms)]
     process = subprocess.Popen(command, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True)
     try:
         assert process.stdout and process.stdout.readline() == "listening\n", process.communicate()[1]

@@ -11,6 +11,7 @@ ALONE = {
     "checkpoint": "checkpoint",
     "guard": "guard",
     "lateness": "lateness",
+    "link": "link.main",
     "linear": "linear.main",
     "process": "process",
     "record": "record",

@@ -24,6 +24,7 @@ from .subjects.guard import guard_rows, guard_times
 from .subjects.lander import ROOT, real_time_factor, step_times
 from .subjects.lateness import lateness, lateness_rows
 from .subjects.linear.main import linear_rows, linear_times
+from .subjects.link.main import link_figures, link_rows
 from .subjects.process import process_rows, process_times
 from .subjects.record import record_rows, record_times
 from .subjects.replay_map import RATES_HZ, replay_map
@@ -131,6 +132,7 @@ SECTIONS = (
     Section("telemetry", "sending telemetry, and receiving it", telemetry_figures, telemetry_rows),
     Section("build", "timing the edit loop", lambda _: edit_to_test(), edit_rows),
     Section("replay_map", "replaying bags of other makers", replay_map, replay_rows),
+    Section("link", "flying in lock-step over every wire, and losing frames", link_figures, link_rows),
     Section("lateness", "flying at 1 kHz under load, beside cyclictest (two minutes)", lateness, lateness_rows),
     Section("guard", "killing flight programs under a guard", guard_times, guard_rows),
     Section("lockstep_ticks_per_s", "flying the lander over ROS 2", lambda _: lockstep(), lockstep_rows),

@@ -1,14 +1,17 @@
 /* SPDX-License-Identifier: Apache-2.0
  *
- * The hardware abstraction layer: where sensor samples come from and actuator commands go to. Going from simulation to
- * flight changes which HAL is constructed and nothing else.
+ * The hardware abstraction layer: what the host of a machine calls. Going from simulation to flight changes which HAL is
+ * constructed and nothing else.
  *
- * Per tick a host calls sample, steps the machine, calls actuate. Both exchange one message (fcsl_codec.h).
+ * Per tick a host waits for the time of the tick, samples, steps the machine, commands. Sensors and commands are messages of
+ * channels (fcsl_codec.h). What happens at a missed deadline is for the host to say.
  */
 #ifndef FCSL_HAL_H
 #define FCSL_HAL_H
 
 #include "fcsl/fcsl_codec.h"
+#include "fcsl/fcsl_log.h"
+#include "fcsl/fcsl_wire.h"
 
 #ifdef __cplusplus
 extern "C" {
@@ -24,30 +27,60 @@ typedef enum {
 
 typedef struct fcsl_hal {
     void *ctx;
+    /* Before anything else, once. Returns 0, or -1 with `error` filled. Sets what stands below as known only now. */
+    int (*open)(struct fcsl_hal *hal, char *error, size_t error_size);
     /* Puts the sensor message of `tick` into `bytes`; `capacity` is fcsl_message_capacity(machine, FCSL_SENSOR_MESSAGE) or
      * more. The HAL has checked what came from elsewhere: the host takes *message as it is. Sets it on FCSL_HAL_OK alone. */
     fcsl_hal_status_t (*sample)(void *ctx, uint64_t tick, uint8_t *bytes, size_t capacity, fcsl_message_t *message);
-    fcsl_hal_status_t (*actuate)(void *ctx, const fcsl_message_t *message);
+    fcsl_hal_status_t (*command)(void *ctx, const fcsl_message_t *message);
+    /* Called when the arm flag of the commands changes, before the command that changes it, and with 0 at the end of a run. A
+     * HAL that owns actuators switches their outputs; one that hands commands on has the flag in them. */
+    fcsl_hal_status_t (*arm)(void *ctx, int armed);
+    /* The clock of the run: monotonic, or simulated time where a simulator sends it. */
+    uint64_t (*now_ns)(void *ctx);
+    /* Sleeps until this time of that clock, or until a signal; at once where sample waits. */
+    void (*wait)(void *ctx, uint64_t until_ns);
+    /* A line for people, from the thread that samples: kept in a bounded ring (fcsl_log.h), never waited for. */
+    void (*log)(void *ctx, const char *text);
+    /* The oldest line, from another thread: 1, or 0 when there is none. */
+    int (*read_log)(void *ctx, char text[FCSL_LOG_BYTES]);
+    /* Brings the counters that `fields` describe up to date; they stand at `counters`. From the thread that samples; before
+     * open, too. */
+    void (*count)(void *ctx);
     /* What the last status other than OK or NONE was about, for messages; never null. */
     const char *(*explain)(void *ctx);
     /* May be called from any thread: a waiting sample, and every later one, returns FCSL_HAL_CLOSED. */
     void (*interrupt)(void *ctx);
     void (*close)(void *ctx);
+    /* What the HAL knows of itself (age, errors, drops, the link), under `hal.` in variables and telemetry; not part of a run's
+     * results. Known before open. */
+    const fcsl_field_t *fields;
+    uint32_t field_count;
+    const void *counters;
+    uint32_t counter_bytes;
     /* True when sensor channels are served: the host attaches them (fcsl_run_attach), so their age is kept. */
     int serves;
-    /* True when sample(k) decides when tick k happens (a simulator at the other end): the host must not pace itself. */
+    /* True when sample(k) decides when tick k happens (a simulator at the other end): the host must not pace itself. Known
+     * after open. */
     int paces;
 } fcsl_hal_t;
 
-/* Samples nothing, accepts everything. */
-fcsl_hal_t fcsl_hal_stub(void);
+/* Samples nothing, accepts everything. Returns 0, or -1 with `error` filled. */
+int fcsl_hal_stub(fcsl_hal_t *hal, char *error, size_t error_size);
 
-/* Lock-step over a Unix sequenced-packet socket; the simulator listens, the controller connects.
- * Received messages wait in bounded slots filled by a thread of its own; sample(k) waits up to `timeout_ms` for message k and
- * then explains "no sensor message of tick k within timeout_ms ms". A peer with another channel table or tick rate is refused.
- * `error` receives a message on failure. Returns 0, or -1. */
-int fcsl_hal_wire_connect(const char *socket_path, const fcsl_machine_t *machine, uint32_t timeout_ms, fcsl_hal_t *hal,
-                          char *error, size_t error_size);
+/* Messages over the wire that `spec` names (fcsl_wire.h); fcsl_external is the other end. A peer with another channel table or
+ * tick rate is refused.
+ *
+ * A simulator that sends the time paces the run: sample(k) waits up to `timeout_ms` for the time message of tick k, and what
+ * was sensed for k has come before it. "no time message of tick k within timeout_ms ms" ends the run.
+ * A rig that sends none leaves the run to the monotonic clock: sample takes the newest message, if one has come since the last
+ * tick. A rig that falls silent, or goes, ends nothing; `hal.connected` and the age of the channels tell.
+ * Returns 0, or -1 with `error` filled. */
+int fcsl_hal_wire(const char *spec, const fcsl_machine_t *machine, uint32_t timeout_ms, fcsl_hal_t *hal, char *error,
+                  size_t error_size);
+/* The same over a wire of your own, which the HAL owns once this has returned 0. */
+int fcsl_hal_over_wire(const fcsl_wire_t *wire, const fcsl_machine_t *machine, uint32_t timeout_ms, fcsl_hal_t *hal,
+                       char *error, size_t error_size);
 
 #ifdef __cplusplus
 }

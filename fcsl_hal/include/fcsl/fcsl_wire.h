@@ -1,45 +1,87 @@
 /* SPDX-License-Identifier: Apache-2.0
  *
- * The simulator's end of the wire HAL (the controller's end is fcsl_hal_wire_connect): lock-step over a Unix
- * sequenced-packet socket, one message per packet. Both ends first exchange a handshake that carries the hash of
- * the channel table and the tick rate; peers that differ refuse each other with a text that says how.
+ * A wire carries messages between a controller and a simulator or rig: send and receive, nothing else. What the messages are
+ * it does not know (fcsl_codec.h makes them). docs/wire.md shows how to write one.
  *
- * Per tick the simulator sends sensor message k and waits for actuator message k. Single-threaded; no allocation after accept.
- * A caught signal ends a wait with FCSL_HAL_NONE, and the caller decides.
+ * A message arrives whole or not at all, and messages arrive in their order. Nothing here allocates, and send never waits.
  */
 #ifndef FCSL_WIRE_H
 #define FCSL_WIRE_H
 
-#include "fcsl/fcsl_hal.h"
+#include <stddef.h>
+#include <stdint.h>
+
+#include "fcsl/fcsl_machine.h"
 
 #ifdef __cplusplus
 extern "C" {
 #endif
 
-typedef struct fcsl_wire fcsl_wire_t;
+typedef enum {
+    FCSL_WIRE_OK = 0,
+    FCSL_WIRE_NONE = 1,   /* receive: no message came; send: no room now, the message was not taken */
+    FCSL_WIRE_CLOSED = 2, /* the peer is gone. A wire that listens then waits for the next one */
+    FCSL_WIRE_ERROR = 3
+} fcsl_wire_status_t;
 
-/* Listens on `socket_path` (fcsl_socket_listen). `machine` must outlive the wire. Returns 0, or -1 with `error` filled. */
-int fcsl_wire_listen(const char *socket_path, const fcsl_machine_t *machine, fcsl_wire_t **wire, char *error,
-                     size_t error_size);
+/* What a wire counts, for whoever looks on: `bytes` of a struct of uint64_t that `fields` describe. */
+typedef struct {
+    const fcsl_field_t *fields;
+    uint32_t field_count;
+    uint32_t bytes; /* FCSL_WIRE_COUNTERS_MAX at most */
+} fcsl_wire_counters_t;
 
-/* Waits up to `timeout_ms` for the controller and shakes hands. A controller made for another machine is refused and ends
- * the wait with FCSL_HAL_ERROR. */
-fcsl_hal_status_t fcsl_wire_accept(fcsl_wire_t *wire, uint32_t timeout_ms);
+enum { FCSL_WIRE_COUNTERS_MAX = 512 };
 
-/* Sends the sensor message of a tick; FCSL_HAL_CLOSED when the controller is gone. Never blocks: in lock-step no more than
- * one message is under way. */
-fcsl_hal_status_t fcsl_wire_send(fcsl_wire_t *wire, const uint8_t *message, size_t size);
+typedef struct {
+    void *ctx;
+    fcsl_wire_status_t (*send)(void *ctx, const uint8_t *message, size_t size);
+    /* Waits for a message until `deadline_ns` of CLOCK_MONOTONIC (0: not at all), or until a signal is caught. Sets *size on
+     * FCSL_WIRE_OK alone. What is longer than `capacity` is dropped and counted. */
+    fcsl_wire_status_t (*receive)(void *ctx, uint64_t deadline_ns, uint8_t *message, size_t capacity, size_t *size);
+    /* What the last FCSL_WIRE_ERROR was about; never null. */
+    const char *(*explain)(void *ctx);
+    /* Delivers what was sent, for a bounded time, and ends. */
+    void (*close)(void *ctx);
+    const fcsl_wire_counters_t *counters;
+    /* Fills such a struct. */
+    void (*count)(void *ctx, void *values);
+} fcsl_wire_t;
 
-/* Waits up to `timeout_ms` for the actuator message of `tick`, whose bytes stay until the next call. Malformed messages and
- * those of earlier ticks are dropped and counted; FCSL_HAL_CLOSED when the controller is gone. */
-fcsl_hal_status_t fcsl_wire_receive(fcsl_wire_t *wire, uint64_t tick, uint32_t timeout_ms, fcsl_message_t *message);
+/* A row of `fields`: a member of the struct, and its path behind `hal.`. */
+#define FCSL_WIRE_COUNTER(type_, path_, member_, doc_)                                                                 \
+    {.path = path_,                                                                                                    \
+     .role = FCSL_ROLE_OUTPUT,                                                                                         \
+     .type = FCSL_U64,                                                                                                 \
+     .count = 1,                                                                                                       \
+     .offset = offsetof(type_, member_),                                                                               \
+     .size = sizeof(uint64_t),                                                                                         \
+     .instance = FCSL_NONE,                                                                                            \
+     .connected_from = FCSL_NONE,                                                                                      \
+     .unit = "",                                                                                                       \
+     .doc = doc_}
 
-/* What the last status other than OK was about; never null. */
-const char *fcsl_wire_explain(const fcsl_wire_t *wire);
-uint64_t fcsl_wire_messages_dropped(const fcsl_wire_t *wire);
+typedef enum {
+    FCSL_WIRE_LISTEN = 0, /* the simulator's end: opens at once, the peer may come later */
+    FCSL_WIRE_CONNECT = 1 /* the controller's end: waits for a peer that listens */
+} fcsl_wire_side_t;
 
-/* Tells the controller that the run has ended, closes, unlinks the socket. Accepts null. */
-void fcsl_wire_close(fcsl_wire_t *wire);
+/* What a SPEC may be, for messages and usage texts. */
+#define FCSL_WIRE_SPECS "unix:PATH, udp:HOST:PORT, tcp:HOST:PORT or uart:DEVICE:BAUD"
+
+/* 0 when `spec` has the form of one of FCSL_WIRE_SPECS, or -1 with `error` filled. Opens nothing. */
+int fcsl_wire_check(const char *spec, char *error, size_t error_size);
+
+/* What the wire counts that such a `spec` names. */
+const fcsl_wire_counters_t *fcsl_wire_counters(const char *spec);
+
+/* Opens the wire that `spec` names, for messages of up to `message_max` bytes. FCSL_WIRE_CONNECT tries again for `timeout_ms`
+ * while nobody listens: two programs may start in either order. Returns 0, or -1 with `error` filled. */
+int fcsl_wire_open(const char *spec, fcsl_wire_side_t side, size_t message_max, uint32_t timeout_ms, fcsl_wire_t *wire,
+                   char *error, size_t error_size);
+
+/* Two ends within a process, joined by the link layer over a socket pair. */
+int fcsl_wire_pair(size_t message_max, fcsl_wire_t ends[2], char *error, size_t error_size);
 
 #ifdef __cplusplus
 }

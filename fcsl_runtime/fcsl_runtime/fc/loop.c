@@ -1,6 +1,6 @@
 /* SPDX-License-Identifier: Apache-2.0
  *
- * The step thread: sample, step, actuate, publish, serve one command, sleep.
+ * The step thread: sample, step, command, publish, serve one command, sleep.
  */
 #define _GNU_SOURCE
 #include "loop.h"
@@ -27,13 +27,14 @@ static uint32_t history_slots(uint32_t size)
 int loop_open(loop_t *loop)
 {
     const fcsl_machine_t *machine = fcsl_run_machine(loop->run);
-    const fcsl_part_t part = {.data = fcsl_run_data(loop->run), .size = machine->size};
+    const fcsl_part_t parts[] = {{.data = fcsl_run_data(loop->run), .size = machine->size},
+                                 {.data = loop->hal.counters, .size = loop->hal.counter_bytes}};
     loop->sensor_capacity = fcsl_message_capacity(machine, FCSL_SENSOR_MESSAGE);
     loop->actuator_capacity = fcsl_message_capacity(machine, FCSL_ACTUATOR_MESSAGE);
     loop->sensor_bytes = calloc(1, loop->sensor_capacity);
     loop->actuator_bytes = calloc(1, loop->actuator_capacity);
     if (loop->sensor_bytes == NULL || loop->actuator_bytes == NULL ||
-        fcsl_history_open(&loop->history, &part, 1, history_slots(machine->size)) != 0) {
+        fcsl_history_open(&loop->history, parts, loop->hal.field_count > 0 ? 2 : 1, history_slots(machine->size)) != 0) {
         return -1;
     }
     loop_publish(loop);
@@ -56,6 +57,7 @@ static void publish(loop_t *loop, uint64_t time_ns)
 {
     const fcsl_moment_t moment = {
         .tick = fcsl_run_tick(loop->run), .time_ns = time_ns, .paused = (uint64_t)loop->paused};
+    loop->hal.count(loop->hal.ctx);
     fcsl_history_publish(&loop->history, &moment);
 }
 
@@ -125,7 +127,23 @@ static void count(loop_t *loop)
     }
 }
 
-/* Steps, actuates and publishes; 0 when the run is over. */
+/* Tells the HAL, and people, that the arm flag changes. */
+static int arm(loop_t *loop, int armed)
+{
+    char text[FCSL_LOG_BYTES];
+    if (armed == loop->armed) {
+        return 1;
+    }
+    loop->armed = armed;
+    if (fcsl_run_machine(loop->run)->arm_field == FCSL_NONE) {
+        return goes_on(loop, loop->hal.arm(loop->hal.ctx, armed)); /* always armed */
+    }
+    (void)snprintf(text, sizeof text, "%s at tick %" PRIu64, armed ? "armed" : "disarmed", fcsl_run_tick(loop->run) - 1u);
+    loop->hal.log(loop->hal.ctx, text);
+    return goes_on(loop, loop->hal.arm(loop->hal.ctx, armed));
+}
+
+/* Steps, commands and publishes; 0 when the run is over. */
 static int act_on_sensors(loop_t *loop, uint64_t begun_ns)
 {
     if (!step(loop)) {
@@ -141,7 +159,7 @@ static int act_on_sensors(loop_t *loop, uint64_t begun_ns)
         fail(loop, "the actuator message does not fit the slot of fcsl-guard");
         return 0;
     }
-    const int on = goes_on(loop, loop->hal.actuate(loop->hal.ctx, &message));
+    const int on = arm(loop, message.armed) && goes_on(loop, loop->hal.command(loop->hal.ctx, &message));
     publish(loop, begun_ns);
     return on;
 }
@@ -190,12 +208,11 @@ static void idle(loop_t *loop)
  * or 0 when the loop should look around instead of ticking. */
 static uint64_t sleep_until(loop_t *loop, uint64_t deadline)
 {
-    uint64_t now = now_ns();
+    const fcsl_hal_t *hal = &loop->hal;
+    uint64_t now = hal->now_ns(hal->ctx);
     while (now < deadline) {
-        const uint64_t slice = deadline - now > SLICE_NS ? now + SLICE_NS : deadline;
-        const struct timespec until = {.tv_sec = (time_t)(slice / 1000000000u), .tv_nsec = (long)(slice % 1000000000u)};
-        (void)clock_nanosleep(CLOCK_MONOTONIC, TIMER_ABSTIME, &until, NULL);
-        now = now_ns();
+        hal->wait(hal->ctx, deadline - now > SLICE_NS ? now + SLICE_NS : deadline);
+        now = hal->now_ns(hal->ctx);
         if (now < deadline) {
             loop_serve(loop);
         }
@@ -237,17 +254,22 @@ static int keep_time(loop_t *loop, pacing_t *pacing)
 
 int loop_run(loop_t *loop)
 {
-    pacing_t pacing = pacing_start(loop->missed_deadline, fcsl_run_machine(loop->run)->tick_hz, now_ns());
+    const fcsl_hal_t *hal = &loop->hal;
+    pacing_t pacing =
+        pacing_start(loop->missed_deadline, fcsl_run_machine(loop->run)->tick_hz, hal->now_ns(hal->ctx));
     while (loop_may_tick(loop)) {
         if (loop->paused) {
             idle(loop);
             loop_serve(loop);
-            pacing.anchor_ns = now_ns();
+            pacing.anchor_ns = hal->now_ns(hal->ctx);
             pacing.next = 0;
         } else if (!loop->realtime || keep_time(loop, &pacing)) {
             (void)loop_tick(loop);
             loop_serve(loop);
         }
+    }
+    if (loop->armed && hal->arm(hal->ctx, 0) != FCSL_HAL_OK && loop->failure[0] == '\0') {
+        fail(loop, hal->explain(hal->ctx));
     }
     return loop->failure[0] != '\0' ? -1 : 0;
 }

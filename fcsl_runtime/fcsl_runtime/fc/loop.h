@@ -1,6 +1,6 @@
 /* SPDX-License-Identifier: Apache-2.0
  *
- * The step thread: sample, step, actuate, publish, at the machine's rate or as the HAL paces; then one command may be served.
+ * The step thread: sample, step, command, publish, at the machine's rate or as the HAL paces; then one command may be served.
  */
 #ifndef FC_LOOP_H
 #define FC_LOOP_H
@@ -26,6 +26,7 @@ typedef struct {
     int realtime;       /* paced by the clock; else as fast as the HAL allows */
     int recording;
     int paused;
+    int armed; /* the last command */
 
     uint8_t *sensor_bytes; /* of the messages */
     size_t sensor_capacity;

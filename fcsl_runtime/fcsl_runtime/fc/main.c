@@ -23,7 +23,8 @@ enum { EXIT_RUN = 1, EXIT_USAGE = 2, EXIT_LATE = 3, EXIT_STUCK = 4 };
 typedef struct {
     options_t options;
     loop_t loop;
-    fcsl_vars_block_t block;
+    fcsl_vars_block_t blocks[2]; /* the machine, and what the HAL knows of itself */
+    uint32_t block_count;
     atomic_int stop;
     realtime_t realtime;
     monitor_t monitor;
@@ -50,6 +51,19 @@ static int open_system(program_t *program)
     return 0;
 }
 
+/* Constructs the HAL; nothing is opened yet. */
+static int make_hal(program_t *program)
+{
+    fcsl_error_t error;
+    const options_t *options = &program->options;
+    fcsl_hal_t *hal = &program->loop.hal;
+    const int status = options->wire == NULL
+                           ? fcsl_hal_stub(hal, error.text, sizeof error.text)
+                           : fcsl_hal_wire(options->wire, fcsl_run_machine(program->loop.run),
+                                           (uint32_t)options->timeout_ms, hal, error.text, sizeof error.text);
+    return status == 0 ? 0 : complain(error.text);
+}
+
 static int open_run(program_t *program)
 {
     fcsl_error_t error;
@@ -63,9 +77,15 @@ static int open_run(program_t *program)
         fcsl_run_restore_file(loop->run, options->restore, options->ignore_source_hash, &error) != 0) {
         return complain(error.text);
     }
+    if (make_hal(program) != 0) {
+        return -1;
+    }
     const fcsl_machine_t *machine = fcsl_run_machine(loop->run);
-    program->block = (fcsl_vars_block_t){
+    program->blocks[0] = (fcsl_vars_block_t){
         .prefix = "", .fields = machine->fields, .field_count = machine->field_count, .machine = machine};
+    program->blocks[1] =
+        (fcsl_vars_block_t){.prefix = "hal", .fields = loop->hal.fields, .field_count = loop->hal.field_count};
+    program->block_count = loop->hal.field_count > 0 ? 2 : 1;
     loop->stop = &program->stop;
     loop->ticks_max = program->options.ticks;
     loop->missed_deadline = program->options.missed_deadline;
@@ -85,17 +105,16 @@ static int open_server(program_t *program)
                                          .token = program->options.token,
                                          .checkpoints = program->options.checkpoints};
     const fcsl_vars_host_t host = loop_host(loop);
-    loop->vars = fcsl_vars_open(&options, &program->block, 1, &loop->history, &host, &error);
+    loop->vars = fcsl_vars_open(&options, program->blocks, program->block_count, &loop->history, &host, &error);
     return loop->vars != NULL ? 0 : complain(error.text);
 }
 
 /* While it waits for the simulator, a signal ends the program as it ends any other: there is nothing to save. */
-static int connect_wire(program_t *program, fcsl_error_t *error)
+static int open_hal(program_t *program, fcsl_error_t *error)
 {
+    fcsl_hal_t *hal = &program->loop.hal;
     monitor_let_signals(&program->monitor);
-    const int status = fcsl_hal_wire_connect(program->options.wire, fcsl_run_machine(program->loop.run),
-                                             (uint32_t)program->options.timeout_ms, &program->loop.hal, error->text,
-                                             sizeof error->text);
+    const int status = hal->open(hal, error->text, sizeof error->text);
     monitor_block_signals(&program->monitor);
     return status;
 }
@@ -104,7 +123,7 @@ static int open_hardware(program_t *program)
 {
     fcsl_error_t error;
     loop_t *loop = &program->loop;
-    if (program->options.wire != NULL && connect_wire(program, &error) != 0) {
+    if (open_hal(program, &error) != 0) {
         return complain(error.text);
     }
     if (program->options.board != NULL && fcsl_run_open_board(loop->run, program->options.board, &error) != 0) {
@@ -159,7 +178,7 @@ static int open_telemetry(program_t *program)
                                               .fields = program->options.telemetry_fields,
                                               .machine = fcsl_run_machine(loop->run),
                                               .realtime = loop->realtime};
-    loop->telemetry = fcsl_telemetry_open(&options, &program->block, 1, &loop->history, &error);
+    loop->telemetry = fcsl_telemetry_open(&options, program->blocks, program->block_count, &loop->history, &error);
     return loop->telemetry != NULL ? 0 : complain(error.text);
 }
 
@@ -181,12 +200,12 @@ static int start_threads(program_t *program)
 static void announce(const program_t *program)
 {
     const fcsl_machine_t *machine = fcsl_run_machine(program->loop.run);
-    const char *pace = program->loop.hal.paces  ? "paced by the HAL"
+    const char *pace = program->loop.hal.paces  ? "paced by the simulator"
                        : program->loop.realtime ? "real time"
                                                 : "as fast as possible";
     const int timed = program->loop.realtime && !program->options.no_overrun_check;
     log_info("machine '%s', %" PRIu64 " Hz, HAL %s, %s%s%s", machine->name, machine->tick_hz,
-             program->options.wire != NULL ? "wire" : "stub", pace, timed ? "" : ", executes not timed",
+             program->options.wire != NULL ? program->options.wire : "stub", pace, timed ? "" : ", executes not timed",
              program->loop.paused ? ", paused" : "");
     if (program->options.restore != NULL) {
         log_info("begins at tick %" PRIu64 ", from %s", fcsl_run_tick(program->loop.run), program->options.restore);
@@ -247,7 +266,9 @@ static int close_all(program_t *program)
     fcsl_vars_close(loop->vars);
     fcsl_telemetry_close(loop->telemetry);
     /* Before the machine is unloaded: the HAL's thread reads its channel table. */
-    loop->hal.close(loop->hal.ctx);
+    if (loop->hal.close != NULL) {
+        loop->hal.close(loop->hal.ctx);
+    }
     if (loop->run != NULL && fcsl_run_close(loop->run, &error) != 0) {
         status = is_told(loop, error.text) ? -1 : complain(error.text);
     }
@@ -280,7 +301,6 @@ int main(int argc, char **argv)
     if (parsed != 0) {
         return parsed > 0 ? 0 : EXIT_USAGE;
     }
-    program.loop.hal = fcsl_hal_stub();
     program.monitor = (monitor_t){.loop = &program.loop,
                                   .exit_on_stdin_eof = program.options.exit_on_stdin_eof,
                                   .watchdog = {.limit_ns = program.options.watchdog_ms * 1000000u},

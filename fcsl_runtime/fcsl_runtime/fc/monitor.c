@@ -1,6 +1,6 @@
 /* SPDX-License-Identifier: Apache-2.0
  *
- * The monitor thread: signals, watchdog, log of faults and of a failed recording.
+ * The monitor thread: signals, watchdog, log of faults, of a failed recording and of the HAL.
  */
 #define _GNU_SOURCE
 #include "monitor.h"
@@ -26,9 +26,20 @@ static uint64_t period_of(const watchdog_t *watchdog)
     return watchdog->limit_ns == 0 || wanted > most ? most : wanted;
 }
 
+/* What the step thread has to say. */
+static void print_log(const monitor_t *monitor)
+{
+    char text[FCSL_LOG_BYTES];
+    const fcsl_hal_t *hal = &monitor->loop->hal;
+    for (int i = 0; i < FCSL_LOG_LINES && hal->read_log(hal->ctx, text); i++) {
+        log_info("%s", text);
+    }
+}
+
 static void check(monitor_t *monitor, uint64_t now)
 {
     char text[TEXT_BYTES];
+    print_log(monitor);
     fcsl_tick_stats_t *stats = &monitor->loop->stats;
     if (watchdog_finds(&monitor->watchdog, fcsl_tick_stats_get(&stats->begun_ns), now)) {
         watchdog_describe(monitor->loop, now, text, sizeof text);
@@ -74,7 +85,8 @@ static void *run_monitor(void *argument)
         const int number = sigtimedwait(&monitor->signals, NULL, &wait);
         const uint64_t now = fcsl_run_monotonic_ns(NULL);
         if (atomic_load(&monitor->loop_over)) {
-            fault_log_update(&monitor->faults); /* the last ticks */
+            print_log(monitor); /* the last ticks */
+            fault_log_update(&monitor->faults);
             return NULL;
         }
         if ((number > 0 || stdin_closed(monitor)) && give_up == UINT64_MAX) {

@@ -3,6 +3,7 @@
  * The command line of fcsl-fc.
  */
 #define _GNU_SOURCE
+#include "fcsl/fcsl_wire.h"
 #include "options.h"
 
 #include <errno.h>
@@ -22,7 +23,8 @@ static const char USAGE[] =
     "Runs a compiled machine as a process of its own (docs/flight.md).\n"
     "\n"
     "  --machine NAME          which machine, when the library holds several\n"
-    "  --hal stub|wire:PATH    stub: no hardware (default); wire: lock-step with the simulator that listens on PATH\n"
+    "  --hal stub|wire:SPEC    stub: no hardware (default); wire: a simulator or rig at the other end, with SPEC one of\n"
+    "                          " FCSL_WIRE_SPECS "\n"
     "  --timeout-ms N          how long to wait for the simulator's next message (default 2000)\n"
     "  --board LIBRARY.so      the board that hw_* of algorithms reach (fcsl/fcsl_hw.h); default: simulated hardware\n"
     "  --guard PATH            the actuators belong to the fcsl-guard that listens on PATH (docs/guard.md)\n"
@@ -65,6 +67,8 @@ static const char USAGE[] =
     "  --version            print name and version\n"
     "  --help\n";
 
+enum { ERROR_BYTES = 512 };
+
 typedef enum { TEXT, NUMBER, FLAG, WORD } kind_t;
 
 /* An option of the command line: where it goes, and for numbers what it may be. */
@@ -89,11 +93,12 @@ static int read_hal(const char *text, options_t *options)
         options->wire = NULL;
         return 0;
     }
-    if (strncmp(text, "wire:", 5) == 0 && text[5] != '\0') {
+    if (strncmp(text, "wire:", 5) == 0) {
+        char error[ERROR_BYTES];
         options->wire = text + 5;
-        return 0;
+        return fcsl_wire_check(options->wire, error, sizeof error) == 0 ? 0 : complain("--hal wire: ", error);
     }
-    return complain("--hal must be stub or wire:PATH, not ", text);
+    return complain("--hal must be stub or wire:SPEC, not ", text);
 }
 
 static int read_rate(const char *text, options_t *options)
@@ -232,7 +237,7 @@ static int check(const options_t *options)
         return complain("--token needs --socket: it is the token of a TCP server", "");
     }
     if (options->timeout_ms != 0 && options->wire == NULL) {
-        return complain("--timeout-ms needs --hal wire:PATH: it is how long to wait for the simulator", "");
+        return complain("--timeout-ms needs --hal wire:SPEC: it is how long to wait for the simulator", "");
     }
     if (options->name_space[0] != '\0' && options->record == NULL) {
         return complain("--namespace needs --record: it is of the recorded topics", "");

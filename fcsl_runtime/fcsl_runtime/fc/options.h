@@ -12,7 +12,7 @@ typedef enum { RECORD_BY_PACE, RECORD_WAIT, RECORD_DROP } record_policy_t;
 typedef struct {
     const char *library;
     const char *machine;    /* null: the only one */
-    const char *wire;       /* null: the stub HAL */
+    const char *wire;       /* SPEC of fcsl_wire.h; null: the stub HAL */
     const char *board;      /* null: simulated hardware */
     const char *guard;      /* socket of fcsl-guard; null: none */
     const char *restore;    /* file of a checkpoint to begin from; null: from tick 0 */

@@ -3,7 +3,7 @@
  * A simulator for tests of fcsl-fc over the wire: it hosts the same machine itself and exits 1 as soon as an actuator message
  * differs from its own by one bit.
  *
- *   wire_sim LIBRARY SOCKET TICKS END    END: end (say that the run is over), hang (send nothing more), die
+ *   wire_sim LIBRARY SPEC TICKS END    END: end (say that the run is over), hang (send nothing more), die
  */
 #define _GNU_SOURCE
 #include <inttypes.h>
@@ -13,7 +13,7 @@
 
 #include "fcsl/fcsl_check.h"
 #include "fcsl/fcsl_run.h"
-#include "fcsl/fcsl_wire.h"
+#include "fcsl/fcsl_external.h"
 
 enum { MESSAGE_BYTES = 256, WAIT_MS = 10000 };
 
@@ -32,16 +32,16 @@ static fcsl_message_t sense(const fcsl_run_t *run, uint8_t *data, uint64_t tick,
     return message;
 }
 
-static void exchange(fcsl_wire_t *wire, fcsl_run_t *run, uint8_t *data, uint64_t tick)
+static void exchange(fcsl_external_t *external, fcsl_run_t *run, uint8_t *data, uint64_t tick)
 {
     fcsl_error_t error;
     uint8_t bytes[MESSAGE_BYTES];
     fcsl_message_t answer;
     fcsl_message_t message = sense(run, data, tick, bytes);
-    CHECK(fcsl_wire_send(wire, message.bytes, message.size) == FCSL_HAL_OK);
+    CHECK(fcsl_external_send(external, &message, tick * 1000000u) == FCSL_HAL_OK);
     CHECK(fcsl_run_sense_message(run, &message, &error) == 0 && fcsl_run_step(run, 1, &error) == 0);
-    if (fcsl_wire_receive(wire, tick, WAIT_MS, &answer) != FCSL_HAL_OK) {
-        (void)fprintf(stderr, "%s\n", fcsl_wire_explain(wire));
+    if (fcsl_external_receive(external, tick, WAIT_MS, &answer) != FCSL_HAL_OK) {
+        (void)fprintf(stderr, "%s\n", fcsl_external_explain(external));
         exit(2);
     }
     CHECK(fcsl_run_actuate_message(run, bytes, sizeof bytes, &message) == 0);
@@ -51,17 +51,17 @@ static void exchange(fcsl_wire_t *wire, fcsl_run_t *run, uint8_t *data, uint64_t
 int main(int argc, char **argv)
 {
     fcsl_error_t error;
-    fcsl_wire_t *wire = NULL;
+    fcsl_external_t *external = NULL;
     CHECK(argc == 5);
     fcsl_run_t *run = fcsl_run_open(argv[1], NULL, &error);
     CHECK(run != NULL && fcsl_run_attach(run, &error) == 0);
     uint8_t *data = calloc(1, fcsl_run_machine(run)->size);
     CHECK(data != NULL);
-    CHECK(fcsl_wire_listen(argv[2], fcsl_run_machine(run), &wire, error.text, sizeof error.text) == 0);
-    CHECK(fcsl_wire_accept(wire, WAIT_MS) == FCSL_HAL_OK);
+    CHECK(fcsl_external_open(argv[2], fcsl_run_machine(run), &external, error.text, sizeof error.text) == 0);
+    CHECK(fcsl_external_accept(external, WAIT_MS) == FCSL_HAL_OK);
     const uint64_t ticks = strtoull(argv[3], NULL, 10);
     for (uint64_t tick = 0; tick < ticks; tick++) {
-        exchange(wire, run, data, tick);
+        exchange(external, run, data, tick);
     }
     (void)printf("%" PRIu64 " ticks\n", ticks);
     (void)fflush(stdout);
@@ -70,7 +70,7 @@ int main(int argc, char **argv)
     } else if (strcmp(argv[4], "hang") == 0) {
         (void)sleep(30);
     }
-    fcsl_wire_close(wire);
+    fcsl_external_close(external);
     CHECK(fcsl_run_close(run, &error) == 0);
     free(data);
     return 0;

@@ -65,5 +65,5 @@ def test_what_it_refuses(saved: tuple[Path, float], tmp_path: Path) -> None:
         2,
         "fcsl-fc: --ignore-source-hash needs --restore\nTry `fcsl-fc --help`.\n",
     )
-    code, err = refused("--restore", file, "--hal", f"wire:{tmp_path / 'w'}")
+    code, err = refused("--restore", file, "--hal", f"wire:unix:{tmp_path / 'w'}")
     assert code == 2 and "a simulator begins at tick 0" in err

@@ -241,7 +241,7 @@ def test_nohup_keeps_the_hangup_away(tmp_path: Path) -> None:
 def test_signal_while_it_waits_for_the_simulator(tmp_path: Path) -> None:
     """Nobody listens yet; the default action ends it, since there is nothing to save."""
     wire = tmp_path / "wire"
-    with flying("--hal", f"wire:{wire}", "--timeout-ms", "60000", "--summary", tmp_path / "end") as fc:
+    with flying("--hal", f"wire:unix:{wire}", "--timeout-ms", "60000", "--summary", tmp_path / "end") as fc:
         with socket.socket(socket.AF_UNIX, socket.SOCK_SEQPACKET) as listener:
             listener.bind(str(wire))
             listener.listen(1)
@@ -389,7 +389,7 @@ def test_a_library_that_cannot_be_one_is_refused(tmp_path: Path) -> None:
     [
         ("--missed-deadline never", 2, "catch-up, skip or stop, not never"),
         ("--missed-deadline skip --rate max", 2, "neither --rate max nor --hal wire"),
-        ("--missed-deadline stop --hal wire:w", 2, "neither --rate max nor --hal wire"),
+        ("--missed-deadline stop --hal wire:unix:w", 2, "neither --rate max nor --hal wire"),
         ("--realtime-priority 0", 2, "from 1 to 99, not 0"),
         ("--realtime-priority 100", 2, "from 1 to 99, not 100"),
         ("--realtime-priority 50 --rate max", 2, "use --rate realtime"),

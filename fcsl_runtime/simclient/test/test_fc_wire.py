@@ -22,7 +22,7 @@ from simclient.link.message import Channel, Kind, Message, decode, encode, table
 @contextmanager
 def simulator(wire: Path, ticks: int, end: str) -> Iterator[subprocess.Popen[str]]:
     process = subprocess.Popen(
-        [WIRE_SIM, FIXTURE, str(wire), str(ticks), end], stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True
+        [WIRE_SIM, FIXTURE, f"unix:{wire}", str(ticks), end], stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True
     )
     try:
         yield process
@@ -35,11 +35,11 @@ def test_same_bits_as_in_process(tmp_path: Path) -> None:
     wire, bag = tmp_path / "wire", tmp_path / "bag"
     with (
         simulator(wire, 3000, "end") as sim,
-        flying("--hal", f"wire:{wire}", "--record", bag, "--timeout-ms", "10000") as fc,
+        flying("--hal", f"wire:unix:{wire}", "--record", bag, "--timeout-ms", "10000") as fc,
     ):
         code, out, err = fc.wait()
         assert sim.wait(timeout=30) == 0, sim.communicate()
-    assert (code, err) == (0, "") and "paced by the HAL" in out
+    assert (code, err) == (0, "") and "paced by the simulator" in out
     assert "3000 ticks" in out and "0 overruns" in out and "0 sensor messages refused, 0 records dropped" in out
     with AnyReader([bag]) as reader:
         messages = [(c.topic, reader.deserialize(d, c.msgtype)) for c, _, d in reader.messages()]
@@ -57,25 +57,25 @@ def test_timeout_names_the_tick(tmp_path: Path) -> None:
     wire, bag = tmp_path / "wire", tmp_path / "bag"
     with (
         simulator(wire, 17, "hang"),
-        flying("--hal", f"wire:{wire}", "--record", bag, "--timeout-ms", "400") as fc,
+        flying("--hal", f"wire:unix:{wire}", "--record", bag, "--timeout-ms", "400") as fc,
     ):
         code, out, err = fc.wait()
-    assert code == 1 and err == "fcsl-fc: no sensor message of tick 17 within 400 ms\n" and "17 ticks" in out
+    assert code == 1 and err == "fcsl-fc: no time message of tick 17 within 400 ms\n" and "17 ticks" in out
     with AnyReader([bag]) as reader:  # and the bag is whole
         assert {c.topic: c.msgcount for c in reader.connections}["/fixture/pilot"] == 17
 
 
 def test_killed_simulator(tmp_path: Path) -> None:
     wire = tmp_path / "wire"
-    with simulator(wire, 9, "die"), flying("--hal", f"wire:{wire}") as fc:
+    with simulator(wire, 9, "die"), flying("--hal", f"wire:unix:{wire}") as fc:
         code, _, err = fc.wait()
-    assert code == 1 and "went away before sensor message of tick 9" in err
+    assert code == 1 and "went away before tick 9" in err
 
 
 @pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGTERM])
 def test_signal_while_waiting(tmp_path: Path, number: int) -> None:
     wire = tmp_path / "wire"
-    with simulator(wire, 5, "hang") as sim, flying("--hal", f"wire:{wire}", "--timeout-ms", "20000") as fc:
+    with simulator(wire, 5, "hang") as sim, flying("--hal", f"wire:unix:{wire}", "--timeout-ms", "20000") as fc:
         assert sim.stdout is not None and sim.stdout.readline() == "5 ticks\n"
         begun = time.monotonic()
         code, out, err = fc.stop(number)
@@ -87,7 +87,7 @@ def test_commands_in_lock_step(tmp_path: Path) -> None:
     wire, socket = tmp_path / "wire", tmp_path / "fc.sock"
     with (
         simulator(wire, 100, "end") as sim,
-        flying("--hal", f"wire:{wire}", "--socket", socket, "--paused") as fc,
+        flying("--hal", f"wire:unix:{wire}", "--socket", socket, "--paused") as fc,
     ):
         client = fc.client(socket)
         assert client.ok("tick", count=60)["tick"] == 60
@@ -113,8 +113,8 @@ TABLE = [Channel(257, False, F64, (3,)), Channel(258, False, BOOL), Channel(513,
 TICK_HZ, HELLO, REFUSAL, END = 100, 1, 2, 3
 
 
-def control(kind: int, table: int = 0, tick_hz: int = 0, text: bytes = b"") -> bytes:
-    return b"FCSW" + struct.pack("<HBBIQ", 1, kind, 0, table, tick_hz) + text
+def control(kind: int, table: int = 0, tick_hz: int = 0, text: bytes = b"", sends_time: int = 0) -> bytes:
+    return b"FCSW" + struct.pack("<HBBIQ", 1, kind, sends_time, table, tick_hz) + text
 
 
 @contextmanager
@@ -128,16 +128,17 @@ def listening(path: Path) -> Iterator[socket.socket]:
 
 def test_a_simulator_written_from_the_page_flies_the_controller(tmp_path: Path) -> None:
     wire, hello = tmp_path / "wire", control(HELLO, table_hash(TABLE), TICK_HZ)
-    with listening(wire) as listener, flying("--hal", f"wire:{wire}", "--timeout-ms", "30000") as fc:
+    with listening(wire) as listener, flying("--hal", f"wire:unix:{wire}", "--timeout-ms", "30000") as fc:
         peer, _ = listener.accept()
         peer.settimeout(30)
         assert peer.recv(4096) == hello
-        peer.send(hello)
+        peer.send(control(HELLO, table_hash(TABLE), TICK_HZ, sends_time=1))
         for tick in range(20):
             rate = 0.25 * tick
             good = encode(Message(Kind.SENSORS, tick, {257: (rate, 0.0, 0.0), 258: (False,)}), TABLE)
             peer.send(good[:-1] + bytes([good[-1] ^ 1]))  # dropped
             peer.send(good)
+            peer.send(encode(Message(Kind.TIME, tick, time_ns=tick * 10**7), TABLE))
             answer = decode(peer.recv(4096), Kind.ACTUATORS, TABLE)
             assert (answer.tick, answer.armed, answer.skipped) == (tick, True, 0)
             assert answer.values[513] == (min(2.0 * rate, 10.0),)
@@ -147,9 +148,37 @@ def test_a_simulator_written_from_the_page_flies_the_controller(tmp_path: Path) 
     assert (code, err) == (0, "") and "20 ticks" in out and "0 sensor messages refused" in out
 
 
+def test_a_rig_that_sends_no_time_leaves_the_clock_to_the_controller(tmp_path: Path) -> None:
+    """It may fall silent and go; the controller makes its ticks, and says how old the samples are."""
+    wire, variables = tmp_path / "wire", tmp_path / "fc.sock"
+    hal = ("--hal", f"wire:unix:{wire}", "--timeout-ms", "30000", "--socket", variables)
+    with listening(wire) as listener, flying(*hal) as fc:
+        peer, _ = listener.accept()
+        peer.settimeout(30)
+        assert peer.recv(4096) == control(HELLO, table_hash(TABLE), TICK_HZ)
+        peer.send(control(HELLO, table_hash(TABLE), TICK_HZ))
+        first = decode(peer.recv(4096), Kind.ACTUATORS, TABLE)
+        assert first.tick == 0  # nothing was sensed yet
+        peer.send(encode(Message(Kind.SENSORS, 12345, {257: (1.5, 0.0, 0.0), 258: (False,)}), TABLE))
+        while decode(peer.recv(4096), Kind.ACTUATORS, TABLE).values[513] != (3.0,):
+            pass
+        client = fc.client(variables)
+        assert (client.get("hal.connected"), client.get("hal.messages"), client.get("hal.messages_dropped")) == (
+            1,
+            1,
+            0,
+        )
+        peer.close()
+        while client.get("hal.connected") == 1 or client.get("hal.ticks_without") < 20:
+            pass
+        assert client.get("channels.imu.gyro.valid") is False
+        code, out, err = fc.stop(signal.SIGTERM)
+    assert (code, err) == (0, "") and "real time" in out and "the rig is gone" in out
+
+
 def test_a_refusal_written_from_the_page_is_told(tmp_path: Path) -> None:
     wire = tmp_path / "wire"
-    with listening(wire) as listener, flying("--hal", f"wire:{wire}", "--timeout-ms", "30000") as fc:
+    with listening(wire) as listener, flying("--hal", f"wire:unix:{wire}", "--timeout-ms", "30000") as fc:
         peer, _ = listener.accept()
         peer.send(control(REFUSAL, text=b"another vehicle"))
         code, _, err = fc.wait()

@@ -60,10 +60,10 @@ int32_t fcsl_sim_state(const fcsl_sim_t *sim);
 /* The hosted machine's struct, to read from. */
 const void *fcsl_sim_machine_data(const fcsl_sim_t *sim);
 
-/* ---- controller in another process (fcsl_hal wire) ----------------------------------------------------------------- */
+/* ---- external controller ------------------------------------------------------------------------------------------- */
 
-/* Listens on `socket_path`, to which the controller can connect from now on. */
-int fcsl_sim_listen(fcsl_sim_t *sim, const char *socket_path, uint32_t timeout_ms, fcsl_error_t *error);
+/* Opens the wire that `spec` names (fcsl_wire.h); the controller, fcsl-fc --hal wire:SPEC, can connect from now on. */
+int fcsl_sim_listen(fcsl_sim_t *sim, const char *spec, uint32_t timeout_ms, fcsl_error_t *error);
 /* Waits up to timeout_ms for the connection; then fcsl_sim_run steps in lock-step with the controller. A missing answer
  * after timeout_ms is an error that names its tick. */
 int fcsl_sim_accept(fcsl_sim_t *sim, fcsl_error_t *error);

@@ -50,20 +50,16 @@ TARGETS = (
         longest=512,
     ),
     Target(
-        "wire_controller",
-        "the wire, controller's end",
-        "socket",
-        Defect(
-            f"{_HAL}/wire.c",
-            "slot->message.tick == tick && slot->message.size <= capacity",
-            "slot->message.tick == tick",
-        ),
+        "hal_wire",
+        "a wire, controller's end",
+        "socket, serial line",
+        Defect(f"{_HAL}/hal_wire.c", "heard.tick < tick || heard.size > capacity", "heard.tick < tick"),
     ),
     Target(
-        "wire_simulator",
-        "the wire, simulator's end",
-        "socket",
-        Defect(f"{_HAL}/wire_server.c", "if (message->tick > tick) {", "if (0) {"),
+        "external",
+        "a wire, simulator's end",
+        "socket, serial line",
+        Defect(f"{_HAL}/external.c", "if (message->tick > tick) {", "if (0) {"),
     ),
     Target(
         "command",
@@ -107,7 +103,9 @@ TARGETS = (
         "options",
         "the command line of fcsl-fc",
         "arguments",
-        Defect("fcsl_runtime/fcsl_runtime/fc/options.c", " && text[5] != '\\0'", ""),
+        Defect(
+            "fcsl_runtime/fcsl_runtime/fc/options.c", "fcsl_wire_check(options->wire, error, sizeof error) == 0", "1"
+        ),
         longest=512,
     ),
     Target(

@@ -2,7 +2,7 @@
 # SPDX-License-Identifier: Apache-2.0
 """Processor in the loop: the lander's controller on a Cortex-M7 (QEMU), its plant here; the flight is that of one process.
 
-One exchange of messages per tick, over a serial line and the simulator's wire (README.md). Two digests must equal
+One exchange of messages per tick, over the link layer on an emulated UART (README.md). Two digests must equal
 those of the same simulation with the controller in its own process: of the plant's truth at every tick, and of all fields of
 the controller. The control: a controller with the last bit of one constant changed flies another trajectory.
 """
@@ -12,9 +12,9 @@ from __future__ import annotations
 import argparse
 import ctypes
 import hashlib
+import socket
 import subprocess
 import sys
-import tempfile
 import time
 from pathlib import Path
 
@@ -30,6 +30,8 @@ from ..shared.cases import EXAMPLES, OUT, ROOT, SHARED, CheckFailed, write_facts
 
 SIMULATION = ROOT / "examples" / "lander" / "sim" / "lander.sim.json"
 _TIMEOUT_MS = 60_000
+#: What the flight computer takes of fcsl_hal.
+_HAL = "codec codec_check crc32 gate link link_frame link_incoming link_outgoing crc16 cobs".split()
 
 
 class Flight:
@@ -82,24 +84,21 @@ def in_process(config: SimConfig) -> Flight:
 def on_target(config: SimConfig, program: Path) -> Flight:
     """The controller on the emulated processor. Raises CheckFailed."""
     flight = Flight()
-    with tempfile.TemporaryDirectory(prefix="fcsl-pil-") as folder, Simulation(config.plan, config.tables) as sim:
-        wire, serial = Path(folder) / "wire", Path(folder) / "serial"
-        sim.listen(wire, _TIMEOUT_MS)
+    with Simulation(config.plan, config.tables) as sim:
+        with socket.socket() as free:
+            free.bind(("127.0.0.1", 0))
+            address = f"tcp:127.0.0.1:{free.getsockname()[1]}"
+        sim.listen(address, _TIMEOUT_MS)
         board = [*CORTEX_M7.runner, "-semihosting-config", "enable=on,target=native", "-kernel", str(program)]
-        board[board.index("-serial") + 1] = f"unix:{serial},server=on,wait=on"
-        between = [sys.executable, str(PIL / "bridge.py"), str(wire), str(serial)]
-        with (
-            subprocess.Popen(board, stdout=subprocess.PIPE, stderr=subprocess.STDOUT, text=True) as emulator,
-            subprocess.Popen(between) as bridge,
-        ):
+        board[board.index("-serial") + 1] = f"{address},nodelay=on"  # what the UART sends is a stream of bytes
+        with subprocess.Popen(board, stdout=subprocess.PIPE, stderr=subprocess.STDOUT, text=True) as emulator:
             try:
                 sim.accept()
                 flight.fly(sim)
                 sim.close()
                 said, _ = emulator.communicate(timeout=_TIMEOUT_MS / 1000)
             finally:
-                for process in (emulator, bridge):
-                    process.kill()
+                emulator.kill()
     words = said.split()
     if emulator.returncode != 0 or words[-2:-1] != ["fields"]:
         raise CheckFailed(f"the flight computer ended with status {emulator.returncode}: {said}")
@@ -108,10 +107,9 @@ def on_target(config: SimConfig, program: Path) -> Flight:
 
 
 def flight_computer(sources: Sources, folder: str) -> Path:
-    """The program for the processor: one machine, the channel codec, controller.c."""
+    """The program for the processor: one machine, the codec and the link layer, controller.c."""
     hal = ROOT / "fcsl_hal" / "src"
-    codec = [hal / name for name in ("codec.c", "codec_check.c", "crc32.c", "gate.c")]
-    platform = [PIL / "controller.c", SHARED / "stimulus.c", *codec]
+    platform = [PIL / "controller.c", SHARED / "stimulus.c", *(hal / f"{name}.c" for name in _HAL)]
     includes = Sources(sources.machines, (*sources.includes, package_prefix("fcsl_hal") / "include"))
     return build(CORTEX_M7, includes, OUT / "pil" / folder, platform)
 

@@ -12,7 +12,7 @@
 #include <string.h>
 #include <unistd.h>
 
-#include "base/address.h"
+#include "fcsl/fcsl_address.h"
 #include "base/error.h"
 
 enum { ADDRESS_BYTES = 96 };

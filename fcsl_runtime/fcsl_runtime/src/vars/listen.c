@@ -19,7 +19,7 @@
 #include <sys/stat.h>
 #include <unistd.h>
 
-#include "base/address.h"
+#include "fcsl/fcsl_address.h"
 #include "base/error.h"
 #include "fcsl/fcsl_socket.h"
 

@@ -4,6 +4,7 @@
  */
 #include <getopt.h>
 
+#include "fcsl/fcsl_wire.h"
 #include "fuzz.h"
 #include "options.h"
 
@@ -20,13 +21,14 @@ int LLVMFuzzerTestOneInput(const uint8_t *data, size_t size)
         arguments[count++] = at;
     }
     options_t options;
+    char error[512];
     optind = 0; /* glibc: begin anew */
     const int status = options_read(count, arguments, &options);
     FUZZ_CHECK(status >= -1 && status <= 1);
     if (status == 0) {
         FUZZ_CHECK(options.library != NULL && options.name_space != NULL && options.timeout_ms > 0);
         FUZZ_CHECK(options.timeout_ms <= 3600000u && options.ticks <= INT64_MAX);
-        FUZZ_CHECK(options.wire == NULL || options.wire[0] != '\0');
+        FUZZ_CHECK(options.wire == NULL || fcsl_wire_check(options.wire, error, sizeof error) == 0);
     }
     free(text);
     return 0;

@@ -30,7 +30,7 @@ from simclient.vars.wire import VarError
 
 PAGE = (Path(__file__).resolve().parents[2] / "docs/arming.md").read_text()
 FILES = dict(re.findall(r"<!-- file: (\S+) -->\n```\w+\n(.*?)```\n", PAGE, re.DOTALL))
-DISARMED, ARMED = 0, 1
+DISARMED, ARMED, SILENT = 0, 1, 2
 #: Ticks in which the page's flight is armed.
 ON, OFF = 100, 200
 
@@ -99,7 +99,7 @@ def test_the_page_flies_and_replays(folder: Path) -> None:
 def test_every_host_arms_alike(config: SimConfig, tmp_path: Path) -> None:
     """The flight in one process and over a wire: the same bits, the same end of the plant, and both replay."""
     alone = run(config, bag=tmp_path / "alone")
-    wire, flight = tmp_path / "wire", tmp_path / "flight"
+    wire, flight = f"unix:{tmp_path / 'wire'}", tmp_path / "flight"
     line = ["fcsl-fc", str(config.library), "--hal", f"wire:{wire}", "--timeout-ms", "60000", "--record", str(flight)]
     with subprocess.Popen(line, stdout=subprocess.DEVNULL) as controller:
         apart = run(config, wire=wire, timeout_ms=60_000)
@@ -164,6 +164,32 @@ def test_the_machine_arms_in_the_tick_that_says_so(folder: Path, switched: list[
             assert inputs(sim) == ((wanted, False) if before else (0.0, True))
             before, wanted = on, float(str(sim.machine_value("drive.outputs.force")))
             assert sim.machine_value("drive.outputs.armed") is on
+
+
+def test_a_line_that_falls_silent_makes_the_plant_safe(folder: Path, tmp_path: Path) -> None:
+    """The line loses everything from 1.5 s to 1.8 s. The gate closes 0.1 s after the last command, not before, and
+    the first command that comes through opens it again."""
+    line = {"reliable": False, "halts": False, "drop_percent": 0.0, "corrupt_percent": 0.0, "bit_error_percent": 0.0}
+    simulation = json.loads(FILES["drive.sim.json"])
+    simulation["controller"]["link"] = "line"
+    simulation["models"]["serial_link"] = {"source": "package://fcsl_sim/models/serial_link.c"}
+    parameters = {**line, "delay_s": 0.0, "baud": 0.0, "retransmit_ticks": 3}
+    simulation["instances"]["line"] = {"model": "serial_link", "parameters": parameters}
+    simulation["rates"] = {"line": 1000}
+    lost = "line.parameters.drop_percent"
+    simulation["events"] += [{"at_s": 1.5, "set": lost, "value": 100.0}, {"at_s": 1.8, "set": lost, "value": 0.0}]
+    (folder / "silent.sim.json").write_text(json.dumps(simulation))
+    run(load(folder / "silent.sim.json"), bag=tmp_path / "flight")
+    flight = Bag(tmp_path / "flight")
+    _, gate = bag.columns(flight, "/sim/actuators:gate")
+    _, force = bag.columns(flight, "/sim/actuators:force")
+    _, brake = bag.columns(flight, "/sim/actuators:brake")
+    silent = np.flatnonzero(gate == SILENT)
+    assert list(silent) == list(range(silent[0], silent[-1] + 1)), "one silence"
+    assert 159 <= silent[0] <= 161 and 180 <= silent[-1] <= 182
+    assert (gate[silent[0] - 9 : silent[0]] == ARMED).all() and gate[silent[-1] + 1] == ARMED
+    assert (force[silent] == 0.0).all() and brake[silent].all()
+    assert replay(tmp_path / "flight", config=str(folder / "drive.json")).identical
 
 
 # ---- the names of the record, and machines without one -------------------------------------------------------------

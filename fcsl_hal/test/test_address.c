@@ -1,11 +1,14 @@
 /* SPDX-License-Identifier: Apache-2.0
  *
- * What is taken for HOST:PORT, and which address it is. The source is compiled in.
+ * What is taken for HOST:PORT, and which address it is.
  */
-#include "base/address.c"
+#define _GNU_SOURCE
+#include "fcsl/fcsl_address.h"
 
 #include <arpa/inet.h>
+#include <netdb.h>
 #include <stdio.h>
+#include <string.h>
 
 #include "fcsl/fcsl_check.h"
 

@@ -3,7 +3,7 @@
  * HOST:PORT as a socket address.
  */
 #define _GNU_SOURCE
-#include "address.h"
+#include "fcsl/fcsl_address.h"
 
 #include <netdb.h>
 #include <stdint.h>

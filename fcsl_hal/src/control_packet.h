@@ -1,0 +1,51 @@
+/* SPDX-License-Identifier: Apache-2.0
+ *
+ * Control packets: with them two peers of a wire meet, refuse each other and part (docs/wire.md).
+ *
+ *   offset size
+ *   0      4   magic "FCSW" (messages of channels begin with an id from 0xff00 on)
+ *   4      2   version (1)
+ *   6      1   kind
+ *   7      1   hello: 1 when the sender is a simulator that sends the time; else zero
+ *   8      4   channel-table hash    hello only, else zero
+ *   12     8   tick_hz               hello only, else zero
+ *   20     n   text, not terminated  refusal only, at most CONTROL_TEXT_MAX bytes
+ */
+#ifndef FCSL_CONTROL_PACKET_H
+#define FCSL_CONTROL_PACKET_H
+
+#include "fcsl/fcsl_codec.h"
+#include "fcsl/fcsl_wire.h"
+
+enum {
+    CONTROL_HEADER_BYTES = 20,
+    CONTROL_TEXT_MAX = 236,
+    CONTROL_PACKET_MAX = CONTROL_HEADER_BYTES + CONTROL_TEXT_MAX,
+};
+
+typedef enum {
+    CONTROL_HELLO = 1,
+    CONTROL_REFUSAL = 2,
+    CONTROL_END = 3, /* the run is over; nothing follows */
+} control_kind_t;
+
+typedef struct {
+    control_kind_t kind;
+    int sends_time;
+    uint32_t table_hash;
+    uint64_t tick_hz;
+    char text[CONTROL_TEXT_MAX + 1];
+} control_packet_t;
+
+/* Returns 0, or -1 when the bytes are not a control packet of this version. */
+int control_parse(const uint8_t *bytes, size_t size, control_packet_t *packet);
+
+/* Each sends one packet without waiting. */
+fcsl_wire_status_t control_send_hello(const fcsl_wire_t *wire, const fcsl_channel_table_t *table, int sends_time);
+fcsl_wire_status_t control_send_refusal(const fcsl_wire_t *wire, const char *text);
+fcsl_wire_status_t control_send_end(const fcsl_wire_t *wire);
+
+/* Why the peer's hello does not fit: returns 1 and fills `text`, or 0 when it fits. */
+int control_differs(const control_packet_t *hello, const fcsl_channel_table_t *table, char *text, size_t text_size);
+
+#endif /* FCSL_CONTROL_PACKET_H */

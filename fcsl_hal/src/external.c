@@ -1,0 +1,236 @@
+/* SPDX-License-Identifier: Apache-2.0
+ *
+ * The simulator's end of a wire.
+ */
+#define _GNU_SOURCE
+#include "fcsl/fcsl_external.h"
+
+#include <inttypes.h>
+#include <stdio.h>
+#include <stdlib.h>
+#include <string.h>
+
+#include "control_packet.h"
+#include "monotonic.h"
+
+enum { TEXT_BYTES = 512, SPEC_BYTES = 256, TIME_BYTES = 64 };
+
+struct fcsl_external {
+    fcsl_channel_table_t table;
+    fcsl_wire_t wire;
+    uint64_t messages_dropped;
+    uint8_t *inbox;
+    size_t inbox_size;
+    char spec[SPEC_BYTES];
+    char text[TEXT_BYTES];
+};
+
+/* Bytes of the longest message to the controller, or from it. */
+static size_t inbox_bytes(const fcsl_machine_t *machine)
+{
+    const size_t actuators = fcsl_message_capacity(machine, FCSL_ACTUATOR_MESSAGE);
+    return actuators > CONTROL_PACKET_MAX ? actuators : CONTROL_PACKET_MAX;
+}
+
+int fcsl_external_over_wire(const fcsl_wire_t *wire, const fcsl_machine_t *machine, fcsl_external_t **external,
+                            char *error, size_t error_size)
+{
+    fcsl_external_t *self = calloc(1, sizeof *self);
+    uint8_t *inbox = malloc(inbox_bytes(machine));
+    if (self == NULL || inbox == NULL) {
+        free(self);
+        free(inbox);
+        (void)snprintf(error, error_size, "out of memory for the wire");
+        return -1;
+    }
+    self->table = fcsl_channel_table(machine);
+    self->wire = *wire;
+    self->inbox = inbox;
+    self->inbox_size = inbox_bytes(machine);
+    (void)snprintf(self->spec, sizeof self->spec, "the wire");
+    *external = self;
+    return 0;
+}
+
+int fcsl_external_open(const char *spec, const fcsl_machine_t *machine, fcsl_external_t **external, char *error,
+                       size_t error_size)
+{
+    fcsl_wire_t wire;
+    const size_t sensors = fcsl_message_capacity(machine, FCSL_SENSOR_MESSAGE);
+    const size_t inbox = inbox_bytes(machine);
+    if (fcsl_wire_open(spec, FCSL_WIRE_LISTEN, sensors > inbox ? sensors : inbox, 0, &wire, error, error_size) != 0) {
+        return -1;
+    }
+    if (fcsl_external_over_wire(&wire, machine, external, error, error_size) != 0) {
+        wire.close(wire.ctx);
+        return -1;
+    }
+    (void)snprintf((*external)->spec, sizeof(*external)->spec, "%s", spec);
+    return 0;
+}
+
+static fcsl_hal_status_t wire_failed(fcsl_external_t *external)
+{
+    (void)snprintf(external->text, sizeof external->text, "%s", external->wire.explain(external->wire.ctx));
+    return FCSL_HAL_ERROR;
+}
+
+static fcsl_wire_status_t receive(fcsl_external_t *external, uint64_t deadline_ns, size_t *size)
+{
+    return external->wire.receive(external->wire.ctx, deadline_ns, external->inbox, external->inbox_size, size);
+}
+
+/* ---- meeting ------------------------------------------------------------------------------------------------------- */
+
+/* Answers a hello: OK, ERROR, or NONE when the controller has left in the meantime. */
+static fcsl_hal_status_t answer(fcsl_external_t *external, const control_packet_t *hello)
+{
+    char text[CONTROL_TEXT_MAX + 1];
+    if (control_differs(hello, &external->table, text, sizeof text)) {
+        (void)control_send_refusal(&external->wire, text);
+        (void)snprintf(external->text, sizeof external->text, "controller refused: %s", text);
+        return FCSL_HAL_ERROR;
+    }
+    const fcsl_wire_status_t status = control_send_hello(&external->wire, &external->table, 1);
+    if (status == FCSL_WIRE_ERROR) {
+        return wire_failed(external);
+    }
+    return status == FCSL_WIRE_OK ? FCSL_HAL_OK : FCSL_HAL_NONE;
+}
+
+fcsl_hal_status_t fcsl_external_accept(fcsl_external_t *external, uint32_t timeout_ms)
+{
+    const uint64_t deadline_ns = monotonic_ns() + (uint64_t)timeout_ms * NS_PER_MS;
+    do { /* every turn takes a message or waits; whoever is no controller is passed over */
+        size_t size = 0;
+        control_packet_t hello;
+        const fcsl_wire_status_t status = receive(external, deadline_ns, &size);
+        if (status == FCSL_WIRE_ERROR) {
+            return wire_failed(external);
+        }
+        if (status == FCSL_WIRE_NONE && monotonic_ns() < deadline_ns) {
+            return FCSL_HAL_NONE;
+        }
+        if (status == FCSL_WIRE_OK && control_parse(external->inbox, size, &hello) == 0 &&
+            hello.kind == CONTROL_HELLO) {
+            const fcsl_hal_status_t answered = answer(external, &hello);
+            if (answered != FCSL_HAL_NONE) {
+                return answered;
+            }
+        } else if (status == FCSL_WIRE_OK) {
+            external->messages_dropped++;
+        }
+    } while (monotonic_ns() < deadline_ns);
+    (void)snprintf(external->text, sizeof external->text, "no controller on %s within %" PRIu32 " ms", external->spec,
+                   timeout_ms);
+    return FCSL_HAL_TIMEOUT;
+}
+
+/* ---- a tick -------------------------------------------------------------------------------------------------------- */
+
+static fcsl_hal_status_t judge(fcsl_external_t *external, fcsl_wire_status_t status)
+{
+    switch (status) {
+    case FCSL_WIRE_OK:
+        return FCSL_HAL_OK;
+    case FCSL_WIRE_NONE:
+        (void)snprintf(external->text, sizeof external->text, "the controller takes no sensor messages");
+        return FCSL_HAL_ERROR;
+    case FCSL_WIRE_CLOSED:
+        (void)snprintf(external->text, sizeof external->text, "the controller is gone");
+        return FCSL_HAL_CLOSED;
+    default:
+        return wire_failed(external);
+    }
+}
+
+fcsl_hal_status_t fcsl_external_send(fcsl_external_t *external, const fcsl_message_t *sensors, uint64_t time_ns)
+{
+    uint8_t bytes[TIME_BYTES];
+    fcsl_message_t time;
+    const fcsl_message_status_t encoded =
+        fcsl_message_encode_time(&external->table, sensors->tick, time_ns, bytes, sizeof bytes, &time);
+    if (encoded != FCSL_MESSAGE_OK) {
+        (void)snprintf(external->text, sizeof external->text, "time message: %s", fcsl_message_status_text(encoded));
+        return FCSL_HAL_ERROR;
+    }
+    const fcsl_hal_status_t status =
+        judge(external, external->wire.send(external->wire.ctx, sensors->bytes, sensors->size));
+    return status == FCSL_HAL_OK ? judge(external, external->wire.send(external->wire.ctx, time.bytes, time.size))
+                                 : status;
+}
+
+/* Looks at what came: OK when it is the message of `tick`, NONE when it counts for nothing. */
+static fcsl_hal_status_t look_at(fcsl_external_t *external, uint64_t tick, size_t size, fcsl_message_t *message)
+{
+    control_packet_t packet;
+    if (control_parse(external->inbox, size, &packet) == 0 && packet.kind != CONTROL_REFUSAL) {
+        (void)snprintf(external->text, sizeof external->text,
+                       "the controller %s before actuator message of tick %" PRIu64,
+                       packet.kind == CONTROL_END ? "ended its run" : "was started again", tick);
+        return FCSL_HAL_CLOSED;
+    }
+    if (fcsl_message_check(&external->table, FCSL_ACTUATOR_MESSAGE, external->inbox, size, message) !=
+            FCSL_MESSAGE_OK ||
+        message->tick < tick) {
+        external->messages_dropped++;
+        return FCSL_HAL_NONE;
+    }
+    if (message->tick > tick) {
+        (void)snprintf(external->text, sizeof external->text,
+                       "actuator message of tick %" PRIu64 " came while tick %" PRIu64 " was due", message->tick, tick);
+        return FCSL_HAL_ERROR;
+    }
+    return FCSL_HAL_OK;
+}
+
+fcsl_hal_status_t fcsl_external_receive(fcsl_external_t *external, uint64_t tick, uint32_t timeout_ms,
+                                        fcsl_message_t *message)
+{
+    const uint64_t deadline_ns = monotonic_ns() + (uint64_t)timeout_ms * NS_PER_MS;
+    do { /* every turn takes a message or waits */
+        size_t size = 0;
+        const fcsl_wire_status_t status = receive(external, deadline_ns, &size);
+        if (status == FCSL_WIRE_ERROR) {
+            return wire_failed(external);
+        }
+        if (status == FCSL_WIRE_CLOSED) {
+            (void)snprintf(external->text, sizeof external->text,
+                           "the controller went away before actuator message of tick %" PRIu64, tick);
+            return FCSL_HAL_CLOSED;
+        }
+        if (status == FCSL_WIRE_NONE && monotonic_ns() < deadline_ns) {
+            return FCSL_HAL_NONE;
+        }
+        const fcsl_hal_status_t seen = status == FCSL_WIRE_OK ? look_at(external, tick, size, message) : FCSL_HAL_NONE;
+        if (seen != FCSL_HAL_NONE) {
+            return seen;
+        }
+    } while (monotonic_ns() < deadline_ns);
+    (void)snprintf(external->text, sizeof external->text,
+                   "no actuator message of tick %" PRIu64 " within %" PRIu32 " ms (%" PRIu64
+                   " malformed or late messages dropped)",
+                   tick, timeout_ms, external->messages_dropped);
+    return FCSL_HAL_TIMEOUT;
+}
+
+const char *fcsl_external_explain(const fcsl_external_t *external)
+{
+    return external->text;
+}
+
+uint64_t fcsl_external_messages_dropped(const fcsl_external_t *external)
+{
+    return external->messages_dropped;
+}
+
+void fcsl_external_close(fcsl_external_t *external)
+{
+    if (external == NULL) {
+        return;
+    }
+    (void)control_send_end(&external->wire); /* to nobody, when the controller is gone */
+    external->wire.close(external->wire.ctx);
+    free(external->inbox);
+    free(external);
+}

@@ -1,0 +1,497 @@
+/* SPDX-License-Identifier: Apache-2.0
+ *
+ * The HAL whose sensors and actuators are at the other end of a wire: a simulator that paces the run, or a rig.
+ */
+#define _GNU_SOURCE
+#include <inttypes.h>
+#include <stdatomic.h>
+#include <stdio.h>
+#include <stdlib.h>
+#include <string.h>
+
+#include "control_packet.h"
+#include "fcsl/fcsl_hal.h"
+#include "monotonic.h"
+
+enum {
+    TEXT_BYTES = 512,
+    SPEC_BYTES = 256,
+    LOOK_NS = 20 * NS_PER_MS, /* a wait looks as often whether it is interrupted */
+    MESSAGES_PER_TICK = 16  /* of a rig; what is more waits for the next tick */
+};
+
+/* What stands under `hal.`; the wire's own counters follow it. */
+typedef struct {
+    uint64_t connected;
+    uint64_t messages;
+    uint64_t messages_dropped;
+    uint64_t messages_late;
+    uint64_t entries_skipped;
+    uint64_t ticks_without;
+    uint64_t commands;
+    uint64_t commands_dropped;
+    uint64_t armed;
+    uint64_t wire[FCSL_WIRE_COUNTERS_MAX / sizeof(uint64_t)];
+} counters_t;
+
+#define COUNTER(member, doc) FCSL_WIRE_COUNTER(counters_t, #member, member, doc)
+
+static const fcsl_field_t OWN_FIELDS[] = {
+    COUNTER(connected, "1 while a peer is there"),
+    COUNTER(messages, "sensor messages that were taken"),
+    COUNTER(messages_dropped, "messages that were malformed, or made for another machine"),
+    COUNTER(messages_late, "sensor messages of earlier ticks, or that a newer one replaced"),
+    COUNTER(entries_skipped, "entries of taken messages that the channel table does not have"),
+    COUNTER(ticks_without, "ticks since the last sensor message"),
+    COUNTER(commands, "actuator messages that were sent"),
+    COUNTER(commands_dropped, "actuator messages that the wire did not take"),
+    COUNTER(armed, "1 while the commands are armed"),
+};
+
+enum { OWN_COUNT = sizeof OWN_FIELDS / sizeof OWN_FIELDS[0] };
+
+typedef struct {
+    fcsl_channel_table_t table;
+    fcsl_wire_t wire;
+    int has_wire;
+    int paces;
+    uint32_t timeout_ms;
+    uint64_t time_ns; /* of the last time message */
+    uint8_t *inbox;
+    size_t inbox_size;
+    fcsl_field_t *fields;
+    counters_t counters;
+    fcsl_log_t log;
+    atomic_int interrupted;
+    char spec[SPEC_BYTES];
+    char text[TEXT_BYTES];
+} hal_t;
+
+static void wire_log(void *ctx, const char *text)
+{
+    fcsl_log_write(&((hal_t *)ctx)->log, text);
+}
+
+static int wire_read_log(void *ctx, char text[FCSL_LOG_BYTES])
+{
+    return fcsl_log_read(&((hal_t *)ctx)->log, text);
+}
+
+/* ---- receiving ----------------------------------------------------------------------------------------------------- */
+
+typedef enum {
+    HEARD_NOTHING, /* that counts */
+    HEARD_SENSORS,
+    HEARD_TIME,
+    HEARD_END /* of the run */
+} heard_t;
+
+/* What the `size` bytes in the inbox are. */
+static heard_t judge(hal_t *hal, size_t size, fcsl_message_t *message)
+{
+    control_packet_t packet;
+    if (fcsl_message_check(&hal->table, FCSL_SENSOR_MESSAGE, hal->inbox, size, message) == FCSL_MESSAGE_OK) {
+        return HEARD_SENSORS;
+    }
+    if (fcsl_message_check(&hal->table, FCSL_TIME_MESSAGE, hal->inbox, size, message) == FCSL_MESSAGE_OK) {
+        return HEARD_TIME;
+    }
+    if (control_parse(hal->inbox, size, &packet) == 0 && packet.kind == CONTROL_END) {
+        return HEARD_END;
+    }
+    hal->counters.messages_dropped++;
+    return HEARD_NOTHING;
+}
+
+static fcsl_wire_status_t receive(hal_t *hal, uint64_t deadline_ns, size_t *size)
+{
+    return hal->wire.receive(hal->wire.ctx, deadline_ns, hal->inbox, hal->inbox_size, size);
+}
+
+/* Copies a sensor message out of the inbox. */
+static void take(hal_t *hal, const fcsl_message_t *heard, uint8_t *bytes, fcsl_message_t *message)
+{
+    *message = *heard;
+    memcpy(bytes, heard->bytes, heard->size);
+    message->bytes = bytes;
+    hal->counters.messages++;
+    hal->counters.entries_skipped += heard->skipped;
+    hal->counters.ticks_without = 0;
+}
+
+/* ---- paced by a simulator ------------------------------------------------------------------------------------------ */
+
+static fcsl_hal_status_t wire_failed(hal_t *hal)
+{
+    (void)snprintf(hal->text, sizeof hal->text, "%s", hal->wire.explain(hal->wire.ctx));
+    return FCSL_HAL_ERROR;
+}
+
+static fcsl_hal_status_t too_early(hal_t *hal, const char *what, uint64_t came, uint64_t tick)
+{
+    (void)snprintf(hal->text, sizeof hal->text, "%s message of tick %" PRIu64 " came while tick %" PRIu64 " was due",
+                   what, came, tick);
+    return FCSL_HAL_ERROR;
+}
+
+static fcsl_hal_status_t timed_out(hal_t *hal, uint64_t tick)
+{
+    const uint64_t useless = hal->counters.messages_dropped + hal->counters.messages_late;
+    (void)snprintf(hal->text, sizeof hal->text, "no time message of tick %" PRIu64 " within %" PRIu32 " ms", tick,
+                   hal->timeout_ms);
+    if (useless > 0) {
+        const size_t length = strlen(hal->text);
+        (void)snprintf(hal->text + length, sizeof hal->text - length,
+                       " (%" PRIu64 " malformed or late messages dropped)", useless);
+    }
+    return FCSL_HAL_TIMEOUT;
+}
+
+/* The wire has nothing now, or never again: FCSL_HAL_OK to wait on. */
+static fcsl_hal_status_t nothing_came(hal_t *hal, fcsl_wire_status_t status, uint64_t tick, uint64_t deadline_ns)
+{
+    if (atomic_load(&hal->interrupted)) {
+        (void)snprintf(hal->text, sizeof hal->text, "interrupted while waiting for tick %" PRIu64, tick);
+        return FCSL_HAL_CLOSED;
+    }
+    if (status == FCSL_WIRE_CLOSED) {
+        (void)snprintf(hal->text, sizeof hal->text, "the simulator went away before tick %" PRIu64, tick);
+        return FCSL_HAL_ERROR;
+    }
+    if (status == FCSL_WIRE_ERROR) {
+        return wire_failed(hal);
+    }
+    return monotonic_ns() >= deadline_ns ? timed_out(hal, tick) : FCSL_HAL_OK;
+}
+
+/* Takes one message of the tick: FCSL_HAL_OK to go on, NONE when the tick happens now. */
+static fcsl_hal_status_t hear(hal_t *hal, uint64_t tick, size_t size, uint8_t *bytes, size_t capacity,
+                              fcsl_message_t *message, int *sensed)
+{
+    fcsl_message_t heard;
+    const heard_t what = judge(hal, size, &heard);
+    if (what == HEARD_END) {
+        (void)snprintf(hal->text, sizeof hal->text, "the simulator ended the run at tick %" PRIu64, tick);
+        return FCSL_HAL_CLOSED;
+    }
+    if (what == HEARD_NOTHING) {
+        return FCSL_HAL_OK;
+    }
+    if (heard.tick > tick) {
+        return too_early(hal, what == HEARD_TIME ? "time" : "sensor", heard.tick, tick);
+    }
+    if (heard.tick < tick || heard.size > capacity) {
+        hal->counters.messages_late++;
+        return FCSL_HAL_OK;
+    }
+    if (what == HEARD_SENSORS) {
+        take(hal, &heard, bytes, message);
+        *sensed = 1;
+        return FCSL_HAL_OK;
+    }
+    hal->time_ns = heard.time_ns;
+    return FCSL_HAL_NONE;
+}
+
+static fcsl_hal_status_t sample_paced(hal_t *hal, uint64_t tick, uint8_t *bytes, size_t capacity,
+                                      fcsl_message_t *message)
+{
+    const uint64_t deadline_ns = monotonic_ns() + (uint64_t)hal->timeout_ms * NS_PER_MS;
+    fcsl_hal_status_t status = FCSL_HAL_OK;
+    int sensed = 0;
+    while (status == FCSL_HAL_OK) { /* every turn takes a message, or waits and looks at the deadline */
+        size_t size = 0;
+        const uint64_t look_ns = monotonic_ns() + LOOK_NS;
+        const fcsl_wire_status_t came = receive(hal, look_ns < deadline_ns ? look_ns : deadline_ns, &size);
+        status = came == FCSL_WIRE_OK ? hear(hal, tick, size, bytes, capacity, message, &sensed)
+                                      : nothing_came(hal, came, tick, deadline_ns);
+        if (status == FCSL_HAL_OK && monotonic_ns() >= deadline_ns) {
+            status = timed_out(hal, tick);
+        }
+    }
+    hal->counters.ticks_without += sensed ? 0u : 1u;
+    return status == FCSL_HAL_NONE && sensed ? FCSL_HAL_OK : status;
+}
+
+/* ---- beside a rig -------------------------------------------------------------------------------------------------- */
+
+static fcsl_hal_status_t sample_newest(hal_t *hal, uint64_t tick, uint8_t *bytes, size_t capacity,
+                                       fcsl_message_t *message)
+{
+    int sensed = 0;
+    for (int i = 0; i < MESSAGES_PER_TICK; i++) {
+        size_t size = 0;
+        fcsl_message_t heard;
+        const fcsl_wire_status_t came = receive(hal, 0, &size);
+        if (came == FCSL_WIRE_CLOSED && hal->counters.connected != 0) {
+            hal->counters.connected = 0;
+            wire_log(hal, "the rig is gone");
+        }
+        if (came != FCSL_WIRE_OK) {
+            break;
+        }
+        if (judge(hal, size, &heard) == HEARD_SENSORS && heard.size <= capacity) {
+            hal->counters.messages_late += (uint64_t)sensed;
+            take(hal, &heard, bytes, message);
+            message->tick = tick; /* a rig counts its own */
+            sensed = 1;
+        }
+    }
+    hal->counters.ticks_without += sensed ? 0u : 1u;
+    if (atomic_load(&hal->interrupted)) {
+        return FCSL_HAL_CLOSED;
+    }
+    return sensed ? FCSL_HAL_OK : FCSL_HAL_NONE;
+}
+
+static fcsl_hal_status_t wire_sample(void *ctx, uint64_t tick, uint8_t *bytes, size_t capacity, fcsl_message_t *message)
+{
+    hal_t *hal = ctx;
+    return hal->paces ? sample_paced(hal, tick, bytes, capacity, message)
+                      : sample_newest(hal, tick, bytes, capacity, message);
+}
+
+/* ---- commands ------------------------------------------------------------------------------------------------------ */
+
+/* The simulator may have ended the run after its last message: what it left is read. */
+static fcsl_hal_status_t peer_gone(hal_t *hal, uint64_t tick)
+{
+    int ended = 0;
+    for (int i = 0; i < MESSAGES_PER_TICK && !ended; i++) {
+        size_t size = 0;
+        fcsl_message_t heard;
+        if (receive(hal, 0, &size) != FCSL_WIRE_OK) {
+            break;
+        }
+        ended = judge(hal, size, &heard) == HEARD_END;
+    }
+    (void)snprintf(hal->text, sizeof hal->text, "the simulator %s before actuator message of tick %" PRIu64,
+                   ended ? "ended the run" : "went away", tick);
+    return ended ? FCSL_HAL_CLOSED : FCSL_HAL_ERROR;
+}
+
+static fcsl_hal_status_t wire_command(void *ctx, const fcsl_message_t *message)
+{
+    hal_t *hal = ctx;
+    const fcsl_wire_status_t status = hal->wire.send(hal->wire.ctx, message->bytes, message->size);
+    if (status == FCSL_WIRE_OK) {
+        hal->counters.commands++;
+        return FCSL_HAL_OK;
+    }
+    hal->counters.commands_dropped++;
+    if (!hal->paces) {
+        return FCSL_HAL_OK; /* its gate closes when commands stay away */
+    }
+    if (status == FCSL_WIRE_CLOSED) {
+        return peer_gone(hal, message->tick);
+    }
+    /* In lock-step no more than one message is under way: a full wire means that the peer is out of step. */
+    if (status == FCSL_WIRE_NONE) {
+        (void)snprintf(hal->text, sizeof hal->text, "the simulator does not take actuator message of tick %" PRIu64,
+                       message->tick);
+        return FCSL_HAL_ERROR;
+    }
+    return wire_failed(hal);
+}
+
+static fcsl_hal_status_t wire_arm(void *ctx, int armed)
+{
+    ((hal_t *)ctx)->counters.armed = armed != 0;
+    return FCSL_HAL_OK;
+}
+
+/* ---- time, counters, end ------------------------------------------------------------------------------------------- */
+
+static uint64_t wire_now_ns(void *ctx)
+{
+    const hal_t *hal = ctx;
+    return hal->paces ? hal->time_ns : monotonic_ns();
+}
+
+static void wire_wait(void *ctx, uint64_t until_ns)
+{
+    if (!((const hal_t *)ctx)->paces) {
+        monotonic_wait(until_ns);
+    }
+}
+
+static void wire_count(void *ctx)
+{
+    hal_t *hal = ctx;
+    if (hal->has_wire) {
+        hal->wire.count(hal->wire.ctx, hal->counters.wire);
+    }
+}
+
+static const char *wire_explain(void *ctx)
+{
+    return ((const hal_t *)ctx)->text;
+}
+
+static void wire_interrupt(void *ctx)
+{
+    atomic_store(&((hal_t *)ctx)->interrupted, 1);
+}
+
+static void wire_close(void *ctx)
+{
+    hal_t *hal = ctx;
+    if (hal->has_wire) {
+        (void)control_send_end(&hal->wire); /* to nobody, when the simulator is gone */
+        hal->wire.close(hal->wire.ctx);
+    }
+    free(hal->inbox);
+    free(hal->fields);
+    free(hal);
+}
+
+/* ---- opening ------------------------------------------------------------------------------------------------------- */
+
+/* Waits for the peer's answer to the hello. */
+static int hear_hello(hal_t *hal, uint64_t deadline_ns, control_packet_t *packet, char *error, size_t error_size)
+{
+    fcsl_wire_status_t status = FCSL_WIRE_NONE;
+    size_t size = 0;
+    while (status == FCSL_WIRE_NONE && monotonic_ns() < deadline_ns && !atomic_load(&hal->interrupted)) {
+        const uint64_t look_ns = monotonic_ns() + LOOK_NS;
+        status = receive(hal, look_ns < deadline_ns ? look_ns : deadline_ns, &size);
+    }
+    if (status == FCSL_WIRE_NONE) {
+        (void)snprintf(error, error_size, "no handshake from the simulator within %" PRIu32 " ms", hal->timeout_ms);
+        return -1;
+    }
+    if (status == FCSL_WIRE_ERROR) {
+        (void)snprintf(error, error_size, "%s", hal->wire.explain(hal->wire.ctx));
+        return -1;
+    }
+    if (status != FCSL_WIRE_OK || control_parse(hal->inbox, size, packet) != 0 || packet->kind == CONTROL_END) {
+        (void)snprintf(error, error_size, "the other end of the wire did not answer as a simulator does");
+        return -1;
+    }
+    return 0;
+}
+
+static int shake_hands(hal_t *hal, uint64_t deadline_ns, char *error, size_t error_size)
+{
+    control_packet_t packet;
+    if (control_send_hello(&hal->wire, &hal->table, 0) != FCSL_WIRE_OK) {
+        (void)snprintf(error, error_size, "cannot send the handshake: the other end is gone");
+        return -1;
+    }
+    if (hear_hello(hal, deadline_ns, &packet, error, error_size) != 0) {
+        return -1;
+    }
+    if (packet.kind == CONTROL_REFUSAL) {
+        (void)snprintf(error, error_size, "the simulator refused: %s", packet.text);
+        return -1;
+    }
+    hal->paces = packet.sends_time;
+    return control_differs(&packet, &hal->table, error, error_size) ? -1 : 0;
+}
+
+static int open_spec(hal_t *hal, char *error, size_t error_size)
+{
+    const size_t actuators = fcsl_message_capacity(hal->table.machine, FCSL_ACTUATOR_MESSAGE);
+    fcsl_wire_t wire;
+    if (fcsl_wire_open(hal->spec, FCSL_WIRE_CONNECT, actuators > hal->inbox_size ? actuators : hal->inbox_size,
+                       hal->timeout_ms, &wire, error, error_size) != 0) {
+        return -1;
+    }
+    hal->wire = wire;
+    hal->has_wire = 1;
+    return 0;
+}
+
+static int wire_open(fcsl_hal_t *handle, char *error, size_t error_size)
+{
+    hal_t *hal = handle->ctx;
+    const uint64_t deadline_ns = monotonic_ns() + (uint64_t)hal->timeout_ms * NS_PER_MS;
+    if ((!hal->has_wire && open_spec(hal, error, error_size) != 0) ||
+        shake_hands(hal, deadline_ns, error, error_size) != 0) {
+        return -1;
+    }
+    hal->counters.connected = 1;
+    handle->paces = hal->paces;
+    return 0;
+}
+
+/* The HAL's fields, and behind them those of the wire. */
+static void fill_fields(hal_t *hal, const fcsl_wire_counters_t *of_wire)
+{
+    memcpy(hal->fields, OWN_FIELDS, sizeof OWN_FIELDS);
+    for (uint32_t i = 0; i < of_wire->field_count; i++) {
+        hal->fields[OWN_COUNT + i] = of_wire->fields[i];
+        hal->fields[OWN_COUNT + i].offset += (uint32_t)offsetof(counters_t, wire);
+    }
+}
+
+static int make(const fcsl_wire_counters_t *of_wire, const fcsl_machine_t *machine, uint32_t timeout_ms,
+                fcsl_hal_t *handle, char *error, size_t error_size)
+{
+    const size_t sensors = fcsl_message_capacity(machine, FCSL_SENSOR_MESSAGE);
+    hal_t *hal = calloc(1, sizeof *hal);
+    if (hal != NULL) {
+        hal->inbox_size = sensors > CONTROL_PACKET_MAX ? sensors : CONTROL_PACKET_MAX;
+        hal->inbox = malloc(hal->inbox_size);
+        hal->fields = calloc(OWN_COUNT + of_wire->field_count, sizeof *hal->fields);
+    }
+    if (hal == NULL || hal->inbox == NULL || hal->fields == NULL || of_wire->bytes > FCSL_WIRE_COUNTERS_MAX) {
+        if (hal != NULL) {
+            wire_close(hal);
+        }
+        (void)snprintf(error, error_size, "out of memory for the wire, or it counts too much");
+        return -1;
+    }
+    hal->table = fcsl_channel_table(machine);
+    hal->timeout_ms = timeout_ms;
+    fill_fields(hal, of_wire);
+    *handle = (fcsl_hal_t){
+        .ctx = hal,
+        .open = wire_open,
+        .sample = wire_sample,
+        .command = wire_command,
+        .arm = wire_arm,
+        .now_ns = wire_now_ns,
+        .wait = wire_wait,
+        .log = wire_log,
+        .read_log = wire_read_log,
+        .count = wire_count,
+        .explain = wire_explain,
+        .interrupt = wire_interrupt,
+        .close = wire_close,
+        .fields = hal->fields,
+        .field_count = OWN_COUNT + of_wire->field_count,
+        .counters = &hal->counters,
+        .counter_bytes = sizeof hal->counters,
+        .serves = 1,
+    };
+    return 0;
+}
+
+int fcsl_hal_wire(const char *spec, const fcsl_machine_t *machine, uint32_t timeout_ms, fcsl_hal_t *hal, char *error,
+                  size_t error_size)
+{
+    if (fcsl_wire_check(spec, error, error_size) != 0) {
+        return -1;
+    }
+    if (strlen(spec) >= SPEC_BYTES) {
+        (void)snprintf(error, error_size, "the wire's name is too long: %d bytes are possible", SPEC_BYTES - 1);
+        return -1;
+    }
+    if (make(fcsl_wire_counters(spec), machine, timeout_ms, hal, error, error_size) != 0) {
+        return -1;
+    }
+    (void)snprintf(((hal_t *)hal->ctx)->spec, SPEC_BYTES, "%s", spec);
+    return 0;
+}
+
+int fcsl_hal_over_wire(const fcsl_wire_t *wire, const fcsl_machine_t *machine, uint32_t timeout_ms, fcsl_hal_t *hal,
+                       char *error, size_t error_size)
+{
+    if (make(wire->counters, machine, timeout_ms, hal, error, error_size) != 0) {
+        return -1;
+    }
+    ((hal_t *)hal->ctx)->wire = *wire;
+    ((hal_t *)hal->ctx)->has_wire = 1;
+    return 0;
+}

@@ -1,0 +1,105 @@
+/* SPDX-License-Identifier: Apache-2.0
+ *
+ * TCP: one end listens, the other connects. A connection is a stream of COBS frames.
+ */
+#define _GNU_SOURCE
+#include <errno.h>
+#include <netinet/in.h>
+#include <netinet/tcp.h>
+#include <poll.h>
+#include <stdio.h>
+#include <string.h>
+#include <unistd.h>
+
+#include "fcsl/fcsl_address.h"
+#include "line.h"
+#include "monotonic.h"
+
+enum { BACKLOG = 4, RETRY_MS = 20 };
+
+static int fail(int fd, const char *what, const char *address, char *error, size_t error_size)
+{
+    (void)snprintf(error, error_size, "cannot %s tcp:%s: %s", what, address, strerror(errno));
+    if (fd >= 0) {
+        (void)close(fd);
+    }
+    return -1;
+}
+
+/* Frames are short and wait for nothing. */
+static int set_up(int fd)
+{
+    const int on = 1;
+    return setsockopt(fd, IPPROTO_TCP, TCP_NODELAY, &on, sizeof on) == 0 ? line_set_nonblocking(fd) : -1;
+}
+
+static int listen_at(const struct sockaddr_storage *there, socklen_t length, const char *address, char *error,
+                     size_t error_size)
+{
+    const int on = 1;
+    const int fd = socket(there->ss_family, SOCK_STREAM | SOCK_CLOEXEC | SOCK_NONBLOCK, 0);
+    if (fd < 0 || setsockopt(fd, SOL_SOCKET, SO_REUSEADDR, &on, sizeof on) != 0 ||
+        bind(fd, (const struct sockaddr *)there, length) != 0 || listen(fd, BACKLOG) != 0) {
+        return fail(fd, "listen on", address, error, error_size);
+    }
+    return fd;
+}
+
+/* Returns a descriptor; -1 with errno. */
+static int connect_once(const struct sockaddr_storage *there, socklen_t length, uint64_t deadline_ns)
+{
+    const int fd = socket(there->ss_family, SOCK_STREAM | SOCK_CLOEXEC | SOCK_NONBLOCK, 0);
+    if (fd < 0) {
+        return -1;
+    }
+    int code = connect(fd, (const struct sockaddr *)there, length) == 0 ? 0 : errno;
+    if (code == EINPROGRESS) {
+        struct pollfd entry = {.fd = fd, .events = POLLOUT};
+        const struct timespec left = time_left(deadline_ns);
+        socklen_t size = sizeof code;
+        if (ppoll(&entry, 1, &left, NULL) <= 0 || getsockopt(fd, SOL_SOCKET, SO_ERROR, &code, &size) != 0) {
+            code = ETIMEDOUT;
+        }
+    }
+    if (code == 0) {
+        return fd;
+    }
+    (void)close(fd);
+    errno = code;
+    return -1;
+}
+
+int line_open_tcp(line_t *line, const char *address, fcsl_wire_side_t side, uint64_t deadline_ns, char *error,
+                  size_t error_size)
+{
+    struct sockaddr_storage there;
+    socklen_t length = 0;
+    *line = (line_t){.fd = -1, .listener = -1};
+    if (fcsl_address_read(address, &there, &length) != 0) {
+        (void)snprintf(error, error_size, "tcp:%s: HOST:PORT must be numbers, like 127.0.0.1:7600", address);
+        return -1;
+    }
+    if (side == FCSL_WIRE_LISTEN) {
+        line->listener = listen_at(&there, length, address, error, error_size);
+        return line->listener >= 0 ? 0 : -1;
+    }
+    while ((line->fd = connect_once(&there, length, deadline_ns)) < 0 && errno == ECONNREFUSED &&
+           monotonic_ns() < deadline_ns) {
+        const struct timespec pause = {.tv_nsec = RETRY_MS * NS_PER_MS};
+        (void)nanosleep(&pause, NULL);
+    }
+    if (line->fd < 0 || set_up(line->fd) != 0) {
+        const int fd = line->fd;
+        line->fd = -1;
+        return fail(fd, "connect to", address, error, error_size);
+    }
+    return 0;
+}
+
+void line_accept(line_t *line)
+{
+    line->fd = accept4(line->listener, NULL, NULL, SOCK_CLOEXEC);
+    if (line->fd >= 0 && set_up(line->fd) != 0) {
+        line_drop(line);
+    }
+}

@@ -1,0 +1,210 @@
+# SPDX-License-Identifier: Apache-2.0
+"""The lander flies over every wire with the bits of the flight in one process, also where the line loses and damages."""
+
+from __future__ import annotations
+
+import contextlib
+import json
+import os
+import pty
+import random
+import selectors
+import socket
+import subprocess
+import sys
+import threading
+from collections.abc import Iterator
+from pathlib import Path
+from typing import Any
+
+import pytest
+
+SIM = Path(__file__).resolve().parent.parent / "examples" / "lander" / "sim" / "lander.sim.json"
+CONFIG = SIM.parent.parent / "fc" / "lander_control.json"
+#: Simulated seconds: what a lossy line does takes real time.
+LENGTH_S = "4"
+DROPPED, DAMAGED = 0.10, 0.05
+
+
+def run(*line: str | Path, statuses: tuple[int, ...] = (0,)) -> str:
+    done = subprocess.run([str(w) for w in line], capture_output=True, text=True, timeout=120, check=False)
+    assert done.returncode in statuses, f"{line}\n{done.stdout}{done.stderr}"
+    return done.stdout
+
+
+def digest(bag: Path) -> str:
+    return run(sys.executable, "-m", "simclient.bag", "digest", bag).split()[0]
+
+
+@pytest.fixture(scope="module")
+def library(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    folder = tmp_path_factory.mktemp("library")
+    run("fcslc", "build", CONFIG, "-o", folder)
+    return folder / "liblander_control.so"
+
+
+@pytest.fixture(scope="module")
+def reference(tmp_path_factory: pytest.TempPathFactory) -> str:
+    bag = tmp_path_factory.mktemp("reference") / "bag"
+    run("fcsl-sim", "run", SIM, "--duration", LENGTH_S, "--record", bag, statuses=(0, 1))
+    return digest(bag)
+
+
+def fly(ours: str, theirs: str, library: Path, bag: Path) -> str:
+    """The digest of the flight; the two programs may start in either order."""
+    line = ["fcsl-sim", "run", str(SIM), "--duration", LENGTH_S, "--external", f"wire:{ours}"]
+    with subprocess.Popen(line, stdout=subprocess.DEVNULL, stderr=subprocess.PIPE, text=True) as simulator:
+        run("fcsl-fc", library, "--hal", f"wire:{theirs}", "--timeout-ms", "60000", "--record", bag)
+        _, err = simulator.communicate(timeout=60)
+    assert simulator.returncode in (0, 1), err  # 1: `until` did not hold in so short a flight
+    return digest(bag)
+
+
+def free_port(kind: socket.SocketKind) -> int:
+    with socket.socket(socket.AF_INET, kind) as found:
+        found.bind(("127.0.0.1", 0))
+        return int(found.getsockname()[1])
+
+
+@pytest.mark.parametrize("kind", ["udp", "tcp"])
+def test_network(kind: str, reference: str, library: Path, tmp_path: Path) -> None:
+    wire = f"{kind}:127.0.0.1:{free_port(socket.SOCK_DGRAM if kind == 'udp' else socket.SOCK_STREAM)}"
+    assert fly(wire, wire, library, tmp_path / "bag") == reference
+
+
+class Line(threading.Thread):
+    """Carries what comes in at one descriptor to the other one, and loses and damages some of it."""
+
+    def __init__(self, ends: tuple[int, int], lossy: bool) -> None:
+        super().__init__(daemon=True)
+        self._to = {ends[0]: ends[1], ends[1]: ends[0]}
+        self._random = random.Random(7)
+        self._lossy = lossy
+        self.lost = self.damaged = 0
+        self._wake, self._over = os.pipe()
+
+    def run(self) -> None:
+        with selectors.DefaultSelector() as selector:
+            for end in (*self._to, self._wake):
+                selector.register(end, selectors.EVENT_READ)
+            while True:
+                for key, _ in selector.select():
+                    if key.fd == self._wake:
+                        return
+                    self._carry(int(key.fd))
+
+    def _carry(self, end: int) -> None:
+        try:
+            data = os.read(end, 2048)
+        except OSError:  # a datagram came back, or nobody has the terminal open
+            return
+        luck = self._random.random() if self._lossy else 1.0
+        if luck < DROPPED:
+            self.lost += 1
+            return
+        if luck < DROPPED + DAMAGED:
+            self.damaged += 1
+            at = self._random.randrange(len(data))
+            data = data[:at] + bytes([data[at] ^ 1 << self._random.randrange(8)]) + data[at + 1 :]
+        with contextlib.suppress(OSError):
+            os.write(self._to[end], data)
+
+    def stop(self) -> None:
+        os.write(self._over, b".")
+        self.join()
+        os.close(self._wake)
+        os.close(self._over)
+
+
+@contextlib.contextmanager
+def running(line: Line) -> Iterator[Line]:
+    line.start()
+    try:
+        yield line
+    finally:
+        line.stop()
+
+
+def test_network_that_loses_and_damages(reference: str, library: Path, tmp_path: Path) -> None:
+    """10 % of the frames are lost, 5 % are damaged: the reliable port repeats them."""
+    ours, theirs = free_port(socket.SOCK_DGRAM), free_port(socket.SOCK_DGRAM)
+    with (
+        socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as sim_side,
+        socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as fc_side,
+    ):
+        sim_side.connect(("127.0.0.1", ours))
+        fc_side.bind(("127.0.0.1", theirs))
+        fc_side.settimeout(60)
+        found: list[str] = []
+        flight = threading.Thread(
+            target=lambda: found.append(
+                fly(f"udp:127.0.0.1:{ours}", f"udp:127.0.0.1:{theirs}", library, tmp_path / "bag")
+            )
+        )
+        flight.start()
+        fc_side.connect(fc_side.recvfrom(2048)[1])  # its first hello is lost, too
+        with running(Line((sim_side.fileno(), fc_side.fileno()), lossy=True)) as line:
+            flight.join(120)
+    assert found == [reference]
+    assert line.lost > 50 and line.damaged > 20
+
+
+@pytest.mark.parametrize("lossy", [False, True])
+def test_serial_line(lossy: bool, reference: str, library: Path, tmp_path: Path) -> None:
+    """Two pseudo-terminals; what is lost or damaged of the stream costs a frame or two."""
+    (a, ours), (b, theirs) = pty.openpty(), pty.openpty()
+    names = [os.ttyname(end) for end in (ours, theirs)]
+    with running(Line((a, b), lossy=lossy)) as line:
+        flown = fly(f"uart:{names[0]}:921600", f"uart:{names[1]}:921600", library, tmp_path / "bag")
+    for end in (a, b, ours, theirs):
+        os.close(end)
+    assert flown == reference
+    assert not lossy or line.lost > 50
+
+
+# ---- the model serial_link ---------------------------------------------------------------------------------------------
+
+SERIAL = SIM.with_name("lander_serial.sim.json")
+
+
+def simulate(bag: Path, *sets: str, seed: int = 1) -> dict[str, Any]:
+    """The summary of the whole flight with these parameters of the line."""
+    options = [word for text in sets for word in ("--set", f"line.parameters.{text}")]
+    line = ["fcsl-sim", "run", SERIAL, "--seed", str(seed), "--record", bag, "--json", *options]
+    summary: dict[str, Any] = json.loads(run(*line))
+    return summary
+
+
+def test_a_lossy_link_while_time_halts(tmp_path: Path) -> None:
+    """10 % of the frames are lost and 5 % damaged: the digest is that of the flight without a link."""
+    summary = simulate(tmp_path / "serial")
+    run("fcsl-sim", "run", SIM, "--record", tmp_path / "direct")
+    assert summary["truth"]["line.outputs.dropped"] > 500 and summary["truth"]["line.outputs.repeated"] > 500
+    assert digest(tmp_path / "serial") == digest(tmp_path / "direct")
+
+
+@pytest.mark.parametrize(
+    "sets",
+    [("halts=false", "reliable=false"), ("halts=false", "reliable=false", "delay_s=0.02", "baud=115200")],
+)
+def test_where_time_passes_the_lander_still_lands(sets: tuple[str, ...], tmp_path: Path) -> None:
+    """Another flight than over a link that takes no time, and the same one from the same seed."""
+    first, again, other = (simulate(tmp_path / str(seed_bag), *sets, seed=1 + seed_bag // 2) for seed_bag in range(3))
+    for summary in (first, other):
+        assert summary["truth"]["lander.outputs.landed"] and summary["truth"]["lander.outputs.touchdown_speed"] < 2.0
+    digests = [digest(tmp_path / str(number)) for number in range(3)]
+    assert digests[0] == digests[1] != digests[2] and first["truth"] == again["truth"]
+    run("fcsl-sim", "run", SIM, "--record", tmp_path / "direct")
+    assert digest(tmp_path / "direct") not in digests
+
+
+def test_hil_over_the_simulated_line(library: Path, tmp_path: Path) -> None:
+    """The flight program in a process of its own, behind the line that loses and damages: the same bits."""
+    wire = f"unix:{tmp_path / 'wire'}"
+    with subprocess.Popen(
+        ["fcsl-sim", "run", str(SERIAL), "--external", f"wire:{wire}"], stdout=subprocess.DEVNULL
+    ) as simulator:
+        run("fcsl-fc", library, "--hal", f"wire:{wire}", "--timeout-ms", "60000", "--record", tmp_path / "own")
+        assert simulator.wait(60) == 0
+    run("fcsl-sim", "run", SIM, "--record", tmp_path / "direct")
+    assert digest(tmp_path / "own") == digest(tmp_path / "direct")
