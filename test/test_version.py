@@ -18,6 +18,7 @@ PROGRAMS = {
     "fcslc": "fcsl_compiler",
     "fcsl-sim": "fcsl_sim",
     "fcsl-fc": "fcsl_runtime/fcsl_runtime",
+    "fcsl-guard": "fcsl_runtime/fcsl_runtime",
     "fcsl-var": "fcsl_runtime/simclient",
     "fcsl-link": "fcsl_runtime/simclient",
     "fcsl-view": "fcsl_runtime/simclient",

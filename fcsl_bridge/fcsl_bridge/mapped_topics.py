@@ -87,7 +87,8 @@ class _Input:
 
 
 class Outputs:
-    """Actuator topics: the machine's actuator outputs, published at every tick."""
+    """Actuator topics: the machine's actuator outputs, published at every tick; their safe values while it is
+    disarmed."""
 
     def __init__(self, node: Node, run: Run):
         self._node, self._run = node, run
@@ -101,7 +102,7 @@ class Outputs:
     def publish(self, time_ns: int) -> None:
         """Publishes the messages of the last completed tick, stamped time_ns."""
         for _, composer, publisher in self._outlets:
-            data = composer.compose([self._run.address], time_ns)
+            data = composer.compose([self._run.actuator_address], time_ns)
             if data is not None:
                 publisher.publish(data)
 

@@ -790,6 +790,19 @@ def mapped(*ros: Mapping[str, Any], **keys: Any) -> str:
     )
 
 
+ACTUATOR = {"name": "force", "id": 1, "field": "two.outputs.y", "direction": "actuator"}
+
+
+def armed(arm: Any, *actuators: Mapping[str, Any]) -> str:
+    """`arm`, and these actuators; without any, one that has its safe value."""
+    channels = [{**ACTUATOR, **a} for a in actuators or ({"safe": 0.0},)]
+    return patch(lambda c: c.update(arm=arm, channels=channels))
+
+
+def timeout(seconds: Any) -> str:
+    return patch(lambda c: c.update(command_timeout_s=seconds, channels=[{**ACTUATOR, "safe": 0.0}]))
+
+
 def edge(**keys: Any) -> str:
     return put("transitions", value=[{"from": "A", "to": "B", **keys}])
 
@@ -996,6 +1009,43 @@ CONFIGS: dict[str, str] = {
             "ros": {"type": "geometry_msgs/Twist", "field": "angular"},
         },
     ),
+    "E206 what arms, misspelt": armed("oen.on_out"),
+    "E206 what arms is the machine's": armed("machine.resumed"),
+    "E208 what arms is no text": armed(True),
+    "E214 a sensor's safe value": channel({"safe": 0.0}),
+    "E214 arm without actuators": put("arm", value="one.b"),
+    "E214 a time-out and sensors alone": patch(
+        lambda c: c.update(
+            command_timeout_s=0.1, channels=[{"name": "a", "id": 1, "field": "one.inputs.x", "direction": "sensor"}]
+        )
+    ),
+    "E215 what arms is an input": armed("one.on"),
+    "E215 what arms, with its dictionary": armed("one.outputs.b"),
+    "E216 what arms is not there": armed("one.bb"),
+    "E216 what arms is an element": armed("one.v[0]"),
+    "E248 what arms is a number": armed("one.y"),
+    "E248 what arms is a vector": armed("one.v"),
+    "E248 what arms is a health": armed("one.health"),
+    "E207 a safe value of another type": armed("one.b", {"safe": True}),
+    "E207 a safe value of another shape": armed("one.b", {"field": "two.outputs.v", "safe": [0.0, 0.0]}),
+    "E207 a safe value that is too large": armed("one.b", {"field": "two.outputs.i", "safe": 2**40}),
+    "E101 a safe value that is no number": armed("one.b", {"safe": float("nan")}),
+    "E101 a time-out without end": timeout(float("inf")),
+    "E249 no safe value": armed("one.b", {}),
+    "E249 some safe values": armed(
+        "one.b",
+        {"safe": 0.0},
+        {"name": "b", "id": 2, "field": "two.outputs.v"},
+        {"name": "c", "id": 3, "field": "two.outputs.i"},
+        {"name": "d", "id": 4, "field": "one.outputs.i"},
+    ),
+    "E249 a time-out without safe values": patch(lambda c: c.update(command_timeout_s=0.1, channels=[ACTUATOR])),
+    "E204 no time-out": timeout(0),
+    "E204 a time-out before its beginning": timeout(-0.5),
+    "E204 a time-out of one tick": timeout(0.01),
+    "E204 a time-out of an hour": timeout(3600),
+    "E208 a time-out as a text": timeout("0.1 s"),
+    "E229 a channel named as the gate": armed("one.b", {"name": "gate", "safe": 0.0}),
     "E226 two names": channel({}, {"id": 2, "field": "two.inputs.x"}),
     "E226 two ids": channel({}, {"name": "b", "field": "two.inputs.x"}),
     "E226 two fields": channel({}, {"name": "b", "id": 2}),
@@ -1064,6 +1114,13 @@ CONFIGS: dict[str, str] = {
     ),
     "W203 unreachable": put("transitions", value=[]),
     "W204 in no schedule": put("states", "A", "schedule", value={"one": 100}),
+    "W204 what arms never runs": patch(
+        lambda c: (
+            c.update(arm="two.b", channels=[{**ACTUATOR, "safe": 0.0}]),
+            c["states"]["A"].update(schedule={"one": 100}),
+        )
+    ),
+    "W212 what arms stops in a state": armed("one.b"),
     "W205 from no other state": patch(
         lambda c: (c["states"].pop("B"), c["transitions"][0].update({"from": "*", "to": "A"}))
     ),

@@ -17,6 +17,7 @@ from fcsl_compiler.base.source import MAX_NAME
 from fcsl_compiler.cli.main import main
 from fcsl_compiler.cli.scaffold import SCHEMA, algorithm_files, machine_files
 from fcsl_compiler.config import views
+from fcsl_compiler.config.arming import MAX_TIMEOUT_S
 from fcsl_compiler.config.machine import MAX_TICK_HZ, RESERVED_INSTANCES
 from fcsl_compiler.driver.passes import compile_machine
 from fcsl_compiler.model.machine import CHANNEL_SOURCES, MACHINE_SOURCES
@@ -49,9 +50,10 @@ SENSOR = """class Sensor:
 """
 LAW = """class Force:
     inputs = {"rate": "f64[2]", "at": "f64[3] m", "nav_health": "Health"}
-    outputs = {"force": "f64"}
+    outputs = {"force": "f64", "armed": "bool"}
     def execute(self):
         self.force = self.rate[0]
+        self.armed = True
 """
 #: Every existing key at least once.
 RICH: dict[str, Any] = {
@@ -126,8 +128,10 @@ RICH: dict[str, Any] = {
                 "child_frame": "base_link",
             },
         },
-        {"name": "force", "id": 2, "field": "law.outputs.force", "direction": "actuator"},
+        {"name": "force", "id": 2, "field": "law.outputs.force", "direction": "actuator", "safe": 0.5},
     ],
+    "arm": "law.armed",
+    "command_timeout_s": 0.1,
     "views": {
         "panels": [
             {
@@ -262,6 +266,7 @@ def test_words_and_limits_are_the_compilers() -> None:
     assert (panel["title"]["maxLength"], body["shape"]["enum"]) == (views.MAX_TITLE, list(views.SHAPES))
     assert defs["views"]["properties"]["panels"]["maxItems"] == views.MAX_PANELS
     assert body["mesh"]["allOf"][1]["pattern"] == f"\\.({'|'.join(s[1:] for s in views.MESH_SUFFIXES)})$"
+    assert top["command_timeout_s"]["maximum"] == MAX_TIMEOUT_S
     assert top["tick_hz"]["maximum"] == defs["hz"]["maximum"] == MAX_TICK_HZ
 
 

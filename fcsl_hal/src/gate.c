@@ -6,6 +6,11 @@
 
 #include <string.h>
 
+int fcsl_is_armed(const fcsl_machine_t *machine, const void *data)
+{
+    return machine->arm_field == FCSL_NONE || ((const uint8_t *)data)[machine->fields[machine->arm_field].offset] != 0u;
+}
+
 static void make_safe(const fcsl_machine_t *machine, uint8_t *data)
 {
     for (uint32_t i = 0; i < machine->channel_count; i++) {

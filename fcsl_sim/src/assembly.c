@@ -6,6 +6,7 @@
 #include <stdlib.h>
 #include <string.h>
 
+#include "actuators.h"
 #include "clock.h"
 #include "fail.h"
 #include "fcsl/fcsl_scalar.h"
@@ -407,12 +408,13 @@ int fcsl_assembly_build(fcsl_sim_t *sim, fcsl_error_t *error)
     if (build_writes(sim, error) || build_copies(sim, error) || build_sensors(sim, error)) {
         return -1;
     }
-    return build_link(sim, error) || fcsl_truth_build(sim, error) ? -1 : 0;
+    return fcsl_actuators_build(sim, error) || build_link(sim, error) || fcsl_truth_build(sim, error) ? -1 : 0;
 }
 
 void fcsl_assembly_free(fcsl_sim_t *sim)
 {
     fcsl_truth_free(sim);
+    fcsl_actuators_free(sim);
     fcsl_sim_link_free(sim->link);
     for (uint32_t i = 0; i < sim->instance_count; i++) {
         free(sim->instances[i].data);

@@ -9,6 +9,14 @@
 #include "fcsl/fcsl_external.h"
 #include "sim_internal.h"
 
+/* The outputs of an instance into the bag, at the present time; 0, or -1. */
+static int record_truth(fcsl_sim_t *sim, const fcsl_instance_state_t *instance, fcsl_error_t *error)
+{
+    const size_t bytes = fcsl_truth_write(sim, instance, sim->truth, instance->truth_size);
+    return fcsl_run_record_write(sim->run, instance->truth_topic, (uint64_t)sim->time_ns, sim->truth, (uint32_t)bytes,
+                                 error);
+}
+
 /* Exchanges the sensor message for the actuator message, which overwrites it; 0, or -1. */
 static int ask_machine(fcsl_sim_t *sim, fcsl_message_t *message, fcsl_error_t *error)
 {
@@ -16,10 +24,7 @@ static int ask_machine(fcsl_sim_t *sim, fcsl_message_t *message, fcsl_error_t *e
         return -1;
     }
     for (uint32_t i = 0; sim->recording && i < sim->instance_count; i++) {
-        const fcsl_instance_state_t *instance = &sim->instances[i];
-        const int64_t bytes = fcsl_sim_truth_message(sim, i, sim->truth, instance->truth_size);
-        if (bytes < 0 || fcsl_run_record_write(sim->run, instance->truth_topic, (uint64_t)sim->time_ns, sim->truth,
-                                               (uint32_t)bytes, error)) {
+        if (record_truth(sim, &sim->instances[i], error)) {
             return -1;
         }
     }
@@ -61,6 +66,9 @@ int fcsl_sim_tick_once(fcsl_sim_t *sim, fcsl_error_t *error)
     if (fcsl_sim_sense_message(sim, sim->message_bytes, sim->message_capacity, &message, error) ||
         (sim->external ? ask_external(sim, &message, error) : ask_machine(sim, &message, error)) ||
         fcsl_sim_actuate_message(sim, &message, error)) {
+        return -1;
+    }
+    if (sim->recording && sim->actuators && record_truth(sim, &sim->actuators->as_instance, error)) {
         return -1;
     }
     fcsl_sim_publish(sim);
@@ -129,11 +137,16 @@ int fcsl_sim_record(fcsl_sim_t *sim, const char *bag, const char *name_space, fc
     if (fcsl_run_record(sim->run, &options, error)) {
         return -1;
     }
-    for (uint32_t i = 0; i < sim->instance_count; i++) {
-        if (add_truth_topic(sim, &sim->instances[i], name_space, error)) {
-            (void)fcsl_run_record_stop(sim->run, NULL);
-            return -1;
-        }
+    int failed = 0;
+    for (uint32_t i = 0; i < sim->instance_count && !failed; i++) {
+        failed = add_truth_topic(sim, &sim->instances[i], name_space, error);
+    }
+    if (!failed && sim->actuators) {
+        failed = add_truth_topic(sim, &sim->actuators->as_instance, name_space, error);
+    }
+    if (failed) {
+        (void)fcsl_run_record_stop(sim->run, NULL);
+        return -1;
     }
     sim->recording = 1;
     return 0;

@@ -84,7 +84,7 @@ static int allocate(fcsl_sim_t *sim, struct fcsl_sim_published *published)
     const uint32_t count = sim->instance_count;
     published->first_model = sim->external ? 0u : 1u;
     published->instance_count = count;
-    published->count = count + published->first_model;
+    published->count = count + published->first_model + (sim->actuators ? 1u : 0u);
     published->blocks = calloc(published->count + 1u, sizeof *published->blocks);
     published->parts = calloc(published->count + 1u, sizeof *published->parts);
     published->fields = calloc(count + 1u, sizeof(fcsl_field_t *));
@@ -103,10 +103,18 @@ static int allocate(fcsl_sim_t *sim, struct fcsl_sim_published *published)
             return -1;
         }
     }
+    if (sim->actuators) {
+        const fcsl_instance_state_t *actuators = &sim->actuators->as_instance;
+        published->blocks[published->count - 1u] = (fcsl_vars_block_t){.prefix = actuators->name,
+                                                                       .fields = actuators->model->fields,
+                                                                       .field_count = actuators->model->field_count};
+        published->parts[published->count - 1u] =
+            (fcsl_part_t){.data = actuators->data, .size = actuators->model->size};
+    }
     return fcsl_history_open(&published->history, published->parts, published->count, HISTORY_SLOTS);
 }
 
-/* Paths must be unique: a model instance must not have the name of a machine instance. */
+/* Paths must be unique: instances of models and of the machine, and what the actuators get, have different names. */
 static int check_names(const fcsl_sim_t *sim, fcsl_error_t *error)
 {
     for (uint32_t i = 0; i < sim->instance_count; i++) {
@@ -120,6 +128,14 @@ static int check_names(const fcsl_sim_t *sim, fcsl_error_t *error)
                                  "model instance `%s` is named like a part of the machine: rename it, so that "
                                  "its variables can be served",
                                  name);
+        }
+    }
+    for (uint32_t m = 0; m < sim->machine->instance_count && sim->actuators && !sim->external; m++) {
+        if (strcmp(sim->machine->instances[m].name, sim->actuators->as_instance.name) == 0) {
+            return fcsl_sim_fail(error,
+                                 "the machine's instance `%s` is named like what the actuators get: rename it, so that "
+                                 "variables can be served",
+                                 sim->actuators->as_instance.name);
         }
     }
     return 0;

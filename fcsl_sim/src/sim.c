@@ -6,6 +6,7 @@
 #include <stdlib.h>
 #include <string.h>
 
+#include "actuators.h"
 #include "clock.h"
 #include "fail.h"
 #include "fcsl/fcsl_scalar.h"
@@ -203,8 +204,8 @@ int fcsl_sim_sense_message(fcsl_sim_t *sim, uint8_t *bytes, size_t capacity, fcs
 
 void fcsl_sim_take_command(void *context, const fcsl_message_t *command)
 {
-    const fcsl_sim_t *sim = context;
-    fcsl_message_apply(sim->machine, sim->image, command);
+    fcsl_sim_t *sim = context;
+    fcsl_gate_command(&sim->gate, command, (uint64_t)sim->time_ns, sim->image);
 }
 
 static int until_holds(const fcsl_sim_t *sim)
@@ -247,6 +248,7 @@ int fcsl_sim_actuate_message(fcsl_sim_t *sim, const fcsl_message_t *message, fcs
         return fcsl_sim_fail(error, "actuator message of tick %llu where that of tick %llu is due",
                              (unsigned long long)message->tick, (unsigned long long)sim->tick);
     }
+    fcsl_gate_wait(&sim->gate, (uint64_t)sim->time_ns, sim->image); /* a link may have delivered nothing for long */
     const char *wrong = sim->link ? fcsl_sim_link_command(sim->link, message) : NULL;
     if (wrong) {
         return fcsl_sim_fail(error, "tick %llu: %s", (unsigned long long)sim->tick, wrong);
@@ -254,6 +256,7 @@ int fcsl_sim_actuate_message(fcsl_sim_t *sim, const fcsl_message_t *message, fcs
     if (!sim->link) {
         fcsl_sim_take_command(sim, message);
     }
+    fcsl_actuators_update(sim);
     sim->sensed = 0;
     sim->tick++;
     if (sim->plan.until != FCSL_UNTIL_NONE) {

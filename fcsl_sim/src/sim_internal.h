@@ -6,6 +6,7 @@
 #define FCSL_SIM_INTERNAL_H
 
 #include "event_queue.h"
+#include "fcsl/fcsl_gate.h"
 #include "fcsl/fcsl_sim.h"
 #include "integrate.h"
 #include "noise.h"
@@ -51,6 +52,14 @@ typedef struct {
     int truth_topic;
 } fcsl_instance_state_t;
 
+/* What the actuators get (actuators.c). */
+typedef struct {
+    fcsl_instance_state_t as_instance; /* for what describes, records and serves an instance of a model */
+    fcsl_model_t model;
+    fcsl_field_t *fields; /* of the gate, then one for each actuator channel in table order */
+    char *texts;          /* the model's name, and the paths of the channels */
+} fcsl_actuators_t;
+
 /* When ticks may run (pace.c). */
 typedef struct {
     double speed; /* limit on simulated seconds per second; 0: as fast as possible */
@@ -80,6 +89,8 @@ struct fcsl_sim {
     uint8_t *select; /* per channel: included in the next sensor message */
     uint8_t *message_bytes;
     size_t message_capacity;
+    fcsl_gate_t gate;            /* before the actuators */
+    fcsl_actuators_t *actuators; /* null: the machine neither arms nor has a time-out */
     fcsl_sim_link_t *link; /* between plant and controller; null: none */
     uint32_t link_instance;
     double *scratch;
@@ -142,8 +153,11 @@ void fcsl_write_bits(uint8_t *to, uint32_t size, uint64_t bits);
 
 /* truth.c: a scalar from its zero-extended bits; integers beyond 2^53 are rounded. */
 double fcsl_as_double(uint64_t bits, uint8_t type);
-/* truth.c: type, schema and size of every instance's message. */
+/* truth.c: type, schema and size of every instance's message, and of the actuators'. */
 int fcsl_truth_build(fcsl_sim_t *sim, fcsl_error_t *error);
 void fcsl_truth_free(fcsl_sim_t *sim);
+/* truth.c: the outputs as CDR, stamped with the present time. Returns its bytes, or 0 when it does not fit. */
+size_t fcsl_truth_write(const fcsl_sim_t *sim, const fcsl_instance_state_t *instance, uint8_t *cdr_bytes,
+                        size_t capacity);
 
 #endif /* FCSL_SIM_INTERNAL_H */

@@ -8,6 +8,7 @@
 #include <stdlib.h>
 #include <string.h>
 
+#include "actuators.h"
 #include "fail.h"
 #include "fcsl/fcsl_scalar.h"
 
@@ -15,6 +16,7 @@ struct fcsl_sim_snapshot {
     int is; /* a snapshot was saved */
     uint8_t *machine;
     uint8_t *image;
+    fcsl_gate_t gate;
     uint8_t *models; /* their structs, concatenated */
     uint8_t *link;   /* null: there is none */
     fcsl_noise_t *noises;
@@ -68,6 +70,7 @@ void fcsl_sim_snapshot_take(const fcsl_sim_t *sim, fcsl_sim_snapshot_t *snapshot
 {
     memcpy(snapshot->machine, fcsl_run_data(sim->run), sim->machine->size);
     memcpy(snapshot->image, sim->image, sim->machine->size);
+    snapshot->gate = sim->gate;
     uint8_t *at = snapshot->models;
     for (uint32_t i = 0; i < sim->instance_count; i++) {
         const fcsl_instance_state_t *instance = &sim->instances[i];
@@ -136,6 +139,8 @@ int fcsl_sim_snapshot_restore(fcsl_sim_t *sim, const fcsl_sim_snapshot_t *snapsh
     }
     *fcsl_run_simulated_hardware(sim->run) = snapshot->hardware;
     memcpy(sim->image, snapshot->image, sim->machine->size);
+    sim->gate = snapshot->gate;
+    fcsl_actuators_update(sim);
     const uint8_t *at = snapshot->models;
     for (uint32_t i = 0; i < sim->instance_count; i++) {
         fcsl_instance_state_t *instance = &sim->instances[i];

@@ -100,13 +100,13 @@ static void write_scalar(fcsl_cdr_t *cdr, const uint8_t *from, uint8_t type)
     }
 }
 
-/* Returns the bytes of the message, or 0 when it does not fit. */
-static size_t write_message(const fcsl_instance_state_t *instance, int64_t time_ns, uint8_t *bytes, size_t capacity)
+size_t fcsl_truth_write(const fcsl_sim_t *sim, const fcsl_instance_state_t *instance, uint8_t *cdr_bytes,
+                        size_t capacity)
 {
     const fcsl_model_t *model = instance->model;
     fcsl_cdr_t cdr;
-    fcsl_cdr_begin(&cdr, bytes, capacity);
-    fcsl_cdr_header(&cdr, (uint64_t)time_ns);
+    fcsl_cdr_begin(&cdr, cdr_bytes, capacity);
+    fcsl_cdr_header(&cdr, (uint64_t)sim->time_ns);
     for (uint32_t i = 0; i < model->field_count; i++) {
         const fcsl_field_t *field = &model->fields[i];
         const uint32_t scalar = fcsl_scalar_size(field->type);
@@ -129,9 +129,20 @@ static size_t message_bytes_max(const fcsl_model_t *model)
 
 /* ---- building ------------------------------------------------------------------------------------------------------------ */
 
+static int describe(fcsl_sim_t *sim, fcsl_instance_state_t *instance, size_t largest, fcsl_error_t *error)
+{
+    instance->truth_type = build_type(instance->model->name);
+    instance->truth_schema = build_schema(instance->model);
+    if (!instance->truth_type || !instance->truth_schema) {
+        return fcsl_sim_fail(error, "no memory for message types");
+    }
+    instance->truth_size = (uint32_t)fcsl_truth_write(sim, instance, sim->truth, largest);
+    return 0;
+}
+
 int fcsl_truth_build(fcsl_sim_t *sim, fcsl_error_t *error)
 {
-    size_t largest = 0;
+    size_t largest = sim->actuators ? message_bytes_max(&sim->actuators->model) : 0;
     for (uint32_t i = 0; i < sim->instance_count; i++) {
         const size_t size = message_bytes_max(sim->instances[i].model);
         largest = size > largest ? size : largest;
@@ -141,22 +152,26 @@ int fcsl_truth_build(fcsl_sim_t *sim, fcsl_error_t *error)
         return fcsl_sim_fail(error, "no memory for messages");
     }
     for (uint32_t i = 0; i < sim->instance_count; i++) {
-        fcsl_instance_state_t *instance = &sim->instances[i];
-        instance->truth_type = build_type(instance->model->name);
-        instance->truth_schema = build_schema(instance->model);
-        if (!instance->truth_type || !instance->truth_schema) {
-            return fcsl_sim_fail(error, "no memory for message types");
+        if (describe(sim, &sim->instances[i], largest, error)) {
+            return -1;
         }
-        instance->truth_size = (uint32_t)write_message(instance, 0, sim->truth, largest);
     }
-    return 0;
+    return sim->actuators ? describe(sim, &sim->actuators->as_instance, largest, error) : 0;
+}
+
+static void free_texts(fcsl_instance_state_t *instance)
+{
+    free(instance->truth_type);
+    free(instance->truth_schema);
 }
 
 void fcsl_truth_free(fcsl_sim_t *sim)
 {
     for (uint32_t i = 0; i < sim->instance_count; i++) {
-        free(sim->instances[i].truth_type);
-        free(sim->instances[i].truth_schema);
+        free_texts(&sim->instances[i]);
+    }
+    if (sim->actuators) {
+        free_texts(&sim->actuators->as_instance);
     }
     free(sim->truth);
 }
@@ -176,7 +191,7 @@ int64_t fcsl_sim_truth_message(const fcsl_sim_t *sim, uint32_t instance, uint8_t
     if (instance >= sim->instance_count || capacity < sim->instances[instance].truth_size) {
         return -1;
     }
-    return (int64_t)write_message(&sim->instances[instance], sim->time_ns, cdr, capacity);
+    return (int64_t)fcsl_truth_write(sim, &sim->instances[instance], cdr, capacity);
 }
 
 /* ---- as numbers ---------------------------------------------------------------------------------------------------------- */

@@ -9,6 +9,7 @@ from pathlib import Path
 ALONE = {
     "chain": "chain",
     "checkpoint": "checkpoint",
+    "guard": "guard",
     "lateness": "lateness",
     "link": "link.main",
     "linear": "linear.main",

@@ -20,6 +20,7 @@ from .harness.size import SUFFIX
 from .subjects.chain import chain_summary, chain_times
 from .subjects.checkpoint import checkpoint_rows, checkpoint_times
 from .subjects.edit_loop import edit_to_test
+from .subjects.guard import guard_rows, guard_times
 from .subjects.lander import ROOT, real_time_factor, step_times
 from .subjects.lateness import lateness, lateness_rows
 from .subjects.linear.main import linear_rows, linear_times
@@ -135,6 +136,7 @@ SECTIONS = (
     Section("replay_map", "replaying bags of other makers", replay_map, replay_rows),
     Section("link", "flying in lock-step over every wire, and losing frames", link_figures, link_rows),
     Section("lateness", "flying at 1 kHz under load, beside cyclictest (two minutes)", lateness, lateness_rows),
+    Section("guard", "killing flight programs under a guard", guard_times, guard_rows),
     Section("lockstep_ticks_per_s", "flying the lander over ROS 2", lambda _: lockstep(), lockstep_rows),
     Section(
         "realtime",

@@ -87,3 +87,17 @@ def test_the_dropout_example(fly):
     with fly(1, EXAMPLE / "sim" / "dropout.sim.json") as sim:
         assert [state for state, _, _ in to_the_end(sim)] == ["COAST", "SAFE"]
         assert sim.get("lander.outputs.touchdown_speed") < MAX_TOUCHDOWN_SPEED
+
+
+def test_the_engine_is_armed_until_it_has_landed(fly):
+    """From the first tick on; on the ground the valve gets the safe throttle."""
+    with fly(1) as sim:
+        armed = []
+        while sim.status == "running":
+            sim.run(1)
+            armed.append(sim.machine_value("engine.outputs.armed"))
+            if not sim.machine_value("engine.outputs.landed"):
+                assert armed[-1]
+        end = armed.index(False)
+        assert all(armed[:end]) and not any(armed[end:])
+        assert sim.get("lander.outputs.landed") and sim.get("lander.inputs.throttle") == 0.0

@@ -11,6 +11,7 @@ from ..model.machine import NOT_MAPPED, Channel, Connection, PortRef, RosMapping
 from ..model.types import HEALTH, REQUEST, Scalar, element_of
 from ..parse.json_reader import ConfigReader
 from ..parse.json_source import JsonNode
+from .arming import read_safe
 from .ports import PortResolver
 from .ros import check_channels
 
@@ -58,7 +59,7 @@ def read_channels(
 def _channel(
     item: JsonNode, ports: PortResolver, connections: list[Connection], reader: ConfigReader
 ) -> Channel | None:
-    keys = reader.object(item, "a channel", ("name", "id", "field", "direction"), ("max_age_ticks", "ros"))
+    keys = reader.object(item, "a channel", ("name", "id", "field", "direction"), ("max_age_ticks", "safe", "ros"))
     if keys is None:
         return None
     name = reader.string(keys.get("name"), "`name`")
@@ -76,7 +77,8 @@ def _channel(
     port = _bound(keys.get("field"), direction, ports, connections, reader)
     if name is None or number is None or direction is None or port is None or ros is None:
         return None
-    return Channel(name, number, port, direction, age, ros, item.span)
+    safe = read_safe(keys["safe"], port.type, direction, reader) if "safe" in keys else ()
+    return Channel(name, number, port, direction, age, ros, item.span, safe or ())
 
 
 def default_topic(name: str) -> str:

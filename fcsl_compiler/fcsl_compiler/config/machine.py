@@ -22,6 +22,7 @@ from ..model.ranges import UNBOUNDED
 from ..parse.json_reader import ConfigReader, Everything
 from ..parse.json_source import JsonNode
 from ..parse.machine_files import ParsedAlgorithm, ParsedMachine
+from .arming import read_arming
 from .channels import read_channels
 from .ports import PortResolver
 from .sources import SourceResolver
@@ -51,6 +52,7 @@ def check_machine(parsed: ParsedMachine, sink: DiagnosticSink) -> Machine | None
     ports = PortResolver(instances, incomplete, SourceResolver(keys.get("channels"), sink), sink)
     connections = _read_connections(keys.get("connections"), ports, reader)
     channels = read_channels(keys.get("channels"), ports, connections, reader)
+    arm, command_timeout_ns = read_arming(keys, tick_hz, ports, channels, reader)
     instances = _with_initial_inputs(keys.get("instances"), instances, connections, reader)
     scheduled = [i.name for i in instances]
     states = read_states(keys.get("states"), keys.get("always"), tick_hz, scheduled, incomplete, reader)
@@ -85,6 +87,8 @@ def check_machine(parsed: ParsedMachine, sink: DiagnosticSink) -> Machine | None
         parsed.targets,
         parsed.hashed_text,
         views,
+        arm=arm,
+        command_timeout_ns=command_timeout_ns,
     )
 
 

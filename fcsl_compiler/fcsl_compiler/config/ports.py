@@ -1,5 +1,6 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Resolves ports that the machine JSON names: `instance.field` in a connection, `instance.outputs.field` elsewhere."""
+"""Resolves ports that the machine JSON names: `instance.field` in connections and `arm`, `instance.outputs.field`
+elsewhere."""
 
 from __future__ import annotations
 
@@ -31,6 +32,10 @@ class PortResolver:
         """The target of a connection: an input `instance.field`."""
         return self._end(node, "inputs", "the target of a connection is an input")
 
+    def output(self, node: JsonNode, rule: str) -> PortRef | None:
+        """An output `instance.field` or a member of one, for which `rule` says why it is needed."""
+        return self._end(node, "outputs", rule)
+
     def swapped(self, source: JsonNode, target: JsonNode) -> bool:
         """Reports a connection from an input to an output as one mistake. Returns whether it is one."""
         if self._record(source) != "inputs" or self._record(target) != "outputs":
@@ -56,8 +61,8 @@ class PortResolver:
             return None
         if len(parts) > 1 and parts[1] in RECORDS:
             fix = f'write "{".".join([parts[0], *parts[2:]])}"' if len(parts) > 2 else f'write "{parts[0]}.<field>"'
-            why = "a source is an output and a target an input"
-            message = f"`{parts[1]}` in a connection"
+            why = "the place says which: a source is an output, a target an input, what arms an output"
+            message = f"`{parts[1]}` in this path"
             if parts[1] != record:
                 known = [p.name for p in _ports(instance, record)]
                 message, why = f"{rule}, not one of `{parts[1]}`", ""
@@ -118,7 +123,7 @@ class PortResolver:
             names = [p.name for p in ports]
             hint = nearest(name, names) or (f"it has {', '.join(names)}" if names else f"it has no {record}")
             if "[" in name:
-                hint = "connections use whole ports, not elements: declare a separate output for the element"
+                hint = "a path names a whole port, not an element: declare a separate output for the element"
             what = {"inputs": "input", "outputs": "output", "parameters": "parameter"}.get(record, "field")
             self.sink.error("E216", f"`{instance.name}` has no {what} `{name}`", node.span, help=hint)
             return None
@@ -131,7 +136,7 @@ class PortResolver:
                 names = [m.name for m in type_.members] if isinstance(type_, Struct) else []
                 hint = nearest(member_name, names) or (f"it has {', '.join(names)}" if names else f"it is {type_}")
                 if "[" in member_name or isinstance(type_, Array):
-                    hint = "connections use ports or members of structs, not elements: declare a separate output for the element"
+                    hint = "a path names a port or a member of a struct, not an element: declare a separate output for the element"
                 self.sink.error("E216", f"`{path}` has no member `{member_name}`", node.span, help=hint)
                 return None
             type_, unit, path = member.type, member.unit, f"{path}.{member_name}"

@@ -9,6 +9,7 @@ from dataclasses import replace
 
 from ..base.diagnostics import DiagnosticSink
 from ..model.machine import Connection, Machine, State, seconds
+from .arming import warn_old_arm
 from .channels import assigned_outputs
 from .idle_transitions import warn_idle_transitions
 
@@ -35,6 +36,7 @@ def schedule(machine: Machine, sink: DiagnosticSink) -> Machine:
     _warn_idle(machine, sink)
     _warn_old_values(machine, sink)
     _warn_slow_dt(machine, sink)
+    warn_old_arm(machine, sink)
     return replace(machine, states=tuple(states))
 
 
@@ -149,10 +151,11 @@ def _warn_idle(machine: Machine, sink: DiagnosticSink) -> None:
     due = {e.instance for state in machine.states for e in state.entries}
     for index, instance in enumerate(machine.instances):
         if index not in due:
+            message = f"no state schedules instance `{instance.name}`: it never runs"
+            arms = machine.arm is not None and machine.arm.instance == index
+            why = "the actuators are never armed" if arms else ""
             fix = "add it to the schedule of a state, or remove it"
-            sink.warning(
-                "W204", f"no state schedules instance `{instance.name}`: it never runs", instance.span, help=fix
-            )
+            sink.warning("W204", message, instance.span, why=why, help=fix)
 
 
 def _warn_old_values(machine: Machine, sink: DiagnosticSink) -> None:

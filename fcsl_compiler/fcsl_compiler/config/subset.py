@@ -13,6 +13,7 @@ from ..base.diagnostics import DiagnosticSink, nearest
 from ..base.source import Span
 from ..model.machine import Channel, Connection, Edge, Machine, PortRef, State
 from ..model.types import leaves
+from .arming import subset_arm
 
 
 def subset(machine: Machine, names: Sequence[str], at: Span, sink: DiagnosticSink) -> Machine | None:
@@ -22,7 +23,8 @@ def subset(machine: Machine, names: Sequence[str], at: Span, sink: DiagnosticSin
     An input whose source is omitted becomes a host input. Its value is zero, or the initial value of its delayed
     connection. States that schedule none of the instances are removed; if the initial state is removed, the first
     remaining state is initial. A transition remains if both its states remain and its guard refers to a remaining
-    instance. All requests keep their names and numbers. There are no views: they may show what is left out.
+    instance. All requests keep their names and numbers. Without the instance that arms, nothing does: the actuators are
+    armed in simulation. There are no views: they may show what is left out.
     """
     if not _is_subset(machine, names, at, sink):
         return None
@@ -45,6 +47,7 @@ def subset(machine: Machine, names: Sequence[str], at: Span, sink: DiagnosticSin
         views="",
         subset=tuple(machine.instances[n].name for n in kept),
         left_out=_left_out(machine, cut),
+        arm=subset_arm(machine.arm, new),
     )
     for c in cut:
         chosen = _with_initial(chosen, c, new[c.target.instance])

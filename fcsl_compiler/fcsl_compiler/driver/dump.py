@@ -50,7 +50,14 @@ def dump_machine(m: Machine) -> str:
             f"edge {m.states[e.source].name} -> {m.states[e.target].name} on {request} priority {e.priority}{guard}"
         )
     for ch in m.channels:
-        out.append(f"channel {ch.id} {ch.name} {ch.direction} {m.instances[ch.port.instance].name}.{ch.port.path}")
+        safe = f" safe {list(ch.safe)}" if ch.safe else ""
+        out.append(
+            f"channel {ch.id} {ch.name} {ch.direction} {m.instances[ch.port.instance].name}.{ch.port.path}{safe}"
+        )
+    if m.arm is not None:
+        out.append(f"arm {m.instances[m.arm.instance].name}.{m.arm.path}")
+    if m.command_timeout_ns:
+        out.append(f"command time-out {m.command_timeout_ns} ns")
     return "\n".join(out) + "\n"
 
 

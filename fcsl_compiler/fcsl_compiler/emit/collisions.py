@@ -45,6 +45,12 @@ def check_collisions(machine: Machine, sink: DiagnosticSink) -> None:
         _check_constants(message_requests(machine, instance), f"`{instance.name}`", instance.span, sink)
     for channel in machine.channels:
         claim(channel_member(channel), channel.span, f"channel `{channel.name}`")
+    if machine.arm is not None or machine.command_timeout_ns:  # the simulator's topic of what the actuators get
+        at = machine.arm.span if machine.arm is not None else machine.config.whole()
+        for field in ("header", "gate"):
+            claim(f"actuators.{field}", at, f"the {field} of the simulator's topic")
+        for channel in (c for c in machine.channels if c.direction == "actuator"):
+            claim(f"actuators.{channel.name.replace('.', '_')}", channel.span, f"channel `{channel.name}`")
     for name, function in machine.program.functions.items():
         claim(name, function.span, f"`{function.source_name}`")
     for entry_function, _ in machine.entries:

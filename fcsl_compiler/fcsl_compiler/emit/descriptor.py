@@ -12,9 +12,9 @@ from dataclasses import dataclass, replace
 from ..base.files import digest
 from ..model import ir
 from ..model.c_names import c_literal, c_name, c_string
-from ..model.machine import Channel, Instance, Machine
+from ..model.machine import Channel, Instance, Machine, PortRef
 from ..model.ranges import UNBOUNDED, Range
-from ..model.types import F64, Scalar, count_of, leaves, scalar_of, shape_of
+from ..model.types import F64, Scalar, count_of, element_of, leaves, scalar_of, shape_of
 from .c_writer import CWriter
 from .fault_places import FaultPlaces
 from .header import channel_member, leaf_member, sensors
@@ -305,10 +305,13 @@ class DescriptorEmitter:
         times = [f"{e.after_ticks}u" for e in self.m.edges] if any(e.after_ticks for e in self.m.edges) else []
         self.after_ticks = self._table("uint64_t", f"fcsl_after_ticks_{self.m.name}", times)
 
+    def _path(self, port: PortRef) -> str:
+        return f"{self.m.instances[port.instance].name}.{port.record}.{port.path}"
+
     def _channels(self) -> None:
         rows = []
         for c in self.m.channels:
-            path = f"{self.m.instances[c.port.instance].name}.{c.port.record}.{c.port.path}"
+            path = self._path(c.port)
             age = "UINT32_MAX" if c.max_age_ticks is None else f"{c.max_age_ticks}u"
             names = ("attached", "fresh", "valid", "age_ticks", "sample_age", "stamp_ns")
             kept = ["FCSL_NO_OFFSET"] * len(names)
@@ -317,9 +320,20 @@ class DescriptorEmitter:
             ros = (c.ros.type, c.ros.field, c.ros.topic, c.ros.frame, c.ros.child_frame, c.ros.axes)
             rows.append(
                 f"{{{c_string(c.name)}, {c.id}u, FCSL_{c.direction.upper()}, {self.by_path[path]}u, {age}, {', '.join(kept)}, "
-                f"{', '.join(map(c_string, ros))}, NULL}}"
+                f"{', '.join(map(c_string, ros))}, {self._safe(c)}}}"
             )
         self.channels = self._table("fcsl_channel_t", f"fcsl_channels_{self.m.name}", rows)
+
+    def _safe(self, channel: Channel) -> str:
+        """Writes the safe value of a channel, flat as its field. Returns a C pointer expression to it."""
+        if not channel.safe:
+            return "NULL"
+        element = element_of(channel.port.type)
+        assert isinstance(element, Scalar)
+        name = f"fcsl_safe_{self.m.name}_{channel.id}"
+        values = ", ".join(c_literal(v, element) for v in channel.safe if not isinstance(v, str))
+        self.w.line(f"static const {element.c} {name}[] = {{{values}}};")
+        return name
 
     def _fault_places(self) -> None:
         rows = [f"{{{c_string(p.file)}, {p.line}u, {p.column}u, {c_string(p.cause)}}}" for p in self.places.rows]
@@ -340,7 +354,7 @@ class DescriptorEmitter:
             "tick_offset": self._offset("tick"),
             "state_offset": self._offset("state_"),
             "next_state_offset": self._offset("next_state_"),
-            "arm_field": "FCSL_NONE",
+            "arm_field": str(self.by_path[self._path(m.arm)]) if m.arm is not None else "FCSL_NONE",
             "views": c_string(m.views),
         }
         for name, table, count in (
@@ -353,6 +367,8 @@ class DescriptorEmitter:
             ("fault_place", self.fault_places, len(self.places.rows)),
         ):
             rows[f"{name}s"], rows[f"{name}_count"] = table, f"{count}u"
+        if m.command_timeout_ns:
+            rows["command_timeout_ns"] = f"UINT64_C({m.command_timeout_ns})"
         if self.after_ticks != "NULL":
             rows |= {"after_ticks": self.after_ticks, "ticks_in_state_offset": self._offset("ticks_in_state")}
         for entry in ("init", "step", "force_state"):

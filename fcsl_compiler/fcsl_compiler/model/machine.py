@@ -143,6 +143,7 @@ class Channel:
     max_age_ticks: int | None
     ros: RosMapping
     span: Span
+    safe: Values = ()  # of an actuator; () if not declared
 
 
 @dataclass(frozen=True)
@@ -165,6 +166,8 @@ class Machine:
     views: str = ""  # canonical text (config/views.py); "" without `views`
     subset: tuple[str, ...] = ()  # names of the instances of a subset machine (config/subset.py)
     left_out: dict[str, str] = dataclass_field(default_factory=dict)  # source by omitted input
+    arm: PortRef | None = None  # the bool output that arms the actuators
+    command_timeout_ns: int = 0  # 0: none
 
     @property
     def structs(self) -> tuple[Struct, ...]:

@@ -157,11 +157,11 @@ class ConfigReader:
         if isinstance(type_, Array):
             if node.kind != "array" or len(node.items) != type_.shape[0]:
                 have = f"a list of {len(node.items)}" if node.kind == "array" else _article(node.kind)
-                self.sink.error("E207", f"{what} is {type_}, not {have}", node.span, help=f"write {_example(type_)}")
+                self.sink.error("E207", f"{what} is {type_}, not {have}", node.span, help=f"write {example(type_)}")
                 return None
             if len(type_.shape) == 1 and any(item.kind == "array" for item in node.items):
                 self.sink.error(
-                    "E207", f"{what} is {type_}, not a list of lists", node.span, help=f"write {_example(type_)}"
+                    "E207", f"{what} is {type_}, not a list of lists", node.span, help=f"write {example(type_)}"
                 )
                 return None
             rest: Type = Array(type_.element, type_.shape[1:]) if len(type_.shape) > 1 else type_.element
@@ -221,12 +221,12 @@ def _article(kind: str) -> str:
     return {"int": "an integer", "object": "an object", "array": "a list", "null": "null"}.get(kind, f"a {kind}")
 
 
-def _example(type_: Array) -> str:
-    if type_.count > 16 or isinstance(type_.element, Struct):
-        return f"a list of {type_.shape[0]}"
-    inner = (
-        "0.0" if type_.element.is_float else {BOOL: "false", HEALTH: '"nominal"', REQUEST: '""'}.get(type_.element, "0")
-    )
-    for extent in reversed(type_.shape):
+def example(type_: Scalar | Array) -> str:
+    """A value of this type, to write in the JSON."""
+    element, shape = (type_, ()) if isinstance(type_, Scalar) else (type_.element, type_.shape)
+    if isinstance(element, Struct) or math.prod(shape) > 16:
+        return f"a list of {shape[0]}"
+    inner = "0.0" if element.is_float else {BOOL: "false", HEALTH: '"nominal"', REQUEST: '""'}.get(element, "0")
+    for extent in reversed(shape):
         inner = "[" + ", ".join([inner] * extent) + "]"
     return inner

@@ -44,6 +44,8 @@ _OPTIONAL = (
         "requests",
         "publish",
         "channels",
+        "arm",
+        "command_timeout_s",
         "targets",
         "views",
     ),

@@ -2,8 +2,8 @@
  *
  * Hardware I/O of a board, used by the builtins hw_read_gpio, hw_write_gpio, hw_read_adc, hw_read_u32 and hw_write_u32 of
  * algorithms. A board provides one table. The host passes it to step (fcsl_host_t.hw). Without a table, reads return false
- * or 0 and writes have no effect. Devices with a protocol or a timer (PWM, counters, sensors) belong into drivers of the
- * HAL (fcsl_hal.h).
+ * or 0 and writes have no effect. Devices with a protocol or a timer (PWM, counters, sensors) belong into drivers
+ * (fcsl_driver.h).
  */
 #ifndef FCSL_HW_H
 #define FCSL_HW_H

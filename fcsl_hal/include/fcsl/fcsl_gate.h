@@ -12,6 +12,10 @@
 extern "C" {
 #endif
 
+/* Whether the machine arms its actuators: what the actuator message of its last tick says. `data` is its struct. A machine
+ * without an arm field is armed in simulation; real actuators refuse it. */
+int fcsl_is_armed(const fcsl_machine_t *machine, const void *data);
+
 typedef enum {
     FCSL_GATE_DISARMED = 0, /* safe: so says the last command, or none has come yet */
     FCSL_GATE_ARMED = 1,    /* the actuators have what the last command says */

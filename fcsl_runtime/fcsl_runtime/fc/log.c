@@ -5,6 +5,7 @@
 #define _GNU_SOURCE
 #include "log.h"
 
+#include <fcntl.h>
 #include <limits.h>
 #include <poll.h>
 #include <stdarg.h>
@@ -12,12 +13,27 @@
 #include <string.h>
 #include <unistd.h>
 
+#ifndef FCSL_PROGRAM /* CMake defines it */
+#define FCSL_PROGRAM "fcsl"
+#endif
+
 /* A pipe with any room takes this much at once. */
 enum { LINE_BYTES = PIPE_BUF };
 
+void log_fill_standard(void)
+{
+    int fd = 0;
+    while (fd >= 0 && fd <= STDERR_FILENO) {
+        fd = open("/dev/null", O_RDWR);
+    }
+    if (fd > STDERR_FILENO) {
+        (void)close(fd);
+    }
+}
+
 static void put_line(int fd, const char *format, va_list arguments)
 {
-    char line[LINE_BYTES] = "fcsl-fc: ";
+    char line[LINE_BYTES] = FCSL_PROGRAM ": ";
     const size_t begin = strlen(line);
     (void)vsnprintf(line + begin, sizeof line - begin - 1u, format, arguments);
     const size_t length = strlen(line);

@@ -169,6 +169,10 @@ static int act_on_sensors(loop_t *loop, uint64_t begun_ns)
         fail(loop, "the actuator message does not fit its buffer");
         return 0;
     }
+    if (fcsl_guard_command(&loop->guard, &message) != 0) {
+        fail(loop, "the actuator message does not fit the slot of fcsl-guard");
+        return 0;
+    }
     const int on = arm(loop, message.armed) && goes_on(loop, loop->hal.command(loop->hal.ctx, &message));
     publish(loop, begun_ns);
     if (loop->recording) {

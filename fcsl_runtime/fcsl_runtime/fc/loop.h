@@ -7,6 +7,7 @@
 
 #include <stdatomic.h>
 
+#include "fcsl/fcsl_guard.h"
 #include "fcsl/fcsl_hal.h"
 #include "fcsl/fcsl_telemetry.h"
 #include "fcsl/fcsl_tick_stats.h"
@@ -16,6 +17,8 @@
 typedef struct {
     fcsl_run_t *run;
     fcsl_hal_t hal;
+    fcsl_guard_link_t guard; /* takes the commands to the actuators, if there is one */
+    int guard_gone; /* the monitor thread has logged that it has ended */
     fcsl_vars_t *vars;  /* null without a variable server */
     fcsl_telemetry_t *telemetry; /* null without telemetry */
     atomic_int *stop;   /* set by a signal */

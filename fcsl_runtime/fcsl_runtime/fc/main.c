@@ -3,13 +3,13 @@
  * fcsl-fc: flies a machine as a process of its own.
  */
 #define _GNU_SOURCE
-#include <fcntl.h>
 #include <inttypes.h>
 #include <signal.h>
 #include <stdio.h>
 #include <string.h>
 #include <unistd.h>
 
+#include "guard_link.h"
 #include "monitor.h"
 #include "run_summary.h"
 #include "summary_file.h"
@@ -140,6 +140,12 @@ static int open_hardware(program_t *program)
     return 0;
 }
 
+static int open_guard(program_t *program)
+{
+    fcsl_error_t error;
+    return guard_link_open(&program->loop, program->options.guard, &error) == 0 ? 0 : complain(error.text);
+}
+
 static int open_record(program_t *program)
 {
     fcsl_error_t error;
@@ -208,6 +214,9 @@ static void announce(const program_t *program)
     if (program->options.board != NULL) {
         log_info("board %s", program->options.board);
     }
+    if (program->options.guard != NULL) {
+        log_info("actuators by the guard at %s", program->options.guard);
+    }
     if (program->options.socket != NULL) {
         log_info("commands on %s", fcsl_vars_address(program->loop.vars));
     }
@@ -264,6 +273,7 @@ static int close_all(program_t *program)
     if (loop->run != NULL && fcsl_run_close(loop->run, &error) != 0) {
         status = is_told(loop, error.text) ? -1 : complain(error.text);
     }
+    guard_link_close(loop);
     loop_free(loop);
     return status;
 }
@@ -284,22 +294,10 @@ static int fly(program_t *program)
     return loop->deadline_missed ? EXIT_LATE : status;
 }
 
-/* What is opened from here on must not get the numbers that are printed to. */
-static void fill_standard(void)
-{
-    int fd = 0;
-    while (fd >= 0 && fd <= STDERR_FILENO) {
-        fd = open("/dev/null", O_RDWR);
-    }
-    if (fd > STDERR_FILENO) {
-        (void)close(fd);
-    }
-}
-
 int main(int argc, char **argv)
 {
     static program_t program;
-    fill_standard();
+    log_fill_standard();
     const int parsed = options_read(argc, argv, &program.options);
     if (parsed != 0) {
         return parsed > 0 ? 0 : EXIT_USAGE;
@@ -315,8 +313,8 @@ int main(int argc, char **argv)
     monitor_block_signals(&program.monitor);
     int status = EXIT_RUN;
     if (open_system(&program) == 0 && open_run(&program) == 0 && open_server(&program) == 0 &&
-        open_hardware(&program) == 0 && open_telemetry(&program) == 0 && open_record(&program) == 0 &&
-        start_threads(&program) == 0) {
+        open_hardware(&program) == 0 && open_guard(&program) == 0 && open_telemetry(&program) == 0 &&
+        open_record(&program) == 0 && start_threads(&program) == 0) {
         status = fly(&program);
     }
     monitor_end(&program.monitor);

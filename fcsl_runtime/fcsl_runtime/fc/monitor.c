@@ -10,6 +10,7 @@
 #include <time.h>
 #include <unistd.h>
 
+#include "guard_link.h"
 #include "log.h"
 
 static const uint64_t MILLISECOND_NS = 1000000u;
@@ -51,6 +52,7 @@ static void check(monitor_t *monitor, uint64_t now)
         atomic_store_explicit(&monitor->loop->record_logged, failed, memory_order_release);
     }
     fault_log_update(&monitor->faults);
+    guard_link_check(monitor->loop);
 }
 
 /* Whoever started the program holds the other end of a pipe, which the system closes when they die. What they write says

@@ -28,6 +28,7 @@ static const char USAGE[] =
     "                          " FCSL_WIRE_SPECS "\n"
     "  --timeout-ms N          how long to wait for the simulator's next message (default 2000)\n"
     "  --board LIBRARY.so      the board that hw_* of algorithms reach (fcsl/fcsl_hw.h); default: simulated hardware\n"
+    "  --guard PATH            the actuators belong to the fcsl-guard that listens on PATH (docs/guard.md)\n"
     "  --ticks N               end after N ticks\n"
     "  --restore FILE          begin where the checkpoint in FILE was saved (docs/checkpoints.md), not at tick 0\n"
     "  --ignore-source-hash    take a checkpoint of other sources, if the layout of the machine is the same\n"
@@ -151,6 +152,7 @@ static const entry_t ENTRIES[] = {
     {.name = "hal", .kind = WORD, .read = read_hal},
     {.name = "timeout-ms", .kind = NUMBER, .offset = TO(timeout_ms), .min = 1, .max = 3600000},
     {.name = "board", .kind = TEXT, .offset = TO(board)},
+    {.name = "guard", .kind = TEXT, .offset = TO(guard)},
     {.name = "ticks", .kind = NUMBER, .offset = TO(ticks), .min = 1, .max = INT64_MAX},
     {.name = "restore", .kind = TEXT, .offset = TO(restore)},
     {.name = "ignore-source-hash", .kind = FLAG, .offset = TO(ignore_source_hash)},

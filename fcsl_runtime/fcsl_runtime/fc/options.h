@@ -14,6 +14,7 @@ typedef struct {
     const char *machine;    /* null: the only one */
     const char *wire;       /* SPEC of fcsl_wire.h; null: the stub HAL */
     const char *board;      /* null: simulated hardware */
+    const char *guard;      /* socket of fcsl-guard; null: none */
     const char *restore;    /* file of a checkpoint to begin from; null: from tick 0 */
     const char *socket;     /* null: no variable server */
     const char *token;      /* file with its token, for TCP */

@@ -106,6 +106,41 @@ static void give_up(void *machine, const fcsl_host_t *host)
     (void)host;
 }
 
+/* Armed by an output, `sensors.outputs.armed`: so says the message, and actuators that are no messages get safe values. */
+static void test_armed(void)
+{
+    enum { FORCE = 2, SATURATED = 3 }; /* channels */
+    static const double SAFE_FORCE = -2.5;
+    static const uint8_t SAFE_SATURATED = 1;
+    fcsl_error_t error;
+    fcsl_run_t *first = open_fixture();
+    fcsl_machine_t own = *fcsl_run_machine(first);
+    fcsl_channel_t channels[8];
+    memcpy(channels, own.channels, own.channel_count * sizeof channels[0]);
+    channels[FORCE].safe = &SAFE_FORCE;
+    channels[SATURATED].safe = &SAFE_SATURATED;
+    own.channels = channels;
+    own.arm_field = (int32_t)field_of(first, "sensors.outputs.armed");
+    fcsl_run_t *run = fcsl_run_open_machine(&own, &error);
+    CHECK(run != NULL);
+    const uint32_t force = own.fields[channels[FORCE].field].offset;
+    const uint32_t saturated = own.fields[channels[SATURATED].field].offset;
+    for (int i = 0; i < 4; i++) {
+        uint8_t bytes[256];
+        fcsl_message_t message;
+        const uint8_t armed = i % 2 != 0;
+        set_armed(run, armed);
+        step(run, 1);
+        CHECK(fcsl_run_actuate_message(run, bytes, sizeof bytes, &message) == 0 && message.armed == armed);
+        const uint8_t *got = fcsl_run_actuator_data(run);
+        CHECK(armed ? got == fcsl_run_data(run)
+                    : memcmp(got + force, &SAFE_FORCE, sizeof SAFE_FORCE) == 0 && got[saturated] == SAFE_SATURATED);
+    }
+    CHECK(fcsl_run_actuator_data(first) == fcsl_run_data(first)); /* nothing arms it */
+    close_run(run);
+    close_run(first);
+}
+
 /* A descriptor of the caller's own runs; a step that leaves its tick undone ends it with an error. */
 static void test_open_machine(void)
 {
@@ -344,6 +379,7 @@ int main(int argc, char **argv)
     CHECK(argc == 2);
     library = argv[1];
     test_open();
+    test_armed();
     test_open_machine();
     test_set();
     test_set_connected_input();

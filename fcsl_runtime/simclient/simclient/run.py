@@ -90,6 +90,12 @@ class Run:
         """Address of the machine struct, readable until the run is closed. Raises TwinError once it is."""
         return int(self._lib.fcsl_run_data(self.handle()))
 
+    @property
+    def actuator_address(self) -> int:
+        """Address of a machine struct whose actuator channels hold what the actuators get after the last tick: safe
+        values while the machine is disarmed. Raises TwinError once the run is closed."""
+        return int(self._lib.fcsl_run_actuator_data(self.handle()))
+
     def close(self) -> None:
         """Stops recording and unloads; idempotent."""
         if self._handle is None:

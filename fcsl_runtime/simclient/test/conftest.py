@@ -18,15 +18,15 @@ ROOT = Path(__file__).resolve().parents[3]
 CFLAGS = ["-std=c11", "-O2", "-Wall", "-Wextra", "-Werror", "-ffp-contract=off", "-fPIC", "-shared"]
 
 
-@pytest.fixture(scope="session")
-def build_probe(tmp_path_factory: pytest.TempPathFactory) -> Callable[..., Path]:
-    """Builds the probe with the given macros, once per set of them."""
+def builder(name: str, folder: Path) -> Callable[..., Path]:
+    """Builds test/machines/NAME.c with the given macros, once per set of them."""
     built: dict[tuple[str, ...], Path] = {}
 
     def build(*macros: str) -> Path:
         if macros not in built:
-            library = tmp_path_factory.mktemp("probe") / "libprobe.so"
-            source = ROOT / "fcsl_runtime/simclient/test/machines/probe.c"
+            library = folder / str(len(built)) / f"lib{name}.so"
+            library.parent.mkdir()
+            source = ROOT / f"fcsl_runtime/simclient/test/machines/{name}.c"
             include = ROOT / "fcsl_compiler/include"
             flags = [*CFLAGS, f"-I{include}", *(f"-D{macro}" for macro in macros)]
             subprocess.run(["cc", *flags, str(source), "-o", str(library)], check=True)
@@ -34,6 +34,17 @@ def build_probe(tmp_path_factory: pytest.TempPathFactory) -> Callable[..., Path]
         return built[macros]
 
     return build
+
+
+@pytest.fixture(scope="session")
+def build_probe(tmp_path_factory: pytest.TempPathFactory) -> Callable[..., Path]:
+    return builder("probe", tmp_path_factory.mktemp("probe"))
+
+
+@pytest.fixture(scope="session")
+def build_guarded(tmp_path_factory: pytest.TempPathFactory) -> Callable[..., Path]:
+    """The machine of tests of fcsl-guard."""
+    return builder("guarded", tmp_path_factory.mktemp("guarded"))
 
 
 @pytest.fixture(scope="session")

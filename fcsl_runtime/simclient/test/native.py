@@ -26,6 +26,7 @@ def _built(variable: str, name: str) -> str:
 FIXTURE = _built("FCSL_TEST_FIXTURE", "libfixture.so")
 FIXTURE_TWIN = _built("FCSL_TEST_FIXTURE_TWIN", "libfixture_twin.so")
 PROGRAM = _built("FCSL_TEST_FC", "fcsl-fc")
+GUARD = _built("FCSL_TEST_GUARD", "fcsl-guard")
 WIRE_SIM = _built("FCSL_TEST_WIRE_SIM", "wire_sim")
 MCAP_WRITE = _built("FCSL_TEST_MCAP_WRITE", "mcap_write")
 

@@ -11,12 +11,13 @@ import re
 import socket
 import subprocess
 import threading
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from pathlib import Path
 
 import pytest
 from conftest import CFLAGS, ROOT
+from guarding import guarding
 from native import FIXTURE, PROGRAM, WIRE_SIM, Fc
 from telemetry_page import Port
 from test_fc_wire import HELLO, TABLE, TICK_HZ, control, listening
@@ -153,6 +154,15 @@ def test_telemetry(folder: Path, tmp_path: Path) -> None:
             options = ("--telemetry", address, "--telemetry-fields", "*", "--socket", str(tmp_path / "s"))
             assert Watched(folder, machine(folder, 0), *options).allocations() == 0
         assert len(port.datagrams()) > TICKS
+
+
+def test_commands_to_a_guard(folder: Path, build_guarded: Callable[..., Path], tmp_path: Path) -> None:
+    library = build_guarded("TICK_HZ=1000")
+    with guarding(library, tmp_path) as guard:
+        assert Watched(folder, str(library), "--guard", str(guard.slot)).allocations() == 0
+        assert guard.end() == 0
+        counts = re.search(r"; (\d+) commands, 0 refused", guard.told("periods")[-1])
+        assert counts and int(counts[1]) > TICKS / 10
 
 
 @contextmanager

@@ -56,6 +56,13 @@ TARGETS = (
         inputs=20_000,
     ),
     Target(
+        "guard_slot",
+        "the slot of fcsl-guard",
+        "shared memory",
+        Defect(f"{_HAL}/guard_slot.c", "said <= server->capacity ? (size_t)said : 0u", "(size_t)said"),
+        longest=512,
+    ),
+    Target(
         "wire_controller",
         "a wire, controller's end",
         "socket, serial line",

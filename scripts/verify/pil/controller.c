@@ -11,11 +11,10 @@
 
 #include "bits.h"
 #include "fcsl/fcsl_cobs.h"
-#include "fcsl/fcsl_codec.h"
+#include "fcsl/fcsl_gate.h"
 #include "fcsl/fcsl_scalar.h"
 #include "stimulus.h"
 
-enum { ARMED_IN_SIMULATION = 1 };
 enum { MACHINE_BYTES = 1 << 20, MESSAGE_MAX = 1 << 12, HELLO_BYTES = 20, HELLO = 1, END = 3, KIND_AT = 6 };
 enum { PORT = 0, SESSION = 1, RETRANSMIT_TICKS = 50 };
 
@@ -159,8 +158,8 @@ static int fly(const fcsl_channel_table_t *table)
         fcsl_message_t message;
         d->step(machine, &host);
         hash = stimulus_hash(d, machine, hash);
-        if (fcsl_message_encode_actuators(table, machine, tick, ARMED_IN_SIMULATION, bytes, sizeof bytes, &message) !=
-            0) {
+        const int armed = fcsl_is_armed(d, machine);
+        if (fcsl_message_encode_actuators(table, machine, tick, armed, bytes, sizeof bytes, &message) != 0) {
             return 9; /* main has seen that there is room */
         }
         send_message(message.size);

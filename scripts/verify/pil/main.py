@@ -31,7 +31,7 @@ from ..shared.cases import EXAMPLES, OUT, ROOT, SHARED, CheckFailed, write_facts
 SIMULATION = ROOT / "examples" / "lander" / "sim" / "lander.sim.json"
 _TIMEOUT_MS = 60_000
 #: What the flight computer takes of fcsl_hal.
-_HAL = "codec codec_check crc32 link link_frame link_incoming link_outgoing crc16 cobs".split()
+_HAL = "codec codec_check crc32 gate link link_frame link_incoming link_outgoing crc16 cobs".split()
 
 
 class Flight:

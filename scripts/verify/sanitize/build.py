@@ -15,7 +15,7 @@ from ..shared.cases import OUT, ROOT, CheckFailed, run
 PACKAGES = ("fcsl_compiler", "fcsl_hal", "fcsl_runtime", "fcsl_sim")
 GCC = "/usr/bin/gcc"
 #: Programs of ours, whose leaks are looked for; those of others (Python, a C compiler) leak what they like at their end.
-PROGRAMS = ("fcsl-fc", "wire_sim", "mcap_write", "control", "layout")
+PROGRAMS = ("fcsl-fc", "fcsl-guard", "wire_sim", "mcap_write", "control", "layout")
 _COMMON = ("-fno-omit-frame-pointer", "-fno-sanitize-recover=all")
 #: float-cast-overflow: undefined in C, and no part of -fsanitize=undefined.
 _FLAGS = {

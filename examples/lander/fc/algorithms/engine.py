@@ -7,7 +7,7 @@ class Engine:
     """The engine as the flight computer sees it: obeys the controller that flies, and expects an effect of that.
 
     A controller flies when the active state runs it; the others are stale, and their last throttle is history. With
-    none of them the engine is off. The expected effect follows from thrust and propellant:
+    none of them the engine is off. It is armed until the vehicle has landed. The expected effect follows from thrust and propellant:
 
         thrust = throttle max_thrust,    a = thrust / mass - gravity,    mass' = -thrust / (specific_impulse g0)
     """
@@ -28,6 +28,7 @@ class Engine:
         "acceleration": "f64 m/s^2",  # expected until the next tick, positive upward
         "mass": "f64 kg",  # expected at the next tick
         "landed": "bool",  # the vehicle stands on the ground, engine off
+        "armed": "bool",  # the valve may open
     }
     parameters = {
         "max_thrust": "f64 N",
@@ -51,6 +52,7 @@ class Engine:
         elif self.safe_health != "stale":
             self.throttle = self.safe_throttle
             self.landed = self.safe_landed
+        self.armed = not self.landed
         thrust = self.throttle * self.max_thrust
         self.acceleration = thrust / self.mass - self.gravity
         self.mass = max(self.mass - thrust / (self.specific_impulse * G0) * self.dt, self.dry_mass)

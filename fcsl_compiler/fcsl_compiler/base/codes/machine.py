@@ -105,7 +105,8 @@ MACHINE_CODES: dict[str, Code] = {
     "E204": Code(
         "a number out of its range",
         "Each number has a valid range: a phase is less than the period, the id of a channel fits 16 bits, a "
-        "parameter is in the range that its algorithm declares.",
+        "parameter is in the range that its algorithm declares. `command_timeout_s` is longer than a tick, because one "
+        "command comes per tick, and at most 60 s.",
         Kind.JSON,
         '"states": {\n'
         '  "COAST": {"schedule": {"nav": 100, "control": {"hz": 50, "phase": 2}}},\n'
@@ -229,7 +230,8 @@ MACHINE_CODES: dict[str, Code] = {
     "E214": Code(
         "keys that do not go together",
         "A `delayed` connection carries the value of the previous tick. It needs an `initial` for the first tick; "
-        "other connections have none. Likewise only a sensor channel has an age limit, not an actuator.",
+        "other connections have none. Likewise only a sensor channel has an age limit, and only an actuator a `safe` "
+        "value. `arm` and `command_timeout_s` are for machines with actuators.",
         Kind.JSON,
         '"connections": [{"from": "nav.speed", "to": "control.speed", "delayed": true}]',
         '"connections": [{"from": "nav.speed", "to": "control.speed", "delayed": true, "initial": 0.0}]',
@@ -530,6 +532,29 @@ MACHINE_CODES: dict[str, Code] = {
         '"views": {"panels": [{"title": "altitude", "values": ["nav.outputs.altitude"]},\n'
         '                     {"title": "speed", "values": ["nav.outputs.speed"]}]}',
     ),
+    "E248": Code(
+        "an output that cannot arm",
+        "`arm` names the one bool output that says whether the actuators may act: true arms them, false holds them at "
+        "their safe values. Let an algorithm make this decision, in one place.",
+        Kind.JSON,
+        '"arm": "control.steps",\n'
+        '"channels": [{"name": "force", "id": 1, "field": "control.outputs.force", "direction": "actuator", "safe": 0.0}],\n'
+        '"states": {"COAST": {"schedule": {"nav": 100, "control": 50}}, "SAFE": {"schedule": {"nav": 10, "control": 10}}}',
+        '"arm": "control.ready",\n'
+        '"channels": [{"name": "force", "id": 1, "field": "control.outputs.force", "direction": "actuator", "safe": 0.0}],\n'
+        '"states": {"COAST": {"schedule": {"nav": 100, "control": 50}}, "SAFE": {"schedule": {"nav": 10, "control": 10}}}',
+    ),
+    "E249": Code(
+        "an actuator without a safe value",
+        "While a machine with `arm` is disarmed, and after `command_timeout_s` without a command, every actuator gets "
+        "its `safe` value. No value is safe for all of them: 0 closes one valve and opens another. So each channel says "
+        "its own, of the type and shape of its field.",
+        Kind.JSON,
+        '"command_timeout_s": 0.1,\n'
+        '"channels": [{"name": "force", "id": 1, "field": "control.outputs.force", "direction": "actuator"}]',
+        '"command_timeout_s": 0.1,\n'
+        '"channels": [{"name": "force", "id": 1, "field": "control.outputs.force", "direction": "actuator", "safe": 0.0}]',
+    ),
     "W201": Code(
         "an algorithm without an instance",
         "The algorithm is checked, but is not part of the machine. Usually its instance was removed or never added.",
@@ -556,7 +581,8 @@ MACHINE_CODES: dict[str, Code] = {
     ),
     "W204": Code(
         "an instance that never runs",
-        "No state schedules the instance. Its outputs stay zero and its health stays stale.",
+        "No state schedules the instance. Its outputs stay zero and its health stays stale. If one of its outputs is "
+        "`arm`, the actuators are never armed.",
         Kind.JSON,
         '"states": {"COAST": {"schedule": {"nav": 100}}, "SAFE": {"schedule": {"nav": 10}}}',
         '"states": {"COAST": {"schedule": {"nav": 100, "control": 50}}, "SAFE": {"schedule": {"nav": 10}}}',
@@ -652,5 +678,18 @@ MACHINE_CODES: dict[str, Code] = {
         '  {"from": "COAST", "to": "SAFE", "after_s": 8.0, "priority": 1},\n'
         '  {"from": "COAST", "to": "SAFE", "after_s": 5.0, "priority": 2, "health": {"instance": "nav", "in": ["failed"]}}\n'
         "]",
+    ),
+    "W212": Code(
+        "an output that arms and does not run in every state",
+        "An instance that a state does not schedule keeps its outputs. If one of them is `arm`, the actuators stay armed "
+        "or disarmed in that state as another state left them, whatever happens. Schedule the instance in every state, "
+        "or let an instance arm that runs in all.",
+        Kind.JSON,
+        '"arm": "control.ready",\n'
+        '"channels": [{"name": "force", "id": 1, "field": "control.outputs.force", "direction": "actuator", "safe": 0.0}],\n'
+        '"states": {"COAST": {"schedule": {"nav": 100, "control": 50}}, "SAFE": {"schedule": {"nav": 10}}}',
+        '"arm": "control.ready",\n'
+        '"channels": [{"name": "force", "id": 1, "field": "control.outputs.force", "direction": "actuator", "safe": 0.0}],\n'
+        '"states": {"COAST": {"schedule": {"nav": 100, "control": 50}}, "SAFE": {"schedule": {"nav": 10, "control": 10}}}',
     ),
 }

@@ -78,10 +78,14 @@ int fcsl_run_sense_message(fcsl_run_t *run, const fcsl_message_t *message, fcsl_
 int fcsl_run_write_channel(fcsl_run_t *run, uint32_t channel, const void *bytes, uint32_t size, uint32_t age_ticks,
                            int64_t stamp_ns, fcsl_error_t *error);
 uint64_t fcsl_run_messages_refused(const fcsl_run_t *run);
-/* Writes the actuator message of the last tick; returns its bytes, or -1 when `capacity` is too small. */
+/* Writes the actuator message of the last tick; returns its bytes, or -1 when `capacity` is too small. It is armed as the
+ * machine's arm field says, and without one. */
 int64_t fcsl_run_actuate(const fcsl_run_t *run, uint8_t *bytes, size_t capacity);
 /* The same as a message; 0, or -1. */
 int fcsl_run_actuate_message(const fcsl_run_t *run, uint8_t *bytes, size_t capacity, fcsl_message_t *message);
+/* A struct of the machine of which the fields of actuator channels hold what the actuators get after the last tick: its own
+ * while it is armed, and one with their safe values. */
+const void *fcsl_run_actuator_data(const fcsl_run_t *run);
 /* The channels of its machine. */
 const fcsl_channel_table_t *fcsl_run_channels(const fcsl_run_t *run);
 

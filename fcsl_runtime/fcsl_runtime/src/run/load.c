@@ -9,6 +9,7 @@
 
 #include "cover.h"
 #include "fault_place.h"
+#include "fcsl/fcsl_gate.h"
 #include "fcsl/fcsl_library.h"
 #include "fcsl/fcsl_scalar.h"
 #include "hardware.h"
@@ -58,6 +59,20 @@ static const fcsl_machine_t *choose(void *handle, const char *library, const cha
     return NULL;
 }
 
+const fcsl_machine_t *fcsl_library_machine(const char *library, const char *name, void **handle, fcsl_error_t *error)
+{
+    *handle = fcsl_library_open(library, "machine", error);
+    const fcsl_machine_t *machine = *handle != NULL ? choose(*handle, library, name, error) : NULL;
+    if (machine != NULL && fcsl_validate(machine, error) == 0) {
+        return machine;
+    }
+    if (*handle != NULL) {
+        (void)dlclose(*handle);
+        *handle = NULL;
+    }
+    return NULL;
+}
+
 static int allocate(fcsl_run_t *run, fcsl_error_t *error)
 {
     const fcsl_machine_t *machine = run->machine;
@@ -72,6 +87,14 @@ static int allocate(fcsl_run_t *run, fcsl_error_t *error)
     }
     memset(run->data, 0, size);
     memset(run->staging, 0, size);
+    if (machine->arm_field != FCSL_NONE) {
+        run->safe = aligned_alloc(align, size);
+        if (run->safe == NULL) {
+            return fcsl_fail(error, "out of memory for machine '%s'", machine->name);
+        }
+        memset(run->safe, 0, size);
+        (void)fcsl_gate(machine, run->safe);
+    }
     for (uint32_t i = 0; i < machine->instance_count; i++) {
         if (fcsl_layout_build(machine, &machine->instances[i], &run->layouts[i], error) != 0) {
             return -1;
@@ -114,6 +137,7 @@ static void release(fcsl_run_t *run)
     free(run->verdicts);
     free(run->data);
     free(run->staging);
+    free(run->safe);
     free(run->views);
     if (run->library != NULL) {
         (void)dlclose(run->library);
@@ -121,11 +145,10 @@ static void release(fcsl_run_t *run)
     free(run);
 }
 
-/* Checks and initialises the machine of a run; frees the run when that fails (or when there is no machine). */
+/* Initialises the machine of a run, which was checked; frees the run when that fails (or when there is no machine). */
 static fcsl_run_t *begin(fcsl_run_t *run, fcsl_error_t *error)
 {
-    if (run->machine == NULL || fcsl_validate(run->machine, error) != 0 || allocate(run, error) != 0 ||
-        initialise(run, error) != 0) {
+    if (run->machine == NULL || allocate(run, error) != 0 || initialise(run, error) != 0) {
         release(run);
         return NULL;
     }
@@ -141,10 +164,7 @@ fcsl_run_t *fcsl_run_open(const char *library, const char *machine, fcsl_error_t
         (void)fcsl_fail(error, "out of memory");
         return NULL;
     }
-    run->library = fcsl_library_open(library, "machine", error);
-    if (run->library != NULL) {
-        run->machine = choose(run->library, library, machine, error);
-    }
+    run->machine = fcsl_library_machine(library, machine, &run->library, error);
     if (run->machine != NULL && fcsl_cover_attach(run->library, library, run->machine, error) != 0) {
         run->machine = NULL;
     }
@@ -158,7 +178,7 @@ fcsl_run_t *fcsl_run_open_machine(const fcsl_machine_t *machine, fcsl_error_t *e
         (void)fcsl_fail(error, "out of memory");
         return NULL;
     }
-    run->machine = machine;
+    run->machine = fcsl_validate(machine, error) == 0 ? machine : NULL;
     return begin(run, error);
 }
 

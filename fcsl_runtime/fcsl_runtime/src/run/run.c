@@ -7,6 +7,7 @@
 #include <stdlib.h>
 #include <time.h>
 
+#include "fcsl/fcsl_gate.h"
 #include "fcsl/fcsl_scalar.h"
 #include "substitution.h"
 #include "record/recorder.h"
@@ -84,16 +85,19 @@ int fcsl_run_restore(fcsl_run_t *run, const void *bytes, uint32_t size, fcsl_err
     return 0;
 }
 
-/* Nothing decides yet whether actuators are armed: in simulation they are. */
-enum { ARMED_IN_SIMULATION = 1 };
-
 int fcsl_run_actuate_message(const fcsl_run_t *run, uint8_t *bytes, size_t capacity, fcsl_message_t *message)
 {
     const uint64_t completed = fcsl_run_tick(run);
     const uint64_t tick = completed == 0 ? 0 : completed - 1u;
+    const int armed = fcsl_is_armed(run->machine, run->data);
     const fcsl_message_status_t status =
-        fcsl_message_encode_actuators(&run->channels, run->data, tick, ARMED_IN_SIMULATION, bytes, capacity, message);
+        fcsl_message_encode_actuators(&run->channels, run->data, tick, armed, bytes, capacity, message);
     return status == FCSL_MESSAGE_OK ? 0 : -1;
+}
+
+const void *fcsl_run_actuator_data(const fcsl_run_t *run)
+{
+    return fcsl_is_armed(run->machine, run->data) ? run->data : run->safe;
 }
 
 int64_t fcsl_run_actuate(const fcsl_run_t *run, uint8_t *bytes, size_t capacity)

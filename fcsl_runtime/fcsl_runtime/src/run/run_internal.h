@@ -31,6 +31,7 @@ struct fcsl_run {
     const fcsl_machine_t *machine;
     fcsl_channel_table_t channels;
     uint8_t *data;
+    uint8_t *safe; /* a struct of which the actuators' fields are safe; null: nothing arms the machine */
     uint8_t *staging; /* the struct's size: a checked copy before it replaces data */
     fcsl_host_t host;
     uint64_t (*clock_ns)(void *ctx); /* null: nothing is timed */

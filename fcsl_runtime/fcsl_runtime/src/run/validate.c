@@ -180,13 +180,13 @@ static int check_tables(const fcsl_machine_t *machine, fcsl_error_t *error)
             return fcsl_fail(error, "machine '%s': transition %u of its descriptor is inconsistent", name, i);
         }
     }
+    if (!is_arm_field(machine)) {
+        return fcsl_fail(error, "machine '%s': the arm field of its descriptor is no bool output", name);
+    }
     for (uint32_t i = 0; i < machine->channel_count; i++) {
         if (check_channel(machine, i) != 0) {
             return fcsl_fail(error, "machine '%s': channel %u of its descriptor is inconsistent", name, i);
         }
-    }
-    if (!is_arm_field(machine)) {
-        return fcsl_fail(error, "machine '%s': the arm field of its descriptor is no bool output", name);
     }
     for (uint32_t i = 0; i < machine->fault_place_count; i++) {
         if (check_fault_place(&machine->fault_places[i]) != 0) {

@@ -1,0 +1,98 @@
+/* SPDX-License-Identifier: Apache-2.0
+ *
+ * What the guard does in a period.
+ */
+#include "guard.h"
+
+#include <stdlib.h>
+#include <string.h>
+
+#include "base/error.h"
+
+int guard_check_machine(const fcsl_machine_t *machine, fcsl_error_t *error)
+{
+    if (machine->arm_field == FCSL_NONE) {
+        return fcsl_fail(error,
+                         "machine '%.100s' does not say when its actuators are armed: name a bool output as \"arm\" in "
+                         "its JSON",
+                         machine->name);
+    }
+    if (machine->command_timeout_ns == 0u) {
+        return fcsl_fail(error,
+                         "machine '%.100s' does not say for how long its actuators keep a command: give "
+                         "\"command_timeout_s\" in its JSON",
+                         machine->name);
+    }
+    return 0;
+}
+
+int guard_open(guard_t *guard, const fcsl_machine_t *machine, fcsl_error_t *error)
+{
+    const size_t align = machine->align < 64u ? 64u : machine->align;
+    const size_t size = ((size_t)machine->size + align - 1u) / align * align;
+    guard->machine = machine;
+    guard->table = fcsl_channel_table(machine);
+    guard->data = aligned_alloc(align, size);
+    guard->bytes = malloc(fcsl_message_capacity(machine, FCSL_ACTUATOR_MESSAGE));
+    if (guard->data == NULL || guard->bytes == NULL) {
+        return fcsl_fail(error, "out of memory for machine '%.100s'", machine->name);
+    }
+    memset(guard->data, 0, size);
+    guard->gate = fcsl_gate(machine, guard->data);
+    return 0;
+}
+
+void guard_free(guard_t *guard)
+{
+    free(guard->data);
+    free(guard->bytes);
+    guard->data = NULL;
+    guard->bytes = NULL;
+}
+
+static void refuse(guard_t *guard, const char *why)
+{
+    guard->refused++;
+    guard->refusal = why;
+}
+
+/* The slot is written by another process: nothing in it is believed. A command counts from when it was written, so one that
+ * waited for a guard that was late is old. */
+static void take_command(guard_t *guard)
+{
+    size_t size = 0;
+    uint64_t written_ns = 0;
+    fcsl_message_t message;
+    if (!fcsl_guard_take(&guard->server, guard->bytes, &size, &written_ns)) {
+        return;
+    }
+    const fcsl_message_status_t status =
+        fcsl_message_check(&guard->table, FCSL_ACTUATOR_MESSAGE, guard->bytes, size, &message);
+    if (status != FCSL_MESSAGE_OK) {
+        refuse(guard, fcsl_message_status_text(status));
+    } else if (written_ns > fcsl_run_monotonic_ns(NULL)) {
+        refuse(guard, "its time is in the future");
+    } else {
+        guard->commands++;
+        guard->tick = message.tick;
+        fcsl_gate_command(&guard->gate, &message, written_ns, guard->data);
+    }
+}
+
+void guard_period(guard_t *guard)
+{
+    const fcsl_gate_state_t before = guard->gate.state;
+    take_command(guard);
+    fcsl_gate_wait(&guard->gate, fcsl_run_monotonic_ns(NULL), guard->data);
+    guard->changes += guard->gate.state != before;
+    guard->silences += guard->gate.state != before && guard->gate.state == FCSL_GATE_SILENT;
+    (void)outputs_write(&guard->outputs, guard->data);
+    guard->periods++;
+    guard->turned_away += fcsl_guard_look(&guard->server) == FCSL_GUARD_REFUSED;
+}
+
+uint32_t guard_make_safe(guard_t *guard)
+{
+    guard->gate = fcsl_gate(guard->machine, guard->data);
+    return outputs_write(&guard->outputs, guard->data);
+}

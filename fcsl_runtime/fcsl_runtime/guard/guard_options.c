@@ -1,0 +1,131 @@
+/* SPDX-License-Identifier: Apache-2.0
+ *
+ * The command line of fcsl-guard.
+ */
+#define _GNU_SOURCE
+#include "guard_options.h"
+
+#include <errno.h>
+#include <getopt.h>
+#include <inttypes.h>
+#include <stdio.h>
+#include <stdlib.h>
+
+#ifndef FCSL_VERSION /* CMake defines it, from package.xml */
+#define FCSL_VERSION "of no package"
+#endif
+
+static const char USAGE[] =
+    "usage: fcsl-guard LIBRARY.so --slot PATH --actuator CHANNEL=DRIVER ... [options]\n"
+    "Owns the actuators of a machine: they get the commands of fcsl-fc --guard PATH while it arms them, and their "
+    "safe\n"
+    "values when it disarms them or falls silent (docs/guard.md).\n"
+    "\n"
+    "  --slot PATH             the socket on which fcsl-fc --guard PATH gets the slot for its commands\n"
+    "  --actuator CHANNEL=DRIVER[.SIGNAL][:DEVICE]\n"
+    "                          what drives an actuator channel; once for each. DRIVER is NAME or LIBRARY.so:NAME\n"
+    "                          (docs/drivers.md). Without SIGNAL: the driver's only signal of the channel's type\n"
+    "  --actuator CHANNEL=none nothing drives it\n"
+    "  --machine NAME          which machine, when the library holds several\n"
+    "  --period-ms N           every N ms the actuators are written (default 2)\n"
+    "  --realtime-priority N   SCHED_FIFO, 1 to 99: above that of the flight program\n"
+    "  --lock-memory           no page of the program leaves memory\n"
+    "  --version               print name and version\n"
+    "  --help\n";
+
+enum { PERIOD_MS = 2, PERIOD_MS_MAX = 1000, PRIORITY_MAX = 99, MESSAGE_BYTES = 128 };
+enum { ACTUATOR = 1, MACHINE, SLOT, PERIOD, PRIORITY, LOCK_MEMORY, VERSION, HELP };
+
+static const struct option OPTIONS[] = {
+    {"actuator", required_argument, NULL, ACTUATOR},
+    {"machine", required_argument, NULL, MACHINE},
+    {"slot", required_argument, NULL, SLOT},
+    {"period-ms", required_argument, NULL, PERIOD},
+    {"realtime-priority", required_argument, NULL, PRIORITY},
+    {"lock-memory", no_argument, NULL, LOCK_MEMORY},
+    {"version", no_argument, NULL, VERSION},
+    {"help", no_argument, NULL, HELP},
+    {NULL, 0, NULL, 0},
+};
+
+static int complain(const char *what, const char *which)
+{
+    (void)fprintf(stderr, "fcsl-guard: %s%s\nTry `fcsl-guard --help`.\n", what, which);
+    return -1;
+}
+
+static int read_number(const char *name, const char *text, uint64_t max, uint64_t *value)
+{
+    char *end = NULL;
+    errno = 0;
+    const unsigned long long number = strtoull(text, &end, 10);
+    if (text[0] >= '0' && text[0] <= '9' && *end == '\0' && errno == 0 && number >= 1u && number <= max) {
+        *value = number;
+        return 0;
+    }
+    char message[MESSAGE_BYTES];
+    (void)snprintf(message, sizeof message, "--%s needs an integer from 1 to %" PRIu64 ", not ", name, max);
+    return complain(message, text);
+}
+
+static int read_option(int option, const char *text, options_t *options)
+{
+    switch (option) {
+    case ACTUATOR:
+        options->actuators[options->actuator_count++] = text;
+        return 0;
+    case MACHINE:
+        options->machine = text;
+        return 0;
+    case SLOT:
+        options->slot = text;
+        return 0;
+    case PERIOD:
+        return read_number("period-ms", text, PERIOD_MS_MAX, &options->period_ms);
+    case PRIORITY:
+        return read_number("realtime-priority", text, PRIORITY_MAX, &options->priority);
+    case LOCK_MEMORY:
+        options->lock_memory = 1;
+        return 0;
+    case VERSION:
+        (void)puts("fcsl-guard " FCSL_VERSION);
+        return 1;
+    case HELP:
+        (void)fputs(USAGE, stdout);
+        return 1;
+    default:
+        (void)fputs("Try `fcsl-guard --help`.\n", stderr);
+        return -1;
+    }
+}
+
+int options_read(int argc, char **argv, options_t *options)
+{
+    *options = (options_t){.period_ms = PERIOD_MS};
+    options->actuators = calloc((size_t)argc, sizeof *options->actuators);
+    if (options->actuators == NULL) {
+        return complain("out of memory", "");
+    }
+    int option = 0;
+    while ((option = getopt_long(argc, argv, "", OPTIONS, NULL)) != -1) {
+        const int status = read_option(option, optarg, options);
+        if (status != 0) {
+            return status;
+        }
+    }
+    if (optind + 1 != argc) {
+        return complain(optind == argc ? "which machine library?" : "one machine library, not also ",
+                        optind == argc ? "" : argv[optind + 1]);
+    }
+    options->library = argv[optind];
+    if (options->slot == NULL) {
+        return complain("--slot PATH is missing: where fcsl-fc --guard PATH gets the slot for its commands", "");
+    }
+    return 0;
+}
+
+void options_free(options_t *options)
+{
+    free(options->actuators);
+    options->actuators = NULL;
+}

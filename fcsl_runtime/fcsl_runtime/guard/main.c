@@ -1,0 +1,184 @@
+/* SPDX-License-Identifier: Apache-2.0
+ *
+ * fcsl-guard: owns the actuators of a machine, and makes them safe when the flight program falls silent.
+ */
+#define _GNU_SOURCE
+#include <dlfcn.h>
+#include <errno.h>
+#include <inttypes.h>
+#include <signal.h>
+#include <stdlib.h>
+#include <time.h>
+
+#include "base/error.h"
+#include "fcsl/fcsl_library.h"
+#include "guard_options.h"
+#include "log.h"
+#include "realtime.h"
+#include "report.h"
+
+/* Exit statuses, besides 0 (docs/guard.md). */
+enum { EXIT_GUARD = 1, EXIT_USAGE = 2 };
+
+typedef struct {
+    options_t options;
+    realtime_t realtime;
+    void *library;
+    plan_entry_t *plan;
+    guard_t guard;
+    report_t report;
+} program_t;
+
+static volatile sig_atomic_t stop;
+
+static void on_signal(int number)
+{
+    (void)number;
+    stop = 1;
+}
+
+/* Signals end the loop; a terminal that is gone does not end what nohup started. */
+static void take_signals(void)
+{
+    const struct sigaction action = {.sa_handler = on_signal};
+    struct sigaction hangup;
+    (void)sigaction(SIGTERM, &action, NULL);
+    (void)sigaction(SIGINT, &action, NULL);
+    if (sigaction(SIGHUP, NULL, &hangup) == 0 && hangup.sa_handler != SIG_IGN) {
+        (void)sigaction(SIGHUP, &action, NULL);
+    }
+    /* What they are about is an error of the call that could not write. */
+    (void)signal(SIGPIPE, SIG_IGN);
+    (void)signal(SIGXFSZ, SIG_IGN);
+}
+
+static int complain(const char *text)
+{
+    log_error("%s", text);
+    return -1;
+}
+
+static int open_machine(program_t *program, fcsl_error_t *error)
+{
+    const options_t *options = &program->options;
+    const fcsl_machine_t *machine = fcsl_library_machine(options->library, options->machine, &program->library, error);
+    if (machine == NULL || guard_check_machine(machine, error) != 0) {
+        return -1;
+    }
+    if (options->period_ms * 1000000u > machine->command_timeout_ns) {
+        return fcsl_fail(error,
+                         "--period-ms %" PRIu64
+                         " is more than the %.6g ms for which actuators of machine '%.100s' keep "
+                         "a command",
+                         options->period_ms, (double)machine->command_timeout_ns / 1e6, machine->name);
+    }
+    return guard_open(&program->guard, machine, error);
+}
+
+static int open_outputs(program_t *program, fcsl_error_t *error)
+{
+    const options_t *options = &program->options;
+    guard_t *guard = &program->guard;
+    program->plan = calloc(options->actuator_count + 1u, sizeof *program->plan);
+    if (program->plan == NULL) {
+        return fcsl_fail(error, "out of memory for the plan");
+    }
+    if (plan_read(guard->machine, options->actuators, options->actuator_count, program->plan, error) != 0 ||
+        outputs_open(guard->machine, program->plan, options->actuator_count, &guard->outputs, error) != 0) {
+        return -1;
+    }
+    /* Before a flight program gets the slot. */
+    (void)guard_make_safe(guard);
+    return 0;
+}
+
+static int open_all(program_t *program)
+{
+    fcsl_error_t error;
+    const options_t *options = &program->options;
+    guard_t *guard = &program->guard;
+    program->realtime =
+        (realtime_t){.priority = (int)options->priority, .lock_memory = options->lock_memory, .cpu = -1};
+    guard->server = (fcsl_guard_server_t){.listener = -1, .client = -1, .memory = -1};
+    /* The slot before the devices: those of a guard that has it already are left alone. */
+    if (realtime_begin(&program->realtime, &error) != 0 || open_machine(program, &error) != 0 ||
+        fcsl_guard_listen(options->slot, guard->machine, &guard->server, error.text, sizeof error.text) != 0 ||
+        open_outputs(program, &error) != 0 || realtime_enter(&program->realtime, &error) != 0) {
+        return complain(error.text);
+    }
+    return 0;
+}
+
+static void announce(const program_t *program)
+{
+    const guard_t *guard = &program->guard;
+    log_info("machine '%s', actuators written every %" PRIu64 " ms, safe after %.6g ms without a command, slot at %s",
+             guard->machine->name, program->options.period_ms, (double)guard->machine->command_timeout_ns / 1e6,
+             program->options.slot);
+    for (uint32_t i = 0; i < program->options.actuator_count; i++) {
+        log_info("actuator %s", program->options.actuators[i]);
+    }
+}
+
+/* Sleeps to the next due time; those that have passed are missed. */
+static void wait_period(program_t *program, uint64_t period_ns, uint64_t *due_ns)
+{
+    *due_ns += period_ns;
+    const struct timespec due = {.tv_sec = (time_t)(*due_ns / 1000000000u), .tv_nsec = (long)(*due_ns % 1000000000u)};
+    while (stop == 0 && clock_nanosleep(CLOCK_MONOTONIC, TIMER_ABSTIME, &due, NULL) == EINTR) {
+    }
+    const uint64_t now_ns = fcsl_run_monotonic_ns(NULL);
+    if (now_ns >= *due_ns + period_ns) {
+        const uint64_t missed = (now_ns - *due_ns) / period_ns;
+        program->guard.periods_missed += missed;
+        *due_ns += missed * period_ns;
+    }
+}
+
+static int run(program_t *program)
+{
+    const uint64_t period_ns = program->options.period_ms * 1000000u;
+    uint64_t due_ns = fcsl_run_monotonic_ns(NULL);
+    announce(program);
+    while (stop == 0) {
+        guard_period(&program->guard);
+        report_changes(&program->report, &program->guard, fcsl_run_monotonic_ns(NULL));
+        wait_period(program, period_ns, &due_ns);
+    }
+    const uint32_t failed = guard_make_safe(&program->guard);
+    report_end(&program->guard);
+    if (failed > 0u) {
+        log_error("%" PRIu32 " of %" PRIu32 " devices did not take their safe values at the end", failed,
+                  program->guard.outputs.device_count);
+        return EXIT_GUARD;
+    }
+    log_info("the actuators have their safe values");
+    return 0;
+}
+
+static void close_all(program_t *program)
+{
+    fcsl_guard_unlisten(&program->guard.server);
+    outputs_close(&program->guard.outputs);
+    guard_free(&program->guard);
+    free(program->plan);
+    options_free(&program->options);
+    if (program->library != NULL) {
+        (void)dlclose(program->library);
+    }
+}
+
+int main(int argc, char **argv)
+{
+    static program_t program;
+    log_fill_standard();
+    const int parsed = options_read(argc, argv, &program.options);
+    if (parsed != 0) {
+        options_free(&program.options);
+        return parsed > 0 ? 0 : EXIT_USAGE;
+    }
+    take_signals();
+    const int status = open_all(&program) == 0 ? run(&program) : EXIT_GUARD;
+    close_all(&program);
+    return status;
+}

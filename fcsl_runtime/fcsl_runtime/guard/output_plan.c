@@ -1,0 +1,110 @@
+/* SPDX-License-Identifier: Apache-2.0
+ *
+ * Reads the plan of outputs.
+ */
+#include "output_plan.h"
+
+#include <stdio.h>
+#include <string.h>
+
+#include "base/error.h"
+#include "fcsl/fcsl_library.h"
+
+enum { LIST_BYTES = 256 };
+static const char *const NOTHING = "none";
+
+static void list_actuators(const fcsl_machine_t *machine, char *text, size_t size)
+{
+    size_t at = 0;
+    (void)snprintf(text, size, "none");
+    for (uint32_t i = 0; i < machine->channel_count && at < size; i++) {
+        if (machine->channels[i].direction == FCSL_ACTUATOR) {
+            const int length = snprintf(text + at, size - at, "%s%s", at > 0u ? ", " : "", machine->channels[i].name);
+            at += length > 0 ? (size_t)length : 0u;
+        }
+    }
+}
+
+static int find_channel(const fcsl_machine_t *machine, const char *name, size_t length, uint32_t *channel,
+                        fcsl_error_t *error)
+{
+    for (uint32_t i = 0; i < machine->channel_count; i++) {
+        const fcsl_channel_t *found = &machine->channels[i];
+        if (strlen(found->name) == length && strncmp(found->name, name, length) == 0) {
+            *channel = i;
+            return found->direction == FCSL_ACTUATOR
+                       ? 0
+                       : fcsl_fail(error, "--actuator %s: channel '%s' is a sensor", name, found->name);
+        }
+    }
+    char names[LIST_BYTES];
+    list_actuators(machine, names, sizeof names);
+    return fcsl_fail(error, "--actuator %.150s: machine '%.60s' has no such channel; its actuators are: %s", name,
+                     machine->name, names);
+}
+
+/* `text` behind the equals sign. */
+static int read_driver(const char *whole, const char *text, plan_entry_t *entry, fcsl_error_t *error)
+{
+    entry->device = "";
+    if (strcmp(text, NOTHING) == 0) {
+        return 0;
+    }
+    const char *name = text + fcsl_library_driver_name(text);
+    const size_t rest = strcspn(name, ":");
+    const size_t length = strcspn(name, ".:");
+    const size_t driver = (size_t)(name - text) + length;
+    if (length == 0u || driver >= sizeof entry->driver || rest >= sizeof entry->signal) {
+        return fcsl_fail(error,
+                         "--actuator %.200s: write CHANNEL=DRIVER[.SIGNAL][:DEVICE], where DRIVER is NAME or "
+                         "LIBRARY.so:NAME, in less than 512 bytes",
+                         whole);
+    }
+    memcpy(entry->driver, text, driver);
+    if (rest > length) {
+        memcpy(entry->signal, name + length + 1u, rest - length - 1u);
+    }
+    entry->device = name[rest] == ':' ? name + rest + 1u : "";
+    return 0;
+}
+
+static int read_entry(const fcsl_machine_t *machine, const char *text, plan_entry_t *entry, fcsl_error_t *error)
+{
+    const char *equals = strchr(text, '=');
+    memset(entry, 0, sizeof *entry);
+    if (equals == NULL) {
+        return fcsl_fail(error, "--actuator %.200s: write CHANNEL=DRIVER[.SIGNAL][:DEVICE], or CHANNEL=none", text);
+    }
+    return find_channel(machine, text, (size_t)(equals - text), &entry->channel, error) == 0
+               ? read_driver(text, equals + 1, entry, error)
+               : -1;
+}
+
+int plan_read(const fcsl_machine_t *machine, const char *const *texts, uint32_t count, plan_entry_t *entries,
+              fcsl_error_t *error)
+{
+    for (uint32_t i = 0; i < count; i++) {
+        if (read_entry(machine, texts[i], &entries[i], error) != 0) {
+            return -1;
+        }
+        for (uint32_t j = 0; j < i; j++) {
+            if (entries[j].channel == entries[i].channel) {
+                return fcsl_fail(error, "channel '%s' has two --actuator", machine->channels[entries[i].channel].name);
+            }
+        }
+    }
+    for (uint32_t i = 0; i < machine->channel_count; i++) {
+        uint32_t at = 0;
+        while (at < count && entries[at].channel != i) {
+            at++;
+        }
+        if (machine->channels[i].direction == FCSL_ACTUATOR && at == count) {
+            const char *name = machine->channels[i].name;
+            return fcsl_fail(error,
+                             "channel '%.100s' has no driver: give it one with --actuator %.100s=DRIVER:DEVICE, or "
+                             "leave it without with --actuator %.100s=none",
+                             name, name, name);
+        }
+    }
+    return 0;
+}

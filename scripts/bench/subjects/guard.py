@@ -1,0 +1,130 @@
+# SPDX-License-Identifier: Apache-2.0
+"""fcsl-guard: from kill -9 of the flight program to safe values at the actuator.
+
+python3 scripts/bench guard
+"""
+
+from __future__ import annotations
+
+import json
+import os
+import statistics
+import subprocess
+import tempfile
+import time
+from collections.abc import Iterator
+from contextlib import contextmanager
+from pathlib import Path
+
+from fcsl_compiler.driver.cache import build_machine
+from simclient.library import runtime_program
+
+from ..harness.size import sized
+
+KILLS = sized(200, 2)
+TIMEOUT_S, PERIOD_S, TICK_S = 0.05, 0.002, 0.01
+LINE_BYTES = 256
+SAFE = -1.0
+ALGORITHM = '''class Pilot:
+    """Commands, armed, from its first tick on."""
+
+    outputs = {"force": "f64", "armed": "bool"}
+
+    def execute(self):
+        self.force = 1.0
+        self.armed = True
+'''
+CONFIG = {
+    "tick_hz": round(1 / TICK_S),
+    "initial_state": "RUN",
+    "algorithms": {"Pilot": {"source": "pilot.py"}},
+    "instances": {"pilot": {"algorithm": "Pilot"}},
+    "connections": [],
+    "states": {"RUN": {"schedule": {"pilot": round(1 / TICK_S)}}},
+    "transitions": [],
+    "channels": [{"name": "force", "id": 1, "field": "pilot.outputs.force", "direction": "actuator", "safe": SAFE}],
+    "arm": "pilot.armed",
+    "command_timeout_s": TIMEOUT_S,
+}
+
+
+REAL_TIME = ("--realtime-priority", "80", "--lock-memory")
+
+
+def guard_times(folder: Path) -> dict[str, dict[str, float]]:
+    """ms from kill to the first safe write: median, 99th percentile, maximum; and kills. A mode that is not allowed here is
+    left out."""
+    (folder / "pilot.py").write_text(ALGORITHM)
+    (folder / "pilot.json").write_text(json.dumps(CONFIG))
+    library = build_machine(folder / "pilot.json").library
+    times = {"no load of the bench": _kills(library, folder / "idle")}
+    with _load():
+        times["loaded"] = _kills(library, folder / "loaded")
+        times["loaded, SCHED_FIFO"] = _kills(library, folder / "fifo", *REAL_TIME)
+    return {name: found for name, found in times.items() if found}
+
+
+@contextmanager
+def _load() -> Iterator[None]:
+    """Three processes for each processor that never sleep."""
+    spinners = [subprocess.Popen(["sh", "-c", "while :; do :; done"]) for _ in range(3 * (os.cpu_count() or 1))]
+    try:
+        yield
+    finally:
+        for spinner in spinners:
+            spinner.kill()
+            spinner.wait()
+
+
+def _kills(library: Path, log: Path, *options: str) -> dict[str, float]:
+    slot = log.with_suffix(".slot")
+    command = [runtime_program("fcsl-guard"), library, "--slot", slot, "--actuator", f"force=log:{log}", *options]
+    found = []
+    with subprocess.Popen(list(map(str, command)), stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL) as guard:
+        while not slot.exists():
+            if guard.poll() is not None:
+                return {}
+            time.sleep(0.01)
+        for _ in range(KILLS):
+            found.append(_kill(library, slot, log))
+        guard.terminate()
+    cuts = statistics.quantiles(found, n=100)
+    return {"median": cuts[49], "p99": cuts[98], "max": max(found), "kills": KILLS}
+
+
+def _kill(library: Path, slot: Path, log: Path) -> float:
+    """Starts a flight program, kills it once the actuator has its command, and returns how long that lasted, in ms."""
+    command = [runtime_program("fcsl-fc"), library, "--guard", slot]
+    with subprocess.Popen(list(map(str, command)), stdout=subprocess.DEVNULL) as program:
+        while _writes(log)[-1][1] == SAFE:
+            time.sleep(0.005)
+        killed = time.monotonic()
+        program.kill()
+    while (writes := _writes(log))[-1][1] != SAFE:
+        time.sleep(0.005)
+    return 1e3 * (next(t for t, value in writes if t > killed and value == SAFE) - killed)
+
+
+def _writes(log: Path) -> list[tuple[float, float]]:
+    """Time (s, monotonic) and value of the complete lines of the driver `log`, oldest first."""
+    data = log.read_bytes()
+    lines = (data[at : at + LINE_BYTES] for at in range(0, len(data), LINE_BYTES))
+    rows = (line.split() for line in lines if line.endswith(b"\n"))
+    return sorted((int(stamp) / 1e9, float(value.partition(b"=")[2])) for stamp, value in rows)
+
+
+def guard_rows(facts: dict[str, dict[str, float]]) -> list[tuple[str, str]]:
+    bound = 1e3 * (TIMEOUT_S + PERIOD_S)
+    return [
+        (
+            f"kill -9 to safe outputs, {name}",
+            f"{t['median']:.1f} ms median, {t['p99']:.1f} 99 %, {t['max']:.1f} worst (time-out and period {bound:.0f})",
+        )
+        for name, t in facts.items()
+    ]
+
+
+if __name__ == "__main__":
+    with tempfile.TemporaryDirectory() as temporary:
+        for title, figure in guard_rows(guard_times(Path(temporary))):
+            print(f"{title:<65}{figure}")
