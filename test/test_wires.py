@@ -13,6 +13,7 @@ import socket
 import subprocess
 import sys
 import threading
+import time
 from collections.abc import Iterator
 from pathlib import Path
 from typing import Any
@@ -54,10 +55,21 @@ def fly(ours: str, theirs: str, library: Path, bag: Path) -> str:
     """The digest of the flight; the two programs may start in either order."""
     line = ["fcsl-sim", "run", str(SIM), "--duration", LENGTH_S, "--external", f"wire:{ours}"]
     with subprocess.Popen(line, stdout=subprocess.DEVNULL, stderr=subprocess.PIPE, text=True) as simulator:
-        run("fcsl-fc", library, "--hal", f"wire:{theirs}", "--timeout-ms", "60000", "--record", bag)
+        line = ["--hal", f"wire:{theirs}", "--timeout-ms", "60000", "--summary", str(bag.with_suffix(".json"))]
+        run("fcsl-fc", library, *line, "--record", bag)
         _, err = simulator.communicate(timeout=60)
     assert simulator.returncode in (0, 1), err  # 1: `until` did not hold in so short a flight
     return digest(bag)
+
+
+def frame_crc(data: bytes) -> bytes:
+    """CRC-16/CCITT-FALSE, as behind a frame."""
+    crc = 0xFFFF
+    for byte in data:
+        crc ^= byte << 8
+        for _ in range(8):
+            crc = (crc << 1 ^ (0x1021 if crc & 0x8000 else 0)) & 0xFFFF
+    return crc.to_bytes(2, "little")
 
 
 def free_port(kind: socket.SocketKind) -> int:
@@ -72,14 +84,23 @@ def test_network(kind: str, reference: str, library: Path, tmp_path: Path) -> No
     assert fly(wire, wire, library, tmp_path / "bag") == reference
 
 
-class Line(threading.Thread):
-    """Carries what comes in at one descriptor to the other one, and loses and damages some of it."""
+#: What is no frame (a stream needs the zero last, to find its next frame): noise, a zero byte alone, a frame of another version, and one of an unknown kind (both with a right CRC).
+STORM = (
+    bytes(random.Random(1).randbytes(200)),
+    b"\0",
+    bytes.fromhex("21 05 03 02 01 00 68 69") + frame_crc(bytes.fromhex("21 05 03 02 01 00 68 69")),
+    bytes.fromhex("1F 05 03 02 01 00 68 69") + frame_crc(bytes.fromhex("1F 05 03 02 01 00 68 69")),
+)
 
-    def __init__(self, ends: tuple[int, int], lossy: bool) -> None:
+
+class Line(threading.Thread):
+    """Carries what comes in at one descriptor to the other one. Loses and damages some of it, or adds a storm of others'."""
+
+    def __init__(self, ends: tuple[int, int], lossy: bool = False, storm: int = 0) -> None:
         super().__init__(daemon=True)
         self._to = {ends[0]: ends[1], ends[1]: ends[0]}
         self._random = random.Random(7)
-        self._lossy = lossy
+        self._lossy, self._storm = lossy, storm
         self.lost = self.damaged = 0
         self._wake, self._over = os.pipe()
 
@@ -107,6 +128,8 @@ class Line(threading.Thread):
             at = self._random.randrange(len(data))
             data = data[:at] + bytes([data[at] ^ 1 << self._random.randrange(8)]) + data[at + 1 :]
         with contextlib.suppress(OSError):
+            for number in range(self._storm):
+                os.write(self._to[end], STORM[number % len(STORM)])
             os.write(self._to[end], data)
 
     def stop(self) -> None:
@@ -125,8 +148,8 @@ def running(line: Line) -> Iterator[Line]:
         line.stop()
 
 
-def test_network_that_loses_and_damages(reference: str, library: Path, tmp_path: Path) -> None:
-    """10 % of the frames are lost, 5 % are damaged: the reliable port repeats them."""
+def fly_relayed(library: Path, folder: Path, **line: Any) -> tuple[str, Line]:
+    """Over UDP, with a line between the two programs; the digest, and the line."""
     ours, theirs = free_port(socket.SOCK_DGRAM), free_port(socket.SOCK_DGRAM)
     with (
         socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as sim_side,
@@ -138,28 +161,77 @@ def test_network_that_loses_and_damages(reference: str, library: Path, tmp_path:
         found: list[str] = []
         flight = threading.Thread(
             target=lambda: found.append(
-                fly(f"udp:127.0.0.1:{ours}", f"udp:127.0.0.1:{theirs}", library, tmp_path / "bag")
+                fly(f"udp:127.0.0.1:{ours}", f"udp:127.0.0.1:{theirs}", library, folder / "bag")
             )
         )
         flight.start()
         fc_side.connect(fc_side.recvfrom(2048)[1])  # its first hello is lost, too
-        with running(Line((sim_side.fileno(), fc_side.fileno()), lossy=True)) as line:
+        with running(Line((sim_side.fileno(), fc_side.fileno()), **line)) as between:
             flight.join(120)
-    assert found == [reference]
+    return found[0], between
+
+
+def test_network_that_loses_and_damages(reference: str, library: Path, tmp_path: Path) -> None:
+    """10 % of the frames are lost, 5 % are damaged: the reliable port repeats them."""
+    flown, line = fly_relayed(library, tmp_path, lossy=True)
+    assert flown == reference
     assert line.lost > 50 and line.damaged > 20
 
 
-@pytest.mark.parametrize("lossy", [False, True])
-def test_serial_line(lossy: bool, reference: str, library: Path, tmp_path: Path) -> None:
-    """Two pseudo-terminals; what is lost or damaged of the stream costs a frame or two."""
+def summary(folder: Path) -> dict[str, Any]:
+    """What the flight program left."""
+    left: dict[str, Any] = json.loads((folder / "bag.json").read_text())
+    return left
+
+
+def test_a_storm_of_others_frames(reference: str, library: Path, tmp_path: Path) -> None:
+    """Twenty datagrams of others come with every frame, both ways: they are dropped and counted, and nothing is lost."""
+    flown, _ = fly_relayed(library, tmp_path, storm=20)
+    counted = summary(tmp_path)["hal"]
+    assert flown == reference
+    assert counted["link.other_version"] > 1000 and counted["link.malformed"] > 3000
+    assert counted["messages_dropped"] == 0 and counted["commands_dropped"] == 0
+
+
+@pytest.mark.parametrize("trouble", [{}, {"lossy": True}, {"storm": 6}])
+def test_serial_line(trouble: dict[str, Any], reference: str, library: Path, tmp_path: Path) -> None:
+    """Two pseudo-terminals; what is lost, damaged or added to the stream costs a frame or two."""
     (a, ours), (b, theirs) = pty.openpty(), pty.openpty()
     names = [os.ttyname(end) for end in (ours, theirs)]
-    with running(Line((a, b), lossy=lossy)) as line:
+    with running(Line((a, b), **trouble)) as line:
         flown = fly(f"uart:{names[0]}:921600", f"uart:{names[1]}:921600", library, tmp_path / "bag")
     for end in (a, b, ours, theirs):
         os.close(end)
     assert flown == reference
-    assert not lossy or line.lost > 50
+    assert not trouble.get("lossy") or line.lost > 50
+    assert not trouble.get("storm") or summary(tmp_path)["hal"]["link.garbage"] > 100
+
+
+def test_a_serial_line_that_never_stops(library: Path, tmp_path: Path) -> None:
+    """Nobody is there but noise, as fast as the line takes it: the flight program gives up in its time."""
+    master, slave = pty.openpty()
+    stop = threading.Event()
+
+    def babble() -> None:
+        numbers = random.Random(2)
+        while not stop.is_set():
+            with contextlib.suppress(OSError):
+                os.write(master, numbers.randbytes(512))
+
+    os.set_blocking(master, False)
+    thread = threading.Thread(target=babble)
+    thread.start()
+    begun = time.monotonic()
+    hal = f"wire:uart:{os.ttyname(slave)}:115200"
+    done = subprocess.run(
+        ["fcsl-fc", str(library), "--hal", hal, "--timeout-ms", "500"], capture_output=True, text=True, check=False
+    )
+    stop.set()
+    thread.join()
+    os.close(master)
+    os.close(slave)
+    assert (done.returncode, done.stderr) == (1, "fcsl-fc: no handshake from the simulator within 500 ms\n")
+    assert time.monotonic() - begun < 20
 
 
 # ---- the model serial_link ---------------------------------------------------------------------------------------------

@@ -1,6 +1,8 @@
 /* SPDX-License-Identifier: Apache-2.0
  *
  * Checks messages of channels, and takes their values.
+ *
+ * `//@ split` is for scripts/verify/codec: from there on it analyses each channel by itself.
  */
 #include "codec_layout.h"
 
@@ -8,9 +10,8 @@
 typedef struct {
     uint16_t id;
     uint8_t type;
-    const uint8_t *values;
-    size_t size; /* bytes of the values */
-    size_t end;  /* offset behind it in the message */
+    size_t values; /* offset in the message */
+    size_t end;    /* offset behind them */
 } raw_entry_t;
 
 /* Reads the entry at `at`, which must end at `end` or before. */
@@ -37,12 +38,13 @@ static fcsl_message_status_t read_entry(const uint8_t *bytes, size_t at, size_t 
     } else {
         count = shape == SCALAR ? 1u : shape == VECTOR ? 3u : 4u;
     }
-    entry->size = count * fcsl_scalar_size(scalar);
-    if (end - at < entry->size) {
+    const size_t behind =
+        at + count * fcsl_scalar_size(scalar); /* half a MiB more than a message has: it does not wrap */
+    if (behind > end) {
         return FCSL_MESSAGE_SHORT;
     }
-    entry->values = bytes + at;
-    entry->end = at + entry->size;
+    entry->values = at;
+    entry->end = behind;
     return FCSL_MESSAGE_OK;
 }
 
@@ -65,7 +67,7 @@ static uint32_t find_channel(const fcsl_machine_t *machine, uint16_t id, uint32_
 /* True when an entry with this id stands in [at, end), which was checked. */
 static int stands_before(const uint8_t *bytes, size_t at, size_t end, uint16_t id)
 {
-    raw_entry_t entry;
+    raw_entry_t entry = {0};
     while (at < end && read_entry(bytes, at, end, &entry) == FCSL_MESSAGE_OK) {
         if (entry.id == id) {
             return 1;
@@ -75,26 +77,29 @@ static int stands_before(const uint8_t *bytes, size_t at, size_t end, uint16_t i
     return 0;
 }
 
-/* Whether the entry, whose values are not looked at, is one of this channel in a message of this kind. */
-static fcsl_message_status_t check_shape(const fcsl_machine_t *machine, fcsl_message_kind_t kind,
-                                         const fcsl_channel_t *channel, const raw_entry_t *entry)
+/* The values of the entry; null unless it is one of this channel in a message of this kind. */
+static const uint8_t *values_of(const fcsl_machine_t *machine, fcsl_message_kind_t kind, uint32_t channel,
+                                const uint8_t *bytes, const raw_entry_t *entry)
 {
-    const fcsl_field_t *field = &machine->fields[channel->field];
-    if (!carries(kind, channel)) {
-        return FCSL_MESSAGE_ENTRY;
+    //@ split channel;
+    const fcsl_field_t *field = &machine->fields[machine->channels[channel].field];
+    if (!carries(kind, &machine->channels[channel]) || entry->type != entry_type(field)) {
+        return NULL;
     }
-    return entry->type == entry_type(field) && entry->size == field->size ? FCSL_MESSAGE_OK : FCSL_MESSAGE_TYPE;
+    return entry->values + field->size == entry->end ? bytes + entry->values : NULL;
 }
 
-static fcsl_message_status_t check_channel(const fcsl_machine_t *machine, fcsl_message_kind_t kind,
-                                           const fcsl_channel_t *channel, const raw_entry_t *entry)
+/* Checks the entry of a channel. */
+static fcsl_message_status_t check_channel(const fcsl_machine_t *machine, fcsl_message_kind_t kind, uint32_t channel,
+                                           const uint8_t *bytes, const raw_entry_t *entry)
 {
-    const fcsl_field_t *field = &machine->fields[channel->field];
-    const fcsl_message_status_t status = check_shape(machine, kind, channel, entry);
-    if (status != FCSL_MESSAGE_OK) {
-        return status;
+    //@ split channel;
+    const fcsl_field_t *field = &machine->fields[machine->channels[channel].field];
+    const uint8_t *values = values_of(machine, kind, channel, bytes, entry);
+    if (values == NULL) {
+        return carries(kind, &machine->channels[channel]) ? FCSL_MESSAGE_TYPE : FCSL_MESSAGE_ENTRY;
     }
-    return fcsl_scalars_valid(machine, entry->values, field->type, field->count) ? FCSL_MESSAGE_OK : FCSL_MESSAGE_VALUE;
+    return fcsl_scalars_valid(machine, values, field->type, field->count) ? FCSL_MESSAGE_OK : FCSL_MESSAGE_VALUE;
 }
 
 static uint32_t actuators(const fcsl_machine_t *machine)
@@ -114,14 +119,14 @@ static fcsl_message_status_t check_entries(const fcsl_machine_t *machine, fcsl_m
     uint32_t behind = 0; /* behind the last channel in the table that was found */
     uint32_t found = 0;
     for (size_t at = first; at < end;) {
-        raw_entry_t entry;
+        raw_entry_t entry = {0};
         fcsl_message_status_t status = read_entry(bytes, at, end, &entry);
         if (status != FCSL_MESSAGE_OK) {
             return status;
         }
         const uint32_t index = find_channel(machine, entry.id, next);
         if (index < machine->channel_count) {
-            status = check_channel(machine, kind, &machine->channels[index], &entry);
+            status = check_channel(machine, kind, index, bytes, &entry);
             if (status != FCSL_MESSAGE_OK) {
                 return status;
             }
@@ -147,7 +152,7 @@ static int begins(const uint8_t *at, uint16_t id, uint8_t type)
     return fcsl_get_u16(at) == id && at[2] == type;
 }
 
-/* Checks the reserved entries, which stand at fixed places, and fills *message from them. */
+/* Checks the reserved entries, which stand at fixed places, and sets what they say in *message. */
 static fcsl_message_status_t check_reserved(const fcsl_channel_table_t *table, fcsl_message_kind_t kind,
                                             const uint8_t *bytes, size_t size, fcsl_message_t *message)
 {
@@ -170,7 +175,7 @@ static fcsl_message_status_t check_reserved(const fcsl_channel_table_t *table, f
     if (fcsl_get_u32(bytes + TABLE_AT + ENTRY_BYTES) != table->hash) {
         return FCSL_MESSAGE_TABLE;
     }
-    *message = (fcsl_message_t){.bytes = bytes, .size = size, .kind = kind, .tick = fcsl_get_u64(bytes + ENTRY_BYTES)};
+    message->tick = fcsl_get_u64(bytes + ENTRY_BYTES);
     const uint8_t *extra = bytes + EXTRA_AT;
     if (kind == FCSL_ACTUATOR_MESSAGE) {
         if (!begins(extra, ARMED_ID, FCSL_BOOL)) {
@@ -191,7 +196,7 @@ static fcsl_message_status_t check_reserved(const fcsl_channel_table_t *table, f
 fcsl_message_status_t fcsl_message_check(const fcsl_channel_table_t *table, fcsl_message_kind_t kind,
                                          const uint8_t *bytes, size_t size, fcsl_message_t *message)
 {
-    fcsl_message_t checked;
+    fcsl_message_t checked = {.bytes = bytes, .size = size, .kind = kind};
     fcsl_message_status_t status = check_reserved(table, kind, bytes, size, &checked);
     if (status == FCSL_MESSAGE_OK) {
         status = check_entries(table->machine, kind, bytes, head_bytes(kind), size - CRC_BYTES, &checked.skipped);
@@ -202,38 +207,70 @@ fcsl_message_status_t fcsl_message_check(const fcsl_channel_table_t *table, fcsl
     return status;
 }
 
-int fcsl_message_next(const fcsl_machine_t *machine, const fcsl_message_t *message, fcsl_message_entry_t *entry)
+/* Finds the next entry of a channel from `at` on. Returns the channel, looked for in the table from `next` on; channel_count
+ * if there is none. */
+static uint32_t next_entry(const fcsl_machine_t *machine, const fcsl_message_t *message, size_t at, uint32_t next,
+                           raw_entry_t *entry)
 {
     const size_t end = message->size - CRC_BYTES;
-    const uint32_t next = entry->end == 0 ? 0 : entry->channel + 1u;
+    while (at < end && read_entry(message->bytes, at, end, entry) == FCSL_MESSAGE_OK) {
+        const uint32_t channel = find_channel(machine, entry->id, next);
+        if (channel < machine->channel_count) {
+            return channel;
+        }
+        at = entry->end;
+    }
+    return machine->channel_count;
+}
+
+int fcsl_message_next(const fcsl_machine_t *machine, const fcsl_message_t *message, fcsl_message_entry_t *entry)
+{
+    uint32_t next = entry->end == 0 ? 0 : entry->channel + 1u;
     size_t at = entry->end == 0 ? head_bytes(message->kind) : entry->end;
-    raw_entry_t raw;
-    while (at < end && read_entry(message->bytes, at, end, &raw) == FCSL_MESSAGE_OK) {
-        const uint32_t channel = find_channel(machine, raw.id, next);
-        /* It was checked; looked at again so that bytes changed since then cannot write beside a field. */
-        if (channel < machine->channel_count &&
-            check_shape(machine, message->kind, &machine->channels[channel], &raw) == FCSL_MESSAGE_OK) {
-            *entry = (fcsl_message_entry_t){
-                .end = raw.end, .channel = channel, .size = (uint32_t)raw.size, .values = raw.values};
+    raw_entry_t raw = {0};
+    for (;;) {
+        const uint32_t channel = next_entry(machine, message, at, next, &raw);
+        if (channel >= machine->channel_count) {
+            return 0;
+        }
+        /* It was checked; looked at again, so that its size is the field's even if bytes changed since then. */
+        const uint8_t *values = values_of(machine, message->kind, channel, message->bytes, &raw);
+        if (values != NULL) {
+            const uint32_t size = (uint32_t)(raw.end - raw.values);
+            *entry = (fcsl_message_entry_t){.end = raw.end, .channel = channel, .size = size, .values = values};
             return 1;
         }
         at = raw.end;
+        next = channel + 1u;
     }
-    return 0;
+}
+
+/* Takes the values of a channel's entry. It was checked; looked at again so that bytes changed since then cannot write beside
+ * a field. */
+static void take_channel(const fcsl_machine_t *machine, uint8_t *data, const fcsl_message_t *message, uint32_t index,
+                         const raw_entry_t *entry)
+{
+    //@ split index;
+    const fcsl_channel_t *channel = &machine->channels[index];
+    const fcsl_field_t *field = &machine->fields[channel->field];
+    const uint8_t *values = values_of(machine, message->kind, index, message->bytes, entry);
+    if (values == NULL) {
+        return;
+    }
+    fcsl_scalars_import(data + field->offset, values, field->type, field->count);
+    if (message->kind == FCSL_SENSOR_MESSAGE) { /* of the coming tick: its samples are not old, and have no stamp */
+        data[channel->fresh_offset] = 1u;
+        memset(data + channel->sample_age_offset, 0, sizeof(uint32_t));
+        memset(data + channel->stamp_offset, 0, sizeof(int64_t));
+    }
 }
 
 void fcsl_message_apply(const fcsl_machine_t *machine, void *data, const fcsl_message_t *message)
 {
-    uint8_t *base = (uint8_t *)data;
-    fcsl_message_entry_t entry = {0};
-    while (fcsl_message_next(machine, message, &entry) != 0) {
-        const fcsl_channel_t *channel = &machine->channels[entry.channel];
-        const fcsl_field_t *field = &machine->fields[channel->field];
-        fcsl_scalars_import(base + field->offset, entry.values, field->type, field->count);
-        if (message->kind == FCSL_SENSOR_MESSAGE) { /* of the coming tick: its samples are not old, and have no stamp */
-            base[channel->fresh_offset] = 1u;
-            memset(base + channel->sample_age_offset, 0, sizeof(uint32_t));
-            memset(base + channel->stamp_offset, 0, sizeof(int64_t));
-        }
+    raw_entry_t entry = {0};
+    uint32_t index = next_entry(machine, message, head_bytes(message->kind), 0, &entry);
+    while (index < machine->channel_count) {
+        take_channel(machine, (uint8_t *)data, message, index, &entry);
+        index = next_entry(machine, message, entry.end, index + 1u, &entry);
     }
 }

@@ -39,11 +39,11 @@ uint32_t fcsl_crc32(uint32_t crc, const void *bytes, size_t size)
 {
     const uint8_t *in = (const uint8_t *)bytes;
     uint32_t value = ~crc;
-    for (; size >= 8u; size -= 8u) {
-        value = eight_bytes(value, in);
-        in += 8;
+    size_t i = 0;
+    for (; i + 8u <= size; i += 8u) {
+        value = eight_bytes(value, in + i);
     }
-    for (size_t i = 0; i < size; i++) {
+    for (; i < size; i++) {
         value = value >> 8 ^ TABLES[7][(value ^ in[i]) & 255u];
     }
     return ~value;

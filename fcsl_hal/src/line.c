@@ -134,8 +134,9 @@ static int read_stream(line_t *line, fcsl_link_t *link)
     if (got <= 0) {
         return -1;
     }
-    for (ssize_t i = 0; i < got; i++) {
-        const size_t size = fcsl_cobs_decode(&line->decoder, bytes[i]);
+    for (size_t at = 0; at < (size_t)got;) {
+        size_t size = 0;
+        at += fcsl_cobs_decode(&line->decoder, bytes + at, (size_t)got - at, &size);
         if (size > 0) {
             fcsl_link_take_frame(link, line->decoder.frame, size);
         }

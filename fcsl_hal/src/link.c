@@ -24,6 +24,7 @@ int fcsl_link_open(fcsl_link_t *link, const fcsl_link_policy_t policies[FCSL_LIN
             return -1;
         }
         link->ports[i].policy = policies[i];
+        link->port_count = policies[i] != FCSL_LINK_CLOSED ? i + 1u : link->port_count;
     }
     link->session.session = session;
     link->session.challenge = 1;
@@ -78,7 +79,7 @@ static void tick_session(fcsl_link_session_t *session)
 void fcsl_link_tick(fcsl_link_t *link)
 {
     tick_session(&link->session);
-    for (uint32_t i = 0; i < FCSL_LINK_PORTS; i++) {
+    for (uint32_t i = 0; i < link->port_count; i++) {
         fcsl_link_port_t *port = &link->ports[i];
         fcsl_link_outgoing_tick(port, link->retransmit_ticks);
         if (port->in.answer == FCSL_LINK_ANSWER_SOON) {
@@ -107,6 +108,9 @@ static size_t port_frame(fcsl_link_t *link, uint32_t number, uint8_t frame[FCSL_
 {
     fcsl_link_port_t *port = &link->ports[number];
     const int reliable = port->policy == FCSL_LINK_RELIABLE;
+    if (port->policy == FCSL_LINK_CLOSED || (reliable && link->session.peer == 0)) {
+        return 0;
+    }
     fcsl_link_header_t header = {
         .kind = FCSL_LINK_ACKNOWLEDGEMENT,
         .port = (uint8_t)number,
@@ -115,9 +119,6 @@ static size_t port_frame(fcsl_link_t *link, uint32_t number, uint8_t frame[FCSL_
         .acknowledge = port->in.sequence,
     };
     size_t size = 0;
-    if (port->policy == FCSL_LINK_CLOSED || (reliable && link->session.peer == 0)) {
-        return 0;
-    }
     if (fcsl_link_outgoing_due(port)) {
         size = fcsl_link_outgoing_take(port, &header, frame);
     } else if (!reliable || port->in.answer != FCSL_LINK_ANSWER_NOW) {
@@ -133,9 +134,9 @@ size_t fcsl_link_next_frame(fcsl_link_t *link, uint8_t frame[FCSL_LINK_FRAME_MAX
         return hello(&link->session, frame);
     }
     /* Ports take turns, so that none of them starves on a slow wire. */
-    for (uint32_t i = 0; i < FCSL_LINK_PORTS; i++) {
+    for (uint32_t i = 0; i < link->port_count; i++) {
         const uint32_t number = link->next_port;
-        link->next_port = (number + 1u) % FCSL_LINK_PORTS;
+        link->next_port = (number + 1u) % link->port_count;
         const size_t size = port_frame(link, number, frame);
         if (size > 0) {
             return size;

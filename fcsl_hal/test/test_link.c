@@ -358,11 +358,16 @@ static void test_garbage(void)
 
 /* ---- streams ------------------------------------------------------------------------------------------------------ */
 
+/* The size of the last frame that the bytes complete. They come in pieces of any size. */
 static size_t decode(fcsl_cobs_decoder_t *decoder, const uint8_t *bytes, size_t count)
 {
     size_t size = 0;
-    for (size_t i = 0; i < count; i++) {
-        const size_t found = fcsl_cobs_decode(decoder, bytes[i]);
+    for (size_t at = 0; at < count;) {
+        const size_t piece = 1 + (size_t)rand() % (count - at);
+        size_t found = 0;
+        const size_t taken = fcsl_cobs_decode(decoder, bytes + at, piece, &found);
+        CHECK(taken >= 1 && taken <= piece && (taken == piece || bytes[at + taken - 1] == 0));
+        at += taken;
         size = found > 0 ? found : size;
     }
     return size;
@@ -399,7 +404,7 @@ static void test_streams(void)
         if (i % 5 == 0) { /* garbage, and the zero that ends it */
             bytes[0] = (uint8_t)(1 + rand() % 255);
             (void)decode(&decoder, bytes, (size_t)rand() % count);
-            CHECK(fcsl_cobs_decode(&decoder, 0) <= FCSL_LINK_FRAME_MAX);
+            CHECK(decode(&decoder, (const uint8_t[]){0}, 1) <= FCSL_LINK_FRAME_MAX);
             (void)fcsl_cobs_encode(frame, size, bytes);
         }
         CHECK(decode(&decoder, bytes, count) == size && memcmp(decoder.frame, frame, size) == 0);
@@ -410,7 +415,7 @@ static void test_streams(void)
     for (int i = 0; i < 100; i++) {
         CHECK(decode(&decoder, bytes, sizeof bytes) == 0 && decoder.size <= FCSL_LINK_FRAME_MAX);
     }
-    CHECK(fcsl_cobs_decode(&decoder, 0) == 0);
+    CHECK(decode(&decoder, (const uint8_t[]){0}, 1) == 0);
 }
 
 int main(void)

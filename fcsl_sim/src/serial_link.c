@@ -113,8 +113,9 @@ static void arrive(fcsl_sim_link_t *link, way_t *way, fcsl_link_t *end)
 {
     while (way->count > 0 && way->flights[way->first].due_ns <= link->state.now_ns) {
         const flight_t *flight = &way->flights[way->first];
-        for (uint32_t i = 0; i < flight->size; i++) {
-            const size_t size = fcsl_cobs_decode(&way->decoder, flight->bytes[i]);
+        for (size_t at = 0; at < flight->size;) {
+            size_t size = 0;
+            at += fcsl_cobs_decode(&way->decoder, flight->bytes + at, flight->size - at, &size);
             if (size > 0) {
                 fcsl_link_take_frame(end, way->decoder.frame, size);
             }

@@ -18,6 +18,7 @@ ALONE = {
     "twin": "twin",
     "vars": "vars.main",
     "whole": "whole.main",
+    "wire": "wire.main",
 }
 
 # The modules here are those of the package `bench`, which is found from the folder that holds it.

@@ -32,6 +32,7 @@ from .subjects.telemetry import telemetry_figures, telemetry_rows
 from .subjects.twin import twin_rows, twin_times
 from .subjects.vars.main import vars_figures, vars_rows
 from .subjects.whole.main import WHOLES, whole_rows, whole_times
+from .subjects.wire.main import wire_figures, wire_rows
 
 Rows = list[tuple[str, str]]
 OUT = ROOT / "out" / f"bench{SUFFIX}.json"
@@ -121,6 +122,7 @@ SECTIONS = (
     Section("wholes", "timing whole machines against the same by hand", measure_wholes, whole_rows),
     Section("linear", "timing filters beside CasADi, Numba and Eigen", linear_times, linear_rows),
     Section("real_time_factor", "timing the simulator", real_time_factor, simulator_rows),
+    Section("wire", "sending messages beside MAVLink 2, and damaging them", wire_figures, wire_rows),
     Section("record", "recording", record_times, record_rows),
     Section("twin", "ticking twins from Python", lambda _: twin_times(), twin_rows),
     Section("checkpoint", "saving and restoring", checkpoint_times, checkpoint_rows),

@@ -9,6 +9,7 @@ from pathlib import Path
 ALONE = {
     "binary": "binary.main",
     "bits": "bits.main",
+    "codec": "codec.main",
     "coverage": "coverage.main",
     "eva": "eva.main",
     "foxglove": "foxglove.main",

@@ -30,9 +30,9 @@ typedef struct {
     uint64_t garbage; /* what stood between two zeros and was no frame */
 } fcsl_cobs_decoder_t;
 
-/* Takes one byte of the stream. Returns the size of the frame that it completes, which lies in decoder->frame until the next
- * call; otherwise 0. */
-size_t fcsl_cobs_decode(fcsl_cobs_decoder_t *decoder, uint8_t byte);
+/* Takes bytes of the stream up to the end of the next frame, or all; returns how many. *size is the size of the frame that they
+ * complete, which lies in decoder->frame until the next call; otherwise 0. */
+size_t fcsl_cobs_decode(fcsl_cobs_decoder_t *decoder, const uint8_t *bytes, size_t count, size_t *size);
 
 #ifdef __cplusplus
 }

@@ -148,7 +148,8 @@ typedef struct {
     fcsl_link_port_t ports[FCSL_LINK_PORTS];
     fcsl_link_session_t session;
     uint32_t retransmit_ticks;
-    uint32_t next_port; /* that fcsl_link_next_frame looks at */
+    uint32_t port_count; /* behind the last one that is open */
+    uint32_t next_port;  /* that fcsl_link_next_frame looks at */
     fcsl_link_counters_t counters;
 } fcsl_link_t;
 

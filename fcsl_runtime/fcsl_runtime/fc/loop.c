@@ -8,6 +8,7 @@
 #include <inttypes.h>
 #include <stdio.h>
 #include <stdlib.h>
+#include <string.h>
 #include <time.h>
 
 /* A sleeping loop looks up this often for a stop signal and for commands. */
@@ -34,7 +35,8 @@ int loop_open(loop_t *loop)
     loop->sensor_bytes = calloc(1, loop->sensor_capacity);
     loop->actuator_bytes = calloc(1, loop->actuator_capacity);
     if (loop->sensor_bytes == NULL || loop->actuator_bytes == NULL ||
-        fcsl_history_open(&loop->history, parts, loop->hal.field_count > 0 ? 2 : 1, history_slots(machine->size)) != 0) {
+        fcsl_history_open(&loop->history, parts, loop->hal.field_count > 0 ? 2 : 1, history_slots(machine->size)) !=
+            0) {
         return -1;
     }
     loop_publish(loop);
@@ -64,6 +66,16 @@ static void publish(loop_t *loop, uint64_t time_ns)
 void loop_publish(loop_t *loop)
 {
     publish(loop, now_ns());
+}
+
+uint64_t loop_hal_count(const loop_t *loop, const uint8_t *published, uint32_t field)
+{
+    const fcsl_field_t *counted = &loop->hal.fields[field];
+    uint64_t value = 0;
+    if (counted->type == FCSL_U64 && counted->count == 1u) {
+        memcpy(&value, published + fcsl_history_part(&loop->history, 1) + counted->offset, sizeof value);
+    }
+    return value;
 }
 
 static void fail(loop_t *loop, const char *text)
@@ -138,7 +150,8 @@ static int arm(loop_t *loop, int armed)
     if (fcsl_run_machine(loop->run)->arm_field == FCSL_NONE) {
         return goes_on(loop, loop->hal.arm(loop->hal.ctx, armed)); /* always armed */
     }
-    (void)snprintf(text, sizeof text, "%s at tick %" PRIu64, armed ? "armed" : "disarmed", fcsl_run_tick(loop->run) - 1u);
+    (void)snprintf(text, sizeof text, "%s at tick %" PRIu64, armed ? "armed" : "disarmed",
+                   fcsl_run_tick(loop->run) - 1u);
     loop->hal.log(loop->hal.ctx, text);
     return goes_on(loop, loop->hal.arm(loop->hal.ctx, armed));
 }
@@ -251,8 +264,7 @@ static int keep_time(loop_t *loop, pacing_t *pacing)
 int loop_run(loop_t *loop)
 {
     const fcsl_hal_t *hal = &loop->hal;
-    pacing_t pacing =
-        pacing_start(loop->missed_deadline, fcsl_run_machine(loop->run)->tick_hz, hal->now_ns(hal->ctx));
+    pacing_t pacing = pacing_start(loop->missed_deadline, fcsl_run_machine(loop->run)->tick_hz, hal->now_ns(hal->ctx));
     while (loop_may_tick(loop)) {
         if (loop->paused) {
             idle(loop);

@@ -11,7 +11,7 @@
 #include "summary_file.h"
 #include "log.h"
 
-enum { CLIENTS_BYTES = 128 };
+enum { CLIENTS_BYTES = 128, HAL_BYTES = 1024 };
 
 static void report_times(const char *what, const fcsl_histogram_t *histogram)
 {
@@ -33,7 +33,25 @@ static void report_telemetry(const fcsl_telemetry_t *telemetry)
              sent.packets, sent.overwritten, sent.configurations, sent.datagrams, sent.failures);
 }
 
-/* `data` is the machine struct of the last tick. */
+/* What the HAL has counted, as far as it is not 0. */
+static void report_hal(const loop_t *loop, const uint8_t *data)
+{
+    const fcsl_hal_t *hal = &loop->hal;
+    char text[HAL_BYTES] = "";
+    size_t at = 0;
+    for (uint32_t i = 0; i < hal->field_count; i++) {
+        const uint64_t value = loop_hal_count(loop, data, i);
+        const int added = value == 0u ? 0
+                                      : snprintf(text + at, sizeof text - at, "%s%s %" PRIu64, at > 0 ? ", " : "",
+                                                 hal->fields[i].path, value);
+        at += added > 0 && (size_t)added < sizeof text - at ? (size_t)added : 0u;
+    }
+    if (at > 0) {
+        log_info("hal: %s", text);
+    }
+}
+
+/* `data` is what was published after the last tick. */
 static void report_counters(const loop_t *loop, const uint8_t *data)
 {
     const fcsl_tick_stats_t *stats = &loop->stats;
@@ -58,6 +76,7 @@ static void report_counters(const loop_t *loop, const uint8_t *data)
     if (loop->telemetry != NULL) {
         report_telemetry(loop->telemetry);
     }
+    report_hal(loop, data);
     report_times("lateness ", &stats->lateness);
     report_times("tick time", &stats->tick_time);
 }

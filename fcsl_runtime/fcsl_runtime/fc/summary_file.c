@@ -76,6 +76,17 @@ static void put_counters(json_out_t *out, const fcsl_machine_t *machine, const f
                   fcsl_tick_stats_get(&stats->messages_refused), fcsl_tick_stats_get(&stats->records_dropped));
 }
 
+static void put_hal(json_out_t *out, const loop_t *loop, const uint8_t *data)
+{
+    fcsl_json_raw(out, "\"hal\":{");
+    for (uint32_t i = 0; i < loop->hal.field_count; i++) {
+        fcsl_json_raw(out, i > 0 ? "," : "");
+        fcsl_json_quoted(out, loop->hal.fields[i].path);
+        fcsl_json_raw(out, ":%" PRIu64, loop_hal_count(loop, data, i));
+    }
+    fcsl_json_raw(out, "},\n");
+}
+
 static const char *state_name(const fcsl_machine_t *machine, const uint8_t *data, uint32_t offset)
 {
     int32_t state = FCSL_NONE;
@@ -98,6 +109,7 @@ static void put_all(json_out_t *out, const loop_t *loop, const uint8_t *data, co
     put_text(out, "next_state", state_name(machine, data, machine->next_state_offset));
     fcsl_json_raw(out, "\"paused\":%s,\n", moment->paused != 0 ? "true" : "false");
     put_instances(out, machine, data);
+    put_hal(out, loop, data);
     put_counters(out, machine, &loop->stats, data);
     fcsl_vars_histogram(out, "lateness_ns", &loop->stats.lateness);
     fcsl_vars_histogram(out, "tick_time_ns", &loop->stats.tick_time);

@@ -3,6 +3,8 @@
  * Preloaded into fcsl-fc (test_fc_steady.py): watches the step thread from its sleep number STEADY_FROM to number STEADY_TO.
  * Meanwhile the kernel lets it make no system call but the absolute sleep, reading the clock, waking a thread (futex, the 8
  * bytes of an eventfd) and sched_yield; its allocations are counted. Then the process ends and prints a line with the result.
+ * With STEADY_PEER set, it may also wait for its peer (ppoll), send and receive without waiting, take 8 bytes of an eventfd, and
+ * take the lock that it shares with the thread of a wire; its waits for the peer count as sleeps.
  * x86-64 and aarch64 Linux.
  */
 #define _GNU_SOURCE
@@ -10,6 +12,7 @@
 #include <linux/filter.h>
 #include <linux/futex.h>
 #include <linux/seccomp.h>
+#include <poll.h>
 #include <pthread.h>
 #include <signal.h>
 #include <stdatomic.h>
@@ -18,6 +21,7 @@
 #include <string.h>
 #include <sys/prctl.h>
 #include <sys/resource.h>
+#include <sys/socket.h>
 #include <sys/syscall.h>
 #include <time.h>
 #include <unistd.h>
@@ -36,6 +40,48 @@ static atomic_uint_fast64_t sleeps;
 #define UNLESS(value, to) BPF_JUMP(BPF_JMP | BPF_JEQ | BPF_K, value, 0, to)
 #define ALLOW             BPF_STMT(BPF_RET | BPF_K, SECCOMP_RET_ALLOW)
 #define TRAP              BPF_STMT(BPF_RET | BPF_K, SECCOMP_RET_TRAP)
+
+/* What a thread may do that waits for its peer; what it may do besides stands behind it. */
+static int watch_calls_of_peer(void)
+{
+    struct sock_filter code[] = {
+        LOAD(offsetof(struct seccomp_data, nr)),
+        UNLESS(SYS_clock_gettime, 1),
+        ALLOW,
+        UNLESS(SYS_sched_yield, 1),
+        ALLOW,
+        UNLESS(SYS_ppoll, 1),
+        ALLOW,
+        UNLESS(SYS_futex, 1),
+        ALLOW,
+        UNLESS(SYS_clock_nanosleep, 1), /* the shape of its sleep is watched without a peer */
+        ALLOW,
+        UNLESS(SYS_recvfrom, 4),
+        LOAD(ARGUMENT(3)),
+        BPF_JUMP(BPF_JMP | BPF_JSET | BPF_K, MSG_DONTWAIT, 0, 1),
+        ALLOW,
+        TRAP,
+        UNLESS(SYS_sendto, 4),
+        LOAD(ARGUMENT(3)),
+        BPF_JUMP(BPF_JMP | BPF_JSET | BPF_K, MSG_DONTWAIT, 0, 1),
+        ALLOW,
+        TRAP,
+        UNLESS(SYS_read, 4),
+        LOAD(ARGUMENT(2)),
+        UNLESS(8, 1),
+        ALLOW,
+        TRAP,
+        UNLESS(SYS_write, 4),
+        LOAD(ARGUMENT(2)),
+        UNLESS(8, 1),
+        ALLOW,
+        TRAP,
+        TRAP,
+    };
+    const struct sock_fprog program = {.len = sizeof code / sizeof code[0], .filter = code};
+    return prctl(PR_SET_NO_NEW_PRIVS, 1, 0, 0, 0) == 0 &&
+           syscall(SYS_seccomp, SECCOMP_SET_MODE_FILTER, 0, &program) == 0;
+}
 
 static int watch_calls(void)
 {
@@ -134,7 +180,7 @@ static void begin(void)
         _exit(CANNOT);
     }
     atomic_store(&faults_before, faults_of_main());
-    if (!watch_calls()) {
+    if (!(getenv("STEADY_PEER") != NULL ? watch_calls_of_peer() : watch_calls())) {
         _exit(CANNOT);
     }
     allocations = 0;
@@ -150,14 +196,18 @@ static void end(void)
     }
 }
 
-/* The step thread's sleep; it alone calls this in fcsl-fc. */
-int clock_nanosleep(clockid_t clock, int flags, const struct timespec *time, struct timespec *left)
+static pthread_t main_thread;
+
+__attribute__((constructor)) static void note_main_thread(void)
+{
+    main_thread = pthread_self();
+}
+
+/* Of the step thread. */
+static void sleep_begins(void)
 {
     static unsigned long from;
     static unsigned long to;
-    if (flags != TIMER_ABSTIME) {
-        return (int)syscall(SYS_clock_nanosleep, clock, flags, time, left);
-    }
     const uint64_t number = atomic_fetch_add(&sleeps, 1) + 1u;
     if (from == 0) {
         from = number_from("STEADY_FROM");
@@ -168,5 +218,23 @@ int clock_nanosleep(clockid_t clock, int flags, const struct timespec *time, str
     } else if (number == to) {
         end();
     }
+}
+
+/* The step thread's sleep; it alone calls this in fcsl-fc. */
+int clock_nanosleep(clockid_t clock, int flags, const struct timespec *time, struct timespec *left)
+{
+    if (flags == TIMER_ABSTIME) {
+        sleep_begins();
+    }
     return (int)syscall(SYS_clock_nanosleep, clock, flags, time, left);
+}
+
+/* Its wait for the peer; the threads of wires call this, too. The kernel writes what is left of the time. */
+int ppoll(struct pollfd *entries, nfds_t count, const struct timespec *time, const sigset_t *mask)
+{
+    struct timespec left = time != NULL ? *time : (struct timespec){0};
+    if (pthread_equal(pthread_self(), main_thread) && getenv("STEADY_PEER") != NULL) {
+        sleep_begins();
+    }
+    return (int)syscall(SYS_ppoll, entries, count, time != NULL ? &left : NULL, mask, 8);
 }

@@ -8,6 +8,7 @@ import json
 import os
 import platform
 import re
+import socket
 import subprocess
 import threading
 from collections.abc import Iterator
@@ -16,10 +17,12 @@ from pathlib import Path
 
 import pytest
 from conftest import CFLAGS, ROOT
-from native import PROGRAM, Fc
+from native import FIXTURE, PROGRAM, WIRE_SIM, Fc
 from telemetry_page import Port
+from test_fc_wire import HELLO, TABLE, TICK_HZ, control, listening
 
 from fcsl_compiler.driver.cache import build_machine
+from simclient.link.message import table_hash
 
 pytestmark = pytest.mark.skipif(platform.system() != "Linux", reason="seccomp is Linux's")
 
@@ -111,8 +114,9 @@ def machine(folder: Path, kind: int) -> str:
 class Watched(Fc):
     """fcsl-fc with its step thread watched from sleep 100 to 100 + TICKS."""
 
-    def __init__(self, folder: Path, library: str, *options: str) -> None:
-        watch = {"LD_PRELOAD": str(folder / "libsteady.so"), "STEADY_FROM": "100", "STEADY_TO": str(100 + TICKS)}
+    def __init__(self, folder: Path, library: str, *options: str, peer: bool = False) -> None:
+        watch = {"STEADY_PEER": "1"} if peer else {}
+        watch |= {"LD_PRELOAD": str(folder / "libsteady.so"), "STEADY_FROM": "100", "STEADY_TO": str(100 + TICKS)}
         self.process = subprocess.Popen(
             [PROGRAM, library, *options], stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True, env={**os.environ, **watch}
         )  # fmt: skip
@@ -189,6 +193,40 @@ def test_every_policy(folder: Path, policy: str) -> None:
     assert Watched(folder, machine(folder, 0), "--missed-deadline", policy).allocations() == 0
 
 
+# ---- with a peer at the other end of a wire
+
+
+@pytest.mark.parametrize("kind", ["unix", "udp"])
+def test_in_lock_step(kind: str, folder: Path, tmp_path: Path) -> None:
+    """It may wait for its peer, and for nothing else."""
+    with socket.socket(type=socket.SOCK_DGRAM) as free:
+        free.bind(("127.0.0.1", 0))
+        wire = f"unix:{tmp_path / 'w'}" if kind == "unix" else f"udp:127.0.0.1:{free.getsockname()[1]}"
+    with subprocess.Popen([WIRE_SIM, FIXTURE, wire, "100000", "end"], stderr=subprocess.DEVNULL) as simulator:
+        options = ("--hal", f"wire:{wire}", "--timeout-ms", "30000", "--record", str(tmp_path / "bag"))
+        assert Watched(folder, FIXTURE, *options, peer=True).allocations() == 0
+        simulator.kill()
+
+
+def beside_a_rig(folder: Path, library: str, hello: bytes, path: Path) -> Watched:
+    """Flown beside a rig that answers the hello and says nothing else."""
+    with listening(path) as listener:
+        fc = Watched(folder, library, "--hal", f"wire:unix:{path}", "--timeout-ms", "30000", peer=True)
+        peer, _ = listener.accept()
+        with peer:
+            peer.settimeout(60)
+            assert peer.recv(4096) == hello
+            peer.send(hello)
+            while peer.recv(4096):
+                pass
+    return fc
+
+
+def test_beside_a_rig_that_says_nothing(folder: Path, tmp_path: Path) -> None:
+    hello = control(HELLO, table_hash(TABLE), TICK_HZ)
+    assert beside_a_rig(folder, FIXTURE, hello, tmp_path / "w").allocations() == 0
+
+
 # ---- controls
 
 
@@ -196,6 +234,12 @@ def test_every_policy(folder: Path, policy: str) -> None:
 def test_control_a_system_call_is_found(folder: Path, misdeed: str) -> None:
     code, line = Watched(folder, machine(folder, MISDEEDS[misdeed])).report()
     assert code == FORBIDDEN and "the step thread made system call" in line
+
+
+def test_control_beside_a_rig(folder: Path, tmp_path: Path) -> None:
+    hello = control(HELLO, table_hash([]), 1000)
+    library = machine(folder, MISDEEDS["asks who it is"])
+    assert beside_a_rig(folder, library, hello, tmp_path / "w").report()[0] == FORBIDDEN
 
 
 def test_control_an_allocation_is_found(folder: Path) -> None:

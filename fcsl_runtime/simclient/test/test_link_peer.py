@@ -234,15 +234,16 @@ def test_bytes_that_are_no_frame_are_refused(data: bytes) -> None:
 
 
 @settings(deadline=None)
-@given(data=st.binary(min_size=1, max_size=FRAME_MAX), before=st.binary(max_size=40))
-def test_cobs_is_that_of_the_cobs_package(native: ctypes.CDLL, data: bytes, before: bytes) -> None:
+@given(data=st.binary(min_size=1, max_size=FRAME_MAX), before=st.binary(max_size=40), piece=st.integers(1, 300))
+def test_cobs_is_that_of_the_cobs_package(native: ctypes.CDLL, data: bytes, before: bytes, piece: int) -> None:
     out, decoder = ctypes.create_string_buffer(FRAME_MAX + 8), ctypes.create_string_buffer(4096)
     size = native.fcsl_cobs_encode(data, ctypes.c_size_t(len(data)), out)
     assert out.raw[:size] == cobs.encode(data) + b"\0"
-    found = 0
-    for byte in before + b"\0" + out.raw[:size]:
-        found = native.fcsl_cobs_decode(decoder, ctypes.c_uint8(byte))
-    assert decoder.raw[:found] == data
+    stream, found = before + b"\0" + out.raw[:size], ctypes.c_size_t(0)
+    while stream:
+        some = stream[:piece]
+        stream = stream[native.fcsl_cobs_decode(decoder, some, ctypes.c_size_t(len(some)), ctypes.byref(found)) :]
+    assert decoder.raw[: found.value] == data
 
 
 @given(st.binary(max_size=300))

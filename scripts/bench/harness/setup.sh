@@ -5,8 +5,8 @@ cd "$(dirname "$0")/../../.."
 . scripts/common.sh
 . scripts/apt.sh
 . scripts/underlay.sh
-if ! python3 -c 'import casadi, numba' 2> /dev/null; then
-    progress "peers of make bench (140 MB to download)" \
+if ! python3 -c 'import casadi, numba, pymavlink' 2> /dev/null; then
+    progress "peers of make bench (160 MB to download)" \
         python3 -m pip install --disable-pip-version-check --progress-bar off -c constraints.txt -r scripts/bench/harness/requirements.txt
 fi
 if [ ! -d /usr/include/eigen3 ] || ! type -P cyclictest > /dev/null; then

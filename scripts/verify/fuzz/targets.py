@@ -40,7 +40,20 @@ TARGETS = (
         "message",
         "messages of channels",
         "sockets, ROS 2 ticks",
-        Defect(f"{_HAL}/codec_check.c", "if (end - at < entry->size) {", "if (0) {"),
+        Defect(f"{_HAL}/codec_check.c", "if (behind > end) {", "if (0) {"),
+    ),
+    Target(
+        "cobs",
+        "streams of COBS frames",
+        "serial lines, TCP",
+        Defect(f"{_HAL}/cobs.c", "at < end && size < FCSL_LINK_FRAME_MAX", "at < end"),
+    ),
+    Target(
+        "link",
+        "frames of the link layer",
+        "serial lines, UDP, TCP",
+        Defect(f"{_HAL}/link_outgoing.c", "more > out->sent_max - out->confirmed", "0"),
+        inputs=20_000,
     ),
     Target(
         "hal_wire",

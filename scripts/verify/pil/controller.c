@@ -67,7 +67,9 @@ static void take_byte(void)
 {
     UART[PENDING] = RECEIVED; /* before the byte is taken, and so before the next one can come */
     *INTERRUPT_CLEAR = 1u;
-    const size_t size = fcsl_cobs_decode(&decoder, (uint8_t)UART[DATA]);
+    const uint8_t byte = (uint8_t)UART[DATA];
+    size_t size = 0;
+    (void)fcsl_cobs_decode(&decoder, &byte, sizeof byte, &size);
     if (size > 0) {
         fcsl_link_take_frame(&serial, decoder.frame, size);
     }

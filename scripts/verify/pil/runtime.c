@@ -72,6 +72,17 @@ MEMORY()
 MEMORY(4)
 MEMORY(8)
 
+void *memchr(const void *bytes, int value, size_t size)
+{
+    const uint8_t *in = bytes;
+    for (size_t i = 0; i < size; i++) {
+        if (in[i] == (uint8_t)value) {
+            return (void *)(uintptr_t)(in + i);
+        }
+    }
+    return NULL;
+}
+
 int memcmp(const void *one, const void *other, size_t size)
 {
     const uint8_t *a = one;

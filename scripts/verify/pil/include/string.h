@@ -10,6 +10,7 @@
 void *memcpy(void *restrict to, const void *restrict from, size_t size);
 void *memmove(void *to, const void *from, size_t size);
 void *memset(void *to, int value, size_t size);
+void *memchr(const void *bytes, int value, size_t size);
 int memcmp(const void *one, const void *other, size_t size);
 
 #endif
