@@ -101,9 +101,11 @@ def test_every_host_arms_alike(config: SimConfig, tmp_path: Path) -> None:
     alone = run(config, bag=tmp_path / "alone")
     wire, flight = f"unix:{tmp_path / 'wire'}", tmp_path / "flight"
     line = ["fcsl-fc", str(config.library), "--hal", f"wire:{wire}", "--timeout-ms", "60000", "--record", str(flight)]
-    with subprocess.Popen(line, stdout=subprocess.DEVNULL) as controller:
+    with subprocess.Popen(line, stdout=subprocess.PIPE, text=True) as controller:
         apart = run(config, wire=wire, timeout_ms=60_000)
-        assert controller.wait(timeout=60) == 0
+        said, _ = controller.communicate(timeout=60)
+        assert controller.returncode == 0
+    assert re.findall(r"(\w+) at tick (\d+)", said) == [("armed", str(ON)), ("disarmed", str(OFF))]
     assert apart.truth == alone.truth
     assert digest(tmp_path / "alone") == digest(flight)
     for recorded in (tmp_path / "alone", flight):
