@@ -8,6 +8,7 @@ import json
 import os
 import pty
 import random
+import re
 import selectors
 import socket
 import subprocess
@@ -253,6 +254,14 @@ def test_a_lossy_link_while_time_halts(tmp_path: Path) -> None:
     run("fcsl-sim", "run", SIM, "--record", tmp_path / "direct")
     assert summary["truth"]["line.outputs.dropped"] > 500 and summary["truth"]["line.outputs.repeated"] > 500
     assert digest(tmp_path / "serial") == digest(tmp_path / "direct")
+
+
+def test_the_page_of_testing_names_the_digests(tmp_path: Path) -> None:
+    page = (SIM.parents[3] / "docs/testing.md").read_text()
+    named = dict(re.findall(r"^- ([AB]): `(\w{64})`$", page, re.MULTILINE))
+    run("fcsl-sim", "run", SIM, "--record", tmp_path / "A")
+    simulate(tmp_path / "B", "halts=false", "reliable=false", "delay_s=0.02", "baud=115200")
+    assert {name: digest(tmp_path / name) for name in "AB"} == named
 
 
 @pytest.mark.parametrize(
