@@ -263,17 +263,19 @@ static fcsl_wire_status_t link_send(void *ctx, const uint8_t *message, size_t si
     return FCSL_WIRE_OK;
 }
 
-/* The oldest message, if there is one. */
+/* The oldest message that fits, if there is one. What does not fit is dropped. */
 static fcsl_wire_status_t take(wire_t *wire, uint8_t *message, size_t capacity, size_t *size)
 {
     fcsl_wire_status_t status = FCSL_WIRE_NONE;
     (void)pthread_mutex_lock(&wire->lock);
-    const fcsl_link_status_t got = fcsl_link_receive(&wire->link, PORT, message, capacity, size);
-    if (got == FCSL_LINK_OK) {
-        status = FCSL_WIRE_OK;
-    } else if (got == FCSL_LINK_TOO_LARGE) {
+    fcsl_link_status_t got = fcsl_link_receive(&wire->link, PORT, message, capacity, size);
+    while (got == FCSL_LINK_TOO_LARGE) { /* every turn takes a message out of the port */
         wire->too_large++;
         (void)fcsl_link_receive(&wire->link, PORT, wire->dropped, sizeof wire->dropped, size);
+        got = fcsl_link_receive(&wire->link, PORT, message, capacity, size);
+    }
+    if (got == FCSL_LINK_OK) {
+        status = FCSL_WIRE_OK;
     } else if (wire->gone || (!wire->has_peer && wire->line.listener < 0)) {
         wire->gone = 0;
         status = FCSL_WIRE_CLOSED;
