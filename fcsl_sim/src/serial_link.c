@@ -22,6 +22,7 @@ enum {
     BITS_PER_BYTE = 8
 };
 static const double NS_PER_S = 1e9;
+static const double DURATION_MAX_S = 3600.0;
 
 /* A COBS frame on its way. */
 typedef struct {
@@ -45,6 +46,7 @@ typedef struct {
     way_t ways[ENDS]; /* by the end that sends */
     int64_t now_ns;
     int opened;
+    int halts;        /* as the run began */
     uint64_t no_room; /* messages that the port did not take */
 } state_t;
 
@@ -85,6 +87,13 @@ static void flip_some(fcsl_sim_link_t *link, uint8_t *bytes, uint32_t size)
     link->model->outputs.corrupted += (uint64_t)flipped;
 }
 
+/* An event may have set any number. */
+static int64_t duration_ns(double seconds)
+{
+    const double within = seconds < DURATION_MAX_S ? seconds : DURATION_MAX_S;
+    return seconds > 0.0 ? (int64_t)(within * NS_PER_S) : 0;
+}
+
 /* A frame leaves. What is lost takes its time, too. */
 static void put_on_line(fcsl_sim_link_t *link, way_t *way, const uint8_t *frame, size_t size)
 {
@@ -93,11 +102,11 @@ static void put_on_line(fcsl_sim_link_t *link, way_t *way, const uint8_t *frame,
     flight.size = (uint32_t)fcsl_cobs_encode(frame, size, flight.bytes);
     if (baud > 0.0) {
         const int64_t begun_ns = way->free_ns > link->state.now_ns ? way->free_ns : link->state.now_ns;
-        way->free_ns = begun_ns + (int64_t)((double)(flight.size * BITS_PER_BYTE_ON_LINE) / baud * NS_PER_S);
+        way->free_ns = begun_ns + duration_ns((double)(flight.size * BITS_PER_BYTE_ON_LINE) / baud);
     } else {
         way->free_ns = link->state.now_ns;
     }
-    flight.due_ns = way->free_ns + (int64_t)(link->model->parameters.delay_s * NS_PER_S);
+    flight.due_ns = way->free_ns + duration_ns(link->model->parameters.delay_s);
     link->model->outputs.frames++;
     if (happens(link, link->model->parameters.drop_percent) || way->count == FRAMES_MAX) {
         link->model->outputs.dropped++;
@@ -171,6 +180,7 @@ static void open_ends(fcsl_sim_link_t *link)
                              link->model->parameters.retransmit_ticks);
     }
     meet(link->state.ends);
+    link->state.halts = link->model->parameters.halts;
     link->state.opened = 1;
 }
 
@@ -241,15 +251,21 @@ static const char *send(fcsl_sim_link_t *link, uint32_t from, const fcsl_message
         return "a message of the machine is too long for serial_link";
     }
     state->no_room += sent == FCSL_LINK_FULL;
-    if (!link->model->parameters.halts) {
+    if (!state->halts) {
         return NULL;
     }
+    const uint64_t refused = link->model->outputs.refused;
     uint32_t taken = 0;
     for (uint32_t round = 0; round < ROUNDS_MAX && taken == 0; round++) {
         move_frames(link);
         taken = take_messages(link, 1u - from);
     }
     count(link);
+    if (link->model->outputs.refused != refused) {
+        return "serial_link: a damaged frame passed the CRC-16 of the link, and its message is lost: with `halts` the "
+               "run "
+               "would not be the one without a line. Set `halts` to false, or fewer bit errors";
+    }
     return taken > 0 ? NULL : "serial_link has delivered nothing in 100000 link ticks: is everything lost?";
 }
 
@@ -276,7 +292,7 @@ const char *fcsl_sim_link_command(fcsl_sim_link_t *link, const fcsl_message_t *m
 void fcsl_sim_link_tick(fcsl_sim_link_t *link, int64_t time_ns)
 {
     link->state.now_ns = time_ns;
-    if (!link->model->parameters.halts && link->state.opened) {
+    if (!link->state.halts && link->state.opened) {
         move_frames(link);
         (void)take_messages(link, PLANT);
         (void)take_messages(link, CONTROLLER);

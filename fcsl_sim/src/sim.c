@@ -205,7 +205,10 @@ int fcsl_sim_sense_message(fcsl_sim_t *sim, uint8_t *bytes, size_t capacity, fcs
 void fcsl_sim_take_command(void *context, const fcsl_message_t *command)
 {
     fcsl_sim_t *sim = context;
-    fcsl_gate_command(&sim->gate, command, (uint64_t)sim->time_ns, sim->image);
+    /* Behind a line it is as old as its tick: one from before an outage does not open the gate again. */
+    const int64_t made_ns = fcsl_grid_time_ns(command->tick, sim->machine->tick_hz);
+    fcsl_gate_command(&sim->gate, command, (uint64_t)made_ns, sim->image);
+    fcsl_gate_wait(&sim->gate, (uint64_t)sim->time_ns, sim->image);
 }
 
 static int until_holds(const fcsl_sim_t *sim)

@@ -124,6 +124,19 @@ def test_a_line_that_loses_all_is_told(open_sim: Open) -> None:
         sim.run(1)
 
 
+@pytest.mark.parametrize("value", [-1e300, 1e300, 1e-300])
+@pytest.mark.parametrize("name", ["delay_s", "baud", "drop_percent", "bit_error_percent"])
+def test_events_may_set_any_number(name: str, value: float, open_sim: Open) -> None:
+    """What means nothing does nothing, or stops the line; nothing worse."""
+
+    def change(config: dict[str, Any]) -> None:
+        line(halts=False, reliable=False)(config)
+        config["events"] = [{"at_s": 0.2, "set": f"line.parameters.{name}", "value": value}]
+
+    with open_sim(change) as sim:
+        assert sum(sim.run(1) for _ in range(70)) == 70
+
+
 @pytest.mark.parametrize(
     ("parameters", "text"),
     [
