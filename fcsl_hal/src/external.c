@@ -15,6 +15,8 @@
 
 enum { TEXT_BYTES = 512, SPEC_BYTES = 256, TIME_BYTES = 64 };
 
+static const struct timespec PAUSE = {.tv_nsec = 20 * NS_PER_MS};
+
 struct fcsl_external {
     fcsl_channel_table_t table;
     fcsl_wire_t wire;
@@ -109,6 +111,10 @@ fcsl_hal_status_t fcsl_external_accept(fcsl_external_t *external, uint32_t timeo
             return wire_failed(external);
         }
         if (status == FCSL_WIRE_NONE && monotonic_ns() < deadline_ns) {
+            return FCSL_HAL_NONE;
+        }
+        /* A wire that cannot be connected again says so at once, again and again. */
+        if (status == FCSL_WIRE_CLOSED && nanosleep(&PAUSE, NULL) != 0) {
             return FCSL_HAL_NONE;
         }
         if (status == FCSL_WIRE_OK && control_parse(external->inbox, size, &hello) == 0 &&

@@ -17,7 +17,7 @@ enum {
     TEXT_BYTES = 512,
     SPEC_BYTES = 256,
     LOOK_NS = 20 * NS_PER_MS, /* a wait looks as often whether it is interrupted */
-    MESSAGES_PER_TICK = 16  /* of a rig; what is more waits for the next tick */
+    MESSAGES_MAX = 4096 /* that a tick takes of a rig: more than a buffer holds */
 };
 
 /* What stands under `hal.`; the wire's own counters follow it. */
@@ -54,6 +54,7 @@ typedef struct {
     fcsl_channel_table_t table;
     fcsl_wire_t wire;
     int has_wire;
+    int is_over; /* the peer has ended the run, or is gone */
     int paces;
     uint32_t timeout_ms;
     uint64_t time_ns; /* of the last time message */
@@ -97,6 +98,7 @@ static heard_t judge(hal_t *hal, size_t size, fcsl_message_t *message)
         return HEARD_TIME;
     }
     if (control_parse(hal->inbox, size, &packet) == 0 && packet.kind == CONTROL_END) {
+        hal->is_over = 1;
         return HEARD_END;
     }
     hal->counters.messages_dropped++;
@@ -155,6 +157,7 @@ static fcsl_hal_status_t nothing_came(hal_t *hal, fcsl_wire_status_t status, uin
         return FCSL_HAL_CLOSED;
     }
     if (status == FCSL_WIRE_CLOSED) {
+        hal->is_over = 1;
         (void)snprintf(hal->text, sizeof hal->text, "the simulator went away before tick %" PRIu64, tick);
         return FCSL_HAL_ERROR;
     }
@@ -202,7 +205,9 @@ static fcsl_hal_status_t sample_paced(hal_t *hal, uint64_t tick, uint8_t *bytes,
     while (status == FCSL_HAL_OK) { /* every turn takes a message, or waits and looks at the deadline */
         size_t size = 0;
         const uint64_t look_ns = monotonic_ns() + LOOK_NS;
-        const fcsl_wire_status_t came = receive(hal, look_ns < deadline_ns ? look_ns : deadline_ns, &size);
+        const fcsl_wire_status_t came = atomic_load(&hal->interrupted)
+                                            ? FCSL_WIRE_NONE
+                                            : receive(hal, look_ns < deadline_ns ? look_ns : deadline_ns, &size);
         status = came == FCSL_WIRE_OK ? hear(hal, tick, size, bytes, capacity, message, &sensed)
                                       : nothing_came(hal, came, tick, deadline_ns);
         if (status == FCSL_HAL_OK && monotonic_ns() >= deadline_ns) {
@@ -215,22 +220,33 @@ static fcsl_hal_status_t sample_paced(hal_t *hal, uint64_t tick, uint8_t *bytes,
 
 /* ---- beside a rig -------------------------------------------------------------------------------------------------- */
 
+static void rig_gone(hal_t *hal)
+{
+    if (hal->counters.connected != 0) {
+        hal->counters.connected = 0;
+        wire_log(hal, "the rig is gone");
+    }
+}
+
 static fcsl_hal_status_t sample_newest(hal_t *hal, uint64_t tick, uint8_t *bytes, size_t capacity,
                                        fcsl_message_t *message)
 {
     int sensed = 0;
-    for (int i = 0; i < MESSAGES_PER_TICK; i++) {
+    for (int i = 0; i < MESSAGES_MAX; i++) {
         size_t size = 0;
         fcsl_message_t heard;
         const fcsl_wire_status_t came = receive(hal, 0, &size);
-        if (came == FCSL_WIRE_CLOSED && hal->counters.connected != 0) {
-            hal->counters.connected = 0;
-            wire_log(hal, "the rig is gone");
+        if (came == FCSL_WIRE_CLOSED) {
+            rig_gone(hal);
         }
         if (came != FCSL_WIRE_OK) {
             break;
         }
-        if (judge(hal, size, &heard) == HEARD_SENSORS && heard.size <= capacity) {
+        const heard_t what = judge(hal, size, &heard);
+        if (what == HEARD_END) {
+            rig_gone(hal);
+        }
+        if (what == HEARD_SENSORS && heard.size <= capacity) {
             hal->counters.messages_late += (uint64_t)sensed;
             take(hal, &heard, bytes, message);
             message->tick = tick; /* a rig counts its own */
@@ -257,7 +273,7 @@ static fcsl_hal_status_t wire_sample(void *ctx, uint64_t tick, uint8_t *bytes, s
 static fcsl_hal_status_t peer_gone(hal_t *hal, uint64_t tick)
 {
     int ended = 0;
-    for (int i = 0; i < MESSAGES_PER_TICK && !ended; i++) {
+    for (int i = 0; i < MESSAGES_MAX && !ended; i++) {
         size_t size = 0;
         fcsl_message_t heard;
         if (receive(hal, 0, &size) != FCSL_WIRE_OK) {
@@ -337,7 +353,9 @@ static void wire_close(void *ctx)
 {
     hal_t *hal = ctx;
     if (hal->has_wire) {
-        (void)control_send_end(&hal->wire); /* to nobody, when the simulator is gone */
+        if (!hal->is_over) {
+            (void)control_send_end(&hal->wire); /* where it finds no room, the peer waits for its time-out */
+        }
         hal->wire.close(hal->wire.ctx);
     }
     free(hal->inbox);
@@ -347,16 +365,19 @@ static void wire_close(void *ctx)
 
 /* ---- opening ------------------------------------------------------------------------------------------------------- */
 
-/* Waits for the peer's answer to the hello. */
+/* Waits for the peer's answer to the hello. A rig may still send what was for a controller before this one. */
 static int hear_hello(hal_t *hal, uint64_t deadline_ns, control_packet_t *packet, char *error, size_t error_size)
 {
     fcsl_wire_status_t status = FCSL_WIRE_NONE;
     size_t size = 0;
-    while (status == FCSL_WIRE_NONE && monotonic_ns() < deadline_ns && !atomic_load(&hal->interrupted)) {
+    int answered = 0;
+    while (!answered && status < FCSL_WIRE_CLOSED && monotonic_ns() < deadline_ns && !atomic_load(&hal->interrupted)) {
         const uint64_t look_ns = monotonic_ns() + LOOK_NS;
         status = receive(hal, look_ns < deadline_ns ? look_ns : deadline_ns, &size);
+        answered =
+            status == FCSL_WIRE_OK && control_parse(hal->inbox, size, packet) == 0 && packet->kind != CONTROL_END;
     }
-    if (status == FCSL_WIRE_NONE) {
+    if (!answered && status < FCSL_WIRE_CLOSED) {
         (void)snprintf(error, error_size, "no handshake from the simulator within %" PRIu32 " ms", hal->timeout_ms);
         return -1;
     }
@@ -364,7 +385,7 @@ static int hear_hello(hal_t *hal, uint64_t deadline_ns, control_packet_t *packet
         (void)snprintf(error, error_size, "%s", hal->wire.explain(hal->wire.ctx));
         return -1;
     }
-    if (status != FCSL_WIRE_OK || control_parse(hal->inbox, size, packet) != 0 || packet->kind == CONTROL_END) {
+    if (!answered) {
         (void)snprintf(error, error_size, "the other end of the wire did not answer as a simulator does");
         return -1;
     }

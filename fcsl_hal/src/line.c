@@ -30,7 +30,9 @@ void line_drop(line_t *line)
         (void)close(line->fd);
         line->fd = -1;
     }
+    const uint64_t garbage = line->decoder.garbage;
     memset(&line->decoder, 0, sizeof line->decoder);
+    line->decoder.garbage = garbage;
     line->pending_from = 0;
     line->pending_to = 0;
 }

@@ -34,8 +34,8 @@ int line_open_tcp(line_t *line, const char *address, fcsl_wire_side_t side, uint
 int line_open_uart(line_t *line, const char *device, uint32_t baud, char *error, size_t error_size);
 /* Whether a UART can run at this speed. */
 int line_has_speed(uint32_t baud);
-/* Takes the peer that waits on the listener, if it is still there. */
-void line_accept(line_t *line);
+/* Takes the peer that waits on the listener, in place of the present one. 0, or -1 when there is none now. */
+int line_accept(line_t *line);
 void line_close(line_t *line);
 
 /* The peer is gone. */

@@ -96,10 +96,17 @@ int line_open_tcp(line_t *line, const char *address, fcsl_wire_side_t side, uint
     return 0;
 }
 
-void line_accept(line_t *line)
+int line_accept(line_t *line)
 {
-    line->fd = accept4(line->listener, NULL, NULL, SOCK_CLOEXEC);
-    if (line->fd >= 0 && set_up(line->fd) != 0) {
-        line_drop(line);
+    const int fd = accept4(line->listener, NULL, NULL, SOCK_CLOEXEC);
+    if (fd < 0) {
+        return -1;
     }
+    line_drop(line);
+    if (set_up(fd) != 0) {
+        (void)close(fd);
+        return -1;
+    }
+    line->fd = fd;
+    return 0;
 }

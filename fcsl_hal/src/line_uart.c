@@ -51,6 +51,7 @@ static int set_up(int fd, speed_t speed)
         return -1;
     }
     cfmakeraw(&options);
+    options.c_iflag &= ~(tcflag_t)(IXOFF | IXANY | INPCK);
     options.c_cflag &= ~(tcflag_t)(CSTOPB | CRTSCTS);
     options.c_cflag |= CLOCAL | CREAD | CS8;
     options.c_cc[VMIN] = 1; /* with O_NONBLOCK: no byte is an error, and the end of the line is not */

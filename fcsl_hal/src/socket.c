@@ -135,10 +135,11 @@ int fcsl_socket_connect(const char *path, int type, char *error, size_t error_si
     if (fill_address(path, &address, error, error_size) != 0) {
         return -1;
     }
-    const int fd = socket(AF_UNIX, type | SOCK_CLOEXEC, 0);
+    const int fd = socket(AF_UNIX, type | SOCK_CLOEXEC | SOCK_NONBLOCK, 0);
     if (fd < 0) {
         return fail(fd, "cannot create", path, error, error_size);
     }
+    /* Without waiting: a listener that takes nobody would hold it for ever. */
     if (connect(fd, (const struct sockaddr *)&address, sizeof address) != 0) {
         if (errno == ECONNREFUSED || errno == ENOENT) {
             (void)close(fd);
@@ -146,6 +147,10 @@ int fcsl_socket_connect(const char *path, int type, char *error, size_t error_si
             return -1;
         }
         return fail(fd, "cannot connect to", path, error, error_size);
+    }
+    const int flags = fcntl(fd, F_GETFL);
+    if (flags < 0 || fcntl(fd, F_SETFL, flags & ~O_NONBLOCK) != 0) {
+        return fail(fd, "cannot set up", path, error, error_size);
     }
     return fd;
 }

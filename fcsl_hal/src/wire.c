@@ -8,6 +8,7 @@
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
+#include <sys/un.h>
 
 #include "fcsl/fcsl_address.h"
 #include "monotonic.h"
@@ -64,6 +65,11 @@ static int parse(const char *spec, parsed_t *parsed, char *error, size_t error_s
         if (parsed->kind == KIND_UART) {
             return read_uart(spec, parsed, error, error_size);
         }
+        if (parsed->kind == KIND_UNIX && strlen(parsed->address) >= sizeof((struct sockaddr_un *)0)->sun_path) {
+            (void)snprintf(error, error_size, "socket path '%s' is too long: 1 to %zu bytes are possible",
+                           parsed->address, sizeof((struct sockaddr_un *)0)->sun_path - 1u);
+            return -1;
+        }
         if (parsed->kind != KIND_UNIX && fcsl_address_read(parsed->address, &address, &length) != 0) {
             (void)snprintf(error, error_size, "%s: HOST:PORT must be numbers, like 127.0.0.1:7600", spec);
             return -1;
@@ -114,7 +120,7 @@ int fcsl_wire_open(const char *spec, fcsl_wire_side_t side, size_t message_max, 
     if (open_line(&parsed, side, deadline_ns, &line, error, error_size) != 0) {
         return -1;
     }
-    return fcsl_wire_over_link(&line, message_max, wire, error, error_size);
+    return fcsl_wire_over_link(&line, side, message_max, wire, error, error_size);
 }
 
 int fcsl_wire_pair(size_t message_max, fcsl_wire_t ends[2], char *error, size_t error_size)
@@ -126,12 +132,12 @@ int fcsl_wire_pair(size_t message_max, fcsl_wire_t ends[2], char *error, size_t 
     }
     const line_t first = {.fd = fds[0], .listener = -1, .datagrams = 1};
     const line_t second = {.fd = fds[1], .listener = -1, .datagrams = 1};
-    if (fcsl_wire_over_link(&first, message_max, &ends[0], error, error_size) != 0) {
+    if (fcsl_wire_over_link(&first, FCSL_WIRE_LISTEN, message_max, &ends[0], error, error_size) != 0) {
         line_t owned = second;
         line_close(&owned);
         return -1;
     }
-    if (fcsl_wire_over_link(&second, message_max, &ends[1], error, error_size) != 0) {
+    if (fcsl_wire_over_link(&second, FCSL_WIRE_CONNECT, message_max, &ends[1], error, error_size) != 0) {
         ends[0].close(ends[0].ctx);
         return -1;
     }

@@ -17,11 +17,14 @@
 #include <sys/eventfd.h>
 #include <unistd.h>
 
+#include "link_frame.h"
 #include "monotonic.h"
 
 enum {
     PORT = 0,
-    RETRANSMIT_TICKS = 5,
+    RETRANSMIT_TICKS = 10,
+    RETRANSMIT_TICKS_TCP = 250, /* it loses nothing by itself */
+    WAITING_MAX = 4,            /* messages; in lock-step there are two. Commands that wait longer are of no use */
     TICK_NS = 2 * NS_PER_MS,   /* without anything to send */
     TICK_MIN_NS = NS_PER_MS / 5, /* a burst of messages makes no faster ticks: they count the time to retransmission */
     CLOSE_NS = 300 * NS_PER_MS, /* for the peer to take what was sent last */
@@ -109,7 +112,7 @@ typedef struct {
 /* When the next link tick is due. On a slow line the frames of the last one come first. */
 static uint64_t next_tick_ns(const wire_t *wire, const pump_t *pump)
 {
-    if (pump->sending || !pump->asked) {
+    if (!pump->asked) {
         return pump->ticked_ns + wire->tick_ns;
     }
     return pump->heard ? 0u : pump->ticked_ns + TICK_MIN_NS;
@@ -165,10 +168,13 @@ static void read_line(wire_t *wire, pump_t *pump)
 /* One that only holds a connection keeps nobody out. */
 static void accept_peer(wire_t *wire)
 {
-    line_drop(&wire->line);
-    line_accept(&wire->line);
+    if (line_accept(&wire->line) != 0) {
+        const struct timespec look = {.tv_nsec = LOOK_NS};
+        (void)nanosleep(&look, NULL); /* it is still there to be accepted, perhaps when a descriptor is free */
+        return;
+    }
     (void)pthread_mutex_lock(&wire->lock);
-    wire->has_peer = wire->line.fd >= 0;
+    wire->has_peer = 1;
     wire->spoken = 0;
     (void)pthread_mutex_unlock(&wire->lock);
 }
@@ -192,12 +198,9 @@ static void attend(wire_t *wire, pump_t *pump)
         {.fd = line->fd, .events = (short)(POLLIN | (blocked ? POLLOUT : 0))},
         {.fd = listens ? line->listener : -1, .events = POLLIN}, /* -1 is passed over */
     };
-    uint64_t until_ns = next_tick_ns(wire, pump);
-    if (pump->sending && line->serial) {
-        const uint64_t look_ns = monotonic_ns() + LOOK_NS;
-        until_ns = look_ns < until_ns ? look_ns : until_ns;
-    }
-    const struct timespec left = time_left(until_ns);
+    /* Where the line has no room, no tick is due. */
+    const uint64_t wait_ns = line->serial ? LOOK_NS : wire->tick_ns;
+    const struct timespec left = pump->sending ? timespec_of(wait_ns) : time_left(next_tick_ns(wire, pump));
     if (ppoll(entries, 3, &left, NULL) <= 0) {
         return;
     }
@@ -241,12 +244,26 @@ static void *run(void *argument)
 
 /* ---- the user ------------------------------------------------------------------------------------------------------ */
 
+/* Messages that the peer has not acknowledged as a whole. */
+static uint32_t waiting(const fcsl_link_t *link)
+{
+    const fcsl_link_outgoing_t *out = &link->ports[PORT].out;
+    uint32_t messages = 0;
+    for (uint32_t i = 0; i < out->count; i++) {
+        messages += (out->frames[(out->first + i) % FCSL_LINK_QUEUE].flags & FCSL_LINK_LAST) != 0u;
+    }
+    return messages;
+}
+
 static fcsl_wire_status_t link_send(void *ctx, const uint8_t *message, size_t size)
 {
     wire_t *wire = ctx;
     (void)pthread_mutex_lock(&wire->lock);
     const int closed = wire->gone || (!wire->has_peer && wire->line.listener < 0);
-    const fcsl_link_status_t status = closed ? FCSL_LINK_EMPTY : fcsl_link_send(&wire->link, PORT, message, size);
+    const fcsl_link_status_t status = closed ? FCSL_LINK_EMPTY
+                                      : waiting(&wire->link) >= WAITING_MAX
+                                          ? FCSL_LINK_FULL
+                                          : fcsl_link_send(&wire->link, PORT, message, size);
     wire->spoken = 1;
     (void)pthread_mutex_unlock(&wire->lock);
     if (closed) {
@@ -395,14 +412,17 @@ static int start(wire_t *wire)
 }
 
 /* Differs from start to start, of one program and of several: the nanoseconds and the process number, mixed. */
-static uint16_t new_session(void)
+static uint16_t new_session(fcsl_wire_side_t side)
 {
     uint64_t mixed = (monotonic_ns() ^ ((uint64_t)getpid() << 32u)) * UINT64_C(0x9E3779B97F4A7C15);
-    mixed >>= 48u;
-    return mixed != 0u ? (uint16_t)mixed : 1u;
+    const uint16_t session = (uint16_t)(mixed >> 48u);
+    /* The two ends never take the same one. */
+    return side == FCSL_WIRE_LISTEN ? (uint16_t)((session & 0xfffeu) | (session < 2u ? 2u : 0u))
+                                    : (uint16_t)(session | 1u);
 }
 
-int fcsl_wire_over_link(const line_t *line, size_t message_max, fcsl_wire_t *wire, char *error, size_t error_size)
+int fcsl_wire_over_link(const line_t *line, fcsl_wire_side_t side, size_t message_max, fcsl_wire_t *wire, char *error,
+                        size_t error_size)
 {
     fcsl_link_policy_t policies[FCSL_LINK_PORTS] = {[PORT] = FCSL_LINK_RELIABLE};
     const size_t most = FCSL_LINK_BUFFER - FCSL_LINK_SIZE_BYTES;
@@ -419,13 +439,16 @@ int fcsl_wire_over_link(const line_t *line, size_t message_max, fcsl_wire_t *wir
         }
         return -1;
     }
+    const int stream = !line->datagrams && !line->serial;
     self->line = *line;
     self->has_peer = line->fd >= 0;
     self->tick_ns = line->frame_ns > TICK_NS ? line->frame_ns : TICK_NS;
     self->wake = eventfd(0, EFD_CLOEXEC | EFD_NONBLOCK);
     self->news = eventfd(0, EFD_CLOEXEC | EFD_NONBLOCK);
     if (self->wake < 0 || self->news < 0 ||
-        fcsl_link_open(&self->link, policies, new_session(), RETRANSMIT_TICKS) != 0 || start(self) != 0) {
+        fcsl_link_open(&self->link, policies, new_session(side), stream ? RETRANSMIT_TICKS_TCP : RETRANSMIT_TICKS) !=
+            0 ||
+        start(self) != 0) {
         release(self);
         (void)snprintf(error, error_size, "cannot start the thread of the wire: %s", strerror(errno));
         return -1;

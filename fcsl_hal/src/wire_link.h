@@ -9,6 +9,7 @@ extern const fcsl_wire_counters_t fcsl_wire_link_counters;
 
 /* A wire of messages of up to `message_max` bytes over a reliable port of a link on this line, which it owns from here on, also
  * when it fails. 0, or -1 with `error` filled. */
-int fcsl_wire_over_link(const line_t *line, size_t message_max, fcsl_wire_t *wire, char *error, size_t error_size);
+int fcsl_wire_over_link(const line_t *line, fcsl_wire_side_t side, size_t message_max, fcsl_wire_t *wire, char *error,
+                        size_t error_size);
 
 #endif /* FCSL_WIRE_LINK_H */

@@ -115,16 +115,19 @@ static fcsl_wire_status_t take_peer(wire_t *wire)
 /* Takes the packet that waits, if there is one. */
 static fcsl_wire_status_t take_packet(wire_t *wire, uint8_t *message, size_t capacity, size_t *size)
 {
-    const ssize_t got = recv(wire->fd, message, capacity, MSG_DONTWAIT | MSG_TRUNC);
+    ssize_t got = recv(wire->fd, message, capacity, MSG_DONTWAIT | MSG_TRUNC);
+    if (got < 0 && errno == ECONNRESET) { /* comes before what the peer has sent last */
+        got = recv(wire->fd, message, capacity, MSG_DONTWAIT | MSG_TRUNC);
+    }
+    while (got > 0 && (size_t)got > capacity) { /* every turn takes a packet out of the socket */
+        wire->counters.too_large++;
+        got = recv(wire->fd, message, capacity, MSG_DONTWAIT | MSG_TRUNC);
+    }
     if (got < 0 && (errno == EAGAIN || errno == EWOULDBLOCK || errno == EINTR)) {
         return FCSL_WIRE_NONE;
     }
     if (got <= 0) {
         return drop_peer(wire);
-    }
-    if ((size_t)got > capacity) {
-        wire->counters.too_large++;
-        return FCSL_WIRE_NONE;
     }
     *size = (size_t)got;
     return FCSL_WIRE_OK;

@@ -19,7 +19,7 @@ def run_example(page: str, file: str, macro: str, program: Path, folder: Path) -
     text = (HAL.parent / "docs" / page).read_text()
     (source,) = re.findall(rf"<!-- file: {re.escape(file)} -->\n```c\n(.*?)```", text, re.DOTALL)
     (folder / file).write_text(source)
-    library = Path(os.environ["FCSL_TEST_PROGRAMS"]) / "libfcsl_hal.a"
+    library = Path(os.environ.get("FCSL_TEST_PROGRAMS", HAL.parent / "build/fcsl_hal")) / "libfcsl_hal.a"
     includes = [f"-I{path}" for path in (*include_dirs(), HAL / "include", HAL / "test")]
     define = f'-D{macro}="{folder / file}"'
     out = folder / "program"

@@ -290,6 +290,19 @@ static void test_actuator_timeout_names_the_tick(void)
     join(child);
 }
 
+/* The simulator ends with a command unread: the system tells of that before what was sent last. */
+static void test_end_with_a_command_unread(void)
+{
+    uint8_t bytes[MESSAGE_BYTES];
+    fcsl_external_t *external = listen_here();
+    const pid_t child = start_controller(&MACHINE, WAIT_MS, FCSL_HAL_CLOSED, "ended the run at tick 1");
+    CHECK(fcsl_external_accept(external, WAIT_MS) == FCSL_HAL_OK);
+    CHECK(send_bytes(external, 0, bytes, sensor_message(0, bytes)) == FCSL_HAL_OK);
+    (void)usleep(200000); /* so that it is there; without it this finds nothing, and passes */
+    fcsl_external_close(external);
+    join(child);
+}
+
 static void test_no_controller(void)
 {
     fcsl_external_t *external = listen_here();
@@ -518,6 +531,19 @@ static void test_socket_paths(void)
     CHECK(fcsl_socket_listen(path, SOCK_STREAM, 1, error, sizeof error) < 0 && strstr(error, "in use") != NULL);
     fcsl_external_close(external);
 
+    /* A listener that takes nobody holds nobody for ever. */
+    const int listener = fcsl_socket_listen(path, SOCK_STREAM, 1, error, sizeof error);
+    CHECK(listener >= 0);
+    int refused = 0;
+    for (int i = 0; i < 8; i++) {
+        const int fd = fcsl_socket_connect(path, SOCK_STREAM, error, sizeof error);
+        refused += fd < 0;
+        if (fd >= 0) {
+            (void)close(fd);
+        }
+    }
+    CHECK(refused > 0 && close(listener) == 0 && unlink(path) == 0);
+
     FILE *file = fopen(path, "w");
     CHECK(file != NULL && fclose(file) == 0);
     CHECK(fcsl_socket_listen(path, SOCK_STREAM, 1, error, sizeof error) < 0 && strstr(error, "not a socket") != NULL);
@@ -566,6 +592,7 @@ int main(void)
     test_controller_may_start_first();
     test_time_timeout_names_the_tick();
     test_actuator_timeout_names_the_tick();
+    test_end_with_a_command_unread();
     test_no_controller();
     test_no_simulator();
     test_killed_simulator();

@@ -68,7 +68,10 @@ int main(void)
     int up[2];
     int status = 0;
     CHECK(pipe2(down, O_CLOEXEC) == 0 && pipe2(up, O_CLOEXEC) == 0);
-    CHECK(fcntl(down[0], F_SETFL, O_NONBLOCK) == 0 && fcntl(up[0], F_SETFL, O_NONBLOCK) == 0);
+    const int ends[] = {down[0], down[1], up[0], up[1]};
+    for (size_t i = 0; i < sizeof ends / sizeof ends[0]; i++) {
+        CHECK(fcntl(ends[i], F_SETFL, O_NONBLOCK) == 0);
+    }
     const pid_t child = fork();
     CHECK(child >= 0);
     if (child == 0) {

@@ -69,10 +69,13 @@ int hal_topic_open(hal_topic_t *topic, const fcsl_hal_t *hal, fcsl_run_t *run, c
         return 0;
     }
     const int bytes = snprintf(name, sizeof name, "%s%s/hal", name_space[0] != '\0' ? "/" : "", name_space);
+    if (bytes < 0 || (size_t)bytes >= sizeof name) {
+        return fcsl_fail(error, "the namespace is too long for the topic of the HAL");
+    }
     char *schema = make_schema(hal);
     topic->size = 64u + sizeof(uint64_t) * (hal->field_count + 2u);
     topic->cdr = calloc(1, topic->size);
-    if (schema == NULL || topic->cdr == NULL || bytes < 0 || (size_t)bytes >= sizeof name) {
+    if (schema == NULL || topic->cdr == NULL) {
         free(schema);
         return fcsl_fail(error, "out of memory for the topic of the HAL");
     }

@@ -132,7 +132,11 @@ static int open_hardware(program_t *program)
     if (loop->hal.serves && fcsl_run_attach(loop->run, &error) != 0) {
         return complain(error.text);
     }
-    loop->realtime = program->options.realtime && !loop->hal.paces;
+    if (program->options.missed_deadline_given && loop->hal.paces) {
+        return complain("--missed-deadline is for ticks that the clock paces; here the simulator paces them");
+    }
+    /* Beside a rig there is but one time. */
+    loop->realtime = (program->options.realtime || loop->hal.serves) && !loop->hal.paces;
     if (loop->realtime && !program->options.no_overrun_check) {
         /* Only here: in lock-step a clock would make the results depend on the computer. */
         fcsl_run_set_clock(loop->run, fcsl_run_monotonic_ns, NULL);
@@ -266,7 +270,7 @@ static int close_all(program_t *program)
     loop_t *loop = &program->loop;
     fcsl_vars_close(loop->vars);
     fcsl_telemetry_close(loop->telemetry);
-    /* Before the machine is unloaded: the HAL's thread reads its channel table. */
+    /* Before the machine is unloaded: the HAL reads its channel table. */
     if (loop->hal.close != NULL) {
         loop->hal.close(loop->hal.ctx);
     }

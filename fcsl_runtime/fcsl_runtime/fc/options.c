@@ -227,7 +227,6 @@ static int read_option(const entry_t *entry, const char *text, options_t *option
 /* Options that say nothing together. */
 static int check(const options_t *options)
 {
-    const int paced = options->realtime && options->wire == NULL;
     if (options->paused && options->socket == NULL) {
         return complain("--paused needs --socket: only commands make ticks then", "");
     }
@@ -255,9 +254,8 @@ static int check(const options_t *options)
     if (options->telemetry_fields != NULL && options->telemetry == NULL) {
         return complain("--telemetry-fields needs --telemetry", "");
     }
-    if (options->missed_deadline_given && !paced) {
-        return complain(
-            "--missed-deadline is for ticks that the clock paces: it goes with neither --rate max nor --hal wire", "");
+    if (options->missed_deadline_given && !options->realtime) {
+        return complain("--missed-deadline is for ticks that the clock paces: it does not go with --rate max", "");
     }
     if (options->priority > 0 && !options->realtime && options->wire == NULL) {
         return complain(

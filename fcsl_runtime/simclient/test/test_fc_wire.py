@@ -75,6 +75,16 @@ def test_killed_simulator(tmp_path: Path) -> None:
     assert code == 1 and "went away before tick 9" in err
 
 
+def test_a_simulator_that_paces_leaves_no_deadline_to_miss(tmp_path: Path) -> None:
+    wire = tmp_path / "wire"
+    with (
+        simulator(wire, 9, "end"),
+        flying("--hal", f"wire:unix:{wire}", "--timeout-ms", "20000", "--missed-deadline", "skip") as fc,
+    ):
+        code, _, err = fc.wait()
+    assert code == 1 and "here the simulator paces them" in err
+
+
 @pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGTERM])
 def test_signal_while_waiting(tmp_path: Path, number: int) -> None:
     wire = tmp_path / "wire"
@@ -162,13 +172,15 @@ def test_a_rig_that_sends_no_time_leaves_the_clock_to_the_controller(tmp_path: P
         peer.send(control(HELLO, table_hash(TABLE), TICK_HZ))
         first = decode(peer.recv(4096), Kind.ACTUATORS, TABLE)
         assert first.tick == 0  # nothing was sensed yet
-        peer.send(encode(Message(Kind.SENSORS, 12345, {257: (1.5, 0.0, 0.0), 258: (False,)}), TABLE))
+        for number in range(100):  # faster than the ticks: the newest counts
+            rate = 1.5 if number == 99 else 0.0
+            peer.send(encode(Message(Kind.SENSORS, 12345 + number, {257: (rate, 0.0, 0.0), 258: (False,)}), TABLE))
         while decode(peer.recv(4096), Kind.ACTUATORS, TABLE).values[513] != (3.0,):
             pass
         client = fc.client(variables)
         assert (client.get("hal.connected"), client.get("hal.messages"), client.get("hal.messages_dropped")) == (
             1,
-            1,
+            100,
             0,
         )
         peer.close()
