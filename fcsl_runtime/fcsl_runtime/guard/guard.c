@@ -56,26 +56,26 @@ static void refuse(guard_t *guard, const char *why)
     guard->refusal = why;
 }
 
-/* The slot is written by another process: nothing in it is believed. A command counts from when it was written, so one that
- * waited for a guard that was late is old. */
+/* The slot is written by another process: nothing in it is believed. A command counts from when its tick began, so one
+ * that waited in the flight program, or for a guard that was late, is old. */
 static void take_command(guard_t *guard)
 {
     size_t size = 0;
-    uint64_t written_ns = 0;
+    uint64_t begun_ns = 0;
     fcsl_message_t message;
-    if (!fcsl_guard_take(&guard->server, guard->bytes, &size, &written_ns)) {
+    if (!fcsl_guard_take(&guard->server, guard->bytes, &size, &begun_ns)) {
         return;
     }
     const fcsl_message_status_t status =
         fcsl_message_check(&guard->table, FCSL_ACTUATOR_MESSAGE, guard->bytes, size, &message);
     if (status != FCSL_MESSAGE_OK) {
         refuse(guard, fcsl_message_status_text(status));
-    } else if (written_ns > fcsl_run_monotonic_ns(NULL)) {
+    } else if (begun_ns > fcsl_run_monotonic_ns(NULL)) {
         refuse(guard, "its time is in the future");
     } else {
         guard->commands++;
         guard->tick = message.tick;
-        fcsl_gate_command(&guard->gate, &message, written_ns, guard->data);
+        fcsl_gate_command(&guard->gate, &message, begun_ns, guard->data);
     }
 }
 

@@ -98,6 +98,19 @@ def test_a_step_that_hangs(guard: Guard, library: Path, tmp_path: Path) -> None:
         assert fc.process.poll() is None and client.get("pilot.outputs.armed") is True
 
 
+def test_stop_in_the_middle_of_a_step(guard: Guard, library: Path, tmp_path: Path) -> None:
+    """Its command comes after SIGCONT, and is as old as the sensors that it was computed from."""
+    with armed_flight(guard, library, tmp_path) as (fc, client):
+        client.ok("set", values={"pilot.outputs.force": -77.0, "pilot.state.stop": True})
+        os.waitid(os.P_PID, fc.process.pid, os.WSTOPPED | os.WNOWAIT)
+        time.sleep(TIMEOUT_S)  # the age that the guard has to notice
+        guard.wait_last(SAFE)
+        fc.process.send_signal(signal.SIGCONT)
+        wait_for(lambda: client.get("pilot.state.hang"))  # published after the command was written
+        guard.stays_safe()
+        assert -77.0 not in {write.values["number"] for write in guard.writes()}
+
+
 def test_a_pause(guard: Guard, library: Path, tmp_path: Path) -> None:
     with armed_flight(guard, library, tmp_path) as (_, client):
         client.ok("pause")
@@ -142,7 +155,7 @@ NONSENSE: dict[str, tuple[Callable[[Slot], None], str]] = {
     "an impossible size": (lambda s: s.write(GOOD, size=2**64 - 1), "truncated"),
     "a size beyond the slot": (lambda s: s.write(GOOD, size=len(s.memory)), "truncated"),
     "a command from the future": (
-        lambda s: s.write(GOOD, written_ns=time.monotonic_ns() + FUTURE_S * 10**9), "its time is in the future"
+        lambda s: s.write(GOOD, begun_ns=time.monotonic_ns() + FUTURE_S * 10**9), "its time is in the future"
     ),
     "all bits": (lambda s: s.write(b"\xff" * len(GOOD)), "it does not begin as a message of this kind"),
 }  # fmt: skip
@@ -173,7 +186,7 @@ def test_nonsense_is_refused(guard: Guard, what: str) -> None:
 def test_an_old_command_is_no_command(guard: Guard) -> None:
     """One that was written longer ago than the time-out: the guard was late, or the writer."""
     slot = Slot(guard.slot)
-    slot.write(command(COMMAND["number"]), written_ns=time.monotonic_ns() - int((TIMEOUT_S + 1) * 1e9))
+    slot.write(command(COMMAND["number"]), begun_ns=time.monotonic_ns() - int((TIMEOUT_S + 1) * 1e9))
     guard.wait_line("silent")
     slot.close()
     assert all(write.values == SAFE for write in guard.writes())
