@@ -61,7 +61,7 @@ static void copy(const fcsl_guard_server_t *server, uint8_t *bytes, size_t *size
 
 int fcsl_guard_take(fcsl_guard_server_t *server, uint8_t *bytes, size_t *size, uint64_t *begun_ns)
 {
-    for (int i = 0; i < TRIES; i++) {
+    for (int i = 0; i < TRIES && server->client >= 0; i++) {
         const uint64_t sequence = atomic_load_explicit(&server->slot->sequence, memory_order_acquire);
         if (sequence == server->taken || (sequence & 1u) != 0u) {
             return 0;

@@ -85,7 +85,7 @@ int fcsl_guard_listen(const char *path, const fcsl_machine_t *machine, fcsl_guar
 /* Whether a flight program has come or gone; at most one event per call. Does not wait. */
 fcsl_guard_event_t fcsl_guard_look(fcsl_guard_server_t *server);
 /* Copies a command that was not taken before to `bytes` (server->capacity of them), unchecked, and sets *size and *begun_ns.
- * Returns 1, or 0 when there is none, or none whole. A size that no slot can hold is 0. Does not wait. */
+ * Returns 1, or 0 when there is none, none whole, or nobody has the slot. A size that no slot can hold is 0. Does not wait. */
 int fcsl_guard_take(fcsl_guard_server_t *server, uint8_t *bytes, size_t *size, uint64_t *begun_ns);
 /* Closes all, and unlinks the socket. */
 void fcsl_guard_unlisten(fcsl_guard_server_t *server);

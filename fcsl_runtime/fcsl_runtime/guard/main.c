@@ -75,6 +75,11 @@ static int open_machine(program_t *program, fcsl_error_t *error)
     return guard_open(&program->guard, machine, error);
 }
 
+static uint64_t period_of(const options_t *options)
+{
+    return options->period_ms * 1000000u;
+}
+
 static int open_outputs(program_t *program, fcsl_error_t *error)
 {
     const options_t *options = &program->options;
@@ -83,8 +88,12 @@ static int open_outputs(program_t *program, fcsl_error_t *error)
     if (program->plan == NULL) {
         return fcsl_fail(error, "out of memory for the plan");
     }
-    if (plan_read(guard->machine, options->actuators, options->actuator_count, program->plan, error) != 0 ||
-        outputs_open(guard->machine, program->plan, options->actuator_count, &guard->outputs, error) != 0) {
+    if (plan_read(guard->machine, options->actuators, options->actuator_count, program->plan, error) != 0) {
+        return -1;
+    }
+    if (outputs_open(guard->machine, program->plan, options->actuator_count, &guard->outputs, error) != 0) {
+        /* The devices that are there may still do what a guard that died has left. */
+        (void)guard_end(guard, period_of(options));
         return -1;
     }
     /* Before a flight program gets the slot. */
@@ -137,7 +146,7 @@ static void wait_period(program_t *program, uint64_t period_ns, uint64_t *due_ns
 
 static int run(program_t *program)
 {
-    const uint64_t period_ns = program->options.period_ms * 1000000u;
+    const uint64_t period_ns = period_of(&program->options);
     uint64_t due_ns = fcsl_run_monotonic_ns(NULL);
     announce(program);
     while (stop == 0) {
@@ -145,7 +154,7 @@ static int run(program_t *program)
         report_changes(&program->report, &program->guard, fcsl_run_monotonic_ns(NULL));
         wait_period(program, period_ns, &due_ns);
     }
-    const uint32_t failed = guard_make_safe(&program->guard);
+    const uint32_t failed = guard_end(&program->guard, period_ns);
     report_end(&program->guard);
     if (failed > 0u) {
         log_error("%" PRIu32 " of %" PRIu32 " devices did not take their safe values at the end", failed,
