@@ -14,6 +14,7 @@
 #include "fcsl/fcsl_library.h"
 #include "guard_options.h"
 #include "log.h"
+#include "printing.h"
 #include "realtime.h"
 #include "report.h"
 
@@ -37,19 +38,29 @@ static void on_signal(int number)
     stop = 1;
 }
 
-/* Signals end the loop; a terminal that is gone does not end what nohup started. */
+/* Every signal that would end the process ends the loop, and so the process with safe values; one that would stop it is
+ * ignored. Not those of a defect (SIGSEGV, SIGABRT, …), and nothing helps against SIGKILL and SIGSTOP. A terminal that is gone
+ * does not end what nohup started. */
 static void take_signals(void)
 {
+    static const int ending[] = {SIGTERM, SIGINT,    SIGQUIT, SIGUSR1, SIGUSR2, SIGALRM,
+                                 SIGPROF, SIGVTALRM, SIGXCPU, SIGPWR,  SIGPOLL, SIGSTKFLT};
+    /* SIGPIPE, SIGXFSZ: what they are about is an error of the call that could not write. */
+    static const int ignored[] = {SIGTSTP, SIGTTIN, SIGTTOU, SIGPIPE, SIGXFSZ};
     const struct sigaction action = {.sa_handler = on_signal};
     struct sigaction hangup;
-    (void)sigaction(SIGTERM, &action, NULL);
-    (void)sigaction(SIGINT, &action, NULL);
+    for (size_t i = 0; i < sizeof ending / sizeof ending[0]; i++) {
+        (void)sigaction(ending[i], &action, NULL);
+    }
+    for (int number = SIGRTMIN; number <= SIGRTMAX; number++) {
+        (void)sigaction(number, &action, NULL);
+    }
+    for (size_t i = 0; i < sizeof ignored / sizeof ignored[0]; i++) {
+        (void)signal(ignored[i], SIG_IGN);
+    }
     if (sigaction(SIGHUP, NULL, &hangup) == 0 && hangup.sa_handler != SIG_IGN) {
         (void)sigaction(SIGHUP, &action, NULL);
     }
-    /* What they are about is an error of the call that could not write. */
-    (void)signal(SIGPIPE, SIG_IGN);
-    (void)signal(SIGXFSZ, SIG_IGN);
 }
 
 static int complain(const char *text)
@@ -112,7 +123,8 @@ static int open_all(program_t *program)
     /* The slot before the devices: those of a guard that has it already are left alone. */
     if (realtime_begin(&program->realtime, &error) != 0 || open_machine(program, &error) != 0 ||
         fcsl_guard_listen(options->slot, guard->machine, &guard->server, error.text, sizeof error.text) != 0 ||
-        open_outputs(program, &error) != 0 || realtime_enter(&program->realtime, &error) != 0) {
+        open_outputs(program, &error) != 0 || printing_start(&error) != 0 ||
+        realtime_enter(&program->realtime, &error) != 0) {
         return complain(error.text);
     }
     return 0;
@@ -157,16 +169,17 @@ static int run(program_t *program)
     const uint32_t failed = guard_end(&program->guard, period_ns);
     report_end(&program->guard);
     if (failed > 0u) {
-        log_error("%" PRIu32 " of %" PRIu32 " devices did not take their safe values at the end", failed,
-                  program->guard.outputs.device_count);
+        print_error("%" PRIu32 " of %" PRIu32 " devices did not take their safe values at the end", failed,
+                    program->guard.outputs.device_count);
         return EXIT_GUARD;
     }
-    log_info("the actuators have their safe values");
+    print_info("the actuators have their safe values");
     return 0;
 }
 
 static void close_all(program_t *program)
 {
+    printing_end();
     fcsl_guard_unlisten(&program->guard.server);
     outputs_close(&program->guard.outputs);
     guard_free(&program->guard);

@@ -223,6 +223,25 @@ def test_the_guard_ends_with_safe_values(patient: Path, tmp_path: Path) -> None:
     assert not guard.slot.exists()
 
 
+@pytest.mark.parametrize(
+    "name", ["SIGINT", "SIGQUIT", "SIGUSR1", "SIGUSR2", "SIGALRM", "SIGXCPU", "SIGPWR", "SIGRTMAX"]
+)
+def test_every_signal_that_ends_the_guard_leaves_safe_values(patient: Path, tmp_path: Path, name: str) -> None:
+    with guarding(patient, tmp_path) as guard:
+        slot = Slot(guard.slot)
+        slot.write(command(COMMAND["number"]))
+        guard.wait_last(COMMAND)
+        assert guard.end(signal.Signals[name]) == 0
+        assert guard.last() == SAFE
+        slot.close()
+
+
+def test_no_terminal_stops_the_guard(guard: Guard) -> None:
+    status = Path(f"/proc/{guard.process.pid}/status").read_text()
+    ignored = int(re.search(r"SigIgn:\s*(\w+)", status)[1], 16)  # type: ignore[index]
+    assert all(ignored >> (number - 1) & 1 for number in (signal.SIGTSTP, signal.SIGTTIN, signal.SIGTTOU))
+
+
 def test_a_killed_guard_leaves_the_last_command(patient: Path, tmp_path: Path) -> None:
     """The limit of it, stated in docs/guard.md: only the device or a hardware watchdog can do something then. A guard that
     starts again writes safe values first, and the flight program must be started again, too."""

@@ -11,7 +11,7 @@ from pathlib import Path
 
 import pytest
 from conftest import CFLAGS, ROOT
-from guarding import Slot, command, guarding, log_writes, wait_for
+from guarding import COMMAND, SAFE, Guard, Slot, command, guarding, log_writes, wait_for
 from native import GUARD
 
 #: A library of drivers, and the defects that a macro puts into the first one. The device is a file that must exist.
@@ -268,6 +268,51 @@ def test_the_last_safe_values_are_tried_again(
         process.communicate()
     assert process.returncode == 0 and out.endswith("fcsl-guard: the actuators have their safe values\n")
     slot.close()
+
+
+#: Preloaded: what is printed hangs while there is a file with the name in HANGS, as on a disk that does not answer.
+HANG = """
+#define _GNU_SOURCE
+#include <stdlib.h>
+#include <sys/syscall.h>
+#include <unistd.h>
+
+ssize_t write(int fd, const void *data, size_t size)
+{
+    while ((fd == STDOUT_FILENO || fd == STDERR_FILENO) && access(getenv("HANGS"), F_OK) == 0) {
+        (void)pause();
+    }
+    return syscall(SYS_write, fd, data, size);
+}
+"""
+
+
+def test_printing_that_hangs(library: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """It keeps the guard neither from making the actuators safe nor from ending."""
+    source, preloaded, hangs = tmp_path / "hang.c", tmp_path / "hang.so", tmp_path / "hangs"
+    source.write_text(HANG)
+    subprocess.run(["cc", *CFLAGS, str(source), "-o", str(preloaded)], check=True)
+    with monkeypatch.context() as patch:
+        patch.setenv("HANGS", str(hangs))
+        patch.setenv("LD_PRELOAD", str(preloaded))
+        guard = Guard(library, tmp_path)
+    try:
+        hangs.touch()
+        slot = Slot(guard.slot)
+
+        def arm() -> bool:
+            slot.write(command(COMMAND["number"]))
+            return guard.last() == COMMAND
+
+        for _ in range(2):
+            wait_for(arm)
+            guard.wait_last(SAFE)
+        wait_for(arm)
+        assert guard.end() == 0 and guard.last() == SAFE
+        assert not guard.told("armed")
+        slot.close()
+    finally:
+        guard.end(signal.SIGKILL)
 
 
 def test_writes_that_fail_are_counted_and_told(library: Path, drivers: Path, tmp_path: Path) -> None:
