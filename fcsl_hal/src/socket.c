@@ -13,11 +13,13 @@
 #include <sys/file.h>
 #include <sys/socket.h>
 #include <sys/stat.h>
+#include <sys/time.h>
 #include <sys/un.h>
 #include <time.h>
 #include <unistd.h>
 
 /* A program that starts holds the folder for microseconds; 2 s is for one that was stopped in between. */
+enum { CONNECT_S = 2 };
 enum { LOCK_TRIES = 200, LOCK_LOOK_NS = 10000000 };
 
 static int fill_address(const char *path, struct sockaddr_un *address, char *error, size_t error_size)
@@ -136,7 +138,9 @@ int fcsl_socket_connect(const char *path, int type, char *error, size_t error_si
         return -1;
     }
     const int fd = socket(AF_UNIX, type | SOCK_CLOEXEC, 0);
-    if (fd < 0) {
+    /* Who listens and does not accept fills its queue: connect would then wait for good. */
+    const struct timeval patience = {.tv_sec = CONNECT_S};
+    if (fd < 0 || setsockopt(fd, SOL_SOCKET, SO_SNDTIMEO, &patience, sizeof patience) != 0) {
         return fail(fd, "cannot create", path, error, error_size);
     }
     if (connect(fd, (const struct sockaddr *)&address, sizeof address) != 0) {
@@ -145,6 +149,10 @@ int fcsl_socket_connect(const char *path, int type, char *error, size_t error_si
             (void)snprintf(error, error_size, "nobody listens on socket '%s'", path);
             return -1;
         }
+        return fail(fd, "cannot connect to", path, error, error_size);
+    }
+    const struct timeval for_good = {0};
+    if (setsockopt(fd, SOL_SOCKET, SO_SNDTIMEO, &for_good, sizeof for_good) != 0) {
         return fail(fd, "cannot connect to", path, error, error_size);
     }
     return fd;

@@ -259,6 +259,11 @@ static int check(const options_t *options)
         return complain(
             "--missed-deadline is for ticks that the clock paces: it goes with neither --rate max nor --hal wire", "");
     }
+    if (options->guard != NULL && !options->realtime && options->wire == NULL) {
+        return complain(
+            "--guard with --rate max would move real actuators faster than the machine's time; use --rate realtime",
+            "");
+    }
     if (options->priority > 0 && !options->realtime && options->wire == NULL) {
         return complain(
             "--realtime-priority with --rate max would leave no processor to anything else; use --rate realtime", "");

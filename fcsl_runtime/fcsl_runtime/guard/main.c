@@ -69,6 +69,11 @@ static int complain(const char *text)
     return -1;
 }
 
+static uint64_t period_of(const options_t *options)
+{
+    return options->period_ms * 1000000u;
+}
+
 static int open_machine(program_t *program, fcsl_error_t *error)
 {
     const options_t *options = &program->options;
@@ -76,19 +81,17 @@ static int open_machine(program_t *program, fcsl_error_t *error)
     if (machine == NULL || guard_check_machine(machine, error) != 0) {
         return -1;
     }
-    if (options->period_ms * 1000000u > machine->command_timeout_ns) {
-        return fcsl_fail(error,
-                         "--period-ms %" PRIu64
-                         " is more than the %.6g ms for which actuators of machine '%.100s' keep "
-                         "a command",
-                         options->period_ms, (double)machine->command_timeout_ns / 1e6, machine->name);
+    /* A command is a tick old when the next one is begun, and taken a period later, with one to spare. */
+    const uint64_t least_ns = 1000000000u / machine->tick_hz + 2u * period_of(options);
+    if (machine->command_timeout_ns < least_ns) {
+        return fcsl_fail(
+            error,
+            "the actuators of machine '%.100s' keep a command for %.6g ms, less than a tick and two periods "
+            "(%.6g ms): they would be safe now and then in every flight. Write a longer "
+            "\"command_timeout_s\" in its JSON, or a shorter --period-ms",
+            machine->name, (double)machine->command_timeout_ns / 1e6, (double)least_ns / 1e6);
     }
     return guard_open(&program->guard, machine, error);
-}
-
-static uint64_t period_of(const options_t *options)
-{
-    return options->period_ms * 1000000u;
 }
 
 static int open_outputs(program_t *program, fcsl_error_t *error)

@@ -68,7 +68,7 @@ static void report_counts(report_t *report, const guard_t *guard, uint64_t now_n
         print_error("refused a command: %s (%" PRIu64 " so far)", guard->refusal, guard->refused);
     }
     if (is_due(&report->turned_away, guard->turned_away, now_ns)) {
-        print_error("turned away a flight program: another one has the slot (%" PRIu64 " so far)", guard->turned_away);
+        print_error("turned away a process: a flight program has the slot (%" PRIu64 " so far)", guard->turned_away);
     }
     if (is_due(&report->missed, outputs_missed(&guard->outputs), now_ns)) {
         report_missed(&guard->outputs);

@@ -3,14 +3,16 @@
 
 from __future__ import annotations
 
+import contextlib
+import json
 import os
 import re
 import signal
+import socket
 import subprocess
 import sys
 import time
 from collections.abc import Callable, Iterator
-from contextlib import contextmanager
 from pathlib import Path
 
 import pytest
@@ -32,7 +34,7 @@ def guard(library: Path, tmp_path: Path) -> Iterator[Guard]:
         yield guard
 
 
-@contextmanager
+@contextlib.contextmanager
 def armed_flight(guard: Guard, library: Path, folder: Path, name: str = "fc") -> Iterator[tuple[Fc, Client]]:
     """A flight program whose commands the actuators have."""
     path = folder / name
@@ -60,6 +62,7 @@ def test_commands_go_through_while_armed(guard: Guard, library: Path, tmp_path: 
         assert guard.told(f"process {fc.process.pid} has the slot")
         code, out, err = fc.stop()
         assert (code, err) == (0, "") and f"actuators by the guard at {guard.slot}" in out
+        assert "fcsl-fc: guard: there to the end\n" in out
     guard.wait_line("has left the slot")
 
 
@@ -72,7 +75,7 @@ def test_stop_and_continue(guard: Guard, library: Path, tmp_path: Path) -> None:
         with flying("--guard", guard.slot, library=str(library)) as second:
             code, _, err = second.wait()
             assert code == 1 and f"refused: process {fc.process.pid} has its slot" in err
-        guard.wait_line("turned away a flight program")
+        guard.wait_line("turned away a process")
         fc.process.send_signal(signal.SIGCONT)
         guard.wait_last(COMMAND)
 
@@ -251,8 +254,8 @@ def test_a_killed_guard_leaves_the_last_command(patient: Path, tmp_path: Path) -
         with guarding(patient, tmp_path) as second:
             assert second.slot == guard.slot
             second.stays_safe()
-        code, _, err = fc.stop()
-        assert code == 0 and "fcsl-guard has ended" in err
+        code, out, err = fc.stop()
+        assert code == 0 and "fcsl-guard has ended" in err and "fcsl-fc: guard: ended before the run did\n" in out
 
 
 def test_a_stopped_guard_knows_how_old_its_command_is(guard: Guard) -> None:
@@ -281,6 +284,32 @@ def test_the_page_names_tests_that_there_are() -> None:
     assert len(named) > 10 and named <= {
         n for file in files for n in re.findall(r"^def (test_\w+)", file.read_text(), re.M)
     }
+
+
+def test_the_summary_tells_of_the_guard(guard: Guard, library: Path, tmp_path: Path) -> None:
+    for options, state in ((("--guard", guard.slot), "there"), ((), "none")):
+        with flying("--ticks", "1", "--summary", tmp_path / "end", *options, library=str(library)) as fc:
+            assert fc.wait()[0] == 0
+        assert json.loads((tmp_path / "end").read_text())["guard"] == state
+
+
+def test_a_guard_that_does_not_answer(library: Path, tmp_path: Path) -> None:
+    """Its queue is full, so nobody can even connect to it."""
+    path = tmp_path / "slot"
+    with contextlib.ExitStack() as stack:
+        sockets = [stack.enter_context(socket.socket(socket.AF_UNIX, socket.SOCK_SEQPACKET)) for _ in range(2)]
+        sockets[0].bind(str(path))
+        sockets[0].listen(0)
+        sockets[1].connect(str(path))
+        with flying("--guard", path, library=str(library)) as fc:
+            code, _, err = fc.wait()
+    assert code == 1 and f"cannot connect to socket '{path}'" in err
+
+
+def test_a_guard_needs_real_time(library: Path, tmp_path: Path) -> None:
+    with flying("--guard", tmp_path / "slot", "--rate", "max", library=str(library)) as fc:
+        code, _, err = fc.wait()
+    assert code == 2 and "--guard with --rate max" in err
 
 
 def test_without_a_guard_nothing_starts(library: Path, tmp_path: Path) -> None:

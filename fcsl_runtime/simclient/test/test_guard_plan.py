@@ -218,8 +218,8 @@ def test_the_command_line(library: Path, tmp_path: Path) -> None:
     }.items():
         code, err = run(*arguments)
         assert code == 2 and reason in err and err.endswith("Try `fcsl-guard --help`.\n")
-    code, err = run(library, *slot, "--period-ms", "201")
-    assert code == 1 and "--period-ms 201 is more than the 200 ms for which actuators of machine 'guarded' keep" in err
+    code, err = run(library, *slot, "--period-ms", "96")
+    assert code == 1 and "keep a command for 200 ms, less than a tick and two periods (202 ms)" in err
     for option in ("--help", "--version"):
         done = subprocess.run([GUARD, option], capture_output=True, text=True, timeout=30, check=True)
         assert "fcsl-guard" in done.stdout and done.stderr == ""
