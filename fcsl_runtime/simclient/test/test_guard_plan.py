@@ -297,6 +297,7 @@ def test_printing_that_hangs(library: Path, tmp_path: Path, monkeypatch: pytest.
         patch.setenv("LD_PRELOAD", str(preloaded))
         guard = Guard(library, tmp_path)
     try:
+        guard.wait_line("actuator panel.valve")  # the last line that the guard itself waits for
         hangs.touch()
         slot = Slot(guard.slot)
 
