@@ -182,9 +182,10 @@ static int run(program_t *program)
 
 static void close_all(program_t *program)
 {
-    printing_end();
-    fcsl_guard_unlisten(&program->guard.server);
+    /* The devices first: a driver may still have to bring them their safe values. */
     outputs_close(&program->guard.outputs);
+    fcsl_guard_unlisten(&program->guard.server);
+    printing_end();
     guard_free(&program->guard);
     free(program->plan);
     options_free(&program->options);
