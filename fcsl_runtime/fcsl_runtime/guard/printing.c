@@ -5,6 +5,7 @@
 #define _GNU_SOURCE
 #include "printing.h"
 
+#include <errno.h>
 #include <inttypes.h>
 #include <pthread.h>
 #include <semaphore.h>
@@ -23,6 +24,7 @@ enum { END_S = 1, INFO = 'i', ERROR = 'e' };
 /* A process prints in one place. The first character of a line says whether it is an error. */
 static fcsl_log_t lines;
 static sem_t written; /* posted once per line, and for the end */
+static sem_t finished; /* posted by the thread: all is printed */
 static atomic_int over;
 static pthread_t thread;
 static int started;
@@ -38,6 +40,7 @@ static void *print_lines(void *unused)
         if (fcsl_log_read(&lines, text)) {
             (text[0] == ERROR ? log_error : log_info)("%s", text + 1);
         } else if (ends) {
+            (void)sem_post(&finished);
             return NULL;
         }
     }
@@ -48,7 +51,8 @@ int printing_start(fcsl_error_t *error)
     sigset_t all;
     sigset_t before;
     (void)sigfillset(&all);
-    if (sem_init(&written, 0, 0) != 0 || pthread_sigmask(SIG_SETMASK, &all, &before) != 0) {
+    if (sem_init(&written, 0, 0) != 0 || sem_init(&finished, 0, 0) != 0 ||
+        pthread_sigmask(SIG_SETMASK, &all, &before) != 0) {
         return fcsl_fail(error, "cannot prepare the thread that prints");
     }
     /* Signals are for the thread that sleeps until the next period. */
@@ -71,8 +75,12 @@ void printing_end(void)
     until.tv_sec += END_S;
     atomic_store(&over, 1);
     (void)sem_post(&written);
-    /* A thread that still waits for the system then ends with the process. */
-    (void)pthread_clockjoin_np(thread, NULL, CLOCK_MONOTONIC, &until);
+    int waited = 0;
+    do {
+        waited = sem_clockwait(&finished, CLOCK_MONOTONIC, &until);
+    } while (waited != 0 && errno == EINTR);
+    /* A thread that still waits for the system ends with the process. */
+    (void)(waited == 0 ? pthread_join(thread, NULL) : pthread_detach(thread));
     started = 0;
 }
 
