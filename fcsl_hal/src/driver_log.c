@@ -16,8 +16,9 @@
 #include <string.h>
 #include <sys/mman.h>
 #include <sys/stat.h>
-#include <time.h>
 #include <unistd.h>
+
+#include "monotonic.h"
 
 enum { LINES = 4096, LINE_BYTES = 256, FILE_BYTES = LINES * LINE_BYTES, SIGNALS = 4 };
 
@@ -101,11 +102,8 @@ static fcsl_driver_status_t write_log(void *self, char *why, size_t size)
     (void)why;
     (void)size;
     log_t *log = self;
-    struct timespec now = {0};
-    (void)clock_gettime(CLOCK_MONOTONIC, &now);
-    const uint64_t now_ns = (uint64_t)now.tv_sec * 1000000000u + (uint64_t)now.tv_nsec;
     char line[LINE_BYTES];
-    size_t at = (size_t)snprintf(line, sizeof line, "%20" PRIu64, now_ns);
+    size_t at = (size_t)snprintf(line, sizeof line, "%20" PRIu64, monotonic_ns());
     for (uint32_t i = 0; i < SIGNALS; i++) {
         at = log->used[i] != 0u ? put_signal(line, at, &signals[i], log) : at;
     }

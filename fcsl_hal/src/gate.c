@@ -8,7 +8,7 @@
 
 int fcsl_is_armed(const fcsl_machine_t *machine, const void *data)
 {
-    return machine->arm_field == FCSL_NONE || ((const uint8_t *)data)[machine->fields[machine->arm_field].offset] != 0u;
+    return machine->arm_field == FCSL_NONE || ((const uint8_t *)data)[machine->fields[machine->arm_field].offset] == 1u;
 }
 
 static void make_safe(const fcsl_machine_t *machine, uint8_t *data)

@@ -46,7 +46,11 @@ static int receive_slot(int connection, const char *path, char *error, size_t er
     if (got < 0 && errno != EAGAIN) {
         return fail(error, error_size, "cannot get the slot of", path);
     }
-    if (got <= 0) {
+    if (got == 0) {
+        (void)snprintf(error, error_size, "guard '%s' has ended before it handed over its slot", path);
+        return -1;
+    }
+    if (got < 0) {
         (void)snprintf(error, error_size, "no answer of guard '%s' within %d s: is it fcsl-guard that listens there?",
                        path, ANSWER_S);
         return -1;
@@ -269,8 +273,9 @@ void fcsl_guard_unlisten(fcsl_guard_server_t *server)
         (void)close(server->client);
     }
     if (server->listener >= 0) {
-        (void)close(server->listener);
+        /* In this order: a path of which nobody listens is stale, and another guard may have taken it. */
         (void)unlink(server->path);
+        (void)close(server->listener);
     }
     *server = (fcsl_guard_server_t){.listener = -1, .client = -1, .memory = -1};
 }

@@ -3,11 +3,9 @@
  * Commands in the slot of fcsl-guard: writing and taking. Words are stored with release and loaded with acquire, so a reader
  * that has seen one word of a command also sees the odd sequence that was stored before it; on x86 both are plain moves.
  */
-#define _POSIX_C_SOURCE 200809L
 #include "fcsl/fcsl_guard.h"
 
 #include <string.h>
-#include <time.h>
 
 /* Times that a reader looks again when the writer was at work meanwhile. */
 enum { TRIES = 8, WORD_BYTES = 8 };
@@ -24,14 +22,7 @@ size_t fcsl_guard_slot_bytes(const fcsl_machine_t *machine)
     return sizeof(fcsl_guard_slot_t) + words_of(fcsl_message_capacity(machine, FCSL_ACTUATOR_MESSAGE)) * WORD_BYTES;
 }
 
-static uint64_t monotonic_ns(void)
-{
-    struct timespec now = {0};
-    (void)clock_gettime(CLOCK_MONOTONIC, &now);
-    return (uint64_t)now.tv_sec * 1000000000u + (uint64_t)now.tv_nsec;
-}
-
-int fcsl_guard_command(const fcsl_guard_link_t *link, const fcsl_message_t *message)
+int fcsl_guard_command(const fcsl_guard_link_t *link, const fcsl_message_t *message, uint64_t begun_ns)
 {
     fcsl_guard_slot_t *slot = link->slot;
     if (slot == NULL) {
@@ -40,9 +31,9 @@ int fcsl_guard_command(const fcsl_guard_link_t *link, const fcsl_message_t *mess
     if (message->size > link->capacity) {
         return -1;
     }
-    const uint64_t begun = atomic_load_explicit(&slot->sequence, memory_order_relaxed) | 1u;
-    atomic_store_explicit(&slot->sequence, begun, memory_order_relaxed);
-    atomic_store_explicit(&slot->written_ns, monotonic_ns(), memory_order_release);
+    const uint64_t sequence = atomic_load_explicit(&slot->sequence, memory_order_relaxed) | 1u;
+    atomic_store_explicit(&slot->sequence, sequence, memory_order_relaxed);
+    atomic_store_explicit(&slot->begun_ns, begun_ns, memory_order_release);
     atomic_store_explicit(&slot->size, message->size, memory_order_release);
     for (size_t at = 0; at < message->size; at += WORD_BYTES) {
         const size_t left = message->size - at;
@@ -50,15 +41,15 @@ int fcsl_guard_command(const fcsl_guard_link_t *link, const fcsl_message_t *mess
         memcpy(&word, message->bytes + at, left < WORD_BYTES ? left : WORD_BYTES);
         atomic_store_explicit(&slot->message[at / WORD_BYTES], word, memory_order_release);
     }
-    atomic_store_explicit(&slot->sequence, begun + 1u, memory_order_release);
+    atomic_store_explicit(&slot->sequence, sequence + 1u, memory_order_release);
     return 0;
 }
 
 /* Copies the command of this sequence. Nothing in the slot is trusted: what is used twice is read once. */
-static void copy(const fcsl_guard_server_t *server, uint8_t *bytes, size_t *size, uint64_t *written_ns)
+static void copy(const fcsl_guard_server_t *server, uint8_t *bytes, size_t *size, uint64_t *begun_ns)
 {
     const fcsl_guard_slot_t *slot = server->slot;
-    *written_ns = atomic_load_explicit(&slot->written_ns, memory_order_acquire);
+    *begun_ns = atomic_load_explicit(&slot->begun_ns, memory_order_acquire);
     const uint64_t said = atomic_load_explicit(&slot->size, memory_order_acquire);
     *size = said <= server->capacity ? (size_t)said : 0u;
     for (size_t at = 0; at < *size; at += WORD_BYTES) {
@@ -68,14 +59,14 @@ static void copy(const fcsl_guard_server_t *server, uint8_t *bytes, size_t *size
     }
 }
 
-int fcsl_guard_take(fcsl_guard_server_t *server, uint8_t *bytes, size_t *size, uint64_t *written_ns)
+int fcsl_guard_take(fcsl_guard_server_t *server, uint8_t *bytes, size_t *size, uint64_t *begun_ns)
 {
-    for (int i = 0; i < TRIES; i++) {
+    for (int i = 0; i < TRIES && server->client >= 0; i++) {
         const uint64_t sequence = atomic_load_explicit(&server->slot->sequence, memory_order_acquire);
         if (sequence == server->taken || (sequence & 1u) != 0u) {
             return 0;
         }
-        copy(server, bytes, size, written_ns);
+        copy(server, bytes, size, begun_ns);
         if (atomic_load_explicit(&server->slot->sequence, memory_order_relaxed) == sequence) {
             server->taken = sequence;
             return 1;

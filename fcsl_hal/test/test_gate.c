@@ -164,6 +164,8 @@ static void test_armed(void)
     CHECK(!fcsl_is_armed(&machine, &data));
     data.flag = 1;
     CHECK(fcsl_is_armed(&machine, &data));
+    memset(&data.flag, 2, sizeof data.flag);
+    CHECK(!fcsl_is_armed(&machine, &data));
 }
 
 static void test_texts(void)

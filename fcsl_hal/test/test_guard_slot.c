@@ -87,12 +87,12 @@ static void test_a_command_is_taken_once(fcsl_guard_server_t *server, const aske
     CHECK(server->capacity <= sizeof taken);
     CHECK(fcsl_guard_take(server, taken, &size, &time_ns) == 0);
     const fcsl_message_t message = command(&asker->machine, 7, 0.25, written);
-    CHECK(fcsl_guard_command(&asker->link, &message) == 0);
+    CHECK(fcsl_guard_command(&asker->link, &message, 12345) == 0);
     CHECK(fcsl_guard_take(server, taken, &size, &time_ns) == 1);
-    CHECK(size == message.size && memcmp(taken, written, size) == 0 && time_ns > 0);
+    CHECK(size == message.size && memcmp(taken, written, size) == 0 && time_ns == 12345);
     CHECK(fcsl_guard_take(server, taken, &size, &time_ns) == 0);
     const fcsl_message_t large = {.bytes = written, .size = server->capacity + 1u};
-    CHECK(fcsl_guard_command(&asker->link, &large) == -1);
+    CHECK(fcsl_guard_command(&asker->link, &large, 1) == -1);
     CHECK(fcsl_guard_take(server, taken, &size, &time_ns) == 0);
 }
 
@@ -107,12 +107,12 @@ static void test_half_a_command_is_none(fcsl_guard_server_t *server, const asker
     const fcsl_message_t message = command(&asker->machine, 8, 0.5, bytes);
     atomic_store(&slot->sequence, begun);
     CHECK(fcsl_guard_take(server, bytes, &size, &time_ns) == 0);
-    atomic_store(&slot->written_ns, 1);
+    atomic_store(&slot->begun_ns, 1);
     atomic_store(&slot->size, message.size);
     atomic_store(&slot->message[0], UINT64_MAX);
     CHECK(fcsl_guard_take(server, bytes, &size, &time_ns) == 0);
     /* The next command of the same writer is whole again. */
-    CHECK(fcsl_guard_command(&asker->link, &message) == 0 && atomic_load(&slot->sequence) == begun + 1u);
+    CHECK(fcsl_guard_command(&asker->link, &message, 1) == 0 && atomic_load(&slot->sequence) == begun + 1u);
     CHECK(fcsl_guard_take(server, bytes, &size, &time_ns) == 1);
 }
 
@@ -143,7 +143,7 @@ static void *write_commands(void *argument)
     const fcsl_message_t messages[2] = {command(&asker->machine, 1, 1.0, bytes[0]),
                                         command(&asker->machine, UINT64_MAX, -2.0, bytes[1])};
     for (unsigned i = 0; !atomic_load(&enough); i++) {
-        CHECK(fcsl_guard_command(&asker->link, &messages[i % 2u]) == 0);
+        CHECK(fcsl_guard_command(&asker->link, &messages[i % 2u], 1) == 0);
     }
     return NULL;
 }
@@ -187,7 +187,7 @@ static void test_one_flight_program_at_a_time(fcsl_guard_server_t *server, asker
     CHECK(fcsl_guard_look(server) == FCSL_GUARD_NO_EVENT);
     /* The next one finds the slot empty, although the last one left a command that was not taken. */
     const fcsl_message_t message = command(&first->machine, 9, 0.75, bytes);
-    CHECK(fcsl_guard_command(&first->link, &message) == 0);
+    CHECK(fcsl_guard_command(&first->link, &message, 1) == 0);
     fcsl_guard_disconnect(&first->link);
     CHECK(fcsl_guard_look(server) == FCSL_GUARD_LEFT);
     CHECK(join(server, &second) == FCSL_GUARD_JOINED && second.status == 0);
@@ -231,7 +231,7 @@ static void test_the_end_of_the_guard_is_seen(fcsl_guard_server_t *server)
     CHECK(fcsl_guard_is_gone(&asker.link) == 1);
     uint8_t bytes[TEXT_BYTES];
     const fcsl_message_t message = command(&asker.machine, 1, 1.0, bytes);
-    CHECK(fcsl_guard_command(&asker.link, &message) == 0); /* into memory that nobody reads */
+    CHECK(fcsl_guard_command(&asker.link, &message, 1) == 0); /* into memory that nobody reads */
     fcsl_guard_disconnect(&asker.link);
     CHECK(access(path, F_OK) != 0);
     CHECK(fcsl_guard_connect(path, &asker.machine, &asker.link, asker.error, sizeof asker.error) == -1);
@@ -245,7 +245,7 @@ int main(void)
     char error[TEXT_BYTES];
     const fcsl_machine_t machine = machine_of("a hash");
     const fcsl_message_t message = command(&machine, 1, 1.0, bytes);
-    CHECK(fcsl_guard_command(&none, &message) == 0 && fcsl_guard_is_gone(&none) == 0); /* without a guard */
+    CHECK(fcsl_guard_command(&none, &message, 1) == 0 && fcsl_guard_is_gone(&none) == 0); /* without a guard */
 
     CHECK(mkdtemp(folder) != NULL);
     (void)snprintf(path, sizeof path, "%s/slot", folder);

@@ -36,7 +36,7 @@ typedef struct {
 } fcsl_driver_signal_t;
 
 /* Every function but close may put a reason into `why` (a text of `size` bytes with its zero, empty before the call) when it
- * returns anything but OK or NOTHING. After open nothing is allocated. read, write and close never wait: what the device
+ * returns anything but OK or NOTHING. After open nothing is allocated. read and write never wait: what the device
  * cannot take or give at once is FAILED or NOTHING. */
 typedef struct {
     uint32_t abi_version;
@@ -59,7 +59,8 @@ typedef struct {
     fcsl_driver_status_t (*read)(void *self, uint64_t *sample_ns, char *why, size_t size);
     /* Actuators (else null): drives the device with the used signals of `self`. Called again and again, with equal values too. */
     fcsl_driver_status_t (*write)(void *self, char *why, size_t size);
-    /* The host has written an actuator's safe values before, if it could: close leaves the device as it is. */
+    /* The host has written an actuator's safe values before, if it could: close leaves the device as it is. A driver that
+     * hands values to a thread of its own waits here until the device has those of the last write, for 1 s at most. */
     void (*close)(void *self);
 } fcsl_driver_t;
 

@@ -12,8 +12,8 @@
 extern "C" {
 #endif
 
-/* Whether the machine arms its actuators: what the actuator message of its last tick says. `data` is its struct. A machine
- * without an arm field is armed in simulation; real actuators refuse it. */
+/* Whether the machine arms its actuators: what the actuator message of its last tick says. `data` is its struct. Only
+ * the byte 1 arms: damaged memory does not. A machine without an arm field is armed in simulation; real actuators refuse it. */
 int fcsl_is_armed(const fcsl_machine_t *machine, const void *data);
 
 typedef enum {

@@ -1,7 +1,7 @@
 /* SPDX-License-Identifier: Apache-2.0
  *
  * The slot between a flight program and fcsl-guard, the process that owns the actuators (docs/guard.md): shared memory that
- * holds the newest actuator message and when it was written.
+ * holds the newest actuator message and when its tick began.
  *
  * One writes, one reads, neither waits for the other, and there is no lock that a dying writer could leave taken. The memory
  * has no name: the guard makes it, of a size that nobody can change any more, and hands it over on a Unix socket that its
@@ -27,7 +27,7 @@ typedef struct {
     uint64_t capacity; /* bytes of `message` */
     char source_hash[FCSL_GUARD_HASH_BYTES]; /* of the guard's machine */
     _Atomic uint64_t sequence;
-    _Atomic uint64_t written_ns; /* the heartbeat: monotonic time of the command, whose message has the tick */
+    _Atomic uint64_t begun_ns; /* the heartbeat: monotonic time at which the tick of the command began */
     _Atomic uint64_t size; /* bytes of the message */
     _Atomic uint64_t message[];
 } fcsl_guard_slot_t;
@@ -48,8 +48,10 @@ typedef struct {
  * `error` receives a message on failure. Returns 0, or -1. */
 int fcsl_guard_connect(const char *path, const fcsl_machine_t *machine, fcsl_guard_link_t *link, char *error,
                        size_t error_size);
-/* Writes a command; makes no system call. Returns 0, or -1 when the message does not fit. Without a guard it does nothing. */
-int fcsl_guard_command(const fcsl_guard_link_t *link, const fcsl_message_t *message);
+/* Writes the command of a tick that began at `begun_ns` of the monotonic clock: it is as old as the sensors that it was computed
+ * from, however long the tick took. Makes no system call. Returns 0, or -1 when the message does not fit. Without a guard it
+ * does nothing. */
+int fcsl_guard_command(const fcsl_guard_link_t *link, const fcsl_message_t *message, uint64_t begun_ns);
 /* Whether the guard has ended: nobody takes the commands. Does not wait. */
 int fcsl_guard_is_gone(const fcsl_guard_link_t *link);
 void fcsl_guard_disconnect(fcsl_guard_link_t *link);
@@ -82,9 +84,9 @@ int fcsl_guard_listen(const char *path, const fcsl_machine_t *machine, fcsl_guar
                       size_t error_size);
 /* Whether a flight program has come or gone; at most one event per call. Does not wait. */
 fcsl_guard_event_t fcsl_guard_look(fcsl_guard_server_t *server);
-/* Copies a command that was not taken before to `bytes` (server->capacity of them), unchecked, and sets *size and *written_ns.
- * Returns 1, or 0 when there is none, or none whole. A size that no slot can hold is 0. Does not wait. */
-int fcsl_guard_take(fcsl_guard_server_t *server, uint8_t *bytes, size_t *size, uint64_t *written_ns);
+/* Copies a command that was not taken before to `bytes` (server->capacity of them), unchecked, and sets *size and *begun_ns.
+ * Returns 1, or 0 when there is none, none whole, or nobody has the slot. A size that no slot can hold is 0. Does not wait. */
+int fcsl_guard_take(fcsl_guard_server_t *server, uint8_t *bytes, size_t *size, uint64_t *begun_ns);
 /* Closes all, and unlinks the socket. */
 void fcsl_guard_unlisten(fcsl_guard_server_t *server);
 

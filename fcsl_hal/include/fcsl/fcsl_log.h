@@ -15,7 +15,7 @@ extern "C" {
 
 enum {
     FCSL_LOG_LINES = 32, /* a power of two */
-    FCSL_LOG_BYTES = 192 /* of a line, its zero included; a longer one is cut */
+    FCSL_LOG_BYTES = 512 /* of a line, its zero included; a longer one is cut */
 };
 
 /* All zero: empty. */

@@ -169,7 +169,7 @@ static int act_on_sensors(loop_t *loop, uint64_t begun_ns)
         fail(loop, "the actuator message does not fit its buffer");
         return 0;
     }
-    if (fcsl_guard_command(&loop->guard, &message) != 0) {
+    if (fcsl_guard_command(&loop->guard, &message, begun_ns) != 0) {
         fail(loop, "the actuator message does not fit the slot of fcsl-guard");
         return 0;
     }

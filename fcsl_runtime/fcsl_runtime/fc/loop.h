@@ -14,11 +14,13 @@
 #include "hal_topic.h"
 #include "pacing.h"
 
+typedef enum { GUARD_NONE, GUARD_THERE, GUARD_ENDED } guard_state_t;
+
 typedef struct {
     fcsl_run_t *run;
     fcsl_hal_t hal;
     fcsl_guard_link_t guard; /* takes the commands to the actuators, if there is one */
-    int guard_gone; /* the monitor thread has logged that it has ended */
+    guard_state_t guard_state;
     fcsl_vars_t *vars;  /* null without a variable server */
     fcsl_telemetry_t *telemetry; /* null without telemetry */
     atomic_int *stop;   /* set by a signal */

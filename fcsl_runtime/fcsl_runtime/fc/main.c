@@ -291,6 +291,7 @@ static int fly(program_t *program)
         (void)complain(loop->failure);
     }
     monitor_end(&program->monitor);
+    guard_link_close(loop); /* at once: to close a bag takes time */
     fcsl_telemetry_stop(loop->telemetry);
     if (write_run_summary(loop, program->options.summary_file, reason_of_end(program)) != 0) {
         status = EXIT_RUN;

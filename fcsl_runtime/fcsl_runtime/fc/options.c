@@ -257,6 +257,11 @@ static int check(const options_t *options)
     if (options->missed_deadline_given && !options->realtime) {
         return complain("--missed-deadline is for ticks that the clock paces: it does not go with --rate max", "");
     }
+    if (options->guard != NULL && !options->realtime && options->wire == NULL) {
+        return complain(
+            "--guard with --rate max would move real actuators faster than the machine's time; use --rate realtime",
+            "");
+    }
     if (options->priority > 0 && !options->realtime && options->wire == NULL) {
         return complain(
             "--realtime-priority with --rate max would leave no processor to anything else; use --rate realtime", "");

@@ -77,6 +77,9 @@ static void report_counters(const loop_t *loop, const uint8_t *data)
         report_telemetry(loop->telemetry);
     }
     report_hal(loop, data);
+    if (loop->guard_state != GUARD_NONE) {
+        log_info("guard: %s", loop->guard_state == GUARD_THERE ? "there to the end" : "ended before the run did");
+    }
     report_times("lateness ", &stats->lateness);
     report_times("tick time", &stats->tick_time);
 }

@@ -11,6 +11,7 @@
 #include <string.h>
 
 #include "base/error.h"
+#include "guard_link.h"
 #include "run/fault_place.h"
 #include "run/health_name.h"
 #include "base/replace_file.h"
@@ -110,6 +111,7 @@ static void put_all(json_out_t *out, const loop_t *loop, const uint8_t *data, co
     fcsl_json_raw(out, "\"paused\":%s,\n", moment->paused != 0 ? "true" : "false");
     put_instances(out, machine, data);
     put_hal(out, loop, data);
+    put_text(out, "guard", guard_state_name(loop->guard_state));
     put_counters(out, machine, &loop->stats, data);
     fcsl_vars_histogram(out, "lateness_ns", &loop->stats.lateness);
     fcsl_vars_histogram(out, "tick_time_ns", &loop->stats.tick_time);

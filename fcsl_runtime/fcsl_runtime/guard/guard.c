@@ -2,12 +2,16 @@
  *
  * What the guard does in a period.
  */
+#define _POSIX_C_SOURCE 200809L
 #include "guard.h"
 
 #include <stdlib.h>
 #include <string.h>
+#include <time.h>
 
 #include "base/error.h"
+
+static const uint64_t END_NS = 2000000000u; /* for how long the last safe values are tried */
 
 int guard_check_machine(const fcsl_machine_t *machine, fcsl_error_t *error)
 {
@@ -56,43 +60,66 @@ static void refuse(guard_t *guard, const char *why)
     guard->refusal = why;
 }
 
-/* The slot is written by another process: nothing in it is believed. A command counts from when it was written, so one that
- * waited for a guard that was late is old. */
+/* The slot is written by another process: nothing in it is believed. A command counts from when its tick began, so one
+ * that waited in the flight program, or for a guard that was late, is old. */
 static void take_command(guard_t *guard)
 {
     size_t size = 0;
-    uint64_t written_ns = 0;
+    uint64_t begun_ns = 0;
     fcsl_message_t message;
-    if (!fcsl_guard_take(&guard->server, guard->bytes, &size, &written_ns)) {
+    if (!fcsl_guard_take(&guard->server, guard->bytes, &size, &begun_ns)) {
         return;
     }
     const fcsl_message_status_t status =
         fcsl_message_check(&guard->table, FCSL_ACTUATOR_MESSAGE, guard->bytes, size, &message);
     if (status != FCSL_MESSAGE_OK) {
         refuse(guard, fcsl_message_status_text(status));
-    } else if (written_ns > fcsl_run_monotonic_ns(NULL)) {
+    } else if (begun_ns > fcsl_run_monotonic_ns(NULL)) {
         refuse(guard, "its time is in the future");
     } else {
         guard->commands++;
         guard->tick = message.tick;
-        fcsl_gate_command(&guard->gate, &message, written_ns, guard->data);
+        fcsl_gate_command(&guard->gate, &message, begun_ns, guard->data);
+    }
+}
+
+/* A command ends with the program that gave it, and the next program begins with a closed gate. */
+static void look_at_programs(guard_t *guard)
+{
+    const fcsl_guard_event_t event = fcsl_guard_look(&guard->server);
+    guard->turned_away += event == FCSL_GUARD_REFUSED;
+    if (event == FCSL_GUARD_LEFT) {
+        guard->gate = fcsl_gate(guard->machine, guard->data);
     }
 }
 
 void guard_period(guard_t *guard)
 {
     const fcsl_gate_state_t before = guard->gate.state;
+    look_at_programs(guard);
     take_command(guard);
     fcsl_gate_wait(&guard->gate, fcsl_run_monotonic_ns(NULL), guard->data);
     guard->changes += guard->gate.state != before;
     guard->silences += guard->gate.state != before && guard->gate.state == FCSL_GATE_SILENT;
     (void)outputs_write(&guard->outputs, guard->data);
     guard->periods++;
-    guard->turned_away += fcsl_guard_look(&guard->server) == FCSL_GUARD_REFUSED;
 }
 
 uint32_t guard_make_safe(guard_t *guard)
 {
     guard->gate = fcsl_gate(guard->machine, guard->data);
     return outputs_write(&guard->outputs, guard->data);
+}
+
+uint32_t guard_end(guard_t *guard, uint64_t period_ns)
+{
+    const struct timespec period = {.tv_sec = (time_t)(period_ns / 1000000000u),
+                                    .tv_nsec = (long)(period_ns % 1000000000u)};
+    const uint64_t end_ns = fcsl_run_monotonic_ns(NULL) + END_NS;
+    uint32_t failed = guard_make_safe(guard);
+    while (failed > 0u && fcsl_run_monotonic_ns(NULL) < end_ns) {
+        (void)nanosleep(&period, NULL);
+        failed = guard_make_safe(guard);
+    }
+    return failed;
 }

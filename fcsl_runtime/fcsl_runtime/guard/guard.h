@@ -38,5 +38,7 @@ void guard_free(guard_t *guard);
 void guard_period(guard_t *guard);
 /* Writes the safe values, whatever was commanded. Returns how many devices did not take them. */
 uint32_t guard_make_safe(guard_t *guard);
+/* The last writes: the safe values, every period until all devices have taken them, for 2 s at most. Returns how many have not. */
+uint32_t guard_end(guard_t *guard, uint64_t period_ns);
 
 #endif /* GUARD_GUARD_H */

@@ -14,6 +14,7 @@
 #include "fcsl/fcsl_library.h"
 #include "guard_options.h"
 #include "log.h"
+#include "printing.h"
 #include "realtime.h"
 #include "report.h"
 
@@ -37,25 +38,40 @@ static void on_signal(int number)
     stop = 1;
 }
 
-/* Signals end the loop; a terminal that is gone does not end what nohup started. */
+/* Every signal that would end the process ends the loop, and so the process with safe values; one that would stop it is
+ * ignored. Not those of a defect (SIGSEGV, SIGABRT, …), and nothing helps against SIGKILL and SIGSTOP. A terminal that is gone
+ * does not end what nohup started. */
 static void take_signals(void)
 {
+    static const int ending[] = {SIGTERM, SIGINT,    SIGQUIT, SIGUSR1, SIGUSR2, SIGALRM,
+                                 SIGPROF, SIGVTALRM, SIGXCPU, SIGPWR,  SIGPOLL, SIGSTKFLT};
+    /* SIGPIPE, SIGXFSZ: what they are about is an error of the call that could not write. */
+    static const int ignored[] = {SIGTSTP, SIGTTIN, SIGTTOU, SIGPIPE, SIGXFSZ};
     const struct sigaction action = {.sa_handler = on_signal};
     struct sigaction hangup;
-    (void)sigaction(SIGTERM, &action, NULL);
-    (void)sigaction(SIGINT, &action, NULL);
+    for (size_t i = 0; i < sizeof ending / sizeof ending[0]; i++) {
+        (void)sigaction(ending[i], &action, NULL);
+    }
+    for (int number = SIGRTMIN; number <= SIGRTMAX; number++) {
+        (void)sigaction(number, &action, NULL);
+    }
+    for (size_t i = 0; i < sizeof ignored / sizeof ignored[0]; i++) {
+        (void)signal(ignored[i], SIG_IGN);
+    }
     if (sigaction(SIGHUP, NULL, &hangup) == 0 && hangup.sa_handler != SIG_IGN) {
         (void)sigaction(SIGHUP, &action, NULL);
     }
-    /* What they are about is an error of the call that could not write. */
-    (void)signal(SIGPIPE, SIG_IGN);
-    (void)signal(SIGXFSZ, SIG_IGN);
 }
 
 static int complain(const char *text)
 {
     log_error("%s", text);
     return -1;
+}
+
+static uint64_t period_of(const options_t *options)
+{
+    return options->period_ms * 1000000u;
 }
 
 static int open_machine(program_t *program, fcsl_error_t *error)
@@ -65,12 +81,15 @@ static int open_machine(program_t *program, fcsl_error_t *error)
     if (machine == NULL || guard_check_machine(machine, error) != 0) {
         return -1;
     }
-    if (options->period_ms * 1000000u > machine->command_timeout_ns) {
-        return fcsl_fail(error,
-                         "--period-ms %" PRIu64
-                         " is more than the %.6g ms for which actuators of machine '%.100s' keep "
-                         "a command",
-                         options->period_ms, (double)machine->command_timeout_ns / 1e6, machine->name);
+    /* A command is a tick old when the next one is begun, and taken a period later, with one to spare. */
+    const uint64_t least_ns = 1000000000u / machine->tick_hz + 2u * period_of(options);
+    if (machine->command_timeout_ns < least_ns) {
+        return fcsl_fail(
+            error,
+            "the actuators of machine '%.100s' keep a command for %.6g ms, less than a tick and two periods "
+            "(%.6g ms): they would be safe now and then in every flight. Write a longer "
+            "\"command_timeout_s\" in its JSON, or a shorter --period-ms",
+            machine->name, (double)machine->command_timeout_ns / 1e6, (double)least_ns / 1e6);
     }
     return guard_open(&program->guard, machine, error);
 }
@@ -83,8 +102,12 @@ static int open_outputs(program_t *program, fcsl_error_t *error)
     if (program->plan == NULL) {
         return fcsl_fail(error, "out of memory for the plan");
     }
-    if (plan_read(guard->machine, options->actuators, options->actuator_count, program->plan, error) != 0 ||
-        outputs_open(guard->machine, program->plan, options->actuator_count, &guard->outputs, error) != 0) {
+    if (plan_read(guard->machine, options->actuators, options->actuator_count, program->plan, error) != 0) {
+        return -1;
+    }
+    if (outputs_open(guard->machine, program->plan, options->actuator_count, &guard->outputs, error) != 0) {
+        /* The devices that are there may still do what a guard that died has left. */
+        (void)guard_end(guard, period_of(options));
         return -1;
     }
     /* Before a flight program gets the slot. */
@@ -103,7 +126,8 @@ static int open_all(program_t *program)
     /* The slot before the devices: those of a guard that has it already are left alone. */
     if (realtime_begin(&program->realtime, &error) != 0 || open_machine(program, &error) != 0 ||
         fcsl_guard_listen(options->slot, guard->machine, &guard->server, error.text, sizeof error.text) != 0 ||
-        open_outputs(program, &error) != 0 || realtime_enter(&program->realtime, &error) != 0) {
+        open_outputs(program, &error) != 0 || printing_start(&error) != 0 ||
+        realtime_enter(&program->realtime, &error) != 0) {
         return complain(error.text);
     }
     return 0;
@@ -137,7 +161,7 @@ static void wait_period(program_t *program, uint64_t period_ns, uint64_t *due_ns
 
 static int run(program_t *program)
 {
-    const uint64_t period_ns = program->options.period_ms * 1000000u;
+    const uint64_t period_ns = period_of(&program->options);
     uint64_t due_ns = fcsl_run_monotonic_ns(NULL);
     announce(program);
     while (stop == 0) {
@@ -145,21 +169,23 @@ static int run(program_t *program)
         report_changes(&program->report, &program->guard, fcsl_run_monotonic_ns(NULL));
         wait_period(program, period_ns, &due_ns);
     }
-    const uint32_t failed = guard_make_safe(&program->guard);
+    const uint32_t failed = guard_end(&program->guard, period_ns);
     report_end(&program->guard);
     if (failed > 0u) {
-        log_error("%" PRIu32 " of %" PRIu32 " devices did not take their safe values at the end", failed,
-                  program->guard.outputs.device_count);
+        print_error("%" PRIu32 " of %" PRIu32 " devices did not take their safe values at the end", failed,
+                    program->guard.outputs.device_count);
         return EXIT_GUARD;
     }
-    log_info("the actuators have their safe values");
+    print_info("the actuators have their safe values");
     return 0;
 }
 
 static void close_all(program_t *program)
 {
-    fcsl_guard_unlisten(&program->guard.server);
+    /* The devices first: a driver may still have to bring them their safe values. */
     outputs_close(&program->guard.outputs);
+    fcsl_guard_unlisten(&program->guard.server);
+    printing_end();
     guard_free(&program->guard);
     free(program->plan);
     options_free(&program->options);

@@ -163,26 +163,29 @@ int outputs_open(const fcsl_machine_t *machine, const plan_entry_t *entries, uin
             return -1;
         }
     }
+    int status = 0;
     for (uint32_t i = 0; i < outputs->device_count; i++) {
-        if (open_device(&outputs->devices[i], error) != 0) {
-            return -1;
+        fcsl_error_t why;
+        if (open_device(&outputs->devices[i], &why) != 0 && status == 0) {
+            *error = why;
+            status = -1;
         }
     }
-    return 0;
+    return status;
 }
 
 uint32_t outputs_write(outputs_t *outputs, const void *data)
 {
     for (uint32_t i = 0; i < outputs->binding_count; i++) {
         const output_binding_t *binding = &outputs->bindings[i];
-        memcpy((uint8_t *)outputs->devices[binding->device].state + binding->to, (const uint8_t *)data + binding->from,
-               binding->size);
+        const output_device_t *device = &outputs->devices[binding->device];
+        memcpy((uint8_t *)device->state + binding->to, (const uint8_t *)data + binding->from, binding->size);
     }
     uint32_t failed = 0;
     for (uint32_t i = 0; i < outputs->device_count; i++) {
         output_device_t *device = &outputs->devices[i];
         char why[OUTPUT_REASON_BYTES] = "";
-        if (device->driver->write(device->state, why, sizeof why) != FCSL_DRIVER_OK) {
+        if (device->opened && device->driver->write(device->state, why, sizeof why) != FCSL_DRIVER_OK) {
             failed++;
             device->missed++;
             memcpy(device->reason, why, sizeof why - 1u);

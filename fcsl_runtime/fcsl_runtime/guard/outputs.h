@@ -38,10 +38,11 @@ typedef struct {
     uint32_t binding_count;
 } outputs_t;
 
-/* Finds the drivers of the plan, probes and opens each device once. `entries` must last until outputs_close. 0, or -1. */
+/* Finds the drivers of the plan, probes and opens each device once. `entries` must last until outputs_close. 0, or -1 with the
+ * first error; a device that does not open keeps no other one from opening. */
 int outputs_open(const fcsl_machine_t *machine, const plan_entry_t *entries, uint32_t count, outputs_t *outputs,
                  fcsl_error_t *error);
-/* Writes the channels of the machine struct `data` to all devices. Returns how many failed. */
+/* Writes the channels of the machine struct `data` to all devices that are open. Returns how many failed. */
 uint32_t outputs_write(outputs_t *outputs, const void *data);
 uint64_t outputs_missed(const outputs_t *outputs);
 void outputs_close(outputs_t *outputs);

@@ -6,7 +6,7 @@
 
 #include <inttypes.h>
 
-#include "log.h"
+#include "printing.h"
 
 static const uint64_t LINE_NS = 100000000u; /* what a line costs */
 static const uint64_t SAVED_NS = 2000000000u; /* what can be saved for lines */
@@ -16,14 +16,14 @@ static void report_state(const guard_t *guard)
 {
     switch (guard->gate.state) {
     case FCSL_GATE_ARMED:
-        log_info("armed, at tick %" PRIu64, guard->tick);
+        print_info("armed, at tick %" PRIu64, guard->tick);
         break;
     case FCSL_GATE_SILENT:
-        log_error("silent: no command for %.3g ms since tick %" PRIu64 "; safe values",
-                  (double)guard->machine->command_timeout_ns / 1e6, guard->tick);
+        print_error("silent: no command for %.6g ms since tick %" PRIu64 "; safe values",
+                    (double)guard->machine->command_timeout_ns / 1e6, guard->tick);
         break;
     default:
-        log_info("disarmed, at tick %" PRIu64 "; safe values", guard->tick);
+        print_info("disarmed, at tick %" PRIu64 "; safe values", guard->tick);
         break;
     }
 }
@@ -31,10 +31,10 @@ static void report_state(const guard_t *guard)
 static void report_program(int32_t before, int32_t now)
 {
     if (before != 0) {
-        log_info("the flight program of process %" PRId32 " has left the slot", before);
+        print_info("the flight program of process %" PRId32 " has left the slot", before);
     }
     if (now != 0) {
-        log_info("the flight program of process %" PRId32 " has the slot", now);
+        print_info("the flight program of process %" PRId32 " has the slot", now);
     }
 }
 
@@ -43,9 +43,10 @@ static void report_missed(const outputs_t *outputs)
     for (uint32_t i = 0; i < outputs->device_count; i++) {
         const output_device_t *device = &outputs->devices[i];
         if (device->missed > 0u) {
-            log_error("device '%s' of driver '%s' did not take a write: %s (%" PRIu64 " so far)", device->device,
-                      device->name, device->reason[0] != '\0' ? device->reason : "the driver gives no reason",
-                      device->missed);
+            /* What may be long stands last: a line that is too long loses its end. */
+            print_error("a device did not take a write: %s (%" PRIu64 " so far): device '%s' of driver '%s'",
+                        device->reason[0] != '\0' ? device->reason : "the driver gives no reason", device->missed,
+                        device->device, device->name);
         }
     }
 }
@@ -64,16 +65,16 @@ static int is_due(report_count_t *count, uint64_t value, uint64_t now_ns)
 static void report_counts(report_t *report, const guard_t *guard, uint64_t now_ns)
 {
     if (is_due(&report->refused, guard->refused, now_ns)) {
-        log_error("refused a command: %s (%" PRIu64 " so far)", guard->refusal, guard->refused);
+        print_error("refused a command: %s (%" PRIu64 " so far)", guard->refusal, guard->refused);
     }
     if (is_due(&report->turned_away, guard->turned_away, now_ns)) {
-        log_error("turned away a flight program: another one has the slot (%" PRIu64 " so far)", guard->turned_away);
+        print_error("turned away a process: a flight program has the slot (%" PRIu64 " so far)", guard->turned_away);
     }
     if (is_due(&report->missed, outputs_missed(&guard->outputs), now_ns)) {
         report_missed(&guard->outputs);
     }
     if (is_due(&report->periods_missed, guard->periods_missed, now_ns)) {
-        log_error("woke too late: %" PRIu64 " periods missed so far", guard->periods_missed);
+        print_error("woke too late: %" PRIu64 " periods missed so far", guard->periods_missed);
     }
 }
 
@@ -107,8 +108,8 @@ void report_changes(report_t *report, const guard_t *guard, uint64_t now_ns)
 
 void report_end(const guard_t *guard)
 {
-    log_info("%" PRIu64 " periods, %" PRIu64 " missed; %" PRIu64 " commands, %" PRIu64 " refused, %" PRIu64
-             " silences; %" PRIu64 " writes missed",
-             guard->periods, guard->periods_missed, guard->commands, guard->refused, guard->silences,
-             outputs_missed(&guard->outputs));
+    print_info("%" PRIu64 " periods, %" PRIu64 " missed; %" PRIu64 " commands, %" PRIu64 " refused, %" PRIu64
+               " silences; %" PRIu64 " writes missed",
+               guard->periods, guard->periods_missed, guard->commands, guard->refused, guard->silences,
+               outputs_missed(&guard->outputs));
 }

@@ -117,7 +117,7 @@ def guarding(library: Path, folder: Path, *options: str | Path) -> Iterator[Guar
 class Slot:
     """The slot as fcsl_guard.h lays it out, and a flight program that does with it what it likes."""
 
-    SEQUENCE, WRITTEN, SIZE, MESSAGE = 88, 96, 104, 112
+    SEQUENCE, BEGUN, SIZE, MESSAGE = 88, 96, 104, 112
 
     def __init__(self, path: Path) -> None:
         self.connection = socket.socket(socket.AF_UNIX, socket.SOCK_SEQPACKET)
@@ -141,9 +141,9 @@ class Slot:
     def finish(self) -> None:
         self.put(self.SEQUENCE, self.get(self.SEQUENCE) + 1)
 
-    def write(self, data: bytes, size: int | None = None, written_ns: int | None = None) -> None:
+    def write(self, data: bytes, size: int | None = None, begun_ns: int | None = None) -> None:
         self.begin()
-        self.put(self.WRITTEN, time.monotonic_ns() if written_ns is None else written_ns)
+        self.put(self.BEGUN, time.monotonic_ns() if begun_ns is None else begun_ns)
         self.put(self.SIZE, len(data) if size is None else size)
         self.memory[self.MESSAGE : self.MESSAGE + len(data)] = data
         self.finish()
@@ -167,7 +167,7 @@ def die_in_the_middle(path: Path, log: Path) -> None:
     half = command(-77.0)
     half = half[: len(half) // 2]
     slot.begin()
-    slot.put(Slot.WRITTEN, time.monotonic_ns() + 10**12)
+    slot.put(Slot.BEGUN, time.monotonic_ns() + 10**12)
     slot.memory[Slot.MESSAGE : Slot.MESSAGE + len(half)] = half
     os.kill(os.getpid(), signal.SIGKILL)
 

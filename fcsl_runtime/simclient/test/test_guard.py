@@ -3,14 +3,16 @@
 
 from __future__ import annotations
 
+import contextlib
+import json
 import os
 import re
 import signal
+import socket
 import subprocess
 import sys
 import time
 from collections.abc import Callable, Iterator
-from contextlib import contextmanager
 from pathlib import Path
 
 import pytest
@@ -32,7 +34,7 @@ def guard(library: Path, tmp_path: Path) -> Iterator[Guard]:
         yield guard
 
 
-@contextmanager
+@contextlib.contextmanager
 def armed_flight(guard: Guard, library: Path, folder: Path, name: str = "fc") -> Iterator[tuple[Fc, Client]]:
     """A flight program whose commands the actuators have."""
     path = folder / name
@@ -60,18 +62,7 @@ def test_commands_go_through_while_armed(guard: Guard, library: Path, tmp_path: 
         assert guard.told(f"process {fc.process.pid} has the slot")
         code, out, err = fc.stop()
         assert (code, err) == (0, "") and f"actuators by the guard at {guard.slot}" in out
-    guard.wait_line("has left the slot")
-
-
-def test_kill(guard: Guard, library: Path, tmp_path: Path) -> None:
-    with armed_flight(guard, library, tmp_path) as (fc, _):
-        fc.process.kill()
-        killed = time.monotonic()
-        guard.wait_last(SAFE)
-        guard.stays_safe()
-        last = max(write.time_s for write in guard.writes() if write.values == COMMAND)
-        assert last - killed < TIMEOUT_S + PATIENCE_S / 10  # that much for a busy computer
-    guard.wait_line("silent: no command for 200 ms")
+        assert "fcsl-fc: guard: there to the end\n" in out
     guard.wait_line("has left the slot")
 
 
@@ -84,7 +75,7 @@ def test_stop_and_continue(guard: Guard, library: Path, tmp_path: Path) -> None:
         with flying("--guard", guard.slot, library=str(library)) as second:
             code, _, err = second.wait()
             assert code == 1 and f"refused: process {fc.process.pid} has its slot" in err
-        guard.wait_line("turned away a flight program")
+        guard.wait_line("turned away a process")
         fc.process.send_signal(signal.SIGCONT)
         guard.wait_last(COMMAND)
 
@@ -96,6 +87,19 @@ def test_a_step_that_hangs(guard: Guard, library: Path, tmp_path: Path) -> None:
         guard.wait_last(SAFE)
         guard.stays_safe()
         assert fc.process.poll() is None and client.get("pilot.outputs.armed") is True
+
+
+def test_stop_in_the_middle_of_a_step(guard: Guard, library: Path, tmp_path: Path) -> None:
+    """Its command comes after SIGCONT, and is as old as the sensors that it was computed from."""
+    with armed_flight(guard, library, tmp_path) as (fc, client):
+        client.ok("set", values={"pilot.outputs.force": -77.0, "pilot.state.stop": True})
+        os.waitid(os.P_PID, fc.process.pid, os.WSTOPPED | os.WNOWAIT)
+        time.sleep(TIMEOUT_S)  # the age that the guard has to notice
+        guard.wait_last(SAFE)
+        fc.process.send_signal(signal.SIGCONT)
+        wait_for(lambda: client.get("pilot.state.hang"))  # published after the command was written
+        guard.stays_safe()
+        assert -77.0 not in {write.values["number"] for write in guard.writes()}
 
 
 def test_a_pause(guard: Guard, library: Path, tmp_path: Path) -> None:
@@ -142,7 +146,7 @@ NONSENSE: dict[str, tuple[Callable[[Slot], None], str]] = {
     "an impossible size": (lambda s: s.write(GOOD, size=2**64 - 1), "truncated"),
     "a size beyond the slot": (lambda s: s.write(GOOD, size=len(s.memory)), "truncated"),
     "a command from the future": (
-        lambda s: s.write(GOOD, written_ns=time.monotonic_ns() + FUTURE_S * 10**9), "its time is in the future"
+        lambda s: s.write(GOOD, begun_ns=time.monotonic_ns() + FUTURE_S * 10**9), "its time is in the future"
     ),
     "all bits": (lambda s: s.write(b"\xff" * len(GOOD)), "it does not begin as a message of this kind"),
 }  # fmt: skip
@@ -173,7 +177,7 @@ def test_nonsense_is_refused(guard: Guard, what: str) -> None:
 def test_an_old_command_is_no_command(guard: Guard) -> None:
     """One that was written longer ago than the time-out: the guard was late, or the writer."""
     slot = Slot(guard.slot)
-    slot.write(command(COMMAND["number"]), written_ns=time.monotonic_ns() - int((TIMEOUT_S + 1) * 1e9))
+    slot.write(command(COMMAND["number"]), begun_ns=time.monotonic_ns() - int((TIMEOUT_S + 1) * 1e9))
     guard.wait_line("silent")
     slot.close()
     assert all(write.values == SAFE for write in guard.writes())
@@ -196,6 +200,19 @@ def patient(build_guarded: BuildGuarded) -> Path:
     return build_guarded("TIMEOUT_NS=60000000000u")
 
 
+@pytest.mark.parametrize("number", [signal.SIGKILL, signal.SIGSEGV, signal.SIGTERM])
+def test_kill(patient: Path, tmp_path: Path, number: signal.Signals) -> None:
+    """A command ends with its program, however that ends and however long its machine lets a command last."""
+    with guarding(patient, tmp_path) as guard, armed_flight(guard, patient, tmp_path) as (fc, _):
+        fc.process.send_signal(number)
+        guard.wait_last(SAFE)
+        guard.stays_safe()
+        guard.wait_line("disarmed, at tick")
+        guard.wait_line(f"process {fc.process.pid} has left the slot")
+        with armed_flight(guard, patient, tmp_path, "again"):
+            pass
+
+
 def test_the_guard_ends_with_safe_values(patient: Path, tmp_path: Path) -> None:
     with guarding(patient, tmp_path) as guard, armed_flight(guard, patient, tmp_path) as (fc, _):
         assert guard.end() == 0
@@ -209,6 +226,25 @@ def test_the_guard_ends_with_safe_values(patient: Path, tmp_path: Path) -> None:
     assert not guard.slot.exists()
 
 
+@pytest.mark.parametrize(
+    "name", ["SIGINT", "SIGQUIT", "SIGUSR1", "SIGUSR2", "SIGALRM", "SIGXCPU", "SIGPWR", "SIGRTMAX"]
+)
+def test_every_signal_that_ends_the_guard_leaves_safe_values(patient: Path, tmp_path: Path, name: str) -> None:
+    with guarding(patient, tmp_path) as guard:
+        slot = Slot(guard.slot)
+        slot.write(command(COMMAND["number"]))
+        guard.wait_last(COMMAND)
+        assert guard.end(signal.Signals[name]) == 0
+        assert guard.last() == SAFE
+        slot.close()
+
+
+def test_no_terminal_stops_the_guard(guard: Guard) -> None:
+    status = Path(f"/proc/{guard.process.pid}/status").read_text()
+    ignored = int(re.search(r"SigIgn:\s*(\w+)", status)[1], 16)  # type: ignore[index]
+    assert all(ignored >> (number - 1) & 1 for number in (signal.SIGTSTP, signal.SIGTTIN, signal.SIGTTOU))
+
+
 def test_a_killed_guard_leaves_the_last_command(patient: Path, tmp_path: Path) -> None:
     """The limit of it, stated in docs/guard.md: only the device or a hardware watchdog can do something then. A guard that
     starts again writes safe values first, and the flight program must be started again, too."""
@@ -218,8 +254,8 @@ def test_a_killed_guard_leaves_the_last_command(patient: Path, tmp_path: Path) -
         with guarding(patient, tmp_path) as second:
             assert second.slot == guard.slot
             second.stays_safe()
-        code, _, err = fc.stop()
-        assert code == 0 and "fcsl-guard has ended" in err
+        code, out, err = fc.stop()
+        assert code == 0 and "fcsl-guard has ended" in err and "fcsl-fc: guard: ended before the run did\n" in out
 
 
 def test_a_stopped_guard_knows_how_old_its_command_is(guard: Guard) -> None:
@@ -248,6 +284,32 @@ def test_the_page_names_tests_that_there_are() -> None:
     assert len(named) > 10 and named <= {
         n for file in files for n in re.findall(r"^def (test_\w+)", file.read_text(), re.M)
     }
+
+
+def test_the_summary_tells_of_the_guard(guard: Guard, library: Path, tmp_path: Path) -> None:
+    for options, state in ((("--guard", guard.slot), "there"), ((), "none")):
+        with flying("--ticks", "1", "--summary", tmp_path / "end", *options, library=str(library)) as fc:
+            assert fc.wait()[0] == 0
+        assert json.loads((tmp_path / "end").read_text())["guard"] == state
+
+
+def test_a_guard_that_does_not_answer(library: Path, tmp_path: Path) -> None:
+    """Its queue is full, so nobody can even connect to it."""
+    path = tmp_path / "slot"
+    with contextlib.ExitStack() as stack:
+        sockets = [stack.enter_context(socket.socket(socket.AF_UNIX, socket.SOCK_SEQPACKET)) for _ in range(2)]
+        sockets[0].bind(str(path))
+        sockets[0].listen(0)
+        sockets[1].connect(str(path))
+        with flying("--guard", path, library=str(library)) as fc:
+            code, _, err = fc.wait()
+    assert code == 1 and f"cannot connect to socket '{path}'" in err
+
+
+def test_a_guard_needs_real_time(library: Path, tmp_path: Path) -> None:
+    with flying("--guard", tmp_path / "slot", "--rate", "max", library=str(library)) as fc:
+        code, _, err = fc.wait()
+    assert code == 2 and "--guard with --rate max" in err
 
 
 def test_without_a_guard_nothing_starts(library: Path, tmp_path: Path) -> None:

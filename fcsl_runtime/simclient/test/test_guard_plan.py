@@ -11,7 +11,7 @@ from pathlib import Path
 
 import pytest
 from conftest import CFLAGS, ROOT
-from guarding import Slot, command, guarding, log_writes, wait_for
+from guarding import COMMAND, SAFE, Guard, Slot, command, guarding, log_writes, wait_for
 from native import GUARD
 
 #: A library of drivers, and the defects that a macro puts into the first one. The device is a file that must exist.
@@ -39,7 +39,7 @@ DRIVERS = """
 #define SECOND FCSL_DRIVER_SIGNAL(arm_t, other, "N", "the other force")
 #endif
 
-typedef struct { double force, other; float small; } arm_t;
+typedef struct { double force, other; float small; double last; int busy; } arm_t;
 static const fcsl_driver_signal_t signals[] = {FCSL_DRIVER_SIGNAL(arm_t, force, "N", "force"), SECOND};
 static const fcsl_driver_signal_t in_metres[] = {FCSL_DRIVER_SIGNAL(arm_t, force, "m", "not a force")};
 static const fcsl_driver_signal_t small[] = {FCSL_DRIVER_SIGNAL(arm_t, small, "N", "a small force")};
@@ -60,10 +60,17 @@ static fcsl_driver_status_t read_arm(void *self, uint64_t *sample_ns, char *why,
     (void)self, (void)sample_ns, (void)why, (void)size;
     return FCSL_DRIVER_NOTHING;
 }
+#ifndef BUSY
+#define BUSY 1000000000
+#endif
+/* After each change of the force so many writes are not taken. */
 static fcsl_driver_status_t write_arm(void *self, char *why, size_t size)
 {
+    arm_t *arm = self;
     (void)snprintf(why, size, "the bus is off");
-    return self != NULL ? FCSL_DRIVER_FAILED : FCSL_DRIVER_OK;
+    arm->busy = arm->force != arm->last ? BUSY : arm->busy - (arm->busy > 0);
+    arm->last = arm->force;
+    return arm->busy > 0 ? FCSL_DRIVER_FAILED : FCSL_DRIVER_OK;
 }
 static void close_arm(void *self)
 {
@@ -211,8 +218,8 @@ def test_the_command_line(library: Path, tmp_path: Path) -> None:
     }.items():
         code, err = run(*arguments)
         assert code == 2 and reason in err and err.endswith("Try `fcsl-guard --help`.\n")
-    code, err = run(library, *slot, "--period-ms", "201")
-    assert code == 1 and "--period-ms 201 is more than the 200 ms for which actuators of machine 'guarded' keep" in err
+    code, err = run(library, *slot, "--period-ms", "96")
+    assert code == 1 and "keep a command for 200 ms, less than a tick and two periods (202 ms)" in err
     for option in ("--help", "--version"):
         done = subprocess.run([GUARD, option], capture_output=True, text=True, timeout=30, check=True)
         assert "fcsl-guard" in done.stdout and done.stderr == ""
@@ -226,6 +233,87 @@ def test_a_slot_in_use_is_left_alone(library: Path, tmp_path: Path) -> None:
         assert not device.exists()  # nor are the devices touched
         assert (guard.slot.stat().st_mode & 0o777) == 0o600
         Slot(guard.slot).close()
+
+
+def test_a_missing_device_keeps_no_other_from_its_safe_values(library: Path, drivers: Path, tmp_path: Path) -> None:
+    """As after the death of a guard, which left its last command, when one device has gone with it."""
+    log = tmp_path / "log"
+    missing = f"cart.force={drivers}:arm.force:{tmp_path}/no"
+    code, err = run(library, "--slot", tmp_path / "slot", "--actuator", missing, "--actuator", f"panel.valve=log:{log}")
+    assert code == 1 and "is not there: no file '" in err and err.count("\n") == 1
+    assert [write.values for write in log_writes(log)] == [{"flag": 1.0}]
+
+
+def test_the_last_safe_values_are_tried_again(
+    build_guarded: Callable[..., Path], tmp_path_factory: pytest.TempPathFactory, tmp_path: Path
+) -> None:
+    """A device that is busy when the guard is told to end has them in the end."""
+    patient = build_guarded("TIMEOUT_NS=60000000000u")
+    device = tmp_path / "arm"
+    device.touch(0o700)
+    plan = [f"cart.force={build(tmp_path_factory.mktemp('busy'), 'BUSY=3')}:arm.force:{device}", VALVE]
+    arguments = [GUARD, patient, "--slot", tmp_path / "slot", *(f"--actuator={entry}" for entry in plan)]
+    process = subprocess.Popen(list(map(str, arguments)), stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True)
+    try:
+        wait_for((tmp_path / "slot").exists)
+        slot = Slot(tmp_path / "slot")
+        slot.write(command(1.0))
+        assert process.stdout
+        lines = iter(process.stdout.readline, "")
+        assert any("armed, at tick" in line for line in lines)
+        process.send_signal(signal.SIGTERM)
+        out, _ = process.communicate(timeout=30)
+    finally:
+        process.kill()
+        process.communicate()
+    assert process.returncode == 0 and out.endswith("fcsl-guard: the actuators have their safe values\n")
+    slot.close()
+
+
+#: Preloaded: what is printed hangs while there is a file with the name in HANGS, as on a disk that does not answer.
+HANG = """
+#define _GNU_SOURCE
+#include <stdlib.h>
+#include <sys/syscall.h>
+#include <unistd.h>
+
+ssize_t write(int fd, const void *data, size_t size)
+{
+    while ((fd == STDOUT_FILENO || fd == STDERR_FILENO) && access(getenv("HANGS"), F_OK) == 0) {
+        (void)pause();
+    }
+    return syscall(SYS_write, fd, data, size);
+}
+"""
+
+
+def test_printing_that_hangs(library: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """It keeps the guard neither from making the actuators safe nor from ending."""
+    source, preloaded, hangs = tmp_path / "hang.c", tmp_path / "hang.so", tmp_path / "hangs"
+    source.write_text(HANG)
+    subprocess.run(["cc", *CFLAGS, str(source), "-o", str(preloaded)], check=True)
+    with monkeypatch.context() as patch:
+        patch.setenv("HANGS", str(hangs))
+        patch.setenv("LD_PRELOAD", str(preloaded))
+        guard = Guard(library, tmp_path)
+    try:
+        guard.wait_line("actuator panel.valve")  # the last line that the guard itself waits for
+        hangs.touch()
+        slot = Slot(guard.slot)
+
+        def arm() -> bool:
+            slot.write(command(COMMAND["number"]))
+            return guard.last() == COMMAND
+
+        for _ in range(2):
+            wait_for(arm)
+            guard.wait_last(SAFE)
+        wait_for(arm)
+        assert guard.end() == 0 and guard.last() == SAFE
+        assert not guard.told("armed")
+        slot.close()
+    finally:
+        guard.end(signal.SIGKILL)
 
 
 def test_writes_that_fail_are_counted_and_told(library: Path, drivers: Path, tmp_path: Path) -> None:

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""fcsl-guard: from kill -9 of the flight program to safe values at the actuator.
+"""fcsl-guard: from SIGSTOP of the flight program, which tells the guard nothing, to safe values at the actuator.
 
 python3 scripts/bench guard
 """
@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import json
 import os
+import signal
 import statistics
 import subprocess
 import tempfile
@@ -21,7 +22,7 @@ from simclient.library import runtime_program
 
 from ..harness.size import sized
 
-KILLS = sized(200, 2)
+STOPS = sized(200, 2)
 TIMEOUT_S, PERIOD_S, TICK_S = 0.05, 0.002, 0.01
 LINE_BYTES = 256
 SAFE = -1.0
@@ -52,15 +53,15 @@ REAL_TIME = ("--realtime-priority", "80", "--lock-memory")
 
 
 def guard_times(folder: Path) -> dict[str, dict[str, float]]:
-    """ms from kill to the first safe write: median, 99th percentile, maximum; and kills. A mode that is not allowed here is
+    """ms from SIGSTOP to the first safe write: median, 99th percentile, maximum; and stops. A mode that is not allowed here is
     left out."""
     (folder / "pilot.py").write_text(ALGORITHM)
     (folder / "pilot.json").write_text(json.dumps(CONFIG))
     library = build_machine(folder / "pilot.json").library
-    times = {"no load of the bench": _kills(library, folder / "idle")}
+    times = {"no load of the bench": _stops(library, folder / "idle")}
     with _load():
-        times["loaded"] = _kills(library, folder / "loaded")
-        times["loaded, SCHED_FIFO"] = _kills(library, folder / "fifo", *REAL_TIME)
+        times["loaded"] = _stops(library, folder / "loaded")
+        times["loaded, SCHED_FIFO"] = _stops(library, folder / "fifo", *REAL_TIME)
     return {name: found for name, found in times.items() if found}
 
 
@@ -76,7 +77,7 @@ def _load() -> Iterator[None]:
             spinner.wait()
 
 
-def _kills(library: Path, log: Path, *options: str) -> dict[str, float]:
+def _stops(library: Path, log: Path, *options: str) -> dict[str, float]:
     slot = log.with_suffix(".slot")
     command = [runtime_program("fcsl-guard"), library, "--slot", slot, "--actuator", f"force=log:{log}", *options]
     found = []
@@ -85,24 +86,25 @@ def _kills(library: Path, log: Path, *options: str) -> dict[str, float]:
             if guard.poll() is not None:
                 return {}
             time.sleep(0.01)
-        for _ in range(KILLS):
-            found.append(_kill(library, slot, log))
+        for _ in range(STOPS):
+            found.append(_stop(library, slot, log))
         guard.terminate()
     cuts = statistics.quantiles(found, n=100)
-    return {"median": cuts[49], "p99": cuts[98], "max": max(found), "kills": KILLS}
+    return {"median": cuts[49], "p99": cuts[98], "max": max(found), "stops": STOPS}
 
 
-def _kill(library: Path, slot: Path, log: Path) -> float:
-    """Starts a flight program, kills it once the actuator has its command, and returns how long that lasted, in ms."""
+def _stop(library: Path, slot: Path, log: Path) -> float:
+    """Starts a flight program, stops it once the actuator has its command, and returns how long that lasted, in ms."""
     command = [runtime_program("fcsl-fc"), library, "--guard", slot]
     with subprocess.Popen(list(map(str, command)), stdout=subprocess.DEVNULL) as program:
         while _writes(log)[-1][1] == SAFE:
             time.sleep(0.005)
-        killed = time.monotonic()
+        stopped = time.monotonic()
+        program.send_signal(signal.SIGSTOP)
+        while (writes := _writes(log))[-1][1] != SAFE:
+            time.sleep(0.005)
         program.kill()
-    while (writes := _writes(log))[-1][1] != SAFE:
-        time.sleep(0.005)
-    return 1e3 * (next(t for t, value in writes if t > killed and value == SAFE) - killed)
+    return 1e3 * (next(t for t, value in writes if t > stopped and value == SAFE) - stopped)
 
 
 def _writes(log: Path) -> list[tuple[float, float]]:
@@ -117,7 +119,7 @@ def guard_rows(facts: dict[str, dict[str, float]]) -> list[tuple[str, str]]:
     bound = 1e3 * (TIMEOUT_S + PERIOD_S)
     return [
         (
-            f"kill -9 to safe outputs, {name}",
+            f"SIGSTOP to safe outputs, {name}",
             f"{t['median']:.1f} ms median, {t['p99']:.1f} 99 %, {t['max']:.1f} worst (time-out and period {bound:.0f})",
         )
         for name, t in facts.items()

@@ -1,9 +1,11 @@
 /* SPDX-License-Identifier: Apache-2.0
  *
  * A machine written by hand against the ABI for fcsl-guard: a client of fcsl-fc sets what it commands and whether it is armed,
- * and can make its step hang. 100 Hz; the actuators keep a command for 0.2 s. Macros change that.
+ * and can make its step hang, or stop the process. 100 Hz; the actuators keep a command for 0.2 s. Macros change that.
  */
+#define _POSIX_C_SOURCE 200809L
 #include <math.h>
+#include <signal.h>
 #include <string.h>
 
 #include "fcsl/fcsl_machine.h"
@@ -18,7 +20,7 @@ typedef struct {
         int64_t stamp_ns;
     } channel;
     double force;
-    uint8_t valve, armed, hang;
+    uint8_t valve, armed, hang, stop;
     int32_t request, health;
     uint64_t faults, overruns;
     uint32_t fault_place;
@@ -55,13 +57,14 @@ static const fcsl_field_t fields[] = {
     FIELD("pilot.outputs.transition_request", FCSL_ROLE_OUTPUT, FCSL_TRANSITION_REQUEST, 0, request, 0, ""),
     FIELD("pilot.outputs.health", FCSL_ROLE_OUTPUT, FCSL_HEALTH, 0, health, 0, ""),
     FIELD("pilot.state.hang", FCSL_ROLE_STATE, FCSL_BOOL, W, hang, 0, ""),
+    FIELD("pilot.state.stop", FCSL_ROLE_STATE, FCSL_BOOL, W, stop, 0, ""),
     FIELD("pilot.counters.faults", FCSL_ROLE_COUNTER, FCSL_U64, 0, faults, 0, ""),
     FIELD("pilot.counters.overruns", FCSL_ROLE_COUNTER, FCSL_U64, 0, overruns, 0, ""),
     FIELD("pilot.counters.fault_place", FCSL_ROLE_COUNTER, FCSL_U32, 0, fault_place, 0, ""),
 };
 
 static const fcsl_instance_t instances[] = {
-    {"pilot", "pilot", "guarded.c", 1, GAUGE, 10, AT(request), AT(health), AT(faults), AT(overruns), AT(fault_place),
+    {"pilot", "pilot", "guarded.c", 1, GAUGE, 11, AT(request), AT(health), AT(faults), AT(overruns), AT(fault_place),
      FCSL_NO_OFFSET, FCSL_NO_OFFSET, 0, 1, "guarded/msg/GuardedPilot",
      "std_msgs/Header header\nuint64 tick\nfloat64 gauge\nfloat64 force\nbool valve\nbool armed\nuint8 health\n"},
 };
@@ -97,6 +100,11 @@ static void step(void *machine, const fcsl_host_t *host)
     const volatile uint8_t *hang = &m->hang;
     m->current = 0;
     while (*hang != 0u) {
+    }
+    if (m->stop != 0u) { /* SIGSTOP in the middle of this step, whose command is the last one: the next step hangs */
+        m->stop = 0;
+        m->hang = 1;
+        (void)raise(SIGSTOP);
     }
     m->current = FCSL_NONE;
     m->health = FCSL_NOMINAL;

@@ -1,0 +1,109 @@
+/* SPDX-License-Identifier: Apache-2.0
+ *
+ * The thread that prints.
+ */
+#define _GNU_SOURCE
+#include "printing.h"
+
+#include <errno.h>
+#include <inttypes.h>
+#include <pthread.h>
+#include <semaphore.h>
+#include <signal.h>
+#include <stdarg.h>
+#include <stdatomic.h>
+#include <stdio.h>
+#include <time.h>
+
+#include "base/error.h"
+#include "fcsl/fcsl_log.h"
+#include "log.h"
+
+enum { END_S = 1, INFO = 'i', ERROR = 'e' };
+
+/* A process prints in one place. The first character of a line says whether it is an error. */
+static fcsl_log_t lines;
+static sem_t written; /* posted once per line, and for the end */
+static sem_t finished; /* posted by the thread: all is printed */
+static atomic_int over;
+static pthread_t thread;
+static int started;
+
+static void *print_lines(void *unused)
+{
+    (void)unused;
+    char text[FCSL_LOG_BYTES];
+    for (;;) {
+        while (sem_wait(&written) != 0) {
+        }
+        const int ends = atomic_load(&over);
+        if (fcsl_log_read(&lines, text)) {
+            (text[0] == ERROR ? log_error : log_info)("%s", text + 1);
+        } else if (ends) {
+            (void)sem_post(&finished);
+            return NULL;
+        }
+    }
+}
+
+int printing_start(fcsl_error_t *error)
+{
+    sigset_t all;
+    sigset_t before;
+    (void)sigfillset(&all);
+    if (sem_init(&written, 0, 0) != 0 || sem_init(&finished, 0, 0) != 0 ||
+        pthread_sigmask(SIG_SETMASK, &all, &before) != 0) {
+        return fcsl_fail(error, "cannot prepare the thread that prints");
+    }
+    /* Signals are for the thread that sleeps until the next period. */
+    started = pthread_create(&thread, NULL, print_lines, NULL) == 0;
+    (void)pthread_sigmask(SIG_SETMASK, &before, NULL);
+    return started ? 0 : fcsl_fail(error, "cannot start the thread that prints");
+}
+
+void printing_end(void)
+{
+    if (!started) {
+        return;
+    }
+    const uint64_t dropped = atomic_load(&lines.dropped);
+    if (dropped > 0u) {
+        print_error("%" PRIu64 " lines were not printed: whoever takes them was too slow", dropped);
+    }
+    struct timespec until = {0};
+    (void)clock_gettime(CLOCK_MONOTONIC, &until);
+    until.tv_sec += END_S;
+    atomic_store(&over, 1);
+    (void)sem_post(&written);
+    int waited = 0;
+    do {
+        waited = sem_clockwait(&finished, CLOCK_MONOTONIC, &until);
+    } while (waited != 0 && errno == EINTR);
+    /* A thread that still waits for the system ends with the process. */
+    (void)(waited == 0 ? pthread_join(thread, NULL) : pthread_detach(thread));
+    started = 0;
+}
+
+static void put_line(char kind, const char *format, va_list arguments)
+{
+    char text[FCSL_LOG_BYTES] = {kind};
+    (void)vsnprintf(text + 1, sizeof text - 1u, format, arguments);
+    fcsl_log_write(&lines, text);
+    (void)sem_post(&written);
+}
+
+void print_info(const char *format, ...)
+{
+    va_list arguments;
+    va_start(arguments, format);
+    put_line(INFO, format, arguments);
+    va_end(arguments);
+}
+
+void print_error(const char *format, ...)
+{
+    va_list arguments;
+    va_start(arguments, format);
+    put_line(ERROR, format, arguments);
+    va_end(arguments);
+}
