@@ -109,10 +109,14 @@ static int open_server(program_t *program)
     return loop->vars != NULL ? 0 : complain(error.text);
 }
 
-/* While it waits for the simulator, a signal ends the program as it ends any other: there is nothing to save. */
+/* While it waits for the simulator, a signal ends the program as it ends any other: there is nothing to save. Where nothing is
+ * waited for, a signal waits for the monitor. */
 static int open_hal(program_t *program, fcsl_error_t *error)
 {
     fcsl_hal_t *hal = &program->loop.hal;
+    if (program->options.wire == NULL) {
+        return hal->open(hal, error->text, sizeof error->text);
+    }
     monitor_let_signals(&program->monitor);
     const int status = hal->open(hal, error->text, sizeof error->text);
     monitor_block_signals(&program->monitor);
