@@ -15,6 +15,7 @@ typedef struct {
     size_t size;
     int waits;
     int closed;
+    int ends; /* closed once what waits is taken */
 } fake_wire_t;
 
 static fcsl_wire_status_t fake_send(void *ctx, const uint8_t *message, size_t size)
@@ -29,7 +30,7 @@ static fcsl_wire_status_t fake_receive(void *ctx, uint64_t deadline_ns, uint8_t 
     fake_wire_t *fake = ctx;
     (void)deadline_ns;
     if (!fake->waits) {
-        return fake->closed ? FCSL_WIRE_CLOSED : FCSL_WIRE_NONE;
+        return fake->closed || fake->ends ? FCSL_WIRE_CLOSED : FCSL_WIRE_NONE;
     }
     fake->waits = 0;
     if (fake->size > capacity) {
