@@ -87,14 +87,15 @@ class ControllerNode(LifecycleNode):
         return self._attempt(self._activate)
 
     def on_deactivate(self, state: LifecycleState) -> TransitionCallbackReturn:
-        self._active = False
+        self._end_ticking()
         return _SUCCESS if self._failure is None else _ERROR
 
     def on_cleanup(self, state: LifecycleState) -> TransitionCallbackReturn:
         return self._attempt(lambda: self._release("cleaned up"))
 
     def on_shutdown(self, state: LifecycleState) -> TransitionCallbackReturn:
-        self._active, self._finalized = False, True
+        self._end_ticking()
+        self._finalized = True
         self._attempt(lambda: self._release(self._ending))
         return _SUCCESS
 
@@ -142,6 +143,12 @@ class ControllerNode(LifecycleNode):
         self._mode.activate()
         self._active, self._ending = True, "shut down"
 
+    def _end_ticking(self) -> None:
+        """The actuators get their safe values: no command follows."""
+        if self._active and self._hosted is not None:
+            self._hosted.make_safe()
+        self._active = False
+
     def _release(self, why: str) -> None:
         if self._hosted is None or self._mode is None:
             return
@@ -153,6 +160,7 @@ class ControllerNode(LifecycleNode):
 
     def _close(self) -> None:
         """Leaves the simulator, completes the bag and removes everything that configure created."""
+        self._end_ticking()
         mode, hosted, self._mode, self._hosted = self._mode, self._hosted, None, None
         if mode is not None:
             mode.leave()

@@ -8,6 +8,7 @@ from __future__ import annotations
 from collections.abc import Callable
 from typing import Any
 
+from rclpy.duration import Duration
 from rclpy.node import Node
 
 from simclient.ros.topics import Inlet, RosTopic, composer_of, topics_of
@@ -16,6 +17,10 @@ from simclient.run import Run
 from . import qos
 from .interfaces import message_class
 from .polled import Polled
+
+
+#: For receivers of the last commands to have them.
+_SAFE_WAIT = Duration(seconds=0.2)
 
 
 class Inputs:
@@ -101,8 +106,20 @@ class Outputs:
 
     def publish(self, time_ns: int) -> None:
         """Publishes the messages of the last completed tick, stamped time_ns."""
+        self._publish(self._run.actuator_address, time_ns)
+
+    def make_safe(self, time_ns: int) -> None:
+        """Publishes the safe values of a machine that something arms, stamped time_ns, and waits a moment for their
+        receivers. For the end of ticking: no command follows."""
+        if self._run.safe_address is None:
+            return
+        self._publish(self._run.safe_address, time_ns)
+        for _, _, publisher in self._outlets:
+            publisher.wait_for_all_acked(_SAFE_WAIT)
+
+    def _publish(self, address: int, time_ns: int) -> None:
         for _, composer, publisher in self._outlets:
-            data = composer.compose([self._run.actuator_address], time_ns)
+            data = composer.compose([address], time_ns)
             if data is not None:
                 publisher.publish(data)
 

@@ -17,7 +17,7 @@ class Imu:
 _PILOT = """
 class Pilot:
     inputs = {"rate": "f64[3] rad/s"}
-    outputs = {"torque": "f64 N", "ticks": "i64"}
+    outputs = {"torque": "f64 N", "ticks": "i64", "on": "bool"}
     parameters = {
         "gain": "f64 N/rad in 0..10",  # torque for each radian
         "limit": "f32",
@@ -37,6 +37,7 @@ class Pilot:
     def execute(self):
         self.torque = self.gain * self.rate[2] + self.shape
         self.ticks += 1
+        self.on = True
 """
 _SLOW = """
 class Slow:
@@ -63,8 +64,9 @@ PARAMETERS = {
 }
 
 
-def build(folder: Path, tick_hz: int = 100, publish: tuple[str, ...] = ()) -> Path:
-    """The library of machine `rig`; its published instances have no message package."""
+def build(folder: Path, tick_hz: int = 100, publish: tuple[str, ...] = (), safe: float | None = None) -> Path:
+    """The library of machine `rig`; its published instances have no message package. safe: of the torque, which the
+    pilot then arms."""
     (folder / "imu.py").write_text(_IMU)
     (folder / "pilot.py").write_text(_PILOT)
     (folder / "slow.py").write_text(_SLOW)
@@ -105,6 +107,8 @@ def build(folder: Path, tick_hz: int = 100, publish: tuple[str, ...] = ()) -> Pa
             },
         ],
     }
+    if safe is not None:
+        config["arm"], config["channels"][1]["safe"] = "pilot.on", safe  # type: ignore[index]
     (folder / "rig.json").write_text(json.dumps(config))
     done = subprocess.run(
         ["fcslc", "build", str(folder / "rig.json"), "-o", str(folder / "out")], capture_output=True, text=True

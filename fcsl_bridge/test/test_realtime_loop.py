@@ -226,6 +226,24 @@ def test_outputs_hold_while_inactive_and_old_samples_are_forgotten(robot: Robot)
     assert replay(robot.bag, library=str(robot.library)).identical
 
 
+@pytest.mark.parametrize("how", ["deactivate", "interrupt", "terminate"])
+def test_actuators_are_safe_when_ticking_ends(
+    how: str, domain: Domain, tmp_path_factory: pytest.TempPathFactory
+) -> None:
+    """The last message of a command is its safe value; before, the machine was armed."""
+    robot = Robot(domain, rig.build(tmp_path_factory.mktemp("rig"), HZ, safe=-7.0))
+    robot.sense(1.0)
+    robot.listener.until(lambda: robot.torque() == 1.25)
+    if how == "deactivate":
+        assert robot.client.change(DEACTIVATE)
+        robot.listener.until(lambda: robot.torque() == -7.0)
+        assert robot.client.change(ACTIVATE)
+        robot.listener.until(lambda: robot.torque() == 1.25)
+    assert robot.end(signal.SIGTERM if how == "terminate" else signal.SIGINT) == 0
+    robot.listener.until(lambda: robot.torque() == -7.0)
+    assert replay(robot.bag, library=str(robot.library)).identical
+
+
 def test_a_killed_controller_leaves_a_bag_that_replays(robot: Robot) -> None:
     for rate in range(20):
         robot.sense(float(rate))

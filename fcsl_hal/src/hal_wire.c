@@ -150,7 +150,7 @@ static fcsl_hal_status_t timed_out(hal_t *hal, uint64_t tick)
 }
 
 /* The wire has nothing now, or never again: FCSL_HAL_OK to wait on. */
-static fcsl_hal_status_t nothing_came(hal_t *hal, fcsl_wire_status_t status, uint64_t tick, uint64_t deadline_ns)
+static fcsl_hal_status_t nothing_came(hal_t *hal, fcsl_wire_status_t status, uint64_t tick)
 {
     if (atomic_load(&hal->interrupted)) {
         (void)snprintf(hal->text, sizeof hal->text, "interrupted while waiting for tick %" PRIu64, tick);
@@ -161,10 +161,7 @@ static fcsl_hal_status_t nothing_came(hal_t *hal, fcsl_wire_status_t status, uin
         (void)snprintf(hal->text, sizeof hal->text, "the simulator went away before tick %" PRIu64, tick);
         return FCSL_HAL_ERROR;
     }
-    if (status == FCSL_WIRE_ERROR) {
-        return wire_failed(hal);
-    }
-    return monotonic_ns() >= deadline_ns ? timed_out(hal, tick) : FCSL_HAL_OK;
+    return status == FCSL_WIRE_ERROR ? wire_failed(hal) : FCSL_HAL_OK;
 }
 
 /* Takes one message of the tick: FCSL_HAL_OK to go on, NONE when the tick happens now. */
@@ -209,7 +206,7 @@ static fcsl_hal_status_t sample_paced(hal_t *hal, uint64_t tick, uint8_t *bytes,
                                             ? FCSL_WIRE_NONE
                                             : receive(hal, look_ns < deadline_ns ? look_ns : deadline_ns, &size);
         status = came == FCSL_WIRE_OK ? hear(hal, tick, size, bytes, capacity, message, &sensed)
-                                      : nothing_came(hal, came, tick, deadline_ns);
+                                      : nothing_came(hal, came, tick);
         if (status == FCSL_HAL_OK && monotonic_ns() >= deadline_ns) {
             status = timed_out(hal, tick);
         }

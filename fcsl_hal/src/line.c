@@ -24,6 +24,14 @@ int line_set_nonblocking(int fd)
     return flags >= 0 && fcntl(fd, F_SETFL, flags | O_NONBLOCK) == 0 ? 0 : -1;
 }
 
+void line_begin(line_t *line, int fd)
+{
+    line->fd = fd;
+    line->pending[0] = 0;
+    line->pending_from = 0;
+    line->pending_to = 1;
+}
+
 void line_drop(line_t *line)
 {
     if (line->fd >= 0) {

@@ -38,6 +38,8 @@ int line_has_speed(uint32_t baud);
 int line_accept(line_t *line);
 void line_close(line_t *line);
 
+/* A stream begins: with a zero, so that what was on the line before does not hide the first frame. */
+void line_begin(line_t *line, int fd);
 /* The peer is gone. */
 void line_drop(line_t *line);
 

@@ -45,6 +45,18 @@ static int listen_at(const struct sockaddr_storage *there, socklen_t length, con
     return fd;
 }
 
+/* Where nobody listens on a port of this computer, the system may give the same one to who connects: to itself, then. */
+static int is_own(int fd)
+{
+    struct sockaddr_storage ours = {0};
+    struct sockaddr_storage theirs = {0};
+    socklen_t length = sizeof ours;
+    socklen_t their_length = sizeof theirs;
+    return getsockname(fd, (struct sockaddr *)&ours, &length) == 0 &&
+           getpeername(fd, (struct sockaddr *)&theirs, &their_length) == 0 && length == their_length &&
+           memcmp(&ours, &theirs, length) == 0;
+}
+
 /* Returns a descriptor; -1 with errno. */
 static int connect_once(const struct sockaddr_storage *there, socklen_t length, uint64_t deadline_ns)
 {
@@ -61,11 +73,11 @@ static int connect_once(const struct sockaddr_storage *there, socklen_t length, 
             code = ETIMEDOUT;
         }
     }
-    if (code == 0) {
+    if (code == 0 && !is_own(fd)) {
         return fd;
     }
     (void)close(fd);
-    errno = code;
+    errno = code == 0 ? ECONNREFUSED : code;
     return -1;
 }
 
@@ -83,16 +95,16 @@ int line_open_tcp(line_t *line, const char *address, fcsl_wire_side_t side, uint
         line->listener = listen_at(&there, length, address, error, error_size);
         return line->listener >= 0 ? 0 : -1;
     }
-    while ((line->fd = connect_once(&there, length, deadline_ns)) < 0 && errno == ECONNREFUSED &&
-           monotonic_ns() < deadline_ns) {
+    int fd = connect_once(&there, length, deadline_ns);
+    while (fd < 0 && monotonic_ns() < deadline_ns) { /* nobody listens yet, or the host is not up yet */
         const struct timespec pause = {.tv_nsec = RETRY_MS * NS_PER_MS};
         (void)nanosleep(&pause, NULL);
+        fd = connect_once(&there, length, deadline_ns);
     }
-    if (line->fd < 0 || set_up(line->fd) != 0) {
-        const int fd = line->fd;
-        line->fd = -1;
+    if (fd < 0 || set_up(fd) != 0) {
         return fail(fd, "connect to", address, error, error_size);
     }
+    line_begin(line, fd);
     return 0;
 }
 
@@ -107,6 +119,6 @@ int line_accept(line_t *line)
         (void)close(fd);
         return -1;
     }
-    line->fd = fd;
+    line_begin(line, fd);
     return 0;
 }

@@ -87,7 +87,7 @@ int line_open_uart(line_t *line, const char *device, uint32_t baud, char *error,
     } else if (set_up(fd, *speed) != 0) {
         (void)snprintf(error, error_size, "cannot set '%s' to %" PRIu32 " baud: %s", device, baud, strerror(errno));
     } else {
-        line->fd = fd;
+        line_begin(line, fd);
         return 0;
     }
     if (fd >= 0) {

@@ -6,7 +6,6 @@
 #define _GNU_SOURCE
 #include "wire_link.h"
 
-#include <errno.h>
 #include <inttypes.h>
 #include <poll.h>
 #include <pthread.h>
@@ -450,7 +449,7 @@ int fcsl_wire_over_link(const line_t *line, fcsl_wire_side_t side, size_t messag
             0 ||
         start(self) != 0) {
         release(self);
-        (void)snprintf(error, error_size, "cannot start the thread of the wire: %s", strerror(errno));
+        (void)snprintf(error, error_size, "cannot start the thread of the wire");
         return -1;
     }
     *wire = (fcsl_wire_t){

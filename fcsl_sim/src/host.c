@@ -32,7 +32,7 @@ static int ask_machine(fcsl_sim_t *sim, fcsl_message_t *message, fcsl_error_t *e
         return -1;
     }
     if (fcsl_run_actuate_message(sim->run, sim->message_bytes, sim->message_capacity, message) != 0) {
-        return fcsl_sim_fail(error, "no room for an actuator message");
+        return fcsl_sim_fail(error, "an actuator channel holds what its type does not have: there is no message of it");
     }
     return 0;
 }

@@ -33,8 +33,8 @@ typedef struct fcsl_hal {
      * more. The HAL has checked what came from elsewhere: the host takes *message as it is. Sets it on FCSL_HAL_OK alone. */
     fcsl_hal_status_t (*sample)(void *ctx, uint64_t tick, uint8_t *bytes, size_t capacity, fcsl_message_t *message);
     fcsl_hal_status_t (*command)(void *ctx, const fcsl_message_t *message);
-    /* Called when the arm flag of the commands changes, before the command that changes it, and with 0 at the end of a run. A
-     * HAL that owns actuators switches their outputs; one that hands commands on has the flag in them. */
+    /* Called when the arm flag of the commands changes, before the command that changes it, and with 0 at the end of a run that
+     * is armed. A HAL that owns actuators switches their outputs; one that hands commands on has the flag in them. */
     fcsl_hal_status_t (*arm)(void *ctx, int armed);
     /* The clock of the run: monotonic, or simulated time where a simulator sends it. */
     uint64_t (*now_ns)(void *ctx);

@@ -166,7 +166,7 @@ static int act_on_sensors(loop_t *loop, uint64_t begun_ns)
     count(loop);
     fcsl_message_t message;
     if (fcsl_run_actuate_message(loop->run, loop->actuator_bytes, loop->actuator_capacity, &message) != 0) {
-        fail(loop, "the actuator message does not fit its buffer");
+        fail(loop, "an actuator channel holds what its type does not have: there is no message of it");
         return 0;
     }
     if (fcsl_guard_command(&loop->guard, &message, begun_ns) != 0) {
@@ -284,8 +284,11 @@ int loop_run(loop_t *loop)
             loop_serve(loop);
         }
     }
-    if (loop->armed && hal->arm(hal->ctx, 0) != FCSL_HAL_OK && loop->failure[0] == '\0') {
-        fail(loop, hal->explain(hal->ctx));
+    if (loop->armed) {
+        if (hal->arm(hal->ctx, 0) != FCSL_HAL_OK && loop->failure[0] == '\0') {
+            fail(loop, hal->explain(hal->ctx));
+        }
+        loop_publish(loop);
     }
     return loop->failure[0] != '\0' ? -1 : 0;
 }

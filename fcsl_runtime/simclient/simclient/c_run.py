@@ -71,6 +71,7 @@ _PROTOTYPES: dict[str, tuple[type | None, list[type]]] = {
     "fcsl_run_sense": (c_int, [ptr, c_char_p, c_size_t, _ERROR]),
     "fcsl_run_write_channel": (c_int, [ptr, c_uint32, c_char_p, c_uint32, c_uint32, c_int64, _ERROR]),
     "fcsl_run_actuator_data": (ptr, [ptr]),
+    "fcsl_run_safe_data": (ptr, [ptr]),
     "fcsl_run_actuate": (c_int64, [ptr, ptr, c_size_t]),
     "fcsl_run_step": (c_int, [ptr, c_uint64, _ERROR]),
     "fcsl_run_step_once": (c_int64, [ptr, _ERROR]),

@@ -96,6 +96,13 @@ class Run:
         values while the machine is disarmed. Raises TwinError once the run is closed."""
         return int(self._lib.fcsl_run_actuator_data(self.handle()))
 
+    @property
+    def safe_address(self) -> int | None:
+        """Address of a machine struct whose actuator channels hold their safe values; None where nothing arms the
+        machine. Raises TwinError once the run is closed."""
+        address = self._lib.fcsl_run_safe_data(self.handle())
+        return None if address is None else int(address)
+
     def close(self) -> None:
         """Stops recording and unloads; idempotent."""
         if self._handle is None:

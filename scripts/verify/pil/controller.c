@@ -193,6 +193,7 @@ int main(int argc, char **argv)
         platform_print("no room for this machine or its messages\n");
         return 1;
     }
+    send_byte(0); /* a stream of frames begins with a zero */
     const fcsl_channel_table_t table = fcsl_channel_table(d);
     if (d->init(machine) != 0 || shake_hands(&table) != 0) {
         platform_print("the machine does not begin, or the simulator flies another one\n");

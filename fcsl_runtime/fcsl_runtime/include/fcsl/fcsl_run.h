@@ -86,6 +86,8 @@ int fcsl_run_actuate_message(const fcsl_run_t *run, uint8_t *bytes, size_t capac
 /* A struct of the machine of which the fields of actuator channels hold what the actuators get after the last tick: its own
  * while it is armed, and one with their safe values. */
 const void *fcsl_run_actuator_data(const fcsl_run_t *run);
+/* A struct of the machine whose actuator channels hold their safe values; null where nothing arms the machine. */
+const void *fcsl_run_safe_data(const fcsl_run_t *run);
 /* The channels of its machine. */
 const fcsl_channel_table_t *fcsl_run_channels(const fcsl_run_t *run);
 

@@ -100,6 +100,11 @@ const void *fcsl_run_actuator_data(const fcsl_run_t *run)
     return fcsl_is_armed(run->machine, run->data) ? run->data : run->safe;
 }
 
+const void *fcsl_run_safe_data(const fcsl_run_t *run)
+{
+    return run->safe;
+}
+
 int64_t fcsl_run_actuate(const fcsl_run_t *run, uint8_t *bytes, size_t capacity)
 {
     fcsl_message_t message;
