@@ -8,8 +8,8 @@ cd "$(dirname "$0")/.."
 
 venv="$root/.venv"
 ros=/opt/ros/jazzy
-min_cargo=$(sed -n 's/^rust-version = "\(.*\)"/\1/p' fcsl_runtime/fcsl_runtime/mcap_writer/Cargo.toml)
-cargo_manifests=(fcsl_compiler/math/Cargo.toml fcsl_runtime/fcsl_runtime/mcap_writer/Cargo.toml)
+min_cargo=$(sed -n 's/^rust-version = "\(.*\)"/\1/p' fcsl_hal/io/Cargo.toml)
+cargo_manifests=(fcsl_compiler/math/Cargo.toml fcsl_hal/io/Cargo.toml)
 
 at_least() { printf '%s\n%s\n' "$1" "$2" | sort -CV; } # at_least MINIMUM VERSION
 

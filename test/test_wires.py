@@ -79,9 +79,9 @@ def free_port(kind: socket.SocketKind) -> int:
         return int(found.getsockname()[1])
 
 
-@pytest.mark.parametrize("kind", ["udp", "tcp"])
+@pytest.mark.parametrize("kind", ["udp:", "tcp:", "zenoh:tcp/"])
 def test_network(kind: str, reference: str, library: Path, tmp_path: Path) -> None:
-    wire = f"{kind}:127.0.0.1:{free_port(socket.SOCK_DGRAM if kind == 'udp' else socket.SOCK_STREAM)}"
+    wire = f"{kind}127.0.0.1:{free_port(socket.SOCK_DGRAM if kind == 'udp:' else socket.SOCK_STREAM)}"
     assert fly(wire, wire, library, tmp_path / "bag") == reference
 
 

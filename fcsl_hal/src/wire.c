@@ -14,18 +14,19 @@
 #include "monotonic.h"
 #include "wire_link.h"
 #include "wire_unix.h"
+#include "wire_zenoh.h"
 
 enum { DEVICE_BYTES = 256, BAUD_DIGITS = 7 };
 
-typedef enum { KIND_UNIX, KIND_UDP, KIND_TCP, KIND_UART } kind_t;
+typedef enum { KIND_UNIX, KIND_UDP, KIND_TCP, KIND_UART, KIND_ZENOH } kind_t;
 
 static const char *const KINDS[] = {
-    [KIND_UNIX] = "unix:", [KIND_UDP] = "udp:", [KIND_TCP] = "tcp:", [KIND_UART] = "uart:"};
+    [KIND_UNIX] = "unix:", [KIND_UDP] = "udp:", [KIND_TCP] = "tcp:", [KIND_UART] = "uart:", [KIND_ZENOH] = "zenoh:"};
 
 /* What a SPEC says. */
 typedef struct {
     kind_t kind;
-    const char *address; /* behind the kind: path, HOST:PORT, DEVICE:BAUD */
+    const char *address; /* behind the kind: path, HOST:PORT, DEVICE:BAUD, tcp/HOST:PORT */
     char device[DEVICE_BYTES];
     uint32_t baud;
 } parsed_t;
@@ -52,6 +53,20 @@ static int read_uart(const char *spec, parsed_t *parsed, char *error, size_t err
     return 0;
 }
 
+static int read_zenoh(const char *spec, const parsed_t *parsed, char *error, size_t error_size)
+{
+    static const char TCP[] = "tcp/";
+    struct sockaddr_storage address;
+    socklen_t length = 0;
+    if (strncmp(parsed->address, TCP, strlen(TCP)) != 0 ||
+        fcsl_address_read(parsed->address + strlen(TCP), &address, &length) != 0) {
+        (void)snprintf(error, error_size, "%s: write zenoh:tcp/HOST:PORT in numbers, like zenoh:tcp/127.0.0.1:7447",
+                       spec);
+        return -1;
+    }
+    return 0;
+}
+
 static int parse(const char *spec, parsed_t *parsed, char *error, size_t error_size)
 {
     struct sockaddr_storage address;
@@ -69,6 +84,9 @@ static int parse(const char *spec, parsed_t *parsed, char *error, size_t error_s
             (void)snprintf(error, error_size, "socket path '%s' is too long: 1 to %zu bytes are possible",
                            parsed->address, sizeof((struct sockaddr_un *)0)->sun_path - 1u);
             return -1;
+        }
+        if (parsed->kind == KIND_ZENOH) {
+            return read_zenoh(spec, parsed, error, error_size);
         }
         if (parsed->kind != KIND_UNIX && fcsl_address_read(parsed->address, &address, &length) != 0) {
             (void)snprintf(error, error_size, "%s: HOST:PORT must be numbers, like 127.0.0.1:7600", spec);
@@ -89,6 +107,10 @@ int fcsl_wire_check(const char *spec, char *error, size_t error_size)
 const fcsl_wire_counters_t *fcsl_wire_counters(const char *spec)
 {
     const char *path = KINDS[KIND_UNIX];
+    const char *zenoh = KINDS[KIND_ZENOH];
+    if (strncmp(spec, zenoh, strlen(zenoh)) == 0) {
+        return &fcsl_wire_zenoh_counters;
+    }
     return strncmp(spec, path, strlen(path)) == 0 ? &fcsl_wire_unix_counters : &fcsl_wire_link_counters;
 }
 
@@ -116,6 +138,9 @@ int fcsl_wire_open(const char *spec, fcsl_wire_side_t side, size_t message_max, 
     }
     if (parsed.kind == KIND_UNIX) {
         return fcsl_wire_open_unix(parsed.address, side, message_max, deadline_ns, wire, error, error_size);
+    }
+    if (parsed.kind == KIND_ZENOH) {
+        return fcsl_wire_open_zenoh(parsed.address, side, message_max, deadline_ns, wire, error, error_size);
     }
     if (open_line(&parsed, side, deadline_ns, &line, error, error_size) != 0) {
         return -1;

@@ -19,9 +19,10 @@ def run_example(page: str, file: str, macro: str, program: Path, folder: Path) -
     text = (HAL.parent / "docs" / page).read_text()
     (source,) = re.findall(rf"<!-- file: {re.escape(file)} -->\n```c\n(.*?)```", text, re.DOTALL)
     (folder / file).write_text(source)
-    library = Path(os.environ.get("FCSL_TEST_PROGRAMS", HAL.parent / "build/fcsl_hal")) / "libfcsl_hal.a"
+    build = Path(os.environ.get("FCSL_TEST_PROGRAMS", HAL.parent / "build/fcsl_hal"))
+    libraries = [build / "libfcsl_hal.a", build / "cargo/release/libfcsl_io.a", "-Wl,--gc-sections"]
     includes = [f"-I{path}" for path in (*include_dirs(), HAL / "include", HAL / "test")]
     define = f'-D{macro}="{folder / file}"'
     out = folder / "program"
-    subprocess.run(["cc", *STRICT, define, *includes, program, library, "-lpthread", "-lm", "-o", out], check=True)
+    subprocess.run(["cc", *STRICT, define, *includes, program, *libraries, "-lpthread", "-lm", "-o", out], check=True)
     subprocess.run([out], check=True, timeout=60)

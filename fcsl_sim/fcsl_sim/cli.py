@@ -121,7 +121,7 @@ def _parser() -> argparse.ArgumentParser:
         "--external",
         metavar="wire:SPEC",
         help="the controller is another process (fcsl-fc --hal) at the other end of a wire: unix:PATH, udp:HOST:PORT, "
-        "tcp:HOST:PORT or uart:DEVICE:BAUD",
+        "tcp:HOST:PORT, uart:DEVICE:BAUD or zenoh:tcp/HOST:PORT",
     )
     help_speed = "limit on simulated seconds per second: 1 for real time; 0 (default): as fast as possible"
     command.add_argument("--speed", type=_speed, default=0.0, metavar="FACTOR", help=help_speed)

@@ -8,7 +8,7 @@
 #include <string.h>
 #include <unistd.h>
 
-#include "allocations.h"
+#include "fcsl/fcsl_allocations.h"
 #include "fcsl/fcsl_check.h"
 #include "fcsl/fcsl_hal.h"
 #include "fcsl/fcsl_run.h"

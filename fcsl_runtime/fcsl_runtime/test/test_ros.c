@@ -10,7 +10,7 @@
 #include <sys/mman.h>
 #include <unistd.h>
 
-#include "allocations.h"
+#include "fcsl/fcsl_allocations.h"
 #include "messages/cdr.c" /* not part of the library's interface */
 #include "fcsl/fcsl_check.h"
 #include "fcsl/fcsl_ros.h"

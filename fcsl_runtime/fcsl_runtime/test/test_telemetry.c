@@ -12,7 +12,7 @@
 #include <unistd.h>
 
 #define COUNTED_THREADS /* all of them */
-#include "allocations.h"
+#include "fcsl/fcsl_allocations.h"
 #include "fcsl/fcsl_check.h"
 #include "fcsl/fcsl_scalar.h"
 #include "fcsl/fcsl_telemetry.h"

@@ -96,7 +96,7 @@ class Builder:
         self.archive = FOLDER / "libnative.a"
         self.archive.unlink(missing_ok=True)
         run(["llvm-ar-19", "rcs", self.archive, *objects])
-        rust = package_prefix("fcsl_runtime") / "lib" / "libfcsl_mcap_writer.a"
+        rust = package_prefix("fcsl_hal") / "lib" / "libfcsl_io.a"
         self.libraries = [self.archive, rust, math_library()]
 
     def machines(self, target: Target) -> list[Path]:

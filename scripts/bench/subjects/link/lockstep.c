@@ -120,11 +120,11 @@ static void over_wire(const char *spec, const char *theirs, int ticks, double *t
     data_t data = {.gyro = {0.1, -0.2, 0.3}, .acceleration = {0.0, 0.1, -9.8}};
     fcsl_external_t *external = NULL;
     const fcsl_channel_table_t table = fcsl_channel_table(&MACHINE);
-    check(fcsl_external_open(spec, &MACHINE, &external, error, sizeof error) == 0, error);
-    const pid_t child = fork();
+    const pid_t child = fork(); /* before there is a thread of a wire */
     if (child == 0) {
         control(theirs);
     }
+    check(fcsl_external_open(spec, &MACHINE, &external, error, sizeof error) == 0, error);
     check(fcsl_external_accept(external, WAIT_MS) == FCSL_HAL_OK, "no controller came");
     double begun = 0.0;
     for (int i = 0; i < WARM_UP + ticks; i++) {

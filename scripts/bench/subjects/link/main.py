@@ -18,13 +18,16 @@ import threading
 from pathlib import Path
 from typing import Any
 
+from fcsl_compiler.base.ament import package_prefix
+
 from ...harness.native import BENCH, compile_program
 from ...harness.size import sized
 
 HERE = Path(__file__).resolve().parent
 HAL = BENCH.parents[1] / "fcsl_hal"
 TICKS = sized(
-    {"unix": 100_000, "udp": 30_000, "tcp": 30_000, "uart": 3_000}, dict.fromkeys(("unix", "udp", "uart"), 200)
+    {"unix": 100_000, "udp": 30_000, "tcp": 30_000, "uart": 3_000, "zenoh": 30_000},
+    dict.fromkeys(("unix", "udp", "uart", "zenoh"), 200),
 )
 LOSSES = (0.0, 0.001, 0.01, 0.05, 0.1, 0.2)
 LINK_TICKS = sized(1_000_000, 20_000)
@@ -33,10 +36,12 @@ LINK_TICKS = sized(1_000_000, 20_000)
 def link_figures(folder: Path) -> dict[str, Any]:
     sources = [HERE / "lockstep.c", BENCH / "harness/timing.c", *sorted((HAL / "src").glob("*.c"))]
     includes = [HAL / "include", HAL / "src"]
-    lockstep = compile_program(sources, folder / "lockstep", includes, ["-lpthread"])
-    goodput = compile_program([HERE / "goodput.c", *sources[1:]], folder / "goodput", includes, ["-lpthread"])
+    flags = ["-lpthread", "-Wl,--gc-sections"]
+    zenoh = package_prefix("fcsl_hal") / "lib/libfcsl_io.a"
+    lockstep = compile_program([*sources, zenoh], folder / "lockstep", includes, flags)
+    goodput = compile_program([HERE / "goodput.c", *sources[1:], zenoh], folder / "goodput", includes, flags)
     wires = {kind: _lockstep(lockstep, kind, folder, ticks) for kind, ticks in TICKS.items()}
-    bare = {kind: _run(lockstep, "bare", kind, ticks) for kind, ticks in TICKS.items() if kind != "uart"}
+    bare = {kind: _run(lockstep, "bare", kind, ticks) for kind, ticks in TICKS.items() if kind not in ("uart", "zenoh")}
     loss = {str(share): _run(goodput, share, LINK_TICKS, 1) for share in LOSSES}
     for share, facts in loss.items():
         facts["formula"] = go_back_n(float(share), facts["round_trip"] + facts["timeout"])
@@ -65,7 +70,7 @@ def _lockstep(program: Path, kind: str, folder: Path, ticks: int) -> dict[str, A
     else:
         with socket.socket(type=socket.SOCK_DGRAM if kind == "udp" else socket.SOCK_STREAM) as free:
             free.bind(("127.0.0.1", 0))
-            spec = f"{kind}:127.0.0.1:{free.getsockname()[1]}"
+            spec = f"{'zenoh:tcp/' if kind == 'zenoh' else kind + ':'}127.0.0.1:{free.getsockname()[1]}"
     return _run(program, spec, spec, ticks)
 
 

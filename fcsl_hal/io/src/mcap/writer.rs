@@ -5,9 +5,9 @@ use std::collections::{BTreeMap, HashMap};
 use std::fs::File;
 use std::io;
 
-use crate::chunk::{Chunk, Sealed};
-use crate::growing_file::GrowingFile;
-use crate::records::{self, alone, record};
+use super::chunk::{Chunk, Sealed};
+use super::growing_file::GrowingFile;
+use super::records::{self, alone, record};
 
 /// FCSL_MCAP_CHUNK_BYTES of the header.
 const CHUNK_BYTES: usize = 256 * 1024;

@@ -1,13 +1,18 @@
 // SPDX-License-Identifier: Apache-2.0
 //! fcsl_mcap_*: contracts are in fcsl/fcsl_mcap_writer.h.
 
+mod chunk;
+mod growing_file;
+mod records;
+mod writer;
+
 use std::ffi::{c_char, CString};
 use std::fs::{self, File, OpenOptions};
 use std::io;
 use std::os::fd::AsRawFd;
 
 use crate::c::{self, Reason};
-use crate::writer::Writer;
+use writer::Writer;
 
 /// What create_new says, on every Unix.
 const EEXIST: i32 = 17;
@@ -258,4 +263,12 @@ pub unsafe extern "C" fn fcsl_mcap_close(mcap: *mut Mcap, error: *mut c_char, er
             -1
         }
     }
+}
+
+/// # Safety
+/// As fcsl_mcap_writer.h. Null counts as no bytes.
+#[no_mangle]
+pub unsafe extern "C" fn fcsl_mcap_crc32(data: *const u8, size: usize) -> u32 {
+    // SAFETY: the header's contract.
+    crc32fast::hash(unsafe { c::bytes(data, size, "data") }.unwrap_or(&[]))
 }

@@ -1,6 +1,6 @@
 /* SPDX-License-Identifier: Apache-2.0
  *
- * Recording to MCAP, the container of ROS 2 bags. Link fcsl_runtime::fcsl_mcap_writer (a Rust library; it allocates and writes to
+ * Recording to MCAP, the container of ROS 2 bags. Link fcsl_hal::fcsl_io (a Rust library; it allocates and writes to
  * disk, so never call it from the thread that steps a machine).
  *
  * Messages are gathered into compressed chunks of about FCSL_MCAP_CHUNK_BYTES. A complete chunk is handed to the operating

@@ -4,7 +4,7 @@
 
 use std::io;
 
-use crate::records::{self, Put};
+use super::records::{self, Put};
 
 /// zstd's fastest regular level: a recorder must keep up, and telemetry compresses well at any level.
 const COMPRESSION_LEVEL: i32 = 1;

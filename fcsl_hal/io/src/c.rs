@@ -68,11 +68,3 @@ pub unsafe fn message(text: &str, out: *mut c_char, size: usize) {
         *out.add(length) = 0;
     }
 }
-
-/// # Safety
-/// As fcsl_mcap_writer.h. Null counts as no bytes.
-#[no_mangle]
-pub unsafe extern "C" fn fcsl_mcap_crc32(data: *const u8, size: usize) -> u32 {
-    // SAFETY: the header's contract.
-    crc32fast::hash(unsafe { bytes(data, size, "data") }.unwrap_or(&[]))
-}

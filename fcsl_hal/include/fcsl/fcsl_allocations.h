@@ -1,10 +1,11 @@
 /* SPDX-License-Identifier: Apache-2.0
  *
- * Counts what a thread allocates and frees while it says so. The program's own allocator takes the place of the C library's
- * for every library in the process; a sanitizer has an allocator of its own and calls hooks instead.
+ * For test programs; flight code does not use it. Counts what a thread allocates and frees while it says so. The program's own
+ * allocator takes the place of the C library's for every library in the process; a sanitizer has an allocator of its own and
+ * calls hooks instead.
  */
-#ifndef ALLOCATIONS_H
-#define ALLOCATIONS_H
+#ifndef FCSL_ALLOCATIONS_H
+#define FCSL_ALLOCATIONS_H
 
 #include <stddef.h>
 #include <stdint.h>
@@ -79,4 +80,4 @@ void free(void *pointer)
 }
 
 #endif
-#endif /* ALLOCATIONS_H */
+#endif /* FCSL_ALLOCATIONS_H */

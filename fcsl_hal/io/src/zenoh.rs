@@ -1,0 +1,337 @@
+// SPDX-License-Identifier: Apache-2.0
+//! fcsl_zenoh_*: contracts are in fcsl_hal/src/zenoh_session.h.
+
+use std::collections::HashSet;
+use std::ffi::{c_char, c_void};
+use std::sync::{Arc, Mutex};
+
+use zenoh::key_expr::KeyExpr;
+use zenoh::liveliness::LivelinessToken;
+use zenoh::pubsub::Publisher;
+use zenoh::qos::{CongestionControl, Priority};
+use zenoh::sample::{Locality, Sample, SampleKind};
+use zenoh::{Config, Session, Wait};
+
+use crate::c::{self, Reason};
+
+/// Most tokens of one watched key that are told apart; of more, some are not counted.
+const TOKENS_MAX: usize = 1024;
+
+#[repr(C)]
+#[derive(Clone, Copy)]
+pub struct Callbacks {
+    ctx: *mut c_void,
+    sample: unsafe extern "C" fn(*mut c_void, u32, *const u8, usize),
+    stray: unsafe extern "C" fn(*mut c_void),
+    matching: unsafe extern "C" fn(*mut c_void, u32, i32),
+    tokens: unsafe extern "C" fn(*mut c_void, u32, u32),
+    release: unsafe extern "C" fn(*mut c_void),
+}
+
+/// What the session and every closure that Zenoh holds share: the last of them releases the context.
+struct Events(Callbacks);
+
+// SAFETY: the header says that the functions are called from several threads at a time.
+unsafe impl Send for Events {}
+// SAFETY: as above.
+unsafe impl Sync for Events {}
+
+impl Events {
+    fn sample(&self, number: u32, payload: Option<&[u8]>) {
+        let (bytes, size) = payload.map_or((std::ptr::null(), 0), |p| (p.as_ptr(), p.len()));
+        // SAFETY: the header's contract; the payload lives through the call.
+        unsafe { (self.0.sample)(self.0.ctx, number, bytes, size) };
+    }
+
+    fn stray(&self) {
+        // SAFETY: the header's contract.
+        unsafe { (self.0.stray)(self.0.ctx) };
+    }
+
+    fn matching(&self, number: u32, matching: bool) {
+        // SAFETY: the header's contract.
+        unsafe { (self.0.matching)(self.0.ctx, number, i32::from(matching)) };
+    }
+
+    fn tokens(&self, number: u32, count: usize) {
+        // SAFETY: the header's contract.
+        unsafe { (self.0.tokens)(self.0.ctx, number, count as u32) };
+    }
+}
+
+impl Drop for Events {
+    fn drop(&mut self) {
+        // SAFETY: the header's contract; nobody else holds the context.
+        unsafe { (self.0.release)(self.0.ctx) };
+    }
+}
+
+pub struct Zenoh {
+    inputs: Vec<KeyExpr<'static>>,
+    outputs: Vec<Publisher<'static>>,
+    /// They live as long as the session.
+    tokens: Vec<LivelinessToken>,
+    session: Session,
+    events: Arc<Events>,
+}
+
+/// Zenoh's messages end with the place in its sources.
+fn reason_of(error: zenoh::Error) -> Reason {
+    let text = error.to_string();
+    text.split(" at /").next().unwrap_or(&text).to_owned()
+}
+
+impl Zenoh {
+    fn open(config: Result<Config, zenoh::Error>, events: Arc<Events>) -> Result<Self, Reason> {
+        let session = config.and_then(|config| zenoh::open(config).wait()).map_err(reason_of)?;
+        Ok(Self { inputs: Vec::new(), outputs: Vec::new(), tokens: Vec::new(), session, events })
+    }
+
+    fn declare_output(&mut self, number: u32, key: &str, droppable: bool) -> Result<(), zenoh::Error> {
+        let (control, priority) = if droppable {
+            (CongestionControl::Drop, Priority::DEFAULT)
+        } else {
+            (CongestionControl::Block, Priority::RealTime)
+        };
+        // Not express: that is much slower where several keys are put in a row.
+        let output = self
+            .session
+            .declare_publisher(key.to_owned())
+            .congestion_control(control)
+            .priority(priority)
+            .allowed_destination(Locality::Remote)
+            .wait()?;
+        let events = self.events.clone();
+        output
+            .matching_listener()
+            .callback(move |status| events.matching(number, status.matching()))
+            .background()
+            .wait()?;
+        self.outputs.push(output);
+        Ok(())
+    }
+
+    fn declare_input(&mut self, number: u32, key: &str) -> Result<(), zenoh::Error> {
+        let key = KeyExpr::new(key.to_owned())?;
+        let events = self.events.clone();
+        let callback = move |sample: Sample| {
+            let payload = (sample.kind() == SampleKind::Put).then(|| sample.payload().to_bytes());
+            events.sample(number, payload.as_deref());
+        };
+        self.inputs.push(key.clone());
+        let input = self.session.declare_subscriber(key).callback(callback);
+        input.allowed_origin(Locality::Remote).background().wait()
+    }
+
+    fn declare_strays(&self, key: &str) -> Result<(), zenoh::Error> {
+        let events = self.events.clone();
+        let inputs = self.inputs.clone();
+        let callback = move |sample: Sample| {
+            if !inputs.iter().any(|input| input.includes(sample.key_expr())) {
+                events.stray();
+            }
+        };
+        let strays = self.session.declare_subscriber(key.to_owned()).callback(callback);
+        strays.allowed_origin(Locality::Remote).background().wait()
+    }
+
+    fn declare_token(&mut self, key: &str) -> Result<(), zenoh::Error> {
+        let key = format!("{key}/{}", self.session.zid());
+        self.tokens.push(self.session.liveliness().declare_token(key).wait()?);
+        Ok(())
+    }
+
+    fn watch_token(&self, number: u32, key: &str) -> Result<(), zenoh::Error> {
+        let events = self.events.clone();
+        let own = format!("{key}/{}", self.session.zid());
+        let alive = Mutex::new(HashSet::new());
+        let callback = move |sample: Sample| {
+            let Ok(mut alive) = alive.lock() else { return };
+            let token = sample.key_expr().as_str();
+            if token == own {
+                return;
+            }
+            match sample.kind() {
+                SampleKind::Put if alive.len() < TOKENS_MAX => alive.insert(token.to_owned()),
+                SampleKind::Put => false,
+                SampleKind::Delete => alive.remove(token),
+            };
+            events.tokens(number, alive.len());
+        };
+        let watched = self.session.liveliness().declare_subscriber(format!("{key}/*"));
+        watched.history(true).callback(callback).background().wait()
+    }
+
+    fn put(&self, output: u32, bytes: &[u8]) -> Result<(), Reason> {
+        let output = self.outputs.get(output as usize).ok_or("there is no such output")?;
+        output.put(bytes).wait().map_err(reason_of)
+    }
+
+    fn peers(&self) -> usize {
+        let info = self.session.info();
+        info.peers_zid().wait().count() + info.routers_zid().wait().count()
+    }
+}
+
+/// Runs `action` on a session and turns its result into what C gets.
+///
+/// # Safety
+/// `zenoh` came from fcsl_zenoh_open and was not closed; `key` a string, `error` null or `error_size` writable bytes.
+unsafe fn declare(
+    zenoh: *mut Zenoh,
+    key: *const c_char,
+    error: *mut c_char,
+    error_size: usize,
+    action: impl FnOnce(&mut Zenoh, &str) -> Result<(), zenoh::Error>,
+) -> i32 {
+    // SAFETY: the caller's promise, and declarations come from one thread at a time.
+    let declared = unsafe {
+        c::string(key, "the key").and_then(|key| {
+            let zenoh = zenoh.as_mut().ok_or("the session is null")?;
+            action(zenoh, key).map_err(reason_of)
+        })
+    };
+    match declared {
+        Ok(()) => 0,
+        Err(reason) => {
+            // SAFETY: the caller's promise.
+            unsafe { c::message(&reason, error, error_size) };
+            -1
+        }
+    }
+}
+
+/// # Safety
+/// As zenoh_session.h: strings or null, `events` and `out` not null, `error` null or `error_size` writable bytes.
+#[no_mangle]
+pub unsafe extern "C" fn fcsl_zenoh_open(
+    path: *const c_char,
+    config: *const c_char,
+    events: *const Callbacks,
+    out: *mut *mut Zenoh,
+    error: *mut c_char,
+    error_size: usize,
+) -> i32 {
+    // SAFETY: the header's contract, for every pointer of this call.
+    unsafe {
+        let events = Arc::new(Events(*events));
+        let config = if path.is_null() {
+            c::string(config, "the configuration").map(Config::from_json5)
+        } else {
+            c::string(path, "the path").map(Config::from_file)
+        };
+        match config.and_then(|config| Zenoh::open(config, events)) {
+            Ok(zenoh) => {
+                *out = Box::into_raw(Box::new(zenoh));
+                0
+            }
+            Err(reason) => {
+                c::message(&reason, error, error_size);
+                -1
+            }
+        }
+    }
+}
+
+/// # Safety
+/// As zenoh_session.h.
+#[no_mangle]
+pub unsafe extern "C" fn fcsl_zenoh_declare_output(
+    zenoh: *mut Zenoh,
+    number: u32,
+    key: *const c_char,
+    droppable: i32,
+    error: *mut c_char,
+    error_size: usize,
+) -> i32 {
+    // SAFETY: the header's contract.
+    unsafe { declare(zenoh, key, error, error_size, |zenoh, key| zenoh.declare_output(number, key, droppable != 0)) }
+}
+
+/// # Safety
+/// As zenoh_session.h.
+#[no_mangle]
+pub unsafe extern "C" fn fcsl_zenoh_declare_input(
+    zenoh: *mut Zenoh,
+    number: u32,
+    key: *const c_char,
+    error: *mut c_char,
+    error_size: usize,
+) -> i32 {
+    // SAFETY: the header's contract.
+    unsafe { declare(zenoh, key, error, error_size, |zenoh, key| zenoh.declare_input(number, key)) }
+}
+
+/// # Safety
+/// As zenoh_session.h.
+#[no_mangle]
+pub unsafe extern "C" fn fcsl_zenoh_declare_strays(
+    zenoh: *mut Zenoh,
+    key: *const c_char,
+    error: *mut c_char,
+    error_size: usize,
+) -> i32 {
+    // SAFETY: the header's contract.
+    unsafe { declare(zenoh, key, error, error_size, |zenoh, key| zenoh.declare_strays(key)) }
+}
+
+/// # Safety
+/// As zenoh_session.h.
+#[no_mangle]
+pub unsafe extern "C" fn fcsl_zenoh_declare_token(
+    zenoh: *mut Zenoh,
+    key: *const c_char,
+    error: *mut c_char,
+    error_size: usize,
+) -> i32 {
+    // SAFETY: the header's contract.
+    unsafe { declare(zenoh, key, error, error_size, |zenoh, key| zenoh.declare_token(key)) }
+}
+
+/// # Safety
+/// As zenoh_session.h.
+#[no_mangle]
+pub unsafe extern "C" fn fcsl_zenoh_watch_token(
+    zenoh: *mut Zenoh,
+    number: u32,
+    key: *const c_char,
+    error: *mut c_char,
+    error_size: usize,
+) -> i32 {
+    // SAFETY: the header's contract.
+    unsafe { declare(zenoh, key, error, error_size, |zenoh, key| zenoh.watch_token(number, key)) }
+}
+
+/// # Safety
+/// As zenoh_session.h: `size` readable bytes.
+#[no_mangle]
+pub unsafe extern "C" fn fcsl_zenoh_put(zenoh: *const Zenoh, output: u32, bytes: *const u8, size: usize) -> i32 {
+    // SAFETY: the header's contract.
+    let put = unsafe {
+        c::bytes(bytes, size, "the message").and_then(|bytes| {
+            let zenoh = zenoh.as_ref().ok_or("the session is null")?;
+            zenoh.put(output, bytes)
+        })
+    };
+    -i32::from(put.is_err())
+}
+
+/// # Safety
+/// As zenoh_session.h.
+#[no_mangle]
+pub unsafe extern "C" fn fcsl_zenoh_peers(zenoh: *const Zenoh) -> u32 {
+    // SAFETY: the header's contract.
+    unsafe { zenoh.as_ref() }.map_or(0, |zenoh| zenoh.peers() as u32)
+}
+
+/// # Safety
+/// As zenoh_session.h; `zenoh` is not used afterwards.
+#[no_mangle]
+pub unsafe extern "C" fn fcsl_zenoh_close(zenoh: *mut Zenoh) {
+    if zenoh.is_null() {
+        return;
+    }
+    // SAFETY: not null, came from Box::into_raw in fcsl_zenoh_open, and ownership ends here.
+    let zenoh = unsafe { Box::from_raw(zenoh) };
+    let _ = zenoh.session.close().wait(); // a timeout: there is nothing to do about it
+}

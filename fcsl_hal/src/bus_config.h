@@ -1,0 +1,15 @@
+/* SPDX-License-Identifier: Apache-2.0 */
+#ifndef FCSL_BUS_CONFIG_H
+#define FCSL_BUS_CONFIG_H
+
+#include "fcsl/fcsl_bus.h"
+
+enum { BUS_CONFIG_BYTES = 2048 };
+
+/* 0 when a session can have these options, or -1 with `error` filled. */
+int bus_config_check(const fcsl_bus_options_t *options, char *error, size_t error_size);
+
+/* Zenoh's configuration (JSON5) of a session with an endpoint. 0, or -1 with `error` filled. */
+int bus_config_write(const fcsl_bus_options_t *options, char text[BUS_CONFIG_BYTES], char *error, size_t error_size);
+
+#endif /* FCSL_BUS_CONFIG_H */

@@ -1,0 +1,80 @@
+/* SPDX-License-Identifier: Apache-2.0
+ *
+ * The thread that hands to Zenoh what was posted. A put may wait for a receiver; then the ring fills, and posts are refused.
+ */
+#define _GNU_SOURCE
+#include "bus_session.h"
+#include "monotonic.h"
+
+enum { LOOK_NS = 50 * NS_PER_MS, TURN = 64 };
+
+/* Puts what is in the ring, at most TURN messages: 1 when there may be more. */
+static int put_some(fcsl_bus_t *bus)
+{
+    uint32_t output = 0;
+    const uint8_t *bytes = NULL;
+    size_t size = 0;
+    for (int i = 0; i < TURN; i++) {
+        if (!ring_front(&bus->ring, &output, &bytes, &size)) {
+            return 0;
+        }
+        const int failed = fcsl_zenoh_put(bus->zenoh, output, bytes, size) != 0;
+        bus_count(failed ? &bus->counters.put_failed : &bus->counters.put, 1);
+        ring_pop(&bus->ring);
+    }
+    return 1;
+}
+
+/* Zenoh does not tell of sessions that come and go: they are looked at. */
+static void look_at_peers(fcsl_bus_t *bus, uint64_t *looked_ns)
+{
+    const uint64_t now_ns = monotonic_ns();
+    if (now_ns < *looked_ns + LOOK_NS) {
+        return;
+    }
+    const uint32_t before = atomic_load(&bus->peers);
+    const uint32_t now = fcsl_zenoh_peers(bus->zenoh);
+    *looked_ns = now_ns;
+    if (now != before) {
+        bus_count(now > before ? &bus->counters.connects : &bus->counters.disconnects,
+                  now > before ? now - before : before - now);
+        atomic_store(&bus->peers, now);
+        bus_tell(bus);
+    }
+}
+
+static void sleep_until_posted(fcsl_bus_t *bus)
+{
+    uint32_t output = 0;
+    const uint8_t *bytes = NULL;
+    size_t size = 0;
+    event_arm(&bus->posted);
+    if (!ring_front(&bus->ring, &output, &bytes, &size) && !atomic_load(&bus->stopping)) {
+        const struct timespec look = timespec_of(LOOK_NS);
+        (void)event_sleep(&bus->posted, &look);
+    }
+}
+
+void *bus_serve(void *argument)
+{
+    fcsl_bus_t *bus = argument;
+    uint64_t looked_ns = 0;
+    for (;;) { /* until the session is closed: each turn puts, or sleeps */
+        const int stopping = atomic_load(&bus->stopping); /* nothing is posted any more */
+        const int more = put_some(bus);
+        if (stopping && !more) {
+            break;
+        }
+        look_at_peers(bus, &looked_ns);
+        if (!more) {
+            sleep_until_posted(bus);
+        }
+    }
+    fcsl_zenoh_close(bus->zenoh);
+    (void)pthread_mutex_lock(&bus->ending);
+    bus->has_ended = 1;
+    (void)pthread_cond_signal(&bus->ended);
+    (void)pthread_mutex_unlock(&bus->ending);
+    bus_disown(bus);
+    return NULL;
+}
