@@ -206,12 +206,12 @@ def test_every_policy(folder: Path, policy: str) -> None:
 # ---- with a peer at the other end of a wire
 
 
-@pytest.mark.parametrize("kind", ["unix", "udp"])
+@pytest.mark.parametrize("kind", ["unix", "udp:", "zenoh:tcp/"])
 def test_in_lock_step(kind: str, folder: Path, tmp_path: Path) -> None:
     """It may wait for its peer, and for nothing else."""
-    with socket.socket(type=socket.SOCK_DGRAM) as free:
+    with socket.socket(type=socket.SOCK_DGRAM if kind == "udp:" else socket.SOCK_STREAM) as free:
         free.bind(("127.0.0.1", 0))
-        wire = f"unix:{tmp_path / 'w'}" if kind == "unix" else f"udp:127.0.0.1:{free.getsockname()[1]}"
+        wire = f"unix:{tmp_path / 'w'}" if kind == "unix" else f"{kind}127.0.0.1:{free.getsockname()[1]}"
     with subprocess.Popen([WIRE_SIM, FIXTURE, wire, "100000", "end"], stderr=subprocess.DEVNULL) as simulator:
         options = ("--hal", f"wire:{wire}", "--timeout-ms", "30000", "--record", str(tmp_path / "bag"))
         assert Watched(folder, FIXTURE, *options, peer=True).allocations() == 0

@@ -5,7 +5,6 @@ from __future__ import annotations
 
 import os
 import shlex
-import shutil
 import subprocess
 import sys
 from dataclasses import dataclass
@@ -137,9 +136,11 @@ class Tree:
             program.chmod(0o755)
 
     def _build(self) -> None:
-        cargo = self.folder / "build/fcsl_runtime/cargo"
-        if not cargo.exists() and (ROOT / "build/fcsl_runtime/cargo").exists():
-            shutil.copytree(ROOT / "build/fcsl_runtime/cargo", cargo, symlinks=True)
+        cargo = self.folder / "build/fcsl_hal/cargo"
+        if not cargo.exists() and (ROOT / "build/fcsl_hal/cargo").exists():
+            # The crates that Rust's own depends on are compiled there.
+            cargo.parent.mkdir(parents=True, exist_ok=True)
+            cargo.symlink_to(ROOT / "build/fcsl_hal/cargo")
         line = [
             *("colcon", "build", "--base-paths", *COPIED, "--cmake-args"),
             *("-DCMAKE_BUILD_TYPE=Release", f"-DCMAKE_C_COMPILER={self.folder / 'bin/cc'}", "-DCMAKE_C_FLAGS=-w"),

@@ -5,7 +5,6 @@ from __future__ import annotations
 
 import os
 import shlex
-import shutil
 import subprocess
 from dataclasses import dataclass
 from pathlib import Path
@@ -57,10 +56,11 @@ class Build:
     def make(self) -> None:
         """Builds what changed. Raises CheckFailed with the end of what the build said."""
         self._make_tools()
-        cargo = self.package("fcsl_runtime") / "cargo"
-        if not cargo.exists() and (ROOT / "build/fcsl_runtime/cargo").exists():
+        cargo = self.package("fcsl_hal") / "cargo"
+        if not cargo.exists() and (ROOT / "build/fcsl_hal/cargo").exists():
             # Rust is the same with or without a sanitizer for C; cargo sees that there is nothing to do.
-            shutil.copytree(ROOT / "build/fcsl_runtime/cargo", cargo, symlinks=True)
+            cargo.parent.mkdir(parents=True, exist_ok=True)
+            cargo.symlink_to(ROOT / "build/fcsl_hal/cargo")
         line = [
             *("colcon", "--log-base", str(self.folder / "log"), "build", "--packages-up-to", "fcsl_sim"),
             *("--build-base", str(self.folder / "build"), "--install-base", str(self.folder / "install")),
