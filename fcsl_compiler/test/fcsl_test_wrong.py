@@ -940,6 +940,9 @@ CONFIGS: dict[str, str] = {
     "E208 delayed as a text": connect({"from": "two.v", "to": "one.w", "delayed": "yes", "initial": [0, 0, 0]}),
     "E208 parameters as a list": put("instances", "one", "parameters", value=[1.5]),
     "E217 types": connect({"from": "two.i", "to": "one.w"}),
+    "E250 a quaternion of three": channel({"field": "one.inputs.w", "as": "quaternion"}),
+    "E250 a blob of floats": channel({"field": "one.inputs.w", "as": "blob"}),
+    "E205 what a field is not": channel({"as": "euler"}),
     "E217 a health on a channel": channel({"field": "one.inputs.h"}),
     "E218 units": connect({"from": "two.y", "to": "one.x"}),
     "E219 no state": put("states", value={}),
@@ -1149,6 +1152,14 @@ def all_cases() -> dict[str, tuple[str, dict[str, str]]]:
         )
     )
     cases["W206 what another state left"] = (kept, {"alg.py": execute("self.v = self.w")})
+    packet = {"field": "one.inputs.n", "as": "blob"}
+    mapped_packet = {**packet, "ros": {"type": "std_msgs/UInt32", "field": "data"}}
+    for name, declared, item in (
+        ("E250 a blob of no bytes", "u32[1]", packet),
+        ("E250 a blob with a message", "u32[9]", mapped_packet),
+        ("E217 more bytes than a channel has", "u32[16384]", {"field": "one.inputs.n"}),
+    ):
+        cases[name] = (channel(item), {"alg.py": GOOD.replace('"n": "i32"', f'"n": "{declared}"')})
     slow = connect({"from": "machine.dt", "to": "two.x"})
     cases["W207 a period of its own"] = (slow, {"alg.py": GOOD.replace('"f64 m"', '"f64 s"')})
     outside = put("instances", "one", "parameters", "k", value=-0.5)

@@ -47,6 +47,7 @@ static size_t sensor_message(uint64_t tick, uint8_t *message)
     data_t data;
     memset(&data, 0, sizeof data);
     data.i64 = (int64_t)tick * 3;
+    data.packet[0] = 5; /* a full blob: the longest message */
     return encode_message(&MACHINE, &data, FCSL_SENSOR_MESSAGE, tick, NULL, message, MESSAGE_BYTES);
 }
 

@@ -144,6 +144,7 @@ class Channel:
     ros: RosMapping
     span: Span
     safe: Values = ()  # of an actuator; () if not declared
+    kind: str = "field"  # field, quaternion, blob
 
 
 @dataclass(frozen=True)
