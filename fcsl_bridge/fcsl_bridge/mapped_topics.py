@@ -18,7 +18,6 @@ from . import qos
 from .interfaces import message_class
 from .polled import Polled
 
-
 #: For receivers of the last commands to have them.
 _SAFE_WAIT = Duration(seconds=0.2)
 
