@@ -31,8 +31,33 @@ static void test_stub(void)
     hal.close(hal.ctx);
 }
 
+/* What finds no room is told behind what found some. */
+static void test_full_log(void)
+{
+    enum { LOST = 3 };
+    char line[FCSL_LOG_BYTES];
+    char error[TEXT_BYTES];
+    fcsl_hal_t hal;
+    CHECK(fcsl_hal_stub(&hal, error, sizeof error) == 0);
+    for (int round = 0; round < 2; round++) {
+        for (int i = 0; i < FCSL_LOG_LINES + LOST; i++) {
+            (void)snprintf(line, sizeof line, "line %d", i);
+            hal.log(hal.ctx, line);
+        }
+        for (int i = 0; i < FCSL_LOG_LINES; i++) {
+            char expected[FCSL_LOG_BYTES];
+            (void)snprintf(expected, sizeof expected, "line %d", i);
+            CHECK(hal.read_log(hal.ctx, line) && strcmp(line, expected) == 0);
+        }
+        CHECK(hal.read_log(hal.ctx, line) && strncmp(line, "3 lines were not printed", 24) == 0);
+        CHECK(!hal.read_log(hal.ctx, line));
+    }
+    hal.close(hal.ctx);
+}
+
 int main(void)
 {
     test_stub();
+    test_full_log();
     return 0;
 }
