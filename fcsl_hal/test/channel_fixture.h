@@ -53,6 +53,7 @@ static const fcsl_field_t FIELDS[] = {
     FIELD("command", FCSL_F64, 2, command, 16), FIELD("enable", FCSL_BOOL, 3, enable, 3),
 };
 
+#define NO_ROS "", "", "", "", "", ""
 #define SENSOR(name_, id_, field_, slot_)                                                                              \
     {name_,                                                                                                            \
      id_,                                                                                                              \
@@ -65,12 +66,7 @@ static const fcsl_field_t FIELDS[] = {
      FCSL_NO_OFFSET,                                                                                                   \
      (uint32_t)offsetof(data_t, sample_age) + 4u * slot_,                                                              \
      (uint32_t)offsetof(data_t, stamp) + 8u * slot_,                                                                   \
-     "",                                                                                                               \
-     "",                                                                                                               \
-     "",                                                                                                               \
-     "",                                                                                                               \
-     "",                                                                                                               \
-     "",                                                                                                               \
+     NO_ROS,                                                                                                           \
      NULL}
 #define ACTUATOR(name_, id_, field_)                                                                                   \
     {name_,                                                                                                            \
@@ -84,12 +80,7 @@ static const fcsl_field_t FIELDS[] = {
      FCSL_NO_OFFSET,                                                                                                   \
      FCSL_NO_OFFSET,                                                                                                   \
      FCSL_NO_OFFSET,                                                                                                   \
-     "",                                                                                                               \
-     "",                                                                                                               \
-     "",                                                                                                               \
-     "",                                                                                                               \
-     "",                                                                                                               \
-     "",                                                                                                               \
+     NO_ROS,                                                                                                           \
      NULL}
 
 /* Ids fall, and directions mix: neither order means anything. */
