@@ -799,6 +799,12 @@ def armed(arm: Any, *actuators: Mapping[str, Any]) -> str:
     return patch(lambda c: c.update(arm=arm, channels=channels))
 
 
+def safe(field: str, value: Any, message: str) -> str:
+    """An actuator with a safe value, mapped to the `data` of a message of std_msgs."""
+    ros = {"type": f"std_msgs/{message}", "field": "data"}
+    return put("channels", value=[{**ACTUATOR, "field": field, "safe": value, "ros": ros}])
+
+
 def timeout(seconds: Any) -> str:
     return patch(lambda c: c.update(command_timeout_s=seconds, channels=[{**ACTUATOR, "safe": 0.0}]))
 
@@ -992,6 +998,11 @@ CONFIGS: dict[str, str] = {
     "E238 a float into a bool": mapped(
         {"type": "std_msgs/Bool", "field": "data"}, field="one.outputs.y", direction="actuator"
     ),
+    "E238 a safe value beyond uint16": safe("two.outputs.i", 70000, "UInt16"),
+    "E238 a safe value below int8": safe("two.outputs.i", -129, "Int8"),
+    "E238 a safe value that is no bool": safe("two.outputs.i", 2, "Bool"),
+    "E238 a safe value beyond float32": safe("two.outputs.y", 1e40, "Float32"),
+    "E238 a number of a safe value": safe("two.outputs.v", [0.0, -4e38, 5e38], "Float32MultiArray"),
     "E218 units of a message": mapped({"type": "sensor_msgs/Imu", "field": "angular_velocity.x"}, field="one.inputs.x"),
     "E239 axes of a number": mapped(
         {"type": "geometry_msgs/Vector3", "field": "x", "axes": "frd"}, field="one.inputs.x"

@@ -56,6 +56,7 @@ static const fcsl_field_t FIELDS[] = {
     FIELD("packet", FCSL_U32, 6, packet, 24),   FIELD("reply", FCSL_U32, 3, reply, 12),
 };
 
+#define NO_ROS "", "", "", "", "", ""
 #define SENSOR(name_, id_, field_, slot_, as_)                                                                         \
     {name_,                                                                                                            \
      id_,                                                                                                              \
@@ -68,12 +69,7 @@ static const fcsl_field_t FIELDS[] = {
      FCSL_NO_OFFSET,                                                                                                   \
      (uint32_t)offsetof(data_t, sample_age) + 4u * slot_,                                                              \
      (uint32_t)offsetof(data_t, stamp) + 8u * slot_,                                                                   \
-     "",                                                                                                               \
-     "",                                                                                                               \
-     "",                                                                                                               \
-     "",                                                                                                               \
-     "",                                                                                                               \
-     "",                                                                                                               \
+     NO_ROS,                                                                                                           \
      NULL,                                                                                                             \
      as_}
 #define ACTUATOR(name_, id_, field_, as_)                                                                              \
@@ -88,12 +84,7 @@ static const fcsl_field_t FIELDS[] = {
      FCSL_NO_OFFSET,                                                                                                   \
      FCSL_NO_OFFSET,                                                                                                   \
      FCSL_NO_OFFSET,                                                                                                   \
-     "",                                                                                                               \
-     "",                                                                                                               \
-     "",                                                                                                               \
-     "",                                                                                                               \
-     "",                                                                                                               \
-     "",                                                                                                               \
+     NO_ROS,                                                                                                           \
      NULL,                                                                                                             \
      as_}
 

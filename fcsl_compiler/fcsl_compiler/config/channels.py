@@ -83,7 +83,8 @@ def _channel(
     if name is None or number is None or direction is None or port is None or ros is None or kind is None:
         return None
     safe = read_safe(keys["safe"], port.type, direction, reader) if "safe" in keys else ()
-    return Channel(name, number, port, direction, age, ros, item.span, safe or (), kind)
+    safe_span = keys["safe"].span if safe else None
+    return Channel(name, number, port, direction, age, ros, item.span, safe or (), safe_span, kind)
 
 
 def _kind(keys: dict[str, JsonNode], port: PortRef | None, reader: ConfigReader) -> str | None:
