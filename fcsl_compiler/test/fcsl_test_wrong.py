@@ -1171,6 +1171,12 @@ def all_cases() -> dict[str, tuple[str, dict[str, str]]]:
         ("E217 more bytes than a channel has", "u32[16384]", {"field": "one.inputs.n"}),
     ):
         cases[name] = (channel(item), {"alg.py": GOOD.replace('"n": "i32"', f'"n": "{declared}"')})
+    reply = {"field": "one.outputs.i", "direction": "actuator", "as": "blob"}
+    for name, safe in (
+        ("E250 a safe value of too many bytes", [3, 0, 0]),
+        ("E250 a safe value that is more than a byte", [1, 256, 0]),
+    ):
+        cases[name] = (channel({**reply, "safe": safe}), {"alg.py": GOOD.replace('"i": "i32"', '"i": "u32[3]"')})
     slow = connect({"from": "machine.dt", "to": "two.x"})
     cases["W207 a period of its own"] = (slow, {"alg.py": GOOD.replace('"f64 m"', '"f64 s"')})
     outside = put("instances", "one", "parameters", "k", value=-0.5)

@@ -7,7 +7,7 @@ import re
 
 from ..base.source import MAX_NAME, Span
 from ..model import ir
-from ..model.machine import NOT_MAPPED, Channel, Connection, PortRef, RosMapping
+from ..model.machine import NOT_MAPPED, Channel, Connection, PortRef, RosMapping, Values
 from ..model.types import F32, F64, HEALTH, REQUEST, U32, Array, Scalar, Type, count_of, element_of, scalar_of
 from ..parse.json_reader import ConfigReader
 from ..parse.json_source import JsonNode
@@ -84,6 +84,12 @@ def _channel(
         return None
     safe = read_safe(keys["safe"], port.type, direction, reader) if "safe" in keys else ()
     safe_span = keys["safe"].span if safe else None
+    if kind == "blob" and safe and not _is_blob(safe):
+        message = f"`safe` of `{name}` is no blob"
+        why = "element 0 is the number of bytes, and each byte has an element behind it, 0 to 255"
+        reader.sink.error(
+            "E250", message, keys["safe"].span, why=why, help="write a 0 first, for example, for no bytes"
+        )
     return Channel(name, number, port, direction, age, ros, item.span, safe or (), safe_span, kind)
 
 
@@ -113,6 +119,11 @@ def _kind(keys: dict[str, JsonNode], port: PortRef | None, reader: ConfigReader)
 
 def _holds_blob(type_: Type) -> bool:
     return isinstance(type_, Array) and type_.element == U32 and len(type_.shape) == 1 and type_.count > 1
+
+
+def _is_blob(values: Values) -> bool:
+    count, *elements = (value for value in values if not isinstance(value, str))
+    return count <= len(elements) and all(element <= 255 for element in elements)
 
 
 def default_topic(name: str) -> str:
