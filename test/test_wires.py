@@ -52,12 +52,12 @@ def reference(tmp_path_factory: pytest.TempPathFactory) -> str:
     return digest(bag)
 
 
-def fly(ours: str, theirs: str, library: Path, bag: Path) -> str:
+def fly(ours: str, theirs: str, library: Path, bag: Path, *options: str | Path) -> str:
     """The digest of the flight; the two programs may start in either order."""
     line = ["fcsl-sim", "run", str(SIM), "--duration", LENGTH_S, "--external", f"wire:{ours}"]
     with subprocess.Popen(line, stdout=subprocess.DEVNULL, stderr=subprocess.PIPE, text=True) as simulator:
         line = ["--hal", f"wire:{theirs}", "--timeout-ms", "60000", "--summary", str(bag.with_suffix(".json"))]
-        run("fcsl-fc", library, *line, "--record", bag)
+        run("fcsl-fc", library, *line, "--record", bag, *options)
         _, err = simulator.communicate(timeout=60)
     assert simulator.returncode in (0, 1), err  # 1: `until` did not hold in so short a flight
     return digest(bag)
@@ -83,6 +83,19 @@ def free_port(kind: socket.SocketKind) -> int:
 def test_network(kind: str, reference: str, library: Path, tmp_path: Path) -> None:
     wire = f"{kind}127.0.0.1:{free_port(socket.SOCK_DGRAM if kind == 'udp:' else socket.SOCK_STREAM)}"
     assert fly(wire, wire, library, tmp_path / "bag") == reference
+
+
+def test_a_guard_changes_nothing_in_the_flight(reference: str, library: Path, tmp_path: Path) -> None:
+    slot, device = tmp_path / "slot", tmp_path / "throttle"
+    line = ["fcsl-guard", str(library), "--slot", str(slot), "--actuator", f"throttle=log:{device}"]
+    wire = f"unix:{tmp_path / 'wire'}"
+    with subprocess.Popen(line, stdout=subprocess.PIPE, text=True) as guard:
+        try:
+            assert guard.stdout and "slot at" in guard.stdout.readline()
+            flown = fly(wire, wire, library, tmp_path / "bag", "--guard", slot)
+        finally:
+            guard.terminate()
+    assert flown == reference and device.stat().st_size > 0
 
 
 #: What is no frame (a stream needs the zero last, to find its next frame): noise, a zero byte alone, a frame of another version, and one of an unknown kind (both with a right CRC).

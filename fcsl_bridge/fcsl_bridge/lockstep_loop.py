@@ -83,7 +83,7 @@ class LockstepLoop:
             self._end.end()
 
     def figures(self) -> Figures:
-        return {"repeated bundles": self._end.dropped}
+        return {"hal.repeated bundles": self._end.dropped}
 
     def troubles(self) -> dict[str, int]:
         return {}

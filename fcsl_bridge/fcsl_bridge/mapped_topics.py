@@ -18,7 +18,6 @@ from . import qos
 from .interfaces import message_class
 from .polled import Polled
 
-
 #: For receivers of the last commands to have them.
 _SAFE_WAIT = Duration(seconds=0.2)
 
@@ -52,7 +51,7 @@ class Inputs:
 
     def _counts(self, wanted: Callable[[str], bool]) -> dict[str, int]:
         return {
-            f"{one.topic.name} {reason}": count
+            f"hal.{one.topic.name} {reason}": count
             for one in self._inlets
             for reason, count in one.counts().items()
             if wanted(reason)
@@ -131,8 +130,8 @@ class Outputs:
         another node was found to publish the same actuator."""
         for name, _, publisher in self._outlets:
             self._contested[name] += self._node.count_publishers(publisher.topic_name) > 1
-        contested = {f"{name} published by others": count for name, count in self._contested.items()}
-        return {f"{name} does not fit": composer.refused for name, composer, _ in self._outlets} | contested
+        contested = {f"hal.{name} published by others": count for name, count in self._contested.items()}
+        return {f"hal.{name} does not fit": composer.refused for name, composer, _ in self._outlets} | contested
 
     def close(self) -> None:
         for _, _, publisher in self._outlets:

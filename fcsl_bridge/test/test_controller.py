@@ -424,7 +424,7 @@ def test_diagnostics_follow_the_lifecycle(domain: Domain, library: Path) -> None
     assert status["rig"].level == DiagnosticStatus.ERROR
     assert re.fullmatch(r"failed; imu\.rate: no sample for \d+ ticks \(\d+ allowed\)", status["rig: imu"].message)
     shown = figures(status["rig"])
-    assert {"state", "tick", "source hash", "deadlines missed", "records dropped", "imu/data taken"} <= set(shown)
+    assert {"state", "tick", "source hash", "deadlines missed", "records dropped", "hal.imu/data taken"} <= set(shown)
     with AlgTwin.from_library(library) as twin:
         assert shown["source hash"] == twin.machine.source_hash
     ticks = sum(int(count) for key, count in shown.items() if key.startswith(("lateness <", "lateness >")))

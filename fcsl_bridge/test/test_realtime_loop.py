@@ -143,9 +143,9 @@ def test_the_newest_sample_counts_and_what_is_refused_is_counted(robot: Robot) -
     while True:
         (message,) = robot.client.diagnosed()
         shown = figures(message["rig"])
-        if all(f"imu/data {reason}" in shown for reason in refused):
+        if all(f"hal.imu/data {reason}" in shown for reason in refused):
             break
-    assert [shown[f"imu/data {reason}"] for reason in refused] == ["1"] * 4
+    assert [shown[f"hal.imu/data {reason}"] for reason in refused] == ["1"] * 4
     assert robot.torque() == 1.25
     robot.sense(4.0)
     robot.listener.until(lambda: robot.torque() == 4.25)
@@ -157,7 +157,7 @@ def test_a_burst_between_two_ticks_ends_with_the_newest(robot: Robot) -> None:
         robot.sense(float(rate))
     robot.listener.until(lambda: robot.torque() == 499.25)
     shown = figures(robot.client.diagnosed()[0]["rig"])
-    assert int(shown["imu/data superseded"]) > 0
+    assert int(shown["hal.imu/data superseded"]) > 0
     assert robot.end() == 0
 
 
@@ -278,5 +278,5 @@ def test_sensors_of_a_simulator_are_as_new_as_its_clock(domain: Domain, library:
         time.sleep(1 / HZ)
     robot.listener.until(lambda: robot.torque() == 200.25)
     shown = figures(robot.client.diagnosed(2)[1]["rig"])
-    assert "imu/data future" not in shown and int(shown["imu/data taken"]) > 100
+    assert "hal.imu/data future" not in shown and int(shown["hal.imu/data taken"]) > 100
     assert robot.end() == 0

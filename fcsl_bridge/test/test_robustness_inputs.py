@@ -116,7 +116,7 @@ def test_whatever_comes_as_an_imu_is_refused_and_counted(domain: Domain, library
             robot.imu.publish(data)
             time.sleep(0.005)
         shown = figures(robot.status())
-        return all(int(shown.get(f"imu/data {why}", 0)) >= n for why, n in least.items())
+        return all(int(shown.get(f"hal.imu/data {why}", 0)) >= n for why, n in least.items())
 
     robot.listener.until(refused)
     robot.obeys(2.0)
@@ -132,7 +132,7 @@ def test_a_publisher_of_another_type_is_not_heard(domain: Domain, library: Path)
         stranger.publish(String(data="1.0"))
     robot.obeys(3.0)
     assert stranger.get_subscription_count() == 0
-    assert not [key for key in figures(robot.status()) if key in ("imu/data malformed", "imu/data truncated")]
+    assert not [key for key in figures(robot.status()) if key in ("hal.imu/data malformed", "hal.imu/data truncated")]
     robot.finish()
 
 

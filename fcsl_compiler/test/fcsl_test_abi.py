@@ -71,6 +71,7 @@ class Channel(c.Structure):
         *[(n, c.c_uint32) for n in ("sample_age", "stamp")],
         *[(f"ros_{n}", c.c_char_p) for n in ("type", "field", "topic", "frame", "child_frame", "axes")],
         ("safe", c.c_void_p),
+        ("as_", c.c_uint8),
     ]
 
 

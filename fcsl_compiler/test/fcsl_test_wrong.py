@@ -799,6 +799,12 @@ def armed(arm: Any, *actuators: Mapping[str, Any]) -> str:
     return patch(lambda c: c.update(arm=arm, channels=channels))
 
 
+def safe(field: str, value: Any, message: str) -> str:
+    """An actuator with a safe value, mapped to the `data` of a message of std_msgs."""
+    ros = {"type": f"std_msgs/{message}", "field": "data"}
+    return put("channels", value=[{**ACTUATOR, "field": field, "safe": value, "ros": ros}])
+
+
 def timeout(seconds: Any) -> str:
     return patch(lambda c: c.update(command_timeout_s=seconds, channels=[{**ACTUATOR, "safe": 0.0}]))
 
@@ -940,6 +946,9 @@ CONFIGS: dict[str, str] = {
     "E208 delayed as a text": connect({"from": "two.v", "to": "one.w", "delayed": "yes", "initial": [0, 0, 0]}),
     "E208 parameters as a list": put("instances", "one", "parameters", value=[1.5]),
     "E217 types": connect({"from": "two.i", "to": "one.w"}),
+    "E250 a quaternion of three": channel({"field": "one.inputs.w", "as": "quaternion"}),
+    "E250 a blob of floats": channel({"field": "one.inputs.w", "as": "blob"}),
+    "E205 what a field is not": channel({"as": "euler"}),
     "E217 a health on a channel": channel({"field": "one.inputs.h"}),
     "E218 units": connect({"from": "two.y", "to": "one.x"}),
     "E219 no state": put("states", value={}),
@@ -989,6 +998,11 @@ CONFIGS: dict[str, str] = {
     "E238 a float into a bool": mapped(
         {"type": "std_msgs/Bool", "field": "data"}, field="one.outputs.y", direction="actuator"
     ),
+    "E238 a safe value beyond uint16": safe("two.outputs.i", 70000, "UInt16"),
+    "E238 a safe value below int8": safe("two.outputs.i", -129, "Int8"),
+    "E238 a safe value that is no bool": safe("two.outputs.i", 2, "Bool"),
+    "E238 a safe value beyond float32": safe("two.outputs.y", 1e40, "Float32"),
+    "E238 a number of a safe value": safe("two.outputs.v", [0.0, -4e38, 5e38], "Float32MultiArray"),
     "E218 units of a message": mapped({"type": "sensor_msgs/Imu", "field": "angular_velocity.x"}, field="one.inputs.x"),
     "E239 axes of a number": mapped(
         {"type": "geometry_msgs/Vector3", "field": "x", "axes": "frd"}, field="one.inputs.x"
@@ -1149,6 +1163,20 @@ def all_cases() -> dict[str, tuple[str, dict[str, str]]]:
         )
     )
     cases["W206 what another state left"] = (kept, {"alg.py": execute("self.v = self.w")})
+    packet = {"field": "one.inputs.n", "as": "blob"}
+    mapped_packet = {**packet, "ros": {"type": "std_msgs/UInt32", "field": "data"}}
+    for name, declared, item in (
+        ("E250 a blob of no bytes", "u32[1]", packet),
+        ("E250 a blob with a message", "u32[9]", mapped_packet),
+        ("E217 more bytes than a channel has", "u32[16384]", {"field": "one.inputs.n"}),
+    ):
+        cases[name] = (channel(item), {"alg.py": GOOD.replace('"n": "i32"', f'"n": "{declared}"')})
+    reply = {"field": "one.outputs.i", "direction": "actuator", "as": "blob"}
+    for name, safe in (
+        ("E250 a safe value of too many bytes", [3, 0, 0]),
+        ("E250 a safe value that is more than a byte", [1, 256, 0]),
+    ):
+        cases[name] = (channel({**reply, "safe": safe}), {"alg.py": GOOD.replace('"i": "i32"', '"i": "u32[3]"')})
     slow = connect({"from": "machine.dt", "to": "two.x"})
     cases["W207 a period of its own"] = (slow, {"alg.py": GOOD.replace('"f64 m"', '"f64 s"')})
     outside = put("instances", "one", "parameters", "k", value=-0.5)

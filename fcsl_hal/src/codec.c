@@ -1,6 +1,8 @@
 /* SPDX-License-Identifier: Apache-2.0
  *
  * Encodes messages of channels, and computes the hash of a channel table.
+ *
+ * `//@ split` is for scripts/verify/codec: from there on it analyses each count by itself.
  */
 #include "codec_layout.h"
 
@@ -13,8 +15,8 @@ fcsl_channel_table_t fcsl_channel_table(const fcsl_machine_t *machine)
         uint8_t row[8] = {0};
         fcsl_put_u16(row, channel->id);
         row[2] = channel->direction;
-        row[3] = entry_type(field);
-        fcsl_put_u32(row + 4, field->count);
+        row[3] = entry_type(channel, field);
+        fcsl_put_u32(row + 4, entry_count(channel, field));
         crc = fcsl_crc32(crc, row, sizeof row);
     }
     return (fcsl_channel_table_t){.machine = machine, .hash = crc};
@@ -24,8 +26,9 @@ size_t fcsl_message_capacity(const fcsl_machine_t *machine, fcsl_message_kind_t 
 {
     size_t bytes = head_bytes(kind) + FCSL_UNKNOWN_BYTES + CRC_BYTES;
     for (uint32_t i = 0; i < machine->channel_count; i++) {
-        if (carries(kind, &machine->channels[i])) {
-            bytes += entry_bytes(&machine->fields[machine->channels[i].field]);
+        const fcsl_channel_t *channel = &machine->channels[i];
+        if (carries(kind, channel)) {
+            bytes += entry_bytes(channel, &machine->fields[channel->field]);
         }
     }
     return bytes;
@@ -39,6 +42,41 @@ static uint8_t *put_entry(uint8_t *at, uint16_t id, uint8_t type)
     return at + ENTRY_BYTES;
 }
 
+/* Writes the entry of a channel behind *at, and moves *at behind it. */
+static fcsl_message_status_t put_channel(const fcsl_machine_t *machine, const fcsl_channel_t *channel,
+                                         const uint8_t *data, uint8_t *bytes, size_t capacity, size_t *at)
+{
+    const fcsl_field_t *field = &machine->fields[channel->field];
+    const uint8_t *from = data + field->offset;
+    const uint8_t type = entry_type(channel, field);
+    const int is_blob = channel->as == FCSL_AS_BLOB;
+    const uint32_t count = is_blob ? blob_count(from, blob_capacity(field)) : field->count;
+    const size_t head = ENTRY_BYTES + (is_array(type) ? (size_t)COUNT_BYTES : 0u);
+    size_t size = head + field->size;
+    //@ split count;
+    if (is_blob) {
+        size = head + count;
+    }
+    if (capacity - *at < size + CRC_BYTES) {
+        return FCSL_MESSAGE_SHORT;
+    }
+    uint8_t *values = put_entry(bytes + *at, channel->id, type);
+    if (is_array(type)) {
+        fcsl_put_u16(values, (uint16_t)count);
+        values += COUNT_BYTES;
+    }
+    if (is_blob) {
+        blob_export(values, from, count);
+    } else {
+        fcsl_scalars_export(values, from, field->type, count);
+        if (!fcsl_scalars_valid(machine, values, field->type, count)) {
+            return FCSL_MESSAGE_VALUE;
+        }
+    }
+    *at += size;
+    return FCSL_MESSAGE_OK;
+}
+
 /* Writes the channels of *message from `data` behind *at, and moves *at behind them. */
 static fcsl_message_status_t put_channels(const fcsl_machine_t *machine, const uint8_t *data, const uint8_t *select,
                                           const fcsl_message_t *message, uint8_t *bytes, size_t capacity, size_t *at)
@@ -48,21 +86,10 @@ static fcsl_message_status_t put_channels(const fcsl_machine_t *machine, const u
         if (!carries(message->kind, channel) || (select != NULL && select[i] == 0u)) {
             continue;
         }
-        const fcsl_field_t *field = &machine->fields[channel->field];
-        const uint8_t type = entry_type(field);
-        if (capacity - *at < entry_bytes(field) + CRC_BYTES) {
-            return FCSL_MESSAGE_SHORT;
+        const fcsl_message_status_t status = put_channel(machine, channel, data, bytes, capacity, at);
+        if (status != FCSL_MESSAGE_OK) {
+            return status;
         }
-        uint8_t *out = put_entry(bytes + *at, channel->id, type);
-        if (is_array(type)) {
-            fcsl_put_u16(out, (uint16_t)field->count);
-            out += COUNT_BYTES;
-        }
-        fcsl_scalars_export(out, data + field->offset, field->type, field->count);
-        if (!fcsl_scalars_valid(machine, out, field->type, field->count)) {
-            return FCSL_MESSAGE_VALUE;
-        }
-        *at += entry_bytes(field);
     }
     return FCSL_MESSAGE_OK;
 }

@@ -77,29 +77,41 @@ static int stands_before(const uint8_t *bytes, size_t at, size_t end, uint16_t i
     return 0;
 }
 
-/* The values of the entry; null unless it is one of this channel in a message of this kind. */
-static const uint8_t *values_of(const fcsl_machine_t *machine, fcsl_message_kind_t kind, uint32_t channel,
-                                const uint8_t *bytes, const raw_entry_t *entry)
+/* The values of the entry, and how many bytes they have; null unless it is one of this channel in a message of this kind. */
+static const uint8_t *values_of(const fcsl_machine_t *machine, fcsl_message_kind_t kind, uint32_t index,
+                                const uint8_t *bytes, const raw_entry_t *entry, size_t *size)
 {
-    //@ split channel;
-    const fcsl_field_t *field = &machine->fields[machine->channels[channel].field];
-    if (!carries(kind, &machine->channels[channel]) || entry->type != entry_type(field)) {
+    //@ split index;
+    const fcsl_channel_t *channel = &machine->channels[index];
+    const fcsl_field_t *field = &machine->fields[channel->field];
+    if (!carries(kind, channel) || entry->type != entry_type(channel, field)) {
         return NULL;
     }
-    return entry->values + field->size == entry->end ? bytes + entry->values : NULL;
+    const int is_blob = channel->as == FCSL_AS_BLOB;
+    *size = is_blob ? entry->end - entry->values : field->size;
+    if (is_blob && *size > blob_capacity(field)) {
+        return NULL;
+    }
+    //@ split *size;
+    return entry->values + *size == entry->end ? bytes + entry->values : NULL;
 }
 
 /* Checks the entry of a channel. */
-static fcsl_message_status_t check_channel(const fcsl_machine_t *machine, fcsl_message_kind_t kind, uint32_t channel,
+static fcsl_message_status_t check_channel(const fcsl_machine_t *machine, fcsl_message_kind_t kind, uint32_t index,
                                            const uint8_t *bytes, const raw_entry_t *entry)
 {
-    //@ split channel;
-    const fcsl_field_t *field = &machine->fields[machine->channels[channel].field];
-    const uint8_t *values = values_of(machine, kind, channel, bytes, entry);
+    //@ split index;
+    const fcsl_channel_t *channel = &machine->channels[index];
+    const fcsl_field_t *field = &machine->fields[channel->field];
+    size_t size = 0;
+    const uint8_t *values = values_of(machine, kind, index, bytes, entry, &size);
     if (values == NULL) {
-        return carries(kind, &machine->channels[channel]) ? FCSL_MESSAGE_TYPE : FCSL_MESSAGE_ENTRY;
+        return carries(kind, channel) ? FCSL_MESSAGE_TYPE : FCSL_MESSAGE_ENTRY;
     }
-    return fcsl_scalars_valid(machine, values, field->type, field->count) ? FCSL_MESSAGE_OK : FCSL_MESSAGE_VALUE;
+    if (channel->as == FCSL_AS_BLOB || fcsl_scalars_valid(machine, values, field->type, field->count)) {
+        return FCSL_MESSAGE_OK;
+    }
+    return FCSL_MESSAGE_VALUE;
 }
 
 static uint32_t actuators(const fcsl_machine_t *machine)
@@ -225,24 +237,15 @@ static uint32_t next_entry(const fcsl_machine_t *machine, const fcsl_message_t *
 
 int fcsl_message_next(const fcsl_machine_t *machine, const fcsl_message_t *message, fcsl_message_entry_t *entry)
 {
-    uint32_t next = entry->end == 0 ? 0 : entry->channel + 1u;
-    size_t at = entry->end == 0 ? head_bytes(message->kind) : entry->end;
+    const uint32_t next = entry->end == 0 ? 0 : entry->channel + 1u;
     raw_entry_t raw = {0};
-    for (;;) {
-        const uint32_t channel = next_entry(machine, message, at, next, &raw);
-        if (channel >= machine->channel_count) {
-            return 0;
-        }
-        /* It was checked; looked at again, so that its size is the field's even if bytes changed since then. */
-        const uint8_t *values = values_of(machine, message->kind, channel, message->bytes, &raw);
-        if (values != NULL) {
-            const uint32_t size = (uint32_t)(raw.end - raw.values);
-            *entry = (fcsl_message_entry_t){.end = raw.end, .channel = channel, .size = size, .values = values};
-            return 1;
-        }
-        at = raw.end;
-        next = channel + 1u;
+    const uint32_t channel =
+        next_entry(machine, message, entry->end == 0 ? head_bytes(message->kind) : entry->end, next, &raw);
+    if (channel >= machine->channel_count) {
+        return 0;
     }
+    *entry = (fcsl_message_entry_t){.end = raw.end, .channel = channel};
+    return 1;
 }
 
 /* Takes the values of a channel's entry. It was checked; looked at again so that bytes changed since then cannot write beside
@@ -253,11 +256,16 @@ static void take_channel(const fcsl_machine_t *machine, uint8_t *data, const fcs
     //@ split index;
     const fcsl_channel_t *channel = &machine->channels[index];
     const fcsl_field_t *field = &machine->fields[channel->field];
-    const uint8_t *values = values_of(machine, message->kind, index, message->bytes, entry);
+    size_t size = 0;
+    const uint8_t *values = values_of(machine, message->kind, index, message->bytes, entry, &size);
     if (values == NULL) {
         return;
     }
-    fcsl_scalars_import(data + field->offset, values, field->type, field->count);
+    if (channel->as == FCSL_AS_BLOB) {
+        blob_import(data + field->offset, values, (uint32_t)size, blob_capacity(field));
+    } else {
+        fcsl_scalars_import(data + field->offset, values, field->type, field->count);
+    }
     if (message->kind == FCSL_SENSOR_MESSAGE) { /* of the coming tick: its samples are not old, and have no stamp */
         data[channel->fresh_offset] = 1u;
         memset(data + channel->sample_age_offset, 0, sizeof(uint32_t));

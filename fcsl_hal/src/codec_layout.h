@@ -5,6 +5,7 @@
 #ifndef FCSL_CODEC_LAYOUT_H
 #define FCSL_CODEC_LAYOUT_H
 
+#include "codec_blob.h"
 #include "fcsl/fcsl_codec.h"
 #include "fcsl/fcsl_scalar.h"
 
@@ -30,17 +31,31 @@ static inline int is_array(uint8_t type)
     return type >> 4 >= ARRAY;
 }
 
-/* The type of the entry that carries this field. Nothing declares a field to be a quaternion or a blob. */
-static inline uint8_t entry_type(const fcsl_field_t *field)
+/* The type of the channel's entry. `field`: the channel's. */
+static inline uint8_t entry_type(const fcsl_channel_t *channel, const fcsl_field_t *field)
 {
+    if (channel->as == FCSL_AS_BLOB) {
+        return BLOB << 4;
+    }
     const uint8_t scalar = field->type <= FCSL_F64 ? field->type : (uint8_t)FCSL_I32;
-    const unsigned shape = field->rank == 0 ? SCALAR : field->rank == 1 && field->count == 3u ? VECTOR : ARRAY;
+    const unsigned shape = channel->as == FCSL_AS_QUATERNION        ? QUATERNION
+                           : field->rank == 0                       ? SCALAR
+                           : field->rank == 1 && field->count == 3u ? VECTOR
+                                                                    : ARRAY;
     return (uint8_t)(shape << 4 | scalar);
 }
 
-static inline size_t entry_bytes(const fcsl_field_t *field)
+/* Values of the channel's entry; of a blob: bytes at most. */
+static inline uint32_t entry_count(const fcsl_channel_t *channel, const fcsl_field_t *field)
 {
-    return ENTRY_BYTES + (is_array(entry_type(field)) ? (size_t)COUNT_BYTES : 0u) + field->size;
+    return channel->as == FCSL_AS_BLOB ? blob_capacity(field) : field->count;
+}
+
+/* Bytes of the channel's entry; of a blob: at most. */
+static inline size_t entry_bytes(const fcsl_channel_t *channel, const fcsl_field_t *field)
+{
+    const size_t count_bytes = is_array(entry_type(channel, field)) ? (size_t)COUNT_BYTES : 0u;
+    return ENTRY_BYTES + count_bytes + (channel->as == FCSL_AS_BLOB ? blob_capacity(field) : field->size);
 }
 
 static inline size_t head_bytes(fcsl_message_kind_t kind)

@@ -4,6 +4,8 @@
  */
 #include "fcsl/fcsl_log.h"
 
+#include <inttypes.h>
+#include <stdio.h>
 #include <string.h>
 
 void fcsl_log_write(fcsl_log_t *log, const char *text)
@@ -23,11 +25,23 @@ void fcsl_log_write(fcsl_log_t *log, const char *text)
     atomic_store_explicit(&log->written, number + 1u, memory_order_release);
 }
 
+static int read_dropped(fcsl_log_t *log, char text[FCSL_LOG_BYTES])
+{
+    const uint64_t dropped = atomic_load_explicit(&log->dropped, memory_order_relaxed);
+    if (dropped == log->dropped_told) {
+        return 0;
+    }
+    (void)snprintf(text, FCSL_LOG_BYTES, "%" PRIu64 " lines were not printed: whoever takes them was too slow",
+                   dropped - log->dropped_told);
+    log->dropped_told = dropped;
+    return 1;
+}
+
 int fcsl_log_read(fcsl_log_t *log, char text[FCSL_LOG_BYTES])
 {
     const uint32_t number = atomic_load_explicit(&log->read, memory_order_relaxed);
     if (number == atomic_load_explicit(&log->written, memory_order_acquire)) {
-        return 0;
+        return read_dropped(log, text);
     }
     memcpy(text, log->lines[number % FCSL_LOG_LINES], FCSL_LOG_BYTES);
     atomic_store_explicit(&log->read, number + 1u, memory_order_release);

@@ -12,9 +12,9 @@
 
 typedef struct {
     uint8_t flag;
-    uint8_t fresh[8];
-    uint32_t sample_age[8];
-    int64_t stamp[8];
+    uint8_t fresh[10];
+    uint32_t sample_age[10];
+    int64_t stamp[10];
     int32_t i32[3];
     int64_t i64;
     uint32_t u32;
@@ -24,6 +24,8 @@ typedef struct {
     int32_t health;
     double command[2];
     uint8_t enable[3];
+    uint32_t packet[6];
+    uint32_t reply[3];
 } data_t;
 
 /* Scalars, and arrays of one axis. */
@@ -51,9 +53,11 @@ static const fcsl_field_t FIELDS[] = {
     FIELD("u64", FCSL_U64, 2, u64, 16),         FIELD("f32", FCSL_F32, 4, f32, 16),
     FIELD("f64", FCSL_F64, 9, f64, 72),         FIELD("health", FCSL_HEALTH, 1, health, 4),
     FIELD("command", FCSL_F64, 2, command, 16), FIELD("enable", FCSL_BOOL, 3, enable, 3),
+    FIELD("packet", FCSL_U32, 6, packet, 24),   FIELD("reply", FCSL_U32, 3, reply, 12),
 };
 
-#define SENSOR(name_, id_, field_, slot_)                                                                              \
+#define NO_ROS "", "", "", "", "", ""
+#define SENSOR(name_, id_, field_, slot_, as_)                                                                         \
     {name_,                                                                                                            \
      id_,                                                                                                              \
      FCSL_SENSOR,                                                                                                      \
@@ -65,14 +69,10 @@ static const fcsl_field_t FIELDS[] = {
      FCSL_NO_OFFSET,                                                                                                   \
      (uint32_t)offsetof(data_t, sample_age) + 4u * slot_,                                                              \
      (uint32_t)offsetof(data_t, stamp) + 8u * slot_,                                                                   \
-     "",                                                                                                               \
-     "",                                                                                                               \
-     "",                                                                                                               \
-     "",                                                                                                               \
-     "",                                                                                                               \
-     "",                                                                                                               \
-     NULL}
-#define ACTUATOR(name_, id_, field_)                                                                                   \
+     NO_ROS,                                                                                                           \
+     NULL,                                                                                                             \
+     as_}
+#define ACTUATOR(name_, id_, field_, as_)                                                                              \
     {name_,                                                                                                            \
      id_,                                                                                                              \
      FCSL_ACTUATOR,                                                                                                    \
@@ -84,19 +84,18 @@ static const fcsl_field_t FIELDS[] = {
      FCSL_NO_OFFSET,                                                                                                   \
      FCSL_NO_OFFSET,                                                                                                   \
      FCSL_NO_OFFSET,                                                                                                   \
-     "",                                                                                                               \
-     "",                                                                                                               \
-     "",                                                                                                               \
-     "",                                                                                                               \
-     "",                                                                                                               \
-     "",                                                                                                               \
-     NULL}
+     NO_ROS,                                                                                                           \
+     NULL,                                                                                                             \
+     as_}
 
 /* Ids fall, and directions mix: neither order means anything. */
 static const fcsl_channel_t CHANNELS[] = {
-    SENSOR("flag", 900, 0, 0),   ACTUATOR("command", 1, 8), SENSOR("i32", 800, 1, 1), SENSOR("i64", 700, 2, 2),
-    SENSOR("u32", 65279, 3, 3),  SENSOR("u64", 500, 4, 4),  SENSOR("f32", 0, 5, 5),   SENSOR("f64", 300, 6, 6),
-    SENSOR("health", 200, 7, 7), ACTUATOR("enable", 2, 9),
+    SENSOR("flag", 900, 0, 0, FCSL_AS_FIELD),   ACTUATOR("command", 1, 8, FCSL_AS_FIELD),
+    SENSOR("i32", 800, 1, 1, FCSL_AS_FIELD),    SENSOR("i64", 700, 2, 2, FCSL_AS_FIELD),
+    SENSOR("u32", 65279, 3, 3, FCSL_AS_FIELD),  SENSOR("u64", 500, 4, 4, FCSL_AS_FIELD),
+    SENSOR("f32", 0, 5, 5, FCSL_AS_QUATERNION), SENSOR("f64", 300, 6, 6, FCSL_AS_FIELD),
+    SENSOR("health", 200, 7, 7, FCSL_AS_FIELD), ACTUATOR("enable", 2, 9, FCSL_AS_FIELD),
+    SENSOR("packet", 150, 10, 8, FCSL_AS_BLOB), ACTUATOR("reply", 3, 11, FCSL_AS_BLOB),
 };
 
 enum { FIELD_COUNT = sizeof FIELDS / sizeof FIELDS[0], CHANNEL_COUNT = sizeof CHANNELS / sizeof CHANNELS[0] };

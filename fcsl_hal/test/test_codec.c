@@ -11,6 +11,7 @@
 #include "fcsl/fcsl_codec.h"
 #include "fcsl/fcsl_scalar.h"
 
+enum { PACKET_BYTES = 5, REPLY_BYTES = 2 };
 enum { MESSAGE_BYTES = 1024, ROUNDS = 2000, HEAD_BYTES = 18, ARMED_AT = 21, TIME_AT = 21, CRC_BYTES = 7 };
 
 static const fcsl_message_kind_t KINDS[] = {FCSL_SENSOR_MESSAGE, FCSL_ACTUATOR_MESSAGE, FCSL_TIME_MESSAGE};
@@ -25,6 +26,15 @@ static uint64_t random_u64(void)
     return random_state;
 }
 
+/* A blob of any bytes, up to the capacity. */
+static void fill_blob(uint32_t *blob, uint32_t capacity)
+{
+    blob[0] = (uint32_t)(random_u64() % (capacity + 1u));
+    for (uint32_t i = 1; i <= capacity; i++) {
+        blob[i] = i <= blob[0] ? (uint8_t)random_u64() : 0u;
+    }
+}
+
 /* Any bits in every field, but valid ones where a type has invalid bits. */
 static void fill(data_t *data)
 {
@@ -37,6 +47,8 @@ static void fill(data_t *data)
         }
     }
     data->health = (int32_t)(random_u64() % 4u);
+    fill_blob(data->packet, PACKET_BYTES);
+    fill_blob(data->reply, REPLY_BYTES);
 }
 
 static int is_fresh(const data_t *data, uint32_t channel)
@@ -115,6 +127,8 @@ static void test_room(void)
     uint8_t message[MESSAGE_BYTES];
     data_t data;
     fill(&data);
+    data.packet[0] = PACKET_BYTES;
+    data.reply[0] = REPLY_BYTES;
     for (size_t i = 0; i < 3; i++) {
         const size_t size = encode_message(&MACHINE, &data, KINDS[i], 3, NULL, message, sizeof message);
         CHECK(size + FCSL_UNKNOWN_BYTES == fcsl_message_capacity(&MACHINE, KINDS[i]));
@@ -142,6 +156,23 @@ static void test_impossible_values(void)
     data.health = 3;
     CHECK(fcsl_message_encode_sensors(&table, &data, 1, NULL, bytes, sizeof bytes, &message) == FCSL_MESSAGE_OK);
     CHECK(message.bytes == bytes && message.tick == 1 && message.kind == FCSL_SENSOR_MESSAGE);
+}
+
+/* Every content of a blob's field is one: of a number above the capacity the capacity counts, of an element its lower byte. */
+static void test_blobs_of_any_content(void)
+{
+    static const uint32_t expected[] = {PACKET_BYTES, 0xff, 0, 1, 0x80, 0x34};
+    const uint32_t content[] = {UINT32_MAX, 0xffu, 0x100u, 0x101u, 0x80u, 0x1234u};
+    uint8_t bytes[MESSAGE_BYTES];
+    data_t data;
+    data_t received;
+    uint64_t tick = 0;
+    fill(&data);
+    fill(&received);
+    memcpy(data.packet, content, sizeof content);
+    const size_t size = encode_message(&MACHINE, &data, FCSL_SENSOR_MESSAGE, 1, NULL, bytes, sizeof bytes);
+    CHECK(decode_message(&MACHINE, &received, FCSL_SENSOR_MESSAGE, bytes, size, &tick) == FCSL_MESSAGE_OK);
+    CHECK(memcmp(received.packet, expected, sizeof expected) == 0);
 }
 
 static void seal(uint8_t *message, size_t size)
@@ -274,6 +305,13 @@ static void test_entries(void)
         ENTRIES(FCSL_MESSAGE_TYPE, 0, 0xff, 0xfe, 1, 1, 2, 3, 4),                   /* an i32 */
         ENTRIES(FCSL_MESSAGE_TYPE, 0, FLAG, 7, 0, 0x0f, 1),
         ENTRIES(FCSL_MESSAGE_TYPE, 0, FLAG, 7, 0, 0x46, 1, 0, 1),
+        ENTRIES(FCSL_MESSAGE_OK, 0, 150, 0, 0x40, 0, 0),                   /* an empty blob */
+        ENTRIES(FCSL_MESSAGE_OK, 0, 150, 0, 0x40, 5, 0, 1, 2, 3, 4, 0xff),    /* one that is full */
+        ENTRIES(FCSL_MESSAGE_TYPE, 0, 150, 0, 0x40, 6, 0, 1, 2, 3, 4, 5, 6),  /* one that is too long */
+        ENTRIES(FCSL_MESSAGE_TYPE, 0, 150, 0, 0x33, 1, 0, 1, 2, 3, 4),        /* not a blob */
+        ENTRIES(FCSL_MESSAGE_TYPE, 0, 0, 0, 0x35, 4, 0, [20] = 0),            /* not a quaternion */
+        ENTRIES(FCSL_MESSAGE_OK, 0, 0, 0, 0x25, [18] = 0),
+        ENTRIES(FCSL_MESSAGE_SHORT, 0, 150, 0, 0x40, 3, 0, 1, 2),
         ENTRIES(FCSL_MESSAGE_SHORT, 0, FLAG, 7),
         ENTRIES(FCSL_MESSAGE_SHORT, 0, FLAG, 7, 0, 4, 1, 2, 3, 4, 5, 6, 7),
         ENTRIES(FCSL_MESSAGE_SHORT, 0, FLAG, 7, 0, 0x36, 1),
@@ -318,7 +356,7 @@ static void test_all_actuators(void)
     data_t data;
     fill(&data);
     const size_t size = encode_message(&MACHINE, &data, FCSL_ACTUATOR_MESSAGE, 5, NULL, message, sizeof message);
-    const size_t last = 6; /* `enable`, a vector of bools */
+    const size_t last = 5u + data.reply[0]; /* a blob */
     memmove(message + size - CRC_BYTES - last, message + size - CRC_BYTES, CRC_BYTES);
     seal(message, size - last);
     check_refused(FCSL_ACTUATOR_MESSAGE, message, size - last, FCSL_MESSAGE_ENTRY);
@@ -378,6 +416,9 @@ static void test_table_hash(void)
     channels[3].field = 1;
     CHECK(fcsl_channel_table(&machine).hash != hash);
     memcpy(channels, CHANNELS, sizeof channels);
+    channels[6].as = FCSL_AS_FIELD; /* not a quaternion */
+    CHECK(fcsl_channel_table(&machine).hash != hash);
+    memcpy(channels, CHANNELS, sizeof channels);
     channels[3].name = "renamed";
     CHECK(fcsl_channel_table(&machine).hash == hash);
 }
@@ -388,6 +429,7 @@ int main(void)
     test_round_trip();
     test_room();
     test_impossible_values();
+    test_blobs_of_any_content();
     test_damage();
     test_wrong_content();
     test_entries();

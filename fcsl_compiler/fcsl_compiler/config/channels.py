@@ -7,8 +7,8 @@ import re
 
 from ..base.source import MAX_NAME, Span
 from ..model import ir
-from ..model.machine import NOT_MAPPED, Channel, Connection, PortRef, RosMapping
-from ..model.types import HEALTH, REQUEST, Scalar, element_of
+from ..model.machine import NOT_MAPPED, Channel, Connection, PortRef, RosMapping, Values
+from ..model.types import F32, F64, HEALTH, REQUEST, U32, Array, Scalar, Type, count_of, element_of, scalar_of
 from ..parse.json_reader import ConfigReader
 from ..parse.json_source import JsonNode
 from .arming import read_safe
@@ -24,6 +24,8 @@ _ROS_FRAME = re.compile(r"\S+")
 #: Axes of a vector; and of a rotation: target axes, source axes.
 AXES = ("enu", "ned", "flu", "frd", "enu/flu", "ned/frd", "ned/flu", "enu/frd")
 _MAX_AGE = 2**32 - 2
+#: Of the field of a channel (fcsl_hal: an entry counts its values, and a message its bytes, in 16 bits).
+_MAX_BYTES = 2**16 - 1
 #: Ids from 0xFF00 on are reserved for entries of messages that are no channels (docs/wire.md).
 MAX_ID = 0xFEFF
 
@@ -59,7 +61,9 @@ def read_channels(
 def _channel(
     item: JsonNode, ports: PortResolver, connections: list[Connection], reader: ConfigReader
 ) -> Channel | None:
-    keys = reader.object(item, "a channel", ("name", "id", "field", "direction"), ("max_age_ticks", "safe", "ros"))
+    keys = reader.object(
+        item, "a channel", ("name", "id", "field", "direction"), ("max_age_ticks", "safe", "as", "ros")
+    )
     if keys is None:
         return None
     name = reader.string(keys.get("name"), "`name`")
@@ -75,10 +79,51 @@ def _channel(
         reader.sink.error("E214", "`max_age_ticks` is for sensors", keys["max_age_ticks"].span, help="remove it")
     ros = read_ros(keys["ros"], default_topic(name or ""), reader) if "ros" in keys else NOT_MAPPED
     port = _bound(keys.get("field"), direction, ports, connections, reader)
-    if name is None or number is None or direction is None or port is None or ros is None:
+    kind = _kind(keys, port, reader)
+    if name is None or number is None or direction is None or port is None or ros is None or kind is None:
         return None
     safe = read_safe(keys["safe"], port.type, direction, reader) if "safe" in keys else ()
-    return Channel(name, number, port, direction, age, ros, item.span, safe or ())
+    safe_span = keys["safe"].span if safe else None
+    if kind == "blob" and safe and not _is_blob(safe):
+        message = f"`safe` of `{name}` is no blob"
+        why = "element 0 is the number of bytes, and each byte has an element behind it, 0 to 255"
+        reader.sink.error(
+            "E250", message, keys["safe"].span, why=why, help="write a 0 first, for example, for no bytes"
+        )
+    return Channel(name, number, port, direction, age, ros, item.span, safe or (), safe_span, kind)
+
+
+def _kind(keys: dict[str, JsonNode], port: PortRef | None, reader: ConfigReader) -> str | None:
+    """What the channel says its field is: "field" without `as`. None after reporting an error."""
+    if "as" not in keys:
+        return "field"
+    kind = reader.choice(keys["as"], "`as`", ("quaternion", "blob"))
+    if kind is None or port is None:
+        return None
+    if kind == "quaternion" and port.type not in (Array(F64, (4,)), Array(F32, (4,))):
+        message = f"a quaternion is an f64[4] or an f32[4], and `{keys['field'].value}` is {port.type}"
+        reader.sink.error("E250", message, keys["as"].span, help="remove `as`, or name another field")
+        return None
+    if kind == "blob" and not _holds_blob(port.type):
+        message = f"a blob is a u32[1 + N], and `{keys['field'].value}` is {port.type}"
+        why = "element 0 is the number of bytes, and each byte has an element behind it"
+        fix = "declare it `u32[65]`, for example, for 64 bytes"
+        reader.sink.error("E250", message, keys["as"].span, why=why, help=fix)
+        return None
+    if kind == "blob" and "ros" in keys:
+        why = "no standard message has one"
+        reader.sink.error("E250", "a blob with `ros`", keys["ros"].span, why=why, help="remove `ros`")
+        return None
+    return kind
+
+
+def _holds_blob(type_: Type) -> bool:
+    return isinstance(type_, Array) and type_.element == U32 and len(type_.shape) == 1 and type_.count > 1
+
+
+def _is_blob(values: Values) -> bool:
+    count, *elements = (value for value in values if not isinstance(value, str))
+    return count <= len(elements) and all(element <= 255 for element in elements)
 
 
 def default_topic(name: str) -> str:
@@ -134,6 +179,12 @@ def _bound(
     if port is not None and element_of(port.type) in (HEALTH, REQUEST):
         message = f"a {element_of(port.type)} cannot be sent on a channel"
         reader.sink.error("E217", message, node.span, help="bind numbers and bools")
+        return None
+    if port is not None and (size := count_of(port.type) * scalar_of(port.type).size) > _MAX_BYTES:
+        message = f"a channel has at most {_MAX_BYTES} bytes, and `{node.value}` has {size}"
+        reader.sink.error(
+            "E217", message, node.span, why="its message counts them in 16 bits", help="use several channels"
+        )
         return None
     if port is None or direction == "actuator":
         return port

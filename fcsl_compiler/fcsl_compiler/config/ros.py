@@ -4,15 +4,17 @@
 from __future__ import annotations
 
 import difflib
+import math
 from collections.abc import Iterable
 from dataclasses import dataclass
 
 from ..base.diagnostics import DiagnosticSink
 from ..base.source import Span
-from ..model.machine import Channel, RosMapping
+from ..model.literals import round_f32
+from ..model.machine import Channel, RosMapping, Values
 from ..model.types import REQUEST, Array, Scalar, Type, count_of, scalar_of
 from .message_fields import FieldError, Kind, Selection, numbers_text, select
-from .standard_messages import STANDARD, SUPPORTED, full_name, short_name
+from .standard_messages import SIZES, STANDARD, SUPPORTED, full_name, short_name
 
 #: Unit spellings, converted to those of the message table.
 _UNITS = {"Nm": "N*m", "m/s2": "m/s^2", "m/s/s": "m/s^2", "rad/s2": "rad/s^2", "degC": "°C", "A*h": "Ah", "°": "deg"}
@@ -21,7 +23,7 @@ _UNITS = {"Nm": "N*m", "m/s2": "m/s^2", "m/s/s": "m/s^2", "rad/s2": "rad/s^2", "
 @dataclass(frozen=True)
 class Mapped:
     """A value that a message carries: its name in errors, its direction ("sensor": read from the message, "actuator":
-    written to it), its mapping in the JSON, its type and unit."""
+    written to it), its mapping in the JSON, its type and unit, and its safe value, if it has one."""
 
     name: str
     direction: str
@@ -29,6 +31,8 @@ class Mapped:
     type: Type
     unit: str
     span: Span
+    safe: Values = ()
+    safe_span: Span | None = None
 
     def at(self, key: str) -> Span:
         """Span of `key` in the mapping; span of the whole entry if the key is absent."""
@@ -41,7 +45,8 @@ def check_channels(channels: Iterable[Channel], sink: DiagnosticSink) -> None:
 
 
 def _mapped(channel: Channel) -> Mapped:
-    return Mapped(channel.name, channel.direction, channel.ros, channel.port.type, channel.port.unit, channel.span)
+    c, port = channel, channel.port
+    return Mapped(c.name, c.direction, c.ros, port.type, port.unit, c.span, c.safe, c.safe_span)
 
 
 def check_mapped(values: Iterable[Mapped], sink: DiagnosticSink) -> None:
@@ -68,7 +73,10 @@ def _check(value: Mapped, sink: DiagnosticSink) -> Selection | None:
         sink.error("E237", error.args[0], value.at("field"), help=error.args[1])
         return None
     _check_frames(value, message, sink)
-    return selection if _check_fit(value, selection, sink) and _check_axes(value, selection, sink) else None
+    if not _check_fit(value, selection, sink):
+        return None
+    _check_safe(value, selection, sink)
+    return selection if _check_axes(value, selection, sink) else None
 
 
 def _meant(type_: str) -> str:
@@ -163,6 +171,35 @@ def _better(ros: str, scalar: Scalar) -> str:
     if ros.startswith("float"):
         return "declare it f64, and convert in the algorithm"
     return "declare it bool" if ros == "bool" else f"declare it {'u' if ros.startswith('u') else 'i'}64"
+
+
+def _check_safe(value: Mapped, selection: Selection, sink: DiagnosticSink) -> None:
+    """Checks that the message can hold the safe value. Axes change order and signs, which no limit depends on."""
+    types = [piece.type for piece in selection.pieces for _ in range(piece.count or count_of(value.type))]
+    for number, ros in zip(value.safe, types, strict=False):  # no numbers if there is no safe value
+        low, high = _limits(ros)
+        if isinstance(number, str) or low <= (round_f32(number) if ros == "float32" else number) <= high:
+            continue
+        text = f"`safe` of `{value.name}`: {number} does not fit `{value.ros.field}`, which is {ros}"
+        why = "a message with a value that does not fit is not sent, so the actuator would keep its last command"
+        fix = (
+            f"write a value from {low:.8g} to {high:.8g}" if ros == "float32" else f"write a value from {low} to {high}"
+        )
+        sink.error("E238", text, value.safe_span or value.span, why=why, help=f"{fix}, or map another field")
+        return
+
+
+def _limits(ros: str) -> tuple[float, float]:
+    """The least and the greatest finite number of a number type of ROS; those of float64, which holds every value, are
+    infinite."""
+    if ros.startswith("float"):
+        high = math.inf if ros == "float64" else float.fromhex("0x1.fffffep+127")
+        return -high, high
+    if ros == "bool":
+        return 0, 1
+    bits = 8 * SIZES[ros]
+    signed = ros.startswith("int")  # byte and char have no sign
+    return (-(1 << bits - 1), (1 << bits - 1) - 1) if signed else (0, (1 << bits) - 1)
 
 
 def _check_axes(value: Mapped, selection: Selection, sink: DiagnosticSink) -> bool:

@@ -50,9 +50,10 @@ def dump_machine(m: Machine) -> str:
             f"edge {m.states[e.source].name} -> {m.states[e.target].name} on {request} priority {e.priority}{guard}"
         )
     for ch in m.channels:
+        kind = f" as {ch.kind}" if ch.kind != "field" else ""
         safe = f" safe {list(ch.safe)}" if ch.safe else ""
         out.append(
-            f"channel {ch.id} {ch.name} {ch.direction} {m.instances[ch.port.instance].name}.{ch.port.path}{safe}"
+            f"channel {ch.id} {ch.name} {ch.direction} {m.instances[ch.port.instance].name}.{ch.port.path}{kind}{safe}"
         )
     if m.arm is not None:
         out.append(f"arm {m.instances[m.arm.instance].name}.{m.arm.path}")

@@ -320,7 +320,7 @@ class DescriptorEmitter:
             ros = (c.ros.type, c.ros.field, c.ros.topic, c.ros.frame, c.ros.child_frame, c.ros.axes)
             rows.append(
                 f"{{{c_string(c.name)}, {c.id}u, FCSL_{c.direction.upper()}, {self.by_path[path]}u, {age}, {', '.join(kept)}, "
-                f"{', '.join(map(c_string, ros))}, {self._safe(c)}}}"
+                f"{', '.join(map(c_string, ros))}, {self._safe(c)}, FCSL_AS_{c.kind.upper()}}}"
             )
         self.channels = self._table("fcsl_channel_t", f"fcsl_channels_{self.m.name}", rows)
 

@@ -144,6 +144,8 @@ class Channel:
     ros: RosMapping
     span: Span
     safe: Values = ()  # of an actuator; () if not declared
+    safe_span: Span | None = None  # of that value
+    kind: str = "field"  # field, quaternion, blob
 
 
 @dataclass(frozen=True)

@@ -19,7 +19,7 @@ extern "C" {
 #endif
 
 /* Incremented when a struct below or in fcsl_hw.h changes its meaning or layout. A host rejects any other value. */
-#define FCSL_ABI_VERSION 8u
+#define FCSL_ABI_VERSION 9u
 
 /* Bytes of fcsl_machine_t.views. */
 #define FCSL_VIEWS_BYTES_MAX UINT16_MAX
@@ -140,6 +140,13 @@ typedef struct {
 
 typedef enum { FCSL_SENSOR = 0, FCSL_ACTUATOR = 1 } fcsl_direction_t;
 
+/* What a channel says of its field beyond the field's type. */
+typedef enum {
+    FCSL_AS_FIELD = 0, /* nothing */
+    FCSL_AS_QUATERNION = 1, /* four floats, scalar first */
+    FCSL_AS_BLOB = 2 /* u32[1 + N]: a number of bytes, at most N, and behind it one byte in each element */
+} fcsl_channel_as_t;
+
 typedef struct {
     const char *name;
     uint16_t id; /* identifies the channel in messages (docs/wire.md); below 0xff00 */
@@ -168,6 +175,7 @@ typedef struct {
     const char *ros_axes; /* axes of the machine's value ("frd", "ned/frd"), or "": as in ROS */
     /* Actuators: what they get while they are disarmed or no command comes, as the field holds it; null: not declared. */
     const void *safe;
+    uint8_t as; /* fcsl_channel_as_t */
 } fcsl_channel_t;
 
 /* A place where a fault can occur, and its cause. */

@@ -46,7 +46,8 @@ uint32_t fcsl_crc32(uint32_t crc, const void *bytes, size_t size);
 typedef struct {
     const fcsl_machine_t *machine;
     uint32_t
-        hash; /* CRC-32 over (id u16, direction u8, type of its entry u8, count u32) of every channel in table order */
+        hash; /* CRC-32 over (id u16, direction u8, type of its entry u8, count u32) of every channel in table order; the
+               * count of a blob: its bytes at most */
 } fcsl_channel_table_t;
 
 fcsl_channel_table_t fcsl_channel_table(const fcsl_machine_t *machine);
@@ -90,8 +91,6 @@ void fcsl_message_apply(const fcsl_machine_t *machine, void *data, const fcsl_me
 typedef struct {
     size_t end; /* offset behind it in the message */
     uint32_t channel; /* index in the machine's channel table */
-    uint32_t size; /* bytes of the values: the size of the channel's field */
-    const uint8_t *values;
 } fcsl_message_entry_t;
 
 /* Moves *entry to the next entry of a channel. Returns 1, or 0 when there is none. */

@@ -1,7 +1,7 @@
 /* SPDX-License-Identifier: Apache-2.0
  *
  * Lines from one thread to another that prints them: a ring of fixed size. Who writes never waits; a line that finds no room
- * is dropped and counted.
+ * is dropped, and who reads gets a line that says how many were.
  */
 #ifndef FCSL_LOG_H
 #define FCSL_LOG_H
@@ -23,12 +23,14 @@ typedef struct {
     _Atomic uint32_t written;
     _Atomic uint32_t read;
     _Atomic uint64_t dropped;
+    uint64_t dropped_told; /* of these, to who reads */
     char lines[FCSL_LOG_LINES][FCSL_LOG_BYTES];
 } fcsl_log_t;
 
 /* From the one thread that writes. */
 void fcsl_log_write(fcsl_log_t *log, const char *text);
-/* From the one thread that reads: the oldest line; 1, or 0 when there is none. */
+/* From the one thread that reads: the oldest line, or behind the last one how many were dropped since that was told; 1, or 0 when
+ * there is nothing. */
 int fcsl_log_read(fcsl_log_t *log, char text[FCSL_LOG_BYTES]);
 
 #ifdef __cplusplus

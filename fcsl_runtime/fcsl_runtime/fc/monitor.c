@@ -26,12 +26,12 @@ static uint64_t period_of(const watchdog_t *watchdog)
     return watchdog->limit_ns == 0 || wanted > most ? most : wanted;
 }
 
-/* What the step thread has to say. */
+/* What the step thread has to say: a full ring, and how many lines it had no room for. */
 static void print_log(const monitor_t *monitor)
 {
     char text[FCSL_LOG_BYTES];
     const fcsl_hal_t *hal = &monitor->loop->hal;
-    for (int i = 0; i < FCSL_LOG_LINES && hal->read_log(hal->ctx, text); i++) {
+    for (int i = 0; i < FCSL_LOG_LINES + 1 && hal->read_log(hal->ctx, text); i++) {
         log_info("%s", text);
     }
 }

@@ -5,10 +5,9 @@
 #define _GNU_SOURCE
 #include "fcsl/fcsl_wire.h"
 #include "options.h"
+#include "usage.h"
 
-#include <errno.h>
 #include <getopt.h>
-#include <inttypes.h>
 #include <stddef.h>
 #include <stdio.h>
 #include <stdlib.h>
@@ -82,12 +81,6 @@ typedef struct {
     int (*read)(const char *text, options_t *options); /* WORD */
 } entry_t;
 
-static int complain(const char *what, const char *which)
-{
-    (void)fprintf(stderr, "fcsl-fc: %s%s\nTry `fcsl-fc --help`.\n", what, which);
-    return -1;
-}
-
 static int read_hal(const char *text, options_t *options)
 {
     if (strcmp(text, "stub") == 0) {
@@ -97,15 +90,16 @@ static int read_hal(const char *text, options_t *options)
     if (strncmp(text, "wire:", 5) == 0) {
         char error[ERROR_BYTES];
         options->wire = text + 5;
-        return fcsl_wire_check(options->wire, error, sizeof error) == 0 ? 0 : complain("--hal wire: ", error);
+        return fcsl_wire_check(options->wire, error, sizeof error) == 0 ? 0 : usage_error("--hal wire: ", error);
     }
-    return complain("--hal must be stub or wire:SPEC, not ", text);
+    return usage_error("--hal must be stub or wire:SPEC, not ", text);
 }
 
 static int read_rate(const char *text, options_t *options)
 {
     options->realtime = strcmp(text, "realtime") == 0;
-    return options->realtime || strcmp(text, "max") == 0 ? 0 : complain("--rate must be realtime or max, not ", text);
+    return options->realtime || strcmp(text, "max") == 0 ? 0
+                                                         : usage_error("--rate must be realtime or max, not ", text);
 }
 
 static int read_missed_deadline(const char *text, options_t *options)
@@ -118,7 +112,7 @@ static int read_missed_deadline(const char *text, options_t *options)
             return 0;
         }
     }
-    return complain("--missed-deadline must be catch-up, skip or stop, not ", text);
+    return usage_error("--missed-deadline must be catch-up, skip or stop, not ", text);
 }
 
 static int read_record_policy(const char *text, options_t *options)
@@ -126,7 +120,7 @@ static int read_record_policy(const char *text, options_t *options)
     options->record_policy = strcmp(text, "wait") == 0 ? RECORD_WAIT : RECORD_DROP;
     return options->record_policy == RECORD_WAIT || strcmp(text, "drop") == 0
                ? 0
-               : complain("--record-policy must be wait or drop, not ", text);
+               : usage_error("--record-policy must be wait or drop, not ", text);
 }
 
 static int read_help(const char *text, options_t *options)
@@ -178,27 +172,7 @@ static const entry_t ENTRIES[] = {
     {.name = "help", .kind = FLAG, .read = read_help},
     {.name = "version", .kind = FLAG, .read = read_version},
 };
-enum { ENTRY_COUNT = sizeof ENTRIES / sizeof ENTRIES[0], MESSAGE_BYTES = 128, TIMEOUT_MS = 2000 };
-
-static int read_number(const entry_t *entry, const char *text, uint64_t *value)
-{
-    char *end = NULL;
-    errno = 0;
-    const unsigned long long number = strtoull(text, &end, 10);
-    if (text[0] >= '0' && text[0] <= '9' && *end == '\0' && errno == 0 && number >= entry->min &&
-        number <= entry->max) {
-        *value = number;
-        return 0;
-    }
-    char message[MESSAGE_BYTES];
-    if (entry->max == INT64_MAX) {
-        (void)snprintf(message, sizeof message, "--%s needs a positive integer, not ", entry->name);
-    } else {
-        (void)snprintf(message, sizeof message, "--%s needs an integer from %" PRIu64 " to %" PRIu64 ", not ",
-                       entry->name, entry->min, entry->max);
-    }
-    return complain(message, text);
-}
+enum { ENTRY_COUNT = sizeof ENTRIES / sizeof ENTRIES[0], TIMEOUT_MS = 2000 };
 
 static int read_option(const entry_t *entry, const char *text, options_t *options)
 {
@@ -212,7 +186,7 @@ static int read_option(const entry_t *entry, const char *text, options_t *option
         return 0;
     case NUMBER: {
         uint64_t number = 0;
-        const int status = read_number(entry, text, &number);
+        const int status = usage_number(entry->name, text, entry->min, entry->max, &number);
         memcpy(place, &number, status == 0 ? sizeof number : 0u);
         return status;
     }
@@ -228,42 +202,42 @@ static int read_option(const entry_t *entry, const char *text, options_t *option
 static int check(const options_t *options)
 {
     if (options->paused && options->socket == NULL) {
-        return complain("--paused needs --socket: only commands make ticks then", "");
+        return usage_error("--paused needs --socket: only commands make ticks then", "");
     }
     if (options->checkpoints != NULL && options->socket == NULL) {
-        return complain("--checkpoints needs --socket: its files are what clients name", "");
+        return usage_error("--checkpoints needs --socket: its files are what clients name", "");
     }
     if (options->token != NULL && options->socket == NULL) {
-        return complain("--token needs --socket: it is the token of a TCP server", "");
+        return usage_error("--token needs --socket: it is the token of a TCP server", "");
     }
     if (options->timeout_ms != 0 && options->wire == NULL) {
-        return complain("--timeout-ms needs --hal wire:SPEC: it is how long to wait for the simulator", "");
+        return usage_error("--timeout-ms needs --hal wire:SPEC: it is how long to wait for the simulator", "");
     }
     if (options->name_space[0] != '\0' && options->record == NULL) {
-        return complain("--namespace needs --record: it is of the recorded topics", "");
+        return usage_error("--namespace needs --record: it is of the recorded topics", "");
     }
     if (options->ignore_source_hash && options->restore == NULL) {
-        return complain("--ignore-source-hash needs --restore", "");
+        return usage_error("--ignore-source-hash needs --restore", "");
     }
     if (options->restore != NULL && options->wire != NULL) {
-        return complain("--restore goes without --hal wire: a simulator begins at tick 0", "");
+        return usage_error("--restore goes without --hal wire: a simulator begins at tick 0", "");
     }
     if ((options->record_fields != NULL || options->record_policy != RECORD_BY_PACE) && options->record == NULL) {
-        return complain("--record-fields and --record-policy need --record", "");
+        return usage_error("--record-fields and --record-policy need --record", "");
     }
     if (options->telemetry_fields != NULL && options->telemetry == NULL) {
-        return complain("--telemetry-fields needs --telemetry", "");
+        return usage_error("--telemetry-fields needs --telemetry", "");
     }
     if (options->missed_deadline_given && !options->realtime) {
-        return complain("--missed-deadline is for ticks that the clock paces: it does not go with --rate max", "");
+        return usage_error("--missed-deadline is for ticks that the clock paces: it does not go with --rate max", "");
     }
     if (options->guard != NULL && !options->realtime && options->wire == NULL) {
-        return complain(
+        return usage_error(
             "--guard with --rate max would move real actuators faster than the machine's time; use --rate realtime",
             "");
     }
     if (options->priority > 0 && !options->realtime && options->wire == NULL) {
-        return complain(
+        return usage_error(
             "--realtime-priority with --rate max would leave no processor to anything else; use --rate realtime", "");
     }
     return 0;
@@ -288,11 +262,9 @@ int options_read(int argc, char **argv, options_t *options)
             return status;
         }
     }
-    if (optind + 1 != argc) {
-        return complain(optind == argc ? "which machine library?" : "one machine library, not also ",
-                        optind == argc ? "" : argv[optind + 1]);
+    if (usage_library(argc, argv, &options->library) != 0) {
+        return -1;
     }
-    options->library = argv[optind];
     const int status = check(options);
     if (options->timeout_ms == 0) {
         options->timeout_ms = TIMEOUT_MS;

@@ -4,10 +4,9 @@
  */
 #define _GNU_SOURCE
 #include "guard_options.h"
+#include "usage.h"
 
-#include <errno.h>
 #include <getopt.h>
-#include <inttypes.h>
 #include <stdio.h>
 #include <stdlib.h>
 
@@ -33,7 +32,7 @@ static const char USAGE[] =
     "  --version               print name and version\n"
     "  --help\n";
 
-enum { PERIOD_MS = 2, PERIOD_MS_MAX = 1000, PRIORITY_MAX = 99, MESSAGE_BYTES = 128 };
+enum { PERIOD_MS = 2, PERIOD_MS_MAX = 1000, PRIORITY_MAX = 99 };
 enum { ACTUATOR = 1, MACHINE, SLOT, PERIOD, PRIORITY, LOCK_MEMORY, VERSION, HELP };
 
 static const struct option OPTIONS[] = {
@@ -48,26 +47,6 @@ static const struct option OPTIONS[] = {
     {NULL, 0, NULL, 0},
 };
 
-static int complain(const char *what, const char *which)
-{
-    (void)fprintf(stderr, "fcsl-guard: %s%s\nTry `fcsl-guard --help`.\n", what, which);
-    return -1;
-}
-
-static int read_number(const char *name, const char *text, uint64_t max, uint64_t *value)
-{
-    char *end = NULL;
-    errno = 0;
-    const unsigned long long number = strtoull(text, &end, 10);
-    if (text[0] >= '0' && text[0] <= '9' && *end == '\0' && errno == 0 && number >= 1u && number <= max) {
-        *value = number;
-        return 0;
-    }
-    char message[MESSAGE_BYTES];
-    (void)snprintf(message, sizeof message, "--%s needs an integer from 1 to %" PRIu64 ", not ", name, max);
-    return complain(message, text);
-}
-
 static int read_option(int option, const char *text, options_t *options)
 {
     switch (option) {
@@ -81,9 +60,9 @@ static int read_option(int option, const char *text, options_t *options)
         options->slot = text;
         return 0;
     case PERIOD:
-        return read_number("period-ms", text, PERIOD_MS_MAX, &options->period_ms);
+        return usage_number("period-ms", text, 1, PERIOD_MS_MAX, &options->period_ms);
     case PRIORITY:
-        return read_number("realtime-priority", text, PRIORITY_MAX, &options->priority);
+        return usage_number("realtime-priority", text, 1, PRIORITY_MAX, &options->priority);
     case LOCK_MEMORY:
         options->lock_memory = 1;
         return 0;
@@ -104,7 +83,7 @@ int options_read(int argc, char **argv, options_t *options)
     *options = (options_t){.period_ms = PERIOD_MS};
     options->actuators = calloc((size_t)argc, sizeof *options->actuators);
     if (options->actuators == NULL) {
-        return complain("out of memory", "");
+        return usage_error("out of memory", "");
     }
     int option = 0;
     while ((option = getopt_long(argc, argv, "", OPTIONS, NULL)) != -1) {
@@ -113,13 +92,11 @@ int options_read(int argc, char **argv, options_t *options)
             return status;
         }
     }
-    if (optind + 1 != argc) {
-        return complain(optind == argc ? "which machine library?" : "one machine library, not also ",
-                        optind == argc ? "" : argv[optind + 1]);
+    if (usage_library(argc, argv, &options->library) != 0) {
+        return -1;
     }
-    options->library = argv[optind];
     if (options->slot == NULL) {
-        return complain("--slot PATH is missing: where fcsl-fc --guard PATH gets the slot for its commands", "");
+        return usage_error("--slot PATH is missing: where fcsl-fc --guard PATH gets the slot for its commands", "");
     }
     return 0;
 }

@@ -6,7 +6,6 @@
 #include "printing.h"
 
 #include <errno.h>
-#include <inttypes.h>
 #include <pthread.h>
 #include <semaphore.h>
 #include <signal.h>
@@ -23,11 +22,21 @@ enum { END_S = 1, INFO = 'i', ERROR = 'e' };
 
 /* A process prints in one place. The first character of a line says whether it is an error. */
 static fcsl_log_t lines;
-static sem_t written; /* posted once per line, and for the end */
+static sem_t written; /* posted once per line, also for one that is dropped, and for the end */
 static sem_t finished; /* posted by the thread: all is printed */
 static atomic_int over;
 static pthread_t thread;
 static int started;
+
+/* How many lines were dropped stands there without a first character of ours: it is an error. */
+static void print_line(const char *text)
+{
+    if (text[0] == INFO) {
+        log_info("%s", text + 1);
+    } else {
+        log_error("%s", text[0] == ERROR ? text + 1 : text);
+    }
+}
 
 static void *print_lines(void *unused)
 {
@@ -38,7 +47,7 @@ static void *print_lines(void *unused)
         }
         const int ends = atomic_load(&over);
         if (fcsl_log_read(&lines, text)) {
-            (text[0] == ERROR ? log_error : log_info)("%s", text + 1);
+            print_line(text);
         } else if (ends) {
             (void)sem_post(&finished);
             return NULL;
@@ -65,10 +74,6 @@ void printing_end(void)
 {
     if (!started) {
         return;
-    }
-    const uint64_t dropped = atomic_load(&lines.dropped);
-    if (dropped > 0u) {
-        print_error("%" PRIu64 " lines were not printed: whoever takes them was too slow", dropped);
     }
     struct timespec until = {0};
     (void)clock_gettime(CLOCK_MONOTONIC, &until);

@@ -166,14 +166,14 @@ static const fcsl_fault_place_t FAULT_PLACES[] = {
 static const fcsl_channel_t CHANNELS[] = {
     {"imu.gyro", 257, FCSL_SENSOR, 3, 5, AT(gyro_channel.attached), AT(gyro_channel.fresh), AT(gyro_channel.valid),
      AT(gyro_channel.age_ticks), AT(gyro_channel.sample_age), AT(gyro_channel.stamp_ns), "sensor_msgs/Imu",
-     "angular_velocity", "imu/data", "imu_link", "", "frd", NULL},
+     "angular_velocity", "imu/data", "imu_link", "", "frd", NULL, FCSL_AS_FIELD},
     {"panel.armed", 258, FCSL_SENSOR, 5, UINT32_MAX, AT(armed_channel.attached), AT(armed_channel.fresh),
      AT(armed_channel.valid), AT(armed_channel.age_ticks), AT(armed_channel.sample_age), AT(armed_channel.stamp_ns), "",
-     "", "", "", "", "", NULL},
+     "", "", "", "", "", NULL, FCSL_AS_FIELD},
     {"cart.force", 513, FCSL_ACTUATOR, 15, 0, FCSL_NO_OFFSET, FCSL_NO_OFFSET, FCSL_NO_OFFSET, FCSL_NO_OFFSET,
-     FCSL_NO_OFFSET, FCSL_NO_OFFSET, "", "", "", "", "", "", NULL},
+     FCSL_NO_OFFSET, FCSL_NO_OFFSET, "", "", "", "", "", "", NULL, FCSL_AS_FIELD},
     {"panel.saturated", 514, FCSL_ACTUATOR, 20, 0, FCSL_NO_OFFSET, FCSL_NO_OFFSET, FCSL_NO_OFFSET, FCSL_NO_OFFSET,
-     FCSL_NO_OFFSET, FCSL_NO_OFFSET, "", "", "", "", "", "", NULL},
+     FCSL_NO_OFFSET, FCSL_NO_OFFSET, "", "", "", "", "", "", NULL, FCSL_AS_FIELD},
     {.name = BEHIND, .direction = FCSL_SENSOR, .field = UINT32_MAX, .attached_offset = FAR, .fresh_offset = FAR},
 };
 

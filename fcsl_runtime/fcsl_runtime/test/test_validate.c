@@ -78,7 +78,7 @@ static void test_damage(void)
     CHECK(fcsl_validate(&machine, &error) == 0);
     machine.arm_field = 5;
     CHECK(fcsl_validate(&machine, &error) == 0);
-    REFUSED(machine.abi_version = FCSL_ABI_VERSION + 1u, "ABI version 9");
+    REFUSED(machine.abi_version = FCSL_ABI_VERSION + 1u, "ABI version 10");
     REFUSED(machine.name = NULL, "name");
     REFUSED(machine.layout_hash = "", "hash");
     static char views[FCSL_VIEWS_BYTES_MAX + 2u];
@@ -132,6 +132,9 @@ static void test_damage(void)
     REFUSED(channels[1].sample_age_offset = machine.size - 2, "channel 1");
     REFUSED(channels[1].stamp_offset = 4, "channel 1");
     REFUSED(channels[1].ros_axes = NULL, "channel 1");
+    REFUSED(channels[1].as = FCSL_AS_BLOB + 1, "channel 1");
+    REFUSED(channels[0].as = FCSL_AS_QUATERNION, "channel 0"); /* of three floats */
+    REFUSED(channels[2].as = FCSL_AS_BLOB, "channel 2");       /* of one */
     REFUSED(machine.arm_field = -2, "arm field");
     REFUSED(machine.arm_field = (int32_t)machine.field_count, "arm field");
     REFUSED(machine.arm_field = 3, "arm field"); /* an output, of floats */

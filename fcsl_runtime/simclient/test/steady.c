@@ -41,56 +41,45 @@ static atomic_uint_fast64_t sleeps;
 #define ALLOW             BPF_STMT(BPF_RET | BPF_K, SECCOMP_RET_ALLOW)
 #define TRAP              BPF_STMT(BPF_RET | BPF_K, SECCOMP_RET_TRAP)
 
-/* What a thread may do that waits for its peer; what it may do besides stands behind it. */
-static int watch_calls_of_peer(void)
+/* A call that is allowed; one that is if argument n is `value`, or has one of `bits`. */
+#define CALL(call)                UNLESS(call, 1), ALLOW
+#define CALL_WITH(call, n, value) UNLESS(call, 4), LOAD(ARGUMENT(n)), UNLESS(value, 1), ALLOW, TRAP
+#define CALL_WITH_BIT(call, n, bits)                                                                                   \
+    UNLESS(call, 4), LOAD(ARGUMENT(n)), BPF_JUMP(BPF_JMP | BPF_JSET | BPF_K, bits, 0, 1), ALLOW, TRAP
+
+/* From here on this thread makes no call but these. */
+static int watch_calls(struct sock_filter *code, size_t length)
 {
-    struct sock_filter code[] = {
-        LOAD(offsetof(struct seccomp_data, nr)),
-        UNLESS(SYS_clock_gettime, 1),
-        ALLOW,
-        UNLESS(SYS_sched_yield, 1),
-        ALLOW,
-        UNLESS(SYS_ppoll, 1),
-        ALLOW,
-        UNLESS(SYS_futex, 1),
-        ALLOW,
-        UNLESS(SYS_clock_nanosleep, 1), /* the shape of its sleep is watched without a peer */
-        ALLOW,
-        UNLESS(SYS_recvfrom, 4),
-        LOAD(ARGUMENT(3)),
-        BPF_JUMP(BPF_JMP | BPF_JSET | BPF_K, MSG_DONTWAIT, 0, 1),
-        ALLOW,
-        TRAP,
-        UNLESS(SYS_sendto, 4),
-        LOAD(ARGUMENT(3)),
-        BPF_JUMP(BPF_JMP | BPF_JSET | BPF_K, MSG_DONTWAIT, 0, 1),
-        ALLOW,
-        TRAP,
-        UNLESS(SYS_read, 4),
-        LOAD(ARGUMENT(2)),
-        UNLESS(8, 1),
-        ALLOW,
-        TRAP,
-        UNLESS(SYS_write, 4),
-        LOAD(ARGUMENT(2)),
-        UNLESS(8, 1),
-        ALLOW,
-        TRAP,
-        TRAP,
-    };
-    const struct sock_fprog program = {.len = sizeof code / sizeof code[0], .filter = code};
+    const struct sock_fprog program = {.len = (unsigned short)length, .filter = code};
     return prctl(PR_SET_NO_NEW_PRIVS, 1, 0, 0, 0) == 0 &&
            syscall(SYS_seccomp, SECCOMP_SET_MODE_FILTER, 0, &program) == 0;
 }
 
-static int watch_calls(void)
+/* What a thread may do that waits for its peer. */
+static int watch_with_peer(void)
 {
     struct sock_filter code[] = {
         LOAD(offsetof(struct seccomp_data, nr)),
-        UNLESS(SYS_clock_gettime, 1),
-        ALLOW,
-        UNLESS(SYS_sched_yield, 1),
-        ALLOW,
+        CALL(SYS_clock_gettime),
+        CALL(SYS_sched_yield),
+        CALL(SYS_ppoll),
+        CALL(SYS_futex),
+        CALL(SYS_clock_nanosleep), /* the shape of its sleep is watched without a peer */
+        CALL_WITH_BIT(SYS_recvfrom, 3, MSG_DONTWAIT),
+        CALL_WITH_BIT(SYS_sendto, 3, MSG_DONTWAIT),
+        CALL_WITH(SYS_read, 2, 8),
+        CALL_WITH(SYS_write, 2, 8),
+        TRAP,
+    };
+    return watch_calls(code, sizeof code / sizeof code[0]);
+}
+
+static int watch_without_peer(void)
+{
+    struct sock_filter code[] = {
+        LOAD(offsetof(struct seccomp_data, nr)),
+        CALL(SYS_clock_gettime),
+        CALL(SYS_sched_yield),
         UNLESS(SYS_clock_nanosleep, 6), /* on the monotonic clock, to an absolute time */
         LOAD(ARGUMENT(0)),
         UNLESS(CLOCK_MONOTONIC, 3),
@@ -98,11 +87,7 @@ static int watch_calls(void)
         UNLESS(TIMER_ABSTIME, 1),
         ALLOW,
         TRAP,
-        UNLESS(SYS_futex, 4), /* that wakes */
-        LOAD(ARGUMENT(1)),
-        UNLESS(FUTEX_WAKE | FUTEX_PRIVATE_FLAG, 1),
-        ALLOW,
-        TRAP,
+        CALL_WITH(SYS_futex, 1, FUTEX_WAKE | FUTEX_PRIVATE_FLAG), /* that wakes */
         UNLESS(SYS_write, 6), /* to an eventfd: 8 bytes, no standard stream */
         LOAD(ARGUMENT(2)),
         UNLESS(8, 3),
@@ -112,9 +97,7 @@ static int watch_calls(void)
         TRAP,
         TRAP,
     };
-    const struct sock_fprog program = {.len = sizeof code / sizeof code[0], .filter = code};
-    return prctl(PR_SET_NO_NEW_PRIVS, 1, 0, 0, 0) == 0 &&
-           syscall(SYS_seccomp, SECCOMP_SET_MODE_FILTER, 0, &program) == 0;
+    return watch_calls(code, sizeof code / sizeof code[0]);
 }
 
 /* From here on this thread may not even end: the other one ends the process. */
@@ -180,7 +163,7 @@ static void begin(void)
         _exit(CANNOT);
     }
     atomic_store(&faults_before, faults_of_main());
-    if (!(getenv("STEADY_PEER") != NULL ? watch_calls_of_peer() : watch_calls())) {
+    if (!(getenv("STEADY_PEER") != NULL ? watch_with_peer() : watch_without_peer())) {
         _exit(CANNOT);
     }
     allocations = 0;

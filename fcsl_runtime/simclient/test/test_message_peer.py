@@ -25,6 +25,9 @@ ROOT = Path(__file__).resolve().parents[3]
 REASONS = ("", "short", "kind", "crc", "table", "entry", "type", "value")
 KINDS = tuple(Kind)
 FORMATS, SIZES = "?iqIQfd", (1, 4, 8, 4, 8, 4, 8)
+U32 = 3
+#: fcsl_channel_as_t
+KINDS_OF = {"field": 0, "quaternion": 1, "blob": 2}
 #: Behind the fields, for the bytes that a sensor has in a machine.
 SPARE = 32
 
@@ -55,14 +58,14 @@ class Native:
         fields, channels, self._at = [], [], {}
         offset = SPARE
         for index, c in enumerate(table):
-            size = c.count * SIZES[c.scalar]
-            shape = (ctypes.c_uint32 * max(len(c.shape), 1))(*c.shape)
-            fields.append(
-                CField(type=c.scalar, rank=len(c.shape), shape=shape, count=c.count, offset=offset, size=size)
-            )
+            scalar, extents = (U32, (1 + c.count,)) if c.kind == "blob" else (c.scalar, c.shape)
+            count = math.prod(extents)
+            size = count * SIZES[scalar]
+            shape = (ctypes.c_uint32 * max(len(extents), 1))(*extents)
+            fields.append(CField(type=scalar, rank=len(extents), shape=shape, count=count, offset=offset, size=size))
             stamps = {"fresh_offset": 0, "sample_age_offset": 4, "stamp_offset": 8}
-            channels.append(CChannel(id=c.id, direction=c.actuator, field=index, **stamps))
-            self._at[c.id] = (offset, size, f"<{c.count}{FORMATS[c.scalar]}")
+            channels.append(CChannel(id=c.id, direction=c.actuator, field=index, as_=KINDS_OF[c.kind], **stamps))
+            self._at[c.id] = (offset, size, f"<{count}{FORMATS[scalar]}")
             offset += size
         self._lib, self._table, self._size = lib, table, offset
         self._machine = CMachine(
@@ -84,7 +87,10 @@ class Native:
         for index, channel in enumerate(self._table):
             if channel.id in message.values:
                 offset, size, layout = self._at[channel.id]
-                data[offset : offset + size] = struct.pack(layout, *message.values[channel.id])
+                values = message.values[channel.id]
+                if channel.kind == "blob":
+                    values = [len(values), *values, *[0] * (channel.count - len(values))]
+                data[offset : offset + size] = struct.pack(layout, *values)
                 select[index] = 1
         out, made = ctypes.create_string_buffer(capacity), CMessage()
         ends = (out, ctypes.c_size_t(capacity), ctypes.byref(made))
@@ -114,10 +120,15 @@ class Native:
         for image in (blank, other):
             self._lib.fcsl_message_apply(ctypes.byref(self._machine), image, ctypes.byref(checked))
         values = {}
-        for channel, (offset, size, layout) in self._at.items():
-            ends = offset, offset + size
-            if blank.raw[slice(*ends)] == other.raw[slice(*ends)]:
-                values[channel] = struct.unpack(layout, blank.raw[slice(*ends)])
+        for channel in self._table:
+            offset, size, layout = self._at[channel.id]
+            found = blank.raw[offset : offset + size]
+            if found == other.raw[offset : offset + size]:
+                values[channel.id] = struct.unpack(layout, found)
+                if channel.kind == "blob":
+                    count, *elements = values[channel.id]
+                    assert not any(elements[count:])
+                    values[channel.id] = tuple(elements[:count])
         return Message(kind, checked.tick, values, bool(checked.armed), checked.time_ns, checked.skipped)
 
 
@@ -152,9 +163,12 @@ SCALARS = (
 )
 SHAPES = st.sampled_from([(), (3,), (1,), (4,), (3, 3), (1, 3), (2, 2, 2), (40,)])
 IDS = st.one_of(st.integers(0, 9), st.integers(0, 0xFEFF))
-TABLES = st.lists(
-    st.builds(Channel, IDS, st.booleans(), st.integers(0, 6), SHAPES), max_size=8, unique_by=lambda c: c.id
+CHANNELS = st.one_of(
+    st.builds(Channel, IDS, st.booleans(), st.integers(0, 6), SHAPES),
+    st.builds(Channel, IDS, st.booleans(), st.integers(5, 6), st.just((4,)), st.just("quaternion")),
+    st.builds(Channel, IDS, st.booleans(), st.just(0), st.tuples(st.integers(1, 40)), st.just("blob")),
 )
+TABLES = st.lists(CHANNELS, max_size=8, unique_by=lambda c: c.id)
 U64 = st.integers(0, 2**64 - 1)
 
 
@@ -165,7 +179,10 @@ def messages(draw: st.DrawFn) -> tuple[list[Channel], Message]:
     for c in table:
         carried = kind is (Kind.ACTUATORS if c.actuator else Kind.SENSORS)
         if carried and (c.actuator or draw(st.booleans())):
-            values[c.id] = draw(st.lists(SCALARS[c.scalar], min_size=c.count, max_size=c.count))
+            if c.kind == "blob":
+                values[c.id] = draw(st.lists(st.integers(0, 255), max_size=c.count))
+            else:
+                values[c.id] = draw(st.lists(SCALARS[c.scalar], min_size=c.count, max_size=c.count))
     armed = kind is Kind.ACTUATORS and draw(st.booleans())
     return table, Message(kind, draw(U64), values, armed, draw(U64) if kind is Kind.TIME else 0)
 
@@ -278,12 +295,17 @@ VECTORS, ACCEPTED, REFUSED = (json.loads(block) for block in re.findall(r"```jso
 def page_table() -> list[Channel]:
     """The channels of the page's example, and its rows."""
     table = []
-    pattern = r"\| (\d+) \| (sensor|actuator) \| `(\w+)(?:\[([\d, ]+)\])?` \| (0x\w\w) \| `([0-9A-F ]+)` \|"
-    for number, direction, scalar, shape, kind, row in re.findall(pattern, PAGE):
+    pattern = (
+        r"\| (\d+) \| (sensor|actuator) \| `(\w+)(?:\[([\d, ]+)\])?`(?: as (\w+))? \| (0x\w\w) \| `([0-9A-F ]+)` \|"
+    )
+    for number, direction, scalar, shape, kind, code, row in re.findall(pattern, PAGE):
         extents = tuple(int(n) for n in shape.split(",")) if shape else ()
         names = ("bool", "i32", "i64", "u32", "u64", "f32", "f64")
-        channel = Channel(int(number), direction == "actuator", names.index(scalar), extents)
-        assert channel.type == int(kind, 16)
+        if kind == "blob":
+            assert scalar == "u32"
+            scalar, extents = "bool", (extents[0] - 1,)
+        channel = Channel(int(number), direction == "actuator", names.index(scalar), extents, kind or "field")
+        assert channel.type == int(code, 16)
         packed = struct.pack("<HBBI", channel.id, channel.actuator, channel.type, channel.count)
         assert packed == bytes.fromhex(row)
         table.append(channel)
@@ -308,7 +330,7 @@ def vector_bytes(vector: dict[str, Any]) -> bytes:
 
 def test_the_hash_of_the_page(native: ctypes.CDLL) -> None:
     table = page_table()
-    assert len(table) == 6
+    assert len(table) == 8
     (printed,) = re.findall(r"is the hash: `(0x[0-9A-F]{8})`", PAGE)
     assert int(printed, 16) == table_hash(table) == Native(native, table).hash
     assert zlib.crc32(b"123456789") == 0xCBF43926

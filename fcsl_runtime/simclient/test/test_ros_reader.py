@@ -12,7 +12,12 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from rosbags.typesys import Stores, get_types_from_msg, get_typestore
 
+from fcsl_compiler.base.diagnostics import DiagnosticSink
+from fcsl_compiler.base.source import SourceFile, Span
+from fcsl_compiler.config.ros import Mapped, check_mapped
 from fcsl_compiler.config.standard_messages import STANDARD
+from fcsl_compiler.model.machine import RosMapping
+from fcsl_compiler.model.types import SCALARS
 from simclient.errors import MapError
 from simclient.ros.composer import Composer, Source
 from simclient.ros.reader import REASONS, Pick, Reader, Samples
@@ -315,6 +320,40 @@ def test_a_value_that_its_field_cannot_hold_is_not_sent() -> None:
     single = Composer(STANDARD, "std_msgs/msg/Float32", [Source("data", "f64", 1, 0)])
     sent = [single.compose([np.array([x]).ctypes.data], 0) for x in (1e39, math.inf, -math.nan)]
     assert [s and s[4:] for s in sent] == [None, np.float32(math.inf).tobytes(), b"\0\0\xc0\x7f"]
+
+
+F32_BEYOND = float.fromhex("0x1.ffffffp+127")  # rounds to infinity
+NUMPY = {"bool": np.bool_, "i32": np.int32, "u32": np.uint32, "i64": np.int64, "u64": np.uint64, "f64": np.float64}
+
+
+def built(wire: str, source: str, number: float) -> bool:
+    """Whether the compiler accepts this safe value of an actuator that a field of this type carries."""
+    span = Span(SourceFile("x.json", ""), 1, 1, 1, 1)
+    ros = RosMapping(f"std_msgs/{wire}", "data", "out", "", "", "")
+    sink = DiagnosticSink()
+    check_mapped([Mapped("out", "actuator", ros, SCALARS[source], "", span, (number,), span)], sink)
+    return not sink.failed
+
+
+WHOLE = ["Bool", *(sign + str(bits) for sign in ("Int", "UInt") for bits in (8, 16, 32, 64))]
+CONVERTED = [(wire, source) for wire in WHOLE for source in LIMITS]
+CONVERTED += [(wire, source) for wire in ("Float32", "Float64") for source in NUMPY if source != "bool"]
+
+
+@pytest.mark.parametrize(("wire", "source"), CONVERTED)
+def test_the_compiler_refuses_the_safe_values_that_are_not_sent(wire: str, source: str) -> None:
+    if source == "f64":
+        numbers = [
+            s * x for s in (-1.0, 1.0) for x in (0.0, 0.1, 1e39, math.nextafter(F32_BEYOND, 0), F32_BEYOND, 1e308)
+        ]
+    else:
+        low, high = LIMITS[source]
+        ends = {limit for limits in [*LIMITS.values(), *WIRE_LIMITS.values()] for limit in limits}
+        numbers = sorted({n + d for n in ends for d in (-1, 0, 1) if low <= n + d <= high})
+    composer = Composer(STANDARD, f"std_msgs/msg/{wire}", [Source("data", source, 1, 0)])
+    for number in numbers:
+        sent = composer.compose([np.array([number], NUMPY[source]).ctypes.data], 0) is not None
+        assert built(wire, source, number) == sent, number
 
 
 @pytest.mark.parametrize(("count", "fits"), [(1024, True), (1025, False)])

@@ -95,12 +95,13 @@ static const fcsl_transition_t transitions[] = {{UP, DOWN, 0, 1, FCSL_NONE, 0}};
      "",                                                                                                               \
      "",                                                                                                               \
      "",                                                                                                               \
-     NULL}
+     NULL,                                                                                                             \
+     FCSL_AS_FIELD}
 static const fcsl_channel_t channels[] = {
     SENSOR("altitude", 1, POS_Z, 0),
     SENSOR("velocity", 2, VEL_Z, 1),
     {"throttle", 16, FCSL_ACTUATOR, THROTTLE, UINT32_MAX, FCSL_NO_OFFSET, FCSL_NO_OFFSET, FCSL_NO_OFFSET,
-     FCSL_NO_OFFSET, FCSL_NO_OFFSET, FCSL_NO_OFFSET, "", "", "", "", "", "", NULL},
+     FCSL_NO_OFFSET, FCSL_NO_OFFSET, FCSL_NO_OFFSET, "", "", "", "", "", "", NULL, FCSL_AS_FIELD},
 };
 
 static int32_t init(void *machine)

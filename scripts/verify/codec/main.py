@@ -52,14 +52,14 @@ class Defect:
 CHECK, ENCODE, COBS, FRAME = "codec_check.c", "codec.c", "cobs.c", "link_frame.c"
 DEFECTS = (
     Defect("an entry may end behind its message", CHECK, "if (behind > end) {", "if (0) {"),
-    Defect("the count of an array is not compared", CHECK, "entry->values + field->size == entry->end", "entry->end > 0"),
+    Defect("the count of an array is not compared", CHECK, "entry->values + *size == entry->end", "entry->end > 0"),
     Defect("a message shorter than its head is read", CHECK, "size < head_bytes(kind) + CRC_BYTES", "size < CRC_BYTES",
            (12, 12)),
     Defect("bytes that change after the check are believed", CHECK,
            "    if (values == NULL) {\n        return;\n    }\n", ""),
-    Defect("values are stored beside their field", CHECK, "import(data + field->offset,",
-           "import(data + field->offset + 1,"),
-    Defect("no room is kept for the CRC", ENCODE, "entry_bytes(field) + CRC_BYTES", "entry_bytes(field)"),
+    Defect("values are stored beside their field", CHECK, "scalars_import(data + field->offset,",
+           "scalars_import(data + field->offset + 1,"),
+    Defect("no room is kept for the CRC", ENCODE, "*at < size + CRC_BYTES", "*at < size"),
     Defect("the last bytes of a message are summed as eight", "crc32.c", "i + 8u <= size", "i < size", (37, 37)),
     Defect("the last bytes of a frame are summed as eight", "crc16.c", "i + 8u <= size", "i < size"),
     Defect("a frame may grow without end", COBS, "at < end && size < FCSL_LINK_FRAME_MAX", "at < end"),

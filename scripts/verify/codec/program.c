@@ -22,15 +22,15 @@ volatile uint8_t any_u8;
 volatile uint32_t any_u32;
 
 /* A channel of every way in which values are read, checked and stored. Nothing writes what lies between the fields. */
-enum { GAPS = 10, GAP_BYTES = 8 };
+enum { GAPS = 12, GAP_BYTES = 8 };
 typedef struct {
     uint8_t flags[3];
     uint8_t gap0[GAP_BYTES];
-    uint8_t fresh[5];
+    uint8_t fresh[7];
     uint8_t gap1[GAP_BYTES];
-    uint32_t age[5];
+    uint32_t age[7];
     uint8_t gap2[GAP_BYTES];
-    int64_t stamp[5];
+    int64_t stamp[7];
     uint8_t gap3[GAP_BYTES];
     int32_t health;
     uint8_t gap4[GAP_BYTES];
@@ -40,6 +40,10 @@ typedef struct {
     uint8_t gap6[GAP_BYTES];
     uint64_t count;
     uint8_t gap7[GAP_BYTES];
+    uint32_t packet[4];
+    uint8_t gap10[GAP_BYTES];
+    uint32_t reply[3];
+    uint8_t gap11[GAP_BYTES];
     float command[1];
     uint8_t gap8[GAP_BYTES];
     uint8_t enable;
@@ -53,30 +57,34 @@ typedef struct {
      .count = (count_),                                                                                                \
      .offset = offsetof(data_t, member_),                                                                              \
      .size = sizeof(((data_t *)0)->member_)}
-#define SENSOR(id_, field_)                                                                                            \
+#define SENSOR(id_, field_, as_)                                                                                       \
     {.name = "",                                                                                                       \
      .id = (id_),                                                                                                      \
      .direction = FCSL_SENSOR,                                                                                         \
      .field = (field_),                                                                                                \
      .fresh_offset = offsetof(data_t, fresh) + (field_),                                                               \
      .sample_age_offset = offsetof(data_t, age) + 4u * (field_),                                                       \
-     .stamp_offset = offsetof(data_t, stamp) + 8u * (field_)}
-#define ACTUATOR(id_, field_)                                                                                          \
+     .stamp_offset = offsetof(data_t, stamp) + 8u * (field_),                                                          \
+     .as = (as_)}
+#define ACTUATOR(id_, field_, as_)                                                                                     \
     {.name = "",                                                                                                       \
      .id = (id_),                                                                                                      \
      .direction = FCSL_ACTUATOR,                                                                                       \
      .field = (field_),                                                                                                \
      .fresh_offset = FCSL_NO_OFFSET,                                                                                   \
      .sample_age_offset = FCSL_NO_OFFSET,                                                                              \
-     .stamp_offset = FCSL_NO_OFFSET}
+     .stamp_offset = FCSL_NO_OFFSET,                                                                                   \
+     .as = (as_)}
 
 static const fcsl_field_t FIELDS[] = {
     FIELD(FCSL_BOOL, flags, 3, 1),   FIELD(FCSL_HEALTH, health, 1, 0), FIELD(FCSL_F32, rate, 3, 1),
-    FIELD(FCSL_F64, position, 1, 1), FIELD(FCSL_U64, count, 1, 0),     FIELD(FCSL_F32, command, 1, 1),
-    FIELD(FCSL_BOOL, enable, 1, 0),
+    FIELD(FCSL_F64, position, 1, 1), FIELD(FCSL_U64, count, 1, 0),     FIELD(FCSL_U32, packet, 4, 1),
+    FIELD(FCSL_F32, command, 1, 1),  FIELD(FCSL_BOOL, enable, 1, 0),   FIELD(FCSL_U32, reply, 3, 1),
 };
-static const fcsl_channel_t CHANNELS[] = {SENSOR(900, 0), ACTUATOR(1, 5), SENSOR(800, 1), SENSOR(3, 2),
-                                          SENSOR(700, 3), SENSOR(4, 4),   ACTUATOR(2, 6)};
+static const fcsl_channel_t CHANNELS[] = {
+    SENSOR(900, 0, FCSL_AS_FIELD), ACTUATOR(1, 6, FCSL_AS_FIELD), SENSOR(800, 1, FCSL_AS_FIELD),
+    SENSOR(3, 2, FCSL_AS_FIELD),   SENSOR(700, 3, FCSL_AS_FIELD), SENSOR(4, 4, FCSL_AS_FIELD),
+    SENSOR(5, 5, FCSL_AS_BLOB),    ACTUATOR(2, 7, FCSL_AS_FIELD), ACTUATOR(6, 8, FCSL_AS_BLOB)};
 enum { CHANNEL_COUNT = sizeof CHANNELS / sizeof CHANNELS[0] };
 static const fcsl_machine_t MACHINE = {
     .name = "any",
@@ -100,8 +108,9 @@ static void any_bytes(uint8_t *bytes, size_t size)
 
 static void check_gaps(void)
 {
-    const uint8_t *const gaps[GAPS] = {received.gap0, received.gap1, received.gap2, received.gap3, received.gap4,
-                                       received.gap5, received.gap6, received.gap7, received.gap8, received.gap9};
+    const uint8_t *const gaps[GAPS] = {received.gap0, received.gap1, received.gap2,  received.gap3,
+                                       received.gap4, received.gap5, received.gap6,  received.gap7,
+                                       received.gap8, received.gap9, received.gap10, received.gap11};
     for (int i = 0; i < GAPS; i++) {
         for (int j = 0; j < GAP_BYTES; j++) {
             //@ assert gaps[i][j] == 0;
@@ -123,8 +132,8 @@ static void receive(const fcsl_channel_table_t *table, fcsl_message_kind_t kind,
     any_bytes(memory, sizeof memory);
     fcsl_message_apply(&MACHINE, &received, &message);
     check_gaps();
-    while (fcsl_message_next(&MACHINE, &message, &entry) != 0 && entry.values != NULL) {
-        any_u8 = entry.values[0];
+    while (fcsl_message_next(&MACHINE, &message, &entry) != 0) {
+        //@ assert entry.channel < CHANNEL_COUNT;
     }
 }
 

@@ -254,7 +254,8 @@ MACHINE_CODES: dict[str, Code] = {
     "E217": Code(
         "a connection between different types",
         "A connection copies values without conversion, so types and shapes of both ends must be equal. Write a "
-        "conversion in an algorithm, where its loss of precision is visible. A channel carries numbers and bools.",
+        "conversion in an algorithm, where its loss of precision is visible. A channel carries numbers and bools, at most "
+        "65535 bytes of them.",
         Kind.JSON,
         '"connections": [{"from": "nav.mode", "to": "control.speed"}]',
         '"connections": [{"from": "nav.mode", "to": "control.mode"}]',
@@ -554,6 +555,16 @@ MACHINE_CODES: dict[str, Code] = {
         '"channels": [{"name": "force", "id": 1, "field": "control.outputs.force", "direction": "actuator"}]',
         '"command_timeout_s": 0.1,\n'
         '"channels": [{"name": "force", "id": 1, "field": "control.outputs.force", "direction": "actuator", "safe": 0.0}]',
+    ),
+    "E250": Code(
+        "a field that is not what its channel says",
+        "`as` says what a field is for the other end of a wire. A quaternion is an f64[4] or f32[4], its scalar part "
+        "first. A blob is a u32[1 + N] for up to N bytes: element 0 is their number, and each of them has an element "
+        "behind it. A blob has no ROS message.",
+        Kind.JSON,
+        '"channels": [{"name": "force", "id": 1, "field": "control.outputs.force", "direction": "actuator",\n'
+        '              "as": "quaternion"}]',
+        '"channels": [{"name": "force", "id": 1, "field": "control.outputs.force", "direction": "actuator"}]',
     ),
     "W201": Code(
         "an algorithm without an instance",

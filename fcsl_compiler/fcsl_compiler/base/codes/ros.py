@@ -44,7 +44,8 @@ ROS_CODES: dict[str, Code] = {
         "a field that does not fit its channel",
         "A field and its channel must have equally many numbers, with a conversion that is free of loss: floats to"
         " floats, integers to floats, integers and bools to one another. A value in a received message that does "
-        "not fit is rejected and counted.",
+        "not fit is rejected and counted. The field must be able to hold the `safe` value of an actuator: 300 does not "
+        "fit a uint8.",
         Kind.JSON,
         _mapped('"type": "sensor_msgs/Imu", "field": "orientation"'),
         _mapped('"type": "sensor_msgs/Imu", "field": "angular_velocity"'),

@@ -106,11 +106,27 @@ static int check_transition(const fcsl_machine_t *machine, const fcsl_transition
                : -1;
 }
 
+/* True when the field can be what the channel says. */
+static int is_kind(const fcsl_channel_t *channel, const fcsl_field_t *field)
+{
+    switch (channel->as) {
+    case FCSL_AS_FIELD:
+        return 1;
+    case FCSL_AS_QUATERNION:
+        return (field->type == FCSL_F32 || field->type == FCSL_F64) && field->count == 4;
+    case FCSL_AS_BLOB:
+        return field->type == FCSL_U32 && field->count > 1;
+    default:
+        return 0;
+    }
+}
+
 static int check_channel(const fcsl_machine_t *machine, uint32_t index)
 {
     const fcsl_channel_t *channel = &machine->channels[index];
     if (!is_name(channel->name) || channel->direction > FCSL_ACTUATOR || channel->field >= machine->field_count ||
-        machine->fields[channel->field].size > UINT16_MAX || channel->id >= FCSL_RESERVED_ID_FIRST) {
+        machine->fields[channel->field].size > UINT16_MAX || channel->id >= FCSL_RESERVED_ID_FIRST ||
+        !is_kind(channel, &machine->fields[channel->field])) {
         return -1;
     }
     for (uint32_t i = 0; i < index; i++) {

@@ -204,15 +204,17 @@ int fcsl_run_attach(fcsl_run_t *run, fcsl_error_t *error)
     return 0;
 }
 
-/* Records each channel that a sensor message brought. */
+/* Records each channel that a sensor message brought, as its field holds it now. */
 static void record_channels(fcsl_run_t *run, const fcsl_message_t *message)
 {
     fcsl_message_entry_t entry = {0};
     while (fcsl_message_next(run->machine, message, &entry) != 0) {
-        fcsl_note_write(run, &(fcsl_write_t){.kind = FCSL_WRITE_CHANNEL,
-                                             .path = run->machine->channels[entry.channel].name,
-                                             .data = entry.values,
-                                             .size = entry.size});
+        const fcsl_channel_t *channel = &run->machine->channels[entry.channel];
+        const fcsl_field_t *field = &run->machine->fields[channel->field];
+        fcsl_scalars_export(run->staging, run->data + field->offset, field->type, field->count);
+        fcsl_note_write(
+            run, &(fcsl_write_t){
+                     .kind = FCSL_WRITE_CHANNEL, .path = channel->name, .data = run->staging, .size = field->size});
     }
 }
 

@@ -14,7 +14,7 @@ from typing import NamedTuple
 #: Formats of the scalars by number.
 _FORMATS = "?iqIQfd"
 _BOOL, _U32, _U64, _F32, _F64 = 0, 3, 4, 5, 6
-_VECTOR, _ARRAY, _BLOB = 1, 3, 4
+_VECTOR, _QUATERNION, _ARRAY, _BLOB = 1, 2, 3, 4
 #: Values of the shapes without a count.
 _COUNTS = (1, 3, 4)
 _HEAD, _COUNT, _ROW = struct.Struct("<HB"), struct.Struct("<H"), struct.Struct("<HBBI")
@@ -58,12 +58,14 @@ class Entry(NamedTuple):
 
 @dataclass(frozen=True)
 class Channel:
-    """A row of the channel table. `scalar`: 0 to 6; `shape`: that of the field, () for a scalar."""
+    """A row of the channel table. `scalar`: 0 to 6; `shape`: that of the field, () for a scalar. `kind`: field,
+    quaternion, or blob: scalar 0 and shape (bytes at most,)."""
 
     id: int
     actuator: bool
     scalar: int
     shape: tuple[int, ...] = ()
+    kind: str = "field"
 
     @property
     def count(self) -> int:
@@ -71,13 +73,13 @@ class Channel:
 
     @property
     def type(self) -> int:
-        shape = _ARRAY if self.shape else 0
-        return (_VECTOR if self.shape == (3,) else shape) << 4 | self.scalar
+        shape = _VECTOR if self.shape == (3,) else _ARRAY if self.shape else 0
+        return {"quaternion": _QUATERNION, "blob": _BLOB}.get(self.kind, shape) << 4 | self.scalar
 
 
 @dataclass(frozen=True)
 class Message:
-    """`values`: by channel id, as many as the channel has, row by row. `skipped`: entries that the table does not have."""
+    """`values`: by channel id, as many as the channel has, row by row; of a blob its bytes. `skipped`: entries that the table does not have."""
 
     kind: Kind
     tick: int
@@ -170,17 +172,22 @@ def _entry(number: int, kind: int, values: Sequence[Value]) -> bytes:
     if scalar in (_F32, _F64):
         values = [math.nan if math.isnan(value) else value for value in values]
     count = _COUNT.pack(len(values)) if kind >> 4 >= _ARRAY else b""
-    return _HEAD.pack(number, kind) + count + struct.pack(f"<{len(values)}{_FORMATS[scalar]}", *values)
+    return _HEAD.pack(number, kind) + count + struct.pack(f"<{len(values)}{_format(kind)}", *values)
+
+
+def _format(kind: int) -> str:
+    """The format of one value of this type."""
+    return "B" if kind >> 4 == _BLOB else _FORMATS[kind & 15]
 
 
 def _size(scalar: int) -> int:
     return struct.calcsize(f"<{_FORMATS[scalar]}")
 
 
-def _values(data: bytes, scalar: int, count: int, at: int) -> tuple[Value, ...]:
-    if scalar == _BOOL and any(byte > 1 for byte in data[at : at + count]):
+def _values(data: bytes, kind: int, count: int, at: int) -> tuple[Value, ...]:
+    if kind & 15 == _BOOL and kind >> 4 != _BLOB and any(byte > 1 for byte in data[at : at + count]):
         raise MessageError("value")
-    return struct.unpack_from(f"<{count}{_FORMATS[scalar]}", data, at)
+    return struct.unpack_from(f"<{count}{_format(kind)}", data, at)
 
 
 def _channels(
@@ -197,9 +204,10 @@ def _channels(
             continue
         if channel is None or not _carries(kind, channel):
             raise MessageError("entry")
-        if (entry.type, entry.elements) != (channel.type, channel.count):
+        fits = entry.elements <= channel.count if channel.kind == "blob" else entry.elements == channel.count
+        if entry.type != channel.type or not fits:
             raise MessageError("type")
-        found = _values(data, channel.scalar, channel.count, entry.values)
+        found = _values(data, channel.type, entry.elements, entry.values)
         if entry.id in values:
             raise MessageError("entry")
         values[entry.id] = found

@@ -187,7 +187,8 @@ static const fcsl_transition_t transitions[] = {
      "",                                                                                                               \
      "",                                                                                                               \
      "",                                                                                                               \
-     NULL}
+     NULL,                                                                                                             \
+     FCSL_AS_FIELD}
 static const fcsl_channel_t channels[] = {
     CHANNEL("imu.gyro", 1, VEC, 0),
     CHANNEL("imu.attitude", 2, QUAT, 1),

@@ -31,21 +31,22 @@ typedef struct {
      .count = (count_),                                                                                                \
      .offset = offsetof(machine_t, member_),                                                                           \
      .size = 4 * (count_)}
-#define SAMPLED(name_, id_, field_)                                                                                    \
+#define SAMPLED(name_, id_, field_, as_)                                                                               \
     {.name = (name_),                                                                                                  \
      .id = (id_),                                                                                                      \
      .direction = FCSL_SENSOR,                                                                                         \
      .field = (field_),                                                                                                \
      .fresh_offset = (uint32_t)offsetof(machine_t, fresh) + (field_),                                                  \
      .sample_age_offset = (uint32_t)offsetof(machine_t, age) + 4u * (field_),                                          \
-     .stamp_offset = (uint32_t)offsetof(machine_t, stamp) + 8u * (field_)}
+     .stamp_offset = (uint32_t)offsetof(machine_t, stamp) + 8u * (field_),                                             \
+     .as = (as_)}
 
 static const fcsl_field_t FIELDS[] = {F32("imu.accelerometer", accelerometer, 3), F32("imu.gyroscope", gyroscope, 3),
                                       F32("ahrs.attitude", attitude, 4), F32("mixer.motors", motors, 4)};
 static const fcsl_channel_t CHANNELS[] = {
-    SAMPLED("accelerometer", 1, 0),
-    SAMPLED("gyroscope", 2, 1),
-    SAMPLED("attitude", 3, 2),
+    SAMPLED("accelerometer", 1, 0, FCSL_AS_FIELD),
+    SAMPLED("gyroscope", 2, 1, FCSL_AS_FIELD),
+    SAMPLED("attitude", 3, 2, FCSL_AS_QUATERNION),
     {.name = "motors", .id = 16, .direction = FCSL_ACTUATOR, .field = 3},
 };
 static const fcsl_machine_t MACHINE = {
