@@ -67,7 +67,7 @@ CHECKS = (
     tests(
         "generated programs: compiled = CPython = oracle",
         "test_generated.py",
-        *("-k", "test_programs or test_machines", "--programs", scaled("2000", "20000"), "--program-seed", "2"),
+        *("-k", "test_programs or test_machines", "--programs", scaled("1000", "20000"), "--program-seed", "2"),
     ),
     script("sanitizers: native tests, threads, generated C", "sanitize"),
     script("fuzzers: every native parser, each with a seeded defect", "fuzz"),
