@@ -54,9 +54,9 @@ def reference(tmp_path_factory: pytest.TempPathFactory) -> str:
 
 def fly(ours: str, theirs: str, library: Path, bag: Path, *options: str | Path) -> str:
     """The digest of the flight; the two programs may start in either order."""
-    line = ["fcsl-sim", "run", str(SIM), "--duration", LENGTH_S, "--external", f"wire:{ours}"]
+    line = ["fcsl-sim", "run", str(SIM), "--duration", LENGTH_S, "--external", ours]
     with subprocess.Popen(line, stdout=subprocess.DEVNULL, stderr=subprocess.PIPE, text=True) as simulator:
-        line = ["--hal", f"wire:{theirs}", "--timeout-ms", "60000", "--summary", str(bag.with_suffix(".json"))]
+        line = ["--hal", theirs, "--timeout-ms", "60000", "--summary", str(bag.with_suffix(".json"))]
         run("fcsl-fc", library, *line, "--record", bag, *options)
         _, err = simulator.communicate(timeout=60)
     assert simulator.returncode in (0, 1), err  # 1: `until` did not hold in so short a flight
@@ -81,14 +81,21 @@ def free_port(kind: socket.SocketKind) -> int:
 
 @pytest.mark.parametrize("kind", ["udp:", "tcp:", "zenoh:tcp/"])
 def test_network(kind: str, reference: str, library: Path, tmp_path: Path) -> None:
-    wire = f"{kind}127.0.0.1:{free_port(socket.SOCK_DGRAM if kind == 'udp:' else socket.SOCK_STREAM)}"
+    wire = f"wire:{kind}127.0.0.1:{free_port(socket.SOCK_DGRAM if kind == 'udp:' else socket.SOCK_STREAM)}"
     assert fly(wire, wire, library, tmp_path / "bag") == reference
+
+
+@pytest.mark.parametrize("role", ["zenoh", "zenoh-peer"])
+def test_named_values_on_the_bus(role: str, reference: str, library: Path, tmp_path: Path) -> None:
+    """Each channel under its own key, and a commit for each tick."""
+    place = f"tcp/127.0.0.1:{free_port(socket.SOCK_STREAM)}"
+    assert fly(f"zenoh:{place}", f"{role}:{place}", library, tmp_path / "bag") == reference
 
 
 def test_a_guard_changes_nothing_in_the_flight(reference: str, library: Path, tmp_path: Path) -> None:
     slot, device = tmp_path / "slot", tmp_path / "throttle"
     line = ["fcsl-guard", str(library), "--slot", str(slot), "--actuator", f"throttle=log:{device}"]
-    wire = f"unix:{tmp_path / 'wire'}"
+    wire = f"wire:unix:{tmp_path / 'wire'}"
     with subprocess.Popen(line, stdout=subprocess.PIPE, text=True) as guard:
         try:
             assert guard.stdout and "slot at" in guard.stdout.readline()
@@ -175,7 +182,7 @@ def fly_relayed(library: Path, folder: Path, **line: Any) -> tuple[str, Line]:
         found: list[str] = []
         flight = threading.Thread(
             target=lambda: found.append(
-                fly(f"udp:127.0.0.1:{ours}", f"udp:127.0.0.1:{theirs}", library, folder / "bag")
+                fly(f"wire:udp:127.0.0.1:{ours}", f"wire:udp:127.0.0.1:{theirs}", library, folder / "bag")
             )
         )
         flight.start()
@@ -213,7 +220,7 @@ def test_serial_line(trouble: dict[str, Any], reference: str, library: Path, tmp
     (a, ours), (b, theirs) = pty.openpty(), pty.openpty()
     names = [os.ttyname(end) for end in (ours, theirs)]
     with running(Line((a, b), **trouble)) as line:
-        flown = fly(f"uart:{names[0]}:921600", f"uart:{names[1]}:921600", library, tmp_path / "bag")
+        flown = fly(f"wire:uart:{names[0]}:921600", f"wire:uart:{names[1]}:921600", library, tmp_path / "bag")
     for end in (a, b, ours, theirs):
         os.close(end)
     assert flown == reference

@@ -244,7 +244,10 @@ int fcsl_message_next(const fcsl_machine_t *machine, const fcsl_message_t *messa
     if (channel >= machine->channel_count) {
         return 0;
     }
-    *entry = (fcsl_message_entry_t){.end = raw.end, .channel = channel};
+    *entry = (fcsl_message_entry_t){.end = raw.end,
+                                    .channel = channel,
+                                    .size = (uint32_t)(raw.end - raw.values),
+                                    .values = message->bytes + raw.values};
     return 1;
 }
 

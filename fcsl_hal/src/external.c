@@ -12,6 +12,7 @@
 
 #include "control_packet.h"
 #include "monotonic.h"
+#include "wire_named.h"
 
 enum { TEXT_BYTES = 512, SPEC_BYTES = 256, TIME_BYTES = 64 };
 
@@ -34,8 +35,8 @@ static size_t inbox_bytes(const fcsl_machine_t *machine)
     return actuators > CONTROL_PACKET_MAX ? actuators : CONTROL_PACKET_MAX;
 }
 
-int fcsl_external_over_wire(const fcsl_wire_t *wire, const fcsl_machine_t *machine, fcsl_external_t **external,
-                            char *error, size_t error_size)
+/* Everything but the wire. Returns null with `error` filled. */
+static fcsl_external_t *create(const fcsl_machine_t *machine, const char *where, char *error, size_t error_size)
 {
     fcsl_external_t *self = calloc(1, sizeof *self);
     uint8_t *inbox = malloc(inbox_bytes(machine));
@@ -43,13 +44,29 @@ int fcsl_external_over_wire(const fcsl_wire_t *wire, const fcsl_machine_t *machi
         free(self);
         free(inbox);
         (void)snprintf(error, error_size, "out of memory for the wire");
-        return -1;
+        return NULL;
     }
     self->table = fcsl_channel_table(machine);
-    self->wire = *wire;
     self->inbox = inbox;
     self->inbox_size = inbox_bytes(machine);
-    (void)snprintf(self->spec, sizeof self->spec, "the wire");
+    (void)snprintf(self->spec, sizeof self->spec, "%s", where);
+    return self;
+}
+
+static void release(fcsl_external_t *external)
+{
+    free(external->inbox);
+    free(external);
+}
+
+int fcsl_external_over_wire(const fcsl_wire_t *wire, const fcsl_machine_t *machine, fcsl_external_t **external,
+                            char *error, size_t error_size)
+{
+    fcsl_external_t *self = create(machine, "the wire", error, error_size);
+    if (self == NULL) {
+        return -1;
+    }
+    self->wire = *wire;
     *external = self;
     return 0;
 }
@@ -57,17 +74,34 @@ int fcsl_external_over_wire(const fcsl_wire_t *wire, const fcsl_machine_t *machi
 int fcsl_external_open(const char *spec, const fcsl_machine_t *machine, fcsl_external_t **external, char *error,
                        size_t error_size)
 {
-    fcsl_wire_t wire;
     const size_t sensors = fcsl_message_capacity(machine, FCSL_SENSOR_MESSAGE);
     const size_t inbox = inbox_bytes(machine);
-    if (fcsl_wire_open(spec, FCSL_WIRE_LISTEN, sensors > inbox ? sensors : inbox, 0, &wire, error, error_size) != 0) {
+    fcsl_external_t *self = create(machine, spec, error, error_size);
+    if (self == NULL) {
         return -1;
     }
-    if (fcsl_external_over_wire(&wire, machine, external, error, error_size) != 0) {
-        wire.close(wire.ctx);
+    if (fcsl_wire_open(spec, FCSL_WIRE_LISTEN, sensors > inbox ? sensors : inbox, 0, &self->wire, error, error_size) !=
+        0) {
+        release(self);
         return -1;
     }
-    (void)snprintf((*external)->spec, sizeof(*external)->spec, "%s", spec);
+    *external = self;
+    return 0;
+}
+
+int fcsl_external_open_bus(const char *address, const char *name_space, const fcsl_machine_t *machine,
+                           fcsl_external_t **external, char *error, size_t error_size)
+{
+    fcsl_external_t *self = create(machine, address, error, error_size);
+    if (self == NULL) {
+        return -1;
+    }
+    if (fcsl_wire_open_named(address, name_space, &self->table, FCSL_WIRE_LISTEN, 0, &self->wire, error, error_size) !=
+        0) {
+        release(self);
+        return -1;
+    }
+    *external = self;
     return 0;
 }
 
@@ -237,6 +271,5 @@ void fcsl_external_close(fcsl_external_t *external)
     }
     (void)control_send_end(&external->wire); /* to nobody, when the controller is gone */
     external->wire.close(external->wire.ctx);
-    free(external->inbox);
-    free(external);
+    release(external);
 }

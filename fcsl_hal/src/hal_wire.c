@@ -12,6 +12,7 @@
 #include "control_packet.h"
 #include "fcsl/fcsl_hal.h"
 #include "monotonic.h"
+#include "wire_named.h"
 
 enum {
     TEXT_BYTES = 512,
@@ -64,7 +65,9 @@ typedef struct {
     counters_t counters;
     fcsl_log_t log;
     atomic_int interrupted;
+    int is_named; /* `spec` is an address of the bus */
     char spec[SPEC_BYTES];
+    char name_space[SPEC_BYTES];
     char text[TEXT_BYTES];
 } hal_t;
 
@@ -407,12 +410,17 @@ static int shake_hands(hal_t *hal, uint64_t deadline_ns, char *error, size_t err
     return control_differs(&packet, &hal->table, error, error_size) ? -1 : 0;
 }
 
-static int open_spec(hal_t *hal, char *error, size_t error_size)
+static int open_spec(hal_t *hal, uint64_t deadline_ns, char *error, size_t error_size)
 {
     const size_t actuators = fcsl_message_capacity(hal->table.machine, FCSL_ACTUATOR_MESSAGE);
     fcsl_wire_t wire;
-    if (fcsl_wire_open(hal->spec, FCSL_WIRE_CONNECT, actuators > hal->inbox_size ? actuators : hal->inbox_size,
-                       hal->timeout_ms, &wire, error, error_size) != 0) {
+    const int failed =
+        hal->is_named ? fcsl_wire_open_named(hal->spec, hal->name_space, &hal->table, FCSL_WIRE_CONNECT, deadline_ns,
+                                             &wire, error, error_size)
+                      : fcsl_wire_open(hal->spec, FCSL_WIRE_CONNECT,
+                                       actuators > hal->inbox_size ? actuators : hal->inbox_size, hal->timeout_ms,
+                                       &wire, error, error_size);
+    if (failed) {
         return -1;
     }
     hal->wire = wire;
@@ -424,7 +432,7 @@ static int wire_open(fcsl_hal_t *handle, char *error, size_t error_size)
 {
     hal_t *hal = handle->ctx;
     const uint64_t deadline_ns = monotonic_ns() + (uint64_t)hal->timeout_ms * NS_PER_MS;
-    if ((!hal->has_wire && open_spec(hal, error, error_size) != 0) ||
+    if ((!hal->has_wire && open_spec(hal, deadline_ns, error, error_size) != 0) ||
         shake_hands(hal, deadline_ns, error, error_size) != 0) {
         return -1;
     }
@@ -500,6 +508,32 @@ int fcsl_hal_wire(const char *spec, const fcsl_machine_t *machine, uint32_t time
         return -1;
     }
     (void)snprintf(((hal_t *)hal->ctx)->spec, SPEC_BYTES, "%s", spec);
+    return 0;
+}
+
+int fcsl_hal_bus_check(const char *address, char *error, size_t error_size)
+{
+    return fcsl_wire_check_named(address, error, error_size);
+}
+
+int fcsl_hal_bus(const char *address, const char *name_space, const fcsl_machine_t *machine, uint32_t timeout_ms,
+                 fcsl_hal_t *hal, char *error, size_t error_size)
+{
+    if (fcsl_wire_check_named(address, error, error_size) != 0) {
+        return -1;
+    }
+    if (strlen(address) >= SPEC_BYTES || strlen(name_space) >= SPEC_BYTES) {
+        (void)snprintf(error, error_size, "the address or the namespace is too long: %d bytes are possible",
+                       SPEC_BYTES - 1);
+        return -1;
+    }
+    if (make(&fcsl_wire_named_counters, machine, timeout_ms, hal, error, error_size) != 0) {
+        return -1;
+    }
+    hal_t *self = hal->ctx;
+    self->is_named = 1;
+    (void)snprintf(self->spec, SPEC_BYTES, "%s", address);
+    (void)snprintf(self->name_space, SPEC_BYTES, "%s", name_space);
     return 0;
 }
 

@@ -9,8 +9,8 @@
 #include <stdlib.h>
 #include <string.h>
 
+#include "bus_peer.h"
 #include "codec_layout.h"
-#include "fcsl/fcsl_bus.h"
 #include "monotonic.h"
 
 enum {
@@ -29,15 +29,10 @@ static const char SIMULATOR_ALL[] = "fcsl/wire/simulator/*";
 static const char CONTROLLER_ALL[] = "fcsl/wire/controller/*";
 static const char *const SIMULATOR_TOKEN[] = {"fcsl/wire/simulator"};
 static const char *const CONTROLLER_TOKEN[] = {"fcsl/wire/controller"};
-/* What an end watches. A controller looks for others before it looks for the simulator. */
-static const char *const TOKENS[] = {"fcsl/wire/controller", "fcsl/wire/simulator"};
-enum { CONTROLLERS = 0, SIMULATORS = 1 };
+static const char *const TOKENS[] = {[BUS_CONTROLLERS] = "fcsl/wire/controller", [BUS_SIMULATORS] = "fcsl/wire/simulator"};
 
 typedef struct {
-    fcsl_bus_t *bus;
-    fcsl_wire_side_t side;
-    uint32_t output_count;
-    int met; /* the peer has been there */
+    bus_peer_t peer;
     uint64_t too_large;
     size_t message_max;
     uint8_t *inbox; /* message_max bytes */
@@ -64,30 +59,13 @@ static const fcsl_field_t FIELDS[] = {
 const fcsl_wire_counters_t fcsl_wire_zenoh_counters = {
     .fields = FIELDS, .field_count = sizeof FIELDS / sizeof FIELDS[0], .bytes = sizeof(counters_t)};
 
-/* ---- the peer --------------------------------------------------------------------------------------------------------- */
-
-static int peer_lives(const wire_t *wire)
-{
-    return fcsl_bus_alive(wire->bus, wire->side == FCSL_WIRE_LISTEN ? CONTROLLERS : SIMULATORS) > 0;
-}
-
-/* What is sent now reaches the peer. */
-static int peer_listens(const wire_t *wire)
-{
-    int matched = peer_lives(wire);
-    for (uint32_t i = 0; i < wire->output_count; i++) {
-        matched = matched && fcsl_bus_matched(wire->bus, i);
-    }
-    return matched;
-}
-
 /* ---- messages --------------------------------------------------------------------------------------------------------- */
 
 /* The key of a message: its first entry says what it is (codec_layout.h), and control packets begin otherwise. */
 static uint32_t output_of(const wire_t *wire, const uint8_t *message, size_t size)
 {
     const uint32_t id = size >= 2 ? (uint32_t)(message[0] | message[1] << 8) : 0u;
-    if (wire->side == FCSL_WIRE_CONNECT) {
+    if (wire->peer.side == FCSL_WIRE_CONNECT) {
         return id == SENSORS_ID + FCSL_ACTUATOR_MESSAGE ? ACTUATORS : CONTROL;
     }
     return id == SENSORS_ID + FCSL_SENSOR_MESSAGE ? SENSORS : id == SENSORS_ID + FCSL_TIME_MESSAGE ? TIME : CONTROL;
@@ -96,23 +74,23 @@ static uint32_t output_of(const wire_t *wire, const uint8_t *message, size_t siz
 static fcsl_wire_status_t zenoh_send(void *ctx, const uint8_t *message, size_t size)
 {
     wire_t *wire = ctx;
-    if (!peer_lives(wire)) {
+    if (!bus_peer_lives(&wire->peer)) {
         return FCSL_WIRE_CLOSED;
     }
     if (size > wire->message_max) {
         (void)snprintf(wire->text, sizeof wire->text, "a message of %zu bytes is longer than any of the machine", size);
         return FCSL_WIRE_ERROR;
     }
-    return fcsl_bus_post(wire->bus, output_of(wire, message, size), message, size) == 0 ? FCSL_WIRE_OK : FCSL_WIRE_NONE;
+    return fcsl_bus_post(wire->peer.bus, output_of(wire, message, size), message, size) == 0 ? FCSL_WIRE_OK : FCSL_WIRE_NONE;
 }
 
 /* The oldest message that fits, if there is one. What a peer sent comes before the news that it is gone. */
 static fcsl_wire_status_t take(wire_t *wire, uint8_t *message, size_t capacity, size_t *size)
 {
     size_t length = 0;
-    const int lives = peer_lives(wire); /* looked at first: what it sent is there then */
-    wire->met = wire->met || peer_listens(wire);
-    while (wire->met && fcsl_bus_take(wire->bus, 0, wire->inbox, &length)) { /* every turn takes one */
+    const int lives = bus_peer_lives(&wire->peer); /* looked at first: what it sent is there then */
+    const int met = bus_peer_meet(&wire->peer);
+    while (met && fcsl_bus_take(wire->peer.bus, 0, wire->inbox, &length)) { /* every turn takes one */
         if (length <= capacity) {
             memcpy(message, wire->inbox, length);
             *size = length;
@@ -120,11 +98,7 @@ static fcsl_wire_status_t take(wire_t *wire, uint8_t *message, size_t capacity, 
         }
         wire->too_large++;
     }
-    if (wire->met && !lives) {
-        wire->met = wire->side == FCSL_WIRE_CONNECT; /* who listens waits for the next one */
-        return FCSL_WIRE_CLOSED;
-    }
-    return FCSL_WIRE_NONE;
+    return lives ? FCSL_WIRE_NONE : bus_peer_gone(&wire->peer);
 }
 
 static fcsl_wire_status_t zenoh_receive(void *ctx, uint64_t deadline_ns, uint8_t *message, size_t capacity,
@@ -136,7 +110,7 @@ static fcsl_wire_status_t zenoh_receive(void *ctx, uint64_t deadline_ns, uint8_t
         if (status != FCSL_WIRE_NONE || monotonic_ns() >= deadline_ns) {
             return status;
         }
-        if (!fcsl_bus_wait(wire->bus, deadline_ns) && monotonic_ns() < deadline_ns) {
+        if (!fcsl_bus_wait(wire->peer.bus, deadline_ns) && monotonic_ns() < deadline_ns) {
             return FCSL_WIRE_NONE; /* a signal */
         }
     }
@@ -151,7 +125,7 @@ static void zenoh_count(void *ctx, void *values)
 {
     const wire_t *wire = ctx;
     counters_t now;
-    fcsl_bus_count(wire->bus, &now);
+    fcsl_bus_count(wire->peer.bus, &now);
     now.too_large += wire->too_large;
     memcpy(values, &now, sizeof now);
 }
@@ -165,32 +139,15 @@ static void release(wire_t *wire)
 static void zenoh_close(void *ctx)
 {
     wire_t *wire = ctx;
-    (void)fcsl_bus_close(wire->bus, CLOSE_MS); /* what Zenoh leaves behind ends with the program */
+    (void)fcsl_bus_close(wire->peer.bus, CLOSE_MS); /* what Zenoh leaves behind ends with the program */
     release(wire);
 }
 
 /* ---- opening ---------------------------------------------------------------------------------------------------------- */
 
-/* The session connects to whoever listens there: is it a simulator, and has it no other controller? */
-static int meet(wire_t *wire, const char *endpoint, uint64_t deadline_ns, char *error, size_t error_size)
-{
-    while (monotonic_ns() < deadline_ns) {
-        if (peer_listens(wire) && fcsl_bus_alive(wire->bus, CONTROLLERS) == 0) {
-            return 0;
-        }
-        (void)fcsl_bus_wait(wire->bus, deadline_ns);
-    }
-    if (peer_lives(wire) && fcsl_bus_alive(wire->bus, CONTROLLERS) > 0) {
-        (void)snprintf(error, error_size, "the simulator on %s has another controller", endpoint);
-    } else {
-        (void)snprintf(error, error_size, "no simulator with a wire is on %s", endpoint);
-    }
-    return -1;
-}
-
 static int open_session(wire_t *wire, const char *endpoint, uint64_t deadline_ns, char *error, size_t error_size)
 {
-    const int listens = wire->side == FCSL_WIRE_LISTEN;
+    const int listens = wire->peer.side == FCSL_WIRE_LISTEN;
     const uint64_t now_ns = monotonic_ns();
     const fcsl_bus_input_t input = {
         .key = listens ? CONTROLLER_ALL : SIMULATOR_ALL, .bytes = (uint32_t)wire->message_max, .depth = WAITING_MAX};
@@ -200,15 +157,15 @@ static int open_session(wire_t *wire, const char *endpoint, uint64_t deadline_ns
         .timeout_ms = deadline_ns > now_ns ? (uint32_t)((deadline_ns - now_ns) / NS_PER_MS) : 0u,
         .ring_bytes = WAITING_MAX * ((uint32_t)wire->message_max + ENTRY_BYTES_MAX),
         .outputs = listens ? SIMULATOR_KEYS : CONTROLLER_KEYS,
-        .output_count = wire->output_count,
+        .output_count = wire->peer.output_count,
         .inputs = &input,
         .input_count = 1,
         .tokens = listens ? SIMULATOR_TOKEN : CONTROLLER_TOKEN,
         .token_count = 1,
         .watched = TOKENS,
-        .watched_count = listens ? 1 : 2,
+        .watched_count = bus_peer_watched(wire->peer.side),
     };
-    return fcsl_bus_open(&options, &wire->bus, error, error_size);
+    return fcsl_bus_open(&options, &wire->peer.bus, error, error_size);
 }
 
 int fcsl_wire_open_zenoh(const char *endpoint, fcsl_wire_side_t side, size_t message_max, uint64_t deadline_ns,
@@ -227,16 +184,16 @@ int fcsl_wire_open_zenoh(const char *endpoint, fcsl_wire_side_t side, size_t mes
         (void)snprintf(error, error_size, "out of memory for the wire");
         return -1;
     }
-    self->side = side;
+    self->peer.side = side;
     self->message_max = message_max;
     self->inbox = inbox;
-    self->output_count = side == FCSL_WIRE_LISTEN ? sizeof SIMULATOR_KEYS / sizeof SIMULATOR_KEYS[0]
+    self->peer.output_count = side == FCSL_WIRE_LISTEN ? sizeof SIMULATOR_KEYS / sizeof SIMULATOR_KEYS[0]
                                                   : sizeof CONTROLLER_KEYS / sizeof CONTROLLER_KEYS[0];
     if (open_session(self, endpoint, deadline_ns, error, error_size) != 0) {
         release(self);
         return -1;
     }
-    if (side == FCSL_WIRE_CONNECT && meet(self, endpoint, deadline_ns, error, error_size) != 0) {
+    if (side == FCSL_WIRE_CONNECT && bus_peer_wait(&self->peer, endpoint, deadline_ns, error, error_size) != 0) {
         zenoh_close(self);
         return -1;
     }

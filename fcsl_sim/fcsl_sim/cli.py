@@ -116,12 +116,13 @@ def _parser() -> argparse.ArgumentParser:
         help_set = "sets a model parameter: altimeter.parameters.sigma=0.8 (repeatable)"
         command.add_argument("--set", action="append", default=[], metavar="PATH=VALUE", dest="sets", help=help_set)
     command.add_argument("--record", type=Path, metavar="BAG", help="new directory for the bag")
-    command.add_argument("--namespace", default="", help="ROS namespace of the bag's topics")
+    command.add_argument("--namespace", default="", help="ROS namespace of the bag's topics, and of the keys on the bus")
     command.add_argument(
         "--external",
-        metavar="wire:SPEC",
-        help="the controller is another process (fcsl-fc --hal) at the other end of a wire: unix:PATH, udp:HOST:PORT, "
-        "tcp:HOST:PORT, uart:DEVICE:BAUD or zenoh:tcp/HOST:PORT",
+        metavar="PEER",
+        help="the controller is another process (fcsl-fc --hal PEER): at the other end of a wire, with wire:unix:PATH, "
+        "wire:udp:HOST:PORT, wire:tcp:HOST:PORT, wire:uart:DEVICE:BAUD or wire:zenoh:tcp/HOST:PORT; or on the bus, each "
+        "channel under its key, with zenoh:tcp/HOST:PORT",
     )
     help_speed = "limit on simulated seconds per second: 1 for real time; 0 (default): as fast as possible"
     command.add_argument("--speed", type=_speed, default=0.0, metavar="FACTOR", help=help_speed)
@@ -168,20 +169,19 @@ def _check(options: argparse.Namespace) -> int:
 
 
 def _run(options: argparse.Namespace) -> int:
-    wire = None
-    if options.external is not None:
-        kind, _, wire = options.external.partition(":")
-        if kind != "wire" or not wire:
-            raise SimError(
-                f"--external {options.external}: write wire:SPEC, as in wire:unix:PATH or wire:udp:127.0.0.1:7600"
-            )
+    external: str | None = options.external
+    if external is not None and not external.startswith(("wire:", "zenoh:")):
+        raise SimError(
+            f"--external {external}: write wire:SPEC, as in wire:unix:PATH or wire:udp:127.0.0.1:7600, "
+            "or zenoh:tcp/HOST:PORT"
+        )
     if options.socket is None and (options.paused or options.token or options.checkpoints):
         raise SimError("`--paused`, `--token` and `--checkpoints` need `--socket`: they configure the variable server")
     if options.telemetry_fields is not None and options.telemetry is None:
         raise SimError("`--telemetry-fields` needs `--telemetry`: it selects the values to send")
-    if options.namespace and options.record is None:
-        raise SimError("`--namespace` needs `--record`: it applies to the recorded topics")
-    if options.timeout is not None and wire is None:
+    if options.namespace and options.record is None and external is None:
+        raise SimError("`--namespace` needs `--record` or `--external`: it applies to topics and to keys of the bus")
+    if options.timeout is not None and external is None:
         raise SimError("`--timeout` needs `--external`: it limits the wait for the controller")
     server = None
     if options.socket is not None:
@@ -191,7 +191,7 @@ def _run(options: argparse.Namespace) -> int:
         config,
         bag=options.record,
         name_space=options.namespace,
-        wire=wire,
+        external=external,
         timeout_ms=TIMEOUT_MS if options.timeout is None else min(2**31 - 1, max(1, int(options.timeout * 1000))),
         speed=options.speed,
         server=server,

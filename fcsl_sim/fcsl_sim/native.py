@@ -49,7 +49,7 @@ _PROTOTYPES: dict[str, tuple[type | None, list[type]]] = {
     "fcsl_sim_set_speed": (c_int, [ptr, c_double, _ERROR]),
     "fcsl_sim_state": (c_int32, [ptr]),
     "fcsl_sim_machine_data": (ptr, [ptr]),
-    "fcsl_sim_listen": (c_int, [ptr, c_char_p, c_uint32, _ERROR]),
+    "fcsl_sim_listen": (c_int, [ptr, c_char_p, c_char_p, c_uint32, _ERROR]),
     "fcsl_sim_accept": (c_int, [ptr, _ERROR]),
     "fcsl_sim_sense": (c_int64, [ptr, ptr, c_size_t, _ERROR]),
     "fcsl_sim_actuate": (c_int, [ptr, c_char_p, c_size_t, _ERROR]),
@@ -208,9 +208,11 @@ class Simulation:
     def record_stop(self) -> None:
         self._check(self._lib.fcsl_sim_record_stop(self.handle(), byref(self._error)))
 
-    def listen(self, wire: str, timeout_ms: int) -> None:
-        """Opens the wire that a SPEC of fcsl_wire.h names; a controller can connect from now on."""
-        status = self._lib.fcsl_sim_listen(self.handle(), wire.encode(), timeout_ms, byref(self._error))
+    def listen(self, peer: str, timeout_ms: int, name_space: str = "") -> None:
+        """A controller can connect from now on: to `wire:SPEC` or `zenoh:tcp/HOST:PORT`, as `fcsl-fc --hal` takes it.
+        name_space: in front of the keys of the bus, with or without surrounding slashes."""
+        within = name_space.strip("/").encode()
+        status = self._lib.fcsl_sim_listen(self.handle(), peer.encode(), within, timeout_ms, byref(self._error))
         self._check(status)
 
     def accept(self) -> None:

@@ -100,32 +100,32 @@ def run(
     *,
     bag: Path | None = None,
     name_space: str = "",
-    wire: str | None = None,
+    external: str | None = None,
     timeout_ms: int = TIMEOUT_MS,
     speed: float = 0.0,
     server: Server | None = None,
     sender: Sender | None = None,
     watcher: Watcher | None = None,
 ) -> Summary:
-    """Runs to the end. bag: records controller and truth into this new directory. wire: the controller is another
-    process at the other end of this wire (a SPEC of fcsl_wire.h), which records itself and answers within `timeout_ms`. speed: limit on simulated
-    seconds per second; 0: as fast as possible. Raises SimError; the bag then has the ticks recorded until then, and is
+    """Runs to the end. bag: records controller and truth into this new directory. external: the controller is another
+    process (`wire:SPEC` or `zenoh:tcp/HOST:PORT`), which records itself and answers within `timeout_ms`. name_space: of
+    the bag's topics, and of the keys on the bus. speed: limit on simulated seconds per second; 0: as fast as possible. Raises SimError; the bag then has the ticks recorded until then, and is
     removed if there are none.
     """
-    if bag is not None and wire is not None:
+    if bag is not None and external is not None:
         raise SimError("with an external controller the controller records: give `--record` to it")
     if bag is not None and bag.exists():
         raise SimError(f"{bag}: exists already; a bag is written into a new directory")
     watcher = watcher or Watcher()
     with Simulation(config.plan, config.tables) as sim:
         sim.set_speed(speed)
-        if wire is not None:
-            sim.listen(wire, timeout_ms)
+        if external is not None:
+            sim.listen(external, timeout_ms, name_space)
         if sender is not None:
             sim.telemetry(sender.address, sender.fields)
         address = sim.serve(server.address, server.token, server.paused, server.checkpoints) if server else None
         # An error above leaves no files and has not contacted other processes.
-        if wire is not None:
+        if external is not None:
             watcher.listening()
             sim.accept()
         if bag is not None:
@@ -133,7 +133,7 @@ def run(
         if address is not None:
             watcher.serving(address)
         try:
-            flight = _fly(sim, hosted=wire is None, watcher=watcher)
+            flight = _fly(sim, hosted=external is None, watcher=watcher)
             sent = sim.telemetry_stop() if sender is not None else None
             if bag is not None:
                 sim.record_stop()

@@ -160,13 +160,19 @@ int fcsl_sim_record_stop(fcsl_sim_t *sim, fcsl_error_t *error)
 
 /* ---- external controller -------------------------------------------------------------------------------------------- */
 
-int fcsl_sim_listen(fcsl_sim_t *sim, const char *spec, uint32_t timeout_ms, fcsl_error_t *error)
+int fcsl_sim_listen(fcsl_sim_t *sim, const char *peer, const char *name_space, uint32_t timeout_ms, fcsl_error_t *error)
 {
+    static const char WIRE[] = "wire:";
+    const size_t prefix = sizeof WIRE - 1u;
     char text[sizeof error->text] = "";
     if (sim->external || sim->tick || sim->sensed || sim->recording) {
         return fcsl_sim_fail(error, "a controller must connect before the first tick, once, and records itself");
     }
-    if (fcsl_external_open(spec, sim->machine, &sim->external, text, sizeof text)) {
+    const int failed =
+        strncmp(peer, WIRE, prefix) == 0
+            ? fcsl_external_open(peer + prefix, sim->machine, &sim->external, text, sizeof text)
+            : fcsl_external_open_bus(peer, name_space, sim->machine, &sim->external, text, sizeof text);
+    if (failed) {
         sim->external = NULL;
         return fcsl_sim_fail(error, "%s", text);
     }

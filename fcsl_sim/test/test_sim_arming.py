@@ -102,7 +102,7 @@ def test_every_host_arms_alike(config: SimConfig, tmp_path: Path) -> None:
     wire, flight = f"unix:{tmp_path / 'wire'}", tmp_path / "flight"
     line = ["fcsl-fc", str(config.library), "--hal", f"wire:{wire}", "--timeout-ms", "60000", "--record", str(flight)]
     with subprocess.Popen(line, stdout=subprocess.PIPE, text=True) as controller:
-        apart = run(config, wire=wire, timeout_ms=60_000)
+        apart = run(config, external=f"wire:{wire}", timeout_ms=60_000)
         said, _ = controller.communicate(timeout=60)
         assert controller.returncode == 0
     assert re.findall(r"(\w+) at tick (\d+)", said) == [("armed", str(ON)), ("disarmed", str(OFF))]

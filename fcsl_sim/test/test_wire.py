@@ -22,7 +22,7 @@ from fcsl_sim import SimError, Simulation
 plan, wire, timeout_ms = sys.argv[1:]
 with Simulation(Path(plan).read_text(), {}) as sim:
     try:
-        sim.listen(wire, int(timeout_ms))
+        sim.listen(f"wire:{wire}", int(timeout_ms))
         print("listening", flush=True)
         sim.accept()
         while sim.status == "running":

@@ -91,6 +91,8 @@ void fcsl_message_apply(const fcsl_machine_t *machine, void *data, const fcsl_me
 typedef struct {
     size_t end; /* offset behind it in the message */
     uint32_t channel; /* index in the machine's channel table */
+    uint32_t size; /* of the values, in bytes */
+    const uint8_t *values; /* little-endian */
 } fcsl_message_entry_t;
 
 /* Moves *entry to the next entry of a channel. Returns 1, or 0 when there is none. */

@@ -20,6 +20,9 @@ typedef struct fcsl_external fcsl_external_t;
 /* Waits for a controller at `spec` (fcsl_wire.h). `machine` must outlive it. Returns 0, or -1 with `error` filled. */
 int fcsl_external_open(const char *spec, const fcsl_machine_t *machine, fcsl_external_t **external, char *error,
                        size_t error_size);
+/* The same on the bus, with the address and the namespace of fcsl_hal_bus. */
+int fcsl_external_open_bus(const char *address, const char *name_space, const fcsl_machine_t *machine,
+                           fcsl_external_t **external, char *error, size_t error_size);
 /* The same over a wire of your own, which it owns once this has returned 0. */
 int fcsl_external_over_wire(const fcsl_wire_t *wire, const fcsl_machine_t *machine, fcsl_external_t **external,
                             char *error, size_t error_size);

@@ -78,6 +78,12 @@ int fcsl_hal_stub(fcsl_hal_t *hal, char *error, size_t error_size);
  * Returns 0, or -1 with `error` filled. */
 int fcsl_hal_wire(const char *spec, const fcsl_machine_t *machine, uint32_t timeout_ms, fcsl_hal_t *hal, char *error,
                   size_t error_size);
+/* The same over the bus, where each channel has a key (docs/bus.md). `address`: zenoh:tcp/HOST:PORT, where a simulator listens,
+ * or zenoh-peer:tcp/HOST:PORT. `name_space`: in front of the keys, or "". */
+int fcsl_hal_bus(const char *address, const char *name_space, const fcsl_machine_t *machine, uint32_t timeout_ms,
+                 fcsl_hal_t *hal, char *error, size_t error_size);
+/* 0 when `address` has that form, or -1 with `error` filled. */
+int fcsl_hal_bus_check(const char *address, char *error, size_t error_size);
 /* The same over a wire of your own, which the HAL owns once this has returned 0. */
 int fcsl_hal_over_wire(const fcsl_wire_t *wire, const fcsl_machine_t *machine, uint32_t timeout_ms, fcsl_hal_t *hal,
                        char *error, size_t error_size);

@@ -57,10 +57,17 @@ static int make_hal(program_t *program)
     fcsl_error_t error;
     const options_t *options = &program->options;
     fcsl_hal_t *hal = &program->loop.hal;
-    const int status = options->wire == NULL
-                           ? fcsl_hal_stub(hal, error.text, sizeof error.text)
-                           : fcsl_hal_wire(options->wire, fcsl_run_machine(program->loop.run),
-                                           (uint32_t)options->timeout_ms, hal, error.text, sizeof error.text);
+    const fcsl_machine_t *machine = fcsl_run_machine(program->loop.run);
+    const uint32_t timeout_ms = (uint32_t)options->timeout_ms;
+    const char *peer = options->peer;
+    int status = 0;
+    if (peer == NULL) {
+        status = fcsl_hal_stub(hal, error.text, sizeof error.text);
+    } else if (strncmp(peer, OPTIONS_WIRE, strlen(OPTIONS_WIRE)) == 0) {
+        status = fcsl_hal_wire(peer + strlen(OPTIONS_WIRE), machine, timeout_ms, hal, error.text, sizeof error.text);
+    } else {
+        status = fcsl_hal_bus(peer, options->name_space, machine, timeout_ms, hal, error.text, sizeof error.text);
+    }
     return status == 0 ? 0 : complain(error.text);
 }
 
@@ -114,7 +121,7 @@ static int open_server(program_t *program)
 static int open_hal(program_t *program, fcsl_error_t *error)
 {
     fcsl_hal_t *hal = &program->loop.hal;
-    if (program->options.wire == NULL) {
+    if (program->options.peer == NULL) {
         return hal->open(hal, error->text, sizeof error->text);
     }
     monitor_let_signals(&program->monitor);
@@ -214,7 +221,7 @@ static void announce(const program_t *program)
                                                 : "as fast as possible";
     const int timed = program->loop.realtime && !program->options.no_overrun_check;
     log_info("machine '%s', %" PRIu64 " Hz, HAL %s, %s%s%s", machine->name, machine->tick_hz,
-             program->options.wire != NULL ? program->options.wire : "stub", pace, timed ? "" : ", executes not timed",
+             program->options.peer != NULL ? program->options.peer : "stub", pace, timed ? "" : ", executes not timed",
              program->loop.paused ? ", paused" : "");
     if (program->options.restore != NULL) {
         log_info("begins at tick %" PRIu64 ", from %s", fcsl_run_tick(program->loop.run), program->options.restore);

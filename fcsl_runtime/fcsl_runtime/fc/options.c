@@ -3,7 +3,7 @@
  * The command line of fcsl-fc.
  */
 #define _GNU_SOURCE
-#include "fcsl/fcsl_wire.h"
+#include "fcsl/fcsl_hal.h"
 #include "options.h"
 #include "usage.h"
 
@@ -22,9 +22,10 @@ static const char USAGE[] =
     "Runs a compiled machine as a process of its own (docs/flight.md).\n"
     "\n"
     "  --machine NAME          which machine, when the library holds several\n"
-    "  --hal stub|wire:SPEC    stub: no hardware (default); wire: a simulator or rig at the other end, with SPEC one "
+    "  --hal HAL               stub: no hardware (default); wire:SPEC: a simulator or rig at the other end, with SPEC one "
     "of\n"
     "                          " FCSL_WIRE_SPECS "\n"
+    "                          zenoh:tcp/HOST:PORT (or zenoh-peer:): a simulator on the bus, each channel under its key\n"
     "  --timeout-ms N          how long to wait for the simulator's next message (default 2000)\n"
     "  --board LIBRARY.so      the board that hw_* of algorithms reach (fcsl/fcsl_hw.h); default: simulated hardware\n"
     "  --guard PATH            the actuators belong to the fcsl-guard that listens on PATH (docs/guard.md)\n"
@@ -62,7 +63,7 @@ static const char USAGE[] =
     "  --record-policy P       when the disk is too slow: wait makes the tick wait, drop leaves records out and counts "
     "them\n"
     "                          (default: drop in real time, else wait)\n"
-    "  --namespace NS          ROS namespace of the recorded topics\n"
+    "  --namespace NS          ROS namespace of the recorded topics, and of the keys on the bus\n"
     "  --summary FILE       at the end write state, health, counters and histograms there, as JSON\n"
     "  --version            print name and version\n"
     "  --help\n";
@@ -83,16 +84,18 @@ typedef struct {
 
 static int read_hal(const char *text, options_t *options)
 {
-    if (strcmp(text, "stub") == 0) {
-        options->wire = NULL;
+    char error[ERROR_BYTES];
+    const int is_wire = strncmp(text, OPTIONS_WIRE, strlen(OPTIONS_WIRE)) == 0;
+    options->peer = strcmp(text, "stub") == 0 ? NULL : text;
+    if (options->peer == NULL) {
         return 0;
     }
-    if (strncmp(text, "wire:", 5) == 0) {
-        char error[ERROR_BYTES];
-        options->wire = text + 5;
-        return fcsl_wire_check(options->wire, error, sizeof error) == 0 ? 0 : usage_error("--hal wire: ", error);
+    if (!is_wire && strncmp(text, "zenoh", strlen("zenoh")) != 0) {
+        return usage_error("--hal must be stub, wire:SPEC or zenoh:tcp/HOST:PORT, not ", text);
     }
-    return usage_error("--hal must be stub or wire:SPEC, not ", text);
+    const int failed = is_wire ? fcsl_wire_check(text + strlen(OPTIONS_WIRE), error, sizeof error)
+                               : fcsl_hal_bus_check(text, error, sizeof error);
+    return failed ? usage_error(is_wire ? "--hal wire: " : "--hal ", error) : 0;
 }
 
 static int read_rate(const char *text, options_t *options)
@@ -210,17 +213,17 @@ static int check(const options_t *options)
     if (options->token != NULL && options->socket == NULL) {
         return usage_error("--token needs --socket: it is the token of a TCP server", "");
     }
-    if (options->timeout_ms != 0 && options->wire == NULL) {
-        return usage_error("--timeout-ms needs --hal wire:SPEC: it is how long to wait for the simulator", "");
+    if (options->timeout_ms != 0 && options->peer == NULL) {
+        return usage_error("--timeout-ms needs --hal wire:SPEC or zenoh:…: it is how long to wait for the simulator", "");
     }
-    if (options->name_space[0] != '\0' && options->record == NULL) {
-        return usage_error("--namespace needs --record: it is of the recorded topics", "");
+    if (options->name_space[0] != '\0' && options->record == NULL && options->peer == NULL) {
+        return usage_error("--namespace needs --record or --hal zenoh:…: it is of topics, and of keys of the bus", "");
     }
     if (options->ignore_source_hash && options->restore == NULL) {
         return usage_error("--ignore-source-hash needs --restore", "");
     }
-    if (options->restore != NULL && options->wire != NULL) {
-        return usage_error("--restore goes without --hal wire: a simulator begins at tick 0", "");
+    if (options->restore != NULL && options->peer != NULL) {
+        return usage_error("--restore goes without a simulator: that begins at tick 0", "");
     }
     if ((options->record_fields != NULL || options->record_policy != RECORD_BY_PACE) && options->record == NULL) {
         return usage_error("--record-fields and --record-policy need --record", "");
@@ -231,12 +234,12 @@ static int check(const options_t *options)
     if (options->missed_deadline_given && !options->realtime) {
         return usage_error("--missed-deadline is for ticks that the clock paces: it does not go with --rate max", "");
     }
-    if (options->guard != NULL && !options->realtime && options->wire == NULL) {
+    if (options->guard != NULL && !options->realtime && options->peer == NULL) {
         return usage_error(
             "--guard with --rate max would move real actuators faster than the machine's time; use --rate realtime",
             "");
     }
-    if (options->priority > 0 && !options->realtime && options->wire == NULL) {
+    if (options->priority > 0 && !options->realtime && options->peer == NULL) {
         return usage_error(
             "--realtime-priority with --rate max would leave no processor to anything else; use --rate realtime", "");
     }

@@ -12,7 +12,7 @@ typedef enum { RECORD_BY_PACE, RECORD_WAIT, RECORD_DROP } record_policy_t;
 typedef struct {
     const char *library;
     const char *machine;    /* null: the only one */
-    const char *wire;       /* SPEC of fcsl_wire.h; null: the stub HAL */
+    const char *peer;       /* OPTIONS_WIRE and a SPEC of fcsl_wire.h, or an address of fcsl_hal_bus; null: the stub HAL */
     const char *board;      /* null: simulated hardware */
     const char *guard;      /* socket of fcsl-guard; null: none */
     const char *restore;    /* file of a checkpoint to begin from; null: from tick 0 */
@@ -42,6 +42,7 @@ typedef struct {
 } options_t;
 
 #define OPTIONS_ANY_CPU UINT64_MAX
+#define OPTIONS_WIRE    "wire:"
 
 /* Reads the command line. Returns 0; 1 when help was printed; -1 after a message. */
 int options_read(int argc, char **argv, options_t *options);

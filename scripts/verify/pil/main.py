@@ -88,7 +88,7 @@ def on_target(config: SimConfig, program: Path) -> Flight:
         with socket.socket() as free:
             free.bind(("127.0.0.1", 0))
             address = f"tcp:127.0.0.1:{free.getsockname()[1]}"
-        sim.listen(address, _TIMEOUT_MS)
+        sim.listen(f"wire:{address}", _TIMEOUT_MS)
         board = [*CORTEX_M7.runner, "-semihosting-config", "enable=on,target=native", "-kernel", str(program)]
         board[board.index("-serial") + 1] = f"{address},nodelay=on"  # what the UART sends is a stream of bytes
         with subprocess.Popen(board, stdout=subprocess.PIPE, stderr=subprocess.STDOUT, text=True) as emulator:

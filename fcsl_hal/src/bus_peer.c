@@ -1,0 +1,56 @@
+/* SPDX-License-Identifier: Apache-2.0
+ *
+ * Meeting the other end of a wire over the bus, and noticing that it is gone.
+ */
+#define _GNU_SOURCE
+#include "bus_peer.h"
+
+#include <stdio.h>
+
+#include "monotonic.h"
+
+int bus_peer_lives(const bus_peer_t *peer)
+{
+    return fcsl_bus_alive(peer->bus, peer->side == FCSL_WIRE_LISTEN ? BUS_CONTROLLERS : BUS_SIMULATORS) > 0;
+}
+
+/* What is sent now reaches the peer. */
+static int listens(const bus_peer_t *peer)
+{
+    int matched = bus_peer_lives(peer);
+    for (uint32_t i = 0; i < peer->output_count; i++) {
+        matched = matched && fcsl_bus_matched(peer->bus, i);
+    }
+    return matched;
+}
+
+int bus_peer_meet(bus_peer_t *peer)
+{
+    peer->met = peer->met || listens(peer);
+    return peer->met;
+}
+
+fcsl_wire_status_t bus_peer_gone(bus_peer_t *peer)
+{
+    if (!peer->met) {
+        return FCSL_WIRE_NONE;
+    }
+    peer->met = peer->side == FCSL_WIRE_CONNECT; /* who listens waits for the next one */
+    return FCSL_WIRE_CLOSED;
+}
+
+int bus_peer_wait(const bus_peer_t *peer, const char *endpoint, uint64_t deadline_ns, char *error, size_t error_size)
+{
+    while (monotonic_ns() < deadline_ns) {
+        if (listens(peer) && fcsl_bus_alive(peer->bus, BUS_CONTROLLERS) == 0) {
+            return 0;
+        }
+        (void)fcsl_bus_wait(peer->bus, deadline_ns);
+    }
+    if (bus_peer_lives(peer) && fcsl_bus_alive(peer->bus, BUS_CONTROLLERS) > 0) {
+        (void)snprintf(error, error_size, "the simulator on %s has another controller", endpoint);
+    } else {
+        (void)snprintf(error, error_size, "no simulator of this machine is on %s", endpoint);
+    }
+    return -1;
+}
