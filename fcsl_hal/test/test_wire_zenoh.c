@@ -136,7 +136,6 @@ static void test_one_controller_after_the_other(void)
     const pid_t first = in_process(be_brief, endpoint);
     const pid_t second = in_process(be_brief_after_another, endpoint);
     const fcsl_wire_t wire = open_wire(endpoint, FCSL_WIRE_LISTEN);
-    CHECK(wire.receive(wire.ctx, 0, got, sizeof got, &size) == FCSL_WIRE_NONE);
     receive_number(&wire, 7);
     CHECK(write(second_may_start[1], "x", 1) == 1);
     send_number(&wire, 8);
