@@ -1,7 +1,7 @@
 /* SPDX-License-Identifier: Apache-2.0
  *
  * The wire over the bus: messages of all keys arrive in their order, a second controller is refused, and each end learns when the
- * other one goes. (test_hal_wire.c flies over it.)
+ * other one goes. (test_wire_lock_step.c flies over it.)
  */
 #define _GNU_SOURCE
 #include "bus_rig.h"
