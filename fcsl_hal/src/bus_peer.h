@@ -15,7 +15,7 @@ enum { BUS_CONTROLLERS = 0, BUS_SIMULATORS = 1 };
 typedef struct {
     fcsl_bus_t *bus;
     fcsl_wire_side_t side;
-    uint32_t output_count;
+    uint32_t output_count; /* of the session's first outputs, as many as the peer must hear */
     int met; /* the peer has been there */
 } bus_peer_t;
 

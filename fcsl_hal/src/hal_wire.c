@@ -414,12 +414,11 @@ static int open_spec(hal_t *hal, uint64_t deadline_ns, char *error, size_t error
 {
     const size_t actuators = fcsl_message_capacity(hal->table.machine, FCSL_ACTUATOR_MESSAGE);
     fcsl_wire_t wire;
-    const int failed =
-        hal->is_named ? fcsl_wire_open_named(hal->spec, hal->name_space, &hal->table, FCSL_WIRE_CONNECT, deadline_ns,
-                                             &wire, error, error_size)
-                      : fcsl_wire_open(hal->spec, FCSL_WIRE_CONNECT,
-                                       actuators > hal->inbox_size ? actuators : hal->inbox_size, hal->timeout_ms,
-                                       &wire, error, error_size);
+    const int failed = hal->is_named ? fcsl_wire_open_named(hal->spec, hal->name_space, &hal->table, FCSL_WIRE_CONNECT,
+                                                            deadline_ns, &wire, error, error_size)
+                                     : fcsl_wire_open(hal->spec, FCSL_WIRE_CONNECT,
+                                                      actuators > hal->inbox_size ? actuators : hal->inbox_size,
+                                                      hal->timeout_ms, &wire, error, error_size);
     if (failed) {
         return -1;
     }

@@ -69,6 +69,7 @@ typedef struct {
     size_t value_bytes;
     uint64_t time_ns; /* of the tick, for its time message */
     uint64_t tick;
+    int greeted;      /* the peer's first control packet was taken: what it put before is not looked at */
     int time_follows; /* the sensor message was handed on, and its time message was not */
     counters_t counters;
     char text[TEXT_BYTES];
@@ -167,8 +168,8 @@ static fcsl_wire_status_t take_values(wire_t *wire, const commit_t *commit)
         const int came = fcsl_bus_take(wire->peer.bus, wire->numbers[i], wire->value, &size);
         if (!came || !store_value(wire, &machine->channels[i], size)) {
             (void)snprintf(wire->text, sizeof wire->text,
-                           "the commit of tick %" PRIu64 " says that channel '%.100s' has a value, and %s", commit->tick,
-                           machine->channels[i].name, came ? "what came is none" : "none came");
+                           "the commit of tick %" PRIu64 " says that channel '%.100s' has a value, and %s",
+                           commit->tick, machine->channels[i].name, came ? "what came is none" : "none came");
             return FCSL_WIRE_ERROR;
         }
     }
@@ -196,8 +197,8 @@ static fcsl_wire_status_t make_message(wire_t *wire, const commit_t *commit, uin
     fcsl_message_t message = {0};
     fcsl_message_status_t status = FCSL_MESSAGE_OK;
     if (commit->direction == FCSL_SENSOR) {
-        status = fcsl_message_encode_sensors(wire->table, wire->image, commit->tick, wire->fresh, bytes, capacity,
-                                             &message);
+        status =
+            fcsl_message_encode_sensors(wire->table, wire->image, commit->tick, wire->fresh, bytes, capacity, &message);
         wire->time_follows = status == FCSL_MESSAGE_OK;
         wire->tick = commit->tick;
         wire->time_ns = commit->time_ns;
@@ -246,15 +247,19 @@ static fcsl_wire_status_t take(wire_t *wire, uint8_t *bytes, size_t capacity, si
         return make_time(wire, bytes, capacity, size);
     }
     if (bus_peer_meet(&wire->peer)) {
-        const fcsl_wire_status_t status = take_commit(wire, bytes, capacity, size);
+        /* Peers begin and end with a control packet: between the two keys that is their order. */
+        const fcsl_wire_status_t status = wire->greeted ? take_commit(wire, bytes, capacity, size) : FCSL_WIRE_NONE;
         if (status != FCSL_WIRE_NONE) {
             return status;
         }
         if (capacity >= CONTROL_PACKET_MAX && fcsl_bus_take(wire->peer.bus, CONTROL, bytes, size)) {
+            wire->greeted = 1;
             return FCSL_WIRE_OK;
         }
     }
-    return lives ? FCSL_WIRE_NONE : bus_peer_gone(&wire->peer);
+    const fcsl_wire_status_t gone = lives ? FCSL_WIRE_NONE : bus_peer_gone(&wire->peer);
+    wire->greeted = wire->greeted && wire->peer.met;
+    return gone;
 }
 
 static fcsl_wire_status_t named_receive(void *ctx, uint64_t deadline_ns, uint8_t *message, size_t capacity,
@@ -380,15 +385,14 @@ static void fill_plan(wire_t *wire, const char *name_space, plan_t *plan)
         const char *key = add_key(wire, &keys, name_space, channel->name);
         if (comes_in(wire, channel)) {
             wire->numbers[i] = plan->input_count;
-            plan->inputs[plan->input_count++] =
-                (fcsl_bus_input_t){.key = key, .bytes = (uint32_t)bytes, .depth = 1};
+            plan->inputs[plan->input_count++] = (fcsl_bus_input_t){.key = key, .bytes = (uint32_t)bytes, .depth = 1};
         } else {
             wire->numbers[i] = plan->output_count;
             plan->outputs[plan->output_count++] = key;
             plan->tick_bytes += bytes + ENTRY_BYTES_MAX;
         }
     }
-    wire->peer.output_count = plan->output_count;
+    wire->peer.output_count = FIRST_CHANNEL; /* a peer need not care for every channel */
 }
 
 /* Of the simulator, which listens; a client of it, or a peer. Sets *endpoint to what is behind the kind, or null. */
@@ -468,8 +472,7 @@ int fcsl_wire_check_named(const char *address, char *error, size_t error_size)
 }
 
 int fcsl_wire_open_named(const char *address, const char *name_space, const fcsl_channel_table_t *table,
-                         fcsl_wire_side_t side, uint64_t deadline_ns, fcsl_wire_t *wire, char *error,
-                         size_t error_size)
+                         fcsl_wire_side_t side, uint64_t deadline_ns, fcsl_wire_t *wire, char *error, size_t error_size)
 {
     const uint32_t channels = table->machine->channel_count;
     if (fcsl_wire_check_named(address, error, error_size) != 0 ||

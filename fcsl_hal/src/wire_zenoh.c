@@ -29,7 +29,8 @@ static const char SIMULATOR_ALL[] = "fcsl/wire/simulator/*";
 static const char CONTROLLER_ALL[] = "fcsl/wire/controller/*";
 static const char *const SIMULATOR_TOKEN[] = {"fcsl/wire/simulator"};
 static const char *const CONTROLLER_TOKEN[] = {"fcsl/wire/controller"};
-static const char *const TOKENS[] = {[BUS_CONTROLLERS] = "fcsl/wire/controller", [BUS_SIMULATORS] = "fcsl/wire/simulator"};
+static const char *const TOKENS[] = {[BUS_CONTROLLERS] = "fcsl/wire/controller",
+                                     [BUS_SIMULATORS] = "fcsl/wire/simulator"};
 
 typedef struct {
     bus_peer_t peer;
@@ -81,7 +82,8 @@ static fcsl_wire_status_t zenoh_send(void *ctx, const uint8_t *message, size_t s
         (void)snprintf(wire->text, sizeof wire->text, "a message of %zu bytes is longer than any of the machine", size);
         return FCSL_WIRE_ERROR;
     }
-    return fcsl_bus_post(wire->peer.bus, output_of(wire, message, size), message, size) == 0 ? FCSL_WIRE_OK : FCSL_WIRE_NONE;
+    return fcsl_bus_post(wire->peer.bus, output_of(wire, message, size), message, size) == 0 ? FCSL_WIRE_OK
+                                                                                             : FCSL_WIRE_NONE;
 }
 
 /* The oldest message that fits, if there is one. What a peer sent comes before the news that it is gone. */
@@ -188,7 +190,7 @@ int fcsl_wire_open_zenoh(const char *endpoint, fcsl_wire_side_t side, size_t mes
     self->message_max = message_max;
     self->inbox = inbox;
     self->peer.output_count = side == FCSL_WIRE_LISTEN ? sizeof SIMULATOR_KEYS / sizeof SIMULATOR_KEYS[0]
-                                                  : sizeof CONTROLLER_KEYS / sizeof CONTROLLER_KEYS[0];
+                                                       : sizeof CONTROLLER_KEYS / sizeof CONTROLLER_KEYS[0];
     if (open_session(self, endpoint, deadline_ns, error, error_size) != 0) {
         release(self);
         return -1;

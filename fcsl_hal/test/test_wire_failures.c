@@ -201,8 +201,8 @@ int main(void)
     use_port("tcp:");
     test_bad_controllers();
     use_port("zenoh:tcp/");
-    run_apart(test_killed_simulator);
-    run_apart(test_killed_controller);
+    check_alone(test_killed_simulator);
+    check_alone(test_killed_controller);
     CHECK(rmdir(folder) == 0);
     return 0;
 }

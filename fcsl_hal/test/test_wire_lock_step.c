@@ -92,6 +92,12 @@ static void test_zenoh(void)
     test_lock_step("zenoh", TICKS / 5);
 }
 
+static void test_named_values(void)
+{
+    named = 1;
+    test_lock_step("zenoh, named values", TICKS / 5);
+}
+
 static void test_every_wire(void)
 {
     use_unix();
@@ -102,7 +108,8 @@ static void test_every_wire(void)
     use_port("tcp:");
     test_lock_step("tcp", TICKS / 5);
     use_port("zenoh:tcp/");
-    run_apart(test_zenoh);
+    check_alone(test_zenoh);
+    check_alone(test_named_values);
     test_serial_line();
 }
 

@@ -6,12 +6,12 @@
 #ifndef WIRE_FIXTURE_H
 #define WIRE_FIXTURE_H
 
-#include <stdlib.h>
 #include <string.h>
 #include <sys/socket.h>
 #include <sys/wait.h>
 #include <unistd.h>
 
+#include "bus_rig.h"
 #include "channel_fixture.h"
 #include "messages.h"
 #include "fcsl/fcsl_address.h"
@@ -24,6 +24,7 @@ static char folder[] = "/tmp/fcsl_wire_XXXXXX";
 static char path[64]; /* of the Unix socket, in `folder` */
 static char spec[80]; /* of the simulator's end */
 static char their_spec[80]; /* of the controller's */
+static int named; /* both are addresses of the bus, for named values */
 
 /* Both ends on a Unix socket. */
 static inline void use_unix(void)
@@ -38,21 +39,6 @@ static inline void use_port(const char *prefix)
 {
     (void)snprintf(spec, sizeof spec, "%s127.0.0.1:%u", prefix, 20000u + (unsigned)getpid() % 12000u);
     memcpy(their_spec, spec, sizeof spec);
-}
-
-/* Zenoh's threads are missing after a fork: a test over Zenoh has a process of its own, which forks before it opens a session. */
-static inline void run_apart(void (*test)(void))
-{
-    (void)fflush(stdout);
-    const pid_t child = fork();
-    CHECK(child >= 0);
-    if (child == 0) {
-        test();
-        exit(0);
-    }
-    int status = 0;
-    CHECK(waitpid(child, &status, 0) == child);
-    CHECK(WIFEXITED(status) && WEXITSTATUS(status) == 0);
 }
 
 /* A connection to the simulator's end, where `spec` begins with tcp:. */
@@ -70,7 +56,9 @@ static inline fcsl_external_t *listen_here(void)
 {
     char error[TEXT_BYTES] = "";
     fcsl_external_t *external = NULL;
-    CHECK(fcsl_external_open(spec, &MACHINE, &external, error, sizeof error) == 0);
+    const int failed = named ? fcsl_external_open_bus(spec, "fleet", &MACHINE, &external, error, sizeof error)
+                             : fcsl_external_open(spec, &MACHINE, &external, error, sizeof error);
+    CHECK(!failed);
     return external;
 }
 
@@ -96,7 +84,9 @@ static inline fcsl_hal_status_t fly(const fcsl_machine_t *machine, uint32_t time
     uint8_t bytes[MESSAGE_BYTES];
     const fcsl_channel_table_t table = fcsl_channel_table(machine);
     memset(&data, 0, sizeof data);
-    CHECK(fcsl_hal_wire(their_spec, machine, timeout_ms, &hal, text, TEXT_BYTES) == 0);
+    const int failed = named ? fcsl_hal_bus(their_spec, "fleet", machine, timeout_ms, &hal, text, TEXT_BYTES)
+                             : fcsl_hal_wire(their_spec, machine, timeout_ms, &hal, text, TEXT_BYTES);
+    CHECK(!failed);
     if (hal.open(&hal, text, TEXT_BYTES) != 0) {
         hal.close(hal.ctx);
         return FCSL_HAL_ERROR;

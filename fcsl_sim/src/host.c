@@ -168,10 +168,9 @@ int fcsl_sim_listen(fcsl_sim_t *sim, const char *peer, const char *name_space, u
     if (sim->external || sim->tick || sim->sensed || sim->recording) {
         return fcsl_sim_fail(error, "a controller must connect before the first tick, once, and records itself");
     }
-    const int failed =
-        strncmp(peer, WIRE, prefix) == 0
-            ? fcsl_external_open(peer + prefix, sim->machine, &sim->external, text, sizeof text)
-            : fcsl_external_open_bus(peer, name_space, sim->machine, &sim->external, text, sizeof text);
+    const int failed = strncmp(peer, WIRE, prefix) == 0
+                           ? fcsl_external_open(peer + prefix, sim->machine, &sim->external, text, sizeof text)
+                           : fcsl_external_open_bus(peer, name_space, sim->machine, &sim->external, text, sizeof text);
     if (failed) {
         sim->external = NULL;
         return fcsl_sim_fail(error, "%s", text);

@@ -22,10 +22,12 @@ static const char USAGE[] =
     "Runs a compiled machine as a process of its own (docs/flight.md).\n"
     "\n"
     "  --machine NAME          which machine, when the library holds several\n"
-    "  --hal HAL               stub: no hardware (default); wire:SPEC: a simulator or rig at the other end, with SPEC one "
+    "  --hal HAL               stub: no hardware (default); wire:SPEC: a simulator or rig at the other end, with SPEC "
+    "one "
     "of\n"
     "                          " FCSL_WIRE_SPECS "\n"
-    "                          zenoh:tcp/HOST:PORT (or zenoh-peer:): a simulator on the bus, each channel under its key\n"
+    "                          zenoh:tcp/HOST:PORT (or zenoh-peer:): a simulator on the bus, each channel under its "
+    "key\n"
     "  --timeout-ms N          how long to wait for the simulator's next message (default 2000)\n"
     "  --board LIBRARY.so      the board that hw_* of algorithms reach (fcsl/fcsl_hw.h); default: simulated hardware\n"
     "  --guard PATH            the actuators belong to the fcsl-guard that listens on PATH (docs/guard.md)\n"
@@ -214,7 +216,8 @@ static int check(const options_t *options)
         return usage_error("--token needs --socket: it is the token of a TCP server", "");
     }
     if (options->timeout_ms != 0 && options->peer == NULL) {
-        return usage_error("--timeout-ms needs --hal wire:SPEC or zenoh:…: it is how long to wait for the simulator", "");
+        return usage_error("--timeout-ms needs --hal wire:SPEC or zenoh:…: it is how long to wait for the simulator",
+                           "");
     }
     if (options->name_space[0] != '\0' && options->record == NULL && options->peer == NULL) {
         return usage_error("--namespace needs --record or --hal zenoh:…: it is of topics, and of keys of the bus", "");

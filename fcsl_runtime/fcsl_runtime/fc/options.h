@@ -12,33 +12,33 @@ typedef enum { RECORD_BY_PACE, RECORD_WAIT, RECORD_DROP } record_policy_t;
 typedef struct {
     const char *library;
     const char *machine;    /* null: the only one */
-    const char *peer;       /* OPTIONS_WIRE and a SPEC of fcsl_wire.h, or an address of fcsl_hal_bus; null: the stub HAL */
-    const char *board;      /* null: simulated hardware */
-    const char *guard;      /* socket of fcsl-guard; null: none */
-    const char *restore;    /* file of a checkpoint to begin from; null: from tick 0 */
-    const char *socket;     /* null: no variable server */
-    const char *token;      /* file with its token, for TCP */
+    const char *peer; /* OPTIONS_WIRE and a SPEC of fcsl_wire.h, or an address of fcsl_hal_bus; null: the stub HAL */
+    const char *board; /* null: simulated hardware */
+    const char *guard; /* socket of fcsl-guard; null: none */
+    const char *restore; /* file of a checkpoint to begin from; null: from tick 0 */
+    const char *socket; /* null: no variable server */
+    const char *token; /* file with its token, for TCP */
     const char *checkpoints; /* folder of the checkpoints that clients name; null: none */
-    const char *telemetry;  /* udp:HOST:PORT[/EVERY]; null: none */
+    const char *telemetry; /* udp:HOST:PORT[/EVERY]; null: none */
     const char *telemetry_fields; /* globs; null: as fcsl_telemetry.h says */
-    const char *record;     /* null: no recording */
+    const char *record; /* null: no recording */
     const char *record_fields; /* globs; null: as fcsl_run_record says */
     record_policy_t record_policy;
     const char *name_space;
     const char *summary_file; /* null: not written */
-    uint64_t ticks;         /* 0: no limit */
+    uint64_t ticks; /* 0: no limit */
     uint64_t timeout_ms;
-    uint64_t watchdog_ms;   /* 0: none */
-    uint64_t priority;      /* of SCHED_FIFO; 0: as started */
-    uint64_t cpu;           /* of the step thread; OPTIONS_ANY_CPU */
+    uint64_t watchdog_ms; /* 0: none */
+    uint64_t priority; /* of SCHED_FIFO; 0: as started */
+    uint64_t cpu; /* of the step thread; OPTIONS_ANY_CPU */
     missed_deadline_t missed_deadline;
     int missed_deadline_given;
     int realtime;
     int lock_memory;
     int paused;
-    int ignore_source_hash;       /* a checkpoint of other sources is taken */
-    int no_overrun_check;            /* executes are not timed */
-    int exit_on_stdin_eof;              /* the end of standard input is a signal to end */
+    int ignore_source_hash; /* a checkpoint of other sources is taken */
+    int no_overrun_check; /* executes are not timed */
+    int exit_on_stdin_eof; /* the end of standard input is a signal to end */
 } options_t;
 
 #define OPTIONS_ANY_CPU UINT64_MAX

@@ -64,7 +64,8 @@ const void *fcsl_sim_machine_data(const fcsl_sim_t *sim);
 
 /* `peer`: wire:SPEC (fcsl_wire.h) or zenoh:tcp/HOST:PORT (fcsl_hal.h), as the --hal of fcsl-fc, which can connect from now on;
  * `name_space` stands in front of the keys of the bus. */
-int fcsl_sim_listen(fcsl_sim_t *sim, const char *peer, const char *name_space, uint32_t timeout_ms, fcsl_error_t *error);
+int fcsl_sim_listen(fcsl_sim_t *sim, const char *peer, const char *name_space, uint32_t timeout_ms,
+                    fcsl_error_t *error);
 /* Waits up to timeout_ms for the connection; then fcsl_sim_run steps in lock-step with the controller. A missing answer
  * after timeout_ms is an error that names its tick. */
 int fcsl_sim_accept(fcsl_sim_t *sim, fcsl_error_t *error);
