@@ -13,6 +13,8 @@ static const char *const ANSWER_KEY[] = {"t/answer"};
 
 /* ---- in lock-step: values first, then the tick that commits them ------------------------------------------------------ */
 
+static fcsl_bus_role_t answering = FCSL_BUS_CLIENT;
+
 /* Each value of a tick is there when its tick is. */
 static void answer(const char *endpoint)
 {
@@ -20,7 +22,7 @@ static void answer(const char *endpoint)
     for (uint32_t i = 0; i < VALUES; i++) {
         inputs[1 + i] = (fcsl_bus_input_t){.key = VALUE_KEYS[i], .bytes = sizeof(uint64_t), .depth = 1};
     }
-    const fcsl_bus_options_t options = {.role = FCSL_BUS_CLIENT,
+    const fcsl_bus_options_t options = {.role = answering,
                                         .endpoint = endpoint,
                                         .timeout_ms = LONG_MS,
                                         .ring_bytes = RING_BYTES,
@@ -76,14 +78,22 @@ static void test_values_come_before_their_tick(void)
     CHECK(fcsl_bus_close(bus, CLOSE_MS) == 0);
 }
 
+static void test_a_peer_is_as_good(void)
+{
+    answering = FCSL_BUS_PEER;
+    test_values_come_before_their_tick();
+}
+
 /* ---- who comes late --------------------------------------------------------------------------------------------------- */
 
-static int first_listener; /* takes the first connection, and is no session */
+static int first_listener = -1; /* takes the first connection, and is no session */
 
 static void say_once(const char *endpoint)
 {
     const uint64_t word = 42;
-    CHECK(close(first_listener) == 0); /* this process has it, too */
+    if (first_listener >= 0) {
+        CHECK(close(first_listener) == 0); /* this process has it, too */
+    }
     const fcsl_bus_options_t options = {.role = FCSL_BUS_CLIENT,
                                         .endpoint = endpoint,
                                         .timeout_ms = LONG_MS,
@@ -116,6 +126,36 @@ static void test_a_listener_that_comes_late(void)
     take_one(bus, 0, &word, sizeof word);
     CHECK(word == 42);
     check_success(process);
+    CHECK(fcsl_bus_close(bus, CLOSE_MS) == 0);
+}
+
+/* ---- who meets whom -------------------------------------------------------------------------------------------------- */
+
+static void hear_once(const char *endpoint)
+{
+    const fcsl_bus_input_t inputs[] = {{.key = ANSWER_KEY[0], .bytes = sizeof(uint64_t), .depth = 1}};
+    const fcsl_bus_options_t options = {.role = FCSL_BUS_CLIENT,
+                                        .endpoint = endpoint,
+                                        .timeout_ms = LONG_MS,
+                                        .ring_bytes = RING_BYTES,
+                                        .inputs = inputs,
+                                        .input_count = 1};
+    fcsl_bus_t *bus = open_bus(&options);
+    uint64_t word = 0;
+    take_one(bus, 0, &word, sizeof word);
+    CHECK(word == 42 && fcsl_bus_close(bus, CLOSE_MS) == 0);
+}
+
+/* Two clients of one that listens. */
+static void test_clients_meet(void)
+{
+    const char *endpoint = free_endpoint();
+    const pid_t hears = in_process(hear_once, endpoint);
+    const pid_t says = in_process(say_once, endpoint);
+    const fcsl_bus_options_t options = {.role = FCSL_BUS_LISTEN, .endpoint = endpoint, .ring_bytes = RING_BYTES};
+    fcsl_bus_t *bus = open_bus(&options);
+    check_success(says);
+    check_success(hears);
     CHECK(fcsl_bus_close(bus, CLOSE_MS) == 0);
 }
 
@@ -252,7 +292,9 @@ static void test_nobody_and_somebody(void)
 int main(void)
 {
     check_alone(test_values_come_before_their_tick);
+    check_alone(test_a_peer_is_as_good);
     check_alone(test_a_listener_that_comes_late);
+    check_alone(test_clients_meet);
     check_alone(test_what_is_dropped_is_counted);
     check_alone(test_options);
     check_alone(test_nobody_and_somebody);

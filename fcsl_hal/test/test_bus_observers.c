@@ -6,7 +6,8 @@
 #define _GNU_SOURCE
 #include "bus_rig.h"
 
-enum { OBSERVERS = 3, MIRROR_BYTES = 16000, MIRROR_RING = 1 << 18, ROUNDS_MIN = 50 };
+enum { OBSERVERS = 3, MIRROR_BYTES = 16000, MIRROR_RING = 1 << 18, TICKS_MIN = 50, TICKS_AFTER = 500 };
+static const uint64_t LONGEST_NS = UINT64_C(5000000000); /* on a busy machine; a link that is closed can take 10 s */
 
 static const char *const TICK[] = {"t/tick"};
 static const char *const ANSWER[] = {"t/answer"};
@@ -109,22 +110,18 @@ int main(void)
     for (int i = 0; i < OBSERVERS; i++) {
         CHECK(kill(observers[i], SIGSTOP) == 0);
     }
-    /* Frozen, they take what their kernels have room for; from then on their ring is full, until the lease ends. */
+    /* Frozen, they take what their kernels have room for, and after the lease their links are closed. Neither is felt. */
     uint64_t tick = 0;
-    const uint64_t refused = counted(mirror).refused;
-    while (counted(mirror).refused == refused) {
-        (void)fly_tick(control, mirror, tick++);
-        CHECK(fcsl_bus_alive(mirror, 0) == OBSERVERS);
-    }
-    const uint64_t full_at = tick;
     uint64_t longest_ns = 0;
-    while (fcsl_bus_alive(mirror, 0) == OBSERVERS) {
+    uint64_t after = 0;
+    while (after < TICKS_AFTER) {
         const uint64_t took_ns = fly_tick(control, mirror, tick++);
         longest_ns = took_ns > longest_ns ? took_ns : longest_ns;
+        after += fcsl_bus_alive(mirror, 0) == 0;
     }
-    (void)printf("%llu ticks until the ring was full, %llu from then to the end of the lease, the longest %.2f ms\n",
-                 (unsigned long long)full_at, (unsigned long long)(tick - full_at), (double)longest_ns * 1e-6);
-    CHECK(tick - full_at >= ROUNDS_MIN);
+    (void)printf("%llu ticks while the observers were frozen, the longest %.2f ms\n",
+                 (unsigned long long)(tick - after), (double)longest_ns * 1e-6);
+    CHECK(tick - after >= TICKS_MIN && longest_ns < LONGEST_NS);
     CHECK(counted(control).refused == 0 && counted(control).received == tick);
     CHECK(fcsl_bus_close(control, CLOSE_MS) == 0);
     (void)fcsl_bus_close(mirror, CLOSE_MS);

@@ -29,7 +29,9 @@ from .build import GCC, Build
 
 HERE = Path(__file__).resolve().parent
 #: C test programs with threads of their own or around a machine.
-_THREADED = "test_bus|test_ring|test_history|test_wire|test_guard_slot|test_run|test_allocation|test_telemetry"
+_THREADED = (
+    "test_bus_queues|test_ring|test_history|test_wire_pair|test_guard_slot|test_run|test_allocation|test_telemetry"
+)
 _MACHINE_TICKS = 10000
 #: Processor time of all commands so far, seconds.
 _spent = [0.0]
