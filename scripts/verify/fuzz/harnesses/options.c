@@ -28,7 +28,10 @@ int LLVMFuzzerTestOneInput(const uint8_t *data, size_t size)
     if (status == 0) {
         FUZZ_CHECK(options.library != NULL && options.name_space != NULL && options.timeout_ms > 0);
         FUZZ_CHECK(options.timeout_ms <= 3600000u && options.ticks <= INT64_MAX);
-        FUZZ_CHECK(options.wire == NULL || fcsl_wire_check(options.wire, error, sizeof error) == 0);
+        const size_t prefix = strlen(OPTIONS_WIRE);
+        const int is_wire = options.peer != NULL && strncmp(options.peer, OPTIONS_WIRE, prefix) == 0;
+        FUZZ_CHECK(options.peer == NULL || (is_wire ? fcsl_wire_check(options.peer + prefix, error, sizeof error)
+                                                    : fcsl_hal_bus_check(options.peer, error, sizeof error)) == 0);
     }
     free(text);
     return 0;
