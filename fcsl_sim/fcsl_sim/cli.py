@@ -116,7 +116,9 @@ def _parser() -> argparse.ArgumentParser:
         help_set = "sets a model parameter: altimeter.parameters.sigma=0.8 (repeatable)"
         command.add_argument("--set", action="append", default=[], metavar="PATH=VALUE", dest="sets", help=help_set)
     command.add_argument("--record", type=Path, metavar="BAG", help="new directory for the bag")
-    command.add_argument("--namespace", default="", help="ROS namespace of the bag's topics, and of the keys on the bus")
+    command.add_argument(
+        "--namespace", default="", help="ROS namespace of the bag's topics, and of the keys on the bus"
+    )
     command.add_argument(
         "--external",
         metavar="PEER",
@@ -196,7 +198,7 @@ def _run(options: argparse.Namespace) -> int:
         speed=options.speed,
         server=server,
         sender=None if options.telemetry is None else Sender(options.telemetry, options.telemetry_fields),
-        watcher=None if options.json else _Printer(config, wire),
+        watcher=None if options.json else _Printer(config, external),
     )
     if options.json:
         show(json.dumps(summary.as_json(), indent=2))
@@ -208,13 +210,13 @@ def _run(options: argparse.Namespace) -> int:
 class _Printer(Watcher):
     """Tells people."""
 
-    def __init__(self, config: SimConfig, wire: str | None):
-        self._config, self._wire = config, wire
+    def __init__(self, config: SimConfig, external: str | None):
+        self._config, self._external = config, external
 
     def listening(self) -> None:
-        serial = str(self._wire).startswith("uart:")
-        end = "uart:DEVICE:BAUD with the device at the other end of the line" if serial else self._wire
-        show(f"waiting for a controller: fcsl-fc {self._config.library} --hal wire:{end}")
+        serial = str(self._external).startswith("wire:uart:")
+        end = "wire:uart:DEVICE:BAUD with the device at the other end of the line" if serial else self._external
+        show(f"waiting for a controller: fcsl-fc {self._config.library} --hal {end}")
 
     def serving(self, address: str) -> None:
         show(f"variables on {address}")

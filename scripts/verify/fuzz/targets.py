@@ -117,7 +117,9 @@ TARGETS = (
         "the command line of fcsl-fc",
         "arguments",
         Defect(
-            "fcsl_runtime/fcsl_runtime/fc/options.c", "fcsl_wire_check(text + strlen(OPTIONS_WIRE), error, sizeof error)", "0"
+            "fcsl_runtime/fcsl_runtime/fc/options.c",
+            "fcsl_wire_check(text + strlen(OPTIONS_WIRE), error, sizeof error)",
+            "0",
         ),
         longest=512,
     ),
