@@ -144,10 +144,10 @@ class ControllerNode(LifecycleNode):
         self._active, self._ending = True, "shut down"
 
     def _end_ticking(self) -> None:
-        """The actuators get their safe values: no command follows."""
-        if self._active and self._hosted is not None:
-            self._hosted.make_safe()
-        self._active = False
+        """The actuators on topics get their safe values: no command follows."""
+        ended, self._active = self._active, False
+        if ended and self._hosted is not None and self._mode is not None:
+            self._hosted.outputs.make_safe(self._mode.now_ns())
 
     def _release(self, why: str) -> None:
         if self._hosted is None or self._mode is None:
@@ -160,13 +160,15 @@ class ControllerNode(LifecycleNode):
 
     def _close(self) -> None:
         """Leaves the simulator, completes the bag and removes everything that configure created."""
-        self._end_ticking()
-        mode, hosted, self._mode, self._hosted = self._mode, self._hosted, None, None
-        if mode is not None:
-            mode.leave()
-            mode.close()
-        if hosted is not None:
-            hosted.close()
+        try:
+            self._end_ticking()
+        finally:
+            mode, hosted, self._mode, self._hosted = self._mode, self._hosted, None, None
+            if mode is not None:
+                mode.leave()
+                mode.close()
+            if hosted is not None:
+                hosted.close()
 
     # ---- running --------------------------------------------------------------------------------------------------
 

@@ -120,10 +120,6 @@ class Hosted:
             print(f"{time_s:10.3f} s  {event.from_state} -> {event.to_state}{cause}", flush=True)
         self.topics.publish_outputs(tick, time_ns)
 
-    def make_safe(self) -> None:
-        """Ticking ends: actuators on topics get their safe values."""
-        self.outputs.make_safe(self._node.get_clock().now().nanoseconds)
-
     def start_over(self) -> None:
         """Begins a new run at tick 0, with the current parameters and a new bag."""
         self.end_record()

@@ -77,6 +77,10 @@ class LockstepLoop:
         """While inactive: keeps the simulator waiting."""
         self._end.alive()
 
+    def now_ns(self) -> int:
+        """The time that a message of now is stamped with: that of the coming tick."""
+        return self._hosted.run.machine.time_ns(self._hosted.run.tick)
+
     def leave(self) -> None:
         """Makes a running simulator end at once instead of waiting for an answer."""
         if self._running:

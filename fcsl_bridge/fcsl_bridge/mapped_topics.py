@@ -5,6 +5,7 @@ published topics.
 
 from __future__ import annotations
 
+import time
 from collections.abc import Callable
 from typing import Any
 
@@ -18,8 +19,8 @@ from . import qos
 from .interfaces import message_class
 from .polled import Polled
 
-#: For receivers of the last commands to have them.
-_SAFE_WAIT = Duration(seconds=0.2)
+#: For all receivers together to have the last commands.
+_SAFE_WAIT_S = 0.2
 
 
 class Inputs:
@@ -113,8 +114,9 @@ class Outputs:
         if self._run.safe_address is None:
             return
         self._publish(self._run.safe_address, time_ns)
+        deadline = time.monotonic() + _SAFE_WAIT_S
         for _, _, publisher in self._outlets:
-            publisher.wait_for_all_acked(_SAFE_WAIT)
+            publisher.wait_for_all_acked(Duration(seconds=max(deadline - time.monotonic(), 0.0)))
 
     def _publish(self, address: int, time_ns: int) -> None:
         for _, composer, publisher in self._outlets:

@@ -91,6 +91,10 @@ class RealtimeLoop:
     def rest(self) -> None:
         """While inactive there is nothing to do."""
 
+    def now_ns(self) -> int:
+        """The time that a message of now is stamped with."""
+        return self._time.at(time.monotonic_ns())
+
     def leave(self) -> None:
         """Nothing to do: no simulator waits for this node."""
 

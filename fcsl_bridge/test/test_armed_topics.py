@@ -6,10 +6,12 @@ from __future__ import annotations
 import json
 import struct
 import subprocess
+import time
 from pathlib import Path
 from typing import Any
 
 import pytest
+from rclpy.duration import Duration
 
 from fcsl_bridge import mapped_topics
 from simclient.run import Run, open_run
@@ -17,7 +19,7 @@ from simclient.run import Run, open_run
 PILOT = """
 class Pilot:
     inputs = {"go": "bool"}
-    outputs = {"force": "f64 N", "armed": "bool"}
+    outputs = {"force": "f64 N", "other": "f64 N", "armed": "bool"}
 
     def execute(self):
         self.force = 3.0
@@ -33,13 +35,20 @@ FORCE: dict[str, Any] = {
 
 
 class Publisher:
-    """Takes the place of a publisher: what it was given."""
+    """Takes the place of a publisher: what it was given, and how long it was waited for."""
 
     def __init__(self) -> None:
         self.values: list[float] = []
+        self.waited_s = 0.0
 
     def publish(self, cdr: bytes) -> None:
         self.values.append(struct.unpack_from("<d", cdr, 4)[0])
+
+    def wait_for_all_acked(self, timeout: Duration) -> bool:
+        """Of a receiver that never answers."""
+        self.waited_s += timeout.nanoseconds / 1e9
+        time.sleep(timeout.nanoseconds / 1e9)
+        return False
 
 
 def opened(folder: Path, **keys: Any) -> Run:
@@ -79,4 +88,20 @@ def test_a_disarmed_machine_publishes_safe_values(
         run.step(1)
         outputs.publish(0)
     assert publisher.values == published
+    run.close()
+
+
+@pytest.mark.parametrize(
+    ("arm", "published"), [({"arm": "pilot.armed"}, [-1.0, -2.0]), ({}, [])], ids=["arm", "no arm"]
+)
+def test_the_end_of_ticking_waits_once_for_all_actuators(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, arm: dict[str, Any], published: list[float]
+) -> None:
+    """However many receivers do not answer; and nothing is published of a machine that nothing arms."""
+    publisher = Publisher()
+    monkeypatch.setattr(mapped_topics.qos, "publisher", lambda *_: publisher)
+    other = {**FORCE, "name": "other", "id": 2, "field": "pilot.outputs.other"}
+    run = opened(tmp_path, channels=[{**FORCE, "safe": -1.0}, {**other, "safe": -2.0}], **arm)
+    mapped_topics.Outputs(None, run).make_safe(0)  # type: ignore[arg-type]  # the node is for publishers only
+    assert publisher.values == published and publisher.waited_s <= 0.2
     run.close()

@@ -93,6 +93,7 @@ static const uint8_t *values_of(const fcsl_machine_t *machine, fcsl_message_kind
         return NULL;
     }
     //@ split *size;
+    /* Of a blob it holds, too; it ties the three together for scripts/verify/codec. */
     return entry->values + *size == entry->end ? bytes + entry->values : NULL;
 }
 

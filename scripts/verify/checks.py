@@ -14,6 +14,7 @@ from __future__ import annotations
 import argparse
 import os
 import re
+import signal
 import subprocess
 import sys
 import time
@@ -28,6 +29,8 @@ ROOT = Path(__file__).resolve().parents[2]
 LOGS = ROOT / "log"
 #: Between two lines that say where a check is, seconds.
 TOLD_EVERY_S = 10.0
+#: What no check takes: one that hangs shall not keep the others from ending, seconds.
+LIMIT_S = scaled(2400.0, 86400.0)
 #: Lines of a failed check that are shown once more at the end, for whoever sees only the end of a long output.
 LAST_LINES = 20
 _TESTS = "fcsl_compiler/test"
@@ -112,6 +115,15 @@ class Running:
     def seconds(self) -> float:
         return time.monotonic() - self.started
 
+    def end(self) -> None:
+        """Like Ctrl-C, upon which a check ends what it has started."""
+        self.process.send_signal(signal.SIGINT)
+        try:
+            self.process.wait(timeout=30)
+        except subprocess.TimeoutExpired:
+            self.process.kill()
+            self.process.wait()
+
 
 def say(text: str) -> None:
     print(f"fcsl: {text}", flush=True)
@@ -152,6 +164,9 @@ def run_all(checks: Sequence[Check], at_once: int) -> list[Check]:
             while waiting and len(running) < at_once:
                 running.append(start(waiting.pop(0)))
             time.sleep(0.2)
+            for one in [r for r in running if r.seconds() > LIMIT_S]:
+                say(f"{one.check.label}: not over after {LIMIT_S:.0f} s, ended")
+                one.end()
             for one in [r for r in running if r.process.poll() is not None]:
                 running.remove(one)
                 if not ended(one):
@@ -163,8 +178,7 @@ def run_all(checks: Sequence[Check], at_once: int) -> list[Check]:
                     print(f"{one.seconds():9.0f} s  {one.check.label.split(':')[0]}: {doing:.90}", flush=True)
     finally:
         for one in running:  # after Ctrl-C, which they got, too
-            one.process.terminate()
-            one.process.wait()
+            one.end()
     return failed
 
 

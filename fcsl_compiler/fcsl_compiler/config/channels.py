@@ -24,7 +24,7 @@ _ROS_FRAME = re.compile(r"\S+")
 #: Axes of a vector; and of a rotation: target axes, source axes.
 AXES = ("enu", "ned", "flu", "frd", "enu/flu", "ned/frd", "ned/flu", "enu/frd")
 _MAX_AGE = 2**32 - 2
-#: Of the field of a channel (fcsl_hal: an entry counts its values, and a message its bytes, in 16 bits).
+#: Of the field of a channel: an entry counts its values in 16 bits (docs/wire.md), and hosts refuse a longer field.
 _MAX_BYTES = 2**16 - 1
 #: Ids from 0xFF00 on are reserved for entries of messages that are no channels (docs/wire.md).
 MAX_ID = 0xFEFF
@@ -183,7 +183,11 @@ def _bound(
     if port is not None and (size := count_of(port.type) * scalar_of(port.type).size) > _MAX_BYTES:
         message = f"a channel has at most {_MAX_BYTES} bytes, and `{node.value}` has {size}"
         reader.sink.error(
-            "E217", message, node.span, why="its message counts them in 16 bits", help="use several channels"
+            "E217",
+            message,
+            node.span,
+            why="a message counts the values of a channel in 16 bits",
+            help="use several channels",
         )
         return None
     if port is None or direction == "actuator":

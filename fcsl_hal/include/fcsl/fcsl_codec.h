@@ -45,9 +45,9 @@ uint32_t fcsl_crc32(uint32_t crc, const void *bytes, size_t size);
 /* The channels of a machine, and the hash by which messages name them. Made once, when a host opens the machine. */
 typedef struct {
     const fcsl_machine_t *machine;
-    uint32_t
-        hash; /* CRC-32 over (id u16, direction u8, type of its entry u8, count u32) of every channel in table order; the
-               * count of a blob: its bytes at most */
+    /* CRC-32 over (id u16, direction u8, type of its entry u8, count u32) of every channel in table order; the count of a blob
+     * is that of its bytes at most. */
+    uint32_t hash;
 } fcsl_channel_table_t;
 
 fcsl_channel_table_t fcsl_channel_table(const fcsl_machine_t *machine);

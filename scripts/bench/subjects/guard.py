@@ -13,7 +13,7 @@ import statistics
 import subprocess
 import tempfile
 import time
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from pathlib import Path
 
@@ -78,33 +78,50 @@ def _load() -> Iterator[None]:
 
 
 def _stops(library: Path, log: Path, *options: str) -> dict[str, float]:
-    slot = log.with_suffix(".slot")
+    slot, told = log.with_suffix(".slot"), log.with_suffix(".txt")
     command = [runtime_program("fcsl-guard"), library, "--slot", slot, "--actuator", f"force=log:{log}", *options]
-    found = []
-    with subprocess.Popen(list(map(str, command)), stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL) as guard:
-        while not slot.exists():
-            if guard.poll() is not None:
+    with (
+        told.open("wb") as output,
+        subprocess.Popen(list(map(str, command)), stdout=output, stderr=subprocess.STDOUT) as guard,
+    ):
+        try:
+            # It says so once nothing can be refused any more; the slot is there before.
+            if not _reached(lambda: "actuators written every" in told.read_text(), guard):
                 return {}
-            time.sleep(0.01)
-        for _ in range(STOPS):
-            found.append(_stop(library, slot, log))
-        guard.terminate()
+            found = [_stop(library, slot, log, guard) for _ in range(STOPS)]
+        finally:
+            guard.terminate()
     cuts = statistics.quantiles(found, n=100)
     return {"median": cuts[49], "p99": cuts[98], "max": max(found), "stops": STOPS}
 
 
-def _stop(library: Path, slot: Path, log: Path) -> float:
+def _stop(library: Path, slot: Path, log: Path, guard: subprocess.Popen[bytes]) -> float:
     """Starts a flight program, stops it once the actuator has its command, and returns how long that lasted, in ms."""
     command = [runtime_program("fcsl-fc"), library, "--guard", slot]
     with subprocess.Popen(list(map(str, command)), stdout=subprocess.DEVNULL) as program:
-        while _writes(log)[-1][1] == SAFE:
-            time.sleep(0.005)
-        stopped = time.monotonic()
-        program.send_signal(signal.SIGSTOP)
-        while (writes := _writes(log))[-1][1] != SAFE:
-            time.sleep(0.005)
-        program.kill()
-    return 1e3 * (next(t for t, value in writes if t > stopped and value == SAFE) - stopped)
+        try:
+            flies = _reached(lambda: _writes(log)[-1][1] != SAFE, guard, program)
+            stopped = time.monotonic()
+            program.send_signal(signal.SIGSTOP)
+            if not flies or not _reached(lambda: _writes(log)[-1][1] == SAFE, guard):
+                raise RuntimeError(
+                    f"`fcsl-guard` or `fcsl-fc` ended; the guard said:\n{log.with_suffix('.txt').read_text()}"
+                )
+        finally:
+            program.kill()
+    return 1e3 * (next(t for t, value in _writes(log) if t > stopped and value == SAFE) - stopped)
+
+
+def _reached(what: Callable[[], bool], *processes: subprocess.Popen[bytes]) -> bool:
+    """Waits; false once one of the processes has ended instead."""
+    deadline = time.monotonic() + 60.0
+    while not what():
+        if any(process.poll() is not None for process in processes):
+            return False
+        if time.monotonic() > deadline:
+            raise TimeoutError("fcsl-guard and fcsl-fc did not come to it within a minute")
+        time.sleep(0.005)
+    return True
 
 
 def _writes(log: Path) -> list[tuple[float, float]]:

@@ -560,7 +560,7 @@ MACHINE_CODES: dict[str, Code] = {
         "a field that is not what its channel says",
         "`as` says what a field is for the other end of a wire. A quaternion is an f64[4] or f32[4], its scalar part "
         "first. A blob is a u32[1 + N] for up to N bytes: element 0 is their number, and each of them has an element "
-        "behind it. A blob has no ROS message.",
+        "behind it. So is its `safe` value. A blob has no ROS message.",
         Kind.JSON,
         '"channels": [{"name": "force", "id": 1, "field": "control.outputs.force", "direction": "actuator",\n'
         '              "as": "quaternion"}]',
