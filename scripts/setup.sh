@@ -86,6 +86,17 @@ tools_key() {
     cat requirements.txt constraints.txt scripts/ros-wheels.txt scripts/ros_wheels.sh "${cargo_manifests[@]/Cargo.toml/Cargo.lock}"
 }
 
+# Starts to build the crates that take longest while packages are downloaded. colcon's cargo waits for this one and finds all
+# of it done; if it failed, colcon's tells why.
+build_crates_ahead() {
+    local cargo
+    cargo=$(find_cargo)
+    mkdir -p log
+    PATH="$(dirname "$cargo"):$PATH" "$cargo" build --release --locked --manifest-path fcsl_hal/io/Cargo.toml \
+        --target-dir build/fcsl_hal/cargo > log/Rust-crates-ahead.txt 2>&1 < /dev/null &
+    trap "kill $! 2> /dev/null || true" EXIT
+}
+
 write_underlay() { # the machine's choices, as one file that scripts/underlay.sh reads
     {
         echo "# written by scripts/setup.sh"
@@ -109,6 +120,7 @@ tools() {
     system_packages
     key=$(tools_key | sha256sum)
     python=$(find_python)
+    build_crates_ahead
     if [ -d "$ros" ]; then
         say "ROS 2: $ros"
         "$python" -m venv --clear --system-site-packages "$venv"

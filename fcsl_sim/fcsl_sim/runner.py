@@ -109,8 +109,8 @@ def run(
 ) -> Summary:
     """Runs to the end. bag: records controller and truth into this new directory. external: the controller is another
     process (`wire:SPEC` or `zenoh:tcp/HOST:PORT`), which records itself and answers within `timeout_ms`. name_space: of
-    the bag's topics, and of the keys on the bus. speed: limit on simulated seconds per second; 0: as fast as possible. Raises SimError; the bag then has the ticks recorded until then, and is
-    removed if there are none.
+    the bag's topics, and of the keys on the bus. speed: limit on simulated seconds per second; 0: as fast as possible.
+    Raises SimError; the bag then has the ticks recorded until then, and is removed if there are none.
     """
     if bag is not None and external is not None:
         raise SimError("with an external controller the controller records: give `--record` to it")

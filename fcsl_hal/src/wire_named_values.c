@@ -1,0 +1,161 @@
+/* SPDX-License-Identifier: Apache-2.0
+ *
+ * Values of a tick and their commit: what a message of channels becomes on the bus, and what it is made of at the other end.
+ */
+#include <inttypes.h>
+#include <stdio.h>
+#include <string.h>
+
+#include "codec_layout.h"
+#include "commit.h"
+#include "wire_named_internal.h"
+
+/* ---- sending ---------------------------------------------------------------------------------------------------------- */
+
+static int post_values(named_wire_t *wire, const uint8_t *bytes, size_t size, fcsl_message_kind_t kind)
+{
+    const fcsl_machine_t *machine = wire->table->machine;
+    const fcsl_message_t message = {.bytes = bytes, .size = size, .kind = kind};
+    fcsl_message_entry_t entry = {0};
+    int failed = 0;
+    memset(wire->fresh, 0, machine->channel_count);
+    while (!failed && fcsl_message_next(machine, &message, &entry)) {
+        wire->fresh[entry.channel] = 1;
+        failed = fcsl_bus_post(wire->peer.bus, wire->numbers[entry.channel], entry.values, entry.size);
+    }
+    return failed;
+}
+
+static int post_commit(named_wire_t *wire, const commit_t *commit)
+{
+    const uint32_t channels = wire->table->machine->channel_count;
+    commit_write(commit, wire->fresh, wire->value);
+    return fcsl_bus_post(wire->peer.bus, NAMED_COMMIT, wire->value, commit_bytes(channels));
+}
+
+/* What the host sends was made by the codec, or by control_packet.c: its first entry says what it is. */
+int named_post(named_wire_t *wire, const uint8_t *bytes, size_t size)
+{
+    const uint32_t id = size >= 2 ? fcsl_get_u16(bytes) : 0u;
+    commit_t commit = {.table_hash = wire->table->hash, .channels = (uint16_t)wire->table->machine->channel_count};
+    if (id < SENSORS_ID || id > SENSORS_ID + FCSL_TIME_MESSAGE) {
+        return fcsl_bus_post(wire->peer.bus, NAMED_CONTROL, bytes, size);
+    }
+    commit.tick = fcsl_get_u64(bytes + ENTRY_BYTES);
+    switch (id - SENSORS_ID) {
+    case FCSL_SENSOR_MESSAGE: /* its time message follows, and with it the commit */
+        return post_values(wire, bytes, size, FCSL_SENSOR_MESSAGE);
+    case FCSL_TIME_MESSAGE:
+        commit.direction = FCSL_SENSOR;
+        commit.time_ns = fcsl_get_u64(bytes + EXTRA_AT + ENTRY_BYTES);
+        return post_commit(wire, &commit);
+    default:
+        commit.direction = FCSL_ACTUATOR;
+        commit.armed = bytes[EXTRA_AT + ENTRY_BYTES];
+        return post_values(wire, bytes, size, FCSL_ACTUATOR_MESSAGE) != 0 ? -1 : post_commit(wire, &commit);
+    }
+}
+
+/* ---- receiving -------------------------------------------------------------------------------------------------------- */
+
+/* Stores the value of a channel. Returns 1, or 0 where it is none. */
+static int store_value(named_wire_t *wire, const fcsl_channel_t *channel, size_t size)
+{
+    const fcsl_machine_t *machine = wire->table->machine;
+    const fcsl_field_t *field = &machine->fields[channel->field];
+    uint8_t *place = wire->image + field->offset;
+    if (channel->as == FCSL_AS_BLOB && size <= blob_capacity(field)) {
+        blob_import(place, wire->value, (uint32_t)size, blob_capacity(field));
+        return 1;
+    }
+    if (channel->as == FCSL_AS_BLOB || size != field->size ||
+        !fcsl_scalars_valid(machine, wire->value, field->type, field->count)) {
+        wire->counters.values_refused++;
+        return 0;
+    }
+    fcsl_scalars_import(place, wire->value, field->type, field->count);
+    return 1;
+}
+
+/* Takes the values of a commit: NONE when all came. */
+static fcsl_wire_status_t take_values(named_wire_t *wire, const commit_t *commit)
+{
+    const fcsl_machine_t *machine = wire->table->machine;
+    for (uint32_t i = 0; i < machine->channel_count; i++) {
+        size_t size = 0;
+        if (wire->fresh[i] == 0) {
+            continue;
+        }
+        const int came = fcsl_bus_take(wire->peer.bus, wire->numbers[i], wire->value, &size);
+        if (!came || !store_value(wire, &machine->channels[i], size)) {
+            (void)snprintf(wire->text, sizeof wire->text,
+                           "the commit of tick %" PRIu64 " says that channel '%.100s' has a value, and %s",
+                           commit->tick, machine->channels[i].name, came ? "what came is none" : "none came");
+            return FCSL_WIRE_ERROR;
+        }
+    }
+    return FCSL_WIRE_NONE;
+}
+
+/* Whether the commit in `value` is one of the peer's, of this machine and direction. */
+static int read_commit(named_wire_t *wire, size_t size, commit_t *commit)
+{
+    const fcsl_machine_t *machine = wire->table->machine;
+    const uint8_t theirs = wire->peer.side == FCSL_WIRE_LISTEN ? FCSL_ACTUATOR : FCSL_SENSOR;
+    int fits = commit_read(wire->value, size, machine->channel_count, commit, wire->fresh) == 0 &&
+               commit->table_hash == wire->table->hash && commit->direction == theirs;
+    for (uint32_t i = 0; fits && i < machine->channel_count; i++) {
+        fits = wire->fresh[i] == 0 || machine->channels[i].direction == theirs;
+    }
+    wire->counters.commits_refused += fits ? 0u : 1u;
+    return fits;
+}
+
+/* Makes of the values that came the message that the peer sent. */
+static fcsl_wire_status_t make_message(named_wire_t *wire, const commit_t *commit, uint8_t *bytes, size_t capacity,
+                                       size_t *size)
+{
+    fcsl_message_t message = {0};
+    fcsl_message_status_t status = FCSL_MESSAGE_OK;
+    if (commit->direction == FCSL_SENSOR) {
+        status =
+            fcsl_message_encode_sensors(wire->table, wire->image, commit->tick, wire->fresh, bytes, capacity, &message);
+        wire->time_follows = status == FCSL_MESSAGE_OK;
+        wire->tick = commit->tick;
+        wire->time_ns = commit->time_ns;
+    } else {
+        status = fcsl_message_encode_actuators(wire->table, wire->image, commit->tick, commit->armed, bytes, capacity,
+                                               &message);
+    }
+    if (status != FCSL_MESSAGE_OK) {
+        (void)snprintf(wire->text, sizeof wire->text, "the values of tick %" PRIu64 ": %s", commit->tick,
+                       fcsl_message_status_text(status));
+        return FCSL_WIRE_ERROR;
+    }
+    *size = message.size;
+    return FCSL_WIRE_OK;
+}
+
+fcsl_wire_status_t named_take_commit(named_wire_t *wire, uint8_t *bytes, size_t capacity, size_t *size)
+{
+    commit_t commit;
+    size_t came = 0;
+    if (!fcsl_bus_take(wire->peer.bus, NAMED_COMMIT, wire->value, &came) || !read_commit(wire, came, &commit)) {
+        return FCSL_WIRE_NONE;
+    }
+    const fcsl_wire_status_t status = take_values(wire, &commit);
+    return status == FCSL_WIRE_NONE ? make_message(wire, &commit, bytes, capacity, size) : status;
+}
+
+fcsl_wire_status_t named_make_time(named_wire_t *wire, uint8_t *bytes, size_t capacity, size_t *size)
+{
+    fcsl_message_t message;
+    wire->time_follows = 0;
+    if (fcsl_message_encode_time(wire->table, wire->tick, wire->time_ns, bytes, capacity, &message) !=
+        FCSL_MESSAGE_OK) {
+        (void)snprintf(wire->text, sizeof wire->text, "no room for a time message");
+        return FCSL_WIRE_ERROR;
+    }
+    *size = message.size;
+    return FCSL_WIRE_OK;
+}
