@@ -2,7 +2,8 @@
 """A compiled machine as a ROS 2 lifecycle node.
 
     configure    finds and loads the machine, checks its messages, creates topics, parameters and services
-    activate     ticks: in lock-step with a simulator (lockstep_loop.py), or at tick_hz (realtime_loop.py)
+    activate     ticks: in lock-step with a simulator (lockstep_loop.py), at tick_hz (realtime_loop.py), or as /clock goes
+                 (clock_loop.py)
     deactivate   stops ticking; outputs, parameters and services stay; activate continues at the next tick
     cleanup      completes the bag, closes the machine, removes topics, parameters and services
 With `autostart`, the default, the node configures and activates itself, and ends with the run or with an error. Without
@@ -20,8 +21,9 @@ from lifecycle_msgs.srv import ChangeState
 from rclpy._rclpy_pybind11 import RCLError
 from rclpy.lifecycle import LifecycleNode, LifecycleState, TransitionCallbackReturn
 
+from .clock_loop import ClockLoop
 from .errors import BridgeError, Stopped
-from .hosted import BagNames, Hosted
+from .hosted import Hosted
 from .lockstep_loop import LockstepLoop
 from .node_main import (
     BAD_INPUT,
@@ -40,17 +42,24 @@ from .services import Allowed
 
 OPTIONS = (  # all read-only: callers of the node's services must not load libraries or write bags elsewhere
     Option("machine", str, "", "package/machine, or the path of a machine library"),
-    Option("mode", str, "lockstep", "lockstep (a simulator triggers the ticks) or realtime (the clock does)"),
-    Option("record", str, "", "the path of a new bag directory; later runs go to <record>_2, ..."),
+    Option(
+        "mode", str, "lockstep", "what triggers the ticks: lockstep (a simulator), realtime (time) or clock (/clock)"
+    ),
+    Option("record", str, "", "the path of a new bag directory; if it exists, <record>_2, ..."),
     Option("decimate", int, 1, "a whole number n: outputs are published each n-th tick"),
     Option("timeout_s", float, 5.0, "lockstep: seconds to wait for the simulator's next bundle"),
     Option("start_timeout_s", float, 60.0, "seconds to wait for the simulator's first bundle"),
+    Option("max_ticks_per_clock", int, 100, "clock: how many ticks one message of /clock makes at most"),
     Option("wait_for_subscribers", int, 0, "how many subscribers each topic needs before the first tick"),
     Option("autostart", bool, True, "whether the node configures and activates itself"),
     Option("allow_set_state", bool, False, "whether ~/set_state and ~/restore may be used"),
     Option("checkpoints", str, "", "folder of the files of ~/save and ~/restore; empty: no files"),
 )
-MODES = ("lockstep", "realtime")
+MODES: dict[str, type[LockstepLoop | RealtimeLoop | ClockLoop]] = {
+    "lockstep": LockstepLoop,
+    "realtime": RealtimeLoop,
+    "clock": ClockLoop,
+}
 _SUCCESS, _FAILURE, _ERROR = (
     TransitionCallbackReturn.SUCCESS,
     TransitionCallbackReturn.FAILURE,
@@ -68,11 +77,10 @@ class ControllerNode(LifecycleNode):
     def __init__(self, name: str, **arguments: Any):
         super().__init__(name, **arguments)
         self._hosted: Hosted | None = None
-        self._mode: RealtimeLoop | LockstepLoop | None = None
+        self._mode: LockstepLoop | RealtimeLoop | ClockLoop | None = None
         self._active = self._finalized = self._starting = False
         self._failure: Exception | None = None
         self._ending = "shut down"
-        self._bags = BagNames()
         self._given: dict[str, Any] = {}
         for service in self.services:
             if service.srv_type is ChangeState:
@@ -124,14 +132,13 @@ class ControllerNode(LifecycleNode):
     def _configure(self) -> None:
         options = self._options
         locked = options["mode"] == "lockstep"
-        faults = locked or bool(self.get_parameter("use_sim_time").value)
+        faults = options["mode"] != "realtime" or bool(self.get_parameter("use_sim_time").value)
         allowed = Allowed(
             options["allow_set_state"], leaving_tick=not locked, faults=faults, folder=options["checkpoints"]
         )
         try:
-            self._hosted = Hosted(self, options, self._given, self._bags, allowed)
-            running = LockstepLoop if locked else RealtimeLoop
-            self._mode = running(self, self._hosted, self._serve_active, options)
+            self._hosted = Hosted(self, options, self._given, allowed)
+            self._mode = MODES[options["mode"]](self, self._hosted, self._serve_active, options)
         except Exception:
             self._close()
             raise
@@ -244,8 +251,8 @@ def _check(options: dict[str, Any]) -> None:
     if not options["machine"]:
         raise BridgeError("parameter `machine` is missing: -p machine:=<package>/<machine>")
     if options["mode"] not in MODES:
-        raise BridgeError(f"parameter `mode` takes {' or '.join(MODES)}, got `{options['mode']}`")
-    positive(options, "decimate", "timeout_s", "start_timeout_s")
+        raise BridgeError(f"parameter `mode` takes {', '.join(MODES)}, got `{options['mode']}`")
+    positive(options, "decimate", "timeout_s", "start_timeout_s", "max_ticks_per_clock")
     not_negative(options, "wait_for_subscribers")
     if options["checkpoints"] and not Path(options["checkpoints"]).is_dir():
         raise BridgeError(f"parameter `checkpoints`: there is no folder {options['checkpoints']}")

@@ -30,6 +30,8 @@ _LEVELS = {
     InstanceHealth.STALE: DiagnosticStatus.STALE,
 }
 _PERIOD_S = 1.0
+#: Of ages in ticks, for all that are older.
+_OLDEST = 2**32 - 1
 _NS = 1_000_000_000
 Figures = Mapping[str, int | float | str]
 
@@ -97,6 +99,8 @@ class Diagnostics:
         counts = {"faults": faults, "overruns": overruns}
         faulted = faults > self._before.get(f"{name} faults", 0)
         grown = self._grown(name, counts)
+        if faulted:
+            self._node.get_logger().warning(f"{name}: {'; '.join([*grown, fault_place])}")
         level = _LEVELS[health]
         if grown and level == DiagnosticStatus.OK:
             level = DiagnosticStatus.WARN
@@ -111,7 +115,10 @@ class Diagnostics:
                 valid, age = (run.machine.fields[f"channels.{channel.name}.{what}"] for what in ("valid", "age_ticks"))
                 if not run.read(valid.offset, 1)[0]:
                     ticks = int.from_bytes(run.read(age.offset, age.size), sys.byteorder)
-                    lacks.append(f"{channel.name}: no sample for {ticks} ticks ({channel.max_age_ticks} allowed)")
+                    if ticks == _OLDEST:
+                        lacks.append(f"{channel.name}: its samples have stamps of another clock")
+                    else:
+                        lacks.append(f"{channel.name}: no sample for {ticks} ticks ({channel.max_age_ticks} allowed)")
         return lacks
 
     def _grown(self, whose: str, counts: Mapping[str, int]) -> list[str]:

@@ -6,8 +6,10 @@ lockstep_loop.py or realtime_loop.py runs the ticks.
 
 from __future__ import annotations
 
+import os
 from collections.abc import Mapping
 from contextlib import ExitStack, suppress
+from itertools import count
 from pathlib import Path
 from typing import Any
 
@@ -25,35 +27,18 @@ from .parameters import MachineParameters
 from .services import Allowed, MachineServices
 
 
-class BagNames:
-    """Names of the bags of a process: `flight`, then `flight_2`, `flight_3`, …, skipping existing ones."""
-
-    def __init__(self) -> None:
-        self._used: dict[str, int] = {}
-
-    def next(self, record: str) -> Path:
-        """The next name, the same until it is `taken`. The first name is not skipped if it exists."""
-        number = self._used.get(record, 0) + 1
-        while number > 1 and self._name(record, number).exists():
-            number += 1
-        return self._name(record, number)
-
-    def taken(self, record: str) -> None:
-        """Marks the last name of `next` as used."""
-        self._used[record] = self._used.get(record, 0) + 1
-
-    def _name(self, record: str, number: int) -> Path:
-        return Path(record if number == 1 else f"{record}_{number}")
+def next_bag(record: str) -> Path:
+    """The first of `flight`, `flight_2`, `flight_3`, … that does not exist."""
+    names = (Path(record if number == 1 else f"{record}_{number}") for number in count(1))
+    return next(name for name in names if not os.path.lexists(name))
 
 
 class Hosted:
     """Exists from configure to cleanup. `given`: machine parameters from the node's start. Raises BridgeError and
     TwinError, and then leaves nothing behind."""
 
-    def __init__(
-        self, node: Node, options: Mapping[str, Any], given: Mapping[str, Any], bags: BagNames, allowed: Allowed
-    ):
-        self._node, self._record, self._bags = node, options["record"], bags
+    def __init__(self, node: Node, options: Mapping[str, Any], given: Mapping[str, Any], allowed: Allowed):
+        self._node, self._record = node, options["record"]
         self._lossless = options["mode"] == "lockstep"
         self.bag: Path | None = None  #: the newest one, unless it failed
         self._recording = False
@@ -87,9 +72,8 @@ class Hosted:
         """Begins the bag of this run, if one is wanted and none is open."""
         if not self._record or self._recording:
             return
-        bag = self._bags.next(self._record)
+        bag = next_bag(self._record)
         self.run.record(bag, self._node.get_namespace().strip("/"), lossless=self._lossless)
-        self._bags.taken(self._record)
         self.bag, self._recording = bag, True
 
     def end_record(self) -> None:
@@ -111,13 +95,13 @@ class Hosted:
                 self.end_record()
 
     def show(self, tick: int, time_ns: int) -> None:
-        """Publishes the results of `tick`, the last completed one, stamped time_ns; also prints a transition."""
+        """Publishes the results of `tick`, the last completed one, stamped time_ns; also logs a transition."""
         self.outputs.publish(time_ns)
         event = self.topics.publish_changes(time_ns)
         if event is not None:
             cause = f" ({event.request} by {event.instance})" if event.request else ""
             time_s = self.run.machine.time_ns(tick + 1) / 1e9
-            print(f"{time_s:10.3f} s  {event.from_state} -> {event.to_state}{cause}", flush=True)
+            self._node.get_logger().info(f"{time_s:.3f} s  {event.from_state} -> {event.to_state}{cause}")
         self.topics.publish_outputs(tick, time_ns)
 
     def start_over(self) -> None:

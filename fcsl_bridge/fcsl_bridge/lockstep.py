@@ -8,7 +8,7 @@
     (answer waits on)   ◄── ALIVE k ── actuators                 alive(): the controller is not active
     reset(), send(0, …) sensors  ── TICK 0 of run r + 1 ──►          next() reports a new run
     end(k)              sensors  ── END k ──►                        next() returns None
-    Left is raised      ◄── END k ── actuators                                           end()
+    Left is raised      ◄── END k ── actuators                                           leave()
 
 Other received messages, the same at both ends:
     a bundle of an earlier run, or of a completed tick         dropped, counted (`dropped`); error if it differs from the first
@@ -45,8 +45,9 @@ ALIVE_PERIOD_S = 0.5
 #: A process that did not run for this long was itself stopped (Ctrl-Z, a debugger) and must not report a timeout, in s.
 _STOPPED_S = 0.5
 _RUN_MASK = 0xFFFFFFFF
-#: How long the last message may take to reach the other end, in s.
-_END_TIMEOUT = Duration(seconds=5)
+#: How long the last message of a run may take to reach the other end, and that of an end which is interrupted: the other one
+#: may have been killed, which DDS notices late.
+_END_TIMEOUT, _LEAVE_TIMEOUT = Duration(seconds=5), Duration(seconds=0.3)
 _NS = 1_000_000_000
 
 #: CDR: encapsulation; stamp, frame_id ("": length 1 and a NUL), tick, run, machine, kind, length of the message.
@@ -136,9 +137,9 @@ class _End:
         """Whether it is time for an ALIVE message."""
         return time.monotonic() - self._said >= ALIVE_PERIOD_S
 
-    def _say_end(self, tick: int, run: int) -> None:
+    def _say_end(self, tick: int, run: int, timeout: Duration) -> None:
         self._say(END, tick, run)
-        self._publisher.wait_for_all_acked(_END_TIMEOUT)
+        self._publisher.wait_for_all_acked(timeout)
 
     def _expect(self, timeout_s: float) -> None:
         """Starts the timeout for the other end."""
@@ -273,7 +274,11 @@ class SimulatorEnd(_End):
 
     def end(self, tick: int) -> None:
         """Sends END to the controller: there is no tick `tick`. Waits until it was received."""
-        self._say_end(tick, self.run)
+        self._say_end(tick, self.run, _END_TIMEOUT)
+
+    def leave(self, tick: int) -> None:
+        """The same in the middle of a run; does not wait for long."""
+        self._say_end(tick, self.run, _LEAVE_TIMEOUT)
 
 
 class ControllerEnd(_End):
@@ -332,7 +337,7 @@ class ControllerEnd(_End):
         if self._run is not None:
             self._say_alive(self.due, self._run)
 
-    def end(self) -> None:
-        """Sends END to the simulator: this end answers no further tick."""
+    def leave(self) -> None:
+        """Sends END to the simulator: this end answers no further tick. Does not wait for long."""
         if self._run is not None:
-            self._say_end(self.due, self._run)
+            self._say_end(self.due, self._run, _LEAVE_TIMEOUT)

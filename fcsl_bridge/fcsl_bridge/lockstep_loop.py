@@ -84,7 +84,7 @@ class LockstepLoop:
     def leave(self) -> None:
         """Makes a running simulator end at once instead of waiting for an answer."""
         if self._running:
-            self._end.end()
+            self._end.leave()
 
     def figures(self) -> Figures:
         return {"hal.repeated bundles": self._end.dropped}

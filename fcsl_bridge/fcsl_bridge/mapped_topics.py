@@ -23,11 +23,18 @@ from .polled import Polled
 _SAFE_WAIT_S = 0.2
 
 
+#: A topic that many publish by design: a receiver picks what it needs by frame.
+_SHARED = "tf2_msgs/msg/TFMessage"
+#: Stamps that lie this far from ROS time are of another clock, in ns.
+_OTHER_CLOCK_NS = 60_000_000_000
+
+
 class Inputs:
     """Sensor topics, polled. Of several messages since the last tick the newest is used; if it is refused, the one
     before."""
 
     def __init__(self, node: Node, run: Run):
+        self._node = node
         topics = [topic for topic in topics_of(run.machine) if topic.direction == "sensor"]
         ready = [(topic, Inlet(run, topic), message_class(topic.type)) for topic in topics]
         self._inlets = [_Input(t, inlet, Polled(node, kind, t.name, qos.SENSOR)) for t, inlet, kind in ready]
@@ -47,8 +54,22 @@ class Inputs:
         return self._counts(lambda reason: reason in _HARMLESS)
 
     def troubles(self) -> dict[str, int]:
-        """Numbers of refused messages, by reason."""
-        return self._counts(lambda reason: reason not in _HARMLESS)
+        """Numbers of refused messages, by reason; and how often a topic was found to have several publishers."""
+        for one in self._inlets:
+            one.contested += one.topic.type != _SHARED and self._node.count_publishers(one.name) > 1
+        contested = {f"hal.{one.topic.name} has several publishers": one.contested for one in self._inlets}
+        return self._counts(lambda reason: reason not in _HARMLESS) | contested
+
+    def warn_of_other_clocks(self, clock: str) -> None:
+        """Logs once for each topic whose stamps are far from ROS time, which is that of `clock`."""
+        for one in self._inlets:
+            if abs(one.behind_ns) > _OTHER_CLOCK_NS and not one.warned:
+                one.warned = True
+                direction = "before" if one.behind_ns > 0 else "after"
+                self._node.get_logger().warning(
+                    f"{one.name}: stamped {abs(one.behind_ns) / 1e9:.0f} s {direction} the time of this node, which is "
+                    f"that of {clock}: its sender has another clock"
+                )
 
     def _counts(self, wanted: Callable[[str], bool]) -> dict[str, int]:
         return {
@@ -70,7 +91,18 @@ _HARMLESS = ("taken", "superseded")
 class _Input:
     def __init__(self, topic: RosTopic, inlet: Inlet, polled: Polled):
         self.topic, self._inlet, self._polled = topic, inlet, polled
-        self._superseded = 0
+        self._superseded = self.contested = 0
+        self.warned = False
+
+    @property
+    def name(self) -> str:
+        """The topic's full name, remapped."""
+        return self._polled.topic
+
+    @property
+    def behind_ns(self) -> int:
+        """How far the newest stamp lay behind ROS time."""
+        return self._inlet.behind_ns
 
     def poll(self, now_ns: int, missing: frozenset[str]) -> None:
         waiting = self._polled.take_all()

@@ -43,7 +43,7 @@ _NAME_ERRORS = (InvalidNamespaceException, InvalidNodeNameException, InvalidTopi
 
 @dataclass(frozen=True)
 class Option:
-    """A node parameter. The parameter has the default's type; None means not given, of type `kind`.
+    """A node parameter of type `kind`. Without a default (None) the node has it where it is given.
 
     `settable`: may be set while the node runs, and the node handles that; others are read-only.
     """
@@ -107,20 +107,32 @@ def run_node(
         sys.stdout.flush()
         return status
     except DiagnosticError as error:
-        print(f"{error}\n{name}: error: the simulation has errors", file=sys.stderr)
+        print(error, file=sys.stderr)
+        _report(node, name, "the simulation has errors")
     except BAD_INPUT as error:
-        print(f"{name}: error: {error}", file=sys.stderr)
+        _report(node, name, str(error))
     except (*_ROS_ERRORS, *_NAME_ERRORS) as error:
-        print(f"{name}: error: ROS 2: {' '.join(str(error).split())}", file=sys.stderr)
+        _report(node, name, f"ROS 2: {' '.join(str(error).split())}")
     except BrokenPipeError:
         os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
     except OSError as error:
-        print(f"{name}: error: {error.filename or ''}: {error.strerror}", file=sys.stderr)
+        _report(node, name, f"{error.filename or ''}: {error.strerror}")
     finally:
+        # The end of one node makes a launch file interrupt the others, which may have just ended, too. Python keeps this
+        # until the process is over, but would bring back the default action, death, for a handler of its own.
+        signal.signal(signal.SIGINT, signal.SIG_IGN)
         if node is not None:
             node.destroy_node()
         rclpy.try_shutdown()
     return 1
+
+
+def _report(node: Node | None, name: str, text: str) -> None:
+    """Says on standard error what ends the process; the logger of a node says it on /rosout, too."""
+    if node is None:
+        print(f"{name}: error: {text}", file=sys.stderr)
+    else:
+        node.get_logger().fatal(text)
 
 
 def _help(name: str, options: Sequence[Option]) -> str:
@@ -182,9 +194,9 @@ def _declare(node: Node, option: Option) -> Any:
     if node.has_parameter(option.name):
         value = _checked(option, node.get_parameter(option.name).value)
         node.undeclare_parameter(option.name)
-    descriptor = ParameterDescriptor(
-        description=option.doc, read_only=not option.settable, dynamic_typing=option.default is None
-    )
+    elif value is None:
+        return None  # `ros2 param dump` writes a parameter without a value in a way that rcl cannot read
+    descriptor = ParameterDescriptor(description=option.doc, read_only=not option.settable)
     node.declare_parameter(option.name, value, descriptor, ignore_override=True)
     return value
 

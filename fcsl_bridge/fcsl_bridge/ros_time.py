@@ -2,8 +2,8 @@
 """ROS time at an instant of CLOCK_MONOTONIC, the clock that ticks are based on.
 
 Both clocks run at the same rate, so their offset is constant until the system clock is set (a robot without a battery
-for its clock gets the time from the network after the start). With use_sim_time (as set when the node was configured),
-ROS time is that of the last /clock message, which is polled, because callbacks run too rarely.
+for its clock gets the time from the network after the start). Simulated ROS time is that of the last /clock message, which
+is polled, because callbacks run too rarely.
 """
 
 from __future__ import annotations
@@ -27,11 +27,11 @@ _NS = 1_000_000_000
 
 
 class RosTime:
-    """Of a node."""
+    """Of a node. `simulated`: that of /clock, instead of the system's clock."""
 
-    def __init__(self, node: Node):
+    def __init__(self, node: Node, simulated: bool):
         self._clock = node.get_clock()
-        simulated = node.get_parameter("use_sim_time").value
+        self.simulated = simulated
         self._simulated = Polled(node, Clock, "/clock", qos.SENSOR) if simulated else None
         self._simulated_ns = self._offset_ns = 0
         self.sets = 0  #: how often follow() detected that the system clock was set
@@ -53,6 +53,11 @@ class RosTime:
                 seconds, nanoseconds = _CLOCK.unpack_from(said)
                 self._simulated_ns = seconds * _NS + nanoseconds
         return self._simulated_ns
+
+    def wait(self, timeout_s: float) -> None:
+        """Returns when a message of /clock may have come, or after timeout_s."""
+        assert self._simulated is not None
+        self._simulated.wait(timeout_s)
 
     def follow(self) -> None:
         """Adopts a system clock that was set by more than _SET_NS; call it occasionally."""

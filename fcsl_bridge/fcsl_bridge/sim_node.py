@@ -16,6 +16,7 @@ import signal
 import struct
 import sys
 from collections.abc import Mapping
+from contextlib import suppress
 from fractions import Fraction
 from typing import Any
 
@@ -96,7 +97,8 @@ class Simulator:
             print(self._progress.summary(f"interrupted at tick {self._tick}"))
             return 128 + (self._stop.signal or signal.SIGINT)
         self._clock.wait_for_all_acked(_END_TIMEOUT)
-        self._control.end()
+        with suppress(Stopped):  # nothing is left to interrupt
+            self._control.end()
         until = all(vehicle.sim.status == "until" for vehicle in self._vehicles)
         print(self._progress.summary("the stop condition held" if until else "the duration is over"))
         return 0

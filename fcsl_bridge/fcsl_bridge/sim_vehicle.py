@@ -65,7 +65,7 @@ class Vehicle:
     def leave(self) -> None:
         """Sends END to the controller: no further tick follows the last sent one."""
         if self.running:
-            self._end.end(self.sim.tick + 1)
+            self._end.leave(self.sim.tick + 1)
 
     def reset(self) -> None:
         """Back to tick 0, in a new run."""

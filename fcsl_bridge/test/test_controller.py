@@ -24,11 +24,12 @@ from controller_client import (
     figures,
 )
 from diagnostic_msgs.msg import DiagnosticArray, DiagnosticStatus
+from rcl_interfaces.msg import Log
 from rclpy.serialization import deserialize_message
 
 from fcsl_bridge import qos
 from fcsl_bridge.interfaces import instance_class
-from fcsl_bridge.lockstep import END
+from fcsl_bridge.lockstep import ALIVE, END
 from fcsl_msgs.msg import Checkpoint, MachineState
 from fcsl_msgs.srv import InjectFault, Restore, Save, SetState
 from simclient import AlgTwin
@@ -86,15 +87,28 @@ def test_a_manager_leads_the_node_through_its_states(domain: Domain) -> None:
     assert process.finish() == 0
 
 
-def test_a_bag_that_exists_is_never_gone_round(domain: Domain, library: Path) -> None:
+def test_a_node_that_is_started_again_begins_the_next_bag(domain: Domain, library: Path) -> None:
+    """A robot's controller flies on, whoever starts it again; what exists is left alone."""
     bag = domain.folder / "bag"
-    bag.mkdir()
+    bag.write_text("mine")
+    for name in ("bag_2", "bag_3", "bag_4"):
+        process, client = free(domain, library, record=bag)
+        client.diagnosed()
+        number = signal.SIGKILL if name == "bag_2" else signal.SIGINT
+        process.signal(number)
+        assert process.finish() == (-number if number == signal.SIGKILL else 0)
+        assert sorted(path.name for path in domain.folder.glob("bag*"))[-1] == name
+    assert bag.read_text() == "mine"
+
+
+def test_a_bag_that_cannot_be_begun(domain: Domain, library: Path) -> None:
+    """The node stays inactive, and may be activated later."""
+    bag = domain.folder / "later" / "bag"
     process, client = free(domain, library, autostart=False, record=bag)
     assert client.change(CONFIGURE)
     for _ in range(2):
-        assert not client.change(ACTIVATE)
-        assert client.state == "inactive" and not Path(f"{bag}_2").exists()
-    bag.rmdir()
+        assert not client.change(ACTIVATE) and client.state == "inactive"
+    bag.parent.mkdir()
     assert client.change(ACTIVATE) and bag.is_dir()
     process.signal(signal.SIGINT)
     assert process.finish() == 0
@@ -224,6 +238,26 @@ def test_cycles_leave_nothing_behind(domain: Domain, library: Path) -> None:
     assert more_memory - memory < 2000 + 4 * CYCLES, "kilobytes"
 
 
+def test_rosout_has_transitions_and_what_ended_the_node(domain: Domain, library: Path) -> None:
+    """Of a node that was there for long enough to be known."""
+    process, _, sim = locked(domain, timeout_s=60.0)
+    sim.listener.subscribe(Log, "/rosout", qos.LATCHED_HISTORY)
+    said = sim.listener.received["/rosout"]
+
+    def until_said(text: str) -> None:
+        sim.listener.until(lambda: any(text in deserialize_message(message, Log).msg for message in said))
+
+    sim.send(0, b"", kind=ALIVE)
+    until_said("the simulator is there")
+    sim.send(1, b"", run=2)
+    until_said("waiting for tick 0 from the simulator")
+    sim.publisher.publish(b"\0" * 8)
+    until_said("a damaged bundle")
+    assert process.finish() == 1
+    domain.start("controller_node", machine=library, mode="realtime")
+    until_said("IDLE -> FLY")
+
+
 # ---- a new run -------------------------------------------------------------------------------------------------------
 
 
@@ -280,7 +314,7 @@ def test_set_state(domain: Domain, library: Path) -> None:
     client._listener.until(lambda: bool(states) and deserialize_message(states[-1], MachineState).state == "FLY")
     process.signal(signal.SIGINT)
     assert process.finish() == 0
-    assert "s  IDLE -> FLY" in process.out, "it prints its transitions"
+    assert "s  IDLE -> FLY" in process.err, "it logs its transitions"
     assert replay(bag, library=str(library)).identical
 
 

@@ -8,6 +8,7 @@ import re
 import signal
 import subprocess
 import sys
+import time
 from collections.abc import Callable, Iterator
 from pathlib import Path
 
@@ -50,7 +51,7 @@ def test_flight_is_that_of_one_process(domain: Domain, reference: Callable[[int,
     assert digest(bag) == digest(reference(SEED, DURATION)) != digest(reference(SEED + 1, DURATION))
     controller_node, sim_node = domain.processes
     assert f"{TICKS} ticks answered" in sim_node.out
-    assert "6.750 s  ASCENT -> COAST (START_COAST by ascent)" in controller_node.out
+    assert "6.750 s  ASCENT -> COAST (START_COAST by ascent)" in controller_node.err
     assert f"the simulator ended the run: {TICKS} ticks" in controller_node.out
 
 
@@ -60,7 +61,7 @@ def test_flight_under_load_and_in_a_namespace(
     """With a change of state: load must not change requests and transitions either."""
     bag, sim, controller = fly(domain, "-r", "__ns:=/fleet/one", duration=DURATION)
     assert (sim, controller) == (0, 0), [p.err for p in domain.processes]
-    assert "ASCENT -> COAST" in domain.processes[0].out
+    assert "ASCENT -> COAST" in domain.processes[0].err
     assert digest(bag) == digest(reference(SEED, DURATION))
     assert "/fleet/one/lander_control/engine" in Bag(bag).topics
 
@@ -107,8 +108,8 @@ def test_a_lost_bundle_is_named(domain: Domain, topic: str, missed: int) -> None
     """`missed`: the tick whose sensors the controller never receives."""
     controller, sim = start_relayed(domain, topic, "drop", PATIENCE_S)
     assert (sim.finish(), controller.finish()) == (1, 1)
-    assert f"sim_node: error: no actuator bundle of tick 17 from the controller within {PATIENCE_S} s" in sim.err
-    said = f"controller_node: error: no sensor bundle of tick {missed} from the simulator within {PATIENCE_S} s"
+    assert f"no actuator bundle of tick 17 from the controller within {PATIENCE_S} s" in sim.err
+    said = f"no sensor bundle of tick {missed} from the simulator within {PATIENCE_S} s"
     assert said in controller.err
 
 
@@ -190,7 +191,35 @@ def test_interrupted_controller(domain: Domain, number: int) -> None:
     assert controller.finish() == 0
     said = re.search(r"interrupted: (\d+) ticks", controller.out)
     assert said and Bag(bag).topics["/lander_control/engine"].count == int(said[1])
-    assert not controller.err and not Bag(bag).truncated
+    assert "ERROR" not in controller.err and not Bag(bag).truncated
+
+
+@pytest.mark.parametrize("killed", ["sim_node", "controller_node"])
+def test_interrupted_after_the_other_end_was_killed(domain: Domain, killed: str) -> None:
+    """It does not wait for a node that is gone: DDS would for seconds."""
+    controller = domain.start("controller_node", machine=MACHINE, timeout_s=60.0)
+    sim = domain.start("sim_node", sim=SIM, seed=SEED, timeout_s=60.0)
+    controller.wait_for("ASCENT -> COAST")
+    dead, other = (sim, controller) if killed == "sim_node" else (controller, sim)
+    dead.signal(signal.SIGKILL)
+    dead.finish()
+    began = time.monotonic()
+    other.signal(signal.SIGINT)
+    assert other.finish() == (0 if other is controller else 128 + signal.SIGINT)
+    assert time.monotonic() - began < 4.0
+
+
+def test_interrupted_after_the_flight(domain: Domain) -> None:
+    """As launch does to all nodes when one ends: the flight was a success, and so is each node's end."""
+    controller = domain.start("controller_node", machine=MACHINE, timeout_s=60.0)
+    sim = domain.start("sim_node", sim=SIM, seed=SEED, timeout_s=60.0, duration=1.0)
+    controller.wait_for("the simulator ended the run")
+    sim.wait_for("the duration is over")
+    while any(node.process.poll() is None for node in (controller, sim)):
+        for node in (controller, sim):
+            node.signal(signal.SIGINT)
+        time.sleep(0.002)
+    assert (controller.finish(), sim.finish()) == (0, 0), controller.err + sim.err
 
 
 @pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGTERM])

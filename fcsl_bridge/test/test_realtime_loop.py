@@ -46,18 +46,15 @@ class Robot:
         self._imu = self.listener.node.create_publisher(Imu, "/imu/data", qos.STREAM)
         self.listener.subscribe(Float64, "/motor/torque", qos.COMMAND)
         self.torques = self.listener.received["/motor/torque"]
-        self.process: Process = domain.start(
-            "controller_node",
-            machine=library,
-            mode="realtime",
-            record=self.bag,
-            allow_set_state=True,
-            checkpoints=self.bag.parent,
-            **parameters,
-        )
+        given = {"mode": "realtime", "allow_set_state": True, "checkpoints": self.bag.parent, **parameters}
+        self.process: Process = domain.start("controller_node", machine=library, record=self.bag, **given)
         self.client = ControllerClient(self.listener)
         assert self.client.call(SetState, "set_state", state="FLY").success
-        self.listener.until(lambda: self._imu.get_subscription_count() == 1 and bool(self.torques))
+        self.listener.until(lambda: self._imu.get_subscription_count() == 1)
+        self.wait_for_torque()
+
+    def wait_for_torque(self) -> None:
+        self.listener.until(lambda: bool(self.torques))
 
     def sense(self, rate: float, stamp_ns: int | None = None, frame: str = "imu_link") -> None:
         """Publishes a sample about the z axis, stamped now by default."""
@@ -279,4 +276,36 @@ def test_sensors_of_a_simulator_are_as_new_as_its_clock(domain: Domain, library:
     robot.listener.until(lambda: robot.torque() == 200.25)
     shown = figures(robot.client.diagnosed(2)[1]["rig"])
     assert "hal.imu/data future" not in shown and int(shown["hal.imu/data taken"]) > 100
+    assert robot.end() == 0
+
+
+def test_a_clock_of_another_speed_is_told(domain: Domain, library: Path) -> None:
+    """A bag at 3 times real time: the machine's time is not that of /clock."""
+    robot = Robot(domain, library, use_sim_time=True)
+    clock = robot.listener.node.create_publisher(Clock, "/clock", qos.STREAM)
+    began_ns = time.monotonic_ns()
+    while "the machine's time is not that of /clock. With mode:=clock it is" not in robot.process.err:
+        clock.publish(Clock(clock=Time(nanoseconds=NS + 3 * (time.monotonic_ns() - began_ns)).to_msg()))
+        time.sleep(1 / HZ)
+        assert robot.process.process.poll() is None
+    status = robot.client.diagnosed()[0]["rig"]
+    assert int(figures(status)["times /clock and ticks parted"]) >= 1
+    assert robot.end() == 0
+
+
+@pytest.mark.parametrize(("stamp_ns", "direction"), [(2 * NS, "before"), (2_100_000_000 * NS, "after")])
+def test_stamps_of_another_clock_are_told(robot: Robot, stamp_ns: int, direction: str) -> None:
+    """A driver that counts from its start; and one whose date is wrong."""
+    robot.sense(1.0, stamp_ns)
+    robot.process.wait_for(f"s {direction} the time of this node, which is that of the system's clock")
+    if direction == "before":
+        while "its samples have stamps of another clock" not in robot.client.diagnosed()[0]["rig: imu"].message:
+            pass
+    assert robot.end() == 0
+
+
+def test_a_second_publisher_of_a_sensor_is_told(robot: Robot) -> None:
+    robot.listener.node.create_publisher(Imu, "/imu/data", qos.STREAM)
+    while "hal.imu/data has several publishers" not in robot.client.diagnosed()[0]["rig"].message:
+        pass
     assert robot.end() == 0

@@ -191,7 +191,7 @@ def test_full_disk_in_lockstep(domain: Domain) -> None:
     controller = limited(domain, 150, [f"machine:={MACHINE}", f"record:={bag}"])
     sim = domain.start("sim_node", sim=SIM, seed=SEED, timeout_s=3.0)
     assert controller.finish() == 1
-    assert "controller_node: error: recording failed: cannot write to bag" in controller.err
+    assert "recording failed: cannot write to bag" in controller.err
     assert sim.finish() == 1 and "controller" in sim.err
     library, _ = find_machine(MACHINE)
     assert check_what_is_left(bag, library) > 0
@@ -205,4 +205,4 @@ def test_the_bag_is_taken_away(domain: Domain, library: Path) -> None:
     shutil.rmtree(bag)
     process.signal(signal.SIGINT)
     assert process.finish() == 1
-    assert f"controller_node: error: cannot write '{bag}/.metadata.yaml.tmp': No such file" in process.err
+    assert f"cannot write '{bag}/.metadata.yaml.tmp': No such file" in process.err

@@ -144,7 +144,7 @@ def test_nonsense_on_the_topic_ends_the_run(domain: Domain, data: bytes) -> None
         sim.tick()
     sim.publisher.publish(data)
     assert controller.finish() == 1
-    assert "controller_node: error: a damaged bundle" in controller.err
+    assert "a damaged bundle" in controller.err
     assert Bag(domain.folder / "bag").topics["/lander_control/engine"].count == 3
     assert SENSORS == sim.publisher.topic_name
 

@@ -275,7 +275,7 @@ def test_a_controller_that_leaves_ends_the_flight_at_once(domain: Domain) -> Non
     times = clock_times(domain, client)
     client._listener.until(lambda: len(times) > 20)
     controller.signal(signal.SIGINT)
-    assert sim.finish() == 1 and "sim_node: error: the controller ended the run: it does not answer tick" in sim.err
+    assert sim.finish() == 1 and "the controller ended the run: it does not answer tick" in sim.err
     assert controller.finish() == 0
 
 
@@ -341,7 +341,7 @@ def test_the_vehicle_that_fails_is_named(domain: Domain) -> None:
     for process in (first, second):
         process.wait_for("ASCENT -> COAST")
     second.signal(signal.SIGKILL)
-    assert sim.finish() == 1 and "sim_node: error: two: no actuator bundle of tick" in sim.err
+    assert sim.finish() == 1 and "two: no actuator bundle of tick" in sim.err
 
 
 @pytest.mark.parametrize(
@@ -349,7 +349,7 @@ def test_the_vehicle_that_fails_is_named(domain: Domain) -> None:
     [
         ({"vehicles": "[one, one]"}, "names a namespace twice"),
         ({"vehicles": "[one, /]"}, "holds namespaces, such as [one, two]"),
-        ({"vehicles": "['no space']"}, "error: ROS 2:"),
+        ({"vehicles": "['no space']"}, "ROS 2:"),
         ({"speed": -1.0}, "`speed` must be zero or above"),
         ({"speed": ".nan"}, "`speed` must be zero or above"),
         ({"speed": "fast"}, "parameter `speed` takes"),

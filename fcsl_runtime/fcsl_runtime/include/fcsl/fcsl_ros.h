@@ -185,6 +185,9 @@ uint32_t fcsl_ros_deliver(fcsl_ros_inlet_t *inlet, const uint8_t *cdr, size_t si
 /* FCSL_ROS_STATUSES counts: of messages of which something was taken, and of messages and values refused, by reason. */
 const uint64_t *fcsl_ros_inlet_counts(const fcsl_ros_inlet_t *inlet);
 
+/* How far the stamp of the newest readable message lay behind its `now_ns` (negative: ahead); 0 where it had no stamp. */
+int64_t fcsl_ros_inlet_behind_ns(const fcsl_ros_inlet_t *inlet);
+
 /* ---- out of memory -------------------------------------------------------------------------------------------------- */
 
 typedef struct {

@@ -16,6 +16,7 @@ struct fcsl_ros_inlet {
     uint8_t *status;
     uint8_t *row;
     int64_t last_ns; /* stamp of the last message taken, 0: none was */
+    int64_t behind_ns;
     uint64_t counts[FCSL_ROS_STATUSES];
 };
 
@@ -72,6 +73,11 @@ void fcsl_ros_inlet_free(fcsl_ros_inlet_t *inlet)
 const uint64_t *fcsl_ros_inlet_counts(const fcsl_ros_inlet_t *inlet)
 {
     return inlet->counts;
+}
+
+int64_t fcsl_ros_inlet_behind_ns(const fcsl_ros_inlet_t *inlet)
+{
+    return inlet->behind_ns;
 }
 
 /* Whole ticks that last this many nanoseconds; as many as an age can say when there are more. */
@@ -135,6 +141,7 @@ uint32_t fcsl_ros_deliver(fcsl_ros_inlet_t *inlet, const uint8_t *cdr, size_t si
     int64_t stamp_ns = 0;
     fcsl_ros_status_t status = fcsl_ros_read(inlet->reader, cdr, size, inlet->row, inlet->status, &stamp_ns);
     if (status == FCSL_ROS_TAKEN) {
+        inlet->behind_ns = stamp_ns == 0 ? 0 : now_ns - stamp_ns;
         status = check_time(inlet, stamp_ns, now_ns);
     }
     if (status != FCSL_ROS_TAKEN) {

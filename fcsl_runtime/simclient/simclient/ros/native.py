@@ -159,6 +159,7 @@ _PROTOTYPES: dict[str, tuple[type | None, list[type]]] = {
     "fcsl_ros_inlet_free": (None, [ptr]),
     "fcsl_ros_deliver": (c_uint32, [ptr, c_char_p, c_size_t, c_int64, c_char_p]),
     "fcsl_ros_inlet_counts": (POINTER(c_uint64), [ptr]),
+    "fcsl_ros_inlet_behind_ns": (c_int64, [ptr]),
     "fcsl_ros_composer_new": (ptr, [POINTER(CComposerPlan), _ERROR]),
     "fcsl_ros_composer_free": (None, [ptr]),
     "fcsl_ros_compose": (c_int, [ptr, POINTER(ptr), c_int64, ptr]),

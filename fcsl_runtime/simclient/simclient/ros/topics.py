@@ -93,3 +93,9 @@ class Inlet:
         """Accepted messages, and refused messages or values by reason (REASONS); zero counts are left out."""
         counts = self._counts(self._handle)
         return {reason: counts[i] for i, reason in enumerate(REASONS) if i == 0 or counts[i]}
+
+    @property
+    def behind_ns(self) -> int:
+        """How far the stamp of the newest readable message lay behind its `now_ns` (negative: ahead), in ns; 0 where it
+        had no stamp."""
+        return int(native.library().fcsl_ros_inlet_behind_ns(self._handle))

@@ -1,0 +1,46 @@
+# SPDX-License-Identifier: Apache-2.0
+"""Runs a machine on /clock: a message of it makes the ticks due whose time has come (clock_ticks.py).
+
+So every tick stands for one period of that clock, however fast it runs: a bag at 3 times real time, Gazebo at 0.7. A tick
+is stamped with the time at which it was due. All ticks that one message makes due find the sensors' newest messages.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping
+from typing import Any
+
+from rclpy.node import Node
+
+from .clock_ticks import ClockTicks
+from .free_running import FreeRunning
+from .hosted import Hosted
+from .polled import SERVE_PERIOD_S
+
+
+class ClockLoop(FreeRunning):
+    """Before the first message of /clock there is no tick."""
+
+    def __init__(self, node: Node, hosted: Hosted, serve: Callable[[], None], options: Mapping[str, Any]):
+        super().__init__(node, hosted, serve, simulated=True)
+        self._ticks = ClockTicks(hosted.run.machine.tick_hz, options["max_ticks_per_clock"])
+
+    def _start(self) -> None:
+        self._ticks.start()
+
+    def run(self) -> None:
+        """Ticks until `serve` raises."""
+        seen_ns = self.now_ns()
+        while True:
+            self._serve()
+            self._diagnose()
+            self._time.wait(SERVE_PERIOD_S)
+            now_ns = self.now_ns()
+            if now_ns != seen_ns:
+                seen_ns = now_ns
+                for due_ns in self._ticks.until(now_ns):
+                    self._tick(due_ns, now_ns)
+
+    def troubles(self) -> dict[str, int]:
+        ticks = {"ticks skipped": self._ticks.skipped, "/clock set back": self._ticks.set_back}
+        return {**ticks, **super().troubles()}

@@ -1,0 +1,91 @@
+# SPDX-License-Identifier: Apache-2.0
+"""What running on a robot's topics has in common, whatever makes a tick due: realtime_loop.py, clock_loop.py.
+
+The thread that steps does all other work in the slack between ticks; no callback causes a tick. Stamps are ROS time, in
+topics and in the bag. Tick numbers count steps: a tick that was skipped is none.
+"""
+
+from __future__ import annotations
+
+import gc
+import time
+from collections.abc import Callable
+
+from rclpy.node import Node
+
+from .diagnostics import Figures
+from .hosted import Hosted
+from .mapped_topics import Inputs
+from .ros_time import RosTime
+
+
+class FreeRunning:
+    """`serve` runs the node's other callbacks, and raises what ends the ticking. `simulated`: ROS time is that of /clock."""
+
+    def __init__(self, node: Node, hosted: Hosted, serve: Callable[[], None], simulated: bool):
+        self._node, self._hosted, self._serve = node, hosted, serve
+        self._inputs = Inputs(node, hosted.run)
+        self._time = RosTime(node, simulated)
+        self._stamp_ns = 0
+        hosted.sources.append(self)
+        hosted.run.time_executes()
+        unmapped = [c.name for c in hosted.run.machine.channels if c.direction == "sensor" and not c.ros_type]
+        if unmapped:
+            node.get_logger().warning(
+                f"nothing fills {', '.join(unmapped)}: outside lock-step a sensor channel needs `ros`"
+            )
+
+    def activate(self) -> None:
+        """Publishes the latched topics; ticks become due from now on."""
+        self._time.start()
+        self._stamp_ns = self.now_ns()
+        self._hosted.run.record_time(self._stamp_ns)
+        self._hosted.record()
+        self._hosted.topics.publish_latched(self._stamp_ns)
+        self._inputs.forget()
+        gc.unfreeze()
+        gc.collect()
+        gc.freeze()  # the garbage collector ignores objects that exist now
+        self._start()
+
+    def _start(self) -> None:
+        """The first tick is due now, or with what makes ticks due."""
+        raise NotImplementedError
+
+    def _tick(self, stamp_ns: int, now_ns: int) -> None:
+        """Makes the tick that was due at stamp_ns, with what came until now_ns; both in ROS time."""
+        hosted, self._stamp_ns = self._hosted, stamp_ns
+        tick = hosted.run.tick
+        hosted.run.record_time(stamp_ns)
+        self._inputs.poll(now_ns, hosted.dropouts.missing())
+        hosted.run.step(1)
+        hosted.show(tick, stamp_ns)
+
+    def _diagnose(self) -> None:
+        """Once per second, in the slack."""
+        if self._hosted.diagnostics.due():
+            self._hosted.check_record()
+            self._time.follow()
+            self._inputs.warn_of_other_clocks("/clock" if self._time.simulated else "the system's clock")
+            self._hosted.diagnostics.publish(self._stamp_ns)
+
+    def rest(self) -> None:
+        """While inactive there is nothing to do."""
+
+    def now_ns(self) -> int:
+        """The time that a message of now is stamped with."""
+        return self._time.at(time.monotonic_ns())
+
+    def leave(self) -> None:
+        """Nothing to do: no simulator waits for this node."""
+
+    def figures(self) -> Figures:
+        return self._inputs.figures()
+
+    def troubles(self) -> dict[str, int]:
+        return {"system clock set": self._time.sets, **self._inputs.troubles()}
+
+    def close(self) -> None:
+        gc.unfreeze()
+        self._inputs.close()
+        self._time.close()
