@@ -222,6 +222,7 @@ class ControllerNode(LifecycleNode):
             try:
                 self._mode.run()
                 self._ending = "the simulator ended the run"
+                self._hosted.topics.wait_for_receivers()
                 if self._options["autostart"]:
                     return
                 self._hosted.end_record()

@@ -23,12 +23,15 @@ from simclient.run import Run
 
 from . import qos
 from .interfaces import instance_class
+from .node_main import wait_for_receivers
 
 #: Latched topics, and their types.
 _LATCHED = {"state": MachineState, "health": InstanceHealth, "faults": FaultCounters}
 _STAMP = struct.Struct("<iI")
 _STAMP_OFFSET = 4
 _NS = 1_000_000_000
+#: For the receivers of the last messages of a run, in s.
+_END_S = 5.0
 #: Encapsulation, stamp, empty frame_id and tick: the part that differs between messages with equal content.
 _HEAD_BYTES = 4 + 8 + 8 + 8
 
@@ -76,6 +79,10 @@ class MachineTopics:
         if tick % self._decimation == 0:
             for index, publisher in self._outputs:
                 publisher.publish(_stamped(self._run.message(index), time_ns))
+
+    def wait_for_receivers(self) -> None:
+        """Returns when all have what was published, or after a time: a publisher that is destroyed sends nothing again."""
+        wait_for_receivers(self.all, _END_S)
 
     def close(self) -> None:
         for publisher in self.all:

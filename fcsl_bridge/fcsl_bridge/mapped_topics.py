@@ -5,11 +5,9 @@ published topics.
 
 from __future__ import annotations
 
-import time
 from collections.abc import Callable
 from typing import Any
 
-from rclpy.duration import Duration
 from rclpy.node import Node
 
 from simclient.ros.topics import Inlet, RosTopic, composer_of, topics_of
@@ -17,6 +15,7 @@ from simclient.run import Run
 
 from . import qos
 from .interfaces import message_class
+from .node_main import wait_for_receivers
 from .polled import Polled
 
 #: For all receivers together to have the last commands.
@@ -146,9 +145,7 @@ class Outputs:
         if self._run.safe_address is None:
             return
         self._publish(self._run.safe_address, time_ns)
-        deadline = time.monotonic() + _SAFE_WAIT_S
-        for _, _, publisher in self._outlets:
-            publisher.wait_for_all_acked(Duration(seconds=max(deadline - time.monotonic(), 0.0)))
+        wait_for_receivers((publisher for _, _, publisher in self._outlets), _SAFE_WAIT_S)
 
     def _publish(self, address: int, time_ns: int) -> None:
         for _, composer, publisher in self._outlets:

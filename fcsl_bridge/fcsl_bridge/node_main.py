@@ -9,7 +9,7 @@ import os
 import signal
 import sys
 import time
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass
 from types import FrameType
 from typing import Any
@@ -17,6 +17,7 @@ from typing import Any
 import rclpy
 from rcl_interfaces.msg import ParameterDescriptor
 from rclpy._rclpy_pybind11 import RCLError, RCLInvalidROSArgsError, UnknownROSArgsError
+from rclpy.duration import Duration
 from rclpy.exceptions import InvalidNamespaceException, InvalidNodeNameException, InvalidTopicNameException
 from rclpy.node import Node
 from rclpy.parameter import Parameter
@@ -227,6 +228,13 @@ def not_negative(options: dict[str, Any], *names: str) -> None:
         value = options[name]
         if value is not None and not value >= 0:
             raise BridgeError(f"parameter `{name}` must not be negative, got {value}")
+
+
+def wait_for_receivers(publishers: Iterable[Publisher], timeout_s: float) -> None:
+    """Returns once the subscribers of each publisher have all messages, or after `timeout_s` for all of them together."""
+    deadline = time.monotonic() + timeout_s
+    for publisher in publishers:
+        publisher.wait_for_all_acked(Duration(seconds=max(deadline - time.monotonic(), 0.0)))
 
 
 def wait_for_subscribers(publishers: Sequence[Publisher], count: int, timeout_s: float, stop: Stop) -> None:

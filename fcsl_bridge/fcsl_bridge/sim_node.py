@@ -20,7 +20,6 @@ from contextlib import suppress
 from fractions import Fraction
 from typing import Any
 
-from rclpy.duration import Duration
 from rclpy.node import Node
 from rosgraph_msgs.msg import Clock
 
@@ -28,7 +27,16 @@ from fcsl_sim.config import SimConfig, load
 
 from . import qos
 from .errors import BridgeError, Stopped
-from .node_main import Option, Stop, not_negative, positive, read_options, run_node, wait_for_subscribers
+from .node_main import (
+    Option,
+    Stop,
+    not_negative,
+    positive,
+    read_options,
+    run_node,
+    wait_for_receivers,
+    wait_for_subscribers,
+)
 from .polled import Housekeeping
 from .sim_control import Control, Reset, speed_problem
 from .sim_progress import Progress
@@ -50,8 +58,8 @@ OPTIONS = (
 _CLOCK = struct.Struct("<4siI")
 _ENCAPSULATION = b"\x00\x01\x00\x00"
 _NS = 1_000_000_000
-#: How long the last /clock may take to reach all subscribers, in s.
-_END_TIMEOUT = Duration(seconds=5)
+#: How long the last /clock and truth may take to reach all subscribers, in s.
+_END_S = 5.0
 
 
 class Simulator:
@@ -96,7 +104,7 @@ class Simulator:
                 vehicle.leave()
             print(self._progress.summary(f"interrupted at tick {self._tick}"))
             return 128 + (self._stop.signal or signal.SIGINT)
-        self._clock.wait_for_all_acked(_END_TIMEOUT)
+        wait_for_receivers((self._clock, *truth), _END_S)
         with suppress(Stopped):  # nothing is left to interrupt
             self._control.end()
         until = all(vehicle.sim.status == "until" for vehicle in self._vehicles)

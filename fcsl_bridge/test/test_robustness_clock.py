@@ -21,14 +21,10 @@ class SystemClock:
     """A node whose clock can be set, and whose answers can be delayed."""
 
     def __init__(self) -> None:
-        self.ahead_ns, self.delay_s, self.simulated = DAY_NS, 0.0, False
+        self.ahead_ns, self.delay_s = DAY_NS, 0.0
 
     def get_clock(self) -> Any:
         return self
-
-    def get_parameter(self, name: str) -> Any:
-        assert name == "use_sim_time"
-        return SimpleNamespace(value=self.simulated)
 
     def now(self) -> Any:
         time.sleep(self.delay_s)
@@ -43,7 +39,7 @@ def error_ns(ros: RosTime, clock: SystemClock) -> int:
 @pytest.mark.parametrize("step_ns", [2 * MS, -2 * MS, 20_000 * DAY_NS, -DAY_NS // 2])
 def test_a_clock_that_is_set_is_followed(step_ns: int) -> None:
     clock = SystemClock()
-    ros = RosTime(clock)
+    ros = RosTime(clock, simulated=False)
     assert error_ns(ros, clock) < MS
     clock.ahead_ns += step_ns
     assert error_ns(ros, clock) > MS, "detected only by follow()"
@@ -57,7 +53,7 @@ def test_a_clock_that_is_set_is_followed(step_ns: int) -> None:
 
 def test_a_process_that_was_held_up_does_not_take_that_for_a_set_clock() -> None:
     clock = SystemClock()
-    ros = RosTime(clock)
+    ros = RosTime(clock, simulated=False)
     clock.delay_s = 0.05
     ros.follow()
     assert ros.sets == 0 and error_ns(ros, clock) < MS
@@ -66,9 +62,7 @@ def test_a_process_that_was_held_up_does_not_take_that_for_a_set_clock() -> None
 def test_simulated_time_is_what_clock_said_last(monkeypatch: pytest.MonkeyPatch) -> None:
     waiting: list[bytes] = []
     monkeypatch.setattr(ros_time, "Polled", lambda *_: SimpleNamespace(take_all=lambda: waiting))
-    clock = SystemClock()
-    clock.simulated = True
-    ros = RosTime(clock)
+    ros = RosTime(SystemClock(), simulated=True)
     assert ros.at(time.monotonic_ns()) == 0
     waiting[:] = [struct.pack("<IiI", 0x100, 4, 0), struct.pack("<IiI", 0x100, 5, 7), b"cut"]
     ros.follow()
