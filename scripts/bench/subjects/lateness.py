@@ -38,21 +38,21 @@ Times = Counter[int]
 
 
 def lateness(folder: Path, seconds: int = SECONDS) -> dict[str, Any]:
-    """For `normal` and `real_time` (null where it is not allowed): quantiles in us of `fcsl_fc` and `cyclictest`."""
+    """For `normal` and `real_time`: quantiles in us of `fcsl_fc` and `cyclictest`. Where real time is not allowed the latter
+    mode is null, and cyclictest, which then refuses everything, is left out of the former."""
     library = build_machine(VEHICLE).library
     facts: dict[str, Any] = {"hz": HZ, "seconds": seconds * ROUNDS, **_computer()}
     modes = {"normal": False, "real_time": True}
     allowed = subprocess.run(["chrt", "-f", str(PRIORITY), "true"], capture_output=True, check=False).returncode == 0
     for mode, real_time in modes.items():
-        facts[mode] = _side_by_side(folder, library, seconds, real_time) if allowed or not real_time else None
+        facts[mode] = _side_by_side(folder, library, seconds, real_time, allowed) if allowed or not real_time else None
     return facts
 
 
-def _side_by_side(folder: Path, library: Path, seconds: int, real_time: bool) -> dict[str, Any]:
-    subjects: dict[str, Callable[[], Times]] = {
-        "fcsl_fc": lambda: _fcsl_fc(folder, library, seconds, real_time),
-        "cyclictest": lambda: _cyclictest(folder, seconds, real_time),
-    }
+def _side_by_side(folder: Path, library: Path, seconds: int, real_time: bool, peer: bool) -> dict[str, Any]:
+    subjects: dict[str, Callable[[], Times]] = {"fcsl_fc": lambda: _fcsl_fc(folder, library, seconds, real_time)}
+    if peer:
+        subjects["cyclictest"] = lambda: _cyclictest(folder, seconds, real_time)
     times = {name: Times() for name in subjects}
     with _load():
         before = _taken_s()
@@ -148,8 +148,9 @@ def lateness_rows(facts: dict[str, Any]) -> list[tuple[str, str]]:
             rows.append((f"    {title}", "not allowed here"))
             continue
         for name, label in (("fcsl_fc", "fcsl-fc"), ("cyclictest", "cyclictest")):
-            f = facts[mode][name]
-            rows.append((f"    {label}, {title}", " / ".join(f"{f[key]:.0f}" for key in (*QUANTILES, "max"))))
+            f = facts[mode].get(name)
+            figures = " / ".join(f"{f[key]:.0f}" for key in (*QUANTILES, "max")) if f else "not allowed here"
+            rows.append((f"    {label}, {title}", figures))
         rows.append(("    taken by the host meanwhile", f"{facts[mode]['taken_by_the_host_s']:.1f} s of a processor"))
     return rows
 
