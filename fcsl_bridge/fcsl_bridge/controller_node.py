@@ -239,13 +239,15 @@ class ControllerNode(LifecycleNode):
         if self._hosted is None or self._mode is None or self._active:
             return
         self._mode.rest()
+        self._hosted.topics.say_alive()
         if self._hosted.diagnostics.due(active=False):
             self._hosted.diagnostics.publish(self.get_clock().now().nanoseconds, active=False)
 
     def _serve_active(self) -> None:
         self._housekeeping.serve()
-        if not self._active:
+        if not self._active or self._hosted is None:
             raise _Inactive
+        self._hosted.topics.say_alive()
 
 
 def _check(options: dict[str, Any]) -> None:

@@ -13,6 +13,7 @@ Topics below the node's namespace, all stamped with the time of the tick (time_n
 from __future__ import annotations
 
 import struct
+import time
 
 from rclpy.node import Node
 from rclpy.publisher import Publisher
@@ -30,6 +31,8 @@ _LATCHED = {"state": MachineState, "health": InstanceHealth, "faults": FaultCoun
 _STAMP = struct.Struct("<iI")
 _STAMP_OFFSET = 4
 _NS = 1_000_000_000
+#: Of the lease that qos.WATCHED has, several.
+_ALIVE_PERIOD_S = 0.4
 #: For the receivers of the last messages of a run, in s.
 _END_S = 5.0
 #: Encapsulation, stamp, empty frame_id and tick: the part that differs between messages with equal content.
@@ -48,14 +51,24 @@ class MachineTopics:
             for instance, kind in kinds
         ]
         self._latched = {
-            topic: qos.publisher(node, kind, f"{machine.name}/{topic}", qos.LATCHED) for topic, kind in _LATCHED.items()
+            topic: qos.publisher(
+                node, kind, f"{machine.name}/{topic}", qos.WATCHED if topic == "state" else qos.LATCHED
+            )
+            for topic, kind in _LATCHED.items()
         }
+        self._lived_s = 0.0
         self._transitions = qos.publisher(node, TransitionEvent, f"{machine.name}/transitions", qos.EVENT)
         self._said = dict.fromkeys(_LATCHED, b"")
 
     @property
     def all(self) -> list[Publisher]:
         return [*(publisher for _, publisher in self._outputs), *self._latched.values(), self._transitions]
+
+    def say_alive(self) -> None:
+        """Keeps the publisher of the state alive; call it often."""
+        if time.monotonic() - self._lived_s > _ALIVE_PERIOD_S:
+            self._lived_s = time.monotonic()
+            self._latched["state"].assert_liveliness()
 
     def publish_latched(self, time_ns: int) -> None:
         """Publishes latched topics whose content has changed."""

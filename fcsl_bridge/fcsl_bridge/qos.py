@@ -5,10 +5,11 @@ from __future__ import annotations
 
 from typing import Any
 
+from rclpy.duration import Duration
 from rclpy.event_handler import PublisherEventCallbacks
 from rclpy.node import Node
 from rclpy.publisher import Publisher
-from rclpy.qos import DurabilityPolicy, HistoryPolicy, QoSProfile, ReliabilityPolicy
+from rclpy.qos import DurabilityPolicy, HistoryPolicy, LivelinessPolicy, QoSProfile, ReliabilityPolicy
 
 
 def _keep_last(depth: int, durability: DurabilityPolicy, reliability: ReliabilityPolicy) -> QoSProfile:
@@ -26,6 +27,10 @@ LOCKSTEP = _reliable(100, DurabilityPolicy.TRANSIENT_LOCAL)
 STREAM = _reliable(2000, DurabilityPolicy.VOLATILE)
 #: Latched topics: a late subscriber gets the last message.
 LATCHED = _reliable(1, DurabilityPolicy.TRANSIENT_LOCAL)
+#: The same of a publisher that lives while its loop says so: whoever asks for this lease learns of a dead controller.
+WATCHED = _reliable(1, DurabilityPolicy.TRANSIENT_LOCAL)
+WATCHED.liveliness = LivelinessPolicy.MANUAL_BY_TOPIC
+WATCHED.liveliness_lease_duration = Duration(seconds=2)
 #: Latched topics, for a subscriber that needs every change.
 LATCHED_HISTORY = _reliable(100, DurabilityPolicy.TRANSIENT_LOCAL)
 #: Sensors of a robot, subscribed: best effort matches every publisher, and a retransmitted message would be too old.

@@ -25,6 +25,7 @@ from controller_client import (
 )
 from diagnostic_msgs.msg import DiagnosticArray, DiagnosticStatus
 from rcl_interfaces.msg import Log
+from rclpy.event_handler import SubscriptionEventCallbacks
 from rclpy.serialization import deserialize_message
 
 from fcsl_bridge import qos
@@ -37,7 +38,7 @@ from simclient.bag import Bag
 from simclient.bag.digest import digest
 from simclient.replay import replay
 
-#: `make verify` runs more cycles.
+#: `make verify EFFORT=full` runs more cycles.
 CYCLES = 50 if os.environ.get("FCSL_VERIFY", "") in ("", "0") else 1000
 FAULT, OVERRUN, DROPOUT = InjectFault.Request.FAULT, InjectFault.Request.OVERRUN, InjectFault.Request.DROPOUT
 
@@ -236,6 +237,25 @@ def test_cycles_leave_nothing_behind(domain: Domain, library: Path) -> None:
     more_memory, more_files = grown(process)
     assert more_files <= files
     assert more_memory - memory < 2000 + 4 * CYCLES, "kilobytes"
+
+
+def test_a_watcher_learns_of_a_dead_controller(domain: Domain, library: Path) -> None:
+    """It asks the state's publisher for a sign of life, and gets an event within the lease, not after DDS's 20 s."""
+    process, client = free(domain, library)
+    alive: list[int] = []
+    client._listener.node.create_subscription(
+        MachineState,
+        "/rig/state",
+        lambda _: None,
+        qos.WATCHED,
+        event_callbacks=SubscriptionEventCallbacks(liveliness=lambda event: alive.append(event.alive_count)),
+    )
+    client._listener.until(lambda: alive[-1:] == [1])
+    for number, count in ((signal.SIGSTOP, 0), (signal.SIGCONT, 1), (signal.SIGKILL, 0)):
+        begun = time.monotonic()
+        process.signal(number)
+        client._listener.until(lambda count=count: alive[-1:] == [count])
+        assert time.monotonic() - begun < 12.0
 
 
 def test_rosout_has_transitions_and_what_ended_the_node(domain: Domain, library: Path) -> None:

@@ -79,7 +79,7 @@ void fcsl_bus_count(const fcsl_bus_t *bus, fcsl_bus_counters_t *counters)
         .received = read_counter(&now->received),
         .replaced = read_counter(&now->replaced),
         .overflowed = read_counter(&now->overflowed),
-        .too_large = read_counter(&now->too_large),
+        .wrong_size = read_counter(&now->wrong_size),
         .deletions = read_counter(&now->deletions),
         .strays = read_counter(&now->strays),
         .connects = read_counter(&now->connects),
@@ -129,7 +129,7 @@ static int allocate(fcsl_bus_t *bus, const fcsl_bus_options_t *options)
     for (uint32_t i = 0; i < options->input_count; i++) {
         const fcsl_bus_input_t *input = &options->inputs[i];
         bus->input_count = i + 1u; /* as many are closed */
-        if (inbox_open(&bus->inboxes[i], input->bytes, input->depth) != 0) {
+        if (inbox_open(&bus->inboxes[i], input->bytes, input->least, input->depth) != 0) {
             return -1;
         }
     }

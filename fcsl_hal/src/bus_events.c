@@ -23,8 +23,8 @@ static void put(fcsl_bus_t *bus, uint32_t input, const uint8_t *bytes, size_t si
     case INBOX_OVERFLOWED:
         bus_count(&counters->overflowed, 1);
         return;
-    case INBOX_TOO_LARGE:
-        bus_count(&counters->too_large, 1);
+    case INBOX_WRONG_SIZE:
+        bus_count(&counters->wrong_size, 1);
         return;
     default:
         break;

@@ -19,9 +19,9 @@ uint64_t inbox_memory(uint32_t bytes, uint32_t depth)
     return (uint64_t)slot_count(depth) * (bytes + sizeof(uint32_t));
 }
 
-int inbox_open(inbox_t *inbox, uint32_t bytes, uint32_t depth)
+int inbox_open(inbox_t *inbox, uint32_t bytes, uint32_t least, uint32_t depth)
 {
-    *inbox = (inbox_t){.bytes = bytes, .depth = depth, .back = 0, .front = 1, .middle = 2};
+    *inbox = (inbox_t){.bytes = bytes, .least = least, .depth = depth, .back = 0, .front = 1, .middle = 2};
     inbox->slots = calloc(slot_count(depth), bytes);
     inbox->sizes = calloc(slot_count(depth), sizeof inbox->sizes[0]);
     return inbox->slots != NULL && inbox->sizes != NULL ? 0 : -1;
@@ -49,8 +49,8 @@ static void copy(const inbox_t *inbox, uint32_t slot, void *bytes, size_t *size)
 
 inbox_result_t inbox_put(inbox_t *inbox, const uint8_t *bytes, size_t size)
 {
-    if (size > inbox->bytes) {
-        return INBOX_TOO_LARGE;
+    if (size > inbox->bytes || size < inbox->least) {
+        return INBOX_WRONG_SIZE;
     }
     if (inbox->depth == 1) {
         fill(inbox, inbox->back, bytes, size);

@@ -9,10 +9,11 @@
 #include <stddef.h>
 #include <stdint.h>
 
-typedef enum { INBOX_TAKEN, INBOX_REPLACED, INBOX_OVERFLOWED, INBOX_TOO_LARGE } inbox_result_t;
+typedef enum { INBOX_TAKEN, INBOX_REPLACED, INBOX_OVERFLOWED, INBOX_WRONG_SIZE } inbox_result_t;
 
 typedef struct {
     uint32_t bytes; /* of a slot */
+    uint32_t least; /* of a message */
     uint32_t depth;
     uint8_t *slots;
     uint32_t *sizes; /* of what lies in the slots */
@@ -30,7 +31,7 @@ typedef struct {
 uint64_t inbox_memory(uint32_t bytes, uint32_t depth);
 
 /* 0, or -1 when there is no memory. */
-int inbox_open(inbox_t *inbox, uint32_t bytes, uint32_t depth);
+int inbox_open(inbox_t *inbox, uint32_t bytes, uint32_t least, uint32_t depth);
 void inbox_close(inbox_t *inbox);
 
 /* INBOX_REPLACED: taken, and the message before it never was. */

@@ -25,7 +25,7 @@ typedef struct {
     _Atomic uint64_t received;
     _Atomic uint64_t replaced;
     _Atomic uint64_t overflowed;
-    _Atomic uint64_t too_large;
+    _Atomic uint64_t wrong_size;
     _Atomic uint64_t deletions;
     _Atomic uint64_t strays;
     _Atomic uint64_t connects;

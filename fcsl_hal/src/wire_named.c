@@ -20,12 +20,12 @@ static const fcsl_field_t FIELDS[] = {
     COUNTER("bus.put_failed", bus.put_failed, "messages that Zenoh refused"),
     COUNTER("bus.received", bus.received, "messages that came"),
     COUNTER("bus.overflowed", bus.overflowed, "messages dropped because earlier ones were not read"),
-    COUNTER("bus.too_large", bus.too_large, "messages dropped because they were too long"),
+    COUNTER("bus.wrong_size", bus.wrong_size, "messages dropped because they were too long or too short"),
     COUNTER("bus.deletions", bus.deletions, "deletions, which are no messages"),
     COUNTER("bus.strays", bus.strays, "messages under keys of the machine that no channel has"),
     COUNTER("bus.connects", bus.connects, "sessions that connected to this one"),
     COUNTER("bus.disconnects", bus.disconnects, "sessions that went"),
-    COUNTER("bus.values_refused", values_refused, "values of a wrong size, or that their type does not have"),
+    COUNTER("bus.values_refused", values_refused, "values that their type does not have"),
     COUNTER("bus.commits_refused", commits_refused, "commits that are none, or made for another machine"),
 };
 

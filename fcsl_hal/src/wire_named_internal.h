@@ -27,7 +27,7 @@ typedef struct {
     bus_peer_t peer;
     const fcsl_channel_table_t *table;
     uint32_t *numbers; /* of each channel: its input or output */
-    char *keys;        /* FCSL_BUS_KEY_MAX + 1 bytes each: those of the channels, and the five others */
+    char *keys;        /* FCSL_BUS_KEY_MAX + 1 bytes each: those of the channels, and the others */
     uint8_t *fresh;    /* of each channel: has a value in the tick */
     uint8_t *image;    /* a struct of the machine: the values that came last */
     uint8_t *value;    /* the longest of a channel, or a commit */

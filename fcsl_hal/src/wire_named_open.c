@@ -18,6 +18,7 @@ enum {
     COMMITS_WAITING = 8,
     CONTROLS_WAITING = 4,
     TICKS_POSTED = 4, /* that the ring has room for */
+    OTHER_KEYS = 5, /* than those of channels: control, commits, both tokens, all that there are */
     ENTRY_BYTES_MAX = 16, /* of the ring, beside a message */
 };
 
@@ -48,7 +49,7 @@ static named_wire_t *allocate(const fcsl_channel_table_t *table, fcsl_wire_side_
         wire->value_bytes = bytes > wire->value_bytes ? bytes : wire->value_bytes;
     }
     wire->numbers = calloc((size_t)channels + 1u, sizeof *wire->numbers);
-    wire->keys = calloc((size_t)channels + 5u, FCSL_BUS_KEY_MAX + 1u);
+    wire->keys = calloc((size_t)channels + OTHER_KEYS, FCSL_BUS_KEY_MAX + 1u);
     wire->fresh = calloc((size_t)channels + 1u, 1);
     wire->image = calloc(1, machine->size);
     wire->value = calloc(1, wire->value_bytes);
@@ -68,6 +69,7 @@ typedef struct {
     uint32_t output_count;
     const char *watched[2];
     const char *token;
+    const char *strays;
     uint64_t tick_bytes; /* that are posted in a tick */
 } plan_t;
 
@@ -89,13 +91,14 @@ static void fill_plan(named_wire_t *wire, const char *name_space, plan_t *plan)
     const char *commit = add_key(wire, &keys, name_space, "tick");
     plan->watched[BUS_CONTROLLERS] = add_key(wire, &keys, name_space, "@controller");
     plan->watched[BUS_SIMULATORS] = add_key(wire, &keys, name_space, "@simulator");
+    plan->strays = add_key(wire, &keys, name_space, "**");
     plan->token = plan->watched[wire->peer.side == FCSL_WIRE_LISTEN ? BUS_SIMULATORS : BUS_CONTROLLERS];
     plan->outputs[plan->output_count++] = control;
     plan->outputs[plan->output_count++] = commit;
     plan->inputs[plan->input_count++] =
         (fcsl_bus_input_t){.key = control, .bytes = CONTROL_PACKET_MAX, .depth = CONTROLS_WAITING};
     plan->inputs[plan->input_count++] =
-        (fcsl_bus_input_t){.key = commit, .bytes = commit_size, .depth = COMMITS_WAITING};
+        (fcsl_bus_input_t){.key = commit, .bytes = commit_size, .least = commit_size, .depth = COMMITS_WAITING};
     plan->tick_bytes = CONTROL_PACKET_MAX + commit_size + NAMED_CHANNELS * (uint64_t)ENTRY_BYTES_MAX;
     for (uint32_t i = 0; i < machine->channel_count; i++) {
         const fcsl_channel_t *channel = &machine->channels[i];
@@ -103,7 +106,9 @@ static void fill_plan(named_wire_t *wire, const char *name_space, plan_t *plan)
         const char *key = add_key(wire, &keys, name_space, channel->name);
         if (comes_in(wire, channel)) {
             wire->numbers[i] = plan->input_count;
-            plan->inputs[plan->input_count++] = (fcsl_bus_input_t){.key = key, .bytes = (uint32_t)bytes, .depth = 1};
+            const uint32_t least = channel->as == FCSL_AS_BLOB ? 0u : (uint32_t)bytes;
+            plan->inputs[plan->input_count++] =
+                (fcsl_bus_input_t){.key = key, .bytes = (uint32_t)bytes, .least = least, .depth = 1};
         } else {
             wire->numbers[i] = plan->output_count;
             plan->outputs[plan->output_count++] = key;
@@ -142,6 +147,7 @@ static int open_session(named_wire_t *wire, const char *address, const plan_t *p
         .tokens = &plan->token,
         .token_count = 1,
         .watched = plan->watched,
+        .strays = plan->strays,
         .watched_count = bus_peer_watched(wire->peer.side),
     };
     if (fcsl_bus_open(&options, &wire->peer.bus, error, error_size) != 0) {

@@ -58,18 +58,17 @@ int named_post(named_wire_t *wire, const uint8_t *bytes, size_t size)
 
 /* ---- receiving -------------------------------------------------------------------------------------------------------- */
 
-/* Stores the value of a channel. Returns 1, or 0 where it is none. */
+/* Stores the value of a channel, whose input takes no other size. Returns 1, or 0 where it is none. */
 static int store_value(named_wire_t *wire, const fcsl_channel_t *channel, size_t size)
 {
     const fcsl_machine_t *machine = wire->table->machine;
     const fcsl_field_t *field = &machine->fields[channel->field];
     uint8_t *place = wire->image + field->offset;
-    if (channel->as == FCSL_AS_BLOB && size <= blob_capacity(field)) {
+    if (channel->as == FCSL_AS_BLOB) {
         blob_import(place, wire->value, (uint32_t)size, blob_capacity(field));
         return 1;
     }
-    if (channel->as == FCSL_AS_BLOB || size != field->size ||
-        !fcsl_scalars_valid(machine, wire->value, field->type, field->count)) {
+    if (!fcsl_scalars_valid(machine, wire->value, field->type, field->count)) {
         wire->counters.values_refused++;
         return 0;
     }

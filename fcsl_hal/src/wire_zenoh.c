@@ -51,7 +51,7 @@ static const fcsl_field_t FIELDS[] = {
     COUNTER("wire.put_failed", put_failed, "messages that Zenoh refused"),
     COUNTER("wire.received", received, "messages that came"),
     COUNTER("wire.overflowed", overflowed, "messages dropped because earlier ones were not read"),
-    COUNTER("wire.too_large", too_large, "messages dropped because they were too long"),
+    COUNTER("wire.too_large", wrong_size, "messages dropped because they were too long"),
     COUNTER("wire.deletions", deletions, "deletions, which are no messages"),
     COUNTER("wire.connects", connects, "sessions that connected to this one"),
     COUNTER("wire.disconnects", disconnects, "sessions that went"),
@@ -128,7 +128,7 @@ static void zenoh_count(void *ctx, void *values)
     const wire_t *wire = ctx;
     counters_t now;
     fcsl_bus_count(wire->peer.bus, &now);
-    now.too_large += wire->too_large;
+    now.wrong_size += wire->too_large;
     memcpy(values, &now, sizeof now);
 }
 

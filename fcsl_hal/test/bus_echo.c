@@ -51,9 +51,9 @@ int main(int argc, char **argv)
         (void)fcsl_bus_wait(bus, now_ns() + LOOK_NS);
     }
     const fcsl_bus_counters_t counters = counted(bus);
-    (void)printf("{\"received\": %" PRIu64 ", \"too_large\": %" PRIu64 ", \"deletions\": %" PRIu64
+    (void)printf("{\"received\": %" PRIu64 ", \"wrong_size\": %" PRIu64 ", \"deletions\": %" PRIu64
                  ", \"strays\": %" PRIu64 ", \"posted\": %" PRIu64 ", \"overflowed\": %" PRIu64 ", \"alive\": %u}\n",
-                 counters.received, counters.too_large, counters.deletions, counters.strays, counters.posted,
+                 counters.received, counters.wrong_size, counters.deletions, counters.strays, counters.posted,
                  counters.overflowed, alive);
     CHECK(fcsl_bus_close(bus, CLOSE_MS) == 0);
     return 0;

@@ -206,7 +206,7 @@ static void test_what_is_dropped_is_counted(void)
     size_t size = 0;
     take_one(bus, 2, got, 1);
     const fcsl_bus_counters_t counters = counted(bus);
-    CHECK(counters.too_large == 2 && counters.replaced == 1 && counters.strays == 1);
+    CHECK(counters.wrong_size == 2 && counters.replaced == 1 && counters.strays == 1);
     CHECK(counters.overflowed == FLOOD - DEPTH && counters.received == 5 + FLOOD);
     CHECK(fcsl_bus_take(bus, 0, got, &size) && size == 0 && !fcsl_bus_take(bus, 0, got, &size));
     for (uint32_t i = 0; i < DEPTH; i++) { /* of a flood, the first ones wait */

@@ -73,7 +73,7 @@ def test_messages_come_back_in_order() -> None:
         assert [got.get(timeout=LONG_S) for _ in sent] == sent
         token.undeclare()
     assert counters == {
-        "received": MESSAGES + 3, "too_large": 1, "deletions": 1, "strays": 1, "posted": MESSAGES + 1, "overflowed": 0, "alive": 1
+        "received": MESSAGES + 3, "wrong_size": 1, "deletions": 1, "strays": 1, "posted": MESSAGES + 1, "overflowed": 0, "alive": 1
     }  # fmt: skip
 
 

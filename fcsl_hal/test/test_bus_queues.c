@@ -12,7 +12,7 @@
 #include "bus_ring.h"
 #include "fcsl/fcsl_check.h"
 
-enum { MESSAGES = 200000, BYTES = 48, CAPACITY = 208, DEPTH = 3 };
+enum { MESSAGES = 200000, BYTES = 48, LEAST = 2, CAPACITY = 208, DEPTH = 3 };
 
 static size_t fill(uint8_t *message, uint32_t number)
 {
@@ -119,7 +119,7 @@ static void test_inbox(uint32_t depth)
     size_t size = 0;
     uint32_t next = 0;
     memset(&rig, 0, sizeof rig);
-    CHECK(inbox_open(&rig.inbox, BYTES, depth) == 0 && !inbox_take(&rig.inbox, message, &size));
+    CHECK(inbox_open(&rig.inbox, BYTES, 0, depth) == 0 && !inbox_take(&rig.inbox, message, &size));
     CHECK(pthread_create(&thread, NULL, put_all, &rig) == 0);
     while (next < MESSAGES) {
         if (!inbox_take(&rig.inbox, message, &size)) {
@@ -142,13 +142,14 @@ static void test_inbox_limits(void)
     uint8_t got[BYTES];
     inbox_t inbox;
     size_t size = BYTES;
-    CHECK(inbox_open(&inbox, BYTES, DEPTH) == 0);
-    CHECK(inbox_put(&inbox, message, BYTES + 1u) == INBOX_TOO_LARGE);
+    CHECK(inbox_open(&inbox, BYTES, LEAST, DEPTH) == 0);
+    CHECK(inbox_put(&inbox, message, BYTES + 1u) == INBOX_WRONG_SIZE);
+    CHECK(inbox_put(&inbox, message, LEAST - 1u) == INBOX_WRONG_SIZE);
     for (uint32_t i = 0; i < DEPTH; i++) {
-        CHECK(inbox_put(&inbox, message, i) == INBOX_TAKEN);
+        CHECK(inbox_put(&inbox, message, LEAST + i) == INBOX_TAKEN);
     }
     CHECK(inbox_put(&inbox, message, BYTES) == INBOX_OVERFLOWED);
-    CHECK(inbox_take(&inbox, got, &size) && size == 0);
+    CHECK(inbox_take(&inbox, got, &size) && size == LEAST);
     CHECK(inbox_put(&inbox, message, BYTES) == INBOX_TAKEN);
     inbox_close(&inbox);
 }

@@ -125,7 +125,7 @@ static void test_value_missing(void)
 static void test_value_too_short(void)
 {
     check_end(value_too_short, FCSL_HAL_ERROR,
-              "the commit of tick 2 says that channel 'flag' has a value, and what came is none");
+              "the commit of tick 2 says that channel 'flag' has a value, and none came");
 }
 
 static void test_value_that_is_none(void)

@@ -34,6 +34,13 @@ LIMIT_S = scaled(2400.0, 86400.0)
 #: Lines of a failed check that are shown once more at the end, for whoever sees only the end of a long output.
 LAST_LINES = 20
 _TESTS = "fcsl_compiler/test"
+#: Files with tests that do more where FCSL_VERIFY is 1.
+_LONGER = (
+    "test/test_bus_faults.py",
+    "fcsl_bridge/test/test_controller.py",
+    "fcsl_bridge/test/test_robustness_bags.py",
+    "fcsl_runtime/simclient/test/test_socket.py",
+)
 
 
 @dataclass(frozen=True)
@@ -62,7 +69,17 @@ def tests(label: str, file: str, *arguments: str, **environment: str) -> Check:
 
 
 #: At EFFORT=full alone.
-FULL_CHECKS = scaled((), (script("mutants: tests notice small changes of the C runtime and of simclient", "mutation"),))
+FULL_CHECKS = scaled(
+    (),
+    (
+        script("mutants: tests notice small changes of the C runtime and of simclient", "mutation"),
+        Check(
+            "longer tests: faults on the bus and of nodes, sockets",
+            ("-m", "pytest", "-q", *_LONGER),
+            {"FCSL_VERIFY": "1"},
+        ),
+    ),
+)
 
 #: The longest first, so that at the end no core waits for one of them.
 CHECKS = (

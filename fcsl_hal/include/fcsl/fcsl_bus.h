@@ -33,6 +33,7 @@ typedef enum {
 typedef struct {
     const char *key;
     uint32_t bytes; /* of the longest message */
+    uint32_t least; /* of the shortest one */
     uint32_t depth; /* 1: fcsl_bus_take gets the newest message; more: as many wait, and the next one is dropped */
 } fcsl_bus_input_t;
 
@@ -66,7 +67,8 @@ typedef struct {
     uint64_t received; /* messages on the keys of inputs */
     uint64_t replaced; /* of these, never taken because a newer one came (depth 1) */
     uint64_t overflowed; /* of these, dropped because `depth` messages waited */
-    uint64_t too_large; /* of these, dropped because they are longer than the input's `bytes` */
+    uint64_t
+        wrong_size; /* of these, dropped because they are longer than the input's `bytes` or shorter than its `least` */
     uint64_t deletions; /* of these, no message but Zenoh's delete: dropped */
     uint64_t strays; /* messages under `strays` on keys that no input has */
     uint64_t connects; /* sessions that were connected to this one, looked at every 50 ms */
