@@ -9,6 +9,8 @@ import subprocess
 import sys
 from pathlib import Path
 
+from test_wires import free_port
+
 from simclient.replay import replay
 
 ROOT = Path(__file__).resolve().parents[1]
@@ -21,9 +23,7 @@ def test_the_plant_of_the_page_flies_the_lander(tmp_path: Path) -> None:
     machine = ROOT / "examples/lander/fc/lander_control.json"
     subprocess.run(["fcslc", "build", machine, "-o", tmp_path], check=True, capture_output=True)
     library, bag = tmp_path / "liblander_control.so", tmp_path / "bag"
-    with socket.socket() as free:
-        free.bind(("127.0.0.1", 0))
-        place = f"tcp/127.0.0.1:{free.getsockname()[1]}"
+    place = f"tcp/127.0.0.1:{free_port(socket.SOCK_STREAM)}"
     line = [sys.executable, tmp_path / "plant.py", place]
     with subprocess.Popen(line, stdout=subprocess.PIPE, text=True) as plant:
         options = ["--hal", f"zenoh:{place}", "--timeout-ms", "30000", "--record", bag]
