@@ -83,11 +83,12 @@ def test_a_package(tmp_path: Path) -> None:
     """As colcon does: configure and build, here only the machine's library, then its pytest."""
     run("fcslc", "new", "machine", "craft", "--package", cwd=tmp_path)
     craft = tmp_path / "craft"
-    assert {"CMakeLists.txt", "package.xml"} <= files(craft)
+    assert {"CMakeLists.txt", "package.xml", "launch/sil.launch.py", "launch/robot.launch.py"} <= files(craft)
+    run("ruff", "check", "--select", "E,F,I", "--line-length", "120", "craft", cwd=tmp_path)
     run("cmake", "-S", craft, "-B", tmp_path / "build", cwd=tmp_path)
     run("cmake", "--build", tmp_path / "build", "--target", "craft_machines", cwd=tmp_path)
     assert (tmp_path / "build" / "libcraft_machines.so").is_file()
-    assert "3 passed" in pytest_in(craft, "test")
+    assert "5 passed" in pytest_in(craft, "test"), "the machine alone, and its flight"
     # STRICT stands in its CMakeLists.txt.
     law = craft / "algorithms" / "controller.py"
     law.write_text(law.read_text().replace('"speed": "f64 m/s"}', '"speed": "f64 m/s", "wind": "f64 m/s"}'))

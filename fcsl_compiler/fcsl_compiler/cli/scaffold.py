@@ -9,6 +9,7 @@ from ..base.usage import UsageError
 from ..check.scope import LANGUAGE_NAMES
 from ..config.machine import RESERVED_INSTANCES
 from ..parse.machine_files import is_machine_name
+from . import scaffold_package
 
 #: JSON Schema of the machine JSON.
 SCHEMA = Path(__file__).parents[1] / "config" / "machine.schema.json"
@@ -139,63 +140,6 @@ With `machine.schema.json`, editors complete and check `@NAME@.json`; `fcslc sch
 the plugin `fcsl_builtins.mypy_plugin`.
 """
 
-_README_PACKAGE = """
-In a colcon workspace (`src/@NAME@`), `colcon build --packages-select @NAME@` compiles the machine and generates one ROS 2 message per
-instance; nodes then find it as `machine:=@NAME@/@NAME@`.
-"""
-
-_CMAKE = """cmake_minimum_required(VERSION 3.22)
-project(@NAME@ C)
-
-find_package(ament_cmake REQUIRED)
-find_package(fcsl_compiler REQUIRED)
-find_package(rosidl_default_generators REQUIRED)
-find_package(std_msgs REQUIRED)
-
-# The machine as a library that nodes find as `machine:=@NAME@/@NAME@`, and one ROS 2 message per instance.
-fcsl_add_machine(@NAME@_machines @NAME@.json STRICT)
-fcsl_generate_interfaces()
-
-install(FILES @NAME@.json DESTINATION share/${PROJECT_NAME})
-install(DIRECTORY algorithms DESTINATION share/${PROJECT_NAME} PATTERN __pycache__ EXCLUDE)
-
-if(BUILD_TESTING)
-  find_package(ament_cmake_pytest REQUIRED)
-  ament_add_pytest_test(pytest test TIMEOUT 120)
-endif()
-
-ament_export_dependencies(rosidl_default_runtime)
-ament_package()
-"""
-
-_PACKAGE = """<?xml version="1.0"?>
-<?xml-model href="http://download.ros.org/schema/package_format3.xsd" schematypens="http://www.w3.org/2001/XMLSchema"?>
-<package format="3">
-  <name>@NAME@</name>
-  <version>0.1.0</version>
-  <description>The machine @NAME@.</description>
-  <maintainer email="you@example.invalid">you</maintainer>
-  <license>Apache-2.0</license>
-
-  <buildtool_depend>ament_cmake</buildtool_depend>
-  <buildtool_depend>rosidl_default_generators</buildtool_depend>
-
-  <depend>fcsl_compiler</depend>
-  <depend>std_msgs</depend>
-  <exec_depend>rosidl_default_runtime</exec_depend>
-
-  <test_depend>ament_cmake_pytest</test_depend>
-  <test_depend>python3-pytest</test_depend>
-  <test_depend>simclient</test_depend>
-
-  <member_of_group>rosidl_interface_packages</member_of_group>
-
-  <export>
-    <build_type>ament_cmake</build_type>
-  </export>
-</package>
-"""
-
 _ALGORITHM = '''from fcsl_builtins import clamp
 
 
@@ -255,7 +199,7 @@ def test_a_small_change_passes_at_once(twin):
 def machine_files(name: str, package: bool) -> dict[Path, str]:
     """Texts by path, all below the folder `name`. Raises UsageError if `name` is not a valid machine name."""
     _check(name, name)
-    readme = _README + (_README_PACKAGE if package else "")
+    readme = _README + (scaffold_package.README if package else "")
     texts = {
         f"{name}.json": _MACHINE,
         "machine.schema.json": SCHEMA.read_text(),
@@ -266,9 +210,9 @@ def machine_files(name: str, package: bool) -> dict[Path, str]:
         "README.md": readme,
     }
     if package:
-        texts |= {"CMakeLists.txt": _CMAKE, "package.xml": _PACKAGE}
+        texts |= scaffold_package.FILES
     folder = Path(name)
-    return {folder / file: _named(text, name) for file, text in texts.items()}
+    return {folder / _named(file, name): _named(text, name) for file, text in texts.items()}
 
 
 def algorithm_files(name: str) -> dict[Path, str]:
