@@ -66,4 +66,4 @@ def test_what_it_refuses(saved: tuple[Path, float], tmp_path: Path) -> None:
         "fcsl-fc: --ignore-source-hash needs --restore\nTry `fcsl-fc --help`.\n",
     )
     code, err = refused("--restore", file, "--hal", f"wire:unix:{tmp_path / 'w'}")
-    assert code == 2 and "a simulator begins at tick 0" in err
+    assert code == 2 and "--restore goes without a simulator" in err
