@@ -39,6 +39,20 @@ fcsl_wire_status_t bus_peer_gone(bus_peer_t *peer)
     return FCSL_WIRE_CLOSED;
 }
 
+fcsl_wire_status_t bus_peer_receive(const bus_peer_t *peer, bus_take_t take, void *ctx, uint64_t deadline_ns,
+                                    uint8_t *message, size_t capacity, size_t *size)
+{
+    for (;;) { /* ends at the deadline, whatever arrives */
+        const fcsl_wire_status_t status = take(ctx, message, capacity, size);
+        if (status != FCSL_WIRE_NONE || monotonic_ns() >= deadline_ns) {
+            return status;
+        }
+        if (!fcsl_bus_wait(peer->bus, deadline_ns) && monotonic_ns() < deadline_ns) {
+            return FCSL_WIRE_NONE; /* a signal */
+        }
+    }
+}
+
 int bus_peer_wait(const bus_peer_t *peer, const char *endpoint, uint64_t deadline_ns, char *error, size_t error_size)
 {
     while (monotonic_ns() < deadline_ns) {

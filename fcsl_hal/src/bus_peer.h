@@ -33,6 +33,13 @@ int bus_peer_meet(bus_peer_t *peer);
 /* What to say when nothing came, and the peer did not live before that was looked at: CLOSED once, to who listens. */
 fcsl_wire_status_t bus_peer_gone(bus_peer_t *peer);
 
+/* Takes the next message, if there is one, as a wire's receive does. */
+typedef fcsl_wire_status_t (*bus_take_t)(void *ctx, uint8_t *message, size_t capacity, size_t *size);
+
+/* A wire's receive: takes until there is something to say, the deadline, or a signal. */
+fcsl_wire_status_t bus_peer_receive(const bus_peer_t *peer, bus_take_t take, void *ctx, uint64_t deadline_ns,
+                                    uint8_t *message, size_t capacity, size_t *size);
+
 /* The session connects to whoever listens there: is it a simulator, and has it no other controller? Returns 0, or -1 with `error`
  * filled. */
 int bus_peer_wait(const bus_peer_t *peer, const char *endpoint, uint64_t deadline_ns, char *error, size_t error_size);

@@ -8,7 +8,6 @@
 #include <string.h>
 
 #include "control_packet.h"
-#include "monotonic.h"
 #include "wire_named_internal.h"
 
 #define COUNTER(path, member, doc) FCSL_WIRE_COUNTER(named_counters_t, path, member, doc)
@@ -42,8 +41,9 @@ static fcsl_wire_status_t named_send(void *ctx, const uint8_t *message, size_t s
 }
 
 /* The next message, if there is one. What a peer sent comes before the news that it is gone. */
-static fcsl_wire_status_t take(named_wire_t *wire, uint8_t *bytes, size_t capacity, size_t *size)
+static fcsl_wire_status_t take(void *ctx, uint8_t *bytes, size_t capacity, size_t *size)
 {
+    named_wire_t *wire = ctx;
     const int lives = bus_peer_lives(&wire->peer); /* looked at first: what it sent is there then */
     if (wire->time_follows) {
         return named_make_time(wire, bytes, capacity, size);
@@ -69,15 +69,7 @@ static fcsl_wire_status_t named_receive(void *ctx, uint64_t deadline_ns, uint8_t
                                         size_t *size)
 {
     named_wire_t *wire = ctx;
-    for (;;) { /* ends at the deadline, whatever arrives */
-        const fcsl_wire_status_t status = take(wire, message, capacity, size);
-        if (status != FCSL_WIRE_NONE || monotonic_ns() >= deadline_ns) {
-            return status;
-        }
-        if (!fcsl_bus_wait(wire->peer.bus, deadline_ns) && monotonic_ns() < deadline_ns) {
-            return FCSL_WIRE_NONE; /* a signal */
-        }
-    }
+    return bus_peer_receive(&wire->peer, take, wire, deadline_ns, message, capacity, size);
 }
 
 static const char *named_explain(void *ctx)

@@ -87,8 +87,9 @@ static fcsl_wire_status_t zenoh_send(void *ctx, const uint8_t *message, size_t s
 }
 
 /* The oldest message that fits, if there is one. What a peer sent comes before the news that it is gone. */
-static fcsl_wire_status_t take(wire_t *wire, uint8_t *message, size_t capacity, size_t *size)
+static fcsl_wire_status_t take(void *ctx, uint8_t *message, size_t capacity, size_t *size)
 {
+    wire_t *wire = ctx;
     size_t length = 0;
     const int lives = bus_peer_lives(&wire->peer); /* looked at first: what it sent is there then */
     const int met = bus_peer_meet(&wire->peer);
@@ -107,15 +108,7 @@ static fcsl_wire_status_t zenoh_receive(void *ctx, uint64_t deadline_ns, uint8_t
                                         size_t *size)
 {
     wire_t *wire = ctx;
-    for (;;) { /* ends at the deadline, whatever arrives */
-        const fcsl_wire_status_t status = take(wire, message, capacity, size);
-        if (status != FCSL_WIRE_NONE || monotonic_ns() >= deadline_ns) {
-            return status;
-        }
-        if (!fcsl_bus_wait(wire->peer.bus, deadline_ns) && monotonic_ns() < deadline_ns) {
-            return FCSL_WIRE_NONE; /* a signal */
-        }
-    }
+    return bus_peer_receive(&wire->peer, take, wire, deadline_ns, message, capacity, size);
 }
 
 static const char *zenoh_explain(void *ctx)
