@@ -31,12 +31,12 @@ SHORT_S = 0.4
 
 
 class Flight:
-    """Simulator and flight program at ten times real time, on the way."""
+    """Simulator and flight program on the way."""
 
-    def __init__(self, mode: str, place: str, library: Path, folder: Path, length_s: str = "120"):
+    def __init__(self, mode: str, place: str, library: Path, folder: Path, length_s: str = "120", speed: str = "10"):
         self.bag = folder / "bag"
         ours = mode.replace("-peer", "")
-        line = ["fcsl-sim", "run", SIM, "--duration", length_s, "--speed", "10", "--external", f"{ours}{place}"]
+        line = ["fcsl-sim", "run", SIM, "--duration", length_s, "--speed", speed, "--external", f"{ours}{place}"]
         self.simulator = subprocess.Popen([*line, "--timeout", "60"], stdout=subprocess.DEVNULL, stderr=subprocess.PIPE)
         line = ["fcsl-fc", library, "--hal", f"{mode}{place}", "--timeout-ms", "60000", "--record", self.bag]
         self.summary = folder / "summary.json"
@@ -85,7 +85,7 @@ def test_a_party_is_killed_or_frozen(seed: int, reference: str, library: Path, t
     killed = victim == "controller" and number == signal.SIGKILL
     assert killed or not Bag(flight.bag).truncated
     verdict = replay(flight.bag, library=str(library))
-    assert verdict.divergence is None and verdict.ticks > 0
+    assert verdict.divergence is None and (killed or verdict.ticks > 0)  # the first ticks may not have been written yet
     again = fly(f"{mode.replace('-peer', '')}{place}", f"{mode}{place}", library, tmp_path / "again")
     assert again == reference, "the next flight, at the same place"
 
@@ -97,10 +97,11 @@ def test_a_party_that_is_frozen_for_a_moment(
 ) -> None:
     """Simulated time stands still meanwhile."""
     place = f"tcp/127.0.0.1:{free_port(socket.SOCK_STREAM)}"
-    flight = Flight(mode, place, library, tmp_path, LENGTH_S)
+    flight = Flight(mode, place, library, tmp_path, LENGTH_S, speed="1")
     try:
         getattr(flight, party).send_signal(signal.SIGSTOP)
         time.sleep(SHORT_S)
+        assert getattr(flight, party).poll() is None
         getattr(flight, party).send_signal(signal.SIGCONT)
         assert flight.ends("controller")[0] == 0 and flight.ends("simulator")[0] in (0, 1)
     finally:
@@ -116,7 +117,7 @@ def resident_kib(process: subprocess.Popen[bytes]) -> int:
 def test_a_hostile_party(reference: str, library: Path, tmp_path: Path) -> None:
     """It puts what no channel takes, as fast as it can: that is dropped and counted, and takes no memory."""
     place = f"tcp/127.0.0.1:{free_port(socket.SOCK_STREAM)}"
-    flight = Flight("zenoh:", place, library, tmp_path, LENGTH_S)
+    flight = Flight("zenoh:", place, library, tmp_path, LENGTH_S, speed="0.5")
     config = zenoh.Config.from_json5('{mode: "client", scouting: {multicast: {enabled: false}}}')
     config.insert_json5("connect/endpoints", f'["{place}"]')
     keys = ("altitude", "velocity", "throttle", "tick", "nothing", "@control/x")
@@ -137,7 +138,8 @@ def test_a_hostile_party(reference: str, library: Path, tmp_path: Path) -> None:
             thread = threading.Thread(target=flood)
             thread.start()
             try:
-                while flight.controller.poll() is None and put < 5000:
+                limit = time.monotonic() + 3.0
+                while put < 20000 and time.monotonic() < limit:
                     time.sleep(0.01)
                 after = [resident_kib(process) for process in (flight.simulator, flight.controller)]
                 assert flight.ends("controller")[0] == 0
@@ -149,5 +151,5 @@ def test_a_hostile_party(reference: str, library: Path, tmp_path: Path) -> None:
         flight.close()
     assert digest(flight.bag) == reference
     counted = json.loads(flight.summary.read_text())["hal"]
-    assert put > 5000 and counted["bus.wrong_size"] > 100 and counted["bus.strays"] > 100
+    assert counted["bus.wrong_size"] > 100 and counted["bus.strays"] > 100
     assert max(now - then for then, now in zip(before, after, strict=True)) < 64 * 1024

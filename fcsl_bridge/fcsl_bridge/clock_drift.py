@@ -20,6 +20,10 @@ class ClockDrift:
         self._tick = self._clock_ns = 0
         self.times = 0  #: windows in which they parted
 
+    def start(self) -> None:
+        """Compares from the next call of `look` on."""
+        self._clock_ns = 0
+
     def look(self, tick: int, clock_ns: int) -> None:
         """`clock_ns`: the time of /clock at tick `tick`, 0 before there is one. Call it often."""
         ticked_ns, went_ns = self._machine.time_ns(tick) - self._machine.time_ns(self._tick), clock_ns - self._clock_ns

@@ -30,14 +30,13 @@ class ClockLoop(FreeRunning):
 
     def run(self) -> None:
         """Ticks until `serve` raises."""
-        seen_ns = self.now_ns()
         while True:
             self._serve()
             self._diagnose()
+            heard = self._time.heard
             self._time.wait(SERVE_PERIOD_S)
             now_ns = self.now_ns()
-            if now_ns != seen_ns:
-                seen_ns = now_ns
+            if self._time.heard != heard:
                 for due_ns in self._ticks.until(now_ns):
                     self._tick(due_ns, now_ns)
 

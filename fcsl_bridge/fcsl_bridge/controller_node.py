@@ -241,7 +241,7 @@ class ControllerNode(LifecycleNode):
         self._mode.rest()
         self._hosted.topics.say_alive()
         if self._hosted.diagnostics.due(active=False):
-            self._hosted.diagnostics.publish(self.get_clock().now().nanoseconds, active=False)
+            self._hosted.diagnostics.publish(self._mode.now_ns(), active=False)
 
     def _serve_active(self) -> None:
         self._housekeeping.serve()

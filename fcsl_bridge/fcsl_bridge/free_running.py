@@ -66,7 +66,8 @@ class FreeRunning:
         if self._hosted.diagnostics.due():
             self._hosted.check_record()
             self._time.follow()
-            self._inputs.warn_of_other_clocks("/clock" if self._time.simulated else "the system's clock")
+            if self.now_ns() > 0:
+                self._inputs.warn_of_other_clocks("/clock" if self._time.simulated else "the system's clock")
             self._hosted.diagnostics.publish(self._stamp_ns)
 
     def rest(self) -> None:
@@ -83,7 +84,11 @@ class FreeRunning:
         return self._inputs.figures()
 
     def troubles(self) -> dict[str, int]:
-        return {"system clock set": self._time.sets, **self._inputs.troubles()}
+        return {
+            "system clock set": self._time.sets,
+            "/clock malformed": self._time.malformed,
+            **self._inputs.troubles(),
+        }
 
     def close(self) -> None:
         gc.unfreeze()

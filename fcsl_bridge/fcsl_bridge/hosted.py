@@ -29,7 +29,8 @@ from .services import Allowed, MachineServices
 
 def next_bag(record: str) -> Path:
     """The first of `flight`, `flight_2`, `flight_3`, … that does not exist."""
-    names = (Path(record if number == 1 else f"{record}_{number}") for number in count(1))
+    first = Path(record)
+    names = (first if number == 1 else first.with_name(f"{first.name}_{number}") for number in count(1))
     return next(name for name in names if not os.path.lexists(name))
 
 

@@ -60,9 +60,11 @@ class Inputs:
         return self._counts(lambda reason: reason not in _HARMLESS) | contested
 
     def warn_of_other_clocks(self, clock: str) -> None:
-        """Logs once for each topic whose stamps are far from ROS time, which is that of `clock`."""
+        """Logs once for each topic whose stamps are far from ROS time, which is that of `clock`, at two calls in succession:
+        a clock may have been set between them."""
         for one in self._inlets:
-            if abs(one.behind_ns) > _OTHER_CLOCK_NS and not one.warned:
+            one.odd = one.odd + 1 if abs(one.behind_ns) > _OTHER_CLOCK_NS else 0
+            if one.odd == 2 and not one.warned:
                 one.warned = True
                 direction = "before" if one.behind_ns > 0 else "after"
                 self._node.get_logger().warning(
@@ -91,7 +93,7 @@ class _Input:
     def __init__(self, topic: RosTopic, inlet: Inlet, polled: Polled):
         self.topic, self._inlet, self._polled = topic, inlet, polled
         self._superseded = self.contested = 0
-        self.warned = False
+        self.odd, self.warned = 0, False
 
     @property
     def name(self) -> str:

@@ -36,6 +36,8 @@ class RealtimeLoop(FreeRunning):
         self._serve_by_ns = 0
 
     def _start(self) -> None:
+        if self._drift is not None:
+            self._drift.start()
         self._pacer.start(time.monotonic_ns())
 
     def run(self) -> None:

@@ -34,6 +34,7 @@ class RosTime:
         self.simulated = simulated
         self._simulated = Polled(node, Clock, "/clock", qos.SENSOR) if simulated else None
         self._simulated_ns = self._offset_ns = 0
+        self.heard = self.malformed = 0  #: messages of /clock
         self.sets = 0  #: how often follow() detected that the system clock was set
         self.start()
 
@@ -49,9 +50,12 @@ class RosTime:
         if self._simulated is None:
             return monotonic_ns + self._offset_ns
         for said in self._simulated.take_all():
-            if len(said) >= _CLOCK.size:
-                seconds, nanoseconds = _CLOCK.unpack_from(said)
+            seconds, nanoseconds = _CLOCK.unpack_from(said) if len(said) >= _CLOCK.size else (-1, 0)
+            if seconds < 0 or nanoseconds >= _NS:
+                self.malformed += 1
+            else:
                 self._simulated_ns = seconds * _NS + nanoseconds
+                self.heard += 1
         return self._simulated_ns
 
     def wait(self, timeout_s: float) -> None:

@@ -407,6 +407,13 @@ static int shake_hands(hal_t *hal, uint64_t deadline_ns, char *error, size_t err
         return -1;
     }
     hal->paces = packet.sends_time;
+    if (hal->is_named && !hal->paces) {
+        (void)snprintf(error, error_size,
+                       "%s is a rig, which sends at its own rate: named values need a simulator that paces the run; "
+                       "use wire:zenoh:… with both",
+                       hal->spec);
+        return -1;
+    }
     return control_differs(&packet, &hal->table, error, error_size) ? -1 : 0;
 }
 
@@ -532,7 +539,10 @@ int fcsl_hal_bus(const char *address, const char *name_space, const fcsl_machine
     hal_t *self = hal->ctx;
     self->is_named = 1;
     (void)snprintf(self->spec, SPEC_BYTES, "%s", address);
-    (void)snprintf(self->name_space, SPEC_BYTES, "%s", name_space);
+    const size_t lead = strspn(name_space, "/");
+    const size_t length = strlen(name_space + lead);
+    const size_t kept = length > 0u && name_space[lead + length - 1u] == '/' ? length - 1u : length;
+    (void)snprintf(self->name_space, SPEC_BYTES, "%.*s", (int)kept, name_space + lead);
     return 0;
 }
 

@@ -18,6 +18,7 @@ static const fcsl_field_t FIELDS[] = {
     COUNTER("bus.put", bus.put, "messages that were handed to Zenoh"),
     COUNTER("bus.put_failed", bus.put_failed, "messages that Zenoh refused"),
     COUNTER("bus.received", bus.received, "messages that came"),
+    COUNTER("bus.replaced", bus.replaced, "values that a newer one of their tick replaced"),
     COUNTER("bus.overflowed", bus.overflowed, "messages dropped because earlier ones were not read"),
     COUNTER("bus.wrong_size", bus.wrong_size, "messages dropped because they were too long or too short"),
     COUNTER("bus.deletions", bus.deletions, "deletions, which are no messages"),
@@ -49,19 +50,27 @@ static fcsl_wire_status_t take(void *ctx, uint8_t *bytes, size_t capacity, size_
         return named_make_time(wire, bytes, capacity, size);
     }
     if (bus_peer_meet(&wire->peer)) {
-        /* Peers begin and end with a control packet: between the two keys that is their order. */
+        /* Looked at before commits: what the peer put before a control packet is there then. */
+        if (wire->control_size == 0u) {
+            (void)fcsl_bus_take(wire->peer.bus, NAMED_CONTROL, wire->control, &wire->control_size);
+        }
         const fcsl_wire_status_t status =
             wire->greeted ? named_take_commit(wire, bytes, capacity, size) : FCSL_WIRE_NONE;
         if (status != FCSL_WIRE_NONE) {
             return status;
         }
-        if (capacity >= CONTROL_PACKET_MAX && fcsl_bus_take(wire->peer.bus, NAMED_CONTROL, bytes, size)) {
+        if (wire->control_size > 0u && capacity >= CONTROL_PACKET_MAX) {
+            memcpy(bytes, wire->control, wire->control_size);
+            *size = wire->control_size;
+            wire->control_size = 0;
             wire->greeted = 1;
             return FCSL_WIRE_OK;
         }
     }
     const fcsl_wire_status_t gone = lives ? FCSL_WIRE_NONE : bus_peer_gone(&wire->peer);
-    wire->greeted = wire->greeted && wire->peer.met;
+    if (gone == FCSL_WIRE_CLOSED) {
+        named_drain(wire, NAMED_COMMIT); /* a hello may be there of the next one */
+    }
     return gone;
 }
 
@@ -84,8 +93,22 @@ static void named_count(void *ctx, void *values)
     memcpy(values, &wire->counters, sizeof wire->counters);
 }
 
+void named_drain(named_wire_t *wire, uint32_t first)
+{
+    size_t size = 0;
+    for (uint32_t i = first; i < wire->input_count; i++) {
+        uint8_t *place = i == NAMED_CONTROL ? wire->control : wire->value;
+        for (uint32_t n = 0; n < NAMED_WAITING_MAX && fcsl_bus_take(wire->peer.bus, i, place, &size); n++) {
+        }
+    }
+    wire->control_size = first == NAMED_CONTROL ? 0u : wire->control_size;
+    wire->greeted = 0;
+    wire->time_follows = 0;
+}
+
 void named_free(named_wire_t *wire)
 {
+    free(wire->control);
     free(wire->numbers);
     free(wire->keys);
     free(wire->fresh);

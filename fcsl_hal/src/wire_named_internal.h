@@ -11,6 +11,7 @@
 
 enum {
     NAMED_TEXT_BYTES = 256,
+    NAMED_WAITING_MAX = 8, /* messages under a key */
     NAMED_CLOSE_MS = 2000 /* for the peer to take what was sent last */
 };
 
@@ -30,11 +31,14 @@ typedef struct {
     char *keys;        /* FCSL_BUS_KEY_MAX + 1 bytes each: those of the channels, and the others */
     uint8_t *fresh;    /* of each channel: has a value in the tick */
     uint8_t *image;    /* a struct of the machine: the values that came last */
+    uint32_t input_count;
     uint8_t *value;    /* the longest of a channel, or a commit */
     size_t value_bytes;
     uint64_t time_ns; /* of the tick, for its time message */
     uint64_t tick;
-    int greeted;      /* the peer's first control packet was taken: what it put before is not looked at */
+    uint8_t *control; /* a packet that came and was not handed on */
+    size_t control_size;
+    int greeted; /* the peer's first control packet was handed on: no commit counts before it */
     int time_follows; /* the sensor message was handed on, and its time message was not */
     named_counters_t counters;
     char text[NAMED_TEXT_BYTES];
@@ -44,6 +48,9 @@ typedef struct {
 fcsl_wire_t named_functions(named_wire_t *wire);
 
 void named_free(named_wire_t *wire);
+
+/* Drops what came until now, of inputs from `first` on: of another run, or for another controller. */
+void named_drain(named_wire_t *wire, uint32_t first);
 
 /* Posts the values and commits that a message of the host stands for; another message as it is. Returns 0, or -1: no room. */
 int named_post(named_wire_t *wire, const uint8_t *bytes, size_t size);

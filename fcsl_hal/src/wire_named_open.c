@@ -15,7 +15,7 @@
 #include "wire_named_internal.h"
 
 enum {
-    COMMITS_WAITING = 8,
+    COMMITS_WAITING = NAMED_WAITING_MAX,
     CONTROLS_WAITING = 4,
     TICKS_POSTED = 4, /* that the ring has room for */
     OTHER_KEYS = 5, /* than those of channels: control, commits, both tokens, all that there are */
@@ -53,8 +53,9 @@ static named_wire_t *allocate(const fcsl_channel_table_t *table, fcsl_wire_side_
     wire->fresh = calloc((size_t)channels + 1u, 1);
     wire->image = calloc(1, machine->size);
     wire->value = calloc(1, wire->value_bytes);
-    if (wire->numbers == NULL || wire->keys == NULL || wire->fresh == NULL || wire->image == NULL ||
-        wire->value == NULL) {
+    wire->control = calloc(1, CONTROL_PACKET_MAX);
+    if (wire->control == NULL || wire->numbers == NULL || wire->keys == NULL || wire->fresh == NULL ||
+        wire->image == NULL || wire->value == NULL) {
         named_free(wire);
         return NULL;
     }
@@ -115,6 +116,7 @@ static void fill_plan(named_wire_t *wire, const char *name_space, plan_t *plan)
             plan->tick_bytes += bytes + ENTRY_BYTES_MAX;
         }
     }
+    wire->input_count = plan->input_count;
     wire->peer.output_count = NAMED_CHANNELS; /* a peer need not care for every channel */
 }
 
@@ -158,12 +160,19 @@ static int open_session(named_wire_t *wire, const char *address, const plan_t *p
         (void)fcsl_bus_close(wire->peer.bus, NAMED_CLOSE_MS);
         return -1;
     }
+    named_drain(wire, NAMED_CONTROL); /* nothing of this controller's run comes before its hello */
     return 0;
 }
 
 static int check(const char *name_space, const fcsl_machine_t *machine, char *error, size_t error_size)
 {
+    static const char LONGEST[] = "@controller"; /* of the names that are no channels */
     const size_t room = FCSL_BUS_KEY_MAX - 2u;
+    if (strlen(name_space) + strlen(machine->name) + strlen(LONGEST) > room) {
+        (void)snprintf(error, error_size, "the keys under namespace '%.100s' are longer than %u bytes", name_space,
+                       FCSL_BUS_KEY_MAX);
+        return -1;
+    }
     for (uint32_t i = 0; i < machine->channel_count; i++) {
         const char *name = machine->channels[i].name;
         if (strcmp(name, "tick") == 0) {

@@ -139,11 +139,15 @@ fcsl_wire_status_t named_take_commit(named_wire_t *wire, uint8_t *bytes, size_t 
 {
     commit_t commit;
     size_t came = 0;
-    if (!fcsl_bus_take(wire->peer.bus, NAMED_COMMIT, wire->value, &came) || !read_commit(wire, came, &commit)) {
-        return FCSL_WIRE_NONE;
+    /* All that wait, and may have been told at once: a refused one must not hide the next. */
+    for (uint32_t n = 0; n < NAMED_WAITING_MAX && fcsl_bus_take(wire->peer.bus, NAMED_COMMIT, wire->value, &came);
+         n++) {
+        if (read_commit(wire, came, &commit)) {
+            const fcsl_wire_status_t status = take_values(wire, &commit);
+            return status == FCSL_WIRE_NONE ? make_message(wire, &commit, bytes, capacity, size) : status;
+        }
     }
-    const fcsl_wire_status_t status = take_values(wire, &commit);
-    return status == FCSL_WIRE_NONE ? make_message(wire, &commit, bytes, capacity, size) : status;
+    return FCSL_WIRE_NONE;
 }
 
 fcsl_wire_status_t named_make_time(named_wire_t *wire, uint8_t *bytes, size_t capacity, size_t *size)

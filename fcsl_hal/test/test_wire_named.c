@@ -134,6 +134,33 @@ static void test_value_that_is_none(void)
               "the commit of tick 2 says that channel 'flag' has a value, and what came is none");
 }
 
+/* Whoever else is on the bus cannot hide a tick with commits of another machine. */
+static void test_a_tick_behind_bad_commits(void)
+{
+    const pid_t child = start_controller(&MACHINE, WAIT_MS, FCSL_HAL_ERROR, "went away before tick 2");
+    fcsl_bus_t *bus = listen_on_the_bus();
+    shake_hands(bus);
+    fly_tick(bus, 0);
+    for (uint32_t i = 0; i < 3; i++) {
+        post_commit(bus, 1, 0, 0, 0, 1);
+    }
+    fly_tick(bus, 1);
+    (void)fcsl_bus_close(bus, WAIT_MS);
+    join(child);
+}
+
+/* It would send values faster than they are taken, and a commit would have those of the next one. */
+static void test_a_rig(void)
+{
+    uint8_t hello[256];
+    const pid_t child = start_controller(&MACHINE, WAIT_MS, FCSL_HAL_ERROR, "named values need a simulator");
+    fcsl_bus_t *bus = listen_on_the_bus();
+    take_one(bus, CONTROL, hello, HELLO_BYTES);
+    CHECK(fcsl_bus_post(bus, CONTROL, hello, HELLO_BYTES) == 0);
+    join(child);
+    (void)fcsl_bus_close(bus, WAIT_MS);
+}
+
 static void test_bad_commits(void)
 {
     check_end(bad_commits, FCSL_HAL_TIMEOUT, "no time message of tick 2");
@@ -147,5 +174,7 @@ int main(void)
     check_alone(test_value_too_short);
     check_alone(test_value_that_is_none);
     check_alone(test_bad_commits);
+    check_alone(test_a_tick_behind_bad_commits);
+    check_alone(test_a_rig);
     return 0;
 }

@@ -181,8 +181,10 @@ def _run(options: argparse.Namespace) -> int:
         raise SimError("`--paused`, `--token` and `--checkpoints` need `--socket`: they configure the variable server")
     if options.telemetry_fields is not None and options.telemetry is None:
         raise SimError("`--telemetry-fields` needs `--telemetry`: it selects the values to send")
-    if options.namespace and options.record is None and external is None:
-        raise SimError("`--namespace` needs `--record` or `--external`: it applies to topics and to keys of the bus")
+    if options.namespace and options.record is None and not (external or "").startswith("zenoh:"):
+        raise SimError(
+            "`--namespace` needs `--record` or `--external zenoh:…`: it is of topics, and of keys of the bus"
+        )
     if options.timeout is not None and external is None:
         raise SimError("`--timeout` needs `--external`: it limits the wait for the controller")
     server = None

@@ -215,13 +215,15 @@ from launch import LaunchDescription
 from launch.actions import DeclareLaunchArgument
 from launch.substitutions import LaunchConfiguration
 from launch_ros.actions import Node
+from launch_ros.parameter_descriptions import ParameterValue
 
 
 def generate_launch_description():
+    bag = ParameterValue(LaunchConfiguration("record"), value_type=str)
     controller = Node(
         package="fcsl_bridge",
         executable="controller_node",
-        parameters=[{"machine": "@NAME@/@NAME@", "mode": "realtime", "record": LaunchConfiguration("record")}],
+        parameters=[{"machine": "@NAME@/@NAME@", "mode": "realtime", "record": bag}],
         # Without this, the node talks to nodes of its own computer alone.
         additional_env={"ROS_AUTOMATIC_DISCOVERY_RANGE": "SUBNET"},
         output="screen",

@@ -219,7 +219,8 @@ static int check(const options_t *options)
         return usage_error("--timeout-ms needs --hal wire:SPEC or zenoh:…: it is how long to wait for the simulator",
                            "");
     }
-    if (options->name_space[0] != '\0' && options->record == NULL && options->peer == NULL) {
+    if (options->name_space[0] != '\0' && options->record == NULL &&
+        (options->peer == NULL || strncmp(options->peer, OPTIONS_WIRE, strlen(OPTIONS_WIRE)) == 0)) {
         return usage_error("--namespace needs --record or --hal zenoh:…: it is of topics, and of keys of the bus", "");
     }
     if (options->ignore_source_hash && options->restore == NULL) {

@@ -4,6 +4,7 @@
  */
 #include <getopt.h>
 
+#include "fcsl/fcsl_hal.h"
 #include "fcsl/fcsl_wire.h"
 #include "fuzz.h"
 #include "options.h"
