@@ -24,19 +24,21 @@ class ClockLoop(FreeRunning):
     def __init__(self, node: Node, hosted: Hosted, serve: Callable[[], None], options: Mapping[str, Any]):
         super().__init__(node, hosted, serve, simulated=True)
         self._ticks = ClockTicks(hosted.run.machine.tick_hz, options["max_ticks_per_clock"])
+        self._heard = 0  # messages of /clock whose ticks were made
 
     def _start(self) -> None:
         self._ticks.start()
+        self._heard = self._time.heard
 
     def run(self) -> None:
         """Ticks until `serve` raises."""
         while True:
             self._serve()
             self._diagnose()
-            heard = self._time.heard
             self._time.wait(SERVE_PERIOD_S)
             now_ns = self.now_ns()
-            if self._time.heard != heard:
+            if self._time.heard != self._heard:  # also those that were taken while diagnostics asked for the time
+                self._heard = self._time.heard
                 for due_ns in self._ticks.until(now_ns):
                     self._tick(due_ns, now_ns)
 

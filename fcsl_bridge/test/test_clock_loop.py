@@ -4,6 +4,7 @@
 from __future__ import annotations
 
 from pathlib import Path
+from types import SimpleNamespace
 
 import pytest
 import rig
@@ -14,6 +15,9 @@ from rosgraph_msgs.msg import Clock
 from test_realtime_loop import HZ, NS, Robot
 
 from fcsl_bridge import qos
+from fcsl_bridge.clock_loop import ClockLoop
+from fcsl_bridge.clock_ticks import ClockTicks
+from fcsl_bridge.errors import Stopped
 from simclient.bag import Bag
 from simclient.replay import replay
 
@@ -61,3 +65,25 @@ def test_ticks_are_those_of_the_clock(domain: Domain, library: Path) -> None:
     ticks = [*range(7), *range(87, 107)]
     assert stamps == [*(NS + tick * NS // HZ for tick in ticks), NS // 2]
     assert replay(robot.bag, library=str(robot.library)).identical
+
+
+def test_a_message_that_diagnostics_take_makes_its_ticks(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Whoever asks for the time takes what /clock said; a slow clock says nothing more for a second."""
+    made: list[int] = []
+    clock, turns = SimpleNamespace(heard=0, wait=lambda _: None), iter(range(3))
+
+    def ask_for_the_time(_: ClockLoop) -> None:
+        clock.heard = 1
+
+    def serve() -> None:
+        if made or next(turns, None) is None:
+            raise Stopped
+
+    loop = ClockLoop.__new__(ClockLoop)
+    loop._time, loop._ticks, loop._heard, loop._serve = clock, ClockTicks(HZ, 1), 0, serve  # type: ignore[assignment]
+    monkeypatch.setattr(ClockLoop, "_diagnose", ask_for_the_time)
+    monkeypatch.setattr(ClockLoop, "now_ns", lambda _: NS)
+    monkeypatch.setattr(ClockLoop, "_tick", lambda _, due_ns, now_ns: made.append(due_ns))
+    with pytest.raises(Stopped):
+        loop.run()
+    assert made == [NS]
