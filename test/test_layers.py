@@ -26,7 +26,7 @@ FOLDERS: dict[str, Sequence[str]] = {
         *("base", "model", "parse", "check", "config", "lower", "emit", "coverage", "driver"),
         *("graph", "build_report", "reference", "cli"),
     ),
-    "simclient": ("", "ros", "bag", "view", "replay", "vars", "twin", "telemetry", "supervisor", "live", "link"),
+    "simclient": ("", "ros", "bag", "view", "replay", "vars", "twin", "telemetry", "supervisor", "live", "link", "bus"),
     "fcsl_sim": ("",),
     "fcsl_bridge": ("",),
     "verify": (

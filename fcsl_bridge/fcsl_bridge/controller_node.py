@@ -21,6 +21,7 @@ from lifecycle_msgs.srv import ChangeState
 from rclpy._rclpy_pybind11 import RCLError
 from rclpy.lifecycle import LifecycleNode, LifecycleState, TransitionCallbackReturn
 
+from . import bus_address
 from .clock_loop import ClockLoop
 from .errors import BridgeError, Stopped
 from .hosted import Hosted
@@ -47,8 +48,9 @@ OPTIONS = (  # all read-only: callers of the node's services must not load libra
     ),
     Option("record", str, "", "the path of a new bag directory; if it exists, <record>_2, ..."),
     Option("decimate", int, 1, "a whole number n: outputs are published each n-th tick"),
-    Option("timeout_s", float, 5.0, "lockstep: seconds to wait for the simulator's next bundle"),
-    Option("start_timeout_s", float, 60.0, "seconds to wait for the simulator's first bundle"),
+    bus_address.OPTION,
+    Option("timeout_s", float, 5.0, "lockstep: seconds to wait for the simulator's next tick"),
+    Option("start_timeout_s", float, 60.0, "seconds to wait for the simulator"),
     Option("max_ticks_per_clock", int, 100, "clock: how many ticks one message of /clock makes at most"),
     Option("wait_for_subscribers", int, 0, "how many subscribers each topic needs before the first tick"),
     Option("autostart", bool, True, "whether the node configures and activates itself"),

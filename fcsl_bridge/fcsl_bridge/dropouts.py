@@ -5,7 +5,6 @@ from __future__ import annotations
 
 from simclient.descriptor import Machine
 from simclient.errors import did_you_mean
-from simclient.link.message import MessageError, without
 
 from .errors import BridgeError
 
@@ -14,13 +13,13 @@ class Dropouts:
     """The channels that get no sample in the next tick."""
 
     def __init__(self, machine: Machine):
-        self._ids = {c.name: c.id for c in machine.channels if c.direction == "sensor"}
+        self._numbers = {c.name: c.index for c in machine.channels if c.direction == "sensor"}
         self._left: dict[str, int] = {}
 
     def add(self, channel: str, ticks: int) -> None:
         """The channel gets no sample in the next `ticks` ticks. Raises BridgeError for an unknown one."""
-        if channel not in self._ids:
-            hint = did_you_mean(channel, self._ids) or f"; there are {', '.join(self._ids) or 'none'}"
+        if channel not in self._numbers:
+            hint = did_you_mean(channel, self._numbers) or f"; there are {', '.join(self._numbers) or 'none'}"
             raise BridgeError(f"no sensor channel `{channel}`{hint}")
         self._left[channel] = ticks
 
@@ -36,15 +35,8 @@ class Dropouts:
         self._left = {name: ticks - 1 for name, ticks in self._left.items() if ticks > 1}
         return names
 
-    def strip(self, message: bytes) -> bytes:
-        """A sensor message (docs/wire.md) without the channels that are missing in its tick.
-
-        Other bytes are returned unchanged.
-        """
-        missing = {self._ids[name] for name in self.missing()}
-        if not missing:
-            return message
-        try:
-            return without(message, missing)
-        except MessageError:
-            return message
+    def take(self) -> list[tuple[int, int]]:
+        """Channels, by number, and their ticks without a sample, for somebody else to count; none is left."""
+        taken = [(self._numbers[name], ticks) for name, ticks in self._left.items()]
+        self._left = {}
+        return taken

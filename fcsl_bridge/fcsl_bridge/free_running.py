@@ -41,7 +41,7 @@ class FreeRunning:
         self._stamp_ns = self.now_ns()
         self._hosted.run.record_time(self._stamp_ns)
         self._hosted.record()
-        self._hosted.topics.publish_latched(self._stamp_ns)
+        self._hosted.show_changes(self._stamp_ns)
         self._inputs.forget()
         gc.unfreeze()
         gc.collect()
@@ -55,11 +55,10 @@ class FreeRunning:
     def _tick(self, stamp_ns: int, now_ns: int) -> None:
         """Makes the tick that was due at stamp_ns, with what came until now_ns; both in ROS time."""
         hosted, self._stamp_ns = self._hosted, stamp_ns
-        tick = hosted.run.tick
         hosted.run.record_time(stamp_ns)
         self._inputs.poll(now_ns, hosted.dropouts.missing())
         hosted.run.step(1)
-        hosted.show(tick, stamp_ns)
+        hosted.show(stamp_ns)
 
     def _diagnose(self) -> None:
         """Once per second, in the slack."""

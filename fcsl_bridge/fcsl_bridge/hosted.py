@@ -14,12 +14,16 @@ from pathlib import Path
 from typing import Any
 
 from rclpy.node import Node
+from rclpy.serialization import deserialize_message
 
+from fcsl_msgs.msg import TransitionEvent
 from simclient.errors import TwinError
+from simclient.ros.outbox import RunTopics
 from simclient.run import open_run
 
 from .diagnostics import Diagnostics, Source
 from .dropouts import Dropouts
+from .forward import Forward
 from .machine_index import find_machine
 from .machine_topics import MachineTopics
 from .mapped_topics import Outputs
@@ -55,10 +59,16 @@ class Hosted:
         self._stack.callback(self.run.close)
         self.run.attach()
         self._initial = self.run.save()
-        self.topics = MachineTopics(node, self.run, options["decimate"])
-        self._stack.callback(self.topics.close)
-        self.outputs = Outputs(node, self.run)
+        # Outside lock-step one thread puts and publishes: it must not wait for itself.
+        self.forward = Forward(lossless=self._lossless and options["wait_for_subscribers"] > 0)
+        self._stack.callback(self.forward.close)
+        self.messages = RunTopics(self.run, self.forward.outbox)
+        self._stack.callback(self.messages.close)
+        self.outputs = Outputs(node, self.run, self.forward, self.messages)
         self._stack.callback(self.outputs.close)
+        parts = (self.forward, self.messages, self._log_transition)
+        self.topics = MachineTopics(node, self.run, options["decimate"], *parts)
+        self._stack.callback(self.topics.close)
         self.parameters = MachineParameters(node, self.run, given)
         self._stack.callback(self.parameters.close)
         self.dropouts = Dropouts(self.run.machine)
@@ -95,15 +105,21 @@ class Hosted:
             with suppress(TwinError):  # raises the same error
                 self.end_record()
 
-    def show(self, tick: int, time_ns: int) -> None:
-        """Publishes the results of `tick`, the last completed one, stamped time_ns; also logs a transition."""
-        self.outputs.publish(time_ns)
-        event = self.topics.publish_changes(time_ns)
-        if event is not None:
-            cause = f" ({event.request} by {event.instance})" if event.request else ""
-            time_s = self.run.machine.time_ns(tick + 1) / 1e9
-            self._node.get_logger().info(f"{time_s:.3f} s  {event.from_state} -> {event.to_state}{cause}")
-        self.topics.publish_outputs(tick, time_ns)
+    def show(self, time_ns: int) -> None:
+        """Publishes the results of the last completed tick, stamped time_ns."""
+        self.messages.put(time_ns)
+        self.forward.all()
+
+    def show_changes(self, time_ns: int) -> None:
+        """Publishes the latched topics whose content has changed, stamped time_ns."""
+        self.messages.put_changes(time_ns)
+        self.forward.all()
+
+    def _log_transition(self, message: bytes) -> None:
+        event = deserialize_message(message, TransitionEvent)
+        cause = f" ({event.request} by {event.instance})" if event.request else ""
+        time_s = self.run.machine.time_ns(event.tick + 1) / 1e9
+        self._node.get_logger().info(f"{time_s:.3f} s  {event.from_state} -> {event.to_state}{cause}")
 
     def start_over(self) -> None:
         """Begins a new run at tick 0, with the current parameters and a new bag."""
@@ -117,7 +133,11 @@ class Hosted:
         return {}
 
     def troubles(self) -> dict[str, int]:
-        return {"records dropped": self.run.record_dropped(), "hardware failures": self.run.hardware_failures()}
+        return {
+            "records dropped": self.run.record_dropped(),
+            "messages dropped": self.forward.outbox.dropped,
+            "hardware failures": self.run.hardware_failures(),
+        }
 
     def close(self) -> None:
         """Completes the bag and releases everything; idempotent."""

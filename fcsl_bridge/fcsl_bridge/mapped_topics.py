@@ -10,10 +10,12 @@ from typing import Any
 
 from rclpy.node import Node
 
+from simclient.ros.outbox import RunTopics
 from simclient.ros.topics import Inlet, RosTopic, composer_of, topics_of
 from simclient.run import Run
 
 from . import qos
+from .forward import Forward
 from .interfaces import message_class
 from .node_main import wait_for_receivers
 from .polled import Polled
@@ -128,32 +130,28 @@ class Outputs:
     """Actuator topics: the machine's actuator outputs, published at every tick; their safe values while it is
     disarmed."""
 
-    def __init__(self, node: Node, run: Run):
-        self._node, self._run = node, run
+    def __init__(self, node: Node, run: Run, forward: Forward, messages: RunTopics):
+        self._node, self._run, self._messages = node, run, messages
         topics = [topic for topic in topics_of(run.machine) if topic.direction == "actuator"]
         ready = [(t.name, composer_of(t), message_class(t.type)) for t in topics]
         self._outlets: list[tuple[str, Any, Any]] = [
             (name, composer, qos.publisher(node, kind, name, qos.COMMAND)) for name, composer, kind in ready
         ]
         self._contested = dict.fromkeys((t.name for t in topics), 0)
-
-    def publish(self, time_ns: int) -> None:
-        """Publishes the messages of the last completed tick, stamped time_ns."""
-        self._publish(self._run.actuator_address, time_ns)
+        self._numbers = {name: forward.add(publisher) for name, _, publisher in self._outlets}
+        for name, composer, _ in self._outlets:
+            messages.add_actuators(self._numbers[name], composer)
 
     def make_safe(self, time_ns: int) -> None:
         """Publishes the safe values of a machine that something arms, stamped time_ns, and waits a moment for their
         receivers. For the end of ticking: no command follows."""
         if self._run.safe_address is None:
             return
-        self._publish(self._run.safe_address, time_ns)
-        wait_for_receivers((publisher for _, _, publisher in self._outlets), _SAFE_WAIT_S)
-
-    def _publish(self, address: int, time_ns: int) -> None:
         for _, composer, publisher in self._outlets:
-            data = composer.compose([address], time_ns)
+            data = composer.compose([self._run.safe_address], time_ns)
             if data is not None:
                 publisher.publish(data)
+        wait_for_receivers((publisher for _, _, publisher in self._outlets), _SAFE_WAIT_S)
 
     def figures(self) -> dict[str, int]:
         return {}
@@ -164,7 +162,11 @@ class Outputs:
         for name, _, publisher in self._outlets:
             self._contested[name] += self._node.count_publishers(publisher.topic_name) > 1
         contested = {f"hal.{name} published by others": count for name, count in self._contested.items()}
-        return {f"hal.{name} does not fit": composer.refused for name, composer, _ in self._outlets} | contested
+        refused = {
+            f"hal.{name} does not fit": composer.refused + self._messages.refused(self._numbers[name])
+            for name, composer, _ in self._outlets
+        }
+        return refused | contested
 
     def close(self) -> None:
         for _, _, publisher in self._outlets:

@@ -20,9 +20,6 @@ def _reliable(depth: int, durability: DurabilityPolicy) -> QoSProfile:
     return _keep_last(depth, durability, ReliabilityPolicy.RELIABLE)
 
 
-#: Bundles. At most one is unanswered, so the last one kept for a late joiner is the one to answer: none is lost,
-#: whichever node starts first. The depth is for other listeners, and for a controller that starts late (lockstep.py).
-LOCKSTEP = _reliable(100, DurabilityPolicy.TRANSIENT_LOCAL)
 #: Streams: outputs, truth, clock. The depth bridges a subscriber that lags (reliable + keep-last drops beyond it).
 STREAM = _reliable(2000, DurabilityPolicy.VOLATILE)
 #: Latched topics: a late subscriber gets the last message.

@@ -11,8 +11,6 @@ speed               parameter            limit on simulated seconds per second; 
 from __future__ import annotations
 
 import math
-import time
-from collections.abc import Callable
 
 from rcl_interfaces.msg import SetParametersResult
 from rclpy.callback_groups import ReentrantCallbackGroup
@@ -25,9 +23,8 @@ from fcsl_msgs.srv import Step
 
 from .polled import SERVE_PERIOD_S, Housekeeping
 
-#: A simulation that is later than this, in s, does not catch up.
-_CATCH_UP_S = 0.1
-_NS = 1_000_000_000
+#: More ticks than any simulation has.
+_ALL = 2**63
 
 
 class Reset(Exception):
@@ -47,35 +44,14 @@ def _adopt(parameters: list[Parameter]) -> list[Parameter]:
     ]
 
 
-class Pace:
-    """When a tick may begin at a given speed. Times: monotonic seconds, simulated nanoseconds."""
-
-    def __init__(self, speed: float):
-        self.speed = speed
-        self._wall_s = self._time_ns = 0.0
-
-    def anchor(self, now_s: float, time_ns: int) -> None:
-        """Starts the pacing at this time."""
-        self._wall_s, self._time_ns = now_s, time_ns
-
-    def left_s(self, now_s: float, time_ns: int) -> float:
-        """Seconds until the tick at time_ns may begin; zero or less: now."""
-        if not self.speed:
-            return 0.0
-        left_s = self._wall_s + (time_ns - self._time_ns) / _NS / self.speed - now_s
-        if left_s < -_CATCH_UP_S:
-            self.anchor(now_s, time_ns)
-        return left_s
-
-
 class Control:
-    """Decides before every tick whether it may begin. Everything runs in the calling thread."""
+    """Decides how many ticks may run. Everything runs in the calling thread."""
 
     def __init__(self, node: Node, housekeeping: Housekeeping, speed: float, paused: bool):
         self._node, self._housekeeping = node, housekeeping
-        self.paused = paused
-        self._pace = Pace(speed)
-        self._anchored = self._reset = False
+        self.paused, self.speed = paused, speed
+        self.pace_changed = True  #: a new speed, or the end of a pause
+        self._reset = False
         self._budget = self._tick = 0  # ticks allowed while paused; ticks completed
         self._stepped: Future | None = None
         group = ReentrantCallbackGroup()  # ~/step is answered later, and must not keep the others waiting
@@ -97,35 +73,28 @@ class Control:
         self._housekeeping.serve()
         self._raise_reset()
 
-    def wait_for_turn(self, tick: int, time_ns: int, alive: Callable[[], None]) -> None:
-        """Returns when tick `tick`, at time_ns, may begin; calls `alive` while it waits. Raises Stopped and Reset."""
+    def allowed(self) -> int:
+        """How many ticks may run now. Raises Stopped and Reset."""
+        self.serve()
+        if self.paused and not self._budget:
+            self.pace_changed = True
+            self._end_step("")
+        return self._budget if self.paused else _ALL
+
+    def done(self, ticks: int, tick: int) -> None:
+        """So many ticks have run; the next one is number `tick`."""
         self._tick = tick
-        while True:
-            self.serve()
-            if self.paused and not self._budget:
-                self._anchored = False
-                self._end_step("")
-                self._housekeeping.idle(SERVE_PERIOD_S)
-            else:
-                now = time.monotonic()
-                if not self._anchored:
-                    self._anchored = True
-                    self._pace.anchor(now, time_ns)
-                left_s = self._pace.left_s(now, time_ns)
-                if left_s <= 0:
-                    break
-                time.sleep(min(left_s, SERVE_PERIOD_S))
-            alive()
-        self._budget -= self._budget > 0
+        self._budget = max(self._budget - ticks, 0)
+
+    def idle(self) -> None:
+        """Waits a while, in which no tick may run, for requests. Raises Stopped and Reset."""
+        self._housekeeping.idle(SERVE_PERIOD_S)
+        self._raise_reset()
 
     def begin_run(self) -> None:
         """The next tick is tick 0 of a new run."""
-        self._anchored, self._budget = False, 0
+        self.pace_changed, self._budget, self._tick = True, 0, 0
         self._end_step("the simulation was reset")
-
-    @property
-    def speed(self) -> float:
-        return self._pace.speed
 
     # ---- the callers' side ----------------------------------------------------------------------------------------------
 
@@ -177,8 +146,7 @@ class Control:
     def _take_parameters(self, parameters: list[Parameter]) -> None:
         for parameter in parameters:
             if parameter.name == "speed":
-                self._pace.speed = parameter.value
-                self._anchored = False
+                self.speed, self.pace_changed = parameter.value, True
             elif parameter.name == "paused":
                 self.paused, self._budget = parameter.value, 0
                 self._end_step("`paused` was set meanwhile")

@@ -1,20 +1,19 @@
 # SPDX-License-Identifier: Apache-2.0
-"""The simulator as a ROS 2 node: publishes time, plant truth and sensors of tick k, then waits for the answer stamped k.
+"""The simulator as a ROS 2 node. It flies over the bus (docs/bus.md) with a controller, and publishes what happens:
 
-    /clock                        rosgraph_msgs/Clock               t_k; back to 0 at a reset
-    sim/truth, …                  see sim_topics.py                 for each vehicle, below its namespace
-    <machine>/lockstep/sensors    fcsl_msgs/TickBundle              likewise: sensor channels of tick k (lockstep.py)
-    <machine>/lockstep/actuators  fcsl_msgs/TickBundle              subscribed: the controller's answer to tick k
-    /diagnostics                  diagnostic_msgs/DiagnosticArray   once per second: rate of simulated time
-    ~/pause, ~/resume, ~/step, ~/reset                              see sim_control.py
-The exit status is 0 only if every tick was answered.
+    /clock         rosgraph_msgs/Clock               t_k; back to 0 at a reset
+    sim/truth, …   see sim_topics.py                 for each vehicle, below its namespace
+    /diagnostics   diagnostic_msgs/DiagnosticArray   once per second: rate of simulated time
+    ~/pause, ~/resume, ~/step, ~/reset               see sim_control.py
+Native code makes the ticks, in slices; in between, the node serves its callbacks. The exit status is 0 only if every tick
+was answered.
 """
 
 from __future__ import annotations
 
 import signal
-import struct
 import sys
+import time
 from collections.abc import Mapping
 from contextlib import suppress
 from fractions import Fraction
@@ -24,9 +23,12 @@ from rclpy.node import Node
 from rosgraph_msgs.msg import Clock
 
 from fcsl_sim.config import SimConfig, load
+from fcsl_sim.native import Failed, run_together
 
-from . import qos
+from . import bus_address, qos
+from .bus_address import endpoint
 from .errors import BridgeError, Stopped
+from .forward import Forward, NativeThread
 from .node_main import (
     Option,
     Stop,
@@ -50,14 +52,15 @@ OPTIONS = (
     Option("speed", float, 0.0, "simulated seconds per second at most; 0: as fast as possible", settable=True),
     Option("paused", bool, False, "true: no tick begins; see ~/step", settable=True),
     Option("decimate", int, 1, "a whole number n: truth is published each n-th tick"),
+    bus_address.OPTION,
     Option("timeout_s", float, 5.0, "seconds to wait for the controller's answer to a tick"),
     Option("start_timeout_s", float, 60.0, "seconds to wait for the controller's first answer"),
     Option("wait_for_subscribers", int, 0, "how many subscribers /clock and sim/truth need before the first tick"),
 )
-#: rosgraph_msgs/Clock as CDR.
-_CLOCK = struct.Struct("<4siI")
-_ENCAPSULATION = b"\x00\x01\x00\x00"
-_NS = 1_000_000_000
+#: rosgraph_msgs/Clock as CDR, at time 0.
+_CLOCK_ZERO = b"\x00\x01\x00\x00" + bytes(8)
+#: How long native code runs before the node's callbacks are served, in ms.
+_SLICE_MS = 50
 #: How long the last /clock and truth may take to reach all subscribers, in s.
 _END_S = 5.0
 
@@ -68,23 +71,32 @@ class Simulator:
     def __init__(self, node: Node, stop: Stop, configs: Mapping[str, SimConfig], options: dict[str, Any]):
         """configs: the simulation of each vehicle, by its namespace (empty: the node's own)."""
         self._stop, self._options = stop, options
+        self._endpoint = endpoint(options["bus"])
         self._housekeeping = Housekeeping(node, stop)
         self._control = Control(node, self._housekeeping, options["speed"], options["paused"])
+        self._forward = Forward(lossless=options["wait_for_subscribers"] > 0)
+        self._native = NativeThread(self._forward)
         self._vehicles: list[Vehicle] = []
+        self._clock = qos.publisher(node, Clock, "/clock", qos.STREAM)
+        self._clock_topic = self._forward.add(self._clock)
         try:
             for name, config in configs.items():
-                self._vehicles.append(Vehicle(node, config, name, options["decimate"], self._serve))
+                # The first vehicle listens, and the others are its clients: all controllers find theirs at one address.
+                address = f"zenoh-client:{self._endpoint}" if self._vehicles else f"zenoh:{self._endpoint}"
+                how = (options["decimate"], address, options["timeout_s"], self._forward)
+                self._vehicles.append(Vehicle(node, config, name, *how))
         except BaseException:
             self.close()
             raise
         self._machine = self._vehicles[0].sim.machine
-        self._clock = qos.publisher(node, Clock, "/clock", qos.STREAM)
-        self._progress = Progress(node, self._machine)
+        self._progress = Progress(node, self._machine, self._forward.outbox)
         self._tick = 0
 
     def close(self) -> None:
-        for vehicle in self._vehicles:
+        self._native.close()
+        for vehicle in reversed(self._vehicles):
             vehicle.close()
+        self._forward.close()
         self._housekeeping.close()
 
     def fly(self) -> int:
@@ -93,17 +105,14 @@ class Simulator:
         needed, timeout_s = self._options["wait_for_subscribers"], self._options["start_timeout_s"]
         try:
             wait_for_subscribers((self._clock, *truth), needed, timeout_s, self._stop)
-            print(f"{self._machine.name}: waiting for a controller", flush=True)
-            while any(vehicle.running for vehicle in self._vehicles):
-                try:
-                    self._one_tick()
-                except Reset:
-                    self._begin_again()
+            print(f"{self._machine.name}: waiting for a controller on {self._endpoint}", flush=True)
+            self._fly_on()
         except Stopped:
             for vehicle in self._vehicles:
-                vehicle.leave()
+                vehicle.sim.end(another_follows=False)
             print(self._progress.summary(f"interrupted at tick {self._tick}"))
             return 128 + (self._stop.signal or signal.SIGINT)
+        self._forward.all()
         wait_for_receivers((self._clock, *truth), _END_S)
         with suppress(Stopped):  # nothing is left to interrupt
             self._control.end()
@@ -111,45 +120,74 @@ class Simulator:
         print(self._progress.summary("the stop condition held" if until else "the duration is over"))
         return 0
 
-    def _one_tick(self) -> None:
-        time_ns = self._machine.time_ns(self._tick)
-        self._control.wait_for_turn(self._tick, time_ns, self._wait)
-        running = [vehicle for vehicle in self._vehicles if vehicle.running]
-        for vehicle in running:
-            vehicle.send()
-        self._say_time(time_ns)
-        for vehicle in running:
-            vehicle.topics.publish(vehicle.sim, time_ns)
-        timeout_s = self._options["timeout_s" if self._tick else "start_timeout_s"]
-        for vehicle in running:
-            vehicle.take_answer(timeout_s)
-        self._tick += 1
-        self._tell()
+    def _fly_on(self) -> None:
+        self._begin_run()
+        while any(vehicle.running for vehicle in self._vehicles):
+            try:
+                if not self._meet():
+                    self._control.serve()
+                    self._say_alive()
+                elif ticks := self._control.allowed():
+                    self._run(ticks)
+                else:
+                    self._control.idle()
+                    self._say_alive()
+            except Reset:
+                self._begin_again()
+            self._progress.tell(self._tick, self._control, self._vehicles)
 
-    def _say_time(self, time_ns: int) -> None:
-        self._clock.publish(_CLOCK.pack(_ENCAPSULATION, *divmod(time_ns, _NS)))
-
-    def _serve(self) -> None:
-        """Serves requests, and keeps other vehicles waiting, while one vehicle's answer is due."""
-        self._control.serve()
-        self._wait()
-
-    def _wait(self) -> None:
+    def _begin_run(self) -> None:
+        self._vehicles[0].sim.show_clock(self._forward.outbox, self._clock_topic)
         for vehicle in self._vehicles:
-            vehicle.say_alive()
-        self._tell()
+            vehicle.topics.show(vehicle.sim)
+            vehicle.listen()
+        self._deadline_s = time.monotonic() + self._options["start_timeout_s"]
 
-    def _tell(self) -> None:
-        self._progress.tell(self._tick, self._control, self._vehicles)
+    def _meet(self) -> bool:
+        """Whether all controllers are there. Raises BridgeError."""
+        for vehicle in self._vehicles:
+            if not vehicle.accepted:
+                self._native(vehicle.accept, _SLICE_MS // len(self._vehicles) + 1)
+        missing = [vehicle for vehicle in self._vehicles if not vehicle.accepted]
+        if missing and time.monotonic() > self._deadline_s:
+            limit_s = self._options["start_timeout_s"]
+            raise BridgeError(_named(missing[0], f"no controller within {limit_s} s on {self._endpoint}"))
+        return not missing
+
+    def _run(self, ticks: int) -> None:
+        first = self._vehicles[0].sim
+        if self._control.pace_changed:
+            self._control.pace_changed = False
+            first.set_speed(self._control.speed)
+        try:
+            done = self._native(run_together, [vehicle.sim for vehicle in self._vehicles], ticks, _SLICE_MS)
+        except Failed as error:
+            raise BridgeError(_named(self._vehicles[error.number], str(error))) from None
+        self._tick += done
+        self._control.done(done, self._tick)
+
+    def _say_alive(self) -> None:
+        """Controllers without a tick wait on."""
+        for vehicle in self._vehicles:
+            if vehicle.accepted:
+                vehicle.sim.alive()
 
     def _begin_again(self) -> None:
-        for vehicle in self._vehicles:
+        self._forward.all()
+        for vehicle in reversed(self._vehicles):
+            vehicle.sim.end(another_follows=True)
             vehicle.reset()
         self._tick = 0
-        self._say_time(0)  # at once, because a paused simulation has no tick yet
+        self._clock.publish(_CLOCK_ZERO)  # at once, because a paused simulation has no tick yet
         self._control.begin_run()
         self._progress.begin_run()
+        self._begin_run()
         print("reset: a new run begins", flush=True)
+
+
+def _named(vehicle: Vehicle, text: str) -> str:
+    """An error of a vehicle, with its namespace."""
+    return f"{vehicle.name_space}: {text}" if vehicle.name_space else text
 
 
 def _load(options: dict[str, Any], number: int) -> SimConfig:

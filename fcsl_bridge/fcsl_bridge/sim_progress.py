@@ -10,6 +10,7 @@ from diagnostic_msgs.msg import DiagnosticArray, DiagnosticStatus, KeyValue
 from rclpy.node import Node
 
 from simclient.descriptor import Machine
+from simclient.ros.outbox import Outbox
 
 from . import qos
 from .sim_control import Control
@@ -34,7 +35,8 @@ def verdict(control: Control, tick: int, factor: float) -> tuple[bytes, str]:
 class Progress:
     """Real time counts from the first answered tick of a run, without the wait for the controller."""
 
-    def __init__(self, node: Node, machine: Machine):
+    def __init__(self, node: Node, machine: Machine, outbox: Outbox):
+        self._outbox = outbox
         self._name, self._machine = node.get_fully_qualified_name()[1:], machine
         self._publisher = qos.publisher(node, DiagnosticArray, "/diagnostics", qos.EVENT)
         self._begun = self._printed = self._published = 0.0
@@ -74,7 +76,7 @@ class Progress:
             "real time factor": f"{factor:.3f}",
             "speed": control.speed,
             "tick": self._tick,
-            "repeated bundles": sum(vehicle.dropped for vehicle in vehicles),
+            "messages dropped": self._outbox.dropped,
         }
         level, text = verdict(control, self._tick, factor)
         values = [KeyValue(key=key, value=str(value)) for key, value in figures.items()]

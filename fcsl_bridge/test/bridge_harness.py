@@ -6,27 +6,25 @@ from __future__ import annotations
 import os
 import signal
 import subprocess
-import sys
 import threading
 import time
 from collections.abc import Callable, Sequence
 from pathlib import Path
 from typing import Any
 
+import pytest
 import rclpy
 from rclpy.context import Context
 from rclpy.executors import SingleThreadedExecutor
 from rclpy.node import Node
 from rclpy.qos import QoSProfile
 
-from fcsl_bridge.lockstep import END, Bundle, pack
+from fcsl_bridge.bus_address import endpoint
 from fcsl_compiler.base.ament import package_prefix, package_share
 
 LIMIT_S = 120.0
 SIM = package_share("lander") / "sim" / "lander.sim.json"
 MACHINE = "lander/lander_control"
-SENSORS = "/lander_control/lockstep/sensors"
-ACTUATORS = "/lander_control/lockstep/actuators"
 
 
 class Process:
@@ -95,13 +93,6 @@ class Domain:
         self.processes.append(Process(command, self.environment))
         return self.processes[-1]
 
-    def relay(self, source: str, target: str, tick: int, deed: str) -> Process:
-        """test/relay.py between two topics; ready on return."""
-        script = Path(__file__).with_name("relay.py")
-        process = self.run([sys.executable, script, source, target, str(tick), deed])
-        process.wait_for("relaying")
-        return process
-
     def listener(self) -> Listener:
         self._listeners.append(Listener(self.number))
         return self._listeners[-1]
@@ -123,6 +114,7 @@ class Listener:
     """A node in the test's own process, spun by the test."""
 
     def __init__(self, domain: int):
+        self.domain = domain
         self.context = Context()
         rclpy.init(context=self.context, domain_id=domain)
         self.node = Node("listener", context=self.context)
@@ -141,6 +133,10 @@ class Listener:
             assert time.monotonic() < limit, "timeout: the expected event did not occur"
             self._executor.spin_once(timeout_sec=0.05)
 
+    def spin(self) -> None:
+        """Takes a message that is there."""
+        self._executor.spin_once(timeout_sec=0.0)
+
     def close(self) -> None:
         self._executor.shutdown()
         self.node.destroy_node()
@@ -148,34 +144,34 @@ class Listener:
 
 
 class HandSimulator:
-    """The simulator's side of the bundle topics, driven tick by tick by the test."""
+    """A simulator on the bus, driven tick by tick by the test."""
 
     def __init__(self, listener: Listener):
-        from fcsl_bridge import qos
-        from fcsl_msgs.msg import TickBundle
         from fcsl_sim.config import load
         from fcsl_sim.native import Simulation
 
         config = load(SIM)
         self.sim = Simulation(config.plan, config.tables)
-        self.listener, self.kind = listener, TickBundle
-        self.answers: list[Any] = []
-        self.publisher = listener.node.create_publisher(TickBundle, SENSORS, qos.LOCKSTEP)
-        listener.node.create_subscription(TickBundle, ACTUATORS, self.answers.append, qos.LOCKSTEP)
+        self.listener = listener
+        self._met = False
+        with pytest.MonkeyPatch.context() as patch:
+            patch.setenv("ROS_DOMAIN_ID", str(listener.domain))
+            self.sim.listen(f"zenoh:{endpoint('')}", int(1000 * LIMIT_S))
 
-    def send(self, tick: int, message: bytes, *, kind: int = 0, run: int = 1) -> None:
-        machine = self.sim.machine
-        bundle = Bundle(tick, run, int(machine.source_hash[:16], 16), kind, message)
-        self.publisher.publish(pack(bundle, machine.time_ns(tick)))
+    def meet(self) -> None:
+        """Waits for the controller."""
+        self.listener.until(lambda: self.sim.accept(20))
+        self._met = True
 
     def tick(self) -> None:
-        """Sends one tick and waits for the answer."""
-        due = self.sim.tick
-        self.send(due, self.sim.sense())
-        self.listener.until(lambda: len(self.answers) > due)
-        assert self.answers[due].tick == due
-        self.sim.actuate(bytes(self.answers[due].message))
+        """One tick, with the controller's answer."""
+        from fcsl_sim.native import run_together
 
-    def end(self) -> None:
-        self.send(self.sim.tick, b"", kind=END)
+        if not self._met:
+            self.meet()
+        self.listener.until(lambda: run_together([self.sim], 1, 20) == 1)
+        self.listener.spin()
+
+    def end(self, another_follows: bool = False) -> None:
+        self.sim.end(another_follows)
         self.sim.close()

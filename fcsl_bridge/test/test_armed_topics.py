@@ -14,6 +14,8 @@ import pytest
 from rclpy.duration import Duration
 
 from fcsl_bridge import mapped_topics
+from fcsl_bridge.forward import Forward
+from simclient.ros.outbox import RunTopics
 from simclient.run import Run, open_run
 
 PILOT = """
@@ -81,13 +83,18 @@ def test_a_disarmed_machine_publishes_safe_values(
     publisher = Publisher()
     monkeypatch.setattr(mapped_topics.qos, "publisher", lambda *_: publisher)
     run = opened(tmp_path, **keys)
-    outputs = mapped_topics.Outputs(None, run)  # type: ignore[arg-type]  # the node is for publishers only
+    forward = Forward(lossless=False)
+    messages = RunTopics(run, forward.outbox)
+    mapped_topics.Outputs(None, run, forward, messages)  # type: ignore[arg-type]  # the node is for publishers only
     go = run.machine.fields["pilot.inputs.go"].index
     for on in (False, True, True, False):
         run.set(go, 0, bytes([on]))
         run.step(1)
-        outputs.publish(0)
+        messages.put(0)
+        forward.all()
     assert publisher.values == published
+    messages.close()
+    forward.close()
     run.close()
 
 
@@ -102,6 +109,11 @@ def test_the_end_of_ticking_waits_once_for_all_actuators(
     monkeypatch.setattr(mapped_topics.qos, "publisher", lambda *_: publisher)
     other = {**FORCE, "name": "other", "id": 2, "field": "pilot.outputs.other"}
     run = opened(tmp_path, channels=[{**FORCE, "safe": -1.0}, {**other, "safe": -2.0}], **arm)
-    mapped_topics.Outputs(None, run).make_safe(0)  # type: ignore[arg-type]  # the node is for publishers only
+    forward = Forward(lossless=False)
+    messages = RunTopics(run, forward.outbox)
+    outputs = mapped_topics.Outputs(None, run, forward, messages)  # type: ignore[arg-type]  # the node is for publishers only
+    outputs.make_safe(0)
     assert publisher.values == published and publisher.waited_s <= 0.2
+    messages.close()
+    forward.close()
     run.close()

@@ -39,7 +39,7 @@ CONTROLLER, SIMULATOR = "controller_node", "sim_node"
         (
             CONTROLLER,
             {"machine": MACHINE, "start_timeout_s": 0.5},
-            "no sensor bundle of tick 0 from the simulator within 0.5 s",
+            "no simulator within 0.5 s: cannot connect to tcp/127.0.0.1:",
         ),
         (
             CONTROLLER,
@@ -60,7 +60,7 @@ CONTROLLER, SIMULATOR = "controller_node", "sim_node"
         (
             SIMULATOR,
             {"sim": SIM, "start_timeout_s": 0.5},
-            "no actuator bundle of tick 0 from the controller within 0.5 s",
+            "no controller within 0.5 s on tcp/127.0.0.1:",
         ),
         ("topic_count", {"idle_s": -1.0}, "`idle_s` must be above zero"),
     ],

@@ -30,7 +30,6 @@ from rclpy.serialization import deserialize_message
 
 from fcsl_bridge import qos
 from fcsl_bridge.interfaces import instance_class
-from fcsl_bridge.lockstep import ALIVE, END
 from fcsl_msgs.msg import Checkpoint, MachineState
 from fcsl_msgs.srv import InjectFault, Restore, Save, SetState
 from simclient import AlgTwin
@@ -69,13 +68,9 @@ def test_a_manager_leads_the_node_through_its_states(domain: Domain) -> None:
     assert client.state == "unconfigured"
     assert not client.change(ACTIVATE), "a transition that the state does not have is refused"
     assert client.change(CONFIGURE) and client.state == "inactive"
-    sim.send(0, sim.sim.sense())
-    sim.listener.until(lambda: client.state == "inactive")
-    assert not sim.answers, "an inactive node does not tick"
+    assert not sim.sim.accept(300), "an inactive node does not tick"
     assert client.change(ACTIVATE) and client.state == "active"
-    sim.listener.until(lambda: len(sim.answers) == 1)
-    sim.sim.actuate(bytes(sim.answers[0].message))
-    for _ in range(50):
+    for _ in range(51):
         sim.tick()
     assert client.change(DEACTIVATE) and client.change(ACTIVATE), "it continues at the next tick"
     for _ in range(50):
@@ -172,7 +167,7 @@ def test_what_fails_leads_back_to_unconfigured(domain: Domain, library: Path) ->
     later.parent.symlink_to(library.parent)
     for _ in range(2):
         assert client.change(CONFIGURE) and client.change(ACTIVATE)
-        process.wait_for("no sensor bundle of tick 0 from the simulator within 0.3 s")
+        process.wait_for("no simulator within 0.3 s")
         client._listener.until(lambda: client.state == "unconfigured")
     process.signal(signal.SIGINT)
     assert process.finish() == 0
@@ -260,37 +255,21 @@ def test_a_watcher_learns_of_a_dead_controller(domain: Domain, library: Path) ->
 
 def test_rosout_has_transitions_and_what_ended_the_node(domain: Domain, library: Path) -> None:
     """Of a node that was there for long enough to be known."""
-    process, _, sim = locked(domain, timeout_s=60.0)
+    process, _, sim = locked(domain, timeout_s=2.0)
     sim.listener.subscribe(Log, "/rosout", qos.LATCHED_HISTORY)
     said = sim.listener.received["/rosout"]
 
     def until_said(text: str) -> None:
         sim.listener.until(lambda: any(text in deserialize_message(message, Log).msg for message in said))
 
-    sim.send(0, b"", kind=ALIVE)
-    until_said("the simulator is there")
-    sim.send(1, b"", run=2)
-    until_said("waiting for tick 0 from the simulator")
-    sim.publisher.publish(b"\0" * 8)
-    until_said("a damaged bundle")
+    sim.tick()
+    until_said("no time message of tick 1 within 2000 ms")
     assert process.finish() == 1
     domain.start("controller_node", machine=library, mode="realtime")
     until_said("IDLE -> FLY")
 
 
 # ---- a new run -------------------------------------------------------------------------------------------------------
-
-
-def fly(sim: HandSimulator, run: int, ticks: int) -> None:
-    """Runs the first ticks of a run; answers of other controllers are received, too."""
-
-    def answer(tick: int) -> list[bytes]:
-        return [bytes(a.message) for a in sim.answers if (a.run, a.tick) == (run, tick)]
-
-    for tick in range(ticks):
-        sim.send(tick, sim.sim.sense(), run=run)
-        sim.listener.until(lambda due=tick: bool(answer(due)))
-        sim.sim.actuate(answer(tick)[0])
 
 
 def test_a_new_run_starts_over_with_the_parameters_that_hold(domain: Domain) -> None:
@@ -300,11 +279,13 @@ def test_a_new_run_starts_over_with_the_parameters_that_hold(domain: Domain) -> 
         sim.tick()
     assert client.set(ascent__gain=2.0).successful
     bag = domain.folder / "bag"
-    for run in (2, 3):
+    for _ in range(2):
+        sim.end(another_follows=True)
         sim = HandSimulator(domain.listener())
-        fly(sim, run, 30)
+        for _ in range(30):
+            sim.tick()
     assert client.get("ascent.gain") == 2.0
-    sim.send(30, b"", kind=END, run=3)
+    sim.end()
     assert process.finish() == 0
     assert f"30 ticks, 0.300 s; recorded to {bag}_3" in process.out
     assert Bag(bag).topics["/lander_control/engine"].count == 20

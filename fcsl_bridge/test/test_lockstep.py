@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Two processes in lock-step give the results of one, and report the tick of a missing bundle."""
+"""Two nodes in lock-step give the results of one process, and report the tick of a missing answer."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ from collections.abc import Callable, Iterator
 from pathlib import Path
 
 import pytest
-from bridge_harness import ACTUATORS, MACHINE, SENSORS, SIM, Domain, Process
+from bridge_harness import MACHINE, SIM, Domain
 
 from simclient.bag import Bag
 from simclient.bag.digest import digest
@@ -22,7 +22,6 @@ SEED = 7
 #: Long enough for the first change of state (6.75 s).
 DURATION = "8.0"
 TICKS = 800
-RELAYED = "/relayed"
 #: Time limit of those tests that let it expire.
 PATIENCE_S = 4.0
 
@@ -76,70 +75,6 @@ def test_exact_counts_for_an_independent_subscriber(domain: Domain) -> None:
     counts = json.loads(counter.out)
     assert {counts[t] for t in ("/clock", "/sim/truth", "/lander_control/engine", "/lander_control/sensors")} == {200}
     assert "/rosout" in counts
-    assert counts[SENSORS] == 201 and counts[ACTUATORS] == 200
-
-
-def start_relayed(domain: Domain, topic: str, deed: str, timeout_s: float = 60.0) -> tuple[Process, Process]:
-    """Controller and simulator; `topic` goes through a relay that alters the bundle of tick 17."""
-    domain.relay(topic, RELAYED, 17, deed)
-    heard = ("-r", f"{topic}:={RELAYED}")
-    to_controller, to_sim = (heard, ()) if topic == SENSORS else ((), heard)
-    bag = domain.folder / "bag"
-    controller = domain.start("controller_node", *to_controller, machine=MACHINE, record=bag, timeout_s=timeout_s)
-    sim = domain.start("sim_node", *to_sim, sim=SIM, seed=SEED, duration="2.0", timeout_s=timeout_s)
-    return controller, sim
-
-
-def test_a_late_bundle_is_waited_for(domain: Domain) -> None:
-    controller, sim = start_relayed(domain, SENSORS, "hold")
-    assert (sim.finish(), controller.finish()) == (0, 0)
-    assert "200 ticks answered" in sim.out
-
-
-@pytest.mark.parametrize("topic", [SENSORS, ACTUATORS])
-def test_a_repeated_bundle_is_dropped(domain: Domain, topic: str, reference: Callable[[int, str], Path]) -> None:
-    controller, sim = start_relayed(domain, topic, "repeat")
-    assert (sim.finish(), controller.finish()) == (0, 0)
-    assert digest(domain.folder / "bag") == digest(reference(SEED, "2.0"))
-
-
-@pytest.mark.parametrize(("topic", "missed"), [(SENSORS, 17), (ACTUATORS, 18)])
-def test_a_lost_bundle_is_named(domain: Domain, topic: str, missed: int) -> None:
-    """`missed`: the tick whose sensors the controller never receives."""
-    controller, sim = start_relayed(domain, topic, "drop", PATIENCE_S)
-    assert (sim.finish(), controller.finish()) == (1, 1)
-    assert f"no actuator bundle of tick 17 from the controller within {PATIENCE_S} s" in sim.err
-    said = f"no sensor bundle of tick {missed} from the simulator within {PATIENCE_S} s"
-    assert said in controller.err
-
-
-@pytest.mark.parametrize(
-    ("deed", "message"),
-    [
-        ("skip", "no sensor bundle of tick 17: that of tick 18 came instead"),
-        ("corrupt", "tick 17: sensor message refused"),
-        ("alien", "carries bundles of machine 00000000000000ff, but this is lander_control"),
-        ("name", "a damaged bundle: not little-endian CDR with an empty frame_id"),
-    ],
-)
-def test_the_controller_refuses(domain: Domain, deed: str, message: str) -> None:
-    """It also leaves, so that the simulator does not wait."""
-    controller, sim = start_relayed(domain, SENSORS, deed)
-    assert controller.finish() == 1 and message in controller.err
-    assert sim.finish() == 1 and "the controller ended the run: it does not answer tick 17" in sim.err
-
-
-@pytest.mark.parametrize(
-    ("deed", "message"),
-    [
-        ("skip", "no actuator bundle of tick 17: that of tick 18 came instead"),
-        ("corrupt", "tick 17"),
-        ("alien", "carries bundles of machine 00000000000000ff, but this is lander_control"),
-    ],
-)
-def test_the_simulator_refuses(domain: Domain, deed: str, message: str) -> None:
-    _, sim = start_relayed(domain, ACTUATORS, deed)
-    assert sim.finish() == 1 and message in sim.err
 
 
 def test_killed_controller(domain: Domain) -> None:
@@ -149,8 +84,8 @@ def test_killed_controller(domain: Domain) -> None:
     controller.signal(signal.SIGKILL)
     controller.finish()
     assert sim.finish() == 1
-    found = re.search(rf"no actuator bundle of tick (\d+) from the controller within {PATIENCE_S} s", sim.err)
-    assert found and int(found[1]) >= 675
+    found = re.search(r"tick (\d+): .*the controller (went away|is gone)", sim.err)
+    assert found and int(found[1]) >= 675, sim.err
 
 
 def test_killed_simulator(domain: Domain) -> None:
@@ -161,7 +96,7 @@ def test_killed_simulator(domain: Domain) -> None:
     sim.signal(signal.SIGKILL)
     sim.finish()
     assert controller.finish() == 1
-    found = re.search(rf"no sensor bundle of tick (\d+) from the simulator within {PATIENCE_S} s", controller.err)
+    found = re.search(r"the simulator went away before (?:actuator message of )?tick (\d+)", controller.err)
     assert found and Bag(bag).topics["/lander_control/engine"].count == int(found[1])
     assert not Bag(bag).truncated
 
@@ -205,7 +140,7 @@ def test_interrupted_after_the_other_end_was_killed(domain: Domain, killed: str)
     dead.finish()
     began = time.monotonic()
     other.signal(signal.SIGINT)
-    assert other.finish() == (0 if other is controller else 128 + signal.SIGINT)
+    assert other.finish() == 0 if other is controller else other.finish() in (1, 128 + signal.SIGINT)
     assert time.monotonic() - began < 4.0
 
 

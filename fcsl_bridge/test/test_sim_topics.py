@@ -6,24 +6,27 @@ from __future__ import annotations
 import json
 import shutil
 import signal
+import subprocess
 from pathlib import Path
 from typing import Any
 
 import pytest
-from bridge_harness import MACHINE, SIM, Domain, Listener
+from bridge_harness import MACHINE, SIM, Domain, Listener, Process
 from controller_client import ControllerClient
 from geometry_msgs.msg import PoseStamped
 from nav_msgs.msg import Odometry
-from rclpy.serialization import deserialize_message, serialize_message
+from rclpy.serialization import deserialize_message
+from rosgraph_msgs.msg import Clock
 from sensor_msgs.msg import Range
 
 from fcsl_bridge import qos
-from fcsl_bridge.sim_topics import TruthMessage, below
+from fcsl_bridge.sim_topics import below
 from fcsl_compiler.base.ament import package_share
 from fcsl_msgs.msg import PlantTruth
 from fcsl_msgs.srv import Step
 from fcsl_sim.config import load
 from fcsl_sim.native import Simulation
+from simclient.library import runtime_program
 
 #: Stamp of the last truth of a flight of one second at 100 Hz, each second tick shown.
 LAST_NS = 980_000_000
@@ -66,7 +69,7 @@ def test_truth_as_odometry_and_pose(domain: Domain) -> None:
 
 
 def test_mapped_sensor_channels_are_published(domain: Domain, tmp_path: Path) -> None:
-    """When the simulation samples them, with the values of the bundle; no controller is needed."""
+    """When the simulation samples them, with the values that the controller gets."""
     share = package_share("lander")
     for folder in ("fc", "sim"):
         shutil.copytree(share / folder, tmp_path / folder)
@@ -76,10 +79,15 @@ def test_mapped_sensor_channels_are_published(domain: Domain, tmp_path: Path) ->
     content["channels"][0]["ros"] = ros
     machine.write_text(json.dumps(content), encoding="utf-8")
     listener = domain.listener()
-    listener.subscribe(Range, "/craft/altimeter", qos.STREAM)
+    for kind, topic in ((Range, "/craft/altimeter"), (PlantTruth, "/craft/sim/truth"), (Clock, "/clock")):
+        listener.subscribe(kind, topic, qos.STREAM)
     sim_file = tmp_path / "sim" / "lander.sim.json"
-    sim = domain.start("sim_node", "-r", "__ns:=/craft", sim=sim_file, seed=7, paused="true")
-    sim.wait_for("waiting for a controller")
+    done = subprocess.run(["fcslc", "build", machine, "-o", tmp_path / "out"], capture_output=True, text=True)
+    assert done.returncode == 0, done.stderr
+    sim = domain.start("sim_node", "-r", "__ns:=/craft", sim=sim_file, seed=7, paused="true", wait_for_subscribers=1)
+    library = tmp_path / "out" / "liblander_control.so"
+    address = sim_address(sim)
+    domain.run([runtime_program("fcsl-fc"), library, "--hal", f"zenoh:{address}", "--namespace", "craft"])
     listener.until(lambda: listener.node.count_publishers("/craft/altimeter") == 1)
     assert ControllerClient(listener, "/craft/sim_node").set(paused=False).successful
     listener.until(lambda: bool(listener.received["/craft/altimeter"]))
@@ -95,16 +103,9 @@ def test_mapped_sensor_channels_are_published(domain: Domain, tmp_path: Path) ->
     assert sim.finish() == 128 + signal.SIGTERM
 
 
-def test_plant_truth_is_its_cdr() -> None:
-    config = load(SIM, seed=7)
-    with Simulation(config.plan, config.tables) as sim:
-        sim.sense()
-        data = TruthMessage(sim).compose(sim, 123, 1_230_000_000)
-        message = deserialize_message(data, PlantTruth)
-        assert (message.tick, stamp_ns(message)) == (123, 1_230_000_000)
-        assert list(message.name) == sim.truth_names()
-        assert list(message.value) == [float(sim.get(name)) for name in message.name]  # type: ignore[arg-type]
-        assert len(serialize_message(message)) == len(data)
+def sim_address(sim: Process) -> str:
+    sim.wait_for("waiting for a controller on ")
+    return sim.out.rsplit("waiting for a controller on ", 1)[1].split()[0]
 
 
 def test_topics_below_a_vehicle() -> None:

@@ -147,7 +147,6 @@ def test_decimation_applies_to_outputs_only(domain: Domain) -> None:
     assert controller.finish() == 0
     ticks = [struct.unpack_from("<Q", data, 20)[0] for data in listener.received["/lander_control/engine"]]
     assert ticks == list(range(0, 101, 10))
-    assert [a.tick for a in sim.answers] == list(range(101))
     assert Bag(domain.folder / "bag").topics["/lander_control/engine"].count == 101
 
 
@@ -158,7 +157,6 @@ def test_state_reaches_a_late_subscriber_and_clock_makes_no_tick(domain: Domain)
         clock.publish(Clock(clock=Time(sec=second)))
     while sim.sim.tick < 680:
         sim.tick()
-    assert [a.tick for a in sim.answers] == list(range(680)), "a tick without a bundle"
     late = domain.listener()
     late.subscribe(MachineState, "/lander_control/state", qos.LATCHED)
     late.subscribe(InstanceHealth, "/lander_control/health", qos.LATCHED)
@@ -192,6 +190,7 @@ def test_quality_of_service(domain: Domain) -> None:
         latched = topic in ("state", "health", "faults")
         wanted = DurabilityPolicy.TRANSIENT_LOCAL if latched else DurabilityPolicy.VOLATILE
         assert offered(topic).durability == wanted, topic
+    sim.meet()
     sim.end()
     assert controller.finish() == 0
 

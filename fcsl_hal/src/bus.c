@@ -180,6 +180,10 @@ static int declare(fcsl_bus_t *bus, const fcsl_bus_options_t *options, char *err
     for (uint32_t i = 0; i < options->output_count && !failed; i++) {
         failed = fcsl_zenoh_declare_output(zenoh, i, options->outputs[i], options->observer, error, error_size);
     }
+    for (uint32_t i = 0; i < options->constant_count && !failed; i++) {
+        const fcsl_bus_constant_t *constant = &options->constants[i];
+        failed = fcsl_zenoh_declare_constant(zenoh, constant->key, constant->bytes, constant->size, error, error_size);
+    }
     for (uint32_t i = 0; i < options->watched_count && !failed; i++) {
         failed = fcsl_zenoh_watch_token(zenoh, i, options->watched[i], error, error_size);
     }

@@ -90,6 +90,27 @@ static int check_inputs(const fcsl_bus_options_t *options, char *error, size_t e
     return 0;
 }
 
+static int check_constants(const fcsl_bus_options_t *options, char *error, size_t error_size)
+{
+    if (options->constant_count > FCSL_BUS_KEYS_MAX) {
+        (void)snprintf(error, error_size, "the bus has %u constants; at most %u are possible", options->constant_count,
+                       FCSL_BUS_KEYS_MAX);
+        return -1;
+    }
+    for (uint32_t i = 0; i < options->constant_count; i++) {
+        const fcsl_bus_constant_t *constant = &options->constants[i];
+        if (check_key("a constant", constant->key, "*$?#", error, error_size) != 0) {
+            return -1;
+        }
+        if (constant->size > FCSL_BUS_MESSAGE_MAX) {
+            (void)snprintf(error, error_size, "constant '%s' of the bus has %u bytes; at most %u are possible",
+                           constant->key, constant->size, FCSL_BUS_MESSAGE_MAX);
+            return -1;
+        }
+    }
+    return 0;
+}
+
 /* The endpoint with a number for its host. */
 static int read_endpoint(const char *endpoint, char text[ENDPOINT_BYTES], char *error, size_t error_size)
 {
@@ -130,7 +151,7 @@ int bus_config_check(const fcsl_bus_options_t *options, char *error, size_t erro
         check_keys("a watched token", options->watched, options->watched_count, error, error_size) != 0) {
         return -1;
     }
-    return check_inputs(options, error, error_size);
+    return check_constants(options, error, error_size) != 0 ? -1 : check_inputs(options, error, error_size);
 }
 
 int bus_config_write(const fcsl_bus_options_t *options, char text[BUS_CONFIG_BYTES], char *error, size_t error_size)

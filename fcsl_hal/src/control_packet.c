@@ -18,12 +18,12 @@ static const uint8_t MAGIC[4] = {'F', 'C', 'S', 'W'};
 int control_parse(const uint8_t *bytes, size_t size, control_packet_t *packet)
 {
     if (size < CONTROL_HEADER_BYTES || size > CONTROL_PACKET_MAX || memcmp(bytes, MAGIC, sizeof MAGIC) != 0 ||
-        fcsl_get_u16(bytes + 4) != VERSION || bytes[6] < CONTROL_HELLO || bytes[6] > CONTROL_END || bytes[7] > 1u) {
+        fcsl_get_u16(bytes + 4) != VERSION || bytes[6] < CONTROL_HELLO || bytes[6] > CONTROL_ALIVE || bytes[7] > 1u) {
         return -1;
     }
     memset(packet, 0, sizeof *packet);
     packet->kind = (control_kind_t)bytes[6];
-    packet->sends_time = bytes[7];
+    packet->flag = bytes[7];
     packet->table_hash = fcsl_get_u32(bytes + 8);
     packet->tick_hz = fcsl_get_u64(bytes + 12);
     memcpy(packet->text, bytes + CONTROL_HEADER_BYTES, size - CONTROL_HEADER_BYTES);
@@ -37,7 +37,7 @@ static fcsl_wire_status_t send_packet(const fcsl_wire_t *wire, const control_pac
     memcpy(bytes, MAGIC, sizeof MAGIC);
     fcsl_put_u16(bytes + 4, VERSION);
     bytes[6] = (uint8_t)packet->kind;
-    bytes[7] = packet->sends_time != 0;
+    bytes[7] = packet->flag != 0;
     fcsl_put_u32(bytes + 8, packet->table_hash);
     fcsl_put_u64(bytes + 12, packet->tick_hz);
     memcpy(bytes + CONTROL_HEADER_BYTES, packet->text, length);
@@ -47,7 +47,7 @@ static fcsl_wire_status_t send_packet(const fcsl_wire_t *wire, const control_pac
 fcsl_wire_status_t control_send_hello(const fcsl_wire_t *wire, const fcsl_channel_table_t *table, int sends_time)
 {
     const control_packet_t packet = {
-        .kind = CONTROL_HELLO, .sends_time = sends_time, .table_hash = table->hash, .tick_hz = table->machine->tick_hz};
+        .kind = CONTROL_HELLO, .flag = sends_time, .table_hash = table->hash, .tick_hz = table->machine->tick_hz};
     return send_packet(wire, &packet);
 }
 
@@ -58,9 +58,15 @@ fcsl_wire_status_t control_send_refusal(const fcsl_wire_t *wire, const char *tex
     return send_packet(wire, &packet);
 }
 
-fcsl_wire_status_t control_send_end(const fcsl_wire_t *wire)
+fcsl_wire_status_t control_send_end(const fcsl_wire_t *wire, int another_follows)
 {
-    const control_packet_t packet = {.kind = CONTROL_END};
+    const control_packet_t packet = {.kind = CONTROL_END, .flag = another_follows};
+    return send_packet(wire, &packet);
+}
+
+fcsl_wire_status_t control_send_alive(const fcsl_wire_t *wire)
+{
+    const control_packet_t packet = {.kind = CONTROL_ALIVE};
     return send_packet(wire, &packet);
 }
 

@@ -6,7 +6,7 @@
  *   0      4   magic "FCSW" (messages of channels begin with an id from 0xff00 on)
  *   4      2   version (1)
  *   6      1   kind
- *   7      1   hello: 1 when the sender is a simulator that sends the time; else zero
+ *   7      1   hello: 1 when the sender is a simulator that sends the time; end: 1 when another run follows; else zero
  *   8      4   channel-table hash    hello only, else zero
  *   12     8   tick_hz               hello only, else zero
  *   20     n   text, not terminated  refusal only, at most CONTROL_TEXT_MAX bytes
@@ -23,15 +23,19 @@ enum {
     CONTROL_PACKET_MAX = CONTROL_HEADER_BYTES + CONTROL_TEXT_MAX,
 };
 
+/* How often a party that pauses says that it is alive. */
+#define CONTROL_ALIVE_NS 500000000u
+
 typedef enum {
     CONTROL_HELLO = 1,
     CONTROL_REFUSAL = 2,
-    CONTROL_END = 3, /* the run is over; nothing follows */
+    CONTROL_END = 3,   /* the run is over */
+    CONTROL_ALIVE = 4, /* the sender pauses: whoever waits for it shall wait on */
 } control_kind_t;
 
 typedef struct {
     control_kind_t kind;
-    int sends_time;
+    int flag; /* the byte at offset 7 */
     uint32_t table_hash;
     uint64_t tick_hz;
     char text[CONTROL_TEXT_MAX + 1];
@@ -43,7 +47,8 @@ int control_parse(const uint8_t *bytes, size_t size, control_packet_t *packet);
 /* Each sends one packet without waiting. */
 fcsl_wire_status_t control_send_hello(const fcsl_wire_t *wire, const fcsl_channel_table_t *table, int sends_time);
 fcsl_wire_status_t control_send_refusal(const fcsl_wire_t *wire, const char *text);
-fcsl_wire_status_t control_send_end(const fcsl_wire_t *wire);
+fcsl_wire_status_t control_send_end(const fcsl_wire_t *wire, int another_follows);
+fcsl_wire_status_t control_send_alive(const fcsl_wire_t *wire);
 
 /* Why the peer's hello does not fit: returns 1 and fills `text`, or 0 when it fits. */
 int control_differs(const control_packet_t *hello, const fcsl_channel_table_t *table, char *text, size_t text_size);

@@ -14,7 +14,13 @@
 #include "monotonic.h"
 #include "wire_named.h"
 
-enum { TEXT_BYTES = 512, SPEC_BYTES = 256, TIME_BYTES = 64 };
+enum {
+    TEXT_BYTES = 512,
+    SPEC_BYTES = 256,
+    TIME_BYTES = 64,
+    JOIN_MS = 10000,
+    LOOK_NS = 20 * NS_PER_MS, /* a moment */
+};
 
 static const struct timespec PAUSE = {.tv_nsec = 20 * NS_PER_MS};
 
@@ -22,6 +28,10 @@ struct fcsl_external {
     fcsl_channel_table_t table;
     fcsl_wire_t wire;
     uint64_t messages_dropped;
+    int waits; /* for an actuator message, until deadline_ns */
+    uint64_t deadline_ns;
+    uint64_t alive_ns; /* when the next sign of life is due */
+    int ended; /* the controller was told */
     uint8_t *inbox;
     size_t inbox_size;
     char spec[SPEC_BYTES];
@@ -96,8 +106,10 @@ int fcsl_external_open_bus(const char *address, const char *name_space, const fc
     if (self == NULL) {
         return -1;
     }
-    if (fcsl_wire_open_named(address, name_space, &self->table, FCSL_WIRE_LISTEN, 0, &self->wire, error, error_size) !=
-        0) {
+    /* A client of another simulator, which may be started later; who listens waits for nobody. */
+    const uint64_t deadline_ns = monotonic_ns() + JOIN_MS * (uint64_t)NS_PER_MS;
+    if (fcsl_wire_open_named(address, name_space, &self->table, FCSL_WIRE_LISTEN, deadline_ns, &self->wire, error,
+                             error_size) != 0) {
         release(self);
         return -1;
     }
@@ -111,9 +123,19 @@ static fcsl_hal_status_t wire_failed(fcsl_external_t *external)
     return FCSL_HAL_ERROR;
 }
 
+/* Waits for a message, for a short time at most. */
 static fcsl_wire_status_t receive(fcsl_external_t *external, uint64_t deadline_ns, size_t *size)
 {
-    return external->wire.receive(external->wire.ctx, deadline_ns, external->inbox, external->inbox_size, size);
+    const uint64_t look_ns = monotonic_ns() + LOOK_NS;
+    return external->wire.receive(external->wire.ctx, look_ns < deadline_ns ? look_ns : deadline_ns, external->inbox,
+                                  external->inbox_size, size);
+}
+
+/* Whether a wait that began then, and brought nothing, was ended by a signal. */
+static int is_early(uint64_t begun_ns, uint64_t deadline_ns)
+{
+    const uint64_t now_ns = monotonic_ns();
+    return now_ns < begun_ns + LOOK_NS && now_ns < deadline_ns;
 }
 
 /* ---- meeting ------------------------------------------------------------------------------------------------------- */
@@ -134,31 +156,36 @@ static fcsl_hal_status_t answer(fcsl_external_t *external, const control_packet_
     return status == FCSL_WIRE_OK ? FCSL_HAL_OK : FCSL_HAL_NONE;
 }
 
+/* Looks at what came, or did not: OK when the controller is there, NONE to wait on. */
+static fcsl_hal_status_t meet(fcsl_external_t *external, fcsl_wire_status_t status, size_t size)
+{
+    control_packet_t hello;
+    if (status == FCSL_WIRE_ERROR) {
+        return wire_failed(external);
+    }
+    if (status == FCSL_WIRE_CLOSED) { /* a wire that cannot be connected again says so at once, again and again */
+        (void)nanosleep(&PAUSE, NULL);
+    }
+    if (status == FCSL_WIRE_OK && control_parse(external->inbox, size, &hello) == 0 && hello.kind == CONTROL_HELLO) {
+        return answer(external, &hello);
+    }
+    external->messages_dropped += status == FCSL_WIRE_OK ? 1u : 0u;
+    return FCSL_HAL_NONE;
+}
+
 fcsl_hal_status_t fcsl_external_accept(fcsl_external_t *external, uint32_t timeout_ms)
 {
     const uint64_t deadline_ns = monotonic_ns() + (uint64_t)timeout_ms * NS_PER_MS;
     do { /* every turn takes a message or waits; whoever is no controller is passed over */
         size_t size = 0;
-        control_packet_t hello;
+        const uint64_t begun_ns = monotonic_ns();
         const fcsl_wire_status_t status = receive(external, deadline_ns, &size);
-        if (status == FCSL_WIRE_ERROR) {
-            return wire_failed(external);
-        }
-        if (status == FCSL_WIRE_NONE && monotonic_ns() < deadline_ns) {
+        if (status == FCSL_WIRE_NONE && is_early(begun_ns, deadline_ns)) {
             return FCSL_HAL_NONE;
         }
-        /* A wire that cannot be connected again says so at once, again and again. */
-        if (status == FCSL_WIRE_CLOSED && nanosleep(&PAUSE, NULL) != 0) {
-            return FCSL_HAL_NONE;
-        }
-        if (status == FCSL_WIRE_OK && control_parse(external->inbox, size, &hello) == 0 &&
-            hello.kind == CONTROL_HELLO) {
-            const fcsl_hal_status_t answered = answer(external, &hello);
-            if (answered != FCSL_HAL_NONE) {
-                return answered;
-            }
-        } else if (status == FCSL_WIRE_OK) {
-            external->messages_dropped++;
+        const fcsl_hal_status_t met = meet(external, status, size);
+        if (met != FCSL_HAL_NONE) {
+            return met;
         }
     } while (monotonic_ns() < deadline_ns);
     (void)snprintf(external->text, sizeof external->text, "no controller on %s within %" PRIu32 " ms", external->spec,
@@ -200,15 +227,26 @@ fcsl_hal_status_t fcsl_external_send(fcsl_external_t *external, const fcsl_messa
                                  : status;
 }
 
-/* Looks at what came: OK when it is the message of `tick`, NONE when it counts for nothing. */
+static void wait_anew(fcsl_external_t *external, uint32_t timeout_ms)
+{
+    external->deadline_ns = monotonic_ns() + (uint64_t)timeout_ms * NS_PER_MS;
+    external->waits = 1;
+}
+
+/* The controller's run is over, or it began another one. */
+static fcsl_hal_status_t controller_left(fcsl_external_t *external, control_kind_t kind, uint64_t tick)
+{
+    (void)snprintf(external->text, sizeof external->text, "the controller %s before actuator message of tick %" PRIu64,
+                   kind == CONTROL_END ? "ended its run" : "was started again", tick);
+    return FCSL_HAL_CLOSED;
+}
+
+/* Looks at what came: OK when it is the message of `tick`, NONE when it counts for nothing, WAITING for a sign of life. */
 static fcsl_hal_status_t look_at(fcsl_external_t *external, uint64_t tick, size_t size, fcsl_message_t *message)
 {
     control_packet_t packet;
     if (control_parse(external->inbox, size, &packet) == 0 && packet.kind != CONTROL_REFUSAL) {
-        (void)snprintf(external->text, sizeof external->text,
-                       "the controller %s before actuator message of tick %" PRIu64,
-                       packet.kind == CONTROL_END ? "ended its run" : "was started again", tick);
-        return FCSL_HAL_CLOSED;
+        return packet.kind == CONTROL_ALIVE ? FCSL_HAL_WAITING : controller_left(external, packet.kind, tick);
     }
     if (fcsl_message_check(&external->table, FCSL_ACTUATOR_MESSAGE, external->inbox, size, message) !=
             FCSL_MESSAGE_OK ||
@@ -224,34 +262,76 @@ static fcsl_hal_status_t look_at(fcsl_external_t *external, uint64_t tick, size_
     return FCSL_HAL_OK;
 }
 
-fcsl_hal_status_t fcsl_external_receive(fcsl_external_t *external, uint64_t tick, uint32_t timeout_ms,
-                                        fcsl_message_t *message)
+static fcsl_hal_status_t timed_out(fcsl_external_t *external, uint64_t tick, uint32_t timeout_ms)
 {
-    const uint64_t deadline_ns = monotonic_ns() + (uint64_t)timeout_ms * NS_PER_MS;
-    do { /* every turn takes a message or waits */
-        size_t size = 0;
-        const fcsl_wire_status_t status = receive(external, deadline_ns, &size);
-        if (status == FCSL_WIRE_ERROR) {
-            return wire_failed(external);
-        }
-        if (status == FCSL_WIRE_CLOSED) {
-            (void)snprintf(external->text, sizeof external->text,
-                           "the controller went away before actuator message of tick %" PRIu64, tick);
-            return FCSL_HAL_CLOSED;
-        }
-        if (status == FCSL_WIRE_NONE && monotonic_ns() < deadline_ns) {
-            return FCSL_HAL_NONE;
-        }
-        const fcsl_hal_status_t seen = status == FCSL_WIRE_OK ? look_at(external, tick, size, message) : FCSL_HAL_NONE;
-        if (seen != FCSL_HAL_NONE) {
-            return seen;
-        }
-    } while (monotonic_ns() < deadline_ns);
     (void)snprintf(external->text, sizeof external->text,
                    "no actuator message of tick %" PRIu64 " within %" PRIu32 " ms (%" PRIu64
                    " malformed or late messages dropped)",
                    tick, timeout_ms, external->messages_dropped);
     return FCSL_HAL_TIMEOUT;
+}
+
+/* One wait: WAITING to go on with it. */
+static fcsl_hal_status_t wait_once(fcsl_external_t *external, uint64_t tick, uint32_t timeout_ms,
+                                   fcsl_message_t *message)
+{
+    size_t size = 0;
+    const uint64_t begun_ns = monotonic_ns();
+    const fcsl_wire_status_t status = receive(external, external->deadline_ns, &size);
+    if (status == FCSL_WIRE_ERROR) {
+        return wire_failed(external);
+    }
+    if (status == FCSL_WIRE_CLOSED) {
+        (void)snprintf(external->text, sizeof external->text,
+                       "the controller went away before actuator message of tick %" PRIu64, tick);
+        return FCSL_HAL_CLOSED;
+    }
+    if (status == FCSL_WIRE_NONE && is_early(begun_ns, external->deadline_ns)) {
+        return FCSL_HAL_NONE;
+    }
+    const fcsl_hal_status_t seen = status == FCSL_WIRE_OK ? look_at(external, tick, size, message) : FCSL_HAL_NONE;
+    if (seen == FCSL_HAL_WAITING) {
+        wait_anew(external, timeout_ms);
+    } else if (seen != FCSL_HAL_NONE) {
+        return seen;
+    }
+    return monotonic_ns() < external->deadline_ns ? FCSL_HAL_WAITING : timed_out(external, tick, timeout_ms);
+}
+
+fcsl_hal_status_t fcsl_external_await(fcsl_external_t *external, uint64_t tick, uint32_t timeout_ms,
+                                      fcsl_message_t *message)
+{
+    if (!external->waits) {
+        wait_anew(external, timeout_ms);
+    }
+    const fcsl_hal_status_t status = wait_once(external, tick, timeout_ms, message);
+    external->waits = status == FCSL_HAL_WAITING;
+    return status;
+}
+
+fcsl_hal_status_t fcsl_external_receive(fcsl_external_t *external, uint64_t tick, uint32_t timeout_ms,
+                                        fcsl_message_t *message)
+{
+    fcsl_hal_status_t status = FCSL_HAL_WAITING;
+    while (status == FCSL_HAL_WAITING) { /* ends at the time-out at the latest */
+        status = fcsl_external_await(external, tick, timeout_ms, message);
+    }
+    return status;
+}
+
+void fcsl_external_alive(fcsl_external_t *external)
+{
+    const uint64_t now_ns = monotonic_ns();
+    if (now_ns >= external->alive_ns) {
+        external->alive_ns = now_ns + CONTROL_ALIVE_NS;
+        (void)control_send_alive(&external->wire); /* the next one comes soon */
+    }
+}
+
+void fcsl_external_end(fcsl_external_t *external, int another_follows)
+{
+    external->ended = 1;
+    (void)control_send_end(&external->wire, another_follows); /* to nobody, when the controller is gone */
 }
 
 const char *fcsl_external_explain(const fcsl_external_t *external)
@@ -269,7 +349,9 @@ void fcsl_external_close(fcsl_external_t *external)
     if (external == NULL) {
         return;
     }
-    (void)control_send_end(&external->wire); /* to nobody, when the controller is gone */
+    if (!external->ended) {
+        fcsl_external_end(external, 0);
+    }
     external->wire.close(external->wire.ctx);
     release(external);
 }

@@ -94,6 +94,7 @@ int fcsl_hal_stub(fcsl_hal_t *hal, char *error, size_t error_size)
         .read_log = stub_read_log,
         .count = stub_nothing,
         .explain = stub_explain,
+        .alive = stub_nothing,
         .interrupt = stub_nothing,
         .close = free,
     };

@@ -55,8 +55,14 @@ typedef struct {
     fcsl_channel_table_t table;
     fcsl_wire_t wire;
     int has_wire;
+    int greets; /* the hello was sent, and not answered yet */
     int is_over; /* the peer has ended the run, or is gone */
     int paces;
+    int sensed;           /* the sensor message of the tick has come */
+    int waits;            /* for that tick, until deadline_ns */
+    uint64_t deadline_ns;
+    uint64_t alive_ns;    /* when the next sign of life is due */
+    uint32_t open_ms; /* how long it may take to find a peer */
     uint32_t timeout_ms;
     uint64_t time_ns; /* of the last time message */
     uint8_t *inbox;
@@ -87,7 +93,9 @@ typedef enum {
     HEARD_NOTHING, /* that counts */
     HEARD_SENSORS,
     HEARD_TIME,
-    HEARD_END /* of the run */
+    HEARD_ALIVE,
+    HEARD_END, /* of the run */
+    HEARD_AGAIN /* the same, and another one follows */
 } heard_t;
 
 /* What the `size` bytes in the inbox are. */
@@ -102,7 +110,10 @@ static heard_t judge(hal_t *hal, size_t size, fcsl_message_t *message)
     }
     if (control_parse(hal->inbox, size, &packet) == 0 && packet.kind == CONTROL_END) {
         hal->is_over = 1;
-        return HEARD_END;
+        return packet.flag ? HEARD_AGAIN : HEARD_END;
+    }
+    if (control_parse(hal->inbox, size, &packet) == 0 && packet.kind == CONTROL_ALIVE) {
+        return HEARD_ALIVE;
     }
     hal->counters.messages_dropped++;
     return HEARD_NOTHING;
@@ -161,23 +172,33 @@ static fcsl_hal_status_t nothing_came(hal_t *hal, fcsl_wire_status_t status, uin
     }
     if (status == FCSL_WIRE_CLOSED) {
         hal->is_over = 1;
+        hal->counters.connected = 0;
         (void)snprintf(hal->text, sizeof hal->text, "the simulator went away before tick %" PRIu64, tick);
         return FCSL_HAL_ERROR;
     }
     return status == FCSL_WIRE_ERROR ? wire_failed(hal) : FCSL_HAL_OK;
 }
 
+static void wait_anew(hal_t *hal)
+{
+    hal->deadline_ns = monotonic_ns() + (uint64_t)hal->timeout_ms * NS_PER_MS;
+    hal->waits = 1;
+}
+
 /* Takes one message of the tick: FCSL_HAL_OK to go on, NONE when the tick happens now. */
 static fcsl_hal_status_t hear(hal_t *hal, uint64_t tick, size_t size, uint8_t *bytes, size_t capacity,
-                              fcsl_message_t *message, int *sensed)
+                              fcsl_message_t *message)
 {
     fcsl_message_t heard;
     const heard_t what = judge(hal, size, &heard);
-    if (what == HEARD_END) {
+    if (what == HEARD_END || what == HEARD_AGAIN) {
         (void)snprintf(hal->text, sizeof hal->text, "the simulator ended the run at tick %" PRIu64, tick);
-        return FCSL_HAL_CLOSED;
+        return what == HEARD_END ? FCSL_HAL_CLOSED : FCSL_HAL_AGAIN;
     }
-    if (what == HEARD_NOTHING) {
+    if (what == HEARD_ALIVE) {
+        wait_anew(hal);
+    }
+    if (what == HEARD_NOTHING || what == HEARD_ALIVE) {
         return FCSL_HAL_OK;
     }
     if (heard.tick > tick) {
@@ -189,31 +210,38 @@ static fcsl_hal_status_t hear(hal_t *hal, uint64_t tick, size_t size, uint8_t *b
     }
     if (what == HEARD_SENSORS) {
         take(hal, &heard, bytes, message);
-        *sensed = 1;
+        hal->sensed = 1;
         return FCSL_HAL_OK;
     }
     hal->time_ns = heard.time_ns;
     return FCSL_HAL_NONE;
 }
 
+/* A message that came before a FCSL_HAL_WAITING stays in `bytes` and *message, which the host hands in again. */
 static fcsl_hal_status_t sample_paced(hal_t *hal, uint64_t tick, uint8_t *bytes, size_t capacity,
                                       fcsl_message_t *message)
 {
-    const uint64_t deadline_ns = monotonic_ns() + (uint64_t)hal->timeout_ms * NS_PER_MS;
+    const uint64_t look_ns = monotonic_ns() + LOOK_NS;
     fcsl_hal_status_t status = FCSL_HAL_OK;
-    int sensed = 0;
-    while (status == FCSL_HAL_OK) { /* every turn takes a message, or waits and looks at the deadline */
+    if (!hal->waits) {
+        wait_anew(hal);
+    }
+    while (status == FCSL_HAL_OK) { /* every turn takes a message, or waits and looks at the time */
         size_t size = 0;
-        const uint64_t look_ns = monotonic_ns() + LOOK_NS;
-        const fcsl_wire_status_t came = atomic_load(&hal->interrupted)
-                                            ? FCSL_WIRE_NONE
-                                            : receive(hal, look_ns < deadline_ns ? look_ns : deadline_ns, &size);
-        status = came == FCSL_WIRE_OK ? hear(hal, tick, size, bytes, capacity, message, &sensed)
-                                      : nothing_came(hal, came, tick);
-        if (status == FCSL_HAL_OK && monotonic_ns() >= deadline_ns) {
+        const fcsl_wire_status_t came =
+            atomic_load(&hal->interrupted)
+                ? FCSL_WIRE_NONE
+                : receive(hal, look_ns < hal->deadline_ns ? look_ns : hal->deadline_ns, &size);
+        status = came == FCSL_WIRE_OK ? hear(hal, tick, size, bytes, capacity, message) : nothing_came(hal, came, tick);
+        if (status == FCSL_HAL_OK && monotonic_ns() >= hal->deadline_ns) {
             status = timed_out(hal, tick);
+        } else if (status == FCSL_HAL_OK && monotonic_ns() >= look_ns) {
+            return FCSL_HAL_WAITING;
         }
     }
+    const int sensed = hal->sensed;
+    hal->waits = 0;
+    hal->sensed = 0;
     hal->counters.ticks_without += sensed ? 0u : 1u;
     return status == FCSL_HAL_NONE && sensed ? FCSL_HAL_OK : status;
 }
@@ -243,7 +271,7 @@ static fcsl_hal_status_t sample_newest(hal_t *hal, uint64_t tick, uint8_t *bytes
             break;
         }
         const heard_t what = judge(hal, size, &heard);
-        if (what == HEARD_END) {
+        if (what == HEARD_END || what == HEARD_AGAIN) {
             rig_gone(hal);
         }
         if (what == HEARD_SENSORS && heard.size <= capacity) {
@@ -273,17 +301,21 @@ static fcsl_hal_status_t wire_sample(void *ctx, uint64_t tick, uint8_t *bytes, s
 static fcsl_hal_status_t peer_gone(hal_t *hal, uint64_t tick)
 {
     int ended = 0;
+    int again = 0;
     for (int i = 0; i < MESSAGES_MAX && !ended; i++) {
         size_t size = 0;
         fcsl_message_t heard;
         if (receive(hal, 0, &size) != FCSL_WIRE_OK) {
             break;
         }
-        ended = judge(hal, size, &heard) == HEARD_END;
+        const heard_t what = judge(hal, size, &heard);
+        ended = what == HEARD_END || what == HEARD_AGAIN;
+        again = what == HEARD_AGAIN;
     }
+    hal->counters.connected = (uint64_t)ended;
     (void)snprintf(hal->text, sizeof hal->text, "the simulator %s before actuator message of tick %" PRIu64,
                    ended ? "ended the run" : "went away", tick);
-    return ended ? FCSL_HAL_CLOSED : FCSL_HAL_ERROR;
+    return again ? FCSL_HAL_AGAIN : ended ? FCSL_HAL_CLOSED : FCSL_HAL_ERROR;
 }
 
 static fcsl_hal_status_t wire_command(void *ctx, const fcsl_message_t *message)
@@ -314,6 +346,17 @@ static fcsl_hal_status_t wire_arm(void *ctx, int armed)
 {
     ((hal_t *)ctx)->counters.armed = armed != 0;
     return FCSL_HAL_OK;
+}
+
+/* A rig waits for nobody. */
+static void wire_alive(void *ctx)
+{
+    hal_t *hal = ctx;
+    const uint64_t now_ns = monotonic_ns();
+    if (hal->paces && now_ns >= hal->alive_ns) {
+        hal->alive_ns = now_ns + CONTROL_ALIVE_NS;
+        (void)control_send_alive(&hal->wire); /* the next one comes soon */
+    }
 }
 
 /* ---- time, counters, end ------------------------------------------------------------------------------------------- */
@@ -354,7 +397,7 @@ static void wire_close(void *ctx)
     hal_t *hal = ctx;
     if (hal->has_wire) {
         if (!hal->is_over) {
-            (void)control_send_end(&hal->wire); /* where it finds no room, the peer waits for its time-out */
+            (void)control_send_end(&hal->wire, 0); /* where it finds no room, the peer waits for its time-out */
         }
         hal->wire.close(hal->wire.ctx);
     }
@@ -375,11 +418,11 @@ static int hear_hello(hal_t *hal, uint64_t deadline_ns, control_packet_t *packet
         const uint64_t look_ns = monotonic_ns() + LOOK_NS;
         status = receive(hal, look_ns < deadline_ns ? look_ns : deadline_ns, &size);
         answered =
-            status == FCSL_WIRE_OK && control_parse(hal->inbox, size, packet) == 0 && packet->kind != CONTROL_END;
+            status == FCSL_WIRE_OK && control_parse(hal->inbox, size, packet) == 0 && packet->kind <= CONTROL_REFUSAL;
     }
     if (!answered && status < FCSL_WIRE_CLOSED) {
-        (void)snprintf(error, error_size, "no handshake from the simulator within %" PRIu32 " ms", hal->timeout_ms);
-        return -1;
+        (void)snprintf(error, error_size, "no handshake from the simulator within %" PRIu32 " ms", hal->open_ms);
+        return 1;
     }
     if (status == FCSL_WIRE_ERROR) {
         (void)snprintf(error, error_size, "%s", hal->wire.explain(hal->wire.ctx));
@@ -395,18 +438,21 @@ static int hear_hello(hal_t *hal, uint64_t deadline_ns, control_packet_t *packet
 static int shake_hands(hal_t *hal, uint64_t deadline_ns, char *error, size_t error_size)
 {
     control_packet_t packet;
-    if (control_send_hello(&hal->wire, &hal->table, 0) != FCSL_WIRE_OK) {
+    if (!hal->greets && control_send_hello(&hal->wire, &hal->table, 0) != FCSL_WIRE_OK) {
         (void)snprintf(error, error_size, "cannot send the handshake: the other end is gone");
         return -1;
     }
-    if (hear_hello(hal, deadline_ns, &packet, error, error_size) != 0) {
-        return -1;
+    hal->greets = 1;
+    const int unheard = hear_hello(hal, deadline_ns, &packet, error, error_size);
+    if (unheard) {
+        return unheard;
     }
+    hal->greets = 0;
     if (packet.kind == CONTROL_REFUSAL) {
         (void)snprintf(error, error_size, "the simulator refused: %s", packet.text);
         return -1;
     }
-    hal->paces = packet.sends_time;
+    hal->paces = packet.flag;
     if (hal->is_named && !hal->paces) {
         (void)snprintf(error, error_size,
                        "%s is a rig, which sends at its own rate: named values need a simulator that paces the run; "
@@ -427,7 +473,7 @@ static int open_spec(hal_t *hal, uint64_t deadline_ns, char *error, size_t error
                                                       actuators > hal->inbox_size ? actuators : hal->inbox_size,
                                                       hal->timeout_ms, &wire, error, error_size);
     if (failed) {
-        return -1;
+        return failed;
     }
     hal->wire = wire;
     hal->has_wire = 1;
@@ -437,10 +483,11 @@ static int open_spec(hal_t *hal, uint64_t deadline_ns, char *error, size_t error
 static int wire_open(fcsl_hal_t *handle, char *error, size_t error_size)
 {
     hal_t *hal = handle->ctx;
-    const uint64_t deadline_ns = monotonic_ns() + (uint64_t)hal->timeout_ms * NS_PER_MS;
-    if ((!hal->has_wire && open_spec(hal, deadline_ns, error, error_size) != 0) ||
-        shake_hands(hal, deadline_ns, error, error_size) != 0) {
-        return -1;
+    const uint64_t deadline_ns = monotonic_ns() + (uint64_t)hal->open_ms * NS_PER_MS;
+    int failed = hal->has_wire ? 0 : open_spec(hal, deadline_ns, error, error_size);
+    failed = failed ? failed : shake_hands(hal, deadline_ns, error, error_size);
+    if (failed) {
+        return failed;
     }
     hal->counters.connected = 1;
     handle->paces = hal->paces;
@@ -475,6 +522,7 @@ static int make(const fcsl_wire_counters_t *of_wire, const fcsl_machine_t *machi
         return -1;
     }
     hal->table = fcsl_channel_table(machine);
+    hal->open_ms = timeout_ms;
     hal->timeout_ms = timeout_ms;
     fill_fields(hal, of_wire);
     *handle = (fcsl_hal_t){
@@ -483,6 +531,7 @@ static int make(const fcsl_wire_counters_t *of_wire, const fcsl_machine_t *machi
         .sample = wire_sample,
         .command = wire_command,
         .arm = wire_arm,
+        .alive = wire_alive,
         .now_ns = wire_now_ns,
         .wait = wire_wait,
         .log = wire_log,
@@ -522,8 +571,8 @@ int fcsl_hal_bus_check(const char *address, char *error, size_t error_size)
     return fcsl_wire_check_named(address, error, error_size);
 }
 
-int fcsl_hal_bus(const char *address, const char *name_space, const fcsl_machine_t *machine, uint32_t timeout_ms,
-                 fcsl_hal_t *hal, char *error, size_t error_size)
+int fcsl_hal_bus(const char *address, const char *name_space, const fcsl_machine_t *machine, uint32_t open_ms,
+                 uint32_t timeout_ms, fcsl_hal_t *hal, char *error, size_t error_size)
 {
     if (fcsl_wire_check_named(address, error, error_size) != 0) {
         return -1;
@@ -538,6 +587,7 @@ int fcsl_hal_bus(const char *address, const char *name_space, const fcsl_machine
     }
     hal_t *self = hal->ctx;
     self->is_named = 1;
+    self->open_ms = open_ms;
     (void)snprintf(self->spec, SPEC_BYTES, "%s", address);
     const size_t lead = strspn(name_space, "/");
     const size_t length = strlen(name_space + lead);

@@ -120,15 +120,24 @@ static void fill_plan(named_wire_t *wire, const char *name_space, plan_t *plan)
     wire->peer.output_count = NAMED_CHANNELS; /* a peer need not care for every channel */
 }
 
-/* Of the simulator, which listens; a client of it, or a peer. Sets *endpoint to what is behind the kind, or null. */
+/* Sets *endpoint to what is behind the kind, or null. */
 static fcsl_bus_role_t role_of(const char *address, fcsl_wire_side_t side, const char **endpoint)
 {
-    static const char CLIENT[] = "zenoh:";
-    static const char PEER[] = "zenoh-peer:";
-    const int is_peer = strncmp(address, PEER, strlen(PEER)) == 0;
-    const int is_client = strncmp(address, CLIENT, strlen(CLIENT)) == 0;
-    *endpoint = is_peer ? address + strlen(PEER) : is_client ? address + strlen(CLIENT) : NULL;
-    return side == FCSL_WIRE_LISTEN ? FCSL_BUS_LISTEN : is_peer ? FCSL_BUS_PEER : FCSL_BUS_CLIENT;
+    const struct {
+        const char *kind;
+        fcsl_bus_role_t role;
+    } kinds[] = {{"zenoh:", side == FCSL_WIRE_LISTEN ? FCSL_BUS_LISTEN : FCSL_BUS_CLIENT},
+                 {"zenoh-client:", FCSL_BUS_CLIENT},
+                 {"zenoh-peer:", FCSL_BUS_PEER}};
+    for (size_t i = 0; i < sizeof kinds / sizeof kinds[0]; i++) {
+        const size_t length = strlen(kinds[i].kind);
+        if (strncmp(address, kinds[i].kind, length) == 0) {
+            *endpoint = address + length;
+            return kinds[i].role;
+        }
+    }
+    *endpoint = NULL;
+    return FCSL_BUS_CLIENT;
 }
 
 static int open_session(named_wire_t *wire, const char *address, const plan_t *plan, uint64_t deadline_ns, char *error,
@@ -160,7 +169,9 @@ static int open_session(named_wire_t *wire, const char *address, const plan_t *p
         (void)fcsl_bus_close(wire->peer.bus, NAMED_CLOSE_MS);
         return -1;
     }
-    named_drain(wire, NAMED_CONTROL); /* nothing of this controller's run comes before its hello */
+    if (wire->peer.side == FCSL_WIRE_CONNECT) {
+        named_drain(wire, NAMED_CONTROL); /* nothing of this controller's run comes before its hello */
+    }
     return 0;
 }
 
@@ -220,7 +231,7 @@ int fcsl_wire_open_named(const char *address, const char *name_space, const fcsl
         (void)snprintf(error, error_size, "out of memory for the bus");
     } else {
         fill_plan(self, name_space, &plan);
-        failed = open_session(self, address, &plan, deadline_ns, error, error_size);
+        failed = open_session(self, address, &plan, deadline_ns, error, error_size) != 0 ? 1 : 0;
     }
     free(plan.inputs);
     free((void *)plan.outputs);
@@ -228,7 +239,7 @@ int fcsl_wire_open_named(const char *address, const char *name_space, const fcsl
         if (self != NULL) {
             named_free(self);
         }
-        return -1;
+        return failed;
     }
     *wire = named_functions(self);
     return 0;

@@ -40,6 +40,10 @@ int fcsl_zenoh_declare_input(fcsl_zenoh_t *session, uint32_t number, const char 
 /* Calls `stray` for what other sessions put on keys that `key` includes, and no input that was declared before. */
 int fcsl_zenoh_declare_strays(fcsl_zenoh_t *session, const char *key, char *error, size_t error_size);
 
+/* Answers queries for `key` with these bytes, which are copied. */
+int fcsl_zenoh_declare_constant(fcsl_zenoh_t *session, const char *key, const uint8_t *bytes, size_t size, char *error,
+                                size_t error_size);
+
 /* A liveliness token, while the session lives: `key`, and the session's number behind it. */
 int fcsl_zenoh_declare_token(fcsl_zenoh_t *session, const char *key, char *error, size_t error_size);
 

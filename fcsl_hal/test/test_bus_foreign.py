@@ -77,6 +77,15 @@ def test_messages_come_back_in_order() -> None:
     }  # fmt: skip
 
 
+def test_a_constant_answers_queries() -> None:
+    endpoint = free_endpoint()
+    with echo(endpoint), client(endpoint) as session:
+        for key in ("t/about", "**/about", "t/*"):
+            (reply,) = session.get(key, timeout=LONG_S)
+            assert reply.ok and (str(reply.ok.key_expr), reply.ok.payload.to_bytes()) == ("t/about", b"echo")
+        assert list(session.get("t/other", timeout=1.0)) == []
+
+
 def listener(folder: Path, endpoint: str, transport: dict[str, Any]) -> Path:
     """A configuration file of a session that listens."""
     path = folder / "listener.json5"

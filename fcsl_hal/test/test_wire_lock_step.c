@@ -198,8 +198,8 @@ static void test_interrupt(void)
           hal.open(&hal, error, sizeof error) == 0);
     CHECK(pthread_join(thread, &accepted) == 0 && accepted == external);
     CHECK(pthread_create(&thread, NULL, interrupt_soon, &hal) == 0);
-    CHECK(hal.sample(hal.ctx, 0, bytes, sizeof bytes, &message) == FCSL_HAL_CLOSED);
-    CHECK(hal.sample(hal.ctx, 0, bytes, sizeof bytes, &message) == FCSL_HAL_CLOSED);
+    CHECK(sample_patiently(&hal, 0, bytes, sizeof bytes, &message) == FCSL_HAL_CLOSED);
+    CHECK(sample_patiently(&hal, 0, bytes, sizeof bytes, &message) == FCSL_HAL_CLOSED);
     CHECK(pthread_join(thread, NULL) == 0);
     hal.close(hal.ctx);
     fcsl_external_close(external);

@@ -76,6 +76,17 @@ static inline size_t sensor_message(uint64_t tick, uint8_t *message)
     return encode_message(&MACHINE, &data, FCSL_SENSOR_MESSAGE, tick, NULL, message, MESSAGE_BYTES);
 }
 
+/* A sample, however long it takes. */
+static inline fcsl_hal_status_t sample_patiently(const fcsl_hal_t *hal, uint64_t tick, uint8_t *bytes, size_t size,
+                                                 fcsl_message_t *message)
+{
+    fcsl_hal_status_t status = FCSL_HAL_WAITING;
+    while (status == FCSL_HAL_WAITING) {
+        status = hal->sample(hal->ctx, tick, bytes, size, message);
+    }
+    return status;
+}
+
 /* Steps a controller that answers 2 * i64 until the run ends; returns the last status. */
 static inline fcsl_hal_status_t fly(const fcsl_machine_t *machine, uint32_t timeout_ms, char *text)
 {
@@ -84,8 +95,9 @@ static inline fcsl_hal_status_t fly(const fcsl_machine_t *machine, uint32_t time
     uint8_t bytes[MESSAGE_BYTES];
     const fcsl_channel_table_t table = fcsl_channel_table(machine);
     memset(&data, 0, sizeof data);
-    const int failed = named ? fcsl_hal_bus(their_spec, "fleet", machine, timeout_ms, &hal, text, TEXT_BYTES)
-                             : fcsl_hal_wire(their_spec, machine, timeout_ms, &hal, text, TEXT_BYTES);
+    const int failed = named
+                           ? fcsl_hal_bus(their_spec, "fleet", machine, timeout_ms, timeout_ms, &hal, text, TEXT_BYTES)
+                           : fcsl_hal_wire(their_spec, machine, timeout_ms, &hal, text, TEXT_BYTES);
     CHECK(!failed);
     if (hal.open(&hal, text, TEXT_BYTES) != 0) {
         hal.close(hal.ctx);
@@ -95,7 +107,7 @@ static inline fcsl_hal_status_t fly(const fcsl_machine_t *machine, uint32_t time
     fcsl_hal_status_t status = FCSL_HAL_OK;
     for (uint64_t tick = 0; status == FCSL_HAL_OK; tick++) {
         fcsl_message_t message;
-        status = hal.sample(hal.ctx, tick, bytes, sizeof bytes, &message);
+        status = sample_patiently(&hal, tick, bytes, sizeof bytes, &message);
         if (status == FCSL_HAL_OK) {
             CHECK(message.bytes == bytes && message.tick == tick && message.kind == FCSL_SENSOR_MESSAGE);
             CHECK(hal.now_ns(hal.ctx) == time_of(tick));

@@ -12,7 +12,6 @@ from fcsl_msgs.msg import (
     HostWrite,
     InstanceHealth,
     MachineState,
-    TickBundle,
     TransitionEvent,
 )
 
@@ -46,7 +45,6 @@ def test_round_trip() -> None:
         InstanceHealth(tick=7, instance=["nav", "pilot"], health=[InstanceHealth.FAILED, InstanceHealth.STALE]),
         TransitionEvent(tick=7, from_state="ASCENT", to_state="COAST", request="START_COAST", instance="ascent"),
         FaultCounters(tick=7, instance=["nav"], faults=[2**63], overruns=[1], fault_place=["nav.py:3:9: …"]),
-        TickBundle(tick=2**64 - 1, frame=[0, 255]),
         Checkpoint(tick=7, machine="lander_control", data=[1, 2, 3]),
         HostWrite(tick=7, kind=HostWrite.SET, path="sensors.outputs.pos_z", element=1, data=[0] * 8),
     ]

@@ -27,6 +27,8 @@ from .runner import TIMEOUT_MS, Sender, Server, StateChange, Summary, Watcher, r
 
 EXIT_UNTIL_NOT_HELD = 1
 EXIT_BAD_INPUT = 2
+#: How an address on the bus begins.
+_BUS = ("zenoh:", "zenoh-client:")
 
 
 class _Terminated(KeyboardInterrupt):
@@ -124,7 +126,7 @@ def _parser() -> argparse.ArgumentParser:
         metavar="PEER",
         help="the controller is another process (fcsl-fc --hal PEER): at the other end of a wire, with wire:unix:PATH, "
         "wire:udp:HOST:PORT, wire:tcp:HOST:PORT, wire:uart:DEVICE:BAUD or wire:zenoh:tcp/HOST:PORT; or on the bus, each "
-        "channel under its key, with zenoh:tcp/HOST:PORT",
+        "channel under its key, with zenoh:tcp/HOST:PORT, or zenoh-client: where another simulation listens",
     )
     help_speed = "limit on simulated seconds per second: 1 for real time; 0 (default): as fast as possible"
     command.add_argument("--speed", type=_speed, default=0.0, metavar="FACTOR", help=help_speed)
@@ -140,6 +142,8 @@ def _parser() -> argparse.ArgumentParser:
         "fields to send, as path globs separated by commas (default: inputs, outputs, state, health, counters)"
     )
     command.add_argument("--telemetry-fields", metavar="GLOBS", help=help_fields)
+    help_observers = "put the values of all channels on a bus of their own (docs/bus.md), which listens there"
+    command.add_argument("--observers", metavar="tcp/HOST:PORT", help=help_observers)
     help_timeout = f"seconds to wait for the external controller (default {TIMEOUT_MS // 1000})"
     command.add_argument("--timeout", type=_seconds, metavar="S", help=help_timeout)
     command.add_argument("--json", action="store_true", help="print the summary as JSON, and nothing else")
@@ -172,7 +176,7 @@ def _check(options: argparse.Namespace) -> int:
 
 def _run(options: argparse.Namespace) -> int:
     external: str | None = options.external
-    if external is not None and not external.startswith(("wire:", "zenoh:")):
+    if external is not None and not external.startswith(("wire:", *_BUS)):
         raise SimError(
             f"--external {external}: write wire:SPEC, as in wire:unix:PATH or wire:udp:127.0.0.1:7600, "
             "or zenoh:tcp/HOST:PORT"
@@ -181,9 +185,11 @@ def _run(options: argparse.Namespace) -> int:
         raise SimError("`--paused`, `--token` and `--checkpoints` need `--socket`: they configure the variable server")
     if options.telemetry_fields is not None and options.telemetry is None:
         raise SimError("`--telemetry-fields` needs `--telemetry`: it selects the values to send")
-    if options.namespace and options.record is None and not (external or "").startswith("zenoh:"):
+    on_bus = options.observers is not None or (external or "").startswith(_BUS)
+    if options.namespace and options.record is None and not on_bus:
         raise SimError(
-            "`--namespace` needs `--record` or `--external zenoh:…`: it is of topics, and of keys of the bus"
+            "`--namespace` needs `--record`, `--observers` or `--external zenoh:…`: it is of topics, and of keys of the "
+            "bus"
         )
     if options.timeout is not None and external is None:
         raise SimError("`--timeout` needs `--external`: it limits the wait for the controller")
@@ -200,6 +206,7 @@ def _run(options: argparse.Namespace) -> int:
         speed=options.speed,
         server=server,
         sender=None if options.telemetry is None else Sender(options.telemetry, options.telemetry_fields),
+        observers=options.observers,
         watcher=None if options.json else _Printer(config, external),
     )
     if options.json:
@@ -257,6 +264,8 @@ def _print_summary(config: SimConfig, summary: Summary) -> None:
             f"telemetry: {counts['packets']} packets, {counts['overwritten']} overwritten, {counts['configurations']} configurations, "
             f"{counts['datagrams']} datagrams sent, {counts['failures']} were returned or not accepted"
         )
+    if summary.observers:
+        show(f"observers: {summary.observers['ticks']} ticks, {summary.observers['dropped']} dropped")
     if summary.bag:
         show(f"bag: {summary.bag}")
     if summary.until_held is False:

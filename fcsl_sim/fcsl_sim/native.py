@@ -6,7 +6,7 @@ from __future__ import annotations
 import ctypes
 import functools
 import struct
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from ctypes import POINTER, byref, c_char_p, c_double, c_int, c_int32, c_int64, c_size_t, c_uint32, c_uint64
 from ctypes import c_void_p as ptr
 from pathlib import Path
@@ -20,18 +20,27 @@ from simclient.descriptor import Machine, read_machine
 from simclient.errors import TwinError
 from simclient.library import bind
 from simclient.paths import resolve
+from simclient.ros.composer import Composer
+from simclient.ros.outbox import Outbox
 from simclient.values import Value, read_part
 
 from .errors import SimError
 from .models import ModelTable, Scalar, parse_description
 
 _SENT = ("packets", "configurations", "datagrams", "failures", "overwritten")
+_OBSERVED = ("ticks", "dropped")
 
 
 class _Counters(ctypes.Structure):
     """fcsl_telemetry_counters_t"""
 
     _fields_ = [(name, c_uint64) for name in _SENT]
+
+
+class _Observed(ctypes.Structure):
+    """fcsl_observers_counters_t"""
+
+    _fields_ = [(name, c_uint64) for name in _OBSERVED]
 
 
 _ERROR = POINTER(CError)
@@ -50,7 +59,14 @@ _PROTOTYPES: dict[str, tuple[type | None, list[type]]] = {
     "fcsl_sim_state": (c_int32, [ptr]),
     "fcsl_sim_machine_data": (ptr, [ptr]),
     "fcsl_sim_listen": (c_int, [ptr, c_char_p, c_char_p, c_uint32, _ERROR]),
-    "fcsl_sim_accept": (c_int, [ptr, _ERROR]),
+    "fcsl_sim_accept": (c_int, [ptr, c_uint32, _ERROR]),
+    "fcsl_sim_run_together": (c_int64, [POINTER(ptr), c_uint32, c_uint64, c_uint32, POINTER(c_uint32), _ERROR]),
+    "fcsl_sim_alive": (None, [ptr]),
+    "fcsl_sim_end": (None, [ptr, c_int]),
+    "fcsl_sim_show_clock": (c_int, [ptr, ptr, c_uint32, _ERROR]),
+    "fcsl_sim_show_truth": (c_int, [ptr, ptr, c_uint32, c_char_p, c_uint32, c_uint32, _ERROR]),
+    "fcsl_sim_show_instances": (c_int, [ptr, ptr, c_uint32, ptr, c_uint32, ptr, c_uint32, c_uint32, _ERROR]),
+    "fcsl_sim_show_channels": (c_int, [ptr, ptr, c_uint32, ptr, c_uint32, ptr, c_uint32, _ERROR]),
     "fcsl_sim_sense": (c_int64, [ptr, ptr, c_size_t, _ERROR]),
     "fcsl_sim_actuate": (c_int, [ptr, c_char_p, c_size_t, _ERROR]),
     "fcsl_sim_message_capacity": (c_size_t, [ptr]),
@@ -61,6 +77,8 @@ _PROTOTYPES: dict[str, tuple[type | None, list[type]]] = {
     "fcsl_sim_address": (c_char_p, [ptr]),
     "fcsl_sim_telemetry": (c_int, [ptr, c_char_p, c_char_p, _ERROR]),
     "fcsl_sim_telemetry_stop": (None, [ptr, POINTER(_Counters)]),
+    "fcsl_sim_observers": (c_int, [ptr, c_char_p, c_char_p, _ERROR]),
+    "fcsl_sim_observers_stop": (None, [ptr, POINTER(_Observed)]),
     "fcsl_sim_channel_data": (ptr, [ptr]),
     "fcsl_sim_sampled": (c_int, [ptr, c_uint32]),
     "fcsl_sim_truth_values": (c_uint32, [ptr, ptr, c_uint32]),
@@ -111,6 +129,26 @@ def describe_model(library: Path, name: str) -> ModelTable:
     if size > len(buffer):
         raise SimError(f"{library}: the field table of model `{name}` exceeds {len(buffer)} bytes")
     return parse_description(buffer.raw[:size].decode("utf-8", "replace"), library)
+
+
+class Failed(SimError):
+    """An error of simulation number `number` of several."""
+
+    def __init__(self, text: str, number: int):
+        super().__init__(text)
+        self.number = number
+
+
+def run_together(simulations: Sequence[Simulation], ticks: int, slice_ms: int) -> int:
+    """Steps simulations with external controllers together, up to `ticks` ticks, for about slice_ms; returns the ticks
+    completed. A tick may then be under way. Raises Failed."""
+    error, failed = CError(), c_uint32()
+    handles = (ptr * len(simulations))(*(simulation.handle() for simulation in simulations))
+    library = simulator_library()
+    done = library.fcsl_sim_run_together(handles, len(handles), ticks, slice_ms, byref(failed), byref(error))
+    if done < 0:
+        raise Failed(_text(error), failed.value)
+    return int(done)
 
 
 class Simulation:
@@ -215,9 +253,46 @@ class Simulation:
         status = self._lib.fcsl_sim_listen(self.handle(), peer.encode(), within, timeout_ms, byref(self._error))
         self._check(status)
 
-    def accept(self) -> None:
-        """Waits for the controller; `run` then steps in lock-step with it."""
-        self._check(self._lib.fcsl_sim_accept(self.handle(), byref(self._error)))
+    def accept(self, wait_ms: int) -> bool:
+        """Waits for the controller, for up to `wait_ms`; whether it has come. `run` then steps in lock-step with it."""
+        return self._check(self._lib.fcsl_sim_accept(self.handle(), wait_ms, byref(self._error))) == 0
+
+    @property
+    def problem(self) -> str:
+        """Why the last call failed, or found nobody."""
+        return _text(self._error)
+
+    def alive(self) -> None:
+        """While no tick is run, called often: the controller waits on."""
+        self._lib.fcsl_sim_alive(self.handle())
+
+    def end(self, another_follows: bool) -> None:
+        """Tells the controller that the run is over, and whether another one follows."""
+        self._lib.fcsl_sim_end(self.handle(), int(another_follows))
+
+    def show_clock(self, outbox: Outbox, topic: int) -> None:
+        """Puts rosgraph_msgs/Clock into the outbox, in each tick of `run_together`, as the next three do with messages of
+        their own. `topic`: a number by which the outbox's reader knows it."""
+        self._check(self._lib.fcsl_sim_show_clock(self.handle(), outbox.handle, topic, byref(self._error)))
+
+    def show_truth(self, outbox: Outbox, topic: int, head: bytes, every: int) -> None:
+        """fcsl_msgs/PlantTruth in each n-th tick. head: its CDR up to the first value."""
+        where = (outbox.handle, topic, head, len(head), every)
+        self._check(self._lib.fcsl_sim_show_truth(self.handle(), *where, byref(self._error)))
+
+    def show_instances(
+        self, outbox: Outbox, topic: int, composer: Composer, instances: Sequence[str], every: int
+    ) -> None:
+        """A message composed of the structs of instances, in each n-th tick."""
+        numbers = (c_uint32 * len(instances))(*(self.instances[name] for name in instances))
+        what = (composer.handle, composer.size, numbers, len(numbers), every)
+        self._check(self._lib.fcsl_sim_show_instances(self.handle(), outbox.handle, topic, *what, byref(self._error)))
+
+    def show_channels(self, outbox: Outbox, topic: int, composer: Composer, channels: Sequence[int]) -> None:
+        """A message composed of sensor channels, when one of these (by number) was sampled."""
+        numbers = (c_uint32 * len(channels))(*channels)
+        what = (composer.handle, composer.size, numbers, len(numbers))
+        self._check(self._lib.fcsl_sim_show_channels(self.handle(), outbox.handle, topic, *what, byref(self._error)))
 
     def serve(self, address: str, token: Path | None, paused: bool, checkpoints: Path | None = None) -> str:
         """Serves all variables on a Unix socket's path or `tcp:HOST:PORT` (docs/protocol.md); only before the first
@@ -244,6 +319,21 @@ class Simulation:
         counters = _Counters()
         self._lib.fcsl_sim_telemetry_stop(self.handle(), byref(counters))
         return {name: int(getattr(counters, name)) for name in _SENT}
+
+    def observers(self, endpoint: str, name_space: str = "") -> None:
+        """Puts the hosted machine's channels on a bus of their own (docs/bus.md), which listens on `tcp/HOST:PORT`.
+
+        Only before the first tick and before `serve`. name_space: in front of the keys, with or without surrounding
+        slashes. Raises SimError.
+        """
+        within = name_space.strip("/").encode()
+        self._check(self._lib.fcsl_sim_observers(self.handle(), endpoint.encode(), within, byref(self._error)))
+
+    def observers_stop(self) -> dict[str, int]:
+        """Puts the remaining ticks and stops; returns the counts (docs/bus.md)."""
+        counters = _Observed()
+        self._lib.fcsl_sim_observers_stop(self.handle(), byref(counters))
+        return {name: int(getattr(counters, name)) for name in _OBSERVED}
 
     def sense(self) -> bytes:
         """Advances to the next tick and returns its sensor message."""

@@ -53,6 +53,7 @@ class Summary:
     truth: dict[str, Scalar | list[Scalar]]
     bag: str | None
     telemetry: dict[str, int] | None
+    observers: dict[str, int] | None
 
     def as_json(self) -> dict[str, Any]:
         return asdict(self)
@@ -105,12 +106,13 @@ def run(
     speed: float = 0.0,
     server: Server | None = None,
     sender: Sender | None = None,
+    observers: str | None = None,
     watcher: Watcher | None = None,
 ) -> Summary:
     """Runs to the end. bag: records controller and truth into this new directory. external: the controller is another
     process (`wire:SPEC` or `zenoh:tcp/HOST:PORT`), which records itself and answers within `timeout_ms`. name_space: of
     the bag's topics, and of the keys on the bus. speed: limit on simulated seconds per second; 0: as fast as possible.
-    Raises SimError; the bag then has the ticks recorded until then, and is removed if there are none.
+    observers: the machine's channels are put on a bus that listens at this `tcp/HOST:PORT`. Raises SimError; the bag then has the ticks recorded until then, and is removed if there are none.
     """
     if bag is not None and external is not None:
         raise SimError("with an external controller the controller records: give `--record` to it")
@@ -123,11 +125,14 @@ def run(
             sim.listen(external, timeout_ms, name_space)
         if sender is not None:
             sim.telemetry(sender.address, sender.fields)
+        if observers is not None:
+            sim.observers(observers, name_space)
         address = sim.serve(server.address, server.token, server.paused, server.checkpoints) if server else None
         # An error above leaves no files and has not contacted other processes.
         if external is not None:
             watcher.listening()
-            sim.accept()
+            if not sim.accept(timeout_ms):
+                raise SimError(sim.problem)
         if bag is not None:
             sim.record(bag, name_space)
         if address is not None:
@@ -135,6 +140,7 @@ def run(
         try:
             flight = _fly(sim, hosted=external is None, watcher=watcher)
             sent = sim.telemetry_stop() if sender is not None else None
+            observed = sim.observers_stop() if observers is not None else None
             if bag is not None:
                 sim.record_stop()
         except SimError as error:
@@ -143,7 +149,7 @@ def run(
             with suppress(SimError):  # a failed recording raises here, too
                 sim.close()
             raise SimError(f"{error}{_left(bag, sim.machine.name)}") from None
-        return _summary(sim, config, flight, bag, sent)
+        return _summary(sim, config, flight, bag, sent, observed)
 
 
 def _left(bag: Path, machine: str) -> str:
@@ -188,7 +194,12 @@ def _fly(sim: Simulation, *, hosted: bool, watcher: Watcher) -> _Flight:
 
 
 def _summary(
-    sim: Simulation, config: SimConfig, flight: _Flight, bag: Path | None, sent: dict[str, int] | None
+    sim: Simulation,
+    config: SimConfig,
+    flight: _Flight,
+    bag: Path | None,
+    sent: dict[str, int] | None,
+    observed: dict[str, int] | None,
 ) -> Summary:
     time_s = sim.machine.time_ns(sim.tick) / 1e9
     return Summary(
@@ -209,4 +220,5 @@ def _summary(
         },
         bag=str(bag) if bag else None,
         telemetry=sent,
+        observers=observed,
     )

@@ -37,7 +37,7 @@ static int ask_machine(fcsl_sim_t *sim, fcsl_message_t *message, fcsl_error_t *e
     return 0;
 }
 
-static int external_failed(const fcsl_sim_t *sim, fcsl_hal_status_t status, const char *doing, fcsl_error_t *error)
+int fcsl_sim_external_failed(const fcsl_sim_t *sim, fcsl_hal_status_t status, const char *doing, fcsl_error_t *error)
 {
     const unsigned long long tick = sim->tick;
     if (status == FCSL_HAL_NONE) {
@@ -50,11 +50,11 @@ static int ask_external(fcsl_sim_t *sim, fcsl_message_t *message, fcsl_error_t *
 {
     fcsl_hal_status_t status = fcsl_external_send(sim->external, message, (uint64_t)sim->time_ns);
     if (status != FCSL_HAL_OK) {
-        return external_failed(sim, status, "cannot send the sensor message", error);
+        return fcsl_sim_external_failed(sim, status, "cannot send the sensor message", error);
     }
     status = fcsl_external_receive(sim->external, sim->tick, sim->external_timeout_ms, message);
     if (status != FCSL_HAL_OK) {
-        return external_failed(sim, status, "no actuator message from the controller", error);
+        return fcsl_sim_external_failed(sim, status, "no actuator message from the controller", error);
     }
     return 0;
 }
@@ -179,19 +179,20 @@ int fcsl_sim_listen(fcsl_sim_t *sim, const char *peer, const char *name_space, u
     return 0;
 }
 
-int fcsl_sim_accept(fcsl_sim_t *sim, fcsl_error_t *error)
+int fcsl_sim_accept(fcsl_sim_t *sim, uint32_t wait_ms, fcsl_error_t *error)
 {
     if (!sim->external || sim->tick) {
         return fcsl_sim_fail(error, "nothing listens for a controller, or it has connected already");
     }
-    switch (fcsl_external_accept(sim->external, sim->external_timeout_ms)) {
-    case FCSL_HAL_OK:
+    const fcsl_hal_status_t status = fcsl_external_accept(sim->external, wait_ms);
+    if (status == FCSL_HAL_OK) {
         return 0;
-    case FCSL_HAL_NONE:
-        return fcsl_sim_fail(error, "interrupted while waiting for a controller");
-    default:
-        return fcsl_sim_fail(error, "no controller: %s", fcsl_external_explain(sim->external));
     }
+    if (status == FCSL_HAL_NONE) {
+        return fcsl_sim_fail(error, "interrupted while waiting for a controller");
+    }
+    (void)fcsl_sim_fail(error, "no controller: %s", fcsl_external_explain(sim->external));
+    return status == FCSL_HAL_TIMEOUT ? 1 : -1;
 }
 
 int fcsl_sim_close(fcsl_sim_t *sim, fcsl_error_t *error)
@@ -204,6 +205,7 @@ int fcsl_sim_close(fcsl_sim_t *sim, fcsl_error_t *error)
     fcsl_telemetry_close(sim->telemetry);
     fcsl_sim_publish_end(sim);
     fcsl_external_close(sim->external);
+    fcsl_sim_topics_free(sim);
     fcsl_event_queue_free(&sim->queue);
     fcsl_assembly_free(sim);
     if (sim->run) {

@@ -14,6 +14,7 @@
 
 /* Longest wait before fcsl_sim_run returns to its caller. */
 static const double SLICE_NS = 50e6;
+static const double FORGIVEN_NS = 100e6;
 
 int fcsl_sim_set_speed(fcsl_sim_t *sim, double speed, fcsl_error_t *error)
 {
@@ -31,6 +32,23 @@ void fcsl_sim_pace_anew(fcsl_sim_t *sim)
     sim->pace.anchored = 0;
 }
 
+/* Time until the next tick is due, at the pace that is kept: negative when it is late. Doubles cannot overflow, and are exact for a
+ * hundred days. */
+static double left_ns(const fcsl_sim_t *sim, uint64_t now)
+{
+    const fcsl_pace_t *pace = &sim->pace;
+    const int64_t simulated_ns = fcsl_grid_time_ns(sim->tick - pace->from_tick, sim->machine->tick_hz);
+    return (double)simulated_ns / pace->speed - (double)(now - pace->from_ns);
+}
+
+void fcsl_sim_forgive(fcsl_sim_t *sim)
+{
+    const fcsl_pace_t *pace = &sim->pace;
+    if (pace->anchored && pace->speed > 0 && left_ns(sim, fcsl_run_monotonic_ns(NULL)) < -FORGIVEN_NS) {
+        fcsl_sim_pace_anew(sim);
+    }
+}
+
 uint64_t fcsl_sim_wait_until(fcsl_sim_t *sim)
 {
     fcsl_pace_t *pace = &sim->pace;
@@ -45,10 +63,8 @@ uint64_t fcsl_sim_wait_until(fcsl_sim_t *sim)
     if (!pace->anchored) {
         *pace = (fcsl_pace_t){.speed = pace->speed, .anchored = 1, .from_ns = now, .from_tick = sim->tick};
     }
-    /* Doubles cannot overflow, and are exact for a hundred days. */
-    const int64_t simulated_ns = fcsl_grid_time_ns(sim->tick - pace->from_tick, sim->machine->tick_hz);
-    const double left_ns = (double)simulated_ns / pace->speed - (double)(now - pace->from_ns);
-    return left_ns > 0 ? now + (uint64_t)fmin(ceil(left_ns), SLICE_NS) : 0;
+    const double left = left_ns(sim, now);
+    return left > 0 ? now + (uint64_t)fmin(ceil(left), SLICE_NS) : 0;
 }
 
 void fcsl_sim_sleep_until(uint64_t deadline_ns)

@@ -86,6 +86,9 @@ static void write_stats(void *ctx, fcsl_vars_out_t *out)
     if (sim->telemetry) {
         fcsl_telemetry_stats(sim->telemetry, out);
     }
+    if (sim->observers) {
+        fcsl_observers_stats(sim->observers, out);
+    }
 }
 
 /* ---- opening ------------------------------------------------------------------------------------------------------- */
@@ -168,6 +171,7 @@ int fcsl_sim_attend(fcsl_sim_t *sim)
     if (until == 0) {
         return sim->status == FCSL_SIM_RUNNING;
     }
+    fcsl_sim_alive(sim);
     if (service) {
         fcsl_vars_wait(service->vars, until);
         fcsl_vars_serve(service->vars);

@@ -6,6 +6,7 @@
 #define FCSL_SIM_INTERNAL_H
 
 #include "event_queue.h"
+#include "fcsl/fcsl_external.h"
 #include "fcsl/fcsl_gate.h"
 #include "fcsl/fcsl_sim.h"
 #include "integrate.h"
@@ -68,9 +69,9 @@ typedef struct {
     uint64_t from_tick;
 } fcsl_pace_t;
 
-struct fcsl_external;
 struct fcsl_sim_service;
 struct fcsl_sim_published;
+struct fcsl_sim_topics;
 
 struct fcsl_sim {
     fcsl_plan_t plan;
@@ -105,11 +106,14 @@ struct fcsl_sim {
     fcsl_sim_status_t status;
     int recording;
     uint8_t *truth; /* scratch for one truth message */
-    struct fcsl_external *external; /* null: the machine is hosted here */
+    fcsl_external_t *external; /* null: the machine is hosted here */
     uint32_t external_timeout_ms;
-    struct fcsl_sim_published *published; /* null: no variable server, no telemetry */
+    int asked; /* the sensors of the tick were sent to it */
+    struct fcsl_sim_topics *topics; /* null: none */
+    struct fcsl_sim_published *published; /* null: no variable server, telemetry, observers */
     struct fcsl_sim_service *service;     /* null: no variable server */
     fcsl_telemetry_t *telemetry;          /* null: none */
+    fcsl_observers_t *observers;          /* null: none */
     fcsl_pace_t pace;
     int service_failed;                   /* a tick that a client asked for failed with `failure` */
     fcsl_error_t failure;
@@ -122,7 +126,16 @@ int fcsl_sim_actuate_message(fcsl_sim_t *sim, const fcsl_message_t *message, fcs
 /* host.c: one tick, with the hosted or the connected controller. */
 int fcsl_sim_tick_once(fcsl_sim_t *sim, fcsl_error_t *error);
 
-/* published.c: publishes the current values to clients and telemetry. */
+/* host.c: says what became of a message to or from the external controller; returns -1. */
+int fcsl_sim_external_failed(const fcsl_sim_t *sim, fcsl_hal_status_t status, const char *doing, fcsl_error_t *error);
+
+/* topics.c: what the sensed tick shows, into the outbox. */
+void fcsl_sim_topics_put(fcsl_sim_t *sim);
+/* Who takes from the outbox looks at once. */
+void fcsl_sim_topics_wake(const fcsl_sim_t *sim);
+void fcsl_sim_topics_free(fcsl_sim_t *sim);
+
+/* published.c: publishes the current values to clients, telemetry and observers. */
 void fcsl_sim_publish(fcsl_sim_t *sim);
 void fcsl_sim_publish_end(fcsl_sim_t *sim);
 /* serve.c: executes a waiting command; waits a while and returns 0 if no tick may run now. */
@@ -138,6 +151,8 @@ int fcsl_sim_paused(const fcsl_sim_t *sim);
 uint64_t fcsl_sim_wait_until(fcsl_sim_t *sim);
 /* pace.c: sleeps until then, or until a signal. */
 void fcsl_sim_sleep_until(uint64_t deadline_ns);
+/* pace.c: a simulation that is late by more than 0.1 s does not make up for it. */
+void fcsl_sim_forgive(fcsl_sim_t *sim);
 /* pace.c: the next tick is due at once, later ones relative to it. */
 void fcsl_sim_pace_anew(fcsl_sim_t *sim);
 

@@ -24,7 +24,8 @@ with Simulation(Path(plan).read_text(), {}) as sim:
     try:
         sim.listen(f"wire:{wire}", int(timeout_ms))
         print("listening", flush=True)
-        sim.accept()
+        if not sim.accept(int(timeout_ms)):
+            raise SimError(sim.problem)
         while sim.status == "running":
             sim.run(1)
             print(sim.tick, flush=True)

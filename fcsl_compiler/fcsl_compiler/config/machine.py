@@ -32,7 +32,7 @@ from .transitions import read_transitions
 from .views import Signals, is_partial, read_views
 
 #: Names that an instance cannot have, because paths and the machine's topics use them.
-RESERVED_INSTANCES = ("machine", "channels", "state", "transitions", "health", "faults", "record", "lockstep")
+RESERVED_INSTANCES = ("machine", "channels", "state", "transitions", "health", "faults", "record")
 MAX_TICK_HZ = 1_000_000
 
 #: Checked algorithms by name, in JSON order. None: an error was reported.

@@ -37,6 +37,13 @@ typedef struct {
     uint32_t depth; /* 1: fcsl_bus_take gets the newest message; more: as many wait, and the next one is dropped */
 } fcsl_bus_input_t;
 
+/* A key that answers queries with the same bytes as long as the session lives. They are copied. */
+typedef struct {
+    const char *key;
+    const void *bytes;
+    uint32_t size;
+} fcsl_bus_constant_t;
+
 /* All other keys are concrete (`lander/engine/throttle`). Each kind is numbered by place. */
 typedef struct {
     fcsl_bus_role_t role;
@@ -53,6 +60,8 @@ typedef struct {
     uint32_t input_count;
     const char *const *tokens; /* while this session lives, others see these */
     uint32_t token_count;
+    const fcsl_bus_constant_t *constants;
+    uint32_t constant_count;
     const char *const *watched; /* tokens of other sessions */
     uint32_t watched_count;
     const char *

@@ -35,16 +35,26 @@ fcsl_hal_status_t fcsl_external_accept(fcsl_external_t *external, uint32_t timeo
  * waits: in lock-step no more than one tick is under way. */
 fcsl_hal_status_t fcsl_external_send(fcsl_external_t *external, const fcsl_message_t *sensors, uint64_t time_ns);
 
-/* Waits up to `timeout_ms` for the actuator message of `tick`, whose bytes stay until the next call. Malformed messages and
- * those of earlier ticks are dropped and counted; FCSL_HAL_CLOSED when the controller is gone. */
+/* Waits up to `timeout_ms` for the actuator message of `tick`, whose bytes stay until the next call; the time begins anew with each
+ * sign of life of a controller that pauses. Malformed messages and those of earlier ticks are dropped and counted; FCSL_HAL_CLOSED
+ * when the controller is gone. */
 fcsl_hal_status_t fcsl_external_receive(fcsl_external_t *external, uint64_t tick, uint32_t timeout_ms,
                                         fcsl_message_t *message);
+/* The same for a moment, after which FCSL_HAL_WAITING says that there is time left: call again for the same tick. */
+fcsl_hal_status_t fcsl_external_await(fcsl_external_t *external, uint64_t tick, uint32_t timeout_ms,
+                                      fcsl_message_t *message);
+
+/* The simulator makes no ticks for a while, and calls this often: the controller waits on. */
+void fcsl_external_alive(fcsl_external_t *external);
+
+/* Tells the controller that the run has ended, and whether another one follows. Nothing is sent afterwards. */
+void fcsl_external_end(fcsl_external_t *external, int another_follows);
 
 /* What the last status other than OK was about; never null. */
 const char *fcsl_external_explain(const fcsl_external_t *external);
 uint64_t fcsl_external_messages_dropped(const fcsl_external_t *external);
 
-/* Tells the controller that the run has ended, and closes. Accepts null. */
+/* Ends the run, if it was not ended, and closes. Accepts null. */
 void fcsl_external_close(fcsl_external_t *external);
 
 #ifdef __cplusplus

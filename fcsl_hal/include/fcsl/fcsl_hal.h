@@ -22,12 +22,15 @@ typedef enum {
     FCSL_HAL_NONE = 1,    /* sample: nothing new for this tick */
     FCSL_HAL_TIMEOUT = 2, /* lock-step: the message of this tick did not come in time */
     FCSL_HAL_CLOSED = 3,  /* the other side ended the run */
-    FCSL_HAL_ERROR = 4
+    FCSL_HAL_ERROR = 4,
+    FCSL_HAL_WAITING = 5, /* lock-step: nothing has come yet, and there is time left: call again for the same tick */
+    FCSL_HAL_AGAIN = 6    /* the other side ended the run, and begins another one */
 } fcsl_hal_status_t;
 
 typedef struct fcsl_hal {
     void *ctx;
-    /* Before anything else, once. Returns 0, or -1 with `error` filled. Sets what stands below as known only now. */
+    /* Before anything else. Returns 0, or with `error` filled -1, or 1 when the peer was not found yet: then it may be called again,
+     * to look on. Sets what stands below as known only now. */
     int (*open)(struct fcsl_hal *hal, char *error, size_t error_size);
     /* Puts the sensor message of `tick` into `bytes`; `capacity` is fcsl_message_capacity(machine, FCSL_SENSOR_MESSAGE) or
      * more. The HAL has checked what came from elsewhere: the host takes *message as it is. Sets it on FCSL_HAL_OK alone. */
@@ -36,6 +39,8 @@ typedef struct fcsl_hal {
     /* Called when the arm flag of the commands changes, before the command that changes it, and with 0 at the end of a run that
      * is armed. A HAL that owns actuators switches their outputs; one that hands commands on has the flag in them. */
     fcsl_hal_status_t (*arm)(void *ctx, int armed);
+    /* The host makes no ticks for a while, and calls this often: a simulator waits on for its commands. */
+    void (*alive)(void *ctx);
     /* The clock of the run: monotonic, or simulated time where a simulator sends it. */
     uint64_t (*now_ns)(void *ctx);
     /* Sleeps until this time of that clock, or until a signal; at once where sample waits. */
@@ -71,17 +76,18 @@ int fcsl_hal_stub(fcsl_hal_t *hal, char *error, size_t error_size);
 /* Messages over the wire that `spec` names (fcsl_wire.h); fcsl_external is the other end. A peer with another channel table or
  * tick rate is refused.
  *
- * A simulator that sends the time paces the run: sample(k) waits up to `timeout_ms` for the time message of tick k, and what
- * was sensed for k has come before it. "no time message of tick k within timeout_ms ms" ends the run.
+ * A simulator that sends the time paces the run: the host waits up to `timeout_ms` for the time message of tick k, and what was
+ * sensed for k has come before it; sample(k) returns FCSL_HAL_WAITING meanwhile. A simulator that pauses says so, and the time
+ * begins anew. "no time message of tick k within timeout_ms ms" ends the run.
  * A rig that sends none leaves the run to the monotonic clock: sample takes the newest message, if one has come since the last
  * tick. A rig that falls silent, or goes, ends nothing; `hal.connected` and the age of the channels tell.
  * Returns 0, or -1 with `error` filled. */
 int fcsl_hal_wire(const char *spec, const fcsl_machine_t *machine, uint32_t timeout_ms, fcsl_hal_t *hal, char *error,
                   size_t error_size);
 /* The same over the bus, where each channel has a key (docs/bus.md). `address`: zenoh:tcp/HOST:PORT, where a simulator listens,
- * or zenoh-peer:tcp/HOST:PORT. `name_space`: in front of the keys, or "". */
-int fcsl_hal_bus(const char *address, const char *name_space, const fcsl_machine_t *machine, uint32_t timeout_ms,
-                 fcsl_hal_t *hal, char *error, size_t error_size);
+ * or zenoh-peer:tcp/HOST:PORT. `name_space`: in front of the keys, or "". `open_ms`: how long to look for the simulator. */
+int fcsl_hal_bus(const char *address, const char *name_space, const fcsl_machine_t *machine, uint32_t open_ms,
+                 uint32_t timeout_ms, fcsl_hal_t *hal, char *error, size_t error_size);
 /* 0 when `address` has that form, or -1 with `error` filled. */
 int fcsl_hal_bus_check(const char *address, char *error, size_t error_size);
 /* The same over a wire of your own, which the HAL owns once this has returned 0. */

@@ -5,10 +5,12 @@ use std::collections::HashSet;
 use std::ffi::{c_char, c_void};
 use std::sync::{Arc, Mutex};
 
+use zenoh::bytes::ZBytes;
 use zenoh::key_expr::KeyExpr;
 use zenoh::liveliness::LivelinessToken;
 use zenoh::pubsub::Publisher;
 use zenoh::qos::{CongestionControl, Priority};
+use zenoh::query::Query;
 use zenoh::sample::{Locality, Sample, SampleKind};
 use zenoh::{Config, Session, Wait};
 
@@ -133,6 +135,16 @@ impl Zenoh {
         };
         let strays = self.session.declare_subscriber(key.to_owned()).callback(callback);
         strays.allowed_origin(Locality::Remote).background().wait()
+    }
+
+    fn declare_constant(&self, key: &str, bytes: &[u8]) -> Result<(), zenoh::Error> {
+        let key = KeyExpr::new(key.to_owned())?;
+        let (answer, bytes) = (key.clone(), ZBytes::from(bytes.to_vec()));
+        let callback = move |query: Query| {
+            let _ = query.reply(&answer, bytes.clone()).wait(); // refused for a query that takes only its own key
+        };
+        let constant = self.session.declare_queryable(key).callback(callback);
+        constant.allowed_origin(Locality::Remote).background().wait()
     }
 
     fn declare_token(&mut self, key: &str) -> Result<(), zenoh::Error> {
@@ -273,6 +285,24 @@ pub unsafe extern "C" fn fcsl_zenoh_declare_strays(
 ) -> i32 {
     // SAFETY: the header's contract.
     unsafe { declare(zenoh, key, error, error_size, |zenoh, key| zenoh.declare_strays(key)) }
+}
+
+/// # Safety
+/// As zenoh_session.h: `size` readable bytes.
+#[no_mangle]
+pub unsafe extern "C" fn fcsl_zenoh_declare_constant(
+    zenoh: *mut Zenoh,
+    key: *const c_char,
+    bytes: *const u8,
+    size: usize,
+    error: *mut c_char,
+    error_size: usize,
+) -> i32 {
+    // SAFETY: the header's contract.
+    unsafe {
+        let bytes = c::bytes(bytes, size, "the constant");
+        declare(zenoh, key, error, error_size, |zenoh, key| zenoh.declare_constant(key, bytes?))
+    }
 }
 
 /// # Safety

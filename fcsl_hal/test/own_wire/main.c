@@ -28,7 +28,9 @@ static int control(pipe_wire_t *pipe)
     fcsl_hal_status_t status = FCSL_HAL_OK;
     uint64_t tick = 0;
     for (; status == FCSL_HAL_OK; tick++) {
-        status = hal.sample(hal.ctx, tick, bytes, sizeof bytes, &message);
+        do { /* ends at the time-out */
+            status = hal.sample(hal.ctx, tick, bytes, sizeof bytes, &message);
+        } while (status == FCSL_HAL_WAITING);
         if (status == FCSL_HAL_OK) {
             fcsl_message_apply(&MACHINE, &data, &message);
             data.command[0] = 2.0 * (double)data.i64;

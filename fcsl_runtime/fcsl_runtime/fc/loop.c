@@ -91,7 +91,7 @@ static int goes_on(loop_t *loop, fcsl_hal_status_t status)
     if (status == FCSL_HAL_OK || status == FCSL_HAL_NONE) {
         return 1;
     }
-    if (status == FCSL_HAL_CLOSED) {
+    if (status == FCSL_HAL_CLOSED || status == FCSL_HAL_AGAIN) {
         loop->ended = 1;
     } else {
         fail(loop, loop->hal.explain(loop->hal.ctx));
@@ -186,8 +186,10 @@ int loop_tick(loop_t *loop)
     fcsl_error_t error;
     const uint64_t tick = fcsl_run_tick(loop->run);
     fcsl_message_t message;
-    const fcsl_hal_status_t sampled =
-        loop->hal.sample(loop->hal.ctx, tick, loop->sensor_bytes, loop->sensor_capacity, &message);
+    fcsl_hal_status_t sampled = FCSL_HAL_WAITING;
+    while (sampled == FCSL_HAL_WAITING) { /* ends at the HAL's time-out, or when it is interrupted */
+        sampled = loop->hal.sample(loop->hal.ctx, tick, loop->sensor_bytes, loop->sensor_capacity, &message);
+    }
     if (!goes_on(loop, sampled)) {
         return 0;
     }
@@ -276,6 +278,7 @@ int loop_run(loop_t *loop)
     while (loop_may_tick(loop)) {
         if (loop->paused) {
             idle(loop);
+            loop->hal.alive(loop->hal.ctx);
             loop_serve(loop);
             pacing.anchor_ns = hal->now_ns(hal->ctx);
             pacing.next = 0;

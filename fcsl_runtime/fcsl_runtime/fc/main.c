@@ -66,7 +66,8 @@ static int make_hal(program_t *program)
     } else if (strncmp(peer, OPTIONS_WIRE, strlen(OPTIONS_WIRE)) == 0) {
         status = fcsl_hal_wire(peer + strlen(OPTIONS_WIRE), machine, timeout_ms, hal, error.text, sizeof error.text);
     } else {
-        status = fcsl_hal_bus(peer, options->name_space, machine, timeout_ms, hal, error.text, sizeof error.text);
+        status = fcsl_hal_bus(peer, options->name_space, machine, timeout_ms, timeout_ms, hal, error.text,
+                              sizeof error.text);
     }
     return status == 0 ? 0 : complain(error.text);
 }
@@ -198,6 +199,20 @@ static int open_telemetry(program_t *program)
     return loop->telemetry != NULL ? 0 : complain(error.text);
 }
 
+static int open_observers(program_t *program)
+{
+    fcsl_error_t error;
+    loop_t *loop = &program->loop;
+    if (program->options.observers == NULL) {
+        return 0;
+    }
+    const fcsl_observers_options_t options = {.endpoint = program->options.observers,
+                                              .name_space = program->options.name_space,
+                                              .machine = fcsl_run_machine(loop->run)};
+    loop->observers = fcsl_observers_open(&options, &loop->history, &error);
+    return loop->observers != NULL ? 0 : complain(error.text);
+}
+
 static int start_threads(program_t *program)
 {
     fcsl_error_t error;
@@ -208,6 +223,9 @@ static int start_threads(program_t *program)
         return complain(error.text);
     }
     if (program->loop.telemetry != NULL && fcsl_telemetry_start(program->loop.telemetry, &error) != 0) {
+        return complain(error.text);
+    }
+    if (program->loop.observers != NULL && fcsl_observers_start(program->loop.observers, &error) != 0) {
         return complain(error.text);
     }
     return realtime_enter(&program->realtime, &error) == 0 ? 0 : complain(error.text);
@@ -237,6 +255,9 @@ static void announce(const program_t *program)
     }
     if (program->options.telemetry != NULL) {
         log_info("telemetry to %s", program->options.telemetry);
+    }
+    if (program->options.observers != NULL) {
+        log_info("observers on %s", program->options.observers);
     }
     if (program->options.record != NULL) {
         log_info("recording to %s", program->options.record);
@@ -281,6 +302,7 @@ static int close_all(program_t *program)
     loop_t *loop = &program->loop;
     fcsl_vars_close(loop->vars);
     fcsl_telemetry_close(loop->telemetry);
+    fcsl_observers_close(loop->observers);
     /* Before the machine is unloaded: the HAL reads its channel table. */
     if (loop->hal.close != NULL) {
         loop->hal.close(loop->hal.ctx);
@@ -304,6 +326,7 @@ static int fly(program_t *program)
     monitor_end(&program->monitor);
     guard_link_close(loop); /* at once: to close a bag takes time */
     fcsl_telemetry_stop(loop->telemetry);
+    fcsl_observers_stop(loop->observers);
     if (write_run_summary(loop, program->options.summary_file, reason_of_end(program)) != 0) {
         status = EXIT_RUN;
     }
@@ -330,7 +353,7 @@ int main(int argc, char **argv)
     int status = EXIT_RUN;
     if (open_system(&program) == 0 && open_run(&program) == 0 && open_server(&program) == 0 &&
         open_hardware(&program) == 0 && open_guard(&program) == 0 && open_telemetry(&program) == 0 &&
-        open_record(&program) == 0 && start_threads(&program) == 0) {
+        open_observers(&program) == 0 && open_record(&program) == 0 && start_threads(&program) == 0) {
         status = fly(&program);
     }
     monitor_end(&program.monitor);

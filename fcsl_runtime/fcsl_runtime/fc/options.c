@@ -59,6 +59,8 @@ static const char USAGE[] =
     "udp:HOST:PORT/N\n"
     "  --telemetry-fields GLOBS  which, as path globs with commas between\n"
     "                          (default machine.*,*.inputs.*,*.outputs.*,*.counters.*)\n"
+    "  --observers tcp/HOST:PORT  put the values of all channels on a bus of their own (docs/bus.md), which listens "
+    "there\n"
     "  --paused                start paused: ticks are made by commands until `resume`\n"
     "  --record BAG            record to this folder, which must not exist\n"
     "  --record-fields GLOBS   what of every tick, as path globs with commas between (default *.inputs.*,*.outputs.*)\n"
@@ -169,6 +171,7 @@ static const entry_t ENTRIES[] = {
     {.name = "checkpoints", .kind = TEXT, .offset = TO(checkpoints)},
     {.name = "telemetry", .kind = TEXT, .offset = TO(telemetry)},
     {.name = "telemetry-fields", .kind = TEXT, .offset = TO(telemetry_fields)},
+    {.name = "observers", .kind = TEXT, .offset = TO(observers)},
     {.name = "record", .kind = TEXT, .offset = TO(record)},
     {.name = "record-fields", .kind = TEXT, .offset = TO(record_fields)},
     {.name = "record-policy", .kind = WORD, .read = read_record_policy},
@@ -219,9 +222,10 @@ static int check(const options_t *options)
         return usage_error("--timeout-ms needs --hal wire:SPEC or zenoh:…: it is how long to wait for the simulator",
                            "");
     }
-    if (options->name_space[0] != '\0' && options->record == NULL &&
+    if (options->name_space[0] != '\0' && options->record == NULL && options->observers == NULL &&
         (options->peer == NULL || strncmp(options->peer, OPTIONS_WIRE, strlen(OPTIONS_WIRE)) == 0)) {
-        return usage_error("--namespace needs --record or --hal zenoh:…: it is of topics, and of keys of the bus", "");
+        return usage_error(
+            "--namespace needs --record, --observers or --hal zenoh:…: it is of topics, and of keys of the bus", "");
     }
     if (options->ignore_source_hash && options->restore == NULL) {
         return usage_error("--ignore-source-hash needs --restore", "");

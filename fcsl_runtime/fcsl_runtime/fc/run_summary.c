@@ -33,6 +33,13 @@ static void report_telemetry(const fcsl_telemetry_t *telemetry)
              sent.packets, sent.overwritten, sent.configurations, sent.datagrams, sent.failures);
 }
 
+static void report_observers(const fcsl_observers_t *observers)
+{
+    fcsl_observers_counters_t put;
+    fcsl_observers_count(observers, &put);
+    log_info("observers %" PRIu64 " ticks, %" PRIu64 " dropped", put.ticks, put.dropped);
+}
+
 /* What the HAL has counted, as far as it is not 0. */
 static void report_hal(const loop_t *loop, const uint8_t *data)
 {
@@ -75,6 +82,9 @@ static void report_counters(const loop_t *loop, const uint8_t *data)
              fcsl_tick_stats_get(&stats->records_dropped), clients);
     if (loop->telemetry != NULL) {
         report_telemetry(loop->telemetry);
+    }
+    if (loop->observers != NULL) {
+        report_observers(loop->observers);
     }
     report_hal(loop, data);
     if (loop->guard_state != GUARD_NONE) {

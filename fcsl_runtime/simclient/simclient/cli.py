@@ -15,7 +15,7 @@ from contextlib import contextmanager
 from pathlib import Path
 from typing import NoReturn
 
-from .errors import BagError, MapError, TwinError, ViewError
+from .errors import BagError, BusError, MapError, TwinError, ViewError
 
 EXIT_INCOMPLETE = 1
 EXIT_BAD_INPUT = 2
@@ -35,7 +35,7 @@ def run_tool(name: str, main: Callable[[Sequence[str]], int]) -> NoReturn:
     try:
         status = main(sys.argv[1:])
         sys.stdout.flush()
-    except (TwinError, BagError, MapError, ViewError) as error:
+    except (TwinError, BagError, BusError, MapError, ViewError) as error:
         print(f"{name}: error: {error}", file=sys.stderr)
         status = EXIT_BAD_INPUT
     except OSError as error:

@@ -23,6 +23,10 @@ class ViewError(ValueError):
     """A viewer that cannot be started or has ended."""
 
 
+class BusError(ValueError):
+    """A bus that cannot be reached, or a request to it that is wrong."""
+
+
 class MapError(ValueError):
     """An invalid map file, or a bag that lacks what the map names."""
 

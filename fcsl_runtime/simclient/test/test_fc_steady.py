@@ -4,6 +4,7 @@ is recorded and whoever asks. The kernel says so (steady.c, a seccomp filter on 
 
 from __future__ import annotations
 
+import contextlib
 import json
 import os
 import platform
@@ -18,11 +19,13 @@ from pathlib import Path
 import pytest
 from conftest import CFLAGS, ROOT
 from guarding import guarding
-from native import FIXTURE, PROGRAM, WIRE_SIM, Fc
+from native import FIXTURE, PROGRAM, WIRE_SIM, Fc, free_endpoint
 from telemetry_page import Port
 from test_fc_wire import HELLO, TABLE, TICK_HZ, control, listening
 
 from fcsl_compiler.driver.cache import build_machine
+from simclient.bus.session import Session
+from simclient.errors import BusError
 from simclient.link.message import table_hash
 
 pytestmark = pytest.mark.skipif(platform.system() != "Linux", reason="seccomp is Linux's")
@@ -154,6 +157,18 @@ def test_telemetry(folder: Path, tmp_path: Path) -> None:
             options = ("--telemetry", address, "--telemetry-fields", "*", "--socket", str(tmp_path / "s"))
             assert Watched(folder, machine(folder, 0), *options).allocations() == 0
         assert len(port.datagrams()) > TICKS
+
+
+def test_observers(folder: Path) -> None:
+    endpoint = free_endpoint()
+    fc = Watched(folder, machine(folder, 0), "--observers", endpoint)
+    for _ in range(100):
+        with contextlib.suppress(BusError), Session(endpoint) as session:
+            session.subscribe(session.machines())
+            came = sum(message is not None for message in session.messages())
+            break
+    assert fc.allocations() == 0
+    assert came > TICKS
 
 
 def test_commands_to_a_guard(folder: Path, build_guarded: Callable[..., Path], tmp_path: Path) -> None:

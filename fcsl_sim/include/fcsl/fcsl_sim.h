@@ -13,7 +13,10 @@
 #define FCSL_SIM_H
 
 #include "fcsl/fcsl_model.h"
+#include "fcsl/fcsl_outbox.h"
+#include "fcsl/fcsl_ros.h"
 #include "fcsl/fcsl_run.h"
+#include "fcsl/fcsl_observers.h"
 #include "fcsl/fcsl_telemetry.h"
 
 #ifdef __cplusplus
@@ -66,9 +69,36 @@ const void *fcsl_sim_machine_data(const fcsl_sim_t *sim);
  * `name_space` stands in front of the keys of the bus. */
 int fcsl_sim_listen(fcsl_sim_t *sim, const char *peer, const char *name_space, uint32_t timeout_ms,
                     fcsl_error_t *error);
-/* Waits up to timeout_ms for the connection; then fcsl_sim_run steps in lock-step with the controller. A missing answer
- * after timeout_ms is an error that names its tick. */
-int fcsl_sim_accept(fcsl_sim_t *sim, fcsl_error_t *error);
+/* Waits up to wait_ms for the connection: 0, or 1 when nobody has come. Then fcsl_sim_run steps in lock-step with the controller. A
+ * missing answer after timeout_ms is an error that names its tick. */
+int fcsl_sim_accept(fcsl_sim_t *sim, uint32_t wait_ms, fcsl_error_t *error);
+
+/* Steps several simulations, each with an external controller, together: tick k of all that run, then tick k + 1. Ends after
+ * `ticks` ticks, after about slice_ms, or when all are over; a tick may then be under way, and goes on with the next call. The
+ * first one has the speed (fcsl_sim_set_speed). Returns the ticks completed, or -1 with `failed` the number of the simulation. */
+int64_t fcsl_sim_run_together(fcsl_sim_t *const *sims, uint32_t count, uint64_t ticks, uint32_t slice_ms,
+                              uint32_t *failed, fcsl_error_t *error);
+/* While no tick is run, called often: the controller waits on. */
+void fcsl_sim_alive(fcsl_sim_t *sim);
+/* Tells the controller that the run is over, and whether another one follows. */
+void fcsl_sim_end(fcsl_sim_t *sim, int another_follows);
+
+/* ---- ROS 2 topics ------------------------------------------------------------------------------------------------------ */
+
+/* Messages of each tick of fcsl_sim_run_together, before the controller answers it, go into an outbox under the number of their
+ * topic. All are added before the first tick; outbox and composers must outlive the simulation. `every`: those of every n-th tick.
+ * Each function returns 0, or -1. */
+int fcsl_sim_show_clock(fcsl_sim_t *sim, fcsl_outbox_t *outbox, uint32_t topic, fcsl_error_t *error);
+/* fcsl_msgs/PlantTruth: `head` is its CDR up to the first value. */
+int fcsl_sim_show_truth(fcsl_sim_t *sim, fcsl_outbox_t *outbox, uint32_t topic, const uint8_t *head, uint32_t head_size,
+                        uint32_t every, fcsl_error_t *error);
+/* A message of `size` bytes composed of the structs of instances. */
+int fcsl_sim_show_instances(fcsl_sim_t *sim, fcsl_outbox_t *outbox, uint32_t topic, const fcsl_ros_composer_t *composer,
+                            uint32_t size, const uint32_t *instances, uint32_t count, uint32_t every,
+                            fcsl_error_t *error);
+/* A message composed of sensor channels, when one of these was sampled. */
+int fcsl_sim_show_channels(fcsl_sim_t *sim, fcsl_outbox_t *outbox, uint32_t topic, const fcsl_ros_composer_t *composer,
+                           uint32_t size, const uint32_t *channels, uint32_t count, fcsl_error_t *error);
 
 /* ---- variable server ----------------------------------------------------------------------------------------------- */
 
@@ -88,6 +118,14 @@ const char *fcsl_sim_address(const fcsl_sim_t *sim);
 int fcsl_sim_telemetry(fcsl_sim_t *sim, const char *address, const char *fields, fcsl_error_t *error);
 /* Sends the remaining packets and stops; returns the counts, all 0 if telemetry was off. */
 void fcsl_sim_telemetry_stop(fcsl_sim_t *sim, fcsl_telemetry_counters_t *counters);
+
+/* ---- observers ------------------------------------------------------------------------------------------------------ */
+
+/* The channels of the hosted machine on a bus that listens on `endpoint` (fcsl_observers.h) from now on; only before the first
+ * tick and before fcsl_sim_serve. */
+int fcsl_sim_observers(fcsl_sim_t *sim, const char *endpoint, const char *name_space, fcsl_error_t *error);
+/* Puts the remaining ticks and stops; returns the counts, all 0 if there were no observers. */
+void fcsl_sim_observers_stop(fcsl_sim_t *sim, fcsl_observers_counters_t *counters);
 
 /* ---- controller driven by the caller --------------------------------------------------------------------------------- */
 

@@ -42,7 +42,11 @@ FLAGS = (
     *("-std=c11", "-O1", "-g", "-fno-omit-frame-pointer", "-ffp-contract=off", "-fPIC", "-Wall", "-Wextra"),
     *(f"-fsanitize={SANITIZE}", "-fno-sanitize-recover=all"),
 )
-_NATIVE = ("fcsl_hal/src", "fcsl_runtime/fcsl_runtime/src/*", "fcsl_runtime/fcsl_runtime/fc", "fcsl_sim/src")
+_NATIVE = (
+    "fcsl_hal/src",
+    *(f"fcsl_runtime/fcsl_runtime/{folder}" for folder in ("src/*", "fc", "observers")),
+    "fcsl_sim/src",
+)
 _INCLUDES = (
     *("fcsl_hal/include", "fcsl_runtime/fcsl_runtime/include", "fcsl_sim/include", "fcsl_compiler/include"),
     *(

@@ -93,7 +93,7 @@ def on_target(config: SimConfig, program: Path) -> Flight:
         board[board.index("-serial") + 1] = f"{address},nodelay=on"  # what the UART sends is a stream of bytes
         with subprocess.Popen(board, stdout=subprocess.PIPE, stderr=subprocess.STDOUT, text=True) as emulator:
             try:
-                sim.accept()
+                sim.accept(_TIMEOUT_MS)
                 flight.fly(sim)
                 sim.close()
                 said, _ = emulator.communicate(timeout=_TIMEOUT_MS / 1000)

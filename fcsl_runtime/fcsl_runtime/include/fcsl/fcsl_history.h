@@ -61,6 +61,9 @@ fcsl_history_status_t fcsl_history_read(const fcsl_history_t *history, uint64_t 
 /* Where a reader goes on that found publication `number` overwritten: in the middle of what is there, so that it is not
  * overtaken again at once. Above `number`. */
 uint64_t fcsl_history_catch_up(const fcsl_history_t *history, uint64_t number);
+/* How long a reader may rest that follows ticks at this rate: an eighth of what the history holds, so that one that is kept
+ * waiting is not overtaken at once; 0.05 ms to 2 ms. */
+uint64_t fcsl_history_nap_ns(const fcsl_history_t *history, uint64_t tick_hz);
 /* Copies the newest: FCSL_HISTORY_OK, or FCSL_HISTORY_COMING before the first. A reader that is overtaken again and again
  * gives up after a bounded number of tries with FCSL_HISTORY_GONE. */
 fcsl_history_status_t fcsl_history_latest(const fcsl_history_t *history, fcsl_moment_t *moment, uint8_t *bytes);

@@ -137,6 +137,14 @@ uint64_t fcsl_history_catch_up(const fcsl_history_t *history, uint64_t number)
     return published > number + kept ? published - kept : number + 1u;
 }
 
+uint64_t fcsl_history_nap_ns(const fcsl_history_t *history, uint64_t tick_hz)
+{
+    const uint64_t least_ns = 50000u;
+    const uint64_t most_ns = 2000000u;
+    const uint64_t nap_ns = UINT64_C(1000000000) / tick_hz * history->slots / 8u;
+    return nap_ns < least_ns ? least_ns : nap_ns > most_ns ? most_ns : nap_ns;
+}
+
 fcsl_history_status_t fcsl_history_latest(const fcsl_history_t *history, fcsl_moment_t *moment, uint8_t *bytes)
 {
     for (int i = 0; i < TRIES; i++) {

@@ -143,6 +143,11 @@ void fcsl_ring_publish(fcsl_ring_t *ring)
     }
 }
 
+void fcsl_ring_wake(fcsl_ring_t *ring)
+{
+    wake_if(&ring->consumer_sleeps, &ring->wake_consumer);
+}
+
 void fcsl_ring_end(fcsl_ring_t *ring)
 {
     atomic_store(&ring->closed, 1);

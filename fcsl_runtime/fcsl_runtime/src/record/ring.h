@@ -59,6 +59,8 @@ typedef enum {
  * was claimed is the consumer's once fcsl_ring_publish is called; the next claim comes after that. */
 uint8_t *fcsl_ring_claim(fcsl_ring_t *ring, const fcsl_record_t *record, fcsl_ring_policy_t policy);
 void fcsl_ring_publish(fcsl_ring_t *ring);
+/* Producer: ends the consumer's nap. */
+void fcsl_ring_wake(fcsl_ring_t *ring);
 /* Producer: no more records will come. */
 void fcsl_ring_end(fcsl_ring_t *ring);
 

@@ -16,9 +16,6 @@
 #include "run/tick_time.h"
 
 static const uint64_t SECOND_NS = 1000000000u;
-/* A nap is an eighth of what the history holds, so that a thread that is kept waiting is not overtaken at once. */
-static const uint64_t NAP_MIN_NS = 50000u;
-static const uint64_t NAP_MAX_NS = 2000000u;
 
 /* UNIX time of tick 0, were all ticks on time; 0 for ticks that do not keep to the clock. */
 static int64_t wall_of(const fcsl_telemetry_options_t *options, uint64_t completed)
@@ -79,12 +76,6 @@ static int prepare(fcsl_telemetry_t *t, const fcsl_telemetry_options_t *options,
     return t->body != NULL ? 0 : fcsl_fail(error, "out of memory for telemetry");
 }
 
-static uint64_t nap_of(const fcsl_telemetry_t *t)
-{
-    const uint64_t nap = SECOND_NS / t->tick_hz * t->history->slots / 8u;
-    return nap < NAP_MIN_NS ? NAP_MIN_NS : nap > NAP_MAX_NS ? NAP_MAX_NS : nap;
-}
-
 fcsl_telemetry_t *fcsl_telemetry_open(const fcsl_telemetry_options_t *options, const fcsl_vars_block_t *blocks,
                                       uint32_t block_count, const fcsl_history_t *history, fcsl_error_t *error)
 {
@@ -95,7 +86,7 @@ fcsl_telemetry_t *fcsl_telemetry_open(const fcsl_telemetry_options_t *options, c
     }
     t->history = history;
     t->tick_hz = options->machine->tick_hz;
-    t->nap_ns = nap_of(t);
+    t->nap_ns = fcsl_history_nap_ns(history, t->tick_hz);
     if (fcsl_udp_open(&t->udp, options->address, error) != 0 || prepare(t, options, blocks, block_count, error) != 0) {
         fcsl_telemetry_close(t);
         return NULL;

@@ -177,6 +177,16 @@ class Composer:
         self.refused = 0
         weakref.finalize(self, library.fcsl_ros_composer_free, handle)
 
+    @property
+    def handle(self) -> int:
+        """The fcsl_ros_composer_t; it lives as long as this object."""
+        return int(self._handle)
+
+    @property
+    def size(self) -> int:
+        """Bytes of each message."""
+        return len(self._message)
+
     def compose(self, memories: Sequence[int], time_ns: int) -> bytes | None:
         """The message (CDR) with stamp `time_ns` (ns); None, counted in `refused`, if a value does not fit its field.
 

@@ -163,6 +163,19 @@ _PROTOTYPES: dict[str, tuple[type | None, list[type]]] = {
     "fcsl_ros_composer_new": (ptr, [POINTER(CComposerPlan), _ERROR]),
     "fcsl_ros_composer_free": (None, [ptr]),
     "fcsl_ros_compose": (c_int, [ptr, POINTER(ptr), c_int64, ptr]),
+    "fcsl_outbox_new": (ptr, [c_int, _ERROR]),
+    "fcsl_outbox_free": (None, [ptr]),
+    "fcsl_outbox_wake": (None, [ptr]),
+    "fcsl_outbox_take": (c_size_t, [ptr, c_int, ptr]),
+    "fcsl_outbox_dropped": (c_uint64, [ptr]),
+    "fcsl_topics_new": (ptr, [ptr, ptr, _ERROR]),
+    "fcsl_topics_free": (None, [ptr]),
+    "fcsl_topics_add_instance": (c_int, [ptr, c_uint32, c_uint32, c_uint32, _ERROR]),
+    "fcsl_topics_add_tick_message": (c_int, [ptr, c_uint32, c_int, _ERROR]),
+    "fcsl_topics_add_actuators": (c_int, [ptr, c_uint32, ptr, c_uint32, _ERROR]),
+    "fcsl_topics_put": (None, [ptr, c_int64]),
+    "fcsl_topics_put_changes": (None, [ptr, c_int64]),
+    "fcsl_topics_refused": (c_uint64, [ptr, c_uint32]),
 }
 
 
@@ -172,7 +185,7 @@ def _load(path: Path) -> ctypes.CDLL:
 
 
 def library() -> ctypes.CDLL:
-    """The runtime with the prototypes of fcsl_ros.h. Raises TwinError."""
+    """The runtime with the prototypes of fcsl_ros.h, fcsl_outbox.h and fcsl_topics.h. Raises TwinError."""
     return _load(runtime_library())
 
 

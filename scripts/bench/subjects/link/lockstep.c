@@ -101,7 +101,11 @@ static _Noreturn void control(const char *spec)
     check(hal.open(&hal, error, sizeof error) == 0, "the HAL does not open");
     for (uint64_t tick = 0;; tick++) {
         fcsl_message_t message;
-        if (hal.sample(hal.ctx, tick, bytes, sizeof bytes, &message) != FCSL_HAL_OK) {
+        fcsl_hal_status_t status = FCSL_HAL_WAITING;
+        while (status == FCSL_HAL_WAITING) {
+            status = hal.sample(hal.ctx, tick, bytes, sizeof bytes, &message);
+        }
+        if (status != FCSL_HAL_OK) {
             break;
         }
         fcsl_message_apply(&MACHINE, &data, &message);

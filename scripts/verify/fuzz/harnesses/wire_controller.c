@@ -18,7 +18,10 @@ static void sample(hal_t *hal, uint64_t *tick, size_t capacity)
     fcsl_message_t message;
     fcsl_message_t again;
     FUZZ_CHECK(out != NULL);
-    const fcsl_hal_status_t status = wire_sample(hal, *tick, out, capacity, &message);
+    fcsl_hal_status_t status = FCSL_HAL_WAITING;
+    while (status == FCSL_HAL_WAITING) {
+        status = wire_sample(hal, *tick, out, capacity, &message);
+    }
     if (status == FCSL_HAL_OK) {
         FUZZ_CHECK(message.bytes == out && message.size <= capacity && message.tick == *tick);
         FUZZ_CHECK(fcsl_message_check(&hal->table, FCSL_SENSOR_MESSAGE, out, message.size, &again) == FCSL_MESSAGE_OK);

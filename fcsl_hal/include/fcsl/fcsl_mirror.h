@@ -1,0 +1,51 @@
+/* SPDX-License-Identifier: Apache-2.0
+ *
+ * The channels of a machine for observers: what they hold after a tick, put on a session of the bus that listens (docs/bus.md).
+ * One thread posts, and it is not the one that steps. What an observer is too slow for is dropped on its way to it.
+ */
+#ifndef FCSL_MIRROR_H
+#define FCSL_MIRROR_H
+
+#include <stddef.h>
+#include <stdint.h>
+
+#include "fcsl/fcsl_machine.h"
+
+#ifdef __cplusplus
+extern "C" {
+#endif
+
+typedef struct fcsl_mirror fcsl_mirror_t;
+
+typedef struct {
+    const char *endpoint;   /* "tcp/HOST:PORT", to listen on */
+    const char *name_space; /* before the keys, "" for none */
+    const char *descriptor; /* the text that answers queries for @descriptor */
+} fcsl_mirror_options_t;
+
+/* Listens. The machine's tables must outlive it. Returns 0, or -1 with `error` filled. */
+int fcsl_mirror_open(const fcsl_mirror_options_t *options, const fcsl_machine_t *machine, fcsl_mirror_t **mirror,
+                     char *error, size_t error_size);
+
+/* Whether an observer takes anything. */
+int fcsl_mirror_watched(const fcsl_mirror_t *mirror);
+
+/* Whether there is room for another tick. */
+int fcsl_mirror_ready(fcsl_mirror_t *mirror);
+
+/* Posts the values of a tick and its commits; `data` is the machine's struct after it. A sensor has a value where a sample came
+ * since the tick that was posted before; in the first tick, and without a HAL, always. Returns 0, or -1: there is no room, and
+ * commits are missing. */
+int fcsl_mirror_post(fcsl_mirror_t *mirror, const void *data, uint64_t tick, uint64_t time_ns);
+
+/* Nobody saw the last tick: the next one is a first one. */
+void fcsl_mirror_begin(fcsl_mirror_t *mirror);
+
+/* Puts what was posted, as far as that takes no longer than 2 s. Accepts null. */
+void fcsl_mirror_close(fcsl_mirror_t *mirror);
+
+#ifdef __cplusplus
+}
+#endif
+
+#endif /* FCSL_MIRROR_H */

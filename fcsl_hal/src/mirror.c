@@ -1,0 +1,277 @@
+/* SPDX-License-Identifier: Apache-2.0
+ *
+ * A machine's channels under their keys, for observers: the session, and what a tick puts on it.
+ */
+#include "fcsl/fcsl_mirror.h"
+
+#include <stdio.h>
+#include <stdlib.h>
+#include <string.h>
+
+#include "codec_layout.h"
+#include "commit.h"
+#include "fcsl/fcsl_bus.h"
+
+enum {
+    COMMIT = 0, /* outputs: the commits, then the channels */
+    CHANNELS = 1,
+    TICKS_POSTED = 64, /* at most, before all of them must have left */
+    TICKS_SPARE = 2, /* one that is leaving, and what is lost where the ring ends */
+    ENTRY_BYTES_MAX = 16, /* of the ring, beside a message */
+    CLOSE_MS = 2000
+};
+/* Fewer ticks are posted at a time where these would take more. */
+static const uint64_t RING_BYTES = UINT64_C(4) << 20;
+
+struct fcsl_mirror {
+    fcsl_channel_table_t table;
+    fcsl_bus_t *bus;
+    uint8_t *fresh; /* of each channel: has a value in the tick */
+    uint32_t *ages; /* of each channel, in the tick posted before */
+    uint8_t *value; /* the longest of a channel, or a commit */
+    uint64_t tick;  /* posted before */
+    int has_begun;  /* there is one */
+    uint32_t ticks; /* that the ring holds */
+    uint32_t room;  /* of them, free for certain */
+};
+
+/* ---- a tick --------------------------------------------------------------------------------------------------------- */
+
+static uint32_t word_at(const uint8_t *data, uint32_t offset)
+{
+    uint32_t word = 0;
+    memcpy(&word, data + offset, sizeof word);
+    return word;
+}
+
+/* Whether a sample came since the tick posted before: without one, the age would have grown by the ticks between. */
+static int is_sampled(fcsl_mirror_t *mirror, uint32_t number, const uint8_t *data, uint64_t tick)
+{
+    const fcsl_channel_t *channel = &mirror->table.machine->channels[number];
+    const uint32_t before = mirror->ages[number];
+    mirror->ages[number] = word_at(data, channel->age_offset);
+    return !mirror->has_begun || data[channel->attached_offset] == 0u || mirror->ages[number] == 0u ||
+           (mirror->ages[number] != UINT32_MAX && mirror->ages[number] != before + (tick - mirror->tick));
+}
+
+static int post_value(const fcsl_mirror_t *mirror, uint32_t number, const uint8_t *data)
+{
+    const fcsl_machine_t *machine = mirror->table.machine;
+    const fcsl_channel_t *channel = &machine->channels[number];
+    const fcsl_field_t *field = &machine->fields[channel->field];
+    uint32_t size = field->size;
+    if (channel->as == FCSL_AS_BLOB) {
+        size = blob_count(data + field->offset, blob_capacity(field));
+        blob_export(mirror->value, data + field->offset, size);
+    } else {
+        fcsl_scalars_export(mirror->value, data + field->offset, field->type, field->count);
+    }
+    return fcsl_bus_post(mirror->bus, CHANNELS + number, mirror->value, size);
+}
+
+static int post_direction(fcsl_mirror_t *mirror, const commit_t *commit, const uint8_t *data)
+{
+    const fcsl_machine_t *machine = mirror->table.machine;
+    int failed = 0;
+    for (uint32_t i = 0; i < machine->channel_count && !failed; i++) {
+        mirror->fresh[i] = machine->channels[i].direction == commit->direction &&
+                           (commit->direction == FCSL_ACTUATOR || is_sampled(mirror, i, data, commit->tick));
+        failed = mirror->fresh[i] != 0u && post_value(mirror, i, data) != 0;
+    }
+    commit_write(commit, mirror->fresh, mirror->value);
+    return failed || fcsl_bus_post(mirror->bus, COMMIT, mirror->value, commit_bytes(commit->channels)) != 0;
+}
+
+int fcsl_mirror_post(fcsl_mirror_t *mirror, const void *data, uint64_t tick, uint64_t time_ns)
+{
+    const fcsl_machine_t *machine = mirror->table.machine;
+    const uint8_t *bytes = data;
+    commit_t commit = {.tick = tick,
+                       .time_ns = time_ns,
+                       .table_hash = mirror->table.hash,
+                       .direction = FCSL_SENSOR,
+                       .channels = (uint16_t)machine->channel_count};
+    mirror->room -= mirror->room > 0u;
+    int failed = post_direction(mirror, &commit, bytes);
+    commit.direction = FCSL_ACTUATOR;
+    commit.time_ns = 0;
+    commit.armed = machine->arm_field == FCSL_NONE || bytes[machine->fields[machine->arm_field].offset] != 0u;
+    failed = failed || post_direction(mirror, &commit, bytes);
+    mirror->tick = tick;
+    mirror->has_begun = !failed;
+    return failed ? -1 : 0;
+}
+
+void fcsl_mirror_begin(fcsl_mirror_t *mirror)
+{
+    mirror->has_begun = 0;
+}
+
+int fcsl_mirror_watched(const fcsl_mirror_t *mirror)
+{
+    int watched = fcsl_bus_matched(mirror->bus, COMMIT);
+    for (uint32_t i = 0; i < mirror->table.machine->channel_count && !watched; i++) {
+        watched = fcsl_bus_matched(mirror->bus, CHANNELS + i);
+    }
+    return watched;
+}
+
+/* Once everything has left, the ring holds as many ticks as it was made for. */
+int fcsl_mirror_ready(fcsl_mirror_t *mirror)
+{
+    if (mirror->room == 0u) {
+        fcsl_bus_counters_t now;
+        fcsl_bus_count(mirror->bus, &now);
+        mirror->room = now.posted == now.put + now.put_failed ? mirror->ticks : 0u;
+    }
+    return mirror->room > 0u;
+}
+
+/* ---- opening and closing -------------------------------------------------------------------------------------------- */
+
+/* Bytes of the longest value under a channel's key. */
+static uint32_t value_bytes(const fcsl_machine_t *machine, uint32_t number)
+{
+    const fcsl_channel_t *channel = &machine->channels[number];
+    const fcsl_field_t *field = &machine->fields[channel->field];
+    return channel->as == FCSL_AS_BLOB ? blob_capacity(field) : field->size;
+}
+
+static int check(const fcsl_machine_t *machine, const char *name_space, char *error, size_t error_size)
+{
+    static const char LONGEST[] = "@descriptor"; /* of the names that are no channels */
+    const size_t before = strlen(name_space) + strlen(machine->name) + 2u;
+    for (uint32_t i = 0; i < machine->channel_count; i++) {
+        const char *name = machine->channels[i].name;
+        if (strcmp(name, "tick") == 0) {
+            (void)snprintf(error, error_size, "channel 'tick' cannot go over the bus: the commits have its key");
+            return -1;
+        }
+        if (before + strlen(name) > FCSL_BUS_KEY_MAX) {
+            (void)snprintf(error, error_size, "the key of channel '%.100s' is longer than %u bytes", name,
+                           FCSL_BUS_KEY_MAX);
+            return -1;
+        }
+        if (value_bytes(machine, i) > FCSL_BUS_MESSAGE_MAX) {
+            (void)snprintf(error, error_size, "channel '%.100s' has %u bytes; a message of the bus has at most %u",
+                           name, value_bytes(machine, i), FCSL_BUS_MESSAGE_MAX);
+            return -1;
+        }
+    }
+    if (before + strlen(LONGEST) > FCSL_BUS_KEY_MAX) {
+        (void)snprintf(error, error_size, "the keys under namespace '%.100s' are longer than %u bytes", name_space,
+                       FCSL_BUS_KEY_MAX);
+        return -1;
+    }
+    return 0;
+}
+
+static fcsl_mirror_t *allocate(const fcsl_machine_t *machine)
+{
+    const size_t channels = machine->channel_count;
+    size_t longest = commit_bytes(machine->channel_count);
+    fcsl_mirror_t *mirror = calloc(1, sizeof *mirror);
+    if (mirror == NULL) {
+        return NULL;
+    }
+    for (uint32_t i = 0; i < machine->channel_count; i++) {
+        longest = value_bytes(machine, i) > longest ? value_bytes(machine, i) : longest;
+    }
+    mirror->table = fcsl_channel_table(machine);
+    mirror->fresh = calloc(channels + 1u, 1);
+    mirror->ages = calloc(channels + 1u, sizeof *mirror->ages);
+    mirror->value = calloc(longest, 1);
+    if (mirror->fresh == NULL || mirror->ages == NULL || mirror->value == NULL) {
+        fcsl_mirror_close(mirror);
+        return NULL;
+    }
+    return mirror;
+}
+
+/* The ring's bytes, and how many ticks it holds. */
+static uint32_t size_ring(fcsl_mirror_t *mirror)
+{
+    const fcsl_machine_t *machine = mirror->table.machine;
+    uint64_t tick_bytes = 2u * (commit_bytes(machine->channel_count) + ENTRY_BYTES_MAX);
+    for (uint32_t i = 0; i < machine->channel_count; i++) {
+        tick_bytes += value_bytes(machine, i) + ENTRY_BYTES_MAX;
+    }
+    const uint64_t ticks = RING_BYTES / tick_bytes;
+    mirror->ticks = ticks < 1u ? 1u : ticks > TICKS_POSTED ? TICKS_POSTED : (uint32_t)ticks;
+    const uint64_t bytes = tick_bytes * (mirror->ticks + TICKS_SPARE);
+    return bytes < UINT32_MAX ? (uint32_t)bytes : UINT32_MAX; /* the bus refuses so many */
+}
+
+/* Writes a key to its place in `keys`. */
+static const char *write_key(char *keys, uint32_t place, const fcsl_mirror_options_t *options, const char *machine,
+                             const char *name)
+{
+    char *key = keys + (size_t)place * (FCSL_BUS_KEY_MAX + 1u);
+    (void)snprintf(key, FCSL_BUS_KEY_MAX + 1u, "%s%s%s/%s", options->name_space,
+                   options->name_space[0] != '\0' ? "/" : "", machine, name);
+    return key;
+}
+
+static int open_session(fcsl_mirror_t *mirror, const fcsl_mirror_options_t *options, const char **outputs, char *keys,
+                        char *error, size_t error_size)
+{
+    const fcsl_machine_t *machine = mirror->table.machine;
+    const uint32_t count = machine->channel_count + CHANNELS;
+    const fcsl_bus_constant_t descriptor = {.key = write_key(keys, count, options, machine->name, "@descriptor"),
+                                            .bytes = options->descriptor,
+                                            .size = (uint32_t)strlen(options->descriptor)};
+    outputs[COMMIT] = write_key(keys, COMMIT, options, machine->name, "tick");
+    for (uint32_t i = 0; i < machine->channel_count; i++) {
+        outputs[CHANNELS + i] = write_key(keys, CHANNELS + i, options, machine->name, machine->channels[i].name);
+    }
+    const fcsl_bus_options_t bus = {.role = FCSL_BUS_LISTEN,
+                                    .endpoint = options->endpoint,
+                                    .observer = 1,
+                                    .ring_bytes = size_ring(mirror),
+                                    .outputs = outputs,
+                                    .output_count = count,
+                                    .constants = &descriptor,
+                                    .constant_count = 1};
+    return fcsl_bus_open(&bus, &mirror->bus, error, error_size);
+}
+
+int fcsl_mirror_open(const fcsl_mirror_options_t *options, const fcsl_machine_t *machine, fcsl_mirror_t **mirror,
+                     char *error, size_t error_size)
+{
+    const size_t count = (size_t)machine->channel_count + CHANNELS;
+    int failed = -1;
+    if (check(machine, options->name_space, error, error_size) != 0) {
+        return -1;
+    }
+    fcsl_mirror_t *self = allocate(machine);
+    const char **outputs = calloc(count, sizeof *outputs);
+    char *keys = calloc(count + 1u, FCSL_BUS_KEY_MAX + 1u);
+    if (self == NULL || outputs == NULL || keys == NULL) {
+        (void)snprintf(error, error_size, "out of memory for observers");
+    } else {
+        failed = open_session(self, options, outputs, keys, error, error_size);
+    }
+    free(keys);
+    free((void *)outputs);
+    if (failed) {
+        fcsl_mirror_close(self);
+        return -1;
+    }
+    *mirror = self;
+    return 0;
+}
+
+void fcsl_mirror_close(fcsl_mirror_t *mirror)
+{
+    if (mirror == NULL) {
+        return;
+    }
+    if (mirror->bus != NULL) {
+        (void)fcsl_bus_close(mirror->bus,
+                             CLOSE_MS); /* frozen observers may hold it up: what is left of it goes on alone */
+    }
+    free(mirror->fresh);
+    free(mirror->ages);
+    free(mirror->value);
+    free(mirror);
+}

@@ -1,0 +1,210 @@
+/* SPDX-License-Identifier: Apache-2.0
+ *
+ * What a tick of a machine puts on the bus for observers: values and commits, byte for byte.
+ */
+#define _GNU_SOURCE
+#include "bus_rig.h"
+#include "fcsl/fcsl_codec.h"
+#include "fcsl/fcsl_mirror.h"
+#include "fcsl/fcsl_scalar.h"
+
+enum { ALTITUDE, PACKET, THROTTLE, CHANNELS, COMMIT_BYTES = 25, DEPTH = 16, MANY = 20000 };
+
+typedef struct {
+    double altitude;
+    uint32_t age;
+    uint32_t packet[4]; /* a blob of at most 3 bytes */
+    float throttle[2];
+    uint8_t attached;
+    uint8_t armed;
+} data_t;
+
+#define AT(member) ((uint32_t)offsetof(data_t, member))
+
+static const uint32_t FOUR[] = {4};
+static const uint32_t TWO[] = {2};
+static const fcsl_field_t FIELDS[] = {
+    {.path = "altitude", .type = FCSL_F64, .count = 1, .offset = AT(altitude), .size = 8},
+    {.path = "packet", .type = FCSL_U32, .rank = 1, .shape = FOUR, .count = 4, .offset = AT(packet), .size = 16},
+    {.path = "throttle", .type = FCSL_F32, .rank = 1, .shape = TWO, .count = 2, .offset = AT(throttle), .size = 8},
+    {.path = "armed", .type = FCSL_BOOL, .count = 1, .offset = AT(armed), .size = 1},
+};
+#define SENSOR .direction = FCSL_SENSOR, .attached_offset = AT(attached), .age_offset = AT(age)
+static const fcsl_channel_t CHANNEL_TABLE[] = {
+    {.name = "altitude", .id = 1, .field = 0, SENSOR},
+    {.name = "gps.packet", .id = 2, .field = 1, .as = FCSL_AS_BLOB, SENSOR},
+    {.name = "throttle", .id = 3, .field = 2, .direction = FCSL_ACTUATOR},
+};
+static const fcsl_machine_t MACHINE = {.name = "craft",
+                                       .tick_hz = 100,
+                                       .size = sizeof(data_t),
+                                       .fields = FIELDS,
+                                       .field_count = 4,
+                                       .channels = CHANNEL_TABLE,
+                                       .channel_count = CHANNELS,
+                                       .arm_field = 3};
+
+static fcsl_mirror_t *open_mirror(const char *endpoint)
+{
+    const fcsl_mirror_options_t options = {.endpoint = endpoint, .name_space = "north", .descriptor = "{}"};
+    fcsl_mirror_t *mirror = NULL;
+    char error[256] = "";
+    CHECK(fcsl_mirror_open(&options, &MACHINE, &mirror, error, sizeof error) == 0);
+    return mirror;
+}
+
+static fcsl_bus_t *observe(const char *endpoint)
+{
+    const fcsl_bus_input_t inputs[] = {{.key = "north/craft/altitude", .bytes = 8, .least = 8, .depth = DEPTH},
+                                       {.key = "north/craft/gps.packet", .bytes = 3, .depth = DEPTH},
+                                       {.key = "north/craft/throttle", .bytes = 8, .least = 8, .depth = DEPTH},
+                                       {.key = "north/craft/tick", .bytes = COMMIT_BYTES, .depth = DEPTH}};
+    const fcsl_bus_options_t options = {.role = FCSL_BUS_CLIENT,
+                                        .endpoint = endpoint,
+                                        .timeout_ms = LONG_MS,
+                                        .ring_bytes = RING_BYTES,
+                                        .inputs = inputs,
+                                        .input_count = CHANNELS + 1u};
+    return open_bus(&options);
+}
+
+static void post(fcsl_mirror_t *mirror, const data_t *data, uint64_t tick)
+{
+    const uint64_t give_up_ns = later_ns();
+    while (!fcsl_mirror_ready(mirror)) {
+        CHECK(now_ns() < give_up_ns);
+    }
+    CHECK(fcsl_mirror_post(mirror, data, tick, tick * 10u) == 0);
+}
+
+static void expect_commit(fcsl_bus_t *bus, uint64_t tick, uint8_t direction, uint8_t armed, uint8_t bits)
+{
+    uint8_t commit[COMMIT_BYTES];
+    take_one(bus, CHANNELS, commit, sizeof commit);
+    CHECK(fcsl_get_u64(commit) == tick && fcsl_get_u64(commit + 8) == (direction == FCSL_SENSOR ? tick * 10u : 0u));
+    CHECK(fcsl_get_u32(commit + 16) == fcsl_channel_table(&MACHINE).hash && fcsl_get_u16(commit + 22) == CHANNELS);
+    CHECK(commit[20] == direction && commit[21] == armed && commit[24] == bits);
+}
+
+static void expect_actuators(fcsl_bus_t *bus, uint64_t tick, uint8_t armed)
+{
+    static const uint8_t values[] = {0, 0, 0, 0x3f, 0, 0, 0xc0, 0x7f}; /* 0.5, and a NaN whose sign is gone */
+    uint8_t throttle[8];
+    take_one(bus, THROTTLE, throttle, sizeof throttle);
+    CHECK(memcmp(throttle, values, sizeof values) == 0);
+    expect_commit(bus, tick, FCSL_ACTUATOR, armed, 1u << THROTTLE);
+}
+
+static void expect_sensors(fcsl_bus_t *bus, uint64_t tick, const uint8_t *packet, size_t size)
+{
+    uint8_t bytes[8];
+    double altitude = 0.0;
+    take_one(bus, ALTITUDE, bytes, sizeof altitude);
+    fcsl_scalars_import(&altitude, bytes, FCSL_F64, 1);
+    CHECK(altitude == (double)tick);
+    take_one(bus, PACKET, bytes, size);
+    CHECK(memcmp(bytes, packet, size) == 0);
+    expect_commit(bus, tick, FCSL_SENSOR, 0, 1u << ALTITUDE | 1u << PACKET);
+}
+
+static void check_ticks(fcsl_mirror_t *mirror, fcsl_bus_t *bus)
+{
+    data_t data = {.altitude = 5.0, .age = 2, .packet = {2, 0x141, 0x42, 0x43}, .throttle = {0.5f}, .attached = 1};
+    const uint32_t nan = 0xffc12345u;
+    memcpy(&data.throttle[1], &nan, sizeof nan);
+    post(mirror, &data, 5); /* the first one: all that there is */
+    expect_sensors(bus, 5, (const uint8_t *)"AB", 2);
+    expect_actuators(bus, 5, 0);
+    data.age = 3;
+    data.armed = 1;
+    post(mirror, &data, 6); /* no sample */
+    expect_commit(bus, 6, FCSL_SENSOR, 0, 0);
+    expect_actuators(bus, 6, 1);
+    data = (data_t){.altitude = 9.0, .age = 5, .packet = {77, 'x', 'y', 'z'}, .throttle = {0.5f}, .attached = 1};
+    memcpy(&data.throttle[1], &nan, sizeof nan);
+    post(mirror, &data, 9); /* 7 and 8 were dropped, and in one of them a sample came */
+    expect_sensors(bus, 9, (const uint8_t *)"xyz", 3);
+    expect_actuators(bus, 9, 0);
+    data.altitude = 10.0;
+    data.age = 0;
+    data.packet[0] = 0;
+    post(mirror, &data, 10);
+    expect_sensors(bus, 10, (const uint8_t *)"", 0);
+    expect_actuators(bus, 10, 0);
+    data.altitude = 11.0;
+    data.age = UINT32_MAX;
+    data.attached = 0;
+    post(mirror, &data, 11); /* nobody samples: what a host set */
+    expect_sensors(bus, 11, (const uint8_t *)"", 0);
+    expect_actuators(bus, 11, 0);
+    data.altitude = 12.0;
+    data.attached = 1;
+    fcsl_mirror_begin(mirror);
+    post(mirror, &data, 12);
+    expect_sensors(bus, 12, (const uint8_t *)"", 0);
+    expect_actuators(bus, 12, 0);
+    data.altitude = 13.0;
+    post(mirror, &data, 13); /* no sample ever came */
+    expect_commit(bus, 13, FCSL_SENSOR, 0, 0);
+    expect_actuators(bus, 13, 0);
+}
+
+/* Where there is room, there is room for all of a tick. */
+static void check_room(fcsl_mirror_t *mirror)
+{
+    const data_t data = {.attached = 0, .packet = {3}};
+    uint32_t refused = 0;
+    for (uint64_t tick = 0; tick < MANY; tick++) {
+        const int ready = fcsl_mirror_ready(mirror);
+        const int posted = fcsl_mirror_post(mirror, &data, tick, 0) == 0;
+        CHECK(posted || !ready);
+        refused += !posted;
+    }
+    (void)printf("%u of %d ticks were refused\n", refused, MANY);
+}
+
+static void check_refused(fcsl_channel_t channel, const char *name_space, const char *endpoint, const char *why)
+{
+    static char descriptor[FCSL_BUS_MESSAGE_MAX + 2u];
+    fcsl_machine_t machine = MACHINE;
+    fcsl_mirror_t *mirror = NULL;
+    char error[256] = "";
+    memset(descriptor, ' ', sizeof descriptor - 1u);
+    const fcsl_mirror_options_t options = {
+        .endpoint = endpoint, .name_space = name_space, .descriptor = endpoint[0] == 't' ? descriptor : "{}"};
+    machine.channels = &channel;
+    machine.channel_count = 1;
+    CHECK(fcsl_mirror_open(&options, &machine, &mirror, error, sizeof error) == -1);
+    CHECK(strstr(error, why) != NULL);
+}
+
+int main(void)
+{
+    char endpoint[64];
+    char long_name[FCSL_BUS_KEY_MAX + 1u];
+    (void)snprintf(endpoint, sizeof endpoint, "%s", free_endpoint());
+    memset(long_name, 'n', sizeof long_name - 1u);
+    long_name[sizeof long_name - 1u] = '\0';
+    check_refused((fcsl_channel_t){.name = "tick"}, "", endpoint, "channel 'tick' cannot go over the bus");
+    check_refused((fcsl_channel_t){.name = "a"}, long_name, endpoint, "longer than 255 bytes");
+    check_refused((fcsl_channel_t){.name = "a"}, "a//b", endpoint, "one slash between them");
+    check_refused((fcsl_channel_t){.name = "a"}, "", "udp/127.0.0.1:7", "write tcp/HOST:PORT");
+    check_refused((fcsl_channel_t){.name = "a"}, "", endpoint, "at most 1048576 are possible");
+    fcsl_mirror_t *mirror = open_mirror(endpoint);
+    CHECK(!fcsl_mirror_watched(mirror));
+    fcsl_bus_t *bus = observe(endpoint);
+    const uint64_t give_up_ns = later_ns();
+    while (!fcsl_mirror_watched(mirror)) {
+        CHECK(now_ns() < give_up_ns);
+    }
+    /* The other keys arrive a little later. */
+    const struct timespec moment = {.tv_nsec = 300000000};
+    (void)nanosleep(&moment, NULL);
+    check_ticks(mirror, bus);
+    check_room(mirror);
+    CHECK(counted(bus).wrong_size == 0 && counted(bus).deletions == 0);
+    CHECK(fcsl_bus_close(bus, CLOSE_MS) == 0);
+    fcsl_mirror_close(mirror);
+    fcsl_mirror_close(NULL);
+    return 0;
+}

@@ -1,0 +1,221 @@
+# SPDX-License-Identifier: Apache-2.0
+"""fcsl-bus: machines on the bus, from the command line (docs/bus.md)."""
+
+from __future__ import annotations
+
+import argparse
+import json
+import signal
+import sys
+import time
+from collections import Counter
+from collections.abc import Callable, Iterator, Sequence
+from itertools import count, islice
+from pathlib import Path
+from typing import Any
+
+from fcsl_compiler.base.version import add_version
+
+from ..errors import BusError, did_you_mean
+from ..vars.show import jsonable, read_value, show_value, table, with_unit
+from .feed import Feed
+from .machine import BusChannel, BusMachine, read_machine
+from .session import Session
+
+_EPILOG = """\
+-c is where fcsl-fc or fcsl-sim listens with --observers. A channel is its name, or MACHINE/NAME where several machines
+have one. Exit status: 0; 2 if nothing listens, or for wrong usage."""
+
+
+def main(arguments: Sequence[str]) -> int:
+    options = _parser().parse_args(arguments)
+    run: Callable[[argparse.Namespace], None] = options.run
+    run(options)
+    return 0
+
+
+def _parser() -> argparse.ArgumentParser:
+    raw = argparse.RawDescriptionHelpFormatter
+    parser = argparse.ArgumentParser(
+        prog="fcsl-bus", description="Machines on the bus.", epilog=_EPILOG, formatter_class=raw
+    )
+    add_version(parser, "simclient", __file__)
+    commands = parser.add_subparsers(metavar="COMMAND", required=True)
+
+    def add(name: str, run: Callable[[argparse.Namespace], None], text: str) -> argparse.ArgumentParser:
+        command = commands.add_parser(name, help=text, description=text)
+        command.add_argument("-c", "--connect", required=True, metavar="tcp/HOST:PORT", help="who listens")
+        command.set_defaults(run=run)
+        return command
+
+    command = add("list", _list, "lists machines and their channels, with type, unit and measured rate")
+    command.add_argument("-s", "--seconds", type=_seconds, default=1.0, help="how long to measure (default 1)")
+    command.add_argument("--json", action="store_true", help="one JSON value, with the descriptors")
+    command = add("echo", _echo, "prints values as they come: tick, channel, value; until Ctrl-C")
+    command.add_argument("channels", nargs="*", metavar="CHANNEL", help="only these")
+    command.add_argument("-n", type=_count, metavar="N", help="end after N values")
+    command.add_argument("--json", action="store_true", help="one JSON object a line")
+    command = add("hz", _hz, "prints the rate of each channel, every second; until Ctrl-C")
+    command.add_argument("-n", type=_count, metavar="N", help="end after N seconds")
+    command = add("put", _put, "puts a value under a channel's key")
+    command.add_argument("channel", metavar="CHANNEL")
+    command.add_argument("value", metavar="VALUE", help="such as 0.5, true, '[0, 0, 9.81]'; of a blob hex digits")
+    command.add_argument("--descriptor", type=Path, metavar="FILE", help="`list --json` of a bus that serves it")
+    command = add("record", _record, "records all values into a bag, until Ctrl-C or the end of the flight")
+    command.add_argument("-o", "--output", required=True, type=Path, metavar="DIR", help="new directory for the bag")
+    return parser
+
+
+def _count(text: str) -> int:
+    if not text.isdecimal() or not 1 <= int(text) < 2**32:
+        raise argparse.ArgumentTypeError(f"a whole number from 1 on wanted, not {text!r}")
+    return int(text)
+
+
+def _seconds(text: str) -> float:
+    try:
+        number = float(text)
+    except ValueError:
+        number = 0.0
+    if not 0 < number <= 3600:
+        raise argparse.ArgumentTypeError(f"seconds wanted, above 0 and up to 3600, not {text!r}")
+    return number
+
+
+# ---- what comes ------------------------------------------------------------------------------------------------------
+
+
+def _counted(session: Session, until_s: float) -> Counter[str]:
+    """Messages of each key until then."""
+    return Counter(message.key for message in session.messages(until_s) if message is not None)
+
+
+def _find(name: str, machines: Sequence[BusMachine]) -> tuple[BusMachine, BusChannel]:
+    """The channel of this name, or MACHINE/NAME. Raises BusError."""
+    choices: dict[str, list[tuple[BusMachine, BusChannel]]] = {}
+    for machine in machines:
+        for channel in machine.channels:
+            choices.setdefault(channel.name, []).append((machine, channel))
+            choices[f"{machine.prefix}/{channel.name}"] = [(machine, channel)]
+    found = choices.get(name, [])
+    if len(found) > 1:
+        raise BusError(f"several machines have a channel `{name}`: write {found[0][0].prefix}/{name}")
+    if not found:
+        raise BusError(f"no machine here has a channel `{name}`{did_you_mean(name, choices)}")
+    return found[0]
+
+
+# ---- commands --------------------------------------------------------------------------------------------------------
+
+
+def _list(options: argparse.Namespace) -> None:
+    with Session(options.connect) as session:
+        machines = session.machines()
+        session.subscribe(machines)
+        counts = _counted(session, time.monotonic() + options.seconds)
+    rates = {key: count / options.seconds for key, count in counts.items()}
+    if options.json:
+        print(json.dumps([_as_json(machine, rates) for machine in machines]))
+        return
+    for machine in machines:
+        print(f"{machine.prefix}: {machine.tick_hz} Hz, sources {machine.source_hash[:12]}")
+        rows = [
+            (c.name, c.direction, c.type_text, c.unit, f"{rates.get(f'{machine.prefix}/{c.name}', 0.0):.1f} Hz", c.doc)
+            for c in machine.channels
+        ]
+        print("\n".join(f"  {line}" for line in table(rows).splitlines()))
+
+
+def _as_json(machine: BusMachine, rates: dict[str, float]) -> dict[str, Any]:
+    return {
+        "prefix": machine.prefix,
+        "descriptor": json.loads(machine.text),
+        "rates_hz": {c.name: rates.get(f"{machine.prefix}/{c.name}", 0.0) for c in machine.channels},
+    }
+
+
+def _echo(options: argparse.Namespace) -> None:
+    with Session(options.connect) as session:
+        machines = session.machines()
+        chosen = {(m.prefix, c.name) for m, c in (_find(name, machines) for name in options.channels)}
+        feed = Feed(session, machines)
+        try:
+            for line in islice(_lines(feed, chosen, options.json, len(machines) > 1), options.n):
+                print(line)
+        except KeyboardInterrupt:
+            pass  # the normal end
+        _tell_lost(feed)
+
+
+def _lines(feed: Feed, chosen: set[tuple[str, str]], as_json: bool, with_machine: bool) -> Iterator[str]:
+    """A line for each value. Those before are shown when nothing more has come yet."""
+    for found in feed.ticks():
+        if found is None:
+            sys.stdout.flush()
+            continue
+        machine, tick = found
+        for channel, data in tick.values:
+            if chosen and (machine.prefix, channel.name) not in chosen:
+                continue
+            value = channel.decode(data)
+            if as_json:
+                told = {"tick": tick.tick, "machine": machine.prefix, "channel": channel.name, "value": jsonable(value)}
+                yield json.dumps(told)
+            else:
+                name = f"{machine.prefix}/{channel.name}" if with_machine else channel.name
+                yield f"{tick.tick}  {name}  {with_unit(show_value(value), channel.unit)}"
+
+
+def _hz(options: argparse.Namespace) -> None:
+    with Session(options.connect) as session:
+        machines = session.machines()
+        session.subscribe(machines)
+        keys = [f"{machine.prefix}/{channel.name}" for machine in machines for channel in machine.channels]
+        begun = time.monotonic()
+        try:
+            for second in islice(count(1), options.n):
+                counts = _counted(session, begun + second)
+                if time.monotonic() < begun + second:
+                    break  # who listens is gone
+                print(f"{second} s  {', '.join(f'{key} {counts[key]} Hz' for key in keys)}", flush=True)
+        except KeyboardInterrupt:
+            pass
+
+
+def _put(options: argparse.Namespace) -> None:
+    with Session(options.connect) as session:
+        machines = session.machines() if options.descriptor is None else _read_descriptors(options.descriptor)
+        machine, channel = _find(options.channel, machines)
+        text = options.value
+        data = channel.encode(text if channel.is_blob else read_value(text))
+        session.put(f"{machine.prefix}/{channel.name}", data)
+
+
+def _read_descriptors(path: Path) -> list[BusMachine]:
+    try:
+        told = json.loads(path.read_text(encoding="utf-8"))
+        return [read_machine(str(machine["prefix"]), json.dumps(machine["descriptor"])) for machine in told]
+    except (ValueError, LookupError, TypeError):
+        raise BusError(f"{path}: not what `fcsl-bus list --json` prints") from None
+
+
+def _record(options: argparse.Namespace) -> None:
+    from .record import recording  # here, because its imports take as long as all others
+
+    with Session(options.connect) as session:
+        machines = session.machines()
+        with recording(options.output, machines) as bag:
+            feed = Feed(session, machines)
+            for number in (signal.SIGINT, signal.SIGTERM):  # an exception could leave half a message in the bag
+                signal.signal(number, lambda *_: session.stop())
+            print(f"recording {', '.join(m.prefix for m in machines)} to {options.output}", flush=True)
+            for found in feed.ticks():
+                if found is not None:
+                    bag.write(*found)
+        print(f"{options.output}: {bag.messages} messages")
+        _tell_lost(feed)
+
+
+def _tell_lost(feed: Feed) -> None:
+    if lost := feed.lost():
+        print(f"fcsl-bus: {lost}", file=sys.stderr)

@@ -1,0 +1,143 @@
+# SPDX-License-Identifier: Apache-2.0
+"""A session on the bus, as a client of one that listens. It listens nowhere and looks for nobody."""
+
+from __future__ import annotations
+
+import json
+import re
+import threading
+import time
+from collections import deque
+from collections.abc import Iterable, Iterator
+from types import TracebackType
+from typing import Any, NamedTuple
+
+from ..errors import BusError
+from .machine import BusMachine, read_machine
+
+_ENDPOINT = re.compile(r"tcp/(\[[0-9a-fA-F:.%]+\]|[\w.-]+):[0-9]{1,5}")
+_CONNECT_MS = 2000
+_DESCRIBE_S = 2.0
+_LOOK_S = 0.2
+#: Zenoh refuses longer ones; those of FCSL have 1 MiB at most.
+_MESSAGE_BYTES_MAX = 2 << 20
+#: Most messages, and bytes of them, that wait to be read; of more, the newest are dropped and counted.
+_WAITING_MAX, _WAITING_BYTES_MAX = 100_000, 64 << 20
+
+
+class Message(NamedTuple):
+    key: str
+    data: bytes
+
+
+class Session:
+    """Connected to `endpoint` (tcp/HOST:PORT). A context manager. Raises BusError."""
+
+    def __init__(self, endpoint: str):
+        self.endpoint = endpoint
+        self.dropped = 0
+        self._stopped = False
+        self._zenoh = _zenoh()
+        self._session = self._open()
+        self._waiting: deque[Message] = deque()
+        self._bytes = 0
+        self._news = threading.Condition()
+        self._subscribers: list[Any] = []
+
+    def _open(self) -> Any:
+        if not _ENDPOINT.fullmatch(self.endpoint):
+            raise BusError(f"{self.endpoint} is no endpoint: write tcp/HOST:PORT, like tcp/127.0.0.1:7447")
+        settings = {
+            "mode": "client",
+            "connect": {
+                "endpoints": [self.endpoint],
+                "timeout_ms": _CONNECT_MS,
+                "exit_on_failure": True,
+                "retry": {"period_init_ms": 50, "period_max_ms": 200, "period_increase_factor": 2},
+            },
+            "listen": {"endpoints": []},
+            "scouting": {"multicast": {"enabled": False}, "gossip": {"enabled": False}},
+            "transport": {
+                "link": {"tx": {"lease": 1000, "keep_alive": 4}, "rx": {"max_message_size": _MESSAGE_BYTES_MAX}}
+            },
+        }
+        try:
+            return self._zenoh.open(self._zenoh.Config.from_json5(json.dumps(settings)))
+        except self._zenoh.ZError:
+            raise BusError(
+                f"no bus listens on {self.endpoint}: start fcsl-fc or fcsl-sim with --observers {self.endpoint}"
+            ) from None
+
+    def __enter__(self) -> Session:
+        return self
+
+    def __exit__(
+        self, kind: type[BaseException] | None, value: BaseException | None, trace: TracebackType | None
+    ) -> None:
+        self._session.close()
+
+    def machines(self) -> list[BusMachine]:
+        """All that answer, by their keys. Raises BusError when there is none."""
+        found: dict[str, BusMachine] = {}
+        deadline = time.monotonic() + _DESCRIBE_S
+        while not found and time.monotonic() < deadline:
+            replies = self._session.get("**/@descriptor", target=self._zenoh.QueryTarget.ALL, timeout=_DESCRIBE_S)
+            for reply in replies:
+                prefix = str(reply.ok.key_expr).rpartition("/")[0] if reply.ok is not None else ""
+                if prefix.isprintable() and prefix and "*" not in prefix:  # anybody may answer
+                    found[prefix] = read_machine(prefix, bytes(reply.ok.payload).decode("utf-8", "replace"))
+            time.sleep(0 if found else _LOOK_S)
+        if not found:
+            raise BusError(f"no machine is on {self.endpoint}: it is served by fcsl-fc and fcsl-sim with --observers")
+        return [machine for _, machine in sorted(found.items())]
+
+    def subscribe(self, machines: Iterable[BusMachine]) -> None:
+        """`messages` brings what comes under their keys from now on."""
+        for machine in machines:
+            self._subscribers.append(self._session.declare_subscriber(f"{machine.prefix}/*", self._heard))
+
+    def _heard(self, sample: Any) -> None:
+        """On a thread of Zenoh's."""
+        if sample.kind != self._zenoh.SampleKind.PUT:
+            return
+        message = Message(str(sample.key_expr), bytes(sample.payload))
+        with self._news:
+            if len(self._waiting) >= _WAITING_MAX or self._bytes >= _WAITING_BYTES_MAX:
+                self.dropped += 1
+                return
+            self._waiting.append(message)
+            self._bytes += len(message.data)
+            self._news.notify()
+
+    def messages(self, until_s: float | None = None) -> Iterator[Message | None]:
+        """What came, in its order; None where nothing more has come yet. Ends at `until_s` of time.monotonic(), after
+        `stop`, or when the one that listens is gone."""
+        while not self._stopped and (until_s is None or time.monotonic() < until_s):
+            with self._news:
+                if not self._waiting:
+                    left_s = _LOOK_S if until_s is None else min(_LOOK_S, max(0.0, until_s - time.monotonic()))
+                    self._news.wait(left_s)
+                batch, self._waiting, self._bytes = self._waiting, deque(), 0
+            yield from batch
+            yield None
+            if not batch and not self._is_connected():
+                return
+
+    def stop(self) -> None:
+        """Ends `messages`. May be called by a signal's handler."""
+        self._stopped = True
+
+    def _is_connected(self) -> bool:
+        info = self._session.info
+        return bool(info.peers_zid() or info.routers_zid())
+
+    def put(self, key: str, data: bytes) -> None:
+        self._session.put(key, data, congestion_control=self._zenoh.CongestionControl.BLOCK)
+
+
+def _zenoh() -> Any:
+    try:
+        import zenoh
+    except ImportError:
+        raise BusError("the bus needs the Python package eclipse-zenoh: pip install eclipse-zenoh") from None
+    return zenoh
