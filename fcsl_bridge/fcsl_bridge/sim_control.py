@@ -11,6 +11,7 @@ speed               parameter            limit on simulated seconds per second; 
 from __future__ import annotations
 
 import math
+import time
 
 from rcl_interfaces.msg import SetParametersResult
 from rclpy.callback_groups import ReentrantCallbackGroup
@@ -25,6 +26,8 @@ from .polled import SERVE_PERIOD_S, Housekeeping
 
 #: More ticks than any simulation has.
 _ALL = 2**63
+#: How long an answer may take to reach who asked, in s: a node that has ended sends nothing again.
+_ANSWER_S = 0.5
 
 
 class Reset(Exception):
@@ -54,6 +57,7 @@ class Control:
         self._reset = False
         self._budget = self._tick = 0  # ticks allowed while paused; ticks completed
         self._stepped: Future | None = None
+        self._asked_s = -_ANSWER_S  # when somebody asked last
         group = ReentrantCallbackGroup()  # ~/step is answered later, and must not keep the others waiting
         for name, kind, callback in (
             ("pause", Trigger, self._on_pause),
@@ -131,10 +135,12 @@ class Control:
 
     def _end_step(self, problem: str) -> None:
         if self._stepped is not None:
+            self._asked_s = time.monotonic()
             self._stepped.set_result(problem)
             self._stepped = None
 
     def _on_reset(self, request: Trigger.Request, response: Trigger.Response) -> Trigger.Response:
+        self._asked_s = time.monotonic()
         self._reset = response.success = True
         response.message = f"a new run begins after {self._tick} ticks"
         return response
@@ -144,6 +150,7 @@ class Control:
         return SetParametersResult(successful=not problem, reason=problem)
 
     def _take_parameters(self, parameters: list[Parameter]) -> None:
+        self._asked_s = time.monotonic()
         for parameter in parameters:
             if parameter.name == "speed":
                 self.speed, self.pace_changed = parameter.value, True
@@ -152,6 +159,8 @@ class Control:
                 self._end_step("`paused` was set meanwhile")
 
     def end(self) -> None:
-        """Ends the simulation: answers a pending ~/step."""
+        """Ends the simulation: answers a pending ~/step, and gives the last answers time to arrive."""
         self._end_step("the simulation is over")
         self._housekeeping.idle(SERVE_PERIOD_S)
+        while time.monotonic() < self._asked_s + _ANSWER_S:
+            self._housekeeping.idle(SERVE_PERIOD_S)
