@@ -140,6 +140,7 @@ class Descriptor(c.Structure):
         ("channel_count", c.c_uint32),
         ("ros_messages", c.c_void_p),
         ("ros_message_count", c.c_uint32),
+        ("payloads", c.c_void_p),
         ("arm_field", c.c_int32),
         ("command_timeout_ns", c.c_uint64),
         ("fault_places", c.POINTER(FaultPlace)),

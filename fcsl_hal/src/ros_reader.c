@@ -113,6 +113,11 @@ const fcsl_ros_reader_plan_t *fcsl_ros_reader_plan(const fcsl_ros_reader_t *read
     return reader->plan;
 }
 
+size_t fcsl_ros_reader_end(const fcsl_ros_reader_t *reader)
+{
+    return reader->walk.end;
+}
+
 static fcsl_ros_status_t read_stamp(const fcsl_ros_reader_t *reader, int64_t *stamp_ns)
 {
     const fcsl_ros_reader_plan_t *plan = reader->plan;
@@ -145,7 +150,8 @@ static fcsl_ros_status_t read_value(const fcsl_ros_reader_t *reader, const fcsl_
     }
     for (uint32_t i = 0; i < value->row_count; i++) {
         const fcsl_ros_row_t *number = &plan->rows[value->first_row + i];
-        const fcsl_ros_status_t status = fcsl_ros_row_apply(number, plan->terms, reader->walk.anchors, 0, row);
+        const fcsl_ros_status_t status =
+            fcsl_ros_row_apply(number, plan->terms, reader->walk.anchors, plan->nan_allowed, row);
         if (status != FCSL_ROS_TAKEN) {
             memset(row + value->offset, 0, value->size);
             return status;

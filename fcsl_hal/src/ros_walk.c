@@ -182,7 +182,9 @@ fcsl_ros_status_t fcsl_ros_walk(const fcsl_ros_reader_plan_t *plan, fcsl_ros_wal
         walk->found[i] = FCSL_ROS_NONE;
     }
     cursor_t cursor = {.from = cdr + FCSL_ROS_ENCAPSULATION_BYTES, .size = size - FCSL_ROS_ENCAPSULATION_BYTES};
-    return walk_parts(plan, walk, &cursor);
+    const fcsl_ros_status_t status = walk_parts(plan, walk, &cursor);
+    walk->end = FCSL_ROS_ENCAPSULATION_BYTES + cursor.at;
+    return status;
 }
 
 static int is_size(uint32_t size)

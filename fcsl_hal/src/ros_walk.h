@@ -19,6 +19,7 @@ enum {
 typedef struct {
     const uint8_t *anchors[FCSL_ROS_ANCHORS_MAX]; /* null: not in this message */
     uint32_t found[FCSL_ROS_NAMES_MAX];           /* index of each name in its NAMES, or FCSL_ROS_NONE */
+    size_t end;                                   /* bytes that the message's type took */
 } fcsl_ros_walk_t;
 
 /* Whether the parts of a plan lead through a message: known codes, loops that nest, tables that are there. */

@@ -108,6 +108,7 @@ void named_drain(named_wire_t *wire, uint32_t first)
 
 void named_free(named_wire_t *wire)
 {
+    payload_close(&wire->payload);
     free(wire->control);
     free(wire->numbers);
     free(wire->keys);

@@ -96,6 +96,7 @@ class MessageEmitter:
             "size": f"{plan.size}u",
             "stamp_anchor": _index(plan.stamp_anchor),
             "stamp_offset": f"{plan.stamp_offset}u",
+            "nan_allowed": f"{int(plan.nan_allowed)}u",
         }
         return self._struct("fcsl_ros_reader_plan_t", f"{name}_reader", members)
 

@@ -119,6 +119,7 @@ class ReaderPlan:
     size: int
     stamp_anchor: int
     stamp_offset: int
+    nan_allowed: bool = False
 
 
 @dataclass(frozen=True)

@@ -242,6 +242,9 @@ typedef struct {
     uint32_t channel_count;
     const fcsl_ros_message_t *ros_messages; /* one for each topic of the mapped channels */
     uint32_t ros_message_count;
+    /* What lies under the key of each channel on the bus (docs/bus.md): a message of it alone; of a blob a UInt8MultiArray without
+     * values. Null: the values as they are. */
+    const fcsl_ros_message_t *payloads;
     /* The output that arms the actuators, a bool: an index into fields; FCSL_NONE: they are armed in simulation, and real ones
      * never. With an index here or a time-out, every actuator channel has its safe value. */
     int32_t arm_field;

@@ -117,6 +117,7 @@ typedef struct {
     uint32_t size; /* bytes of a row of values */
     uint32_t stamp_anchor; /* of a header's stamp (int32 s, uint32 ns), or FCSL_ROS_NONE */
     uint32_t stamp_offset;
+    uint8_t nan_allowed; /* a NaN is a value of a float, else it is refused */
 } fcsl_ros_reader_plan_t;
 
 typedef struct {

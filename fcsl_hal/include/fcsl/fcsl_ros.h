@@ -62,6 +62,9 @@ const fcsl_ros_reader_plan_t *fcsl_ros_reader_plan(const fcsl_ros_reader_t *read
 fcsl_ros_status_t fcsl_ros_read(fcsl_ros_reader_t *reader, const uint8_t *cdr, size_t size, uint8_t *row,
                                 uint8_t *status, int64_t *stamp_ns);
 
+/* Bytes of the last message that was read whole, as its type says: what is behind them was passed over. */
+size_t fcsl_ros_reader_end(const fcsl_ros_reader_t *reader);
+
 /* The same for `count` messages in one buffer, each given by its offset and size; rows, status and stamps follow one
  * another. A message that does not lie within the buffer is truncated. */
 void fcsl_ros_read_many(fcsl_ros_reader_t *reader, const uint8_t *buffer, size_t size, const int64_t *offsets,

@@ -302,6 +302,28 @@ static void test_ros_messages(void)
 #undef WRONG_MESSAGE
 }
 
+static void test_payloads(void)
+{
+    static const uint32_t numbers[8] = {0, 1, 2, 3, 4, 5, 6, 7};
+    const fcsl_ros_composer_plan_t composer = {.memory_count = 1};
+    const fcsl_ros_reader_plan_t reader = {.value_count = 1};
+    const fcsl_ros_reader_plan_t none = {.value_count = 0};
+    fcsl_ros_message_t messages[8];
+    fcsl_error_t error;
+    for (uint32_t i = 0; i < good->channel_count; i++) {
+        messages[i] = (fcsl_ros_message_t){
+            "", "std_msgs/msg/Float64", good->channels[i].direction, &numbers[i], 1, &composer, &reader};
+    }
+    copy_good();
+    machine.payloads = messages;
+    CHECK(fcsl_validate(&machine, &error) == 0);
+    messages[1].channels = &numbers[0];
+    REFUSED(machine.payloads = messages, "payload of channel 1");
+    messages[1].channels = &numbers[1];
+    messages[1].reader = &none; /* as of a blob */
+    REFUSED(machine.payloads = messages, "payload of channel 1");
+}
+
 int main(int argc, char **argv)
 {
     CHECK(argc == 2);
@@ -312,6 +334,7 @@ int main(int argc, char **argv)
     test_every_row();
     test_bounds();
     test_ros_messages();
+    test_payloads();
     test_message_texts();
     test_struct_texts();
     return 0;

@@ -154,6 +154,7 @@ class CMachine(Structure):
         ("channel_count", c_uint32),
         ("ros_messages", c_void_p),
         ("ros_message_count", c_uint32),
+        ("payloads", c_void_p),
         ("arm_field", c_int32),
         ("command_timeout_ns", c_uint64),
         ("fault_places", POINTER(CFaultPlace)),

@@ -171,18 +171,39 @@ static int reads_in_struct(const fcsl_machine_t *machine, const fcsl_ros_compose
 }
 
 /* A message's channels are of one direction, and its numbers lie in the struct. Readers and composers check the rest of a plan. */
-static int check_ros_message(const fcsl_machine_t *machine, const fcsl_ros_message_t *message)
+static int check_ros_message(const fcsl_machine_t *machine, const fcsl_ros_message_t *message, uint32_t value_count)
 {
-    if (!is_name(message->topic) || !is_name(message->type) || message->channels == NULL ||
-        message->channel_count == 0 || message->channel_count > machine->channel_count || message->composer == NULL ||
+    if (message->topic == NULL || !is_name(message->type) || message->channels == NULL || message->channel_count == 0 ||
+        message->channel_count > machine->channel_count || message->composer == NULL ||
         message->composer->memory_count != 1 || !reads_in_struct(machine, message->composer) ||
-        message->reader == NULL || message->reader->value_count != message->channel_count) {
+        message->reader == NULL || message->reader->value_count != value_count) {
         return -1;
     }
     for (uint32_t i = 0; i < message->channel_count; i++) {
         if (message->channels[i] >= machine->channel_count ||
             machine->channels[message->channels[i]].direction != message->direction) {
             return -1;
+        }
+    }
+    return 0;
+}
+
+static int check_ros_messages(const fcsl_machine_t *machine, fcsl_error_t *error)
+{
+    const char *name = machine->name;
+    for (uint32_t i = 0; i < machine->ros_message_count; i++) {
+        const fcsl_ros_message_t *message = &machine->ros_messages[i];
+        if (!is_name(message->topic) || check_ros_message(machine, message, message->channel_count) != 0) {
+            return fcsl_fail(error, "machine '%s': ROS 2 message %u of its descriptor is inconsistent", name, i);
+        }
+    }
+    for (uint32_t i = 0; machine->payloads != NULL && i < machine->channel_count; i++) {
+        const fcsl_ros_message_t *message = &machine->payloads[i];
+        const uint32_t values = machine->channels[i].as == FCSL_AS_BLOB ? 0u : 1u;
+        if (check_ros_message(machine, message, values) != 0 || message->channel_count != 1u ||
+            message->channels[0] != i) {
+            return fcsl_fail(error, "machine '%s': the payload of channel %u of its descriptor is inconsistent", name,
+                             i);
         }
     }
     return 0;
@@ -242,10 +263,8 @@ static int check_tables(const fcsl_machine_t *machine, fcsl_error_t *error)
             return fcsl_fail(error, "machine '%s': channel %u of its descriptor is inconsistent", name, i);
         }
     }
-    for (uint32_t i = 0; i < machine->ros_message_count; i++) {
-        if (check_ros_message(machine, &machine->ros_messages[i]) != 0) {
-            return fcsl_fail(error, "machine '%s': ROS 2 message %u of its descriptor is inconsistent", name, i);
-        }
+    if (check_ros_messages(machine, error) != 0) {
+        return -1;
     }
     for (uint32_t i = 0; i < machine->fault_place_count; i++) {
         if (check_fault_place(&machine->fault_places[i]) != 0) {

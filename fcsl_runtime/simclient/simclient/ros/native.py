@@ -111,6 +111,7 @@ class CReaderPlan(Structure):
         ("size", c_uint32),
         ("stamp_anchor", c_uint32),
         ("stamp_offset", c_uint32),
+        ("nan_allowed", c_uint8),
     ]
 
 
@@ -133,6 +134,8 @@ _ERROR = POINTER(CError)
 _PROTOTYPES: dict[str, tuple[type | None, list[type]]] = {
     "fcsl_ros_reader_new": (ptr, [POINTER(CReaderPlan), c_char_p, c_size_t]),
     "fcsl_ros_reader_free": (None, [ptr]),
+    "fcsl_ros_reader_end": (c_size_t, [ptr]),
+    "fcsl_ros_read": (c_int, [ptr, c_char_p, c_size_t, ptr, ptr, ptr]),
     "fcsl_ros_read_many": (None, [ptr, ptr, c_size_t, ptr, ptr, c_size_t, ptr, ptr, ptr]),
     "fcsl_ros_inlet_new": (ptr, [ptr, ptr, POINTER(c_uint32), c_uint32, _ERROR]),
     "fcsl_ros_inlet_free": (None, [ptr]),
@@ -204,6 +207,7 @@ def reader_plan(plan: ReaderPlan) -> CReaderPlan:
         guard_count=len(plan.guards),
         anchor_count=plan.anchor_count,
         size=plan.size,
+        nan_allowed=plan.nan_allowed,
         stamp_anchor=plan.stamp_anchor,
         stamp_offset=plan.stamp_offset,
         **_row_tables(plan),

@@ -7,7 +7,7 @@ import ctypes
 import weakref
 from collections.abc import Sequence
 from ctypes import byref
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
@@ -43,15 +43,22 @@ class Reader:
     """Reads the picks from messages of one type."""
 
     def __init__(
-        self, definitions: Definitions, message: str, picks: Sequence[Pick], frame: str = "", child_frame: str = ""
+        self,
+        definitions: Definitions,
+        message: str,
+        picks: Sequence[Pick],
+        frame: str = "",
+        child_frame: str = "",
+        *,
+        nan_allowed: bool = False,
     ):
         """`message`: full name of the type. `frame`, `child_frame`: required header.frame_id and child_frame_id (empty:
-        any).
+        any). `nan_allowed`: a NaN is a value, else it is refused.
 
         Raises MapError, which names the pick that does not fit the message and why.
         """
         try:
-            plan = reader_plan(definitions, message, picks, frame, child_frame)
+            plan = replace(reader_plan(definitions, message, picks, frame, child_frame), nan_allowed=nan_allowed)
         except PlanError as error:
             raise MapError(str(error)) from None
         self.has_stamp = has_stamp(definitions, message)
@@ -62,14 +69,26 @@ class Reader:
         if not handle:
             raise TwinError(failure.value.decode("utf-8", "replace"))
         self._handle: int = handle
+        self._read, self._end = library.fcsl_ros_read, library.fcsl_ros_reader_end
         self._read_many = library.fcsl_ros_read_many
         self._value_count = len(picks)
+        self._row = ctypes.create_string_buffer(max(1, plan.size))
+        self._status = ctypes.create_string_buffer(max(1, len(picks)))
+        self._stamp = ctypes.c_int64()
         weakref.finalize(self, library.fcsl_ros_reader_free, handle)
 
     @property
     def handle(self) -> int:
         """The address of the fcsl_ros_reader_t, which is valid as long as this object."""
         return self._handle
+
+    def read(self, message: bytes, padding: int) -> bytes | None:
+        """The bytes of the values of one message, as `dtype` says; None if it is none, has a value that is refused, or
+        more than `padding` bytes behind what its type takes."""
+        status = self._read(self._handle, message, len(message), self._row, self._status, ctypes.byref(self._stamp))
+        if status != 0 or any(self._status.raw) or len(message) - self._end(self._handle) > padding:
+            return None
+        return self._row.raw[: self.dtype.itemsize]
 
     def read_many(self, buffer: Any, offsets: Any, sizes: Any) -> Samples:
         """Reads the messages at `offsets` in `buffer` with `sizes` in bytes, encapsulation included.
