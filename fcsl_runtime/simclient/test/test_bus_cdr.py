@@ -27,6 +27,7 @@ from simclient.bag import Bag, rows_of
 from simclient.bus.machine import BusMachine, read_machine
 from simclient.bus.payload import Payload
 from simclient.bus.session import Session
+from simclient.errors import BusError
 
 STORE = get_typestore(Stores.ROS2_JAZZY)
 T = STORE.types
@@ -56,6 +57,7 @@ def machine_files(folder: Path) -> Path:
     ports = {name: kind for name, (_, kind, _) in zip(NAMES, KINDS, strict=True)} | {
         "packet": "u32[5]",
         "rate": "f64[3] rad/s",
+        "level": "i32",
     }
     inputs = ", ".join(f'"{name}": "{kind}"' for name, kind in ports.items())
     outputs = ", ".join(f'"{name}_out": "{kind}"' for name, kind in ports.items())
@@ -67,16 +69,19 @@ def machine_files(folder: Path) -> Path:
     channels = []
     for way, record, suffix in (("sensor", "inputs", ""), ("actuator", "outputs", "_out")):
         for name in ports:
-            more: dict[str, Any] = {"packet": {"as": "blob"}, "rate": {"ros": {**imu, "topic": f"imu{suffix}"}}}.get(
-                name, {}
-            )
+            bits = 16 if way == "sensor" else 8
+            special: dict[str, dict[str, Any]] = {
+                "packet": {"as": "blob"},
+                "rate": {"ros": {**imu, "topic": f"imu{suffix}"}},
+                "level": {"ros": {"type": f"std_msgs/Int{bits}", "field": "data", "topic": f"level{suffix}"}},
+            }
             row = {
                 "name": f"{name}{suffix}",
                 "id": len(channels),
                 "field": f"echo.{record}.{name}{suffix}",
                 "direction": way,
             }
-            channels.append(row | more)
+            channels.append(row | special.get(name, {}))
     machine = {
         "tick_hz": 100,
         "initial_state": "A",
@@ -117,7 +122,7 @@ def imu(rate: Sequence[float], frame: str = "imu_link") -> bytes:
 
 
 GOOD = {name: std(kind, value) for name, (kind, _, value) in zip(NAMES, KINDS, strict=True)}
-GOOD |= {"packet": std("UInt8MultiArray", [7, 0, 255]), "rate": imu((1.0, 2.0, 3.0))}
+GOOD |= {"packet": std("UInt8MultiArray", [7, 0, 255]), "rate": imu((1.0, 2.0, 3.0)), "level": std("Int16", 100)}
 
 
 def read(kind: str, message: bytes) -> Any:
@@ -229,6 +234,20 @@ def test_messages_of_every_type(simulator: Simulator) -> None:
     assert hal["bus.values_refused"] == hal["bus.wrong_size"] == hal["bus.strays"] == 0
 
 
+def test_a_value_that_its_message_cannot_hold_is_not_put(simulator: Simulator) -> None:
+    simulator.fly(GOOD)
+    simulator.put("level", std("Int16", 200))
+    simulator.commit(["level"])
+    bits = int.from_bytes(simulator.take("tick")[24:], "little")
+    assert bits == (1 << 2 * len(GOOD)) - (1 << len(GOOD)) - (1 << 2 * len(GOOD) - 1)  # all actuators but the last one
+    for name in list(GOOD)[:-1]:
+        simulator.take(f"{name}_out")
+    answers = simulator.fly({"level": std("Int16", -128)})
+    assert read("std_msgs/msg/Int8", answers["level"]).data == -128
+    said, hal = simulator.end()
+    assert simulator.controller.returncode == 0 and hal["bus.values_refused"] == 1, said
+
+
 def test_what_other_programs_add(simulator: Simulator) -> None:
     """Padding at the end, and the dimensions of an array, change nothing."""
     dimension = T["std_msgs/msg/MultiArrayDimension"]
@@ -326,7 +345,7 @@ def tool(*arguments: str | Path, status: int = 0) -> str:
 def test_the_tools_show_the_values(endpoint: str) -> None:
     rows = {row.split()[0]: row for row in tool("list", "-c", endpoint, "-s", "0.2").splitlines()[1:]}
     assert "std_msgs/msg/Float64MultiArray" in rows["v13"] and "sensor_msgs/msg/Imu" in rows["rate"]
-    told = [json.loads(line) for line in tool("echo", "-c", endpoint, "--json", "-n", "64").splitlines()]
+    told = [json.loads(line) for line in tool("echo", "-c", endpoint, "--json", "-n", "68").splitlines()]
     shown = {one["channel"]: one["value"] for one in told}
     assert shown["v0"] is False and shown["v13"] == [[0.0] * 3] * 2 and shown["rate"] == [0.0] * 3
     assert shown["packet"] == "" and shown["v4_out"] == 0
@@ -344,6 +363,8 @@ def test_values_there_and_back(machine: BusMachine) -> None:
         assert channel.values(data[:-1]) is None and channel.values(b"\0\0" + data[2:]) is None
         if name != "rate":
             assert channel.encode(value) == data
+    with pytest.raises(BusError, match="whose `data` cannot hold this value"):
+        channels["level_out"].encode(200)
     assert channels["rate"].decode(channels["rate"].values(imu((1.0, 2.0, 3.0))) or b"") == [1.0, -2.0, -3.0]
     assert channels["rate"].values(imu((1.0, 2.0, 3.0), "other")) is None
 
@@ -384,7 +405,7 @@ def test_a_recording_has_the_values(endpoint: str, tmp_path: Path) -> None:
 )
 def test_a_descriptor_with_an_unknown_message(machine: BusMachine, ros: dict[str, str]) -> None:
     told = json.loads(machine.text)
-    told["channels"][-1]["ros"] |= ros
-    channel = read_machine("echo", json.dumps(told)).channels[-1]
+    told["channels"][15]["ros"] |= ros  # that of the rate
+    channel = read_machine("echo", json.dumps(told)).channels[15]
     with pytest.raises(ValueError, match="`"):
         channel.values(GOOD["rate"])
