@@ -25,7 +25,7 @@ static const fcsl_field_t FIELDS[] = {
     COUNTER("bus.strays", bus.strays, "messages under keys of the machine that no channel has"),
     COUNTER("bus.connects", bus.connects, "sessions that connected to this one"),
     COUNTER("bus.disconnects", bus.disconnects, "sessions that went"),
-    COUNTER("bus.values_refused", values_refused, "values that their type does not have"),
+    COUNTER("bus.values_refused", values_refused, "values that their type, or their message, does not have"),
     COUNTER("bus.commits_refused", commits_refused, "commits that are none, or made for another machine"),
 };
 
@@ -108,6 +108,7 @@ void named_drain(named_wire_t *wire, uint32_t first)
 
 void named_free(named_wire_t *wire)
 {
+    payload_close(&wire->payload);
     free(wire->control);
     free(wire->numbers);
     free(wire->keys);
