@@ -28,6 +28,7 @@ static const char USAGE[] =
     "                          " FCSL_WIRE_SPECS "\n"
     "                          zenoh:tcp/HOST:PORT (or zenoh-peer:): a simulator on the bus, each channel under its "
     "key\n"
+    "                          the same with ,free-running behind it: whatever puts values there; waits for nobody\n"
     "  --timeout-ms N          how long to wait for the simulator's next message (default 2000)\n"
     "  --board LIBRARY.so      the board that hw_* of algorithms reach (fcsl/fcsl_hw.h); default: simulated hardware\n"
     "  --guard PATH            the actuators belong to the fcsl-guard that listens on PATH (docs/guard.md)\n"
