@@ -78,13 +78,14 @@ static fcsl_wire_status_t take(void *ctx, uint8_t *bytes, size_t capacity, size_
 static fcsl_wire_status_t take_newest(void *ctx, uint8_t *bytes, size_t capacity, size_t *size)
 {
     named_wire_t *wire = ctx;
-    const int was_there = wire->peer.met;
-    wire->peer.met = bus_peer_lives(&wire->peer);
-    if (was_there && !wire->peer.met) {
-        return FCSL_WIRE_CLOSED;
-    }
+    const int lives = bus_peer_lives(&wire->peer); /* looked at first: what it sent is there then */
+    wire->peer.met = wire->peer.met || lives;
     if (capacity >= CONTROL_PACKET_MAX && fcsl_bus_take(wire->peer.bus, NAMED_CONTROL, bytes, size) && wire->peer.met) {
         return FCSL_WIRE_OK;
+    }
+    if (wire->peer.met && !lives) {
+        wire->peer.met = 0;
+        return FCSL_WIRE_CLOSED;
     }
     return named_take_newest(wire, bytes, capacity, size);
 }
