@@ -152,6 +152,7 @@ class Program:
         words = [str(word) for word in line]
         self.process = subprocess.Popen(words, stdout=subprocess.PIPE, stderr=subprocess.STDOUT, text=True)
         self.said: list[str] = []
+        self._heard = 0
         self._reader = threading.Thread(target=self._read, daemon=True)
         self._reader.start()
 
@@ -160,10 +161,15 @@ class Program:
         for line in self.process.stdout:
             self.said.append(line.rstrip())
 
-    def hears(self, text: str, times: int = 1, limit_s: float = LONG_S) -> None:
-        """Waits until it has said that so often."""
+    def hears(self, text: str, limit_s: float = LONG_S) -> None:
+        """Waits until it says that, in a line behind the last one that was waited for."""
         end = time.monotonic() + limit_s
-        while sum(text in line for line in self.said) < times:
+        while True:
+            lines = self.said[self._heard :]
+            for number, line in enumerate(lines):
+                if text in line:
+                    self._heard += number + 1
+                    return
             assert time.monotonic() < end and self.process.poll() is None, (text, self.said)
             time.sleep(0.01)
 
@@ -236,38 +242,40 @@ def gate(path: Path) -> int:
         return int(client.get_value("actuators.outputs.gate"))
 
 
+def wait_for_gate(path: Path, state: int) -> None:
+    end = time.monotonic() + LONG_S
+    while gate(path) != state:
+        assert time.monotonic() < end
+
+
 def test_each_side_freezes_dies_and_returns(folder: Path, tmp_path: Path, programs: contextlib.ExitStack) -> None:
     """The other side says so within about a second, and flies on."""
     place = free_place()
+    high = ["--set", "plant.parameters.height=1000", "--socket", str(tmp_path / "socket")]
+    sim = start(programs, *sim_line(folder, place, *high))
     fc = start(programs, *fc_line(folder, place))
-    sim = start(programs, *sim_line(folder, place))
+    sim.hears("the controller is there")
+    fc.signal(signal.SIGSTOP)
+    sim.hears("the controller is gone", limit_s=NOTICED_S)
+    wait_for_gate(tmp_path / "socket", SILENT)
+    fc.signal(signal.SIGCONT)
+    sim.hears("the controller is back")
+    wait_for_gate(tmp_path / "socket", ARMED)
+    fc.signal(signal.SIGKILL)
+    sim.hears("the controller is gone", limit_s=NOTICED_S)
+    fc = start(programs, *fc_line(folder, place))
+    sim.hears("the controller is back")
     fc.hears("the simulator is there")
+    sim.signal(signal.SIGSTOP)
+    fc.hears("disarmed")  # its sensors are too old
+    fc.hears("the simulator is gone", limit_s=NOTICED_S)
+    sim.signal(signal.SIGCONT)
+    fc.hears("the simulator is back")
     sim.signal(signal.SIGKILL)
     fc.hears("the simulator is gone", limit_s=NOTICED_S)
-    socket_path = tmp_path / "socket"
-    high = ["--set", "plant.parameters.height=1000", "--socket", str(socket_path)]
     sim = start(programs, *sim_line(folder, place, *high))
     fc.hears("the simulator is back")
-    sim.hears("the controller is there")
-    sim.signal(signal.SIGSTOP)
-    fc.hears("the simulator is gone", 2, NOTICED_S)
-    fc.hears("disarmed")  # its sensors are too old
-    sim.signal(signal.SIGCONT)
-    fc.hears("the simulator is back", 2)
-    sim.hears("the controller is back")
-    fc.signal(signal.SIGSTOP)
-    sim.hears("the controller is gone", 2, NOTICED_S)
-    assert gate(socket_path) == SILENT
-    fc.signal(signal.SIGCONT)
-    sim.hears("the controller is back", 2)
-    fc.signal(signal.SIGKILL)
-    sim.hears("the controller is gone", 3, NOTICED_S)
-    fc = start(programs, *fc_line(folder, place))
-    fc.hears("armed at tick")
-    sim.hears("the controller is back", 3)
-    end = time.monotonic() + LONG_S
-    while gate(socket_path) != ARMED:
-        assert time.monotonic() < end
+    wait_for_gate(tmp_path / "socket", ARMED)
 
 
 class Source:

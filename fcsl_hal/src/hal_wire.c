@@ -600,6 +600,11 @@ int fcsl_hal_bus_check(const char *address, char *error, size_t error_size)
     return fcsl_wire_check_named(address, error, error_size);
 }
 
+int fcsl_hal_bus_runs_free(const char *address)
+{
+    return fcsl_wire_runs_free(address);
+}
+
 int fcsl_hal_bus(const char *address, const char *name_space, const fcsl_machine_t *machine, uint32_t open_ms,
                  uint32_t timeout_ms, fcsl_hal_t *hal, char *error, size_t error_size)
 {

@@ -91,6 +91,8 @@ int fcsl_hal_bus(const char *address, const char *name_space, const fcsl_machine
                  uint32_t timeout_ms, fcsl_hal_t *hal, char *error, size_t error_size);
 /* 0 when `address` has that form, or -1 with `error` filled. */
 int fcsl_hal_bus_check(const char *address, char *error, size_t error_size);
+/* Whether it says ,free-running. */
+int fcsl_hal_bus_runs_free(const char *address);
 /* The same over a wire of your own, which the HAL owns once this has returned 0. */
 int fcsl_hal_over_wire(const fcsl_wire_t *wire, const fcsl_machine_t *machine, uint32_t timeout_ms, fcsl_hal_t *hal,
                        char *error, size_t error_size);

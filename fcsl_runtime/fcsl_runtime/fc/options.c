@@ -223,6 +223,9 @@ static int check(const options_t *options)
         return usage_error("--timeout-ms needs --hal wire:SPEC or zenoh:…: it is how long to wait for the simulator",
                            "");
     }
+    if (options->timeout_ms != 0 && fcsl_hal_bus_runs_free(options->peer)) {
+        return usage_error("--timeout-ms does not go with ,free-running: nobody waits for the simulator", "");
+    }
     if (options->name_space[0] != '\0' && options->record == NULL && options->observers == NULL &&
         (options->peer == NULL || strncmp(options->peer, OPTIONS_WIRE, strlen(OPTIONS_WIRE)) == 0)) {
         return usage_error(
