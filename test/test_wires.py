@@ -10,6 +10,7 @@ import pty
 import random
 import re
 import selectors
+import shutil
 import socket
 import subprocess
 import sys
@@ -52,9 +53,9 @@ def reference(tmp_path_factory: pytest.TempPathFactory) -> str:
     return digest(bag)
 
 
-def fly(ours: str, theirs: str, library: Path, bag: Path, *options: str | Path) -> str:
+def fly(ours: str, theirs: str, library: Path, bag: Path, *options: str | Path, sim: Path = SIM) -> str:
     """The digest of the flight; the two programs may start in either order."""
-    line = ["fcsl-sim", "run", str(SIM), "--duration", LENGTH_S, "--external", ours]
+    line = ["fcsl-sim", "run", str(sim), "--duration", LENGTH_S, "--external", ours]
     with subprocess.Popen(line, stdout=subprocess.DEVNULL, stderr=subprocess.PIPE, text=True) as simulator:
         line = ["--hal", theirs, "--timeout-ms", "60000", "--summary", str(bag.with_suffix(".json"))]
         run("fcsl-fc", library, *line, "--record", bag, *options)
@@ -93,6 +94,20 @@ def test_named_values_on_the_bus(role: str, reference: str, library: Path, tmp_p
     """Each channel under its own key, and a commit for each tick."""
     place = f"tcp/127.0.0.1:{free_port(socket.SOCK_STREAM)}"
     assert fly(f"zenoh:{place}", f"{role}:{place}", library, tmp_path / "bag") == reference
+
+
+def test_messages_under_the_names_on_the_bus(reference: str, tmp_path: Path) -> None:
+    """With `"payload": "cdr"` ROS 2 messages travel, of which one is mapped; not a bit of the flight is another."""
+    shutil.copytree(SIM.parents[1], tmp_path / "lander")
+    config = tmp_path / "lander/fc/lander_control.json"
+    machine = json.loads(config.read_text())
+    machine["bus"] = {"payload": "cdr"}
+    machine["channels"][0]["ros"] = {"type": "geometry_msgs/PointStamped", "field": "point.z", "frame": "ground"}
+    config.write_text(json.dumps(machine))
+    run("fcslc", "build", config, "-o", tmp_path)
+    place = f"tcp/127.0.0.1:{free_port(socket.SOCK_STREAM)}"
+    library, sim = tmp_path / "liblander_control.so", tmp_path / "lander/sim/lander.sim.json"
+    assert fly(f"zenoh:{place}", f"zenoh:{place}", library, tmp_path / "bag", sim=sim) == reference
 
 
 def test_a_guard_changes_nothing_in_the_flight(reference: str, library: Path, tmp_path: Path) -> None:

@@ -11,6 +11,7 @@
 #include "codec_layout.h"
 #include "commit.h"
 #include "fcsl/fcsl_bus.h"
+#include "payload.h"
 
 enum {
     COMMIT = 0, /* outputs: the commits, then the channels */
@@ -28,6 +29,7 @@ struct fcsl_mirror {
     fcsl_bus_t *bus;
     uint8_t *fresh; /* of each channel: has a value in the tick */
     uint32_t *ages; /* of each channel, in the tick posted before */
+    payload_t payload;
     uint8_t *value; /* the longest of a channel, or a commit */
     uint64_t tick;  /* posted before */
     int has_begun;  /* there is one */
@@ -54,29 +56,25 @@ static int is_sampled(fcsl_mirror_t *mirror, uint32_t number, const uint8_t *dat
            (mirror->ages[number] != UINT32_MAX && mirror->ages[number] != before + (tick - mirror->tick));
 }
 
-static int post_value(const fcsl_mirror_t *mirror, uint32_t number, const uint8_t *data)
+/* A value that its message cannot hold is none of the tick. */
+static int post_value(fcsl_mirror_t *mirror, uint32_t number, const uint8_t *data, uint64_t time_ns)
 {
-    const fcsl_machine_t *machine = mirror->table.machine;
-    const fcsl_channel_t *channel = &machine->channels[number];
-    const fcsl_field_t *field = &machine->fields[channel->field];
-    uint32_t size = field->size;
-    if (channel->as == FCSL_AS_BLOB) {
-        size = blob_count(data + field->offset, blob_capacity(field));
-        blob_export(mirror->value, data + field->offset, size);
-    } else {
-        fcsl_scalars_export(mirror->value, data + field->offset, field->type, field->count);
+    uint32_t size = 0;
+    if (payload_write(&mirror->payload, number, data, (int64_t)time_ns, mirror->value, &size) != 0) {
+        mirror->fresh[number] = 0;
+        return 0;
     }
     return fcsl_bus_post(mirror->bus, CHANNELS + number, mirror->value, size);
 }
 
-static int post_direction(fcsl_mirror_t *mirror, const commit_t *commit, const uint8_t *data)
+static int post_direction(fcsl_mirror_t *mirror, const commit_t *commit, const uint8_t *data, uint64_t time_ns)
 {
     const fcsl_machine_t *machine = mirror->table.machine;
     int failed = 0;
     for (uint32_t i = 0; i < machine->channel_count && !failed; i++) {
         mirror->fresh[i] = machine->channels[i].direction == commit->direction &&
                            (commit->direction == FCSL_ACTUATOR || is_sampled(mirror, i, data, commit->tick));
-        failed = mirror->fresh[i] != 0u && post_value(mirror, i, data) != 0;
+        failed = mirror->fresh[i] != 0u && post_value(mirror, i, data, time_ns) != 0;
     }
     commit_write(commit, mirror->fresh, mirror->value);
     return failed || fcsl_bus_post(mirror->bus, COMMIT, mirror->value, commit_bytes(commit->channels)) != 0;
@@ -92,11 +90,11 @@ int fcsl_mirror_post(fcsl_mirror_t *mirror, const void *data, uint64_t tick, uin
                        .direction = FCSL_SENSOR,
                        .channels = (uint16_t)machine->channel_count};
     mirror->room -= mirror->room > 0u;
-    int failed = post_direction(mirror, &commit, bytes);
+    int failed = post_direction(mirror, &commit, bytes, time_ns);
     commit.direction = FCSL_ACTUATOR;
     commit.time_ns = 0;
     commit.armed = machine->arm_field == FCSL_NONE || bytes[machine->fields[machine->arm_field].offset] != 0u;
-    failed = failed || post_direction(mirror, &commit, bytes);
+    failed = failed || post_direction(mirror, &commit, bytes, time_ns);
     mirror->tick = tick;
     mirror->has_begun = !failed;
     return failed ? -1 : 0;
@@ -129,14 +127,6 @@ int fcsl_mirror_ready(fcsl_mirror_t *mirror)
 
 /* ---- opening and closing -------------------------------------------------------------------------------------------- */
 
-/* Bytes of the longest value under a channel's key. */
-static uint32_t value_bytes(const fcsl_machine_t *machine, uint32_t number)
-{
-    const fcsl_channel_t *channel = &machine->channels[number];
-    const fcsl_field_t *field = &machine->fields[channel->field];
-    return channel->as == FCSL_AS_BLOB ? blob_capacity(field) : field->size;
-}
-
 static int check(const fcsl_machine_t *machine, const char *name_space, char *error, size_t error_size)
 {
     static const char LONGEST[] = "@descriptor"; /* of the names that are no channels */
@@ -152,9 +142,9 @@ static int check(const fcsl_machine_t *machine, const char *name_space, char *er
                            FCSL_BUS_KEY_MAX);
             return -1;
         }
-        if (value_bytes(machine, i) > FCSL_BUS_MESSAGE_MAX) {
+        if (payload_bytes(machine, i) > FCSL_BUS_MESSAGE_MAX) {
             (void)snprintf(error, error_size, "channel '%.100s' has %u bytes; a message of the bus has at most %u",
-                           name, value_bytes(machine, i), FCSL_BUS_MESSAGE_MAX);
+                           name, payload_bytes(machine, i), FCSL_BUS_MESSAGE_MAX);
             return -1;
         }
     }
@@ -166,22 +156,24 @@ static int check(const fcsl_machine_t *machine, const char *name_space, char *er
     return 0;
 }
 
-static fcsl_mirror_t *allocate(const fcsl_machine_t *machine)
+static fcsl_mirror_t *allocate(const fcsl_machine_t *machine, char *error, size_t error_size)
 {
     const size_t channels = machine->channel_count;
     size_t longest = commit_bytes(machine->channel_count);
     fcsl_mirror_t *mirror = calloc(1, sizeof *mirror);
+    (void)snprintf(error, error_size, "out of memory for observers");
     if (mirror == NULL) {
         return NULL;
     }
     for (uint32_t i = 0; i < machine->channel_count; i++) {
-        longest = value_bytes(machine, i) > longest ? value_bytes(machine, i) : longest;
+        longest = payload_bytes(machine, i) > longest ? payload_bytes(machine, i) : longest;
     }
     mirror->table = fcsl_channel_table(machine);
     mirror->fresh = calloc(channels + 1u, 1);
     mirror->ages = calloc(channels + 1u, sizeof *mirror->ages);
     mirror->value = calloc(longest, 1);
-    if (mirror->fresh == NULL || mirror->ages == NULL || mirror->value == NULL) {
+    if (mirror->fresh == NULL || mirror->ages == NULL || mirror->value == NULL ||
+        payload_open(&mirror->payload, machine, error, error_size) != 0) {
         fcsl_mirror_close(mirror);
         return NULL;
     }
@@ -194,7 +186,7 @@ static uint32_t size_ring(fcsl_mirror_t *mirror)
     const fcsl_machine_t *machine = mirror->table.machine;
     uint64_t tick_bytes = 2u * (commit_bytes(machine->channel_count) + ENTRY_BYTES_MAX);
     for (uint32_t i = 0; i < machine->channel_count; i++) {
-        tick_bytes += value_bytes(machine, i) + ENTRY_BYTES_MAX;
+        tick_bytes += payload_bytes(machine, i) + ENTRY_BYTES_MAX;
     }
     const uint64_t ticks = RING_BYTES / tick_bytes;
     mirror->ticks = ticks < 1u ? 1u : ticks > TICKS_POSTED ? TICKS_POSTED : (uint32_t)ticks;
@@ -243,12 +235,10 @@ int fcsl_mirror_open(const fcsl_mirror_options_t *options, const fcsl_machine_t 
     if (check(machine, options->name_space, error, error_size) != 0) {
         return -1;
     }
-    fcsl_mirror_t *self = allocate(machine);
+    fcsl_mirror_t *self = allocate(machine, error, error_size);
     const char **outputs = calloc(count, sizeof *outputs);
     char *keys = calloc(count + 1u, FCSL_BUS_KEY_MAX + 1u);
-    if (self == NULL || outputs == NULL || keys == NULL) {
-        (void)snprintf(error, error_size, "out of memory for observers");
-    } else {
+    if (self != NULL && outputs != NULL && keys != NULL) {
         failed = open_session(self, options, outputs, keys, error, error_size);
     }
     free(keys);
@@ -270,6 +260,7 @@ void fcsl_mirror_close(fcsl_mirror_t *mirror)
         (void)fcsl_bus_close(mirror->bus,
                              CLOSE_MS); /* frozen observers may hold it up: what is left of it goes on alone */
     }
+    payload_close(&mirror->payload);
     free(mirror->fresh);
     free(mirror->ages);
     free(mirror->value);

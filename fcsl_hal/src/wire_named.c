@@ -127,6 +127,7 @@ void named_free(named_wire_t *wire)
 {
     free(wire->plan.inputs);
     free((void *)wire->plan.outputs);
+    payload_close(&wire->payload);
     free(wire->control);
     free(wire->has_value);
     free(wire->numbers);

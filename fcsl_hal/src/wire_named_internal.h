@@ -7,6 +7,7 @@
 #define FCSL_WIRE_NAMED_INTERNAL_H
 
 #include "bus_peer.h"
+#include "payload.h"
 #include "wire_named.h"
 
 enum {
@@ -45,8 +46,9 @@ typedef struct {
     uint32_t *numbers; /* of each channel: its input or output */
     char *keys;        /* FCSL_BUS_KEY_MAX + 1 bytes each: those of the channels, and the others */
     uint8_t *fresh;    /* of each channel: has a value in the tick */
-    uint8_t *image;    /* a struct of the machine: the values that came last */
+    uint8_t *image;    /* a struct of the machine: the values that came last, and those that were sent */
     uint32_t input_count;
+    payload_t payload;
     uint8_t *value;    /* the longest of a channel, or a commit */
     size_t value_bytes;
     uint64_t time_ns; /* of the tick, for its time message */

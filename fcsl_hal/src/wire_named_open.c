@@ -37,17 +37,12 @@ static int comes_in(const named_wire_t *wire, const fcsl_channel_t *channel)
     return (channel->direction == FCSL_SENSOR) == (wire->peer.side == FCSL_WIRE_CONNECT);
 }
 
-/* Bytes of the longest value under a channel's key. */
-static size_t value_bytes(const fcsl_channel_t *channel, const fcsl_field_t *field)
-{
-    return channel->as == FCSL_AS_BLOB ? blob_capacity(field) : field->size;
-}
-
-static named_wire_t *allocate(const fcsl_channel_table_t *table, fcsl_wire_side_t side)
+static named_wire_t *allocate(const fcsl_channel_table_t *table, fcsl_wire_side_t side, char *error, size_t error_size)
 {
     const fcsl_machine_t *machine = table->machine;
     const uint32_t channels = machine->channel_count;
     named_wire_t *wire = calloc(1, sizeof *wire);
+    (void)snprintf(error, error_size, "out of memory for the bus");
     if (wire == NULL) {
         return NULL;
     }
@@ -55,7 +50,7 @@ static named_wire_t *allocate(const fcsl_channel_table_t *table, fcsl_wire_side_
     wire->table = table;
     wire->value_bytes = commit_bytes(channels);
     for (uint32_t i = 0; i < channels; i++) {
-        const size_t bytes = value_bytes(&machine->channels[i], &machine->fields[machine->channels[i].field]);
+        const size_t bytes = payload_most(machine, i);
         wire->value_bytes = bytes > wire->value_bytes ? bytes : wire->value_bytes;
     }
     wire->numbers = calloc((size_t)channels + 1u, sizeof *wire->numbers);
@@ -69,7 +64,7 @@ static named_wire_t *allocate(const fcsl_channel_table_t *table, fcsl_wire_side_
     wire->plan.outputs = calloc((size_t)channels + NAMED_CHANNELS, sizeof *wire->plan.outputs);
     if (wire->plan.inputs == NULL || wire->plan.outputs == NULL || wire->has_value == NULL || wire->control == NULL ||
         wire->numbers == NULL || wire->keys == NULL || wire->fresh == NULL || wire->image == NULL ||
-        wire->value == NULL) {
+        wire->value == NULL || payload_open(&wire->payload, machine, error, error_size) != 0) {
         named_free(wire);
         return NULL;
     }
@@ -106,17 +101,15 @@ static void fill_plan(named_wire_t *wire, const char *name_space)
     plan->tick_bytes = CONTROL_PACKET_MAX + commit_size + NAMED_CHANNELS * (uint64_t)ENTRY_BYTES_MAX;
     for (uint32_t i = 0; i < machine->channel_count; i++) {
         const fcsl_channel_t *channel = &machine->channels[i];
-        const size_t bytes = value_bytes(channel, &machine->fields[channel->field]);
         const char *key = add_key(wire, &keys, name_space, channel->name);
         if (comes_in(wire, channel)) {
             wire->numbers[i] = plan->input_count;
-            const uint32_t least = channel->as == FCSL_AS_BLOB ? 0u : (uint32_t)bytes;
-            plan->inputs[plan->input_count++] =
-                (fcsl_bus_input_t){.key = key, .bytes = (uint32_t)bytes, .least = least, .depth = 1};
+            plan->inputs[plan->input_count++] = (fcsl_bus_input_t){
+                .key = key, .bytes = payload_most(machine, i), .least = payload_least(machine, i), .depth = 1};
         } else {
             wire->numbers[i] = plan->output_count;
             plan->outputs[plan->output_count++] = key;
-            plan->tick_bytes += bytes + ENTRY_BYTES_MAX;
+            plan->tick_bytes += payload_bytes(machine, i) + ENTRY_BYTES_MAX;
         }
     }
     wire->input_count = plan->input_count;
@@ -234,9 +227,8 @@ int fcsl_wire_open_named(const char *address, const char *name_space, const fcsl
         check(name_space, table->machine, error, error_size) != 0) {
         return -1;
     }
-    named_wire_t *self = allocate(table, side);
+    named_wire_t *self = allocate(table, side, error, error_size);
     if (self == NULL) {
-        (void)snprintf(error, error_size, "out of memory for the bus");
         return -1;
     }
     self->runs_free = fcsl_wire_runs_free(address);

@@ -8,20 +8,28 @@
 
 #include "codec_layout.h"
 #include "commit.h"
+#include "fcsl/fcsl_tick_time.h"
 #include "wire_named_internal.h"
 
 /* ---- sending ---------------------------------------------------------------------------------------------------------- */
 
-static int post_values(named_wire_t *wire, const uint8_t *bytes, size_t size, fcsl_message_kind_t kind)
+/* A value that its message cannot hold is not put: the other end keeps the one before. */
+static int post_values(named_wire_t *wire, const fcsl_message_t *message)
 {
     const fcsl_machine_t *machine = wire->table->machine;
-    const fcsl_message_t message = {.bytes = bytes, .size = size, .kind = kind};
+    const int64_t time_ns = (int64_t)fcsl_tick_time_ns(machine->tick_hz, message->tick);
     fcsl_message_entry_t entry = {0};
+    uint32_t size = 0;
     int failed = 0;
+    fcsl_message_apply(machine, wire->image, message);
     memset(wire->fresh, 0, machine->channel_count);
-    while (!failed && fcsl_message_next(machine, &message, &entry)) {
+    while (!failed && fcsl_message_next(machine, message, &entry)) {
+        if (payload_write(&wire->payload, entry.channel, wire->image, time_ns, wire->value, &size) != 0) {
+            wire->counters.values_refused++;
+            continue;
+        }
         wire->fresh[entry.channel] = 1;
-        failed = fcsl_bus_post(wire->peer.bus, wire->numbers[entry.channel], entry.values, entry.size);
+        failed = fcsl_bus_post(wire->peer.bus, wire->numbers[entry.channel], wire->value, size);
     }
     return failed;
 }
@@ -42,9 +50,11 @@ int named_post(named_wire_t *wire, const uint8_t *bytes, size_t size)
         return fcsl_bus_post(wire->peer.bus, NAMED_CONTROL, bytes, size);
     }
     commit.tick = fcsl_get_u64(bytes + ENTRY_BYTES);
+    fcsl_message_t message = {.bytes = bytes, .size = size, .tick = commit.tick};
     switch (id - SENSORS_ID) {
     case FCSL_SENSOR_MESSAGE: /* its time message follows, and with it the commit */
-        return post_values(wire, bytes, size, FCSL_SENSOR_MESSAGE);
+        message.kind = FCSL_SENSOR_MESSAGE;
+        return post_values(wire, &message);
     case FCSL_TIME_MESSAGE:
         commit.direction = FCSL_SENSOR;
         commit.time_ns = fcsl_get_u64(bytes + EXTRA_AT + ENTRY_BYTES);
@@ -52,29 +62,12 @@ int named_post(named_wire_t *wire, const uint8_t *bytes, size_t size)
     default:
         commit.direction = FCSL_ACTUATOR;
         commit.armed = bytes[EXTRA_AT + ENTRY_BYTES];
-        return post_values(wire, bytes, size, FCSL_ACTUATOR_MESSAGE) != 0 ? -1 : post_commit(wire, &commit);
+        message.kind = FCSL_ACTUATOR_MESSAGE;
+        return post_values(wire, &message) != 0 ? -1 : post_commit(wire, &commit);
     }
 }
 
 /* ---- receiving -------------------------------------------------------------------------------------------------------- */
-
-/* Stores the value of a channel, whose input takes no other size. Returns 1, or 0 where it is none. */
-static int store_value(named_wire_t *wire, const fcsl_channel_t *channel, size_t size)
-{
-    const fcsl_machine_t *machine = wire->table->machine;
-    const fcsl_field_t *field = &machine->fields[channel->field];
-    uint8_t *place = wire->image + field->offset;
-    if (channel->as == FCSL_AS_BLOB) {
-        blob_import(place, wire->value, (uint32_t)size, blob_capacity(field));
-        return 1;
-    }
-    if (!fcsl_scalars_valid(machine, wire->value, field->type, field->count)) {
-        wire->counters.values_refused++;
-        return 0;
-    }
-    fcsl_scalars_import(place, wire->value, field->type, field->count);
-    return 1;
-}
 
 /* Takes the values of a commit: NONE when all came. */
 static fcsl_wire_status_t take_values(named_wire_t *wire, const commit_t *commit)
@@ -86,7 +79,9 @@ static fcsl_wire_status_t take_values(named_wire_t *wire, const commit_t *commit
             continue;
         }
         const int came = fcsl_bus_take(wire->peer.bus, wire->numbers[i], wire->value, &size);
-        if (!came || !store_value(wire, &machine->channels[i], size)) {
+        const int is_value = came && payload_read(&wire->payload, i, wire->value, size, wire->image) == 0;
+        wire->counters.values_refused += came && !is_value;
+        if (!is_value) {
             (void)snprintf(wire->text, sizeof wire->text,
                            "the commit of tick %" PRIu64 " says that channel '%.100s' has a value, and %s",
                            commit->tick, machine->channels[i].name, came ? "what came is none" : "none came");
@@ -188,11 +183,12 @@ static newest_t take_newest_values(named_wire_t *wire)
         if (machine->channels[i].direction != theirs(wire)) {
             continue;
         }
-        if (fcsl_bus_take(wire->peer.bus, wire->numbers[i], wire->value, &size) &&
-            store_value(wire, &machine->channels[i], size)) {
-            wire->fresh[i] = 1;
-            wire->has_value[i] = 1;
-            newest.some = 1;
+        if (fcsl_bus_take(wire->peer.bus, wire->numbers[i], wire->value, &size)) {
+            const int is_value = payload_read(&wire->payload, i, wire->value, size, wire->image) == 0;
+            wire->counters.values_refused += is_value ? 0u : 1u;
+            wire->fresh[i] = (uint8_t)is_value;
+            wire->has_value[i] |= (uint8_t)is_value;
+            newest.some = newest.some || is_value;
         }
         newest.all = newest.all && wire->has_value[i];
     }

@@ -26,6 +26,8 @@ AXES = ("enu", "ned", "flu", "frd", "enu/flu", "ned/frd", "ned/flu", "enu/frd")
 _MAX_AGE = 2**32 - 2
 #: Of the field of a channel: an entry counts its values in 16 bits (docs/wire.md), and hosts refuse a longer field.
 _MAX_BYTES = 2**16 - 1
+#: Values as they are, or a ROS 2 message of each channel.
+PAYLOADS = ("raw", "cdr")
 #: Ids from 0xFF00 on are reserved for entries of messages that are no channels (docs/wire.md).
 MAX_ID = 0xFEFF
 
@@ -56,6 +58,12 @@ def read_channels(
         channels.append(channel)
     check_channels(channels, reader.sink)
     return channels
+
+
+def read_payload(node: JsonNode | None, reader: ConfigReader) -> str:
+    """`payload` of `bus`: what lies under a channel's key on the bus."""
+    keys = reader.object(node, "`bus`", ("payload",)) if node is not None else None
+    return (reader.choice(keys.get("payload"), "`payload`", PAYLOADS) if keys else None) or PAYLOADS[0]
 
 
 def _channel(

@@ -23,7 +23,7 @@ from ..parse.json_reader import ConfigReader, Everything
 from ..parse.json_source import JsonNode
 from ..parse.machine_files import ParsedAlgorithm, ParsedMachine
 from .arming import read_arming
-from .channels import read_channels
+from .channels import read_channels, read_payload
 from .ports import PortResolver
 from .sources import SourceResolver
 from .states import read_states
@@ -52,6 +52,7 @@ def check_machine(parsed: ParsedMachine, sink: DiagnosticSink) -> Machine | None
     ports = PortResolver(instances, incomplete, SourceResolver(keys.get("channels"), sink), sink)
     connections = _read_connections(keys.get("connections"), ports, reader)
     channels = read_channels(keys.get("channels"), ports, connections, reader)
+    payload = read_payload(keys.get("bus"), reader)
     arm, command_timeout_ns = read_arming(keys, tick_hz, ports, channels, reader)
     instances = _with_initial_inputs(keys.get("instances"), instances, connections, reader)
     scheduled = [i.name for i in instances]
@@ -89,6 +90,7 @@ def check_machine(parsed: ParsedMachine, sink: DiagnosticSink) -> Machine | None
         views,
         arm=arm,
         command_timeout_ns=command_timeout_ns,
+        payload=payload,
     )
 
 

@@ -170,6 +170,7 @@ class Machine:
     left_out: dict[str, str] = dataclass_field(default_factory=dict)  # source by omitted input
     arm: PortRef | None = None  # the bool output that arms the actuators
     command_timeout_ns: int = 0  # 0: none
+    payload: str = "raw"  # of values on the bus: raw, cdr
 
     @property
     def structs(self) -> tuple[Struct, ...]:

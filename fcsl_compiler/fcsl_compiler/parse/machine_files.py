@@ -44,6 +44,7 @@ _OPTIONAL = (
         "requests",
         "publish",
         "channels",
+        "bus",
         "arm",
         "command_timeout_s",
         "targets",

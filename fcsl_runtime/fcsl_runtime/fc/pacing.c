@@ -4,7 +4,7 @@
  */
 #include "pacing.h"
 
-#include "run/tick_time.h"
+#include "fcsl/fcsl_tick_time.h"
 
 static const uint64_t SECOND_NS = 1000000000u;
 /* A burst of ticks that are older than this helps nobody. */

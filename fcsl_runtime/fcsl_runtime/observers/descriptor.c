@@ -32,8 +32,22 @@ static void put_shape(json_out_t *out, const fcsl_channel_t *channel, const fcsl
     fcsl_json_raw(out, "]");
 }
 
-static void put_channel(json_out_t *out, const fcsl_channel_t *channel, const fcsl_field_t *field)
+/* The message under the channel's key, and the part of it that is the channel's. */
+static void put_ros(json_out_t *out, const fcsl_channel_t *channel, const fcsl_ros_message_t *message)
 {
+    fcsl_json_raw(out, ",\"ros\":{\"type\":");
+    fcsl_json_quoted(out, message->type);
+    put_text(out, "field", channel->ros_type[0] != '\0' ? channel->ros_field : "data"); /* of a std_msgs message */
+    put_text(out, "frame", channel->ros_frame);
+    put_text(out, "child_frame", channel->ros_child_frame);
+    put_text(out, "axes", channel->ros_axes);
+    fcsl_json_raw(out, "}");
+}
+
+static void put_channel(json_out_t *out, const fcsl_machine_t *machine, uint32_t number)
+{
+    const fcsl_channel_t *channel = &machine->channels[number];
+    const fcsl_field_t *field = &machine->fields[channel->field];
     static const char *const types[] = {"bool", "i32", "i64", "u32", "u64", "f32", "f64"};
     static const char *const as[] = {"field", "quaternion", "blob"};
     fcsl_json_raw(out, "{\"name\":");
@@ -45,6 +59,9 @@ static void put_channel(json_out_t *out, const fcsl_channel_t *channel, const fc
     fcsl_json_raw(out, ",\"as\":\"%s\"", as[channel->as <= FCSL_AS_BLOB ? channel->as : FCSL_AS_FIELD]);
     put_text(out, "unit", field->unit);
     put_text(out, "doc", field->doc);
+    if (machine->payloads != NULL) {
+        put_ros(out, channel, &machine->payloads[number]);
+    }
     fcsl_json_raw(out, "}");
 }
 
@@ -54,12 +71,12 @@ static void put_all(json_out_t *out, const fcsl_machine_t *machine)
     put_text(out, "machine", machine->name);
     put_text(out, "source_hash", machine->source_hash);
     put_text(out, "layout_hash", machine->layout_hash);
+    put_text(out, "payload", machine->payloads != NULL ? "cdr" : "raw");
     fcsl_json_raw(out, ",\"table_hash\":%" PRIu32 ",\"tick_hz\":%" PRIu64 ",\"channels\":[",
                   fcsl_channel_table(machine).hash, machine->tick_hz);
     for (uint32_t i = 0; i < machine->channel_count; i++) {
-        const fcsl_channel_t *channel = &machine->channels[i];
         fcsl_json_raw(out, i > 0 ? "," : "");
-        put_channel(out, channel, &machine->fields[channel->field]);
+        put_channel(out, machine, i);
     }
     fcsl_json_raw(out, "]}");
 }

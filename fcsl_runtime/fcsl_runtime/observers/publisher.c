@@ -7,7 +7,7 @@
 
 #include <time.h>
 
-#include "run/tick_time.h"
+#include "fcsl/fcsl_tick_time.h"
 
 /* How long the last ticks may take to leave. */
 static const uint64_t LAST_NS = 1000000000u;

@@ -8,7 +8,7 @@
 
 #include "recorder_internal.h"
 #include "messages/tick_messages.h"
-#include "run/tick_time.h"
+#include "fcsl/fcsl_tick_time.h"
 
 /* Records that are written before the clock is looked at again. */
 enum { BATCH_RECORDS = 256 };

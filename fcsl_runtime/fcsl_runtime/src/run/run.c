@@ -13,7 +13,7 @@
 #include "record/recorder.h"
 #include "run_internal.h"
 #include "trace.h"
-#include "tick_time.h"
+#include "fcsl/fcsl_tick_time.h"
 #include "writes.h"
 
 const fcsl_machine_t *fcsl_run_machine(const fcsl_run_t *run)

@@ -7,7 +7,7 @@
 
 #include <time.h>
 
-#include "run/tick_time.h"
+#include "fcsl/fcsl_tick_time.h"
 
 /* Datagrams of the configuration in one round: what a socket of the usual size holds while its reader is busy. */
 enum { BURST = 32 };

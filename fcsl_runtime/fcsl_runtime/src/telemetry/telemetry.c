@@ -13,7 +13,7 @@
 #include "base/error.h"
 #include "fcsl/fcsl_codec.h"
 #include "sender.h"
-#include "run/tick_time.h"
+#include "fcsl/fcsl_tick_time.h"
 
 static const uint64_t SECOND_NS = 1000000000u;
 

@@ -120,7 +120,15 @@ def _list(options: argparse.Namespace) -> None:
     for machine in machines:
         print(f"{machine.prefix}: {machine.tick_hz} Hz, sources {machine.source_hash[:12]}")
         rows = [
-            (c.name, c.direction, c.type_text, c.unit, f"{rates.get(f'{machine.prefix}/{c.name}', 0.0):.1f} Hz", c.doc)
+            (
+                c.name,
+                c.direction,
+                c.type_text,
+                c.ros_type,
+                c.unit,
+                f"{rates.get(f'{machine.prefix}/{c.name}', 0.0):.1f} Hz",
+                c.doc,
+            )
             for c in machine.channels
         ]
         print("\n".join(f"  {line}" for line in table(rows).splitlines()))

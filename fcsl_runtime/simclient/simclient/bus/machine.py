@@ -11,6 +11,7 @@ from dataclasses import dataclass
 from typing import Any
 
 from ..errors import BusError
+from .payload import Payload
 
 #: A scalar's letter for `struct`.
 _FORMATS = {"bool": "?", "i32": "i", "i64": "q", "u32": "I", "u64": "Q", "f32": "f", "f64": "d"}
@@ -33,6 +34,17 @@ class BusChannel:
     is_blob: bool
     unit: str
     doc: str
+    payload: Payload | None = None  # None: the values lie under its key as they are
+
+    def values(self, data: bytes) -> bytes | None:
+        """The values in what lies under the channel's key, little-endian; None if there are none."""
+        values = data if self.payload is None else self.payload.read(data)
+        return values if values is not None and self.decode(values) is not None else None
+
+    @property
+    def ros_type(self) -> str:
+        """Of the message under its key; "" where the values lie there as they are."""
+        return self.payload.ros_type if self.payload is not None else ""
 
     @property
     def type_text(self) -> str:
@@ -53,12 +65,15 @@ class BusChannel:
         return _nested(struct.unpack(self.format, data), self.shape)
 
     def encode(self, value: Any) -> bytes:
-        """The bytes of a value; numbers, true and false, lists of them, of a blob hex digits. Raises BusError."""
+        """What lies under the channel's key for a value; numbers, true and false, lists of them, of a blob hex digits.
+        Raises BusError."""
         if self.is_blob:
-            return self._encode_blob(value)
-        flat: list[Any] = []
-        self._flatten(value, self.shape, flat)
-        return struct.pack(self.format, *flat)
+            values = self._encode_blob(value)
+        else:
+            flat: list[Any] = []
+            self._flatten(value, self.shape, flat)
+            values = struct.pack(self.format, *flat)
+        return values if self.payload is None else self.payload.write(values)
 
     def _encode_blob(self, value: Any) -> bytes:
         try:
@@ -125,19 +140,26 @@ class BusMachine:
     text: str
 
 
+#: What lies under a channel's key.
+_PAYLOADS = ("raw", "cdr")
+
+
 def read_machine(prefix: str, text: str) -> BusMachine:
     """The machine that a descriptor describes. Raises BusError: anybody may answer on a bus."""
     try:
         told = json.loads(text)
         if told["version"] != 1:
             raise BusError(f"{prefix} has a descriptor of version {told['version']}, and this fcsl-bus reads 1")
+        if told["payload"] not in _PAYLOADS:
+            raise BusError(f"{prefix} has the payload {told['payload']!r}, and this fcsl-bus reads raw and cdr")
+        cdr = told["payload"] == "cdr"
         machine = BusMachine(
             prefix=prefix,
             name=_name(told["machine"]),
             source_hash=_printable(told["source_hash"]),
             table_hash=_integer(told["table_hash"], 1 << 32),
             tick_hz=_integer(told["tick_hz"], 1 << 32, least=1),
-            channels=tuple(_read_channel(i, channel) for i, channel in enumerate(told["channels"])),
+            channels=tuple(_read_channel(i, channel, cdr) for i, channel in enumerate(told["channels"])),
             text=text,
         )
     except (ValueError, LookupError, TypeError, RecursionError) as error:
@@ -147,7 +169,7 @@ def read_machine(prefix: str, text: str) -> BusMachine:
     return machine
 
 
-def _read_channel(index: int, told: dict[str, Any]) -> BusChannel:
+def _read_channel(index: int, told: dict[str, Any], cdr: bool) -> BusChannel:
     shape = tuple(_integer(extent, _COUNT_MAX) for extent in told["shape"])
     words_fit = told["type"] in _FORMATS and told["as"] in _AS and told["direction"] in ("sensor", "actuator")
     shape_fits = len(shape) == 1 if told["as"] == "blob" else len(shape) <= _RANK_MAX
@@ -162,6 +184,22 @@ def _read_channel(index: int, told: dict[str, Any]) -> BusChannel:
         is_blob=told["as"] == "blob",
         unit=_printable(told["unit"]),
         doc=_printable(told["doc"]),
+        payload=_read_payload(told, math.prod(shape)) if cdr else None,
+    )
+
+
+def _read_payload(told: dict[str, Any], count: int) -> Payload:
+    ros = {key: _printable(told["ros"][key]) for key in ("type", "field", "frame", "child_frame", "axes")}
+    return Payload(
+        name=_name(told["name"]),
+        ros_type=ros["type"],
+        field=ros["field"],
+        frame=ros["frame"],
+        child_frame=ros["child_frame"],
+        axes=ros["axes"],
+        type=told["type"],
+        count=count,
+        is_blob=told["as"] == "blob",
     )
 
 

@@ -18,7 +18,7 @@ _DIRECTIONS = ("sensor", "actuator")
 
 @dataclass(frozen=True)
 class Tick:
-    """The values of one direction in a tick, as bytes, in the order of the table."""
+    """The values of one direction in a tick, little-endian, in the order of the table."""
 
     tick: int
     values: list[tuple[BusChannel, bytes]]
@@ -97,9 +97,10 @@ class TickReader:
         found = []
         for channel in self.machine.channels:
             if bits >> channel.index & 1:
-                values = waiting.get(channel.name, [])
-                if len(values) == 1 and channel.decode(values[0]) is not None:
-                    found.append((channel, values[0]))
+                came = waiting.get(channel.name, [])
+                values = channel.values(came[0]) if len(came) == 1 else None
+                if values is not None:
+                    found.append((channel, values))
                 else:
                     self._missing += 1
         return found

@@ -11,13 +11,15 @@ enum {
     FCSL_ROS_PARTS_MAX = 1 << 16,
     FCSL_ROS_ANCHORS_MAX = 1024,
     FCSL_ROS_NAMES_MAX = 256,
-    FCSL_ROS_DEPTH_MAX = 16 /* sequences of messages inside one another */
+    FCSL_ROS_DEPTH_MAX = 16, /* sequences of messages inside one another */
+    FCSL_ROS_ENCAPSULATION_BYTES = 4
 };
 
 /* What a walk found. */
 typedef struct {
     const uint8_t *anchors[FCSL_ROS_ANCHORS_MAX]; /* null: not in this message */
     uint32_t found[FCSL_ROS_NAMES_MAX];           /* index of each name in its NAMES, or FCSL_ROS_NONE */
+    size_t end;                                   /* bytes that the message's type took */
 } fcsl_ros_walk_t;
 
 /* Whether the parts of a plan lead through a message: known codes, loops that nest, tables that are there. */

@@ -1,0 +1,75 @@
+# SPDX-License-Identifier: Apache-2.0
+"""The ROS 2 messages of a machine's channels, with their plans."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Sequence
+from dataclasses import dataclass, replace
+
+from ..model.machine import Channel, RosMapping
+from ..model.types import Scalar, Type, count_of, scalar_of
+from .composer import Source, composer_plan
+from .plan import ComposerPlan, ReaderPlan
+from .reader import Pick, reader_plan
+from .standard_messages import STANDARD, full_name
+
+#: The message of std_msgs for one scalar of a type; of arrays its …MultiArray. There is no array of bools.
+_SCALAR = {"bool": "Bool", "i32": "Int32", "i64": "Int64", "u32": "UInt32", "u64": "UInt64"}
+_SCALAR |= {"f32": "Float32", "f64": "Float64", "Health": "Int32", "TransitionRequest": "Int32"}
+_ARRAY = {**_SCALAR, "bool": "UInt8"}
+#: That of a blob: its bytes are no values of a plan.
+BLOB = "std_msgs/UInt8MultiArray"
+
+
+@dataclass(frozen=True)
+class Message:
+    """A message of channels of one direction. In `composer` the field of channels[i] is memory i, at offset 0; in
+    `reader` it is value i."""
+
+    channels: tuple[Channel, ...]
+    type: str  # full name
+    composer: ComposerPlan
+    reader: ReaderPlan
+
+
+def by_topic(channels: Iterable[Channel]) -> list[list[Channel]]:
+    """The mapped channels, those of one message together, in the order of the JSON."""
+    topics: dict[str, list[Channel]] = {}
+    for channel in channels:
+        if channel.ros.type:
+            topics.setdefault(channel.ros.topic, []).append(channel)
+    return list(topics.values())
+
+
+def message_of(channels: Sequence[Channel]) -> Message:
+    """The message of checked channels, which are parts of one. Raises PlanError where it would be too large."""
+    ros = channels[0].ros
+    sources, picks = [], []
+    for i, c in enumerate(channels):
+        type_, count = scalar_of(c.port.type).name, count_of(c.port.type)
+        sources.append(Source(c.ros.field, type_, count, 0, axes=c.ros.axes, memory=i, name=c.name))
+        picks.append(Pick(c.name, (c.ros.field,), type_, count, axes=c.ros.axes))
+    message = full_name(ros.type)
+    composer = composer_plan(STANDARD, message, sources, ros.frame, ros.child_frame)
+    reader = reader_plan(STANDARD, message, picks, ros.frame, ros.child_frame)
+    return Message(tuple(channels), message, composer, reader)
+
+
+def payload_of(channel: Channel) -> Message:
+    """The message of a channel alone, as it lies on the bus: that of its `ros` block, else one of std_msgs.
+
+    A NaN is a value there, as it is without a message.
+    """
+    if channel.kind == "blob":
+        blob = full_name(BLOB)
+        return Message((channel,), blob, composer_plan(STANDARD, blob, []), reader_plan(STANDARD, blob, []))
+    ros = channel.ros if channel.ros.type else standard_mapping(channel.port.type)
+    message = message_of([replace(channel, ros=ros)])
+    return replace(message, reader=replace(message.reader, nan_allowed=True))
+
+
+def standard_mapping(type_: Type) -> RosMapping:
+    """The mapping of a value of this type that has no `ros` block."""
+    names = _SCALAR if isinstance(type_, Scalar) else _ARRAY
+    array = "" if isinstance(type_, Scalar) else "MultiArray"
+    return RosMapping(f"std_msgs/{names[scalar_of(type_).name]}{array}", "data", "", "", "", "")
