@@ -1,8 +1,9 @@
 # SPDX-License-Identifier: Apache-2.0
-"""docs/bus.md: its plant, which is a Python script over Zenoh's own package, flies the lander."""
+"""docs/bus.md: its plant, which is a Python script over Zenoh's own package, flies the lander; its source is one."""
 
 from __future__ import annotations
 
+import json
 import re
 import socket
 import subprocess
@@ -17,9 +18,15 @@ ROOT = Path(__file__).resolve().parents[1]
 LONG_S = 120
 
 
+def write_script(marker: str, path: Path) -> None:
+    """The script of the page that has this text."""
+    scripts = re.findall(r"```python\n(.*?)```", (ROOT / "docs/bus.md").read_text(), re.DOTALL)
+    (script,) = (script for script in scripts if marker in script)
+    path.write_text(script)
+
+
 def test_the_plant_of_the_page_flies_the_lander(tmp_path: Path) -> None:
-    (script,) = re.findall(r"```python\n(.*?)```", (ROOT / "docs/bus.md").read_text(), re.DOTALL)
-    (tmp_path / "plant.py").write_text(script)
+    write_script("touchdown", tmp_path / "plant.py")
     machine = ROOT / "examples/lander/fc/lander_control.json"
     subprocess.run(["fcslc", "build", machine, "-o", tmp_path], check=True, capture_output=True)
     library, bag = tmp_path / "liblander_control.so", tmp_path / "bag"
@@ -35,3 +42,16 @@ def test_the_plant_of_the_page_flies_the_lander(tmp_path: Path) -> None:
     (speed,) = re.findall(r"touchdown at ([0-9.]+) m/s", said)
     assert float(speed) < 2.0
     assert replay(bag, library=str(library)).identical
+
+
+def test_the_source_of_the_page_is_one(tmp_path: Path) -> None:
+    write_script("12.5", tmp_path / "source.py")
+    machine, summary = ROOT / "examples/lander/fc/lander_control.json", tmp_path / "summary.json"
+    subprocess.run(["fcslc", "build", machine, "-o", tmp_path], check=True, capture_output=True)
+    place = f"tcp/127.0.0.1:{free_port(socket.SOCK_STREAM)}"
+    with subprocess.Popen([sys.executable, tmp_path / "source.py", place]) as source:
+        options = ["--hal", f"zenoh:{place},free-running", "--ticks", "300", "--summary", summary]
+        subprocess.run(["fcsl-fc", tmp_path / "liblander_control.so", *options], check=True, timeout=LONG_S)
+        source.kill()
+    counted = json.loads(summary.read_text())["hal"]
+    assert counted["messages"] > 50 and counted["bus.strays"] == counted["bus.wrong_size"] == 0

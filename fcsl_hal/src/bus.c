@@ -194,8 +194,7 @@ static int declare(fcsl_bus_t *bus, const fcsl_bus_options_t *options, char *err
     return failed;
 }
 
-/* Zenoh's session, with all that is declared. */
-static int open_zenoh(fcsl_bus_t *bus, const fcsl_bus_options_t *options, char *error, size_t error_size)
+int bus_connect(fcsl_bus_t *bus, const fcsl_bus_options_t *options, char *error, size_t error_size)
 {
     char config[BUS_CONFIG_BYTES] = "";
     char reason[256] = "";
@@ -216,6 +215,7 @@ static int open_zenoh(fcsl_bus_t *bus, const fcsl_bus_options_t *options, char *
     if (declare(bus, options, reason, sizeof reason) != 0) {
         (void)snprintf(error, error_size, "the bus refuses a key: %s", reason);
         fcsl_zenoh_close(bus->zenoh);
+        bus->zenoh = NULL;
         return -1;
     }
     return 0;
@@ -225,7 +225,9 @@ static int start(fcsl_bus_t *bus)
 {
     (void)atomic_fetch_add(&bus->owners, 1);
     if (pthread_create(&bus->service, NULL, bus_serve, bus) != 0) {
-        fcsl_zenoh_close(bus->zenoh);
+        if (bus->zenoh != NULL) {
+            fcsl_zenoh_close(bus->zenoh);
+        }
         bus_disown(bus);
         return -1;
     }
@@ -244,10 +246,12 @@ int fcsl_bus_open(const fcsl_bus_options_t *options, fcsl_bus_t **bus, char *err
         (void)snprintf(error, error_size, "out of memory for the bus");
         return -1;
     }
+    self->options = *options;
     /* Signals belong to the program's own threads; Zenoh's begin here. */
     (void)sigfillset(&all);
     (void)pthread_sigmask(SIG_SETMASK, &all, &before);
-    int failed = open_zenoh(self, options, error, error_size);
+    const int later = options->connects_later && options->role != FCSL_BUS_LISTEN;
+    int failed = later ? 0 : bus_connect(self, options, error, error_size);
     if (!failed && start(self) != 0) {
         (void)snprintf(error, error_size, "cannot start the thread of the bus");
         failed = -1;

@@ -6,7 +6,7 @@
 #include "bus_session.h"
 #include "monotonic.h"
 
-enum { LOOK_NS = 50 * NS_PER_MS, TURN = 64 };
+enum { LOOK_NS = 50 * NS_PER_MS, TURN = 64, REASON_BYTES = 256 };
 
 /* Puts what is in the ring, at most TURN messages: 1 when there may be more. */
 static int put_some(fcsl_bus_t *bus)
@@ -55,11 +55,30 @@ static void sleep_until_posted(fcsl_bus_t *bus)
     }
 }
 
-void *bus_serve(void *argument)
+/* Tries until somebody listens. What was posted meanwhile is of the past. */
+static void connect_later(fcsl_bus_t *bus)
 {
-    fcsl_bus_t *bus = argument;
+    uint32_t output = 0;
+    const uint8_t *bytes = NULL;
+    size_t size = 0;
+    char reason[REASON_BYTES];
+    const struct timespec pause = timespec_of(LOOK_NS);
+    while (bus->zenoh == NULL && !atomic_load(&bus->stopping)) { /* until the session is closed at the latest */
+        if (bus_connect(bus, &bus->options, reason, sizeof reason) != 0) {
+            (void)nanosleep(&pause, NULL);
+        }
+    }
+    while (ring_front(&bus->ring, &output, &bytes, &size) && !atomic_load(&bus->stopping)) {
+        bus_count(&bus->counters.put_failed, 1);
+        ring_pop(&bus->ring);
+    }
+}
+
+/* Puts, or sleeps, until the session is closed. */
+static void serve(fcsl_bus_t *bus)
+{
     uint64_t looked_ns = 0;
-    for (;;) { /* until the session is closed: each turn puts, or sleeps */
+    for (;;) { /* each turn puts, or sleeps */
         const int stopping = atomic_load(&bus->stopping); /* nothing is posted any more */
         const int more = put_some(bus);
         if (stopping && !more) {
@@ -71,6 +90,17 @@ void *bus_serve(void *argument)
         }
     }
     fcsl_zenoh_close(bus->zenoh);
+}
+
+void *bus_serve(void *argument)
+{
+    fcsl_bus_t *bus = argument;
+    if (bus->zenoh == NULL) {
+        connect_later(bus);
+    }
+    if (bus->zenoh != NULL) {
+        serve(bus);
+    }
     (void)pthread_mutex_lock(&bus->ending);
     bus->has_ended = 1;
     (void)pthread_cond_signal(&bus->ended);

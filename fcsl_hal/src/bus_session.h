@@ -33,7 +33,8 @@ typedef struct {
 } counters_t;
 
 struct fcsl_bus {
-    fcsl_zenoh_t *zenoh; /* of the service thread, once that runs */
+    fcsl_zenoh_t *zenoh; /* of the service thread, once that runs; null: not connected yet */
+    fcsl_bus_options_t options; /* of a session that connects later */
     pthread_t service;
 
     /* Out. */
@@ -75,6 +76,9 @@ static inline void bus_tell(fcsl_bus_t *bus)
     (void)atomic_fetch_add(&bus->news_count, 1);
     event_signal(&bus->news);
 }
+
+/* Opens Zenoh's session and declares all that is in `options`. Returns 0, or -1 with `error` filled. */
+int bus_connect(fcsl_bus_t *bus, const fcsl_bus_options_t *options, char *error, size_t error_size);
 
 /* Gives up one of the owners. */
 void bus_disown(fcsl_bus_t *bus);

@@ -44,10 +44,10 @@ static fcsl_wire_status_t send_packet(const fcsl_wire_t *wire, const control_pac
     return wire->send(wire->ctx, bytes, CONTROL_HEADER_BYTES + length);
 }
 
-fcsl_wire_status_t control_send_hello(const fcsl_wire_t *wire, const fcsl_channel_table_t *table, int sends_time)
+fcsl_wire_status_t control_send_hello(const fcsl_wire_t *wire, const fcsl_channel_table_t *table, int flag)
 {
     const control_packet_t packet = {
-        .kind = CONTROL_HELLO, .flag = sends_time, .table_hash = table->hash, .tick_hz = table->machine->tick_hz};
+        .kind = CONTROL_HELLO, .flag = flag, .table_hash = table->hash, .tick_hz = table->machine->tick_hz};
     return send_packet(wire, &packet);
 }
 

@@ -6,7 +6,8 @@
  *   0      4   magic "FCSW" (messages of channels begin with an id from 0xff00 on)
  *   4      2   version (1)
  *   6      1   kind
- *   7      1   hello: 1 when the sender is a simulator that sends the time; end: 1 when another run follows; else zero
+ *   7      1   hello: 1 when the sender is a simulator that sends the time, or a controller that runs free; end: 1 when another run
+ *              follows; else zero
  *   8      4   channel-table hash    hello only, else zero
  *   12     8   tick_hz               hello only, else zero
  *   20     n   text, not terminated  refusal only, at most CONTROL_TEXT_MAX bytes
@@ -45,7 +46,7 @@ typedef struct {
 int control_parse(const uint8_t *bytes, size_t size, control_packet_t *packet);
 
 /* Each sends one packet without waiting. */
-fcsl_wire_status_t control_send_hello(const fcsl_wire_t *wire, const fcsl_channel_table_t *table, int sends_time);
+fcsl_wire_status_t control_send_hello(const fcsl_wire_t *wire, const fcsl_channel_table_t *table, int flag);
 fcsl_wire_status_t control_send_refusal(const fcsl_wire_t *wire, const char *text);
 fcsl_wire_status_t control_send_end(const fcsl_wire_t *wire, int another_follows);
 fcsl_wire_status_t control_send_alive(const fcsl_wire_t *wire);

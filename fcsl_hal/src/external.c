@@ -12,6 +12,7 @@
 
 #include "control_packet.h"
 #include "monotonic.h"
+#include "presence.h"
 #include "wire_named.h"
 
 enum {
@@ -19,6 +20,7 @@ enum {
     SPEC_BYTES = 256,
     TIME_BYTES = 64,
     JOIN_MS = 10000,
+    MESSAGES_MAX = 64, /* that one call takes */
     LOOK_NS = 20 * NS_PER_MS, /* a moment */
 };
 
@@ -28,6 +30,11 @@ struct fcsl_external {
     fcsl_channel_table_t table;
     fcsl_wire_t wire;
     uint64_t messages_dropped;
+    int runs_free;
+    presence_t presence; /* of a controller that runs free, too */
+    fcsl_log_t log;
+    fcsl_external_counters_t counters; /* free-running */
+    uint64_t ticks_without; /* since the last actuator message */
     int waits; /* for an actuator message, until deadline_ns */
     uint64_t deadline_ns;
     uint64_t alive_ns; /* when the next sign of life is due */
@@ -106,9 +113,11 @@ int fcsl_external_open_bus(const char *address, const char *name_space, const fc
     if (self == NULL) {
         return -1;
     }
+    self->runs_free = fcsl_wire_runs_free(address);
+    self->presence = presence_of(FCSL_WIRE_CONNECT, &self->table, &self->log);
     /* A client of another simulator, which may be started later; who listens waits for nobody. */
     const uint64_t deadline_ns = monotonic_ns() + JOIN_MS * (uint64_t)NS_PER_MS;
-    if (fcsl_wire_open_named(address, name_space, &self->table, FCSL_WIRE_LISTEN, deadline_ns, &self->wire, error,
+    if (fcsl_wire_open_named(self->spec, name_space, &self->table, FCSL_WIRE_LISTEN, deadline_ns, &self->wire, error,
                              error_size) != 0) {
         release(self);
         return -1;
@@ -144,7 +153,12 @@ static int is_early(uint64_t begun_ns, uint64_t deadline_ns)
 static fcsl_hal_status_t answer(fcsl_external_t *external, const control_packet_t *hello)
 {
     char text[CONTROL_TEXT_MAX + 1];
-    if (control_differs(hello, &external->table, text, sizeof text)) {
+    int refused = control_differs(hello, &external->table, text, sizeof text);
+    if (!refused && hello->flag) {
+        (void)snprintf(text, sizeof text, "one of them runs free: write ,free-running behind both addresses, or none");
+        refused = 1;
+    }
+    if (refused) {
         (void)control_send_refusal(&external->wire, text);
         (void)snprintf(external->text, sizeof external->text, "controller refused: %s", text);
         return FCSL_HAL_ERROR;
@@ -201,6 +215,9 @@ static fcsl_hal_status_t judge(fcsl_external_t *external, fcsl_wire_status_t sta
     case FCSL_WIRE_OK:
         return FCSL_HAL_OK;
     case FCSL_WIRE_NONE:
+        if (external->runs_free) {
+            return FCSL_HAL_OK; /* the next ones are newer */
+        }
         (void)snprintf(external->text, sizeof external->text, "the controller takes no sensor messages");
         return FCSL_HAL_ERROR;
     case FCSL_WIRE_CLOSED:
@@ -322,11 +339,66 @@ fcsl_hal_status_t fcsl_external_receive(fcsl_external_t *external, uint64_t tick
 void fcsl_external_alive(fcsl_external_t *external)
 {
     const uint64_t now_ns = monotonic_ns();
-    if (now_ns >= external->alive_ns) {
+    if (external->runs_free) {
+        presence_tell(&external->presence, &external->wire);
+    } else if (now_ns >= external->alive_ns) {
         external->alive_ns = now_ns + CONTROL_ALIVE_NS;
         (void)control_send_alive(&external->wire); /* the next one comes soon */
     }
 }
+
+/* ---- free-running ------------------------------------------------------------------------------------------------- */
+
+static void count_take(fcsl_external_t *external, int taken)
+{
+    fcsl_external_counters_t *counters = &external->counters;
+    external->ticks_without = taken ? 0u : external->ticks_without + 1u;
+    counters->commands += taken ? 1u : 0u;
+    counters->ticks_without += taken ? 0u : 1u;
+    if (external->ticks_without > counters->longest_without) {
+        counters->longest_without = external->ticks_without;
+    }
+}
+
+fcsl_hal_status_t fcsl_external_take(fcsl_external_t *external, uint64_t tick, fcsl_message_t *message)
+{
+    int taken = 0;
+    fcsl_external_alive(external);
+    for (int i = 0; i < MESSAGES_MAX && !taken; i++) { /* one message has all that came */
+        size_t size = 0;
+        const fcsl_wire_status_t status =
+            external->wire.receive(external->wire.ctx, 0, external->inbox, external->inbox_size, &size);
+        if (status == FCSL_WIRE_CLOSED) {
+            presence_gone(&external->presence);
+        } else if (status != FCSL_WIRE_OK) {
+            break;
+        } else if (!presence_hear(&external->presence, external->inbox, size)) {
+            taken = fcsl_message_check(&external->table, FCSL_ACTUATOR_MESSAGE, external->inbox, size, message) ==
+                    FCSL_MESSAGE_OK;
+            external->messages_dropped += taken ? 0u : 1u;
+        }
+    }
+    message->tick = tick; /* the controller counts its own */
+    count_take(external, taken);
+    return taken ? FCSL_HAL_OK : FCSL_HAL_NONE;
+}
+
+int fcsl_external_runs_free(const fcsl_external_t *external)
+{
+    return external->runs_free;
+}
+
+int fcsl_external_read_log(fcsl_external_t *external, char text[FCSL_LOG_BYTES])
+{
+    return fcsl_log_read(&external->log, text);
+}
+
+fcsl_external_counters_t fcsl_external_counters(const fcsl_external_t *external)
+{
+    return external->counters;
+}
+
+/* ---- the end ------------------------------------------------------------------------------------------------------ */
 
 void fcsl_external_end(fcsl_external_t *external, int another_follows)
 {

@@ -12,6 +12,7 @@
 #include "control_packet.h"
 #include "fcsl/fcsl_hal.h"
 #include "monotonic.h"
+#include "presence.h"
 #include "wire_named.h"
 
 enum {
@@ -72,6 +73,8 @@ typedef struct {
     fcsl_log_t log;
     atomic_int interrupted;
     int is_named; /* `spec` is an address of the bus */
+    int runs_free; /* such an address says so: nobody waits */
+    presence_t presence; /* of a simulator that runs free, too */
     char spec[SPEC_BYTES];
     char name_space[SPEC_BYTES];
     char text[TEXT_BYTES];
@@ -246,7 +249,20 @@ static fcsl_hal_status_t sample_paced(hal_t *hal, uint64_t tick, uint8_t *bytes,
     return status == FCSL_HAL_NONE && sensed ? FCSL_HAL_OK : status;
 }
 
-/* ---- beside a rig -------------------------------------------------------------------------------------------------- */
+/* A rig waits for nobody. */
+static void wire_alive(void *ctx)
+{
+    hal_t *hal = ctx;
+    const uint64_t now_ns = monotonic_ns();
+    if (hal->runs_free) {
+        presence_tell(&hal->presence, &hal->wire);
+    } else if (hal->paces && now_ns >= hal->alive_ns) {
+        hal->alive_ns = now_ns + CONTROL_ALIVE_NS;
+        (void)control_send_alive(&hal->wire); /* the next one comes soon */
+    }
+}
+
+/* ---- beside a rig, or free-running ----------------------------------------------------------------------------------- */
 
 static void rig_gone(hal_t *hal)
 {
@@ -256,14 +272,35 @@ static void rig_gone(hal_t *hal)
     }
 }
 
+/* What comes of a simulator that runs free, besides values: 1 where it was that. */
+static int hear_presence(hal_t *hal, fcsl_wire_status_t came, size_t size)
+{
+    int heard = 1;
+    if (!hal->runs_free) {
+        return 0;
+    }
+    if (came == FCSL_WIRE_CLOSED) {
+        presence_gone(&hal->presence);
+    } else {
+        heard = came == FCSL_WIRE_OK && presence_hear(&hal->presence, hal->inbox, size);
+    }
+    hal->counters.connected = (uint64_t)hal->presence.there;
+    return heard;
+}
+
+/* Free-running, one message has all that came. */
 static fcsl_hal_status_t sample_newest(hal_t *hal, uint64_t tick, uint8_t *bytes, size_t capacity,
                                        fcsl_message_t *message)
 {
     int sensed = 0;
-    for (int i = 0; i < MESSAGES_MAX; i++) {
+    wire_alive(hal);
+    for (int i = 0; i < MESSAGES_MAX && !(sensed && hal->runs_free); i++) {
         size_t size = 0;
         fcsl_message_t heard;
         const fcsl_wire_status_t came = receive(hal, 0, &size);
+        if (hear_presence(hal, came, size)) {
+            continue;
+        }
         if (came == FCSL_WIRE_CLOSED) {
             rig_gone(hal);
         }
@@ -346,17 +383,6 @@ static fcsl_hal_status_t wire_arm(void *ctx, int armed)
 {
     ((hal_t *)ctx)->counters.armed = armed != 0;
     return FCSL_HAL_OK;
-}
-
-/* A rig waits for nobody. */
-static void wire_alive(void *ctx)
-{
-    hal_t *hal = ctx;
-    const uint64_t now_ns = monotonic_ns();
-    if (hal->paces && now_ns >= hal->alive_ns) {
-        hal->alive_ns = now_ns + CONTROL_ALIVE_NS;
-        (void)control_send_alive(&hal->wire); /* the next one comes soon */
-    }
 }
 
 /* ---- time, counters, end ------------------------------------------------------------------------------------------- */
@@ -455,8 +481,8 @@ static int shake_hands(hal_t *hal, uint64_t deadline_ns, char *error, size_t err
     hal->paces = packet.flag;
     if (hal->is_named && !hal->paces) {
         (void)snprintf(error, error_size,
-                       "%s is a rig, which sends at its own rate: named values need a simulator that paces the run; "
-                       "use wire:zenoh:… with both",
+                       "the simulator on %s runs free: named values in lock-step need one that paces the run; write "
+                       ",free-running behind this address, too",
                        hal->spec);
         return -1;
     }
@@ -485,6 +511,9 @@ static int wire_open(fcsl_hal_t *handle, char *error, size_t error_size)
     hal_t *hal = handle->ctx;
     const uint64_t deadline_ns = monotonic_ns() + (uint64_t)hal->open_ms * NS_PER_MS;
     int failed = hal->has_wire ? 0 : open_spec(hal, deadline_ns, error, error_size);
+    if (hal->runs_free) {
+        return failed;
+    }
     failed = failed ? failed : shake_hands(hal, deadline_ns, error, error_size);
     if (failed) {
         return failed;
@@ -571,6 +600,11 @@ int fcsl_hal_bus_check(const char *address, char *error, size_t error_size)
     return fcsl_wire_check_named(address, error, error_size);
 }
 
+int fcsl_hal_bus_runs_free(const char *address)
+{
+    return fcsl_wire_runs_free(address);
+}
+
 int fcsl_hal_bus(const char *address, const char *name_space, const fcsl_machine_t *machine, uint32_t open_ms,
                  uint32_t timeout_ms, fcsl_hal_t *hal, char *error, size_t error_size)
 {
@@ -587,6 +621,8 @@ int fcsl_hal_bus(const char *address, const char *name_space, const fcsl_machine
     }
     hal_t *self = hal->ctx;
     self->is_named = 1;
+    self->runs_free = fcsl_wire_runs_free(address);
+    self->presence = presence_of(FCSL_WIRE_LISTEN, &self->table, &self->log);
     self->open_ms = open_ms;
     (void)snprintf(self->spec, SPEC_BYTES, "%s", address);
     const size_t lead = strspn(name_space, "/");

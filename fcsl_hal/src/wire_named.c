@@ -18,7 +18,7 @@ static const fcsl_field_t FIELDS[] = {
     COUNTER("bus.put", bus.put, "messages that were handed to Zenoh"),
     COUNTER("bus.put_failed", bus.put_failed, "messages that Zenoh refused"),
     COUNTER("bus.received", bus.received, "messages that came"),
-    COUNTER("bus.replaced", bus.replaced, "values that a newer one of their tick replaced"),
+    COUNTER("bus.replaced", bus.replaced, "values that a newer one replaced before they were taken"),
     COUNTER("bus.overflowed", bus.overflowed, "messages dropped because earlier ones were not read"),
     COUNTER("bus.wrong_size", bus.wrong_size, "messages dropped because they were too long or too short"),
     COUNTER("bus.deletions", bus.deletions, "deletions, which are no messages"),
@@ -35,7 +35,7 @@ const fcsl_wire_counters_t fcsl_wire_named_counters = {
 static fcsl_wire_status_t named_send(void *ctx, const uint8_t *message, size_t size)
 {
     named_wire_t *wire = ctx;
-    if (!bus_peer_lives(&wire->peer)) {
+    if (!wire->runs_free && !bus_peer_lives(&wire->peer)) {
         return FCSL_WIRE_CLOSED;
     }
     return named_post(wire, message, size) == 0 ? FCSL_WIRE_OK : FCSL_WIRE_NONE;
@@ -74,11 +74,28 @@ static fcsl_wire_status_t take(void *ctx, uint8_t *bytes, size_t capacity, size_
     return gone;
 }
 
+/* Free-running: values come from anybody, control packets from a peer that lives. */
+static fcsl_wire_status_t take_newest(void *ctx, uint8_t *bytes, size_t capacity, size_t *size)
+{
+    named_wire_t *wire = ctx;
+    const int lives = bus_peer_lives(&wire->peer); /* looked at first: what it sent is there then */
+    wire->peer.met = wire->peer.met || lives;
+    if (capacity >= CONTROL_PACKET_MAX && fcsl_bus_take(wire->peer.bus, NAMED_CONTROL, bytes, size) && wire->peer.met) {
+        return FCSL_WIRE_OK;
+    }
+    if (wire->peer.met && !lives) {
+        wire->peer.met = 0;
+        return FCSL_WIRE_CLOSED;
+    }
+    return named_take_newest(wire, bytes, capacity, size);
+}
+
 static fcsl_wire_status_t named_receive(void *ctx, uint64_t deadline_ns, uint8_t *message, size_t capacity,
                                         size_t *size)
 {
     named_wire_t *wire = ctx;
-    return bus_peer_receive(&wire->peer, take, wire, deadline_ns, message, capacity, size);
+    return bus_peer_receive(&wire->peer, wire->runs_free ? take_newest : take, wire, deadline_ns, message, capacity,
+                            size);
 }
 
 static const char *named_explain(void *ctx)
@@ -108,8 +125,11 @@ void named_drain(named_wire_t *wire, uint32_t first)
 
 void named_free(named_wire_t *wire)
 {
+    free(wire->plan.inputs);
+    free((void *)wire->plan.outputs);
     payload_close(&wire->payload);
     free(wire->control);
+    free(wire->has_value);
     free(wire->numbers);
     free(wire->keys);
     free(wire->fresh);
@@ -121,8 +141,9 @@ void named_free(named_wire_t *wire)
 static void named_close(void *ctx)
 {
     named_wire_t *wire = ctx;
-    (void)fcsl_bus_close(wire->peer.bus, NAMED_CLOSE_MS); /* what Zenoh leaves behind ends with the program */
-    named_free(wire);
+    if (fcsl_bus_close(wire->peer.bus, NAMED_CLOSE_MS) == 0) { /* what Zenoh leaves behind ends with the program */
+        named_free(wire);
+    }
 }
 
 fcsl_wire_t named_functions(named_wire_t *wire)

@@ -12,9 +12,23 @@
 
 enum {
     NAMED_TEXT_BYTES = 256,
+    NAMED_ENDPOINT_BYTES = 256,
     NAMED_WAITING_MAX = 8, /* messages under a key */
     NAMED_CLOSE_MS = 2000 /* for the peer to take what was sent last */
 };
+
+/* What a session is opened with. */
+typedef struct {
+    fcsl_bus_input_t *inputs;
+    const char **outputs;
+    uint32_t input_count;
+    uint32_t output_count;
+    const char *watched[2];
+    const char *token;
+    const char *strays;
+    char endpoint[NAMED_ENDPOINT_BYTES];
+    uint64_t tick_bytes; /* that are posted in a tick */
+} named_plan_t;
 
 /* Inputs and outputs of both ends; behind them the channels that come, and those that go. */
 enum { NAMED_CONTROL = 0, NAMED_COMMIT = 1, NAMED_CHANNELS = 2 };
@@ -27,6 +41,7 @@ typedef struct {
 
 typedef struct {
     bus_peer_t peer;
+    named_plan_t plan; /* the session may connect later */
     const fcsl_channel_table_t *table;
     uint32_t *numbers; /* of each channel: its input or output */
     char *keys;        /* FCSL_BUS_KEY_MAX + 1 bytes each: those of the channels, and the others */
@@ -42,6 +57,8 @@ typedef struct {
     size_t control_size;
     int greeted; /* the peer's first control packet was handed on: no commit counts before it */
     int time_follows; /* the sensor message was handed on, and its time message was not */
+    int runs_free;
+    uint8_t *has_value; /* free-running: of each channel, a value has come */
     named_counters_t counters;
     char text[NAMED_TEXT_BYTES];
 } named_wire_t;
@@ -59,6 +76,10 @@ int named_post(named_wire_t *wire, const uint8_t *bytes, size_t size);
 
 /* The message that the next commit stands for. NONE: no commit came; ERROR: its values did not. */
 fcsl_wire_status_t named_take_commit(named_wire_t *wire, uint8_t *bytes, size_t capacity, size_t *size);
+
+/* Free-running: the message of the newest values that came since the last one, of tick 0. An actuator message needs a commit, which
+ * says whether they are armed. NONE: nothing came. */
+fcsl_wire_status_t named_take_newest(named_wire_t *wire, uint8_t *bytes, size_t capacity, size_t *size);
 
 /* The time message that follows a sensor message. */
 fcsl_wire_status_t named_make_time(named_wire_t *wire, uint8_t *bytes, size_t capacity, size_t *size);

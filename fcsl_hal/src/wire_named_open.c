@@ -20,7 +20,17 @@ enum {
     TICKS_POSTED = 4, /* that the ring has room for */
     OTHER_KEYS = 5, /* than those of channels: control, commits, both tokens, all that there are */
     ENTRY_BYTES_MAX = 16, /* of the ring, beside a message */
+    CONNECT_MS = 500, /* of one of many tries */
 };
+
+static const char RUNS_FREE[] = ",free-running";
+
+int fcsl_wire_runs_free(const char *address)
+{
+    const size_t length = strlen(address);
+    const size_t behind = strlen(RUNS_FREE);
+    return length >= behind && strcmp(address + length - behind, RUNS_FREE) == 0;
+}
 
 static int comes_in(const named_wire_t *wire, const fcsl_channel_t *channel)
 {
@@ -48,26 +58,18 @@ static named_wire_t *allocate(const fcsl_channel_table_t *table, fcsl_wire_side_
     wire->fresh = calloc((size_t)channels + 1u, 1);
     wire->image = calloc(1, machine->size);
     wire->value = calloc(1, wire->value_bytes);
+    wire->has_value = calloc((size_t)channels + 1u, 1);
     wire->control = calloc(1, CONTROL_PACKET_MAX);
-    if (wire->control == NULL || wire->numbers == NULL || wire->keys == NULL || wire->fresh == NULL ||
-        wire->image == NULL || wire->value == NULL || payload_open(&wire->payload, machine, error, error_size) != 0) {
+    wire->plan.inputs = calloc((size_t)channels + NAMED_CHANNELS, sizeof *wire->plan.inputs);
+    wire->plan.outputs = calloc((size_t)channels + NAMED_CHANNELS, sizeof *wire->plan.outputs);
+    if (wire->plan.inputs == NULL || wire->plan.outputs == NULL || wire->has_value == NULL || wire->control == NULL ||
+        wire->numbers == NULL || wire->keys == NULL || wire->fresh == NULL || wire->image == NULL ||
+        wire->value == NULL || payload_open(&wire->payload, machine, error, error_size) != 0) {
         named_free(wire);
         return NULL;
     }
     return wire;
 }
-
-/* What a session is opened with. */
-typedef struct {
-    fcsl_bus_input_t *inputs;
-    const char **outputs;
-    uint32_t input_count;
-    uint32_t output_count;
-    const char *watched[2];
-    const char *token;
-    const char *strays;
-    uint64_t tick_bytes; /* that are posted in a tick */
-} plan_t;
 
 /* Writes a key behind those that were written before. */
 static const char *add_key(named_wire_t *wire, uint32_t *count, const char *name_space, const char *name)
@@ -78,8 +80,9 @@ static const char *add_key(named_wire_t *wire, uint32_t *count, const char *name
     return key;
 }
 
-static void fill_plan(named_wire_t *wire, const char *name_space, plan_t *plan)
+static void fill_plan(named_wire_t *wire, const char *name_space)
 {
+    named_plan_t *plan = &wire->plan;
     const fcsl_machine_t *machine = wire->table->machine;
     const uint32_t commit_size = (uint32_t)commit_bytes(machine->channel_count);
     uint32_t keys = 0;
@@ -113,8 +116,8 @@ static void fill_plan(named_wire_t *wire, const char *name_space, plan_t *plan)
     wire->peer.output_count = NAMED_CHANNELS; /* a peer need not care for every channel */
 }
 
-/* Sets *endpoint to what is behind the kind, or null. */
-static fcsl_bus_role_t role_of(const char *address, fcsl_wire_side_t side, const char **endpoint)
+/* Copies what is behind the kind, without ,free-running; "" where there is no such kind. */
+static fcsl_bus_role_t role_of(const char *address, fcsl_wire_side_t side, char endpoint[NAMED_ENDPOINT_BYTES])
 {
     const struct {
         const char *kind;
@@ -125,24 +128,28 @@ static fcsl_bus_role_t role_of(const char *address, fcsl_wire_side_t side, const
     for (size_t i = 0; i < sizeof kinds / sizeof kinds[0]; i++) {
         const size_t length = strlen(kinds[i].kind);
         if (strncmp(address, kinds[i].kind, length) == 0) {
-            *endpoint = address + length;
+            const size_t behind = fcsl_wire_runs_free(address) ? strlen(RUNS_FREE) : 0u;
+            (void)snprintf(endpoint, NAMED_ENDPOINT_BYTES, "%.*s", (int)(strlen(address) - length - behind),
+                           address + length);
             return kinds[i].role;
         }
     }
-    *endpoint = NULL;
+    endpoint[0] = '\0';
     return FCSL_BUS_CLIENT;
 }
 
-static int open_session(named_wire_t *wire, const char *address, const plan_t *plan, uint64_t deadline_ns, char *error,
-                        size_t error_size)
+static int open_session(named_wire_t *wire, const char *address, uint64_t deadline_ns, char *error, size_t error_size)
 {
     const uint64_t now_ns = monotonic_ns();
-    const char *endpoint = NULL;
-    const fcsl_bus_role_t role = role_of(address, wire->peer.side, &endpoint);
+    const uint32_t wait_ms = deadline_ns > now_ns ? (uint32_t)((deadline_ns - now_ns) / NS_PER_MS) : 0u;
+    named_plan_t *plan = &wire->plan;
+    const fcsl_bus_role_t role = role_of(address, wire->peer.side, plan->endpoint);
     const fcsl_bus_options_t options = {
         .role = role,
-        .endpoint = endpoint,
-        .timeout_ms = deadline_ns > now_ns ? (uint32_t)((deadline_ns - now_ns) / NS_PER_MS) : 0u,
+        .endpoint = plan->endpoint,
+        .timeout_ms = wire->runs_free ? CONNECT_MS : wait_ms,
+        .connects_later = wire->runs_free,
+        .observer = wire->runs_free, /* who reads slowly gets the newest later, and holds up nobody */
         .ring_bytes = (uint32_t)(TICKS_POSTED * plan->tick_bytes),
         .outputs = plan->outputs,
         .output_count = plan->output_count,
@@ -157,8 +164,11 @@ static int open_session(named_wire_t *wire, const char *address, const plan_t *p
     if (fcsl_bus_open(&options, &wire->peer.bus, error, error_size) != 0) {
         return -1;
     }
+    if (wire->runs_free) {
+        return 0;
+    }
     if (wire->peer.side == FCSL_WIRE_CONNECT &&
-        bus_peer_wait(&wire->peer, endpoint, deadline_ns, error, error_size) != 0) {
+        bus_peer_wait(&wire->peer, plan->endpoint, deadline_ns, error, error_size) != 0) {
         (void)fcsl_bus_close(wire->peer.bus, NAMED_CLOSE_MS);
         return -1;
     }
@@ -197,12 +207,14 @@ int fcsl_wire_check_named(const char *address, char *error, size_t error_size)
     static const char TCP[] = "tcp/";
     struct sockaddr_storage there;
     socklen_t length = 0;
-    const char *endpoint = NULL;
-    (void)role_of(address, FCSL_WIRE_CONNECT, &endpoint);
-    if (endpoint == NULL || strncmp(endpoint, TCP, strlen(TCP)) != 0 ||
-        fcsl_address_read(endpoint + strlen(TCP), &there, &length) != 0) {
-        (void)snprintf(error, error_size, "%s: write zenoh:tcp/HOST:PORT in numbers, like zenoh:tcp/127.0.0.1:7447",
-                       address);
+    char endpoint[NAMED_ENDPOINT_BYTES];
+    (void)role_of(address, FCSL_WIRE_CONNECT, endpoint);
+    if (strncmp(endpoint, TCP, strlen(TCP)) != 0 || fcsl_address_read(endpoint + strlen(TCP), &there, &length) != 0) {
+        (void)snprintf(
+            error, error_size,
+            "%s: write zenoh:tcp/HOST:PORT in numbers, like zenoh:tcp/127.0.0.1:7447, and ,free-running behind it "
+            "where nobody waits for the other",
+            address);
         return -1;
     }
     return 0;
@@ -211,26 +223,19 @@ int fcsl_wire_check_named(const char *address, char *error, size_t error_size)
 int fcsl_wire_open_named(const char *address, const char *name_space, const fcsl_channel_table_t *table,
                          fcsl_wire_side_t side, uint64_t deadline_ns, fcsl_wire_t *wire, char *error, size_t error_size)
 {
-    const uint32_t channels = table->machine->channel_count;
     if (fcsl_wire_check_named(address, error, error_size) != 0 ||
         check(name_space, table->machine, error, error_size) != 0) {
         return -1;
     }
-    plan_t plan = {.inputs = calloc((size_t)channels + NAMED_CHANNELS, sizeof *plan.inputs),
-                   .outputs = calloc((size_t)channels + NAMED_CHANNELS, sizeof *plan.outputs)};
     named_wire_t *self = allocate(table, side, error, error_size);
-    int failed = -1;
-    if (self != NULL && plan.inputs != NULL && plan.outputs != NULL) {
-        fill_plan(self, name_space, &plan);
-        failed = open_session(self, address, &plan, deadline_ns, error, error_size) != 0 ? 1 : 0;
+    if (self == NULL) {
+        return -1;
     }
-    free(plan.inputs);
-    free((void *)plan.outputs);
-    if (failed) {
-        if (self != NULL) {
-            named_free(self);
-        }
-        return failed;
+    self->runs_free = fcsl_wire_runs_free(address);
+    fill_plan(self, name_space);
+    if (open_session(self, address, deadline_ns, error, error_size) != 0) {
+        named_free(self);
+        return 1;
     }
     *wire = named_functions(self);
     return 0;

@@ -91,15 +91,20 @@ static fcsl_wire_status_t take_values(named_wire_t *wire, const commit_t *commit
     return FCSL_WIRE_NONE;
 }
 
+/* The direction of what comes. */
+static uint8_t theirs(const named_wire_t *wire)
+{
+    return wire->peer.side == FCSL_WIRE_LISTEN ? FCSL_ACTUATOR : FCSL_SENSOR;
+}
+
 /* Whether the commit in `value` is one of the peer's, of this machine and direction. */
 static int read_commit(named_wire_t *wire, size_t size, commit_t *commit)
 {
     const fcsl_machine_t *machine = wire->table->machine;
-    const uint8_t theirs = wire->peer.side == FCSL_WIRE_LISTEN ? FCSL_ACTUATOR : FCSL_SENSOR;
     int fits = commit_read(wire->value, size, machine->channel_count, commit, wire->fresh) == 0 &&
-               commit->table_hash == wire->table->hash && commit->direction == theirs;
+               commit->table_hash == wire->table->hash && commit->direction == theirs(wire);
     for (uint32_t i = 0; fits && i < machine->channel_count; i++) {
-        fits = wire->fresh[i] == 0 || machine->channels[i].direction == theirs;
+        fits = wire->fresh[i] == 0 || machine->channels[i].direction == theirs(wire);
     }
     wire->counters.commits_refused += fits ? 0u : 1u;
     return fits;
@@ -143,6 +148,74 @@ fcsl_wire_status_t named_take_commit(named_wire_t *wire, uint8_t *bytes, size_t 
         }
     }
     return FCSL_WIRE_NONE;
+}
+
+/* Whether channels of what comes have values. */
+typedef struct {
+    int some; /* at least one has a new one */
+    int all; /* each has one that came at some time */
+} newest_t;
+
+/* Free-running: looks at the commits that came. Returns 1 where one of them is the peer's, and *newest the last such one. */
+static int take_newest_commit(named_wire_t *wire, commit_t *newest)
+{
+    commit_t commit;
+    size_t size = 0;
+    int found = 0;
+    for (uint32_t n = 0; n < NAMED_WAITING_MAX && fcsl_bus_take(wire->peer.bus, NAMED_COMMIT, wire->value, &size);
+         n++) {
+        if (read_commit(wire, size, &commit)) {
+            *newest = commit;
+            found = 1;
+        }
+    }
+    return found;
+}
+
+/* Free-running: stores the values that came, and marks them in `fresh`. */
+static newest_t take_newest_values(named_wire_t *wire)
+{
+    const fcsl_machine_t *machine = wire->table->machine;
+    newest_t newest = {.all = 1};
+    memset(wire->fresh, 0, machine->channel_count);
+    for (uint32_t i = 0; i < machine->channel_count; i++) {
+        size_t size = 0;
+        if (machine->channels[i].direction != theirs(wire)) {
+            continue;
+        }
+        if (fcsl_bus_take(wire->peer.bus, wire->numbers[i], wire->value, &size)) {
+            const int is_value = payload_read(&wire->payload, i, wire->value, size, wire->image) == 0;
+            wire->counters.values_refused += is_value ? 0u : 1u;
+            wire->fresh[i] = (uint8_t)is_value;
+            wire->has_value[i] |= (uint8_t)is_value;
+            newest.some = newest.some || is_value;
+        }
+        newest.all = newest.all && wire->has_value[i];
+    }
+    return newest;
+}
+
+fcsl_wire_status_t named_take_newest(named_wire_t *wire, uint8_t *bytes, size_t capacity, size_t *size)
+{
+    commit_t commit = {0};
+    fcsl_message_t message;
+    fcsl_message_status_t status = FCSL_MESSAGE_OK;
+    const int committed = take_newest_commit(wire, &commit); /* first: its values are there then */
+    const newest_t newest = take_newest_values(wire);
+    if (wire->peer.side == FCSL_WIRE_CONNECT ? !newest.some : !newest.all || !committed) {
+        return FCSL_WIRE_NONE;
+    }
+    if (wire->peer.side == FCSL_WIRE_CONNECT) {
+        status = fcsl_message_encode_sensors(wire->table, wire->image, 0, wire->fresh, bytes, capacity, &message);
+    } else {
+        status = fcsl_message_encode_actuators(wire->table, wire->image, 0, commit.armed, bytes, capacity, &message);
+    }
+    if (status != FCSL_MESSAGE_OK) {
+        (void)snprintf(wire->text, sizeof wire->text, "the values that came: %s", fcsl_message_status_text(status));
+        return FCSL_WIRE_ERROR;
+    }
+    *size = message.size;
+    return FCSL_WIRE_OK;
 }
 
 fcsl_wire_status_t named_make_time(named_wire_t *wire, uint8_t *bytes, size_t capacity, size_t *size)

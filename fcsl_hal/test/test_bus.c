@@ -289,6 +289,35 @@ static void test_nobody_and_somebody(void)
     CHECK(close(taken) == 0);
 }
 
+/* Opening does not wait. What was posted before somebody listens is dropped; what comes then arrives. */
+static void test_one_that_connects_later(void)
+{
+    uint64_t value = 1;
+    const fcsl_bus_input_t inputs[] = {{.key = ANSWER_KEY[0], .bytes = sizeof value, .depth = DEPTH}};
+    /* Not of those ports from which the system takes one for who tries to connect. */
+    const char *endpoint = endpoint_of((uint16_t)(20000 + getpid() % 12000));
+    const fcsl_bus_options_t options = {.role = FCSL_BUS_CLIENT,
+                                        .endpoint = endpoint,
+                                        .timeout_ms = 200,
+                                        .connects_later = 1,
+                                        .ring_bytes = RING_BYTES,
+                                        .outputs = ANSWER_KEY,
+                                        .output_count = 1};
+    const fcsl_bus_options_t listening = {
+        .role = FCSL_BUS_LISTEN, .endpoint = endpoint, .ring_bytes = RING_BYTES, .inputs = inputs, .input_count = 1};
+    fcsl_bus_t *alone = open_bus(&options);
+    CHECK(fcsl_bus_peers(alone) == 0 && fcsl_bus_close(alone, CLOSE_MS) == 0);
+    fcsl_bus_t *bus = open_bus(&options);
+    CHECK(fcsl_bus_post(bus, 0, &value, sizeof value) == 0);
+    fcsl_bus_t *listener = open_bus(&listening);
+    WAIT_UNTIL(bus, fcsl_bus_matched(bus, 0));
+    value = 2;
+    CHECK(fcsl_bus_post(bus, 0, &value, sizeof value) == 0);
+    take_one(listener, 0, &value, sizeof value);
+    CHECK(value == 2 && counted(bus).put_failed == 1 && counted(bus).put == 1);
+    CHECK(fcsl_bus_close(bus, CLOSE_MS) == 0 && fcsl_bus_close(listener, CLOSE_MS) == 0);
+}
+
 int main(void)
 {
     check_alone(test_values_come_before_their_tick);
@@ -298,5 +327,6 @@ int main(void)
     check_alone(test_what_is_dropped_is_counted);
     check_alone(test_options);
     check_alone(test_nobody_and_somebody);
+    check_alone(test_one_that_connects_later);
     return 0;
 }

@@ -153,7 +153,8 @@ static void test_a_tick_behind_bad_commits(void)
 static void test_a_rig(void)
 {
     uint8_t hello[256];
-    const pid_t child = start_controller(&MACHINE, WAIT_MS, FCSL_HAL_ERROR, "named values need a simulator");
+    const pid_t child = start_controller(&MACHINE, WAIT_MS, FCSL_HAL_ERROR,
+                                         "runs free: named values in lock-step need one that paces the run");
     fcsl_bus_t *bus = listen_on_the_bus();
     take_one(bus, CONTROL, hello, HELLO_BYTES);
     CHECK(fcsl_bus_post(bus, CONTROL, hello, HELLO_BYTES) == 0);

@@ -23,7 +23,7 @@ from .config import SERIAL_LINK, SimConfig, load
 from .errors import SimError
 from .models import Scalar
 from .output import show
-from .runner import TIMEOUT_MS, Sender, Server, StateChange, Summary, Watcher, run
+from .runner import FREE_RUNNING, TIMEOUT_MS, Sender, Server, StateChange, Summary, Watcher, run
 
 EXIT_UNTIL_NOT_HELD = 1
 EXIT_BAD_INPUT = 2
@@ -126,7 +126,8 @@ def _parser() -> argparse.ArgumentParser:
         metavar="PEER",
         help="the controller is another process (fcsl-fc --hal PEER): at the other end of a wire, with wire:unix:PATH, "
         "wire:udp:HOST:PORT, wire:tcp:HOST:PORT, wire:uart:DEVICE:BAUD or wire:zenoh:tcp/HOST:PORT; or on the bus, each "
-        "channel under its key, with zenoh:tcp/HOST:PORT, or zenoh-client: where another simulation listens",
+        "channel under its key, with zenoh:tcp/HOST:PORT, or zenoh-client: where another simulation listens; with "
+        ",free-running behind that, neither waits for the other",
     )
     help_speed = "limit on simulated seconds per second: 1 for real time; 0 (default): as fast as possible"
     command.add_argument("--speed", type=_speed, default=0.0, metavar="FACTOR", help=help_speed)
@@ -193,6 +194,8 @@ def _run(options: argparse.Namespace) -> int:
         )
     if options.timeout is not None and external is None:
         raise SimError("`--timeout` needs `--external`: it limits the wait for the controller")
+    if options.timeout is not None and external is not None and external.endswith(FREE_RUNNING):
+        raise SimError("`--timeout` does not go with `,free-running`: nobody waits for the controller")
     server = None
     if options.socket is not None:
         server = Server(options.socket, options.token, options.checkpoints, options.paused)
@@ -225,7 +228,8 @@ class _Printer(Watcher):
     def listening(self) -> None:
         serial = str(self._external).startswith("wire:uart:")
         end = "wire:uart:DEVICE:BAUD with the device at the other end of the line" if serial else self._external
-        show(f"waiting for a controller: fcsl-fc {self._config.library} --hal {end}")
+        waits = "a controller may come" if str(self._external).endswith(FREE_RUNNING) else "waiting for a controller"
+        show(f"{waits}: fcsl-fc {self._config.library} --hal {end}")
 
     def serving(self, address: str) -> None:
         show(f"variables on {address}")
@@ -263,6 +267,12 @@ def _print_summary(config: SimConfig, summary: Summary) -> None:
         show(
             f"telemetry: {counts['packets']} packets, {counts['overwritten']} overwritten, {counts['configurations']} configurations, "
             f"{counts['datagrams']} datagrams sent, {counts['failures']} were returned or not accepted"
+        )
+    if summary.commands:
+        counts = summary.commands
+        show(
+            f"commands: in {counts['commands']} ticks; none in {counts['ticks_without']}, at most "
+            f"{counts['longest_without']} in a row"
         )
     if summary.observers:
         show(f"observers: {summary.observers['ticks']} ticks, {summary.observers['dropped']} dropped")

@@ -29,6 +29,8 @@ from .models import ModelTable, Scalar, parse_description
 
 _SENT = ("packets", "configurations", "datagrams", "failures", "overwritten")
 _OBSERVED = ("ticks", "dropped")
+_COMMANDS = ("commands", "ticks_without", "longest_without")
+_LOG_BYTES = 512
 
 
 class _Counters(ctypes.Structure):
@@ -41,6 +43,12 @@ class _Observed(ctypes.Structure):
     """fcsl_observers_counters_t"""
 
     _fields_ = [(name, c_uint64) for name in _OBSERVED]
+
+
+class _Commands(ctypes.Structure):
+    """fcsl_external_counters_t"""
+
+    _fields_ = [(name, c_uint64) for name in _COMMANDS]
 
 
 _ERROR = POINTER(CError)
@@ -60,6 +68,8 @@ _PROTOTYPES: dict[str, tuple[type | None, list[type]]] = {
     "fcsl_sim_machine_data": (ptr, [ptr]),
     "fcsl_sim_listen": (c_int, [ptr, c_char_p, c_char_p, c_uint32, _ERROR]),
     "fcsl_sim_accept": (c_int, [ptr, c_uint32, _ERROR]),
+    "fcsl_sim_read_log": (c_int, [ptr, c_char_p]),
+    "fcsl_sim_count_commands": (None, [ptr, POINTER(_Commands)]),
     "fcsl_sim_run_together": (c_int64, [POINTER(ptr), c_uint32, c_uint64, c_uint32, POINTER(c_uint32), _ERROR]),
     "fcsl_sim_alive": (None, [ptr]),
     "fcsl_sim_end": (None, [ptr, c_int]),
@@ -248,7 +258,8 @@ class Simulation:
 
     def listen(self, peer: str, timeout_ms: int, name_space: str = "") -> None:
         """A controller can connect from now on: to `wire:SPEC` or `zenoh:tcp/HOST:PORT`, as `fcsl-fc --hal` takes it.
-        name_space: in front of the keys of the bus, with or without surrounding slashes."""
+        name_space: in front of the keys of the bus, with or without surrounding slashes. With `,free-running` behind an
+        address of the bus nobody waits: set a speed."""
         within = name_space.strip("/").encode()
         status = self._lib.fcsl_sim_listen(self.handle(), peer.encode(), within, timeout_ms, byref(self._error))
         self._check(status)
@@ -261,6 +272,20 @@ class Simulation:
     def problem(self) -> str:
         """Why the last call failed, or found nobody."""
         return _text(self._error)
+
+    def log(self) -> list[str]:
+        """With a free-running controller: that it came or went, since the last call."""
+        text = ctypes.create_string_buffer(_LOG_BYTES)
+        lines = []
+        while self._lib.fcsl_sim_read_log(self.handle(), text):
+            lines.append(text.value.decode(errors="replace"))
+        return lines
+
+    def commands(self) -> dict[str, int]:
+        """With a free-running controller: ticks in which a command came, and in which none did; of these the most in a row."""
+        counters = _Commands()
+        self._lib.fcsl_sim_count_commands(self.handle(), byref(counters))
+        return {name: int(getattr(counters, name)) for name in _COMMANDS}
 
     def alive(self) -> None:
         """While no tick is run, called often: the controller waits on."""

@@ -20,6 +20,8 @@ from .native import Simulation
 #: `tick`.
 _CHUNK_TICKS = 1000
 _PROGRESS_PERIOD_S = 2.0
+#: Behind an address on the bus: neither side waits for the other.
+FREE_RUNNING = ",free-running"
 #: Default timeout for an external controller.
 TIMEOUT_MS = 30_000
 
@@ -54,6 +56,7 @@ class Summary:
     bag: str | None
     telemetry: dict[str, int] | None
     observers: dict[str, int] | None
+    commands: dict[str, int] | None
 
     def as_json(self) -> dict[str, Any]:
         return asdict(self)
@@ -110,14 +113,17 @@ def run(
     watcher: Watcher | None = None,
 ) -> Summary:
     """Runs to the end. bag: records controller and truth into this new directory. external: the controller is another
-    process (`wire:SPEC` or `zenoh:tcp/HOST:PORT`), which records itself and answers within `timeout_ms`. name_space: of
-    the bag's topics, and of the keys on the bus. speed: limit on simulated seconds per second; 0: as fast as possible.
+    process (`wire:SPEC` or `zenoh:tcp/HOST:PORT`), which records itself and answers within `timeout_ms`; with
+    `,free-running` behind the address nobody waits, and a speed is needed. name_space: of the bag's topics, and of the keys on the bus. speed: limit on simulated seconds per second; 0: as fast as possible.
     observers: the machine's channels are put on a bus that listens at this `tcp/HOST:PORT`. Raises SimError; the bag then has the ticks recorded until then, and is removed if there are none.
     """
     if bag is not None and external is not None:
         raise SimError("with an external controller the controller records: give `--record` to it")
     if bag is not None and bag.exists():
         raise SimError(f"{bag}: exists already; a bag is written into a new directory")
+    free = external is not None and external.endswith(FREE_RUNNING)
+    if free and not speed:
+        raise SimError("a free-running simulation keeps to the clock: give it a speed, as with `--speed 1`")
     watcher = watcher or Watcher()
     with Simulation(config.plan, config.tables) as sim:
         sim.set_speed(speed)
@@ -149,7 +155,7 @@ def run(
             with suppress(SimError):  # a failed recording raises here, too
                 sim.close()
             raise SimError(f"{error}{_left(bag, sim.machine.name)}") from None
-        return _summary(sim, config, flight, bag, sent, observed)
+        return _summary(sim, config, flight, bag, sent, observed, sim.commands() if free else None)
 
 
 def _left(bag: Path, machine: str) -> str:
@@ -185,6 +191,8 @@ def _fly(sim: Simulation, *, hosted: bool, watcher: Watcher) -> _Flight:
             changes.append(StateChange(tick, sim.machine.time_ns(tick) / 1e9, state, sim.state))
             state = sim.state
             watcher.changed(changes[-1])
+        for line in sim.log():
+            print(f"fcsl-sim: {line}", file=sys.stderr, flush=True)
         now = time.perf_counter()
         if done and now - told > _PROGRESS_PERIOD_S:
             told = now
@@ -200,6 +208,7 @@ def _summary(
     bag: Path | None,
     sent: dict[str, int] | None,
     observed: dict[str, int] | None,
+    commands: dict[str, int] | None,
 ) -> Summary:
     time_s = sim.machine.time_ns(sim.tick) / 1e9
     return Summary(
@@ -221,4 +230,5 @@ def _summary(
         bag=str(bag) if bag else None,
         telemetry=sent,
         observers=observed,
+        commands=commands,
     )

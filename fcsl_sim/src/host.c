@@ -59,13 +59,39 @@ static int ask_external(fcsl_sim_t *sim, fcsl_message_t *message, fcsl_error_t *
     return 0;
 }
 
+/* The controller runs free, too: its newest message counts, and without one the actuators hold. */
+static int exchange_newest(fcsl_sim_t *sim, const fcsl_message_t *sensors, fcsl_error_t *error)
+{
+    fcsl_message_t command = {0};
+    const fcsl_hal_status_t status = fcsl_external_send(sim->external, sensors, (uint64_t)sim->time_ns);
+    if (status != FCSL_HAL_OK) {
+        return fcsl_sim_external_failed(sim, status, "cannot send the sensor message", error);
+    }
+    if (fcsl_external_take(sim->external, sim->tick, &command) == FCSL_HAL_OK) {
+        return fcsl_sim_actuate_message(sim, &command, error);
+    }
+    fcsl_sim_hold(sim);
+    return 0;
+}
+
+/* Exchanges messages with the controller, and completes the tick. */
+static int exchange(fcsl_sim_t *sim, fcsl_message_t *message, fcsl_error_t *error)
+{
+    if (sim->external && fcsl_external_runs_free(sim->external)) {
+        return exchange_newest(sim, message, error);
+    }
+    if (sim->external ? ask_external(sim, message, error) : ask_machine(sim, message, error)) {
+        return -1;
+    }
+    return fcsl_sim_actuate_message(sim, message, error);
+}
+
 int fcsl_sim_tick_once(fcsl_sim_t *sim, fcsl_error_t *error)
 {
     const uint64_t begun_ns = fcsl_sim_tick_begins(sim);
     fcsl_message_t message;
     if (fcsl_sim_sense_message(sim, sim->message_bytes, sim->message_capacity, &message, error) ||
-        (sim->external ? ask_external(sim, &message, error) : ask_machine(sim, &message, error)) ||
-        fcsl_sim_actuate_message(sim, &message, error)) {
+        exchange(sim, &message, error)) {
         return -1;
     }
     if (sim->recording && sim->actuators && record_truth(sim, &sim->actuators->as_instance, error)) {
@@ -184,6 +210,9 @@ int fcsl_sim_accept(fcsl_sim_t *sim, uint32_t wait_ms, fcsl_error_t *error)
     if (!sim->external || sim->tick) {
         return fcsl_sim_fail(error, "nothing listens for a controller, or it has connected already");
     }
+    if (fcsl_external_runs_free(sim->external)) {
+        return 0;
+    }
     const fcsl_hal_status_t status = fcsl_external_accept(sim->external, wait_ms);
     if (status == FCSL_HAL_OK) {
         return 0;
@@ -193,6 +222,16 @@ int fcsl_sim_accept(fcsl_sim_t *sim, uint32_t wait_ms, fcsl_error_t *error)
     }
     (void)fcsl_sim_fail(error, "no controller: %s", fcsl_external_explain(sim->external));
     return status == FCSL_HAL_TIMEOUT ? 1 : -1;
+}
+
+int fcsl_sim_read_log(fcsl_sim_t *sim, char text[FCSL_LOG_BYTES])
+{
+    return sim->external && fcsl_external_read_log(sim->external, text);
+}
+
+void fcsl_sim_count_commands(const fcsl_sim_t *sim, fcsl_external_counters_t *counters)
+{
+    *counters = sim->external ? fcsl_external_counters(sim->external) : (fcsl_external_counters_t){0};
 }
 
 int fcsl_sim_close(fcsl_sim_t *sim, fcsl_error_t *error)

@@ -241,6 +241,29 @@ int fcsl_sim_actuate(fcsl_sim_t *sim, const uint8_t *bytes, size_t size, fcsl_er
     return fcsl_sim_actuate_message(sim, &message, error);
 }
 
+/* The tick is over: the actuators hold from its time on. */
+static void complete_tick(fcsl_sim_t *sim)
+{
+    fcsl_actuators_update(sim);
+    sim->sensed = 0;
+    sim->tick++;
+    if (sim->plan.until != FCSL_UNTIL_NONE) {
+        sim->until_held = until_holds(sim) ? sim->until_held + 1 : 0;
+        if (sim->until_held >= sim->plan.until_ticks) {
+            sim->status = FCSL_SIM_UNTIL;
+        }
+    }
+    if (sim->status == FCSL_SIM_RUNNING && sim->tick >= sim->plan.ticks) {
+        sim->status = FCSL_SIM_DURATION;
+    }
+}
+
+void fcsl_sim_hold(fcsl_sim_t *sim)
+{
+    fcsl_gate_wait(&sim->gate, (uint64_t)sim->time_ns, sim->image);
+    complete_tick(sim);
+}
+
 int fcsl_sim_actuate_message(fcsl_sim_t *sim, const fcsl_message_t *message, fcsl_error_t *error)
 {
     if (!sim->sensed) {
@@ -259,18 +282,7 @@ int fcsl_sim_actuate_message(fcsl_sim_t *sim, const fcsl_message_t *message, fcs
     if (!sim->link) {
         fcsl_sim_take_command(sim, message);
     }
-    fcsl_actuators_update(sim);
-    sim->sensed = 0;
-    sim->tick++;
-    if (sim->plan.until != FCSL_UNTIL_NONE) {
-        sim->until_held = until_holds(sim) ? sim->until_held + 1 : 0;
-        if (sim->until_held >= sim->plan.until_ticks) {
-            sim->status = FCSL_SIM_UNTIL;
-        }
-    }
-    if (sim->status == FCSL_SIM_RUNNING && sim->tick >= sim->plan.ticks) {
-        sim->status = FCSL_SIM_DURATION;
-    }
+    complete_tick(sim);
     return 0;
 }
 

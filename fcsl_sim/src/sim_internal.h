@@ -123,6 +123,8 @@ struct fcsl_sim {
 int fcsl_sim_sense_message(fcsl_sim_t *sim, uint8_t *bytes, size_t capacity, fcsl_message_t *message,
                            fcsl_error_t *error);
 int fcsl_sim_actuate_message(fcsl_sim_t *sim, const fcsl_message_t *message, fcsl_error_t *error);
+/* Completes a sensed tick without an actuator message: the actuators hold what they have, until the gate's time-out. */
+void fcsl_sim_hold(fcsl_sim_t *sim);
 /* host.c: one tick, with the hosted or the connected controller. */
 int fcsl_sim_tick_once(fcsl_sim_t *sim, fcsl_error_t *error);
 

@@ -9,8 +9,8 @@
 static int ask(fcsl_sim_t *sim, fcsl_error_t *error)
 {
     fcsl_message_t sensors;
-    if (!sim->external) {
-        return fcsl_sim_fail(error, "only simulations with an external controller run together");
+    if (!sim->external || fcsl_external_runs_free(sim->external)) {
+        return fcsl_sim_fail(error, "only simulations in lock-step with an external controller run together");
     }
     if (fcsl_sim_sense_message(sim, sim->message_bytes, sim->message_capacity, &sensors, error)) {
         return -1;

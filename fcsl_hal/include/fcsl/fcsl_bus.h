@@ -52,6 +52,8 @@ typedef struct {
     const char
         *config_path; /* instead of an endpoint: a Zenoh configuration file, and nothing but what it says; or null */
     uint32_t timeout_ms;     /* how long fcsl_bus_open tries to connect; 0: once */
+    int connects_later; /* of those that connect: fcsl_bus_open does not wait, and the session connects when somebody listens. All
+                           that stands here must outlive it */
     int observer; /* messages of this session give way to all others, and are dropped where a receiver is slow */
     uint32_t ring_bytes; /* for what is posted and not yet put; a message may take half of it */
     const char *const *outputs;

@@ -44,6 +44,23 @@ fcsl_hal_status_t fcsl_external_receive(fcsl_external_t *external, uint64_t tick
 fcsl_hal_status_t fcsl_external_await(fcsl_external_t *external, uint64_t tick, uint32_t timeout_ms,
                                       fcsl_message_t *message);
 
+/* Free-running, on the bus with an address that says so: nobody waits. `fcsl_external_accept` is not called, `fcsl_external_send` fails
+ * for no peer, and this takes the actuator message of the newest values, if a controller committed some since the last call: OK or
+ * NONE. Its bytes stay until the next call, and its tick is `tick`. */
+fcsl_hal_status_t fcsl_external_take(fcsl_external_t *external, uint64_t tick, fcsl_message_t *message);
+int fcsl_external_runs_free(const fcsl_external_t *external);
+
+typedef struct {
+    uint64_t commands; /* calls of fcsl_external_take that took one */
+    uint64_t ticks_without; /* that did not */
+    uint64_t longest_without; /* of those, the most in a row */
+} fcsl_external_counters_t;
+
+fcsl_external_counters_t fcsl_external_counters(const fcsl_external_t *external);
+
+/* The oldest line about a controller that came, went or does not fit: 1, or 0 where there is none. */
+int fcsl_external_read_log(fcsl_external_t *external, char text[FCSL_LOG_BYTES]);
+
 /* The simulator makes no ticks for a while, and calls this often: the controller waits on. */
 void fcsl_external_alive(fcsl_external_t *external);
 

@@ -85,11 +85,14 @@ int fcsl_hal_stub(fcsl_hal_t *hal, char *error, size_t error_size);
 int fcsl_hal_wire(const char *spec, const fcsl_machine_t *machine, uint32_t timeout_ms, fcsl_hal_t *hal, char *error,
                   size_t error_size);
 /* The same over the bus, where each channel has a key (docs/bus.md). `address`: zenoh:tcp/HOST:PORT, where a simulator listens,
- * or zenoh-peer:tcp/HOST:PORT. `name_space`: in front of the keys, or "". `open_ms`: how long to look for the simulator. */
+ * or zenoh-peer:tcp/HOST:PORT. With ,free-running behind it `open` waits for nobody, the monotonic clock paces the run, and sample
+ * takes the newest values that anybody put; that a simulator comes or goes is logged. `name_space`: in front of the keys, or "". `open_ms`: how long to look for the simulator. */
 int fcsl_hal_bus(const char *address, const char *name_space, const fcsl_machine_t *machine, uint32_t open_ms,
                  uint32_t timeout_ms, fcsl_hal_t *hal, char *error, size_t error_size);
 /* 0 when `address` has that form, or -1 with `error` filled. */
 int fcsl_hal_bus_check(const char *address, char *error, size_t error_size);
+/* Whether it says ,free-running. */
+int fcsl_hal_bus_runs_free(const char *address);
 /* The same over a wire of your own, which the HAL owns once this has returned 0. */
 int fcsl_hal_over_wire(const fcsl_wire_t *wire, const fcsl_machine_t *machine, uint32_t timeout_ms, fcsl_hal_t *hal,
                        char *error, size_t error_size);

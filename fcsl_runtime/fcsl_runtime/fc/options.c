@@ -28,6 +28,7 @@ static const char USAGE[] =
     "                          " FCSL_WIRE_SPECS "\n"
     "                          zenoh:tcp/HOST:PORT (or zenoh-peer:): a simulator on the bus, each channel under its "
     "key\n"
+    "                          the same with ,free-running behind it: whatever puts values there; waits for nobody\n"
     "  --timeout-ms N          how long to wait for the simulator's next message (default 2000)\n"
     "  --board LIBRARY.so      the board that hw_* of algorithms reach (fcsl/fcsl_hw.h); default: simulated hardware\n"
     "  --guard PATH            the actuators belong to the fcsl-guard that listens on PATH (docs/guard.md)\n"
@@ -221,6 +222,9 @@ static int check(const options_t *options)
     if (options->timeout_ms != 0 && options->peer == NULL) {
         return usage_error("--timeout-ms needs --hal wire:SPEC or zenoh:…: it is how long to wait for the simulator",
                            "");
+    }
+    if (options->timeout_ms != 0 && fcsl_hal_bus_runs_free(options->peer)) {
+        return usage_error("--timeout-ms does not go with ,free-running: nobody waits for the simulator", "");
     }
     if (options->name_space[0] != '\0' && options->record == NULL && options->observers == NULL &&
         (options->peer == NULL || strncmp(options->peer, OPTIONS_WIRE, strlen(OPTIONS_WIRE)) == 0)) {

@@ -368,6 +368,11 @@ def test_socket_is_private_and_not_taken_away(path: Path) -> None:
         ([FIXTURE, "--timeout-ms", "-1"], 2, "--timeout-ms"),
         ([FIXTURE, "--timeout-ms", "50"], 2, "--timeout-ms needs --hal wire"),
         ([FIXTURE, "--timeout-ms", "2000"], 2, "--timeout-ms needs --hal wire"),
+        (
+            [FIXTURE, "--timeout-ms", "9", "--hal", "zenoh:tcp/127.0.0.1:1,free-running"],
+            2,
+            "nobody waits for the simulator",
+        ),
         ([FIXTURE, "--paused"], 2, "--socket"),
         ([FIXTURE, "--token", "t"], 2, "--token needs --socket"),
         ([FIXTURE, "--namespace", "n"], 2, "--namespace needs --record"),

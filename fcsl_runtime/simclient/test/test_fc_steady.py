@@ -9,10 +9,12 @@ import json
 import os
 import platform
 import re
+import signal
 import socket
 import subprocess
+import sys
 import threading
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager
 from pathlib import Path
 
@@ -31,6 +33,18 @@ from simclient.link.message import table_hash
 pytestmark = pytest.mark.skipif(platform.system() != "Linux", reason="seccomp is Linux's")
 
 TICKS = 1500
+#: Puts values under the key of a sensor, and hears its commands.
+SOURCE = """
+import struct, sys, time, zenoh
+config = zenoh.Config.from_json5('{mode: "peer", scouting: {multicast: {enabled: false}}}')
+config.insert_json5("listen/endpoints", f'["{sys.argv[1]}"]')
+with zenoh.open(config) as bus:
+    heard = bus.declare_subscriber("flown_0/tick", lambda sample: print("heard", flush=True))
+    print("listening", flush=True)
+    while True:
+        bus.put("flown_0/sample", struct.pack("<3d", 0.0, 0.1, 0.2))
+        time.sleep(0.0005)
+"""
 CANNOT, FORBIDDEN = 77, 90
 #: What an extern does in every tick, by number; 0 is nothing.
 MISDEEDS = {"sleeps a little": 1, "allocates": 2, "writes to a stream": 3, "asks who it is": 4}
@@ -72,6 +86,7 @@ def misbehave(kind: i64) -> i64: ...
 class Misbehave:
     """Does in every tick what no step may."""
 
+    inputs = {"sample": "f64[3]"}
     outputs = {"result": "i64"}
     parameters = {"kind": "i64"}
     state = {"ticks": "u64"}
@@ -95,9 +110,15 @@ def folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
     return folder
 
 
-def machine(folder: Path, kind: int) -> str:
+CHANNELS = [
+    {"name": "sample", "id": 1, "field": "agent.inputs.sample", "direction": "sensor", "max_age_ticks": 5},
+    {"name": "result", "id": 2, "field": "agent.outputs.result", "direction": "actuator"},
+]
+
+
+def machine(folder: Path, kind: int, name: str = "misdeed", channels: Sequence[dict[str, object]] = ()) -> str:
     """A machine at 1 kHz."""
-    config = folder / f"misdeed_{kind}.json"
+    config = folder / f"{name}_{kind}.json"
     config.write_text(
         json.dumps(
             {
@@ -108,6 +129,7 @@ def machine(folder: Path, kind: int) -> str:
                 "connections": [],
                 "states": {"RUN": {"schedule": {"agent": 1000}}},
                 "transitions": [],
+                "channels": channels,
                 "targets": {"simulation": {"sources": ["misbehave.c"], "include": ["."]}},
             }
         )
@@ -250,6 +272,20 @@ def beside_a_rig(folder: Path, library: str, hello: bytes, path: Path) -> Watche
 def test_beside_a_rig_that_says_nothing(folder: Path, tmp_path: Path) -> None:
     hello = control(HELLO, table_hash(TABLE), TICK_HZ)
     assert beside_a_rig(folder, FIXTURE, hello, tmp_path / "w").allocations() == 0
+
+
+def test_free_running(folder: Path, tmp_path: Path) -> None:
+    """It may not even wait for a peer. Values come at about its own rate, and their source, which reads its commands, freezes."""
+    endpoint = free_endpoint()
+    with subprocess.Popen([sys.executable, "-c", SOURCE, endpoint], stdout=subprocess.PIPE, text=True) as source:
+        assert source.stdout and source.stdout.readline() == "listening\n"
+        options = ("--hal", f"zenoh:{endpoint},free-running", "--record", str(tmp_path / "bag"))
+        fc = Watched(folder, machine(folder, 0, "flown", CHANNELS), *options)
+        for _ in range(TICKS // 3):
+            assert source.stdout.readline() == "heard\n"
+        source.send_signal(signal.SIGSTOP)
+        assert fc.allocations() == 0
+        source.kill()
 
 
 # ---- controls

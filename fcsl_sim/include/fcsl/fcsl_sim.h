@@ -12,6 +12,7 @@
 #ifndef FCSL_SIM_H
 #define FCSL_SIM_H
 
+#include "fcsl/fcsl_external.h"
 #include "fcsl/fcsl_model.h"
 #include "fcsl/fcsl_outbox.h"
 #include "fcsl/fcsl_ros.h"
@@ -66,12 +67,17 @@ const void *fcsl_sim_machine_data(const fcsl_sim_t *sim);
 /* ---- external controller ------------------------------------------------------------------------------------------- */
 
 /* `peer`: wire:SPEC (fcsl_wire.h) or zenoh:tcp/HOST:PORT (fcsl_hal.h), as the --hal of fcsl-fc, which can connect from now on;
- * `name_space` stands in front of the keys of the bus. */
+ * `name_space` stands in front of the keys of the bus. With ,free-running behind an address of the bus nobody waits: give a speed,
+ * and fcsl_sim_run puts the sensors of each tick and takes the newest command, or holds the one before. */
 int fcsl_sim_listen(fcsl_sim_t *sim, const char *peer, const char *name_space, uint32_t timeout_ms,
                     fcsl_error_t *error);
 /* Waits up to wait_ms for the connection: 0, or 1 when nobody has come. Then fcsl_sim_run steps in lock-step with the controller. A
  * missing answer after timeout_ms is an error that names its tick. */
 int fcsl_sim_accept(fcsl_sim_t *sim, uint32_t wait_ms, fcsl_error_t *error);
+
+/* Free-running: the oldest line about a controller that came or went, 1; or 0 where there is none. And what came of it. */
+int fcsl_sim_read_log(fcsl_sim_t *sim, char text[FCSL_LOG_BYTES]);
+void fcsl_sim_count_commands(const fcsl_sim_t *sim, fcsl_external_counters_t *counters);
 
 /* Steps several simulations, each with an external controller, together: tick k of all that run, then tick k + 1. Ends after
  * `ticks` ticks, after about slice_ms, or when all are over; a tick may then be under way, and goes on with the next call. The

@@ -1,0 +1,90 @@
+/* SPDX-License-Identifier: Apache-2.0
+ *
+ * Who is at the other end of a free-running one.
+ */
+#define _GNU_SOURCE
+#include "presence.h"
+
+#include <stdio.h>
+#include <string.h>
+
+#include "monotonic.h"
+
+presence_t presence_of(fcsl_wire_side_t peer, const fcsl_channel_table_t *table, fcsl_log_t *log)
+{
+    const int is_simulator = peer == FCSL_WIRE_LISTEN;
+    return (presence_t){.peer = is_simulator ? "the simulator" : "the controller",
+                        .table = table,
+                        .log = log,
+                        .sends = is_simulator,
+                        .expects = !is_simulator};
+}
+
+void presence_tell(presence_t *presence, const fcsl_wire_t *wire)
+{
+    const uint64_t now_ns = monotonic_ns();
+    if (now_ns >= presence->hello_ns) {
+        presence->hello_ns = now_ns + CONTROL_ALIVE_NS;
+        (void)control_send_hello(wire, presence->table, presence->sends); /* the next one comes soon */
+    }
+}
+
+static void say(presence_t *presence, const char *what)
+{
+    char text[FCSL_LOG_BYTES];
+    (void)snprintf(text, sizeof text, "%s %s", presence->peer, what);
+    fcsl_log_write(presence->log, text);
+}
+
+static void leave(presence_t *presence, const char *what)
+{
+    if (presence->there) {
+        presence->there = 0;
+        say(presence, what);
+    }
+    presence->misfit[0] = '\0';
+}
+
+static void come(presence_t *presence)
+{
+    if (!presence->there) {
+        say(presence, presence->returns ? "is back" : "is there");
+        presence->there = 1;
+        presence->returns = 1;
+    }
+}
+
+/* Says it once of a peer that says hello again and again. */
+static void refuse(presence_t *presence, const char *why)
+{
+    char what[PRESENCE_TEXT_BYTES];
+    (void)snprintf(what, sizeof what, "that is there does not fit: %s", why);
+    if (strcmp(what, presence->misfit) != 0) {
+        memcpy(presence->misfit, what, sizeof what);
+        say(presence, what);
+    }
+}
+
+int presence_hear(presence_t *presence, const uint8_t *bytes, size_t size)
+{
+    control_packet_t packet;
+    char why[CONTROL_TEXT_MAX + 1];
+    if (control_parse(bytes, size, &packet) != 0) {
+        return 0;
+    }
+    if (packet.kind == CONTROL_END) {
+        leave(presence, "ended its run");
+    } else if (packet.kind == CONTROL_HELLO && packet.flag != presence->expects) {
+        refuse(presence, "it flies in lock-step; write ,free-running behind its address, too");
+    } else if (packet.kind == CONTROL_HELLO && control_differs(&packet, presence->table, why, sizeof why)) {
+        refuse(presence, why);
+    } else if (packet.kind == CONTROL_HELLO) {
+        come(presence);
+    }
+    return 1;
+}
+
+void presence_gone(presence_t *presence)
+{
+    leave(presence, "is gone");
+}
