@@ -118,8 +118,8 @@ def test_two_simulations_at_one_address(tmp_path: Path) -> None:
             peer = ["--external", f"{how}:{endpoint}", "--namespace", name]
             sims.append(begin("fcsl-sim", "run", SIM, *peer, "--speed", str(speed), "--json"))
         for name in names:
-            where = ["--hal", f"zenoh:{endpoint}", "--namespace", name, "--record", tmp_path / name]
-            controllers.append(begin("fcsl-fc", tmp_path / "liblander_control.so", *where))
+            where = ["--hal", f"zenoh:{endpoint}", "--timeout-ms", "30000", "--namespace", name]
+            controllers.append(begin("fcsl-fc", tmp_path / "liblander_control.so", *where, "--record", tmp_path / name))
         for process in (*controllers, *sims):
             _, complaint = process.communicate(timeout=LONG_S)
             assert process.returncode == 0, complaint

@@ -78,7 +78,7 @@ def _write_kinds(bag: Bag, topic: str) -> dict[int, str]:
 
 def describe(bag: Bag, machine: str = "") -> str:
     """The text. `machine` selects one of several machines. Raises BagError."""
-    machines = [bag.machine(machine)] if machine else bag.machines()
+    machines = [bag.machine(machine, True)] if machine else bag.machines(by_bystanders=True)
     found = _scan(bag, machines)
     spans = [span for span in found.spans.values() if span.count]
     lines = _head(bag, spans)
@@ -138,7 +138,12 @@ def _machine(bag: Bag, machine: RecordedMachine, found: Contents) -> list[str]:
         ]
     writes = found.writes.get(machine.writes, Counter())
     lines.append("writes     " + (", ".join(f"{count} {kind}" for kind, count in sorted(writes.items())) or "none"))
-    return lines + _states(bag, machine)
+    return lines + (_lacks(bag, machine) if machine.by_bystander else _states(bag, machine))
+
+
+def _lacks(bag: Bag, machine: RecordedMachine) -> list[str]:
+    texts = bag.messages({machine.lacks}) if machine.lacks in bag.topics else ()
+    return [f"lacks      {bag.decode_own(machine.lacks, data, ('data',)).data}" for _, _, data in texts]
 
 
 def _states(bag: Bag, machine: RecordedMachine) -> list[str]:

@@ -10,6 +10,7 @@ import sys
 import time
 from collections import Counter
 from collections.abc import Callable, Iterator, Sequence
+from functools import partial
 from itertools import count, islice
 from pathlib import Path
 from typing import Any
@@ -61,7 +62,11 @@ def _parser() -> argparse.ArgumentParser:
     command.add_argument("channel", metavar="CHANNEL")
     command.add_argument("value", metavar="VALUE", help="such as 0.5, true, '[0, 0, 9.81]'; of a blob hex digits")
     command.add_argument("--descriptor", type=Path, metavar="FILE", help="`list --json` of a bus that serves it")
-    command = add("record", _record, "records all values into a bag, until Ctrl-C or the end of the flight")
+    command = add(
+        "record",
+        _record,
+        "records all values, and what replays the run, into a bag, until Ctrl-C or the end of the flight",
+    )
     command.add_argument("-o", "--output", required=True, type=Path, metavar="DIR", help="new directory for the bag")
     return parser
 
@@ -204,15 +209,16 @@ def _record(options: argparse.Namespace) -> None:
 
     with Session(options.connect) as session:
         machines = session.machines()
-        with recording(options.output, machines) as bag:
-            feed = Feed(session, machines)
+        with recording(options.output, machines, session, partial(print, flush=True)) as bag:
+            feed = Feed(session, machines, writes=True)
             for number in (signal.SIGINT, signal.SIGTERM):  # an exception could leave half a message in the bag
                 signal.signal(number, lambda *_: session.stop())
             print(f"recording {', '.join(m.prefix for m in machines)} to {options.output}", flush=True)
-            for found in feed.ticks():
-                if found is not None:
-                    bag.write(*found)
+            for found in feed.events():
+                bag.take(found)
         print(f"{options.output}: {bag.messages} messages")
+        for prefix, verdict in bag.verdicts.items():
+            print(f"{prefix}: {verdict}")
         _tell_lost(feed)
 
 

@@ -86,9 +86,9 @@ class TickReader:
         state = self._directions[_DIRECTIONS[direction]]
         last, waiting = state.last, state.waiting
         state.last, state.waiting = tick, {}
-        if last is None:  # what came before it may be a part
+        if last is None and tick > 0:  # what came before it may be a part
             return None
-        if tick != last + 1:
+        if last is not None and tick != last + 1:
             state.lost += max(1, tick - last)
             return None
         return Tick(tick, self._values(bits, waiting))

@@ -37,6 +37,13 @@ def _open(config: str, library: str, machine: str | None) -> Run:
     return open_run(Path(library).absolute(), machine)
 
 
+def _check_whole(bag: Bag, recorded: RecordedMachine) -> None:
+    """Raises BagError where a bystander has said that the bag does not reproduce the run."""
+    for _, _, data in bag.messages({recorded.lacks}) if recorded.lacks in bag.topics else ():
+        lacks = bag.decode_own(recorded.lacks, data, ("data",)).data
+        raise BagError(f"{bag.path}: it does not reproduce the run of `{recorded.name}`: {lacks}")
+
+
 def _first_checkpoint(bag: Bag, recorded: RecordedMachine) -> Any:
     """The checkpoint at the start of the record. Raises BagError."""
     data = next((data for _, _, data in bag.messages({recorded.checkpoint})), None)
@@ -129,7 +136,8 @@ def replay(
     differing parameters.
     """
     opened = bag if isinstance(bag, Bag) else Bag(bag)
-    recorded = opened.machine(machine)
+    recorded = opened.machine(machine, by_bystanders=True)
+    _check_whole(opened, recorded)
     checkpoint = _first_checkpoint(opened, recorded)
     whole = _open(config, library, recorded.name)
     run = _recorded_part(whole, recorded, checkpoint.layout_hash, config)
@@ -138,7 +146,8 @@ def replay(
         if run is not whole:
             names = ", ".join(instance.name for instance in run.machine.instances)
             notes.append(f"the bag records a part of `{run.machine.name}`, so only that part ran: {names}")
-        expected = opened.topics[recorded.state].count if recorded.state in opened.topics else 0
+        counted = opened.topics.get(recorded.writes if recorded.by_bystander else recorded.state)
+        expected = counted.count if counted else 0
         verdict = Replay(opened, recorded, run).run(Progress("replaying", expected).at)
         verdict.notes += notes
         return verdict
