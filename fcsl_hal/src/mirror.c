@@ -140,10 +140,10 @@ int fcsl_mirror_post_write(fcsl_mirror_t *mirror, const void *bytes, size_t size
     return post_from_writes_room(mirror, WRITES, bytes, size);
 }
 
-int fcsl_mirror_post_written(fcsl_mirror_t *mirror, uint64_t tick, uint64_t number)
+int fcsl_mirror_post_written(fcsl_mirror_t *mirror, uint64_t ticks, uint64_t number)
 {
     uint8_t bytes[WRITTEN_BYTES];
-    fcsl_put_u64(bytes, tick);
+    fcsl_put_u64(bytes, ticks);
     fcsl_put_u64(bytes + 8, number);
     return post_from_writes_room(mirror, WRITTEN, bytes, sizeof bytes);
 }

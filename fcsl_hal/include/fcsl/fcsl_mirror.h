@@ -45,8 +45,8 @@ int fcsl_mirror_writes_watched(const fcsl_mirror_t *mirror);
 /* Posts a host write under @writes. Returns 0, or -1: there is no room. */
 int fcsl_mirror_post_write(fcsl_mirror_t *mirror, const void *bytes, size_t size);
 
-/* Posts under @written that all writes that ticks up to this one saw have numbers below `number`. Returns as above. */
-int fcsl_mirror_post_written(fcsl_mirror_t *mirror, uint64_t tick, uint64_t number);
+/* Posts under @written that after so many ticks the next write has this number. Returns as above. */
+int fcsl_mirror_post_written(fcsl_mirror_t *mirror, uint64_t ticks, uint64_t number);
 
 /* Answers queries for @checkpoint with these bytes from now on. Returns 0, or -1. */
 int fcsl_mirror_answer_checkpoint(fcsl_mirror_t *mirror, const void *bytes, size_t size);

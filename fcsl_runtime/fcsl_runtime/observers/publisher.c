@@ -41,6 +41,7 @@ static uint64_t dropped_before(const fcsl_observers_t *o, uint64_t completed)
 static void see(fcsl_observers_t *o, const fcsl_moment_t *moment)
 {
     const uint64_t completed = moment->tick;
+    const int written = fcsl_observers_post_writes(o, moment) == 0;
     fcsl_observers_answer_checkpoint(o, moment);
     if (completed == o->completed || completed == 0) {
         return;
@@ -49,7 +50,7 @@ static void see(fcsl_observers_t *o, const fcsl_moment_t *moment)
     count(&o->dropped, dropped_before(o, completed));
     o->overtaken = 0;
     o->completed = completed;
-    const int posted = fcsl_observers_post_writes(o, tick, moment->next_write) == 0 &&
+    const int posted = written &&
                        fcsl_mirror_post(o->mirror, o->publication, tick, fcsl_tick_time_ns(o->tick_hz, tick)) == 0;
     count(posted ? &o->ticks : &o->dropped, 1);
 }

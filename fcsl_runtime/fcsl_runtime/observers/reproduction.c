@@ -15,21 +15,21 @@ size_t fcsl_observers_write_bytes(const fcsl_journal_t *journal)
     return NUMBER_BYTES + fcsl_journal_capacity(journal);
 }
 
-int fcsl_observers_post_writes(fcsl_observers_t *o, uint64_t tick, uint64_t next_write)
+int fcsl_observers_post_writes(fcsl_observers_t *o, const fcsl_moment_t *moment)
 {
     uint8_t *message = o->message + NUMBER_BYTES;
     const size_t capacity = fcsl_journal_capacity(o->journal);
     uint64_t number = 0;
     size_t size = 0;
     int failed = 0;
-    if (next_write == 0) {
+    if (moment->next_write == 0) {
         return 0;
     }
-    while ((size = fcsl_journal_take(o->journal, next_write, &number, message, capacity)) > 0) {
+    while ((size = fcsl_journal_take(o->journal, moment->next_write, &number, message, capacity)) > 0) {
         fcsl_put_u64(o->message, number);
         failed = fcsl_mirror_post_write(o->mirror, o->message, NUMBER_BYTES + size) != 0 || failed;
     }
-    return fcsl_mirror_post_written(o->mirror, tick, next_write) != 0 || failed ? -1 : 0;
+    return fcsl_mirror_post_written(o->mirror, moment->tick, moment->next_write) != 0 || failed ? -1 : 0;
 }
 
 void fcsl_observers_answer_checkpoint(fcsl_observers_t *o, const fcsl_moment_t *moment)

@@ -10,9 +10,9 @@
 /* Bytes of the longest message, with its number. */
 size_t fcsl_observers_write_bytes(const fcsl_journal_t *journal);
 
-/* Puts the writes with numbers below `next_write`, those that ticks up to `tick` saw, and that there are no others. Nothing for
- * `next_write` 0. Returns 0, or -1: there was no room for all of them. */
-int fcsl_observers_post_writes(fcsl_observers_t *o, uint64_t tick, uint64_t next_write);
+/* Puts the writes before a publication, and that these were all; nothing unless they are followed. Returns 0, or -1: there was
+ * no room for all of them. */
+int fcsl_observers_post_writes(fcsl_observers_t *o, const fcsl_moment_t *moment);
 
 /* Makes the publication the checkpoint, if writes are followed and the one before is older than 20 ms. */
 void fcsl_observers_answer_checkpoint(fcsl_observers_t *o, const fcsl_moment_t *moment);

@@ -21,7 +21,7 @@ class Feed:
         session.subscribe(machines, *((WRITES, WRITTEN) if writes else ()))
 
     def events(self) -> Iterator[tuple[BusMachine, Tick | Write | Written] | None]:
-        """In their order: of a tick the writes that it saw, that these were all, then the values. None where nothing
+        """In their order: of a tick the writes that it saw, how many there were, then the values. None where nothing
         more has come yet. Ends with the session."""
         for message in self._session.messages():
             if message is None:

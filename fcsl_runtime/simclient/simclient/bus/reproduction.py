@@ -82,7 +82,7 @@ class Reproduction:
                 self._expected = self._oldest = event.next_write
             self._expect(event.next_write, event.next_write)
             if self._begun and not self.lacks:
-                self.last = event.tick
+                self.last = event.ticks - 1
 
     def _expect(self, number: int, following: int) -> None:
         if number != self._expected and not self._begun:  # nothing is lost yet: it begins anew behind the gap
@@ -112,7 +112,7 @@ class Reproduction:
             found is not None
             and isinstance(last, Written)
             and last.next_write >= found.next_write
-            and last.tick + 1 >= found.tick
+            and last.ticks >= found.tick
         )
 
     def _begin(self) -> Iterator[Tick | Write | Checkpoint]:
@@ -127,7 +127,7 @@ class Reproduction:
         if not self._begun:
             yield found
             self._begun = True
-        self.first, self.last = found.tick, waiting[-1].tick
+        self.first, self.last = found.tick, waiting[-1].ticks - 1
 
     def _pass_on(self, event: Event | None) -> Iterator[Tick | Write]:
         if isinstance(event, Tick) or (isinstance(event, Write) and self.reproduces):
@@ -137,4 +137,4 @@ class Reproduction:
 def _is_behind(event: Event, checkpoint: Checkpoint) -> bool:
     if isinstance(event, Write):
         return event.number >= checkpoint.next_write
-    return event.tick >= checkpoint.tick
+    return (event.ticks - 1 if isinstance(event, Written) else event.tick) >= checkpoint.tick

@@ -23,9 +23,9 @@ class Write:
 
 @dataclass(frozen=True)
 class Written:
-    """All writes that ticks up to `tick` saw have numbers below `next_write`."""
+    """After `ticks` ticks the next write has the number `next_write`."""
 
-    tick: int
+    ticks: int
     next_write: int
 
 

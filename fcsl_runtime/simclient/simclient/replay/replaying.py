@@ -30,7 +30,8 @@ from .verdict import Verdict
 _MAX_LISTED = 10
 
 
-def _open(config: str, library: str, machine: str | None) -> Run:
+def open_machine(config: str, library: str, machine: str | None) -> Run:
+    """A new run of the machine in `config` (JSON) or `library`. Raises TwinError."""
     if config:
         built, name = build_config(config)
         return open_run(built, name)
@@ -139,7 +140,7 @@ def replay(
     recorded = opened.machine(machine, by_bystanders=True)
     _check_whole(opened, recorded)
     checkpoint = _first_checkpoint(opened, recorded)
-    whole = _open(config, library, recorded.name)
+    whole = open_machine(config, library, recorded.name)
     run = _recorded_part(whole, recorded, checkpoint.layout_hash, config)
     try:
         notes = _check_source(opened, checkpoint, run, ignore_source_hash)
@@ -179,7 +180,7 @@ def replay_foreign(
     opened = with_transforms(opened, entries, parsed.header_time)
     stages = _Stages()
     with complete_or_absent(output) if output is not None else nullcontext() as directory:
-        run = _open(config, library, machine or None)
+        run = open_machine(config, library, machine or None)
         try:
             targets = check(expectations, opened, run.machine)
             record = (directory, name_space) if directory is not None else None
