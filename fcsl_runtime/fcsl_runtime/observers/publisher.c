@@ -50,8 +50,8 @@ static void see(fcsl_observers_t *o, const fcsl_moment_t *moment)
     count(&o->dropped, dropped_before(o, completed));
     o->overtaken = 0;
     o->completed = completed;
-    const int posted = written &&
-                       fcsl_mirror_post(o->mirror, o->publication, tick, fcsl_tick_time_ns(o->tick_hz, tick)) == 0;
+    const int posted =
+        written && fcsl_mirror_post(o->mirror, o->publication, tick, fcsl_tick_time_ns(o->tick_hz, tick)) == 0;
     count(posted ? &o->ticks : &o->dropped, 1);
 }
 
