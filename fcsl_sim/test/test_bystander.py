@@ -87,14 +87,15 @@ def complete(process: subprocess.Popen[str]) -> str:
 
 
 def test_what_a_bystander_recorded_replays_bit_for_bit(flight: Flight, library: Path, tmp_path: Path) -> None:
-    """Recorded while somebody writes a parameter, forces a state and injects a fault, an overrun and a health; with the
-    recorder of the flight program beside it, which says the same."""
+    """Recorded while somebody writes a parameter, forces a state and injects a fault and a health, and
+    restores a checkpoint; with the recorder of the flight program beside it, which says the same."""
     recorder = flight.record(tmp_path / "bag")
     with flight.paused():
         flight.client.set({"coast.parameters.touchdown_speed": 0.75, "filter.inputs.altimeter": 3.0})
         flight.client.set_state("DESCENT")
         flight.client.inject("sensors", "fault")
         flight.client.inject("monitor", "degraded")
+        flight.client.restore(flight.client.save())
     said = complete(recorder)
     complete(flight.fc)
     verdict = said.splitlines()[-1]
@@ -106,7 +107,7 @@ def test_what_a_bystander_recorded_replays_bit_for_bit(flight: Flight, library: 
     assert replay(tmp_path / "own", library=str(library)).identical
     info = run(sys.executable, "-m", "simclient.bag", "info", tmp_path / "bag")
     assert f"replays from the checkpoint before tick {first}" in info and "lacks" not in info.split("machine ")[1]
-    for kind in ("2 SET", "1 SET_STATE", "1 FAULT", "1 HEALTH", " CHANNEL"):
+    for kind in ("2 SET", "1 SET_STATE", "1 FAULT", "1 HEALTH", "1 RESTORE", " CHANNEL"):
         assert kind in info, info
 
 

@@ -73,6 +73,7 @@ void fcsl_observers_stop(fcsl_observers_t *observers)
     if (observers != NULL && observers->started) {
         atomic_store(&observers->stop, 1);
         (void)pthread_join(observers->thread, NULL);
+        fcsl_journal_follow(observers->journal, 0);
         observers->started = 0;
     }
 }

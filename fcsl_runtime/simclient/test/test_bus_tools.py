@@ -313,6 +313,19 @@ def test_values_belong_to_the_commit_behind_them() -> None:
     bus.reader.take("a", b"\1")
     assert bus.commit(2) is None  # another run
     assert bus.reader.lost.refused == 0
+    lost = bus.reader.lost
+    bus.reader.take("a", b"\0")
+    bus.reader.jump()  # a checkpoint of tick 40 was restored
+    bus.reader.take("a", b"\1")
+    assert bus.commit(40) == {"a": b"\1"} and bus.commit(41, bits=0) == {} and bus.reader.lost == lost
+
+
+def test_the_first_tick_of_all_needs_none_before_it() -> None:
+    bus = Bus()
+    bus.reader.take("a", b"\1")
+    assert bus.commit(0) == {"a": b"\1"} and not bus.reader.lost
+    late = Bus()
+    assert late.commit(0) == {} and late.reader.lost.values == 1
 
 
 def test_messages_that_are_none() -> None:

@@ -75,12 +75,16 @@ def _parser() -> argparse.ArgumentParser:
     command.add_argument("-o", "--output", required=True, type=Path, metavar="DIR", help="new directory for the bag")
     command = add("play", _play, "plays a bag's sensors to a flight computer in lock-step, and compares its answers")
     command.add_argument("bag", metavar="BAG", help="of `record`, or of fcsl-fc, fcsl-sim or a twin")
-    command.add_argument("--speed", type=_speed, default=0.0, help="1: real time (default: as fast as it goes)")
-    command.add_argument("--machine", default="", help="the machine, if the bag has several")
+    command.add_argument(
+        "--speed", type=_speed, default=0.0, metavar="FACTOR", help="1: real time (default: as fast as it goes)"
+    )
+    command.add_argument("--machine", default="", metavar="NAME", help="the machine, if the bag has several")
     which = command.add_mutually_exclusive_group()
-    which.add_argument("--config", default="", help="machine JSON, for a bag that a host recorded")
-    which.add_argument("--library", default="", help="machine library, for the same")
-    command.add_argument("--timeout", type=_seconds, default=10.0, help="seconds for each answer (default 10)")
+    which.add_argument("--config", default="", metavar="FILE", help="machine JSON, for a bag that a host recorded")
+    which.add_argument("--library", default="", metavar="FILE", help="machine library, for the same")
+    command.add_argument(
+        "--timeout", type=_seconds, default=10.0, metavar="SECONDS", help="seconds for each answer (default 10)"
+    )
     return parser
 
 

@@ -30,6 +30,8 @@ class Feed:
             prefix, _, name = message.key.rpartition("/")
             reader = self._readers[prefix]
             found = read_writes(name, message.data) or reader.take(name, message.data)
+            if isinstance(found, Write) and found.is_restore:
+                reader.jump()
             if found is not None:
                 yield reader.machine, found
 

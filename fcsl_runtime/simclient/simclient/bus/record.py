@@ -34,6 +34,8 @@ from .ticks import Tick
 from .writes import Checkpoint, Write, tick_of
 
 _NS = 1_000_000_000
+#: Whoever is on the bus may put any tick.
+_TIME_NS_MAX = (1 << 63) - 1
 #: The format version of metadata.yaml that Jazzy writes.
 _FORMAT = 9
 
@@ -57,7 +59,7 @@ class _Part:
         return self._writer.add_connection(topic, kind, msgdef=definition, rihs01=store.hash_rihs01(kind))
 
     def _write(self, connection: Connection, tick: int, message: bytes) -> None:
-        time_ns = tick * _NS // self._machine.tick_hz
+        time_ns = min(tick * _NS // self._machine.tick_hz, _TIME_NS_MAX)
         if not self._is_described:
             self._is_described = True
             self._writer.write(self._record[DESCRIPTOR], time_ns, string_of(self._machine.text))

@@ -7,6 +7,8 @@ import struct
 from dataclasses import dataclass
 
 WRITES, WRITTEN, CHECKPOINT = "@writes", "@written", "@checkpoint"
+#: HostWrite.kind
+_RESTORE = 2
 _NUMBER = struct.Struct("<Q")
 _WRITTEN = struct.Struct("<QQ")
 #: How messages of fcsl_msgs begin: stamp, length and zero of an empty frame, tick.
@@ -19,6 +21,10 @@ class Write:
 
     number: int
     message: bytes
+
+    @property
+    def is_restore(self) -> bool:
+        return self.message[_HEAD.size : _HEAD.size + 1] == bytes((_RESTORE,))
 
 
 @dataclass(frozen=True)
