@@ -4,6 +4,7 @@
 from __future__ import annotations
 
 import json
+import random
 import re
 import select
 import signal
@@ -15,17 +16,19 @@ from typing import Any
 
 import pytest
 from native import PROGRAM, free_endpoint
-from test_bus_tools import LONG_S, TOOL
+from test_bus_tools import LONG_S, TOOL, library  # noqa: F401  a fixture
 
-from simclient import VarClient
+from simclient import AlgTwin, VarClient
 from simclient.bag import Bag
 from simclient.bus.machine import BusMachine
 from simclient.bus.messages import RECORD_TOPICS
 from simclient.bus.reproduction import Reproduction
+from simclient.bus.tape import read_tape
 from simclient.bus.ticks import Tick
 from simclient.bus.writes import Checkpoint, Write, Written, read_checkpoint, read_writes
 from simclient.errors import BagError
 from simclient.replay import replay
+from simclient.run import open_run
 
 MESSAGES = Path(__file__).resolve().parents[3] / "fcsl_msgs/msg"
 MACHINE = BusMachine("m", "m", "", 0, 100, (), "")
@@ -69,8 +72,8 @@ def test_a_machine_that_reads_hardware(tmp_path: Path) -> None:
     (tmp_path / "probe.json").write_text(json.dumps(PROBE))
     built = subprocess.run(["fcslc", "build", tmp_path / "probe.json", "-o", tmp_path], capture_output=True, text=True)
     assert built.returncode == 0, built.stderr
-    library, endpoint, socket = tmp_path / "libprobe.so", free_endpoint(), tmp_path / "socket"
-    line = [PROGRAM, library, "--observers", endpoint, "--namespace", "north", "--socket", socket, "--paused"]
+    probe, endpoint, socket = tmp_path / "libprobe.so", free_endpoint(), tmp_path / "socket"
+    line = [PROGRAM, probe, "--observers", endpoint, "--namespace", "north", "--socket", socket, "--paused"]
     pipe = subprocess.PIPE
     with (
         subprocess.Popen([str(word) for word in line], stdout=pipe, stderr=pipe, text=True) as fc,
@@ -104,7 +107,7 @@ def test_a_machine_that_reads_hardware(tmp_path: Path) -> None:
     assert recorder.returncode == 0, err
     (begin, end) = map(int, re.findall(r"north/probe: reproduces ticks (\d+) to (\d+)", out)[0])
     assert begin == 0 and end == last == 69
-    found = replay(tmp_path / "bag", library=str(library))
+    found = replay(tmp_path / "bag", library=str(probe))
     assert found.identical and found.values == found.ticks == end + 1 - begin, str(found)
     assert any("outputs of `probe` come from the record" in note for note in found.notes)
     whole = tmp_path / "bag"
@@ -218,6 +221,59 @@ def test_messages_that_are_none() -> None:
     assert read_writes("@writes", bytes(35)) is None and read_writes("@written", bytes(15)) is None
     assert read_writes("@writes", bytes(36)) and read_writes("tick", bytes(16)) is None
     assert read_checkpoint(bytes(35)) is None and read_checkpoint(bytes(36)) is not None
+
+
+def test_whatever_comes() -> None:
+    randomly = random.Random(5)
+    for _ in range(200):
+        host = Host()
+        host.answers = [randomly.randbytes(randomly.choice((0, 8, 36, 60))) for _ in range(3)]
+        for _ in range(100):
+            number = randomly.choice((0, 1, 2, 3, 2**63, 2**64 - 1))
+            host.now_s += 0.1
+            host.takes(randomly.choice((None, Write(number, message(1)), Written(number, number), Tick(number, []))))
+        assert host.told.lacks or host.told.reproduces or not host.told._waiting or host.now_s < 15.0
+        str(host.told)
+
+
+# ---- what is played ----------------------------------------------------------------------------------------------------
+
+
+def test_a_tape_of_a_bag_that_a_host_recorded(library: Path, tmp_path: Path) -> None:  # noqa: F811
+    """Samples of their ticks and all actuators, as bytes of the bus, up to a restored checkpoint."""
+    with AlgTwin.from_library(library) as twin:
+        twin.record(tmp_path / "bag")
+        twin.attach("packet")
+        saved = b""
+        for tick in range(6):
+            if tick == 2:
+                twin.sample("packet", [3, 0x41, 0x42, 0x143, 7, 0, 0, 0, 0])
+            if tick == 3:
+                twin.sample("offset", [[1, -2], [3, 4]])
+                twin.set("rig.inputs.ready", True)
+            twin.tick()
+            saved = twin.save() if tick < 2 else saved
+        twin.restore(saved)
+        twin.tick(3)
+    run = open_run(library, None)
+    try:
+        with pytest.raises(BagError, match="needs the machine: --config FILE or --library FILE"):
+            read_tape(Bag(tmp_path / "bag"), None)
+        tape = read_tape(Bag(tmp_path / "bag"), run)
+        tape.check()
+        ticks = list(tape.ticks())
+    finally:
+        run.close()
+    assert [tick.tick for tick in ticks] == [0, 1, 2, 3, 4, 5]
+    assert "restored before tick 6" in tape.stop
+    assert {tick.tick: tick.sensors for tick in ticks if tick.sensors} == {
+        2: {"packet": b"ABC"},
+        3: {"offset": struct.pack("<4i", 1, -2, 3, 4)},
+    }
+    assert ticks[4].actuators == {
+        "reply": b"\xab\0", "count": (5).to_bytes(8, "little"), "angle": struct.pack("<d", 2.5)
+    }  # fmt: skip
+    assert dict(tape.left_out) == {"SET": 1, "RESTORE": 1}
 
 
 def test_definitions_are_those_of_the_interfaces() -> None:

@@ -66,8 +66,8 @@ class Tape:
                 continue
             tick = self._tick_of(topic, data)
             current = current or TapeTick(tick)
-            if tick < current.tick or self.stop:
-                self.stop = self.stop or f"the bag goes back to tick {tick}, behind tick {current.tick}"
+            if tick < current.tick:
+                self.stop = f"the bag goes back to tick {tick}, behind tick {current.tick}"
                 break
             if tick - current.tick > _GAP_MAX:
                 raise BagError(f"{self._bag.path}: a message of tick {tick} comes after one of tick {current.tick}")
@@ -75,6 +75,8 @@ class Tape:
                 yield current
                 current = TapeTick(current.tick + 1)
             self._take(current, topic, data)
+            if self.stop:  # this tick did not come
+                return
         if current is not None:
             yield current
 
