@@ -102,8 +102,9 @@ def test_what_a_bystander_recorded_replays_bit_for_bit(flight: Flight, library: 
     assert verdict.startswith("lander_control: reproduces ticks ")
     first, last = (int(word) for word in verdict.split() if word.isdigit())
     found = replay(tmp_path / "bag", library=str(library))
-    assert found.identical and found.ticks == last + 1 - first > 50, str(found)
-    assert found.values == found.ticks  # the throttle
+    assert found.divergence is None and found.ticks == last + 1 - first > 50, str(found)
+    # A busy machine drops values of ticks, which are not compared; the replay needs none of them.
+    assert found.values > 50 and all("throttle` has" in text for text in found.missing), str(found)
     assert replay(tmp_path / "own", library=str(library)).identical
     info = run(sys.executable, "-m", "simclient.bag", "info", tmp_path / "bag")
     assert f"replays from the checkpoint before tick {first}" in info and "lacks" not in info.split("machine ")[1]
