@@ -107,7 +107,7 @@ def test_what_a_bystander_recorded_replays_bit_for_bit(flight: Flight, library: 
     assert found.values > 50 and all("throttle` has" in text for text in found.missing), str(found)
     assert replay(tmp_path / "own", library=str(library)).identical
     info = run(sys.executable, "-m", "simclient.bag", "info", tmp_path / "bag")
-    assert f"replays from the checkpoint before tick {first}" in info and "lacks" not in info.split("machine ")[1]
+    assert f"replays from the checkpoint before tick {first}" in info
     for kind in ("2 SET", "1 SET_STATE", "1 FAULT", "1 HEALTH", "1 RESTORE", " CHANNEL"):
         assert kind in info, info
 
@@ -141,4 +141,6 @@ def test_a_recorder_that_was_frozen_says_what_it_lacks(flight: Flight, library: 
     )  # fmt: skip
     assert refused.returncode == 2 and len(refused.stderr.splitlines()) == 1
     assert "it does not reproduce the run of `lander_control`: host writes" in refused.stderr
-    assert "lacks      host writes" in run(sys.executable, "-m", "simclient.bag", "info", tmp_path / "bag")
+    assert "record     does not reproduce the run: host writes" in run(
+        sys.executable, "-m", "simclient.bag", "info", tmp_path / "bag"
+    )

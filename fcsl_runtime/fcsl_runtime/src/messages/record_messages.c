@@ -1,4 +1,7 @@
-/* SPDX-License-Identifier: Apache-2.0 */
+/* SPDX-License-Identifier: Apache-2.0
+ *
+ * Writes checkpoints and host writes as CDR.
+ */
 #include "record_messages.h"
 
 #include <string.h>

@@ -338,6 +338,11 @@ class Bag:
             )
         return chosen[0]
 
+    def lacks(self, machine: RecordedMachine) -> str:
+        """Why the bag of a bystander does not reproduce the machine's run; "" if nothing says so."""
+        messages = self.messages({machine.lacks}) if machine.lacks in self.topics else ()
+        return next((str(self.decode_own(machine.lacks, data, ("data",)).data) for _, _, data in messages), "")
+
     def views(self, machine: RecordedMachine) -> str:
         """What plots and viewers show of the machine, as the recording host gave it: JSON (docs/language.md, views), of
         which nothing has been checked but its size. "" if there is none; `notes` then say why, if it cannot be read.

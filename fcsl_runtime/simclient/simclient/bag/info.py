@@ -124,8 +124,10 @@ def _table(rows: Sequence[tuple[str, ...]], right: tuple[int, ...]) -> list[str]
 
 def _machine(bag: Bag, machine: RecordedMachine, found: Contents) -> list[str]:
     lines = [f"machine    {machine.prefix}"]
-    data = found.checkpoints.get(machine.checkpoint)
-    if data is None:
+    data, lacks = found.checkpoints.get(machine.checkpoint), bag.lacks(machine)
+    if lacks:
+        lines.append(f"record     does not reproduce the run: {lacks}")
+    elif data is None:
         lines.append("record     no checkpoint: shows what the machine did, but cannot be replayed")
     else:
         wanted = ("tick", "source_hash", "layout_hash", "build_hash", "data")
@@ -138,12 +140,7 @@ def _machine(bag: Bag, machine: RecordedMachine, found: Contents) -> list[str]:
         ]
     writes = found.writes.get(machine.writes, Counter())
     lines.append("writes     " + (", ".join(f"{count} {kind}" for kind, count in sorted(writes.items())) or "none"))
-    return lines + (_lacks(bag, machine) if machine.by_bystander else _states(bag, machine))
-
-
-def _lacks(bag: Bag, machine: RecordedMachine) -> list[str]:
-    texts = bag.messages({machine.lacks}) if machine.lacks in bag.topics else ()
-    return [f"lacks      {bag.decode_own(machine.lacks, data, ('data',)).data}" for _, _, data in texts]
+    return lines if machine.by_bystander else lines + _states(bag, machine)
 
 
 def _states(bag: Bag, machine: RecordedMachine) -> list[str]:

@@ -38,13 +38,6 @@ def open_machine(config: str, library: str, machine: str | None) -> Run:
     return open_run(Path(library).absolute(), machine)
 
 
-def _check_whole(bag: Bag, recorded: RecordedMachine) -> None:
-    """Raises BagError where a bystander has said that the bag does not reproduce the run."""
-    for _, _, data in bag.messages({recorded.lacks}) if recorded.lacks in bag.topics else ():
-        lacks = bag.decode_own(recorded.lacks, data, ("data",)).data
-        raise BagError(f"{bag.path}: it does not reproduce the run of `{recorded.name}`: {lacks}")
-
-
 def _first_checkpoint(bag: Bag, recorded: RecordedMachine) -> Any:
     """The checkpoint at the start of the record. Raises BagError."""
     data = next((data for _, _, data in bag.messages({recorded.checkpoint})), None)
@@ -138,7 +131,8 @@ def replay(
     """
     opened = bag if isinstance(bag, Bag) else Bag(bag)
     recorded = opened.machine(machine, by_bystanders=True)
-    _check_whole(opened, recorded)
+    if lacks := opened.lacks(recorded):
+        raise BagError(f"{opened.path}: it does not reproduce the run of `{recorded.name}`: {lacks}")
     checkpoint = _first_checkpoint(opened, recorded)
     whole = open_machine(config, library, recorded.name)
     run = _recorded_part(whole, recorded, checkpoint.layout_hash, config)
