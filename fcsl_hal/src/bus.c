@@ -87,6 +87,11 @@ void fcsl_bus_count(const fcsl_bus_t *bus, fcsl_bus_counters_t *counters)
     };
 }
 
+int fcsl_bus_answer(fcsl_bus_t *bus, uint32_t answer, const void *bytes, size_t size)
+{
+    return size <= FCSL_BUS_MESSAGE_MAX ? fcsl_zenoh_answer(bus->zenoh, answer, bytes, size) : -1;
+}
+
 /* ---- opening and closing -------------------------------------------------------------------------------------------- */
 
 void bus_disown(fcsl_bus_t *bus)
@@ -180,9 +185,9 @@ static int declare(fcsl_bus_t *bus, const fcsl_bus_options_t *options, char *err
     for (uint32_t i = 0; i < options->output_count && !failed; i++) {
         failed = fcsl_zenoh_declare_output(zenoh, i, options->outputs[i], options->observer, error, error_size);
     }
-    for (uint32_t i = 0; i < options->constant_count && !failed; i++) {
-        const fcsl_bus_constant_t *constant = &options->constants[i];
-        failed = fcsl_zenoh_declare_constant(zenoh, constant->key, constant->bytes, constant->size, error, error_size);
+    for (uint32_t i = 0; i < options->answer_count && !failed; i++) {
+        const fcsl_bus_answer_t *answer = &options->answers[i];
+        failed = fcsl_zenoh_declare_answer(zenoh, answer->key, answer->bytes, answer->size, error, error_size);
     }
     for (uint32_t i = 0; i < options->watched_count && !failed; i++) {
         failed = fcsl_zenoh_watch_token(zenoh, i, options->watched[i], error, error_size);

@@ -90,21 +90,21 @@ static int check_inputs(const fcsl_bus_options_t *options, char *error, size_t e
     return 0;
 }
 
-static int check_constants(const fcsl_bus_options_t *options, char *error, size_t error_size)
+static int check_answers(const fcsl_bus_options_t *options, char *error, size_t error_size)
 {
-    if (options->constant_count > FCSL_BUS_KEYS_MAX) {
-        (void)snprintf(error, error_size, "the bus has %u constants; at most %u are possible", options->constant_count,
+    if (options->answer_count > FCSL_BUS_KEYS_MAX) {
+        (void)snprintf(error, error_size, "the bus has %u answers; at most %u are possible", options->answer_count,
                        FCSL_BUS_KEYS_MAX);
         return -1;
     }
-    for (uint32_t i = 0; i < options->constant_count; i++) {
-        const fcsl_bus_constant_t *constant = &options->constants[i];
-        if (check_key("a constant", constant->key, "*$?#", error, error_size) != 0) {
+    for (uint32_t i = 0; i < options->answer_count; i++) {
+        const fcsl_bus_answer_t *answer = &options->answers[i];
+        if (check_key("an answer", answer->key, "*$?#", error, error_size) != 0) {
             return -1;
         }
-        if (constant->size > FCSL_BUS_MESSAGE_MAX) {
-            (void)snprintf(error, error_size, "constant '%s' of the bus has %u bytes; at most %u are possible",
-                           constant->key, constant->size, FCSL_BUS_MESSAGE_MAX);
+        if (answer->size > FCSL_BUS_MESSAGE_MAX) {
+            (void)snprintf(error, error_size, "answer '%s' of the bus has %u bytes; at most %u are possible",
+                           answer->key, answer->size, FCSL_BUS_MESSAGE_MAX);
             return -1;
         }
     }
@@ -151,7 +151,7 @@ int bus_config_check(const fcsl_bus_options_t *options, char *error, size_t erro
         check_keys("a watched token", options->watched, options->watched_count, error, error_size) != 0) {
         return -1;
     }
-    return check_constants(options, error, error_size) != 0 ? -1 : check_inputs(options, error, error_size);
+    return check_answers(options, error, error_size) != 0 ? -1 : check_inputs(options, error, error_size);
 }
 
 int bus_config_write(const fcsl_bus_options_t *options, char text[BUS_CONFIG_BYTES], char *error, size_t error_size)

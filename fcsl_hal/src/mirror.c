@@ -14,8 +14,15 @@
 #include "payload.h"
 
 enum {
-    COMMIT = 0, /* outputs: the commits, then the channels */
-    CHANNELS = 1,
+    COMMIT = 0, /* outputs: the commits, the host writes, then the channels */
+    WRITES = 1,
+    WRITTEN = 2,
+    CHANNELS = 3,
+    DESCRIPTOR = 0, /* answers */
+    CHECKPOINT = 1,
+    ANSWERS = 2,
+    WRITTEN_BYTES = 16,
+    LONG_WRITES = 4, /* of the longest, as many are posted, before all of them must have left */
     TICKS_POSTED = 64, /* at most, before all of them must have left */
     TICKS_SPARE = 2, /* one that is leaving, and what is lost where the ring ends */
     ENTRY_BYTES_MAX = 16, /* of the ring, beside a message */
@@ -23,6 +30,8 @@ enum {
 };
 /* Fewer ticks are posted at a time where these would take more. */
 static const uint64_t RING_BYTES = UINT64_C(4) << 20;
+/* For host writes, at least. */
+static const uint64_t WRITES_BYTES_MIN = UINT64_C(1) << 20;
 
 struct fcsl_mirror {
     fcsl_channel_table_t table;
@@ -35,6 +44,8 @@ struct fcsl_mirror {
     int has_begun;  /* there is one */
     uint32_t ticks; /* that the ring holds */
     uint32_t room;  /* of them, free for certain */
+    uint64_t writes_bytes; /* of the ring, for host writes */
+    uint64_t writes_room;  /* of them, free for certain */
 };
 
 /* ---- a tick --------------------------------------------------------------------------------------------------------- */
@@ -105,22 +116,61 @@ void fcsl_mirror_begin(fcsl_mirror_t *mirror)
     mirror->has_begun = 0;
 }
 
+/* ---- host writes ---------------------------------------------------------------------------------------------------- */
+
+int fcsl_mirror_writes_watched(const fcsl_mirror_t *mirror)
+{
+    return fcsl_bus_matched(mirror->bus, WRITES);
+}
+
+static int post_from_writes_room(fcsl_mirror_t *mirror, uint32_t output, const void *bytes, size_t size)
+{
+    const uint64_t needed = size + ENTRY_BYTES_MAX;
+    if (needed > mirror->writes_room) {
+        return -1;
+    }
+    mirror->writes_room -= needed;
+    return fcsl_bus_post(mirror->bus, output, bytes, size);
+}
+
+int fcsl_mirror_post_write(fcsl_mirror_t *mirror, const void *bytes, size_t size)
+{
+    return post_from_writes_room(mirror, WRITES, bytes, size);
+}
+
+int fcsl_mirror_post_written(fcsl_mirror_t *mirror, uint64_t ticks, uint64_t number)
+{
+    uint8_t bytes[WRITTEN_BYTES];
+    fcsl_put_u64(bytes, ticks);
+    fcsl_put_u64(bytes + 8, number);
+    return post_from_writes_room(mirror, WRITTEN, bytes, sizeof bytes);
+}
+
+int fcsl_mirror_answer_checkpoint(fcsl_mirror_t *mirror, const void *bytes, size_t size)
+{
+    return fcsl_bus_answer(mirror->bus, CHECKPOINT, bytes, size);
+}
+
+/* ---- room ----------------------------------------------------------------------------------------------------------- */
+
 int fcsl_mirror_watched(const fcsl_mirror_t *mirror)
 {
-    int watched = fcsl_bus_matched(mirror->bus, COMMIT);
+    int watched = fcsl_bus_matched(mirror->bus, COMMIT) || fcsl_mirror_writes_watched(mirror);
     for (uint32_t i = 0; i < mirror->table.machine->channel_count && !watched; i++) {
         watched = fcsl_bus_matched(mirror->bus, CHANNELS + i);
     }
     return watched;
 }
 
-/* Once everything has left, the ring holds as many ticks as it was made for. */
+/* Once everything has left, the ring holds as many ticks as it was made for, and as many writes. */
 int fcsl_mirror_ready(fcsl_mirror_t *mirror)
 {
-    if (mirror->room == 0u) {
+    if (mirror->room == 0u || mirror->writes_room < mirror->writes_bytes / 2u) {
         fcsl_bus_counters_t now;
         fcsl_bus_count(mirror->bus, &now);
-        mirror->room = now.posted == now.put + now.put_failed ? mirror->ticks : 0u;
+        const int empty = now.posted == now.put + now.put_failed;
+        mirror->room = empty ? mirror->ticks : 0u;
+        mirror->writes_room = empty ? mirror->writes_bytes : 0u;
     }
     return mirror->room > 0u;
 }
@@ -129,7 +179,7 @@ int fcsl_mirror_ready(fcsl_mirror_t *mirror)
 
 static int check(const fcsl_machine_t *machine, const char *name_space, char *error, size_t error_size)
 {
-    static const char LONGEST[] = "@descriptor"; /* of the names that are no channels */
+    static const char LONGEST[] = "@checkpoint"; /* of the names that are no channels */
     const size_t before = strlen(name_space) + strlen(machine->name) + 2u;
     for (uint32_t i = 0; i < machine->channel_count; i++) {
         const char *name = machine->channels[i].name;
@@ -180,8 +230,8 @@ static fcsl_mirror_t *allocate(const fcsl_machine_t *machine, char *error, size_
     return mirror;
 }
 
-/* The ring's bytes, and how many ticks it holds. */
-static uint32_t size_ring(fcsl_mirror_t *mirror)
+/* The ring's bytes, and what it holds: ticks, and host writes. */
+static uint32_t size_ring(fcsl_mirror_t *mirror, uint32_t write_bytes)
 {
     const fcsl_machine_t *machine = mirror->table.machine;
     uint64_t tick_bytes = 2u * (commit_bytes(machine->channel_count) + ENTRY_BYTES_MAX);
@@ -190,7 +240,9 @@ static uint32_t size_ring(fcsl_mirror_t *mirror)
     }
     const uint64_t ticks = RING_BYTES / tick_bytes;
     mirror->ticks = ticks < 1u ? 1u : ticks > TICKS_POSTED ? TICKS_POSTED : (uint32_t)ticks;
-    const uint64_t bytes = tick_bytes * (mirror->ticks + TICKS_SPARE);
+    const uint64_t writes = LONG_WRITES * ((uint64_t)write_bytes + ENTRY_BYTES_MAX);
+    mirror->writes_bytes = writes < WRITES_BYTES_MIN ? WRITES_BYTES_MIN : writes;
+    const uint64_t bytes = tick_bytes * (mirror->ticks + TICKS_SPARE) + mirror->writes_bytes;
     return bytes < UINT32_MAX ? (uint32_t)bytes : UINT32_MAX; /* the bus refuses so many */
 }
 
@@ -209,21 +261,26 @@ static int open_session(fcsl_mirror_t *mirror, const fcsl_mirror_options_t *opti
 {
     const fcsl_machine_t *machine = mirror->table.machine;
     const uint32_t count = machine->channel_count + CHANNELS;
-    const fcsl_bus_constant_t descriptor = {.key = write_key(keys, count, options, machine->name, "@descriptor"),
-                                            .bytes = options->descriptor,
-                                            .size = (uint32_t)strlen(options->descriptor)};
+    const fcsl_bus_answer_t answers[ANSWERS] = {
+        [DESCRIPTOR] = {.key = write_key(keys, count + DESCRIPTOR, options, machine->name, "@descriptor"),
+                        .bytes = options->descriptor,
+                        .size = (uint32_t)strlen(options->descriptor)},
+        [CHECKPOINT] = {.key = write_key(keys, count + CHECKPOINT, options, machine->name, "@checkpoint")},
+    };
     outputs[COMMIT] = write_key(keys, COMMIT, options, machine->name, "tick");
+    outputs[WRITES] = write_key(keys, WRITES, options, machine->name, "@writes");
+    outputs[WRITTEN] = write_key(keys, WRITTEN, options, machine->name, "@written");
     for (uint32_t i = 0; i < machine->channel_count; i++) {
         outputs[CHANNELS + i] = write_key(keys, CHANNELS + i, options, machine->name, machine->channels[i].name);
     }
     const fcsl_bus_options_t bus = {.role = FCSL_BUS_LISTEN,
                                     .endpoint = options->endpoint,
                                     .observer = 1,
-                                    .ring_bytes = size_ring(mirror),
+                                    .ring_bytes = size_ring(mirror, options->write_bytes),
                                     .outputs = outputs,
                                     .output_count = count,
-                                    .constants = &descriptor,
-                                    .constant_count = 1};
+                                    .answers = answers,
+                                    .answer_count = ANSWERS};
     return fcsl_bus_open(&bus, &mirror->bus, error, error_size);
 }
 
@@ -237,7 +294,7 @@ int fcsl_mirror_open(const fcsl_mirror_options_t *options, const fcsl_machine_t 
     }
     fcsl_mirror_t *self = allocate(machine, error, error_size);
     const char **outputs = calloc(count, sizeof *outputs);
-    char *keys = calloc(count + 1u, FCSL_BUS_KEY_MAX + 1u);
+    char *keys = calloc(count + ANSWERS, FCSL_BUS_KEY_MAX + 1u);
     if (self != NULL && outputs != NULL && keys != NULL) {
         failed = open_session(self, options, outputs, keys, error, error_size);
     }

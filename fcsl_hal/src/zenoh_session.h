@@ -40,15 +40,18 @@ int fcsl_zenoh_declare_input(fcsl_zenoh_t *session, uint32_t number, const char 
 /* Calls `stray` for what other sessions put on keys that `key` includes, and no input that was declared before. */
 int fcsl_zenoh_declare_strays(fcsl_zenoh_t *session, const char *key, char *error, size_t error_size);
 
-/* Answers queries for `key` with these bytes, which are copied. */
-int fcsl_zenoh_declare_constant(fcsl_zenoh_t *session, const char *key, const uint8_t *bytes, size_t size, char *error,
-                                size_t error_size);
+/* Answers queries for `key` with these bytes, which are copied; with none it does not answer. */
+int fcsl_zenoh_declare_answer(fcsl_zenoh_t *session, const char *key, const uint8_t *bytes, size_t size, char *error,
+                              size_t error_size);
 
 /* A liveliness token, while the session lives: `key`, and the session's number behind it. */
 int fcsl_zenoh_declare_token(fcsl_zenoh_t *session, const char *key, char *error, size_t error_size);
 
 /* Calls `tokens` when another session with such a token comes or goes. */
 int fcsl_zenoh_watch_token(fcsl_zenoh_t *session, uint32_t number, const char *key, char *error, size_t error_size);
+
+/* Answers queries with these bytes from now on. Any thread may call it, while others put. */
+int fcsl_zenoh_answer(const fcsl_zenoh_t *session, uint32_t answer, const uint8_t *bytes, size_t size);
 
 /* Returns 0, or -1. 0 does not say that anybody got it. */
 int fcsl_zenoh_put(fcsl_zenoh_t *session, uint32_t output, const uint8_t *bytes, size_t size);

@@ -21,7 +21,7 @@ int main(int argc, char **argv)
 {
     static const char *const outputs[] = {"t/out"};
     static const char *const tokens[] = {"t/alive"};
-    const fcsl_bus_constant_t constant = {.key = "t/about", .bytes = "echo", .size = 4};
+    const fcsl_bus_answer_t answer = {.key = "t/about", .bytes = "echo", .size = 4};
     const fcsl_bus_input_t inputs[] = {{.key = "t/in", .bytes = MESSAGE_BYTES, .depth = DEPTH}};
     CHECK(argc == 2);
     const int is_endpoint = strncmp(argv[1], "tcp/", 4) == 0;
@@ -35,8 +35,8 @@ int main(int argc, char **argv)
                                         .input_count = 1,
                                         .tokens = tokens,
                                         .token_count = 1,
-                                        .constants = &constant,
-                                        .constant_count = 1,
+                                        .answers = &answer,
+                                        .answer_count = 1,
                                         .watched = tokens,
                                         .watched_count = 1,
                                         .strays = "t/**"};

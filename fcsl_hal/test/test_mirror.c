@@ -8,7 +8,19 @@
 #include "fcsl/fcsl_mirror.h"
 #include "fcsl/fcsl_scalar.h"
 
-enum { ALTITUDE, PACKET, THROTTLE, CHANNELS, COMMIT_BYTES = 25, DEPTH = 16, MANY = 20000 };
+enum {
+    ALTITUDE,
+    PACKET,
+    THROTTLE,
+    CHANNELS,
+    WRITES = CHANNELS + 1,
+    WRITTEN,
+    COMMIT_BYTES = 25,
+    LONG_BYTES = 50000,
+    WRITE_BYTES = 1 << 20, /* as long as a message of the bus may be */
+    DEPTH = 16,
+    MANY = 20000
+};
 
 typedef struct {
     double altitude;
@@ -46,7 +58,8 @@ static const fcsl_machine_t MACHINE = {.name = "craft",
 
 static fcsl_mirror_t *open_mirror(const char *endpoint)
 {
-    const fcsl_mirror_options_t options = {.endpoint = endpoint, .name_space = "north", .descriptor = "{}"};
+    const fcsl_mirror_options_t options = {
+        .endpoint = endpoint, .name_space = "north", .descriptor = "{}", .write_bytes = WRITE_BYTES};
     fcsl_mirror_t *mirror = NULL;
     char error[256] = "";
     CHECK(fcsl_mirror_open(&options, &MACHINE, &mirror, error, sizeof error) == 0);
@@ -58,13 +71,15 @@ static fcsl_bus_t *observe(const char *endpoint)
     const fcsl_bus_input_t inputs[] = {{.key = "north/craft/altitude", .bytes = 8, .least = 8, .depth = DEPTH},
                                        {.key = "north/craft/gps.packet", .bytes = 3, .depth = DEPTH},
                                        {.key = "north/craft/throttle", .bytes = 8, .least = 8, .depth = DEPTH},
-                                       {.key = "north/craft/tick", .bytes = COMMIT_BYTES, .depth = DEPTH}};
+                                       {.key = "north/craft/tick", .bytes = COMMIT_BYTES, .depth = DEPTH},
+                                       {.key = "north/craft/@writes", .bytes = WRITE_BYTES, .depth = DEPTH},
+                                       {.key = "north/craft/@written", .bytes = 16, .least = 16, .depth = DEPTH}};
     const fcsl_bus_options_t options = {.role = FCSL_BUS_CLIENT,
                                         .endpoint = endpoint,
                                         .timeout_ms = LONG_MS,
                                         .ring_bytes = RING_BYTES,
                                         .inputs = inputs,
-                                        .input_count = CHANNELS + 1u};
+                                        .input_count = WRITTEN + 1u};
     return open_bus(&options);
 }
 
@@ -149,6 +164,49 @@ static void check_ticks(fcsl_mirror_t *mirror, fcsl_bus_t *bus)
     expect_actuators(bus, 13, 0);
 }
 
+static void check_writes(fcsl_mirror_t *mirror, fcsl_bus_t *bus)
+{
+    static uint8_t bytes[LONG_BYTES];
+    static uint8_t got[LONG_BYTES];
+    uint8_t written[16];
+    for (size_t i = 0; i < sizeof bytes; i++) {
+        bytes[i] = (uint8_t)(i * 7u);
+    }
+    CHECK(fcsl_mirror_writes_watched(mirror));
+    const uint64_t give_up_ns = later_ns();
+    while (!fcsl_mirror_ready(mirror)) {
+        CHECK(now_ns() < give_up_ns);
+    }
+    CHECK(fcsl_mirror_post_write(mirror, "write", 5) == 0);
+    CHECK(fcsl_mirror_post_write(mirror, bytes, sizeof bytes) == 0);
+    CHECK(fcsl_mirror_post_written(mirror, 7, UINT64_C(1) << 40) == 0);
+    take_one(bus, WRITES, got, 5);
+    CHECK(memcmp(got, "write", 5) == 0);
+    take_one(bus, WRITES, got, sizeof got);
+    CHECK(memcmp(got, bytes, sizeof got) == 0);
+    take_one(bus, WRITTEN, written, sizeof written);
+    CHECK(fcsl_get_u64(written) == 7u && fcsl_get_u64(written + 8) == UINT64_C(1) << 40);
+    CHECK(fcsl_mirror_answer_checkpoint(mirror, "checkpoint", 10) == 0);
+    CHECK(fcsl_mirror_answer_checkpoint(mirror, "", FCSL_BUS_MESSAGE_MAX + 1u) == -1);
+}
+
+/* Writes take none of the room of ticks, however many there are. */
+static void check_room_beside_writes(fcsl_mirror_t *mirror)
+{
+    static const uint8_t bytes[WRITE_BYTES / 2];
+    const data_t data = {.attached = 0};
+    uint32_t posted = 0;
+    const uint64_t give_up_ns = later_ns();
+    while (!fcsl_mirror_ready(mirror)) {
+        CHECK(now_ns() < give_up_ns);
+    }
+    while (fcsl_mirror_post_write(mirror, bytes, sizeof bytes) == 0) {
+        posted++;
+    }
+    CHECK(posted == 2u * 4u - 1u || posted == 2u * 4u);
+    CHECK(fcsl_mirror_post(mirror, &data, 1, 0) == 0);
+}
+
 /* Where there is room, there is room for all of a tick. */
 static void check_room(fcsl_mirror_t *mirror)
 {
@@ -201,6 +259,8 @@ int main(void)
     const struct timespec moment = {.tv_nsec = 300000000};
     (void)nanosleep(&moment, NULL);
     check_ticks(mirror, bus);
+    check_writes(mirror, bus);
+    check_room_beside_writes(mirror);
     check_room(mirror);
     CHECK(counted(bus).wrong_size == 0 && counted(bus).deletions == 0);
     CHECK(fcsl_bus_close(bus, CLOSE_MS) == 0);

@@ -17,7 +17,7 @@ int fcsl_sim_observers(fcsl_sim_t *sim, const char *endpoint, const char *name_s
     if (fcsl_sim_publish_begin(sim, error)) {
         return -1;
     }
-    const fcsl_observers_options_t options = {.endpoint = endpoint, .name_space = name_space, .machine = sim->machine};
+    const fcsl_observers_options_t options = {.endpoint = endpoint, .name_space = name_space, .run = sim->run};
     sim->observers = fcsl_observers_open(&options, &sim->published->history, error);
     return sim->observers ? fcsl_observers_start(sim->observers, error) : -1;
 }

@@ -8,6 +8,7 @@
 #include <string.h>
 
 #include "fail.h"
+#include "fcsl/fcsl_journal.h"
 
 enum { HISTORY_SLOTS = 64, WRITER_BYTES = 256 };
 
@@ -187,8 +188,10 @@ void fcsl_sim_publish_end(fcsl_sim_t *sim)
 void fcsl_sim_publish(fcsl_sim_t *sim)
 {
     if (sim->published) {
-        const fcsl_moment_t moment = {
-            .tick = sim->tick, .time_ns = (uint64_t)sim->time_ns, .paused = (uint64_t)fcsl_sim_paused(sim)};
+        const fcsl_moment_t moment = {.tick = sim->tick,
+                                      .time_ns = (uint64_t)sim->time_ns,
+                                      .paused = (uint64_t)fcsl_sim_paused(sim),
+                                      .next_write = sim->external ? 0u : fcsl_run_next_write(sim->run)};
         fcsl_history_publish(&sim->published->history, &moment);
     }
 }

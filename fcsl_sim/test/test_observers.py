@@ -176,10 +176,9 @@ def test_the_bus_has_the_values_of_the_machine(open_sim: Callable[..., Simulatio
             counts = sim.observers_stop()
             sim.close()
     assert counts == {"ticks": TICKS, "dropped": 0} and not observed.lost
-    # An observer counts from the commit after its first one.
-    seen = {(t, name): value for (t, name), value in wanted.items() if t > 0 and (name != "altitude" or t % 5 == 0)}
+    seen = {(t, name): value for (t, name), value in wanted.items() if name != "altitude" or t % 5 == 0}
     assert observed.values == seen
-    assert len({value for (_, name), value in seen.items() if name == "altitude"}) == TICKS / 5 - 1
+    assert len({value for (_, name), value in seen.items() if name == "altitude"}) == TICKS / 5
 
 
 def test_a_simulation_that_nobody_can_follow(open_sim: Callable[..., Simulation]) -> None:

@@ -37,12 +37,12 @@ typedef struct {
     uint32_t depth; /* 1: fcsl_bus_take gets the newest message; more: as many wait, and the next one is dropped */
 } fcsl_bus_input_t;
 
-/* A key that answers queries with the same bytes as long as the session lives. They are copied. */
+/* A key that answers queries, with these bytes until fcsl_bus_answer replaces them; with none it is silent. They are copied. */
 typedef struct {
     const char *key;
     const void *bytes;
     uint32_t size;
-} fcsl_bus_constant_t;
+} fcsl_bus_answer_t;
 
 /* All other keys are concrete (`lander/engine/throttle`). Each kind is numbered by place. */
 typedef struct {
@@ -62,8 +62,8 @@ typedef struct {
     uint32_t input_count;
     const char *const *tokens; /* while this session lives, others see these */
     uint32_t token_count;
-    const fcsl_bus_constant_t *constants;
-    uint32_t constant_count;
+    const fcsl_bus_answer_t *answers;
+    uint32_t answer_count;
     const char *const *watched; /* tokens of other sessions */
     uint32_t watched_count;
     const char *
@@ -97,6 +97,10 @@ int fcsl_bus_post(fcsl_bus_t *bus, uint32_t output, const void *bytes, size_t si
 /* Copies the next message of an input (depth 1: the newest one) and sets *size: 1. 0: none came since the last call.
  * `bytes` has room for as many as the input's `bytes`. */
 int fcsl_bus_take(fcsl_bus_t *bus, uint32_t input, void *bytes, size_t *size);
+
+/* Replaces the bytes of an answer. Copies them, may wait for a query that is being answered: not from the thread that steps.
+ * Returns 0, or -1: no such answer, too long, or no memory. */
+int fcsl_bus_answer(fcsl_bus_t *bus, uint32_t answer, const void *bytes, size_t size);
 
 /* Waits until a message came, or something that the three functions below tell changed, since the last call of this: 1. 0 at
  * `deadline_ns` of CLOCK_MONOTONIC, or when a signal is caught. */

@@ -21,6 +21,7 @@ typedef struct {
     const char *endpoint;   /* "tcp/HOST:PORT", to listen on */
     const char *name_space; /* before the keys, "" for none */
     const char *descriptor; /* the text that answers queries for @descriptor */
+    uint32_t write_bytes;   /* of the longest host write */
 } fcsl_mirror_options_t;
 
 /* Listens. The machine's tables must outlive it. Returns 0, or -1 with `error` filled. */
@@ -37,6 +38,18 @@ int fcsl_mirror_ready(fcsl_mirror_t *mirror);
  * since the tick that was posted before; in the first tick, and without a HAL, always. Returns 0, or -1: there is no room, and
  * commits are missing. */
 int fcsl_mirror_post(fcsl_mirror_t *mirror, const void *data, uint64_t tick, uint64_t time_ns);
+
+/* Whether an observer takes the host writes. */
+int fcsl_mirror_writes_watched(const fcsl_mirror_t *mirror);
+
+/* Posts a host write under @writes. Returns 0, or -1: there is no room. */
+int fcsl_mirror_post_write(fcsl_mirror_t *mirror, const void *bytes, size_t size);
+
+/* Posts under @written that after so many ticks the next write has this number. Returns as above. */
+int fcsl_mirror_post_written(fcsl_mirror_t *mirror, uint64_t ticks, uint64_t number);
+
+/* Answers queries for @checkpoint with these bytes from now on. Returns 0, or -1. */
+int fcsl_mirror_answer_checkpoint(fcsl_mirror_t *mirror, const void *bytes, size_t size);
 
 /* Nobody saw the last tick: the next one is a first one. */
 void fcsl_mirror_begin(fcsl_mirror_t *mirror);

@@ -71,6 +71,8 @@ impl Drop for Events {
 pub struct Zenoh {
     inputs: Vec<KeyExpr<'static>>,
     outputs: Vec<Publisher<'static>>,
+    /// What queries get; empty: nothing.
+    answers: Vec<Arc<Mutex<ZBytes>>>,
     /// They live as long as the session.
     tokens: Vec<LivelinessToken>,
     session: Session,
@@ -86,7 +88,7 @@ fn reason_of(error: zenoh::Error) -> Reason {
 impl Zenoh {
     fn open(config: Result<Config, zenoh::Error>, events: Arc<Events>) -> Result<Self, Reason> {
         let session = config.and_then(|config| zenoh::open(config).wait()).map_err(reason_of)?;
-        Ok(Self { inputs: Vec::new(), outputs: Vec::new(), tokens: Vec::new(), session, events })
+        Ok(Self { inputs: Vec::new(), outputs: Vec::new(), answers: Vec::new(), tokens: Vec::new(), session, events })
     }
 
     fn declare_output(&mut self, number: u32, key: &str, droppable: bool) -> Result<(), zenoh::Error> {
@@ -137,14 +139,26 @@ impl Zenoh {
         strays.allowed_origin(Locality::Remote).background().wait()
     }
 
-    fn declare_constant(&self, key: &str, bytes: &[u8]) -> Result<(), zenoh::Error> {
+    fn declare_answer(&mut self, key: &str, bytes: &[u8]) -> Result<(), zenoh::Error> {
         let key = KeyExpr::new(key.to_owned())?;
-        let (answer, bytes) = (key.clone(), ZBytes::from(bytes.to_vec()));
+        let answer = Arc::new(Mutex::new(ZBytes::from(bytes.to_vec())));
+        self.answers.push(answer.clone());
+        let own = key.clone();
         let callback = move |query: Query| {
-            let _ = query.reply(&answer, bytes.clone()).wait(); // refused for a query that takes only its own key
+            let bytes = answer.lock().map(|bytes| bytes.clone()).unwrap_or_default(); // shares what is replaced
+            if !bytes.is_empty() {
+                let _ = query.reply(&own, bytes).wait(); // refused for a query that takes only its own key
+            }
         };
-        let constant = self.session.declare_queryable(key).callback(callback);
-        constant.allowed_origin(Locality::Remote).background().wait()
+        let queryable = self.session.declare_queryable(key).callback(callback);
+        queryable.allowed_origin(Locality::Remote).background().wait()
+    }
+
+    fn answer(&self, answer: u32, bytes: &[u8]) -> Result<(), Reason> {
+        let answer = self.answers.get(answer as usize).ok_or("there is no such answer")?;
+        let bytes = ZBytes::from(bytes.to_vec());
+        *answer.lock().map_err(|_| "the answer is lost")? = bytes;
+        Ok(())
     }
 
     fn declare_token(&mut self, key: &str) -> Result<(), zenoh::Error> {
@@ -290,7 +304,7 @@ pub unsafe extern "C" fn fcsl_zenoh_declare_strays(
 /// # Safety
 /// As zenoh_session.h: `size` readable bytes.
 #[no_mangle]
-pub unsafe extern "C" fn fcsl_zenoh_declare_constant(
+pub unsafe extern "C" fn fcsl_zenoh_declare_answer(
     zenoh: *mut Zenoh,
     key: *const c_char,
     bytes: *const u8,
@@ -300,8 +314,8 @@ pub unsafe extern "C" fn fcsl_zenoh_declare_constant(
 ) -> i32 {
     // SAFETY: the header's contract.
     unsafe {
-        let bytes = c::bytes(bytes, size, "the constant");
-        declare(zenoh, key, error, error_size, |zenoh, key| zenoh.declare_constant(key, bytes?))
+        let bytes = c::bytes(bytes, size, "the answer");
+        declare(zenoh, key, error, error_size, |zenoh, key| zenoh.declare_answer(key, bytes?))
     }
 }
 
@@ -344,6 +358,20 @@ pub unsafe extern "C" fn fcsl_zenoh_put(zenoh: *const Zenoh, output: u32, bytes:
         })
     };
     -i32::from(put.is_err())
+}
+
+/// # Safety
+/// As zenoh_session.h: `size` readable bytes.
+#[no_mangle]
+pub unsafe extern "C" fn fcsl_zenoh_answer(zenoh: *const Zenoh, answer: u32, bytes: *const u8, size: usize) -> i32 {
+    // SAFETY: the header's contract.
+    let answered = unsafe {
+        c::bytes(bytes, size, "the answer").and_then(|bytes| {
+            let zenoh = zenoh.as_ref().ok_or("the session is null")?;
+            zenoh.answer(answer, bytes)
+        })
+    };
+    -i32::from(answered.is_err())
 }
 
 /// # Safety

@@ -59,8 +59,10 @@ static uint64_t now_ns(void)
 static void publish(loop_t *loop, uint64_t time_ns)
 {
     loop->hal.count(loop->hal.ctx);
-    const fcsl_moment_t moment = {
-        .tick = fcsl_run_tick(loop->run), .time_ns = time_ns, .paused = (uint64_t)loop->paused};
+    const fcsl_moment_t moment = {.tick = fcsl_run_tick(loop->run),
+                                  .time_ns = time_ns,
+                                  .paused = (uint64_t)loop->paused,
+                                  .next_write = fcsl_run_next_write(loop->run)};
     fcsl_history_publish(&loop->history, &moment);
 }
 

@@ -9,6 +9,7 @@
 
 #include "fcsl/fcsl_guard.h"
 #include "fcsl/fcsl_hal.h"
+#include "fcsl/fcsl_journal.h"
 #include "fcsl/fcsl_observers.h"
 #include "fcsl/fcsl_telemetry.h"
 #include "fcsl/fcsl_tick_stats.h"

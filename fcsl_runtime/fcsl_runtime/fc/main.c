@@ -206,9 +206,8 @@ static int open_observers(program_t *program)
     if (program->options.observers == NULL) {
         return 0;
     }
-    const fcsl_observers_options_t options = {.endpoint = program->options.observers,
-                                              .name_space = program->options.name_space,
-                                              .machine = fcsl_run_machine(loop->run)};
+    const fcsl_observers_options_t options = {
+        .endpoint = program->options.observers, .name_space = program->options.name_space, .run = loop->run};
     loop->observers = fcsl_observers_open(&options, &loop->history, &error);
     return loop->observers != NULL ? 0 : complain(error.text);
 }

@@ -10,18 +10,25 @@
 
 #include "base/error.h"
 #include "descriptor.h"
+#include "fcsl/fcsl_bus.h"
 #include "publisher.h"
+#include "reproduction.h"
 
 static int listen_on(fcsl_observers_t *o, const fcsl_observers_options_t *options, fcsl_error_t *error)
 {
     char reason[256];
-    char *descriptor = fcsl_observers_descriptor(options->machine, error);
+    const fcsl_machine_t *machine = fcsl_run_machine(options->run);
+    char *descriptor = fcsl_observers_descriptor(machine, error);
     if (descriptor == NULL) {
         return -1;
     }
-    const fcsl_mirror_options_t mirror = {
-        .endpoint = options->endpoint, .name_space = options->name_space, .descriptor = descriptor};
-    const int failed = fcsl_mirror_open(&mirror, options->machine, &o->mirror, reason, sizeof reason);
+    const size_t write_bytes = fcsl_observers_write_bytes(o->journal);
+    const fcsl_mirror_options_t mirror = {.endpoint = options->endpoint,
+                                          .name_space = options->name_space,
+                                          .descriptor = descriptor,
+                                          .write_bytes = write_bytes < FCSL_BUS_MESSAGE_MAX ? (uint32_t)write_bytes
+                                                                                            : FCSL_BUS_MESSAGE_MAX};
+    const int failed = fcsl_mirror_open(&mirror, machine, &o->mirror, reason, sizeof reason);
     free(descriptor);
     return failed ? fcsl_fail(error, "no observers: %s", reason) : 0;
 }
@@ -35,11 +42,17 @@ fcsl_observers_t *fcsl_observers_open(const fcsl_observers_options_t *options, c
         return NULL;
     }
     o->history = history;
-    o->tick_hz = options->machine->tick_hz;
+    o->journal = fcsl_run_journal(options->run, error);
+    if (o->journal == NULL) {
+        fcsl_observers_close(o);
+        return NULL;
+    }
+    o->tick_hz = fcsl_run_machine(options->run)->tick_hz;
     o->nap_ns = fcsl_history_nap_ns(history, o->tick_hz);
     o->cursor = fcsl_history_published(history);
     o->publication = malloc(fcsl_history_bytes(history) + 1u);
-    if (o->publication == NULL) {
+    o->message = malloc(fcsl_observers_write_bytes(o->journal));
+    if (o->publication == NULL || o->message == NULL) {
         (void)fcsl_fail(error, "out of memory for observers");
     } else if (listen_on(o, options, error) == 0) {
         return o;
@@ -60,6 +73,7 @@ void fcsl_observers_stop(fcsl_observers_t *observers)
     if (observers != NULL && observers->started) {
         atomic_store(&observers->stop, 1);
         (void)pthread_join(observers->thread, NULL);
+        fcsl_journal_follow(observers->journal, 0);
         observers->started = 0;
     }
 }
@@ -72,6 +86,7 @@ void fcsl_observers_close(fcsl_observers_t *observers)
     fcsl_observers_stop(observers);
     fcsl_mirror_close(observers->mirror);
     free(observers->publication);
+    free(observers->message);
     free(observers);
 }
 

@@ -8,6 +8,7 @@
 #include <time.h>
 
 #include "fcsl/fcsl_tick_time.h"
+#include "reproduction.h"
 
 /* How long the last ticks may take to leave. */
 static const uint64_t LAST_NS = 1000000000u;
@@ -37,8 +38,11 @@ static uint64_t dropped_before(const fcsl_observers_t *o, uint64_t completed)
 }
 
 /* A publication: that of a tick is put; a command's, of the same tick once more, is not. */
-static void see(fcsl_observers_t *o, uint64_t completed)
+static void see(fcsl_observers_t *o, const fcsl_moment_t *moment)
 {
+    const uint64_t completed = moment->tick;
+    const int written = fcsl_observers_post_writes(o, moment) == 0;
+    fcsl_observers_answer_checkpoint(o, moment);
     if (completed == o->completed || completed == 0) {
         return;
     }
@@ -46,13 +50,15 @@ static void see(fcsl_observers_t *o, uint64_t completed)
     count(&o->dropped, dropped_before(o, completed));
     o->overtaken = 0;
     o->completed = completed;
-    const int posted = fcsl_mirror_post(o->mirror, o->publication, tick, fcsl_tick_time_ns(o->tick_hz, tick)) == 0;
+    const int posted =
+        written && fcsl_mirror_post(o->mirror, o->publication, tick, fcsl_tick_time_ns(o->tick_hz, tick)) == 0;
     count(posted ? &o->ticks : &o->dropped, 1);
 }
 
 static void pass_over(fcsl_observers_t *o)
 {
     fcsl_mirror_begin(o->mirror);
+    fcsl_journal_pass(o->journal);
     o->cursor = fcsl_history_published(o->history);
     o->overtaken = 0;
 }
@@ -62,6 +68,7 @@ static void pass_over(fcsl_observers_t *o)
 static int follow(fcsl_observers_t *o)
 {
     fcsl_moment_t moment;
+    fcsl_journal_follow(o->journal, fcsl_mirror_writes_watched(o->mirror));
     if (!fcsl_mirror_watched(o->mirror)) {
         pass_over(o);
         return 1;
@@ -80,7 +87,7 @@ static int follow(fcsl_observers_t *o)
             o->cursor = cursor;
         } else {
             o->cursor++;
-            see(o, moment.tick);
+            see(o, &moment);
         }
     }
     return 0;

@@ -8,11 +8,13 @@
 #include <pthread.h>
 #include <stdatomic.h>
 
+#include "fcsl/fcsl_journal.h"
 #include "fcsl/fcsl_mirror.h"
 #include "fcsl/fcsl_observers.h"
 
 struct fcsl_observers {
     const fcsl_history_t *history;
+    fcsl_journal_t *journal;
     fcsl_mirror_t *mirror;
     uint64_t tick_hz;
     uint64_t nap_ns;
@@ -20,6 +22,8 @@ struct fcsl_observers {
     uint64_t cursor;    /* publications looked at */
     uint64_t overtaken; /* of them, since the last one that was seen */
     uint64_t completed; /* ticks, in the last one that was seen */
+    uint8_t *message;       /* a write or a checkpoint, with its number */
+    uint64_t answered_ns;   /* when the checkpoint was last replaced */
     _Atomic uint64_t ticks;
     _Atomic uint64_t dropped;
     pthread_t thread;

@@ -28,10 +28,10 @@ static fcsl_instance_t instances[INSTANCES];
 static memory_t memory;
 static uint32_t recorded;
 
-void fcsl_recorder_write(fcsl_recorder_t *recorder, uint64_t tick, const fcsl_write_t *write)
+void fcsl_note_write_at(fcsl_run_t *noted, uint64_t tick, const fcsl_write_t *write)
 {
     double output = 0.0;
-    (void)recorder;
+    (void)noted;
     CHECK(write->kind == FCSL_WRITE_IMPURE && strcmp(write->path, "b") == 0 && write->size == BYTES_LEFT);
     memcpy(&output, write->data, sizeof output);
     CHECK(output == 10.0 * IMPURE + 1.0 && tick % 3u == 2u);
@@ -94,7 +94,7 @@ int main(void)
     }
     CHECK(fcsl_run_substitute(&run, INSTANCES, bytes, BYTES_LEFT, &error) != 0);
     for (uint64_t tick = 0; tick < 9; tick++) {
-        fcsl_substitution_record(&run, tick);
+        fcsl_substitution_note(&run, tick);
     }
     CHECK(recorded == 3); /* in the ticks in which it executed */
 

@@ -7,6 +7,7 @@ import contextlib
 import json
 import queue
 import random
+import re
 import signal
 import struct
 import subprocess
@@ -168,7 +169,7 @@ def test_an_interrupted_recording_is_complete(endpoint: str, number: signal.Sign
     text = describe(bag, "")
     assert bag.truncated == "" and "damage     none" in text
     assert bag.topics["/north/hill/rig/imu/attitude"].type == "rig_bus/msg/ImuAttitude"
-    assert sum(topic.count for topic in bag.topics.values()) == int(out.split()[1])
+    assert sum(topic.count for topic in bag.topics.values()) == int(re.findall(r": (\d+) messages", out)[0])
     rows = rows_of(bag, "/north/hill/rig/angle")
     ticks = rows["tick"].tolist()
     assert len(ticks) > 50 and ticks == list(range(ticks[0], ticks[0] + len(ticks)))
@@ -185,8 +186,10 @@ def test_the_end_of_the_flight_ends_a_recording(library: Path, tmp_path: Path) -
         out, _ = tool("record", "-c", where, "-o", tmp_path / "bag")
         said, _ = fc.communicate(timeout=LONG_S)
     assert fc.returncode == 0 and ", 0 dropped" in said
-    assert rows_of(Bag(tmp_path / "bag"), "/rig/count")["tick"][-1] == 499
-    assert int(out.split(" messages")[0].split()[-1]) % len(ROWS) == 0
+    bag = Bag(tmp_path / "bag")
+    assert rows_of(bag, "/rig/count")["tick"][-1] == 499
+    assert int(out.split(" messages")[0].split()[-1]) == sum(topic.count for topic in bag.topics.values())
+    assert re.search("rig: reproduces ticks [0-9]+ to 499$", out)
 
 
 def test_put(endpoint: str, rig: BusMachine, tmp_path: Path) -> None:
@@ -310,6 +313,19 @@ def test_values_belong_to_the_commit_behind_them() -> None:
     bus.reader.take("a", b"\1")
     assert bus.commit(2) is None  # another run
     assert bus.reader.lost.refused == 0
+    lost = bus.reader.lost
+    bus.reader.take("a", b"\0")
+    bus.reader.jump()  # a checkpoint of tick 40 was restored
+    bus.reader.take("a", b"\1")
+    assert bus.commit(40) == {"a": b"\1"} and bus.commit(41, bits=0) == {} and bus.reader.lost == lost
+
+
+def test_the_first_tick_of_all_needs_none_before_it() -> None:
+    bus = Bus()
+    bus.reader.take("a", b"\1")
+    assert bus.commit(0) == {"a": b"\1"} and not bus.reader.lost
+    late = Bus()
+    assert late.commit(0) == {} and late.reader.lost.values == 1
 
 
 def test_messages_that_are_none() -> None:
@@ -331,7 +347,7 @@ def test_names_of_messages() -> None:
     )
     machine = BusMachine("n-s/M1", "M1", "", 0, 1, channels, "")
     assert list(type_names(machine).values()) == ["m1_bus/msg/AB", "m1_bus/msg/ABId1", "m1_bus/msg/Channel3d"]
-    assert topic_of(machine, channels[0]) == "/n_s/M1/a/b"
+    assert topic_of(machine.prefix, channels[0].name) == "/n_s/M1/a/b"
     assert definition_of(channels[0]).startswith(
         "# two lines\nstd_msgs/Header header\nuint64 tick\nfloat32[3] value  # m\n"
     )

@@ -17,6 +17,7 @@ typedef struct {
     uint64_t tick;    /* ticks completed */
     uint64_t time_ns; /* on the host's monotonic clock */
     uint64_t paused;  /* 0 or 1 */
+    uint64_t next_write; /* fcsl_run_next_write, of a host that keeps a journal */
 } fcsl_moment_t;
 
 /* A piece of memory that is published: a machine struct, a model's variables. */

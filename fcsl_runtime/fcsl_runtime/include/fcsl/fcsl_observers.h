@@ -4,7 +4,8 @@
  * through this file.
  *
  * A thread reads the host's history and never meets the step thread; all memory is taken by open. Ticks that are overwritten
- * before there is room for them on the bus are dropped whole and counted; nobody waits for an observer.
+ * before there is room for them on the bus are dropped whole and counted; nobody waits for an observer. Who asks for them gets
+ * a checkpoint and the host's writes, too (fcsl_journal.h).
  */
 #ifndef FCSL_OBSERVERS_H
 #define FCSL_OBSERVERS_H
@@ -19,11 +20,11 @@ typedef struct fcsl_observers fcsl_observers_t;
 
 typedef struct {
     const char *endpoint;          /* tcp/HOST:PORT, to listen on */
-    const char *name_space;        /* before the keys, "" for none */
-    const fcsl_machine_t *machine; /* its struct is part 0 of the history */
+    const char *name_space; /* before the keys, "" for none */
+    fcsl_run_t *run;        /* its machine's struct is part 0 of the history */
 } fcsl_observers_options_t;
 
-/* Listens; nothing is put before fcsl_observers_start. History and machine must outlive it. Null with `error`. */
+/* Listens; nothing is put before fcsl_observers_start. History and run must outlive it. Null with `error`. */
 fcsl_observers_t *fcsl_observers_open(const fcsl_observers_options_t *options, const fcsl_history_t *history,
                                       fcsl_error_t *error);
 int fcsl_observers_start(fcsl_observers_t *observers, fcsl_error_t *error);

@@ -6,6 +6,7 @@
 #ifndef FCSL_RECORDER_H
 #define FCSL_RECORDER_H
 
+#include "messages/record_messages.h"
 #include "run/run_internal.h"
 
 /* Opens the bag and records the initial checkpoint; null with `error` filled. */
@@ -20,17 +21,6 @@ void fcsl_recorder_set_lossless(fcsl_recorder_t *recorder, int lossless);
 /* The same, of a lossless recording alone: whether a step may begin. */
 int fcsl_recorder_may_step(const fcsl_recorder_t *recorder, fcsl_error_t *error);
 fcsl_record_drops_t fcsl_recorder_drops(const fcsl_recorder_t *recorder);
-
-/* One host write, as fcsl_msgs/HostWrite has it. */
-typedef struct {
-    fcsl_write_kind_t kind;
-    const char *path; /* of the descriptor, or a literal: it is read later */
-    uint32_t element;
-    const uint8_t *data; /* little-endian */
-    uint32_t size;
-    uint32_t age_ticks; /* of a sample, which may have a stamp */
-    int64_t stamp_ns;
-} fcsl_write_t;
 
 /* `tick` is the first tick to see it. */
 void fcsl_recorder_write(fcsl_recorder_t *recorder, uint64_t tick, const fcsl_write_t *write);

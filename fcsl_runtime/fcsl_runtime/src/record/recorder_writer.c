@@ -18,17 +18,9 @@ static int put(fcsl_recorder_t *recorder, uint32_t topic, uint64_t time_ns, cons
     return fcsl_bag_write(recorder->bag, topic, time_ns, cdr, (uint32_t)size, &recorder->failure);
 }
 
-/* Opens a message in the scratch with the header and tick that all of them begin with. */
-static fcsl_cdr_t begin(fcsl_recorder_t *recorder, fcsl_stamp_t stamp)
+/* Writes the message of `size` bytes that is in the scratch. */
+static int put_scratch(fcsl_recorder_t *recorder, uint32_t topic, fcsl_stamp_t stamp, size_t size)
 {
-    fcsl_cdr_t cdr;
-    fcsl_tick_message_begin(&cdr, stamp, recorder->scratch, recorder->scratch_size);
-    return cdr;
-}
-
-static int end(fcsl_recorder_t *recorder, uint32_t topic, fcsl_stamp_t stamp, const fcsl_cdr_t *cdr)
-{
-    const size_t size = fcsl_cdr_end(cdr);
     if (size == 0) {
         return fcsl_fail(&recorder->failure, "a message of tick %" PRIu64 " is too large", stamp.tick);
     }
@@ -37,46 +29,31 @@ static int end(fcsl_recorder_t *recorder, uint32_t topic, fcsl_stamp_t stamp, co
 
 static int put_checkpoint(fcsl_recorder_t *recorder, fcsl_stamp_t stamp, const uint8_t *data)
 {
-    const fcsl_machine_t *machine = recorder->machine;
-    fcsl_cdr_t cdr = begin(recorder, stamp);
-    fcsl_cdr_string(&cdr, machine->name);
-    fcsl_cdr_string(&cdr, machine->source_hash);
-    fcsl_cdr_string(&cdr, machine->layout_hash);
-    fcsl_cdr_string(&cdr, machine->build_hash);
-    uint8_t *bytes = fcsl_cdr_reserve_bytes(&cdr, machine->size);
-    if (bytes != NULL) {
-        fcsl_copy_canonical(machine, bytes, data);
-    }
-    return end(recorder, FCSL_TOPIC_CHECKPOINT, stamp, &cdr);
+    return put_scratch(
+        recorder, FCSL_TOPIC_CHECKPOINT, stamp,
+        fcsl_checkpoint_message(recorder->machine, data, stamp, recorder->scratch, recorder->scratch_size));
 }
 
 static int put_write(fcsl_recorder_t *recorder, fcsl_stamp_t stamp, const uint8_t *data)
 {
     fcsl_write_t write;
     memcpy(&write, data, sizeof write);
-    fcsl_cdr_t cdr = begin(recorder, stamp);
-    fcsl_cdr_u8(&cdr, (uint8_t)write.kind);
-    fcsl_cdr_string(&cdr, write.path);
-    fcsl_cdr_u32(&cdr, write.element);
-    fcsl_cdr_u32(&cdr, write.age_ticks);
-    fcsl_cdr_u64(&cdr, (uint64_t)write.stamp_ns);
-    uint8_t *bytes = fcsl_cdr_reserve_bytes(&cdr, write.size);
-    if (bytes != NULL && write.size > 0) {
-        memcpy(bytes, data + sizeof write, write.size);
-    }
-    return end(recorder, FCSL_TOPIC_WRITES, stamp, &cdr);
+    write.data = data + sizeof write;
+    return put_scratch(recorder, FCSL_TOPIC_WRITES, stamp,
+                       fcsl_write_message(&write, stamp, recorder->scratch, recorder->scratch_size));
 }
 
 static int put_forced(fcsl_recorder_t *recorder, fcsl_stamp_t stamp, const uint8_t *data)
 {
     const fcsl_state_t *states[2];
     memcpy(states, data, sizeof states);
-    fcsl_cdr_t cdr = begin(recorder, stamp);
+    fcsl_cdr_t cdr;
+    fcsl_tick_message_begin(&cdr, stamp, recorder->scratch, recorder->scratch_size);
     fcsl_cdr_string(&cdr, states[0]->name);
     fcsl_cdr_string(&cdr, states[1]->name);
     fcsl_cdr_string(&cdr, "");
     fcsl_cdr_string(&cdr, "");
-    return end(recorder, FCSL_TOPIC_TRANSITIONS, stamp, &cdr);
+    return put_scratch(recorder, FCSL_TOPIC_TRANSITIONS, stamp, fcsl_cdr_end(&cdr));
 }
 
 /* Records one fcsl_msgs message of a tick, if there is something to say. */

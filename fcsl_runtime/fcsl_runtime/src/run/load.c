@@ -13,6 +13,7 @@
 #include "fcsl/fcsl_library.h"
 #include "fcsl/fcsl_scalar.h"
 #include "hardware.h"
+#include "record/journal.h"
 #include "substitution.h"
 #include "trace.h"
 #include "validate.h"
@@ -133,6 +134,7 @@ static void release(fcsl_run_t *run)
     fcsl_hardware_close(run);
     fcsl_substitution_free(run);
     fcsl_trace_free(run);
+    fcsl_journal_close(run->journal);
     free(run->layouts);
     free(run->verdicts);
     free(run->data);

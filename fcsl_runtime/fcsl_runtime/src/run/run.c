@@ -137,7 +137,7 @@ uint64_t fcsl_run_monotonic_ns(void *ctx)
     return (uint64_t)now.tv_sec * 1000000000u + (uint64_t)now.tv_nsec;
 }
 
-static void note_verdicts(fcsl_run_t *run)
+static void keep_verdicts(fcsl_run_t *run)
 {
     for (uint32_t i = 0; i < run->machine->instance_count; i++) {
         const fcsl_instance_t *instance = &run->machine->instances[i];
@@ -149,14 +149,13 @@ static void note_verdicts(fcsl_run_t *run)
 }
 
 /* Overruns that the clock found in `tick`: an input of the run, so a replay injects them. */
-static void record_verdicts(fcsl_run_t *run, uint64_t tick)
+static void note_new_overruns(fcsl_run_t *run, uint64_t tick)
 {
     for (uint32_t i = 0; i < run->machine->instance_count; i++) {
         const fcsl_instance_t *instance = &run->machine->instances[i];
         if (instance->max_wcet_us != 0 && run->verdicts[i].injected == 0 &&
             fcsl_read_u64(run->data, instance->overruns_offset) != run->verdicts[i].overruns) {
-            fcsl_recorder_write(run->recorder, tick,
-                                &(fcsl_write_t){.kind = FCSL_WRITE_OVERRUN, .path = instance->name});
+            fcsl_note_write_at(run, tick, &(fcsl_write_t){.kind = FCSL_WRITE_OVERRUN, .path = instance->name});
         }
     }
 }
@@ -177,7 +176,7 @@ static int step_once(fcsl_run_t *run, uint64_t tick, fcsl_error_t *error)
 
 int fcsl_run_step(fcsl_run_t *run, uint64_t ticks, fcsl_error_t *error)
 {
-    if (run->recorder == NULL) {
+    if (!fcsl_writes_noted(run)) {
         for (uint64_t i = 0; i < ticks; i++) {
             if (step_once(run, fcsl_run_tick(run), error) != 0) {
                 return -1;
@@ -187,21 +186,23 @@ int fcsl_run_step(fcsl_run_t *run, uint64_t ticks, fcsl_error_t *error)
     }
     const int timed = run->host.clock_ns != NULL;
     for (uint64_t i = 0; i < ticks; i++) {
-        if (fcsl_recorder_may_step(run->recorder, error) != 0) {
+        if (run->recorder != NULL && fcsl_recorder_may_step(run->recorder, error) != 0) {
             return -1;
         }
         const uint64_t tick = fcsl_run_tick(run);
         if (timed) {
-            note_verdicts(run);
+            keep_verdicts(run);
         }
         if (step_once(run, tick, error) != 0) {
             return -1;
         }
-        fcsl_substitution_record(run, tick);
+        fcsl_substitution_note(run, tick);
         if (timed) {
-            record_verdicts(run, tick);
+            note_new_overruns(run, tick);
         }
-        fcsl_recorder_tick(run->recorder, tick);
+        if (run->recorder != NULL) {
+            fcsl_recorder_tick(run->recorder, tick);
+        }
     }
     return 0;
 }

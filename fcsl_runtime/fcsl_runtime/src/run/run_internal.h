@@ -9,6 +9,7 @@
 #include "messages/message.h"
 
 typedef struct fcsl_recorder fcsl_recorder_t;
+typedef struct fcsl_journal fcsl_journal_t;
 
 /* Instead of a time: tick k is at k / tick_hz. */
 #define FCSL_TICK_TIME UINT64_MAX
@@ -44,6 +45,7 @@ struct fcsl_run {
     uint8_t *left;
     uint64_t messages_refused;
     fcsl_recorder_t *recorder; /* null: not recording */
+    fcsl_journal_t *journal;   /* null: none */
     uint64_t record_time_ns;   /* of the coming records; FCSL_TICK_TIME: that of their tick */
     fcsl_trace_t *traces;      /* null: none */
     char *views;               /* of the host; null: those of the machine */

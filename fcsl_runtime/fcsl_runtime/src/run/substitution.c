@@ -1,6 +1,6 @@
 /* SPDX-License-Identifier: Apache-2.0
  *
- * Records what instances with I/O left in a tick, and puts it in place in a replay.
+ * Notes what instances with I/O left in a tick, and puts it in place in a replay.
  */
 #include "substitution.h"
 
@@ -8,7 +8,7 @@
 #include <stdlib.h>
 
 #include "fcsl/fcsl_scalar.h"
-#include "record/recorder.h"
+#include "writes.h"
 
 /* Whether an execute may change this field: outputs, state, the count of faults and the place of the last one. */
 static int is_left(const fcsl_instance_t *instance, const fcsl_field_t *field)
@@ -125,7 +125,7 @@ void fcsl_substitution_settle(fcsl_run_t *run)
     }
 }
 
-void fcsl_substitution_record(fcsl_run_t *run, uint64_t tick)
+void fcsl_substitution_note(fcsl_run_t *run, uint64_t tick)
 {
     if (run->impure_count == 0) {
         return;
@@ -139,11 +139,11 @@ void fcsl_substitution_record(fcsl_run_t *run, uint64_t tick)
         if (impure->size != 0 && tick % entry->divisor == entry->phase) {
             uint8_t *bytes = run->left + impure->offset;
             move(run, entry->instance, bytes, 1);
-            fcsl_recorder_write(run->recorder, tick,
-                                &(fcsl_write_t){.kind = FCSL_WRITE_IMPURE,
-                                                .path = machine->instances[entry->instance].name,
-                                                .data = bytes,
-                                                .size = impure->size});
+            fcsl_note_write_at(run, tick,
+                               &(fcsl_write_t){.kind = FCSL_WRITE_IMPURE,
+                                               .path = machine->instances[entry->instance].name,
+                                               .data = bytes,
+                                               .size = impure->size});
         }
     }
 }

@@ -16,7 +16,7 @@ void fcsl_substitution_free(fcsl_run_t *run);
 int32_t fcsl_substitution_apply(void *ctx, uint32_t instance);
 /* After a step: forgets substitutes of instances that did not execute. */
 void fcsl_substitution_settle(fcsl_run_t *run);
-/* After the step of `tick`: records what the impure instances that executed have left. */
-void fcsl_substitution_record(fcsl_run_t *run, uint64_t tick);
+/* After the step of `tick`: notes what the impure instances that executed have left. */
+void fcsl_substitution_note(fcsl_run_t *run, uint64_t tick);
 
 #endif /* FCSL_SUBSTITUTION_H */

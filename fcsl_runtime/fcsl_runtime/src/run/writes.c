@@ -12,14 +12,29 @@
 
 #include "fcsl/fcsl_scalar.h"
 #include "range.h"
+#include "record/journal.h"
+#include "record/recorder.h"
 
 enum { RANGE_BYTES = 64 };
 
-void fcsl_note_write(fcsl_run_t *run, const fcsl_write_t *write)
+int fcsl_writes_noted(const fcsl_run_t *run)
+{
+    return run->recorder != NULL || fcsl_journal_is_followed(run->journal);
+}
+
+void fcsl_note_write_at(fcsl_run_t *run, uint64_t tick, const fcsl_write_t *write)
 {
     if (run->recorder != NULL) {
-        fcsl_recorder_write(run->recorder, fcsl_run_tick(run), write);
+        fcsl_recorder_write(run->recorder, tick, write);
     }
+    if (fcsl_journal_is_followed(run->journal)) {
+        fcsl_journal_note(run->journal, tick, write);
+    }
+}
+
+void fcsl_note_write(fcsl_run_t *run, const fcsl_write_t *write)
+{
+    fcsl_note_write_at(run, fcsl_run_tick(run), write);
 }
 
 /* `[-1, 1]`, `[0, inf]`: the fewest digits that tell the bounds from other values of the type. */
@@ -204,8 +219,8 @@ int fcsl_run_attach(fcsl_run_t *run, fcsl_error_t *error)
     return 0;
 }
 
-/* Records each channel that a sensor message brought, as its field holds it now. */
-static void record_channels(fcsl_run_t *run, const fcsl_message_t *message)
+/* Notes each channel that a sensor message brought, as its field holds it now. */
+static void note_channels(fcsl_run_t *run, const fcsl_message_t *message)
 {
     fcsl_message_entry_t entry = {0};
     while (fcsl_message_next(run->machine, message, &entry) != 0) {
@@ -227,8 +242,8 @@ int fcsl_run_sense_message(fcsl_run_t *run, const fcsl_message_t *message, fcsl_
                          message->tick, due);
     }
     fcsl_message_apply(run->machine, run->data, message);
-    if (run->recorder != NULL) {
-        record_channels(run, message);
+    if (fcsl_writes_noted(run)) {
+        note_channels(run, message);
     }
     return 0;
 }

@@ -2,9 +2,14 @@
 #ifndef FCSL_WRITES_H
 #define FCSL_WRITES_H
 
-#include "record/recorder.h"
+#include "messages/record_messages.h"
+#include "run_internal.h"
 
-/* Records a host write that the coming tick will be the first to see. */
+/* Whether anybody is told of what the host does: a recorder, or who follows the journal. */
+int fcsl_writes_noted(const fcsl_run_t *run);
+/* Tells them of a host write that `tick` is the first to see. */
+void fcsl_note_write_at(fcsl_run_t *run, uint64_t tick, const fcsl_write_t *write);
+/* The same of the coming tick. */
 void fcsl_note_write(fcsl_run_t *run, const fcsl_write_t *write);
 
 #endif /* FCSL_WRITES_H */

@@ -27,6 +27,8 @@ Array = np.ndarray[Any, Any]
 
 _OWN_PACKAGE = "fcsl_msgs/msg/"
 _CHECKPOINT_SUFFIX = "/record/checkpoint"
+#: A bystander has the machine's channels in it (docs/bus.md).
+_DESCRIPTOR_SUFFIX = "/record/descriptor"
 #: End of the topic that says what plots and viewers show of a machine. It is no part of what the machine did.
 VIEWS_SUFFIX = "/record/views"
 #: FCSL_VIEWS_BYTES_MAX of fcsl_machine.h, with encapsulation, length and terminating zero.
@@ -57,6 +59,8 @@ class RecordedMachine:
     prefix: str
     outputs: dict[str, str]
     fields: dict[str, str] = field(default_factory=dict)
+    #: A bystander on the bus recorded it: the values of its channels, instead of outputs and states.
+    by_bystander: bool = False
 
     @property
     def checkpoint(self) -> str:
@@ -65,6 +69,11 @@ class RecordedMachine:
     @property
     def writes(self) -> str:
         return self.prefix + "/record/writes"
+
+    @property
+    def lacks(self) -> str:
+        """Of a bystander: the topic that says why the run is not reproduced."""
+        return self.prefix + "/record/lacks"
 
     @property
     def views(self) -> str:
@@ -274,13 +283,19 @@ class Bag:
 
     # ---- machines ------------------------------------------------------------------------------------------
 
-    def machines(self) -> list[RecordedMachine]:
-        """The machines that this bag records; empty for a bag that FCSL did not record."""
+    def machines(self, by_bystanders: bool = False) -> list[RecordedMachine]:
+        """The machines that this bag records, on request those of `fcsl-bus record`, too; empty for a bag that FCSL did
+        not record.
+        """
         found = []
         for name in self.topics:
             if not name.endswith(_CHECKPOINT_SUFFIX):
                 continue
             prefix = name.removesuffix(_CHECKPOINT_SUFFIX)
+            if prefix + _DESCRIPTOR_SUFFIX in self.topics:
+                if by_bystanders:
+                    found.append(RecordedMachine(prefix.rsplit("/", 1)[-1], prefix, {}, by_bystander=True))
+                continue
             outputs = {
                 topic.name.removeprefix(prefix + "/"): topic.name
                 for topic in self.topics.values()
@@ -298,11 +313,16 @@ class Bag:
             found.append(RecordedMachine(prefix.rsplit("/", 1)[-1], prefix, outputs, fields))
         return found
 
-    def machine(self, wanted: str = "") -> RecordedMachine:
+    def machine(self, wanted: str = "", by_bystanders: bool = False) -> RecordedMachine:
         """The machine named `wanted` (or its topic prefix), or the only one. Raises BagError."""
-        machines = self.machines()
+        machines = self.machines(by_bystanders)
         if not machines and self.truncated:
             raise BagError(f"{self.path}: damaged or cut off before the first record of a machine ({self.truncated})")
+        if not machines and self.machines(by_bystanders=True):
+            raise BagError(
+                f"{self.path}: `fcsl-bus record` made it: it has the values of channels, not all outputs and states of "
+                "a machine; simclient.replay runs it"
+            )
         if not machines:
             raise BagError(
                 f"{self.path}: not a recording of a machine (no topic */record/checkpoint); "
@@ -317,6 +337,11 @@ class Bag:
                 + f"; it holds {names}"
             )
         return chosen[0]
+
+    def lacks(self, machine: RecordedMachine) -> str:
+        """Why the bag of a bystander does not reproduce the machine's run; "" if nothing says so."""
+        messages = self.messages({machine.lacks}) if machine.lacks in self.topics else ()
+        return next((str(self.decode_own(machine.lacks, data, ("data",)).data) for _, _, data in messages), "")
 
     def views(self, machine: RecordedMachine) -> str:
         """What plots and viewers show of the machine, as the recording host gave it: JSON (docs/language.md, views), of

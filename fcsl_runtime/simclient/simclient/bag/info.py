@@ -78,7 +78,7 @@ def _write_kinds(bag: Bag, topic: str) -> dict[int, str]:
 
 def describe(bag: Bag, machine: str = "") -> str:
     """The text. `machine` selects one of several machines. Raises BagError."""
-    machines = [bag.machine(machine)] if machine else bag.machines()
+    machines = [bag.machine(machine, True)] if machine else bag.machines(by_bystanders=True)
     found = _scan(bag, machines)
     spans = [span for span in found.spans.values() if span.count]
     lines = _head(bag, spans)
@@ -124,8 +124,10 @@ def _table(rows: Sequence[tuple[str, ...]], right: tuple[int, ...]) -> list[str]
 
 def _machine(bag: Bag, machine: RecordedMachine, found: Contents) -> list[str]:
     lines = [f"machine    {machine.prefix}"]
-    data = found.checkpoints.get(machine.checkpoint)
-    if data is None:
+    data, lacks = found.checkpoints.get(machine.checkpoint), bag.lacks(machine)
+    if lacks:
+        lines.append(f"record     does not reproduce the run: {lacks}")
+    elif data is None:
         lines.append("record     no checkpoint: shows what the machine did, but cannot be replayed")
     else:
         wanted = ("tick", "source_hash", "layout_hash", "build_hash", "data")
@@ -138,7 +140,7 @@ def _machine(bag: Bag, machine: RecordedMachine, found: Contents) -> list[str]:
         ]
     writes = found.writes.get(machine.writes, Counter())
     lines.append("writes     " + (", ".join(f"{count} {kind}" for kind, count in sorted(writes.items())) or "none"))
-    return lines + _states(bag, machine)
+    return lines if machine.by_bystander else lines + _states(bag, machine)
 
 
 def _states(bag: Bag, machine: RecordedMachine) -> list[str]:

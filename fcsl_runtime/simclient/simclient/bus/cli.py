@@ -7,9 +7,12 @@ import argparse
 import json
 import signal
 import sys
+import threading
 import time
 from collections import Counter
 from collections.abc import Callable, Iterator, Sequence
+from contextlib import ExitStack
+from functools import partial
 from itertools import count, islice
 from pathlib import Path
 from typing import Any
@@ -23,15 +26,15 @@ from .machine import BusChannel, BusMachine, read_machine
 from .session import Session
 
 _EPILOG = """\
--c is where fcsl-fc or fcsl-sim listens with --observers. A channel is its name, or MACHINE/NAME where several machines
-have one. Exit status: 0; 2 if nothing listens, or for wrong usage."""
+-c is where fcsl-fc or fcsl-sim listens with --observers; `play` listens itself. A channel is its name, or MACHINE/NAME
+where several machines have one. Exit status: 0; 1 if `play` was answered otherwise than in its bag; 2 if nothing
+listens, the flight computer is another one or gone, or for wrong usage."""
 
 
 def main(arguments: Sequence[str]) -> int:
     options = _parser().parse_args(arguments)
-    run: Callable[[argparse.Namespace], None] = options.run
-    run(options)
-    return 0
+    run: Callable[[argparse.Namespace], int | None] = options.run
+    return run(options) or 0
 
 
 def _parser() -> argparse.ArgumentParser:
@@ -42,9 +45,12 @@ def _parser() -> argparse.ArgumentParser:
     add_version(parser, "simclient", __file__)
     commands = parser.add_subparsers(metavar="COMMAND", required=True)
 
-    def add(name: str, run: Callable[[argparse.Namespace], None], text: str) -> argparse.ArgumentParser:
+    def add(name: str, run: Callable[[argparse.Namespace], int | None], text: str) -> argparse.ArgumentParser:
         command = commands.add_parser(name, help=text, description=text)
-        command.add_argument("-c", "--connect", required=True, metavar="tcp/HOST:PORT", help="who listens")
+        if name == "play":
+            command.add_argument("--listen", required=True, metavar="tcp/HOST:PORT", help="where fcsl-fc connects to")
+        else:
+            command.add_argument("-c", "--connect", required=True, metavar="tcp/HOST:PORT", help="who listens")
         command.set_defaults(run=run)
         return command
 
@@ -61,8 +67,24 @@ def _parser() -> argparse.ArgumentParser:
     command.add_argument("channel", metavar="CHANNEL")
     command.add_argument("value", metavar="VALUE", help="such as 0.5, true, '[0, 0, 9.81]'; of a blob hex digits")
     command.add_argument("--descriptor", type=Path, metavar="FILE", help="`list --json` of a bus that serves it")
-    command = add("record", _record, "records all values into a bag, until Ctrl-C or the end of the flight")
+    command = add(
+        "record",
+        _record,
+        "records all values, and what replays the run, into a bag, until Ctrl-C or the end of the flight",
+    )
     command.add_argument("-o", "--output", required=True, type=Path, metavar="DIR", help="new directory for the bag")
+    command = add("play", _play, "plays a bag's sensors to a flight computer in lock-step, and compares its answers")
+    command.add_argument("bag", metavar="BAG", help="of `record`, or of fcsl-fc, fcsl-sim or a twin")
+    command.add_argument(
+        "--speed", type=_speed, default=0.0, metavar="FACTOR", help="1: real time (default: as fast as it goes)"
+    )
+    command.add_argument("--machine", default="", metavar="NAME", help="the machine, if the bag has several")
+    which = command.add_mutually_exclusive_group()
+    which.add_argument("--config", default="", metavar="FILE", help="machine JSON, for a bag that a host recorded")
+    which.add_argument("--library", default="", metavar="FILE", help="machine library, for the same")
+    command.add_argument(
+        "--timeout", type=_seconds, default=10.0, metavar="SECONDS", help="seconds for each answer (default 10)"
+    )
     return parser
 
 
@@ -73,12 +95,20 @@ def _count(text: str) -> int:
 
 
 def _seconds(text: str) -> float:
+    return _positive(text, 3600, "seconds")
+
+
+def _speed(text: str) -> float:
+    return _positive(text, 1000, "a speed")
+
+
+def _positive(text: str, most: float, what: str) -> float:
     try:
         number = float(text)
     except ValueError:
         number = 0.0
-    if not 0 < number <= 3600:
-        raise argparse.ArgumentTypeError(f"seconds wanted, above 0 and up to 3600, not {text!r}")
+    if not 0 < number <= most:
+        raise argparse.ArgumentTypeError(f"{what} wanted, above 0 and up to {most:g}, not {text!r}")
     return number
 
 
@@ -212,16 +242,49 @@ def _record(options: argparse.Namespace) -> None:
 
     with Session(options.connect) as session:
         machines = session.machines()
-        with recording(options.output, machines) as bag:
-            feed = Feed(session, machines)
+        with recording(options.output, machines, session, partial(print, flush=True)) as bag:
+            feed = Feed(session, machines, writes=True)
             for number in (signal.SIGINT, signal.SIGTERM):  # an exception could leave half a message in the bag
                 signal.signal(number, lambda *_: session.stop())
             print(f"recording {', '.join(m.prefix for m in machines)} to {options.output}", flush=True)
-            for found in feed.ticks():
-                if found is not None:
-                    bag.write(*found)
+            for found in feed.events():
+                bag.take(found)
         print(f"{options.output}: {bag.messages} messages")
+        for prefix, verdict in bag.verdicts.items():
+            print(f"{prefix}: {verdict}")
         _tell_lost(feed)
+
+
+def _play(options: argparse.Namespace) -> int:
+    from ..bag import Bag  # here, because these imports take as long as all others
+    from ..replay.replaying import open_machine
+    from .controller import Controller
+    from .play import Player
+    from .tape import read_tape
+
+    bag = Bag(options.bag)
+    with ExitStack() as opened:
+        run = open_machine(options.config, options.library, None) if options.config or options.library else None
+        if run is not None:
+            opened.callback(run.close)
+        tape = read_tape(bag, run, options.machine)
+        tape.check()
+        session = opened.enter_context(Session(options.listen, listens=True))
+        stop = threading.Event()
+        for number in (signal.SIGINT, signal.SIGTERM):  # an exception could leave half a tick on the bus
+            signal.signal(number, lambda *_: stop.set())
+        controller = Controller(session, tape.machine, options.timeout)
+        print(f"{tape.machine.prefix}: waiting for a flight computer on {options.listen}", flush=True)
+        if not controller.meet(stop.is_set):
+            return 0
+        opened.callback(controller.end)
+        print(f"{tape.machine.prefix}: playing", flush=True)
+        played = Player(tape, controller, options.speed, stop.is_set).play()
+    print(played)
+    if tape.left_out:
+        done = ", ".join(f"{count} {kind}" for kind, count in sorted(tape.left_out.items()))
+        print(f"fcsl-bus: the host did more than sample, which is not played: {done}", file=sys.stderr)
+    return 1 if played.differ else 0
 
 
 def _tell_lost(feed: Feed) -> None:

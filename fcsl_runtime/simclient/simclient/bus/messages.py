@@ -38,13 +38,56 @@ MSG: builtin_interfaces/Time
 int32 sec
 uint32 nanosec
 """
+#: Topics of a machine that say what reproduces it: behind `/[NAMESPACE/]MACHINE/`, with type and definition.
+DESCRIPTOR, CHECKPOINT, WRITES, LACKS = "record/descriptor", "record/checkpoint", "record/writes", "record/lacks"
+_STRING = "std_msgs/msg/String", "string data\n"
+RECORD_TOPICS = {
+    DESCRIPTOR: _STRING,
+    CHECKPOINT: (
+        "fcsl_msgs/msg/Checkpoint",
+        """\
+std_msgs/Header header
+uint64 tick
+string machine
+string source_hash
+string layout_hash
+string build_hash
+uint8[] data
+"""
+        + _NEEDED,
+    ),
+    WRITES: (
+        "fcsl_msgs/msg/HostWrite",
+        """\
+uint8 SET=0
+uint8 SET_STATE=1
+uint8 RESTORE=2
+uint8 CHANNEL=3
+uint8 OVERRUN=4
+uint8 ATTACH=5
+uint8 IMPURE=6
+uint8 FAULT=7
+uint8 HEALTH=8
+std_msgs/Header header
+uint64 tick
+uint8 kind
+string path
+uint32 element
+uint32 age_ticks
+int64 stamp_ns
+uint8[] data
+"""
+        + _NEEDED,
+    ),
+    LACKS: _STRING,
+}
 #: Encapsulation (little-endian), stamp, length and zero of the frame, padding, tick.
 _HEAD = struct.Struct("<4siIIB3xQ")
 
 
-def topic_of(machine: BusMachine, channel: BusChannel) -> str:
-    """`/[NAMESPACE/]MACHINE/CHANNEL`, with a level for each dot of the channel's name."""
-    return "/" + re.sub(r"[^\w/]", "_", f"{machine.prefix}/{channel.name.replace('.', '/')}", flags=re.ASCII)
+def topic_of(prefix: str, name: str) -> str:
+    """`/[NAMESPACE/]MACHINE/NAME`; a channel has a level for each dot of its name."""
+    return "/" + re.sub(r"[^\w/]", "_", f"{prefix}/{name.replace('.', '/')}", flags=re.ASCII)
 
 
 def type_names(machine: BusMachine) -> dict[str, str]:
@@ -73,6 +116,12 @@ def definition_of(channel: BusChannel) -> str:
 def message_of(channel: BusChannel, tick: int, time_ns: int, value: bytes) -> bytes:
     head = _HEAD.pack(b"\0\1\0\0", time_ns // 1_000_000_000 % (1 << 31), time_ns % 1_000_000_000, 1, 0, tick)
     return head + (struct.pack("<I", len(value)) if channel.is_blob else b"") + value
+
+
+def string_of(text: str) -> bytes:
+    """std_msgs/String as CDR."""
+    data = text.encode() + b"\0"
+    return b"\0\1\0\0" + struct.pack("<I", len(data)) + data
 
 
 def _one_line(text: str) -> str:

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""A session on the bus, as a client of one that listens. It listens nowhere and looks for nobody."""
+"""A session on the bus: a client of one that listens, or the one that listens. It looks for nobody."""
 
 from __future__ import annotations
 
@@ -19,6 +19,8 @@ _ENDPOINT = re.compile(r"tcp/(\[[0-9a-fA-F:.%]+\]|[\w.-]+):[0-9]{1,5}")
 _CONNECT_MS = 2000
 _DESCRIBE_S = 2.0
 _LOOK_S = 0.2
+#: A link that was lost is back within this time, or the one that listens is gone.
+_GONE_S = 1.0
 #: Zenoh refuses longer ones; those of FCSL have 1 MiB at most.
 _MESSAGE_BYTES_MAX = 2 << 20
 #: Most messages, and bytes of them, that wait to be read; of more, the newest are dropped and counted.
@@ -30,11 +32,31 @@ class Message(NamedTuple):
     data: bytes
 
 
-class Session:
-    """Connected to `endpoint` (tcp/HOST:PORT). A context manager. Raises BusError."""
+class Question:
+    """A query under way."""
 
-    def __init__(self, endpoint: str):
+    def __init__(self, replies: Any, failure: type[Exception]):
+        self._replies, self._failure = replies, failure
+        self.is_over = False
+
+    def answer(self) -> bytes | None:
+        """The first answer, once it has come."""
+        try:
+            while (reply := self._replies.try_recv()) is not None:
+                if reply.ok is not None:
+                    self.is_over = True
+                    return bytes(reply.ok.payload)
+        except self._failure:  # no answer will come
+            self.is_over = True
+        return None
+
+
+class Session:
+    """Connected to `endpoint` (tcp/HOST:PORT), or listening there. A context manager. Raises BusError."""
+
+    def __init__(self, endpoint: str, listens: bool = False):
         self.endpoint = endpoint
+        self._listens = listens
         self.dropped = 0
         self._stopped = False
         self._zenoh = _zenoh()
@@ -47,15 +69,16 @@ class Session:
     def _open(self) -> Any:
         if not _ENDPOINT.fullmatch(self.endpoint):
             raise BusError(f"{self.endpoint} is no endpoint: write tcp/HOST:PORT, like tcp/127.0.0.1:7447")
+        here, there = ([self.endpoint], []) if self._listens else ([], [self.endpoint])
         settings = {
-            "mode": "client",
+            "mode": "peer" if self._listens else "client",
             "connect": {
-                "endpoints": [self.endpoint],
+                "endpoints": there,
                 "timeout_ms": _CONNECT_MS,
                 "exit_on_failure": True,
                 "retry": {"period_init_ms": 50, "period_max_ms": 200, "period_increase_factor": 2},
             },
-            "listen": {"endpoints": []},
+            "listen": {"endpoints": here},
             "scouting": {"multicast": {"enabled": False}, "gossip": {"enabled": False}},
             "transport": {
                 "link": {"tx": {"lease": 1000, "keep_alive": 4}, "rx": {"max_message_size": _MESSAGE_BYTES_MAX}}
@@ -64,6 +87,10 @@ class Session:
         try:
             return self._zenoh.open(self._zenoh.Config.from_json5(json.dumps(settings)))
         except self._zenoh.ZError:
+            if self._listens:
+                raise BusError(
+                    f"cannot listen on {self.endpoint}: it is taken, or no address of this machine"
+                ) from None
             raise BusError(
                 f"no bus listens on {self.endpoint}: start fcsl-fc or fcsl-sim with --observers {self.endpoint}"
             ) from None
@@ -91,10 +118,20 @@ class Session:
             raise BusError(f"no machine is on {self.endpoint}: it is served by fcsl-fc and fcsl-sim with --observers")
         return [machine for _, machine in sorted(found.items())]
 
-    def subscribe(self, machines: Iterable[BusMachine]) -> None:
-        """`messages` brings what comes under their keys from now on."""
+    def subscribe(self, machines: Iterable[BusMachine], *names: str) -> None:
+        """`messages` brings what comes from now on: all values and commits, then what is under these names, too."""
+        # On Zenoh's own thread: one thread for each subscriber would lose the order among them.
+        heard = self._zenoh.handlers.Callback(self._heard, indirect=False)
         for machine in machines:
-            self._subscribers.append(self._session.declare_subscriber(f"{machine.prefix}/*", self._heard))
+            for name in ("*", *names):
+                subscriber = self._session.declare_subscriber(
+                    f"{machine.prefix}/{name}", heard, allowed_origin=self._zenoh.Locality.REMOTE
+                )
+                self._subscribers.append(subscriber)
+
+    def ask(self, key: str) -> Question:
+        """Asks for what is under the key; does not wait."""
+        return Question(self._session.get(key, timeout=_DESCRIBE_S), self._zenoh.ZError)
 
     def _heard(self, sample: Any) -> None:
         """On a thread of Zenoh's."""
@@ -112,6 +149,7 @@ class Session:
     def messages(self, until_s: float | None = None) -> Iterator[Message | None]:
         """What came, in its order; None where nothing more has come yet. Ends at `until_s` of time.monotonic(), after
         `stop`, or when the one that listens is gone."""
+        seen_s = time.monotonic()
         while not self._stopped and (until_s is None or time.monotonic() < until_s):
             with self._news:
                 if not self._waiting:
@@ -120,8 +158,36 @@ class Session:
                 batch, self._waiting, self._bytes = self._waiting, deque(), 0
             yield from batch
             yield None
-            if not batch and not self._is_connected():
+            if batch or self._is_connected():
+                seen_s = time.monotonic()
+            elif time.monotonic() > seen_s + _GONE_S:
                 return
+
+    def receive(self, until_s: float) -> Message | None:
+        """The next message; None when none has come until then."""
+        with self._news:
+            while not self._waiting and (left_s := until_s - time.monotonic()) > 0:
+                self._news.wait(left_s)
+            if not self._waiting:
+                return None
+            message = self._waiting.popleft()
+            self._bytes -= len(message.data)
+            return message
+
+    def declare_token(self, key: str) -> None:
+        """While the session lives, others see it: the key, and the session's number behind it."""
+        self._subscribers.append(self._session.liveliness().declare_token(f"{key}/{self._session.zid()}"))
+
+    def watch_tokens(self, key: str) -> set[str]:
+        """The tokens of others under this expression, kept up to date."""
+        alive: set[str] = set()
+
+        def heard(sample: Any) -> None:
+            change = alive.add if sample.kind == self._zenoh.SampleKind.PUT else alive.discard
+            change(str(sample.key_expr))
+
+        self._subscribers.append(self._session.liveliness().declare_subscriber(key, heard, history=True))
+        return alive
 
     def stop(self) -> None:
         """Ends `messages`. May be called by a signal's handler."""

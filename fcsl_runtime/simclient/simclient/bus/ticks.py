@@ -42,6 +42,7 @@ class Lost:
 @dataclass
 class _Direction:
     last: int | None = None  # tick of the last commit
+    is_known: bool = False  # that nothing of the tick that comes was missed
     lost: int = 0  # ticks
     waiting: dict[str, list[bytes]] = field(default_factory=dict)  # since then
 
@@ -74,6 +75,11 @@ class TickReader:
             values.append(data)
         return None
 
+    def jump(self) -> None:
+        """A checkpoint was restored: the next tick may be any."""
+        for state in self._directions.values():
+            state.last, state.waiting, state.is_known = None, {}, True
+
     def _commit(self, data: bytes) -> Tick | None:
         if len(data) != self._commit_bytes:
             self._refused += 1
@@ -84,11 +90,11 @@ class TickReader:
             self._refused += 1
             return None
         state = self._directions[_DIRECTIONS[direction]]
-        last, waiting = state.last, state.waiting
-        state.last, state.waiting = tick, {}
-        if last is None:  # what came before it may be a part
+        last, waiting, is_known = state.last, state.waiting, state.is_known or tick == 0
+        state.last, state.waiting, state.is_known = tick, {}, False
+        if last is None and not is_known:  # what came before it may be a part
             return None
-        if tick != last + 1:
+        if last is not None and tick != last + 1:
             state.lost += max(1, tick - last)
             return None
         return Tick(tick, self._values(bits, waiting))

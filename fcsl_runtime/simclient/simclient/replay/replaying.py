@@ -30,7 +30,8 @@ from .verdict import Verdict
 _MAX_LISTED = 10
 
 
-def _open(config: str, library: str, machine: str | None) -> Run:
+def open_machine(config: str, library: str, machine: str | None) -> Run:
+    """A new run of the machine in `config` (JSON) or `library`. Raises TwinError."""
     if config:
         built, name = build_config(config)
         return open_run(built, name)
@@ -129,16 +130,19 @@ def replay(
     differing parameters.
     """
     opened = bag if isinstance(bag, Bag) else Bag(bag)
-    recorded = opened.machine(machine)
+    recorded = opened.machine(machine, by_bystanders=True)
+    if lacks := opened.lacks(recorded):
+        raise BagError(f"{opened.path}: it does not reproduce the run of `{recorded.name}`: {lacks}")
     checkpoint = _first_checkpoint(opened, recorded)
-    whole = _open(config, library, recorded.name)
+    whole = open_machine(config, library, recorded.name)
     run = _recorded_part(whole, recorded, checkpoint.layout_hash, config)
     try:
         notes = _check_source(opened, checkpoint, run, ignore_source_hash)
         if run is not whole:
             names = ", ".join(instance.name for instance in run.machine.instances)
             notes.append(f"the bag records a part of `{run.machine.name}`, so only that part ran: {names}")
-        expected = opened.topics[recorded.state].count if recorded.state in opened.topics else 0
+        counted = opened.topics.get(recorded.writes if recorded.by_bystander else recorded.state)
+        expected = counted.count if counted else 0
         verdict = Replay(opened, recorded, run).run(Progress("replaying", expected).at)
         verdict.notes += notes
         return verdict
@@ -170,7 +174,7 @@ def replay_foreign(
     opened = with_transforms(opened, entries, parsed.header_time)
     stages = _Stages()
     with complete_or_absent(output) if output is not None else nullcontext() as directory:
-        run = _open(config, library, machine or None)
+        run = open_machine(config, library, machine or None)
         try:
             targets = check(expectations, opened, run.machine)
             record = (directory, name_space) if directory is not None else None

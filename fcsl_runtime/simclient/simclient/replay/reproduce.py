@@ -15,6 +15,7 @@ from ..bag.states import StateReader
 from ..c_machine import HEALTH_NAMES
 from ..errors import BagError, TwinError
 from ..run import Run
+from .channels import ChannelComparison
 from .verdict import Divergence, OutputComparison, Verdict
 
 #: HostWrite.kind
@@ -35,14 +36,16 @@ class Replay:
         self._run = run
         self._instances = {instance.name: instance.index for instance in run.machine.instances}
         self._channels = {channel.name: channel for channel in run.machine.channels}
-        self._outputs: dict[str, OutputComparison] = {}
+        self._outputs: dict[str, OutputComparison | ChannelComparison] = {}
         for name, topic in recorded.outputs.items():
             if name not in self._instances:
                 raise BagError(
                     f"{bag.path}: it records instance `{name}`, which machine `{run.machine.name}` does not have"
                 )
             self._outputs[topic] = OutputComparison(bag, topic, run, self._instances[name])
-        self._state_reader = StateReader(bag, recorded.state)
+        if recorded.by_bystander:
+            self._outputs = {c.topic: c for c in ChannelComparison.all(bag, recorded, run)}
+        self._state_reader = None if recorded.by_bystander else StateReader(bag, recorded.state)
         self._states = 0
         self._started = False
         self._restored = False
@@ -53,9 +56,12 @@ class Replay:
     def run(self, progress: Callable[[int], None] = lambda ticks: None) -> Verdict:
         """Replays until the bag ends, lacks messages, or a value differs. Raises BagError if the record contradicts itself."""
         verdict = self._verdict
-        for topic, _, data in self._bag.messages_before_damage(self._topics.topics):
+        topics = {self._topics.checkpoint, self._topics.writes, self._topics.state, *self._outputs}
+        for topic, _, data in self._bag.messages_before_damage(topics):
             if topic == self._topics.checkpoint:
                 self._start(data)
+            elif not self._started and self._topics.by_bystander:
+                continue  # what crossed the bus before
             elif not self._started:
                 raise BagError(f"{self._bag.path}: `{topic}` comes before the initial checkpoint")
             elif topic == self._topics.writes:
@@ -155,6 +161,7 @@ class Replay:
             self._diverged(tick, *found)
 
     def _compare_state(self, data: bytes) -> None:
+        assert self._state_reader is not None
         sample = self._state_reader.read(data)
         self._advance(sample.tick + 1, f"`{self._topics.state}`")
         self._states += 1
@@ -189,10 +196,15 @@ class Replay:
         if self._bag.truncated:
             verdict.missing.append(f"the bag is incomplete: {self._bag.truncated}")
         counts = {comparison.topic: comparison.messages for comparison in self._outputs.values()}
-        counts[self._topics.state] = self._states
+        if self._state_reader is not None:
+            counts[self._topics.state] = self._states
         for topic, count in counts.items():
             if count < verdict.ticks:
                 verdict.missing.append(f"`{topic}` has {count} of {verdict.ticks} messages")
+        if self._topics.by_bystander:
+            channels = ", ".join(comparison.name for comparison in self._outputs.values())
+            verdict.notes.append(f"a bystander made the bag: compared are the actuator channels {channels or '(none)'}")
+            return
         absent = sorted(set(self._instances) - set(self._topics.outputs))
         if absent:
             # For the same machine, missing outputs were not chosen for recording.
