@@ -148,9 +148,14 @@ class ControllerNode(LifecycleNode):
     def _activate(self) -> None:
         assert self._hosted is not None and self._mode is not None
         count, limit_s = self._options["wait_for_subscribers"], self._options["start_timeout_s"]
-        wait_for_subscribers(self._hosted.topics.all, count, limit_s, self._stop)
+        wait_for_subscribers(self._hosted.topics.all, count, limit_s, self._waiting)
         self._mode.activate()
         self._active, self._ending = True, "shut down"
+
+    def _waiting(self) -> None:
+        self._stop.check()
+        assert self._hosted is not None
+        self._hosted.topics.say_alive()
 
     def _end_ticking(self) -> None:
         """The actuators on topics get their safe values: no command follows."""

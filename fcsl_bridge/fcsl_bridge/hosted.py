@@ -55,7 +55,8 @@ class Hosted:
             raise
 
     def _open(self, node: Node, options: Mapping[str, Any], given: Mapping[str, Any], allowed: Allowed) -> None:
-        self.run = open_run(*find_machine(options["machine"]))
+        library, machine = find_machine(options["machine"])
+        self.run = open_run(library, machine)
         self._stack.callback(self.run.close)
         self.run.attach()
         self._initial = self.run.save()
@@ -72,7 +73,7 @@ class Hosted:
         self.parameters = MachineParameters(node, self.run, given)
         self._stack.callback(self.parameters.close)
         self.dropouts = Dropouts(self.run.machine)
-        self._services = MachineServices(node, self.run, self.dropouts, self.parameters.refresh, allowed)
+        self._services = MachineServices(node, library, self.run, self.dropouts, self.parameters.refresh, allowed)
         self._stack.callback(self._services.close)
         #: Sources of diagnostics; the object that runs the ticks adds itself.
         self.sources: list[Source] = [self, self.outputs]

@@ -104,7 +104,7 @@ class Simulator:
         truth = [vehicle.topics.plant_publisher for vehicle in self._vehicles]
         needed, timeout_s = self._options["wait_for_subscribers"], self._options["start_timeout_s"]
         try:
-            wait_for_subscribers((self._clock, *truth), needed, timeout_s, self._stop)
+            wait_for_subscribers((self._clock, *truth), needed, timeout_s, self._stop.check)
             print(f"{self._machine.name}: waiting for a controller on {self._endpoint}", flush=True)
             self._fly_on()
         except Stopped:
