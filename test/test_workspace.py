@@ -44,7 +44,15 @@ ROSDEP_KEYS = {
         "ros2cli",
         "ros2launch",
     ),
-    *("rosgraph_msgs", "rosidl_default_generators", "rosidl_default_runtime", "sensor_msgs", "std_msgs", "std_srvs"),
+    *(
+        "rosgraph_msgs",
+        "rosidl_default_generators",
+        "rosidl_default_runtime",
+        "sensor_msgs",
+        "std_msgs",
+        "std_srvs",
+        "tf2_msgs",
+    ),
 }
 PIN = re.compile(r"^\s*[A-Za-z0-9_.\[\]-]+\s*(==|~=|>=|<=|<|>)\s*\d", re.MULTILINE)
 

@@ -65,7 +65,7 @@ class Hosted:
         self._stack.callback(self.forward.close)
         self.messages = RunTopics(self.run, self.forward.outbox)
         self._stack.callback(self.messages.close)
-        self.outputs = Outputs(node, self.run, self.forward, self.messages)
+        self.outputs = Outputs(node, self.run, self.forward, self.messages, options["tf"] or ())
         self._stack.callback(self.outputs.close)
         parts = (self.forward, self.messages, self._log_transition)
         self.topics = MachineTopics(node, self.run, options["decimate"], *parts)

@@ -35,6 +35,8 @@ LATCHED_HISTORY = _reliable(100, DurabilityPolicy.TRANSIENT_LOCAL)
 #: Sensors of a robot, subscribed: best effort matches every publisher, and a retransmitted message would be too old.
 #: The depth covers the messages between two ticks.
 SENSOR = _keep_last(10, DurabilityPolicy.VOLATILE, ReliabilityPolicy.BEST_EFFORT)
+#: /tf, as tf2's broadcaster has it.
+TF = _reliable(100, DurabilityPolicy.VOLATILE)
 #: Commands to actuators: only the newest are used.
 COMMAND = _reliable(10, DurabilityPolicy.VOLATILE)
 #: Single events.
