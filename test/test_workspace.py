@@ -37,6 +37,7 @@ ROSDEP_KEYS = {
         "geometry_msgs",
         "launch",
         "launch_ros",
+        "launch_testing_ament_cmake",
         "lifecycle_msgs",
         "nav_msgs",
         "rcl_interfaces",
