@@ -29,6 +29,7 @@ from .machine_topics import MachineTopics
 from .mapped_topics import Outputs
 from .parameters import MachineParameters
 from .services import Allowed, MachineServices
+from .tf import StaticFrames
 
 
 def next_bag(record: str) -> Path:
@@ -67,6 +68,7 @@ class Hosted:
         self._stack.callback(self.messages.close)
         self.outputs = Outputs(node, self.run, self.forward, self.messages, options["tf"] or ())
         self._stack.callback(self.outputs.close)
+        self._stack.callback(StaticFrames(node, self.run.machine.views).close)
         parts = (self.forward, self.messages, self._log_transition)
         self.topics = MachineTopics(node, self.run, options["decimate"], *parts)
         self._stack.callback(self.topics.close)

@@ -1,20 +1,26 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Mapped poses on /tf: what a topic of a standard message says of a pose, as tf2's TransformBroadcaster sends it."""
+"""Mapped poses on /tf, and the frames of a machine's views on /tf_static, as tf2's broadcasters send them."""
 
 from __future__ import annotations
 
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass, replace
 
+from geometry_msgs.msg import TransformStamped
+from rclpy.node import Node
+
 from fcsl_compiler.config.standard_messages import STANDARD, short_name
 from simclient.errors import did_you_mean
 from simclient.ros.composer import Composer, Source
+from simclient.view.views import Frame, views_or_remark
 
+from . import qos
 from .errors import BridgeError
+from .interfaces import message_class
 from .node_main import Option
 
-#: Absolute, as tf2 has it; `-r /tf:=tf` puts it below the namespace.
-TOPIC = "/tf"
+#: Absolute, as tf2 has them; `-r /tf:=tf` puts one below the namespace.
+TOPIC, _STATIC_TOPIC = "/tf", "/tf_static"
 MESSAGE = "tf2_msgs/msg/TFMessage"
 OPTION = Option("tf", list, None, "a list of mapped topics whose poses go to /tf, too: odom, or pose=base_link")
 #: Where a message has position and orientation.
@@ -97,3 +103,34 @@ def _composer(text: str, topic: Posed) -> Composer:
     if not sources:
         raise BridgeError(f"parameter `tf`: nothing fills the pose of `{text}`")
     return Composer(STANDARD, MESSAGE, sources, topic.frame, topic.child_frame, _STAMPED)
+
+
+class StaticFrames:
+    """Publishes the frames of `views` (a machine's, as text) once, for all who come. Without tf2_msgs it only says so: the
+    machine runs without them. Stamp 0, since they hold at all times."""
+
+    def __init__(self, node: Node, views: str):
+        self._node, self._publisher = node, None
+        shown, _ = views_or_remark(views)
+        if shown is None or not shown.frames:
+            return
+        try:
+            kind = message_class(MESSAGE)
+        except BridgeError as error:
+            node.get_logger().warning(f"the machine's frames are not on {_STATIC_TOPIC}: {error}")
+            return
+        self._publisher = qos.publisher(node, kind, _STATIC_TOPIC, qos.LATCHED)
+        self._publisher.publish(kind(transforms=[_transform(frame) for frame in shown.frames]))
+
+    def close(self) -> None:
+        if self._publisher is not None:
+            self._node.destroy_publisher(self._publisher)
+
+
+def _transform(frame: Frame) -> TransformStamped:
+    message = TransformStamped(child_frame_id=frame.frame)
+    message.header.frame_id = frame.parent
+    translation, rotation = message.transform.translation, message.transform.rotation
+    translation.x, translation.y, translation.z = frame.position
+    rotation.w, rotation.x, rotation.y, rotation.z = frame.rotation
+    return message

@@ -4,6 +4,7 @@
 from __future__ import annotations
 
 import json
+import math
 import signal
 import subprocess
 from importlib.util import find_spec
@@ -31,13 +32,15 @@ LISTENER = QoSProfile(depth=100, reliability=ReliabilityPolicy.RELIABLE, durabil
 ODOMETRY, POSE = "nav_msgs/msg/Odometry", "geometry_msgs/msg/PoseStamped"
 
 
-def chain(folder: Path, messages: list[tuple[int, bytes]], parent: str, child: str) -> Chain:
-    """The transforms from one frame to another, of a bag with these messages on /tf."""
+def chain(folder: Path, messages: list[tuple[int, bytes]], parent: str, child: str, static: bytes = b"") -> Chain:
+    """The transforms from one frame to another, of a bag with these messages on /tf, and that one on /tf_static."""
     store = get_typestore(Stores.ROS2_JAZZY)
     with Writer(folder, version=9, storage_plugin=StoragePlugin.MCAP) as writer:
         connection = writer.add_connection("/tf", tf.MESSAGE, typestore=store)
         for time_ns, data in messages:
             writer.write(connection, time_ns, data)
+        if static:
+            writer.write(writer.add_connection("/tf_static", tf.MESSAGE, typestore=store), 1, static)
     return Frames(Bag(folder), True).between(parent, child)
 
 
@@ -144,8 +147,8 @@ class Walker:
 """
 
 
-@NEEDS_TF2
-def test_a_channel_on_tf(domain: Domain, tmp_path: Path) -> None:
+def walker(folder: Path) -> Path:
+    """The library of a machine whose pose is mapped, and that has frames."""
     ros = {"type": "geometry_msgs/PoseStamped", "topic": "pose", "frame": "odom"}
     fields = {"position": "pose.position", "attitude": "pose.orientation"}
     channels = [
@@ -168,18 +171,48 @@ def test_a_channel_on_tf(domain: Domain, tmp_path: Path) -> None:
         "states": {"GO": {"schedule": {"walker": 50}}},
         "transitions": [],
         "channels": channels,
+        "views": {
+            "panels": [{"title": "position", "values": ["walker.outputs.position"]}],
+            "frames": [
+                {"frame": "mast", "parent": "base_link", "position": [0, 0, 2], "rpy": [0, 0, math.pi / 2]},
+                {"frame": "camera", "parent": "mast", "position": [1, 0, 0], "rotation": [0, 1, 0, 0]},
+            ],
+        },
     }
-    (tmp_path / "walker.py").write_text(WALKER)
-    (tmp_path / "walker.json").write_text(json.dumps(machine))
-    build = ["fcslc", "build", str(tmp_path / "walker.json"), "-o", str(tmp_path / "out")]
+    (folder / "walker.py").write_text(WALKER)
+    (folder / "walker.json").write_text(json.dumps(machine))
+    build = ["fcslc", "build", str(folder / "walker.json"), "-o", str(folder / "out")]
     subprocess.run(build, check=True, capture_output=True)
+    return folder / "out" / "libwalker.so"
+
+
+@NEEDS_TF2
+def test_a_channel_and_static_frames_on_tf(domain: Domain, tmp_path: Path) -> None:
+    """Composed by the tree of frames, as tf2 does it: the camera is 1 m to the left of the mast."""
     listener = domain.listener()
     listener.subscribe(tf_message(), "/tf", LISTENER)
-    library = tmp_path / "out" / "libwalker.so"
-    node = domain.start("controller_node", machine=library, mode="realtime", tf="[pose=base_link]")
+    node = domain.start("controller_node", machine=walker(tmp_path), mode="realtime", tf="[pose=base_link]")
     listener.until(lambda: len(listener.received["/tf"]) >= 10)
+    listener.subscribe(tf_message(), "/tf_static", qos.LATCHED)
+    listener.until(lambda: bool(listener.received["/tf_static"]))
     node.signal(signal.SIGINT)
     assert node.finish() == 0, node.err
-    found = chain(tmp_path / "bag", list(enumerate(listener.received["/tf"], start=1)), "odom", "base_link")
-    assert np.diff(found.poses.position[:10, 0]).tolist() == [0.5] * 9
-    assert found.poses.rotation[:10].tolist() == [[0.0, 0.0, 0.0, 1.0]] * 10
+    (static,) = listener.received["/tf_static"]
+    moving = list(enumerate(listener.received["/tf"], start=1))
+    found = chain(tmp_path / "bag", moving, "odom", "camera", static)
+    assert np.allclose(np.diff(found.poses.position[:10, 0]), 0.5, rtol=0, atol=1e-12)
+    assert np.allclose(found.poses.position[:10, 1:], [1.0, 2.0], rtol=0, atol=1e-12)
+    half = math.sqrt(0.5)
+    assert np.allclose(np.abs(found.poses.rotation[:10]), [half, half, 0.0, 0.0], rtol=0, atol=1e-12)
+
+
+@pytest.mark.skipif(find_spec("tf2_msgs") is not None, reason="tf2_msgs is installed")
+def test_without_tf2_msgs(domain: Domain, tmp_path: Path) -> None:
+    """The machine runs without its frames; a pose that was asked for is an error."""
+    library = walker(tmp_path)
+    node = domain.start("controller_node", machine=library, mode="realtime")
+    node.wait_for("the machine's frames are not on /tf_static: ")
+    node.signal(signal.SIGINT)
+    assert node.finish() == 0, node.err
+    refused = domain.start("controller_node", machine=library, mode="realtime", tf="[pose=base_link]")
+    assert refused.finish() == 1 and "package `tf2_msgs` has no ROS 2 messages" in refused.err
