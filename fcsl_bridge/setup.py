@@ -30,6 +30,16 @@ setup(
             "rerun_node = fcsl_bridge.start:rerun_node",
             "sim_node = fcsl_bridge.start:sim_node",
             "topic_count = fcsl_bridge.start:topic_count",
-        ]
+        ],
+        # Read by ros2cli where it is installed: `ros2 fcsl VERB`.
+        "ros2cli.command": ["fcsl = fcsl_bridge.ros2_fcsl:FcslCommand"],
+        "ros2cli.extension_point": ["ros2fcsl.verb = fcsl_bridge.ros2_fcsl:Verb"],
+        "ros2fcsl.verb": [
+            "info = fcsl_bridge.ros2_fcsl:InfoVerb",
+            "list = fcsl_bridge.ros2_fcsl:ListVerb",
+            "replay = fcsl_bridge.ros2_fcsl:ReplayVerb",
+            "set-state = fcsl_bridge.ros2_fcsl:SetStateVerb",
+            "state = fcsl_bridge.ros2_fcsl:StateVerb",
+        ],
     },
 )

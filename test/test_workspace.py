@@ -33,8 +33,27 @@ ROSDEP_KEYS = {
         "builtin_interfaces",
         "diagnostic_msgs",
     ),
-    *("geometry_msgs", "launch", "launch_ros", "lifecycle_msgs", "nav_msgs", "rcl_interfaces", "rclpy", "ros2launch"),
-    *("rosgraph_msgs", "rosidl_default_generators", "rosidl_default_runtime", "sensor_msgs", "std_msgs", "std_srvs"),
+    *(
+        "geometry_msgs",
+        "launch",
+        "launch_ros",
+        "launch_testing_ament_cmake",
+        "lifecycle_msgs",
+        "nav_msgs",
+        "rcl_interfaces",
+        "rclpy",
+        "ros2cli",
+        "ros2launch",
+    ),
+    *(
+        "rosgraph_msgs",
+        "rosidl_default_generators",
+        "rosidl_default_runtime",
+        "sensor_msgs",
+        "std_msgs",
+        "std_srvs",
+        "tf2_msgs",
+    ),
 }
 PIN = re.compile(r"^\s*[A-Za-z0-9_.\[\]-]+\s*(==|~=|>=|<=|<|>)\s*\d", re.MULTILINE)
 

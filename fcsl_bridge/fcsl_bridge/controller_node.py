@@ -21,7 +21,7 @@ from lifecycle_msgs.srv import ChangeState
 from rclpy._rclpy_pybind11 import RCLError
 from rclpy.lifecycle import LifecycleNode, LifecycleState, TransitionCallbackReturn
 
-from . import bus_address
+from . import bus_address, tf
 from .clock_loop import ClockLoop
 from .errors import BridgeError, Stopped
 from .hosted import Hosted
@@ -53,6 +53,7 @@ OPTIONS = (  # all read-only: callers of the node's services must not load libra
     Option("start_timeout_s", float, 60.0, "seconds to wait for the simulator"),
     Option("max_ticks_per_clock", int, 100, "clock: how many ticks one message of /clock makes at most"),
     Option("wait_for_subscribers", int, 0, "how many subscribers each topic needs before the first tick"),
+    tf.OPTION,
     Option("autostart", bool, True, "whether the node configures and activates itself"),
     Option("allow_set_state", bool, False, "whether ~/set_state and ~/restore may be used"),
     Option("checkpoints", str, "", "folder of the files of ~/save and ~/restore; empty: no files"),
@@ -148,9 +149,14 @@ class ControllerNode(LifecycleNode):
     def _activate(self) -> None:
         assert self._hosted is not None and self._mode is not None
         count, limit_s = self._options["wait_for_subscribers"], self._options["start_timeout_s"]
-        wait_for_subscribers(self._hosted.topics.all, count, limit_s, self._stop)
+        wait_for_subscribers(self._hosted.topics.all, count, limit_s, self._waiting)
         self._mode.activate()
         self._active, self._ending = True, "shut down"
+
+    def _waiting(self) -> None:
+        self._stop.check()
+        assert self._hosted is not None
+        self._hosted.topics.say_alive()
 
     def _end_ticking(self) -> None:
         """The actuators on topics get their safe values: no command follows."""

@@ -29,6 +29,7 @@ from .machine_topics import MachineTopics
 from .mapped_topics import Outputs
 from .parameters import MachineParameters
 from .services import Allowed, MachineServices
+from .tf import StaticFrames
 
 
 def next_bag(record: str) -> Path:
@@ -55,7 +56,8 @@ class Hosted:
             raise
 
     def _open(self, node: Node, options: Mapping[str, Any], given: Mapping[str, Any], allowed: Allowed) -> None:
-        self.run = open_run(*find_machine(options["machine"]))
+        library, machine = find_machine(options["machine"])
+        self.run = open_run(library, machine)
         self._stack.callback(self.run.close)
         self.run.attach()
         self._initial = self.run.save()
@@ -64,15 +66,16 @@ class Hosted:
         self._stack.callback(self.forward.close)
         self.messages = RunTopics(self.run, self.forward.outbox)
         self._stack.callback(self.messages.close)
-        self.outputs = Outputs(node, self.run, self.forward, self.messages)
+        self.outputs = Outputs(node, self.run, self.forward, self.messages, options["tf"] or ())
         self._stack.callback(self.outputs.close)
+        self._stack.callback(StaticFrames(node, self.run.machine.views).close)
         parts = (self.forward, self.messages, self._log_transition)
         self.topics = MachineTopics(node, self.run, options["decimate"], *parts)
         self._stack.callback(self.topics.close)
         self.parameters = MachineParameters(node, self.run, given)
         self._stack.callback(self.parameters.close)
         self.dropouts = Dropouts(self.run.machine)
-        self._services = MachineServices(node, self.run, self.dropouts, self.parameters.refresh, allowed)
+        self._services = MachineServices(node, library, self.run, self.dropouts, self.parameters.refresh, allowed)
         self._stack.callback(self._services.close)
         #: Sources of diagnostics; the object that runs the ticks adds itself.
         self.sources: list[Source] = [self, self.outputs]

@@ -4,7 +4,7 @@ due, and puts them into the outbox.
 
 Topics below the node's namespace, all stamped with the time of the tick (time_ns below; in lock-step the machine's own time):
     <machine>/<instance>      its generated message       each tick, or each n-th with decimation; of published instances
-    <machine>/state           fcsl_msgs/MachineState      at the start and on change; transient local
+    <machine>/state           fcsl_msgs/MachineState      at the start and on change, and again as a sign of life; transient local
     <machine>/transitions     fcsl_msgs/TransitionEvent   each one
     <machine>/health          fcsl_msgs/InstanceHealth    at the start and on change; transient local
     <machine>/faults          fcsl_msgs/FaultCounters     at the start and on change; transient local
@@ -29,8 +29,8 @@ from .node_main import wait_for_receivers
 
 #: Latched topics, and their types.
 _LATCHED = {"state": MachineState, "health": InstanceHealth, "faults": FaultCounters}
-#: Of the lease that qos.WATCHED has, several.
-_ALIVE_PERIOD_S = 0.4
+#: Of the lease and the deadline that qos.WATCHED has, several.
+_ALIVE_PERIOD_S = 0.5
 #: For the receivers of the last messages of a run, in s.
 _END_S = 5.0
 
@@ -65,8 +65,9 @@ class MachineTopics:
             for instance, kind in kinds
         ]
         self._lived_s = 0.0
+        self._state = b""  # the last message
         for topic, publisher in self._latched.items():
-            messages.add_tick_message(forward.add(publisher), topic)
+            messages.add_tick_message(forward.add(publisher, self._keep if topic == "state" else None), topic)
         messages.add_tick_message(forward.add(self._transitions, transition), "transitions")
         for index, publisher in self._outputs:
             messages.add_instance(forward.add(publisher), index, decimation)
@@ -75,10 +76,17 @@ class MachineTopics:
     def all(self) -> list[Publisher]:
         return [*(publisher for _, publisher in self._outputs), *self._latched.values(), self._transitions]
 
+    def _keep(self, state: bytes) -> None:
+        self._state = state
+
     def say_alive(self) -> None:
-        """Keeps the publisher of the state alive; call it often."""
-        if time.monotonic() - self._lived_s > _ALIVE_PERIOD_S:
-            self._lived_s = time.monotonic()
+        """Sends the last state again, the same bytes; before the first one, a bare sign of life. Call it often."""
+        if time.monotonic() - self._lived_s < _ALIVE_PERIOD_S:
+            return
+        self._lived_s = time.monotonic()
+        if self._state:
+            self._latched["state"].publish(self._state)
+        else:
             self._latched["state"].assert_liveliness()
 
     def wait_for_receivers(self) -> None:

@@ -5,16 +5,16 @@ published topics.
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from typing import Any
 
 from rclpy.node import Node
 
 from simclient.ros.outbox import RunTopics
-from simclient.ros.topics import Inlet, RosTopic, composer_of, topics_of
+from simclient.ros.topics import Inlet, RosTopic, composer_of, sources_of, topics_of
 from simclient.run import Run
 
-from . import qos
+from . import qos, tf
 from .forward import Forward
 from .interfaces import message_class
 from .node_main import wait_for_receivers
@@ -128,9 +128,9 @@ class _Input:
 
 class Outputs:
     """Actuator topics: the machine's actuator outputs, published at every tick; their safe values while it is
-    disarmed."""
+    disarmed. `chosen`: those whose poses go to /tf, too."""
 
-    def __init__(self, node: Node, run: Run, forward: Forward, messages: RunTopics):
+    def __init__(self, node: Node, run: Run, forward: Forward, messages: RunTopics, chosen: Sequence[str]):
         self._node, self._run, self._messages = node, run, messages
         topics = [topic for topic in topics_of(run.machine) if topic.direction == "actuator"]
         ready = [(t.name, composer_of(t), message_class(t.type)) for t in topics]
@@ -141,6 +141,11 @@ class Outputs:
         self._numbers = {name: forward.add(publisher) for name, _, publisher in self._outlets}
         for name, composer, _ in self._outlets:
             messages.add_actuators(self._numbers[name], composer)
+        posed = [tf.Posed(t.name, t.type, t.frame, t.child_frame, sources_of(t)) for t in topics]
+        transforms = tf.broadcasts(chosen, posed)
+        self._tf = qos.publisher(node, message_class(tf.MESSAGE), tf.TOPIC, qos.TF) if transforms else None
+        for composer in transforms.values():
+            messages.add_actuators(forward.add(self._tf), composer)
 
     def make_safe(self, time_ns: int) -> None:
         """Publishes the safe values of a machine that something arms, stamped time_ns, and waits a moment for their
@@ -171,3 +176,5 @@ class Outputs:
     def close(self) -> None:
         for _, _, publisher in self._outlets:
             self._node.destroy_publisher(publisher)
+        if self._tf is not None:
+            self._node.destroy_publisher(self._tf)

@@ -237,8 +237,11 @@ def wait_for_receivers(publishers: Iterable[Publisher], timeout_s: float) -> Non
         publisher.wait_for_all_acked(Duration(seconds=max(deadline - time.monotonic(), 0.0)))
 
 
-def wait_for_subscribers(publishers: Sequence[Publisher], count: int, timeout_s: float, stop: Stop) -> None:
-    """Returns once each publisher has `count` matched subscriptions. Raises BridgeError with those that lack them."""
+def wait_for_subscribers(
+    publishers: Sequence[Publisher], count: int, timeout_s: float, meanwhile: Callable[[], None]
+) -> None:
+    """Returns once each publisher has `count` matched subscriptions. Raises BridgeError with those that lack them, and
+    what `meanwhile` raises."""
     deadline = time.monotonic() + timeout_s
     said = False
     while True:
@@ -248,7 +251,7 @@ def wait_for_subscribers(publishers: Sequence[Publisher], count: int, timeout_s:
         if not said:
             said = True
             print(f"waiting for {count} subscribers each on {', '.join(lacking)}", flush=True)
-        stop.check()
+        meanwhile()
         if time.monotonic() > deadline:
             raise BridgeError(f"fewer than {count} subscribers within {timeout_s} s on {', '.join(lacking)}")
         time.sleep(_MATCH_POLL_S)

@@ -24,15 +24,19 @@ def _reliable(depth: int, durability: DurabilityPolicy) -> QoSProfile:
 STREAM = _reliable(2000, DurabilityPolicy.VOLATILE)
 #: Latched topics: a late subscriber gets the last message.
 LATCHED = _reliable(1, DurabilityPolicy.TRANSIENT_LOCAL)
-#: The same of a publisher that lives while its loop says so: whoever asks for this lease learns of a dead controller.
+#: The same of a publisher that lives while its loop says so, and sends its message again (machine_topics.py): whoever asks
+#: for this lease or this deadline learns of a dead controller.
 WATCHED = _reliable(1, DurabilityPolicy.TRANSIENT_LOCAL)
 WATCHED.liveliness = LivelinessPolicy.MANUAL_BY_TOPIC
 WATCHED.liveliness_lease_duration = Duration(seconds=2)
+WATCHED.deadline = Duration(seconds=2)
 #: Latched topics, for a subscriber that needs every change.
 LATCHED_HISTORY = _reliable(100, DurabilityPolicy.TRANSIENT_LOCAL)
 #: Sensors of a robot, subscribed: best effort matches every publisher, and a retransmitted message would be too old.
 #: The depth covers the messages between two ticks.
 SENSOR = _keep_last(10, DurabilityPolicy.VOLATILE, ReliabilityPolicy.BEST_EFFORT)
+#: /tf, as tf2's broadcaster has it.
+TF = _reliable(100, DurabilityPolicy.VOLATILE)
 #: Commands to actuators: only the newest are used.
 COMMAND = _reliable(10, DurabilityPolicy.VOLATILE)
 #: Single events.

@@ -66,6 +66,7 @@ class LiveView:
             self._take(again)
             self.finish()
             self._ticks.clear()
+            self._state = b""
             for topic, messages in again.items():
                 for data in messages:
                     self._hand_on(topic, data)
@@ -79,10 +80,12 @@ class LiveView:
                 self._hand_on(topic, data)
 
     def _hand_on(self, topic: str, data: bytes) -> None:
+        if topic == self._topics.state_topic:
+            if data == self._state:
+                return  # sent again, as a sign of life
+            self._state = data
         self._ticks[topic] = tick_of(data)
         self.messages += 1
-        if topic == self._topics.state_topic:
-            self._state = data
         if self._show is not None and topic not in self._show.feed.topics:
             self.finish()  # a plant appeared late: it is shown from here on, in a new recording
             self._early += [(self._topics.state_topic, self._state)] if self._state else []

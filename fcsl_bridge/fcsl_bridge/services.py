@@ -1,5 +1,6 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Services that change a machine between two ticks: ~/set_state, ~/save, ~/restore, ~/inject_fault.
+"""Services that change a machine between two ticks, ~/set_state, ~/save, ~/restore, ~/inject_fault, and one that says what
+machine it is, ~/describe.
 
 Each change is recorded, so that a replay applies it at the same tick. A refusal is an answer with its reason; nothing
 changes.
@@ -18,8 +19,8 @@ from rclpy.callback_groups import MutuallyExclusiveCallbackGroup
 from rclpy.node import Node
 from rclpy.task import Future
 
-from fcsl_msgs.msg import Checkpoint
-from fcsl_msgs.srv import InjectFault, Restore, Save, SetState
+from fcsl_msgs.msg import Channel, Checkpoint
+from fcsl_msgs.srv import Describe, InjectFault, Restore, Save, SetState
 from simclient.checkpoint import read_checkpoint
 from simclient.errors import TwinError, did_you_mean
 from simclient.run import Run
@@ -75,27 +76,29 @@ async def _elsewhere(work: Callable[..., Any], *arguments: Any) -> Any:
 
 
 class MachineServices:
-    """The services of a run. `restored` is called after the machine's memory was replaced."""
+    """The services of a run of `library`. `restored` is called after the machine's memory was replaced."""
 
     def __init__(
         self,
         node: Node,
+        library: Path,
         run: Run,
         dropouts: Dropouts,
         restored: Callable[[], None],
         allowed: Allowed,
     ):
-        self._node, self._run, self._dropouts, self._restored = node, run, dropouts, restored
+        self._node, self._library, self._run, self._dropouts, self._restored = node, library, run, dropouts, restored
         self._allowed = allowed
         group = MutuallyExclusiveCallbackGroup()  # a separate group: rclpy's default one keeps every former entity
         table = (
-            (SetState, "~/set_state", self._set_state),
-            (Save, "~/save", self._save),
-            (Restore, "~/restore", self._restore),
-            (InjectFault, "~/inject_fault", self._inject_fault),
+            (Describe, "~/describe", self._describe),
+            (SetState, "~/set_state", _answering(self._set_state)),
+            (Save, "~/save", _answering(self._save)),
+            (Restore, "~/restore", _answering(self._restore)),
+            (InjectFault, "~/inject_fault", _answering(self._inject_fault)),
         )
         self._services = [
-            node.create_service(kind, name, _answering(serve), callback_group=group) for kind, name, serve in table
+            node.create_service(kind, name, callback, callback_group=group) for kind, name, callback in table
         ]
 
     def close(self) -> None:
@@ -105,6 +108,30 @@ class MachineServices:
     def _need_forcing(self) -> None:
         if not self._allowed.forcing:
             raise BridgeError("not allowed: start the node with -p allow_set_state:=true")
+
+    def _describe(self, request: Any, response: Any) -> Any:
+        machine = self._run.machine
+        response.machine, response.library = machine.name, str(self._library.absolute())
+        response.source_hash, response.layout_hash, response.build_hash = (
+            machine.source_hash,
+            machine.layout_hash,
+            machine.build_hash,
+        )
+        response.tick_hz, response.states = machine.tick_hz, list(machine.states)
+        response.channels = [
+            Channel(
+                name=channel.name,
+                id=channel.id,
+                direction=channel.direction,
+                type=channel.field.type_text,
+                unit=channel.field.unit,
+                topic=self._node.resolve_topic_name(channel.ros_topic) if channel.ros_type else "",
+                message=channel.ros_type,
+                field=channel.ros_field,
+            )
+            for channel in machine.channels
+        ]
+        return response
 
     async def _set_state(self, request: Any, response: Any) -> None:
         self._need_forcing()

@@ -25,7 +25,7 @@ from rosgraph_msgs.msg import Clock
 from fcsl_sim.config import SimConfig, load
 from fcsl_sim.native import Failed, run_together
 
-from . import bus_address, qos
+from . import bus_address, qos, tf
 from .bus_address import endpoint
 from .errors import BridgeError, Stopped
 from .forward import Forward, NativeThread
@@ -42,6 +42,7 @@ from .node_main import (
 from .polled import Housekeeping
 from .sim_control import Control, Reset, speed_problem
 from .sim_progress import Progress
+from .sim_topics import below
 from .sim_vehicle import Vehicle
 
 OPTIONS = (
@@ -51,6 +52,7 @@ OPTIONS = (
     Option("duration", float, None, "seconds of simulated time at most, instead of the file's"),
     Option("speed", float, 0.0, "simulated seconds per second at most; 0: as fast as possible", settable=True),
     Option("paused", bool, False, "true: no tick begins; see ~/step", settable=True),
+    tf.OPTION,
     Option("decimate", int, 1, "a whole number n: truth is published each n-th tick"),
     bus_address.OPTION,
     Option("timeout_s", float, 5.0, "seconds to wait for the controller's answer to a tick"),
@@ -83,7 +85,9 @@ class Simulator:
             for name, config in configs.items():
                 # The first vehicle listens, and the others are its clients: all controllers find theirs at one address.
                 address = f"zenoh-client:{self._endpoint}" if self._vehicles else f"zenoh:{self._endpoint}"
-                how = (options["decimate"], address, options["timeout_s"], self._forward)
+                # Vehicles of one simulation have the same frames: each has a tree of its own.
+                shown = tf.Chosen(tuple(options["tf"] or ()), below(name, "tf") if len(configs) > 1 else tf.TOPIC)
+                how = (options["decimate"], shown, address, options["timeout_s"], self._forward)
                 self._vehicles.append(Vehicle(node, config, name, *how))
         except BaseException:
             self.close()
@@ -104,7 +108,7 @@ class Simulator:
         truth = [vehicle.topics.plant_publisher for vehicle in self._vehicles]
         needed, timeout_s = self._options["wait_for_subscribers"], self._options["start_timeout_s"]
         try:
-            wait_for_subscribers((self._clock, *truth), needed, timeout_s, self._stop)
+            wait_for_subscribers((self._clock, *truth), needed, timeout_s, self._stop.check)
             print(f"{self._machine.name}: waiting for a controller on {self._endpoint}", flush=True)
             self._fly_on()
         except Stopped:

@@ -3,6 +3,7 @@
 
     sim/truth       fcsl_msgs/PlantTruth     outputs of the plant's models, each n-th tick
     truth topics    standard messages        those of the simulation's `ros` list, each n-th tick
+    /tf             tf2_msgs/TFMessage       poses of truth topics, of those that are chosen
     sensor topics   standard messages        the machine's mapped sensor channels, when the simulation samples one of them
 
 The simulation composes the messages in each tick, and puts them into the outbox.
@@ -18,7 +19,7 @@ from fcsl_sim.native import Simulation
 from fcsl_sim.ros import TruthTopic
 from simclient.ros.topics import composer_of, topics_of
 
-from . import qos
+from . import qos, tf
 from .forward import Forward
 from .interfaces import message_class
 
@@ -35,7 +36,7 @@ def _head(names: list[str]) -> bytes:
 
 
 class SimTopics:
-    """The publishers of a vehicle. `decimate` n: truth is published at each n-th tick."""
+    """The publishers of a vehicle. `decimate` n: truth is published at each n-th tick. `chosen`: what goes to /tf, too."""
 
     def __init__(
         self,
@@ -44,6 +45,7 @@ class SimTopics:
         truth: tuple[TruthTopic, ...],
         name_space: str,
         decimate: int,
+        chosen: tf.Chosen,
         forward: Forward,
     ):
         self._decimate, self._outbox = decimate, forward.outbox
@@ -53,6 +55,12 @@ class SimTopics:
         for topic in truth:
             publisher = qos.publisher(node, message_class(topic.type), below(name_space, topic.name), qos.STREAM)
             self._truth.append((forward.add(publisher), topic.composer(), topic.instances))
+        posed = [tf.Posed(t.name, t.type, t.frame, t.child_frame, t.sources) for t in truth]
+        transforms = tf.broadcasts(chosen.topics, posed)
+        if transforms:
+            publisher = qos.publisher(node, message_class(tf.MESSAGE), chosen.tf_topic, qos.TF)
+            instances = {topic.name: topic.instances for topic in truth}
+            self._truth += [(forward.add(publisher), c, instances[name]) for name, c in transforms.items()]
         self._sensors = []
         for mapped in topics_of(sim.machine):
             if mapped.direction == "sensor":

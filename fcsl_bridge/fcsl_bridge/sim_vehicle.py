@@ -10,6 +10,7 @@ from fcsl_sim.native import Simulation
 
 from .forward import Forward
 from .sim_topics import SimTopics
+from .tf import Chosen
 
 
 class Vehicle:
@@ -21,6 +22,7 @@ class Vehicle:
         config: SimConfig,
         name_space: str,
         decimate: int,
+        chosen: Chosen,
         address: str,
         timeout_s: float,
         forward: Forward,
@@ -31,7 +33,7 @@ class Vehicle:
         self._keys = name_space if name_space.startswith("/") else f"{inside}/{name_space}"
         self.accepted = False
         self.sim = Simulation(config.plan, config.tables)
-        self.topics = SimTopics(node, self.sim, config.ros, name_space, decimate, forward)
+        self.topics = SimTopics(node, self.sim, config.ros, name_space, decimate, chosen, forward)
 
     def listen(self) -> None:
         """A controller can connect from now on. Raises SimError."""

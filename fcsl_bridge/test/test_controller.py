@@ -206,7 +206,7 @@ def test_topics_and_services_come_and_go(domain: Domain, library: Path) -> None:
         "/rig/transitions",
         "/diagnostics",
     }
-    made |= {f"/controller_node/{name}" for name in ("set_state", "save", "restore", "inject_fault")}
+    made |= {f"/controller_node/{name}" for name in ("describe", "set_state", "save", "restore", "inject_fault")}
     client._listener.until(lambda: graph() == before | made)
     assert client.change(CLEANUP)
     client._listener.until(lambda: graph() == before)
@@ -234,23 +234,59 @@ def test_cycles_leave_nothing_behind(domain: Domain, library: Path) -> None:
     assert more_memory - memory < 2000 + 4 * CYCLES, "kilobytes"
 
 
-def test_a_watcher_learns_of_a_dead_controller(domain: Domain, library: Path) -> None:
-    """It asks the state's publisher for a sign of life, and gets an event within the lease, not after DDS's 20 s."""
-    process, client = free(domain, library)
-    alive: list[int] = []
-    client._listener.node.create_subscription(
-        MachineState,
-        "/rig/state",
-        lambda _: None,
-        qos.WATCHED,
-        event_callbacks=SubscriptionEventCallbacks(liveliness=lambda event: alive.append(event.alive_count)),
-    )
-    client._listener.until(lambda: alive[-1:] == [1])
-    for number, count in ((signal.SIGSTOP, 0), (signal.SIGCONT, 1), (signal.SIGKILL, 0)):
-        begun = time.monotonic()
+class Watcher:
+    """Asks the publisher of a state for signs of life, and collects its messages and events."""
+
+    def __init__(self, client: ControllerClient, topic: str):
+        self.alive: list[int] = []  #: numbers of live publishers
+        self.missed: list[int] = []  #: numbers of deadlines missed
+        self.states: list[bytes] = []
+        client._listener.node.create_subscription(
+            MachineState,
+            topic,
+            self.states.append,
+            qos.WATCHED,
+            raw=True,
+            event_callbacks=SubscriptionEventCallbacks(
+                liveliness=lambda event: self.alive.append(event.alive_count),
+                deadline=lambda event: self.missed.append(event.total_count),
+            ),
+        )
+
+
+def test_a_watcher_learns_of_a_dead_controller(domain: Domain) -> None:
+    """By liveliness and by deadline, within seconds and not DDS's 20 s; a flight that pauses is not dead."""
+    process, client, sim = locked(domain, timeout_s=60.0)
+    watcher = Watcher(client, "/lander_control/state")
+    sim.tick()
+    client._listener.until(lambda: watcher.alive[-1:] == [1] and bool(watcher.states))
+    count, paused_until_s = len(watcher.states), time.monotonic() + 5.0
+    client._listener.until(lambda: sim.sim.alive() or time.monotonic() > paused_until_s)
+    assert watcher.alive[-1:] == [1] and not watcher.missed
+    assert len(watcher.states) - count >= 5, "the state is sent again at least once a second"
+    assert len({bytes(state[: state.rindex(b"\0")]) for state in watcher.states[count:]}) == 1, "the same one"
+    for number, dead in ((signal.SIGSTOP, True), (signal.SIGCONT, False), (signal.SIGKILL, True)):
+        begun, missed = time.monotonic(), len(watcher.missed)
         process.signal(number)
-        client._listener.until(lambda count=count: alive[-1:] == [count])
+        client._listener.until(lambda dead=dead: watcher.alive[-1:] == [0 if dead else 1])
+        client._listener.until(lambda dead=dead, missed=missed: not dead or len(watcher.missed) > missed)
         assert time.monotonic() - begun < 12.0
+
+
+def test_a_controller_that_waits_for_subscribers_or_is_inactive_is_alive(domain: Domain, library: Path) -> None:
+    _, client = free(domain, library, wait_for_subscribers=9)
+    waiting = Watcher(client, "/rig/state")
+    client._listener.until(lambda: waiting.alive[-1:] == [1])
+    domain.start("controller_node", "-r", "__ns:=/b", machine=library, mode="realtime", autostart=False)
+    client = ControllerClient(domain.listener(), "/b/controller_node")
+    inactive = Watcher(client, "/b/rig/state")
+    assert client.change(CONFIGURE)
+    client._listener.until(lambda: inactive.alive[-1:] == [1])
+    assert client.change(ACTIVATE) and client.change(DEACTIVATE)
+    client._listener.until(lambda: bool(inactive.states))
+    count = len(inactive.states)
+    client._listener.until(lambda: len(inactive.states) >= count + 3)
+    assert not inactive.missed
 
 
 def test_rosout_has_transitions_and_what_ended_the_node(domain: Domain, library: Path) -> None:

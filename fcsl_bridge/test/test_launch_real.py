@@ -18,6 +18,7 @@ HERE = Path(__file__).parent
 SIL = HERE.parent / "launch" / "sil.launch.py"
 GIVEN = ["machine:=lander/lander_control", "sim:=package://lander/sim/lander.sim.json"]
 LANDER = package_share("lander") / "launch" / "lander.launch.py"
+LAUNCH_TEST = HERE.parents[1] / "examples" / "lander" / "test" / "flight.launch.py"
 
 
 @pytest.mark.parametrize(
@@ -34,3 +35,10 @@ def test_a_flight(domain: Domain, path: Path, given: list[str], bags: list[str])
     assert process.finish() == 0, process.out + process.err
     for bag in bags:
         assert any(Bag(domain.folder / bag).messages())
+
+
+def test_the_launch_test_of_the_lander(domain: Domain) -> None:
+    pytest.importorskip("launch_testing", reason="launch_testing is not installed; CONTRIBUTING.md says how to have it")
+    process = domain.run([sys.executable, "-m", "launch_testing.launch_test", LAUNCH_TEST])
+    assert process.finish() == 0, process.out + process.err
+    assert "Ran 1 test" in process.err and "Ran 2 tests" in process.err, process.err

@@ -772,6 +772,16 @@ def body(**keys: Any) -> str:
     return put("views", value={"panels": panels, "body": {"shape": "rover", **keys}})
 
 
+def frames(*placed: dict[str, Any]) -> str:
+    """A panel and frames."""
+    panels = [{"title": "t", "values": ["one.outputs.y"]}]
+    return put("views", value={"panels": panels, "frames": list(placed)})
+
+
+def frame(name: str = "imu", parent: str = "base", **keys: Any) -> dict[str, Any]:
+    return {"frame": name, "parent": parent, **keys}
+
+
 def heard(source: str, direction: str = "sensor", **keys: Any) -> str:
     """Sensor v.a and actuator force, and a connection from a value of their channels to a bool."""
     channels = [
@@ -1114,6 +1124,14 @@ CONFIGS: dict[str, str] = {
     "E246 a title of two lines": panel("one.outputs.y", title="a\nb"),
     "E247 a panel of two units": panel("one.outputs.i", "one.inputs.x", "two.outputs.y"),
     "E247 a position in seconds": body(position=["one.outputs.y", 0, 0]),
+    "E203 a frame with a slash": frames(frame("/imu")),
+    "E214 two rotations of a frame": frames(frame(rotation=[1, 0, 0, 0], rpy=[0, 0, 0])),
+    "E251 two parents": frames(frame(), frame(parent="mast")),
+    "E251 a frame in itself": frames(frame("base")),
+    "E251 a loop of frames": frames(frame(), frame("base", "mast"), frame("mast", "imu"), frame("a", "imu")),
+    "E251 a rotation without length": frames(frame(rotation=[0.0, 0.0, 0.0, 0.0])),
+    "E251 a position of two numbers": frames(frame(position=[0.0, 0.0])),
+    "E251 too many frames": frames(*(frame(f"f{i}") for i in range(65))),
     "W201 unused": patch(lambda c: c["algorithms"].update(other={"source": "alg.py", "class": "Alg"})),
     "W202 nobody asks": edge(request="GO"),
     "W209 never": guarded_in_b(["failed"]),

@@ -7,6 +7,7 @@ from typing import Any
 
 import pytest
 from fcsl_test_abi import Machine, write_machine
+from scipy.spatial.transform import Rotation
 
 from fcsl_compiler.base.diagnostics import DiagnosticError
 from fcsl_compiler.driver.cache import build_machine
@@ -57,6 +58,21 @@ def test_the_text_is_compact_and_sorted_and_says_the_defaults(tmp_path: Path) ->
     views["body"] = {"shape": "rover", "attitude": "nav.outputs.q", "size": 2, "up": "-z"}
     found = json.loads(checked(tmp_path, views).views)["body"]
     assert found == {"shape": "rover", "attitude": "nav.outputs.q", "size": 2.0, "up": "-z"}
+
+
+def test_frames_have_a_position_and_a_unit_quaternion(tmp_path: Path) -> None:
+    """Roll, pitch, yaw are those of ROS: about the fixed axes x, y, z, in this order."""
+    roll, pitch, yaw = 0.3, -0.4, 2.5
+    frames = [
+        {"frame": "base/imu", "parent": "base_link", "position": [0, 1, -2.5], "rpy": [roll, pitch, yaw]},
+        {"frame": "camera", "parent": "base/imu", "rotation": [0.707, 0, 0, 0.707]},
+        {"frame": "mast", "parent": "base_link"},
+    ]
+    imu, camera, mast = json.loads(checked(tmp_path, {"panels": [PANEL], "frames": frames}).views)["frames"]
+    x, y, z, w = Rotation.from_euler("xyz", [roll, pitch, yaw]).as_quat()
+    assert imu["rotation"] == pytest.approx([w, x, y, z], abs=1e-15) and imu["position"] == [0.0, 1.0, -2.5]
+    assert camera["rotation"] == pytest.approx([0.5**0.5, 0, 0, 0.5**0.5], abs=1e-15)
+    assert mast == {"frame": "mast", "parent": "base_link", "position": [0.0] * 3, "rotation": [1.0, 0.0, 0.0, 0.0]}
 
 
 def test_no_views_are_no_text(tmp_path: Path) -> None:

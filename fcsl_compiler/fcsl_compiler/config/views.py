@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""`views` of a machine JSON or a simulation JSON: the panels and the body that plots, viewers and pages show.
+"""`views` of a machine JSON or a simulation JSON: panels, body and frames, which plots, viewers and pages show.
 
 The result is a canonical text, which hosts pass on to bags and telemetry and which no host interprets.
 """
@@ -31,6 +31,7 @@ from ..model.types import (
 from ..parse.json_reader import ConfigReader
 from ..parse.json_source import JsonNode
 from ..parse.source_path import SourcePathError, resolve_source
+from .frames import read_frames
 
 MAX_PANELS = 16
 #: Curves of one panel. More cannot be told apart by colour.
@@ -132,17 +133,19 @@ def read_views(node: JsonNode | None, signals: Signals, config: Path, reader: Co
     without a block or with an empty one, and after any error."""
     if node is None or (node.kind == "object" and not node.members):
         return ""
-    keys = reader.object(node, "`views`", ("panels",), ("body",)) or {}
+    keys = reader.object(node, "`views`", ("panels",), ("body", "frames")) or {}
     checker = _Checker(signals, config, reader)
     views: dict[str, Any] = {"panels": [checker.panel(item) for item in checker.panels(keys.get("panels"))]}
     if "body" in keys:
         views["body"] = checker.body(keys["body"])
+    if "frames" in keys:
+        views["frames"] = read_frames(keys["frames"], reader)
     if reader.sink.failed:  # values may be of any kind
         return ""
     text = json.dumps(views, separators=(",", ":"), sort_keys=True)
     if len(text) > MAX_BYTES:
         message = f"`views` has {len(text)} bytes, of which {MAX_BYTES} fit into telemetry"
-        reader.sink.error("E246", message, node.span, help="use fewer panels")
+        reader.sink.error("E246", message, node.span, help="use fewer panels or frames")
         return ""
     return text
 

@@ -42,12 +42,12 @@ class Source:
 class _Text:
     """The bytes of a message with every constant filled in, and the offset of each number."""
 
-    def __init__(self, definitions: Definitions, message: str, pieces: Sequence[Piece], frame: str, child_frame: str):
+    def __init__(self, definitions: Definitions, message: str, pieces: Sequence[Piece], strings: dict[str, str]):
         self.data = bytearray(_ENCAPSULATION)
         self.places: dict[str, tuple[int, int]] = {}  # path of a number, array or sequence: offset, count
         self._definitions = definitions
         self._message = message
-        self._strings = {"header.frame_id": frame, "child_frame_id": child_frame}
+        self._strings = strings
         self._pieces = pieces
         self._defaults: dict[str, float] = {}
         self._members(message, "")
@@ -133,14 +133,21 @@ class _Text:
 
 
 def composer_plan(
-    definitions: Definitions, message: str, sources: Sequence[Source], frame: str = "", child_frame: str = ""
+    definitions: Definitions,
+    message: str,
+    sources: Sequence[Source],
+    frame: str = "",
+    child_frame: str = "",
+    stamped: str = "",
 ) -> ComposerPlan:
-    """`message`: full name of the type. Raises PlanError, which names the source that does not fit and why."""
+    """`message`: full name of the type. `stamped`: where the part with header and frames is, as a prefix of paths
+    ("transforms[0]."). Raises PlanError, which names the source that does not fit and why."""
     if message not in definitions:
         raise PlanError(f"there is no definition of message type `{short_name(message)}`")
     selections = [_selection(definitions, message, source) for source in sources]
     pieces = [piece for selection in selections for piece in selection.pieces]
-    text = _Text(definitions, message, pieces, frame, child_frame)
+    strings = {f"{stamped}header.frame_id": frame, f"{stamped}child_frame_id": child_frame}
+    text = _Text(definitions, message, pieces, strings)
     _check_once(sources, selections, text)
     rows = Rows()
     for source, selection in zip(sources, selections, strict=True):
@@ -151,7 +158,7 @@ def composer_plan(
         rows=rows.rows,
         terms=rows.terms,
         memory_count=1 + max((s.memory for s in sources), default=0),
-        stamp_offset=text.places.get("header.stamp.sec", (NONE, 0))[0],
+        stamp_offset=text.places.get(f"{stamped}header.stamp.sec", (NONE, 0))[0],
     )
 
 

@@ -61,7 +61,7 @@ def short_name(name: str) -> str:
     return name.replace("/msg/", "/")
 
 
-#: Messages that only occur within other messages. No channel is mapped to them.
+#: Messages that only occur within other messages, and that of /tf. No channel is mapped to them.
 _PARTS = """
 builtin_interfaces/Time
     int32 sec
@@ -79,6 +79,8 @@ std_msgs/MultiArrayLayout
 sensor_msgs/NavSatStatus
     int8 status
     uint16 service
+tf2_msgs/TFMessage
+    geometry_msgs/TransformStamped[] transforms
 """
 
 #: The unit in brackets after a name applies to every number below it that has no unit of its own.
@@ -102,6 +104,13 @@ geometry_msgs/Pose
 geometry_msgs/PoseWithCovariance
     geometry_msgs/Pose pose
     float64[36] covariance
+geometry_msgs/Transform
+    geometry_msgs/Vector3 translation [m]
+    geometry_msgs/Quaternion rotation
+geometry_msgs/TransformStamped
+    std_msgs/Header header
+    string child_frame_id
+    geometry_msgs/Transform transform
 geometry_msgs/Twist
     geometry_msgs/Vector3 linear [m/s]
     geometry_msgs/Vector3 angular [rad/s]

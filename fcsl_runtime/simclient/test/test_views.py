@@ -16,6 +16,7 @@ from simclient.view.views import (
     TEXT_BYTES_MAX,
     Body,
     Curve,
+    Frame,
     PanelView,
     Views,
     parse_views,
@@ -40,6 +41,17 @@ def test_defaults_are_those_of_the_compiler() -> None:
     assert parse_views(json.dumps({"panels": [PANEL]})).body is None
 
 
+def test_frames_have_defaults_too() -> None:
+    placed = {"frame": "imu", "parent": "base", "position": [1, 2, 3], "rotation": [0.0, 1.0, 0.0, 0.0]}
+    views = parse_views(json.dumps({"panels": [PANEL], "frames": [placed, {"frame": "a", "parent": "b"}]}))
+    identity = Frame("a", "b", (0.0, 0.0, 0.0), (1.0, 0.0, 0.0, 0.0))
+    assert views.frames == (Frame("imu", "base", (1.0, 2.0, 3.0), (0.0, 1.0, 0.0, 0.0)), identity)
+
+
+def with_frame(**changes: Any) -> str:
+    return json.dumps({"panels": [PANEL], "frames": [{"frame": "imu", "parent": "base", **changes}]})
+
+
 def with_panel(**changes: Any) -> str:
     return json.dumps({"panels": [{**PANEL, **changes}]})
 
@@ -57,6 +69,9 @@ def with_body(**changes: Any) -> str:
         (" " * (TEXT_BYTES_MAX + 1), "more than 65535 bytes"),
         ("7", r"views: not an object with panels, body"),
         ("{}", "holds neither"),
+        (with_frame(position=[1, 2]), r"views.frames\[0\]: a position has 3 numbers, a rotation 4"),
+        (with_frame(rotation=[1, 0, 0, "x"]), r"views.frames\[0\].rotation: not a number"),
+        (with_frame(frame=7), r"views.frames\[0\].frame"),
         ('{"panels": [], "panels": []}', "a key appears twice"),
         ('{"pannels": []}', "no key `pannels`; did you mean `panels`"),
         (json.dumps({"panels": [PANEL] * 17}), r"views.panels: 17 elements; at most 16"),

@@ -566,6 +566,16 @@ MACHINE_CODES: dict[str, Code] = {
         '              "as": "quaternion"}]',
         '"channels": [{"name": "force", "id": 1, "field": "control.outputs.force", "direction": "actuator"}]',
     ),
+    "E251": Code(
+        "frames that are no tree",
+        "Each of `views.frames` has one parent, and none is its own ancestor. A position is three numbers in m. A rotation "
+        "is a unit quaternion w, x, y, z, or `rpy`: roll, pitch and yaw in rad.",
+        Kind.JSON,
+        '"views": {"panels": [{"title": "altitude", "estimate": ["nav.outputs.altitude"]}],\n'
+        '          "frames": [{"frame": "imu_link", "parent": "base_link", "rotation": [0.0, 0.0, 0.0, 0.0]}]}',
+        '"views": {"panels": [{"title": "altitude", "estimate": ["nav.outputs.altitude"]}],\n'
+        '          "frames": [{"frame": "imu_link", "parent": "base_link", "rotation": [1.0, 0.0, 0.0, 0.0]}]}',
+    ),
     "W201": Code(
         "an algorithm without an instance",
         "The algorithm is checked, but is not part of the machine. Usually its instance was removed or never added.",

@@ -25,14 +25,11 @@ from . import mapping
 from .replaying import replay, replay_foreign
 
 
-def _parser() -> argparse.ArgumentParser:
-    parser = argparse.ArgumentParser(
-        prog="simclient.replay",
-        description="Replays a recorded run, bit for bit; or runs a machine on a bag that FCSL did not record.",
-        epilog=mapping.__doc__,
-        formatter_class=argparse.RawDescriptionHelpFormatter,
-    )
-    add_version(parser, "simclient", __file__)
+def add_arguments(parser: argparse.ArgumentParser) -> None:
+    """Also of `ros2 fcsl replay`."""
+    parser.description = "Replays a recorded run, bit for bit; or runs a machine on a bag that FCSL did not record."
+    parser.epilog = mapping.__doc__
+    parser.formatter_class = argparse.RawDescriptionHelpFormatter
     parser.add_argument("bag", help="directory or .mcap file; with --map also .db3, .bag (ROS 1), .zstd")
     which = parser.add_mutually_exclusive_group(required=True)
     which.add_argument("--config", default="", help="machine JSON")
@@ -51,7 +48,6 @@ def _parser() -> argparse.ArgumentParser:
     parser.add_argument(
         "--msg-path", action="append", default=[], metavar="FOLDER", help=f"with --map: {MSG_PATH_HELP}"
     )
-    return parser
 
 
 def _main_foreign(options: argparse.Namespace) -> int:
@@ -81,8 +77,14 @@ def _main_foreign(options: argparse.Namespace) -> int:
 
 
 def main(arguments: Sequence[str]) -> int:
-    parser = _parser()
-    options = parser.parse_args(arguments)
+    parser = argparse.ArgumentParser(prog="simclient.replay")
+    add_version(parser, "simclient", __file__)
+    add_arguments(parser)
+    return command(parser, parser.parse_args(arguments))
+
+
+def command(parser: argparse.ArgumentParser, options: argparse.Namespace) -> int:
+    """What the arguments of `add_arguments` ask for; the exit code."""
     for name in ("output", "namespace", "expect", "plot", "msg_path"):
         if getattr(options, name) and not options.map:
             parser.error(f"{'-o' if name == 'output' else '--' + name.replace('_', '-')} needs --map")

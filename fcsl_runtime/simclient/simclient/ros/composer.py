@@ -20,11 +20,18 @@ class Composer:
     """Composes messages of one type."""
 
     def __init__(
-        self, definitions: Definitions, message: str, sources: Sequence[Source], frame: str = "", child_frame: str = ""
+        self,
+        definitions: Definitions,
+        message: str,
+        sources: Sequence[Source],
+        frame: str = "",
+        child_frame: str = "",
+        stamped: str = "",
     ):
-        """`message`: full name of the type. Raises MapError, which names the source that does not fit and why."""
+        """`message`, `stamped`: as composer_plan takes them. Raises MapError, which names the source that does not fit and
+        why."""
         try:
-            plan = composer_plan(definitions, message, sources, frame, child_frame)
+            plan = composer_plan(definitions, message, sources, frame, child_frame, stamped)
         except PlanError as error:
             raise MapError(str(error)) from None
         self._memories = (ctypes.c_void_p * plan.memory_count)()

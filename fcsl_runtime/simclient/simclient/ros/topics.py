@@ -57,13 +57,17 @@ def reader_of(topic: RosTopic) -> Reader:
     return Reader(STANDARD, topic.type, picks, topic.frame, topic.child_frame)
 
 
-def composer_of(topic: RosTopic) -> Composer:
-    """A composer of the topic's message from a machine struct (memory 0). Raises MapError."""
-    sources = [
+def sources_of(topic: RosTopic) -> list[Source]:
+    """What fills the topic's message, in a machine struct (memory 0)."""
+    return [
         Source(c.ros_field, c.field.type, c.field.count, c.field.offset, axes=c.ros_axes, name=c.name)
         for c in topic.channels
     ]
-    return Composer(STANDARD, topic.type, sources, topic.frame, topic.child_frame)
+
+
+def composer_of(topic: RosTopic) -> Composer:
+    """A composer of the topic's message from a machine struct (memory 0). Raises MapError."""
+    return Composer(STANDARD, topic.type, sources_of(topic), topic.frame, topic.child_frame)
 
 
 class Inlet:

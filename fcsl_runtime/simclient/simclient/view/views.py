@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""The `views` block: the panels and the body that a machine or a simulation chooses for its pictures.
+"""The `views` block: the panels, the body and the frames that a machine or a simulation chooses for its pictures.
 
 It comes as text from a bag, from telemetry or from a file of the user, so it is checked as hostile input.
 """
@@ -21,7 +21,7 @@ SHAPES = ("lander", "multirotor", "fixed_wing", "rover", "satellite", "mesh")
 MESH_SUFFIXES = (".glb", ".stl", ".obj")
 #: Limits of a block. A file around it (a machine JSON) may be larger.
 TEXT_BYTES_MAX, FILE_BYTES_MAX = (1 << 16) - 1, 4 * 1024 * 1024
-PANELS_MAX, CURVES_MAX = 16, 8
+PANELS_MAX, CURVES_MAX, FRAMES_MAX = 16, 8, 64
 _NAME_CHARACTERS_MAX = 400
 _SIZE_M, _LANDER_SIZE_M = 1.0, 3.0
 _STEP = r"[^\s.\[\]]+(?:\[[0-9]+\])*"
@@ -65,9 +65,20 @@ class Body:
 
 
 @dataclass(frozen=True)
+class Frame:
+    """A frame, placed in that of its parent: position in m, rotation w, x, y, z. Names may be any text."""
+
+    frame: str
+    parent: str
+    position: tuple[float, ...]
+    rotation: tuple[float, ...]
+
+
+@dataclass(frozen=True)
 class Views:
     panels: tuple[PanelView, ...]
     body: Body | None
+    frames: tuple[Frame, ...] = ()
 
 
 def parse_views(text: str) -> Views:
@@ -135,7 +146,7 @@ def _refuse_constant(name: str) -> Any:
 
 
 def _views(block: Any) -> Views:
-    members = _object(block, "views", ("panels", "body"))
+    members = _object(block, "views", ("panels", "body", "frames"))
     panels = [
         _panel(panel, f"views.panels[{i}]")
         for i, panel in enumerate(_list(members.get("panels", []), "views.panels", PANELS_MAX))
@@ -143,7 +154,23 @@ def _views(block: Any) -> Views:
     body = _body(members["body"]) if members.get("body") is not None else None
     if not panels and body is None:
         raise ViewError('views: holds neither "panels" nor a "body"')
-    return Views(tuple(panels), body)
+    frames = _list(members.get("frames", []), "views.frames", FRAMES_MAX)
+    return Views(tuple(panels), body, tuple(_frame(frame, f"views.frames[{i}]") for i, frame in enumerate(frames)))
+
+
+def _frame(value: Any, where: str) -> Frame:
+    """The compiler makes a rotation of `rpy`; pictures show no frames, so that of a JSON file is passed over."""
+    members = _object(value, where, ("frame", "parent", "position", "rotation", "rpy"))
+    name, parent = (_text(members.get(key, ""), f"{where}.{key}") for key in ("frame", "parent"))
+    position, rotation = (
+        tuple(
+            _number(n, f"{where}.{key}", -1e9) for n in _list(members.get(key, default), f"{where}.{key}", len(default))
+        )
+        for key, default in (("position", [0.0] * 3), ("rotation", [1.0, 0.0, 0.0, 0.0]))
+    )
+    if len(position) != 3 or len(rotation) != 4:
+        raise ViewError(f"{where}: a position has 3 numbers, a rotation 4")
+    return Frame(name, parent, position, rotation)
 
 
 def _panel(value: Any, where: str) -> PanelView:
