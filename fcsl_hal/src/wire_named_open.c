@@ -109,7 +109,7 @@ static void fill_plan(named_wire_t *wire, const char *name_space, plan_t *plan)
             wire->numbers[i] = plan->input_count;
             const uint32_t least = channel->as == FCSL_AS_BLOB ? 0u : (uint32_t)bytes;
             plan->inputs[plan->input_count++] =
-                (fcsl_bus_input_t){.key = key, .bytes = (uint32_t)bytes, .least = least, .depth = 1};
+                (fcsl_bus_input_t){.key = key, .bytes = (uint32_t)bytes, .least = least, .depth = 1, .quiet = 1};
         } else {
             wire->numbers[i] = plan->output_count;
             plan->outputs[plan->output_count++] = key;

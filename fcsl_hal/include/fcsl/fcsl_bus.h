@@ -35,6 +35,7 @@ typedef struct {
     uint32_t bytes; /* of the longest message */
     uint32_t least; /* of the shortest one */
     uint32_t depth; /* 1: fcsl_bus_take gets the newest message; more: as many wait, and the next one is dropped */
+    int quiet; /* its messages do not end fcsl_bus_wait: others follow that do */
 } fcsl_bus_input_t;
 
 /* A key that answers queries with the same bytes as long as the session lives. They are copied. */
@@ -96,7 +97,7 @@ int fcsl_bus_post(fcsl_bus_t *bus, uint32_t output, const void *bytes, size_t si
  * `bytes` has room for as many as the input's `bytes`. */
 int fcsl_bus_take(fcsl_bus_t *bus, uint32_t input, void *bytes, size_t *size);
 
-/* Waits until a message came, or something that the three functions below tell changed, since the last call of this: 1. 0 at
+/* Waits until a message came for an input that is not quiet, or something that the three functions below tell changed, since the last call of this: 1. 0 at
  * `deadline_ns` of CLOCK_MONOTONIC, or when a signal is caught. */
 int fcsl_bus_wait(fcsl_bus_t *bus, uint64_t deadline_ns);
 
