@@ -31,7 +31,7 @@ FULL = os.environ.get("FCSL_VERIFY", "") not in ("", "0")
 MOMENTS = 200 if FULL else 10
 RUNS_UNDER_LOAD = 20 if FULL else 1
 #: Messages, and the flight meanwhile: simulated seconds, and how many of them in a second.
-FLOOD, FLOODED_S, FLOODED_SPEED = (1_000_000, "25", "0.25") if FULL else (20_000, "4", "1")
+FLOOD, FLOODED_S, FLOODED_SPEED = (1_000_000, "25", "0.5") if FULL else (20_000, "4", "1")
 #: A thread that steps and had to do with each message of a flood would take longer, ns.
 STEP_LIMIT_NS = 1_000_000
 #: Such a freeze is shorter than the lease of a session, s.
