@@ -7,6 +7,7 @@ python3 scripts/bench bus
 
 from __future__ import annotations
 
+import functools
 import json
 import os
 import resource
@@ -76,9 +77,9 @@ def round_trips(folder: Path) -> dict[str, dict[str, float]]:
     program = lockstep_program(folder)
     ways: dict[str, Callable[[], dict[str, float]]] = {}
     for kind, ticks in TICKS.items():
-        ways[f"lock-step over {kind}"] = lambda kind=kind, ticks=ticks: lockstep_over(program, kind, folder, ticks)
+        ways[f"lock-step over {kind}"] = functools.partial(lockstep_over, program, kind, folder, ticks)
         if kind != "zenoh":
-            ways[f"bare sockets, {kind}"] = lambda kind=kind, ticks=ticks: lockstep_over(program, kind, None, ticks)
+            ways[f"bare sockets, {kind}"] = functools.partial(lockstep_over, program, kind, None, ticks)
     ways["zenoh's own ping (Python)"] = _ping_zenoh
     ways["Fast DDS (rclpy, raw)"] = _ping_dds
     rounds: dict[str, list[dict[str, float]]] = {name: [] for name in ways}
@@ -182,7 +183,7 @@ def computers(folder: Path) -> dict[str, float]:
         for i in range(COMPUTERS):
             where = ["--external", f"zenoh-client:{endpoint}", "--namespace", f"c{i}"]
             simulators.append(begin("fcsl-sim", "run", SIM, *where, "--speed", SPEED, "--timeout", 60, "--json"))
-            where = ["--hal", f"zenoh:{endpoint}", "--namespace", f"c{i}", "--timeout-ms", 60000]
+            where = ["--hal", f"zenoh:{endpoint}", "--namespace", f"c{i}", "--timeout-ms", "60000"]
             flying.append(begin("fcsl-fc", library, *where, "--summary", folder / f"c{i}.json"))
         used = 0.0
         for process in flying:
