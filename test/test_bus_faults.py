@@ -11,13 +11,15 @@ import re
 import signal
 import socket
 import subprocess
+import sys
 import threading
 import time
 from pathlib import Path
+from typing import Any
 
 import pytest
 import zenoh
-from test_wires import LENGTH_S, SIM, digest, fly, free_port, library, reference
+from test_wires import LENGTH_S, SIM, digest, fly, free_port, library, reference, run
 
 from simclient.bag import Bag
 from simclient.replay import replay
@@ -25,7 +27,13 @@ from simclient.replay import replay
 __all__ = ["library", "reference"]
 MODES = ("zenoh:", "zenoh-peer:", "wire:zenoh:")
 #: `make verify EFFORT=full` tries more.
-MOMENTS = 10 if os.environ.get("FCSL_VERIFY", "") in ("", "0") else 200
+FULL = os.environ.get("FCSL_VERIFY", "") not in ("", "0")
+MOMENTS = 200 if FULL else 10
+RUNS_UNDER_LOAD = 20 if FULL else 1
+#: Messages, and the flight meanwhile: simulated seconds, and how many of them in a second.
+FLOOD, FLOODED_S, FLOODED_SPEED = (1_000_000, "25", "0.5") if FULL else (20_000, "4", "1")
+#: A thread that steps and had to do with each message of a flood would take longer, ns.
+STEP_LIMIT_NS = 1_000_000
 #: Such a freeze is shorter than the lease of a session, s.
 SHORT_S = 0.4
 
@@ -109,47 +117,115 @@ def test_a_party_that_is_frozen_for_a_moment(
     assert digest(flight.bag) == reference
 
 
-def resident_kib(process: subprocess.Popen[bytes]) -> int:
-    status = Path(f"/proc/{process.pid}/status").read_text()
-    return next(int(line.split()[1]) for line in status.splitlines() if line.startswith("VmRSS"))
-
-
-def test_a_hostile_party(reference: str, library: Path, tmp_path: Path) -> None:
-    """It puts what no channel takes, as fast as it can: that is dropped and counted, and takes no memory."""
+@pytest.mark.parametrize("number", range(RUNS_UNDER_LOAD))
+@pytest.mark.parametrize("mode", MODES)
+def test_beside_busy_processes(mode: str, number: int, reference: str, library: Path, tmp_path: Path) -> None:
     place = f"tcp/127.0.0.1:{free_port(socket.SOCK_STREAM)}"
-    flight = Flight("zenoh:", place, library, tmp_path, LENGTH_S, speed="0.5")
-    config = zenoh.Config.from_json5('{mode: "client", scouting: {multicast: {enabled: false}}}')
-    config.insert_json5("connect/endpoints", f'["{place}"]')
-    keys = ("altitude", "velocity", "throttle", "tick", "nothing", "@control/x")
-    over = threading.Event()
-    put = 0
+    busy = [subprocess.Popen([sys.executable, "-c", "while True: pass"]) for _ in range(2)]
     try:
-        before = [resident_kib(process) for process in (flight.simulator, flight.controller)]
-        with zenoh.open(config) as session:
+        assert fly(f"{mode.replace('-peer', '')}{place}", f"{mode}{place}", library, tmp_path / "bag") == reference
+    finally:
+        for process in busy:
+            process.kill()
+            process.wait()
 
-            def flood() -> None:
-                nonlocal put
-                numbers = random.Random(1)
-                while not over.is_set():
-                    size = numbers.choice([0, 1, 7, 9, 24, 26, 4096])
-                    session.put(f"lander_control/{numbers.choice(keys)}", numbers.randbytes(size))
-                    put += 1
 
-            thread = threading.Thread(target=flood)
-            thread.start()
-            try:
-                limit = time.monotonic() + 3.0
-                while put < 20000 and time.monotonic() < limit:
-                    time.sleep(0.01)
-                after = [resident_kib(process) for process in (flight.simulator, flight.controller)]
-                assert flight.ends("controller")[0] == 0
-            finally:
-                over.set()
-                thread.join()
-        assert flight.ends("simulator")[0] in (0, 1)
+# ---- a hostile party ---------------------------------------------------------------------------------------------------
+
+
+def resident_kib(process: subprocess.Popen[bytes]) -> int:
+    """0 of one that has ended."""
+    status = Path(f"/proc/{process.pid}/status").read_text()
+    return next((int(line.split()[1]) for line in status.splitlines() if line.startswith("VmRSS")), 0)
+
+
+class Flood:
+    """Puts what no channel takes as fast as it can, until it is closed."""
+
+    KEYS = ("altitude", "velocity", "throttle", "tick", "nothing", "@control/x")
+    SIZES = (0, 1, 7, 9, 24, 26, 4096)
+
+    def __init__(self, place: str):
+        config = zenoh.Config.from_json5('{mode: "client", scouting: {multicast: {enabled: false}}}')
+        config.insert_json5("connect/endpoints", f'["{place}"]')
+        config.insert_json5("connect/timeout_ms", "30000")
+        self.put = 0
+        self._over = threading.Event()
+        self._session = zenoh.open(config)
+        self._thread = threading.Thread(target=self._run)
+        self._thread.start()
+
+    def _run(self) -> None:
+        numbers = random.Random(1)
+        messages = [(f"lander_control/{key}", numbers.randbytes(size)) for key in self.KEYS for size in self.SIZES]
+        while not self._over.is_set():
+            self._session.put(*numbers.choice(messages))
+            self.put += 1
+
+    def close(self) -> None:
+        self._over.set()
+        self._thread.join()
+        self._session.close()
+
+
+def flood(place: str, *processes: subprocess.Popen[bytes]) -> tuple[int, int]:
+    """Puts FLOOD messages, or as many as can be until the first process ends: how many, and the memory in KiB that a process
+    has taken meanwhile."""
+    before = [resident_kib(process) for process in processes]
+    grown = 0
+    hostile = Flood(place)
+    try:
+        while hostile.put < FLOOD and processes[0].poll() is None:
+            grown = max(grown, *(resident_kib(p) - then for p, then in zip(processes, before, strict=True)))
+            time.sleep(0.01)
+    finally:
+        hostile.close()
+    return hostile.put, grown
+
+
+def summary_of(path: Path) -> dict[str, Any]:
+    summary: dict[str, Any] = json.loads(path.read_text())
+    return summary
+
+
+def test_a_hostile_party(library: Path, tmp_path: Path) -> None:
+    """What it puts is dropped and counted, takes no memory, and delays no step."""
+    place = f"tcp/127.0.0.1:{free_port(socket.SOCK_STREAM)}"
+    run("fcsl-sim", "run", SIM, "--duration", FLOODED_S, "--record", tmp_path / "alone", statuses=(0, 1))
+    flight = Flight("zenoh:", place, library, tmp_path, FLOODED_S, FLOODED_SPEED)
+    try:
+        put, grown = flood(place, flight.controller, flight.simulator)
+        assert flight.ends("controller")[0] == 0 and flight.ends("simulator")[0] in (0, 1)
     finally:
         flight.close()
-    assert digest(flight.bag) == reference
-    counted = json.loads(flight.summary.read_text())["hal"]
-    assert counted["bus.wrong_size"] > 100 and counted["bus.strays"] > 100
-    assert max(now - then for then, now in zip(before, after, strict=True)) < 64 * 1024
+    assert digest(flight.bag) == digest(tmp_path / "alone")
+    summary = summary_of(flight.summary)
+    counted = summary["hal"]
+    assert counted["bus.wrong_size"] > 100 and counted["bus.strays"] > 100 and put > 1000
+    assert grown < 64 * 1024
+    assert summary["tick_time_ns"]["p50"] < STEP_LIMIT_NS, summary["tick_time_ns"]
+
+
+def test_a_hostile_observer(library: Path, tmp_path: Path) -> None:
+    """The flight in real time does not hear it."""
+    place = f"tcp/127.0.0.1:{free_port(socket.SOCK_STREAM)}"
+    line = [
+        library,
+        "--observers",
+        place,
+        "--ticks",
+        "10000" if FULL else "300",
+        "--summary",
+        tmp_path / "summary.json",
+    ]
+    with subprocess.Popen(["fcsl-fc", *map(str, line)], stdout=subprocess.DEVNULL, stderr=subprocess.PIPE) as flying:
+        try:
+            put, grown = flood(place, flying)
+            _, said = flying.communicate(timeout=200)
+        finally:
+            flying.kill()
+    assert flying.returncode == 0 and put > 1000, said
+    summary = summary_of(tmp_path / "summary.json")
+    assert grown < 64 * 1024
+    for what in ("tick_time_ns", "lateness_ns"):
+        assert summary[what]["count"] > 0 and summary[what]["p50"] < STEP_LIMIT_NS, summary[what]

@@ -137,6 +137,7 @@ static int allocate(fcsl_bus_t *bus, const fcsl_bus_options_t *options)
         if (inbox_open(&bus->inboxes[i], input->bytes, input->least, input->depth) != 0) {
             return -1;
         }
+        bus->inboxes[i].quiet = input->quiet;
     }
     return 0;
 }

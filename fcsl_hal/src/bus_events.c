@@ -29,7 +29,9 @@ static void put(fcsl_bus_t *bus, uint32_t input, const uint8_t *bytes, size_t si
     default:
         break;
     }
-    bus_tell(bus);
+    if (!bus->inboxes[input].quiet) {
+        bus_tell(bus);
+    }
 }
 
 static void on_sample(void *ctx, uint32_t number, const uint8_t *bytes, size_t size)

@@ -15,6 +15,7 @@ typedef struct {
     uint32_t bytes; /* of a slot */
     uint32_t least; /* of a message */
     uint32_t depth;
+    int quiet; /* see fcsl_bus_input_t */
     uint8_t *slots;
     uint32_t *sizes; /* of what lies in the slots */
     /* depth > 1: a queue. Messages that ever came in and went out. */

@@ -104,8 +104,11 @@ static void fill_plan(named_wire_t *wire, const char *name_space)
         const char *key = add_key(wire, &keys, name_space, channel->name);
         if (comes_in(wire, channel)) {
             wire->numbers[i] = plan->input_count;
-            plan->inputs[plan->input_count++] = (fcsl_bus_input_t){
-                .key = key, .bytes = payload_most(machine, i), .least = payload_least(machine, i), .depth = 1};
+            plan->inputs[plan->input_count++] = (fcsl_bus_input_t){.key = key,
+                                                                   .bytes = payload_most(machine, i),
+                                                                   .least = payload_least(machine, i),
+                                                                   .depth = 1,
+                                                                   .quiet = 1};
         } else {
             wire->numbers[i] = plan->output_count;
             plan->outputs[plan->output_count++] = key;

@@ -78,6 +78,59 @@ static void test_values_come_before_their_tick(void)
     CHECK(fcsl_bus_close(bus, CLOSE_MS) == 0);
 }
 
+/* ---- quiet inputs ----------------------------------------------------------------------------------------------------- */
+
+static void put_quietly(const char *endpoint)
+{
+    const fcsl_bus_options_t options = {.role = FCSL_BUS_CLIENT,
+                                        .endpoint = endpoint,
+                                        .timeout_ms = LONG_MS,
+                                        .ring_bytes = RING_BYTES,
+                                        .outputs = VALUE_KEYS,
+                                        .output_count = 1,
+                                        .inputs = &(fcsl_bus_input_t){.key = TICK_KEY[0], .bytes = 1, .depth = 1},
+                                        .input_count = 1};
+    fcsl_bus_t *bus = open_bus(&options);
+    uint8_t byte = 0;
+    WAIT_UNTIL(bus, fcsl_bus_matched(bus, 0));
+    for (uint32_t i = 0; i < ROUNDS; i++) {
+        CHECK(fcsl_bus_post(bus, 0, &byte, sizeof byte) == 0);
+    }
+    take_one(bus, 0, &byte, sizeof byte);
+    CHECK(fcsl_bus_close(bus, CLOSE_MS) == 0);
+}
+
+/* They are taken like others, but wake nobody. */
+static void test_a_quiet_input(void)
+{
+    const struct timespec moment = {.tv_nsec = 1000000};
+    const uint64_t limit_ns = later_ns();
+    const char *endpoint = free_endpoint();
+    const pid_t process = in_process(put_quietly, endpoint);
+    const fcsl_bus_input_t inputs[] = {{.key = VALUE_KEYS[0], .bytes = 1, .depth = 1, .quiet = 1}};
+    const fcsl_bus_options_t options = {.role = FCSL_BUS_LISTEN,
+                                        .endpoint = endpoint,
+                                        .ring_bytes = RING_BYTES,
+                                        .outputs = TICK_KEY,
+                                        .output_count = 1,
+                                        .inputs = inputs,
+                                        .input_count = 1};
+    fcsl_bus_t *bus = open_bus(&options);
+    uint8_t byte = 1;
+    size_t size = 0;
+    uint32_t news = 0;
+    WAIT_UNTIL(bus, fcsl_bus_matched(bus, 0));
+    while (counted(bus).received < ROUNDS && now_ns() < limit_ns) {
+        (void)nanosleep(&moment, NULL);
+        news += (uint32_t)fcsl_bus_wait(bus, 0);
+    }
+    CHECK(counted(bus).received == ROUNDS && news < 5u); /* the match may have been told late */
+    CHECK(fcsl_bus_take(bus, 0, &byte, &size) && byte == 0);
+    CHECK(fcsl_bus_post(bus, 0, &byte, sizeof byte) == 0);
+    check_success(process);
+    CHECK(fcsl_bus_close(bus, CLOSE_MS) == 0);
+}
+
 static void test_a_peer_is_as_good(void)
 {
     answering = FCSL_BUS_PEER;
@@ -321,6 +374,7 @@ static void test_one_that_connects_later(void)
 int main(void)
 {
     check_alone(test_values_come_before_their_tick);
+    check_alone(test_a_quiet_input);
     check_alone(test_a_peer_is_as_good);
     check_alone(test_a_listener_that_comes_late);
     check_alone(test_clients_meet);

@@ -7,6 +7,7 @@ from pathlib import Path
 
 #: What can be run alone, and its module in subjects/.
 ALONE = {
+    "bus": "bus.main",
     "chain": "chain",
     "checkpoint": "checkpoint",
     "guard": "guard",

@@ -17,6 +17,7 @@ from pathlib import Path
 from typing import Any
 
 from .harness.size import SUFFIX
+from .subjects.bus.main import bus_figures, bus_rows
 from .subjects.chain import chain_summary, chain_times
 from .subjects.checkpoint import checkpoint_rows, checkpoint_times
 from .subjects.edit_loop import edit_to_test
@@ -84,11 +85,11 @@ def replay_rows(replayed: dict[str, Any]) -> Rows:
 
 
 def lockstep_rows(ticks_per_s: dict[str, float]) -> Rows:
-    rows = []
+    rows = [("lock-step over the bus, native programs", f"{ticks_per_s['native']:.0f} ticks/s")]
     for n in LOCKSTEP_DECIMATES:
         what = "all published" if n == 1 else f"1 of {n} published"
-        rows.append((f"lock-step, {what}", f"{ticks_per_s[f'decimate_{n}']:.0f} ticks/s (goal 6000)"))
-    return rows
+        rows.append((f"lock-step of nodes, {what}", f"{ticks_per_s[f'decimate_{n}']:.0f} ticks/s (goal 6000)"))
+    return [*rows, ("    with a subscriber", f"{ticks_per_s['subscribed']:.0f} ticks/s (goal 6000)")]
 
 
 def realtime_rows(sides: dict[str, Any]) -> Rows:
@@ -135,6 +136,7 @@ SECTIONS = (
     Section("build", "timing the edit loop", lambda _: edit_to_test(), edit_rows),
     Section("replay_map", "replaying bags of other makers", replay_map, replay_rows),
     Section("link", "flying in lock-step over every wire, and losing frames", link_figures, link_rows),
+    Section("bus", "going round over the bus, beside sockets, Zenoh and Fast DDS", bus_figures, bus_rows),
     Section("lateness", "flying at 1 kHz under load, beside cyclictest (two minutes)", lateness, lateness_rows),
     Section("guard", "killing flight programs under a guard", guard_times, guard_rows),
     Section("lockstep_ticks_per_s", "flying the lander over ROS 2", lambda _: lockstep(), lockstep_rows),

@@ -37,6 +37,7 @@ _TESTS = "fcsl_compiler/test"
 #: Files with tests that do more where FCSL_VERIFY is 1.
 _LONGER = (
     "test/test_bus_faults.py",
+    "fcsl_bridge/test/test_bus_parties.py",
     "fcsl_bridge/test/test_controller.py",
     "fcsl_bridge/test/test_robustness_bags.py",
     "fcsl_runtime/simclient/test/test_socket.py",

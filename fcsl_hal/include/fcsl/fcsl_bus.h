@@ -35,6 +35,7 @@ typedef struct {
     uint32_t bytes; /* of the longest message */
     uint32_t least; /* of the shortest one */
     uint32_t depth; /* 1: fcsl_bus_take gets the newest message; more: as many wait, and the next one is dropped */
+    int quiet; /* its messages do not end fcsl_bus_wait: others follow that do */
 } fcsl_bus_input_t;
 
 /* A key that answers queries, with these bytes until fcsl_bus_answer replaces them; with none it is silent. They are copied. */
@@ -102,7 +103,8 @@ int fcsl_bus_take(fcsl_bus_t *bus, uint32_t input, void *bytes, size_t *size);
  * Returns 0, or -1: no such answer, too long, or no memory. */
 int fcsl_bus_answer(fcsl_bus_t *bus, uint32_t answer, const void *bytes, size_t size);
 
-/* Waits until a message came, or something that the three functions below tell changed, since the last call of this: 1. 0 at
+/* Waits until a message came for an input that is not quiet, or something that the three functions below tell changed, since the
+ * last call of this: 1. 0 at
  * `deadline_ns` of CLOCK_MONOTONIC, or when a signal is caught. */
 int fcsl_bus_wait(fcsl_bus_t *bus, uint64_t deadline_ns);
 

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""What subjects/ros/rig.json does, as an ordinary rclpy node: a timer at 1 kHz, twenty publishers, every tenth result published.
+"""What subjects/ros/rig.json does, as an ordinary rclpy node: a timer at 1 kHz, twenty publishers, every twentieth result published.
 
 The stamp is the deadline that the timer served, on a grid from its creation, so that delays compare with controller_node's.
 """
@@ -19,7 +19,7 @@ from rclpy.node import Node
 AXES = 20
 DT = 0.001
 PERIOD_NS = 1_000_000
-DECIMATE = 10
+DECIMATE = 20
 
 
 class Axis:

@@ -33,15 +33,23 @@ LOSSES = (0.0, 0.001, 0.01, 0.05, 0.1, 0.2)
 LINK_TICKS = sized(1_000_000, 20_000)
 
 
-def link_figures(folder: Path) -> dict[str, Any]:
-    sources = [HERE / "lockstep.c", BENCH / "harness/timing.c", *sorted((HAL / "src").glob("*.c"))]
-    includes = [HAL / "include", HAL / "src"]
-    flags = ["-lpthread", "-Wl,--gc-sections"]
+def _compile(name: str, folder: Path) -> Path:
+    sources = [HERE / f"{name}.c", BENCH / "harness/timing.c", *sorted((HAL / "src").glob("*.c"))]
     zenoh = package_prefix("fcsl_hal") / "lib/libfcsl_io.a"
-    lockstep = compile_program([*sources, zenoh], folder / "lockstep", includes, flags)
-    goodput = compile_program([HERE / "goodput.c", *sources[1:], zenoh], folder / "goodput", includes, flags)
-    wires = {kind: _lockstep(lockstep, kind, folder, ticks) for kind, ticks in TICKS.items()}
-    bare = {kind: _run(lockstep, "bare", kind, ticks) for kind, ticks in TICKS.items() if kind not in ("uart", "zenoh")}
+    flags = ["-lpthread", "-Wl,--gc-sections"]
+    return compile_program([*sources, zenoh], folder / name, [HAL / "include", HAL / "src"], flags)
+
+
+def lockstep_program(folder: Path) -> Path:
+    """lockstep.c, compiled."""
+    return _compile("lockstep", folder)
+
+
+def link_figures(folder: Path) -> dict[str, Any]:
+    lockstep, goodput = lockstep_program(folder), _compile("goodput", folder)
+    wires = {kind: lockstep_over(lockstep, kind, folder, ticks) for kind, ticks in TICKS.items()}
+    kinds = [kind for kind in TICKS if kind not in ("uart", "zenoh")]
+    bare = {kind: lockstep_over(lockstep, kind, None, TICKS[kind]) for kind in kinds}
     loss = {str(share): _run(goodput, share, LINK_TICKS, 1) for share in LOSSES}
     for share, facts in loss.items():
         facts["formula"] = go_back_n(float(share), facts["round_trip"] + facts["timeout"])
@@ -62,7 +70,10 @@ def _run(program: Path, *arguments: object) -> dict[str, Any]:
     return facts
 
 
-def _lockstep(program: Path, kind: str, folder: Path, ticks: int) -> dict[str, Any]:
+def lockstep_over(program: Path, kind: str, folder: Path | None, ticks: int) -> dict[str, Any]:
+    """Over a wire; without a folder, over two bare sockets of the kind."""
+    if folder is None:
+        return _run(program, "bare", kind, ticks)
     if kind == "uart":
         return _over_terminals(program, ticks)
     if kind == "unix":

@@ -6,14 +6,16 @@ The package in this folder is built once below out/bench_ros. Both nodes are hea
 
 from __future__ import annotations
 
+import functools
 import json
 import os
 import re
 import shutil
 import signal
+import statistics
 import subprocess
 import sys
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from pathlib import Path
 from typing import Any
 
@@ -22,6 +24,7 @@ import numpy as np
 from fcsl_bridge.domain import own_domain
 from fcsl_bridge.loopback import loopback_environment
 from fcsl_compiler.base.ament import package_prefix
+from fcsl_compiler.driver.cache import build_machine
 
 from ...harness.size import SUFFIX, sized
 
@@ -32,9 +35,10 @@ OUT = ROOT / "out/bench_ros"
 PICTURE = ROOT / f"out/bench_ros{SUFFIX}.png"
 WARM_UP_S, WINDOW_S = sized((4.0, 10.0), (0.5, 1.0))
 LIMIT_S = 300
-#: 1 of 10 ticks is published: 100 Hz.
-DECIMATE = 10
+#: 1 of 20 ticks is published: 50 Hz.
+DECIMATE = 20
 LOCKSTEP_DECIMATES = (100, 1)
+LOCKSTEP_ROUNDS = sized(3, 1)
 #: Edges of the latency histogram in microseconds, for the picture.
 EDGES_US = np.geomspace(20, 20_000, 61)
 
@@ -142,9 +146,39 @@ def draw(delays_us: dict[str, Any], figures: dict[str, Any]) -> None:
 
 
 def lockstep() -> dict[str, Any]:
-    """Ticks per second of sim_node and controller_node flying the lander, by how many ticks share one publication."""
+    """Ticks per second of the lander in lock-step over the bus: of two native programs, and of sim_node and controller_node by how
+    many ticks share one publication, and with a subscriber. They take turns; medians."""
     with own_domain() as domain:
-        return {f"decimate_{n}": _fly(n, environment(domain)) for n in LOCKSTEP_DECIMATES}
+        env = environment(domain)
+        ways: dict[str, Callable[[], float]] = {"native": lambda: _fly_native(f"zenoh:tcp/127.0.0.1:{7500 + domain}")}
+        ways |= {f"decimate_{n}": functools.partial(_fly, n, env) for n in LOCKSTEP_DECIMATES}
+        ways["subscribed"] = lambda: _fly_subscribed(env)
+        rounds = [{name: fly() for name, fly in ways.items()} for _ in range(LOCKSTEP_ROUNDS)]
+    return {name: statistics.median(found[name] for found in rounds) for name in ways}
+
+
+def _fly_native(place: str) -> float:
+    lander = ROOT / "examples/lander"
+    library = build_machine(lander / "fc/lander_control.json").library
+    line = ["fcsl-sim", "run", str(lander / "sim/lander.sim.json"), "--seed", "1", "--external", place, "--json"]
+    with subprocess.Popen(line, stdout=subprocess.PIPE, text=True) as simulator:
+        flight = ["fcsl-fc", str(library), "--hal", place, "--timeout-ms", "20000"]
+        subprocess.run(flight, stdout=subprocess.DEVNULL, check=True, timeout=LIMIT_S)
+        said = json.loads(simulator.communicate(timeout=LIMIT_S)[0])
+    return float(said["ticks"] / said["wall_s"])
+
+
+def _fly_subscribed(env: dict[str, str]) -> float:
+    topics = "topics:=[/clock, /sim/truth, /odom, /lander_control/engine, /lander_control/filter]"
+    executable = package_prefix("fcsl_bridge") / "lib/fcsl_bridge/topic_count"
+    line = [str(executable), "--ros-args", "-p", topics]
+    with subprocess.Popen(line, stdout=subprocess.DEVNULL, stderr=subprocess.PIPE, text=True, env=env) as listening:
+        try:
+            assert listening.stderr is not None
+            listening.stderr.readline()  # it waits for topics
+            return _fly(1, env)
+        finally:
+            listening.kill()
 
 
 def _fly(decimate: int, env: dict[str, str]) -> float:
