@@ -213,6 +213,21 @@ static int open_observers(program_t *program)
     return loop->observers != NULL ? 0 : complain(error.text);
 }
 
+static int open_ros_graph(program_t *program)
+{
+    fcsl_error_t error;
+    loop_t *loop = &program->loop;
+    if (program->options.ros == NULL) {
+        return 0;
+    }
+    const fcsl_ros_graph_options_t options = {.endpoint = program->options.ros,
+                                              .name_space = program->options.name_space,
+                                              .machine = fcsl_run_machine(loop->run),
+                                              .simulated = !loop->realtime};
+    loop->ros = fcsl_ros_graph_open(&options, &loop->history, &error);
+    return loop->ros != NULL ? 0 : complain(error.text);
+}
+
 static int start_threads(program_t *program)
 {
     fcsl_error_t error;
@@ -226,6 +241,9 @@ static int start_threads(program_t *program)
         return complain(error.text);
     }
     if (program->loop.observers != NULL && fcsl_observers_start(program->loop.observers, &error) != 0) {
+        return complain(error.text);
+    }
+    if (program->loop.ros != NULL && fcsl_ros_graph_start(program->loop.ros, &error) != 0) {
         return complain(error.text);
     }
     return realtime_enter(&program->realtime, &error) == 0 ? 0 : complain(error.text);
@@ -258,6 +276,9 @@ static void announce(const program_t *program)
     }
     if (program->options.observers != NULL) {
         log_info("observers on %s", program->options.observers);
+    }
+    if (program->options.ros != NULL) {
+        log_info("ROS 2 topics for a bridge on %s", program->options.ros);
     }
     if (program->options.record != NULL) {
         log_info("recording to %s", program->options.record);
@@ -303,6 +324,7 @@ static int close_all(program_t *program)
     fcsl_vars_close(loop->vars);
     fcsl_telemetry_close(loop->telemetry);
     fcsl_observers_close(loop->observers);
+    fcsl_ros_graph_close(loop->ros);
     /* Before the machine is unloaded: the HAL reads its channel table. */
     if (loop->hal.close != NULL) {
         loop->hal.close(loop->hal.ctx);
@@ -327,6 +349,7 @@ static int fly(program_t *program)
     guard_link_close(loop); /* at once: to close a bag takes time */
     fcsl_telemetry_stop(loop->telemetry);
     fcsl_observers_stop(loop->observers);
+    fcsl_ros_graph_stop(loop->ros);
     if (write_run_summary(loop, program->options.summary_file, reason_of_end(program)) != 0) {
         status = EXIT_RUN;
     }
@@ -353,7 +376,8 @@ int main(int argc, char **argv)
     int status = EXIT_RUN;
     if (open_system(&program) == 0 && open_run(&program) == 0 && open_server(&program) == 0 &&
         open_hardware(&program) == 0 && open_guard(&program) == 0 && open_telemetry(&program) == 0 &&
-        open_observers(&program) == 0 && open_record(&program) == 0 && start_threads(&program) == 0) {
+        open_observers(&program) == 0 && open_ros_graph(&program) == 0 && open_record(&program) == 0 &&
+        start_threads(&program) == 0) {
         status = fly(&program);
     }
     monitor_end(&program.monitor);

@@ -61,13 +61,16 @@ static const char USAGE[] =
     "                          (default machine.*,*.inputs.*,*.outputs.*,*.counters.*)\n"
     "  --observers tcp/HOST:PORT  put the values of all channels on a bus of their own (docs/bus.md), which listens "
     "there\n"
+    "  --ros tcp/HOST:PORT     publish the machine's ROS 2 topics through a bridge (docs/ros_graph.md), for which it "
+    "listens "
+    "there\n"
     "  --paused                start paused: ticks are made by commands until `resume`\n"
     "  --record BAG            record to this folder, which must not exist\n"
     "  --record-fields GLOBS   what of every tick, as path globs with commas between (default *.inputs.*,*.outputs.*)\n"
     "  --record-policy P       when the disk is too slow: wait makes the tick wait, drop leaves records out and counts "
     "them\n"
     "                          (default: drop in real time, else wait)\n"
-    "  --namespace NS          ROS namespace of the recorded topics, and of the keys on the bus\n"
+    "  --namespace NS          ROS namespace of topics, and of the keys on the bus\n"
     "  --summary FILE       at the end write state, health, counters and histograms there, as JSON\n"
     "  --version            print name and version\n"
     "  --help\n";
@@ -172,6 +175,7 @@ static const entry_t ENTRIES[] = {
     {.name = "telemetry", .kind = TEXT, .offset = TO(telemetry)},
     {.name = "telemetry-fields", .kind = TEXT, .offset = TO(telemetry_fields)},
     {.name = "observers", .kind = TEXT, .offset = TO(observers)},
+    {.name = "ros", .kind = TEXT, .offset = TO(ros)},
     {.name = "record", .kind = TEXT, .offset = TO(record)},
     {.name = "record-fields", .kind = TEXT, .offset = TO(record_fields)},
     {.name = "record-policy", .kind = WORD, .read = read_record_policy},
@@ -223,9 +227,11 @@ static int check(const options_t *options)
                            "");
     }
     if (options->name_space[0] != '\0' && options->record == NULL && options->observers == NULL &&
+        options->ros == NULL &&
         (options->peer == NULL || strncmp(options->peer, OPTIONS_WIRE, strlen(OPTIONS_WIRE)) == 0)) {
         return usage_error(
-            "--namespace needs --record, --observers or --hal zenoh:…: it is of topics, and of keys of the bus", "");
+            "--namespace needs --record, --observers, --ros or --hal zenoh:…: it is of topics, and of keys of the bus",
+            "");
     }
     if (options->ignore_source_hash && options->restore == NULL) {
         return usage_error("--ignore-source-hash needs --restore", "");

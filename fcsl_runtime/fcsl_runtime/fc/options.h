@@ -22,6 +22,7 @@ typedef struct {
     const char *telemetry; /* udp:HOST:PORT[/EVERY]; null: none */
     const char *telemetry_fields; /* globs; null: as fcsl_telemetry.h says */
     const char *observers; /* tcp/HOST:PORT to listen on; null: none */
+    const char *ros; /* tcp/HOST:PORT to listen on for a bridge to ROS 2; null: none */
     const char *record; /* null: no recording */
     const char *record_fields; /* globs; null: as fcsl_run_record says */
     record_policy_t record_policy;

@@ -1,16 +1,43 @@
 /* SPDX-License-Identifier: Apache-2.0
  *
- * The library's interface: everything is made here, before the thread starts.
+ * Observers' library interface: the mirror of the machine's channels, fed with every tick.
  */
-#define _GNU_SOURCE
 #include "fcsl/fcsl_observers.h"
 
 #include <stdlib.h>
-#include <string.h>
 
 #include "base/error.h"
 #include "descriptor.h"
-#include "publisher.h"
+#include "fcsl/fcsl_mirror.h"
+#include "follower.h"
+#include "run/tick_time.h"
+
+struct fcsl_observers {
+    follower_t follower;
+    fcsl_mirror_t *mirror;
+    uint64_t tick_hz;
+};
+
+static int is_watched(void *ctx)
+{
+    return fcsl_mirror_watched(((const fcsl_observers_t *)ctx)->mirror);
+}
+
+static void pass_over(void *ctx)
+{
+    fcsl_mirror_begin(((fcsl_observers_t *)ctx)->mirror);
+}
+
+static int is_ready(void *ctx)
+{
+    return fcsl_mirror_ready(((fcsl_observers_t *)ctx)->mirror);
+}
+
+static int put(void *ctx, const followed_tick_t *tick)
+{
+    const fcsl_observers_t *o = ctx;
+    return fcsl_mirror_post(o->mirror, tick->publication, tick->number, fcsl_tick_time_ns(o->tick_hz, tick->number));
+}
 
 static int listen_on(fcsl_observers_t *o, const fcsl_observers_options_t *options, fcsl_error_t *error)
 {
@@ -34,12 +61,9 @@ fcsl_observers_t *fcsl_observers_open(const fcsl_observers_options_t *options, c
         (void)fcsl_fail(error, "out of memory for observers");
         return NULL;
     }
-    o->history = history;
+    const follower_sink_t sink = {.ctx = o, .wants = is_watched, .pass_over = pass_over, .ready = is_ready, .put = put};
     o->tick_hz = options->machine->tick_hz;
-    o->nap_ns = fcsl_history_nap_ns(history, o->tick_hz);
-    o->cursor = fcsl_history_published(history);
-    o->publication = malloc(fcsl_history_bytes(history) + 1u);
-    if (o->publication == NULL) {
+    if (follower_open(&o->follower, history, o->tick_hz, &sink) != 0) {
         (void)fcsl_fail(error, "out of memory for observers");
     } else if (listen_on(o, options, error) == 0) {
         return o;
@@ -50,17 +74,13 @@ fcsl_observers_t *fcsl_observers_open(const fcsl_observers_options_t *options, c
 
 int fcsl_observers_start(fcsl_observers_t *observers, fcsl_error_t *error)
 {
-    const int code = pthread_create(&observers->thread, NULL, fcsl_observers_publish, observers);
-    observers->started = code == 0;
-    return code == 0 ? 0 : fcsl_fail(error, "cannot start the thread of observers: %s", strerror(code));
+    return follower_start(&observers->follower, error);
 }
 
 void fcsl_observers_stop(fcsl_observers_t *observers)
 {
-    if (observers != NULL && observers->started) {
-        atomic_store(&observers->stop, 1);
-        (void)pthread_join(observers->thread, NULL);
-        observers->started = 0;
+    if (observers != NULL) {
+        follower_stop(&observers->follower);
     }
 }
 
@@ -69,16 +89,15 @@ void fcsl_observers_close(fcsl_observers_t *observers)
     if (observers == NULL) {
         return;
     }
-    fcsl_observers_stop(observers);
+    follower_close(&observers->follower);
     fcsl_mirror_close(observers->mirror);
-    free(observers->publication);
     free(observers);
 }
 
 void fcsl_observers_count(const fcsl_observers_t *observers, fcsl_observers_counters_t *counters)
 {
-    *counters = (fcsl_observers_counters_t){.ticks = atomic_load_explicit(&observers->ticks, memory_order_relaxed),
-                                            .dropped = atomic_load_explicit(&observers->dropped, memory_order_relaxed)};
+    *counters = (fcsl_observers_counters_t){.ticks = follower_ticks(&observers->follower),
+                                            .dropped = follower_dropped(&observers->follower)};
 }
 
 void fcsl_observers_stats(const fcsl_observers_t *observers, fcsl_vars_out_t *out)
