@@ -17,10 +17,12 @@ from rclpy.serialization import deserialize_message, serialize_message
 
 from fcsl_bridge.interfaces import message_class
 from fcsl_compiler.base.ament import package_prefix
-from fcsl_compiler.config.message_fields import fields_of, select
-from fcsl_compiler.config.standard_messages import SIZES, STANDARD, SUPPORTED, Definitions
-from simclient.ros.composer import Composer, Source
-from simclient.ros.reader import REASONS, Pick, Reader, Samples
+from fcsl_compiler.ros.composer import Source
+from fcsl_compiler.ros.message_fields import fields_of, select
+from fcsl_compiler.ros.reader import Pick
+from fcsl_compiler.ros.standard_messages import SIZES, STANDARD, SUPPORTED, Definitions
+from simclient.ros.composer import Composer
+from simclient.ros.reader import REASONS, Reader, Samples
 
 #: Numbers of type_description_interfaces/FieldType.
 NUMBERS = {2: "int8", 3: "uint8", 4: "int16", 5: "uint16", 6: "int32", 7: "uint32", 8: "int64", 9: "uint64"}

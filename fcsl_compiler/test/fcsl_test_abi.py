@@ -138,6 +138,8 @@ class Descriptor(c.Structure):
         ("after_ticks", c.POINTER(c.c_uint64)),
         ("channels", c.POINTER(Channel)),
         ("channel_count", c.c_uint32),
+        ("ros_messages", c.c_void_p),
+        ("ros_message_count", c.c_uint32),
         ("arm_field", c.c_int32),
         ("command_timeout_ns", c.c_uint64),
         ("fault_places", c.POINTER(FaultPlace)),

@@ -14,11 +14,12 @@ from dataclasses import dataclass
 
 from fcsl_compiler.config.channels import read_ros
 from fcsl_compiler.config.ros import Mapped, check_mapped
-from fcsl_compiler.config.standard_messages import STANDARD, full_name
 from fcsl_compiler.model.types import count_of, scalar_of
 from fcsl_compiler.parse.json_reader import ConfigReader
 from fcsl_compiler.parse.json_source import JsonNode
-from simclient.ros.composer import Composer, Source
+from fcsl_compiler.ros.composer import Source
+from fcsl_compiler.ros.standard_messages import STANDARD, full_name
+from simclient.ros.composer import Composer
 
 from .models import ModelField
 

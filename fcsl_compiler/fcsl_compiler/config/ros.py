@@ -13,8 +13,10 @@ from ..base.source import Span
 from ..model.literals import round_f32
 from ..model.machine import Channel, RosMapping, Values
 from ..model.types import REQUEST, Array, Scalar, Type, count_of, scalar_of
-from .message_fields import FieldError, Kind, Selection, numbers_text, select
-from .standard_messages import SIZES, STANDARD, SUPPORTED, full_name, short_name
+from ..ros.channels import by_topic, message_of
+from ..ros.message_fields import FieldError, Kind, Selection, numbers_text, select
+from ..ros.plan import PlanError
+from ..ros.standard_messages import SIZES, STANDARD, SUPPORTED, full_name, short_name
 
 #: Unit spellings, converted to those of the message table.
 _UNITS = {"Nm": "N*m", "m/s2": "m/s^2", "m/s/s": "m/s^2", "rad/s2": "rad/s^2", "degC": "°C", "A*h": "Ah", "°": "deg"}
@@ -41,7 +43,16 @@ class Mapped:
 
 def check_channels(channels: Iterable[Channel], sink: DiagnosticSink) -> None:
     """Checks all mapped channels and reports errors."""
-    check_mapped([_mapped(c) for c in channels if c.ros.type], sink)
+    channels = list(channels)
+    if not check_mapped([_mapped(c) for c in channels if c.ros.type], sink):
+        return
+    for parts in by_topic(channels):
+        try:
+            message_of(parts)
+        except PlanError as error:
+            text = f"the message of topic `{parts[0].ros.topic}`: {error}"
+            fix = "map fewer numbers to it, or give some another `topic`"
+            sink.error("E241", text, _mapped(parts[0]).at("field"), help=fix)
 
 
 def _mapped(channel: Channel) -> Mapped:
@@ -49,8 +60,9 @@ def _mapped(channel: Channel) -> Mapped:
     return Mapped(c.name, c.direction, c.ros, port.type, port.unit, c.span, c.safe, c.safe_span)
 
 
-def check_mapped(values: Iterable[Mapped], sink: DiagnosticSink) -> None:
-    """Checks each value, and the values of each topic together. Reports errors."""
+def check_mapped(values: Iterable[Mapped], sink: DiagnosticSink) -> bool:
+    """Checks each value, and the values of each topic together. Reports errors; returns whether there are none."""
+    before = sink.errors
     topics: dict[str, list[tuple[Mapped, Selection]]] = {}
     for value in values:
         selection = _check(value, sink)
@@ -58,6 +70,7 @@ def check_mapped(values: Iterable[Mapped], sink: DiagnosticSink) -> None:
             topics.setdefault(value.ros.topic, []).append((value, selection))
     for found in topics.values():
         _check_topic(found, sink)
+    return sink.errors == before
 
 
 def _check(value: Mapped, sink: DiagnosticSink) -> Selection | None:

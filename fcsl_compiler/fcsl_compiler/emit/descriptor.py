@@ -15,10 +15,12 @@ from ..model.c_names import c_literal, c_name, c_string
 from ..model.machine import Channel, Instance, Machine, PortRef
 from ..model.ranges import UNBOUNDED, Range
 from ..model.types import F64, Scalar, count_of, element_of, leaves, scalar_of, shape_of
+from ..ros.channels import by_topic, message_of
 from .c_writer import CWriter
 from .fault_places import FaultPlaces
 from .header import channel_member, leaf_member, sensors
 from .messages import message_definition, message_name
+from .ros_messages import MessageEmitter
 
 _ROLES = {"inputs": "INPUT", "parameters": "PARAMETER", "outputs": "OUTPUT", "state": "STATE"}
 
@@ -226,6 +228,7 @@ class DescriptorEmitter:
         self._requests()
         self._transitions()
         self._channels()
+        self._ros_messages()
         self._fault_places()
         self._machine()
 
@@ -324,6 +327,16 @@ class DescriptorEmitter:
             )
         self.channels = self._table("fcsl_channel_t", f"fcsl_channels_{self.m.name}", rows)
 
+    def _ros_messages(self) -> None:
+        """The messages of mapped channels, by topic."""
+        emitter = MessageEmitter(self.w, self.m.channels, self._field_offset)
+        prefix = f"fcsl_ros_{self.m.name}"
+        rows = [emitter.emit(message_of(parts), f"{prefix}_{i}") for i, parts in enumerate(by_topic(self.m.channels))]
+        self.ros_messages = self._table("fcsl_ros_message_t", f"{prefix}_messages", rows), len(rows)
+
+    def _field_offset(self, channel: Channel) -> str:
+        return self._offset(self.rows[self.by_path[self._path(channel.port)]].member)
+
     def _safe(self, channel: Channel) -> str:
         """Writes the safe value of a channel, flat as its field. Returns a C pointer expression to it."""
         if not channel.safe:
@@ -367,6 +380,9 @@ class DescriptorEmitter:
             ("fault_place", self.fault_places, len(self.places.rows)),
         ):
             rows[f"{name}s"], rows[f"{name}_count"] = table, f"{count}u"
+        table, count = self.ros_messages
+        if count:
+            rows |= {"ros_messages": table, "ros_message_count": f"{count}u"}
         if m.command_timeout_ns:
             rows["command_timeout_ns"] = f"UINT64_C({m.command_timeout_ns})"
         if self.after_ticks != "NULL":

@@ -14,12 +14,14 @@
 #include <stddef.h>
 #include <stdint.h>
 
+#include "fcsl/fcsl_ros_plan.h"
+
 #ifdef __cplusplus
 extern "C" {
 #endif
 
-/* Incremented when a struct below or in fcsl_hw.h changes its meaning or layout. A host rejects any other value. */
-#define FCSL_ABI_VERSION 9u
+/* Incremented when a struct below, in fcsl_ros_plan.h or in fcsl_hw.h changes its meaning or layout. A host rejects any other value. */
+#define FCSL_ABI_VERSION 10u
 
 /* Bytes of fcsl_machine_t.views. */
 #define FCSL_VIEWS_BYTES_MAX UINT16_MAX
@@ -178,6 +180,18 @@ typedef struct {
     uint8_t as; /* fcsl_channel_as_t */
 } fcsl_channel_t;
 
+/* A ROS 2 message of channels. `composer` makes it from the machine's struct, which is its one memory; value i of `reader` is that
+ * of channels[i]. */
+typedef struct {
+    const char *topic; /* "imu/data", relative to the namespace of the node */
+    const char *type; /* "sensor_msgs/msg/Imu" */
+    uint8_t direction; /* fcsl_direction_t, of all its channels */
+    const uint32_t *channels; /* indices into channels */
+    uint32_t channel_count;
+    const fcsl_ros_composer_plan_t *composer;
+    const fcsl_ros_reader_plan_t *reader;
+} fcsl_ros_message_t;
+
 /* A place where a fault can occur, and its cause. */
 typedef struct {
     const char *file; /* path as in the machine JSON; "" for a fault without a source line (an injected one) */
@@ -226,6 +240,8 @@ typedef struct {
     const uint64_t *after_ticks; /* for each transition: minimum ticks in its state, or 0; null if all are 0 */
     const fcsl_channel_t *channels;
     uint32_t channel_count;
+    const fcsl_ros_message_t *ros_messages; /* one for each topic of the mapped channels */
+    uint32_t ros_message_count;
     /* The output that arms the actuators, a bool: an index into fields; FCSL_NONE: they are armed in simulation, and real ones
      * never. With an index here or a time-out, every actuator channel has its safe value. */
     int32_t arm_field;

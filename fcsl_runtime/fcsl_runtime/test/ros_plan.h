@@ -42,15 +42,15 @@ static const fcsl_ros_part_t PARTS[] = {
 static const fcsl_ros_pick_t PICKS[] = {{1, 0, 0, 0}};
 static const char *const NAMES[] = {"left"};
 static const fcsl_ros_term_t TERMS[] = {
-    {1.0, 1, 0, FCSL_ROS_F64},   {1.0, 3, 0, FCSL_ROS_F64},  {-1.0, 3, 8, FCSL_ROS_F64},
-    {-1.0, 3, 16, FCSL_ROS_F64}, {1.0, 2, 0, FCSL_ROS_BOOL}, {1.0, 2, 2, FCSL_ROS_U16},
+    {1.0, 1, 0, FCSL_ROS_F64},  {1.0, 3, 0, FCSL_ROS_F64}, {-1.0, 3, 8, FCSL_ROS_F64},
+    {1.0, 2, 0, FCSL_ROS_BOOL}, {1.0, 2, 2, FCSL_ROS_U16},
 };
 static const fcsl_ros_row_t ROWS[] = {
-    {0, 1, 0, FCSL_ROS_F64, 0, 0.0, 0.0},   {1, 1, 8, FCSL_ROS_F64, 0, 0.0, 0.0},
-    {2, 1, 16, FCSL_ROS_F64, 0, 0.0, 0.0},  {3, 1, 24, FCSL_ROS_F64, 0, 0.0, 0.0},
-    {4, 1, 32, FCSL_ROS_BOOL, 0, 0.0, 0.0}, {5, 1, 36, FCSL_ROS_I32, 1, 0.5, 1.0},
+    {0, 1, 0, FCSL_ROS_F64, 0, 0.0, 0.0, 0},  {1, 1, 8, FCSL_ROS_F64, 0, 0.0, 0.0, 0},
+    {2, 1, 16, FCSL_ROS_F64, 0, 0.0, 0.0, 1}, {3, 1, 32, FCSL_ROS_BOOL, 0, 0.0, 0.0, 0},
+    {4, 1, 36, FCSL_ROS_I32, 1, 0.5, 1.0, 0},
 };
-static const fcsl_ros_value_t ROW_VALUES[VALUES] = {{0, 8, 0, 1, 0, 0}, {8, 24, 1, 3, 0, 0}, {32, 8, 4, 2, 0, 0}};
+static const fcsl_ros_value_t ROW_VALUES[VALUES] = {{0, 8, 0, 1, 0, 0}, {8, 24, 1, 2, 0, 0}, {32, 8, 3, 2, 0, 0}};
 
 #define COUNT_OF(table) ((uint32_t)(sizeof(table) / sizeof(table)[0]))
 static const fcsl_ros_reader_plan_t PLAN = {

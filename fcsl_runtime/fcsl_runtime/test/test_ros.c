@@ -13,7 +13,7 @@
 #include "fcsl/fcsl_allocations.h"
 #include "messages/cdr.c" /* not part of the library's interface */
 #include "fcsl/fcsl_check.h"
-#include "fcsl/fcsl_ros.h"
+#include "fcsl/fcsl_ros_inlet.h"
 #include "ros_plan.h"
 
 enum { PAGE = 4096, MUTATIONS = 200000 };
@@ -138,7 +138,7 @@ static void test_random_bytes(fcsl_ros_reader_t *reader, uint8_t *page)
 static int plan_is_refused(const fcsl_ros_reader_plan_t *plan)
 {
     fcsl_error_t error = {{0}};
-    fcsl_ros_reader_t *reader = fcsl_ros_reader_new(plan, &error);
+    fcsl_ros_reader_t *reader = fcsl_ros_reader_new(plan, error.text, sizeof error.text);
     fcsl_ros_reader_free(reader);
     return reader == NULL && error.text[0] != '\0';
 }
@@ -179,7 +179,10 @@ static void test_plans(void)
     WRONG(TERMS, terms, 0, type, 11);
     WRONG(ROWS, rows, 0, offset, 33);
     WRONG(ROWS, rows, 0, term_count, 0);
-    WRONG(ROWS, rows, 5, first_term, 6);
+    WRONG(ROWS, rows, 4, first_term, 5);
+    WRONG(ROWS, rows, 2, more, 2);          /* beyond its block */
+    WRONG(ROWS, rows, 2, more, UINT32_MAX);
+    WRONG(ROWS, rows, 2, term_count, 2);    /* of several terms there is one number */
     WRONG(ROW_VALUES, values, 2, size, 9);
     WRONG(ROW_VALUES, values, 2, row_count, 3);
     WRONG(ROW_VALUES, values, 0, guard_count, 1);
@@ -213,7 +216,7 @@ static void test_inlet(const char *library)
     static const fcsl_ros_term_t terms[] = {
         {1.0, 1, 0, FCSL_ROS_F64}, {1.0, 1, 8, FCSL_ROS_F64}, {1.0, 1, 16, FCSL_ROS_F64}};
     static const fcsl_ros_row_t rows[] = {
-        {0, 1, 0, FCSL_ROS_F64, 0, 0, 0}, {1, 1, 8, FCSL_ROS_F64, 0, 0, 0}, {2, 1, 16, FCSL_ROS_F64, 0, 0, 0}};
+        {0, 1, 0, FCSL_ROS_F64, 0, 0, 0, 0}, {1, 1, 8, FCSL_ROS_F64, 0, 0, 0, 0}, {2, 1, 16, FCSL_ROS_F64, 0, 0, 0, 0}};
     static const fcsl_ros_value_t values[] = {{0, 24, 0, 3, 0, 0}};
     const fcsl_ros_reader_plan_t plan = {.parts = parts,
                                          .picks = picks,
@@ -230,7 +233,7 @@ static void test_inlet(const char *library)
     static const uint32_t channels[] = {0, 1};
     fcsl_error_t error;
     fcsl_run_t *run = fcsl_run_open(library, "fixture", &error);
-    fcsl_ros_reader_t *reader = fcsl_ros_reader_new(&plan, &error);
+    fcsl_ros_reader_t *reader = fcsl_ros_reader_new(&plan, error.text, sizeof error.text);
     CHECK(run != NULL && reader != NULL);
     CHECK(fcsl_ros_inlet_new(run, reader, channels, 2, &error) == NULL);
     CHECK(fcsl_ros_inlet_new(run, reader, channels + 1, 1, &error) == NULL);
@@ -267,7 +270,7 @@ static void test_composing(void)
 {
     static const uint8_t text[20] = {0, 1, 0, 0, 1, 2, 3, 4, 5, 6, 7, 8};
     static const fcsl_ros_term_t terms[] = {{2.0, 1, 0, FCSL_ROS_F64}, {-1.0, 0, 8, FCSL_ROS_I32}};
-    static const fcsl_ros_row_t rows[] = {{0, 2, 12, FCSL_ROS_F64, 0, 0, 0}};
+    static const fcsl_ros_row_t rows[] = {{0, 2, 12, FCSL_ROS_F64, 0, 0, 0, 0}};
     fcsl_ros_composer_plan_t plan = {.text = text,
                                      .rows = rows,
                                      .terms = terms,
@@ -277,7 +280,7 @@ static void test_composing(void)
                                      .memory_count = 2,
                                      .stamp_offset = 4};
     fcsl_error_t error;
-    fcsl_ros_composer_t *composer = fcsl_ros_composer_new(&plan, &error);
+    fcsl_ros_composer_t *composer = fcsl_ros_composer_new(&plan, error.text, sizeof error.text);
     CHECK(composer != NULL);
     const double number = 1.25;
     const int32_t whole[3] = {0, 0, 7};
@@ -293,14 +296,14 @@ static void test_composing(void)
     CHECK(fcsl_ros_compose(composer, memories, (int64_t)INT32_MAX * 1000000000 + 1000000000, out) == FCSL_ROS_STAMP);
     fcsl_ros_composer_free(composer);
     plan.stamp_offset = 13;
-    CHECK(fcsl_ros_composer_new(&plan, &error) == NULL);
+    CHECK(fcsl_ros_composer_new(&plan, error.text, sizeof error.text) == NULL);
     plan.stamp_offset = 4;
     plan.memory_count = 1;
-    CHECK(fcsl_ros_composer_new(&plan, &error) == NULL);
+    CHECK(fcsl_ros_composer_new(&plan, error.text, sizeof error.text) == NULL);
 
     /* Nothing but constants and a stamp: no tables at all. */
     const fcsl_ros_composer_plan_t constant = {.text = text, .size = sizeof text, .stamp_offset = 4};
-    composer = fcsl_ros_composer_new(&constant, &error);
+    composer = fcsl_ros_composer_new(&constant, error.text, sizeof error.text);
     CHECK(composer != NULL && fcsl_ros_compose(composer, NULL, 7000000000, out) == FCSL_ROS_TAKEN && out[4] == 7);
     fcsl_ros_composer_free(composer);
 }
@@ -309,7 +312,7 @@ int main(int argc, char **argv)
 {
     CHECK(argc == 2 && sizeof(row_t) == 40);
     fcsl_error_t error = {{0}};
-    fcsl_ros_reader_t *reader = fcsl_ros_reader_new(&PLAN, &error);
+    fcsl_ros_reader_t *reader = fcsl_ros_reader_new(&PLAN, error.text, sizeof error.text);
     CHECK(reader != NULL);
     uint8_t *page = guarded_page();
     test_reading(reader, page);

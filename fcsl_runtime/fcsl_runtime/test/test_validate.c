@@ -78,7 +78,7 @@ static void test_damage(void)
     CHECK(fcsl_validate(&machine, &error) == 0);
     machine.arm_field = 5;
     CHECK(fcsl_validate(&machine, &error) == 0);
-    REFUSED(machine.abi_version = FCSL_ABI_VERSION + 1u, "ABI version 10");
+    REFUSED(machine.abi_version = FCSL_ABI_VERSION + 1u, "ABI version");
     REFUSED(machine.name = NULL, "name");
     REFUSED(machine.layout_hash = "", "hash");
     static char views[FCSL_VIEWS_BYTES_MAX + 2u];
@@ -256,6 +256,52 @@ static void test_message_texts(void)
                0);
 }
 
+static void test_ros_messages(void)
+{
+    static const uint32_t both[] = {0, 1};
+    static const uint32_t mixed[] = {0, 2};
+    static const uint32_t beyond[] = {0, 1000};
+    static fcsl_ros_term_t terms[] = {{1.0, 0, 0, FCSL_ROS_F64}};
+    static fcsl_ros_row_t rows[] = {{0, 1, 0, FCSL_ROS_F64, 0, 1.0, 0.0, 0}};
+    const fcsl_ros_composer_plan_t composer = {
+        .rows = rows, .row_count = 1, .terms = terms, .term_count = 1, .memory_count = 1};
+    const fcsl_ros_composer_plan_t scattered = {
+        .rows = rows, .row_count = 1, .terms = terms, .term_count = 1, .memory_count = 2};
+    const fcsl_ros_reader_plan_t reader = {.value_count = 2};
+    const fcsl_ros_message_t message = {"imu", "sensor_msgs/msg/Imu", FCSL_SENSOR, both, 2, &composer, &reader};
+    fcsl_ros_message_t damaged = message;
+    fcsl_error_t error;
+    copy_good();
+    machine.ros_messages = &message;
+    machine.ros_message_count = 1;
+    CHECK(fcsl_validate(&machine, &error) == 0);
+    REFUSED(machine.ros_message_count = 1, "incomplete");
+#define WRONG_MESSAGE(damage)                                                                                          \
+    do {                                                                                                               \
+        damaged = message;                                                                                             \
+        REFUSED((damage, machine.ros_messages = &damaged, machine.ros_message_count = 1), "ROS 2 message 0");          \
+    } while (0)
+    WRONG_MESSAGE(damaged.topic = NULL);
+    WRONG_MESSAGE(damaged.type = "");
+    WRONG_MESSAGE(damaged.direction = FCSL_ACTUATOR);
+    WRONG_MESSAGE(damaged.channels = NULL);
+    WRONG_MESSAGE(damaged.channels = mixed);
+    WRONG_MESSAGE(damaged.channels = beyond);
+    WRONG_MESSAGE(damaged.channel_count = 1);
+    WRONG_MESSAGE(damaged.channel_count = 0);
+    WRONG_MESSAGE(damaged.composer = NULL);
+    WRONG_MESSAGE(damaged.composer = &scattered);
+    WRONG_MESSAGE(damaged.reader = NULL);
+    terms[0].offset = good->size - 8u;
+    WRONG_MESSAGE(rows[0].more = 1);
+    WRONG_MESSAGE(rows[0].more = UINT32_MAX);
+    rows[0].more = 0;
+    WRONG_MESSAGE(rows[0].first_term = 1);
+    rows[0].first_term = 0;
+    WRONG_MESSAGE(terms[0].offset = good->size - 7u);
+#undef WRONG_MESSAGE
+}
+
 int main(int argc, char **argv)
 {
     CHECK(argc == 2);
@@ -265,6 +311,7 @@ int main(int argc, char **argv)
     test_damage();
     test_every_row();
     test_bounds();
+    test_ros_messages();
     test_message_texts();
     test_struct_texts();
     return 0;

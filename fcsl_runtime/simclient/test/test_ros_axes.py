@@ -11,8 +11,8 @@ import numpy as np
 import pytest
 from scipy.spatial.transform import Rotation
 
-from fcsl_compiler.config.message_fields import QUATERNION_AXES, Kind
-from simclient.ros.axes import XYZW, AxesError, conversion, inverse, permutation, product
+from fcsl_compiler.ros.axes import XYZW, AxesError, conversion, inverse, permutation, product
+from fcsl_compiler.ros.message_fields import QUATERNION_AXES, Kind
 
 Array = np.ndarray[Any, Any]
 

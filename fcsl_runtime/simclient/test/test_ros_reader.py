@@ -15,12 +15,14 @@ from rosbags.typesys import Stores, get_types_from_msg, get_typestore
 from fcsl_compiler.base.diagnostics import DiagnosticSink
 from fcsl_compiler.base.source import SourceFile, Span
 from fcsl_compiler.config.ros import Mapped, check_mapped
-from fcsl_compiler.config.standard_messages import STANDARD
 from fcsl_compiler.model.machine import RosMapping
 from fcsl_compiler.model.types import SCALARS
+from fcsl_compiler.ros.composer import Source
+from fcsl_compiler.ros.reader import Pick
+from fcsl_compiler.ros.standard_messages import STANDARD
 from simclient.errors import MapError
-from simclient.ros.composer import Composer, Source
-from simclient.ros.reader import REASONS, Pick, Reader, Samples
+from simclient.ros.composer import Composer
+from simclient.ros.reader import REASONS, Reader, Samples
 from simclient.ros.types import definitions_of
 
 STORE = get_typestore(Stores.ROS2_JAZZY)

@@ -18,10 +18,11 @@ import zstandard
 from foreign_bags import imu, number, write, write_mcap
 from mcap.writer import CompressionType
 
+from fcsl_compiler.ros.reader import Pick
 from simclient import BagError, MapError
 from simclient.bag import unpack
 from simclient.bag.formats import open_bag
-from simclient.ros.reader import Pick, Reader
+from simclient.ros.reader import Reader
 from simclient.ros.types import definitions_of
 
 START = 100 * 10**9

@@ -138,14 +138,14 @@ TARGETS = (
         "ros_read",
         "ROS 2 messages along a plan, and the plan",
         "ROS 2, bags",
-        Defect(f"{_RUNTIME}/ros/walk.c", "if (padding > left || size > left - padding) {", "if (size > left) {"),
+        Defect(f"{_HAL}/ros_walk.c", "if (padding > left || size > left - padding) {", "if (size > left) {"),
         longest=1024,
     ),
     Target(
         "ros_compose",
         "plans of ROS 2 messages to write",
         "simclient",
-        Defect(f"{_RUNTIME}/ros/number.c", "rows[i].offset > size - bytes", "rows[i].offset > size"),
+        Defect(f"{_HAL}/ros_number.c", "rows[i].offset > size - bytes", "rows[i].offset > size"),
         longest=512,
     ),
     Target(
@@ -153,7 +153,7 @@ TARGETS = (
         "ROS 2 messages into a machine, their times",
         "ROS 2",
         Defect(
-            f"{_RUNTIME}/ros/walk.c",
+            f"{_HAL}/ros_walk.c",
             "walk->anchors[pick->anchor] = pick->count == count ? numbers : NULL;",
             "walk->anchors[pick->anchor] = numbers;",
         ),

@@ -6,7 +6,7 @@
 #include <stdlib.h>
 
 #include "base/error.h"
-#include "reader.h"
+#include "fcsl/fcsl_ros_inlet.h"
 
 struct fcsl_ros_inlet {
     fcsl_run_t *run;

@@ -9,6 +9,7 @@
 #include <string.h>
 
 #include "fcsl/fcsl_codec.h"
+#include "fcsl/fcsl_ros.h"
 #include "fcsl/fcsl_scalar.h"
 #include "range.h"
 
@@ -150,6 +151,43 @@ static int check_channel(const fcsl_machine_t *machine, uint32_t index)
                : -1;
 }
 
+/* Whether a composer, whose memory is the struct, reads in it alone. */
+static int reads_in_struct(const fcsl_machine_t *machine, const fcsl_ros_composer_plan_t *plan)
+{
+    for (uint32_t i = 0; i < plan->row_count; i++) {
+        const fcsl_ros_row_t *row = &plan->rows[i];
+        if (row->term_count > plan->term_count || row->first_term > plan->term_count - row->term_count ||
+            row->more > machine->size) {
+            return 0;
+        }
+        for (uint32_t j = 0; j < row->term_count; j++) {
+            const fcsl_ros_term_t *term = &plan->terms[row->first_term + j];
+            if (!in_struct(machine, term->offset, (row->more + 1u) * fcsl_ros_scalar_size(term->type), 1)) {
+                return 0;
+            }
+        }
+    }
+    return 1;
+}
+
+/* A message's channels are of one direction, and its numbers lie in the struct. Readers and composers check the rest of a plan. */
+static int check_ros_message(const fcsl_machine_t *machine, const fcsl_ros_message_t *message)
+{
+    if (!is_name(message->topic) || !is_name(message->type) || message->channels == NULL ||
+        message->channel_count == 0 || message->channel_count > machine->channel_count || message->composer == NULL ||
+        message->composer->memory_count != 1 || !reads_in_struct(machine, message->composer) ||
+        message->reader == NULL || message->reader->value_count != message->channel_count) {
+        return -1;
+    }
+    for (uint32_t i = 0; i < message->channel_count; i++) {
+        if (message->channels[i] >= machine->channel_count ||
+            machine->channels[message->channels[i]].direction != message->direction) {
+            return -1;
+        }
+    }
+    return 0;
+}
+
 /* No field, or a bool output. */
 static int is_arm_field(const fcsl_machine_t *machine)
 {
@@ -204,6 +242,11 @@ static int check_tables(const fcsl_machine_t *machine, fcsl_error_t *error)
             return fcsl_fail(error, "machine '%s': channel %u of its descriptor is inconsistent", name, i);
         }
     }
+    for (uint32_t i = 0; i < machine->ros_message_count; i++) {
+        if (check_ros_message(machine, &machine->ros_messages[i]) != 0) {
+            return fcsl_fail(error, "machine '%s': ROS 2 message %u of its descriptor is inconsistent", name, i);
+        }
+    }
     for (uint32_t i = 0; i < machine->fault_place_count; i++) {
         if (check_fault_place(&machine->fault_places[i]) != 0) {
             return fcsl_fail(error, "machine '%s': fault place %u of its descriptor is inconsistent", name, i);
@@ -243,7 +286,9 @@ int fcsl_validate(const fcsl_machine_t *machine, fcsl_error_t *error)
                        (machine->instance_count == 0 || machine->instances != NULL) &&
                        (machine->request_count == 0 || machine->requests != NULL) &&
                        (machine->transition_count == 0 || machine->transitions != NULL) &&
-                       (machine->channel_count == 0 || machine->channels != NULL) && machine->state_count > 0 &&
+                       (machine->channel_count == 0 || machine->channels != NULL) &&
+                       machine->ros_message_count <= machine->channel_count &&
+                       (machine->ros_message_count == 0 || machine->ros_messages != NULL) && machine->state_count > 0 &&
                        machine->states != NULL;
     const int code = machine->init != NULL && machine->step != NULL && machine->force_state != NULL;
     const int places =

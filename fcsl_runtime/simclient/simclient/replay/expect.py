@@ -12,12 +12,13 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from fcsl_compiler.config.message_fields import Kind
+from fcsl_compiler.ros.message_fields import Kind
+from fcsl_compiler.ros.plan import PlanError
+from fcsl_compiler.ros.rows import select_all
 
 from ..bag import Bag, field_value
 from ..descriptor import Machine
 from ..errors import BagError, MapError, did_you_mean
-from ..ros.rows import select_all
 from ..ros.types import definitions_of
 from .grid import Array, Grid, first_ticks_at, nearest_ticks, place, screen
 from .intake import Wish, gather, refusals, wish
@@ -84,7 +85,7 @@ def _target(expectation: Expectation, bag: Bag, machine: Machine) -> Target:
     definitions = definitions_of(bag.store(entry.topic).fielddefs)
     try:
         kind = select_all(definitions, wanted.topic.type, entry.fields, field.count).kind
-    except MapError as error:
+    except PlanError as error:
         raise MapError(f"{entry.place}: {error}") from None
     rotation = kind is Kind.QUATERNION or bool(entry.order)
     measure = expectation.compare or ("angle" if rotation else "values")

@@ -8,9 +8,11 @@ from dataclasses import dataclass, field, replace
 
 import numpy as np
 
+from fcsl_compiler.ros.reader import Pick
+
 from ..bag import Bag, Topic
 from ..errors import BagError, MapError
-from ..ros.reader import REASONS, Pick, Reader
+from ..ros.reader import REASONS, Reader
 from ..ros.types import definitions_of
 from .grid import Array, Oddities, screen
 from .mapping import Entry

@@ -54,7 +54,7 @@ from typing import Any
 
 import yaml
 
-from fcsl_compiler.config.message_fields import QUATERNION_AXES, VECTOR_AXES
+from fcsl_compiler.ros.message_fields import QUATERNION_AXES, VECTOR_AXES
 
 from ..errors import MapError, did_you_mean
 

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""ctypes mirror of fcsl/fcsl_ros.h, with the same names and meaning."""
+"""ctypes mirror of fcsl/fcsl_ros_plan.h and fcsl_ros.h, with the same names and meaning, and plans in this form."""
 
 from __future__ import annotations
 
@@ -11,35 +11,13 @@ from ctypes import c_void_p as ptr
 from pathlib import Path
 from typing import Any
 
+from fcsl_compiler.ros.plan import ComposerPlan, ReaderPlan, Term
+
 from ..c_run import CError
 from ..library import bind_runtime, runtime_library
 
-NONE = 0xFFFFFFFF
-
-#: fcsl_ros_scalar_t by ROS type of a message's number.
-WIRE = {
-    "bool": 0,
-    "int8": 1,
-    "byte": 2,
-    "char": 2,
-    "uint8": 2,
-    "int16": 3,
-    "uint16": 4,
-    "int32": 5,
-    "uint32": 6,
-    "int64": 7,
-    "uint64": 8,
-    "float32": 9,
-    "float64": 10,
-}
-#: fcsl_ros_scalar_t by type of a machine's scalar.
-MEMORY = {"bool": 0, "i32": 5, "u32": 6, "i64": 7, "u64": 8, "f32": 9, "f64": 10}
-MEMORY |= dict.fromkeys(("TransitionRequest", "Health", "state"), 5)
-#: Bytes of each fcsl_ros_scalar_t.
-SIZES = (1, 1, 1, 2, 2, 4, 4, 8, 8, 4, 8)
-
-#: fcsl_ros_code_t
-BLOCK, STRING, NAMES, SEQUENCE, COUNT, REPEAT, END = range(7)
+#: Room for an error's text.
+ERROR_BYTES = 256
 
 #: fcsl_ros_status_t: the result of reading a message, or a value of it.
 REASONS = (
@@ -88,6 +66,7 @@ class CRow(Structure):
         ("scaled", c_uint8),
         ("scale", c_double),
         ("bias", c_double),
+        ("more", c_uint32),
     ]
 
 
@@ -139,7 +118,7 @@ class CComposerPlan(Structure):
     """fcsl_ros_composer_plan_t"""
 
     _fields_ = [
-        ("text", c_char_p),
+        ("text", POINTER(c_uint8)),
         ("rows", POINTER(CRow)),
         ("terms", POINTER(CTerm)),
         ("size", c_uint32),
@@ -152,7 +131,7 @@ class CComposerPlan(Structure):
 
 _ERROR = POINTER(CError)
 _PROTOTYPES: dict[str, tuple[type | None, list[type]]] = {
-    "fcsl_ros_reader_new": (ptr, [POINTER(CReaderPlan), _ERROR]),
+    "fcsl_ros_reader_new": (ptr, [POINTER(CReaderPlan), c_char_p, c_size_t]),
     "fcsl_ros_reader_free": (None, [ptr]),
     "fcsl_ros_read_many": (None, [ptr, ptr, c_size_t, ptr, ptr, c_size_t, ptr, ptr, ptr]),
     "fcsl_ros_inlet_new": (ptr, [ptr, ptr, POINTER(c_uint32), c_uint32, _ERROR]),
@@ -160,7 +139,7 @@ _PROTOTYPES: dict[str, tuple[type | None, list[type]]] = {
     "fcsl_ros_deliver": (c_uint32, [ptr, c_char_p, c_size_t, c_int64, c_char_p]),
     "fcsl_ros_inlet_counts": (POINTER(c_uint64), [ptr]),
     "fcsl_ros_inlet_behind_ns": (c_int64, [ptr]),
-    "fcsl_ros_composer_new": (ptr, [POINTER(CComposerPlan), _ERROR]),
+    "fcsl_ros_composer_new": (ptr, [POINTER(CComposerPlan), c_char_p, c_size_t]),
     "fcsl_ros_composer_free": (None, [ptr]),
     "fcsl_ros_compose": (c_int, [ptr, POINTER(ptr), c_int64, ptr]),
     "fcsl_outbox_new": (ptr, [c_int, _ERROR]),
@@ -185,10 +164,58 @@ def _load(path: Path) -> ctypes.CDLL:
 
 
 def library() -> ctypes.CDLL:
-    """The runtime with the prototypes of fcsl_ros.h, fcsl_outbox.h and fcsl_topics.h. Raises TwinError."""
+    """The runtime with the prototypes of fcsl_ros.h, fcsl_ros_inlet.h, fcsl_outbox.h and fcsl_topics.h. Raises TwinError."""
     return _load(runtime_library())
 
 
-def table(kind: Any, items: Sequence[Any]) -> Any:
-    """A C array of `items`; at least one element long, because C has no empty arrays."""
-    return (kind * max(1, len(items)))(*items)
+def _table(kind: Any, rows: Sequence[Sequence[Any]]) -> Any:
+    """A C array of `kind`, each from the values of its members; at least one element long, because C has no empty
+    arrays."""
+    return (kind * max(1, len(rows)))(*(kind(*row) for row in rows))
+
+
+def _term(term: Term) -> tuple[float, int, int, int]:
+    return term.factor, term.anchor, term.offset, term.type
+
+
+def _row_tables(plan: ReaderPlan | ComposerPlan) -> dict[str, Any]:
+    rows = [(r.first_term, r.term_count, r.offset, r.type, r.scaled, r.scale, r.bias, r.more) for r in plan.rows]
+    return {
+        "rows": _table(CRow, rows),
+        "terms": _table(CTerm, [_term(t) for t in plan.terms]),
+        "row_count": len(plan.rows),
+        "term_count": len(plan.terms),
+    }
+
+
+def reader_plan(plan: ReaderPlan) -> CReaderPlan:
+    """The plan as C has it."""
+    values = [(v.offset, v.size, v.first_row, v.row_count, v.first_guard, v.guard_count) for v in plan.values]
+    return CReaderPlan(
+        parts=_table(CPart, [(p.code, p.align, p.size, p.first, p.count) for p in plan.parts]),
+        picks=_table(CPick, [(p.anchor, p.count, p.element, p.name) for p in plan.picks]),
+        names=(c_char_p * max(1, len(plan.names)))(*plan.names),
+        values=_table(CValue, values),
+        guards=_table(CGuard, [(CTerm(*_term(g.at)), g.value) for g in plan.guards]),
+        part_count=len(plan.parts),
+        pick_count=len(plan.picks),
+        name_count=len(plan.names),
+        value_count=len(values),
+        guard_count=len(plan.guards),
+        anchor_count=plan.anchor_count,
+        size=plan.size,
+        stamp_anchor=plan.stamp_anchor,
+        stamp_offset=plan.stamp_offset,
+        **_row_tables(plan),
+    )
+
+
+def composer_plan(plan: ComposerPlan) -> CComposerPlan:
+    """The plan as C has it."""
+    return CComposerPlan(
+        text=(c_uint8 * len(plan.text)).from_buffer_copy(plan.text),
+        size=len(plan.text),
+        memory_count=plan.memory_count,
+        stamp_offset=plan.stamp_offset,
+        **_row_tables(plan),
+    )

@@ -10,15 +10,17 @@ import weakref
 from ctypes import byref, c_uint32
 from dataclasses import dataclass
 
-from fcsl_compiler.config.standard_messages import STANDARD, full_name
+from fcsl_compiler.ros.composer import Source
+from fcsl_compiler.ros.reader import Pick
+from fcsl_compiler.ros.standard_messages import STANDARD, full_name
 
 from ..c_run import CError
 from ..descriptor import Channel, Machine
 from ..errors import TwinError
 from ..run import Run
 from . import native
-from .composer import Composer, Source
-from .reader import REASONS, Pick, Reader
+from .composer import Composer
+from .reader import REASONS, Reader
 
 
 @dataclass(frozen=True)

@@ -14,15 +14,16 @@ static const fcsl_ros_term_t TERM[TERMS] = {
     {1.0, 1, 24, FCSL_ROS_U64}, {1.0, 1, 32, FCSL_ROS_I32}, {1.0, 1, 36, FCSL_ROS_F32},
 };
 static const fcsl_ros_row_t ROW[ROWS] = {
-    {0, 1, 12, FCSL_ROS_F64, 0, 0.0, 0.0}, {1, 2, 20, FCSL_ROS_F32, 1, 0.5, 1.0}, {3, 1, 28, FCSL_ROS_U64, 0, 0.0, 0.0},
-    {4, 1, 36, FCSL_ROS_U8, 0, 0.0, 0.0},  {2, 1, 40, FCSL_ROS_I64, 0, 0.0, 0.0}, {0, 1, 48, FCSL_ROS_I16, 1, 1.0, 0.0},
+    {0, 1, 12, FCSL_ROS_F64, 0, 0.0, 0.0, 0}, {1, 2, 20, FCSL_ROS_F32, 1, 0.5, 1.0, 0},
+    {3, 1, 28, FCSL_ROS_U64, 0, 0.0, 0.0, 0}, {4, 1, 36, FCSL_ROS_U8, 0, 0.0, 0.0, 0},
+    {2, 1, 40, FCSL_ROS_I64, 0, 0.0, 0.0, 0}, {0, 1, 48, FCSL_ROS_I16, 1, 1.0, 0.0, 0},
 };
 
 static void apply(const fcsl_ros_composer_t *composer, uint32_t size, bytes_t *bytes)
 {
-    uint8_t memory[MEMORY_BYTES] = {0};
+    uint8_t memory[MEMORY_BYTES + 8 * TEXT_BYTES] = {0}; /* a row has no more numbers than the text has bytes */
     const int64_t time_ns = (int64_t)take_number(bytes, 8);
-    for (size_t i = 0; i < sizeof memory; i++) {
+    for (size_t i = 0; i < MEMORY_BYTES; i++) {
         memory[i] = (uint8_t)take_number(bytes, 1);
     }
     const uint8_t *const memories[] = {memory, memory};
@@ -37,7 +38,7 @@ static void apply(const fcsl_ros_composer_t *composer, uint32_t size, bytes_t *b
 int LLVMFuzzerTestOneInput(const uint8_t *data, size_t size)
 {
     bytes_t bytes = {data, size};
-    fcsl_error_t error = {{0}};
+    char error[64] = "";
     fcsl_ros_row_t rows[ROWS];
     fcsl_ros_term_t terms[TERMS];
     uint32_t numbers[] = {TEXT_BYTES, ROWS, TERMS, 2, 4};
@@ -62,8 +63,8 @@ int LLVMFuzzerTestOneInput(const uint8_t *data, size_t size)
     plan.stamp_offset = numbers[4];
     plan.rows = plan.row_count > 0 ? rows : NULL;
     plan.terms = plan.term_count > 0 ? terms : NULL;
-    fcsl_ros_composer_t *composer = fcsl_ros_composer_new(&plan, &error);
-    FUZZ_CHECK((composer == NULL) == (error.text[0] != '\0'));
+    fcsl_ros_composer_t *composer = fcsl_ros_composer_new(&plan, error, sizeof error);
+    FUZZ_CHECK((composer == NULL) == (error[0] != '\0'));
     if (composer != NULL) {
         apply(composer, plan.size, &bytes);
     }

@@ -1,10 +1,10 @@
 /* SPDX-License-Identifier: Apache-2.0
  *
- * fcsl_ros.h: messages that come in while the fixture machine runs (a stamp and a gyro). Input: messages, each of the time
+ * fcsl_ros_inlet.h: messages that come in while the fixture machine runs (a stamp and a gyro). Input: messages, each of the time
  * since the last one in 0.1 ms (2), how (1), length (1) and bytes. Of how, bit 0 stamps it with a time close to now, bit 1
  * makes its sequence one of three numbers, bit 2 marks it as missing, bit 3 steps the machine.
  */
-#include "fcsl/fcsl_ros.h"
+#include "fcsl/fcsl_ros_inlet.h"
 #include "fcsl/fcsl_scalar.h"
 #include "fuzz.h"
 
@@ -17,7 +17,7 @@ static const fcsl_ros_pick_t PICKS[] = {{1, 3, 0, FCSL_ROS_NONE}};
 static const fcsl_ros_term_t TERMS[] = {
     {1.0, 1, 0, FCSL_ROS_F64}, {1.0, 1, 8, FCSL_ROS_F64}, {1.0, 1, 16, FCSL_ROS_F64}};
 static const fcsl_ros_row_t ROWS[] = {
-    {0, 1, 0, FCSL_ROS_F64, 0, 0, 0}, {1, 1, 8, FCSL_ROS_F64, 0, 0, 0}, {2, 1, 16, FCSL_ROS_F64, 0, 0, 0}};
+    {0, 1, 0, FCSL_ROS_F64, 0, 0, 0, 0}, {1, 1, 8, FCSL_ROS_F64, 0, 0, 0, 0}, {2, 1, 16, FCSL_ROS_F64, 0, 0, 0, 0}};
 static const fcsl_ros_value_t ROW_VALUES[] = {{0, 24, 0, 3, 0, 0}};
 static const fcsl_ros_reader_plan_t PLAN = {.parts = PARTS,
                                             .picks = PICKS,
@@ -59,7 +59,7 @@ int LLVMFuzzerTestOneInput(const uint8_t *data, size_t size)
     bytes_t bytes = {data, size};
     fcsl_error_t error;
     fcsl_run_t *run = fcsl_run_open_machine(fcsl_machines[0], &error);
-    fcsl_ros_reader_t *reader = fcsl_ros_reader_new(&PLAN, &error);
+    fcsl_ros_reader_t *reader = fcsl_ros_reader_new(&PLAN, error.text, sizeof error.text);
     FUZZ_CHECK(run != NULL && reader != NULL && fcsl_run_attach(run, &error) == 0);
     fcsl_ros_inlet_t *inlet = fcsl_ros_inlet_new(run, reader, channels, 1, &error);
     FUZZ_CHECK(inlet != NULL);

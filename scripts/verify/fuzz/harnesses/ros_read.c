@@ -81,16 +81,15 @@ static void read_message(fcsl_ros_reader_t *reader, uint32_t row_size, bytes_t *
 int LLVMFuzzerTestOneInput(const uint8_t *data, size_t size)
 {
     bytes_t bytes = {data, size};
-    fcsl_error_t error = {{0}};
+    char error[64] = "";
     plan_t p;
     open_plan(&p, &bytes);
-    fcsl_ros_reader_t *reader = fcsl_ros_reader_new(&p.plan, &error);
-    const uint32_t row_size = p.plan.size;
-    close_plan(&p); /* the reader has copied it */
-    FUZZ_CHECK((reader == NULL) == (error.text[0] != '\0'));
+    fcsl_ros_reader_t *reader = fcsl_ros_reader_new(&p.plan, error, sizeof error);
+    FUZZ_CHECK((reader == NULL) == (error[0] != '\0'));
     if (reader != NULL) {
-        read_message(reader, row_size, &bytes);
+        read_message(reader, p.plan.size, &bytes);
     }
     fcsl_ros_reader_free(reader);
+    close_plan(&p);
     return 0;
 }

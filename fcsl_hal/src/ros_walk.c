@@ -2,11 +2,10 @@
  *
  * Walks through the bytes of a CDR message, which come from anywhere.
  */
-#include "walk.h"
+#include "ros_walk.h"
 
 #include <string.h>
 
-#include "fcsl/fcsl_cdr.h"
 #include "fcsl/fcsl_scalar.h"
 
 /* The bytes not walked yet; they begin at an offset whose alignment counts from behind the encapsulation. */
@@ -173,7 +172,7 @@ static fcsl_ros_status_t walk_parts(const fcsl_ros_reader_plan_t *plan, fcsl_ros
 fcsl_ros_status_t fcsl_ros_walk(const fcsl_ros_reader_plan_t *plan, fcsl_ros_walk_t *walk, const uint8_t *cdr,
                                 size_t size)
 {
-    if (size < FCSL_CDR_ENCAPSULATION_BYTES) {
+    if (size < FCSL_ROS_ENCAPSULATION_BYTES) {
         return FCSL_ROS_TRUNCATED;
     }
     if (cdr[0] != 0 || cdr[1] != 1) {
@@ -182,7 +181,7 @@ fcsl_ros_status_t fcsl_ros_walk(const fcsl_ros_reader_plan_t *plan, fcsl_ros_wal
     for (uint32_t i = 0; i < plan->name_count; i++) {
         walk->found[i] = FCSL_ROS_NONE;
     }
-    cursor_t cursor = {.from = cdr + FCSL_CDR_ENCAPSULATION_BYTES, .size = size - FCSL_CDR_ENCAPSULATION_BYTES};
+    cursor_t cursor = {.from = cdr + FCSL_ROS_ENCAPSULATION_BYTES, .size = size - FCSL_ROS_ENCAPSULATION_BYTES};
     return walk_parts(plan, walk, &cursor);
 }
 

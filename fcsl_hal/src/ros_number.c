@@ -2,7 +2,7 @@
  *
  * Reads, converts, checks and writes numbers by the rows of a plan.
  */
-#include "number.h"
+#include "ros_number.h"
 
 #include <math.h>
 #include <string.h>
@@ -33,9 +33,11 @@ uint32_t fcsl_ros_scalar_size(uint8_t type)
 int fcsl_ros_rows_valid(const fcsl_ros_row_t *rows, uint32_t row_count, uint32_t term_count, uint32_t size)
 {
     for (uint32_t i = 0; i < row_count; i++) {
-        const uint32_t bytes = fcsl_ros_scalar_size(rows[i].type);
-        if (bytes == 0 || bytes > size || rows[i].offset > size - bytes || rows[i].term_count == 0 ||
-            rows[i].term_count > term_count || rows[i].first_term > term_count - rows[i].term_count) {
+        const fcsl_ros_row_t *row = &rows[i];
+        const uint64_t bytes = ((uint64_t)row->more + 1u) * fcsl_ros_scalar_size(row->type);
+        if (bytes == 0 || bytes > size || row->offset > size - bytes || row->term_count == 0 ||
+            row->term_count > term_count || row->first_term > term_count - row->term_count ||
+            (row->more > 0 && row->term_count > 1u)) {
             return 0;
         }
     }
@@ -174,17 +176,19 @@ static inline fcsl_ros_status_t store(uint8_t type, number_t *number, int nan_al
     return number->kind == FLOAT && !make_integer(number) ? FCSL_ROS_RANGE : store_integer(type, *number, out);
 }
 
-fcsl_ros_status_t fcsl_ros_row_apply(const fcsl_ros_row_t *row, const fcsl_ros_term_t *terms,
-                                     const uint8_t *const *anchors, int nan_allowed, uint8_t *out)
+/* Number `n` of a row. */
+static fcsl_ros_status_t apply(const fcsl_ros_row_t *row, const fcsl_ros_term_t *term, const uint8_t *const *anchors,
+                               uint32_t n, int nan_allowed, uint8_t *out)
 {
-    const fcsl_ros_term_t *term = &terms[row->first_term];
     number_t number = {.kind = FLOAT};
     double sum = 0.0;
     for (uint32_t i = 0; i < row->term_count; i++) {
-        if (anchors[term[i].anchor] == NULL) {
+        const uint8_t *at = anchors[term[i].anchor];
+        if (at == NULL) {
             return FCSL_ROS_SHAPE;
         }
-        const fcsl_ros_status_t status = load(term[i].type, anchors[term[i].anchor] + term[i].offset, &number);
+        at += term[i].offset + (size_t)n * fcsl_ros_scalar_size(term[i].type);
+        const fcsl_ros_status_t status = load(term[i].type, at, &number);
         if (status != FCSL_ROS_TAKEN) {
             return status;
         }
@@ -195,7 +199,17 @@ fcsl_ros_status_t fcsl_ros_row_apply(const fcsl_ros_row_t *row, const fcsl_ros_t
     if (!exact) {
         number = (number_t){.kind = FLOAT, .f = row->scaled ? sum * row->scale + row->bias : sum};
     }
-    return store(row->type, &number, nan_allowed, out + row->offset);
+    return store(row->type, &number, nan_allowed, out + row->offset + (size_t)n * fcsl_ros_scalar_size(row->type));
+}
+
+fcsl_ros_status_t fcsl_ros_row_apply(const fcsl_ros_row_t *row, const fcsl_ros_term_t *terms,
+                                     const uint8_t *const *anchors, int nan_allowed, uint8_t *out)
+{
+    fcsl_ros_status_t status = FCSL_ROS_TAKEN;
+    for (uint32_t n = 0; n <= row->more && status == FCSL_ROS_TAKEN; n++) {
+        status = apply(row, &terms[row->first_term], anchors, n, nan_allowed, out);
+    }
+    return status;
 }
 
 int fcsl_ros_guard_holds(const fcsl_ros_guard_t *guard, const uint8_t *const *anchors)

@@ -11,13 +11,10 @@
 #error "ROS 2 messages are read and written as they lie in memory: a little-endian processor is needed"
 #endif
 
-/* Bytes of a number, 0 for an unknown type. */
-uint32_t fcsl_ros_scalar_size(uint8_t type);
-
-/* Whether every row writes within `size` bytes and is the sum of terms that exist, of known types. */
+/* Whether every row writes within `size` bytes and is the sum of terms that exist. Whether these may be read is up to the caller. */
 int fcsl_ros_rows_valid(const fcsl_ros_row_t *rows, uint32_t row_count, uint32_t term_count, uint32_t size);
 
-/* Computes a row and writes it into `out`; a null anchor is FCSL_ROS_SHAPE. Nothing is written unless FCSL_ROS_TAKEN. */
+/* Computes a row and writes its numbers into `out`, up to the first that cannot be taken; a null anchor is FCSL_ROS_SHAPE. */
 fcsl_ros_status_t fcsl_ros_row_apply(const fcsl_ros_row_t *row, const fcsl_ros_term_t *terms,
                                      const uint8_t *const *anchors, int nan_allowed, uint8_t *out);
 

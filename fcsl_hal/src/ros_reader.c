@@ -1,17 +1,17 @@
 /* SPDX-License-Identifier: Apache-2.0
  *
- * Readers: a plan, checked and copied, and what a message looks like through it.
+ * Readers: a plan, checked, and what a message looks like through it.
  */
+#include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
 
-#include "base/error.h"
-#include "reader.h"
-#include "number.h"
-#include "walk.h"
+#include "fcsl/fcsl_ros.h"
+#include "ros_number.h"
+#include "ros_walk.h"
 
 struct fcsl_ros_reader {
-    fcsl_ros_reader_plan_t plan; /* its tables lie behind the struct */
+    const fcsl_ros_reader_plan_t *plan;
     fcsl_ros_walk_t walk;
 };
 
@@ -43,10 +43,12 @@ static int anchor_sizes(const fcsl_ros_reader_plan_t *plan, uint32_t *sizes)
     return 1;
 }
 
-static int term_valid(const fcsl_ros_term_t *term, const uint32_t *sizes, uint32_t anchor_count)
+/* Whether `count` numbers of a term lie behind its anchor. */
+static int term_valid(const fcsl_ros_term_t *term, uint32_t count, const uint32_t *sizes, uint32_t anchor_count)
 {
-    const uint32_t bytes = fcsl_ros_scalar_size(term->type);
-    return bytes > 0 && term->anchor < anchor_count && range_fits(term->offset, bytes, sizes[term->anchor]);
+    const uint64_t bytes = (uint64_t)count * fcsl_ros_scalar_size(term->type);
+    return bytes > 0 && bytes <= UINT32_MAX && term->anchor < anchor_count &&
+           range_fits(term->offset, (uint32_t)bytes, sizes[term->anchor]);
 }
 
 static int values_valid(const fcsl_ros_reader_plan_t *plan)
@@ -62,20 +64,23 @@ static int values_valid(const fcsl_ros_reader_plan_t *plan)
     return fcsl_ros_rows_valid(plan->rows, plan->row_count, plan->term_count, plan->size);
 }
 
-/* Whether every number that the plan reads lies behind an anchor that the walk sets. */
+/* Whether every number that valid rows and the guards read lies behind an anchor that the walk sets. */
 static int reads_valid(const fcsl_ros_reader_plan_t *plan)
 {
     uint32_t sizes[FCSL_ROS_ANCHORS_MAX];
     if (plan->anchor_count > FCSL_ROS_ANCHORS_MAX || !anchor_sizes(plan, sizes)) {
         return 0;
     }
-    for (uint32_t i = 0; i < plan->term_count; i++) {
-        if (!term_valid(&plan->terms[i], sizes, plan->anchor_count)) {
-            return 0;
+    for (uint32_t i = 0; i < plan->row_count; i++) {
+        const fcsl_ros_row_t *row = &plan->rows[i];
+        for (uint32_t j = 0; j < row->term_count; j++) {
+            if (!term_valid(&plan->terms[row->first_term + j], row->more + 1u, sizes, plan->anchor_count)) {
+                return 0;
+            }
         }
     }
     for (uint32_t i = 0; i < plan->guard_count; i++) {
-        if (!term_valid(&plan->guards[i].at, sizes, plan->anchor_count)) {
+        if (!term_valid(&plan->guards[i].at, 1, sizes, plan->anchor_count)) {
             return 0;
         }
     }
@@ -83,68 +88,18 @@ static int reads_valid(const fcsl_ros_reader_plan_t *plan)
            (plan->stamp_anchor < plan->anchor_count && range_fits(plan->stamp_offset, 8u, sizes[plan->stamp_anchor]));
 }
 
-/* Bytes of a table, rounded up so that the next one is aligned. */
-static size_t room(size_t count, size_t size)
-{
-    return (count * size + 15u) & ~(size_t)15u;
-}
-
-static const void *put_table(uint8_t **at, const void *table, size_t count, size_t size)
-{
-    uint8_t *copy = *at;
-    if (count > 0) {
-        memcpy(copy, table, count * size);
-    }
-    *at += room(count, size);
-    return copy;
-}
-
-#define PUT(field, count_field) copy->field = put_table(at, plan->field, plan->count_field, sizeof *plan->field)
-
-/* Copies the tables, and the names that they point to. */
-static void copy_plan(fcsl_ros_reader_plan_t *copy, const fcsl_ros_reader_plan_t *plan, uint8_t **at)
-{
-    *copy = *plan;
-    PUT(parts, part_count);
-    PUT(picks, pick_count);
-    PUT(values, value_count);
-    PUT(rows, row_count);
-    PUT(terms, term_count);
-    PUT(guards, guard_count);
-    const char **names = (const char **)*at;
-    *at += room(plan->name_count, sizeof *names);
-    for (uint32_t i = 0; i < plan->name_count; i++) {
-        names[i] = put_table(at, plan->names[i], strlen(plan->names[i]) + 1u, 1);
-    }
-    copy->names = names;
-}
-
-static size_t plan_bytes(const fcsl_ros_reader_plan_t *plan)
-{
-    size_t bytes = room(plan->part_count, sizeof *plan->parts) + room(plan->pick_count, sizeof *plan->picks) +
-                   room(plan->value_count, sizeof *plan->values) + room(plan->row_count, sizeof *plan->rows) +
-                   room(plan->term_count, sizeof *plan->terms) + room(plan->guard_count, sizeof *plan->guards) +
-                   room(plan->name_count, sizeof *plan->names);
-    for (uint32_t i = 0; i < plan->name_count; i++) {
-        bytes += room(strlen(plan->names[i]) + 1u, 1);
-    }
-    return bytes;
-}
-
-fcsl_ros_reader_t *fcsl_ros_reader_new(const fcsl_ros_reader_plan_t *plan, fcsl_error_t *error)
+fcsl_ros_reader_t *fcsl_ros_reader_new(const fcsl_ros_reader_plan_t *plan, char *error, size_t error_size)
 {
     if (!fcsl_ros_walk_valid(plan) || !values_valid(plan) || !reads_valid(plan)) {
-        (void)fcsl_fail(error, "this plan of a message does not hold together");
+        (void)snprintf(error, error_size, "this plan of a message does not hold together");
         return NULL;
     }
-    const size_t head = room(1, sizeof(fcsl_ros_reader_t));
-    fcsl_ros_reader_t *reader = calloc(1, head + plan_bytes(plan));
+    fcsl_ros_reader_t *reader = calloc(1, sizeof *reader);
     if (reader == NULL) {
-        (void)fcsl_fail(error, "out of memory for the plan of a message");
+        (void)snprintf(error, error_size, "out of memory for the plan of a message");
         return NULL;
     }
-    uint8_t *at = (uint8_t *)reader + head;
-    copy_plan(&reader->plan, plan, &at);
+    reader->plan = plan;
     return reader;
 }
 
@@ -155,12 +110,12 @@ void fcsl_ros_reader_free(fcsl_ros_reader_t *reader)
 
 const fcsl_ros_reader_plan_t *fcsl_ros_reader_plan(const fcsl_ros_reader_t *reader)
 {
-    return &reader->plan;
+    return reader->plan;
 }
 
 static fcsl_ros_status_t read_stamp(const fcsl_ros_reader_t *reader, int64_t *stamp_ns)
 {
-    const fcsl_ros_reader_plan_t *plan = &reader->plan;
+    const fcsl_ros_reader_plan_t *plan = reader->plan;
     *stamp_ns = 0;
     if (plan->stamp_anchor == FCSL_ROS_NONE) {
         return FCSL_ROS_TAKEN;
@@ -182,7 +137,7 @@ static fcsl_ros_status_t read_stamp(const fcsl_ros_reader_t *reader, int64_t *st
 
 static fcsl_ros_status_t read_value(const fcsl_ros_reader_t *reader, const fcsl_ros_value_t *value, uint8_t *row)
 {
-    const fcsl_ros_reader_plan_t *plan = &reader->plan;
+    const fcsl_ros_reader_plan_t *plan = reader->plan;
     for (uint32_t i = 0; i < value->guard_count; i++) {
         if (fcsl_ros_guard_holds(&plan->guards[value->first_guard + i], reader->walk.anchors)) {
             return FCSL_ROS_UNMEASURED;
@@ -202,7 +157,7 @@ static fcsl_ros_status_t read_value(const fcsl_ros_reader_t *reader, const fcsl_
 fcsl_ros_status_t fcsl_ros_read(fcsl_ros_reader_t *reader, const uint8_t *cdr, size_t size, uint8_t *row,
                                 uint8_t *status, int64_t *stamp_ns)
 {
-    const fcsl_ros_reader_plan_t *plan = &reader->plan;
+    const fcsl_ros_reader_plan_t *plan = reader->plan;
     memset(row, 0, plan->size);
     *stamp_ns = 0;
     fcsl_ros_status_t whole = fcsl_ros_walk(plan, &reader->walk, cdr, size);
@@ -223,7 +178,7 @@ void fcsl_ros_read_many(fcsl_ros_reader_t *reader, const uint8_t *buffer, size_t
                            (uint64_t)sizes[i] <= size - (uint64_t)offsets[i];
         (void)fcsl_ros_read(reader, buffer + (inside ? offsets[i] : 0), inside ? (size_t)sizes[i] : 0, rows, status,
                             &stamps_ns[i]);
-        rows += reader->plan.size;
-        status += reader->plan.value_count;
+        rows += reader->plan->size;
+        status += reader->plan->value_count;
     }
 }

@@ -12,7 +12,7 @@ and back keeps the sign.
 
 from __future__ import annotations
 
-from fcsl_compiler.config.message_fields import Kind
+from .message_fields import Kind
 
 #: Row i gives element i of the result as the sum of row[j] * value[j] over all j with row[j] != 0, in order.
 Matrix = tuple[tuple[float, ...], ...]

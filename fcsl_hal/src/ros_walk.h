@@ -11,7 +11,8 @@ enum {
     FCSL_ROS_PARTS_MAX = 1 << 16,
     FCSL_ROS_ANCHORS_MAX = 1024,
     FCSL_ROS_NAMES_MAX = 256,
-    FCSL_ROS_DEPTH_MAX = 16 /* sequences of messages inside one another */
+    FCSL_ROS_DEPTH_MAX = 16, /* sequences of messages inside one another */
+    FCSL_ROS_ENCAPSULATION_BYTES = 4
 };
 
 /* What a walk found. */

@@ -9,13 +9,11 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Mapping
 
-from fcsl_compiler.config.message_fields import Piece
-from fcsl_compiler.config.standard_messages import SIZES, Definitions, Member, short_name
+from .message_fields import Piece
+from .plan import BLOCK, COUNT, END, NAMES, NONE, REPEAT, SEQUENCE, STRING, Part, PlanError, SequencePick
+from .standard_messages import SIZES, Definitions, Member, short_name
 
-from ..errors import MapError
-from .native import BLOCK, COUNT, END, NAMES, NONE, REPEAT, SEQUENCE, STRING, CPart, CPick
-
-#: Limits of fcsl_ros.h.
+#: Limits of ros_walk.h.
 _MAX_PARTS, _MAX_ANCHORS, _MAX_NAMES, _MAX_DEPTH = 1 << 16, 1024, 256, 16
 _MAX_BLOCK_BYTES = 1 << 30
 #: Most members of a walk. Members repeat per element of a message array; two arrays of 100000 would give 10^10.
@@ -26,9 +24,9 @@ class Walk:
     """The parts, picks and names of a plan, and the anchor and offset of each selected piece (`places`)."""
 
     def __init__(self, definitions: Definitions, message: str, pieces: Iterable[Piece], strings: Mapping[str, str]):
-        """`strings`: path of a string to its required value. Raises MapError for a message that cannot be walked."""
-        self.parts: list[CPart] = []
-        self.picks: list[CPick] = []
+        """`strings`: path of a string to its required value. Raises PlanError for a message that cannot be walked."""
+        self.parts: list[Part] = []
+        self.picks: list[SequencePick] = []
         self.names: list[bytes] = []
         self.places: dict[Piece, tuple[int, int]] = {}
         self.anchor_count = 0
@@ -36,7 +34,7 @@ class Walk:
         self._definitions, self._message, self._strings = definitions, message, strings
         self._wanted: dict[str, list[Piece]] = {}
         self._elements: dict[tuple[str, str], int] = {}  # path of a sequence of names, and a name: its index in `names`
-        self._block: CPart | None = None
+        self._block: Part | None = None
         self._met: set[str] = set()  # paths of `strings` found
         for piece in dict.fromkeys(pieces):
             self._wanted.setdefault(piece.path, []).append(piece)
@@ -46,11 +44,11 @@ class Walk:
         if len(self.parts) > _MAX_PARTS or self.anchor_count > _MAX_ANCHORS or len(self.names) > _MAX_NAMES:
             raise self._error("", "has too many parts")
 
-    def _error(self, path: str, text: str) -> MapError:
-        return MapError(f"`{path or short_name(self._message)}` {text}")
+    def _error(self, path: str, text: str) -> PlanError:
+        return PlanError(f"`{path or short_name(self._message)}` {text}")
 
-    def _part(self, code: int, align: int = 0, size: int = 0, first: int = NONE, count: int = 0) -> CPart:
-        part = CPart(code, align, size, first, count)
+    def _part(self, code: int, align: int = 0, size: int = 0, first: int = NONE, count: int = 0) -> Part:
+        part = Part(code, align, size, first, count)
         self.parts.append(part)
         if len(self.parts) > _MAX_PARTS:
             raise self._error("", "has too many parts")
@@ -131,7 +129,7 @@ class Walk:
                 if name == NONE:
                     raise self._error(path or "", "stands before the names of its elements")
             element = piece.element if isinstance(piece.element, int) else 0
-            self.picks.append(CPick(anchor, piece.count if piece.element is None else 0, element, name))
+            self.picks.append(SequencePick(anchor, piece.count if piece.element is None else 0, element, name))
         self._part(SEQUENCE, align=size, size=size, first=first, count=len(self.picks) - first)
 
     def _sequence_of_strings(self, path: str | None) -> None:

@@ -1,0 +1,158 @@
+# SPDX-License-Identifier: Apache-2.0
+"""The plan that reads samples from the messages of a type: fields become values in a row of memory."""
+
+from __future__ import annotations
+
+import contextlib
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+from . import axes
+from .message_fields import FieldError, Kind, Piece, Selection, numbers_text, select
+from .plan import MEMORY, NONE, SIZES, WIRE, Guard, PlanError, ReaderPlan, Value
+from .rows import Place, Rows, array_of, select_all
+from .standard_messages import GUARDS, Definitions, short_name
+from .walk import Walk
+
+_STAMP = ("header.stamp.sec", "header.stamp.nanosec")
+
+
+@dataclass(frozen=True)
+class Pick:
+    """The source of one value: `fields` of the message become `count` scalars of `type`, in a column called `name`.
+
+    `fields`: paths such as "angular_velocity", "axes[1]", "position[left_wheel]", whose numbers are concatenated.
+    `axes`: the axes of the value, `source_axes` those of the message; the empty string means ROS's axes. `order`:
+    "xyzw" or "wxyz", for four numbers that are a quaternion in the message; the value is always w, x, y, z. A
+    geometry_msgs/Quaternion needs none. `scale`, `offset`: none, one, or one per scalar; applied last.
+    """
+
+    name: str
+    fields: tuple[str, ...]
+    type: str
+    count: int = 1
+    axes: str = ""
+    source_axes: str = ""
+    order: str = ""
+    scale: tuple[float, ...] = ()
+    offset: tuple[float, ...] = ()
+
+
+def has_stamp(definitions: Definitions, message: str) -> bool:
+    """Whether messages of the type begin with a header, whose stamp a reader reads."""
+    header = next((m for m in definitions.get(message, ()) if m.name == "header"), None)
+    return header is not None and header.type == "std_msgs/msg/Header"
+
+
+def reader_plan(
+    definitions: Definitions, message: str, picks: Sequence[Pick], frame: str = "", child_frame: str = ""
+) -> ReaderPlan:
+    """`message`: full name of the type. `frame`, `child_frame`: required header.frame_id and child_frame_id (empty:
+    any). The values stand in the order of the picks, each aligned to its scalar.
+
+    Raises PlanError, which names the pick that does not fit the message and why.
+    """
+    if message not in definitions:
+        raise PlanError(f"there is no definition of message type `{short_name(message)}`")
+    selections = [_selection(definitions, message, pick) for pick in picks]
+    guards = [_guards(definitions, message, pick) for pick in picks]
+    stamps = (
+        [select(definitions, message, path).pieces[0] for path in _STAMP] if has_stamp(definitions, message) else []
+    )
+    wanted = [piece for selection in selections for piece in selection.pieces]
+    wanted += [*stamps, *(piece for found in guards for piece, _ in found)]
+    strings = {"header.frame_id": frame, "child_frame_id": child_frame}
+    walk = Walk(definitions, message, wanted, {path: text for path, text in strings.items() if text})
+    return _plan(walk, picks, selections, guards, stamps)
+
+
+def _plan(
+    walk: Walk,
+    picks: Sequence[Pick],
+    selections: Sequence[Selection],
+    guards: Sequence[Sequence[tuple[Piece, float]]],
+    stamps: Sequence[Piece],
+) -> ReaderPlan:
+    rows, at, align = Rows(), 0, 1
+    values: list[Value] = []
+    all_guards: list[Guard] = []
+    for pick, selection, found in zip(picks, selections, guards, strict=True):
+        type_ = MEMORY[pick.type]
+        size = SIZES[type_]
+        at, align = _aligned(at, size), max(align, size)
+        first = len(rows.rows)
+        sources = [place for piece in selection.pieces for place in _places(walk, piece)]
+        targets = [(at + size * i, type_) for i in range(pick.count)]
+        rows.add(_matrix(pick, selection), sources, targets, pick.scale, pick.offset)
+        row_count = len(rows.rows) - first
+        values.append(Value(at, size * pick.count, first, row_count, len(all_guards), len(found)))
+        all_guards += [Guard(_places(walk, piece)[0].term(), value) for piece, value in found]
+        at += size * pick.count
+    stamp_anchor, stamp_offset = walk.places[stamps[0]] if stamps else (NONE, 0)
+    return ReaderPlan(
+        parts=walk.parts,
+        picks=walk.picks,
+        names=walk.names,
+        values=values,
+        rows=rows.rows,
+        terms=rows.terms,
+        guards=all_guards,
+        anchor_count=walk.anchor_count,
+        size=_aligned(at, align),
+        stamp_anchor=stamp_anchor,
+        stamp_offset=stamp_offset,
+    )
+
+
+def _aligned(at: int, size: int) -> int:
+    return -(-at // size) * size
+
+
+def _places(walk: Walk, piece: Piece) -> list[Place]:
+    return array_of(*walk.places[piece], WIRE[piece.type], piece.count)
+
+
+def _selection(definitions: Definitions, message: str, pick: Pick) -> Selection:
+    """The numbers that the pick selects, with their kind; checks the pick's own options."""
+    try:
+        selection = select_all(definitions, message, pick.fields, pick.count)
+    except PlanError as error:
+        raise PlanError(f"`{pick.name}`: {error}") from None
+    for what, numbers in (("scale", pick.scale), ("offset", pick.offset)):
+        if len(numbers) not in (0, 1, pick.count):
+            raise PlanError(f"`{pick.name}`: `{what}` has {numbers_text(len(numbers))}; it takes 1 or {pick.count}")
+    if pick.order and pick.count != 4:
+        raise PlanError(f"`{pick.name}`: a quaternion has 4 numbers, not {pick.count}")
+    if pick.order == "wxyz" and selection.kind is Kind.QUATERNION:
+        raise PlanError(f"`{pick.name}`: a geometry_msgs/Quaternion is in the order x, y, z, w, not w, x, y, z")
+    return selection
+
+
+def _matrix(pick: Pick, selection: Selection) -> axes.Matrix | None:
+    """The matrix from the numbers of the message to those of the value, None where they are the same. Raises PlanError."""
+    is_quaternion = selection.kind is Kind.QUATERNION or bool(pick.order)
+    if not is_quaternion and not pick.source_axes and not pick.axes:
+        return None
+    kind = Kind.QUATERNION if is_quaternion else selection.kind
+    try:
+        matrix = axes.conversion(kind, pick.count, pick.source_axes, pick.axes)
+    except axes.AxesError as error:
+        raise PlanError(f"`{pick.name}`: {error}") from None
+    if is_quaternion and pick.order != "wxyz":
+        return axes.product(matrix, axes.permutation(axes.XYZW))
+    return matrix
+
+
+def _guards(definitions: Definitions, message: str, pick: Pick) -> list[tuple[Piece, float]]:
+    """Numbers of the message and the values by which they mark a field of the pick as not measured."""
+    found = []
+    for guard in GUARDS.get(message, ()):
+        guarded = any(
+            field == group or field.startswith((group + ".", group + "["))
+            for group in guard.groups
+            for field in pick.fields
+        )
+        if guarded:
+            with contextlib.suppress(FieldError):  # the bag's definition of that type may lack the field
+                found.append((select(definitions, message, guard.field).pieces[0], guard.value))
+    return found

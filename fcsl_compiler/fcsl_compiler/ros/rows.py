@@ -1,0 +1,91 @@
+# SPDX-License-Identifier: Apache-2.0
+"""The rows of a plan: numbers of a message and of a machine, related by a change of axes."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+
+from .axes import Matrix
+from .message_fields import FieldError, Kind, Selection, select
+from .plan import SIZES, PlanError, Row, Term
+from .standard_messages import Definitions
+
+
+@dataclass(frozen=True)
+class Place:
+    """A number to read: type `type` (fcsl_ros_scalar_t), `offset` bytes from anchor (or memory) number `anchor`."""
+
+    anchor: int
+    offset: int
+    type: int
+
+    def term(self, factor: float = 1.0) -> Term:
+        return Term(factor, self.anchor, self.offset, self.type)
+
+
+class Rows:
+    """Collects the rows and terms of a plan."""
+
+    def __init__(self) -> None:
+        self.rows: list[Row] = []
+        self.terms: list[Term] = []
+
+    def add(
+        self,
+        matrix: Matrix | None,
+        sources: Sequence[Place],
+        targets: Sequence[tuple[int, int]],
+        scale: Sequence[float] = (),
+        offset: Sequence[float] = (),
+    ) -> None:
+        """Target i, an (offset, type), becomes the sum over j of matrix[i][j] * sources[j]; then * scale + offset.
+        Without a matrix it becomes sources[i]."""
+        first = len(self.rows)
+        for i, (at, type_) in enumerate(targets):
+            if matrix is None:
+                terms = [sources[i].term()]
+            else:
+                terms = [place.term(factor) for factor, place in zip(matrix[i], sources, strict=True) if factor != 0.0]
+            scaled = bool(scale or offset)
+            factor = scale[i % len(scale)] if scale else 1.0
+            bias = offset[i % len(offset)] if offset else 0.0
+            row = Row(len(self.terms), len(terms), at, type_, scaled, factor, bias, 0)
+            if len(self.rows) > first and self._continues(self.rows[-1], row, terms):
+                self.rows[-1] = replace(self.rows[-1], more=self.rows[-1].more + 1)
+            else:
+                self.rows.append(row)
+                self.terms += terms
+
+    def _continues(self, last: Row, row: Row, terms: Sequence[Term]) -> bool:
+        """Whether a row of these terms is the next number of the last one."""
+        if last.term_count != 1 or len(terms) != 1:
+            return False
+        number, before = last.more + 1, self.terms[last.first_term]
+        here = replace(before, offset=before.offset + number * SIZES[before.type])
+        there = replace(last, offset=last.offset + number * SIZES[last.type], first_term=row.first_term, more=0)
+        return terms[0] == here and row == there
+
+
+def array_of(anchor: int, offset: int, type_: int, count: int) -> list[Place]:
+    """`count` consecutive numbers."""
+    return [Place(anchor, offset + i * SIZES[type_], type_) for i in range(count)]
+
+
+def select_all(definitions: Definitions, message: str, fields: Sequence[str], count: int) -> Selection:
+    """The `count` numbers that several fields select together. A whole sequence takes all of them. Raises PlanError."""
+    try:
+        found = [select(definitions, message, field) for field in fields]
+    except FieldError as error:
+        raise PlanError(f"{error.args[0]}; {error.args[1]}") from None
+    pieces = tuple(piece for selection in found for piece in selection.pieces)
+    kind = found[0].kind if len(found) == 1 else Kind.NUMBERS
+    if len(pieces) == 1 and pieces[0].count == 0:
+        pieces = (replace(pieces[0], count=count),)
+    total = sum(piece.count for piece in pieces)
+    if total != count or not all(piece.count for piece in pieces):
+        what = ", ".join(f"`{field}`" for field in fields)
+        raise PlanError(f"{what} {'has' if len(fields) == 1 else 'have'} {total} numbers, not {count}")
+    if kind is Kind.NUMBERS and count == 3 and all(piece.type.startswith("float") for piece in pieces):
+        kind = Kind.VECTOR
+    return Selection(kind, pieces)
