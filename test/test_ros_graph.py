@@ -21,20 +21,28 @@ from pathlib import Path
 
 import zenoh
 from ament_index_python.packages import get_package_share_directory
+from geometry_msgs.msg import TwistStamped
 from lander.msg import LanderControlDescent
-from rclpy.serialization import deserialize_message
+from rclpy.serialization import deserialize_message, serialize_message
 from rosgraph_msgs.msg import Clock
+from sensor_msgs.msg import Imu
 from zenoh.ext import HistoryConfig, declare_advanced_subscriber
 
+from fcsl_compiler.ros.standard_messages import SUPPORTED, full_name
 from fcsl_msgs.msg import MachineState
 from simclient.bag.bag import Bag
 
-SIM = Path(__file__).resolve().parents[1] / "examples/lander/sim/lander.sim.json"
+ROOT = Path(__file__).resolve().parents[1]
+SIM = ROOT / "examples/lander/sim/lander.sim.json"
+ECHO = ROOT / "scripts/interop/machine/echo.json"
+HASHES = ROOT / "fcsl_runtime/fcsl_runtime/ros_graph/type_hashes.c"
 LIBRARY = Path(get_package_share_directory("lander")).parents[1] / "lib/lander/liblander_machines.so"
 LONG_S = 60
 HZ = 100
 INSTANCES = ["sensors", "monitor", "filter", "ascent", "coast", "descent", "safe", "engine"]
-TOKEN = re.compile(r"@/(\w+)/@ros2_lv/MP/([^/]+)/([^/]+)/:1:([01]):0,(\d+):typehash=(RIHS01_[0-9a-f]{64});")
+TOKEN = re.compile(r"@/(\w+)/@ros2_lv/(M[PS])/([^/]+)/([^/]+)/:([01]:[01]:0,\d+):typehash=(RIHS01_[0-9a-f]{64});")
+#: Reliable or not, transient local or not, keep last, depth.
+STREAM, EVENT, LATCHED, COMMAND, SENSOR = "1:0:0,2000", "1:0:0,100", "1:1:0,1", "1:0:0,10", "0:0:0,10"
 
 
 def free_endpoint() -> str:
@@ -75,12 +83,14 @@ def until(holds: Callable[[], bool]) -> None:
         time.sleep(0.01)
 
 
-def tokens(session: zenoh.Session) -> dict[str, tuple[str, str, str, str]]:
-    """By topic: type, durability, depth, hash. All are of the session that listens."""
+def tokens(session: zenoh.Session) -> dict[str, tuple[str, str]]:
+    """Kind and quality of service by topic. All are of the session that listens, and their hashes those of the installed types."""
     found = [TOKEN.fullmatch(str(r.ok.key_expr)) for r in session.liveliness().get("@/*/@ros2_lv/**") if r.ok]
     (zid,) = {token[1] for token in found if token}
     assert zid in map(str, session.info.peers_zid())
-    return {t[2].replace("§", "/"): (t[3].replace("§", "/"), t[4], t[5], t[6]) for t in found if t}
+    for token in found:
+        assert token and token[6] == installed_hash(token[4].replace("§", "/"))
+    return {token[3].replace("§", "/"): (token[2], token[5]) for token in found if token}
 
 
 def installed_hash(kind: str) -> str:
@@ -112,13 +122,10 @@ def test_topics_of_a_simulation(tmp_path: Path) -> None:
     assert (state.state, state.tick, state.header.stamp.sec) == ("ASCENT", 0, 0)
     assert json.loads(out)["ros"] == {"ticks": 4 * HZ, "dropped": 0}
 
-    volatile = {"transitions": "100", **dict.fromkeys(INSTANCES, "2000")}
-    wanted = {f"r1/lander_control/{name}": ("0", depth) for name, depth in volatile.items()}
-    wanted |= {f"r1/lander_control/{name}": ("1", "1") for name in ("state", "health", "faults")}
-    assert {topic: token[1:3] for topic, token in declared.items()} == wanted | {"clock": ("0", "2000")}
-    assert {topic: token[3] for topic, token in declared.items()} == {
-        topic: installed_hash(token[0]) for topic, token in declared.items()
-    }
+    wanted = {"transitions": EVENT, **dict.fromkeys(INSTANCES, STREAM)}
+    wanted |= dict.fromkeys(("state", "health", "faults"), LATCHED)
+    of_machine = {f"r1/lander_control/{name}": ("MP", quality) for name, quality in wanted.items()}
+    assert declared == of_machine | {"clock": ("MP", STREAM)}
 
     recorded: dict[str, list[bytes]] = defaultdict(list)
     for topic, _, data in Bag(bag).messages():
@@ -158,3 +165,61 @@ def test_topics_of_a_flight_computer() -> None:
     assert second.tick == first.tick + 1
     stamps = [m.header.stamp.sec + m.header.stamp.nanosec * 1e-9 for m in (first, second)]
     assert begun_s < stamps[0] < stamps[1] < time.time()
+
+
+def imu(rate: float, stamp_ns: int) -> bytes:
+    message = Imu()
+    message.header.stamp.sec, message.header.stamp.nanosec = divmod(stamp_ns, 10**9)
+    message.angular_velocity.x = rate
+    return bytes(serialize_message(message))
+
+
+def test_a_hal_of_topics(tmp_path: Path) -> None:
+    """Messages of the graph are the machine's sensors, its commands are topics. What is no good is refused and counted."""
+    endpoint = free_endpoint()
+    summary = tmp_path / "summary.json"
+    commands: queue.Queue[TwistStamped] = queue.Queue()
+    subprocess.run(["fcslc", "build", ECHO, "-o", tmp_path], check=True)
+    options = ["--hal", f"ros:{endpoint}", "--namespace", "r1", "--summary", summary]
+
+    def heard(sample: zenoh.Sample) -> None:
+        commands.put(deserialize_message(bytes(sample.payload), TwistStamped))
+
+    with started("fcsl-fc", tmp_path / "libecho.so", *options) as fc, bridge(endpoint) as session:
+        assert tokens(session) == {"r1/imu/data": ("MS", SENSOR), "r1/cmd_vel": ("MP", COMMAND)}
+        everything = session.declare_subscriber("r1/cmd_vel", heard)
+
+        def send(data: bytes) -> float:
+            """The command of the tick behind that which has taken the message."""
+            session.put("r1/imu/data", data)
+            time.sleep(0.02)
+            commands.queue.clear()
+            return float([commands.get(timeout=LONG_S) for _ in range(3)][-1].twist.linear.x)
+
+        now_ns = time.time_ns()
+        until(lambda: send(imu(42.0, time.time_ns())) == 42.0)
+        assert send(imu(43.0, now := time.time_ns())) == 43.0
+        for bad in (
+            imu(1.0, now),  # repeated
+            imu(2.0, now_ns),  # older
+            imu(3.0, time.time_ns() + 10**11),  # future
+            imu(4.0, time.time_ns())[:40],  # truncated
+            b"\0\0" + imu(5.0, time.time_ns())[2:],  # encoding
+            imu(float("nan"), time.time_ns()),
+        ):
+            assert send(bad) == 43.0
+        assert send(imu(44.0, time.time_ns())) == 44.0
+        fc.send_signal(signal.SIGTERM)
+        _, complaint = fc.communicate(timeout=LONG_S)
+        everything.undeclare()
+    assert fc.returncode == 0, complaint
+    counted = json.loads(summary.read_text())["hal"]
+    refused = {name.removeprefix("refused."): n for name, n in counted.items() if name.startswith("refused.") and n}
+    assert refused == dict.fromkeys(("repeated", "older", "future", "truncated", "encoding", "nan"), 1)
+    assert counted["messages"] >= 3 and counted["superseded"] == 0 and counted["commands"] > 0
+
+
+def test_hashes_of_all_standard_messages() -> None:
+    rows = dict(re.findall(r'{"(\w+/msg/\w+)", "(RIHS01_\w+)"}', HASHES.read_text()))
+    assert set(rows) == {full_name(name) for name in SUPPORTED}
+    assert rows == {kind: installed_hash(kind) for kind in rows}

@@ -15,6 +15,7 @@
 #include "summary_file.h"
 #include "options.h"
 #include "realtime.h"
+#include "ros_graph/hal_ros.h"
 #include "log.h"
 
 /* Exit statuses, besides 0 (docs/flight.md). */
@@ -65,6 +66,8 @@ static int make_hal(program_t *program)
         status = fcsl_hal_stub(hal, error.text, sizeof error.text);
     } else if (strncmp(peer, OPTIONS_WIRE, strlen(OPTIONS_WIRE)) == 0) {
         status = fcsl_hal_wire(peer + strlen(OPTIONS_WIRE), machine, timeout_ms, hal, error.text, sizeof error.text);
+    } else if (options_hal_is_ros(options)) {
+        status = hal_ros(peer + strlen(OPTIONS_ROS), options->name_space, program->loop.run, hal, &error);
     } else {
         status = fcsl_hal_bus(peer, options->name_space, machine, timeout_ms, timeout_ms, hal, error.text,
                               sizeof error.text);
@@ -220,9 +223,12 @@ static int open_ros_graph(program_t *program)
     if (program->options.ros == NULL) {
         return 0;
     }
+    /* With a HAL of the same graph the commands are there already. */
     const fcsl_ros_graph_options_t options = {.endpoint = program->options.ros,
                                               .name_space = program->options.name_space,
                                               .machine = fcsl_run_machine(loop->run),
+                                              .safe = fcsl_run_safe_data(loop->run),
+                                              .actuators = !options_hal_is_ros(&program->options),
                                               .simulated = !loop->realtime};
     loop->ros = fcsl_ros_graph_open(&options, &loop->history, &error);
     return loop->ros != NULL ? 0 : complain(error.text);

@@ -27,7 +27,9 @@ static const char USAGE[] =
     "of\n"
     "                          " FCSL_WIRE_SPECS "\n"
     "                          zenoh:tcp/HOST:PORT (or zenoh-peer:): a simulator on the bus, each channel under its "
-    "key\n"
+    "key;\n"
+    "                          ros:tcp/HOST:PORT: the topics of the channels in a ROS 2 graph, whose bridge connects "
+    "there\n"
     "  --timeout-ms N          how long to wait for the simulator's next message (default 2000)\n"
     "  --board LIBRARY.so      the board that hw_* of algorithms reach (fcsl/fcsl_hw.h); default: simulated hardware\n"
     "  --guard PATH            the actuators belong to the fcsl-guard that listens on PATH (docs/guard.md)\n"
@@ -97,8 +99,11 @@ static int read_hal(const char *text, options_t *options)
     if (options->peer == NULL) {
         return 0;
     }
+    if (options_hal_is_ros(options)) {
+        return 0;
+    }
     if (!is_wire && strncmp(text, "zenoh", strlen("zenoh")) != 0) {
-        return usage_error("--hal must be stub, wire:SPEC or zenoh:tcp/HOST:PORT, not ", text);
+        return usage_error("--hal must be stub, wire:SPEC, zenoh:tcp/HOST:PORT or ros:tcp/HOST:PORT, not ", text);
     }
     const int failed = is_wire ? fcsl_wire_check(text + strlen(OPTIONS_WIRE), error, sizeof error)
                                : fcsl_hal_bus_check(text, error, sizeof error);
@@ -210,6 +215,11 @@ static int read_option(const entry_t *entry, const char *text, options_t *option
     }
 }
 
+static int has_simulator(const options_t *options)
+{
+    return options->peer != NULL && !options_hal_is_ros(options);
+}
+
 /* Options that say nothing together. */
 static int check(const options_t *options)
 {
@@ -222,7 +232,7 @@ static int check(const options_t *options)
     if (options->token != NULL && options->socket == NULL) {
         return usage_error("--token needs --socket: it is the token of a TCP server", "");
     }
-    if (options->timeout_ms != 0 && options->peer == NULL) {
+    if (options->timeout_ms != 0 && !has_simulator(options)) {
         return usage_error("--timeout-ms needs --hal wire:SPEC or zenoh:…: it is how long to wait for the simulator",
                            "");
     }
@@ -236,7 +246,7 @@ static int check(const options_t *options)
     if (options->ignore_source_hash && options->restore == NULL) {
         return usage_error("--ignore-source-hash needs --restore", "");
     }
-    if (options->restore != NULL && options->peer != NULL) {
+    if (options->restore != NULL && has_simulator(options)) {
         return usage_error("--restore goes without a simulator: that begins at tick 0", "");
     }
     if ((options->record_fields != NULL || options->record_policy != RECORD_BY_PACE) && options->record == NULL) {

@@ -22,6 +22,9 @@ typedef struct {
     const char *endpoint;          /* tcp/HOST:PORT, to listen on; the bridge connects there */
     const char *name_space;        /* of the topics, "" for none */
     const fcsl_machine_t *machine; /* its struct is part 0 of the history */
+    const void *safe; /* the machine's struct with safe values (fcsl_run_safe_data), or null */
+    int sensors;      /* with the topics of mapped sensor channels */
+    int actuators;    /* with those of actuators */
     int simulated; /* time is the machine's own, and `clock` tells it; else stamps are ROS time, of the system's clock */
 } fcsl_ros_graph_options_t;
 

@@ -9,7 +9,7 @@
 #include <time.h>
 
 #include "base/error.h"
-#include "follower.h"
+#include "observers/follower.h"
 #include "ros_topics.h"
 #include "run/tick_time.h"
 
@@ -150,8 +150,7 @@ fcsl_ros_graph_t *fcsl_ros_graph_open(const fcsl_ros_graph_options_t *options, c
     g->simulated = options->simulated;
     if (follower_open(&g->follower, history, options->machine->tick_hz, &sink) != 0) {
         (void)fcsl_fail(error, "out of memory for the ROS 2 graph");
-    } else if (ros_topics_build(&g->topics, options->machine, options->name_space, options->simulated, error) == 0 &&
-               listen_on(g, options->endpoint, error) == 0) {
+    } else if (ros_topics_build(&g->topics, options, error) == 0 && listen_on(g, options->endpoint, error) == 0) {
         return g;
     }
     fcsl_ros_graph_close(g);

@@ -4,13 +4,15 @@
  */
 #include "ros_topics.h"
 
-#include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
 
+#include "endpoint.h"
+#include "fcsl/fcsl_scalar.h"
 #include "messages/schema.h"
 #include "messages/type_hash.h"
 #include "run/fault_place.h"
+#include "type_hashes.h"
 
 enum {
     /* Encapsulation, stamp, empty frame_id and tick: in these alone do latched messages of the same content differ. */
@@ -19,6 +21,7 @@ enum {
     PADDING_BYTES = 8, /* before a number or a length, at most, with that length */
     DEPTH_LATCHED = 1,
     DEPTH_EVENT = 100,
+    DEPTH_COMMAND = 10,
     DEPTH_STREAM = 2000, /* what a subscriber may lag behind before a reliable bridge overwrites messages */
 };
 
@@ -39,58 +42,16 @@ static const fixed_t FIXED[] = {
 };
 enum { FIXED_COUNT = sizeof FIXED / sizeof FIXED[0] };
 
-/* ---- keys and tokens ------------------------------------------------------------------------------------------------ */
-
-/* A namespace may have slashes around it; a key has none. */
-static int write_key(ros_topic_t *topic, const fcsl_machine_t *machine, const char *name_space, const char *name,
-                     fcsl_error_t *error)
-{
-    name_space += strspn(name_space, "/");
-    size_t length = strlen(name_space);
-    while (length > 0 && name_space[length - 1] == '/') {
-        length--;
-    }
-    const int size = snprintf(topic->key, sizeof topic->key, "%.*s%s%s/%s", (int)length, name_space,
-                              length > 0 ? "/" : "", machine->name, name);
-    return size < (int)sizeof topic->key
-               ? 0
-               : fcsl_fail(error, "topic '%.100s' of machine '%.100s' has a name of more than %u bytes", name,
-                           machine->name, FCSL_BUS_KEY_MAX);
-}
-
-/* A name as one word of a key: the plugin writes a paragraph sign for each slash. */
-static void write_word(const char *name, char *word, size_t size)
-{
-    static const char SLASH[] = "\xc2\xa7";
-    size_t at = 0;
-    for (; *name != '\0' && at + sizeof SLASH < size; name++) {
-        if (*name == '/') {
-            memcpy(word + at, SLASH, sizeof SLASH - 1u);
-            at += sizeof SLASH - 1u;
-        } else {
-            word[at++] = *name;
-        }
-    }
-    word[at] = '\0';
-}
-
-/* The token by which the bridge knows a publisher: "MP", topic, type, and its quality of service, which is reliable (1), volatile
- * (0) or transient local (1), keep last (0) with a depth, and the type's hash. */
-static int write_token(ros_topic_t *topic, const char *type, const char *schema, unsigned depth, fcsl_error_t *error)
+/* Key and token of a topic of which the complete text of the type is known. */
+static int announce(ros_topic_t *topic, const char *type, const char *schema, unsigned depth, fcsl_error_t *error)
 {
     char hash[FCSL_TYPE_HASH_BYTES];
-    char name[2u * sizeof topic->key];
-    char kind[2u * sizeof topic->key];
     if (fcsl_type_hash(type, schema, hash) != 0) {
         return fcsl_fail(error, "there is no type hash of the interface %.200s", type);
     }
-    write_word(topic->key, name, sizeof name);
-    write_word(type, kind, sizeof kind);
-    const int size = snprintf(topic->token, sizeof topic->token, "@/{zid}/@ros2_lv/MP/%s/%s/:1:%d:0,%u:typehash=%s;",
-                              name, kind, topic->latched, depth, hash);
-    return size < (int)sizeof topic->token
-               ? 0
-               : fcsl_fail(error, "topic %.200s of type %.200s has too long names", topic->key, type);
+    const ros_quality_t quality = {
+        .kind = ROS_PUBLISHER, .type = type, .hash = hash, .reliable = 1, .latched = topic->latched, .depth = depth};
+    return ros_token_write(topic->token, topic->key, &quality, error);
 }
 
 /* ---- the topics of a machine ---------------------------------------------------------------------------------------- */
@@ -129,9 +90,9 @@ static int add_fixed(ros_topics_t *topics, const fixed_t *fixed, const char *nam
     if (topic->said == NULL) {
         return fcsl_fail(error, "out of memory for topics");
     }
-    return write_key(topic, topics->machine, name_space, fixed->name, error) != 0
+    return ros_key_write(topic->key, name_space, topics->machine->name, fixed->name, error) != 0
                ? -1
-               : write_token(topic, fixed->type, fixed->schema, fixed->latched ? DEPTH_LATCHED : DEPTH_EVENT, error);
+               : announce(topic, fixed->type, fixed->schema, fixed->latched ? DEPTH_LATCHED : DEPTH_EVENT, error);
 }
 
 /* Of all topics only this one is outside of the namespace. */
@@ -140,8 +101,9 @@ static int add_clock(ros_topics_t *topics, fcsl_error_t *error)
     ros_topic_t *topic = &topics->topics[topics->count++];
     topic->kind = ROS_CLOCK;
     topic->longest = CLOCK_BYTES;
-    (void)snprintf(topic->key, sizeof topic->key, "clock");
-    return write_token(topic, "rosgraph_msgs/msg/Clock", FCSL_SCHEMA_CLOCK, DEPTH_STREAM, error);
+    return ros_key_write(topic->key, "", NULL, "/clock", error) != 0
+               ? -1
+               : announce(topic, "rosgraph_msgs/msg/Clock", FCSL_SCHEMA_CLOCK, DEPTH_STREAM, error);
 }
 
 static int add_instance(ros_topics_t *topics, const fcsl_instance_t *instance, const char *name_space,
@@ -154,18 +116,45 @@ static int add_instance(ros_topics_t *topics, const fcsl_instance_t *instance, c
         return fcsl_fail(error, "out of memory for topics");
     }
     const int failed = fcsl_layout_build(topics->machine, instance, &topic->layout, error) != 0 ||
-                       write_key(topic, topics->machine, name_space, instance->name, error) != 0 ||
-                       write_token(topic, instance->message_type, schema, DEPTH_STREAM, error) != 0;
+                       ros_key_write(topic->key, name_space, topics->machine->name, instance->name, error) != 0 ||
+                       announce(topic, instance->message_type, schema, DEPTH_STREAM, error) != 0;
     free(schema);
     topic->longest = topic->layout.size;
     return failed ? -1 : 0;
 }
 
-int ros_topics_build(ros_topics_t *topics, const fcsl_machine_t *machine, const char *name_space, int clock,
-                     fcsl_error_t *error)
+static int add_mapped(ros_topics_t *topics, const fcsl_ros_message_t *message, const char *name_space,
+                      fcsl_error_t *error)
 {
-    *topics = (ros_topics_t){.machine = machine};
-    topics->topics = calloc((size_t)machine->instance_count + FIXED_COUNT + 1u, sizeof *topics->topics);
+    char reason[256];
+    ros_topic_t *topic = &topics->topics[topics->count++];
+    const ros_quality_t quality = {.kind = ROS_PUBLISHER,
+                                   .type = message->type,
+                                   .hash = ros_type_hash(message->type),
+                                   .reliable = 1,
+                                   .depth = message->direction == FCSL_ACTUATOR ? DEPTH_COMMAND : DEPTH_STREAM};
+    topic->kind = ROS_MAPPED;
+    topic->mapped = message;
+    topic->longest = message->composer->size;
+    topic->composer = fcsl_ros_composer_new(message->composer, reason, sizeof reason);
+    if (topic->composer == NULL) {
+        return fcsl_fail(error, "topic %.100s: %s", message->topic, reason);
+    }
+    if (quality.hash == NULL) {
+        return fcsl_fail(error, "topic %.100s: there is no type hash of %.200s", message->topic, message->type);
+    }
+    return ros_key_write(topic->key, name_space, NULL, message->topic, error) != 0
+               ? -1
+               : ros_token_write(topic->token, topic->key, &quality, error);
+}
+
+int ros_topics_build(ros_topics_t *topics, const fcsl_ros_graph_options_t *options, fcsl_error_t *error)
+{
+    const fcsl_machine_t *machine = options->machine;
+    const char *name_space = options->name_space;
+    *topics = (ros_topics_t){.machine = machine, .safe = options->safe};
+    topics->topics =
+        calloc((size_t)machine->instance_count + machine->ros_message_count + FIXED_COUNT + 1u, sizeof *topics->topics);
     if (topics->topics == NULL) {
         return fcsl_fail(error, "out of memory for topics");
     }
@@ -173,12 +162,18 @@ int ros_topics_build(ros_topics_t *topics, const fcsl_machine_t *machine, const 
     for (uint32_t i = 0; i < FIXED_COUNT && !failed; i++) {
         failed = add_fixed(topics, &FIXED[i], name_space, error);
     }
-    if (clock && !failed) {
+    if (options->simulated && !failed) {
         failed = add_clock(topics, error);
     }
     for (uint32_t i = 0; i < machine->instance_count && !failed; i++) {
         if (machine->instances[i].published) {
             failed = add_instance(topics, &machine->instances[i], name_space, error);
+        }
+    }
+    for (uint32_t i = 0; i < machine->ros_message_count && !failed; i++) {
+        const fcsl_ros_message_t *message = &machine->ros_messages[i];
+        if (message->direction == FCSL_ACTUATOR ? options->actuators : options->sensors) {
+            failed = add_mapped(topics, message, name_space, error);
         }
     }
     return failed;
@@ -188,6 +183,7 @@ void ros_topics_free(ros_topics_t *topics)
 {
     for (uint32_t i = 0; i < topics->count; i++) {
         fcsl_layout_free(&topics->topics[i].layout);
+        fcsl_ros_composer_free(topics->topics[i].composer);
         free(topics->topics[i].said);
     }
     free(topics->topics);
@@ -221,6 +217,35 @@ static size_t write_tick_message(const fcsl_machine_t *machine, ros_topic_t *top
     return length;
 }
 
+/* Whether a sample came for the tick, or nothing says when samples come. */
+static int is_sampled(const fcsl_machine_t *machine, const fcsl_ros_message_t *message, const uint8_t *data)
+{
+    for (uint32_t i = 0; i < message->channel_count; i++) {
+        const fcsl_channel_t *channel = &machine->channels[message->channels[i]];
+        uint32_t age = 0;
+        memcpy(&age, data + channel->age_offset, sizeof age);
+        if (age == 0u || data[channel->attached_offset] == 0u) {
+            return 1;
+        }
+    }
+    return 0;
+}
+
+/* Actuators of a disarmed machine get their safe values. A number that its field cannot hold makes no message. */
+static size_t write_mapped(const ros_topics_t *topics, const ros_topic_t *topic, const uint8_t *data,
+                           fcsl_stamp_t stamp, uint8_t *bytes)
+{
+    const fcsl_machine_t *machine = topics->machine;
+    const int is_actuator = topic->mapped->direction == FCSL_ACTUATOR;
+    if (!is_actuator && !is_sampled(machine, topic->mapped, data)) {
+        return 0;
+    }
+    const int is_armed = machine->arm_field == FCSL_NONE || data[machine->fields[machine->arm_field].offset] != 0u;
+    const uint8_t *memory = is_actuator && !is_armed && topics->safe != NULL ? topics->safe : data;
+    return fcsl_ros_compose(topic->composer, &memory, (int64_t)stamp.time_ns, bytes) == FCSL_ROS_TAKEN ? topic->longest
+                                                                                                       : 0u;
+}
+
 size_t ros_topics_write(ros_topics_t *topics, uint32_t number, const uint8_t *data, fcsl_stamp_t stamp, uint8_t *bytes)
 {
     ros_topic_t *topic = &topics->topics[number];
@@ -230,6 +255,8 @@ size_t ros_topics_write(ros_topics_t *topics, uint32_t number, const uint8_t *da
     case ROS_INSTANCE:
         fcsl_layout_write(&topic->layout, data, stamp.tick, stamp.time_ns, bytes);
         return topic->layout.size;
+    case ROS_MAPPED:
+        return write_mapped(topics, topic, data, stamp, bytes);
     default:
         return write_tick_message(topics->machine, topic, data, stamp, bytes);
     }
