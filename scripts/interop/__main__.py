@@ -1,9 +1,9 @@
 # SPDX-License-Identifier: Apache-2.0
 """`make interop`: FCSL's programs and rclpy nodes in one ROS 2 graph, by a bridge with the published zenoh-plugin-ros2dds.
 
-    simulation  fcsl-sim run … --ros ──┐                        ┌── listener.py (use_sim_time)
-    flight computer  fcsl-fc --hal ros: ├── Zenoh ── bridge ── DDS ┤
-                                       ┘   (127.0.0.1)          └── talker.py, twice: it is started again halfway
+    fcsl-sim run … --ros ─────┐                       ┌── listener.py, on use_sim_time
+                              ├── Zenoh ── bridge ── DDS
+    fcsl-fc … --hal ros: ─────┘     (127.0.0.1)       └── talker.py, which ends halfway and is started again
 
 `python3 scripts/interop [SECONDS]` prints what both sides saw, and fails when a message was lost or came twice.
 """
@@ -87,33 +87,33 @@ def talk(first: int, count: int, environment: dict[str, str]) -> None:
     subprocess.run([sys.executable, HERE / "talker.py", str(first), str(count)], env=environment, check=True)
 
 
-def fly(duration_s: float, folder: Path, domain: int) -> tuple[dict[str, dict[str, int]], dict[str, int], str, int]:
-    """What the listener saw, what the flight computer's HAL counted, what the simulation said, and how many the talkers sent."""
+def fly(duration_s: float, folder: Path, domain: int) -> tuple[dict[str, dict[str, int]], dict[str, int], int]:
+    """What the listener saw, what the flight computer's HAL counted, and how many messages the talkers sent."""
     environment = {**os.environ, **loopback_environment(os.environ), "ROS_DOMAIN_ID": str(domain)}
     of_bridge = {**environment, "ROS_DISTRO": "jazzy", "CYCLONEDDS_URI": CYCLONE}
     simulated, flown = free_endpoint(), free_endpoint()
     summary = folder / "summary.json"
-    subprocess.run(["fcslc", "build", HERE / "machine/echo.json", "-o", folder], check=True)
-    sim_line = ["fcsl-sim", "run", HERE / "machine/lander.sim.json", "--speed", "1", "--ros", simulated]
-    fc_line = ["fcsl-fc", folder / "libecho.so", "--hal", f"ros:{flown}", "--summary", summary]
-    sent = int(duration_s * TALK_HZ / 2)
+    subprocess.run(["fcslc", "build", HERE / "machine/echo.json", "-o", folder], check=True, stdout=subprocess.DEVNULL)
+    fc_options = ["--hal", f"ros:{flown}", "--summary", str(summary)]
+    half = int(duration_s * TALK_HZ / 2)
     with (
-        started(*sim_line, env=environment) as sim,
-        started(*fc_line, env=environment) as fc,
+        started(
+            "fcsl-sim", "run", HERE / "machine/lander.sim.json", "--speed", "1", "--ros", simulated, env=environment
+        ) as sim,
+        started("fcsl-fc", folder / "libecho.so", *fc_options, env=environment) as fc,
         started(BRIDGE, bridge_config(folder, domain, [simulated, flown]), env=of_bridge) as bridge,
         started(sys.executable, HERE / "listener.py", env=environment) as listener,
     ):
         time.sleep(START_S)
-        for first in (1, sent + 1):
-            talk(first, sent, environment)
+        for first in (1, half + 1):
+            talk(first, half, environment)
         time.sleep(END_S)
         heard = json.loads(end(listener))
         end(fc)
         end(sim)
         if bridge.poll() is not None:
             sys.exit(f"interop: the bridge ended by itself, with {bridge.returncode}")
-    counted = json.loads(summary.read_text())["hal"]
-    return heard, counted, summary.read_text(), 2 * sent
+    return heard, json.loads(summary.read_text())["hal"], 2 * half
 
 
 def complaints(heard: dict[str, dict[str, int]], counted: dict[str, int], sent: int, duration_s: float) -> list[str]:
@@ -134,7 +134,7 @@ def complaints(heard: dict[str, dict[str, int]], counted: dict[str, int], sent: 
 def main() -> None:
     duration_s = float(sys.argv[1]) if len(sys.argv) > 1 else DURATION_S
     with own_domain() as domain, tempfile.TemporaryDirectory() as folder:
-        heard, counted, _, sent = fly(duration_s, Path(folder), domain)
+        heard, counted, sent = fly(duration_s, Path(folder), domain)
     print(json.dumps({"listener": heard, "flight computer": counted, "talkers sent": sent}, indent=2))
     wrong = complaints(heard, counted, sent, duration_s)
     if wrong:
