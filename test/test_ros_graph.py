@@ -18,10 +18,11 @@ import time
 from collections import defaultdict
 from collections.abc import Callable, Iterator
 from pathlib import Path
+from typing import Any, TypeVar, cast
 
 import zenoh
 from ament_index_python.packages import get_package_share_directory
-from geometry_msgs.msg import TwistStamped
+from geometry_msgs.msg import PointStamped, TwistStamped
 from lander.msg import LanderControlDescent
 from rclpy.serialization import deserialize_message, serialize_message
 from rosgraph_msgs.msg import Clock
@@ -37,6 +38,7 @@ SIM = ROOT / "examples/lander/sim/lander.sim.json"
 ECHO = ROOT / "scripts/interop/machine/echo.json"
 HASHES = ROOT / "fcsl_runtime/fcsl_runtime/ros_graph/type_hashes.c"
 LIBRARY = Path(get_package_share_directory("lander")).parents[1] / "lib/lander/liblander_machines.so"
+Message = TypeVar("Message")
 LONG_S = 60
 HZ = 100
 INSTANCES = ["sensors", "monitor", "filter", "ascent", "coast", "descent", "safe", "engine"]
@@ -100,6 +102,16 @@ def installed_hash(kind: str) -> str:
     return str(hashes[kind])
 
 
+def last_tick(messages: list[bytes]) -> int:
+    """Behind encapsulation, stamp and an empty frame_id."""
+    return int.from_bytes(messages[-1][20:28], "little")
+
+
+def clock_tick(data: bytes) -> int:
+    clock = deserialize_message(data, Clock).clock
+    return int((clock.sec * 10**9 + clock.nanosec) * HZ // 10**9)
+
+
 def test_topics_of_a_simulation(tmp_path: Path) -> None:
     """Every message has the bytes that the bag has, of every tick from the first one on that was subscribed."""
     endpoint = free_endpoint()
@@ -116,6 +128,7 @@ def test_topics_of_a_simulation(tmp_path: Path) -> None:
         advanced = declare_advanced_subscriber(session, "r1/lander_control/state", heard, history=history)
         state = deserialize_message(late.get(timeout=LONG_S), MachineState)
         out, complaint = sim.communicate(timeout=LONG_S)
+        until(lambda: {last_tick(came[f"r1/lander_control/{name}"]) for name in INSTANCES} == {4 * HZ - 1})
         advanced.undeclare()
         everything.undeclare()
     assert sim.returncode == 1, complaint  # it ends before it has landed
@@ -132,8 +145,7 @@ def test_topics_of_a_simulation(tmp_path: Path) -> None:
         recorded[topic.removeprefix("/")].append(data)
     for topic in (f"r1/lander_control/{name}" for name in INSTANCES):
         assert len(came[topic]) > HZ and came[topic] == recorded[topic][-len(came[topic]) :], topic
-    clocks = [deserialize_message(data, Clock).clock for data in came["clock"]]
-    ticks = [(clock.sec * 10**9 + clock.nanosec) * HZ // 10**9 for clock in clocks]
+    ticks = [clock_tick(data) for data in came["clock"]]
     assert ticks == list(range(ticks[0], 4 * HZ))
 
 
@@ -167,6 +179,15 @@ def test_topics_of_a_flight_computer() -> None:
     assert begun_s < stamps[0] < stamps[1] < time.time()
 
 
+def read(sample: zenoh.Sample, kind: type[Message]) -> Message:
+    return cast(Message, deserialize_message(bytes(sample.payload), kind))
+
+
+def tick_of(message: Any) -> int:
+    stamp = message.header.stamp
+    return int((stamp.sec * 10**9 + stamp.nanosec) * HZ // 10**9)
+
+
 def imu(rate: float, stamp_ns: int) -> bytes:
     message = Imu()
     message.header.stamp.sec, message.header.stamp.nanosec = divmod(stamp_ns, 10**9)
@@ -183,7 +204,7 @@ def test_a_hal_of_topics(tmp_path: Path) -> None:
     options = ["--hal", f"ros:{endpoint}", "--namespace", "r1", "--summary", summary]
 
     def heard(sample: zenoh.Sample) -> None:
-        commands.put(deserialize_message(bytes(sample.payload), TwistStamped))
+        commands.put(read(sample, TwistStamped))
 
     with started("fcsl-fc", tmp_path / "libecho.so", *options) as fc, bridge(endpoint) as session:
         assert tokens(session) == {"r1/imu/data": ("MS", SENSOR), "r1/cmd_vel": ("MP", COMMAND)}
@@ -220,6 +241,82 @@ def test_a_hal_of_topics(tmp_path: Path) -> None:
 
 
 def test_hashes_of_all_standard_messages() -> None:
-    rows = dict(re.findall(r'{"(\w+/msg/\w+)", "(RIHS01_\w+)"}', HASHES.read_text()))
+    rows = dict(re.findall(r'{\s*"(\w+/msg/\w+)",\s+"(RIHS01_\w+)"}', HASHES.read_text()))
     assert set(rows) == {full_name(name) for name in SUPPORTED}
     assert rows == {kind: installed_hash(kind) for kind in rows}
+
+
+PUMP = """
+class Gauge:
+    outputs = {"level": "f64 m"}
+
+    def execute(self):
+        pass
+
+
+class Pump:
+    inputs = {"now": "i64"}
+    outputs = {"speed": "f64 m/s", "armed": "bool"}
+
+    def execute(self):
+        self.speed = 3.0
+        self.armed = self.now < 2000000000
+"""
+TANK = {
+    "tick_hz": HZ,
+    "initial_state": "RUN",
+    "algorithms": {"Gauge": {"source": "pump.py"}, "Pump": {"source": "pump.py"}},
+    "instances": {"gauge": {"algorithm": "Gauge"}, "pump": {"algorithm": "Pump"}},
+    "connections": [{"from": "machine.time_ns", "to": "pump.now"}],
+    "states": {"RUN": {"schedule": {"gauge": HZ, "pump": HZ}}},
+    "transitions": [],
+    "publish": [],
+    "arm": "pump.armed",
+    "channels": [
+        {"name": "level", "id": 1, "field": "gauge.outputs.level", "direction": "sensor", "max_age_ticks": 10}
+        | {"ros": {"type": "geometry_msgs/PointStamped", "field": "point.z", "topic": "level", "frame": "tank"}},
+        {"name": "speed", "id": 2, "field": "pump.outputs.speed", "direction": "actuator", "safe": -1.0}
+        | {"ros": {"type": "geometry_msgs/TwistStamped", "field": "twist.linear.x", "topic": "/cmd_vel"}},
+    ],
+}
+TANK_SIM = {
+    "controller": {"machine": "tank.json"},
+    "seed": 1,
+    "duration": 4.0,
+    "integrator": {"method": "euler", "hz": HZ},
+    "models": {"sensor": {"source": "package://fcsl_sim/models/noisy_sensor.c"}},
+    "instances": {"meter": {"model": "sensor", "parameters": {"bias": 7.5, "sigma": 0.0, "dropout": False}}},
+    "connections": [{"from": "meter.value", "to": "controller.level"}],
+    "rates": {"meter": HZ // 2},
+}
+
+
+def test_mapped_channels_of_a_simulation(tmp_path: Path) -> None:
+    """Sensors when they are sampled, actuators in every tick: the machine's value while it is armed, then the safe one."""
+    (tmp_path / "pump.py").write_text(PUMP)
+    (tmp_path / "tank.json").write_text(json.dumps(TANK))
+    (tmp_path / "tank.sim.json").write_text(json.dumps(TANK_SIM))
+    endpoint = free_endpoint()
+    options = ["--ros", endpoint, "--namespace", "r1", "--speed", "2"]
+    levels: list[PointStamped] = []
+    commands: list[TwistStamped] = []
+    with started("fcsl-sim", "run", tmp_path / "tank.sim.json", *options) as sim, bridge(endpoint) as session:
+        declared = tokens(session)
+        subscribers = [
+            session.declare_subscriber("r1/level", lambda s: levels.append(read(s, PointStamped))),
+            session.declare_subscriber("cmd_vel", lambda s: commands.append(read(s, TwistStamped))),
+        ]
+        said, complaint = sim.communicate(timeout=LONG_S)
+        until(lambda: bool(commands) and tick_of(commands[-1]) == 399 and tick_of(levels[-1]) == 398)
+        for subscriber in subscribers:
+            subscriber.undeclare()
+    assert sim.returncode == 0, complaint
+    of_machine = {"state": LATCHED, "health": LATCHED, "faults": LATCHED, "transitions": EVENT}
+    wanted = {f"r1/tank/{name}": quality for name, quality in of_machine.items()}
+    wanted |= {"clock": STREAM, "r1/level": STREAM, "cmd_vel": COMMAND}
+    assert declared == {topic: ("MP", quality) for topic, quality in wanted.items()}
+    assert "ROS 2 topics: 400 ticks, 0 dropped" in said
+    assert {(m.point.z, m.header.frame_id, tick_of(m) % 2) for m in levels} == {(7.5, "tank", 0)}
+    assert [tick_of(m) for m in levels] == list(range(tick_of(levels[0]), 400, 2))
+    assert [tick_of(m) for m in commands] == list(range(tick_of(commands[0]), 400))
+    assert all(m.twist.linear.x == (3.0 if tick_of(m) < 200 else -1.0) for m in commands)
