@@ -104,6 +104,8 @@ def fly(duration_s: float, folder: Path, domain: int) -> tuple[dict[str, dict[st
         started(BRIDGE, bridge_config(folder, domain, [simulated, flown]), env=of_bridge) as bridge,
         started(sys.executable, HERE / "listener.py", env=environment) as listener,
     ):
+        if not listener.stdout or listener.stdout.readline() != "listening\n":
+            sys.exit("interop: the listener does not start")
         time.sleep(START_S)
         for first in (1, half + 1):
             talk(first, half, environment)

@@ -1,6 +1,6 @@
 # SPDX-License-Identifier: Apache-2.0
-"""The listener of `make interop`: an rclpy node as users write them, on use_sim_time. Runs until SIGTERM, then prints what it saw
-as JSON: of each topic how many messages, how many are missing between the first and the last, how many came twice or out of order.
+"""The listener of `make interop`: an rclpy node as users write them, on use_sim_time. Says that it listens. Runs until SIGTERM, then
+prints what it saw as JSON: of each topic how many messages, how many are missing between the first and the last, how many came twice or out of order.
 """
 
 from __future__ import annotations
@@ -80,6 +80,7 @@ def main() -> None:
     ended: list[int] = []
     signal.signal(signal.SIGTERM, lambda number, frame: ended.append(number))
     latched = QoSProfile(depth=1, durability=DurabilityPolicy.TRANSIENT_LOCAL)
+    print("listening", flush=True)
     begun, late = time.monotonic(), False
     while not ended:
         rclpy.spin_once(node, timeout_sec=0.1)

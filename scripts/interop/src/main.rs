@@ -13,9 +13,6 @@ async fn bridge(path: &str) -> Result<(), Box<dyn std::error::Error + Send + Syn
     let mut terminated = signal(SignalKind::terminate())?;
     let mut plugins = PluginsManager::static_plugins_only();
     plugins.declare_static_plugin::<ROS2Plugin, &str>("ros2dds", true);
-    for plugin in plugins.declared_plugins_iter_mut() {
-        plugin.load()?;
-    }
     let config = zenoh::Config::from_file(path)?;
     let mut runtime = RuntimeBuilder::new(config).plugins_manager(plugins).build().await?;
     runtime.start().await?;
