@@ -32,10 +32,10 @@ DURATION_S = 600
 #: For routes (the plugin takes up to 4 s), late subscriptions and the last messages.
 START_S, END_S = 12.0, 4.0
 TALK_HZ = 100
-#: Cyclone DDS on 127.0.0.1 alone. Participants of a computer are found there by their ports, without multicast.
+#: Cyclone DDS on 127.0.0.1 alone, where it meets Fast DDS of the profile of fcsl_bridge by multicast.
 CYCLONE = (
-    '<CycloneDDS><Domain><General><Interfaces><NetworkInterface address="127.0.0.1"/></Interfaces></General>'
-    "</Domain></CycloneDDS>"
+    '<CycloneDDS><Domain><General><Interfaces><NetworkInterface address="127.0.0.1" multicast="true"/></Interfaces>'
+    "<AllowMulticast>true</AllowMulticast></General></Domain></CycloneDDS>"
 )
 STREAMS = ("clock", "descent", "sensors")
 
@@ -49,8 +49,11 @@ def free_endpoint() -> str:
 
 
 @contextlib.contextmanager
-def started(*line: str | Path, env: dict[str, str]) -> Iterator[subprocess.Popen[str]]:
-    process = subprocess.Popen([str(w) for w in line], env=env, text=True, stdout=subprocess.PIPE)
+def started(*line: str | Path, env: dict[str, str], quiet: bool = False) -> Iterator[subprocess.Popen[str]]:
+    pipe, nothing = subprocess.PIPE, subprocess.DEVNULL
+    process = subprocess.Popen(
+        [str(w) for w in line], env=env, text=True, stdout=pipe, stderr=nothing if quiet else None
+    )
     try:
         yield process
     finally:
@@ -77,7 +80,7 @@ def bridge_config(folder: Path, domain: int, endpoints: list[str]) -> Path:
         },
         "listen": {"endpoints": []},
         "scouting": {"multicast": {"enabled": False}, "gossip": {"enabled": False}},
-        "plugins": {"ros2dds": {"domain": domain, "ros_automatic_discovery_range": "LOCALHOST"}},
+        "plugins": {"ros2dds": {"domain": domain, "ros_automatic_discovery_range": "SYSTEM_DEFAULT"}},
     }
     path.write_text(json.dumps(config, indent=2))
     return path
@@ -98,7 +101,15 @@ def fly(duration_s: float, folder: Path, domain: int) -> tuple[dict[str, dict[st
     half = int(duration_s * TALK_HZ / 2)
     with (
         started(
-            "fcsl-sim", "run", HERE / "machine/lander.sim.json", "--speed", "1", "--ros", simulated, env=environment
+            "fcsl-sim",
+            "run",
+            HERE / "machine/lander.sim.json",
+            "--speed",
+            "1",
+            "--ros",
+            simulated,
+            env=environment,
+            quiet=True,
         ) as sim,
         started("fcsl-fc", folder / "libecho.so", *fc_options, env=environment) as fc,
         started(BRIDGE, bridge_config(folder, domain, [simulated, flown]), env=of_bridge) as bridge,
