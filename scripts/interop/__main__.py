@@ -25,6 +25,7 @@ from pathlib import Path
 
 from fcsl_bridge.domain import own_domain
 from fcsl_bridge.loopback import loopback_environment
+from simclient import VarClient
 
 HERE = Path(__file__).resolve().parent
 BRIDGE = HERE.parents[1] / "build/interop/target/release/interop_bridge"
@@ -98,6 +99,7 @@ def fly(duration_s: float, folder: Path, domain: int) -> tuple[dict[str, dict[st
     summary = folder / "summary.json"
     subprocess.run(["fcslc", "build", HERE / "machine/echo.json", "-o", folder], check=True, stdout=subprocess.DEVNULL)
     fc_options = ["--hal", f"ros:{flown}", "--summary", str(summary)]
+    served = folder / "sim.sock"
     half = int(duration_s * TALK_HZ / 2)
     with (
         started(
@@ -108,6 +110,8 @@ def fly(duration_s: float, folder: Path, domain: int) -> tuple[dict[str, dict[st
             "1",
             "--ros",
             simulated,
+            "--socket",
+            served,
             env=environment,
             quiet=True,
         ) as sim,
@@ -121,11 +125,14 @@ def fly(duration_s: float, folder: Path, domain: int) -> tuple[dict[str, dict[st
         for first in (1, half + 1):
             talk(first, half, environment)
         time.sleep(END_S)
+        with VarClient(str(served)) as client:
+            put = client.stats()["ros"]
         heard = json.loads(end(listener))
         end(fc)
         end(sim)
         if bridge.poll() is not None:
             sys.exit(f"interop: the bridge ended by itself, with {bridge.returncode}")
+    heard["simulation"] = put
     return heard, json.loads(summary.read_text())["hal"], 2 * half
 
 
