@@ -3,7 +3,7 @@
 SHELL := /bin/bash
 .SHELLFLAGS := -euo pipefail -c
 .DEFAULT_GOAL := help
-.PHONY: help setup build demo test verify bench lint format clean
+.PHONY: help setup build demo test verify bench interop lint format clean
 
 ENV := . scripts/env.sh &&
 PYTHON_DIRS := conftest.py fcsl_compiler fcsl_hal fcsl_runtime fcsl_sim fcsl_bridge fcsl_msgs examples scripts test
@@ -30,6 +30,10 @@ verify: setup ## the evidence: EVA, binaries, other processors, sanitizers, fuzz
 bench: setup ## the figures: steps, filters, simulator, replay, ROS 2 nodes, each beside what others would write; SIZE=smallest: only whether all of it runs
 	@scripts/bench/harness/setup.sh
 	@$(ENV) FCSL_BENCH_SIZE=$(SIZE) python3 scripts/bench
+
+interop: setup ## FCSL beside rclpy nodes in a ROS 2 graph, through a bridge with zenoh-plugin-ros2dds, which it builds once; DURATION=600 s
+	@scripts/interop/build.sh
+	@$(ENV) python3 scripts/interop $(DURATION)
 
 lint: setup ## ruff, mypy, clang-format; nothing is changed
 	@. scripts/underlay.sh && ruff check $(PYTHON_DIRS)

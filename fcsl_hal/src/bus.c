@@ -184,7 +184,8 @@ static int declare(fcsl_bus_t *bus, const fcsl_bus_options_t *options, char *err
         failed = fcsl_zenoh_declare_strays(zenoh, options->strays, error, error_size);
     }
     for (uint32_t i = 0; i < options->output_count && !failed; i++) {
-        failed = fcsl_zenoh_declare_output(zenoh, i, options->outputs[i], options->observer, error, error_size);
+        failed = fcsl_zenoh_declare_output(zenoh, i, options->outputs[i], options->observer, i < options->latched_count,
+                                           error, error_size);
     }
     for (uint32_t i = 0; i < options->answer_count && !failed; i++) {
         const fcsl_bus_answer_t *answer = &options->answers[i];

@@ -27,13 +27,14 @@ static const char CONFIG[] = "{mode: '%s',"
                              "    queue: {congestion_control: {block: {wait_before_close: 1000000}}}},"
                              "   rx: {max_message_size: %u}}}}";
 
-/* `forbidden`: characters. */
-static int check_key(const char *what, const char *key, const char *forbidden, char *error, size_t error_size)
+/* `longest`: bytes; `forbidden`: characters. */
+static int check_key(const char *what, const char *key, size_t longest, const char *forbidden, char *error,
+                     size_t error_size)
 {
-    const size_t size = key != NULL ? strnlen(key, FCSL_BUS_KEY_MAX + 1u) : 0u;
-    if (size == 0 || size > FCSL_BUS_KEY_MAX) {
-        (void)snprintf(error, error_size, "%s of the bus has a key of %s bytes: 1 to %u are possible", what,
-                       size == 0 ? "0" : "more than 255", FCSL_BUS_KEY_MAX);
+    const size_t size = key != NULL ? strnlen(key, longest + 1u) : 0u;
+    if (size == 0 || size > longest) {
+        (void)snprintf(error, error_size, "%s of the bus has a key of %s bytes: 1 to %zu are possible", what,
+                       size == 0 ? "0" : "too many", longest);
         return -1;
     }
     if (strpbrk(key, forbidden) != NULL || key[0] == '/' || key[size - 1] == '/' || strstr(key, "//") != NULL) {
@@ -45,7 +46,8 @@ static int check_key(const char *what, const char *key, const char *forbidden, c
     return 0;
 }
 
-static int check_keys(const char *what, const char *const *keys, uint32_t count, char *error, size_t error_size)
+static int check_keys(const char *what, const char *const *keys, uint32_t count, size_t longest, char *error,
+                      size_t error_size)
 {
     if (count > FCSL_BUS_KEYS_MAX) {
         (void)snprintf(error, error_size, "the bus has %u keys for %s; at most %u are possible", count, what,
@@ -53,7 +55,7 @@ static int check_keys(const char *what, const char *const *keys, uint32_t count,
         return -1;
     }
     for (uint32_t i = 0; i < count; i++) {
-        if (check_key(what, keys[i], "*$?#", error, error_size) != 0) {
+        if (check_key(what, keys[i], longest, "*$?#", error, error_size) != 0) {
             return -1;
         }
     }
@@ -70,7 +72,7 @@ static int check_inputs(const fcsl_bus_options_t *options, char *error, size_t e
     }
     for (uint32_t i = 0; i < options->input_count; i++) {
         const fcsl_bus_input_t *input = &options->inputs[i];
-        if (check_key("an input", input->key, "$?#", error, error_size) != 0) {
+        if (check_key("an input", input->key, FCSL_BUS_KEY_MAX, "$?#", error, error_size) != 0) {
             return -1;
         }
         if (input->bytes == 0 || input->bytes > FCSL_BUS_MESSAGE_MAX || input->depth == 0) {
@@ -99,7 +101,7 @@ static int check_answers(const fcsl_bus_options_t *options, char *error, size_t 
     }
     for (uint32_t i = 0; i < options->answer_count; i++) {
         const fcsl_bus_answer_t *answer = &options->answers[i];
-        if (check_key("an answer", answer->key, "*$?#", error, error_size) != 0) {
+        if (check_key("an answer", answer->key, FCSL_BUS_KEY_MAX, "*$?#", error, error_size) != 0) {
             return -1;
         }
         if (answer->size > FCSL_BUS_MESSAGE_MAX) {
@@ -146,9 +148,10 @@ int bus_config_check(const fcsl_bus_options_t *options, char *error, size_t erro
     if (options->endpoint != NULL && read_endpoint(options->endpoint, endpoint, error, error_size) != 0) {
         return -1;
     }
-    if (check_keys("an output", options->outputs, options->output_count, error, error_size) != 0 ||
-        check_keys("a token", options->tokens, options->token_count, error, error_size) != 0 ||
-        check_keys("a watched token", options->watched, options->watched_count, error, error_size) != 0) {
+    if (check_keys("an output", options->outputs, options->output_count, FCSL_BUS_KEY_MAX, error, error_size) != 0 ||
+        check_keys("a token", options->tokens, options->token_count, FCSL_BUS_TOKEN_MAX, error, error_size) != 0 ||
+        check_keys("a watched token", options->watched, options->watched_count, FCSL_BUS_KEY_MAX, error, error_size) !=
+            0) {
         return -1;
     }
     return check_answers(options, error, error_size) != 0 ? -1 : check_inputs(options, error, error_size);

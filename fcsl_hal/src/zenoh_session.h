@@ -30,9 +30,10 @@ int fcsl_zenoh_open(const char *path, const char *config, const fcsl_zenoh_event
                     char *error, size_t error_size);
 
 /* Declares a key to put on. The declarations are numbered from 0, and so are those of each kind below. `droppable` messages
- * give way when a receiver is slow, others make fcsl_zenoh_put wait. */
-int fcsl_zenoh_declare_output(fcsl_zenoh_t *session, uint32_t number, const char *key, int droppable, char *error,
-                              size_t error_size);
+ * give way when a receiver is slow, others make fcsl_zenoh_put wait. Of a `latched` one Zenoh's advanced subscribers get the last
+ * message when they come later. */
+int fcsl_zenoh_declare_output(fcsl_zenoh_t *session, uint32_t number, const char *key, int droppable, int latched,
+                              char *error, size_t error_size);
 
 /* Calls `sample` for what other sessions put on keys that `key` (an expression) includes. */
 int fcsl_zenoh_declare_input(fcsl_zenoh_t *session, uint32_t number, const char *key, char *error, size_t error_size);
@@ -44,7 +45,7 @@ int fcsl_zenoh_declare_strays(fcsl_zenoh_t *session, const char *key, char *erro
 int fcsl_zenoh_declare_answer(fcsl_zenoh_t *session, const char *key, const uint8_t *bytes, size_t size, char *error,
                               size_t error_size);
 
-/* A liveliness token, while the session lives: `key`, and the session's number behind it. */
+/* A liveliness token, while the session lives: `key`, with the session's number in the place of `{zid}`, or else behind it. */
 int fcsl_zenoh_declare_token(fcsl_zenoh_t *session, const char *key, char *error, size_t error_size);
 
 /* Calls `tokens` when another session with such a token comes or goes. */

@@ -145,6 +145,10 @@ def _parser() -> argparse.ArgumentParser:
     command.add_argument("--telemetry-fields", metavar="GLOBS", help=help_fields)
     help_observers = "put the values of all channels on a bus of their own (docs/bus.md), which listens there"
     command.add_argument("--observers", metavar="tcp/HOST:PORT", help=help_observers)
+    help_ros = (
+        "publish the machine's ROS 2 topics and /clock through a bridge (docs/ros_graph.md), for which it listens there"
+    )
+    command.add_argument("--ros", metavar="tcp/HOST:PORT", help=help_ros)
     help_timeout = f"seconds to wait for the external controller (default {TIMEOUT_MS // 1000})"
     command.add_argument("--timeout", type=_seconds, metavar="S", help=help_timeout)
     command.add_argument("--json", action="store_true", help="print the summary as JSON, and nothing else")
@@ -186,11 +190,11 @@ def _run(options: argparse.Namespace) -> int:
         raise SimError("`--paused`, `--token` and `--checkpoints` need `--socket`: they configure the variable server")
     if options.telemetry_fields is not None and options.telemetry is None:
         raise SimError("`--telemetry-fields` needs `--telemetry`: it selects the values to send")
-    on_bus = options.observers is not None or (external or "").startswith(_BUS)
+    on_bus = options.observers is not None or options.ros is not None or (external or "").startswith(_BUS)
     if options.namespace and options.record is None and not on_bus:
         raise SimError(
-            "`--namespace` needs `--record`, `--observers` or `--external zenoh:…`: it is of topics, and of keys of the "
-            "bus"
+            "`--namespace` needs `--record`, `--observers`, `--ros` or `--external zenoh:…`: it is of topics, and of keys "
+            "of the bus"
         )
     if options.timeout is not None and external is None:
         raise SimError("`--timeout` needs `--external`: it limits the wait for the controller")
@@ -210,6 +214,7 @@ def _run(options: argparse.Namespace) -> int:
         server=server,
         sender=None if options.telemetry is None else Sender(options.telemetry, options.telemetry_fields),
         observers=options.observers,
+        ros=options.ros,
         watcher=None if options.json else _Printer(config, external),
     )
     if options.json:
@@ -276,6 +281,8 @@ def _print_summary(config: SimConfig, summary: Summary) -> None:
         )
     if summary.observers:
         show(f"observers: {summary.observers['ticks']} ticks, {summary.observers['dropped']} dropped")
+    if summary.ros:
+        show(f"ROS 2 topics: {summary.ros['ticks']} ticks, {summary.ros['dropped']} dropped")
     if summary.bag:
         show(f"bag: {summary.bag}")
     if summary.until_held is False:

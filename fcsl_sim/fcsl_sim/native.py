@@ -40,7 +40,7 @@ class _Counters(ctypes.Structure):
 
 
 class _Observed(ctypes.Structure):
-    """fcsl_observers_counters_t"""
+    """fcsl_observers_counters_t, fcsl_ros_graph_counters_t"""
 
     _fields_ = [(name, c_uint64) for name in _OBSERVED]
 
@@ -89,6 +89,8 @@ _PROTOTYPES: dict[str, tuple[type | None, list[type]]] = {
     "fcsl_sim_telemetry_stop": (None, [ptr, POINTER(_Counters)]),
     "fcsl_sim_observers": (c_int, [ptr, c_char_p, c_char_p, _ERROR]),
     "fcsl_sim_observers_stop": (None, [ptr, POINTER(_Observed)]),
+    "fcsl_sim_ros": (c_int, [ptr, c_char_p, c_char_p, _ERROR]),
+    "fcsl_sim_ros_stop": (None, [ptr, POINTER(_Observed)]),
     "fcsl_sim_channel_data": (ptr, [ptr]),
     "fcsl_sim_sampled": (c_int, [ptr, c_uint32]),
     "fcsl_sim_truth_values": (c_uint32, [ptr, ptr, c_uint32]),
@@ -358,6 +360,19 @@ class Simulation:
         """Puts the remaining ticks and stops; returns the counts (docs/bus.md)."""
         counters = _Observed()
         self._lib.fcsl_sim_observers_stop(self.handle(), byref(counters))
+        return {name: int(getattr(counters, name)) for name in _OBSERVED}
+
+    def ros(self, endpoint: str, name_space: str = "") -> None:
+        """Publishes the hosted machine's ROS 2 topics and /clock through a bridge, which connects to `tcp/HOST:PORT`
+        (docs/ros_graph.md). As `observers`.
+        """
+        within = name_space.encode()
+        self._check(self._lib.fcsl_sim_ros(self.handle(), endpoint.encode(), within, byref(self._error)))
+
+    def ros_stop(self) -> dict[str, int]:
+        """Puts the remaining ticks and stops; returns the counts (docs/ros_graph.md)."""
+        counters = _Observed()
+        self._lib.fcsl_sim_ros_stop(self.handle(), byref(counters))
         return {name: int(getattr(counters, name)) for name in _OBSERVED}
 
     def sense(self) -> bytes:

@@ -56,6 +56,7 @@ class Summary:
     bag: str | None
     telemetry: dict[str, int] | None
     observers: dict[str, int] | None
+    ros: dict[str, int] | None
     commands: dict[str, int] | None
 
     def as_json(self) -> dict[str, Any]:
@@ -110,12 +111,15 @@ def run(
     server: Server | None = None,
     sender: Sender | None = None,
     observers: str | None = None,
+    ros: str | None = None,
     watcher: Watcher | None = None,
 ) -> Summary:
     """Runs to the end. bag: records controller and truth into this new directory. external: the controller is another
     process (`wire:SPEC` or `zenoh:tcp/HOST:PORT`), which records itself and answers within `timeout_ms`; with
-    `,free-running` behind the address nobody waits, and a speed is needed. name_space: of the bag's topics, and of the keys on the bus. speed: limit on simulated seconds per second; 0: as fast as possible.
-    observers: the machine's channels are put on a bus that listens at this `tcp/HOST:PORT`. Raises SimError; the bag then has the ticks recorded until then, and is removed if there are none.
+    `,free-running` behind the address nobody waits, and a speed is needed. name_space: of the bag's topics, and of the
+    keys on the bus. speed: limit on simulated seconds per second; 0: as fast as possible. observers: the machine's channels
+    are put on a bus that listens at this `tcp/HOST:PORT`. ros: likewise its ROS 2 topics, for a bridge. Raises SimError; the
+    bag then has the ticks recorded until then, and is removed if there are none.
     """
     if bag is not None and external is not None:
         raise SimError("with an external controller the controller records: give `--record` to it")
@@ -133,6 +137,8 @@ def run(
             sim.telemetry(sender.address, sender.fields)
         if observers is not None:
             sim.observers(observers, name_space)
+        if ros is not None:
+            sim.ros(ros, name_space)
         address = sim.serve(server.address, server.token, server.paused, server.checkpoints) if server else None
         # An error above leaves no files and has not contacted other processes.
         if external is not None:
@@ -147,6 +153,7 @@ def run(
             flight = _fly(sim, hosted=external is None, watcher=watcher)
             sent = sim.telemetry_stop() if sender is not None else None
             observed = sim.observers_stop() if observers is not None else None
+            shown = sim.ros_stop() if ros is not None else None
             if bag is not None:
                 sim.record_stop()
         except SimError as error:
@@ -155,7 +162,7 @@ def run(
             with suppress(SimError):  # a failed recording raises here, too
                 sim.close()
             raise SimError(f"{error}{_left(bag, sim.machine.name)}") from None
-        return _summary(sim, config, flight, bag, sent, observed, sim.commands() if free else None)
+        return _summary(sim, config, flight, bag, sent, observed, shown, sim.commands() if free else None)
 
 
 def _left(bag: Path, machine: str) -> str:
@@ -208,6 +215,7 @@ def _summary(
     bag: Path | None,
     sent: dict[str, int] | None,
     observed: dict[str, int] | None,
+    shown: dict[str, int] | None,
     commands: dict[str, int] | None,
 ) -> Summary:
     time_s = sim.machine.time_ns(sim.tick) / 1e9
@@ -230,5 +238,6 @@ def _summary(
         bag=str(bag) if bag else None,
         telemetry=sent,
         observers=observed,
+        ros=shown,
         commands=commands,
     )

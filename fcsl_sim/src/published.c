@@ -170,6 +170,8 @@ void fcsl_sim_publish_end(fcsl_sim_t *sim)
     }
     fcsl_observers_close(sim->observers); /* they read it */
     sim->observers = NULL;
+    fcsl_ros_graph_close(sim->ros);
+    sim->ros = NULL;
     fcsl_history_free(&published->history);
     for (uint32_t i = 0; i < published->instance_count; i++) {
         free(published->fields ? published->fields[i] : NULL);

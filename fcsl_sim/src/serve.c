@@ -86,6 +86,9 @@ static void write_stats(void *ctx, fcsl_vars_out_t *out)
     if (sim->telemetry) {
         fcsl_telemetry_stats(sim->telemetry, out);
     }
+    if (sim->ros) {
+        fcsl_ros_graph_stats(sim->ros, out);
+    }
     if (sim->observers) {
         fcsl_observers_stats(sim->observers, out);
     }

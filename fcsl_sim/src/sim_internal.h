@@ -114,6 +114,7 @@ struct fcsl_sim {
     struct fcsl_sim_service *service;     /* null: no variable server */
     fcsl_telemetry_t *telemetry;          /* null: none */
     fcsl_observers_t *observers;          /* null: none */
+    fcsl_ros_graph_t *ros;                /* null: none */
     fcsl_pace_t pace;
     int service_failed;                   /* a tick that a client asked for failed with `failure` */
     fcsl_error_t failure;

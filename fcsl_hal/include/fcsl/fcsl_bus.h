@@ -18,6 +18,8 @@ extern "C" {
 #define FCSL_BUS_MESSAGE_MAX (1u << 20)
 #define FCSL_BUS_KEY_MAX     255u
 #define FCSL_BUS_KEYS_MAX    1024u
+/* Tokens may say more: that of a ROS 2 topic has names, type, hash and quality of service. */
+#define FCSL_BUS_TOKEN_MAX 1023u
 /* Most bytes that fcsl_bus_open allocates for the inputs and the ring. */
 #define FCSL_BUS_MEMORY_MAX (256u << 20)
 
@@ -59,9 +61,12 @@ typedef struct {
     uint32_t ring_bytes; /* for what is posted and not yet put; a message may take half of it */
     const char *const *outputs;
     uint32_t output_count;
+    uint32_t
+        latched_count; /* the first so many: who subscribes later, as Zenoh's advanced subscribers do, gets their last message */
     const fcsl_bus_input_t *inputs;
     uint32_t input_count;
-    const char *const *tokens; /* while this session lives, others see these */
+    const char *const *
+        tokens; /* while this session lives, others see these; the session's number stands for `{zid}` in them, or else behind them */
     uint32_t token_count;
     const fcsl_bus_answer_t *answers;
     uint32_t answer_count;

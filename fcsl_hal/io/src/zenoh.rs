@@ -12,9 +12,13 @@ use zenoh::pubsub::Publisher;
 use zenoh::qos::{CongestionControl, Priority};
 use zenoh::query::Query;
 use zenoh::sample::{Locality, Sample, SampleKind};
+use zenoh::time::{Timestamp, NTP64};
 use zenoh::{Config, Session, Wait};
 
 use crate::c::{self, Reason};
+
+/// In the key of a token: the session's number.
+const ZID: &str = "{zid}";
 
 /// Most tokens of one watched key that are told apart; of more, some are not counted.
 const TOKENS_MAX: usize = 1024;
@@ -68,9 +72,17 @@ impl Drop for Events {
     }
 }
 
+/// The last message of a latched output, with its time: by that a subscriber knows a message that it has got already.
+type Latch = Arc<Mutex<Option<(ZBytes, Timestamp)>>>;
+
+struct Output {
+    publisher: Publisher<'static>,
+    latch: Option<Latch>,
+}
+
 pub struct Zenoh {
     inputs: Vec<KeyExpr<'static>>,
-    outputs: Vec<Publisher<'static>>,
+    outputs: Vec<Output>,
     /// What queries get; empty: nothing.
     answers: Vec<Arc<Mutex<ZBytes>>>,
     /// They live as long as the session.
@@ -83,6 +95,14 @@ pub struct Zenoh {
 fn reason_of(error: zenoh::Error) -> Reason {
     let text = error.to_string();
     text.split(" at /").next().unwrap_or(&text).to_owned()
+}
+
+/// `now`, or the next instant after the last message: subscribers drop what is older, and a system's clock may be set back.
+fn later(now: Timestamp, last: Option<&(ZBytes, Timestamp)>) -> Timestamp {
+    match last {
+        Some((_, last)) if now <= *last => Timestamp::new(NTP64(last.get_time().0 + 1), *last.get_id()),
+        _ => now,
+    }
 }
 
 impl Zenoh {
@@ -111,7 +131,29 @@ impl Zenoh {
             .callback(move |status| events.matching(number, status.matching()))
             .background()
             .wait()?;
-        self.outputs.push(output);
+        self.outputs.push(Output { publisher: output, latch: None });
+        Ok(())
+    }
+
+    /// Keeps the last message of the output declared last, as an advanced publisher of Zenoh with a cache of one message does:
+    /// under this key advanced subscribers ask for it, and by the token they find publishers that come after them.
+    fn latch_output(&mut self) -> Result<(), zenoh::Error> {
+        let zid = self.session.zid();
+        let output = self.outputs.last_mut().ok_or("there is no output")?;
+        let answer = output.publisher.key_expr().clone().into_owned();
+        let key = KeyExpr::new(format!("{answer}/@adv/pub/{zid}/uhlc/_"))?;
+        let latch: Latch = Arc::default();
+        let kept = latch.clone();
+        let callback = move |query: Query| {
+            let last = kept.lock().ok().and_then(|last| last.clone());
+            if let Some((bytes, time)) = last {
+                let _ = query.reply(&answer, bytes).timestamp(time).wait(); // as of constants
+            }
+        };
+        let queryable = self.session.declare_queryable(key.clone()).callback(callback);
+        queryable.allowed_origin(Locality::Remote).background().wait()?;
+        output.latch = Some(latch);
+        self.tokens.push(self.session.liveliness().declare_token(key).wait()?);
         Ok(())
     }
 
@@ -162,7 +204,8 @@ impl Zenoh {
     }
 
     fn declare_token(&mut self, key: &str) -> Result<(), zenoh::Error> {
-        let key = format!("{key}/{}", self.session.zid());
+        let zid = self.session.zid().to_string();
+        let key = if key.contains(ZID) { key.replacen(ZID, &zid, 1) } else { format!("{key}/{zid}") };
         self.tokens.push(self.session.liveliness().declare_token(key).wait()?);
         Ok(())
     }
@@ -190,7 +233,13 @@ impl Zenoh {
 
     fn put(&self, output: u32, bytes: &[u8]) -> Result<(), Reason> {
         let output = self.outputs.get(output as usize).ok_or("there is no such output")?;
-        output.put(bytes).wait().map_err(reason_of)
+        let Some(latch) = &output.latch else { return output.publisher.put(bytes).wait().map_err(reason_of) };
+        let bytes = ZBytes::from(bytes);
+        let mut last = latch.lock().map_err(|_| "a message is being kept")?;
+        let time = later(self.session.new_timestamp(), last.as_ref());
+        *last = Some((bytes.clone(), time));
+        drop(last);
+        output.publisher.put(bytes).timestamp(time).wait().map_err(reason_of)
     }
 
     fn peers(&self) -> usize {
@@ -267,11 +316,20 @@ pub unsafe extern "C" fn fcsl_zenoh_declare_output(
     number: u32,
     key: *const c_char,
     droppable: i32,
+    latched: i32,
     error: *mut c_char,
     error_size: usize,
 ) -> i32 {
     // SAFETY: the header's contract.
-    unsafe { declare(zenoh, key, error, error_size, |zenoh, key| zenoh.declare_output(number, key, droppable != 0)) }
+    unsafe {
+        declare(zenoh, key, error, error_size, |zenoh, key| {
+            zenoh.declare_output(number, key, droppable != 0)?;
+            if latched != 0 {
+                zenoh.latch_output()?;
+            }
+            Ok(())
+        })
+    }
 }
 
 /// # Safety

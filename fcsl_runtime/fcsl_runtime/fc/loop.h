@@ -11,6 +11,7 @@
 #include "fcsl/fcsl_hal.h"
 #include "fcsl/fcsl_journal.h"
 #include "fcsl/fcsl_observers.h"
+#include "fcsl/fcsl_ros_graph.h"
 #include "fcsl/fcsl_telemetry.h"
 #include "fcsl/fcsl_tick_stats.h"
 #include "hal_topic.h"
@@ -26,6 +27,7 @@ typedef struct {
     fcsl_vars_t *vars;  /* null without a variable server */
     fcsl_telemetry_t *telemetry; /* null without telemetry */
     fcsl_observers_t *observers; /* null without a bus for observers */
+    fcsl_ros_graph_t *ros; /* null without a ROS 2 graph */
     atomic_int *stop;   /* set by a signal */
     uint64_t ticks_max; /* 0: no limit */
     missed_deadline_t missed_deadline;

@@ -15,6 +15,7 @@
 #include "summary_file.h"
 #include "options.h"
 #include "realtime.h"
+#include "ros_graph/hal_ros.h"
 #include "log.h"
 
 /* Exit statuses, besides 0 (docs/flight.md). */
@@ -65,6 +66,8 @@ static int make_hal(program_t *program)
         status = fcsl_hal_stub(hal, error.text, sizeof error.text);
     } else if (strncmp(peer, OPTIONS_WIRE, strlen(OPTIONS_WIRE)) == 0) {
         status = fcsl_hal_wire(peer + strlen(OPTIONS_WIRE), machine, timeout_ms, hal, error.text, sizeof error.text);
+    } else if (options_hal_is_ros(options)) {
+        status = hal_ros(peer + strlen(OPTIONS_ROS), options->name_space, program->loop.run, hal, &error);
     } else {
         status = fcsl_hal_bus(peer, options->name_space, machine, timeout_ms, timeout_ms, hal, error.text,
                               sizeof error.text);
@@ -212,6 +215,24 @@ static int open_observers(program_t *program)
     return loop->observers != NULL ? 0 : complain(error.text);
 }
 
+static int open_ros_graph(program_t *program)
+{
+    fcsl_error_t error;
+    loop_t *loop = &program->loop;
+    if (program->options.ros == NULL) {
+        return 0;
+    }
+    /* With a HAL of the same graph the commands are there already. */
+    const fcsl_ros_graph_options_t options = {.endpoint = program->options.ros,
+                                              .name_space = program->options.name_space,
+                                              .machine = fcsl_run_machine(loop->run),
+                                              .safe = fcsl_run_safe_data(loop->run),
+                                              .actuators = !options_hal_is_ros(&program->options),
+                                              .simulated = !loop->realtime};
+    loop->ros = fcsl_ros_graph_open(&options, &loop->history, &error);
+    return loop->ros != NULL ? 0 : complain(error.text);
+}
+
 static int start_threads(program_t *program)
 {
     fcsl_error_t error;
@@ -225,6 +246,9 @@ static int start_threads(program_t *program)
         return complain(error.text);
     }
     if (program->loop.observers != NULL && fcsl_observers_start(program->loop.observers, &error) != 0) {
+        return complain(error.text);
+    }
+    if (program->loop.ros != NULL && fcsl_ros_graph_start(program->loop.ros, &error) != 0) {
         return complain(error.text);
     }
     return realtime_enter(&program->realtime, &error) == 0 ? 0 : complain(error.text);
@@ -257,6 +281,9 @@ static void announce(const program_t *program)
     }
     if (program->options.observers != NULL) {
         log_info("observers on %s", program->options.observers);
+    }
+    if (program->options.ros != NULL) {
+        log_info("ROS 2 topics for a bridge on %s", program->options.ros);
     }
     if (program->options.record != NULL) {
         log_info("recording to %s", program->options.record);
@@ -302,6 +329,7 @@ static int close_all(program_t *program)
     fcsl_vars_close(loop->vars);
     fcsl_telemetry_close(loop->telemetry);
     fcsl_observers_close(loop->observers);
+    fcsl_ros_graph_close(loop->ros);
     /* Before the machine is unloaded: the HAL reads its channel table. */
     if (loop->hal.close != NULL) {
         loop->hal.close(loop->hal.ctx);
@@ -326,6 +354,7 @@ static int fly(program_t *program)
     guard_link_close(loop); /* at once: to close a bag takes time */
     fcsl_telemetry_stop(loop->telemetry);
     fcsl_observers_stop(loop->observers);
+    fcsl_ros_graph_stop(loop->ros);
     if (write_run_summary(loop, program->options.summary_file, reason_of_end(program)) != 0) {
         status = EXIT_RUN;
     }
@@ -352,7 +381,8 @@ int main(int argc, char **argv)
     int status = EXIT_RUN;
     if (open_system(&program) == 0 && open_run(&program) == 0 && open_server(&program) == 0 &&
         open_hardware(&program) == 0 && open_guard(&program) == 0 && open_telemetry(&program) == 0 &&
-        open_observers(&program) == 0 && open_record(&program) == 0 && start_threads(&program) == 0) {
+        open_observers(&program) == 0 && open_ros_graph(&program) == 0 && open_record(&program) == 0 &&
+        start_threads(&program) == 0) {
         status = fly(&program);
     }
     monitor_end(&program.monitor);

@@ -29,6 +29,8 @@ static const char USAGE[] =
     "                          zenoh:tcp/HOST:PORT (or zenoh-peer:): a simulator on the bus, each channel under its "
     "key\n"
     "                          the same with ,free-running behind it: whatever puts values there; waits for nobody\n"
+    "                          ros:tcp/HOST:PORT: the topics of the channels in a ROS 2 graph, whose bridge connects "
+    "there\n"
     "  --timeout-ms N          how long to wait for the simulator's next message (default 2000)\n"
     "  --board LIBRARY.so      the board that hw_* of algorithms reach (fcsl/fcsl_hw.h); default: simulated hardware\n"
     "  --guard PATH            the actuators belong to the fcsl-guard that listens on PATH (docs/guard.md)\n"
@@ -62,13 +64,16 @@ static const char USAGE[] =
     "                          (default machine.*,*.inputs.*,*.outputs.*,*.counters.*)\n"
     "  --observers tcp/HOST:PORT  put the values of all channels on a bus of their own (docs/bus.md), which listens "
     "there\n"
+    "  --ros tcp/HOST:PORT     publish the machine's ROS 2 topics through a bridge (docs/ros_graph.md), for which it "
+    "listens "
+    "there\n"
     "  --paused                start paused: ticks are made by commands until `resume`\n"
     "  --record BAG            record to this folder, which must not exist\n"
     "  --record-fields GLOBS   what of every tick, as path globs with commas between (default *.inputs.*,*.outputs.*)\n"
     "  --record-policy P       when the disk is too slow: wait makes the tick wait, drop leaves records out and counts "
     "them\n"
     "                          (default: drop in real time, else wait)\n"
-    "  --namespace NS          ROS namespace of the recorded topics, and of the keys on the bus\n"
+    "  --namespace NS          ROS namespace of topics, and of the keys on the bus\n"
     "  --summary FILE       at the end write state, health, counters and histograms there, as JSON\n"
     "  --version            print name and version\n"
     "  --help\n";
@@ -95,8 +100,11 @@ static int read_hal(const char *text, options_t *options)
     if (options->peer == NULL) {
         return 0;
     }
+    if (options_hal_is_ros(options)) {
+        return 0;
+    }
     if (!is_wire && strncmp(text, "zenoh", strlen("zenoh")) != 0) {
-        return usage_error("--hal must be stub, wire:SPEC or zenoh:tcp/HOST:PORT, not ", text);
+        return usage_error("--hal must be stub, wire:SPEC, zenoh:tcp/HOST:PORT or ros:tcp/HOST:PORT, not ", text);
     }
     const int failed = is_wire ? fcsl_wire_check(text + strlen(OPTIONS_WIRE), error, sizeof error)
                                : fcsl_hal_bus_check(text, error, sizeof error);
@@ -173,6 +181,7 @@ static const entry_t ENTRIES[] = {
     {.name = "telemetry", .kind = TEXT, .offset = TO(telemetry)},
     {.name = "telemetry-fields", .kind = TEXT, .offset = TO(telemetry_fields)},
     {.name = "observers", .kind = TEXT, .offset = TO(observers)},
+    {.name = "ros", .kind = TEXT, .offset = TO(ros)},
     {.name = "record", .kind = TEXT, .offset = TO(record)},
     {.name = "record-fields", .kind = TEXT, .offset = TO(record_fields)},
     {.name = "record-policy", .kind = WORD, .read = read_record_policy},
@@ -207,6 +216,11 @@ static int read_option(const entry_t *entry, const char *text, options_t *option
     }
 }
 
+static int has_simulator(const options_t *options)
+{
+    return options->peer != NULL && !options_hal_is_ros(options);
+}
+
 /* Options that say nothing together. */
 static int check(const options_t *options)
 {
@@ -219,7 +233,7 @@ static int check(const options_t *options)
     if (options->token != NULL && options->socket == NULL) {
         return usage_error("--token needs --socket: it is the token of a TCP server", "");
     }
-    if (options->timeout_ms != 0 && options->peer == NULL) {
+    if (options->timeout_ms != 0 && !has_simulator(options)) {
         return usage_error("--timeout-ms needs --hal wire:SPEC or zenoh:…: it is how long to wait for the simulator",
                            "");
     }
@@ -227,14 +241,16 @@ static int check(const options_t *options)
         return usage_error("--timeout-ms does not go with ,free-running: nobody waits for the simulator", "");
     }
     if (options->name_space[0] != '\0' && options->record == NULL && options->observers == NULL &&
+        options->ros == NULL &&
         (options->peer == NULL || strncmp(options->peer, OPTIONS_WIRE, strlen(OPTIONS_WIRE)) == 0)) {
         return usage_error(
-            "--namespace needs --record, --observers or --hal zenoh:…: it is of topics, and of keys of the bus", "");
+            "--namespace needs --record, --observers, --ros or --hal zenoh:…: it is of topics, and of keys of the bus",
+            "");
     }
     if (options->ignore_source_hash && options->restore == NULL) {
         return usage_error("--ignore-source-hash needs --restore", "");
     }
-    if (options->restore != NULL && options->peer != NULL) {
+    if (options->restore != NULL && has_simulator(options)) {
         return usage_error("--restore goes without a simulator: that begins at tick 0", "");
     }
     if ((options->record_fields != NULL || options->record_policy != RECORD_BY_PACE) && options->record == NULL) {

@@ -3,6 +3,7 @@
 #define FC_OPTIONS_H
 
 #include <stdint.h>
+#include <string.h>
 
 #include "pacing.h"
 
@@ -12,7 +13,8 @@ typedef enum { RECORD_BY_PACE, RECORD_WAIT, RECORD_DROP } record_policy_t;
 typedef struct {
     const char *library;
     const char *machine;    /* null: the only one */
-    const char *peer; /* OPTIONS_WIRE and a SPEC of fcsl_wire.h, or an address of fcsl_hal_bus; null: the stub HAL */
+    const char *
+        peer; /* OPTIONS_WIRE and a SPEC of fcsl_wire.h, an address of fcsl_hal_bus, or OPTIONS_ROS and an endpoint; null: the stub HAL */
     const char *board; /* null: simulated hardware */
     const char *guard; /* socket of fcsl-guard; null: none */
     const char *restore; /* file of a checkpoint to begin from; null: from tick 0 */
@@ -22,6 +24,7 @@ typedef struct {
     const char *telemetry; /* udp:HOST:PORT[/EVERY]; null: none */
     const char *telemetry_fields; /* globs; null: as fcsl_telemetry.h says */
     const char *observers; /* tcp/HOST:PORT to listen on; null: none */
+    const char *ros; /* tcp/HOST:PORT to listen on for a bridge to ROS 2; null: none */
     const char *record; /* null: no recording */
     const char *record_fields; /* globs; null: as fcsl_run_record says */
     record_policy_t record_policy;
@@ -44,6 +47,12 @@ typedef struct {
 
 #define OPTIONS_ANY_CPU UINT64_MAX
 #define OPTIONS_WIRE    "wire:"
+#define OPTIONS_ROS     "ros:"
+
+static inline int options_hal_is_ros(const options_t *options)
+{
+    return options->peer != NULL && strncmp(options->peer, OPTIONS_ROS, strlen(OPTIONS_ROS)) == 0;
+}
 
 /* Reads the command line. Returns 0; 1 when help was printed; -1 after a message. */
 int options_read(int argc, char **argv, options_t *options);

@@ -33,6 +33,13 @@ static void report_telemetry(const fcsl_telemetry_t *telemetry)
              sent.packets, sent.overwritten, sent.configurations, sent.datagrams, sent.failures);
 }
 
+static void report_ros(const fcsl_ros_graph_t *ros)
+{
+    fcsl_ros_graph_counters_t put;
+    fcsl_ros_graph_count(ros, &put);
+    log_info("ROS 2 topics %" PRIu64 " ticks, %" PRIu64 " dropped", put.ticks, put.dropped);
+}
+
 static void report_observers(const fcsl_observers_t *observers)
 {
     fcsl_observers_counters_t put;
@@ -82,6 +89,9 @@ static void report_counters(const loop_t *loop, const uint8_t *data)
              fcsl_tick_stats_get(&stats->records_dropped), clients);
     if (loop->telemetry != NULL) {
         report_telemetry(loop->telemetry);
+    }
+    if (loop->ros != NULL) {
+        report_ros(loop->ros);
     }
     if (loop->observers != NULL) {
         report_observers(loop->observers);

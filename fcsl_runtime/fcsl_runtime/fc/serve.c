@@ -114,6 +114,9 @@ static void write_stats(void *ctx, fcsl_vars_out_t *out)
     if (loop->telemetry != NULL) {
         fcsl_telemetry_stats(loop->telemetry, out);
     }
+    if (loop->ros != NULL) {
+        fcsl_ros_graph_stats(loop->ros, out);
+    }
     if (loop->observers != NULL) {
         fcsl_observers_stats(loop->observers, out);
     }

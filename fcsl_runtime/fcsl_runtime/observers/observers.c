@@ -1,18 +1,58 @@
 /* SPDX-License-Identifier: Apache-2.0
  *
- * The library's interface: everything is made here, before the thread starts.
+ * The library's interface, and what the thread that follows the history does with a tick.
  */
-#define _GNU_SOURCE
 #include "fcsl/fcsl_observers.h"
 
 #include <stdlib.h>
-#include <string.h>
 
 #include "base/error.h"
 #include "descriptor.h"
 #include "fcsl/fcsl_bus.h"
-#include "publisher.h"
+#include "fcsl/fcsl_mirror.h"
+#include "fcsl/fcsl_tick_time.h"
+#include "follower.h"
 #include "reproduction.h"
+
+struct fcsl_observers {
+    follower_t follower;
+    fcsl_mirror_t *mirror;
+    reproduction_t reproduction;
+    int unwritten; /* writes of the coming tick are lost */
+    uint64_t tick_hz;
+};
+
+static int is_watched(void *ctx)
+{
+    const fcsl_observers_t *o = ctx;
+    fcsl_journal_follow(o->reproduction.journal, fcsl_mirror_writes_watched(o->mirror));
+    return fcsl_mirror_watched(o->mirror);
+}
+
+static void pass_over(void *ctx)
+{
+    fcsl_observers_t *o = ctx;
+    fcsl_mirror_begin(o->mirror);
+    fcsl_journal_pass(o->reproduction.journal);
+}
+
+static int is_ready(void *ctx)
+{
+    return fcsl_mirror_ready(((fcsl_observers_t *)ctx)->mirror);
+}
+
+static void see(void *ctx, const fcsl_moment_t *moment, const uint8_t *publication)
+{
+    fcsl_observers_t *o = ctx;
+    o->unwritten = reproduction_put(&o->reproduction, o->mirror, moment, publication) != 0;
+}
+
+static int put(void *ctx, const followed_tick_t *tick)
+{
+    const fcsl_observers_t *o = ctx;
+    const uint64_t time_ns = fcsl_tick_time_ns(o->tick_hz, tick->number);
+    return o->unwritten ? -1 : fcsl_mirror_post(o->mirror, tick->publication, tick->number, time_ns);
+}
 
 static int listen_on(fcsl_observers_t *o, const fcsl_observers_options_t *options, fcsl_error_t *error)
 {
@@ -22,7 +62,7 @@ static int listen_on(fcsl_observers_t *o, const fcsl_observers_options_t *option
     if (descriptor == NULL) {
         return -1;
     }
-    const size_t write_bytes = fcsl_observers_write_bytes(o->journal);
+    const size_t write_bytes = reproduction_write_bytes(&o->reproduction);
     const fcsl_mirror_options_t mirror = {.endpoint = options->endpoint,
                                           .name_space = options->name_space,
                                           .descriptor = descriptor,
@@ -41,21 +81,17 @@ fcsl_observers_t *fcsl_observers_open(const fcsl_observers_options_t *options, c
         (void)fcsl_fail(error, "out of memory for observers");
         return NULL;
     }
-    o->history = history;
-    o->journal = fcsl_run_journal(options->run, error);
-    if (o->journal == NULL) {
-        fcsl_observers_close(o);
-        return NULL;
-    }
+    const follower_sink_t sink = {
+        .ctx = o, .wants = is_watched, .pass_over = pass_over, .ready = is_ready, .see = see, .put = put};
+    fcsl_journal_t *journal = fcsl_run_journal(options->run, error);
     o->tick_hz = fcsl_run_machine(options->run)->tick_hz;
-    o->nap_ns = fcsl_history_nap_ns(history, o->tick_hz);
-    o->cursor = fcsl_history_published(history);
-    o->publication = malloc(fcsl_history_bytes(history) + 1u);
-    o->message = malloc(fcsl_observers_write_bytes(o->journal));
-    if (o->publication == NULL || o->message == NULL) {
-        (void)fcsl_fail(error, "out of memory for observers");
-    } else if (listen_on(o, options, error) == 0) {
-        return o;
+    if (journal != NULL) {
+        if (follower_open(&o->follower, history, o->tick_hz, &sink) != 0 ||
+            reproduction_open(&o->reproduction, journal) != 0) {
+            (void)fcsl_fail(error, "out of memory for observers");
+        } else if (listen_on(o, options, error) == 0) {
+            return o;
+        }
     }
     fcsl_observers_close(o);
     return NULL;
@@ -63,18 +99,14 @@ fcsl_observers_t *fcsl_observers_open(const fcsl_observers_options_t *options, c
 
 int fcsl_observers_start(fcsl_observers_t *observers, fcsl_error_t *error)
 {
-    const int code = pthread_create(&observers->thread, NULL, fcsl_observers_publish, observers);
-    observers->started = code == 0;
-    return code == 0 ? 0 : fcsl_fail(error, "cannot start the thread of observers: %s", strerror(code));
+    return follower_start(&observers->follower, error);
 }
 
 void fcsl_observers_stop(fcsl_observers_t *observers)
 {
-    if (observers != NULL && observers->started) {
-        atomic_store(&observers->stop, 1);
-        (void)pthread_join(observers->thread, NULL);
-        fcsl_journal_follow(observers->journal, 0);
-        observers->started = 0;
+    if (observers != NULL && observers->follower.started) {
+        follower_stop(&observers->follower);
+        fcsl_journal_follow(observers->reproduction.journal, 0);
     }
 }
 
@@ -84,16 +116,16 @@ void fcsl_observers_close(fcsl_observers_t *observers)
         return;
     }
     fcsl_observers_stop(observers);
+    follower_close(&observers->follower);
     fcsl_mirror_close(observers->mirror);
-    free(observers->publication);
-    free(observers->message);
+    reproduction_close(&observers->reproduction);
     free(observers);
 }
 
 void fcsl_observers_count(const fcsl_observers_t *observers, fcsl_observers_counters_t *counters)
 {
-    *counters = (fcsl_observers_counters_t){.ticks = atomic_load_explicit(&observers->ticks, memory_order_relaxed),
-                                            .dropped = atomic_load_explicit(&observers->dropped, memory_order_relaxed)};
+    *counters = (fcsl_observers_counters_t){.ticks = follower_ticks(&observers->follower),
+                                            .dropped = follower_dropped(&observers->follower)};
 }
 
 void fcsl_observers_stats(const fcsl_observers_t *observers, fcsl_vars_out_t *out)

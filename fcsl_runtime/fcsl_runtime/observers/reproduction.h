@@ -5,16 +5,27 @@
 #ifndef FCSL_OBSERVERS_REPRODUCTION_H
 #define FCSL_OBSERVERS_REPRODUCTION_H
 
-#include "publisher.h"
+#include "fcsl/fcsl_history.h"
+#include "fcsl/fcsl_journal.h"
+#include "fcsl/fcsl_mirror.h"
+
+typedef struct {
+    fcsl_journal_t *journal;
+    uint8_t *message;     /* a write or a checkpoint, with its number */
+    uint64_t answered_ns; /* when the checkpoint was last replaced */
+} reproduction_t;
+
+/* Returns 0, or -1 without memory. */
+int reproduction_open(reproduction_t *reproduction, fcsl_journal_t *journal);
+/* Accepts one that was not opened. */
+void reproduction_close(reproduction_t *reproduction);
 
 /* Bytes of the longest message, with its number. */
-size_t fcsl_observers_write_bytes(const fcsl_journal_t *journal);
+size_t reproduction_write_bytes(const reproduction_t *reproduction);
 
-/* Puts the writes before a publication, and that these were all; nothing unless they are followed. Returns 0, or -1: there was
- * no room for all of them. */
-int fcsl_observers_post_writes(fcsl_observers_t *o, const fcsl_moment_t *moment);
-
-/* Makes the publication the checkpoint, if writes are followed and the one before is older than 20 ms. */
-void fcsl_observers_answer_checkpoint(fcsl_observers_t *o, const fcsl_moment_t *moment);
+/* Puts the writes before a publication, and that these were all; nothing unless they are followed. Makes the publication the
+ * checkpoint, if the one before is older than 20 ms. Returns 0, or -1: there was no room for all of the writes. */
+int reproduction_put(reproduction_t *reproduction, fcsl_mirror_t *mirror, const fcsl_moment_t *moment,
+                     const uint8_t *publication);
 
 #endif /* FCSL_OBSERVERS_REPRODUCTION_H */

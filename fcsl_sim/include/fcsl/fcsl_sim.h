@@ -18,6 +18,7 @@
 #include "fcsl/fcsl_ros.h"
 #include "fcsl/fcsl_run.h"
 #include "fcsl/fcsl_observers.h"
+#include "fcsl/fcsl_ros_graph.h"
 #include "fcsl/fcsl_telemetry.h"
 
 #ifdef __cplusplus
@@ -132,6 +133,10 @@ void fcsl_sim_telemetry_stop(fcsl_sim_t *sim, fcsl_telemetry_counters_t *counter
 int fcsl_sim_observers(fcsl_sim_t *sim, const char *endpoint, const char *name_space, fcsl_error_t *error);
 /* Puts the remaining ticks and stops; returns the counts, all 0 if there were no observers. */
 void fcsl_sim_observers_stop(fcsl_sim_t *sim, fcsl_observers_counters_t *counters);
+
+/* The same of the hosted machine's ROS 2 topics and /clock, for a bridge that connects to `endpoint` (fcsl_ros_graph.h). */
+int fcsl_sim_ros(fcsl_sim_t *sim, const char *endpoint, const char *name_space, fcsl_error_t *error);
+void fcsl_sim_ros_stop(fcsl_sim_t *sim, fcsl_ros_graph_counters_t *counters);
 
 /* ---- controller driven by the caller --------------------------------------------------------------------------------- */
 

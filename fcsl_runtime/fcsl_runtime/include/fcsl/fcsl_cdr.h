@@ -38,6 +38,8 @@ void fcsl_cdr_u64(fcsl_cdr_t *cdr, uint64_t value);
 void fcsl_cdr_string(fcsl_cdr_t *cdr, const char *text);
 /* Opens a byte sequence and returns where its bytes go, or null when it does not fit. */
 uint8_t *fcsl_cdr_reserve_bytes(fcsl_cdr_t *cdr, uint32_t size);
+/* builtin_interfaces/Time. */
+void fcsl_cdr_time(fcsl_cdr_t *cdr, uint64_t time_ns);
 /* std_msgs/Header of this stamp with an empty frame_id. */
 void fcsl_cdr_header(fcsl_cdr_t *cdr, uint64_t time_ns);
 /* Bytes of the message, or 0 when it did not fit. */

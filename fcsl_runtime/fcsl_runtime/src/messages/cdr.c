@@ -89,10 +89,15 @@ uint8_t *fcsl_cdr_reserve_bytes(fcsl_cdr_t *cdr, uint32_t size)
     return take(cdr, size);
 }
 
-void fcsl_cdr_header(fcsl_cdr_t *cdr, uint64_t time_ns)
+void fcsl_cdr_time(fcsl_cdr_t *cdr, uint64_t time_ns)
 {
     fcsl_cdr_u32(cdr, (uint32_t)(time_ns / 1000000000u));
     fcsl_cdr_u32(cdr, (uint32_t)(time_ns % 1000000000u));
+}
+
+void fcsl_cdr_header(fcsl_cdr_t *cdr, uint64_t time_ns)
+{
+    fcsl_cdr_time(cdr, time_ns);
     fcsl_cdr_string(cdr, "");
 }
 

@@ -2,6 +2,7 @@
  *
  * Generated messages: their layout from the message text, and their bytes each tick.
  */
+#define _GNU_SOURCE
 #include "message.h"
 
 #include <stdio.h>
@@ -262,6 +263,14 @@ int fcsl_layout_build(const fcsl_machine_t *machine, const fcsl_instance_t *inst
         }
     }
     return more == 0 ? 0 : refuse(&b, "a line that is not 'type name'", "");
+}
+
+char *fcsl_interface_schema(const fcsl_instance_t *instance)
+{
+    char *schema = NULL;
+    const size_t length = strlen(instance->message_text);
+    const char *newline = length > 0 && instance->message_text[length - 1] == '\n' ? "" : "\n";
+    return asprintf(&schema, "%s%s" FCSL_SCHEMA_HEADER, instance->message_text, newline) < 0 ? NULL : schema;
 }
 
 void fcsl_layout_free(fcsl_layout_t *layout)

@@ -30,6 +30,9 @@ int fcsl_layout_build(const fcsl_machine_t *machine, const fcsl_instance_t *inst
 /* An empty layout with room for `count` fields, and one field behind the others; 0, or -1 without memory, or room in a message. */
 int fcsl_layout_open(fcsl_layout_t *layout, uint32_t count);
 int fcsl_layout_append(fcsl_layout_t *layout, const fcsl_field_t *field);
+/* The complete ros2msg text of an instance's interface; the caller frees it. Null without memory. */
+char *fcsl_interface_schema(const fcsl_instance_t *instance);
+
 void fcsl_layout_free(fcsl_layout_t *layout);
 
 /* The ROS 2 name of a field's type: "float64" or "float64[9]". */

@@ -28,7 +28,10 @@
     "std_msgs/Header header\nuint64 tick\nuint8 kind\nstring path\nuint32 element\nuint32 age_ticks\n"                 \
     "int64 stamp_ns\nuint8[] data\n" FCSL_SCHEMA_HEADER
 
-/* std_msgs' own. */
+/* Of other packages. */
+#define FCSL_SCHEMA_CLOCK                                                                                              \
+    "builtin_interfaces/Time clock\n" FCSL_SCHEMA_SEPARATOR "MSG: builtin_interfaces/Time\nint32 sec\nuint32 "         \
+                                                            "nanosec\n"
 #define FCSL_SCHEMA_STRING "string data\n"
 
 #endif /* FCSL_SCHEMA_H */

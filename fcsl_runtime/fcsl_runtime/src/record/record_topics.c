@@ -72,12 +72,10 @@ static uint32_t gather(const builder_t *b, fcsl_role_t role, int32_t instance, i
 static int add_interface(builder_t *b, const fcsl_instance_t *instance)
 {
     fcsl_record_topic_t *shown = &b->shown[b->count++];
-    const size_t length = strlen(instance->message_text);
-    const char *newline = length > 0 && instance->message_text[length - 1] == '\n' ? "" : "\n";
     shown->topic = strdup(instance->name);
     shown->type = strdup(instance->message_type);
-    if (asprintf(&shown->schema, "%s%s" FCSL_SCHEMA_HEADER, instance->message_text, newline) < 0 ||
-        shown->topic == NULL || shown->type == NULL) {
+    shown->schema = fcsl_interface_schema(instance);
+    if (shown->topic == NULL || shown->type == NULL || shown->schema == NULL) {
         return fcsl_fail(b->error, "out of memory for messages");
     }
     return fcsl_layout_build(b->machine, instance, &shown->layout, b->error);

@@ -1,0 +1,159 @@
+/* SPDX-License-Identifier: Apache-2.0
+ *
+ * One round follows the history to its end, or until the sink has no room, and naps. While no tick is wanted, it only keeps up.
+ */
+#define _GNU_SOURCE
+#include "follower.h"
+
+#include <stdlib.h>
+#include <string.h>
+#include <time.h>
+
+#include "base/error.h"
+
+/* How long the last ticks may take to leave. */
+static const uint64_t LAST_NS = 1000000000u;
+
+static void count(_Atomic uint64_t *number, uint64_t more)
+{
+    atomic_fetch_add_explicit(number, more, memory_order_relaxed);
+}
+
+static void nap(const follower_t *f)
+{
+    const struct timespec time = {.tv_nsec = (long)f->nap_ns};
+    (void)nanosleep(&time, NULL);
+}
+
+static int at_end(const follower_t *f)
+{
+    return f->cursor >= fcsl_history_published(f->history);
+}
+
+/* Ticks between this publication and the one seen before it, if some were overtaken. Ticks that a restore jumped over were
+ * never there: at most as many as publications were lost. */
+static uint64_t dropped_before(const follower_t *f, uint64_t completed)
+{
+    const uint64_t between = completed > f->completed ? completed - f->completed - 1u : 0u;
+    return between < f->overtaken ? between : f->overtaken;
+}
+
+/* A publication: that of a tick is put; a command's, of the same tick once more, is not. */
+static void see(follower_t *f, const fcsl_moment_t *moment)
+{
+    const uint64_t completed = moment->tick;
+    if (f->sink.see != NULL) {
+        f->sink.see(f->sink.ctx, moment, f->publication);
+    }
+    if (completed == f->completed || completed == 0) {
+        return;
+    }
+    const followed_tick_t tick = {.publication = f->publication, .number = completed - 1u, .begun_ns = moment->time_ns};
+    count(&f->dropped, dropped_before(f, completed));
+    f->overtaken = 0;
+    f->completed = completed;
+    count(f->sink.put(f->sink.ctx, &tick) == 0 ? &f->ticks : &f->dropped, 1);
+}
+
+static void pass_over(follower_t *f)
+{
+    f->sink.pass_over(f->sink.ctx);
+    f->cursor = fcsl_history_published(f->history);
+    f->overtaken = 0;
+}
+
+/* Puts what has been published. 1 when that was all, or all that there is room for; bounded, since a host may publish faster
+ * than this. */
+static int follow(follower_t *f)
+{
+    fcsl_moment_t moment;
+    if (!f->sink.wants(f->sink.ctx)) {
+        pass_over(f);
+        return 1;
+    }
+    for (uint32_t i = 0; i < 2u * f->history->slots; i++) {
+        if (!f->sink.ready(f->sink.ctx)) {
+            return 1;
+        }
+        const fcsl_history_status_t status = fcsl_history_read(f->history, f->cursor, &moment, f->publication);
+        if (status == FCSL_HISTORY_COMING) {
+            return 1;
+        }
+        if (status == FCSL_HISTORY_GONE) {
+            const uint64_t cursor = fcsl_history_catch_up(f->history, f->cursor);
+            f->overtaken += cursor - f->cursor;
+            f->cursor = cursor;
+        } else {
+            f->cursor++;
+            see(f, &moment);
+        }
+    }
+    return 0;
+}
+
+/* The host publishes nothing more. */
+static void finish(follower_t *f)
+{
+    const uint64_t deadline_ns = fcsl_run_monotonic_ns(NULL) + LAST_NS;
+    (void)follow(f);
+    while (!at_end(f) && fcsl_run_monotonic_ns(NULL) < deadline_ns) {
+        nap(f);
+        (void)follow(f);
+    }
+    count(&f->dropped, f->overtaken + fcsl_history_published(f->history) - f->cursor);
+}
+
+static void *run(void *follower)
+{
+    follower_t *f = follower;
+    while (!atomic_load(&f->stop)) {
+        if (follow(f)) {
+            nap(f);
+        }
+    }
+    finish(f);
+    return NULL;
+}
+
+int follower_open(follower_t *follower, const fcsl_history_t *history, uint64_t tick_hz, const follower_sink_t *sink)
+{
+    follower->history = history;
+    follower->sink = *sink;
+    follower->nap_ns = fcsl_history_nap_ns(history, tick_hz);
+    follower->cursor = fcsl_history_published(history);
+    follower->publication = malloc(fcsl_history_bytes(history) + 1u);
+    return follower->publication != NULL ? 0 : -1;
+}
+
+int follower_start(follower_t *follower, fcsl_error_t *error)
+{
+    const int code = pthread_create(&follower->thread, NULL, run, follower);
+    follower->started = code == 0;
+    return code == 0 ? 0 : fcsl_fail(error, "cannot start the thread of observers: %s", strerror(code));
+}
+
+void follower_stop(follower_t *follower)
+{
+    if (follower->started) {
+        atomic_store(&follower->stop, 1);
+        (void)pthread_join(follower->thread, NULL);
+        follower->started = 0;
+    }
+}
+
+void follower_close(follower_t *follower)
+{
+    follower_stop(follower);
+    free(follower->publication);
+    follower->publication = NULL;
+}
+
+uint64_t follower_ticks(const follower_t *follower)
+{
+    return atomic_load_explicit(&follower->ticks, memory_order_relaxed);
+}
+
+uint64_t follower_dropped(const follower_t *follower)
+{
+    return atomic_load_explicit(&follower->dropped, memory_order_relaxed);
+}

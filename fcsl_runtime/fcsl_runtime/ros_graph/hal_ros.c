@@ -1,0 +1,392 @@
+/* SPDX-License-Identifier: Apache-2.0
+ *
+ * Tokens are held as long as the session lives: a route of the plugin that goes and comes back sends each message several times
+ * (docs/ros_graph.md).
+ */
+#define _GNU_SOURCE
+#include "hal_ros.h"
+
+#include <stdio.h>
+#include <stdlib.h>
+#include <string.h>
+#include <time.h>
+
+#include "base/error.h"
+#include "endpoint.h"
+#include "fcsl/fcsl_ros_inlet.h"
+#include "type_hashes.h"
+
+enum {
+    MESSAGE_BYTES = 65536, /* of the longest sensor message that is taken */
+    TICKS_POSTED = 8,      /* whose commands the ring holds */
+    ENTRY_BYTES_MAX = 16,  /* of the ring, beside a message */
+    RING_BYTES_MIN = 256,
+    DEPTH = 10, /* of what is read, best effort, and of commands, reliable */
+    CLOSE_MS = 2000
+};
+
+/* What stands under `hal.`. */
+typedef struct {
+    uint64_t connected;
+    uint64_t messages;
+    uint64_t superseded;
+    uint64_t wrong_size;
+    uint64_t refused[FCSL_ROS_STATUSES]; /* by reason; that of FCSL_ROS_TAKEN is unused */
+    uint64_t commands;
+    uint64_t commands_refused;
+    uint64_t commands_dropped;
+} counters_t;
+
+#define COUNTER(member, doc)       FCSL_WIRE_COUNTER(counters_t, #member, member, doc)
+#define REFUSED(name, status, doc) FCSL_WIRE_COUNTER(counters_t, "refused." name, refused[status], doc)
+
+static const fcsl_field_t FIELDS[] = {
+    COUNTER(connected, "sessions connected: the bridge, and whoever else"),
+    COUNTER(messages, "messages of which a value was taken"),
+    COUNTER(superseded, "messages that a newer one of their topic overtook before a tick"),
+    COUNTER(wrong_size, "messages longer than 65536 bytes, or deletes"),
+    REFUSED("encoding", FCSL_ROS_ENCODING, "messages that are no little-endian CDR"),
+    REFUSED("truncated", FCSL_ROS_TRUNCATED, "messages that end before their type does"),
+    REFUSED("malformed", FCSL_ROS_MALFORMED, "messages with a string without its end"),
+    REFUSED("stamp", FCSL_ROS_STAMP, "messages whose stamp is no time"),
+    REFUSED("frame", FCSL_ROS_FRAME, "messages of another frame"),
+    REFUSED("shape", FCSL_ROS_SHAPE, "values of a sequence that has another length, or no such element"),
+    REFUSED("range", FCSL_ROS_RANGE, "values that their channel cannot hold"),
+    REFUSED("nan", FCSL_ROS_NAN, "values that are NaN"),
+    REFUSED("unmeasured", FCSL_ROS_UNMEASURED, "values that the message marks as not measured"),
+    REFUSED("future", FCSL_ROS_FUTURE, "messages stamped more than 50 ms ahead of now"),
+    REFUSED("older", FCSL_ROS_OLDER, "messages stamped before the last one"),
+    REFUSED("repeated", FCSL_ROS_REPEATED, "messages stamped as the last one"),
+    COUNTER(commands, "actuator messages that were put on the bus"),
+    COUNTER(commands_refused, "actuator messages not made: a value does not fit its field"),
+    COUNTER(commands_dropped, "actuator messages without room on the bus"),
+};
+
+typedef struct {
+    fcsl_ros_reader_t *reader;
+    fcsl_ros_inlet_t *inlet;
+} sensor_t;
+
+typedef struct {
+    fcsl_ros_composer_t *composer;
+    uint32_t size;
+} actuator_t;
+
+typedef struct {
+    fcsl_hal_t base; /* the stub: its clock and its log */
+    fcsl_run_t *run;
+    const char *endpoint;
+    const char *name_space;
+    fcsl_bus_t *bus;
+    sensor_t *sensors; /* the bus's inputs */
+    uint32_t sensor_count;
+    actuator_t *actuators; /* its outputs */
+    uint32_t actuator_count;
+    uint8_t *message;
+    int64_t now_ns; /* ROS time of the tick */
+    counters_t counters;
+} hal_t;
+
+/* ---- a tick --------------------------------------------------------------------------------------------------------- */
+
+static int64_t ros_time_ns(void)
+{
+    struct timespec now;
+    (void)clock_gettime(CLOCK_REALTIME, &now);
+    return (int64_t)now.tv_sec * 1000000000 + now.tv_nsec;
+}
+
+static fcsl_hal_status_t ros_sample(void *ctx, uint64_t tick, uint8_t *bytes, size_t capacity, fcsl_message_t *message)
+{
+    hal_t *hal = ctx;
+    (void)tick;
+    (void)bytes;
+    (void)capacity;
+    (void)message;
+    hal->now_ns = ros_time_ns();
+    for (uint32_t i = 0; i < hal->sensor_count; i++) {
+        size_t size = 0;
+        if (fcsl_bus_take(hal->bus, i, hal->message, &size)) {
+            (void)fcsl_ros_deliver(hal->sensors[i].inlet, hal->message, size, hal->now_ns, NULL);
+        }
+    }
+    return FCSL_HAL_NONE;
+}
+
+/* Commands from this struct of the machine. */
+static void post(hal_t *hal, const uint8_t *memory)
+{
+    for (uint32_t i = 0; i < hal->actuator_count; i++) {
+        const actuator_t *actuator = &hal->actuators[i];
+        if (fcsl_ros_compose(actuator->composer, &memory, hal->now_ns, hal->message) != FCSL_ROS_TAKEN) {
+            hal->counters.commands_refused++;
+        } else if (fcsl_bus_matched(hal->bus, i)) {
+            const int dropped = fcsl_bus_post(hal->bus, i, hal->message, actuator->size) != 0;
+            hal->counters.commands += dropped ? 0u : 1u;
+            hal->counters.commands_dropped += dropped ? 1u : 0u;
+        }
+    }
+}
+
+static fcsl_hal_status_t ros_command(void *ctx, const fcsl_message_t *message)
+{
+    hal_t *hal = ctx;
+    (void)message; /* the same values, in another form */
+    post(hal, fcsl_run_actuator_data(hal->run));
+    return FCSL_HAL_OK;
+}
+
+/* At the end of a run no command follows. */
+static fcsl_hal_status_t ros_arm(void *ctx, int armed)
+{
+    hal_t *hal = ctx;
+    const uint8_t *safe = fcsl_run_safe_data(hal->run);
+    if (!armed && safe != NULL) {
+        post(hal, safe);
+    }
+    return FCSL_HAL_OK;
+}
+
+static void ros_count(void *ctx)
+{
+    hal_t *hal = ctx;
+    counters_t *counters = &hal->counters;
+    fcsl_bus_counters_t of_bus = {0};
+    if (hal->bus != NULL) {
+        fcsl_bus_count(hal->bus, &of_bus);
+        counters->connected = fcsl_bus_peers(hal->bus);
+    }
+    counters->superseded = of_bus.replaced;
+    counters->wrong_size = of_bus.wrong_size + of_bus.deletions;
+    counters->messages = 0;
+    memset(counters->refused, 0, sizeof counters->refused);
+    for (uint32_t i = 0; i < hal->sensor_count; i++) {
+        const uint64_t *counts = fcsl_ros_inlet_counts(hal->sensors[i].inlet);
+        counters->messages += counts[FCSL_ROS_TAKEN];
+        for (uint32_t status = FCSL_ROS_TAKEN + 1u; status < FCSL_ROS_STATUSES; status++) {
+            counters->refused[status] += counts[status];
+        }
+    }
+}
+
+static uint64_t ros_now_ns(void *ctx)
+{
+    const fcsl_hal_t *base = &((hal_t *)ctx)->base;
+    return base->now_ns(base->ctx);
+}
+
+static void ros_wait(void *ctx, uint64_t until_ns)
+{
+    const fcsl_hal_t *base = &((hal_t *)ctx)->base;
+    base->wait(base->ctx, until_ns);
+}
+
+static void ros_log(void *ctx, const char *text)
+{
+    const fcsl_hal_t *base = &((hal_t *)ctx)->base;
+    base->log(base->ctx, text);
+}
+
+static int ros_read_log(void *ctx, char text[FCSL_LOG_BYTES])
+{
+    const fcsl_hal_t *base = &((hal_t *)ctx)->base;
+    return base->read_log(base->ctx, text);
+}
+
+static const char *ros_explain(void *ctx)
+{
+    (void)ctx;
+    return "";
+}
+
+static void ros_nothing(void *ctx)
+{
+    (void)ctx;
+}
+
+/* ---- opening and closing -------------------------------------------------------------------------------------------- */
+
+static void ros_close(void *ctx)
+{
+    hal_t *hal = ctx;
+    if (hal->bus != NULL) {
+        (void)fcsl_bus_close(hal->bus, CLOSE_MS);
+    }
+    for (uint32_t i = 0; i < hal->sensor_count; i++) {
+        fcsl_ros_inlet_free(hal->sensors[i].inlet);
+        fcsl_ros_reader_free(hal->sensors[i].reader);
+    }
+    for (uint32_t i = 0; i < hal->actuator_count; i++) {
+        fcsl_ros_composer_free(hal->actuators[i].composer);
+    }
+    if (hal->base.close != NULL) {
+        hal->base.close(hal->base.ctx);
+    }
+    free(hal->sensors);
+    free(hal->actuators);
+    free(hal->message);
+    free(hal);
+}
+
+/* Keys and tokens of all topics, those of sensors before those of actuators. */
+typedef struct {
+    char key[FCSL_BUS_KEY_MAX + 1];
+    char token[FCSL_BUS_TOKEN_MAX + 1];
+} names_t;
+
+static int name_topics(const hal_t *hal, names_t *names, fcsl_error_t *error)
+{
+    const fcsl_machine_t *machine = fcsl_run_machine(hal->run);
+    uint32_t places[] = {[FCSL_SENSOR] = 0, [FCSL_ACTUATOR] = hal->sensor_count};
+    for (uint32_t i = 0; i < machine->ros_message_count; i++) {
+        const fcsl_ros_message_t *message = &machine->ros_messages[i];
+        const int is_sensor = message->direction == FCSL_SENSOR;
+        const ros_quality_t quality = {.kind = is_sensor ? ROS_SUBSCRIPTION : ROS_PUBLISHER,
+                                       .type = message->type,
+                                       .hash = ros_type_hash(message->type),
+                                       .reliable = !is_sensor,
+                                       .depth = DEPTH};
+        names_t *at = &names[places[message->direction]++];
+        if (quality.hash == NULL) {
+            return fcsl_fail(error, "topic %.100s: there is no type hash of %.200s", message->topic, message->type);
+        }
+        if (ros_key_write(at->key, hal->name_space, NULL, message->topic, error) != 0 ||
+            ros_token_write(at->token, at->key, &quality, error) != 0) {
+            return -1;
+        }
+    }
+    return 0;
+}
+
+static int open_session(hal_t *hal, const names_t *names, const char **texts, fcsl_bus_input_t *inputs, char *error,
+                        size_t error_size)
+{
+    const uint32_t count = hal->sensor_count + hal->actuator_count;
+    uint32_t tick_bytes = RING_BYTES_MIN / TICKS_POSTED;
+    for (uint32_t i = 0; i < count; i++) {
+        texts[i] = names[i].key;
+        texts[count + i] = names[i].token;
+    }
+    for (uint32_t i = 0; i < hal->sensor_count; i++) {
+        inputs[i] = (fcsl_bus_input_t){.key = names[i].key, .bytes = MESSAGE_BYTES, .depth = 1};
+    }
+    for (uint32_t i = 0; i < hal->actuator_count; i++) {
+        tick_bytes += hal->actuators[i].size + ENTRY_BYTES_MAX;
+    }
+    const fcsl_bus_options_t options = {.role = FCSL_BUS_LISTEN,
+                                        .endpoint = hal->endpoint,
+                                        .ring_bytes = TICKS_POSTED * tick_bytes,
+                                        .outputs = texts + hal->sensor_count,
+                                        .output_count = hal->actuator_count,
+                                        .inputs = inputs,
+                                        .input_count = hal->sensor_count,
+                                        .tokens = texts + count,
+                                        .token_count = count};
+    return fcsl_bus_open(&options, &hal->bus, error, error_size);
+}
+
+static int ros_open(fcsl_hal_t *handle, char *error, size_t error_size)
+{
+    hal_t *hal = handle->ctx;
+    fcsl_error_t reason;
+    const size_t count = (size_t)hal->sensor_count + hal->actuator_count;
+    names_t *names = calloc(count, sizeof *names);
+    const char **texts = calloc(2u * count, sizeof *texts);
+    fcsl_bus_input_t *inputs = calloc(count, sizeof *inputs);
+    int failed = -1;
+    if (names == NULL || texts == NULL || inputs == NULL) {
+        (void)snprintf(error, error_size, "out of memory for the ROS 2 graph");
+    } else if (name_topics(hal, names, &reason) != 0) {
+        (void)snprintf(error, error_size, "%s", reason.text);
+    } else {
+        failed = open_session(hal, names, texts, inputs, error, error_size);
+    }
+    free(inputs);
+    free((void *)texts);
+    free(names);
+    return failed ? -1 : 0;
+}
+
+static int add_sensor(hal_t *hal, const fcsl_ros_message_t *message, fcsl_error_t *error)
+{
+    char reason[256];
+    sensor_t *sensor = &hal->sensors[hal->sensor_count++];
+    sensor->reader = fcsl_ros_reader_new(message->reader, reason, sizeof reason);
+    if (sensor->reader == NULL) {
+        return fcsl_fail(error, "topic %.100s: %s", message->topic, reason);
+    }
+    sensor->inlet = fcsl_ros_inlet_new(hal->run, sensor->reader, message->channels, message->channel_count, error);
+    return sensor->inlet != NULL ? 0 : -1;
+}
+
+static int add_actuator(hal_t *hal, const fcsl_ros_message_t *message, fcsl_error_t *error)
+{
+    char reason[256];
+    actuator_t *actuator = &hal->actuators[hal->actuator_count++];
+    actuator->size = message->composer->size;
+    actuator->composer = fcsl_ros_composer_new(message->composer, reason, sizeof reason);
+    return actuator->composer != NULL ? 0 : fcsl_fail(error, "topic %.100s: %s", message->topic, reason);
+}
+
+static int add_topics(hal_t *hal, fcsl_error_t *error)
+{
+    const fcsl_machine_t *machine = fcsl_run_machine(hal->run);
+    size_t longest = MESSAGE_BYTES;
+    hal->sensors = calloc(machine->ros_message_count + 1u, sizeof *hal->sensors);
+    hal->actuators = calloc(machine->ros_message_count + 1u, sizeof *hal->actuators);
+    if (hal->sensors == NULL || hal->actuators == NULL) {
+        return fcsl_fail(error, "out of memory for the ROS 2 graph");
+    }
+    int failed = 0;
+    for (uint32_t i = 0; i < machine->ros_message_count && !failed; i++) {
+        const fcsl_ros_message_t *message = &machine->ros_messages[i];
+        longest = message->composer->size > longest ? message->composer->size : longest;
+        failed =
+            message->direction == FCSL_SENSOR ? add_sensor(hal, message, error) : add_actuator(hal, message, error);
+    }
+    hal->message = malloc(longest);
+    return failed ? -1 : hal->message == NULL ? fcsl_fail(error, "out of memory for the ROS 2 graph") : 0;
+}
+
+int hal_ros(const char *endpoint, const char *name_space, fcsl_run_t *run, fcsl_hal_t *hal, fcsl_error_t *error)
+{
+    const fcsl_machine_t *machine = fcsl_run_machine(run);
+    if (machine->ros_message_count == 0) {
+        return fcsl_fail(error,
+                         "no channel of machine '%.100s' has a topic: write a `ros` block for it in the machine JSON",
+                         machine->name);
+    }
+    hal_t *self = calloc(1, sizeof *self);
+    if (self == NULL) {
+        return fcsl_fail(error, "out of memory for the ROS 2 graph");
+    }
+    self->run = run;
+    self->endpoint = endpoint;
+    self->name_space = name_space;
+    if (fcsl_hal_stub(&self->base, error->text, sizeof error->text) != 0 || add_topics(self, error) != 0) {
+        ros_close(self);
+        return -1;
+    }
+    *hal = (fcsl_hal_t){
+        .ctx = self,
+        .open = ros_open,
+        .sample = ros_sample,
+        .command = ros_command,
+        .arm = ros_arm,
+        .alive = ros_nothing,
+        .now_ns = ros_now_ns,
+        .wait = ros_wait,
+        .log = ros_log,
+        .read_log = ros_read_log,
+        .count = ros_count,
+        .explain = ros_explain,
+        .interrupt = ros_nothing,
+        .close = ros_close,
+        .fields = FIELDS,
+        .field_count = sizeof FIELDS / sizeof FIELDS[0],
+        .counters = &self->counters,
+        .counter_bytes = sizeof self->counters,
+        .serves = 1,
+    };
+    return 0;
+}

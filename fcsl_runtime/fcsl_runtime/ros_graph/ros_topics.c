@@ -1,0 +1,263 @@
+/* SPDX-License-Identifier: Apache-2.0
+ *
+ * Names, types and quality of service are those of docs/ros2.md.
+ */
+#include "ros_topics.h"
+
+#include <stdlib.h>
+#include <string.h>
+
+#include "endpoint.h"
+#include "fcsl/fcsl_scalar.h"
+#include "messages/schema.h"
+#include "messages/type_hash.h"
+#include "run/fault_place.h"
+#include "type_hashes.h"
+
+enum {
+    /* Encapsulation, stamp, empty frame_id and tick: in these alone do latched messages of the same content differ. */
+    HEAD_BYTES = 4 + 8 + 8 + 8,
+    CLOCK_BYTES = 4 + 8,
+    PADDING_BYTES = 8, /* before a number or a length, at most, with that length */
+    DEPTH_LATCHED = 1,
+    DEPTH_EVENT = 100,
+    DEPTH_COMMAND = 10,
+    DEPTH_STREAM = 2000, /* what a subscriber may lag behind before a reliable bridge overwrites messages */
+};
+
+/* A topic of every machine. */
+typedef struct {
+    fcsl_tick_message_t what;
+    int latched;
+    const char *name; /* behind the machine's */
+    const char *type;
+    const char *schema;
+} fixed_t;
+
+static const fixed_t FIXED[] = {
+    {FCSL_TICK_STATE, 1, "state", "fcsl_msgs/msg/MachineState", FCSL_SCHEMA_MACHINE_STATE},
+    {FCSL_TICK_HEALTH, 1, "health", "fcsl_msgs/msg/InstanceHealth", FCSL_SCHEMA_INSTANCE_HEALTH},
+    {FCSL_TICK_FAULTS, 1, "faults", "fcsl_msgs/msg/FaultCounters", FCSL_SCHEMA_FAULT_COUNTERS},
+    {FCSL_TICK_TRANSITION, 0, "transitions", "fcsl_msgs/msg/TransitionEvent", FCSL_SCHEMA_TRANSITION_EVENT},
+};
+enum { FIXED_COUNT = sizeof FIXED / sizeof FIXED[0] };
+
+/* Key and token of a topic of which the complete text of the type is known. */
+static int announce(ros_topic_t *topic, const char *type, const char *schema, unsigned depth, fcsl_error_t *error)
+{
+    char hash[FCSL_TYPE_HASH_BYTES];
+    if (fcsl_type_hash(type, schema, hash) != 0) {
+        return fcsl_fail(error, "there is no type hash of the interface %.200s", type);
+    }
+    const ros_quality_t quality = {
+        .kind = ROS_PUBLISHER, .type = type, .hash = hash, .reliable = 1, .latched = topic->latched, .depth = depth};
+    return ros_token_write(topic->token, topic->key, &quality, error);
+}
+
+/* ---- the topics of a machine ---------------------------------------------------------------------------------------- */
+
+/* Bytes that no message of state, transition, health or faults exceeds. */
+static uint32_t tick_message_bytes(const fcsl_machine_t *machine)
+{
+    size_t longest = 0; /* of the names, of which a message has four at most */
+    size_t bytes = HEAD_BYTES;
+    for (uint32_t i = 0; i < machine->state_count; i++) {
+        const size_t length = strlen(machine->states[i].name);
+        longest = length > longest ? length : longest;
+    }
+    for (uint32_t i = 0; i < machine->request_count; i++) {
+        const size_t length = strlen(machine->requests[i]);
+        longest = length > longest ? length : longest;
+    }
+    for (uint32_t i = 0; i < machine->instance_count; i++) {
+        const size_t length = strlen(machine->instances[i].name);
+        longest = length > longest ? length : longest;
+        bytes += PADDING_BYTES + length + 8u + 8u + PADDING_BYTES + fcsl_fault_text_bytes(machine);
+    }
+    bytes += 4u * (PADDING_BYTES + longest + 1u) + 4u * PADDING_BYTES;
+    return bytes < FCSL_MESSAGE_BYTES_MAX ? (uint32_t)bytes : FCSL_MESSAGE_BYTES_MAX;
+}
+
+static int add_fixed(ros_topics_t *topics, const fixed_t *fixed, const char *name_space, fcsl_error_t *error)
+{
+    ros_topic_t *topic = &topics->topics[topics->count++];
+    topic->kind = ROS_TICK_MESSAGE;
+    topic->what = fixed->what;
+    topic->latched = fixed->latched;
+    topic->longest = tick_message_bytes(topics->machine);
+    topic->said = malloc(topic->longest);
+    topics->latched_count += fixed->latched ? 1u : 0u;
+    if (topic->said == NULL) {
+        return fcsl_fail(error, "out of memory for topics");
+    }
+    return ros_key_write(topic->key, name_space, topics->machine->name, fixed->name, error) != 0
+               ? -1
+               : announce(topic, fixed->type, fixed->schema, fixed->latched ? DEPTH_LATCHED : DEPTH_EVENT, error);
+}
+
+/* Of all topics only this one is outside of the namespace. */
+static int add_clock(ros_topics_t *topics, fcsl_error_t *error)
+{
+    ros_topic_t *topic = &topics->topics[topics->count++];
+    topic->kind = ROS_CLOCK;
+    topic->longest = CLOCK_BYTES;
+    return ros_key_write(topic->key, "", NULL, "/clock", error) != 0
+               ? -1
+               : announce(topic, "rosgraph_msgs/msg/Clock", FCSL_SCHEMA_CLOCK, DEPTH_STREAM, error);
+}
+
+static int add_instance(ros_topics_t *topics, const fcsl_instance_t *instance, const char *name_space,
+                        fcsl_error_t *error)
+{
+    ros_topic_t *topic = &topics->topics[topics->count++];
+    topic->kind = ROS_INSTANCE;
+    char *schema = fcsl_interface_schema(instance);
+    if (schema == NULL) {
+        return fcsl_fail(error, "out of memory for topics");
+    }
+    const int failed = fcsl_layout_build(topics->machine, instance, &topic->layout, error) != 0 ||
+                       ros_key_write(topic->key, name_space, topics->machine->name, instance->name, error) != 0 ||
+                       announce(topic, instance->message_type, schema, DEPTH_STREAM, error) != 0;
+    free(schema);
+    topic->longest = topic->layout.size;
+    return failed ? -1 : 0;
+}
+
+static int add_mapped(ros_topics_t *topics, const fcsl_ros_message_t *message, const char *name_space,
+                      fcsl_error_t *error)
+{
+    char reason[256];
+    ros_topic_t *topic = &topics->topics[topics->count++];
+    const ros_quality_t quality = {.kind = ROS_PUBLISHER,
+                                   .type = message->type,
+                                   .hash = ros_type_hash(message->type),
+                                   .reliable = 1,
+                                   .depth = message->direction == FCSL_ACTUATOR ? DEPTH_COMMAND : DEPTH_STREAM};
+    topic->kind = ROS_MAPPED;
+    topic->mapped = message;
+    topic->longest = message->composer->size;
+    topic->composer = fcsl_ros_composer_new(message->composer, reason, sizeof reason);
+    if (topic->composer == NULL) {
+        return fcsl_fail(error, "topic %.100s: %s", message->topic, reason);
+    }
+    if (quality.hash == NULL) {
+        return fcsl_fail(error, "topic %.100s: there is no type hash of %.200s", message->topic, message->type);
+    }
+    return ros_key_write(topic->key, name_space, NULL, message->topic, error) != 0
+               ? -1
+               : ros_token_write(topic->token, topic->key, &quality, error);
+}
+
+int ros_topics_build(ros_topics_t *topics, const fcsl_ros_graph_options_t *options, fcsl_error_t *error)
+{
+    const fcsl_machine_t *machine = options->machine;
+    const char *name_space = options->name_space;
+    *topics = (ros_topics_t){.machine = machine, .safe = options->safe};
+    topics->topics =
+        calloc((size_t)machine->instance_count + machine->ros_message_count + FIXED_COUNT + 1u, sizeof *topics->topics);
+    if (topics->topics == NULL) {
+        return fcsl_fail(error, "out of memory for topics");
+    }
+    int failed = 0;
+    for (uint32_t i = 0; i < FIXED_COUNT && !failed; i++) {
+        failed = add_fixed(topics, &FIXED[i], name_space, error);
+    }
+    if (options->simulated && !failed) {
+        failed = add_clock(topics, error);
+    }
+    for (uint32_t i = 0; i < machine->instance_count && !failed; i++) {
+        if (machine->instances[i].published) {
+            failed = add_instance(topics, &machine->instances[i], name_space, error);
+        }
+    }
+    for (uint32_t i = 0; i < machine->ros_message_count && !failed; i++) {
+        const fcsl_ros_message_t *message = &machine->ros_messages[i];
+        if (message->direction == FCSL_ACTUATOR ? options->actuators : options->sensors) {
+            failed = add_mapped(topics, message, name_space, error);
+        }
+    }
+    return failed;
+}
+
+void ros_topics_free(ros_topics_t *topics)
+{
+    for (uint32_t i = 0; i < topics->count; i++) {
+        fcsl_layout_free(&topics->topics[i].layout);
+        fcsl_ros_composer_free(topics->topics[i].composer);
+        free(topics->topics[i].said);
+    }
+    free(topics->topics);
+    *topics = (ros_topics_t){0};
+}
+
+/* ---- messages of a tick --------------------------------------------------------------------------------------------- */
+
+static size_t write_clock(fcsl_stamp_t stamp, uint8_t *bytes)
+{
+    fcsl_cdr_t cdr;
+    fcsl_cdr_begin(&cdr, bytes, CLOCK_BYTES);
+    fcsl_cdr_time(&cdr, stamp.time_ns);
+    return fcsl_cdr_end(&cdr);
+}
+
+static size_t write_tick_message(const fcsl_machine_t *machine, ros_topic_t *topic, const uint8_t *data,
+                                 fcsl_stamp_t stamp, uint8_t *bytes)
+{
+    const int64_t size = fcsl_tick_message_write(machine, data, topic->what, stamp, bytes, topic->longest);
+    if (size <= HEAD_BYTES) {
+        return 0;
+    }
+    const uint32_t length = (uint32_t)size;
+    if (topic->latched && length == topic->said_bytes &&
+        memcmp(topic->said + HEAD_BYTES, bytes + HEAD_BYTES, length - HEAD_BYTES) == 0) {
+        return 0;
+    }
+    memcpy(topic->said, bytes, length);
+    topic->said_bytes = length;
+    return length;
+}
+
+/* Whether a sample came for the tick, or nothing says when samples come. */
+static int is_sampled(const fcsl_machine_t *machine, const fcsl_ros_message_t *message, const uint8_t *data)
+{
+    for (uint32_t i = 0; i < message->channel_count; i++) {
+        const fcsl_channel_t *channel = &machine->channels[message->channels[i]];
+        uint32_t age = 0;
+        memcpy(&age, data + channel->age_offset, sizeof age);
+        if (age == 0u || data[channel->attached_offset] == 0u) {
+            return 1;
+        }
+    }
+    return 0;
+}
+
+/* Actuators of a disarmed machine get their safe values. A number that its field cannot hold makes no message. */
+static size_t write_mapped(const ros_topics_t *topics, const ros_topic_t *topic, const uint8_t *data,
+                           fcsl_stamp_t stamp, uint8_t *bytes)
+{
+    const fcsl_machine_t *machine = topics->machine;
+    const int is_actuator = topic->mapped->direction == FCSL_ACTUATOR;
+    if (!is_actuator && !is_sampled(machine, topic->mapped, data)) {
+        return 0;
+    }
+    const int is_armed = machine->arm_field == FCSL_NONE || data[machine->fields[machine->arm_field].offset] != 0u;
+    const uint8_t *memory = is_actuator && !is_armed && topics->safe != NULL ? topics->safe : data;
+    return fcsl_ros_compose(topic->composer, &memory, (int64_t)stamp.time_ns, bytes) == FCSL_ROS_TAKEN ? topic->longest
+                                                                                                       : 0u;
+}
+
+size_t ros_topics_write(ros_topics_t *topics, uint32_t number, const uint8_t *data, fcsl_stamp_t stamp, uint8_t *bytes)
+{
+    ros_topic_t *topic = &topics->topics[number];
+    switch (topic->kind) {
+    case ROS_CLOCK:
+        return write_clock(stamp, bytes);
+    case ROS_INSTANCE:
+        fcsl_layout_write(&topic->layout, data, stamp.tick, stamp.time_ns, bytes);
+        return topic->layout.size;
+    case ROS_MAPPED:
+        return write_mapped(topics, topic, data, stamp, bytes);
+    default:
+        return write_tick_message(topics->machine, topic, data, stamp, bytes);
+    }
+}

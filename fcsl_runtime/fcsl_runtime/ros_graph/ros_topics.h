@@ -1,0 +1,46 @@
+/* SPDX-License-Identifier: Apache-2.0
+ *
+ * The topics of a machine as zenoh-plugin-ros2dds sees them: key, liveliness token, messages of a tick.
+ */
+#ifndef FCSL_ROS_GRAPH_ROS_TOPICS_H
+#define FCSL_ROS_GRAPH_ROS_TOPICS_H
+
+#include "fcsl/fcsl_bus.h"
+#include "fcsl/fcsl_ros.h"
+#include "fcsl/fcsl_ros_graph.h"
+#include "messages/message.h"
+#include "messages/tick_messages.h"
+
+typedef enum { ROS_TICK_MESSAGE, ROS_INSTANCE, ROS_CLOCK, ROS_MAPPED } ros_topic_kind_t;
+
+typedef struct {
+    ros_topic_kind_t kind;
+    int latched;              /* of a ROS_TICK_MESSAGE: written when it differs from the last one */
+    fcsl_tick_message_t what; /* ROS_TICK_MESSAGE */
+    fcsl_layout_t layout;     /* ROS_INSTANCE */
+    const fcsl_ros_message_t *mapped; /* ROS_MAPPED */
+    fcsl_ros_composer_t *composer;
+    uint32_t longest;         /* bytes of the longest message */
+    uint32_t said_bytes;      /* of the last one */
+    uint8_t *said;
+    char key[FCSL_BUS_KEY_MAX + 1];
+    char token[FCSL_BUS_TOKEN_MAX + 1];
+} ros_topic_t;
+
+typedef struct {
+    const fcsl_machine_t *machine;
+    const uint8_t *safe; /* as of fcsl_ros_graph_options_t */
+    ros_topic_t *topics; /* the latched ones first */
+    uint32_t count;
+    uint32_t latched_count;
+} ros_topics_t;
+
+/* Returns 0, or -1 with `error`; free it either way. */
+int ros_topics_build(ros_topics_t *topics, const fcsl_ros_graph_options_t *options, fcsl_error_t *error);
+void ros_topics_free(ros_topics_t *topics);
+
+/* Writes a topic's message of a tick; `data` is the machine's struct after it. Returns its bytes, or 0 when there is none.
+ * `bytes` has room for the topic's longest. */
+size_t ros_topics_write(ros_topics_t *topics, uint32_t number, const uint8_t *data, fcsl_stamp_t stamp, uint8_t *bytes);
+
+#endif /* FCSL_ROS_GRAPH_ROS_TOPICS_H */

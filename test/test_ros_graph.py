@@ -1,0 +1,318 @@
+# SPDX-License-Identifier: Apache-2.0
+"""`--ros`: a machine in a ROS 2 graph by zenoh-plugin-ros2dds, seen as the bridge sees it (docs/ros_graph.md).
+
+Here a Zenoh session of Python stands for the bridge; `make interop` has the plugin itself.
+"""
+
+from __future__ import annotations
+
+import contextlib
+import json
+import queue
+import random
+import re
+import signal
+import socket
+import subprocess
+import time
+from collections import defaultdict
+from collections.abc import Callable, Iterator
+from pathlib import Path
+from typing import Any, TypeVar, cast
+
+import zenoh
+from ament_index_python.packages import get_package_share_directory
+from geometry_msgs.msg import PointStamped, TwistStamped
+from lander.msg import LanderControlDescent
+from rclpy.serialization import deserialize_message, serialize_message
+from rosgraph_msgs.msg import Clock
+from sensor_msgs.msg import Imu
+from zenoh.ext import HistoryConfig, declare_advanced_subscriber
+
+from fcsl_compiler.ros.standard_messages import SUPPORTED, full_name
+from fcsl_msgs.msg import MachineState
+from simclient.bag.bag import Bag
+
+ROOT = Path(__file__).resolve().parents[1]
+SIM = ROOT / "examples/lander/sim/lander.sim.json"
+ECHO = ROOT / "scripts/interop/machine/echo.json"
+HASHES = ROOT / "fcsl_runtime/fcsl_runtime/ros_graph/type_hashes.c"
+LIBRARY = Path(get_package_share_directory("lander")).parents[1] / "lib/lander/liblander_machines.so"
+Message = TypeVar("Message")
+LONG_S = 60
+HZ = 100
+INSTANCES = ["sensors", "monitor", "filter", "ascent", "coast", "descent", "safe", "engine"]
+TOKEN = re.compile(r"@/(\w+)/@ros2_lv/(M[PS])/([^/]+)/([^/]+)/:([01]:[01]:0,\d+):typehash=(RIHS01_[0-9a-f]{64});")
+#: Reliable or not, transient local or not, keep last, depth.
+STREAM, EVENT, LATCHED, COMMAND, SENSOR = "1:0:0,2000", "1:0:0,100", "1:1:0,1", "1:0:0,10", "0:0:0,10"
+
+
+def free_endpoint() -> str:
+    """Below the ports of outgoing connections."""
+    for port in random.SystemRandom().sample(range(20000, 32000), 100):
+        with socket.socket() as found, contextlib.suppress(OSError):
+            found.bind(("127.0.0.1", port))
+            return f"tcp/127.0.0.1:{port}"
+    raise AssertionError("no free port")
+
+
+@contextlib.contextmanager
+def started(*line: str | Path) -> Iterator[subprocess.Popen[str]]:
+    pipe = subprocess.PIPE
+    process = subprocess.Popen([str(w) for w in line], stdout=pipe, stderr=pipe, text=True)
+    try:
+        yield process
+    finally:
+        process.kill()
+        process.communicate()
+
+
+@contextlib.contextmanager
+def bridge(endpoint: str) -> Iterator[zenoh.Session]:
+    """It may begin before the program that listens."""
+    config = zenoh.Config.from_json5('{mode: "client", scouting: {multicast: {enabled: false}}}')
+    config.insert_json5("connect/endpoints", json.dumps([endpoint]))
+    config.insert_json5("connect/timeout_ms", str(LONG_S * 1000))
+    config.insert_json5("connect/retry", "{period_init_ms: 20, period_max_ms: 20}")
+    with zenoh.open(config) as session:
+        yield session
+
+
+def until(holds: Callable[[], bool]) -> None:
+    deadline = time.monotonic() + LONG_S
+    while not holds():
+        assert time.monotonic() < deadline
+        time.sleep(0.01)
+
+
+def tokens(session: zenoh.Session) -> dict[str, tuple[str, str]]:
+    """Kind and quality of service by topic. All are of the session that listens, and their hashes those of the installed types."""
+    found = [TOKEN.fullmatch(str(r.ok.key_expr)) for r in session.liveliness().get("@/*/@ros2_lv/**") if r.ok]
+    (zid,) = {token[1] for token in found if token}
+    assert zid in map(str, session.info.peers_zid())
+    for token in found:
+        assert token and token[6] == installed_hash(token[4].replace("§", "/"))
+    return {token[3].replace("§", "/"): (token[2], token[5]) for token in found if token}
+
+
+def installed_hash(kind: str) -> str:
+    package, _, name = kind.split("/")
+    known = json.loads((Path(get_package_share_directory(package)) / f"msg/{name}.json").read_text())
+    hashes = {entry["type_name"]: entry["hash_string"] for entry in known["type_hashes"]}
+    return str(hashes[kind])
+
+
+def clock_tick(data: bytes) -> int:
+    clock = deserialize_message(data, Clock).clock
+    return int((clock.sec * 10**9 + clock.nanosec) * HZ // 10**9)
+
+
+def test_topics_of_a_simulation(tmp_path: Path) -> None:
+    """Every message has the bytes that the bag has, of each tick from the first one on that was subscribed. The last ones may be
+    missing: Zenoh ends a session ahead of what waits to be sent."""
+    endpoint = free_endpoint()
+    bag = tmp_path / "bag"
+    options = ["--record", bag, "--ros", endpoint, "--namespace", "/r1/", "--speed", "2", "--duration", "4", "--json"]
+    came: dict[str, list[bytes]] = defaultdict(list)
+    late: queue.Queue[bytes] = queue.Queue()
+    with started("fcsl-sim", "run", SIM, *options) as sim, bridge(endpoint) as session:
+        declared = tokens(session)
+        everything = session.declare_subscriber("**", lambda s: came[str(s.key_expr)].append(bytes(s.payload)))
+        until(lambda: len(came["clock"]) > 20)
+        history = HistoryConfig(detect_late_publishers=True, max_samples=1)
+        heard = lambda s: late.put(bytes(s.payload))  # noqa: E731
+        advanced = declare_advanced_subscriber(session, "r1/lander_control/state", heard, history=history)
+        state = deserialize_message(late.get(timeout=LONG_S), MachineState)
+        out, complaint = sim.communicate(timeout=LONG_S)
+        advanced.undeclare()
+        everything.undeclare()
+    assert sim.returncode == 1, complaint  # it ends before it has landed
+    assert (state.state, state.tick, state.header.stamp.sec) == ("ASCENT", 0, 0)
+    assert json.loads(out)["ros"] == {"ticks": 4 * HZ, "dropped": 0}
+
+    wanted = {"transitions": EVENT, **dict.fromkeys(INSTANCES, STREAM)}
+    wanted |= dict.fromkeys(("state", "health", "faults"), LATCHED)
+    of_machine = {f"r1/lander_control/{name}": ("MP", quality) for name, quality in wanted.items()}
+    assert declared == of_machine | {"clock": ("MP", STREAM)}
+
+    recorded: dict[str, list[bytes]] = defaultdict(list)
+    for topic, _, data in Bag(bag).messages():
+        recorded[topic.removeprefix("/")].append(data)
+    for topic in (f"r1/lander_control/{name}" for name in INSTANCES):
+        first = recorded[topic].index(came[topic][0])
+        assert len(came[topic]) > HZ and came[topic] == recorded[topic][first : first + len(came[topic])], topic
+    ticks = [clock_tick(data) for data in came["clock"]]
+    assert ticks == list(range(ticks[0], ticks[0] + len(ticks)))
+
+
+def test_topics_of_a_flight_computer() -> None:
+    """In real time stamps are of the system's clock, and there is no /clock."""
+    endpoint = free_endpoint()
+    came: queue.Queue[bytes] = queue.Queue()
+    keys = set()
+
+    def heard(sample: zenoh.Sample) -> None:
+        keys.add(str(sample.key_expr))
+        if str(sample.key_expr) == "lander_control/descent":
+            came.put(bytes(sample.payload))
+
+    begun_s = time.time()
+    with (
+        started("fcsl-fc", LIBRARY, "--machine", "lander_control", "--ros", endpoint) as fc,
+        bridge(endpoint) as session,
+    ):
+        assert "clock" not in tokens(session)
+        everything = session.declare_subscriber("**", heard)
+        first, second = (deserialize_message(came.get(timeout=LONG_S), LanderControlDescent) for _ in range(2))
+        fc.send_signal(signal.SIGTERM)
+        said, complaint = fc.communicate(timeout=LONG_S)
+        everything.undeclare()
+    assert fc.returncode == 0, complaint
+    assert re.search(r"ROS 2 topics \d+ ticks, 0 dropped", said)
+    assert "clock" not in keys
+    assert second.tick == first.tick + 1
+    stamps = [m.header.stamp.sec + m.header.stamp.nanosec * 1e-9 for m in (first, second)]
+    assert begun_s < stamps[0] < stamps[1] < time.time()
+
+
+def read(sample: zenoh.Sample, kind: type[Message]) -> Message:
+    return cast(Message, deserialize_message(bytes(sample.payload), kind))
+
+
+def tick_of(message: Any) -> int:
+    stamp = message.header.stamp
+    return int((stamp.sec * 10**9 + stamp.nanosec) * HZ // 10**9)
+
+
+def imu(rate: float, stamp_ns: int) -> bytes:
+    message = Imu()
+    message.header.stamp.sec, message.header.stamp.nanosec = divmod(stamp_ns, 10**9)
+    message.angular_velocity.x = rate
+    return bytes(serialize_message(message))
+
+
+def test_a_hal_of_topics(tmp_path: Path) -> None:
+    """Messages of the graph are the machine's sensors, its commands are topics. What is no good is refused and counted."""
+    endpoint = free_endpoint()
+    summary = tmp_path / "summary.json"
+    commands: queue.Queue[TwistStamped] = queue.Queue()
+    subprocess.run(["fcslc", "build", ECHO, "-o", tmp_path], check=True)
+    options = ["--hal", f"ros:{endpoint}", "--namespace", "r1", "--summary", summary]
+
+    def heard(sample: zenoh.Sample) -> None:
+        commands.put(read(sample, TwistStamped))
+
+    with started("fcsl-fc", tmp_path / "libecho.so", *options) as fc, bridge(endpoint) as session:
+        assert tokens(session) == {"r1/imu/data": ("MS", SENSOR), "r1/cmd_vel": ("MP", COMMAND)}
+        everything = session.declare_subscriber("r1/cmd_vel", heard)
+
+        def send(data: bytes) -> float:
+            """The command of the tick behind that which has taken the message."""
+            session.put("r1/imu/data", data)
+            time.sleep(0.02)
+            commands.queue.clear()
+            return float([commands.get(timeout=LONG_S) for _ in range(3)][-1].twist.linear.x)
+
+        now_ns = time.time_ns()
+        until(lambda: send(imu(42.0, time.time_ns())) == 42.0)
+        assert send(imu(43.0, now := time.time_ns())) == 43.0
+        for bad in (
+            imu(1.0, now),  # repeated
+            imu(2.0, now_ns),  # older
+            imu(3.0, time.time_ns() + 10**11),  # future
+            imu(4.0, time.time_ns())[:40],  # truncated
+            b"\0\0" + imu(5.0, time.time_ns())[2:],  # encoding
+            imu(float("nan"), time.time_ns()),
+        ):
+            assert send(bad) == 43.0
+        assert send(imu(44.0, time.time_ns())) == 44.0
+        fc.send_signal(signal.SIGTERM)
+        _, complaint = fc.communicate(timeout=LONG_S)
+        everything.undeclare()
+    assert fc.returncode == 0, complaint
+    counted = json.loads(summary.read_text())["hal"]
+    refused = {name.removeprefix("refused."): n for name, n in counted.items() if name.startswith("refused.") and n}
+    assert refused == dict.fromkeys(("repeated", "older", "future", "truncated", "encoding", "nan"), 1)
+    assert counted["messages"] >= 3 and counted["superseded"] == 0 and counted["commands"] > 0
+
+
+def test_hashes_of_all_standard_messages() -> None:
+    rows = dict(re.findall(r'{\s*"(\w+/msg/\w+)",\s+"(RIHS01_\w+)"}', HASHES.read_text()))
+    assert set(rows) == {full_name(name) for name in SUPPORTED}
+    assert rows == {kind: installed_hash(kind) for kind in rows}
+
+
+PUMP = """
+class Gauge:
+    outputs = {"level": "f64 m"}
+
+    def execute(self):
+        pass
+
+
+class Pump:
+    inputs = {"now": "i64"}
+    outputs = {"speed": "f64 m/s", "armed": "bool"}
+
+    def execute(self):
+        self.speed = 3.0
+        self.armed = self.now < 2000000000
+"""
+TANK = {
+    "tick_hz": HZ,
+    "initial_state": "RUN",
+    "algorithms": {"Gauge": {"source": "pump.py"}, "Pump": {"source": "pump.py"}},
+    "instances": {"gauge": {"algorithm": "Gauge"}, "pump": {"algorithm": "Pump"}},
+    "connections": [{"from": "machine.time_ns", "to": "pump.now"}],
+    "states": {"RUN": {"schedule": {"gauge": HZ, "pump": HZ}}},
+    "transitions": [],
+    "publish": [],
+    "arm": "pump.armed",
+    "channels": [
+        {"name": "level", "id": 1, "field": "gauge.outputs.level", "direction": "sensor", "max_age_ticks": 10}
+        | {"ros": {"type": "geometry_msgs/PointStamped", "field": "point.z", "topic": "level", "frame": "tank"}},
+        {"name": "speed", "id": 2, "field": "pump.outputs.speed", "direction": "actuator", "safe": -1.0}
+        | {"ros": {"type": "geometry_msgs/TwistStamped", "field": "twist.linear.x", "topic": "/cmd_vel"}},
+    ],
+}
+TANK_SIM = {
+    "controller": {"machine": "tank.json"},
+    "seed": 1,
+    "duration": 4.0,
+    "integrator": {"method": "euler", "hz": HZ},
+    "models": {"sensor": {"source": "package://fcsl_sim/models/noisy_sensor.c"}},
+    "instances": {"meter": {"model": "sensor", "parameters": {"bias": 7.5, "sigma": 0.0, "dropout": False}}},
+    "connections": [{"from": "meter.value", "to": "controller.level"}],
+    "rates": {"meter": HZ // 2},
+}
+
+
+def test_mapped_channels_of_a_simulation(tmp_path: Path) -> None:
+    """Sensors when they are sampled, actuators in every tick: the machine's value while it is armed, then the safe one."""
+    (tmp_path / "pump.py").write_text(PUMP)
+    (tmp_path / "tank.json").write_text(json.dumps(TANK))
+    (tmp_path / "tank.sim.json").write_text(json.dumps(TANK_SIM))
+    endpoint = free_endpoint()
+    options = ["--ros", endpoint, "--namespace", "r1", "--speed", "2"]
+    levels: list[PointStamped] = []
+    commands: list[TwistStamped] = []
+    with started("fcsl-sim", "run", tmp_path / "tank.sim.json", *options) as sim, bridge(endpoint) as session:
+        declared = tokens(session)
+        subscribers = [
+            session.declare_subscriber("r1/level", lambda s: levels.append(read(s, PointStamped))),
+            session.declare_subscriber("cmd_vel", lambda s: commands.append(read(s, TwistStamped))),
+        ]
+        said, complaint = sim.communicate(timeout=LONG_S)
+        for subscriber in subscribers:
+            subscriber.undeclare()
+    assert sim.returncode == 0, complaint
+    of_machine = {"state": LATCHED, "health": LATCHED, "faults": LATCHED, "transitions": EVENT}
+    wanted = {f"r1/tank/{name}": quality for name, quality in of_machine.items()}
+    wanted |= {"clock": STREAM, "r1/level": STREAM, "cmd_vel": COMMAND}
+    assert declared == {topic: ("MP", quality) for topic, quality in wanted.items()}
+    assert "ROS 2 topics: 400 ticks, 0 dropped" in said
+    assert {(m.point.z, m.header.frame_id, tick_of(m) % 2) for m in levels} == {(7.5, "tank", 0)}
+    assert [tick_of(m) for m in levels] == [tick_of(levels[0]) + 2 * i for i in range(len(levels))]
+    assert [tick_of(m) for m in commands] == [tick_of(commands[0]) + i for i in range(len(commands))]
+    assert len(levels) > HZ / 2 and len(commands) > HZ
+    assert all(m.twist.linear.x == (3.0 if tick_of(m) < 200 else -1.0) for m in commands)
