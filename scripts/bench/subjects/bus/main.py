@@ -16,9 +16,8 @@ import statistics
 import subprocess
 import sys
 import tempfile
-import time
+import threading
 from collections.abc import Callable, Sequence
-from concurrent.futures import ThreadPoolExecutor
 from contextlib import ExitStack
 from pathlib import Path
 from typing import Any
@@ -41,8 +40,8 @@ MACHINE = ROOT / "examples/lander/fc/lander_control.json"
 ROUNDS = sized(3, 1)
 TRIPS = sized(5000, 50)
 TICKS = sized({"unix": 30_000, "udp": 10_000, "zenoh": 10_000}, dict.fromkeys(("unix", "udp", "zenoh"), 200))
-#: Fewer messages show that an observer was not there.
-TICKS_SEEN = 5
+#: An observer is there when so many messages came.
+SEEN = 10
 COMPUTERS = sized(10, 1)
 #: Ticks a second of each flight computer: the lander's 100 Hz at this speed.
 SPEED, RATE_HZ = 10, 1000
@@ -134,31 +133,25 @@ def step_instructions(folder: Path) -> dict[str, list[int]]:
         "without the bus": instructions(folder, library, program, []),
         "observers, nobody there": instructions(folder, library, program, [], "--observers", endpoint),
     }
-    with ThreadPoolExecutor(1) as pool:
-        flying = pool.submit(instructions, folder, library, program, [], "--observers", endpoint)
-        seen = _observe(endpoint, flying.done)
-        counts["observers, one there"] = flying.result()
-    if seen < TICKS_SEEN:
-        raise RuntimeError(f"the observer saw {seen} messages")
+    with ExitStack() as stack:
+        watch = functools.partial(_observe, endpoint, stack)
+        counts["observers, one there"] = instructions(
+            folder, library, program, [], "--observers", endpoint, ready=watch
+        )
     return {name: [min(found), int(statistics.median(found)), max(found)] for name, found in counts.items()}
 
 
-def _observe(endpoint: str, over: Callable[[], bool]) -> int:
-    """How many messages came until it is over. It tries to connect until somebody listens."""
+def _observe(endpoint: str, stack: ExitStack) -> None:
+    """Takes all messages until the stack is closed; returns when some came."""
     config = zenoh.Config.from_json5('{mode: "client", scouting: {multicast: {enabled: false}}}')
     config.insert_json5("connect/endpoints", json.dumps([endpoint]))
     config.insert_json5("connect/timeout_ms", "30000")
-    seen = 0
-
-    def see(_: object) -> None:
-        nonlocal seen
-        seen += 1
-
-    with zenoh.open(config) as bus:
-        bus.declare_subscriber("**", see)
-        while not over():
-            time.sleep(0.01)
-    return seen
+    came = threading.Semaphore(0)
+    bus = stack.enter_context(zenoh.open(config))
+    bus.declare_subscriber("**", lambda _: came.release())
+    for _ in range(SEEN):
+        if not came.acquire(timeout=30):
+            raise RuntimeError("the observer saw nothing")
 
 
 # ---- flight computers on one listener ----------------------------------------------------------------------------------

@@ -18,7 +18,7 @@ import tempfile
 import threading
 import time
 from collections import Counter
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from contextlib import ExitStack, contextmanager, suppress
 from pathlib import Path
 from typing import Any
@@ -155,9 +155,17 @@ def _address(process: int) -> int:
     return base + next(int(s.split()[0], 16) for s in symbols.splitlines() if s.endswith(" fcsl_run_step"))
 
 
-def instructions(folder: Path, library: Path, program: Path, requests: Requests, *options: str) -> list[int]:
-    """Of TICKS ticks in a row of fcsl-fc with these options, under a flood of requests."""
+def instructions(
+    folder: Path,
+    library: Path,
+    program: Path,
+    requests: Requests,
+    *options: str,
+    ready: Callable[[], None] = lambda: None,
+) -> list[int]:
+    """Of TICKS ticks in a row of fcsl-fc with these options, under a flood of requests, once `ready` returned in its flight."""
     with _flying(folder, library, *options) as (process, path), _flood(path, requests) as received:
+        ready()
         before = received[0]
         line = [str(program), str(process.pid), f"{_address(process.pid):x}", str(TICKS)]
         done = subprocess.run(line, capture_output=True, text=True, timeout=120, check=False)
