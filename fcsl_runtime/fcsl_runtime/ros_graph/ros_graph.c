@@ -11,7 +11,7 @@
 #include "base/error.h"
 #include "observers/follower.h"
 #include "ros_topics.h"
-#include "run/tick_time.h"
+#include "fcsl/fcsl_tick_time.h"
 
 enum {
     TICKS_POSTED = 64, /* at most, before all of them must have left */
