@@ -53,10 +53,11 @@ fcsl_wire_status_t bus_peer_receive(const bus_peer_t *peer, bus_take_t take, voi
     }
 }
 
-int bus_peer_wait(const bus_peer_t *peer, const char *endpoint, uint64_t deadline_ns, char *error, size_t error_size)
+int bus_peer_wait(bus_peer_t *peer, const char *endpoint, uint64_t deadline_ns, char *error, size_t error_size)
 {
     while (monotonic_ns() < deadline_ns) {
         if (listens(peer) && fcsl_bus_alive(peer->bus, BUS_CONTROLLERS) == 0) {
+            peer->met = 1;
             return 0;
         }
         (void)fcsl_bus_wait(peer->bus, deadline_ns);

@@ -22,6 +22,9 @@ enum {
     MESSAGES_MAX = 4096 /* that a tick takes of a rig: more than a buffer holds */
 };
 
+/* How long a hello may be unanswered before another one is sent. */
+static const uint64_t GREETING_NS = 5000000000u;
+
 /* What stands under `hal.`; the wire's own counters follow it. */
 typedef struct {
     uint64_t connected;
@@ -57,6 +60,7 @@ typedef struct {
     fcsl_wire_t wire;
     int has_wire;
     int greets; /* the hello was sent, and not answered yet */
+    uint64_t greeted_ns; /* when; 0: nobody can answer any more */
     int is_over; /* the peer has ended the run, or is gone */
     int paces;
     int sensed;           /* the sensor message of the tick has come */
@@ -454,6 +458,11 @@ static int hear_hello(hal_t *hal, uint64_t deadline_ns, control_packet_t *packet
         (void)snprintf(error, error_size, "%s", hal->wire.explain(hal->wire.ctx));
         return -1;
     }
+    if (!answered && hal->is_named) {
+        (void)snprintf(error, error_size, "the simulator on %s went away before it answered", hal->spec);
+        hal->greeted_ns = 0;
+        return 1;
+    }
     if (!answered) {
         (void)snprintf(error, error_size, "the other end of the wire did not answer as a simulator does");
         return -1;
@@ -468,6 +477,7 @@ static int shake_hands(hal_t *hal, uint64_t deadline_ns, char *error, size_t err
         (void)snprintf(error, error_size, "cannot send the handshake: the other end is gone");
         return -1;
     }
+    hal->greeted_ns = hal->greets ? hal->greeted_ns : monotonic_ns();
     hal->greets = 1;
     const int unheard = hear_hello(hal, deadline_ns, &packet, error, error_size);
     if (unheard) {
@@ -506,6 +516,16 @@ static int open_spec(hal_t *hal, uint64_t deadline_ns, char *error, size_t error
     return 0;
 }
 
+/* A link that is cut takes a hello with it that was under way, and nobody tells: after a while a new session sends another one. */
+static void begin_anew(hal_t *hal)
+{
+    if (hal->has_wire && hal->is_named && monotonic_ns() - hal->greeted_ns > GREETING_NS) {
+        hal->wire.close(hal->wire.ctx);
+        hal->has_wire = 0;
+        hal->greets = 0;
+    }
+}
+
 static int wire_open(fcsl_hal_t *handle, char *error, size_t error_size)
 {
     hal_t *hal = handle->ctx;
@@ -515,6 +535,9 @@ static int wire_open(fcsl_hal_t *handle, char *error, size_t error_size)
         return failed;
     }
     failed = failed ? failed : shake_hands(hal, deadline_ns, error, error_size);
+    if (failed > 0) {
+        begin_anew(hal);
+    }
     if (failed) {
         return failed;
     }

@@ -162,6 +162,35 @@ static void test_a_rig(void)
     (void)fcsl_bus_close(bus, WAIT_MS);
 }
 
+/* A simulator that ends without an answer is one that was not found: the controller looks on, and meets the next one. */
+static void look_on(void)
+{
+    char error[TEXT_BYTES] = "";
+    fcsl_hal_t hal;
+    CHECK(fcsl_hal_bus(spec, "fleet", &MACHINE, WAIT_MS, WAIT_MS, &hal, error, sizeof error) == 0);
+    CHECK(hal.open(&hal, error, sizeof error) == 1 && strstr(error, "went away before it answered") != NULL);
+    CHECK(hal.open(&hal, error, sizeof error) == 0 && hal.paces);
+    hal.close(hal.ctx);
+}
+
+static void test_a_simulator_that_does_not_answer(void)
+{
+    uint8_t hello[256];
+    const pid_t child = fork();
+    CHECK(child >= 0);
+    if (child == 0) {
+        look_on();
+        _exit(0);
+    }
+    fcsl_bus_t *bus = listen_on_the_bus();
+    take_one(bus, CONTROL, hello, HELLO_BYTES);
+    (void)fcsl_bus_close(bus, WAIT_MS);
+    bus = listen_on_the_bus();
+    shake_hands(bus);
+    join(child);
+    (void)fcsl_bus_close(bus, WAIT_MS);
+}
+
 static void test_bad_commits(void)
 {
     check_end(bad_commits, FCSL_HAL_TIMEOUT, "no time message of tick 2");
@@ -177,5 +206,6 @@ int main(void)
     check_alone(test_bad_commits);
     check_alone(test_a_tick_behind_bad_commits);
     check_alone(test_a_rig);
+    check_alone(test_a_simulator_that_does_not_answer);
     return 0;
 }

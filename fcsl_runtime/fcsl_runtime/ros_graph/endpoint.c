@@ -1,4 +1,7 @@
-/* SPDX-License-Identifier: Apache-2.0 */
+/* SPDX-License-Identifier: Apache-2.0
+ *
+ * Keys and liveliness tokens as zenoh-plugin-ros2dds reads them.
+ */
 #include "endpoint.h"
 
 #include <stdio.h>

@@ -31,7 +31,7 @@
 /* Of other packages. */
 #define FCSL_SCHEMA_CLOCK                                                                                              \
     "builtin_interfaces/Time clock\n" FCSL_SCHEMA_SEPARATOR "MSG: builtin_interfaces/Time\nint32 sec\nuint32 "         \
-                                                            "nanosec\n"
+    "nanosec\n"
 #define FCSL_SCHEMA_STRING "string data\n"
 
 #endif /* FCSL_SCHEMA_H */

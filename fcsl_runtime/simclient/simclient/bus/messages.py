@@ -85,11 +85,6 @@ uint8[] data
 _HEAD = struct.Struct("<4siIIB3xQ")
 
 
-def topic_of(prefix: str, name: str) -> str:
-    """`/[NAMESPACE/]MACHINE/NAME`; a channel has a level for each dot of its name."""
-    return "/" + re.sub(r"[^\w/]", "_", f"{prefix}/{name.replace('.', '/')}", flags=re.ASCII)
-
-
 def type_names(machine: BusMachine) -> dict[str, str]:
     """Type of each channel's message: `imu.gyro` of machine `rover` is rover_bus/msg/ImuGyro."""
     package = re.sub(r"_+", "_", re.sub(r"[^a-z0-9]", "_", machine.name.lower())).strip("_")

@@ -14,6 +14,7 @@ from rosbags.rosbag2 import StoragePlugin, Writer
 from rosbags.rosbag2.errors import WriterError
 from rosbags.typesys import Stores, get_types_from_msg, get_typestore
 
+from ..bag.bus_topics import topic_of
 from ..errors import BusError
 from .machine import BusMachine
 from .messages import (
@@ -25,7 +26,6 @@ from .messages import (
     definition_of,
     message_of,
     string_of,
-    topic_of,
     type_names,
 )
 from .reproduction import Event, Reproduction

@@ -8,6 +8,7 @@ from collections.abc import Callable, Iterator
 from dataclasses import dataclass, field
 
 from ..bag import Bag, RecordedMachine
+from ..bag.bus_topics import topic_of
 from ..c_machine import TYPE_FORMATS
 from ..descriptor import Machine
 from ..errors import BagError
@@ -15,7 +16,7 @@ from ..link.message import Channel as Row
 from ..link.message import table_hash
 from ..run import Run
 from .machine import BusChannel, BusMachine, read_machine
-from .messages import DESCRIPTOR, topic_of
+from .messages import DESCRIPTOR
 
 #: HostWrite.kind
 _CHANNEL, _RESTORE = 3, 2

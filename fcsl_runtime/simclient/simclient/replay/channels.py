@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 
 from ..bag import Bag, RecordedMachine
-from ..bus.messages import topic_of
+from ..bag.bus_topics import topic_of
 from ..c_machine import TYPE_FORMATS
 from ..descriptor import Channel
 from ..errors import BagError
