@@ -64,6 +64,12 @@ fcsl_wire_status_t control_send_end(const fcsl_wire_t *wire, int another_follows
     return send_packet(wire, &packet);
 }
 
+fcsl_wire_status_t control_send_leave(const fcsl_wire_t *wire)
+{
+    const control_packet_t packet = {.kind = CONTROL_END, .table_hash = CONTROL_LEAVES};
+    return send_packet(wire, &packet);
+}
+
 fcsl_wire_status_t control_send_alive(const fcsl_wire_t *wire)
 {
     const control_packet_t packet = {.kind = CONTROL_ALIVE};

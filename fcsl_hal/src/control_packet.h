@@ -8,7 +8,7 @@
  *   6      1   kind
  *   7      1   hello: 1 when the sender is a simulator that sends the time, or a controller that runs free; end: 1 when another run
  *              follows; else zero
- *   8      4   channel-table hash    hello only, else zero
+ *   8      4   hello: channel-table hash; end: 1 when the sender is a controller; else zero
  *   12     8   tick_hz               hello only, else zero
  *   20     n   text, not terminated  refusal only, at most CONTROL_TEXT_MAX bytes
  */
@@ -22,6 +22,7 @@ enum {
     CONTROL_HEADER_BYTES = 20,
     CONTROL_TEXT_MAX = 236,
     CONTROL_PACKET_MAX = CONTROL_HEADER_BYTES + CONTROL_TEXT_MAX,
+    CONTROL_LEAVES = 1, /* in place of the hash, in an end: it is a controller that ends its run */
 };
 
 /* How often a party that pauses says that it is alive. */
@@ -48,8 +49,15 @@ int control_parse(const uint8_t *bytes, size_t size, control_packet_t *packet);
 /* Each sends one packet without waiting. */
 fcsl_wire_status_t control_send_hello(const fcsl_wire_t *wire, const fcsl_channel_table_t *table, int flag);
 fcsl_wire_status_t control_send_refusal(const fcsl_wire_t *wire, const char *text);
+/* A simulator's, and a controller's: on the bus they share a key with other controllers, who pass over the latter. */
 fcsl_wire_status_t control_send_end(const fcsl_wire_t *wire, int another_follows);
+fcsl_wire_status_t control_send_leave(const fcsl_wire_t *wire);
 fcsl_wire_status_t control_send_alive(const fcsl_wire_t *wire);
+
+static inline int control_is_leave(const control_packet_t *packet)
+{
+    return packet->kind == CONTROL_END && packet->table_hash == CONTROL_LEAVES;
+}
 
 /* Why the peer's hello does not fit: returns 1 and fills `text`, or 0 when it fits. */
 int control_differs(const control_packet_t *hello, const fcsl_channel_table_t *table, char *text, size_t text_size);

@@ -262,7 +262,12 @@ static fcsl_hal_status_t controller_left(fcsl_external_t *external, control_kind
 static fcsl_hal_status_t look_at(fcsl_external_t *external, uint64_t tick, size_t size, fcsl_message_t *message)
 {
     control_packet_t packet;
-    if (control_parse(external->inbox, size, &packet) == 0 && packet.kind != CONTROL_REFUSAL) {
+    const int is_control = control_parse(external->inbox, size, &packet) == 0;
+    if (is_control && packet.kind == CONTROL_HELLO && packet.flag) { /* another one, which runs free */
+        external->messages_dropped++;
+        return FCSL_HAL_NONE;
+    }
+    if (is_control && packet.kind != CONTROL_REFUSAL) {
         return packet.kind == CONTROL_ALIVE ? FCSL_HAL_WAITING : controller_left(external, packet.kind, tick);
     }
     if (fcsl_message_check(&external->table, FCSL_ACTUATOR_MESSAGE, external->inbox, size, message) !=

@@ -115,11 +115,12 @@ static heard_t judge(hal_t *hal, size_t size, fcsl_message_t *message)
     if (fcsl_message_check(&hal->table, FCSL_TIME_MESSAGE, hal->inbox, size, message) == FCSL_MESSAGE_OK) {
         return HEARD_TIME;
     }
-    if (control_parse(hal->inbox, size, &packet) == 0 && packet.kind == CONTROL_END) {
+    const int is_control = control_parse(hal->inbox, size, &packet) == 0;
+    if (is_control && packet.kind == CONTROL_END && !control_is_leave(&packet)) {
         hal->is_over = 1;
         return packet.flag ? HEARD_AGAIN : HEARD_END;
     }
-    if (control_parse(hal->inbox, size, &packet) == 0 && packet.kind == CONTROL_ALIVE) {
+    if (is_control && packet.kind == CONTROL_ALIVE) {
         return HEARD_ALIVE;
     }
     hal->counters.messages_dropped++;
@@ -427,7 +428,7 @@ static void wire_close(void *ctx)
     hal_t *hal = ctx;
     if (hal->has_wire) {
         if (!hal->is_over) {
-            (void)control_send_end(&hal->wire, 0); /* where it finds no room, the peer waits for its time-out */
+            (void)control_send_leave(&hal->wire); /* where it finds no room, the peer waits for its time-out */
         }
         hal->wire.close(hal->wire.ctx);
     }
@@ -648,10 +649,7 @@ int fcsl_hal_bus(const char *address, const char *name_space, const fcsl_machine
     self->presence = presence_of(FCSL_WIRE_LISTEN, &self->table, &self->log);
     self->open_ms = open_ms;
     (void)snprintf(self->spec, SPEC_BYTES, "%s", address);
-    const size_t lead = strspn(name_space, "/");
-    const size_t length = strlen(name_space + lead);
-    const size_t kept = length > 0u && name_space[lead + length - 1u] == '/' ? length - 1u : length;
-    (void)snprintf(self->name_space, SPEC_BYTES, "%.*s", (int)kept, name_space + lead);
+    (void)snprintf(self->name_space, SPEC_BYTES, "%s", name_space);
     return 0;
 }
 

@@ -11,6 +11,8 @@
 #include "codec_layout.h"
 #include "commit.h"
 #include "fcsl/fcsl_bus.h"
+#include "fcsl/fcsl_gate.h"
+#include "name_space.h"
 #include "payload.h"
 
 enum {
@@ -38,6 +40,7 @@ struct fcsl_mirror {
     fcsl_bus_t *bus;
     uint8_t *fresh; /* of each channel: has a value in the tick */
     uint32_t *ages; /* of each channel, in the tick posted before */
+    int64_t *stamps_ns; /* likewise */
     payload_t payload;
     uint8_t *value; /* the longest of a channel, or a commit */
     uint64_t tick;  /* posted before */
@@ -62,8 +65,11 @@ static int is_sampled(fcsl_mirror_t *mirror, uint32_t number, const uint8_t *dat
 {
     const fcsl_channel_t *channel = &mirror->table.machine->channels[number];
     const uint32_t before = mirror->ages[number];
+    const int64_t stamped_ns = mirror->stamps_ns[number];
     mirror->ages[number] = word_at(data, channel->age_offset);
-    return !mirror->has_begun || data[channel->attached_offset] == 0u || mirror->ages[number] == 0u ||
+    memcpy(&mirror->stamps_ns[number], data + channel->stamp_offset, sizeof stamped_ns);
+    return !mirror->has_begun || mirror->stamps_ns[number] != stamped_ns || data[channel->attached_offset] == 0u ||
+           mirror->ages[number] == 0u ||
            (mirror->ages[number] != UINT32_MAX && mirror->ages[number] != before + (tick - mirror->tick));
 }
 
@@ -104,7 +110,7 @@ int fcsl_mirror_post(fcsl_mirror_t *mirror, const void *data, uint64_t tick, uin
     int failed = post_direction(mirror, &commit, bytes, time_ns);
     commit.direction = FCSL_ACTUATOR;
     commit.time_ns = 0;
-    commit.armed = machine->arm_field == FCSL_NONE || bytes[machine->fields[machine->arm_field].offset] != 0u;
+    commit.armed = fcsl_is_armed(machine, bytes);
     failed = failed || post_direction(mirror, &commit, bytes, time_ns);
     mirror->tick = tick;
     mirror->has_begun = !failed;
@@ -221,8 +227,9 @@ static fcsl_mirror_t *allocate(const fcsl_machine_t *machine, char *error, size_
     mirror->table = fcsl_channel_table(machine);
     mirror->fresh = calloc(channels + 1u, 1);
     mirror->ages = calloc(channels + 1u, sizeof *mirror->ages);
+    mirror->stamps_ns = calloc(channels + 1u, sizeof *mirror->stamps_ns);
     mirror->value = calloc(longest, 1);
-    if (mirror->fresh == NULL || mirror->ages == NULL || mirror->value == NULL ||
+    if (mirror->fresh == NULL || mirror->ages == NULL || mirror->stamps_ns == NULL || mirror->value == NULL ||
         payload_open(&mirror->payload, machine, error, error_size) != 0) {
         fcsl_mirror_close(mirror);
         return NULL;
@@ -251,8 +258,9 @@ static const char *write_key(char *keys, uint32_t place, const fcsl_mirror_optio
                              const char *name)
 {
     char *key = keys + (size_t)place * (FCSL_BUS_KEY_MAX + 1u);
-    (void)snprintf(key, FCSL_BUS_KEY_MAX + 1u, "%s%s%s/%s", options->name_space,
-                   options->name_space[0] != '\0' ? "/" : "", machine, name);
+    const char *name_space = options->name_space;
+    const int length = name_space_trim(&name_space);
+    (void)snprintf(key, FCSL_BUS_KEY_MAX + 1u, "%.*s%s%s/%s", length, name_space, length > 0 ? "/" : "", machine, name);
     return key;
 }
 
@@ -320,6 +328,7 @@ void fcsl_mirror_close(fcsl_mirror_t *mirror)
     payload_close(&mirror->payload);
     free(mirror->fresh);
     free(mirror->ages);
+    free(mirror->stamps_ns);
     free(mirror->value);
     free(mirror);
 }

@@ -72,8 +72,14 @@ int presence_hear(presence_t *presence, const uint8_t *bytes, size_t size)
     if (control_parse(bytes, size, &packet) != 0) {
         return 0;
     }
+    const int is_of_controller = control_is_leave(&packet) || (packet.kind == CONTROL_HELLO && packet.flag);
+    if (is_of_controller && !presence->expects) {
+        return 1; /* from another controller; of a simulator in lock-step a refusal tells */
+    }
     if (packet.kind == CONTROL_END) {
         leave(presence, "ended its run");
+    } else if (packet.kind == CONTROL_REFUSAL) {
+        refuse(presence, packet.text);
     } else if (packet.kind == CONTROL_HELLO && packet.flag != presence->expects) {
         refuse(presence, "it flies in lock-step; write ,free-running behind its address, too");
     } else if (packet.kind == CONTROL_HELLO && control_differs(&packet, presence->table, why, sizeof why)) {

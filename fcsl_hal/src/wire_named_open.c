@@ -12,6 +12,7 @@
 #include "control_packet.h"
 #include "fcsl/fcsl_address.h"
 #include "monotonic.h"
+#include "name_space.h"
 #include "wire_named_internal.h"
 
 enum {
@@ -75,7 +76,8 @@ static named_wire_t *allocate(const fcsl_channel_table_t *table, fcsl_wire_side_
 static const char *add_key(named_wire_t *wire, uint32_t *count, const char *name_space, const char *name)
 {
     char *key = wire->keys + (size_t)(*count)++ * (FCSL_BUS_KEY_MAX + 1u);
-    (void)snprintf(key, FCSL_BUS_KEY_MAX + 1u, "%s%s%s/%s", name_space, name_space[0] != '\0' ? "/" : "",
+    const int length = name_space_trim(&name_space);
+    (void)snprintf(key, FCSL_BUS_KEY_MAX + 1u, "%.*s%s%s/%s", length, name_space, length > 0 ? "/" : "",
                    wire->table->machine->name, name);
     return key;
 }
@@ -96,8 +98,8 @@ static void fill_plan(named_wire_t *wire, const char *name_space)
     plan->outputs[plan->output_count++] = commit;
     plan->inputs[plan->input_count++] =
         (fcsl_bus_input_t){.key = control, .bytes = CONTROL_PACKET_MAX, .depth = CONTROLS_WAITING};
-    plan->inputs[plan->input_count++] =
-        (fcsl_bus_input_t){.key = commit, .bytes = commit_size, .least = commit_size, .depth = COMMITS_WAITING};
+    plan->inputs[plan->input_count++] = (fcsl_bus_input_t){
+        .key = commit, .bytes = commit_size, .least = commit_size, .depth = wire->runs_free ? 1u : COMMITS_WAITING};
     plan->tick_bytes = CONTROL_PACKET_MAX + commit_size + NAMED_CHANNELS * (uint64_t)ENTRY_BYTES_MAX;
     for (uint32_t i = 0; i < machine->channel_count; i++) {
         const fcsl_channel_t *channel = &machine->channels[i];

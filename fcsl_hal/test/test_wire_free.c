@@ -121,6 +121,7 @@ static void test_commands(void)
     CHECK(take(&wire, 8, FCSL_ACTUATOR_MESSAGE, bytes, &message) == FCSL_WIRE_OK);
     check_command(&message, 3.0, 0);
     post_commit(bus, 1, FCSL_ACTUATOR, 1);
+    CHECK(take(&wire, 9, FCSL_ACTUATOR_MESSAGE, bytes, &message) == FCSL_WIRE_NONE);
     post_commit(bus, 0, FCSL_SENSOR, 1);
     CHECK(take(&wire, 10, FCSL_ACTUATOR_MESSAGE, bytes, &message) == FCSL_WIRE_NONE);
     CHECK(count(&wire).commits_refused == 2);

@@ -3,6 +3,7 @@
 
 use std::collections::HashSet;
 use std::ffi::{c_char, c_void};
+use std::sync::mpsc::{sync_channel, SyncSender};
 use std::sync::{Arc, Mutex};
 
 use zenoh::bytes::ZBytes;
@@ -72,6 +73,19 @@ impl Drop for Events {
     }
 }
 
+/// Queries that wait for their answer. More are dropped: who asked may ask again.
+const QUERIES_MAX: usize = 8;
+
+type Reply = Box<dyn FnOnce() + Send>;
+
+/// A thread that replies until all senders are gone. A reply waits for a slow receiver, and Zenoh's own threads, which serve all
+/// sessions of the process, must not.
+fn start_replier() -> Result<SyncSender<Reply>, std::io::Error> {
+    let (sender, replies) = sync_channel::<Reply>(QUERIES_MAX);
+    std::thread::Builder::new().spawn(move || replies.into_iter().for_each(|reply| reply()))?;
+    Ok(sender)
+}
+
 /// The last message of a latched output, with its time: by that a subscriber knows a message that it has got already.
 type Latch = Arc<Mutex<Option<(ZBytes, Timestamp)>>>;
 
@@ -85,6 +99,8 @@ pub struct Zenoh {
     outputs: Vec<Output>,
     /// What queries get; empty: nothing.
     answers: Vec<Arc<Mutex<ZBytes>>>,
+    /// Of a session that answers queries.
+    replier: Option<SyncSender<Reply>>,
     /// They live as long as the session.
     tokens: Vec<LivelinessToken>,
     session: Session,
@@ -108,7 +124,24 @@ fn later(now: Timestamp, last: Option<&(ZBytes, Timestamp)>) -> Timestamp {
 impl Zenoh {
     fn open(config: Result<Config, zenoh::Error>, events: Arc<Events>) -> Result<Self, Reason> {
         let session = config.and_then(|config| zenoh::open(config).wait()).map_err(reason_of)?;
-        Ok(Self { inputs: Vec::new(), outputs: Vec::new(), answers: Vec::new(), tokens: Vec::new(), session, events })
+        Ok(Self {
+            inputs: Vec::new(),
+            outputs: Vec::new(),
+            answers: Vec::new(),
+            replier: None,
+            tokens: Vec::new(),
+            session,
+            events,
+        })
+    }
+
+    fn replier(&mut self) -> Result<SyncSender<Reply>, zenoh::Error> {
+        let replier = match self.replier.take() {
+            Some(replier) => replier,
+            None => start_replier()?,
+        };
+        self.replier = Some(replier.clone());
+        Ok(replier)
     }
 
     fn declare_output(&mut self, number: u32, key: &str, droppable: bool) -> Result<(), zenoh::Error> {
@@ -139,6 +172,7 @@ impl Zenoh {
     /// under this key advanced subscribers ask for it, and by the token they find publishers that come after them.
     fn latch_output(&mut self) -> Result<(), zenoh::Error> {
         let zid = self.session.zid();
+        let replier = self.replier()?;
         let output = self.outputs.last_mut().ok_or("there is no output")?;
         let answer = output.publisher.key_expr().clone().into_owned();
         let key = KeyExpr::new(format!("{answer}/@adv/pub/{zid}/uhlc/_"))?;
@@ -147,7 +181,10 @@ impl Zenoh {
         let callback = move |query: Query| {
             let last = kept.lock().ok().and_then(|last| last.clone());
             if let Some((bytes, time)) = last {
-                let _ = query.reply(&answer, bytes).timestamp(time).wait(); // as of constants
+                let answer = answer.clone();
+                let _ = replier.try_send(Box::new(move || {
+                    let _ = query.reply(&answer, bytes).timestamp(time).wait(); // refused for a query of its own key alone
+                }));
             }
         };
         let queryable = self.session.declare_queryable(key.clone()).callback(callback);
@@ -185,11 +222,15 @@ impl Zenoh {
         let key = KeyExpr::new(key.to_owned())?;
         let answer = Arc::new(Mutex::new(ZBytes::from(bytes.to_vec())));
         self.answers.push(answer.clone());
+        let replier = self.replier()?;
         let own = key.clone();
         let callback = move |query: Query| {
             let bytes = answer.lock().map(|bytes| bytes.clone()).unwrap_or_default(); // shares what is replaced
             if !bytes.is_empty() {
-                let _ = query.reply(&own, bytes).wait(); // refused for a query that takes only its own key
+                let own = own.clone();
+                let _ = replier.try_send(Box::new(move || {
+                    let _ = query.reply(&own, bytes).wait(); // refused for a query that takes only its own key
+                }));
             }
         };
         let queryable = self.session.declare_queryable(key).callback(callback);

@@ -85,7 +85,10 @@ static int put(void *ctx, const followed_tick_t *tick)
             continue;
         }
         const size_t size = ros_topics_write(&g->topics, i, tick->publication, stamp, g->message);
-        failed |= size > 0u && fcsl_bus_post(g->bus, i, g->message, size) != 0;
+        if (size > 0u && fcsl_bus_post(g->bus, i, g->message, size) != 0) {
+            ros_topics_unsay(&g->topics, i);
+            failed = 1;
+        }
     }
     return failed ? -1 : 0;
 }

@@ -8,6 +8,7 @@
 #include <string.h>
 
 #include "endpoint.h"
+#include "fcsl/fcsl_gate.h"
 #include "fcsl/fcsl_scalar.h"
 #include "messages/schema.h"
 #include "messages/type_hash.h"
@@ -240,7 +241,7 @@ static size_t write_mapped(const ros_topics_t *topics, const ros_topic_t *topic,
     if (!is_actuator && !is_sampled(machine, topic->mapped, data)) {
         return 0;
     }
-    const int is_armed = machine->arm_field == FCSL_NONE || data[machine->fields[machine->arm_field].offset] != 0u;
+    const int is_armed = fcsl_is_armed(machine, data);
     const uint8_t *memory = is_actuator && !is_armed && topics->safe != NULL ? topics->safe : data;
     return fcsl_ros_compose(topic->composer, &memory, (int64_t)stamp.time_ns, bytes) == FCSL_ROS_TAKEN ? topic->longest
                                                                                                        : 0u;
@@ -260,4 +261,9 @@ size_t ros_topics_write(ros_topics_t *topics, uint32_t number, const uint8_t *da
     default:
         return write_tick_message(topics->machine, topic, data, stamp, bytes);
     }
+}
+
+void ros_topics_unsay(ros_topics_t *topics, uint32_t number)
+{
+    topics->topics[number].said_bytes = 0;
 }

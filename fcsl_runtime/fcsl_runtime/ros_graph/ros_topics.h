@@ -43,4 +43,7 @@ void ros_topics_free(ros_topics_t *topics);
  * `bytes` has room for the topic's longest. */
 size_t ros_topics_write(ros_topics_t *topics, uint32_t number, const uint8_t *data, fcsl_stamp_t stamp, uint8_t *bytes);
 
+/* What was written last was not put: it is written again with the next tick. */
+void ros_topics_unsay(ros_topics_t *topics, uint32_t number);
+
 #endif /* FCSL_ROS_GRAPH_ROS_TOPICS_H */

@@ -306,13 +306,16 @@ static void test_payloads(void)
 {
     static const uint32_t numbers[8] = {0, 1, 2, 3, 4, 5, 6, 7};
     const fcsl_ros_composer_plan_t composer = {.memory_count = 1};
-    const fcsl_ros_reader_plan_t reader = {.value_count = 1};
+    fcsl_ros_value_t values[8];
+    fcsl_ros_reader_plan_t readers[8];
     const fcsl_ros_reader_plan_t none = {.value_count = 0};
     fcsl_ros_message_t messages[8];
     fcsl_error_t error;
     for (uint32_t i = 0; i < good->channel_count; i++) {
+        values[i] = (fcsl_ros_value_t){.size = good->fields[good->channels[i].field].size};
+        readers[i] = (fcsl_ros_reader_plan_t){.values = &values[i], .value_count = 1};
         messages[i] = (fcsl_ros_message_t){
-            "", "std_msgs/msg/Float64", good->channels[i].direction, &numbers[i], 1, &composer, &reader};
+            "", "std_msgs/msg/Float64", good->channels[i].direction, &numbers[i], 1, &composer, &readers[i]};
     }
     copy_good();
     machine.payloads = messages;
@@ -320,6 +323,8 @@ static void test_payloads(void)
     messages[1].channels = &numbers[0];
     REFUSED(machine.payloads = messages, "payload of channel 1");
     messages[1].channels = &numbers[1];
+    values[1].size++;
+    REFUSED(machine.payloads = messages, "payload of channel 1");
     messages[1].reader = &none; /* as of a blob */
     REFUSED(machine.payloads = messages, "payload of channel 1");
 }

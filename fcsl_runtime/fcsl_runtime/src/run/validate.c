@@ -188,6 +188,16 @@ static int check_ros_message(const fcsl_machine_t *machine, const fcsl_ros_messa
     return 0;
 }
 
+/* Whether a payload is of another size than its channel's field; without a value it is a blob, whose size stands before its bytes. */
+static int holds_another(const fcsl_machine_t *machine, const fcsl_ros_message_t *message, uint32_t values)
+{
+    const fcsl_field_t *field = &machine->fields[machine->channels[message->channels[0]].field];
+    if (values == 0u) {
+        return message->composer->size < 2u * sizeof(uint32_t);
+    }
+    return message->reader->values == NULL || message->reader->values[0].offset != 0u || message->reader->values[0].size != field->size;
+}
+
 static int check_ros_messages(const fcsl_machine_t *machine, fcsl_error_t *error)
 {
     const char *name = machine->name;
@@ -201,7 +211,7 @@ static int check_ros_messages(const fcsl_machine_t *machine, fcsl_error_t *error
         const fcsl_ros_message_t *message = &machine->payloads[i];
         const uint32_t values = machine->channels[i].as == FCSL_AS_BLOB ? 0u : 1u;
         if (check_ros_message(machine, message, values) != 0 || message->channel_count != 1u ||
-            message->channels[0] != i) {
+            message->channels[0] != i || holds_another(machine, message, values)) {
             return fcsl_fail(error, "machine '%s': the payload of channel %u of its descriptor is inconsistent", name,
                              i);
         }
