@@ -110,7 +110,7 @@ def test_two_simulations_at_one_address(tmp_path: Path) -> None:
     run("fcslc", "build", MACHINE, "-o", tmp_path)
     run("fcsl-sim", "run", SIM, "--record", tmp_path / "alone")
     endpoint = free_endpoint()
-    names = {"two": ("zenoh-client", 20), "one": ("zenoh", 8)}  # who listens ends last
+    names = {"two": ("zenoh-client", 20), "one": ("zenoh", 5)}  # who listens ends last
     with contextlib.ExitStack() as stack:
         begin = lambda *line: stack.enter_context(started(*line))  # noqa: E731
         sims, controllers = [], []
@@ -120,6 +120,10 @@ def test_two_simulations_at_one_address(tmp_path: Path) -> None:
         for name in names:
             where = ["--hal", f"zenoh:{endpoint}", "--namespace", name, "--timeout-ms", "60000"]
             controllers.append(begin("fcsl-fc", tmp_path / "liblander_control.so", *where, "--record", tmp_path / name))
+            give_up_s = time.monotonic() + LONG_S
+            while not (tmp_path / name).exists():  # it flies
+                assert time.monotonic() < give_up_s
+                time.sleep(0.01)
         for process in (*controllers, *sims):
             _, complaint = process.communicate(timeout=LONG_S)
             assert process.returncode == 0, complaint

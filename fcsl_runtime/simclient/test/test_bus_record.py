@@ -11,6 +11,7 @@ import signal
 import struct
 import subprocess
 import sys
+import time
 from pathlib import Path
 from typing import Any
 
@@ -95,9 +96,9 @@ def test_a_machine_that_reads_hardware(tmp_path: Path) -> None:
                     client.hardware("adc", 3, counts)
                     client.sample("level", counts * 0.125, age_ticks=2, stamp_ns=5)
                     client.set({"probe.parameters.gain": counts / 3.0})
-                    client.tick(20)
+                    tick_followed(client, 20)
                 client.set_state("B")
-                client.tick(10)
+                tick_followed(client, 10)
                 last = client.get_value("machine.tick") - 1
             fc.send_signal(signal.SIGTERM)
             out, err = recorder.communicate(timeout=LONG_S)
@@ -113,6 +114,16 @@ def test_a_machine_that_reads_hardware(tmp_path: Path) -> None:
     whole = tmp_path / "bag"
     with pytest.raises(BagError, match="`fcsl-bus record` made it"):
         Bag(whole).machine()
+
+
+def tick_followed(client: VarClient, ticks: int) -> None:
+    """Makes ticks, and waits until observers have them: the history holds 64, and a busy machine is slow to follow."""
+    client.tick(ticks)
+    wanted = client.get_value("machine.tick")
+    give_up_s = time.monotonic() + LONG_S
+    while client.stats()["observers"]["ticks"] < wanted:
+        assert time.monotonic() < give_up_s
+        time.sleep(0.005)
 
 
 def recorder_waits(recorder: subprocess.Popen[str]) -> bool:

@@ -20,10 +20,11 @@ import pytest
 from native import PROGRAM, free_endpoint
 
 from simclient.bag import Bag, rows_of
+from simclient.bag.bus_topics import topic_of
 from simclient.bag.info import describe
 from simclient.bus.cli import _read_descriptors
 from simclient.bus.machine import BusChannel, BusMachine, read_machine
-from simclient.bus.messages import definition_of, message_of, topic_of, type_names
+from simclient.bus.messages import definition_of, message_of, type_names
 from simclient.bus.session import Session
 from simclient.bus.ticks import TickReader
 from simclient.errors import BusError

@@ -42,7 +42,7 @@ class Arrival(ctypes.Structure):
 def build(folder: Path) -> ctypes.CDLL:
     """pacing.c as a library of its own."""
     library = folder / "libpacing.so"
-    flags = [*CFLAGS, f"-I{RUNTIME / 'src'}"]
+    flags = [*CFLAGS, f"-I{RUNTIME / 'src'}", f"-I{RUNTIME.parents[1] / 'fcsl_hal/include'}"]
     subprocess.run(["cc", *flags, str(RUNTIME / "fc/pacing.c"), "-o", str(library)], check=True)
     loaded = ctypes.CDLL(str(library))
     loaded.pacing_start.argtypes = [ctypes.c_int, ctypes.c_uint64, ctypes.c_uint64]
