@@ -51,7 +51,9 @@ def test_the_source_of_the_page_is_one(tmp_path: Path) -> None:
     place = f"tcp/127.0.0.1:{free_port(socket.SOCK_STREAM)}"
     with subprocess.Popen([sys.executable, tmp_path / "source.py", place]) as source:
         options = ["--hal", f"zenoh:{place},free-running", "--ticks", "300", "--summary", summary]
-        subprocess.run(["fcsl-fc", tmp_path / "liblander_control.so", *options], check=True, timeout=LONG_S)
-        source.kill()
+        try:
+            subprocess.run(["fcsl-fc", tmp_path / "liblander_control.so", *options], check=True, timeout=LONG_S)
+        finally:
+            source.kill()
     counted = json.loads(summary.read_text())["hal"]
     assert counted["messages"] > 50 and counted["bus.strays"] == counted["bus.wrong_size"] == 0

@@ -162,6 +162,7 @@ class ControllerNode(LifecycleNode):
         """The actuators on topics get their safe values: no command follows."""
         ended, self._active = self._active, False
         if ended and self._hosted is not None and self._mode is not None:
+            self._hosted.forward.all()  # what the last ticks put; commands come before safe values
             self._hosted.outputs.make_safe(self._mode.now_ns())
 
     def _release(self, why: str) -> None:

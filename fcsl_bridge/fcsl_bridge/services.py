@@ -180,7 +180,7 @@ class MachineServices:
 
     async def _inject_fault(self, request: Any, response: Any) -> None:
         if not self._allowed.faults:
-            raise BridgeError("only in a simulation: in lock-step, or with use_sim_time")
+            raise BridgeError("only where time is simulated: mode lockstep or clock, or use_sim_time")
         if request.kind == _Fault.DROPOUT:
             self._dropouts.add(request.name, request.ticks)
             return

@@ -162,5 +162,6 @@ class Control:
         """Ends the simulation: answers a pending ~/step, and gives the last answers time to arrive."""
         self._end_step("the simulation is over")
         self._housekeeping.idle(SERVE_PERIOD_S)
-        while time.monotonic() < self._asked_s + _ANSWER_S:
+        until_s = self._asked_s + _ANSWER_S
+        while time.monotonic() < until_s:
             self._housekeeping.idle(SERVE_PERIOD_S)

@@ -112,6 +112,7 @@ class Simulator:
             print(f"{self._machine.name}: waiting for a controller on {self._endpoint}", flush=True)
             self._fly_on()
         except Stopped:
+            self._forward.all()
             for vehicle in self._vehicles:
                 vehicle.sim.end(another_follows=False)
             print(self._progress.summary(f"interrupted at tick {self._tick}"))

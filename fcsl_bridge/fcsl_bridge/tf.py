@@ -67,6 +67,8 @@ def broadcasts(chosen: Iterable[str], topics: Sequence[Posed]) -> dict[str, Comp
             raise BridgeError(f"parameter `tf`: this node publishes no pose on `{name}`{hint}")
         posed = replace(topic, child_frame=child or topic.child_frame)
         _check(text, posed)
+        if name in found:
+            raise BridgeError(f"parameter `tf`: `{name}` is named twice")
         if posed.child_frame in children:
             raise BridgeError(
                 f"parameter `tf`: `{children[posed.child_frame]}` and `{text}` both place `{posed.child_frame}`"

@@ -193,6 +193,12 @@ def test_the_end_of_the_flight_ends_a_recording(library: Path, tmp_path: Path) -
     assert re.search("rig: reproduces ticks [0-9]+ to 499$", out)
 
 
+def test_the_end_of_the_flight_ends_hz(library: Path) -> None:
+    where = free_endpoint()
+    with flying(library, where, "--ticks", "500"):
+        assert tool("hz", "-c", where)[0].startswith("1 s  rig/packet ")
+
+
 def test_put(endpoint: str, rig: BusMachine, tmp_path: Path) -> None:
     """Who subscribes on the bus gets it; with a file, also where no descriptor is served."""
     got: queue.Queue[bytes] = queue.Queue()

@@ -278,14 +278,16 @@ def test_free_running(folder: Path, tmp_path: Path) -> None:
     """It may not even wait for a peer. Values come at about its own rate, and their source, which reads its commands, freezes."""
     endpoint = free_endpoint()
     with subprocess.Popen([sys.executable, "-c", SOURCE, endpoint], stdout=subprocess.PIPE, text=True) as source:
-        assert source.stdout and source.stdout.readline() == "listening\n"
-        options = ("--hal", f"zenoh:{endpoint},free-running", "--record", str(tmp_path / "bag"))
-        fc = Watched(folder, machine(folder, 0, "flown", CHANNELS), *options)
-        for _ in range(TICKS // 3):
-            assert source.stdout.readline() == "heard\n"
-        source.send_signal(signal.SIGSTOP)
-        assert fc.allocations() == 0
-        source.kill()
+        try:
+            assert source.stdout and source.stdout.readline() == "listening\n"
+            options = ("--hal", f"zenoh:{endpoint},free-running", "--record", str(tmp_path / "bag"))
+            fc = Watched(folder, machine(folder, 0, "flown", CHANNELS), *options)
+            for _ in range(TICKS // 3):
+                assert source.stdout.readline() == "heard\n"
+            source.send_signal(signal.SIGSTOP)
+            assert fc.allocations() == 0
+        finally:
+            source.kill()
 
 
 # ---- controls

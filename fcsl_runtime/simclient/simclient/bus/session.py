@@ -59,6 +59,7 @@ class Session:
         self._listens = listens
         self.dropped = 0
         self._stopped = False
+        self._seen_s = time.monotonic()  # when the one that listens was seen
         self._zenoh = _zenoh()
         self._session = self._open()
         self._waiting: deque[Message] = deque()
@@ -149,7 +150,6 @@ class Session:
     def messages(self, until_s: float | None = None) -> Iterator[Message | None]:
         """What came, in its order; None where nothing more has come yet. Ends at `until_s` of time.monotonic(), after
         `stop`, or when the one that listens is gone."""
-        seen_s = time.monotonic()
         while not self._stopped and (until_s is None or time.monotonic() < until_s):
             with self._news:
                 if not self._waiting:
@@ -159,8 +159,8 @@ class Session:
             yield from batch
             yield None
             if batch or self._is_connected():
-                seen_s = time.monotonic()
-            elif time.monotonic() > seen_s + _GONE_S:
+                self._seen_s = time.monotonic()
+            elif time.monotonic() > self._seen_s + _GONE_S:
                 return
 
     def receive(self, until_s: float) -> Message | None:
