@@ -85,7 +85,7 @@ def test_a_disarmed_machine_publishes_safe_values(
     run = opened(tmp_path, **keys)
     forward = Forward(lossless=False)
     messages = RunTopics(run, forward.outbox)
-    mapped_topics.Outputs(None, run, forward, messages)  # type: ignore[arg-type]  # the node is for publishers only
+    mapped_topics.Outputs(None, run, forward, messages, ())  # type: ignore[arg-type]  # the node is for publishers only
     go = run.machine.fields["pilot.inputs.go"].index
     for on in (False, True, True, False):
         run.set(go, 0, bytes([on]))
@@ -111,7 +111,7 @@ def test_the_end_of_ticking_waits_once_for_all_actuators(
     run = opened(tmp_path, channels=[{**FORCE, "safe": -1.0}, {**other, "safe": -2.0}], **arm)
     forward = Forward(lossless=False)
     messages = RunTopics(run, forward.outbox)
-    outputs = mapped_topics.Outputs(None, run, forward, messages)  # type: ignore[arg-type]  # the node is for publishers only
+    outputs = mapped_topics.Outputs(None, run, forward, messages, ())  # type: ignore[arg-type]  # the node is for publishers only
     outputs.make_safe(0)
     assert publisher.values == published and publisher.waited_s <= 0.2
     messages.close()

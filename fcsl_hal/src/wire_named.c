@@ -49,11 +49,12 @@ static fcsl_wire_status_t take(void *ctx, uint8_t *bytes, size_t capacity, size_
     if (wire->time_follows) {
         return named_make_time(wire, bytes, capacity, size);
     }
-    if (bus_peer_meet(&wire->peer)) {
-        /* Looked at before commits: what the peer put before a control packet is there then. */
-        if (wire->control_size == 0u) {
-            (void)fcsl_bus_take(wire->peer.bus, NAMED_CONTROL, wire->control, &wire->control_size);
-        }
+    /* Looked at before commits: what the peer put before a control packet is there then. */
+    if (wire->control_size == 0u) {
+        (void)fcsl_bus_take(wire->peer.bus, NAMED_CONTROL, wire->control, &wire->control_size);
+    }
+    /* Who says hello hears already, whatever is known of it. */
+    if (bus_peer_meet(&wire->peer) || (lives && wire->control_size > 0u && bus_peer_met(&wire->peer))) {
         const fcsl_wire_status_t status =
             wire->greeted ? named_take_commit(wire, bytes, capacity, size) : FCSL_WIRE_NONE;
         if (status != FCSL_WIRE_NONE) {
