@@ -466,7 +466,9 @@ def instance(name: str) -> Any:
 def test_faults_are_injected_in_a_simulation_only(domain: Domain, library: Path) -> None:
     process, client = free(domain, library)
     answer = client.call(InjectFault, "inject_fault", kind=FAULT, name="imu")
-    assert not answer.success and answer.message == "only where time is simulated: mode lockstep or clock, or use_sim_time"
+    assert (
+        not answer.success and answer.message == "only where time is simulated: mode lockstep or clock, or use_sim_time"
+    )
     process.signal(signal.SIGINT)
     assert process.finish() == 0
     _, client = free(domain, library, use_sim_time=True)

@@ -195,7 +195,8 @@ static int holds_another(const fcsl_machine_t *machine, const fcsl_ros_message_t
     if (values == 0u) {
         return message->composer->size < 2u * sizeof(uint32_t);
     }
-    return message->reader->values == NULL || message->reader->values[0].offset != 0u || message->reader->values[0].size != field->size;
+    return message->reader->values == NULL || message->reader->values[0].offset != 0u ||
+           message->reader->values[0].size != field->size;
 }
 
 static int check_ros_messages(const fcsl_machine_t *machine, fcsl_error_t *error)
