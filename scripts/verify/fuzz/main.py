@@ -44,13 +44,14 @@ FLAGS = (
 )
 _NATIVE = (
     "fcsl_hal/src",
-    *(f"fcsl_runtime/fcsl_runtime/{folder}" for folder in ("src/*", "fc", "observers")),
+    *(f"fcsl_runtime/fcsl_runtime/{folder}" for folder in ("src/*", "fc", "observers", "ros_graph")),
     "fcsl_sim/src",
 )
 _INCLUDES = (
     *("fcsl_hal/include", "fcsl_runtime/fcsl_runtime/include", "fcsl_sim/include", "fcsl_compiler/include"),
     *(
         "fcsl_hal/src",
+        "fcsl_runtime/fcsl_runtime",
         "fcsl_runtime/fcsl_runtime/src",
         "fcsl_runtime/fcsl_runtime/src/*/",
         "fcsl_runtime/fcsl_runtime/fc",
