@@ -145,7 +145,7 @@ TARGETS = (
         "ros_compose",
         "plans of ROS 2 messages to write",
         "simclient",
-        Defect(f"{_HAL}/ros_number.c", "rows[i].offset > size - bytes", "rows[i].offset > size"),
+        Defect(f"{_HAL}/ros_number.c", "row->offset > size - bytes", "row->offset > size"),
         longest=512,
     ),
     Target(
