@@ -1,6 +1,6 @@
 # SPDX-License-Identifier: Apache-2.0
-"""`python3 scripts/failed_tests.py FOLDER`: one line per test that failed, of every JUnit and CTest file below FOLDER. The last lines that
-`make test` prints, so that whoever sees only the end of a long output knows what to run again."""
+"""`python3 scripts/failed_tests.py FOLDER`: the tests that failed and why, of every JUnit and CTest file below FOLDER. The last lines that
+`make test` prints, so that whoever sees only the end of a long output knows what happened and what to run again."""
 
 from __future__ import annotations
 
@@ -9,8 +9,12 @@ import xml.etree.ElementTree as ET
 from pathlib import Path
 
 
+#: Of a message: what a process printed stands in its later lines.
+_LINES_MAX, _CHARACTERS_MAX = 12, 300
+
+
 def failed(file: Path) -> list[str]:
-    """`name: first line of the message`; a file that cannot be read counts as failed."""
+    """`name: message`, its lines below each other; a file that cannot be read counts as failed."""
     try:
         root = ET.parse(file).getroot()
     except ET.ParseError as error:
@@ -19,7 +23,9 @@ def failed(file: Path) -> list[str]:
     for case in root.iter("testcase"):
         for outcome in (*case.findall("failure"), *case.findall("error")):
             message = (outcome.get("message") or outcome.text or "").strip().splitlines()
-            lines.append(f"{case.get('classname', '')}::{case.get('name', '')}: {message[0] if message else ''}"[:300])
+            first, *more = message[:_LINES_MAX] or [""]
+            lines.append(f"{case.get('classname', '')}::{case.get('name', '')}: {first}"[:_CHARACTERS_MAX])
+            lines += [f"    {line}"[:_CHARACTERS_MAX] for line in more]
     return lines
 
 

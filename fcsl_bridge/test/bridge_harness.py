@@ -82,7 +82,7 @@ class Domain:
         self.number, self.folder = number, folder
         self.environment = {**os.environ, "ROS_DOMAIN_ID": str(number), "ROS_LOG_DIR": str(folder / "ros_log")}
         self.processes: list[Process] = []
-        self._listeners: list[Listener] = []
+        self._opened: list[Listener | HandSimulator] = []
 
     def start(self, executable: str, *arguments: str, **parameters: Any) -> Process:
         """A node of fcsl_bridge, with ROS arguments and parameters."""
@@ -94,12 +94,19 @@ class Domain:
         return self.processes[-1]
 
     def listener(self) -> Listener:
-        self._listeners.append(Listener(self.number))
-        return self._listeners[-1]
+        listener = Listener(self.number)
+        self._opened.append(listener)
+        return listener
+
+    def simulator(self, listener: Listener) -> HandSimulator:
+        simulator = HandSimulator(listener)
+        self._opened.append(simulator)
+        return simulator
 
     def close(self) -> None:
-        for listener in self._listeners:
-            listener.close()
+        """Nothing of the test stays behind: a simulator that still listens would keep the controllers of a later test."""
+        for opened in reversed(self._opened):
+            opened.close()
         for process in self.processes:
             if process.process.poll() is None:
                 process.signal(signal.SIGKILL)
@@ -174,4 +181,7 @@ class HandSimulator:
 
     def end(self, another_follows: bool = False) -> None:
         self.sim.end(another_follows)
+        self.close()
+
+    def close(self) -> None:
         self.sim.close()

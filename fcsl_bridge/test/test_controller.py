@@ -50,7 +50,7 @@ def library(tmp_path_factory: pytest.TempPathFactory) -> Path:
 def locked(domain: Domain, **parameters: Any) -> tuple[Process, ControllerClient, HandSimulator]:
     """A lander's controller, and the test as its simulator."""
     listener = domain.listener()
-    sim = HandSimulator(listener)
+    sim = domain.simulator(listener)
     process = domain.start("controller_node", machine=MACHINE, record=domain.folder / "bag", **parameters)
     return process, ControllerClient(listener), sim
 
@@ -317,7 +317,7 @@ def test_a_new_run_starts_over_with_the_parameters_that_hold(domain: Domain) -> 
     bag = domain.folder / "bag"
     for _ in range(2):
         sim.end(another_follows=True)
-        sim = HandSimulator(domain.listener())
+        sim = domain.simulator(domain.listener())
         for _ in range(30):
             sim.tick()
     assert client.get("ascent.gain") == 2.0

@@ -10,7 +10,9 @@ from collections.abc import Callable
 from pathlib import Path
 
 from bridge_harness import MACHINE, SIM, Domain, Process
+from rosgraph_msgs.msg import Clock
 
+from fcsl_bridge import qos
 from simclient.bag import Bag
 from simclient.bag.digest import digest
 
@@ -70,8 +72,10 @@ def test_who_stops_for_a_moment_flies_on(domain: Domain, reference: Reference) -
 
 def test_a_second_controller_finds_no_simulator(domain: Domain) -> None:
     controller = domain.start("controller_node", machine=MACHINE, timeout_s=60.0)
-    sim = domain.start("sim_node", sim=SIM, seed=SEED, speed=1.5, timeout_s=60.0)
-    controller.wait_for("ASCENT -> COAST")
+    sim = domain.start("sim_node", sim=SIM, seed=SEED, speed=0.1, timeout_s=60.0)
+    listener = domain.listener()
+    listener.subscribe(Clock, "/clock", qos.STREAM)
+    listener.until(lambda: bool(listener.received["/clock"]))
     late = domain.start("controller_node", "-r", "__node:=late", machine=MACHINE, start_timeout_s=1.0)
     assert late.finish() == 1 and "has another controller" in late.err
     sim.signal(signal.SIGINT)

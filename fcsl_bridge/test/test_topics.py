@@ -106,7 +106,7 @@ def test_message_of_another_build_is_refused() -> None:
 def start(domain: Domain, **parameters: Any) -> tuple[Listener, HandSimulator, Any]:
     """A controller with the test as simulator; it runs no tick before the test's subscriptions are matched."""
     listener = domain.listener()
-    sim = HandSimulator(listener)
+    sim = domain.simulator(listener)
     run = open_lander()
     for instance in run.machine.instances:
         listener.subscribe(instance_class(instance), f"/lander_control/{instance.name}", qos.STREAM)

@@ -122,7 +122,7 @@ class Slot:
     def __init__(self, path: Path) -> None:
         self.connection = socket.socket(socket.AF_UNIX, socket.SOCK_SEQPACKET)
         self.connection.settimeout(PATIENCE_S)
-        self.connection.connect(str(path))
+        wait_for(lambda: self.connection.connect_ex(str(path)) == 0)  # the path is there before the guard listens
         said, descriptors, _, _ = socket.recv_fds(self.connection, 128, 1)
         assert said == b"slot\0" and len(descriptors) == 1
         self.memory = mmap.mmap(descriptors[0], 0)
