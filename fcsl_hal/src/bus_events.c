@@ -51,9 +51,8 @@ static void on_matching(void *ctx, uint32_t number, int matching)
 {
     fcsl_bus_t *bus = ctx;
     if (number < bus->output_count) {
-        if (atomic_exchange(&bus->matched[number], matching) != matching) {
-            bus_tell(bus);
-        }
+        atomic_store(&bus->matched[number], matching);
+        bus_tell(bus);
     }
 }
 

@@ -6,7 +6,7 @@
 #include "bus_session.h"
 #include "monotonic.h"
 
-enum { LOOK_NS = 50 * NS_PER_MS, TURN = 64, OUTPUTS = 8, REASON_BYTES = 256 };
+enum { LOOK_NS = 50 * NS_PER_MS, TURN = 64, REASON_BYTES = 256 };
 
 /* Puts what is in the ring, at most TURN messages: 1 when there may be more. */
 static int put_some(fcsl_bus_t *bus)
@@ -25,15 +25,13 @@ static int put_some(fcsl_bus_t *bus)
     return 1;
 }
 
-/* Zenoh does not tell of sessions that come and go, nor always of matches: they are looked at, of the latter a few at a time. */
-static void look_around(fcsl_bus_t *bus, uint64_t *looked_ns, uint32_t *output)
+/* Zenoh does not tell of sessions that come and go: they are looked at. */
+static void look_at_peers(fcsl_bus_t *bus, uint64_t *looked_ns)
 {
     const uint64_t now_ns = monotonic_ns();
     if (now_ns < *looked_ns + LOOK_NS) {
         return;
     }
-    fcsl_zenoh_look_at_matches(bus->zenoh, *output, OUTPUTS);
-    *output = *output + OUTPUTS < bus->output_count ? *output + OUTPUTS : 0u;
     const uint32_t before = atomic_load(&bus->peers);
     const uint32_t now = fcsl_zenoh_peers(bus->zenoh);
     *looked_ns = now_ns;
@@ -80,14 +78,13 @@ static void connect_later(fcsl_bus_t *bus)
 static void serve(fcsl_bus_t *bus)
 {
     uint64_t looked_ns = 0;
-    uint32_t output = 0;
     for (;;) { /* each turn puts, or sleeps */
         const int stopping = atomic_load(&bus->stopping); /* nothing is posted any more */
         const int more = put_some(bus);
         if (stopping && !more) {
             break;
         }
-        look_around(bus, &looked_ns, &output);
+        look_at_peers(bus, &looked_ns);
         if (!more) {
             sleep_until_posted(bus);
         }

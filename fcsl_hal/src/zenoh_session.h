@@ -57,9 +57,6 @@ int fcsl_zenoh_answer(const fcsl_zenoh_t *session, uint32_t answer, const uint8_
 /* Returns 0, or -1. 0 does not say that anybody got it. */
 int fcsl_zenoh_put(fcsl_zenoh_t *session, uint32_t output, const uint8_t *bytes, size_t size);
 
-/* Calls `matching` for outputs [first, first + count), as they are now. */
-void fcsl_zenoh_look_at_matches(const fcsl_zenoh_t *session, uint32_t first, uint32_t count);
-
 /* How many sessions this one is connected to. */
 uint32_t fcsl_zenoh_peers(const fcsl_zenoh_t *session);
 

@@ -283,15 +283,6 @@ impl Zenoh {
         output.publisher.put(bytes).timestamp(time).wait().map_err(reason_of)
     }
 
-    /// Zenoh tells of a match by a task of its own, which may look too early: it is looked at again.
-    fn look_at_matches(&self, first: usize, count: usize) {
-        for (number, output) in self.outputs.iter().enumerate().skip(first).take(count) {
-            if let Ok(status) = output.publisher.matching_status().wait() {
-                self.events.matching(number as u32, status.matching());
-            }
-        }
-    }
-
     fn peers(&self) -> usize {
         let info = self.session.info();
         info.peers_zid().wait().count() + info.routers_zid().wait().count()
@@ -480,16 +471,6 @@ pub unsafe extern "C" fn fcsl_zenoh_answer(zenoh: *const Zenoh, answer: u32, byt
         })
     };
     -i32::from(answered.is_err())
-}
-
-/// # Safety
-/// As zenoh_session.h.
-#[no_mangle]
-pub unsafe extern "C" fn fcsl_zenoh_look_at_matches(zenoh: *const Zenoh, first: u32, count: u32) {
-    // SAFETY: the header's contract.
-    if let Some(zenoh) = unsafe { zenoh.as_ref() } {
-        zenoh.look_at_matches(first as usize, count as usize);
-    }
 }
 
 /// # Safety
