@@ -8,7 +8,6 @@ import sys
 import xml.etree.ElementTree as ET
 from pathlib import Path
 
-
 #: Of a message: what a process printed stands in its later lines.
 _LINES_MAX, _CHARACTERS_MAX = 12, 300
 
