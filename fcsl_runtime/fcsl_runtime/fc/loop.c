@@ -183,29 +183,40 @@ static int act_on_sensors(loop_t *loop, uint64_t begun_ns)
     return on;
 }
 
-int loop_tick(loop_t *loop)
+/* Looks for the sensors of the coming tick. */
+static fcsl_hal_status_t sample(loop_t *loop)
+{
+    return loop->hal.sample(loop->hal.ctx, fcsl_run_tick(loop->run), loop->sensor_bytes, loop->sensor_capacity,
+                            &loop->sensors);
+}
+
+/* The tick of what was sampled; 0 when the run is over. */
+static int make_tick(loop_t *loop, fcsl_hal_status_t sampled)
 {
     fcsl_error_t error;
-    const uint64_t tick = fcsl_run_tick(loop->run);
-    fcsl_message_t message;
-    fcsl_hal_status_t sampled = FCSL_HAL_WAITING;
-    while (sampled == FCSL_HAL_WAITING) { /* ends at the HAL's time-out, or when it is interrupted */
-        sampled = loop->hal.sample(loop->hal.ctx, tick, loop->sensor_bytes, loop->sensor_capacity, &message);
-    }
     if (!goes_on(loop, sampled)) {
         return 0;
     }
     const uint64_t begun_ns = now_ns();
-    fcsl_tick_stats_put(&loop->stats.tick, tick);
+    fcsl_tick_stats_put(&loop->stats.tick, fcsl_run_tick(loop->run));
     fcsl_tick_stats_put(&loop->stats.begun_ns, begun_ns);
     if (sampled == FCSL_HAL_OK) {
         /* A refused message is counted by the run and changes nothing: the channel grows old instead. */
-        (void)fcsl_run_sense_message(loop->run, &message, &error);
+        (void)fcsl_run_sense_message(loop->run, &loop->sensors, &error);
     }
     const int on = act_on_sensors(loop, begun_ns);
     fcsl_tick_stats_put(&loop->stats.begun_ns, 0);
     fcsl_histogram_add(&loop->stats.tick_time, now_ns() - begun_ns);
     return on;
+}
+
+int loop_tick(loop_t *loop)
+{
+    fcsl_hal_status_t sampled = FCSL_HAL_WAITING;
+    while (sampled == FCSL_HAL_WAITING) { /* ends at the HAL's time-out, or when it is interrupted */
+        sampled = sample(loop);
+    }
+    return make_tick(loop, sampled);
 }
 
 int loop_may_tick(const loop_t *loop)
@@ -285,7 +296,10 @@ int loop_run(loop_t *loop)
             pacing.anchor_ns = hal->now_ns(hal->ctx);
             pacing.next = 0;
         } else if (!loop->realtime || keep_time(loop, &pacing)) {
-            (void)loop_tick(loop);
+            const fcsl_hal_status_t sampled = sample(loop);
+            if (sampled != FCSL_HAL_WAITING) { /* for a simulator that is paused, perhaps for long: commands are served */
+                (void)make_tick(loop, sampled);
+            }
             loop_serve(loop);
         }
     }

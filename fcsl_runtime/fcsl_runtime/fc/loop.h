@@ -37,6 +37,7 @@ typedef struct {
     int paused;
     int armed; /* the last command */
 
+    fcsl_message_t sensors; /* the last one */
     uint8_t *sensor_bytes; /* of the messages */
     size_t sensor_capacity;
     uint8_t *actuator_bytes;
