@@ -31,6 +31,7 @@ from zenoh.ext import HistoryConfig, declare_advanced_subscriber
 
 from fcsl_compiler.ros.standard_messages import SUPPORTED, full_name
 from fcsl_msgs.msg import MachineState
+from simclient import VarClient
 from simclient.bag.bag import Bag
 
 ROOT = Path(__file__).resolve().parents[1]
@@ -128,7 +129,7 @@ def test_topics_of_a_simulation(tmp_path: Path) -> None:
         everything.undeclare()
     assert sim.returncode == 1, complaint  # it ends before it has landed
     assert (state.state, state.tick, state.header.stamp.sec) == ("ASCENT", 0, 0)
-    assert json.loads(out)["ros"] == {"ticks": 4 * HZ, "dropped": 0}
+    assert json.loads(out)["ros"] == {"ticks": 4 * HZ, "dropped": 0, "refused": 0}
 
     wanted = {"transitions": EVENT, **dict.fromkeys(INSTANCES, STREAM)}
     wanted |= dict.fromkeys(("state", "health", "faults"), LATCHED)
@@ -168,11 +169,27 @@ def test_topics_of_a_flight_computer() -> None:
         said, complaint = fc.communicate(timeout=LONG_S)
         everything.undeclare()
     assert fc.returncode == 0, complaint
-    assert re.search(r"ROS 2 topics \d+ ticks, 0 dropped", said)
+    assert re.search(r"ROS 2 topics \d+ ticks, 0 dropped, 0 messages refused", said)
     assert "clock" not in keys
     assert second.tick == first.tick + 1
     stamps = [m.header.stamp.sec + m.header.stamp.nanosec * 1e-9 for m in (first, second)]
     assert begun_s < stamps[0] < stamps[1] < time.time()
+
+
+def test_a_command_is_told_while_the_flight_computer_is_paused(tmp_path: Path) -> None:
+    endpoint, address = free_endpoint(), tmp_path / "socket"
+    came: queue.Queue[bytes] = queue.Queue()
+    line = [LIBRARY, "--machine", "lander_control", "--ros", endpoint, "--socket", address, "--paused"]
+    with started("fcsl-fc", *line), bridge(endpoint) as session:
+        subscribed = session.declare_subscriber("lander_control/state", lambda s: came.put(bytes(s.payload)))
+        until(address.exists)
+        with VarClient(address) as client:
+            client.tick(3)
+            told = deserialize_message(came.get(timeout=LONG_S), MachineState)
+            client.set_state("COAST")
+            changed = deserialize_message(came.get(timeout=LONG_S), MachineState)
+        subscribed.undeclare()
+    assert (told.state, changed.state, changed.tick) == ("ASCENT", "COAST", 2)
 
 
 def read(sample: zenoh.Sample, kind: type[Message]) -> Message:

@@ -282,7 +282,9 @@ def _print_summary(config: SimConfig, summary: Summary) -> None:
     if summary.observers:
         show(f"observers: {summary.observers['ticks']} ticks, {summary.observers['dropped']} dropped")
     if summary.ros:
-        show(f"ROS 2 topics: {summary.ros['ticks']} ticks, {summary.ros['dropped']} dropped")
+        show(
+            f"ROS 2 topics: {summary.ros['ticks']} ticks, {summary.ros['dropped']} dropped, {summary.ros['refused']} messages refused"
+        )
     if summary.bag:
         show(f"bag: {summary.bag}")
     if summary.until_held is False:

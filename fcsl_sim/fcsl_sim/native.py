@@ -29,6 +29,7 @@ from .models import ModelTable, Scalar, parse_description
 
 _SENT = ("packets", "configurations", "datagrams", "failures", "overwritten")
 _OBSERVED = ("ticks", "dropped")
+_ROS = (*_OBSERVED, "refused")
 _COMMANDS = ("commands", "ticks_without", "longest_without")
 _LOG_BYTES = 512
 
@@ -40,9 +41,15 @@ class _Counters(ctypes.Structure):
 
 
 class _Observed(ctypes.Structure):
-    """fcsl_observers_counters_t, fcsl_ros_graph_counters_t"""
+    """fcsl_observers_counters_t"""
 
     _fields_ = [(name, c_uint64) for name in _OBSERVED]
+
+
+class _Ros(ctypes.Structure):
+    """fcsl_ros_graph_counters_t"""
+
+    _fields_ = [(name, c_uint64) for name in _ROS]
 
 
 class _Commands(ctypes.Structure):
@@ -90,7 +97,7 @@ _PROTOTYPES: dict[str, tuple[type | None, list[type]]] = {
     "fcsl_sim_observers": (c_int, [ptr, c_char_p, c_char_p, _ERROR]),
     "fcsl_sim_observers_stop": (None, [ptr, POINTER(_Observed)]),
     "fcsl_sim_ros": (c_int, [ptr, c_char_p, c_char_p, _ERROR]),
-    "fcsl_sim_ros_stop": (None, [ptr, POINTER(_Observed)]),
+    "fcsl_sim_ros_stop": (None, [ptr, POINTER(_Ros)]),
     "fcsl_sim_channel_data": (ptr, [ptr]),
     "fcsl_sim_sampled": (c_int, [ptr, c_uint32]),
     "fcsl_sim_truth_values": (c_uint32, [ptr, ptr, c_uint32]),
@@ -371,9 +378,9 @@ class Simulation:
 
     def ros_stop(self) -> dict[str, int]:
         """Puts the remaining ticks and stops; returns the counts (docs/ros_graph.md)."""
-        counters = _Observed()
+        counters = _Ros()
         self._lib.fcsl_sim_ros_stop(self.handle(), byref(counters))
-        return {name: int(getattr(counters, name)) for name in _OBSERVED}
+        return {name: int(getattr(counters, name)) for name in _ROS}
 
     def sense(self) -> bytes:
         """Advances to the next tick and returns its sensor message."""

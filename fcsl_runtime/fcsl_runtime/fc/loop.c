@@ -297,7 +297,8 @@ int loop_run(loop_t *loop)
             pacing.next = 0;
         } else if (!loop->realtime || keep_time(loop, &pacing)) {
             const fcsl_hal_status_t sampled = sample(loop);
-            if (sampled != FCSL_HAL_WAITING) { /* for a simulator that is paused, perhaps for long: commands are served */
+            if (sampled !=
+                FCSL_HAL_WAITING) { /* for a simulator that is paused, perhaps for long: commands are served */
                 (void)make_tick(loop, sampled);
             }
             loop_serve(loop);

@@ -37,7 +37,8 @@ static void report_ros(const fcsl_ros_graph_t *ros)
 {
     fcsl_ros_graph_counters_t put;
     fcsl_ros_graph_count(ros, &put);
-    log_info("ROS 2 topics %" PRIu64 " ticks, %" PRIu64 " dropped", put.ticks, put.dropped);
+    log_info("ROS 2 topics %" PRIu64 " ticks, %" PRIu64 " dropped, %" PRIu64 " messages refused", put.ticks,
+             put.dropped, put.refused);
 }
 
 static void report_observers(const fcsl_observers_t *observers)

@@ -91,6 +91,18 @@ static int follow(follower_t *f)
     return 0;
 }
 
+/* Ticks that the host's last publication tells of, and that were not put. */
+static uint64_t left_behind(follower_t *f)
+{
+    fcsl_moment_t last;
+    const uint64_t published = fcsl_history_published(f->history);
+    if (published == 0u || fcsl_history_read(f->history, published - 1u, &last, f->publication) != FCSL_HISTORY_OK) {
+        return 0;
+    }
+    f->overtaken += published - f->cursor;
+    return dropped_before(f, last.tick + 1u);
+}
+
 /* The host publishes nothing more. */
 static void finish(follower_t *f)
 {
@@ -100,7 +112,7 @@ static void finish(follower_t *f)
         nap(f);
         (void)follow(f);
     }
-    count(&f->dropped, f->overtaken + fcsl_history_published(f->history) - f->cursor);
+    count(&f->dropped, left_behind(f));
 }
 
 static void *run(void *follower)

@@ -30,6 +30,7 @@ struct fcsl_ros_graph {
     int simulated;
     uint32_t ring_ticks; /* that the ring holds */
     uint32_t room;       /* of them, free for certain */
+    uint64_t completed;  /* ticks, in the last publication */
 };
 
 /* ---- a tick --------------------------------------------------------------------------------------------------------- */
@@ -74,13 +75,13 @@ static uint64_t time_of(const fcsl_ros_graph_t *g, const followed_tick_t *tick)
     return clock_ns(CLOCK_REALTIME) - (fcsl_run_monotonic_ns(NULL) - tick->begun_ns);
 }
 
-static int put(void *ctx, const followed_tick_t *tick)
+/* The messages of the first `count` topics. Returns 0, or -1: one found no room. */
+static int post(fcsl_ros_graph_t *g, const followed_tick_t *tick, uint32_t count)
 {
-    fcsl_ros_graph_t *g = ctx;
     const fcsl_stamp_t stamp = {.tick = tick->number, .time_ns = time_of(g, tick)};
     int failed = 0;
     g->room--;
-    for (uint32_t i = 0; i < g->topics.count; i++) {
+    for (uint32_t i = 0; i < count; i++) {
         if (i >= g->topics.latched_count && !fcsl_bus_matched(g->bus, i)) {
             continue;
         }
@@ -91,6 +92,25 @@ static int put(void *ctx, const followed_tick_t *tick)
         }
     }
     return failed ? -1 : 0;
+}
+
+static int put(void *ctx, const followed_tick_t *tick)
+{
+    fcsl_ros_graph_t *g = ctx;
+    return post(g, tick, g->topics.count);
+}
+
+/* What a command changes between ticks is told at once, by the latched topics; the host may be paused. */
+static void see(void *ctx, const fcsl_moment_t *moment, const uint8_t *publication)
+{
+    fcsl_ros_graph_t *g = ctx;
+    if (moment->tick == g->completed) {
+        const followed_tick_t tick = {.publication = publication,
+                                      .number = moment->tick > 0u ? moment->tick - 1u : 0u,
+                                      .begun_ns = moment->time_ns};
+        (void)post(g, &tick, g->topics.latched_count); /* without room the next tick tells of it */
+    }
+    g->completed = moment->tick;
 }
 
 /* ---- opening and closing -------------------------------------------------------------------------------------------- */
@@ -149,7 +169,7 @@ fcsl_ros_graph_t *fcsl_ros_graph_open(const fcsl_ros_graph_options_t *options, c
         return NULL;
     }
     const follower_sink_t sink = {
-        .ctx = g, .wants = wants_all, .pass_over = pass_over_none, .ready = is_ready, .put = put};
+        .ctx = g, .wants = wants_all, .pass_over = pass_over_none, .ready = is_ready, .see = see, .put = put};
     g->simulated = options->simulated;
     if (follower_open(&g->follower, history, options->machine->tick_hz, &sink) != 0) {
         (void)fcsl_fail(error, "out of memory for the ROS 2 graph");
@@ -189,8 +209,10 @@ void fcsl_ros_graph_close(fcsl_ros_graph_t *graph)
 
 void fcsl_ros_graph_count(const fcsl_ros_graph_t *graph, fcsl_ros_graph_counters_t *counters)
 {
-    *counters = (fcsl_ros_graph_counters_t){.ticks = follower_ticks(&graph->follower),
-                                            .dropped = follower_dropped(&graph->follower)};
+    *counters =
+        (fcsl_ros_graph_counters_t){.ticks = follower_ticks(&graph->follower),
+                                    .dropped = follower_dropped(&graph->follower),
+                                    .refused = atomic_load_explicit(&graph->topics.refused, memory_order_relaxed)};
 }
 
 void fcsl_ros_graph_stats(const fcsl_ros_graph_t *graph, fcsl_vars_out_t *out)
@@ -200,5 +222,6 @@ void fcsl_ros_graph_stats(const fcsl_ros_graph_t *graph, fcsl_vars_out_t *out)
     fcsl_vars_begin(out, "ros");
     fcsl_vars_number(out, "ticks", counters.ticks);
     fcsl_vars_number(out, "dropped", counters.dropped);
+    fcsl_vars_number(out, "refused", counters.refused);
     fcsl_vars_end(out);
 }

@@ -232,9 +232,9 @@ static int is_sampled(const fcsl_machine_t *machine, const fcsl_ros_message_t *m
     return 0;
 }
 
-/* Actuators of a disarmed machine get their safe values. A number that its field cannot hold makes no message. */
-static size_t write_mapped(const ros_topics_t *topics, const ros_topic_t *topic, const uint8_t *data,
-                           fcsl_stamp_t stamp, uint8_t *bytes)
+/* Actuators of a disarmed machine get their safe values. A number that its field cannot hold makes no message, and is counted. */
+static size_t write_mapped(ros_topics_t *topics, const ros_topic_t *topic, const uint8_t *data, fcsl_stamp_t stamp,
+                           uint8_t *bytes)
 {
     const fcsl_machine_t *machine = topics->machine;
     const int is_actuator = topic->mapped->direction == FCSL_ACTUATOR;
@@ -243,8 +243,11 @@ static size_t write_mapped(const ros_topics_t *topics, const ros_topic_t *topic,
     }
     const int is_armed = fcsl_is_armed(machine, data);
     const uint8_t *memory = is_actuator && !is_armed && topics->safe != NULL ? topics->safe : data;
-    return fcsl_ros_compose(topic->composer, &memory, (int64_t)stamp.time_ns, bytes) == FCSL_ROS_TAKEN ? topic->longest
-                                                                                                       : 0u;
+    if (fcsl_ros_compose(topic->composer, &memory, (int64_t)stamp.time_ns, bytes) != FCSL_ROS_TAKEN) {
+        atomic_fetch_add_explicit(&topics->refused, 1, memory_order_relaxed);
+        return 0;
+    }
+    return topic->longest;
 }
 
 size_t ros_topics_write(ros_topics_t *topics, uint32_t number, const uint8_t *data, fcsl_stamp_t stamp, uint8_t *bytes)

@@ -5,6 +5,8 @@
 #ifndef FCSL_ROS_GRAPH_ROS_TOPICS_H
 #define FCSL_ROS_GRAPH_ROS_TOPICS_H
 
+#include <stdatomic.h>
+
 #include "fcsl/fcsl_bus.h"
 #include "fcsl/fcsl_ros.h"
 #include "fcsl/fcsl_ros_graph.h"
@@ -33,6 +35,7 @@ typedef struct {
     ros_topic_t *topics; /* the latched ones first */
     uint32_t count;
     uint32_t latched_count;
+    _Atomic uint64_t refused; /* messages that were not made, because a value does not fit its field */
 } ros_topics_t;
 
 /* Returns 0, or -1 with `error`; free it either way. */

@@ -41,6 +41,7 @@ void fcsl_ros_graph_close(fcsl_ros_graph_t *graph);
 typedef struct {
     uint64_t ticks; /* whose messages were put */
     uint64_t dropped; /* whose messages were not, because there was no room in time */
+    uint64_t refused; /* messages that were not made, because a value does not fit its field */
 } fcsl_ros_graph_counters_t;
 
 void fcsl_ros_graph_count(const fcsl_ros_graph_t *graph, fcsl_ros_graph_counters_t *counters);
