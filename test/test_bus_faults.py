@@ -9,7 +9,6 @@ import os
 import random
 import re
 import signal
-import socket
 import subprocess
 import sys
 import threading
@@ -19,9 +18,10 @@ from typing import Any
 
 import pytest
 import zenoh
-from test_wires import LENGTH_S, SIM, digest, fly, free_port, library, reference, run
+from test_wires import LENGTH_S, SIM, digest, fly, library, reference, run
 
 from simclient.bag import Bag
+from simclient.bus.free_port import free_endpoint
 from simclient.replay import replay
 
 __all__ = ["library", "reference"]
@@ -75,7 +75,7 @@ def test_a_party_is_killed_or_frozen(seed: int, reference: str, library: Path, t
     numbers = random.Random(seed)
     mode, number = numbers.choice(MODES), numbers.choice([signal.SIGKILL, signal.SIGSTOP])
     victim, other = numbers.sample(["simulator", "controller"], 2)
-    place = f"tcp/127.0.0.1:{free_port(socket.SOCK_STREAM)}"
+    place = free_endpoint()
     flight = Flight(mode, place, library, tmp_path)
     try:
         time.sleep(numbers.uniform(0.0, 1.5))
@@ -104,7 +104,7 @@ def test_a_party_that_is_frozen_for_a_moment(
     mode: str, party: str, reference: str, library: Path, tmp_path: Path
 ) -> None:
     """Simulated time stands still meanwhile."""
-    place = f"tcp/127.0.0.1:{free_port(socket.SOCK_STREAM)}"
+    place = free_endpoint()
     flight = Flight(mode, place, library, tmp_path, LENGTH_S, speed="1")
     try:
         getattr(flight, party).send_signal(signal.SIGSTOP)
@@ -120,7 +120,7 @@ def test_a_party_that_is_frozen_for_a_moment(
 @pytest.mark.parametrize("number", range(RUNS_UNDER_LOAD))
 @pytest.mark.parametrize("mode", MODES)
 def test_beside_busy_processes(mode: str, number: int, reference: str, library: Path, tmp_path: Path) -> None:
-    place = f"tcp/127.0.0.1:{free_port(socket.SOCK_STREAM)}"
+    place = free_endpoint()
     busy = [subprocess.Popen([sys.executable, "-c", "while True: pass"]) for _ in range(2)]
     try:
         assert fly(f"{mode.replace('-peer', '')}{place}", f"{mode}{place}", library, tmp_path / "bag") == reference
@@ -190,7 +190,7 @@ def summary_of(path: Path) -> dict[str, Any]:
 
 def test_a_hostile_party(library: Path, tmp_path: Path) -> None:
     """What it puts is dropped and counted, takes no memory, and delays no step."""
-    place = f"tcp/127.0.0.1:{free_port(socket.SOCK_STREAM)}"
+    place = free_endpoint()
     run("fcsl-sim", "run", SIM, "--duration", FLOODED_S, "--record", tmp_path / "alone", statuses=(0, 1))
     flight = Flight("zenoh:", place, library, tmp_path, FLOODED_S, FLOODED_SPEED)
     try:
@@ -208,7 +208,7 @@ def test_a_hostile_party(library: Path, tmp_path: Path) -> None:
 
 def test_a_hostile_observer(library: Path, tmp_path: Path) -> None:
     """The flight in real time does not hear it."""
-    place = f"tcp/127.0.0.1:{free_port(socket.SOCK_STREAM)}"
+    place = free_endpoint()
     line = [
         library,
         "--observers",

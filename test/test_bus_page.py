@@ -5,13 +5,11 @@ from __future__ import annotations
 
 import json
 import re
-import socket
 import subprocess
 import sys
 from pathlib import Path
 
-from test_wires import free_port
-
+from simclient.bus.free_port import free_endpoint
 from simclient.replay import replay
 
 ROOT = Path(__file__).resolve().parents[1]
@@ -30,7 +28,7 @@ def test_the_plant_of_the_page_flies_the_lander(tmp_path: Path) -> None:
     machine = ROOT / "examples/lander/fc/lander_control.json"
     subprocess.run(["fcslc", "build", machine, "-o", tmp_path], check=True, capture_output=True)
     library, bag = tmp_path / "liblander_control.so", tmp_path / "bag"
-    place = f"tcp/127.0.0.1:{free_port(socket.SOCK_STREAM)}"
+    place = free_endpoint()
     line = [sys.executable, tmp_path / "plant.py", place]
     with subprocess.Popen(line, stdout=subprocess.PIPE, text=True) as plant:
         options = ["--hal", f"zenoh:{place}", "--timeout-ms", "30000", "--record", bag]
@@ -48,7 +46,7 @@ def test_the_source_of_the_page_is_one(tmp_path: Path) -> None:
     write_script("12.5", tmp_path / "source.py")
     machine, summary = ROOT / "examples/lander/fc/lander_control.json", tmp_path / "summary.json"
     subprocess.run(["fcslc", "build", machine, "-o", tmp_path], check=True, capture_output=True)
-    place = f"tcp/127.0.0.1:{free_port(socket.SOCK_STREAM)}"
+    place = free_endpoint()
     with subprocess.Popen([sys.executable, tmp_path / "source.py", place]) as source:
         options = ["--hal", f"zenoh:{place},free-running", "--ticks", "300", "--summary", summary]
         try:

@@ -8,7 +8,6 @@ import contextlib
 import json
 import re
 import signal
-import socket
 import struct
 import subprocess
 import threading
@@ -20,8 +19,9 @@ from typing import Any
 
 import pytest
 import zenoh
-from test_wires import free_port, run
+from test_wires import run
 
+from simclient.bus.free_port import free_endpoint
 from simclient.vars.client import VarClient
 
 ALGORITHM = '''
@@ -198,10 +198,6 @@ def start(programs: contextlib.ExitStack, *line: str | Path) -> Program:
     return program
 
 
-def free_place() -> str:
-    return f"tcp/127.0.0.1:{free_port(socket.SOCK_STREAM)}"
-
-
 def fc_line(folder: Path, place: str, *options: str | Path) -> list[str | Path]:
     return ["fcsl-fc", folder / "libhopper.so", "--hal", f"zenoh:{place},free-running", *options]
 
@@ -215,7 +211,7 @@ def sim_line(folder: Path, place: str, *options: str) -> list[str | Path]:
 def test_it_lands_in_whatever_order_they_start(
     first: str, folder: Path, tmp_path: Path, programs: contextlib.ExitStack
 ) -> None:
-    place, summary = free_place(), tmp_path / "summary.json"
+    place, summary = free_endpoint(), tmp_path / "summary.json"
     lines = {"fcsl-fc": fc_line(folder, place, "--summary", summary), "fcsl-sim": sim_line(folder, place)}
     (second,) = set(lines) - {first}
     started = {first: start(programs, *lines[first])}
@@ -250,7 +246,7 @@ def wait_for_gate(path: Path, state: int) -> None:
 
 def test_each_side_freezes_dies_and_returns(folder: Path, tmp_path: Path, programs: contextlib.ExitStack) -> None:
     """The other side says so within about a second, and flies on."""
-    place = free_place()
+    place = free_endpoint()
     high = ["--set", "plant.parameters.height=1000", "--socket", str(tmp_path / "socket")]
     sim = start(programs, *sim_line(folder, place, *high))
     fc = start(programs, *fc_line(folder, place))
@@ -316,7 +312,7 @@ class Source:
 def test_a_script_is_the_only_source(folder: Path, tmp_path: Path, programs: contextlib.ExitStack) -> None:
     """It flies the hopper at 300 Hz, without commits. What is no value of a channel is dropped and counted; of several values in
     a tick the newest counts, and a channel without new ones grows old."""
-    place, summary = free_place(), tmp_path / "summary.json"
+    place, summary = free_endpoint(), tmp_path / "summary.json"
     fc = start(programs, *fc_line(folder, place, "--summary", summary))
     fc.hears("HAL")
     source = Source(place)
@@ -357,7 +353,7 @@ def test_a_script_is_the_only_source(folder: Path, tmp_path: Path, programs: con
 
 @pytest.mark.parametrize("free", ["fcsl-fc", "fcsl-sim"])
 def test_one_side_in_lock_step_is_told(free: str, folder: Path, programs: contextlib.ExitStack) -> None:
-    place = free_place()
+    place = free_endpoint()
     lines = {"fcsl-fc": fc_line(folder, place), "fcsl-sim": sim_line(folder, place, "--duration", "100")}
     bound = ({*lines} - {free}).pop()
     lines[bound] = [str(word).removesuffix(",free-running") for word in lines[bound]]

@@ -4,16 +4,16 @@
 from __future__ import annotations
 
 import contextlib
-import socket
 import subprocess
 import time
 from collections.abc import Callable, Iterator
 from pathlib import Path
 
 import pytest
-from test_wires import LENGTH_S, SIM, free_port, library
+from test_wires import LENGTH_S, SIM, library
 
 from simclient import VarClient
+from simclient.bus.free_port import free_endpoint
 from simclient.replay import replay
 
 __all__ = ["library"]
@@ -40,7 +40,7 @@ def comes_to_rest(tick: Callable[[], int]) -> int:
 
 @pytest.fixture
 def flight(library: Path, tmp_path: Path) -> Iterator[tuple[VarClient, VarClient, subprocess.Popen[str]]]:
-    place = f"zenoh:tcp/127.0.0.1:{free_port(socket.SOCK_STREAM)}"
+    place = f"zenoh:{free_endpoint()}"
     lines = (
         ["fcsl-sim", "run", SIM, "--duration", LENGTH_S, "--external", place, "--paused"],
         ["fcsl-fc", library, "--hal", place, "--timeout-ms", "2000", "--record", tmp_path / "bag"],

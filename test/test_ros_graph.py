@@ -9,10 +9,8 @@ from __future__ import annotations
 import contextlib
 import json
 import queue
-import random
 import re
 import signal
-import socket
 import subprocess
 import time
 from collections import defaultdict
@@ -33,6 +31,7 @@ from fcsl_compiler.ros.standard_messages import SUPPORTED, full_name
 from fcsl_msgs.msg import MachineState
 from simclient import VarClient
 from simclient.bag.bag import Bag
+from simclient.bus.free_port import free_endpoint
 
 ROOT = Path(__file__).resolve().parents[1]
 SIM = ROOT / "examples/lander/sim/lander.sim.json"
@@ -46,15 +45,6 @@ INSTANCES = ["sensors", "monitor", "filter", "ascent", "coast", "descent", "safe
 TOKEN = re.compile(r"@/(\w+)/@ros2_lv/(M[PS])/([^/]+)/([^/]+)/:([01]:[01]:0,\d+):typehash=(RIHS01_[0-9a-f]{64});")
 #: Reliable or not, transient local or not, keep last, depth.
 STREAM, EVENT, LATCHED, COMMAND, SENSOR = "1:0:0,2000", "1:0:0,100", "1:1:0,1", "1:0:0,10", "0:0:0,10"
-
-
-def free_endpoint() -> str:
-    """Below the ports of outgoing connections."""
-    for port in random.SystemRandom().sample(range(20000, 32000), 100):
-        with socket.socket() as found, contextlib.suppress(OSError):
-            found.bind(("127.0.0.1", port))
-            return f"tcp/127.0.0.1:{port}"
-    raise AssertionError("no free port")
 
 
 @contextlib.contextmanager

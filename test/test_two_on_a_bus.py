@@ -8,8 +8,10 @@ import signal
 import time
 from pathlib import Path
 
-from test_free_running import LONG_S, Program, folder, free_place, programs, start
+from test_free_running import LONG_S, Program, folder, programs, start
 from test_wires import LENGTH_S, SIM, digest, library, reference, run
+
+from simclient.bus.free_port import free_endpoint
 
 __all__ = ["folder", "library", "programs", "reference"]
 
@@ -33,7 +35,7 @@ class Pair:
 
 
 def pairs(folder: Path, library: Path, tmp_path: Path, speed: str = "2") -> tuple[Pair, Pair]:
-    place = free_place()
+    place = free_endpoint()
     lander = Pair("zenoh", place, SIM, library, tmp_path / "lander", LENGTH_S, "2")
     hopper = Pair(
         "zenoh-client", place, folder / "hopper.sim.json", folder / "libhopper.so", tmp_path / "hopper", "2", speed

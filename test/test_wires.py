@@ -22,6 +22,8 @@ from typing import Any
 
 import pytest
 
+from simclient.bus.free_port import free_endpoint, free_port
+
 SIM = Path(__file__).resolve().parent.parent / "examples" / "lander" / "sim" / "lander.sim.json"
 CONFIG = SIM.parent.parent / "fc" / "lander_control.json"
 #: Simulated seconds: what a lossy line does takes real time.
@@ -74,15 +76,6 @@ def frame_crc(data: bytes) -> bytes:
     return crc.to_bytes(2, "little")
 
 
-def free_port(kind: socket.SocketKind) -> int:
-    """Not of those that outgoing connections get: a client that tries before anybody listens might be connected to itself."""
-    for port in random.SystemRandom().sample(range(20000, 32000), 100):
-        with socket.socket(socket.AF_INET, kind) as found, contextlib.suppress(OSError):
-            found.bind(("127.0.0.1", port))
-            return port
-    raise AssertionError("no free port")
-
-
 @pytest.mark.parametrize("kind", ["udp:", "tcp:", "zenoh:tcp/"])
 def test_network(kind: str, reference: str, library: Path, tmp_path: Path) -> None:
     wire = f"wire:{kind}127.0.0.1:{free_port(socket.SOCK_DGRAM if kind == 'udp:' else socket.SOCK_STREAM)}"
@@ -92,7 +85,7 @@ def test_network(kind: str, reference: str, library: Path, tmp_path: Path) -> No
 @pytest.mark.parametrize("role", ["zenoh", "zenoh-peer"])
 def test_named_values_on_the_bus(role: str, reference: str, library: Path, tmp_path: Path) -> None:
     """Each channel under its own key, and a commit for each tick."""
-    place = f"tcp/127.0.0.1:{free_port(socket.SOCK_STREAM)}"
+    place = free_endpoint()
     assert fly(f"zenoh:{place}", f"{role}:{place}", library, tmp_path / "bag") == reference
 
 
@@ -105,7 +98,7 @@ def test_messages_under_the_names_on_the_bus(reference: str, tmp_path: Path) -> 
     machine["channels"][0]["ros"] = {"type": "geometry_msgs/PointStamped", "field": "point.z", "frame": "ground"}
     config.write_text(json.dumps(machine))
     run("fcslc", "build", config, "-o", tmp_path)
-    place = f"tcp/127.0.0.1:{free_port(socket.SOCK_STREAM)}"
+    place = free_endpoint()
     library, sim = tmp_path / "liblander_control.so", tmp_path / "lander/sim/lander.sim.json"
     assert fly(f"zenoh:{place}", f"zenoh:{place}", library, tmp_path / "bag", sim=sim) == reference
 

@@ -15,12 +15,13 @@ from pathlib import Path
 
 import pytest
 from test_bystander import RECORD, wait_until
-from test_observers import LONG_S, MACHINE, SIM, free_endpoint, run, started
+from test_observers import LONG_S, MACHINE, SIM, run, started
 
 from simclient import AlgTwin, VarClient
 from simclient.bag import Bag
 from simclient.bag.writer import copy_of
 from simclient.bus.cli import main
+from simclient.bus.free_port import free_endpoint
 from simclient.errors import BagError
 
 PLAY = [RECORD[0], "play"]

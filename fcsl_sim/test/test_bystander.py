@@ -14,9 +14,10 @@ from collections.abc import Callable, Iterator
 from pathlib import Path
 
 import pytest
-from test_observers import LONG_S, MACHINE, SIM, free_endpoint, run, started
+from test_observers import LONG_S, MACHINE, SIM, run, started
 
 from simclient import VarClient
+from simclient.bus.free_port import free_endpoint
 from simclient.replay import replay
 
 SPEED = "5"

@@ -6,10 +6,8 @@ from __future__ import annotations
 import contextlib
 import json
 import os
-import random
 import re
 import signal
-import socket
 import subprocess
 import sys
 import threading
@@ -22,6 +20,7 @@ import pytest
 
 from fcsl_sim import SimError, Simulation
 from simclient import VarClient
+from simclient.bus.free_port import free_endpoint
 from simclient.bus.session import Session
 from simclient.bus.ticks import Lost, TickReader
 
@@ -46,15 +45,6 @@ with zenoh.open(config) as bus:
     while True:
         came.recv()
 """
-
-
-def free_endpoint() -> str:
-    """Below the ports of outgoing connections."""
-    for port in random.SystemRandom().sample(range(20000, 32000), 100):
-        with socket.socket() as found, contextlib.suppress(OSError):
-            found.bind(("127.0.0.1", port))
-            return f"tcp/127.0.0.1:{port}"
-    raise AssertionError("no free port")
 
 
 def run(*line: str | Path) -> str:
@@ -139,7 +129,7 @@ class Observed:
         self.lost = Lost()
 
     def follow(self, session: Session, ready: threading.Event) -> None:
-        (machine,) = session.machines()
+        (machine,), _ = session.machines()
         reader = TickReader(machine)
         session.subscribe([machine])
         ready.set()

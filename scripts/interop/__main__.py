@@ -13,9 +13,7 @@ from __future__ import annotations
 import contextlib
 import json
 import os
-import random
 import signal
-import socket
 import subprocess
 import sys
 import tempfile
@@ -26,6 +24,7 @@ from pathlib import Path
 from fcsl_bridge.domain import own_domain
 from fcsl_bridge.loopback import loopback_environment
 from simclient import VarClient
+from simclient.bus.free_port import free_endpoint
 
 HERE = Path(__file__).resolve().parent
 BRIDGE = HERE.parents[1] / "build/interop/target/release/interop_bridge"
@@ -39,14 +38,6 @@ CYCLONE = (
     "<AllowMulticast>true</AllowMulticast></General></Domain></CycloneDDS>"
 )
 STREAMS = ("clock", "descent", "sensors")
-
-
-def free_endpoint() -> str:
-    for port in random.SystemRandom().sample(range(20000, 32000), 100):
-        with socket.socket() as found, contextlib.suppress(OSError):
-            found.bind(("127.0.0.1", port))
-            return f"tcp/127.0.0.1:{port}"
-    sys.exit("interop: no free port")
 
 
 @contextlib.contextmanager

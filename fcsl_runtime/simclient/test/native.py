@@ -7,7 +7,6 @@ import contextlib
 import ctypes
 import json
 import os
-import random
 import signal
 import socket
 import subprocess
@@ -30,15 +29,6 @@ PROGRAM = _built("FCSL_TEST_FC", "fcsl-fc")
 GUARD = _built("FCSL_TEST_GUARD", "fcsl-guard")
 WIRE_SIM = _built("FCSL_TEST_WIRE_SIM", "wire_sim")
 MCAP_WRITE = _built("FCSL_TEST_MCAP_WRITE", "mcap_write")
-
-
-def free_endpoint() -> str:
-    """For a bus, below the ports of outgoing connections: who tries before anybody listens might reach itself."""
-    for port in random.SystemRandom().sample(range(20000, 32000), 100):
-        with socket.socket() as found, contextlib.suppress(OSError):
-            found.bind(("127.0.0.1", port))
-            return f"tcp/127.0.0.1:{port}"
-    raise AssertionError("no free port")
 
 
 class _Error(ctypes.Structure):

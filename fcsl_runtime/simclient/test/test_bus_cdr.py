@@ -17,13 +17,14 @@ from typing import Any
 import numpy as np
 import pytest
 import zenoh
-from native import PROGRAM, free_endpoint
+from native import PROGRAM
 from rosbags.typesys import Stores, get_typestore
 
 from fcsl_compiler.model.types import SCALARS, Array, Type
 from fcsl_compiler.ros.channels import standard_mapping
 from fcsl_compiler.ros.standard_messages import full_name
 from simclient.bag import Bag, rows_of
+from simclient.bus.free_port import free_endpoint
 from simclient.bus.machine import BusMachine, read_machine
 from simclient.bus.payload import Payload
 from simclient.bus.session import Session
@@ -330,7 +331,7 @@ def endpoint(library: Path) -> Iterator[str]:
 @pytest.fixture(scope="module")
 def machine(endpoint: str) -> BusMachine:
     with Session(endpoint) as session:
-        (found,) = session.machines()
+        (found,), _ = session.machines()
     return found
 
 

@@ -16,11 +16,12 @@ from pathlib import Path
 from typing import Any
 
 import pytest
-from native import PROGRAM, free_endpoint
+from native import PROGRAM
 from test_bus_tools import LONG_S, TOOL, library  # noqa: F401  a fixture
 
 from simclient import AlgTwin, VarClient
 from simclient.bag import Bag
+from simclient.bus.free_port import free_endpoint
 from simclient.bus.machine import BusMachine
 from simclient.bus.messages import RECORD_TOPICS
 from simclient.bus.reproduction import Reproduction

@@ -21,11 +21,12 @@ from pathlib import Path
 import pytest
 from conftest import CFLAGS, ROOT
 from guarding import guarding
-from native import FIXTURE, PROGRAM, WIRE_SIM, Fc, free_endpoint
+from native import FIXTURE, PROGRAM, WIRE_SIM, Fc
 from telemetry_page import Port
 from test_fc_wire import HELLO, TABLE, TICK_HZ, control, listening
 
 from fcsl_compiler.driver.cache import build_machine
+from simclient.bus.free_port import free_endpoint
 from simclient.bus.session import Session
 from simclient.errors import BusError
 from simclient.link.message import table_hash

@@ -140,7 +140,7 @@ def _find(name: str, machines: Sequence[BusMachine]) -> tuple[BusMachine, BusCha
 
 def _list(options: argparse.Namespace) -> None:
     with Session(options.connect) as session:
-        machines = session.machines()
+        machines = _machines(session)
         session.subscribe(machines)
         counts = _counted(session, time.monotonic() + options.seconds)
     rates = {key: count / options.seconds for key, count in counts.items()}
@@ -174,7 +174,7 @@ def _as_json(machine: BusMachine, rates: dict[str, float]) -> dict[str, Any]:
 
 def _echo(options: argparse.Namespace) -> None:
     with Session(options.connect) as session:
-        machines = session.machines()
+        machines = _machines(session)
         chosen = {(m.prefix, c.name) for m, c in (_find(name, machines) for name in options.channels)}
         feed = Feed(session, machines)
         try:
@@ -206,7 +206,7 @@ def _lines(feed: Feed, chosen: set[tuple[str, str]], as_json: bool, with_machine
 
 def _hz(options: argparse.Namespace) -> None:
     with Session(options.connect) as session:
-        machines = session.machines()
+        machines = _machines(session)
         session.subscribe(machines)
         keys = [f"{machine.prefix}/{channel.name}" for machine in machines for channel in machine.channels]
         begun = time.monotonic()
@@ -222,11 +222,19 @@ def _hz(options: argparse.Namespace) -> None:
 
 def _put(options: argparse.Namespace) -> None:
     with Session(options.connect) as session:
-        machines = session.machines() if options.descriptor is None else _read_descriptors(options.descriptor)
+        machines = _machines(session) if options.descriptor is None else _read_descriptors(options.descriptor)
         machine, channel = _find(options.channel, machines)
         text = options.value
         data = channel.encode(text if channel.is_blob else read_value(text))
         session.put(f"{machine.prefix}/{channel.name}", data)
+
+
+def _machines(session: Session) -> list[BusMachine]:
+    """All that can be read; of others a line says why not."""
+    machines, refused = session.machines()
+    for why in refused:
+        print(f"fcsl-bus: left out: {why}", file=sys.stderr)
+    return machines
 
 
 def _read_descriptors(path: Path) -> list[BusMachine]:
@@ -241,7 +249,7 @@ def _record(options: argparse.Namespace) -> None:
     from .record import recording  # here, because its imports take as long as all others
 
     with Session(options.connect) as session:
-        machines = session.machines()
+        machines = _machines(session)
         with recording(options.output, machines, session, partial(print, flush=True)) as bag:
             feed = Feed(session, machines, writes=True)
             for number in (signal.SIGINT, signal.SIGTERM):  # an exception could leave half a message in the bag

@@ -104,20 +104,25 @@ class Session:
     ) -> None:
         self._session.close()
 
-    def machines(self) -> list[BusMachine]:
-        """All that answer, by their keys. Raises BusError when there is none."""
+    def machines(self) -> tuple[list[BusMachine], list[str]]:
+        """All that answer, by their keys, and why others cannot be read. Raises BusError when there is none."""
         found: dict[str, BusMachine] = {}
+        refused: dict[str, str] = {}
         deadline = time.monotonic() + _DESCRIBE_S
         while not found and time.monotonic() < deadline:
             replies = self._session.get("**/@descriptor", target=self._zenoh.QueryTarget.ALL, timeout=_DESCRIBE_S)
             for reply in replies:
                 prefix = str(reply.ok.key_expr).rpartition("/")[0] if reply.ok is not None else ""
                 if prefix.isprintable() and prefix and "*" not in prefix:  # anybody may answer
-                    found[prefix] = read_machine(prefix, bytes(reply.ok.payload).decode("utf-8", "replace"))
+                    try:
+                        found[prefix] = read_machine(prefix, bytes(reply.ok.payload).decode("utf-8", "replace"))
+                    except BusError as error:
+                        refused[prefix] = str(error)
             time.sleep(0 if found else _LOOK_S)
         if not found:
-            raise BusError(f"no machine is on {self.endpoint}: it is served by fcsl-fc and fcsl-sim with --observers")
-        return [machine for _, machine in sorted(found.items())]
+            why = f"no machine is on {self.endpoint}: it is served by fcsl-fc and fcsl-sim with --observers"
+            raise BusError(min(refused.values(), default=why))
+        return [machine for _, machine in sorted(found.items())], [why for _, why in sorted(refused.items())]
 
     def subscribe(self, machines: Iterable[BusMachine], *names: str) -> None:
         """`messages` brings what comes from now on: all values and commits, then what is under these names, too."""

@@ -11,7 +11,6 @@ import functools
 import json
 import os
 import resource
-import socket
 import statistics
 import subprocess
 import sys
@@ -27,6 +26,7 @@ import zenoh
 from fcsl_bridge.domain import own_domain
 from fcsl_bridge.loopback import loopback_environment
 from fcsl_compiler.driver.cache import build_machine
+from simclient.bus.free_port import free_endpoint
 
 from ...harness.native import compile_program
 from ...harness.size import sized
@@ -57,15 +57,6 @@ def bus_figures(folder: Path) -> dict[str, Any]:
         "computers": computers(folder),
         "load": os.getloadavg()[0],
     }
-
-
-def free_endpoint() -> str:
-    """Below the ports that Linux gives to outgoing connections."""
-    for port in range(21000 + os.getpid() % 8000, 32000):
-        with socket.socket() as found:
-            if found.connect_ex(("127.0.0.1", port)) != 0:
-                return f"tcp/127.0.0.1:{port}"
-    raise RuntimeError("no free port")
 
 
 # ---- round trips -------------------------------------------------------------------------------------------------------
