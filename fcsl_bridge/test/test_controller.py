@@ -8,6 +8,7 @@ import re
 import signal
 import struct
 import time
+from itertools import pairwise
 from pathlib import Path
 from typing import Any
 
@@ -38,7 +39,7 @@ from simclient.bag.digest import digest
 from simclient.replay import replay
 
 #: `make verify EFFORT=full` runs more cycles.
-CYCLES = 50 if os.environ.get("FCSL_VERIFY", "") in ("", "0") else 1000
+CYCLES = 20 if os.environ.get("FCSL_VERIFY", "") in ("", "0") else 1000
 FAULT, OVERRUN, DROPOUT = InjectFault.Request.FAULT, InjectFault.Request.OVERRUN, InjectFault.Request.DROPOUT
 
 
@@ -227,11 +228,13 @@ def test_cycles_leave_nothing_behind(domain: Domain, library: Path) -> None:
             assert all(client.change(transition) for transition in (CONFIGURE, ACTIVATE, DEACTIVATE, CLEANUP))
 
     cycle(20)  # pools fill
-    memory, files = grown(process)
-    cycle(CYCLES)
-    more_memory, more_files = grown(process)
-    assert more_files <= files
-    assert more_memory - memory < 2000 + 4 * CYCLES, "kilobytes"
+    found = [grown(process)]
+    for _ in range(3):  # what leaks grows each time; allocators, which fetch a MiB now and then, do not
+        cycle(CYCLES)
+        found.append(grown(process))
+    assert all(files <= found[0][1] for _, files in found)
+    growth = [later - memory for (memory, _), (later, _) in pairwise(found)]
+    assert min(growth) < 500 + 4 * CYCLES, f"{growth} kB"
 
 
 class Watcher:
