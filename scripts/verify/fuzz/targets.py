@@ -56,6 +56,13 @@ TARGETS = (
         inputs=20_000,
     ),
     Target(
+        "receivers",
+        "streams of UBX, NMEA 0183, SBUS and CRSF",
+        "serial lines",
+        Defect(f"{_HAL}/gnss_nmea.c", "} else if (sentence.count < FIELDS_MAX) {", "} else if (1) {"),
+        longest=2048,
+    ),
+    Target(
         "guard_slot",
         "the slot of fcsl-guard",
         "shared memory",

@@ -1,0 +1,41 @@
+/* SPDX-License-Identifier: Apache-2.0
+ *
+ * A damaged frame may hide the beginning of a good one: only its first byte is dropped.
+ */
+#include "byte_stream.h"
+
+#include <string.h>
+
+static void drop(byte_stream_t *stream, uint32_t count)
+{
+    stream->size -= count;
+    memmove(stream->bytes, stream->bytes + count, stream->size);
+}
+
+uint32_t byte_stream_take(byte_stream_t *stream, uint8_t byte, byte_stream_judge_t judge)
+{
+    drop(stream, stream->taken);
+    stream->taken = 0;
+    if (stream->size == BYTE_STREAM_MAX) { /* a judge that waits for more than there is room for */
+        byte_stream_break(stream);
+    }
+    stream->bytes[stream->size++] = byte;
+    while (stream->size > 0u) { /* every turn drops a byte, or ends */
+        const int32_t length = judge(stream->bytes, stream->size);
+        if (length >= 0) {
+            stream->taken = (uint32_t)length <= stream->size ? (uint32_t)length : 0u;
+            stream->frames += stream->taken > 0u ? 1u : 0u;
+            return stream->taken;
+        }
+        drop(stream, 1);
+        stream->garbage++;
+    }
+    return 0;
+}
+
+void byte_stream_break(byte_stream_t *stream)
+{
+    stream->garbage += stream->size - stream->taken;
+    stream->size = 0;
+    stream->taken = 0;
+}

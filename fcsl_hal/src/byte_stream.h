@@ -1,0 +1,31 @@
+/* SPDX-License-Identifier: Apache-2.0
+ *
+ * Frames in a stream of bytes that may begin anywhere, lose bytes and damage them. What is no frame is dropped and counted.
+ */
+#ifndef FCSL_HAL_BYTE_STREAM_H
+#define FCSL_HAL_BYTE_STREAM_H
+
+#include <stdint.h>
+
+enum { BYTE_STREAM_MAX = 1024 }; /* bytes of the longest frame */
+
+/* Looks at bytes that begin a frame, or do not: the length of a complete frame that they begin with, 0 while it may still become one,
+ * -1 when it is none. */
+typedef int32_t (*byte_stream_judge_t)(const uint8_t *bytes, uint32_t size);
+
+typedef struct {
+    uint8_t bytes[BYTE_STREAM_MAX];
+    uint32_t size;
+    uint32_t taken; /* of them, the frame that was returned last */
+    uint64_t frames;
+    uint64_t garbage; /* bytes that belong to no frame */
+} byte_stream_t;
+
+/* Takes the next byte. Returns the length of a frame that is complete now, which stays in `bytes` until the next call, or 0. Where a
+ * damaged frame hid several, each comes with a byte of its own. */
+uint32_t byte_stream_take(byte_stream_t *stream, uint8_t byte, byte_stream_judge_t judge);
+
+/* What came so far does not go on: the next byte begins a frame. */
+void byte_stream_break(byte_stream_t *stream);
+
+#endif /* FCSL_HAL_BYTE_STREAM_H */

@@ -1,0 +1,166 @@
+/* SPDX-License-Identifier: Apache-2.0
+ *
+ * Receivers of remote controls: frames that others published, and streams that are damaged.
+ */
+#include <string.h>
+
+#include "fcsl/fcsl_check.h"
+#include "rc.h"
+
+enum { SBUS_BYTES = 25, CRSF_BYTES = 26 };
+static const uint64_t BYTE_NS = 120000; /* 12 bits at 100000 baud */
+static const uint64_t PAUSE_NS = 4000000;
+
+/* The example of the crate sbus-protocol, and the channels that it tells. */
+static const uint8_t SBUS[SBUS_BYTES] = {0x0F, 0xE0, 0x03, 0x1F, 0x58, 0xC0, 0x07, 0x16, 0xB0, 0x80, 0x05, 0x2C, 0x60,
+                                         0x01, 0x0B, 0xF8, 0xC0, 0x07, 0x00, 0x00, 0x00, 0x00, 0x00, 0x03, 0x00};
+static const int SBUS_CHANNELS[] = {992, 992, 352, 992, 352, 352, 352, 352, 352, 352, 992, 992, 0, 0, 0, 0};
+
+/* Captured by Betaflight's unit tests, and what its rx_crsf makes of them. */
+static const uint8_t CRSF[2][CRSF_BYTES] = {
+    {0x00, 0x18, 0x16, 0xBD, 0x08, 0x9F, 0xF4, 0xAE, 0xF7, 0xBD, 0xEF, 0x7D, 0xEF,
+     0xFB, 0xAD, 0xFD, 0x45, 0x2B, 0x5A, 0x01, 0x00, 0x00, 0x00, 0x00, 0x00, 0x6C},
+    {0x00, 0x18, 0x16, 0xBD, 0x08, 0x9F, 0xF4, 0xAA, 0xF7, 0xBD, 0xEF, 0x7D, 0xEF,
+     0xFB, 0xAD, 0xFD, 0x45, 0x2B, 0x5A, 0x01, 0x00, 0x00, 0x00, 0x00, 0x00, 0x94}};
+static const int CRSF_CHANNELS[] = {189, 993, 978, 983, 991, 991, 991, 2015, 1453, 191, 173, 173, 0, 0, 0, 0};
+
+/* ---- SBUS --------------------------------------------------------------------------------------------------------------- */
+
+/* Frames that come of these bytes; the last one is *frame. */
+static int feed_sbus(rc_sbus_t *sbus, const uint8_t *bytes, uint32_t size, uint64_t *time_ns, rc_frame_t *frame)
+{
+    int frames = 0;
+    for (uint32_t i = 0; i < size; i++) {
+        *time_ns += BYTE_NS;
+        frames += rc_sbus_take(sbus, bytes[i], *time_ns, frame);
+    }
+    *time_ns += PAUSE_NS;
+    return frames;
+}
+
+static int has_channels(const rc_frame_t *frame, const int *steps)
+{
+    for (uint32_t i = 0; i < RC_PACKED_CHANNELS; i++) {
+        if (frame->pulse_us[i] != (float)(1500.0 + (steps[i] - 992) * 0.625)) {
+            return 0;
+        }
+    }
+    return 1;
+}
+
+static void check_published_sbus(void)
+{
+    rc_sbus_t sbus = {0};
+    rc_frame_t frame;
+    uint64_t time_ns = PAUSE_NS;
+    CHECK(feed_sbus(&sbus, SBUS, SBUS_BYTES, &time_ns, &frame) == 1);
+    CHECK(has_channels(&frame, SBUS_CHANNELS));
+    CHECK(frame.count == 18 && frame.pulse_us[16] == 2000.0f && frame.pulse_us[17] == 2000.0f);
+    CHECK(!frame.frame_lost && !frame.failsafe && sbus.stream.garbage == 0);
+}
+
+static void check_sbus_flags(void)
+{
+    static const struct {
+        uint8_t flags;
+        uint8_t end;
+        int taken;
+        int frame_lost;
+        int failsafe;
+    } CASES[] = {{0x04, 0x00, 1, 1, 0}, {0x08, 0x00, 1, 0, 1}, {0x0C, 0x04, 1, 1, 1}, {0x00, 0x34, 1, 0, 0},
+                 {0x00, 0x24, 1, 0, 0}, {0x10, 0x00, 0, 0, 0}, {0x00, 0x01, 0, 0, 0}, {0x00, 0x44, 0, 0, 0}};
+    for (size_t i = 0; i < sizeof CASES / sizeof CASES[0]; i++) {
+        rc_sbus_t sbus = {0};
+        rc_frame_t frame;
+        uint8_t bytes[SBUS_BYTES];
+        uint64_t time_ns = PAUSE_NS;
+        memcpy(bytes, SBUS, sizeof bytes);
+        bytes[23] = CASES[i].flags;
+        bytes[24] = CASES[i].end;
+        CHECK(feed_sbus(&sbus, bytes, sizeof bytes, &time_ns, &frame) == CASES[i].taken);
+        CHECK(!CASES[i].taken || (frame.frame_lost == CASES[i].frame_lost && frame.failsafe == CASES[i].failsafe));
+    }
+}
+
+/* One byte is lost in every other frame: the pause begins the next one. */
+static void check_sbus_loses_bytes(void)
+{
+    rc_sbus_t sbus = {0};
+    rc_frame_t frame;
+    uint64_t time_ns = PAUSE_NS;
+    for (uint32_t lost = 0; lost < SBUS_BYTES; lost++) {
+        uint8_t bytes[SBUS_BYTES];
+        memcpy(bytes, SBUS, lost);
+        memcpy(bytes + lost, SBUS + lost + 1, SBUS_BYTES - lost - 1u);
+        CHECK(feed_sbus(&sbus, bytes, SBUS_BYTES - 1u, &time_ns, &frame) == 0);
+        CHECK(feed_sbus(&sbus, SBUS, SBUS_BYTES, &time_ns, &frame) == 1 && has_channels(&frame, SBUS_CHANNELS));
+    }
+    CHECK(sbus.stream.frames == SBUS_BYTES && sbus.stream.garbage == SBUS_BYTES * (SBUS_BYTES - 1u));
+}
+
+/* ---- CRSF --------------------------------------------------------------------------------------------------------------- */
+
+static int feed_crsf(rc_crsf_t *crsf, const uint8_t *bytes, uint32_t size, rc_frame_t *frame, rc_link_t *link)
+{
+    int found = 0;
+    for (uint32_t i = 0; i < size; i++) {
+        found += rc_crsf_take(crsf, bytes[i], frame, link) != RC_CRSF_NOTHING;
+    }
+    return found;
+}
+
+static void check_published_crsf(void)
+{
+    rc_crsf_t crsf = {0};
+    rc_frame_t frame;
+    rc_link_t link;
+    CHECK(feed_crsf(&crsf, CRSF[0], CRSF_BYTES, &frame, &link) == 1);
+    CHECK(frame.count == 16 && has_channels(&frame, CRSF_CHANNELS) && !frame.failsafe);
+    CHECK(feed_crsf(&crsf, CRSF[1], CRSF_BYTES, &frame, &link) == 1);
+    CHECK(frame.pulse_us[3] == 1500.0f + (981.0f - 992.0f) * 0.625f);
+    CHECK(crsf.stream.garbage == 0 && crsf.others == 0);
+}
+
+/* Of two antennas the second hears better: -45 dBm; quality 100 %, SNR -10 dB. */
+static void check_crsf_link(void)
+{
+    static const uint8_t LINK[] = {0xC8, 0x0C, 0x14, 0x32, 0x2D, 0x64, 0xF6, 0x00, 0x02, 0x03, 0x40, 0x62, 0x0C, 0x8A};
+    static const uint8_t BATTERY[] = {0xC8, 0x03, 0x08, 0x00, 0x00};
+    rc_crsf_t crsf = {0};
+    rc_frame_t frame;
+    rc_link_t link = {0};
+    CHECK(feed_crsf(&crsf, LINK, sizeof LINK, &frame, &link) == 1);
+    CHECK(link.rssi_dbm == -45 && link.quality_percent == 100 && link.snr_db == -10);
+    CHECK(feed_crsf(&crsf, BATTERY, sizeof BATTERY, &frame, &link) == 0);
+}
+
+/* A bit of each byte is turned, one after the other: no wrong frame comes, and the next good one does. */
+static void check_damaged_crsf(void)
+{
+    rc_crsf_t crsf = {0};
+    rc_frame_t frame;
+    rc_link_t link;
+    for (uint32_t bit = 0; bit < 8u * CRSF_BYTES; bit++) {
+        uint8_t bytes[CRSF_BYTES];
+        memcpy(bytes, CRSF[0], sizeof bytes);
+        bytes[bit / 8u] ^= (uint8_t)(1u << bit % 8u);
+        const int came = feed_crsf(&crsf, bytes, CRSF_BYTES, &frame, &link);
+        CHECK(came == 0 || (bit < 8u && has_channels(&frame, CRSF_CHANNELS))); /* another address is as good */
+        int later = 0;
+        for (int i = 0; i < 4; i++) { /* a longer length swallows the frames behind it until it proves wrong */
+            later += feed_crsf(&crsf, CRSF[0], CRSF_BYTES, &frame, &link);
+        }
+        CHECK(later >= 2 && has_channels(&frame, CRSF_CHANNELS));
+    }
+}
+
+int main(void)
+{
+    check_published_sbus();
+    check_sbus_flags();
+    check_sbus_loses_bytes();
+    check_published_crsf();
+    check_crsf_link();
+    check_damaged_crsf();
+    return 0;
+}
