@@ -187,7 +187,7 @@ def test_observers(folder: Path) -> None:
     fc = Watched(folder, machine(folder, 0), "--observers", endpoint)
     for _ in range(100):
         with contextlib.suppress(BusError), Session(endpoint) as session:
-            session.subscribe(session.machines(), "@writes", "@written")
+            session.subscribe(session.machines()[0], "@writes", "@written")
             came = [message.key.rpartition("/")[2] for message in session.messages() if message is not None]
             break
     assert fc.allocations() == 0
