@@ -263,13 +263,13 @@ def test_several_vehicles_on_one_clock(domain: Domain, reference: Reference) -> 
 
 def test_a_controller_that_starts_late_takes_no_other_one_down(domain: Domain, reference: Reference) -> None:
     """The other one has answered, and is kept waiting for much longer than its timeout."""
-    parameters = {"machine": MACHINE, "timeout_s": 1.5}
+    parameters = {"machine": MACHINE, "timeout_s": 2.5}
     bags = {name: domain.folder / name for name in ("one", "two")}
     two = domain.start("controller_node", "-r", "__ns:=/two", record=bags["two"], **parameters)
     sim = domain.start("sim_node", vehicles="[one, two]", sim=SIM, seed=SEED, duration="2.0", timeout_s=10.0)
     sim.wait_for("waiting for a controller")
     two.wait_for("waiting for a simulator")
-    time.sleep(4.0)
+    time.sleep(6.0)
     assert two.process.poll() is None, two.err
     one = domain.start("controller_node", "-r", "__ns:=/one", record=bags["one"], **parameters)
     assert [process.finish() for process in (sim, one, two)] == [0, 0, 0], sim.err + one.err + two.err
