@@ -30,13 +30,6 @@ int bus_peer_lives(const bus_peer_t *peer);
 /* Looks for the peer. A message counts only from a peer that was met. */
 int bus_peer_meet(bus_peer_t *peer);
 
-/* The same, of a peer that lives and was heard. */
-static inline int bus_peer_met(bus_peer_t *peer)
-{
-    peer->met = 1;
-    return 1;
-}
-
 /* What to say when nothing came, and the peer did not live before that was looked at: CLOSED once, to who listens. */
 fcsl_wire_status_t bus_peer_gone(bus_peer_t *peer);
 

@@ -54,7 +54,8 @@ static fcsl_wire_status_t take(void *ctx, uint8_t *bytes, size_t capacity, size_
         (void)fcsl_bus_take(wire->peer.bus, NAMED_CONTROL, wire->control, &wire->control_size);
     }
     /* Who says hello hears already, whatever is known of it. */
-    if (bus_peer_meet(&wire->peer) || (lives && wire->control_size > 0u && bus_peer_met(&wire->peer))) {
+    wire->peer.met = wire->peer.met || (lives && wire->control_size > 0u);
+    if (bus_peer_meet(&wire->peer)) {
         const fcsl_wire_status_t status =
             wire->greeted ? named_take_commit(wire, bytes, capacity, size) : FCSL_WIRE_NONE;
         if (status != FCSL_WIRE_NONE) {

@@ -296,9 +296,9 @@ int loop_run(loop_t *loop)
             pacing.anchor_ns = hal->now_ns(hal->ctx);
             pacing.next = 0;
         } else if (!loop->realtime || keep_time(loop, &pacing)) {
+            /* A simulator may be paused for long: clients are served while it is waited for. */
             const fcsl_hal_status_t sampled = sample(loop);
-            if (sampled !=
-                FCSL_HAL_WAITING) { /* for a simulator that is paused, perhaps for long: commands are served */
+            if (sampled != FCSL_HAL_WAITING) {
                 (void)make_tick(loop, sampled);
             }
             loop_serve(loop);
