@@ -25,7 +25,7 @@ from lander.msg import LanderControlDescent
 from rclpy.serialization import deserialize_message, serialize_message
 from rosgraph_msgs.msg import Clock
 from sensor_msgs.msg import Imu
-from zenoh.ext import HistoryConfig, declare_advanced_subscriber
+from zenoh.ext import AdvancedSubscriber, HistoryConfig, declare_advanced_subscriber
 
 from fcsl_compiler.ros.standard_messages import SUPPORTED, full_name
 from fcsl_msgs.msg import MachineState
@@ -86,6 +86,12 @@ def tokens(session: zenoh.Session) -> dict[str, tuple[str, str]]:
     return {token[3].replace("§", "/"): (token[2], token[5]) for token in found if token}
 
 
+def subscribe_latched(session: zenoh.Session, key: str, came: queue.Queue[bytes]) -> AdvancedSubscriber[Any]:
+    """As the bridge subscribes to a transient local topic: what was sent before the subscription is known is asked for."""
+    history = HistoryConfig(detect_late_publishers=True, max_samples=1)
+    return declare_advanced_subscriber(session, key, lambda s: came.put(bytes(s.payload)), history=history)
+
+
 def installed_hash(kind: str) -> str:
     package, _, name = kind.split("/")
     known = json.loads((Path(get_package_share_directory(package)) / f"msg/{name}.json").read_text())
@@ -110,12 +116,10 @@ def test_topics_of_a_simulation(tmp_path: Path) -> None:
         declared = tokens(session)
         everything = session.declare_subscriber("**", lambda s: came[str(s.key_expr)].append(bytes(s.payload)))
         until(lambda: len(came["clock"]) > 20)
-        history = HistoryConfig(detect_late_publishers=True, max_samples=1)
-        heard = lambda s: late.put(bytes(s.payload))  # noqa: E731
-        advanced = declare_advanced_subscriber(session, "r1/lander_control/state", heard, history=history)
+        latched = subscribe_latched(session, "r1/lander_control/state", late)
         state = deserialize_message(late.get(timeout=LONG_S), MachineState)
         out, complaint = sim.communicate(timeout=LONG_S)
-        advanced.undeclare()
+        latched.undeclare()
         everything.undeclare()
     assert sim.returncode == 1, complaint  # it ends before it has landed
     assert (state.state, state.tick, state.header.stamp.sec) == ("ASCENT", 0, 0)
@@ -171,14 +175,14 @@ def test_a_command_is_told_while_the_flight_computer_is_paused(tmp_path: Path) -
     came: queue.Queue[bytes] = queue.Queue()
     line = [LIBRARY, "--machine", "lander_control", "--ros", endpoint, "--socket", address, "--paused"]
     with started("fcsl-fc", *line), bridge(endpoint) as session:
-        subscribed = session.declare_subscriber("lander_control/state", lambda s: came.put(bytes(s.payload)))
+        latched = subscribe_latched(session, "lander_control/state", came)
         until(address.exists)
         with VarClient(address) as client:
             client.tick(3)
             told = deserialize_message(came.get(timeout=LONG_S), MachineState)
             client.set_state("COAST")
             changed = deserialize_message(came.get(timeout=LONG_S), MachineState)
-        subscribed.undeclare()
+        latched.undeclare()
     assert (told.state, changed.state, changed.tick) == ("ASCENT", "COAST", 2)
 
 
