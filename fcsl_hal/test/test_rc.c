@@ -5,7 +5,7 @@
 #include <string.h>
 
 #include "fcsl/fcsl_check.h"
-#include "rc.h"
+#include "receivers/rc.h"
 
 enum { SBUS_BYTES = 25, CRSF_BYTES = 26 };
 static const uint64_t BYTE_NS = 120000; /* 12 bits at 100000 baud */

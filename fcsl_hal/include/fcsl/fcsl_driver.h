@@ -1,6 +1,6 @@
 /* SPDX-License-Identifier: Apache-2.0
  *
- * The driver ABI: the interface between a host (fcsl-guard) and the code that talks to a device, a sensor or an actuator
+ * The driver ABI: the interface between a host (fcsl-fc, fcsl-guard) and the code that talks to a device, a sensor or an actuator
  * (docs/drivers.md).
  *
  * A driver is one constant descriptor. An opened device is one flat struct that the host allocates; the driver's functions get
@@ -16,12 +16,14 @@
 extern "C" {
 #endif
 
-#define FCSL_DRIVER_ABI_VERSION 1u
+#define FCSL_DRIVER_ABI_VERSION 2u
+
+enum { FCSL_DRIVER_WAIT_MS = 100 }; /* a read that waits does so for this long at most */
 
 typedef enum {
     FCSL_DRIVER_OK = 0,
     FCSL_DRIVER_NOTHING = 1, /* read: no sample since the last one */
-    FCSL_DRIVER_ABSENT = 2,  /* probe, open: there is no such device */
+    FCSL_DRIVER_ABSENT = 2,  /* there is no such device; read: it has gone, the host closes it and probes from time to time */
     FCSL_DRIVER_FAILED = 3   /* the device is there, and it or the system refused */
 } fcsl_driver_status_t;
 
@@ -36,8 +38,8 @@ typedef struct {
 } fcsl_driver_signal_t;
 
 /* Every function but close may put a reason into `why` (a text of `size` bytes with its zero, empty before the call) when it
- * returns anything but OK or NOTHING. After open nothing is allocated. read and write never wait: what the device
- * cannot take or give at once is FAILED or NOTHING. */
+ * returns anything but OK or NOTHING. After open nothing is allocated. A sensor's functions are called from a thread of its own, so
+ * read may take as long as the device does. write never waits: what the device cannot take at once is FAILED. */
 typedef struct {
     uint32_t abi_version;
     const char *name;
@@ -47,6 +49,9 @@ typedef struct {
     uint32_t signal_count;
     uint32_t state_size; /* of the struct, bytes */
     uint32_t state_align;
+    /* Sensors: 1 when read waits for the next sample (FCSL_DRIVER_WAIT_MS at most, then NOTHING) and so sets the pace; 0 when it takes
+     * a sample at each call, and the host calls it at the rate that the user gave. */
+    uint8_t waits;
 
     /* Whether the device of this name is there; opens and changes nothing. `device` is the text that the user gave, "" for none. */
     fcsl_driver_status_t (*probe)(const char *device, char *why, size_t size);
@@ -54,8 +59,8 @@ typedef struct {
      * signals of the device alone. An actuator keeps doing what it does until the first write. `device` lasts until close. After
      * another status than OK there is nothing to close. */
     fcsl_driver_status_t (*open)(void *self, const char *device, const uint8_t *used, char *why, size_t size);
-    /* Sensors (else null): puts the newest sample into the used signals of `self`, and the monotonic time at which it was taken
-     * into *sample_ns; or changes neither. */
+    /* Sensors (else null): puts a sample into the used signals of `self`, and the monotonic time at which it was taken into
+     * *sample_ns; or changes neither. Samples come in their order. A value that the device does not tell is NaN. */
     fcsl_driver_status_t (*read)(void *self, uint64_t *sample_ns, char *why, size_t size);
     /* Actuators (else null): drives the device with the used signals of `self`. Called again and again, with equal values too. */
     fcsl_driver_status_t (*write)(void *self, char *why, size_t size);

@@ -1,0 +1,72 @@
+/* SPDX-License-Identifier: Apache-2.0
+ *
+ * The plan of a board, which `fcslc board` writes: its devices, the sensors of the machine that they are, and how their readings are
+ * corrected and judged. Text, one statement per line, words separated by one space:
+ *
+ *   fcsl-board-plan 1
+ *   machine NAME TICK_HZ
+ *   device NAME PERIOD_NS DRIVER ADDRESS         PERIOD_NS 0: it is read as it waits; ADDRESS: to the end of the line
+ *   sensor NAME KIND                             what follows, up to the next one, belongs to it
+ *   health MAX_AGE_NS STUCK_NS RECOVER_NS        STUCK_NS 0: never stuck
+ *   limits QUANTITY LOW HIGH                     bits; of each element, before the correction
+ *   tolerance QUANTITY DISTANCE                  bits; of disagreement
+ *   bind QUANTITY CHANNEL                        a sensor channel of the machine
+ *   backend DEVICE                               in order of preference; what follows belongs to it
+ *   signal QUANTITY SIGNAL                       the device's signal has another name
+ *   correct QUANTITY MATRIX OFFSET PER_KELVIN CELSIUS     9, 3, 3 words and one, bits
+ *   stick CHANNEL MINIMUM MIDDLE MAXIMUM DEADBAND         bits, in us; CHANNEL from 0
+ *   section QUANTITY B0 B1 B2 A1 A2              bits; a biquad that the quantity goes through, in order
+ *   end
+ *
+ * BITS are 16 hexadecimal digits, those of a double. A plan that was cut off lacks `end`.
+ */
+#ifndef BOARD_BOARD_PLAN_H
+#define BOARD_BOARD_PLAN_H
+
+#include "fcsl/fcsl_frontend.h"
+#include "fcsl/fcsl_run.h"
+
+enum {
+    BOARD_BYTES_MAX = 1 << 20,
+    BOARD_DEVICES_MAX = 32,
+    BOARD_SENSORS_MAX = 32,
+    BOARD_NAME_BYTES = 65
+};
+
+typedef struct {
+    const char *name;
+    const char *driver;
+    const char *address;
+    uint64_t period_ns;
+} board_device_t;
+
+typedef struct {
+    uint32_t quantity;
+    const char *channel;
+} board_binding_t;
+
+typedef struct {
+    const char *name;
+    fcsl_frontend_config_t config;
+    uint32_t devices[FCSL_BACKENDS_MAX]; /* by backend: index into the plan's */
+    const char *signals[FCSL_BACKENDS_MAX][FCSL_QUANTITIES_MAX]; /* of the device; null: that of the quantity's name */
+    board_binding_t bindings[FCSL_QUANTITIES_MAX];
+    uint32_t binding_count;
+} board_sensor_t;
+
+/* All strings point into `text`. */
+typedef struct {
+    char *text;
+    const char *machine;
+    uint64_t tick_hz;
+    board_device_t devices[BOARD_DEVICES_MAX];
+    uint32_t device_count;
+    board_sensor_t sensors[BOARD_SENSORS_MAX];
+    uint32_t sensor_count;
+} board_plan_t;
+
+/* Reads the file. Returns a plan for board_plan_free, or null with a message that names file and line. */
+board_plan_t *board_plan_read(const char *file, fcsl_error_t *error);
+void board_plan_free(board_plan_t *plan);
+
+#endif /* BOARD_BOARD_PLAN_H */
