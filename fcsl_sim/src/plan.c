@@ -8,6 +8,7 @@
 #include <string.h>
 
 #include "fail.h"
+#include "fcsl/fcsl_plan_text.h"
 
 #define MAX_WORDS 7
 
@@ -16,7 +17,6 @@ typedef struct {
     fcsl_error_t *error;
     uint32_t line;
     char *word[MAX_WORDS];
-    uint32_t words;
 } parser_t;
 
 static int bad(const parser_t *parser, const char *what)
@@ -24,108 +24,18 @@ static int bad(const parser_t *parser, const char *what)
     return fcsl_sim_fail(parser->error, "plan line %u: %s", parser->line, what);
 }
 
-/* ---- words --------------------------------------------------------------------------------------------------------- */
-
-/* Decimal, no sign, no leading zeros beyond "0" itself. */
-static int parse_u64(const char *word, uint64_t limit, uint64_t *value)
-{
-    if (!*word || (word[0] == '0' && word[1])) {
-        return -1;
-    }
-    uint64_t v = 0;
-    for (const char *c = word; *c; c++) {
-        if (*c < '0' || *c > '9') {
-            return -1;
-        }
-        const uint64_t digit = (uint64_t)(*c - '0');
-        if (v > (UINT64_MAX - digit) / 10) {
-            return -1;
-        }
-        v = v * 10 + digit;
-    }
-    if (v > limit) {
-        return -1;
-    }
-    *value = v;
-    return 0;
-}
-
-static int parse_bits(const char *word, uint64_t *bits)
-{
-    if (strlen(word) != 16) {
-        return -1;
-    }
-    uint64_t v = 0;
-    for (const char *c = word; *c; c++) {
-        uint64_t digit;
-        if (*c >= '0' && *c <= '9') {
-            digit = (uint64_t)(*c - '0');
-        } else if (*c >= 'a' && *c <= 'f') {
-            digit = (uint64_t)(*c - 'a') + 10;
-        } else {
-            return -1;
-        }
-        v = v << 4 | digit;
-    }
-    *bits = v;
-    return 0;
-}
-
-/* Names of instances, models and machines. */
-static int is_name(const char *word)
-{
-    const size_t length = strlen(word);
-    if (length == 0 || length > 64 || (word[0] >= '0' && word[0] <= '9')) {
-        return 0;
-    }
-    return strspn(word, "abcdefghijklmnopqrstuvwxyzABCDEFGHIJKLMNOPQRSTUVWXYZ0123456789_") == length;
-}
-
-/* Fields and channels: names joined by dots. */
-static int is_path(const char *word)
-{
-    const size_t length = strlen(word);
-    if (length == 0 || length > 200) {
-        return 0;
-    }
-    return strspn(word, "abcdefghijklmnopqrstuvwxyzABCDEFGHIJKLMNOPQRSTUVWXYZ0123456789_.") == length;
-}
-
 /* Cuts the line into `count` words; with `rest` the last takes the rest of the line (library paths may have spaces). */
 static int split(parser_t *parser, char *line, uint32_t count, int rest)
 {
-    parser->words = 0;
-    for (char *at = line;;) {
-        if (parser->words == MAX_WORDS) {
-            return bad(parser, "too many words");
-        }
-        parser->word[parser->words++] = at;
-        if (rest && parser->words == count) {
-            break;
-        }
-        char *space = strchr(at, ' ');
-        if (!space) {
-            break;
-        }
-        *space = '\0';
-        at = space + 1;
-    }
-    if (parser->words != count) {
-        return bad(parser, "wrong number of words for this statement");
-    }
-    for (uint32_t i = 0; i < count; i++) {
-        if (!*parser->word[i]) {
-            return bad(parser, "an empty word (two spaces, or one at the end)");
-        }
-    }
-    return 0;
+    const char *wrong = fcsl_plan_split(line, parser->word, count, rest);
+    return wrong == NULL ? 0 : bad(parser, wrong);
 }
 
 /* ---- statements: each gets its words, word[0] is the keyword ---------------------------------------------------------- */
 
 static int take_library(parser_t *parser, fcsl_plan_library_t *library)
 {
-    if (!is_name(parser->word[1])) {
+    if (!fcsl_plan_is_name(parser->word[1])) {
         return bad(parser, "not a name");
     }
     *library = (fcsl_plan_library_t){parser->line, parser->word[1], parser->word[2]};
@@ -153,7 +63,7 @@ static int on_integrator(parser_t *parser)
     } else {
         return bad(parser, "the integrator is neither `euler` nor `rk4`");
     }
-    if (parse_u64(parser->word[2], FCSL_PLAN_MAX_HZ, &plan->integrator_hz) || plan->integrator_hz == 0) {
+    if (fcsl_plan_number(parser->word[2], FCSL_PLAN_MAX_HZ, &plan->integrator_hz) || plan->integrator_hz == 0) {
         return bad(parser, "the integrator's rate is not in 1..1000000 Hz");
     }
     plan->integrator_line = parser->line;
@@ -165,7 +75,7 @@ static int on_seed(parser_t *parser)
     if (parser->plan->seed_line) {
         return bad(parser, "a second `seed`");
     }
-    if (parse_u64(parser->word[1], UINT64_MAX, &parser->plan->seed)) {
+    if (fcsl_plan_number(parser->word[1], UINT64_MAX, &parser->plan->seed)) {
         return bad(parser, "the seed is not an unsigned 64-bit number");
     }
     parser->plan->seed_line = parser->line;
@@ -177,7 +87,7 @@ static int on_ticks(parser_t *parser)
     if (parser->plan->ticks_line) {
         return bad(parser, "a second `ticks`");
     }
-    if (parse_u64(parser->word[1], FCSL_PLAN_MAX_TICKS, &parser->plan->ticks) || parser->plan->ticks == 0) {
+    if (fcsl_plan_number(parser->word[1], FCSL_PLAN_MAX_TICKS, &parser->plan->ticks) || parser->plan->ticks == 0) {
         return bad(parser, "ticks is not in 1..1000000000000");
     }
     parser->plan->ticks_line = parser->line;
@@ -193,10 +103,10 @@ static int on_instance(parser_t *parser)
 {
     fcsl_plan_instance_t *instance = &parser->plan->instances[parser->plan->instance_count++];
     *instance = (fcsl_plan_instance_t){parser->line, parser->word[1], parser->word[2], 0};
-    if (!is_name(instance->name) || !is_name(instance->model)) {
+    if (!fcsl_plan_is_name(instance->name) || !fcsl_plan_is_name(instance->model)) {
         return bad(parser, "not a name");
     }
-    if (parse_u64(parser->word[3], FCSL_PLAN_MAX_HZ, &instance->hz)) {
+    if (fcsl_plan_number(parser->word[3], FCSL_PLAN_MAX_HZ, &instance->hz)) {
         return bad(parser, "the rate is not in 0..1000000 Hz");
     }
     return 0;
@@ -206,13 +116,13 @@ static int on_instance(parser_t *parser)
 static int take_set(parser_t *parser, uint32_t first, fcsl_plan_set_t *set)
 {
     *set = (fcsl_plan_set_t){.line = parser->line, .instance = parser->word[first], .field = parser->word[first + 1]};
-    if (!is_name(set->instance) || !is_path(set->field)) {
+    if (!fcsl_plan_is_name(set->instance) || !fcsl_plan_is_path(set->field)) {
         return bad(parser, "not a name or field");
     }
-    if (parse_u64(parser->word[first + 2], UINT32_MAX, &set->element)) {
+    if (fcsl_plan_number(parser->word[first + 2], UINT32_MAX, &set->element)) {
         return bad(parser, "the element is not a number");
     }
-    if (parse_bits(parser->word[first + 3], &set->bits)) {
+    if (fcsl_plan_bits(parser->word[first + 3], &set->bits)) {
         return bad(parser, "the value is not 16 hexadecimal digits");
     }
     return 0;
@@ -229,7 +139,7 @@ static int on_event(parser_t *parser)
     if (take_set(parser, 2, event)) {
         return -1;
     }
-    if (parse_u64(parser->word[1], INT64_MAX, &event->time_ns)) {
+    if (fcsl_plan_number(parser->word[1], INT64_MAX, &event->time_ns)) {
         return bad(parser, "the time is not a number of nanoseconds");
     }
     return 0;
@@ -240,7 +150,8 @@ static int on_link(parser_t *parser)
     char *const *word = parser->word;
     parser->plan->links[parser->plan->link_count++] =
         (fcsl_plan_link_t){parser->line, word[1], word[2], word[3], word[4]};
-    if (!is_name(word[1]) || !is_path(word[2]) || !is_name(word[3]) || !is_path(word[4])) {
+    if (!fcsl_plan_is_name(word[1]) || !fcsl_plan_is_path(word[2]) || !fcsl_plan_is_name(word[3]) ||
+        !fcsl_plan_is_path(word[4])) {
         return bad(parser, "not a name or field");
     }
     return 0;
@@ -251,7 +162,7 @@ static int on_sensor(parser_t *parser)
     char *const *word = parser->word;
     parser->plan->sensors[parser->plan->sensor_count++] =
         (fcsl_plan_link_t){parser->line, word[1], word[2], NULL, word[3]};
-    if (!is_name(word[1]) || !is_path(word[2]) || !is_path(word[3])) {
+    if (!fcsl_plan_is_name(word[1]) || !fcsl_plan_is_path(word[2]) || !fcsl_plan_is_path(word[3])) {
         return bad(parser, "not a name, field or channel");
     }
     return 0;
@@ -262,7 +173,7 @@ static int on_actuator(parser_t *parser)
     char *const *word = parser->word;
     parser->plan->actuators[parser->plan->actuator_count++] =
         (fcsl_plan_link_t){parser->line, NULL, word[1], word[2], word[3]};
-    if (!is_path(word[1]) || !is_name(word[2]) || !is_path(word[3])) {
+    if (!fcsl_plan_is_path(word[1]) || !fcsl_plan_is_name(word[2]) || !fcsl_plan_is_path(word[3])) {
         return bad(parser, "not a name, field or channel");
     }
     return 0;
@@ -276,7 +187,7 @@ static int on_until(parser_t *parser)
         return bad(parser, "a second `until`");
     }
     plan->until_value = (fcsl_plan_set_t){.line = parser->line, .instance = word[1], .field = word[2]};
-    if (!is_name(word[1]) || !is_path(word[2])) {
+    if (!fcsl_plan_is_name(word[1]) || !fcsl_plan_is_path(word[2])) {
         return bad(parser, "not a name or field");
     }
     if (strcmp(word[3], "equals") == 0) {
@@ -288,10 +199,10 @@ static int on_until(parser_t *parser)
     } else {
         return bad(parser, "the comparison is not `equals`, `above` or `below`");
     }
-    if (parse_bits(word[4], &plan->until_value.bits)) {
+    if (fcsl_plan_bits(word[4], &plan->until_value.bits)) {
         return bad(parser, "the value is not 16 hexadecimal digits");
     }
-    if (parse_u64(word[5], FCSL_PLAN_MAX_TICKS, &plan->until_ticks) || plan->until_ticks == 0) {
+    if (fcsl_plan_number(word[5], FCSL_PLAN_MAX_TICKS, &plan->until_ticks) || plan->until_ticks == 0) {
         return bad(parser, "the number of ticks is not in 1..1000000000000");
     }
     return 0;
@@ -300,7 +211,7 @@ static int on_until(parser_t *parser)
 static int on_serial_link(parser_t *parser)
 {
     parser->plan->serial_link = (fcsl_plan_library_t){.line = parser->line, .name = parser->word[1]};
-    return is_name(parser->word[1]) ? 0 : bad(parser, "not a name");
+    return fcsl_plan_is_name(parser->word[1]) ? 0 : bad(parser, "not a name");
 }
 
 static int on_views(parser_t *parser)
@@ -364,27 +275,6 @@ static const statement_t *find_statement(const char *line)
 }
 
 /* ---- the whole --------------------------------------------------------------------------------------------------------- */
-
-/* Turns the text into null-terminated lines. Rejects control characters and lines that are too long; returns the number of lines. */
-static int cut_lines(char *text, size_t size, uint32_t *lines, fcsl_error_t *error)
-{
-    size_t length = 0;
-    uint32_t line = 1;
-    for (size_t i = 0; i < size; i++) {
-        const uint8_t c = (uint8_t)text[i];
-        if (c == '\n') {
-            text[i] = '\0';
-            line++;
-            length = 0;
-        } else if (c < 0x20 || c == 0x7f) {
-            return fcsl_sim_fail(error, "plan line %u: a control character", line);
-        } else if (++length > FCSL_PLAN_MAX_LINE) {
-            return fcsl_sim_fail(error, "plan line %u: longer than %u bytes", line, FCSL_PLAN_MAX_LINE);
-        }
-    }
-    *lines = size && text[size - 1] == '\0' ? line - 1 : line; /* the last line may or may not end in a line feed */
-    return 0;
-}
 
 /* First pass: counts each kind of statement, so that every table is allocated once with the right size. */
 static int count_statements(const char *text, uint32_t lines, uint32_t counts[STATEMENTS], fcsl_error_t *error)
@@ -475,8 +365,9 @@ int fcsl_plan_parse(fcsl_plan_t *plan, const char *text, size_t size, fcsl_error
 
     uint32_t lines = 0;
     uint32_t counts[STATEMENTS] = {0};
-    if (cut_lines(plan->text, size, &lines, error)) {
-        return -1;
+    const char *wrong = fcsl_plan_cut_lines(plan->text, size, FCSL_PLAN_MAX_LINE, &lines);
+    if (wrong != NULL) {
+        return fcsl_sim_fail(error, "plan line %u: %s", lines, wrong);
     }
     if (count_statements(plan->text, lines, counts, error)) {
         return -1;

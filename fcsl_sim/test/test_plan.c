@@ -102,7 +102,7 @@ static void refuses_long_lines(void)
     static char text[3 * FCSL_PLAN_MAX_LINE];
     memset(text, 'a', sizeof text);
     memcpy(text, "fcsl-sim-plan 1\n", 16);
-    refuses(text, sizeof text, "plan line 2: longer than 65543 bytes");
+    refuses(text, sizeof text, "plan line 2: the line is too long");
 }
 
 /* No proper prefix of a plan is a plan, except the one without the last line feed. */

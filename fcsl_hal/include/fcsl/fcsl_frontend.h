@@ -94,6 +94,7 @@ typedef struct {
     double low[FCSL_QUANTITIES_MAX]; /* by quantity, before the correction; -INFINITY, INFINITY without a limit */
     double high[FCSL_QUANTITIES_MAX];
     double tolerance[FCSL_QUANTITIES_MAX]; /* of disagreement; INFINITY: none */
+    uint32_t needed[FCSL_QUANTITIES_MAX]; /* how many elements the machine gets: they must be numbers */
     fcsl_backend_config_t backends[FCSL_BACKENDS_MAX];
     uint32_t backend_count;
 } fcsl_frontend_config_t;
@@ -101,12 +102,12 @@ typedef struct {
 /* Why a backend is not healthy; the first that holds. */
 typedef enum {
     FCSL_BACKEND_HEALTHY = 0,
-    FCSL_BACKEND_SILENT = 1,     /* no good reading for max_age_ns */
-    FCSL_BACKEND_RANGE = 2,      /* the last reading was outside the limits, or no number */
-    FCSL_BACKEND_STUCK = 3,
-    FCSL_BACKEND_INVALID = 4,    /* it says itself that its values count for nothing: no fix, failsafe */
-    FCSL_BACKEND_DISAGREES = 5,  /* with two others that agree */
-    FCSL_BACKEND_RECOVERING = 6, /* good again, for less than recover_ns */
+    FCSL_BACKEND_SILENT = 1,     /* no reading for more than max_age_ns */
+    FCSL_BACKEND_INVALID = 2,    /* it says itself that its values count for nothing: no fix, failsafe */
+    FCSL_BACKEND_RANGE = 3,      /* its last reading was outside the limits, or no number */
+    FCSL_BACKEND_STUCK = 4,
+    FCSL_BACKEND_DISAGREES = 5,  /* with the median of three or more, for more than max_age_ns */
+    FCSL_BACKEND_RECOVERING = 6, /* it was healthy, then not, and has been good for less than recover_ns */
     FCSL_BACKEND_CONDITIONS = 7
 } fcsl_backend_condition_t;
 

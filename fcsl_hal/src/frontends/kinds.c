@@ -4,12 +4,12 @@
  */
 #include "fcsl/fcsl_frontend.h"
 
-#define COUNT(array) (uint32_t)(sizeof(array) / sizeof(array)[0])
+#define COUNT(array)             (uint32_t)(sizeof(array) / sizeof(array)[0])
 #define KIND(name_, quantities_) {.name = (name_), .quantities = (quantities_), .quantity_count = COUNT(quantities_)}
 
 static const fcsl_quantity_t INERTIAL[] = {
-    {"gyro", "rad/s", 0, 3, 1},        {"accel", "m/s^2", 3, 3, 1},       {"temperature", "degC", 6, 1, 1},
-    {"delta_angle", "rad", 7, 3, 0},   {"delta_velocity", "m/s", 10, 3, 0}, {"delta_time", "s", 13, 1, 0},
+    {"gyro", "rad/s", 0, 3, 1},      {"accel", "m/s^2", 3, 3, 1},         {"temperature", "degC", 6, 1, 1},
+    {"delta_angle", "rad", 7, 3, 0}, {"delta_velocity", "m/s", 10, 3, 0}, {"delta_time", "s", 13, 1, 0},
 };
 static const fcsl_quantity_t COMPASS[] = {{"field", "T", 0, 3, 1}, {"temperature", "degC", 3, 1, 1}};
 static const fcsl_quantity_t BAROMETER[] = {{"pressure", "Pa", 0, 1, 1}, {"temperature", "degC", 1, 1, 1}};

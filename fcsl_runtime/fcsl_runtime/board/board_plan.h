@@ -16,6 +16,8 @@
  *   correct QUANTITY MATRIX OFFSET PER_KELVIN CELSIUS     9, 3, 3 words and one, bits
  *   stick CHANNEL MINIMUM MIDDLE MAXIMUM DEADBAND         bits, in us; CHANNEL from 0
  *   section QUANTITY B0 B1 B2 A1 A2              bits; a biquad that the quantity goes through, in order
+ *   output CHANNEL DEVICE                        an actuator channel; what follows, up to the next one, belongs to it
+ *   pulse INDEX SIGNAL LOW HIGH MINIMUM MIDDLE MAXIMUM SLEW SAFE     bits; see board_pulse_t
  *   end
  *
  * BITS are 16 hexadecimal digits, those of a double. A plan that was cut off lacks `end`.
@@ -30,6 +32,8 @@ enum {
     BOARD_BYTES_MAX = 1 << 20,
     BOARD_DEVICES_MAX = 32,
     BOARD_SENSORS_MAX = 32,
+    BOARD_OUTPUTS_MAX = 16,
+    BOARD_PULSES_MAX = 16, /* of an output */
     BOARD_NAME_BYTES = 65
 };
 
@@ -54,6 +58,28 @@ typedef struct {
     uint32_t binding_count;
 } board_sensor_t;
 
+/* How element `index` of an actuator channel becomes a signal of its device, a pulse for example: a command from `low` over the middle
+ * to `high` goes to `minimum`, `middle`, `maximum` in straight lines (minimum > maximum: reversed); beyond them it stays there, and what
+ * is no number is the safe value. The pulse moves by `slew` per second at most (0: at once). Safe actuators get `safe` at once. */
+typedef struct {
+    const char *signal;
+    uint32_t index;
+    double low;
+    double high;
+    double minimum;
+    double middle;
+    double maximum;
+    double slew;
+    double safe;
+} board_pulse_t;
+
+typedef struct {
+    const char *channel;
+    uint32_t device; /* index into the plan's */
+    board_pulse_t pulses[BOARD_PULSES_MAX];
+    uint32_t pulse_count;
+} board_output_t;
+
 /* All strings point into `text`. */
 typedef struct {
     char *text;
@@ -63,6 +89,8 @@ typedef struct {
     uint32_t device_count;
     board_sensor_t sensors[BOARD_SENSORS_MAX];
     uint32_t sensor_count;
+    board_output_t outputs[BOARD_OUTPUTS_MAX];
+    uint32_t output_count;
 } board_plan_t;
 
 /* Reads the file. Returns a plan for board_plan_free, or null with a message that names file and line. */

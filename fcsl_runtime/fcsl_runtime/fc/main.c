@@ -9,6 +9,7 @@
 #include <string.h>
 #include <unistd.h>
 
+#include "board/hal_linux.h"
 #include "guard_link.h"
 #include "monitor.h"
 #include "run_summary.h"
@@ -66,6 +67,8 @@ static int make_hal(program_t *program)
         status = fcsl_hal_stub(hal, error.text, sizeof error.text);
     } else if (strncmp(peer, OPTIONS_WIRE, strlen(OPTIONS_WIRE)) == 0) {
         status = fcsl_hal_wire(peer + strlen(OPTIONS_WIRE), machine, timeout_ms, hal, error.text, sizeof error.text);
+    } else if (options_hal_is_linux(options)) {
+        status = hal_linux(peer + strlen(OPTIONS_LINUX), program->loop.run, hal, &error);
     } else if (options_hal_is_ros(options)) {
         status = hal_ros(peer + strlen(OPTIONS_ROS), options->name_space, program->loop.run, hal, &error);
     } else {

@@ -31,6 +31,8 @@ static const char USAGE[] =
     "                          the same with ,free-running behind it: whatever puts values there; waits for nobody\n"
     "                          ros:tcp/HOST:PORT: the topics of the channels in a ROS 2 graph, whose bridge connects "
     "there\n"
+    "                          linux:PLAN: the sensors of this computer, as a plan of `fcslc board` says "
+    "(docs/board.md)\n"
     "  --timeout-ms N          how long to wait for the simulator's next message (default 2000)\n"
     "  --board LIBRARY.so      the board that hw_* of algorithms reach (fcsl/fcsl_hw.h); default: simulated hardware\n"
     "  --guard PATH            the actuators belong to the fcsl-guard that listens on PATH (docs/guard.md)\n"
@@ -100,11 +102,12 @@ static int read_hal(const char *text, options_t *options)
     if (options->peer == NULL) {
         return 0;
     }
-    if (options_hal_is_ros(options)) {
+    if (options_hal_is_ros(options) || options_hal_is_linux(options)) {
         return 0;
     }
     if (!is_wire && strncmp(text, "zenoh", strlen("zenoh")) != 0) {
-        return usage_error("--hal must be stub, wire:SPEC, zenoh:tcp/HOST:PORT or ros:tcp/HOST:PORT, not ", text);
+        return usage_error("--hal must be stub, linux:PLAN, wire:SPEC, zenoh:tcp/HOST:PORT or ros:tcp/HOST:PORT, not ",
+                           text);
     }
     const int failed = is_wire ? fcsl_wire_check(text + strlen(OPTIONS_WIRE), error, sizeof error)
                                : fcsl_hal_bus_check(text, error, sizeof error);
@@ -218,7 +221,7 @@ static int read_option(const entry_t *entry, const char *text, options_t *option
 
 static int has_simulator(const options_t *options)
 {
-    return options->peer != NULL && !options_hal_is_ros(options);
+    return options->peer != NULL && !options_hal_is_ros(options) && !options_hal_is_linux(options);
 }
 
 /* Options that say nothing together. */
@@ -242,7 +245,8 @@ static int check(const options_t *options)
     }
     if (options->name_space[0] != '\0' && options->record == NULL && options->observers == NULL &&
         options->ros == NULL &&
-        (options->peer == NULL || strncmp(options->peer, OPTIONS_WIRE, strlen(OPTIONS_WIRE)) == 0)) {
+        (options->peer == NULL || options_hal_is_linux(options) ||
+         strncmp(options->peer, OPTIONS_WIRE, strlen(OPTIONS_WIRE)) == 0)) {
         return usage_error(
             "--namespace needs --record, --observers, --ros or --hal zenoh:…: it is of topics, and of keys of the bus",
             "");

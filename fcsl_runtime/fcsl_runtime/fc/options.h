@@ -14,7 +14,8 @@ typedef struct {
     const char *library;
     const char *machine;    /* null: the only one */
     const char *
-        peer; /* OPTIONS_WIRE and a SPEC of fcsl_wire.h, an address of fcsl_hal_bus, or OPTIONS_ROS and an endpoint; null: the stub HAL */
+        peer; /* OPTIONS_WIRE and a SPEC of fcsl_wire.h, an address of fcsl_hal_bus, OPTIONS_ROS and an endpoint, or OPTIONS_LINUX
+               * and the plan of a board; null: the stub HAL */
     const char *board; /* null: simulated hardware */
     const char *guard; /* socket of fcsl-guard; null: none */
     const char *restore; /* file of a checkpoint to begin from; null: from tick 0 */
@@ -48,6 +49,12 @@ typedef struct {
 #define OPTIONS_ANY_CPU UINT64_MAX
 #define OPTIONS_WIRE    "wire:"
 #define OPTIONS_ROS     "ros:"
+#define OPTIONS_LINUX   "linux:"
+
+static inline int options_hal_is_linux(const options_t *options)
+{
+    return options->peer != NULL && strncmp(options->peer, OPTIONS_LINUX, strlen(OPTIONS_LINUX)) == 0;
+}
 
 static inline int options_hal_is_ros(const options_t *options)
 {

@@ -1,0 +1,118 @@
+/* SPDX-License-Identifier: Apache-2.0
+ *
+ * A sensor of a board.
+ */
+#include "board_sensor.h"
+
+#include <stdlib.h>
+#include <string.h>
+
+#include "base/error.h"
+#include "fcsl/fcsl_scalar.h"
+
+static const uint64_t NS_PER_SECOND = 1000000000u;
+
+static int find_channel(const fcsl_machine_t *machine, const char *name, uint32_t *index)
+{
+    for (uint32_t i = 0; i < machine->channel_count; i++) {
+        if (strcmp(machine->channels[i].name, name) == 0) {
+            *index = i;
+            return 0;
+        }
+    }
+    return -1;
+}
+
+static int bind(board_sensor_run_t *sensor, const board_binding_t *binding, board_channel_t *bound,
+                const fcsl_machine_t *machine, fcsl_error_t *error)
+{
+    fcsl_frontend_config_t *config = &sensor->plan->config;
+    const fcsl_quantity_t *quantity = &fcsl_sensor_kinds[config->kind].quantities[binding->quantity];
+    if (find_channel(machine, binding->channel, &bound->channel) != 0) {
+        return fcsl_fail(error, "machine '%.60s' has no channel '%.100s': the plan was made for another one",
+                         machine->name, binding->channel);
+    }
+    const fcsl_channel_t *channel = &machine->channels[bound->channel];
+    const fcsl_field_t *field = &machine->fields[channel->field];
+    const int is_float = field->type == FCSL_F64 || field->type == FCSL_F32;
+    const int fits = field->count == quantity->count || (config->kind == FCSL_RC && field->count < quantity->count);
+    if (channel->direction != FCSL_SENSOR || !is_float || !fits) {
+        return fcsl_fail(
+            error, "channel '%.100s' is no sensor of %u floating-point numbers: the plan was made for another machine",
+            channel->name, quantity->count);
+    }
+    bound->at = quantity->at;
+    bound->count = field->count;
+    bound->type = field->type;
+    if (quantity->given && config->needed[binding->quantity] < field->count) {
+        config->needed[binding->quantity] = field->count;
+    }
+    return 0;
+}
+
+int board_sensor_open(board_sensor_run_t *sensor, board_sensor_t *plan, const fcsl_machine_t *machine,
+                      fcsl_error_t *error)
+{
+    sensor->plan = plan;
+    sensor->frontend = calloc(1, fcsl_frontend_bytes());
+    if (sensor->frontend == NULL) {
+        return fcsl_fail(error, "out of memory for sensor '%.60s'", plan->name);
+    }
+    for (uint32_t i = 0; i < plan->binding_count; i++) {
+        if (bind(sensor, &plan->bindings[i], &sensor->channels[i], machine, error) != 0) {
+            return -1;
+        }
+    }
+    fcsl_frontend_init(sensor->frontend, &plan->config);
+    return 0;
+}
+
+/* Whole ticks, rounded down. */
+static uint32_t age_in_ticks(uint64_t now_ns, uint64_t sample_ns, uint64_t tick_hz)
+{
+    const uint64_t age_ns = now_ns > sample_ns ? now_ns - sample_ns : 0u;
+    const uint64_t ticks =
+        age_ns / NS_PER_SECOND * tick_hz + age_ns % NS_PER_SECOND * tick_hz / NS_PER_SECOND; /* tick_hz ≤ 10⁶ */
+    return ticks < UINT32_MAX ? (uint32_t)ticks : UINT32_MAX;
+}
+
+static uint32_t put_values(const board_channel_t *channel, const double *values, uint8_t *bytes)
+{
+    if (channel->type == FCSL_F64) {
+        fcsl_scalars_export(bytes, values, FCSL_F64, channel->count);
+        return channel->count * (uint32_t)sizeof(double);
+    }
+    float narrow[FCSL_VALUES_MAX];
+    for (uint32_t i = 0; i < channel->count; i++) {
+        narrow[i] = (float)values[i];
+    }
+    fcsl_scalars_export(bytes, narrow, FCSL_F32, channel->count);
+    return channel->count * (uint32_t)sizeof(float);
+}
+
+int board_sensor_tick(board_sensor_run_t *sensor, fcsl_run_t *run, uint64_t now_ns, fcsl_error_t *error)
+{
+    const fcsl_machine_t *machine = fcsl_run_machine(run);
+    const fcsl_frontend_output_t *output = &sensor->output;
+    fcsl_frontend_tick(sensor->frontend, now_ns, &sensor->output);
+    if (output->primary < 0 || !output->fresh) {
+        return 0;
+    }
+    const uint32_t age_ticks = age_in_ticks(now_ns, output->sample_ns, machine->tick_hz);
+    for (uint32_t i = 0; i < sensor->plan->binding_count; i++) {
+        uint8_t bytes[FCSL_VALUES_MAX * sizeof(double)];
+        const board_channel_t *channel = &sensor->channels[i];
+        const uint32_t size = put_values(channel, &output->values[channel->at], bytes);
+        if (fcsl_run_write_channel(run, channel->channel, bytes, size, age_ticks, (int64_t)output->sample_ns, error) !=
+            0) {
+            return -1;
+        }
+    }
+    return 0;
+}
+
+void board_sensor_close(board_sensor_run_t *sensor)
+{
+    free(sensor->frontend);
+    sensor->frontend = NULL;
+}

@@ -1,0 +1,15 @@
+/* SPDX-License-Identifier: Apache-2.0
+ *
+ * The HAL of a board: sensors are devices of this computer, read through drivers and frontends as a plan says (docs/board.md). Actuators
+ * are fcsl-guard's: without one, commands move nothing.
+ */
+#ifndef BOARD_HAL_LINUX_H
+#define BOARD_HAL_LINUX_H
+
+#include "fcsl/fcsl_hal.h"
+#include "fcsl/fcsl_run.h"
+
+/* `file`: the plan that `fcslc board` has written, for the machine of `run`. 0, or -1. */
+int hal_linux(const char *file, fcsl_run_t *run, fcsl_hal_t *hal, fcsl_error_t *error);
+
+#endif /* BOARD_HAL_LINUX_H */

@@ -1,0 +1,377 @@
+/* SPDX-License-Identifier: Apache-2.0
+ *
+ * A sensor's device and its thread.
+ */
+#define _GNU_SOURCE
+#include "sensor_device.h"
+
+#include <dlfcn.h>
+#include <errno.h>
+#include <math.h>
+#include <pthread.h>
+#include <semaphore.h>
+#include <signal.h>
+#include <stdatomic.h>
+#include <stdio.h>
+#include <stdlib.h>
+#include <string.h>
+#include <time.h>
+
+#include "base/error.h"
+#include "fcsl/fcsl_library.h"
+#include "fcsl/fcsl_scalar.h"
+
+enum { NEWS_BYTES = 512, STACK_BYTES = 256 << 10 };
+static const uint64_t LOOK_AGAIN_NS = 500000000u; /* for a device that is not there */
+static const uint64_t FAILED_NS = 10000000u; /* after a read that failed, of a driver that waits */
+static const uint64_t END_NS = 1000000000u;
+
+typedef enum { DEVICE_MISSING, DEVICE_OPEN, DEVICE_FAILING } condition_t;
+
+struct sensor_device {
+    const board_device_t *plan;
+    const fcsl_driver_t *driver;
+    void *library;
+    void *state;
+    uint8_t *used;
+    uint32_t *at; /* by signal: where its elements lie in a sample */
+    uint32_t value_count;
+    int opened; /* the thread's, once it runs */
+
+    pthread_t thread;
+    int started;
+    atomic_int over;
+    sem_t wake;
+
+    device_sample_t ring[DEVICE_RING_SAMPLES];
+    _Atomic uint64_t written;
+    _Atomic uint64_t taken;
+    _Atomic uint64_t samples;
+    _Atomic uint64_t errors;
+    _Atomic uint64_t dropped;
+    _Atomic uint64_t lost;
+    atomic_int condition; /* condition_t */
+
+    pthread_mutex_t reason_lock; /* the step thread only tries it */
+    char reason[DEVICE_REASON_BYTES];
+    condition_t told;
+    char news[NEWS_BYTES];
+};
+
+static uint64_t now_ns(void)
+{
+    return fcsl_run_monotonic_ns(NULL);
+}
+
+/* ---- before the thread ---------------------------------------------------------------------------------------------- */
+
+static int allocate(sensor_device_t *device, fcsl_error_t *error)
+{
+    const fcsl_driver_t *driver = device->driver;
+    const size_t align = driver->state_align < 64u ? 64u : driver->state_align;
+    const size_t size = (driver->state_size + align - 1u) / align * align;
+    device->state = aligned_alloc(align, size);
+    device->used = calloc(driver->signal_count, 1);
+    device->at = calloc(driver->signal_count, sizeof *device->at);
+    if (device->state == NULL || device->used == NULL || device->at == NULL) {
+        return fcsl_fail(error, "out of memory for device '%.60s'", device->plan->name);
+    }
+    memset(device->state, 0, size);
+    return 0;
+}
+
+sensor_device_t *sensor_device_new(const board_device_t *plan, fcsl_error_t *error)
+{
+    sensor_device_t *device = calloc(1, sizeof *device);
+    if (device == NULL) {
+        (void)fcsl_fail(error, "out of memory for device '%.60s'", plan->name);
+        return NULL;
+    }
+    device->plan = plan;
+    fcsl_error_t why;
+    device->driver = fcsl_library_driver(plan->driver, FCSL_SENSOR, &device->library, &why);
+    if (device->driver == NULL) {
+        (void)fcsl_fail(error, "device '%.60s': %.400s", plan->name, why.text);
+    } else if (!device->driver->waits && plan->period_ns == 0u) {
+        (void)fcsl_fail(error,
+                        "device '%.60s': driver '%.60s' does not wait for samples: give the device a \"rate_hz\"",
+                        plan->name, plan->driver);
+    } else if (sem_init(&device->wake, 0, 0) != 0 || pthread_mutex_init(&device->reason_lock, NULL) != 0) {
+        (void)fcsl_fail(error, "device '%.60s': no semaphore", plan->name);
+    } else if (allocate(device, error) == 0) {
+        return device;
+    }
+    sensor_device_free(device);
+    return NULL;
+}
+
+int sensor_device_use(sensor_device_t *device, const char *signal, const char *unit, uint32_t count, uint32_t *found,
+                      fcsl_error_t *error)
+{
+    const fcsl_driver_t *driver = device->driver;
+    const char *name = device->plan->name;
+    for (uint32_t i = 0; i < driver->signal_count; i++) {
+        const fcsl_driver_signal_t *known = &driver->signals[i];
+        if (strcmp(known->name, signal) != 0) {
+            continue;
+        }
+        if (known->unit[0] != '\0' && unit[0] != '\0' && strcmp(known->unit, unit) != 0) {
+            return fcsl_fail(error, "device '%.60s': signal '%.60s' is in %.40s, here it must be in %.40s", name,
+                             signal, known->unit, unit);
+        }
+        if (device->used[i] == 0u) {
+            if (device->value_count + known->count > DEVICE_VALUES_MAX) {
+                return fcsl_fail(error, "device '%.60s': more than %d values", name, DEVICE_VALUES_MAX);
+            }
+            device->used[i] = 1;
+            device->at[i] = device->value_count;
+            device->value_count += known->count;
+        }
+        *found = known->count < count ? known->count : count;
+        return (int)device->at[i];
+    }
+    return fcsl_fail(error, "device '%.60s': driver '%.60s' has no signal '%.60s'", name, device->plan->driver, signal);
+}
+
+/* ---- the thread ----------------------------------------------------------------------------------------------------- */
+
+static void set_condition(sensor_device_t *device, condition_t condition, const char *reason)
+{
+    (void)pthread_mutex_lock(&device->reason_lock);
+    (void)snprintf(device->reason, sizeof device->reason, "%s",
+                   reason[0] != '\0' ? reason : "the driver gives no reason");
+    atomic_store(&device->condition, (int)condition);
+    (void)pthread_mutex_unlock(&device->reason_lock);
+}
+
+static int open_device(sensor_device_t *device, char *why, size_t size)
+{
+    const char *address = device->plan->address;
+    fcsl_driver_status_t status = device->driver->probe(address, why, size);
+    if (status == FCSL_DRIVER_OK) {
+        memset(device->state, 0, device->driver->state_size);
+        status = device->driver->open(device->state, address, device->used, why, size);
+    }
+    why[size - 1u] = '\0';
+    device->opened = status == FCSL_DRIVER_OK;
+    return (int)status;
+}
+
+#define SCALAR(type_)                                                                                                  \
+    {                                                                                                                  \
+        type_ value;                                                                                                   \
+        memcpy(&value, bytes, sizeof value);                                                                           \
+        return (double)value;                                                                                          \
+    }
+
+/* A scalar of fcsl_type_t, FCSL_BOOL to FCSL_F64. */
+static double scalar_at(const uint8_t *bytes, uint8_t type)
+{
+    switch (type) {
+    case FCSL_I32:
+        SCALAR(int32_t)
+    case FCSL_I64:
+        SCALAR(int64_t)
+    case FCSL_U32:
+        SCALAR(uint32_t)
+    case FCSL_U64:
+        SCALAR(uint64_t)
+    case FCSL_F32:
+        SCALAR(float)
+    case FCSL_F64:
+        SCALAR(double)
+    default:
+        SCALAR(uint8_t)
+    }
+}
+
+static void keep_sample(sensor_device_t *device, uint64_t sample_ns)
+{
+    const fcsl_driver_t *driver = device->driver;
+    const uint64_t written = atomic_load_explicit(&device->written, memory_order_relaxed);
+    if (written - atomic_load_explicit(&device->taken, memory_order_acquire) >= DEVICE_RING_SAMPLES) {
+        atomic_fetch_add_explicit(&device->dropped, 1, memory_order_relaxed);
+        return;
+    }
+    device_sample_t *sample = &device->ring[written % DEVICE_RING_SAMPLES];
+    sample->sample_ns = sample_ns;
+    for (uint32_t s = 0; s < driver->signal_count; s++) {
+        const fcsl_driver_signal_t *signal = &driver->signals[s];
+        const size_t scalar = fcsl_scalar_size(signal->type);
+        for (uint32_t i = 0; device->used[s] != 0u && i < signal->count; i++) {
+            sample->values[device->at[s] + i] =
+                scalar_at((const uint8_t *)device->state + signal->offset + i * scalar, signal->type);
+        }
+    }
+    atomic_store_explicit(&device->written, written + 1u, memory_order_release);
+    atomic_fetch_add_explicit(&device->samples, 1, memory_order_relaxed);
+}
+
+/* Reads once. Returns how long to wait before the next read of a driver that waits by itself. */
+static uint64_t read_device(sensor_device_t *device)
+{
+    char why[DEVICE_REASON_BYTES] = "";
+    uint64_t sample_ns = 0;
+    const fcsl_driver_status_t status = device->driver->read(device->state, &sample_ns, why, sizeof why);
+    why[sizeof why - 1u] = '\0';
+    if (status == FCSL_DRIVER_OK) {
+        keep_sample(device, sample_ns);
+        if (atomic_load(&device->condition) != DEVICE_OPEN) {
+            set_condition(device, DEVICE_OPEN, "");
+        }
+        return 0;
+    }
+    if (status == FCSL_DRIVER_NOTHING) {
+        return 0;
+    }
+    atomic_fetch_add_explicit(&device->errors, 1, memory_order_relaxed);
+    if (status == FCSL_DRIVER_ABSENT) {
+        device->driver->close(device->state);
+        device->opened = 0;
+        atomic_fetch_add_explicit(&device->lost, 1, memory_order_relaxed);
+        set_condition(device, DEVICE_MISSING, why);
+        return 0;
+    }
+    if (atomic_load(&device->condition) != DEVICE_FAILING) {
+        set_condition(device, DEVICE_FAILING, why);
+    }
+    return FAILED_NS;
+}
+
+/* Until then, or until the end. */
+static void sleep_until(sensor_device_t *device, uint64_t until_ns)
+{
+    const struct timespec until = {.tv_sec = (time_t)(until_ns / 1000000000u),
+                                   .tv_nsec = (long)(until_ns % 1000000000u)};
+    while (atomic_load(&device->over) == 0 && sem_clockwait(&device->wake, CLOCK_MONOTONIC, &until) != 0 &&
+           errno == EINTR) {
+    }
+}
+
+/* The next time in the grid of the period that has not passed. */
+static uint64_t next_due(uint64_t due_ns, uint64_t period_ns)
+{
+    const uint64_t now = now_ns();
+    return now < due_ns + period_ns ? due_ns + period_ns : due_ns + ((now - due_ns) / period_ns + 1u) * period_ns;
+}
+
+static void *run(void *ctx)
+{
+    sensor_device_t *device = ctx;
+    uint64_t due_ns = now_ns();
+    while (atomic_load(&device->over) == 0) {
+        char why[DEVICE_REASON_BYTES] = "";
+        if (!device->opened && open_device(device, why, sizeof why) != FCSL_DRIVER_OK) {
+            sleep_until(device, now_ns() + LOOK_AGAIN_NS);
+            continue;
+        }
+        const uint64_t wait_ns = read_device(device);
+        if (!device->driver->waits) {
+            due_ns = next_due(due_ns, device->plan->period_ns);
+            sleep_until(device, due_ns);
+        } else if (wait_ns > 0u) {
+            sleep_until(device, now_ns() + wait_ns);
+        }
+    }
+    return NULL;
+}
+
+/* Signals are for the threads that expect them. */
+static int start_thread(sensor_device_t *device)
+{
+    pthread_attr_t attributes;
+    sigset_t all;
+    sigset_t before;
+    (void)sigfillset(&all);
+    if (pthread_attr_init(&attributes) != 0) {
+        return -1;
+    }
+    (void)pthread_attr_setstacksize(&attributes, STACK_BYTES);
+    (void)pthread_sigmask(SIG_SETMASK, &all, &before);
+    device->started = pthread_create(&device->thread, &attributes, run, device) == 0;
+    (void)pthread_sigmask(SIG_SETMASK, &before, NULL);
+    (void)pthread_attr_destroy(&attributes);
+    return device->started ? 0 : -1;
+}
+
+int sensor_device_start(sensor_device_t *device, fcsl_error_t *error)
+{
+    char why[DEVICE_REASON_BYTES] = "";
+    const int status = open_device(device, why, sizeof why);
+    if (status == FCSL_DRIVER_FAILED) {
+        return fcsl_fail(error, "device '%.60s' (%.200s) cannot be opened: %s", device->plan->name,
+                         device->plan->address, why[0] != '\0' ? why : "the driver gives no reason");
+    }
+    set_condition(device, device->opened ? DEVICE_OPEN : DEVICE_MISSING, why);
+    device->told = DEVICE_OPEN;
+    return start_thread(device) == 0 ? 0 : fcsl_fail(error, "device '%.60s': no thread", device->plan->name);
+}
+
+/* ---- the step thread ------------------------------------------------------------------------------------------------ */
+
+int sensor_device_take(sensor_device_t *device, device_sample_t *sample)
+{
+    const uint64_t taken = atomic_load_explicit(&device->taken, memory_order_relaxed);
+    if (taken == atomic_load_explicit(&device->written, memory_order_acquire)) {
+        return 0;
+    }
+    *sample = device->ring[taken % DEVICE_RING_SAMPLES];
+    atomic_store_explicit(&device->taken, taken + 1u, memory_order_release);
+    return 1;
+}
+
+device_counts_t sensor_device_counts(const sensor_device_t *device)
+{
+    return (device_counts_t){
+        .samples = atomic_load_explicit(&device->samples, memory_order_relaxed),
+        .errors = atomic_load_explicit(&device->errors, memory_order_relaxed),
+        .dropped = atomic_load_explicit(&device->dropped, memory_order_relaxed),
+        .lost = atomic_load_explicit(&device->lost, memory_order_relaxed),
+        .open = atomic_load_explicit(&device->condition, memory_order_relaxed) != (int)DEVICE_MISSING,
+    };
+}
+
+const char *sensor_device_news(sensor_device_t *device)
+{
+    static const char *const SAY[] = {
+        [DEVICE_MISSING] = "is not there: ", [DEVICE_OPEN] = "is there", [DEVICE_FAILING] = "fails: "};
+    if (atomic_load(&device->condition) == (int)device->told || pthread_mutex_trylock(&device->reason_lock) != 0) {
+        return NULL;
+    }
+    device->told = (condition_t)atomic_load(&device->condition);
+    (void)snprintf(device->news, sizeof device->news, "device '%.60s' %s%s", device->plan->name, SAY[device->told],
+                   device->told == DEVICE_OPEN ? "" : device->reason);
+    (void)pthread_mutex_unlock(&device->reason_lock);
+    return device->news;
+}
+
+/* 0, or -1 when the thread hangs in its driver. */
+static int end_thread(sensor_device_t *device)
+{
+    const uint64_t end_ns = now_ns() + END_NS;
+    const struct timespec end = {.tv_sec = (time_t)(end_ns / 1000000000u), .tv_nsec = (long)(end_ns % 1000000000u)};
+    atomic_store(&device->over, 1);
+    (void)sem_post(&device->wake);
+    if (pthread_clockjoin_np(device->thread, NULL, CLOCK_MONOTONIC, &end) == 0) {
+        return 0;
+    }
+    (void)pthread_detach(device->thread);
+    return -1;
+}
+
+void sensor_device_free(sensor_device_t *device)
+{
+    if (device == NULL || (device->started && end_thread(device) != 0)) {
+        return; /* its memory stays: the driver may still return to it */
+    }
+    if (device->opened) {
+        device->driver->close(device->state);
+    }
+    free(device->state);
+    free(device->used);
+    free(device->at);
+    if (device->library != NULL) {
+        (void)dlclose(device->library);
+    }
+    free(device);
+}

@@ -1,0 +1,46 @@
+/* SPDX-License-Identifier: Apache-2.0
+ *
+ * A sensor's device, read through its driver by a thread of its own. What it measures waits in a bounded ring for the step thread, which
+ * never waits for the device. A device that is missing, or goes, is looked for again and again.
+ */
+#ifndef BOARD_SENSOR_DEVICE_H
+#define BOARD_SENSOR_DEVICE_H
+
+#include "board_plan.h"
+#include "fcsl/fcsl_driver.h"
+
+enum { DEVICE_VALUES_MAX = 64, DEVICE_REASON_BYTES = 160, DEVICE_RING_SAMPLES = 256 };
+
+/* What a device gave at one time: the used signals one after the other, as doubles. */
+typedef struct {
+    uint64_t sample_ns; /* monotonic */
+    double values[DEVICE_VALUES_MAX];
+} device_sample_t;
+
+typedef struct {
+    uint64_t samples;
+    uint64_t errors; /* reads that failed */
+    uint64_t dropped; /* samples that found no room in the ring */
+    uint64_t lost; /* how often the device was gone */
+    uint64_t open; /* 1: it is there */
+} device_counts_t;
+
+typedef struct sensor_device sensor_device_t;
+
+/* Finds the driver. Nothing is opened. Null with `error`. `plan` must outlive the device. */
+sensor_device_t *sensor_device_new(const board_device_t *plan, fcsl_error_t *error);
+/* Says that this signal is used; `count` of its elements at most. Returns where its first element lies in the samples, or -1 with
+ * `error`: no such signal, another unit, or too many. *found: how many elements there are. */
+int sensor_device_use(sensor_device_t *device, const char *signal, const char *unit, uint32_t count, uint32_t *found,
+                      fcsl_error_t *error);
+/* Opens the device and starts its thread. A device that is not there is no error. */
+int sensor_device_start(sensor_device_t *device, fcsl_error_t *error);
+/* From the step thread: the oldest sample that was not taken, 1; or 0. Does not wait. */
+int sensor_device_take(sensor_device_t *device, device_sample_t *sample);
+device_counts_t sensor_device_counts(const sensor_device_t *device);
+/* Whether the device came, went or began to fail since the last call: a text for people, or null. */
+const char *sensor_device_news(sensor_device_t *device);
+/* Ends the thread and closes the device. A driver that hangs is left alone after 1 s. */
+void sensor_device_free(sensor_device_t *device);
+
+#endif /* BOARD_SENSOR_DEVICE_H */
