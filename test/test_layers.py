@@ -24,9 +24,9 @@ PACKAGES = {
 FOLDERS: dict[str, Sequence[str]] = {
     "fcsl_compiler": (
         *("base", "model", "parse", "check", "ros", "config", "lower", "emit", "coverage", "driver"),
-        *("graph", "build_report", "reference", "cli"),
+        *("board", "graph", "build_report", "reference", "cli"),
     ),
-    "simclient": ("", "ros", "bag", "view", "replay", "vars", "twin", "telemetry", "supervisor", "live", "link", "bus"),
+    "simclient": ("", "ros", "board", "bag", "view", "replay", "vars", "twin", "telemetry", "supervisor", "live", "link", "bus"),
     "fcsl_sim": ("",),
     "fcsl_bridge": ("",),
     "verify": (

@@ -16,9 +16,17 @@ import pytest
 
 import fcsl_compiler
 from fcsl_compiler.base.codes.code import Kind
-from fcsl_compiler.base.codes.examples import EXAMPLE_CONTROL, EXAMPLE_MACHINE, EXAMPLE_NAV, EXAMPLE_PILOT
+from fcsl_compiler.base.codes.examples import (
+    EXAMPLE_BOARD,
+    EXAMPLE_CHANNELS,
+    EXAMPLE_CONTROL,
+    EXAMPLE_MACHINE,
+    EXAMPLE_NAV,
+    EXAMPLE_PILOT,
+)
 from fcsl_compiler.base.codes.pages import explain, overview, table
 from fcsl_compiler.base.diagnostics import Diagnostic, DiagnosticError
+from fcsl_compiler.board.board import check_board
 from fcsl_compiler.cli import report
 from fcsl_compiler.cli.main import main
 from fcsl_compiler.driver.passes import compile_machine
@@ -57,7 +65,7 @@ def diagnose(folder: Path, kind: Kind, text: str) -> list[Diagnostic]:
     (folder / "law.py").write_text(file(text))
     config = EXAMPLE_MACHINE
     if kind in (Kind.JSON, Kind.STRICT):
-        config = json.dumps({**json.loads(config), **json.loads("{" + text + "}")})
+        config = with_members(config, text)
     elif kind is Kind.FILE:
         config = json.dumps(ALONE)
     elif kind is Kind.TEXT:
@@ -66,6 +74,28 @@ def diagnose(folder: Path, kind: Kind, text: str) -> list[Diagnostic]:
     try:
         found = compile_machine(folder / "craft.json", "", strict=kind is Kind.STRICT).sink.diagnostics
         return [d for d in found if kind is not Kind.BODY or d.code not in ("W304", "W305")]
+    except DiagnosticError as error:
+        return list(error.diagnostics)
+
+
+def with_members(config: str, members: str) -> str:
+    """A JSON object with these members in place of those of the same name."""
+    return json.dumps({**json.loads(config), **json.loads("{" + members + "}")})
+
+
+def diagnose_board(folder: Path, kind: Kind, text: str) -> list[Diagnostic]:
+    """Diagnostics of the example board, or of its machine's, with these members."""
+    (folder / "nav.py").write_text(EXAMPLE_NAV)
+    (folder / "control.py").write_text(EXAMPLE_CONTROL)
+    machine, board = with_members(EXAMPLE_MACHINE, EXAMPLE_CHANNELS), EXAMPLE_BOARD
+    if kind is Kind.CHANNELS:
+        machine = with_members(machine, text)
+    else:
+        board = with_members(board, text)
+    (folder / "craft.json").write_text(machine)
+    (folder / "board.json").write_text(board)
+    try:
+        return list(check_board(folder / "board.json").warnings)
     except DiagnosticError as error:
         return list(error.diagnostics)
 
@@ -93,14 +123,16 @@ def test_examples(code: str, tmp_path: Path, capsys: pytest.CaptureFixture[str])
         assert command(tmp_path, row.wrong, capsys) == [code]
         assert command(tmp_path, row.right, capsys) == []
         return
-    wrong = diagnose(tmp_path, row.kind, row.wrong)
+    check = diagnose_board if row.kind in (Kind.BOARD, Kind.CHANNELS) else diagnose
+    wrong = check(tmp_path, row.kind, row.wrong)
     assert [d.code for d in wrong] == [code], "\n".join(d.render() for d in wrong)
-    right = diagnose(tmp_path, row.kind, row.right)
+    right = check(tmp_path, row.kind, row.right)
     assert not right, "\n".join(d.render() for d in right)
 
 
 def test_the_examples_stand_in_a_good_machine(tmp_path: Path) -> None:
     assert diagnose(tmp_path, Kind.COMMAND, "") == []
+    assert diagnose_board(tmp_path, Kind.BOARD, "") == []
 
 
 def test_table_and_sources_name_the_same_codes() -> None:
@@ -150,7 +182,7 @@ def page() -> str:
         "<!-- generated: fcsl_compiler/test/test_codes.py -->",
         "Every code that `fcslc` reports, why it is a rule, and an example; `fcslc explain E402` prints one of them.\n"
         "E1xx are about files, E2xx about the machine JSON, E3xx about the module level of an algorithm, E4xx about its\n"
-        "statements; a W is a warning and stops nothing.",
+        "statements, E5xx about boards; a W is a warning and stops nothing.",
         "The examples are pieces of this machine:",
         f"```json\n{EXAMPLE_MACHINE}```",
         "with `nav.py`:",
@@ -159,11 +191,12 @@ def page() -> str:
         f"```python\n{EXAMPLE_CONTROL}```",
         "and `pilot.py`:",
         f"```python\n{EXAMPLE_PILOT}```",
+        "Those of boards (E5xx, W5xx) are pieces of this board, whose machine has channels in addition:",
+        f"```json\n{EXAMPLE_BOARD}```",
+        f"```json\n{EXAMPLE_CHANNELS}\n```",
     ]
     for code, row in CODES.items():
-        language = {Kind.JSON: "json", Kind.STRICT: "json", Kind.TEXT: "json", Kind.COMMAND: "sh"}.get(
-            row.kind, "python"
-        )
+        language = {Kind.BODY: "python", Kind.FILE: "python", Kind.COMMAND: "sh"}.get(row.kind, "json")
         parts.append(f"## {code}: {row.title}")
         parts.append(textwrap.fill(row.explanation, 120, break_long_words=False, break_on_hyphens=False))
         for word, text in (("Wrong", row.wrong), ("Right", row.right)):

@@ -20,7 +20,8 @@ def add_authoring(commands: argparse._SubParsersAction[argparse.ArgumentParser])
     graph.add_argument("-o", "--output", type=Path, help=".svg, .mmd (Mermaid) or .md; default: Mermaid on stdout")
     graph.set_defaults(run=_graph)
 
-    schema = commands.add_parser("schema", help="print the JSON Schema of a machine, for editors")
+    schema = commands.add_parser("schema", help="print the JSON Schema of a machine or a board, for editors")
+    schema.add_argument("--board", action="store_true", help="that of a board")
     schema.set_defaults(run=_schema)
 
     new = commands.add_parser("new", help="start a machine or an algorithm, with a test")
@@ -59,9 +60,10 @@ def _graph(options: argparse.Namespace) -> int:
 
 
 def _schema(options: argparse.Namespace) -> int:
+    from ..board.board import SCHEMA as BOARD_SCHEMA
     from .scaffold import SCHEMA
 
-    print(SCHEMA.read_text(), end="")
+    print((BOARD_SCHEMA if options.board else SCHEMA).read_text(), end="")
     return 0
 
 

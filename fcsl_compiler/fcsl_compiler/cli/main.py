@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""fcslc: checks machines, compiles them, writes their ROS 2 messages."""
+"""fcslc: checks machines, compiles them, writes their ROS 2 messages and the plans of their boards."""
 
 from __future__ import annotations
 
@@ -25,6 +25,7 @@ from ..model.target import DEFAULT_TARGET
 from ..parse.machine_files import parse_machine
 from ..parse.targets import choose_target
 from .authoring import add_authoring
+from .board import add_board
 from .build import (
     STRICT_HELP,
     TARGET_HELP,
@@ -88,6 +89,7 @@ def _parser() -> argparse.ArgumentParser:
     check.set_defaults(run=_check)
 
     add_build(commands)
+    add_board(commands)
 
     why = commands.add_parser("explain", help="explain a diagnostic code, with an example, or a function")
     why.add_argument("what", nargs="*", help="a code such as E402, or a function such as kf_gain; none: list all codes")

@@ -58,7 +58,7 @@ int board_sensor_open(board_sensor_run_t *sensor, board_sensor_t *plan, const fc
     if (sensor->frontend == NULL) {
         return fcsl_fail(error, "out of memory for sensor '%.60s'", plan->name);
     }
-    for (uint32_t i = 0; i < plan->binding_count; i++) {
+    for (uint32_t i = 0; machine != NULL && i < plan->binding_count; i++) {
         if (bind(sensor, &plan->bindings[i], &sensor->channels[i], machine, error) != 0) {
             return -1;
         }
@@ -92,13 +92,12 @@ static uint32_t put_values(const board_channel_t *channel, const double *values,
 
 int board_sensor_tick(board_sensor_run_t *sensor, fcsl_run_t *run, uint64_t now_ns, fcsl_error_t *error)
 {
-    const fcsl_machine_t *machine = fcsl_run_machine(run);
     const fcsl_frontend_output_t *output = &sensor->output;
     fcsl_frontend_tick(sensor->frontend, now_ns, &sensor->output);
-    if (output->primary < 0 || !output->fresh) {
+    if (run == NULL || output->primary < 0 || !output->fresh) {
         return 0;
     }
-    const uint32_t age_ticks = age_in_ticks(now_ns, output->sample_ns, machine->tick_hz);
+    const uint32_t age_ticks = age_in_ticks(now_ns, output->sample_ns, fcsl_run_machine(run)->tick_hz);
     for (uint32_t i = 0; i < sensor->plan->binding_count; i++) {
         uint8_t bytes[FCSL_VALUES_MAX * sizeof(double)];
         const board_channel_t *channel = &sensor->channels[i];

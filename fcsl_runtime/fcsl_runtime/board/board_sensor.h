@@ -21,10 +21,10 @@ typedef struct {
     board_channel_t channels[FCSL_QUANTITIES_MAX];
 } board_sensor_run_t;
 
-/* Finds the channels in the run's machine, and makes the frontend. 0, or -1. */
+/* Finds the channels in the machine, and makes the frontend. Without a machine (null) nothing gets its values. 0, or -1. */
 int board_sensor_open(board_sensor_run_t *sensor, board_sensor_t *plan, const fcsl_machine_t *machine,
                       fcsl_error_t *error);
-/* Judges the backends at `now_ns`, and gives new values to the channels. 0, or -1. */
+/* Judges the backends at `now_ns`, and gives new values to the channels of the run (null: to none). 0, or -1. */
 int board_sensor_tick(board_sensor_run_t *sensor, fcsl_run_t *run, uint64_t now_ns, fcsl_error_t *error);
 void board_sensor_close(board_sensor_run_t *sensor);
 

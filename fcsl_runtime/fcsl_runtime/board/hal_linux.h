@@ -11,5 +11,7 @@
 
 /* `file`: the plan that `fcslc board` has written, for the machine of `run`. 0, or -1. */
 int hal_linux(const char *file, fcsl_run_t *run, fcsl_hal_t *hal, fcsl_error_t *error);
+/* Records the readings of the devices with the run, which is being recorded (readings.h). 0, or -1. */
+int hal_linux_record(const fcsl_hal_t *hal, const char *name_space, fcsl_error_t *error);
 
 #endif /* BOARD_HAL_LINUX_H */

@@ -105,8 +105,8 @@ sensor_device_t *sensor_device_new(const board_device_t *plan, fcsl_error_t *err
     return NULL;
 }
 
-int sensor_device_use(sensor_device_t *device, const char *signal, const char *unit, uint32_t count, uint32_t *found,
-                      fcsl_error_t *error)
+int sensor_device_use(sensor_device_t *device, const char *signal, const char *unit, fcsl_driver_use_t use,
+                      uint32_t count, uint32_t *found, fcsl_error_t *error)
 {
     const fcsl_driver_t *driver = device->driver;
     const char *name = device->plan->name;
@@ -119,14 +119,15 @@ int sensor_device_use(sensor_device_t *device, const char *signal, const char *u
             return fcsl_fail(error, "device '%.60s': signal '%.60s' is in %.40s, here it must be in %.40s", name,
                              signal, known->unit, unit);
         }
-        if (device->used[i] == 0u) {
+        if (device->used[i] == FCSL_DRIVER_UNUSED) {
             if (device->value_count + known->count > DEVICE_VALUES_MAX) {
                 return fcsl_fail(error, "device '%.60s': more than %d values", name, DEVICE_VALUES_MAX);
             }
-            device->used[i] = 1;
+            device->used[i] = (uint8_t)use;
             device->at[i] = device->value_count;
             device->value_count += known->count;
         }
+        device->used[i] = use == FCSL_DRIVER_NEEDED ? (uint8_t)use : device->used[i];
         *found = known->count < count ? known->count : count;
         return (int)device->at[i];
     }
@@ -198,7 +199,7 @@ static void keep_sample(sensor_device_t *device, uint64_t sample_ns)
     for (uint32_t s = 0; s < driver->signal_count; s++) {
         const fcsl_driver_signal_t *signal = &driver->signals[s];
         const size_t scalar = fcsl_scalar_size(signal->type);
-        for (uint32_t i = 0; device->used[s] != 0u && i < signal->count; i++) {
+        for (uint32_t i = 0; device->used[s] != FCSL_DRIVER_UNUSED && i < signal->count; i++) {
             sample->values[device->at[s] + i] =
                 scalar_at((const uint8_t *)device->state + signal->offset + i * scalar, signal->type);
         }

@@ -29,10 +29,10 @@ typedef struct sensor_device sensor_device_t;
 
 /* Finds the driver. Nothing is opened. Null with `error`. `plan` must outlive the device. */
 sensor_device_t *sensor_device_new(const board_device_t *plan, fcsl_error_t *error);
-/* Says that this signal is used; `count` of its elements at most. Returns where its first element lies in the samples, or -1 with
+/* Says how this signal is used; `count` of its elements at most. Returns where its first element lies in the samples, or -1 with
  * `error`: no such signal, another unit, or too many. *found: how many elements there are. */
-int sensor_device_use(sensor_device_t *device, const char *signal, const char *unit, uint32_t count, uint32_t *found,
-                      fcsl_error_t *error);
+int sensor_device_use(sensor_device_t *device, const char *signal, const char *unit, fcsl_driver_use_t use,
+                      uint32_t count, uint32_t *found, fcsl_error_t *error);
 /* Opens the device and starts its thread. A device that is not there is no error. */
 int sensor_device_start(sensor_device_t *device, fcsl_error_t *error);
 /* From the step thread: the oldest sample that was not taken, 1; or 0. Does not wait. */

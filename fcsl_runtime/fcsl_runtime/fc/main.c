@@ -183,7 +183,8 @@ static int open_record(program_t *program)
         .fields = program->options.record_fields,
     };
     if (fcsl_run_record(loop->run, &record, &error) != 0 ||
-        hal_topic_open(&loop->hal_topic, &loop->hal, loop->run, record.name_space, &error) != 0) {
+        hal_topic_open(&loop->hal_topic, &loop->hal, loop->run, record.name_space, &error) != 0 ||
+        (options_hal_is_linux(&program->options) && hal_linux_record(&loop->hal, record.name_space, &error) != 0)) {
         return complain(error.text);
     }
     loop->recording = 1;

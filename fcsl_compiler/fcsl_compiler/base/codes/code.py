@@ -16,6 +16,8 @@ class Kind(Enum):
     JSON = "members of the example machine, in place of those of the same name"
     STRICT = "members of the example machine, checked with --strict"
     TEXT = "the whole text of a machine JSON"
+    BOARD = "members of the example board, in place of those of the same name"
+    CHANNELS = "members of the machine of the example board"
     COMMAND = "a command"
 
 

@@ -87,3 +87,26 @@ class Pilot:
     def execute(self):
         self.transition_request = self.on_done
 '''
+
+#: Members that the example machine has as the machine of the example board.
+EXAMPLE_CHANNELS = """\
+"channels": [
+  {"name": "baro.pressure", "id": 1, "field": "nav.inputs.pressure", "direction": "sensor", "max_age_ticks": 20},
+  {"name": "imu.gyro", "id": 2, "field": "control.inputs.rate", "direction": "sensor", "max_age_ticks": 5},
+  {"name": "force", "id": 3, "field": "control.outputs.force", "direction": "actuator"}
+]"""
+
+#: The board that BOARD examples modify.
+EXAMPLE_BOARD = """\
+{
+  "machine": "craft.json",
+  "devices": {
+    "mpu": {"driver": "iio", "device": "mpu6500", "rate_hz": 100},
+    "bmp": {"driver": "iio", "device": "bmp280", "rate_hz": 50}
+  },
+  "sensors": {
+    "imu": {"kind": "inertial", "channels": {"gyro": "imu.gyro"}, "backends": [{"device": "mpu"}]},
+    "baro": {"kind": "barometer", "channels": {"pressure": "baro.pressure"}, "backends": [{"device": "bmp"}]}
+  }
+}
+"""

@@ -2,7 +2,8 @@
 """The pages of diagnostic codes: title, reason for the rule, a wrong example and its correction.
 
 `fcslc explain`, the SARIF report and docs/diagnostics.md (generated) use the same table. Tests compile every example
-and check that the table and the sources use the same codes. Rows: machine.py, ros.py and algorithm.py.
+and check that the table and the sources use the same codes. Rows: machine.py, ros.py, algorithm.py
+and board.py.
 """
 
 from __future__ import annotations
@@ -13,6 +14,7 @@ from collections.abc import Mapping, Sequence
 
 from ..diagnostics import nearest
 from .algorithm import ALGORITHM_CODES
+from .board import BOARD_CODES
 from .code import Code, Kind
 from .examples import EXAMPLE_CONTROL
 from .machine import MACHINE_CODES
@@ -23,7 +25,7 @@ _WIDTH = 100
 
 def table() -> dict[str, Code]:
     """All codes, sorted: errors, then warnings."""
-    return dict(sorted({**MACHINE_CODES, **ROS_CODES, **ALGORITHM_CODES}.items()))
+    return dict(sorted({**MACHINE_CODES, **ROS_CODES, **ALGORITHM_CODES, **BOARD_CODES}.items()))
 
 
 class UnknownCode(ValueError):

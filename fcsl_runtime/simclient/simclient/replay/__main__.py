@@ -3,6 +3,7 @@
 
     python -m simclient.replay BAG --config lander_control.json
     python -m simclient.replay BAG --library liblander_control.so
+    python -m simclient.replay BAG --library liblander_control.so --board board.plan    # its sensors, too, from readings
     python -m simclient.replay BAG --config ahrs.json --map map.yaml -o OUT     # a bag that FCSL did not record, of any format
 
 Exit code 0: identical (with --map: ran to the end and met the map's expectations). 1: differs, or the bag is
@@ -40,6 +41,8 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         action="store_true",
         help="replay with changed sources and the recorded parameters; lists parameters whose compiled value differs",
     )
+    board_help = "plan of a board: the recorded readings of its devices go through its frontends again"
+    parser.add_argument("--board", default="", metavar="PLAN", help=board_help)
     parser.add_argument("--map", default="", help="map file for a bag that FCSL did not record")
     parser.add_argument("-o", "--output", help="with --map: bag to write")
     parser.add_argument("--namespace", default="", help="with --map -o: ROS namespace of the topics written")
@@ -88,9 +91,12 @@ def command(parser: argparse.ArgumentParser, options: argparse.Namespace) -> int
     for name in ("output", "namespace", "expect", "plot", "msg_path"):
         if getattr(options, name) and not options.map:
             parser.error(f"{'-o' if name == 'output' else '--' + name.replace('_', '-')} needs --map")
+    if options.map and options.board:
+        parser.error("--board needs a flight that FCSL recorded, and --map is for other bags")
     if options.map:
         return _main_foreign(options)
-    verdict = replay(options.bag, options.config, options.library, options.machine, options.ignore_source_hash)
+    ignore = options.ignore_source_hash
+    verdict = replay(options.bag, options.config, options.library, options.machine, ignore, options.board)
     for note in verdict.notes:
         print(f"simclient.replay: {note}", file=sys.stderr)
     print(verdict)

@@ -3,7 +3,7 @@
 
 from __future__ import annotations
 
-from contextlib import nullcontext
+from contextlib import closing, nullcontext
 from dataclasses import replace
 from pathlib import Path
 from typing import Any
@@ -122,12 +122,14 @@ def replay(
     library: str = "",
     machine: str = "",
     ignore_source_hash: bool = False,
+    board: str | Path = "",
 ) -> Verdict:
     """Replays an FCSL bag against the machine in `config` (JSON) or `library`. Raises BagError or TwinError.
 
     If a subset machine (`instances=[…]`) made the bag, that subset of `config` runs. `machine` selects one of several
     in the bag. `ignore_source_hash` replays although the machine has changed since; the verdict's notes then list the
-    differing parameters.
+    differing parameters. With the plan of a `board` the recorded readings of its devices go through its frontends again;
+    without it the recorded samples of the channels are used.
     """
     opened = bag if isinstance(bag, Bag) else Bag(bag)
     recorded = opened.machine(machine, by_bystanders=True)
@@ -143,7 +145,8 @@ def replay(
             notes.append(f"the bag records a part of `{run.machine.name}`, so only that part ran: {names}")
         counted = opened.topics.get(recorded.writes if recorded.by_bystander else recorded.state)
         expected = counted.count if counted else 0
-        verdict = Replay(opened, recorded, run).run(Progress("replaying", expected).at)
+        with closing(Replay(opened, recorded, run, board)) as reproduced:
+            verdict = reproduced.run(Progress("replaying", expected).at)
         verdict.notes += notes
         return verdict
     finally:

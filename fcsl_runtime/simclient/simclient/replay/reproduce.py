@@ -8,10 +8,13 @@ the checkpoint and repeats the writes at the same ticks. Outputs, health, reques
 from __future__ import annotations
 
 from collections.abc import Callable
+from pathlib import Path
 from typing import Any
 
 from ..bag import Bag, RecordedMachine
 from ..bag.states import StateReader
+from ..board.frontends import Frontends
+from ..board.plan import bound_channels
 from ..c_machine import HEALTH_NAMES
 from ..errors import BagError, TwinError
 from ..run import Run
@@ -24,16 +27,37 @@ SET, SET_STATE, RESTORE, CHANNEL, OVERRUN, ATTACH, IMPURE, FAULT, HEALTH = range
 _WRITE_FIELDS = ("tick", "kind", "path", "element", "data")
 #: A longer gap between two records is damage; running it would take hours.
 _MAX_LOST_TICKS = 10_000_000
+_READINGS_TYPE = "fcsl_hal/msg/Readings"
+_READINGS_FIELDS = ("tick", "now_ns", "readings")
 _KIND_NAMES = ("SET", "SET_STATE", "RESTORE", "CHANNEL", "OVERRUN", "ATTACH", "IMPURE", "FAULT", "HEALTH")
 
 
-class Replay:
-    """Applies one recorded machine's messages to a run of it and compares."""
+def _readings_topic(bag: Bag, recorded: RecordedMachine) -> str:
+    """The topic of the readings beside the machine's. Raises BagError."""
+    topic = f"{recorded.prefix.rpartition('/')[0]}/readings"
+    found = bag.topics.get(topic)
+    if found is None or found.type != _READINGS_TYPE:
+        raise BagError(
+            f"{bag.path}: no topic `{topic}` [{_READINGS_TYPE}]: no flight with --hal linux:PLAN recorded it"
+        )
+    return topic
 
-    def __init__(self, bag: Bag, recorded: RecordedMachine, run: Run):
+
+class Replay:
+    """Applies one recorded machine's messages to a run of it and compares.
+
+    With the plan of a `board` its channels get what its frontends make of the recorded readings, not the recorded samples.
+    Call `close` at the end.
+    """
+
+    def __init__(self, bag: Bag, recorded: RecordedMachine, run: Run, board: str | Path = ""):
         self._bag = bag
         self._topics = recorded
         self._run = run
+        self._frontends = Frontends(board, run) if board else None
+        self._sensed_channels = bound_channels(board) if board else frozenset()
+        self._readings = _readings_topic(bag, recorded) if board else ""
+        self._sensed = 0
         self._instances = {instance.name: instance.index for instance in run.machine.instances}
         self._channels = {channel.name: channel for channel in run.machine.channels}
         self._outputs: dict[str, OutputComparison | ChannelComparison] = {}
@@ -57,6 +81,7 @@ class Replay:
         """Replays until the bag ends, lacks messages, or a value differs. Raises BagError if the record contradicts itself."""
         verdict = self._verdict
         topics = {self._topics.checkpoint, self._topics.writes, self._topics.state, *self._outputs}
+        topics |= {self._readings} - {""}
         for topic, _, data in self._bag.messages_before_damage(topics):
             if topic == self._topics.checkpoint:
                 self._start(data)
@@ -68,6 +93,8 @@ class Replay:
                 self._write(data)
             elif topic == self._topics.state:
                 self._compare_state(data)
+            elif topic == self._readings:
+                self._sense(data)
             else:
                 self._compare_outputs(topic, data)
                 progress(verdict.ticks)
@@ -77,7 +104,13 @@ class Replay:
             raise BagError(f"{self._bag.path}: the initial checkpoint is missing")
         self._note_missing()
         self._note_impure()
+        if self._frontends is not None and self._sensed < verdict.ticks:
+            verdict.missing.append(f"`{self._readings}` has {self._sensed} of {verdict.ticks} messages")
         return verdict
+
+    def close(self) -> None:
+        if self._frontends is not None:
+            self._frontends.close()
 
     def _start(self, data: bytes) -> None:
         """The first checkpoint starts the replay; later ones serve readers that start in the middle."""
@@ -120,6 +153,18 @@ class Replay:
                 f"{self._bag.path}: the write {kind} `{write.path}` at tick {write.tick} cannot be applied: {reason}"
             ) from None
 
+    def _sense(self, data: bytes) -> None:
+        message = self._bag.decode_own(self._readings, data, _READINGS_FIELDS)
+        assert self._frontends is not None
+        self._advance(message.tick, f"`{self._readings}`")
+        try:
+            for reading in message.readings:
+                self._frontends.take(reading.sensor, reading.backend, reading.sample_ns, reading.values)
+            self._frontends.tick(message.now_ns)
+        except (TwinError, ValueError) as error:
+            raise BagError(f"{self._bag.path}: the readings of tick {message.tick} cannot be used: {error}") from None
+        self._sensed += 1
+
     def _apply(self, write: Any, data: bytes) -> None:
         run, kind, path = self._run, write.kind, write.path
         if kind == SET:
@@ -135,6 +180,8 @@ class Replay:
             if not self._restored:  # the checkpoint has another layout
                 run.attach()
                 self._restored = True
+            if path in self._sensed_channels:
+                return  # the frontends have given it a sample
             age, stamp = getattr(write, "age_ticks", 0), getattr(write, "stamp_ns", 0)
             run.write_channel(self._channels[path].index, data, age, stamp)
         elif kind == ATTACH and path:

@@ -1,0 +1,142 @@
+# SPDX-License-Identifier: Apache-2.0
+"""A board with every key, and the machine that it is for."""
+
+import copy
+import json
+from pathlib import Path
+from typing import Any
+
+LAW = """class Law:
+    inputs = {
+        "gyro": "f64[3] rad/s",
+        "accel": "f32[3] m/s^2",
+        "angle": "f64[3] rad",
+        "pressure": "f64 Pa",
+        "sticks": "f64[4]",
+        "failsafe": "f64",
+        "voltage": "f64",
+        "count": "i32",
+        "range": "f64 m",
+    }
+    outputs = {"force": "f64 N"}
+    def execute(self):
+        x = self.gyro[0] + f64(self.accel[0]) + self.angle[0] + self.pressure + self.sticks[0] + self.failsafe
+        self.force = x + self.voltage + self.range + f64(self.count)
+"""
+
+
+def _channel(number: int, name: str, field: str, **more: Any) -> dict[str, Any]:
+    return {
+        "name": name,
+        "id": number,
+        "field": f"law.inputs.{field}",
+        "direction": "sensor",
+        "max_age_ticks": 5,
+    } | more
+
+
+MACHINE: dict[str, Any] = {
+    "tick_hz": 100,
+    "initial_state": "RUN",
+    "algorithms": {"Law": {"source": "law.py"}},
+    "instances": {"law": {"algorithm": "Law"}},
+    "states": {"RUN": {"schedule": {"law": 100}}},
+    "channels": [
+        _channel(1, "imu.gyro", "gyro"),
+        _channel(2, "imu.accel", "accel"),
+        _channel(3, "imu.angle", "angle"),
+        _channel(4, "baro.pressure", "pressure"),
+        _channel(5, "rc.sticks", "sticks"),
+        _channel(6, "rc.failsafe", "failsafe"),
+        _channel(7, "battery.voltage", "voltage"),
+        {"name": "force", "id": 8, "field": "law.outputs.force", "direction": "actuator"},
+    ],
+}
+
+#: Every existing key at least once.
+BOARD: dict[str, Any] = {
+    "$schema": "board.schema.json",
+    "description": "everything",
+    "machine": "quad.json",
+    "devices": {
+        "imu_top": {"driver": "iio_buffer", "device": "icm20602", "rate_hz": 1000},
+        "imu_side": {"driver": "iio", "device": "mpu 6500", "rate_hz": 500},
+        "imu_far": {"driver": "./libfar.so:far", "device": "0", "rate_hz": 400.5},
+        "receiver": {"driver": "sbus", "device": "/dev/ttyS1"},
+        "cells": {"driver": "libcells.so:cells", "device": "i2c-1"},
+        "bmp": {"driver": "iio", "device": "bmp280", "rate_hz": 3},
+    },
+    "sensors": {
+        "imu": {
+            "kind": "inertial",
+            "channels": {"gyro": "imu.gyro", "accel": "imu.accel", "delta_angle": "imu.angle"},
+            "backends": [
+                {
+                    "device": "imu_top",
+                    "rotation": "roll_180_yaw_90",
+                    "correct": {
+                        "gyro": {"offset": [0.01, 0, -0.02], "per_kelvin": [1e-4, 0, 0], "celsius": 30},
+                        "accel": {"scale": [[1, 0.01, 0], [0, 1.02, 0], [0, 0, 0.98]]},
+                        "temperature": {"offset": 2.5, "scale": 2},
+                    },
+                    "signals": {"gyro": "anglvel"},
+                },
+                {
+                    "device": "imu_side",
+                    "rotation": [[0, -1, 0], [1, 0, 0], [0, 0, 1]],
+                    "correct": {"accel": {"scale": [1, 2, 3]}, "gyro": {"scale": 0.5}},
+                },
+                {"device": "imu_far"},
+            ],
+            "health": {
+                "max_age_s": 0.1,
+                "stuck_s": 0.5,
+                "recover_s": 2,
+                "limits": {"accel": [-160, 160], "gyro": [-35, 35]},
+                "tolerance": {"gyro": 0.2},
+            },
+            "low_pass_hz": {"gyro": 80, "accel": 40},
+            "notch": {"gyro": [{"hz": 120, "width_hz": 20}]},
+        },
+        "rc": {
+            "kind": "rc",
+            "channels": {"sticks": "rc.sticks", "failsafe": "rc.failsafe"},
+            "backends": [
+                {
+                    "device": "receiver",
+                    "sticks": [
+                        {"minimum": 1900, "middle": 1500, "maximum": 1100, "deadband": 5},
+                        {},
+                    ],
+                }
+            ],
+        },
+        "battery": {"kind": "battery", "channels": {"voltage": "battery.voltage"}, "backends": [{"device": "cells"}]},
+        "baro": {"kind": "barometer", "channels": {"pressure": "baro.pressure"}, "backends": [{"device": "bmp"}]},
+    },
+}
+
+
+def write_machine(folder: Path, **members: Any) -> None:
+    """quad.json with these members in place of its own, and its algorithm."""
+    (folder / "law.py").write_text(LAW)
+    (folder / "quad.json").write_text(json.dumps({**MACHINE, **members}))
+
+
+def write_board(folder: Path, board: Any) -> Path:
+    path = folder / "board.json"
+    path.write_text(json.dumps(board))
+    return path
+
+
+def edited(*steps: str | int, value: Any) -> Any:
+    """BOARD with this value at a place; `...` removes it."""
+    board: Any = copy.deepcopy(BOARD)
+    at = board
+    for step in steps[:-1]:
+        at = at[step]
+    if value is ...:
+        del at[steps[-1]]
+    else:
+        at[steps[-1]] = value
+    return board

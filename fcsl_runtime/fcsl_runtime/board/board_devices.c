@@ -1,0 +1,181 @@
+/* SPDX-License-Identifier: Apache-2.0
+ *
+ * The sensor devices of a plan.
+ */
+#include "board_devices.h"
+
+#include <math.h>
+#include <stdlib.h>
+#include <string.h>
+
+#include "base/error.h"
+
+/* A backend of a sensor, seen from its device. */
+typedef struct {
+    uint32_t device;
+    uint32_t sensor;
+    uint32_t backend;
+    struct {
+        uint32_t from; /* in a sample of the device */
+        uint32_t to; /* in a reading */
+        uint32_t count;
+    } copies[FCSL_QUANTITIES_MAX];
+    uint32_t copy_count;
+} feed_t;
+
+struct board_devices {
+    const board_plan_t *plan;
+    sensor_device_t *devices[BOARD_DEVICES_MAX]; /* null: no sensor uses it */
+    uint32_t feeds_of[BOARD_DEVICES_MAX];
+    feed_t feeds[BOARD_SENSORS_MAX * FCSL_BACKENDS_MAX];
+    uint32_t feed_count;
+};
+
+/* ---- opening -------------------------------------------------------------------------------------------------------- */
+
+static int use_device(board_devices_t *devices, uint32_t d, fcsl_error_t *error)
+{
+    if (devices->devices[d] == NULL) {
+        devices->devices[d] = sensor_device_new(&devices->plan->devices[d], error);
+    }
+    devices->feeds_of[d]++;
+    return devices->devices[d] != NULL ? 0 : -1;
+}
+
+static int is_bound(const board_sensor_t *sensor, uint32_t quantity)
+{
+    for (uint32_t i = 0; i < sensor->binding_count; i++) {
+        if (sensor->bindings[i].quantity == quantity) {
+            return 1;
+        }
+    }
+    return 0;
+}
+
+/* Copies a signal into the quantity. One that the driver does not have is an error where the machine or the plan needs it. */
+static int add_copy(board_devices_t *devices, feed_t *feed, uint32_t q, fcsl_error_t *error)
+{
+    const board_sensor_t *sensor = &devices->plan->sensors[feed->sensor];
+    const fcsl_quantity_t *quantity = &fcsl_sensor_kinds[sensor->config.kind].quantities[q];
+    const char *given = sensor->signals[feed->backend][q];
+    const char *unit = sensor->config.kind == FCSL_RC ? "" : quantity->unit; /* pulses become sticks */
+    const fcsl_driver_use_t use = is_bound(sensor, q) || given != NULL ? FCSL_DRIVER_NEEDED : FCSL_DRIVER_OPTIONAL;
+    uint32_t count = 0;
+    fcsl_error_t why;
+    const int from = sensor_device_use(devices->devices[feed->device], given != NULL ? given : quantity->name, unit,
+                                       use, quantity->count, &count, &why);
+    if (from < 0 && use == FCSL_DRIVER_NEEDED) {
+        *error = why;
+        return -1;
+    }
+    if (from >= 0) {
+        feed->copies[feed->copy_count].from = (uint32_t)from;
+        feed->copies[feed->copy_count].to = quantity->at;
+        feed->copies[feed->copy_count++].count = count;
+    }
+    return 0;
+}
+
+static int add_feed(board_devices_t *devices, uint32_t s, uint32_t b, fcsl_error_t *error)
+{
+    const board_sensor_t *sensor = &devices->plan->sensors[s];
+    const fcsl_sensor_kind_info_t *kind = &fcsl_sensor_kinds[sensor->config.kind];
+    feed_t *feed = &devices->feeds[devices->feed_count++];
+    *feed = (feed_t){.device = sensor->devices[b], .sensor = s, .backend = b};
+    if (use_device(devices, feed->device, error) != 0) {
+        return -1;
+    }
+    for (uint32_t q = 0; q < kind->quantity_count; q++) {
+        if (kind->quantities[q].given && add_copy(devices, feed, q, error) != 0) {
+            return -1;
+        }
+    }
+    return 0;
+}
+
+board_devices_t *board_devices_new(const board_plan_t *plan, fcsl_error_t *error)
+{
+    board_devices_t *devices = calloc(1, sizeof *devices);
+    if (devices == NULL) {
+        (void)fcsl_fail(error, "out of memory for the devices");
+        return NULL;
+    }
+    devices->plan = plan;
+    for (uint32_t s = 0; s < plan->sensor_count; s++) {
+        for (uint32_t b = 0; b < plan->sensors[s].config.backend_count; b++) {
+            if (add_feed(devices, s, b, error) != 0) {
+                board_devices_free(devices);
+                return NULL;
+            }
+        }
+    }
+    return devices;
+}
+
+int board_devices_start(board_devices_t *devices, fcsl_error_t *error)
+{
+    for (uint32_t d = 0; d < devices->plan->device_count; d++) {
+        if (devices->devices[d] != NULL && sensor_device_start(devices->devices[d], error) != 0) {
+            return -1;
+        }
+    }
+    return 0;
+}
+
+void board_devices_free(board_devices_t *devices)
+{
+    if (devices != NULL) {
+        for (uint32_t d = 0; d < BOARD_DEVICES_MAX; d++) {
+            sensor_device_free(devices->devices[d]);
+        }
+        free(devices);
+    }
+}
+
+/* ---- the step thread ------------------------------------------------------------------------------------------------ */
+
+static void make_reading(const feed_t *feed, const device_sample_t *sample, sensor_reading_t *made)
+{
+    made->sensor = feed->sensor;
+    made->reading = (fcsl_reading_t){.sample_ns = sample->sample_ns, .backend = feed->backend};
+    for (uint32_t i = 0; i < FCSL_VALUES_MAX; i++) {
+        made->reading.values[i] = NAN;
+    }
+    for (uint32_t i = 0; i < feed->copy_count; i++) {
+        memcpy(&made->reading.values[feed->copies[i].to], &sample->values[feed->copies[i].from],
+               feed->copies[i].count * sizeof(double));
+    }
+}
+
+uint32_t board_devices_take(board_devices_t *devices, sensor_reading_t *readings, uint32_t capacity)
+{
+    uint32_t count = 0;
+    for (uint32_t d = 0; d < devices->plan->device_count; d++) {
+        device_sample_t sample;
+        while (devices->devices[d] != NULL && count + devices->feeds_of[d] <= capacity &&
+               sensor_device_take(devices->devices[d], &sample)) {
+            for (uint32_t i = 0; i < devices->feed_count; i++) {
+                if (devices->feeds[i].device == d) {
+                    make_reading(&devices->feeds[i], &sample, &readings[count++]);
+                }
+            }
+        }
+    }
+    return count;
+}
+
+device_counts_t board_devices_counts(const board_devices_t *devices, uint32_t device)
+{
+    return devices->devices[device] != NULL ? sensor_device_counts(devices->devices[device]) : (device_counts_t){0};
+}
+
+const char *board_devices_news(board_devices_t *devices)
+{
+    for (uint32_t d = 0; d < devices->plan->device_count; d++) {
+        const char *news = devices->devices[d] != NULL ? sensor_device_news(devices->devices[d]) : NULL;
+        if (news != NULL) {
+            return news;
+        }
+    }
+    return NULL;
+}

@@ -1,0 +1,32 @@
+/* SPDX-License-Identifier: Apache-2.0
+ *
+ * The sensor devices of a plan, and which sensor each of their samples is a reading of.
+ */
+#ifndef BOARD_BOARD_DEVICES_H
+#define BOARD_BOARD_DEVICES_H
+
+#include "sensor_device.h"
+
+/* A reading of the backend of a sensor. */
+typedef struct {
+    uint32_t sensor; /* index into the plan's */
+    fcsl_reading_t reading;
+} sensor_reading_t;
+
+typedef struct board_devices board_devices_t;
+
+/* Finds drivers and signals; opens nothing. Quantities that the machine gets must have a signal. `plan` must outlive it. Null with
+ * `error`. */
+board_devices_t *board_devices_new(const board_plan_t *plan, fcsl_error_t *error);
+/* Opens all devices and starts their threads. 0, or -1. */
+int board_devices_start(board_devices_t *devices, fcsl_error_t *error);
+/* From one thread: takes what the devices have given since the last call, device by device, into `readings`; at most `capacity` of
+ * them, which is FCSL_BACKENDS_MAX or more: what is left waits. Returns how many. Does not wait. */
+uint32_t board_devices_take(board_devices_t *devices, sensor_reading_t *readings, uint32_t capacity);
+/* Of a device of the plan. */
+device_counts_t board_devices_counts(const board_devices_t *devices, uint32_t device);
+/* Of any device, since the last call: a text for people, or null when nothing has changed. */
+const char *board_devices_news(board_devices_t *devices);
+void board_devices_free(board_devices_t *devices);
+
+#endif /* BOARD_BOARD_DEVICES_H */

@@ -1,0 +1,76 @@
+/* SPDX-License-Identifier: Apache-2.0
+ *
+ * The readings of a tick.
+ */
+#include "readings.h"
+
+#include <stdio.h>
+#include <stdlib.h>
+#include <string.h>
+
+#include "base/error.h"
+#include "fcsl/fcsl_cdr.h"
+
+enum { NAME_BYTES = 512, HEAD_BYTES = 64, READING_BYTES = 32 + FCSL_VALUES_MAX * 8 };
+static const char TYPE[] = "fcsl_hal/msg/Readings";
+static const char SCHEMA[] = "std_msgs/Header header\n"
+                             "uint64 tick\n"
+                             "uint64 now_ns  # monotonic time of the tick\n"
+                             "Reading[] readings\n" FCSL_SCHEMA_SEPARATOR "MSG: fcsl_hal/Reading\n"
+                             "uint32 sensor  # of the board, from 0\n"
+                             "uint32 backend  # of the sensor, from 0\n"
+                             "uint64 sample_ns  # monotonic\n"
+                             "float64[] values  # NaN: not told\n" FCSL_SCHEMA_HEADER;
+
+int readings_record(readings_t *readings, fcsl_run_t *run, const char *name_space, fcsl_error_t *error)
+{
+    char name[NAME_BYTES];
+    const int length = snprintf(name, sizeof name, "%s%s/readings", name_space[0] != '\0' ? "/" : "", name_space);
+    if (length < 0 || (size_t)length >= sizeof name) {
+        return fcsl_fail(error, "the namespace is too long for the topic of the readings");
+    }
+    readings->cdr = calloc(1, HEAD_BYTES + READINGS_MAX * (size_t)READING_BYTES);
+    if (readings->cdr == NULL) {
+        return fcsl_fail(error, "out of memory for the readings");
+    }
+    readings->topic = fcsl_run_record_add_topic(run, name, TYPE, SCHEMA, error);
+    return readings->topic < 0 ? -1 : 0;
+}
+
+static void put_reading(fcsl_cdr_t *cdr, const sensor_reading_t *kept)
+{
+    fcsl_cdr_u32(cdr, kept->sensor);
+    fcsl_cdr_u32(cdr, kept->reading.backend);
+    fcsl_cdr_u64(cdr, kept->reading.sample_ns);
+    fcsl_cdr_u32(cdr, FCSL_VALUES_MAX);
+    for (uint32_t i = 0; i < FCSL_VALUES_MAX; i++) {
+        uint64_t bits = 0;
+        memcpy(&bits, &kept->reading.values[i], sizeof bits);
+        fcsl_cdr_u64(cdr, bits);
+    }
+}
+
+void readings_end_tick(readings_t *readings, fcsl_run_t *run, uint64_t now_ns)
+{
+    if (readings->topic >= 0) {
+        fcsl_error_t error; /* of a disk; the recording tells it */
+        fcsl_cdr_t cdr;
+        const uint64_t time_ns = fcsl_run_tick_time_ns(run, fcsl_run_tick(run));
+        fcsl_cdr_begin(&cdr, readings->cdr, HEAD_BYTES + READINGS_MAX * (size_t)READING_BYTES);
+        fcsl_cdr_header(&cdr, time_ns);
+        fcsl_cdr_u64(&cdr, fcsl_run_tick(run));
+        fcsl_cdr_u64(&cdr, now_ns);
+        fcsl_cdr_u32(&cdr, readings->count);
+        for (uint32_t i = 0; i < readings->count; i++) {
+            put_reading(&cdr, &readings->kept[i]);
+        }
+        (void)fcsl_run_record_write(run, readings->topic, time_ns, readings->cdr, (uint32_t)fcsl_cdr_end(&cdr), &error);
+    }
+    readings->count = 0;
+}
+
+void readings_free(readings_t *readings)
+{
+    free(readings->cdr);
+    readings->cdr = NULL;
+}
