@@ -225,6 +225,25 @@ static void test_disagreement(void)
     free(rig.frontend);
 }
 
+/* At the beginning the first of the list is waited for, for max_age. */
+static void test_beginning(void)
+{
+    const fcsl_frontend_config_t config = config_of(FCSL_INERTIAL, 2);
+    rig_t rig = begin(&config);
+    give(&rig, 1, 2);
+    CHECK(tick(&rig) == -1);
+    give(&rig, 0, 1);
+    give(&rig, 1, 2);
+    CHECK(tick(&rig) == 0);
+    free(rig.frontend);
+    rig = begin(&config);
+    for (int i = 0; i < 5; i++) {
+        give(&rig, 1, 2);
+        CHECK(tick(&rig) == (i < 3 ? -1 : 1));
+    }
+    free(rig.frontend);
+}
+
 /* What comes late, twice or from nowhere changes nothing. */
 static void test_times(void)
 {
@@ -300,6 +319,7 @@ int main(void)
     test_loss();
     test_conditions();
     test_disagreement();
+    test_beginning();
     test_times();
     test_replay();
     test_section();

@@ -27,6 +27,13 @@ typedef enum {
     FCSL_DRIVER_FAILED = 3   /* the device is there, and it or the system refused */
 } fcsl_driver_status_t;
 
+/* Whether the host exchanges the value of a signal. */
+typedef enum {
+    FCSL_DRIVER_UNUSED = 0,
+    FCSL_DRIVER_NEEDED = 1,  /* open fails where the device does not have it */
+    FCSL_DRIVER_OPTIONAL = 2 /* sensors: NaN where the device does not have it */
+} fcsl_driver_use_t;
+
 /* A value that a device takes or gives. */
 typedef struct {
     const char *name;
@@ -55,8 +62,8 @@ typedef struct {
 
     /* Whether the device of this name is there; opens and changes nothing. `device` is the text that the user gave, "" for none. */
     fcsl_driver_status_t (*probe)(const char *device, char *why, size_t size);
-    /* Opens it. `self` is zeroed. `used` has one byte per signal, not 0 where the host exchanges its value; leave the other
-     * signals of the device alone. An actuator keeps doing what it does until the first write. `device` lasts until close. After
+    /* Opens it. `self` is zeroed. `used` has one fcsl_driver_use_t per signal; leave those of the device alone that are not
+     * used. An actuator keeps doing what it does until the first write. `device` lasts until close. After
      * another status than OK there is nothing to close. */
     fcsl_driver_status_t (*open)(void *self, const char *device, const uint8_t *used, char *why, size_t size);
     /* Sensors (else null): puts a sample into the used signals of `self`, and the monotonic time at which it was taken into

@@ -138,15 +138,21 @@ void fcsl_frontend_take(fcsl_frontend_t *frontend, const fcsl_reading_t *reading
 
 /* ---- a tick --------------------------------------------------------------------------------------------------------- */
 
-/* The primary stays as long as it is healthy; then the first healthy one of the list. */
-static int32_t choose_primary(const fcsl_frontend_t *frontend)
+/* The primary stays as long as it is healthy; then the first healthy one of the list. At the beginning those that come first in the list
+ * may be a moment later than the others: they are waited for. */
+static int32_t choose_primary(fcsl_frontend_t *frontend, uint64_t now_ns)
 {
+    const int waits = !frontend->chosen && now_ns - frontend->begun_ns <= frontend->config->max_age_ns;
     if (frontend->primary >= 0 && frontend->backends[frontend->primary].condition == FCSL_BACKEND_HEALTHY) {
         return frontend->primary;
     }
     for (uint32_t b = 0; b < frontend->config->backend_count; b++) {
         if (frontend->backends[b].condition == FCSL_BACKEND_HEALTHY) {
+            frontend->chosen = 1;
             return (int32_t)b;
+        }
+        if (waits && !frontend->backends[b].heard) {
+            return -1;
         }
     }
     return -1;
@@ -155,8 +161,9 @@ static int32_t choose_primary(const fcsl_frontend_t *frontend)
 void fcsl_frontend_tick(fcsl_frontend_t *frontend, uint64_t now_ns, fcsl_frontend_output_t *output)
 {
     const fcsl_frontend_config_t *config = frontend->config;
+    frontend->begun_ns = frontend->begun_ns > 0u ? frontend->begun_ns : now_ns;
     judge_backends(frontend, now_ns);
-    frontend->primary = choose_primary(frontend);
+    frontend->primary = choose_primary(frontend, now_ns);
     *output = (fcsl_frontend_output_t){.primary = frontend->primary};
     if (frontend->primary >= 0) {
         const backend_t *primary = &frontend->backends[frontend->primary];

@@ -14,6 +14,7 @@ import socket
 import subprocess
 import sys
 import threading
+import time
 from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager
 from pathlib import Path
@@ -289,6 +290,52 @@ def test_free_running(folder: Path, tmp_path: Path) -> None:
             assert fc.allocations() == 0
         finally:
             source.kill()
+
+
+# ---- with the sensors of a board
+
+
+def test_with_a_board(folder: Path, tmp_path: Path) -> None:
+    """Two gyroscopes, one of which fails and recovers all the time: threads of their own read them."""
+    library = machine(folder, 0, "board", CHANNELS)
+    names = ("top", "bottom")
+    for number, name in enumerate(names):
+        device = tmp_path / f"sys/bus/iio/devices/iio:device{number}"
+        device.mkdir(parents=True)
+        (device / "name").write_text(name)
+        for axis in "xyz":
+            (device / f"in_anglvel_{axis}_raw").write_text("1")
+    (tmp_path / "board.json").write_text(
+        json.dumps(
+            {
+                "machine": str(folder / "board_0.json"),
+                "devices": {name: {"driver": "iio", "device": name, "rate_hz": 2000} for name in names},
+                "sensors": {
+                    "imu": {
+                        "kind": "inertial",
+                        "channels": {"gyro": "sample"},
+                        "backends": [{"device": name} for name in names],
+                        "low_pass_hz": {"gyro": 100},
+                        "health": {"recover_s": 0.01},
+                    }
+                },
+            }
+        )
+    )
+    subprocess.run(["fcslc", "board", tmp_path / "board.json"], check=True, capture_output=True)
+    options = ("--hal", f"linux:{tmp_path / 'board.plan'}", "--record", str(tmp_path / "bag"))
+    os.environ["FCSL_SYSFS"] = str(tmp_path / "sys")
+    try:
+        fc = Watched(folder, library, *options)
+    finally:
+        del os.environ["FCSL_SYSFS"]
+    value = tmp_path / "sys/bus/iio/devices/iio:device0/in_anglvel_x_raw"
+    while fc.process.poll() is None:
+        value.write_text("broken")
+        time.sleep(0.05)
+        value.write_text("1")
+        time.sleep(0.05)
+    assert fc.allocations() == 0
 
 
 # ---- controls

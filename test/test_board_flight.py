@@ -1,0 +1,291 @@
+# SPDX-License-Identifier: Apache-2.0
+"""A flight with the sensors of a board: `fcslc board`, `fcsl-fc --hal linux:PLAN`, replays. Folders stand for the kernel's devices here;
+`make hardware` has its real drivers."""
+
+from __future__ import annotations
+
+import json
+import os
+import re
+import signal
+import subprocess
+import time
+from collections.abc import Callable, Iterator
+from pathlib import Path
+from typing import Any
+
+import pytest
+
+from fcsl_compiler.base.ament import package_prefix
+from fcsl_compiler.driver.cache import build_machine
+from simclient import VarClient
+from simclient.replay import replay
+from simclient.vars.wire import VarError
+
+BIN = package_prefix("fcsl_runtime") / "bin"
+HZ = 100
+LONG_S = 60
+ALGORITHMS = '''class Sensors:
+    """What the board gives."""
+
+    outputs = {"gyro": "f64[3] rad/s", "turned": "f64[3] rad", "sticks": "f32[4]"}
+
+    def execute(self):
+        pass
+
+
+class Pilot:
+    """Asks for SAFE when the gyro is not valid."""
+
+    inputs = {"gyro": "f64[3] rad/s", "valid": "bool"}
+    outputs = {"rate": "f64 rad/s", "transition_request": "TransitionRequest"}
+
+    def execute(self):
+        self.rate = self.gyro[2]
+        self.transition_request = "FLY" if self.valid else "LOSE"
+'''
+MACHINE = {
+    "tick_hz": HZ,
+    "initial_state": "STAND",
+    "algorithms": {"Sensors": {"source": "craft.py"}, "Pilot": {"source": "craft.py"}},
+    "instances": {"sensors": {"algorithm": "Sensors"}, "pilot": {"algorithm": "Pilot"}},
+    "connections": [
+        {"from": "sensors.gyro", "to": "pilot.gyro"},
+        {"from": "channels.imu.gyro.valid", "to": "pilot.valid"},
+    ],
+    "states": {
+        "STAND": {"schedule": {"sensors": HZ, "pilot": HZ}},
+        "FLIGHT": {"schedule": {"sensors": HZ, "pilot": HZ}},
+        "SAFE": {"schedule": {"sensors": HZ, "pilot": HZ}},
+    },
+    "transitions": [
+        {"from": ["STAND", "SAFE"], "to": "FLIGHT", "request": "FLY"},
+        {"from": "FLIGHT", "to": "SAFE", "request": "LOSE"},
+    ],
+    "channels": [
+        {"name": "imu.gyro", "id": 1, "field": "sensors.outputs.gyro", "direction": "sensor", "max_age_ticks": 5},
+        {"name": "imu.turned", "id": 2, "field": "sensors.outputs.turned", "direction": "sensor", "max_age_ticks": 5},
+    ],
+}
+IMU = {
+    "kind": "inertial",
+    "channels": {"gyro": "imu.gyro", "delta_angle": "imu.turned"},
+    "backends": [
+        {"device": "top", "rotation": "yaw_90", "correct": {"gyro": {"offset": [0.1, 0.0, 0.0]}}},
+        {"device": "bottom", "rotation": "roll_180"},
+    ],
+    "health": {"max_age_s": 0.05, "recover_s": 0.2},
+}
+BOARD = {
+    "machine": "craft.json",
+    "devices": {
+        "top": {"driver": "iio", "device": "imu-top", "rate_hz": 200},
+        "bottom": {"driver": "iio", "device": "imu-bottom", "rate_hz": 200},
+    },
+    "sensors": {"imu": IMU},
+}
+
+
+class Craft:
+    """A folder with machine, board and two gyroscopes that the kernel shows in its sysfs."""
+
+    def __init__(self, folder: Path):
+        self.folder, self.plan, self.socket = folder, folder / "board.plan", folder / "socket"
+        self.sysfs = folder / "sys"
+        self.environment = {**os.environ, "FCSL_SYSFS": str(self.sysfs)}
+        (folder / "craft.py").write_text(ALGORITHMS)
+        (folder / "craft.json").write_text(json.dumps(MACHINE))
+        self.library = build_machine(folder / "craft.json", "simulation").library
+        for number, name in enumerate(("imu-top", "imu-bottom")):
+            device = self.device(number)
+            device.mkdir(parents=True)
+            (device / "name").write_text(f"{name}\n")
+            (device / "in_anglvel_scale").write_text("0.001\n")
+            self.turn(number, (300, 500, 700))
+        self.write_plan(BOARD)
+
+    def device(self, number: int) -> Path:
+        return self.sysfs / f"bus/iio/devices/iio:device{number}"
+
+    def turn(self, number: int, raw: tuple[int, int, int]) -> None:
+        for axis, value in zip("xyz", raw, strict=True):
+            (self.device(number) / f"in_anglvel_{axis}_raw").write_text(f"{value}\n")
+
+    def fail(self, number: int) -> None:
+        for axis in "xyz":
+            (self.device(number) / f"in_anglvel_{axis}_raw").write_text("broken\n")
+
+    def write_plan(self, board: dict[str, Any], plan: str = "board.plan") -> Path:
+        (self.folder / "board.json").write_text(json.dumps(board))
+        line = ["fcslc", "board", self.folder / "board.json", "-o", self.folder / plan]
+        done = subprocess.run(line, capture_output=True, text=True, check=False)
+        assert done.returncode == 0, done.stderr
+        return self.folder / plan
+
+    def line(self, *options: str | Path) -> list[str]:
+        words = [BIN / "fcsl-fc", self.library, "--hal", f"linux:{self.plan}", *options]
+        return [str(word) for word in words]
+
+    def refusal(self, *options: str) -> str:
+        """What a flight says that cannot begin."""
+        line = self.line("--ticks", "5", *options)
+        done = subprocess.run(line, env=self.environment, capture_output=True, text=True, timeout=LONG_S, check=False)
+        assert done.returncode == 1 and done.stderr.startswith("fcsl-fc: "), done
+        return done.stderr
+
+
+@pytest.fixture
+def craft(tmp_path: Path) -> Craft:
+    return Craft(tmp_path)
+
+
+class Flight:
+    def __init__(self, craft: Craft, *options: str | Path):
+        line = craft.line("--socket", craft.socket, *options)
+        pipe = subprocess.PIPE
+        self.process = subprocess.Popen(line, env=craft.environment, stdout=pipe, stderr=pipe, text=True)
+        until(lambda: self.process.poll() is not None or self._connect(craft.socket))
+        assert self.process.poll() is None, self.process.communicate()
+
+    def _connect(self, socket: Path) -> bool:
+        """The socket's path is there before the program listens."""
+        try:
+            self.client = VarClient(socket)
+        except VarError:
+            return False
+        return True
+
+    def get(self, path: str) -> Any:
+        return self.client.get(path)[path]
+
+    def until_value(self, path: str, value: object) -> None:
+        until(lambda: self.get(path) == value)
+
+    def end(self) -> str:
+        self.client.close()
+        self.process.send_signal(signal.SIGTERM)
+        out, complaint = self.process.communicate(timeout=LONG_S)
+        assert self.process.returncode == 0, complaint
+        return out + complaint
+
+
+@pytest.fixture
+def fly(craft: Craft) -> Iterator[Callable[..., Flight]]:
+    flights: list[Flight] = []
+
+    def begin(*options: str | Path) -> Flight:
+        flights.append(Flight(craft, *options))
+        return flights[-1]
+
+    yield begin
+    for flight in flights:
+        flight.process.kill()
+        flight.process.communicate()
+
+
+def until(holds: Callable[[], bool]) -> None:
+    deadline = time.monotonic() + LONG_S
+    while not holds():
+        assert time.monotonic() < deadline, "it does not happen"
+        time.sleep(0.005)
+
+
+def near(values: Any, expected: list[float]) -> bool:
+    return list(values) == pytest.approx(expected, abs=1e-9)
+
+
+def test_a_gyro_is_lost_then_the_other_one(craft: Craft, fly: Callable[..., Flight]) -> None:
+    """The primary changes and nothing else; then the channel is invalid, and the machine goes to SAFE. Both come back."""
+    flight = fly("--record", craft.folder / "bag")
+    flight.until_value("hal.sensors.imu.primary", 1)
+    flight.until_value("machine.state", "FLIGHT")
+    # Raw 0.3 0.5 0.7 rad/s, less 0.1 of x; then turned by 90° about z. The other one stands on its head.
+    assert near(flight.get("sensors.outputs.gyro"), [-0.5, 0.2, 0.7])
+    # Over a tick, or two where the device was late.
+    assert flight.get("sensors.outputs.turned")[2] == pytest.approx(0.7 / HZ, rel=2)
+    craft.fail(0)
+    flight.until_value("hal.sensors.imu.primary", 2)
+    assert near(flight.get("sensors.outputs.gyro"), [0.3, -0.5, -0.7])
+    assert flight.get("machine.state") == "FLIGHT"
+    assert flight.get("hal.sensors.imu.condition.top") == 1
+    craft.fail(1)
+    flight.until_value("machine.state", "SAFE")
+    assert flight.get("channels.imu.gyro.valid") is False
+    assert flight.get("hal.sensors.imu.primary") == 0
+    craft.turn(0, (300, 500, 700))
+    flight.until_value("machine.state", "FLIGHT")
+    assert flight.get("hal.sensors.imu.primary") == 1
+    craft.turn(1, (300, 500, 700))
+    flight.until_value("hal.sensors.imu.condition.bottom", 0)
+    assert flight.get("hal.sensors.imu.primary") == 1
+    assert flight.get("hal.devices.top.errors") > 0
+    said = flight.end()
+    told = re.findall(r"fcsl-fc: (sensor 'imu': .*|device .*)", said)
+    assert told[:2] == [
+        "sensor 'imu': primary is device 'top'",
+        "device 'top' fails: in_anglvel_x: 'broken' is no number",
+    ]
+    assert "sensor 'imu': no device is healthy; 'bottom' is silent" in told
+    # The flight comes out of the readings again, bit for bit.
+    bag, library = craft.folder / "bag", str(craft.library)
+    whole = replay(bag, library=library, board=craft.plan)
+    assert whole.identical and whole.ticks > 50, str(whole)
+    # Another calibration shows from the first reading on.
+    other = json.loads(json.dumps(BOARD))
+    other["sensors"]["imu"]["backends"][0]["correct"]["gyro"]["offset"][0] = 0.15
+    changed = replay(bag, library=library, board=craft.write_plan(other, "other.plan"))
+    assert changed.divergence and changed.divergence.path == "sensors.outputs.gyro[1]"
+    assert float(changed.divergence.replayed) == pytest.approx(0.15)
+
+
+def test_a_device_that_is_not_there_comes_later(craft: Craft, fly: Callable[..., Flight]) -> None:
+    """It is found by its name, whatever number the kernel gives it."""
+    away = craft.folder / "away"
+    craft.device(0).rename(away)
+    flight = fly()
+    flight.until_value("hal.sensors.imu.primary", 2)
+    flight.until_value("machine.state", "FLIGHT")
+    assert flight.get("hal.devices.top.open") == 0
+    away.rename(craft.device(7))
+    flight.until_value("hal.devices.top.open", 1)
+    flight.until_value("hal.sensors.imu.condition.top", 0)
+    assert flight.get("hal.sensors.imu.primary") == 2
+    said = flight.end()
+    assert re.search(r"device 'top' is not there: .*imu-top", said) and "device 'top' is there" in said
+
+
+def test_it_ends_while_it_waits_for_a_slow_device(craft: Craft, fly: Callable[..., Flight]) -> None:
+    slow = json.loads(json.dumps(BOARD))
+    slow["devices"]["bottom"]["rate_hz"] = 0.01
+    slow["sensors"]["imu"]["health"]["max_age_s"] = 200
+    craft.write_plan(slow)
+    flight = fly()
+    flight.until_value("machine.state", "FLIGHT")
+    begun = time.monotonic()
+    flight.end()
+    assert time.monotonic() - begun < 20
+
+
+def test_plans_that_cannot_fly(craft: Craft) -> None:
+    good = craft.plan.read_text()
+    craft.plan.rename(craft.folder / "away.plan")
+    assert f"cannot read '{craft.plan}': No such file or directory" in craft.refusal()
+    for old, new, reason in (
+        ("end\n", "", "the plan has no `end`: it was cut off"),
+        ("fcsl-board-plan 1", "fcsl-board-plan 2", "board.plan:1: not a plan that `fcslc board` wrote"),
+        ("machine craft 100", "machine raft 100", "is for machine 'raft' at 100 Hz, and this is 'craft' at 100 Hz"),
+        ("sensor imu inertial", "sensor imu internal", "board.plan:5: not a kind of sensor"),
+        ("bind gyro imu.gyro", "bind gyro imu.giro", "machine 'craft' has no channel 'imu.giro'"),
+        ("iio imu-top", "no_driver imu-top", "device 'top': no driver 'no_driver' comes with FCSL; there is: "),
+        ("iio imu-top", "ubx imu-top", "device 'top': driver 'ubx' has no signal 'gyro'"),
+    ):
+        assert old in good
+        craft.plan.write_text(good.replace(old, new))
+        assert reason in craft.refusal(), new
+
+
+def test_a_channel_that_a_device_lacks(craft: Craft) -> None:
+    for axis in "xyz":
+        (craft.device(1) / f"in_anglvel_{axis}_raw").unlink()
+    reason = "device 'bottom' (imu-bottom) cannot be opened: the device has no channel for gyro"
+    assert reason in craft.refusal()
