@@ -3,7 +3,7 @@
 SHELL := /bin/bash
 .SHELLFLAGS := -euo pipefail -c
 .DEFAULT_GOAL := help
-.PHONY: help setup build demo test verify bench interop lint format clean
+.PHONY: help setup build demo test verify bench interop hardware lint format clean
 
 ENV := . scripts/env.sh &&
 PYTHON_DIRS := conftest.py fcsl_compiler fcsl_hal fcsl_runtime fcsl_sim fcsl_bridge fcsl_msgs examples scripts test
@@ -34,6 +34,10 @@ bench: setup ## the figures: steps, filters, simulator, replay, ROS 2 nodes, eac
 interop: setup ## FCSL beside rclpy nodes in a ROS 2 graph, through a bridge with zenoh-plugin-ros2dds, which it builds once; DURATION=600 s
 	@scripts/interop/build.sh
 	@$(ENV) python3 scripts/interop $(DURATION)
+
+hardware: setup ## a Linux kernel with real drivers and chips that are registers, which it builds once: each device is tried
+	@scripts/hardware/build.sh > /dev/null
+	@$(ENV) python3 scripts/hardware
 
 lint: setup ## ruff, mypy, clang-format; nothing is changed
 	@. scripts/underlay.sh && ruff check $(PYTHON_DIRS)
