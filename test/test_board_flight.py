@@ -8,6 +8,7 @@ import json
 import os
 import re
 import signal
+import struct
 import subprocess
 import time
 from collections.abc import Callable, Iterator
@@ -22,6 +23,7 @@ from simclient import VarClient
 from simclient.replay import replay
 from simclient.vars.wire import VarError
 
+ROOT = Path(__file__).resolve().parents[1]
 BIN = package_prefix("fcsl_runtime") / "bin"
 HZ = 100
 LONG_S = 60
@@ -144,7 +146,10 @@ class Flight:
         line = craft.line("--socket", craft.socket, *options)
         pipe = subprocess.PIPE
         self.process = subprocess.Popen(line, env=craft.environment, stdout=pipe, stderr=pipe, text=True)
-        until(lambda: self.process.poll() is not None or self._connect(craft.socket))
+        self._socket = craft.socket
+
+    def connect(self) -> None:
+        until(lambda: self.process.poll() is not None or self._connect(self._socket))
         assert self.process.poll() is None, self.process.communicate()
 
     def _connect(self, socket: Path) -> bool:
@@ -175,6 +180,7 @@ def fly(craft: Craft) -> Iterator[Callable[..., Flight]]:
 
     def begin(*options: str | Path) -> Flight:
         flights.append(Flight(craft, *options))
+        flights[-1].connect()
         return flights[-1]
 
     yield begin
@@ -289,3 +295,124 @@ def test_a_channel_that_a_device_lacks(craft: Craft) -> None:
         (craft.device(1) / f"in_anglvel_{axis}_raw").unlink()
     reason = "device 'bottom' (imu-bottom) cannot be opened: the device has no channel for gyro"
     assert reason in craft.refusal()
+
+
+#: A robot that sends a frame whenever it likes: a double, through a FIFO.
+ROBOT = r"""
+#define _GNU_SOURCE
+#include <fcntl.h>
+#include <poll.h>
+#include <time.h>
+#include <unistd.h>
+
+#include <fcsl/fcsl_driver.h>
+
+typedef struct {
+    double value;
+    int fifo;
+} robot_t;
+
+static const fcsl_driver_signal_t signals[] = {FCSL_DRIVER_SIGNAL(robot_t, value, "", "what it says")};
+
+static fcsl_driver_status_t probe(const char *device, char *why, size_t size)
+{
+    (void)why;
+    (void)size;
+    return access(device, F_OK) == 0 ? FCSL_DRIVER_OK : FCSL_DRIVER_ABSENT;
+}
+
+static fcsl_driver_status_t open_robot(void *self, const char *device, const uint8_t *used, char *why, size_t size)
+{
+    robot_t *robot = self;
+    (void)used;
+    (void)why;
+    (void)size;
+    robot->fifo = open(device, O_RDWR | O_NONBLOCK);
+    return robot->fifo >= 0 ? FCSL_DRIVER_OK : FCSL_DRIVER_FAILED;
+}
+
+static fcsl_driver_status_t read_robot(void *self, uint64_t *sample_ns, char *why, size_t size)
+{
+    robot_t *robot = self;
+    struct pollfd ready = {.fd = robot->fifo, .events = POLLIN};
+    struct timespec now;
+    (void)why;
+    (void)size;
+    if (poll(&ready, 1, FCSL_DRIVER_WAIT_MS) <= 0 || read(robot->fifo, &robot->value, sizeof robot->value) != 8) {
+        return FCSL_DRIVER_NOTHING;
+    }
+    (void)clock_gettime(CLOCK_MONOTONIC, &now);
+    *sample_ns = (uint64_t)now.tv_sec * 1000000000u + (uint64_t)now.tv_nsec;
+    return FCSL_DRIVER_OK;
+}
+
+static void close_robot(void *self)
+{
+    (void)close(((robot_t *)self)->fifo);
+}
+
+static const fcsl_driver_t robot = {
+    .abi_version = FCSL_DRIVER_ABI_VERSION, .name = "robot", .doc = "a robot", .direction = FCSL_SENSOR,
+    .signals = signals, .signal_count = 1, .state_size = sizeof(robot_t), .state_align = _Alignof(robot_t),
+    .waits = 1, .probe = probe, .open = open_robot, .read = read_robot, .close = close_robot,
+};
+
+const fcsl_driver_t *const fcsl_drivers[] = {&robot, NULL};
+"""
+ECHO = '''class Echo:
+    """Adds up what it hears."""
+
+    inputs = {"heard": "f64"}
+    outputs = {"sum": "f64", "last": "f64"}
+    state = {"total": "f64"}
+
+    def execute(self):
+        self.total += self.heard
+        self.sum = self.total
+        self.last = self.heard
+'''
+ECHO_MACHINE = {
+    "tick_hz": 1000,
+    "initial_state": "RUN",
+    "algorithms": {"Echo": {"source": "echo.py"}},
+    "instances": {"echo": {"algorithm": "Echo"}},
+    "states": {"RUN": {"schedule": {"echo": 1000}}},
+    "channels": [{"name": "heard", "id": 1, "field": "echo.inputs.heard", "direction": "sensor", "max_age_ticks": 9}],
+}
+PACED_BOARD = {
+    "machine": "echo.json",
+    "devices": {"robot": {"driver": "DRIVER", "device": "FIFO"}},
+    "pace": {"device": "robot", "timeout_s": 0.5},
+    "sensors": {"robot": {"kind": "value", "channels": {"value": "heard"}, "backends": [{"device": "robot"}]}},
+}
+
+
+def test_a_device_paces_the_loop(tmp_path: Path) -> None:
+    """Tick k is its frame k, in bursts and with pauses. When it falls silent the flight ends, and says why."""
+    (tmp_path / "robot.c").write_text(ROBOT)
+    includes = [f"-I{ROOT / package / 'include'}" for package in ("fcsl_hal", "fcsl_compiler")]
+    library = tmp_path / "librobot.so"
+    subprocess.run(["cc", "-shared", "-fPIC", *includes, tmp_path / "robot.c", "-o", library], check=True)
+    (tmp_path / "echo.py").write_text(ECHO)
+    (tmp_path / "echo.json").write_text(json.dumps(ECHO_MACHINE))
+    fifo, bag = tmp_path / "fifo", tmp_path / "bag"
+    os.mkfifo(fifo)
+    board = json.dumps(PACED_BOARD).replace("DRIVER", f"{library}:robot").replace("FIFO", str(fifo))
+    (tmp_path / "board.json").write_text(board)
+    subprocess.run(["fcslc", "board", tmp_path / "board.json"], check=True)
+    machine = build_machine(tmp_path / "echo.json", "simulation").library
+    line = [BIN / "fcsl-fc", machine, "--hal", f"linux:{tmp_path / 'board.plan'}", "--record", bag]
+    with subprocess.Popen(line, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True) as process:
+        with fifo.open("wb", buffering=0) as robot:
+            for burst in (1, 40, 3, 1, 55):
+                for _ in range(burst):
+                    robot.write(struct.pack("<d", 0.5))
+                time.sleep(0.1)
+            out, complaint = process.communicate(timeout=LONG_S)
+    assert process.returncode == 1
+    assert re.search(r"device 'robot', which paces the loop, has given nothing for 5\d\d(\.\d+)? ms", complaint), (
+        complaint
+    )
+    assert "paced by a device" in out and re.search(r"^fcsl-fc: 100 ticks,", out, re.MULTILINE), out
+    whole = replay(bag, library=str(machine), board=tmp_path / "board.plan")
+    assert whole.identical and whole.ticks == 100, str(whole)

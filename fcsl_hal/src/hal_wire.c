@@ -543,7 +543,7 @@ static int wire_open(fcsl_hal_t *handle, char *error, size_t error_size)
         return failed;
     }
     hal->counters.connected = 1;
-    handle->paces = hal->paces;
+    handle->paces = hal->paces ? FCSL_PACED_BY_SIMULATOR : FCSL_PACED_BY_HOST;
     return 0;
 }
 

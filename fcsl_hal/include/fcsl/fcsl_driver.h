@@ -23,7 +23,8 @@ enum { FCSL_DRIVER_WAIT_MS = 100 }; /* a read that waits does so for this long a
 typedef enum {
     FCSL_DRIVER_OK = 0,
     FCSL_DRIVER_NOTHING = 1, /* read: no sample since the last one */
-    FCSL_DRIVER_ABSENT = 2,  /* there is no such device; read: it has gone, the host closes it and probes from time to time */
+    FCSL_DRIVER_ABSENT =
+        2,  /* there is no such device; read: it has gone, the host closes it and probes from time to time */
     FCSL_DRIVER_FAILED = 3   /* the device is there, and it or the system refused */
 } fcsl_driver_status_t;
 
@@ -45,8 +46,8 @@ typedef struct {
 } fcsl_driver_signal_t;
 
 /* Every function but close may put a reason into `why` (a text of `size` bytes with its zero, empty before the call) when it
- * returns anything but OK or NOTHING. After open nothing is allocated. A sensor's functions are called from a thread of its own, so
- * read may take as long as the device does. write never waits: what the device cannot take at once is FAILED. */
+ * returns anything but OK or NOTHING. After open nothing is allocated. The host has a thread of its own for each device, so
+ * read and write may take as long as the device does; two functions of an opened device never run at the same time. */
 typedef struct {
     uint32_t abi_version;
     const char *name;
@@ -69,10 +70,10 @@ typedef struct {
     /* Sensors (else null): puts a sample into the used signals of `self`, and the monotonic time at which it was taken into
      * *sample_ns; or changes neither. Samples come in their order. A value that the device does not tell is NaN. */
     fcsl_driver_status_t (*read)(void *self, uint64_t *sample_ns, char *why, size_t size);
-    /* Actuators (else null): drives the device with the used signals of `self`. Called again and again, with equal values too. */
+    /* Actuators (else null): drives the device with the used signals of `self`. Called again and again, with equal values too, and always
+     * with the newest ones: those that came during a write are not kept. The host tells of a write that lasts for too long. */
     fcsl_driver_status_t (*write)(void *self, char *why, size_t size);
-    /* The host has written an actuator's safe values before, if it could: close leaves the device as it is. A driver that
-     * hands values to a thread of its own waits here until the device has those of the last write, for 1 s at most. */
+    /* The host has written an actuator's safe values before, if it could: close leaves the device as it is. */
     void (*close)(void *self);
 } fcsl_driver_t;
 

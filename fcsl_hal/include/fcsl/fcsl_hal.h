@@ -27,6 +27,12 @@ typedef enum {
     FCSL_HAL_AGAIN = 6    /* the other side ended the run, and begins another one */
 } fcsl_hal_status_t;
 
+typedef enum {
+    FCSL_PACED_BY_HOST = 0,      /* the clock */
+    FCSL_PACED_BY_SIMULATOR = 1, /* the time is simulated */
+    FCSL_PACED_BY_DEVICE = 2     /* each of its samples is a tick, in real time */
+} fcsl_pacer_t;
+
 typedef struct fcsl_hal {
     void *ctx;
     /* Before anything else. Returns 0, or with `error` filled -1, or 1 when the peer was not found yet: then it may be called again,
@@ -65,9 +71,9 @@ typedef struct fcsl_hal {
     uint32_t counter_bytes;
     /* True when sensor channels are served: the host attaches them (fcsl_run_attach), so their age is kept. */
     int serves;
-    /* True when sample(k) decides when tick k happens (a simulator at the other end): the host must not pace itself. Known
-     * after open. */
-    int paces;
+    /* Who decides when tick k happens. Where it is not the host, sample(k) does, and the host must not pace itself. Known after
+     * open. */
+    fcsl_pacer_t paces;
 } fcsl_hal_t;
 
 /* Samples nothing, accepts everything. Returns 0, or -1 with `error` filled. */

@@ -110,6 +110,34 @@ static inline void fcsl_scalars_import(void *out, const uint8_t *in, uint8_t typ
     }
 }
 
+#define FCSL_SCALAR_AS_DOUBLE(type_)                                                                                   \
+    {                                                                                                                  \
+        type_ value;                                                                                                   \
+        memcpy(&value, bytes, sizeof value);                                                                           \
+        return (double)value;                                                                                          \
+    }
+
+/* A scalar in native byte order, FCSL_BOOL to FCSL_F64, rounded to the nearest double. */
+static inline double fcsl_scalar_as_double(const uint8_t *bytes, uint8_t type)
+{
+    switch (type) {
+    case FCSL_I32:
+        FCSL_SCALAR_AS_DOUBLE(int32_t)
+    case FCSL_I64:
+        FCSL_SCALAR_AS_DOUBLE(int64_t)
+    case FCSL_U32:
+        FCSL_SCALAR_AS_DOUBLE(uint32_t)
+    case FCSL_U64:
+        FCSL_SCALAR_AS_DOUBLE(uint64_t)
+    case FCSL_F32:
+        FCSL_SCALAR_AS_DOUBLE(float)
+    case FCSL_F64:
+        FCSL_SCALAR_AS_DOUBLE(double)
+    default:
+        FCSL_SCALAR_AS_DOUBLE(uint8_t)
+    }
+}
+
 /* True when every little-endian scalar is a value of its type: bools 0 or 1, enumerators that exist. */
 static inline int fcsl_scalars_valid(const fcsl_machine_t *machine, const uint8_t *in, uint8_t type, uint32_t count)
 {

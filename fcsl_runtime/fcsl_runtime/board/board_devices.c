@@ -2,11 +2,15 @@
  *
  * The sensor devices of a plan.
  */
+#define _GNU_SOURCE
 #include "board_devices.h"
 
+#include <errno.h>
 #include <math.h>
+#include <stdatomic.h>
 #include <stdlib.h>
 #include <string.h>
+#include <time.h>
 
 #include "base/error.h"
 
@@ -29,6 +33,8 @@ struct board_devices {
     uint32_t feeds_of[BOARD_DEVICES_MAX];
     feed_t feeds[BOARD_SENSORS_MAX * FCSL_BACKENDS_MAX];
     uint32_t feed_count;
+    sem_t sampled; /* posted by the device that paces the loop */
+    atomic_int interrupted;
 };
 
 /* ---- opening -------------------------------------------------------------------------------------------------------- */
@@ -101,6 +107,11 @@ board_devices_t *board_devices_new(const board_plan_t *plan, fcsl_error_t *error
         return NULL;
     }
     devices->plan = plan;
+    if (sem_init(&devices->sampled, 0, 0) != 0) {
+        free(devices);
+        (void)fcsl_fail(error, "no semaphore for the devices");
+        return NULL;
+    }
     for (uint32_t s = 0; s < plan->sensor_count; s++) {
         for (uint32_t b = 0; b < plan->sensors[s].config.backend_count; b++) {
             if (add_feed(devices, s, b, error) != 0) {
@@ -108,6 +119,9 @@ board_devices_t *board_devices_new(const board_plan_t *plan, fcsl_error_t *error
                 return NULL;
             }
         }
+    }
+    if (plan->pacing != BOARD_NO_DEVICE && devices->devices[plan->pacing] != NULL) {
+        sensor_device_post(devices->devices[plan->pacing], &devices->sampled);
     }
     return devices;
 }
@@ -134,6 +148,37 @@ void board_devices_free(board_devices_t *devices)
 
 /* ---- the step thread ------------------------------------------------------------------------------------------------ */
 
+int board_devices_wait(board_devices_t *devices, uint64_t deadline_ns)
+{
+    const sensor_device_t *pacing = devices->devices[devices->plan->pacing];
+    const struct timespec deadline = {.tv_sec = (time_t)(deadline_ns / 1000000000u),
+                                      .tv_nsec = (long)(deadline_ns % 1000000000u)};
+    int waited = 0;
+    /* The semaphore may have been posted for samples that were taken already: each of them costs a turn. */
+    while (!sensor_device_has_sample(pacing) && waited == 0 && atomic_load(&devices->interrupted) == 0) {
+        waited = sem_clockwait(&devices->sampled, CLOCK_MONOTONIC, &deadline) != 0 && errno != EINTR;
+    }
+    return sensor_device_has_sample(pacing);
+}
+
+void board_devices_interrupt(board_devices_t *devices)
+{
+    atomic_store(&devices->interrupted, 1);
+    (void)sem_post(&devices->sampled);
+}
+
+void board_devices_discard(board_devices_t *devices)
+{
+    for (uint32_t d = 0; d < devices->plan->device_count; d++) {
+        device_sample_t sample;
+        for (uint32_t i = 0; i < DEVICE_RING_SAMPLES && devices->devices[d] != NULL; i++) {
+            if (!sensor_device_take(devices->devices[d], &sample)) {
+                break;
+            }
+        }
+    }
+}
+
 static void make_reading(const feed_t *feed, const device_sample_t *sample, sensor_reading_t *made)
 {
     made->sensor = feed->sensor;
@@ -147,18 +192,30 @@ static void make_reading(const feed_t *feed, const device_sample_t *sample, sens
     }
 }
 
+static uint32_t take_sample(board_devices_t *devices, uint32_t d, sensor_reading_t *readings)
+{
+    device_sample_t sample;
+    uint32_t count = 0;
+    if (!sensor_device_take(devices->devices[d], &sample)) {
+        return 0;
+    }
+    for (uint32_t i = 0; i < devices->feed_count; i++) {
+        if (devices->feeds[i].device == d) {
+            make_reading(&devices->feeds[i], &sample, &readings[count++]);
+        }
+    }
+    return count;
+}
+
 uint32_t board_devices_take(board_devices_t *devices, sensor_reading_t *readings, uint32_t capacity)
 {
     uint32_t count = 0;
     for (uint32_t d = 0; d < devices->plan->device_count; d++) {
-        device_sample_t sample;
-        while (devices->devices[d] != NULL && count + devices->feeds_of[d] <= capacity &&
-               sensor_device_take(devices->devices[d], &sample)) {
-            for (uint32_t i = 0; i < devices->feed_count; i++) {
-                if (devices->feeds[i].device == d) {
-                    make_reading(&devices->feeds[i], &sample, &readings[count++]);
-                }
-            }
+        const uint32_t samples = d == devices->plan->pacing ? 1u : DEVICE_RING_SAMPLES;
+        uint32_t made = 1;
+        for (uint32_t i = 0; devices->devices[d] != NULL && i < samples && made > 0u; i++) {
+            made = count + devices->feeds_of[d] <= capacity ? take_sample(devices, d, &readings[count]) : 0u;
+            count += made;
         }
     }
     return count;

@@ -20,9 +20,16 @@ typedef struct board_devices board_devices_t;
 board_devices_t *board_devices_new(const board_plan_t *plan, fcsl_error_t *error);
 /* Opens all devices and starts their threads. 0, or -1. */
 int board_devices_start(board_devices_t *devices, fcsl_error_t *error);
-/* From one thread: takes what the devices have given since the last call, device by device, into `readings`; at most `capacity` of
- * them, which is FCSL_BACKENDS_MAX or more: what is left waits. Returns how many. Does not wait. */
+/* Where a device paces the loop: waits for its next sample until `deadline_ns` of the monotonic clock, or until it is interrupted. 1, or 0
+ * when there is none. */
+int board_devices_wait(board_devices_t *devices, uint64_t deadline_ns);
+/* From any thread: a wait ends, and so do all later ones. */
+void board_devices_interrupt(board_devices_t *devices);
+/* From one thread: takes what the devices have given since the last call, device by device, into `readings`; one sample of the device that
+ * paces the loop. At most `capacity` readings, which is FCSL_BACKENDS_MAX or more: what is left waits. Returns how many. Does not wait. */
 uint32_t board_devices_take(board_devices_t *devices, sensor_reading_t *readings, uint32_t capacity);
+/* Throws away what the devices have given. */
+void board_devices_discard(board_devices_t *devices);
 /* Of a device of the plan. */
 device_counts_t board_devices_counts(const board_devices_t *devices, uint32_t device);
 /* Of any device, since the last call: a text for people, or null when nothing has changed. */

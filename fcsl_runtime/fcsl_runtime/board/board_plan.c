@@ -88,6 +88,29 @@ static const char *on_device(parser_t *parser)
                : "not a name and a period";
 }
 
+static int find_device(const board_plan_t *plan, const char *name, uint32_t *device)
+{
+    for (uint32_t d = 0; d < plan->device_count; d++) {
+        if (strcmp(plan->devices[d].name, name) == 0) {
+            *device = d;
+            return 0;
+        }
+    }
+    return -1;
+}
+
+static const char *on_pace(parser_t *parser)
+{
+    board_plan_t *plan = parser->plan;
+    if (plan->pacing != BOARD_NO_DEVICE) {
+        return "a second `pace`";
+    }
+    return find_device(plan, parser->word[1], &plan->pacing) == 0 &&
+                   fcsl_plan_number(parser->word[2], PERIOD_NS_MAX, &plan->pace_timeout_ns) == 0
+               ? NULL
+               : "not a device and a time";
+}
+
 static void set_no_limits(fcsl_frontend_config_t *config)
 {
     for (uint32_t q = 0; q < FCSL_QUANTITIES_MAX; q++) {
@@ -169,17 +192,6 @@ static const char *on_bind(parser_t *parser)
     }
     sensor->bindings[sensor->binding_count++] = (board_binding_t){.quantity = q, .channel = parser->word[2]};
     return NULL;
-}
-
-static int find_device(const board_plan_t *plan, const char *name, uint32_t *device)
-{
-    for (uint32_t d = 0; d < plan->device_count; d++) {
-        if (strcmp(plan->devices[d].name, name) == 0) {
-            *device = d;
-            return 0;
-        }
-    }
-    return -1;
 }
 
 static void set_no_corrections(fcsl_backend_config_t *backend)
@@ -313,13 +325,21 @@ static const struct {
     owner_t owner;
     take_t take;
 } STATEMENTS[] = {
-    {"machine", 3, 0, BELONGS_TO_BOARD, on_machine}, {"device", 5, 1, BELONGS_TO_BOARD, on_device},
-    {"sensor", 3, 0, BELONGS_TO_BOARD, on_sensor},   {"health", 4, 0, BELONGS_TO_SENSOR, on_health},
-    {"limits", 4, 0, BELONGS_TO_SENSOR, on_limits},  {"tolerance", 3, 0, BELONGS_TO_SENSOR, on_tolerance},
-    {"bind", 3, 0, BELONGS_TO_SENSOR, on_bind},      {"backend", 2, 0, BELONGS_TO_SENSOR, on_backend},
-    {"signal", 3, 0, BELONGS_TO_BACKEND, on_signal}, {"correct", 18, 0, BELONGS_TO_BACKEND, on_correct},
-    {"stick", 6, 0, BELONGS_TO_BACKEND, on_stick},   {"section", 7, 0, BELONGS_TO_BACKEND, on_section},
-    {"output", 3, 0, BELONGS_TO_BOARD, on_output},   {"pulse", 10, 0, BELONGS_TO_OUTPUT, on_pulse},
+    {"machine", 3, 0, BELONGS_TO_BOARD, on_machine},
+    {"device", 5, 1, BELONGS_TO_BOARD, on_device},
+    {"pace", 3, 0, BELONGS_TO_BOARD, on_pace},
+    {"sensor", 3, 0, BELONGS_TO_BOARD, on_sensor},
+    {"health", 4, 0, BELONGS_TO_SENSOR, on_health},
+    {"limits", 4, 0, BELONGS_TO_SENSOR, on_limits},
+    {"tolerance", 3, 0, BELONGS_TO_SENSOR, on_tolerance},
+    {"bind", 3, 0, BELONGS_TO_SENSOR, on_bind},
+    {"backend", 2, 0, BELONGS_TO_SENSOR, on_backend},
+    {"signal", 3, 0, BELONGS_TO_BACKEND, on_signal},
+    {"correct", 18, 0, BELONGS_TO_BACKEND, on_correct},
+    {"stick", 6, 0, BELONGS_TO_BACKEND, on_stick},
+    {"section", 7, 0, BELONGS_TO_BACKEND, on_section},
+    {"output", 3, 0, BELONGS_TO_BOARD, on_output},
+    {"pulse", 10, 0, BELONGS_TO_OUTPUT, on_pulse},
 };
 
 static const char *take_line(parser_t *parser, char *line)
@@ -392,21 +412,35 @@ static long read_text(const char *file, char *text, fcsl_error_t *error)
     return failed ? fcsl_fail(error, "cannot read '%.300s'", file) : (long)size;
 }
 
-board_plan_t *board_plan_read(const char *file, fcsl_error_t *error)
+board_plan_t *board_plan_parse(const char *name, const char *text, size_t size, fcsl_error_t *error)
 {
-    board_plan_t *plan = calloc(1, sizeof *plan);
-    char *text = plan != NULL ? calloc(1, BOARD_BYTES_MAX + 1) : NULL;
-    if (text == NULL) {
+    board_plan_t *plan = size <= BOARD_BYTES_MAX ? calloc(1, sizeof *plan) : NULL;
+    char *copy = plan != NULL ? calloc(1, size + 1u) : NULL;
+    if (copy == NULL) {
         free(plan);
         (void)fcsl_fail(error, "out of memory for the plan");
         return NULL;
     }
-    plan->text = text;
-    const long size = read_text(file, text, error);
-    if (size < 0 || parse(plan, file, (size_t)size, error) != 0) {
+    memcpy(copy, text, size);
+    plan->text = copy;
+    plan->pacing = BOARD_NO_DEVICE;
+    if (parse(plan, name, size, error) != 0) {
         board_plan_free(plan);
         return NULL;
     }
+    return plan;
+}
+
+board_plan_t *board_plan_read(const char *file, fcsl_error_t *error)
+{
+    char *text = malloc(BOARD_BYTES_MAX);
+    if (text == NULL) {
+        (void)fcsl_fail(error, "out of memory for the plan");
+        return NULL;
+    }
+    const long size = read_text(file, text, error);
+    board_plan_t *plan = size >= 0 ? board_plan_parse(file, text, (size_t)size, error) : NULL;
+    free(text);
     return plan;
 }
 

@@ -6,6 +6,7 @@
  *   fcsl-board-plan 1
  *   machine NAME TICK_HZ
  *   device NAME PERIOD_NS DRIVER ADDRESS         PERIOD_NS 0: it is read as it waits; ADDRESS: to the end of the line
+ *   pace DEVICE TIMEOUT_NS                       each of its samples is a tick; silent for longer, it ends the flight
  *   sensor NAME KIND                             what follows, up to the next one, belongs to it
  *   health MAX_AGE_NS STUCK_NS RECOVER_NS        STUCK_NS 0: never stuck
  *   limits QUANTITY LOW HIGH                     bits; of each element, before the correction
@@ -27,6 +28,8 @@
 
 #include "fcsl/fcsl_frontend.h"
 #include "fcsl/fcsl_run.h"
+
+#define BOARD_NO_DEVICE UINT32_MAX
 
 enum {
     BOARD_BYTES_MAX = 1 << 20,
@@ -87,6 +90,8 @@ typedef struct {
     uint64_t tick_hz;
     board_device_t devices[BOARD_DEVICES_MAX];
     uint32_t device_count;
+    uint32_t pacing; /* the device that paces the loop; BOARD_NO_DEVICE: the clock does */
+    uint64_t pace_timeout_ns;
     board_sensor_t sensors[BOARD_SENSORS_MAX];
     uint32_t sensor_count;
     board_output_t outputs[BOARD_OUTPUTS_MAX];
@@ -95,6 +100,8 @@ typedef struct {
 
 /* Reads the file. Returns a plan for board_plan_free, or null with a message that names file and line. */
 board_plan_t *board_plan_read(const char *file, fcsl_error_t *error);
+/* The same of its text, at most BOARD_BYTES_MAX; `name` is for messages. */
+board_plan_t *board_plan_parse(const char *name, const char *text, size_t size, fcsl_error_t *error);
 void board_plan_free(board_plan_t *plan);
 
 #endif /* BOARD_BOARD_PLAN_H */

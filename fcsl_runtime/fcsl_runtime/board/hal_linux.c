@@ -4,6 +4,7 @@
  */
 #include "hal_linux.h"
 
+#include <stdatomic.h>
 #include <stdio.h>
 #include <stdlib.h>
 
@@ -21,8 +22,12 @@ typedef struct {
     int32_t primaries[BOARD_SENSORS_MAX]; /* as they were logged */
     readings_t readings;
     counters_t counters;
+    uint64_t paced_ns; /* time of the last sample that was a tick; 0: none yet */
+    atomic_int interrupted;
     fcsl_error_t failure;
 } hal_t;
+
+static const uint64_t SLICE_NS = 50000000u; /* a loop that waits for a device looks around so often */
 
 /* ---- a tick --------------------------------------------------------------------------------------------------------- */
 
@@ -47,6 +52,26 @@ static void tell_primary(hal_t *hal, uint32_t s)
     hal->base.log(hal->base.ctx, text);
 }
 
+/* Waits for the sample of the device that paces the loop: OK, WAITING, or the end. Before the first one nothing is too late. */
+static fcsl_hal_status_t wait_for_pace(hal_t *hal)
+{
+    const board_plan_t *plan = hal->plan;
+    const uint64_t now_ns = hal->base.now_ns(hal->base.ctx);
+    if (board_devices_wait(hal->devices, now_ns + SLICE_NS)) {
+        hal->paced_ns = hal->base.now_ns(hal->base.ctx);
+        return FCSL_HAL_OK;
+    }
+    if (atomic_load(&hal->interrupted) != 0) {
+        return FCSL_HAL_CLOSED;
+    }
+    if (hal->paced_ns == 0u || now_ns - hal->paced_ns <= plan->pace_timeout_ns) {
+        return FCSL_HAL_WAITING;
+    }
+    (void)fcsl_fail(&hal->failure, "device '%.60s', which paces the loop, has given nothing for %.6g ms",
+                    plan->devices[plan->pacing].name, (double)(now_ns - hal->paced_ns) / 1e6);
+    return FCSL_HAL_TIMEOUT;
+}
+
 static fcsl_hal_status_t linux_sample(void *ctx, uint64_t tick, uint8_t *bytes, size_t capacity,
                                       fcsl_message_t *message)
 {
@@ -55,6 +80,10 @@ static fcsl_hal_status_t linux_sample(void *ctx, uint64_t tick, uint8_t *bytes, 
     (void)bytes;
     (void)capacity;
     (void)message;
+    const fcsl_hal_status_t paced = hal->plan->pacing != BOARD_NO_DEVICE ? wait_for_pace(hal) : FCSL_HAL_OK;
+    if (paced != FCSL_HAL_OK) {
+        return paced;
+    }
     const uint64_t now_ns = hal->base.now_ns(hal->base.ctx);
     readings_t *readings = &hal->readings;
     readings->count = board_devices_take(hal->devices, readings->kept, READINGS_MAX);
@@ -140,9 +169,19 @@ static const char *linux_explain(void *ctx)
     return ((hal_t *)ctx)->failure.text;
 }
 
-static void linux_nothing(void *ctx)
+/* While it is paused nobody gets what is measured. */
+static void linux_alive(void *ctx)
 {
-    (void)ctx;
+    hal_t *hal = ctx;
+    board_devices_discard(hal->devices);
+    hal->paced_ns = 0;
+}
+
+static void linux_interrupt(void *ctx)
+{
+    hal_t *hal = ctx;
+    atomic_store(&hal->interrupted, 1);
+    board_devices_interrupt(hal->devices);
 }
 
 /* ---- opening and closing -------------------------------------------------------------------------------------------- */
@@ -188,7 +227,7 @@ static int open_board(hal_t *hal, const char *file, fcsl_error_t *error)
 int hal_linux_record(const fcsl_hal_t *hal, const char *name_space, fcsl_error_t *error)
 {
     hal_t *self = hal->ctx;
-    return readings_record(&self->readings, self->run, name_space, error);
+    return readings_record(&self->readings, self->plan, self->run, name_space, error);
 }
 
 int hal_linux(const char *file, fcsl_run_t *run, fcsl_hal_t *hal, fcsl_error_t *error)
@@ -209,20 +248,21 @@ int hal_linux(const char *file, fcsl_run_t *run, fcsl_hal_t *hal, fcsl_error_t *
         .sample = linux_sample,
         .command = linux_command,
         .arm = linux_arm,
-        .alive = linux_nothing,
+        .alive = linux_alive,
         .now_ns = linux_now_ns,
         .wait = linux_wait,
         .log = linux_log,
         .read_log = linux_read_log,
         .count = linux_count,
         .explain = linux_explain,
-        .interrupt = linux_nothing,
+        .interrupt = linux_interrupt,
         .close = linux_close,
         .fields = self->counters.fields,
         .field_count = self->counters.count,
         .counters = self->counters.values,
         .counter_bytes = self->counters.count * (uint32_t)sizeof(uint64_t),
         .serves = 1,
+        .paces = self->plan->pacing != BOARD_NO_DEVICE ? FCSL_PACED_BY_DEVICE : FCSL_PACED_BY_HOST,
     };
     return 0;
 }

@@ -13,18 +13,33 @@
 
 enum { NAME_BYTES = 512, HEAD_BYTES = 64, READING_BYTES = 32 + FCSL_VALUES_MAX * 8 };
 static const char TYPE[] = "fcsl_hal/msg/Readings";
-static const char SCHEMA[] = "std_msgs/Header header\n"
-                             "uint64 tick\n"
-                             "uint64 now_ns  # monotonic time of the tick\n"
-                             "Reading[] readings\n" FCSL_SCHEMA_SEPARATOR "MSG: fcsl_hal/Reading\n"
-                             "uint32 sensor  # of the board, from 0\n"
-                             "uint32 backend  # of the sensor, from 0\n"
-                             "uint64 sample_ns  # monotonic\n"
-                             "float64[] values  # NaN: not told\n" FCSL_SCHEMA_HEADER;
+static const char SCHEMA[] =
+    "std_msgs/Header header\n"
+    "uint64 tick\n"
+    "uint64 now_ns  # monotonic time of the tick\n"
+    "Reading[] readings\n" FCSL_SCHEMA_SEPARATOR "MSG: fcsl_hal/Reading\n"
+    "uint32 sensor  # of the board, from 0\n"
+    "uint32 backend  # of the sensor, from 0\n"
+    "uint64 sample_ns  # monotonic\n"
+    "float64[] values  # of the quantities that its kind measures (docs/board.md); NaN: not told\n" FCSL_SCHEMA_HEADER;
 
-int readings_record(readings_t *readings, fcsl_run_t *run, const char *name_space, fcsl_error_t *error)
+/* Those that devices give stand before those that are computed. */
+static uint32_t given_values(const fcsl_sensor_kind_info_t *kind)
+{
+    uint32_t count = 0;
+    for (uint32_t q = 0; q < kind->quantity_count; q++) {
+        count += kind->quantities[q].given ? kind->quantities[q].count : 0u;
+    }
+    return count;
+}
+
+int readings_record(readings_t *readings, const board_plan_t *plan, fcsl_run_t *run, const char *name_space,
+                    fcsl_error_t *error)
 {
     char name[NAME_BYTES];
+    for (uint32_t s = 0; s < plan->sensor_count; s++) {
+        readings->values[s] = given_values(&fcsl_sensor_kinds[plan->sensors[s].config.kind]);
+    }
     const int length = snprintf(name, sizeof name, "%s%s/readings", name_space[0] != '\0' ? "/" : "", name_space);
     if (length < 0 || (size_t)length >= sizeof name) {
         return fcsl_fail(error, "the namespace is too long for the topic of the readings");
@@ -37,13 +52,13 @@ int readings_record(readings_t *readings, fcsl_run_t *run, const char *name_spac
     return readings->topic < 0 ? -1 : 0;
 }
 
-static void put_reading(fcsl_cdr_t *cdr, const sensor_reading_t *kept)
+static void put_reading(fcsl_cdr_t *cdr, const sensor_reading_t *kept, uint32_t values)
 {
     fcsl_cdr_u32(cdr, kept->sensor);
     fcsl_cdr_u32(cdr, kept->reading.backend);
     fcsl_cdr_u64(cdr, kept->reading.sample_ns);
-    fcsl_cdr_u32(cdr, FCSL_VALUES_MAX);
-    for (uint32_t i = 0; i < FCSL_VALUES_MAX; i++) {
+    fcsl_cdr_u32(cdr, values);
+    for (uint32_t i = 0; i < values; i++) {
         uint64_t bits = 0;
         memcpy(&bits, &kept->reading.values[i], sizeof bits);
         fcsl_cdr_u64(cdr, bits);
@@ -62,7 +77,7 @@ void readings_end_tick(readings_t *readings, fcsl_run_t *run, uint64_t now_ns)
         fcsl_cdr_u64(&cdr, now_ns);
         fcsl_cdr_u32(&cdr, readings->count);
         for (uint32_t i = 0; i < readings->count; i++) {
-            put_reading(&cdr, &readings->kept[i]);
+            put_reading(&cdr, &readings->kept[i], readings->values[readings->kept[i].sensor]);
         }
         (void)fcsl_run_record_write(run, readings->topic, time_ns, readings->cdr, (uint32_t)fcsl_cdr_end(&cdr), &error);
     }

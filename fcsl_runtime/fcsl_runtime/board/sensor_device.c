@@ -9,7 +9,6 @@
 #include <errno.h>
 #include <math.h>
 #include <pthread.h>
-#include <semaphore.h>
 #include <signal.h>
 #include <stdatomic.h>
 #include <stdio.h>
@@ -25,6 +24,8 @@ enum { NEWS_BYTES = 512, STACK_BYTES = 256 << 10 };
 static const uint64_t LOOK_AGAIN_NS = 500000000u; /* for a device that is not there */
 static const uint64_t FAILED_NS = 10000000u; /* after a read that failed, of a driver that waits */
 static const uint64_t END_NS = 1000000000u;
+static const uint64_t AHEAD_NS = 1000000u; /* a sample that is further in the future has a wrong time */
+static const uint64_t NEWS_NS = 1000000000u; /* between two texts for people */
 
 typedef enum { DEVICE_MISSING, DEVICE_OPEN, DEVICE_FAILING } condition_t;
 
@@ -42,6 +43,7 @@ struct sensor_device {
     int started;
     atomic_int over;
     sem_t wake;
+    sem_t *posted; /* null: nobody waits for samples */
 
     device_sample_t ring[DEVICE_RING_SAMPLES];
     _Atomic uint64_t written;
@@ -55,6 +57,7 @@ struct sensor_device {
     pthread_mutex_t reason_lock; /* the step thread only tries it */
     char reason[DEVICE_REASON_BYTES];
     condition_t told;
+    uint64_t told_ns;
     char news[NEWS_BYTES];
 };
 
@@ -158,34 +161,6 @@ static int open_device(sensor_device_t *device, char *why, size_t size)
     return (int)status;
 }
 
-#define SCALAR(type_)                                                                                                  \
-    {                                                                                                                  \
-        type_ value;                                                                                                   \
-        memcpy(&value, bytes, sizeof value);                                                                           \
-        return (double)value;                                                                                          \
-    }
-
-/* A scalar of fcsl_type_t, FCSL_BOOL to FCSL_F64. */
-static double scalar_at(const uint8_t *bytes, uint8_t type)
-{
-    switch (type) {
-    case FCSL_I32:
-        SCALAR(int32_t)
-    case FCSL_I64:
-        SCALAR(int64_t)
-    case FCSL_U32:
-        SCALAR(uint32_t)
-    case FCSL_U64:
-        SCALAR(uint64_t)
-    case FCSL_F32:
-        SCALAR(float)
-    case FCSL_F64:
-        SCALAR(double)
-    default:
-        SCALAR(uint8_t)
-    }
-}
-
 static void keep_sample(sensor_device_t *device, uint64_t sample_ns)
 {
     const fcsl_driver_t *driver = device->driver;
@@ -201,11 +176,14 @@ static void keep_sample(sensor_device_t *device, uint64_t sample_ns)
         const size_t scalar = fcsl_scalar_size(signal->type);
         for (uint32_t i = 0; device->used[s] != FCSL_DRIVER_UNUSED && i < signal->count; i++) {
             sample->values[device->at[s] + i] =
-                scalar_at((const uint8_t *)device->state + signal->offset + i * scalar, signal->type);
+                fcsl_scalar_as_double((const uint8_t *)device->state + signal->offset + i * scalar, signal->type);
         }
     }
     atomic_store_explicit(&device->written, written + 1u, memory_order_release);
     atomic_fetch_add_explicit(&device->samples, 1, memory_order_relaxed);
+    if (device->posted != NULL) {
+        (void)sem_post(device->posted);
+    }
 }
 
 /* Reads once. Returns how long to wait before the next read of a driver that waits by itself. */
@@ -213,8 +191,12 @@ static uint64_t read_device(sensor_device_t *device)
 {
     char why[DEVICE_REASON_BYTES] = "";
     uint64_t sample_ns = 0;
-    const fcsl_driver_status_t status = device->driver->read(device->state, &sample_ns, why, sizeof why);
+    fcsl_driver_status_t status = device->driver->read(device->state, &sample_ns, why, sizeof why);
     why[sizeof why - 1u] = '\0';
+    if (status == FCSL_DRIVER_OK && sample_ns > now_ns() + AHEAD_NS) {
+        (void)snprintf(why, sizeof why, "its sample has a time in the future");
+        status = FCSL_DRIVER_FAILED;
+    }
     if (status == FCSL_DRIVER_OK) {
         keep_sample(device, sample_ns);
         if (atomic_load(&device->condition) != DEVICE_OPEN) {
@@ -295,6 +277,11 @@ static int start_thread(sensor_device_t *device)
     return device->started ? 0 : -1;
 }
 
+void sensor_device_post(sensor_device_t *device, sem_t *semaphore)
+{
+    device->posted = semaphore;
+}
+
 int sensor_device_start(sensor_device_t *device, fcsl_error_t *error)
 {
     char why[DEVICE_REASON_BYTES] = "";
@@ -321,6 +308,12 @@ int sensor_device_take(sensor_device_t *device, device_sample_t *sample)
     return 1;
 }
 
+int sensor_device_has_sample(const sensor_device_t *device)
+{
+    return atomic_load_explicit(&device->taken, memory_order_relaxed) !=
+           atomic_load_explicit(&device->written, memory_order_acquire);
+}
+
 device_counts_t sensor_device_counts(const sensor_device_t *device)
 {
     return (device_counts_t){
@@ -336,9 +329,12 @@ const char *sensor_device_news(sensor_device_t *device)
 {
     static const char *const SAY[] = {
         [DEVICE_MISSING] = "is not there: ", [DEVICE_OPEN] = "is there", [DEVICE_FAILING] = "fails: "};
-    if (atomic_load(&device->condition) == (int)device->told || pthread_mutex_trylock(&device->reason_lock) != 0) {
+    const uint64_t now = now_ns();
+    if (atomic_load(&device->condition) == (int)device->told || now - device->told_ns < NEWS_NS ||
+        pthread_mutex_trylock(&device->reason_lock) != 0) {
         return NULL;
     }
+    device->told_ns = now;
     device->told = (condition_t)atomic_load(&device->condition);
     (void)snprintf(device->news, sizeof device->news, "device '%.60s' %s%s", device->plan->name, SAY[device->told],
                    device->told == DEVICE_OPEN ? "" : device->reason);

@@ -6,6 +6,8 @@
 #ifndef BOARD_SENSOR_DEVICE_H
 #define BOARD_SENSOR_DEVICE_H
 
+#include <semaphore.h>
+
 #include "board_plan.h"
 #include "fcsl/fcsl_driver.h"
 
@@ -33,12 +35,16 @@ sensor_device_t *sensor_device_new(const board_device_t *plan, fcsl_error_t *err
  * `error`: no such signal, another unit, or too many. *found: how many elements there are. */
 int sensor_device_use(sensor_device_t *device, const char *signal, const char *unit, fcsl_driver_use_t use,
                       uint32_t count, uint32_t *found, fcsl_error_t *error);
+/* Each sample that it keeps posts the semaphore. Before start. */
+void sensor_device_post(sensor_device_t *device, sem_t *semaphore);
 /* Opens the device and starts its thread. A device that is not there is no error. */
 int sensor_device_start(sensor_device_t *device, fcsl_error_t *error);
 /* From the step thread: the oldest sample that was not taken, 1; or 0. Does not wait. */
 int sensor_device_take(sensor_device_t *device, device_sample_t *sample);
+/* Whether one waits. */
+int sensor_device_has_sample(const sensor_device_t *device);
 device_counts_t sensor_device_counts(const sensor_device_t *device);
-/* Whether the device came, went or began to fail since the last call: a text for people, or null. */
+/* Whether the device came, went or began to fail since the last text: a text for people, once a second at most; or null. */
 const char *sensor_device_news(sensor_device_t *device);
 /* Ends the thread and closes the device. A driver that hangs is left alone after 1 s. */
 void sensor_device_free(sensor_device_t *device);

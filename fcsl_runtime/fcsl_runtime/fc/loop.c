@@ -295,7 +295,7 @@ int loop_run(loop_t *loop)
             loop_serve(loop);
             pacing.anchor_ns = hal->now_ns(hal->ctx);
             pacing.next = 0;
-        } else if (!loop->realtime || keep_time(loop, &pacing)) {
+        } else if (!loop->realtime || hal->paces != FCSL_PACED_BY_HOST || keep_time(loop, &pacing)) {
             /* A simulator may be paused for long: clients are served while it is waited for. */
             const fcsl_hal_status_t sampled = sample(loop);
             if (sampled != FCSL_HAL_WAITING) {

@@ -151,10 +151,10 @@ static int open_hardware(program_t *program)
         return complain(error.text);
     }
     if (program->options.missed_deadline_given && loop->hal.paces) {
-        return complain("--missed-deadline is for ticks that the clock paces; here the simulator paces them");
+        return complain("--missed-deadline is for ticks that the clock paces; here a simulator or a device paces them");
     }
     /* Beside a rig there is but one time. */
-    loop->realtime = (program->options.realtime || loop->hal.serves) && !loop->hal.paces;
+    loop->realtime = (program->options.realtime || loop->hal.serves) && loop->hal.paces != FCSL_PACED_BY_SIMULATOR;
     if (loop->realtime && !program->options.no_overrun_check) {
         /* Only here: in lock-step a clock would make the results depend on the computer. */
         fcsl_run_set_clock(loop->run, fcsl_run_monotonic_ns, NULL);
@@ -261,9 +261,11 @@ static int start_threads(program_t *program)
 static void announce(const program_t *program)
 {
     const fcsl_machine_t *machine = fcsl_run_machine(program->loop.run);
-    const char *pace = program->loop.hal.paces  ? "paced by the simulator"
-                       : program->loop.realtime ? "real time"
-                                                : "as fast as possible";
+    static const char *const PACES[] = {[FCSL_PACED_BY_HOST] = "as fast as possible",
+                                        [FCSL_PACED_BY_SIMULATOR] = "paced by the simulator",
+                                        [FCSL_PACED_BY_DEVICE] = "paced by a device"};
+    const fcsl_pacer_t paces = program->loop.hal.paces;
+    const char *pace = paces == FCSL_PACED_BY_HOST && program->loop.realtime ? "real time" : PACES[paces];
     const int timed = program->loop.realtime && !program->options.no_overrun_check;
     log_info("machine '%s', %" PRIu64 " Hz, HAL %s, %s%s%s", machine->name, machine->tick_hz,
              program->options.peer != NULL ? program->options.peer : "stub", pace, timed ? "" : ", executes not timed",

@@ -19,7 +19,7 @@ static fcsl_vars_status_t restore(void *ctx, const void *data, const fcsl_hw_sim
     const fcsl_machine_t *machine = fcsl_run_machine(loop->run);
     uint64_t tick = 0;
     memcpy(&tick, (const uint8_t *)data + machine->tick_offset, sizeof tick);
-    if (loop->hal.paces && tick != fcsl_run_tick(loop->run)) {
+    if (loop->hal.paces == FCSL_PACED_BY_SIMULATOR && tick != fcsl_run_tick(loop->run)) {
         (void)snprintf(error->text, sizeof error->text,
                        "the checkpoint is of tick %" PRIu64 ", and the simulator of this lock-step is at tick %" PRIu64
                        ": only one of this very tick can be restored",

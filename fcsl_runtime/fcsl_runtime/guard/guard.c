@@ -2,16 +2,14 @@
  *
  * What the guard does in a period.
  */
-#define _POSIX_C_SOURCE 200809L
 #include "guard.h"
 
 #include <stdlib.h>
 #include <string.h>
-#include <time.h>
 
 #include "base/error.h"
 
-static const uint64_t END_NS = 2000000000u; /* for how long the last safe values are tried */
+static const uint64_t SAFE_NS = 2000000000u; /* for how long safe values are waited for */
 
 int guard_check_machine(const fcsl_machine_t *machine, fcsl_error_t *error)
 {
@@ -98,28 +96,16 @@ void guard_period(guard_t *guard)
     const fcsl_gate_state_t before = guard->gate.state;
     look_at_programs(guard);
     take_command(guard);
-    fcsl_gate_wait(&guard->gate, fcsl_run_monotonic_ns(NULL), guard->data);
+    const uint64_t now_ns = fcsl_run_monotonic_ns(NULL);
+    fcsl_gate_wait(&guard->gate, now_ns, guard->data);
     guard->changes += guard->gate.state != before;
     guard->silences += guard->gate.state != before && guard->gate.state == FCSL_GATE_SILENT;
-    (void)outputs_write(&guard->outputs, guard->data);
+    outputs_put(&guard->outputs, guard->data, guard->gate.state == FCSL_GATE_ARMED, now_ns);
     guard->periods++;
 }
 
-uint32_t guard_make_safe(guard_t *guard)
+uint32_t guard_make_safe(guard_t *guard, uint64_t period_ns)
 {
     guard->gate = fcsl_gate(guard->machine, guard->data);
-    return outputs_write(&guard->outputs, guard->data);
-}
-
-uint32_t guard_end(guard_t *guard, uint64_t period_ns)
-{
-    const struct timespec period = {.tv_sec = (time_t)(period_ns / 1000000000u),
-                                    .tv_nsec = (long)(period_ns % 1000000000u)};
-    const uint64_t end_ns = fcsl_run_monotonic_ns(NULL) + END_NS;
-    uint32_t failed = guard_make_safe(guard);
-    while (failed > 0u && fcsl_run_monotonic_ns(NULL) < end_ns) {
-        (void)nanosleep(&period, NULL);
-        failed = guard_make_safe(guard);
-    }
-    return failed;
+    return outputs_make_safe(&guard->outputs, guard->data, period_ns, SAFE_NS);
 }

@@ -1,6 +1,6 @@
 /* SPDX-License-Identifier: Apache-2.0
  *
- * One period of the guard: takes a command from the slot, passes it through the gate, writes the actuators.
+ * One period of the guard: takes a command from the slot, passes it through the gate, hands it to the actuators.
  */
 #ifndef GUARD_GUARD_H
 #define GUARD_GUARD_H
@@ -36,9 +36,8 @@ int guard_open(guard_t *guard, const fcsl_machine_t *machine, fcsl_error_t *erro
 void guard_free(guard_t *guard);
 
 void guard_period(guard_t *guard);
-/* Writes the safe values, whatever was commanded. Returns how many devices did not take them. */
-uint32_t guard_make_safe(guard_t *guard);
-/* The last writes: the safe values, every period until all devices have taken them, for 2 s at most. Returns how many have not. */
-uint32_t guard_end(guard_t *guard, uint64_t period_ns);
+/* Closes the gate and waits until all devices have taken their safe values, which they get every period until then, for 2 s at most.
+ * Returns how many have not taken them. */
+uint32_t guard_make_safe(guard_t *guard, uint64_t period_ns);
 
 #endif /* GUARD_GUARD_H */

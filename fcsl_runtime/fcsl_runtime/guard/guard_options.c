@@ -16,6 +16,7 @@
 
 static const char USAGE[] =
     "usage: fcsl-guard LIBRARY.so --slot PATH --actuator CHANNEL=DRIVER ... [options]\n"
+    "       fcsl-guard LIBRARY.so --slot PATH --board PLAN [options]\n"
     "Owns the actuators of a machine: they get the commands of fcsl-fc --guard PATH while it arms them, and their "
     "safe\n"
     "values when it disarms them or falls silent (docs/guard.md).\n"
@@ -25,6 +26,7 @@ static const char USAGE[] =
     "                          what drives an actuator channel; once for each. DRIVER is NAME or LIBRARY.so:NAME\n"
     "                          (docs/drivers.md). Without SIGNAL: the driver's only signal of the channel's type\n"
     "  --actuator CHANNEL=none nothing drives it\n"
+    "  --board PLAN            the outputs of a board's plan drive every actuator channel, in the place of --actuator\n"
     "  --machine NAME          which machine, when the library holds several\n"
     "  --period-ms N           every N ms the actuators are written (default 2)\n"
     "  --realtime-priority N   SCHED_FIFO, 1 to 99: above that of the flight program\n"
@@ -33,10 +35,11 @@ static const char USAGE[] =
     "  --help\n";
 
 enum { PERIOD_MS = 2, PERIOD_MS_MAX = 1000, PRIORITY_MAX = 99 };
-enum { ACTUATOR = 1, MACHINE, SLOT, PERIOD, PRIORITY, LOCK_MEMORY, VERSION, HELP };
+enum { ACTUATOR = 1, BOARD, MACHINE, SLOT, PERIOD, PRIORITY, LOCK_MEMORY, VERSION, HELP };
 
 static const struct option OPTIONS[] = {
     {"actuator", required_argument, NULL, ACTUATOR},
+    {"board", required_argument, NULL, BOARD},
     {"machine", required_argument, NULL, MACHINE},
     {"slot", required_argument, NULL, SLOT},
     {"period-ms", required_argument, NULL, PERIOD},
@@ -52,6 +55,9 @@ static int read_option(int option, const char *text, options_t *options)
     switch (option) {
     case ACTUATOR:
         options->actuators[options->actuator_count++] = text;
+        return 0;
+    case BOARD:
+        options->board = text;
         return 0;
     case MACHINE:
         options->machine = text;
@@ -97,6 +103,9 @@ int options_read(int argc, char **argv, options_t *options)
     }
     if (options->slot == NULL) {
         return usage_error("--slot PATH is missing: where fcsl-fc --guard PATH gets the slot for its commands", "");
+    }
+    if (options->board != NULL && options->actuator_count > 0u) {
+        return usage_error("--board with --actuator: the board's plan says what drives every actuator channel", "");
     }
     return 0;
 }

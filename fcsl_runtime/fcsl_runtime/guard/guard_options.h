@@ -10,6 +10,7 @@ typedef struct {
     const char *slot;    /* path of the socket on which the flight program gets the slot */
     const char **actuators; /* texts of --actuator */
     uint32_t actuator_count;
+    const char *board; /* file of the board's plan, in the place of actuators; null: none */
     uint64_t period_ms;
     uint64_t priority; /* of SCHED_FIFO; 0: as started */
     int lock_memory;

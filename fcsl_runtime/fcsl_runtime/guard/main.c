@@ -25,7 +25,8 @@ typedef struct {
     options_t options;
     realtime_t realtime;
     void *library;
-    plan_entry_t *plan;
+    plan_entry_t *plan; /* of --actuator */
+    board_plan_t *board; /* of --board */
     guard_t guard;
     report_t report;
 } program_t;
@@ -94,25 +95,48 @@ static int open_machine(program_t *program, fcsl_error_t *error)
     return guard_open(&program->guard, machine, error);
 }
 
+static int add_actuators(program_t *program, fcsl_error_t *error)
+{
+    const options_t *options = &program->options;
+    guard_t *guard = &program->guard;
+    const uint32_t count = options->actuator_count;
+    program->plan = calloc((size_t)count + 1u, sizeof *program->plan);
+    if (program->plan == NULL) {
+        return fcsl_fail(error, "out of memory for the plan");
+    }
+    return plan_read(guard->machine, options->actuators, count, program->plan, error) == 0 &&
+                   outputs_open(&guard->outputs, guard->machine, count, count, error) == 0 &&
+                   outputs_add_actuators(&guard->outputs, program->plan, count, error) == 0
+               ? 0
+               : -1;
+}
+
+static int add_board(program_t *program, fcsl_error_t *error)
+{
+    const char *file = program->options.board;
+    guard_t *guard = &program->guard;
+    program->board = board_plan_read(file, error);
+    return program->board != NULL &&
+                   outputs_open(&guard->outputs, guard->machine, BOARD_OUTPUTS_MAX,
+                                BOARD_OUTPUTS_MAX * BOARD_PULSES_MAX, error) == 0 &&
+                   outputs_add_board(&guard->outputs, program->board, file, error) == 0
+               ? 0
+               : -1;
+}
+
 static int open_outputs(program_t *program, fcsl_error_t *error)
 {
     const options_t *options = &program->options;
     guard_t *guard = &program->guard;
-    program->plan = calloc(options->actuator_count + 1u, sizeof *program->plan);
-    if (program->plan == NULL) {
-        return fcsl_fail(error, "out of memory for the plan");
-    }
-    if (plan_read(guard->machine, options->actuators, options->actuator_count, program->plan, error) != 0) {
+    if ((options->board != NULL ? add_board(program, error) : add_actuators(program, error)) != 0) {
         return -1;
     }
-    if (outputs_open(guard->machine, program->plan, options->actuator_count, &guard->outputs, error) != 0) {
-        /* The devices that are there may still do what a guard that died has left. */
-        (void)guard_end(guard, period_of(options));
-        return -1;
-    }
-    /* Before a flight program gets the slot. */
-    (void)guard_make_safe(guard);
-    return 0;
+    const int status =
+        outputs_start(&guard->outputs, program->realtime.priority, guard->machine->command_timeout_ns, error);
+    /* Before a flight program gets the slot. Where a device cannot be opened, the others may still do what a guard that died has
+     * left. */
+    (void)guard_make_safe(guard, period_of(options));
+    return status;
 }
 
 static int open_all(program_t *program)
@@ -142,6 +166,12 @@ static void announce(const program_t *program)
     for (uint32_t i = 0; i < program->options.actuator_count; i++) {
         log_info("actuator %s", program->options.actuators[i]);
     }
+    for (uint32_t i = 0; program->board != NULL && i < guard->outputs.binding_count; i++) {
+        const output_binding_t *binding = &guard->outputs.bindings[i];
+        log_info("actuator %s[%" PRIu32 "]=%s.%s:%s", binding->channel->name, binding->rule->index,
+                 output_device_driver_name(binding->device), binding->rule->signal,
+                 output_device_address(binding->device));
+    }
 }
 
 /* Sleeps to the next due time; those that have passed are missed. */
@@ -169,7 +199,7 @@ static int run(program_t *program)
         report_changes(&program->report, &program->guard, fcsl_run_monotonic_ns(NULL));
         wait_period(program, period_ns, &due_ns);
     }
-    const uint32_t failed = guard_end(&program->guard, period_ns);
+    const uint32_t failed = guard_make_safe(&program->guard, period_ns);
     report_end(&program->guard);
     if (failed > 0u) {
         print_error("%" PRIu32 " of %" PRIu32 " devices did not take their safe values at the end", failed,
@@ -182,12 +212,13 @@ static int run(program_t *program)
 
 static void close_all(program_t *program)
 {
-    /* The devices first: a driver may still have to bring them their safe values. */
+    /* The devices first: one that was late may still take its safe values. */
     outputs_close(&program->guard.outputs);
     fcsl_guard_unlisten(&program->guard.server);
     printing_end();
     guard_free(&program->guard);
     free(program->plan);
+    board_plan_free(program->board);
     options_free(&program->options);
     if (program->library != NULL) {
         (void)dlclose(program->library);

@@ -41,12 +41,14 @@ static void report_program(int32_t before, int32_t now)
 static void report_missed(const outputs_t *outputs)
 {
     for (uint32_t i = 0; i < outputs->device_count; i++) {
-        const output_device_t *device = &outputs->devices[i];
-        if (device->missed > 0u) {
+        output_device_t *device = outputs->devices[i];
+        const uint64_t missed = output_device_missed(device);
+        if (missed > 0u) {
+            const char *reason = output_device_reason(device);
             /* What may be long stands last: a line that is too long loses its end. */
             print_error("a device did not take a write: %s (%" PRIu64 " so far): device '%s' of driver '%s'",
-                        device->reason[0] != '\0' ? device->reason : "the driver gives no reason", device->missed,
-                        device->device, device->name);
+                        reason[0] != '\0' ? reason : "the driver gives no reason", missed,
+                        output_device_address(device), output_device_driver_name(device));
         }
     }
 }

@@ -129,7 +129,7 @@ PLANS = {
     "cart.forc=log": "machine 'guarded' has no such channel; its actuators are: cart.force, panel.valve",
     "panel.gauge=log": "channel 'panel.gauge' is a sensor",
     "panel.valve=log": "channel 'panel.valve' has two --actuator",
-    "cart.force=logg:T/x": "no driver 'logg' comes with FCSL; there is: log (actuator). One of a library is LIBRARY.so:NAME",
+    "cart.force=logg:T/x": "no driver 'logg' comes with FCSL; there is: log (actuator)",
     "cart.force=T/no.so:arm": "cannot load driver library: ",
     "cart.force=M:arm": "is not a driver library: it has no symbol fcsl_drivers",
     "cart.force=D:leg": "holds no driver 'leg'; it holds: arm (actuator), metres (actuator), tiny (actuator), gauge (sensor)",
@@ -168,7 +168,7 @@ def test_two_channels_of_one_signal(build_guarded: Callable[..., Path], drivers:
 
 #: Macro → what is wrong with the driver `arm`.
 DEFECTS = {
-    "ABI=7": "driver ABI 7, this program has 1: compile the drivers again",
+    "ABI=7": "driver ABI 7, this program has 2: compile the drivers again",
     "SIGNALS=0": "driver 'arm': it has no signals, or too many",
     "STATE=8": "a signal lacks its name, unit, doc or type, or lies outside the state",
     "STATE=0": "its state_size or state_align is impossible",

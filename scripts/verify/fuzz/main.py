@@ -43,8 +43,8 @@ FLAGS = (
     *(f"-fsanitize={SANITIZE}", "-fno-sanitize-recover=all"),
 )
 _NATIVE = (
-    "fcsl_hal/src",
-    *(f"fcsl_runtime/fcsl_runtime/{folder}" for folder in ("src/*", "fc", "observers", "ros_graph")),
+    *("fcsl_hal/src", "fcsl_hal/src/*"),
+    *(f"fcsl_runtime/fcsl_runtime/{folder}" for folder in ("src/*", "fc", "observers", "ros_graph", "board")),
     "fcsl_sim/src",
 )
 _INCLUDES = (
@@ -55,6 +55,7 @@ _INCLUDES = (
         "fcsl_runtime/fcsl_runtime/src",
         "fcsl_runtime/fcsl_runtime/src/*/",
         "fcsl_runtime/fcsl_runtime/fc",
+        "fcsl_runtime/fcsl_runtime/board",
     ),
     *("fcsl_runtime/fcsl_runtime/test", "fcsl_hal/test", "fcsl_sim/src"),
 )

@@ -59,8 +59,15 @@ TARGETS = (
         "receivers",
         "streams of UBX, NMEA 0183, SBUS and CRSF",
         "serial lines",
-        Defect(f"{_HAL}/gnss_nmea.c", "} else if (sentence.count < FIELDS_MAX) {", "} else if (1) {"),
+        Defect(f"{_HAL}/receivers/gnss_nmea.c", "} else if (sentence.count < FIELDS_MAX) {", "} else if (1) {"),
         longest=2048,
+    ),
+    Target(
+        "board",
+        "plans of boards, and readings of their devices",
+        "file, devices",
+        Defect("fcsl_runtime/fcsl_runtime/board/board_plan.c", "FCSL_STICKS_MAX - 1u, &i", "UINT16_MAX, &i"),
+        longest=8192,
     ),
     Target(
         "guard_slot",

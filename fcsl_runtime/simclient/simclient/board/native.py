@@ -49,6 +49,8 @@ _PROTOTYPES: dict[str, tuple[type | None, list[type]]] = {
     "board_condition": (c_int, [ptr, c_uint32, c_uint32]),
     "board_close": (None, [ptr]),
     "board_plan": (ptr, [ptr]),
+    "board_plan_read": (ptr, [c_char_p, _ERROR]),
+    "board_plan_free": (None, [ptr]),
     "board_devices_new": (ptr, [ptr, _ERROR]),
     "board_devices_start": (c_int, [ptr, _ERROR]),
     "board_devices_take": (c_uint32, [ptr, POINTER(CSensorReading), c_uint32]),
