@@ -256,6 +256,7 @@ def test_a_device_that_is_not_there_comes_later(craft: Craft, fly: Callable[...,
     flight.until_value("hal.devices.top.open", 1)
     flight.until_value("hal.sensors.imu.condition.top", 0)
     assert flight.get("hal.sensors.imu.primary") == 2
+    until(lambda: flight.get("hal.devices.top.samples") > 400)  # a device has one text a second
     said = flight.end()
     assert re.search(r"device 'top' is not there: .*imu-top", said) and "device 'top' is there" in said
 

@@ -20,6 +20,7 @@ PROGRAMS = {
     "fcsl-fc": "fcsl_runtime/fcsl_runtime",
     "fcsl-guard": "fcsl_runtime/fcsl_runtime",
     "fcsl-bus": "fcsl_runtime/simclient",
+    "fcsl-hal": "fcsl_runtime/simclient",
     "fcsl-var": "fcsl_runtime/simclient",
     "fcsl-link": "fcsl_runtime/simclient",
     "fcsl-view": "fcsl_runtime/simclient",

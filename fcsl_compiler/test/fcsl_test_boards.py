@@ -18,10 +18,14 @@ LAW = """class Law:
         "count": "i32",
         "range": "f64 m",
     }
-    outputs = {"force": "f64 N"}
+    outputs = {"force": "f64 N", "motors": "f32[2]", "many": "f64[17]", "ready": "bool", "steps": "i32[2]"}
     def execute(self):
         x = self.gyro[0] + f64(self.accel[0]) + self.angle[0] + self.pressure + self.sticks[0] + self.failsafe
         self.force = x + self.voltage + self.range + f64(self.count)
+        self.motors = [f32(self.force), f32(x)]
+        self.many[0] = x
+        self.ready = x > 0.0
+        self.steps[0] = self.count
 """
 
 
@@ -50,6 +54,7 @@ MACHINE: dict[str, Any] = {
         _channel(6, "rc.failsafe", "failsafe"),
         _channel(7, "battery.voltage", "voltage"),
         {"name": "force", "id": 8, "field": "law.outputs.force", "direction": "actuator"},
+        {"name": "motors", "id": 9, "field": "law.outputs.motors", "direction": "actuator", "safe": [0.25, -1.5]},
     ],
 }
 
@@ -65,6 +70,8 @@ BOARD: dict[str, Any] = {
         "receiver": {"driver": "sbus", "device": "/dev/ttyS1"},
         "cells": {"driver": "libcells.so:cells", "device": "i2c-1"},
         "bmp": {"driver": "iio", "device": "bmp280", "rate_hz": 3},
+        "esc": {"driver": "pwm", "device": "pwmchip0"},
+        "valve": {"driver": "./libvalve.so:valve", "device": "/dev/valve"},
     },
     "sensors": {
         "imu": {
@@ -113,6 +120,20 @@ BOARD: dict[str, Any] = {
         },
         "battery": {"kind": "battery", "channels": {"voltage": "battery.voltage"}, "backends": [{"device": "cells"}]},
         "baro": {"kind": "barometer", "channels": {"pressure": "baro.pressure"}, "backends": [{"device": "bmp"}]},
+    },
+    "pace": {"device": "imu_top", "timeout_s": 0.05},
+    "outputs": {
+        "motors": {
+            "device": "esc",
+            "elements": [
+                {"signal": "pulse0", "command": [0, 1], "output": [1000, 1400, 2000], "slew_per_s": 4000},
+                {"signal": "pulse1", "output": [1900, 1100], "safe_output": 0},
+            ],
+        },
+        "force": {
+            "device": "valve",
+            "elements": [{"signal": "opening", "command": [-10, 30], "output": [0, 1], "safe_output": 0.5}],
+        },
     },
 }
 

@@ -844,6 +844,7 @@ CONFIGS: dict[str, str] = {
     "E103 outside the folder": put("algorithms", "Alg", "source", value="../alg.py"),
     "E103 a package": put("algorithms", "Alg", "source", value="package://nowhere/alg.py"),
     "E104 a simulation": json.dumps({"controller": {"machine": "lander.json"}, "models": {}}),
+    "E105 a board": json.dumps({"machine": "lander.json", "devices": {}, "sensors": {}}),
     "E201 a key": put("tick_hertz", value=1),
     "E201 a misspelt request": edge(reqest="GO"),
     "E202 a missing key": patch(lambda c: c.pop("states")),

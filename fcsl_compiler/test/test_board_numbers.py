@@ -1,14 +1,17 @@
 # SPDX-License-Identifier: Apache-2.0
 """Rotations, corrections and filters of boards against SciPy."""
 
+import ctypes
 import math
+import subprocess
+from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 import pytest
 from fcsl_test_boards import edited, write_board, write_machine
-from hypothesis import given, settings
+from hypothesis import example, given, settings
 from hypothesis import strategies as st
 from scipy import signal
 from scipy.spatial.transform import Rotation
@@ -16,7 +19,9 @@ from scipy.spatial.transform import Rotation
 from fcsl_compiler.board.board import check_board
 from fcsl_compiler.board.corrections import Correction
 from fcsl_compiler.board.filters import Section, low_pass, notch
+from fcsl_compiler.board.pulses import MAX_NUMBER, Line
 from fcsl_compiler.board.rotations import IDENTITY, NAMED, determinant, from_angles, matrix_problem
+from fcsl_compiler.driver.toolchain import compiler
 
 TOP = ("sensors", "imu", "backends", 0)
 angles = st.floats(-180.0, 180.0)
@@ -183,3 +188,69 @@ def test_sections_of_a_backend(tmp_path: Path) -> None:
             ("accel", low_pass(40.0, rate_hz)),
             ("gyro", notch(120.0, 20.0, rate_hz)),
         )
+
+
+# ---- outputs ---------------------------------------------------------------------------------------------------------
+
+ROOT = Path(__file__).parents[2]
+RUNTIME = ROOT / "fcsl_runtime" / "fcsl_runtime"
+INCLUDES = (RUNTIME, RUNTIME / "include", ROOT / "fcsl_hal" / "include", ROOT / "fcsl_compiler" / "include")
+numbers = st.floats(-MAX_NUMBER, MAX_NUMBER)
+
+
+class RuntimePulse(ctypes.Structure):
+    """board_pulse_t."""
+
+    _fields_ = [
+        ("signal", ctypes.c_char_p),
+        ("index", ctypes.c_uint32),
+        *((name, ctypes.c_double) for name in ("low", "high", "minimum", "middle", "maximum", "slew", "safe")),
+    ]
+
+
+@pytest.fixture(scope="module")
+def runtime(tmp_path_factory: pytest.TempPathFactory) -> Callable[[Line, float], float]:
+    """The pulse of a command as the guard computes it."""
+    library = tmp_path_factory.mktemp("map") / "map.so"
+    source = RUNTIME / "board" / "output_map.c"
+    options = ["-std=c11", "-O2", "-shared", "-fPIC", *(f"-I{folder}" for folder in INCLUDES)]
+    subprocess.run([*compiler(), *options, str(source), "-o", str(library), "-lm"], check=True)
+    functions = ctypes.CDLL(str(library))
+    functions.output_map_pulse.restype = ctypes.c_double
+    functions.output_map_flaw.restype = ctypes.c_char_p
+
+    def pulse(line: Line, command: float) -> float:
+        rule = RuntimePulse(b"", 0, line.low, line.high, line.minimum, line.middle, line.maximum, 0.0, line.middle)
+        assert functions.output_map_flaw(ctypes.byref(rule)) is None
+        return float(functions.output_map_pulse(ctypes.byref(rule), ctypes.c_double(command)))
+
+    return pulse
+
+
+@settings(max_examples=500)
+@given(
+    st.tuples(numbers, numbers).filter(lambda ends: ends[0] != ends[1]),
+    st.tuples(numbers, numbers, numbers),
+    st.booleans(),
+    numbers,
+)
+@example(ends=(-1.0, 1.0), outputs=(952.9, 2043.8, 2100.0), is_reversed=False, command=-1e-17)  # rounds beyond its end
+def test_outputs_are_those_of_the_runtime(
+    runtime: Callable[[Line, float], float],
+    ends: tuple[float, float],
+    outputs: tuple[float, ...],
+    is_reversed: bool,
+    command: float,
+) -> None:
+    line = Line(*sorted(ends), *sorted(outputs, reverse=is_reversed))
+    for value in (command, *ends, line.low + 0.3 * (line.high - line.low)):
+        assert line.at(value) == runtime(line, value)
+        assert line.contains(line.at(value))
+
+
+@pytest.mark.parametrize(
+    ("command", "output"),
+    [(-5.0, 1900.0), (-1.0, 1900.0), (-0.5, 1650.0), (0.0, 1400.0), (0.5, 1250.0), (1.0, 1100.0), (7.0, 1100.0)],
+)
+def test_an_output_with_a_trim(command: float, output: float) -> None:
+    assert Line(-1.0, 1.0, 1900.0, 1400.0, 1100.0).at(command) == output

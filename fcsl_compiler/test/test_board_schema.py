@@ -14,7 +14,7 @@ from test_schema import mutants
 
 from fcsl_compiler.base.ament import package_share
 from fcsl_compiler.base.diagnostics import DiagnosticError
-from fcsl_compiler.board import devices, health, limits
+from fcsl_compiler.board import devices, health, limits, pulses
 from fcsl_compiler.board import machine as board_machine
 from fcsl_compiler.board.board import SCHEMA, check_board
 from fcsl_compiler.board.kinds import KINDS, MAX_BACKENDS, MAX_SECTIONS, STICKS
@@ -35,6 +35,8 @@ OBJECTS = {
     "a stick": ("$defs", "stick"),
     "`health`": ("$defs", "health"),
     "a notch": ("$defs", "notch"),
+    r"output `\w+`": ("$defs", "output"),
+    "an element": ("$defs", "element"),
 }
 
 
@@ -101,6 +103,12 @@ def test_words_and_limits_are_the_compilers() -> None:
     assert sensor["notch"]["additionalProperties"]["maxItems"] == MAX_SECTIONS
     assert top["devices"]["maxProperties"] == limits.MAX_DEVICES
     assert top["sensors"]["maxProperties"] == limits.MAX_SENSORS
+    assert top["outputs"]["maxProperties"] == limits.MAX_OUTPUTS
+    assert defs["output"]["properties"]["elements"]["maxItems"] == limits.MAX_PULSES
+    assert defs["number"]["maximum"] == -defs["number"]["minimum"] == pulses.MAX_NUMBER
+    element = defs["element"]["properties"]
+    assert element["slew_per_s"]["maximum"] == pulses.MAX_NUMBER
+    assert element["signal"]["maxLength"] == limits.MAX_PLAN_NAME
     assert defs["name"]["maxLength"] == backend["signals"]["additionalProperties"]["maxLength"] == limits.MAX_PLAN_NAME
     assert defs["text"]["maxLength"] == limits.MAX_TEXT
     age = defs["health"]["properties"]["max_age_s"]

@@ -82,12 +82,13 @@ static void check_other_units(void)
     CHECK(is_near(value_at(&rig, "temperature", 0), 23.0)); /* raw before input */
     CHECK(is_near(value_at(&rig, "distance", 0), 1.234));
     rig_close(&rig);
-    CHECK(rig_open(&rig, iio, "ads1115", "voltage") == FCSL_DRIVER_OK);
+    CHECK(rig_open(&rig, iio, "ads1115", "voltage0 voltage1 voltage6? voltage7") == FCSL_DRIVER_OK);
     CHECK(rig_read(&rig) == FCSL_DRIVER_OK);
-    CHECK(is_near(value_at(&rig, "voltage", 0), 0.125) && is_near(value_at(&rig, "voltage", 1), -4.096));
-    CHECK(isnan(value_at(&rig, "voltage", 2)) && isnan(value_at(&rig, "voltage", 6)));
-    CHECK(is_near(value_at(&rig, "voltage", 7), 3.3));
+    CHECK(is_near(value_at(&rig, "voltage0", 0), 0.125) && is_near(value_at(&rig, "voltage1", 0), -4.096));
+    CHECK(value_at(&rig, "voltage2", 0) == 0.0); /* not used */
+    CHECK(isnan(value_at(&rig, "voltage6", 0)) && is_near(value_at(&rig, "voltage7", 0), 3.3));
     rig_close(&rig);
+    CHECK(rig_open_fails(iio, "ads1115", "voltage1 voltage2", FCSL_DRIVER_FAILED, "no channel for voltage2"));
 }
 
 static void check_samples(void)
@@ -121,7 +122,7 @@ static void check_missing_channels(void)
 {
     CHECK(rig_open_fails(iio, "bmp390", "pressure gyro", FCSL_DRIVER_FAILED, "no channel for gyro"));
     /* Without a scale, a proximity is no distance. */
-    CHECK(rig_open_fails(iio, "ads1115", "voltage distance", FCSL_DRIVER_FAILED, "no channel for distance"));
+    CHECK(rig_open_fails(iio, "ads1115", "voltage0 distance", FCSL_DRIVER_FAILED, "no channel for distance"));
     CHECK(rig_open_fails(iio, in_tree("bus"), "accel", FCSL_DRIVER_FAILED, "no channel for accel"));
     rig_t rig;
     CHECK(rig_open(&rig, iio, "bmp390", "pressure gyro? temperature?") == FCSL_DRIVER_OK);
@@ -144,6 +145,26 @@ static void check_ambiguous_names(void)
     CHECK(probes(iio, "bmp390", FCSL_DRIVER_FAILED, "more than one"));
     remove_below("bus/iio/devices/iio:device5");
     CHECK(probes(iio, "bmp390", FCSL_DRIVER_OK, ""));
+}
+
+/* Two chips of one kind differ by their places on the bus. */
+static void check_places(void)
+{
+    static const char *const LINKS[] = {"bus/iio/devices/iio:device6", "bus/iio/devices/iio:device7"};
+    static const char *const TARGETS[] = {"../../../devices/i2c-1/1-0068/iio:device6",
+                                          "../../../devices/i2c-1/1-0069/iio:device7"};
+    put("devices/i2c-1/1-0068/iio:device6/name", "bmi160\n");
+    put("devices/i2c-1/1-0069/iio:device7/name", "bmi160\n");
+    put("devices/i2c-1/1-0069/iio:device7/in_temp_input", "5000\n");
+    CHECK(symlink(TARGETS[0], in_tree(LINKS[0])) == 0 && symlink(TARGETS[1], in_tree(LINKS[1])) == 0);
+    CHECK(probes(iio, "bmi160", FCSL_DRIVER_FAILED, "its place on the bus"));
+    CHECK(probes(iio, "1-0068", FCSL_DRIVER_OK, "") && probes(iio, "1-006a", FCSL_DRIVER_ABSENT, "there are: "));
+    rig_t rig;
+    CHECK(rig_open(&rig, iio, "1-0069", "temperature") == FCSL_DRIVER_OK);
+    CHECK(rig_read(&rig) == FCSL_DRIVER_OK && value_at(&rig, "temperature", 0) == 5.0);
+    rig_close(&rig);
+    CHECK(unlink(in_tree(LINKS[0])) == 0 && unlink(in_tree(LINKS[1])) == 0);
+    remove_below("devices");
 }
 
 static void check_bounded_reasons(void)
@@ -302,6 +323,7 @@ int main(void)
     check_names();
     check_missing_channels();
     check_ambiguous_names();
+    check_places();
     check_bounded_reasons();
     check_no_sysfs();
     check_renumbered();

@@ -1,2 +1,2 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Boards: which devices are the sensors of a machine, and how their readings are corrected, filtered and judged."""
+"""Boards: which devices are the sensors and actuators of a machine, and how their values are corrected and judged."""

@@ -3,22 +3,19 @@
 
 from __future__ import annotations
 
-import re
 from dataclasses import dataclass
 
 from ..base.source import Span
 from ..parse.json_reader import ConfigReader
 from ..parse.json_source import JsonNode
 from .corrections import Correction, read_corrections
-from .devices import Device
+from .devices import ACTUATORS, Device
 from .filters import Filter, Section, sections_for
 from .kinds import KINDS, MAX_BACKENDS
-from .limits import check_name
+from .limits import read_signal
 from .quantities import by_quantity, measured
 from .rotations import IDENTITY, Matrix, read_rotation
 from .sticks import Stick, read_sticks
-
-_SIGNAL = re.compile(r"[A-Za-z_]\w*", re.ASCII)
 
 
 @dataclass(frozen=True)
@@ -76,7 +73,11 @@ class BackendReader:
         if first is not node.span:
             message, notes = f"device `{name}` twice in one sensor", [(first, "the first time")]
             self.reader.sink.error("E509", message, node.span, help="remove this", notes=notes)
-        return self.devices[name]
+        device = self.devices[name]
+        if device is not None and device.driver in ACTUATORS:
+            message, why = f"device `{name}` cannot be a backend", f"`{device.driver}` drives actuators"
+            self.reader.sink.error("E518", message, node.span, why=why, notes=[(device.span, "the device")])
+        return device
 
     def _rotation(self, node: JsonNode | None, kind: str) -> Matrix:
         if node is not None and not any(q.in_axes for q in KINDS[kind]):
@@ -89,10 +90,7 @@ class BackendReader:
     def _signals(self, node: JsonNode | None, kind: str) -> dict[str, str]:
         found: dict[str, str] = {}
         for quantity, value in by_quantity(node, "`signals`", measured(kind), self.reader):
-            name = self.reader.string(value, f"the signal of `{quantity.name}`")
-            if name is not None and not _SIGNAL.fullmatch(name):
-                fix = "letters, digits and underscores, as the driver names it"
-                self.reader.sink.error("E203", f"`{name}` is not the name of a signal", value.span, help=fix)
-            elif name is not None and check_name(name, value.span, self.reader):
+            name = read_signal(value, f"the signal of `{quantity.name}`", self.reader)
+            if name is not None:
                 found[quantity.name] = name
         return found

@@ -15,6 +15,8 @@ from .backends import BackendReader
 from .channels import ChannelBinder
 from .devices import Device, read_devices
 from .machine import load_machine
+from .outputs import Output, OutputReader
+from .pace import Pace, read_pace
 from .sensors import Sensor, read_sensors
 
 SCHEMA = Path(__file__).parent / "board.schema.json"
@@ -28,6 +30,8 @@ class Board:
     machine: Machine
     devices: tuple[Device, ...]
     sensors: tuple[Sensor, ...]
+    outputs: tuple[Output, ...]
+    pace: Pace | None
     warnings: tuple[Diagnostic, ...]
 
 
@@ -39,7 +43,8 @@ def check_board(path: Path) -> Board:
     assert root is not None
     _refuse_machine(path, root, sink)
     reader = ConfigReader(sink)
-    keys = reader.object(root, "a board", ("machine", "devices", "sensors"), ("$schema", "description")) or {}
+    optional = ("$schema", "description", "pace", "sensors", "outputs")
+    keys = reader.object(root, "a board", ("machine", "devices"), optional) or {}
     for key in ("$schema", "description"):
         reader.string(keys.get(key), f"`{key}`")
     machine, of_machine = load_machine(keys.get("machine"), path, reader)
@@ -47,12 +52,21 @@ def check_board(path: Path) -> Board:
     channels = ChannelBinder(machine, reader)
     backends = BackendReader(devices, reader, set())
     sensors = read_sensors(keys.get("sensors"), channels, backends, reader)
-    _warn_unused(devices, backends.used, reader)
-    channels.warn_unbound(keys.get("machine"))
+    actuators = OutputReader(machine, devices, reader, backends.used)
+    outputs = actuators.read(keys.get("outputs"))
+    pace = read_pace(keys.get("pace"), devices, backends.used, reader)
+    _check_purpose(root, keys, reader)
+    _warn_unused(devices, backends.used | actuators.used, reader)
+    # Without the key `sensors` or `outputs` that half of the machine is not this board's.
+    if "machine" in keys and "sensors" in keys:
+        channels.warn_unbound(keys["machine"])
+    if "machine" in keys and "outputs" in keys:
+        actuators.warn_undriven(keys["machine"])
     if of_machine or sink.failed:
         raise DiagnosticError([*of_machine, *(d for d in sink.diagnostics if d.severity is Severity.ERROR)])
     assert machine is not None
-    return Board(path, machine, tuple(d for d in devices.values() if d), sensors, tuple(sink.diagnostics))
+    used = tuple(d for d in devices.values() if d)
+    return Board(path, machine, used, sensors, outputs, pace, tuple(sink.diagnostics))
 
 
 def _parse(path: Path, sink: DiagnosticSink) -> JsonNode | None:
@@ -72,10 +86,15 @@ def _refuse_machine(path: Path, root: JsonNode, sink: DiagnosticSink) -> None:
         sink.raise_if_failed()
 
 
+def _check_purpose(root: JsonNode, keys: dict[str, JsonNode], reader: ConfigReader) -> None:
+    """Reports a board without sensors and outputs."""
+    parts = [keys[key] for key in ("sensors", "outputs") if key in keys]
+    if root.kind == "object" and not any(part.kind != "object" or part.members for part in parts):
+        reader.sink.error("E202", "a board has no `sensors` and no `outputs`", root.span, help="add one of them")
+
+
 def _warn_unused(devices: dict[str, Device | None], used: set[str], reader: ConfigReader) -> None:
     for device in devices.values():
         if device is not None and device.name not in used:
-            message = f"no sensor uses device `{device.name}`"
-            reader.sink.warning(
-                "W501", message, device.span, why="it is not opened", help="remove it, or add a backend"
-            )
+            message, fix = f"nothing uses device `{device.name}`", "remove it, or add a backend or an output"
+            reader.sink.warning("W501", message, device.span, why="it is not opened", help=fix)

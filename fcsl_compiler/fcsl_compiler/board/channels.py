@@ -37,10 +37,10 @@ class ChannelBinder:
         bindings = [self._binding(quantity, value) for quantity, value in quantities]
         return tuple(b for b in bindings if b is not None)
 
-    def warn_unbound(self, node: JsonNode | None) -> None:
+    def warn_unbound(self, node: JsonNode) -> None:
         """The sensor channels without a quantity. `node`: of `machine`."""
         for channel in self.machine.channels if self.machine else ():
-            if node is not None and channel.direction == "sensor" and channel.name not in self._bound:
+            if channel.direction == "sensor" and channel.name not in self._bound:
                 message = f"no sensor feeds channel `{channel.name}`"
                 notes = [(channel.span, "the channel")]
                 self.reader.sink.warning("W502", message, node.span, why="it never gets a sample", notes=notes)

@@ -12,12 +12,14 @@ from ..parse.json_reader import ConfigReader
 from ..parse.json_source import JsonNode
 from .limits import MAX_DEVICES, check_count, check_name, check_text
 
-#: Drivers of sensors that come with FCSL. Polled ones are read at a rate, the others wait for the next sample.
+#: Drivers that come with FCSL. Those of sensors: polled ones are read at a rate, the others wait for the next sample.
 POLLED = ("iio", "power_supply", "thermal")
 #: Waits, and the device samples at the rate that it is set to.
 BUFFERED = ("iio_buffer",)
-WAITING = ("evdev", "sbus", "crsf", "ubx", "nmea")
-DRIVERS = (*POLLED, *BUFFERED, *WAITING)
+WAITING = ("evdev", "sbus", "crsf", "ubx", "nmea", "can")
+SENSORS = (*POLLED, *BUFFERED, *WAITING)
+ACTUATORS = ("pwm", "log")
+DRIVERS = (*SENSORS, *ACTUATORS)
 
 MIN_RATE_HZ, MAX_RATE_HZ = 0.001, 100_000.0
 
@@ -27,7 +29,7 @@ _OF_LIBRARY = re.compile(r"(?:\S*/\S*|\S+\.so):[A-Za-z_]\w*", re.ASCII)
 
 @dataclass(frozen=True)
 class Device:
-    """`rate_hz`: nominal, of its readings; 0 if it is unknown."""
+    """`rate_hz`: nominal, of its readings; 0 if there is none, or none is known."""
 
     name: str
     driver: str
@@ -37,7 +39,7 @@ class Device:
 
     @property
     def period_s(self) -> float:
-        """0 if it is unknown."""
+        """0 if the rate is."""
         return 1.0 / self.rate_hz if self.rate_hz else 0.0
 
 
@@ -85,8 +87,9 @@ def _check_rate(name: str, driver: str, definition: JsonNode, node: JsonNode | N
         fix = 'add `"rate_hz": …`'
         reader.sink.error("E504", f"device `{name}` has no `rate_hz`", definition.span, why=why, help=fix)
         return False
-    if driver in WAITING and node is not None:
-        why = f"`{driver}` waits for the device, which sends when it likes"
+    if driver in (*WAITING, *ACTUATORS) and node is not None:
+        waits = f"`{driver}` waits for the device, which sends when it likes"
+        why = waits if driver in WAITING else f"`{driver}` is written as often as the guard writes"
         reader.sink.error("E504", f"device `{name}` has a rate", node.span, why=why, help="remove `rate_hz`")
         return False
     return True

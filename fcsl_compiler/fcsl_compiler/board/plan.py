@@ -9,6 +9,7 @@ from collections.abc import Iterator
 from .backends import Backend
 from .board import Board
 from .kinds import KINDS
+from .outputs import Output
 from .sensors import Sensor
 
 _NS_PER_S = 1e9
@@ -19,8 +20,12 @@ def plan_text(board: Board) -> str:
     lines = ["fcsl-board-plan 1", f"machine {board.machine.name} {board.machine.tick_hz}"]
     for device in board.devices:
         lines.append(f"device {device.name} {_ns(device.period_s)} {device.driver} {device.address}")
+    if board.pace is not None:
+        lines.append(f"pace {board.pace.device.name} {_ns(board.pace.timeout_s)}")
     for sensor in board.sensors:
         lines += _sensor(sensor)
+    for output in board.outputs:
+        lines += _output(output)
     return "\n".join([*lines, "end", ""])
 
 
@@ -49,6 +54,13 @@ def _backend(backend: Backend) -> Iterator[str]:
         yield f"stick {channel} {_bits(stick.minimum, stick.middle, stick.maximum, stick.deadband)}"
     for name, s in backend.sections:
         yield f"section {name} {_bits(s.b0, s.b1, s.b2, s.a1, s.a2)}"
+
+
+def _output(output: Output) -> Iterator[str]:
+    yield f"output {output.channel.name} {output.device.name}"
+    for index, p in enumerate(output.pulses):
+        line = (p.line.low, p.line.high, p.line.minimum, p.line.middle, p.line.maximum)
+        yield f"pulse {index} {p.signal} {_bits(*line, p.slew, p.safe)}"
 
 
 def _ns(seconds: float) -> int:

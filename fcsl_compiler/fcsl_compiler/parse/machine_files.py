@@ -138,6 +138,10 @@ def parse_machine(path: Path, sink: DiagnosticSink, trees: bool = True) -> Parse
         fix = f"`fcsl-sim check {path}` checks it together with the machine of its `controller`"
         sink.error("E104", "this is a simulation, not a machine", source.whole(), help=fix)
         return None
+    if root is not None and root.kind == "object" and {"machine", "devices"} <= root.members.keys():
+        fix = f"`fcslc board {path}` checks it together with its machine"
+        sink.error("E105", "this is a board, not a machine", source.whole(), help=fix)
+        return None
     _check_name(name, source, sink)
     if root is None:
         return None

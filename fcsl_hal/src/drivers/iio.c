@@ -16,7 +16,16 @@ static const double PER_MILLI = 1e-3;
 
 static const char *const names[] = {"name", "label", NULL};
 const sysfs_class_t iio_devices = {
-    .noun = "IIO device", .folder = "bus/iio/devices", .prefix = "iio:device", .names = names};
+    .noun = "IIO device", .folder = "bus/iio/devices", .prefix = "iio:device", .names = names, .owner = ".."};
+
+/* Each is a signal of its own: one of them is the battery, the next one an air speed. */
+#define VOLTAGE(index_)                                                                                                \
+    [IIO_VOLTAGE + (index_)] = {.name = "voltage" #index_,                                                             \
+                                .type = FCSL_F64,                                                                      \
+                                .count = 1,                                                                            \
+                                .offset = offsetof(iio_values_t, voltage) + (index_) * sizeof(double),                 \
+                                .unit = "V",                                                                           \
+                                .doc = "input " #index_ " of an analog-digital converter"}
 
 const fcsl_driver_signal_t iio_signals[IIO_SIGNALS] = {
     [IIO_GYRO] = FCSL_DRIVER_SIGNAL(iio_values_t, gyro, "rad/s", "angular velocity"),
@@ -25,7 +34,14 @@ const fcsl_driver_signal_t iio_signals[IIO_SIGNALS] = {
     [IIO_PRESSURE] = FCSL_DRIVER_SIGNAL(iio_values_t, pressure, "Pa", "air pressure"),
     [IIO_TEMPERATURE] = FCSL_DRIVER_SIGNAL(iio_values_t, temperature, "degC", "temperature of the sensor"),
     [IIO_DISTANCE] = FCSL_DRIVER_SIGNAL(iio_values_t, distance, "m", "distance to what is in front of the sensor"),
-    [IIO_VOLTAGE] = FCSL_DRIVER_SIGNAL(iio_values_t, voltage, "V", "inputs 0 to 7 of an analog-digital converter"),
+    VOLTAGE(0),
+    VOLTAGE(1),
+    VOLTAGE(2),
+    VOLTAGE(3),
+    VOLTAGE(4),
+    VOLTAGE(5),
+    VOLTAGE(6),
+    VOLTAGE(7),
 };
 
 #define CHANNEL(name_, type_, factor_, signal_, member_)                                                               \
@@ -57,14 +73,14 @@ static const iio_channel_t channels[CHANNELS] = {
      .offset = offsetof(iio_values_t, distance),
      .signal = IIO_DISTANCE,
      .scale_required = 1},
-    CHANNEL("in_voltage0", "in_voltage", PER_MILLI, IIO_VOLTAGE, voltage[0]),
-    CHANNEL("in_voltage1", "in_voltage", PER_MILLI, IIO_VOLTAGE, voltage[1]),
-    CHANNEL("in_voltage2", "in_voltage", PER_MILLI, IIO_VOLTAGE, voltage[2]),
-    CHANNEL("in_voltage3", "in_voltage", PER_MILLI, IIO_VOLTAGE, voltage[3]),
-    CHANNEL("in_voltage4", "in_voltage", PER_MILLI, IIO_VOLTAGE, voltage[4]),
-    CHANNEL("in_voltage5", "in_voltage", PER_MILLI, IIO_VOLTAGE, voltage[5]),
-    CHANNEL("in_voltage6", "in_voltage", PER_MILLI, IIO_VOLTAGE, voltage[6]),
-    CHANNEL("in_voltage7", "in_voltage", PER_MILLI, IIO_VOLTAGE, voltage[7]),
+    CHANNEL("in_voltage0", "in_voltage", PER_MILLI, IIO_VOLTAGE + 0, voltage[0]),
+    CHANNEL("in_voltage1", "in_voltage", PER_MILLI, IIO_VOLTAGE + 1, voltage[1]),
+    CHANNEL("in_voltage2", "in_voltage", PER_MILLI, IIO_VOLTAGE + 2, voltage[2]),
+    CHANNEL("in_voltage3", "in_voltage", PER_MILLI, IIO_VOLTAGE + 3, voltage[3]),
+    CHANNEL("in_voltage4", "in_voltage", PER_MILLI, IIO_VOLTAGE + 4, voltage[4]),
+    CHANNEL("in_voltage5", "in_voltage", PER_MILLI, IIO_VOLTAGE + 5, voltage[5]),
+    CHANNEL("in_voltage6", "in_voltage", PER_MILLI, IIO_VOLTAGE + 6, voltage[6]),
+    CHANNEL("in_voltage7", "in_voltage", PER_MILLI, IIO_VOLTAGE + 7, voltage[7]),
 };
 
 /* ---- channels ----------------------------------------------------------------------------------------------------------- */

@@ -27,8 +27,8 @@ typedef enum {
     IIO_PRESSURE,
     IIO_TEMPERATURE,
     IIO_DISTANCE,
-    IIO_VOLTAGE,
-    IIO_SIGNALS
+    IIO_VOLTAGE, /* the first of IIO_VOLTAGES */
+    IIO_SIGNALS = IIO_VOLTAGE + IIO_VOLTAGES
 } iio_signal_t;
 
 /* Of a state that begins with iio_values_t. */

@@ -19,6 +19,7 @@ typedef struct {
     const char *folder; /* "bus/iio/devices", below the root */
     const char *prefix; /* "iio:device": how the names of their folders begin */
     const char *const *names; /* attributes whose text names a device; ends with a null pointer */
+    const char *owner; /* "..": leads from a folder to that of what it belongs to, whose name also names it; or null */
 } sysfs_class_t;
 
 /* The environment's variable, or `otherwise`. */
@@ -27,8 +28,8 @@ const char *sysfs_root(const char *variable, const char *otherwise);
 /* Joins them with a slash into SYSFS_PATH_BYTES. 0, or -1 with errno. */
 int sysfs_join(char *path, const char *folder, const char *name);
 
-/* Finds the folder of a device by its path, the name of its folder, or the text of an attribute. It is ABSENT, with the names of
- * those that are there; or FAILED where two devices have the name. */
+/* Finds the folder of a device by its path, the name of its folder or of its owner's, or the text of an attribute. It is ABSENT, with
+ * the names of those that are there; or FAILED where two devices have the name. */
 fcsl_driver_status_t sysfs_find(const sysfs_class_t *devices, const char *device, char *path, char *why, size_t size);
 
 /* Opens an attribute for reading. NOTHING, without a reason: the folder has no such attribute. */

@@ -1,13 +1,16 @@
 /* SPDX-License-Identifier: Apache-2.0
  *
- * The folder of a device of sysfs. The numbers in the names of folders change from boot to boot; the texts of attributes stay.
+ * The folder of a device of sysfs. The numbers in the names of folders change from boot to boot; the texts of attributes stay, and so
+ * does the place of a chip on its bus, by which two chips of one kind differ.
  */
-#define _POSIX_C_SOURCE 200809L
+#define _GNU_SOURCE
 #include "sysfs.h"
 
 #include <dirent.h>
 #include <errno.h>
+#include <limits.h>
 #include <stdio.h>
+#include <stdlib.h>
 #include <string.h>
 #include <sys/stat.h>
 
@@ -50,11 +53,22 @@ static const char *next_device(const sysfs_class_t *devices, DIR *folder, uint32
     return NULL;
 }
 
+static int belongs_to(const sysfs_class_t *devices, const char *path, const char *device)
+{
+    char link[SYSFS_PATH_BYTES];
+    char owner[PATH_MAX];
+    if (devices->owner == NULL || sysfs_join(link, path, devices->owner) != 0 || realpath(link, owner) == NULL) {
+        return 0;
+    }
+    const char *name = strrchr(owner, '/');
+    return name != NULL && strcmp(name + 1, device) == 0;
+}
+
 static int is_called(const sysfs_class_t *devices, const char *path, const char *entry, const char *device)
 {
     char text[SYSFS_TEXT_BYTES];
     char why[1];
-    if (strcmp(entry, device) == 0) {
+    if (strcmp(entry, device) == 0 || belongs_to(devices, path, device)) {
         return 1;
     }
     for (const char *const *name = devices->names; *name != NULL; name++) {
@@ -106,8 +120,8 @@ static fcsl_driver_status_t find_in(const sysfs_class_t *devices, const char *de
         entry = next_device(devices, folder, &entries);
     }
     if (found == 2u) {
-        (void)snprintf(why, size, "'%s' names more than one %s, %s and %s; name it by its path", device, devices->noun,
-                       path, other);
+        (void)snprintf(why, size, "'%s' names more than one %s, %s and %s; name it by its path%s", device,
+                       devices->noun, path, other, devices->owner != NULL ? ", or its place on the bus: 1-0068" : "");
         return FCSL_DRIVER_FAILED;
     }
     if (found == 0u) {

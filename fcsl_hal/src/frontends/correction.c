@@ -1,4 +1,7 @@
-/* SPDX-License-Identifier: Apache-2.0 */
+/* SPDX-License-Identifier: Apache-2.0
+ *
+ * Corrections of readings.
+ */
 #include "frontends/correction.h"
 
 #include <math.h>

@@ -1,4 +1,7 @@
-/* SPDX-License-Identifier: Apache-2.0 */
+/* SPDX-License-Identifier: Apache-2.0
+ *
+ * Second-order sections.
+ */
 #include "frontends/section.h"
 
 double section_step(const fcsl_section_t *section, section_state_t *state, double x)

@@ -1,4 +1,7 @@
-/* SPDX-License-Identifier: Apache-2.0 */
+/* SPDX-License-Identifier: Apache-2.0
+ *
+ * Delta angle and delta velocity.
+ */
 #include "frontends/strapdown.h"
 
 #include <stdint.h>

@@ -6,6 +6,7 @@ from __future__ import annotations
 from .code import Code, Kind
 from .examples import EXAMPLE_CHANNELS
 
+_ESC = '{"driver": "pwm", "device": "pwmchip0"}'
 _BARO = '{"kind": "barometer", "channels": {"pressure": "baro.pressure"}, "backends": [{"device": "bmp"}]}'
 
 
@@ -36,13 +37,22 @@ def _fast(more: str = "") -> str:
     return _devices('{"driver": "iio", "device": "mpu6500", "rate_hz": 1000}') + ",\n" + _sensors(more=more)
 
 
+def _outputs(*elements: str, device: str = _ESC) -> str:
+    """The example board with one more device, which drives its actuator channel."""
+    rows = ",\n    ".join(elements)
+    output = f'{{"device": "esc", "elements": [\n    {rows}\n  ]}}'
+    return _devices(_MPU, f',\n  "esc": {device}') + f',\n"outputs": {{\n  "torque": {output}\n}}'
+
+
 _MPU = '{"driver": "iio", "device": "mpu6500", "rate_hz": 100}'
+
+_PULSES = [f'{{"signal": "pulse{i}", "output": [1000, 2000], "safe_output": 1500}}' for i in range(3)]
 
 BOARD_CODES: dict[str, Code] = {
     "E501": Code(
         "a machine where a board is needed",
         "A machine says what is computed, and runs unchanged on any board. A board says which devices are its "
-        "sensors, in a separate JSON file that names the machine.",
+        "sensors and actuators, in a separate JSON file that names the machine.",
         Kind.BOARD,
         '"tick_hz": 100,\n"states": {"COAST": {"schedule": {"nav": 100}}}',
         '"machine": "craft.json"',
@@ -57,7 +67,7 @@ BOARD_CODES: dict[str, Code] = {
     ),
     "E503": Code(
         "a driver that does not exist",
-        "`driver` is one of the drivers for sensors that come with FCSL, or LIBRARY.so:NAME for one of a library; the "
+        "`driver` is one of the drivers that come with FCSL, or LIBRARY.so:NAME for one of a library; the "
         "name of the library has a slash or ends in .so.",
         Kind.BOARD,
         _devices('{"driver": "iiobuffer", "device": "mpu6500", "rate_hz": 100}'),
@@ -66,15 +76,15 @@ BOARD_CODES: dict[str, Code] = {
     "E504": Code(
         "a rate that is missing or misplaced",
         "A device that is polled is read at `rate_hz`, and a buffered one samples at it. Other devices send when "
-        "they like; their drivers wait, and take no rate.",
+        "they like; their drivers wait, and take no rate. Drivers of actuators take none either.",
         Kind.BOARD,
         _devices('{"driver": "iio", "device": "mpu6500"}'),
         _devices(_MPU),
     ),
     "E505": Code(
         "something that does not fit the plan",
-        "The plan of a board is text, with one statement per line, and has limits: 32 devices and 32 sensors, names of "
-        "64 characters, drivers and addresses of 500 bytes without control characters.",
+        "The plan of a board is text, with one statement per line, and has limits: 32 devices, 32 sensors and 16 "
+        "outputs, names of 64 characters, drivers and addresses of 500 bytes without control characters.",
         Kind.BOARD,
         _devices('{"driver": "iio", "device": "", "rate_hz": 100}'),
         _devices(_MPU),
@@ -153,9 +163,57 @@ BOARD_CODES: dict[str, Code] = {
         _of_sensor('"low_pass_hz": {"gyro": 50}'),
         _of_sensor('"low_pass_hz": {"gyro": 40}'),
     ),
+    "E515": Code(
+        "a channel that cannot be an output",
+        "An output is an actuator channel of f64 or f32 with at most 16 elements, and has one entry per element. A bool "
+        "or an integer has no values between two ends; let the machine compute a float.",
+        Kind.BOARD,
+        _outputs(*_PULSES[:2]),
+        _outputs(*_PULSES),
+    ),
+    "E516": Code(
+        "an output with wrong numbers",
+        "`command` has the lower value first. `output` has two different ends, the lower or the higher one first, and a "
+        "middle between them. `safe_output` is between them too, or 0 for no pulse. 0 excludes `slew_per_s`, which would "
+        "make the output move through the pulses between 0 and its ends.",
+        Kind.BOARD,
+        _outputs('{"signal": "pulse0", "output": [1000, 2100, 2000], "safe_output": 1500}', *_PULSES[1:]),
+        _outputs('{"signal": "pulse0", "output": [1000, 1450, 2000], "safe_output": 1500}', *_PULSES[1:]),
+    ),
+    "E517": Code(
+        "an output without a safe value",
+        "While the machine is disarmed or silent its outputs are safe. Without `safe_output` an element has the output "
+        "of the `safe` of its channel in the machine, if the channel has one.",
+        Kind.BOARD,
+        _outputs('{"signal": "pulse0", "output": [1000, 2000]}', *_PULSES[1:]),
+        _outputs(*_PULSES),
+    ),
+    "E518": Code(
+        "a device of the other direction",
+        "A driver reads a sensor or drives an actuator, never both. A device of an output has no `rate_hz`.",
+        Kind.BOARD,
+        _outputs(*_PULSES, device='{"driver": "iio", "device": "pca9685", "rate_hz": 50}'),
+        _outputs(*_PULSES),
+    ),
+    "E519": Code(
+        "a signal with two sources",
+        "Each of them would overwrite the other one. Mixing the commands of several controllers is work of the "
+        "machine, which has one element per signal then.",
+        Kind.BOARD,
+        _outputs(*_PULSES[:2], _PULSES[1]),
+        _outputs(*_PULSES),
+    ),
+    "E520": Code(
+        "a device that cannot pace the loop",
+        "Each sample of the device that paces the loop is a tick, and somebody must get it: it is a backend of a sensor.",
+        Kind.BOARD,
+        _devices(_MPU, ',\n  "spare": {"driver": "iio", "device": "mpu9250", "rate_hz": 100}')
+        + ',\n"pace": {"device": "spare", "timeout_s": 0.1}',
+        _devices(_MPU) + ',\n"pace": {"device": "mpu", "timeout_s": 0.1}',
+    ),
     "W501": Code(
-        "a device that no sensor uses",
-        "It is not opened. Usually a backend is missing, and the sensor has less redundancy than the board.",
+        "a device that nothing uses",
+        "It is not opened. Usually a backend is missing, and the sensor has less redundancy than the board; or an output.",
         Kind.BOARD,
         _devices(_MPU, ',\n  "spare": {"driver": "iio", "device": "mpu9250", "rate_hz": 100}'),
         _devices(_MPU),
@@ -195,5 +253,13 @@ BOARD_CODES: dict[str, Code] = {
         Kind.BOARD,
         _of_sensor('"health": {"tolerance": {"gyro": 0.2}}'),
         _sensors(),
+    ),
+    "W506": Code(
+        "an actuator channel that no output drives",
+        "A board with `outputs` drives all actuator channels of its machine: a motor that gets nothing would be found in "
+        "flight. fcsl-guard refuses such a board.",
+        Kind.BOARD,
+        '"outputs": {}',
+        _outputs(*_PULSES),
     ),
 }

@@ -93,7 +93,7 @@ EXAMPLE_CHANNELS = """\
 "channels": [
   {"name": "baro.pressure", "id": 1, "field": "nav.inputs.pressure", "direction": "sensor", "max_age_ticks": 20},
   {"name": "imu.gyro", "id": 2, "field": "control.inputs.rate", "direction": "sensor", "max_age_ticks": 5},
-  {"name": "force", "id": 3, "field": "control.outputs.force", "direction": "actuator"}
+  {"name": "torque", "id": 3, "field": "control.outputs.torque", "direction": "actuator"}
 ]"""
 
 #: The board that BOARD examples modify.

@@ -67,6 +67,18 @@ MACHINE_CODES: dict[str, Code] = {
         "}",
         _SMALLEST,
     ),
+    "E105": Code(
+        "a board where a machine is needed",
+        "A board says which devices are the sensors and actuators of a machine. The machine is a separate JSON file, "
+        "which runs unchanged on any board. `fcslc board` checks a board together with its machine.",
+        Kind.TEXT,
+        "{\n"
+        '  "machine": "craft.json",\n'
+        '  "devices": {"mpu": {"driver": "iio", "device": "mpu6500", "rate_hz": 100}},\n'
+        '  "sensors": {"imu": {"kind": "inertial", "channels": {"gyro": "imu.gyro"}, "backends": [{"device": "mpu"}]}}\n'
+        "}",
+        _SMALLEST,
+    ),
     "E201": Code(
         "an unknown key",
         "If a misspelt optional key were ignored, the machine would not do what its file states: with `max_wcet` "

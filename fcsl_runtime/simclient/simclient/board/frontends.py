@@ -4,6 +4,7 @@
 from __future__ import annotations
 
 import ctypes
+import os
 from collections.abc import Iterable
 from ctypes import byref
 from pathlib import Path
@@ -25,7 +26,7 @@ class Frontends:
     def __init__(self, plan: str | Path, run: Run | None = None):
         self._library, self._error, self._run = board_library(), CError(), run
         handle = run.handle() if run is not None else None
-        self.handle = self._library.board_open(str(plan).encode(), handle, byref(self._error))
+        self.handle = self._library.board_open(os.fsencode(plan), handle, byref(self._error))
         if not self.handle:
             raise TwinError(self._error.text.decode(errors="replace"))
 

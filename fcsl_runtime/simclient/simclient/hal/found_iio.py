@@ -1,0 +1,60 @@
+# SPDX-License-Identifier: Apache-2.0
+"""IIO devices of this computer. fcsl_hal/src/drivers/iio.c has the same channels."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+from .found import Candidate, Found, first_unique
+from .sysfs import attribute, folders, names_in
+
+#: How the names of channels begin, and the signal of the drivers iio and iio_buffer.
+_IIO_SIGNALS = {
+    "in_anglvel": "gyro",
+    "in_accel": "accel",
+    "in_magn": "field",
+    "in_pressure": "pressure",
+    "in_temp": "temperature",
+    "in_distance": "distance",
+    "in_proximity": "distance",
+    "in_voltage": "voltage",
+}
+_POLLED_ENDS, _BUFFERED_ENDS = ("_raw", "_input"), ("_index",)
+_DEFAULT_RATE = "100"
+
+
+def _iio_signals(folder: Path, ends: tuple[str, ...]) -> list[str]:
+    files = [name for name in names_in(folder) if name.endswith(ends)]
+    signals = [signal for start, signal in _IIO_SIGNALS.items() if any(name.startswith(start) for name in files)]
+    return list(dict.fromkeys(signals))
+
+
+def _iio_rate(folder: Path) -> str:
+    """The rate that the device has now, for the text of iio_buffer."""
+    files = sorted(name for name in names_in(folder) if name.endswith("sampling_frequency"))
+    for name in files:
+        rate = attribute(folder, name)
+        try:
+            if float(rate) > 0.0:
+                return f"{float(rate):g}"
+        except ValueError:
+            continue
+    return _DEFAULT_RATE
+
+
+def find_iio() -> list[Found]:
+    devices = folders("bus/iio/devices", "iio:device")
+    names = {path: [attribute(path, "label"), attribute(path, "name"), path.name] for path in devices}
+    found = []
+    for path in devices:
+        device = first_unique(names[path], names.values())
+        polled, buffered = _iio_signals(path, _POLLED_ENDS), _iio_signals(path / "scan_elements", _BUFFERED_ENDS)
+        candidates = [Candidate("iio", device)] if polled else []
+        if buffered:
+            candidates.append(Candidate("iio_buffer", f"{device}@{_iio_rate(path)}"))
+        measures = list(dict.fromkeys([*polled, *buffered]))
+        name = " ".join(dict.fromkeys(text for text in (attribute(path, "name"), attribute(path, "label")) if text))
+        found.append(
+            Found("IIO device", name or path.name, str(path), measures, candidates, "no channel that a driver reads")
+        )
+    return found

@@ -1,0 +1,214 @@
+# SPDX-License-Identifier: Apache-2.0
+"""`fcsl-hal list` and `describe` on a fake sysfs."""
+
+from __future__ import annotations
+
+import json
+import os
+import pty
+import tty
+from pathlib import Path
+
+import pytest
+from hal_rig import Iio, run, write_plan
+
+
+def write(folder: Path, **attributes: str) -> None:
+    folder.mkdir(parents=True, exist_ok=True)
+    for name, text in attributes.items():
+        (folder / name).write_text(f"{text}\n")
+
+
+@pytest.fixture
+def sysfs(tmp_path: Path) -> Path:
+    """A computer with one device of each kind, and two IIO devices of one name."""
+    root = tmp_path / "sys"
+    imu = Iio(root, 0, "icm42688", anglvel=(0.1, 0.0, -0.1), accel=(0.0, 0.0, 9.8))
+    write(imu.folder / "scan_elements", in_anglvel_x_index="0", in_timestamp_index="7")
+    write(imu.folder, sampling_frequency="1000.000000")
+    Iio(root, 1, "bmi088", accel=(0.0, 0.0, 9.8))
+    write(Iio(root, 2, "bmi088", anglvel=(0.0, 0.0, 0.0)).folder, label="gyro_2")
+    (root / "class/pwm/pwmchip0").mkdir(parents=True)
+    (root / "class/pwm/pwmchip0/device").symlink_to("../../../devices/i2c-1/1-0040")
+    write(root / "class/pwm/pwmchip0", npwm="16")
+    write(root / "class/power_supply/BAT0", type="Battery", voltage_now="12000000", capacity="80")
+    write(root / "class/power_supply/AC", type="Mains", online="1")
+    write(root / "class/thermal/thermal_zone0", type="cpu-thermal", temp="45000")
+    write(root / "class/input/event3/device", name="RadioMaster TX16S", uniq="", phys="usb-1/input0")
+    write(root / "class/input/event3/device/capabilities", abs="ff")
+    write(root / "class/input/event4/device", name="Power Button")
+    write(root / "class/input/event4/device/capabilities", abs="0")
+    write(root / "class/tty/ttyUSB0/device")
+    write(root / "class/tty/ttyS9/device")
+    write(root / "class/tty/ttyS9", type="0")
+    write(root / "class/tty/tty1")
+    write(root / "class/net/can0", type="280")
+    write(root / "class/net/eth0", type="1")
+    write(root / "bus/gpio/devices/gpiochip0", label="pinctrl")
+    return root
+
+
+def listed(sysfs: Path, dev: Path | None = None) -> dict[str, dict[str, object]]:
+    found = json.loads(run(sysfs, "list", "--json", dev=dev).stdout)
+    return {f"{one['kind']} {one['name']}": one for one in found}
+
+
+def devices(one: dict[str, object]) -> list[tuple[str, str]]:
+    candidates = one["candidates"]
+    assert isinstance(candidates, list)
+    return [(candidate["driver"], candidate["device"]) for candidate in candidates]
+
+
+def test_each_kind_of_device_and_the_text_for_the_board(sysfs: Path) -> None:
+    found = listed(sysfs)
+    assert {name: devices(one) for name, one in found.items()} == {
+        "IIO device icm42688": [("iio", "icm42688"), ("iio_buffer", "icm42688@1000")],
+        "IIO device bmi088": [("iio", "iio:device1")],
+        "IIO device bmi088 gyro_2": [("iio", "gyro_2")],
+        "PWM chip pwmchip0": [("pwm", "1-0040")],
+        "power supply AC (Mains)": [],
+        "power supply BAT0 (Battery)": [("power_supply", "BAT0")],
+        "thermal zone cpu-thermal": [("thermal", "cpu-thermal")],
+        "input device RadioMaster TX16S": [("evdev", "RadioMaster TX16S")],
+        "input device Power Button": [],
+        "serial port ttyUSB0": [(name, f"{sysfs}/dev/ttyUSB0") for name in ("sbus", "crsf", "ubx", "nmea")],
+        "CAN interface can0": [("can", "can0:1A0/16:12@1-*0.1")],
+        "GPIO chip pinctrl": [],
+    }
+    assert found["IIO device icm42688"]["measures"] == ["gyro", "accel"]
+    assert found["power supply BAT0 (Battery)"]["measures"] == ["voltage", "charge"]
+    assert found["input device RadioMaster TX16S"]["measures"] == ["sticks (8 axes)"]
+    assert found["GPIO chip pinctrl"]["why"] == "FCSL has no driver for GPIO lines"
+
+
+def test_drivers_say_whether_they_would_take_it(sysfs: Path) -> None:
+    ready = {
+        name: [candidate["ready"] for candidate in one["candidates"]]  # type: ignore[attr-defined]
+        for name, one in listed(sysfs).items()
+    }
+    for name in ("IIO device bmi088", "IIO device bmi088 gyro_2", "power supply BAT0 (Battery)", "PWM chip pwmchip0"):
+        assert ready[name] == [True], name
+    assert ready["IIO device icm42688"] == [True, True]
+    assert not any(ready["CAN interface can0"] + ready["serial port ttyUSB0"] + ready["input device RadioMaster TX16S"])
+
+
+def test_a_serial_port_by_its_id(sysfs: Path, tmp_path: Path) -> None:
+    primary, secondary = pty.openpty()
+    dev = tmp_path / "dev"
+    (dev / "serial/by-id").mkdir(parents=True)
+    (dev / "ttyUSB0").symlink_to(os.ttyname(secondary))
+    (dev / "serial/by-id/usb-u-blox").symlink_to("../../ttyUSB0")
+    one = listed(sysfs, dev)["serial port ttyUSB0"]
+    assert devices(one)[0] == ("sbus", f"{dev}/serial/by-id/usb-u-blox")
+    assert [candidate["ready"] for candidate in one["candidates"]] == [True] * 4  # type: ignore[attr-defined]
+    os.close(primary)
+    os.close(secondary)
+
+
+def test_the_table(sysfs: Path) -> None:
+    lines = run(sysfs, "list").stdout.splitlines()
+    assert lines[0].split() == ["kind", "name", "driver", '"device"', "in", "board.json", "measures"]
+    assert any("sbus or crsf or ubx or nmea" in line and "No such file" in line for line in lines)
+    assert any(line.startswith("GPIO chip") and "no driver" in line for line in lines)
+
+
+def test_a_computer_without_devices(tmp_path: Path) -> None:
+    assert "no IIO device" in run(tmp_path, "list").stdout
+    assert json.loads(run(tmp_path, "list", "--json").stdout) == []
+
+
+def test_odd_files_of_sysfs(tmp_path: Path) -> None:
+    """Texts that are no numbers, a pipe in the place of an attribute, bytes that are no text."""
+    folder = tmp_path / "bus/iio/devices/iio:device0"
+    write(folder, in_accel_x_raw="1", sampling_frequency="often")
+    write(folder / "scan_elements", in_accel_x_index="?")
+    (folder / "name").write_bytes(b"\xff\x1b[2J\n")
+    os.mkfifo(folder / "label")
+    write(tmp_path / "class/input/event0/device/capabilities", abs="none of these")
+    write(tmp_path / "class/pwm/pwmchip0", npwm="")
+    found = listed(tmp_path)
+    assert len(found) == 3
+    assert devices(found["IIO device \ufffd\ufffd[2J"])[1][1].endswith("@100")
+
+
+# ---- describe --------------------------------------------------------------------------------------------------------
+
+
+def test_describe_a_driver(tmp_path: Path) -> None:
+    text = run(tmp_path, "describe", "iio").stdout
+    assert text.startswith("iio (sensor, polled: it needs a rate_hz): ")
+    assert "accel        f64[3]  m/s^2  specific force" in text
+    assert "actuator" in run(tmp_path, "describe", "log").stdout
+
+
+def test_describe_a_device(sysfs: Path) -> None:
+    text = run(sysfs, "describe", "iio", "icm42688").stdout
+    assert "gyro         f64[3]  rad/s  [0.1, 0, -0.1]" in text
+    assert "pressure     f64     Pa     not told" in text
+    told = json.loads(run(sysfs, "describe", "iio", "icm42688", "--json").stdout)
+    assert told["values"]["accel"] == pytest.approx([0.0, 0.0, 9.8]) and told["values"]["pressure"] == ["nan"]
+    assert not told["waits"] and told["why"] == ""
+
+
+def test_a_device_that_cannot_be_opened(sysfs: Path) -> None:
+    done = run(sysfs, "describe", "iio", "icm20602", status=1)
+    assert "gyro" in done.stdout
+    assert "no IIO device is called 'icm20602'; there are: " in done.stderr
+    assert json.loads(run(sysfs, "describe", "iio", "icm20602", "--json", status=1).stdout)["values"] is None
+
+
+def test_a_device_that_is_silent(tmp_path: Path) -> None:
+    primary, secondary = pty.openpty()
+    tty.setraw(secondary)
+    done = run(tmp_path, "describe", "sbus", os.ttyname(secondary), "--seconds", "0.3", status=1)
+    assert "gave no sample in 0.3 s" in done.stderr
+    os.close(primary)
+    os.close(secondary)
+
+
+def test_an_actuator_is_not_opened(tmp_path: Path) -> None:
+    done = run(tmp_path, "describe", "log", tmp_path / "log")
+    assert "is there; an actuator is not opened" in done.stdout
+    assert not (tmp_path / "log").exists()
+
+
+def test_describe_a_plan(tmp_path: Path) -> None:
+    plan = write_plan(tmp_path)
+    text = run(tmp_path, "describe", plan).stdout
+    for line in (
+        "machine craft, 100 Hz",
+        "  imu       iio   icm42688          200 Hz               inertial",
+        "  receiver  sbus  /dev/no_receiver  sends when it likes  rc",
+        "sensor inertial (inertial)",
+        "  gyro → channel gyro",
+        "     gyro: offset [9, 9, 9] rad/s",
+        "     gyro: times [0, -1, 0], [1, 0, 0], [0, 0, 1]",
+    ):
+        assert line in text.splitlines(), text
+    told = json.loads(run(tmp_path, "describe", plan, "--json").stdout)
+    assert [sensor["name"] for sensor in told["sensors"]] == ["inertial", "compass", "rc"]
+
+
+@pytest.mark.parametrize(
+    ("words", "says"),
+    [
+        (["describe", "nothing"], "no driver 'nothing'"),
+        (["describe", "./nothing.so:x", "y"], "nothing.so"),
+        (["describe", "nothing.plan"], "nothing.plan"),
+        (["describe", "iio", "x", "--seconds", "0"], "seconds wanted"),
+        (["describe", "cut.plan"], "cut.plan"),
+        (["describe", "odd.plan"], "odd.plan"),
+        (["describe", "pipe.plan"], "pipe.plan"),
+        (["describe", "\udcff.plan"], "cannot read"),
+        (["monitor", "odd.plan"], "odd.plan"),
+        (["list", "more"], "unrecognized"),
+        (["describe"], "required"),
+        ([], "required"),
+    ],
+)
+def test_wrong_usage(tmp_path: Path, monkeypatch: pytest.MonkeyPatch, words: list[str], says: str) -> None:
+    monkeypatch.chdir(tmp_path)
+    Path("cut.plan").write_text("fcsl-board-plan 1\nmachine craft 100\n")
+    Path("odd.plan").write_bytes(b"\xff\x00\xfe")
+    os.mkfifo("pipe.plan")
+    assert says in run(tmp_path, *words, status=2).stderr

@@ -1,0 +1,117 @@
+# SPDX-License-Identifier: Apache-2.0
+"""`fcsl-hal monitor`: devices that come and go, values before and after their correction, the end by Ctrl-C."""
+
+from __future__ import annotations
+
+import json
+import os
+import pty
+import select
+import signal
+import subprocess
+import time
+from collections.abc import Iterator
+from pathlib import Path
+from typing import Any
+
+import pytest
+from hal_rig import HAL, Iio, environment, run, write_plan
+
+
+@pytest.fixture
+def sysfs(tmp_path: Path) -> Path:
+    Iio(tmp_path / "sys", 0, "icm42688", anglvel=(9.1, 9.2, 9.3), accel=(0.0, 0.0, 9.8))
+    Iio(tmp_path / "sys", 1, "ist8310", magn=(0.2, 0.0, -0.4))
+    return tmp_path / "sys"
+
+
+def by_name(rows: list[dict[str, Any]]) -> dict[str, dict[str, Any]]:
+    return {row["name"]: row for row in rows}
+
+
+def objects(process: subprocess.Popen[str]) -> Iterator[dict[str, Any]]:
+    assert process.stdout is not None
+    for line in process.stdout:
+        yield json.loads(line)
+
+
+def test_values_rates_and_a_device_that_comes(tmp_path: Path, sysfs: Path) -> None:
+    plan = write_plan(tmp_path)
+    line = [*HAL, "monitor", str(plan), "--json"]
+    with subprocess.Popen(
+        line, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True, env=environment(sysfs)
+    ) as process:
+        first = next(objects(process))
+        devices, sensors = by_name(first["devices"]), by_name(first["sensors"])
+        assert devices["imu"]["there"] and devices["imu"]["rate_hz"] > 0.0 and devices["imu"]["age_s"] < 5.0
+        assert not devices["spare"]["there"] and "no IIO device is called 'bmi088'" in devices["spare"]["note"]
+        inertial = sensors["inertial"]
+        assert inertial["primary"] == "imu"
+        assert inertial["backends"][0]["raw"]["gyro"] == pytest.approx([9.1, 9.2, 9.3])
+        assert inertial["values"]["gyro"] == pytest.approx([-0.2, 0.1, 0.3])  # less 9, turned by 90 degrees
+        assert [backend["condition"] for backend in inertial["backends"]] == ["healthy", "silent"]
+        assert sensors["rc"]["primary"] is None and sensors["rc"]["values"] is None
+
+        Iio(sysfs, 2, "bmi088", anglvel=(0.0, 0.0, 0.0), accel=(0.0, 0.0, 9.8))
+        assert any(by_name(told["devices"])["spare"]["there"] for told in (next(objects(process)) for _ in range(4)))
+        process.send_signal(signal.SIGINT)
+        assert process.wait(timeout=10) == 0
+        assert process.stderr is not None
+        said = process.stderr.read()
+    assert "Traceback" not in said
+    assert "device 'spare' is not there" in said and "device 'spare' is there" in said
+
+
+def test_lines_of_one_sensor(tmp_path: Path, sysfs: Path) -> None:
+    lines = run(sysfs, "monitor", write_plan(tmp_path), "--sensor", "compass", "--seconds", "0.5").stdout.splitlines()
+    assert len(lines) == 1
+    assert lines[0].startswith("0.5 s  compass: mag  field [2e-05, 0, -4e-05] T  (mag ")
+
+
+def test_a_device_that_is_missing_at_the_end(tmp_path: Path, sysfs: Path) -> None:
+    done = run(sysfs, "monitor", write_plan(tmp_path), "--seconds", "0.3", status=1)
+    assert done.stderr.splitlines()[-1].startswith("fcsl-hal: device 'spare' is not there: no IIO device")
+    assert "rc: no healthy device" in done.stdout
+
+
+def test_curves(tmp_path: Path, sysfs: Path) -> None:
+    words = ("--sensor", "compass", "--plot", "--seconds", "0.4")
+    text = run(sysfs, "monitor", write_plan(tmp_path), *words).stdout
+    assert text.startswith("compass.field = [2e-05, 0, -4e-05] T\n") and "┤" in text and "tick" in text
+
+
+def test_a_terminal_is_redrawn(tmp_path: Path, sysfs: Path) -> None:
+    plan = write_plan(tmp_path)
+    primary, secondary = pty.openpty()
+    with subprocess.Popen(
+        [*HAL, "monitor", str(plan)], stdout=secondary, stderr=secondary, env=environment(sysfs)
+    ) as process:
+        os.close(secondary)
+        text, end = "", time.monotonic() + 10.0
+        while text.count("\x1b[J") < 3 and time.monotonic() < end:
+            if select.select([primary], [], [], 0.1)[0]:
+                text += os.read(primary, 65536).decode(errors="replace")
+        process.send_signal(signal.SIGINT)
+        assert process.wait(timeout=10) == 0
+        text += os.read(primary, 65536).decode(errors="replace")
+    os.close(primary)
+    assert "inertial (inertial): primary imu" in text and "corrected" in text
+    assert "\x1b[?25l" in text and text.rstrip().endswith("\x1b[?25h")
+
+
+@pytest.mark.parametrize(
+    ("words", "says"),
+    [
+        (["--sensor", "compas"], "did you mean `compass`?"),
+        (["--plot"], "give --seconds"),
+        (["--plot", "--json"], "not allowed with"),
+        (["--seconds", "nan"], "a number wanted"),
+    ],
+)
+def test_wrong_usage(tmp_path: Path, sysfs: Path, words: list[str], says: str) -> None:
+    assert says in run(sysfs, "monitor", write_plan(tmp_path), *words, status=2).stderr
+
+
+def test_a_device_that_is_there_and_cannot_be_opened(tmp_path: Path, sysfs: Path) -> None:
+    plan = write_plan(tmp_path, receiver=str(tmp_path / "board.json"))
+    assert "is no serial device" in run(sysfs, "monitor", plan, "--seconds", "0.3", status=1).stderr
