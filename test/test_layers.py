@@ -45,7 +45,7 @@ FOLDERS: dict[str, Sequence[str]] = {
     "fcsl_sim": ("",),
     "fcsl_bridge": ("",),
     "verify": (
-        *("shared", "binary", "bits", "coverage", "eva", "foxglove", "fuzz", "instructions", "link"),
+        *("shared", "binary", "bits", "coverage", "eva", "foxglove", "fuzz", "hardware", "instructions", "link"),
         *("mutation", "pil", "sanitize", ""),
     ),
     "bench": ("harness", "machines", "peers", "subjects", ""),

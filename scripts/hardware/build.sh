@@ -1,7 +1,7 @@
 #!/usr/bin/env bash
 # Builds the kernel of `make hardware`, Linux as a process of this computer, and prints its path. It is built once
 # for a version of Debian's source and of kernel.config, in the cache of fcslc; a second run returns at once. All else that it says
-# goes to standard error.
+# goes to standard error. With --if-built it builds nothing, and ends with status 77 where there is none.
 set -euo pipefail
 exec 3>&1 1>&2
 cd "$(dirname "$0")/../.."
@@ -31,6 +31,7 @@ build() {
     cp "$1/$source/drivers/i2c/i2c-stub.ko" "$1/built"
 }
 
+if [ "${1:-}" = --if-built ] && { [ "$(uname -m)" != x86_64 ] || [ -n "$(missing)" ]; }; then exit 77; fi
 if [ "$(uname -m)" != x86_64 ]; then die "make hardware: user-mode Linux runs on x86-64 only"; fi
 if [ -n "$(missing)" ]; then
     package_lists
@@ -39,6 +40,7 @@ if [ -n "$(missing)" ]; then
 fi
 version=$(dpkg-query -W -f '${Version}' "$source")
 kernel=$cache/uml-$( (echo "$version" && cat "$config") | sha256sum | cut -c 1-16)
+if [ "${1:-}" = --if-built ] && [ ! -x "$kernel/linux" ]; then exit 77; fi
 if [ ! -x "$kernel/linux" ]; then
     (umask 077 && mkdir -p "$cache")
     exec 4> "$cache/uml.lock"

@@ -15,6 +15,7 @@ ALONE = {
     "foxglove": "foxglove.main",
     "fuzz": "fuzz.main",
     "fuzz_telemetry": "fuzz.telemetry",
+    "hardware": "hardware.main",
     "instruction_table": "instructions.table",
     "instructions": "instructions.main",
     "link": "link.main",
