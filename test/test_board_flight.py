@@ -414,6 +414,6 @@ def test_a_device_paces_the_loop(tmp_path: Path) -> None:
     assert re.search(r"device 'robot', which paces the loop, has given nothing for 5\d\d(\.\d+)? ms", complaint), (
         complaint
     )
-    assert "paced by a device" in out and re.search(r"^fcsl-fc: 100 ticks,", out, re.MULTILINE), out
+    assert "paced in real time" in out and re.search(r"^fcsl-fc: 100 ticks,", out, re.MULTILINE), out
     whole = replay(bag, library=str(machine), board=tmp_path / "board.plan")
     assert whole.identical and whole.ticks == 100, str(whole)

@@ -193,6 +193,31 @@ static void test_running_channel(void)
     driver->close(rig.self);
 }
 
+/* Two channels of a chip with one period for both, as the kernel shows those of a PCA9685 that has just got its power: enabled, without
+ * pulses. Both are off before one gets the new period; with pulses, only the first write does that. */
+static void test_enabled_channels(void)
+{
+    static const char *const DUTIES[] = {"0\n", "1000000\n"};
+    for (size_t i = 0; i < sizeof DUTIES / sizeof DUTIES[0]; i++) {
+        rig_t rig;
+        make_channel(CHIP, 0, "5079040\n", DUTIES[i], "1\n");
+        make_channel(CHIP, 1, "5079040\n", DUTIES[i], "1\n");
+        CHECK(open_pulses(&rig, "pwmchip0", "01") == FCSL_DRIVER_OK);
+        CHECK(has_number(CHIP "pwm1/enable", i == 0u ? 0 : 1));
+        CHECK(has_number(CHIP "pwm1/period", i == 0u ? 20000000 : 5079040));
+        set_pulse(&rig, 0, 1100.0);
+        set_pulse(&rig, 1, NAN); /* what is set up, and what gets no pulse */
+        CHECK(write_pulses(&rig) == FCSL_DRIVER_FAILED && strstr(rig.why, "pulse1: nan us is no pulse") != NULL);
+        CHECK(has_number(CHIP "pwm0/period", 20000000) && has_number(CHIP "pwm0/enable", 1));
+        CHECK(has_number(CHIP "pwm1/period", 20000000) && has_number(CHIP "pwm1/enable", 0));
+        set_pulse(&rig, 1, 1200.0);
+        CHECK(write_pulses(&rig) == FCSL_DRIVER_OK);
+        CHECK(has_number(CHIP "pwm0/duty_cycle", 1100000) && has_number(CHIP "pwm1/duty_cycle", 1200000));
+        CHECK(has_number(CHIP "pwm1/enable", 1));
+        driver->close(rig.self);
+    }
+}
+
 /* It keeps no other channel from its pulse. */
 static void test_impossible_pulses(void)
 {
@@ -300,6 +325,7 @@ int main(void)
     test_writes();
     test_rewrite();
     test_running_channel();
+    test_enabled_channels();
     test_impossible_pulses();
     test_chips_that_refuse();
     test_export();

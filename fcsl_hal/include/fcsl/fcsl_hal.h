@@ -30,7 +30,7 @@ typedef enum {
 typedef enum {
     FCSL_PACED_BY_HOST = 0,      /* the clock */
     FCSL_PACED_BY_SIMULATOR = 1, /* the time is simulated */
-    FCSL_PACED_BY_DEVICE = 2     /* each of its samples is a tick, in real time */
+    FCSL_PACED_IN_REAL_TIME = 2  /* a device, each of whose samples is a tick; or a simulator that keeps real time */
 } fcsl_pacer_t;
 
 typedef struct fcsl_hal {
@@ -74,6 +74,8 @@ typedef struct fcsl_hal {
     /* Who decides when tick k happens. Where it is not the host, sample(k) does, and the host must not pace itself. Known after
      * open. */
     fcsl_pacer_t paces;
+    /* Why ticks cannot wait for a client; null: they can. */
+    const char *no_pause;
 } fcsl_hal_t;
 
 /* Samples nothing, accepts everything. Returns 0, or -1 with `error` filled. */

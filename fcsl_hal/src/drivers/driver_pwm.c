@@ -45,6 +45,7 @@ typedef struct {
     uint8_t is_open;
     uint64_t look_ns; /* when a chip that has gone is looked for */
     uint64_t rewrite_ns;
+    uint8_t writes_all; /* this write, what has not changed, too */
 } pwm_t;
 
 #define PULSE(index_)                                                                                                  \
@@ -195,20 +196,18 @@ static fcsl_driver_status_t put_ns(const char *folder, const char *attribute, ui
     return put(folder, attribute, text, why, size);
 }
 
-/* Sets the period. The kernel refuses one that is shorter than the pulse: that becomes `duty_ns` before. */
-static fcsl_driver_status_t set_period(const char *folder, uint64_t period_ns, uint64_t duty_ns, char *why, size_t size)
+/* Sets the period. A channel of another one is switched off before: a chip with one period for all channels takes another one only
+ * while no other channel is on, and the kernel refuses one that is shorter than the pulse. */
+static fcsl_driver_status_t set_period(const char *folder, uint64_t period_ns, char *why, size_t size)
 {
     double period = 0.0;
-    double duty = 0.0;
     fcsl_driver_status_t status = get_ns(folder, "period", &period, why, size);
-    if (status == FCSL_DRIVER_OK) {
-        status = get_ns(folder, "duty_cycle", &duty, why, size);
-    }
     if (status != FCSL_DRIVER_OK || period == (double)period_ns) {
         return status;
     }
-    if (duty > (double)period_ns) {
-        status = put_ns(folder, "duty_cycle", duty_ns, why, size);
+    if (period > 0.0) { /* one without a period is off, and takes no pulse */
+        status = put(folder, "enable", "0", why, size);
+        status = status == FCSL_DRIVER_OK ? put(folder, "duty_cycle", "0", why, size) : status;
     }
     if (status != FCSL_DRIVER_OK) {
         return status;
@@ -223,10 +222,10 @@ static fcsl_driver_status_t set_period(const char *folder, uint64_t period_ns, u
 }
 
 /* Sets period and polarity. Chips that cannot invert have no polarity, or refuse it. */
-static fcsl_driver_status_t set_up(const char *folder, uint64_t period_ns, uint64_t duty_ns, char *why, size_t size)
+static fcsl_driver_status_t set_up(const char *folder, uint64_t period_ns, char *why, size_t size)
 {
     char polarity[SYSFS_TEXT_BYTES];
-    fcsl_driver_status_t status = set_period(folder, period_ns, duty_ns, why, size);
+    fcsl_driver_status_t status = set_period(folder, period_ns, why, size);
     if (status != FCSL_DRIVER_OK) {
         return status;
     }
@@ -237,15 +236,18 @@ static fcsl_driver_status_t set_up(const char *folder, uint64_t period_ns, uint6
     return status == FCSL_DRIVER_NOTHING ? FCSL_DRIVER_OK : status;
 }
 
-/* One that runs is left alone until the first write. */
+/* One that has pulses is left alone until the first write. The kernel calls all channels of some chips enabled, those without pulses,
+ * too. */
 static fcsl_driver_status_t open_channel(pwm_t *pwm, unsigned index, const char *folder, char *why, size_t size)
 {
     channel_t *channel = &pwm->channels[index];
     char path[SYSFS_PATH_BYTES];
     double enabled = 0.0;
+    double duty = 0.0;
     fcsl_driver_status_t status = get_ns(folder, "enable", &enabled, why, size);
-    if (status == FCSL_DRIVER_OK && enabled == 0.0) {
-        status = set_up(folder, pwm->period_ns, 0, why, size);
+    status = status == FCSL_DRIVER_OK ? get_ns(folder, "duty_cycle", &duty, why, size) : status;
+    if (status == FCSL_DRIVER_OK && (enabled == 0.0 || duty == 0.0)) {
+        status = set_up(folder, pwm->period_ns, why, size);
         channel->is_set_up = status == FCSL_DRIVER_OK;
     }
     if (status != FCSL_DRIVER_OK) {
@@ -363,28 +365,41 @@ static fcsl_driver_status_t write_duty(channel_t *channel, uint64_t duty_ns, cha
     return code == ENODEV || code == ENOENT ? FCSL_DRIVER_ABSENT : FCSL_DRIVER_FAILED;
 }
 
-/* Brings a channel to its pulse: what has changed of it, or `all`. */
-static fcsl_driver_status_t write_channel(pwm_t *pwm, unsigned index, int all, char *why, size_t size)
+/* What open has left to the first write. */
+static fcsl_driver_status_t set_up_channel(pwm_t *pwm, unsigned index, char *why, size_t size)
+{
+    channel_t *channel = &pwm->channels[index];
+    char folder[SYSFS_PATH_BYTES];
+    fcsl_driver_status_t status = FCSL_DRIVER_OK;
+    (void)channel_folder(pwm, index, folder); /* open_channel has used it */
+    if (!channel->is_set_up) {
+        status = set_up(folder, pwm->period_ns, why, size);
+        channel->is_set_up = status == FCSL_DRIVER_OK;
+    }
+    return status == FCSL_DRIVER_NOTHING ? FCSL_DRIVER_ABSENT : status;
+}
+
+/* Brings a channel to its pulse: what has changed of it, or all. */
+static fcsl_driver_status_t write_channel(pwm_t *pwm, unsigned index, char *why, size_t size)
 {
     channel_t *channel = &pwm->channels[index];
     const double duty = pwm->pulses[index] * 1000.0;
     char folder[SYSFS_PATH_BYTES];
     fcsl_driver_status_t status = FCSL_DRIVER_OK;
     (void)channel_folder(pwm, index, folder); /* open_channel has used it */
+    if (!channel->is_set_up) {
+        return FCSL_DRIVER_OK; /* set_up_channel has failed, and said why */
+    }
     if (!(duty >= 0.0 && duty <= (double)pwm->period_ns)) { /* NaN, too */
         (void)snprintf(why, size, "%g us is no pulse within the period of %g us", pwm->pulses[index],
                        (double)pwm->period_ns / 1000.0);
         return FCSL_DRIVER_FAILED;
     }
     const uint64_t duty_ns = (uint64_t)llround(duty);
-    if (!channel->is_set_up) {
-        status = set_up(folder, pwm->period_ns, duty_ns, why, size);
-        channel->is_set_up = status == FCSL_DRIVER_OK;
-    }
-    if (status == FCSL_DRIVER_OK && (all || !channel->is_written || duty_ns != channel->duty_ns)) {
+    if (pwm->writes_all || !channel->is_written || duty_ns != channel->duty_ns) {
         status = write_duty(channel, duty_ns, why, size);
     }
-    if (status == FCSL_DRIVER_OK && (all || !channel->is_enabled)) {
+    if (status == FCSL_DRIVER_OK && (pwm->writes_all || !channel->is_enabled)) {
         status = put(folder, "enable", "1", why, size);
         channel->is_enabled = status == FCSL_DRIVER_OK;
     }
@@ -394,15 +409,17 @@ static fcsl_driver_status_t write_channel(pwm_t *pwm, unsigned index, int all, c
     return status == FCSL_DRIVER_NOTHING ? FCSL_DRIVER_ABSENT : status;
 }
 
-/* A channel that refuses its pulse keeps no other one from its own. */
-static fcsl_driver_status_t write_channels(pwm_t *pwm, int all, char *why, size_t size)
+typedef fcsl_driver_status_t (*act_t)(pwm_t *pwm, unsigned index, char *why, size_t size);
+
+/* A channel that refuses keeps no other one from its own. */
+static fcsl_driver_status_t act_on_all(pwm_t *pwm, act_t act, char *why, size_t size)
 {
     fcsl_driver_status_t result = FCSL_DRIVER_OK;
     for (unsigned i = 0; i < CHANNELS; i++) {
         if (pwm->used[i] == 0u) {
             continue;
         }
-        const fcsl_driver_status_t status = write_channel(pwm, i, all, why, size);
+        const fcsl_driver_status_t status = act(pwm, i, why, size);
         if (status != FCSL_DRIVER_OK) {
             result = fail(i, why, size);
         }
@@ -413,6 +430,17 @@ static fcsl_driver_status_t write_channels(pwm_t *pwm, int all, char *why, size_
         }
     }
     return result;
+}
+
+/* All are set up before one gets its pulse: set_period says why. */
+static fcsl_driver_status_t write_channels(pwm_t *pwm, char *why, size_t size)
+{
+    const fcsl_driver_status_t set_up_all = act_on_all(pwm, set_up_channel, why, size);
+    if (!pwm->is_open) {
+        return set_up_all;
+    }
+    const fcsl_driver_status_t written = act_on_all(pwm, write_channel, why, size);
+    return written != FCSL_DRIVER_OK ? written : set_up_all;
 }
 
 static fcsl_driver_status_t write_pwm(void *self, char *why, size_t size)
@@ -429,9 +457,9 @@ static fcsl_driver_status_t write_pwm(void *self, char *why, size_t size)
             return FCSL_DRIVER_FAILED;
         }
     }
-    const int all = now_ns >= pwm->rewrite_ns;
-    pwm->rewrite_ns = all ? now_ns + REWRITE_NS : pwm->rewrite_ns;
-    return write_channels(pwm, all, why, size);
+    pwm->writes_all = now_ns >= pwm->rewrite_ns;
+    pwm->rewrite_ns = pwm->writes_all ? now_ns + REWRITE_NS : pwm->rewrite_ns;
+    return write_channels(pwm, why, size);
 }
 
 const fcsl_driver_t fcsl_driver_pwm = {

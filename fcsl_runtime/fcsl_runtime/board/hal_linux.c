@@ -224,6 +224,19 @@ static int open_board(hal_t *hal, const char *file, fcsl_error_t *error)
     return hal->devices != NULL && counters_open(&hal->counters, hal->plan, error) == 0 ? 0 : -1;
 }
 
+int hal_linux_feeds(const fcsl_hal_t *hal, uint32_t channel)
+{
+    const hal_t *self = hal->ctx;
+    for (uint32_t s = 0; s < self->plan->sensor_count; s++) {
+        for (uint32_t i = 0; i < self->plan->sensors[s].binding_count; i++) {
+            if (self->board->sensors[s].channels[i].channel == channel) {
+                return 1;
+            }
+        }
+    }
+    return 0;
+}
+
 int hal_linux_record(const fcsl_hal_t *hal, const char *name_space, fcsl_error_t *error)
 {
     hal_t *self = hal->ctx;
@@ -262,7 +275,7 @@ int hal_linux(const char *file, fcsl_run_t *run, fcsl_hal_t *hal, fcsl_error_t *
         .counters = self->counters.values,
         .counter_bytes = self->counters.count * (uint32_t)sizeof(uint64_t),
         .serves = 1,
-        .paces = self->plan->pacing != BOARD_NO_DEVICE ? FCSL_PACED_BY_DEVICE : FCSL_PACED_BY_HOST,
+        .paces = self->plan->pacing != BOARD_NO_DEVICE ? FCSL_PACED_IN_REAL_TIME : FCSL_PACED_BY_HOST,
     };
     return 0;
 }

@@ -11,6 +11,8 @@
 
 /* `file`: the plan that `fcslc board` has written, for the machine of `run`. 0, or -1. */
 int hal_linux(const char *file, fcsl_run_t *run, fcsl_hal_t *hal, fcsl_error_t *error);
+/* Whether a sensor of the board gives this channel of the machine its samples. */
+int hal_linux_feeds(const fcsl_hal_t *hal, uint32_t channel);
 /* Records the readings of the devices with the run, which is being recorded (readings.h). 0, or -1. */
 int hal_linux_record(const fcsl_hal_t *hal, const char *name_space, fcsl_error_t *error);
 

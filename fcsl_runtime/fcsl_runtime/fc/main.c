@@ -9,6 +9,7 @@
 #include <string.h>
 #include <unistd.h>
 
+#include "board/hal_composite.h"
 #include "board/hal_linux.h"
 #include "guard_link.h"
 #include "monitor.h"
@@ -25,6 +26,7 @@ enum { EXIT_RUN = 1, EXIT_USAGE = 2, EXIT_LATE = 3, EXIT_STUCK = 4 };
 typedef struct {
     options_t options;
     loop_t loop;
+    fcsl_hal_t board; /* of loop.hal: hal_linux, alone or beside a simulator; ctx null: none */
     fcsl_vars_block_t blocks[2]; /* the machine, and what the HAL knows of itself */
     uint32_t block_count;
     atomic_int stop;
@@ -53,29 +55,48 @@ static int open_system(program_t *program)
     return 0;
 }
 
+/* The HAL that options->peer names. */
+static int make_named_hal(const options_t *options, fcsl_run_t *run, fcsl_hal_t *hal, fcsl_error_t *error)
+{
+    const fcsl_machine_t *machine = fcsl_run_machine(run);
+    const uint32_t timeout_ms = (uint32_t)options->timeout_ms;
+    const char *peer = options->peer;
+    if (peer == NULL) {
+        return fcsl_hal_stub(hal, error->text, sizeof error->text);
+    }
+    if (strncmp(peer, OPTIONS_WIRE, strlen(OPTIONS_WIRE)) == 0) {
+        return fcsl_hal_wire(peer + strlen(OPTIONS_WIRE), machine, timeout_ms, hal, error->text, sizeof error->text);
+    }
+    if (options_hal_is_linux(options)) {
+        return hal_linux(peer + strlen(OPTIONS_LINUX), run, hal, error);
+    }
+    if (options_hal_is_ros(options)) {
+        return hal_ros(peer + strlen(OPTIONS_ROS), options->name_space, run, hal, error);
+    }
+    return fcsl_hal_bus(peer, options->name_space, machine, timeout_ms, timeout_ms, hal, error->text,
+                        sizeof error->text);
+}
+
 /* Constructs the HAL; nothing is opened yet. */
 static int make_hal(program_t *program)
 {
     fcsl_error_t error;
     const options_t *options = &program->options;
-    fcsl_hal_t *hal = &program->loop.hal;
-    const fcsl_machine_t *machine = fcsl_run_machine(program->loop.run);
-    const uint32_t timeout_ms = (uint32_t)options->timeout_ms;
-    const char *peer = options->peer;
-    int status = 0;
-    if (peer == NULL) {
-        status = fcsl_hal_stub(hal, error.text, sizeof error.text);
-    } else if (strncmp(peer, OPTIONS_WIRE, strlen(OPTIONS_WIRE)) == 0) {
-        status = fcsl_hal_wire(peer + strlen(OPTIONS_WIRE), machine, timeout_ms, hal, error.text, sizeof error.text);
-    } else if (options_hal_is_linux(options)) {
-        status = hal_linux(peer + strlen(OPTIONS_LINUX), program->loop.run, hal, &error);
-    } else if (options_hal_is_ros(options)) {
-        status = hal_ros(peer + strlen(OPTIONS_ROS), options->name_space, program->loop.run, hal, &error);
-    } else {
-        status = fcsl_hal_bus(peer, options->name_space, machine, timeout_ms, timeout_ms, hal, error.text,
-                              sizeof error.text);
+    loop_t *loop = &program->loop;
+    fcsl_hal_t named;
+    if (make_named_hal(options, loop->run, &named, &error) != 0) {
+        return complain(error.text);
     }
-    return status == 0 ? 0 : complain(error.text);
+    if (!options_hal_is_composite(options)) {
+        loop->hal = named;
+        program->board = options_hal_is_linux(options) ? loop->hal : (fcsl_hal_t){0};
+        return 0;
+    }
+    if (hal_linux(options->composite_plan, loop->run, &program->board, &error) != 0) {
+        named.close(named.ctx);
+        return complain(error.text);
+    }
+    return hal_composite(&program->board, &named, loop->run, &loop->hal, &error) == 0 ? 0 : complain(error.text);
 }
 
 static int open_run(program_t *program)
@@ -184,7 +205,7 @@ static int open_record(program_t *program)
     };
     if (fcsl_run_record(loop->run, &record, &error) != 0 ||
         hal_topic_open(&loop->hal_topic, &loop->hal, loop->run, record.name_space, &error) != 0 ||
-        (options_hal_is_linux(&program->options) && hal_linux_record(&loop->hal, record.name_space, &error) != 0)) {
+        (program->board.ctx != NULL && hal_linux_record(&program->board, record.name_space, &error) != 0)) {
         return complain(error.text);
     }
     loop->recording = 1;
@@ -263,13 +284,16 @@ static void announce(const program_t *program)
     const fcsl_machine_t *machine = fcsl_run_machine(program->loop.run);
     static const char *const PACES[] = {[FCSL_PACED_BY_HOST] = "as fast as possible",
                                         [FCSL_PACED_BY_SIMULATOR] = "paced by the simulator",
-                                        [FCSL_PACED_BY_DEVICE] = "paced by a device"};
+                                        [FCSL_PACED_IN_REAL_TIME] = "paced in real time"};
     const fcsl_pacer_t paces = program->loop.hal.paces;
     const char *pace = paces == FCSL_PACED_BY_HOST && program->loop.realtime ? "real time" : PACES[paces];
     const int timed = program->loop.realtime && !program->options.no_overrun_check;
     log_info("machine '%s', %" PRIu64 " Hz, HAL %s, %s%s%s", machine->name, machine->tick_hz,
              program->options.peer != NULL ? program->options.peer : "stub", pace, timed ? "" : ", executes not timed",
              program->loop.paused ? ", paused" : "");
+    if (options_hal_is_composite(&program->options)) {
+        log_info("sensors of the board %s instead of the simulator's", program->options.composite_plan);
+    }
     if (program->options.restore != NULL) {
         log_info("begins at tick %" PRIu64 ", from %s", fcsl_run_tick(program->loop.run), program->options.restore);
     }

@@ -33,6 +33,8 @@ static const char USAGE[] =
     "there\n"
     "                          linux:PLAN: the sensors of this computer, as a plan of `fcslc board` says "
     "(docs/board.md)\n"
+    "                          composite:PLAN,wire:SPEC (or ,zenoh:…): these sensors, and all others from the "
+    "simulator\n"
     "  --timeout-ms N          how long to wait for the simulator's next message (default 2000)\n"
     "  --board LIBRARY.so      the board that hw_* of algorithms reach (fcsl/fcsl_hw.h); default: simulated hardware\n"
     "  --guard PATH            the actuators belong to the fcsl-guard that listens on PATH (docs/guard.md)\n"
@@ -94,9 +96,33 @@ typedef struct {
     int (*read)(const char *text, options_t *options); /* WORD */
 } entry_t;
 
+/* composite:PLAN,wire:SPEC or composite:PLAN,zenoh:…; returns what stands behind the comma, or null after a message. */
+static const char *read_composite(const char *text, options_t *options)
+{
+    const char *plan = text + strlen(OPTIONS_COMPOSITE);
+    const char *wire = strstr(plan, "," OPTIONS_WIRE);
+    const char *comma = wire != NULL ? wire : strstr(plan, ",zenoh");
+    const size_t length = comma != NULL ? (size_t)(comma - plan) : 0u;
+    if (length == 0u || length >= sizeof options->composite_plan) {
+        (void)usage_error(
+            "--hal composite:PLAN,HAL needs the plan of a board and wire:SPEC or zenoh:tcp/HOST:PORT, not ", text);
+        return NULL;
+    }
+    memcpy(options->composite_plan, plan, length);
+    options->composite_plan[length] = '\0';
+    return comma + 1;
+}
+
 static int read_hal(const char *text, options_t *options)
 {
     char error[ERROR_BYTES];
+    options->composite_plan[0] = '\0';
+    if (strncmp(text, OPTIONS_COMPOSITE, strlen(OPTIONS_COMPOSITE)) == 0) {
+        text = read_composite(text, options);
+        if (text == NULL) {
+            return -1;
+        }
+    }
     const int is_wire = strncmp(text, OPTIONS_WIRE, strlen(OPTIONS_WIRE)) == 0;
     options->peer = strcmp(text, "stub") == 0 ? NULL : text;
     if (options->peer == NULL) {
@@ -106,7 +132,8 @@ static int read_hal(const char *text, options_t *options)
         return 0;
     }
     if (!is_wire && strncmp(text, "zenoh", strlen("zenoh")) != 0) {
-        return usage_error("--hal must be stub, linux:PLAN, wire:SPEC, zenoh:tcp/HOST:PORT or ros:tcp/HOST:PORT, not ",
+        return usage_error("--hal must be stub, linux:PLAN, wire:SPEC, zenoh:tcp/HOST:PORT, composite:PLAN,HAL or "
+                           "ros:tcp/HOST:PORT, not ",
                            text);
     }
     const int failed = is_wire ? fcsl_wire_check(text + strlen(OPTIONS_WIRE), error, sizeof error)
@@ -229,6 +256,12 @@ static int check(const options_t *options)
 {
     if (options->paused && options->socket == NULL) {
         return usage_error("--paused needs --socket: only commands make ticks then", "");
+    }
+    if (options->paused && options_hal_is_composite(options)) {
+        return usage_error("--paused does not go with --hal composite:…: real devices do not wait", "");
+    }
+    if (options_hal_is_composite(options) && fcsl_hal_bus_runs_free(options->peer)) {
+        return usage_error("--hal composite:…,free-running: there is no simulator beside the board; write linux:PLAN", "");
     }
     if (options->checkpoints != NULL && options->socket == NULL) {
         return usage_error("--checkpoints needs --socket: its files are what clients name", "");

@@ -10,12 +10,16 @@
 /* What a recording does that the disk cannot keep up with. */
 typedef enum { RECORD_BY_PACE, RECORD_WAIT, RECORD_DROP } record_policy_t;
 
+enum { OPTIONS_PATH_BYTES = 4096 };
+
 typedef struct {
     const char *library;
     const char *machine;    /* null: the only one */
     const char *
         peer; /* OPTIONS_WIRE and a SPEC of fcsl_wire.h, an address of fcsl_hal_bus, OPTIONS_ROS and an endpoint, or OPTIONS_LINUX
                * and the plan of a board; null: the stub HAL */
+    char
+        composite_plan[OPTIONS_PATH_BYTES]; /* of the board whose sensors take the place of the simulator's; "": none */
     const char *board; /* null: simulated hardware */
     const char *guard; /* socket of fcsl-guard; null: none */
     const char *restore; /* file of a checkpoint to begin from; null: from tick 0 */
@@ -46,14 +50,21 @@ typedef struct {
     int exit_on_stdin_eof; /* the end of standard input is a signal to end */
 } options_t;
 
-#define OPTIONS_ANY_CPU UINT64_MAX
-#define OPTIONS_WIRE    "wire:"
-#define OPTIONS_ROS     "ros:"
-#define OPTIONS_LINUX   "linux:"
+#define OPTIONS_ANY_CPU   UINT64_MAX
+#define OPTIONS_WIRE      "wire:"
+#define OPTIONS_ROS       "ros:"
+#define OPTIONS_LINUX     "linux:"
+#define OPTIONS_COMPOSITE "composite:"
 
 static inline int options_hal_is_linux(const options_t *options)
 {
     return options->peer != NULL && strncmp(options->peer, OPTIONS_LINUX, strlen(OPTIONS_LINUX)) == 0;
+}
+
+/* Beside the simulator that `peer` names. */
+static inline int options_hal_is_composite(const options_t *options)
+{
+    return options->composite_plan[0] != '\0';
 }
 
 static inline int options_hal_is_ros(const options_t *options)

@@ -18,6 +18,10 @@ static fcsl_vars_status_t restore(void *ctx, const void *data, const fcsl_hw_sim
     loop_t *loop = ctx;
     const fcsl_machine_t *machine = fcsl_run_machine(loop->run);
     uint64_t tick = 0;
+    if (loop->hal.no_pause != NULL) {
+        (void)snprintf(error->text, sizeof error->text, "%s", loop->hal.no_pause);
+        return FCSL_VARS_REFUSED;
+    }
     memcpy(&tick, (const uint8_t *)data + machine->tick_offset, sizeof tick);
     if (loop->hal.paces == FCSL_PACED_BY_SIMULATOR && tick != fcsl_run_tick(loop->run)) {
         (void)snprintf(error->text, sizeof error->text,
@@ -44,7 +48,10 @@ static void pace_recording(loop_t *loop)
 static fcsl_vars_status_t set_paused(void *ctx, int paused, fcsl_error_t *error)
 {
     loop_t *loop = ctx;
-    (void)error;
+    if (paused && loop->hal.no_pause != NULL) {
+        (void)snprintf(error->text, sizeof error->text, "%s", loop->hal.no_pause);
+        return FCSL_VARS_REFUSED;
+    }
     loop->paused = paused;
     pace_recording(loop);
     return FCSL_VARS_OK;
