@@ -585,6 +585,14 @@ def test_a_board_may_be_for_sensors_or_for_outputs(folder: Path) -> None:
     assert {d.code for d in found(folder, board)} == {"W501"}
 
 
+def test_a_channel_that_nothing_drives_on_purpose(folder: Path) -> None:
+    board = check_board(write_board(folder, edited("outputs", "force", value=None)))
+    assert {d.code for d in board.warnings} == {"W501"}  # of its device
+    assert "\nundriven force\nend\n" in plan_text(board)
+    (error,) = found(folder, edited("outputs", "imu.gyro", value=None))
+    assert error.code == "E515"
+
+
 @pytest.mark.parametrize("rest", [{}, {"sensors": {}}, {"outputs": {}}, {"sensors": {}, "outputs": {}}])
 def test_a_board_for_nothing(rest: dict[str, Any], folder: Path) -> None:
     (error,) = found(folder, {"machine": "quad.json", "devices": {}, **rest})

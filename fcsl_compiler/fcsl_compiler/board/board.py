@@ -24,13 +24,14 @@ SCHEMA = Path(__file__).parent / "board.schema.json"
 
 @dataclass(frozen=True)
 class Board:
-    """A checked board, and the warnings of its check."""
+    """A checked board, and the warnings of its check. `undriven`: actuator channels without an output, on purpose."""
 
     path: Path
     machine: Machine
     devices: tuple[Device, ...]
     sensors: tuple[Sensor, ...]
     outputs: tuple[Output, ...]
+    undriven: tuple[str, ...]
     pace: Pace | None
     warnings: tuple[Diagnostic, ...]
 
@@ -66,7 +67,8 @@ def check_board(path: Path) -> Board:
         raise DiagnosticError([*of_machine, *(d for d in sink.diagnostics if d.severity is Severity.ERROR)])
     assert machine is not None
     used = tuple(d for d in devices.values() if d)
-    return Board(path, machine, used, sensors, outputs, pace, tuple(sink.diagnostics))
+    undriven = tuple(actuators.undriven)
+    return Board(path, machine, used, sensors, outputs, undriven, pace, tuple(sink.diagnostics))
 
 
 def _parse(path: Path, sink: DiagnosticSink) -> JsonNode | None:

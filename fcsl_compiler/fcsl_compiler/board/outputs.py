@@ -33,6 +33,8 @@ class OutputReader:
     ):
         self.machine, self.devices, self.reader = machine, devices, reader
         self.used: set[str] = set()
+        #: Channels that nothing drives, as the file says.
+        self.undriven: list[str] = []
         self._of_sensors = of_sensors
         self._channels: set[str] = set()
         #: By driver, address and signal: two devices with one address are the same.
@@ -59,6 +61,10 @@ class OutputReader:
 
     def _output(self, name: str, node: JsonNode, span: Span) -> Output | None:
         self._channels.add(name)
+        if node.kind == "null":
+            if self._channel(name, span) is not None:
+                self.undriven.append(name)
+            return None
         keys = self.reader.object(node, f"output `{name}`", ("device", "elements"))
         if keys is None:
             return None

@@ -26,6 +26,7 @@ def plan_text(board: Board) -> str:
         lines += _sensor(sensor)
     for output in board.outputs:
         lines += _output(output)
+    lines += [f"undriven {name}" for name in board.undriven]
     return "\n".join([*lines, "end", ""])
 
 

@@ -316,6 +316,16 @@ static const char *on_pulse(parser_t *parser)
     return NULL;
 }
 
+static const char *on_undriven(parser_t *parser)
+{
+    board_plan_t *plan = parser->plan;
+    if (plan->undriven_count == BOARD_OUTPUTS_MAX) {
+        return "too many";
+    }
+    plan->undriven[plan->undriven_count++] = parser->word[1];
+    return fcsl_plan_is_path(parser->word[1]) ? NULL : "not a channel";
+}
+
 typedef enum { BELONGS_TO_BOARD, BELONGS_TO_SENSOR, BELONGS_TO_BACKEND, BELONGS_TO_OUTPUT } owner_t;
 
 static const struct {
@@ -339,6 +349,7 @@ static const struct {
     {"stick", 6, 0, BELONGS_TO_BACKEND, on_stick},
     {"section", 7, 0, BELONGS_TO_BACKEND, on_section},
     {"output", 3, 0, BELONGS_TO_BOARD, on_output},
+    {"undriven", 2, 0, BELONGS_TO_BOARD, on_undriven},
     {"pulse", 10, 0, BELONGS_TO_OUTPUT, on_pulse},
 };
 

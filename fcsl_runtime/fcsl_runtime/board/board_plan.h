@@ -19,6 +19,7 @@
  *   section QUANTITY B0 B1 B2 A1 A2              bits; a biquad that the quantity goes through, in order
  *   output CHANNEL DEVICE                        an actuator channel; what follows, up to the next one, belongs to it
  *   pulse INDEX SIGNAL LOW HIGH MINIMUM MIDDLE MAXIMUM SLEW SAFE     bits; see board_pulse_t
+ *   undriven CHANNEL                             an actuator channel that nothing drives, on purpose
  *   end
  *
  * BITS are 16 hexadecimal digits, those of a double. A plan that was cut off lacks `end`.
@@ -96,6 +97,8 @@ typedef struct {
     uint32_t sensor_count;
     board_output_t outputs[BOARD_OUTPUTS_MAX];
     uint32_t output_count;
+    const char *undriven[BOARD_OUTPUTS_MAX]; /* actuator channels without an output */
+    uint32_t undriven_count;
 } board_plan_t;
 
 /* Reads the file. Returns a plan for board_plan_free, or null with a message that names file and line. */

@@ -103,18 +103,29 @@ static int has_pulse(const outputs_t *outputs, const fcsl_channel_t *channel, ui
     return 0;
 }
 
-/* An actuator that nothing drives would be found in flight. */
-static int check_all_driven(const outputs_t *outputs, const char *file, fcsl_error_t *error)
+static int is_undriven(const board_plan_t *plan, const fcsl_channel_t *channel)
+{
+    for (uint32_t i = 0; i < plan->undriven_count; i++) {
+        if (strcmp(plan->undriven[i], channel->name) == 0) {
+            return 1;
+        }
+    }
+    return 0;
+}
+
+/* An actuator that nothing drives would be found in flight, unless the board says so. */
+static int check_all_driven(const outputs_t *outputs, const board_plan_t *plan, const char *file, fcsl_error_t *error)
 {
     const fcsl_machine_t *machine = outputs->machine;
     for (uint32_t i = 0; i < machine->channel_count; i++) {
         const fcsl_channel_t *channel = &machine->channels[i];
-        const uint32_t count = channel->direction == FCSL_ACTUATOR ? machine->fields[channel->field].count : 0u;
+        const int is_meant = channel->direction == FCSL_ACTUATOR && !is_undriven(plan, channel);
+        const uint32_t count = is_meant ? machine->fields[channel->field].count : 0u;
         for (uint32_t index = 0; index < count; index++) {
             if (!has_pulse(outputs, channel, index)) {
                 return fcsl_fail(error,
                                  "element %" PRIu32 " of channel '%.60s' has no output in '%.200s': with --board every "
-                                 "actuator channel needs one in the plan, for each of its elements",
+                                 "actuator channel needs one in the plan, for each of its elements, or null",
                                  index, channel->name, file);
             }
         }
@@ -132,5 +143,5 @@ int outputs_add_board(outputs_t *outputs, const board_plan_t *plan, const char *
             return -1;
         }
     }
-    return check_all_driven(outputs, file, error);
+    return check_all_driven(outputs, plan, file, error);
 }

@@ -424,6 +424,13 @@ def test_a_wrong_plan(text: str, library: Path, tmp_path: Path) -> None:
     assert not (tmp_path / "a").exists()
 
 
+def test_a_channel_that_nothing_drives_on_purpose(library: Path, tmp_path: Path) -> None:
+    text = plan(*GOOD, "undriven panel.valve").replace(" T/", f" {tmp_path}/")
+    with guarding(library, tmp_path, text) as guard:
+        guard.wait_line("actuator cart.force[0]")
+        assert guard.end() == 0
+
+
 def test_a_board_or_actuators(library: Path, tmp_path: Path) -> None:
     arguments = [GUARD, library, "--slot", tmp_path / "slot", "--board", "x", "--actuator", "panel.valve=none"]
     done = subprocess.run(list(map(str, arguments)), capture_output=True, text=True, timeout=30, check=False)
