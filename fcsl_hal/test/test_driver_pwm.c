@@ -128,7 +128,7 @@ static void test_names(void)
     CHECK(probes(driver, path, FCSL_DRIVER_FAILED, "is no PWM chip"));
     put("class/pwm/pwmchip7/npwm", "1\n");
     CHECK(symlink("../../../devices/1-0040", in_tree("class/pwm/pwmchip7/device")) == 0);
-    CHECK(probes(driver, "1-0040", FCSL_DRIVER_FAILED, "'1-0040' has 2 PWM chips, pwmchip7 is one"));
+    CHECK(probes(driver, "1-0040", FCSL_DRIVER_FAILED, "'1-0040' names more than one PWM chip, "));
     remove_below("class/pwm/pwmchip7");
 }
 

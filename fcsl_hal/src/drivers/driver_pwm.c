@@ -20,7 +20,7 @@
 
 #include "monotonic.h"
 
-enum { CHANNELS = 16, CHIPS_MAX = 1024, TEXT_BYTES = 32, WHY_BYTES = 256, EXPORT_TRIES = 50 };
+enum { CHANNELS = 16, TEXT_BYTES = 32, WHY_BYTES = 256, EXPORT_TRIES = 50 };
 static const double HZ = 50.0; /* of most servos */
 static const double HZ_MAX = 100000.0;
 static const uint64_t EXPORT_WAIT_NS = 10000000u; /* udev gives the files of a new channel to their group */
@@ -62,7 +62,8 @@ static const fcsl_driver_signal_t signals[CHANNELS] = {
 };
 
 static const char *const names[] = {"device/name", "device/modalias", NULL};
-static const sysfs_class_t chips = {.noun = "PWM chip", .folder = "class/pwm", .prefix = "pwmchip", .names = names};
+static const sysfs_class_t chips = {
+    .noun = "PWM chip", .folder = "class/pwm", .prefix = "pwmchip", .names = names, .owner = "device"};
 
 /* ---- the chip ----------------------------------------------------------------------------------------------------------- */
 
@@ -87,51 +88,10 @@ static fcsl_driver_status_t parse(const char *device, char name[SYSFS_PATH_BYTES
     return FCSL_DRIVER_OK;
 }
 
-/* Whether the chip of this number belongs to the device: the name of that is the end of a link. */
-static int belongs_to(const char *classes, unsigned number, const char *device)
-{
-    char link[SYSFS_PATH_BYTES];
-    char target[SYSFS_PATH_BYTES];
-    char name[TEXT_BYTES];
-    (void)snprintf(name, sizeof name, "pwmchip%u/device", number);
-    const ssize_t length = sysfs_join(link, classes, name) == 0 ? readlink(link, target, sizeof target - 1u) : -1;
-    if (length < 0) {
-        return 0;
-    }
-    target[length] = '\0';
-    const char *slash = strrchr(target, '/');
-    return strcmp(slash != NULL ? slash + 1 : target, device) == 0;
-}
-
-/* NOTHING: no chip belongs to a device of this name. */
-static fcsl_driver_status_t find_by_device(const char *device, char *path, char *why, size_t size)
-{
-    char classes[SYSFS_PATH_BYTES];
-    char chip[TEXT_BYTES];
-    if (strchr(device, '/') != NULL || sysfs_join(classes, sysfs_root("FCSL_SYSFS", "/sys"), chips.folder) != 0) {
-        return FCSL_DRIVER_NOTHING;
-    }
-    unsigned found = 0;
-    for (unsigned number = 0; number < CHIPS_MAX; number++) {
-        if (belongs_to(classes, number, device)) {
-            (void)snprintf(chip, sizeof chip, "pwmchip%u", number);
-            found++;
-        }
-    }
-    if (found > 1u) {
-        (void)snprintf(why, size, "'%s' has %u PWM chips, %s is one: name it by its path", device, found, chip);
-        return FCSL_DRIVER_FAILED;
-    }
-    return found == 1u && sysfs_join(path, classes, chip) == 0 ? FCSL_DRIVER_OK : FCSL_DRIVER_NOTHING;
-}
-
 /* Finds the folder of a chip, and how many channels it has. */
 static fcsl_driver_status_t find_chip(const char *name, char *path, double *count, char *why, size_t size)
 {
-    fcsl_driver_status_t status = find_by_device(name, path, why, size);
-    if (status == FCSL_DRIVER_NOTHING) {
-        status = sysfs_find(&chips, name, path, why, size);
-    }
+    fcsl_driver_status_t status = sysfs_find(&chips, name, path, why, size);
     if (status != FCSL_DRIVER_OK) {
         return status;
     }

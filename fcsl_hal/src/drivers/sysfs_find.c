@@ -120,8 +120,9 @@ static fcsl_driver_status_t find_in(const sysfs_class_t *devices, const char *de
         entry = next_device(devices, folder, &entries);
     }
     if (found == 2u) {
+        const int by_name = devices->owner != NULL && !belongs_to(devices, path, device);
         (void)snprintf(why, size, "'%s' names more than one %s, %s and %s; name it by its path%s", device,
-                       devices->noun, path, other, devices->owner != NULL ? ", or its place on the bus: 1-0068" : "");
+                       devices->noun, path, other, by_name ? ", or its place on the bus: 1-0068" : "");
         return FCSL_DRIVER_FAILED;
     }
     if (found == 0u) {
