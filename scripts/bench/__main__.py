@@ -7,6 +7,7 @@ from pathlib import Path
 
 #: What can be run alone, and its module in subjects/.
 ALONE = {
+    "board": "board",
     "bus": "bus.main",
     "chain": "chain",
     "checkpoint": "checkpoint",

@@ -17,6 +17,7 @@ from pathlib import Path
 from typing import Any
 
 from .harness.size import SUFFIX
+from .subjects.board import board_rows, board_times
 from .subjects.bus.main import bus_figures, bus_rows
 from .subjects.chain import chain_summary, chain_times
 from .subjects.checkpoint import checkpoint_rows, checkpoint_times
@@ -138,6 +139,7 @@ SECTIONS = (
     Section("link", "flying in lock-step over every wire, and losing frames", link_figures, link_rows),
     Section("bus", "going round over the bus, beside sockets, Zenoh and Fast DDS", bus_figures, bus_rows),
     Section("lateness", "flying at 1 kHz under load, beside cyclictest (two minutes)", lateness, lateness_rows),
+    Section("board", "sampling three devices at 1 kHz, beside cyclictest", board_times, board_rows),
     Section("guard", "killing flight programs under a guard", guard_times, guard_rows),
     Section("lockstep_ticks_per_s", "flying the lander over ROS 2", lambda _: lockstep(), lockstep_rows),
     Section(
