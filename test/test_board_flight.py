@@ -65,8 +65,8 @@ MACHINE = {
         {"from": "FLIGHT", "to": "SAFE", "request": "LOSE"},
     ],
     "channels": [
-        {"name": "imu.gyro", "id": 1, "field": "sensors.outputs.gyro", "direction": "sensor", "max_age_ticks": 5},
-        {"name": "imu.turned", "id": 2, "field": "sensors.outputs.turned", "direction": "sensor", "max_age_ticks": 5},
+        {"name": "imu.gyro", "id": 1, "field": "sensors.outputs.gyro", "direction": "sensor", "max_age_ticks": 200},
+        {"name": "imu.turned", "id": 2, "field": "sensors.outputs.turned", "direction": "sensor", "max_age_ticks": 200},
     ],
 }
 IMU = {
@@ -76,7 +76,7 @@ IMU = {
         {"device": "top", "rotation": "yaw_90", "correct": {"gyro": {"offset": [0.1, 0.0, 0.0]}}},
         {"device": "bottom", "rotation": "roll_180"},
     ],
-    "health": {"max_age_s": 0.05, "recover_s": 0.2},
+    "health": {"max_age_s": 1.0, "recover_s": 0.2},
 }
 BOARD = {
     "machine": "craft.json",
@@ -383,7 +383,7 @@ ECHO_MACHINE = {
 PACED_BOARD = {
     "machine": "echo.json",
     "devices": {"robot": {"driver": "DRIVER", "device": "FIFO"}},
-    "pace": {"device": "robot", "timeout_s": 0.5},
+    "pace": {"device": "robot", "timeout_s": 2.0},
     "sensors": {"robot": {"kind": "value", "channels": {"value": "heard"}, "backends": [{"device": "robot"}]}},
 }
 
@@ -411,9 +411,8 @@ def test_a_device_paces_the_loop(tmp_path: Path) -> None:
                 time.sleep(0.1)
             out, complaint = process.communicate(timeout=LONG_S)
     assert process.returncode == 1
-    assert re.search(r"device 'robot', which paces the loop, has given nothing for 5\d\d(\.\d+)? ms", complaint), (
-        complaint
-    )
+    told = re.search(r"device 'robot', which paces the loop, has given nothing for (\d+(\.\d+)?) ms", complaint)
+    assert told and float(told[1]) > 2000, complaint
     assert "paced in real time" in out and re.search(r"^fcsl-fc: 100 ticks,", out, re.MULTILINE), out
     whole = replay(bag, library=str(machine), board=tmp_path / "board.plan")
     assert whole.identical and whole.ticks == 100, str(whole)

@@ -52,4 +52,4 @@ def test_the_steps(tmp_path: Path) -> None:
     whole = replay(tmp_path / "one_real", library=str(LIBRARY), board=tmp_path / "board.plan")
     assert whole.identical and whole.ticks > 250, str(whole)
     assert re.search(r"fcsl-guard: armed, at tick \d+", said["guard"]), said["guard"]
-    assert re.findall(r" number=(\S+)\s", said["guard"]) == ["1000", "1000"], said["guard"]  # safe at the end
+    assert re.findall(r" number=(\S+)\s", said["guard"])[-1] == "1000", said["guard"]  # safe at the end

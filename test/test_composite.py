@@ -115,9 +115,9 @@ def test_one_sensor_is_real(plan: Path, tmp_path: Path) -> None:
         out, complaint = fc.communicate(timeout=LONG_S)
         client.close()
     assert fc.returncode == 1
-    assert re.search(r"the simulator is 1(\.\d+)? s behind real time at tick \d+: beside real devices", complaint), (
-        complaint
-    )
+    assert re.search(
+        r"the simulator is [2-9](\.\d+)? s behind real time at tick \d+: beside real devices", complaint
+    ), complaint
     assert f"sensors of the board {plan} instead of the simulator's" in out and "paced in real time" in out
     whole = replay(bag, library=str(LIBRARY), machine="lander_control", board=plan)
     assert whole.identical and whole.ticks > 30, str(whole)

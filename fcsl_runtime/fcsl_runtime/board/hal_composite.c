@@ -13,7 +13,7 @@
 #include "hal_linux.h"
 
 static const uint64_t AHEAD_NS = 250000000u; /* of real time: the simulator goes too fast */
-static const uint64_t BEHIND_NS = 1000000000u; /* it is paused, or too slow */
+static const uint64_t BEHIND_NS = 2000000000u; /* it is paused, or too slow */
 static const char NO_PAUSE[] = "some sensors are real devices, which do not wait: end the flight instead";
 
 typedef struct {

@@ -28,6 +28,7 @@ def sysfs(tmp_path: Path) -> Path:
     write(imu.folder, sampling_frequency="1000.000000")
     Iio(root, 1, "bmi088", accel=(0.0, 0.0, 9.8))
     write(Iio(root, 2, "bmi088", anglvel=(0.0, 0.0, 0.0)).folder, label="gyro_2")
+    (root / "devices/i2c-1/1-0040").mkdir(parents=True)
     (root / "class/pwm/pwmchip0").mkdir(parents=True)
     (root / "class/pwm/pwmchip0/device").symlink_to("../../../devices/i2c-1/1-0040")
     write(root / "class/pwm/pwmchip0", npwm="16")
