@@ -114,6 +114,7 @@ def record_a_tick(zoo: Path, machine: str, bag: Path) -> tuple[AlgTwin, list[tup
 MACHINES = [
     "lander/lander_control",
     "ahrs/ahrs",
+    "arming/arming",
     "thermal_guard/thermal_guard",
     "minimal/minimal",
     "zoo/rover",

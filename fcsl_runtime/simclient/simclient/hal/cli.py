@@ -50,7 +50,9 @@ def _parser() -> argparse.ArgumentParser:
     command.add_argument("what", metavar="DRIVER|PLAN", help="a driver, or the file that `fcslc board` wrote")
     command.add_argument("device", nargs="?", metavar="DEVICE", help='the text of "device" in board.json')
     command.add_argument("--seconds", type=_seconds(60), default=2.0, metavar="N", help="wait for a sample (default 2)")
-    command.add_argument("--json", action="store_true", help="one JSON value")
+    shape = command.add_mutually_exclusive_group()
+    shape.add_argument("--json", action="store_true", help="one JSON value")
+    shape.add_argument("--plot", metavar="FILE", help="draw the filters of a PLAN: .png, .svg or .pdf")
     command = add("monitor", _monitor, "shows devices and sensors of a plan as they run; until Ctrl-C")
     command.add_argument("plan", metavar="PLAN", help="the file that `fcslc board` wrote")
     command.add_argument("--sensor", metavar="NAME", help="only this one")
@@ -117,7 +119,14 @@ def _describe(options: argparse.Namespace) -> None:
     if is_plan(options.what):
         if options.device is not None:
             raise TwinError(f"{options.what} is a plan: it has its devices itself")
-        describe_plan(options.what, options.json)
+        if options.plot is not None:
+            from .plot_filters import plot_filters
+
+            plot_filters(options.what, options.plot)
+        else:
+            describe_plan(options.what, options.json)
+    elif options.plot is not None:
+        raise TwinError(f"{options.what} is no plan: --plot draws the filters of a plan")
     else:
         describe_driver(options.what, options.device, options.seconds, options.json)
 
