@@ -360,7 +360,11 @@ def test_socket_is_private_and_not_taken_away(path: Path) -> None:
         ([], 2, "which machine library"),
         ([FIXTURE, "other"], 2, "other"),
         ([FIXTURE, "--nonsense"], 2, "--nonsense"),
-        ([FIXTURE, "--hal", "linux"], 2, "stub, wire:SPEC, zenoh:tcp/HOST:PORT or ros:tcp/HOST:PORT"),
+        (
+            [FIXTURE, "--hal", "linux"],
+            2,
+            "stub, linux:PLAN, wire:SPEC, zenoh:tcp/HOST:PORT, composite:PLAN,HAL or ros:tcp/HOST:PORT",
+        ),
         ([FIXTURE, "--hal", "wire:"], 2, "a wire is unix:PATH"),
         ([FIXTURE, "--rate", "fast"], 2, "realtime or max"),
         ([FIXTURE, "--ticks", "0"], 2, "--ticks"),
