@@ -1,5 +1,6 @@
 # SPDX-License-Identifier: Apache-2.0
-"""`python3 scripts/hardware` tries every device that guest/ offers; `python3 scripts/hardware run COMMAND…` runs a command in the guest."""
+"""`python3 scripts/hardware` tries every device that guest/ offers, and flies on them; `python3 scripts/hardware run COMMAND…` runs a
+command in the guest."""
 
 import argparse
 import os
@@ -10,7 +11,10 @@ from pathlib import Path
 
 # The modules here are those of the package `hardware`, which is found from the folder that holds it.
 sys.path[0] = str(Path(__file__).resolve().parents[1])
+from hardware.flight.craft import Craft  # noqa: E402
 from hardware.machine import HERE, Machine  # noqa: E402
+
+_LIMIT_S = 300.0
 
 
 def arguments() -> argparse.Namespace:
@@ -34,8 +38,12 @@ def main() -> int:
     args = arguments()
     if args.what == "run":
         return Machine(kernel(), args.write).run(args.command, os.environ, args.limit)
-    smoke = [sys.executable, "-m", "hardware.smoke"]
-    return Machine(kernel()).run(smoke, os.environ, 120.0)
+    craft = Craft(HERE.parents[1] / "out/hardware")
+    craft.build()
+    smoke, flights = ([sys.executable, "-m", f"hardware.{module}"] for module in ("smoke", "flights"))
+    # One after the other, each with a bus of its own: a boot has one.
+    statuses = [Machine(kernel()).run(line, os.environ, _LIMIT_S) for line in (smoke, [*flights, str(craft.folder)])]
+    return max(statuses)
 
 
 sys.exit(main())

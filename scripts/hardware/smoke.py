@@ -9,6 +9,7 @@ import struct
 import sys
 import time
 from collections.abc import Callable
+from functools import partial
 
 from . import readers
 from .guest import battery, sysfs
@@ -18,19 +19,11 @@ from .guest.joystick import Joystick
 from .guest.lines import GpioChip
 from .guest.pca9685 import Pca9685
 from .guest.vcan import add_vcan
+from .trials import Failed, expect, run_trials
 
 _RATE_HZ = 500.0
 _SCANS = 1000
 _BTN_JOYSTICK = 0x120
-
-
-class Failed(Exception):
-    pass
-
-
-def expect(what: str, got: float, wanted: float, tolerance: float) -> None:
-    if not abs(got - wanted) <= tolerance:
-        raise Failed(f"{what} is {got}, not {wanted} +- {tolerance}")
 
 
 def try_inertial(bus: I2cBus) -> str:
@@ -206,14 +199,8 @@ def main() -> int:
         try_inertial, try_buffer, try_air, try_field, try_distance, try_supply, try_pwm, try_unplugging,
     )  # fmt: skip
     others: tuple[Callable[[], str], ...] = (try_sticks, try_battery, try_lines, try_can, try_clock)
-    failures = 0
-    for name, attempt in [(f.__name__, lambda f=f: f(bus)) for f in on_bus] + [(f.__name__, f) for f in others]:
-        try:
-            print(f"  ok    {name.removeprefix('try_'):<12} {attempt()}")
-        except (Failed, OSError, LookupError) as error:
-            failures += 1
-            print(f"  FAIL  {name.removeprefix('try_'):<12} {type(error).__name__}: {error}")
-    return min(failures, 1)
+    trials = {f.__name__: partial(f, bus) for f in on_bus} | {f.__name__: f for f in others}
+    return run_trials({name.removeprefix("try_"): trial for name, trial in trials.items()})
 
 
 if __name__ == "__main__":

@@ -39,6 +39,16 @@ class Chip:
         self._bus.unplug(self.address)
 
     @property
+    def is_plugged(self) -> bool:
+        return self._bus.device(self.address).exists()
+
+    def replug(self) -> None:
+        """Plugged in, with the registers of a chip that has just got its power."""
+        if self.is_plugged:
+            self.unplug()
+        self.plug()
+
+    @property
     def iio(self) -> Path:
         """Its IIO folder; another one after each `plug`."""
         return next(self._bus.device(self.address).glob("iio:device*"))

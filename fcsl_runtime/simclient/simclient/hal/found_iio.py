@@ -3,6 +3,7 @@
 
 from __future__ import annotations
 
+import re
 from pathlib import Path
 
 from .found import Candidate, Found, first_unique
@@ -17,8 +18,10 @@ _IIO_SIGNALS = {
     "in_temp": "temperature",
     "in_distance": "distance",
     "in_proximity": "distance",
-    "in_voltage": "voltage",
+    **{f"in_voltage{n}_": f"voltage{n}" for n in range(8)},
 }
+#: Where a chip is, which stays when the kernel numbers its devices anew: on an I2C or SPI bus.
+_PLACE = re.compile(r"\d+-[0-9a-f]{4}|spi\d+\.\d+")
 _POLLED_ENDS, _BUFFERED_ENDS = ("_raw", "_input"), ("_index",)
 _DEFAULT_RATE = "100"
 
@@ -42,9 +45,15 @@ def _iio_rate(folder: Path) -> str:
     return _DEFAULT_RATE
 
 
+def _place(folder: Path) -> str:
+    """ "" if it is on no such bus."""
+    owner = folder.resolve().parent.name
+    return owner if _PLACE.fullmatch(owner) else ""
+
+
 def find_iio() -> list[Found]:
     devices = folders("bus/iio/devices", "iio:device")
-    names = {path: [attribute(path, "label"), attribute(path, "name"), path.name] for path in devices}
+    names = {path: [attribute(path, "label"), attribute(path, "name"), _place(path), path.name] for path in devices}
     found = []
     for path in devices:
         device = first_unique(names[path], names.values())
