@@ -261,7 +261,8 @@ static int check(const options_t *options)
         return usage_error("--paused does not go with --hal composite:…: real devices do not wait", "");
     }
     if (options_hal_is_composite(options) && fcsl_hal_bus_runs_free(options->peer)) {
-        return usage_error("--hal composite:…,free-running: there is no simulator beside the board; write linux:PLAN", "");
+        return usage_error("--hal composite:…,free-running: there is no simulator beside the board; write linux:PLAN",
+                           "");
     }
     if (options->checkpoints != NULL && options->socket == NULL) {
         return usage_error("--checkpoints needs --socket: its files are what clients name", "");
