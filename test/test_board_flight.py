@@ -416,3 +416,25 @@ def test_a_device_paces_the_loop(tmp_path: Path) -> None:
     assert "paced in real time" in out and re.search(r"^fcsl-fc: 100 ticks,", out, re.MULTILINE), out
     whole = replay(bag, library=str(machine), board=tmp_path / "board.plan")
     assert whole.identical and whole.ticks == 100, str(whole)
+
+
+def test_the_board_of_the_page(tmp_path: Path) -> None:
+    """docs/board.md: its first board, for a machine with its channels."""
+    page = (ROOT / "docs/board.md").read_text()
+    example = re.search(r"^```json\n(.*?)^```$", page, re.MULTILINE | re.DOTALL)
+    assert example
+    channels = {"imu.gyro": "f64[3] rad/s", "imu.accel": "f64[3] m/s^2", "gps.latitude": "f64", "gps.longitude": "f64"}
+    names = {channel: channel.replace(".", "_") for channel in channels}
+    inputs = ", ".join(f'"{names[channel]}": "{kind}"' for channel, kind in channels.items())
+    source = f'class Nav:\n    inputs = {{{inputs}}}\n    outputs = {{"x": "f64"}}\n\n    def execute(self):\n        self.x = 0.0\n'
+    machine = {**ECHO_MACHINE, "algorithms": {"Nav": {"source": "nav.py"}}, "instances": {"nav": {"algorithm": "Nav"}}}
+    machine["states"] = {"RUN": {"schedule": {"nav": 1000}}}
+    machine["channels"] = [
+        {"name": name, "id": number, "field": f"nav.inputs.{names[name]}", "direction": "sensor", "max_age_ticks": 9}
+        for number, name in enumerate(channels)
+    ]
+    (tmp_path / "nav.py").write_text(source)
+    (tmp_path / "craft.json").write_text(json.dumps(machine))
+    (tmp_path / "board.json").write_text(example[1])
+    done = subprocess.run(["fcslc", "board", tmp_path / "board.json"], capture_output=True, text=True, check=False)
+    assert done.returncode == 0 and "warning" not in done.stderr, done.stderr
