@@ -20,6 +20,7 @@ import pytest
 from fcsl_compiler.base.ament import package_prefix
 from fcsl_compiler.driver.cache import build_machine
 from simclient import VarClient
+from simclient.errors import BagError
 from simclient.replay import replay
 from simclient.vars.wire import VarError
 
@@ -438,3 +439,25 @@ def test_the_board_of_the_page(tmp_path: Path) -> None:
     (tmp_path / "board.json").write_text(example[1])
     done = subprocess.run(["fcslc", "board", tmp_path / "board.json"], capture_output=True, text=True, check=False)
     assert done.returncode == 0 and "warning" not in done.stderr, done.stderr
+
+
+def test_a_replay_matches_devices_by_name(craft: Craft, fly: Callable[..., Flight]) -> None:
+    """Another order of the backends, fewer of them, and one that did not fly."""
+    bag, library = craft.folder / "bag", str(craft.library)
+    craft.turn(1, (100, 200, 400))
+    flight = fly("--record", bag)
+    flight.until_value("hal.sensors.imu.primary", 1)
+    until(lambda: flight.get("machine.tick") > 100)
+    flight.end()
+    other = json.loads(json.dumps(BOARD))
+    backends = other["sensors"]["imu"]["backends"]
+    for chosen in (backends[::-1], backends[1:]):
+        other["sensors"]["imu"]["backends"] = chosen
+        changed = replay(bag, library=library, board=craft.write_plan(other, "other.plan"))
+        # The first of the list is the one that stands on its head.
+        assert changed.divergence and changed.divergence.path == "sensors.outputs.gyro[0]", str(changed)
+        assert float(changed.divergence.replayed) == pytest.approx(0.1)
+    other["devices"]["side"] = {"driver": "iio", "device": "imu-side", "rate_hz": 200}
+    other["sensors"]["imu"]["backends"] = [*backends, {"device": "side"}]
+    with pytest.raises(BagError, match="the flight has no readings of device `side` for sensor `imu`"):
+        replay(bag, library=library, board=craft.write_plan(other, "other.plan"))

@@ -121,7 +121,7 @@ BOARD: dict[str, Any] = {
         "battery": {"kind": "battery", "channels": {"voltage": "battery.voltage"}, "backends": [{"device": "cells"}]},
         "baro": {"kind": "barometer", "channels": {"pressure": "baro.pressure"}, "backends": [{"device": "bmp"}]},
     },
-    "pace": {"device": "imu_top", "timeout_s": 0.05},
+    "pace": {"device": "receiver", "timeout_s": 0.05},
     "outputs": {
         "motors": {
             "device": "esc",

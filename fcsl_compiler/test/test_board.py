@@ -469,6 +469,9 @@ EDITS: Sequence[tuple[Any, str, str, str]] = [
     (edited(*FIRST, "signal", value="p" * 65), "E505", "longer than 64 characters", '"ppp'),
     (edited("pace", "device", value="esc"), "E520", "device `esc` paces the loop, and no sensor uses it", '"esc"'),
     (edited("pace", "device", value="none"), "E206", "no device `none`", '"none"'),
+    (edited("pace", "device", value="bmp"), "E520", "device `bmp` cannot pace the loop", '"bmp"'),
+    (edited("pace", "device", value="imu_top"), "E520", "has 1000 samples a second, and the machine 100", '"imu_top"'),
+    (edited("devices", "esc", "device", value="pwmchip0@600"), "E516", "a pulse of 2000 us, and `esc` has one", "{"),
     (edited("pace", "timeout_s", value=0), "E204", "`timeout_s` is 0", "0"),
     (edited(*FIRST, "signal", value="pulse1"), "E519", "signal `pulse1` of `esc` has two sources", '{"signal"'),
     (edited(*FIRST, "command", value=[1, 1]), "E516", "no command is between 1 and 1", "[1, 1]"),
@@ -591,6 +594,9 @@ def test_a_channel_that_nothing_drives_on_purpose(folder: Path) -> None:
     assert "\nundriven force\nend\n" in plan_text(board)
     (error,) = found(folder, edited("outputs", "imu.gyro", value=None))
     assert error.code == "E515"
+    channel = {"name": "ready", "id": 20, "field": "law.outputs.ready", "direction": "actuator"}
+    write_machine(folder, channels=[*MACHINE["channels"], channel])
+    assert check_board(write_board(folder, edited("outputs", "ready", value=None))).undriven == ("ready",)
 
 
 @pytest.mark.parametrize("rest", [{}, {"sensors": {}}, {"outputs": {}}, {"sensors": {}, "outputs": {}}])

@@ -145,6 +145,11 @@ static void test_loss(void)
     (void)tick(&rig);
     (void)tick(&rig);
     CHECK(tick(&rig) == -1 && !rig.output.fresh);
+    /* One that recovers is better than none: the last primary first. */
+    give(&rig, 0, 1);
+    give(&rig, 1, 2);
+    CHECK(tick(&rig) == 0 && rig.output.fresh && rig.output.values[0] == 1);
+    CHECK(fcsl_frontend_condition(rig.frontend, 0) == FCSL_BACKEND_RECOVERING);
     free(rig.frontend);
 }
 

@@ -55,7 +55,7 @@ def check_board(path: Path) -> Board:
     sensors = read_sensors(keys.get("sensors"), channels, backends, reader)
     actuators = OutputReader(machine, devices, reader, backends.used)
     outputs = actuators.read(keys.get("outputs"))
-    pace = read_pace(keys.get("pace"), devices, backends.used, reader)
+    pace = read_pace(keys.get("pace"), devices, backends.used, machine.tick_hz if machine else None, reader)
     _check_purpose(root, keys, reader)
     _warn_unused(devices, backends.used | actuators.used, reader)
     # Without the key `sensors` or `outputs` that half of the machine is not this board's.

@@ -15,6 +15,9 @@ from .devices import SENSORS, Device
 from .limits import MAX_OUTPUTS, MAX_PULSES, check_count
 from .pulses import Pulse, read_pulse
 
+#: Of the driver pwm, without an @ in the address.
+_PWM_HZ = 50.0
+
 
 @dataclass(frozen=True)
 class Output:
@@ -57,13 +60,17 @@ class OutputReader:
             if channel.direction == "actuator" and channel.name not in self._channels:
                 message, why = f"no output drives channel `{channel.name}`", "fcsl-guard refuses such a board"
                 notes = [(channel.span, "the channel")]
-                self.reader.sink.warning("W506", message, node.span, why=why, notes=notes)
+                fix = f'add an output, or `"{channel.name}": null` if nothing drives it'
+                self.reader.sink.warning("W506", message, node.span, why=why, help=fix, notes=notes)
 
     def _output(self, name: str, node: JsonNode, span: Span) -> Output | None:
         self._channels.add(name)
         if node.kind == "null":
-            if self._channel(name, span) is not None:
+            channel = self._named(name, span)
+            if channel is not None and channel.direction == "actuator":
                 self.undriven.append(name)
+            elif channel is not None:
+                self._report_misfit(channel, "it is a sensor's", span)
             return None
         keys = self.reader.object(node, f"output `{name}`", ("device", "elements"))
         if keys is None:
@@ -75,6 +82,20 @@ class OutputReader:
 
     def _channel(self, name: str, span: Span) -> Channel | None:
         """The channel of this name if it can be an output. None after reporting why not, or without a machine."""
+        channel = self._named(name, span)
+        problem = _misfit(channel) if channel is not None else ""
+        if channel is not None and problem:
+            self._report_misfit(channel, problem, span)
+            return None
+        return channel
+
+    def _report_misfit(self, channel: Channel, problem: str, span: Span) -> None:
+        message, notes = f"channel `{channel.name}` cannot be an output", [(channel.span, "the channel")]
+        fix = "write null, if nothing of this board drives it" if channel.direction == "actuator" else ""
+        self.reader.sink.error("E515", message, span, why=problem, help=fix, notes=notes)
+
+    def _named(self, name: str, span: Span) -> Channel | None:
+        """The channel of this name. None after reporting that there is none, or without a machine."""
         if self.machine is None:
             return None
         channel = next((c for c in self.machine.channels if c.name == name), None)
@@ -82,12 +103,6 @@ class OutputReader:
             actuators = [c.name for c in self.machine.channels if c.direction == "actuator"]
             hint = nearest(name, actuators) or f"there are {', '.join(actuators) or 'none'}"
             self.reader.sink.error("E206", f"no channel `{name}`", span, help=hint)
-            return None
-        problem = _misfit(channel)
-        if problem:
-            message, notes = f"channel `{name}` cannot be an output", [(channel.span, "the channel")]
-            self.reader.sink.error("E515", message, span, why=problem, notes=notes)
-            return None
         return channel
 
     def _device(self, node: JsonNode | None) -> Device | None:
@@ -125,6 +140,7 @@ class OutputReader:
         for pulse, item in zip(pulses, items, strict=True):
             if pulse is not None and device is not None:
                 self._check_signal(pulse.signal, device, item.span)
+                self._check_period(pulse, device, item.span)
         return tuple(p for p in pulses if p is not None)
 
     def _check_signal(self, signal: str, device: Device, span: Span) -> None:
@@ -132,6 +148,25 @@ class OutputReader:
         if first is not span:
             message, notes = f"signal `{signal}` of `{device.name}` has two sources", [(first, "the other")]
             self.reader.sink.error("E519", message, span, help="an element has a signal of its own", notes=notes)
+
+    def _check_period(self, pulse: Pulse, device: Device, span: Span) -> None:
+        """Pulses of the driver pwm fit into its period, which is in the address."""
+        hz = _pwm_hz(device)
+        longest = max(pulse.line.minimum, pulse.line.middle, pulse.line.maximum, pulse.safe)
+        if hz and longest > 1e6 / hz:
+            message = f"a pulse of {longest:g} us, and `{device.name}` has one every {1e6 / hz:g} us"
+            notes = [(device.span, "the device")]
+            fix = "shorten the pulse, or write a lower frequency behind the @ of the device"
+            self.reader.sink.error("E516", message, span, help=fix, notes=notes)
+
+
+def _pwm_hz(device: Device) -> float:
+    """The frequency of a chip of the driver pwm; 0 for other drivers, and where it is no number (the driver refuses it)."""
+    _, at, text = device.address.rpartition("@")
+    try:
+        return 0.0 if device.driver != "pwm" else float(text) if at else _PWM_HZ
+    except ValueError:
+        return 0.0
 
 
 def _misfit(channel: Channel) -> str:

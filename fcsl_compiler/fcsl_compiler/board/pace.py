@@ -7,7 +7,7 @@ from dataclasses import dataclass
 
 from ..parse.json_reader import ConfigReader
 from ..parse.json_source import JsonNode
-from .devices import Device
+from .devices import POLLED, Device
 
 MIN_TIMEOUT_S, MAX_TIMEOUT_S = 0.001, 60.0
 
@@ -21,7 +21,11 @@ class Pace:
 
 
 def read_pace(
-    node: JsonNode | None, devices: dict[str, Device | None], sensed: set[str], reader: ConfigReader
+    node: JsonNode | None,
+    devices: dict[str, Device | None],
+    sensed: set[str],
+    tick_hz: int | None,
+    reader: ConfigReader,
 ) -> Pace | None:
     """`sensed`: the names of devices that are backends of sensors. None without a node, or after reporting an error."""
     keys = reader.object(node, "`pace`", ("device", "timeout_s")) if node is not None else None
@@ -38,5 +42,18 @@ def read_pace(
         why = "a tick is a sample of a sensor"
         message, fix = f"device `{device.name}` paces the loop, and no sensor uses it", "make it a backend of a sensor"
         reader.sink.error("E520", message, keys["device"].span, why=why, help=fix)
+        return None
+    if device is not None and device.driver in POLLED:
+        why = f"`{device.driver}` is read by a clock of this computer, so that paces the loop already"
+        message, fix = (
+            f"device `{device.name}` cannot pace the loop",
+            "remove `pace`, or name a device that sends by itself",
+        )
+        reader.sink.error("E520", message, keys["device"].span, why=why, help=fix)
+        return None
+    if device is not None and tick_hz is not None and device.rate_hz not in (0.0, tick_hz):
+        message = f"device `{device.name}` has {device.rate_hz:g} samples a second, and the machine {tick_hz} ticks"
+        notes = [(device.span, "the device")]
+        reader.sink.error("E520", message, keys["device"].span, why="each sample is a tick", notes=notes)
         return None
     return Pace(device, timeout_s) if device is not None else None

@@ -122,7 +122,7 @@ typedef struct {
 } fcsl_reading_t;
 
 typedef struct {
-    int32_t primary; /* -1: no backend is healthy, and the rest says nothing */
+    int32_t primary; /* -1: no backend is healthy or recovering, and the rest says nothing */
     int fresh; /* it has a new sample */
     uint64_t sample_ns; /* of the newest one */
     double values[FCSL_VALUES_MAX];

@@ -38,7 +38,8 @@ typedef struct {
     uint64_t bytes; /* so many were read */
 } gnss_t;
 
-enum { HORIZONTAL_ACCURACY = 7, SPEED_ACCURACY = 9 }; /* their places; NMEA tells none of the three */
+/* Their places. NMEA tells none of the accuracies, and of the velocity only what is horizontal. */
+enum { VELOCITY = 5, HORIZONTAL_ACCURACY = 7, SPEED_ACCURACY = 9 };
 static const fcsl_driver_signal_t signals[] = {
     FCSL_DRIVER_SIGNAL(gnss_t, fix, "", "0: none, 2: 2D, 3: 3D; without a fix all but the satellites is NaN"),
     FCSL_DRIVER_SIGNAL(gnss_t, latitude, "deg", "north"),
@@ -138,9 +139,11 @@ const fcsl_driver_t fcsl_driver_ubx = {
 
 static fcsl_driver_status_t open_nmea(void *self, const char *device, const uint8_t *used, char *why, size_t size)
 {
-    for (uint32_t i = HORIZONTAL_ACCURACY; i <= SPEED_ACCURACY; i++) {
-        if (used[i] == FCSL_DRIVER_NEEDED) {
-            (void)snprintf(why, size, "%s is needed, and NMEA does not tell it", signals[i].name);
+    for (uint32_t i = 0; i < sizeof signals / sizeof signals[0]; i++) {
+        const int is_untold = i == VELOCITY || (i >= HORIZONTAL_ACCURACY && i <= SPEED_ACCURACY);
+        if (is_untold && used[i] == FCSL_DRIVER_NEEDED) {
+            (void)snprintf(why, size, "%s is needed, and NMEA does not tell %s", signals[i].name,
+                           i == VELOCITY ? "how fast it goes down" : "it");
             return FCSL_DRIVER_FAILED;
         }
     }

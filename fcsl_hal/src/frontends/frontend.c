@@ -21,7 +21,7 @@ size_t fcsl_frontend_bytes(void)
 
 void fcsl_frontend_init(fcsl_frontend_t *frontend, const fcsl_frontend_config_t *config)
 {
-    *frontend = (fcsl_frontend_t){.config = config, .primary = -1};
+    *frontend = (fcsl_frontend_t){.config = config, .primary = -1, .last_primary = -1};
     for (uint32_t b = 0; b < config->backend_count; b++) {
         frontend->backends[b].condition = FCSL_BACKEND_SILENT;
     }
@@ -138,24 +138,34 @@ void fcsl_frontend_take(fcsl_frontend_t *frontend, const fcsl_reading_t *reading
 
 /* ---- a tick --------------------------------------------------------------------------------------------------------- */
 
-/* The primary stays as long as it is healthy; then the first healthy one of the list. At the beginning those that come first in the list
- * may be a moment later than the others: they are waited for. */
-static int32_t choose_primary(fcsl_frontend_t *frontend, uint64_t now_ns)
+/* The backend that was primary last, if it is in this condition, or the first one of the list that is; -1: none. */
+static int32_t find_condition(const fcsl_frontend_t *frontend, fcsl_backend_condition_t condition)
 {
-    const int waits = !frontend->chosen && now_ns - frontend->begun_ns <= frontend->config->max_age_ns;
-    if (frontend->primary >= 0 && frontend->backends[frontend->primary].condition == FCSL_BACKEND_HEALTHY) {
-        return frontend->primary;
+    if (frontend->last_primary >= 0 && frontend->backends[frontend->last_primary].condition == condition) {
+        return frontend->last_primary;
     }
     for (uint32_t b = 0; b < frontend->config->backend_count; b++) {
-        if (frontend->backends[b].condition == FCSL_BACKEND_HEALTHY) {
-            frontend->chosen = 1;
+        if (frontend->backends[b].condition == condition) {
             return (int32_t)b;
-        }
-        if (waits && !frontend->backends[b].heard) {
-            return -1;
         }
     }
     return -1;
+}
+
+/* A backend that recovers is better than none. At the beginning those that come first in the list may be a moment later than the others:
+ * they are waited for. */
+static int32_t choose_primary(fcsl_frontend_t *frontend, uint64_t now_ns)
+{
+    const int waits = frontend->last_primary < 0 && now_ns - frontend->begun_ns <= frontend->config->max_age_ns;
+    int32_t chosen = find_condition(frontend, FCSL_BACKEND_HEALTHY);
+    if (chosen < 0) {
+        chosen = find_condition(frontend, FCSL_BACKEND_RECOVERING);
+    }
+    if (chosen > 0 && waits) {
+        return -1;
+    }
+    frontend->last_primary = chosen >= 0 ? chosen : frontend->last_primary;
+    return chosen;
 }
 
 void fcsl_frontend_tick(fcsl_frontend_t *frontend, uint64_t now_ns, fcsl_frontend_output_t *output)

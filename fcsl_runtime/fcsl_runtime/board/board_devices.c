@@ -30,7 +30,6 @@ typedef struct {
 struct board_devices {
     const board_plan_t *plan;
     sensor_device_t *devices[BOARD_DEVICES_MAX]; /* null: no sensor uses it */
-    uint32_t feeds_of[BOARD_DEVICES_MAX];
     feed_t feeds[BOARD_SENSORS_MAX * FCSL_BACKENDS_MAX];
     uint32_t feed_count;
     sem_t sampled; /* posted by the device that paces the loop */
@@ -44,18 +43,7 @@ static int use_device(board_devices_t *devices, uint32_t d, fcsl_error_t *error)
     if (devices->devices[d] == NULL) {
         devices->devices[d] = sensor_device_new(&devices->plan->devices[d], error);
     }
-    devices->feeds_of[d]++;
     return devices->devices[d] != NULL ? 0 : -1;
-}
-
-static int is_bound(const board_sensor_t *sensor, uint32_t quantity)
-{
-    for (uint32_t i = 0; i < sensor->binding_count; i++) {
-        if (sensor->bindings[i].quantity == quantity) {
-            return 1;
-        }
-    }
-    return 0;
 }
 
 /* Copies a signal into the quantity. One that the driver does not have is an error where the machine or the plan needs it. */
@@ -65,7 +53,8 @@ static int add_copy(board_devices_t *devices, feed_t *feed, uint32_t q, fcsl_err
     const fcsl_quantity_t *quantity = &fcsl_sensor_kinds[sensor->config.kind].quantities[q];
     const char *given = sensor->signals[feed->backend][q];
     const char *unit = sensor->config.kind == FCSL_RC ? "" : quantity->unit; /* pulses become sticks */
-    const fcsl_driver_use_t use = is_bound(sensor, q) || given != NULL ? FCSL_DRIVER_NEEDED : FCSL_DRIVER_OPTIONAL;
+    const fcsl_driver_use_t use =
+        board_sensor_needs(sensor, q) || given != NULL ? FCSL_DRIVER_NEEDED : FCSL_DRIVER_OPTIONAL;
     uint32_t count = 0;
     fcsl_error_t why;
     const int from = sensor_device_use(devices->devices[feed->device], given != NULL ? given : quantity->name, unit,
@@ -115,12 +104,18 @@ board_devices_t *board_devices_new(const board_plan_t *plan, fcsl_error_t *error
     for (uint32_t s = 0; s < plan->sensor_count; s++) {
         for (uint32_t b = 0; b < plan->sensors[s].config.backend_count; b++) {
             if (add_feed(devices, s, b, error) != 0) {
-                board_devices_free(devices);
+                (void)board_devices_free(devices);
                 return NULL;
             }
         }
     }
-    if (plan->pacing != BOARD_NO_DEVICE && devices->devices[plan->pacing] != NULL) {
+    if (plan->pacing != BOARD_NO_DEVICE && devices->devices[plan->pacing] == NULL) {
+        (void)fcsl_fail(error, "device '%.60s' paces the loop, and no sensor uses it",
+                        plan->devices[plan->pacing].name);
+        (void)board_devices_free(devices);
+        return NULL;
+    }
+    if (plan->pacing != BOARD_NO_DEVICE) {
         sensor_device_post(devices->devices[plan->pacing], &devices->sampled);
     }
     return devices;
@@ -136,14 +131,17 @@ int board_devices_start(board_devices_t *devices, fcsl_error_t *error)
     return 0;
 }
 
-void board_devices_free(board_devices_t *devices)
+int board_devices_free(board_devices_t *devices)
 {
-    if (devices != NULL) {
-        for (uint32_t d = 0; d < BOARD_DEVICES_MAX; d++) {
-            sensor_device_free(devices->devices[d]);
-        }
-        free(devices);
+    int left = 0;
+    for (uint32_t d = 0; devices != NULL && d < BOARD_DEVICES_MAX; d++) {
+        left |= sensor_device_free(devices->devices[d]) != 0;
     }
+    if (left) {
+        return -1;
+    }
+    free(devices);
+    return 0;
 }
 
 /* ---- the step thread ------------------------------------------------------------------------------------------------ */
@@ -170,11 +168,8 @@ void board_devices_interrupt(board_devices_t *devices)
 void board_devices_discard(board_devices_t *devices)
 {
     for (uint32_t d = 0; d < devices->plan->device_count; d++) {
-        device_sample_t sample;
-        for (uint32_t i = 0; i < DEVICE_RING_SAMPLES && devices->devices[d] != NULL; i++) {
-            if (!sensor_device_take(devices->devices[d], &sample)) {
-                break;
-            }
+        if (devices->devices[d] != NULL) {
+            sensor_device_skip(devices->devices[d], 1);
         }
     }
 }
@@ -209,12 +204,16 @@ static uint32_t take_sample(board_devices_t *devices, uint32_t d, sensor_reading
 
 uint32_t board_devices_take(board_devices_t *devices, sensor_reading_t *readings, uint32_t capacity)
 {
+    const uint32_t share = devices->feed_count > 0u ? capacity / devices->feed_count : 0u; /* of a device */
     uint32_t count = 0;
     for (uint32_t d = 0; d < devices->plan->device_count; d++) {
-        const uint32_t samples = d == devices->plan->pacing ? 1u : DEVICE_RING_SAMPLES;
+        const uint32_t samples = d == devices->plan->pacing ? 1u : share;
         uint32_t made = 1;
+        if (devices->devices[d] != NULL && d != devices->plan->pacing) {
+            sensor_device_skip(devices->devices[d], share);
+        }
         for (uint32_t i = 0; devices->devices[d] != NULL && i < samples && made > 0u; i++) {
-            made = count + devices->feeds_of[d] <= capacity ? take_sample(devices, d, &readings[count]) : 0u;
+            made = take_sample(devices, d, &readings[count]);
             count += made;
         }
     }

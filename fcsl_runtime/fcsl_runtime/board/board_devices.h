@@ -26,14 +26,16 @@ int board_devices_wait(board_devices_t *devices, uint64_t deadline_ns);
 /* From any thread: a wait ends, and so do all later ones. */
 void board_devices_interrupt(board_devices_t *devices);
 /* From one thread: takes what the devices have given since the last call, device by device, into `readings`; one sample of the device that
- * paces the loop. At most `capacity` readings, which is FCSL_BACKENDS_MAX or more: what is left waits. Returns how many. Does not wait. */
+ * paces the loop. At most `capacity` readings, of which each device has its share: of one that gave more the oldest samples are dropped.
+ * Returns how many. Does not wait. */
 uint32_t board_devices_take(board_devices_t *devices, sensor_reading_t *readings, uint32_t capacity);
-/* Throws away what the devices have given. */
+/* Throws away what the devices have given, but the newest sample of each. */
 void board_devices_discard(board_devices_t *devices);
 /* Of a device of the plan. */
 device_counts_t board_devices_counts(const board_devices_t *devices, uint32_t device);
 /* Of any device, since the last call: a text for people, or null when nothing has changed. */
 const char *board_devices_news(board_devices_t *devices);
-void board_devices_free(board_devices_t *devices);
+/* Ends the threads. 0, or -1: one hangs in its driver, and all memory stays, that of the plan must, too. */
+int board_devices_free(board_devices_t *devices);
 
 #endif /* BOARD_BOARD_DEVICES_H */

@@ -455,6 +455,27 @@ board_plan_t *board_plan_read(const char *file, fcsl_error_t *error)
     return plan;
 }
 
+/* Integrals of rates need these; those of accelerations both, because the body turns meanwhile. */
+static int is_integral_of(const board_sensor_t *sensor, uint32_t integral, uint32_t quantity)
+{
+    const fcsl_quantity_t *quantities = fcsl_sensor_kinds[sensor->config.kind].quantities;
+    const int is_rate = strcmp(quantities[quantity].name, "gyro") == 0;
+    const int is_accel = strcmp(quantities[quantity].name, "accel") == 0;
+    return (strcmp(quantities[integral].name, "delta_angle") == 0 && is_rate) ||
+           (strcmp(quantities[integral].name, "delta_velocity") == 0 && (is_rate || is_accel));
+}
+
+int board_sensor_needs(const board_sensor_t *sensor, uint32_t quantity)
+{
+    for (uint32_t i = 0; i < sensor->binding_count; i++) {
+        const uint32_t bound = sensor->bindings[i].quantity;
+        if (bound == quantity || is_integral_of(sensor, bound, quantity)) {
+            return 1;
+        }
+    }
+    return 0;
+}
+
 void board_plan_free(board_plan_t *plan)
 {
     if (plan != NULL) {

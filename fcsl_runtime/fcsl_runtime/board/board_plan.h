@@ -84,6 +84,9 @@ typedef struct {
     uint32_t pulse_count;
 } board_output_t;
 
+/* Whether the machine gets this quantity of the sensor, or one that is computed from it. */
+int board_sensor_needs(const board_sensor_t *sensor, uint32_t quantity);
+
 /* All strings point into `text`. */
 typedef struct {
     char *text;

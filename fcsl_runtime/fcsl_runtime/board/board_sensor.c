@@ -50,10 +50,22 @@ static int bind(board_sensor_run_t *sensor, const board_binding_t *binding, boar
     return 0;
 }
 
+/* What is computed needs all of what it is computed from. */
+static void need_inputs(board_sensor_t *plan)
+{
+    const fcsl_sensor_kind_info_t *kind = &fcsl_sensor_kinds[plan->config.kind];
+    for (uint32_t q = 0; q < kind->quantity_count; q++) {
+        if (kind->quantities[q].given && plan->config.needed[q] == 0u && board_sensor_needs(plan, q)) {
+            plan->config.needed[q] = plan->config.kind == FCSL_RC ? 1u : kind->quantities[q].count;
+        }
+    }
+}
+
 int board_sensor_open(board_sensor_run_t *sensor, board_sensor_t *plan, const fcsl_machine_t *machine,
                       fcsl_error_t *error)
 {
     sensor->plan = plan;
+    sensor->output.primary = -1;
     sensor->frontend = calloc(1, fcsl_frontend_bytes());
     if (sensor->frontend == NULL) {
         return fcsl_fail(error, "out of memory for sensor '%.60s'", plan->name);
@@ -63,6 +75,7 @@ int board_sensor_open(board_sensor_run_t *sensor, board_sensor_t *plan, const fc
             return -1;
         }
     }
+    need_inputs(plan);
     fcsl_frontend_init(sensor->frontend, &plan->config);
     return 0;
 }

@@ -52,19 +52,31 @@ static void tell_primary(hal_t *hal, uint32_t s)
     hal->base.log(hal->base.ctx, text);
 }
 
+static void tell_news(hal_t *hal)
+{
+    const char *news = board_devices_news(hal->devices);
+    if (news != NULL) {
+        hal->base.log(hal->base.ctx, news);
+    }
+}
+
 /* Waits for the sample of the device that paces the loop: OK, WAITING, or the end. Before the first one nothing is too late. */
 static fcsl_hal_status_t wait_for_pace(hal_t *hal)
 {
     const board_plan_t *plan = hal->plan;
+    const uint64_t slice_ns = hal->base.now_ns(hal->base.ctx) + SLICE_NS;
+    const uint64_t end_ns = hal->paced_ns > 0u ? hal->paced_ns + plan->pace_timeout_ns : UINT64_MAX;
+    const int sampled = board_devices_wait(hal->devices, slice_ns < end_ns ? slice_ns : end_ns);
     const uint64_t now_ns = hal->base.now_ns(hal->base.ctx);
-    if (board_devices_wait(hal->devices, now_ns + SLICE_NS)) {
-        hal->paced_ns = hal->base.now_ns(hal->base.ctx);
+    if (sampled) {
+        hal->paced_ns = now_ns;
         return FCSL_HAL_OK;
     }
     if (atomic_load(&hal->interrupted) != 0) {
         return FCSL_HAL_CLOSED;
     }
-    if (hal->paced_ns == 0u || now_ns - hal->paced_ns <= plan->pace_timeout_ns) {
+    if (now_ns < end_ns) {
+        tell_news(hal);
         return FCSL_HAL_WAITING;
     }
     (void)fcsl_fail(&hal->failure, "device '%.60s', which paces the loop, has given nothing for %.6g ms",
@@ -97,10 +109,7 @@ static fcsl_hal_status_t linux_sample(void *ctx, uint64_t tick, uint8_t *bytes, 
     for (uint32_t s = 0; s < hal->plan->sensor_count; s++) {
         tell_primary(hal, s);
     }
-    const char *news = board_devices_news(hal->devices);
-    if (news != NULL) {
-        hal->base.log(hal->base.ctx, news);
-    }
+    tell_news(hal);
     return FCSL_HAL_NONE; /* the channels have their samples already */
 }
 
@@ -169,12 +178,12 @@ static const char *linux_explain(void *ctx)
     return ((hal_t *)ctx)->failure.text;
 }
 
-/* While it is paused nobody gets what is measured. */
+/* While it is paused nobody gets what is measured; the newest sample is kept for the tick that follows. */
 static void linux_alive(void *ctx)
 {
     hal_t *hal = ctx;
     board_devices_discard(hal->devices);
-    hal->paced_ns = 0;
+    hal->paced_ns = hal->paced_ns > 0u ? hal->base.now_ns(hal->base.ctx) : 0u;
 }
 
 static void linux_interrupt(void *ctx)
@@ -189,13 +198,15 @@ static void linux_interrupt(void *ctx)
 static void linux_close(void *ctx)
 {
     hal_t *hal = ctx;
-    board_devices_free(hal->devices);
+    const int left = board_devices_free(hal->devices) != 0;
     if (hal->base.close != NULL) {
         hal->base.close(hal->base.ctx);
     }
     counters_free(&hal->counters);
     readings_free(&hal->readings);
-    board_close(hal->board);
+    if (!left) { /* a thread that hangs in its driver reads the plan */
+        board_close(hal->board);
+    }
     free(hal);
 }
 
@@ -206,6 +217,12 @@ static int linux_open(fcsl_hal_t *handle, char *error, size_t error_size)
     if (board_devices_start(hal->devices, &reason) != 0) {
         (void)snprintf(error, error_size, "%s", reason.text);
         return -1;
+    }
+    if (hal->plan->pacing != BOARD_NO_DEVICE) {
+        char text[FCSL_LOG_BYTES];
+        (void)snprintf(text, sizeof text, "waits for device '%.60s', which paces the loop",
+                       hal->plan->devices[hal->plan->pacing].name);
+        hal->base.log(hal->base.ctx, text);
     }
     return 0;
 }

@@ -11,12 +11,20 @@
 #include "base/error.h"
 #include "fcsl/fcsl_cdr.h"
 
-enum { NAME_BYTES = 512, HEAD_BYTES = 64, READING_BYTES = 32 + FCSL_VALUES_MAX * 8 };
+enum {
+    NAME_BYTES = 512,
+    HEAD_BYTES = 64,
+    NAMED_BYTES = 2 * BOARD_NAME_BYTES + 8,
+    READING_BYTES = 32 + FCSL_VALUES_MAX * 8
+};
+static const size_t CAPACITY =
+    HEAD_BYTES + BOARD_SENSORS_MAX * FCSL_BACKENDS_MAX * (size_t)NAMED_BYTES + READINGS_MAX * (size_t)READING_BYTES;
 static const char TYPE[] = "fcsl_hal/msg/Readings";
 static const char SCHEMA[] =
     "std_msgs/Header header\n"
     "uint64 tick\n"
     "uint64 now_ns  # monotonic time of the tick\n"
+    "string[] backends  # in the first message: sensor and device of each, as readings count them\n"
     "Reading[] readings\n" FCSL_SCHEMA_SEPARATOR "MSG: fcsl_hal/Reading\n"
     "uint32 sensor  # of the board, from 0\n"
     "uint32 backend  # of the sensor, from 0\n"
@@ -37,6 +45,8 @@ int readings_record(readings_t *readings, const board_plan_t *plan, fcsl_run_t *
                     fcsl_error_t *error)
 {
     char name[NAME_BYTES];
+    readings->plan = plan;
+    readings->named = 0;
     for (uint32_t s = 0; s < plan->sensor_count; s++) {
         readings->values[s] = given_values(&fcsl_sensor_kinds[plan->sensors[s].config.kind]);
     }
@@ -44,7 +54,7 @@ int readings_record(readings_t *readings, const board_plan_t *plan, fcsl_run_t *
     if (length < 0 || (size_t)length >= sizeof name) {
         return fcsl_fail(error, "the namespace is too long for the topic of the readings");
     }
-    readings->cdr = calloc(1, HEAD_BYTES + READINGS_MAX * (size_t)READING_BYTES);
+    readings->cdr = calloc(1, CAPACITY);
     if (readings->cdr == NULL) {
         return fcsl_fail(error, "out of memory for the readings");
     }
@@ -65,16 +75,36 @@ static void put_reading(fcsl_cdr_t *cdr, const sensor_reading_t *kept, uint32_t 
     }
 }
 
+/* The backends of the plan; null: none of them. */
+static void put_names(fcsl_cdr_t *cdr, const board_plan_t *plan)
+{
+    uint32_t count = 0;
+    for (uint32_t s = 0; plan != NULL && s < plan->sensor_count; s++) {
+        count += plan->sensors[s].config.backend_count;
+    }
+    fcsl_cdr_u32(cdr, count);
+    for (uint32_t s = 0; plan != NULL && s < plan->sensor_count; s++) {
+        const board_sensor_t *sensor = &plan->sensors[s];
+        for (uint32_t b = 0; b < sensor->config.backend_count; b++) {
+            char name[2 * BOARD_NAME_BYTES];
+            (void)snprintf(name, sizeof name, "%.64s %.64s", sensor->name, plan->devices[sensor->devices[b]].name);
+            fcsl_cdr_string(cdr, name);
+        }
+    }
+}
+
 void readings_end_tick(readings_t *readings, fcsl_run_t *run, uint64_t now_ns)
 {
     if (readings->topic >= 0) {
         fcsl_error_t error; /* of a disk; the recording tells it */
         fcsl_cdr_t cdr;
         const uint64_t time_ns = fcsl_run_tick_time_ns(run, fcsl_run_tick(run));
-        fcsl_cdr_begin(&cdr, readings->cdr, HEAD_BYTES + READINGS_MAX * (size_t)READING_BYTES);
+        fcsl_cdr_begin(&cdr, readings->cdr, CAPACITY);
         fcsl_cdr_header(&cdr, time_ns);
         fcsl_cdr_u64(&cdr, fcsl_run_tick(run));
         fcsl_cdr_u64(&cdr, now_ns);
+        put_names(&cdr, readings->named ? NULL : readings->plan);
+        readings->named = 1;
         fcsl_cdr_u32(&cdr, readings->count);
         for (uint32_t i = 0; i < readings->count; i++) {
             put_reading(&cdr, &readings->kept[i], readings->values[readings->kept[i].sensor]);

@@ -16,6 +16,8 @@ typedef struct {
     int topic; /* -1: they are not recorded */
     uint8_t *cdr;
     uint32_t values[BOARD_SENSORS_MAX]; /* of a reading, by sensor */
+    const board_plan_t *plan;
+    int named; /* the names of the plan are recorded */
 } readings_t;
 
 /* The topic `<name_space>/readings` of the run's recording, for the sensors of the plan. 0, or -1. */

@@ -37,7 +37,7 @@ struct sensor_device {
     uint8_t *used;
     uint32_t *at; /* by signal: where its elements lie in a sample */
     uint32_t value_count;
-    int opened; /* the thread's, once it runs */
+    atomic_int opened;
 
     pthread_t thread;
     int started;
@@ -45,7 +45,7 @@ struct sensor_device {
     sem_t wake;
     sem_t *posted; /* null: nobody waits for samples */
 
-    device_sample_t ring[DEVICE_RING_SAMPLES];
+    _Atomic uint64_t ring[DEVICE_RING_SAMPLES][1 + DEVICE_VALUES_MAX]; /* time and values of a sample */
     _Atomic uint64_t written;
     _Atomic uint64_t taken;
     _Atomic uint64_t samples;
@@ -104,7 +104,7 @@ sensor_device_t *sensor_device_new(const board_device_t *plan, fcsl_error_t *err
     } else if (allocate(device, error) == 0) {
         return device;
     }
-    sensor_device_free(device);
+    (void)sensor_device_free(device);
     return NULL;
 }
 
@@ -157,28 +157,44 @@ static int open_device(sensor_device_t *device, char *why, size_t size)
         status = device->driver->open(device->state, address, device->used, why, size);
     }
     why[size - 1u] = '\0';
-    device->opened = status == FCSL_DRIVER_OK;
+    atomic_store(&device->opened, status == FCSL_DRIVER_OK);
     return (int)status;
 }
 
-static void keep_sample(sensor_device_t *device, uint64_t sample_ns)
+/* Makes room by taking the oldest sample away, unless the step thread has just taken it. */
+static void drop_oldest(sensor_device_t *device, uint64_t taken)
+{
+    if (atomic_compare_exchange_strong(&device->taken, &taken, taken + 1u)) {
+        atomic_fetch_add_explicit(&device->dropped, 1, memory_order_relaxed);
+    }
+}
+
+static void keep_values(sensor_device_t *device, _Atomic uint64_t *words)
 {
     const fcsl_driver_t *driver = device->driver;
-    const uint64_t written = atomic_load_explicit(&device->written, memory_order_relaxed);
-    if (written - atomic_load_explicit(&device->taken, memory_order_acquire) >= DEVICE_RING_SAMPLES) {
-        atomic_fetch_add_explicit(&device->dropped, 1, memory_order_relaxed);
-        return;
-    }
-    device_sample_t *sample = &device->ring[written % DEVICE_RING_SAMPLES];
-    sample->sample_ns = sample_ns;
     for (uint32_t s = 0; s < driver->signal_count; s++) {
         const fcsl_driver_signal_t *signal = &driver->signals[s];
         const size_t scalar = fcsl_scalar_size(signal->type);
         for (uint32_t i = 0; device->used[s] != FCSL_DRIVER_UNUSED && i < signal->count; i++) {
-            sample->values[device->at[s] + i] =
-                fcsl_scalar_as_double((const uint8_t *)device->state + signal->offset + i * scalar, signal->type);
+            const uint8_t *bytes = (const uint8_t *)device->state + signal->offset + i * scalar;
+            const double value = fcsl_scalar_as_double(bytes, signal->type);
+            uint64_t bits = 0;
+            memcpy(&bits, &value, sizeof bits);
+            atomic_store_explicit(&words[device->at[s] + i], bits, memory_order_relaxed);
         }
     }
+}
+
+static void keep_sample(sensor_device_t *device, uint64_t sample_ns)
+{
+    const uint64_t written = atomic_load_explicit(&device->written, memory_order_relaxed);
+    const uint64_t taken = atomic_load(&device->taken);
+    if (written - taken >= DEVICE_RING_SAMPLES) {
+        drop_oldest(device, taken);
+    }
+    _Atomic uint64_t *words = device->ring[written % DEVICE_RING_SAMPLES];
+    atomic_store_explicit(&words[0], sample_ns, memory_order_relaxed);
+    keep_values(device, words + 1);
     atomic_store_explicit(&device->written, written + 1u, memory_order_release);
     atomic_fetch_add_explicit(&device->samples, 1, memory_order_relaxed);
     if (device->posted != NULL) {
@@ -210,10 +226,10 @@ static uint64_t read_device(sensor_device_t *device)
     atomic_fetch_add_explicit(&device->errors, 1, memory_order_relaxed);
     if (status == FCSL_DRIVER_ABSENT) {
         device->driver->close(device->state);
-        device->opened = 0;
+        atomic_store(&device->opened, 0);
         atomic_fetch_add_explicit(&device->lost, 1, memory_order_relaxed);
         set_condition(device, DEVICE_MISSING, why);
-        return 0;
+        return LOOK_AGAIN_NS;
     }
     if (atomic_load(&device->condition) != DEVICE_FAILING) {
         set_condition(device, DEVICE_FAILING, why);
@@ -238,18 +254,31 @@ static uint64_t next_due(uint64_t due_ns, uint64_t period_ns)
     return now < due_ns + period_ns ? due_ns + period_ns : due_ns + ((now - due_ns) / period_ns + 1u) * period_ns;
 }
 
+/* Opens a device that was not there; one that is there and refuses is told. */
+static int look_again(sensor_device_t *device)
+{
+    char why[DEVICE_REASON_BYTES] = "";
+    const int status = open_device(device, why, sizeof why);
+    if (status == FCSL_DRIVER_FAILED) {
+        atomic_fetch_add_explicit(&device->errors, 1, memory_order_relaxed);
+        if (atomic_load(&device->condition) != DEVICE_FAILING) {
+            set_condition(device, DEVICE_FAILING, why);
+        }
+    }
+    return status == FCSL_DRIVER_OK;
+}
+
 static void *run(void *ctx)
 {
     sensor_device_t *device = ctx;
     uint64_t due_ns = now_ns();
     while (atomic_load(&device->over) == 0) {
-        char why[DEVICE_REASON_BYTES] = "";
-        if (!device->opened && open_device(device, why, sizeof why) != FCSL_DRIVER_OK) {
+        if (!atomic_load(&device->opened) && !look_again(device)) {
             sleep_until(device, now_ns() + LOOK_AGAIN_NS);
             continue;
         }
         const uint64_t wait_ns = read_device(device);
-        if (!device->driver->waits) {
+        if (!device->driver->waits && atomic_load(&device->opened)) {
             due_ns = next_due(due_ns, device->plan->period_ns);
             sleep_until(device, due_ns);
         } else if (wait_ns > 0u) {
@@ -290,22 +319,43 @@ int sensor_device_start(sensor_device_t *device, fcsl_error_t *error)
         return fcsl_fail(error, "device '%.60s' (%.200s) cannot be opened: %s", device->plan->name,
                          device->plan->address, why[0] != '\0' ? why : "the driver gives no reason");
     }
-    set_condition(device, device->opened ? DEVICE_OPEN : DEVICE_MISSING, why);
+    set_condition(device, status == FCSL_DRIVER_OK ? DEVICE_OPEN : DEVICE_MISSING, why);
     device->told = DEVICE_OPEN;
     return start_thread(device) == 0 ? 0 : fcsl_fail(error, "device '%.60s': no thread", device->plan->name);
 }
 
 /* ---- the step thread ------------------------------------------------------------------------------------------------ */
 
+/* The device's thread may take the oldest sample away meanwhile: then the next one is tried. */
 int sensor_device_take(sensor_device_t *device, device_sample_t *sample)
 {
-    const uint64_t taken = atomic_load_explicit(&device->taken, memory_order_relaxed);
-    if (taken == atomic_load_explicit(&device->written, memory_order_acquire)) {
-        return 0;
+    for (uint32_t i = 0; i < DEVICE_RING_SAMPLES; i++) {
+        uint64_t taken = atomic_load(&device->taken);
+        if (taken == atomic_load_explicit(&device->written, memory_order_acquire)) {
+            return 0;
+        }
+        const _Atomic uint64_t *words = device->ring[taken % DEVICE_RING_SAMPLES];
+        sample->sample_ns = atomic_load_explicit(&words[0], memory_order_relaxed);
+        for (uint32_t v = 0; v < device->value_count; v++) {
+            const uint64_t bits = atomic_load_explicit(&words[1u + v], memory_order_relaxed);
+            memcpy(&sample->values[v], &bits, sizeof bits);
+        }
+        if (atomic_compare_exchange_strong(&device->taken, &taken, taken + 1u)) {
+            return 1;
+        }
     }
-    *sample = device->ring[taken % DEVICE_RING_SAMPLES];
-    atomic_store_explicit(&device->taken, taken + 1u, memory_order_release);
-    return 1;
+    return 0;
+}
+
+void sensor_device_skip(sensor_device_t *device, uint32_t most)
+{
+    for (uint32_t i = 0; i < DEVICE_RING_SAMPLES; i++) {
+        const uint64_t taken = atomic_load(&device->taken);
+        if (atomic_load_explicit(&device->written, memory_order_acquire) - taken <= most) {
+            return;
+        }
+        drop_oldest(device, taken);
+    }
 }
 
 int sensor_device_has_sample(const sensor_device_t *device)
@@ -321,7 +371,7 @@ device_counts_t sensor_device_counts(const sensor_device_t *device)
         .errors = atomic_load_explicit(&device->errors, memory_order_relaxed),
         .dropped = atomic_load_explicit(&device->dropped, memory_order_relaxed),
         .lost = atomic_load_explicit(&device->lost, memory_order_relaxed),
-        .open = atomic_load_explicit(&device->condition, memory_order_relaxed) != (int)DEVICE_MISSING,
+        .open = atomic_load_explicit(&device->opened, memory_order_relaxed) != 0,
     };
 }
 
@@ -356,12 +406,15 @@ static int end_thread(sensor_device_t *device)
     return -1;
 }
 
-void sensor_device_free(sensor_device_t *device)
+int sensor_device_free(sensor_device_t *device)
 {
-    if (device == NULL || (device->started && end_thread(device) != 0)) {
-        return; /* its memory stays: the driver may still return to it */
+    if (device == NULL) {
+        return 0;
     }
-    if (device->opened) {
+    if (device->started && end_thread(device) != 0) {
+        return -1; /* its memory stays: the driver may still return to it */
+    }
+    if (atomic_load(&device->opened)) {
         device->driver->close(device->state);
     }
     free(device->state);
@@ -371,4 +424,5 @@ void sensor_device_free(sensor_device_t *device)
         (void)dlclose(device->library);
     }
     free(device);
+    return 0;
 }

@@ -22,7 +22,7 @@ typedef struct {
 typedef struct {
     uint64_t samples;
     uint64_t errors; /* reads that failed */
-    uint64_t dropped; /* samples that found no room in the ring */
+    uint64_t dropped; /* samples that no tick took: newer ones came */
     uint64_t lost; /* how often the device was gone */
     uint64_t open; /* 1: it is there */
 } device_counts_t;
@@ -41,12 +41,14 @@ void sensor_device_post(sensor_device_t *device, sem_t *semaphore);
 int sensor_device_start(sensor_device_t *device, fcsl_error_t *error);
 /* From the step thread: the oldest sample that was not taken, 1; or 0. Does not wait. */
 int sensor_device_take(sensor_device_t *device, device_sample_t *sample);
+/* Drops the oldest samples until `most` are left at most, and counts them. */
+void sensor_device_skip(sensor_device_t *device, uint32_t most);
 /* Whether one waits. */
 int sensor_device_has_sample(const sensor_device_t *device);
 device_counts_t sensor_device_counts(const sensor_device_t *device);
 /* Whether the device came, went or began to fail since the last text: a text for people, once a second at most; or null. */
 const char *sensor_device_news(sensor_device_t *device);
-/* Ends the thread and closes the device. A driver that hangs is left alone after 1 s. */
-void sensor_device_free(sensor_device_t *device);
+/* Ends the thread and closes the device. 0, or -1: a driver that hangs was left alone after 1 s; plan and device stay in use. */
+int sensor_device_free(sensor_device_t *device);
 
 #endif /* BOARD_SENSOR_DEVICE_H */

@@ -12,7 +12,7 @@
 #include "base/error.h"
 #include "fcsl/fcsl_cdr.h"
 
-enum { NAME_BYTES = 512, LINE_BYTES = 192 };
+enum { NAME_BYTES = 512, LINE_BYTES = 384 };
 static const char TYPE[] = "fcsl_hal/msg/Counters";
 
 static int is_counter(const fcsl_field_t *field)
@@ -35,7 +35,7 @@ static char *make_schema(const fcsl_hal_t *hal)
         if (!is_counter(field)) {
             continue;
         }
-        (void)snprintf(line, sizeof line, "uint64 %.60s  # %.110s\n", field->path, field->doc);
+        (void)snprintf(line, sizeof line, "uint64 %.240s  # %.110s\n", field->path, field->doc);
         for (char *c = line; *c != '#'; c++) {
             *c = *c == '.' ? '_' : *c;
         }

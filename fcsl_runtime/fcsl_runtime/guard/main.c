@@ -131,8 +131,8 @@ static int open_outputs(program_t *program, fcsl_error_t *error)
     if ((options->board != NULL ? add_board(program, error) : add_actuators(program, error)) != 0) {
         return -1;
     }
-    const int status =
-        outputs_start(&guard->outputs, program->realtime.priority, guard->machine->command_timeout_ns, error);
+    const int status = outputs_start(&guard->outputs, guard->data, program->realtime.priority,
+                                     guard->machine->command_timeout_ns, error);
     /* Before a flight program gets the slot. Where a device cannot be opened, the others may still do what a guard that died has
      * left. */
     (void)guard_make_safe(guard, period_of(options));

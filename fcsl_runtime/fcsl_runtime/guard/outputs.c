@@ -60,19 +60,6 @@ int outputs_bind(outputs_t *outputs, const output_binding_t *binding, uint32_t s
     return 0;
 }
 
-int outputs_start(outputs_t *outputs, int priority, uint64_t patience_ns, fcsl_error_t *error)
-{
-    int status = 0;
-    for (uint32_t i = 0; i < outputs->device_count; i++) {
-        fcsl_error_t why;
-        if (output_device_start(outputs->devices[i], priority, patience_ns, &why) != 0 && status == 0) {
-            *error = why;
-            status = -1;
-        }
-    }
-    return status;
-}
-
 /* ---- values --------------------------------------------------------------------------------------------------------- */
 
 static void put_value(output_binding_t *binding, const uint8_t *data, int armed, uint64_t time_ns)
@@ -96,6 +83,22 @@ static void put_device(outputs_t *outputs, output_device_t *device, const void *
         }
     }
     output_device_put(device, time_ns);
+}
+
+int outputs_start(outputs_t *outputs, const void *data, int priority, uint64_t patience_ns, fcsl_error_t *error)
+{
+    int status = 0;
+    for (uint32_t i = 0; i < outputs->device_count; i++) {
+        output_device_t *device = outputs->devices[i];
+        fcsl_error_t why;
+        if (output_device_start(device, priority, patience_ns, &why) == 0) {
+            put_device(outputs, device, data, 0, now_ns()); /* the next one may take its time to open */
+        } else if (status == 0) {
+            *error = why;
+            status = -1;
+        }
+    }
+    return status;
 }
 
 void outputs_put(outputs_t *outputs, const void *data, int armed, uint64_t time_ns)

@@ -205,11 +205,11 @@ BOARD_CODES: dict[str, Code] = {
     ),
     "E520": Code(
         "a device that cannot pace the loop",
-        "Each sample of the device that paces the loop is a tick, and somebody must get it: it is a backend of a sensor.",
+        "Each sample of the device that paces the loop is a tick. So it is a backend of a sensor, sends by itself (a driver "
+        "that is polled follows a clock of the computer), and its rate, if it has one, is that of the ticks.",
         Kind.BOARD,
-        _devices(_MPU, ',\n  "spare": {"driver": "iio", "device": "mpu9250", "rate_hz": 100}')
-        + ',\n"pace": {"device": "spare", "timeout_s": 0.1}',
         _devices(_MPU) + ',\n"pace": {"device": "mpu", "timeout_s": 0.1}',
+        _devices(_MPU.replace('"iio"', '"iio_buffer"')) + ',\n"pace": {"device": "mpu", "timeout_s": 0.1}',
     ),
     "W501": Code(
         "a device that nothing uses",

@@ -110,11 +110,6 @@ def read_plan(path: str | Path) -> Plan:
     return plan
 
 
-def bound_channels(path: str | Path) -> frozenset[str]:
-    """The channels that the board's sensors feed. Raises TwinError."""
-    return frozenset(channel for sensor in read_plan(path).sensors for channel in sensor.channels.values())
-
-
 def find_sensor(plan: Plan, name: str) -> int:
     """Its index. Raises TwinError."""
     names = [sensor.name for sensor in plan.sensors]

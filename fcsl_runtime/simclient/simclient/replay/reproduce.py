@@ -7,14 +7,14 @@ the checkpoint and repeats the writes at the same ticks. Outputs, health, reques
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from pathlib import Path
 from typing import Any
 
 from ..bag import Bag, RecordedMachine
 from ..bag.states import StateReader
 from ..board.frontends import Frontends
-from ..board.plan import bound_channels
+from ..board.plan import Plan, read_plan
 from ..c_machine import HEALTH_NAMES
 from ..errors import BagError, TwinError
 from ..run import Run
@@ -28,7 +28,7 @@ _WRITE_FIELDS = ("tick", "kind", "path", "element", "data")
 #: A longer gap between two records is damage; running it would take hours.
 _MAX_LOST_TICKS = 10_000_000
 _READINGS_TYPE = "fcsl_hal/msg/Readings"
-_READINGS_FIELDS = ("tick", "now_ns", "readings")
+_READINGS_FIELDS = ("tick", "now_ns", "backends", "readings")
 _KIND_NAMES = ("SET", "SET_STATE", "RESTORE", "CHANNEL", "OVERRUN", "ATTACH", "IMPURE", "FAULT", "HEALTH")
 
 
@@ -55,7 +55,9 @@ class Replay:
         self._topics = recorded
         self._run = run
         self._frontends = Frontends(board, run) if board else None
-        self._sensed_channels = bound_channels(board) if board else frozenset()
+        self._plan = read_plan(board) if board else Plan()
+        self._sensed_channels = {channel for sensor in self._plan.sensors for channel in sensor.channels.values()}
+        self._backends: dict[tuple[int, int], tuple[int, int]] = {}
         self._readings = _readings_topic(bag, recorded) if board else ""
         self._sensed = 0
         self._instances = {instance.name: instance.index for instance in run.machine.instances}
@@ -157,13 +159,36 @@ class Replay:
         message = self._bag.decode_own(self._readings, data, _READINGS_FIELDS)
         assert self._frontends is not None
         self._advance(message.tick, f"`{self._readings}`")
+        if message.backends:
+            self._backends = self._match_backends(message.backends)
         try:
             for reading in message.readings:
-                self._frontends.take(reading.sensor, reading.backend, reading.sample_ns, reading.values)
+                place = self._backends.get((reading.sensor, reading.backend))
+                if place is not None:
+                    self._frontends.take(*place, reading.sample_ns, reading.values)
             self._frontends.tick(message.now_ns)
         except (TwinError, ValueError) as error:
             raise BagError(f"{self._bag.path}: the readings of tick {message.tick} cannot be used: {error}") from None
         self._sensed += 1
+
+    def _match_backends(self, names: Sequence[str]) -> dict[tuple[int, int], tuple[int, int]]:
+        """From places in the recorded board to those in this one, by the names of sensor and device. Raises BagError where
+        this board has a backend that the flight did not have: its readings are not in the bag."""
+        here = {
+            f"{s.name} {b.device}": (i, k) for i, s in enumerate(self._plan.sensors) for k, b in enumerate(s.backends)
+        }
+        if missing := [name for name in here if name not in names]:
+            sensor, device = missing[0].split(" ")
+            raise BagError(f"{self._bag.path}: the flight has no readings of device `{device}` for sensor `{sensor}`")
+        places, count = {}, dict[str, int]()
+        sensors = list(dict.fromkeys(name.partition(" ")[0] for name in names))
+        for name in names:
+            sensor = name.partition(" ")[0]
+            backend = count.get(sensor, 0)
+            count[sensor] = backend + 1
+            if name in here:
+                places[sensors.index(sensor), backend] = here[name]
+        return places
 
     def _apply(self, write: Any, data: bytes) -> None:
         run, kind, path = self._run, write.kind, write.path
