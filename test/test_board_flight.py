@@ -280,7 +280,11 @@ def test_plans_that_cannot_fly(craft: Craft) -> None:
     assert f"cannot read '{craft.plan}': No such file or directory" in craft.refusal()
     for old, new, reason in (
         ("end\n", "", "the plan has no `end`: it was cut off"),
-        ("fcsl-board-plan 1", "fcsl-board-plan 2", "board.plan:1: not a plan that `fcslc board` wrote"),
+        (
+            "fcsl-board-plan 1",
+            "fcsl-board-plan 2",
+            "board.plan:1: not a plan, or of another version: `fcslc board board.json` writes it",
+        ),
         ("machine craft 100", "machine raft 100", "is for machine 'raft' at 100 Hz, and this is 'craft' at 100 Hz"),
         ("sensor imu inertial", "sensor imu internal", "board.plan:5: not a kind of sensor"),
         ("bind gyro imu.gyro", "bind gyro imu.giro", "machine 'craft' has no channel 'imu.giro'"),

@@ -527,7 +527,7 @@ def test_diagnostics(board: Any, code: str, message: str, at: str, folder: Path)
         (edited("devices", "bmp", "driver", value="ioo"), "did you mean `iio`?"),
         (edited("devices", "bmp", "driver", value="thing"), "there are iio, power_supply"),
         (edited(*IMU, "channels", "feld", value="imu.gyro"), "there are gyro, accel, temperature, delta_angle"),
-        (edited(*TOP, "rotation", value="roll_180_yaw_80"), "did you mean `roll_180_yaw_"),
+        (edited(*TOP, "rotation", value="roll_180_yaw_80"), "angles are multiples of 45 from 45 to 315"),
     ],
 )
 def test_help(board: Any, help_text: str, folder: Path) -> None:

@@ -106,6 +106,8 @@ def _problem(f: Filter, device: Device) -> tuple[str, str] | None:
         return f"a filter of `{device.name}`, whose rate is unknown", "remove it, or give a device with `rate_hz`"
     low, high = f.hz - 0.5 * f.width_hz, f.hz + 0.5 * f.width_hz
     nyquist = 0.5 * device.rate_hz
+    if f.width_hz and low < 0.0:
+        return f"a notch at {f.hz:g} Hz that is {f.width_hz:g} Hz wide", "`width_hz` must be below twice `hz`"
     what = f"a notch from {low:g} to {high:g} Hz" if f.width_hz else f"a low-pass of {f.hz:g} Hz"
     if high >= nyquist:
         return (

@@ -6,7 +6,6 @@ from __future__ import annotations
 import itertools
 import math
 
-from ..base.diagnostics import nearest
 from ..model.types import F64, Array
 from ..parse.json_reader import ConfigReader
 from ..parse.json_source import JsonNode
@@ -83,7 +82,7 @@ def read_rotation(node: JsonNode | None, reader: ConfigReader) -> Matrix | None:
         return None
     if text not in NAMED:
         fix = "angles are multiples of 45 from 45 to 315, in the order roll, pitch, yaw; or write a 3x3 matrix"
-        reader.sink.error("E510", f"no rotation `{text}`", node.span, help=nearest(text, list(NAMED)) or fix)
+        reader.sink.error("E510", f"no rotation `{text}`", node.span, help=fix)
         return None
     return from_angles(*NAMED[text])
 

@@ -389,7 +389,7 @@ static int parse(board_plan_t *plan, const char *file, size_t size, fcsl_error_t
         char *next = at + strlen(at) + 1;
         const int is_end = strcmp(at, "end") == 0;
         if (line == 1u ? strcmp(at, FIRST_LINE) != 0 : is_end != (line == lines)) {
-            wrong = line == 1u ? "not a plan that `fcslc board` wrote, or of another version"
+            wrong = line == 1u ? "not a plan, or of another version: `fcslc board board.json` writes it"
                     : is_end   ? "text after `end`"
                                : "the plan has no `end`: it was cut off";
         } else if (line > 1u && !is_end) {
