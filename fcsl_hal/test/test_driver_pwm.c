@@ -271,6 +271,24 @@ static void test_chips_that_refuse(void)
     driver->close(rig.self);
 }
 
+/* A channel has one driver: a second one changes nothing of it, and gets it when the first has closed. */
+static void test_two_drivers(void)
+{
+    rig_t first;
+    rig_t second;
+    make_channel(CHIP, 0, "20000000\n", "0\n", "0\n");
+    make_channel(CHIP, 1, "20000000\n", "0\n", "0\n");
+    CHECK(open_pulses(&first, "pwmchip0", "0") == FCSL_DRIVER_OK);
+    CHECK(open_fails("pwmchip0@400", "0", "pulse0: another device or program drives it"));
+    CHECK(open_fails("pwmchip0@400", "10", "pulse0: another device or program drives it"));
+    CHECK(has_number(CHIP "pwm0/period", 20000000));
+    CHECK(open_pulses(&second, "pwmchip0", "1") == FCSL_DRIVER_OK);
+    driver->close(second.self);
+    driver->close(first.self);
+    CHECK(open_pulses(&second, "pwmchip0@400", "0") == FCSL_DRIVER_OK && has_number(CHIP "pwm0/period", 2500000));
+    driver->close(second.self);
+}
+
 /* Channels that are not there yet are exported. */
 static void test_export(void)
 {
@@ -328,6 +346,7 @@ int main(void)
     test_enabled_channels();
     test_impossible_pulses();
     test_chips_that_refuse();
+    test_two_drivers();
     test_export();
     test_a_chip_that_comes_back();
     remove_tree();

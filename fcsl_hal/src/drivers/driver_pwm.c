@@ -3,9 +3,10 @@
  * The driver `pwm`: pulses of a PWM chip of the kernel (Documentation/ABI/testing/sysfs-class-pwm of the kernel). Its device is
  * `CHIP[@HZ]`: the chip's folder by its name or path, or the device that it belongs to, as `1-0040`; and the frequency of the pulses.
  *
- * The files of pulses stay open: those of a chip that has gone refuse everything, whatever chip has got its name.
+ * The files of pulses stay open: those of a chip that has gone refuse everything, whatever chip has got its name. They are locked:
+ * a second program on a channel would write over the safe pulses of the first.
  */
-#define _POSIX_C_SOURCE 200809L
+#define _GNU_SOURCE
 #include "drivers.h"
 #include "sysfs.h"
 
@@ -196,30 +197,56 @@ static fcsl_driver_status_t set_up(const char *folder, uint64_t period_ns, char 
     return status == FCSL_DRIVER_NOTHING ? FCSL_DRIVER_OK : status;
 }
 
-/* One that has pulses is left alone until the first write. The kernel calls all channels of some chips enabled, those without pulses,
- * too. */
-static fcsl_driver_status_t open_channel(pwm_t *pwm, unsigned index, const char *folder, char *why, size_t size)
+static void release(channel_t *channel)
 {
-    channel_t *channel = &pwm->channels[index];
+    if (channel->duty_file >= 0) {
+        (void)close(channel->duty_file);
+    }
+    *channel = (channel_t){.duty_file = -1};
+}
+
+/* Opens and locks the file of the pulses. The lock ends with the program, however it ends; who may not write has none. */
+static fcsl_driver_status_t take(channel_t *channel, const char *folder, char *why, size_t size)
+{
+    struct flock all = {.l_type = F_WRLCK, .l_whence = SEEK_SET};
     char path[SYSFS_PATH_BYTES];
-    double enabled = 0.0;
-    double duty = 0.0;
-    fcsl_driver_status_t status = get_ns(folder, "enable", &enabled, why, size);
-    status = status == FCSL_DRIVER_OK ? get_ns(folder, "duty_cycle", &duty, why, size) : status;
-    if (status == FCSL_DRIVER_OK && (enabled == 0.0 || duty == 0.0)) {
-        status = set_up(folder, pwm->period_ns, why, size);
-        channel->is_set_up = status == FCSL_DRIVER_OK;
-    }
-    if (status != FCSL_DRIVER_OK) {
-        return status;
-    }
     channel->duty_file =
         sysfs_join(path, folder, "duty_cycle") == 0 ? open(path, O_WRONLY | O_NONBLOCK | O_CLOEXEC) : -1;
     if (channel->duty_file < 0) {
         (void)snprintf(why, size, "cannot open its duty_cycle: %s", strerror(errno));
         return FCSL_DRIVER_FAILED;
     }
+    if (fcntl(channel->duty_file, F_OFD_SETLK, &all) != 0) {
+        const int code = errno;
+        release(channel);
+        if (code == EAGAIN || code == EACCES) {
+            (void)snprintf(why, size, "another device or program drives it");
+        } else {
+            (void)snprintf(why, size, "cannot lock its duty_cycle: %s", strerror(code));
+        }
+        return FCSL_DRIVER_FAILED;
+    }
     return FCSL_DRIVER_OK;
+}
+
+/* One that has pulses is left alone until the first write. The kernel calls all channels of some chips enabled, those without pulses,
+ * too. */
+static fcsl_driver_status_t open_channel(pwm_t *pwm, unsigned index, const char *folder, char *why, size_t size)
+{
+    channel_t *channel = &pwm->channels[index];
+    double enabled = 0.0;
+    double duty = 0.0;
+    fcsl_driver_status_t status = get_ns(folder, "enable", &enabled, why, size);
+    status = status == FCSL_DRIVER_OK ? get_ns(folder, "duty_cycle", &duty, why, size) : status;
+    status = status == FCSL_DRIVER_OK ? take(channel, folder, why, size) : status;
+    if (status == FCSL_DRIVER_OK && (enabled == 0.0 || duty == 0.0)) {
+        status = set_up(folder, pwm->period_ns, why, size);
+        channel->is_set_up = status == FCSL_DRIVER_OK;
+    }
+    if (status != FCSL_DRIVER_OK) {
+        release(channel); /* export_and_open tries again */
+    }
+    return status;
 }
 
 /* The kernel shows the files of a channel when it is exported. */
@@ -254,10 +281,7 @@ static void close_pwm(void *self)
 {
     pwm_t *pwm = self;
     for (unsigned i = 0; i < CHANNELS; i++) {
-        if (pwm->channels[i].duty_file >= 0) {
-            (void)close(pwm->channels[i].duty_file);
-        }
-        pwm->channels[i] = (channel_t){.duty_file = -1};
+        release(&pwm->channels[i]);
     }
     pwm->is_open = 0;
 }

@@ -108,14 +108,14 @@ def _words(movement: Movement, seconds: float) -> str:
 
 @contextmanager
 def _signals_seen() -> Iterator[list[int]]:
-    """The signals that have come: a list that grows."""
+    """The signals that have come: a list that grows. One has ended the command, so the next ones are ignored to its end."""
     seen: list[int] = []
     before = {number: signal.signal(number, lambda number, _: seen.append(number)) for number in _SIGNALS}
     try:
         yield seen
     finally:
         for number, handler in before.items():
-            signal.signal(number, handler)
+            signal.signal(number, signal.SIG_IGN if seen else handler)
 
 
 def _move(device: Device, movement: Movement, seconds: float, seen: list[int]) -> None:
