@@ -25,7 +25,8 @@ from simclient.replay import replay
 from simclient.vars.wire import VarError
 
 ROOT = Path(__file__).resolve().parents[1]
-BIN = package_prefix("fcsl_runtime") / "bin"
+#: The check with sanitizers has its own.
+PROGRAM = Path(os.environ.get("FCSL_TEST_FC", package_prefix("fcsl_runtime") / "bin/fcsl-fc"))
 HZ = 100
 LONG_S = 60
 ALGORITHMS = '''class Sensors:
@@ -126,7 +127,7 @@ class Craft:
         return self.folder / plan
 
     def line(self, *options: str | Path) -> list[str]:
-        words = [BIN / "fcsl-fc", self.library, "--hal", f"linux:{self.plan}", *options]
+        words = [PROGRAM, self.library, "--hal", f"linux:{self.plan}", *options]
         return [str(word) for word in words]
 
     def refusal(self, *options: str) -> str:
@@ -407,7 +408,7 @@ def test_a_device_paces_the_loop(tmp_path: Path) -> None:
     (tmp_path / "board.json").write_text(board)
     subprocess.run(["fcslc", "board", tmp_path / "board.json"], check=True)
     machine = build_machine(tmp_path / "echo.json", "simulation").library
-    line = [BIN / "fcsl-fc", machine, "--hal", f"linux:{tmp_path / 'board.plan'}", "--record", bag]
+    line = [PROGRAM, machine, "--hal", f"linux:{tmp_path / 'board.plan'}", "--record", bag]
     with subprocess.Popen(line, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True) as process:
         with fifo.open("wb", buffering=0) as robot:
             for burst in (1, 40, 3, 1, 55):

@@ -43,6 +43,7 @@ struct sensor_device {
     int started;
     atomic_int over;
     sem_t wake;
+    sem_t finished;
     sem_t *posted; /* null: nobody waits for samples */
 
     _Atomic uint64_t ring[DEVICE_RING_SAMPLES][1 + DEVICE_VALUES_MAX]; /* time and values of a sample */
@@ -99,7 +100,8 @@ sensor_device_t *sensor_device_new(const board_device_t *plan, fcsl_error_t *err
         (void)fcsl_fail(error,
                         "device '%.60s': driver '%.60s' does not wait for samples: give the device a \"rate_hz\"",
                         plan->name, plan->driver);
-    } else if (sem_init(&device->wake, 0, 0) != 0 || pthread_mutex_init(&device->reason_lock, NULL) != 0) {
+    } else if (sem_init(&device->wake, 0, 0) != 0 || sem_init(&device->finished, 0, 0) != 0 ||
+               pthread_mutex_init(&device->reason_lock, NULL) != 0) {
         (void)fcsl_fail(error, "device '%.60s': no semaphore", plan->name);
     } else if (allocate(device, error) == 0) {
         return device;
@@ -285,6 +287,7 @@ static void *run(void *ctx)
             sleep_until(device, now_ns() + wait_ns);
         }
     }
+    (void)sem_post(&device->finished);
     return NULL;
 }
 
@@ -399,11 +402,12 @@ static int end_thread(sensor_device_t *device)
     const struct timespec end = {.tv_sec = (time_t)(end_ns / 1000000000u), .tv_nsec = (long)(end_ns % 1000000000u)};
     atomic_store(&device->over, 1);
     (void)sem_post(&device->wake);
-    if (pthread_clockjoin_np(device->thread, NULL, CLOCK_MONOTONIC, &end) == 0) {
-        return 0;
-    }
-    (void)pthread_detach(device->thread);
-    return -1;
+    int waited = 0;
+    do {
+        waited = sem_clockwait(&device->finished, CLOCK_MONOTONIC, &end);
+    } while (waited != 0 && errno == EINTR);
+    (void)(waited == 0 ? pthread_join(device->thread, NULL) : pthread_detach(device->thread));
+    return waited;
 }
 
 int sensor_device_free(sensor_device_t *device)

@@ -51,6 +51,7 @@ _INCLUDES = (
     *("fcsl_hal/include", "fcsl_runtime/fcsl_runtime/include", "fcsl_sim/include", "fcsl_compiler/include"),
     *(
         "fcsl_hal/src",
+        "fcsl_hal/src/*/",
         "fcsl_runtime/fcsl_runtime",
         "fcsl_runtime/fcsl_runtime/src",
         "fcsl_runtime/fcsl_runtime/src/*/",

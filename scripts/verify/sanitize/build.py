@@ -100,7 +100,7 @@ class Build:
         runtime = self.package("fcsl_runtime")
         prefixes = [str(self.folder / "install" / p) for p in PACKAGES]
         own["LD_LIBRARY_PATH"] = _before(own, "LD_LIBRARY_PATH", *(f"{p}/lib" for p in prefixes))
-        programs = {"FC": "fcsl-fc", "WIRE_SIM": "wire_sim", "MCAP_WRITE": "mcap_write"}
+        programs = {"FC": "fcsl-fc", "GUARD": "fcsl-guard", "WIRE_SIM": "wire_sim", "MCAP_WRITE": "mcap_write"}
         own |= {f"FCSL_TEST_{name}": str(runtime / program) for name, program in programs.items()}
         report = f"log_path={self.reports / 'report'}"
         if self.kind == "thread":

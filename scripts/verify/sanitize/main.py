@@ -53,8 +53,9 @@ SUITES = (
         (
             *(
                 f"fcsl_runtime/simclient/test/test_{n}.py"
-                for n in ("fc", "fc_wire", "fc_time", "fc_telemetry", "guard")
+                for n in ("fc", "fc_wire", "fc_time", "fc_telemetry", "guard", "guard_board")
             ),
+            "test/test_board_flight.py",
             "-k",
             "not locking and not pinned",
         ),
