@@ -15,8 +15,10 @@ static const struct {
     const char *name;
     const char *doc;
 } OF_DEVICE[] = {
-    {"open", "1: the device is there"}, {"samples", "samples that it gave"},
-    {"errors", "reads that failed"},    {"dropped", "samples that waited for a tick in vain: the ring was full"},
+    {"open", "1: the device is there"},
+    {"samples", "samples that it gave"},
+    {"errors", "reads that failed"},
+    {"dropped", "samples that no tick got: a tick was late, or the flight was paused"},
     {"lost", "times that it was gone"},
 };
 enum { DEVICE_COUNTERS = sizeof OF_DEVICE / sizeof OF_DEVICE[0] };

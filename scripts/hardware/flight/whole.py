@@ -23,6 +23,7 @@ from .process import Flight, Guard, linux, until
 _FLIGHT_S, _SCENES_HZ = 20.0, 20.0
 _LOST_S, _BACK_S = 8.0, 10.0  # of the first inertial sensor
 _DEVICES = ("top", "bottom", "barometer", "magnetometer", "battery", "joystick")
+_DROPPED_MAX = 0.05
 _REPLAY_LIMIT_S = 60.0
 
 
@@ -64,15 +65,15 @@ def fly(world: World, flight: Flight) -> None:
 
 
 def check(flight: Flight, servos: Servos) -> None:
-    """The last values: those of a world that stands still now."""
+    """The last values: those of a world that stands still now. The guest's processor may keep a tick waiting, which costs samples."""
     flight.set(throttle=0.25, steer=0.5)
     servos.until((1250.0, 1310.0))
     flight.until_output("pressure", 101325.0 - 12.0 * _FLIGHT_S, 5.0)
     flight.until_output("voltage", 16.8 - 0.05 * _FLIGHT_S, 0.01)
     for device in _DEVICES:
-        dropped = flight.get(f"hal.devices.{device}.dropped")
-        if flight.get(f"hal.devices.{device}.open") != 1 or dropped != 0:
-            raise Failed(f"device {device} is not open, or {dropped} samples were dropped")
+        samples, dropped = (flight.get(f"hal.devices.{device}.{name}") for name in ("samples", "dropped"))
+        if flight.get(f"hal.devices.{device}.open") != 1 or dropped > _DROPPED_MAX * samples:
+            raise Failed(f"device {device} is not open, or {dropped} of {samples} samples were dropped")
     flight.until_value("hal.sensors.imu.condition.top", 0)
     flight.until_value("machine.state", "FLIGHT")
     if "sensor 'imu': primary is device 'bottom'" not in flight.said():
