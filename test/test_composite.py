@@ -10,7 +10,7 @@ import signal
 import subprocess
 import time
 from collections.abc import Callable, Iterator
-from contextlib import contextmanager
+from contextlib import AbstractContextManager, contextmanager
 from pathlib import Path
 
 import pytest
@@ -53,8 +53,7 @@ def plan(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
 
 
 @contextmanager
-def simulated(wire: str, *options: str) -> Iterator[subprocess.Popen[str]]:
-    line = ["fcsl-sim", "run", str(SIM), "--external", f"wire:{wire}", *options]
+def running(line: list[str | Path]) -> Iterator[subprocess.Popen[str]]:
     with subprocess.Popen(line, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True) as process:
         try:
             yield process
@@ -63,15 +62,13 @@ def simulated(wire: str, *options: str) -> Iterator[subprocess.Popen[str]]:
             process.communicate()
 
 
-@contextmanager
-def flown(hal: str, *options: str | Path) -> Iterator[subprocess.Popen[str]]:
+def simulated(wire: str, *options: str) -> AbstractContextManager[subprocess.Popen[str]]:
+    return running(["fcsl-sim", "run", SIM, "--external", f"wire:{wire}", *options])
+
+
+def flown(hal: str, *options: str | Path) -> AbstractContextManager[subprocess.Popen[str]]:
     line = [FC, LIBRARY, "--machine", "lander_control", "--hal", hal, "--timeout-ms", str(LONG_S * 1000), *options]
-    with subprocess.Popen(line, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True) as process:
-        try:
-            yield process
-        finally:
-            process.kill()
-            process.communicate()
+    return running(line)
 
 
 def until(holds: Callable[[], bool]) -> None:

@@ -10,7 +10,7 @@ from typing import Any
 import jsonschema
 import pytest
 from fcsl_test_boards import BOARD, write_board, write_machine
-from test_schema import mutants
+from test_schema import agree, mutants
 
 from fcsl_compiler.base.ament import package_share
 from fcsl_compiler.base.diagnostics import DiagnosticError
@@ -77,15 +77,7 @@ def test_schema_and_reader_have_the_same_keys(folder: Path, monkeypatch: pytest.
 
     monkeypatch.setattr(ConfigReader, "object", record)
     assert accepted(folder, BOARD)
-    assert set(keys) == set(OBJECTS)
-    for kind, steps in OBJECTS.items():
-        place = TEXT
-        for step in steps:
-            place = place[step]
-        known, required = keys[kind]
-        assert place["additionalProperties"] is False
-        assert set(place["properties"]) == known, kind
-        assert set(place.get("required", ())) == required, kind
+    agree(TEXT, OBJECTS, keys)
 
 
 def test_words_and_limits_are_the_compilers() -> None:

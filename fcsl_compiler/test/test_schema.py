@@ -4,7 +4,7 @@
 import copy
 import json
 import re
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
@@ -223,6 +223,19 @@ OBJECTS = {
 }
 
 
+def agree(text: Any, objects: Mapping[str, Sequence[str]], keys: dict[str, tuple[set[str], set[str]]]) -> None:
+    """`keys`: known and required ones of each object that the reader read; `objects`: its place in the schema."""
+    assert set(keys) == set(objects)
+    for kind, steps in objects.items():
+        place = text
+        for step in steps:
+            place = place[step]
+        known, required = keys[kind]
+        assert place["additionalProperties"] is False
+        assert set(place["properties"]) == known, kind
+        assert set(place.get("required", ())) == required, kind
+
+
 def test_schema_and_reader_have_the_same_keys(folder: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     keys: dict[str, tuple[set[str], set[str]]] = {}
     original = ConfigReader.object
@@ -239,15 +252,7 @@ def test_schema_and_reader_have_the_same_keys(folder: Path, monkeypatch: pytest.
 
     monkeypatch.setattr(ConfigReader, "object", record)
     assert accepted(folder, RICH)
-    assert set(keys) == set(OBJECTS)
-    for kind, steps in OBJECTS.items():
-        place = TEXT
-        for step in steps:
-            place = place[step]
-        known, required = keys[kind]
-        assert place["additionalProperties"] is False
-        assert set(place["properties"]) == known, kind
-        assert set(place.get("required", ())) == required, kind
+    agree(TEXT, OBJECTS, keys)
 
 
 def test_words_and_limits_are_the_compilers() -> None:

@@ -101,18 +101,20 @@ int sysfs_parse_number(const char *text, double *number)
     return *end == '\0' && fabs(*number) <= NUMBER_MAX ? 0 : -1;
 }
 
-fcsl_driver_status_t sysfs_read_number(int file, const char *name, double *number, char *why, size_t size)
+static fcsl_driver_status_t to_number(const char *text, const char *name, double *number, char *why, size_t size)
 {
-    char text[SYSFS_TEXT_BYTES];
-    const fcsl_driver_status_t status = sysfs_read_text(file, name, text, why, size);
-    if (status != FCSL_DRIVER_OK) {
-        return status;
-    }
     if (sysfs_parse_number(text, number) != 0) {
         (void)snprintf(why, size, "%s: '%s' is no number", name, text);
         return FCSL_DRIVER_FAILED;
     }
     return FCSL_DRIVER_OK;
+}
+
+fcsl_driver_status_t sysfs_read_number(int file, const char *name, double *number, char *why, size_t size)
+{
+    char text[SYSFS_TEXT_BYTES];
+    const fcsl_driver_status_t status = sysfs_read_text(file, name, text, why, size);
+    return status == FCSL_DRIVER_OK ? to_number(text, name, number, why, size) : status;
 }
 
 fcsl_driver_status_t sysfs_get_text(const char *folder, const char *attribute, char *text, char *why, size_t size)
@@ -129,14 +131,9 @@ fcsl_driver_status_t sysfs_get_text(const char *folder, const char *attribute, c
 
 fcsl_driver_status_t sysfs_get_number(const char *folder, const char *attribute, double *number, char *why, size_t size)
 {
-    int file = -1;
-    fcsl_driver_status_t status = sysfs_open(folder, attribute, &file, why, size);
-    if (status != FCSL_DRIVER_OK) {
-        return status;
-    }
-    status = sysfs_read_number(file, attribute, number, why, size);
-    (void)close(file);
-    return status == FCSL_DRIVER_NOTHING ? judge_error(EAGAIN, attribute, why, size) : status;
+    char text[SYSFS_TEXT_BYTES];
+    const fcsl_driver_status_t status = sysfs_get_text(folder, attribute, text, why, size);
+    return status == FCSL_DRIVER_OK ? to_number(text, attribute, number, why, size) : status;
 }
 
 /* ---- write -------------------------------------------------------------------------------------------------------------- */

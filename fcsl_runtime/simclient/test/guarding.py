@@ -63,7 +63,10 @@ class Guard:
     def __init__(self, library: Path, folder: Path, *options: str | Path) -> None:
         self.slot, self.log = folder / "slot", folder / f"log{len(list(folder.glob('log*')))}"
         plan = ["--actuator", f"cart.force=log:{self.log}", "--actuator", f"panel.valve=log:{self.log}"]
-        arguments = [GUARD, library, "--slot", self.slot, *plan, *options]
+        self._start(library, *plan, *options)
+
+    def _start(self, library: Path, *options: str | Path) -> None:
+        arguments = [GUARD, library, "--slot", self.slot, *options]
         self.process = subprocess.Popen(
             list(map(str, arguments)), stdout=subprocess.PIPE, stderr=subprocess.STDOUT, text=True
         )

@@ -8,7 +8,6 @@ import os
 import signal
 import struct
 import subprocess
-import threading
 import time
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass
@@ -168,14 +167,7 @@ class BoardGuard(Guard):
     def __init__(self, library: Path, folder: Path, text: str, *options: str) -> None:
         self.slot = folder / "slot"
         (folder / "board.plan").write_text(text)
-        arguments = [GUARD, library, "--slot", self.slot, "--board", folder / "board.plan", *options]
-        self.process = subprocess.Popen(
-            list(map(str, arguments)), stdout=subprocess.PIPE, stderr=subprocess.STDOUT, text=True
-        )
-        self.lines: list[str] = []
-        self._reader = threading.Thread(target=self._read)
-        self._reader.start()
-        self.wait_line("machine 'guarded'")
+        self._start(library, "--board", folder / "board.plan", *options)
 
 
 @contextlib.contextmanager
