@@ -38,12 +38,12 @@ class Write:
 
 
 def log_writes(path: Path) -> list[Write]:
-    """All complete lines of the file, oldest first."""
-    data = path.read_bytes()
+    """All complete lines of the file, oldest first. One that changes between two looks is being written."""
+    data, again = path.read_bytes(), path.read_bytes()
     found = []
     for at in range(0, len(data), 256):
         line = data[at : at + 256]
-        if line.endswith(b"\n"):
+        if line.endswith(b"\n") and line == again[at : at + 256]:
             stamp, *values = line.decode().split()
             pairs = (value.split("=") for value in values)
             found.append(Write(int(stamp) / 1e9, {name: float(text) for name, text in pairs}))
