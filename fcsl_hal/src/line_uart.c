@@ -8,11 +8,10 @@
 #include <inttypes.h>
 #include <stdio.h>
 #include <string.h>
-#include <sys/file.h>
-#include <sys/ioctl.h>
 #include <termios.h>
 #include <unistd.h>
 
+#include "drivers/serial.h"
 #include "line.h"
 #include "monotonic.h"
 
@@ -62,12 +61,6 @@ static int set_up(int fd, speed_t speed)
                : -1;
 }
 
-/* TIOCEXCL keeps other users out, the lock those who are root, too, if they ask. */
-static int take_for_us(int fd)
-{
-    return flock(fd, LOCK_EX | LOCK_NB) == 0 && ioctl(fd, TIOCEXCL) == 0 ? 0 : -1;
-}
-
 int line_open_uart(line_t *line, const char *device, uint32_t baud, char *error, size_t error_size)
 {
     const speed_t *speed = speed_of(baud);
@@ -82,7 +75,7 @@ int line_open_uart(line_t *line, const char *device, uint32_t baud, char *error,
     if (fd < 0 || isatty(fd) == 0) {
         (void)snprintf(error, error_size, fd < 0 ? "cannot open '%s': %s" : "'%s' is no serial device: %s", device,
                        strerror(errno));
-    } else if (take_for_us(fd) != 0) {
+    } else if (serial_take_for_us(fd) != 0) {
         (void)snprintf(error, error_size, "'%s' is in use by another process", device);
     } else if (set_up(fd, *speed) != 0) {
         (void)snprintf(error, error_size, "cannot set '%s' to %" PRIu32 " baud: %s", device, baud, strerror(errno));

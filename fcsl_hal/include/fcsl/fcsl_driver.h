@@ -46,7 +46,8 @@ typedef struct {
 } fcsl_driver_signal_t;
 
 /* Every function but close may put a reason into `why` (a text of `size` bytes with its zero, empty before the call) when it
- * returns anything but OK or NOTHING. After open nothing is allocated. The host has a thread of its own for each device, so
+ * returns anything but OK or NOTHING. After open nothing is
+ * allocated, except to look for a device that has gone. The host has a thread of its own for each device, so
  * read and write may take as long as the device does; two functions of an opened device never run at the same time. */
 typedef struct {
     uint32_t abi_version;

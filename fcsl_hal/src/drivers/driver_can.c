@@ -10,7 +10,6 @@
 #include "drivers.h"
 
 #include <errno.h>
-#include <fcntl.h>
 #include <inttypes.h>
 #include <linux/can.h>
 #include <linux/can/raw.h>

@@ -7,7 +7,6 @@
  */
 #include "drivers.h"
 
-#include <fcntl.h>
 #include <math.h>
 #include <stdio.h>
 #include <unistd.h>
@@ -94,7 +93,7 @@ static void close_gnss(void *self)
 static fcsl_driver_status_t open_ubx(void *self, const char *device, const uint8_t *used, char *why, size_t size)
 {
     (void)used;
-    return serial_open(device, O_RDONLY, &UBX_MODE, &((gnss_t *)self)->fd, why, size);
+    return serial_open(device, &UBX_MODE, &((gnss_t *)self)->fd, why, size);
 }
 
 static int take_ubx(void *self, const uint8_t *bytes, uint32_t count, uint64_t time_ns, uint64_t *sample_ns)
@@ -147,7 +146,7 @@ static fcsl_driver_status_t open_nmea(void *self, const char *device, const uint
             return FCSL_DRIVER_FAILED;
         }
     }
-    return serial_open(device, O_RDONLY, &NMEA_MODE, &((gnss_t *)self)->fd, why, size);
+    return serial_open(device, &NMEA_MODE, &((gnss_t *)self)->fd, why, size);
 }
 
 /* NMEA tells the motion as speed and course. */

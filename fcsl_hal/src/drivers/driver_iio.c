@@ -7,12 +7,9 @@
 #include "iio.h"
 
 #include <stdio.h>
-#include <string.h>
 #include <unistd.h>
 
 #include "monotonic.h"
-
-enum { ATTRIBUTE_BYTES = 64 };
 
 typedef struct {
     const iio_channel_t *channel;
@@ -45,7 +42,7 @@ static void close_iio(void *self)
 static fcsl_driver_status_t open_input(const char *folder, const iio_channel_t *channel, input_t *input, char *why,
                                        size_t size)
 {
-    char attribute[ATTRIBUTE_BYTES];
+    char attribute[IIO_ATTRIBUTE_BYTES];
     (void)snprintf(attribute, sizeof attribute, "%s_raw", channel->name);
     fcsl_driver_status_t status = sysfs_open(folder, attribute, &input->file, why, size);
     if (status == FCSL_DRIVER_OK) {

@@ -23,9 +23,7 @@
 enum {
     ELEMENTS = IIO_VALUES + 1, /* and the timestamp */
     SCAN_BYTES = ELEMENTS * 8,
-    ATTRIBUTE_BYTES = 64,
-    RATE_BYTES = 32,
-    ENTRIES_MAX = 1024 /* of scan_elements */
+    RATE_BYTES = 32
 };
 static const double RATE_MIN_HZ = 0.001;
 static const double RATE_MAX_HZ = 1e6;
@@ -97,7 +95,7 @@ static fcsl_driver_status_t probe_iio_buffer(const char *device, char *why, size
 static fcsl_driver_status_t get_element(const char *folder, const char *name, iio_element_t *element, char *why,
                                         size_t size)
 {
-    char attribute[ATTRIBUTE_BYTES];
+    char attribute[IIO_ATTRIBUTE_BYTES];
     char text[SYSFS_TEXT_BYTES];
     double index = 0.0;
     (void)snprintf(attribute, sizeof attribute, "scan_elements/%s_index", name);
@@ -182,7 +180,7 @@ static fcsl_driver_status_t put_text(const char *folder, const char *attribute, 
 static int is_enable(const char *entry)
 {
     const size_t length = strlen(entry);
-    return length > 3u && length < ATTRIBUTE_BYTES && strcmp(entry + length - 3u, "_en") == 0;
+    return length > 3u && length < IIO_ATTRIBUTE_BYTES && strcmp(entry + length - 3u, "_en") == 0;
 }
 
 /* Elements that another program has left enabled would be in the scan. */
@@ -195,7 +193,7 @@ static fcsl_driver_status_t disable_elements(const iio_buffer_t *buffer, char *w
         return FCSL_DRIVER_FAILED;
     }
     fcsl_driver_status_t status = FCSL_DRIVER_OK;
-    for (uint32_t i = 0; i < ENTRIES_MAX && status == FCSL_DRIVER_OK; i++) {
+    for (uint32_t i = 0; i < SYSFS_ENTRIES_MAX && status == FCSL_DRIVER_OK; i++) {
         const struct dirent *entry = readdir(folder);
         if (entry == NULL) {
             break;
@@ -212,7 +210,7 @@ static fcsl_driver_status_t enable_elements(const iio_buffer_t *buffer, char *wh
 {
     fcsl_driver_status_t status = disable_elements(buffer, why, size);
     for (uint32_t i = 0; i < buffer->element_count && status == FCSL_DRIVER_OK; i++) {
-        char attribute[ATTRIBUTE_BYTES];
+        char attribute[IIO_ATTRIBUTE_BYTES];
         const iio_channel_t *channel = buffer->elements[i].channel;
         (void)snprintf(attribute, sizeof attribute, "scan_elements/%s_en", channel != NULL ? channel->name : TIMESTAMP);
         status = put_text(buffer->folder, attribute, "1", why, size);
@@ -274,7 +272,7 @@ static int get_number(const char *folder, uint32_t *number)
 /* The kernel lets one program open it. */
 static fcsl_driver_status_t open_device(uint32_t number, int *file, char *why, size_t size)
 {
-    char name[ATTRIBUTE_BYTES];
+    char name[IIO_ATTRIBUTE_BYTES];
     char path[SYSFS_PATH_BYTES];
     (void)snprintf(name, sizeof name, "iio:device%" PRIu32, number);
     const int joined = sysfs_join(path, sysfs_root("FCSL_DEV", "/dev"), name) == 0;

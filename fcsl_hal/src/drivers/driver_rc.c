@@ -5,7 +5,6 @@
  */
 #include "drivers.h"
 
-#include <fcntl.h>
 #include <math.h>
 #include <stdbool.h>
 #include <unistd.h>
@@ -52,7 +51,7 @@ static fcsl_driver_status_t open_sbus(void *self, const char *device, const uint
     (void)used;
     sbus_t *sbus = self;
     clear_sticks(sbus->sticks);
-    return serial_open(device, O_RDONLY, &SBUS_MODE, &sbus->fd, why, size);
+    return serial_open(device, &SBUS_MODE, &sbus->fd, why, size);
 }
 
 /* A frame that repeats the last one is no sample: its values are old. In failsafe a receiver may set both flags. */
@@ -127,7 +126,7 @@ static fcsl_driver_status_t open_crsf(void *self, const char *device, const uint
     clear_sticks(crsf->sticks);
     crsf->rssi = (double)NAN;
     crsf->link_quality = (double)NAN;
-    return serial_open(device, O_RDONLY, &CRSF_MODE, &crsf->fd, why, size);
+    return serial_open(device, &CRSF_MODE, &crsf->fd, why, size);
 }
 
 /* CRSF has no failsafe flag. A receiver without a transmitter reports a link quality of 0; it stops sending channels, or repeats

@@ -42,7 +42,11 @@ static uint32_t count_called(const char *folder, const char *text, uint32_t *num
     if (events == NULL) {
         return 0;
     }
-    for (const struct dirent *entry = readdir(events); entry != NULL; entry = readdir(events)) {
+    for (uint32_t i = 0; i < SYSFS_ENTRIES_MAX; i++) {
+        const struct dirent *entry = readdir(events);
+        if (entry == NULL) {
+            break;
+        }
         uint32_t event = 0;
         if (event_number(entry->d_name, &event) == 0 && is_called(folder, entry->d_name, text)) {
             *number = event;

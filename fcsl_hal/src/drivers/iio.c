@@ -8,7 +8,7 @@
 #include <stdio.h>
 #include <string.h>
 
-enum { CHANNELS = 23, ATTRIBUTE_BYTES = 64 };
+enum { CHANNELS = 23 };
 
 static const double T_PER_GAUSS = 1e-4;
 static const double PA_PER_KPA = 1e3;
@@ -128,7 +128,7 @@ fcsl_driver_status_t iio_add_channels(void *self, const uint8_t *used, iio_add_t
 static fcsl_driver_status_t get_shared(const char *folder, const iio_channel_t *channel, const char *what,
                                        double *number, char *why, size_t size)
 {
-    char attribute[ATTRIBUTE_BYTES];
+    char attribute[IIO_ATTRIBUTE_BYTES];
     (void)snprintf(attribute, sizeof attribute, "%s_%s", channel->name, what);
     const fcsl_driver_status_t status = sysfs_get_number(folder, attribute, number, why, size);
     if (status != FCSL_DRIVER_NOTHING) {

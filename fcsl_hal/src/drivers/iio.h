@@ -9,6 +9,7 @@
 #include "sysfs.h"
 
 enum { IIO_VECTOR = 3, IIO_VOLTAGES = 8, IIO_VALUES = 3 * IIO_VECTOR + 3 + IIO_VOLTAGES };
+enum { IIO_ATTRIBUTE_BYTES = 64 }; /* of a name, with its zero */
 
 typedef struct {
     double gyro[IIO_VECTOR];

@@ -12,7 +12,7 @@
 #include <string.h>
 #include <sys/stat.h>
 
-enum { TRIGGER_BYTES = SYSFS_TEXT_BYTES + 16, ATTRIBUTE_BYTES = 64, TIMER_MODE = 0755 };
+enum { TRIGGER_BYTES = SYSFS_TEXT_BYTES + 16, TIMER_MODE = 0755 };
 
 static const char RATE[] = "sampling_frequency";
 static const char CURRENT_TRIGGER[] = "trigger/current_trigger";
@@ -31,7 +31,7 @@ static fcsl_driver_status_t set_device_rate(const iio_setup_t *setup, char *why,
         return result;
     }
     for (uint32_t i = 0; i < setup->element_count; i++) {
-        char attribute[ATTRIBUTE_BYTES];
+        char attribute[IIO_ATTRIBUTE_BYTES];
         const iio_channel_t *channel = setup->elements[i].channel;
         if (channel == NULL) {
             continue;

@@ -103,7 +103,7 @@ fcsl_driver_status_t serial_probe(const char *text, char *why, size_t size)
 /* ---- open --------------------------------------------------------------------------------------------------------------- */
 
 /* TIOCEXCL keeps other users out, the lock those who are root, too, if they ask. */
-static int take_for_us(int fd)
+int serial_take_for_us(int fd)
 {
     return flock(fd, LOCK_EX | LOCK_NB) == 0 && ioctl(fd, TIOCEXCL) == 0 ? 0 : -1;
 }
@@ -115,15 +115,14 @@ static int set_up(int fd, const char *path, const serial_mode_t *mode, char *why
         (void)snprintf(why, size, "'%s' is no serial device: %s", path, strerror(errno));
         return -1;
     }
-    if (take_for_us(fd) != 0) {
+    if (serial_take_for_us(fd) != 0) {
         (void)snprintf(why, size, "'%s' is in use by another process", path);
         return -1;
     }
     return serial_set_mode(fd, mode, why, size);
 }
 
-fcsl_driver_status_t serial_open(const char *text, int flags, const serial_mode_t *mode, int *fd, char *why,
-                                 size_t size)
+fcsl_driver_status_t serial_open(const char *text, const serial_mode_t *mode, int *fd, char *why, size_t size)
 {
     device_t device;
     const fcsl_driver_status_t status = parse(text, &device, why, size);
@@ -131,7 +130,7 @@ fcsl_driver_status_t serial_open(const char *text, int flags, const serial_mode_
         return status;
     }
     /* O_NONBLOCK: opening does not wait for a carrier. */
-    const int opened = open(device.path, flags | O_NOCTTY | O_NONBLOCK | O_CLOEXEC);
+    const int opened = open(device.path, O_RDONLY | O_NOCTTY | O_NONBLOCK | O_CLOEXEC);
     if (opened < 0) {
         return judge_error(errno, device.path, why, size);
     }

@@ -17,9 +17,11 @@ typedef struct {
 /* Whether the device of this text is there. Opens nothing. */
 fcsl_driver_status_t serial_probe(const char *device, char *why, size_t size);
 
-/* Opens it; `flags` are O_RDONLY or O_RDWR. `mode` has the baud rate of a device that names none. */
-fcsl_driver_status_t serial_open(const char *device, int flags, const serial_mode_t *mode, int *fd, char *why,
-                                 size_t size);
+/* Opens it for reading. `mode` has the baud rate of a device that names none. */
+fcsl_driver_status_t serial_open(const char *device, const serial_mode_t *mode, int *fd, char *why, size_t size);
+
+/* Keeps all others out of an open tty. 0, or -1 with errno. */
+int serial_take_for_us(int fd);
 
 /* Makes an open tty raw and sets its mode. 0, or -1 with the reason. */
 int serial_set_mode(int fd, const serial_mode_t *mode, char *why, size_t size);

@@ -10,7 +10,8 @@
 
 enum {
     SYSFS_PATH_BYTES = 512,
-    SYSFS_TEXT_BYTES = 128 /* of an attribute, with its zero */
+    SYSFS_TEXT_BYTES = 128, /* of an attribute, with its zero */
+    SYSFS_ENTRIES_MAX = 1024 /* of a folder that is searched */
 };
 
 /* Devices of one kind: folders in one folder. */

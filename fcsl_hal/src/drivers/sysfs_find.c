@@ -14,8 +14,6 @@
 #include <string.h>
 #include <sys/stat.h>
 
-enum { ENTRIES_MAX = 1024 }; /* of a folder that is searched */
-
 static fcsl_driver_status_t find_by_path(const sysfs_class_t *devices, const char *device, char *path, char *why,
                                          size_t size)
 {
@@ -40,7 +38,7 @@ static fcsl_driver_status_t find_by_path(const sysfs_class_t *devices, const cha
 /* The next device, or null after the last one. `entries` bounds a folder that never ends. */
 static const char *next_device(const sysfs_class_t *devices, DIR *folder, uint32_t *entries)
 {
-    while (*entries < ENTRIES_MAX) {
+    while (*entries < SYSFS_ENTRIES_MAX) {
         const struct dirent *entry = readdir(folder);
         if (entry == NULL) {
             return NULL;

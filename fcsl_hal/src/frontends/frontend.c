@@ -21,7 +21,7 @@ size_t fcsl_frontend_bytes(void)
 
 void fcsl_frontend_init(fcsl_frontend_t *frontend, const fcsl_frontend_config_t *config)
 {
-    *frontend = (fcsl_frontend_t){.config = config, .primary = -1, .last_primary = -1};
+    *frontend = (fcsl_frontend_t){.config = config, .last_primary = -1};
     for (uint32_t b = 0; b < config->backend_count; b++) {
         frontend->backends[b].condition = FCSL_BACKEND_SILENT;
     }
@@ -173,10 +173,10 @@ void fcsl_frontend_tick(fcsl_frontend_t *frontend, uint64_t now_ns, fcsl_fronten
     const fcsl_frontend_config_t *config = frontend->config;
     frontend->begun_ns = frontend->begun_ns > 0u ? frontend->begun_ns : now_ns;
     judge_backends(frontend, now_ns);
-    frontend->primary = choose_primary(frontend, now_ns);
-    *output = (fcsl_frontend_output_t){.primary = frontend->primary};
-    if (frontend->primary >= 0) {
-        const backend_t *primary = &frontend->backends[frontend->primary];
+    const int32_t chosen = choose_primary(frontend, now_ns);
+    *output = (fcsl_frontend_output_t){.primary = chosen};
+    if (chosen >= 0) {
+        const backend_t *primary = &frontend->backends[chosen];
         output->sample_ns = primary->sample_ns;
         output->fresh = primary->sample_ns > frontend->given_ns;
         frontend->given_ns = output->fresh ? primary->sample_ns : frontend->given_ns;
@@ -187,7 +187,7 @@ void fcsl_frontend_tick(fcsl_frontend_t *frontend, uint64_t now_ns, fcsl_fronten
         double velocity[VECTOR];
         double time_s = 0.0;
         strapdown_take(&frontend->backends[b].strapdown, angle, velocity, &time_s);
-        if ((int32_t)b == frontend->primary) {
+        if ((int32_t)b == chosen) {
             memcpy(&output->values[DELTA_ANGLE_AT], angle, sizeof angle);
             memcpy(&output->values[DELTA_VELOCITY_AT], velocity, sizeof velocity);
             output->values[DELTA_TIME_AT] = time_s;

@@ -32,7 +32,6 @@ typedef struct {
 struct fcsl_frontend {
     const fcsl_frontend_config_t *config;
     backend_t backends[FCSL_BACKENDS_MAX];
-    int32_t primary;
     int32_t last_primary; /* the last one that there was; -1: none */
     uint64_t begun_ns; /* time of the first tick; 0: none yet */
     uint64_t given_ns; /* sample time of what the machine got last */

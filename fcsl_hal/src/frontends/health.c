@@ -22,7 +22,7 @@ const char *fcsl_backend_condition_text(fcsl_backend_condition_t condition)
 
 /* ---- a reading by itself -------------------------------------------------------------------------------------------- */
 
-enum { GNSS_FIX_AT = 0, GNSS_FIX_2D = 2, RC_FAILSAFE_AT = 18 };
+enum { GNSS_FIX_AT = 0, GNSS_FIX_2D = 2, RC_FAILSAFE_AT = FCSL_STICKS_MAX };
 
 static int says_invalid(fcsl_sensor_kind_t kind, const double *values)
 {

@@ -26,7 +26,7 @@ static const fcsl_quantity_t GNSS[] = {
     {"speed_accuracy", "m/s", 11, 1, 1},
 };
 static const fcsl_quantity_t RANGE_FINDER[] = {{"distance", "m", 0, 1, 1}};
-static const fcsl_quantity_t RC[] = {{"sticks", "", 0, 18, 1}, {"failsafe", "", 18, 1, 1}};
+static const fcsl_quantity_t RC[] = {{"sticks", "", 0, FCSL_STICKS_MAX, 1}, {"failsafe", "", FCSL_STICKS_MAX, 1, 1}};
 static const fcsl_quantity_t BATTERY[] = {
     {"voltage", "V", 0, 1, 1}, {"current", "A", 1, 1, 1}, {"charge", "", 2, 1, 1}, {"temperature", "degC", 3, 1, 1}};
 static const fcsl_quantity_t VALUE[] = {{"value", "", 0, 1, 1}};

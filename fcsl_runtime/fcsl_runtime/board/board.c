@@ -4,26 +4,16 @@
  */
 #include "board.h"
 
-#include <inttypes.h>
 #include <stdlib.h>
 #include <string.h>
 
 #include "base/error.h"
 
-static int check_machine(const board_plan_t *plan, const char *file, const fcsl_machine_t *machine, fcsl_error_t *error)
-{
-    if (strcmp(plan->machine, machine->name) == 0 && plan->tick_hz == machine->tick_hz) {
-        return 0;
-    }
-    return fcsl_fail(error, "'%.300s' is for machine '%.60s' at %" PRIu64 " Hz, and this is '%.60s' at %" PRIu64 " Hz",
-                     file, plan->machine, plan->tick_hz, machine->name, machine->tick_hz);
-}
-
 static int open_sensors(board_t *board, const char *file, fcsl_error_t *error)
 {
     const fcsl_machine_t *machine = board->run != NULL ? fcsl_run_machine(board->run) : NULL;
     board->plan = board_plan_read(file, error);
-    if (board->plan == NULL || (machine != NULL && check_machine(board->plan, file, machine, error) != 0)) {
+    if (board->plan == NULL || (machine != NULL && board_plan_check_machine(board->plan, file, machine, error) != 0)) {
         return -1;
     }
     for (uint32_t s = 0; s < board->plan->sensor_count; s++) {

@@ -134,12 +134,16 @@ int board_devices_start(board_devices_t *devices, fcsl_error_t *error)
 int board_devices_free(board_devices_t *devices)
 {
     int left = 0;
-    for (uint32_t d = 0; devices != NULL && d < BOARD_DEVICES_MAX; d++) {
+    if (devices == NULL) {
+        return 0;
+    }
+    for (uint32_t d = 0; d < BOARD_DEVICES_MAX; d++) {
         left |= sensor_device_free(devices->devices[d]) != 0;
     }
     if (left) {
         return -1;
     }
+    (void)sem_destroy(&devices->sampled);
     free(devices);
     return 0;
 }
@@ -156,7 +160,10 @@ int board_devices_wait(board_devices_t *devices, uint64_t deadline_ns)
     while (!sensor_device_has_sample(pacing) && waited == 0 && atomic_load(&devices->interrupted) == 0) {
         waited = sem_clockwait(&devices->sampled, CLOCK_MONOTONIC, &deadline) != 0 && errno != EINTR;
     }
-    return sensor_device_has_sample(pacing);
+    if (sensor_device_has_sample(pacing)) {
+        return 1;
+    }
+    return atomic_load(&devices->interrupted) != 0 ? -1 : 0;
 }
 
 void board_devices_interrupt(board_devices_t *devices)

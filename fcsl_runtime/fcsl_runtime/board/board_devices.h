@@ -20,8 +20,8 @@ typedef struct board_devices board_devices_t;
 board_devices_t *board_devices_new(const board_plan_t *plan, fcsl_error_t *error);
 /* Opens all devices and starts their threads. 0, or -1. */
 int board_devices_start(board_devices_t *devices, fcsl_error_t *error);
-/* Where a device paces the loop: waits for its next sample until `deadline_ns` of the monotonic clock, or until it is interrupted. 1, or 0
- * when there is none. */
+/* Where a device paces the loop: waits for its next sample until `deadline_ns` of the monotonic clock, or until it is interrupted: 1, 0
+ * when there is none, or -1. */
 int board_devices_wait(board_devices_t *devices, uint64_t deadline_ns);
 /* From any thread: a wait ends, and so do all later ones. */
 void board_devices_interrupt(board_devices_t *devices);

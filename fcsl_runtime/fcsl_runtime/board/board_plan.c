@@ -6,6 +6,7 @@
 #include "board_plan.h"
 
 #include <errno.h>
+#include <inttypes.h>
 #include <math.h>
 #include <stdio.h>
 #include <stdlib.h>
@@ -482,4 +483,14 @@ void board_plan_free(board_plan_t *plan)
         free(plan->text);
         free(plan);
     }
+}
+
+int board_plan_check_machine(const board_plan_t *plan, const char *file, const fcsl_machine_t *machine,
+                             fcsl_error_t *error)
+{
+    if (strcmp(plan->machine, machine->name) == 0 && plan->tick_hz == machine->tick_hz) {
+        return 0;
+    }
+    return fcsl_fail(error, "'%.300s' is for machine '%.60s' at %" PRIu64 " Hz, and this is '%.60s' at %" PRIu64 " Hz",
+                     file, plan->machine, plan->tick_hz, machine->name, machine->tick_hz);
 }

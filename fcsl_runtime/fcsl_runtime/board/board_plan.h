@@ -109,5 +109,8 @@ board_plan_t *board_plan_read(const char *file, fcsl_error_t *error);
 /* The same of its text, at most BOARD_BYTES_MAX; `name` is for messages. */
 board_plan_t *board_plan_parse(const char *name, const char *text, size_t size, fcsl_error_t *error);
 void board_plan_free(board_plan_t *plan);
+/* Whether the plan of this file is for the machine. 0, or -1. */
+int board_plan_check_machine(const board_plan_t *plan, const char *file, const fcsl_machine_t *machine,
+                             fcsl_error_t *error);
 
 #endif /* BOARD_BOARD_PLAN_H */

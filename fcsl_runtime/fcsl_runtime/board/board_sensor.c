@@ -9,8 +9,7 @@
 
 #include "base/error.h"
 #include "fcsl/fcsl_scalar.h"
-
-static const uint64_t NS_PER_SECOND = 1000000000u;
+#include "fcsl/fcsl_tick_time.h"
 
 static int find_channel(const fcsl_machine_t *machine, const char *name, uint32_t *index)
 {
@@ -80,15 +79,6 @@ int board_sensor_open(board_sensor_run_t *sensor, board_sensor_t *plan, const fc
     return 0;
 }
 
-/* Whole ticks, rounded down. */
-static uint32_t age_in_ticks(uint64_t now_ns, uint64_t sample_ns, uint64_t tick_hz)
-{
-    const uint64_t age_ns = now_ns > sample_ns ? now_ns - sample_ns : 0u;
-    const uint64_t ticks =
-        age_ns / NS_PER_SECOND * tick_hz + age_ns % NS_PER_SECOND * tick_hz / NS_PER_SECOND; /* tick_hz ≤ 10⁶ */
-    return ticks < UINT32_MAX ? (uint32_t)ticks : UINT32_MAX;
-}
-
 static uint32_t put_values(const board_channel_t *channel, const double *values, uint8_t *bytes)
 {
     if (channel->type == FCSL_F64) {
@@ -110,7 +100,8 @@ int board_sensor_tick(board_sensor_run_t *sensor, fcsl_run_t *run, uint64_t now_
     if (run == NULL || output->primary < 0 || !output->fresh) {
         return 0;
     }
-    const uint32_t age_ticks = age_in_ticks(now_ns, output->sample_ns, fcsl_run_machine(run)->tick_hz);
+    const uint64_t age_ns = now_ns > output->sample_ns ? now_ns - output->sample_ns : 0u;
+    const uint32_t age_ticks = fcsl_ticks_of(fcsl_run_machine(run)->tick_hz, age_ns);
     for (uint32_t i = 0; i < sensor->plan->binding_count; i++) {
         uint8_t bytes[FCSL_VALUES_MAX * sizeof(double)];
         const board_channel_t *channel = &sensor->channels[i];

@@ -4,7 +4,6 @@
  */
 #include "hal_linux.h"
 
-#include <stdatomic.h>
 #include <stdio.h>
 #include <stdlib.h>
 
@@ -23,7 +22,6 @@ typedef struct {
     readings_t readings;
     counters_t counters;
     uint64_t paced_ns; /* time of the last sample that was a tick; 0: none yet */
-    atomic_int interrupted;
     fcsl_error_t failure;
 } hal_t;
 
@@ -68,11 +66,11 @@ static fcsl_hal_status_t wait_for_pace(hal_t *hal)
     const uint64_t end_ns = hal->paced_ns > 0u ? hal->paced_ns + plan->pace_timeout_ns : UINT64_MAX;
     const int sampled = board_devices_wait(hal->devices, slice_ns < end_ns ? slice_ns : end_ns);
     const uint64_t now_ns = hal->base.now_ns(hal->base.ctx);
-    if (sampled) {
+    if (sampled > 0) {
         hal->paced_ns = now_ns;
         return FCSL_HAL_OK;
     }
-    if (atomic_load(&hal->interrupted) != 0) {
+    if (sampled < 0) {
         return FCSL_HAL_CLOSED;
     }
     if (now_ns < end_ns) {
@@ -189,7 +187,6 @@ static void linux_alive(void *ctx)
 static void linux_interrupt(void *ctx)
 {
     hal_t *hal = ctx;
-    atomic_store(&hal->interrupted, 1);
     board_devices_interrupt(hal->devices);
 }
 

@@ -8,7 +8,7 @@
 
 #include "board_devices.h"
 
-enum { READINGS_MAX = 512 }; /* of a tick; what is left waits for the next one */
+enum { READINGS_MAX = 512 }; /* of a tick; board_devices_take says what becomes of more */
 
 typedef struct {
     sensor_reading_t kept[READINGS_MAX];

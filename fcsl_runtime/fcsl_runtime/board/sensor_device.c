@@ -7,7 +7,6 @@
 
 #include <dlfcn.h>
 #include <errno.h>
-#include <math.h>
 #include <pthread.h>
 #include <signal.h>
 #include <stdatomic.h>
@@ -17,10 +16,11 @@
 #include <time.h>
 
 #include "base/error.h"
+#include "device_thread.h"
 #include "fcsl/fcsl_library.h"
 #include "fcsl/fcsl_scalar.h"
 
-enum { NEWS_BYTES = 512, STACK_BYTES = 256 << 10 };
+enum { NEWS_BYTES = 512 };
 static const uint64_t LOOK_AGAIN_NS = 500000000u; /* for a device that is not there */
 static const uint64_t FAILED_NS = 10000000u; /* after a read that failed, of a driver that waits */
 static const uint64_t END_NS = 1000000000u;
@@ -43,7 +43,7 @@ struct sensor_device {
     int started;
     atomic_int over;
     sem_t wake;
-    sem_t finished;
+    sem_t finished; /* posted by the thread, at its end */
     sem_t *posted; /* null: nobody waits for samples */
 
     _Atomic uint64_t ring[DEVICE_RING_SAMPLES][1 + DEVICE_VALUES_MAX]; /* time and values of a sample */
@@ -72,22 +72,21 @@ static uint64_t now_ns(void)
 static int allocate(sensor_device_t *device, fcsl_error_t *error)
 {
     const fcsl_driver_t *driver = device->driver;
-    const size_t align = driver->state_align < 64u ? 64u : driver->state_align;
-    const size_t size = (driver->state_size + align - 1u) / align * align;
-    device->state = aligned_alloc(align, size);
+    device->state = device_state_new(driver);
     device->used = calloc(driver->signal_count, 1);
     device->at = calloc(driver->signal_count, sizeof *device->at);
     if (device->state == NULL || device->used == NULL || device->at == NULL) {
         return fcsl_fail(error, "out of memory for device '%.60s'", device->plan->name);
     }
-    memset(device->state, 0, size);
     return 0;
 }
 
 sensor_device_t *sensor_device_new(const board_device_t *plan, fcsl_error_t *error)
 {
     sensor_device_t *device = calloc(1, sizeof *device);
-    if (device == NULL) {
+    if (device == NULL || sem_init(&device->wake, 0, 0) != 0 || sem_init(&device->finished, 0, 0) != 0 ||
+        pthread_mutex_init(&device->reason_lock, NULL) != 0) {
+        free(device);
         (void)fcsl_fail(error, "out of memory for device '%.60s'", plan->name);
         return NULL;
     }
@@ -100,9 +99,6 @@ sensor_device_t *sensor_device_new(const board_device_t *plan, fcsl_error_t *err
         (void)fcsl_fail(error,
                         "device '%.60s': driver '%.60s' does not wait for samples: give the device a \"rate_hz\"",
                         plan->name, plan->driver);
-    } else if (sem_init(&device->wake, 0, 0) != 0 || sem_init(&device->finished, 0, 0) != 0 ||
-               pthread_mutex_init(&device->reason_lock, NULL) != 0) {
-        (void)fcsl_fail(error, "device '%.60s': no semaphore", plan->name);
     } else if (allocate(device, error) == 0) {
         return device;
     }
@@ -291,24 +287,6 @@ static void *run(void *ctx)
     return NULL;
 }
 
-/* Signals are for the threads that expect them. */
-static int start_thread(sensor_device_t *device)
-{
-    pthread_attr_t attributes;
-    sigset_t all;
-    sigset_t before;
-    (void)sigfillset(&all);
-    if (pthread_attr_init(&attributes) != 0) {
-        return -1;
-    }
-    (void)pthread_attr_setstacksize(&attributes, STACK_BYTES);
-    (void)pthread_sigmask(SIG_SETMASK, &all, &before);
-    device->started = pthread_create(&device->thread, &attributes, run, device) == 0;
-    (void)pthread_sigmask(SIG_SETMASK, &before, NULL);
-    (void)pthread_attr_destroy(&attributes);
-    return device->started ? 0 : -1;
-}
-
 void sensor_device_post(sensor_device_t *device, sem_t *semaphore)
 {
     device->posted = semaphore;
@@ -324,7 +302,9 @@ int sensor_device_start(sensor_device_t *device, fcsl_error_t *error)
     }
     set_condition(device, status == FCSL_DRIVER_OK ? DEVICE_OPEN : DEVICE_MISSING, why);
     device->told = DEVICE_OPEN;
-    return start_thread(device) == 0 ? 0 : fcsl_fail(error, "device '%.60s': no thread", device->plan->name);
+    const int code = device_thread_start(&device->thread, 0, run, device);
+    device->started = code == 0;
+    return code == 0 ? 0 : fcsl_fail(error, "device '%.60s': no thread: %s", device->plan->name, strerror(code));
 }
 
 /* ---- the step thread ------------------------------------------------------------------------------------------------ */
@@ -395,19 +375,11 @@ const char *sensor_device_news(sensor_device_t *device)
     return device->news;
 }
 
-/* 0, or -1 when the thread hangs in its driver. */
 static int end_thread(sensor_device_t *device)
 {
-    const uint64_t end_ns = now_ns() + END_NS;
-    const struct timespec end = {.tv_sec = (time_t)(end_ns / 1000000000u), .tv_nsec = (long)(end_ns % 1000000000u)};
     atomic_store(&device->over, 1);
     (void)sem_post(&device->wake);
-    int waited = 0;
-    do {
-        waited = sem_clockwait(&device->finished, CLOCK_MONOTONIC, &end);
-    } while (waited != 0 && errno == EINTR);
-    (void)(waited == 0 ? pthread_join(device->thread, NULL) : pthread_detach(device->thread));
-    return waited;
+    return device_thread_end(device->thread, &device->finished, now_ns() + END_NS);
 }
 
 int sensor_device_free(sensor_device_t *device)
@@ -421,6 +393,9 @@ int sensor_device_free(sensor_device_t *device)
     if (atomic_load(&device->opened)) {
         device->driver->close(device->state);
     }
+    (void)sem_destroy(&device->wake);
+    (void)sem_destroy(&device->finished);
+    (void)pthread_mutex_destroy(&device->reason_lock);
     free(device->state);
     free(device->used);
     free(device->at);

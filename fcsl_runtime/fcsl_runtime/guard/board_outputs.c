@@ -9,16 +9,6 @@
 #include "fcsl/fcsl_scalar.h"
 #include "outputs.h"
 
-static int check_machine(const board_plan_t *plan, const char *file, const fcsl_machine_t *machine, fcsl_error_t *error)
-{
-    if (strcmp(plan->machine, machine->name) != 0 || plan->tick_hz != machine->tick_hz) {
-        return fcsl_fail(error,
-                         "'%.300s' is for machine '%.60s' at %" PRIu64 " Hz, and this is '%.60s' at %" PRIu64 " Hz",
-                         file, plan->machine, plan->tick_hz, machine->name, (uint64_t)machine->tick_hz);
-    }
-    return 0;
-}
-
 /* The actuator channel of this name, or null. */
 static const fcsl_channel_t *find_channel(const fcsl_machine_t *machine, const char *name)
 {
@@ -135,7 +125,7 @@ static int check_all_driven(const outputs_t *outputs, const board_plan_t *plan, 
 
 int outputs_add_board(outputs_t *outputs, const board_plan_t *plan, const char *file, fcsl_error_t *error)
 {
-    if (check_machine(plan, file, outputs->machine, error) != 0) {
+    if (board_plan_check_machine(plan, file, outputs->machine, error) != 0) {
         return -1;
     }
     for (uint32_t i = 0; i < plan->output_count; i++) {

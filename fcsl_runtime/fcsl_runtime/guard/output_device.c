@@ -6,23 +6,18 @@
 #include "output_device.h"
 
 #include <dlfcn.h>
-#include <errno.h>
 #include <pthread.h>
-#include <sched.h>
 #include <semaphore.h>
-#include <signal.h>
 #include <stdatomic.h>
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
-#include <time.h>
 
 #include "base/error.h"
+#include "board/device_thread.h"
 #include "fcsl/fcsl_library.h"
 #include "fcsl/fcsl_scalar.h"
 #include "triple_buffer.h"
-
-enum { STACK_BYTES = 256 << 10 };
 
 struct output_device {
     char *name; /* of its driver as the user writes it */
@@ -58,15 +53,12 @@ struct output_device {
 static int allocate(output_device_t *device, fcsl_error_t *error)
 {
     const fcsl_driver_t *driver = device->driver;
-    const size_t align = driver->state_align < 64u ? 64u : driver->state_align;
-    const size_t size = (driver->state_size + align - 1u) / align * align;
-    device->state = aligned_alloc(align, size);
+    device->state = device_state_new(driver);
     device->used = calloc(driver->signal_count, 1);
     if (device->state == NULL || device->used == NULL || triple_buffer_open(&device->values, driver->state_size) != 0 ||
         triple_buffer_open(&device->reasons, OUTPUT_REASON_BYTES) != 0) {
         return fcsl_fail(error, "out of memory for driver '%.100s'", device->name);
     }
-    memset(device->state, 0, size);
     return 0;
 }
 
@@ -176,34 +168,6 @@ static void *run(void *ctx)
     }
 }
 
-/* 0, or an error number. Signals are for the thread that expects them. */
-static int start_thread(output_device_t *device, int priority)
-{
-    const struct sched_param parameters = {.sched_priority = priority};
-    pthread_attr_t attributes;
-    sigset_t all;
-    sigset_t before;
-    int code = pthread_attr_init(&attributes);
-    if (code != 0) {
-        return code;
-    }
-    code = pthread_attr_setstacksize(&attributes, STACK_BYTES);
-    if (code == 0 && priority > 0) {
-        /* realtime_begin leaves no priority to other threads by itself. */
-        code = pthread_attr_setinheritsched(&attributes, PTHREAD_EXPLICIT_SCHED);
-        code = code == 0 ? pthread_attr_setschedpolicy(&attributes, SCHED_FIFO) : code;
-        code = code == 0 ? pthread_attr_setschedparam(&attributes, &parameters) : code;
-    }
-    (void)sigfillset(&all);
-    code = code == 0 ? pthread_sigmask(SIG_SETMASK, &all, &before) : code;
-    if (code == 0) {
-        code = pthread_create(&device->thread, &attributes, run, device);
-        (void)pthread_sigmask(SIG_SETMASK, &before, NULL);
-    }
-    (void)pthread_attr_destroy(&attributes);
-    return code;
-}
-
 static int open_device(output_device_t *device, fcsl_error_t *error)
 {
     const fcsl_driver_t *driver = device->driver;
@@ -227,7 +191,7 @@ int output_device_start(output_device_t *device, int priority, uint64_t patience
     if (open_device(device, error) != 0) {
         return -1;
     }
-    const int code = start_thread(device, priority);
+    const int code = device_thread_start(&device->thread, priority, run, device);
     device->started = code == 0;
     return code == 0 ? 0
                      : fcsl_fail(error, "device '%.150s' of driver '%.150s': no thread: %s", device->address,
@@ -305,22 +269,9 @@ void output_device_end(output_device_t *device)
     (void)sem_post(&device->wake);
 }
 
-/* 0, or -1: the thread hangs in its driver. */
-static int join_thread(output_device_t *device, uint64_t until_ns)
-{
-    const struct timespec until = {.tv_sec = (time_t)(until_ns / 1000000000u),
-                                   .tv_nsec = (long)(until_ns % 1000000000u)};
-    int waited = 0;
-    do {
-        waited = sem_clockwait(&device->finished, CLOCK_MONOTONIC, &until);
-    } while (waited != 0 && errno == EINTR);
-    (void)(waited == 0 ? pthread_join(device->thread, NULL) : pthread_detach(device->thread));
-    return waited;
-}
-
 void output_device_free(output_device_t *device, uint64_t until_ns)
 {
-    if (device->started && join_thread(device, until_ns) != 0) {
+    if (device->started && device_thread_end(device->thread, &device->finished, until_ns) != 0) {
         return; /* the driver may still come back to its memory */
     }
     if (device->opened) {

@@ -5,7 +5,6 @@
 #include "triple_buffer.h"
 
 #include <stdlib.h>
-#include <string.h>
 
 enum { SLOT = 3, FRESH = 4 };
 

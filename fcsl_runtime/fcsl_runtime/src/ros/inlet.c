@@ -7,6 +7,7 @@
 
 #include "base/error.h"
 #include "fcsl/fcsl_ros_inlet.h"
+#include "fcsl/fcsl_tick_time.h"
 
 struct fcsl_ros_inlet {
     fcsl_run_t *run;
@@ -80,18 +81,6 @@ int64_t fcsl_ros_inlet_behind_ns(const fcsl_ros_inlet_t *inlet)
     return inlet->behind_ns;
 }
 
-/* Whole ticks that last this many nanoseconds; as many as an age can say when there are more. */
-static uint32_t ticks_of(int64_t duration_ns, uint64_t tick_hz)
-{
-    const uint64_t seconds = (uint64_t)duration_ns / 1000000000u;
-    const uint64_t rest = (uint64_t)duration_ns % 1000000000u;
-    if (seconds > UINT32_MAX) {
-        return UINT32_MAX; /* more than a hundred years, at 1 Hz */
-    }
-    const uint64_t ticks = seconds * tick_hz + rest * tick_hz / 1000000000u; /* tick_hz is at most 1e9 */
-    return ticks < UINT32_MAX ? (uint32_t)ticks : UINT32_MAX;
-}
-
 /* Whether a message of this stamp comes in its turn. */
 static fcsl_ros_status_t check_time(fcsl_ros_inlet_t *inlet, int64_t stamp_ns, int64_t now_ns)
 {
@@ -149,7 +138,7 @@ uint32_t fcsl_ros_deliver(fcsl_ros_inlet_t *inlet, const uint8_t *cdr, size_t si
         return 0;
     }
     const int64_t age_ns = stamp_ns == 0 || stamp_ns > now_ns ? 0 : now_ns - stamp_ns;
-    const uint32_t age_ticks = ticks_of(age_ns, fcsl_run_machine(inlet->run)->tick_hz);
+    const uint32_t age_ticks = fcsl_ticks_of(fcsl_run_machine(inlet->run)->tick_hz, (uint64_t)age_ns);
     const uint32_t written = write_channels(inlet, age_ticks, stamp_ns, missing);
     if (written > 0) {
         inlet->counts[FCSL_ROS_TAKEN]++;
