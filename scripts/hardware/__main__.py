@@ -42,7 +42,8 @@ def main() -> int:
     craft.build()
     smoke, flights = ([sys.executable, "-m", f"hardware.{module}"] for module in ("smoke", "flights"))
     # One after the other, each with a bus of its own: a boot has one.
-    statuses = [Machine(kernel()).run(line, os.environ, _LIMIT_S) for line in (smoke, [*flights, str(craft.folder)])]
+    machine = Machine(kernel())
+    statuses = [machine.run(line, os.environ, _LIMIT_S) for line in (smoke, [*flights, str(craft.folder)])]
     return max(statuses)
 
 

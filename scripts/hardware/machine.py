@@ -23,6 +23,7 @@ ORDERS = "orders.json"
 TIMED_OUT, KERNEL_FAILED = 124, 125
 _PANIC = "Kernel panic"
 _CHUNK_BYTES = 65536
+_MEMORY_MIB = 512
 
 
 @dataclass(frozen=True)
@@ -32,7 +33,6 @@ class Machine:
 
     kernel: Path
     writable: Sequence[Path] = field(default=())
-    memory_mib: int = 512
 
     def run(self, command: Sequence[str], env: Mapping[str, str], limit_s: float) -> int:
         """Runs `command` as root of the guest, in this folder. Returns its exit status, TIMED_OUT or KERNEL_FAILED."""
@@ -51,7 +51,7 @@ class Machine:
     def _line(self, folder: Path, output: int, errors: int) -> list[str]:
         """The kernel's command line: its messages go to standard output, tty1 and tty2 are the command's output."""
         python = os.path.realpath(sys.executable)
-        options = f"mem={self.memory_mib}M root=/dev/root rootfstype=hostfs rootflags=/ ro uml_dir={folder} umid=guest"
+        options = f"mem={_MEMORY_MIB}M root=/dev/root rootfstype=hostfs rootflags=/ ro uml_dir={folder} umid=guest"
         consoles = f"con=null con0=null,fd:1 con1=null,fd:{output} con2=null,fd:{errors}"
         first = f"init={python} -- -I -S {HERE / 'init.py'} {folder}"
         return [str(self.kernel), *options.split(), *consoles.split(), *shlex.split(first)]

@@ -14,7 +14,7 @@ from hal_rig import HAL, build_driver, environment, run
 
 from simclient.board.plan import Pulse
 from simclient.hal.in_use import user_of
-from simclient.hal.pulses import pulse_of, ramp, start_of
+from simclient.hal.pulses import ramp, start_of
 
 
 def bits(*values: float) -> str:
@@ -150,9 +150,12 @@ def process(proc: Path, number: int, folder: Path, *words: str) -> None:
         (("fcsl-guard", "lib.so", "--board", "missing.plan"), True),
         (("fcsl-guard", "lib.so", "--bo", "board.plan"), True),
         (("fcsl-guard", "lib.so", "--actuator", "motors=pwm.pulse0:pwmchip0@400"), True),
+        (("fcsl-guard", "lib.so", "--actuator", "motors=/opt/ros@2/libpwm.so:pwm:pwmchip0"), True),
         (("fcsl-guard", "lib.so", "--actuator", "motors=pwm:pwmchip1"), False),
         (("fcsl-guard", "lib.so", "--actuator", "motors=none"), False),
         (("fcsl-fc", "lib.so", "--hal", "linux:board.plan"), True),
+        (("fcsl-fc", "lib.so", "--hal", "composite:board.plan,wire:unix:/s,x"), True),
+        (("fcsl-fc", "lib.so", "--hal", "composite:board.plan,zenoh:tcp/localhost:7447"), True),
         (("fcsl-fc", "lib.so", "--hal", "linux:missing.plan"), False),
         (("fcsl-fc", "lib.so", "--hal", "stub"), False),
         (("cat", "--board", "board.plan"), False),
@@ -163,7 +166,7 @@ def test_programs_that_have_the_device(tmp_path: Path, words: tuple[str, ...], i
     write_plan(tmp_path, "pwm", "pwmchip0")
     process(tmp_path / "proc", 7, tmp_path, *words)
     (tmp_path / "proc/self").mkdir()
-    assert bool(user_of("pwm", "pwmchip0@50", tmp_path / "proc")) == is_used
+    assert bool(user_of("pwmchip0@50", tmp_path / "proc")) == is_used
 
 
 # ---- pulses ----------------------------------------------------------------------------------------------------------
@@ -172,7 +175,7 @@ RULE = Pulse(0, "pulse0", -1.0, 1.0, 1000.0, 1400.0, 2000.0, 0.0, 1000.0)
 
 
 def test_pulses_of_commands() -> None:
-    pulses = [pulse_of(RULE, command) for command in (-1.0, -0.5, 0.0, 0.5, 1.0)]
+    pulses = [RULE.line.at(command) for command in (-1.0, -0.5, 0.0, 0.5, 1.0)]
     assert pulses == [1000.0, 1200.0, 1400.0, 1700.0, 2000.0]
 
 

@@ -190,6 +190,20 @@ def test_describe_a_plan(tmp_path: Path) -> None:
     assert [sensor["name"] for sensor in told["sensors"]] == ["inertial", "compass", "rc"]
 
 
+def test_describe_what_paces_and_what_is_not_driven(tmp_path: Path) -> None:
+    plan = tmp_path / "small.plan"
+    lines = ["machine craft 100", "device imu 0 iio_buffer bmi088", "device spare 0 log /tmp/log", "pace imu 250000000"]
+    lines += ["sensor inertial inertial", "health 100000000 0 1000000000", "bind gyro gyro", "backend imu"]
+    plan.write_text("\n".join(["fcsl-board-plan 1", *lines, "signal gyro gyro", "undriven valve", "end", ""]))
+    text = run(tmp_path, "describe", plan).stdout.splitlines()
+    assert text[0] == "machine craft, 100 Hz, its ticks are the samples of imu"
+    assert text[1] == "the flight ends when imu is silent for 0.25 s"
+    assert text[-1] == "nothing drives valve"
+    assert any(line.split() == ["spare", "log", "/tmp/log", "-", "not", "used"] for line in text)
+    told = json.loads(run(tmp_path, "describe", plan, "--json").stdout)
+    assert (told["pace"], told["pace_timeout_ns"], told["undriven"]) == ("imu", 250000000, ["valve"])
+
+
 @pytest.mark.parametrize(
     ("words", "says"),
     [

@@ -6,7 +6,6 @@ from __future__ import annotations
 import signal
 import statistics
 import time
-from collections.abc import Callable
 from functools import partial
 from pathlib import Path
 
@@ -14,7 +13,7 @@ from ..guest.i2c import I2cBus
 from ..guest.pca9685 import Pca9685
 from ..trials import Failed, expect
 from .craft import Craft
-from .process import Flight, Guard, in_ms, until
+from .process import Flight, Guard, after, in_ms, until
 
 #: command_timeout_s of the craft and the period of the guard: T and P of docs/guard.md.
 _TIMEOUT_S, _PERIOD_S = 0.1, 0.002
@@ -95,15 +94,8 @@ def try_kill(bus: I2cBus, craft: Craft) -> str:
     with Guard(craft, craft.plan("outputs")) as guard:
         for _ in range(_REPETITIONS):
             with arm(craft, guard, servos) as flight:
-                times.append(_safe_after(servos, flight.process.kill))
+                times.append(after(flight.process.kill, partial(servos.until, _SAFE)))
     return describe(times, _TIMEOUT_S + _PERIOD_S)
-
-
-def _safe_after(servos: Servos, act: Callable[[], object]) -> float:
-    begin = time.monotonic()
-    act()
-    servos.until(_SAFE)
-    return time.monotonic() - begin
 
 
 def try_stop(bus: I2cBus, craft: Craft) -> str:
@@ -111,7 +103,7 @@ def try_stop(bus: I2cBus, craft: Craft) -> str:
     servos, times = plug(bus), []
     with Guard(craft, craft.plan("outputs")) as guard, arm(craft, guard, servos) as flight:
         for _ in range(_REPETITIONS):
-            times.append(_safe_after(servos, partial(flight.send, signal.SIGSTOP)))
+            times.append(after(partial(flight.send, signal.SIGSTOP), partial(servos.until, _SAFE)))
             flight.send(signal.SIGCONT)
             servos.until(_COMMANDED)
     return describe(times, _TIMEOUT_S + _PERIOD_S)
@@ -122,7 +114,7 @@ def try_guard_end(bus: I2cBus, craft: Craft) -> str:
     servos, times = plug(bus), []
     for _ in range(_REPETITIONS):
         with Guard(craft, craft.plan("outputs")) as guard, arm(craft, guard, servos):
-            times.append(_safe_after(servos, partial(guard.send, signal.SIGTERM)))
+            times.append(after(partial(guard.send, signal.SIGTERM), partial(servos.until, _SAFE)))
             if guard.process.wait() != 0 or not servos.are(_SAFE):
                 raise Failed(f"the guard ends with unsafe pulses: {guard.said()}")
     return describe(times, _PERIOD_S)

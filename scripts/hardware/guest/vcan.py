@@ -8,7 +8,7 @@ import os
 import socket
 import struct
 
-_RTM_NEWLINK, _RTM_DELLINK = 16, 17
+_RTM_NEWLINK = 16
 _REQUEST, _ACK, _EXCL, _CREATE = 0x01, 0x04, 0x200, 0x400
 _IFLA_IFNAME, _IFLA_LINKINFO, _IFLA_INFO_KIND = 3, 18, 1
 _NLMSG_ERROR = 2
@@ -37,16 +37,11 @@ def add_vcan(name: str) -> None:
     """Makes it and brings it up."""
     info = _attribute(_IFLA_LINKINFO, _attribute(_IFLA_INFO_KIND, b"vcan"))
     _ask(_RTM_NEWLINK, _CREATE | _EXCL, _attribute(_IFLA_IFNAME, name.encode() + b"\0") + info)
-    set_up(name, True)
+    _bring_up(name)
 
 
-def set_up(name: str, up: bool) -> None:
+def _bring_up(name: str) -> None:
     with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as any_socket:
         request = struct.pack("16sH14x", name.encode(), 0)
         (flags,) = struct.unpack_from("H", fcntl.ioctl(any_socket, _SIOCGIFFLAGS, request), 16)
-        flags = flags | _IFF_UP if up else flags & ~_IFF_UP
-        fcntl.ioctl(any_socket, _SIOCSIFFLAGS, struct.pack("16sH14x", name.encode(), flags))
-
-
-def remove_vcan(name: str) -> None:
-    _ask(_RTM_DELLINK, 0, _attribute(_IFLA_IFNAME, name.encode() + b"\0"))
+        fcntl.ioctl(any_socket, _SIOCSIFFLAGS, struct.pack("16sH14x", name.encode(), flags | _IFF_UP))

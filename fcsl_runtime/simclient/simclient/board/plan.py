@@ -10,6 +10,8 @@ from ctypes import byref
 from dataclasses import dataclass, field
 from pathlib import Path
 
+from fcsl_compiler.board.pulses import Line
+
 from ..c_run import CError
 from ..errors import TwinError, did_you_mean
 from .native import board_library
@@ -17,7 +19,7 @@ from .native import board_library
 
 @dataclass(frozen=True)
 class Device:
-    """`period_ns` 0: its driver waits for samples."""
+    """`period_ns` 0: its driver waits for samples, or drives actuators."""
 
     name: str
     driver: str
@@ -73,6 +75,10 @@ class Pulse:
     slew: float
     safe: float
 
+    @property
+    def line(self) -> Line:
+        return Line(self.low, self.high, self.minimum, self.middle, self.maximum)
+
 
 @dataclass
 class Output:
@@ -83,14 +89,16 @@ class Output:
 
 @dataclass
 class Plan:
-    """`pace`: the device whose samples are the ticks; "" without one."""
+    """`pace`: the device whose samples are the ticks; "" without one. `undriven`: actuator channels without an output."""
 
     machine: str = ""
     tick_hz: int = 0
     pace: str = ""
+    pace_timeout_ns: int = 0
     devices: dict[str, Device] = field(default_factory=dict)
     sensors: list[Sensor] = field(default_factory=list)
     outputs: list[Output] = field(default_factory=list)
+    undriven: list[str] = field(default_factory=list)
 
 
 def read_plan(path: str | Path) -> Plan:
@@ -126,8 +134,10 @@ def _take(plan: Plan, words: Sequence[str]) -> None:
             plan.machine, plan.tick_hz = name, int(tick_hz)
         case ["device", name, period_ns, driver, *address]:
             plan.devices[name] = Device(name, driver, " ".join(address), int(period_ns))
-        case ["pace", device, _]:
-            plan.pace = device
+        case ["pace", device, timeout_ns]:
+            plan.pace, plan.pace_timeout_ns = device, int(timeout_ns)
+        case ["undriven", channel]:
+            plan.undriven.append(channel)
         case ["sensor", name, kind]:
             plan.sensors.append(Sensor(name, kind))
         case ["output", channel, device]:

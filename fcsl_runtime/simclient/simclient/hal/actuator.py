@@ -19,7 +19,7 @@ from .driver import Device, Driver
 from .driver_abi import ACTUATOR
 from .errors import Refused
 from .in_use import user_of
-from .pulses import is_in_range, pulse_of, ramp, ramp_seconds, start_of
+from .pulses import ramp, ramp_seconds, start_of
 
 _ELEMENT = re.compile(r"(?P<channel>[^\[\]]+)(?:\[(?P<index>\d{1,5})\])?")
 _PERIOD_S = 0.02
@@ -49,7 +49,7 @@ def test_actuator(
     driver = _driver(movement)
     if not may_move:
         raise TwinError(f"nothing moves without --yes-move-it. It would move {words}")
-    if user := user_of(movement.driver, movement.address):
+    if user := user_of(movement.address):
         raise Refused(f"{movement.name} is not moved: {user}; end it first")
     print(f"moving {words}", flush=True)
     with _signals_seen() as seen:
@@ -78,9 +78,9 @@ def _target(name: str, rule: Pulse, command: float | None, pulse: float | None) 
     if command is not None:
         if not rule.low <= command <= rule.high:
             raise TwinError(f"{name} takes commands from {rule.low:g} to {rule.high:g}, not {command:g}")
-        return pulse_of(rule, command)
+        return rule.line.at(command)
     assert pulse is not None
-    if not is_in_range(rule, pulse):
+    if not rule.line.contains(pulse):
         low, high = sorted((rule.minimum, rule.maximum))
         raise TwinError(f"{name} takes pulses from {low:g} to {high:g}, not {pulse:g}")
     return pulse

@@ -12,14 +12,16 @@ from pathlib import Path
 import numpy as np
 
 from fcsl_compiler.board.kinds import KINDS
+from fcsl_compiler.board.rotations import IDENTITY
 
 from ..board.plan import Backend, Correction, Output, Plan, Pulse, Sensor, read_plan
 from ..vars.show import jsonable, table
+from .describe import show_numbers
+from .filter_response import response
 
 _SUFFIX = ".plan"
 _HEAD = b"fcsl-board-plan "
 _NS_PER_S = 1e9
-_IDENTITY = [1.0, 0.0, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0, 1.0]
 
 
 def is_plan(text: str) -> bool:
@@ -45,11 +47,15 @@ def plan_lines(plan: Plan) -> list[str]:
     lines = [
         f"machine {plan.machine}, {plan.tick_hz} Hz{f', its ticks are the samples of {plan.pace}' if plan.pace else ''}"
     ]
+    if plan.pace:
+        lines.append(f"the flight ends when {plan.pace} is silent for {plan.pace_timeout_ns / _NS_PER_S:g} s")
     lines += ["", "devices", *_indented(table([_device_row(plan, name) for name in plan.devices]))]
     for sensor in plan.sensors:
         lines += ["", f"sensor {sensor.name} ({sensor.kind})", *(f"  {line}" for line in _sensor_lines(plan, sensor))]
     for output in plan.outputs:
         lines += ["", f"output {output.channel} → {output.device}", *(f"  {line}" for line in _output_lines(output))]
+    if plan.undriven:
+        lines += ["", f"nothing drives {', '.join(plan.undriven)}"]
     return lines
 
 
@@ -64,7 +70,7 @@ def _device_row(plan: Plan, name: str) -> tuple[str, ...]:
     if driven:
         pace = "actuator"
     elif device.period_ns == 0:
-        pace = "sends when it likes"
+        pace = "sends when it likes" if used else "-"
     else:
         pace = f"{_NS_PER_S / device.period_ns:.6g} Hz"
     return (name, device.driver, device.address, pace, ", ".join([*used, *driven]) or "not used")
@@ -107,16 +113,16 @@ def _backend_lines(plan: Plan, backend: Backend, kind: str) -> list[str]:
 
 
 def _vector_words(correction: Correction, unit: str) -> list[str]:
-    words = _offset_words(correction, unit, _numbers)
-    if correction.matrix != _IDENTITY:
+    words = _offset_words(correction, unit, show_numbers)
+    if tuple(correction.matrix) != IDENTITY:
         rows = (correction.matrix[i : i + 3] for i in (0, 3, 6))
-        words.append(f"times {', '.join(map(_numbers, rows))}")
+        words.append(f"times {', '.join(map(show_numbers, rows))}")
     return words
 
 
 def _scalar_words(correction: Correction, unit: str) -> list[str]:
     """Only the first element of each counts."""
-    words = _offset_words(correction, unit, lambda values: f"{values[0]:.6g}")
+    words = _offset_words(correction, unit, lambda values: show_numbers(values[:1]))
     return words if correction.matrix[0] == 1.0 else [*words, f"times {correction.matrix[0]:.6g}"]
 
 
@@ -137,15 +143,11 @@ def _filter_words(section: list[float], period_ns: int) -> str:
     kind = "notch" if at_half_rate > 0.5 else "low-pass"
     if period_ns == 0:
         return kind
-    angles = np.linspace(0.0, math.pi, 20001)[1:-1]
-    z = np.exp(-1j * np.outer(angles, range(3)))
-    gain = abs(z @ b) / abs(z @ a)
+    rate_hz = _NS_PER_S / period_ns
+    hz = np.linspace(0.0, 0.5 * rate_hz, 20001)[1:-1]
+    gain, _ = response([section], rate_hz, hz)
     found = gain.argmin() if kind == "notch" else abs(gain - math.sqrt(0.5)).argmin()
-    return f"{kind} at {angles[found] / (2 * math.pi) * _NS_PER_S / period_ns:.3g} Hz"
-
-
-def _numbers(values: list[float]) -> str:
-    return f"[{', '.join(f'{value:.6g}' for value in values)}]"
+    return f"{kind} at {hz[found]:.3g} Hz"
 
 
 # ---- outputs ---------------------------------------------------------------------------------------------------------

@@ -9,7 +9,19 @@ from collections.abc import Iterable, Mapping
 from ctypes import byref, c_uint64
 from dataclasses import dataclass
 
-from .driver_abi import ABSENT, ACTUATOR, NEEDED, NOTHING, OK, OPTIONAL, REASON_BYTES, SCALARS, SENSOR, find_driver
+from .driver_abi import (
+    ABSENT,
+    ACTUATOR,
+    NEEDED,
+    NOTHING,
+    OK,
+    OPTIONAL,
+    REASON_BYTES,
+    SCALARS,
+    SENSOR,
+    UNUSED,
+    find_driver,
+)
 from .errors import Refused
 
 _NO_REASON = "the driver gives no reason"
@@ -86,7 +98,7 @@ class Device:
         align = max(abi.state_align, 64)
         self._memory = ctypes.create_string_buffer(abi.state_size + align)
         self._state = -(-ctypes.addressof(self._memory) // align) * align
-        self._used = (ctypes.c_uint8 * abi.signal_count)(*(uses.get(s.name, 0) for s in driver.signals))
+        self._used = (ctypes.c_uint8 * abi.signal_count)(*(uses.get(s.name, UNUSED) for s in driver.signals))
         self._address = ctypes.create_string_buffer(os.fsencode(address))  # the driver may keep it until close
         self._why = ctypes.create_string_buffer(REASON_BYTES)
         self._values = {name: values for name, values in driver.bind(self._state).items() if name in uses}

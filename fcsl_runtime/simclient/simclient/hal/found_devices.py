@@ -84,7 +84,7 @@ def _input_devices() -> list[Found]:
     return found
 
 
-_SERIAL = {"sbus": "sticks", "crsf": "sticks", "ubx": "position, velocity", "nmea": "position, velocity"}
+_SERIAL = ("sbus", "crsf", "ubx", "nmea")
 #: PORT_UNKNOWN: a place for a port that the computer does not have.
 _NO_UART = "0"
 

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""From a command to the pulse of an output, and the way of a pulse to it. fcsl_runtime/board/output_map.c has the same rules."""
+"""The way of an output to a pulse."""
 
 from __future__ import annotations
 
@@ -8,25 +8,11 @@ from ..board.plan import Pulse
 RAMP_S = 0.5
 
 
-def pulse_of(rule: Pulse, command: float) -> float:
-    """On the straight lines from (low, minimum) over the middle to (high, maximum)."""
-    middle = (rule.low + rule.high) / 2.0
-    if command < middle:
-        part = (max(command, rule.low) - rule.low) / (middle - rule.low)
-        return rule.minimum + part * (rule.middle - rule.minimum)
-    part = (min(command, rule.high) - middle) / (rule.high - middle)
-    return rule.middle + part * (rule.maximum - rule.middle)
-
-
-def is_in_range(rule: Pulse, pulse: float) -> bool:
-    return min(rule.minimum, rule.maximum) <= pulse <= max(rule.minimum, rule.maximum)
-
-
 def start_of(rule: Pulse) -> float:
     """Where the ramp begins: at the safe pulse. If that is none that moves (0: no pulses), at the command nearest to zero."""
-    if is_in_range(rule, rule.safe):
+    if rule.line.contains(rule.safe):
         return rule.safe
-    return pulse_of(rule, min(max(0.0, rule.low), rule.high))
+    return rule.line.at(0.0)
 
 
 def ramp_seconds(rule: Pulse, target: float) -> float:
