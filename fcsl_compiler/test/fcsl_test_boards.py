@@ -1,10 +1,13 @@
 # SPDX-License-Identifier: Apache-2.0
-"""A board with every key, and the machine that it is for."""
+"""A board with every key, the machine that it is for, and what the compiler says of boards."""
 
 import copy
 import json
 from pathlib import Path
 from typing import Any
+
+from fcsl_compiler.base.diagnostics import Diagnostic, DiagnosticError
+from fcsl_compiler.board.board import check_board
 
 LAW = """class Law:
     inputs = {
@@ -138,6 +141,15 @@ BOARD: dict[str, Any] = {
 }
 
 
+#: Places in it.
+IMU = ("sensors", "imu")
+TOP = (*IMU, "backends", 0)
+OUT = ("outputs", "motors")
+FIRST = (*OUT, "elements", 0)
+#: A value for `edited`.
+REMOVED: Any = ...
+
+
 def write_machine(folder: Path, **members: Any) -> None:
     """quad.json with these members in place of its own, and its algorithm."""
     (folder / "law.py").write_text(LAW)
@@ -161,3 +173,17 @@ def edited(*steps: str | int, value: Any) -> Any:
     else:
         at[steps[-1]] = value
     return board
+
+
+def found(folder: Path, board: Any) -> list[Diagnostic]:
+    """All errors, or all warnings if there are none."""
+    try:
+        return list(check_board(write_board(folder, board)).warnings)
+    except DiagnosticError as error:
+        return list(error.diagnostics)
+
+
+def place(diagnostic: Diagnostic) -> str:
+    """The text that a diagnostic points at."""
+    start, end = diagnostic.span.source.offsets(diagnostic.span)
+    return diagnostic.span.source.text[start:end]
