@@ -34,10 +34,9 @@ LINK_TICKS = sized(1_000_000, 20_000)
 
 
 def _compile(name: str, folder: Path) -> Path:
-    sources = [HERE / f"{name}.c", BENCH / "harness/timing.c", *sorted((HAL / "src").glob("*.c"))]
-    zenoh = package_prefix("fcsl_hal") / "lib/libfcsl_io.a"
-    flags = ["-lpthread", "-Wl,--gc-sections"]
-    return compile_program([*sources, zenoh], folder / name, [HAL / "include", HAL / "src"], flags)
+    libraries = package_prefix("fcsl_hal") / "lib"
+    sources = [HERE / f"{name}.c", BENCH / "harness/timing.c", libraries / "libfcsl_hal.a", libraries / "libfcsl_io.a"]
+    return compile_program(sources, folder / name, [HAL / "include", HAL / "src"], ["-lpthread", "-Wl,--gc-sections"])
 
 
 def lockstep_program(folder: Path) -> Path:
