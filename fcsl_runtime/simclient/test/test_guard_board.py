@@ -10,7 +10,6 @@ import struct
 import subprocess
 import time
 from collections.abc import Callable, Iterator
-from dataclasses import dataclass
 from pathlib import Path
 
 import pytest
@@ -18,6 +17,7 @@ from conftest import CFLAGS, ROOT
 from guarding import PATIENCE_S, TIMEOUT_S, Guard, Slot, log_writes, wait_for
 from guarding import command as message
 from native import GUARD, Client, Fc, flying
+from pwm_tree import Sysfs
 
 BuildGuarded = Callable[..., Path]
 
@@ -103,35 +103,6 @@ def servos(force: tuple[float, ...] = FORCE) -> str:
         "output panel.valve servos",
         pulse("pulse3", *VALVE),
     )
-
-
-@dataclass(frozen=True)
-class Sysfs:
-    """A PWM chip of 16 channels."""
-
-    root: Path
-
-    @property
-    def chip(self) -> Path:
-        return self.root / "class/pwm/pwmchip2"
-
-    def make(self) -> None:
-        (self.root / "devices/1-0040").mkdir(parents=True)
-        self.chip.mkdir(parents=True)
-        (self.chip / "device").symlink_to("../../../devices/1-0040")
-        (self.chip / "npwm").write_text("16\n")
-        for index in (0, 3):
-            channel = self.chip / f"pwm{index}"
-            channel.mkdir()
-            for name, text in {"period": "0", "duty_cycle": "0", "polarity": "inversed", "enable": "0"}.items():
-                (channel / name).write_text(text + "\n")
-
-    def get(self, index: int, name: str = "duty_cycle") -> str:
-        """The first line: a write does not cut a plain file."""
-        return (self.chip / f"pwm{index}" / name).read_text().partition("\n")[0]
-
-    def pulses(self) -> tuple[str, str]:
-        return self.get(0), self.get(3)
 
 
 SAFE = ("1100000", "1900000")

@@ -61,7 +61,7 @@ def test_nothing_moves_without_the_word(tmp_path: Path) -> None:
     assert not (tmp_path / "log").exists()
 
 
-@pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGTERM, signal.SIGHUP])
+@pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGTERM, signal.SIGHUP, signal.SIGQUIT])
 def test_a_signal_makes_it_safe(tmp_path: Path, number: signal.Signals) -> None:
     plan = write_plan(tmp_path, "log", tmp_path / "log")
     line = [*HAL, "test-actuator", str(plan), "motors", "--command", "1", "--seconds", "10", "--yes-move-it"]
@@ -85,7 +85,7 @@ def test_a_driver_of_a_library_that_fails(tmp_path: Path) -> None:
     plan = write_plan(tmp_path, f"{build_driver(tmp_path)}:fin", device, safe=1234.0)
     words = ("motors", "--pulse", "1300", "--seconds", "0.3", "--yes-move-it")
     done = run(tmp_path, "test-actuator", plan, *words, status=1)
-    assert "stuck" in done.stderr and "motors[0] IS NOT SAFE" in done.stderr
+    assert "stuck" in done.stderr and "motors[0]: NOT SAFE, cut the power" in done.stderr
     plan = write_plan(tmp_path, f"{tmp_path / 'libfin.so'}:fin", device)
     run(tmp_path, "test-actuator", plan, *words)
     values = [float(line) for line in device.read_text().split()]

@@ -17,6 +17,15 @@ EXIT_REFUSED = 1
 _EPILOG = """\
 DRIVER is one that comes with FCSL, or LIBRARY.so:NAME (docs/drivers.md). Exit status: 0; 1 if something is not as it
 should be: a device is missing, a calibration or a movement is refused; 2 for wrong usage or an unreadable file."""
+_MEASURED = {
+    "gyro": "the offset of a gyro, from a vehicle that stands still",
+    "accel": "offset and scale of an accelerometer, from a vehicle on each of its six sides",
+    "compass": "hard and soft iron of a compass, from a vehicle that is turned about all its axes",
+    "rc": "the ranges of a remote control, from sticks that are moved to all their ends",
+}
+_ESC = """\
+PROPELLERS OFF. It sends the longest pulse, asks for the controllers' power, sends the shortest pulse after Enter, and the
+safe value last, whatever ends it. No file is changed."""
 
 
 def main(arguments: Sequence[str]) -> int:
@@ -60,7 +69,9 @@ def _parser() -> argparse.ArgumentParser:
     shape = command.add_mutually_exclusive_group()
     shape.add_argument("--json", action="store_true", help="one JSON object a line")
     shape.add_argument("--plot", action="store_true", help="curves of the corrected values")
-    _add_calibrate(add("calibrate", _calibrate, "measures what corrects a sensor, for the board's JSON"))
+    _add_calibrate(
+        add("calibrate", _calibrate, "measures what corrects a sensor, or teaches motor controllers their range")
+    )
     command = add(
         "test-actuator", _test_actuator, "moves one element of an output for some seconds, then makes it safe"
     )
@@ -75,12 +86,28 @@ def _parser() -> argparse.ArgumentParser:
 
 
 def _add_calibrate(command: argparse.ArgumentParser) -> None:
-    command.add_argument("what", choices=("gyro", "accel", "compass", "rc"))
-    command.add_argument("board", metavar="BOARD", help="board JSON")
-    command.add_argument("--sensor", required=True, metavar="NAME")
-    command.add_argument("--device", metavar="NAME", help="of the sensor's; needed if it has several")
-    command.add_argument("--seconds", type=_seconds(3600), metavar="N", help="how long it measures")
-    command.add_argument("--write", action="store_true", help="write the values into BOARD")
+    kinds = command.add_subparsers(metavar="WHAT", required=True)
+    for what, text in _MEASURED.items():
+        kind = kinds.add_parser(what, help=text, description=f"{text}; for the board's JSON")
+        kind.set_defaults(what=what)
+        kind.add_argument("board", metavar="BOARD", help="board JSON")
+        kind.add_argument("--sensor", required=True, metavar="NAME")
+        kind.add_argument("--device", metavar="NAME", help="of the sensor's; needed if it has several")
+        kind.add_argument("--seconds", type=_seconds(3600), metavar="N", help="how long it measures")
+        kind.add_argument("--write", action="store_true", help="write the values into BOARD")
+    text = "electronic speed controllers of motors: they learn the ends of their outputs"
+    esc = kinds.add_parser("esc", help=text, description=f"{text}. {_ESC}")
+    esc.set_defaults(run=_calibrate_esc)
+    esc.add_argument("plan", metavar="PLAN", help="the file that `fcslc board` wrote")
+    esc.add_argument(
+        "--output",
+        dest="names",
+        nargs="+",
+        required=True,
+        metavar="CHANNEL[INDEX]",
+        help="of one device, such as motors[0] motors[1]; motors: all its elements",
+    )
+    esc.add_argument("--yes-move-it", action="store_true", help="nothing moves without it")
 
 
 def _number(text: str) -> float:
@@ -141,6 +168,12 @@ def _calibrate(options: argparse.Namespace) -> None:
     from .calibrate import calibrate
 
     calibrate(options.what, options.board, options.sensor, options.device, options.seconds, options.write)
+
+
+def _calibrate_esc(options: argparse.Namespace) -> None:
+    from .calibrate_esc import calibrate_esc
+
+    calibrate_esc(options.plan, options.names, options.yes_move_it)
 
 
 def _test_actuator(options: argparse.Namespace) -> None:
