@@ -27,6 +27,7 @@ setup(
     entry_points={
         "console_scripts": [
             "controller_node = fcsl_bridge.start:controller_node",
+            "diagnostics_node = fcsl_bridge.start:diagnostics_node",
             "rerun_node = fcsl_bridge.start:rerun_node",
             "sim_node = fcsl_bridge.start:sim_node",
             "topic_count = fcsl_bridge.start:topic_count",

@@ -27,7 +27,7 @@ PROGRAMS = {
     "fcsl-supervisor": "fcsl_runtime/simclient",
 }
 MODULES = ("bag", "plot", "replay", "to_rerun")
-NODES = ("controller_node", "rerun_node", "sim_node", "topic_count")
+NODES = ("controller_node", "diagnostics_node", "rerun_node", "sim_node", "topic_count")
 
 
 def check(command: Sequence[str | Path], name: str, package: str) -> None:

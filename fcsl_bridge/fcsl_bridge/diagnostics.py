@@ -13,7 +13,7 @@ import time
 from collections.abc import Mapping, Sequence
 from typing import Protocol
 
-from diagnostic_msgs.msg import DiagnosticArray, DiagnosticStatus, KeyValue
+from diagnostic_msgs.msg import DiagnosticArray, DiagnosticStatus
 from rclpy.node import Node
 from rclpy.serialization import deserialize_message
 
@@ -22,6 +22,7 @@ from simclient.c_machine import HEALTH_NAMES
 from simclient.run import Run
 
 from . import qos
+from .diagnostic_status import Figures, make_status
 
 _LEVELS = {
     InstanceHealth.NOMINAL: DiagnosticStatus.OK,
@@ -33,7 +34,6 @@ _PERIOD_S = 1.0
 #: Of ages in ticks, for all that are older.
 _OLDEST = 2**32 - 1
 _NS = 1_000_000_000
-Figures = Mapping[str, int | float | str]
 
 
 class Source(Protocol):
@@ -132,10 +132,7 @@ class Diagnostics:
         return grown
 
     def _status(self, name: str, level: bytes, message: str, figures: Figures) -> DiagnosticStatus:
-        values = [KeyValue(key=key, value=str(value)) for key, value in figures.items()]
-        return DiagnosticStatus(
-            name=name, level=level, message=message, hardware_id=self._run.machine.name, values=values
-        )
+        return make_status(name, level, message, self._run.machine.name, figures)
 
     def close(self) -> None:
         self._node.destroy_publisher(self._publisher)

@@ -6,13 +6,14 @@ from __future__ import annotations
 import time
 from collections.abc import Sequence
 
-from diagnostic_msgs.msg import DiagnosticArray, DiagnosticStatus, KeyValue
+from diagnostic_msgs.msg import DiagnosticArray, DiagnosticStatus
 from rclpy.node import Node
 
 from simclient.descriptor import Machine
 from simclient.ros.outbox import Outbox
 
 from . import qos
+from .diagnostic_status import Figures, make_status
 from .sim_control import Control
 from .sim_vehicle import Vehicle
 
@@ -74,16 +75,14 @@ class Progress:
         flown_s = self._time_s(self._tick) - self._time_s(self._published_tick)
         factor = flown_s / (now - self._published) if self._published else 0.0
         self._published, self._published_tick = now, self._tick
-        figures = {
+        figures: Figures = {
             "real time factor": f"{factor:.3f}",
             "speed": control.speed,
             "tick": self._tick,
             "messages dropped": self._outbox.dropped,
         }
         level, text = verdict(control, self._tick, factor)
-        values = [KeyValue(key=key, value=str(value)) for key, value in figures.items()]
-        status = DiagnosticStatus(level=level, name=self._name, message=text, hardware_id="simulation", values=values)
-        message = DiagnosticArray(status=[status])
+        message = DiagnosticArray(status=[make_status(self._name, level, text, "simulation", figures)])
         message.header.stamp.sec, message.header.stamp.nanosec = divmod(self._machine.time_ns(self._tick), _NS)
         self._publisher.publish(message)
 

@@ -15,6 +15,10 @@ def controller_node() -> None:
     _start("controller_node")
 
 
+def diagnostics_node() -> None:
+    _start("diagnostics_node")
+
+
 def rerun_node() -> None:
     _start("rerun_node")
 

@@ -1,0 +1,192 @@
+# SPDX-License-Identifier: Apache-2.0
+"""`diagnostics_node`: the sensors and devices of a flight with a board, on /diagnostics. Folders stand for the kernel's devices."""
+
+from __future__ import annotations
+
+import json
+import signal
+import subprocess
+from collections.abc import Callable
+from pathlib import Path
+
+import pytest
+from bridge_harness import Domain, Process
+from diagnostic_msgs.msg import DiagnosticArray, DiagnosticStatus
+from rclpy.serialization import deserialize_message
+
+from fcsl_bridge import qos
+from fcsl_bridge.board_status import BoardStatus
+from fcsl_compiler.base.ament import package_prefix
+
+ROOT = Path(__file__).resolve().parents[2]
+LIBRARY = package_prefix("lander") / "lib/lander/liblander_machines.so"
+DEVICES = ("top", "bottom")
+BOARD = {
+    "machine": str(ROOT / "examples/lander/fc/lander_control.json"),
+    "devices": {name: {"driver": "iio", "device": f"lidar-{name}", "rate_hz": 200} for name in DEVICES},
+    "sensors": {
+        "altimeter": {
+            "kind": "range_finder",
+            "channels": {"distance": "altitude"},
+            "backends": [{"device": name} for name in DEVICES],
+            "health": {"max_age_s": 0.5, "recover_s": 0.2},
+        }
+    },
+}
+SENSOR, TOP, BOTTOM = "one/lander_control: sensor altimeter", *(f"one/lander_control: device {n}" for n in DEVICES)
+OK, WARN, ERROR, STALE = DiagnosticStatus.OK, DiagnosticStatus.WARN, DiagnosticStatus.ERROR, DiagnosticStatus.STALE
+
+
+class Vehicle:
+    """Two lidars, a plan for them, and what a node of the graph sees of it."""
+
+    def __init__(self, domain: Domain):
+        self._domain, self.socket = domain, domain.folder / "socket"
+        domain.environment["FCSL_SYSFS"] = str(domain.folder / "sys")
+        for name in DEVICES:
+            self.device(name).mkdir(parents=True)
+            (self.device(name) / "name").write_text(f"lidar-{name}")
+            (self.device(name) / "in_distance_scale").write_text("0.01")
+            self.measure(name)
+        (domain.folder / "board.json").write_text(json.dumps(BOARD))
+        subprocess.run(["fcslc", "board", domain.folder / "board.json"], check=True, capture_output=True)
+        self.listener = domain.listener()
+        self.listener.subscribe(DiagnosticArray, "/diagnostics", qos.EVENT)
+
+    def device(self, name: str) -> Path:
+        return self._domain.folder / f"sys/bus/iio/devices/iio:device{DEVICES.index(name)}"
+
+    def measure(self, name: str, raw: str = "325") -> None:
+        (self.device(name) / "in_distance_raw").write_text(raw)
+
+    def fly(self, *options: str) -> Process:
+        program = package_prefix("fcsl_runtime") / "bin/fcsl-fc"
+        line = [program, LIBRARY, "--machine", "lander_control", "--socket", self.socket, *options]
+        return self._domain.run(line)
+
+    def fly_with_board(self) -> Process:
+        return self.fly("--hal", f"linux:{self._domain.folder / 'board.plan'}")
+
+    def until(self, holds: Callable[[dict[str, DiagnosticStatus]], bool]) -> dict[str, DiagnosticStatus]:
+        """The statuses by name, of the first message from now on for which it holds."""
+        received = self.listener.received["/diagnostics"]
+        received.clear()
+        found: dict[str, DiagnosticStatus] = {}
+
+        def is_there() -> bool:
+            while received:
+                array = deserialize_message(received.pop(0), DiagnosticArray)
+                found.clear()
+                found.update({status.name: status for status in array.status})
+                if holds(found):
+                    assert array.header.stamp.sec > 1_700_000_000, "ROS time"
+                    return True
+            return False
+
+        self.listener.until(is_there)
+        return found
+
+
+@pytest.fixture
+def vehicle(domain: Domain) -> Vehicle:
+    return Vehicle(domain)
+
+
+def values(status: DiagnosticStatus) -> dict[str, str]:
+    return {pair.key: pair.value for pair in status.values}
+
+
+def test_a_flight_loses_its_lidars(domain: Domain, vehicle: Vehicle) -> None:
+    """One is missing at first. Both fail, one by one; then the flight ends, and the next one begins."""
+    vehicle.device("bottom").rename(domain.folder / "away")
+    node = domain.start("diagnostics_node", "-r", "__ns:=/one", socket=vehicle.socket)
+    node.wait_for(f"waiting for a flight program at {vehicle.socket}")
+    flight = vehicle.fly_with_board()
+    found = vehicle.until(lambda all_: all_[SENSOR].message == "primary top; bottom silent")
+    assert list(found) == [SENSOR, TOP, BOTTOM] and {s.hardware_id for s in found.values()} == {"lander_control"}
+    assert found[SENSOR].level == WARN
+    assert values(found[SENSOR]) == {"primary": "top", "condition.top": "healthy", "condition.bottom": "silent"}
+    assert (found[TOP].level, found[TOP].message) == (OK, "there")
+    assert list(values(found[TOP])) == ["open", "samples", "errors", "dropped", "lost"]
+    assert (found[BOTTOM].level, found[BOTTOM].message) == (ERROR, "not there")
+    (domain.folder / "away").rename(vehicle.device("bottom"))
+    found = vehicle.until(lambda all_: all(status.level == OK for status in all_.values()))
+    assert found[SENSOR].message == "primary top"
+    vehicle.measure("top", "broken")
+    found = vehicle.until(lambda all_: "primary bottom" in all_[SENSOR].message and all_[TOP].level == WARN)
+    assert (found[SENSOR].level, found[SENSOR].message) == (WARN, "primary bottom; top silent")
+    assert found[TOP].message.endswith(" errors") and found[BOTTOM].level == OK
+    vehicle.measure("bottom", "broken")
+    found = vehicle.until(lambda all_: all_[SENSOR].level == ERROR)
+    assert found[SENSOR].message == "primary none; top silent; bottom silent"
+    flight.signal(signal.SIGKILL)
+    found = vehicle.until(lambda all_: all(status.level == STALE for status in all_.values()))
+    assert list(found) == [SENSOR, TOP, BOTTOM] and str(vehicle.socket) in found[SENSOR].message
+    for name in DEVICES:
+        vehicle.measure(name)
+    vehicle.fly_with_board()
+    vehicle.until(lambda all_: all_[SENSOR].level == OK)
+    node.signal(signal.SIGTERM)
+    assert node.finish() == 0, node.err
+
+
+def test_a_flight_that_hangs_is_stale(domain: Domain, vehicle: Vehicle) -> None:
+    flight = vehicle.fly_with_board()
+    node = domain.start("diagnostics_node", socket=vehicle.socket)
+    vehicle.until(lambda all_: bool(all_))
+    flight.signal(signal.SIGSTOP)
+    vehicle.until(lambda all_: all(status.level == STALE for status in all_.values()))
+    flight.signal(signal.SIGCONT)
+    vehicle.until(lambda all_: any(status.level == OK for status in all_.values()))
+    assert node.out.count("its board is on /diagnostics") == 2
+
+
+def test_a_flight_without_a_board(domain: Domain, vehicle: Vehicle) -> None:
+    vehicle.fly()
+    node = domain.start("diagnostics_node", socket=vehicle.socket)
+    assert node.finish() == 1 and "has no board: --hal linux:PLAN has one" in node.err, node.err
+
+
+def test_a_node_without_its_socket(domain: Domain) -> None:
+    node = domain.start("diagnostics_node")
+    assert node.finish() == 1 and "parameter `socket` is missing" in node.err, node.err
+
+
+# ---- statuses --------------------------------------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize(
+    ("primary", "conditions", "level", "text"),
+    [
+        (1, (0, 0), OK, "primary top"),
+        (1, (0, 5), WARN, "primary top; bottom disagrees"),
+        (1, (6, 1), WARN, "primary top; top recovering; bottom silent"),
+        (2, (0, 0), WARN, "primary bottom"),
+        (0, (1, 3), ERROR, "primary none; top silent; bottom out of range"),
+        (0, (0, 0), ERROR, "primary none"),
+    ],
+)
+def test_a_sensor(primary: int, conditions: tuple[int, int], level: bytes, text: str) -> None:
+    """What the wire of a composite flight counts is no part of a board."""
+    top, bottom = conditions
+    counters = {"commands": 7, "link.port1.sent": 3, "sensors.imu.primary": primary}
+    counters |= {"sensors.imu.condition.top": top, "sensors.imu.condition.bottom": bottom}
+    (status,) = BoardStatus("rover", "rover").look(counters)
+    assert (status.name, status.level, status.message) == ("rover: sensor imu", level, text)
+
+
+def test_counts_of_a_device_grow() -> None:
+    """What was counted before the first look is old."""
+    board = BoardStatus("rover", "rover")
+    for (is_open, samples, errors, dropped, lost), level, text in (
+        ((1, 10, 4, 4, 1), OK, "there"),
+        ((1, 20, 4, 4, 1), OK, "there"),
+        ((1, 30, 6, 4, 1), WARN, "there; 2 errors"),
+        ((1, 40, 6, 5, 2), WARN, "there; 1 dropped; 1 lost"),
+        ((0, 40, 7, 5, 2), ERROR, "not there; 1 errors"),
+        ((1, 50, 7, 5, 2), OK, "there"),
+    ):
+        counts = {"open": is_open, "samples": samples, "errors": errors, "dropped": dropped, "lost": lost}
+        (status,) = board.look({f"devices.gyro.{name}": count for name, count in counts.items()})
+        assert (status.name, status.level, status.message) == ("rover: device gyro", level, text)
+        assert values(status) == {name: str(count) for name, count in counts.items()}
