@@ -91,6 +91,19 @@ static int lock_folder(const char *path)
     return fd;
 }
 
+/* A name beside the path, under which the socket is bound: at its path there is nothing until it listens, so that who sees it can
+ * connect. A path that leaves no room for one stays as it is. */
+static void name_first(const char *path, struct sockaddr_un *address)
+{
+    char folder[sizeof address->sun_path];
+    char name[sizeof address->sun_path];
+    (void)snprintf(folder, sizeof folder, "%s", path);
+    const int length = snprintf(name, sizeof name, "%s/.fcsl-%ld", dirname(folder), (long)getpid());
+    if (length > 0 && (size_t)length < sizeof name) {
+        memcpy(address->sun_path, name, (size_t)length + 1u);
+    }
+}
+
 /* The path is free or stale. */
 static int listen_there(const char *path, int type, int backlog, const struct sockaddr_un *address, char *error,
                         size_t error_size)
@@ -103,12 +116,16 @@ static int listen_there(const char *path, int type, int backlog, const struct so
     if (fd < 0 || fchmod(fd, S_IRUSR | S_IWUSR) != 0) {
         return fail(fd, "cannot create", path, error, error_size);
     }
-    if (bind(fd, (const struct sockaddr *)address, sizeof *address) != 0) {
+    struct sockaddr_un first = *address;
+    name_first(path, &first);
+    (void)unlink(first.sun_path); /* of a process of this number that was killed; `path` itself is free */
+    if (bind(fd, (const struct sockaddr *)&first, sizeof first) != 0) {
         return fail(fd, "cannot bind", path, error, error_size);
     }
-    if (chmod(path, S_IRUSR | S_IWUSR) != 0 || listen(fd, backlog) != 0) {
+    if (chmod(first.sun_path, S_IRUSR | S_IWUSR) != 0 || listen(fd, backlog) != 0 ||
+        rename(first.sun_path, path) != 0) {
         const int code = errno;
-        (void)unlink(path);
+        (void)unlink(first.sun_path);
         errno = code;
         return fail(fd, "cannot listen on", path, error, error_size);
     }
