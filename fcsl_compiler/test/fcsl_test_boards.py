@@ -75,6 +75,9 @@ BOARD: dict[str, Any] = {
         "bmp": {"driver": "iio", "device": "bmp280", "rate_hz": 3},
         "esc": {"driver": "pwm", "device": "pwmchip0"},
         "valve": {"driver": "./libvalve.so:valve", "device": "/dev/valve"},
+        "panel": {"driver": "gpio", "device": "gpiochip0,pull_up", "rate_hz": 50},
+        "lamps": {"driver": "gpio_out", "device": "pinctrl-bcm2711"},
+        "taps": {"driver": "adc", "device": "ads1015", "rate_hz": 20},
     },
     "sensors": {
         "imu": {
@@ -89,7 +92,7 @@ BOARD: dict[str, Any] = {
                         "accel": {"scale": [[1, 0.01, 0], [0, 1.02, 0], [0, 0, 0.98]]},
                         "temperature": {"offset": 2.5, "scale": 2},
                     },
-                    "signals": {"gyro": "anglvel"},
+                    "signals": {"temperature": "voltage3"},
                 },
                 {
                     "device": "imu_side",
@@ -123,6 +126,18 @@ BOARD: dict[str, Any] = {
         },
         "battery": {"kind": "battery", "channels": {"voltage": "battery.voltage"}, "backends": [{"device": "cells"}]},
         "baro": {"kind": "barometer", "channels": {"pressure": "baro.pressure"}, "backends": [{"device": "bmp"}]},
+    },
+    "hardware": {
+        "gpio": {
+            "4": {"device": "panel", "signal": "line7"},
+            "17": {"device": "lamps", "signal": "line17", "safe": False},
+            "18": {"device": "lamps", "signal": "line2", "safe": True},
+        },
+        "adc": {"0": {"device": "taps", "signal": "counts3"}},
+        "registers": {
+            "0x40000000": {"file": "/dev/uio0", "bytes": 4096},
+            "16": {"file": "/dev/my mem", "bytes": 8, "offset": 65536, "write": True},
+        },
     },
     "pace": {"device": "receiver", "timeout_s": 0.05},
     "outputs": {

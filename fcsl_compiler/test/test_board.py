@@ -26,7 +26,7 @@ from fcsl_test_boards import (
 )
 
 from fcsl_compiler.board.board import check_board
-from fcsl_compiler.board.devices import ACTUATORS, BUFFERED, POLLED, WAITING
+from fcsl_compiler.board.drivers import ACTUATORS, BUFFERED, POLLED, WAITING
 from fcsl_compiler.board.kinds import KINDS, MAX_BACKENDS, MAX_SECTIONS, STICKS
 from fcsl_compiler.board.limits import MAX_DEVICES, MAX_OUTPUTS, MAX_PLAN_NAME, MAX_PULSES, MAX_SENSORS
 from fcsl_compiler.board.plan import plan_text
@@ -304,7 +304,7 @@ def test_a_board_may_be_for_sensors_or_for_outputs(folder: Path) -> None:
 def test_a_channel_that_nothing_drives_on_purpose(folder: Path) -> None:
     board = check_board(write_board(folder, edited("outputs", "force", value=None)))
     assert {d.code for d in board.warnings} == {"W501"}  # of its device
-    assert "\nundriven force\nend\n" in plan_text(board)
+    assert "\nundriven force\n" in plan_text(board)
     (error,) = found(folder, edited("outputs", "imu.gyro", value=None))
     assert error.code == "E515"
     channel = {"name": "ready", "id": 20, "field": "law.outputs.ready", "direction": "actuator"}
@@ -312,10 +312,12 @@ def test_a_channel_that_nothing_drives_on_purpose(folder: Path) -> None:
     assert check_board(write_board(folder, edited("outputs", "ready", value=None))).undriven == ("ready",)
 
 
-@pytest.mark.parametrize("rest", [{}, {"sensors": {}}, {"outputs": {}}, {"sensors": {}, "outputs": {}}])
+@pytest.mark.parametrize(
+    "rest", [{}, {"sensors": {}}, {"outputs": {}}, {"hardware": {}}, {"sensors": {}, "outputs": {}}]
+)
 def test_a_board_for_nothing(rest: dict[str, Any], folder: Path) -> None:
     (error,) = found(folder, {"machine": "quad.json", "devices": {}, **rest})
-    assert (error.code, error.message) == ("E202", "a board has no `sensors` and no `outputs`")
+    assert (error.code, error.message) == ("E202", "a board has no `sensors`, `outputs` or `hardware`")
 
 
 def test_safe_outputs(folder: Path) -> None:
@@ -369,10 +371,12 @@ def test_outputs_without_a_machine(folder: Path) -> None:
     assert [d.code for d in found(folder, board)] == ["E502", "E516"]
 
 
-@pytest.mark.parametrize("driver", ["log", "pwm"])
-def test_devices_of_actuators_have_no_period(driver: str, folder: Path) -> None:
-    text = plan_text(check_board(write_board(folder, edited("devices", "esc", "driver", value=driver))))
-    assert f"device esc 0 {driver} pwmchip0" in text
+@pytest.mark.parametrize(("driver", "signals"), [("log", ["number", "flag"]), ("pwm", ["pulse2", "pulse1"])])
+def test_devices_of_actuators_have_no_period(driver: str, signals: list[str], folder: Path) -> None:
+    board = edited("devices", "esc", "driver", value=driver)
+    for element, signal in zip(board["outputs"]["motors"]["elements"], signals, strict=True):
+        element["signal"] = signal
+    assert f"device esc 0 {driver} pwmchip0" in plan_text(check_board(write_board(folder, board)))
 
 
 def test_too_many_outputs(folder: Path) -> None:

@@ -20,6 +20,11 @@ from fcsl_test_boards import (
     write_machine,
 )
 
+#: Places of hardware, and what may stand there.
+PINS, ADC, WINDOWS = ("hardware", "gpio"), ("hardware", "adc"), ("hardware", "registers")
+PIN = {"device": "panel", "signal": "line1"}
+WINDOW = {"file": "/dev/uio1", "bytes": 8}
+
 
 @pytest.fixture
 def folder(tmp_path: Path) -> Path:
@@ -44,11 +49,42 @@ EDITS: Sequence[tuple[Any, str, str, str]] = [
     # names and counts
     (edited("sensors", "s" * 65, value=BOARD["sensors"]["baro"]), "E505", "longer than 64 characters", '"sss'),
     (
-        edited("devices", value=BOARD["devices"] | {f"d{i}": BOARD["devices"]["bmp"] for i in range(25)}),
+        edited("devices", value=BOARD["devices"] | {f"d{i}": BOARD["devices"]["bmp"] for i in range(22)}),
         "E505",
         "33 devices",
         "{",
     ),
+    # signals of drivers
+    (edited(*TOP, "signals", value={"gyro": "anglvel"}), "E521", "`iio_buffer` has no signal `anglvel`", '"anglvel"'),
+    (edited(*FIRST, "signal", value="pulse16"), "E521", "driver `pwm` has no signal `pulse16`", '"pulse16"'),
+    (edited(*PINS, "4", "signal", value="line64"), "E521", "driver `gpio` has no signal `line64`", '"line64"'),
+    (edited(*ADC, "0", "signal", value="voltage3"), "E521", "driver `adc` has no signal `voltage3`", '"voltage3"'),
+    # hardware
+    (edited("hardware", value=[]), "E208", "`hardware` is an object", "[]"),
+    (edited("hardware", "gpios", value={}), "E201", "unknown key `gpios` in `hardware`", '"gpios"'),
+    (edited(*PINS, value=[]), "E208", "`gpio` is an object", "[]"),
+    (edited(*PINS, "04", value=PIN), "E203", "`04` is no number", '"04"'),
+    (edited(*PINS, "-1", value=PIN), "E203", "`-1` is no number", '"-1"'),
+    (edited(*PINS, "0x4", value=PIN), "E203", "`0x4` is no number", '"0x4"'),
+    (edited(*PINS, "4294967296", value=PIN), "E203", "`4294967296` is no number", '"4294967296"'),
+    (edited(*PINS, value={str(i): PIN for i in range(65)}), "E505", "65 pins", "{"),
+    (edited(*PINS, "4", "device", value="panle"), "E206", "no device `panle`", '"panle"'),
+    (edited(*PINS, "4", "safe", value=True), "E518", "device `panel` cannot be driven here", '"panel"'),
+    (edited(*PINS, "17", "safe", value=REMOVED), "E518", "device `lamps` cannot be read here", '"lamps"'),
+    (edited(*PINS, "17", "safe", value=0), "E208", "`safe` is", "0"),
+    (edited(*PINS, "18", "signal", value="line17"), "E519", "signal `line17` of `lamps` has two", '"line17"'),
+    (edited(*PINS, "18", "device", value="esc"), "E518", "device `esc` cannot be driven here", '"esc"'),
+    (edited(*PINS, "18", "device", value="cells"), "E518", "device `cells` cannot be driven here", '"cells"'),
+    (edited(*ADC, "0", "device", value="lamps"), "E518", "device `lamps` cannot be read here", '"lamps"'),
+    (edited(*ADC, "0", "safe", value=False), "E201", "unknown key `safe`", '"safe"'),
+    (edited(*WINDOWS, "0x10000000g", value=WINDOW), "E203", "is no number", '"0x10000000g"'),
+    (edited(*WINDOWS, "16", "bytes", value=6), "E522", "`bytes` is 6, no multiple of 4", "6"),
+    (edited(*WINDOWS, "16", "bytes", value=0), "E204", "`bytes` is 0", "0"),
+    (edited(*WINDOWS, "16", "offset", value=2), "E522", "`offset` is 2, no multiple of 4", "2"),
+    (edited(*WINDOWS, "18", value=WINDOW), "E522", "no registers are at 18", '"18"'),
+    (edited(*WINDOWS, "4294967292", value=WINDOW), "E522", "no registers are at 4294967292", '"4294967292"'),
+    (edited(*WINDOWS, "0x14", value=WINDOW), "E522", "two windows have the same registers", '"0x14"'),
+    (edited(*WINDOWS, "16", "file", value=""), "E505", "`file` is empty", '""'),
     # kinds and channels
     (edited(*IMU, "kind", value="inertail"), "E205", "`kind` cannot be `inertail`", '"inertail"'),
     (edited(*IMU, "channels", "field", value="imu.gyro"), "E506", "kind `inertial` has", '"field"'),
@@ -301,3 +337,24 @@ def test_a_channel_of_integers(folder: Path) -> None:
 def test_a_value_has_any_unit(folder: Path) -> None:
     value = {"kind": "value", "channels": {"value": "baro.pressure"}, "backends": [{"device": "bmp"}]}
     assert found(folder, edited("sensors", "baro", value=value)) == []
+
+
+def test_hardware_that_the_machine_needs(folder: Path) -> None:
+    """Each builtin that an algorithm calls needs its part of `hardware`."""
+    calls = (
+        "level = hw_read_gpio(5)",
+        "hw_write_gpio(4, level)",
+        "counts = hw_read_adc(0)",
+        "self.steps[1] = i32(counts)",
+    )
+    source = (folder / "law.py").read_text().rstrip()
+    (folder / "law.py").write_text("\n        ".join([source, *calls]) + "\n")
+    assert not [d for d in found(folder, BOARD) if d.code == "W507"]
+    warnings = found(folder, edited("hardware", value=REMOVED))
+    assert [d.message for d in warnings if d.code == "W507"] == [
+        "algorithm `Law` calls hw_read_adc, and the board has no `adc`",
+        "algorithm `Law` calls hw_read_gpio, and the board has no `gpio`",
+        "algorithm `Law` calls hw_write_gpio, and the board has no `gpio`",
+    ]
+    only_outputs = {k: v for k, v in BOARD.items() if k in ("machine", "devices", "outputs")}
+    assert not [d for d in found(folder, only_outputs) if d.code == "W507"]  # fcsl-guard's board

@@ -14,7 +14,7 @@ from test_schema import agree, mutants
 
 from fcsl_compiler.base.ament import package_share
 from fcsl_compiler.base.diagnostics import DiagnosticError
-from fcsl_compiler.board import devices, health, limits, pulses
+from fcsl_compiler.board import devices, drivers, hardware, health, limits, pulses
 from fcsl_compiler.board import machine as board_machine
 from fcsl_compiler.board.board import SCHEMA, check_board
 from fcsl_compiler.board.kinds import KINDS, MAX_BACKENDS, MAX_SECTIONS, STICKS
@@ -37,6 +37,10 @@ OBJECTS = {
     "a notch": ("$defs", "notch"),
     r"output `\w+`": ("$defs", "output"),
     "an element": ("$defs", "element"),
+    "`hardware`": ("properties", "hardware"),
+    r"`gpio` \d+": ("$defs", "pin"),
+    r"`adc` \d+": ("$defs", "converter"),
+    r"the registers `\w+`": ("$defs", "registers"),
 }
 
 
@@ -83,7 +87,7 @@ def test_schema_and_reader_have_the_same_keys(folder: Path, monkeypatch: pytest.
 def test_words_and_limits_are_the_compilers() -> None:
     defs, top = TEXT["$defs"], TEXT["properties"]
     device, sensor, backend = (defs[name]["properties"] for name in ("device", "sensor", "backend"))
-    assert device["driver"]["anyOf"][0]["enum"] == list(devices.DRIVERS)
+    assert device["driver"]["anyOf"][0]["enum"] == list(drivers.DRIVERS)
     assert (device["rate_hz"]["minimum"], device["rate_hz"]["maximum"]) == (devices.MIN_RATE_HZ, devices.MAX_RATE_HZ)
     assert sensor["kind"]["enum"] == list(KINDS)
     quantities = {q for kind in KINDS.values() for q in kind}
@@ -100,6 +104,13 @@ def test_words_and_limits_are_the_compilers() -> None:
     assert defs["number"]["maximum"] == -defs["number"]["minimum"] == pulses.MAX_NUMBER
     element = defs["element"]["properties"]
     assert element["slew_per_s"]["maximum"] == pulses.MAX_NUMBER
+    assert defs["signal"]["maxLength"] == limits.MAX_PLAN_NAME
+    builtins = top["hardware"]["properties"]
+    assert builtins["gpio"]["maxProperties"] == limits.MAX_PINS
+    assert builtins["adc"]["maxProperties"] == limits.MAX_CONVERTERS
+    assert builtins["registers"]["maxProperties"] == limits.MAX_REGISTERS
+    assert defs["registers"]["properties"]["offset"]["maximum"] == hardware.MAX_OFFSET
+    assert defs["registers"]["properties"]["bytes"]["maximum"] == hardware.MAX_U32
     assert element["signal"]["maxLength"] == limits.MAX_PLAN_NAME
     assert defs["name"]["maxLength"] == backend["signals"]["additionalProperties"]["maxLength"] == limits.MAX_PLAN_NAME
     assert defs["text"]["maxLength"] == limits.MAX_TEXT

@@ -20,6 +20,7 @@ from fcsl_compiler.base.codes.examples import (
     EXAMPLE_BOARD,
     EXAMPLE_CHANNELS,
     EXAMPLE_CONTROL,
+    EXAMPLE_LAMP,
     EXAMPLE_MACHINE,
     EXAMPLE_NAV,
     EXAMPLE_PILOT,
@@ -87,6 +88,7 @@ def diagnose_board(folder: Path, kind: Kind, text: str) -> list[Diagnostic]:
     """Diagnostics of the example board, or of its machine's, with these members."""
     (folder / "nav.py").write_text(EXAMPLE_NAV)
     (folder / "control.py").write_text(EXAMPLE_CONTROL)
+    (folder / "lamp.py").write_text(EXAMPLE_LAMP)
     machine, board = with_members(EXAMPLE_MACHINE, EXAMPLE_CHANNELS), EXAMPLE_BOARD
     if kind is Kind.CHANNELS:
         machine = with_members(machine, text)
@@ -189,8 +191,10 @@ def page() -> str:
         f"```python\n{EXAMPLE_NAV}```",
         "`control.py`:",
         f"```python\n{EXAMPLE_CONTROL}```",
-        "and `pilot.py`:",
+        "`pilot.py`:",
         f"```python\n{EXAMPLE_PILOT}```",
+        "and `lamp.py`:",
+        f"```python\n{EXAMPLE_LAMP}```",
         "Those of boards (E5xx, W5xx) are pieces of this board, whose machine has channels in addition:",
         f"```json\n{EXAMPLE_BOARD}```",
         f"```json\n{EXAMPLE_CHANNELS}\n```",

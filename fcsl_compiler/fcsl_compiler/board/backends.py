@@ -9,10 +9,10 @@ from ..base.source import Span
 from ..parse.json_reader import ConfigReader
 from ..parse.json_source import JsonNode
 from .corrections import Correction, read_corrections
-from .devices import ACTUATORS, Device
+from .devices import Device
+from .drivers import ACTUATORS, check_signal, read_signal
 from .filters import Filter, Section, sections_for
 from .kinds import KINDS, MAX_BACKENDS
-from .limits import read_signal
 from .quantities import by_quantity, measured
 from .rotations import IDENTITY, Matrix, read_rotation
 from .sticks import Stick, read_sticks
@@ -55,7 +55,7 @@ class BackendReader:
         device = self._device(keys.get("device"), places)
         rotation = self._rotation(keys.get("rotation"), kind)
         corrections = read_corrections(keys.get("correct"), rotation, kind, self.reader)
-        signals = self._signals(keys.get("signals"), kind)
+        signals = self._signals(keys.get("signals"), kind, device)
         sticks = read_sticks(keys.get("sticks"), kind, self.reader)
         if device is None:
             return None
@@ -87,10 +87,12 @@ class BackendReader:
             return IDENTITY
         return read_rotation(node, self.reader) or IDENTITY
 
-    def _signals(self, node: JsonNode | None, kind: str) -> dict[str, str]:
+    def _signals(self, node: JsonNode | None, kind: str, device: Device | None) -> dict[str, str]:
         found: dict[str, str] = {}
         for quantity, value in by_quantity(node, "`signals`", measured(kind), self.reader):
             name = read_signal(value, f"the signal of `{quantity.name}`", self.reader)
             if name is not None:
                 found[quantity.name] = name
+                if device is not None:
+                    check_signal(name, device.driver, value.span, self.reader)
         return found

@@ -14,6 +14,7 @@ from ..parse.json_source import JsonNode, parse_json
 from .backends import BackendReader
 from .channels import ChannelBinder
 from .devices import Device, read_devices
+from .hardware import Hardware, HardwareReader, warn_unreached
 from .machine import load_machine
 from .outputs import Output, OutputReader
 from .pace import Pace, read_pace
@@ -32,6 +33,7 @@ class Board:
     sensors: tuple[Sensor, ...]
     outputs: tuple[Output, ...]
     undriven: tuple[str, ...]
+    hardware: Hardware
     pace: Pace | None
     warnings: tuple[Diagnostic, ...]
 
@@ -44,7 +46,7 @@ def check_board(path: Path) -> Board:
     assert root is not None
     _refuse_machine(path, root, sink)
     reader = ConfigReader(sink)
-    optional = ("$schema", "description", "pace", "sensors", "outputs")
+    optional = ("$schema", "description", "pace", "sensors", "outputs", "hardware")
     keys = reader.object(root, "a board", ("machine", "devices"), optional) or {}
     for key in ("$schema", "description"):
         reader.string(keys.get(key), f"`{key}`")
@@ -55,20 +57,24 @@ def check_board(path: Path) -> Board:
     sensors = read_sensors(keys.get("sensors"), channels, backends, reader)
     actuators = OutputReader(machine, devices, reader, backends.used)
     outputs = actuators.read(keys.get("outputs"))
+    builtins = HardwareReader(devices, reader, backends.used, actuators.used)
+    hardware = builtins.read(keys.get("hardware"))
     pace = read_pace(keys.get("pace"), devices, backends.used, machine.tick_hz if machine else None, reader)
     _check_purpose(root, keys, reader)
-    _warn_unused(devices, backends.used | actuators.used, reader)
+    _warn_unused(devices, backends.used | actuators.used | builtins.used, reader)
     # Without the key `sensors` or `outputs` that half of the machine is not this board's.
     if "machine" in keys and "sensors" in keys:
         channels.warn_unbound(keys["machine"])
     if "machine" in keys and "outputs" in keys:
         actuators.warn_undriven(keys["machine"])
+    if "machine" in keys and ("sensors" in keys or "hardware" in keys):
+        warn_unreached(hardware, machine, keys["machine"], reader)
     if of_machine or sink.failed:
         raise DiagnosticError([*of_machine, *(d for d in sink.diagnostics if d.severity is Severity.ERROR)])
     assert machine is not None
     used = tuple(d for d in devices.values() if d)
     undriven = tuple(actuators.undriven)
-    return Board(path, machine, used, sensors, outputs, undriven, pace, tuple(sink.diagnostics))
+    return Board(path, machine, used, sensors, outputs, undriven, hardware, pace, tuple(sink.diagnostics))
 
 
 def _parse(path: Path, sink: DiagnosticSink) -> JsonNode | None:
@@ -89,14 +95,16 @@ def _refuse_machine(path: Path, root: JsonNode, sink: DiagnosticSink) -> None:
 
 
 def _check_purpose(root: JsonNode, keys: dict[str, JsonNode], reader: ConfigReader) -> None:
-    """Reports a board without sensors and outputs."""
-    parts = [keys[key] for key in ("sensors", "outputs") if key in keys]
+    """Reports a board without sensors, outputs and hardware."""
+    parts = [keys[key] for key in ("sensors", "outputs", "hardware") if key in keys]
     if root.kind == "object" and not any(part.kind != "object" or part.members for part in parts):
-        reader.sink.error("E202", "a board has no `sensors` and no `outputs`", root.span, help="add one of them")
+        reader.sink.error(
+            "E202", "a board has no `sensors`, `outputs` or `hardware`", root.span, help="add one of them"
+        )
 
 
 def _warn_unused(devices: dict[str, Device | None], used: set[str], reader: ConfigReader) -> None:
     for device in devices.values():
         if device is not None and device.name not in used:
-            message, fix = f"nothing uses device `{device.name}`", "remove it, or add a backend or an output"
+            message, fix = f"nothing uses device `{device.name}`", "remove it, or add a backend, an output or a pin"
             reader.sink.warning("W501", message, device.span, why="it is not opened", help=fix)

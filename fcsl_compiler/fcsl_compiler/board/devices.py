@@ -10,16 +10,8 @@ from ..base.diagnostics import nearest
 from ..base.source import Span
 from ..parse.json_reader import ConfigReader
 from ..parse.json_source import JsonNode
+from .drivers import ACTUATORS, BUFFERED, DRIVERS, POLLED, WAITING
 from .limits import MAX_DEVICES, check_count, check_name, check_text
-
-#: Drivers that come with FCSL. Those of sensors: polled ones are read at a rate, the others wait for the next sample.
-POLLED = ("iio", "power_supply", "thermal")
-#: Waits, and the device samples at the rate that it is set to.
-BUFFERED = ("iio_buffer",)
-WAITING = ("evdev", "sbus", "crsf", "ubx", "nmea", "can")
-SENSORS = (*POLLED, *BUFFERED, *WAITING)
-ACTUATORS = ("pwm", "log")
-DRIVERS = (*SENSORS, *ACTUATORS)
 
 MIN_RATE_HZ, MAX_RATE_HZ = 0.001, 100_000.0
 
@@ -75,7 +67,7 @@ def _driver(node: JsonNode | None, reader: ConfigReader) -> str | None:
     if "/" in text or ".so" in text or ":" in text:
         hint = "write LIBRARY.so:NAME, without spaces"
     else:
-        hint = nearest(text, DRIVERS) or f"there are {', '.join(DRIVERS)}; one of a library is LIBRARY.so:NAME"
+        hint = nearest(text, tuple(DRIVERS)) or f"there are {', '.join(DRIVERS)}; one of a library is LIBRARY.so:NAME"
     reader.sink.error("E503", f"no driver `{text}`", node.span, help=hint)
     return None
 

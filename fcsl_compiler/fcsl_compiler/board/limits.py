@@ -3,8 +3,6 @@
 
 from __future__ import annotations
 
-import re
-
 from ..base.source import Span
 from ..parse.json_reader import ConfigReader
 from ..parse.json_source import JsonNode
@@ -14,11 +12,14 @@ MAX_SENSORS = 32
 MAX_OUTPUTS = 16
 #: Elements of one output.
 MAX_PULSES = 16
+MAX_PINS = 64
+#: Inputs of converters.
+MAX_CONVERTERS = 32
+#: Windows of registers.
+MAX_REGISTERS = 8
 MAX_PLAN_NAME = 64
 #: Of a driver or an address, in bytes.
 MAX_TEXT = 500
-
-_SIGNAL = re.compile(r"[A-Za-z_]\w*", re.ASCII)
 
 
 def check_name(name: str, span: Span, reader: ConfigReader) -> bool:
@@ -28,18 +29,6 @@ def check_name(name: str, span: Span, reader: ConfigReader) -> bool:
     message = f"`{name}` is longer than {MAX_PLAN_NAME} characters"
     reader.sink.error("E505", message, span, help="shorten it")
     return False
-
-
-def read_signal(node: JsonNode | None, what: str, reader: ConfigReader) -> str | None:
-    """The name of a signal of a driver. None after reporting an error."""
-    name = reader.string(node, what)
-    if node is None or name is None:
-        return None
-    if not _SIGNAL.fullmatch(name):
-        fix = "letters, digits and underscores, as the driver names it"
-        reader.sink.error("E203", f"`{name}` is not the name of a signal", node.span, help=fix)
-        return None
-    return name if check_name(name, node.span, reader) else None
 
 
 def check_text(node: JsonNode | None, what: str, reader: ConfigReader) -> str | None:

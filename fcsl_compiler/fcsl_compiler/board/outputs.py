@@ -11,7 +11,8 @@ from ..model.machine import Channel, Machine
 from ..model.types import Scalar, count_of, element_of
 from ..parse.json_reader import ConfigReader
 from ..parse.json_source import JsonNode
-from .devices import SENSORS, Device
+from .devices import Device
+from .drivers import SENSORS, check_signal
 from .limits import MAX_OUTPUTS, MAX_PULSES, check_count
 from .pulses import Pulse, read_pulse
 
@@ -114,13 +115,7 @@ class OutputReader:
         device = self.devices[names[index]]
         if device is None:
             return None
-        problem = ""
-        if device.driver in SENSORS:
-            problem = f"`{device.driver}` reads sensors"
-        elif device.name in self._of_sensors:
-            problem = "a sensor reads it, and a driver reads or writes"
-        elif device.rate_hz:
-            problem = "it has a `rate_hz`, as sensors have"
+        problem = misfit_as_output(device, self._of_sensors)
         if problem:
             message, notes = f"device `{device.name}` cannot have outputs", [(device.span, "the device")]
             self.reader.sink.error("E518", message, node.span, why=problem, notes=notes)
@@ -139,11 +134,12 @@ class OutputReader:
         pulses = [read_pulse(item, channel, index, self.reader) for index, item in enumerate(items)]
         for pulse, item in zip(pulses, items, strict=True):
             if pulse is not None and device is not None:
-                self._check_signal(pulse.signal, device, item.span)
+                check_signal(pulse.signal, device.driver, item.members["signal"].value.span, self.reader)
+                self._check_driven(pulse.signal, device, item.span)
                 self._check_period(pulse, device, item.span)
         return tuple(p for p in pulses if p is not None)
 
-    def _check_signal(self, signal: str, device: Device, span: Span) -> None:
+    def _check_driven(self, signal: str, device: Device, span: Span) -> None:
         first = self._driven.setdefault((device.driver, device.address, signal), span)
         if first is not span:
             message, notes = f"signal `{signal}` of `{device.name}` has two sources", [(first, "the other")]
@@ -158,6 +154,15 @@ class OutputReader:
             notes = [(device.span, "the device")]
             fix = "shorten the pulse, or write a lower frequency behind the @ of the device"
             self.reader.sink.error("E516", message, span, help=fix, notes=notes)
+
+
+def misfit_as_output(device: Device, read: set[str]) -> str:
+    """Why the device cannot be driven; "" if it can. `read`: the names of those that something reads."""
+    if device.driver in SENSORS:
+        return f"`{device.driver}` reads sensors"
+    if device.name in read:
+        return "something reads it, and a driver reads or writes"
+    return "it has a `rate_hz`, as sensors have" if device.rate_hz else ""
 
 
 def _pwm_hz(device: Device) -> float:

@@ -7,7 +7,8 @@ from dataclasses import dataclass
 
 from ..parse.json_reader import ConfigReader
 from ..parse.json_source import JsonNode
-from .devices import POLLED, Device
+from .devices import Device
+from .drivers import POLLED
 
 MIN_TIMEOUT_S, MAX_TIMEOUT_S = 0.001, 60.0
 

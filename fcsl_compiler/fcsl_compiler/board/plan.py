@@ -8,6 +8,7 @@ from collections.abc import Iterator
 
 from .backends import Backend
 from .board import Board
+from .hardware import Hardware
 from .kinds import KINDS
 from .outputs import Output
 from .sensors import Sensor
@@ -27,6 +28,7 @@ def plan_text(board: Board) -> str:
     for output in board.outputs:
         lines += _output(output)
     lines += [f"undriven {name}" for name in board.undriven]
+    lines += _hardware(board.hardware)
     return "\n".join([*lines, "end", ""])
 
 
@@ -62,6 +64,19 @@ def _output(output: Output) -> Iterator[str]:
     for index, p in enumerate(output.pulses):
         line = (p.line.low, p.line.high, p.line.minimum, p.line.middle, p.line.maximum)
         yield f"pulse {index} {p.signal} {_bits(*line, p.slew, p.safe)}"
+
+
+def _hardware(hardware: Hardware) -> Iterator[str]:
+    for pin in hardware.pins:
+        if pin.safe is None:
+            yield f"gpio_in {pin.number} {pin.device.name} {pin.signal}"
+        else:
+            yield f"gpio_out {pin.number} {pin.device.name} {pin.signal} {int(pin.safe)}"
+    for converter in hardware.converters:
+        yield f"adc {converter.number} {converter.device.name} {converter.signal}"
+    for r in hardware.registers:
+        access = "read_write" if r.write else "read"
+        yield f"registers {r.address} {r.bytes} {r.offset} {access} {r.file}"
 
 
 def _ns(seconds: float) -> int:

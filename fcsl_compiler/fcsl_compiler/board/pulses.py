@@ -13,7 +13,7 @@ from ..model.machine import Channel
 from ..model.types import F64, Array
 from ..parse.json_reader import ConfigReader
 from ..parse.json_source import JsonNode
-from .limits import read_signal
+from .drivers import read_signal
 
 #: Of commands and outputs; the guard refuses more.
 MAX_NUMBER = 1e9

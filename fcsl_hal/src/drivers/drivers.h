@@ -17,6 +17,9 @@ extern const fcsl_driver_t fcsl_driver_iio;
 extern const fcsl_driver_t fcsl_driver_iio_buffer;
 extern const fcsl_driver_t fcsl_driver_power_supply;
 extern const fcsl_driver_t fcsl_driver_thermal;
+extern const fcsl_driver_t fcsl_driver_adc;
+extern const fcsl_driver_t fcsl_driver_gpio;
 extern const fcsl_driver_t fcsl_driver_pwm;
+extern const fcsl_driver_t fcsl_driver_gpio_out;
 
 #endif /* FCSL_DRIVERS_H */

@@ -7,6 +7,7 @@
 
 const fcsl_driver_t *const fcsl_drivers_built_in[] = {&fcsl_driver_log,
                                                       &fcsl_driver_pwm,
+                                                      &fcsl_driver_gpio_out,
                                                       &fcsl_driver_can,
                                                       &fcsl_driver_crsf,
                                                       &fcsl_driver_evdev,
@@ -17,4 +18,6 @@ const fcsl_driver_t *const fcsl_drivers_built_in[] = {&fcsl_driver_log,
                                                       &fcsl_driver_iio_buffer,
                                                       &fcsl_driver_power_supply,
                                                       &fcsl_driver_thermal,
+                                                      &fcsl_driver_adc,
+                                                      &fcsl_driver_gpio,
                                                       NULL};

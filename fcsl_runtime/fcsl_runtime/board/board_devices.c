@@ -30,6 +30,8 @@ typedef struct {
 struct board_devices {
     const board_plan_t *plan;
     sensor_device_t *devices[BOARD_DEVICES_MAX]; /* null: no sensor uses it */
+    device_sample_t latest[BOARD_DEVICES_MAX];
+    uint8_t has_latest[BOARD_DEVICES_MAX];
     feed_t feeds[BOARD_SENSORS_MAX * FCSL_BACKENDS_MAX];
     uint32_t feed_count;
     sem_t sampled; /* posted by the device that paces the loop */
@@ -121,6 +123,14 @@ board_devices_t *board_devices_new(const board_plan_t *plan, fcsl_error_t *error
     return devices;
 }
 
+int board_devices_use(board_devices_t *devices, uint32_t device, const char *signal, fcsl_error_t *error)
+{
+    uint32_t count = 0;
+    return use_device(devices, device, error) == 0
+               ? sensor_device_use(devices->devices[device], signal, "", FCSL_DRIVER_NEEDED, 1, &count, error)
+               : -1;
+}
+
 int board_devices_start(board_devices_t *devices, fcsl_error_t *error)
 {
     for (uint32_t d = 0; d < devices->plan->device_count; d++) {
@@ -194,19 +204,31 @@ static void make_reading(const feed_t *feed, const device_sample_t *sample, sens
     }
 }
 
-static uint32_t take_sample(board_devices_t *devices, uint32_t d, sensor_reading_t *readings)
+/* Returns whether there was a sample. */
+static int take_sample(board_devices_t *devices, uint32_t d, sensor_reading_t *readings, uint32_t *count)
 {
     device_sample_t sample;
-    uint32_t count = 0;
     if (!sensor_device_take(devices->devices[d], &sample)) {
         return 0;
     }
+    devices->latest[d] = sample;
+    devices->has_latest[d] = 1;
     for (uint32_t i = 0; i < devices->feed_count; i++) {
         if (devices->feeds[i].device == d) {
-            make_reading(&devices->feeds[i], &sample, &readings[count++]);
+            make_reading(&devices->feeds[i], &sample, &readings[(*count)++]);
         }
     }
-    return count;
+    return 1;
+}
+
+static int has_feed(const board_devices_t *devices, uint32_t d)
+{
+    for (uint32_t i = 0; i < devices->feed_count; i++) {
+        if (devices->feeds[i].device == d) {
+            return 1;
+        }
+    }
+    return 0;
 }
 
 uint32_t board_devices_take(board_devices_t *devices, sensor_reading_t *readings, uint32_t capacity)
@@ -214,14 +236,17 @@ uint32_t board_devices_take(board_devices_t *devices, sensor_reading_t *readings
     const uint32_t share = devices->feed_count > 0u ? capacity / devices->feed_count : 0u; /* of a device */
     uint32_t count = 0;
     for (uint32_t d = 0; d < devices->plan->device_count; d++) {
-        const uint32_t samples = d == devices->plan->pacing ? 1u : share;
-        uint32_t made = 1;
-        if (devices->devices[d] != NULL && d != devices->plan->pacing) {
+        uint32_t samples = DEVICE_RING_SAMPLES; /* of one that makes no readings */
+        if (devices->devices[d] == NULL) {
+            continue;
+        }
+        if (d == devices->plan->pacing) {
+            samples = 1;
+        } else if (has_feed(devices, d)) {
+            samples = share;
             sensor_device_skip(devices->devices[d], share);
         }
-        for (uint32_t i = 0; devices->devices[d] != NULL && i < samples && made > 0u; i++) {
-            made = take_sample(devices, d, &readings[count]);
-            count += made;
+        for (uint32_t i = 0; i < samples && take_sample(devices, d, readings, &count); i++) {
         }
     }
     return count;
@@ -230,6 +255,12 @@ uint32_t board_devices_take(board_devices_t *devices, sensor_reading_t *readings
 device_counts_t board_devices_counts(const board_devices_t *devices, uint32_t device)
 {
     return devices->devices[device] != NULL ? sensor_device_counts(devices->devices[device]) : (device_counts_t){0};
+}
+
+const device_sample_t *board_devices_latest(const board_devices_t *devices, uint32_t device)
+{
+    const int is_there = devices->has_latest[device] != 0u && board_devices_counts(devices, device).open != 0u;
+    return is_there ? &devices->latest[device] : NULL;
 }
 
 const char *board_devices_news(board_devices_t *devices)

@@ -1,6 +1,6 @@
 /* SPDX-License-Identifier: Apache-2.0
  *
- * The sensor devices of a plan, and which sensor each of their samples is a reading of.
+ * The devices of a plan that are read, and which sensor each of their samples is a reading of.
  */
 #ifndef BOARD_BOARD_DEVICES_H
 #define BOARD_BOARD_DEVICES_H
@@ -18,6 +18,9 @@ typedef struct board_devices board_devices_t;
 /* Finds drivers and signals; opens nothing. Quantities that the machine gets must have a signal. `plan` must outlive it. Null with
  * `error`. */
 board_devices_t *board_devices_new(const board_plan_t *plan, fcsl_error_t *error);
+/* Before the start: what hw_read_… of a pin or a converter needs. Returns where the signal, a scalar, lies among the latest values of the
+ * device of the plan, or -1 with `error`. */
+int board_devices_use(board_devices_t *devices, uint32_t device, const char *signal, fcsl_error_t *error);
 /* Opens all devices and starts their threads. 0, or -1. */
 int board_devices_start(board_devices_t *devices, fcsl_error_t *error);
 /* Where a device paces the loop: waits for its next sample until `deadline_ns` of the monotonic clock, or until it is interrupted: 1, 0
@@ -29,6 +32,8 @@ void board_devices_interrupt(board_devices_t *devices);
  * paces the loop. At most `capacity` readings, of which each device has its share: of one that gave more the oldest samples are dropped.
  * Returns how many. Does not wait. */
 uint32_t board_devices_take(board_devices_t *devices, sensor_reading_t *readings, uint32_t capacity);
+/* The newest sample that was taken of a device that is there; null: there is none. */
+const device_sample_t *board_devices_latest(const board_devices_t *devices, uint32_t device);
 /* Throws away what the devices have given, but the newest sample of each. */
 void board_devices_discard(board_devices_t *devices);
 /* Of a device of the plan. */

@@ -327,6 +327,76 @@ static const char *on_undriven(parser_t *parser)
     return fcsl_plan_is_path(parser->word[1]) ? NULL : "not a channel";
 }
 
+/* Of a pin, a converter or a register. */
+static int take_number(const char *word, uint32_t *number)
+{
+    uint64_t value = 0;
+    const int status = fcsl_plan_number(word, UINT32_MAX, &value);
+    *number = (uint32_t)value;
+    return status;
+}
+
+static const char *take_pin(parser_t *parser, int is_output, int safe)
+{
+    board_plan_t *plan = parser->plan;
+    board_pin_t pin = {.signal = parser->word[3], .is_output = is_output, .safe = safe};
+    if (plan->pin_count == BOARD_PINS_MAX) {
+        return "too many pins";
+    }
+    if (take_number(parser->word[1], &pin.number) != 0 || find_device(plan, parser->word[2], &pin.device) != 0) {
+        return "not a pin and a device";
+    }
+    plan->pins[plan->pin_count++] = pin;
+    return NULL;
+}
+
+static const char *on_gpio_in(parser_t *parser)
+{
+    return take_pin(parser, 0, 0);
+}
+
+static const char *on_gpio_out(parser_t *parser)
+{
+    uint64_t safe = 0;
+    return fcsl_plan_number(parser->word[4], 1, &safe) == 0 ? take_pin(parser, 1, (int)safe) : "safe is not 0 or 1";
+}
+
+static const char *on_adc(parser_t *parser)
+{
+    board_plan_t *plan = parser->plan;
+    board_converter_t converter = {.signal = parser->word[3]};
+    if (plan->converter_count == BOARD_CONVERTERS_MAX) {
+        return "too many inputs of converters";
+    }
+    if (take_number(parser->word[1], &converter.number) != 0 ||
+        find_device(plan, parser->word[2], &converter.device) != 0) {
+        return "not an input and a device";
+    }
+    plan->converters[plan->converter_count++] = converter;
+    return NULL;
+}
+
+static const char *on_registers(parser_t *parser)
+{
+    board_plan_t *plan = parser->plan;
+    const char *access = parser->word[4];
+    board_registers_t window = {.is_written = strcmp(access, "read_write") == 0, .file = parser->word[5]};
+    if (plan->registers_count == BOARD_REGISTERS_MAX) {
+        return "too many registers";
+    }
+    if (take_number(parser->word[1], &window.address) != 0 || take_number(parser->word[2], &window.bytes) != 0 ||
+        fcsl_plan_number(parser->word[3], INT64_MAX, &window.offset) != 0 ||
+        (!window.is_written && strcmp(access, "read") != 0)) {
+        return "not an address, bytes, an offset, and read or read_write";
+    }
+    if (window.bytes == 0u || (window.address | window.bytes | window.offset) % sizeof(uint32_t) != 0u ||
+        window.bytes - 1u > UINT32_MAX - window.address || window.offset > (uint64_t)INT64_MAX - window.bytes) {
+        return "registers are whole words of 4 bytes, and their addresses have 32 bits";
+    }
+    plan->registers[plan->registers_count++] = window;
+    return NULL;
+}
+
 typedef enum { BELONGS_TO_BOARD, BELONGS_TO_SENSOR, BELONGS_TO_BACKEND, BELONGS_TO_OUTPUT } owner_t;
 
 static const struct {
@@ -352,6 +422,10 @@ static const struct {
     {"output", 3, 0, BELONGS_TO_BOARD, on_output},
     {"undriven", 2, 0, BELONGS_TO_BOARD, on_undriven},
     {"pulse", 10, 0, BELONGS_TO_OUTPUT, on_pulse},
+    {"gpio_in", 4, 0, BELONGS_TO_BOARD, on_gpio_in},
+    {"gpio_out", 5, 0, BELONGS_TO_BOARD, on_gpio_out},
+    {"adc", 4, 0, BELONGS_TO_BOARD, on_adc},
+    {"registers", 6, 1, BELONGS_TO_BOARD, on_registers},
 };
 
 static const char *take_line(parser_t *parser, char *line)
@@ -483,6 +557,21 @@ void board_plan_free(board_plan_t *plan)
         free(plan->text);
         free(plan);
     }
+}
+
+int board_plan_has_hardware(const board_plan_t *plan)
+{
+    return plan->pin_count + plan->converter_count + plan->registers_count > 0u;
+}
+
+int board_plan_flies(const board_plan_t *plan, uint32_t device)
+{
+    for (uint32_t i = 0; i < plan->output_count; i++) {
+        if (plan->outputs[i].device == device) {
+            return 0;
+        }
+    }
+    return 1;
 }
 
 int board_plan_check_machine(const board_plan_t *plan, const char *file, const fcsl_machine_t *machine,

@@ -1,7 +1,7 @@
 /* SPDX-License-Identifier: Apache-2.0
  *
- * The plan of a board, which `fcslc board` writes: its devices, the sensors of the machine that they are, and how their readings are
- * corrected and judged. Text, one statement per line, words separated by one space:
+ * The plan of a board, which `fcslc board` writes: its devices, the sensors of the machine that they are, how their readings are
+ * corrected and judged, and what the hw_* builtins of algorithms reach. Text, one statement per line, words separated by one space:
  *
  *   fcsl-board-plan 1
  *   machine NAME TICK_HZ
@@ -20,6 +20,11 @@
  *   output CHANNEL DEVICE                        an actuator channel; what follows, up to the next one, belongs to it
  *   pulse INDEX SIGNAL LOW HIGH MINIMUM MIDDLE MAXIMUM SLEW SAFE     bits; see board_pulse_t
  *   undriven CHANNEL                             an actuator channel that nothing drives, on purpose
+ *   gpio_in PIN DEVICE SIGNAL                    what hw_read_gpio of the pin gives
+ *   gpio_out PIN DEVICE SIGNAL SAFE              what hw_write_gpio of the pin drives; SAFE 0 or 1: at the start and at the end
+ *   adc CHANNEL DEVICE SIGNAL                    what hw_read_adc of the channel gives
+ *   registers ADDRESS BYTES OFFSET ACCESS FILE   what hw_read_u32 and hw_write_u32 reach: BYTES of FILE from OFFSET on, as if they were
+ *                                                at ADDRESS; ACCESS: read or read_write
  *   end
  *
  * BITS are 16 hexadecimal digits, those of a double. A plan that was cut off lacks `end`.
@@ -38,6 +43,9 @@ enum {
     BOARD_SENSORS_MAX = 32,
     BOARD_OUTPUTS_MAX = 16,
     BOARD_PULSES_MAX = 16, /* of an output */
+    BOARD_PINS_MAX = 64,
+    BOARD_CONVERTERS_MAX = 32,
+    BOARD_REGISTERS_MAX = 8,
     BOARD_NAME_BYTES = 65
 };
 
@@ -84,6 +92,31 @@ typedef struct {
     uint32_t pulse_count;
 } board_output_t;
 
+/* A digital pin, as hw_read_gpio and hw_write_gpio number it. */
+typedef struct {
+    uint32_t number;
+    uint32_t device; /* index into the plan's */
+    const char *signal;
+    int is_output;
+    int safe; /* of an output: its level before the first tick, and after the last one */
+} board_pin_t;
+
+/* An input of an analog-digital converter, as hw_read_adc numbers it. */
+typedef struct {
+    uint32_t number;
+    uint32_t device;
+    const char *signal;
+} board_converter_t;
+
+/* A part of a file in memory, whose words are registers for hw_read_u32 and hw_write_u32. */
+typedef struct {
+    uint32_t address; /* of the first register */
+    uint32_t bytes;
+    uint64_t offset; /* in the file */
+    int is_written;
+    const char *file;
+} board_registers_t;
+
 /* Whether the machine gets this quantity of the sensor, or one that is computed from it. */
 int board_sensor_needs(const board_sensor_t *sensor, uint32_t quantity);
 
@@ -102,6 +135,12 @@ typedef struct {
     uint32_t output_count;
     const char *undriven[BOARD_OUTPUTS_MAX]; /* actuator channels without an output */
     uint32_t undriven_count;
+    board_pin_t pins[BOARD_PINS_MAX];
+    uint32_t pin_count;
+    board_converter_t converters[BOARD_CONVERTERS_MAX];
+    uint32_t converter_count;
+    board_registers_t registers[BOARD_REGISTERS_MAX];
+    uint32_t registers_count;
 } board_plan_t;
 
 /* Reads the file. Returns a plan for board_plan_free, or null with a message that names file and line. */
@@ -109,6 +148,10 @@ board_plan_t *board_plan_read(const char *file, fcsl_error_t *error);
 /* The same of its text, at most BOARD_BYTES_MAX; `name` is for messages. */
 board_plan_t *board_plan_parse(const char *name, const char *text, size_t size, fcsl_error_t *error);
 void board_plan_free(board_plan_t *plan);
+/* Whether it has pins, converters or registers. */
+int board_plan_has_hardware(const board_plan_t *plan);
+/* Whether the flight program opens the device: outputs belong to fcsl-guard. */
+int board_plan_flies(const board_plan_t *plan, uint32_t device);
 /* Whether the plan of this file is for the machine. 0, or -1. */
 int board_plan_check_machine(const board_plan_t *plan, const char *file, const fcsl_machine_t *machine,
                              fcsl_error_t *error);

@@ -16,8 +16,8 @@ static const struct {
     const char *doc;
 } OF_DEVICE[] = {
     {"open", "1: the device is there"},
-    {"samples", "samples that it gave"},
-    {"errors", "reads that failed"},
+    {"samples", "samples that it gave; 0 for one that is driven"},
+    {"errors", "reads or writes that failed"},
     {"dropped", "samples that no tick got: a tick was late, or the flight was paused"},
     {"lost", "times that it was gone"},
 };
@@ -65,7 +65,7 @@ int counters_open(counters_t *counters, const board_plan_t *plan, fcsl_error_t *
         }
     }
     for (uint32_t d = 0; d < plan->device_count; d++) {
-        for (uint32_t i = 0; i < DEVICE_COUNTERS; i++) {
+        for (uint32_t i = 0; board_plan_flies(plan, d) && i < DEVICE_COUNTERS; i++) {
             add(counters, "devices", plan->devices[d].name, OF_DEVICE[i].name, OF_DEVICE[i].doc);
         }
     }

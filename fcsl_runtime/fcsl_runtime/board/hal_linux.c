@@ -9,6 +9,7 @@
 
 #include "base/error.h"
 #include "board.h"
+#include "board_hardware.h"
 #include "counters.h"
 #include "readings.h"
 
@@ -18,6 +19,7 @@ typedef struct {
     board_t *board;
     const board_plan_t *plan; /* the board's */
     board_devices_t *devices;
+    board_hardware_t *hardware; /* null: the plan has none */
     int32_t primaries[BOARD_SENSORS_MAX]; /* as they were logged */
     readings_t readings;
     counters_t counters;
@@ -53,6 +55,9 @@ static void tell_primary(hal_t *hal, uint32_t s)
 static void tell_news(hal_t *hal)
 {
     const char *news = board_devices_news(hal->devices);
+    if (news == NULL && hal->hardware != NULL) {
+        news = board_hardware_news(hal->hardware);
+    }
     if (news != NULL) {
         hal->base.log(hal->base.ctx, news);
     }
@@ -138,7 +143,13 @@ static void linux_count(void *ctx)
         }
     }
     for (uint32_t d = 0; d < hal->plan->device_count; d++) {
-        const device_counts_t counts = board_devices_counts(hal->devices, d);
+        device_counts_t counts;
+        if (!board_plan_flies(hal->plan, d)) {
+            continue;
+        }
+        if (hal->hardware == NULL || !board_hardware_counts(hal->hardware, d, &counts)) {
+            counts = board_devices_counts(hal->devices, d);
+        }
         *at++ = counts.open;
         *at++ = counts.samples;
         *at++ = counts.errors;
@@ -195,6 +206,10 @@ static void linux_interrupt(void *ctx)
 static void linux_close(void *ctx)
 {
     hal_t *hal = ctx;
+    if (hal->hardware != NULL) {
+        fcsl_run_use_board(hal->run, NULL);
+        board_hardware_free(hal->hardware);
+    }
     const int left = board_devices_free(hal->devices) != 0;
     if (hal->base.close != NULL) {
         hal->base.close(hal->base.ctx);
@@ -211,7 +226,8 @@ static int linux_open(fcsl_hal_t *handle, char *error, size_t error_size)
 {
     hal_t *hal = handle->ctx;
     fcsl_error_t reason;
-    if (board_devices_start(hal->devices, &reason) != 0) {
+    if (board_devices_start(hal->devices, &reason) != 0 ||
+        (hal->hardware != NULL && board_hardware_start(hal->hardware, &reason) != 0)) {
         (void)snprintf(error, error_size, "%s", reason.text);
         return -1;
     }
@@ -235,7 +251,18 @@ static int open_board(hal_t *hal, const char *file, fcsl_error_t *error)
         hal->primaries[s] = -1;
     }
     hal->devices = board_devices_new(hal->plan, error);
-    return hal->devices != NULL && counters_open(&hal->counters, hal->plan, error) == 0 ? 0 : -1;
+    if (hal->devices == NULL || counters_open(&hal->counters, hal->plan, error) != 0) {
+        return -1;
+    }
+    if (!board_plan_has_hardware(hal->plan)) {
+        return 0;
+    }
+    hal->hardware = board_hardware_new(hal->plan, hal->devices, error);
+    if (hal->hardware == NULL) {
+        return -1;
+    }
+    fcsl_run_use_board(hal->run, board_hardware_table(hal->hardware));
+    return 0;
 }
 
 int hal_linux_feeds(const fcsl_hal_t *hal, uint32_t channel)

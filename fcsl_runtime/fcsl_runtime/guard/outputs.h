@@ -5,8 +5,8 @@
 #ifndef GUARD_OUTPUTS_H
 #define GUARD_OUTPUTS_H
 
+#include "board/output_device.h"
 #include "board/output_map.h"
-#include "output_device.h"
 #include "output_plan.h"
 
 /* A value of the machine struct, and its place among the values of a device. */

@@ -4,7 +4,7 @@
  * The source is compiled in: it is part of fcsl-guard.
  */
 #define _POSIX_C_SOURCE 200809L
-#include "../guard/triple_buffer.c"
+#include "../board/triple_buffer.c"
 
 #include <pthread.h>
 #include <semaphore.h>

@@ -44,6 +44,17 @@ def _outputs(*elements: str, device: str = _ESC) -> str:
     return _devices(_MPU, f',\n  "esc": {device}') + f',\n"outputs": {{\n  "torque": {output}\n}}'
 
 
+#: The machine of the example board with an algorithm that calls a builtin of hardware.
+_WITH_LAMP = f"""\
+"algorithms": {{"Nav": {{"source": "nav.py"}}, "Control": {{"source": "control.py"}}, "Lamp": {{"source": "lamp.py"}}}},
+"instances": {{
+  "nav": {{"algorithm": "Nav"}},
+  "control": {{"algorithm": "Control", "parameters": {{"gain": 2.0}}}},
+  "lamp": {{"algorithm": "Lamp"}}
+}},
+"states": {{"COAST": {{"schedule": {{"nav": 100, "control": 50, "lamp": 10}}}}, "SAFE": {{"schedule": {{"nav": 10}}}}}},
+{EXAMPLE_CHANNELS}"""
+
 _MPU = '{"driver": "iio", "device": "mpu6500", "rate_hz": 100}'
 
 _PULSES = [f'{{"signal": "pulse{i}", "output": [1000, 2000], "safe_output": 1500}}' for i in range(3)]
@@ -190,7 +201,8 @@ BOARD_CODES: dict[str, Code] = {
     ),
     "E518": Code(
         "a device of the other direction",
-        "A driver reads a sensor or drives an actuator, never both. A device of an output has no `rate_hz`.",
+        "A driver reads a sensor or drives an actuator, never both. A device of an output has no `rate_hz`. fcsl-guard "
+        "drives those of `outputs`, and the flight program those of `hardware`: a device belongs to one of them.",
         Kind.BOARD,
         _outputs(*_PULSES, device='{"driver": "iio", "device": "pca9685", "rate_hz": 50}'),
         _outputs(*_PULSES),
@@ -210,6 +222,22 @@ BOARD_CODES: dict[str, Code] = {
         Kind.BOARD,
         _devices(_MPU) + ',\n"pace": {"device": "mpu", "timeout_s": 0.1}',
         _devices(_MPU.replace('"iio"', '"iio_buffer"')) + ',\n"pace": {"device": "mpu", "timeout_s": 0.1}',
+    ),
+    "E521": Code(
+        "a signal that the driver does not have",
+        "The signals of the drivers that come with FCSL are known; those of a library are looked for when the flight "
+        "program starts. `fcsl-hal describe DRIVER` lists them.",
+        Kind.BOARD,
+        _outputs(*_PULSES[:2], _PULSES[2].replace("pulse2", "pulse16")),
+        _outputs(*_PULSES),
+    ),
+    "E522": Code(
+        "registers that cannot be",
+        "A register has 4 bytes: addresses, offsets and sizes are multiples of 4. Addresses have 32 bits, and no two "
+        "windows have one in common.",
+        Kind.BOARD,
+        '"hardware": {"registers": {"0x1000": {"file": "/dev/uio0", "bytes": 6}}}',
+        '"hardware": {"registers": {"0x1000": {"file": "/dev/uio0", "bytes": 8}}}',
     ),
     "W501": Code(
         "a device that nothing uses",
@@ -261,5 +289,13 @@ BOARD_CODES: dict[str, Code] = {
         Kind.BOARD,
         '"outputs": {}',
         _outputs(*_PULSES),
+    ),
+    "W507": Code(
+        "a builtin that reaches nothing",
+        "An algorithm calls hw_read_gpio or another builtin of hardware, and the board has no `hardware` for it. It would "
+        "read false or 0, and what it writes would move nothing.",
+        Kind.CHANNELS,
+        _WITH_LAMP,
+        EXAMPLE_CHANNELS,
     ),
 }

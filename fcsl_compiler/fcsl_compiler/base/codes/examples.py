@@ -88,6 +88,16 @@ class Pilot:
         self.transition_request = self.on_done
 '''
 
+EXAMPLE_LAMP = '''\
+class Lamp:
+    """Is lit while the vehicle is armed."""
+
+    inputs = {"armed": "bool"}
+
+    def execute(self):
+        hw_write_gpio(4, self.armed)
+'''
+
 #: Members that the example machine has as the machine of the example board.
 EXAMPLE_CHANNELS = """\
 "channels": [

@@ -101,6 +101,8 @@ uint64_t fcsl_run_monotonic_ns(void *ctx);
 fcsl_hw_sim_t *fcsl_run_simulated_hardware(fcsl_run_t *run);
 /* Opens a board library (fcsl_hw.h), which fcsl_run_close closes. */
 int fcsl_run_open_board(fcsl_run_t *run, const char *library, fcsl_error_t *error);
+/* The caller's board, which must last until it is taken back with null: the simulated hardware has its place again then. */
+void fcsl_run_use_board(fcsl_run_t *run, const struct fcsl_hw *board);
 /* Whether a board has taken the place of the simulated hardware. */
 int fcsl_run_has_board(const fcsl_run_t *run);
 /* Reads and writes that the simulated hardware or the board refused. */

@@ -74,9 +74,15 @@ fcsl_hw_sim_t *fcsl_run_simulated_hardware(fcsl_run_t *run)
     return &run->simulated;
 }
 
+void fcsl_run_use_board(fcsl_run_t *run, const struct fcsl_hw *board)
+{
+    run->board = board;
+    run->hardware = board != NULL ? *board : fcsl_hw_simulated(&run->simulated);
+}
+
 int fcsl_run_has_board(const fcsl_run_t *run)
 {
-    return run->board_library != NULL;
+    return run->board != NULL;
 }
 
 uint64_t fcsl_run_hardware_failures(const fcsl_run_t *run)
@@ -94,8 +100,8 @@ static int find(void *library, const char *name, void *function, size_t size)
 
 int fcsl_run_open_board(fcsl_run_t *run, const char *library, fcsl_error_t *error)
 {
-    if (run->board_library != NULL) {
-        return fcsl_fail(error, "this run has a board already");
+    if (run->board != NULL) {
+        return fcsl_fail(error, "there is a board already: that of --hal linux:PLAN, whose plan has pins, converters or registers");
     }
     void *handle = fcsl_library_open(library, "board", error);
     if (handle == NULL) {
@@ -117,9 +123,8 @@ int fcsl_run_open_board(fcsl_run_t *run, const char *library, fcsl_error_t *erro
         return fcsl_fail(error, "board '%s': %s", library, reason[0] != '\0' ? reason : "it cannot be opened");
     }
     run->board_library = handle;
-    run->board = board;
     run->close_board = close;
-    run->hardware = *board;
+    fcsl_run_use_board(run, board);
     return 0;
 }
 
@@ -127,6 +132,7 @@ void fcsl_hardware_close(fcsl_run_t *run)
 {
     if (run->board_library != NULL) {
         run->close_board(run->board);
+        fcsl_run_use_board(run, NULL);
         (void)dlclose(run->board_library);
         run->board_library = NULL;
     }

@@ -54,8 +54,8 @@ struct fcsl_run {
     struct fcsl_hw hardware; /* what serves the machine: the simulated hardware or a board */
     struct fcsl_hw counted;  /* what the machine sees of it: failures are counted */
     uint64_t hardware_failures;
-    void *board_library; /* null: no board */
-    const struct fcsl_hw *board;
+    const struct fcsl_hw *board; /* null: none */
+    void *board_library; /* null: the board is the caller's */
     fcsl_board_close_fn *close_board;
 };
 

@@ -64,7 +64,7 @@ static fcsl_vars_status_t reach_hardware(fcsl_run_t *run, command_t *command)
 {
     if (fcsl_run_has_board(run)) {
         (void)snprintf(command->error.text, sizeof command->error.text,
-                       "the machine reaches the hardware of a board (--board), not simulated hardware");
+                       "the machine reaches the hardware of a board, not simulated hardware");
         return FCSL_VARS_REFUSED;
     }
     command->count = fcsl_run_hardware_failures(run);

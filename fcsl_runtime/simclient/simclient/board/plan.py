@@ -87,6 +87,36 @@ class Output:
     pulses: list[Pulse] = field(default_factory=list)
 
 
+@dataclass(frozen=True)
+class Pin:
+    """`safe`: the level of an output before the first tick and after the last one; None: an input."""
+
+    number: int
+    device: str
+    signal: str
+    safe: bool | None
+
+
+@dataclass(frozen=True)
+class Converter:
+    """An input of an analog-digital converter."""
+
+    number: int
+    device: str
+    signal: str
+
+
+@dataclass(frozen=True)
+class Registers:
+    """`bytes` of a file from `offset` on, which have the addresses from `address` on."""
+
+    address: int
+    bytes: int
+    offset: int
+    write: bool
+    file: str
+
+
 @dataclass
 class Plan:
     """`pace`: the device whose samples are the ticks; "" without one. `undriven`: actuator channels without an output."""
@@ -99,6 +129,9 @@ class Plan:
     sensors: list[Sensor] = field(default_factory=list)
     outputs: list[Output] = field(default_factory=list)
     undriven: list[str] = field(default_factory=list)
+    pins: list[Pin] = field(default_factory=list)
+    converters: list[Converter] = field(default_factory=list)
+    registers: list[Registers] = field(default_factory=list)
 
 
 def read_plan(path: str | Path) -> Plan:
@@ -146,6 +179,15 @@ def _take(plan: Plan, words: Sequence[str]) -> None:
             plan.outputs[-1].pulses.append(Pulse(int(index), signal, *map(_double, bits)))
         case [keyword, *rest] if keyword in ("health", "limits", "tolerance", "bind"):
             _take_of_sensor(plan.sensors[-1], keyword, rest)
+        case ["gpio_in", number, device, signal]:
+            plan.pins.append(Pin(int(number), device, signal, None))
+        case ["gpio_out", number, device, signal, safe]:
+            plan.pins.append(Pin(int(number), device, signal, safe == "1"))
+        case ["adc", number, device, signal]:
+            plan.converters.append(Converter(int(number), device, signal))
+        case ["registers", address, size, offset, access, *file]:
+            write = access == "read_write"
+            plan.registers.append(Registers(int(address), int(size), int(offset), write, " ".join(file)))
         case ["backend", device]:
             plan.sensors[-1].backends.append(Backend(device))
         case [keyword, *rest] if keyword in ("signal", "correct", "stick", "section"):

@@ -54,6 +54,8 @@ def plan_lines(plan: Plan) -> list[str]:
         lines += ["", f"sensor {sensor.name} ({sensor.kind})", *(f"  {line}" for line in _sensor_lines(plan, sensor))]
     for output in plan.outputs:
         lines += ["", f"output {output.channel} → {output.device}", *(f"  {line}" for line in _output_lines(output))]
+    hardware = _hardware_lines(plan)
+    lines += ["", "hardware", *(f"  {line}" for line in hardware)] if hardware else []
     if plan.undriven:
         lines += ["", f"nothing drives {', '.join(plan.undriven)}"]
     return lines
@@ -66,7 +68,10 @@ def _indented(text: str) -> list[str]:
 def _device_row(plan: Plan, name: str) -> tuple[str, ...]:
     device = plan.devices[name]
     used = [s.name for s in plan.sensors if any(b.device == name for b in s.backends)]
+    used += [f"adc {c.number}" for c in plan.converters if c.device == name]
+    used += [f"gpio {p.number}" for p in plan.pins if p.device == name and p.safe is None]
     driven = [o.channel for o in plan.outputs if o.device == name]
+    driven += [f"gpio {p.number}" for p in plan.pins if p.device == name and p.safe is not None]
     if driven:
         pace = "actuator"
     elif device.period_ns == 0:
@@ -74,6 +79,22 @@ def _device_row(plan: Plan, name: str) -> tuple[str, ...]:
     else:
         pace = f"{_NS_PER_S / device.period_ns:.6g} Hz"
     return (name, device.driver, device.address, pace, ", ".join([*used, *driven]) or "not used")
+
+
+def _hardware_lines(plan: Plan) -> list[str]:
+    lines = []
+    for pin in plan.pins:
+        if pin.safe is None:
+            lines.append(f"hw_read_gpio({pin.number}): {pin.signal} of {pin.device}")
+        else:
+            safe = f"{'on' if pin.safe else 'off'} at the start and at the end"
+            lines.append(f"hw_write_gpio({pin.number}): {pin.signal} of {pin.device}, {safe}")
+    lines += [f"hw_read_adc({c.number}): {c.signal} of {c.device}" for c in plan.converters]
+    for r in plan.registers:
+        calls = "hw_read_u32 and hw_write_u32" if r.write else "hw_read_u32"
+        where = f"{r.file}, from byte {r.offset} on" if r.offset else r.file
+        lines.append(f"{calls} from {r.address:#x} to {r.address + r.bytes - 4:#x}: {where}")
+    return lines
 
 
 # ---- sensors ---------------------------------------------------------------------------------------------------------

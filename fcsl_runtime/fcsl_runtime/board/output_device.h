@@ -2,8 +2,8 @@
  *
  * The device of outputs and its thread, which writes what the loop hands over. The loop never waits for it.
  */
-#ifndef GUARD_OUTPUT_DEVICE_H
-#define GUARD_OUTPUT_DEVICE_H
+#ifndef BOARD_OUTPUT_DEVICE_H
+#define BOARD_OUTPUT_DEVICE_H
 
 #include "fcsl/fcsl_driver.h"
 #include "fcsl/fcsl_run.h"
@@ -47,4 +47,4 @@ void output_device_end(output_device_t *device);
  * memory. */
 void output_device_free(output_device_t *device, uint64_t until_ns);
 
-#endif /* GUARD_OUTPUT_DEVICE_H */
+#endif /* BOARD_OUTPUT_DEVICE_H */

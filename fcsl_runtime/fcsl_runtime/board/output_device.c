@@ -14,7 +14,7 @@
 #include <string.h>
 
 #include "base/error.h"
-#include "board/device_thread.h"
+#include "device_thread.h"
 #include "fcsl/fcsl_library.h"
 #include "fcsl/fcsl_scalar.h"
 #include "triple_buffer.h"

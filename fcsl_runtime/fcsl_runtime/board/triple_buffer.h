@@ -3,8 +3,8 @@
  * The newest values from one thread to another. Neither waits for the other: each has a slot of its own, and both exchange theirs for
  * the third one.
  */
-#ifndef GUARD_TRIPLE_BUFFER_H
-#define GUARD_TRIPLE_BUFFER_H
+#ifndef BOARD_TRIPLE_BUFFER_H
+#define BOARD_TRIPLE_BUFFER_H
 
 #include <stdatomic.h>
 #include <stddef.h>
@@ -37,4 +37,4 @@ uint64_t triple_buffer_take(triple_buffer_t *buffer);
 /* From the reader's thread: the values that were taken last. */
 const void *triple_buffer_front(const triple_buffer_t *buffer);
 
-#endif /* GUARD_TRIPLE_BUFFER_H */
+#endif /* BOARD_TRIPLE_BUFFER_H */

@@ -1,0 +1,27 @@
+/* SPDX-License-Identifier: Apache-2.0
+ *
+ * What the hw_* builtins of algorithms reach on a board: pins and converters of devices, and registers. Nothing here waits for a device:
+ * a read gives what its thread read last, a write is handed to its thread.
+ */
+#ifndef BOARD_BOARD_HARDWARE_H
+#define BOARD_BOARD_HARDWARE_H
+
+#include "board_devices.h"
+#include "fcsl/fcsl_hw.h"
+
+typedef struct board_hardware board_hardware_t;
+
+/* Finds drivers and signals; opens nothing. `plan` and `inputs` must outlive it. Null with `error`. */
+board_hardware_t *board_hardware_new(const board_plan_t *plan, board_devices_t *inputs, fcsl_error_t *error);
+/* Opens the devices of outputs, which get their safe levels, and maps registers. 0, or -1. */
+int board_hardware_start(board_hardware_t *hardware, fcsl_error_t *error);
+/* For the step thread. Lasts as long as the hardware. */
+const struct fcsl_hw *board_hardware_table(const board_hardware_t *hardware);
+/* Whether it drives the device of the plan, and its counts then. */
+int board_hardware_counts(const board_hardware_t *hardware, uint32_t device, device_counts_t *counts);
+/* Of any output, since the last call: a text for people, or null. */
+const char *board_hardware_news(board_hardware_t *hardware);
+/* Makes the outputs safe, and closes all. A device that hangs is left alone after 1 s. */
+void board_hardware_free(board_hardware_t *hardware);
+
+#endif /* BOARD_BOARD_HARDWARE_H */
