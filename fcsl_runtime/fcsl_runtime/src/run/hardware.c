@@ -101,7 +101,8 @@ static int find(void *library, const char *name, void *function, size_t size)
 int fcsl_run_open_board(fcsl_run_t *run, const char *library, fcsl_error_t *error)
 {
     if (run->board != NULL) {
-        return fcsl_fail(error, "there is a board already: that of --hal linux:PLAN, whose plan has pins, converters or registers");
+        return fcsl_fail(
+            error, "there is a board already: that of --hal linux:PLAN, whose plan has pins, converters or registers");
     }
     void *handle = fcsl_library_open(library, "board", error);
     if (handle == NULL) {
