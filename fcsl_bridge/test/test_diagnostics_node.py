@@ -23,13 +23,22 @@ LIBRARY = package_prefix("lander") / "lib/lander/liblander_machines.so"
 DEVICES = ("top", "bottom")
 BOARD = {
     "machine": str(ROOT / "examples/lander/fc/lander_control.json"),
-    "devices": {name: {"driver": "iio", "device": f"lidar-{name}", "rate_hz": 200} for name in DEVICES},
+    "devices": {
+        **{name: {"driver": "iio", "device": f"lidar-{name}", "rate_hz": 200} for name in DEVICES},
+        "valve": {"driver": "log", "device": "valve.log"},  # fcsl-guard's, so it has no status
+    },
     "sensors": {
         "altimeter": {
             "kind": "range_finder",
             "channels": {"distance": "altitude"},
             "backends": [{"device": name} for name in DEVICES],
             "health": {"max_age_s": 0.5, "recover_s": 0.2},
+        }
+    },
+    "outputs": {
+        "throttle": {
+            "device": "valve",
+            "elements": [{"signal": "number", "command": [0, 1], "output": [1000, 2000]}],
         }
     },
 }
