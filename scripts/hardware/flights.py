@@ -10,6 +10,7 @@ from pathlib import Path
 
 from .flight.craft import Craft
 from .flight.inertial import BOTTOM, TOP, try_buffer, try_inertial
+from .flight.lines import try_lines, try_valves
 from .flight.others import try_can, try_rc, try_slow
 from .flight.outputs import try_commands, try_guard_end, try_guard_kill, try_kill, try_pwm_unplug, try_stop
 from .flight.whole import try_whole
@@ -20,7 +21,7 @@ from .trials import run_trials
 
 _TRIALS: tuple[Callable[[I2cBus, Craft], str], ...] = (
     try_inertial, try_buffer, try_slow, try_rc, try_can,
-    try_commands, try_kill, try_stop, try_guard_end, try_guard_kill, try_pwm_unplug, try_whole,
+    try_commands, try_kill, try_stop, try_guard_end, try_guard_kill, try_pwm_unplug, try_lines, try_valves, try_whole,
 )  # fmt: skip
 
 

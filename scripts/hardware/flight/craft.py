@@ -9,7 +9,7 @@ from dataclasses import dataclass
 from pathlib import Path
 
 _SOURCES = Path(__file__).resolve().parents[1] / "craft"
-_MACHINES = ("craft", "listener")
+_MACHINES = ("craft", "listener", "panel")
 
 
 @dataclass(frozen=True)

@@ -17,9 +17,10 @@ from .process import Flight, Guard, after, in_ms, until
 
 #: command_timeout_s of the craft and the period of the guard: T and P of docs/guard.md.
 _TIMEOUT_S, _PERIOD_S = 0.1, 0.002
+SAFE_AFTER_S = _TIMEOUT_S + _PERIOD_S
 #: For a guest that has one processor, of a computer that has other work.
 _MARGIN_S = 0.25
-_REPETITIONS = 20
+REPETITIONS = 20
 _STEP_US = 6.0  # of the chip, and its period, which is not quite 20 ms
 _SAFE = (0.0, 1520.0)
 _COMMAND = {"throttle": 0.25, "steer": 0.5}
@@ -92,27 +93,27 @@ def try_kill(bus: I2cBus, craft: Craft) -> str:
     """kill -9 of the flight program."""
     servos, times = plug(bus), []
     with Guard(craft, craft.plan("outputs")) as guard:
-        for _ in range(_REPETITIONS):
+        for _ in range(REPETITIONS):
             with arm(craft, guard, servos) as flight:
                 times.append(after(flight.process.kill, partial(servos.until, _SAFE)))
-    return describe(times, _TIMEOUT_S + _PERIOD_S)
+    return describe(times, SAFE_AFTER_S)
 
 
 def try_stop(bus: I2cBus, craft: Craft) -> str:
     """SIGSTOP of the flight program; it goes on after SIGCONT."""
     servos, times = plug(bus), []
     with Guard(craft, craft.plan("outputs")) as guard, arm(craft, guard, servos) as flight:
-        for _ in range(_REPETITIONS):
+        for _ in range(REPETITIONS):
             times.append(after(partial(flight.send, signal.SIGSTOP), partial(servos.until, _SAFE)))
             flight.send(signal.SIGCONT)
             servos.until(_COMMANDED)
-    return describe(times, _TIMEOUT_S + _PERIOD_S)
+    return describe(times, SAFE_AFTER_S)
 
 
 def try_guard_end(bus: I2cBus, craft: Craft) -> str:
     """SIGTERM of the guard."""
     servos, times = plug(bus), []
-    for _ in range(_REPETITIONS):
+    for _ in range(REPETITIONS):
         with Guard(craft, craft.plan("outputs")) as guard, arm(craft, guard, servos):
             times.append(after(partial(guard.send, signal.SIGTERM), partial(servos.until, _SAFE)))
             if guard.process.wait() != 0 or not servos.are(_SAFE):
