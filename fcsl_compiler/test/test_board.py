@@ -28,7 +28,16 @@ from fcsl_test_boards import (
 from fcsl_compiler.board.board import check_board
 from fcsl_compiler.board.drivers import ACTUATORS, BUFFERED, POLLED, WAITING
 from fcsl_compiler.board.kinds import KINDS, MAX_BACKENDS, MAX_SECTIONS, STICKS
-from fcsl_compiler.board.limits import MAX_DEVICES, MAX_OUTPUTS, MAX_PLAN_NAME, MAX_PULSES, MAX_SENSORS
+from fcsl_compiler.board.limits import (
+    MAX_CONVERTERS,
+    MAX_DEVICES,
+    MAX_OUTPUTS,
+    MAX_PINS,
+    MAX_PLAN_NAME,
+    MAX_PULSES,
+    MAX_REGISTERS,
+    MAX_SENSORS,
+)
 from fcsl_compiler.board.plan import plan_text
 from fcsl_compiler.cli.main import main
 
@@ -151,6 +160,9 @@ def test_drivers_are_those_that_come_with_fcsl() -> None:
                 "BOARD_OUTPUTS_MAX": MAX_OUTPUTS,
                 "BOARD_PULSES_MAX": MAX_PULSES,
                 "BOARD_NAME_BYTES": MAX_PLAN_NAME + 1,
+                "BOARD_PINS_MAX": MAX_PINS,
+                "BOARD_CONVERTERS_MAX": MAX_CONVERTERS,
+                "BOARD_REGISTERS_MAX": MAX_REGISTERS,
             },
         ),
     ],

@@ -62,7 +62,7 @@ typedef struct {
      * a sample at each call, and the host calls it at the rate that the user gave. */
     uint8_t waits;
 
-    /* Whether the device of this name is there; opens and changes nothing. `device` is the text that the user gave, "" for none. */
+    /* Whether the device of this name is there; takes nothing into use and changes nothing. `device` is the text that the user gave, "" for none. */
     fcsl_driver_status_t (*probe)(const char *device, char *why, size_t size);
     /* Opens it. `self` is zeroed. `used` has one fcsl_driver_use_t per signal; leave those of the device alone that are not
      * used. An actuator keeps doing what it does until the first write. `device` lasts until close. After

@@ -12,6 +12,9 @@ from pathlib import Path
 import pytest
 from hal_rig import Iio, run, write_plan
 
+from fcsl_compiler.board.drivers import DRIVERS
+from simclient.hal.driver import any_driver
+
 
 def write(folder: Path, **attributes: str) -> None:
     folder.mkdir(parents=True, exist_ok=True)
@@ -45,7 +48,8 @@ def sysfs(tmp_path: Path) -> Path:
     write(root / "class/tty/tty1")
     write(root / "class/net/can0", type="280")
     write(root / "class/net/eth0", type="1")
-    write(root / "bus/gpio/devices/gpiochip0", label="pinctrl")
+    (root / "bus/gpio/devices/gpiochip0").mkdir(parents=True)
+    write(root / "bus/iio/devices/iio:device3", name="ads1015", in_voltage2_raw="7")
     return root
 
 
@@ -74,12 +78,12 @@ def test_each_kind_of_device_and_the_text_for_the_board(sysfs: Path) -> None:
         "input device Power Button": [],
         "serial port ttyUSB0": [(name, f"{sysfs}/dev/ttyUSB0") for name in ("sbus", "crsf", "ubx", "nmea")],
         "CAN interface can0": [("can", "can0:1A0/16:12@1-*0.1")],
-        "GPIO chip pinctrl": [],
+        "IIO device ads1015": [("iio", "ads1015"), ("adc", "ads1015")],
+        "GPIO chip gpiochip0": [("gpio", "gpiochip0"), ("gpio_out", "gpiochip0")],
     }
     assert found["IIO device icm42688"]["measures"] == ["gyro", "accel"]
     assert found["power supply BAT0 (Battery)"]["measures"] == ["voltage", "charge"]
     assert found["input device RadioMaster TX16S"]["measures"] == ["sticks (8 axes)"]
-    assert found["GPIO chip pinctrl"]["why"] == "FCSL has no driver for GPIO lines"
 
 
 def test_drivers_say_whether_they_would_take_it(sysfs: Path) -> None:
@@ -110,7 +114,7 @@ def test_the_table(sysfs: Path) -> None:
     lines = run(sysfs, "list").stdout.splitlines()
     assert lines[0].split() == ["kind", "name", "driver", '"device"', "in", "board.json", "measures"]
     assert any("sbus or crsf or ubx or nmea" in line and "No such file" in line for line in lines)
-    assert any(line.startswith("GPIO chip") and "no driver" in line for line in lines)
+    assert any(line.startswith("GPIO chip") and "gpio or gpio_out" in line for line in lines)
 
 
 def test_a_computer_without_devices(tmp_path: Path) -> None:
@@ -188,6 +192,30 @@ def test_describe_a_plan(tmp_path: Path) -> None:
         assert line in text.splitlines(), text
     told = json.loads(run(tmp_path, "describe", plan, "--json").stdout)
     assert [sensor["name"] for sensor in told["sensors"]] == ["inertial", "compass", "rc"]
+
+
+def test_describe_hardware(tmp_path: Path) -> None:
+    plan = tmp_path / "panel.plan"
+    lines = ["machine panel 100", "device buttons 5000000 gpio chip,pull_up", "device lamps 0 gpio_out chip"]
+    lines += ["device cells 20000000 adc ads1015", "gpio_in 4 buttons line22", "gpio_out 17 lamps line17 0"]
+    lines += ["gpio_out 18 lamps line18 1", "adc 0 cells counts2", "registers 4096 8 16 read_write /dev/my uio"]
+    plan.write_text("\n".join(["fcsl-board-plan 1", *lines, "registers 64 4 0 read /dev/uio1", "end", ""]))
+    text = run(tmp_path, "describe", plan).stdout.splitlines()
+    assert text[text.index("hardware") + 1 :] == [
+        "  hw_read_gpio(4): line22 of buttons",
+        "  hw_write_gpio(17): line17 of lamps, off at the start and at the end",
+        "  hw_write_gpio(18): line18 of lamps, on at the start and at the end",
+        "  hw_read_adc(0): counts2 of cells",
+        "  hw_read_u32 and hw_write_u32 from 0x1000 to 0x1004: /dev/my uio, from byte 16 on",
+        "  hw_read_u32 from 0x40 to 0x40: /dev/uio1",
+    ]
+    assert [line.split()[-4:] for line in text if line.split()[:1] == ["lamps"]] == [["gpio", "17,", "gpio", "18"]]
+    told = json.loads(run(tmp_path, "describe", plan, "--json").stdout)
+    assert [pin["safe"] for pin in told["pins"]] == [None, False, True]
+
+
+def test_signals_of_drivers_are_those_that_the_compiler_knows() -> None:
+    assert {name: tuple(s.name for s in any_driver(name).signals) for name in DRIVERS} == DRIVERS
 
 
 def test_describe_what_paces_and_what_is_not_driven(tmp_path: Path) -> None:

@@ -7,6 +7,7 @@ import struct
 from collections.abc import Callable
 
 from .found import Candidate, Found, first_unique
+from .found_gpio import find_gpio
 from .found_iio import find_iio
 from .sysfs import attribute, dev_root, folders, link_name, names_in
 
@@ -116,17 +117,6 @@ def _can_interfaces() -> list[Found]:
     return found
 
 
-def _gpio_chips() -> list[Found]:
-    found = []
-    for path in folders("bus/gpio/devices", "gpiochip"):
-        found.append(
-            Found(
-                "GPIO chip", attribute(path, "label") or path.name, str(path), why="FCSL has no driver for GPIO lines"
-            )
-        )
-    return found
-
-
 _CLASSES: tuple[Callable[[], list[Found]], ...] = (
     find_iio,
     _pwm,
@@ -135,10 +125,10 @@ _CLASSES: tuple[Callable[[], list[Found]], ...] = (
     _input_devices,
     _serial_ports,
     _can_interfaces,
-    _gpio_chips,
+    find_gpio,
 )
 
 
 def find_devices() -> list[Found]:
-    """All that sysfs shows. Nothing is opened or changed."""
+    """All that sysfs shows. Nothing is taken into use or changed."""
     return [found for of_class in _CLASSES for found in of_class()]

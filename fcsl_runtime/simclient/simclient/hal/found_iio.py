@@ -24,6 +24,8 @@ _IIO_SIGNALS = {
 _PLACE = re.compile(r"\d+-[0-9a-f]{4}|spi\d+\.\d+")
 _POLLED_ENDS, _BUFFERED_ENDS = ("_raw", "_input"), ("_index",)
 _DEFAULT_RATE = "100"
+#: What the driver adc reads.
+_COUNTS = re.compile(r"in_voltage(\d|1[0-5])_raw")
 
 
 def _iio_signals(folder: Path, ends: tuple[str, ...]) -> list[str]:
@@ -59,6 +61,8 @@ def find_iio() -> list[Found]:
         device = first_unique(names[path], names.values())
         polled, buffered = _iio_signals(path, _POLLED_ENDS), _iio_signals(path / "scan_elements", _BUFFERED_ENDS)
         candidates = [Candidate("iio", device)] if polled else []
+        if any(_COUNTS.fullmatch(name) for name in names_in(path)):
+            candidates.append(Candidate("adc", device))
         if buffered:
             candidates.append(Candidate("iio_buffer", f"{device}@{_iio_rate(path)}"))
         measures = list(dict.fromkeys([*polled, *buffered]))
