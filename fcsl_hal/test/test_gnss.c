@@ -162,6 +162,25 @@ static void check_signs_and_order(void)
     CHECK(fix.kind == GNSS_NO_FIX && !fix.has_utc && isnan(fix.latitude_deg) && nmea.refused == 0);
 }
 
+/* A count that a receiver cannot have counts for nothing; the sentence does. */
+static void check_satellites(void)
+{
+    static const struct {
+        const char *text;
+        uint32_t satellites;
+    } CASES[] = {{"00", 0}, {"7", 7}, {"255", 255}, {"256", 0}, {"999999999999999", 0}, {"-4", 0}, {"4.9", 4}, {"", 0}};
+    for (size_t i = 0; i < sizeof CASES / sizeof CASES[0]; i++) {
+        gnss_nmea_t nmea = {0};
+        gnss_fix_t fix;
+        char line[LINE_BYTES];
+        const int length =
+            snprintf(line, sizeof line, "GPGGA,123519,4807.038,N,01131.000,E,1,%s,0.9,5.4,M,46.9,M,,", CASES[i].text);
+        CHECK(length > 0 && length < LINE_BYTES);
+        CHECK(feed_nmea(&nmea, "GPRMC,123519,A,4807.038,N,01131.000,E,022.4,084.4,230394,003.1,W", &fix) == 0);
+        CHECK(feed_nmea(&nmea, line, &fix) == 1 && fix.kind == GNSS_3D && fix.satellites == CASES[i].satellites);
+    }
+}
+
 static void check_refused(void)
 {
     static const char *const LINES[] = {
@@ -232,6 +251,7 @@ int main(void)
     check_damaged_ubx();
     check_published_nmea();
     check_signs_and_order();
+    check_satellites();
     check_refused();
     check_garbage();
     check_calendar();

@@ -112,6 +112,7 @@ CHECKS = (
         *("--fuzz", scaled("500", "5000"), "--fuzz-seed", "2"),
     ),
     script("EVA: no run-time error in the codec, any bytes, with seeded defects", "codec"),
+    script("EVA: no run-time error in parsers of receivers, any stream, with seeded defects", "receivers"),
     script("link layer: every state of two small ends, with seeded defects", "link"),
     script("processor in the loop: the lander's controller on a Cortex-M7", "pil"),
     Check(

@@ -13,12 +13,14 @@ enum { BYTE_STREAM_MAX = 1024 }; /* bytes of the longest frame */
  * -1 when it is none. */
 typedef int32_t (*byte_stream_judge_t)(const uint8_t *bytes, uint32_t size);
 
+/* The bytes are last, and a stream is the last member of what holds it: what is read or written behind them lies outside of the
+ * object, where EVA and the sanitizers see it. */
 typedef struct {
-    uint8_t bytes[BYTE_STREAM_MAX];
-    uint32_t size;
+    uint32_t size; /* of what came, and was not dropped */
     uint32_t taken; /* of them, the frame that was returned last */
     uint64_t frames;
     uint64_t garbage; /* bytes that belong to no frame */
+    uint8_t bytes[BYTE_STREAM_MAX];
 } byte_stream_t;
 
 /* Takes the next byte. Returns the length of a frame that is complete now, which stays in `bytes` until the next call, or 0. Where a

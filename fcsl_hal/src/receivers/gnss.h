@@ -40,8 +40,8 @@ int64_t gnss_utc_ns(int year, int month, int day, int64_t ns_of_day);
 
 /* UBX, of which NAV-PVT is read. */
 typedef struct {
-    byte_stream_t stream;
     uint64_t others; /* messages of other kinds */
+    byte_stream_t stream;
 } gnss_ubx_t;
 
 /* Takes a byte. Returns 1 with *fix when it completes a NAV-PVT, else 0. */
@@ -49,12 +49,12 @@ int gnss_ubx_take(gnss_ubx_t *ubx, uint8_t byte, gnss_fix_t *fix);
 
 /* NMEA 0183, of which GGA and RMC of any talker are read. A solution has both, of the same time. */
 typedef struct {
-    byte_stream_t stream;
     uint64_t others; /* sentences of other kinds */
     uint64_t refused; /* GGA and RMC with a field that cannot be, or without a time */
     gnss_fix_t fix; /* of what came of it so far */
     int64_t ns_of_day;
     uint32_t seen;
+    byte_stream_t stream;
 } gnss_nmea_t;
 
 /* Takes a byte. Returns 1 with *fix when a solution is complete, else 0. */

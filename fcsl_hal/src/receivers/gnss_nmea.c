@@ -32,10 +32,12 @@ static int hex_of(uint8_t digit)
     return letter >= 0 && letter < 6 ? letter + 10 : -1;
 }
 
-/* The place of the line feed that ends it; `size` where it has not come, and -1 where something is no text. */
+/* The place of the line feed that ends it; `size` where it is not among the first SENTENCE_MAX bytes, and -1 where something is no
+ * text. */
 static int32_t end_of(const uint8_t *bytes, uint32_t size)
 {
-    for (uint32_t i = 1; i < size; i++) {
+    //@ loop unroll SENTENCE_MAX;
+    for (uint32_t i = 1; i < size && i < SENTENCE_MAX; i++) {
         if (bytes[i] == '\n') {
             return (int32_t)i;
         }
@@ -60,7 +62,8 @@ static int32_t judge(const uint8_t *bytes, uint32_t size)
         return -1;
     }
     int sum = 0;
-    for (uint32_t i = 1; i < length - TAIL; i++) {
+    //@ loop unroll SENTENCE_MAX;
+    for (uint32_t i = 1; i + TAIL < length; i++) {
         sum ^= bytes[i];
     }
     const int high = hex_of(bytes[length - 4u]);
@@ -83,8 +86,11 @@ typedef struct {
 static sentence_t split(const uint8_t *bytes, uint32_t size)
 {
     sentence_t sentence = {.count = 1};
-    sentence.fields[0].text = (const char *)bytes + 1;
-    for (uint32_t i = 1; i < size - TAIL; i++) {
+    for (uint32_t i = 0; i < FIELDS_MAX; i++) { /* a field that does not come is empty */
+        sentence.fields[i].text = (const char *)bytes + 1;
+    }
+    //@ loop unroll SENTENCE_MAX;
+    for (uint32_t i = 1; i + TAIL < size; i++) {
         if (bytes[i] != ',') {
             sentence.fields[sentence.count - 1u].size++;
         } else if (sentence.count < FIELDS_MAX) {
@@ -109,6 +115,7 @@ static int read_decimal(field_t field, decimal_t *decimal)
     const int negative = field.size > 0u && field.text[0] == '-';
     uint32_t digits = 0;
     int point = 0;
+    //@ loop unroll SENTENCE_MAX;
     for (uint32_t i = negative ? 1u : 0u; i < field.size; i++) {
         const char c = field.text[i];
         if (c == '.' && !point) {
@@ -123,6 +130,16 @@ static int read_decimal(field_t field, decimal_t *decimal)
     }
     decimal->whole = negative ? -decimal->whole : decimal->whole;
     return field.size == 0u ? 0 : digits > 0u ? 1 : -1;
+}
+
+/* The whole part of a number; 0 for one that is negative or above 255, and for an empty field. Returns 0, or -1. */
+static int read_count(field_t field, uint32_t *count)
+{
+    decimal_t decimal;
+    const int found = read_decimal(field, &decimal);
+    const int64_t whole = decimal.whole / decimal.scale;
+    *count = whole >= 0 && whole <= 255 ? (uint32_t)whole : 0u;
+    return found < 0 ? -1 : 0;
 }
 
 /* Returns 0 with the number, NaN for an empty field, or -1. */
@@ -161,12 +178,11 @@ static int read_angle(field_t field, field_t side, const char *marks, int64_t de
 static int read_triple(field_t field, int triple[3])
 {
     for (uint32_t i = 0; i < 6u; i++) {
-        if (i >= field.size || field.text[i] < '0' || field.text[i] > '9') {
+        const int digit = i < field.size ? field.text[i] - '0' : -1;
+        if (digit < 0 || digit > 9) {
             return -1;
         }
-    }
-    for (uint32_t i = 0; i < 3u; i++) {
-        triple[i] = (field.text[2u * i] - '0') * 10 + (field.text[2u * i + 1u] - '0');
+        triple[i / 2u] = i % 2u == 0u ? digit * 10 : triple[i / 2u] + digit;
     }
     return 0;
 }
@@ -191,17 +207,15 @@ static int read_time(field_t field, int64_t *ns_of_day)
 static int read_gga(const sentence_t *s, gnss_fix_t *fix)
 {
     double quality = 0.0;
-    double satellites = 0.0;
     double dilution = 0.0;
     double separation = 0.0;
     if (s->count < 12u || read_angle(s->fields[2], s->fields[3], "NS", 90, &fix->latitude_deg) != 0 ||
         read_angle(s->fields[4], s->fields[5], "EW", 180, &fix->longitude_deg) != 0 ||
-        read_number(s->fields[6], &quality) != 0 || read_number(s->fields[7], &satellites) != 0 ||
+        read_number(s->fields[6], &quality) != 0 || read_count(s->fields[7], &fix->satellites) != 0 ||
         read_number(s->fields[8], &dilution) != 0 || read_number(s->fields[9], &fix->altitude_m) != 0 ||
         read_number(s->fields[11], &separation) != 0) {
         return -1;
     }
-    fix->satellites = satellites >= 0.0 && satellites < 256.0 ? (uint32_t)satellites : 0u;
     fix->dilution = (float)dilution;
     fix->height_m = fix->altitude_m + separation;
     const int is_there = quality > 0.0 && isfinite(fix->latitude_deg) && isfinite(fix->longitude_deg);

@@ -57,6 +57,7 @@ static int32_t judge(const uint8_t *bytes, uint32_t size)
     }
     uint32_t a = 0;
     uint32_t b = 0;
+    //@ loop unroll BYTE_STREAM_MAX;
     for (uint32_t i = 2; i < length - 2u; i++) {
         a = (a + bytes[i]) & 0xFFu;
         b = (b + a) & 0xFFu;
@@ -74,24 +75,27 @@ static gnss_fix_kind_t kind_of(const uint8_t *pvt)
     return type == 2u ? GNSS_2D : type == 3u || type == 4u ? GNSS_3D : GNSS_NO_FIX;
 }
 
-/* The receiver says that it knows date and time, and they can be. */
-static int has_utc(const uint8_t *pvt)
+/* Date and time, where the receiver says that it knows them, and they can be. */
+static void read_utc(const uint8_t *pvt, gnss_fix_t *fix)
 {
     const uint32_t year = u16(pvt + 4);
-    return (pvt[11] & VALID_DATE_TIME) == VALID_DATE_TIME && year >= YEAR_MIN && year <= YEAR_MAX && pvt[6] >= 1u &&
-           pvt[6] <= 12u && pvt[7] >= 1u && pvt[7] <= 31u;
+    const int month = pvt[6];
+    const int day = pvt[7];
+    if ((pvt[11] & VALID_DATE_TIME) != VALID_DATE_TIME || year < YEAR_MIN || year > YEAR_MAX || month < 1 ||
+        month > 12 || day < 1 || day > 31) {
+        return;
+    }
+    const int64_t seconds = pvt[8] * 3600 + pvt[9] * 60 + pvt[10];
+    fix->has_utc = 1;
+    fix->utc_ns = gnss_utc_ns((int)year, month, day, seconds * 1000000000 + i32(pvt + 16));
 }
 
 static gnss_fix_t read_pvt(const uint8_t *pvt)
 {
     gnss_fix_t fix = gnss_no_fix();
-    const int64_t seconds = pvt[8] * 3600 + pvt[9] * 60 + pvt[10];
     fix.kind = kind_of(pvt);
     fix.satellites = pvt[23];
-    fix.has_utc = has_utc(pvt);
-    if (fix.has_utc) {
-        fix.utc_ns = gnss_utc_ns((int)u16(pvt + 4), pvt[6], pvt[7], seconds * 1000000000 + i32(pvt + 16));
-    }
+    read_utc(pvt, &fix);
     fix.longitude_deg = i32(pvt + 24) / 1e7;
     fix.latitude_deg = i32(pvt + 28) / 1e7;
     fix.height_m = i32(pvt + 32) / 1e3;

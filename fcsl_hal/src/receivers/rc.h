@@ -27,8 +27,8 @@ typedef struct {
 /* Futaba's SBUS: 100000 baud, 8 data bits, even parity, 2 stop bits, inverted. 16 channels and two switches, which are channels 17 and 18
  * with 1000 or 2000 us. */
 typedef struct {
-    byte_stream_t stream;
     uint64_t last_ns;
+    byte_stream_t stream;
 } rc_sbus_t;
 
 /* Takes a byte that came at `time_ns`. Returns 1 with *frame when it completes a frame, else 0. After a pause of 2 ms, which there is
@@ -37,8 +37,8 @@ int rc_sbus_take(rc_sbus_t *sbus, uint8_t byte, uint64_t time_ns, rc_frame_t *fr
 
 /* TBS's Crossfire, and ExpressLRS: 420000 baud, 8N1, 16 channels. It has no failsafe: a receiver that hears nothing is silent. */
 typedef struct {
-    byte_stream_t stream;
     uint64_t others; /* frames of other types */
+    byte_stream_t stream;
 } rc_crsf_t;
 
 typedef enum { RC_CRSF_NOTHING, RC_CRSF_CHANNELS, RC_CRSF_LINK } rc_crsf_kind_t;

@@ -25,6 +25,7 @@ static int is_address(uint8_t byte)
 static uint8_t crc_of(const uint8_t *bytes, uint32_t size)
 {
     uint32_t crc = 0;
+    //@ loop unroll LENGTH_MAX;
     for (uint32_t i = 0; i < size; i++) {
         crc ^= bytes[i];
         for (int bit = 0; bit < 8; bit++) {
@@ -37,14 +38,21 @@ static uint8_t crc_of(const uint8_t *bytes, uint32_t size)
 
 static int32_t judge(const uint8_t *bytes, uint32_t size)
 {
-    if (!is_address(bytes[0]) || (size > LENGTH && (bytes[LENGTH] < LENGTH_MIN || bytes[LENGTH] > LENGTH_MAX))) {
+    if (!is_address(bytes[0])) {
         return -1;
     }
-    if (size <= LENGTH || size < (uint32_t)bytes[LENGTH] + TYPE) {
+    if (size <= LENGTH) {
         return 0;
     }
-    const uint32_t covered = bytes[LENGTH] - 1u;
-    return crc_of(bytes + TYPE, covered) == bytes[TYPE + covered] ? bytes[LENGTH] + TYPE : -1;
+    const uint32_t length = bytes[LENGTH];
+    if (length < LENGTH_MIN || length > LENGTH_MAX) {
+        return -1;
+    }
+    if (size < length + TYPE) {
+        return 0;
+    }
+    const uint32_t covered = length - 1u;
+    return crc_of(bytes + TYPE, covered) == bytes[TYPE + covered] ? (int32_t)length + TYPE : -1;
 }
 
 /* Signal strengths are sent as -dBm; that of the second antenna is 0 where there is none. */
