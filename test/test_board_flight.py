@@ -297,6 +297,27 @@ def test_plans_that_cannot_fly(craft: Craft) -> None:
         assert reason in craft.refusal(), new
 
 
+def test_a_machine_whose_units_have_changed(craft: Craft) -> None:
+    """Its plan was right for other units: numbers would mean something else."""
+    (craft.folder / "craft.py").write_text(ALGORITHMS.replace("f64[3] rad/s", "f64[3] deg/s"))
+    craft.library = build_machine(craft.folder / "craft.json", "simulation").library
+    assert "channel 'imu.gyro' is in deg/s, and sensor 'imu' gives rad/s" in craft.refusal()
+
+
+def test_threads_of_devices_have_less_priority_than_ticks(craft: Craft, fly: Callable[..., Flight]) -> None:
+    before = os.sched_getscheduler(0), os.sched_getparam(0)
+    try:
+        os.sched_setscheduler(0, os.SCHED_FIFO, os.sched_param(7))
+        os.sched_setscheduler(0, *before)
+    except PermissionError:
+        pytest.skip("needs the right to real-time scheduling (CAP_SYS_NICE)")
+    flight = fly("--realtime-priority", "7")
+    threads = [int(t.name) for t in Path(f"/proc/{flight.process.pid}/task").iterdir()]
+    real_time = [t for t in threads if os.sched_getscheduler(t) & ~os.SCHED_RESET_ON_FORK == os.SCHED_FIFO]
+    assert sorted(os.sched_getparam(t).sched_priority for t in real_time) == [6, 6, 7]
+    flight.end()
+
+
 def test_a_channel_that_a_device_lacks(craft: Craft) -> None:
     for axis in "xyz":
         (craft.device(1) / f"in_anglvel_{axis}_raw").unlink()

@@ -13,6 +13,7 @@
 #include <time.h>
 
 #include "base/error.h"
+#include "base/timespec.h"
 
 /* A backend of a sensor, seen from its device. */
 typedef struct {
@@ -131,10 +132,10 @@ int board_devices_use(board_devices_t *devices, uint32_t device, const char *sig
                : -1;
 }
 
-int board_devices_start(board_devices_t *devices, fcsl_error_t *error)
+int board_devices_start(board_devices_t *devices, int priority, fcsl_error_t *error)
 {
     for (uint32_t d = 0; d < devices->plan->device_count; d++) {
-        if (devices->devices[d] != NULL && sensor_device_start(devices->devices[d], error) != 0) {
+        if (devices->devices[d] != NULL && sensor_device_start(devices->devices[d], priority, error) != 0) {
             return -1;
         }
     }
@@ -163,8 +164,7 @@ int board_devices_free(board_devices_t *devices)
 int board_devices_wait(board_devices_t *devices, uint64_t deadline_ns)
 {
     const sensor_device_t *pacing = devices->devices[devices->plan->pacing];
-    const struct timespec deadline = {.tv_sec = (time_t)(deadline_ns / 1000000000u),
-                                      .tv_nsec = (long)(deadline_ns % 1000000000u)};
+    const struct timespec deadline = timespec_of(deadline_ns);
     int waited = 0;
     /* The semaphore may have been posted for samples that were taken already: each of them costs a turn. */
     while (!sensor_device_has_sample(pacing) && waited == 0 && atomic_load(&devices->interrupted) == 0) {

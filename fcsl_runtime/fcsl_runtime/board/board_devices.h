@@ -21,8 +21,8 @@ board_devices_t *board_devices_new(const board_plan_t *plan, fcsl_error_t *error
 /* Before the start: what hw_read_… of a pin or a converter needs. Returns where the signal, a scalar, lies among the latest values of the
  * device of the plan, or -1 with `error`. */
 int board_devices_use(board_devices_t *devices, uint32_t device, const char *signal, fcsl_error_t *error);
-/* Opens all devices and starts their threads. 0, or -1. */
-int board_devices_start(board_devices_t *devices, fcsl_error_t *error);
+/* Opens all devices and starts their threads, with this priority of SCHED_FIFO (0: as any thread). 0, or -1. */
+int board_devices_start(board_devices_t *devices, int priority, fcsl_error_t *error);
 /* Where a device paces the loop: waits for its next sample until `deadline_ns` of the monotonic clock, or until it is interrupted: 1, 0
  * when there is none, or -1. */
 int board_devices_wait(board_devices_t *devices, uint64_t deadline_ns);

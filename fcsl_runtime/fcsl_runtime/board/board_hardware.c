@@ -271,7 +271,7 @@ board_hardware_t *board_hardware_new(const board_plan_t *plan, board_devices_t *
     return hardware;
 }
 
-int board_hardware_start(board_hardware_t *hardware, fcsl_error_t *error)
+int board_hardware_start(board_hardware_t *hardware, int priority, fcsl_error_t *error)
 {
     const board_plan_t *plan = hardware->plan;
     fcsl_error_t why;
@@ -282,7 +282,7 @@ int board_hardware_start(board_hardware_t *hardware, fcsl_error_t *error)
     }
     for (uint32_t d = 0; d < plan->device_count; d++) {
         if (hardware->outputs[d].device != NULL &&
-            output_device_start(hardware->outputs[d].device, 0, PATIENCE_NS, &why) != 0) {
+            output_device_start(hardware->outputs[d].device, priority, PATIENCE_NS, &why) != 0) {
             return fcsl_fail(error, "device '%.60s': %.400s", plan->devices[d].name, why.text);
         }
     }

@@ -13,8 +13,9 @@ typedef struct board_hardware board_hardware_t;
 
 /* Finds drivers and signals; opens nothing. `plan` and `inputs` must outlive it. Null with `error`. */
 board_hardware_t *board_hardware_new(const board_plan_t *plan, board_devices_t *inputs, fcsl_error_t *error);
-/* Opens the devices of outputs, which get their safe levels, and maps registers. 0, or -1. */
-int board_hardware_start(board_hardware_t *hardware, fcsl_error_t *error);
+/* Opens the devices of outputs, which get their safe levels, and maps registers. Threads have this priority of SCHED_FIFO (0: as any
+ * thread). 0, or -1. */
+int board_hardware_start(board_hardware_t *hardware, int priority, fcsl_error_t *error);
 /* For the step thread. Lasts as long as the hardware. */
 const struct fcsl_hw *board_hardware_table(const board_hardware_t *hardware);
 /* Whether it drives the device of the plan, and its counts then. */

@@ -40,6 +40,13 @@ static int bind(board_sensor_run_t *sensor, const board_binding_t *binding, boar
             error, "channel '%.100s' is no sensor of %u floating-point numbers: the plan was made for another machine",
             channel->name, quantity->count);
     }
+    if (config->kind != FCSL_RC && quantity->unit[0] != '\0' && field->unit[0] != '\0' &&
+        strcmp(quantity->unit, field->unit) != 0) {
+        return fcsl_fail(
+            error,
+            "channel '%.100s' is in %.40s, and sensor '%.60s' gives %.40s: the plan was made for another machine",
+            channel->name, field->unit, sensor->plan->name, quantity->unit);
+    }
     bound->at = quantity->at;
     bound->count = field->count;
     bound->type = field->type;

@@ -12,6 +12,8 @@
 #include <string.h>
 #include <time.h>
 
+#include "base/timespec.h"
+
 enum { STACK_BYTES = 256 << 10, LINE_BYTES = 64 /* of a cache */ };
 
 void *device_state_new(const fcsl_driver_t *driver)
@@ -51,8 +53,7 @@ int device_thread_start(pthread_t *thread, int priority, void *(*run)(void *), v
 
 int device_thread_end(pthread_t thread, sem_t *finished, uint64_t until_ns)
 {
-    const struct timespec until = {.tv_sec = (time_t)(until_ns / 1000000000u),
-                                   .tv_nsec = (long)(until_ns % 1000000000u)};
+    const struct timespec until = timespec_of(until_ns);
     int waited = 0;
     do {
         waited = sem_clockwait(finished, CLOCK_MONOTONIC, &until);

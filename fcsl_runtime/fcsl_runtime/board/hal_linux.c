@@ -16,6 +16,7 @@
 typedef struct {
     fcsl_hal_t base; /* the stub: its clock and its log */
     fcsl_run_t *run;
+    int priority; /* of the devices' threads */
     board_t *board;
     const board_plan_t *plan; /* the board's */
     board_devices_t *devices;
@@ -226,8 +227,8 @@ static int linux_open(fcsl_hal_t *handle, char *error, size_t error_size)
 {
     hal_t *hal = handle->ctx;
     fcsl_error_t reason;
-    if (board_devices_start(hal->devices, &reason) != 0 ||
-        (hal->hardware != NULL && board_hardware_start(hal->hardware, &reason) != 0)) {
+    if (board_devices_start(hal->devices, hal->priority, &reason) != 0 ||
+        (hal->hardware != NULL && board_hardware_start(hal->hardware, hal->priority, &reason) != 0)) {
         (void)snprintf(error, error_size, "%s", reason.text);
         return -1;
     }
@@ -284,13 +285,14 @@ int hal_linux_record(const fcsl_hal_t *hal, const char *name_space, fcsl_error_t
     return readings_record(&self->readings, self->plan, self->run, name_space, error);
 }
 
-int hal_linux(const char *file, fcsl_run_t *run, fcsl_hal_t *hal, fcsl_error_t *error)
+int hal_linux(const char *file, int priority, fcsl_run_t *run, fcsl_hal_t *hal, fcsl_error_t *error)
 {
     hal_t *self = calloc(1, sizeof *self);
     if (self == NULL) {
         return fcsl_fail(error, "out of memory for the board");
     }
     self->run = run;
+    self->priority = priority;
     self->readings.topic = -1;
     if (fcsl_hal_stub(&self->base, error->text, sizeof error->text) != 0 || open_board(self, file, error) != 0) {
         linux_close(self);

@@ -16,6 +16,7 @@
 #include <time.h>
 
 #include "base/error.h"
+#include "base/timespec.h"
 #include "device_thread.h"
 #include "fcsl/fcsl_library.h"
 #include "fcsl/fcsl_scalar.h"
@@ -238,8 +239,7 @@ static uint64_t read_device(sensor_device_t *device)
 /* Until then, or until the end. */
 static void sleep_until(sensor_device_t *device, uint64_t until_ns)
 {
-    const struct timespec until = {.tv_sec = (time_t)(until_ns / 1000000000u),
-                                   .tv_nsec = (long)(until_ns % 1000000000u)};
+    const struct timespec until = timespec_of(until_ns);
     while (atomic_load(&device->over) == 0 && sem_clockwait(&device->wake, CLOCK_MONOTONIC, &until) != 0 &&
            errno == EINTR) {
     }
@@ -292,7 +292,7 @@ void sensor_device_post(sensor_device_t *device, sem_t *semaphore)
     device->posted = semaphore;
 }
 
-int sensor_device_start(sensor_device_t *device, fcsl_error_t *error)
+int sensor_device_start(sensor_device_t *device, int priority, fcsl_error_t *error)
 {
     char why[DEVICE_REASON_BYTES] = "";
     const int status = open_device(device, why, sizeof why);
@@ -302,7 +302,7 @@ int sensor_device_start(sensor_device_t *device, fcsl_error_t *error)
     }
     set_condition(device, status == FCSL_DRIVER_OK ? DEVICE_OPEN : DEVICE_MISSING, why);
     device->told = DEVICE_OPEN;
-    const int code = device_thread_start(&device->thread, 0, run, device);
+    const int code = device_thread_start(&device->thread, priority, run, device);
     device->started = code == 0;
     return code == 0 ? 0 : fcsl_fail(error, "device '%.60s': no thread: %s", device->plan->name, strerror(code));
 }

@@ -37,8 +37,8 @@ int sensor_device_use(sensor_device_t *device, const char *signal, const char *u
                       uint32_t count, uint32_t *found, fcsl_error_t *error);
 /* Each sample that it keeps posts the semaphore. Before start. */
 void sensor_device_post(sensor_device_t *device, sem_t *semaphore);
-/* Opens the device and starts its thread. A device that is not there is no error. */
-int sensor_device_start(sensor_device_t *device, fcsl_error_t *error);
+/* Opens the device and starts its thread with this priority of SCHED_FIFO (0: as any thread). A device that is not there is no error. */
+int sensor_device_start(sensor_device_t *device, int priority, fcsl_error_t *error);
 /* From the step thread: the oldest sample that was not taken, 1; or 0. Does not wait. */
 int sensor_device_take(sensor_device_t *device, device_sample_t *sample);
 /* Drops the oldest samples until `most` are left at most, and counts them. */

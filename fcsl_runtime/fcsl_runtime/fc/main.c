@@ -55,6 +55,12 @@ static int open_system(program_t *program)
     return 0;
 }
 
+/* Below the step thread, which no device keeps waiting, and above all else. */
+static int priority_of_devices(const options_t *options)
+{
+    return options->priority > 0 ? (int)options->priority - 1 : 0;
+}
+
 /* The HAL that options->peer names. */
 static int make_named_hal(const options_t *options, fcsl_run_t *run, fcsl_hal_t *hal, fcsl_error_t *error)
 {
@@ -68,7 +74,7 @@ static int make_named_hal(const options_t *options, fcsl_run_t *run, fcsl_hal_t 
         return fcsl_hal_wire(peer + strlen(OPTIONS_WIRE), machine, timeout_ms, hal, error->text, sizeof error->text);
     }
     if (options_hal_is_linux(options)) {
-        return hal_linux(peer + strlen(OPTIONS_LINUX), run, hal, error);
+        return hal_linux(peer + strlen(OPTIONS_LINUX), priority_of_devices(options), run, hal, error);
     }
     if (options_hal_is_ros(options)) {
         return hal_ros(peer + strlen(OPTIONS_ROS), options->name_space, run, hal, error);
@@ -92,7 +98,7 @@ static int make_hal(program_t *program)
         program->board = options_hal_is_linux(options) ? loop->hal : (fcsl_hal_t){0};
         return 0;
     }
-    if (hal_linux(options->composite_plan, loop->run, &program->board, &error) != 0) {
+    if (hal_linux(options->composite_plan, priority_of_devices(options), loop->run, &program->board, &error) != 0) {
         named.close(named.ctx);
         return complain(error.text);
     }

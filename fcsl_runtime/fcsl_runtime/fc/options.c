@@ -49,7 +49,7 @@ static const char USAGE[] =
     "                          ticks are made at once, 0.1 s of them at most (default); skip: they are not made; "
     "stop:\n"
     "                          the run ends with status 3\n"
-    "  --realtime-priority N   SCHED_FIFO for the step thread, 1 to 99\n"
+    "  --realtime-priority N   SCHED_FIFO for the step thread, 1 to 99; threads of a board's devices have one less\n"
     "  --lock-memory           no page of the program leaves memory\n"
     "  --cpu N                 the step thread on processor N, all others elsewhere\n"
     "  --watchdog-ms N         report a tick that takes longer, with the instance it is in\n"

@@ -11,6 +11,7 @@
 #include <time.h>
 
 #include "base/error.h"
+#include "base/timespec.h"
 #include "fcsl/fcsl_library.h"
 #include "guard_options.h"
 #include "log.h"
@@ -178,7 +179,7 @@ static void announce(const program_t *program)
 static void wait_period(program_t *program, uint64_t period_ns, uint64_t *due_ns)
 {
     *due_ns += period_ns;
-    const struct timespec due = {.tv_sec = (time_t)(*due_ns / 1000000000u), .tv_nsec = (long)(*due_ns % 1000000000u)};
+    const struct timespec due = timespec_of(*due_ns);
     while (stop == 0 && clock_nanosleep(CLOCK_MONOTONIC, TIMER_ABSTIME, &due, NULL) == EINTR) {
     }
     const uint64_t now_ns = fcsl_run_monotonic_ns(NULL);

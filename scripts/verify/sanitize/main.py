@@ -56,6 +56,7 @@ SUITES = (
                 for n in ("fc", "fc_wire", "fc_time", "fc_telemetry", "guard", "guard_board")
             ),
             "test/test_board_flight.py",
+            "test/test_board_hardware.py",
             "-k",
             "not locking and not pinned",
         ),

@@ -11,6 +11,8 @@
 #include <time.h>
 #include <unistd.h>
 
+#include "base/timespec.h"
+
 enum { FREE, POSTED, ANSWERED };
 
 int fcsl_mailbox_open(mailbox_t *mailbox, size_t bytes)
@@ -82,8 +84,7 @@ void fcsl_mailbox_answer(mailbox_t *mailbox)
 
 void fcsl_mailbox_wait(mailbox_t *mailbox, uint64_t deadline_ns)
 {
-    const struct timespec until = {.tv_sec = (time_t)(deadline_ns / 1000000000u),
-                                   .tv_nsec = (long)(deadline_ns % 1000000000u)};
+    const struct timespec until = timespec_of(deadline_ns);
     (void)sem_clockwait(&mailbox->arrived, CLOCK_MONOTONIC, &until);
 }
 

@@ -52,7 +52,7 @@ _PROTOTYPES: dict[str, tuple[type | None, list[type]]] = {
     "board_plan_read": (ptr, [c_char_p, _ERROR]),
     "board_plan_free": (None, [ptr]),
     "board_devices_new": (ptr, [ptr, _ERROR]),
-    "board_devices_start": (c_int, [ptr, _ERROR]),
+    "board_devices_start": (c_int, [ptr, c_int, _ERROR]),
     "board_devices_take": (c_uint32, [ptr, POINTER(CSensorReading), c_uint32]),
     "board_devices_counts": (CCounts, [ptr, c_uint32]),
     "board_devices_news": (c_char_p, [ptr]),

@@ -26,7 +26,7 @@ class SensorDevices:
         self._handle = self._library.board_devices_new(self._library.board_plan(frontends.handle), byref(error))
         if not self._handle:
             raise TwinError(error.text.decode(errors="replace"))
-        if self._library.board_devices_start(self._handle, byref(error)) != 0:
+        if self._library.board_devices_start(self._handle, 0, byref(error)) != 0:
             self.close()
             raise Refused(error.text.decode(errors="replace"))
 
