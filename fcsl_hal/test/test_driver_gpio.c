@@ -11,7 +11,7 @@
 #include "drivers/gpio_chip.h"
 #include "sysfs_rig.h"
 
-enum { CHIPS = 3, LINES = 70, REQUEST_FILE = 900, REQUESTS = 8 };
+enum { CHIPS = 3, LINES = 70, REQUEST_FILE = 900, REQUESTS = 16 };
 
 /* ---- the kernel's part -------------------------------------------------------------------------------------------------- */
 
@@ -25,6 +25,7 @@ static struct {
     uint32_t lines[CHIPS];
     uint64_t levels[CHIPS]; /* as they are on the wires, of lines 0 to 63 */
     uint64_t hogged[CHIPS]; /* in use by somebody else */
+    uint64_t driven[CHIPS]; /* free, and outputs */
     int gone[CHIPS];
     request_t requests[REQUESTS];
     int next;
@@ -56,8 +57,10 @@ static int answer_chip(int chip, unsigned long request, void *data)
     if (request == GPIO_V2_GET_LINEINFO_IOCTL) {
         struct gpio_v2_line_info *info = data;
         CHECK(info->offset < kernel.lines[chip]);
-        info->flags = (kernel.hogged[chip] >> info->offset & 1u) != 0u ? GPIO_V2_LINE_FLAG_USED : 0u;
-        (void)snprintf(info->consumer, sizeof info->consumer, "%s", info->flags != 0u ? "sysfs" : "");
+        const int hogged = (kernel.hogged[chip] >> info->offset & 1u) != 0u;
+        const int driven = (kernel.driven[chip] >> info->offset & 1u) != 0u;
+        info->flags = (hogged ? GPIO_V2_LINE_FLAG_USED : 0u) | (driven ? GPIO_V2_LINE_FLAG_OUTPUT : 0u);
+        (void)snprintf(info->consumer, sizeof info->consumer, "%s", hogged ? "sysfs" : "");
         return 0;
     }
     CHECK(request == GPIO_V2_GET_LINE_IOCTL && kernel.next < REQUESTS);
@@ -174,6 +177,33 @@ static void check_inputs(void)
     rig_close(&rig);
 }
 
+/* Who looks at all lines gets those that are free inputs, and changes no other one. */
+static void check_optional_lines(void)
+{
+    rig_t rig;
+    uint8_t used[GPIO_LINES];
+    memset(used, FCSL_DRIVER_OPTIONAL, sizeof used);
+    memset(&rig, 0, sizeof rig);
+    rig.driver = &fcsl_driver_gpio;
+    kernel.hogged[1] = 1u << 6;
+    kernel.driven[1] = 1u << 2;
+    kernel.levels[1] = 0xff;
+    CHECK(rig.driver->open(rig.self, "gpiochip1", used, rig.why, sizeof rig.why) == FCSL_DRIVER_OK);
+    CHECK(kernel.requests[kernel.next - 1].asked.num_lines == 6u && rig.why[0] == '\0');
+    CHECK(rig_read(&rig) == FCSL_DRIVER_OK);
+    for (uint32_t i = 0; i < GPIO_LINES; i++) {
+        const double value = value_at(&rig, gpio_signals[i].name, 0);
+        CHECK(i < 8u && i != 6u && i != 2u ? value == 1.0 : isnan(value) != 0);
+    }
+    rig_close(&rig);
+    kernel.hogged[1] = 0xff;
+    memset(&rig, 0, sizeof rig);
+    CHECK(fcsl_driver_gpio.open(rig.self, "gpiochip1", used, rig.why, sizeof rig.why) == FCSL_DRIVER_FAILED);
+    CHECK(strstr(rig.why, "no line of the GPIO chip can be used") != NULL);
+    kernel.hogged[1] = 0;
+    kernel.driven[1] = 0;
+}
+
 /* ---- outputs ------------------------------------------------------------------------------------------------------------ */
 
 static void set(rig_t *rig, uint32_t line, double value)
@@ -277,6 +307,7 @@ int main(void)
     put("plain", "no chip\n");
     const int files = count_files();
     check_inputs();
+    check_optional_lines();
     check_outputs();
     check_return();
     check_refusals();

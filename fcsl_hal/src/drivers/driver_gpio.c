@@ -3,6 +3,7 @@
  * The drivers `gpio`, which polls lines of a GPIO chip, and `gpio_out`, which drives them.
  */
 #define _GNU_SOURCE
+#include <math.h>
 #include <stdio.h>
 #include <string.h>
 #include <unistd.h>
@@ -47,7 +48,11 @@ static fcsl_driver_status_t open_inputs(void *self, const char *device, const ui
 {
     gpio_t *gpio = self;
     keep(gpio, device, used);
-    return gpio_claim(device, 0, used, NULL, &gpio->file, why, size);
+    const fcsl_driver_status_t status = gpio_claim(device, 0, gpio->used, NULL, &gpio->file, why, size);
+    for (uint32_t i = 0; i < GPIO_LINES; i++) {
+        gpio->lines[i] = gpio->used[i] != FCSL_DRIVER_UNUSED ? 0.0 : NAN;
+    }
+    return status;
 }
 
 static fcsl_driver_status_t read_inputs(void *self, uint64_t *sample_ns, char *why, size_t size)
@@ -89,7 +94,7 @@ static fcsl_driver_status_t open_outputs(void *self, const char *device, const u
 {
     gpio_t *gpio = self;
     keep(gpio, device, used);
-    return gpio_check(device, 1, used, why, size);
+    return gpio_check(device, 1, gpio->used, why, size);
 }
 
 static fcsl_driver_status_t claim_outputs(gpio_t *gpio, char *why, size_t size)

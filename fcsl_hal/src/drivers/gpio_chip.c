@@ -199,26 +199,47 @@ fcsl_driver_status_t gpio_probe(const char *device, int outputs, char *why, size
 
 /* ---- lines -------------------------------------------------------------------------------------------------------------- */
 
-static fcsl_driver_status_t check_lines(int chip, uint32_t lines, const uint8_t *used, char *why, size_t size)
+/* Whether a line may be used; FAILED with a reason if not. What somebody drives is no input that is only looked at. */
+static fcsl_driver_status_t check_line(int chip, uint32_t lines, uint32_t i, uint8_t use, char *why, size_t size)
 {
-    for (uint32_t i = 0; i < GPIO_LINES; i++) {
-        struct gpio_v2_line_info info = {.offset = i};
-        if (used[i] == FCSL_DRIVER_UNUSED) {
-            continue;
-        }
-        if (i >= lines) {
-            (void)snprintf(why, size, "line%u: the GPIO chip has %u lines", i, lines);
-            return FCSL_DRIVER_FAILED;
-        }
-        if (ioctl(chip, GPIO_V2_GET_LINEINFO_IOCTL, &info) < 0) {
-            (void)snprintf(why, size, "line%u: %s", i, strerror(errno));
-            return FCSL_DRIVER_FAILED;
-        }
-        if ((info.flags & GPIO_V2_LINE_FLAG_USED) != 0u) {
-            (void)snprintf(why, size, "line%u is in use, by '%.*s'", i, (int)sizeof info.consumer - 1, info.consumer);
-            return FCSL_DRIVER_FAILED;
-        }
+    struct gpio_v2_line_info info = {.offset = i};
+    if (i >= lines) {
+        (void)snprintf(why, size, "line%u: the GPIO chip has %u lines", i, lines);
+        return FCSL_DRIVER_FAILED;
     }
+    if (ioctl(chip, GPIO_V2_GET_LINEINFO_IOCTL, &info) < 0) {
+        (void)snprintf(why, size, "line%u: %s", i, strerror(errno));
+        return FCSL_DRIVER_FAILED;
+    }
+    if ((info.flags & GPIO_V2_LINE_FLAG_USED) != 0u) {
+        (void)snprintf(why, size, "line%u is in use, by '%.*s'", i, (int)sizeof info.consumer - 1, info.consumer);
+        return FCSL_DRIVER_FAILED;
+    }
+    if (use == FCSL_DRIVER_OPTIONAL && (info.flags & GPIO_V2_LINE_FLAG_OUTPUT) != 0u) {
+        (void)snprintf(why, size, "line%u is driven", i);
+        return FCSL_DRIVER_FAILED;
+    }
+    return FCSL_DRIVER_OK;
+}
+
+/* Optional lines that may not be used are not used any more. */
+static fcsl_driver_status_t check_lines(int chip, uint32_t lines, uint8_t *used, char *why, size_t size)
+{
+    uint32_t count = 0;
+    for (uint32_t i = 0; i < GPIO_LINES; i++) {
+        const fcsl_driver_status_t status =
+            used[i] != FCSL_DRIVER_UNUSED ? check_line(chip, lines, i, used[i], why, size) : FCSL_DRIVER_NOTHING;
+        if (status == FCSL_DRIVER_FAILED && used[i] == FCSL_DRIVER_NEEDED) {
+            return status;
+        }
+        used[i] = status == FCSL_DRIVER_OK ? used[i] : FCSL_DRIVER_UNUSED;
+        count += status == FCSL_DRIVER_OK;
+    }
+    if (count == 0u) {
+        (void)snprintf(why, size, "no line of the GPIO chip can be used");
+        return FCSL_DRIVER_FAILED;
+    }
+    why[0] = '\0';
     return FCSL_DRIVER_OK;
 }
 
@@ -254,7 +275,7 @@ static fcsl_driver_status_t claim_lines(int chip, uint64_t flags, const uint8_t 
     return FCSL_DRIVER_OK;
 }
 
-fcsl_driver_status_t gpio_check(const char *device, int outputs, const uint8_t *used, char *why, size_t size)
+fcsl_driver_status_t gpio_check(const char *device, int outputs, uint8_t *used, char *why, size_t size)
 {
     address_t address;
     uint32_t lines = 0;
@@ -268,7 +289,7 @@ fcsl_driver_status_t gpio_check(const char *device, int outputs, const uint8_t *
     return status;
 }
 
-fcsl_driver_status_t gpio_claim(const char *device, int outputs, const uint8_t *used, const double *values, int *file,
+fcsl_driver_status_t gpio_claim(const char *device, int outputs, uint8_t *used, const double *values, int *file,
                                 char *why, size_t size)
 {
     address_t address;

@@ -16,11 +16,12 @@ extern const fcsl_driver_signal_t gpio_signals[GPIO_LINES];
 /* Whether the chip is there and the options are known; `outputs`: of lines that are driven. */
 fcsl_driver_status_t gpio_probe(const char *device, int outputs, char *why, size_t size);
 
-/* Whether the chip has the used lines, and nobody else uses them. Claims nothing. */
-fcsl_driver_status_t gpio_check(const char *device, int outputs, const uint8_t *used, char *why, size_t size);
+/* Whether the chip has the used lines, and nobody else uses them. Optional lines that it lacks, that are in use or driven become unused:
+ * they are for people who look, and to claim a line is to make it an input. Claims nothing. */
+fcsl_driver_status_t gpio_check(const char *device, int outputs, uint8_t *used, char *why, size_t size);
 
-/* Claims the used lines; those that are driven get these values at once. ABSENT: there is no such chip. */
-fcsl_driver_status_t gpio_claim(const char *device, int outputs, const uint8_t *used, const double *values, int *file,
+/* Checks and claims the used lines; those that are driven get these values at once. ABSENT: there is no such chip. */
+fcsl_driver_status_t gpio_claim(const char *device, int outputs, uint8_t *used, const double *values, int *file,
                                 char *why, size_t size);
 
 /* Of claimed lines, in the places of the used ones. ABSENT: the chip has gone. */

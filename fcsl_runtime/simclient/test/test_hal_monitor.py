@@ -62,6 +62,36 @@ def test_values_rates_and_a_device_that_comes(tmp_path: Path, sysfs: Path) -> No
     assert "device 'spare' is not there" in said and "device 'spare' is there" in said
 
 
+def test_pins_and_converters(tmp_path: Path) -> None:
+    """What an algorithm would read of them; a board of them alone is watched, too."""
+    adc = tmp_path / "sys/bus/iio/devices/iio:device0"
+    adc.mkdir(parents=True)
+    (tmp_path / "sys/dev").mkdir()
+    for name, text in (("name", "ads1015"), ("in_voltage2_raw", "1234")):
+        (adc / name).write_text(f"{text}\n")
+    plan = tmp_path / "panel.plan"
+    lines = ["machine panel 100", "device cells 5000000 adc ads1015", "device buttons 5000000 gpio chip"]
+    lines += ["adc 7 cells counts2", "gpio_in 4 buttons line1", "gpio_out 5 buttons line2 0"]
+    plan.write_text("\n".join(["fcsl-board-plan 1", *lines, "end", ""]))
+    done = run(tmp_path / "sys", "monitor", plan, "--seconds", "1.2", status=1)
+    assert "device 'buttons' is not there: no GPIO chip is called 'chip'" in done.stderr
+    assert done.stdout.splitlines()[-1].partition("s  ")[2] == "hardware: gpio 4: -  adc 7: 1234"
+    told = json.loads(run(tmp_path / "sys", "monitor", plan, "--seconds", "0.3", "--json", status=1).stdout)
+    assert [(one["name"], one["device"], one["value"]) for one in told["hardware"]] == [
+        ("gpio 4", "buttons", None),
+        ("adc 7", "cells", 1234.0),
+    ]
+    cells = by_name(told["devices"])["cells"]
+    assert (
+        cells["there"]
+        and cells["samples"] > 0
+        and cells["age_s"] < 5.0
+        and not by_name(told["devices"])["buttons"]["there"]
+    )
+    plan.write_text(plan.read_text().replace("counts2", "counts16"))
+    assert "driver 'adc' has no signal 'counts16'" in run(tmp_path / "sys", "monitor", plan, status=2).stderr
+
+
 def test_lines_of_one_sensor(tmp_path: Path, sysfs: Path) -> None:
     lines = run(sysfs, "monitor", write_plan(tmp_path), "--sensor", "compass", "--seconds", "0.5").stdout.splitlines()
     assert len(lines) == 1

@@ -40,6 +40,16 @@ class CCounts(Structure):
     _fields_ = [(name, c_uint64) for name in ("samples", "errors", "dropped", "lost", "open")]
 
 
+#: DEVICE_VALUES_MAX
+_DEVICE_VALUES = 64
+
+
+class CSample(Structure):
+    """device_sample_t"""
+
+    _fields_ = [("sample_ns", c_uint64), ("values", c_double * _DEVICE_VALUES)]
+
+
 _ERROR = POINTER(CError)
 _PROTOTYPES: dict[str, tuple[type | None, list[type]]] = {
     "board_open": (ptr, [c_char_p, ptr, _ERROR]),
@@ -52,6 +62,8 @@ _PROTOTYPES: dict[str, tuple[type | None, list[type]]] = {
     "board_plan_read": (ptr, [c_char_p, _ERROR]),
     "board_plan_free": (None, [ptr]),
     "board_devices_new": (ptr, [ptr, _ERROR]),
+    "board_devices_use": (c_int, [ptr, c_uint32, c_char_p, _ERROR]),
+    "board_devices_latest": (POINTER(CSample), [ptr, c_uint32]),
     "board_devices_start": (c_int, [ptr, c_int, _ERROR]),
     "board_devices_take": (c_uint32, [ptr, POINTER(CSensorReading), c_uint32]),
     "board_devices_counts": (CCounts, [ptr, c_uint32]),

@@ -133,6 +133,12 @@ class Plan:
     converters: list[Converter] = field(default_factory=list)
     registers: list[Registers] = field(default_factory=list)
 
+    @property
+    def inputs(self) -> dict[str, Pin | Converter]:
+        """What hw_read_gpio and hw_read_adc read of devices, by name."""
+        pins = {f"gpio {pin.number}": pin for pin in self.pins if pin.safe is None}
+        return {**pins, **{f"adc {converter.number}": converter for converter in self.converters}}
+
 
 def read_plan(path: str | Path) -> Plan:
     """Raises TwinError, with file and line, for what is not a plan."""

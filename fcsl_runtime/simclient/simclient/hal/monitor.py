@@ -28,8 +28,11 @@ def monitor(path: str, sensor: str | None, seconds: float | None, as_json: bool,
     """Until `seconds` have passed (None: until Ctrl-C). Raises Refused where a device is missing at that time."""
     plan = read_plan(path)
     sensors = list(range(len(plan.sensors))) if sensor is None else [find_sensor(plan, sensor)]
-    if not sensors:
-        raise TwinError(f"{path}: the plan has no sensors")
+    with_hardware = sensor is None and not as_plot
+    if not sensors and not (with_hardware and plan.inputs):
+        raise TwinError(
+            f"{path}: the plan has no sensors{'' if plan.inputs else ', and no pins or converters to read'}"
+        )
     live = sys.stdout.isatty() and not as_json
     if as_plot and not live and seconds is None:
         raise TwinError("without a terminal --plot draws once, at the end: give --seconds")
@@ -37,17 +40,23 @@ def monitor(path: str, sensor: str | None, seconds: float | None, as_json: bool,
         watch = Watch(path, plan)
         opened.callback(watch.close)
         curves = Curves(watch, sensors) if as_plot else None
-        show = _shower(watch, sensors, curves, as_json, live, opened)
+        show = _shower(watch, sensors, with_hardware, curves, as_json, live, opened)
         with contextlib.suppress(KeyboardInterrupt):  # the normal end
             _run(watch, seconds, curves, show, _REDRAW_NS if live else _LINE_NS, says_news=not live)
-            _check(watch, sensors)
+            _check(watch, sensors, with_hardware)
 
 
 Show = Callable[[int, bool], None]
 
 
 def _shower(
-    watch: Watch, sensors: list[int], curves: Curves | None, as_json: bool, live: bool, opened: ExitStack
+    watch: Watch,
+    sensors: list[int],
+    with_hardware: bool,
+    curves: Curves | None,
+    as_json: bool,
+    live: bool,
+    opened: ExitStack,
 ) -> Show:
     """What shows the state at a time in ns since the start; the flag is that of the last call."""
     screen = opened.enter_context(Screen()) if live else None
@@ -55,7 +64,7 @@ def _shower(
     def lines(time_ns: int) -> list[str]:
         if curves is not None:
             return curves.lines(*Screen.size())
-        snapshot = watch.snapshot(time.monotonic_ns(), sensors)
+        snapshot = watch.snapshot(time.monotonic_ns(), sensors, with_hardware)
         if as_json:
             return [json.dumps(jsonable({"time_s": time_ns / _NS_PER_S, **snapshot}))]
         return table_lines(snapshot) if live else sensor_lines(snapshot, time_ns / _NS_PER_S)
@@ -96,7 +105,7 @@ def _ticks(tick_hz: int, begun_ns: int, seconds: float | None) -> Iterator[int]:
         tick = max(tick + 1, (time.monotonic_ns() - begun_ns) * tick_hz // _NS_PER_S)
 
 
-def _check(watch: Watch, sensors: list[int]) -> None:
-    missing = [d for d in watch.snapshot(time.monotonic_ns(), sensors)["devices"] if not d["there"]]
+def _check(watch: Watch, sensors: list[int], with_hardware: bool) -> None:
+    missing = [d for d in watch.snapshot(time.monotonic_ns(), sensors, with_hardware)["devices"] if not d["there"]]
     if missing:
         raise Refused("; ".join(f"device '{d['name']}' {d['note'] or 'is not there'}" for d in missing))

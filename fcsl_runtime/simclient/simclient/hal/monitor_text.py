@@ -23,7 +23,15 @@ def table_lines(snapshot: dict[str, Any]) -> list[str]:
             f"{sensor['name']} ({sensor['kind']}): {f'primary {primary}' if primary else 'no healthy device'}",
         ]
         lines += [f"  {line}" for line in table(_quantity_rows(sensor)).splitlines()]
+    if snapshot["hardware"]:
+        rows = [(one["name"], f"{one['signal']} of {one['device']}", _value(one)) for one in snapshot["hardware"]]
+        lines += ["", "hardware", *(f"  {line}" for line in table(rows).splitlines())]
     return lines
+
+
+def _value(one: dict[str, Any]) -> str:
+    """Of a pin or a converter."""
+    return "-" if one["value"] is None else f"{one['value']:g}"
 
 
 def _quantity_rows(sensor: dict[str, Any]) -> list[tuple[str, ...]]:
@@ -51,6 +59,9 @@ def sensor_lines(snapshot: dict[str, Any], time_s: float) -> list[str]:
         lines.append(
             f"{time_s:.1f} s  {sensor['name']}: {sensor['primary'] or 'no healthy device'}  {values}  ({'; '.join(states)})"
         )
+    if snapshot["hardware"]:
+        values = "  ".join(f"{one['name']}: {_value(one)}" for one in snapshot["hardware"])
+        lines.append(f"{time_s:.1f} s  hardware: {values}")
     return lines
 
 

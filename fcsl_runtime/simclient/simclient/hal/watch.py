@@ -49,7 +49,8 @@ class Watch:
         self.plan, self._names = plan, list(plan.devices)
         self._frontends = Frontends(path)
         try:
-            self._devices = SensorDevices(self._frontends)
+            inputs = [(self._names.index(i.device), i.signal) for i in plan.inputs.values()]
+            self._devices = SensorDevices(self._frontends, inputs)
         except ValueError:
             self._frontends.close()
             raise
@@ -65,6 +66,9 @@ class Watch:
             self._frontends.take(sensor, backend, sample_ns, values)
             self._raw[sensor, backend] = values
             self._last_ns[self.plan.sensors[sensor].backends[backend].device] = sample_ns
+        for one, told in zip(self.plan.inputs.values(), self._devices.inputs(), strict=True):
+            if told is not None:
+                self._last_ns[one.device] = told[0]
         self._frontends.tick(now_ns)
         news = self._devices.news()
         for text in news:
@@ -79,11 +83,16 @@ class Watch:
             return None
         return _by_quantity(self.plan.sensors[sensor], list(output.values))
 
-    def snapshot(self, now_ns: int, sensors: list[int]) -> dict[str, Any]:
-        """Of these sensors and their devices."""
-        used = {b.device for s in sensors for b in self.plan.sensors[s].backends}
+    def snapshot(self, now_ns: int, sensors: list[int], with_hardware: bool) -> dict[str, Any]:
+        """Of these sensors and what hw_read_gpio and hw_read_adc read, and of their devices."""
+        inputs = self.plan.inputs if with_hardware else {}
+        used = {b.device for s in sensors for b in self.plan.sensors[s].backends} | {i.device for i in inputs.values()}
         devices = [self._device(d, name, now_ns) for d, name in enumerate(self._names) if name in used]
-        return {"devices": devices, "sensors": [self._sensor(s) for s in sensors]}
+        hardware = [
+            {"name": name, "device": one.device, "signal": one.signal, "value": told[1] if told else None}
+            for (name, one), told in zip(inputs.items(), self._devices.inputs() if inputs else (), strict=True)
+        ]
+        return {"devices": devices, "sensors": [self._sensor(s) for s in sensors], "hardware": hardware}
 
     def _device(self, number: int, name: str, now_ns: int) -> dict[str, Any]:
         counts, history = self._devices.counts(number), self._history[name]
