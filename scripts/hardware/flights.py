@@ -9,10 +9,19 @@ from functools import partial
 from pathlib import Path
 
 from .flight.craft import Craft
-from .flight.inertial import BOTTOM, TOP, try_buffer, try_inertial
+from .flight.inertial import BOTTOM, TOP, try_buffer, try_inertial, try_pace
 from .flight.lines import try_lines, try_valves
 from .flight.others import try_can, try_rc, try_slow
-from .flight.outputs import try_commands, try_guard_end, try_guard_kill, try_kill, try_pwm_unplug, try_stop
+from .flight.outputs import (
+    try_commands,
+    try_full_disk,
+    try_guard_end,
+    try_guard_kill,
+    try_hang,
+    try_kill,
+    try_pwm_unplug,
+    try_stop,
+)  # fmt: skip
 from .flight.whole import try_whole
 from .guest.chips import Bmp280, Ina226, LidarLite, Mag3110
 from .guest.i2c import I2cBus
@@ -20,8 +29,8 @@ from .guest.pca9685 import Pca9685
 from .trials import run_trials
 
 _TRIALS: tuple[Callable[[I2cBus, Craft], str], ...] = (
-    try_inertial, try_buffer, try_slow, try_rc, try_can,
-    try_commands, try_kill, try_stop, try_guard_end, try_guard_kill, try_pwm_unplug, try_lines, try_valves, try_whole,
+    try_inertial, try_buffer, try_pace, try_slow, try_rc, try_can,
+    try_commands, try_kill, try_stop, try_hang, try_full_disk, try_guard_end, try_guard_kill, try_pwm_unplug, try_lines, try_valves, try_whole,
 )  # fmt: skip
 
 

@@ -10,7 +10,7 @@ from functools import partial
 
 from ..guest.chips import Bmi160
 from ..guest.i2c import I2cBus
-from ..trials import Failed, expect_all
+from ..trials import Failed, expect, expect_all
 from .craft import Craft
 from .process import Flight, after, in_ms, linux, until
 
@@ -22,6 +22,7 @@ _GYRO, _ACCEL = (0.3, 0.5, 0.7), (1.5, -2.5, 9.81)
 _GYRO_STEP, _ACCEL_STEP = 0.00054, 0.0003
 #: The guest has one processor, and the computer has other work: one window without that is enough.
 _WINDOW_S, _WINDOWS = 1.0, 10
+_LIMIT_S = 10.0
 _LATE_PART, _RATE_PART, _SPAN_S = 0.05, 0.05, 0.05
 
 
@@ -130,6 +131,31 @@ def try_inertial(bus: I2cBus, craft: Craft) -> str:
         number = top.iio.name
         said = (lose_both(flight, top, bottom), get_both_back(flight, top, bottom, number))
     return f"2 x {window.rate:.1f} of 200 Hz, {window.late:.1%} of the ticks older than one; {'; '.join(said)}"
+
+
+def try_pace(bus: I2cBus, craft: Craft) -> str:
+    """Each scan is a tick; a device that goes ends the flight."""
+    imu = Bmi160(bus, TOP)
+    imu.replug()
+    imu.set_motion(_ACCEL, _GYRO)
+    with linux(craft, "paced") as flight:
+        flight.until_value("machine.state", "FLIGHT")
+        paths = ("machine.tick", "hal.devices.top.samples", "odometer.outputs.spanned")
+        first, begin = flight.client.get(*paths), time.monotonic()
+        time.sleep(_WINDOW_S)
+        last, took = flight.client.get(*paths), time.monotonic() - begin
+        ticks, samples, spanned = (last[path] - first[path] for path in paths)
+        expect("rate of ticks", ticks / took, 100.0, 100.0 * _RATE_PART)
+        expect("samples of a tick", samples / ticks, 1.0, 1.5 / ticks)  # one may wait for its tick
+        expect("time of a tick", spanned / ticks, 0.01, 0.0002)
+        end_s = after(imu.unplug, lambda: flight.process.wait(_LIMIT_S))
+        reason = "device 'top', which paces the loop, has given nothing for"
+        if flight.process.returncode != 1 or reason not in flight.said():
+            raise Failed(f"it ends with {flight.process.returncode}: {flight.said()}")
+    imu.plug()
+    return (
+        f"{ticks} ticks and {samples} scans in {took:.2f} s; unplugged: status 1 with the reason after {in_ms(end_s)}"
+    )
 
 
 def try_buffer(bus: I2cBus, craft: Craft) -> str:

@@ -5,6 +5,7 @@ from __future__ import annotations
 
 import signal
 import statistics
+import subprocess
 import time
 from functools import partial
 from pathlib import Path
@@ -21,6 +22,10 @@ SAFE_AFTER_S = _TIMEOUT_S + _PERIOD_S
 #: For a guest that has one processor, of a computer that has other work.
 _MARGIN_S = 0.25
 REPETITIONS = 20
+#: The client that makes a step hang waits for its answer.
+_HANGS = 5
+_TICK_S = 0.01
+_DISK_BYTES = 1 << 16
 _STEP_US = 6.0  # of the chip, and its period, which is not quite 20 ms
 _SAFE = (0.0, 1520.0)
 _COMMAND = {"throttle": 0.25, "steer": 0.5}
@@ -108,6 +113,39 @@ def try_stop(bus: I2cBus, craft: Craft) -> str:
             flight.send(signal.SIGCONT)
             servos.until(_COMMANDED)
     return describe(times, SAFE_AFTER_S)
+
+
+def try_hang(bus: I2cBus, craft: Craft) -> str:
+    """A step that does not end, while all other threads of the flight program go on."""
+    servos, times = plug(bus), []
+    with Guard(craft, craft.plan("outputs")) as guard:
+        for _ in range(_HANGS):
+            with arm(craft, guard, servos) as flight:
+                times.append(after(partial(flight.set, hang=True), partial(servos.until, _SAFE)))
+                if flight.process.poll() is not None:
+                    raise Failed(f"the flight has ended: {flight.said()}")
+    return describe(times, _TICK_S + SAFE_AFTER_S)
+
+
+def try_full_disk(bus: I2cBus, craft: Craft) -> str:
+    """The recording ends, is told, and moves nothing."""
+    servos, disk = plug(bus), Path("/tmp/small")
+    disk.mkdir()
+    subprocess.run(["mount", "-t", "tmpfs", "-o", f"size={_DISK_BYTES}", "small", disk], check=True)
+    record = ("--record", disk / "bag", "--record-fields", "*")
+    with Guard(craft, craft.plan("outputs")) as guard, Flight(craft, "--guard", guard.slot, *record) as flight:
+        flight.set(**_COMMAND, arm=True)
+        servos.until(_COMMANDED)
+        full_s = flight.until_said("No space left on device")
+        for _ in range(REPETITIONS):
+            flight.set(throttle=0.75)
+            servos.until((1750.0, 1310.0))
+            flight.set(throttle=0.25)
+            servos.until(_COMMANDED)
+        if guard.end() != 0 or " 0 silences" not in guard.said():
+            raise Failed(f"the guard was without commands: {guard.said()}")
+    subprocess.run(["umount", disk], check=True)
+    return f"full after {full_s:.1f} s; then {2 * REPETITIONS} commands became pulses, and the guard saw no silence"
 
 
 def try_guard_end(bus: I2cBus, craft: Craft) -> str:

@@ -47,13 +47,18 @@ class Odometer:
 
 
 class Pilot:
-    """Passes its parameters to the motors; asks for SAFE when the angular velocity is not valid."""
+    """Passes its parameters to the motors; asks for SAFE when the angular velocity is not valid. Told to hang, it makes steps that take
+    the larger part of a second."""
 
     inputs = {"valid": "bool"}
     outputs = {"motors": "f64[2]", "armed": "bool", "transition_request": "TransitionRequest"}
-    parameters = {"throttle": "f64", "steer": "f64", "arm": "bool"}
+    parameters = {"throttle": "f64", "steer": "f64", "arm": "bool", "hang": "bool"}
+    state = {"spun": "f64"}
 
     def execute(self):
+        if self.hang:
+            for i in range(10000000):
+                self.spun = sin(self.spun + f64(i))
         self.motors[0] = self.throttle
         self.motors[1] = self.steer
         self.armed = self.arm
