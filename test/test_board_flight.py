@@ -7,7 +7,6 @@ from __future__ import annotations
 import json
 import os
 import re
-import signal
 import struct
 import subprocess
 import time
@@ -16,19 +15,13 @@ from pathlib import Path
 from typing import Any
 
 import pytest
+from fcsl_test_board_flights import LONG_S, PROGRAM, ROOT, Flight, compile_driver, flying, refusal, until
 
-from fcsl_compiler.base.ament import package_prefix
 from fcsl_compiler.driver.cache import build_machine
-from simclient import VarClient
 from simclient.errors import BagError
 from simclient.replay import replay
-from simclient.vars.wire import VarError
 
-ROOT = Path(__file__).resolve().parents[1]
-#: The check with sanitizers has its own.
-PROGRAM = Path(os.environ.get("FCSL_TEST_FC", package_prefix("fcsl_runtime") / "bin/fcsl-fc"))
 HZ = 100
-LONG_S = 60
 ALGORITHMS = '''class Sensors:
     """What the board gives."""
 
@@ -132,10 +125,7 @@ class Craft:
 
     def refusal(self, *options: str) -> str:
         """What a flight says that cannot begin."""
-        line = self.line("--ticks", "5", *options)
-        done = subprocess.run(line, env=self.environment, capture_output=True, text=True, timeout=LONG_S, check=False)
-        assert done.returncode == 1 and done.stderr.startswith("fcsl-fc: "), done
-        return done.stderr
+        return refusal(self.line(*options), self.environment)
 
 
 @pytest.fixture
@@ -143,59 +133,10 @@ def craft(tmp_path: Path) -> Craft:
     return Craft(tmp_path)
 
 
-class Flight:
-    def __init__(self, craft: Craft, *options: str | Path):
-        line = craft.line("--socket", craft.socket, *options)
-        pipe = subprocess.PIPE
-        self.process = subprocess.Popen(line, env=craft.environment, stdout=pipe, stderr=pipe, text=True)
-        self._socket = craft.socket
-
-    def connect(self) -> None:
-        until(lambda: self.process.poll() is not None or self._connect(self._socket))
-        assert self.process.poll() is None, self.process.communicate()
-
-    def _connect(self, socket: Path) -> bool:
-        """The socket's path is there before the program listens."""
-        try:
-            self.client = VarClient(socket)
-        except VarError:
-            return False
-        return True
-
-    def get(self, path: str) -> Any:
-        return self.client.get(path)[path]
-
-    def until_value(self, path: str, value: object) -> None:
-        until(lambda: self.get(path) == value)
-
-    def end(self) -> str:
-        self.client.close()
-        self.process.send_signal(signal.SIGTERM)
-        out, complaint = self.process.communicate(timeout=LONG_S)
-        assert self.process.returncode == 0, complaint
-        return out + complaint
-
-
 @pytest.fixture
 def fly(craft: Craft) -> Iterator[Callable[..., Flight]]:
-    flights: list[Flight] = []
-
-    def begin(*options: str | Path) -> Flight:
-        flights.append(Flight(craft, *options))
-        flights[-1].connect()
-        return flights[-1]
-
-    yield begin
-    for flight in flights:
-        flight.process.kill()
-        flight.process.communicate()
-
-
-def until(holds: Callable[[], bool]) -> None:
-    deadline = time.monotonic() + LONG_S
-    while not holds():
-        assert time.monotonic() < deadline, "it does not happen"
-        time.sleep(0.005)
+    with flying(lambda *options: Flight(craft.line(*options), craft.socket, craft.environment)) as fly:
+        yield fly
 
 
 def near(values: Any, expected: list[float]) -> bool:
@@ -417,10 +358,7 @@ PACED_BOARD = {
 
 def test_a_device_paces_the_loop(tmp_path: Path) -> None:
     """Tick k is its frame k, in bursts and with pauses. When it falls silent the flight ends, and says why."""
-    (tmp_path / "robot.c").write_text(ROBOT)
-    includes = [f"-I{ROOT / package / 'include'}" for package in ("fcsl_hal", "fcsl_compiler")]
-    library = tmp_path / "librobot.so"
-    subprocess.run(["cc", "-shared", "-fPIC", *includes, tmp_path / "robot.c", "-o", library], check=True)
+    library = compile_driver(ROBOT, "robot", tmp_path)
     (tmp_path / "echo.py").write_text(ECHO)
     (tmp_path / "echo.json").write_text(json.dumps(ECHO_MACHINE))
     fifo, bag = tmp_path / "fifo", tmp_path / "bag"

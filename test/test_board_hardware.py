@@ -7,27 +7,19 @@ from __future__ import annotations
 import json
 import mmap
 import os
-import signal
 import struct
 import subprocess
-import time
 from collections.abc import Callable, Iterator
 from pathlib import Path
 from typing import Any
 
 import pytest
+from fcsl_test_board_flights import PROGRAM, Flight, compile_driver, flying, refusal, until
 
-from fcsl_compiler.base.ament import package_prefix
 from fcsl_compiler.driver.cache import build_machine
-from simclient import VarClient
 from simclient.replay import replay
-from simclient.vars.wire import VarError
 
-ROOT = Path(__file__).resolve().parents[1]
-#: The check with sanitizers has its own.
-PROGRAM = Path(os.environ.get("FCSL_TEST_FC", package_prefix("fcsl_runtime") / "bin/fcsl-fc"))
 HZ = 100
-LONG_S = 60
 #: Lines of a chip in a file of characters, `0` or `1`.
 DRIVERS = r"""
 #define _GNU_SOURCE
@@ -160,10 +152,7 @@ class Board:
         self.lines.write_text("00")
         self.lamps.write_text("--")
         self.memory.write_bytes(bytes(2 * PAGE))
-        (folder / "drivers.c").write_text(DRIVERS)
-        includes = [f"-I{ROOT / package / 'include'}" for package in ("fcsl_hal", "fcsl_compiler")]
-        drivers = folder / "libchips.so"
-        subprocess.run(["cc", "-shared", "-fPIC", *includes, folder / "drivers.c", "-o", drivers], check=True)
+        drivers = compile_driver(DRIVERS, "chips", folder)
         (folder / "panel.py").write_text(PANEL)
         (folder / "panel.json").write_text(json.dumps(MACHINE))
         self.library = build_machine(folder / "panel.json", "simulation").library
@@ -205,44 +194,7 @@ class Board:
 
     def refusal(self, *options: str | Path) -> str:
         """What a flight says that cannot begin."""
-        line = self.line("--ticks", "5", *options)
-        done = subprocess.run(line, env=self.environment, capture_output=True, text=True, timeout=LONG_S, check=False)
-        assert done.returncode == 1, done
-        return done.stderr
-
-
-class Flight:
-    def __init__(self, board: Board, *options: str | Path):
-        line = board.line("--socket", board.socket, *options)
-        pipe = subprocess.PIPE
-        self.process = subprocess.Popen(line, env=board.environment, stdout=pipe, stderr=pipe, text=True)
-        self._socket = board.socket
-        until(lambda: self.process.poll() is not None or self._connect())
-        assert self.process.poll() is None, self.process.communicate()
-
-    def _connect(self) -> bool:
-        try:
-            self.client = VarClient(self._socket)
-        except VarError:
-            return False
-        return True
-
-    def until_value(self, path: str, value: object) -> None:
-        until(lambda: self.client.get(path)[path] == value)
-
-    def end(self) -> str:
-        self.client.close()
-        self.process.send_signal(signal.SIGTERM)
-        out, complaint = self.process.communicate(timeout=LONG_S)
-        assert self.process.returncode == 0, complaint
-        return out + complaint
-
-
-def until(holds: Callable[[], bool]) -> None:
-    deadline = time.monotonic() + LONG_S
-    while not holds():
-        assert time.monotonic() < deadline, "it does not happen"
-        time.sleep(0.005)
+        return refusal(self.line(*options), self.environment)
 
 
 @pytest.fixture
@@ -252,16 +204,8 @@ def board(tmp_path: Path) -> Board:
 
 @pytest.fixture
 def fly(board: Board) -> Iterator[Callable[..., Flight]]:
-    flights: list[Flight] = []
-
-    def begin(*options: str | Path) -> Flight:
-        flights.append(Flight(board, *options))
-        return flights[-1]
-
-    yield begin
-    for flight in flights:
-        flight.process.kill()
-        flight.process.communicate()
+    with flying(lambda *options: Flight(board.line(*options), board.socket, board.environment)) as fly:
+        yield fly
 
 
 def test_pins_a_converter_and_registers(board: Board, fly: Callable[..., Flight]) -> None:
@@ -306,7 +250,7 @@ def test_writes_that_fail_are_counted_and_told(board: Board, fly: Callable[..., 
     flight.until_value("hal.devices.lamps.open", 1)
     flight.until_value("hal.devices.lamps.errors", 0)
     board.lamps.rename(board.folder / "away")
-    until(lambda: flight.client.get("hal.devices.lamps.errors")["hal.devices.lamps.errors"] > 3)
+    until(lambda: flight.get("hal.devices.lamps.errors") > 3)
     (board.folder / "away").rename(board.lamps)
     said = flight.end()
     assert "device 'lamps' fails: the lamps: No such file or directory" in said, said

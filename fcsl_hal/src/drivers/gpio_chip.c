@@ -68,6 +68,7 @@ static uint64_t find_option(const char *text, size_t length, int outputs)
 
 static fcsl_driver_status_t parse(const char *device, int outputs, address_t *address, char *why, size_t size)
 {
+    address->flags = outputs ? GPIO_V2_LINE_FLAG_OUTPUT : GPIO_V2_LINE_FLAG_INPUT;
     const size_t length = strcspn(device, ",");
     if (length == 0u || length >= sizeof address->chip) {
         (void)snprintf(why, size, "name the GPIO chip: its file, or its label as gpiodetect shows it");
@@ -75,7 +76,6 @@ static fcsl_driver_status_t parse(const char *device, int outputs, address_t *ad
     }
     memcpy(address->chip, device, length);
     address->chip[length] = '\0';
-    address->flags = outputs ? GPIO_V2_LINE_FLAG_OUTPUT : GPIO_V2_LINE_FLAG_INPUT;
     const char *at = device + length;
     while (*at == ',') {
         const char *option = at + 1;
@@ -184,19 +184,6 @@ static fcsl_driver_status_t open_chip(const char *chip, int *file, uint32_t *lin
     return status;
 }
 
-fcsl_driver_status_t gpio_probe(const char *device, int outputs, char *why, size_t size)
-{
-    address_t address;
-    uint32_t lines = 0;
-    int file = -1;
-    fcsl_driver_status_t status = parse(device, outputs, &address, why, size);
-    status = status == FCSL_DRIVER_OK ? open_chip(address.chip, &file, &lines, why, size) : status;
-    if (status == FCSL_DRIVER_OK) {
-        (void)close(file);
-    }
-    return status;
-}
-
 /* ---- lines -------------------------------------------------------------------------------------------------------------- */
 
 /* Whether a line may be used; FAILED with a reason if not. What somebody drives is no input that is only looked at. */
@@ -275,33 +262,48 @@ static fcsl_driver_status_t claim_lines(int chip, uint64_t flags, const uint8_t 
     return FCSL_DRIVER_OK;
 }
 
-fcsl_driver_status_t gpio_check(const char *device, int outputs, uint8_t *used, char *why, size_t size)
+/* Opens the chip of an address. */
+static fcsl_driver_status_t open_address(const char *device, int outputs, int *chip, uint32_t *lines, uint64_t *flags,
+                                         char *why, size_t size)
 {
     address_t address;
+    const fcsl_driver_status_t status = parse(device, outputs, &address, why, size);
+    *flags = address.flags;
+    return status == FCSL_DRIVER_OK ? open_chip(address.chip, chip, lines, why, size) : status;
+}
+
+fcsl_driver_status_t gpio_probe(const char *device, int outputs, char *why, size_t size)
+{
     uint32_t lines = 0;
+    uint64_t flags = 0;
     int chip = -1;
-    fcsl_driver_status_t status = parse(device, outputs, &address, why, size);
-    status = status == FCSL_DRIVER_OK ? open_chip(address.chip, &chip, &lines, why, size) : status;
+    const fcsl_driver_status_t status = open_address(device, outputs, &chip, &lines, &flags, why, size);
     if (status == FCSL_DRIVER_OK) {
-        status = check_lines(chip, lines, used, why, size);
         (void)close(chip);
     }
     return status;
 }
 
+fcsl_driver_status_t gpio_check(const char *device, int outputs, uint8_t *used, char *why, size_t size)
+{
+    return gpio_claim(device, outputs, used, NULL, NULL, why, size);
+}
+
 fcsl_driver_status_t gpio_claim(const char *device, int outputs, uint8_t *used, const double *values, int *file,
                                 char *why, size_t size)
 {
-    address_t address;
     uint32_t lines = 0;
+    uint64_t flags = 0;
     int chip = -1;
-    fcsl_driver_status_t status = parse(device, outputs, &address, why, size);
-    status = status == FCSL_DRIVER_OK ? open_chip(address.chip, &chip, &lines, why, size) : status;
-    if (status == FCSL_DRIVER_OK) {
-        status = check_lines(chip, lines, used, why, size);
-        status = status == FCSL_DRIVER_OK ? claim_lines(chip, address.flags, used, values, file, why, size) : status;
-        (void)close(chip);
+    fcsl_driver_status_t status = open_address(device, outputs, &chip, &lines, &flags, why, size);
+    if (status != FCSL_DRIVER_OK) {
+        return status;
     }
+    status = check_lines(chip, lines, used, why, size);
+    if (status == FCSL_DRIVER_OK && file != NULL) {
+        status = claim_lines(chip, flags, used, values, file, why, size);
+    }
+    (void)close(chip);
     return status;
 }
 

@@ -84,19 +84,12 @@ class Flight(Program):
     """fcsl-fc with a client of its variables."""
 
     def __init__(self, craft: Craft, *options: str | Path, machine: str = "craft") -> None:
-        self._socket = Path(f"/tmp/socket{next(_numbers)}")
-        super().__init__(_BIN / "fcsl-fc", craft.library(machine), "--socket", self._socket, *options)
-        until("the flight program serves", lambda: self.process.poll() is not None or self._connect())
+        socket = Path(f"/tmp/socket{next(_numbers)}")
+        super().__init__(_BIN / "fcsl-fc", craft.library(machine), "--socket", socket, *options)
+        until("the flight program serves", lambda: self.process.poll() is not None or socket.exists())
         if self.process.poll() is not None:
             raise Failed(f"the flight cannot begin: {self.said()}")
-
-    def _connect(self) -> bool:
-        """The socket's path is there before the program listens."""
-        try:
-            self.client = VarClient(self._socket)
-        except VarError:
-            return False
-        return True
+        self.client = VarClient(socket)
 
     def get(self, path: str) -> Any:
         return self.client.get_value(path)
