@@ -9,6 +9,7 @@ import mmap
 import os
 import struct
 import subprocess
+import time
 from collections.abc import Callable, Iterator
 from pathlib import Path
 from typing import Any
@@ -295,3 +296,79 @@ def test_hardware_that_cannot_be_opened(place: tuple[str, ...], value: object, s
 
 def test_a_board_library_beside_it_is_refused(board: Board) -> None:
     assert "there is a board already" in board.refusal("--board", board.folder / "libchips.so")
+
+
+ONCE = '''class Panel:
+    """Writes once, and looks at a pin three times."""
+
+    outputs = {"level": "bool", "agree": "bool", "counts": "u32"}
+    state = {"is_on": "bool"}
+    parameters = {"button_pin": "u32"}
+
+    def execute(self):
+        if not self.is_on:
+            hw_write_gpio(17, True)
+            self.is_on = True
+        self.level = hw_read_gpio(self.button_pin)
+        second = hw_read_gpio(self.button_pin)
+        self.agree = second == self.level
+        self.counts = hw_read_adc(2)
+'''
+
+
+@pytest.fixture
+def written_once(board: Board) -> Board:
+    (board.folder / "panel.py").write_text(ONCE)
+    board.library = build_machine(board.folder / "panel.json", "simulation").library
+    return board
+
+
+def test_a_level_that_is_written_once_comes_back_with_its_device(
+    written_once: Board, fly: Callable[..., Flight]
+) -> None:
+    """So does the safe level of a pin that nobody writes."""
+    board = written_once
+    flight = fly()
+    until(lambda: board.lamps.read_text() == "11")
+    board.lamps.unlink()
+    flight.until_value("hal.devices.lamps.open", 0)
+    assert flight.get("hal.devices.lamps.lost") == 1
+    board.lamps.write_text("--")
+    until(lambda: board.lamps.read_text() == "11")
+    flight.until_value("hal.devices.lamps.open", 1)
+    flight.end()
+
+
+def test_a_device_that_fails_gives_no_old_value(written_once: Board, fly: Callable[..., Flight]) -> None:
+    board = written_once
+    flight = fly()
+    flight.until_value("panel.outputs.counts", 1234)
+    board.adc.write_text("broken\n")
+    flight.until_value("panel.outputs.counts", 0)
+    board.adc.write_text("77\n")
+    flight.until_value("panel.outputs.counts", 77)
+    flight.end()
+
+
+def test_safe_levels_are_tried_again_at_the_end(board: Board, fly: Callable[..., Flight]) -> None:
+    flight = fly()
+    board.lines.write_text("01")
+    until(lambda: board.lamps.read_text() == "10")
+    board.lamps.rename(board.folder / "away")
+    flight.client.close()
+    flight.process.terminate()
+    time.sleep(0.3)
+    (board.folder / "away").rename(board.lamps)
+    out, complaint = flight.process.communicate(timeout=60)
+    assert flight.process.returncode == 0 and board.lamps.read_text() == "01", out + complaint
+
+
+def test_pins_that_are_not_safe_are_told(board: Board, fly: Callable[..., Flight]) -> None:
+    flight = fly()
+    until(lambda: board.lamps.read_text() == "00")
+    board.lamps.unlink()
+    flight.client.close()
+    flight.process.terminate()
+    _, complaint = flight.process.communicate(timeout=60)
+    assert flight.process.returncode == 1
+    assert "1 devices of pins are NOT safe, the last of them 'lamps': the lamps: No such file" in complaint

@@ -61,7 +61,9 @@ class BoardWatch:
         if self._board is None:
             machine = self._client.describe()["machine"]
             if not self._client.list("hal.devices."):
-                raise BridgeError(f"the flight program at {self._address} has no board: --hal linux:PLAN has one")
+                raise BridgeError(
+                    f"the flight program at {self._address} has no board with devices: --hal linux:PLAN has one"
+                )
             self._board = BoardStatus(f"{self._node.get_namespace().rstrip('/')}/{machine}"[1:], machine)
             print(f"{machine}: its board is on /diagnostics", flush=True)
         self._statuses = self._board.look(self._client.get_value("hal"))

@@ -153,7 +153,7 @@ def test_a_flight_that_hangs_is_stale(domain: Domain, vehicle: Vehicle) -> None:
 def test_a_flight_without_a_board(domain: Domain, vehicle: Vehicle) -> None:
     vehicle.fly()
     node = domain.start("diagnostics_node", socket=vehicle.socket)
-    assert node.finish() == 1 and "has no board: --hal linux:PLAN has one" in node.err, node.err
+    assert node.finish() == 1 and "has no board with devices: --hal linux:PLAN has one" in node.err, node.err
 
 
 def test_a_node_without_its_socket(domain: Domain) -> None:

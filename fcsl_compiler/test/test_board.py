@@ -325,7 +325,15 @@ def test_a_channel_that_nothing_drives_on_purpose(folder: Path) -> None:
 
 
 @pytest.mark.parametrize(
-    "rest", [{}, {"sensors": {}}, {"outputs": {}}, {"hardware": {}}, {"sensors": {}, "outputs": {}}]
+    "rest",
+    [
+        {},
+        {"sensors": {}},
+        {"outputs": {}},
+        {"hardware": {}},
+        {"hardware": {"gpio": {}, "adc": {}}},
+        {"sensors": {}, "outputs": {}},
+    ],
 )
 def test_a_board_for_nothing(rest: dict[str, Any], folder: Path) -> None:
     (error,) = found(folder, {"machine": "quad.json", "devices": {}, **rest})
@@ -383,7 +391,7 @@ def test_outputs_without_a_machine(folder: Path) -> None:
     assert [d.code for d in found(folder, board)] == ["E502", "E516"]
 
 
-@pytest.mark.parametrize(("driver", "signals"), [("log", ["number", "flag"]), ("pwm", ["pulse2", "pulse1"])])
+@pytest.mark.parametrize(("driver", "signals"), [("gpio_out", ["line0", "line1"]), ("pwm", ["pulse2", "pulse1"])])
 def test_devices_of_actuators_have_no_period(driver: str, signals: list[str], folder: Path) -> None:
     board = edited("devices", "esc", "driver", value=driver)
     for element, signal in zip(board["outputs"]["motors"]["elements"], signals, strict=True):

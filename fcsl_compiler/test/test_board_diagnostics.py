@@ -26,6 +26,21 @@ PIN = {"device": "panel", "signal": "line1"}
 WINDOW = {"file": "/dev/uio1", "bytes": 8}
 
 
+def log_output(signal: str) -> Any:
+    """BOARD whose first motor goes to this signal of `log`, the other one nowhere else."""
+    board = edited("devices", "esc", value={"driver": "log", "device": "/tmp/log"})
+    for element, name in zip(board["outputs"]["motors"]["elements"], (signal, "number"), strict=True):
+        element["signal"] = name
+    return board
+
+
+def two_names_of_a_chip() -> Any:
+    """BOARD whose devices `lamps` and `more` are the same."""
+    board = edited("devices", "more", value=BOARD["devices"]["lamps"])
+    board["hardware"]["gpio"]["18"] |= {"device": "more", "signal": "line17"}
+    return board
+
+
 @pytest.fixture
 def folder(tmp_path: Path) -> Path:
     write_machine(tmp_path)
@@ -57,6 +72,7 @@ EDITS: Sequence[tuple[Any, str, str, str]] = [
     # signals of drivers
     (edited(*TOP, "signals", value={"gyro": "anglvel"}), "E521", "`iio_buffer` has no signal `anglvel`", '"anglvel"'),
     (edited(*FIRST, "signal", value="pulse16"), "E521", "driver `pwm` has no signal `pulse16`", '"pulse16"'),
+    (log_output("three"), "E521", "driver `log` has no signal `three`", '"three"'),
     (edited(*PINS, "4", "signal", value="line64"), "E521", "driver `gpio` has no signal `line64`", '"line64"'),
     (edited(*ADC, "0", "signal", value="voltage3"), "E521", "driver `adc` has no signal `voltage3`", '"voltage3"'),
     # hardware
@@ -77,6 +93,21 @@ EDITS: Sequence[tuple[Any, str, str, str]] = [
     (edited(*PINS, "18", "device", value="cells"), "E518", "device `cells` cannot be driven here", '"cells"'),
     (edited(*ADC, "0", "device", value="lamps"), "E518", "device `lamps` cannot be read here", '"lamps"'),
     (edited(*ADC, "0", "safe", value=False), "E201", "unknown key `safe`", '"safe"'),
+    (
+        edited(*PINS, "4", value={"device": "imu_side", "signal": "voltage0"}),
+        "E518",
+        "`imu_side` cannot be read",
+        '"imu',
+    ),
+    (
+        edited(*ADC, "0", value={"device": "imu_side", "signal": "voltage0"}),
+        "E518",
+        "`imu_side` cannot be read",
+        '"imu',
+    ),
+    (edited(*ADC, "0", value={"device": "panel", "signal": "line1"}), "E518", "`panel` cannot be read", '"panel"'),
+    (two_names_of_a_chip(), "E519", "signal `line17` of `more` has two sources", '"line17"'),
+    (edited("hardware", value={"gpio": 4}), "E208", "`gpio` is an object", "4"),
     (edited(*WINDOWS, "0x10000000g", value=WINDOW), "E203", "is no number", '"0x10000000g"'),
     (edited(*WINDOWS, "16", "bytes", value=6), "E522", "`bytes` is 6, no multiple of 4", "6"),
     (edited(*WINDOWS, "16", "bytes", value=0), "E204", "`bytes` is 0", "0"),
@@ -353,8 +384,10 @@ def test_hardware_that_the_machine_needs(folder: Path) -> None:
     warnings = found(folder, edited("hardware", value=REMOVED))
     assert [d.message for d in warnings if d.code == "W507"] == [
         "algorithm `Law` calls hw_read_adc, and the board has no `adc`",
-        "algorithm `Law` calls hw_read_gpio, and the board has no `gpio`",
-        "algorithm `Law` calls hw_write_gpio, and the board has no `gpio`",
+        "algorithm `Law` calls hw_read_gpio, and the board has no pins",
+        "algorithm `Law` calls hw_write_gpio, and the board has no pins with `safe`",
     ]
+    board = edited("hardware", value={"gpio": {"4": PIN}})
+    assert [d.why for d in found(folder, board) if d.code == "W507"] == ["it reads false or 0, and writes nothing"] * 2
     only_outputs = {k: v for k, v in BOARD.items() if k in ("machine", "devices", "outputs")}
     assert not [d for d in found(folder, only_outputs) if d.code == "W507"]  # fcsl-guard's board

@@ -283,11 +283,14 @@ static void check_refusals(void)
     CHECK(refuses(in, "gpiochip1", 8, FCSL_DRIVER_FAILED, "line8: the GPIO chip has 8 lines"));
     CHECK(refuses(in, "no_such", 1, FCSL_DRIVER_ABSENT, "no GPIO chip is called 'no_such'"));
     CHECK(refuses(in, "", 1, FCSL_DRIVER_ABSENT, "name the GPIO chip"));
-    CHECK(
-        refuses(in, "gpiochip1,pullup", 1, FCSL_DRIVER_FAILED, "'pullup' is no option; there are active_low, pull_up"));
-    CHECK(
-        refuses(out, "gpiochip1,pull_up", 1, FCSL_DRIVER_FAILED, "'pull_up' is no option; there are active_low, open"));
+    CHECK(refuses(in, "gpiochip1,pullup", 1, FCSL_DRIVER_FAILED,
+                  "'pullup' is no option here; there are active_low, and pull_up"));
+    CHECK(refuses(out, "gpiochip1,pull_up", 1, FCSL_DRIVER_FAILED,
+                  "'pull_up' is no option here; there are active_low, and open"));
     CHECK(refuses(in, "gpiochip1,", 1, FCSL_DRIVER_FAILED, "is no option"));
+    CHECK(refuses(in, "gpiochip1,pull_up,pull_down", 1, FCSL_DRIVER_FAILED, "'pull_down' is no option here"));
+    CHECK(refuses(out, "gpiochip1,open_source,open_drain", 1, FCSL_DRIVER_FAILED, "'open_drain' is no option here"));
+    CHECK(refuses(in, ",pull_up", 1, FCSL_DRIVER_FAILED, "name the GPIO chip"));
     CHECK(refuses(in, in_tree("plain"), 1, FCSL_DRIVER_FAILED, "no GPIO chip is at"));
     CHECK(refuses(in, in_tree("none"), 1, FCSL_DRIVER_ABSENT, "cannot open"));
     kernel.hogged[1] = 1u << 6;

@@ -57,7 +57,7 @@ def check_board(path: Path) -> Board:
     sensors = read_sensors(keys.get("sensors"), channels, backends, reader)
     actuators = OutputReader(machine, devices, reader, backends.used)
     outputs = actuators.read(keys.get("outputs"))
-    builtins = HardwareReader(devices, reader, backends.used, actuators.used)
+    builtins = HardwareReader(devices, reader, backends.used, actuators)
     hardware = builtins.read(keys.get("hardware"))
     pace = read_pace(keys.get("pace"), devices, backends.used, machine.tick_hz if machine else None, reader)
     _check_purpose(root, keys, reader)
@@ -97,6 +97,8 @@ def _refuse_machine(path: Path, root: JsonNode, sink: DiagnosticSink) -> None:
 def _check_purpose(root: JsonNode, keys: dict[str, JsonNode], reader: ConfigReader) -> None:
     """Reports a board without sensors, outputs and hardware."""
     parts = [keys[key] for key in ("sensors", "outputs", "hardware") if key in keys]
+    if "hardware" in keys and keys["hardware"].kind == "object":
+        parts = [*parts[:-1], *(member.value for member in keys["hardware"].members.values())]
     if root.kind == "object" and not any(part.kind != "object" or part.members for part in parts):
         reader.sink.error(
             "E202", "a board has no `sensors`, `outputs` or `hardware`", root.span, help="add one of them"

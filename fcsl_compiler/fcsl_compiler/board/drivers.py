@@ -45,7 +45,8 @@ WAITING = {
     "can": _numbered("value", 8),
 }
 SENSORS = {**POLLED, **BUFFERED, **WAITING}
-ACTUATORS = {"pwm": _numbered("pulse", 16), "gpio_out": _LINES, "log": ("number", "flag", "three", "four")}
+#: The signals that an output can drive: one f64 each.
+ACTUATORS = {"pwm": _numbered("pulse", 16), "gpio_out": _LINES, "log": ("number",)}
 #: Signals by driver.
 DRIVERS = {**SENSORS, **ACTUATORS}
 
@@ -63,7 +64,7 @@ def read_signal(node: JsonNode | None, what: str, reader: ConfigReader) -> str |
 
 
 def check_signal(name: str, driver: str, span: Span, reader: ConfigReader) -> None:
-    """Reports a signal that the driver does not have. Nothing is known of the drivers of libraries."""
+    """Reports a signal that the driver does not have, or that no output can drive. Nothing is known of the drivers of libraries."""
     known = DRIVERS.get(driver)
     if known is not None and name not in known:
         hint = nearest(name, known) or f"it has {_listed(known)}"

@@ -4,7 +4,7 @@
 from __future__ import annotations
 
 import re
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 
 from ..base.source import Span
@@ -13,9 +13,9 @@ from ..model.machine import Machine
 from ..parse.json_reader import ConfigReader
 from ..parse.json_source import JsonNode
 from .devices import Device
-from .drivers import ACTUATORS, check_signal, read_signal
+from .drivers import ACTUATORS, DRIVERS, check_signal, read_signal
 from .limits import MAX_CONVERTERS, MAX_PINS, MAX_REGISTERS, check_count, check_text
-from .outputs import misfit_as_output
+from .outputs import OutputReader, check_driven, misfit_as_output
 
 MAX_U32 = (1 << 32) - 1
 MAX_OFFSET = (1 << 62) - 4
@@ -25,14 +25,8 @@ _NUMBER = re.compile(r"0|[1-9][0-9]{0,9}")
 _ADDRESS = re.compile(r"0x[0-9a-fA-F]{1,8}|0|[1-9][0-9]{0,9}")
 #: Builtins by their names in C.
 _BUILTINS = {function.name: name for name, function in HARDWARE.items()}
-#: The key of `hardware` that each builtin needs.
-_NEEDS = {
-    "hw_read_gpio": "gpio",
-    "hw_write_gpio": "gpio",
-    "hw_read_adc": "adc",
-    "hw_read_u32": "registers",
-    "hw_write_u32": "registers",
-}
+#: Built-in drivers whose signals are levels, or counts; what comes on a CAN bus may be either.
+_LEVELS, _LEVELS_OUT, _COUNTS = ("gpio", "can"), ("gpio_out", "log"), ("adc", "can")
 
 
 @dataclass(frozen=True)
@@ -76,18 +70,17 @@ class Hardware:
 class HardwareReader:
     """Reads `hardware` of one board. `used` collects the names of devices.
 
-    `of_sensors`, `of_outputs`: the devices that sensors read, and that fcsl-guard drives.
+    `of_sensors`: the devices that sensors read; `outputs`: what fcsl-guard drives, and has been read.
     """
 
     def __init__(
-        self, devices: dict[str, Device | None], reader: ConfigReader, of_sensors: set[str], of_outputs: set[str]
+        self, devices: dict[str, Device | None], reader: ConfigReader, of_sensors: set[str], outputs: OutputReader
     ):
         self.devices, self.reader = devices, reader
         self.used: set[str] = set()
-        self._of_sensors, self._of_outputs = of_sensors, of_outputs
+        self._of_sensors, self._of_outputs, self._driven = of_sensors, outputs.used, outputs.driven
         self._inputs: set[str] = set()
         self._outputs: set[str] = set()
-        self._driven: dict[tuple[str, str], Span] = {}
 
     def read(self, node: JsonNode | None) -> Hardware:
         """What is without errors."""
@@ -106,12 +99,12 @@ class HardwareReader:
     # ---- numbers ---------------------------------------------------------------------------------------------------
 
     def _members(
-        self, node: JsonNode | None, what: str, limit: int, things: str
+        self, node: JsonNode | None, what: str, limit: int, things: str, example: str
     ) -> Iterator[tuple[str, JsonNode, Span]]:
         if node is None:
             return
         if node.kind != "object":
-            self.reader.wrong(node, f"{what} is an object from number to definition", '{"4": …}')
+            self.reader.wrong(node, f"{what} is an object from number to definition", f'{{"{example}": …}}')
             return
         check_count(len(node.members), limit, things, node, self.reader)
         yield from ((text, member.value, member.key_span) for text, member in node.members.items())
@@ -119,7 +112,7 @@ class HardwareReader:
     def _numbered(
         self, node: JsonNode | None, what: str, limit: int, things: str
     ) -> Iterator[tuple[int | None, str, JsonNode]]:
-        for text, value, span in self._members(node, what, limit, things):
+        for text, value, span in self._members(node, what, limit, things, "4"):
             yield self._number(text, _NUMBER, span), f"{what} {text}", value
 
     def _number(self, text: str, pattern: re.Pattern[str], span: Span) -> int | None:
@@ -138,27 +131,30 @@ class HardwareReader:
         if keys is None:
             return None
         safe = self.reader.boolean(keys.get("safe"), "`safe`")
-        device, signal = self._signal(keys, is_output="safe" in keys)
+        is_output = "safe" in keys
+        device, signal = self._signal(keys, is_output, _LEVELS_OUT if is_output else _LEVELS)
         if number is None or device is None or signal is None or (safe is None and "safe" in keys):
             return None
         return Pin(number, device, signal, safe)
 
     def _converter(self, number: int | None, what: str, node: JsonNode) -> Converter | None:
         keys = self.reader.object(node, what, ("device", "signal"))
-        device, signal = self._signal(keys, is_output=False) if keys is not None else (None, None)
+        device, signal = self._signal(keys, False, _COUNTS) if keys is not None else (None, None)
         return None if number is None or device is None or signal is None else Converter(number, device, signal)
 
-    def _signal(self, keys: dict[str, JsonNode], is_output: bool) -> tuple[Device | None, str | None]:
+    def _signal(
+        self, keys: dict[str, JsonNode], is_output: bool, drivers: Sequence[str]
+    ) -> tuple[Device | None, str | None]:
         node = keys.get("signal")
-        device = self._device(keys.get("device"), is_output)
+        device = self._device(keys.get("device"), is_output, drivers)
         signal = read_signal(node, "`signal`", self.reader)
         if node is not None and device is not None and signal is not None:
             check_signal(signal, device.driver, node.span, self.reader)
             if is_output:
-                self._check_driven(device, signal, node.span)
+                check_driven(self._driven, signal, device, node.span, self.reader)
         return device, signal
 
-    def _device(self, node: JsonNode | None, is_output: bool) -> Device | None:
+    def _device(self, node: JsonNode | None, is_output: bool, drivers: Sequence[str]) -> Device | None:
         names = list(self.devices)
         index = self.reader.reference(node, "device", names)
         if node is None or index is None:
@@ -169,6 +165,8 @@ class HardwareReader:
         if device is None:
             return None
         problem = self._misfit(device, is_output)
+        if not problem and device.driver in DRIVERS and device.driver not in drivers:
+            problem = f"`{device.driver}` has no {'counts' if drivers is _COUNTS else 'levels'}; {_either(drivers)} has"
         if problem:
             what, fix = ("be driven", "") if is_output else ("be read", 'an output has `"safe": false` or true')
             fix = fix if device.driver in ACTUATORS else ""
@@ -188,17 +186,11 @@ class HardwareReader:
             return f"`{device.driver}` drives actuators"
         return "another pin drives it, and a driver reads or writes" if device.name in self._outputs else ""
 
-    def _check_driven(self, device: Device, signal: str, span: Span) -> None:
-        first = self._driven.setdefault((device.name, signal), span)
-        if first is not span:
-            message, notes = f"signal `{signal}` of `{device.name}` has two sources", [(first, "the other")]
-            self.reader.sink.error("E519", message, span, help="a pin has a signal of its own", notes=notes)
-
     # ---- registers -------------------------------------------------------------------------------------------------
 
     def _registers(self, node: JsonNode | None) -> tuple[Registers, ...]:
         found: list[Registers] = []
-        for text, value, span in self._members(node, "`registers`", MAX_REGISTERS, "windows of registers"):
+        for text, value, span in self._members(node, "`registers`", MAX_REGISTERS, "windows of registers", "0x1000"):
             window = self._window(text, value, span)
             if window is None:
                 continue
@@ -237,13 +229,27 @@ class HardwareReader:
 
 def warn_unreached(hardware: Hardware, machine: Machine | None, node: JsonNode, reader: ConfigReader) -> None:
     """Warns of builtins that the machine calls and the board has nothing for. `node`: of `machine`."""
-    has = {"gpio": hardware.pins, "adc": hardware.converters, "registers": hardware.registers}
+    has = {
+        "hw_read_gpio": ("pins", hardware.pins),
+        "hw_write_gpio": ("pins with `safe`", [pin for pin in hardware.pins if pin.safe is not None]),
+        "hw_read_adc": ("`adc`", hardware.converters),
+        "hw_read_u32": ("`registers`", hardware.registers),
+        "hw_write_u32": ("`registers` with `write`", [window for window in hardware.registers if window.write]),
+    }
+    simulated = hardware == Hardware()
+    why = "without `hardware` it reaches simulated hardware" if simulated else "it reads false or 0, and writes nothing"
     for algorithm in machine.algorithms if machine is not None else ():
-        called = {_BUILTINS[e.function.name]: e.span for e in algorithm.effects if e.is_hardware}
-        for builtin, span in sorted(called.items()):
-            key = _NEEDS[builtin]
-            if not has[key]:
-                message = f"algorithm `{algorithm.name}` calls {builtin}, and the board has no `{key}`"
-                why = "without `hardware` it reaches simulated hardware, and else nothing"
-                fix, notes = f"add `{key}` to `hardware`", [(span, "the call")]
+        calls: dict[str, Span] = {}
+        for effect in algorithm.effects:
+            if effect.is_hardware:
+                calls.setdefault(_BUILTINS[effect.function.name], effect.span)
+        for builtin, span in sorted(calls.items()):
+            what, found = has[builtin]
+            if not found:
+                message = f"algorithm `{algorithm.name}` calls {builtin}, and the board has no {what}"
+                fix, notes = "add them to `hardware`", [(span, "the call")]
                 reader.sink.warning("W507", message, node.span, why=why, help=fix, notes=notes)
+
+
+def _either(drivers: Sequence[str]) -> str:
+    return " or ".join(f"`{driver}`" for driver in drivers)

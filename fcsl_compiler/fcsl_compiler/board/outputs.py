@@ -42,7 +42,7 @@ class OutputReader:
         self._of_sensors = of_sensors
         self._channels: set[str] = set()
         #: By driver, address and signal: two devices with one address are the same.
-        self._driven: dict[tuple[str, str, str], Span] = {}
+        self.driven: dict[tuple[str, str, str], Span] = {}
 
     def read(self, node: JsonNode | None) -> tuple[Output, ...]:
         """Outputs in the order of the file; those with errors are missing."""
@@ -135,15 +135,9 @@ class OutputReader:
         for pulse, item in zip(pulses, items, strict=True):
             if pulse is not None and device is not None:
                 check_signal(pulse.signal, device.driver, item.members["signal"].value.span, self.reader)
-                self._check_driven(pulse.signal, device, item.span)
+                check_driven(self.driven, pulse.signal, device, item.span, self.reader)
                 self._check_period(pulse, device, item.span)
         return tuple(p for p in pulses if p is not None)
-
-    def _check_driven(self, signal: str, device: Device, span: Span) -> None:
-        first = self._driven.setdefault((device.driver, device.address, signal), span)
-        if first is not span:
-            message, notes = f"signal `{signal}` of `{device.name}` has two sources", [(first, "the other")]
-            self.reader.sink.error("E519", message, span, help="an element has a signal of its own", notes=notes)
 
     def _check_period(self, pulse: Pulse, device: Device, span: Span) -> None:
         """Pulses of the driver pwm fit into its period, which is in the address."""
@@ -154,6 +148,16 @@ class OutputReader:
             notes = [(device.span, "the device")]
             fix = "shorten the pulse, or write a lower frequency behind the @ of the device"
             self.reader.sink.error("E516", message, span, help=fix, notes=notes)
+
+
+def check_driven(
+    driven: dict[tuple[str, str, str], Span], signal: str, device: Device, span: Span, reader: ConfigReader
+) -> None:
+    """Reports a signal that is driven already. `driven`: those that are, by driver, address and signal."""
+    first = driven.setdefault((device.driver, device.address, signal), span)
+    if first is not span:
+        message, notes = f"signal `{signal}` of `{device.name}` has two sources", [(first, "the other")]
+        reader.sink.error("E519", message, span, help="an element and a pin have a signal of their own", notes=notes)
 
 
 def misfit_as_output(device: Device, read: set[str]) -> str:

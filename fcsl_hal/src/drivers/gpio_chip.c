@@ -47,23 +47,27 @@ typedef struct {
 static const struct {
     const char *name;
     uint64_t flag;
+    uint64_t others; /* that exclude it */
     int outputs; /* 0: of inputs, 1: of outputs, -1: of both */
 } OPTIONS[] = {
-    {"active_low", GPIO_V2_LINE_FLAG_ACTIVE_LOW, -1},   {"pull_up", GPIO_V2_LINE_FLAG_BIAS_PULL_UP, 0},
-    {"pull_down", GPIO_V2_LINE_FLAG_BIAS_PULL_DOWN, 0}, {"open_drain", GPIO_V2_LINE_FLAG_OPEN_DRAIN, 1},
-    {"open_source", GPIO_V2_LINE_FLAG_OPEN_SOURCE, 1},
+    {"active_low", GPIO_V2_LINE_FLAG_ACTIVE_LOW, 0, -1},
+    {"pull_up", GPIO_V2_LINE_FLAG_BIAS_PULL_UP, GPIO_V2_LINE_FLAG_BIAS_PULL_DOWN, 0},
+    {"pull_down", GPIO_V2_LINE_FLAG_BIAS_PULL_DOWN, GPIO_V2_LINE_FLAG_BIAS_PULL_UP, 0},
+    {"open_drain", GPIO_V2_LINE_FLAG_OPEN_DRAIN, GPIO_V2_LINE_FLAG_OPEN_SOURCE, 1},
+    {"open_source", GPIO_V2_LINE_FLAG_OPEN_SOURCE, GPIO_V2_LINE_FLAG_OPEN_DRAIN, 1},
 };
 
-/* The flag of an option of so many characters; 0: there is none. */
-static uint64_t find_option(const char *text, size_t length, int outputs)
+/* Adds an option of so many characters. 0, or -1: there is none, or another one excludes it. */
+static int add_option(const char *text, size_t length, int outputs, uint64_t *flags)
 {
     for (size_t i = 0; i < sizeof OPTIONS / sizeof OPTIONS[0]; i++) {
         if (strlen(OPTIONS[i].name) == length && memcmp(OPTIONS[i].name, text, length) == 0 &&
-            (OPTIONS[i].outputs < 0 || OPTIONS[i].outputs == outputs)) {
-            return OPTIONS[i].flag;
+            (OPTIONS[i].outputs < 0 || OPTIONS[i].outputs == outputs) && (*flags & OPTIONS[i].others) == 0u) {
+            *flags |= OPTIONS[i].flag;
+            return 0;
         }
     }
-    return 0;
+    return -1;
 }
 
 static fcsl_driver_status_t parse(const char *device, int outputs, address_t *address, char *why, size_t size)
@@ -72,7 +76,7 @@ static fcsl_driver_status_t parse(const char *device, int outputs, address_t *ad
     const size_t length = strcspn(device, ",");
     if (length == 0u || length >= sizeof address->chip) {
         (void)snprintf(why, size, "name the GPIO chip: its file, or its label as gpiodetect shows it");
-        return FCSL_DRIVER_ABSENT;
+        return device[0] == '\0' ? FCSL_DRIVER_ABSENT : FCSL_DRIVER_FAILED;
     }
     memcpy(address->chip, device, length);
     address->chip[length] = '\0';
@@ -80,13 +84,12 @@ static fcsl_driver_status_t parse(const char *device, int outputs, address_t *ad
     while (*at == ',') {
         const char *option = at + 1;
         const size_t end = strcspn(option, ",");
-        const uint64_t flag = find_option(option, end, outputs);
-        if (flag == 0u) {
-            (void)snprintf(why, size, "'%.40s' is no option; there are %s", option,
-                           outputs ? "active_low, open_drain, open_source" : "active_low, pull_up, pull_down");
+        if (add_option(option, end, outputs, &address->flags) != 0) {
+            (void)snprintf(why, size, "'%.40s' is no option here; there are %s", option,
+                           outputs ? "active_low, and open_drain or open_source"
+                                   : "active_low, and pull_up or pull_down");
             return FCSL_DRIVER_FAILED;
         }
-        address->flags |= flag;
         at = option + end;
     }
     return FCSL_DRIVER_OK;

@@ -15,6 +15,10 @@
 #include "base/error.h"
 #include "base/timespec.h"
 
+/* How long a sample stands for what is on a pin. */
+static const uint64_t LATEST_NS = 500000000u;
+enum { PERIODS = 3 };
+
 /* A backend of a sensor, seen from its device. */
 typedef struct {
     uint32_t device;
@@ -127,9 +131,15 @@ board_devices_t *board_devices_new(const board_plan_t *plan, fcsl_error_t *error
 int board_devices_use(board_devices_t *devices, uint32_t device, const char *signal, fcsl_error_t *error)
 {
     uint32_t count = 0;
-    return use_device(devices, device, error) == 0
-               ? sensor_device_use(devices->devices[device], signal, "", FCSL_DRIVER_NEEDED, 1, &count, error)
-               : -1;
+    if (use_device(devices, device, error) != 0) {
+        return -1;
+    }
+    const int at = sensor_device_use(devices->devices[device], signal, "", FCSL_DRIVER_NEEDED, 2, &count, error);
+    if (at >= 0 && count != 1u) {
+        return fcsl_fail(error, "device '%.60s': signal '%.60s' has several values, and a pin or a count is one",
+                         devices->plan->devices[device].name, signal);
+    }
+    return at;
 }
 
 int board_devices_start(board_devices_t *devices, int priority, fcsl_error_t *error)
@@ -221,6 +231,18 @@ static int take_sample(board_devices_t *devices, uint32_t d, sensor_reading_t *r
     return 1;
 }
 
+/* Once a tick, so that all reads of a tick agree. */
+static void judge_latest(board_devices_t *devices, uint32_t d, uint64_t now_ns)
+{
+    const uint64_t period_ns = devices->plan->devices[d].period_ns;
+    const uint64_t limit_ns = PERIODS * period_ns > LATEST_NS ? PERIODS * period_ns : LATEST_NS;
+    const int is_old =
+        period_ns > 0u && now_ns > devices->latest[d].sample_ns && now_ns - devices->latest[d].sample_ns > limit_ns;
+    if (is_old || !sensor_device_is_well(devices->devices[d])) {
+        devices->has_latest[d] = 0;
+    }
+}
+
 static int has_feed(const board_devices_t *devices, uint32_t d)
 {
     for (uint32_t i = 0; i < devices->feed_count; i++) {
@@ -234,6 +256,7 @@ static int has_feed(const board_devices_t *devices, uint32_t d)
 uint32_t board_devices_take(board_devices_t *devices, sensor_reading_t *readings, uint32_t capacity)
 {
     const uint32_t share = devices->feed_count > 0u ? capacity / devices->feed_count : 0u; /* of a device */
+    const uint64_t now_ns = fcsl_run_monotonic_ns(NULL);
     uint32_t count = 0;
     for (uint32_t d = 0; d < devices->plan->device_count; d++) {
         uint32_t samples = DEVICE_RING_SAMPLES; /* of one that makes no readings */
@@ -248,6 +271,7 @@ uint32_t board_devices_take(board_devices_t *devices, sensor_reading_t *readings
         }
         for (uint32_t i = 0; i < samples && take_sample(devices, d, readings, &count); i++) {
         }
+        judge_latest(devices, d, now_ns);
     }
     return count;
 }
@@ -259,8 +283,7 @@ device_counts_t board_devices_counts(const board_devices_t *devices, uint32_t de
 
 const device_sample_t *board_devices_latest(const board_devices_t *devices, uint32_t device)
 {
-    const int is_there = devices->has_latest[device] != 0u && board_devices_counts(devices, device).open != 0u;
-    return is_there ? &devices->latest[device] : NULL;
+    return devices->has_latest[device] != 0u ? &devices->latest[device] : NULL;
 }
 
 const char *board_devices_news(board_devices_t *devices)

@@ -18,8 +18,8 @@ typedef struct board_devices board_devices_t;
 /* Finds drivers and signals; opens nothing. Quantities that the machine gets must have a signal. `plan` must outlive it. Null with
  * `error`. */
 board_devices_t *board_devices_new(const board_plan_t *plan, fcsl_error_t *error);
-/* Before the start: what hw_read_… of a pin or a converter needs. Returns where the signal, a scalar, lies among the latest values of the
- * device of the plan, or -1 with `error`. */
+/* Before the start: what hw_read_… of a pin or a converter needs. Returns where the signal, which must be a scalar, lies among the latest
+ * values of the device of the plan, or -1 with `error`. */
 int board_devices_use(board_devices_t *devices, uint32_t device, const char *signal, fcsl_error_t *error);
 /* Opens all devices and starts their threads, with this priority of SCHED_FIFO (0: as any thread). 0, or -1. */
 int board_devices_start(board_devices_t *devices, int priority, fcsl_error_t *error);
@@ -32,7 +32,8 @@ void board_devices_interrupt(board_devices_t *devices);
  * paces the loop. At most `capacity` readings, of which each device has its share: of one that gave more the oldest samples are dropped.
  * Returns how many. Does not wait. */
 uint32_t board_devices_take(board_devices_t *devices, sensor_reading_t *readings, uint32_t capacity);
-/* The newest sample that was taken of a device that is there; null: there is none. */
+/* The newest sample of a device as of the last board_devices_take. Null: there is none, its last read failed, or it is old: of a device
+ * with a rate three periods, and half a second at least. */
 const device_sample_t *board_devices_latest(const board_devices_t *devices, uint32_t device);
 /* Throws away what the devices have given, but the newest sample of each. */
 void board_devices_discard(board_devices_t *devices);

@@ -23,7 +23,10 @@ static const double ON = 0.5; /* the least value of a signal that is on */
 /* A device that has driven pins. */
 typedef struct {
     output_device_t *device; /* null: it has none */
-    uint64_t missed; /* as it was told */
+    uint64_t missed; /* writes, as of the last tick */
+    uint64_t lost; /* how often it began to fail */
+    int is_failing;
+    int is_told; /* that it fails */
     uint64_t told_ns;
 } output_t;
 
@@ -36,6 +39,7 @@ struct board_hardware {
     uint32_t converter_at[BOARD_CONVERTERS_MAX];
     register_window_t windows[BOARD_REGISTERS_MAX];
     struct fcsl_hw table;
+    int is_started;
     char news[NEWS_BYTES];
 };
 
@@ -44,7 +48,7 @@ static uint64_t now_ns(void)
     return fcsl_run_monotonic_ns(NULL);
 }
 
-/* ---- outputs -------------------------------------------------------------------------------------------------------- */
+/* ---- levels --------------------------------------------------------------------------------------------------------- */
 
 static void put_levels(board_hardware_t *hardware, uint32_t device)
 {
@@ -60,16 +64,39 @@ static void put_levels(board_hardware_t *hardware, uint32_t device)
     output_device_put(output, now_ns());
 }
 
-static void put_safe_levels(board_hardware_t *hardware)
+static int is_open(const output_t *output)
 {
-    const board_plan_t *plan = hardware->plan;
-    for (uint32_t i = 0; i < plan->pin_count; i++) {
-        hardware->levels[i] = plan->pins[i].safe != 0;
+    return output->device != NULL && output_device_is_open(output->device);
+}
+
+/* By the writes before this one: one that still lasts says nothing yet. */
+static void judge(output_t *output)
+{
+    const uint64_t missed = output_device_missed(output->device);
+    const int was_failing = output->is_failing;
+    if (missed != output->missed) {
+        output->is_failing = 1;
+    } else if (!output_device_is_busy(output->device)) {
+        output->is_failing = 0;
     }
-    for (uint32_t d = 0; d < plan->device_count; d++) {
-        if (hardware->outputs[d].device != NULL && output_device_is_open(hardware->outputs[d].device)) {
+    output->missed = missed;
+    output->lost += output->is_failing && !was_failing;
+}
+
+void board_hardware_tick(board_hardware_t *hardware)
+{
+    for (uint32_t d = 0; d < hardware->plan->device_count; d++) {
+        if (is_open(&hardware->outputs[d])) {
+            judge(&hardware->outputs[d]);
             put_levels(hardware, d);
         }
+    }
+}
+
+static void set_safe_levels(board_hardware_t *hardware)
+{
+    for (uint32_t i = 0; i < hardware->plan->pin_count; i++) {
+        hardware->levels[i] = hardware->plan->pins[i].safe != 0;
     }
 }
 
@@ -120,7 +147,6 @@ static int32_t write_gpio(void *ctx, uint32_t number, bool level)
         return -1;
     }
     hardware->levels[i] = level ? 1u : 0u;
-    put_levels(hardware, plan->pins[i].device);
     return 0;
 }
 
@@ -286,7 +312,9 @@ int board_hardware_start(board_hardware_t *hardware, int priority, fcsl_error_t 
             return fcsl_fail(error, "device '%.60s': %.400s", plan->devices[d].name, why.text);
         }
     }
-    put_safe_levels(hardware);
+    hardware->is_started = 1;
+    set_safe_levels(hardware);
+    board_hardware_tick(hardware);
     return 0;
 }
 
@@ -294,13 +322,19 @@ int board_hardware_start(board_hardware_t *hardware, int priority, fcsl_error_t 
 
 int board_hardware_counts(const board_hardware_t *hardware, uint32_t device, device_counts_t *counts)
 {
-    const output_device_t *output = hardware->outputs[device].device;
-    if (output == NULL) {
+    const output_t *output = &hardware->outputs[device];
+    if (output->device == NULL) {
         return 0;
     }
-    *counts =
-        (device_counts_t){.errors = output_device_missed(output), .open = (uint64_t)output_device_is_open(output)};
+    *counts = (device_counts_t){
+        .errors = output->missed, .lost = output->lost, .open = (uint64_t)(is_open(output) && !output->is_failing)};
     return 1;
+}
+
+static const char *reason_of(const output_t *output)
+{
+    const char *reason = output_device_reason(output->device);
+    return reason[0] != '\0' ? reason : "the driver gives no reason";
 }
 
 const char *board_hardware_news(board_hardware_t *hardware)
@@ -308,15 +342,14 @@ const char *board_hardware_news(board_hardware_t *hardware)
     const uint64_t now = now_ns();
     for (uint32_t d = 0; d < hardware->plan->device_count; d++) {
         output_t *output = &hardware->outputs[d];
-        const uint64_t missed = output->device != NULL ? output_device_missed(output->device) : 0u;
-        if (missed == output->missed || now - output->told_ns < NEWS_NS) {
+        if (output->is_failing == output->is_told || now - output->told_ns < NEWS_NS) {
             continue;
         }
-        output->missed = missed;
+        output->is_told = output->is_failing;
         output->told_ns = now;
-        const char *reason = output_device_reason(output->device);
-        (void)snprintf(hardware->news, sizeof hardware->news, "device '%.60s' fails: %s",
-                       hardware->plan->devices[d].name, reason[0] != '\0' ? reason : "the driver gives no reason");
+        (void)snprintf(hardware->news, sizeof hardware->news, "device '%.60s' %s%s", hardware->plan->devices[d].name,
+                       output->is_failing ? "fails: " : "takes its levels again",
+                       output->is_failing ? reason_of(output) : "");
         return hardware->news;
     }
     return NULL;
@@ -324,38 +357,60 @@ const char *board_hardware_news(board_hardware_t *hardware)
 
 /* ---- the end -------------------------------------------------------------------------------------------------------- */
 
-static int are_taken(const board_hardware_t *hardware)
+/* Hands the levels to the devices that have written the last ones, and returns how many have not taken them; *one: the last of those. */
+static uint32_t count_unsafe(board_hardware_t *hardware, int puts, uint32_t *one)
 {
+    uint32_t count = 0;
     for (uint32_t d = 0; d < hardware->plan->device_count; d++) {
-        const output_device_t *device = hardware->outputs[d].device;
-        if (device != NULL && output_device_is_open(device) && !output_device_has_taken(device)) {
-            return 0;
+        output_t *output = &hardware->outputs[d];
+        if (!is_open(output) || output_device_has_taken(output->device)) {
+            continue;
         }
+        if (puts && !output_device_is_busy(output->device)) {
+            put_levels(hardware, d);
+        }
+        *one = d;
+        count++;
     }
-    return 1;
+    return count;
 }
 
-static void make_safe(board_hardware_t *hardware)
+int board_hardware_end(board_hardware_t *hardware, fcsl_error_t *error)
 {
     const struct timespec look = {.tv_nsec = LOOK_NS};
     const uint64_t end_ns = now_ns() + END_NS;
-    put_safe_levels(hardware);
+    uint32_t one = 0;
+    if (!hardware->is_started) {
+        return 0;
+    }
+    hardware->is_started = 0;
+    set_safe_levels(hardware);
+    board_hardware_tick(hardware);
     for (uint32_t d = 0; d < hardware->plan->device_count; d++) {
-        if (hardware->outputs[d].device != NULL) {
+        if (is_open(&hardware->outputs[d])) {
             output_device_await(hardware->outputs[d].device);
         }
     }
-    while (!are_taken(hardware) && now_ns() < end_ns) {
+    uint32_t missing = count_unsafe(hardware, 0, &one);
+    while (missing > 0u && now_ns() < end_ns) {
         (void)nanosleep(&look, NULL);
+        missing = count_unsafe(hardware, 1, &one);
     }
+    if (missing == 0u) {
+        return 0;
+    }
+    return fcsl_fail(error, "%u devices of pins are NOT safe, the last of them '%.60s': %.200s", missing,
+                     hardware->plan->devices[one].name, reason_of(&hardware->outputs[one]));
 }
 
 void board_hardware_free(board_hardware_t *hardware)
 {
+    fcsl_error_t ignored; /* the flight has told it, or never began */
     if (hardware == NULL) {
         return;
     }
-    make_safe(hardware);
+    (void)board_hardware_end(hardware, &ignored);
+    const uint64_t until_ns = now_ns() + END_NS;
     for (uint32_t d = 0; d < hardware->plan->device_count; d++) {
         if (hardware->outputs[d].device != NULL) {
             output_device_end(hardware->outputs[d].device);
@@ -363,7 +418,7 @@ void board_hardware_free(board_hardware_t *hardware)
     }
     for (uint32_t d = 0; d < hardware->plan->device_count; d++) {
         if (hardware->outputs[d].device != NULL) {
-            output_device_free(hardware->outputs[d].device, now_ns() + END_NS);
+            output_device_free(hardware->outputs[d].device, until_ns);
         }
     }
     for (uint32_t i = 0; i < hardware->plan->registers_count; i++) {

@@ -117,11 +117,14 @@ static fcsl_hal_status_t linux_sample(void *ctx, uint64_t tick, uint8_t *bytes, 
     return FCSL_HAL_NONE; /* the channels have their samples already */
 }
 
-/* Those of fcsl-guard move actuators, if there is one. */
+/* The tick is over: pins get their levels. Actuators are moved by fcsl-guard, if there is one. */
 static fcsl_hal_status_t linux_command(void *ctx, const fcsl_message_t *message)
 {
-    (void)ctx;
+    hal_t *hal = ctx;
     (void)message;
+    if (hal->hardware != NULL) {
+        board_hardware_tick(hal->hardware);
+    }
     return FCSL_HAL_OK;
 }
 
@@ -193,6 +196,9 @@ static void linux_alive(void *ctx)
 {
     hal_t *hal = ctx;
     board_devices_discard(hal->devices);
+    if (hal->hardware != NULL) {
+        board_hardware_tick(hal->hardware);
+    }
     hal->paced_ns = hal->paced_ns > 0u ? hal->base.now_ns(hal->base.ctx) : 0u;
 }
 
@@ -264,6 +270,12 @@ static int open_board(hal_t *hal, const char *file, fcsl_error_t *error)
     }
     fcsl_run_use_board(hal->run, board_hardware_table(hal->hardware));
     return 0;
+}
+
+int hal_linux_end(const fcsl_hal_t *hal, fcsl_error_t *error)
+{
+    const hal_t *self = hal->ctx;
+    return self->hardware != NULL ? board_hardware_end(self->hardware, error) : 0;
 }
 
 int hal_linux_feeds(const fcsl_hal_t *hal, uint32_t channel)

@@ -12,6 +12,8 @@
 /* `file`: the plan that `fcslc board` has written, for the machine of `run`; `priority`: of the devices' threads, with SCHED_FIFO (0: as any
  * thread). 0, or -1. */
 int hal_linux(const char *file, int priority, fcsl_run_t *run, fcsl_hal_t *hal, fcsl_error_t *error);
+/* After the last tick: makes pins safe. 0, or -1: one is not. */
+int hal_linux_end(const fcsl_hal_t *hal, fcsl_error_t *error);
 /* Whether a sensor of the board gives this channel of the machine its samples. */
 int hal_linux_feeds(const fcsl_hal_t *hal, uint32_t channel);
 /* Records the readings of the devices with the run, which is being recorded (readings.h). 0, or -1. */

@@ -43,6 +43,7 @@ static int map(register_window_t *window, int file, fcsl_error_t *error)
 int register_window_open(register_window_t *window, const board_registers_t *plan, fcsl_error_t *error)
 {
     *window = (register_window_t){.plan = plan};
+    /* O_SYNC: /dev/mem is not cached then. */
     const int file = open(plan->file, (plan->is_written ? O_RDWR : O_RDONLY) | O_SYNC | O_CLOEXEC);
     if (file < 0) {
         return fcsl_fail(error, "registers of '%.300s': %s", plan->file, strerror(errno));

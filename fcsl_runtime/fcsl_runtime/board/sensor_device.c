@@ -347,6 +347,11 @@ int sensor_device_has_sample(const sensor_device_t *device)
            atomic_load_explicit(&device->written, memory_order_acquire);
 }
 
+int sensor_device_is_well(const sensor_device_t *device)
+{
+    return atomic_load(&device->condition) == DEVICE_OPEN;
+}
+
 device_counts_t sensor_device_counts(const sensor_device_t *device)
 {
     return (device_counts_t){

@@ -43,6 +43,8 @@ int sensor_device_start(sensor_device_t *device, int priority, fcsl_error_t *err
 int sensor_device_take(sensor_device_t *device, device_sample_t *sample);
 /* Drops the oldest samples until `most` are left at most, and counts them. */
 void sensor_device_skip(sensor_device_t *device, uint32_t most);
+/* Whether the device is there, and its last read did not fail. */
+int sensor_device_is_well(const sensor_device_t *device);
 /* Whether one waits. */
 int sensor_device_has_sample(const sensor_device_t *device);
 device_counts_t sensor_device_counts(const sensor_device_t *device);

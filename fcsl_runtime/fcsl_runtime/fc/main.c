@@ -378,6 +378,13 @@ static int close_all(program_t *program)
     return status;
 }
 
+/* Pins of the board, if there is one, get their safe levels. */
+static int end_board(program_t *program)
+{
+    fcsl_error_t error;
+    return program->board.ctx == NULL || hal_linux_end(&program->board, &error) == 0 ? 0 : complain(error.text);
+}
+
 static int fly(program_t *program)
 {
     loop_t *loop = &program->loop;
@@ -388,6 +395,7 @@ static int fly(program_t *program)
     }
     monitor_end(&program->monitor);
     guard_link_close(loop); /* at once: to close a bag takes time */
+    status = end_board(program) == 0 ? status : EXIT_RUN;
     fcsl_telemetry_stop(loop->telemetry);
     fcsl_observers_stop(loop->observers);
     fcsl_ros_graph_stop(loop->ros);

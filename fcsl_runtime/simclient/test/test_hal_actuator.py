@@ -156,7 +156,9 @@ def process(proc: Path, number: int, folder: Path, *words: str) -> None:
         (("fcsl-fc", "lib.so", "--hal", "linux:board.plan"), True),
         (("fcsl-fc", "lib.so", "--hal", "composite:board.plan,wire:unix:/s,x"), True),
         (("fcsl-fc", "lib.so", "--hal", "composite:board.plan,zenoh:tcp/localhost:7447"), True),
-        (("fcsl-fc", "lib.so", "--hal", "linux:missing.plan"), False),
+        (("fcsl-fc", "lib.so", "--hal", "linux:missing.plan"), True),
+        (("fcsl-fc", "lib.so", "--hal", "linux:pins.plan"), True),
+        (("fcsl-fc", "lib.so", "--hal", "linux:inputs.plan"), False),
         (("fcsl-fc", "lib.so", "--hal", "stub"), False),
         (("cat", "--board", "board.plan"), False),
         ((), False),
@@ -164,6 +166,9 @@ def process(proc: Path, number: int, folder: Path, *words: str) -> None:
 )
 def test_programs_that_have_the_device(tmp_path: Path, words: tuple[str, ...], is_used: bool) -> None:
     write_plan(tmp_path, "pwm", "pwmchip0")
+    for name, pin in (("pins", "gpio_out 17 esc line3 0"), ("inputs", "gpio_in 17 esc line3")):
+        lines = ["fcsl-board-plan 1", "machine craft 100", "device esc 0 pwm pwmchip0", pin, "end", ""]
+        (tmp_path / f"{name}.plan").write_text("\n".join(lines))
     process(tmp_path / "proc", 7, tmp_path, *words)
     (tmp_path / "proc/self").mkdir()
     assert bool(user_of("pwmchip0@50", tmp_path / "proc")) == is_used

@@ -12,7 +12,7 @@ from pathlib import Path
 import pytest
 from hal_rig import Iio, run, write_plan
 
-from fcsl_compiler.board.drivers import DRIVERS
+from fcsl_compiler.board.drivers import ACTUATORS, DRIVERS
 from simclient.hal.driver import any_driver
 
 
@@ -215,7 +215,10 @@ def test_describe_hardware(tmp_path: Path) -> None:
 
 
 def test_signals_of_drivers_are_those_that_the_compiler_knows() -> None:
-    assert {name: tuple(s.name for s in any_driver(name).signals) for name in DRIVERS} == DRIVERS
+    """An output needs a signal that is one f64."""
+    for name, known in DRIVERS.items():
+        signals = [s for s in any_driver(name).signals if name not in ACTUATORS or s.type_text == "f64"]
+        assert tuple(s.name for s in signals) == known, name
 
 
 def test_describe_what_paces_and_what_is_not_driven(tmp_path: Path) -> None:

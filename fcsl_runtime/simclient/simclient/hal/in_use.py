@@ -44,10 +44,8 @@ def _use(program: str, arguments: Sequence[str], folder: Path, address: str) -> 
         try:
             found = read_plan(str((folder / "cwd").readlink() / plan))
         except (OSError, TwinError):
-            if program == _FLIGHT:
-                continue  # by itself it drives no actuators
             return f"runs with a board that cannot be read, {plan}"
-        used = {output.device for output in found.outputs}
+        used = {output.device for output in found.outputs} | {p.device for p in found.pins if p.safe is not None}
         if any(_is_same(f"{d.driver}:{d.address}", address) for d in found.devices.values() if d.name in used):
             return f"runs with the board {plan}, which has this device"
     return ""
