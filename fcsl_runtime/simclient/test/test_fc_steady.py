@@ -86,7 +86,7 @@ def misbehave(kind: i64) -> i64: ...
 
 
 class Misbehave:
-    """Does in every tick what no step may."""
+    """Does in every tick what no step may; and reaches hardware, which any may."""
 
     inputs = {"sample": "f64[3]"}
     outputs = {"result": "i64"}
@@ -95,6 +95,10 @@ class Misbehave:
 
     def execute(self):
         self.ticks += 1
+        hw_write_gpio(1, self.ticks % 2 == 0)
+        counts = hw_read_adc(0)
+        word = hw_read_u32(16)
+        hw_write_u32(16, word + counts)
         self.result = misbehave(self.kind)
 '''
 
@@ -296,20 +300,31 @@ def test_free_running(folder: Path, tmp_path: Path) -> None:
 
 
 def test_with_a_board(folder: Path, tmp_path: Path) -> None:
-    """Two gyroscopes, one of which fails and recovers all the time: threads of their own read them."""
+    """Two gyroscopes, one of which fails and recovers all the time: threads of their own read them. Pins, counts and registers, too."""
     library = machine(folder, 0, "board", CHANNELS)
     names = ("top", "bottom")
+    (tmp_path / "memory").write_bytes(bytes(4))
     for number, name in enumerate(names):
         device = tmp_path / f"sys/bus/iio/devices/iio:device{number}"
         device.mkdir(parents=True)
         (device / "name").write_text(name)
+        (device / "in_voltage0_raw").write_text("3")
         for axis in "xyz":
             (device / f"in_anglvel_{axis}_raw").write_text("1")
     (tmp_path / "board.json").write_text(
         json.dumps(
             {
                 "machine": str(folder / "board_0.json"),
-                "devices": {name: {"driver": "iio", "device": name, "rate_hz": 2000} for name in names},
+                "devices": {
+                    **{name: {"driver": "iio", "device": name, "rate_hz": 2000} for name in names},
+                    "counts": {"driver": "adc", "device": "top", "rate_hz": 2000},
+                    "lamp": {"driver": "log", "device": str(tmp_path / "lamp")},
+                },
+                "hardware": {
+                    "gpio": {"1": {"device": "lamp", "signal": "number", "safe": False}},
+                    "adc": {"0": {"device": "counts", "signal": "counts0"}},
+                    "registers": {"16": {"file": str(tmp_path / "memory"), "bytes": 4, "write": True}},
+                },
                 "sensors": {
                     "imu": {
                         "kind": "inertial",
@@ -336,6 +351,8 @@ def test_with_a_board(folder: Path, tmp_path: Path) -> None:
         value.write_text("1")
         time.sleep(0.05)
     assert fc.allocations() == 0
+    assert int.from_bytes((tmp_path / "memory").read_bytes(), "little") > TICKS  # three counts in most ticks
+    assert b"number=1" in (tmp_path / "lamp").read_bytes()
 
 
 # ---- controls
