@@ -7,6 +7,7 @@ from __future__ import annotations
 import json
 import mmap
 import os
+import re
 import struct
 import subprocess
 import time
@@ -21,11 +22,12 @@ from fcsl_compiler.driver.cache import build_machine
 from simclient.replay import replay
 
 HZ = 100
-#: Lines of a chip in a file of characters, `0` or `1`.
+#: Lines of a chip in a file of characters, `0` or `1`; `?` is not told.
 DRIVERS = r"""
 #define _GNU_SOURCE
 #include <errno.h>
 #include <fcntl.h>
+#include <math.h>
 #include <stdio.h>
 #include <string.h>
 #include <time.h>
@@ -72,8 +74,8 @@ static fcsl_driver_status_t read_chip(void *self, uint64_t *sample_ns, char *why
         return FCSL_DRIVER_ABSENT;
     }
     (void)close(file);
-    chip->a = text[0] == '1';
-    chip->b = text[1] == '1';
+    chip->a = text[0] == '?' ? NAN : text[0] == '1';
+    chip->b = text[1] == '?' ? NAN : text[1] == '1';
     (void)clock_gettime(CLOCK_MONOTONIC, &now);
     *sample_ns = (uint64_t)now.tv_sec * 1000000000u + (uint64_t)now.tv_nsec;
     return FCSL_DRIVER_OK;
@@ -246,6 +248,14 @@ def test_a_lost_device_fails_its_reads_and_comes_back(board: Board, fly: Callabl
     assert "device 'panel' is not there: the chip has gone" in said, said
 
 
+def test_a_level_that_is_not_told_is_a_failed_read(board: Board, fly: Callable[..., Flight]) -> None:
+    board.lines.write_text("0?")
+    flight = fly()
+    flight.until_value("panel.outputs.counts", 1234)
+    failed = re.search(r"(\d+) ticks.* (\d+) hardware failures", flight.end())
+    assert failed and int(failed[2]) >= int(failed[1]), failed
+
+
 def test_writes_that_fail_are_counted_and_told(board: Board, fly: Callable[..., Flight]) -> None:
     flight = fly()
     flight.until_value("hal.devices.lamps.open", 1)
@@ -371,4 +381,4 @@ def test_pins_that_are_not_safe_are_told(board: Board, fly: Callable[..., Flight
     flight.process.terminate()
     _, complaint = flight.process.communicate(timeout=60)
     assert flight.process.returncode == 1
-    assert "1 devices of pins are NOT safe, the last of them 'lamps': the lamps: No such file" in complaint
+    assert "pins of device 'lamps' are NOT safe: the lamps: No such file" in complaint

@@ -9,7 +9,7 @@ from ..base.source import Span
 from ..parse.json_reader import ConfigReader
 from ..parse.json_source import JsonNode
 from .corrections import Correction, read_corrections
-from .devices import Device
+from .devices import Device, read_device_name
 from .drivers import ACTUATORS, check_signal, read_signal
 from .filters import Filter, Section, sections_for
 from .kinds import KINDS, MAX_BACKENDS
@@ -63,12 +63,9 @@ class BackendReader:
 
     def _device(self, node: JsonNode | None, places: dict[str, Span]) -> Device | None:
         """The device that a backend names. `places`: where this sensor names its devices."""
-        names = list(self.devices)
-        index = self.reader.reference(node, "device", names)
-        if node is None or index is None:
+        name = read_device_name(node, self.devices, self.used, self.reader)
+        if node is None or name is None:
             return None
-        name = names[index]
-        self.used.add(name)
         first = places.setdefault(name, node.span)
         if first is not node.span:
             message, notes = f"device `{name}` twice in one sensor", [(first, "the first time")]

@@ -46,6 +46,18 @@ def read_devices(node: JsonNode | None, reader: ConfigReader) -> dict[str, Devic
     return found
 
 
+def read_device_name(
+    node: JsonNode | None, devices: dict[str, Device | None], used: set[str], reader: ConfigReader
+) -> str | None:
+    """The name of one of `devices`, which is `used` then. None after reporting an error."""
+    names = list(devices)
+    index = reader.reference(node, "device", names)
+    if node is None or index is None:
+        return None
+    used.add(names[index])
+    return names[index]
+
+
 def _device(name: str, span: Span, definition: JsonNode, reader: ConfigReader) -> Device | None:
     keys = reader.object(definition, f"device `{name}`", ("driver", "device"), ("rate_hz",))
     if keys is None:

@@ -12,7 +12,7 @@ from ..model.effects import HARDWARE
 from ..model.machine import Machine
 from ..parse.json_reader import ConfigReader
 from ..parse.json_source import JsonNode
-from .devices import Device
+from .devices import Device, read_device_name
 from .drivers import ACTUATORS, DRIVERS, check_signal, read_signal
 from .limits import MAX_CONVERTERS, MAX_PINS, MAX_REGISTERS, check_count, check_text
 from .outputs import OutputReader, check_driven, misfit_as_output
@@ -155,14 +155,9 @@ class HardwareReader:
         return device, signal
 
     def _device(self, node: JsonNode | None, is_output: bool, drivers: Sequence[str]) -> Device | None:
-        names = list(self.devices)
-        index = self.reader.reference(node, "device", names)
-        if node is None or index is None:
-            return None
-        name = names[index]
-        self.used.add(name)
-        device = self.devices[name]
-        if device is None:
+        name = read_device_name(node, self.devices, self.used, self.reader)
+        device = self.devices[name] if name is not None else None
+        if node is None or name is None or device is None:
             return None
         problem = self._misfit(device, is_output)
         if not problem and device.driver in DRIVERS and device.driver not in drivers:

@@ -11,7 +11,7 @@ from ..model.machine import Channel, Machine
 from ..model.types import Scalar, count_of, element_of
 from ..parse.json_reader import ConfigReader
 from ..parse.json_source import JsonNode
-from .devices import Device
+from .devices import Device, read_device_name
 from .drivers import SENSORS, check_signal
 from .limits import MAX_OUTPUTS, MAX_PULSES, check_count
 from .pulses import Pulse, read_pulse
@@ -107,13 +107,9 @@ class OutputReader:
         return channel
 
     def _device(self, node: JsonNode | None) -> Device | None:
-        names = list(self.devices)
-        index = self.reader.reference(node, "device", names)
-        if node is None or index is None:
-            return None
-        self.used.add(names[index])
-        device = self.devices[names[index]]
-        if device is None:
+        name = read_device_name(node, self.devices, self.used, self.reader)
+        device = self.devices[name] if name is not None else None
+        if node is None or device is None:
             return None
         problem = misfit_as_output(device, self._of_sensors)
         if problem:

@@ -5,6 +5,7 @@
 #define _POSIX_C_SOURCE 200809L
 #include "board_hardware.h"
 
+#include <math.h>
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
@@ -133,9 +134,11 @@ static int32_t read_gpio(void *ctx, uint32_t number, bool *level)
         *level = hardware->levels[i] != 0u;
         return 0;
     }
-    const int32_t status = latest(hardware, plan->pins[i].device, hardware->pin_at[i], &value);
+    if (latest(hardware, plan->pins[i].device, hardware->pin_at[i], &value) != 0 || isnan(value)) {
+        return -1; /* NaN: the device does not tell */
+    }
     *level = value >= ON;
-    return status;
+    return 0;
 }
 
 static int32_t write_gpio(void *ctx, uint32_t number, bool level)
@@ -286,9 +289,6 @@ board_hardware_t *board_hardware_new(const board_plan_t *plan, board_devices_t *
     }
     hardware->plan = plan;
     hardware->inputs = inputs;
-    for (uint32_t i = 0; i < plan->registers_count; i++) {
-        hardware->windows[i].plan = &plan->registers[i];
-    }
     make_table(hardware);
     if (use_signals(hardware, error) != 0) {
         board_hardware_free(hardware);
@@ -399,8 +399,9 @@ int board_hardware_end(board_hardware_t *hardware, fcsl_error_t *error)
     if (missing == 0u) {
         return 0;
     }
-    return fcsl_fail(error, "%u devices of pins are NOT safe, the last of them '%.60s': %.200s", missing,
-                     hardware->plan->devices[one].name, reason_of(&hardware->outputs[one]));
+    return fcsl_fail(error, "pins of %s'%.60s' are NOT safe: %.200s",
+                     missing > 1u ? "several devices, such as " : "device ", hardware->plan->devices[one].name,
+                     reason_of(&hardware->outputs[one]));
 }
 
 void board_hardware_free(board_hardware_t *hardware)

@@ -238,6 +238,9 @@ static int linux_open(fcsl_hal_t *handle, char *error, size_t error_size)
         (void)snprintf(error, error_size, "%s", reason.text);
         return -1;
     }
+    if (hal->hardware != NULL) {
+        fcsl_run_use_board(hal->run, board_hardware_table(hal->hardware));
+    }
     if (hal->plan->pacing != BOARD_NO_DEVICE) {
         char text[FCSL_LOG_BYTES];
         (void)snprintf(text, sizeof text, "waits for device '%.60s', which paces the loop",
@@ -265,11 +268,7 @@ static int open_board(hal_t *hal, const char *file, fcsl_error_t *error)
         return 0;
     }
     hal->hardware = board_hardware_new(hal->plan, hal->devices, error);
-    if (hal->hardware == NULL) {
-        return -1;
-    }
-    fcsl_run_use_board(hal->run, board_hardware_table(hal->hardware));
-    return 0;
+    return hal->hardware != NULL ? 0 : -1;
 }
 
 int hal_linux_end(const fcsl_hal_t *hal, fcsl_error_t *error)
