@@ -241,7 +241,8 @@ def test_a_missing_device_keeps_no_other_from_its_safe_values(library: Path, dri
     missing = f"cart.force={drivers}:arm.force:{tmp_path}/no"
     code, err = run(library, "--slot", tmp_path / "slot", "--actuator", missing, "--actuator", f"panel.valve=log:{log}")
     assert code == 1 and "is not there: no file '" in err and err.count("\n") == 1
-    assert [write.values for write in log_writes(log)] == [{"flag": 1.0}]
+    written = [write.values for write in log_writes(log)]  # when it is opened, and again at the end
+    assert written in ([{"flag": 1.0}], [{"flag": 1.0}] * 2)
 
 
 def test_the_last_safe_values_are_tried_again(
