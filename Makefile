@@ -7,7 +7,7 @@ SHELL := /bin/bash
 
 ENV := . scripts/env.sh &&
 PYTHON_DIRS := conftest.py fcsl_compiler fcsl_hal fcsl_runtime fcsl_sim fcsl_bridge fcsl_msgs examples scripts test
-C_FILES = $$(git ls-files --cached --others --exclude-standard '*.c' '*.h' | while read -r f; do [ ! -e "$$f" ] || echo "$$f"; done)
+C_FILES = $$(git ls-files --cached --others --exclude-standard '*.c' '*.h' '*.cpp' '*.hpp' | while read -r f; do [ ! -e "$$f" ] || echo "$$f"; done)
 
 help: ## list the commands
 	@grep -hE '^[a-z]+:.*## ' $(MAKEFILE_LIST) | sed -E 's/^([a-z]+):.*## (.*)/\1\t\2/' | while IFS=$$'\t' read -r t d; do printf '  make %-8s %s\n' "$$t" "$$d"; done

@@ -57,7 +57,7 @@ PLANT = """
 typedef struct {
     struct { double thrust; } inputs;
     struct { double height; } parameters;
-    struct { double altitude, velocity; } state; /* integrated */
+    struct { double altitude, velocity; bool released, landed; double touchdown; } state; /* two are integrated */
     struct { double altitude, velocity, touchdown; bool released, landed; } outputs;
 } plant_t;
 
@@ -65,31 +65,52 @@ static const char *init(void *self, const fcsl_model_context_t *context)
 {
     plant_t *p = self;
     (void)context;
-    p->state.altitude = p->outputs.altitude = p->parameters.height;
+    p->state.altitude = p->parameters.height;
     return NULL;
 }
 
 static void derivative(const void *self, double t, const double *x, double *dx)
 {
     const plant_t *p = self;
-    const bool flies = p->outputs.released && !p->outputs.landed;
+    const bool flies = p->state.released && !p->state.landed;
     (void)t;
     dx[0] = flies ? x[1] : 0.0;
     dx[1] = flies ? p->inputs.thrust - 1.6 : 0.0;
 }
 
-static void update(void *self, const fcsl_model_context_t *context)
+static void output(void *self, double t, const double *x)
+{
+    plant_t *p = self;
+    (void)t;
+    p->outputs.altitude = x[0];
+    p->outputs.velocity = x[1];
+    p->outputs.released = p->state.released;
+    p->outputs.landed = p->state.landed;
+    p->outputs.touchdown = p->state.touchdown;
+}
+
+static void event(const void *self, double t, const double *x, double *value)
+{
+    (void)t;
+    value[0] = ((const plant_t *)self)->inputs.thrust;
+    value[1] = x[0];
+}
+
+static void reset(void *self, const fcsl_model_context_t *context, uint32_t number)
 {
     plant_t *p = self;
     (void)context;
-    p->outputs.released |= p->inputs.thrust > 0.0; /* it hangs until its controller is there */
-    p->outputs.altitude = p->state.altitude;
-    p->outputs.velocity = p->state.velocity;
-    if (!p->outputs.landed && p->state.altitude <= 0.0) {
-        p->outputs.landed = true;
-        p->outputs.touchdown = -p->state.velocity;
+    if (number == 0) {
+        p->state.released = true;
+    } else if (!p->state.landed) {
+        p->state.landed = true;
+        p->state.touchdown = -p->state.velocity;
     }
 }
+
+static const fcsl_model_event_t events[] = {
+    {"release", FCSL_RISING, "it hangs until its controller is there"}, {"touchdown", FCSL_FALLING, ""},
+};
 
 #define FIELD(role, path) FCSL_MODEL_SCALAR(plant_t, FCSL_ROLE_##role, path, "", "")
 
@@ -103,7 +124,8 @@ static const fcsl_model_t model = {
     .abi_version = FCSL_MODEL_ABI_VERSION, .name = "plant", .doc = "", .fields = fields,
     .field_count = sizeof fields / sizeof *fields, .size = sizeof(plant_t), .align = _Alignof(plant_t),
     .continuous_offset = offsetof(plant_t, state), .continuous_count = 2, .sampled_offset = FCSL_NO_OFFSET,
-    .init = init, .derivative = derivative, .update = update,
+    .events = events, .event_count = 2, .init = init, .derivative = derivative, .output = output, .event = event,
+    .reset = reset,
 };
 
 const fcsl_model_t *const fcsl_models[] = {&model, NULL};

@@ -6,6 +6,7 @@ import subprocess
 import sys
 from pathlib import Path
 
+import jsonschema
 import pytest
 
 TIMEOUT_S = 240
@@ -55,6 +56,71 @@ def test_an_algorithm(tmp_path: Path) -> None:
     assert "2 passed" in pytest_in(tmp_path, "test")
 
 
+def test_a_plant(tmp_path: Path) -> None:
+    """It flies with the machine of its folder, and its test fails where its stop does not hold."""
+    run("fcslc", "new", "machine", "craft", cwd=tmp_path)
+    craft = tmp_path / "craft"
+    run("fcslc", "new", "algorithm", "slew", cwd=craft)  # its bench is no machine to fly
+    *made, following = run("fcslc", "new", "plant", "mass", cwd=craft).splitlines()
+    assert made == ["mass.c", "mass.sim.json", "test/test_mass_plant.py"]
+    assert (
+        following == "next: fcsl-sim plot mass.sim.json; python3 -m pytest test/test_mass_plant.py; then change mass.c"
+    )
+    checked = run("fcsl-sim", "check", "mass.sim.json", cwd=craft)
+    assert checked == "mass.sim.json: ok: `craft` and plant for at most 20 s\n"
+    schema = json.loads(run("fcsl-sim", "schema", cwd=craft))
+    jsonschema.validate(json.loads((craft / "mass.sim.json").read_text()), schema)
+    assert "2 passed" in pytest_in(craft, "test/test_mass_plant.py")
+    run("ruff", "check", "--select", "E,F,I", "--line-length", "120", "test", cwd=craft)
+    plant = craft / "mass.c"
+    plant.write_text(plant.read_text().replace("> 0.0;\n}", "< 0.0;\n}"))
+    failed = subprocess.run([sys.executable, "-m", "pytest", "-q", "test/test_mass_plant.py"], cwd=craft, check=False)
+    assert failed.returncode == 1
+
+
+def test_a_plant_without_a_machine(tmp_path: Path) -> None:
+    *made, remark, following = run("fcslc", "new", "plant", "mass", cwd=tmp_path).splitlines()
+    assert made == ["mass.c", "test/test_mass_plant.py"]
+    assert remark == "no simulation was written: name a machine with --machine"
+    assert following.startswith("next: fcsl-sim describe mass.c; ")
+    assert "1 passed" in pytest_in(tmp_path, "test")
+
+
+def test_the_machine_of_a_plant(tmp_path: Path) -> None:
+    """One of several, of another folder, with channels of other names and a unit that does not fit."""
+    for name in ("one", "two"):
+        run("fcslc", "new", "machine", name, cwd=tmp_path)
+    (tmp_path / "two/two.json").rename(tmp_path / "one/two.json")
+    assert "name one of one.json, two.json with --machine" in run("fcslc", "new", "plant", "a", cwd=tmp_path / "one")
+    machine = tmp_path / "one/one.json"
+    content = json.loads(machine.read_text())
+    for channel, name in zip(content["channels"], ("altitude", "speed", "motor"), strict=True):
+        channel["name"] = name
+        del channel["ros"]
+    machine.write_text(json.dumps(content))
+    printed = run("fcslc", "new", "plant", "mass", "--machine", "one/one.json", cwd=tmp_path)
+    assert "not connected" not in printed
+    simulation = json.loads((tmp_path / "mass.sim.json").read_text())
+    assert simulation["controller"] == {"machine": "one/one.json"}
+    assert {(c["from"], c["to"]) for c in simulation["connections"]} == {
+        ("plant.position", "controller.altitude"),
+        ("plant.speed", "controller.speed"),
+        ("controller.motor", "plant.force"),
+    }
+    law = tmp_path / "one/algorithms/controller.py"
+    law.write_text(law.read_text().replace('"f64 N"}', '"f64 V"}'))
+    printed = run("fcslc", "new", "plant", "volt", "--machine", "one/one.json", cwd=tmp_path)
+    assert "\nnot connected: motor\n" in printed
+    assert (
+        "W802"
+        in subprocess.run(
+            ["fcsl-sim", "check", "volt.sim.json"], cwd=tmp_path, capture_output=True, text=True, check=True
+        ).stderr
+    )
+    assert "error[E100]" in run("fcslc", "new", "plant", "b", "--machine", "no.json", cwd=tmp_path, status=1)
+    assert not (tmp_path / "b.c").exists()
+
+
 @pytest.mark.parametrize(
     ("arguments", "message"),
     [
@@ -67,6 +133,9 @@ def test_an_algorithm(tmp_path: Path) -> None:
         (("machine", ""), "is not a valid name"),
         (("algorithm", "two__lines"), "is not a valid name"),
         (("algorithm", "state"), "`state` is reserved"),
+        (("plant", "slew"), "`slew.c` exists; nothing was written"),
+        (("plant", "Plant"), "`Plant` is not a valid name"),
+        (("plant", "../plant"), "is not a valid name"),
         (("algorithm", "transition_request"), "`TransitionRequest` is a name of the language"),
     ],
 )
@@ -74,6 +143,7 @@ def test_nothing_is_overwritten_and_names_are_checked(tmp_path: Path, arguments:
     (tmp_path / "craft").mkdir()
     (tmp_path / "test").mkdir()
     (tmp_path / "test" / "test_slew.py").write_text("mine")
+    (tmp_path / "slew.c").write_text("mine")
     before = files(tmp_path)
     assert message in run("fcslc", "new", *arguments, cwd=tmp_path, status=2)
     assert files(tmp_path) == before and (tmp_path / "test" / "test_slew.py").read_text() == "mine"

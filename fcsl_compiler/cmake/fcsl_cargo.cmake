@@ -1,6 +1,7 @@
 # Rust crates in a CMake build: pinned by a committed Cargo.lock, fetched once, built offline.
 
-# fcsl_cargo_fetch(<Cargo.toml>): sets FCSL_CARGO and downloads the locked crates that are missing on this computer.
+# fcsl_cargo_fetch(<Cargo.toml> [<option of cargo> ...]): sets FCSL_CARGO and downloads the locked crates that are
+# missing on this computer.
 function(fcsl_cargo_fetch manifest)
   file(STRINGS "${manifest}" minimum REGEX "^rust-version = ")
   string(REGEX REPLACE ".*\"(.*)\".*" "\\1" minimum "${minimum}")
@@ -14,10 +15,11 @@ function(fcsl_cargo_fetch manifest)
     message(FATAL_ERROR "${FCSL_CARGO} is ${version}, but ${minimum} or newer is needed; `make setup` installs it or says how")
   endif()
   execute_process(
-    COMMAND "${FCSL_CARGO}" fetch --locked --offline --manifest-path "${manifest}" RESULT_VARIABLE failed OUTPUT_QUIET ERROR_QUIET)
+    COMMAND "${FCSL_CARGO}" fetch --locked --offline --manifest-path "${manifest}" ${ARGN}
+    RESULT_VARIABLE failed OUTPUT_QUIET ERROR_QUIET)
   if(failed)
     message(STATUS "Fetching the crates of ${manifest}")
-    execute_process(COMMAND "${FCSL_CARGO}" fetch --locked --manifest-path "${manifest}" RESULT_VARIABLE failed)
+    execute_process(COMMAND "${FCSL_CARGO}" fetch --locked --manifest-path "${manifest}" ${ARGN} RESULT_VARIABLE failed)
     if(failed)
       message(FATAL_ERROR "`cargo fetch --locked --manifest-path ${manifest}` failed; its message is above")
     endif()

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""`fcsl-sim`: checks and runs simulations."""
+"""`fcsl-sim`: checks, runs and draws simulations; lists and describes models."""
 
 from __future__ import annotations
 
@@ -9,24 +9,28 @@ import os
 import signal
 import sys
 from collections.abc import Sequence
-from fractions import Fraction
-from math import isfinite, isnan
 from pathlib import Path
 from types import FrameType
 
 from fcsl_compiler.base.codes.pages import UnknownCode, pages
 from fcsl_compiler.base.diagnostics import DiagnosticError
-from fcsl_compiler.base.version import add_version
 
+from . import arguments as command_line
+from . import plot
 from .codes import SIM_CODES
 from .config import SERIAL_LINK, SimConfig, load
 from .errors import SimError
+from .model_list import find_model, find_models
+from .model_page import describe_json, describe_text, list_json, list_text
 from .models import Scalar
 from .output import show
 from .runner import FREE_RUNNING, TIMEOUT_MS, Sender, Server, StateChange, Summary, Watcher, run
 
 EXIT_UNTIL_NOT_HELD = 1
 EXIT_BAD_INPUT = 2
+EXIT_INCOMPLETE_BAG = 1
+#: JSON Schema of a simulation file.
+SCHEMA = Path(__file__).parent / "simulation.schema.json"
 #: How an address on the bus begins.
 _BUS = ("zenoh:", "zenoh-client:")
 
@@ -43,17 +47,19 @@ def main(arguments: Sequence[str] | None = None) -> int:
     """Exit status: 0 if the run completed, 1 if `until` has not held in it, 2 for wrong input, 130 on SIGINT, 143 on
     SIGTERM; the bag is then complete with the ticks done so far.
     """
-    options = _parser().parse_args(arguments)
+    options = command_line.parse(arguments)
     try:
         signal.signal(signal.SIGTERM, _terminate)
-        status = {"check": _check, "run": _run, "explain": _explain}[options.command](options)
+        status = _COMMANDS[options.command](options)
         sys.stdout.flush()
         return status
     except DiagnosticError as error:
+        _fail_as_json(options, str(error))
         print(error, file=sys.stderr)
         count = len(error.diagnostics)
         print(f"fcsl-sim: {count} error{'s' if count > 1 else ''}", file=sys.stderr)
     except SimError as error:
+        _fail_as_json(options, str(error))
         print(f"fcsl-sim: error: {error}", file=sys.stderr)
     except BrokenPipeError:
         os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
@@ -68,93 +74,16 @@ def main(arguments: Sequence[str] | None = None) -> int:
     return EXIT_BAD_INPUT
 
 
+def _fail_as_json(options: argparse.Namespace, message: str) -> None:
+    if getattr(options, "json", False):
+        show(json.dumps({"end": "error", "error": message}, indent=2))
+
+
 def _interrupted(options: argparse.Namespace, number: signal.Signals) -> int:
     bag = getattr(options, "record", None)
     kept = f"; {bag} has the ticks flown until then" if bag and Path(bag).exists() else ""
     print(f"fcsl-sim: interrupted{kept}", file=sys.stderr)
     return 128 + number
-
-
-def _seed(text: str) -> int:
-    value = int(text, 10)
-    if not 0 <= value < 2**64:
-        raise ValueError
-    return value
-
-
-def _seconds(text: str) -> Fraction:
-    about = float(text)
-    if isnan(about):
-        raise ValueError
-    if not 0 < about <= 1e9:
-        raise argparse.ArgumentTypeError(f"{text} s is {'not above zero' if about <= 0 else 'more than 1e+09 s'}")
-    return Fraction(text)  # exact; without the checks above, 1e99999999 would take minutes
-
-
-def _speed(text: str) -> float:
-    value = float(text)
-    if not (isfinite(value) and value >= 0):
-        raise ValueError
-    return value
-
-
-# argparse uses these names in its error messages.
-_seed.__name__ = "seed (0 to 2^64 - 1)"
-_seconds.__name__ = "number of seconds"
-_speed.__name__ = "speed (a number above zero, or 0 for as fast as possible)"
-
-
-def _parser() -> argparse.ArgumentParser:
-    parser = argparse.ArgumentParser(prog="fcsl-sim", description="Flies a compiled machine against plant models.")
-    add_version(parser, "fcsl_sim", __file__)
-    commands = parser.add_subparsers(dest="command", required=True)
-    for name, text in (("check", "check a simulation, run nothing"), ("run", "run a simulation to its end")):
-        command = commands.add_parser(name, help=text, description=text.capitalize() + ".")
-        command.add_argument("config", help="*.sim.json, or package://PACKAGE/PATH below its share folder")
-        command.add_argument("--seed", type=_seed, help="random seed; replaces the file's")
-        command.add_argument(
-            "--duration", type=_seconds, metavar="S", help="longest simulated time in s; replaces the file's"
-        )
-        help_set = "sets a model parameter: altimeter.parameters.sigma=0.8 (repeatable)"
-        command.add_argument("--set", action="append", default=[], metavar="PATH=VALUE", dest="sets", help=help_set)
-    command.add_argument("--record", type=Path, metavar="BAG", help="new directory for the bag")
-    command.add_argument(
-        "--namespace", default="", help="ROS namespace of the bag's topics, and of the keys on the bus"
-    )
-    command.add_argument(
-        "--external",
-        metavar="PEER",
-        help="the controller is another process (fcsl-fc --hal PEER): at the other end of a wire, with wire:unix:PATH, "
-        "wire:udp:HOST:PORT, wire:tcp:HOST:PORT, wire:uart:DEVICE:BAUD or wire:zenoh:tcp/HOST:PORT; or on the bus, each "
-        "channel under its key, with zenoh:tcp/HOST:PORT, or zenoh-client: where another simulation listens; with "
-        ",free-running behind that, neither waits for the other",
-    )
-    help_speed = "limit on simulated seconds per second: 1 for real time; 0 (default): as fast as possible"
-    command.add_argument("--speed", type=_speed, default=0.0, metavar="FACTOR", help=help_speed)
-    help_socket = "serve all variables (docs/protocol.md) on this Unix socket, or on tcp:HOST:PORT with --token"
-    command.add_argument("--socket", metavar="ADDRESS", help=help_socket)
-    help_checkpoints = "folder of the checkpoint files that clients name"
-    command.add_argument("--checkpoints", type=Path, metavar="DIR", help=help_checkpoints)
-    command.add_argument("--token", type=Path, metavar="FILE", help="token file of a TCP server; created if absent")
-    command.add_argument("--paused", action="store_true", help="start paused: only commands run ticks until `resume`")
-    help_telemetry = "send values as UDP (docs/telemetry.md) to udp:HOST:PORT, or of every N-th tick to udp:HOST:PORT/N"
-    command.add_argument("--telemetry", metavar="ADDRESS", help=help_telemetry)
-    help_fields = (
-        "fields to send, as path globs separated by commas (default: inputs, outputs, state, health, counters)"
-    )
-    command.add_argument("--telemetry-fields", metavar="GLOBS", help=help_fields)
-    help_observers = "put the values of all channels on a bus of their own (docs/bus.md), which listens there"
-    command.add_argument("--observers", metavar="tcp/HOST:PORT", help=help_observers)
-    help_ros = (
-        "publish the machine's ROS 2 topics and /clock through a bridge (docs/ros_graph.md), for which it listens there"
-    )
-    command.add_argument("--ros", metavar="tcp/HOST:PORT", help=help_ros)
-    help_timeout = f"seconds to wait for the external controller (default {TIMEOUT_MS // 1000})"
-    command.add_argument("--timeout", type=_seconds, metavar="S", help=help_timeout)
-    command.add_argument("--json", action="store_true", help="print the summary as JSON, and nothing else")
-    why = commands.add_parser("explain", help="explain a diagnostic code of simulations, with an example")
-    why.add_argument("code", nargs="*", help="such as E804; none: list all")
-    return parser
 
 
 def _explain(options: argparse.Namespace) -> int:
@@ -166,7 +95,9 @@ def _explain(options: argparse.Namespace) -> int:
 
 
 def _load(options: argparse.Namespace) -> SimConfig:
-    config = load(options.config, seed=options.seed, duration_s=options.duration, sets=options.sets)
+    config = load(
+        options.config, seed=options.seed, duration_s=options.duration, sets=options.sets, events=options.events
+    )
     for warning in config.warnings:
         print(warning, file=sys.stderr)
     return config
@@ -177,6 +108,38 @@ def _check(options: argparse.Namespace) -> int:
     seconds = config.machine.time_ns(config.ticks) / 1e9
     print(f"{options.config}: ok: `{config.machine.name}` and {', '.join(config.tables)} for at most {seconds:g} s")
     return 0
+
+
+def _schema(options: argparse.Namespace) -> int:
+    print(SCHEMA.read_text(encoding="utf-8"), end="")
+    return 0
+
+
+def _list_models(options: argparse.Namespace) -> int:
+    models = find_models(options.folder)
+    print(json.dumps(list_json(models), indent=2) if options.json else list_text(models))
+    return 0
+
+
+def _describe(options: argparse.Namespace) -> int:
+    model = find_model(options.model)
+    table = model.table()
+    print(json.dumps(describe_json(model, table), indent=2) if options.json else describe_text(model, table))
+    return 0
+
+
+def _plot(options: argparse.Namespace) -> int:
+    options.config = options.target
+    given = options.sets or options.events or options.seed is not None or options.duration is not None
+    if plot.is_bag(options.target) and given:
+        raise SimError("`--seed`, `--duration`, `--set` and `--event` are of a simulation, and this is a bag")
+    picture = plot.draw(options.target, options.output, options.paths, options.against, lambda: _load(options))
+    print(f"{picture.path}: {picture.path.stat().st_size} bytes")
+    if picture.left_out:
+        print(f"left out: {', '.join(picture.left_out)}; PATHs choose what is drawn")
+    if picture.damage:
+        print(f"fcsl-sim: the bag is incomplete: {picture.damage}", file=sys.stderr)
+    return EXIT_INCOMPLETE_BAG if picture.damage else 0
 
 
 def _run(options: argparse.Namespace) -> int:
@@ -215,7 +178,7 @@ def _run(options: argparse.Namespace) -> int:
         sender=None if options.telemetry is None else Sender(options.telemetry, options.telemetry_fields),
         observers=options.observers,
         ros=options.ros,
-        watcher=None if options.json else _Printer(config, external),
+        watcher=Watcher(as_json=True) if options.json else _Printer(config, external),
     )
     if options.json:
         show(json.dumps(summary.as_json(), indent=2))
@@ -228,6 +191,7 @@ class _Printer(Watcher):
     """Tells people."""
 
     def __init__(self, config: SimConfig, external: str | None):
+        super().__init__()
         self._config, self._external = config, external
 
     def listening(self) -> None:
@@ -289,3 +253,14 @@ def _print_summary(config: SimConfig, summary: Summary) -> None:
         show(f"bag: {summary.bag}")
     if summary.until_held is False:
         show(f"until never held: {config.until}")
+
+
+_COMMANDS = {
+    "check": _check,
+    "run": _run,
+    "plot": _plot,
+    "list-models": _list_models,
+    "describe": _describe,
+    "schema": _schema,
+    "explain": _explain,
+}

@@ -24,8 +24,10 @@ _BIAS = '"events": [{"at_s": 0.5, "set": "altimeter.parameters.bias", "value": 1
 SIM_CODES: dict[str, Code] = {
     "E801": Code(
         "a model that cannot be used",
-        "A model is a C file inside the simulation's folder, or of an installed package. It is compiled on "
-        "demand, and its name is its file's; the reason why that fails stands in the message.",
+        "A model is a `source`, a file in C or C++ inside the simulation's folder or of an installed package, which is "
+        "compiled on demand and has the name of its file; or a `library` that fcsl_add_model() of an installed package "
+        "has built. It calls nothing whose results differ between machines or runs, such as sin or rand. The reason "
+        "stands in the message, and what the compiler printed below it.",
         Kind.SIMULATION,
         '"models": {"ramp": {"source": "romp.c"}, "sensor": {"source": "package://fcsl_sim/models/noisy_sensor.c"}}',
         '"models": {"ramp": {"source": "ramp.c"}, "sensor": {"source": "package://fcsl_sim/models/noisy_sensor.c"}}',
@@ -39,10 +41,10 @@ SIM_CODES: dict[str, Code] = {
         '"controller": {"machine": "hopper.json"}',
     ),
     "E803": Code(
-        "models that feed each other",
-        "A model that is updated at a rate takes what its sources have computed for the same instant, so around "
-        "a circle each would have to be first. This holds for integrated models, too: their outputs may depend on "
-        "their inputs. Make one model of those in the circle, or let the loop close through the controller, whose "
+        "models that feed each other at one instant",
+        "Around a circle of outputs that depend on inputs of the same instant each would have to be first: an algebraic "
+        "loop. Updates count, too: they take what their sources make at the same instant. An output without direct "
+        "feed-through opens the circle: one that is computed from states alone. So does the controller, whose "
         "actuators hold from one tick to the next.",
         Kind.SIMULATION,
         _CONNECTIONS.replace('"ramp.x"', '"velocimeter.value"').replace('"ramp.seen_rate"', '"altimeter.value"'),
@@ -50,8 +52,9 @@ SIM_CODES: dict[str, Code] = {
     ),
     "E804": Code(
         "a rate that is missing or misplaced",
-        "A sampled model (a sensor) says in `rates` how often it is updated. An integrated one has no rate of "
-        "its own: the `integrator` steps all of them together.",
+        "A model with an `update` function (a sensor) says in `rates` how often it is updated: in Hz, or with a phase as "
+        '`{"hz": 5, "phase_s": 0.02}`. A model without one has no rate. An integrator of fixed steps has a rate, too, '
+        "and `rk45` has tolerances instead.",
         Kind.SIMULATION,
         '"rates": {"altimeter": 100}',
         '"rates": {"altimeter": 100, "velocimeter": 100}',
@@ -71,6 +74,23 @@ SIM_CODES: dict[str, Code] = {
         Kind.SIMULATION,
         '"controller": {"machine": "hopper.json", "link": "altimeter"}',
         '"controller": {"machine": "hopper.json"}',
+    ),
+    "E807": Code(
+        "a base that cannot be extended",
+        "`extends` names another simulation file, relative to the folder of the one that says it, or package://…: the "
+        "members of the file are merged over those of its base. A base may extend another one, but none of those that "
+        "extend it.",
+        Kind.SIMULATION,
+        '"extends": "ramp.sim.json"',
+        '"description": "a simulation of its own"',
+    ),
+    "E808": Code(
+        "an integrator that does not fit the models",
+        "States of directly connected models integrate together, so such models have one integrator. `verlet` is for models "
+        "that declare positions and their velocities, and whose forces depend on no velocity.",
+        Kind.SIMULATION,
+        '"integrator": {"method": "verlet", "hz": 1000}',
+        '"integrator": {"method": "rk4", "hz": 1000}',
     ),
     "W801": Code(
         "a sensor channel that nothing feeds",

@@ -12,11 +12,10 @@ from dataclasses import dataclass, field
 from fractions import Fraction
 from pathlib import Path
 
-from fcsl_compiler.base.ament import PackageNotFound, package_prefix
 from fcsl_compiler.base.diagnostics import Diagnostic, DiagnosticError, DiagnosticSink, Severity, nearest
 from fcsl_compiler.base.source import SourceError, SourceFile, Span
 from fcsl_compiler.config.views import Signals, read_views
-from fcsl_compiler.driver.cache import build_machine, build_shared
+from fcsl_compiler.driver.cache import build_machine
 from fcsl_compiler.driver.toolchain import ToolchainError
 from fcsl_compiler.model.types import Type, scalar_of
 from fcsl_compiler.parse.json_reader import ConfigReader, Everything
@@ -28,17 +27,23 @@ from simclient.run import open_run
 
 from . import plan
 from .errors import SimError
+from .event_argument import with_events
+from .extends import file_of, read_extended
+from .integrators import Integrator, read_integrator
 from .models import ModelField, ModelTable, type_of, with_unit
-from .native import describe_model
+from .plugins import model_library, model_source
 from .ros import TruthTopic
-from .wiring import MAX_HZ, MAX_SECONDS, Instance, Wiring, check_wiring, seconds
+from .wiring import MAX_SECONDS, Instance, Wiring, check_wiring, seconds
 
 MAX_TICKS = 10**12
-METHODS = ("euler", "rk4")
+#: Keys that say nothing about the flight; `extends` was followed before.
+FOR_READERS = ("$schema", "description", "extends")
 #: The model that may stand between plant and controller.
 SERIAL_LINK = "serial_link"
-#: Include folders of a plugin: the model ABI, and the machine ABI that it includes.
-_INCLUDE_PACKAGES = ("fcsl_sim", "fcsl_compiler")
+
+
+#: Of an instance.
+_OPTIONAL = ("parameters", "integrator", "tolerances")
 
 
 @dataclass(frozen=True)
@@ -69,8 +74,7 @@ class _Parts:
     instances: dict[str, Instance] = field(default_factory=dict)
     machine: Machine | None = None
     library: Path | None = None
-    method: str | None = None
-    hz: int | None = None
+    integrator: Integrator | None = None
     seed: int | None = None
     ticks: int | None = None
 
@@ -81,14 +85,15 @@ def load(
     seed: int | None = None,
     duration_s: Fraction | None = None,
     sets: Sequence[str] = (),
+    events: Sequence[str] = (),
     machine: tuple[Path, str] | None = None,
 ) -> SimConfig:
     """Reads and checks a `*.sim.json`, compiles its models and its machine (both cached).
 
     path: of the file, or package://<ROS package>/<path below its share folder>.
-    seed, duration_s: replace the file's. sets: `instance.parameters.name=value`. machine: library and name of a
-    compiled controller, which replaces the file's. Raises DiagnosticError with all errors of the file, or SimError if
-    the file or the simulator is missing.
+    seed, duration_s: replace the file's. sets: `instance.parameters.name=value`. events, beside the file's:
+    `14.0 instance.parameters.name=value`. machine: library and name of a compiled controller, which replaces the
+    file's. Raises DiagnosticError with all errors of the file, or SimError if the file or the simulator is missing.
     """
     try:
         file = resolve_source(str(path), config=Path()) if str(path).startswith("package://") else Path(path)
@@ -98,10 +103,11 @@ def load(
     except SourceError as error:
         raise SimError(f"{path}: {error}") from None
     sink = DiagnosticSink()
-    root = parse_json(source, sink)
+    root = read_extended(source, sink)
     sink.raise_if_failed()
     assert root is not None
     _refuse_machine(file, root)
+    root = with_events(root, events, sink)
     return _Loader(file, sink, sets, machine).load(root, seed, duration_s)
 
 
@@ -137,13 +143,16 @@ class _Loader:
     def load(self, root: JsonNode, seed: int | None, duration_s: Fraction | None) -> SimConfig:
         required = ("controller", "models", "instances", "integrator", "seed", "duration")
         keys = self.reader.object(
-            root, "a simulation", required, ("connections", "rates", "events", "until", "ros", "views")
+            root, "a simulation", required, ("connections", "rates", "events", "until", "ros", "views", *FOR_READERS)
         )
         if keys is None:
             raise DiagnosticError(self.sink.diagnostics)
+        for key in FOR_READERS:
+            self.reader.string(keys.get(key), f"`{key}`")
         parts = self.parts
         self._read_controller(keys.get("controller"))
-        self._read_integrator(keys.get("integrator"))
+        tick_hz = parts.machine.tick_hz if parts.machine else None
+        parts.integrator = read_integrator(keys.get("integrator"), self.reader, tick_hz)
         self._read_models(keys.get("models"))
         self._read_instances(keys.get("instances"))
         link = self._read_link(self.link_node)
@@ -153,7 +162,7 @@ class _Loader:
         self._report_unused_overrides()
         # A shorter duration on the command line is intended; in the file, an event after the end is probably a mistake.
         file_ticks = parts.ticks if duration_s is None else None
-        wiring = check_wiring(self.reader, parts.instances, parts.machine, parts.hz, keys, file_ticks)
+        wiring = check_wiring(self.reader, parts.instances, parts.machine, parts.integrator, keys, file_ticks)
         views = read_views(keys.get("views"), self._signals(), self.file, self.reader)
         if self.foreign or self.sink.failed:
             raise DiagnosticError([*self.foreign, *(d for d in self.sink.diagnostics if d.severity is Severity.ERROR)])
@@ -162,12 +171,11 @@ class _Loader:
     def _finish(self, wiring: Wiring, views: str, link: str | None) -> SimConfig:
         """Assembles the result; called only without errors, so every part is present."""
         parts = self.parts
-        assert parts.machine and parts.library and parts.hz and parts.ticks and parts.seed is not None
+        assert parts.machine and parts.library and parts.ticks and parts.seed is not None
         tables = {name: parts.instances[name].table for name in wiring.order}
         used = {table.name: table for table in tables.values() if table}
         lines = [
             plan.library_statement("machine", parts.machine.name, parts.library),
-            plan.statement("integrator", parts.method, parts.hz),
             plan.statement("seed", parts.seed),
             plan.statement("ticks", parts.ticks),
             *(plan.library_statement("model", name, table.library) for name, table in sorted(used.items())),
@@ -198,7 +206,7 @@ class _Loader:
         if machine is None or text is None:
             return
         try:
-            library, name = self.given_machine or self._build_machine(text)
+            library, name = self.given_machine or self._build_machine(text, file_of(machine.span))
             run = open_run(library, name)
             self.parts.machine, self.parts.library = run.machine, library
             run.close()
@@ -207,26 +215,14 @@ class _Loader:
         except (SourcePathError, ToolchainError, TwinError) as error:
             self.sink.error("E802", f"the machine `{text}` cannot be used: {error}", machine.span)
 
-    def _build_machine(self, text: str) -> tuple[Path, str]:
-        """Unlike sources, a machine may be outside of the simulation's folder; otherwise the same rules apply."""
-        path = resolve_source(text, config=self.file) if text.startswith("package://") else self.file.parent / text
+    def _build_machine(self, text: str, config: Path) -> tuple[Path, str]:
+        """Unlike sources, a machine may be outside of the folder of the file `config` that names it; otherwise the same
+        rules apply."""
+        path = resolve_source(text, config=config) if text.startswith("package://") else config.parent / text
         if not path.is_file():
             raise SourcePathError(f"no such file: {path}")
         built = build_machine(path)
         return built.library, built.name
-
-    def _read_integrator(self, node: JsonNode | None) -> None:
-        keys = self.reader.object(node, "`integrator`", ("method", "hz")) if node else None
-        if not keys:
-            return
-        self.parts.method = self.reader.choice(keys.get("method"), "`method`", METHODS)
-        hz = self.reader.integer(keys.get("hz"), "`hz`", 1, MAX_HZ)
-        machine = self.parts.machine
-        if hz and machine and hz % machine.tick_hz:
-            message = f"the integrator's {hz} Hz is not a multiple of tick_hz ({machine.tick_hz})"
-            self.sink.error("E805", message, keys["hz"].span, why="the controller ticks between two integration steps")
-            return
-        self.parts.hz = hz
 
     def _read_duration(self, node: JsonNode | None, given_s: Fraction | None) -> None:
         duration_s = seconds(self.reader, node, "`duration`")
@@ -259,26 +255,33 @@ class _Loader:
 
     def _read_models(self, node: JsonNode | None) -> None:
         libraries: dict[str, Path] = {}
-        for name, (definition, _) in self.reader.named(node, "`models`").items():
+        for name, (definition, span) in self.reader.named(node, "`models`").items():
             self.parts.models[name] = None
-            keys = self.reader.object(definition, f"model `{name}`", ("source",))
-            source = keys.get("source") if keys else None
-            text = self.reader.string(source, "`source`")
-            table = self._compile(text, source.span) if source and text is not None else None
-            if table and source and libraries.setdefault(table.name, table.library) != table.library:
-                self.sink.error("E801", f"two different models are called `{table.name}`", source.span)
+            keys = self.reader.object(definition, f"model `{name}`", (), ("source", "library"))
+            if keys is None:
+                continue
+            if len(keys) != 1:
+                has = "has both `source` and `library`" if keys else "has neither `source` nor `library`"
+                fix = 'write {"source": "cart.c"} for a file in C or C++, {"library": "package://PACKAGE/NAME"} for another'
+                self.sink.error("E801", f"model `{name}` {has}", span, help=fix)
+                continue
+            ((key, place),) = keys.items()
+            table = self._compile(key, place)
+            if table and libraries.setdefault(table.name, table.library) != table.library:
+                self.sink.error("E801", f"two different models are called `{table.name}`", place.span)
             else:
                 self.parts.models[name] = table
 
-    def _compile(self, text: str, span: Span) -> ModelTable | None:
+    def _compile(self, key: str, node: JsonNode) -> ModelTable | None:
+        text = self.reader.string(node, f"`{key}`", "cart.c" if key == "source" else "package://PACKAGE/NAME")
+        if text is None:
+            return None
         try:
-            path = resolve_source(text, config=self.file)
-            if not path.is_file():
-                raise SourcePathError(f"no such file: {path}")
-            includes = [package_prefix(package) / "include" for package in _INCLUDE_PACKAGES]
-            return describe_model(build_shared([path], includes), path.stem)
-        except (PackageNotFound, SimError, SourcePathError, ToolchainError) as error:
-            self.sink.error("E801", f"the model `{text}` cannot be used: {error}", span)
+            return model_source(text, file_of(node.span)) if key == "source" else model_library(text)
+        except SimError as error:
+            reason, _, output = str(error).partition("\n")
+            reason = reason.removesuffix(":")
+            self.sink.error("E801", f"the model `{text}` cannot be used: {reason}", node.span, output=output)
             return None
 
     # ---- instances ----------------------------------------------------------------------------------------------------
@@ -288,7 +291,7 @@ class _Loader:
             if name == "controller":
                 self.sink.error("E209", "`controller` is reserved", span, help="give the instance another name")
                 continue
-            keys = self.reader.object(definition, f"instance `{name}`", ("model",), ("parameters",)) or {}
+            keys = self.reader.object(definition, f"instance `{name}`", ("model",), _OPTIONAL) or {}
             model = self.reader.string(keys.get("model"), "`model`")
             instance = Instance(name, span, None)
             self.parts.instances[name] = instance
@@ -297,6 +300,9 @@ class _Loader:
             instance.table = self.parts.models[model]
             if instance.table:
                 self._read_parameters(instance, instance.table, keys.get("parameters"))
+                self._read_tolerances(instance, instance.table, keys.get("tolerances"))
+                tick_hz = self.parts.machine.tick_hz if self.parts.machine else None
+                instance.integrator = read_integrator(keys.get("integrator"), self.reader, tick_hz)
 
     def _read_parameters(self, instance: Instance, table: ModelTable, node: JsonNode | None) -> None:
         wanted = {f.name: f for f in table.of_role("parameter")}
@@ -317,6 +323,23 @@ class _Loader:
             self.sink.error("E211", message, instance.span, help="every parameter is given; nothing has a default")
         for name, definition in given.items():
             self._set(instance, wanted[name], definition)
+
+    def _read_tolerances(self, instance: Instance, table: ModelTable, node: JsonNode | None) -> None:
+        """Absolute tolerances of continuous states, for rk45."""
+        states = table.continuous()
+        if node is not None and node.kind != "object":
+            self.reader.wrong(node, "`tolerances` is an object from state to tolerance", '{"state.position": 1e-6}')
+            return
+        for path, member in node.members.items() if node else ():
+            definition, span = member.value, member.key_span
+            if path not in states:
+                hint = nearest(path, list(states)) or (f"it has {', '.join(states)}" if states else "it has none")
+                self.sink.error("E216", f"`{instance.name}` has no continuous state `{path}`", span, help=hint)
+                continue
+            value = self.reader.number(definition, "a tolerance", 1e-300, 1e300)
+            if value is not None:
+                bits = plan.bits("f64", value)
+                instance.tolerances += [plan.statement("tolerance", instance.name, i, bits) for i in states[path]]
 
     def _set(self, instance: Instance, target: ModelField, node: JsonNode) -> None:
         scalars = self.reader.value(node, target.type, f"parameter `{target.name}`")

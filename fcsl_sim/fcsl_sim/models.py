@@ -17,10 +17,12 @@ _FORMATS = {"bool": "B", "i32": "i", "i64": "q", "u32": "I", "u64": "Q", "f32": 
 
 @dataclass(frozen=True)
 class ModelField:
-    """One leaf of a model's struct. `role` is input, output, parameter or state; `offset` is in bytes."""
+    """One leaf of a model's struct. `role` is input, output, parameter or state; `offset` is in bytes; `feedthrough`: an
+    output that depends on an input of the same instant."""
 
     path: str
     role: str
+    feedthrough: bool
     type: Type
     offset: int
     unit: str
@@ -44,18 +46,42 @@ class ModelField:
 
 
 @dataclass(frozen=True)
+class ModelEvent:
+    """`crossing` is falling, rising or either."""
+
+    name: str
+    crossing: str
+    doc: str
+
+
+@dataclass(frozen=True)
 class ModelTable:
-    """A model: `fields` by path, in the table's order; integrated if it has continuous states."""
+    """A model: `fields` by path, in the table's order; integrated if it has continuous states, which lie together at
+    `continuous_offset`. `second_order`: these are positions, then their velocities."""
 
     name: str
     library: Path
+    continuous_offset: int
     continuous_count: int
+    has_output: bool
+    has_update: bool
+    second_order: bool
     doc: str
+    events: tuple[ModelEvent, ...]
     fields: dict[str, ModelField]
 
     @property
     def integrated(self) -> bool:
         return self.continuous_count > 0
+
+    def continuous(self) -> dict[str, range]:
+        """The numbers of the continuous states of each field that has some."""
+        found = {}
+        for field in self.of_role("state"):
+            first = (field.offset - self.continuous_offset) // 8
+            if scalar_of(field.type).name == "f64" and 0 <= first < self.continuous_count:
+                found[field.path] = range(first, min(first + count_of(field.type), self.continuous_count))
+        return found
 
     def of_role(self, *roles: str) -> list[ModelField]:
         return [field for field in self.fields.values() if field.role in roles]
@@ -74,8 +100,25 @@ def with_unit(type_: Type, unit: str) -> str:
 def parse_description(text: str, library: Path) -> ModelTable:
     """Parses the text of fcsl_sim_describe_model (src/describe.c)."""
     head, *rows = (line.split("\t") for line in text.splitlines())
+    _, name, offset, count, functions, doc = head
+    events = tuple(ModelEvent(*row[1:]) for row in rows if row[0] == "event")
     fields = {}
-    for _, path, role, scalar, shape, offset, unit, doc in rows:
-        extents = tuple(int(extent) for extent in shape.split(",")) if shape else ()
-        fields[path] = ModelField(path, role, type_of(scalar, extents), int(offset), unit, doc)
-    return ModelTable(head[1], library, int(head[2]), head[3], fields)
+    for row in rows:
+        if row[0] == "field":
+            _, path, role, feedthrough, scalar, shape, at, unit, field_doc = row
+            extents = tuple(int(extent) for extent in shape.split(",")) if shape else ()
+            type_ = type_of(scalar, extents)
+            fields[path] = ModelField(path, role, feedthrough == "1", type_, int(at), unit, field_doc)
+    has = functions.split(",")
+    return ModelTable(
+        name,
+        library,
+        int(offset),
+        int(count),
+        "output" in has,
+        "update" in has,
+        "second_order" in has,
+        doc,
+        events,
+        fields,
+    )

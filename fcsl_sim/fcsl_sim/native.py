@@ -9,6 +9,7 @@ import struct
 from collections.abc import Mapping, Sequence
 from ctypes import POINTER, byref, c_char_p, c_double, c_int, c_int32, c_int64, c_size_t, c_uint32, c_uint64
 from ctypes import c_void_p as ptr
+from dataclasses import dataclass
 from pathlib import Path
 from types import TracebackType
 
@@ -104,6 +105,9 @@ _PROTOTYPES: dict[str, tuple[type | None, list[type]]] = {
     "fcsl_sim_truth_type": (c_char_p, [ptr, c_uint32]),
     "fcsl_sim_truth_schema": (c_char_p, [ptr, c_uint32]),
     "fcsl_sim_truth_message": (c_int64, [ptr, c_uint32, ptr, c_size_t]),
+    "fcsl_sim_place": (c_char_p, [ptr, POINTER(c_char_p), POINTER(c_uint64)]),
+    "fcsl_sim_time_ns": (c_int64, [ptr]),
+    "fcsl_sim_watch_crashes": (c_int, [ptr, c_int, _ERROR]),
     "fcsl_sim_describe_model": (c_int64, [c_char_p, c_char_p, ptr, c_size_t, _ERROR]),
 }
 
@@ -148,6 +152,16 @@ def describe_model(library: Path, name: str) -> ModelTable:
     if size > len(buffer):
         raise SimError(f"{library}: the field table of model `{name}` exceeds {len(buffer)} bytes")
     return parse_description(buffer.raw[:size].decode("utf-8", "replace"), library)
+
+
+@dataclass(frozen=True)
+class Place:
+    """The function of a model that runs. `entry` is another number in each call; `time_s` that of the last instant."""
+
+    instance: str
+    function: str
+    entry: int
+    time_s: float
 
 
 class Failed(SimError):
@@ -243,6 +257,20 @@ class Simulation:
             raise SimError(str(error)) from None
         base = self._lib.fcsl_sim_machine_data(self.handle())
         return read_part(part, lambda offset, size: ctypes.string_at(base + offset, size), self.machine)
+
+    def place(self) -> Place | None:
+        """What runs now; None: no function of a model. From any thread."""
+        function, entry = c_char_p(), c_uint64()
+        instance = self._lib.fcsl_sim_place(self.handle(), byref(function), byref(entry))
+        if instance is None:
+            return None
+        time_s = self._lib.fcsl_sim_time_ns(self.handle()) / 1e9
+        return Place(instance.decode(), (function.value or b"").decode(), entry.value, time_s)
+
+    def watch_crashes(self, watch: bool, as_json: bool) -> None:
+        """Whether a crash within a model ends the process with a message that names it, as JSON too. Raises SimError."""
+        sim = self.handle() if watch else None
+        self._check(self._lib.fcsl_sim_watch_crashes(sim, int(as_json), byref(self._error)))
 
     def run(self, ticks: int) -> int:
         """Runs up to `ticks` ticks; returns early at the end, after a change of state and after a wait. Returns ticks done."""

@@ -38,4 +38,4 @@ def library_statement(keyword: str, name: str, library: Path) -> str:
 
 def document(lines: list[str]) -> str:
     """The whole text."""
-    return "\n".join(["fcsl-sim-plan 1", *lines, "end", ""])
+    return "\n".join(["fcsl-sim-plan 2", *lines, "end", ""])

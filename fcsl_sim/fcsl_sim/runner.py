@@ -15,6 +15,7 @@ from .config import SimConfig
 from .errors import SimError
 from .models import Scalar
 from .native import Simulation
+from .watchdog import Watchdog
 
 #: Ticks between two checks of the clock; an interrupt waits at most for these, or for two portions of a client's
 #: `tick`.
@@ -88,7 +89,11 @@ class Sender:
 
 
 class Watcher:
-    """Receives the events of a run; this base class ignores them."""
+    """Receives the events of a run; this base class ignores them. as_json: a model that crashes or hangs ends the process
+    with JSON on standard output."""
+
+    def __init__(self, as_json: bool = False):
+        self.as_json = as_json
 
     def listening(self) -> None:
         """A controller in another process can connect now."""
@@ -150,7 +155,8 @@ def run(
         if address is not None:
             watcher.serving(address)
         try:
-            flight = _fly(sim, hosted=external is None, watcher=watcher)
+            with Watchdog(sim, watcher.as_json):
+                flight = _fly(sim, hosted=external is None, watcher=watcher)
             sent = sim.telemetry_stop() if sender is not None else None
             observed = sim.observers_stop() if observers is not None else None
             shown = sim.ros_stop() if ros is not None else None

@@ -1,9 +1,8 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Connections, rates, order of updates, events, the stop condition and the ROS topics of a simulation."""
+"""Connections, rates, groups, order of evaluation, events, the stop condition and the ROS topics of a simulation."""
 
 from __future__ import annotations
 
-import heapq
 import json
 import math
 from collections.abc import Mapping, Sequence
@@ -17,25 +16,47 @@ from fcsl_compiler.parse.json_reader import ConfigReader
 from fcsl_compiler.parse.json_source import JsonNode
 from simclient.descriptor import Machine
 
-from . import plan
+from . import dataflow, plan
+from .dataflow import AlgebraicLoop, Link
+from .integrators import MAX_HZ, Integrator
 from .models import ModelField, ModelTable, type_of, with_unit
 from .ros import TruthTopic, read_truth
 
-#: Limits of the native simulator (src/plan.h).
-MAX_HZ = 1_000_000
 MAX_SECONDS = 1e9
+#: Of the grid on which updates with a phase lie (src/plan.h).
+_MAX_GRID_HZ = 1_000_000_000
 _COMPARISONS = ("equals", "above", "below")
 
 
 @dataclass
 class Instance:
-    """`table` is None if its model has an error; `sets` are the plan's statements for its parameters."""
+    """`table` is None if its model has an error; `sets` are the plan's statements for its parameters, `tolerances` those
+    for its continuous states. `integrator`: of its group, where it says so. `rate`: of its updates."""
 
     name: str
     span: Span
     table: ModelTable | None
     sets: list[str] = field(default_factory=list)
-    hz: int = 0
+    tolerances: list[str] = field(default_factory=list)
+    integrator: Integrator | None = None
+    rate: Rate | None = None
+
+
+@dataclass(frozen=True)
+class Rate:
+    """Updates at steps `phase` + i * `every` of a grid of `hz`."""
+
+    hz: int
+    every: int
+    phase: int
+    span: Span
+
+    def statement(self) -> str:
+        return f"{self.hz} {self.every} {self.phase}"
+
+    def text(self) -> str:
+        hz = Fraction(self.hz, self.every)
+        return f"{hz} Hz" + (f" from {float(Fraction(self.phase, self.hz)):g} s on" if self.phase else "")
 
 
 @dataclass(frozen=True)
@@ -98,7 +119,7 @@ def check_wiring(
     reader: ConfigReader,
     instances: dict[str, Instance],
     machine: Machine | None,
-    integrator_hz: int | None,
+    integrator: Integrator | None,
     keys: Mapping[str, JsonNode],
     ticks: int | None,
 ) -> Wiring:
@@ -107,16 +128,11 @@ def check_wiring(
     ticks: length of the run; events after the last tick give a warning (None: unknown, no warning).
     """
     checker = _Checker(reader, instances, machine)
-    checker.read_rates(keys.get("rates"), integrator_hz)
+    checker.read_rates(keys.get("rates"))
     checker.read_connections(keys)
-    order = checker.order()
-    lines = []
+    lines, order = checker.order(integrator)
     for name in order:
-        table = instances[name].table
-        if table:
-            lines.append(plan.statement("instance", name, table.name, instances[name].hz))
-    for name in order:
-        lines += instances[name].sets
+        lines += instances[name].sets + instances[name].tolerances
     lines += [_edge_statement(edge) for edge in checker.edges]
     lines += checker.read_events(keys.get("events"), ticks)
     checker.warn_unfed(keys.get("connections") or keys.get("controller"))
@@ -143,26 +159,43 @@ class _Checker:
 
     # ---- rates --------------------------------------------------------------------------------------------------------
 
-    def read_rates(self, node: JsonNode | None, integrator_hz: int | None) -> None:
+    def read_rates(self, node: JsonNode | None) -> None:
         rates = self.reader.named(node, "`rates`")
         for name, (definition, span) in rates.items():
             instance = self.instances.get(name)
             if instance is None:
                 self._no_instance(name, span)
                 continue
-            hz = self.reader.integer(definition, "a rate (Hz)", 1, MAX_HZ)
-            if instance.table and instance.table.integrated:
-                message = f"`{name}` is integrated: it is updated after every step of the integrator"
-                self.sink.error("E804", message, span, help="remove its rate; `integrator` has one for all")
-            elif hz and integrator_hz and integrator_hz % hz:
-                message = f"{hz} Hz does not divide the integrator's {integrator_hz} Hz"
-                self.sink.error("E220", message, definition.span)
-            elif hz:
-                instance.hz = hz
+            rate = self._rate(definition)
+            if instance.table and not instance.table.has_update:
+                message = f"`{name}` has no rate: its model has no `update`, and its outputs follow at every instant"
+                self.sink.error("E804", message, span, help="remove its rate")
+            else:
+                instance.rate = rate
         for instance in self.instances.values():
-            if instance.table and not instance.table.integrated and instance.name not in rates:
+            if instance.table and instance.table.has_update and instance.name not in rates:
                 fix = f'add `"{instance.name}": …` (Hz) to `rates`'
                 self.sink.error("E804", f"`{instance.name}` has no rate", instance.span, help=fix)
+
+    def _rate(self, node: JsonNode) -> Rate | None:
+        """100, or {"hz": 100, "phase_s": 0.002}."""
+        if node.kind != "object":
+            hz = self.reader.integer(node, "a rate (Hz)", 1, MAX_HZ)
+            return None if hz is None else Rate(hz, 1, 0, node.span)
+        keys = self.reader.object(node, "a rate", ("hz",), ("phase_s",))
+        hz = self.reader.integer(keys.get("hz"), "`hz`", 1, MAX_HZ) if keys else None
+        if keys is None or hz is None:
+            return None
+        phase = seconds(self.reader, keys.get("phase_s"), "`phase_s`") or Fraction(0)
+        if phase * hz >= 1:
+            message = f"the phase {float(phase):g} s is not within the period of {hz} Hz"
+            self.sink.error("E804", message, keys["phase_s"].span, help=f"write less than {1 / hz:g}")
+            return None
+        grid = math.lcm(hz, phase.denominator)
+        if grid > _MAX_GRID_HZ:
+            self.sink.error("E804", f"the phase {float(phase):g} s is finer than a nanosecond", keys["phase_s"].span)
+            return None
+        return Rate(grid, grid // hz, int(phase * grid), node.span)
 
     # ---- connections ----------------------------------------------------------------------------------------------------
 
@@ -303,44 +336,93 @@ class _Checker:
                 message = f"nothing feeds input {', '.join(unfed)} of `{instance.name}`"
                 self.sink.warning("W802", message, instance.span, why="it stays zero")
 
-    # ---- order ----------------------------------------------------------------------------------------------------------
+    # ---- groups and order ---------------------------------------------------------------------------------------------
 
-    def order(self) -> list[str]:
-        """Topological order: sources before targets, ties by name, independent of the order in the file."""
-        feeds: dict[str, set[str]] = {name: set() for name in self.instances}
-        for edge in self.edges:
-            if edge.source.instance and edge.target.instance:
-                feeds[edge.source.instance].add(edge.target.instance)
-        waiting = {name: sum(name in targets for targets in feeds.values()) for name in feeds}
-        ready = [name for name, count in waiting.items() if count == 0]
-        heapq.heapify(ready)
-        order = []
-        while ready:
-            name = heapq.heappop(ready)
-            order.append(name)
-            for target in feeds[name]:
-                waiting[target] -= 1
-                if waiting[target] == 0:
-                    heapq.heappush(ready, target)
-        if len(order) < len(feeds):
-            self._report_cycle({name for name in feeds if name not in order})
-        return order
+    def order(self, integrator: Integrator | None) -> tuple[list[str], list[str]]:
+        """The plan's statements of groups, instances and calls; and the instances, sources before what they feed."""
+        tables = {name: instance.table for name, instance in self.instances.items() if instance.table}
+        links = [self._link(edge, tables) for edge in self.edges if edge.source.instance and edge.target.instance]
+        try:
+            calls = dataflow.calls(tables, links)
+        except AlgebraicLoop as loop:
+            self._report_loop(loop.links, tables)
+            return [], list(self.instances)
+        groups = dataflow.groups(tables, links)
+        number = {name: i for i, group in enumerate(groups) for name in group}
+        chosen = [self._integrator_of(group, integrator) for group in groups]
+        self._check_grids(tables, links, number, chosen)
+        self._check_methods(tables, groups, chosen)
+        order = list(dict.fromkeys(call.instance for call in calls))
+        order += [name for name in self.instances if name not in order]
+        tick_hz = self.machine.tick_hz if self.machine else 1
+        lines = [one.statement(tick_hz) for one in chosen if one]
+        for name in order:
+            if name in tables:
+                rate = self.instances[name].rate
+                grid = rate.statement() if rate else "0 0 0"
+                lines.append(plan.statement("instance", name, tables[name].name, number.get(name, "-"), grid))
+        return lines + [plan.statement("call", call.instance, call.kind) for call in calls], order
 
-    def _report_cycle(self, stuck: set[str]) -> None:
-        """Follows sources backwards until an instance repeats, which closes a cycle."""
-        path: list[_Edge] = []
-        seen: list[str] = []
-        name = min(stuck & {e.target.instance for e in self.edges if e.source.instance in stuck})
-        while name not in seen:
-            seen.append(name)
-            edge = next(e for e in self.edges if e.target.instance == name and e.source.instance in stuck)
-            path.append(edge)
-            name = edge.source.instance
-        cycle = path[seen.index(name) :][::-1]
-        text = " -> ".join([cycle[0].source.instance, *(edge.target.instance for edge in cycle)])
-        notes = [(edge.span, f"`{edge.source.instance}` feeds `{edge.target.instance}`") for edge in cycle[1:]]
-        why = "an update uses the outputs that its sources computed for the same instant"
-        self.sink.error("E803", f"models feed each other: {text}", cycle[0].span, why=why, notes=notes)
+    def _link(self, edge: _Edge, tables: Mapping[str, ModelTable]) -> Link:
+        source, target = edge.source, edge.target
+        output = tables[source.instance].fields[source.path]
+        return Link(source.instance, output, target.instance, tables[target.instance].fields[target.path], edge.span)
+
+    def _integrator_of(self, group: Sequence[str], default: Integrator | None) -> Integrator | None:
+        given = [(name, own) for name in group if (own := self.instances[name].integrator)]
+        for name, own in given[1:]:
+            if not own.same(given[0][1]):
+                message = f"`{name}` and `{given[0][0]}` are directly connected, and have different integrators"
+                why = f"states of directly connected models integrate together: {', '.join(group)}"
+                notes = [(given[0][1].span, f"that of `{given[0][0]}`")]
+                self.sink.error("E808", message, first(own.span), why=why, notes=notes)
+        return given[0][1] if given else default
+
+    def _check_grids(
+        self,
+        tables: Mapping[str, ModelTable],
+        links: Sequence[Link],
+        number: Mapping[str, int],
+        chosen: Sequence[Integrator | None],
+    ) -> None:
+        """An update that a group feeds, or that feeds it, is at one of its steps, if these are of fixed size."""
+        for name, instance in self.instances.items():
+            near = {link.source for link in links if link.target == name} | {name}
+            near |= {link.target for link in links if link.source == name}
+            for group in sorted({number[other] for other in near if other in number}):
+                integrator = chosen[group]
+                if instance.rate and integrator and integrator.hz and integrator.hz % instance.rate.hz:
+                    message = f"{instance.rate.text()} is not on the grid of the integrator's {integrator.hz} Hz"
+                    fix = "let its rate divide the integrator's, or integrate with rk45, which has no grid"
+                    self.sink.error("E220", message, instance.rate.span, help=fix)
+                    break
+
+    def _check_methods(
+        self, tables: Mapping[str, ModelTable], groups: Sequence[Sequence[str]], chosen: Sequence[Integrator | None]
+    ) -> None:
+        for group, integrator in zip(groups, chosen, strict=True):
+            if integrator is None or integrator.method != "verlet":
+                continue
+            for name in group:
+                if tables[name].integrated and not tables[name].second_order:
+                    message = f"`{name}` cannot be integrated by verlet"
+                    why = f"model `{tables[name].name}` does not declare positions and their velocities"
+                    fix = "use another integrator, or set `is_second_order` where its forces depend on no velocity"
+                    self.sink.error("E808", message, self.instances[name].span, why=why, help=fix)
+
+    def _report_loop(self, links: Sequence[Link], tables: Mapping[str, ModelTable]) -> None:
+        texts = [f"{link.source}.{link.output.name} -> {link.target}.{link.input.name}" for link in links]
+        notes = [(link.span, text) for link, text in zip(links, texts, strict=True)]
+        loop = " -> ".join([links[0].source, *(link.target for link in links)])
+        sampled = all(not tables[link.source].has_output for link in links)
+        why = (
+            "an update uses the values that its sources make at the same instant"
+            if sampled
+            else "each of these outputs depends on the input before it at the same instant"
+        )
+        fix = "make one model of them, or let one keep its value in a state, so that its output needs no input"
+        head = "models feed each other" if sampled else "an algebraic loop"
+        self.sink.error("E803", f"{head}: {loop}", links[0].span, why=why, help=fix, notes=notes)
 
     def output(self, node: JsonNode, text: str) -> ModelField | None:
         """The output that `text` names; None if an error was reported."""

@@ -9,6 +9,8 @@
 
 #include "fcsl/fcsl_model.h"
 
+enum { NOISE = 0 }; /* stream */
+
 typedef struct {
     struct {
         double truth;
@@ -37,7 +39,7 @@ static const char *init(void *self, const fcsl_model_context_t *context)
 static void update(void *self, const fcsl_model_context_t *context)
 {
     noisy_sensor_t *sensor = self;
-    const double error = sensor->parameters.bias + sensor->parameters.sigma * context->gaussian(context->noise);
+    const double error = sensor->parameters.bias + sensor->parameters.sigma * context->gaussian(context->noise, NOISE);
     sensor->outputs.sampled = !sensor->parameters.dropout;
     if (sensor->outputs.sampled) {
         sensor->outputs.value = sensor->inputs.truth + error;

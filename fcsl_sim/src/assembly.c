@@ -30,7 +30,7 @@ void fcsl_write_bits(uint8_t *to, uint32_t size, uint64_t bits)
     }
 }
 
-static void *allocate(size_t size, size_t align)
+void *fcsl_sim_allocate(size_t size, size_t align)
 {
     if (align < sizeof(void *)) {
         align = sizeof(void *);
@@ -57,16 +57,14 @@ static int build_machine(fcsl_sim_t *sim, fcsl_error_t *error)
     if (plan->views && fcsl_run_set_views(sim->run, plan->views, error)) {
         return -1;
     }
-    if (machine->tick_hz == 0 || plan->integrator_hz % machine->tick_hz) {
-        return fcsl_sim_fail(error, "plan line %u: the integrator's rate is not a multiple of tick_hz %llu",
-                             plan->integrator_line, (unsigned long long)machine->tick_hz);
+    if (machine->tick_hz == 0) {
+        return fcsl_sim_fail(error, "plan line %u: the machine does not tick", plan->machine.line);
     }
-    sim->steps_per_tick = plan->integrator_hz / machine->tick_hz;
     const size_t sensors = fcsl_message_capacity(machine, FCSL_SENSOR_MESSAGE);
     const size_t actuators = fcsl_message_capacity(machine, FCSL_ACTUATOR_MESSAGE);
     sim->message_capacity = sensors > actuators ? sensors : actuators;
     sim->message_bytes = malloc(sim->message_capacity);
-    sim->image = allocate(machine->size, machine->align);
+    sim->image = fcsl_sim_allocate(machine->size, machine->align);
     sim->select = calloc(machine->channel_count + 1u, 1);
     if (!sim->message_bytes || !sim->image || !sim->select) {
         return fcsl_sim_fail(error, "no memory for the channels");
@@ -105,15 +103,18 @@ static int build_instance(fcsl_sim_t *sim, uint32_t index, fcsl_error_t *error)
     if (!instance->model) {
         return bad(error, from->line, "no model", from->model);
     }
-    const int integrated = instance->model->continuous_count > 0;
-    if (integrated != (from->hz == 0)) {
-        return bad(error, from->line, "integrated models have rate 0, others another, unlike", from->name);
+    if ((instance->model->update != NULL) != (from->hz > 0)) {
+        return bad(error, from->line, "models with `update` have a rate, others none, unlike", from->name);
     }
-    if (from->hz && plan->integrator_hz % from->hz) {
-        return bad(error, from->line, "the integrator's rate is not a multiple of the rate of", from->name);
+    if (instance->model->continuous_count > 0 && from->group == FCSL_PLAN_NO_GROUP) {
+        return bad(error, from->line, "in no group, with states to integrate:", from->name);
     }
-    instance->divisor = from->hz ? plan->integrator_hz / from->hz : 1;
-    instance->data = allocate(instance->model->size, instance->model->align);
+    instance->group = from->group;
+    instance->hz = from->hz;
+    instance->every = from->every;
+    instance->next_update = from->phase;
+    instance->next_update_ns = from->hz > 0 ? fcsl_grid_time_ns(from->phase, from->hz) : INT64_MAX;
+    instance->data = fcsl_sim_allocate(instance->model->size, instance->model->align);
     if (!instance->data) {
         return fcsl_sim_fail(error, "no memory for instance `%s`", from->name);
     }
@@ -129,38 +130,39 @@ static int build_instances(fcsl_sim_t *sim, fcsl_error_t *error)
         return fcsl_sim_fail(error, "no memory for the instances");
     }
     sim->instance_count = count;
-    uint32_t continuous = 0;
     for (uint32_t i = 0; i < count; i++) {
         if (build_instance(sim, i, error)) {
             return -1;
         }
-        const uint32_t n = sim->instances[i].model->continuous_count;
-        if (n > continuous) {
-            continuous = n;
-        }
     }
-    sim->scratch = calloc((size_t)FCSL_INTEGRATE_SCRATCH * (continuous + 1u), sizeof *sim->scratch);
-    return sim->scratch ? 0 : fcsl_sim_fail(error, "no memory for the integrator");
+    return 0;
 }
 
 /* ---- fields ---------------------------------------------------------------------------------------------------------- */
 
+int fcsl_sim_find_instance(const fcsl_sim_t *sim, uint32_t line, const char *name, uint32_t *index,
+                           fcsl_error_t *error)
+{
+    for (uint32_t i = 0; i < sim->instance_count; i++) {
+        if (strcmp(sim->instances[i].name, name) == 0) {
+            *index = i;
+            return 0;
+        }
+    }
+    return bad(error, line, "no instance", name);
+}
+
 static const fcsl_field_t *find_field(const fcsl_sim_t *sim, uint32_t line, const char *name, const char *path,
                                       uint32_t *index, fcsl_error_t *error)
 {
-    for (uint32_t i = 0; i < sim->instance_count; i++) {
-        if (strcmp(sim->instances[i].name, name) != 0) {
-            continue;
-        }
-        const fcsl_field_t *field = fcsl_model_field(sim->instances[i].model, path);
-        if (!field) {
-            (void)fcsl_sim_fail(error, "plan line %u: instance `%s` has no field `%s`", line, name, path);
-        }
-        *index = i;
-        return field;
+    if (fcsl_sim_find_instance(sim, line, name, index, error)) {
+        return NULL;
     }
-    (void)bad(error, line, "no instance", name);
-    return NULL;
+    const fcsl_field_t *field = fcsl_model_field(sim->instances[*index].model, path);
+    if (!field) {
+        (void)fcsl_sim_fail(error, "plan line %u: instance `%s` has no field `%s`", line, name, path);
+    }
+    return field;
 }
 
 static int build_write(const fcsl_sim_t *sim, const fcsl_plan_set_t *set, fcsl_write_t *write, fcsl_error_t *error)
@@ -185,6 +187,20 @@ static int build_write(const fcsl_sim_t *sim, const fcsl_plan_set_t *set, fcsl_w
     return 0;
 }
 
+/* Events by time; those of one time as in the plan. */
+static void sort_events(fcsl_sim_t *sim)
+{
+    const fcsl_plan_set_t *events = sim->plan.events;
+    for (uint32_t i = 0; i < sim->plan.event_count; i++) {
+        uint32_t at = i;
+        while (at > 0 && events[sim->event_order[at - 1u]].time_ns > events[i].time_ns) {
+            sim->event_order[at] = sim->event_order[at - 1u];
+            at--;
+        }
+        sim->event_order[at] = i;
+    }
+}
+
 static int build_writes(fcsl_sim_t *sim, fcsl_error_t *error)
 {
     const fcsl_plan_t *plan = &sim->plan;
@@ -196,7 +212,8 @@ static int build_writes(fcsl_sim_t *sim, fcsl_error_t *error)
         fcsl_write_bits(write.to, write.size, write.bits);
     }
     sim->events = calloc(plan->event_count + 1u, sizeof *sim->events);
-    if (!sim->events) {
+    sim->event_order = calloc(plan->event_count + 1u, sizeof *sim->event_order);
+    if (!sim->events || !sim->event_order) {
         return fcsl_sim_fail(error, "no memory for the events");
     }
     for (uint32_t i = 0; i < plan->event_count; i++) {
@@ -204,6 +221,7 @@ static int build_writes(fcsl_sim_t *sim, fcsl_error_t *error)
             return -1;
         }
     }
+    sort_events(sim);
     if (plan->until == FCSL_UNTIL_NONE) {
         return 0;
     }
@@ -282,9 +300,11 @@ static int add_copy(fcsl_sim_t *sim, const fcsl_plan_link_t *link, fcsl_error_t 
         if (from->role != FCSL_ROLE_OUTPUT) {
             return bad(error, link->line, "not an output:", link->from_field);
         }
-        if (source >= copy->instance) {
-            return bad(error, link->line, "the source must be updated first:", link->from_instance);
-        }
+        const fcsl_instance_state_t *feeds = &sim->instances[source];
+        const fcsl_instance_state_t *fed = &sim->instances[copy->instance];
+        copy->is_inner =
+            feeds->model->output != NULL && feeds->group == fed->group && fed->group != FCSL_PLAN_NO_GROUP;
+        copy->source = source;
         copy->from = sim->instances[source].data + from->offset;
     } else {
         uint32_t channel = 0;
@@ -292,6 +312,7 @@ static int add_copy(fcsl_sim_t *sim, const fcsl_plan_link_t *link, fcsl_error_t 
             return -1;
         }
         from = &sim->machine->fields[sim->machine->channels[channel].field];
+        copy->source = UINT32_MAX;
         copy->from = sim->image + from->offset;
     }
     if (check_pair(link, from, to, error)) {
@@ -314,6 +335,9 @@ static int by_instance(const void *left, const void *right)
     const fcsl_copy_t *b = right;
     if (a->instance != b->instance) {
         return a->instance < b->instance ? -1 : 1;
+    }
+    if (a->is_inner != b->is_inner) {
+        return a->is_inner < b->is_inner ? -1 : 1;
     }
     return a->to < b->to ? -1 : a->to > b->to;
 }
@@ -340,6 +364,8 @@ static int build_copies(fcsl_sim_t *sim, fcsl_error_t *error)
         fcsl_instance_state_t *instance = &sim->instances[sim->copies[i].instance];
         instance->first_copy = i;
         instance->copy_count++;
+        instance->inner_count += sim->copies[i].is_inner;
+        instance->outer_count += !sim->copies[i].is_inner;
     }
     return 0;
 }
@@ -405,7 +431,8 @@ int fcsl_assembly_build(fcsl_sim_t *sim, fcsl_error_t *error)
     if (build_machine(sim, error) || build_models(sim, error) || build_instances(sim, error)) {
         return -1;
     }
-    if (build_writes(sim, error) || build_copies(sim, error) || build_sensors(sim, error)) {
+    if (build_writes(sim, error) || build_copies(sim, error) || build_sensors(sim, error) ||
+        fcsl_sim_build_groups(sim, error)) {
         return -1;
     }
     return fcsl_actuators_build(sim, error) || build_link(sim, error) || fcsl_truth_build(sim, error) ? -1 : 0;
@@ -416,6 +443,10 @@ void fcsl_assembly_free(fcsl_sim_t *sim)
     fcsl_truth_free(sim);
     fcsl_actuators_free(sim);
     fcsl_sim_link_free(sim->link);
+    for (uint32_t i = 0; sim->groups && i < sim->group_count; i++) {
+        fcsl_group_free(&sim->groups[i]);
+    }
+    free(sim->groups);
     for (uint32_t i = 0; i < sim->instance_count; i++) {
         free(sim->instances[i].data);
     }
@@ -428,8 +459,11 @@ void fcsl_assembly_free(fcsl_sim_t *sim)
     free(sim->copies);
     free(sim->sensors);
     free(sim->events);
+    free(sim->event_order);
+    free(sim->calls);
+    free(sim->group_scratch);
+    free(sim->before);
     free(sim->image);
     free(sim->select);
     free(sim->message_bytes);
-    free(sim->scratch);
 }

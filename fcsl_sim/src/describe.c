@@ -2,10 +2,12 @@
  *
  * A model's table as text, for the front end: one record per line, columns separated by tabs.
  *
- *   model NAME CONTINUOUS_STATES DOC
- *   field PATH ROLE TYPE SHAPE OFFSET UNIT DOC
+ *   model NAME CONTINUOUS_OFFSET CONTINUOUS_STATES FUNCTIONS DOC
+ *   event NAME CROSSING DOC
+ *   field PATH ROLE FEEDTHROUGH TYPE SHAPE OFFSET UNIT DOC
  *
- * SHAPE is empty for a scalar, else its extents separated by commas.
+ * SHAPE is empty for a scalar, else its extents separated by commas. FUNCTIONS are names separated by commas, `second_order`
+ * among them where the model is; FEEDTHROUGH is 1 or 0.
  */
 #include <string.h>
 
@@ -62,6 +64,25 @@ static void put_type(text_t *text, const fcsl_field_t *field)
     put_char(text, '\t');
 }
 
+static void put_functions(text_t *text, const fcsl_model_t *model)
+{
+    char names[64];
+    (void)snprintf(names, sizeof names, "%s%s%s", model->output ? "output," : "", model->update ? "update," : "",
+                   model->is_second_order ? "second_order," : "");
+    put(text, names, '\t');
+}
+
+static void put_events(text_t *text, const fcsl_model_t *model)
+{
+    static const char *const crossings[] = {"", "falling", "rising", "either"};
+    for (uint32_t i = 0; i < model->event_count; i++) {
+        put(text, "event", '\t');
+        put(text, model->events[i].name, '\t');
+        put(text, crossings[model->events[i].crossing], '\t'); /* one of these: checked at load */
+        put(text, model->events[i].doc, '\n');
+    }
+}
+
 int64_t fcsl_sim_describe_model(const char *library, const char *name, char *text, size_t capacity, fcsl_error_t *error)
 {
     static const char *const roles[] = {"machine", "input", "output", "parameter", "state"};
@@ -73,13 +94,17 @@ int64_t fcsl_sim_describe_model(const char *library, const char *name, char *tex
     text_t out = {text, capacity, 0};
     put(&out, "model", '\t');
     put(&out, model->name, '\t');
+    put_number(&out, model->continuous_offset, '\t');
     put_number(&out, model->continuous_count, '\t');
+    put_functions(&out, model);
     put(&out, model->doc, '\n');
+    put_events(&out, model);
     for (uint32_t i = 0; i < model->field_count; i++) {
         const fcsl_field_t *field = &model->fields[i];
         put(&out, "field", '\t');
         put(&out, field->path, '\t');
         put(&out, roles[field->role], '\t'); /* one of these four: checked at load */
+        put_number(&out, (field->flags & FCSL_FIELD_FEEDTHROUGH) != 0, '\t');
         put_type(&out, field);
         put_number(&out, field->offset, '\t');
         put(&out, field->unit, '\t');

@@ -53,6 +53,15 @@ int fcsl_event_queue_push(fcsl_event_queue_t *queue, fcsl_event_t event)
     return 0;
 }
 
+int fcsl_event_queue_peek(const fcsl_event_queue_t *queue, fcsl_event_t *event)
+{
+    if (queue->count == 0) {
+        return -1;
+    }
+    *event = queue->events[0];
+    return 0;
+}
+
 int fcsl_event_queue_pop(fcsl_event_queue_t *queue, fcsl_event_t *event)
 {
     if (queue->count == 0) {

@@ -30,6 +30,8 @@ void fcsl_event_queue_free(fcsl_event_queue_t *queue);
 
 /* Returns 0, or -1 if the queue is full (nothing changes). */
 int fcsl_event_queue_push(fcsl_event_queue_t *queue, fcsl_event_t event);
+/* The first event, which stays. Returns 0, or -1 if the queue is empty. */
+int fcsl_event_queue_peek(const fcsl_event_queue_t *queue, fcsl_event_t *event);
 /* Removes the first event. Returns 0, or -1 if the queue is empty. */
 int fcsl_event_queue_pop(fcsl_event_queue_t *queue, fcsl_event_t *event);
 

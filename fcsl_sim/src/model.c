@@ -45,6 +45,28 @@ static int is_field_name(const char *name)
     return name[length - 1] != '_' && !strstr(name, "__");
 }
 
+/* Members of structs are joined with dots: "wind.east". */
+static int is_member_path(const char *path)
+{
+    char name[FCSL_MODEL_MAX_PATH + 1u];
+    while (*path) {
+        const size_t length = strcspn(path, ".");
+        if (length == 0 || length > FCSL_MODEL_MAX_PATH) {
+            return 0;
+        }
+        memcpy(name, path, length);
+        name[length] = '\0';
+        if (!is_field_name(name)) {
+            return 0;
+        }
+        path += length;
+        if (*path == '.' && *++path == '\0') {
+            return 0;
+        }
+    }
+    return 1;
+}
+
 /* The error in one field, or null. */
 static const char *check_field(const fcsl_model_t *model, const fcsl_field_t *field)
 {
@@ -55,7 +77,8 @@ static const char *check_field(const fcsl_model_t *model, const fcsl_field_t *fi
     if (strncmp(field->path, prefix, strlen(prefix)) != 0) {
         return "its path does not begin with its role";
     }
-    if (strlen(field->path) > 200 || !is_field_name(field->path + strlen(prefix))) {
+    if (strlen(field->path) > FCSL_MODEL_MAX_PATH || !field->path[strlen(prefix)] ||
+        !is_member_path(field->path + strlen(prefix))) {
         return "its name is not lower_snake_case";
     }
     if (strcmp(field->path, "outputs.header") == 0) {
@@ -87,6 +110,9 @@ static const char *check_field(const fcsl_model_t *model, const fcsl_field_t *fi
     if (field->offset % scalar) {
         return "its offset is not aligned";
     }
+    if ((field->flags & FCSL_FIELD_FEEDTHROUGH) != 0 && (field->role != FCSL_ROLE_OUTPUT || !model->output)) {
+        return "only an output that `output` writes depends on inputs of the same instant";
+    }
     if (!field->unit || !field->doc) {
         return "its unit or doc is null";
     }
@@ -102,8 +128,28 @@ static const char *check_descriptor(const fcsl_model_t *model)
     if (!model->doc) {
         return "its doc is null";
     }
-    if (!model->update) {
-        return "it has no update function";
+    if (!model->update && !model->output) {
+        return "it has neither `output` nor `update`: nothing writes its outputs";
+    }
+    if (model->continuous_count && !model->output) {
+        return "it has continuous states and no `output`";
+    }
+    if (model->is_second_order && (model->continuous_count == 0 || model->continuous_count % 2u != 0)) {
+        return "it is of second order without as many velocities as positions";
+    }
+    if ((model->event_count > 0) != (model->event != NULL) || (model->event_count > 0) != (model->reset != NULL) ||
+        (model->event_count > 0 && !model->events)) {
+        return "it must have `events`, `event` and `reset` together, or none of them";
+    }
+    if (model->event_count > FCSL_MODEL_MAX_EVENTS) {
+        return "it has too many events";
+    }
+    for (uint32_t i = 0; i < model->event_count; i++) {
+        const fcsl_model_event_t *event = &model->events[i];
+        if (!event->name || !is_field_name(event->name) || !event->doc || event->crossing < FCSL_FALLING ||
+            event->crossing > FCSL_EITHER) {
+            return "an event has no name in lower_snake_case, no doc or no crossing";
+        }
     }
     if (model->size == 0 || model->size > FCSL_MODEL_MAX_BYTES) {
         return "its size is zero or above 1 MiB";

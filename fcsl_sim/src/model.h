@@ -11,6 +11,8 @@
 #define FCSL_MODEL_MAX_FIELDS     1024u
 #define FCSL_MODEL_MAX_BYTES      (1u << 20)
 #define FCSL_MODEL_MAX_CONTINUOUS 4096u
+#define FCSL_MODEL_MAX_EVENTS     64u
+#define FCSL_MODEL_MAX_PATH       200u
 
 /* Loads `library` and finds its model `name`; rejects another ABI version and invalid tables.
  * *handle receives the argument of fcsl_model_unload. Returns null on failure. */

@@ -1,6 +1,6 @@
 /* SPDX-License-Identifier: Apache-2.0
  *
- * Seeded random numbers, one stream per instance.
+ * Seeded random numbers, a stream per instance and use.
  */
 #include "noise.h"
 
@@ -8,13 +8,30 @@
 
 #include "fcsl/fcsl_math.h"
 
-/* Spreads a counter over all bits; it seeds the main generator, as its authors recommend. */
-static uint64_t next_splitmix64(uint64_t *state)
+enum { ROUNDS = 10, STREAM_BITS = 8 };
+
+void fcsl_philox(const uint32_t counter[4], const uint32_t key[2], uint32_t block[4])
 {
-    uint64_t z = (*state += UINT64_C(0x9e3779b97f4a7c15));
-    z = (z ^ (z >> 30)) * UINT64_C(0xbf58476d1ce4e5b9);
-    z = (z ^ (z >> 27)) * UINT64_C(0x94d049bb133111eb);
-    return z ^ (z >> 31);
+    uint32_t c0 = counter[0];
+    uint32_t c1 = counter[1];
+    uint32_t c2 = counter[2];
+    uint32_t c3 = counter[3];
+    uint32_t k0 = key[0];
+    uint32_t k1 = key[1];
+    for (int round = 0; round < ROUNDS; round++) {
+        const uint64_t a = (uint64_t)0xD2511F53u * c0;
+        const uint64_t b = (uint64_t)0xCD9E8D57u * c2;
+        c0 = (uint32_t)(b >> 32) ^ c1 ^ k0;
+        c1 = (uint32_t)b;
+        c2 = (uint32_t)(a >> 32) ^ c3 ^ k1;
+        c3 = (uint32_t)a;
+        k0 += 0x9E3779B9u;
+        k1 += 0xBB67AE85u;
+    }
+    block[0] = c0;
+    block[1] = c1;
+    block[2] = c2;
+    block[3] = c3;
 }
 
 /* FNV-1a, 64 bits. */
@@ -29,50 +46,48 @@ static uint64_t hash_name(const char *name)
 
 void fcsl_noise_seed(fcsl_noise_t *noise, uint64_t seed, const char *name)
 {
-    uint64_t state = seed;
-    state = next_splitmix64(&state) ^ hash_name(name);
-    for (int i = 0; i < 4; i++) {
-        noise->word[i] = next_splitmix64(&state);
+    *noise = (fcsl_noise_t){.seed = seed, .instance = hash_name(name)};
+}
+
+/* Two uniform numbers of the next block, in [0, 1). */
+static void draw(fcsl_noise_t *noise, uint32_t stream, double uniform[2])
+{
+    const uint64_t number = noise->streams[stream].drawn++ << STREAM_BITS | stream;
+    const uint32_t counter[4] = {(uint32_t)number, (uint32_t)(number >> 32), (uint32_t)noise->instance,
+                                 (uint32_t)(noise->instance >> 32)};
+    const uint32_t key[2] = {(uint32_t)noise->seed, (uint32_t)(noise->seed >> 32)};
+    uint32_t block[4];
+    fcsl_philox(counter, key, block);
+    uniform[0] = (double)(((uint64_t)block[1] << 32 | block[0]) >> 11) * 0x1p-53;
+    uniform[1] = (double)(((uint64_t)block[3] << 32 | block[2]) >> 11) * 0x1p-53;
+}
+
+double fcsl_noise_uniform(fcsl_noise_t *noise, uint32_t stream)
+{
+    double uniform[2];
+    if (stream >= FCSL_NOISE_STREAMS) {
+        return NAN;
     }
-    noise->spare = 0.0;
-    noise->has_spare = 0;
-}
-
-static uint64_t rotate_left(uint64_t x, int bits)
-{
-    return (x << bits) | (x >> (64 - bits));
-}
-
-/* xoshiro256++ (Blackman, Vigna). */
-static uint64_t next_xoshiro(uint64_t word[4])
-{
-    const uint64_t result = rotate_left(word[0] + word[3], 23) + word[0];
-    const uint64_t shifted = word[1] << 17;
-    word[2] ^= word[0];
-    word[3] ^= word[1];
-    word[1] ^= word[2];
-    word[0] ^= word[3];
-    word[2] ^= shifted;
-    word[3] = rotate_left(word[3], 45);
-    return result;
-}
-
-double fcsl_noise_uniform(fcsl_noise_t *noise)
-{
-    return (double)(next_xoshiro(noise->word) >> 11) * 0x1p-53;
+    draw(noise, stream, uniform);
+    return uniform[0];
 }
 
 /* Box and Muller: two uniform numbers make two normal ones, without a rejection loop. */
-double fcsl_noise_gaussian(fcsl_noise_t *noise)
+double fcsl_noise_gaussian(fcsl_noise_t *noise, uint32_t stream)
 {
-    if (noise->has_spare) {
-        noise->has_spare = 0;
-        return noise->spare;
+    double uniform[2];
+    if (stream >= FCSL_NOISE_STREAMS) {
+        return NAN;
     }
-    const double u = 1.0 - fcsl_noise_uniform(noise); /* (0, 1]: its logarithm is finite */
-    const double angle = 0x1.921fb54442d18p+2 * fcsl_noise_uniform(noise);
-    const double radius = sqrt(-2.0 * cr_log(u));
-    noise->spare = radius * cr_sin(angle);
-    noise->has_spare = 1;
+    fcsl_noise_stream_t *at = &noise->streams[stream];
+    if (at->has_spare) {
+        at->has_spare = 0;
+        return at->spare;
+    }
+    draw(noise, stream, uniform);
+    const double radius = sqrt(-2.0 * cr_log(1.0 - uniform[0])); /* of (0, 1]: it is finite */
+    const double angle = 0x1.921fb54442d18p+2 * uniform[1];
+    at->spare = radius * cr_sin(angle);
+    at->has_spare = 1;
     return radius * cr_cos(angle);
 }

@@ -4,6 +4,7 @@
  */
 #include "plan.h"
 
+#include <math.h>
 #include <stdlib.h>
 #include <string.h>
 
@@ -50,23 +51,42 @@ static int on_machine(parser_t *parser)
     return take_library(parser, &parser->plan->machine);
 }
 
-static int on_integrator(parser_t *parser)
+/* A double from its bits. */
+static int take_double(const parser_t *parser, const char *word, double *value)
 {
-    fcsl_plan_t *plan = parser->plan;
-    if (plan->integrator_line) {
-        return bad(parser, "a second `integrator`");
+    uint64_t bits = 0;
+    if (fcsl_plan_bits(word, &bits)) {
+        return bad(parser, "the value is not 16 hexadecimal digits");
     }
-    if (strcmp(parser->word[1], "euler") == 0) {
-        plan->method = FCSL_EULER;
-    } else if (strcmp(parser->word[1], "rk4") == 0) {
-        plan->method = FCSL_RK4;
-    } else {
-        return bad(parser, "the integrator is neither `euler` nor `rk4`");
+    memcpy(value, &bits, sizeof bits);
+    return isfinite(*value) && *value >= 0.0 ? 0 : bad(parser, "not a number from 0 on");
+}
+
+static int on_group(parser_t *parser)
+{
+    static const char *const names[FCSL_METHODS] = {"euler", "rk2", "rk4", "ab4", "verlet", "rk45"};
+    fcsl_plan_group_t *group = &parser->plan->groups[parser->plan->group_count++];
+    *group = (fcsl_plan_group_t){.line = parser->line, .method = FCSL_METHODS};
+    for (uint32_t i = 0; i < FCSL_METHODS; i++) {
+        if (strcmp(parser->word[1], names[i]) == 0) {
+            group->method = (fcsl_method_t)i;
+        }
     }
-    if (fcsl_plan_number(parser->word[2], FCSL_PLAN_MAX_HZ, &plan->integrator_hz) || plan->integrator_hz == 0) {
-        return bad(parser, "the integrator's rate is not in 1..1000000 Hz");
+    if (group->method == FCSL_METHODS) {
+        return bad(parser, "there is no such integrator");
     }
-    plan->integrator_line = parser->line;
+    if (fcsl_plan_number(parser->word[2], FCSL_PLAN_MAX_HZ, &group->hz) ||
+        (group->hz == 0) != (group->method == FCSL_RK45)) {
+        return bad(parser, "the integrator's rate is not in 1..1000000 Hz, or 0 for rk45");
+    }
+    if (take_double(parser, parser->word[3], &group->rtol) || take_double(parser, parser->word[4], &group->atol) ||
+        take_double(parser, parser->word[5], &group->min_step_s) ||
+        take_double(parser, parser->word[6], &group->max_step_s)) {
+        return -1;
+    }
+    if (group->hz == 0 && !(group->max_step_s > 0.0 && group->atol > 0.0)) {
+        return bad(parser, "the largest step and the absolute tolerance are not above 0");
+    }
     return 0;
 }
 
@@ -101,15 +121,53 @@ static int on_model(parser_t *parser)
 
 static int on_instance(parser_t *parser)
 {
-    fcsl_plan_instance_t *instance = &parser->plan->instances[parser->plan->instance_count++];
-    *instance = (fcsl_plan_instance_t){parser->line, parser->word[1], parser->word[2], 0};
+    fcsl_plan_t *plan = parser->plan;
+    fcsl_plan_instance_t *instance = &plan->instances[plan->instance_count++];
+    uint64_t group = FCSL_PLAN_NO_GROUP;
+    *instance = (fcsl_plan_instance_t){.line = parser->line, .name = parser->word[1], .model = parser->word[2]};
     if (!fcsl_plan_is_name(instance->name) || !fcsl_plan_is_name(instance->model)) {
         return bad(parser, "not a name");
     }
-    if (fcsl_plan_number(parser->word[3], FCSL_PLAN_MAX_HZ, &instance->hz)) {
-        return bad(parser, "the rate is not in 0..1000000 Hz");
+    if (strcmp(parser->word[3], "-") != 0 &&
+        (fcsl_plan_number(parser->word[3], FCSL_PLAN_MAX_GROUPS, &group) || group >= plan->group_count)) {
+        return bad(parser, "there is no such group");
+    }
+    instance->group = (uint32_t)group;
+    if (fcsl_plan_number(parser->word[4], FCSL_PLAN_MAX_GRID_HZ, &instance->hz) ||
+        fcsl_plan_number(parser->word[5], FCSL_PLAN_MAX_TICKS, &instance->every) ||
+        fcsl_plan_number(parser->word[6], FCSL_PLAN_MAX_TICKS, &instance->phase) ||
+        (instance->hz > 0) != (instance->every > 0)) {
+        return bad(parser, "not a rate with its phase");
     }
     return 0;
+}
+
+static int on_tolerance(parser_t *parser)
+{
+    fcsl_plan_tolerance_t *tolerance = &parser->plan->tolerances[parser->plan->tolerance_count++];
+    *tolerance = (fcsl_plan_tolerance_t){.line = parser->line, .instance = parser->word[1]};
+    if (!fcsl_plan_is_name(tolerance->instance) ||
+        fcsl_plan_number(parser->word[2], UINT32_MAX, &tolerance->state)) {
+        return bad(parser, "not an instance and the number of a state");
+    }
+    if (take_double(parser, parser->word[3], &tolerance->atol)) {
+        return -1;
+    }
+    return tolerance->atol > 0.0 ? 0 : bad(parser, "the tolerance is not above 0");
+}
+
+static int on_call(parser_t *parser)
+{
+    static const char *const kinds[] = {"output", "stage", "update"};
+    fcsl_plan_call_t *call = &parser->plan->calls[parser->plan->call_count++];
+    *call = (fcsl_plan_call_t){.line = parser->line, .instance = parser->word[1]};
+    for (uint32_t i = 0; i < sizeof kinds / sizeof *kinds; i++) {
+        if (strcmp(parser->word[2], kinds[i]) == 0) {
+            call->kind = (fcsl_call_kind_t)i;
+            return fcsl_plan_is_name(call->instance) ? 0 : bad(parser, "not a name");
+        }
+    }
+    return bad(parser, "the call is not `output`, `stage` or `update`");
 }
 
 /* INSTANCE FIELD ELEMENT BITS from word `first` on. */
@@ -230,11 +288,13 @@ typedef struct {
 
 enum {
     MACHINE,
-    INTEGRATOR,
     SEED,
     TICKS,
     MODEL,
+    GROUP,
     INSTANCE,
+    TOLERANCE,
+    CALL,
     SET,
     LINK,
     SENSOR,
@@ -248,11 +308,13 @@ enum {
 
 static const statement_t statements[STATEMENTS] = {
     [MACHINE] = {"machine", 3, 1, on_machine, 1},
-    [INTEGRATOR] = {"integrator", 3, 0, on_integrator, 1},
     [SEED] = {"seed", 2, 0, on_seed, 1},
     [TICKS] = {"ticks", 2, 0, on_ticks, 1},
     [MODEL] = {"model", 3, 1, on_model, FCSL_PLAN_MAX_MODELS},
-    [INSTANCE] = {"instance", 4, 0, on_instance, FCSL_PLAN_MAX_INSTANCES},
+    [GROUP] = {"group", 7, 0, on_group, FCSL_PLAN_MAX_GROUPS},
+    [INSTANCE] = {"instance", 7, 0, on_instance, FCSL_PLAN_MAX_INSTANCES},
+    [TOLERANCE] = {"tolerance", 4, 0, on_tolerance, FCSL_PLAN_MAX_SETS},
+    [CALL] = {"call", 3, 0, on_call, FCSL_PLAN_MAX_CALLS},
     [SET] = {"set", 5, 0, on_set, FCSL_PLAN_MAX_SETS},
     [LINK] = {"link", 5, 0, on_link, FCSL_PLAN_MAX_LINKS},
     [SENSOR] = {"sensor", 4, 0, on_sensor, FCSL_PLAN_MAX_LINKS},
@@ -282,8 +344,8 @@ static int count_statements(const char *text, uint32_t lines, uint32_t counts[ST
     const char *at = text;
     for (uint32_t i = 1; i <= lines; i++, at += strlen(at) + 1) {
         if (i == 1) {
-            if (strcmp(at, "fcsl-sim-plan 1") != 0) {
-                return fcsl_sim_fail(error, "plan line 1: not `fcsl-sim-plan 1`");
+            if (strcmp(at, "fcsl-sim-plan 2") != 0) {
+                return fcsl_sim_fail(error, "plan line 1: not `fcsl-sim-plan 2`");
             }
             continue;
         }
@@ -308,13 +370,16 @@ static int count_statements(const char *text, uint32_t lines, uint32_t counts[ST
 static int allocate(fcsl_plan_t *plan, const uint32_t counts[STATEMENTS], fcsl_error_t *error)
 {
     plan->models = calloc(counts[MODEL] + 1u, sizeof *plan->models);
+    plan->groups = calloc(counts[GROUP] + 1u, sizeof *plan->groups);
     plan->instances = calloc(counts[INSTANCE] + 1u, sizeof *plan->instances);
+    plan->tolerances = calloc(counts[TOLERANCE] + 1u, sizeof *plan->tolerances);
+    plan->calls = calloc(counts[CALL] + 1u, sizeof *plan->calls);
     plan->sets = calloc(counts[SET] + 1u, sizeof *plan->sets);
     plan->links = calloc(counts[LINK] + 1u, sizeof *plan->links);
     plan->sensors = calloc(counts[SENSOR] + 1u, sizeof *plan->sensors);
     plan->actuators = calloc(counts[ACTUATOR] + 1u, sizeof *plan->actuators);
     plan->events = calloc(counts[EVENT] + 1u, sizeof *plan->events);
-    if (!plan->models || !plan->instances || !plan->sets || !plan->links || !plan->sensors || !plan->actuators ||
+    if (!plan->models || !plan->groups || !plan->instances || !plan->tolerances || !plan->calls || !plan->sets || !plan->links || !plan->sensors || !plan->actuators ||
         !plan->events) {
         return fcsl_sim_fail(error, "no memory for the plan");
     }
@@ -323,8 +388,7 @@ static int allocate(fcsl_plan_t *plan, const uint32_t counts[STATEMENTS], fcsl_e
 
 static int check_complete(const fcsl_plan_t *plan, fcsl_error_t *error)
 {
-    const char *missing = !plan->machine.line      ? "machine"
-                          : !plan->integrator_line ? "integrator"
+    const char *missing = !plan->machine.line ? "machine"
                           : !plan->seed_line       ? "seed"
                           : !plan->ticks_line      ? "ticks"
                                                    : NULL;
@@ -393,7 +457,10 @@ int fcsl_plan_parse(fcsl_plan_t *plan, const char *text, size_t size, fcsl_error
 void fcsl_plan_free(fcsl_plan_t *plan)
 {
     free(plan->models);
+    free(plan->groups);
     free(plan->instances);
+    free(plan->tolerances);
+    free(plan->calls);
     free(plan->sets);
     free(plan->links);
     free(plan->sensors);

@@ -2,13 +2,15 @@
  *
  * The plan: the front end's input to the native simulator. Text, one statement per line, words separated by one space:
  *
- *   fcsl-sim-plan 1
+ *   fcsl-sim-plan 2
  *   machine NAME LIBRARY                              library: to the end of the line
- *   integrator euler|rk4 HZ
  *   seed N
  *   ticks N                                           controller ticks at the latest
  *   model NAME LIBRARY
- *   instance NAME MODEL HZ                            in order of update; HZ 0: integrated
+ *   group METHOD HZ RTOL ATOL MIN_STEP MAX_STEP       by number, from 0; HZ 0: adaptive. The others are bits of doubles
+ *   instance NAME MODEL GROUP HZ EVERY PHASE          GROUP -: in none; updates at steps PHASE + i * EVERY of a grid of HZ; 0: none
+ *   tolerance INSTANCE STATE BITS                     absolute, of a continuous state by its number
+ *   call INSTANCE output|stage|update                 in order of evaluation; stage: an output that derivatives need
  *   set INSTANCE FIELD ELEMENT BITS                   before init
  *   link INSTANCE FIELD INSTANCE FIELD                from, to
  *   sensor INSTANCE FIELD CHANNEL                     from, to
@@ -20,7 +22,7 @@
  *   end
  *
  * BITS are 16 hexadecimal digits: the scalar's bits, zero-extended. The plan starts with the first line and ends with `end`, so
- * a truncated plan is detected. `machine`, `integrator`, `seed` and `ticks` occur exactly once.
+ * a truncated plan is detected. `machine`, `seed` and `ticks` occur exactly once.
  */
 #ifndef FCSL_SIM_PLAN_H
 #define FCSL_SIM_PLAN_H
@@ -32,9 +34,12 @@
 #define FCSL_PLAN_MAX_LINE      (FCSL_VIEWS_BYTES_MAX + 8u)
 #define FCSL_PLAN_MAX_MODELS    64u
 #define FCSL_PLAN_MAX_INSTANCES 256u
+#define FCSL_PLAN_MAX_GROUPS    256u
+#define FCSL_PLAN_MAX_CALLS     1024u
 #define FCSL_PLAN_MAX_LINKS     4096u  /* of each kind */
 #define FCSL_PLAN_MAX_SETS      65536u /* of each kind */
 #define FCSL_PLAN_MAX_HZ        1000000u
+#define FCSL_PLAN_MAX_GRID_HZ   1000000000u
 #define FCSL_PLAN_MAX_TICKS     UINT64_C(1000000000000)
 
 /* Every record has its line number, for messages. All strings point into the plan's copy of the text. */
@@ -48,8 +53,38 @@ typedef struct {
     uint32_t line;
     const char *name;
     const char *model;
-    uint64_t hz;
+    uint32_t group; /* FCSL_PLAN_NO_GROUP: none */
+    uint64_t hz;    /* of the grid of its updates; 0: none */
+    uint64_t every;
+    uint64_t phase;
 } fcsl_plan_instance_t;
+
+#define FCSL_PLAN_NO_GROUP UINT32_MAX
+
+typedef struct {
+    uint32_t line;
+    fcsl_method_t method;
+    uint64_t hz; /* of fixed steps; 0: adaptive */
+    double rtol;
+    double atol;
+    double min_step_s;
+    double max_step_s;
+} fcsl_plan_group_t;
+
+typedef struct {
+    uint32_t line;
+    const char *instance;
+    uint64_t state;
+    double atol;
+} fcsl_plan_tolerance_t;
+
+typedef enum { FCSL_CALL_OUTPUT, FCSL_CALL_STAGE, FCSL_CALL_UPDATE } fcsl_call_kind_t;
+
+typedef struct {
+    uint32_t line;
+    const char *instance;
+    fcsl_call_kind_t kind;
+} fcsl_plan_call_t;
 
 typedef struct {
     uint32_t line;
@@ -73,17 +108,20 @@ typedef enum { FCSL_UNTIL_NONE = 0, FCSL_UNTIL_EQUALS, FCSL_UNTIL_ABOVE, FCSL_UN
 typedef struct {
     char *text;
     fcsl_plan_library_t machine;
-    uint32_t integrator_line;
-    fcsl_method_t method;
-    uint64_t integrator_hz;
     uint32_t seed_line;
     uint64_t seed;
     uint32_t ticks_line;
     uint64_t ticks;
     fcsl_plan_library_t *models;
     uint32_t model_count;
+    fcsl_plan_group_t *groups;
+    uint32_t group_count;
     fcsl_plan_instance_t *instances;
     uint32_t instance_count;
+    fcsl_plan_tolerance_t *tolerances;
+    uint32_t tolerance_count;
+    fcsl_plan_call_t *calls;
+    uint32_t call_count;
     fcsl_plan_set_t *sets;
     uint32_t set_count;
     fcsl_plan_link_t *links;

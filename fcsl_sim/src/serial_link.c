@@ -15,6 +15,7 @@ enum {
     CONTROLLER = 1,
     ENDS = 2,
     PORT = 0,
+    LINE_STREAM = 0, /* of its noise */
     FRAMES_MAX = 256,     /* on the line in one direction; more are lost */
     ROUNDS_MAX = 100000,  /* link ticks for which time halts */
     MEET_ROUNDS = 16, /* a hello each way and the answers take fewer */
@@ -66,7 +67,7 @@ struct fcsl_sim_link {
 
 static int happens(fcsl_sim_link_t *link, double percent)
 {
-    return percent > 0.0 && fcsl_noise_uniform(link->noise) * 100.0 < percent;
+    return percent > 0.0 && fcsl_noise_uniform(link->noise, LINE_STREAM) * 100.0 < percent;
 }
 
 static void flip_some(fcsl_sim_link_t *link, uint8_t *bytes, uint32_t size)
@@ -74,7 +75,7 @@ static void flip_some(fcsl_sim_link_t *link, uint8_t *bytes, uint32_t size)
     const double percent = link->model->parameters.bit_error_percent;
     int flipped = 0;
     if (happens(link, link->model->parameters.corrupt_percent)) {
-        const uint32_t bit = (uint32_t)(fcsl_noise_uniform(link->noise) * (double)(size * BITS_PER_BYTE));
+        const uint32_t bit = (uint32_t)(fcsl_noise_uniform(link->noise, LINE_STREAM) * (double)(size * BITS_PER_BYTE));
         bytes[bit / BITS_PER_BYTE] ^= (uint8_t)(1u << bit % BITS_PER_BYTE);
         flipped = 1;
     }

@@ -28,6 +28,7 @@ static void set(void *ctx, uint32_t block, uint32_t number, uint32_t element, co
     const fcsl_field_t *field = &published->blocks[block].fields[number];
     uint8_t *to = sim->instances[block - published->first_model].data + field->offset;
     memcpy(to + (size_t)element * fcsl_scalar_size(field->type), bytes, size);
+    fcsl_sim_disturb(sim);
 }
 
 static void save(void *ctx)

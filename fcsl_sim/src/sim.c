@@ -1,7 +1,7 @@
 /* SPDX-License-Identifier: Apache-2.0
  *
- * The run loop. Between two controller ticks it only pops events: at one time first the integration that ends there, then
- * scheduled writes, then updates in the order of instances, then the controller.
+ * The run loop. It goes from instant to instant: integration up to it, scheduled writes, outputs and updates in the order of
+ * dataflow, then the controller.
  */
 #include <stdlib.h>
 #include <string.h>
@@ -10,70 +10,102 @@
 #include "clock.h"
 #include "fail.h"
 #include "fcsl/fcsl_scalar.h"
-#include "sim_internal.h"
+#include "plant_state.h"
 
-enum { EVENT_INTEGRATE, EVENT_WRITE, EVENT_UPDATE, EVENT_TICK };
+enum { EVENT_UPDATE, EVENT_TICK };
 
-#define PRIORITY_INTEGRATE 0u
-#define PRIORITY_WRITE     1u
-#define PRIORITY_UPDATE    2u /* + index of the instance */
-#define PRIORITY_TICK      UINT32_MAX
+#define PRIORITY_TICK UINT32_MAX /* behind the updates, each with the index of its instance */
 
-static int schedule(fcsl_sim_t *sim, uint32_t kind, uint32_t index, uint64_t step)
+static int64_t tick_ns(const fcsl_sim_t *sim, uint64_t tick)
 {
-    static const uint32_t priority[] = {PRIORITY_INTEGRATE, PRIORITY_WRITE, PRIORITY_UPDATE, PRIORITY_TICK};
-    fcsl_event_t event = {.kind = kind, .index = index, .step = step, .priority = priority[kind]};
-    if (kind == EVENT_UPDATE) {
-        event.priority += index;
-    }
-    event.time_ns = kind == EVENT_WRITE ? (int64_t)sim->plan.events[index].time_ns
-                                        : fcsl_grid_time_ns(step, sim->plan.integrator_hz);
+    return fcsl_grid_time_ns(tick, sim->machine->tick_hz);
+}
+
+static int schedule_tick(fcsl_sim_t *sim, uint64_t tick)
+{
+    const fcsl_event_t event = {
+        .time_ns = tick_ns(sim, tick), .kind = EVENT_TICK, .step = tick, .priority = PRIORITY_TICK};
     return fcsl_event_queue_push(&sim->queue, event);
 }
 
-static fcsl_model_context_t context_of(const fcsl_sim_t *sim, fcsl_instance_state_t *instance)
+static int schedule_update(fcsl_sim_t *sim, uint32_t index)
 {
-    return (fcsl_model_context_t){sim->time_ns, &instance->noise, fcsl_noise_gaussian, fcsl_noise_uniform};
+    const fcsl_event_t event = {
+        .time_ns = sim->instances[index].next_update_ns, .kind = EVENT_UPDATE, .index = index, .priority = index};
+    return fcsl_event_queue_push(&sim->queue, event);
 }
 
-static void copy_inputs(const fcsl_sim_t *sim, const fcsl_instance_state_t *instance)
+/* ---- an instant -------------------------------------------------------------------------------------------------------- */
+
+static int64_t next_write_ns(const fcsl_sim_t *sim)
 {
-    const fcsl_copy_t *copy = sim->copies + instance->first_copy;
-    for (uint32_t i = 0; i < instance->copy_count; i++) {
-        memcpy(copy[i].to, copy[i].from, copy[i].size);
+    return sim->next_event < sim->plan.event_count
+               ? (int64_t)sim->plan.events[sim->event_order[sim->next_event]].time_ns
+               : INT64_MAX;
+}
+
+/* When inputs of a group may jump next, after the present: at a tick, at a scheduled write, or when an instance is updated. */
+static int64_t barrier_ns(const fcsl_sim_t *sim, const fcsl_group_t *group)
+{
+    int64_t barrier = tick_ns(sim, sim->tick);
+    const int64_t write_ns = next_write_ns(sim);
+    barrier = write_ns < barrier ? write_ns : barrier;
+    for (uint32_t i = 0; i < group->timed_count; i++) {
+        const int64_t update_ns = sim->instances[group->timed[i]].next_update_ns;
+        barrier = update_ns < barrier ? update_ns : barrier;
     }
+    return barrier;
 }
 
-/* ---- events ------------------------------------------------------------------------------------------------------------ */
-
-/* Integrates from step - 1 to step. All inputs are copied before any state changes, so the order of instances is irrelevant. */
-static void do_integrate(fcsl_sim_t *sim, uint64_t step)
+static int advance(fcsl_sim_t *sim, int64_t time_ns, fcsl_error_t *error)
 {
-    const double hz = (double)sim->plan.integrator_hz;
-    const double t = (double)(step - 1) / hz;
-    const double h = 1.0 / hz;
-    for (uint32_t i = 0; i < sim->instance_count; i++) {
-        if (sim->instances[i].model->continuous_count) {
-            copy_inputs(sim, &sim->instances[i]);
+    for (uint32_t i = 0; i < sim->group_count; i++) {
+        fcsl_group_t *group = &sim->groups[i];
+        if (fcsl_group_advance(group, time_ns, barrier_ns(sim, group), error)) {
+            return -1;
         }
     }
-    for (uint32_t i = 0; i < sim->instance_count; i++) {
-        const fcsl_model_t *model = sim->instances[i].model;
-        if (!model->continuous_count) {
-            continue;
-        }
-        uint8_t *self = sim->instances[i].data;
-        double *x = (double *)(void *)(self + model->continuous_offset); /* its alignment was checked at load */
-        fcsl_integrate(sim->plan.method, model->derivative, self, t, h, x, model->continuous_count, sim->scratch);
+    sim->time_ns = time_ns;
+    return 0;
+}
+
+/* Groups see what has been written at their next step. */
+void fcsl_sim_disturb(fcsl_sim_t *sim)
+{
+    for (uint32_t i = 0; i < sim->group_count; i++) {
+        sim->groups[i].state.disturbed = 1;
     }
 }
 
-static void do_update(fcsl_sim_t *sim, uint32_t index)
+static void make_writes(fcsl_sim_t *sim)
+{
+    while (next_write_ns(sim) == sim->time_ns) {
+        const fcsl_write_t *write = &sim->events[sim->event_order[sim->next_event++]];
+        fcsl_write_bits(write->to, write->size, write->bits);
+        fcsl_sim_disturb(sim);
+    }
+}
+
+static void call_output(fcsl_sim_t *sim, uint32_t index)
 {
     fcsl_instance_state_t *instance = &sim->instances[index];
     const fcsl_model_t *model = instance->model;
-    const fcsl_model_context_t context = context_of(sim, instance);
-    copy_inputs(sim, instance);
+    const double *x = (const double *)(const void *)(instance->data + model->continuous_offset);
+    fcsl_sim_copy(sim, instance->first_copy, instance->copy_count);
+    fcsl_sim_enter(sim, index, FCSL_IN_OUTPUT);
+    model->output(instance->data, (double)sim->time_ns / FCSL_NS_PER_S, model->continuous_count > 0 ? x : NULL);
+    if (model->sampled_offset == FCSL_NO_OFFSET) {
+        instance->fresh = 1;
+    }
+}
+
+static int call_update(fcsl_sim_t *sim, uint32_t index)
+{
+    fcsl_instance_state_t *instance = &sim->instances[index];
+    const fcsl_model_t *model = instance->model;
+    const fcsl_model_context_t context = fcsl_sim_context(sim, index, sim->time_ns);
+    fcsl_sim_copy(sim, instance->first_copy, instance->copy_count);
+    fcsl_sim_enter(sim, index, FCSL_IN_UPDATE);
     model->update(instance->data, &context);
     if (sim->link && index == sim->link_instance) {
         fcsl_sim_link_tick(sim->link, sim->time_ns);
@@ -81,26 +113,57 @@ static void do_update(fcsl_sim_t *sim, uint32_t index)
     if (model->sampled_offset == FCSL_NO_OFFSET || instance->data[model->sampled_offset]) {
         instance->fresh = 1;
     }
+    if (instance->group != FCSL_PLAN_NO_GROUP) {
+        sim->groups[instance->group].state.disturbed = 1;
+    }
+    instance->due = 0;
+    instance->next_update += instance->every;
+    instance->next_update_ns = fcsl_grid_time_ns(instance->next_update, instance->hz);
+    return schedule_update(sim, index);
 }
 
-/* Handles one event; *ticked becomes non-zero if it was the controller's. */
-static int handle(fcsl_sim_t *sim, const fcsl_event_t *event, int *ticked)
+/* Outputs and due updates, sources before what they feed. */
+static int evaluate(fcsl_sim_t *sim)
 {
-    const fcsl_write_t *write = &sim->events[event->index];
-    switch (event->kind) {
-    case EVENT_INTEGRATE:
-        do_integrate(sim, event->step);
-        return schedule(sim, EVENT_INTEGRATE, 0, event->step + 1);
-    case EVENT_WRITE:
-        fcsl_write_bits(write->to, write->size, write->bits);
-        return 0;
-    case EVENT_UPDATE:
-        do_update(sim, event->index);
-        return schedule(sim, EVENT_UPDATE, event->index, event->step + sim->instances[event->index].divisor);
-    default:
-        *ticked = 1;
-        return schedule(sim, EVENT_TICK, 0, event->step + sim->steps_per_tick);
+    for (uint32_t i = 0; i < sim->call_count; i++) {
+        const fcsl_call_t *call = &sim->calls[i];
+        if (call->kind != FCSL_CALL_UPDATE) {
+            call_output(sim, call->instance);
+        } else if (sim->instances[call->instance].due && call_update(sim, call->instance)) {
+            return -1;
+        }
     }
+    fcsl_sim_enter(sim, 0, FCSL_IN_NONE);
+    return 0;
+}
+
+/* Goes to the next instant and does all that is due but for the controller's tick; *ticked: whether that is due. Returns 0, or -1. */
+static int do_instant(fcsl_sim_t *sim, int *ticked, fcsl_error_t *error)
+{
+    fcsl_event_t event;
+    if (fcsl_event_queue_peek(&sim->queue, &event)) {
+        return fcsl_sim_fail(error, "the event queue ran empty");
+    }
+    const int64_t write_ns = next_write_ns(sim);
+    if (advance(sim, write_ns < event.time_ns ? write_ns : event.time_ns, error)) {
+        return -1;
+    }
+    make_writes(sim);
+    if (write_ns < event.time_ns) {
+        return 0;
+    }
+    while (fcsl_event_queue_peek(&sim->queue, &event) == 0 && event.time_ns == sim->time_ns) {
+        (void)fcsl_event_queue_pop(&sim->queue, &event);
+        if (event.kind == EVENT_TICK) {
+            *ticked = 1;
+        } else {
+            sim->instances[event.index].due = 1;
+        }
+    }
+    if (evaluate(sim)) {
+        return fcsl_sim_fail(error, "the event queue overflowed");
+    }
+    return 0;
 }
 
 /* ---- opening ----------------------------------------------------------------------------------------------------------- */
@@ -109,29 +172,50 @@ static int init_models(fcsl_sim_t *sim, fcsl_error_t *error)
 {
     for (uint32_t i = 0; i < sim->instance_count; i++) {
         fcsl_instance_state_t *instance = &sim->instances[i];
-        const fcsl_model_context_t context = context_of(sim, instance);
+        const fcsl_model_context_t context = fcsl_sim_context(sim, i, 0);
+        fcsl_sim_enter(sim, i, FCSL_IN_INIT);
         const char *wrong = instance->model->init ? instance->model->init(instance->data, &context) : NULL;
         if (wrong) {
             return fcsl_sim_fail(error, "instance `%s`: %s", instance->name, wrong);
         }
+        if (fcsl_sim_check_purity(sim, i, error)) {
+            return -1;
+        }
     }
+    for (uint32_t i = 0; i < sim->group_count; i++) {
+        if (fcsl_group_check(&sim->groups[i], error)) {
+            return -1;
+        }
+    }
+    fcsl_sim_enter(sim, 0, FCSL_IN_NONE);
     return 0;
+}
+
+void fcsl_sim_refill_queue(fcsl_sim_t *sim)
+{
+    sim->queue.count = 0;
+    (void)schedule_tick(sim, sim->tick); /* there is room for all */
+    for (uint32_t i = 0; i < sim->instance_count; i++) {
+        if (sim->instances[i].hz > 0) {
+            (void)schedule_update(sim, i);
+        }
+    }
 }
 
 static int fill_queue(fcsl_sim_t *sim, fcsl_error_t *error)
 {
-    const fcsl_plan_t *plan = &sim->plan;
-    if (fcsl_event_queue_init(&sim->queue, sim->instance_count + plan->event_count + 2u)) {
+    if (fcsl_event_queue_init(&sim->queue, sim->instance_count + 1u)) {
         return fcsl_sim_fail(error, "no memory for the event queue");
     }
-    int failed = schedule(sim, EVENT_INTEGRATE, 0, 1) || schedule(sim, EVENT_TICK, 0, 0);
-    for (uint32_t i = 0; i < sim->instance_count; i++) {
-        failed |= schedule(sim, EVENT_UPDATE, i, 0);
+    fcsl_sim_refill_queue(sim);
+    size_t vectors = 1;
+    for (uint32_t i = 0; i < sim->group_count; i++) {
+        const size_t saved = fcsl_group_saved(&sim->groups[i]);
+        vectors = saved > vectors ? saved : vectors;
     }
-    for (uint32_t i = 0; i < plan->event_count; i++) {
-        failed |= schedule(sim, EVENT_WRITE, i, 0);
-    }
-    return failed ? fcsl_sim_fail(error, "the event queue is too small") : 0;
+    sim->group_scratch = calloc(vectors, sizeof *sim->group_scratch);
+    sim->before = malloc(fcsl_plant_state_bytes(sim) + 1u);
+    return sim->group_scratch && sim->before ? 0 : fcsl_sim_fail(error, "no memory for checkpoints");
 }
 
 fcsl_sim_t *fcsl_sim_open(const char *plan, size_t size, fcsl_error_t *error)
@@ -168,14 +252,15 @@ int fcsl_sim_sense_message(fcsl_sim_t *sim, uint8_t *bytes, size_t capacity, fcs
                              (unsigned long long)sim->tick);
     }
     for (int ticked = 0; !ticked;) { /* the next tick is in the queue, with finitely many events before it */
-        fcsl_event_t event;
-        if (fcsl_event_queue_pop(&sim->queue, &event)) {
-            return fcsl_sim_fail(error, "the event queue ran empty");
+        if (do_instant(sim, &ticked, error)) {
+            return -1;
         }
-        sim->time_ns = event.time_ns;
-        if (handle(sim, &event, &ticked)) {
-            return fcsl_sim_fail(error, "the event queue overflowed");
-        }
+    }
+    if (fcsl_sim_check_outputs(sim, error) || schedule_tick(sim, sim->tick + 1u)) {
+        return -1;
+    }
+    for (uint32_t i = 0; sim->tick == 0 && i < sim->group_count; i++) {
+        fcsl_group_start(&sim->groups[i]);
     }
     memset(sim->select, 0, sim->machine->channel_count);
     for (uint32_t i = 0; i < sim->sensor_count; i++) {
@@ -286,11 +371,35 @@ int fcsl_sim_actuate_message(fcsl_sim_t *sim, const fcsl_message_t *message, fcs
     return 0;
 }
 
+/* ---- writing ------------------------------------------------------------------------------------------------------------- */
+
+fcsl_run_t *fcsl_sim_hosted(fcsl_sim_t *sim)
+{
+    return sim->run;
+}
+
+int fcsl_sim_write(fcsl_sim_t *sim, uint32_t instance, uint32_t offset, const void *bytes, uint32_t size,
+                   fcsl_error_t *error)
+{
+    if (sim->sensed || instance >= sim->instance_count || offset > sim->instances[instance].model->size ||
+        size > sim->instances[instance].model->size - offset) {
+        return fcsl_sim_fail(error, "a write that is not between two ticks, or not within an instance");
+    }
+    memcpy(sim->instances[instance].data + offset, bytes, size);
+    fcsl_sim_disturb(sim);
+    return 0;
+}
+
 /* ---- reading ------------------------------------------------------------------------------------------------------------- */
 
 const fcsl_machine_t *fcsl_sim_machine(const fcsl_sim_t *sim)
 {
     return sim->machine;
+}
+
+int64_t fcsl_sim_time_ns(const fcsl_sim_t *sim)
+{
+    return sim->time_ns;
 }
 
 uint64_t fcsl_sim_tick(const fcsl_sim_t *sim)

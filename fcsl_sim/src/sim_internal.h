@@ -5,11 +5,14 @@
 #ifndef FCSL_SIM_INTERNAL_H
 #define FCSL_SIM_INTERNAL_H
 
+#include <stdatomic.h>
+#include <string.h>
+
 #include "event_queue.h"
 #include "fcsl/fcsl_external.h"
 #include "fcsl/fcsl_gate.h"
 #include "fcsl/fcsl_sim.h"
-#include "integrate.h"
+#include "group.h"
 #include "noise.h"
 #include "plan.h"
 #include "serial_link.h"
@@ -20,6 +23,8 @@ typedef struct {
     uint8_t *to;
     uint32_t size;
     uint32_t instance; /* instance of the input */
+    uint32_t source;   /* of the output; UINT32_MAX: an actuator channel */
+    uint32_t is_inner; /* 1: an output that is evaluated whenever the input is used, within a group */
 } fcsl_copy_t;
 
 /* One output copied to a sensor channel. */
@@ -43,15 +48,41 @@ typedef struct {
     const fcsl_model_t *model;
     uint8_t *data;
     fcsl_noise_t noise;
-    uint64_t divisor;    /* steps of the integrator's grid per update */
-    uint32_t first_copy; /* its inputs: copies[first_copy .. first_copy + copy_count) */
+    uint32_t group;       /* or FCSL_PLAN_NO_GROUP */
+    uint32_t first_state; /* in the vectors of its group */
+    uint32_t first_event;
+    uint64_t hz; /* of the grid of its updates; 0: it is not updated */
+    uint64_t every;
+    int64_t next_update_ns; /* INT64_MAX: none */
+    uint64_t next_update;   /* the step of the grid */
+    uint32_t first_copy;  /* its inputs: copies[first_copy .. first_copy + copy_count) */
     uint32_t copy_count;
+    uint32_t outer_count; /* of them, those from outside of its group, which come first */
+    uint32_t inner_count;
+    uint8_t due;   /* its update is at the present */
     uint8_t fresh; /* sampled since the last tick */
     char *truth_type;
     char *truth_schema;
     uint32_t truth_size; /* bytes of its message */
     int truth_topic;
 } fcsl_instance_state_t;
+
+/* What models do at an instant, in order. */
+typedef struct {
+    uint32_t instance;
+    fcsl_call_kind_t kind;
+} fcsl_call_t;
+
+/* Which function of which instance runs (for whoever finds that it does not end). */
+typedef enum {
+    FCSL_IN_NONE,
+    FCSL_IN_INIT,
+    FCSL_IN_DERIVATIVE,
+    FCSL_IN_OUTPUT,
+    FCSL_IN_UPDATE,
+    FCSL_IN_EVENT,
+    FCSL_IN_RESET
+} fcsl_function_t;
 
 /* What the actuators get (actuators.c). */
 typedef struct {
@@ -86,6 +117,14 @@ struct fcsl_sim {
     fcsl_sensor_t *sensors;
     uint32_t sensor_count;
     fcsl_write_t *events;
+    uint32_t *event_order; /* by time, then as in the plan */
+    uint32_t next_event;   /* in event_order */
+    fcsl_call_t *calls;
+    uint32_t call_count;
+    fcsl_group_t *groups;
+    uint32_t group_count;
+    _Atomic uint64_t place; /* call, instance and function that run (fcsl_sim_enter) */
+    uint64_t entries;       /* calls so far */
     uint8_t *image;  /* the plant's copy of the machine's struct: only its channel fields are defined */
     uint8_t *select; /* per channel: included in the next sensor message */
     uint8_t *message_bytes;
@@ -94,14 +133,14 @@ struct fcsl_sim {
     fcsl_actuators_t *actuators; /* null: the machine neither arms nor has a time-out */
     fcsl_sim_link_t *link; /* between plant and controller; null: none */
     uint32_t link_instance;
-    double *scratch;
     fcsl_event_queue_t queue;
     const uint8_t *until_field;
     uint8_t until_type;
     uint64_t until_held; /* ticks in a row that the stop condition has held */
-    uint64_t steps_per_tick;
     uint64_t tick;
     int64_t time_ns;
+    double *group_scratch; /* the vectors of one group, for checkpoints */
+    uint8_t *before;       /* the plant before a checkpoint was restored */
     int sensed; /* between sense and actuate */
     fcsl_sim_status_t status;
     int recording;
@@ -119,6 +158,43 @@ struct fcsl_sim {
     int service_failed;                   /* a tick that a client asked for failed with `failure` */
     fcsl_error_t failure;
 };
+
+/* Copies inputs. */
+static inline void fcsl_sim_copy(const fcsl_sim_t *sim, uint32_t first, uint32_t count)
+{
+    for (const fcsl_copy_t *copy = sim->copies + first, *end = copy + count; copy < end; copy++) {
+        if (copy->size == sizeof(double)) {
+            memcpy(copy->to, copy->from, sizeof(double));
+        } else {
+            memcpy(copy->to, copy->from, copy->size);
+        }
+    }
+}
+
+static inline void fcsl_sim_enter(fcsl_sim_t *sim, uint32_t instance, fcsl_function_t function)
+{
+    const uint64_t place = ++sim->entries << 24 | (uint64_t)instance << 8 | (uint64_t)function;
+    atomic_store_explicit(&sim->place, place, memory_order_relaxed);
+}
+
+static inline fcsl_model_context_t fcsl_sim_context(fcsl_sim_t *sim, uint32_t instance, int64_t time_ns)
+{
+    return (fcsl_model_context_t){time_ns, &sim->instances[instance].noise, fcsl_noise_gaussian, fcsl_noise_uniform,
+                                  sim->instances[instance].model};
+}
+
+/* place.c: the field at an offset in the struct of an instance: "lander.state.pos_z", "wheel.state.rate[2]". */
+#define FCSL_PLACE_BYTES 320u
+void fcsl_sim_name_place(const fcsl_instance_state_t *instance, size_t offset, char *text, size_t size);
+/* place.c: fails where an output of an instance is not finite. */
+int fcsl_sim_check_outputs(const fcsl_sim_t *sim, fcsl_error_t *error);
+
+/* purity.c: tries the functions of an instance that is initialised. Returns 0, or -1. */
+int fcsl_sim_check_purity(const fcsl_sim_t *sim, uint32_t index, fcsl_error_t *error);
+/* sim.c: the next events of a simulation between two ticks, from its instances. */
+void fcsl_sim_refill_queue(fcsl_sim_t *sim);
+/* sim.c: something besides the plant itself has changed a value of a model. */
+void fcsl_sim_disturb(fcsl_sim_t *sim);
 
 /* sim.c: fcsl_sim_sense and fcsl_sim_actuate without validation of messages. Each returns 0, or -1. */
 int fcsl_sim_sense_message(fcsl_sim_t *sim, uint8_t *bytes, size_t capacity, fcsl_message_t *message,
@@ -162,6 +238,13 @@ void fcsl_sim_pace_anew(fcsl_sim_t *sim);
 /* sim.c: a command arrives at the plant. */
 void fcsl_sim_take_command(void *sim, const fcsl_message_t *command);
 
+/* assembly.c: the number of an instance; 0, or -1. */
+int fcsl_sim_find_instance(const fcsl_sim_t *sim, uint32_t line, const char *name, uint32_t *index,
+                           fcsl_error_t *error);
+/* group_build.c: the order of calls, and the groups of models that integrate together. */
+int fcsl_sim_build_groups(fcsl_sim_t *sim, fcsl_error_t *error);
+/* assembly.c: zeroed memory for a struct, or null. */
+void *fcsl_sim_allocate(size_t size, size_t align);
 /* assembly.c: builds everything that the plan names. The plan must be parsed, the rest zero. */
 int fcsl_assembly_build(fcsl_sim_t *sim, fcsl_error_t *error);
 void fcsl_assembly_free(fcsl_sim_t *sim);

@@ -8,25 +8,16 @@
 #include <stdlib.h>
 #include <string.h>
 
-#include "actuators.h"
 #include "fail.h"
 #include "fcsl/fcsl_scalar.h"
+#include "plant_state.h"
 
 struct fcsl_sim_snapshot {
     int is; /* a snapshot was saved */
     uint8_t *machine;
-    uint8_t *image;
-    fcsl_gate_t gate;
-    uint8_t *models; /* their structs, concatenated */
-    uint8_t *link;   /* null: there is none */
-    fcsl_noise_t *noises;
-    fcsl_event_t *events;
-    uint32_t event_count;
-    uint64_t next_sequence;
+    uint8_t *plant;
     fcsl_hw_sim_t hardware;
-    uint64_t until_held;
     uint64_t tick;
-    int64_t time_ns;
 };
 
 fcsl_sim_snapshot_t *fcsl_sim_snapshot_open(const fcsl_sim_t *sim)
@@ -35,18 +26,9 @@ fcsl_sim_snapshot_t *fcsl_sim_snapshot_open(const fcsl_sim_t *sim)
     if (!snapshot) {
         return NULL;
     }
-    size_t models = 1;
-    for (uint32_t i = 0; i < sim->instance_count; i++) {
-        models += sim->instances[i].model->size;
-    }
     snapshot->machine = malloc(sim->machine->size);
-    snapshot->image = malloc(sim->machine->size);
-    snapshot->models = malloc(models);
-    snapshot->link = sim->link ? malloc(fcsl_sim_link_bytes(sim->link)) : NULL;
-    snapshot->noises = calloc(sim->instance_count + 1u, sizeof *snapshot->noises);
-    snapshot->events = calloc(sim->queue.capacity, sizeof *snapshot->events);
-    if (!snapshot->machine || !snapshot->image || !snapshot->models || !snapshot->noises || !snapshot->events ||
-        (sim->link && !snapshot->link)) {
+    snapshot->plant = malloc(fcsl_plant_state_bytes(sim));
+    if (!snapshot->machine || !snapshot->plant) {
         fcsl_sim_snapshot_free(snapshot);
         return NULL;
     }
@@ -57,11 +39,7 @@ void fcsl_sim_snapshot_free(fcsl_sim_snapshot_t *snapshot)
 {
     if (snapshot) {
         free(snapshot->machine);
-        free(snapshot->image);
-        free(snapshot->models);
-        free(snapshot->link);
-        free(snapshot->noises);
-        free(snapshot->events);
+        free(snapshot->plant);
         free(snapshot);
     }
 }
@@ -69,25 +47,9 @@ void fcsl_sim_snapshot_free(fcsl_sim_snapshot_t *snapshot)
 void fcsl_sim_snapshot_take(const fcsl_sim_t *sim, fcsl_sim_snapshot_t *snapshot)
 {
     memcpy(snapshot->machine, fcsl_run_data(sim->run), sim->machine->size);
-    memcpy(snapshot->image, sim->image, sim->machine->size);
-    snapshot->gate = sim->gate;
-    uint8_t *at = snapshot->models;
-    for (uint32_t i = 0; i < sim->instance_count; i++) {
-        const fcsl_instance_state_t *instance = &sim->instances[i];
-        memcpy(at, instance->data, instance->model->size);
-        at += instance->model->size;
-        snapshot->noises[i] = instance->noise;
-    }
-    if (sim->link) {
-        fcsl_sim_link_save(sim->link, snapshot->link);
-    }
-    memcpy(snapshot->events, sim->queue.events, sim->queue.count * sizeof *snapshot->events);
-    snapshot->event_count = sim->queue.count;
-    snapshot->next_sequence = sim->queue.next_sequence;
+    fcsl_plant_state_save(sim, snapshot->plant);
     snapshot->hardware = *fcsl_run_simulated_hardware(sim->run);
-    snapshot->until_held = sim->until_held;
     snapshot->tick = sim->tick;
-    snapshot->time_ns = sim->time_ns;
     snapshot->is = 1;
 }
 
@@ -138,25 +100,6 @@ int fcsl_sim_snapshot_restore(fcsl_sim_t *sim, const fcsl_sim_snapshot_t *snapsh
         return -1;
     }
     *fcsl_run_simulated_hardware(sim->run) = snapshot->hardware;
-    memcpy(sim->image, snapshot->image, sim->machine->size);
-    sim->gate = snapshot->gate;
-    fcsl_actuators_update(sim);
-    const uint8_t *at = snapshot->models;
-    for (uint32_t i = 0; i < sim->instance_count; i++) {
-        fcsl_instance_state_t *instance = &sim->instances[i];
-        memcpy(instance->data, at, instance->model->size);
-        at += instance->model->size;
-        instance->noise = snapshot->noises[i];
-    }
-    if (sim->link) {
-        fcsl_sim_link_restore(sim->link, snapshot->link);
-    }
-    memcpy(sim->queue.events, snapshot->events, snapshot->event_count * sizeof *snapshot->events);
-    sim->queue.count = snapshot->event_count;
-    sim->queue.next_sequence = snapshot->next_sequence;
-    sim->until_held = snapshot->until_held;
-    sim->tick = snapshot->tick;
-    sim->time_ns = snapshot->time_ns;
-    fcsl_sim_pace_anew(sim);
+    fcsl_plant_state_restore(sim, snapshot->plant);
     return 0;
 }

@@ -52,6 +52,15 @@ static char *build_type(const char *name)
     return text;
 }
 
+/* "outputs.wind.east" -> "wind_east": a member of a struct as a field of its own. */
+static void flatten(const char *path, char name[FCSL_MODEL_MAX_PATH + 1u])
+{
+    (void)snprintf(name, FCSL_MODEL_MAX_PATH + 1u, "%s", path + strlen("outputs."));
+    for (char *c = name; *c; c++) {
+        *c = *c == '.' ? '_' : *c;
+    }
+}
+
 static char *build_schema(const fcsl_model_t *model)
 {
     size_t capacity = 256 + sizeof FCSL_SCHEMA_HEADER;
@@ -70,11 +79,13 @@ static char *build_schema(const fcsl_model_t *model)
             continue;
         }
         char extent[16] = "";
+        char name[FCSL_MODEL_MAX_PATH + 1u];
+        flatten(field->path, name);
         if (field->rank) {
             (void)snprintf(extent, sizeof extent, "[%u]", field->count);
         }
         used += (size_t)snprintf(text + used, capacity - used, "%s%s %s  # %s%s%s\n", ros_type(field->type), extent,
-                                 field->path + strlen("outputs."), field->unit,
+                                 name, field->unit,
                                  field->unit[0] && field->doc[0] ? ", " : "", field->doc);
     }
     (void)snprintf(text + used, capacity - used, FCSL_SCHEMA_HEADER);

@@ -47,6 +47,24 @@ RAMP: dict[str, Any] = {
 Change = Callable[[dict[str, Any]], object]
 
 
+def open_models(open_sim: Callable[..., Simulation], instances: dict[str, Any], **keys: Any) -> Simulation:
+    """Opens RAMP with further instances, of models in test/models; `keys` replace members of the file."""
+
+    def change(config: dict[str, Any]) -> None:
+        config.update(keys)
+        for name, instance in instances.items():
+            config["instances"][name] = instance
+            config["models"].setdefault(instance["model"], {"source": f"{instance['model']}.c"})
+
+    return open_sim(change)
+
+
+@pytest.fixture
+def lander() -> Path:
+    """The simulation of the lander example."""
+    return TEST.parents[1] / "examples/lander/sim/lander.sim.json"
+
+
 @pytest.fixture(scope="session")
 def hopper(tmp_path_factory: pytest.TempPathFactory) -> tuple[Path, str]:
     """Library and machine name of the controller."""
@@ -58,13 +76,16 @@ def hopper(tmp_path_factory: pytest.TempPathFactory) -> tuple[Path, str]:
 
 @pytest.fixture
 def write_sim(tmp_path: Path) -> Callable[..., Path]:
-    """Writes RAMP, changed by a function, and its models; returns the path of the *.sim.json."""
+    """Writes RAMP, changed by a function, and its models, `chain` with a macro; returns the path of the *.sim.json."""
 
-    def write(change: Change = lambda config: None) -> Path:
+    def write(change: Change = lambda config: None, define: str = "") -> Path:
         config = copy.deepcopy(RAMP)
         change(config)
         for model in (TEST / "models").glob("*.c"):
             shutil.copy(model, tmp_path)
+        if define:
+            chain = tmp_path / "chain.c"
+            chain.write_text(f"#define {define}\n{chain.read_text()}")
         path = tmp_path / "ramp.sim.json"
         path.write_text(json.dumps(config, indent=2))
         return path
@@ -76,8 +97,8 @@ def write_sim(tmp_path: Path) -> Callable[..., Path]:
 def load_sim(write_sim: Callable[..., Path], hopper: tuple[Path, str]) -> Callable[..., SimConfig]:
     """Loads RAMP, changed by a function, with the hopper as controller."""
 
-    def load_changed(change: Change = lambda config: None, **options: Any) -> SimConfig:
-        return load(write_sim(change), machine=hopper, **options)
+    def load_changed(change: Change = lambda config: None, define: str = "", **options: Any) -> SimConfig:
+        return load(write_sim(change, define), machine=hopper, **options)
 
     return load_changed
 

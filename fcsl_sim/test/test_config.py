@@ -71,11 +71,11 @@ EVENT = {"at_s": 0.1, "set": "altimeter.parameters.bias", "value": 1.0}
         (edit(*SENSOR, "sigma", value=True), ["E207: parameter `sigma` is f64, not a bool"]),
         (edit(*SENSOR, "dropout", value=0), ["E207: parameter `dropout` is bool, not an integer"]),
         (edit("rates", "altimeter", value=...), ["E804: `altimeter` has no rate"]),
-        (edit("rates", "altimeter", value=300), ["E220: 300 Hz does not divide the integrator's 1000 Hz"]),
+        (edit("rates", "altimeter", value=300), ["E220: 300 Hz is not on the grid of the integrator's 1000 Hz"]),
         (edit("rates", "altimeter", value=0), ["E204: a rate (Hz) is 0"]),
         (
             edit("rates", "ramp", value=100),
-            ["E804: `ramp` is integrated: it is updated after every step of the integrator"],
+            ["E804: `ramp` has no rate: its model has no `update`, and its outputs follow at every instant"],
         ),
         (edit("rates", "altimetre", value=100), ["E206: no instance `altimetre`"]),
         (add(("ramp.x", "altimeter.truth")), ["E213: two sources for `altimeter.truth`"]),
@@ -205,7 +205,10 @@ def test_models_that_feed_each_other(load_sim: Load) -> None:
     with pytest.raises(DiagnosticError) as error:
         load_sim(change)
     assert heads(error.value) == ["E803: models feed each other: altimeter -> second -> altimeter"]
-    assert [note.text for note in error.value.diagnostics[0].notes] == ["`second` feeds `altimeter`"]
+    assert [note.text for note in error.value.diagnostics[0].notes] == [
+        "altimeter.value -> second.truth",
+        "second.value -> altimeter.truth",
+    ]
 
 
 def test_what_nothing_feeds_is_a_warning(load_sim: Load) -> None:
@@ -313,8 +316,9 @@ def test_a_model_that_does_not_compile(write_sim: Callable[..., Path], hopper: t
     (path.parent / "ramp.c").write_text("int x = ;\n")
     with pytest.raises(DiagnosticError) as error:
         load(path, machine=hopper)
-    (head,) = heads(error.value)
-    assert head.startswith("E801: the model `ramp.c` cannot be used: `cc` failed:") and "ramp.c:1:9" in head
+    (problem,) = error.value.diagnostics
+    assert problem.message == "the model `ramp.c` cannot be used: `cc` failed"
+    assert problem.output.startswith(f"{path.parent}/ramp.c:1:9: error: ") and problem.output in problem.render()
 
 
 def test_files_that_are_not_there(write_sim: Callable[..., Path], tmp_path: Path) -> None:

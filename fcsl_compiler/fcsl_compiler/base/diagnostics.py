@@ -15,6 +15,7 @@ MAX_DIAGNOSTICS = 200
 
 #: Longer texts (they can quote names of the input) are truncated to this many characters.
 _MAX_TEXT = 400
+_MAX_OUTPUT_LINES = 200
 
 #: Codes about an undefined name. Every use of the name is the same mistake, so further uses become notes of the first.
 _OF_NAMES = frozenset({"E206", "E216", "E225", "E406", "E408"})
@@ -43,11 +44,15 @@ class Diagnostic:
     why: str = ""
     help: str = ""
     notes: tuple[Note, ...] = ()
+    #: What another program (a C compiler) printed; shown as it is, line by line.
+    output: str = ""
 
     def render(self) -> str:
-        """The text shown to users: message, location, source line with caret, notes, reason, correction."""
+        """The text shown to users: message, location, source line with caret, output of another program, notes, reason,
+        correction."""
         lines = [f"{self.span}: {self.severity.value}[{self.code}]: {self.message}"]
         lines += excerpt(self.span)
+        lines += _output(self.output)
         for note in self.notes:
             lines.append(f"{note.span}: note: {note.text}")
             lines += excerpt(note.span)
@@ -87,6 +92,14 @@ def _printable(text: str) -> str:
     return shown if len(shown) <= _MAX_TEXT else shown[: _MAX_TEXT - 1] + "…"
 
 
+def _output(text: str) -> list[str]:
+    """The lines of another program's output, without control characters. Of a very long one the first and their number."""
+    lines = ["".join(c if c == "\t" or c.isprintable() else "\ufffd" for c in line) for line in text.splitlines()]
+    if len(lines) <= _MAX_OUTPUT_LINES:
+        return lines
+    return [*lines[:_MAX_OUTPUT_LINES], f"({len(lines) - _MAX_OUTPUT_LINES} more lines)"]
+
+
 class DiagnosticError(Exception):
     """Compilation failed. str() is the rendered text of all diagnostics."""
 
@@ -114,8 +127,9 @@ class DiagnosticSink:
         why: str = "",
         help: str = "",
         notes: Sequence[tuple[Span, str]] = (),
+        output: str = "",
     ) -> None:
-        self._add(Severity.ERROR, code, message, span, why, help, notes)
+        self._add(Severity.ERROR, code, message, span, why, help, notes, output)
 
     def warning(
         self,
@@ -138,6 +152,7 @@ class DiagnosticSink:
         why: str,
         help_text: str,
         notes: Sequence[tuple[Span, str]],
+        output: str = "",
     ) -> None:
         message = _printable(message)
         key = (code, message, span.key)
@@ -156,7 +171,7 @@ class DiagnosticSink:
         self._count[severity] += 1
         places = tuple(Note(s, _printable(t)) for s, t in notes)
         self._diagnostics.append(
-            Diagnostic(severity, code, message, span, _printable(why), _printable(help_text), places)
+            Diagnostic(severity, code, message, span, _printable(why), _printable(help_text), places, output)
         )
 
     @property

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Commands for authors of machines: graph, schema, new."""
+"""Commands for authors of machines and plants: graph, schema, new."""
 
 from __future__ import annotations
 
@@ -24,7 +24,7 @@ def add_authoring(commands: argparse._SubParsersAction[argparse.ArgumentParser])
     schema.add_argument("--board", action="store_true", help="that of a board")
     schema.set_defaults(run=_schema)
 
-    new = commands.add_parser("new", help="start a machine or an algorithm, with a test")
+    new = commands.add_parser("new", help="start a machine, an algorithm or a plant, with a test")
     kinds = new.add_subparsers(required=True, metavar="KIND")
     machine = kinds.add_parser("machine", help="a folder NAME with a machine, two algorithms and a test")
     machine.add_argument("name", help="lower_snake_case")
@@ -35,6 +35,12 @@ def add_authoring(commands: argparse._SubParsersAction[argparse.ArgumentParser])
     )
     algorithm.add_argument("name", help="lower_snake_case; the class has it in CamelCase")
     algorithm.set_defaults(run=_new_algorithm)
+    plant = kinds.add_parser(
+        "plant", help="NAME.c, a model for fcsl-sim, and NAME.sim.json with a machine of this folder; with a test"
+    )
+    plant.add_argument("name", help="lower_snake_case; of the model")
+    plant.add_argument("--machine", type=Path, metavar="FILE", help="machine JSON that the simulation flies")
+    plant.set_defaults(run=_new_plant)
 
 
 def _graph(options: argparse.Namespace) -> int:
@@ -85,6 +91,18 @@ def _new_algorithm(options: argparse.Namespace) -> int:
     print(
         f"next: python3 -m pytest test/test_{options.name}.py; then change it, and name algorithms/{options.name}.py in your machine"
     )
+    return 0
+
+
+def _new_plant(options: argparse.Namespace) -> int:
+    from .scaffold_plant import plant_files
+
+    made = plant_files(options.name, options.machine)
+    _write(made.files)
+    if made.remark:
+        print(made.remark)
+    first = f"fcsl-sim plot {made.simulation}" if made.simulation else f"fcsl-sim describe {options.name}.c"
+    print(f"next: {first}; python3 -m pytest test/test_{options.name}_plant.py; then change {options.name}.c")
     return 0
 
 

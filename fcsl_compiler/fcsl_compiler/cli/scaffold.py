@@ -133,6 +133,7 @@ fcslc check --strict @NAME@.json     # errors, with reasons and corrections
 python3 -m pytest test          # the compiled machine, tick by tick
 fcslc graph @NAME@.json -o @NAME@.svg     # a picture of it
 fcslc new algorithm NAME        # another algorithm, with a test
+fcslc new plant NAME            # a vehicle to simulate, connected with it, with a test
 ```
 
 With `machine.schema.json`, editors complete and check `@NAME@.json`; `fcslc schema > machine.schema.json` updates it.

@@ -104,12 +104,12 @@ static void derivative(const void *self, double t, const double *x, double *dx)
     dx[1] = (c->inputs.force + c->parameters.push - c->parameters.friction * x[1]) / c->parameters.mass;
 }
 
-static void update(void *self, const fcsl_model_context_t *context)
+static void output(void *self, double t, const double *x)
 {
     cart_t *c = self;
-    (void)context;
-    c->outputs.position = c->state.position;
-    c->outputs.speed = c->state.speed;
+    (void)t;
+    c->outputs.position = x[0];
+    c->outputs.speed = x[1];
 }
 
 #define FIELD(role, path, unit, doc) FCSL_MODEL_SCALAR(cart_t, FCSL_ROLE_##role, path, unit, doc)
@@ -127,7 +127,7 @@ static const fcsl_model_t model = {
     .abi_version = FCSL_MODEL_ABI_VERSION, .name = "cart", .doc = "a cart on rails",
     .fields = fields, .field_count = sizeof fields / sizeof *fields, .size = sizeof(cart_t), .align = _Alignof(cart_t),
     .continuous_offset = offsetof(cart_t, state), .continuous_count = 2, .sampled_offset = FCSL_NO_OFFSET,
-    .init = init, .derivative = derivative, .update = update,
+    .init = init, .derivative = derivative, .output = output,
 };
 
 const fcsl_model_t *const fcsl_models[] = {&model, NULL};

@@ -277,8 +277,9 @@ class _Checker:
         text = self.reader.string(node, "`mesh`", "vehicle.glb")
         if text is None:
             return ""
+        config = Path(node.span.source.path or self.config)  # of a simulation that extends another one: either's
         try:
-            path = resolve_source(text, config=self.config)
+            path = resolve_source(text, config=config)
         except SourcePathError as error:
             self.sink.error("E103", f"`{text}` cannot be a mesh", node.span, why=str(error))
             return ""
@@ -286,7 +287,7 @@ class _Checker:
             fix = f"the formats are {', '.join(MESH_SUFFIXES)}"
             self.sink.error("E205", f"`{text}` is not a mesh", node.span, help=fix)
         elif not path.is_file():
-            fix = f"paths are relative to {self.config.parent}"
+            fix = f"paths are relative to {config.parent}"
             self.sink.error("E100", f"cannot read `{text}`: no such file", node.span, help=fix)
         return str(path.resolve())
 

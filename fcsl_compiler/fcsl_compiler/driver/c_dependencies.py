@@ -14,7 +14,7 @@ from pathlib import Path
 from ..base.files import digest
 from ..model.target import Target
 from ..parse.machine_files import ParsedMachine
-from .toolchain import FLAGS, ToolchainError, compiler, include_dirs, run_compiler
+from .toolchain import LANGUAGES, C, Language, ToolchainError, include_dirs, run_compiler
 
 #: A word in a dependency list of make: everything but an unescaped blank.
 _WORD = re.compile(r"(?:\\.|\$\$|[^\s\\])+", re.DOTALL)
@@ -54,16 +54,19 @@ def c_inputs(sources: Sequence[Path], includes: Sequence[Path], root: Path, gene
     """The sources and every file that they include, compiled with these include folders.
 
     `root`: folder to which names are relative. `generated`: folder of files that are not inputs. Missing files are
-    listed as such; the compilation reports them. Raises ToolchainError if the sources cannot be preprocessed.
+    listed as such; the compilation reports them. The sources have one language. Raises ToolchainError if they cannot be
+    preprocessed.
     """
+    language = LANGUAGES.get(sources[0].suffix, C)
     # Absolute, so that only a missing file is listed with a relative path.
     files = [str(source.absolute()) for source in sources]
-    options = [*FLAGS, *(f"-I{folder.absolute()}" for folder in includes)]
-    listed = os.fsdecode(run_compiler([*compiler(), *options, "-MM", "-MG", "-MT", "x", *files]))
+    options = [*language.flags, *(f"-I{folder.absolute()}" for folder in includes)]
+    command = [*language.compiler(), *options, "-MM", "-MG", "-MT", "x", *files]
+    listed = os.fsdecode(run_compiler(command, language=language))
     paths = [Path(word) for word in dict.fromkeys(_words(listed))]
     found = [_read(path, root) for path in paths if generated is None or not path.is_relative_to(generated)]
     asks = any(file.content is not None and b"__has_include" in file.content for file in found)
-    return CInputs(tuple(found), _preprocessed(files, options) if asks else "")
+    return CInputs(tuple(found), _preprocessed(files, options, language) if asks else "")
 
 
 def _words(rules: str) -> list[str]:
@@ -82,10 +85,11 @@ def _read(path: Path, root: Path) -> CFile:
         return CFile(name, path, None)
 
 
-def _preprocessed(files: Sequence[str], options: Sequence[str]) -> str:
+def _preprocessed(files: Sequence[str], options: Sequence[str], language: Language) -> str:
+    command = [*language.compiler(), *options, "-E", "-P"]
     try:
         # Without line markers, which contain paths; with a fixed time.
-        texts = [run_compiler([*compiler(), *options, "-E", "-P", file], {"SOURCE_DATE_EPOCH": "0"}) for file in files]
+        texts = [run_compiler([*command, file], {"SOURCE_DATE_EPOCH": "0"}, language) for file in files]
     except ToolchainError:
         return "failed"  # the compilation reports it
     return digest(*texts)

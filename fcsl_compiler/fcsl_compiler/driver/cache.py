@@ -19,7 +19,8 @@ from ..model.target import DEFAULT_TARGET
 from ..parse.machine_files import parse_machine
 from .c_dependencies import c_inputs, extern_inputs
 from .cache_entry import cached
-from .toolchain import ToolchainError, include_dirs, link_shared, math_library, toolchain, unwritten
+from .symbols import SymbolError, check_model_symbols
+from .toolchain import LANGUAGES, C, ToolchainError, include_dirs, link_shared, math_library, toolchain, unwritten
 
 
 @dataclass(frozen=True)
@@ -102,19 +103,33 @@ def _math_stamp() -> str:
     return str(math_library().stat().st_mtime_ns)
 
 
-def build_shared(sources: Sequence[Path], include: Sequence[Path]) -> Path:
-    """Builds or finds a cached shared library of C sources (simulation models). Raises ToolchainError."""
+def build_shared(sources: Sequence[Path], include: Sequence[Path], exports: Sequence[str] = ()) -> Path:
+    """Builds or finds a cached shared library of C or C++ sources (simulation models); the suffix of the first one says
+    which.
+
+    exports: if there are any, the library has no other symbols. Raises ToolchainError, also if the sources call what a
+    model must not call.
+    """
     includes = [*include, *include_dirs()]
+    language = LANGUAGES.get(sources[0].suffix, C)
 
     def key() -> str:
         read = c_inputs(sources, includes, sources[0].parent)
-        return digest(toolchain(), _math_stamp(), *read.digest_parts, read.probed)
+        rules = Path(__file__).with_name("symbols.py").read_bytes()
+        return digest(toolchain(language), _math_stamp(), rules, *exports, *read.digest_parts, read.probed)
 
     def build(library: Path) -> dict[str, str]:
-        link_shared(list(sources), includes, library)
+        link_shared(list(sources), includes, library, _check_model, language=language, exports=exports)
         return {}
 
     try:
         return cached("shared", key, f"lib{sources[0].stem}.so", build, sources[0]).library
     except OSError as error:
         raise unwritten(error, sources[0]) from None
+
+
+def _check_model(library: Path) -> None:
+    try:
+        check_model_symbols(library)
+    except SymbolError as error:
+        raise ToolchainError(str(error)) from None

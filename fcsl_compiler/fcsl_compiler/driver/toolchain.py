@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""The C compiler and its flags."""
+"""The C compiler and its flags; for models also the C++ compiler."""
 
 from __future__ import annotations
 
@@ -10,6 +10,7 @@ import subprocess
 import tempfile
 from collections.abc import Callable, Mapping, Sequence
 from contextlib import suppress
+from dataclasses import dataclass
 from functools import cache
 from pathlib import Path
 
@@ -26,33 +27,62 @@ _COMPILE_TIMEOUT_S = 300
 
 
 class ToolchainError(RuntimeError):
-    """The C compiler is missing or failed. str() gives the remedy."""
+    """The C compiler is missing or failed. str() gives the remedy; what the compiler printed follows on lines of its
+    own."""
+
+
+@dataclass(frozen=True)
+class Language:
+    """A language of sources: the variable that names its compiler, the command without it, and the flags."""
+
+    name: str
+    variable: str
+    command: str
+    package: str
+    flags: tuple[str, ...]
+
+    def compiler(self) -> list[str]:
+        """The compiler command."""
+        return shlex.split(os.environ.get(self.variable, "")) or [self.command]
+
+    def absent(self, command: str) -> ToolchainError:
+        """The error for a command that does not run."""
+        fix = f"install {self.package}, or set {self.variable}"
+        return ToolchainError(f"no {self.name} compiler: `{command}` does not run; {fix}")
+
+
+C = Language("C", "CC", "cc", "gcc", FLAGS)
+#: Only models are written in C++. No exception may leave one.
+CXX = Language("C++", "CXX", "c++", "g++", ("-std=c++17", *FLAGS[1:], "-fno-exceptions", "-fno-rtti"))
+#: The language of a source by the suffix of its name.
+LANGUAGES = {".c": C, ".cpp": CXX, ".cc": CXX, ".cxx": CXX}
 
 
 def compiler() -> list[str]:
     """The C compiler command: $CC, else cc."""
-    return shlex.split(os.environ.get("CC", "")) or ["cc"]
+    return C.compiler()
 
 
 @cache
-def _version(command: tuple[str, ...]) -> str:
+def _version(command: tuple[str, ...], language: Language) -> str:
     try:
         done = subprocess.run([*command, "--version"], capture_output=True, text=True, timeout=30, check=False)
     except (OSError, subprocess.TimeoutExpired):
-        raise ToolchainError(f"no C compiler: `{' '.join(command)}` does not run; install gcc, or set CC") from None
+        raise language.absent(" ".join(command)) from None
     if done.returncode != 0:
-        raise ToolchainError(f"`{' '.join(command)} --version` failed; set CC to a C compiler")
+        fix = f"set {language.variable} to a {language.name} compiler"
+        raise ToolchainError(f"`{' '.join(command)} --version` failed; {fix}")
     return done.stdout.splitlines()[0] if done.stdout else ""
 
 
-def toolchain() -> str:
+def toolchain(language: Language = C) -> str:
     """Compiler version and flags, as included in build_hash. Raises ToolchainError."""
-    return toolchain_of(compiler())
+    return toolchain_of(language.compiler(), language)
 
 
-def toolchain_of(command: Sequence[str]) -> str:
+def toolchain_of(command: Sequence[str], language: Language = C) -> str:
     """Compiler version and flags for another compiler command. Raises ToolchainError."""
-    return " ".join([_version(tuple(command)), *command[1:], *FLAGS])
+    return " ".join([_version(tuple(command), language), *command[1:], *language.flags])
 
 
 def cache_dir() -> Path:
@@ -102,8 +132,8 @@ def call_graph_flag(command: tuple[str, ...]) -> list[str]:
     return [CALL_GRAPH_FLAG] if done.returncode == 0 else []
 
 
-def run_compiler(command: Sequence[str], environment: Mapping[str, str] | None = None) -> bytes:
-    """What the C compiler prints. `environment` adds variables. Raises ToolchainError with the compiler's errors."""
+def run_compiler(command: Sequence[str], environment: Mapping[str, str] | None = None, language: Language = C) -> bytes:
+    """What a compiler prints. `environment` adds variables. Raises ToolchainError with the compiler's errors."""
     try:
         child = subprocess.Popen(
             command,
@@ -113,15 +143,15 @@ def run_compiler(command: Sequence[str], environment: Mapping[str, str] | None =
             start_new_session=True,
         )
     except OSError:
-        raise ToolchainError(f"no C compiler: `{compiler()[0]}` does not run; install gcc, or set CC") from None
+        raise language.absent(command[0]) from None
     try:
         printed, errors = child.communicate(timeout=_COMPILE_TIMEOUT_S)
     except subprocess.TimeoutExpired:
-        raise ToolchainError(f"`{compiler()[0]}` took longer than {_COMPILE_TIMEOUT_S} s") from None
+        raise ToolchainError(f"`{command[0]}` took longer than {_COMPILE_TIMEOUT_S} s") from None
     finally:
         _end_group(child)
     if child.returncode != 0:
-        raise ToolchainError(f"`{compiler()[0]}` failed:\n{errors.decode(errors='replace').strip()}")
+        raise ToolchainError(f"`{command[0]}` failed:\n{errors.decode(errors='replace').strip()}")
     return printed
 
 
@@ -153,18 +183,24 @@ def link_shared(
     output: Path,
     check: Callable[[Path], None] = lambda _: None,
     flags: Sequence[str] = (),
+    language: Language = C,
+    exports: Sequence[str] = (),
 ) -> None:
-    """Links C sources, objects, archives and the math library to a shared library. `flags` follow them on the command
-    line.
+    """Links sources of a language, objects, archives and the math library to a shared library. `flags` follow them on
+    the command line.
 
-    `output` appears atomically after `check` has passed. Raises ToolchainError with the compiler's output, and the
+    exports: if there are any, the library has no other symbols. `output` appears atomically after `check` has passed. Raises ToolchainError with the compiler's output, and the
     exceptions of `check`.
     """
     output.parent.mkdir(parents=True, exist_ok=True)
     with tempfile.TemporaryDirectory(dir=output.parent, prefix=".build-") as folder:
         made = Path(folder) / output.name
-        command = [*compiler(), *FLAGS, "-shared", *(f"-I{d}" for d in includes), *map(str, inputs)]
+        command = [*language.compiler(), *language.flags, "-shared", *(f"-I{d}" for d in includes), *map(str, inputs)]
         command += [str(math_library()), *flags, "-lm", *LINK_FLAGS, "-o", str(made)]
-        run_compiler(command)
+        if exports:
+            names = Path(folder) / "exports.map"
+            names.write_text(f"{{ global: {' '.join(f'{name};' for name in exports)} local: *; }};\n")
+            command.append(f"-Wl,--version-script={names}")
+        run_compiler(command, language=language)
         check(made)
         made.replace(output)

@@ -68,9 +68,11 @@ _NO_COMMENTS = "JSON has no comments"
 _LITERALS: dict[str, tuple[str, object]] = {"true": ("bool", True), "false": ("bool", False), "null": ("null", None)}
 
 
-def parse_json(source: SourceFile, sink: DiagnosticSink) -> JsonNode | None:
-    """Parses the whole text. Reports E101 (syntax) or E102 (duplicate key). Returns None after a syntax error."""
+def parse_json(source: SourceFile, sink: DiagnosticSink, start: int = 0) -> JsonNode | None:
+    """Parses the text from character `start` to its end. Reports E101 (syntax) or E102 (duplicate key). Returns None
+    after a syntax error."""
     parser = _Parser(source, sink)
+    parser.at = start
     try:
         node = parser.value(0)
         parser.skip()

@@ -170,7 +170,7 @@ def _is_simulation(path: Path, root: JsonNode | None) -> bool:
     """Whether the file is a simulation, by its content; by its file name if the content is not valid JSON."""
     if root is None or root.kind != "object":
         return path.name.endswith(".sim.json")
-    return {"controller", "models"} <= root.members.keys()
+    return "extends" in root.members or {"controller", "models"} <= root.members.keys()
 
 
 def _check_name(name: str, source: SourceFile, sink: DiagnosticSink) -> None:

@@ -142,6 +142,7 @@ def test_a_file_is_a_machine_a_simulation_or_the_block(tmp_path: Path) -> None:
     ("content", "reason"),
     [
         (b'{"tick_hz": 100}', 'no member "views"'),
+        (b'{"extends": "a.sim.json"}', 'no member "views": it extends "a.sim.json"; name the file that has them'),
         (b"\xff\xfe", "not a JSON file"),
         (b"{", "the file: not valid JSON"),
         (b'{"views": null}', "not an object"),

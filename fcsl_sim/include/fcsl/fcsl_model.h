@@ -1,7 +1,8 @@
 /* SPDX-License-Identifier: Apache-2.0
  *
  * The model ABI: the interface between the simulator and plants, sensors or environments. Like a machine, a model instance
- * is one flat struct without pointers, described by the same field table, so one variable server serves both.
+ * is one flat struct without pointers, described by the same field table, so one variable server serves both. The
+ * simulator copies and moves instances; nothing else may keep an address of one.
  *
  * A model library exports `fcsl_models`, ended by a null pointer; a model is found by its name, which is the stem of its
  * source file. All units are SI unless a field says otherwise.
@@ -12,25 +13,51 @@
 #include <math.h>
 
 #include "fcsl/fcsl_machine.h"
+#include "fcsl/fcsl_math.h"
 
 #ifdef __cplusplus
 extern "C" {
 #endif
 
-#define FCSL_MODEL_ABI_VERSION 2u
+#define FCSL_MODEL_ABI_VERSION 3u
 
-/* The noise stream of one instance. The same seed gives the same numbers, independent of other instances. */
+/* Streams of noise that each instance has, numbered from 0. A model uses one for each kind of random number, so that one
+ * that it stops drawing changes none of the others. */
+#define FCSL_NOISE_STREAMS 16u
+
+/* The noise of one instance: Philox4x32-10 (Salmon et al., SC11), keyed by the seed; stream and instance are in its counter. */
 typedef struct fcsl_noise fcsl_noise_t;
 
-/* Services that a model may use while it runs. */
+struct fcsl_model;
+
+/* Services that a model may use in init, update and reset. */
 typedef struct {
     int64_t time_ns;
     fcsl_noise_t *noise;
-    double (*gaussian)(fcsl_noise_t *noise); /* mean 0, standard deviation 1 */
-    double (*uniform)(fcsl_noise_t *noise);  /* [0, 1) */
+    double (*gaussian)(fcsl_noise_t *noise, uint32_t stream); /* mean 0, standard deviation 1; NaN: no such stream */
+    double (*uniform)(fcsl_noise_t *noise, uint32_t stream);  /* [0, 1); NaN: no such stream */
+    const struct fcsl_model *model;
 } fcsl_model_context_t;
 
+/* Which sign changes of an event function count. */
+typedef enum { FCSL_FALLING = 1, FCSL_RISING = 2, FCSL_EITHER = 3 } fcsl_crossing_t;
+
 typedef struct {
+    const char *name; /* lower_snake_case */
+    uint8_t crossing; /* fcsl_crossing_t */
+    const char *doc;
+} fcsl_model_event_t;
+
+/* With u the inputs, p the parameters, x the continuous states and d the other states of an instance:
+ *
+ *   y     = output(t, x, u, p, d)        at any instant, so also within steps of the integrator
+ *   dx/dt = derivative(t, x, u, p, d)
+ *   d, x  = update(t, x, u, p, d)        at the rate of the instance
+ *   d, x  = reset(t, x, u, p, d)         when event(t, x, u, p, d) changes its sign
+ *
+ * `output`, `derivative` and `event` get x as an argument: the states in `self` are older. They are pure; only `output` writes,
+ * and only outputs. Whatever a function does not use is null. */
+typedef struct fcsl_model {
     uint32_t abi_version;
     const char *name;
     const char *doc;
@@ -38,35 +65,69 @@ typedef struct {
     uint32_t field_count;
     uint32_t size;
     uint32_t align;
-    /* Continuous states: doubles, contiguous; integrated by the simulator. If there are none, the model has no derivative. */
+    /* Continuous states: doubles, contiguous; integrated by the simulator. If there are none, there is no derivative. */
     uint32_t continuous_offset;
     uint32_t continuous_count;
+    /* For velocity Verlet: the first half of the continuous states are positions, the second half their velocities in the same
+     * order, and the accelerations do not depend on velocities. */
+    uint8_t is_second_order;
     /* uint8_t: zero after an update without a sample (a dropout); the channels connected to this instance are then left
      * out of the tick's sensor message. FCSL_NO_OFFSET: every update is a sample. */
     uint32_t sampled_offset;
+    const fcsl_model_event_t *events;
+    uint32_t event_count;
 
     /* Called after parameters were written: checks them, sets states. Returns null, or an error text about a parameter. */
     const char *(*init)(void *self, const fcsl_model_context_t *context);
-    /* dx/dt at time t (s) for state x; reads inputs and parameters of self, changes nothing. Null without continuous states. */
+    /* dx/dt at time t (s) for the states x. */
     void (*derivative)(const void *self, double t, const double *x, double *dx);
-    /* Without continuous states: called at every update of its rate. With them: after every integration step, and once at
-     * time 0. Makes the discrete changes (contact, dropouts) and writes all outputs. Its inputs are up to date. */
+    /* Writes every output, from time t (s) and the states x; x is null without continuous states. Null: `update` writes the
+     * outputs, and they hold until the next update. */
+    void (*output)(void *self, double t, const double *x);
+    /* Called at the rate of the instance, with current inputs and states. May change any state. */
     void (*update)(void *self, const fcsl_model_context_t *context);
+    /* Writes the value of each event function at time t (s) for the states x. */
+    void (*event)(const void *self, double t, const double *x, double *value);
+    /* Event `number` happened, at most 1 ns ago; inputs, states and outputs are those of now. May change any state. */
+    void (*reset)(void *self, const fcsl_model_context_t *context, uint32_t number);
 } fcsl_model_t;
 
 /* Exported regardless of compiler flags. */
 extern __attribute__((visibility("default"))) const fcsl_model_t *const fcsl_models[];
 
-/* One scalar of a field table. A model's struct has the members `inputs`, `outputs`, `parameters` and `state` (as far as it
- * needs them), so that a path is a C expression; the type follows from the member (bool, int32_t … double):
+/* Flag of an output that depends on an input of the same instant. `update` and `derivative` are no such dependency. */
+#define FCSL_FIELD_FEEDTHROUGH (1u << 4)
+/* In place of FCSL_ROLE_OUTPUT in the macros below: an output with this flag. */
+#define FCSL_ROLE_FEEDTHROUGH  (FCSL_ROLE_OUTPUT | 0x80u)
+
+/* One field of a table. A model's struct has the members `inputs`, `outputs`, `parameters` and `state` (as far as it needs
+ * them), so that a path is a C expression; type and shape follow from the member (bool, int32_t … double):
  *
  *   FCSL_MODEL_SCALAR(lander_t, FCSL_ROLE_OUTPUT, outputs.pos_z, "m", "height above the ground")
+ *   FCSL_MODEL_SCALAR(lander_t, FCSL_ROLE_FEEDTHROUGH, outputs.wind.east, "m/s", "a member of a struct")
+ *   FCSL_MODEL_VECTOR(lander_t, FCSL_ROLE_STATE, state.rate, "rad/s", "double rate[3]")
+ *   FCSL_MODEL_MATRIX(lander_t, FCSL_ROLE_PARAMETER, parameters.inertia, "kg*m^2", "double inertia[3][3]")
  */
 #define FCSL_MODEL_SCALAR(struct_, role_, path_, unit_, doc_)                                                          \
+    FCSL_MODEL_FIELD(struct_, role_, path_, path_, 0u, NULL, unit_, doc_)
+#define FCSL_MODEL_VECTOR(struct_, role_, path_, unit_, doc_)                                                          \
+    FCSL_MODEL_FIELD(struct_, role_, path_, path_[0], 1u,                                                              \
+                     ((const uint32_t[]){FCSL_MODEL_EXTENT(struct_, path_, path_[0])}), unit_, doc_)
+#define FCSL_MODEL_MATRIX(struct_, role_, path_, unit_, doc_)                                                          \
+    FCSL_MODEL_FIELD(struct_, role_, path_, path_[0][0], 2u,                                                           \
+                     ((const uint32_t[]){FCSL_MODEL_EXTENT(struct_, path_, path_[0]),                                  \
+                                         FCSL_MODEL_EXTENT(struct_, path_[0], path_[0][0])}),                          \
+                     unit_, doc_)
+#define FCSL_MODEL_EXTENT(struct_, whole_, part_)                                                                      \
+    ((uint32_t)(sizeof(((struct_ *)0)->whole_) / sizeof(((struct_ *)0)->part_)))
+#define FCSL_MODEL_FIELD(struct_, role_, path_, element_, rank_, shape_, unit_, doc_)                                  \
     {.path = #path_,                                                                                                   \
-     .role = (role_),                                                                                                  \
-     .type = FCSL_MODEL_TYPE(((struct_ *)0)->path_),                                                                   \
-     .count = 1u,                                                                                                      \
+     .role = (uint8_t)((role_) & 0x7fu),                                                                               \
+     .type = FCSL_MODEL_TYPE(((struct_ *)0)->element_),                                                                \
+     .flags = (role_) == FCSL_ROLE_FEEDTHROUGH ? FCSL_FIELD_FEEDTHROUGH : 0u,                                          \
+     .rank = (rank_),                                                                                                  \
+     .shape = (shape_),                                                                                                \
+     .count = FCSL_MODEL_EXTENT(struct_, path_, element_),                                                             \
      .offset = offsetof(struct_, path_),                                                                               \
      .size = sizeof(((struct_ *)0)->path_),                                                                            \
      .instance = FCSL_NONE,                                                                                            \

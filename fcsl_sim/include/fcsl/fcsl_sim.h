@@ -33,6 +33,8 @@ fcsl_sim_t *fcsl_sim_open(const char *plan, size_t size, fcsl_error_t *error);
 int fcsl_sim_close(fcsl_sim_t *sim, fcsl_error_t *error);
 
 const fcsl_machine_t *fcsl_sim_machine(const fcsl_sim_t *sim);
+/* The last instant, in simulated time. */
+int64_t fcsl_sim_time_ns(const fcsl_sim_t *sim);
 /* Controller ticks completed, and the largest number of ticks of the simulation. */
 uint64_t fcsl_sim_tick(const fcsl_sim_t *sim);
 uint64_t fcsl_sim_ticks(const fcsl_sim_t *sim);
@@ -64,6 +66,33 @@ int fcsl_sim_set_speed(fcsl_sim_t *sim, double speed, fcsl_error_t *error);
 int32_t fcsl_sim_state(const fcsl_sim_t *sim);
 /* The hosted machine's struct, to read from. */
 const void *fcsl_sim_machine_data(const fcsl_sim_t *sim);
+
+/* ---- models that crash or hang ---------------------------------------------------------------------------------------- */
+
+/* From any thread: the instance of which a function runs now, or null; and the function. While *entry is the same, it is the same
+ * call. */
+const char *fcsl_sim_place(const fcsl_sim_t *sim, const char **function, uint64_t *entry);
+/* From now on a crash within a model ends the process with status 2 and a message that names instance, function and time; with
+ * `json` also as JSON on standard output. One simulation at a time; null: no longer. Returns 0, or -1. */
+int fcsl_sim_watch_crashes(const fcsl_sim_t *sim, int json, fcsl_error_t *error);
+
+/* ---- writing, checkpoints ------------------------------------------------------------------------------------------ */
+
+/* The hosted machine, to write into between two ticks and to trace (fcsl_run.h); it is stepped by the simulation alone. */
+fcsl_run_t *fcsl_sim_hosted(fcsl_sim_t *sim);
+/* Replaces `size` bytes of the struct of an instance, between two ticks. The next evaluation overwrites outputs and connected
+ * inputs. Returns 0, or -1: not within the struct. */
+int fcsl_sim_write(fcsl_sim_t *sim, uint32_t instance, uint32_t offset, const void *bytes, uint32_t size,
+                   fcsl_error_t *error);
+
+/* A checkpoint is all that a simulation needs to go on as if it had never stopped, between two ticks: plant, machine,
+ * hardware, integrators, noise. Its bytes are the content of its file. */
+size_t fcsl_sim_checkpoint_capacity(const fcsl_sim_t *sim);
+/* Writes it into `bytes`, which has that capacity; returns its bytes. */
+size_t fcsl_sim_checkpoint(const fcsl_sim_t *sim, void *bytes);
+/* Puts it back, into a simulation of the same plan, models and machine. Other bytes are refused with the reason, and nothing is
+ * changed then. */
+int fcsl_sim_restore_checkpoint(fcsl_sim_t *sim, const void *bytes, size_t size, fcsl_error_t *error);
 
 /* ---- external controller ------------------------------------------------------------------------------------------- */
 

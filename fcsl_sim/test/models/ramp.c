@@ -25,19 +25,19 @@ static void derivative(const void *self, double t, const double *x, double *dx)
     dx[0] = ((const ramp_t *)self)->inputs.rate;
 }
 
-static void update(void *self, const fcsl_model_context_t *context)
+static void output(void *self, double t, const double *x)
 {
     ramp_t *ramp = self;
-    ramp->outputs.x = ramp->state.x;
+    ramp->outputs.x = x[0];
     ramp->outputs.seen_rate = ramp->inputs.rate;
-    ramp->outputs.time_ns = context->time_ns;
+    ramp->outputs.time_ns = (int64_t)(t * 1e9 + 0.5);
 }
 
 static const fcsl_field_t fields[] = {
     FCSL_MODEL_SCALAR(ramp_t, FCSL_ROLE_INPUT, inputs.rate, "", ""),
     FCSL_MODEL_SCALAR(ramp_t, FCSL_ROLE_STATE, state.x, "m", "integrated"),
     FCSL_MODEL_SCALAR(ramp_t, FCSL_ROLE_OUTPUT, outputs.x, "m", "position"),
-    FCSL_MODEL_SCALAR(ramp_t, FCSL_ROLE_OUTPUT, outputs.seen_rate, "", "rate at the update"),
+    FCSL_MODEL_SCALAR(ramp_t, FCSL_ROLE_FEEDTHROUGH, outputs.seen_rate, "", "rate at the update"),
     FCSL_MODEL_SCALAR(ramp_t, FCSL_ROLE_OUTPUT, outputs.time_ns, "ns", "of the update"),
 };
 
@@ -53,7 +53,7 @@ static const fcsl_model_t model = {
     .continuous_count = 1,
     .sampled_offset = FCSL_NO_OFFSET,
     .derivative = derivative,
-    .update = update,
+    .output = output,
 };
 
 const fcsl_model_t *const fcsl_models[] = {&model, NULL};

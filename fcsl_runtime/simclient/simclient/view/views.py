@@ -109,6 +109,8 @@ def read_views(file: str | Path) -> Views:
     try:
         block = _json(raw.decode("utf-8"), "the file")
         if isinstance(block, dict) and "panels" not in block and "body" not in block:
+            if "views" not in block and isinstance(block.get("extends"), str):
+                raise ViewError(f'no member "views": it extends "{block["extends"]}"; name the file that has them')
             if "views" not in block:
                 raise ViewError('no member "views", and not such a block itself: {"panels": […], "body": {…}}')
             block = block["views"]

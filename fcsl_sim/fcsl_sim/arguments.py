@@ -1,0 +1,159 @@
+# SPDX-License-Identifier: Apache-2.0
+"""The command line of `fcsl-sim`: commands, options and the forms of their values."""
+
+from __future__ import annotations
+
+import argparse
+from collections.abc import Sequence
+from fractions import Fraction
+from math import isfinite, isnan
+from pathlib import Path
+
+from fcsl_compiler.base.version import add_version
+
+from .runner import TIMEOUT_MS
+
+_CONFIG = "*.sim.json, or package://PACKAGE/PATH below its share folder"
+
+
+def parse(arguments: Sequence[str] | None) -> argparse.Namespace:
+    """The options; `command` names the command. Wrong ones end the program with status 2."""
+    parser = _parser()
+    options, rest = parser.parse_known_args(arguments)
+    if options.command == "plot":  # argparse takes paths behind an option for unknown ones
+        options.paths += [text for text in rest if not text.startswith("-")]
+        rest = [text for text in rest if text.startswith("-")]
+    if rest:
+        parser.error(f"unrecognized arguments: {' '.join(rest)}")
+    return options
+
+
+def _parser() -> argparse.ArgumentParser:
+    parser = argparse.ArgumentParser(prog="fcsl-sim", description="Flies a compiled machine against plant models.")
+    add_version(parser, "fcsl_sim", __file__)
+    commands = parser.add_subparsers(dest="command", required=True)
+    check = _add(commands, "check", "check a simulation, run nothing")
+    check.add_argument("config", help=_CONFIG)
+    _add_flight(check)
+    run = _add(commands, "run", "run a simulation to its end")
+    run.add_argument("config", help=_CONFIG)
+    _add_flight(run)
+    _add_run(run)
+    _add_plot(_add(commands, "plot", "draw a simulation or a bag"))
+    _add_model_commands(commands)
+    _add(commands, "schema", "print the JSON Schema of a simulation, for editors")
+    why = _add(commands, "explain", "explain a diagnostic code of simulations, with an example")
+    why.add_argument("code", nargs="*", help="such as E804; none: list all")
+    return parser
+
+
+def _add(
+    commands: argparse._SubParsersAction[argparse.ArgumentParser], name: str, text: str
+) -> argparse.ArgumentParser:
+    return commands.add_parser(name, help=text, description=text[0].upper() + text[1:] + ".")
+
+
+def _add_flight(command: argparse.ArgumentParser) -> None:
+    """What replaces members of the simulation file."""
+    command.add_argument("--seed", type=_seed, help="random seed; replaces the file's")
+    command.add_argument(
+        "--duration", type=_seconds, metavar="S", help="longest simulated time in s; replaces the file's"
+    )
+    help_set = "sets a model parameter: altimeter.parameters.sigma=0.8 (repeatable)"
+    command.add_argument("--set", action="append", default=[], metavar="PATH=VALUE", dest="sets", help=help_set)
+    help_event = 'adds an event: "14.0 altimeter.parameters.dropout=true", at 14 s (repeatable)'
+    command.add_argument("--event", action="append", default=[], metavar="EVENT", dest="events", help=help_event)
+
+
+def _add_run(command: argparse.ArgumentParser) -> None:
+    command.add_argument("--record", type=Path, metavar="BAG", help="new directory for the bag")
+    command.add_argument(
+        "--namespace", default="", help="ROS namespace of the bag's topics, and of the keys on the bus"
+    )
+    command.add_argument(
+        "--external",
+        metavar="PEER",
+        help="the controller is another process (fcsl-fc --hal PEER): at the other end of a wire, with wire:unix:PATH, "
+        "wire:udp:HOST:PORT, wire:tcp:HOST:PORT, wire:uart:DEVICE:BAUD or wire:zenoh:tcp/HOST:PORT; or on the bus, "
+        "each channel under its key, with zenoh:tcp/HOST:PORT, or zenoh-client: where another simulation listens; with "
+        ",free-running behind that, neither waits for the other",
+    )
+    help_speed = "limit on simulated seconds per second: 1 for real time; 0 (default): as fast as possible"
+    command.add_argument("--speed", type=_speed, default=0.0, metavar="FACTOR", help=help_speed)
+    help_timeout = f"seconds to wait for the external controller (default {TIMEOUT_MS // 1000})"
+    command.add_argument("--timeout", type=_seconds, metavar="S", help=help_timeout)
+    command.add_argument("--json", action="store_true", help="print the summary as JSON, and nothing else")
+    _add_servers(command)
+
+
+def _add_servers(command: argparse.ArgumentParser) -> None:
+    help_socket = "serve all variables (docs/protocol.md) on this Unix socket, or on tcp:HOST:PORT with --token"
+    command.add_argument("--socket", metavar="ADDRESS", help=help_socket)
+    help_checkpoints = "folder of the checkpoint files that clients name"
+    command.add_argument("--checkpoints", type=Path, metavar="DIR", help=help_checkpoints)
+    command.add_argument("--token", type=Path, metavar="FILE", help="token file of a TCP server; created if absent")
+    command.add_argument("--paused", action="store_true", help="start paused: only commands run ticks until `resume`")
+    help_telemetry = "send values as UDP (docs/telemetry.md) to udp:HOST:PORT, or of every N-th tick to udp:HOST:PORT/N"
+    command.add_argument("--telemetry", metavar="ADDRESS", help=help_telemetry)
+    help_fields = (
+        "fields to send, as path globs separated by commas (default: inputs, outputs, state, health, counters)"
+    )
+    command.add_argument("--telemetry-fields", metavar="GLOBS", help=help_fields)
+    help_observers = "put the values of all channels on a bus of their own (docs/bus.md), which listens there"
+    command.add_argument("--observers", metavar="tcp/HOST:PORT", help=help_observers)
+    help_ros = (
+        "publish the machine's ROS 2 topics and /clock through a bridge (docs/ros_graph.md), for which it listens there"
+    )
+    command.add_argument("--ros", metavar="tcp/HOST:PORT", help=help_ros)
+
+
+def _add_plot(command: argparse.ArgumentParser) -> None:
+    command.add_argument("target", help="*.sim.json, which is run; or a bag: a directory or an .mcap file")
+    help_paths = "what to draw, a panel for each, as in python3 -m simclient.plot; none: the views of the run"
+    command.add_argument("paths", nargs="*", metavar="PATH", help=help_paths)
+    help_output = "picture to write: .png, .svg or .pdf (default: the target's name with .png, here)"
+    command.add_argument("-o", "--output", type=Path, metavar="FILE", help=help_output)
+    command.add_argument("--against", default="", metavar="PATH", help="the horizontal axis, instead of time")
+    _add_flight(command)
+
+
+def _add_model_commands(commands: argparse._SubParsersAction[argparse.ArgumentParser]) -> None:
+    listing = _add(commands, "list-models", "list the models of installed packages and of a folder")
+    help_folder = "where to look for C and C++ files with models (default: this folder)"
+    listing.add_argument("folder", nargs="?", type=Path, default=Path(), metavar="FOLDER", help=help_folder)
+    listing.add_argument("--json", action="store_true", help="print them as a JSON list")
+    description = _add(commands, "describe", "print the fields and events of a model, and JSON to paste")
+    description.add_argument("model", help="a C or C++ file, package://PACKAGE/PATH, or a name that list-models prints")
+    description.add_argument("--json", action="store_true", help="print one JSON object")
+
+
+# ---- forms of values -----------------------------------------------------------------------------------------------
+
+
+def _seed(text: str) -> int:
+    value = int(text, 10)
+    if not 0 <= value < 2**64:
+        raise ValueError
+    return value
+
+
+def _seconds(text: str) -> Fraction:
+    about = float(text)
+    if isnan(about):
+        raise ValueError
+    if not 0 < about <= 1e9:
+        raise argparse.ArgumentTypeError(f"{text} s is {'not above zero' if about <= 0 else 'more than 1e+09 s'}")
+    return Fraction(text)  # exact; without the checks above, 1e99999999 would take minutes
+
+
+def _speed(text: str) -> float:
+    value = float(text)
+    if not (isfinite(value) and value >= 0):
+        raise ValueError
+    return value
+
+
+# argparse uses these names in its error messages.
+_seed.__name__ = "seed (0 to 2^64 - 1)"
+_seconds.__name__ = "number of seconds"
+_speed.__name__ = "speed (a number above zero, or 0 for as fast as possible)"

@@ -1,0 +1,81 @@
+# SPDX-License-Identifier: Apache-2.0
+"""Ends a run whose model crashes or does not return, with a message that names it.
+
+While native code runs, Python handles no signal: the main thread cannot. A thread looks whether one and the same call of
+a model goes on and on.
+"""
+
+from __future__ import annotations
+
+import json
+import os
+import signal
+import sys
+import threading
+from contextlib import suppress
+from types import TracebackType
+
+from .errors import SimError
+from .native import Simulation
+
+#: Between two looks.
+_LOOK_S = 0.25
+#: Looks at one call after which it hangs: 10 s, of which a stopped process counts none.
+_LOOKS = 40
+#: After a signal.
+_LOOKS_OF_SIGNAL = 8
+_EXIT_FAILED = 2
+
+
+class Watchdog:
+    """A context manager around the run of a simulation by `fcsl-sim`. as_json: the end is told as JSON, too."""
+
+    def __init__(self, sim: Simulation, as_json: bool):
+        self._sim, self._as_json = sim, as_json
+        self._over = threading.Event()
+        self._thread = threading.Thread(target=self._watch, daemon=True)
+        self._signalled, self._wake = os.pipe2(os.O_NONBLOCK | os.O_CLOEXEC)
+        self._before = -1
+
+    def __enter__(self) -> Watchdog:
+        self._before = signal.set_wakeup_fd(self._wake, warn_on_full_buffer=False)
+        self._sim.watch_crashes(True, self._as_json)
+        self._thread.start()
+        return self
+
+    def __exit__(
+        self, kind: type[BaseException] | None, value: BaseException | None, trace: TracebackType | None
+    ) -> None:
+        self._over.set()
+        self._thread.join()
+        self._sim.watch_crashes(False, self._as_json)
+        signal.set_wakeup_fd(self._before)
+        os.close(self._signalled)
+        os.close(self._wake)
+
+    def _watch(self) -> None:
+        number, entry, looks = 0, -1, 0
+        while not self._over.wait(_LOOK_S):
+            number = self._signal() or number
+            place = self._sim.place()
+            looks = looks + 1 if place is not None and place.entry == entry else 0
+            entry = place.entry if place is not None else -1
+            if place is not None and looks >= (_LOOKS_OF_SIGNAL if number else _LOOKS):
+                self._end(
+                    f"`{place.function}` of `{place.instance}` does not return after {place.time_s:.9f} s", number
+                )
+
+    def _signal(self) -> int:
+        """The last SIGINT or SIGTERM that has come, or 0."""
+        numbers: list[int] = []
+        with suppress(BlockingIOError):
+            numbers = [n for n in os.read(self._signalled, 1024) if n in (signal.SIGINT, signal.SIGTERM)]
+        return numbers[-1] if numbers else 0
+
+    def _end(self, message: str, number: int) -> None:
+        with suppress(SimError):
+            self._sim.record_stop()  # the thread that records is in the model
+        print(f"fcsl-sim: error: {message}", file=sys.stderr, flush=True)
+        if self._as_json:
+            print(json.dumps({"end": "error", "error": message}), flush=True)
+        os._exit(128 + number if number else _EXIT_FAILED)

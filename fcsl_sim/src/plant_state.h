@@ -1,0 +1,15 @@
+/* SPDX-License-Identifier: Apache-2.0
+ *
+ * All that a simulation needs to go on, besides the hosted machine and its hardware, as bytes: models, noise, integrators, events,
+ * the channels, the gate, the line. Between two ticks.
+ */
+#ifndef FCSL_SIM_PLANT_STATE_H
+#define FCSL_SIM_PLANT_STATE_H
+
+#include "sim_internal.h"
+
+size_t fcsl_plant_state_bytes(const fcsl_sim_t *sim);
+void fcsl_plant_state_save(const fcsl_sim_t *sim, void *bytes);
+void fcsl_plant_state_restore(fcsl_sim_t *sim, const void *bytes);
+
+#endif /* FCSL_SIM_PLANT_STATE_H */

@@ -1,0 +1,132 @@
+/* SPDX-License-Identifier: Apache-2.0
+ *
+ * Finds models that break the rules of fcsl_model.h, by trying their functions once on a copy: functions that change what they may
+ * only read, and outputs that depend on an input without saying so.
+ */
+#include <stdlib.h>
+#include <string.h>
+
+#include "fail.h"
+#include "fcsl/fcsl_scalar.h"
+#include "sim_internal.h"
+
+typedef struct {
+    const fcsl_instance_state_t *instance;
+    uint8_t *before;
+    uint8_t *after;
+    double *scratch; /* derivatives, or event functions */
+} trial_t;
+
+static double *states_in(const fcsl_model_t *model, uint8_t *data)
+{
+    return model->continuous_count > 0 ? (double *)(void *)(data + model->continuous_offset) : NULL;
+}
+
+static int is_output(const fcsl_model_t *model, uint32_t offset)
+{
+    for (uint32_t i = 0; i < model->field_count; i++) {
+        const fcsl_field_t *field = &model->fields[i];
+        if (field->role == FCSL_ROLE_OUTPUT && offset >= field->offset && offset - field->offset < field->size) {
+            return 1;
+        }
+    }
+    return 0;
+}
+
+static int check_unchanged(const trial_t *trial, const char *function, int may_write_outputs, fcsl_error_t *error)
+{
+    const fcsl_model_t *model = trial->instance->model;
+    for (uint32_t i = 0; i < model->size; i++) {
+        if (trial->before[i] != trial->after[i] && !(may_write_outputs && is_output(model, i))) {
+            char name[FCSL_PLACE_BYTES];
+            fcsl_sim_name_place(trial->instance, i, name, sizeof name);
+            return fcsl_sim_fail(error, "`%s` of model `%s` changes %s%s; states change in `update` and `reset`",
+                                 function, model->name, name, may_write_outputs ? ", which is no output" : "");
+        }
+    }
+    return 0;
+}
+
+static void change_inputs(const fcsl_model_t *model, uint8_t *data)
+{
+    for (uint32_t i = 0; i < model->field_count; i++) {
+        const fcsl_field_t *field = &model->fields[i];
+        for (uint32_t k = 0; field->role == FCSL_ROLE_INPUT && k < field->count; k++) {
+            double value;
+            float single;
+            if (field->type == FCSL_F64) {
+                uint8_t *at = data + field->offset + (size_t)k * sizeof value;
+                memcpy(&value, at, sizeof value);
+                value += 0.75;
+                memcpy(at, &value, sizeof value);
+            } else if (field->type == FCSL_F32) {
+                uint8_t *at = data + field->offset + (size_t)k * sizeof single;
+                memcpy(&single, at, sizeof single);
+                single += 0.75f;
+                memcpy(at, &single, sizeof single);
+            } else if (field->type == FCSL_BOOL) {
+                data[field->offset + k] ^= 1u;
+            }
+        }
+    }
+}
+
+static int check_feedthrough(const trial_t *trial, fcsl_error_t *error)
+{
+    const fcsl_model_t *model = trial->instance->model;
+    memcpy(trial->before, trial->after, model->size);
+    change_inputs(model, trial->after);
+    model->output(trial->after, 0.0, states_in(model, trial->after));
+    for (uint32_t i = 0; i < model->field_count; i++) {
+        const fcsl_field_t *field = &model->fields[i];
+        if (field->role == FCSL_ROLE_OUTPUT && (field->flags & FCSL_FIELD_FEEDTHROUGH) == 0 &&
+            memcmp(trial->before + field->offset, trial->after + field->offset, field->size) != 0) {
+            return fcsl_sim_fail(error,
+                                 "model `%s`: `%s` depends on an input of the same instant, and is not declared so; "
+                                 "give it the role FCSL_ROLE_FEEDTHROUGH",
+                                 model->name, field->path);
+        }
+    }
+    return 0;
+}
+
+static int try_functions(const trial_t *trial, fcsl_error_t *error)
+{
+    const fcsl_model_t *model = trial->instance->model;
+    memcpy(trial->before, trial->instance->data, model->size);
+    memcpy(trial->after, trial->instance->data, model->size);
+    if (model->derivative) {
+        model->derivative(trial->after, 0.0, states_in(model, trial->after), trial->scratch);
+        if (check_unchanged(trial, "derivative", 0, error)) {
+            return -1;
+        }
+    }
+    if (model->event) {
+        model->event(trial->after, 0.0, states_in(model, trial->after), trial->scratch);
+        if (check_unchanged(trial, "event", 0, error)) {
+            return -1;
+        }
+    }
+    if (model->output) {
+        model->output(trial->after, 0.0, states_in(model, trial->after));
+        return check_unchanged(trial, "output", 1, error) || check_feedthrough(trial, error) ? -1 : 0;
+    }
+    return 0;
+}
+
+int fcsl_sim_check_purity(const fcsl_sim_t *sim, uint32_t index, fcsl_error_t *error)
+{
+    const fcsl_instance_state_t *instance = &sim->instances[index];
+    const fcsl_model_t *model = instance->model;
+    trial_t trial = {.instance = instance};
+    trial.before = fcsl_sim_allocate(model->size, model->align);
+    trial.after = fcsl_sim_allocate(model->size, model->align);
+    trial.scratch = calloc((size_t)model->continuous_count + model->event_count + 1u, sizeof *trial.scratch);
+    const int failed = !trial.before || !trial.after || !trial.scratch
+                           ? fcsl_sim_fail(error, "no memory for instance `%s`", instance->name)
+                           : try_functions(&trial, error);
+    free(trial.before);
+    free(trial.after);
+    free(trial.scratch);
+    return failed;
+}

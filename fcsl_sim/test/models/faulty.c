@@ -1,0 +1,62 @@
+/* SPDX-License-Identifier: Apache-2.0
+ *
+ * A model that goes wrong at `at_s`, as `how` says: 1 crashes, 2 never returns, 3 aborts, 4 recurses for ever.
+ */
+#include <stdlib.h>
+
+#include "fcsl/fcsl_model.h"
+
+typedef struct {
+    struct { double at_s; int64_t how; } parameters;
+    struct { double y; } outputs;
+} faulty_t;
+
+static volatile int never;
+
+static int recurse(volatile int *depth)
+{
+    volatile int below = *depth + 1;
+    return below == 0 ? 0 : recurse(&below) + below;
+}
+
+static void update(void *self, const fcsl_model_context_t *context)
+{
+    faulty_t *faulty = self;
+    volatile int depth = 0;
+    if ((double)context->time_ns / 1e9 < faulty->parameters.at_s) {
+        return;
+    }
+    switch (faulty->parameters.how) {
+    case 1:
+        *(volatile int *)16 = 1;
+        break;
+    case 2:
+        while (!never) {
+        }
+        break;
+    case 3:
+        abort();
+    default:
+        faulty->outputs.y = recurse(&depth);
+    }
+}
+
+static const fcsl_field_t fields[] = {
+    FCSL_MODEL_SCALAR(faulty_t, FCSL_ROLE_PARAMETER, parameters.at_s, "s", ""),
+    FCSL_MODEL_SCALAR(faulty_t, FCSL_ROLE_PARAMETER, parameters.how, "", ""),
+    FCSL_MODEL_SCALAR(faulty_t, FCSL_ROLE_OUTPUT, outputs.y, "", ""),
+};
+
+static const fcsl_model_t model = {
+    .abi_version = FCSL_MODEL_ABI_VERSION,
+    .name = "faulty",
+    .doc = "goes wrong",
+    .fields = fields,
+    .field_count = sizeof fields / sizeof *fields,
+    .size = sizeof(faulty_t),
+    .align = _Alignof(faulty_t),
+    .sampled_offset = FCSL_NO_OFFSET,
+    .update = update,
+};
+
+const fcsl_model_t *const fcsl_models[] = {&model, NULL};
