@@ -82,6 +82,9 @@ def _add_run(command: argparse.ArgumentParser) -> None:
     command.add_argument("--speed", type=_speed, default=0.0, metavar="FACTOR", help=help_speed)
     help_timeout = f"seconds to wait for the external controller (default {TIMEOUT_MS // 1000})"
     command.add_argument("--timeout", type=_seconds, metavar="S", help=help_timeout)
+    command.add_argument("--restore", type=Path, metavar="FILE", help="go on from this checkpoint of the simulation")
+    help_save = "write a checkpoint at the end (docs/checkpoints.md), whose time --duration chooses"
+    command.add_argument("--save", type=Path, metavar="FILE", help=help_save)
     command.add_argument("--json", action="store_true", help="print the summary as JSON, and nothing else")
     _add_servers(command)
 

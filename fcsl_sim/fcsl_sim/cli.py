@@ -179,6 +179,8 @@ def _run(options: argparse.Namespace) -> int:
         observers=options.observers,
         ros=options.ros,
         watcher=Watcher(as_json=True) if options.json else _Printer(config, external),
+        restore=options.restore,
+        save=options.save,
     )
     if options.json:
         show(json.dumps(summary.as_json(), indent=2))
@@ -228,7 +230,7 @@ def _print_summary(config: SimConfig, summary: Summary) -> None:
                 value = _value_text(summary.truth[f"{name}.{field.path}"])
                 show(f"  {name}.{field.path} = {value}{' ' + field.unit if field.unit else ''}")
     show(
-        f"seed {summary.seed}: {summary.ticks} ticks in {summary.wall_s:.3f} s, "
+        f"seed {summary.seed}: {summary.ticks - summary.from_tick} ticks in {summary.wall_s:.3f} s, "
         f"{_factor_text(summary.real_time_factor)} times real time"
     )
     if summary.telemetry:
@@ -249,8 +251,10 @@ def _print_summary(config: SimConfig, summary: Summary) -> None:
         show(
             f"ROS 2 topics: {summary.ros['ticks']} ticks, {summary.ros['dropped']} dropped, {summary.ros['refused']} messages refused"
         )
+    for name, companion in summary.companions.items():
+        show(f"controller {name}: {companion['ticks']} ticks, {companion['state']}")
     if summary.bag:
-        show(f"bag: {summary.bag}")
+        show(f"bag: {', '.join([summary.bag, *(str(c['bag']) for c in summary.companions.values())])}")
     if summary.until_held is False:
         show(f"until never held: {config.until}")
 

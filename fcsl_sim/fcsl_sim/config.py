@@ -7,7 +7,8 @@ codes.py.
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+import math
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field
 from fractions import Fraction
 from pathlib import Path
@@ -31,17 +32,22 @@ from .event_argument import with_events
 from .extends import file_of, read_extended
 from .integrators import Integrator, read_integrator
 from .models import ModelField, ModelTable, type_of, with_unit
+from .plant_only import MAX_TICK_HZ, build_plant_only
 from .plugins import model_library, model_source
 from .ros import TruthTopic
 from .wiring import MAX_SECONDS, Instance, Wiring, check_wiring, seconds
 
 MAX_TICKS = 10**12
+#: Of a controller's commands (src/delay.h).
+MAX_DELAY_TICKS = 1000
 #: Keys that say nothing about the flight; `extends` was followed before.
 FOR_READERS = ("$schema", "description", "extends")
 #: The model that may stand between plant and controller.
 SERIAL_LINK = "serial_link"
 
 
+#: What no instance may be called.
+_RESERVED = ("controller", "machine", "channels", "actuators")
 #: Of an instance.
 _OPTIONAL = ("parameters", "integrator", "tolerances")
 
@@ -50,7 +56,7 @@ _OPTIONAL = ("parameters", "integrator", "tolerances")
 class SimConfig:
     """A checked simulation. `tables` maps each instance to its model, in update order.
 
-    `ros` lists the standard messages onto which truth is mapped; `until` is the stop condition as text, empty without one;
+    `companions` are the controllers beside the first one. `ros` lists the standard messages onto which truth is mapped; `until` is the stop condition as text, empty without one;
     `warnings` are rendered texts.
     """
 
@@ -59,11 +65,21 @@ class SimConfig:
     tables: dict[str, ModelTable]
     machine: Machine
     library: Path
+    companions: dict[str, Controller]
     seed: int
     ticks: int
     ros: tuple[TruthTopic, ...]
     until: str
     warnings: tuple[str, ...]
+
+
+@dataclass(frozen=True)
+class Controller:
+    """A hosted machine. Its commands act `delay_ticks` of its ticks after they are made."""
+
+    machine: Machine
+    library: Path
+    delay_ticks: int
 
 
 @dataclass
@@ -72,11 +88,25 @@ class _Parts:
 
     models: dict[str, ModelTable | None] = field(default_factory=dict)
     instances: dict[str, Instance] = field(default_factory=dict)
-    machine: Machine | None = None
-    library: Path | None = None
+    #: By name; the first one leads.
+    controllers: dict[str, Controller] = field(default_factory=dict)
     integrator: Integrator | None = None
     seed: int | None = None
     ticks: int | None = None
+
+    @property
+    def machines(self) -> dict[str, Machine]:
+        return {name: controller.machine for name, controller in self.controllers.items()}
+
+    @property
+    def machine(self) -> Machine | None:
+        """That of the first controller."""
+        return next(iter(self.machines.values()), None)
+
+    @property
+    def tick_hz(self) -> int | None:
+        """Of a grid on which the ticks of all controllers lie."""
+        return math.lcm(*(machine.tick_hz for machine in self.machines.values())) if self.controllers else None
 
 
 def load(
@@ -131,6 +161,11 @@ def _duration_problem(duration_s: Fraction, tick_hz: int) -> str | None:
     return None if ticks.denominator == 1 else f"{text} is not a whole number of ticks (1/{tick_hz} s)"
 
 
+def _plant_only(tick_hz: int) -> tuple[Path, str]:
+    built = build_plant_only(tick_hz)
+    return built.library, built.name
+
+
 class _Loader:
     def __init__(self, file: Path, sink: DiagnosticSink, sets: Sequence[str], machine: tuple[Path, str] | None):
         self.file, self.sink, self.given_machine = file, sink, machine
@@ -141,18 +176,17 @@ class _Loader:
         self.overrides = self._parse_sets(sets)
 
     def load(self, root: JsonNode, seed: int | None, duration_s: Fraction | None) -> SimConfig:
-        required = ("controller", "models", "instances", "integrator", "seed", "duration")
-        keys = self.reader.object(
-            root, "a simulation", required, ("connections", "rates", "events", "until", "ros", "views", *FOR_READERS)
-        )
+        required = ("models", "instances", "integrator", "seed", "duration")
+        optional = ("controller", "controllers", "tick_hz", "connections", "rates", "events", "until", "ros", "views", *FOR_READERS)
+        keys = self.reader.object(root, "a simulation", required, optional)
         if keys is None:
             raise DiagnosticError(self.sink.diagnostics)
         for key in FOR_READERS:
             self.reader.string(keys.get(key), f"`{key}`")
         parts = self.parts
-        self._read_controller(keys.get("controller"))
-        tick_hz = parts.machine.tick_hz if parts.machine else None
-        parts.integrator = read_integrator(keys.get("integrator"), self.reader, tick_hz)
+        if self._has_controller(root, keys):
+            self._read_controllers(keys)
+        parts.integrator = read_integrator(keys.get("integrator"), self.reader, parts.tick_hz)
         self._read_models(keys.get("models"))
         self._read_instances(keys.get("instances"))
         link = self._read_link(self.link_node)
@@ -162,7 +196,7 @@ class _Loader:
         self._report_unused_overrides()
         # A shorter duration on the command line is intended; in the file, an event after the end is probably a mistake.
         file_ticks = parts.ticks if duration_s is None else None
-        wiring = check_wiring(self.reader, parts.instances, parts.machine, parts.integrator, keys, file_ticks)
+        wiring = check_wiring(self.reader, parts.instances, parts.machines, parts.integrator, keys, file_ticks)
         views = read_views(keys.get("views"), self._signals(), self.file, self.reader)
         if self.foreign or self.sink.failed:
             raise DiagnosticError([*self.foreign, *(d for d in self.sink.diagnostics if d.severity is Severity.ERROR)])
@@ -171,11 +205,17 @@ class _Loader:
     def _finish(self, wiring: Wiring, views: str, link: str | None) -> SimConfig:
         """Assembles the result; called only without errors, so every part is present."""
         parts = self.parts
-        assert parts.machine and parts.library and parts.ticks and parts.seed is not None
+        assert parts.machine and parts.ticks and parts.seed is not None
+        lead = next(iter(parts.controllers.values()))
         tables = {name: parts.instances[name].table for name in wiring.order}
         used = {table.name: table for table in tables.values() if table}
         lines = [
-            plan.library_statement("machine", parts.machine.name, parts.library),
+            plan.library_statement("machine", lead.machine.name, lead.library),
+            *([plan.statement("delay", lead.delay_ticks)] if lead.delay_ticks else []),
+            *(
+                plan.library_statement(f"companion {name} {other.delay_ticks}", other.machine.name, other.library)
+                for name, other in list(parts.controllers.items())[1:]
+            ),
             plan.statement("seed", parts.seed),
             plan.statement("ticks", parts.ticks),
             *(plan.library_statement("model", name, table.library) for name, table in sorted(used.items())),
@@ -187,8 +227,9 @@ class _Loader:
             self.file,
             plan.document(lines),
             {name: table for name, table in tables.items() if table},
-            parts.machine,
-            parts.library,
+            lead.machine,
+            lead.library,
+            dict(list(parts.controllers.items())[1:]),
             parts.seed,
             parts.ticks,
             wiring.ros,
@@ -198,22 +239,68 @@ class _Loader:
 
     # ---- controller and time ------------------------------------------------------------------------------------------
 
-    def _read_controller(self, node: JsonNode | None) -> None:
-        keys = self.reader.object(node, "`controller`", ("machine",), ("link",)) if node else None
-        self.link_node = keys.get("link") if keys else None
+    def _has_controller(self, root: JsonNode, keys: dict[str, JsonNode]) -> bool:
+        """False: the simulation says its `tick_hz` instead, and runs with a machine that does nothing."""
+        if "tick_hz" not in keys:
+            if "controller" not in keys and "controllers" not in keys:
+                fix = 'add `"controller": …`, or `"tick_hz": 100` for a simulation of the plant alone'
+                self.sink.error("E202", "a simulation has no `controller`", root.span, help=fix)
+            return True
+        if "controller" in keys or "controllers" in keys:
+            fix = "remove `tick_hz`; it is for a simulation without a controller"
+            self.sink.error("E201", "`tick_hz` is that of the controller", keys["tick_hz"].span, help=fix)
+            return True
+        tick_hz = self.reader.integer(keys["tick_hz"], "`tick_hz`", 1, MAX_TICK_HZ)
+        if tick_hz is not None:
+            self._use_machine("controller", lambda: _plant_only(tick_hz), "plant_only", keys["tick_hz"].span)
+        return False
+
+    def _read_controllers(self, keys: dict[str, JsonNode]) -> None:
+        """`controller`, or several by name, of which the first one leads: the simulation's ticks are its own."""
+        if "controllers" not in keys:
+            self._read_controller("controller", keys.get("controller"), self.given_machine)
+            return
+        if "controller" in keys:
+            fix = "write all of them into `controllers`"
+            self.sink.error("E201", "both `controller` and `controllers`", keys["controller"].span, help=fix)
+        given = self.given_machine
+        for name, (definition, span) in self.reader.named(keys["controllers"], "`controllers`").items():
+            if name in ("machine", "channels", "actuators"):
+                self.sink.error("E209", f"`{name}` is reserved", span, help="give the controller another name")
+            self._read_controller(name, definition, given)
+            given = None
+        if not self.parts.controllers and not (self.sink.failed or self.foreign):
+            self.sink.error("E202", "`controllers` is empty", keys["controllers"].span)
+
+    def _read_controller(self, name: str, node: JsonNode | None, given: tuple[Path, str] | None) -> None:
+        first = not self.parts.controllers
+        optional = ("link", "delay_ticks") if first else ("delay_ticks",)
+        what = f"`{name}`" if name == "controller" else f"controller `{name}`"
+        keys = self.reader.object(node, what, ("machine",), optional) if node else None
+        if first:
+            self.link_node = keys.get("link") if keys else None
+        delay = keys.get("delay_ticks") if keys else None
+        delay_ticks = self.reader.integer(delay, "`delay_ticks`", 0, MAX_DELAY_TICKS) if delay else 0
         machine = keys.get("machine") if keys else None
         text = self.reader.string(machine, "`machine`")
         if machine is None or text is None:
             return
+        config = file_of(machine.span)
+        self._use_machine(name, lambda: given or self._build_machine(text, config), text, machine.span, delay_ticks or 0)
+
+    def _use_machine(
+        self, controller: str, build: Callable[[], tuple[Path, str]], text: str, span: Span, delay_ticks: int = 0
+    ) -> None:
+        """Opens the machine that `build` gives: its library, and its name within that."""
         try:
-            library, name = self.given_machine or self._build_machine(text, file_of(machine.span))
+            library, name = build()
             run = open_run(library, name)
-            self.parts.machine, self.parts.library = run.machine, library
+            self.parts.controllers[controller] = Controller(run.machine, library, delay_ticks)
             run.close()
         except DiagnosticError as error:
             self.foreign.extend(error.diagnostics)
         except (SourcePathError, ToolchainError, TwinError) as error:
-            self.sink.error("E802", f"the machine `{text}` cannot be used: {error}", machine.span)
+            self.sink.error("E802", f"the machine `{text}` cannot be used: {error}", span)
 
     def _build_machine(self, text: str, config: Path) -> tuple[Path, str]:
         """Unlike sources, a machine may be outside of the folder of the file `config` that names it; otherwise the same
@@ -288,8 +375,11 @@ class _Loader:
 
     def _read_instances(self, node: JsonNode | None) -> None:
         for name, (definition, span) in self.reader.named(node, "`instances`").items():
-            if name == "controller":
-                self.sink.error("E209", "`controller` is reserved", span, help="give the instance another name")
+            if name in self._taken():
+                what = f"an instance of machine `{self.parts.machine.name}`" if self.parts.machine else ""
+                what = "a controller" if name in self.parts.controllers else what
+                what = "reserved" if name in _RESERVED else what
+                self.sink.error("E209", f"`{name}` is {what}", span, help="give the instance another name")
                 continue
             keys = self.reader.object(definition, f"instance `{name}`", ("model",), _OPTIONAL) or {}
             model = self.reader.string(keys.get("model"), "`model`")
@@ -301,8 +391,13 @@ class _Loader:
             if instance.table:
                 self._read_parameters(instance, instance.table, keys.get("parameters"))
                 self._read_tolerances(instance, instance.table, keys.get("tolerances"))
-                tick_hz = self.parts.machine.tick_hz if self.parts.machine else None
-                instance.integrator = read_integrator(keys.get("integrator"), self.reader, tick_hz)
+                instance.integrator = read_integrator(keys.get("integrator"), self.reader, self.parts.tick_hz)
+
+    def _taken(self) -> set[str]:
+        """Names that paths of the simulation already begin with."""
+        machine = self.parts.machine
+        names = {instance.name for instance in machine.instances} if machine else set()
+        return names | set(_RESERVED) | set(self.parts.controllers)
 
     def _read_parameters(self, instance: Instance, table: ModelTable, node: JsonNode | None) -> None:
         wanted = {f.name: f for f in table.of_role("parameter")}

@@ -74,6 +74,11 @@ _PROTOTYPES: dict[str, tuple[type | None, list[type]]] = {
     "fcsl_sim_set_speed": (c_int, [ptr, c_double, _ERROR]),
     "fcsl_sim_state": (c_int32, [ptr]),
     "fcsl_sim_machine_data": (ptr, [ptr]),
+    "fcsl_sim_hosted": (ptr, [ptr]),
+    "fcsl_sim_write": (c_int, [ptr, c_uint32, c_uint32, c_char_p, c_uint32, _ERROR]),
+    "fcsl_sim_checkpoint_capacity": (c_size_t, [ptr]),
+    "fcsl_sim_checkpoint": (c_size_t, [ptr, ptr]),
+    "fcsl_sim_restore_checkpoint": (c_int, [ptr, c_char_p, c_size_t, _ERROR]),
     "fcsl_sim_listen": (c_int, [ptr, c_char_p, c_char_p, c_uint32, _ERROR]),
     "fcsl_sim_accept": (c_int, [ptr, c_uint32, _ERROR]),
     "fcsl_sim_read_log": (c_int, [ptr, c_char_p]),
@@ -105,6 +110,9 @@ _PROTOTYPES: dict[str, tuple[type | None, list[type]]] = {
     "fcsl_sim_truth_type": (c_char_p, [ptr, c_uint32]),
     "fcsl_sim_truth_schema": (c_char_p, [ptr, c_uint32]),
     "fcsl_sim_truth_message": (c_int64, [ptr, c_uint32, ptr, c_size_t]),
+    "fcsl_sim_companion_count": (c_uint32, [ptr]),
+    "fcsl_sim_companion_name": (c_char_p, [ptr, c_uint32]),
+    "fcsl_sim_companion_state": (c_char_p, [ptr, c_uint32, POINTER(c_uint64)]),
     "fcsl_sim_place": (c_char_p, [ptr, POINTER(c_char_p), POINTER(c_uint64)]),
     "fcsl_sim_time_ns": (c_int64, [ptr]),
     "fcsl_sim_watch_crashes": (c_int, [ptr, c_int, _ERROR]),
@@ -234,6 +242,10 @@ class Simulation:
         handle, self._handle = self._handle, None
         self._check(self._lib.fcsl_sim_close(handle, byref(self._error)))
 
+    def leave_to_parent(self) -> None:
+        """In a forked process: abandons the recording, whose writer thread is in the parent."""
+        self._handle = None
+
     @property
     def tick(self) -> int:
         """Controller ticks completed."""
@@ -257,6 +269,15 @@ class Simulation:
             raise SimError(str(error)) from None
         base = self._lib.fcsl_sim_machine_data(self.handle())
         return read_part(part, lambda offset, size: ctypes.string_at(base + offset, size), self.machine)
+
+    def companions(self) -> dict[str, tuple[str, int]]:
+        """State and completed ticks of each controller beside the first one, by its name."""
+        found = {}
+        for i in range(self._lib.fcsl_sim_companion_count(self.handle())):
+            ticks = c_uint64()
+            state = self._lib.fcsl_sim_companion_state(self.handle(), i, byref(ticks)).decode()
+            found[self._lib.fcsl_sim_companion_name(self.handle(), i).decode()] = state, ticks.value
+        return found
 
     def place(self) -> Place | None:
         """What runs now; None: no function of a model. From any thread."""
@@ -284,7 +305,7 @@ class Simulation:
         self._check(self._lib.fcsl_sim_set_speed(self.handle(), speed, byref(self._error)))
 
     def record(self, bag: Path, name_space: str = "") -> None:
-        """Records controller and truth into `bag`; before the first tick. name_space: with or without surrounding
+        """Records controller and truth into `bag`, from the next tick on. name_space: with or without surrounding
         slashes.
         """
         within = name_space.strip("/").encode()
@@ -292,6 +313,29 @@ class Simulation:
 
     def record_stop(self) -> None:
         self._check(self._lib.fcsl_sim_record_stop(self.handle(), byref(self._error)))
+
+    def hosted(self) -> int:
+        """Address of the fcsl_run_t of the hosted machine, to write into it and to trace it (fcsl_run.h). The simulation
+        alone steps it."""
+        return int(self._lib.fcsl_sim_hosted(self.handle()))
+
+    def write(self, instance: str, offset: int, data: bytes) -> None:
+        """Replaces bytes of the struct of an instance, between two ticks. The next evaluation overwrites outputs and
+        connected inputs."""
+        number = self.instances[instance]
+        self._check(self._lib.fcsl_sim_write(self.handle(), number, offset, data, len(data), byref(self._error)))
+
+    def checkpoint(self) -> bytes:
+        """Plant and machine between two ticks, the content of a checkpoint file (docs/checkpoints.md)."""
+        room = ctypes.create_string_buffer(self._lib.fcsl_sim_checkpoint_capacity(self.handle()))
+        size = self._lib.fcsl_sim_checkpoint(self.handle(), room)
+        return ctypes.string_at(room, size)
+
+    def restore_checkpoint(self, checkpoint: bytes) -> None:
+        """Goes on from there. Raises SimError for other bytes than those of a checkpoint of this simulation, and then
+        changes nothing."""
+        size = len(checkpoint)
+        self._check(self._lib.fcsl_sim_restore_checkpoint(self.handle(), checkpoint, size, byref(self._error)))
 
     def listen(self, peer: str, timeout_ms: int, name_space: str = "") -> None:
         """A controller can connect from now on: to `wire:SPEC` or `zenoh:tcp/HOST:PORT`, as `fcsl-fc --hal` takes it.

@@ -11,6 +11,9 @@ from dataclasses import asdict, dataclass
 from pathlib import Path
 from typing import Any
 
+from simclient.checkpoint import read_checkpoint, write_checkpoint
+from simclient.errors import TwinError
+
 from .config import SimConfig
 from .errors import SimError
 from .models import Scalar
@@ -39,20 +42,22 @@ class StateChange:
 
 @dataclass(frozen=True)
 class Summary:
-    """`end` is `duration` or `until`; `until_held` is None without a stop condition; `truth` maps
-    `<instance>.outputs.<field>` to its last value.
+    """`from_tick` is that of the restored checkpoint, else 0; `ticks` were completed in the end. `end` is `duration` or `until`; `until_held` is None without a stop condition; `truth` maps
+    `<instance>.outputs.<field>` to its last value. `companions` are the controllers beside the first one: `state`, `ticks`, `bag`.
     """
 
     config: str
     seed: int
     end: str
     until_held: bool | None
+    from_tick: int
     ticks: int
     time_s: float
     wall_s: float
     real_time_factor: float
     state: str | None
     transitions: list[StateChange]
+    companions: dict[str, dict[str, Any]]
     truth: dict[str, Scalar | list[Scalar]]
     bag: str | None
     telemetry: dict[str, int] | None
@@ -118,14 +123,19 @@ def run(
     observers: str | None = None,
     ros: str | None = None,
     watcher: Watcher | None = None,
+    restore: Path | None = None,
+    save: Path | None = None,
 ) -> Summary:
     """Runs to the end. bag: records controller and truth into this new directory. external: the controller is another
     process (`wire:SPEC` or `zenoh:tcp/HOST:PORT`), which records itself and answers within `timeout_ms`; with
     `,free-running` behind the address nobody waits, and a speed is needed. name_space: of the bag's topics, and of the
     keys on the bus. speed: limit on simulated seconds per second; 0: as fast as possible. observers: the machine's channels
-    are put on a bus that listens at this `tcp/HOST:PORT`. ros: likewise its ROS 2 topics, for a bridge. Raises SimError; the
-    bag then has the ticks recorded until then, and is removed if there are none.
+    are put on a bus that listens at this `tcp/HOST:PORT`. ros: likewise its ROS 2 topics, for a bridge. restore: a
+    checkpoint file of this simulation, from which it goes on. save: the checkpoint file to write at the end. Raises SimError;
+    the bag then has the ticks recorded until then, and is removed if there are none.
     """
+    if external is not None and (restore or save):
+        raise SimError("with an external controller a checkpoint would lack the machine; fly with the machine of the file")
     if bag is not None and external is not None:
         raise SimError("with an external controller the controller records: give `--record` to it")
     if bag is not None and bag.exists():
@@ -145,6 +155,9 @@ def run(
         if ros is not None:
             sim.ros(ros, name_space)
         address = sim.serve(server.address, server.token, server.paused, server.checkpoints) if server else None
+        if restore is not None:
+            _restore(sim, restore)
+        begun = sim.tick
         # An error above leaves no files and has not contacted other processes.
         if external is not None:
             watcher.listening()
@@ -162,13 +175,29 @@ def run(
             shown = sim.ros_stop() if ros is not None else None
             if bag is not None:
                 sim.record_stop()
+            if save is not None:
+                _save(sim, save)
         except SimError as error:
             if bag is None:
                 raise
             with suppress(SimError):  # a failed recording raises here, too
                 sim.close()
             raise SimError(f"{error}{_left(bag, sim.machine.name)}") from None
-        return _summary(sim, config, flight, bag, sent, observed, shown, sim.commands() if free else None)
+        return _summary(sim, config, flight, begun, bag, sent, observed, shown, sim.commands() if free else None)
+
+
+def _restore(sim: Simulation, path: Path) -> None:
+    try:
+        sim.restore_checkpoint(read_checkpoint(path))
+    except (SimError, TwinError) as error:
+        raise SimError(f"{path}: {error}") from None
+
+
+def _save(sim: Simulation, path: Path) -> None:
+    try:
+        write_checkpoint(path, sim.checkpoint())
+    except TwinError as error:
+        raise SimError(f"{path}: the checkpoint cannot be written: {error}") from None
 
 
 def _left(bag: Path, machine: str) -> str:
@@ -218,6 +247,7 @@ def _summary(
     sim: Simulation,
     config: SimConfig,
     flight: _Flight,
+    begun: int,
     bag: Path | None,
     sent: dict[str, int] | None,
     observed: dict[str, int] | None,
@@ -225,17 +255,23 @@ def _summary(
     commands: dict[str, int] | None,
 ) -> Summary:
     time_s = sim.machine.time_ns(sim.tick) / 1e9
+    flown_s = time_s - sim.machine.time_ns(begun) / 1e9
     return Summary(
         config=str(config.path),
         seed=config.seed,
         end=sim.status,
         until_held=sim.status == "until" if config.until else None,
+        from_tick=begun,
         ticks=sim.tick,
         time_s=time_s,
         wall_s=flight.wall_s,
-        real_time_factor=time_s / flight.wall_s if flight.wall_s > 0 else 0.0,
+        real_time_factor=flown_s / flight.wall_s if flight.wall_s > 0 else 0.0,
         state=flight.state,
         transitions=flight.changes,
+        companions={
+            name: {"state": state, "ticks": ticks, "bag": f"{bag}_{name}" if bag else None}
+            for name, (state, ticks) in sim.companions().items()
+        },
         truth={
             f"{name}.{f.path}": sim.get(f"{name}.{f.path}")
             for name in config.tables

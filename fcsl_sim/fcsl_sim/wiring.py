@@ -14,7 +14,7 @@ from fcsl_compiler.base.source import Span
 from fcsl_compiler.model.types import Array, Type, scalar_of
 from fcsl_compiler.parse.json_reader import ConfigReader
 from fcsl_compiler.parse.json_source import JsonNode
-from simclient.descriptor import Machine
+from simclient.descriptor import Field, Machine, why_read_only
 
 from . import dataflow, plan
 from .dataflow import AlgebraicLoop, Link
@@ -74,12 +74,15 @@ class Wiring:
 
 @dataclass(frozen=True)
 class _Port:
-    """One end of a connection: a field of an instance (a channel of the controller when `instance` is empty)."""
+    """One end of a connection: a field of an instance, or of a controller, where `instance` is empty. `channel`: whether this
+    is one of its channels, or any other field."""
 
     instance: str
     path: str
     type: Type
     unit: str
+    controller: str = ""
+    channel: bool = True
 
 
 @dataclass(frozen=True)
@@ -95,6 +98,8 @@ _FROM = _End("output", "actuator", "a connection comes `from` an output or an ac
 _TO = _End("input", "sensor", "a connection goes `to` an input or a sensor")
 _A_ROLE = {"input": "an input", "output": "an output", "parameter": "a parameter", "state": "a state"}
 _RECORDS = ("inputs", "outputs", "parameters", "state")
+#: What a field of a model may be.
+_MODEL_TYPES = ("bool", "i32", "i64", "u32", "u64", "f32", "f64")
 
 
 @dataclass(frozen=True)
@@ -118,7 +123,7 @@ def first(span: Span) -> Span:
 def check_wiring(
     reader: ConfigReader,
     instances: dict[str, Instance],
-    machine: Machine | None,
+    machines: Mapping[str, Machine],
     integrator: Integrator | None,
     keys: Mapping[str, JsonNode],
     ticks: int | None,
@@ -127,31 +132,42 @@ def check_wiring(
 
     ticks: length of the run; events after the last tick give a warning (None: unknown, no warning).
     """
-    checker = _Checker(reader, instances, machine)
+    checker = _Checker(reader, instances, machines)
     checker.read_rates(keys.get("rates"))
     checker.read_connections(keys)
     lines, order = checker.order(integrator)
     for name in order:
         lines += instances[name].sets + instances[name].tolerances
-    lines += [_edge_statement(edge) for edge in checker.edges]
+    lead = next(iter(machines), "")
+    lines += [_edge_statement(edge, lead) for edge in checker.edges]
     lines += checker.read_events(keys.get("events"), ticks)
     checker.warn_unfed(keys.get("connections") or keys.get("controller"))
     until, condition = checker.read_until(keys.get("until"))
     return Wiring([*lines, *until], order, read_truth(keys.get("ros"), reader, checker.output), condition)
 
 
-def _edge_statement(edge: _Edge) -> str:
+def _edge_statement(edge: _Edge, lead: str) -> str:
     source, target = edge.source, edge.target
     if not source.instance:
-        return plan.statement("actuator", source.path, target.instance, target.path)
+        if not source.channel:
+            return plan.statement("read", source.path, target.instance, target.path)
+        if source.controller == lead:
+            return plan.statement("actuator", source.path, target.instance, target.path)
+        return plan.statement("companion_actuator", source.controller, source.path, target.instance, target.path)
     if not target.instance:
-        return plan.statement("sensor", source.instance, source.path, target.path)
+        if not target.channel:
+            return plan.statement("write", source.instance, source.path, target.path)
+        if target.controller == lead:
+            return plan.statement("sensor", source.instance, source.path, target.path)
+        return plan.statement("companion_sensor", source.instance, source.path, target.controller, target.path)
     return plan.statement("link", source.instance, source.path, target.instance, target.path)
 
 
 class _Checker:
-    def __init__(self, reader: ConfigReader, instances: dict[str, Instance], machine: Machine | None):
-        self.reader, self.instances, self.machine = reader, instances, machine
+    def __init__(self, reader: ConfigReader, instances: dict[str, Instance], machines: Mapping[str, Machine]):
+        self.reader, self.instances, self.machines = reader, instances, machines
+        #: The first controller, whose ticks are those of the simulation.
+        self.machine = next(iter(machines.values()), None)
         self.sink = reader.sink
         self.edges: list[_Edge] = []
         #: What feeds (instance, input): a connection, or an event. None: a connection is broken, nothing is known.
@@ -213,7 +229,7 @@ class _Checker:
             if target is None or source is None:
                 broken = True
                 continue
-            where = (target.instance, target.path)
+            where = (target.instance or f"{target.controller}.", target.path)
             if where in fed:
                 fix = "an input has one source; remove one connection"
                 text = keys["to"].value
@@ -230,8 +246,8 @@ class _Checker:
         notes = [(source_node.span, f"the source is {with_unit(source.type, source.unit)}")]
         notes += [(target_node.span, f"the target is {with_unit(target.type, target.unit)}")]
         if not source.instance and not target.instance:
-            fix = "connect its instances in the machine's own file"
-            self.sink.error("E215", "the controller is connected to itself", target_node.span, help=fix)
+            fix = "connect instances of a machine in its own file; between controllers put a model, such as a link"
+            self.sink.error("E215", "a controller is connected to a controller", target_node.span, help=fix)
         elif source.type != target.type:
             message = f"{source.type} cannot be connected to {target.type}"
             self.sink.error("E217", message, target_node.span, notes=notes)
@@ -249,8 +265,8 @@ class _Checker:
             self.sink.error("E208", f"{end.rule}, written as a string", node.span, help=fix)
             return None
         head, _, name = node.value.partition(".")
-        if head == "controller":
-            return self._channel(node, name, end)
+        if head in self.machines or (head == "controller" and not self.machines):
+            return self._channel(node, head, name, end)
         found = self._model_port(node, head, name, end)
         return _Port(head, found.path, found.type, found.unit) if found else None
 
@@ -278,24 +294,41 @@ class _Checker:
             self.sink.error("E216", f"`{head}` has no {end.role} `{name}`", node.span, help=hint)
         return None
 
-    def _channel(self, node: JsonNode, name: str, end: _End) -> _Port | None:
-        if self.machine is None:
+    def _channel(self, node: JsonNode, controller: str, name: str, end: _End) -> _Port | None:
+        machine = self.machines.get(controller)
+        if machine is None:
             return None
-        channel = next((c for c in self.machine.channels if c.name == name), None)
+        channel = next((c for c in machine.channels if c.name == name), None)
         if channel and channel.direction == end.direction:
             type_ = type_of(channel.field.type, channel.field.shape)
-            return _Port("", name, type_, channel.field.unit)
+            return _Port("", name, type_, channel.field.unit, controller)
+        if name in machine.fields:
+            return self._machine_field(node, controller, machine.fields[name], end)
         if channel:
             self.sink.error("E215", f"{end.rule}, but `{name}` is the other kind of channel", node.span)
             return None
-        names = [c.name for c in self.machine.channels if c.direction == end.direction]
+        names = [c.name for c in machine.channels if c.direction == end.direction]
         hint = nearest(name, names) or (f"it has {', '.join(names)}" if names else "it has none")
-        message = f"machine `{self.machine.name}` has no {end.direction} channel `{name}`"
+        message = f"machine `{machine.name}` has no {end.direction} channel `{name}`"
         self.sink.error("E206", message, node.span, help=hint)
         return None
 
+    def _machine_field(self, node: JsonNode, controller: str, field: Field, end: _End) -> _Port | None:
+        """Any field of the first controller beside its channels: `controller.pilot.outputs.throttle`."""
+        if controller != next(iter(self.machines)):
+            why = "fields beside the channels are those of the first controller"
+            self.sink.error("E215", f"`{node.value}` is no channel of `{controller}`", node.span, why=why)
+            return None
+        if end is _TO and not field.writable:
+            self.sink.error("E215", f"`{node.value}`: {why_read_only(field)}", node.span)
+            return None
+        if field.type not in _MODEL_TYPES:
+            self.sink.error("E217", f"`{node.value}` is {field.type}, which models do not have", node.span)
+            return None
+        return _Port("", field.path, type_of(field.type, field.shape), field.unit, controller, False)
+
     def _no_instance(self, name: str, span: Span) -> None:
-        names = ["controller", *self.instances]
+        names = [*(self.machines or ["controller"]), *self.instances]
         hint = nearest(name, names) or f"the instances are {', '.join(self.instances)}"
         self.sink.error("E206", f"no instance `{name}`", span, help=hint)
 
@@ -324,8 +357,13 @@ class _Checker:
         fed = self._fed
         if fed is None or place is None:
             return
-        channels = self.machine.channels if self.machine else ()
-        unfed = [f"`{c.name}`" for c in channels if c.direction == "sensor" and ("", c.name) not in fed]
+        several = len(self.machines) > 1
+        unfed = [
+            f"`{name}.{c.name}`" if several else f"`{c.name}`"
+            for name, machine in self.machines.items()
+            for c in machine.channels
+            if c.direction == "sensor" and (f"{name}.", c.name) not in fed
+        ]
         if unfed:
             message = f"nothing feeds sensor channel {', '.join(unfed)}"
             self.sink.warning("W801", message, first(place.span), why="it never gets a sample")
@@ -354,7 +392,7 @@ class _Checker:
         self._check_methods(tables, groups, chosen)
         order = list(dict.fromkeys(call.instance for call in calls))
         order += [name for name in self.instances if name not in order]
-        tick_hz = self.machine.tick_hz if self.machine else 1
+        tick_hz = max((machine.tick_hz for machine in self.machines.values()), default=1)
         lines = [one.statement(tick_hz) for one in chosen if one]
         for name in order:
             if name in tables:

@@ -72,6 +72,22 @@ static int build_machine(fcsl_sim_t *sim, fcsl_error_t *error)
     return 0;
 }
 
+static int build_companions(fcsl_sim_t *sim, fcsl_error_t *error)
+{
+    const fcsl_plan_t *plan = &sim->plan;
+    sim->companions = calloc(plan->companion_count + 1u, sizeof *sim->companions);
+    if (!sim->companions || fcsl_delay_open(&sim->delay, plan->delay_ticks, sim->message_capacity)) {
+        return fcsl_sim_fail(error, "no memory for the controllers");
+    }
+    sim->companion_count = plan->companion_count;
+    for (uint32_t i = 0; i < plan->companion_count; i++) {
+        if (fcsl_companion_open(&sim->companions[i], &plan->companions[i], error)) {
+            return -1;
+        }
+    }
+    return 0;
+}
+
 static int build_models(fcsl_sim_t *sim, fcsl_error_t *error)
 {
     const fcsl_plan_t *plan = &sim->plan;
@@ -264,14 +280,27 @@ static int check_pair(const fcsl_plan_link_t *link, const fcsl_field_t *from, co
                          link->from_field, link->to_field);
 }
 
-static int find_channel(const fcsl_sim_t *sim, uint32_t line, const char *name, fcsl_direction_t direction,
+/* The companion of a connection; null: the first controller. Returns 0, or -1. */
+static int find_companion(const fcsl_sim_t *sim, const fcsl_plan_link_t *link, fcsl_companion_t **companion,
+                          fcsl_error_t *error)
+{
+    *companion = NULL;
+    for (uint32_t i = 0; link->companion && i < sim->companion_count; i++) {
+        if (strcmp(sim->companions[i].name, link->companion) == 0) {
+            *companion = &sim->companions[i];
+        }
+    }
+    return link->companion && !*companion ? bad(error, link->line, "no controller", link->companion) : 0;
+}
+
+static int find_channel(const fcsl_machine_t *machine, uint32_t line, const char *name, fcsl_direction_t direction,
                         uint32_t *channel, fcsl_error_t *error)
 {
-    for (uint32_t i = 0; i < sim->machine->channel_count; i++) {
-        if (strcmp(sim->machine->channels[i].name, name) != 0) {
+    for (uint32_t i = 0; i < machine->channel_count; i++) {
+        if (strcmp(machine->channels[i].name, name) != 0) {
             continue;
         }
-        if (sim->machine->channels[i].direction != direction) {
+        if (machine->channels[i].direction != direction) {
             return bad(error, line, "wrong direction of channel", name);
         }
         *channel = i;
@@ -280,7 +309,44 @@ static int find_channel(const fcsl_sim_t *sim, uint32_t line, const char *name, 
     return bad(error, line, "the machine has no channel", name);
 }
 
-static int add_copy(fcsl_sim_t *sim, const fcsl_plan_link_t *link, fcsl_error_t *error)
+static const fcsl_field_t *find_machine_field(const fcsl_sim_t *sim, uint32_t line, const char *path,
+                                              fcsl_error_t *error)
+{
+    for (uint32_t i = 0; i < sim->machine->field_count; i++) {
+        if (strcmp(sim->machine->fields[i].path, path) == 0) {
+            return &sim->machine->fields[i];
+        }
+    }
+    (void)bad(error, line, "the machine has no field", path);
+    return NULL;
+}
+
+/* What a controller gives: an actuator channel, or any field of the first one. */
+static const fcsl_field_t *find_source(fcsl_sim_t *sim, const fcsl_plan_link_t *link, int is_field, fcsl_copy_t *copy,
+                                       fcsl_error_t *error)
+{
+    fcsl_companion_t *companion = NULL;
+    uint32_t channel = 0;
+    copy->source = UINT32_MAX;
+    if (is_field) {
+        const fcsl_field_t *field = find_machine_field(sim, link->line, link->from_field, error);
+        copy->from = field ? (const uint8_t *)fcsl_run_data(sim->run) + field->offset : NULL;
+        sim->reads_fields = 1;
+        return field;
+    }
+    if (find_companion(sim, link, &companion, error)) {
+        return NULL;
+    }
+    const fcsl_machine_t *machine = companion ? companion->machine : sim->machine;
+    if (find_channel(machine, link->line, link->from_field, FCSL_ACTUATOR, &channel, error)) {
+        return NULL;
+    }
+    const fcsl_field_t *field = &machine->fields[machine->channels[channel].field];
+    copy->from = (companion ? companion->image : sim->image) + field->offset;
+    return field;
+}
+
+static int add_copy(fcsl_sim_t *sim, const fcsl_plan_link_t *link, int is_field, fcsl_error_t *error)
 {
     fcsl_copy_t *copy = &sim->copies[sim->copy_count];
     const fcsl_field_t *to = find_field(sim, link->line, link->to_instance, link->to_field, &copy->instance, error);
@@ -307,13 +373,10 @@ static int add_copy(fcsl_sim_t *sim, const fcsl_plan_link_t *link, fcsl_error_t 
         copy->source = source;
         copy->from = sim->instances[source].data + from->offset;
     } else {
-        uint32_t channel = 0;
-        if (find_channel(sim, link->line, link->from_field, FCSL_ACTUATOR, &channel, error)) {
+        from = find_source(sim, link, is_field, copy, error);
+        if (!from) {
             return -1;
         }
-        from = &sim->machine->fields[sim->machine->channels[channel].field];
-        copy->source = UINT32_MAX;
-        copy->from = sim->image + from->offset;
     }
     if (check_pair(link, from, to, error)) {
         return -1;
@@ -345,17 +408,22 @@ static int by_instance(const void *left, const void *right)
 static int build_copies(fcsl_sim_t *sim, fcsl_error_t *error)
 {
     const fcsl_plan_t *plan = &sim->plan;
-    sim->copies = calloc(plan->link_count + plan->actuator_count + 1u, sizeof *sim->copies);
+    sim->copies = calloc(plan->link_count + plan->actuator_count + plan->read_count + 1u, sizeof *sim->copies);
     if (!sim->copies) {
         return fcsl_sim_fail(error, "no memory for the connections");
     }
     for (uint32_t i = 0; i < plan->link_count; i++) {
-        if (add_copy(sim, &plan->links[i], error)) {
+        if (add_copy(sim, &plan->links[i], 0, error)) {
             return -1;
         }
     }
     for (uint32_t i = 0; i < plan->actuator_count; i++) {
-        if (add_copy(sim, &plan->actuators[i], error)) {
+        if (add_copy(sim, &plan->actuators[i], 0, error)) {
+            return -1;
+        }
+    }
+    for (uint32_t i = 0; i < plan->read_count; i++) {
+        if (add_copy(sim, &plan->reads[i], 1, error)) {
             return -1;
         }
     }
@@ -370,38 +438,83 @@ static int build_copies(fcsl_sim_t *sim, fcsl_error_t *error)
     return 0;
 }
 
+/* Adds a sensor of the first controller, or of a companion. */
+static int add_sensor(fcsl_sim_t *sim, const fcsl_plan_link_t *link, fcsl_error_t *error)
+{
+    fcsl_companion_t *companion = NULL;
+    if (find_companion(sim, link, &companion, error)) {
+        return -1;
+    }
+    const fcsl_machine_t *machine = companion ? companion->machine : sim->machine;
+    fcsl_sensor_t *sensors = companion ? companion->sensors : sim->sensors;
+    uint32_t *count = companion ? &companion->sensor_count : &sim->sensor_count;
+    fcsl_sensor_t *sensor = &sensors[*count];
+    const fcsl_field_t *from =
+        find_field(sim, link->line, link->from_instance, link->from_field, &sensor->instance, error);
+    if (!from || find_channel(machine, link->line, link->to_field, FCSL_SENSOR, &sensor->channel, error)) {
+        return -1;
+    }
+    if (from->role != FCSL_ROLE_OUTPUT) {
+        return bad(error, link->line, "not an output:", link->from_field);
+    }
+    const fcsl_field_t *to = &machine->fields[machine->channels[sensor->channel].field];
+    if (check_pair(link, from, to, error)) {
+        return -1;
+    }
+    for (uint32_t j = 0; j < *count; j++) {
+        if (sensors[j].channel == sensor->channel) {
+            return bad(error, link->line, "two sources for channel", link->to_field);
+        }
+    }
+    sensor->from = sim->instances[sensor->instance].data + from->offset;
+    sensor->to = (companion ? companion->image : sim->image) + to->offset;
+    sensor->size = to->size;
+    (*count)++;
+    return 0;
+}
+
 static int build_sensors(fcsl_sim_t *sim, fcsl_error_t *error)
 {
     const fcsl_plan_t *plan = &sim->plan;
     sim->sensors = calloc(plan->sensor_count + 1u, sizeof *sim->sensors);
-    if (!sim->sensors) {
+    int is_memory = sim->sensors != NULL;
+    for (uint32_t i = 0; i < sim->companion_count; i++) {
+        sim->companions[i].sensors = calloc(plan->sensor_count + 1u, sizeof *sim->sensors);
+        is_memory = is_memory && sim->companions[i].sensors != NULL;
+    }
+    if (!is_memory) {
         return fcsl_sim_fail(error, "no memory for the sensors");
     }
     for (uint32_t i = 0; i < plan->sensor_count; i++) {
-        const fcsl_plan_link_t *link = &plan->sensors[i];
-        fcsl_sensor_t *sensor = &sim->sensors[i];
-        const fcsl_field_t *from =
-            find_field(sim, link->line, link->from_instance, link->from_field, &sensor->instance, error);
-        if (!from || find_channel(sim, link->line, link->to_field, FCSL_SENSOR, &sensor->channel, error)) {
+        if (add_sensor(sim, &plan->sensors[i], error)) {
             return -1;
         }
-        if (from->role != FCSL_ROLE_OUTPUT) {
-            return bad(error, link->line, "not an output:", link->from_field);
-        }
-        const fcsl_field_t *to = &sim->machine->fields[sim->machine->channels[sensor->channel].field];
-        if (check_pair(link, from, to, error)) {
-            return -1;
-        }
-        for (uint32_t j = 0; j < i; j++) {
-            if (sim->sensors[j].channel == sensor->channel) {
-                return bad(error, link->line, "two sources for channel", link->to_field);
-            }
-        }
-        sensor->from = sim->instances[sensor->instance].data + from->offset;
-        sensor->to = sim->image + to->offset;
-        sensor->size = to->size;
     }
-    sim->sensor_count = plan->sensor_count;
+    return 0;
+}
+
+/* Outputs of models to fields of the hosted machine. */
+static int build_field_writes(fcsl_sim_t *sim, fcsl_error_t *error)
+{
+    const fcsl_plan_t *plan = &sim->plan;
+    sim->writes = calloc(plan->write_count + 1u, sizeof *sim->writes);
+    if (!sim->writes) {
+        return fcsl_sim_fail(error, "no memory for the connections");
+    }
+    for (uint32_t i = 0; i < plan->write_count; i++) {
+        const fcsl_plan_link_t *link = &plan->writes[i];
+        uint32_t source = 0;
+        const fcsl_field_t *from = find_field(sim, link->line, link->from_instance, link->from_field, &source, error);
+        const fcsl_field_t *to = from ? find_machine_field(sim, link->line, link->to_field, error) : NULL;
+        if (!to || check_pair(link, from, to, error)) {
+            return -1;
+        }
+        if (from->role != FCSL_ROLE_OUTPUT || (to->flags & FCSL_FIELD_WRITABLE) == 0) {
+            return bad(error, link->line, "not from an output to a field that a host may write:", link->to_field);
+        }
+        sim->writes[sim->write_count++] = (fcsl_field_link_t){
+            (uint32_t)(to - sim->machine->fields), sim->instances[source].data + from->offset, from->size};
+    }
     return 0;
 }
 
@@ -428,11 +541,11 @@ static int build_link(fcsl_sim_t *sim, fcsl_error_t *error)
 
 int fcsl_assembly_build(fcsl_sim_t *sim, fcsl_error_t *error)
 {
-    if (build_machine(sim, error) || build_models(sim, error) || build_instances(sim, error)) {
+    if (build_machine(sim, error) || build_companions(sim, error) || build_models(sim, error) || build_instances(sim, error)) {
         return -1;
     }
     if (build_writes(sim, error) || build_copies(sim, error) || build_sensors(sim, error) ||
-        fcsl_sim_build_groups(sim, error)) {
+        build_field_writes(sim, error) || fcsl_sim_build_groups(sim, error)) {
         return -1;
     }
     return fcsl_actuators_build(sim, error) || build_link(sim, error) || fcsl_truth_build(sim, error) ? -1 : 0;
@@ -461,6 +574,9 @@ void fcsl_assembly_free(fcsl_sim_t *sim)
     free(sim->events);
     free(sim->event_order);
     free(sim->calls);
+    free(sim->writes);
+    fcsl_delay_free(&sim->delay);
+    free(sim->companions);
     free(sim->group_scratch);
     free(sim->before);
     free(sim->image);

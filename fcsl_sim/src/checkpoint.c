@@ -61,7 +61,6 @@ static uint64_t layout_of(const fcsl_sim_t *sim)
     uint64_t hash = UINT64_C(0xcbf29ce484222325);
     mix_number(&hash, sizeof(fcsl_group_state_t));
     mix_number(&hash, sizeof(fcsl_noise_t));
-    mix_number(&hash, sim->plan.event_count);
     for (uint32_t i = 0; i < sim->instance_count; i++) {
         const fcsl_instance_state_t *instance = &sim->instances[i];
         mix_text(&hash, instance->name);
@@ -69,6 +68,12 @@ static uint64_t layout_of(const fcsl_sim_t *sim)
         mix_number(&hash, instance->group);
         mix_number(&hash, instance->hz);
         mix_number(&hash, instance->every);
+    }
+    mix_number(&hash, sim->delay.ticks);
+    for (uint32_t i = 0; i < sim->companion_count; i++) {
+        mix_text(&hash, sim->companions[i].name);
+        mix_text(&hash, sim->companions[i].machine->layout_hash);
+        mix_number(&hash, sim->companions[i].delay.ticks);
     }
     for (uint32_t i = 0; i < sim->group_count; i++) {
         mix_number(&hash, sim->groups[i].plan->method);
@@ -123,27 +128,99 @@ static int check_head(const fcsl_sim_t *sim, const uint8_t *in, size_t size, fcs
         return fcsl_sim_fail(error, "of another simulation: its models, their fields, rates or integrators differ");
     }
     const uint64_t plant = fcsl_plant_state_bytes(sim);
-    if (fcsl_get_u64(in + AT_PLANT) != plant || fcsl_get_u64(in + AT_MACHINE) != size - HEAD_BYTES - plant - CRC_BYTES) {
+    if (fcsl_get_u64(in + AT_PLANT) != plant ||
+        fcsl_get_u64(in + AT_MACHINE) != size - HEAD_BYTES - plant - CRC_BYTES) {
         return fcsl_sim_fail(error, "damaged: the sizes of its parts are wrong");
     }
     return 0;
 }
 
-/* Whether the restored plant is at one instant of this simulation. Its vectors and structs may hold any number. */
+/* Whether the next update of an instance is the first one behind the present: PHASE + i * EVERY of its grid. */
+static int is_update_possible(const fcsl_sim_t *sim, uint32_t index, int64_t now_ns)
+{
+    const fcsl_instance_state_t *instance = &sim->instances[index];
+    const uint64_t phase = sim->plan.instances[index].phase;
+    const uint64_t next = instance->next_update;
+    if (instance->hz == 0 || sim->tick == 0 || next == phase) {
+        return next == phase && (instance->hz == 0 || sim->tick == 0 || fcsl_grid_time_ns(next, instance->hz) > now_ns);
+    }
+    if (next < phase || (next - phase) % instance->every != 0 ||
+        next / instance->hz >= (uint64_t)INT64_MAX / FCSL_NS_PER_S) {
+        return 0;
+    }
+    return fcsl_grid_time_ns(next, instance->hz) > now_ns &&
+           fcsl_grid_time_ns(next - instance->every, instance->hz) <= now_ns;
+}
+
+static int is_group_possible(const fcsl_group_t *group, int64_t now_ns)
+{
+    const fcsl_group_state_t *state = &group->state;
+    const uint64_t hz = group->plan->hz;
+    const int events =
+        state->last_event_ns >= 0 && state->last_event_ns <= now_ns && state->events_in_a_row < FCSL_CHATTER_EVENTS;
+    if (state->time_ns != now_ns || state->from_ns > state->to_ns || state->to_ns > now_ns || state->event_ns != 0 ||
+        !events || state->has_slope > 1 || state->kept >= FCSL_SLOPES || state->disturbed > 1) {
+        return 0;
+    }
+    return hz == 0 || (state->begin_ns <= now_ns && state->end_ns > now_ns && state->step <= (uint64_t)now_ns &&
+                       state->begin_ns == fcsl_grid_time_ns(state->step, hz) &&
+                       state->end_ns == fcsl_grid_time_ns(state->step + 1u, hz) &&
+                       state->carry == (state->step + 1u) % hz * FCSL_NS_PER_S % hz);
+}
+
+/* No bool of these fields holds another value than 0 and 1, which C has no meaning for. */
+static int are_bools(const fcsl_field_t *fields, uint32_t count, const uint8_t *data)
+{
+    for (uint32_t i = 0; i < count; i++) {
+        for (uint32_t k = 0; fields[i].type == FCSL_BOOL && k < fields[i].count; k++) {
+            if (data[fields[i].offset + k] > 1u) {
+                return 0;
+            }
+        }
+    }
+    return 1;
+}
+
+static int are_channels_possible(const fcsl_machine_t *machine, const uint8_t *image, const fcsl_gate_t *gate)
+{
+    for (uint32_t i = 0; i < machine->channel_count; i++) {
+        if (!are_bools(&machine->fields[machine->channels[i].field], 1, image)) {
+            return 0;
+        }
+    }
+    return (unsigned)gate->state <= FCSL_GATE_SILENT;
+}
+
+static int is_companion_possible(const fcsl_companion_t *companion, const fcsl_sim_t *sim)
+{
+    const uint64_t hz = companion->machine->tick_hz;
+    const uint64_t tick = companion->tick;
+    if (tick != fcsl_run_tick(companion->run) || tick / hz >= (uint64_t)INT64_MAX / FCSL_NS_PER_S ||
+        !are_channels_possible(companion->machine, companion->image, &companion->gate)) {
+        return 0;
+    }
+    if (sim->tick == 0 || tick == 0) {
+        return sim->tick == 0 && tick == 0;
+    }
+    return companion->next_tick_ns > sim->time_ns && fcsl_grid_time_ns(tick - 1u, hz) <= sim->time_ns;
+}
+
+/* Whether the restored plant is at one instant of this simulation. Its vectors and numbers may be any. */
 static int is_possible(const fcsl_sim_t *sim, uint64_t machine_tick)
 {
-    int possible = sim->tick == machine_tick && sim->tick <= sim->plan.ticks && sim->next_event <= sim->plan.event_count;
+    int possible = sim->tick == machine_tick && are_channels_possible(sim->machine, sim->image, &sim->gate);
     const int64_t now_ns = sim->tick > 0 ? fcsl_grid_time_ns(sim->tick - 1u, sim->machine->tick_hz) : 0;
-    possible = possible && sim->time_ns == now_ns && (unsigned)sim->gate.state <= FCSL_GATE_SILENT;
+    possible = possible && sim->time_ns == now_ns;
     for (uint32_t i = 0; possible && i < sim->instance_count; i++) {
-        const fcsl_instance_state_t *instance = &sim->instances[i];
-        possible = instance->hz == 0 || (instance->next_update_ns > now_ns || sim->tick == 0);
+        const fcsl_model_t *model = sim->instances[i].model;
+        possible =
+            is_update_possible(sim, i, now_ns) && are_bools(model->fields, model->field_count, sim->instances[i].data);
+    }
+    for (uint32_t i = 0; possible && i < sim->companion_count; i++) {
+        possible = is_companion_possible(&sim->companions[i], sim);
     }
     for (uint32_t i = 0; possible && i < sim->group_count; i++) {
-        const fcsl_group_state_t *state = &sim->groups[i].state;
-        possible = state->time_ns == now_ns && state->from_ns <= state->to_ns && state->to_ns <= now_ns &&
-                   state->event_ns == 0 &&
-                   (sim->groups[i].plan->hz == 0 || (state->begin_ns <= now_ns && state->end_ns > now_ns));
+        possible = is_group_possible(&sim->groups[i], now_ns);
     }
     return possible;
 }
@@ -153,7 +230,8 @@ int fcsl_sim_restore_checkpoint(fcsl_sim_t *sim, const void *bytes, size_t size,
     const uint8_t *in = bytes;
     uint64_t tick = 0;
     if (sim->sensed || sim->recording || sim->external) {
-        return fcsl_sim_fail(error, "a simulation is restored between two ticks, before it records, with its own machine");
+        return fcsl_sim_fail(error,
+                             "a simulation is restored between two ticks, before it records, with its own machine");
     }
     if (sim->link) {
         return fcsl_sim_fail(error, "a serial link cannot be restored from a checkpoint");
@@ -162,15 +240,22 @@ int fcsl_sim_restore_checkpoint(fcsl_sim_t *sim, const void *bytes, size_t size,
         fcsl_run_checkpoint_tick(sim->run, in + HEAD_BYTES, (size_t)fcsl_get_u64(in + AT_MACHINE), 0, &tick, error)) {
         return -1;
     }
+    if (tick > sim->plan.ticks) {
+        return fcsl_sim_fail(
+            error, "of tick %" PRIu64 ", and this simulation ends at tick %" PRIu64 ": it needs a longer duration",
+            tick, sim->plan.ticks);
+    }
     const size_t machine = (size_t)fcsl_get_u64(in + AT_MACHINE);
     fcsl_plant_state_save(sim, sim->before);
-    fcsl_plant_state_restore(sim, in + HEAD_BYTES + machine);
-    const int possible = is_possible(sim, tick);
+    const int taken = fcsl_plant_state_restore(sim, in + HEAD_BYTES + machine) == 0;
+    const int possible = taken && is_possible(sim, tick);
     if (!possible || fcsl_run_restore_checkpoint(sim->run, in + HEAD_BYTES, machine, 0, error)) {
-        fcsl_plant_state_restore(sim, sim->before);
+        (void)fcsl_plant_state_restore(sim, sim->before);
         return possible ? -1 : fcsl_sim_fail(error, "damaged: its plant is at no instant of this simulation");
     }
-    sim->status = sim->tick < sim->plan.ticks ? FCSL_SIM_RUNNING : FCSL_SIM_DURATION;
+    sim->failed = 0;
+    const int is_until = sim->plan.until != FCSL_UNTIL_NONE && sim->until_held >= sim->plan.until_ticks;
+    sim->status = is_until ? FCSL_SIM_UNTIL : sim->tick < sim->plan.ticks ? FCSL_SIM_RUNNING : FCSL_SIM_DURATION;
     fcsl_sim_publish(sim);
     return 0;
 }

@@ -9,8 +9,7 @@
 
 /* ---- calls ----------------------------------------------------------------------------------------------------------- */
 
-static int check_call(const fcsl_sim_t *sim, const fcsl_plan_call_t *from, const fcsl_call_t *call,
-                      fcsl_error_t *error)
+static int check_call(const fcsl_sim_t *sim, const fcsl_plan_call_t *from, const fcsl_call_t *call, fcsl_error_t *error)
 {
     const fcsl_model_t *model = sim->instances[call->instance].model;
     const int is_there = call->kind == FCSL_CALL_UPDATE ? model->update != NULL : model->output != NULL;
@@ -19,6 +18,26 @@ static int check_call(const fcsl_sim_t *sim, const fcsl_plan_call_t *from, const
     }
     if (call->kind == FCSL_CALL_STAGE && sim->instances[call->instance].group == FCSL_PLAN_NO_GROUP) {
         return fcsl_sim_fail(error, "plan line %u: `%s` is in no group", from->line, from->instance);
+    }
+    return 0;
+}
+
+/* Whether every `output` is called, and every `update` once. */
+static int check_complete(const fcsl_sim_t *sim, fcsl_error_t *error)
+{
+    for (uint32_t i = 0; i < sim->instance_count; i++) {
+        const fcsl_model_t *model = sim->instances[i].model;
+        uint32_t outputs = 0;
+        uint32_t updates = 0;
+        for (uint32_t k = 0; k < sim->call_count; k++) {
+            const int is_here = sim->calls[k].instance == i;
+            outputs += is_here && sim->calls[k].kind != FCSL_CALL_UPDATE;
+            updates += is_here && sim->calls[k].kind == FCSL_CALL_UPDATE;
+        }
+        if ((model->output != NULL && outputs == 0) || (model->update != NULL && updates != 1u)) {
+            return fcsl_sim_fail(error, "plan line %u: `%s` is not called as its model needs it",
+                                 sim->plan.instances[i].line, sim->instances[i].name);
+        }
     }
     return 0;
 }
@@ -38,7 +57,7 @@ static int build_calls(fcsl_sim_t *sim, fcsl_error_t *error)
             return -1;
         }
     }
-    return 0;
+    return check_complete(sim, error);
 }
 
 /* ---- lists of a group ------------------------------------------------------------------------------------------------- */
@@ -127,7 +146,8 @@ static int build_group(fcsl_sim_t *sim, uint32_t number, fcsl_error_t *error)
     group->stages = calloc(sim->call_count + 1u, sizeof *group->stages);
     group->outputs = calloc(sim->call_count + 1u, sizeof *group->outputs);
     group->outer = calloc(sim->copy_count + 1u, sizeof *group->outer);
-    if (!group->derived || !group->blocks || !group->eventful || !group->timed || !group->stages || !group->outputs || !group->outer) {
+    if (!group->derived || !group->blocks || !group->eventful || !group->timed || !group->stages || !group->outputs ||
+        !group->outer) {
         return fcsl_sim_fail(error, "no memory for a group of models");
     }
     add_calls(sim, group, number);

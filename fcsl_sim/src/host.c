@@ -17,10 +17,25 @@ static int record_truth(fcsl_sim_t *sim, const fcsl_instance_state_t *instance, 
                                  error);
 }
 
+/* Outputs of models into fields of the machine, where they have another value. */
+static int write_fields(fcsl_sim_t *sim, fcsl_error_t *error)
+{
+    const uint8_t *data = fcsl_run_data(sim->run);
+    for (uint32_t i = 0; i < sim->write_count; i++) {
+        const fcsl_field_link_t *link = &sim->writes[i];
+        const fcsl_field_t *field = &sim->machine->fields[link->field];
+        if (memcmp(data + field->offset, link->data, link->size) != 0 &&
+            fcsl_run_set(sim->run, link->field, 0, link->data, link->size, error)) {
+            return -1;
+        }
+    }
+    return 0;
+}
+
 /* Exchanges the sensor message for the actuator message, which overwrites it; 0, or -1. */
 static int ask_machine(fcsl_sim_t *sim, fcsl_message_t *message, fcsl_error_t *error)
 {
-    if (fcsl_run_sense_message(sim->run, message, error)) {
+    if (fcsl_run_sense_message(sim->run, message, error) || write_fields(sim, error)) {
         return -1;
     }
     for (uint32_t i = 0; sim->recording && i < sim->instance_count; i++) {
@@ -154,10 +169,23 @@ static int add_truth_topic(fcsl_sim_t *sim, fcsl_instance_state_t *instance, con
     return instance->truth_topic < 0 ? -1 : 0;
 }
 
+/* A companion has a bag of its own beside that of the first controller: BAG_NAME. */
+static int record_companion(const fcsl_companion_t *companion, const char *bag, const char *name_space,
+                            fcsl_error_t *error)
+{
+    char path[4096];
+    const int bytes = snprintf(path, sizeof path, "%s_%s", bag, companion->name);
+    if (bytes < 0 || (size_t)bytes >= sizeof path) {
+        return fcsl_sim_fail(error, "the name of a bag is too long: %s_%s", bag, companion->name);
+    }
+    const fcsl_record_options_t options = {.bag = path, .name_space = name_space, .lossless = 1};
+    return fcsl_run_record(companion->run, &options, error);
+}
+
 int fcsl_sim_record(fcsl_sim_t *sim, const char *bag, const char *name_space, fcsl_error_t *error)
 {
-    if (sim->tick || sim->sensed || sim->external) {
-        return fcsl_sim_fail(error, "recording must begin before the first tick, with the controller in this process");
+    if (sim->sensed || sim->external) {
+        return fcsl_sim_fail(error, "recording must begin between two ticks, with the controller in this process");
     }
     const fcsl_record_options_t options = {.bag = bag, .name_space = name_space, .lossless = 1};
     if (fcsl_run_record(sim->run, &options, error)) {
@@ -175,13 +203,23 @@ int fcsl_sim_record(fcsl_sim_t *sim, const char *bag, const char *name_space, fc
         return -1;
     }
     sim->recording = 1;
+    for (uint32_t i = 0; i < sim->companion_count; i++) {
+        if (record_companion(&sim->companions[i], bag, name_space, error)) {
+            (void)fcsl_sim_record_stop(sim, NULL);
+            return -1;
+        }
+    }
     return 0;
 }
 
 int fcsl_sim_record_stop(fcsl_sim_t *sim, fcsl_error_t *error)
 {
+    int status = 0;
     sim->recording = 0;
-    return fcsl_run_record_stop(sim->run, error);
+    for (uint32_t i = 0; i < sim->companion_count; i++) {
+        status = fcsl_run_record_stop(sim->companions[i].run, error) != 0 ? -1 : status;
+    }
+    return fcsl_run_record_stop(sim->run, error) != 0 ? -1 : status;
 }
 
 /* ---- external controller -------------------------------------------------------------------------------------------- */
@@ -193,6 +231,9 @@ int fcsl_sim_listen(fcsl_sim_t *sim, const char *peer, const char *name_space, u
     char text[sizeof error->text] = "";
     if (sim->external || sim->tick || sim->sensed || sim->recording) {
         return fcsl_sim_fail(error, "a controller must connect before the first tick, once, and records itself");
+    }
+    if (sim->reads_fields || sim->write_count > 0) {
+        return fcsl_sim_fail(error, "fields of the machine are connected: only channels reach a controller in another process");
     }
     const int failed = strncmp(peer, WIRE, prefix) == 0
                            ? fcsl_external_open(peer + prefix, sim->machine, &sim->external, text, sizeof text)
@@ -246,9 +287,12 @@ int fcsl_sim_close(fcsl_sim_t *sim, fcsl_error_t *error)
     fcsl_external_close(sim->external);
     fcsl_sim_topics_free(sim);
     fcsl_event_queue_free(&sim->queue);
+    for (uint32_t i = 0; sim->companions && i < sim->companion_count; i++) {
+        status = fcsl_companion_close(&sim->companions[i], error) != 0 ? -1 : status;
+    }
     fcsl_assembly_free(sim);
     if (sim->run) {
-        status = fcsl_run_close(sim->run, error);
+        status = fcsl_run_close(sim->run, error) != 0 ? -1 : status;
     }
     fcsl_plan_free(&sim->plan);
     free(sim);

@@ -8,6 +8,7 @@
 #include <stdlib.h>
 #include <string.h>
 
+#include "delay.h"
 #include "fail.h"
 #include "fcsl/fcsl_plan_text.h"
 
@@ -207,7 +208,7 @@ static int on_link(parser_t *parser)
 {
     char *const *word = parser->word;
     parser->plan->links[parser->plan->link_count++] =
-        (fcsl_plan_link_t){parser->line, word[1], word[2], word[3], word[4]};
+        (fcsl_plan_link_t){parser->line, NULL, word[1], word[2], word[3], word[4]};
     if (!fcsl_plan_is_name(word[1]) || !fcsl_plan_is_path(word[2]) || !fcsl_plan_is_name(word[3]) ||
         !fcsl_plan_is_path(word[4])) {
         return bad(parser, "not a name or field");
@@ -219,7 +220,7 @@ static int on_sensor(parser_t *parser)
 {
     char *const *word = parser->word;
     parser->plan->sensors[parser->plan->sensor_count++] =
-        (fcsl_plan_link_t){parser->line, word[1], word[2], NULL, word[3]};
+        (fcsl_plan_link_t){parser->line, NULL, word[1], word[2], NULL, word[3]};
     if (!fcsl_plan_is_name(word[1]) || !fcsl_plan_is_path(word[2]) || !fcsl_plan_is_path(word[3])) {
         return bad(parser, "not a name, field or channel");
     }
@@ -230,11 +231,82 @@ static int on_actuator(parser_t *parser)
 {
     char *const *word = parser->word;
     parser->plan->actuators[parser->plan->actuator_count++] =
-        (fcsl_plan_link_t){parser->line, NULL, word[1], word[2], word[3]};
+        (fcsl_plan_link_t){parser->line, NULL, NULL, word[1], word[2], word[3]};
     if (!fcsl_plan_is_path(word[1]) || !fcsl_plan_is_name(word[2]) || !fcsl_plan_is_path(word[3])) {
         return bad(parser, "not a name, field or channel");
     }
     return 0;
+}
+
+static int take_delay(const parser_t *parser, const char *word, uint32_t *ticks)
+{
+    uint64_t value = 0;
+    if (fcsl_plan_number(word, FCSL_DELAY_TICKS_MAX, &value)) {
+        return bad(parser, "the delay is not in 0..1000 ticks");
+    }
+    *ticks = (uint32_t)value;
+    return 0;
+}
+
+static int on_delay(parser_t *parser)
+{
+    parser->plan->delay_line = parser->line;
+    return take_delay(parser, parser->word[1], &parser->plan->delay_ticks);
+}
+
+static int on_companion(parser_t *parser)
+{
+    char *const *word = parser->word;
+    fcsl_plan_companion_t *companion = &parser->plan->companions[parser->plan->companion_count++];
+    *companion = (fcsl_plan_companion_t){parser->line, word[1], word[3], word[4], 0};
+    if (!fcsl_plan_is_name(word[1]) || !fcsl_plan_is_name(word[3])) {
+        return bad(parser, "not a name");
+    }
+    return take_delay(parser, word[2], &companion->delay_ticks);
+}
+
+static int on_companion_sensor(parser_t *parser)
+{
+    char *const *word = parser->word;
+    parser->plan->sensors[parser->plan->sensor_count++] =
+        (fcsl_plan_link_t){parser->line, word[3], word[1], word[2], NULL, word[4]};
+    if (!fcsl_plan_is_name(word[1]) || !fcsl_plan_is_path(word[2]) || !fcsl_plan_is_name(word[3]) ||
+        !fcsl_plan_is_path(word[4])) {
+        return bad(parser, "not a name, field or channel");
+    }
+    return 0;
+}
+
+static int on_companion_actuator(parser_t *parser)
+{
+    char *const *word = parser->word;
+    parser->plan->actuators[parser->plan->actuator_count++] =
+        (fcsl_plan_link_t){parser->line, word[1], NULL, word[2], word[3], word[4]};
+    if (!fcsl_plan_is_name(word[1]) || !fcsl_plan_is_path(word[2]) || !fcsl_plan_is_name(word[3]) ||
+        !fcsl_plan_is_path(word[4])) {
+        return bad(parser, "not a name, field or channel");
+    }
+    return 0;
+}
+
+static int on_read(parser_t *parser)
+{
+    char *const *word = parser->word;
+    parser->plan->reads[parser->plan->read_count++] =
+        (fcsl_plan_link_t){parser->line, NULL, NULL, word[1], word[2], word[3]};
+    return fcsl_plan_is_path(word[1]) && fcsl_plan_is_name(word[2]) && fcsl_plan_is_path(word[3])
+               ? 0
+               : bad(parser, "not a name or field");
+}
+
+static int on_write(parser_t *parser)
+{
+    char *const *word = parser->word;
+    parser->plan->writes[parser->plan->write_count++] =
+        (fcsl_plan_link_t){parser->line, NULL, word[1], word[2], NULL, word[3]};
+    return fcsl_plan_is_name(word[1]) && fcsl_plan_is_path(word[2]) && fcsl_plan_is_path(word[3])
+               ? 0
+               : bad(parser, "not a name or field");
 }
 
 static int on_until(parser_t *parser)
@@ -290,6 +362,8 @@ enum {
     MACHINE,
     SEED,
     TICKS,
+    DELAY,
+    COMPANION,
     MODEL,
     GROUP,
     INSTANCE,
@@ -299,6 +373,10 @@ enum {
     LINK,
     SENSOR,
     ACTUATOR,
+    COMPANION_SENSOR,
+    COMPANION_ACTUATOR,
+    READ,
+    WRITE,
     EVENT,
     SERIAL_LINK,
     UNTIL,
@@ -310,6 +388,8 @@ static const statement_t statements[STATEMENTS] = {
     [MACHINE] = {"machine", 3, 1, on_machine, 1},
     [SEED] = {"seed", 2, 0, on_seed, 1},
     [TICKS] = {"ticks", 2, 0, on_ticks, 1},
+    [DELAY] = {"delay", 2, 0, on_delay, 1},
+    [COMPANION] = {"companion", 5, 1, on_companion, FCSL_PLAN_MAX_COMPANIONS},
     [MODEL] = {"model", 3, 1, on_model, FCSL_PLAN_MAX_MODELS},
     [GROUP] = {"group", 7, 0, on_group, FCSL_PLAN_MAX_GROUPS},
     [INSTANCE] = {"instance", 7, 0, on_instance, FCSL_PLAN_MAX_INSTANCES},
@@ -319,6 +399,10 @@ static const statement_t statements[STATEMENTS] = {
     [LINK] = {"link", 5, 0, on_link, FCSL_PLAN_MAX_LINKS},
     [SENSOR] = {"sensor", 4, 0, on_sensor, FCSL_PLAN_MAX_LINKS},
     [ACTUATOR] = {"actuator", 4, 0, on_actuator, FCSL_PLAN_MAX_LINKS},
+    [COMPANION_SENSOR] = {"companion_sensor", 5, 0, on_companion_sensor, FCSL_PLAN_MAX_LINKS},
+    [COMPANION_ACTUATOR] = {"companion_actuator", 5, 0, on_companion_actuator, FCSL_PLAN_MAX_LINKS},
+    [READ] = {"read", 4, 0, on_read, FCSL_PLAN_MAX_LINKS},
+    [WRITE] = {"write", 4, 0, on_write, FCSL_PLAN_MAX_LINKS},
     [EVENT] = {"event", 6, 0, on_event, FCSL_PLAN_MAX_SETS},
     [SERIAL_LINK] = {"serial_link", 2, 0, on_serial_link, 1},
     [UNTIL] = {"until", 6, 0, on_until, 1},
@@ -376,10 +460,13 @@ static int allocate(fcsl_plan_t *plan, const uint32_t counts[STATEMENTS], fcsl_e
     plan->calls = calloc(counts[CALL] + 1u, sizeof *plan->calls);
     plan->sets = calloc(counts[SET] + 1u, sizeof *plan->sets);
     plan->links = calloc(counts[LINK] + 1u, sizeof *plan->links);
-    plan->sensors = calloc(counts[SENSOR] + 1u, sizeof *plan->sensors);
-    plan->actuators = calloc(counts[ACTUATOR] + 1u, sizeof *plan->actuators);
+    plan->sensors = calloc(counts[SENSOR] + counts[COMPANION_SENSOR] + 1u, sizeof *plan->sensors);
+    plan->actuators = calloc(counts[ACTUATOR] + counts[COMPANION_ACTUATOR] + 1u, sizeof *plan->actuators);
+    plan->companions = calloc(counts[COMPANION] + 1u, sizeof *plan->companions);
+    plan->reads = calloc(counts[READ] + 1u, sizeof *plan->reads);
+    plan->writes = calloc(counts[WRITE] + 1u, sizeof *plan->writes);
     plan->events = calloc(counts[EVENT] + 1u, sizeof *plan->events);
-    if (!plan->models || !plan->groups || !plan->instances || !plan->tolerances || !plan->calls || !plan->sets || !plan->links || !plan->sensors || !plan->actuators ||
+    if (!plan->companions || !plan->reads || !plan->writes || !plan->models || !plan->groups || !plan->instances || !plan->tolerances || !plan->calls || !plan->sets || !plan->links || !plan->sensors || !plan->actuators ||
         !plan->events) {
         return fcsl_sim_fail(error, "no memory for the plan");
     }
@@ -394,6 +481,14 @@ static int check_complete(const fcsl_plan_t *plan, fcsl_error_t *error)
                                                    : NULL;
     if (missing) {
         return fcsl_sim_fail(error, "the plan has no `%s`", missing);
+    }
+    for (uint32_t i = 0; i < plan->companion_count; i++) {
+        for (uint32_t j = 0; j < i; j++) {
+            if (strcmp(plan->companions[i].name, plan->companions[j].name) == 0) {
+                return fcsl_sim_fail(error, "plan line %u: a second controller `%s`", plan->companions[i].line,
+                                     plan->companions[i].name);
+            }
+        }
     }
     for (uint32_t i = 0; i < plan->model_count; i++) {
         for (uint32_t j = 0; j < i; j++) {
@@ -463,6 +558,9 @@ void fcsl_plan_free(fcsl_plan_t *plan)
     free(plan->calls);
     free(plan->sets);
     free(plan->links);
+    free(plan->companions);
+    free(plan->reads);
+    free(plan->writes);
     free(plan->sensors);
     free(plan->actuators);
     free(plan->events);

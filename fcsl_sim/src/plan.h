@@ -6,6 +6,8 @@
  *   machine NAME LIBRARY                              library: to the end of the line
  *   seed N
  *   ticks N                                           controller ticks at the latest
+ *   delay TICKS                                       of the machine's commands
+ *   companion NAME DELAY MACHINE LIBRARY              a further controller; library: to the end of the line
  *   model NAME LIBRARY
  *   group METHOD HZ RTOL ATOL MIN_STEP MAX_STEP       by number, from 0; HZ 0: adaptive. The others are bits of doubles
  *   instance NAME MODEL GROUP HZ EVERY PHASE          GROUP -: in none; updates at steps PHASE + i * EVERY of a grid of HZ; 0: none
@@ -15,6 +17,10 @@
  *   link INSTANCE FIELD INSTANCE FIELD                from, to
  *   sensor INSTANCE FIELD CHANNEL                     from, to
  *   actuator CHANNEL INSTANCE FIELD                   from, to
+ *   companion_sensor INSTANCE FIELD COMPANION CHANNEL
+ *   companion_actuator COMPANION CHANNEL INSTANCE FIELD
+ *   read MACHINE_FIELD INSTANCE FIELD                 from, to: any field of the machine
+ *   write INSTANCE FIELD MACHINE_FIELD                from, to
  *   event TIME_NS INSTANCE FIELD ELEMENT BITS
  *   serial_link INSTANCE                              between plant and controller (serial_link.h)
  *   until INSTANCE FIELD equals|above|below BITS TICKS
@@ -36,6 +42,7 @@
 #define FCSL_PLAN_MAX_INSTANCES 256u
 #define FCSL_PLAN_MAX_GROUPS    256u
 #define FCSL_PLAN_MAX_CALLS     1024u
+#define FCSL_PLAN_MAX_COMPANIONS 64u
 #define FCSL_PLAN_MAX_LINKS     4096u  /* of each kind */
 #define FCSL_PLAN_MAX_SETS      65536u /* of each kind */
 #define FCSL_PLAN_MAX_HZ        1000000u
@@ -88,6 +95,14 @@ typedef struct {
 
 typedef struct {
     uint32_t line;
+    const char *name;
+    const char *machine;
+    const char *library;
+    uint32_t delay_ticks;
+} fcsl_plan_companion_t;
+
+typedef struct {
+    uint32_t line;
     const char *instance;
     const char *field;
     uint64_t element;
@@ -97,9 +112,10 @@ typedef struct {
 
 typedef struct {
     uint32_t line;
-    const char *from_instance; /* null: a channel */
+    const char *companion;     /* null: the first controller */
+    const char *from_instance; /* null: a channel, or a field of a machine */
     const char *from_field;
-    const char *to_instance; /* null: a channel */
+    const char *to_instance; /* null: a channel, or a field of a machine */
     const char *to_field;
 } fcsl_plan_link_t;
 
@@ -112,6 +128,10 @@ typedef struct {
     uint64_t seed;
     uint32_t ticks_line;
     uint64_t ticks;
+    uint32_t delay_line;
+    uint32_t delay_ticks;
+    fcsl_plan_companion_t *companions;
+    uint32_t companion_count;
     fcsl_plan_library_t *models;
     uint32_t model_count;
     fcsl_plan_group_t *groups;
@@ -130,6 +150,10 @@ typedef struct {
     uint32_t sensor_count;
     fcsl_plan_link_t *actuators;
     uint32_t actuator_count;
+    fcsl_plan_link_t *reads;
+    uint32_t read_count;
+    fcsl_plan_link_t *writes;
+    uint32_t write_count;
     fcsl_plan_set_t *events;
     uint32_t event_count;
     fcsl_plan_library_t serial_link; /* its instance; name null: none */

@@ -1,7 +1,7 @@
 /* SPDX-License-Identifier: Apache-2.0
  *
- * All that a simulation needs to go on, besides the hosted machine and its hardware, as bytes: models, noise, integrators, events,
- * the channels, the gate, the line. Between two ticks.
+ * All that a simulation needs to go on, besides the first machine and its hardware, as bytes: models, noise, integrators, events,
+ * channels, gates, delays, the line, companions. Between two ticks.
  */
 #ifndef FCSL_SIM_PLANT_STATE_H
 #define FCSL_SIM_PLANT_STATE_H
@@ -10,6 +10,7 @@
 
 size_t fcsl_plant_state_bytes(const fcsl_sim_t *sim);
 void fcsl_plant_state_save(const fcsl_sim_t *sim, void *bytes);
-void fcsl_plant_state_restore(fcsl_sim_t *sim, const void *bytes);
+/* Returns 0, or -1: a machine has refused its part, and the simulation is of no use until another one is restored. */
+int fcsl_plant_state_restore(fcsl_sim_t *sim, const void *bytes);
 
 #endif /* FCSL_SIM_PLANT_STATE_H */

@@ -12,9 +12,10 @@
 #include "fcsl/fcsl_scalar.h"
 #include "plant_state.h"
 
-enum { EVENT_UPDATE, EVENT_TICK };
+enum { EVENT_UPDATE, EVENT_COMPANION, EVENT_TICK };
 
-#define PRIORITY_TICK UINT32_MAX /* behind the updates, each with the index of its instance */
+#define PRIORITY_TICK      UINT32_MAX /* behind the updates, each with the index of its instance */
+#define PRIORITY_COMPANION (UINT32_MAX - 1u)
 
 static int64_t tick_ns(const fcsl_sim_t *sim, uint64_t tick)
 {
@@ -35,6 +36,15 @@ static int schedule_update(fcsl_sim_t *sim, uint32_t index)
     return fcsl_event_queue_push(&sim->queue, event);
 }
 
+static int schedule_companion(fcsl_sim_t *sim, uint32_t index)
+{
+    const fcsl_event_t event = {.time_ns = sim->companions[index].next_tick_ns,
+                                .kind = EVENT_COMPANION,
+                                .index = index,
+                                .priority = PRIORITY_COMPANION};
+    return fcsl_event_queue_push(&sim->queue, event);
+}
+
 /* ---- an instant -------------------------------------------------------------------------------------------------------- */
 
 static int64_t next_write_ns(const fcsl_sim_t *sim)
@@ -50,6 +60,10 @@ static int64_t barrier_ns(const fcsl_sim_t *sim, const fcsl_group_t *group)
     int64_t barrier = tick_ns(sim, sim->tick);
     const int64_t write_ns = next_write_ns(sim);
     barrier = write_ns < barrier ? write_ns : barrier;
+    for (uint32_t i = 0; i < sim->companion_count; i++) {
+        const int64_t due_ns = sim->companions[i].next_tick_ns;
+        barrier = due_ns < barrier ? due_ns : barrier;
+    }
     for (uint32_t i = 0; i < group->timed_count; i++) {
         const int64_t update_ns = sim->instances[group->timed[i]].next_update_ns;
         barrier = update_ns < barrier ? update_ns : barrier;
@@ -95,7 +109,7 @@ static void call_output(fcsl_sim_t *sim, uint32_t index)
     fcsl_sim_enter(sim, index, FCSL_IN_OUTPUT);
     model->output(instance->data, (double)sim->time_ns / FCSL_NS_PER_S, model->continuous_count > 0 ? x : NULL);
     if (model->sampled_offset == FCSL_NO_OFFSET) {
-        instance->fresh = 1;
+        instance->samples++;
     }
 }
 
@@ -111,7 +125,7 @@ static int call_update(fcsl_sim_t *sim, uint32_t index)
         fcsl_sim_link_tick(sim->link, sim->time_ns);
     }
     if (model->sampled_offset == FCSL_NO_OFFSET || instance->data[model->sampled_offset]) {
-        instance->fresh = 1;
+        instance->samples++;
     }
     if (instance->group != FCSL_PLAN_NO_GROUP) {
         sim->groups[instance->group].state.disturbed = 1;
@@ -137,6 +151,20 @@ static int evaluate(fcsl_sim_t *sim)
     return 0;
 }
 
+static int tick_companions(fcsl_sim_t *sim, fcsl_error_t *error)
+{
+    for (uint32_t i = 0; i < sim->companion_count; i++) {
+        fcsl_companion_t *companion = &sim->companions[i];
+        if (companion->due) {
+            companion->due = 0;
+            if (fcsl_companion_tick(companion, sim, error) || schedule_companion(sim, i)) {
+                return -1;
+            }
+        }
+    }
+    return 0;
+}
+
 /* Goes to the next instant and does all that is due but for the controller's tick; *ticked: whether that is due. Returns 0, or -1. */
 static int do_instant(fcsl_sim_t *sim, int *ticked, fcsl_error_t *error)
 {
@@ -156,6 +184,8 @@ static int do_instant(fcsl_sim_t *sim, int *ticked, fcsl_error_t *error)
         (void)fcsl_event_queue_pop(&sim->queue, &event);
         if (event.kind == EVENT_TICK) {
             *ticked = 1;
+        } else if (event.kind == EVENT_COMPANION) {
+            sim->companions[event.index].due = 1;
         } else {
             sim->instances[event.index].due = 1;
         }
@@ -163,7 +193,7 @@ static int do_instant(fcsl_sim_t *sim, int *ticked, fcsl_error_t *error)
     if (evaluate(sim)) {
         return fcsl_sim_fail(error, "the event queue overflowed");
     }
-    return 0;
+    return tick_companions(sim, error);
 }
 
 /* ---- opening ----------------------------------------------------------------------------------------------------------- */
@@ -195,6 +225,9 @@ void fcsl_sim_refill_queue(fcsl_sim_t *sim)
 {
     sim->queue.count = 0;
     (void)schedule_tick(sim, sim->tick); /* there is room for all */
+    for (uint32_t i = 0; i < sim->companion_count; i++) {
+        (void)schedule_companion(sim, i);
+    }
     for (uint32_t i = 0; i < sim->instance_count; i++) {
         if (sim->instances[i].hz > 0) {
             (void)schedule_update(sim, i);
@@ -204,7 +237,7 @@ void fcsl_sim_refill_queue(fcsl_sim_t *sim)
 
 static int fill_queue(fcsl_sim_t *sim, fcsl_error_t *error)
 {
-    if (fcsl_event_queue_init(&sim->queue, sim->instance_count + 1u)) {
+    if (fcsl_event_queue_init(&sim->queue, sim->instance_count + sim->companion_count + 1u)) {
         return fcsl_sim_fail(error, "no memory for the event queue");
     }
     fcsl_sim_refill_queue(sim);
@@ -218,6 +251,16 @@ static int fill_queue(fcsl_sim_t *sim, fcsl_error_t *error)
     return sim->group_scratch && sim->before ? 0 : fcsl_sim_fail(error, "no memory for checkpoints");
 }
 
+static int attach(fcsl_sim_t *sim, fcsl_error_t *error)
+{
+    for (uint32_t i = 0; i < sim->companion_count; i++) {
+        if (fcsl_companion_start(&sim->companions[i], error)) {
+            return -1;
+        }
+    }
+    return fcsl_run_attach(sim->run, error);
+}
+
 fcsl_sim_t *fcsl_sim_open(const char *plan, size_t size, fcsl_error_t *error)
 {
     fcsl_sim_t *sim = calloc(1, sizeof *sim);
@@ -226,7 +269,7 @@ fcsl_sim_t *fcsl_sim_open(const char *plan, size_t size, fcsl_error_t *error)
         return NULL;
     }
     if (fcsl_plan_parse(&sim->plan, plan, size, error) || fcsl_assembly_build(sim, error) || init_models(sim, error) ||
-        fill_queue(sim, error) || fcsl_run_attach(sim->run, error)) {
+        fill_queue(sim, error) || attach(sim, error)) {
         (void)fcsl_sim_close(sim, NULL);
         return NULL;
     }
@@ -251,6 +294,10 @@ int fcsl_sim_sense_message(fcsl_sim_t *sim, uint8_t *bytes, size_t capacity, fcs
         return fcsl_sim_fail(error, "tick %llu was sensed and waits for its actuator message",
                              (unsigned long long)sim->tick);
     }
+    if (sim->failed) {
+        return fcsl_sim_fail(error, "tick %llu has failed: the simulation cannot go on", (unsigned long long)sim->tick);
+    }
+    sim->failed = 1;
     for (int ticked = 0; !ticked;) { /* the next tick is in the queue, with finitely many events before it */
         if (do_instant(sim, &ticked, error)) {
             return -1;
@@ -259,21 +306,11 @@ int fcsl_sim_sense_message(fcsl_sim_t *sim, uint8_t *bytes, size_t capacity, fcs
     if (fcsl_sim_check_outputs(sim, error) || schedule_tick(sim, sim->tick + 1u)) {
         return -1;
     }
+    sim->failed = 0;
     for (uint32_t i = 0; sim->tick == 0 && i < sim->group_count; i++) {
         fcsl_group_start(&sim->groups[i]);
     }
-    memset(sim->select, 0, sim->machine->channel_count);
-    for (uint32_t i = 0; i < sim->sensor_count; i++) {
-        const fcsl_sensor_t *sensor = &sim->sensors[i];
-        if (!sim->instances[sensor->instance].fresh) {
-            continue;
-        }
-        memcpy(sensor->to, sensor->from, sensor->size);
-        sim->select[sensor->channel] = 1;
-    }
-    for (uint32_t i = 0; i < sim->instance_count; i++) {
-        sim->instances[i].fresh = 0;
-    }
+    fcsl_sensors_sample(sim, sim->sensors, sim->sensor_count, sim->select, sim->machine->channel_count);
     sim->sensed = 1;
     const fcsl_message_status_t status = fcsl_message_encode_sensors(fcsl_run_channels(sim->run), sim->image, sim->tick,
                                                                      sim->select, bytes, capacity, message);
@@ -360,15 +397,46 @@ int fcsl_sim_actuate_message(fcsl_sim_t *sim, const fcsl_message_t *message, fcs
                              (unsigned long long)message->tick, (unsigned long long)sim->tick);
     }
     fcsl_gate_wait(&sim->gate, (uint64_t)sim->time_ns, sim->image); /* a link may have delivered nothing for long */
-    const char *wrong = sim->link ? fcsl_sim_link_command(sim->link, message) : NULL;
+    fcsl_message_t due;
+    const int is_due = fcsl_delay_pass(&sim->delay, fcsl_run_channels(sim->run), message, &due);
+    const char *wrong = is_due && sim->link ? fcsl_sim_link_command(sim->link, &due) : NULL;
     if (wrong) {
         return fcsl_sim_fail(error, "tick %llu: %s", (unsigned long long)sim->tick, wrong);
     }
-    if (!sim->link) {
-        fcsl_sim_take_command(sim, message);
+    if (is_due && !sim->link) {
+        fcsl_sim_take_command(sim, &due);
     }
     complete_tick(sim);
     return 0;
+}
+
+/* ---- further controllers ------------------------------------------------------------------------------------------------ */
+
+uint32_t fcsl_sim_companion_count(const fcsl_sim_t *sim)
+{
+    return sim->companion_count;
+}
+
+const char *fcsl_sim_companion_name(const fcsl_sim_t *sim, uint32_t companion)
+{
+    return companion < sim->companion_count ? sim->companions[companion].name : NULL;
+}
+
+fcsl_run_t *fcsl_sim_companion(fcsl_sim_t *sim, uint32_t companion)
+{
+    return companion < sim->companion_count ? sim->companions[companion].run : NULL;
+}
+
+const char *fcsl_sim_companion_state(const fcsl_sim_t *sim, uint32_t companion, uint64_t *ticks)
+{
+    if (companion >= sim->companion_count) {
+        return NULL;
+    }
+    const fcsl_companion_t *found = &sim->companions[companion];
+    int32_t state = 0;
+    memcpy(&state, (const uint8_t *)fcsl_run_data(found->run) + found->machine->state_offset, sizeof state);
+    *ticks = found->tick;
+    return found->machine->states[state].name; /* within the table: a run holds no other */
 }
 
 /* ---- writing ------------------------------------------------------------------------------------------------------------- */

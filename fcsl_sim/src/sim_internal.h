@@ -8,6 +8,7 @@
 #include <stdatomic.h>
 #include <string.h>
 
+#include "companion.h"
 #include "event_queue.h"
 #include "fcsl/fcsl_external.h"
 #include "fcsl/fcsl_gate.h"
@@ -23,18 +24,16 @@ typedef struct {
     uint8_t *to;
     uint32_t size;
     uint32_t instance; /* instance of the input */
-    uint32_t source;   /* of the output; UINT32_MAX: an actuator channel */
+    uint32_t source;   /* of the output; UINT32_MAX: a controller */
     uint32_t is_inner; /* 1: an output that is evaluated whenever the input is used, within a group */
 } fcsl_copy_t;
 
-/* One output copied to a sensor channel. */
+/* A field of the hosted machine beside its channels, connected with a model. */
 typedef struct {
-    const uint8_t *from;
-    uint8_t *to; /* in the channel image */
+    uint32_t field;   /* of the machine */
+    uint8_t *data;    /* of the model */
     uint32_t size;
-    uint32_t instance; /* instance of the output */
-    uint32_t channel;
-} fcsl_sensor_t;
+} fcsl_field_link_t;
 
 /* One scalar write. */
 typedef struct {
@@ -59,8 +58,8 @@ typedef struct {
     uint32_t copy_count;
     uint32_t outer_count; /* of them, those from outside of its group, which come first */
     uint32_t inner_count;
-    uint8_t due;   /* its update is at the present */
-    uint8_t fresh; /* sampled since the last tick */
+    uint8_t due;      /* its update is at the present */
+    uint64_t samples; /* taken so far */
     char *truth_type;
     char *truth_schema;
     uint32_t truth_size; /* bytes of its message */
@@ -116,6 +115,12 @@ struct fcsl_sim {
     uint32_t copy_count;
     fcsl_sensor_t *sensors;
     uint32_t sensor_count;
+    fcsl_delay_t delay;
+    fcsl_companion_t *companions;
+    uint32_t companion_count;
+    int reads_fields; /* an input of a model is connected with a field of the hosted machine */
+    fcsl_field_link_t *writes; /* outputs of models to fields of the hosted machine */
+    uint32_t write_count;
     fcsl_write_t *events;
     uint32_t *event_order; /* by time, then as in the plan */
     uint32_t next_event;   /* in event_order */
@@ -142,6 +147,7 @@ struct fcsl_sim {
     double *group_scratch; /* the vectors of one group, for checkpoints */
     uint8_t *before;       /* the plant before a checkpoint was restored */
     int sensed; /* between sense and actuate */
+    int failed; /* a tick has failed on its way: without a checkpoint there is no next one */
     fcsl_sim_status_t status;
     int recording;
     uint8_t *truth; /* scratch for one truth message */

@@ -9,7 +9,7 @@ use. Each of these packages imports only those above it:
     view    pictures and 3D scenes of a run; the commands are simclient.plot and simclient.to_rerun
     replay  runs machines on bags: `python -m simclient.replay`
     vars    the variable server's clients, fcsl-var
-    twin    AlgTwin, PyTwin, ProcessTwin, and the pytest plugin
+    twin    AlgTwin, PyTwin, ProcessTwin, and the pytest plugin; SimTwin is in fcsl_sim
     telemetry  Telemetry, the receiver of UDP telemetry from flight programs and simulators
 """
 
@@ -35,6 +35,8 @@ _LATER = {
     "VarClient": "vars.client",
     "VarError": "vars.wire",
 }
+#: In a package that needs this one.
+_SIM_TWIN = "fcsl_sim.sim_twin"
 
 __all__ = [
     "AlgTwin",
@@ -61,4 +63,19 @@ __all__ = [
 def __getattr__(name: str) -> Any:
     if name in _LATER:
         return getattr(import_module(f".{_LATER[name]}", __name__), name)
+    if name == "SimTwin":
+        return getattr(_sim_twin(), name)
     raise AttributeError(f"module {__name__!r} has no attribute {name!r}")
+
+
+def _sim_twin() -> Any:
+    """The module of SimTwin. Raises ImportError, which says what is missing."""
+    try:
+        return import_module(_SIM_TWIN)
+    except ModuleNotFoundError as error:
+        if error.name not in ("fcsl_sim", _SIM_TWIN):
+            raise
+        fix = "build it (colcon build --packages-up-to fcsl_sim) and source the workspace's setup.bash"
+        raise ImportError(
+            f"SimTwin is in the package `fcsl_sim`, which this environment does not have: {fix}"
+        ) from None

@@ -9,8 +9,9 @@ from pathlib import Path
 from .errors import TwinError
 
 
-def find_config(path: str | Path, caller: str = "") -> Path:
-    """`path` relative to the working directory, else relative to the folder of the file `caller`. Raises TwinError."""
+def find_config(path: str | Path, caller: str = "", what: str = "machine config") -> Path:
+    """`path` relative to the working directory, else relative to the folder of the file `caller`. Raises TwinError, which
+    says that there is no such `what`."""
     wanted = Path(path)
     tried = [wanted]
     if not wanted.is_absolute() and caller and not caller.startswith("<"):
@@ -21,8 +22,8 @@ def find_config(path: str | Path, caller: str = "") -> Path:
             return candidate.resolve()
     for candidate in tried:
         if candidate.is_dir():
-            raise TwinError(f"{candidate.absolute()}: a directory; name the machine's JSON file in it")
-    raise TwinError(f"no such machine config: {' nor '.join(str(p.absolute()) for p in tried)}")
+            raise TwinError(f"{candidate.absolute()}: a directory; name the JSON file of the {what.split()[0]} in it")
+    raise TwinError(f"no such {what}: {' nor '.join(str(p.absolute()) for p in tried)}")
 
 
 def build_config(

@@ -49,7 +49,7 @@ fcsl_sim_status_t fcsl_sim_status(const fcsl_sim_t *sim);
 
 /* ---- controller in this process ---------------------------------------------------------------------------------- */
 
-/* Records controller and plant truth into a bag; only before the first tick. Topics of the plant: /<ns>/sim/<instance>. */
+/* Records controller and plant truth into a bag, from the next tick on. Topics of the plant: /<ns>/sim/<instance>. */
 int fcsl_sim_record(fcsl_sim_t *sim, const char *bag, const char *name_space, fcsl_error_t *error);
 int fcsl_sim_record_stop(fcsl_sim_t *sim, fcsl_error_t *error);
 
@@ -66,6 +66,16 @@ int fcsl_sim_set_speed(fcsl_sim_t *sim, double speed, fcsl_error_t *error);
 int32_t fcsl_sim_state(const fcsl_sim_t *sim);
 /* The hosted machine's struct, to read from. */
 const void *fcsl_sim_machine_data(const fcsl_sim_t *sim);
+
+/* ---- further controllers --------------------------------------------------------------------------------------------- */
+
+/* Controllers hosted beside the first one, in the plan's order. Each steps at its own rate; their runs are to read from and to write
+ * into between two ticks. fcsl_sim_record records them into bags of their own, BAG_NAME. */
+uint32_t fcsl_sim_companion_count(const fcsl_sim_t *sim);
+const char *fcsl_sim_companion_name(const fcsl_sim_t *sim, uint32_t companion);
+fcsl_run_t *fcsl_sim_companion(fcsl_sim_t *sim, uint32_t companion);
+/* The state in its last completed tick, and how many there were. */
+const char *fcsl_sim_companion_state(const fcsl_sim_t *sim, uint32_t companion, uint64_t *ticks);
 
 /* ---- models that crash or hang ---------------------------------------------------------------------------------------- */
 
@@ -90,8 +100,8 @@ int fcsl_sim_write(fcsl_sim_t *sim, uint32_t instance, uint32_t offset, const vo
 size_t fcsl_sim_checkpoint_capacity(const fcsl_sim_t *sim);
 /* Writes it into `bytes`, which has that capacity; returns its bytes. */
 size_t fcsl_sim_checkpoint(const fcsl_sim_t *sim, void *bytes);
-/* Puts it back, into a simulation of the same plan, models and machine. Other bytes are refused with the reason, and nothing is
- * changed then. */
+/* Puts it back, into a simulation of the same models, integrators, rates and machine. Its own scheduled writes go on; those until
+ * the checkpoint's time are passed over. Other bytes are refused with the reason, and nothing is changed then. */
 int fcsl_sim_restore_checkpoint(fcsl_sim_t *sim, const void *bytes, size_t size, fcsl_error_t *error);
 
 /* ---- external controller ------------------------------------------------------------------------------------------- */

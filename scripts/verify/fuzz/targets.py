@@ -34,6 +34,12 @@ _HAL, _RUNTIME, _SIM = "fcsl_hal/src", "fcsl_runtime/fcsl_runtime/src", "fcsl_si
 _VARS = "fcsl_runtime/fcsl_runtime/src/vars"
 #: What takes bytes from clients or disks while a machine runs is searched for longer.
 _SEARCHED_S = 300
+#: Libraries of the harnesses of the simulator: a machine, then models.
+_MODELS = (
+    "fcsl_sim/test/machines/hopper.c",
+    *(f"fcsl_sim/test/models/{name}.c" for name in ("ball", "chain", "problem", "ramp")),
+    *(f"fcsl_sim/models/{name}.c" for name in ("noisy_sensor", "serial_link")),
+)
 
 TARGETS = (
     Target(
@@ -138,15 +144,45 @@ TARGETS = (
         longest=512,
     ),
     Target(
+        "plan",
+        "plans of simulations",
+        "file",
+        Defect(f"{_SIM}/plan.c", " || group >= plan->group_count", ""),
+    ),
+    Target(
         "simulation",
         "plans of simulations, and what they name",
         "file",
         Defect(f"{_SIM}/assembly.c", "if (set->element >= field->count) {", "if (0) {"),
-        plugins=(
-            "fcsl_sim/test/machines/hopper.c",
-            "fcsl_sim/test/models/ramp.c",
-            "fcsl_sim/models/noisy_sensor.c",
-        ),
+        inputs=30_000,
+        plugins=_MODELS,
+    ),
+    Target(
+        "assembly",
+        "plans that nearly hold together; checkpoints",
+        "file",
+        Defect(f"{_SIM}/group_build.c", "if (tolerance->state >= instance->model->continuous_count) {", "if (0) {"),
+        longest=512,
+        inputs=20_000,
+        plugins=_MODELS,
+    ),
+    Target(
+        "model_table",
+        "descriptors of models, and all that a simulation does by them",
+        "model library",
+        Defect(f"{_SIM}/model.c", "if (end > model->size || model", "if (model"),
+        longest=256,
+        inputs=30_000,
+        plugins=_MODELS[:1],
+    ),
+    Target(
+        "sim_checkpoint",
+        "checkpoints of simulations, and ticks from there",
+        "files",
+        Defect(f"{_SIM}/checkpoint.c", "data[fields[i].offset + k] > 1u", "0"),
+        longest=256,
+        inputs=20_000,
+        plugins=_MODELS,
     ),
     Target(
         "ros_read",

@@ -23,7 +23,12 @@ def warn_overwritten(fields: Iterable[Field]) -> None:
     """One warning for these leaves of connected inputs, at the line that called this package."""
     connected = dict(map(_connection, fields))
     text = _one(*connected.popitem()) if len(connected) == 1 else _several(connected)
-    warnings.warn(text, OverwrittenWarning, stacklevel=_levels_inside() + 1)
+    warn(text)
+
+
+def warn(text: str, package: str = _PACKAGE) -> None:
+    """An OverwrittenWarning at the line that called this package, or `package`, a folder that ends with a separator."""
+    warnings.warn(text, OverwrittenWarning, stacklevel=_levels_inside(package) + 1)
 
 
 def _connection(field: Field) -> tuple[str, str]:
@@ -53,9 +58,10 @@ def _several(connected: dict[str, str]) -> str:
     )
 
 
-def _levels_inside() -> int:
-    """Stack frames up to the first one outside of this package, whose line the warning shows."""
+def _levels_inside(package: str) -> int:
+    """Stack frames up to the first one outside of these packages, whose line the warning shows."""
+    inside = (_PACKAGE, package)
     frame, levels = sys._getframe(1), 1
-    while frame.f_back is not None and frame.f_code.co_filename.startswith(_PACKAGE):
+    while frame.f_back is not None and frame.f_code.co_filename.startswith(inside):
         frame, levels = frame.f_back, levels + 1
     return levels - 1

@@ -1,11 +1,16 @@
 # SPDX-License-Identifier: Apache-2.0
-"""The pytest fixture `fcsl`: twins that are closed when the test ends, and whose last ticks are written if it fails.
+"""The pytest fixtures `fcsl` and `fcsl_sim`: twins that are closed when the test ends, and whose last ticks are written if
+it fails.
 
     def test_cutoff(fcsl):
         twin = fcsl("../fc/lander_control.json")
         ...
 
-`--fcsl-twin=python` runs the same tests in CPython, `--fcsl-twin=process` against the flight program.
+    def test_landing(fcsl_sim):
+        twin = fcsl_sim("../sim/lander.sim.json", seed=3)
+        ...
+
+`--fcsl-twin=python` runs tests with `fcsl` in CPython, `--fcsl-twin=process` against the flight program.
 """
 
 from __future__ import annotations
@@ -14,7 +19,7 @@ import re
 from collections.abc import Callable, Generator, Iterator, Sequence
 from importlib import import_module
 from pathlib import Path
-from typing import TYPE_CHECKING, cast
+from typing import TYPE_CHECKING, Any, cast
 
 import pytest
 
@@ -76,6 +81,31 @@ def fcsl(request: pytest.FixtureRequest) -> Iterator[Callable[..., Twin]]:
 
         opened.append(open_one(kind))
         boxes.append(BlackBox(opened[-1], again=lambda: open_one(twin_class("native"))))
+        return opened[-1]
+
+    yield open_twin
+    for twin in reversed(opened):
+        twin.close()
+
+
+@pytest.fixture
+def fcsl_sim(request: pytest.FixtureRequest) -> Iterator[Callable[..., Any]]:
+    """`fcsl_sim(path, seed=…, sets=…, events=…, duration=…)` opens a simulation as a SimTwin, paused at tick 0.
+
+    A relative path is relative to the working directory, or else to the folder of the test file. Raises ImportError
+    without the package `fcsl_sim`.
+    """
+    from .. import _sim_twin
+    from ..machine_build import find_config
+
+    module = _sim_twin()
+    opened: list[Twin] = []
+    boxes = request.node.stash.setdefault(_BOXES, [])
+
+    def open_twin(path: str | Path, **options: Any) -> Any:
+        found = path if str(path).startswith("package://") else find_config(path, str(request.path), "simulation")
+        opened.append(module.SimTwin.from_config(found, **options))
+        boxes.append(module.SimBlackBox(opened[-1]))
         return opened[-1]
 
     yield open_twin

@@ -164,7 +164,15 @@ class Twin(TwinFaults):
             writes += encode_part(value, part, self.machine)
         if writes:
             self._do("write", writes)
-            _warn_of_connected(leaf.field for leaf, _ in writes)
+            self._warn_of_connected(leaf.field for leaf, _ in writes)
+
+    def _warn_of_connected(self, fields: Iterable[Field]) -> None:
+        """Warns if some of these fields, which were written, are connected inputs."""
+        connected = [field for field in fields if field.connected_from]
+        if connected:
+            from .overwritten import warn_overwritten
+
+            warn_overwritten(connected)
 
     def state(self) -> str:
         """The machine's state in the last tick (the initial state before the first)."""
@@ -201,7 +209,7 @@ class Twin(TwinFaults):
         from .profile import read_profile
 
         read = read_profile(self, profile)
-        _warn_of_connected(read.fields(self.machine))
+        self._warn_of_connected(read.fields(self.machine))
         self.attach(*read.attach)
         return self._play(read.samples, read.ticks)
 
@@ -279,11 +287,3 @@ class Twin(TwinFaults):
     def channels(self) -> tuple[Channel, ...]:
         """The machine's sensor and actuator channels."""
         return self.machine.channels
-
-
-def _warn_of_connected(fields: Iterable[Field]) -> None:
-    connected = [field for field in fields if field.connected_from]
-    if connected:
-        from .overwritten import warn_overwritten
-
-        warn_overwritten(connected)

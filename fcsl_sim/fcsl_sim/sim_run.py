@@ -1,0 +1,353 @@
+# SPDX-License-Identifier: Apache-2.0
+"""A simulation behind the interface of a run (simclient.run.Run): one descriptor for the hosted machine and all models.
+
+The descriptor is of a virtual memory: the machine struct, then the struct of each instance of a model. A field of the
+machine has its own path and number, one of a model the path `<instance>.<path>`.
+"""
+
+from __future__ import annotations
+
+from bisect import bisect_right
+from collections.abc import Iterator, Sequence
+from contextlib import contextmanager
+from ctypes import c_char
+from dataclasses import dataclass, replace
+from itertools import groupby
+from pathlib import Path
+
+from fcsl_compiler.base.files import digest
+from fcsl_compiler.model.types import count_of, scalar_of, shape_of
+from simclient.descriptor import Field, Machine
+from simclient.errors import TwinError
+from simclient.forks import for_children, not_for_children
+from simclient.run import Run
+
+from .config import SimConfig
+from .errors import SimError
+from .models import ModelField
+from .native import Simulation
+
+#: Ticks per call into C, during which Python handles no signal.
+_SLICE_TICKS = 100_000
+#: Between two structs in the virtual memory; more than what a trace copies to join two fields.
+_GAP_BYTES = 64
+#: Bytes of a scalar in the struct of a model.
+_BYTES = {"bool": 1, "i32": 4, "i64": 8, "u32": 4, "u64": 8, "f32": 4, "f64": 8}
+
+
+@contextmanager
+def twin_errors() -> Iterator[None]:
+    """SimError becomes TwinError, with the same text."""
+    try:
+        yield
+    except SimError as error:
+        raise TwinError(str(error)) from None
+
+
+@dataclass(frozen=True)
+class _Region:
+    """A struct at `begin` of the virtual memory; `instance` is empty for that of the machine."""
+
+    instance: str
+    begin: int
+    memory: memoryview
+
+
+class SimRun(Run):
+    """Owns a simulation and, through it, its hosted machine. Not thread-safe; every failure is a TwinError."""
+
+    def __init__(self, config: SimConfig):
+        self.config = config
+        with twin_errors():
+            self._simulation = Simulation(config.plan, config.tables)
+        self._regions: list[_Region] = []
+        self._traces: list[SimTrace] = []
+        super().__init__(config.library, config.machine.name)
+        self._only = self.machine
+        self._place(self._data)
+        for instance in self._simulation.instances:
+            fields = config.tables[instance].fields.values()
+            size = max((field.offset + _size(field) for field in fields), default=0)
+            address = self._simulation.instance_data(instance)
+            self._place(memoryview((c_char * size).from_address(address)).cast("B"), instance)
+        self._begins = [region.begin for region in self._regions]
+        self._sources = _Sources(config.plan, self._only)
+        self.machine = self._combined()
+        self._fields = tuple(self.machine.fields.values())
+
+    def _open(self, library: Path, machine: str | None) -> int | None:
+        return self._simulation.hosted()
+
+    def _place(self, memory: memoryview, instance: str = "") -> None:
+        last = self._regions[-1] if self._regions else None
+        begin = last.begin + len(last.memory) + _GAP_BYTES if last else 0
+        self._regions.append(_Region(instance, begin, memory))
+
+    def _combined(self) -> Machine:
+        """The descriptor of the virtual memory. Raises TwinError for a model's field whose path the machine has."""
+        machine = self._only
+        fed = self._sources.of_machine
+        fields = {
+            path: replace(f, connected_from=fed.get(path, f.connected_from)) for path, f in machine.fields.items()
+        }
+        for region in self._regions[1:]:
+            for found in self.config.tables[region.instance].fields.values():
+                path = f"{region.instance}.{found.path}"
+                if path in fields:
+                    raise TwinError(f"`{path}` is in the machine and in a model; rename instance `{region.instance}`")
+                fields[path] = _field(len(fields), region, found, self._sources.of_models.get(path, ""))
+        last = self._regions[-1]
+        layout = [f"{f.path} {f.type_text} {f.offset}" for f in fields.values()]
+        return replace(
+            machine,
+            size=last.begin + len(last.memory),
+            fields=fields,
+            layout_hash=digest(machine.layout_hash, *layout),
+        )
+
+    # ---- life -------------------------------------------------------------------------------------------------------
+
+    def close(self) -> None:
+        if self._handle is None:
+            return
+        self._handle, self._data = None, memoryview(b"")
+        self._regions.clear()
+        with twin_errors():
+            self._simulation.close()
+
+    def leave_to_parent(self) -> None:
+        super().leave_to_parent()
+        self._simulation.leave_to_parent()
+
+    # ---- values -----------------------------------------------------------------------------------------------------
+
+    def parts(self, offset: int, size: int) -> Iterator[tuple[_Region, int, int]]:
+        """The parts of structs in a range of the virtual memory: each with its beginning and end within its struct."""
+        self.handle()
+        for region in self._regions[bisect_right(self._begins, offset) - 1 :]:
+            begin, end = max(0, offset - region.begin), min(len(region.memory), offset + size - region.begin)
+            if end <= 0:
+                return
+            if begin < end:
+                yield region, begin, end
+
+    def read(self, offset: int, size: int) -> bytes:
+        self.handle()
+        region = self._regions[bisect_right(self._begins, offset) - 1]
+        at = offset - region.begin
+        return bytes(region.memory[at : at + size])
+
+    def is_fed(self, field: Field) -> bool:
+        """Whether the simulation writes this field: a channel of the machine, or a connected input of a model."""
+        return field.index >= len(self._only.fields) or field.path in self._sources.of_machine
+
+    def check_set(self, field: int, element: int, data: bytes) -> None:
+        if field < len(self._only.fields):
+            super().check_set(field, element, data)
+
+    def set(self, field: int, element: int, data: bytes) -> None:
+        if field < len(self._only.fields):
+            super().set(field, element, data)
+            return
+        self.handle()
+        target = self._fields[field]
+        region = self._regions[bisect_right(self._begins, target.offset) - 1]
+        at = target.offset - region.begin + element * (target.size // target.count)
+        with twin_errors():
+            self._simulation.write(region.instance, at, data)
+
+    def save(self) -> bytes:
+        """The virtual memory."""
+        self.handle()
+        data = bytearray(self.machine.size)
+        for region in self._regions:
+            data[region.begin : region.begin + len(region.memory)] = region.memory
+        return bytes(data)
+
+    def restore(self, data: bytes) -> None:
+        """Always raises TwinError: integrators and noise are outside of the structs."""
+        raise TwinError("the structs of a simulation cannot be put back alone; restore a checkpoint")
+
+    def checkpoint(self) -> bytes:
+        self.handle()
+        return self._simulation.checkpoint()
+
+    def restore_checkpoint(self, checkpoint: bytes, ignore_source_hash: bool = False) -> None:
+        if ignore_source_hash:
+            raise TwinError(
+                "a checkpoint of a simulation fits the same machine alone: ignore_source_hash is for AlgTwin"
+            )
+        self.handle()
+        with twin_errors():
+            self._simulation.restore_checkpoint(checkpoint)
+
+    # ---- time -------------------------------------------------------------------------------------------------------
+
+    def step(self, ticks: int) -> None:
+        self.handle()
+        while ticks > 0:
+            ticks -= self._run_ticks(1 if self._traces else min(ticks, _SLICE_TICKS))
+
+    def step_once(self) -> int:
+        self.handle()
+        self._run_ticks(1)
+        return self.tick
+
+    def _run_ticks(self, ticks: int) -> int:
+        """Runs up to `ticks` ticks, at least one; returns how many."""
+        try:
+            done = self._simulation.run(ticks)
+        except SimError as error:
+            raise TwinError(str(error)) from None
+        if done == 0:
+            raise TwinError(self._over())
+        for trace in self._traces:
+            trace.take()
+        return done
+
+    def _over(self) -> str:
+        """Why there is no next tick."""
+        tick = self.tick
+        held = self._simulation.status == "until"
+        why = f"`until` held: {self.config.until}" if held else "its duration is over"
+        fix = 'extend the file with {"until": null}' if held else "give from_config() a longer `duration`"
+        return f"the simulation has ended after {tick} ticks, at {tick / self.machine.tick_hz:g} s: {why}; {fix}"
+
+    def feed(self, samples: bytes, payloads: bytes, end: int) -> None:
+        """As of Run; tick by tick in Python."""
+        import numpy as np
+
+        from simclient.samples import NO_CHANNEL, SAMPLE
+
+        rows = np.frombuffer(samples, SAMPLE).tolist()
+        for tick, due in groupby(rows, key=lambda row: int(row[0])):
+            self.step(tick - self.tick)
+            for _, stamp_ns, channel, age_ticks, at, field, element, size, _ in due:
+                if channel != NO_CHANNEL:
+                    size = self.machine.channels[channel].field.size
+                    self.write_channel(channel, payloads[at : at + size], age_ticks, stamp_ns)
+                else:
+                    self.set(field, element, payloads[at : at + size])
+        self.step(end - self.tick)
+
+    def trace(self, ranges: Sequence[tuple[int, int]], rows: int) -> SimTrace:  # type: ignore[override]
+        """Traces parts (offset, size) of the virtual memory. While a trace is open, each tick is a call from Python."""
+        trace = SimTrace(self._traces, [part for pair in ranges for part in self._views(*pair)], rows)
+        self._traces.append(trace)
+        return trace
+
+    def _views(self, offset: int, size: int) -> Iterator[memoryview | bytes]:
+        """The bytes of a range; zeros where no struct is."""
+        at = offset
+        for region, begin, end in self.parts(offset, size):
+            if region.begin + begin > at:
+                yield bytes(region.begin + begin - at)
+            yield region.memory[begin:end]
+            at = region.begin + end
+        if offset + size > at:
+            yield bytes(offset + size - at)
+
+    # ---- channels ---------------------------------------------------------------------------------------------------
+
+    def write_channel(self, channel: int, data: bytes, age_ticks: int = 0, stamp_ns: int = 0) -> None:
+        name = self.machine.channels[channel].name
+        source = self._sources.of_channels.get(name)
+        if source is not None:
+            where = source.partition(".")[0]
+            raise TwinError(
+                f"channel `{name}` gets its samples from `{source}`; set a parameter of `{where}`, or leave the connection "
+                "out: in a file that extends this one, with other `connections`"
+            )
+        super().write_channel(channel, data, age_ticks, stamp_ns)
+
+    # ---- recording --------------------------------------------------------------------------------------------------
+
+    def record(self, bag: Path, name_space: str, lossless: bool, fields: str | None = None) -> None:
+        self.handle()
+        with twin_errors():
+            self._simulation.record(bag, name_space)
+        not_for_children(self)
+
+    def record_stop(self) -> None:
+        self.handle()
+        for_children(self)
+        with twin_errors():
+            self._simulation.record_stop()
+
+
+class SimTrace:
+    """Parts of the virtual memory after each of the last `capacity` ticks (simclient.twin.host.Tap)."""
+
+    def __init__(self, traces: list[SimTrace], parts: Sequence[memoryview | bytes], capacity: int):
+        self._traces, self._parts, self.capacity = traces, parts, capacity
+        self._row_bytes = sum(map(len, parts))
+        self._ring = bytearray(capacity * self._row_bytes)
+        self._rows = 0
+
+    def take(self) -> None:
+        """A tick has ended."""
+        at = self._rows % self.capacity * self._row_bytes
+        self._ring[at : at + self._row_bytes] = b"".join(self._parts)
+        self._rows += 1
+
+    def rows(self) -> int:
+        return self._rows
+
+    def read(self, first: int, count: int) -> bytes:
+        """`count` rows from row `first` on. Raises TwinError if they were discarded."""
+        if first < self._rows - self.capacity or first + count > self._rows:
+            raise TwinError(f"rows {first} to {first + count} of a trace were discarded, or are not there yet")
+        begin = first % self.capacity
+        before = min(count, self.capacity - begin) * self._row_bytes
+        at, size = begin * self._row_bytes, count * self._row_bytes
+        return bytes(self._ring[at : at + before] + self._ring[: size - before])
+
+    def close(self) -> None:
+        if self in self._traces:
+            self._traces.remove(self)
+        self._parts = ()
+
+
+class _Sources:
+    """What feeds the channels of the machine and the inputs of models, from the plan (src/plan.h)."""
+
+    def __init__(self, plan: str, machine: Machine):
+        #: `<instance>.<output>` by sensor channel, and by the path of the channel's field.
+        self.of_channels: dict[str, str] = {}
+        #: `<instance>.<output>` or `controller.<channel>` by the path of an input.
+        self.of_models: dict[str, str] = {}
+        for line in plan.splitlines():
+            word, *rest = line.split(" ")
+            if word == "link":
+                self.of_models[f"{rest[2]}.{rest[3]}"] = f"{rest[0]}.{rest[1]}"
+            elif word == "actuator":
+                self.of_models[f"{rest[1]}.{rest[2]}"] = f"controller.{rest[0]}"
+            elif word == "sensor":
+                self.of_channels[rest[2]] = f"{rest[0]}.{rest[1]}"
+        fields = {channel.name: channel.field.path for channel in machine.channels}
+        self.of_machine = {fields[name]: source for name, source in self.of_channels.items()}
+
+
+def _size(field: ModelField) -> int:
+    return count_of(field.type) * _BYTES[scalar_of(field.type).name]
+
+
+def _field(index: int, region: _Region, found: ModelField, source: str) -> Field:
+    """The row of a model's field in the combined descriptor."""
+    return Field(
+        index=index,
+        path=f"{region.instance}.{found.path}",
+        role=found.role,
+        type=scalar_of(found.type).name,
+        shape=shape_of(found.type),
+        count=count_of(found.type),
+        offset=region.begin + found.offset,
+        size=_size(found),
+        instance=region.instance,
+        connected_from=source,
+        unit=found.unit,
+        doc=found.doc,
+        writable=found.role != "output",
+        frozen=False,
+        impure=False,
+    )

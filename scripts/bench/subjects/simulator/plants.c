@@ -1,0 +1,173 @@
+/* SPDX-License-Identifier: Apache-2.0
+ *
+ * Times a plant in the simulator against the same loop by hand:
+ *   plants LIBFCSL_SIM PLANT PLAN ROUNDS
+ * The plan has one instance and ticks once a second; a round is all of its seconds. The two take turns, a second each, which is a
+ * thousand steps. Reported are medians and quartiles over the seconds, so that whatever else runs spoils some of them. Prints
+ * JSON, with the last states of both, and whether their bits agree.
+ */
+#include "plants_by_hand.h"
+#include "timing.h"
+
+#include <dlfcn.h>
+#include <fcsl/fcsl_sim.h>
+#include <stdio.h>
+#include <stdlib.h>
+#include <string.h>
+
+enum { STEPS = 1000 };
+
+typedef struct {
+    fcsl_sim_t *(*open)(const char *plan, size_t size, fcsl_error_t *error);
+    int (*close)(fcsl_sim_t *sim, fcsl_error_t *error);
+    int64_t (*run)(fcsl_sim_t *sim, uint64_t ticks, fcsl_error_t *error);
+    uint64_t (*ticks)(const fcsl_sim_t *sim);
+    void *(*data)(fcsl_sim_t *sim, uint32_t instance);
+} simulator_t;
+
+typedef struct {
+    double *simulated, *by_hand, *ratio, *more;
+    int count;
+} times_t;
+
+static void fail(const char *what, const char *why)
+{
+    fprintf(stderr, "bench: %s: %s\n", what, why);
+    exit(1);
+}
+
+/* POSIX has functions in the pointers that dlsym returns; C does not convert those. */
+static void find(void *library, const char *name, void *function)
+{
+    void *const found = library != NULL ? dlsym(library, name) : NULL;
+    if (found == NULL) {
+        fail(name, dlerror());
+    }
+    memcpy(function, &found, sizeof found);
+}
+
+static simulator_t load_simulator(const char *path)
+{
+    void *library = dlopen(path, RTLD_NOW | RTLD_LOCAL);
+    simulator_t simulator;
+    find(library, "fcsl_sim_open", &simulator.open);
+    find(library, "fcsl_sim_close", &simulator.close);
+    find(library, "fcsl_sim_run", &simulator.run);
+    find(library, "fcsl_sim_ticks", &simulator.ticks);
+    find(library, "fcsl_sim_instance_data", &simulator.data);
+    return simulator;
+}
+
+static const by_hand_plant_t *find_plant(const char *name)
+{
+    for (uint32_t i = 0; i < by_hand_count; i++) {
+        if (strcmp(by_hand_plants[i].name, name) == 0) {
+            return &by_hand_plants[i];
+        }
+    }
+    fail(name, "no such plant");
+    return NULL;
+}
+
+static char *read_text(const char *path, size_t *size)
+{
+    FILE *file = fopen(path, "rb");
+    enum { MAX = 1 << 20 };
+    char *text = allocate(MAX);
+    if (file == NULL) {
+        fail(path, "cannot be read");
+    }
+    *size = fread(text, 1, MAX, file);
+    fclose(file);
+    return text;
+}
+
+static void run_tick(const simulator_t *simulator, fcsl_sim_t *sim)
+{
+    fcsl_error_t error = {{0}};
+    if (simulator->run(sim, 1, &error) != 1) {
+        fail("simulator", error.text);
+    }
+}
+
+/* One round. The structs of both are as they end in `mine` and `theirs`. */
+static void fly(const simulator_t *simulator, const by_hand_plant_t *plant, const char *plan, size_t size,
+                times_t *times, void *mine, void *theirs)
+{
+    fcsl_error_t error = {{0}};
+    fcsl_sim_t *sim = simulator->open(plan, size, &error);
+    if (sim == NULL) {
+        fail("simulator", error.text);
+    }
+    run_tick(simulator, sim); /* tick 0: no time has passed */
+    memcpy(mine, simulator->data(sim, 0), plant->size);
+    for (uint64_t second = 0; second + 1u < simulator->ticks(sim); second++) {
+        const double begun = now_ns();
+        run_tick(simulator, sim);
+        const double between = now_ns();
+        plant->run(mine, second * STEPS, STEPS);
+        const double simulated = (between - begun) / STEPS;
+        const double by_hand = (now_ns() - between) / STEPS;
+        times->simulated[times->count] = simulated;
+        times->by_hand[times->count] = by_hand;
+        times->ratio[times->count] = simulated / by_hand;
+        times->more[times->count++] = simulated - by_hand;
+    }
+    memcpy(theirs, simulator->data(sim, 0), plant->size);
+    if (simulator->close(sim, &error) != 0) {
+        fail("simulator", error.text);
+    }
+}
+
+static void print_spread(const char *name, double *values, int count)
+{
+    const spread_t s = spread(values, count);
+    printf("\"%s\": %.6g, \"%s_low\": %.6g, \"%s_high\": %.6g, ", name, s.median, name, s.low, name, s.high);
+}
+
+static void print_states(const char *name, const double *x, uint32_t count)
+{
+    printf("\"%s\": [", name);
+    for (uint32_t i = 0; i < count; i++) {
+        printf("%s%.17g", i > 0 ? ", " : "", x[i]);
+    }
+    printf("], ");
+}
+
+int main(int argc, char **argv)
+{
+    if (argc != 5) {
+        fail("usage", "plants LIBFCSL_SIM PLANT PLAN ROUNDS");
+    }
+    enum { SECONDS_MAX = 10000 };
+    const simulator_t simulator = load_simulator(argv[1]);
+    const by_hand_plant_t *plant = find_plant(argv[2]);
+    const int rounds = atoi(argv[4]);
+    size_t size;
+    char *plan = read_text(argv[3], &size);
+    const size_t bytes = (size_t)rounds * SECONDS_MAX * sizeof(double);
+    times_t times = {allocate(bytes), allocate(bytes), allocate(bytes), allocate(bytes), 0};
+    unsigned char *mine = allocate(plant->size), *theirs = allocate(plant->size);
+    for (int round = 0; round < rounds; round++) {
+        fly(&simulator, plant, plan, size, &times, mine, theirs);
+    }
+    const double *x = (const double *)(const void *)(theirs + plant->states);
+    const double *y = (const double *)(const void *)(mine + plant->states);
+    printf("{");
+    print_spread("simulated_ns", times.simulated, times.count);
+    print_spread("by_hand_ns", times.by_hand, times.count);
+    print_spread("ratio", times.ratio, times.count);
+    print_spread("more_ns", times.more, times.count);
+    print_states("simulated", x, plant->count);
+    print_states("by_hand", y, plant->count);
+    printf("\"states\": %u, \"same_bits\": %s}\n", plant->count,
+           memcmp(x, y, plant->count * sizeof *x) == 0 ? "true" : "false");
+    free(plan);
+    free(mine);
+    free(theirs);
+    free(times.simulated);
+    free(times.by_hand);
+    free(times.ratio);
+    free(times.more);
+    return 0;
+}
