@@ -3,6 +3,7 @@
 
 from __future__ import annotations
 
+import json
 import re
 import shutil
 import subprocess
@@ -11,6 +12,7 @@ from pathlib import Path
 
 import pytest
 
+from fcsl_sim import Simulation, load
 from fcsl_sim.model_instance import ModelInstance
 
 ROOT = Path(__file__).resolve().parents[1]
@@ -22,7 +24,7 @@ FILES = dict(re.findall(r"<!-- file: (\S+) -->\n```\w+\n(.*?)```\n", PAGE, re.DO
 def folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
     """A folder with the page's files, and its package built below."""
     path = tmp_path_factory.mktemp("drives")
-    names = ["CMakeLists.txt", "gyro.cpp", "motor.c", "motor.cpp", "motor/Cargo.toml", "motor/src/lib.rs"]
+    names = ["CMakeLists.txt", "gust.json", "gust.py", "gyro.cpp", "motor.c", "motor.cpp", "motor/Cargo.toml", "motor/src/lib.rs"]
     assert sorted(FILES) == [*names, "test_motor.py"]
     for name, text in FILES.items():
         (path / name).parent.mkdir(parents=True, exist_ok=True)
@@ -65,6 +67,26 @@ def test_the_motor_is_the_same_in_each_language(motors: list[ModelInstance]) -> 
         other.output(0.0, x)
         for output in ("angle", "speed", "current"):
             assert other.get(f"outputs.{output}") == in_c.get(f"outputs.{output}")
+
+
+def test_the_gust(folder: Path) -> None:
+    simulation = {
+        "tick_hz": 50,
+        "seed": 1,
+        "duration": 4.0,
+        "integrator": {"method": "rk4", "hz": 50},
+        "models": {"gust": {"machine": "gust.json"}},
+        "instances": {"wind": {"model": "gust", "parameters": {"strength": 3.0}}},
+        "rates": {"wind": 50},
+    }
+    (folder / "gust.sim.json").write_text(json.dumps(simulation))
+    config = load(folder / "gust.sim.json")
+    assert not config.warnings
+    with Simulation(config.plan, config.tables) as sim:
+        sim.run(50)
+        assert sim.get("wind.outputs.force") == pytest.approx(3.0)
+        sim.run(100)
+        assert sim.get("wind.outputs.force") == pytest.approx(-3.0)
 
 
 def test_the_gyroscope(folder: Path) -> None:

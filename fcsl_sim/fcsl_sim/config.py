@@ -31,6 +31,7 @@ from .errors import SimError
 from .event_argument import with_events
 from .extends import file_of, read_extended
 from .integrators import Integrator, read_integrator
+from .machine_model import machine_model
 from .models import ModelField, ModelTable, type_of, with_unit
 from .plant_only import MAX_TICK_HZ, build_plant_only
 from .plugins import model_library, model_source
@@ -177,7 +178,18 @@ class _Loader:
 
     def load(self, root: JsonNode, seed: int | None, duration_s: Fraction | None) -> SimConfig:
         required = ("models", "instances", "integrator", "seed", "duration")
-        optional = ("controller", "controllers", "tick_hz", "connections", "rates", "events", "until", "ros", "views", *FOR_READERS)
+        optional = (
+            "controller",
+            "controllers",
+            "tick_hz",
+            "connections",
+            "rates",
+            "events",
+            "until",
+            "ros",
+            "views",
+            *FOR_READERS,
+        )
         keys = self.reader.object(root, "a simulation", required, optional)
         if keys is None:
             raise DiagnosticError(self.sink.diagnostics)
@@ -218,7 +230,10 @@ class _Loader:
             ),
             plan.statement("seed", parts.seed),
             plan.statement("ticks", parts.ticks),
-            *(plan.library_statement("model", name, table.library) for name, table in sorted(used.items())),
+            *(
+                plan.library_statement("machine_model" if table.tick_hz else "model", name, table.library)
+                for name, table in sorted(used.items())
+            ),
             *wiring.lines,
             *([plan.statement("serial_link", link)] if link else []),
             *([plan.statement("views", views)] if views else []),
@@ -286,7 +301,9 @@ class _Loader:
         if machine is None or text is None:
             return
         config = file_of(machine.span)
-        self._use_machine(name, lambda: given or self._build_machine(text, config), text, machine.span, delay_ticks or 0)
+        self._use_machine(
+            name, lambda: given or self._build_machine(text, config), text, machine.span, delay_ticks or 0
+        )
 
     def _use_machine(
         self, controller: str, build: Callable[[], tuple[Path, str]], text: str, span: Span, delay_ticks: int = 0
@@ -344,12 +361,15 @@ class _Loader:
         libraries: dict[str, Path] = {}
         for name, (definition, span) in self.reader.named(node, "`models`").items():
             self.parts.models[name] = None
-            keys = self.reader.object(definition, f"model `{name}`", (), ("source", "library"))
+            keys = self.reader.object(definition, f"model `{name}`", (), ("source", "library", "machine"))
             if keys is None:
                 continue
             if len(keys) != 1:
-                has = "has both `source` and `library`" if keys else "has neither `source` nor `library`"
-                fix = 'write {"source": "cart.c"} for a file in C or C++, {"library": "package://PACKAGE/NAME"} for another'
+                has = f"has {' and '.join(f'`{key}`' for key in keys)}" if keys else "says neither of its sources"
+                fix = (
+                    'write {"source": "cart.c"} for a file in C or C++, {"library": "package://PACKAGE/NAME"} for one of a '
+                    'package, or {"machine": "gust.json"} for an algorithm'
+                )
                 self.sink.error("E801", f"model `{name}` {has}", span, help=fix)
                 continue
             ((key, place),) = keys.items()
@@ -360,9 +380,12 @@ class _Loader:
                 self.parts.models[name] = table
 
     def _compile(self, key: str, node: JsonNode) -> ModelTable | None:
-        text = self.reader.string(node, f"`{key}`", "cart.c" if key == "source" else "package://PACKAGE/NAME")
+        form = {"source": "cart.c", "library": "package://PACKAGE/NAME", "machine": "gust.json"}[key]
+        text = self.reader.string(node, f"`{key}`", form)
         if text is None:
             return None
+        if key == "machine":
+            return self._machine_model(text, node.span)
         try:
             return model_source(text, file_of(node.span)) if key == "source" else model_library(text)
         except SimError as error:
@@ -370,6 +393,16 @@ class _Loader:
             reason = reason.removesuffix(":")
             self.sink.error("E801", f"the model `{text}` cannot be used: {reason}", node.span, output=output)
             return None
+
+    def _machine_model(self, text: str, span: Span) -> ModelTable | None:
+        """A machine with one instance: its algorithm is the model."""
+        try:
+            return machine_model(*self._build_machine(text, file_of(span)))
+        except DiagnosticError as error:
+            self.foreign.extend(error.diagnostics)
+        except (SimError, SourcePathError, ToolchainError, TwinError) as error:
+            self.sink.error("E801", f"the machine `{text}` cannot be used as a model: {error}", span)
+        return None
 
     # ---- instances ----------------------------------------------------------------------------------------------------
 
@@ -413,7 +446,7 @@ class _Loader:
             if override:
                 given[name] = override[1]
         missing = [f"`{name}` ({with_unit(f.type, f.unit)})" for name, f in wanted.items() if name not in given]
-        if missing:
+        if missing and not table.tick_hz:
             message = f"parameter {', '.join(missing)} of `{instance.name}` has no value"
             self.sink.error("E211", message, instance.span, help="every parameter is given; nothing has a default")
         for name, definition in given.items():

@@ -57,7 +57,8 @@ class ModelEvent:
 @dataclass(frozen=True)
 class ModelTable:
     """A model: `fields` by path, in the table's order; integrated if it has continuous states, which lie together at
-    `continuous_offset`. `second_order`: these are positions, then their velocities."""
+    `continuous_offset`. `second_order`: these are positions, then their velocities. `tick_hz`: of a machine as a model, whose
+    parameters have values already; 0 for others."""
 
     name: str
     library: Path
@@ -69,6 +70,7 @@ class ModelTable:
     doc: str
     events: tuple[ModelEvent, ...]
     fields: dict[str, ModelField]
+    tick_hz: int = 0
 
     @property
     def integrated(self) -> bool:

@@ -135,7 +135,9 @@ def run(
     the bag then has the ticks recorded until then, and is removed if there are none.
     """
     if external is not None and (restore or save):
-        raise SimError("with an external controller a checkpoint would lack the machine; fly with the machine of the file")
+        raise SimError(
+            "with an external controller a checkpoint would lack the machine; fly with the machine of the file"
+        )
     if bag is not None and external is not None:
         raise SimError("with an external controller the controller records: give `--record` to it")
     if bag is not None and bag.exists():

@@ -186,6 +186,9 @@ class _Checker:
             if instance.table and not instance.table.has_update:
                 message = f"`{name}` has no rate: its model has no `update`, and its outputs follow at every instant"
                 self.sink.error("E804", message, span, help="remove its rate")
+            elif rate and instance.table and instance.table.tick_hz not in (0, Fraction(rate.hz, rate.every)):
+                message = f"`{name}` is a machine with a tick_hz of {instance.table.tick_hz}: its rate is that"
+                self.sink.error("E804", message, definition.span)
             else:
                 instance.rate = rate
         for instance in self.instances.values():

@@ -93,11 +93,18 @@ static int build_models(fcsl_sim_t *sim, fcsl_error_t *error)
     const fcsl_plan_t *plan = &sim->plan;
     sim->handles = calloc(plan->model_count + 1u, sizeof *sim->handles);
     sim->models = calloc(plan->model_count + 1u, sizeof *sim->models);
-    if (!sim->handles || !sim->models) {
+    sim->machine_models = calloc(plan->model_count + 1u, sizeof(fcsl_machine_model_t *));
+    if (!sim->handles || !sim->models || !sim->machine_models) {
         return fcsl_sim_fail(error, "no memory for the models");
     }
     for (uint32_t i = 0; i < plan->model_count; i++) {
-        sim->models[i] = fcsl_model_load(plan->models[i].library, plan->models[i].name, &sim->handles[i], error);
+        const fcsl_plan_library_t *from = &plan->models[i];
+        if (from->is_machine) {
+            sim->machine_models[i] = fcsl_machine_model_open(from->library, from->name, error);
+            sim->models[i] = sim->machine_models[i] ? fcsl_machine_model_of(sim->machine_models[i]) : NULL;
+        } else {
+            sim->models[i] = fcsl_model_load(from->library, from->name, &sim->handles[i], error);
+        }
         if (!sim->models[i]) {
             return -1;
         }
@@ -111,9 +118,11 @@ static int build_instance(fcsl_sim_t *sim, uint32_t index, fcsl_error_t *error)
     const fcsl_plan_instance_t *from = &plan->instances[index];
     fcsl_instance_state_t *instance = &sim->instances[index];
     instance->name = from->name;
+    const fcsl_machine_model_t *machine = NULL;
     for (uint32_t i = 0; i < plan->model_count; i++) {
         if (strcmp(plan->models[i].name, from->model) == 0) {
             instance->model = sim->models[i];
+            machine = sim->machine_models[i];
         }
     }
     if (!instance->model) {
@@ -135,7 +144,7 @@ static int build_instance(fcsl_sim_t *sim, uint32_t index, fcsl_error_t *error)
         return fcsl_sim_fail(error, "no memory for instance `%s`", from->name);
     }
     fcsl_noise_seed(&instance->noise, plan->seed, from->name);
-    return 0;
+    return machine ? fcsl_machine_model_init(machine, instance->data, error) : 0;
 }
 
 static int build_instances(fcsl_sim_t *sim, fcsl_error_t *error)
@@ -565,8 +574,12 @@ void fcsl_assembly_free(fcsl_sim_t *sim)
     }
     for (uint32_t i = 0; sim->handles && i < sim->plan.model_count; i++) {
         fcsl_model_unload(sim->handles[i]);
+        if (sim->machine_models) {
+            fcsl_machine_model_close(sim->machine_models[i]);
+        }
     }
     free(sim->handles);
+    free(sim->machine_models);
     free(sim->models);
     free(sim->instances);
     free(sim->copies);

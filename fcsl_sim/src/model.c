@@ -178,7 +178,7 @@ static const char *check_descriptor(const fcsl_model_t *model)
     return NULL;
 }
 
-static int check_model(const fcsl_model_t *model, const char *library, fcsl_error_t *error)
+int fcsl_model_check(const fcsl_model_t *model, const char *library, fcsl_error_t *error)
 {
     const char *wrong = check_descriptor(model);
     if (wrong) {
@@ -237,7 +237,7 @@ const fcsl_model_t *fcsl_model_load(const char *library, const char *name, void 
     } else {
         model = find_model(models, library, name, error);
     }
-    if (model && check_model(model, library, error) != 0) {
+    if (model && fcsl_model_check(model, library, error) != 0) {
         model = NULL;
     }
     if (!model) {

@@ -19,6 +19,8 @@
 const fcsl_model_t *fcsl_model_load(const char *library, const char *name, void **handle, fcsl_error_t *error);
 void fcsl_model_unload(void *handle);
 
+/* Rejects a descriptor that breaks a rule of fcsl_model.h; `library` is for the message. Returns 0, or -1. */
+int fcsl_model_check(const fcsl_model_t *model, const char *library, fcsl_error_t *error);
 /* The field of this path, or null. */
 const fcsl_field_t *fcsl_model_field(const fcsl_model_t *model, const char *path);
 

@@ -40,7 +40,7 @@ static int take_library(parser_t *parser, fcsl_plan_library_t *library)
     if (!fcsl_plan_is_name(parser->word[1])) {
         return bad(parser, "not a name");
     }
-    *library = (fcsl_plan_library_t){parser->line, parser->word[1], parser->word[2]};
+    *library = (fcsl_plan_library_t){parser->line, parser->word[1], parser->word[2], 0};
     return 0;
 }
 
@@ -118,6 +118,16 @@ static int on_ticks(parser_t *parser)
 static int on_model(parser_t *parser)
 {
     return take_library(parser, &parser->plan->models[parser->plan->model_count++]);
+}
+
+static int on_machine_model(parser_t *parser)
+{
+    fcsl_plan_library_t *model = &parser->plan->models[parser->plan->model_count++];
+    if (take_library(parser, model)) {
+        return -1;
+    }
+    model->is_machine = 1;
+    return 0;
 }
 
 static int on_instance(parser_t *parser)
@@ -365,6 +375,7 @@ enum {
     DELAY,
     COMPANION,
     MODEL,
+    MACHINE_MODEL,
     GROUP,
     INSTANCE,
     TOLERANCE,
@@ -391,6 +402,7 @@ static const statement_t statements[STATEMENTS] = {
     [DELAY] = {"delay", 2, 0, on_delay, 1},
     [COMPANION] = {"companion", 5, 1, on_companion, FCSL_PLAN_MAX_COMPANIONS},
     [MODEL] = {"model", 3, 1, on_model, FCSL_PLAN_MAX_MODELS},
+    [MACHINE_MODEL] = {"machine_model", 3, 1, on_machine_model, FCSL_PLAN_MAX_MODELS},
     [GROUP] = {"group", 7, 0, on_group, FCSL_PLAN_MAX_GROUPS},
     [INSTANCE] = {"instance", 7, 0, on_instance, FCSL_PLAN_MAX_INSTANCES},
     [TOLERANCE] = {"tolerance", 4, 0, on_tolerance, FCSL_PLAN_MAX_SETS},
@@ -453,7 +465,7 @@ static int count_statements(const char *text, uint32_t lines, uint32_t counts[ST
 
 static int allocate(fcsl_plan_t *plan, const uint32_t counts[STATEMENTS], fcsl_error_t *error)
 {
-    plan->models = calloc(counts[MODEL] + 1u, sizeof *plan->models);
+    plan->models = calloc(counts[MODEL] + counts[MACHINE_MODEL] + 1u, sizeof *plan->models);
     plan->groups = calloc(counts[GROUP] + 1u, sizeof *plan->groups);
     plan->instances = calloc(counts[INSTANCE] + 1u, sizeof *plan->instances);
     plan->tolerances = calloc(counts[TOLERANCE] + 1u, sizeof *plan->tolerances);

@@ -9,6 +9,7 @@
  *   delay TICKS                                       of the machine's commands
  *   companion NAME DELAY MACHINE LIBRARY              a further controller; library: to the end of the line
  *   model NAME LIBRARY
+ *   machine_model NAME LIBRARY                        a machine with one instance, as a model
  *   group METHOD HZ RTOL ATOL MIN_STEP MAX_STEP       by number, from 0; HZ 0: adaptive. The others are bits of doubles
  *   instance NAME MODEL GROUP HZ EVERY PHASE          GROUP -: in none; updates at steps PHASE + i * EVERY of a grid of HZ; 0: none
  *   tolerance INSTANCE STATE BITS                     absolute, of a continuous state by its number
@@ -54,6 +55,7 @@ typedef struct {
     uint32_t line;
     const char *name;
     const char *library;
+    int is_machine; /* of a model: it is a machine */
 } fcsl_plan_library_t;
 
 typedef struct {

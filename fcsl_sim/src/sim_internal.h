@@ -14,6 +14,7 @@
 #include "fcsl/fcsl_gate.h"
 #include "fcsl/fcsl_sim.h"
 #include "group.h"
+#include "machine_model.h"
 #include "noise.h"
 #include "plan.h"
 #include "serial_link.h"
@@ -108,6 +109,7 @@ struct fcsl_sim {
     fcsl_run_t *run;
     const fcsl_machine_t *machine;
     void **handles; /* of the model libraries */
+    fcsl_machine_model_t **machine_models; /* by model; null: a plugin */
     const fcsl_model_t **models;
     fcsl_instance_state_t *instances;
     uint32_t instance_count;

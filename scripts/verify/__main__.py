@@ -21,6 +21,7 @@ ALONE = {
     "link": "link.main",
     "mutation": "mutation.main",
     "pil": "pil.main",
+    "plant_bits": "plant_bits.main",
     "receivers": "receivers.main",
     "sanitize": "sanitize.main",
 }

@@ -97,6 +97,7 @@ CHECKS = (
     script("fuzzer: the receiver of telemetry, with seeded defects", "fuzz_telemetry"),
     script("EVA: no run-time error in generated C", "eva"),
     script("same bits: every example on every target and in CPython", "bits"),
+    script("same bits: the simulator on every target and twice in a row", "plant_bits"),
     script("no allocation, bounded stack, no foreign call: every example's binary", "binary"),
     script("coverage: fcslc and clang agree on lines, branches and MC/DC", "coverage"),
     script("instruction bounds: what a step executes is counted and never exceeds them", "instructions"),

@@ -4,6 +4,7 @@
 from __future__ import annotations
 
 import json
+import os
 import subprocess
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
@@ -41,12 +42,13 @@ class Target:
         return " ".join([*self.compiler, *BASE, *self.flags])
 
 
-def _native(compiler: str) -> list[Target]:
-    levels = (("-O0",), ("-O2",), ("-O3",), ("-O3", "-march=native"))
-    return [Target(f"{compiler} {' '.join(level)}", (compiler,), level) for level in levels]
+def native(compiler: str, levels: Sequence[str] = ("-O0", "-O2", "-O3", "-O3 -march=native")) -> list[Target]:
+    """Of this computer, with each of these flags."""
+    return [Target(f"{compiler} {level}", (compiler,), tuple(level.split())) for level in levels]
 
 
-def _cross(machine: str, flags: tuple[str, ...] = ("-O3",)) -> Target:
+def cross(machine: str, flags: tuple[str, ...] = ("-O3",)) -> Target:
+    """Of another processor, emulated."""
     compiler, emulator = f"{machine}-linux-gnu-gcc", f"qemu-{machine}-static"
     return Target(f"{machine} {' '.join(flags)}", (compiler,), flags, True, ("-static",), (emulator,))
 
@@ -61,14 +63,14 @@ def _cortex_m7(flags: tuple[str, ...] = ("-O3",)) -> Target:
 
 
 REFERENCE = Target("gcc -O3", ("gcc",), ("-O3",))
-AARCH64 = _cross("aarch64")
+AARCH64 = cross("aarch64")
 CORTEX_M7 = _cortex_m7()
 TARGETS = [
-    *_native("gcc"),
-    *_native("clang-19"),
+    *native("gcc"),
+    *native("clang-19"),
     Target("clang-19 -O3, its own fcsl_math", ("clang-19",), ("-O3",), own_math=True),
     AARCH64,
-    _cross("riscv64"),
+    cross("riscv64"),
     CORTEX_M7,
 ]
 #: What `--all` adds.
@@ -76,8 +78,8 @@ MORE = [
     Target("gcc -Os", ("gcc",), ("-Os",)),
     Target("gcc -O3 -flto", ("gcc",), ("-O3", "-flto")),
     Target("gcc -O3, its own fcsl_math", ("gcc",), ("-O3",), own_math=True),
-    _cross("aarch64", ("-O0",)),
-    _cross("riscv64", ("-O0",)),
+    cross("aarch64", ("-O0",)),
+    cross("riscv64", ("-O0",)),
     _cortex_m7(("-O0",)),
     _cortex_m7(("-Os",)),
 ]
@@ -109,7 +111,7 @@ def core_math() -> list[Path]:
     return [source / f"binary{bits}/{f}/{f}{suffix}.c" for f in listed for bits, suffix in ((64, ""), (32, "f"))]
 
 
-def _math_objects(target: Target) -> list[Path]:
+def math_objects(target: Target) -> list[Path]:
     """fcsl_math by the target's compiler; kept in out/verify until compiler or flags change."""
     flags = [*target.compiler, *_MATH_FLAGS, "-include", str(MATH / "no_stdio.h")]
     sources = core_math()
@@ -119,7 +121,9 @@ def _math_objects(target: Target) -> list[Path]:
     if not all(o.is_file() for o in objects):
         folder.mkdir(parents=True, exist_ok=True)
         for source, made in zip(sources, objects, strict=True):
-            run([*flags, "-c", str(source), "-o", str(made)])
+            part = made.with_suffix(f".{os.getpid()}.part")  # another check may compile it at the same time
+            run([*flags, "-c", str(source), "-o", str(part)])
+            part.replace(made)
     return objects
 
 
@@ -136,7 +140,7 @@ def build(target: Target, sources: Sources, folder: Path, platform: Sequence[Pat
         for file in files:
             objects.append(folder / f"{len(objects)}-{file.stem}.o")
             run([*target.compiler, *BASE, *flags, *includes, "-c", str(file), "-o", str(objects[-1])])
-    math = _math_objects(target) if target.own_math else [math_library()]
+    math = math_objects(target) if target.own_math else [math_library()]
     libm = [] if target.bare else ["-lm"]
     program = folder / "bits"
     run([*target.compiler, *target.flags, *map(str, [*objects, *math]), *libm, *target.link, "-o", str(program)])

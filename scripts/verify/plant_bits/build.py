@@ -1,0 +1,110 @@
+# SPDX-License-Identifier: Apache-2.0
+"""How the simulator, models and a machine become a program and libraries on a target of the check `plant_bits`."""
+
+from __future__ import annotations
+
+import shutil
+from collections.abc import Sequence
+from concurrent.futures import ThreadPoolExecutor
+from dataclasses import dataclass
+from pathlib import Path
+
+from fcsl_compiler.driver.toolchain import include_dirs, math_library
+
+from ..bits.targets import BASE, Target, math_objects
+from ..shared.cases import EXAMPLES, OUT, ROOT, Case, emit_case, run
+
+HERE = Path(__file__).resolve().parent
+FOLDER = OUT / "plant_bits"
+SIMULATOR = ROOT / "fcsl_sim" / "src"
+_RUNTIME, _HAL = ROOT / "fcsl_runtime/fcsl_runtime/src", ROOT / "fcsl_hal/src"
+#: Files of the simulator that move values to others, and compute none.
+_MOVERS = {"crash", "describe", "observers", "pace", "published", "ros_graph", "serve", "telemetry", "together", "topics"}
+#: The rest of what a flight calls: hosting a machine, and messages of channels. Not under test; recording, sockets and the bus
+#: are left out, and a call of one of their functions would end the program.
+_CARRIERS = (
+    *(_RUNTIME / "run", _RUNTIME / "base", _RUNTIME / "history", _RUNTIME / "messages"),
+    *(_HAL / f"{name}.c" for name in ("codec", "codec_check", "crc16", "crc32", "fcsl_hw", "gate", "payload", "plan_text")),
+)
+_INCLUDES = (
+    *(ROOT / f"{package}/include" for package in ("fcsl_hal", "fcsl_runtime/fcsl_runtime", "fcsl_sim")),
+    *(SIMULATOR, _RUNTIME, _RUNTIME / "run", _HAL),
+)
+_LINK = ("-Wl,--unresolved-symbols=ignore-all", "-Wl,-z,lazy", "-lm", "-ldl", "-lpthread")
+#: By name: source, and the flags that select what is in it.
+MODELS = {
+    "lander_plant": (ROOT / "examples/lander/sim/lander_plant.c", ()),
+    "noisy_sensor": (ROOT / "fcsl_sim/models/noisy_sensor.c", ()),
+    "ball": (ROOT / "fcsl_sim/test/models/ball.c", ()),
+    "kepler": (ROOT / "fcsl_sim/test/models/problem.c", ("-DPROBLEM=1",)),
+    "pleiades": (ROOT / "fcsl_sim/test/models/problem.c", ("-DPROBLEM=3",)),
+}
+MACHINE = "lander_control"
+
+
+@dataclass(frozen=True)
+class Built:
+    """What a target made: the program, and the libraries that plans name."""
+
+    target: Target
+    program: Path
+    libraries: dict[str, Path]
+
+
+def _compile(target: Target, flags: Sequence[str], source: Path, made: Path, includes: Sequence[Path]) -> Path:
+    made.parent.mkdir(parents=True, exist_ok=True)
+    folders = [f"{'-I' if d.name == 'include' else '-iquote'}{d}" for d in includes]
+    run([*target.compiler, *BASE, *flags, *folders, "-c", source, "-o", made])
+    return made
+
+
+class Builder:
+    """Keeps what targets of one processor share: fcsl_math and the carriers."""
+
+    def __init__(self, targets: Sequence[Target], pool: ThreadPoolExecutor) -> None:
+        shutil.rmtree(FOLDER, ignore_errors=True)
+        self.machine: Case = emit_case(EXAMPLES[MACHINE], FOLDER / "c")
+        self.includes = [*_INCLUDES, *include_dirs()]
+        self._shared = {self._key(t): pool.submit(self._make_shared, t) for t in reversed(targets)}
+
+    @staticmethod
+    def _key(target: Target) -> str:
+        return target.runner[0] if target.runner else "native"
+
+    def _make_shared(self, target: Target) -> list[Path]:
+        folder = FOLDER / self._key(target)
+        sources = [s for p in _CARRIERS for s in (sorted(p.glob("*.c")) if p.is_dir() else [p])]
+        sources += [HERE / "plant.c", *(SIMULATOR / f"{name}.c" for name in sorted(_MOVERS))]
+        flags = ("-O1", "-w")
+        objects = [_compile(target, flags, s, folder / f"{s.parent.name}-{s.stem}.o", self.includes) for s in sources]
+        if not target.own_math:
+            return [*objects, math_library()]
+        archive = folder / "libmath.a"
+        run(["llvm-ar-19", "rcs", archive, *math_objects(target)])
+        return [*objects, archive]
+
+    def build(self, target: Target, patched: Path | None = None) -> Built:
+        """The program of a target; `patched` stands in for the simulator's file of its name. Raises CheckFailed."""
+        folder = FOLDER / target.name.replace(" ", "_").replace(":", "")
+        sources = [s for s in sorted(SIMULATOR.glob("*.c")) if s.stem not in _MOVERS]
+        sources = [patched if patched is not None and s.name == patched.name else s for s in sources]
+        core = [_compile(target, target.flags, s, folder / f"{s.stem}.o", self.includes) for s in sources]
+        shared = self._shared[self._key(target)].result()
+        libraries = {}
+        for name, (source, flags) in MODELS.items():
+            model = _compile(target, (*target.flags, *flags), source, folder / f"model_{name}.o", self.includes)
+            libraries[name] = self._library(target, [model], shared[-1], folder / f"{name}.so")
+        case = self.machine
+        machine = [
+            _compile(target, target.flags, s, folder / f"machine_{s.stem}.o", [*case.includes])
+            for s in (*case.sources, *case.externs)
+        ]
+        libraries[MACHINE] = self._library(target, machine, shared[-1], folder / f"{MACHINE}.so")
+        program = folder / "plant"
+        run([*target.compiler, *target.flags, *core, *shared, *_LINK, "-o", program])
+        return Built(target, program, libraries)
+
+    @staticmethod
+    def _library(target: Target, objects: Sequence[Path], math: Path, made: Path) -> Path:
+        run([*target.compiler, *target.flags, "-shared", *objects, math, "-lm", "-o", made])
+        return made

@@ -1,0 +1,187 @@
+# SPDX-License-Identifier: Apache-2.0
+"""The simulator has the same bits everywhere: a SHA-256 over all values at all ticks, whoever compiles it, wherever it runs.
+
+    python3 scripts/verify plant_bits [--all]
+
+Simulator, models and the lander's controller are built for each target and fly: the lander with noisy sensors; bouncing balls,
+whose events end steps; Kepler's orbit and the Pleiades, with each integrator. Each flight is flown twice in one process, which must
+not differ either. The first difference is named by tick and value. Then the controls: builds that must be found different.
+"""
+
+from __future__ import annotations
+
+import argparse
+import hashlib
+import subprocess
+import sys
+import time
+from collections.abc import Sequence
+from concurrent.futures import ThreadPoolExecutor
+from dataclasses import dataclass
+from pathlib import Path
+
+from ..bits.targets import AARCH64, REFERENCE, Target, cross, native, with_flags
+from ..shared.cases import CheckFailed, write_facts
+from ..shared.effort import scaled
+from .build import FOLDER, SIMULATOR, Builder, Built
+from .plans import PLANS, plan_text
+
+TARGETS = [*native("gcc", ("-O0", "-O3")), *native("clang-19", ("-O0", "-O3")), AARCH64, cross("riscv64")]
+#: What `--all` adds.
+MORE = [
+    *native("gcc", ("-O2", "-Os", "-O3 -march=native")),
+    *native("clang-19", ("-O2", "-O3 -march=native")),
+    *(cross(machine, ("-O0",)) for machine in ("aarch64", "riscv64")),
+]
+_WORD_BYTES = 8
+_RUN_TIMEOUT_S = 600.0
+#: Where the loader of another processor finds its own libraries.
+_SYSROOTS = {"qemu-aarch64-static": "/usr/aarch64-linux-gnu", "qemu-riscv64-static": "/usr/riscv64-linux-gnu"}
+
+
+@dataclass(frozen=True)
+class Defect:
+    """A text of the simulator that is changed: what must be found."""
+
+    name: str
+    file: str
+    text: str
+    instead: str
+
+
+#: The last bit of one constant; and numbers that depend on what the process has drawn before.
+DEFECTS = (
+    Defect("control: last bit of one constant", "rk45.c", "44.0 / 45.0", "0x1.f49f49f49f49ep-1"),
+    Defect(
+        "control: noise remembers the run before",
+        "noise.c",
+        "const uint64_t number = noise->streams[stream].drawn++",
+        "static uint64_t drawn;\n    const uint64_t number = drawn++",
+    ),
+)
+
+
+def command(built: Built, *arguments: str) -> list[str]:
+    """The program's command line, behind the emulator of its processor."""
+    runner = [w for e in built.target.runner for w in (e, "-L", _SYSROOTS[e])]
+    return [*runner, str(built.program), *arguments]
+
+
+def output(built: Built, *arguments: str) -> bytes:
+    """What it prints. Raises CheckFailed."""
+    line = command(built, *arguments)
+    done = subprocess.run(line, capture_output=True, timeout=_RUN_TIMEOUT_S, check=False)
+    if done.returncode != 0:
+        words = done.stderr.decode(errors="replace")[-2000:]
+        raise CheckFailed(f"{built.target.name}: {' '.join(line)}: exit status {done.returncode}\n{words}")
+    return done.stdout
+
+
+def write_plan(built: Built, name: str) -> str:
+    """A plan that names the target's libraries."""
+    path = built.program.parent / f"{name}.plan"
+    path.write_text(plan_text(name, built.libraries))
+    return str(path)
+
+
+def fly(built: Built, name: str, runs: int) -> list[bytes]:
+    """All values at all ticks, of each run."""
+    values = output(built, "values", write_plan(built, name), str(runs))
+    size = len(values) // runs
+    if not values or len(values) != size * runs:
+        raise CheckFailed(f"{built.target.name}: {name}: {len(values)} bytes of {runs} runs")
+    return [values[i * size : (i + 1) * size] for i in range(runs)]
+
+
+def first_difference(built: Built, name: str, one: bytes, other: bytes) -> str:
+    """Tick and value where two flights part."""
+    names = output(built, "names", write_plan(built, name)).decode().split()
+    words = (range(0, min(len(one), len(other)), _WORD_BYTES)) if one != other else range(0)
+    for at in words:
+        here, there = one[at : at + _WORD_BYTES], other[at : at + _WORD_BYTES]
+        if here != there:
+            tick, value = divmod(at // _WORD_BYTES, len(names))
+            return f"{name}, tick {tick}: {names[value]} is {here[::-1].hex()} there and {there[::-1].hex()} here"
+    return f"{name}: {len(one)} bytes there and {len(other)} here"
+
+
+def measure(builder: Builder, target: Target, patched: Path | None = None) -> tuple[Built, dict[str, list[bytes]]]:
+    """Builds, and flies every plan twice."""
+    built = builder.build(target, patched)
+    return built, {name: fly(built, name, 2) for name in PLANS}
+
+
+def difference(built: Built, flights: dict[str, list[bytes]], wanted: dict[str, bytes]) -> str | None:
+    """The first difference to the reference, or between two runs; None where all is equal."""
+    for name, (first, second) in flights.items():
+        if first != second:
+            return f"twice in a row: {first_difference(built, name, first, second)}"
+        if first != wanted[name]:
+            return first_difference(built, name, wanted[name], first)
+    return None
+
+
+def seeded(defect: Defect) -> Path:
+    """The simulator's file with the defect. Raises CheckFailed when there is nothing to change."""
+    text = (SIMULATOR / defect.file).read_text()
+    if text.count(defect.text) != 1:
+        raise CheckFailed(f"{defect.file} does not hold `{defect.text}` once; the control needs another text")
+    changed = FOLDER / "defects" / defect.name.split(": ")[1].replace(" ", "_") / defect.file
+    changed.parent.mkdir(parents=True, exist_ok=True)
+    changed.write_text(text.replace(defect.text, defect.instead))
+    return changed
+
+
+def control_builds() -> list[tuple[Target, Path | None]]:
+    return [
+        (with_flags(AARCH64, "control: contraction on aarch64", "-ffp-contract=fast"), None),
+        (with_flags(REFERENCE, "control: -ffast-math", "-ffast-math"), None),
+        *((with_flags(REFERENCE, d.name), seeded(d)) for d in DEFECTS),
+    ]
+
+
+def check(targets: Sequence[Target]) -> None:
+    """Raises CheckFailed, DiagnosticError, ToolchainError."""
+    with ThreadPoolExecutor(2) as pool, ThreadPoolExecutor(2) as shared:
+        builder = Builder(targets, shared)
+        started = [pool.submit(measure, builder, t) for t in targets]
+        controls = [(t, pool.submit(measure, builder, t, patched)) for t, patched in control_builds()]
+        wanted: dict[str, bytes] = {}
+        rows, seen = [], {}
+        for target, future in zip(targets, started, strict=True):
+            built, flights = future.result()
+            wanted = wanted or {name: runs[0] for name, runs in flights.items()}
+            found = difference(built, flights, wanted)
+            if found:
+                raise CheckFailed(f"{target.name}: {found}\n  there: {targets[0].line}\n  here:  {target.line}")
+            print(f"plant_bits: {target.name}: equal", flush=True)
+            rows.append({"target": target.name, "flags": target.line})
+        for target, control in controls:
+            built, flights = control.result()
+            found = difference(built, flights, wanted)
+            if not found:
+                raise CheckFailed(f"{target.name}: not found, and so this check finds nothing: {target.line}")
+            print(f"plant_bits: {target.name}: {found}", flush=True)
+            seen[target.name] = found
+    hashes = {name: hashlib.sha256(values).hexdigest() for name, values in wanted.items()}
+    for name, value in hashes.items():
+        print(f"{name:<10} {len(wanted[name]) // _WORD_BYTES:>9} values  {value}")
+    write_facts("plant_bits", {"flights": hashes, "targets": rows, "controls": seen})
+
+
+def main() -> int:
+    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser.add_argument("--all", action="store_true", default=scaled(False, True), help="more levels of optimisation")
+    given = parser.parse_args()
+    began = time.perf_counter()
+    try:
+        check(TARGETS + (MORE if given.all else []))
+    except CheckFailed as error:
+        print(f"plant_bits: {error}", file=sys.stderr)
+        return 1
+    print(f"plant_bits: done in {time.perf_counter() - began:.0f} s")
+    return 0
+
+
+if __name__ == "__main__":
+    sys.exit(main())

@@ -1,0 +1,105 @@
+# SPDX-License-Identifier: Apache-2.0
+"""The flights of the check `plant_bits`, as plans of the simulator (fcsl_sim/src/plan.h)."""
+
+from __future__ import annotations
+
+from functools import cache
+from pathlib import Path
+
+from fcsl_sim import load, plan
+
+from ..shared.cases import ROOT
+from .build import MACHINE
+
+_LANDER = ROOT / "examples/lander/sim/lander.sim.json"
+#: Steps a second of each integrator; 0: adaptive.
+_METHODS = {"euler": 300, "rk2": 200, "rk4": 100, "ab4": 700, "verlet": 250, "rk45": 0}
+#: x at the start, and rates are those of _METHODS times this.
+_PROBLEMS = {
+    "kepler": ([0.5, 0.0, 0.0, 3.0**0.5], 1),
+    "pleiades": (
+        [3, 3, -1, -3, 2, -2, 2, 3, -3, 2, 0, 0, -4, 4, 0, 0, 0, 0, 0, 1.75, -1.5, 0, 0, 0, -1.25, 1, 0, 0],
+        4,
+    ),
+}
+#: Their flights, seconds of 100 ticks.
+_SECONDS = 3
+PLANS = ("lander", "balls", *_PROBLEMS)
+
+
+def _bits(value: float) -> str:
+    return plan.bits("f64", float(value))
+
+
+def _groups(methods: dict[str, int], times: int) -> list[str]:
+    adaptive = [_bits(v) for v in (1e-8, 1e-8, 1e-7, 0.1)]
+    return [plan.statement("group", m, hz * times, *([_bits(0.0)] * 4 if hz else adaptive)) for m, hz in methods.items()]
+
+
+def _begin(ticks: int, models: dict[str, Path], machine: Path) -> list[str]:
+    return [
+        plan.library_statement("machine", MACHINE, machine),
+        plan.statement("seed", 1),
+        plan.statement("ticks", ticks),
+        *(plan.library_statement("model", name, library) for name, library in models.items()),
+    ]
+
+
+def _problem(name: str, libraries: dict[str, Path]) -> list[str]:
+    """One problem with every integrator."""
+    x, times = _PROBLEMS[name]
+    return [
+        *_begin(_SECONDS * 100, {"problem": libraries[name]}, libraries[MACHINE]),
+        *_groups(_METHODS, times),
+        *(plan.statement("instance", m, "problem", i, 0, 0, 0) for i, m in enumerate(_METHODS)),
+        *(plan.statement("call", m, "output") for m in _METHODS),
+        *(plan.statement("set", m, "parameters.x", i, _bits(v)) for m in _METHODS for i, v in enumerate(x)),
+    ]
+
+
+def _balls(libraries: dict[str, Path]) -> list[str]:
+    """Bouncing balls, each integrated in another way, of which noisy sensors see two; and a push on one of them by the controller."""
+    methods = {m: hz for m, hz in _METHODS.items() if m != "verlet"}
+    values = {"gravity": 9.81, "restitution": 0.7, "rest_speed": 0.05, "height": 0.5}
+    models = {name: libraries[name] for name in ("ball", "noisy_sensor")}
+    return [
+        *_begin(_SECONDS * 100, models, libraries[MACHINE]),
+        *_groups(methods, 1),
+        *(plan.statement("instance", m, "ball", i, 0, 0, 0) for i, m in enumerate(methods)),
+        "instance fast noisy_sensor - 1000 7 3",
+        "instance slow noisy_sensor - 100 1 0",
+        *(plan.statement("call", m, "stage") for m in methods),
+        "call fast update",
+        "call slow update",
+        *(plan.statement("set", m, f"parameters.{n}", 0, _bits(v)) for m in methods for n, v in values.items()),
+        *(plan.statement("set", s, "parameters.sigma", 0, _bits(0.1)) for s in ("fast", "slow")),
+        "link rk45 outputs.z fast inputs.truth",
+        "link ab4 outputs.v slow inputs.truth",
+        "sensor fast outputs.value altitude",
+        "sensor slow outputs.value velocity",
+        "actuator throttle rk4 inputs.push",
+        plan.statement("event", 1_234_567_891, "rk45", "inputs.push", 0, _bits(-1.5)),
+    ]
+
+
+@cache
+def _lander() -> list[str]:
+    """What `fcsl-sim` flies, but for its views."""
+    lines = load(_LANDER).plan.splitlines()
+    return [line for line in lines[1:-1] if not line.startswith("views ")]
+
+
+def _lander_plan(libraries: dict[str, Path]) -> list[str]:
+    lines = []
+    for line in _lander():
+        keyword, name = line.split()[:2]
+        is_library = keyword in ("machine", "model")
+        lines.append(plan.library_statement(keyword, name, libraries[name]) if is_library else line)
+    return lines
+
+
+def plan_text(name: str, libraries: dict[str, Path]) -> str:
+    """The plan of a flight, with these libraries."""
+    if name == "lander":
+        return plan.document(_lander_plan(libraries))
+    return plan.document(_balls(libraries) if name == "balls" else _problem(name, libraries))
