@@ -111,6 +111,7 @@ _PROTOTYPES: dict[str, tuple[type | None, list[type]]] = {
     "fcsl_sim_truth_schema": (c_char_p, [ptr, c_uint32]),
     "fcsl_sim_truth_message": (c_int64, [ptr, c_uint32, ptr, c_size_t]),
     "fcsl_sim_companion_count": (c_uint32, [ptr]),
+    "fcsl_sim_companion": (ptr, [ptr, c_uint32]),
     "fcsl_sim_companion_name": (c_char_p, [ptr, c_uint32]),
     "fcsl_sim_companion_state": (c_char_p, [ptr, c_uint32, POINTER(c_uint64)]),
     "fcsl_sim_place": (c_char_p, [ptr, POINTER(c_char_p), POINTER(c_uint64)]),
@@ -269,6 +270,12 @@ class Simulation:
             raise SimError(str(error)) from None
         base = self._lib.fcsl_sim_machine_data(self.handle())
         return read_part(part, lambda offset, size: ctypes.string_at(base + offset, size), self.machine)
+
+    def companion_runs(self) -> dict[str, int]:
+        """Address of the fcsl_run_t of each controller beside the first one, by its name; as `hosted`."""
+        numbers = range(self._lib.fcsl_sim_companion_count(self.handle()))
+        names = (self._lib.fcsl_sim_companion_name(self.handle(), i).decode() for i in numbers)
+        return {name: int(self._lib.fcsl_sim_companion(self.handle(), i)) for i, name in enumerate(names)}
 
     def companions(self) -> dict[str, tuple[str, int]]:
         """State and completed ticks of each controller beside the first one, by its name."""

@@ -1,23 +1,24 @@
 # SPDX-License-Identifier: Apache-2.0
 """A simulation behind the interface of a run (simclient.run.Run): one descriptor for the hosted machine and all models.
 
-The descriptor is of a virtual memory: the machine struct, then the struct of each instance of a model. A field of the
-machine has its own path and number, one of a model the path `<instance>.<path>`.
+The descriptor is of a virtual memory: the machine struct, then those of further controllers, then the struct of each
+instance of a model. A field of the machine has its own path and number, one of another controller the path
+`<controller>.<path>`, one of a model `<instance>.<path>`.
 """
 
 from __future__ import annotations
 
 from bisect import bisect_right
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from contextlib import contextmanager
-from ctypes import c_char
+from ctypes import byref, c_char
 from dataclasses import dataclass, replace
 from itertools import groupby
 from pathlib import Path
 
 from fcsl_compiler.base.files import digest
 from fcsl_compiler.model.types import count_of, scalar_of, shape_of
-from simclient.descriptor import Field, Machine
+from simclient.descriptor import Field, Machine, read_machine
 from simclient.errors import TwinError
 from simclient.forks import for_children, not_for_children
 from simclient.run import Run
@@ -46,11 +47,13 @@ def twin_errors() -> Iterator[None]:
 
 @dataclass(frozen=True)
 class _Region:
-    """A struct at `begin` of the virtual memory; `instance` is empty for that of the machine."""
+    """A struct at `begin` of the virtual memory: of an instance of a model, or of the controller whose fcsl_run_t is at `run`.
+    `name` is empty for the first controller."""
 
-    instance: str
+    name: str
     begin: int
     memory: memoryview
+    run: int | None
 
 
 class SimRun(Run):
@@ -61,48 +64,67 @@ class SimRun(Run):
         with twin_errors():
             self._simulation = Simulation(config.plan, config.tables)
         self._regions: list[_Region] = []
+        self._firsts: list[int] = []  # by region: the number of its first field
         self._traces: list[SimTrace] = []
         super().__init__(config.library, config.machine.name)
-        self._only = self.machine
-        self._place(self._data)
-        for instance in self._simulation.instances:
-            fields = config.tables[instance].fields.values()
-            size = max((field.offset + _size(field) for field in fields), default=0)
-            address = self._simulation.instance_data(instance)
-            self._place(memoryview((c_char * size).from_address(address)).cast("B"), instance)
+        #: By name; the first one, whose name is empty here, leads.
+        self._machines = {"": self.machine}
+        self._place("", self.address, self.machine.size, self.handle())
+        for name, run in self._simulation.companion_runs().items():
+            machine = self._machines[name] = read_machine(self._lib.fcsl_run_machine(run))
+            self._place(name, self._lib.fcsl_run_data(run), machine.size, run)
+        for name in self._simulation.instances:
+            size = max((field.offset + _size(field) for field in config.tables[name].fields.values()), default=0)
+            self._place(name, self._simulation.instance_data(name), size, None)
         self._begins = [region.begin for region in self._regions]
-        self._sources = _Sources(config.plan, self._only)
+        self._sources = _Sources(config.plan, self._machines)
         self.machine = self._combined()
         self._fields = tuple(self.machine.fields.values())
 
     def _open(self, library: Path, machine: str | None) -> int | None:
         return self._simulation.hosted()
 
-    def _place(self, memory: memoryview, instance: str = "") -> None:
+    def _place(self, name: str, address: int, size: int, run: int | None) -> None:
         last = self._regions[-1] if self._regions else None
         begin = last.begin + len(last.memory) + _GAP_BYTES if last else 0
-        self._regions.append(_Region(instance, begin, memory))
+        memory = memoryview((c_char * size).from_address(address)).cast("B")
+        self._regions.append(_Region(name, begin, memory, run))
 
     def _combined(self) -> Machine:
-        """The descriptor of the virtual memory. Raises TwinError for a model's field whose path the machine has."""
-        machine = self._only
-        fed = self._sources.of_machine
-        fields = {
-            path: replace(f, connected_from=fed.get(path, f.connected_from)) for path, f in machine.fields.items()
-        }
-        for region in self._regions[1:]:
-            for found in self.config.tables[region.instance].fields.values():
-                path = f"{region.instance}.{found.path}"
-                if path in fields:
-                    raise TwinError(f"`{path}` is in the machine and in a model; rename instance `{region.instance}`")
-                fields[path] = _field(len(fields), region, found, self._sources.of_models.get(path, ""))
+        """The descriptor of the virtual memory. Raises TwinError for two fields with the same path."""
+        fields: dict[str, Field] = {}
+        for region in self._regions:
+            self._firsts.append(len(fields))
+            if region.run is not None:
+                rows = [self._of_machine(region, field) for field in self._machines[region.name].fields.values()]
+            else:
+                rows = [_of_model(region, field) for field in self.config.tables[region.name].fields.values()]
+            for row in rows:
+                if row.path in fields:
+                    raise TwinError(f"`{row.path}` is in the machine and in a model; rename instance `{region.name}`")
+                source = self._sources.of_fields.get(row.path, row.connected_from)
+                fields[row.path] = replace(row, index=len(fields), connected_from=source)
         last = self._regions[-1]
-        layout = [f"{f.path} {f.type_text} {f.offset}" for f in fields.values()]
+        layout = [f"{field.path} {field.type_text} {field.offset}" for field in fields.values()]
+        machine = self._machines[""]
+        size, layout_hash = last.begin + len(last.memory), digest(machine.layout_hash, *layout)
+        return replace(machine, size=size, fields=fields, layout_hash=layout_hash)
+
+    def _of_machine(self, region: _Region, field: Field) -> Field:
+        """The row of a controller's field. States and requests of another machine than the first one are numbers."""
+        if not region.name:
+            return field
+        one, lead = self._machines[region.name], self._machines[""]
+        same = one.states == lead.states and one.requests == lead.requests
+        numbered = field.type in ("state", "TransitionRequest") and not same
+        source = field.connected_from
         return replace(
-            machine,
-            size=last.begin + len(last.memory),
-            fields=fields,
-            layout_hash=digest(machine.layout_hash, *layout),
+            field,
+            path=f"{region.name}.{field.path}",
+            type="i32" if numbered else field.type,
+            offset=region.begin + field.offset,
+            instance=f"{region.name}.{field.instance}" if field.instance else "",
+            connected_from=f"{region.name}.{source}" if source in one.fields else source,
         )
 
     # ---- life -------------------------------------------------------------------------------------------------------
@@ -138,23 +160,32 @@ class SimRun(Run):
         return bytes(region.memory[at : at + size])
 
     def is_fed(self, field: Field) -> bool:
-        """Whether the simulation writes this field: a channel of the machine, or a connected input of a model."""
-        return field.index >= len(self._only.fields) or field.path in self._sources.of_machine
+        """Whether the simulation writes this field: a channel of a machine, or a connected input of a model."""
+        return field.path in self._sources.of_fields
 
     def check_set(self, field: int, element: int, data: bytes) -> None:
-        if field < len(self._only.fields):
-            super().check_set(field, element, data)
+        region, number, _ = self._find(field)
+        if region.run is not None:
+            check = self._lib.fcsl_run_check_set
+            self._check(check(region.run, number, element, data, len(data), byref(self._error)))
 
     def set(self, field: int, element: int, data: bytes) -> None:
-        if field < len(self._only.fields):
-            super().set(field, element, data)
+        region, number, at = self._find(field)
+        if region.run is not None:
+            write = self._lib.fcsl_run_set
+            self._check(write(region.run, number, element, data, len(data), byref(self._error)))
             return
-        self.handle()
         target = self._fields[field]
-        region = self._regions[bisect_right(self._begins, target.offset) - 1]
-        at = target.offset - region.begin + element * (target.size // target.count)
         with twin_errors():
-            self._simulation.write(region.instance, at, data)
+            self._simulation.write(region.name, at + element * (target.size // target.count), data)
+
+    def _find(self, field: int) -> tuple[_Region, int, int]:
+        """The struct of a field, its number among the fields of that, and its offset in that."""
+        self.handle()
+        offset = self._fields[field].offset
+        place = bisect_right(self._begins, offset) - 1
+        region = self._regions[place]
+        return region, field - self._firsts[place], offset - region.begin
 
     def save(self) -> bytes:
         """The virtual memory."""
@@ -309,42 +340,53 @@ class SimTrace:
 
 
 class _Sources:
-    """What feeds the channels of the machine and the inputs of models, from the plan (src/plan.h)."""
+    """What feeds fields of machines and inputs of models, from the plan (src/plan.h)."""
 
-    def __init__(self, plan: str, machine: Machine):
-        #: `<instance>.<output>` by sensor channel, and by the path of the channel's field.
+    def __init__(self, plan: str, machines: Mapping[str, Machine]):
+        #: `<instance>.<output>` by sensor channel of the first controller.
         self.of_channels: dict[str, str] = {}
-        #: `<instance>.<output>` or `controller.<channel>` by the path of an input.
-        self.of_models: dict[str, str] = {}
+        #: The path of an output, or `<controller>.<channel>`, by the path of a field.
+        self.of_fields: dict[str, str] = {}
+        channels = {
+            (name, channel.name): f"{name}.{channel.field.path}".removeprefix(".")
+            for name, machine in machines.items()
+            for channel in machine.channels
+        }
         for line in plan.splitlines():
             word, *rest = line.split(" ")
             if word == "link":
-                self.of_models[f"{rest[2]}.{rest[3]}"] = f"{rest[0]}.{rest[1]}"
+                self.of_fields[f"{rest[2]}.{rest[3]}"] = f"{rest[0]}.{rest[1]}"
             elif word == "actuator":
-                self.of_models[f"{rest[1]}.{rest[2]}"] = f"controller.{rest[0]}"
+                self.of_fields[f"{rest[1]}.{rest[2]}"] = f"controller.{rest[0]}"
+            elif word == "companion_actuator":
+                self.of_fields[f"{rest[2]}.{rest[3]}"] = f"{rest[0]}.{rest[1]}"
             elif word == "sensor":
-                self.of_channels[rest[2]] = f"{rest[0]}.{rest[1]}"
-        fields = {channel.name: channel.field.path for channel in machine.channels}
-        self.of_machine = {fields[name]: source for name, source in self.of_channels.items()}
+                self.of_channels[rest[2]] = self.of_fields[channels["", rest[2]]] = f"{rest[0]}.{rest[1]}"
+            elif word == "companion_sensor":
+                self.of_fields[channels[rest[2], rest[3]]] = f"{rest[0]}.{rest[1]}"
+            elif word == "read":
+                self.of_fields[f"{rest[1]}.{rest[2]}"] = rest[0]
+            elif word == "write":
+                self.of_fields[rest[2]] = f"{rest[0]}.{rest[1]}"
 
 
 def _size(field: ModelField) -> int:
     return count_of(field.type) * _BYTES[scalar_of(field.type).name]
 
 
-def _field(index: int, region: _Region, found: ModelField, source: str) -> Field:
-    """The row of a model's field in the combined descriptor."""
+def _of_model(region: _Region, found: ModelField) -> Field:
+    """The row of a model's field; its number and its source come later."""
     return Field(
-        index=index,
-        path=f"{region.instance}.{found.path}",
+        index=0,
+        path=f"{region.name}.{found.path}",
         role=found.role,
         type=scalar_of(found.type).name,
         shape=shape_of(found.type),
         count=count_of(found.type),
         offset=region.begin + found.offset,
         size=_size(found),
-        instance=region.instance,
-        connected_from=source,
+        instance=region.name,
+        connected_from="",
         unit=found.unit,
         doc=found.doc,
         writable=found.role != "output",

@@ -19,7 +19,8 @@ static const double NS_PER_S = 1e9;
 
 static double *states_of(const fcsl_instance_state_t *instance)
 {
-    return (double *)(void *)(instance->data + instance->model->continuous_offset); /* its alignment was checked at load */
+    return (double *)(void *)(instance->data +
+                              instance->model->continuous_offset); /* its alignment was checked at load */
 }
 
 static const double *part_of(const fcsl_instance_state_t *instance, const double *x)
@@ -104,6 +105,25 @@ static void slope(void *context, double t, const double *x, double *dx)
         fcsl_sim_enter(sim, group->derived[i], FCSL_IN_DERIVATIVE);
         instance->model->derivative(instance->data, t, x + instance->first_state, dx + instance->first_state);
     }
+}
+
+/* The slope of a group of one instance, with nothing to evaluate or copy before. */
+static void slope_of_one(void *context, double t, const double *x, double *dx)
+{
+    const fcsl_group_t *group = context;
+    fcsl_sim_enter(group->sim, group->derived[0], FCSL_IN_DERIVATIVE);
+    group->derivative(group->derivative_of, t, x, dx);
+}
+
+static fcsl_slope_t choose_slope(fcsl_group_t *group)
+{
+    const fcsl_instance_state_t *first = &group->sim->instances[group->derived[0]];
+    if (group->derived_count != 1u || group->stage_count > 0 || first->inner_count > 0) {
+        return slope;
+    }
+    group->derivative = first->model->derivative;
+    group->derivative_of = first->data;
+    return slope_of_one;
 }
 
 void fcsl_group_events(fcsl_group_t *group, double t, const double *x, double *value)
@@ -290,7 +310,7 @@ int fcsl_group_advance(fcsl_group_t *group, int64_t time_ns, int64_t barrier_ns,
 
 int fcsl_group_open(fcsl_group_t *group, fcsl_sim_t *sim, fcsl_error_t *error)
 {
-    const size_t n = group->n;
+    const size_t n = fcsl_vector_room(group->n);
     const size_t events = group->event_count;
     group->sim = sim;
     group->memory = calloc(4u * n + 3u * events + fcsl_integrator_memory(group->n) + 1u, sizeof(double));
@@ -302,10 +322,10 @@ int fcsl_group_open(fcsl_group_t *group, fcsl_sim_t *sim, fcsl_error_t *error)
     group->x1 = at + n;
     group->probe = at + 2u * n;
     group->atol = at + 3u * n;
-    group->g = at + 4u * n;
+    group->g = at + 4u * n + fcsl_integrator_memory(group->n);
     group->g1 = group->g + events;
     group->g_probe = group->g1 + events;
-    fcsl_integrator_init(&group->integrator, group->plan->method, group->n, slope, group, group->g_probe + events);
+    fcsl_integrator_init(&group->integrator, group->plan->method, group->n, choose_slope(group), group, at + 4u * n);
     group->integrator.blocks = group->blocks;
     group->integrator.block_count = group->derived_count;
     for (uint32_t i = 0; i < group->n; i++) {

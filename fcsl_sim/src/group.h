@@ -6,6 +6,7 @@
 #ifndef FCSL_SIM_GROUP_H
 #define FCSL_SIM_GROUP_H
 
+#include "fcsl/fcsl_model.h"
 #include "integrate.h"
 #include "plan.h"
 
@@ -44,6 +45,8 @@ struct fcsl_group {
     uint8_t *crossing;    /* by event: fcsl_crossing_t */
     uint8_t *fired;       /* by event: among those of now */
     uint32_t *derived;    /* instances with continuous states */
+    void (*derivative)(const void *self, double t, const double *x, double *dx); /* of a single one, else null */
+    const void *derivative_of; /* its struct */
     uint32_t *blocks;     /* how many each of them has */
     uint32_t derived_count;
     uint32_t *eventful;   /* instances with events */
@@ -72,7 +75,7 @@ int fcsl_group_open(fcsl_group_t *group, struct fcsl_sim *sim, fcsl_error_t *err
 int fcsl_group_check(fcsl_group_t *group, fcsl_error_t *error);
 void fcsl_group_free(fcsl_group_t *group);
 
-/* At time 0, before the first tick: from these values on events are watched. */
+/* After init, with the inputs of the beginning: from these values on events are watched. */
 void fcsl_group_start(fcsl_group_t *group);
 /* Brings all states of the group to `time_ns`, and handles its events until then. No step goes beyond `barrier_ns`, when inputs may
  * jump; time_ns <= barrier_ns. Returns 0, or -1. */
@@ -87,8 +90,14 @@ void fcsl_group_restore(fcsl_group_t *group, const fcsl_group_state_t *state, co
 
 /* The outputs that events need, then the event functions, at t (s) for states x. */
 void fcsl_group_events(fcsl_group_t *group, double t, const double *x, double *value);
-/* Whether event number `event` of the group happens where its function goes from `before` to `after`. */
-int fcsl_group_crosses(const fcsl_group_t *group, uint32_t event, double before, double after);
+/* Whether event number `event` of the group happens where its function goes from `before` to `after`. Zero belongs to the side
+ * from which the function came, and counts as crossed only once it has been left. */
+static inline int fcsl_group_crosses(const fcsl_group_t *group, uint32_t event, double before, double after)
+{
+    const uint8_t crossing = group->crossing[event];
+    return ((crossing & FCSL_FALLING) != 0 && before >= 0.0 && after < 0.0) ||
+           ((crossing & FCSL_RISING) != 0 && before <= 0.0 && after > 0.0);
+}
 int fcsl_group_any_crosses(const fcsl_group_t *group, const double *before, const double *after);
 /* The states at the present, into the models; and from them. */
 void fcsl_group_scatter(const fcsl_group_t *group, const double *x);

@@ -25,14 +25,6 @@ static const fcsl_instance_state_t *instance_of(const fcsl_group_t *group, uint3
     return instance;
 }
 
-/* Zero belongs to the side from which the function came, and counts as crossed only once it has been left. */
-int fcsl_group_crosses(const fcsl_group_t *group, uint32_t event, double before, double after)
-{
-    const uint8_t crossing = group->crossing[event];
-    return ((crossing & FCSL_FALLING) != 0 && before >= 0.0 && after < 0.0) ||
-           ((crossing & FCSL_RISING) != 0 && before <= 0.0 && after > 0.0);
-}
-
 int fcsl_group_any_crosses(const fcsl_group_t *group, const double *before, const double *after)
 {
     for (uint32_t i = 0; i < group->event_count; i++) {
@@ -158,11 +150,12 @@ static int check_chatter(fcsl_group_t *group, uint32_t event, fcsl_error_t *erro
     }
     uint32_t number = 0;
     const fcsl_instance_state_t *instance = instance_of(group, event, &number);
-    return fcsl_sim_fail(error,
-                         "chattering at %.9f s: event `%s` of `%s` is the last of %u events in a row, each at most %u ns "
-                         "after the one before; let `reset` change a state that ends this, such as a ball at rest",
-                         (double)state->time_ns / NS_PER_S, instance->model->events[number].name, instance->name,
-                         FCSL_CHATTER_EVENTS, FCSL_CHATTER_NS);
+    return fcsl_sim_fail(
+        error,
+        "chattering at %.9f s: event `%s` of `%s` is the last of %u events in a row, each at most %u ns "
+        "after the one before; let `reset` change a state that ends this, such as a ball at rest",
+        (double)state->time_ns / NS_PER_S, instance->model->events[number].name, instance->name, FCSL_CHATTER_EVENTS,
+        FCSL_CHATTER_NS);
 }
 
 static int reset(fcsl_group_t *group, uint32_t event, fcsl_error_t *error)

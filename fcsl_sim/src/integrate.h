@@ -30,14 +30,20 @@ typedef struct {
     void *context;
     fcsl_method_t method;
     uint32_t n;
-    double *stage; /* n doubles */
+    double *stage; /* a vector */
     const uint32_t *blocks; /* Verlet: the states come in blocks, of as many positions and then their velocities */
     uint32_t block_count;
-    double *k[FCSL_SLOPES]; /* n doubles each; k[0] is f at the beginning of the step */
+    double *k[FCSL_SLOPES]; /* vectors; k[0] is f at the beginning of the step */
     /* Carried from step to step, until fcsl_integrator_restart. */
     uint8_t has_slope; /* k[0] is known */
     uint8_t kept; /* AB4: k[1..kept] are those of the last steps, newest first */
 } fcsl_integrator_t;
+
+/* Vectors are computed in pairs: they have room for an even number of doubles, with a zero behind an odd n. */
+static inline size_t fcsl_vector_room(uint32_t n)
+{
+    return (size_t)n + n % 2u;
+}
 
 /* Doubles that fcsl_integrator_init takes from `memory`. */
 size_t fcsl_integrator_memory(uint32_t n);
@@ -47,8 +53,8 @@ void fcsl_integrator_init(fcsl_integrator_t *integrator, fcsl_method_t method, u
 /* Forgets what was carried over: after a jump of a state or an input. */
 void fcsl_integrator_restart(fcsl_integrator_t *integrator);
 
-/* x1 from x0 at t, h seconds later, by a method of fixed steps. Any number of steps may be tried from one x0, with other h; AB4
- * uses its history for a `regular` one only, whose size is that of the steps before, and RK4 else. */
+/* x1 from x0 at t, h seconds later, by a method of fixed steps; two vectors. Any number of steps may be tried from one x0, with
+ * other h; AB4 uses its history for a `regular` one only, whose size is that of the steps before, and RK4 else. */
 void fcsl_integrator_step(fcsl_integrator_t *integrator, double t, double h, int regular, const double *x0, double *x1);
 /* The last step tried counts: x1 is the x0 of the next one. */
 void fcsl_integrator_accept(fcsl_integrator_t *integrator, int regular);

@@ -216,6 +216,7 @@ static int init_models(fcsl_sim_t *sim, fcsl_error_t *error)
         if (fcsl_group_check(&sim->groups[i], error)) {
             return -1;
         }
+        fcsl_group_start(&sim->groups[i]);
     }
     fcsl_sim_enter(sim, 0, FCSL_IN_NONE);
     return 0;
@@ -307,9 +308,6 @@ int fcsl_sim_sense_message(fcsl_sim_t *sim, uint8_t *bytes, size_t capacity, fcs
         return -1;
     }
     sim->failed = 0;
-    for (uint32_t i = 0; sim->tick == 0 && i < sim->group_count; i++) {
-        fcsl_group_start(&sim->groups[i]);
-    }
     fcsl_sensors_sample(sim, sim->sensors, sim->sensor_count, sim->select, sim->machine->channel_count);
     sim->sensed = 1;
     const fcsl_message_status_t status = fcsl_message_encode_sensors(fcsl_run_channels(sim->run), sim->image, sim->tick,

@@ -30,7 +30,7 @@ _INCLUDES = (
     *(ROOT / f"{package}/include" for package in ("fcsl_hal", "fcsl_runtime/fcsl_runtime", "fcsl_sim")),
     *(SIMULATOR, _RUNTIME, _RUNTIME / "run", _HAL),
 )
-_LINK = ("-Wl,--unresolved-symbols=ignore-all", "-Wl,-z,lazy", "-lm", "-ldl", "-lpthread")
+_LINK = ("-no-pie", "-Wl,--unresolved-symbols=ignore-all", "-lm", "-ldl", "-lpthread")
 #: By name: source, and the flags that select what is in it.
 MODELS = {
     "lander_plant": (ROOT / "examples/lander/sim/lander_plant.c", ()),
