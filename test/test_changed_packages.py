@@ -11,7 +11,7 @@ sys.path.insert(0, str(ROOT / "scripts"))
 from changed_packages import manifests, touched  # noqa: E402
 
 ALL = sorted(manifests(ROOT))
-EXAMPLES = ["ahrs", "arming", "lander", "minimal", "thermal_guard"]
+EXAMPLES = ["ahrs", "arming", "lander", "minimal", "models", "thermal_guard"]
 
 
 @pytest.mark.parametrize(

@@ -47,8 +47,8 @@ def twin_errors() -> Iterator[None]:
 
 @dataclass(frozen=True)
 class _Region:
-    """A struct at `begin` of the virtual memory: of an instance of a model, or of the controller whose fcsl_run_t is at `run`.
-    `name` is empty for the first controller."""
+    """A struct at `begin` of the virtual memory: of an instance of a model, or of the controller whose fcsl_run_t is at
+    `run`. `name` is empty for the first controller."""
 
     name: str
     begin: int
@@ -286,8 +286,8 @@ class SimRun(Run):
         if source is not None:
             where = source.partition(".")[0]
             raise TwinError(
-                f"channel `{name}` gets its samples from `{source}`; set a parameter of `{where}`, or leave the connection "
-                "out: in a file that extends this one, with other `connections`"
+                f"channel `{name}` gets its samples from `{source}`; set a parameter of `{where}`, or leave the "
+                "connection out: in a file that extends this one, with other `connections`"
             )
         super().write_channel(channel, data, age_ticks, stamp_ns)
 

@@ -6,8 +6,8 @@
         twin.run_until("lander.outputs.landed", timeout_ticks=20_000)
         assert twin.get("lander.outputs.touchdown_speed") < 2.0
 
-The paths of the machine are its own; those of a model begin with its instance. After tick k a model has the values of the
-time of tick k, t_k, at which the machine has read its sensors.
+The paths of the machine are its own; those of a model begin with its instance. After tick k a model has the values of
+t_k, the time of tick k, at which the machine has read its sensors.
 """
 
 from __future__ import annotations
@@ -82,8 +82,8 @@ class SimTwin(AlgTwin):
     def from_instances(cls, path: str | Path, instances: Sequence[str], target: str = "simulation") -> Self:
         """Always raises TwinError: a simulation is flown whole."""
         raise TwinError(
-            f"{path}: a simulation is flown whole; write a file with fewer models, with `tick_hz` in place of `controller` "
-            "for the plant alone, or open a part of its machine with AlgTwin.from_instances()"
+            f"{path}: a simulation is flown whole; write a file with fewer models, with `tick_hz` in place of "
+            "`controller` for the plant alone, or open a part of its machine with AlgTwin.from_instances()"
         )
 
     @classmethod
@@ -96,7 +96,7 @@ class SimTwin(AlgTwin):
         """The checked simulation: its plan, tables of models, seed, warnings."""
         return self._sim_run.config
 
-    # ---- the names of the specification -------------------------------------------------------------------------------
+    # ---- the names of the specification -----------------------------------------------------------------------------
 
     step = Twin.tick
     get = Twin.get_value
@@ -112,8 +112,8 @@ class SimTwin(AlgTwin):
             shown = [f"{field.path} (from {field.connected_from})" for field in fed[:_SHOWN]]
             more = [f"{len(fed) - _SHOWN} more"] if len(fed) > _SHOWN else []
             warn(
-                f"{', '.join(shown + more)}: the simulation feeds it, and overwrites this value in the next tick; set a "
-                "parameter of the source, or leave the connection out: in a file that extends this one, with other "
+                f"{', '.join(shown + more)}: the simulation feeds it, and overwrites this value in the next tick; set "
+                "a parameter of the source, or leave the connection out: in a file that extends this one, with other "
                 "`connections`",
                 _PACKAGE,
             )
@@ -151,7 +151,7 @@ def _seconds(duration: Any) -> Fraction | None:
 
 
 class SimBlackBox(BlackBox):
-    """The last ticks of a SimTwin, as CSV: all fields of machine and models. The seed repeats the flight, so there is no bag."""
+    """The last ticks of a SimTwin, as CSV: all fields of machine and models; the seed repeats the flight."""
 
     def note(self, before: int, what: str, arguments: tuple[Any, ...]) -> None:
         """Does nothing: a CSV file has no actions."""

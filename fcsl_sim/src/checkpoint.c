@@ -205,6 +205,17 @@ static int is_companion_possible(const fcsl_companion_t *companion, const fcsl_s
     return companion->next_tick_ns > sim->time_ns && fcsl_grid_time_ns(tick - 1u, hz) <= sim->time_ns;
 }
 
+/* Where an instance is a machine, its struct holds what a machine may hold. */
+static int is_machine_possible(const fcsl_sim_t *sim, const fcsl_instance_state_t *instance)
+{
+    for (uint32_t i = 0; i < sim->plan.model_count; i++) {
+        if (sim->models[i] == instance->model && sim->machine_models[i]) {
+            return fcsl_machine_model_takes(sim->machine_models[i], instance->data);
+        }
+    }
+    return 1;
+}
+
 /* Whether the restored plant is at one instant of this simulation. Its vectors and numbers may be any. */
 static int is_possible(const fcsl_sim_t *sim, uint64_t machine_tick)
 {
@@ -214,7 +225,8 @@ static int is_possible(const fcsl_sim_t *sim, uint64_t machine_tick)
     for (uint32_t i = 0; possible && i < sim->instance_count; i++) {
         const fcsl_model_t *model = sim->instances[i].model;
         possible =
-            is_update_possible(sim, i, now_ns) && are_bools(model->fields, model->field_count, sim->instances[i].data);
+            is_update_possible(sim, i, now_ns) && are_bools(model->fields, model->field_count, sim->instances[i].data) &&
+                   is_machine_possible(sim, &sim->instances[i]);
     }
     for (uint32_t i = 0; possible && i < sim->companion_count; i++) {
         possible = is_companion_possible(&sim->companions[i], sim);

@@ -101,3 +101,9 @@ int fcsl_machine_model_init(const fcsl_machine_model_t *model, void *self, fcsl_
 {
     return model->machine->init(self) == 0 ? 0 : fcsl_sim_fail(error, "`start` of `%s` faults", model->machine->name);
 }
+
+int fcsl_machine_model_takes(const fcsl_machine_model_t *model, const void *self)
+{
+    fcsl_error_t error; /* the run's own struct is not used otherwise */
+    return fcsl_run_restore(model->run, self, model->machine->size, &error) == 0;
+}

@@ -18,4 +18,7 @@ const fcsl_model_t *fcsl_machine_model_of(const fcsl_machine_model_t *model);
 /* Binds the parameters of the machine JSON and runs `start`, in the struct of an instance. Returns 0, or -1: `start` faults. */
 int fcsl_machine_model_init(const fcsl_machine_model_t *model, void *self, fcsl_error_t *error);
 
+/* Whether a struct from a checkpoint is one of the machine's: no state, no enumeration has an impossible value. */
+int fcsl_machine_model_takes(const fcsl_machine_model_t *model, const void *self);
+
 #endif /* FCSL_SIM_MACHINE_MODEL_H */

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""SimTwin: values, traces and conditions of machine and models; plants without a controller; checkpoints, bit for bit."""
+"""SimTwin: values, traces and conditions of machine and models; plants without a controller; checkpoints."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ import sys
 import time
 import warnings
 import zlib
-from collections.abc import Callable, Iterator
+from collections.abc import Iterator
 from pathlib import Path
 from typing import Any
 
@@ -369,6 +369,37 @@ def test_snapshots_show_what_changed(plant: SimTwin) -> None:
     assert before["ball.parameters.restitution"] == 0.8 and before.values["ramp"]["state"]["x"] == 0.0
 
 
+def test_further_controllers_have_their_fields_below_their_names(tmp_path: Path) -> None:
+    machine = "package://lander/fc/lander_control.json"
+    connections = json.loads(FLIGHT.read_text())["connections"]
+    measured = [c | {"to": c["to"].replace("controller", "spare")} for c in connections if "controller." in c["to"]]
+    lead = json.loads(json.dumps(connections).replace("controller.", "main."))
+    config = {
+        "extends": "package://lander/sim/lander.sim.json",
+        "controller": None,
+        "controllers": {"main": {"machine": machine}, "spare": {"machine": machine}},
+        "connections": lead + measured,
+        "views": None,
+    }
+    path = write(tmp_path, config)
+    with SimTwin.from_config(path) as twin, SimTwin.from_config(path) as other:
+        twin.set("spare.ascent.parameters.target_altitude", 10.0)
+        assert twin.get("ascent.parameters.target_altitude") == 40.0
+        twin.tick(50)
+        saved = twin.save()
+        other.restore(saved)
+        with twin.trace("machine.state", "spare.machine.state", "spare.sensors.outputs.pos_z") as trace:
+            twin.run_until("spare.machine.state == 'COAST' and machine.state == 'ASCENT'", timeout_ticks=500)
+            twin.run_until("machine.state == 'COAST'", timeout_ticks=500)
+        assert trace["spare.machine.state"].tolist().index("COAST") < trace["machine.state"].tolist().index("COAST")
+        other.tick(len(trace))
+        assert twin.save() == other.save() and not diff(twin.snapshot(), other.snapshot())
+        with pytest.raises(TwinError, match="read-only"):
+            twin.set("spare.machine.tick", 0)
+        assert twin.describe("spare.sensors.outputs.pos_z").connected_from == "altimeter.outputs.value"
+        assert twin.describe("lander.inputs.throttle").connected_from == "controller.throttle"
+
+
 # ---- checkpoints -----------------------------------------------------------------------------------------------------
 
 
@@ -384,7 +415,11 @@ def everything(method: str) -> dict[str, Any]:
         "models": {"problem": {"source": "problem.c"}, "ball": {"source": "ball.c"}},
         "instances": {
             "lander": {"integrator": free},
-            "orbit": {"model": "problem", "integrator": tight, "parameters": {"p": [0.0], "x": [0.5, 0.0, 0.0, 3.0**0.5]}},
+            "orbit": {
+                "model": "problem",
+                "integrator": tight,
+                "parameters": {"p": [0.0], "x": [0.5, 0.0, 0.0, 3.0**0.5]},
+            },
             "ball": {"model": "ball", "integrator": free, "parameters": ball},
         },
         "rates": {"altimeter": {"hz": 50, "phase_s": 0.003}, "velocimeter": {"hz": 40, "phase_s": 0.012}},
@@ -630,9 +665,10 @@ def test_the_fixture_opens_twins_and_shows_the_last_ticks(tmp_path: Path) -> Non
 
 
 def test_simclient_has_it_and_says_where_it_is_missing() -> None:
-    run: Callable[[str], Any] = lambda code: subprocess.run(
-        [sys.executable, "-c", code], capture_output=True, text=True, check=False, timeout=60
-    )
+    def run(code: str) -> subprocess.CompletedProcess[str]:
+        line = [sys.executable, "-c", code]
+        return subprocess.run(line, capture_output=True, text=True, check=False, timeout=60)
+
     assert run("from simclient import SimTwin; print(SimTwin.__module__)").stdout == "fcsl_sim.sim_twin\n"
     missing = run("import sys; sys.modules['fcsl_sim'] = None; from simclient import SimTwin")
     assert missing.returncode == 1 and "ImportError: SimTwin is in the package `fcsl_sim`" in missing.stderr

@@ -17,6 +17,7 @@ ALONE = {
     "linear": "linear.main",
     "process": "process",
     "record": "record",
+    "simulator": "simulator.main",
     "telemetry": "telemetry",
     "twin": "twin",
     "vars": "vars.main",

@@ -31,6 +31,7 @@ from .subjects.process import process_rows, process_times
 from .subjects.record import record_rows, record_times
 from .subjects.replay_map import RATES_HZ, replay_map
 from .subjects.ros.main import DECIMATE, LOCKSTEP_DECIMATES, PICTURE, lockstep, realtime
+from .subjects.simulator.main import simulator_figures, simulator_rows
 from .subjects.telemetry import telemetry_figures, telemetry_rows
 from .subjects.twin import twin_rows, twin_times
 from .subjects.vars.main import vars_figures, vars_rows
@@ -59,7 +60,7 @@ def step_rows(step: dict[str, float]) -> Rows:
     ]
 
 
-def simulator_rows(factor: dict[str, float]) -> Rows:
+def factor_rows(factor: dict[str, float]) -> Rows:
     return [
         ("simulator, in process", f"{factor['plain']:.0f} × real time"),
         ("simulator, recording every output", f"{factor['recorded']:.0f} × real time"),
@@ -124,7 +125,13 @@ SECTIONS = (
     ),
     Section("wholes", "timing whole machines against the same by hand", measure_wholes, whole_rows),
     Section("linear", "timing filters beside CasADi, Numba and Eigen", linear_times, linear_rows),
-    Section("real_time_factor", "timing the simulator", real_time_factor, simulator_rows),
+    Section("real_time_factor", "timing the simulator", real_time_factor, factor_rows),
+    Section(
+        "simulator",
+        "integrating plants beside C by hand, landing a thousand times, flying a satellite beside JSBSim and Basilisk",
+        simulator_figures,
+        simulator_rows,
+    ),
     Section("wire", "sending messages beside MAVLink 2, and damaging them", wire_figures, wire_rows),
     Section("record", "recording", record_times, record_rows),
     Section("twin", "ticking twins from Python", lambda _: twin_times(), twin_rows),

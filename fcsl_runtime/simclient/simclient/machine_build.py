@@ -10,8 +10,10 @@ from .errors import TwinError
 
 
 def find_config(path: str | Path, caller: str = "", what: str = "machine config") -> Path:
-    """`path` relative to the working directory, else relative to the folder of the file `caller`. Raises TwinError, which
-    says that there is no such `what`."""
+    """`path` relative to the working directory, else relative to the folder of the file `caller`.
+
+    Raises TwinError, which says that there is no such `what`.
+    """
     wanted = Path(path)
     tried = [wanted]
     if not wanted.is_absolute() and caller and not caller.startswith("<"):

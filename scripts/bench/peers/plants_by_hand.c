@@ -98,15 +98,19 @@ INLINED void step_with_events(slope_t *slope, event_t *event, reset_t *reset, cr
 
 /* ---- loops ----------------------------------------------------------------------------------------------------------- */
 
-#define SLOPE(plant_)                                                                                                  \
+/* The derivative, inlined, and as a function of its own, of which the loop knows nothing. */
+#define SLOPES(plant_)                                                                                                 \
     INLINED void plant_##_slope(const void *plant, const double *x, double *dx)                                        \
+    {                                                                                                                  \
+        plant_##_derivative(plant, x, dx);                                                                             \
+    }                                                                                                                  \
+    static __attribute__((noipa)) void plant_##_slope_apart(const void *plant, const double *x, double *dx)            \
     {                                                                                                                  \
         plant_##_derivative(plant, x, dx);                                                                             \
     }
 
-#define SMOOTH(plant_, STATES_)                                                                                        \
-    SLOPE(plant_)                                                                                                      \
-    static void plant_##_run(void *self, uint64_t step, uint32_t steps)                                                \
+#define SMOOTH_LOOP(plant_, STATES_, run_, slope_)                                                                     \
+    static void run_(void *self, uint64_t step, uint32_t steps)                                                        \
     {                                                                                                                  \
         plant_##_t *plant = self;                                                                                      \
         const double h = 1.0 / HZ;                                                                                     \
@@ -114,13 +118,39 @@ INLINED void step_with_events(slope_t *slope, event_t *event, reset_t *reset, cr
         (void)step;                                                                                                    \
         memcpy(x, plant->state.x, sizeof plant->state.x);                                                              \
         for (uint32_t k = 0; k < steps; k++) {                                                                         \
-            rk4(plant_##_slope, plant, STATES_, h, x, x);                                                              \
+            rk4(slope_, plant, STATES_, h, x, x);                                                                      \
+        }                                                                                                              \
+        memcpy(plant->state.x, x, sizeof plant->state.x);                                                              \
+    }
+
+#define SMOOTH(plant_, STATES_)                                                                                        \
+    SLOPES(plant_)                                                                                                     \
+    SMOOTH_LOOP(plant_, STATES_, plant_##_run, plant_##_slope)                                                         \
+    SMOOTH_LOOP(plant_, STATES_, plant_##_run_apart, plant_##_slope_apart)
+
+#define EVENTFUL_LOOP(plant_, STATES_, EVENTS_, run_, slope_)                                                          \
+    static void run_(void *self, uint64_t step, uint32_t steps)                                                        \
+    {                                                                                                                  \
+        plant_##_t *plant = self;                                                                                      \
+        const double h = 1.0 / HZ;                                                                                     \
+        double x[STATES_MAX], x1[STATES_MAX], g[EVENTS_MAX], g1[EVENTS_MAX];                                           \
+        memcpy(x, plant->state.x, sizeof plant->state.x);                                                              \
+        plant_##_event(plant, x, g);                                                                                   \
+        for (uint32_t k = 0; k < steps; k++) {                                                                         \
+            rk4(slope_, plant, STATES_, h, x, x1);                                                                     \
+            plant_##_event(plant, x1, g1);                                                                             \
+            if (any(plant_##_crosses, EVENTS_, g, g1)) {                                                               \
+                plant_##_happens(plant, step + k, x, g);                                                               \
+                continue;                                                                                              \
+            }                                                                                                          \
+            memcpy(x, x1, (STATES_) * sizeof *x);                                                                      \
+            memcpy(g, g1, (EVENTS_) * sizeof *g);                                                                      \
         }                                                                                                              \
         memcpy(plant->state.x, x, sizeof plant->state.x);                                                              \
     }
 
 #define EVENTFUL(plant_, STATES_, EVENTS_)                                                                             \
-    SLOPE(plant_)                                                                                                      \
+    SLOPES(plant_)                                                                                                     \
     INLINED void plant_##_values(const void *plant, const double *x, double *value)                                    \
     {                                                                                                                  \
         plant_##_event(plant, x, value);                                                                               \
@@ -134,25 +164,8 @@ INLINED void step_with_events(slope_t *slope, event_t *event, reset_t *reset, cr
         step_with_events(plant_##_slope, plant_##_values, plant_##_jump, plant_##_crosses, plant, plant->state.x,      \
                          STATES_, EVENTS_, step, x, g);                                                                \
     }                                                                                                                  \
-    static void plant_##_run(void *self, uint64_t step, uint32_t steps)                                                \
-    {                                                                                                                  \
-        plant_##_t *plant = self;                                                                                      \
-        const double h = 1.0 / HZ;                                                                                     \
-        double x[STATES_MAX], x1[STATES_MAX], g[EVENTS_MAX], g1[EVENTS_MAX];                                           \
-        memcpy(x, plant->state.x, sizeof plant->state.x);                                                              \
-        plant_##_event(plant, x, g);                                                                                   \
-        for (uint32_t k = 0; k < steps; k++) {                                                                         \
-            rk4(plant_##_slope, plant, STATES_, h, x, x1);                                                             \
-            plant_##_event(plant, x1, g1);                                                                             \
-            if (any(plant_##_crosses, EVENTS_, g, g1)) {                                                               \
-                plant_##_happens(plant, step + k, x, g);                                                               \
-                continue;                                                                                              \
-            }                                                                                                          \
-            memcpy(x, x1, (STATES_) * sizeof *x);                                                                      \
-            memcpy(g, g1, (EVENTS_) * sizeof *g);                                                                      \
-        }                                                                                                              \
-        memcpy(plant->state.x, x, sizeof plant->state.x);                                                              \
-    }
+    EVENTFUL_LOOP(plant_, STATES_, EVENTS_, plant_##_run, plant_##_slope)                                              \
+    EVENTFUL_LOOP(plant_, STATES_, EVENTS_, plant_##_run_apart, plant_##_slope_apart)
 
 INLINED int falls(double before, double after)
 {
@@ -177,7 +190,7 @@ SMOOTH(quadrotor, QUADROTOR_STATES)
 SMOOTH(satellite, SATELLITE_STATES)
 
 #define BY_HAND(plant_, STATES_)                                                                                       \
-    {#plant_, plant_##_run, sizeof(plant_##_t), offsetof(plant_##_t, state.x), STATES_}
+    {#plant_, plant_##_run, plant_##_run_apart, sizeof(plant_##_t), offsetof(plant_##_t, state.x), STATES_}
 
 const by_hand_plant_t by_hand_plants[] = {
     BY_HAND(lander, LANDER_STATES),       BY_HAND(ball, BALL_STATES),           BY_HAND(bodies, BODIES_STATES),

@@ -21,6 +21,7 @@ typedef void by_hand_run_t(void *plant, uint64_t step, uint32_t steps);
 typedef struct {
     const char *name;
     by_hand_run_t *run;
+    by_hand_run_t *run_apart; /* with the derivative in a function of its own: what any library of models costs */
     size_t size;    /* of the struct */
     size_t states;  /* where they are in it */
     uint32_t count; /* of states */

@@ -19,18 +19,40 @@ FOLDER = OUT / "plant_bits"
 SIMULATOR = ROOT / "fcsl_sim" / "src"
 _RUNTIME, _HAL = ROOT / "fcsl_runtime/fcsl_runtime/src", ROOT / "fcsl_hal/src"
 #: Files of the simulator that move values to others, and compute none.
-_MOVERS = {"crash", "describe", "observers", "pace", "published", "ros_graph", "serve", "telemetry", "together", "topics"}
-#: The rest of what a flight calls: hosting a machine, and messages of channels. Not under test; recording, sockets and the bus
-#: are left out, and a call of one of their functions would end the program.
+_MOVERS = {
+    "crash",
+    "describe",
+    "observers",
+    "pace",
+    "published",
+    "ros_graph",
+    "serve",
+    "telemetry",
+    "together",
+    "topics",
+}
+#: The rest of what a flight calls: hosting a machine, and messages of channels. Not under test. Recording, sockets and the bus are
+#: left out: in their place are functions that end the program, but for those that close nothing.
 _CARRIERS = (
     *(_RUNTIME / "run", _RUNTIME / "base", _RUNTIME / "history", _RUNTIME / "messages"),
-    *(_HAL / f"{name}.c" for name in ("codec", "codec_check", "crc16", "crc32", "fcsl_hw", "gate", "payload", "plan_text")),
+    *(
+        _HAL / f"{name}.c"
+        for name in ("codec", "codec_check", "crc16", "crc32", "fcsl_hw", "gate", "payload", "plan_text")
+    ),
 )
 _INCLUDES = (
     *(ROOT / f"{package}/include" for package in ("fcsl_hal", "fcsl_runtime/fcsl_runtime", "fcsl_sim")),
     *(SIMULATOR, _RUNTIME, _RUNTIME / "run", _HAL),
 )
-_LINK = ("-no-pie", "-Wl,--unresolved-symbols=ignore-all", "-lm", "-ldl", "-lpthread")
+_STUB = """void {name}(const void *of);
+void {name}(const void *of)
+{{
+    if ({ends} || of != NULL) {{
+        (void)fputs("plant: {name} is left out here\\n", stderr);
+        abort();
+    }}
+}}
+"""
 #: By name: source, and the flags that select what is in it.
 MODELS = {
     "lander_plant": (ROOT / "examples/lander/sim/lander_plant.c", ()),
@@ -101,8 +123,22 @@ class Builder:
         ]
         libraries[MACHINE] = self._library(target, machine, shared[-1], folder / f"{MACHINE}.so")
         program = folder / "plant"
-        run([*target.compiler, *target.flags, *core, *shared, *_LINK, "-o", program])
+        stubs = self._stubs(target, [*core, *shared[:-1]], folder / "stubs.c")
+        run([*target.compiler, *target.flags, *core, stubs, *shared, "-lm", "-ldl", "-lpthread", "-o", program])
         return Built(target, program, libraries)
+
+    @staticmethod
+    def _stubs(target: Target, objects: Sequence[Path], source: Path) -> Path:
+        """An object that defines what these leave undefined of FCSL."""
+        names: dict[bool, set[str]] = {}
+        for line in run(["llvm-nm-19", "--no-sort", *objects]).splitlines():
+            words = line.split()
+            if len(words) >= 2 and words[-1].startswith("fcsl_"):
+                names.setdefault(words[-2] == "U", set()).add(words[-1])
+        missing = sorted(names[True] - names[False])
+        text = [_STUB.format(name=n, ends=int(not n.endswith(("_close", "_free")))) for n in missing]
+        source.write_text("\n".join(["#include <stdio.h>\n#include <stdlib.h>\n", *text]))
+        return _compile(target, ("-O1",), source, source.with_suffix(".o"), [])
 
     @staticmethod
     def _library(target: Target, objects: Sequence[Path], math: Path, made: Path) -> Path:

@@ -34,6 +34,7 @@ MORE = [
     *(cross(machine, ("-O0",)) for machine in ("aarch64", "riscv64")),
 ]
 _WORD_BYTES = 8
+_TICKS_MIN = 100
 _RUN_TIMEOUT_S = 600.0
 #: Where the loader of another processor finds its own libraries.
 _SYSROOTS = {"qemu-aarch64-static": "/usr/aarch64-linux-gnu", "qemu-riscv64-static": "/usr/riscv64-linux-gnu"}
@@ -67,14 +68,14 @@ def command(built: Built, *arguments: str) -> list[str]:
     return [*runner, str(built.program), *arguments]
 
 
-def output(built: Built, *arguments: str) -> bytes:
-    """What it prints. Raises CheckFailed."""
+def output(built: Built, *arguments: str) -> tuple[bytes, str]:
+    """What it prints, and what on standard error. Raises CheckFailed."""
     line = command(built, *arguments)
     done = subprocess.run(line, capture_output=True, timeout=_RUN_TIMEOUT_S, check=False)
+    words = done.stderr.decode(errors="replace")
     if done.returncode != 0:
-        words = done.stderr.decode(errors="replace")[-2000:]
-        raise CheckFailed(f"{built.target.name}: {' '.join(line)}: exit status {done.returncode}\n{words}")
-    return done.stdout
+        raise CheckFailed(f"{built.target.name}: {' '.join(line)}: exit status {done.returncode}\n{words[-2000:]}")
+    return done.stdout, words
 
 
 def write_plan(built: Built, name: str) -> str:
@@ -84,41 +85,42 @@ def write_plan(built: Built, name: str) -> str:
     return str(path)
 
 
-def fly(built: Built, name: str, runs: int) -> list[bytes]:
-    """All values at all ticks, of each run."""
-    values = output(built, "values", write_plan(built, name), str(runs))
-    size = len(values) // runs
-    if not values or len(values) != size * runs:
-        raise CheckFailed(f"{built.target.name}: {name}: {len(values)} bytes of {runs} runs")
-    return [values[i * size : (i + 1) * size] for i in range(runs)]
+def fly(built: Built, name: str) -> list[bytes]:
+    """All values at all ticks, of each of two runs. Raises CheckFailed."""
+    values, counts = output(built, "values", write_plan(built, name), "2")
+    ticks = [int(n) for n in counts.split()]
+    row = len(values) // sum(ticks)
+    if len(ticks) != 2 or min(ticks) < _TICKS_MIN or len(values) != row * sum(ticks):
+        raise CheckFailed(f"{built.target.name}: {name}: {len(values)} bytes of {ticks} ticks")
+    return [values[: ticks[0] * row], values[ticks[0] * row :]]
 
 
-def first_difference(built: Built, name: str, one: bytes, other: bytes) -> str:
+def first_difference(built: Built, name: str, there: bytes, here: bytes) -> str:
     """Tick and value where two flights part."""
-    names = output(built, "names", write_plan(built, name)).decode().split()
-    words = (range(0, min(len(one), len(other)), _WORD_BYTES)) if one != other else range(0)
-    for at in words:
-        here, there = one[at : at + _WORD_BYTES], other[at : at + _WORD_BYTES]
-        if here != there:
+    names = output(built, "names", write_plan(built, name))[0].decode().split()
+    for at in range(0, min(len(there), len(here)), _WORD_BYTES):
+        one, other = there[at : at + _WORD_BYTES], here[at : at + _WORD_BYTES]
+        if one != other:
             tick, value = divmod(at // _WORD_BYTES, len(names))
-            return f"{name}, tick {tick}: {names[value]} is {here[::-1].hex()} there and {there[::-1].hex()} here"
-    return f"{name}: {len(one)} bytes there and {len(other)} here"
+            return f"{name}, tick {tick}: {names[value]} is {one[::-1].hex()} there and {other[::-1].hex()} here"
+    return f"{name}: {len(there)} bytes there and {len(here)} here"
 
 
 def measure(builder: Builder, target: Target, patched: Path | None = None) -> tuple[Built, dict[str, list[bytes]]]:
     """Builds, and flies every plan twice."""
     built = builder.build(target, patched)
-    return built, {name: fly(built, name, 2) for name in PLANS}
+    return built, {name: fly(built, name) for name in PLANS}
 
 
-def difference(built: Built, flights: dict[str, list[bytes]], wanted: dict[str, bytes]) -> str | None:
-    """The first difference to the reference, or between two runs; None where all is equal."""
+def differences(built: Built, flights: dict[str, list[bytes]], wanted: dict[str, bytes]) -> dict[str, str]:
+    """By flight the first difference to the reference, or between two runs in a row."""
+    found = {}
     for name, (first, second) in flights.items():
         if first != second:
-            return f"twice in a row: {first_difference(built, name, first, second)}"
-        if first != wanted[name]:
-            return first_difference(built, name, wanted[name], first)
-    return None
+            found[name] = f"twice in a row: {first_difference(built, name, first, second)}"
+        elif first != wanted[name]:
+            found[name] = first_difference(built, name, wanted[name], first)
+    return found
 
 
 def seeded(defect: Defect) -> Path:
@@ -151,18 +153,19 @@ def check(targets: Sequence[Target]) -> None:
         for target, future in zip(targets, started, strict=True):
             built, flights = future.result()
             wanted = wanted or {name: runs[0] for name, runs in flights.items()}
-            found = difference(built, flights, wanted)
-            if found:
-                raise CheckFailed(f"{target.name}: {found}\n  there: {targets[0].line}\n  here:  {target.line}")
+            found = differences(built, flights, wanted)
+            for first in found.values():
+                raise CheckFailed(f"{target.name}: {first}\n  there: {targets[0].line}\n  here:  {target.line}")
             print(f"plant_bits: {target.name}: equal", flush=True)
             rows.append({"target": target.name, "flags": target.line})
         for target, control in controls:
             built, flights = control.result()
-            found = difference(built, flights, wanted)
+            found = differences(built, flights, wanted)
             if not found:
                 raise CheckFailed(f"{target.name}: not found, and so this check finds nothing: {target.line}")
-            print(f"plant_bits: {target.name}: {found}", flush=True)
-            seen[target.name] = found
+            first = next(iter(found.values()))
+            print(f"plant_bits: {target.name}: found in {', '.join(found)}\n  {first}", flush=True)
+            seen[target.name] = first
     hashes = {name: hashlib.sha256(values).hexdigest() for name, values in wanted.items()}
     for name, value in hashes.items():
         print(f"{name:<10} {len(wanted[name]) // _WORD_BYTES:>9} values  {value}")

@@ -33,7 +33,9 @@ def _bits(value: float) -> str:
 
 def _groups(methods: dict[str, int], times: int) -> list[str]:
     adaptive = [_bits(v) for v in (1e-8, 1e-8, 1e-7, 0.1)]
-    return [plan.statement("group", m, hz * times, *([_bits(0.0)] * 4 if hz else adaptive)) for m, hz in methods.items()]
+    return [
+        plan.statement("group", m, hz * times, *([_bits(0.0)] * 4 if hz else adaptive)) for m, hz in methods.items()
+    ]
 
 
 def _begin(ticks: int, models: dict[str, Path], machine: Path) -> list[str]:

@@ -2,7 +2,8 @@
  *
  * Flies a plan of the simulator and writes every value at every tick.
  *
- *     plant values PLAN RUNS   8 bytes for each scalar of all instances, then of the machine; RUNS times in this process
+ *     plant values PLAN RUNS   8 bytes for each scalar of all instances, then of the machine; RUNS times in this process. The
+ *                              number of ticks of each run is a line on standard error.
  *     plant names PLAN         a line for each of these scalars
  */
 #include <stdio.h>
@@ -79,6 +80,7 @@ static int fly(size_t size, int names)
         }
         put(sim, 0);
     }
+    (void)fprintf(stderr, "%llu\n", (unsigned long long)fcsl_sim_tick(sim));
     return fcsl_sim_close(sim, &error) == 0 ? 0 : fail(error.text);
 }
 

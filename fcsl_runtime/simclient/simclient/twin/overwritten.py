@@ -27,7 +27,7 @@ def warn_overwritten(fields: Iterable[Field]) -> None:
 
 
 def warn(text: str, package: str = _PACKAGE) -> None:
-    """An OverwrittenWarning at the line that called this package, or `package`, a folder that ends with a separator."""
+    """An OverwrittenWarning at the line that called this package, or `package`, a folder (with a separator behind)."""
     warnings.warn(text, OverwrittenWarning, stacklevel=_levels_inside(package) + 1)
 
 

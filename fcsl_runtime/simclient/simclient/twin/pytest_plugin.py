@@ -1,5 +1,6 @@
 # SPDX-License-Identifier: Apache-2.0
-"""The pytest plugin of simclient: the fixtures `fcsl` and `fcsl_sim` (pytest_twins.py), and --fcsl-cover, the coverage of algorithms.
+"""The pytest plugin of simclient: the fixtures `fcsl` and `fcsl_sim` (pytest_twins.py), and --fcsl-cover, the coverage
+of algorithms.
 
 pytest loads it automatically if simclient is in the environment (entry point pytest11 in setup.cfg); elsewhere use
 `-p simclient.twin.pytest_plugin`. Nothing is imported unless a test or an option needs it.

@@ -1,6 +1,6 @@
 # SPDX-License-Identifier: Apache-2.0
-"""The pytest fixtures `fcsl` and `fcsl_sim`: twins that are closed when the test ends, and whose last ticks are written if
-it fails.
+"""The pytest fixtures `fcsl` and `fcsl_sim`: twins that are closed when the test ends, and whose last ticks are written
+if it fails.
 
     def test_cutoff(fcsl):
         twin = fcsl("../fc/lander_control.json")

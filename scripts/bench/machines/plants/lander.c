@@ -16,8 +16,9 @@ static const char *init(void *self, const fcsl_model_context_t *context)
 }
 
 static const fcsl_field_t fields[] = {
-    SCALAR(lander, dry_mass, "kg"),   SCALAR(lander, fuel_mass, "kg"), SCALAR(lander, max_thrust, "N"),
-    SCALAR(lander, isp, "s"),         SCALAR(lander, gravity, "m/s^2"), SCALAR(lander, height, "m"),
+    SCALAR(lander, dry_mass, "kg"),   SCALAR(lander, fuel_mass, "kg"),
+    SCALAR(lander, max_thrust, "N"),  SCALAR(lander, isp, "s"),
+    SCALAR(lander, gravity, "m/s^2"), SCALAR(lander, height, "m"),
     SCALAR(lander, throttle, ""),     STATES(lander),
 };
 

@@ -2,9 +2,10 @@
  *
  * Times a plant in the simulator against the same loop by hand:
  *   plants LIBFCSL_SIM PLANT PLAN ROUNDS
- * The plan has one instance and ticks once a second; a round is all of its seconds. The two take turns, a second each, which is a
- * thousand steps. Reported are medians and quartiles over the seconds, so that whatever else runs spoils some of them. Prints
- * JSON, with the last states of both, and whether their bits agree.
+ * The plan has one instance and ticks once a second; a round is all of its seconds. The simulator, the loop by hand and the loop
+ * with the derivative in a function of its own take turns, a second each, which is a thousand steps. Reported are medians and
+ * quartiles over the seconds, so that whatever else runs spoils some of them. Prints JSON, with the last states, and whether
+ * their bits agree.
  */
 #include "plants_by_hand.h"
 #include "timing.h"
@@ -15,7 +16,7 @@
 #include <stdlib.h>
 #include <string.h>
 
-enum { STEPS = 1000 };
+enum { STEPS = 1000, SECONDS_MAX = 10000 };
 
 typedef struct {
     fcsl_sim_t *(*open)(const char *plan, size_t size, fcsl_error_t *error);
@@ -26,7 +27,7 @@ typedef struct {
 } simulator_t;
 
 typedef struct {
-    double *simulated, *by_hand, *ratio, *more;
+    double *simulated, *by_hand, *apart, *ratio, *more;
     int count;
 } times_t;
 
@@ -90,30 +91,37 @@ static void run_tick(const simulator_t *simulator, fcsl_sim_t *sim)
     }
 }
 
-/* One round. The structs of both are as they end in `mine` and `theirs`. */
+/* One round. The structs are as they end in `simulated`, `by_hand` and `apart`. */
 static void fly(const simulator_t *simulator, const by_hand_plant_t *plant, const char *plan, size_t size,
-                times_t *times, void *mine, void *theirs)
+                times_t *times, void *simulated, void *by_hand, void *apart)
 {
     fcsl_error_t error = {{0}};
     fcsl_sim_t *sim = simulator->open(plan, size, &error);
     if (sim == NULL) {
         fail("simulator", error.text);
     }
-    run_tick(simulator, sim); /* tick 0: no time has passed */
-    memcpy(mine, simulator->data(sim, 0), plant->size);
-    for (uint64_t second = 0; second + 1u < simulator->ticks(sim); second++) {
-        const double begun = now_ns();
-        run_tick(simulator, sim);
-        const double between = now_ns();
-        plant->run(mine, second * STEPS, STEPS);
-        const double simulated = (between - begun) / STEPS;
-        const double by_hand = (now_ns() - between) / STEPS;
-        times->simulated[times->count] = simulated;
-        times->by_hand[times->count] = by_hand;
-        times->ratio[times->count] = simulated / by_hand;
-        times->more[times->count++] = simulated - by_hand;
+    if (simulator->ticks(sim) > SECONDS_MAX) {
+        fail("plan", "too long");
     }
-    memcpy(theirs, simulator->data(sim, 0), plant->size);
+    run_tick(simulator, sim); /* tick 0: no time has passed */
+    memcpy(by_hand, simulator->data(sim, 0), plant->size);
+    memcpy(apart, simulator->data(sim, 0), plant->size);
+    for (uint64_t second = 0; second + 1u < simulator->ticks(sim); second++) {
+        double at[4];
+        at[0] = now_ns();
+        run_tick(simulator, sim);
+        at[1] = now_ns();
+        plant->run(by_hand, second * STEPS, STEPS);
+        at[2] = now_ns();
+        plant->run_apart(apart, second * STEPS, STEPS);
+        at[3] = now_ns();
+        times->simulated[times->count] = (at[1] - at[0]) / STEPS;
+        times->by_hand[times->count] = (at[2] - at[1]) / STEPS;
+        times->apart[times->count] = (at[3] - at[2]) / STEPS;
+        times->ratio[times->count] = (at[1] - at[0]) / (at[2] - at[1]);
+        times->more[times->count++] = (at[1] - at[0] - (at[2] - at[1])) / STEPS;
+    }
+    memcpy(simulated, simulator->data(sim, 0), plant->size);
     if (simulator->close(sim, &error) != 0) {
         fail("simulator", error.text);
     }
@@ -121,8 +129,9 @@ static void fly(const simulator_t *simulator, const by_hand_plant_t *plant, cons
 
 static void print_spread(const char *name, double *values, int count)
 {
-    const spread_t s = spread(values, count);
-    printf("\"%s\": %.6g, \"%s_low\": %.6g, \"%s_high\": %.6g, ", name, s.median, name, s.low, name, s.high);
+    const spread_t s = spread(values, count); /* sorts them */
+    printf("\"%s\": %.6g, \"%s_low\": %.6g, \"%s_high\": %.6g, \"%s_best\": %.6g, ", name, s.median, name, s.low, name,
+           s.high, name, values[0]);
 }
 
 static void print_states(const char *name, const double *x, uint32_t count)
@@ -139,35 +148,32 @@ int main(int argc, char **argv)
     if (argc != 5) {
         fail("usage", "plants LIBFCSL_SIM PLANT PLAN ROUNDS");
     }
-    enum { SECONDS_MAX = 10000 };
     const simulator_t simulator = load_simulator(argv[1]);
     const by_hand_plant_t *plant = find_plant(argv[2]);
     const int rounds = atoi(argv[4]);
     size_t size;
     char *plan = read_text(argv[3], &size);
     const size_t bytes = (size_t)rounds * SECONDS_MAX * sizeof(double);
-    times_t times = {allocate(bytes), allocate(bytes), allocate(bytes), allocate(bytes), 0};
-    unsigned char *mine = allocate(plant->size), *theirs = allocate(plant->size);
+    times_t times = {allocate(bytes), allocate(bytes), allocate(bytes), allocate(bytes), allocate(bytes), 0};
+    unsigned char *ends[3] = {allocate(plant->size), allocate(plant->size), allocate(plant->size)};
     for (int round = 0; round < rounds; round++) {
-        fly(&simulator, plant, plan, size, &times, mine, theirs);
+        fly(&simulator, plant, plan, size, &times, ends[0], ends[1], ends[2]);
     }
-    const double *x = (const double *)(const void *)(theirs + plant->states);
-    const double *y = (const double *)(const void *)(mine + plant->states);
+    const double *x[3];
+    for (int i = 0; i < 3; i++) {
+        x[i] = (const double *)(const void *)(ends[i] + plant->states);
+    }
+    const size_t state_bytes = plant->count * sizeof *x[0];
     printf("{");
     print_spread("simulated_ns", times.simulated, times.count);
     print_spread("by_hand_ns", times.by_hand, times.count);
+    print_spread("apart_ns", times.apart, times.count);
     print_spread("ratio", times.ratio, times.count);
     print_spread("more_ns", times.more, times.count);
-    print_states("simulated", x, plant->count);
-    print_states("by_hand", y, plant->count);
-    printf("\"states\": %u, \"same_bits\": %s}\n", plant->count,
-           memcmp(x, y, plant->count * sizeof *x) == 0 ? "true" : "false");
-    free(plan);
-    free(mine);
-    free(theirs);
-    free(times.simulated);
-    free(times.by_hand);
-    free(times.ratio);
-    free(times.more);
+    print_states("simulated", x[0], plant->count);
+    print_states("by_hand", x[1], plant->count);
+    print_states("apart", x[2], plant->count);
+    const int same = memcmp(x[0], x[1], state_bytes) == 0 && memcmp(x[1], x[2], state_bytes) == 0;
+    printf("\"states\": %u, \"same_bits\": %s}\n", plant->count, same ? "true" : "false");
     return 0;
 }

@@ -32,6 +32,7 @@ static const kind_t kinds[] = {
     {"problem", "./problem.so", "inputs.none", "outputs.x", "parameters.x", 2, 1, 0},
     {"chain", "./chain.so", "inputs.u", "outputs.through", "parameters.gain", 1, 1, 0},
     {"serial_link", "./serial_link.so", "inputs.none", "outputs.frames", "parameters.reliable", 0, 0, 1},
+    {"hopper", "./hopper.so", "inputs.none", "outputs.throttle", "parameters.none", 0, 0, 1}, /* a machine */
 };
 enum { KINDS = sizeof kinds / sizeof *kinds };
 
@@ -42,6 +43,8 @@ static const char *const bits[] = {
     "3f50624dd2f1a9fc", "0000000000000001", "7ff0000000000000", "7ff8000000000000",
     "7fefffffffffffff", "ffffffffffffffff", "40239eb851eb851f", "00000000ffffffff",
 };
+/* No step so small that a tick takes long. */
+static const char *const steps[] = {"3f1a36e2eb1c432d", "3f50624dd2f1a9fc", "3fb999999999999a", "7e37e43c8800759c"};
 static const char *const fields[] = {
     "inputs.push", "inputs.rate",       "inputs.truth",       "outputs.z",       "outputs.bounces",
     "outputs.x",   "outputs.value",     "outputs.sampled",    "outputs.time_ns", "outputs.nested.twice",
@@ -57,6 +60,7 @@ typedef struct {
     size_t used;
     const kind_t *kind[INSTANCES_MAX];
     uint32_t count;
+    int with_companion;
 } plan_t;
 
 int LLVMFuzzerInitialize(int *argc, char ***argv)
@@ -96,7 +100,8 @@ __attribute__((format(printf, 2, 3))) static void say(plan_t *plan, const char *
 static void say_groups(plan_t *plan)
 {
     const uint32_t method = any(plan, 4);
-    say(plan, "group %s 0 %s %s %s %s\n", PICK(methods, 5), PICK(bits, 3), PICK(bits, 3), PICK(bits, 4), PICK(bits, 4));
+    say(plan, "group %s 0 %s %s %s %s\n", PICK(methods, 5), PICK(bits, 3), PICK(bits, 3), PICK(steps, 0),
+        PICK(steps, 1));
     say(plan, "group %s %u %s %s %s %s\n", PICK(methods, method), PICK(rates, 2), bits[0], bits[0], bits[0], bits[0]);
     say(plan, "group %s 100 %s %s %s %s\n", PICK(methods, 4), bits[0], bits[0], bits[0], bits[0]);
 }
@@ -124,7 +129,7 @@ static void say_order(plan_t *plan)
             say(plan, "call %s %s\n", PICK(names, i), PICK(calls, right));
         }
         if (plan->kind[i]->states > 0 && any(plan, 2) != 0) {
-            say(plan, "tolerance %s %u %s\n", PICK(names, i), choose(plan, 0, 4), PICK(bits, 3));
+            say(plan, "tolerance %s %u %s\n", PICK(names, i), choose(plan, 0, 4) * 777u, PICK(bits, 3));
         }
     }
 }
@@ -163,6 +168,37 @@ static void say_connections(plan_t *plan)
     }
 }
 
+/* With a companion, and with the machine's own fields. */
+static void say_others(plan_t *plan)
+{
+    const uint32_t how = any(plan, 4);
+    plan->with_companion = how > 1;
+    if (how > 0) {
+        say(plan, "delay %u\n", any(plan, 4));
+    }
+    if (plan->with_companion) {
+        say(plan, "companion %s %u hopper %s\n", how > 2 ? "second" : names[0], any(plan, 3), kinds[KINDS - 1].library);
+    }
+}
+
+static void say_fields(plan_t *plan)
+{
+    static const char *const machine[] = {"pilot.outputs.throttle", "pilot.outputs.pos_z", "pilot.outputs.health",
+                                          "machine.tick", "pilot.inputs.none"};
+    const uint32_t i = any(plan, plan->count);
+    const uint32_t how = any(plan, 8);
+    if (plan->with_companion && (how & 1u) != 0) {
+        say(plan, "companion_sensor %s %s second %s\n", PICK(names, i), plan->kind[i]->output, PICK(channels, 0));
+        say(plan, "companion_actuator second %s %s %s\n", PICK(channels, 2), PICK(names, i), plan->kind[i]->input);
+    }
+    if ((how & 2u) != 0) {
+        say(plan, "read %s %s %s\n", PICK(machine, 0), PICK(names, i), plan->kind[i]->input);
+    }
+    if ((how & 4u) != 0) {
+        say(plan, "write %s %s %s\n", PICK(names, i), plan->kind[i]->output, PICK(machine, 1));
+    }
+}
+
 static void say_end(plan_t *plan)
 {
     static const char *const comparisons[] = {"equals", "above", "below", "around"};
@@ -181,14 +217,17 @@ static void say_all(plan_t *plan)
 {
     plan->count = 1u + any(plan, INSTANCES_MAX);
     say(plan, "fcsl-sim-plan 2\nmachine hopper ./hopper.so\nseed 1\nticks %u\n", 1u + choose(plan, 99, TICKS));
+    say_others(plan);
     for (uint32_t i = 0; i < KINDS; i++) {
-        say(plan, "model %s %s\n", kinds[i].name, kinds[choose(plan, i, KINDS)].library);
+        const char *keyword = strcmp(kinds[i].name, "hopper") == 0 ? "machine_model" : "model";
+        say(plan, "%s %s %s\n", keyword, kinds[i].name, kinds[choose(plan, i, KINDS)].library);
     }
     say_groups(plan);
     say_instances(plan);
     say_order(plan);
     say_values(plan);
     say_connections(plan);
+    say_fields(plan);
     say_end(plan);
 }
 

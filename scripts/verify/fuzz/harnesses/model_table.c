@@ -118,7 +118,7 @@ const fcsl_model_t *fcsl_model_load(const char *library, const char *name, void 
     const fcsl_model_t *const models[] = {&tables->model, NULL};
     const fcsl_model_t *model = find_model(models, library, name, error);
     *handle = NULL;
-    return model != NULL && check_model(model, library, error) == 0 ? model : NULL;
+    return model != NULL && fcsl_model_check(model, library, error) == 0 ? model : NULL;
 }
 
 /* ---- the input ------------------------------------------------------------------------------------------------------------ */
