@@ -2,7 +2,7 @@
 """The satellite in JSBSim: `python3 -m bench.peers.satellite.fly_jsbsim SECONDS` prints ns per step and the errors at the end.
 
 JSBSim has no Runge-Kutta method: it integrates by Adams and Bashforth's fourth order here. Its models of what a satellite has
-not (atmosphere, engines, ground and so on) are switched off. Each step is a call from Python, of some 0.1 us.
+not (atmosphere, engines, ground and so on) are switched off. Each step is a call from Python.
 """
 
 from __future__ import annotations

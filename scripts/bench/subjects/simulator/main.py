@@ -19,14 +19,13 @@ from typing import Any
 from ...harness.native import BENCH
 from ...harness.size import sized
 from ...peers.satellite import case
-from .plants import DEFAULT_SECONDS, plant_times
+from .plants import SECONDS, plant_times
 
 HERE = Path(__file__).resolve().parent
 LANDINGS = sized(1000, 4)
 PROCESSES = 2
 #: Of which the fastest counts.
 REPEATS = sized(3, 1)
-SECONDS = sized(20, 1)
 PEERS = {"JSBSim": "fly_jsbsim", "Basilisk": "fly_basilisk"}
 #: From so many states on a ratio is the goal, below a difference.
 MANY_STATES = 10
@@ -80,8 +79,8 @@ def satellite(plant: Facts) -> Facts:
     found: Facts = {}
     for name, key in (("FCSL", "simulated"), ("by hand", "by_hand")):
         x = plant[key]
-        errors = case.errors(float(DEFAULT_SECONDS), x[:3], x[6:10])
-        found[name] = _checked(name, {"ns": plant[f"{key}_ns_best"], "errors": errors, "seconds": DEFAULT_SECONDS})
+        errors = case.errors(float(SECONDS["satellite"]), x[:3], x[6:10])
+        found[name] = _checked(name, {"ns": plant[f"{key}_ns_best"], "errors": errors})
     for name, module in PEERS.items():
         try:
             found[name] = _checked(name, _fly(module))
@@ -92,7 +91,7 @@ def satellite(plant: Facts) -> Facts:
 
 def _fly(module: str) -> Facts:
     environment = {**os.environ, "PYTHONPATH": os.pathsep.join([str(BENCH.parent), os.environ.get("PYTHONPATH", "")])}
-    line = [sys.executable, "-m", f"bench.peers.satellite.{module}", str(SECONDS)]
+    line = [sys.executable, "-m", f"bench.peers.satellite.{module}", str(SECONDS["satellite"])]
     runs = []
     for _ in range(REPEATS):
         done = subprocess.run(line, env=environment, capture_output=True, text=True)
@@ -102,7 +101,7 @@ def _fly(module: str) -> Facts:
             raise RuntimeError(f"{module}: {done.stderr}")
         runs.append(json.loads(done.stdout.strip().rpartition("\n")[2]))
     ns = min(second for run in runs for second in run["ns"])
-    return {"ns": ns, "errors": runs[0]["errors"], "seconds": SECONDS, "version": runs[0]["version"]}
+    return {"ns": ns, "errors": runs[0]["errors"], "version": runs[0]["version"]}
 
 
 def _checked(name: str, facts: Facts) -> Facts:
@@ -138,7 +137,7 @@ def simulator_rows(facts: Facts) -> list[tuple[str, str]]:
             rows.append((f"satellite, {name}", f"not installed: {s['missing']}"))
             continue
         rows.append((f"satellite, {name}", f"{s['ns']:.0f} ns per step"))
-        rows.append((f"    off after {s['seconds']} s", f"{s['errors'][0]:.0e} m, {s['errors'][1]:.0e} rad"))
+        rows.append((f"    off after {SECONDS['satellite']} s", f"{s['errors'][0]:.0e} m, {s['errors'][1]:.0e} rad"))
     return rows
 
 
