@@ -371,7 +371,11 @@ class _Loader:
             if keys is None:
                 continue
             if len(keys) != 1:
-                has = f"has {' and '.join(f'`{key}`' for key in keys)}" if keys else "says neither of its sources"
+                has = (
+                    f"has {' and '.join(f'`{key}`' for key in keys)}"
+                    if keys
+                    else "has none of `source`, `library` and `machine`"
+                )
                 fix = (
                     'write {"source": "cart.c"} for a file in C or C++, {"library": "package://PACKAGE/NAME"} for one of a '
                     'package, or {"machine": "gust.json"} for an algorithm'
@@ -419,6 +423,7 @@ class _Loader:
                 what = "a controller" if name in self.parts.controllers else what
                 what = "reserved" if name in _RESERVED else what
                 self.sink.error("E209", f"`{name}` is {what}", span, help="give the instance another name")
+                self.parts.instances[name] = Instance(name, span, None)  # so that its uses are no further errors
                 continue
             keys = self.reader.object(definition, f"instance `{name}`", ("model",), _OPTIONAL) or {}
             model = self.reader.string(keys.get("model"), "`model`")

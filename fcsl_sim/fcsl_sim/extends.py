@@ -75,17 +75,21 @@ def _same(a: Path, b: Path) -> bool:
         return False
 
 
+def _nothing(like: JsonNode) -> JsonNode:
+    return JsonNode("object", like.span, {})
+
+
 def _merged(base: JsonNode, over: JsonNode) -> JsonNode:
-    """`over` merged over `base`; members in the order of the base, then new ones."""
-    if base.kind != "object" or over.kind != "object":
+    """`over` merged over `base`; members in the order of the base, then new ones. A null removes, also where there is
+    nothing to remove (RFC 7396)."""
+    if over.kind != "object":
         return over
-    members = dict(base.members)
+    members = dict(base.members) if base.kind == "object" else {}
     for key, member in over.members.items():
         below = members.get(key)
-        if below is None:
-            members[key] = member
-        elif member.value.kind == "null":
-            del members[key]
+        if member.value.kind == "null":
+            members.pop(key, None)
         else:
-            members[key] = Member(key, member.key_span, _merged(below.value, member.value))
+            below_value = below.value if below else _nothing(member.value)
+            members[key] = Member(key, member.key_span, _merged(below_value, member.value))
     return JsonNode("object", over.span, members)

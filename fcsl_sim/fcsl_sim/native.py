@@ -114,9 +114,8 @@ _PROTOTYPES: dict[str, tuple[type | None, list[type]]] = {
     "fcsl_sim_companion": (ptr, [ptr, c_uint32]),
     "fcsl_sim_companion_name": (c_char_p, [ptr, c_uint32]),
     "fcsl_sim_companion_state": (c_char_p, [ptr, c_uint32, POINTER(c_uint64)]),
-    "fcsl_sim_place": (c_char_p, [ptr, POINTER(c_char_p), POINTER(c_uint64)]),
-    "fcsl_sim_time_ns": (c_int64, [ptr]),
-    "fcsl_sim_watch_crashes": (c_int, [ptr, c_int, _ERROR]),
+    "fcsl_sim_place": (c_char_p, [POINTER(c_char_p), POINTER(c_uint64), POINTER(c_int64)]),
+    "fcsl_sim_watch_crashes": (c_int, [c_int, c_int, _ERROR]),
     "fcsl_sim_describe_model": (c_int64, [c_char_p, c_char_p, ptr, c_size_t, _ERROR]),
 }
 
@@ -171,6 +170,22 @@ class Place:
     function: str
     entry: int
     time_s: float
+
+
+def place() -> Place | None:
+    """What runs now in the simulation that was opened last; None: no function of a model. From any thread."""
+    function, entry, time_ns = c_char_p(), c_uint64(), c_int64()
+    instance = simulator_library().fcsl_sim_place(byref(function), byref(entry), byref(time_ns))
+    if instance is None:
+        return None
+    return Place(instance.decode(), (function.value or b"").decode(), entry.value, time_ns.value / 1e9)
+
+
+def watch_crashes(watch: bool, as_json: bool) -> None:
+    """Whether a crash within a model ends the process with a message that names it, as JSON too. Raises SimError."""
+    error = CError()
+    if simulator_library().fcsl_sim_watch_crashes(int(watch), int(as_json), byref(error)) < 0:
+        raise SimError(_text(error))
 
 
 class Failed(SimError):
@@ -285,20 +300,6 @@ class Simulation:
             state = self._lib.fcsl_sim_companion_state(self.handle(), i, byref(ticks)).decode()
             found[self._lib.fcsl_sim_companion_name(self.handle(), i).decode()] = state, ticks.value
         return found
-
-    def place(self) -> Place | None:
-        """What runs now; None: no function of a model. From any thread."""
-        function, entry = c_char_p(), c_uint64()
-        instance = self._lib.fcsl_sim_place(self.handle(), byref(function), byref(entry))
-        if instance is None:
-            return None
-        time_s = self._lib.fcsl_sim_time_ns(self.handle()) / 1e9
-        return Place(instance.decode(), (function.value or b"").decode(), entry.value, time_s)
-
-    def watch_crashes(self, watch: bool, as_json: bool) -> None:
-        """Whether a crash within a model ends the process with a message that names it, as JSON too. Raises SimError."""
-        sim = self.handle() if watch else None
-        self._check(self._lib.fcsl_sim_watch_crashes(sim, int(as_json), byref(self._error)))
 
     def run(self, ticks: int) -> int:
         """Runs up to `ticks` ticks; returns early at the end, after a change of state and after a wait. Returns ticks done."""

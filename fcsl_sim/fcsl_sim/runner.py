@@ -146,7 +146,8 @@ def run(
     if free and not speed:
         raise SimError("a free-running simulation keeps to the clock: give it a speed, as with `--speed 1`")
     watcher = watcher or Watcher()
-    with Simulation(config.plan, config.tables) as sim:
+    with Watchdog(watcher.as_json) as watchdog, Simulation(config.plan, config.tables) as sim:
+        watchdog.sim = sim
         sim.set_speed(speed)
         if external is not None:
             sim.listen(external, timeout_ms, name_space)
@@ -170,8 +171,7 @@ def run(
         if address is not None:
             watcher.serving(address)
         try:
-            with Watchdog(sim, watcher.as_json):
-                flight = _fly(sim, hosted=external is None, watcher=watcher)
+            flight = _fly(sim, hosted=external is None, watcher=watcher)
             sent = sim.telemetry_stop() if sender is not None else None
             observed = sim.observers_stop() if observers is not None else None
             shown = sim.ros_stop() if ros is not None else None

@@ -16,7 +16,7 @@ from contextlib import suppress
 from types import TracebackType
 
 from .errors import SimError
-from .native import Simulation
+from .native import Simulation, place, watch_crashes
 
 #: Between two looks.
 _LOOK_S = 0.25
@@ -28,10 +28,12 @@ _EXIT_FAILED = 2
 
 
 class Watchdog:
-    """A context manager around the run of a simulation by `fcsl-sim`. as_json: the end is told as JSON, too."""
+    """A context manager around the life of a simulation in `fcsl-sim`. as_json: the end is told as JSON, too. `sim`: the
+    simulation once it is open, whose bag is then closed."""
 
-    def __init__(self, sim: Simulation, as_json: bool):
-        self._sim, self._as_json = sim, as_json
+    def __init__(self, as_json: bool):
+        self.sim: Simulation | None = None
+        self._as_json = as_json
         self._over = threading.Event()
         self._thread = threading.Thread(target=self._watch, daemon=True)
         self._signalled, self._wake = os.pipe2(os.O_NONBLOCK | os.O_CLOEXEC)
@@ -39,7 +41,7 @@ class Watchdog:
 
     def __enter__(self) -> Watchdog:
         self._before = signal.set_wakeup_fd(self._wake, warn_on_full_buffer=False)
-        self._sim.watch_crashes(True, self._as_json)
+        watch_crashes(True, self._as_json)
         self._thread.start()
         return self
 
@@ -48,7 +50,7 @@ class Watchdog:
     ) -> None:
         self._over.set()
         self._thread.join()
-        self._sim.watch_crashes(False, self._as_json)
+        watch_crashes(False, self._as_json)
         signal.set_wakeup_fd(self._before)
         os.close(self._signalled)
         os.close(self._wake)
@@ -57,13 +59,12 @@ class Watchdog:
         number, entry, looks = 0, -1, 0
         while not self._over.wait(_LOOK_S):
             number = self._signal() or number
-            place = self._sim.place()
-            looks = looks + 1 if place is not None and place.entry == entry else 0
-            entry = place.entry if place is not None else -1
-            if place is not None and looks >= (_LOOKS_OF_SIGNAL if number else _LOOKS):
-                self._end(
-                    f"`{place.function}` of `{place.instance}` does not return after {place.time_s:.9f} s", number
-                )
+            at = place()
+            looks = looks + 1 if at is not None and at.entry == entry else 0
+            entry = at.entry if at is not None else -1
+            if at is not None and looks >= (_LOOKS_OF_SIGNAL if number else _LOOKS):
+                message = f"`{at.function}` of `{at.instance}` does not return after {at.time_s:.9f} s"
+                self._end(message, number)
 
     def _signal(self) -> int:
         """The last SIGINT or SIGTERM that has come, or 0."""
@@ -74,7 +75,8 @@ class Watchdog:
 
     def _end(self, message: str, number: int) -> None:
         with suppress(SimError):
-            self._sim.record_stop()  # the thread that records is in the model
+            if self.sim is not None:
+                self.sim.record_stop()  # the thread that records is in the model
         print(f"fcsl-sim: error: {message}", file=sys.stderr, flush=True)
         if self._as_json:
             print(json.dumps({"end": "error", "error": message}), flush=True)

@@ -393,16 +393,33 @@ class _Checker:
         chosen = [self._integrator_of(group, integrator) for group in groups]
         self._check_grids(tables, links, number, chosen)
         self._check_methods(tables, groups, chosen)
+        self._check_unused(number, chosen)
         order = list(dict.fromkeys(call.instance for call in calls))
         order += [name for name in self.instances if name not in order]
-        tick_hz = max((machine.tick_hz for machine in self.machines.values()), default=1)
-        lines = [one.statement(tick_hz) for one in chosen if one]
+        lines = [one.statement(self._fastest(group)) for group, one in zip(groups, chosen, strict=True) if one]
         for name in order:
             if name in tables:
                 rate = self.instances[name].rate
                 grid = rate.statement() if rate else "0 0 0"
                 lines.append(plan.statement("instance", name, tables[name].name, number.get(name, "-"), grid))
         return lines + [plan.statement("call", call.instance, call.kind) for call in calls], order
+
+    def _fastest(self, group: Sequence[str]) -> int:
+        """The highest rate at which a controller sets an input of the group, in Hz; 0: none does."""
+        names = {
+            edge.source.controller for edge in self.edges if edge.target.instance in group and edge.source.controller
+        }
+        return max((self.machines[name].tick_hz for name in names), default=0)
+
+    def _check_unused(self, number: Mapping[str, int], chosen: Sequence[Integrator | None]) -> None:
+        for name, instance in self.instances.items():
+            if instance.integrator and instance.table and name not in number:
+                message = f"`{name}` has an integrator, and nothing to integrate or to locate"
+                self.sink.error("E808", message, first(instance.integrator.span), help="remove it")
+            integrator = chosen[number[name]] if name in number else None
+            if instance.tolerances and (integrator is None or integrator.method != "rk45"):
+                message = f"`tolerances` of `{name}`: only rk45 chooses its steps"
+                self.sink.error("E804", message, instance.span, help="remove them, or integrate with rk45")
 
     def _link(self, edge: _Edge, tables: Mapping[str, ModelTable]) -> Link:
         source, target = edge.source, edge.target

@@ -60,6 +60,9 @@ static int build_machine(fcsl_sim_t *sim, fcsl_error_t *error)
     if (machine->tick_hz == 0) {
         return fcsl_sim_fail(error, "plan line %u: the machine does not tick", plan->machine.line);
     }
+    if (plan->ticks / machine->tick_hz > FCSL_PLAN_MAX_SECONDS) {
+        return fcsl_sim_fail(error, "plan line %u: more than %u s", plan->ticks_line, FCSL_PLAN_MAX_SECONDS);
+    }
     const size_t sensors = fcsl_message_capacity(machine, FCSL_SENSOR_MESSAGE);
     const size_t actuators = fcsl_message_capacity(machine, FCSL_ACTUATOR_MESSAGE);
     sim->message_capacity = sensors > actuators ? sensors : actuators;
@@ -208,22 +211,43 @@ static int build_write(const fcsl_sim_t *sim, const fcsl_plan_set_t *set, fcsl_w
     if (set->bits > limit) {
         return bad(error, set->line, "these bits are no value of", set->field);
     }
-    *write = (fcsl_write_t){sim->instances[index].data + field->offset + set->element * size, size, set->bits};
+    *write = (fcsl_write_t){sim->instances[index].data + field->offset + set->element * size, size, set->bits, index,
+                            sim->instances[index].group};
     return 0;
 }
 
-/* Events by time; those of one time as in the plan. */
-static void sort_events(fcsl_sim_t *sim)
+typedef struct {
+    uint64_t time_ns;
+    uint32_t index;
+} timed_t;
+
+static int by_time(const void *left, const void *right)
 {
-    const fcsl_plan_set_t *events = sim->plan.events;
-    for (uint32_t i = 0; i < sim->plan.event_count; i++) {
-        uint32_t at = i;
-        while (at > 0 && events[sim->event_order[at - 1u]].time_ns > events[i].time_ns) {
-            sim->event_order[at] = sim->event_order[at - 1u];
-            at--;
-        }
-        sim->event_order[at] = i;
+    const timed_t *a = left;
+    const timed_t *b = right;
+    if (a->time_ns != b->time_ns) {
+        return a->time_ns < b->time_ns ? -1 : 1;
     }
+    return a->index < b->index ? -1 : a->index > b->index;
+}
+
+/* Events by time; those of one time as in the plan. */
+static int sort_events(fcsl_sim_t *sim, fcsl_error_t *error)
+{
+    const uint32_t count = sim->plan.event_count;
+    timed_t *order = calloc(count + 1u, sizeof *order);
+    if (!order) {
+        return fcsl_sim_fail(error, "no memory for the events");
+    }
+    for (uint32_t i = 0; i < count; i++) {
+        order[i] = (timed_t){sim->plan.events[i].time_ns, i};
+    }
+    qsort(order, count, sizeof *order, by_time);
+    for (uint32_t i = 0; i < count; i++) {
+        sim->event_order[i] = order[i].index;
+    }
+    free(order);
+    return 0;
 }
 
 static int build_writes(fcsl_sim_t *sim, fcsl_error_t *error)
@@ -246,7 +270,9 @@ static int build_writes(fcsl_sim_t *sim, fcsl_error_t *error)
             return -1;
         }
     }
-    sort_events(sim);
+    if (sort_events(sim, error)) {
+        return -1;
+    }
     if (plan->until == FCSL_UNTIL_NONE) {
         return 0;
     }

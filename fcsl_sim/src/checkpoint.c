@@ -78,6 +78,21 @@ static uint64_t layout_of(const fcsl_sim_t *sim)
     for (uint32_t i = 0; i < sim->group_count; i++) {
         mix_number(&hash, sim->groups[i].plan->method);
         mix_number(&hash, sim->groups[i].plan->hz);
+        mix(&hash, &sim->groups[i].plan->rtol, sizeof sim->groups[i].plan->rtol);
+        mix(&hash, &sim->groups[i].plan->min_step_s, sizeof sim->groups[i].plan->min_step_s);
+        mix(&hash, &sim->groups[i].plan->max_step_s, sizeof sim->groups[i].plan->max_step_s);
+        mix(&hash, sim->groups[i].atol, sim->groups[i].n * sizeof *sim->groups[i].atol);
+    }
+    for (uint32_t i = 0; i < sim->copy_count; i++) {
+        const fcsl_copy_t *copy = &sim->copies[i];
+        mix_number(&hash, copy->instance);
+        mix_number(&hash, copy->source);
+        mix_number(&hash, (uint64_t)(copy->to - sim->instances[copy->instance].data));
+        mix_number(&hash, copy->source != UINT32_MAX ? (uint64_t)(copy->from - sim->instances[copy->source].data) : 0u);
+    }
+    for (uint32_t i = 0; i < sim->sensor_count; i++) {
+        mix_number(&hash, sim->sensors[i].instance);
+        mix_number(&hash, sim->sensors[i].channel);
     }
     return hash;
 }
@@ -224,8 +239,8 @@ static int is_possible(const fcsl_sim_t *sim, uint64_t machine_tick)
     possible = possible && sim->time_ns == now_ns;
     for (uint32_t i = 0; possible && i < sim->instance_count; i++) {
         const fcsl_model_t *model = sim->instances[i].model;
-        possible =
-            is_update_possible(sim, i, now_ns) && are_bools(model->fields, model->field_count, sim->instances[i].data) &&
+        possible = is_update_possible(sim, i, now_ns) &&
+                   are_bools(model->fields, model->field_count, sim->instances[i].data) &&
                    is_machine_possible(sim, &sim->instances[i]);
     }
     for (uint32_t i = 0; possible && i < sim->companion_count; i++) {

@@ -88,7 +88,7 @@ int fcsl_companion_tick(fcsl_companion_t *companion, fcsl_sim_t *sim, fcsl_error
                              companion->name);
     }
     fcsl_gate_wait(&companion->gate, now_ns, companion->image);
-    if (fcsl_delay_pass(&companion->delay, channels, &message, &due)) {
+    if (fcsl_delay_pass(&companion->delay, channels, companion->tick, &message, &due)) {
         const int64_t made_ns = fcsl_grid_time_ns(due.tick, companion->machine->tick_hz);
         fcsl_gate_command(&companion->gate, &due, (uint64_t)made_ns, companion->image);
         fcsl_gate_wait(&companion->gate, now_ns, companion->image);

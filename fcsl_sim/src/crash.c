@@ -16,11 +16,21 @@ enum { STACK_BYTES = 1 << 16, TEXT_BYTES = 1024, EXIT_FAILED = 2 };
 static const int SIGNALS[] = {SIGSEGV, SIGBUS, SIGFPE, SIGILL, SIGABRT};
 static const char *const FUNCTIONS[] = {"", "init", "derivative", "output", "update", "event", "reset"};
 
-/* One simulation at a time, since the handlers are those of the process. */
-static const fcsl_sim_t *volatile watched;
+/* The simulation that was opened last, since the handlers are those of the process. */
+static const fcsl_sim_t *_Atomic current;
 static volatile sig_atomic_t as_json;
 
-const char *fcsl_sim_place(const fcsl_sim_t *sim, const char **function, uint64_t *entry)
+void fcsl_sim_is_open(const fcsl_sim_t *sim, int is_open)
+{
+    const fcsl_sim_t *before = sim;
+    if (is_open) {
+        atomic_store(&current, sim);
+    } else {
+        (void)atomic_compare_exchange_strong(&current, &before, NULL);
+    }
+}
+
+static const char *place_of(const fcsl_sim_t *sim, const char **function, uint64_t *entry)
 {
     const uint64_t place = atomic_load_explicit(&sim->place, memory_order_relaxed);
     const uint32_t instance = (uint32_t)(place >> 8) & 0xffffu;
@@ -28,6 +38,14 @@ const char *fcsl_sim_place(const fcsl_sim_t *sim, const char **function, uint64_
     *entry = place;
     *function = FUNCTIONS[number < sizeof FUNCTIONS / sizeof *FUNCTIONS ? number : 0];
     return number != FCSL_IN_NONE && instance < sim->instance_count ? sim->instances[instance].name : NULL;
+}
+
+const char *fcsl_sim_place(const char **function, uint64_t *entry, int64_t *time_ns)
+{
+    const fcsl_sim_t *sim = atomic_load(&current);
+    const char *instance = sim ? place_of(sim, function, entry) : NULL;
+    *time_ns = instance ? sim->time_ns : 0;
+    return instance;
 }
 
 /* Text without the C library's printf, which a crash may have interrupted. */
@@ -69,10 +87,10 @@ static void put_crash(line_t *line, int number, const char *instance, const char
 
 static void handle(int number)
 {
-    const fcsl_sim_t *sim = watched;
     const char *function = "";
     uint64_t entry = 0;
-    const char *instance = sim ? fcsl_sim_place(sim, &function, &entry) : NULL;
+    int64_t time_ns = 0;
+    const char *instance = fcsl_sim_place(&function, &entry, &time_ns);
     if (!instance) { /* no model runs: as if nobody watched */
         (void)signal(number, SIG_DFL);
         (void)raise(number);
@@ -81,10 +99,10 @@ static void handle(int number)
     line_t message = {.used = 0};
     line_t json = {.used = 0};
     put(&message, "fcsl-sim: error: ");
-    put_crash(&message, number, instance, function, sim->time_ns);
+    put_crash(&message, number, instance, function, time_ns);
     put(&message, "\n");
     put(&json, "{\"end\": \"error\", \"error\": \"");
-    put_crash(&json, number, instance, function, sim->time_ns);
+    put_crash(&json, number, instance, function, time_ns);
     put(&json, "\"}\n");
     ssize_t written = write(STDERR_FILENO, message.text, message.used);
     if (as_json) {
@@ -94,7 +112,7 @@ static void handle(int number)
     _exit(EXIT_FAILED);
 }
 
-int fcsl_sim_watch_crashes(const fcsl_sim_t *sim, int json, fcsl_error_t *error)
+int fcsl_sim_watch_crashes(int watch, int json, fcsl_error_t *error)
 {
     static uint8_t *stack;
     if (!stack) {
@@ -105,8 +123,7 @@ int fcsl_sim_watch_crashes(const fcsl_sim_t *sim, int json, fcsl_error_t *error)
         return fcsl_sim_fail(error, "no memory for the handler of crashes");
     }
     as_json = json;
-    watched = sim;
-    struct sigaction action = {.sa_handler = sim ? handle : SIG_DFL, .sa_flags = SA_ONSTACK};
+    struct sigaction action = {.sa_handler = watch ? handle : SIG_DFL, .sa_flags = SA_ONSTACK};
     (void)sigemptyset(&action.sa_mask);
     for (uint32_t i = 0; i < sizeof SIGNALS / sizeof *SIGNALS; i++) {
         if (sigaction(SIGNALS[i], &action, NULL) != 0) {

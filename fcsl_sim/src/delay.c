@@ -25,27 +25,38 @@ static uint8_t *slot_of(const fcsl_delay_t *delay, uint64_t tick)
     return delay->slots + (size_t)(tick % (delay->ticks + 1u)) * delay->slot_bytes;
 }
 
-int fcsl_delay_pass(fcsl_delay_t *delay, const fcsl_channel_table_t *table, const fcsl_message_t *message,
-                    fcsl_message_t *due)
+/* Keeps the message of a tick; none has size 0. */
+static void keep(fcsl_delay_t *delay, uint64_t tick, const fcsl_message_t *message)
 {
-    if (delay->ticks == 0) {
-        *due = *message;
-        return 1;
-    }
-    uint64_t size = message->size;
-    uint8_t *slot = slot_of(delay, message->tick);
+    uint64_t size = message != NULL ? message->size : 0u;
+    uint8_t *slot = slot_of(delay, tick);
     if (size > delay->slot_bytes - sizeof size) {
-        return 0; /* not reached: the capacity is that of the longest message */
+        size = 0; /* not reached: the capacity is that of the longest message */
     }
     memcpy(slot, &size, sizeof size);
-    memcpy(slot + sizeof size, message->bytes, (size_t)size);
-    if (message->tick < delay->ticks) {
+    if (size > 0) {
+        memcpy(slot + sizeof size, message->bytes, (size_t)size);
+    }
+}
+
+int fcsl_delay_pass(fcsl_delay_t *delay, const fcsl_channel_table_t *table, uint64_t tick,
+                    const fcsl_message_t *message, fcsl_message_t *due)
+{
+    uint64_t size = 0;
+    if (delay->ticks == 0) {
+        if (message != NULL) {
+            *due = *message;
+        }
+        return message != NULL;
+    }
+    keep(delay, tick, message);
+    if (tick < delay->ticks) {
         return 0;
     }
-    slot = slot_of(delay, message->tick - delay->ticks);
+    const uint8_t *slot = slot_of(delay, tick - delay->ticks);
     memcpy(&size, slot, sizeof size);
     /* Checked again, since a checkpoint may have brought it. */
-    return size <= delay->slot_bytes - sizeof size &&
+    return size > 0 && size <= delay->slot_bytes - sizeof size &&
            fcsl_message_check(table, FCSL_ACTUATOR_MESSAGE, slot + sizeof size, (size_t)size, due) == FCSL_MESSAGE_OK;
 }
 

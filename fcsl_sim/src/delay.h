@@ -18,10 +18,10 @@ typedef struct {
 /* For messages of up to `capacity` bytes. Returns 0, or -1 without memory. */
 int fcsl_delay_open(fcsl_delay_t *delay, uint32_t ticks, size_t capacity);
 void fcsl_delay_free(fcsl_delay_t *delay);
-/* Takes the message of a tick; *due is the one that acts now, in the delay's memory until the next call. Returns 0 where there is
- * none yet. */
-int fcsl_delay_pass(fcsl_delay_t *delay, const fcsl_channel_table_t *table, const fcsl_message_t *message,
-                    fcsl_message_t *due);
+/* Takes the message of a tick, or null where there was none; *due is the one that acts now, in the delay's memory until the next
+ * call. Returns 0 where there is none. */
+int fcsl_delay_pass(fcsl_delay_t *delay, const fcsl_channel_table_t *table, uint64_t tick,
+                    const fcsl_message_t *message, fcsl_message_t *due);
 /* What a checkpoint needs: so many bytes from `slots` on. */
 size_t fcsl_delay_bytes(const fcsl_delay_t *delay);
 

@@ -126,7 +126,7 @@ static fcsl_slope_t choose_slope(fcsl_group_t *group)
     return slope_of_one;
 }
 
-void fcsl_group_events(fcsl_group_t *group, double t, const double *x, double *value)
+int fcsl_group_events(fcsl_group_t *group, double t, const double *x, double *value, fcsl_error_t *error)
 {
     fcsl_sim_t *sim = group->sim;
     evaluate_stages(group, t, x);
@@ -136,6 +136,7 @@ void fcsl_group_events(fcsl_group_t *group, double t, const double *x, double *v
         fcsl_sim_enter(sim, group->eventful[i], FCSL_IN_EVENT);
         instance->model->event(instance->data, t, part_of(instance, x), value + instance->first_event);
     }
+    return fcsl_group_check_events(group, t, value, error);
 }
 
 /* ---- one advance ------------------------------------------------------------------------------------------------------ */
@@ -173,14 +174,9 @@ void fcsl_group_restart(fcsl_group_t *group)
 /* Copies the inputs from outside of the group; whether one has changed. */
 static int take_inputs(fcsl_group_t *group)
 {
-    const fcsl_sim_t *sim = group->sim;
     int changed = 0;
     for (uint32_t i = 0; i < group->outer_count; i++) {
-        const fcsl_copy_t *copy = &sim->copies[group->outer[i]];
-        if (memcmp(copy->to, copy->from, copy->size) != 0) {
-            memcpy(copy->to, copy->from, copy->size);
-            changed = 1;
-        }
+        changed |= fcsl_sim_copy_changed(&group->sim->copies[group->outer[i]]);
     }
     return changed;
 }
@@ -189,6 +185,7 @@ static int take_inputs(fcsl_group_t *group)
 typedef struct {
     double t;
     double h;
+    double end;
     int64_t length_ns;
     int regular;
 } step_t;
@@ -199,11 +196,11 @@ static step_t next_step(const fcsl_group_t *group, int64_t time_ns)
     const double hz = (double)group->plan->hz;
     const int reaches_end = time_ns >= state->end_ns;
     const double t = fcsl_group_time_s(group);
-    if (state->time_ns == state->begin_ns && reaches_end) {
-        return (step_t){t, 1.0 / hz, state->end_ns - state->begin_ns, 1};
-    }
     const double end = reaches_end ? (double)(state->step + 1u) / hz : (double)time_ns / NS_PER_S;
-    return (step_t){t, end - t, (reaches_end ? state->end_ns : time_ns) - state->time_ns, 0};
+    if (state->time_ns == state->begin_ns && reaches_end) {
+        return (step_t){t, 1.0 / hz, end, state->end_ns - state->begin_ns, 1};
+    }
+    return (step_t){t, end - t, end, (reaches_end ? state->end_ns : time_ns) - state->time_ns, 0};
 }
 
 static void probe_fixed(fcsl_group_t *group, int64_t offset_ns, double *x)
@@ -237,13 +234,17 @@ static int step_fixed(fcsl_group_t *group, int64_t time_ns, fcsl_error_t *error)
         move_to(group, from_ns + length_ns);
         return 0;
     }
-    fcsl_group_events(group, step.t + step.h, group->x1, group->g1);
+    if (fcsl_group_events(group, step.end, group->x1, group->g1, error)) {
+        return -1;
+    }
     const int happens = fcsl_group_any_crosses(group, group->g, group->g1);
     if (happens) {
         length_ns = fcsl_group_locate(group, from_ns, step.length_ns, probe_fixed);
         if (length_ns < step.length_ns) {
             probe_fixed(group, length_ns, group->x1);
-            fcsl_group_events(group, (double)(from_ns + length_ns) / NS_PER_S, group->x1, group->g1);
+            if (fcsl_group_events(group, (double)(from_ns + length_ns) / NS_PER_S, group->x1, group->g1, error)) {
+                return -1;
+            }
         }
     }
     fcsl_integrator_accept(&group->integrator, step.regular && length_ns == step.length_ns);
@@ -251,17 +252,15 @@ static int step_fixed(fcsl_group_t *group, int64_t time_ns, fcsl_error_t *error)
     if (happens) {
         return fcsl_group_fire(group, group->g1, error);
     }
-    memcpy(group->g, group->g1, group->event_count * sizeof *group->g);
+    fcsl_group_pass(group, group->g1);
     return 0;
 }
 
-void fcsl_group_start(fcsl_group_t *group)
+int fcsl_group_start(fcsl_group_t *group, fcsl_error_t *error)
 {
     (void)take_inputs(group);
     (void)fcsl_group_gather(group, group->x);
-    if (group->event_count > 0) {
-        fcsl_group_events(group, 0.0, group->x, group->g);
-    }
+    return group->event_count > 0 ? fcsl_group_events(group, 0.0, group->x, group->g, error) : 0;
 }
 
 /* The states and inputs that the group goes on with. Events that a jump has caused happen now. */
@@ -280,8 +279,10 @@ static int begin(fcsl_group_t *group, fcsl_error_t *error)
     fcsl_group_restart(group);
     state->disturbed = 0;
     if (group->event_count > 0) {
-        fcsl_group_events(group, fcsl_group_time_s(group), group->x, group->g1);
-        return fcsl_group_fire(group, group->g1, error);
+        return fcsl_group_events(group, fcsl_group_time_s(group), group->x, group->g1, error) ||
+                       fcsl_group_fire(group, group->g1, error)
+                   ? -1
+                   : 0;
     }
     return 0;
 }
@@ -346,6 +347,8 @@ void fcsl_group_free(fcsl_group_t *group)
     free(group->outputs);
     free(group->timed);
     free(group->outer);
+    free(group->sampling);
+    free(group->companions);
     free(group->crossing);
     free(group->fired);
     free(group->memory);

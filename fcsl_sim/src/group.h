@@ -57,6 +57,10 @@ struct fcsl_group {
     uint32_t output_count;
     uint32_t *timed;      /* instances that are updated at a rate, in the group or with outputs to it */
     uint32_t timed_count;
+    uint32_t *sampling;   /* instances outside of the group whose update reads one of its outputs */
+    uint32_t sampling_count;
+    uint8_t *companions;  /* by companion: whether it meets the group */
+    uint32_t next_write;  /* in event_order: no write to the group is before it */
     uint32_t *outer;      /* copies from outside of the group */
     uint32_t outer_count;
     double *memory;       /* all vectors below, and the integrator's */
@@ -76,7 +80,7 @@ int fcsl_group_check(fcsl_group_t *group, fcsl_error_t *error);
 void fcsl_group_free(fcsl_group_t *group);
 
 /* After init, with the inputs of the beginning: from these values on events are watched. */
-void fcsl_group_start(fcsl_group_t *group);
+int fcsl_group_start(fcsl_group_t *group, fcsl_error_t *error);
 /* Brings all states of the group to `time_ns`, and handles its events until then. No step goes beyond `barrier_ns`, when inputs may
  * jump; time_ns <= barrier_ns. Returns 0, or -1. */
 int fcsl_group_advance(fcsl_group_t *group, int64_t time_ns, int64_t barrier_ns, fcsl_error_t *error);
@@ -88,8 +92,11 @@ void fcsl_group_restore(fcsl_group_t *group, const fcsl_group_state_t *state, co
 
 /* ---- between the files of a group ---------------------------------------------------------------------------------- */
 
-/* The outputs that events need, then the event functions, at t (s) for states x. */
-void fcsl_group_events(fcsl_group_t *group, double t, const double *x, double *value);
+/* The outputs that events need, then the event functions, at t (s) for states x. Fails where one is NaN. */
+int fcsl_group_events(fcsl_group_t *group, double t, const double *x, double *value, fcsl_error_t *error);
+int fcsl_group_check_events(const fcsl_group_t *group, double t, const double *value, fcsl_error_t *error);
+/* group->g becomes `now`, in which no event has happened: a zero stays at the side from which it came. */
+void fcsl_group_pass(fcsl_group_t *group, const double *now);
 /* Whether event number `event` of the group happens where its function goes from `before` to `after`. Zero belongs to the side
  * from which the function came, and counts as crossed only once it has been left. */
 static inline int fcsl_group_crosses(const fcsl_group_t *group, uint32_t event, double before, double after)

@@ -29,8 +29,11 @@ static int64_t length_ns(const fcsl_group_t *group, double seconds, int64_t barr
 {
     const int64_t room_ns = barrier_ns - group->state.time_ns;
     const double wanted_ns = floor(seconds * NS_PER_S);
-    if (wanted_ns * 1.1 >= (double)room_ns) {
+    if (wanted_ns >= (double)room_ns) {
         return room_ns;
+    }
+    if (2.0 * wanted_ns > (double)room_ns) { /* two equal steps, instead of a tiny last one */
+        return room_ns - room_ns / 2;
     }
     return wanted_ns < 1.0 ? 1 : (int64_t)wanted_ns;
 }
@@ -86,18 +89,21 @@ static int make_step(fcsl_group_t *group, int64_t barrier_ns, fcsl_error_t *erro
 }
 
 /* The events within the step: the first one ends it. */
-static void find_event(fcsl_group_t *group)
+static int find_event(fcsl_group_t *group, fcsl_error_t *error)
 {
     fcsl_group_state_t *state = &group->state;
     state->event_ns = 0;
     if (group->event_count == 0) {
-        return;
+        return 0;
     }
-    fcsl_group_events(group, (double)state->to_ns / NS_PER_S, group->x1, group->g1);
+    if (fcsl_group_events(group, (double)state->to_ns / NS_PER_S, group->x1, group->g1, error)) {
+        return -1;
+    }
     if (fcsl_group_any_crosses(group, group->g, group->g1)) {
         state->event_ns =
             state->from_ns + fcsl_group_locate(group, state->from_ns, state->to_ns - state->from_ns, probe_adaptive);
     }
+    return 0;
 }
 
 /* The step under way ends where its event is. */
@@ -111,8 +117,10 @@ static int end_at_event(fcsl_group_t *group, fcsl_error_t *error)
         memcpy(group->x, group->x1, group->n * sizeof *group->x);
     }
     state->time_ns = state->event_ns;
-    fcsl_group_events(group, fcsl_group_time_s(group), group->x, group->g1);
-    return fcsl_group_fire(group, group->g1, error);
+    return fcsl_group_events(group, fcsl_group_time_s(group), group->x, group->g1, error) ||
+                   fcsl_group_fire(group, group->g1, error)
+               ? -1
+               : 0;
 }
 
 static void end_step(fcsl_group_t *group)
@@ -122,7 +130,7 @@ static void end_step(fcsl_group_t *group)
     group->x1 = before;
     group->state.time_ns = group->state.to_ns;
     fcsl_integrator_accept(&group->integrator, 1);
-    memcpy(group->g, group->g1, group->event_count * sizeof *group->g);
+    fcsl_group_pass(group, group->g1);
 }
 
 int fcsl_group_advance_adaptive(fcsl_group_t *group, int64_t time_ns, int64_t barrier_ns, fcsl_error_t *error)
@@ -137,7 +145,9 @@ int fcsl_group_advance_adaptive(fcsl_group_t *group, int64_t time_ns, int64_t ba
                 fcsl_group_check_finite(group, group->x1, state->to_ns, error)) {
                 return -1;
             }
-            find_event(group);
+            if (find_event(group, error)) {
+                return -1;
+            }
         }
         if (state->event_ns > 0 && state->event_ns <= time_ns) {
             if (end_at_event(group, error)) {

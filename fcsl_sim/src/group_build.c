@@ -124,6 +124,56 @@ static void add_outer(const fcsl_sim_t *sim, fcsl_group_t *group, uint32_t numbe
     }
 }
 
+static void add_once(uint32_t *list, uint32_t *count, uint32_t item)
+{
+    for (uint32_t i = 0; i < *count; i++) {
+        if (list[i] == item) {
+            return;
+        }
+    }
+    list[(*count)++] = item;
+}
+
+/* Who reads outputs of the group at instants of its own: updates of others, and controllers. */
+static void add_readers(const fcsl_sim_t *sim, fcsl_group_t *group, uint32_t number)
+{
+    for (uint32_t i = 0; i < sim->copy_count; i++) {
+        const fcsl_copy_t *copy = &sim->copies[i];
+        const fcsl_instance_state_t *reader = &sim->instances[copy->instance];
+        if (copy->source != UINT32_MAX && sim->instances[copy->source].group == number && reader->group != number &&
+            reader->model->update) {
+            add_once(group->sampling, &group->sampling_count, copy->instance);
+        }
+    }
+    for (uint32_t c = 0; c < sim->companion_count; c++) {
+        const fcsl_companion_t *companion = &sim->companions[c];
+        for (uint32_t i = 0; i < companion->sensor_count; i++) {
+            group->companions[c] |= sim->instances[companion->sensors[i].instance].group == number;
+        }
+        for (uint32_t i = 0; i < group->outer_count; i++) {
+            const uint8_t *from = sim->copies[group->outer[i]].from;
+            group->companions[c] |= from >= companion->image && from < companion->image + companion->machine->size;
+        }
+    }
+}
+
+/* Behind a serial line commands arrive at its own instants. */
+static int add_link(const fcsl_sim_t *sim, fcsl_group_t *group, fcsl_error_t *error)
+{
+    const fcsl_plan_library_t *link = &sim->plan.serial_link;
+    uint32_t index = 0;
+    for (uint32_t i = 0; link->name && i < group->outer_count; i++) {
+        if (sim->copies[group->outer[i]].source == UINT32_MAX) {
+            if (fcsl_sim_find_instance(sim, link->line, link->name, &index, error)) {
+                return -1;
+            }
+            add_once(group->timed, &group->timed_count, index);
+            return 0;
+        }
+    }
+    return 0;
+}
+
 static void add_crossings(const fcsl_sim_t *sim, fcsl_group_t *group)
 {
     for (uint32_t i = 0; i < group->eventful_count; i++) {
@@ -146,7 +196,9 @@ static int build_group(fcsl_sim_t *sim, uint32_t number, fcsl_error_t *error)
     group->stages = calloc(sim->call_count + 1u, sizeof *group->stages);
     group->outputs = calloc(sim->call_count + 1u, sizeof *group->outputs);
     group->outer = calloc(sim->copy_count + 1u, sizeof *group->outer);
-    if (!group->derived || !group->blocks || !group->eventful || !group->timed || !group->stages || !group->outputs ||
+    group->sampling = calloc(count, sizeof *group->sampling);
+    group->companions = calloc(sim->companion_count + 1u, sizeof *group->companions);
+    if (!group->derived || !group->blocks || !group->eventful || !group->timed || !group->sampling || !group->companions || !group->stages || !group->outputs ||
         !group->outer) {
         return fcsl_sim_fail(error, "no memory for a group of models");
     }
@@ -155,6 +207,10 @@ static int build_group(fcsl_sim_t *sim, uint32_t number, fcsl_error_t *error)
         return -1;
     }
     add_outer(sim, group, number);
+    add_readers(sim, group, number);
+    if (add_link(sim, group, error)) {
+        return -1;
+    }
     group->crossing = calloc(group->event_count + 1u, 1);
     group->fired = calloc(group->event_count + 1u, 1);
     if (!group->crossing || !group->fired) {

@@ -35,6 +35,26 @@ int fcsl_group_any_crosses(const fcsl_group_t *group, const double *before, cons
     return 0;
 }
 
+void fcsl_group_pass(fcsl_group_t *group, const double *now)
+{
+    for (uint32_t i = 0; i < group->event_count; i++) {
+        group->g[i] = now[i] == 0.0 && group->g[i] != 0.0 ? group->g[i] : now[i];
+    }
+}
+
+int fcsl_group_check_events(const fcsl_group_t *group, double t, const double *value, fcsl_error_t *error)
+{
+    for (uint32_t i = 0; i < group->event_count; i++) {
+        if (isnan(value[i])) {
+            uint32_t number = 0;
+            const fcsl_instance_state_t *instance = instance_of(group, i, &number);
+            return fcsl_sim_fail(error, "the function of event `%s` of `%s` is no number at %.9f s",
+                                 instance->model->events[number].name, instance->name, t);
+        }
+    }
+    return 0;
+}
+
 /* ---- locating ----------------------------------------------------------------------------------------------------------- */
 
 typedef struct {
@@ -53,7 +73,9 @@ static void look(search_t *search, int64_t offset_ns)
 {
     fcsl_group_t *group = search->group;
     search->probe(group, offset_ns, group->probe);
-    fcsl_group_events(group, (double)(search->from_ns + offset_ns) / NS_PER_S, group->probe, group->g_probe);
+    /* A NaN here counts as not yet; where the search ends it is found again. */
+    (void)fcsl_group_events(group, (double)(search->from_ns + offset_ns) / NS_PER_S, group->probe, group->g_probe,
+                            NULL);
     const double value = group->g_probe[search->event];
     if (fcsl_group_crosses(group, search->event, group->g[search->event], value)) {
         search->after_ns = offset_ns;
@@ -152,7 +174,7 @@ static int check_chatter(fcsl_group_t *group, uint32_t event, fcsl_error_t *erro
     const fcsl_instance_state_t *instance = instance_of(group, event, &number);
     return fcsl_sim_fail(
         error,
-        "chattering at %.9f s: event `%s` of `%s` is the last of %u events in a row, each at most %u ns "
+        "chattering at %.9f s: event `%s` of `%s` is the last of %u in a row, each at most %u ns "
         "after the one before; let `reset` change a state that ends this, such as a ball at rest",
         (double)state->time_ns / NS_PER_S, instance->model->events[number].name, instance->name, FCSL_CHATTER_EVENTS,
         FCSL_CHATTER_NS);
@@ -163,9 +185,6 @@ static int reset(fcsl_group_t *group, uint32_t event, fcsl_error_t *error)
     uint32_t number = 0;
     const fcsl_instance_state_t *instance = instance_of(group, event, &number);
     const uint32_t index = (uint32_t)(instance - group->sim->instances);
-    if (check_chatter(group, event, error)) {
-        return -1;
-    }
     fcsl_group_scatter(group, group->x);
     evaluate(group);
     const fcsl_model_context_t context = fcsl_sim_context(group->sim, index, group->state.time_ns);
@@ -178,16 +197,23 @@ static int reset(fcsl_group_t *group, uint32_t event, fcsl_error_t *error)
 /* Handles the events whose functions came from group->g to `now`, in their order; returns 0, or -1. */
 static int fire_once(fcsl_group_t *group, double *now, fcsl_error_t *error)
 {
-    for (uint32_t i = 0; i < group->event_count; i++) {
+    uint32_t first = group->event_count;
+    for (uint32_t i = group->event_count; i-- > 0;) {
         group->fired[i] = (uint8_t)fcsl_group_crosses(group, i, group->g[i], now[i]);
+        first = group->fired[i] ? i : first;
+    }
+    if (check_chatter(group, first, error)) {
+        return -1;
     }
     for (uint32_t i = 0; i < group->event_count; i++) {
         if (group->fired[i] && reset(group, i, error)) {
             return -1;
         }
     }
-    memcpy(group->g, now, group->event_count * sizeof *now);
-    fcsl_group_events(group, fcsl_group_time_s(group), group->x, now);
+    fcsl_group_pass(group, now);
+    if (fcsl_group_events(group, fcsl_group_time_s(group), group->x, now, error)) {
+        return -1;
+    }
     for (uint32_t i = 0; i < group->event_count; i++) {
         if (group->fired[i]) { /* what its own reset does to its function is no event */
             group->g[i] = now[i];
@@ -204,7 +230,7 @@ int fcsl_group_fire(fcsl_group_t *group, double *now, fcsl_error_t *error)
             return -1;
         }
     }
-    memcpy(group->g, now, group->event_count * sizeof *now);
+    fcsl_group_pass(group, now);
     fcsl_group_restart(group);
     return 0;
 }

@@ -281,6 +281,7 @@ int fcsl_sim_close(fcsl_sim_t *sim, fcsl_error_t *error)
         return 0;
     }
     int status = 0;
+    fcsl_sim_is_open(sim, 0);
     fcsl_sim_end_service(sim);
     fcsl_telemetry_close(sim->telemetry);
     fcsl_sim_publish_end(sim);

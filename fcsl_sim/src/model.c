@@ -141,6 +141,9 @@ static const char *check_descriptor(const fcsl_model_t *model)
         (model->event_count > 0 && !model->events)) {
         return "it must have `events`, `event` and `reset` together, or none of them";
     }
+    if (model->event_count > 0 && !model->output) {
+        return "it has events and no `output`: its inputs would be those of its last update";
+    }
     if (model->event_count > FCSL_MODEL_MAX_EVENTS) {
         return "it has too many events";
     }

@@ -34,8 +34,12 @@ void fcsl_sim_name_place(const fcsl_instance_state_t *instance, size_t offset, c
             return;
         }
     }
-    (void)snprintf(text, size, "%s: continuous state %zu", instance->name,
-                   (offset - model->continuous_offset) / sizeof(double));
+    const size_t state = (offset - model->continuous_offset) / sizeof(double);
+    if (offset >= model->continuous_offset && state < model->continuous_count) {
+        (void)snprintf(text, size, "continuous state %zu of %s", state, instance->name);
+    } else {
+        (void)snprintf(text, size, "byte %zu of the struct of %s, which is in no field", offset, instance->name);
+    }
 }
 
 static double value_at(const uint8_t *from, uint8_t type)

@@ -147,7 +147,9 @@ static int on_instance(parser_t *parser)
     if (fcsl_plan_number(parser->word[4], FCSL_PLAN_MAX_GRID_HZ, &instance->hz) ||
         fcsl_plan_number(parser->word[5], FCSL_PLAN_MAX_TICKS, &instance->every) ||
         fcsl_plan_number(parser->word[6], FCSL_PLAN_MAX_TICKS, &instance->phase) ||
-        (instance->hz > 0) != (instance->every > 0)) {
+        (instance->hz > 0) != (instance->every > 0) ||
+        (instance->hz > 0 && (instance->every / instance->hz > FCSL_PLAN_MAX_SECONDS ||
+                              instance->phase / instance->hz > FCSL_PLAN_MAX_SECONDS))) {
         return bad(parser, "not a rate with its phase");
     }
     return 0;

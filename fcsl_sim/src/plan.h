@@ -48,6 +48,7 @@
 #define FCSL_PLAN_MAX_SETS      65536u /* of each kind */
 #define FCSL_PLAN_MAX_HZ        1000000u
 #define FCSL_PLAN_MAX_GRID_HZ   1000000000u
+#define FCSL_PLAN_MAX_SECONDS   1000000000u
 #define FCSL_PLAN_MAX_TICKS     UINT64_C(1000000000000)
 
 /* Every record has its line number, for messages. All strings point into the plan's copy of the text. */

@@ -143,6 +143,9 @@ int fcsl_plant_state_restore(fcsl_sim_t *sim, const void *bytes)
         instance->due = 0;
     }
     pass_events(sim);
+    for (uint32_t i = 0; i < sim->group_count; i++) {
+        sim->groups[i].next_write = 0;
+    }
     fcsl_sim_refill_queue(sim);
     fcsl_actuators_update(sim);
     fcsl_sim_pace_anew(sim);

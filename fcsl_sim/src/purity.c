@@ -3,6 +3,7 @@
  * Finds models that break the rules of fcsl_model.h, by trying their functions once on a copy: functions that change what they may
  * only read, and outputs that depend on an input without saying so.
  */
+#include <math.h>
 #include <stdlib.h>
 #include <string.h>
 
@@ -11,6 +12,8 @@
 #include "sim_internal.h"
 
 typedef struct {
+    fcsl_sim_t *sim;
+    uint32_t index;
     const fcsl_instance_state_t *instance;
     uint8_t *before;
     uint8_t *after;
@@ -90,38 +93,94 @@ static int check_feedthrough(const trial_t *trial, fcsl_error_t *error)
     return 0;
 }
 
+/* Other states and outputs in the struct than in x, where these are not what a function may read. */
+static void change_what_is_older(const fcsl_model_t *model, uint8_t *data)
+{
+    double *x = states_in(model, data);
+    for (uint32_t i = 0; i < model->continuous_count; i++) {
+        x[i] += 0.75;
+    }
+    for (uint32_t i = 0; i < model->field_count; i++) {
+        const fcsl_field_t *field = &model->fields[i];
+        for (uint32_t k = 0; field->role == FCSL_ROLE_OUTPUT && field->type == FCSL_F64 && k < field->count; k++) {
+            const double value = 0.625;
+            memcpy(data + field->offset + (size_t)k * sizeof value, &value, sizeof value);
+        }
+    }
+}
+
+/* Whether `derivative` and `event` take states from their argument, and nothing from outputs. */
+static int check_argument(const trial_t *trial, fcsl_error_t *error)
+{
+    const fcsl_model_t *model = trial->instance->model;
+    const uint32_t count = model->continuous_count + model->event_count;
+    double *x = trial->scratch + 2u * count;
+    double *first = trial->scratch;
+    double *second = trial->scratch + count;
+    if (model->continuous_count == 0) {
+        return 0;
+    }
+    memcpy(trial->after, trial->before, model->size);
+    memcpy(x, states_in(model, trial->before), model->continuous_count * sizeof *x);
+    change_what_is_older(model, trial->after);
+    for (int pass = 0; pass < 2; pass++) {
+        const uint8_t *self = pass == 0 ? trial->before : trial->after;
+        double *values = pass == 0 ? first : second;
+        model->derivative(self, 0.0, x, values);
+        if (model->event) {
+            model->event(self, 0.0, x, values + model->continuous_count);
+        }
+    }
+    for (uint32_t i = 0; i < count; i++) {
+        if (memcmp(&first[i], &second[i], sizeof *first) != 0 && !(isnan(first[i]) && isnan(second[i]))) {
+            return fcsl_sim_fail(error,
+                                 "`%s` of model `%s` reads integrated states, or outputs, in the struct: they are older "
+                                 "than its argument; take the states from x",
+                                 i < model->continuous_count ? "derivative" : "event", model->name);
+        }
+    }
+    return 0;
+}
+
 static int try_functions(const trial_t *trial, fcsl_error_t *error)
 {
     const fcsl_model_t *model = trial->instance->model;
     memcpy(trial->before, trial->instance->data, model->size);
     memcpy(trial->after, trial->instance->data, model->size);
     if (model->derivative) {
+        fcsl_sim_enter(trial->sim, trial->index, FCSL_IN_DERIVATIVE);
         model->derivative(trial->after, 0.0, states_in(model, trial->after), trial->scratch);
         if (check_unchanged(trial, "derivative", 0, error)) {
             return -1;
         }
     }
     if (model->event) {
+        fcsl_sim_enter(trial->sim, trial->index, FCSL_IN_EVENT);
         model->event(trial->after, 0.0, states_in(model, trial->after), trial->scratch);
         if (check_unchanged(trial, "event", 0, error)) {
             return -1;
         }
     }
+    if (check_argument(trial, error)) {
+        return -1;
+    }
+    memcpy(trial->after, trial->before, model->size);
     if (model->output) {
+        fcsl_sim_enter(trial->sim, trial->index, FCSL_IN_OUTPUT);
         model->output(trial->after, 0.0, states_in(model, trial->after));
         return check_unchanged(trial, "output", 1, error) || check_feedthrough(trial, error) ? -1 : 0;
     }
     return 0;
 }
 
-int fcsl_sim_check_purity(const fcsl_sim_t *sim, uint32_t index, fcsl_error_t *error)
+int fcsl_sim_check_purity(fcsl_sim_t *sim, uint32_t index, fcsl_error_t *error)
 {
     const fcsl_instance_state_t *instance = &sim->instances[index];
     const fcsl_model_t *model = instance->model;
-    trial_t trial = {.instance = instance};
+    trial_t trial = {.sim = sim, .index = index, .instance = instance};
     trial.before = fcsl_sim_allocate(model->size, model->align);
     trial.after = fcsl_sim_allocate(model->size, model->align);
-    trial.scratch = calloc((size_t)model->continuous_count + model->event_count + 1u, sizeof *trial.scratch);
+    trial.scratch = calloc(3u * ((size_t)model->continuous_count + model->event_count) + 1u, sizeof *trial.scratch);
     const int failed = !trial.before || !trial.after || !trial.scratch
                            ? fcsl_sim_fail(error, "no memory for instance `%s`", instance->name)
                            : try_functions(&trial, error);

@@ -26,9 +26,9 @@ static void set(void *ctx, uint32_t block, uint32_t number, uint32_t element, co
     fcsl_sim_t *sim = ctx;
     const struct fcsl_sim_published *published = sim->published;
     const fcsl_field_t *field = &published->blocks[block].fields[number];
-    uint8_t *to = sim->instances[block - published->first_model].data + field->offset;
-    memcpy(to + (size_t)element * fcsl_scalar_size(field->type), bytes, size);
-    fcsl_sim_disturb(sim);
+    const uint32_t instance = block - published->first_model;
+    fcsl_error_t error; /* a field lies within its struct */
+    (void)fcsl_sim_write(sim, instance, field->offset + element * fcsl_scalar_size(field->type), bytes, size, &error);
 }
 
 static void save(void *ctx)

@@ -54,15 +54,28 @@ static int64_t next_write_ns(const fcsl_sim_t *sim)
                : INT64_MAX;
 }
 
-/* When inputs of a group may jump next, after the present: at a tick, at a scheduled write, or when an instance is updated. */
-static int64_t barrier_ns(const fcsl_sim_t *sim, const fcsl_group_t *group)
+/* The next write to an instance of a group. */
+static int64_t next_write_to_ns(const fcsl_sim_t *sim, fcsl_group_t *group)
+{
+    const uint32_t number = (uint32_t)(group - sim->groups);
+    uint32_t i = group->next_write > sim->next_event ? group->next_write : sim->next_event;
+    while (i < sim->plan.event_count && sim->events[sim->event_order[i]].group != number) {
+        i++;
+    }
+    group->next_write = i;
+    return i < sim->plan.event_count ? (int64_t)sim->plan.events[sim->event_order[i]].time_ns : INT64_MAX;
+}
+
+/* When inputs of a group may jump next, after the present: at a tick, at a scheduled write to it, or when an instance that feeds it is
+ * updated. */
+static int64_t barrier_ns(const fcsl_sim_t *sim, fcsl_group_t *group)
 {
     int64_t barrier = tick_ns(sim, sim->tick);
-    const int64_t write_ns = next_write_ns(sim);
+    const int64_t write_ns = next_write_to_ns(sim, group);
     barrier = write_ns < barrier ? write_ns : barrier;
     for (uint32_t i = 0; i < sim->companion_count; i++) {
         const int64_t due_ns = sim->companions[i].next_tick_ns;
-        barrier = due_ns < barrier ? due_ns : barrier;
+        barrier = group->companions[i] && due_ns < barrier ? due_ns : barrier;
     }
     for (uint32_t i = 0; i < group->timed_count; i++) {
         const int64_t update_ns = sim->instances[group->timed[i]].next_update_ns;
@@ -71,11 +84,25 @@ static int64_t barrier_ns(const fcsl_sim_t *sim, const fcsl_group_t *group)
     return barrier;
 }
 
+/* Whether somebody reads outputs of the group at this instant. A group that an instant does not concern makes no step for it, so that
+ * what is beside it changes none of its bits. */
+static int is_read(const fcsl_sim_t *sim, const fcsl_group_t *group, int64_t time_ns)
+{
+    for (uint32_t i = 0; i < group->sampling_count; i++) {
+        if (sim->instances[group->sampling[i]].next_update_ns == time_ns) {
+            return 1;
+        }
+    }
+    return 0;
+}
+
 static int advance(fcsl_sim_t *sim, int64_t time_ns, fcsl_error_t *error)
 {
     for (uint32_t i = 0; i < sim->group_count; i++) {
         fcsl_group_t *group = &sim->groups[i];
-        if (fcsl_group_advance(group, time_ns, barrier_ns(sim, group), error)) {
+        const int64_t barrier = barrier_ns(sim, group);
+        if ((barrier == time_ns || is_read(sim, group, time_ns)) &&
+            fcsl_group_advance(group, time_ns, barrier, error)) {
             return -1;
         }
     }
@@ -83,11 +110,11 @@ static int advance(fcsl_sim_t *sim, int64_t time_ns, fcsl_error_t *error)
     return 0;
 }
 
-/* Groups see what has been written at their next step. */
-void fcsl_sim_disturb(fcsl_sim_t *sim)
+/* Its group sees at its next step what has been written. */
+void fcsl_sim_disturb(fcsl_sim_t *sim, uint32_t instance)
 {
-    for (uint32_t i = 0; i < sim->group_count; i++) {
-        sim->groups[i].state.disturbed = 1;
+    if (sim->instances[instance].group != FCSL_PLAN_NO_GROUP) {
+        sim->groups[sim->instances[instance].group].state.disturbed = 1;
     }
 }
 
@@ -96,8 +123,28 @@ static void make_writes(fcsl_sim_t *sim)
     while (next_write_ns(sim) == sim->time_ns) {
         const fcsl_write_t *write = &sim->events[sim->event_order[sim->next_event++]];
         fcsl_write_bits(write->to, write->size, write->bits);
-        fcsl_sim_disturb(sim);
+        fcsl_sim_disturb(sim, write->instance);
     }
+}
+
+/* The inputs of an instance; its group hears of a jump. */
+static void take_inputs(fcsl_sim_t *sim, uint32_t index)
+{
+    const fcsl_instance_state_t *instance = &sim->instances[index];
+    const fcsl_copy_t *copies = &sim->copies[instance->first_copy];
+    for (uint32_t i = 0; i < instance->outer_count; i++) {
+        if (fcsl_sim_copy_changed(&copies[i])) {
+            fcsl_sim_disturb(sim, index);
+        }
+    }
+    fcsl_sim_copy(sim, instance->first_copy + instance->outer_count, instance->inner_count);
+}
+
+/* Whether the states of an instance are those of the present. */
+static int is_present(const fcsl_sim_t *sim, uint32_t index)
+{
+    const uint32_t group = sim->instances[index].group;
+    return group == FCSL_PLAN_NO_GROUP || sim->groups[group].state.time_ns == sim->time_ns;
 }
 
 static void call_output(fcsl_sim_t *sim, uint32_t index)
@@ -105,7 +152,7 @@ static void call_output(fcsl_sim_t *sim, uint32_t index)
     fcsl_instance_state_t *instance = &sim->instances[index];
     const fcsl_model_t *model = instance->model;
     const double *x = (const double *)(const void *)(instance->data + model->continuous_offset);
-    fcsl_sim_copy(sim, instance->first_copy, instance->copy_count);
+    take_inputs(sim, index);
     fcsl_sim_enter(sim, index, FCSL_IN_OUTPUT);
     model->output(instance->data, (double)sim->time_ns / FCSL_NS_PER_S, model->continuous_count > 0 ? x : NULL);
     if (model->sampled_offset == FCSL_NO_OFFSET) {
@@ -118,7 +165,7 @@ static int call_update(fcsl_sim_t *sim, uint32_t index)
     fcsl_instance_state_t *instance = &sim->instances[index];
     const fcsl_model_t *model = instance->model;
     const fcsl_model_context_t context = fcsl_sim_context(sim, index, sim->time_ns);
-    fcsl_sim_copy(sim, instance->first_copy, instance->copy_count);
+    take_inputs(sim, index);
     fcsl_sim_enter(sim, index, FCSL_IN_UPDATE);
     model->update(instance->data, &context);
     if (sim->link && index == sim->link_instance) {
@@ -127,9 +174,7 @@ static int call_update(fcsl_sim_t *sim, uint32_t index)
     if (model->sampled_offset == FCSL_NO_OFFSET || instance->data[model->sampled_offset]) {
         instance->samples++;
     }
-    if (instance->group != FCSL_PLAN_NO_GROUP) {
-        sim->groups[instance->group].state.disturbed = 1;
-    }
+    fcsl_sim_disturb(sim, index);
     instance->due = 0;
     instance->next_update += instance->every;
     instance->next_update_ns = fcsl_grid_time_ns(instance->next_update, instance->hz);
@@ -142,7 +187,9 @@ static int evaluate(fcsl_sim_t *sim)
     for (uint32_t i = 0; i < sim->call_count; i++) {
         const fcsl_call_t *call = &sim->calls[i];
         if (call->kind != FCSL_CALL_UPDATE) {
-            call_output(sim, call->instance);
+            if (is_present(sim, call->instance)) {
+                call_output(sim, call->instance);
+            }
         } else if (sim->instances[call->instance].due && call_update(sim, call->instance)) {
             return -1;
         }
@@ -213,10 +260,9 @@ static int init_models(fcsl_sim_t *sim, fcsl_error_t *error)
         }
     }
     for (uint32_t i = 0; i < sim->group_count; i++) {
-        if (fcsl_group_check(&sim->groups[i], error)) {
+        if (fcsl_group_check(&sim->groups[i], error) || fcsl_group_start(&sim->groups[i], error)) {
             return -1;
         }
-        fcsl_group_start(&sim->groups[i]);
     }
     fcsl_sim_enter(sim, 0, FCSL_IN_NONE);
     return 0;
@@ -269,6 +315,7 @@ fcsl_sim_t *fcsl_sim_open(const char *plan, size_t size, fcsl_error_t *error)
         (void)fcsl_sim_fail(error, "no memory for a simulation");
         return NULL;
     }
+    fcsl_sim_is_open(sim, 1);
     if (fcsl_plan_parse(&sim->plan, plan, size, error) || fcsl_assembly_build(sim, error) || init_models(sim, error) ||
         fill_queue(sim, error) || attach(sim, error)) {
         (void)fcsl_sim_close(sim, NULL);
@@ -380,7 +427,11 @@ static void complete_tick(fcsl_sim_t *sim)
 
 void fcsl_sim_hold(fcsl_sim_t *sim)
 {
+    fcsl_message_t due;
     fcsl_gate_wait(&sim->gate, (uint64_t)sim->time_ns, sim->image);
+    if (fcsl_delay_pass(&sim->delay, fcsl_run_channels(sim->run), sim->tick, NULL, &due)) {
+        fcsl_sim_take_command(sim, &due);
+    }
     complete_tick(sim);
 }
 
@@ -396,7 +447,7 @@ int fcsl_sim_actuate_message(fcsl_sim_t *sim, const fcsl_message_t *message, fcs
     }
     fcsl_gate_wait(&sim->gate, (uint64_t)sim->time_ns, sim->image); /* a link may have delivered nothing for long */
     fcsl_message_t due;
-    const int is_due = fcsl_delay_pass(&sim->delay, fcsl_run_channels(sim->run), message, &due);
+    const int is_due = fcsl_delay_pass(&sim->delay, fcsl_run_channels(sim->run), sim->tick, message, &due);
     const char *wrong = is_due && sim->link ? fcsl_sim_link_command(sim->link, &due) : NULL;
     if (wrong) {
         return fcsl_sim_fail(error, "tick %llu: %s", (unsigned long long)sim->tick, wrong);
@@ -451,8 +502,11 @@ int fcsl_sim_write(fcsl_sim_t *sim, uint32_t instance, uint32_t offset, const vo
         size > sim->instances[instance].model->size - offset) {
         return fcsl_sim_fail(error, "a write that is not between two ticks, or not within an instance");
     }
-    memcpy(sim->instances[instance].data + offset, bytes, size);
-    fcsl_sim_disturb(sim);
+    uint8_t *to = sim->instances[instance].data + offset;
+    if (memcmp(to, bytes, size) != 0) {
+        memcpy(to, bytes, size);
+        fcsl_sim_disturb(sim, instance);
+    }
     return 0;
 }
 

@@ -41,6 +41,8 @@ typedef struct {
     uint8_t *to;
     uint32_t size;
     uint64_t bits;
+    uint32_t instance;
+    uint32_t group; /* of the instance */
 } fcsl_write_t;
 
 typedef struct {
@@ -179,6 +181,16 @@ static inline void fcsl_sim_copy(const fcsl_sim_t *sim, uint32_t first, uint32_t
     }
 }
 
+/* Copies one input; whether it was another one. */
+static inline int fcsl_sim_copy_changed(const fcsl_copy_t *copy)
+{
+    const int changed = memcmp(copy->to, copy->from, copy->size) != 0;
+    if (changed) {
+        memcpy(copy->to, copy->from, copy->size);
+    }
+    return changed;
+}
+
 static inline void fcsl_sim_enter(fcsl_sim_t *sim, uint32_t instance, fcsl_function_t function)
 {
     const uint64_t place = ++sim->entries << 24 | (uint64_t)instance << 8 | (uint64_t)function;
@@ -194,15 +206,17 @@ static inline fcsl_model_context_t fcsl_sim_context(fcsl_sim_t *sim, uint32_t in
 /* place.c: the field at an offset in the struct of an instance: "lander.state.pos_z", "wheel.state.rate[2]". */
 #define FCSL_PLACE_BYTES 320u
 void fcsl_sim_name_place(const fcsl_instance_state_t *instance, size_t offset, char *text, size_t size);
+/* crash.c: the simulation exists, or no longer. */
+void fcsl_sim_is_open(const fcsl_sim_t *sim, int is_open);
 /* place.c: fails where an output of an instance is not finite. */
 int fcsl_sim_check_outputs(const fcsl_sim_t *sim, fcsl_error_t *error);
 
 /* purity.c: tries the functions of an instance that is initialised. Returns 0, or -1. */
-int fcsl_sim_check_purity(const fcsl_sim_t *sim, uint32_t index, fcsl_error_t *error);
+int fcsl_sim_check_purity(fcsl_sim_t *sim, uint32_t index, fcsl_error_t *error);
 /* sim.c: the next events of a simulation between two ticks, from its instances. */
 void fcsl_sim_refill_queue(fcsl_sim_t *sim);
-/* sim.c: something besides the plant itself has changed a value of a model. */
-void fcsl_sim_disturb(fcsl_sim_t *sim);
+/* sim.c: something besides the plant itself has changed a value of an instance. */
+void fcsl_sim_disturb(fcsl_sim_t *sim, uint32_t instance);
 
 /* sim.c: fcsl_sim_sense and fcsl_sim_actuate without validation of messages. Each returns 0, or -1. */
 int fcsl_sim_sense_message(fcsl_sim_t *sim, uint8_t *bytes, size_t capacity, fcsl_message_t *message,

@@ -257,6 +257,10 @@ def test_the_command_line_replaces_values(load_sim: Load) -> None:
     assert "seed 7" in config.plan.splitlines() and "ticks 50" in config.plan.splitlines()
 
 
+def test_another_seed_is_the_same_as_if_it_had_been_loaded(load_sim: Load) -> None:
+    assert load_sim(seed=1).with_seed(2**64 - 1) == load_sim(seed=2**64 - 1)
+
+
 @pytest.mark.parametrize(
     ("text", "expected"),
     [

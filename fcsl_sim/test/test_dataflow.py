@@ -229,3 +229,88 @@ def test_an_output_that_is_no_number_ends_the_run(open_sim: Open) -> None:
     with open_sim(chained(two, ("a.free", "b.u"))) as sim, pytest.raises(SimError) as error:
         sim.run(100)
     assert str(error.value) == "b.outputs.through became inf at 0.000000000 s"
+
+
+METHODS: list[dict[str, Any]] = [
+    *({"method": method, "hz": 100} for method in ("euler", "rk2", "rk4")),
+    {"method": "ab4", "hz": 1000},
+    {"method": "rk45", "rtol": 1e-9, "atol": 1e-9},
+]
+
+
+@pytest.mark.parametrize("integrator", METHODS)
+@pytest.mark.parametrize("name", ["a", "z"])
+def test_a_jump_of_a_sensor_is_noticed(name: str, integrator: dict[str, Any], open_sim: Open) -> None:
+    """v' = u, where u holds the samples k/20 of a sensor with 20 Hz; every method is exact between two of them."""
+
+    def change(config: dict[str, Any]) -> None:
+        chained({name: link(gain=1.0)}, ("altimeter.value", f"{name}.u"), integrator=integrator)(config)
+        config["rates"]["altimeter"] = 20
+
+    with open_sim(change) as sim:
+        sim.run(100)
+        assert sim.get(f"{name}.outputs.free") == pytest.approx(sum(k / 400 for k in range(19)) + 0.95 * 0.04, rel=1e-9)
+
+
+@pytest.mark.parametrize("integrator", METHODS)
+@pytest.mark.parametrize("beside", [100, 1000, 7, {"hz": 30, "phase_s": 0.0123}])
+def test_a_sensor_beside_it_changes_no_bit(beside: Any, integrator: dict[str, Any], open_sim: Open) -> None:
+    def flown(*others: Any) -> list[Any]:
+        two = {"x": link(x=1.0), "v": link(rate=-1.0)}
+        change = chained(two, ("v.free", "x.u"), ("x.free", "v.u"), integrator=integrator)
+
+        def with_others(config: dict[str, Any]) -> None:
+            change(config)
+            for number, rate in enumerate(others):
+                config["instances"][f"other{number}"] = config["instances"]["altimeter"]
+                config["rates"][f"other{number}"] = rate
+            if others:
+                config["instances"]["still"] = link()
+                config["events"] = [{"at_s": 0.12345, "set": "still.inputs.u", "value": 1.0}]
+
+        values = []
+        with open_sim(with_others) as sim:
+            while sim.status == "running":
+                sim.run(1)
+                values += [sim.get("x.state.x"), sim.get("v.state.x")]
+        return values
+
+    assert flown() == flown(beside)
+
+
+def test_the_largest_step_is_never_exceeded(open_sim: Open) -> None:
+    """Ticks are 10 ms apart: with steps of at most 9.2 ms there are two in each."""
+
+    def error(limit: float) -> float:
+        two = {"x": link(x=1.0), "v": link(rate=-1.0)}
+        loose = {"method": "rk45", "rtol": 1e-1, "atol": 1e-1, "max_step_s": limit}
+        with open_sim(chained(two, ("v.free", "x.u"), ("x.free", "v.u"), integrator=loose)) as sim:
+            sim.run(100)
+            return abs(sim.get("x.outputs.free") - math.cos(0.99))
+
+    assert error(0.0092) == error(0.005) < error(0.01)
+
+
+def test_a_derivative_that_reads_the_struct_is_refused(load_sim: Load) -> None:
+    config = load_sim(chained({"a": link(), "b": link()}, ("a.free", "b.u")), define="STALE")
+    with pytest.raises(SimError) as error:
+        Simulation(config.plan, config.tables)
+    assert str(error.value).startswith(
+        "`derivative` of model `chain` reads integrated states, or outputs, in the struct"
+    )
+
+
+def test_settings_without_an_effect_are_refused(load_sim: Load) -> None:
+    def tolerances(config: dict[str, Any]) -> None:
+        chained({"a": link() | {"tolerances": {"state.x": 1.0}}})(config)
+
+    def integrator(config: dict[str, Any]) -> None:
+        config["instances"]["altimeter"]["integrator"] = {"method": "rk4", "hz": 100}
+
+    for change, message in (
+        (tolerances, "E804: `tolerances` of `a`: only rk45 chooses its steps"),
+        (integrator, "E808: `altimeter` has an integrator, and nothing to integrate or to locate"),
+    ):
+        with pytest.raises(DiagnosticError) as error:
+            load_sim(change)
+        assert heads(error.value) == [message]

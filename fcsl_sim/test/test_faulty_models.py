@@ -87,3 +87,19 @@ def test_no_number_is_an_error_as_json(write: Write) -> None:
     )
     assert done.returncode == 2
     assert json.loads(done.stdout)["error"].startswith("lander.")
+
+
+@pytest.mark.parametrize(("how", "name"), [(11, "SIGSEGV"), (13, "SIGABRT")])
+def test_a_crash_while_it_is_opened(how: int, name: str, write: Write) -> None:
+    done = fly(write(how))
+    message = f"`init` of `bad` crashed after 0.000000000 s: {name}"
+    assert (done.returncode, done.stderr) == (2, f"fcsl-sim: error: {message}\n")
+    assert json.loads(done.stdout) == {"end": "error", "error": message}
+
+
+def test_a_hang_while_it_is_opened(write: Write) -> None:
+    done = fly(write(12))
+    assert (done.returncode, done.stderr) == (
+        2,
+        "fcsl-sim: error: `init` of `bad` does not return after 0.000000000 s\n",
+    )

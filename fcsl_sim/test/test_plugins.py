@@ -465,8 +465,8 @@ def reported(load_sim: Load, change: Callable[[dict[str, Any]], None]) -> str:
 @pytest.mark.parametrize(
     ("definition", "message"),
     [
-        ({}, "E801]: model `ramp` has neither `source` nor `library`"),
-        ({"source": "ramp.c", "library": "package://a/b"}, "E801]: model `ramp` has both `source` and `library`"),
+        ({}, "E801]: model `ramp` has none of `source`, `library` and `machine`"),
+        ({"source": "ramp.c", "library": "package://a/b"}, "E801]: model `ramp` has `source` and `library`"),
         ({"source": "ramp.rs"}, "a model in Rust is a crate that its package builds: write `fcsl_add_model(NAME CRATE"),
         ({"source": "libramp.so"}, 'a built library is not a source: write {"library": "package://PACKAGE/NAME"}'),
         (

@@ -19,7 +19,8 @@ from typing import Any
 
 import pytest
 
-from fcsl_sim import SimError, Simulation, load
+from fcsl_compiler.base.diagnostics import DiagnosticError
+from fcsl_sim import Simulation, load
 
 FCSL_SIM = Path(__file__).resolve().parents[1] / "bin/fcsl-sim"
 LANDER = Path(__file__).resolve().parents[2] / "examples/lander/sim/lander.sim.json"
@@ -322,14 +323,15 @@ def test_a_long_tick_ends_with_a_pause(open_sim: Callable[..., Simulation], tmp_
             client.close()
 
 
-def test_a_name_means_one_thing(open_sim: Callable[..., Simulation], tmp_path: Path) -> None:
+def test_a_name_means_one_thing(open_sim: Callable[..., Simulation]) -> None:
     def rename(config: dict[str, Any]) -> None:
         config["instances"]["machine"] = config["instances"].pop("velocimeter")
         config["rates"]["machine"] = config["rates"].pop("velocimeter")
         config["connections"] = json.loads(json.dumps(config["connections"]).replace("velocimeter", "machine"))
 
-    with open_sim(rename) as sim, pytest.raises(SimError, match="rename it"):
-        sim.serve(str(tmp_path / "s"), None, paused=True)
+    with pytest.raises(DiagnosticError) as error:
+        open_sim(rename)
+    assert [d.message for d in error.value.diagnostics] == ["`machine` is reserved"]
 
 
 def test_from_the_command_line(tmp_path: Path) -> None:

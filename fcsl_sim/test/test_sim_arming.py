@@ -17,6 +17,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
+from fcsl_compiler.base.diagnostics import DiagnosticError
 from fcsl_sim import SimConfig, SimError, Simulation, load
 from fcsl_sim.runner import run
 from simclient import bag
@@ -237,9 +238,9 @@ def driven(sim: Simulation) -> Iterator[None]:
 def test_an_instance_with_the_name_of_the_topic(folder: Path, tmp_path: Path) -> None:
     text = FILES["drive.sim.json"].replace('"plant"', '"actuators"').replace("plant.", "actuators.")
     (folder / "named.sim.json").write_text(text)
-    config = load(folder / "named.sim.json")
-    with pytest.raises(SimError, match="model instance `actuators` is named like the topic of what the actuators get"):
-        Simulation(config.plan, config.tables)
+    with pytest.raises(DiagnosticError) as error:
+        load(folder / "named.sim.json")
+    assert [d.message for d in error.value.diagnostics] == ["`actuators` is reserved"]
 
     def rename(machine: dict[str, Any]) -> None:
         machine.update(

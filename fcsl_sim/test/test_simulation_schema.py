@@ -54,7 +54,7 @@ RICH: dict[str, Any] = copy.deepcopy(RAMP) | {
 }
 RICH["controller"]["link"] = "line"
 RICH["models"]["serial_link"] = {"source": "package://fcsl_sim/models/serial_link.c"}
-RICH["instances"]["ramp"] |= {"integrator": {"method": "rk4", "hz": 1000}, "tolerances": {"state.x": 1e-6}}
+RICH["instances"]["ramp"] |= {"integrator": {"method": "rk45", "atol": 1e-6}, "tolerances": {"state.x": 1e-6}}
 RICH["instances"]["line"] = {
     "model": "serial_link",
     "parameters": {

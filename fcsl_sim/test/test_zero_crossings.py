@@ -70,7 +70,9 @@ def test_what_follows_an_event_is_exact(open_sim: Open) -> None:
 def test_a_zeno_ball_is_chattering_and_named(open_sim: Open) -> None:
     with (
         open_models(open_sim, {"ball": ball(rest_speed=-1.0)}, duration=10.0) as sim,
-        pytest.raises(SimError, match=r"^chattering at 3\.6\d+ s: event `bounce` of `ball` is the last of 100 events"),
+        pytest.raises(
+            SimError, match=r"^chattering at 3\.6\d+ s: event `bounce` of `ball` is the last of 100 in a row"
+        ),
     ):
         while sim.status == "running":
             sim.run(1)
@@ -136,3 +138,52 @@ def test_touchdown_speed(integrator: dict[str, Any], lander: Path, open_sim: Ope
     ) as sim:
         sim.run(1200)
         assert sim.get("ball.outputs.last_bounce_ns") / 1e9 == pytest.approx(math.sqrt(200 / 1.62), abs=2e-9)
+
+
+def alarm(first: float, period: float, kind: int = 0) -> dict[str, Any]:
+    return {"model": "alarm", "parameters": {"first": first, "period": period, "kind": kind}}
+
+
+@pytest.mark.parametrize("integrator", [{"method": "rk4", "hz": hz} for hz in (100, 1000, 3000)] + INTEGRATORS[-1:])
+@pytest.mark.parametrize(("first", "period"), [(0.001, 0.001), (0.01, 0.01), (0.0107, 0.0123)])
+def test_an_event_of_time_happens_once(first: float, period: float, integrator: dict[str, Any], open_sim: Open) -> None:
+    """Also where it is exactly at a step of the grid, at a tick, or between them."""
+    with open_models(open_sim, {"clock": alarm(first, period)}, integrator=integrator, duration=1.0) as sim:
+        for tick in range(100):
+            sim.run(1)
+            seen = sim.get("clock.outputs.count")
+            assert seen == sum(first + k * period < tick / 100 - 1e-9 for k in range(1001)) or seen == sum(
+                first + k * period <= tick / 100 + 1e-9 for k in range(1001)
+            )
+        last = first + (seen - 1) * period
+        assert 0 <= sim.get("clock.outputs.last_ns") - last * 1e9 < 2
+
+
+@pytest.mark.parametrize("integrator", INTEGRATORS)
+def test_a_function_that_only_touches_zero_is_no_event(integrator: dict[str, Any], open_sim: Open) -> None:
+    with open_models(open_sim, {"clock": alarm(0.5, 1.0, kind=1)}, integrator=integrator) as sim:
+        sim.run(100)
+        assert sim.get("clock.outputs.count") == 0
+
+
+@pytest.mark.parametrize("integrator", INTEGRATORS)
+def test_a_function_that_is_no_number_ends_the_run(integrator: dict[str, Any], open_sim: Open) -> None:
+    with (
+        open_models(open_sim, {"clock": alarm(0.5, 1.0, kind=2)}, integrator=integrator) as sim,
+        pytest.raises(SimError, match=r"^the function of event `alarm` of `clock` is no number at 0\.5"),
+    ):
+        sim.run(100)
+
+
+def test_a_hundred_at_once_are_no_chattering(open_sim: Open) -> None:
+    """One group of 100 balls, pushed by the same ramp."""
+
+    def change(config: dict[str, Any]) -> None:
+        config["models"]["ball"] = {"source": "ball.c"}
+        for i in range(100):
+            config["instances"][f"b{i}"] = ball()
+            config["connections"].append({"from": "ramp.seen_rate", "to": f"b{i}.push"})
+
+    with open_sim(change) as sim:
+        sim.run(100)
+        assert {sim.get(f"b{i}.outputs.bounces") for i in range(100)} == {1}

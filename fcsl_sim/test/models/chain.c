@@ -1,7 +1,7 @@
 /* SPDX-License-Identifier: Apache-2.0
  *
- * y = gain * u + x, x' = rate * u: an output with feed-through (`through`) and one without (`free`). With IMPURE, SECRET or
- * BLOWS_UP it is a model as it must not be.
+ * y = gain * u + x, x' = rate * u: an output with feed-through (`through`) and one without (`free`). With IMPURE, SECRET,
+ * STALE or BLOWS_UP it is a model as it must not be.
  */
 #include "fcsl/fcsl_model.h"
 
@@ -27,6 +27,9 @@ static void derivative(const void *self, double t, const double *x, double *dx)
     dx[0] = chain->parameters.rate * chain->inputs.u;
 #ifdef BLOWS_UP
     dx[0] = 1.0 / (0.05 - t) + x[0];
+#endif
+#ifdef STALE
+    dx[0] += chain->state.x;
 #endif
     (void)x;
 }

@@ -1,6 +1,6 @@
 /* SPDX-License-Identifier: Apache-2.0
  *
- * A model that goes wrong at `at_s`, as `how` says: 1 crashes, 2 never returns, 3 aborts, 4 recurses for ever.
+ * A model that goes wrong at `at_s`, as `how` says: 1 crashes, 2 never returns, 3 aborts, 4 recurses for ever; 10 more: in init.
  */
 #include <stdlib.h>
 
@@ -19,14 +19,10 @@ static int recurse(volatile int *depth)
     return below == 0 ? 0 : recurse(&below) + below;
 }
 
-static void update(void *self, const fcsl_model_context_t *context)
+static void go_wrong(faulty_t *faulty, int64_t how)
 {
-    faulty_t *faulty = self;
     volatile int depth = 0;
-    if ((double)context->time_ns / 1e9 < faulty->parameters.at_s) {
-        return;
-    }
-    switch (faulty->parameters.how) {
+    switch (how) {
     case 1:
         *(volatile int *)16 = 1;
         break;
@@ -36,8 +32,27 @@ static void update(void *self, const fcsl_model_context_t *context)
         break;
     case 3:
         abort();
-    default:
+    case 4:
         faulty->outputs.y = recurse(&depth);
+        break;
+    default:
+        break;
+    }
+}
+
+static const char *init(void *self, const fcsl_model_context_t *context)
+{
+    faulty_t *faulty = self;
+    (void)context;
+    go_wrong(faulty, faulty->parameters.how - 10);
+    return NULL;
+}
+
+static void update(void *self, const fcsl_model_context_t *context)
+{
+    faulty_t *faulty = self;
+    if ((double)context->time_ns / 1e9 >= faulty->parameters.at_s) {
+        go_wrong(faulty, faulty->parameters.how);
     }
 }
 
@@ -56,6 +71,7 @@ static const fcsl_model_t model = {
     .size = sizeof(faulty_t),
     .align = _Alignof(faulty_t),
     .sampled_offset = FCSL_NO_OFFSET,
+    .init = init,
     .update = update,
 };
 

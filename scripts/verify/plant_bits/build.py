@@ -87,7 +87,8 @@ class Builder:
         shutil.rmtree(FOLDER, ignore_errors=True)
         self.machine: Case = emit_case(EXAMPLES[MACHINE], FOLDER / "c")
         self.includes = [*_INCLUDES, *include_dirs()]
-        self._shared = {self._key(t): pool.submit(self._make_shared, t) for t in reversed(targets)}
+        first = {self._key(t): t for t in reversed(targets)}  # of each processor
+        self._shared = {key: pool.submit(self._make_shared, t) for key, t in first.items()}
 
     @staticmethod
     def _key(target: Target) -> str:

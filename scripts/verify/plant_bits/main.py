@@ -17,7 +17,7 @@ import sys
 import time
 from collections.abc import Sequence
 from concurrent.futures import ThreadPoolExecutor
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 
 from ..bits.targets import AARCH64, REFERENCE, Target, cross, native, with_flags
@@ -26,13 +26,22 @@ from ..shared.effort import scaled
 from .build import FOLDER, SIMULATOR, Builder, Built
 from .plans import PLANS, plan_text
 
-TARGETS = [*native("gcc", ("-O0", "-O3")), *native("clang-19", ("-O0", "-O3")), AARCH64, cross("riscv64")]
-#: What `--all` adds.
-MORE = [
-    *native("gcc", ("-O2", "-Os", "-O3 -march=native")),
-    *native("clang-19", ("-O2", "-O3 -march=native")),
-    *(cross(machine, ("-O0",)) for machine in ("aarch64", "riscv64")),
+
+def clang_cross(machine: str) -> Target:
+    """Of another processor by clang; headers and libraries are those of the cross gcc."""
+    of_gcc = cross(machine)
+    compiler = ("clang-19", f"--target={machine}-linux-gnu")
+    return replace(of_gcc, name=f"{machine} clang-19 -O3", compiler=compiler)
+
+
+TARGETS = [
+    *native("gcc", ("-O0", "-O3")),
+    *native("clang-19", ("-O0", "-O3")),
+    *(cross(machine, (level,)) for machine in ("aarch64", "riscv64") for level in ("-O0", "-O3")),
+    *(clang_cross(machine) for machine in ("aarch64", "riscv64")),
 ]
+#: What `--all` adds.
+MORE = [*native("gcc", ("-O2", "-Os", "-O3 -march=native")), *native("clang-19", ("-O2", "-O3 -march=native"))]
 _WORD_BYTES = 8
 _TICKS_MIN = 100
 _RUN_TIMEOUT_S = 600.0
