@@ -24,7 +24,16 @@ FILES = dict(re.findall(r"<!-- file: (\S+) -->\n```\w+\n(.*?)```\n", PAGE, re.DO
 def folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
     """A folder with the page's files, and its package built below."""
     path = tmp_path_factory.mktemp("drives")
-    names = ["CMakeLists.txt", "gust.json", "gust.py", "gyro.cpp", "motor.c", "motor.cpp", "motor/Cargo.toml", "motor/src/lib.rs"]
+    names = [
+        "CMakeLists.txt",
+        "gust.json",
+        "gust.py",
+        "gyro.cpp",
+        "motor.c",
+        "motor.cpp",
+        "motor/Cargo.toml",
+        "motor/src/lib.rs",
+    ]
     assert sorted(FILES) == [*names, "test_motor.py"]
     for name, text in FILES.items():
         (path / name).parent.mkdir(parents=True, exist_ok=True)

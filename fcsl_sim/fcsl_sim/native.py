@@ -334,9 +334,11 @@ class Simulation:
         self._check(self._lib.fcsl_sim_write(self.handle(), number, offset, data, len(data), byref(self._error)))
 
     def checkpoint(self) -> bytes:
-        """Plant and machine between two ticks, the content of a checkpoint file (docs/checkpoints.md)."""
+        """Plant and machine between two ticks, the content of a checkpoint file (docs/checkpoints.md). Raises SimError."""
         room = ctypes.create_string_buffer(self._lib.fcsl_sim_checkpoint_capacity(self.handle()))
         size = self._lib.fcsl_sim_checkpoint(self.handle(), room)
+        if size == 0:
+            raise SimError("a simulation with a serial line cannot be restored, so it is not saved")
         return ctypes.string_at(room, size)
 
     def restore_checkpoint(self, checkpoint: bytes) -> None:

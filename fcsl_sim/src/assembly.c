@@ -168,8 +168,7 @@ static int build_instances(fcsl_sim_t *sim, fcsl_error_t *error)
 
 /* ---- fields ---------------------------------------------------------------------------------------------------------- */
 
-int fcsl_sim_find_instance(const fcsl_sim_t *sim, uint32_t line, const char *name, uint32_t *index,
-                           fcsl_error_t *error)
+int fcsl_sim_find_instance(const fcsl_sim_t *sim, uint32_t line, const char *name, uint32_t *index, fcsl_error_t *error)
 {
     for (uint32_t i = 0; i < sim->instance_count; i++) {
         if (strcmp(sim->instances[i].name, name) == 0) {
@@ -403,8 +402,7 @@ static int add_copy(fcsl_sim_t *sim, const fcsl_plan_link_t *link, int is_field,
         }
         const fcsl_instance_state_t *feeds = &sim->instances[source];
         const fcsl_instance_state_t *fed = &sim->instances[copy->instance];
-        copy->is_inner =
-            feeds->model->output != NULL && feeds->group == fed->group && fed->group != FCSL_PLAN_NO_GROUP;
+        copy->is_inner = feeds->model->output != NULL && feeds->group == fed->group && fed->group != FCSL_PLAN_NO_GROUP;
         copy->source = source;
         copy->from = sim->instances[source].data + from->offset;
     } else {
@@ -547,8 +545,8 @@ static int build_field_writes(fcsl_sim_t *sim, fcsl_error_t *error)
         if (from->role != FCSL_ROLE_OUTPUT || (to->flags & FCSL_FIELD_WRITABLE) == 0) {
             return bad(error, link->line, "not from an output to a field that a host may write:", link->to_field);
         }
-        sim->writes[sim->write_count++] = (fcsl_field_link_t){
-            (uint32_t)(to - sim->machine->fields), sim->instances[source].data + from->offset, from->size};
+        sim->writes[sim->write_count++] = (fcsl_field_link_t){(uint32_t)(to - sim->machine->fields),
+                                                              sim->instances[source].data + from->offset, from->size};
     }
     return 0;
 }
@@ -576,7 +574,8 @@ static int build_link(fcsl_sim_t *sim, fcsl_error_t *error)
 
 int fcsl_assembly_build(fcsl_sim_t *sim, fcsl_error_t *error)
 {
-    if (build_machine(sim, error) || build_companions(sim, error) || build_models(sim, error) || build_instances(sim, error)) {
+    if (build_machine(sim, error) || build_companions(sim, error) || build_models(sim, error) ||
+        build_instances(sim, error)) {
         return -1;
     }
     if (build_writes(sim, error) || build_copies(sim, error) || build_sensors(sim, error) ||

@@ -107,6 +107,9 @@ size_t fcsl_sim_checkpoint_capacity(const fcsl_sim_t *sim)
 size_t fcsl_sim_checkpoint(const fcsl_sim_t *sim, void *bytes)
 {
     uint8_t *out = bytes;
+    if (sim->link) {
+        return 0;
+    }
     const size_t machine = fcsl_run_checkpoint(sim->run, out + HEAD_BYTES);
     const size_t plant = fcsl_plant_state_bytes(sim);
     const size_t all = HEAD_BYTES + machine + plant + CRC_BYTES;

@@ -141,8 +141,7 @@ int fcsl_group_advance_adaptive(fcsl_group_t *group, int64_t time_ns, int64_t ba
             if (state->time_ns >= time_ns) {
                 break;
             }
-            if (make_step(group, barrier_ns, error) ||
-                fcsl_group_check_finite(group, group->x1, state->to_ns, error)) {
+            if (make_step(group, barrier_ns, error) || fcsl_group_check_finite(group, group->x1, state->to_ns, error)) {
                 return -1;
             }
             if (find_event(group, error)) {

@@ -198,8 +198,8 @@ static int build_group(fcsl_sim_t *sim, uint32_t number, fcsl_error_t *error)
     group->outer = calloc(sim->copy_count + 1u, sizeof *group->outer);
     group->sampling = calloc(count, sizeof *group->sampling);
     group->companions = calloc(sim->companion_count + 1u, sizeof *group->companions);
-    if (!group->derived || !group->blocks || !group->eventful || !group->timed || !group->sampling || !group->companions || !group->stages || !group->outputs ||
-        !group->outer) {
+    if (!group->derived || !group->blocks || !group->eventful || !group->timed || !group->sampling ||
+        !group->companions || !group->stages || !group->outputs || !group->outer) {
         return fcsl_sim_fail(error, "no memory for a group of models");
     }
     add_calls(sim, group, number);

@@ -172,12 +172,11 @@ static int check_chatter(fcsl_group_t *group, uint32_t event, fcsl_error_t *erro
     }
     uint32_t number = 0;
     const fcsl_instance_state_t *instance = instance_of(group, event, &number);
-    return fcsl_sim_fail(
-        error,
-        "chattering at %.9f s: event `%s` of `%s` is the last of %u in a row, each at most %u ns "
-        "after the one before; let `reset` change a state that ends this, such as a ball at rest",
-        (double)state->time_ns / NS_PER_S, instance->model->events[number].name, instance->name, FCSL_CHATTER_EVENTS,
-        FCSL_CHATTER_NS);
+    return fcsl_sim_fail(error,
+                         "chattering at %.9f s: event `%s` of `%s` is the last of %u in a row, each at most %u ns "
+                         "after the one before; let `reset` change a state that ends this, such as a ball at rest",
+                         (double)state->time_ns / NS_PER_S, instance->model->events[number].name, instance->name,
+                         FCSL_CHATTER_EVENTS, FCSL_CHATTER_NS);
 }
 
 static int reset(fcsl_group_t *group, uint32_t event, fcsl_error_t *error)

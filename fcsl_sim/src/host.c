@@ -233,7 +233,8 @@ int fcsl_sim_listen(fcsl_sim_t *sim, const char *peer, const char *name_space, u
         return fcsl_sim_fail(error, "a controller must connect before the first tick, once, and records itself");
     }
     if (sim->reads_fields || sim->write_count > 0) {
-        return fcsl_sim_fail(error, "fields of the machine are connected: only channels reach a controller in another process");
+        return fcsl_sim_fail(
+            error, "fields of the machine are connected: only channels reach a controller in another process");
     }
     const int failed = strncmp(peer, WIRE, prefix) == 0
                            ? fcsl_external_open(peer + prefix, sim->machine, &sim->external, text, sizeof text)

@@ -159,8 +159,7 @@ static int on_tolerance(parser_t *parser)
 {
     fcsl_plan_tolerance_t *tolerance = &parser->plan->tolerances[parser->plan->tolerance_count++];
     *tolerance = (fcsl_plan_tolerance_t){.line = parser->line, .instance = parser->word[1]};
-    if (!fcsl_plan_is_name(tolerance->instance) ||
-        fcsl_plan_number(parser->word[2], UINT32_MAX, &tolerance->state)) {
+    if (!fcsl_plan_is_name(tolerance->instance) || fcsl_plan_number(parser->word[2], UINT32_MAX, &tolerance->state)) {
         return bad(parser, "not an instance and the number of a state");
     }
     if (take_double(parser, parser->word[3], &tolerance->atol)) {
@@ -480,7 +479,8 @@ static int allocate(fcsl_plan_t *plan, const uint32_t counts[STATEMENTS], fcsl_e
     plan->reads = calloc(counts[READ] + 1u, sizeof *plan->reads);
     plan->writes = calloc(counts[WRITE] + 1u, sizeof *plan->writes);
     plan->events = calloc(counts[EVENT] + 1u, sizeof *plan->events);
-    if (!plan->companions || !plan->reads || !plan->writes || !plan->models || !plan->groups || !plan->instances || !plan->tolerances || !plan->calls || !plan->sets || !plan->links || !plan->sensors || !plan->actuators ||
+    if (!plan->companions || !plan->reads || !plan->writes || !plan->models || !plan->groups || !plan->instances ||
+        !plan->tolerances || !plan->calls || !plan->sets || !plan->links || !plan->sensors || !plan->actuators ||
         !plan->events) {
         return fcsl_sim_fail(error, "no memory for the plan");
     }
@@ -490,9 +490,9 @@ static int allocate(fcsl_plan_t *plan, const uint32_t counts[STATEMENTS], fcsl_e
 static int check_complete(const fcsl_plan_t *plan, fcsl_error_t *error)
 {
     const char *missing = !plan->machine.line ? "machine"
-                          : !plan->seed_line       ? "seed"
-                          : !plan->ticks_line      ? "ticks"
-                                                   : NULL;
+                          : !plan->seed_line  ? "seed"
+                          : !plan->ticks_line ? "ticks"
+                                              : NULL;
     if (missing) {
         return fcsl_sim_fail(error, "the plan has no `%s`", missing);
     }

@@ -37,19 +37,19 @@
 #include "fcsl/fcsl_run.h"
 #include "integrate.h"
 
-#define FCSL_PLAN_MAX_BYTES     (4u << 20)
-#define FCSL_PLAN_MAX_LINE      (FCSL_VIEWS_BYTES_MAX + 8u)
-#define FCSL_PLAN_MAX_MODELS    64u
-#define FCSL_PLAN_MAX_INSTANCES 256u
-#define FCSL_PLAN_MAX_GROUPS    256u
-#define FCSL_PLAN_MAX_CALLS     1024u
+#define FCSL_PLAN_MAX_BYTES      (4u << 20)
+#define FCSL_PLAN_MAX_LINE       (FCSL_VIEWS_BYTES_MAX + 8u)
+#define FCSL_PLAN_MAX_MODELS     64u
+#define FCSL_PLAN_MAX_INSTANCES  256u
+#define FCSL_PLAN_MAX_GROUPS     256u
+#define FCSL_PLAN_MAX_CALLS      1024u
 #define FCSL_PLAN_MAX_COMPANIONS 64u
-#define FCSL_PLAN_MAX_LINKS     4096u  /* of each kind */
-#define FCSL_PLAN_MAX_SETS      65536u /* of each kind */
-#define FCSL_PLAN_MAX_HZ        1000000u
-#define FCSL_PLAN_MAX_GRID_HZ   1000000000u
-#define FCSL_PLAN_MAX_SECONDS   1000000000u
-#define FCSL_PLAN_MAX_TICKS     UINT64_C(1000000000000)
+#define FCSL_PLAN_MAX_LINKS      4096u  /* of each kind */
+#define FCSL_PLAN_MAX_SETS       65536u /* of each kind */
+#define FCSL_PLAN_MAX_HZ         1000000u
+#define FCSL_PLAN_MAX_GRID_HZ    1000000000u
+#define FCSL_PLAN_MAX_SECONDS    1000000000u
+#define FCSL_PLAN_MAX_TICKS      UINT64_C(1000000000000)
 
 /* Every record has its line number, for messages. All strings point into the plan's copy of the text. */
 typedef struct {

@@ -133,10 +133,11 @@ static int check_argument(const trial_t *trial, fcsl_error_t *error)
     }
     for (uint32_t i = 0; i < count; i++) {
         if (memcmp(&first[i], &second[i], sizeof *first) != 0 && !(isnan(first[i]) && isnan(second[i]))) {
-            return fcsl_sim_fail(error,
-                                 "`%s` of model `%s` reads integrated states, or outputs, in the struct: they are older "
-                                 "than its argument; take the states from x",
-                                 i < model->continuous_count ? "derivative" : "event", model->name);
+            return fcsl_sim_fail(
+                error,
+                "`%s` of model `%s` reads integrated states, or outputs, in the struct: they are older "
+                "than its argument; take the states from x",
+                i < model->continuous_count ? "derivative" : "event", model->name);
         }
     }
     return 0;

@@ -41,8 +41,8 @@ static const double FACTOR_MAX = 5.0;
 static const double ORDER = 5.0;
 
 /* x0 + h * (c[0]*k[0] + c[1]*k[1] + ...), summed from the left. */
-static void combine(const fcsl_integrator_t *at, double h, const double *coefficients, uint32_t count,
-                    const double *x0, double *x)
+static void combine(const fcsl_integrator_t *at, double h, const double *coefficients, uint32_t count, const double *x0,
+                    double *x)
 {
     for (uint32_t i = 0; i < at->n; i++) {
         double sum = coefficients[0] * at->k[0][i];

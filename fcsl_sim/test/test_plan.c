@@ -34,7 +34,8 @@ static void reads_all(void)
     fcsl_error_t error;
     CHECK(fcsl_plan_parse(&plan, good, sizeof good - 1, &error) == 0);
     CHECK(strcmp(plan.machine.library, "/path with spaces/libhopper.so") == 0);
-    CHECK(plan.group_count == 1 && plan.groups[0].method == FCSL_RK4 && plan.groups[0].hz == 1000 && plan.seed == UINT64_MAX && plan.ticks == 100);
+    CHECK(plan.group_count == 1 && plan.groups[0].method == FCSL_RK4 && plan.groups[0].hz == 1000 &&
+          plan.seed == UINT64_MAX && plan.ticks == 100);
     CHECK(plan.model_count == 2 && plan.instance_count == 2 && plan.instances[1].hz == 1000);
     CHECK(plan.instances[0].group == 0 && plan.instances[1].group == FCSL_PLAN_NO_GROUP);
     CHECK(plan.instances[1].every == 20 && plan.instances[1].phase == 5);

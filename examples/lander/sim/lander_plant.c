@@ -147,11 +147,11 @@ static void reset(void *self, const fcsl_model_context_t *context, uint32_t numb
     }
 }
 
-#define IN(path_, unit_, doc_)    FCSL_MODEL_SCALAR(lander_t, FCSL_ROLE_INPUT, path_, unit_, doc_)
-#define OUT(path_, unit_, doc_)   FCSL_MODEL_SCALAR(lander_t, FCSL_ROLE_OUTPUT, path_, unit_, doc_)
+#define IN(path_, unit_, doc_)      FCSL_MODEL_SCALAR(lander_t, FCSL_ROLE_INPUT, path_, unit_, doc_)
+#define OUT(path_, unit_, doc_)     FCSL_MODEL_SCALAR(lander_t, FCSL_ROLE_OUTPUT, path_, unit_, doc_)
 #define THROUGH(path_, unit_, doc_) FCSL_MODEL_SCALAR(lander_t, FCSL_ROLE_FEEDTHROUGH, path_, unit_, doc_)
-#define PARAM(path_, unit_, doc_) FCSL_MODEL_SCALAR(lander_t, FCSL_ROLE_PARAMETER, path_, unit_, doc_)
-#define STATE(path_, unit_, doc_) FCSL_MODEL_SCALAR(lander_t, FCSL_ROLE_STATE, path_, unit_, doc_)
+#define PARAM(path_, unit_, doc_)   FCSL_MODEL_SCALAR(lander_t, FCSL_ROLE_PARAMETER, path_, unit_, doc_)
+#define STATE(path_, unit_, doc_)   FCSL_MODEL_SCALAR(lander_t, FCSL_ROLE_STATE, path_, unit_, doc_)
 
 static const fcsl_field_t fields[] = {
     IN(inputs.throttle, "", "0 to 1"),

@@ -98,7 +98,7 @@ extern __attribute__((visibility("default"))) const fcsl_model_t *const fcsl_mod
 /* Flag of an output that depends on an input of the same instant. `update` and `derivative` are no such dependency. */
 #define FCSL_FIELD_FEEDTHROUGH (1u << 4)
 /* In place of FCSL_ROLE_OUTPUT in the macros below: an output with this flag. */
-#define FCSL_ROLE_FEEDTHROUGH  (FCSL_ROLE_OUTPUT | 0x80u)
+#define FCSL_ROLE_FEEDTHROUGH (FCSL_ROLE_OUTPUT | 0x80u)
 
 /* One field of a table. A model's struct has the members `inputs`, `outputs`, `parameters` and `state` (as far as it needs
  * them), so that a path is a C expression; type and shape follow from the member (bool, int32_t … double):

@@ -100,7 +100,7 @@ int fcsl_sim_write(fcsl_sim_t *sim, uint32_t instance, uint32_t offset, const vo
 /* A checkpoint is all that a simulation needs to go on as if it had never stopped, between two ticks: plant, machine,
  * hardware, integrators, noise. Its bytes are the content of its file. */
 size_t fcsl_sim_checkpoint_capacity(const fcsl_sim_t *sim);
-/* Writes it into `bytes`, which has that capacity; returns its bytes. */
+/* Writes it into `bytes`, which has that capacity; returns its bytes. 0: a serial line cannot be restored. */
 size_t fcsl_sim_checkpoint(const fcsl_sim_t *sim, void *bytes);
 /* Puts it back, into a simulation of the same models, integrators, rates and machine. Its own scheduled writes go on; those until
  * the checkpoint's time are passed over. Other bytes are refused with the reason, and nothing is changed then. */

@@ -6,9 +6,17 @@
 #include "fcsl/fcsl_model.h"
 
 typedef struct {
-    struct { double first, period; int64_t kind; } parameters;
-    struct { double next; int64_t count, last_ns; } state;
-    struct { int64_t count, last_ns; } outputs;
+    struct {
+        double first, period;
+        int64_t kind;
+    } parameters;
+    struct {
+        double next;
+        int64_t count, last_ns;
+    } state;
+    struct {
+        int64_t count, last_ns;
+    } outputs;
 } alarm_t;
 
 static const char *init(void *self, const fcsl_model_context_t *context)

@@ -7,10 +7,21 @@
 #include "fcsl/fcsl_model.h"
 
 typedef struct {
-    struct { double push; } inputs;
-    struct { double gravity, restitution, rest_speed, height; } parameters;
-    struct { double z, v; bool at_rest; int64_t bounces, last_bounce_ns; } state;
-    struct { double z, v; int64_t bounces, last_bounce_ns; } outputs;
+    struct {
+        double push;
+    } inputs;
+    struct {
+        double gravity, restitution, rest_speed, height;
+    } parameters;
+    struct {
+        double z, v;
+        bool at_rest;
+        int64_t bounces, last_bounce_ns;
+    } state;
+    struct {
+        double z, v;
+        int64_t bounces, last_bounce_ns;
+    } outputs;
 } ball_t;
 
 static const char *init(void *self, const fcsl_model_context_t *context)

@@ -6,10 +6,21 @@
 #include "fcsl/fcsl_model.h"
 
 typedef struct {
-    struct { double u; } inputs;
-    struct { double gain, rate, x; } parameters;
-    struct { double x, calls; } state;
-    struct { double through, free; struct { double twice; } nested; } outputs;
+    struct {
+        double u;
+    } inputs;
+    struct {
+        double gain, rate, x;
+    } parameters;
+    struct {
+        double x, calls;
+    } state;
+    struct {
+        double through, free;
+        struct {
+            double twice;
+        } nested;
+    } outputs;
 } chain_t;
 
 static const char *init(void *self, const fcsl_model_context_t *context)
@@ -52,10 +63,14 @@ static void output(void *self, double t, const double *x)
 #define FIELD(role_, path_, unit_, doc_) FCSL_MODEL_SCALAR(chain_t, FCSL_ROLE_##role_, path_, unit_, doc_)
 
 static const fcsl_field_t fields[] = {
-    FIELD(INPUT, inputs.u, "", ""),           FIELD(PARAMETER, parameters.gain, "", ""),
-    FIELD(PARAMETER, parameters.rate, "", ""), FIELD(PARAMETER, parameters.x, "", "at the start"),
-    FIELD(STATE, state.x, "", ""),            FIELD(STATE, state.calls, "", ""),
-    FIELD(FEEDTHROUGH, outputs.through, "", ""), FIELD(OUTPUT, outputs.free, "", ""),
+    FIELD(INPUT, inputs.u, "", ""),
+    FIELD(PARAMETER, parameters.gain, "", ""),
+    FIELD(PARAMETER, parameters.rate, "", ""),
+    FIELD(PARAMETER, parameters.x, "", "at the start"),
+    FIELD(STATE, state.x, "", ""),
+    FIELD(STATE, state.calls, "", ""),
+    FIELD(FEEDTHROUGH, outputs.through, "", ""),
+    FIELD(OUTPUT, outputs.free, "", ""),
     FIELD(OUTPUT, outputs.nested.twice, "", ""),
 };
 

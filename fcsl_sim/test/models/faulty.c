@@ -7,8 +7,13 @@
 #include "fcsl/fcsl_model.h"
 
 typedef struct {
-    struct { double at_s; int64_t how; } parameters;
-    struct { double y; } outputs;
+    struct {
+        double at_s;
+        int64_t how;
+    } parameters;
+    struct {
+        double y;
+    } outputs;
 } faulty_t;
 
 static volatile int never;

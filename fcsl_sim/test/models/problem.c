@@ -98,9 +98,15 @@ static void slope(double t, const double *x, const double *p, double *dx)
 #endif
 
 typedef struct {
-    struct { double p[1], x[N]; } parameters;
-    struct { double x[N]; } state;
-    struct { double x[N]; } outputs;
+    struct {
+        double p[1], x[N];
+    } parameters;
+    struct {
+        double x[N];
+    } state;
+    struct {
+        double x[N];
+    } outputs;
 } problem_t;
 
 static const char *init(void *self, const fcsl_model_context_t *context)
