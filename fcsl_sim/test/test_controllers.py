@@ -137,13 +137,21 @@ def test_commands_act_after_the_delay(delay: int, load_two: Load) -> None:
         assert flown(config, f"{cart}.outputs.free") == pytest.approx(expected(100, delay, 200), rel=1e-12)
 
 
-def test_another_vehicle_beside_it_changes_no_bit(load_two: Load) -> None:
+@pytest.mark.parametrize("hz", [100, 30, 250])
+@pytest.mark.parametrize(
+    "integrator", [{"method": "rk4", "hz": 3000}, {"method": "ab4", "hz": 3000}, {"method": "rk45", "rtol": 1e-9}]
+)
+def test_another_vehicle_beside_it_changes_no_bit(integrator: dict[str, Any], hz: int, load_two: Load) -> None:
     def alone(config: dict[str, Any]) -> None:
+        config["integrator"] = integrator
         config["controller"] = config.pop("controllers")["one"]
         del config["instances"]["b"]
         config["connections"] = [{"from": "a.free", "to": "controller.x"}, {"from": "controller.u", "to": "a.u"}]
 
-    assert flown(load_two(alone), "a.outputs.free") == flown(load_two(hz=100), "a.outputs.free")
+    def beside(config: dict[str, Any]) -> None:
+        config["integrator"] = integrator
+
+    assert flown(load_two(alone), "a.outputs.free") == flown(load_two(beside, hz=hz), "a.outputs.free")
 
 
 def replay(bag: Path, config: Path) -> str:
