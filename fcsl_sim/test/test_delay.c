@@ -16,7 +16,7 @@ static fcsl_message_t message_of(const fcsl_channel_table_t *table, uint64_t tic
     static hopper_t hopper;
     fcsl_message_t message = {0};
     hopper.pilot.throttle = throttle;
-    CHECK(fcsl_message_encode_actuators(table, &hopper, tick, bytes, capacity, &message) == FCSL_MESSAGE_OK);
+    CHECK(fcsl_message_encode_actuators(table, &hopper, tick, 1, bytes, capacity, &message) == FCSL_MESSAGE_OK);
     return message;
 }
 
