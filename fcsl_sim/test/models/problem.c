@@ -95,6 +95,21 @@ static void slope(double t, const double *x, const double *p, double *dx)
     dx[4] = -x[3] * x[5];
     dx[5] = -0.51 * x[3] * x[4];
 }
+#elif PROBLEM == 7 /* DETEST B1, B3, B4: two populations, a nonlinear reaction, a line around a torus */
+enum { N = 8, SECOND_ORDER = 0 };
+static void slope(double t, const double *x, const double *p, double *dx)
+{
+    const double r = sqrt(x[5] * x[5] + x[6] * x[6]);
+    (void)t, (void)p;
+    dx[0] = 2.0 * (x[0] - x[0] * x[1]);
+    dx[1] = -(x[1] - x[0] * x[1]);
+    dx[2] = -x[2];
+    dx[3] = x[2] - x[3] * x[3];
+    dx[4] = x[3] * x[3];
+    dx[5] = -x[6] - x[5] * x[7] / r;
+    dx[6] = x[5] - x[6] * x[7] / r;
+    dx[7] = x[5] / r;
+}
 #endif
 
 typedef struct {
