@@ -187,3 +187,47 @@ def test_a_hundred_at_once_are_no_chattering(open_sim: Open) -> None:
     with open_sim(change) as sim:
         sim.run(100)
         assert {sim.get(f"b{i}.outputs.bounces") for i in range(100)} == {1}
+
+
+@pytest.mark.parametrize("integrator", INTEGRATORS)
+def test_staging(integrator: dict[str, Any], open_sim: Open) -> None:
+    """Burnouts at fuel / flow, and the speed by Tsiolkovsky's equation for each stage."""
+    dry, fuel, thrust, flow = [100.0, 20.0], [50.0, 30.0], [9000.0, 3000.0], [40.0, 31.0]
+    parameters = {"dry": dry, "fuel": fuel, "thrust": thrust, "flow": flow}
+    stages = {"rocket": {"model": "stages", "parameters": parameters}}
+    with open_models(open_sim, stages, integrator=integrator, duration=3.0) as sim:
+        sim.run(300)
+        ends = [fuel[0] / flow[0], fuel[0] / flow[0] + fuel[1] / flow[1]]
+        for ns, time_s in zip(sim.get("rocket.outputs.burnout_ns"), ends, strict=True):
+            assert -1e-9 < ns / 1e9 - time_s < 4e-9
+        first = thrust[0] / flow[0] * math.log(200.0 / 150.0)
+        second = thrust[1] / flow[1] * math.log(50.0 / 20.0)
+        assert sim.get("rocket.outputs.v") == pytest.approx(
+            first + second, rel=1e-4 if integrator == INTEGRATORS[0] else 1e-7
+        )
+        assert sim.get("rocket.outputs.stage") == 2
+        assert sim.get("rocket.outputs.mass") == pytest.approx(0.0, abs=1e-5)
+
+
+@pytest.mark.parametrize("integrator", INTEGRATORS)
+def test_saturation(integrator: dict[str, Any], open_sim: Open) -> None:
+    """x(t) by hand: up to the end, held there, down from the instant at which the input turns, held again."""
+    piston = {"piston": {"model": "piston", "parameters": {"travel": 0.3, "start": 0.1}}}
+    turns = [(0.1, 1.7), (0.4503, -0.9), (0.9, 2.0)]
+    events = [{"at_s": at, "set": "piston.inputs.u", "value": u} for at, u in turns]
+
+    def exact(t: float) -> float:
+        x, before, u = 0.1, 0.0, 0.0
+        for at, following in [*turns, (t, 0.0)]:
+            until = min(at, t)
+            x = min(max(x + u * max(until - before, 0.0), 0.0), 0.3)
+            before, u = until, following
+        return x
+
+    with open_models(open_sim, piston, integrator=integrator, events=events) as sim:
+        ends = set()
+        for tick in range(100):
+            sim.run(1)
+            assert sim.get("piston.outputs.x") == pytest.approx(exact(tick / 100), abs=1e-8), tick
+            ends.add(sim.get("piston.outputs.at"))
+        assert ends == {0, 1, 2}
