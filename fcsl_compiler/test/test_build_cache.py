@@ -15,6 +15,7 @@ import subprocess
 import sys
 from collections.abc import Callable, Sequence
 from pathlib import Path
+from typing import Any
 
 import pytest
 
@@ -240,8 +241,8 @@ def test_a_source_that_changes_during_its_build_is_built_again(tmp_path: Path, m
     source = tmp_path / "plant.c"
     link, edits = cache.link_shared, ["int plant = 2;\n"]
 
-    def slow(*arguments: object) -> None:
-        link(*arguments)  # type: ignore[arg-type]
+    def slow(*arguments: Any, **options: Any) -> None:
+        link(*arguments, **options)
         if edits:
             source.write_text(edits.pop())
 

@@ -50,7 +50,7 @@ def test_the_examples_pictures_are_current(config: str) -> None:
 
 def test_every_example_has_a_picture() -> None:
     """Except the lander's filter alone, a machine for a test with a single box."""
-    configs = [p for p in EXAMPLES.rglob("*.json") if '"tick_hz"' in p.read_text()]
+    configs = [p for p in EXAMPLES.rglob("*.json") if '"states"' in p.read_text()]
     assert {str(p.relative_to(EXAMPLES)) for p in configs} == {*PICTURES, "lander/fc/filter_alone.json"}
 
 

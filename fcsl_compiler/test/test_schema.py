@@ -26,7 +26,7 @@ from fcsl_compiler.parse.json_reader import ConfigReader, is_name
 
 ROOT = Path(__file__).parents[2]
 MACHINES = [
-    *(p for p in sorted((ROOT / "examples").rglob("*.json")) if "tick_hz" in json.loads(p.read_text())),
+    *(p for p in sorted((ROOT / "examples").rglob("*.json")) if "states" in json.loads(p.read_text())),
     ROOT / "fcsl_compiler/test/golden/small.json",
 ]
 TEXT = json.loads(SCHEMA.read_text())
