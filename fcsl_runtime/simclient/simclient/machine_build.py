@@ -24,7 +24,7 @@ def find_config(path: str | Path, caller: str = "", what: str = "machine config"
             return candidate.resolve()
     for candidate in tried:
         if candidate.is_dir():
-            raise TwinError(f"{candidate.absolute()}: a directory; name the JSON file of the {what.split()[0]} in it")
+            raise TwinError(f"{candidate.absolute()}: a directory; name the {what.split()[0]}'s JSON file")
     raise TwinError(f"no such {what}: {' nor '.join(str(p.absolute()) for p in tried)}")
 
 
