@@ -523,4 +523,8 @@ class _Loader:
             if name in instances and instances[name].table is None:
                 continue  # the error in its model was reported
             known = [f"{i.name}.{f.path}" for i in instances.values() if i.table for f in i.table.of_role("parameter")]
-            self.sink.error("E210", f"there is no parameter `{path}`", span, help=nearest(path, known))
+            fix = nearest(path, known)
+            machine = self.parts.machine
+            if name in self.parts.controllers or (machine and path in machine.fields):
+                fix = "`--set` sets parameters of models; those of a machine are in its own file, or `SimTwin.set` sets them"
+            self.sink.error("E210", f"there is no parameter `{path}`", span, help=fix)

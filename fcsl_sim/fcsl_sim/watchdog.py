@@ -63,7 +63,7 @@ class Watchdog:
             looks = looks + 1 if at is not None and at.entry == entry else 0
             entry = at.entry if at is not None else -1
             if at is not None and looks >= (_LOOKS_OF_SIGNAL if number else _LOOKS):
-                message = f"`{at.function}` of `{at.instance}` does not return after {at.time_s:.9f} s"
+                message = f"`{at.function}` of `{at.instance}` does not return, at {at.time_s:.9f} s"
                 self._end(message, number)
 
     def _signal(self) -> int:

@@ -180,11 +180,13 @@ class _Checker:
         for name, (definition, span) in rates.items():
             instance = self.instances.get(name)
             if instance is None:
-                self._no_instance(name, span)
+                self._no_instance(name, span, controllers=False)
                 continue
             rate = self._rate(definition)
             if instance.table and not instance.table.has_update:
-                message = f"`{name}` has no rate: its model has no `update`, and its outputs follow at every instant"
+                message = (
+                    f"`{name}` may have no rate: its model has no `update`, and its outputs follow at every instant"
+                )
                 self.sink.error("E804", message, span, help="remove its rate")
             elif rate and instance.table and instance.table.tick_hz not in (0, Fraction(rate.hz, rate.every)):
                 message = f"`{name}` is a machine with a tick_hz of {instance.table.tick_hz}: its rate is that"
@@ -330,10 +332,16 @@ class _Checker:
             return None
         return _Port("", field.path, type_of(field.type, field.shape), field.unit, controller, False)
 
-    def _no_instance(self, name: str, span: Span) -> None:
-        names = [*(self.machines or ["controller"]), *self.instances]
-        hint = nearest(name, names) or f"the instances are {', '.join(self.instances)}"
-        self.sink.error("E206", f"no instance `{name}`", span, help=hint)
+    def _no_instance(self, name: str, span: Span, controllers: bool = True) -> None:
+        if name in self.machines:
+            message = f"`{name}` is a controller, and this is about models"
+            fix = "set parameters of a machine in its own file, or in a test with `SimTwin.set`"
+            self.sink.error("E206", message, span, help=fix)
+            return
+        others = list(self.machines) if controllers else []
+        text = f"the instances are {', '.join(self.instances)}"
+        text += f", the controllers {', '.join(others)}" if others else ""
+        self.sink.error("E206", f"no instance `{name}`", span, help=nearest(name, [*others, *self.instances]) or text)
 
     def _field(self, node: JsonNode, text: str, roles: Sequence[str], rule: str) -> ModelField | None:
         """The field of `instance.path` if it has one of these roles; None if an error was reported."""
@@ -451,7 +459,7 @@ class _Checker:
                 integrator = chosen[group]
                 if instance.rate and integrator and integrator.hz and integrator.hz % instance.rate.hz:
                     message = f"{instance.rate.text()} is not on the grid of the integrator's {integrator.hz} Hz"
-                    fix = "let its rate divide the integrator's, or integrate with rk45, which has no grid"
+                    fix = f"let its rate divide the integrator's, and its phase be a multiple of {1 / integrator.hz:g} s, or integrate with rk45"
                     self.sink.error("E220", message, instance.rate.span, help=fix)
                     break
 

@@ -77,7 +77,7 @@ static void put_crash(line_t *line, int number, const char *instance, const char
     put(line, function);
     put(line, "` of `");
     put(line, instance);
-    put(line, "` crashed after ");
+    put(line, "` crashed at ");
     put_digits(line, (uint64_t)time_ns / 1000000000u, 1);
     put(line, ".");
     put_digits(line, (uint64_t)time_ns % 1000000000u, 9);

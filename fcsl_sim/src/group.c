@@ -75,7 +75,8 @@ int fcsl_group_check_finite(const fcsl_group_t *group, const double *x, int64_t 
         if (!isfinite(x[i])) {
             char name[FCSL_PLACE_BYTES];
             fcsl_group_name_state(group, i, name, sizeof name);
-            return fcsl_sim_fail(error, "%s became %g at %.9f s", name, x[i], (double)time_ns / NS_PER_S);
+            return fcsl_sim_fail(error, "%s became %g at %.9f s", name, isnan(x[i]) ? (double)NAN : x[i],
+                                 (double)time_ns / NS_PER_S);
         }
     }
     return 0;

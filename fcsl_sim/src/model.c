@@ -181,6 +181,27 @@ static const char *check_descriptor(const fcsl_model_t *model)
     return NULL;
 }
 
+/* The error in what the table says of places that the descriptor names, or null. */
+static const char *check_places(const fcsl_model_t *model)
+{
+    const uint64_t begin = model->continuous_offset;
+    const uint64_t end = begin + 8u * (uint64_t)model->continuous_count;
+    int is_bool = 0;
+    for (uint32_t i = 0; i < model->field_count; i++) {
+        const fcsl_field_t *field = &model->fields[i];
+        const uint64_t last = (uint64_t)field->offset + field->size;
+        if (field->offset < end && last > begin && (field->role != FCSL_ROLE_STATE || field->type != FCSL_F64)) {
+            return "its continuous states reach into a field that is no state of doubles: continuous_count is too "
+                   "large";
+        }
+        is_bool = is_bool || (field->type == FCSL_BOOL && field->offset == model->sampled_offset);
+    }
+    if (model->sampled_offset != FCSL_NO_OFFSET && !is_bool) {
+        return "sampled_offset is no field of type bool: write that of `outputs.sampled`, or FCSL_NO_OFFSET";
+    }
+    return NULL;
+}
+
 int fcsl_model_check(const fcsl_model_t *model, const char *library, fcsl_error_t *error)
 {
     const char *wrong = check_descriptor(model);
@@ -200,7 +221,8 @@ int fcsl_model_check(const fcsl_model_t *model, const char *library, fcsl_error_
             return fcsl_sim_fail(error, "%s: model `%s`: field `%s` is there twice", library, model->name, field->path);
         }
     }
-    return 0;
+    wrong = check_places(model);
+    return wrong ? fcsl_sim_fail(error, "%s: model `%s`: %s", library, model->name, wrong) : 0;
 }
 
 static const fcsl_model_t *find_model(const fcsl_model_t *const *models, const char *library, const char *name,

@@ -63,7 +63,8 @@ static int check_field(const fcsl_sim_t *sim, const fcsl_instance_state_t *insta
         if (!isfinite(value)) {
             char name[FCSL_PLACE_BYTES];
             fcsl_sim_name_place(instance, field->offset + (size_t)i * scalar, name, sizeof name);
-            return fcsl_sim_fail(error, "%s became %g at %.9f s", name, value, (double)sim->time_ns / 1e9);
+            return fcsl_sim_fail(error, "%s became %g at %.9f s", name, isnan(value) ? (double)NAN : value,
+                                 (double)sim->time_ns / 1e9);
         }
     }
     return 0;

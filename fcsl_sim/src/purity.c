@@ -109,35 +109,112 @@ static void change_what_is_older(const fcsl_model_t *model, uint8_t *data)
     }
 }
 
-/* Whether `derivative` and `event` take states from their argument, and nothing from outputs. */
-static int check_argument(const trial_t *trial, fcsl_error_t *error)
+/* Behind what a function may write; it finds these bits there again. */
+enum { GUARDS = 4 };
+
+/* Fills derivatives and event values with a number that no model computes, calls both functions, and checks the guards. */
+static int call_both(const trial_t *trial, uint8_t *self, const double *x, uint64_t mark, double *values,
+                     fcsl_error_t *error)
 {
     const fcsl_model_t *model = trial->instance->model;
-    const uint32_t count = model->continuous_count + model->event_count;
-    double *x = trial->scratch + 2u * count;
-    double *first = trial->scratch;
-    double *second = trial->scratch + count;
-    if (model->continuous_count == 0) {
-        return 0;
+    const uint32_t n = model->continuous_count;
+    double *events = values + n + GUARDS;
+    for (uint32_t i = 0; i < n + model->event_count + 2u * GUARDS; i++) {
+        memcpy(&values[i], &mark, sizeof mark);
     }
-    memcpy(trial->after, trial->before, model->size);
-    memcpy(x, states_in(model, trial->before), model->continuous_count * sizeof *x);
-    change_what_is_older(model, trial->after);
-    for (int pass = 0; pass < 2; pass++) {
-        const uint8_t *self = pass == 0 ? trial->before : trial->after;
-        double *values = pass == 0 ? first : second;
+    if (model->derivative) {
+        fcsl_sim_enter(trial->sim, trial->index, FCSL_IN_DERIVATIVE);
         model->derivative(self, 0.0, x, values);
-        if (model->event) {
-            model->event(self, 0.0, x, values + model->continuous_count);
+    }
+    if (model->event) {
+        fcsl_sim_enter(trial->sim, trial->index, FCSL_IN_EVENT);
+        model->event(self, 0.0, x, events);
+    }
+    for (uint32_t i = 0; i < GUARDS; i++) {
+        if (memcmp(&values[n + i], &mark, sizeof mark) != 0 ||
+            memcmp(&events[model->event_count + i], &mark, sizeof mark) != 0) {
+            return fcsl_sim_fail(error, "`derivative` or `event` of model `%s` writes more values than the model has",
+                                 model->name);
         }
     }
+    return 0;
+}
+
+/* Fails where a function has left a value as it was marked. */
+static int check_written(const trial_t *trial, const double *first, const double *second, const uint64_t marks[2],
+                         fcsl_error_t *error)
+{
+    const fcsl_model_t *model = trial->instance->model;
+    const uint32_t n = model->continuous_count;
+    for (uint32_t i = 0; i < n + GUARDS + model->event_count; i++) {
+        const int is_mark =
+            memcmp(&first[i], &marks[0], sizeof *first) == 0 && memcmp(&second[i], &marks[1], sizeof *second) == 0;
+        if (is_mark && i < n) {
+            char name[FCSL_PLACE_BYTES];
+            fcsl_sim_name_place(trial->instance, model->continuous_offset + i * sizeof *first, name, sizeof name);
+            return fcsl_sim_fail(error, "`derivative` of model `%s` does not write dx[%u], that of %s", model->name, i,
+                                 name);
+        }
+        if (is_mark && i >= n + GUARDS) {
+            return fcsl_sim_fail(error, "`event` of model `%s` does not write value[%u], that of `%s`", model->name,
+                                 i - n - GUARDS, model->events[i - n - GUARDS].name);
+        }
+    }
+    return 0;
+}
+
+/* Whether `derivative` and `event` write all their values, take states from their argument, and nothing from outputs. */
+static int check_argument(const trial_t *trial, fcsl_error_t *error)
+{
+    static const uint64_t marks[2] = {UINT64_C(0x7ff8feed00000001), UINT64_C(0x7ff8feed00000002)};
+    const fcsl_model_t *model = trial->instance->model;
+    const uint32_t n = model->continuous_count;
+    const uint32_t count = n + model->event_count + 2u * GUARDS;
+    double *first = trial->scratch;
+    double *second = first + count;
+    double *x = second + count;
+    memcpy(trial->after, trial->before, model->size);
+    if (n > 0) {
+        memcpy(x, states_in(model, trial->before), n * sizeof *x);
+    }
+    change_what_is_older(model, trial->after);
+    if (call_both(trial, trial->before, n > 0 ? x : NULL, marks[0], first, error) ||
+        call_both(trial, trial->after, n > 0 ? x : NULL, marks[1], second, error) ||
+        check_written(trial, first, second, marks, error)) {
+        return -1;
+    }
     for (uint32_t i = 0; i < count; i++) {
-        if (memcmp(&first[i], &second[i], sizeof *first) != 0 && !(isnan(first[i]) && isnan(second[i]))) {
+        const int is_guard = (i >= n && i < n + GUARDS) || i >= n + GUARDS + model->event_count;
+        if (!is_guard && memcmp(&first[i], &second[i], sizeof *first) != 0 && !(isnan(first[i]) && isnan(second[i]))) {
             return fcsl_sim_fail(
                 error,
                 "`%s` of model `%s` reads integrated states, or outputs, in the struct: they are older "
                 "than its argument; take the states from x",
-                i < model->continuous_count ? "derivative" : "event", model->name);
+                i < n ? "derivative" : "event", model->name);
+        }
+    }
+    return 0;
+}
+
+/* Whether `output` writes all outputs that are doubles. */
+static int check_outputs_written(const trial_t *trial, fcsl_error_t *error)
+{
+    static const double marks[2] = {0x1.23456789p-300, 0x1.3456789ap-300};
+    const fcsl_model_t *model = trial->instance->model;
+    for (uint32_t i = 0; i < model->field_count; i++) {
+        const fcsl_field_t *field = &model->fields[i];
+        if (field->role != FCSL_ROLE_OUTPUT || field->type != FCSL_F64) {
+            continue;
+        }
+        int kept = 0;
+        for (int pass = 0; pass < 2; pass++) {
+            memcpy(trial->after, trial->before, model->size);
+            memcpy(trial->after + field->offset, &marks[pass], sizeof marks[pass]);
+            model->output(trial->after, 0.0, states_in(model, trial->after));
+            kept += memcmp(trial->after + field->offset, &marks[pass], sizeof marks[pass]) == 0;
+        }
+        if (kept == 2) {
+            return fcsl_sim_fail(error, "`output` of model `%s` does not write `%s`", model->name, field->path);
         }
     }
     return 0;
@@ -148,26 +225,21 @@ static int try_functions(const trial_t *trial, fcsl_error_t *error)
     const fcsl_model_t *model = trial->instance->model;
     memcpy(trial->before, trial->instance->data, model->size);
     memcpy(trial->after, trial->instance->data, model->size);
-    if (model->derivative) {
-        fcsl_sim_enter(trial->sim, trial->index, FCSL_IN_DERIVATIVE);
-        model->derivative(trial->after, 0.0, states_in(model, trial->after), trial->scratch);
-        if (check_unchanged(trial, "derivative", 0, error)) {
-            return -1;
-        }
-    }
-    if (model->event) {
-        fcsl_sim_enter(trial->sim, trial->index, FCSL_IN_EVENT);
-        model->event(trial->after, 0.0, states_in(model, trial->after), trial->scratch);
-        if (check_unchanged(trial, "event", 0, error)) {
-            return -1;
-        }
-    }
     if (check_argument(trial, error)) {
         return -1;
     }
+    /* `before` went through both functions. */
     memcpy(trial->after, trial->before, model->size);
+    memcpy(trial->before, trial->instance->data, model->size);
+    if (check_unchanged(trial, "derivative or event", 0, error)) {
+        return -1;
+    }
     if (model->output) {
         fcsl_sim_enter(trial->sim, trial->index, FCSL_IN_OUTPUT);
+        if (!model->update && check_outputs_written(trial, error)) { /* what `update` writes holds */
+            return -1;
+        }
+        memcpy(trial->after, trial->before, model->size);
         model->output(trial->after, 0.0, states_in(model, trial->after));
         return check_unchanged(trial, "output", 1, error) || check_feedthrough(trial, error) ? -1 : 0;
     }
@@ -181,7 +253,8 @@ int fcsl_sim_check_purity(fcsl_sim_t *sim, uint32_t index, fcsl_error_t *error)
     trial_t trial = {.sim = sim, .index = index, .instance = instance};
     trial.before = fcsl_sim_allocate(model->size, model->align);
     trial.after = fcsl_sim_allocate(model->size, model->align);
-    trial.scratch = calloc(3u * ((size_t)model->continuous_count + model->event_count) + 1u, sizeof *trial.scratch);
+    trial.scratch =
+        calloc(3u * ((size_t)model->continuous_count + model->event_count) + 4u * GUARDS + 1u, sizeof *trial.scratch);
     const int failed = !trial.before || !trial.after || !trial.scratch
                            ? fcsl_sim_fail(error, "no memory for instance `%s`", instance->name)
                            : try_functions(&trial, error);

@@ -75,7 +75,7 @@ EVENT = {"at_s": 0.1, "set": "altimeter.parameters.bias", "value": 1.0}
         (edit("rates", "altimeter", value=0), ["E204: a rate (Hz) is 0"]),
         (
             edit("rates", "ramp", value=100),
-            ["E804: `ramp` has no rate: its model has no `update`, and its outputs follow at every instant"],
+            ["E804: `ramp` may have no rate: its model has no `update`, and its outputs follow at every instant"],
         ),
         (edit("rates", "altimetre", value=100), ["E206: no instance `altimetre`"]),
         (add(("ramp.x", "altimeter.truth")), ["E213: two sources for `altimeter.truth`"]),

@@ -314,3 +314,18 @@ def test_settings_without_an_effect_are_refused(load_sim: Load) -> None:
         with pytest.raises(DiagnosticError) as error:
             load_sim(change)
         assert heads(error.value) == [message]
+
+
+@pytest.mark.parametrize(
+    ("macro", "message"),
+    [
+        ("FORGETS_DX", "`derivative` of model `chain` does not write dx[0], that of a.state.x"),
+        ("FORGETS_OUTPUT", "`output` of model `chain` does not write `outputs.free`"),
+        ("WRITES_MORE", "`derivative` or `event` of model `chain` writes more values than the model has"),
+    ],
+)
+def test_what_is_forgotten_or_too_much_is_refused(macro: str, message: str, load_sim: Load) -> None:
+    config = load_sim(chained({"a": link()}), define=macro)
+    with pytest.raises(SimError) as error:
+        Simulation(config.plan, config.tables)
+    assert str(error.value) == message

@@ -50,14 +50,14 @@ def fly(path: Path, *options: str | Path) -> subprocess.CompletedProcess[str]:
 @pytest.mark.parametrize(("how", "name"), [(1, "SIGSEGV"), (3, "SIGABRT"), (4, "SIGSEGV")])
 def test_a_crash_names_the_model(how: int, name: str, write: Write) -> None:
     done = fly(write(how))
-    message = f"`update` of `bad` crashed after 1.250000000 s: {name}"
+    message = f"`update` of `bad` crashed at 1.250000000 s: {name}"
     assert (done.returncode, done.stderr) == (2, f"fcsl-sim: error: {message}\n")
     assert json.loads(done.stdout) == {"end": "error", "error": message}
 
 
 def test_a_model_that_hangs_is_named_and_the_bag_is_whole(write: Write, tmp_path: Path) -> None:
     done = fly(write(2), "--record", tmp_path / "bag")
-    message = "`update` of `bad` does not return after 1.250000000 s"
+    message = "`update` of `bad` does not return, at 1.250000000 s"
     assert (done.returncode, done.stderr) == (2, f"fcsl-sim: error: {message}\n")
     assert json.loads(done.stdout) == {"end": "error", "error": message}
     line = [sys.executable, "-m", "simclient.bag", "info", str(tmp_path / "bag")]
@@ -92,7 +92,7 @@ def test_no_number_is_an_error_as_json(write: Write) -> None:
 @pytest.mark.parametrize(("how", "name"), [(11, "SIGSEGV"), (13, "SIGABRT")])
 def test_a_crash_while_it_is_opened(how: int, name: str, write: Write) -> None:
     done = fly(write(how))
-    message = f"`init` of `bad` crashed after 0.000000000 s: {name}"
+    message = f"`init` of `bad` crashed at 0.000000000 s: {name}"
     assert (done.returncode, done.stderr) == (2, f"fcsl-sim: error: {message}\n")
     assert json.loads(done.stdout) == {"end": "error", "error": message}
 
@@ -101,5 +101,5 @@ def test_a_hang_while_it_is_opened(write: Write) -> None:
     done = fly(write(12))
     assert (done.returncode, done.stderr) == (
         2,
-        "fcsl-sim: error: `init` of `bad` does not return after 0.000000000 s\n",
+        "fcsl-sim: error: `init` of `bad` does not return, at 0.000000000 s\n",
     )

@@ -81,8 +81,8 @@ typedef struct fcsl_model {
     const char *(*init)(void *self, const fcsl_model_context_t *context);
     /* dx/dt at time t (s) for the states x. */
     void (*derivative)(const void *self, double t, const double *x, double *dx);
-    /* Writes every output, from time t (s) and the states x; x is null without continuous states. Null: `update` writes the
-     * outputs, and they hold until the next update. */
+    /* Writes every output but those that `update` writes, from time t (s) and the states x; x is null without continuous states.
+     * What `update` writes holds until the next update. Null: `update` writes all. */
     void (*output)(void *self, double t, const double *x);
     /* Called at the rate of the instance, with current inputs and states. May change any state. */
     void (*update)(void *self, const fcsl_model_context_t *context);

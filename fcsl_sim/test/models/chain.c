@@ -1,7 +1,7 @@
 /* SPDX-License-Identifier: Apache-2.0
  *
- * y = gain * u + x, x' = rate * u: an output with feed-through (`through`) and one without (`free`). With IMPURE, SECRET,
- * STALE or BLOWS_UP it is a model as it must not be.
+ * y = gain * u + x, x' = rate * u: an output with feed-through (`through`) and one without (`free`). With a macro it is a model as
+ * it must not be.
  */
 #include "fcsl/fcsl_model.h"
 
@@ -34,8 +34,13 @@ static const char *init(void *self, const fcsl_model_context_t *context)
 static void derivative(const void *self, double t, const double *x, double *dx)
 {
     const chain_t *chain = self;
-    (void)t;
+    (void)t, (void)chain;
+#ifndef FORGETS_DX
     dx[0] = chain->parameters.rate * chain->inputs.u;
+#endif
+#ifdef WRITES_MORE
+    dx[1] = 0.0;
+#endif
 #ifdef BLOWS_UP
     dx[0] = 1.0 / (0.05 - t) + x[0];
 #endif
@@ -50,7 +55,9 @@ static void output(void *self, double t, const double *x)
     chain_t *chain = self;
     (void)t;
     chain->outputs.through = chain->parameters.gain * chain->inputs.u + x[0];
+#ifndef FORGETS_OUTPUT
     chain->outputs.free = x[0];
+#endif
     chain->outputs.nested.twice = 2.0 * x[0];
 #ifdef IMPURE
     chain->state.calls += 1.0;
