@@ -19,7 +19,7 @@ from simclient.bag import Bag
 from simclient.bag.digest import digest
 
 SEED = 7
-#: Long enough for the first change of state (6.75 s).
+#: Long enough for the first change of state (6.81 s).
 DURATION = "8.0"
 TICKS = 800
 #: Time limit of those tests that let it expire.
@@ -50,7 +50,7 @@ def test_flight_is_that_of_one_process(domain: Domain, reference: Callable[[int,
     assert digest(bag) == digest(reference(SEED, DURATION)) != digest(reference(SEED + 1, DURATION))
     controller_node, sim_node = domain.processes
     assert f"{TICKS} ticks answered" in sim_node.out
-    assert "6.750 s  ASCENT -> COAST (START_COAST by ascent)" in controller_node.err
+    assert "6.810 s  ASCENT -> COAST (START_COAST by ascent)" in controller_node.err
     assert f"the simulator ended the run: {TICKS} ticks" in controller_node.out
 
 

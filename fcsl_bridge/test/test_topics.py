@@ -155,7 +155,7 @@ def test_state_reaches_a_late_subscriber_and_clock_makes_no_tick(domain: Domain)
     clock = listener.node.create_publisher(Clock, "/clock", qos.STREAM)
     for second in range(100):
         clock.publish(Clock(clock=Time(sec=second)))
-    while sim.sim.tick < 680:
+    while sim.sim.tick < 690:
         sim.tick()
     late = domain.listener()
     late.subscribe(MachineState, "/lander_control/state", qos.LATCHED)
