@@ -253,9 +253,16 @@ def test_threads_of_devices_have_less_priority_than_ticks(craft: Craft, fly: Cal
     except PermissionError:
         pytest.skip("needs the right to real-time scheduling (CAP_SYS_NICE)")
     flight = fly("--realtime-priority", "7")
-    threads = [int(t.name) for t in Path(f"/proc/{flight.process.pid}/task").iterdir()]
-    real_time = [t for t in threads if os.sched_getscheduler(t) & ~os.SCHED_RESET_ON_FORK == os.SCHED_FIFO]
-    assert sorted(os.sched_getparam(t).sched_priority for t in real_time) == [6, 6, 7]
+
+    def priorities() -> list[int]:
+        threads = [int(t.name) for t in Path(f"/proc/{flight.process.pid}/task").iterdir()]
+        real_time = [t for t in threads if os.sched_getscheduler(t) & ~os.SCHED_RESET_ON_FORK == os.SCHED_FIFO]
+        return sorted(os.sched_getparam(t).sched_priority for t in real_time)
+
+    deadline = time.monotonic() + 30
+    while len(priorities()) < 3 and time.monotonic() < deadline:  # the threads may still be starting
+        time.sleep(0.01)
+    assert priorities() == [6, 6, 7]
     flight.end()
 
 
