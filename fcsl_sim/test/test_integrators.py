@@ -22,32 +22,11 @@ OSCILLATOR, KEPLER, ARENSTORF, PLEIADES, VAN_DER_POL, DETEST_A, DETEST_B, DETEST
 Vector = NDArray[np.float64]
 Solve = Callable[..., Vector]
 
-#: One tick a second, so that ticks do not make steps short.
-MACHINE = {
-    "tick_hz": 1,
-    "initial_state": "RUN",
-    "algorithms": {"Idle": {"source": "idle.py"}},
-    "instances": {"idle": {"algorithm": "Idle"}},
-    "states": {"RUN": {"schedule": {"idle": 1}}},
-}
-IDLE = """
-class Idle:
-    inputs = {}
-    outputs = {"ticks": "i64"}
-    parameters = {}
-    state = {}
-
-    def execute(self):
-        self.ticks = self.ticks + 1
-"""
-
 
 @pytest.fixture(scope="module")
 def solve(tmp_path_factory: pytest.TempPathFactory) -> Solve:
     """The states of a problem (test/models/problem.c) at each second from 0 on."""
     folder = tmp_path_factory.mktemp("problems")
-    (folder / "idle.json").write_text(json.dumps(MACHINE))
-    (folder / "idle.py").write_text(IDLE)
     source = (TEST / "models/problem.c").read_text()
 
     def run(problem: int, x: Sequence[float], seconds: int, p: float = 0.0, **integrator: Any) -> Vector:
@@ -55,7 +34,7 @@ def solve(tmp_path_factory: pytest.TempPathFactory) -> Solve:
         where.mkdir(exist_ok=True)
         (where / "problem.c").write_text(f"#define PROBLEM {problem}\n{source}")
         config = {
-            "controller": {"machine": "../idle.json"},
+            "tick_hz": 1,  # ticks do not make steps short
             "seed": 1,
             "duration": float(seconds + 1),
             "integrator": integrator,

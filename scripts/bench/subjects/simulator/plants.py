@@ -36,24 +36,6 @@ _EIGHT = [
     *(0.97000436, -0.24308753, 0.0, -0.97000436, 0.24308753, 0.0, 0.0, 0.0, 0.0),
     *(0.466203685, 0.43236573, 0.01, 0.466203685, 0.43236573, -0.01, -0.93240737, -0.86473146, 0.0),
 ]
-#: A controller that does nothing, once a second, so that ticks do not make steps short.
-IDLE = {
-    "tick_hz": 1,
-    "initial_state": "RUN",
-    "algorithms": {"Idle": {"source": "idle.py"}},
-    "instances": {"idle": {"algorithm": "Idle"}},
-    "states": {"RUN": {"schedule": {"idle": 1}}},
-}
-IDLE_SOURCE = """
-class Idle:
-    inputs = {}
-    outputs = {"ticks": "i64"}
-    parameters = {}
-    state = {}
-
-    def execute(self):
-        self.ticks = self.ticks + 1
-"""
 PARAMETERS: dict[str, dict[str, Any]] = {
     "lander": {
         "dry_mass": 400.0, "fuel_mass": 100.0, "max_thrust": 2000.0, "isp": 220.0, "gravity": 1.62,
@@ -70,14 +52,12 @@ PARAMETERS: dict[str, dict[str, Any]] = {
 
 
 def plan_of(plant: str, folder: Path) -> str:
-    """The plan of a simulation of one plant, which ticks once a second."""
+    """The plan of a simulation of one plant, without a controller."""
     where = folder / "plants"
     if not where.exists():
         shutil.copytree(PLANTS, where)
-        (where / "idle.json").write_text(json.dumps(IDLE))
-        (where / "idle.py").write_text(IDLE_SOURCE)
     config = {
-        "controller": {"machine": "idle.json"},
+        "tick_hz": 1,  # ticks do not make steps short
         "seed": 1,
         "duration": float(SECONDS[plant] + 1),
         "integrator": {"method": "rk4", "hz": 1000},
