@@ -1,7 +1,7 @@
 /* SPDX-License-Identifier: Apache-2.0
  *
- * A snapshot of the last `save`: the hosted machine, and the plant, which a checkpoint does not include. A client's
- * checkpoint is only compared with it; no client data are copied into a model.
+ * A snapshot of the last `save`: the hosted machine, and the plant, which a checkpoint of a machine does not include. A
+ * client's checkpoint is only compared with it; no client data are copied into a model.
  */
 #ifndef FCSL_SIM_SNAPSHOT_H
 #define FCSL_SIM_SNAPSHOT_H
