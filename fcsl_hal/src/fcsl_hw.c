@@ -66,6 +66,22 @@ int32_t fcsl_hw_sim_set_register(fcsl_hw_sim_t *sim, uint32_t address, uint32_t 
     return 0;
 }
 
+/* ---- bytes from a file --------------------------------------------------------------------------------------------- */
+
+int fcsl_hw_sim_is_valid(const fcsl_hw_sim_t *sim)
+{
+    uint8_t levels[FCSL_HW_SIM_COUNT]; /* a bool may not hold what a file does */
+    int valid = sim->register_count <= FCSL_HW_SIM_COUNT;
+    memcpy(levels, sim->gpio, sizeof levels);
+    for (uint32_t i = 0; i < FCSL_HW_SIM_COUNT; i++) {
+        const fcsl_hw_sim_register_t *at = &sim->registers[i];
+        const int is_used = i < sim->register_count;
+        valid = valid && levels[i] <= 1u && (at->value != 0) == is_used && (is_used || at->address == 0);
+        valid = valid && (!is_used || i == 0 || at[-1].address < at->address);
+    }
+    return valid;
+}
+
 /* ---- the table ----------------------------------------------------------------------------------------------------- */
 
 static int32_t read_gpio(void *ctx, uint32_t pin, bool *level)

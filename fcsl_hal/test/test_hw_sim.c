@@ -64,6 +64,35 @@ static void test_bytes(void)
     CHECK(memcmp(&other, &empty, sizeof empty) == 0);
 }
 
+static void check_invalid(void)
+{
+    CHECK(!fcsl_hw_sim_is_valid(&other));
+    other = sim;
+    CHECK(fcsl_hw_sim_is_valid(&other));
+}
+
+/* Bytes of a file. `sim` is full here. */
+static void test_validity(void)
+{
+    const uint32_t last = FCSL_HW_SIM_COUNT - 1;
+    CHECK(sim.register_count == FCSL_HW_SIM_COUNT && fcsl_hw_sim_is_valid(&other)); /* empty */
+    other = sim;
+    other.register_count++;
+    check_invalid();
+    other.register_count--; /* a register behind the last */
+    check_invalid();
+    other.registers[last].value = 0;
+    check_invalid();
+    other.registers[last].address = other.registers[last - 1].address;
+    check_invalid();
+    memset(&other.gpio[last], 2, 1);
+    check_invalid();
+    other.register_count = 0;
+    memset(other.registers, 0, sizeof other.registers);
+    other.registers[0].address = 1;
+    check_invalid();
+}
+
 static void test_pins_and_channels(struct fcsl_hw hw)
 {
     bool level = false;
@@ -83,6 +112,7 @@ int main(void)
     const struct fcsl_hw hw = fcsl_hw_simulated(&sim);
     test_against_a_list(hw);
     test_bytes();
+    test_validity();
     test_pins_and_channels(hw);
     return 0;
 }

@@ -57,13 +57,14 @@ _OPTIONAL = ("parameters", "integrator", "tolerances")
 class SimConfig:
     """A checked simulation. `tables` maps each instance to its model, in update order.
 
-    `companions` are the controllers beside the first one. `ros` lists the standard messages onto which truth is mapped; `until` is the stop condition as text, empty without one;
+    `controller` is the name of the first controller, `companions` are those beside it. `ros` lists the standard messages onto which truth is mapped; `until` is the stop condition as text, empty without one;
     `warnings` are rendered texts.
     """
 
     path: Path
     plan: str
     tables: dict[str, ModelTable]
+    controller: str
     machine: Machine
     library: Path
     companions: dict[str, Controller]
@@ -224,7 +225,7 @@ class _Loader:
         """Assembles the result; called only without errors, so every part is present."""
         parts = self.parts
         assert parts.machine and parts.ticks and parts.seed is not None
-        lead = next(iter(parts.controllers.values()))
+        controller, lead = next(iter(parts.controllers.items()))
         tables = {name: parts.instances[name].table for name in wiring.order}
         used = {table.name: table for table in tables.values() if table}
         lines = [
@@ -248,6 +249,7 @@ class _Loader:
             self.file,
             plan.document(lines),
             {name: table for name, table in tables.items() if table},
+            controller,
             lead.machine,
             lead.library,
             dict(list(parts.controllers.items())[1:]),
@@ -286,7 +288,7 @@ class _Loader:
             self.sink.error("E201", "both `controller` and `controllers`", keys["controller"].span, help=fix)
         given = self.given_machine
         for name, (definition, span) in self.reader.named(keys["controllers"], "`controllers`").items():
-            if name in ("machine", "channels", "actuators"):
+            if name in _RESERVED[1:]:
                 self.sink.error("E209", f"`{name}` is reserved", span, help="give the controller another name")
             self._read_controller(name, definition, given)
             given = None

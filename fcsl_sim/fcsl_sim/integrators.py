@@ -65,6 +65,11 @@ def read_integrator(node: JsonNode | None, reader: ConfigReader, tick_hz: int | 
     for key, (low, high) in _LIMITS.items():
         value = reader.number(keys.get(key), f"`{key}`", low, high)
         values[key] = _DEFAULTS[key] if value is None else value
+    if values["min_step_s"] > values["max_step_s"]:
+        message = f"`min_step_s` ({values['min_step_s']:g}) is above `max_step_s` ({values['max_step_s']:g})"
+        at = keys.get("min_step_s") or keys["max_step_s"]
+        reader.sink.error("E804", message, at.span, help="let the smallest step be at most the largest")
+        return None
     hz = 0
     if not adaptive:
         if "hz" not in keys:

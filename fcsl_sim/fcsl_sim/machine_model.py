@@ -8,10 +8,9 @@ from pathlib import Path
 from simclient.run import open_run
 
 from .errors import SimError
-from .models import ModelField, ModelTable, type_of
+from .models import FIELD_TYPES, ModelField, ModelTable, type_of
 
 _ROLES = ("input", "output", "parameter", "state")
-_TYPES = ("bool", "i32", "i64", "u32", "u64", "f32", "f64")
 
 
 def machine_model(library: Path, name: str) -> ModelTable:
@@ -25,7 +24,7 @@ def machine_model(library: Path, name: str) -> ModelTable:
         raise SimError(f"it has {len(machine.instances)} instances ({names}), and a model is one")
     fields = {}
     for field in machine.fields.values():
-        if field.role in _ROLES and field.type in _TYPES and not field.connected_from:
+        if field.role in _ROLES and field.type in FIELD_TYPES and not field.connected_from:
             path = field.path.partition(".")[2]
             type_ = type_of(field.type, field.shape)
             fields[path] = ModelField(path, field.role, False, type_, field.offset, field.unit, field.doc)

@@ -22,8 +22,8 @@ from typing import Any
 from simclient.c_machine import CField
 
 from .errors import SimError
+from .model_list import find_model
 from .models import Scalar
-from .plugins import find_model_table
 
 ABI_VERSION = 3
 NO_OFFSET = 2**32 - 1
@@ -132,9 +132,9 @@ class ModelInstance:
 
     @classmethod
     def load(cls, text: str, **noise: Callable[[int], float]) -> ModelInstance:
-        """The model that `text` names: the path of a file in C or C++, which is compiled, or package://PACKAGE/NAME, or
-        package://PACKAGE/PATH of a file. `noise` are `gaussian` and `uniform`. Raises SimError."""
-        table = find_model_table(text)
+        """The model that `text` names: the path of a file in C or C++, which is compiled, package://PACKAGE/NAME,
+        package://PACKAGE/PATH of a file, or a name that `fcsl-sim list-models` prints. `noise` are `gaussian` and `uniform`. Raises SimError."""
+        table = find_model(text).table()
         return cls(table.library, table.name, **noise)
 
     def has(self, function: str) -> bool:

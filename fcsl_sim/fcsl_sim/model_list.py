@@ -16,7 +16,7 @@ from fcsl_compiler.parse.source_path import SourcePathError, resolve_source
 
 from .errors import SimError
 from .models import ModelTable
-from .plugins import compile_model, model_library
+from .plugins import LIBRARY, compile_model, model_library
 
 #: Folders below a package's share folder in which it installs models as source.
 _SHARED = ("models", "sim")
@@ -25,7 +25,6 @@ _MAX_LIBRARY_BYTES = 1 << 28
 #: A source that defines the symbol by which the simulator finds models, in C or by the macro of fcsl_model.hpp.
 _DEFINES = re.compile(rb"\bfcsl_models\s*\[\s*\]\s*=|^\s*FCSL_MODEL_EXPORT\w*\s*\(", re.MULTILINE)
 _SYMBOL = b"\0fcsl_models\0"
-_LIBRARY = re.compile(r"package://[^/]+/([a-z][a-z0-9_]*)")
 #: Folders that colcon, CMake, cargo and fcslc fill.
 _BUILT = {"build", "install", "log", "target"}
 
@@ -61,8 +60,8 @@ def find_models(folder: Path) -> list[Found]:
 
 def find_model(text: str) -> Found:
     """The model that a path, package://… or a name of `find_models` names. Raises SimError."""
-    if library := _LIBRARY.fullmatch(text):
-        return Found(library[1], "library", text, Path(model_library(text).library))
+    if library := LIBRARY.fullmatch(text):
+        return Found(library[2], "library", text, Path(model_library(text).library))
     if text.startswith("package://"):
         try:
             return _file(text, text, resolve_source(text, config=Path()))

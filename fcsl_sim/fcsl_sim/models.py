@@ -13,6 +13,8 @@ from fcsl_compiler.model.types import SCALARS, Array, Type, count_of, scalar_of,
 Scalar = bool | int | float
 
 _FORMATS = {"bool": "B", "i32": "i", "i64": "q", "u32": "I", "u64": "Q", "f32": "f", "f64": "d"}
+#: What a field of a model may be, or an array of it.
+FIELD_TYPES = tuple(_FORMATS)
 
 
 @dataclass(frozen=True)

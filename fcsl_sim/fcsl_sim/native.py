@@ -59,6 +59,17 @@ class _Commands(ctypes.Structure):
     _fields_ = [(name, c_uint64) for name in _COMMANDS]
 
 
+class _Place(ctypes.Structure):
+    """fcsl_sim_place_t"""
+
+    _fields_ = (
+        ("instance", ctypes.c_char * 256),
+        ("function", c_char_p),
+        ("entry", c_uint64),
+        ("time_ns", c_int64),
+    )
+
+
 _ERROR = POINTER(CError)
 #: Result type and argument types of every function used here.
 _PROTOTYPES: dict[str, tuple[type | None, list[type]]] = {
@@ -114,7 +125,7 @@ _PROTOTYPES: dict[str, tuple[type | None, list[type]]] = {
     "fcsl_sim_companion": (ptr, [ptr, c_uint32]),
     "fcsl_sim_companion_name": (c_char_p, [ptr, c_uint32]),
     "fcsl_sim_companion_state": (c_char_p, [ptr, c_uint32, POINTER(c_uint64)]),
-    "fcsl_sim_place": (c_char_p, [POINTER(c_char_p), POINTER(c_uint64), POINTER(c_int64)]),
+    "fcsl_sim_place": (c_int, [POINTER(_Place)]),
     "fcsl_sim_watch_crashes": (c_int, [c_int, c_int, _ERROR]),
     "fcsl_sim_describe_model": (c_int64, [c_char_p, c_char_p, ptr, c_size_t, _ERROR]),
 }
@@ -174,11 +185,10 @@ class Place:
 
 def place() -> Place | None:
     """What runs now in the simulation that was opened last; None: no function of a model. From any thread."""
-    function, entry, time_ns = c_char_p(), c_uint64(), c_int64()
-    instance = simulator_library().fcsl_sim_place(byref(function), byref(entry), byref(time_ns))
-    if instance is None:
+    at = _Place()
+    if not simulator_library().fcsl_sim_place(byref(at)):
         return None
-    return Place(instance.decode(), (function.value or b"").decode(), entry.value, time_ns.value / 1e9)
+    return Place(at.instance.decode("utf-8", "replace"), at.function.decode(), at.entry, at.time_ns / 1e9)
 
 
 def watch_crashes(watch: bool, as_json: bool) -> None:

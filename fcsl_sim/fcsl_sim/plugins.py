@@ -19,7 +19,8 @@ from .native import describe_model
 
 #: Include folders of a model: the model ABI, and the machine ABI that it includes.
 INCLUDE_PACKAGES = ("fcsl_sim", "fcsl_compiler")
-_LIBRARY = re.compile(r"package://([^/]+)/([a-z][a-z0-9_]*)")
+#: package://PACKAGE/NAME
+LIBRARY = re.compile(r"package://([^/]+)/([a-z][a-z0-9_]*)")
 _AS_LIBRARY = '{"library": "package://PACKAGE/NAME"}'
 
 
@@ -48,19 +49,9 @@ def _no_source(suffix: str) -> str:
 def model_source(text: str, config: Path) -> ModelTable:
     """The model of the `source` that the file `config` names. Raises SimError."""
     try:
-        return _existing(resolve_source(text, config=config))
+        path = resolve_source(text, config=config)
     except SourcePathError as error:
         raise SimError(str(error)) from None
-
-
-def find_model_table(text: str) -> ModelTable:
-    """The model of a path of a file, of package://PACKAGE/PATH or of package://PACKAGE/NAME. Raises SimError."""
-    if _LIBRARY.fullmatch(text):
-        return model_library(text)
-    return model_source(text, Path()) if text.startswith("package://") else _existing(Path(text))
-
-
-def _existing(path: Path) -> ModelTable:
     if path.suffix in LANGUAGES and not path.is_file():
         raise SimError(f"no such file: {path}")
     return compile_model(path)
@@ -69,7 +60,7 @@ def _existing(path: Path) -> ModelTable:
 def model_library(text: str) -> ModelTable:
     """The model of a `library`, package://PACKAGE/NAME, which fcsl_add_model() of that package has installed. Raises
     SimError."""
-    named = _LIBRARY.fullmatch(text)
+    named = LIBRARY.fullmatch(text)
     if not named:
         raise SimError(
             "write package://PACKAGE/NAME, where the package's CMakeLists.txt has `fcsl_add_model(NAME …)`; a file in C "

@@ -32,8 +32,6 @@ from .native import Simulation
 _SLICE_TICKS = 100_000
 #: Between two structs in the virtual memory; more than what a trace copies to join two fields.
 _GAP_BYTES = 64
-#: Bytes of a scalar in the struct of a model.
-_BYTES = {"bool": 1, "i32": 4, "i64": 8, "u32": 4, "u64": 8, "f32": 4, "f64": 8}
 
 
 @contextmanager
@@ -77,7 +75,7 @@ class SimRun(Run):
             size = max((field.offset + _size(field) for field in config.tables[name].fields.values()), default=0)
             self._place(name, self._simulation.instance_data(name), size, None)
         self._begins = [region.begin for region in self._regions]
-        self._sources = _Sources(config.plan, self._machines)
+        self._sources = _Sources(config, self._machines)
         self.machine = self._combined()
         self._fields = tuple(self.machine.fields.values())
 
@@ -342,7 +340,7 @@ class SimTrace:
 class _Sources:
     """What feeds fields of machines and inputs of models, from the plan (src/plan.h)."""
 
-    def __init__(self, plan: str, machines: Mapping[str, Machine]):
+    def __init__(self, config: SimConfig, machines: Mapping[str, Machine]):
         #: `<instance>.<output>` by sensor channel of the first controller.
         self.of_channels: dict[str, str] = {}
         #: The path of an output, or `<controller>.<channel>`, by the path of a field.
@@ -352,12 +350,12 @@ class _Sources:
             for name, machine in machines.items()
             for channel in machine.channels
         }
-        for line in plan.splitlines():
+        for line in config.plan.splitlines():
             word, *rest = line.split(" ")
             if word == "link":
                 self.of_fields[f"{rest[2]}.{rest[3]}"] = f"{rest[0]}.{rest[1]}"
             elif word == "actuator":
-                self.of_fields[f"{rest[1]}.{rest[2]}"] = f"controller.{rest[0]}"
+                self.of_fields[f"{rest[1]}.{rest[2]}"] = f"{config.controller}.{rest[0]}"
             elif word == "companion_actuator":
                 self.of_fields[f"{rest[2]}.{rest[3]}"] = f"{rest[0]}.{rest[1]}"
             elif word == "sensor":
@@ -371,7 +369,7 @@ class _Sources:
 
 
 def _size(field: ModelField) -> int:
-    return count_of(field.type) * _BYTES[scalar_of(field.type).name]
+    return count_of(field.type) * scalar_of(field.type).size
 
 
 def _of_model(region: _Region, found: ModelField) -> Field:

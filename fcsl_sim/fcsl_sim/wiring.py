@@ -19,7 +19,7 @@ from simclient.descriptor import Field, Machine, why_read_only
 from . import dataflow, plan
 from .dataflow import AlgebraicLoop, Link
 from .integrators import MAX_HZ, Integrator
-from .models import ModelField, ModelTable, type_of, with_unit
+from .models import FIELD_TYPES, ModelField, ModelTable, type_of, with_unit
 from .ros import TruthTopic, read_truth
 
 MAX_SECONDS = 1e9
@@ -98,8 +98,6 @@ _FROM = _End("output", "actuator", "a connection comes `from` an output or an ac
 _TO = _End("input", "sensor", "a connection goes `to` an input or a sensor")
 _A_ROLE = {"input": "an input", "output": "an output", "parameter": "a parameter", "state": "a state"}
 _RECORDS = ("inputs", "outputs", "parameters", "state")
-#: What a field of a model may be.
-_MODEL_TYPES = ("bool", "i32", "i64", "u32", "u64", "f32", "f64")
 
 
 @dataclass(frozen=True)
@@ -327,7 +325,7 @@ class _Checker:
         if end is _TO and not field.writable:
             self.sink.error("E215", f"`{node.value}`: {why_read_only(field)}", node.span)
             return None
-        if field.type not in _MODEL_TYPES:
+        if field.type not in FIELD_TYPES:
             self.sink.error("E217", f"`{node.value}` is {field.type}, which models do not have", node.span)
             return None
         return _Port("", field.path, type_of(field.type, field.shape), field.unit, controller, False)

@@ -1,7 +1,7 @@
 /* SPDX-License-Identifier: Apache-2.0
  *
- * Builds the simulation from the plan: loads the named libraries, checks every connection once, and fills tables of
- * pointers, so that the run loop needs no look-up by name.
+ * Builds the simulation from the plan: loads the named libraries, checks every name once, and fills tables of pointers, so
+ * that the run loop needs no look-up by name.
  */
 #include <stdlib.h>
 #include <string.h>
@@ -13,7 +13,7 @@
 #include "model.h"
 #include "sim_internal.h"
 
-static int bad(fcsl_error_t *error, uint32_t line, const char *what, const char *name)
+int fcsl_sim_fail_line(fcsl_error_t *error, uint32_t line, const char *what, const char *name)
 {
     return fcsl_sim_fail(error, "plan line %u: %s `%s`", line, what, name);
 }
@@ -121,21 +121,21 @@ static int build_instance(fcsl_sim_t *sim, uint32_t index, fcsl_error_t *error)
     const fcsl_plan_instance_t *from = &plan->instances[index];
     fcsl_instance_state_t *instance = &sim->instances[index];
     instance->name = from->name;
-    const fcsl_machine_model_t *machine = NULL;
     for (uint32_t i = 0; i < plan->model_count; i++) {
         if (strcmp(plan->models[i].name, from->model) == 0) {
             instance->model = sim->models[i];
-            machine = sim->machine_models[i];
+            instance->machine = sim->machine_models[i];
         }
     }
     if (!instance->model) {
-        return bad(error, from->line, "no model", from->model);
+        return fcsl_sim_fail_line(error, from->line, "no model", from->model);
     }
     if ((instance->model->update != NULL) != (from->hz > 0)) {
-        return bad(error, from->line, "models with `update` have a rate, others none, unlike", from->name);
+        return fcsl_sim_fail_line(error, from->line, "models with `update` have a rate, others none, unlike",
+                                  from->name);
     }
     if (instance->model->continuous_count > 0 && from->group == FCSL_PLAN_NO_GROUP) {
-        return bad(error, from->line, "in no group, with states to integrate:", from->name);
+        return fcsl_sim_fail_line(error, from->line, "in no group, with states to integrate:", from->name);
     }
     instance->group = from->group;
     instance->hz = from->hz;
@@ -147,7 +147,7 @@ static int build_instance(fcsl_sim_t *sim, uint32_t index, fcsl_error_t *error)
         return fcsl_sim_fail(error, "no memory for instance `%s`", from->name);
     }
     fcsl_noise_seed(&instance->noise, plan->seed, from->name);
-    return machine ? fcsl_machine_model_init(machine, instance->data, error) : 0;
+    return instance->machine ? fcsl_machine_model_init(instance->machine, instance->data, error) : 0;
 }
 
 static int build_instances(fcsl_sim_t *sim, fcsl_error_t *error)
@@ -176,11 +176,11 @@ int fcsl_sim_find_instance(const fcsl_sim_t *sim, uint32_t line, const char *nam
             return 0;
         }
     }
-    return bad(error, line, "no instance", name);
+    return fcsl_sim_fail_line(error, line, "no instance", name);
 }
 
-static const fcsl_field_t *find_field(const fcsl_sim_t *sim, uint32_t line, const char *name, const char *path,
-                                      uint32_t *index, fcsl_error_t *error)
+const fcsl_field_t *fcsl_sim_find_field(const fcsl_sim_t *sim, uint32_t line, const char *name, const char *path,
+                                        uint32_t *index, fcsl_error_t *error)
 {
     if (fcsl_sim_find_instance(sim, line, name, index, error)) {
         return NULL;
@@ -195,20 +195,20 @@ static const fcsl_field_t *find_field(const fcsl_sim_t *sim, uint32_t line, cons
 static int build_write(const fcsl_sim_t *sim, const fcsl_plan_set_t *set, fcsl_write_t *write, fcsl_error_t *error)
 {
     uint32_t index = 0;
-    const fcsl_field_t *field = find_field(sim, set->line, set->instance, set->field, &index, error);
+    const fcsl_field_t *field = fcsl_sim_find_field(sim, set->line, set->instance, set->field, &index, error);
     if (!field) {
         return -1;
     }
     if (field->role != FCSL_ROLE_PARAMETER && field->role != FCSL_ROLE_INPUT) {
-        return bad(error, set->line, "neither parameter nor input:", set->field);
+        return fcsl_sim_fail_line(error, set->line, "neither parameter nor input:", set->field);
     }
     if (set->element >= field->count) {
-        return bad(error, set->line, "no such element of", set->field);
+        return fcsl_sim_fail_line(error, set->line, "no such element of", set->field);
     }
     const uint32_t size = fcsl_scalar_size(field->type);
     const uint64_t limit = field->type == FCSL_BOOL ? 1 : size == 4 ? UINT32_MAX : UINT64_MAX;
     if (set->bits > limit) {
-        return bad(error, set->line, "these bits are no value of", set->field);
+        return fcsl_sim_fail_line(error, set->line, "these bits are no value of", set->field);
     }
     *write = (fcsl_write_t){sim->instances[index].data + field->offset + set->element * size, size, set->bits, index,
                             sim->instances[index].group};
@@ -277,279 +277,19 @@ static int build_writes(fcsl_sim_t *sim, fcsl_error_t *error)
     }
     uint32_t index = 0;
     const fcsl_plan_set_t *until = &plan->until_value;
-    const fcsl_field_t *field = find_field(sim, until->line, until->instance, until->field, &index, error);
+    const fcsl_field_t *field = fcsl_sim_find_field(sim, until->line, until->instance, until->field, &index, error);
     if (!field) {
         return -1;
     }
     if (field->count != 1) {
-        return bad(error, until->line, "not a scalar:", until->field);
+        return fcsl_sim_fail_line(error, until->line, "not a scalar:", until->field);
     }
     sim->until_field = sim->instances[index].data + field->offset;
     sim->until_type = field->type;
     return 0;
 }
 
-/* ---- connections ------------------------------------------------------------------------------------------------------- */
-
-static int same_kind(const fcsl_field_t *a, const fcsl_field_t *b)
-{
-    if (a->type != b->type || a->rank != b->rank) {
-        return 0;
-    }
-    for (uint32_t i = 0; i < a->rank; i++) {
-        if (a->shape[i] != b->shape[i]) {
-            return 0;
-        }
-    }
-    return !a->unit[0] || !b->unit[0] || strcmp(a->unit, b->unit) == 0;
-}
-
-static int check_pair(const fcsl_plan_link_t *link, const fcsl_field_t *from, const fcsl_field_t *to,
-                      fcsl_error_t *error)
-{
-    if (same_kind(from, to)) {
-        return 0;
-    }
-    return fcsl_sim_fail(error, "plan line %u: `%s` and `%s` differ in type, shape or unit", link->line,
-                         link->from_field, link->to_field);
-}
-
-/* The companion of a connection; null: the first controller. Returns 0, or -1. */
-static int find_companion(const fcsl_sim_t *sim, const fcsl_plan_link_t *link, fcsl_companion_t **companion,
-                          fcsl_error_t *error)
-{
-    *companion = NULL;
-    for (uint32_t i = 0; link->companion && i < sim->companion_count; i++) {
-        if (strcmp(sim->companions[i].name, link->companion) == 0) {
-            *companion = &sim->companions[i];
-        }
-    }
-    return link->companion && !*companion ? bad(error, link->line, "no controller", link->companion) : 0;
-}
-
-static int find_channel(const fcsl_machine_t *machine, uint32_t line, const char *name, fcsl_direction_t direction,
-                        uint32_t *channel, fcsl_error_t *error)
-{
-    for (uint32_t i = 0; i < machine->channel_count; i++) {
-        if (strcmp(machine->channels[i].name, name) != 0) {
-            continue;
-        }
-        if (machine->channels[i].direction != direction) {
-            return bad(error, line, "wrong direction of channel", name);
-        }
-        *channel = i;
-        return 0;
-    }
-    return bad(error, line, "the machine has no channel", name);
-}
-
-static const fcsl_field_t *find_machine_field(const fcsl_sim_t *sim, uint32_t line, const char *path,
-                                              fcsl_error_t *error)
-{
-    for (uint32_t i = 0; i < sim->machine->field_count; i++) {
-        if (strcmp(sim->machine->fields[i].path, path) == 0) {
-            return &sim->machine->fields[i];
-        }
-    }
-    (void)bad(error, line, "the machine has no field", path);
-    return NULL;
-}
-
-/* What a controller gives: an actuator channel, or any field of the first one. */
-static const fcsl_field_t *find_source(fcsl_sim_t *sim, const fcsl_plan_link_t *link, int is_field, fcsl_copy_t *copy,
-                                       fcsl_error_t *error)
-{
-    fcsl_companion_t *companion = NULL;
-    uint32_t channel = 0;
-    copy->source = UINT32_MAX;
-    if (is_field) {
-        const fcsl_field_t *field = find_machine_field(sim, link->line, link->from_field, error);
-        copy->from = field ? (const uint8_t *)fcsl_run_data(sim->run) + field->offset : NULL;
-        sim->reads_fields = 1;
-        return field;
-    }
-    if (find_companion(sim, link, &companion, error)) {
-        return NULL;
-    }
-    const fcsl_machine_t *machine = companion ? companion->machine : sim->machine;
-    if (find_channel(machine, link->line, link->from_field, FCSL_ACTUATOR, &channel, error)) {
-        return NULL;
-    }
-    const fcsl_field_t *field = &machine->fields[machine->channels[channel].field];
-    copy->from = (companion ? companion->image : sim->image) + field->offset;
-    return field;
-}
-
-static int add_copy(fcsl_sim_t *sim, const fcsl_plan_link_t *link, int is_field, fcsl_error_t *error)
-{
-    fcsl_copy_t *copy = &sim->copies[sim->copy_count];
-    const fcsl_field_t *to = find_field(sim, link->line, link->to_instance, link->to_field, &copy->instance, error);
-    if (!to) {
-        return -1;
-    }
-    if (to->role != FCSL_ROLE_INPUT) {
-        return bad(error, link->line, "not an input:", link->to_field);
-    }
-    const fcsl_field_t *from;
-    if (link->from_instance) {
-        uint32_t source = 0;
-        from = find_field(sim, link->line, link->from_instance, link->from_field, &source, error);
-        if (!from) {
-            return -1;
-        }
-        if (from->role != FCSL_ROLE_OUTPUT) {
-            return bad(error, link->line, "not an output:", link->from_field);
-        }
-        const fcsl_instance_state_t *feeds = &sim->instances[source];
-        const fcsl_instance_state_t *fed = &sim->instances[copy->instance];
-        copy->is_inner = feeds->model->output != NULL && feeds->group == fed->group && fed->group != FCSL_PLAN_NO_GROUP;
-        copy->source = source;
-        copy->from = sim->instances[source].data + from->offset;
-    } else {
-        from = find_source(sim, link, is_field, copy, error);
-        if (!from) {
-            return -1;
-        }
-    }
-    if (check_pair(link, from, to, error)) {
-        return -1;
-    }
-    copy->to = sim->instances[copy->instance].data + to->offset;
-    copy->size = to->size;
-    for (uint32_t i = 0; i < sim->copy_count; i++) {
-        if (sim->copies[i].to == copy->to) {
-            return bad(error, link->line, "two sources for", link->to_field);
-        }
-    }
-    sim->copy_count++;
-    return 0;
-}
-
-static int by_instance(const void *left, const void *right)
-{
-    const fcsl_copy_t *a = left;
-    const fcsl_copy_t *b = right;
-    if (a->instance != b->instance) {
-        return a->instance < b->instance ? -1 : 1;
-    }
-    if (a->is_inner != b->is_inner) {
-        return a->is_inner < b->is_inner ? -1 : 1;
-    }
-    return a->to < b->to ? -1 : a->to > b->to;
-}
-
-static int build_copies(fcsl_sim_t *sim, fcsl_error_t *error)
-{
-    const fcsl_plan_t *plan = &sim->plan;
-    sim->copies = calloc(plan->link_count + plan->actuator_count + plan->read_count + 1u, sizeof *sim->copies);
-    if (!sim->copies) {
-        return fcsl_sim_fail(error, "no memory for the connections");
-    }
-    for (uint32_t i = 0; i < plan->link_count; i++) {
-        if (add_copy(sim, &plan->links[i], 0, error)) {
-            return -1;
-        }
-    }
-    for (uint32_t i = 0; i < plan->actuator_count; i++) {
-        if (add_copy(sim, &plan->actuators[i], 0, error)) {
-            return -1;
-        }
-    }
-    for (uint32_t i = 0; i < plan->read_count; i++) {
-        if (add_copy(sim, &plan->reads[i], 1, error)) {
-            return -1;
-        }
-    }
-    qsort(sim->copies, sim->copy_count, sizeof *sim->copies, by_instance);
-    for (uint32_t i = sim->copy_count; i-- > 0;) {
-        fcsl_instance_state_t *instance = &sim->instances[sim->copies[i].instance];
-        instance->first_copy = i;
-        instance->copy_count++;
-        instance->inner_count += sim->copies[i].is_inner;
-        instance->outer_count += !sim->copies[i].is_inner;
-    }
-    return 0;
-}
-
-/* Adds a sensor of the first controller, or of a companion. */
-static int add_sensor(fcsl_sim_t *sim, const fcsl_plan_link_t *link, fcsl_error_t *error)
-{
-    fcsl_companion_t *companion = NULL;
-    if (find_companion(sim, link, &companion, error)) {
-        return -1;
-    }
-    const fcsl_machine_t *machine = companion ? companion->machine : sim->machine;
-    fcsl_sensor_t *sensors = companion ? companion->sensors : sim->sensors;
-    uint32_t *count = companion ? &companion->sensor_count : &sim->sensor_count;
-    fcsl_sensor_t *sensor = &sensors[*count];
-    const fcsl_field_t *from =
-        find_field(sim, link->line, link->from_instance, link->from_field, &sensor->instance, error);
-    if (!from || find_channel(machine, link->line, link->to_field, FCSL_SENSOR, &sensor->channel, error)) {
-        return -1;
-    }
-    if (from->role != FCSL_ROLE_OUTPUT) {
-        return bad(error, link->line, "not an output:", link->from_field);
-    }
-    const fcsl_field_t *to = &machine->fields[machine->channels[sensor->channel].field];
-    if (check_pair(link, from, to, error)) {
-        return -1;
-    }
-    for (uint32_t j = 0; j < *count; j++) {
-        if (sensors[j].channel == sensor->channel) {
-            return bad(error, link->line, "two sources for channel", link->to_field);
-        }
-    }
-    sensor->from = sim->instances[sensor->instance].data + from->offset;
-    sensor->to = (companion ? companion->image : sim->image) + to->offset;
-    sensor->size = to->size;
-    (*count)++;
-    return 0;
-}
-
-static int build_sensors(fcsl_sim_t *sim, fcsl_error_t *error)
-{
-    const fcsl_plan_t *plan = &sim->plan;
-    sim->sensors = calloc(plan->sensor_count + 1u, sizeof *sim->sensors);
-    int is_memory = sim->sensors != NULL;
-    for (uint32_t i = 0; i < sim->companion_count; i++) {
-        sim->companions[i].sensors = calloc(plan->sensor_count + 1u, sizeof *sim->sensors);
-        is_memory = is_memory && sim->companions[i].sensors != NULL;
-    }
-    if (!is_memory) {
-        return fcsl_sim_fail(error, "no memory for the sensors");
-    }
-    for (uint32_t i = 0; i < plan->sensor_count; i++) {
-        if (add_sensor(sim, &plan->sensors[i], error)) {
-            return -1;
-        }
-    }
-    return 0;
-}
-
-/* Outputs of models to fields of the hosted machine. */
-static int build_field_writes(fcsl_sim_t *sim, fcsl_error_t *error)
-{
-    const fcsl_plan_t *plan = &sim->plan;
-    sim->writes = calloc(plan->write_count + 1u, sizeof *sim->writes);
-    if (!sim->writes) {
-        return fcsl_sim_fail(error, "no memory for the connections");
-    }
-    for (uint32_t i = 0; i < plan->write_count; i++) {
-        const fcsl_plan_link_t *link = &plan->writes[i];
-        uint32_t source = 0;
-        const fcsl_field_t *from = find_field(sim, link->line, link->from_instance, link->from_field, &source, error);
-        const fcsl_field_t *to = from ? find_machine_field(sim, link->line, link->to_field, error) : NULL;
-        if (!to || check_pair(link, from, to, error)) {
-            return -1;
-        }
-        if (from->role != FCSL_ROLE_OUTPUT || (to->flags & FCSL_FIELD_WRITABLE) == 0) {
-            return bad(error, link->line, "not from an output to a field that a host may write:", link->to_field);
-        }
-        sim->writes[sim->write_count++] = (fcsl_field_link_t){(uint32_t)(to - sim->machine->fields),
-                                                              sim->instances[source].data + from->offset, from->size};
-    }
-    return 0;
-}
+/* ---- all ---------------------------------------------------------------------------------------------------------------- */
 
 /* Whether an instance is of the model whose struct this library knows. */
 static int is_serial_link(const fcsl_model_t *model)
@@ -569,7 +309,8 @@ static int build_link(fcsl_sim_t *sim, fcsl_error_t *error)
             return sim->link ? 0 : fcsl_sim_fail(error, "no memory for the serial link");
         }
     }
-    return wanted->name ? bad(error, wanted->line, "no instance of " FCSL_SERIAL_LINK_NAME, wanted->name) : 0;
+    return wanted->name ? fcsl_sim_fail_line(error, wanted->line, "no instance of " FCSL_SERIAL_LINK_NAME, wanted->name)
+                        : 0;
 }
 
 int fcsl_assembly_build(fcsl_sim_t *sim, fcsl_error_t *error)
@@ -578,8 +319,7 @@ int fcsl_assembly_build(fcsl_sim_t *sim, fcsl_error_t *error)
         build_instances(sim, error)) {
         return -1;
     }
-    if (build_writes(sim, error) || build_copies(sim, error) || build_sensors(sim, error) ||
-        build_field_writes(sim, error) || fcsl_sim_build_groups(sim, error)) {
+    if (build_writes(sim, error) || fcsl_sim_build_connections(sim, error) || fcsl_sim_build_groups(sim, error)) {
         return -1;
     }
     return fcsl_actuators_build(sim, error) || build_link(sim, error) || fcsl_truth_build(sim, error) ? -1 : 0;

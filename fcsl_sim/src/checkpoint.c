@@ -214,7 +214,8 @@ static int is_companion_possible(const fcsl_companion_t *companion, const fcsl_s
     const uint64_t hz = companion->machine->tick_hz;
     const uint64_t tick = companion->tick;
     if (tick != fcsl_run_tick(companion->run) || tick / hz >= (uint64_t)INT64_MAX / FCSL_NS_PER_S ||
-        !are_channels_possible(companion->machine, companion->image, &companion->gate)) {
+        !are_channels_possible(companion->machine, companion->image, &companion->gate) ||
+        !fcsl_hw_sim_is_valid(fcsl_run_simulated_hardware(companion->run))) {
         return 0;
     }
     if (sim->tick == 0 || tick == 0) {
@@ -224,14 +225,9 @@ static int is_companion_possible(const fcsl_companion_t *companion, const fcsl_s
 }
 
 /* Where an instance is a machine, its struct holds what a machine may hold. */
-static int is_machine_possible(const fcsl_sim_t *sim, const fcsl_instance_state_t *instance)
+static int is_machine_possible(const fcsl_instance_state_t *instance)
 {
-    for (uint32_t i = 0; i < sim->plan.model_count; i++) {
-        if (sim->models[i] == instance->model && sim->machine_models[i]) {
-            return fcsl_machine_model_takes(sim->machine_models[i], instance->data);
-        }
-    }
-    return 1;
+    return !instance->machine || fcsl_machine_model_takes(instance->machine, instance->data);
 }
 
 /* Whether the restored plant is at one instant of this simulation. Its vectors and numbers may be any. */
@@ -244,7 +240,7 @@ static int is_possible(const fcsl_sim_t *sim, uint64_t machine_tick)
         const fcsl_model_t *model = sim->instances[i].model;
         possible = is_update_possible(sim, i, now_ns) &&
                    are_bools(model->fields, model->field_count, sim->instances[i].data) &&
-                   is_machine_possible(sim, &sim->instances[i]);
+                   is_machine_possible(&sim->instances[i]);
     }
     for (uint32_t i = 0; possible && i < sim->companion_count; i++) {
         possible = is_companion_possible(&sim->companions[i], sim);

@@ -3,22 +3,29 @@
  * Where a simulation is, for whoever finds that it crashes or hangs.
  */
 #define _GNU_SOURCE
+#include <sched.h>
 #include <signal.h>
 #include <stdlib.h>
 #include <string.h>
 #include <unistd.h>
 
+#include "clock.h"
 #include "fail.h"
 #include "sim_internal.h"
 
 enum { STACK_BYTES = 1 << 16, TEXT_BYTES = 1024, EXIT_FAILED = 2 };
 
 static const int SIGNALS[] = {SIGSEGV, SIGBUS, SIGFPE, SIGILL, SIGABRT};
+#define SIGNAL_COUNT (sizeof SIGNALS / sizeof *SIGNALS)
 static const char *const FUNCTIONS[] = {"", "init", "derivative", "output", "update", "event", "reset"};
 
 /* The simulation that was opened last, since the handlers are those of the process. */
 static const fcsl_sim_t *_Atomic current;
+/* Threads that look into it: it is not freed meanwhile. */
+static _Atomic uint32_t looking;
 static volatile sig_atomic_t as_json;
+static struct sigaction previous[SIGNAL_COUNT];
+static int watching;
 
 void fcsl_sim_is_open(const fcsl_sim_t *sim, int is_open)
 {
@@ -27,25 +34,36 @@ void fcsl_sim_is_open(const fcsl_sim_t *sim, int is_open)
         atomic_store(&current, sim);
     } else {
         (void)atomic_compare_exchange_strong(&current, &before, NULL);
+        while (atomic_load(&looking) > 0) {
+            (void)sched_yield();
+        }
     }
 }
 
-static const char *place_of(const fcsl_sim_t *sim, const char **function, uint64_t *entry)
+static void look_into(const fcsl_sim_t *sim, fcsl_sim_place_t *at)
 {
     const uint64_t place = atomic_load_explicit(&sim->place, memory_order_relaxed);
     const uint32_t instance = (uint32_t)(place >> 8) & 0xffffu;
     const uint32_t number = (uint32_t)(place & 0xffu);
-    *entry = place;
-    *function = FUNCTIONS[number < sizeof FUNCTIONS / sizeof *FUNCTIONS ? number : 0];
-    return number != FCSL_IN_NONE && instance < sim->instance_count ? sim->instances[instance].name : NULL;
+    at->entry = place;
+    at->function = FUNCTIONS[number < sizeof FUNCTIONS / sizeof *FUNCTIONS ? number : 0];
+    at->time_ns = sim->time_ns;
+    const char *name = number != FCSL_IN_NONE && instance < sim->instance_count ? sim->instances[instance].name : "";
+    for (uint32_t i = 0; name[i] && i + 1u < sizeof at->instance; i++) {
+        at->instance[i] = name[i];
+    }
 }
 
-const char *fcsl_sim_place(const char **function, uint64_t *entry, int64_t *time_ns)
+int fcsl_sim_place(fcsl_sim_place_t *at)
 {
+    *at = (fcsl_sim_place_t){.function = ""};
+    (void)atomic_fetch_add(&looking, 1u);
     const fcsl_sim_t *sim = atomic_load(&current);
-    const char *instance = sim ? place_of(sim, function, entry) : NULL;
-    *time_ns = instance ? sim->time_ns : 0;
-    return instance;
+    if (sim) {
+        look_into(sim, at);
+    }
+    (void)atomic_fetch_sub(&looking, 1u);
+    return at->instance[0] != '\0';
 }
 
 /* Text without the C library's printf, which a crash may have interrupted. */
@@ -71,38 +89,45 @@ static void put_digits(line_t *line, uint64_t value, uint32_t digits)
     put(line, at);
 }
 
-static void put_crash(line_t *line, int number, const char *instance, const char *function, int64_t time_ns)
+static void put_crash(line_t *line, int number, const fcsl_sim_place_t *at)
 {
     put(line, "`");
-    put(line, function);
+    put(line, at->function);
     put(line, "` of `");
-    put(line, instance);
+    put(line, at->instance);
     put(line, "` crashed at ");
-    put_digits(line, (uint64_t)time_ns / 1000000000u, 1);
+    put_digits(line, (uint64_t)at->time_ns / FCSL_NS_PER_S, 1);
     put(line, ".");
-    put_digits(line, (uint64_t)time_ns % 1000000000u, 9);
+    put_digits(line, (uint64_t)at->time_ns % FCSL_NS_PER_S, 9);
     put(line, " s: SIG");
     put(line, sigabbrev_np(number));
 }
 
+/* The handlers before ours, such as those of Python's faulthandler. */
+static int give_back(void)
+{
+    int failed = 0;
+    for (uint32_t i = 0; i < SIGNAL_COUNT; i++) {
+        failed = sigaction(SIGNALS[i], &previous[i], NULL) != 0 || failed;
+    }
+    return failed ? -1 : 0;
+}
+
 static void handle(int number)
 {
-    const char *function = "";
-    uint64_t entry = 0;
-    int64_t time_ns = 0;
-    const char *instance = fcsl_sim_place(&function, &entry, &time_ns);
-    if (!instance) { /* no model runs: as if nobody watched */
-        (void)signal(number, SIG_DFL);
+    fcsl_sim_place_t at;
+    if (!fcsl_sim_place(&at)) { /* no model runs: as if nobody watched */
+        (void)give_back();
         (void)raise(number);
         return;
     }
     line_t message = {.used = 0};
     line_t json = {.used = 0};
     put(&message, "fcsl-sim: error: ");
-    put_crash(&message, number, instance, function, time_ns);
+    put_crash(&message, number, &at);
     put(&message, "\n");
     put(&json, "{\"end\": \"error\", \"error\": \"");
-    put_crash(&json, number, instance, function, time_ns);
+    put_crash(&json, number, &at);
     put(&json, "\"}\n");
     ssize_t written = write(STDERR_FILENO, message.text, message.used);
     if (as_json) {
@@ -112,7 +137,7 @@ static void handle(int number)
     _exit(EXIT_FAILED);
 }
 
-int fcsl_sim_watch_crashes(int watch, int json, fcsl_error_t *error)
+static int take(fcsl_error_t *error)
 {
     static uint8_t *stack;
     if (!stack) {
@@ -122,13 +147,26 @@ int fcsl_sim_watch_crashes(int watch, int json, fcsl_error_t *error)
     if (!stack || sigaltstack(&alternate, NULL) != 0) {
         return fcsl_sim_fail(error, "no memory for the handler of crashes");
     }
-    as_json = json;
-    struct sigaction action = {.sa_handler = watch ? handle : SIG_DFL, .sa_flags = SA_ONSTACK};
+    struct sigaction action = {.sa_handler = handle, .sa_flags = SA_ONSTACK};
     (void)sigemptyset(&action.sa_mask);
-    for (uint32_t i = 0; i < sizeof SIGNALS / sizeof *SIGNALS; i++) {
-        if (sigaction(SIGNALS[i], &action, NULL) != 0) {
+    for (uint32_t i = 0; i < SIGNAL_COUNT; i++) {
+        if (sigaction(SIGNALS[i], &action, &previous[i]) != 0) {
             return fcsl_sim_fail(error, "the handler of crashes cannot be installed");
         }
+    }
+    watching = 1;
+    return 0;
+}
+
+int fcsl_sim_watch_crashes(int watch, int json, fcsl_error_t *error)
+{
+    as_json = json;
+    if (watch && !watching) {
+        return take(error);
+    }
+    if (!watch && watching) {
+        watching = 0;
+        return give_back() == 0 ? 0 : fcsl_sim_fail(error, "the handlers before cannot be installed again");
     }
     return 0;
 }

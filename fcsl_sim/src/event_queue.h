@@ -11,7 +11,6 @@
 typedef struct {
     int64_t time_ns;
     uint64_t sequence; /* set by push */
-    uint64_t step;     /* for the caller: step of the grid */
     uint32_t priority; /* smaller comes first */
     uint32_t kind;     /* for the caller */
     uint32_t index;    /* for the caller */

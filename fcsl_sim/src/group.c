@@ -13,8 +13,6 @@
 #include "fail.h"
 #include "sim_internal.h"
 
-static const double NS_PER_S = 1e9;
-
 /* ---- states of models ------------------------------------------------------------------------------------------------ */
 
 static double *states_of(const fcsl_instance_state_t *instance)
@@ -76,7 +74,7 @@ int fcsl_group_check_finite(const fcsl_group_t *group, const double *x, int64_t 
             char name[FCSL_PLACE_BYTES];
             fcsl_group_name_state(group, i, name, sizeof name);
             return fcsl_sim_fail(error, "%s became %g at %.9f s", name, isnan(x[i]) ? (double)NAN : x[i],
-                                 (double)time_ns / NS_PER_S);
+                                 (double)time_ns / FCSL_NS_PER_S);
         }
     }
     return 0;
@@ -146,7 +144,7 @@ double fcsl_group_time_s(const fcsl_group_t *group)
 {
     const fcsl_group_state_t *state = &group->state;
     const int on_grid = group->plan->hz > 0 && state->time_ns == state->begin_ns;
-    return on_grid ? (double)state->step / (double)group->plan->hz : (double)state->time_ns / NS_PER_S;
+    return on_grid ? (double)state->step / (double)group->plan->hz : (double)state->time_ns / FCSL_NS_PER_S;
 }
 
 /* To the next step of the grid. Its times are those of fcsl_grid_time_ns, without a division. */
@@ -197,7 +195,7 @@ static step_t next_step(const fcsl_group_t *group, int64_t time_ns)
     const double hz = (double)group->plan->hz;
     const int reaches_end = time_ns >= state->end_ns;
     const double t = fcsl_group_time_s(group);
-    const double end = reaches_end ? (double)(state->step + 1u) / hz : (double)time_ns / NS_PER_S;
+    const double end = reaches_end ? (double)(state->step + 1u) / hz : (double)time_ns / FCSL_NS_PER_S;
     if (state->time_ns == state->begin_ns && reaches_end) {
         return (step_t){t, 1.0 / hz, end, state->end_ns - state->begin_ns, 1};
     }
@@ -206,7 +204,8 @@ static step_t next_step(const fcsl_group_t *group, int64_t time_ns)
 
 static void probe_fixed(fcsl_group_t *group, int64_t offset_ns, double *x)
 {
-    fcsl_integrator_step(&group->integrator, fcsl_group_time_s(group), (double)offset_ns / NS_PER_S, 0, group->x, x);
+    fcsl_integrator_step(&group->integrator, fcsl_group_time_s(group), (double)offset_ns / FCSL_NS_PER_S, 0, group->x,
+                         x);
 }
 
 static void move_to(fcsl_group_t *group, int64_t time_ns)
@@ -243,7 +242,7 @@ static int step_fixed(fcsl_group_t *group, int64_t time_ns, fcsl_error_t *error)
         length_ns = fcsl_group_locate(group, from_ns, step.length_ns, probe_fixed);
         if (length_ns < step.length_ns) {
             probe_fixed(group, length_ns, group->x1);
-            if (fcsl_group_events(group, (double)(from_ns + length_ns) / NS_PER_S, group->x1, group->g1, error)) {
+            if (fcsl_group_events(group, (double)(from_ns + length_ns) / FCSL_NS_PER_S, group->x1, group->g1, error)) {
                 return -1;
             }
         }

@@ -6,16 +6,16 @@
 #include <math.h>
 #include <string.h>
 
+#include "clock.h"
 #include "fail.h"
 #include "group.h"
 #include "sim_internal.h"
 
-static const double NS_PER_S = 1e9;
 enum { REJECTED_MAX = 200 }; /* each makes the step smaller by 10 % at least */
 
 static double step_s(const fcsl_group_t *group)
 {
-    return (double)(group->state.to_ns - group->state.from_ns) / NS_PER_S;
+    return (double)(group->state.to_ns - group->state.from_ns) / FCSL_NS_PER_S;
 }
 
 static void probe_adaptive(fcsl_group_t *group, int64_t offset_ns, double *x)
@@ -28,7 +28,7 @@ static void probe_adaptive(fcsl_group_t *group, int64_t offset_ns, double *x)
 static int64_t length_ns(const fcsl_group_t *group, double seconds, int64_t barrier_ns)
 {
     const int64_t room_ns = barrier_ns - group->state.time_ns;
-    const double wanted_ns = floor(seconds * NS_PER_S);
+    const double wanted_ns = floor(seconds * FCSL_NS_PER_S);
     if (wanted_ns >= (double)room_ns) {
         return room_ns;
     }
@@ -41,7 +41,7 @@ static int64_t length_ns(const fcsl_group_t *group, double seconds, int64_t barr
 static int too_small(const fcsl_group_t *group, double h, double error, uint32_t worst, fcsl_error_t *why)
 {
     char name[FCSL_PLACE_BYTES];
-    const double t = (double)group->state.time_ns / NS_PER_S;
+    const double t = (double)group->state.time_ns / FCSL_NS_PER_S;
     fcsl_group_name_state(group, worst, name, sizeof name);
     if (isnan(error)) {
         return fcsl_sim_fail(why, "%s has no finite value behind %.9f s, even with a step of %g s", name, t, h);
@@ -58,7 +58,7 @@ static int make_step(fcsl_group_t *group, int64_t barrier_ns, fcsl_error_t *erro
 {
     fcsl_group_state_t *state = &group->state;
     const fcsl_plan_group_t *plan = group->plan;
-    const double t = (double)state->time_ns / NS_PER_S;
+    const double t = (double)state->time_ns / FCSL_NS_PER_S;
     if (state->next_s == 0.0) {
         state->next_s =
             fcsl_rk45_first_step(&group->integrator, t, group->x, group->atol, plan->rtol, plan->max_step_s);
@@ -66,7 +66,7 @@ static int make_step(fcsl_group_t *group, int64_t barrier_ns, fcsl_error_t *erro
     int rejected = 0;
     for (double wanted_s = state->next_s; rejected < REJECTED_MAX; rejected++) {
         const int64_t ns = length_ns(group, wanted_s > plan->min_step_s ? wanted_s : plan->min_step_s, barrier_ns);
-        const double h = (double)ns / NS_PER_S;
+        const double h = (double)ns / FCSL_NS_PER_S;
         uint32_t worst = 0;
         const double size =
             fcsl_rk45_step(&group->integrator, t, h, group->x, group->x1, group->atol, plan->rtol, &worst);
@@ -96,7 +96,7 @@ static int find_event(fcsl_group_t *group, fcsl_error_t *error)
     if (group->event_count == 0) {
         return 0;
     }
-    if (fcsl_group_events(group, (double)state->to_ns / NS_PER_S, group->x1, group->g1, error)) {
+    if (fcsl_group_events(group, (double)state->to_ns / FCSL_NS_PER_S, group->x1, group->g1, error)) {
         return -1;
     }
     if (fcsl_group_any_crosses(group, group->g, group->g1)) {

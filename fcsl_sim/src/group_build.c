@@ -105,6 +105,16 @@ static int add_members(fcsl_sim_t *sim, fcsl_group_t *group, uint32_t number, fc
     return 0;
 }
 
+static void add_once(uint32_t *list, uint32_t *count, uint32_t item)
+{
+    for (uint32_t i = 0; i < *count; i++) {
+        if (list[i] == item) {
+            return;
+        }
+    }
+    list[(*count)++] = item;
+}
+
 /* Inputs from outside; what is updated to change them ends a step. */
 static void add_outer(const fcsl_sim_t *sim, fcsl_group_t *group, uint32_t number)
 {
@@ -114,24 +124,11 @@ static void add_outer(const fcsl_sim_t *sim, fcsl_group_t *group, uint32_t numbe
             continue;
         }
         group->outer[group->outer_count++] = i;
-        int known = copy->source == UINT32_MAX || sim->instances[copy->source].group == number;
-        for (uint32_t k = 0; k < group->timed_count; k++) {
-            known = known || group->timed[k] == copy->source;
-        }
-        if (!known && sim->instances[copy->source].model->update) {
-            group->timed[group->timed_count++] = copy->source;
+        if (copy->source != UINT32_MAX && sim->instances[copy->source].group != number &&
+            sim->instances[copy->source].model->update) {
+            add_once(group->timed, &group->timed_count, copy->source);
         }
     }
-}
-
-static void add_once(uint32_t *list, uint32_t *count, uint32_t item)
-{
-    for (uint32_t i = 0; i < *count; i++) {
-        if (list[i] == item) {
-            return;
-        }
-    }
-    list[(*count)++] = item;
 }
 
 /* Who reads outputs of the group at instants of its own: updates of others, and controllers. */
@@ -151,8 +148,7 @@ static void add_readers(const fcsl_sim_t *sim, fcsl_group_t *group, uint32_t num
             group->companions[c] |= sim->instances[companion->sensors[i].instance].group == number;
         }
         for (uint32_t i = 0; i < group->outer_count; i++) {
-            const uint8_t *from = sim->copies[group->outer[i]].from;
-            group->companions[c] |= from >= companion->image && from < companion->image + companion->machine->size;
+            group->companions[c] |= sim->copies[group->outer[i]].companion == companion;
         }
     }
 }

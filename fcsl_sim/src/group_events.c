@@ -5,12 +5,12 @@
 #include <math.h>
 #include <string.h>
 
+#include "clock.h"
 #include "fail.h"
 #include "group.h"
 #include "sim_internal.h"
 
 enum { ROUNDS_MAX = 64 }; /* a step of 2^63 ns is halved 63 times */
-static const double NS_PER_S = 1e9;
 
 /* The instance and the number of an event of the group. */
 static const fcsl_instance_state_t *instance_of(const fcsl_group_t *group, uint32_t event, uint32_t *number)
@@ -74,7 +74,7 @@ static void look(search_t *search, int64_t offset_ns)
     fcsl_group_t *group = search->group;
     search->probe(group, offset_ns, group->probe);
     /* A NaN here counts as not yet; where the search ends it is found again. */
-    (void)fcsl_group_events(group, (double)(search->from_ns + offset_ns) / NS_PER_S, group->probe, group->g_probe,
+    (void)fcsl_group_events(group, (double)(search->from_ns + offset_ns) / FCSL_NS_PER_S, group->probe, group->g_probe,
                             NULL);
     const double value = group->g_probe[search->event];
     if (fcsl_group_crosses(group, search->event, group->g[search->event], value)) {
@@ -175,7 +175,7 @@ static int check_chatter(fcsl_group_t *group, uint32_t event, fcsl_error_t *erro
     return fcsl_sim_fail(error,
                          "chattering at %.9f s: event `%s` of `%s` is the last of %u in a row, each at most %u ns "
                          "after the one before; let `reset` change a state that ends this, such as a ball at rest",
-                         (double)state->time_ns / NS_PER_S, instance->model->events[number].name, instance->name,
+                         (double)state->time_ns / FCSL_NS_PER_S, instance->model->events[number].name, instance->name,
                          FCSL_CHATTER_EVENTS, FCSL_CHATTER_NS);
 }
 

@@ -28,14 +28,6 @@ void fcsl_integrator_restart(fcsl_integrator_t *integrator)
     integrator->kept = 0;
 }
 
-static void find_slope(fcsl_integrator_t *integrator, double t, const double *x0)
-{
-    if (!integrator->has_slope) {
-        integrator->slope(integrator->context, t, x0, integrator->k[0]);
-        integrator->has_slope = 1;
-    }
-}
-
 /* x1 = x0 + h*k1: first order. */
 static void step_euler(const fcsl_integrator_t *at, double h, const double *x0, double *x1)
 {
@@ -146,7 +138,7 @@ static void step_verlet(const fcsl_integrator_t *at, double t, double h, const d
 
 void fcsl_integrator_step(fcsl_integrator_t *integrator, double t, double h, int regular, const double *x0, double *x1)
 {
-    find_slope(integrator, t, x0);
+    fcsl_integrator_find_slope(integrator, t, x0);
     switch (integrator->method) {
     case FCSL_EULER:
         step_euler(integrator, h, x0, x1);

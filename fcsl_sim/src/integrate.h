@@ -52,6 +52,14 @@ void fcsl_integrator_init(fcsl_integrator_t *integrator, fcsl_method_t method, u
 
 /* Forgets what was carried over: after a jump of a state or an input. */
 void fcsl_integrator_restart(fcsl_integrator_t *integrator);
+/* The derivative at the present, where the step before has not left it. */
+static inline void fcsl_integrator_find_slope(fcsl_integrator_t *integrator, double t, const double *x0)
+{
+    if (!integrator->has_slope) {
+        integrator->slope(integrator->context, t, x0, integrator->k[0]);
+        integrator->has_slope = 1;
+    }
+}
 
 /* x1 from x0 at t, h seconds later, by a method of fixed steps; two vectors. Any number of steps may be tried from one x0, with
  * other h; AB4 uses its history for a `regular` one only, whose size is that of the steps before, and RK4 else. */

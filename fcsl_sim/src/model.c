@@ -202,6 +202,27 @@ static const char *check_places(const fcsl_model_t *model)
     return NULL;
 }
 
+/* Whether two outputs are the same member of a ROS 2 message, in which `.` becomes `_`. */
+static int is_same_member(const char *a, const char *b)
+{
+    for (; *a && (*a == '.' ? '_' : *a) == (*b == '.' ? '_' : *b); a++) {
+        b++;
+    }
+    return *a == *b;
+}
+
+/* An output before field number `last` that is the same member as that, or null. */
+static const fcsl_field_t *same_member(const fcsl_model_t *model, uint32_t last)
+{
+    for (uint32_t i = 0; model->fields[last].role == FCSL_ROLE_OUTPUT && i < last; i++) {
+        const fcsl_field_t *field = &model->fields[i];
+        if (field->role == FCSL_ROLE_OUTPUT && is_same_member(field->path, model->fields[last].path)) {
+            return field;
+        }
+    }
+    return NULL;
+}
+
 int fcsl_model_check(const fcsl_model_t *model, const char *library, fcsl_error_t *error)
 {
     const char *wrong = check_descriptor(model);
@@ -219,6 +240,11 @@ int fcsl_model_check(const fcsl_model_t *model, const char *library, fcsl_error_
         }
         if (fcsl_model_field(model, field->path) != field) {
             return fcsl_sim_fail(error, "%s: model `%s`: field `%s` is there twice", library, model->name, field->path);
+        }
+        const fcsl_field_t *other = same_member(model, i);
+        if (other) {
+            return fcsl_sim_fail(error, "%s: model `%s`: `%s` and `%s` have the same name in a message", library,
+                                 model->name, other->path, field->path);
         }
     }
     wrong = check_places(model);

@@ -88,6 +88,9 @@ static int on_group(parser_t *parser)
     if (group->hz == 0 && !(group->max_step_s > 0.0 && group->atol > 0.0)) {
         return bad(parser, "the largest step and the absolute tolerance are not above 0");
     }
+    if (group->hz == 0 && group->min_step_s > group->max_step_s) {
+        return bad(parser, "the smallest step is above the largest");
+    }
     return 0;
 }
 
@@ -261,7 +264,6 @@ static int take_delay(const parser_t *parser, const char *word, uint32_t *ticks)
 
 static int on_delay(parser_t *parser)
 {
-    parser->plan->delay_line = parser->line;
     return take_delay(parser, parser->word[1], &parser->plan->delay_ticks);
 }
 

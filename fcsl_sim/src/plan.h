@@ -131,7 +131,6 @@ typedef struct {
     uint64_t seed;
     uint32_t ticks_line;
     uint64_t ticks;
-    uint32_t delay_line;
     uint32_t delay_ticks;
     fcsl_plan_companion_t *companions;
     uint32_t companion_count;

@@ -67,8 +67,8 @@ static void change_inputs(const fcsl_model_t *model, uint8_t *data)
                 memcpy(&single, at, sizeof single);
                 single += 0.75f;
                 memcpy(at, &single, sizeof single);
-            } else if (field->type == FCSL_BOOL) {
-                data[field->offset + k] ^= 1u;
+            } else { /* the lowest bit, the first byte in memory */
+                data[field->offset + (size_t)k * fcsl_scalar_size(field->type)] ^= 1u;
             }
         }
     }
@@ -196,25 +196,34 @@ static int check_argument(const trial_t *trial, fcsl_error_t *error)
     return 0;
 }
 
-/* Whether `output` writes all outputs that are doubles. */
-static int check_outputs_written(const trial_t *trial, fcsl_error_t *error)
+/* Whether `output` writes the double at this offset. */
+static int is_written(const trial_t *trial, size_t offset)
 {
     static const double marks[2] = {0x1.23456789p-300, 0x1.3456789ap-300};
     const fcsl_model_t *model = trial->instance->model;
+    int kept = 0;
+    for (int pass = 0; pass < 2; pass++) {
+        memcpy(trial->after, trial->before, model->size);
+        memcpy(trial->after + offset, &marks[pass], sizeof marks[pass]);
+        model->output(trial->after, 0.0, states_in(model, trial->after));
+        kept += memcmp(trial->after + offset, &marks[pass], sizeof marks[pass]) == 0;
+    }
+    return kept < 2;
+}
+
+/* Whether `output` writes all outputs that are doubles. */
+static int check_outputs_written(const trial_t *trial, fcsl_error_t *error)
+{
+    const fcsl_model_t *model = trial->instance->model;
     for (uint32_t i = 0; i < model->field_count; i++) {
         const fcsl_field_t *field = &model->fields[i];
-        if (field->role != FCSL_ROLE_OUTPUT || field->type != FCSL_F64) {
-            continue;
-        }
-        int kept = 0;
-        for (int pass = 0; pass < 2; pass++) {
-            memcpy(trial->after, trial->before, model->size);
-            memcpy(trial->after + field->offset, &marks[pass], sizeof marks[pass]);
-            model->output(trial->after, 0.0, states_in(model, trial->after));
-            kept += memcmp(trial->after + field->offset, &marks[pass], sizeof marks[pass]) == 0;
-        }
-        if (kept == 2) {
-            return fcsl_sim_fail(error, "`output` of model `%s` does not write `%s`", model->name, field->path);
+        for (uint32_t k = 0; field->role == FCSL_ROLE_OUTPUT && field->type == FCSL_F64 && k < field->count; k++) {
+            const size_t offset = field->offset + (size_t)k * sizeof(double);
+            if (!is_written(trial, offset)) {
+                char name[FCSL_PLACE_BYTES];
+                fcsl_sim_name_place(trial->instance, offset, name, sizeof name);
+                return fcsl_sim_fail(error, "`output` of model `%s` does not write %s", model->name, name);
+            }
         }
     }
     return 0;

@@ -63,10 +63,7 @@ static double tolerance(double atol, double rtol, double x0, double x1)
 double fcsl_rk45_step(fcsl_integrator_t *integrator, double t, double h, const double *x0, double *x1,
                       const double *atol, double rtol, uint32_t *worst)
 {
-    if (!integrator->has_slope) {
-        integrator->slope(integrator->context, t, x0, integrator->k[0]);
-        integrator->has_slope = 1;
-    }
+    fcsl_integrator_find_slope(integrator, t, x0);
     for (uint32_t s = 1; s < STAGES; s++) {
         combine(integrator, h, A[s], s, x0, integrator->stage);
         integrator->slope(integrator->context, t + C[s] * h, integrator->stage, integrator->k[s]);
@@ -126,10 +123,7 @@ double fcsl_rk45_first_step(fcsl_integrator_t *integrator, double t, const doubl
 {
     const uint32_t n = integrator->n;
     double *k = integrator->k[1];
-    if (!integrator->has_slope) {
-        integrator->slope(integrator->context, t, x0, integrator->k[0]);
-        integrator->has_slope = 1;
-    }
+    fcsl_integrator_find_slope(integrator, t, x0);
     const double d0 = norm(x0, x0, n, atol, rtol);
     const double d1 = norm(x0, integrator->k[0], n, atol, rtol);
     double h0 = d0 < 1e-5 || d1 < 1e-5 ? 1e-6 : 0.01 * d0 / d1;

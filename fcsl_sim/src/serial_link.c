@@ -7,6 +7,7 @@
 #include <stdlib.h>
 #include <string.h>
 
+#include "clock.h"
 #include "fcsl/fcsl_cobs.h"
 #include "fcsl/fcsl_link.h"
 
@@ -22,7 +23,6 @@ enum {
     BITS_PER_BYTE_ON_LINE = 10,
     BITS_PER_BYTE = 8
 };
-static const double NS_PER_S = 1e9;
 static const double DURATION_MAX_S = 3600.0;
 
 /* A COBS frame on its way. */
@@ -92,7 +92,7 @@ static void flip_some(fcsl_sim_link_t *link, uint8_t *bytes, uint32_t size)
 static int64_t duration_ns(double seconds)
 {
     const double within = seconds < DURATION_MAX_S ? seconds : DURATION_MAX_S;
-    return seconds > 0.0 ? (int64_t)(within * NS_PER_S) : 0;
+    return seconds > 0.0 ? (int64_t)(within * FCSL_NS_PER_S) : 0;
 }
 
 /* A frame leaves. What is lost takes its time, too. */

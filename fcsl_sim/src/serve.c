@@ -27,7 +27,7 @@ static void set(void *ctx, uint32_t block, uint32_t number, uint32_t element, co
     const struct fcsl_sim_published *published = sim->published;
     const fcsl_field_t *field = &published->blocks[block].fields[number];
     const uint32_t instance = block - published->first_model;
-    fcsl_error_t error; /* a field lies within its struct */
+    fcsl_error_t error; /* commands are executed between two ticks, and a field lies within its struct */
     (void)fcsl_sim_write(sim, instance, field->offset + element * fcsl_scalar_size(field->type), bytes, size, &error);
 }
 

@@ -24,8 +24,7 @@ static int64_t tick_ns(const fcsl_sim_t *sim, uint64_t tick)
 
 static int schedule_tick(fcsl_sim_t *sim, uint64_t tick)
 {
-    const fcsl_event_t event = {
-        .time_ns = tick_ns(sim, tick), .kind = EVENT_TICK, .step = tick, .priority = PRIORITY_TICK};
+    const fcsl_event_t event = {.time_ns = tick_ns(sim, tick), .kind = EVENT_TICK, .priority = PRIORITY_TICK};
     return fcsl_event_queue_push(&sim->queue, event);
 }
 
@@ -348,6 +347,7 @@ int fcsl_sim_sense_message(fcsl_sim_t *sim, uint8_t *bytes, size_t capacity, fcs
     sim->failed = 1;
     for (int ticked = 0; !ticked;) { /* the next tick is in the queue, with finitely many events before it */
         if (do_instant(sim, &ticked, error)) {
+            fcsl_sim_enter(sim, 0, FCSL_IN_NONE);
             return -1;
         }
     }

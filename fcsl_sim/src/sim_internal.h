@@ -26,6 +26,7 @@ typedef struct {
     uint32_t size;
     uint32_t instance; /* instance of the input */
     uint32_t source;   /* of the output; UINT32_MAX: a controller */
+    const fcsl_companion_t *companion; /* whose actuator it is; null: not a companion's */
     uint32_t is_inner; /* 1: an output that is evaluated whenever the input is used, within a group */
 } fcsl_copy_t;
 
@@ -48,6 +49,7 @@ typedef struct {
 typedef struct {
     const char *name; /* in the plan */
     const fcsl_model_t *model;
+    const fcsl_machine_model_t *machine; /* null: a plugin */
     uint8_t *data;
     fcsl_noise_t noise;
     uint32_t group;       /* or FCSL_PLAN_NO_GROUP */
@@ -263,6 +265,13 @@ void fcsl_sim_take_command(void *sim, const fcsl_message_t *command);
 /* assembly.c: the number of an instance; 0, or -1. */
 int fcsl_sim_find_instance(const fcsl_sim_t *sim, uint32_t line, const char *name, uint32_t *index,
                            fcsl_error_t *error);
+/* assembly.c: a field of an instance, or null. */
+const fcsl_field_t *fcsl_sim_find_field(const fcsl_sim_t *sim, uint32_t line, const char *name, const char *path,
+                                        uint32_t *index, fcsl_error_t *error);
+/* assembly.c: says what is wrong with a name in a line of the plan; returns -1. */
+int fcsl_sim_fail_line(fcsl_error_t *error, uint32_t line, const char *what, const char *name);
+/* connections.c */
+int fcsl_sim_build_connections(fcsl_sim_t *sim, fcsl_error_t *error);
 /* group_build.c: the order of calls, and the groups of models that integrate together. */
 int fcsl_sim_build_groups(fcsl_sim_t *sim, fcsl_error_t *error);
 /* assembly.c: zeroed memory for a struct, or null. */

@@ -100,8 +100,6 @@ int fcsl_sim_snapshot_restore(fcsl_sim_t *sim, const fcsl_sim_snapshot_t *snapsh
         return -1;
     }
     *fcsl_run_simulated_hardware(sim->run) = snapshot->hardware;
-    sim->failed = 0;
-    return fcsl_plant_state_restore(sim, snapshot->plant) == 0
-               ? 0
-               : fcsl_sim_fail(error, "a machine does not take its state");
+    sim->failed = fcsl_plant_state_restore(sim, snapshot->plant) != 0;
+    return sim->failed ? fcsl_sim_fail(error, "a machine does not take its state") : 0;
 }

@@ -17,7 +17,7 @@ void fcsl_sim_snapshot_free(fcsl_sim_snapshot_t *snapshot);
 /* Call both between two ticks only, when no sample is pending. */
 void fcsl_sim_snapshot_take(const fcsl_sim_t *sim, fcsl_sim_snapshot_t *snapshot);
 /* Restores the whole simulation to the saved moment, if `data` and `hardware` are its machine's. Returns 0, or -1 with
- * `error` and nothing changed. */
+ * `error`: then nothing has changed, or the simulation cannot go on. */
 int fcsl_sim_snapshot_restore(fcsl_sim_t *sim, const fcsl_sim_snapshot_t *snapshot, const void *data,
                               const fcsl_hw_sim_t *hardware, fcsl_error_t *error);
 

@@ -6,6 +6,7 @@ from __future__ import annotations
 import json
 import subprocess
 import sys
+import zlib
 from collections.abc import Callable
 from pathlib import Path
 from typing import Any
@@ -14,6 +15,7 @@ import pytest
 
 from fcsl_compiler.base.diagnostics import DiagnosticError
 from fcsl_sim import SimConfig, SimError, Simulation, load
+from fcsl_sim.sim_twin import SimTwin
 from simclient.bag import Bag, columns
 
 TEST = Path(__file__).resolve().parent
@@ -185,6 +187,33 @@ def test_a_companion_continues_from_a_checkpoint(load_two: Load) -> None:
             second.run(1)
             rest.append(second.get("b.outputs.free"))
     assert rest == whole[77:]
+
+
+def test_a_checkpoint_with_impossible_registers_is_refused(load_two: Load) -> None:
+    """Behind a right CRC: a register that the simulated hardware of the second controller does not count."""
+    config = load_two()
+    with Simulation(config.plan, config.tables) as sim:
+        sim.run(10)
+        good = sim.checkpoint()
+        # Its hardware: 1024 pins, 1024 counts, 1024 registers of 8 bytes, their count; all zero, as is what is around.
+        pins, size = 1024 + 4 * 1024, 1024 + 4 * 1024 + 8 * 1024 + 4
+        at = good.index(bytes(size))
+        around = len(good[at:]) - len(good[at:].lstrip(b"\0")) - size
+        assert around < 4096
+        wrong = bytearray(good)
+        wrong[at + around + pins] = 1
+        wrong[-4:] = zlib.crc32(wrong[:-4]).to_bytes(4, "little")
+        with pytest.raises(SimError, match="damaged"):
+            sim.restore_checkpoint(bytes(wrong))
+        assert sim.checkpoint() == good
+        sim.restore_checkpoint(good)
+
+
+def test_sources_have_the_names_of_their_controllers(load_two: Load, tmp_path: Path) -> None:
+    load_two()
+    with SimTwin.from_config(tmp_path / "two.sim.json") as twin:
+        assert twin.machine.fields["a.inputs.u"].connected_from == "one.u"
+        assert twin.machine.fields["b.inputs.u"].connected_from == "two.u"
 
 
 def wired(config: dict[str, Any]) -> None:

@@ -109,6 +109,11 @@ def test_groups_have_integrators_of_their_own(open_sim: Open) -> None:
         ({"method": "rk5", "hz": 100}, None, "E205: `method` cannot be `rk5`"),
         ({"method": "rk4", "hz": 150}, None, "E805: the integrator's 150 Hz is not a multiple of tick_hz (100)"),
         ({"method": "rk45", "atol": 0.0}, None, "E204: `atol` is 0"),
+        (
+            {"method": "rk45", "min_step_s": 1e-2, "max_step_s": 1e-3},
+            None,
+            "E804: `min_step_s` (0.01) is above `max_step_s` (0.001)",
+        ),
     ],
 )
 def test_integrators_that_are_refused(
@@ -201,6 +206,10 @@ def test_an_event_between_two_steps_splits_one(open_sim: Open) -> None:
     [
         ("IMPURE", "`output` of model `chain` changes a.state.calls, which is no output; states change in `update`"),
         ("SECRET", "model `chain`: `outputs.free` depends on an input of the same instant, and is not declared so"),
+        (
+            "SECRET_MODE",
+            "model `chain`: `outputs.free` depends on an input of the same instant, and is not declared so",
+        ),
     ],
 )
 def test_models_that_break_the_rules(macro: str, message: str, load_sim: Load) -> None:
@@ -320,7 +329,8 @@ def test_settings_without_an_effect_are_refused(load_sim: Load) -> None:
     ("macro", "message"),
     [
         ("FORGETS_DX", "`derivative` of model `chain` does not write dx[0], that of a.state.x"),
-        ("FORGETS_OUTPUT", "`output` of model `chain` does not write `outputs.free`"),
+        ("FORGETS_OUTPUT", "`output` of model `chain` does not write a.outputs.free"),
+        ("FORGETS_ELEMENT", "`output` of model `chain` does not write a.outputs.nested.both[1]"),
         ("WRITES_MORE", "`derivative` or `event` of model `chain` writes more values than the model has"),
     ],
 )

@@ -65,6 +65,16 @@ def test_a_model_that_hangs_is_named_and_the_bag_is_whole(write: Write, tmp_path
     assert info.returncode == 0, info.stdout + info.stderr
 
 
+def test_handlers_from_before_come_back(write: Write) -> None:
+    """Python's faulthandler, after a run that ends before the landing."""
+    program = (
+        "import ctypes, faulthandler, sys; faulthandler.enable(); from fcsl_sim.cli import main; "
+        f"assert main(['run', {str(LANDER / 'sim/lander.sim.json')!r}, '--duration', '1']) == 1; ctypes.string_at(0)"
+    )
+    done = subprocess.run([sys.executable, "-c", program], capture_output=True, text=True, timeout=120, check=False)
+    assert (done.returncode, "Fatal Python error: Segmentation fault" in done.stderr) == (-signal.SIGSEGV, True)
+
+
 @pytest.mark.parametrize("number", [signal.SIGTERM, signal.SIGINT])
 def test_a_signal_ends_a_model_that_hangs(number: signal.Signals, write: Write) -> None:
     line = [sys.executable, str(FCSL_SIM), "run", str(write(2))]

@@ -37,6 +37,7 @@ Open = Callable[..., Simulation]
         (11, "model `broken`: its continuous states lie outside the struct or unaligned"),
         (12, "model `broken`: it must have a derivative exactly when it has continuous states"),
         (13, "model `broken`: it has neither `output` nor `update`: nothing writes its outputs"),
+        (15, "model `broken`: `outputs.x.y` and `outputs.x_y` have the same name in a message"),
         (14, "not a model library (it does not export fcsl_models)"),
     ],
 )

@@ -397,7 +397,7 @@ def test_further_controllers_have_their_fields_below_their_names(tmp_path: Path)
         with pytest.raises(TwinError, match="read-only"):
             twin.set("spare.machine.tick", 0)
         assert twin.describe("spare.sensors.outputs.pos_z").connected_from == "altimeter.outputs.value"
-        assert twin.describe("lander.inputs.throttle").connected_from == "controller.throttle"
+        assert twin.describe("lander.inputs.throttle").connected_from == "main.throttle"
 
 
 # ---- checkpoints -----------------------------------------------------------------------------------------------------

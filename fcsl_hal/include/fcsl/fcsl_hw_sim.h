@@ -35,6 +35,9 @@ uint32_t fcsl_hw_sim_register(const fcsl_hw_sim_t *sim, uint32_t address);
 /* Returns 0, or -1 where FCSL_HW_SIM_COUNT others hold a value already. */
 int32_t fcsl_hw_sim_set_register(fcsl_hw_sim_t *sim, uint32_t address, uint32_t value);
 
+/* Whether these bytes, from a file, are one: pins are 0 or 1, and registers are in order. */
+int fcsl_hw_sim_is_valid(const fcsl_hw_sim_t *sim);
+
 /* The table that reaches `sim`, which must outlive it. */
 struct fcsl_hw fcsl_hw_simulated(fcsl_hw_sim_t *sim);
 

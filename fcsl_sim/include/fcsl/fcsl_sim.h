@@ -79,11 +79,18 @@ const char *fcsl_sim_companion_state(const fcsl_sim_t *sim, uint32_t companion, 
 
 /* ---- models that crash or hang ---------------------------------------------------------------------------------------- */
 
+/* The function of a model that runs. While `entry` is the same, it is the same call. */
+typedef struct {
+    char instance[256]; /* empty: none; a longer name is cut */
+    const char *function;
+    uint64_t entry;
+    int64_t time_ns; /* of the last instant */
+} fcsl_sim_place_t;
+
 /* These two are of the simulation that was opened last, from the beginning of fcsl_sim_open on.
  *
- * From any thread: the instance of which a function runs now, or null; the function, and the last instant. While *entry is the
- * same, it is the same call. */
-const char *fcsl_sim_place(const char **function, uint64_t *entry, int64_t *time_ns);
+ * From any thread: whether a function of a model runs now, and which. */
+int fcsl_sim_place(fcsl_sim_place_t *at);
 /* From now on a crash within a model ends the process with status 2 and a message that names instance, function and time; with
  * `json` also as JSON on standard output. `watch` 0: no longer. Returns 0, or -1. */
 int fcsl_sim_watch_crashes(int watch, int json, fcsl_error_t *error);

@@ -55,6 +55,9 @@ static const fcsl_field_t fields[] = {
 #elif BREAK == 8
     OUTPUT("outputs.x", 0, 8, 1, FCSL_F64),
     OUTPUT("outputs.x", 0, 8, 1, FCSL_F64),
+#elif BREAK == 15
+    OUTPUT("outputs.x.y", 0, 8, 1, FCSL_F64),
+    OUTPUT("outputs.x_y", 8, 8, 1, FCSL_F64),
 #else
     OUTPUT("outputs.x", 0, 8, 1, FCSL_F64),
 #endif

@@ -8,6 +8,7 @@
 typedef struct {
     struct {
         double u;
+        int64_t mode;
     } inputs;
     struct {
         double gain, rate, x;
@@ -18,7 +19,7 @@ typedef struct {
     struct {
         double through, free;
         struct {
-            double twice;
+            double twice, both[2];
         } nested;
     } outputs;
 } chain_t;
@@ -59,11 +60,18 @@ static void output(void *self, double t, const double *x)
     chain->outputs.free = x[0];
 #endif
     chain->outputs.nested.twice = 2.0 * x[0];
+    chain->outputs.nested.both[0] = x[0];
+#ifndef FORGETS_ELEMENT
+    chain->outputs.nested.both[1] = -x[0];
+#endif
 #ifdef IMPURE
     chain->state.calls += 1.0;
 #endif
 #ifdef SECRET
     chain->outputs.free += chain->inputs.u;
+#endif
+#ifdef SECRET_MODE
+    chain->outputs.free += chain->inputs.mode != 0 ? 1.0 : 0.0;
 #endif
 }
 
@@ -71,6 +79,7 @@ static void output(void *self, double t, const double *x)
 
 static const fcsl_field_t fields[] = {
     FIELD(INPUT, inputs.u, "", ""),
+    FIELD(INPUT, inputs.mode, "", ""),
     FIELD(PARAMETER, parameters.gain, "", ""),
     FIELD(PARAMETER, parameters.rate, "", ""),
     FIELD(PARAMETER, parameters.x, "", "at the start"),
@@ -79,6 +88,7 @@ static const fcsl_field_t fields[] = {
     FIELD(FEEDTHROUGH, outputs.through, "", ""),
     FIELD(OUTPUT, outputs.free, "", ""),
     FIELD(OUTPUT, outputs.nested.twice, "", ""),
+    FCSL_MODEL_VECTOR(chain_t, FCSL_ROLE_OUTPUT, outputs.nested.both, "", ""),
 };
 
 static const fcsl_model_t model = {
