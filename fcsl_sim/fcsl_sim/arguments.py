@@ -40,6 +40,7 @@ def _parser() -> argparse.ArgumentParser:
     _add_flight(run)
     _add_run(run)
     _add_plot(_add(commands, "plot", "draw a simulation or a bag"))
+    _add_campaign(_add(commands, "campaign", "fly a simulation many times, with dispersed parameters"))
     _add_model_commands(commands)
     _add(commands, "schema", "print the JSON Schema of a simulation, for editors")
     why = _add(commands, "explain", "explain a diagnostic code of simulations, with an example")
@@ -120,6 +121,22 @@ def _add_plot(command: argparse.ArgumentParser) -> None:
     _add_flight(command)
 
 
+def _add_campaign(command: argparse.ArgumentParser) -> None:
+    command.add_argument("study", type=Path, help="*.study.json (docs/campaigns.md)")
+    help_output = "folder of the results; a campaign that was interrupted goes on in it (default: NAME.campaign, here)"
+    command.add_argument("-o", "--output", type=Path, metavar="FOLDER", help=help_output)
+    command.add_argument("--cases", type=_count, metavar="N", help="number of cases; replaces the file's")
+    command.add_argument("--jobs", type=_count, metavar="N", help="processes (default: one for each core)")
+    command.add_argument(
+        "--restart", action="store_true", help="remove the results that the folder has, and begin anew"
+    )
+    command.add_argument("--case", type=int, metavar="I", help="fly this case alone and print what it gives")
+    command.add_argument("--record", type=Path, metavar="BAG", help="with --case: new directory for its bag")
+    help_engine = "who flies: processes of this machine (default), or a Ray cluster (needs the Python package ray)"
+    command.add_argument("--engine", choices=("local", "ray"), default="local", help=help_engine)
+    command.add_argument("--json", action="store_true", help="print the summary as JSON, and nothing else")
+
+
 def _add_model_commands(commands: argparse._SubParsersAction[argparse.ArgumentParser]) -> None:
     listing = _add(commands, "list-models", "list the models of installed packages and of a folder")
     help_folder = "where to look for C and C++ files with models (default: this folder)"
@@ -136,6 +153,13 @@ def _add_model_commands(commands: argparse._SubParsersAction[argparse.ArgumentPa
 def _seed(text: str) -> int:
     value = int(text, 10)
     if not 0 <= value < 2**64:
+        raise ValueError
+    return value
+
+
+def _count(text: str) -> int:
+    value = int(text, 10)
+    if value < 1:
         raise ValueError
     return value
 
@@ -157,6 +181,7 @@ def _speed(text: str) -> float:
 
 
 # argparse uses these names in its error messages.
+_count.__name__ = "number of at least 1"
 _seed.__name__ = "seed (0 to 2^64 - 1)"
 _seconds.__name__ = "number of seconds"
 _speed.__name__ = "speed (a number above zero, or 0 for as fast as possible)"

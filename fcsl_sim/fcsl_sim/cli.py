@@ -17,6 +17,7 @@ from fcsl_compiler.base.diagnostics import DiagnosticError
 
 from . import arguments as command_line
 from . import plot
+from .campaign.command import run_campaign
 from .codes import SIM_CODES
 from .config import SERIAL_LINK, SimConfig, load
 from .errors import SimError
@@ -263,6 +264,7 @@ _COMMANDS = {
     "check": _check,
     "run": _run,
     "plot": _plot,
+    "campaign": run_campaign,
     "list-models": _list_models,
     "describe": _describe,
     "schema": _schema,

@@ -36,6 +36,7 @@ from .models import ModelField, ModelTable, type_of, with_unit
 from .plant_only import MAX_TICK_HZ, build_plant_only
 from .plugins import model_library, model_source
 from .ros import TruthTopic
+from .table_parameter import read_table
 from .wiring import MAX_SECONDS, Instance, Wiring, check_wiring, seconds
 
 MAX_TICKS = 10**12
@@ -50,7 +51,7 @@ SERIAL_LINK = "serial_link"
 #: What no instance may be called.
 _RESERVED = ("controller", "machine", "channels", "actuators")
 #: Of an instance.
-_OPTIONAL = ("parameters", "integrator", "tolerances")
+_OPTIONAL = ("parameters", "inputs", "integrator", "tolerances")
 
 
 @dataclass(frozen=True)
@@ -436,6 +437,7 @@ class _Loader:
             instance.table = self.parts.models[model]
             if instance.table:
                 self._read_parameters(instance, instance.table, keys.get("parameters"))
+                self._read_inputs(instance, instance.table, keys.get("inputs"))
                 self._read_tolerances(instance, instance.table, keys.get("tolerances"))
                 instance.integrator = read_integrator(keys.get("integrator"), self.reader, self.parts.tick_hz)
 
@@ -447,23 +449,39 @@ class _Loader:
 
     def _read_parameters(self, instance: Instance, table: ModelTable, node: JsonNode | None) -> None:
         wanted = {f.name: f for f in table.of_role("parameter")}
-        given: dict[str, JsonNode] = {}
-        for name, (definition, span) in self.reader.named(node, f"`parameters` of `{instance.name}`").items():
-            if name in wanted:
-                given[name] = definition
-                continue
-            hint = nearest(name, list(wanted)) or (f"it has {', '.join(wanted)}" if wanted else "it has none")
-            self.sink.error("E210", f"model `{table.name}` has no parameter `{name}`", span, help=hint)
-        for name in wanted:
-            override = self.overrides.pop(f"{instance.name}.parameters.{name}", None)
-            if override:
-                given[name] = override[1]
+        given = self._values(instance, table, "parameter", node)
         missing = [f"`{name}` ({with_unit(f.type, f.unit)})" for name, f in wanted.items() if name not in given]
         if missing and not table.tick_hz:
             message = f"parameter {', '.join(missing)} of `{instance.name}` has no value"
             self.sink.error("E211", message, instance.span, help="every parameter is given; nothing has a default")
-        for name, definition in given.items():
+        for name, (definition, _) in given.items():
             self._set(instance, wanted[name], definition)
+
+    def _read_inputs(self, instance: Instance, table: ModelTable, node: JsonNode | None) -> None:
+        """Values of inputs that no connection feeds."""
+        fields = {f.name: f for f in table.of_role("input")}
+        for name, (definition, span) in self._values(instance, table, "input", node).items():
+            instance.given[fields[name].path] = span
+            self._set(instance, fields[name], definition)
+
+    def _values(
+        self, instance: Instance, table: ModelTable, role: str, node: JsonNode | None
+    ) -> dict[str, tuple[JsonNode, Span]]:
+        """What the file and the command line give to parameters or inputs, by name."""
+        wanted = [f.name for f in table.of_role(role)]
+        given: dict[str, tuple[JsonNode, Span]] = {}
+        for name, (definition, span) in self.reader.named(node, f"`{role}s` of `{instance.name}`").items():
+            if name in wanted:
+                given[name] = definition, span
+                continue
+            hint = nearest(name, wanted) or (f"it has {', '.join(wanted)}" if wanted else "it has none")
+            code = "E210" if role == "parameter" else "E216"
+            self.sink.error(code, f"model `{table.name}` has no {role} `{name}`", span, help=hint)
+        for name in wanted:
+            override = self.overrides.pop(f"{instance.name}.{role}s.{name}", None)
+            if override:
+                given[name] = override[1], override[0]
+        return given
 
     def _read_tolerances(self, instance: Instance, table: ModelTable, node: JsonNode | None) -> None:
         """Absolute tolerances of continuous states, for rk45."""
@@ -483,7 +501,10 @@ class _Loader:
                 instance.tolerances += [plan.statement("tolerance", instance.name, i, bits) for i in states[path]]
 
     def _set(self, instance: Instance, target: ModelField, node: JsonNode) -> None:
-        scalars = self.reader.value(node, target.type, f"parameter `{target.name}`")
+        if target.table:
+            scalars: Sequence[bool | int | float | str] | None = read_table(node, target, self.reader)
+        else:
+            scalars = self.reader.value(node, target.type, f"{target.role} `{target.name}`")
         for i, value in enumerate(scalars or ()):
             value_bits = plan.bits(scalar_of(target.type).name, value)
             instance.sets.append(plan.statement("set", instance.name, target.path, i, value_bits))
@@ -524,9 +545,10 @@ class _Loader:
             name = path.partition(".")[0]
             if name in instances and instances[name].table is None:
                 continue  # the error in its model was reported
-            known = [f"{i.name}.{f.path}" for i in instances.values() if i.table for f in i.table.of_role("parameter")]
+            tables = {i.name: i.table for i in instances.values() if i.table}
+            known = [f"{i}.{f.path}" for i, table in tables.items() for f in table.of_role("parameter", "input")]
             fix = nearest(path, known)
             machine = self.parts.machine
             if name in self.parts.controllers or (machine and path in machine.fields):
                 fix = "`--set` sets parameters of models; those of a machine are in its own file, or `SimTwin.set` sets them"
-            self.sink.error("E210", f"there is no parameter `{path}`", span, help=fix)
+            self.sink.error("E210", f"there is no parameter or input `{path}`", span, help=fix)

@@ -27,5 +27,5 @@ def machine_model(library: Path, name: str) -> ModelTable:
         if field.role in _ROLES and field.type in FIELD_TYPES and not field.connected_from:
             path = field.path.partition(".")[2]
             type_ = type_of(field.type, field.shape)
-            fields[path] = ModelField(path, field.role, False, type_, field.offset, field.unit, field.doc)
+            fields[path] = ModelField(path, field.role, False, False, False, type_, field.offset, field.unit, field.doc)
     return ModelTable(name, library, 0, 0, False, True, False, "", (), fields, machine.tick_hz)

@@ -28,7 +28,7 @@ from .models import Scalar
 ABI_VERSION = 3
 NO_OFFSET = 2**32 - 1
 _ROLES = {1: "input", 2: "output", 3: "parameter", 4: "state"}
-_FEEDTHROUGH = 1 << 4
+_FEEDTHROUGH, _OPTIONAL, _TABLE = 1 << 4, 1 << 5, 1 << 6
 _SCALARS: dict[int, tuple[str, Any]] = {
     0: ("bool", ctypes.c_bool),
     1: ("i32", ctypes.c_int32),
@@ -91,6 +91,8 @@ class Field:
     unit: str
     doc: str
     is_feedthrough: bool
+    is_optional: bool
+    is_table: bool
 
 
 @dataclass(frozen=True)
@@ -209,7 +211,7 @@ class ModelInstance:
     def _states(self, x: Sequence[float]) -> Any:
         if len(x) != self.continuous_count:
             raise ValueError(f"the model has {self.continuous_count} continuous states, not {len(x)}")
-        return (c_double * len(x))(*x) if x else None
+        return (c_double * len(x))(*x) if len(x) else None
 
     def _continuous(self) -> Any:
         return (c_double * self.continuous_count).from_address(self._self + self._model.continuous_offset)
@@ -246,5 +248,5 @@ def _field(row: CField) -> Field:
         row.offset,
         row.unit.decode(),
         row.doc.decode(),
-        bool(row.flags & _FEEDTHROUGH),
+        *(bool(row.flags & flag) for flag in (_FEEDTHROUGH, _OPTIONAL, _TABLE)),
     )

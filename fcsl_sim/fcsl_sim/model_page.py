@@ -66,6 +66,8 @@ def describe_json(model: Found, table: ModelTable) -> dict[str, Any]:
                 "unit": field.unit,
                 "doc": field.doc,
                 "feedthrough": field.feedthrough,
+                "optional": field.optional,
+                "table": field.table,
                 "integrated": field.path in integrated,
             }
             for field in table.fields.values()
@@ -102,7 +104,13 @@ def _facts(table: ModelTable) -> list[str]:
 
 
 def _row(field: ModelField, is_integrated: bool) -> list[str]:
-    mark = "feed-through" if field.feedthrough else "integrated" if is_integrated else ""
+    marks = {
+        "feed-through": field.feedthrough,
+        "optional": field.optional,
+        "table": field.table,
+        "integrated": is_integrated,
+    }
+    mark = next((name for name, holds in marks.items() if holds), "")
     return [field.name, str(field.type), field.unit, mark, field.doc]
 
 
@@ -116,9 +124,9 @@ def _columns(rows: Sequence[Sequence[str]]) -> list[str]:
 
 
 def skeleton(model: Found, table: ModelTable) -> dict[str, Any]:
-    """Members of a simulation file with one instance of the model: every parameter is 0, and the rate 100 Hz."""
+    """Members of a simulation file with one instance of the model: every parameter is 0, a table one value, and the rate 100 Hz."""
     instance: dict[str, Any] = {"model": table.name}
-    parameters = {field.name: _zero(field.type) for field in table.of_role("parameter")}
+    parameters = {f.name: [0.0] if f.table else _zero(f.type) for f in table.of_role("parameter")}
     if parameters:
         instance["parameters"] = parameters
     members: dict[str, Any] = {"models": {table.name: model.definition}, "instances": {table.name: instance}}

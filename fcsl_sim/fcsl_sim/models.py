@@ -20,11 +20,14 @@ FIELD_TYPES = tuple(_FORMATS)
 @dataclass(frozen=True)
 class ModelField:
     """One leaf of a model's struct. `role` is input, output, parameter or state; `offset` is in bytes; `feedthrough`: an
-    output that depends on an input of the same instant."""
+    output that depends on an input of the same instant; `optional`: an input that may stay unconnected; `table`:
+    a vector parameter of at most so many values."""
 
     path: str
     role: str
     feedthrough: bool
+    optional: bool
+    table: bool
     type: Type
     offset: int
     unit: str
@@ -109,10 +112,12 @@ def parse_description(text: str, library: Path) -> ModelTable:
     fields = {}
     for row in rows:
         if row[0] == "field":
-            _, path, role, feedthrough, scalar, shape, at, unit, field_doc = row
+            _, path, role, feedthrough, optional, is_table, scalar, shape, at, unit, field_doc = row
             extents = tuple(int(extent) for extent in shape.split(",")) if shape else ()
             type_ = type_of(scalar, extents)
-            fields[path] = ModelField(path, role, feedthrough == "1", type_, int(at), unit, field_doc)
+            through, may_stay_free, holds_any = (flag == "1" for flag in (feedthrough, optional, is_table))
+            marks = through, may_stay_free, holds_any
+            fields[path] = ModelField(path, role, *marks, type_, int(at), unit, field_doc)
     has = functions.split(",")
     return ModelTable(
         name,

@@ -70,6 +70,12 @@ class _Place(ctypes.Structure):
     )
 
 
+class _Part(ctypes.Structure):
+    """fcsl_sim_part_t"""
+
+    _fields_ = (("data", ptr), ("size", c_uint32))
+
+
 _ERROR = POINTER(CError)
 #: Result type and argument types of every function used here.
 _PROTOTYPES: dict[str, tuple[type | None, list[type]]] = {
@@ -82,6 +88,7 @@ _PROTOTYPES: dict[str, tuple[type | None, list[type]]] = {
     "fcsl_sim_record": (c_int, [ptr, c_char_p, c_char_p, _ERROR]),
     "fcsl_sim_record_stop": (c_int, [ptr, _ERROR]),
     "fcsl_sim_run": (c_int64, [ptr, c_uint64, _ERROR]),
+    "fcsl_sim_run_traced": (c_int, [ptr, c_uint64, POINTER(_Part), c_uint32, ptr, POINTER(c_uint64), _ERROR]),
     "fcsl_sim_set_speed": (c_int, [ptr, c_double, _ERROR]),
     "fcsl_sim_state": (c_int32, [ptr]),
     "fcsl_sim_machine_data": (ptr, [ptr]),
@@ -314,6 +321,17 @@ class Simulation:
     def run(self, ticks: int) -> int:
         """Runs up to `ticks` ticks; returns early at the end, after a change of state and after a wait. Returns ticks done."""
         return self._check(self._lib.fcsl_sim_run(self.handle(), ticks, byref(self._error)))
+
+    def run_traced(self, ticks: int, parts: Sequence[tuple[int, int]]) -> tuple[int, bytes, SimError | None]:
+        """As `run`, past changes of the state, too. Returns ticks done, a row for each, which has the parts (address, size) of
+        the structs after it, and the error that ended the run."""
+        table, done = (_Part * len(parts))(*(_Part(*part) for part in parts)), c_uint64()
+        row_bytes = sum(size for _, size in parts)
+        rows = ctypes.create_string_buffer(max(1, ticks * row_bytes))
+        where = (table, len(parts), rows, byref(done))
+        status = self._lib.fcsl_sim_run_traced(self.handle(), ticks, *where, byref(self._error))
+        error = SimError(_text(self._error)) if status < 0 else None
+        return done.value, ctypes.string_at(rows, done.value * row_bytes), error
 
     def set_speed(self, speed: float) -> None:
         """Limits `run` to this many simulated seconds per second from now on; 0: as fast as possible.

@@ -11,7 +11,7 @@ from __future__ import annotations
 from bisect import bisect_right
 from collections.abc import Iterator, Mapping, Sequence
 from contextlib import contextmanager
-from ctypes import byref, c_char
+from ctypes import addressof, byref, c_char, create_string_buffer
 from dataclasses import dataclass, replace
 from itertools import groupby
 from pathlib import Path
@@ -32,6 +32,8 @@ from .native import Simulation
 _SLICE_TICKS = 100_000
 #: Between two structs in the virtual memory; more than what a trace copies to join two fields.
 _GAP_BYTES = 64
+#: Of rows that one call into C traces.
+_TRACED_BYTES = 1 << 20
 
 
 @contextmanager
@@ -50,6 +52,7 @@ class _Region:
 
     name: str
     begin: int
+    address: int
     memory: memoryview
     run: int | None
 
@@ -64,6 +67,7 @@ class SimRun(Run):
         self._regions: list[_Region] = []
         self._firsts: list[int] = []  # by region: the number of its first field
         self._traces: list[SimTrace] = []
+        self._zeros = create_string_buffer(_GAP_BYTES)
         super().__init__(config.library, config.machine.name)
         #: By name; the first one, whose name is empty here, leads.
         self._machines = {"": self.machine}
@@ -86,7 +90,7 @@ class SimRun(Run):
         last = self._regions[-1] if self._regions else None
         begin = last.begin + len(last.memory) + _GAP_BYTES if last else 0
         memory = memoryview((c_char * size).from_address(address)).cast("B")
-        self._regions.append(_Region(name, begin, memory, run))
+        self._regions.append(_Region(name, begin, address, memory, run))
 
     def _combined(self) -> Machine:
         """The descriptor of the virtual memory. Raises TwinError for two fields with the same path."""
@@ -215,7 +219,7 @@ class SimRun(Run):
     def step(self, ticks: int) -> None:
         self.handle()
         while ticks > 0:
-            ticks -= self._run_ticks(1 if self._traces else min(ticks, _SLICE_TICKS))
+            ticks -= self._run_ticks(min(ticks, _SLICE_TICKS))
 
     def step_once(self) -> int:
         self.handle()
@@ -224,14 +228,28 @@ class SimRun(Run):
 
     def _run_ticks(self, ticks: int) -> int:
         """Runs up to `ticks` ticks, at least one; returns how many."""
-        try:
+        if self._traces:
+            return self._run_traced(ticks)
+        with twin_errors():
             done = self._simulation.run(ticks)
-        except SimError as error:
-            raise TwinError(str(error)) from None
         if done == 0:
             raise TwinError(self._over())
+        return done
+
+    def _run_traced(self, ticks: int) -> int:
+        """Likewise, with a row for each tick in each trace."""
+        row_bytes = sum(trace.row_bytes for trace in self._traces)
+        parts = [part for trace in self._traces for part in trace.parts]
+        ticks = min(ticks, max(1, _TRACED_BYTES // row_bytes))
+        with twin_errors():
+            done, rows, error = self._simulation.run_traced(ticks, parts)
+        at = 0
         for trace in self._traces:
-            trace.take()
+            begin, at = at, at + trace.row_bytes
+            own = rows if trace.row_bytes == row_bytes else b"".join(_column(rows, row_bytes, begin, at))
+            trace.take(own)
+        if error or not done:
+            raise TwinError(str(error) if error else self._over())
         return done
 
     def _over(self) -> str:
@@ -260,21 +278,33 @@ class SimRun(Run):
         self.step(end - self.tick)
 
     def trace(self, ranges: Sequence[tuple[int, int]], rows: int) -> SimTrace:  # type: ignore[override]
-        """Traces parts (offset, size) of the virtual memory. While a trace is open, each tick is a call from Python."""
-        trace = SimTrace(self._traces, [part for pair in ranges for part in self._views(*pair)], rows)
+        """Traces parts (offset, size) of the virtual memory."""
+        trace = SimTrace(self._traces, self.addresses(ranges), rows)
         self._traces.append(trace)
         return trace
 
-    def _views(self, offset: int, size: int) -> Iterator[memoryview | bytes]:
-        """The bytes of a range; zeros where no struct is."""
-        at = offset
-        for region, begin, end in self.parts(offset, size):
-            if region.begin + begin > at:
-                yield bytes(region.begin + begin - at)
-            yield region.memory[begin:end]
-            at = region.begin + end
-        if offset + size > at:
-            yield bytes(offset + size - at)
+    def addresses(self, ranges: Sequence[tuple[int, int]], of: Simulation | None = None) -> list[tuple[int, int]]:
+        """Address and size of the parts of structs in ranges (offset, size); zeros where no struct is, which is never more
+        than a gap. `of`: another simulation of the same models and machines, in place of this one."""
+        found = []
+        begins = {region.name: self._address(region, of) if of else region.address for region in self._regions}
+        for offset, size in ranges:
+            at = offset
+            for region, begin, end in self.parts(offset, size):
+                if region.begin + begin > at:
+                    found.append((addressof(self._zeros), region.begin + begin - at))
+                found.append((begins[region.name] + begin, end - begin))
+                at = region.begin + end
+            if offset + size > at:
+                found.append((addressof(self._zeros), offset + size - at))
+        return found
+
+    def _address(self, region: _Region, of: Simulation) -> int:
+        """Of the same struct in another simulation."""
+        if region.run is None:
+            return of.instance_data(region.name)
+        run = of.companion_runs()[region.name] if region.name else of.hosted()
+        return int(self._lib.fcsl_run_data(run))
 
     # ---- channels ---------------------------------------------------------------------------------------------------
 
@@ -307,17 +337,21 @@ class SimRun(Run):
 class SimTrace:
     """Parts of the virtual memory after each of the last `capacity` ticks (simclient.twin.host.Tap)."""
 
-    def __init__(self, traces: list[SimTrace], parts: Sequence[memoryview | bytes], capacity: int):
-        self._traces, self._parts, self.capacity = traces, parts, capacity
-        self._row_bytes = sum(map(len, parts))
-        self._ring = bytearray(capacity * self._row_bytes)
+    def __init__(self, traces: list[SimTrace], parts: Sequence[tuple[int, int]], capacity: int):
+        self._traces, self.parts, self.capacity = traces, parts, capacity
+        self.row_bytes = sum(size for _, size in parts)
+        self._ring = bytearray(capacity * self.row_bytes)
         self._rows = 0
 
-    def take(self) -> None:
-        """A tick has ended."""
-        at = self._rows % self.capacity * self._row_bytes
-        self._ring[at : at + self._row_bytes] = b"".join(self._parts)
-        self._rows += 1
+    def take(self, rows: bytes) -> None:
+        """Of the ticks that were run."""
+        count = len(rows) // self.row_bytes
+        kept = rows[max(0, count - self.capacity) * self.row_bytes :]
+        begin = (self._rows + count - len(kept) // self.row_bytes) % self.capacity * self.row_bytes
+        before = kept[: len(self._ring) - begin]
+        self._ring[begin : begin + len(before)] = before
+        self._ring[: len(kept) - len(before)] = kept[len(before) :]
+        self._rows += count
 
     def rows(self) -> int:
         return self._rows
@@ -327,14 +361,14 @@ class SimTrace:
         if first < self._rows - self.capacity or first + count > self._rows:
             raise TwinError(f"rows {first} to {first + count} of a trace were discarded, or are not there yet")
         begin = first % self.capacity
-        before = min(count, self.capacity - begin) * self._row_bytes
-        at, size = begin * self._row_bytes, count * self._row_bytes
+        before = min(count, self.capacity - begin) * self.row_bytes
+        at, size = begin * self.row_bytes, count * self.row_bytes
         return bytes(self._ring[at : at + before] + self._ring[: size - before])
 
     def close(self) -> None:
         if self in self._traces:
             self._traces.remove(self)
-        self._parts = ()
+        self.parts = ()
 
 
 class _Sources:
@@ -366,6 +400,11 @@ class _Sources:
                 self.of_fields[f"{rest[1]}.{rest[2]}"] = rest[0]
             elif word == "write":
                 self.of_fields[rest[2]] = f"{rest[0]}.{rest[1]}"
+
+
+def _column(rows: bytes, row_bytes: int, begin: int, end: int) -> Iterator[bytes]:
+    """A part of each row."""
+    return (rows[at + begin : at + end] for at in range(0, len(rows), row_bytes))
 
 
 def _size(field: ModelField) -> int:

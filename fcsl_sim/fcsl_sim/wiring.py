@@ -30,13 +30,14 @@ _COMPARISONS = ("equals", "above", "below")
 
 @dataclass
 class Instance:
-    """`table` is None if its model has an error; `sets` are the plan's statements for its parameters, `tolerances` those
-    for its continuous states. `integrator`: of its group, where it says so. `rate`: of its updates."""
+    """`table` is None if its model has an error; `sets` are the plan's statements for its parameters and inputs, `given` the
+    paths of these inputs; `tolerances` are the statements for its continuous states. `integrator`: of its group, where it says so. `rate`: of its updates."""
 
     name: str
     span: Span
     table: ModelTable | None
     sets: list[str] = field(default_factory=list)
+    given: dict[str, Span] = field(default_factory=dict)
     tolerances: list[str] = field(default_factory=list)
     integrator: Integrator | None = None
     rate: Rate | None = None
@@ -241,9 +242,14 @@ class _Checker:
                 )
                 continue
             fed[where] = keys["to"].span
+            value = self.instances[target.instance].given.get(target.path) if target.instance else None
+            if value:
+                message = f"`{keys['to'].value}` has a value and a connection"
+                self.sink.error("E212", message, value, help="remove one of them", notes=[(fed[where], "connected")])
             if self._compatible(source, target, keys["from"], keys["to"]):
                 self.edges.append(_Edge(source, target, keys["from"].span))
-        self._fed = None if broken else set(fed)
+        values = {(name, path) for name, instance in self.instances.items() for path in instance.given}
+        self._fed = None if broken else set(fed) | values
 
     def _compatible(self, source: _Port, target: _Port, source_node: JsonNode, target_node: JsonNode) -> bool:
         notes = [(source_node.span, f"the source is {with_unit(source.type, source.unit)}")]
@@ -378,7 +384,7 @@ class _Checker:
             self.sink.warning("W801", message, first(place.span), why="it never gets a sample")
         for instance in self.instances.values():
             inputs = instance.table.of_role("input") if instance.table else []
-            unfed = [f"`{f.name}`" for f in inputs if (instance.name, f.path) not in fed]
+            unfed = [f"`{f.name}`" for f in inputs if not f.optional and (instance.name, f.path) not in fed]
             if unfed:
                 message = f"nothing feeds input {', '.join(unfed)} of `{instance.name}`"
                 self.sink.warning("W802", message, instance.span, why="it stays zero")

@@ -4,10 +4,10 @@
  *
  *   model NAME CONTINUOUS_OFFSET CONTINUOUS_STATES FUNCTIONS DOC
  *   event NAME CROSSING DOC
- *   field PATH ROLE FEEDTHROUGH TYPE SHAPE OFFSET UNIT DOC
+ *   field PATH ROLE FEEDTHROUGH OPTIONAL TABLE TYPE SHAPE OFFSET UNIT DOC
  *
  * SHAPE is empty for a scalar, else its extents separated by commas. FUNCTIONS are names separated by commas, `second_order`
- * among them where the model is; FEEDTHROUGH is 1 or 0.
+ * among them where the model is; FEEDTHROUGH, OPTIONAL and TABLE are 1 or 0.
  */
 #include <string.h>
 
@@ -105,6 +105,8 @@ int64_t fcsl_sim_describe_model(const char *library, const char *name, char *tex
         put(&out, field->path, '\t');
         put(&out, roles[field->role], '\t'); /* one of these four: checked at load */
         put_number(&out, (field->flags & FCSL_FIELD_FEEDTHROUGH) != 0, '\t');
+        put_number(&out, (field->flags & FCSL_FIELD_OPTIONAL) != 0, '\t');
+        put_number(&out, (field->flags & FCSL_FIELD_TABLE) != 0, '\t');
         put_type(&out, field);
         put_number(&out, field->offset, '\t');
         put(&out, field->unit, '\t');

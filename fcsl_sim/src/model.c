@@ -113,6 +113,13 @@ static const char *check_field(const fcsl_model_t *model, const fcsl_field_t *fi
     if ((field->flags & FCSL_FIELD_FEEDTHROUGH) != 0 && (field->role != FCSL_ROLE_OUTPUT || !model->output)) {
         return "only an output that `output` writes depends on inputs of the same instant";
     }
+    if ((field->flags & FCSL_FIELD_OPTIONAL) != 0 && field->role != FCSL_ROLE_INPUT) {
+        return "only an input is optional";
+    }
+    if ((field->flags & FCSL_FIELD_TABLE) != 0 &&
+        (field->role != FCSL_ROLE_PARAMETER || field->rank != 1 || field->type != FCSL_F64)) {
+        return "only a parameter that is a vector of doubles is a table";
+    }
     if (!field->unit || !field->doc) {
         return "its unit or doc is null";
     }

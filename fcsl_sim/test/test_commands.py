@@ -154,6 +154,8 @@ def test_what_is_told_of_a_model(tmp_path: Path) -> None:
         "unit": "m",
         "doc": "integrated",
         "feedthrough": False,
+        "optional": False,
+        "table": False,
         "integrated": True,
     }
     assert fields["outputs.time_ns"]["type"] == "i64" and not fields["outputs.time_ns"]["integrated"]

@@ -268,8 +268,8 @@ def test_another_seed_is_the_same_as_if_it_had_been_loaded(load_sim: Load) -> No
         ("altimeter.parameters.sigma=", "E101: the file ends where a value is expected"),
         ("altimeter.parameters.sigma=True", "E101: expected a JSON value, found `True`"),
         ("altimeter.parameters.sigma=true", "E207: parameter `sigma` is f64, not a bool"),
-        ("altimeter.parameters.sigm=1", "E210: there is no parameter `altimeter.parameters.sigm`"),
-        ("altimetre.parameters.sigma=1", "E210: there is no parameter `altimetre.parameters.sigma`"),
+        ("altimeter.parameters.sigm=1", "E210: there is no parameter or input `altimeter.parameters.sigm`"),
+        ("altimetre.parameters.sigma=1", "E210: there is no parameter or input `altimetre.parameters.sigma`"),
     ],
 )
 def test_the_command_line_is_checked(text: str, expected: str, load_sim: Load) -> None:

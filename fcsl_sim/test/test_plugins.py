@@ -79,6 +79,7 @@ def test_the_field_table(everything: ModelInstance) -> None:
         "parameters.gain": ("f32", (2, 3), "", "two rows of three"),
         "parameters.limit": ("u64", (), "", ""),
         "parameters.identity": ("i64", (), "", ""),
+        "parameters.curve": ("f64", (4,), "N", ""),
         "state.position": ("f64", (), "m", ""),
         "state.speed": ("f64", (), "m/s", ""),
         "state.updates": ("u32", (), "", ""),
@@ -89,6 +90,8 @@ def test_the_field_table(everything: ModelInstance) -> None:
     }
     assert all(path.startswith(field.role) for path, field in everything.fields.items())
     assert [path for path, f in everything.fields.items() if f.is_feedthrough] == ["outputs.value"]
+    assert [path for path, f in everything.fields.items() if f.is_optional] == ["inputs.count"]
+    assert [path for path, f in everything.fields.items() if f.is_table] == ["parameters.curve"]
     assert [(e.name, e.crossing, e.doc) for e in everything.events] == [
         ("ground", "falling", "the position becomes negative"),
         ("second", "either", ""),
@@ -318,7 +321,7 @@ def test_rust_that_compiles(cargo: Callable[[str], str]) -> None:
         (
             'force: f64 = "N"',
             'force: f64 = "N", feedthrough',
-            "only `feedthrough` may follow a unit, and only of an output",
+            "only `feedthrough` of an output, `optional` of an input or `table` of a parameter may follow a unit",
         ),
         ("middle: either", "middle: sinking", "an event is falling, rising or either"),
         ("now.x.position; }", "now.x.position.sin(); }", "no method named `sin` found for type `f64`"),
@@ -538,7 +541,7 @@ def test_a_simulation_with_a_library(
 
     def change(config: dict[str, Any]) -> None:
         config["models"]["extra"] = {"library": f"package://plugins/everything_{language}"}
-        parameters = {"gain": [[0.0] * 3] * 2, "limit": 1, "identity": 1}
+        parameters = {"gain": [[0.0] * 3] * 2, "limit": 1, "identity": 1, "curve": [0.0]}
         config["instances"]["extra"] = {"model": "extra", "parameters": parameters}
         config["rates"]["extra"] = 100
 
@@ -553,7 +556,7 @@ def test_the_languages_fly_alike(load_sim: Load, package: Path, monkeypatch: pyt
 
     def change(config: dict[str, Any]) -> None:
         config["duration"] = 5.0
-        parameters = {"gain": [[0.0, 0.0, 0.0], [0.0, 0.0, 0.5]], "limit": 1, "identity": 1}
+        parameters = {"gain": [[0.0, 0.0, 0.0], [0.0, 0.0, 0.5]], "limit": 1, "identity": 1, "curve": [0.0]}
         for language in LANGUAGES:
             config["models"][language] = {"library": f"package://plugins/everything_{language}"}
             config["instances"][language] = {"model": language, "parameters": parameters}

@@ -36,7 +36,7 @@ _LATER = {
     "VarError": "vars.wire",
 }
 #: In a package that needs this one.
-_SIM_TWIN = "fcsl_sim.sim_twin"
+_SIM = "fcsl_sim"
 
 __all__ = [
     "AlgTwin",
@@ -64,18 +64,17 @@ def __getattr__(name: str) -> Any:
     if name in _LATER:
         return getattr(import_module(f".{_LATER[name]}", __name__), name)
     if name == "SimTwin":
-        return getattr(_sim_twin(), name)
+        return getattr(_sim_module("sim_twin", name), name)
     raise AttributeError(f"module {__name__!r} has no attribute {name!r}")
 
 
-def _sim_twin() -> Any:
-    """The module of SimTwin. Raises ImportError, which says what is missing."""
+def _sim_module(module: str, what: str) -> Any:
+    """A module of the simulator, where `what` is. Raises ImportError, which says what is missing."""
+    name = f"{_SIM}.{module}"
     try:
-        return import_module(_SIM_TWIN)
+        return import_module(name)
     except ModuleNotFoundError as error:
-        if error.name not in ("fcsl_sim", _SIM_TWIN):
+        if error.name not in (_SIM, name):
             raise
         fix = "build it (colcon build --packages-up-to fcsl_sim) and source the workspace's setup.bash"
-        raise ImportError(
-            f"SimTwin is in the package `fcsl_sim`, which this environment does not have: {fix}"
-        ) from None
+        raise ImportError(f"{what} is in the package `{_SIM}`, which this environment does not have: {fix}") from None

@@ -99,6 +99,15 @@ extern __attribute__((visibility("default"))) const fcsl_model_t *const fcsl_mod
 #define FCSL_FIELD_FEEDTHROUGH (1u << 4)
 /* In place of FCSL_ROLE_OUTPUT in the macros below: an output with this flag. */
 #define FCSL_ROLE_FEEDTHROUGH (FCSL_ROLE_OUTPUT | 0x80u)
+/* Flag of an input that may stay unconnected, and is zero then: a disturbance, one of several forces. */
+#define FCSL_FIELD_OPTIONAL (1u << 5)
+/* In place of FCSL_ROLE_INPUT in the macros below: an input with this flag. */
+#define FCSL_ROLE_OPTIONAL_INPUT (FCSL_ROLE_INPUT | 0x40u)
+/* Flag of a parameter that is a vector of at most so many values: a simulation gives any number of them, or the column of a
+ * file, and the last one fills the rest. */
+#define FCSL_FIELD_TABLE (1u << 6)
+/* In place of FCSL_ROLE_PARAMETER in FCSL_MODEL_VECTOR: a parameter with this flag. */
+#define FCSL_ROLE_TABLE (FCSL_ROLE_PARAMETER | 0x40u)
 
 /* One field of a table. A model's struct has the members `inputs`, `outputs`, `parameters` and `state` (as far as it needs
  * them), so that a path is a C expression; type and shape follow from the member (bool, int32_t … double):
@@ -122,9 +131,9 @@ extern __attribute__((visibility("default"))) const fcsl_model_t *const fcsl_mod
     ((uint32_t)(sizeof(((struct_ *)0)->whole_) / sizeof(((struct_ *)0)->part_)))
 #define FCSL_MODEL_FIELD(struct_, role_, path_, element_, rank_, shape_, unit_, doc_)                                  \
     {.path = #path_,                                                                                                   \
-     .role = (uint8_t)((role_) & 0x7fu),                                                                               \
+     .role = (uint8_t)((role_) & 0x3fu),                                                                               \
      .type = FCSL_MODEL_TYPE(((struct_ *)0)->element_),                                                                \
-     .flags = (role_) == FCSL_ROLE_FEEDTHROUGH ? FCSL_FIELD_FEEDTHROUGH : 0u,                                          \
+     .flags = FCSL_MODEL_FLAGS(role_),                                                                                 \
      .rank = (rank_),                                                                                                  \
      .shape = (shape_),                                                                                                \
      .count = FCSL_MODEL_EXTENT(struct_, path_, element_),                                                             \
@@ -136,6 +145,11 @@ extern __attribute__((visibility("default"))) const fcsl_model_t *const fcsl_mod
      .doc = (doc_),                                                                                                    \
      .minimum = -(double)INFINITY,                                                                                     \
      .maximum = (double)INFINITY}
+#define FCSL_MODEL_FLAGS(role_)                                                                                        \
+    ((role_) == FCSL_ROLE_FEEDTHROUGH      ? FCSL_FIELD_FEEDTHROUGH                                                    \
+     : (role_) == FCSL_ROLE_OPTIONAL_INPUT ? FCSL_FIELD_OPTIONAL                                                       \
+     : (role_) == FCSL_ROLE_TABLE          ? FCSL_FIELD_TABLE                                                          \
+                                           : 0u)
 #define FCSL_MODEL_TYPE(member_)                                                                                       \
     _Generic((member_),                                                                                                \
         _Bool: FCSL_BOOL,                                                                                              \

@@ -131,9 +131,9 @@ constexpr fcsl_field_t field(const char *path, unsigned role, std::size_t offset
     static_assert(described::rank == rank, "FCSL_MODEL_SCALAR is for a scalar, _VECTOR for T[n], _MATRIX for T[n][m]");
     fcsl_field_t made{};
     made.path = path;
-    made.role = static_cast<uint8_t>(role & 0x7fu);
+    made.role = static_cast<uint8_t>(role & 0x3fu);
     made.type = type_of<typename described::scalar>();
-    made.flags = role == FCSL_ROLE_FEEDTHROUGH ? FCSL_FIELD_FEEDTHROUGH : 0u;
+    made.flags = FCSL_MODEL_FLAGS(role);
     made.rank = rank;
     made.shape = described::values;
     made.count = sizeof(Member) / sizeof(typename described::scalar);

@@ -57,6 +57,14 @@ int fcsl_sim_record_stop(fcsl_sim_t *sim, fcsl_error_t *error);
  * and after a wait for a tick that is not due (fcsl_sim_set_speed) or for a client that keeps the simulation paused.
  * Returns ticks done, or -1. */
 int64_t fcsl_sim_run(fcsl_sim_t *sim, uint64_t ticks, fcsl_error_t *error);
+typedef struct {
+    const void *data; /* within the struct of a machine or of an instance */
+    uint32_t size;
+} fcsl_sim_part_t;
+/* As fcsl_sim_run, past changes of the state, too; after each tick the parts are appended to `rows`, which has room for all.
+ * `done`: ticks that were run, also before an error. Returns 0, or -1. */
+int fcsl_sim_run_traced(fcsl_sim_t *sim, uint64_t ticks, const fcsl_sim_part_t *parts, uint32_t count, uint8_t *rows,
+                        uint64_t *done, fcsl_error_t *error);
 /* Limits fcsl_sim_run to `speed` simulated seconds per second of the monotonic clock, from its next tick and from the end
  * of a pause on; 0, the default: as fast as possible. A late tick runs at once. fcsl_sim_run waits for 50 ms at most, or
  * until a signal, and returns, so that its caller can do other work. Ticks that a client requests from a paused simulation,

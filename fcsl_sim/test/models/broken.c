@@ -58,6 +58,13 @@ static const fcsl_field_t fields[] = {
 #elif BREAK == 15
     OUTPUT("outputs.x.y", 0, 8, 1, FCSL_F64),
     OUTPUT("outputs.x_y", 8, 8, 1, FCSL_F64),
+#elif BREAK == 16
+    FCSL_MODEL_SCALAR(broken_t, FCSL_ROLE_OUTPUT, outputs.x, "", ""),
+    {.path = "outputs.y", .role = FCSL_ROLE_OUTPUT, .flags = FCSL_FIELD_OPTIONAL, .type = FCSL_F64, .count = 1, .offset = 8,
+     .size = 8, .unit = "", .doc = ""},
+#elif BREAK == 17
+    {.path = "parameters.y", .role = FCSL_ROLE_PARAMETER, .flags = FCSL_FIELD_TABLE, .type = FCSL_F64, .count = 1, .offset = 8,
+     .size = 8, .unit = "", .doc = ""},
 #else
     OUTPUT("outputs.x", 0, 8, 1, FCSL_F64),
 #endif

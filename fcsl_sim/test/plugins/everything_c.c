@@ -17,6 +17,7 @@ typedef struct {
         float gain[2][3];
         uint64_t limit;
         int64_t identity;
+        double curve[4];
     } parameters;
     struct {
         double position, speed; /* integrated */
@@ -79,11 +80,12 @@ static void reset(void *self, const fcsl_model_context_t *context, uint32_t numb
 
 static const fcsl_field_t fields[] = {
     FIELD(VECTOR, INPUT, inputs.wind, "m/s", "of the air"),
-    FIELD(SCALAR, INPUT, inputs.count, "", ""),
+    FIELD(SCALAR, OPTIONAL_INPUT, inputs.count, "", ""),
     FIELD(SCALAR, INPUT, inputs.enabled, "", ""),
     FIELD(MATRIX, PARAMETER, parameters.gain, "", "two rows of three"),
     FIELD(SCALAR, PARAMETER, parameters.limit, "", ""),
     FIELD(SCALAR, PARAMETER, parameters.identity, "", ""),
+    FIELD(VECTOR, TABLE, parameters.curve, "N", ""),
     FIELD(SCALAR, STATE, state.position, "m", ""),
     FIELD(SCALAR, STATE, state.speed, "m/s", ""),
     FIELD(SCALAR, STATE, state.updates, "", ""),

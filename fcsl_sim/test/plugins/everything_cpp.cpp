@@ -20,6 +20,7 @@ struct everything_cpp {
         float gain[2][3];
         uint64_t limit;
         int64_t identity;
+        double curve[4];
     } parameters;
     struct {
         continuous x;
@@ -80,11 +81,12 @@ struct everything_cpp {
 
 constexpr fcsl_field_t fields[] = {
     FIELD(VECTOR, INPUT, inputs.wind, "m/s", "of the air"),
-    FIELD(SCALAR, INPUT, inputs.count, "", ""),
+    FIELD(SCALAR, OPTIONAL_INPUT, inputs.count, "", ""),
     FIELD(SCALAR, INPUT, inputs.enabled, "", ""),
     FIELD(MATRIX, PARAMETER, parameters.gain, "", "two rows of three"),
     FIELD(SCALAR, PARAMETER, parameters.limit, "", ""),
     FIELD(SCALAR, PARAMETER, parameters.identity, "", ""),
+    FIELD(VECTOR, TABLE, parameters.curve, "N", ""),
     FIELD(SCALAR, STATE, state.x.position, "m", ""),
     FIELD(SCALAR, STATE, state.x.speed, "m/s", ""),
     FIELD(SCALAR, STATE, state.updates, "", ""),

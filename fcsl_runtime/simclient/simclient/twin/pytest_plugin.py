@@ -1,6 +1,6 @@
 # SPDX-License-Identifier: Apache-2.0
-"""The pytest plugin of simclient: the fixtures `fcsl` and `fcsl_sim` (pytest_twins.py), and --fcsl-cover, the coverage
-of algorithms.
+"""The pytest plugin of simclient: the fixtures `fcsl` and `fcsl_sim` (pytest_twins.py), tests of campaigns
+(pytest_campaign.py), and --fcsl-cover, the coverage of algorithms.
 
 pytest loads it automatically if simclient is in the environment (entry point pytest11 in setup.cfg); elsewhere use
 `-p simclient.twin.pytest_plugin`. Nothing is imported unless a test or an option needs it.
@@ -15,6 +15,9 @@ from typing import TYPE_CHECKING
 
 import pytest
 
+from .pytest_campaign import _fcsl_studies as _fcsl_studies
+from .pytest_campaign import add_mark, generate
+from .pytest_campaign import fcsl_case as fcsl_case
 from .pytest_twins import add_options
 from .pytest_twins import fcsl as fcsl
 from .pytest_twins import fcsl_sim as fcsl_sim
@@ -47,7 +50,12 @@ def pytest_addoption(parser: pytest.Parser) -> None:
     )
 
 
+def pytest_generate_tests(metafunc: pytest.Metafunc) -> None:
+    generate(metafunc)
+
+
 def pytest_configure(config: pytest.Config) -> None:
+    add_mark(config)
     for option in ("--fcsl-cover-json", "--fcsl-cover-fail-under"):
         if config.getoption(option) and not config.getoption("--fcsl-cover"):
             raise pytest.UsageError(f"{option} does nothing without --fcsl-cover; add it")

@@ -13,6 +13,8 @@ pub const ROLE_OUTPUT: u8 = 2;
 pub const ROLE_PARAMETER: u8 = 3;
 pub const ROLE_STATE: u8 = 4;
 pub const FIELD_FEEDTHROUGH: u8 = 1 << 4;
+pub const FIELD_OPTIONAL: u8 = 1 << 5;
+pub const FIELD_TABLE: u8 = 1 << 6;
 
 /// fcsl_field_t
 #[repr(C)]

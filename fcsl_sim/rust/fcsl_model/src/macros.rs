@@ -192,11 +192,17 @@ macro_rules! __flag {
     (feedthrough ROLE_OUTPUT) => {
         d::FIELD_FEEDTHROUGH
     };
+    (optional ROLE_INPUT) => {
+        d::FIELD_OPTIONAL
+    };
+    (table ROLE_PARAMETER) => {
+        d::FIELD_TABLE
+    };
     ($flag:ident $role:ident) => {
         compile_error!(concat!(
             "`",
             stringify!($flag),
-            "`: only `feedthrough` may follow a unit, and only of an output"
+            "`: only `feedthrough` of an output, `optional` of an input or `table` of a parameter may follow a unit"
         ))
     };
 }

@@ -13,7 +13,7 @@ fcsl_model::model! {
     inputs {
         /// of the air
         wind: [f64; 3] = "m/s";
-        count: i32 = "";
+        count: i32 = "", optional;
         enabled: bool = "";
     }
     parameters {
@@ -21,6 +21,7 @@ fcsl_model::model! {
         gain: [[f32; 3]; 2] = "";
         limit: u64 = "";
         identity: i64 = "";
+        curve: [f64; 4] = "N", table;
     }
     second_order continuous {
         position: f64 = "m";

@@ -1,0 +1,139 @@
+# SPDX-License-Identifier: Apache-2.0
+"""`fcsl-sim campaign`: flies a study, or one of its cases."""
+
+from __future__ import annotations
+
+import json
+import os
+import sys
+import time
+from collections.abc import Callable, Iterator
+from dataclasses import asdict
+from pathlib import Path
+from typing import Any
+
+from ..errors import SimError
+from ..output import show
+from ..watchdog import Watchdog
+from . import report
+from .flight import Flights, Outcome
+from .results import Results
+from .study import Study, read_study
+from .workers import fly_in_processes
+
+EXIT_FAILED = 1
+_PROGRESS_PERIOD_S = 2.0
+_SUFFIXES = (".study.json", ".json")
+
+
+def run_campaign(options: Any) -> int:
+    """Exit status: 0 if every case passed, else 1. Raises SimError or DiagnosticError."""
+    study = read_study(options.study, options.cases)
+    for warning in study.config.warnings:
+        print(warning, file=sys.stderr)
+    if options.case is not None:
+        return _fly_one(study, options)
+    if options.record is not None:
+        raise SimError("`--record` is for one case: give `--case` too")
+    results = Results(study, options.output or _folder(options.study), options.restart)
+    if results.done:
+        print(f"{results.folder}: {results.done} of {study.cases} cases are there already", file=sys.stderr)
+    _fly_missing(study, results, options)
+    table, picture = results.write_table(), report.draw(results)
+    if options.json:
+        show(json.dumps(_summary(results, table, picture), indent=2))
+    else:
+        print(report.text(results))
+        print(f"{table}\n{picture}")
+    return 0 if results.count("passed") == study.cases else EXIT_FAILED
+
+
+def _folder(study: Path) -> Path:
+    """Beside the user, not beside the file: `touchdown.study.json` gives `touchdown.campaign`."""
+    suffix = next((s for s in _SUFFIXES if study.name.endswith(s)), "")
+    return Path(study.name.removesuffix(suffix) + ".campaign")
+
+
+def _fly_missing(study: Study, results: Results, options: Any) -> None:
+    jobs = min(options.jobs or len(os.sched_getaffinity(0)), max(1, study.cases - results.done))
+    if results.done == study.cases:
+        return
+    progress = _Progress(results)
+    for outcome in _engine(options, study, results, jobs, progress.show):
+        results.add(outcome)
+    progress.end()
+
+
+def _engine(options: Any, study: Study, results: Results, jobs: int, progress: Callable[[], None]) -> Iterator[Outcome]:
+    if options.engine == "ray":
+        from .ray_engine import fly_on_ray  # an extra, so imported only when asked for
+
+        return fly_on_ray(study, results.missing(), jobs, options.cases, progress)
+    return fly_in_processes(study, results.missing(), jobs, options.cases, progress)
+
+
+def _fly_one(study: Study, options: Any) -> int:
+    if not 0 <= options.case < study.cases:
+        raise SimError(f"there is no case {options.case}: the study has cases 0 to {study.cases - 1}")
+    if options.record is not None and options.record.exists():
+        raise SimError(f"{options.record}: exists already; a bag is written into a new directory")
+    flights = Flights(study)
+    with Watchdog(options.json) as watchdog:
+        outcome = flights.fly(options.case, options.record, watchdog)
+    flights.close()
+    if options.json:
+        names = {"values": [p.path for p in study.parameters], "metrics": list(study.metrics)}
+        found = asdict(outcome)
+        for key, keys in names.items():
+            found[key] = dict(zip(keys, found[key], strict=True))
+        show(json.dumps(found, indent=2))
+    else:
+        print(_lines(study, outcome))
+    return 0 if outcome.verdict == "passed" else EXIT_FAILED
+
+
+def _lines(study: Study, outcome: Outcome) -> str:
+    lines = [f"case {outcome.case} {outcome.verdict}, seed {outcome.seed}"]
+    lines += [f"  {p.path} = {value}" for p, value in zip(study.parameters, outcome.values, strict=True)]
+    if outcome.error:
+        return "\n".join([*lines, outcome.error])
+    lines += [f"  {name} = {value:.9g}" for name, value in zip(study.metrics, outcome.metrics, strict=True)]
+    return "\n".join([*lines, f"{outcome.ticks} ticks, hash {outcome.hash}"])
+
+
+def _summary(results: Results, table: Path, picture: Path) -> dict[str, Any]:
+    passed, cases = results.count("passed"), results.study.cases
+    return {
+        "study": str(results.study.path),
+        "cases": cases,
+        "passed": passed,
+        "failed": results.count("failed"),
+        "errors": results.count("error"),
+        "confidence_95": report.wilson(passed, cases),
+        "table": str(table),
+        "report": str(picture),
+    }
+
+
+class _Progress:
+    """A line on standard error every 2 s, with the time that is left."""
+
+    def __init__(self, results: Results):
+        self._results, self._first = results, results.done
+        self._begun = self._shown = time.monotonic()
+
+    def show(self) -> None:
+        now = time.monotonic()
+        if now - self._shown >= _PROGRESS_PERIOD_S:
+            self._shown = now
+            self._print(now)
+
+    def end(self) -> None:
+        self._print(time.monotonic())
+
+    def _print(self, now: float) -> None:
+        done, cases = self._results.done, self._results.study.cases
+        rate = (done - self._first) / max(now - self._begun, 1e-9)
+        left = f", {(cases - done) / rate:.0f} s left" if rate > 0 and done < cases else ""
+        failed = self._results.count("failed") + self._results.count("error")
+        print(f"  {done} of {cases} cases, {failed} not passed, {rate:.3g} a second{left}", file=sys.stderr)

@@ -1,0 +1,128 @@
+# SPDX-License-Identifier: Apache-2.0
+"""Flies the cases of a study, one after another, in this process."""
+
+from __future__ import annotations
+
+import ctypes
+import hashlib
+import math
+from dataclasses import dataclass, replace
+from pathlib import Path
+
+from fcsl_compiler.model.types import scalar_of
+from simclient.errors import TwinError
+from simclient.twin.trace import Columns, merged, places
+
+from .. import plan
+from ..config import SimConfig
+from ..errors import SimError
+from ..native import Simulation
+from ..sim_run import SimRun
+from ..watchdog import Watchdog
+from .metric import MetricError
+from .study import Study, read_study
+
+#: Of the rows that a flight may leave for its metrics.
+_MAX_TRACE_BYTES = 1 << 28
+_TICK = "machine.tick"
+
+
+@dataclass(frozen=True)
+class Outcome:
+    """What a case has given. `verdict` is `passed`, `failed` or `error`; `hash` is that of the last state of machine and plant, 16
+    digits; `metrics` are NaN after an error."""
+
+    case: int
+    seed: int
+    values: tuple[bool | int | float, ...]
+    verdict: str
+    end: str
+    ticks: int
+    hash: str
+    metrics: tuple[float, ...]
+    error: str = ""
+
+
+#: Of a case that ended its process.
+CRASHED = "a model crashed: `--case` with this number says which"
+
+
+def not_flown(study: Study, case: int, why: str) -> Outcome:
+    """Of a case without a result."""
+    nothing = (math.nan,) * len(study.metrics)
+    return Outcome(case, study.seed_of(case), study.values(case), "error", "error", 0, "", nothing, why)
+
+
+class Flights:
+    """The simulation of a study, ready to be flown with the values of any case."""
+
+    def __init__(self, study: Study):
+        """Raises SimError or TwinError."""
+        self.study = study
+        self._lines = study.config.plan.split("\n")
+        self._seed_line = next(i for i, line in enumerate(self._lines) if line.startswith("seed "))
+        numbers = {line.rsplit(" ", 1)[0]: i for i, line in enumerate(self._lines) if line.startswith("set ")}
+        self._value_lines = [numbers[dispersed.key] for dispersed in study.parameters]
+        self._base = SimRun(study.config)
+        fields = [study.machine.fields[path] for path in sorted(study.paths() | {_TICK})]
+        self._ranges = merged(fields)
+        self._at = places(fields, self._ranges)
+        self._row_bytes = sum(size for _, size in self._ranges)
+        if study.all_ticks() and study.config.ticks * self._row_bytes > _MAX_TRACE_BYTES:
+            size = study.config.ticks * self._row_bytes >> 20
+            raise SimError(
+                f"the metrics need {size} MiB for each flight, and {_MAX_TRACE_BYTES >> 20} are allowed: give `duration`, or "
+                "read fewer fields in functions of all ticks"
+            )
+
+    @classmethod
+    def of(cls, path: Path, cases: int | None = None) -> Flights:
+        """Those of the study in a file. Raises SimError, TwinError or DiagnosticError."""
+        return cls(read_study(path, cases))
+
+    def close(self) -> None:
+        self._base.close()
+
+    def config(self, case: int) -> SimConfig:
+        """The simulation with the seed and the values of this case."""
+        seed, lines = self.study.seed_of(case), list(self._lines)
+        lines[self._seed_line] = plan.statement("seed", seed)
+        values = self.study.values(case)
+        for dispersed, number, value in zip(self.study.parameters, self._value_lines, values, strict=True):
+            bits = plan.bits(scalar_of(dispersed.field.type).name, value)
+            lines[number] = plan.statement(dispersed.key, bits)
+        return replace(self.study.config, seed=seed, plan="\n".join(lines))
+
+    def fly(self, case: int, bag: Path | None = None, watchdog: Watchdog | None = None) -> Outcome:
+        """What goes wrong in a flight is its outcome. bag: records it into this new folder. watchdog: ends the process with a
+        message that names a model that hangs."""
+        config = self.config(case)
+        given = case, config.seed, self.study.values(case)
+        try:
+            with Simulation(config.plan, config.tables) as sim:
+                if watchdog:
+                    watchdog.sim = sim
+                if bag is not None:
+                    sim.record(bag)
+                columns = self._run(sim)
+                metrics: dict[str, float | bool] = {}
+                for name, metric in self.study.metrics.items():
+                    metrics[name] = metric(columns, metrics)
+                passed = self.study.passes is None or bool(self.study.passes(columns, metrics))
+                digest = hashlib.sha256(sim.checkpoint()).hexdigest()[:16]
+                verdict, numbers = "passed" if passed else "failed", tuple(map(float, metrics.values()))
+                return Outcome(*given, verdict, sim.status, sim.tick, digest, numbers)
+        except (SimError, TwinError, MetricError) as error:
+            return not_flown(self.study, case, str(error))
+
+    def _run(self, sim: Simulation) -> Columns:
+        parts = self._base.addresses(self._ranges, of=sim)
+        if self.study.all_ticks():
+            _, rows, error = sim.run_traced(self.study.config.ticks, parts)
+            if error:
+                raise error
+        else:
+            while sim.status == "running":
+                sim.run(self.study.config.ticks)
+            rows = b"".join(ctypes.string_at(*part) for part in parts)
+        return Columns(self.study.machine, self._at, self._row_bytes, rows)

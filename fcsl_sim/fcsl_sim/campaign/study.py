@@ -1,0 +1,359 @@
+# SPDX-License-Identifier: Apache-2.0
+"""Reads a study, *.study.json: which simulation is flown, what is dispersed, what is measured, when a flight has passed."""
+
+from __future__ import annotations
+
+import hashlib
+import re
+from collections.abc import Sequence
+from dataclasses import dataclass
+from fractions import Fraction
+from pathlib import Path
+
+from fcsl_compiler.base.diagnostics import DiagnosticSink, nearest
+from fcsl_compiler.base.source import SourceError, SourceFile, Span
+from fcsl_compiler.model.types import Scalar, count_of, scalar_of, shape_of
+from fcsl_compiler.parse.json_reader import ConfigReader
+from fcsl_compiler.parse.json_source import JsonNode, parse_json
+from fcsl_compiler.parse.source_path import SourcePathError, resolve_source
+from simclient.descriptor import Machine
+
+from ..config import SimConfig, load
+from ..errors import SimError
+from ..models import ModelField
+from ..sim_run import SimRun
+from .dispersion import (
+    Choice,
+    Design,
+    Distribution,
+    Grid,
+    LatinHypercube,
+    Normal,
+    Random,
+    Uniform,
+    Value,
+    random_bits,
+)
+from .metric import FUNCTIONS, Metric, MetricError
+
+MAX_CASES = 10_000_000
+#: Of the table, beside those of parameters and metrics.
+OWN_COLUMNS = ("case", "seed", "verdict", "end", "ticks", "hash", "error")
+_DESIGNS = ("random", "latin_hypercube", "sweep", "corners")
+_SPREADS = ("uniform", "normal", "choice", "linear")
+_EXAMPLE = '{"uniform": [0.5, 1.5]}'
+_DEFAULT_TIMEOUT_S = 60.0
+_ELEMENT = re.compile(r"(.+?)((?:\[\d+\])*)")
+
+
+@dataclass(frozen=True)
+class Dispersed:
+    """A parameter or input of a model, or an element of one: `instance.parameters.name[2]`. `key`: how its value begins in
+    the plan."""
+
+    path: str
+    field: ModelField
+    key: str
+    distribution: Distribution
+
+
+@dataclass(frozen=True)
+class Study:
+    """`metrics` by name; `passes` is None where every flight that ends has passed. `fingerprint` is of all that decides what
+    the cases give."""
+
+    path: Path
+    config: SimConfig
+    machine: Machine
+    seed: int
+    parameters: tuple[Dispersed, ...]
+    design: Design
+    metrics: dict[str, Metric]
+    passes: Metric | None
+    timeout_s: float
+    fingerprint: str
+
+    @property
+    def cases(self) -> int:
+        return self.design.count
+
+    def seed_of(self, case: int) -> int:
+        """Of the simulation's noise."""
+        return random_bits(self.seed, case, "seed")
+
+    def values(self, case: int) -> tuple[Value, ...]:
+        """Of the parameters, in their order; those of a number are rounded to it."""
+        return self.design.values(case)
+
+    def expressions(self) -> list[Metric]:
+        return [*self.metrics.values(), *([self.passes] if self.passes else [])]
+
+    def paths(self) -> set[str]:
+        """The fields that metrics read."""
+        return {path for metric in self.expressions() for path in metric.paths}
+
+    def all_ticks(self) -> bool:
+        return any(metric.all_ticks for metric in self.expressions())
+
+
+def read_study(path: Path, cases: int | None = None) -> Study:
+    """Reads and checks the file; compiles models and machine. cases: in place of the file's. Raises DiagnosticError with all
+    errors of the file, or SimError."""
+    try:
+        source = SourceFile.read(path, str(path))
+    except SourceError as error:
+        raise SimError(f"{path}: {error}") from None
+    sink = DiagnosticSink()
+    root = parse_json(source, sink)
+    sink.raise_if_failed()
+    assert root is not None
+    return _Reader(path, sink).read(root, source.text, cases)
+
+
+class _Reader:
+    def __init__(self, path: Path, sink: DiagnosticSink):
+        self.path, self.sink = path, sink
+        self.reader = ConfigReader(sink)
+
+    def read(self, root: JsonNode, text: str, cases: int | None) -> Study:
+        optional = ("$schema", "description", "cases", "parameters", "metrics", "pass", "duration", "timeout_s")
+        keys = self.reader.object(root, "a study", ("simulation", "seed", "design"), optional)
+        self.sink.raise_if_failed()
+        assert keys is not None
+        config = self._simulation(keys)
+        seed = self.reader.integer(keys["seed"], "`seed`", 0, 2**64 - 1)
+        parameters = self._parameters(keys.get("parameters"), config)
+        design = self._design(keys, seed or 0, parameters, cases)
+        timeout_s = self.reader.number(keys.get("timeout_s"), "`timeout_s`", 0.1, 1e6) or _DEFAULT_TIMEOUT_S
+        run = SimRun(config)
+        try:
+            metrics = self._metrics(keys.get("metrics"), run.machine)
+            passes = self._expression(keys.get("pass"), "`pass`", run.machine, tuple(metrics))
+            machine = run.machine
+        finally:
+            run.close()
+        self.sink.raise_if_failed()
+        assert seed is not None and design is not None
+        print_of = hashlib.sha256("\n".join([text, str(design.count), config.plan]).encode())
+        for library in sorted({config.library, *(table.library for table in config.tables.values())}):
+            print_of.update(library.read_bytes())
+        return Study(
+            self.path, config, machine, seed, parameters, design, metrics, passes, timeout_s, print_of.hexdigest()
+        )
+
+    def _simulation(self, keys: dict[str, JsonNode]) -> SimConfig:
+        node = keys["simulation"]
+        text = self.reader.string(node, "`simulation`", "rover.sim.json")
+        duration = self.reader.number(keys.get("duration"), "`duration`", 1e-9, 1e9)
+        self.sink.raise_if_failed()
+        assert text is not None
+        try:
+            file = resolve_source(text, config=self.path) if text.startswith("package://") else self.path.parent / text
+        except SourcePathError as error:
+            raise SimError(f"{text}: {error}") from None
+        return load(file, duration_s=None if duration is None else Fraction(repr(duration)))
+
+    # ---- what is dispersed ------------------------------------------------------------------------------------------
+
+    def _parameters(self, node: JsonNode | None, config: SimConfig) -> tuple[Dispersed, ...]:
+        if node is None:
+            return ()
+        if node.kind != "object":
+            self.reader.wrong(
+                node, "`parameters` is an object from path to distribution", f'{{"plant.parameters.mass": {_EXAMPLE}}}'
+            )
+            return ()
+        starts = {line.rsplit(" ", 1)[0] for line in config.plan.splitlines() if line.startswith("set ")}
+        found = []
+        for path, member in node.members.items():
+            target = self._target(path, member.key_span, config, starts)
+            if target is None:
+                continue
+            spread = self._distribution(member.value, path, scalar_of(target[0].type))
+            if spread is not None:
+                found.append(Dispersed(path, *target, spread))
+        return tuple(found)
+
+    def _target(self, path: str, span: Span, config: SimConfig, starts: set[str]) -> tuple[ModelField, str] | None:
+        """The field, and how the statement that sets it begins."""
+        parts = _ELEMENT.fullmatch(path)
+        whole, brackets = parts.groups() if parts else (path, "")
+        instance, _, rest = whole.partition(".")
+        table = config.tables.get(instance)
+        field = table.fields.get(rest) if table else None
+        if field is None or field.role not in ("parameter", "input"):
+            known = [f"{i}.{f.path}" for i, t in config.tables.items() for f in t.of_role("parameter", "input")]
+            fix = nearest(whole, known) or f"such as `{known[0]}`" if known else "the simulation has none"
+            self.sink.error("E210", f"there is no parameter or input `{whole}` of a model", span, help=fix)
+            return None
+        shape = shape_of(field.type)
+        index = [int(text) for text in re.findall(r"\d+", brackets)]
+        if len(index) != len(shape) or any(i >= extent for i, extent in zip(index, shape, strict=True)):
+            what = f"`{whole}` is {field.type}"
+            fix = f"name an element: `{whole}{'[0]' * len(shape)}`" if shape else f"write `{whole}`"
+            self.sink.error("E217", f"{what}; a study disperses scalars", span, help=fix)
+            return None
+        element = 0
+        for i, extent in zip(index, shape, strict=True):
+            element = element * extent + i
+        assert element < count_of(field.type)
+        key = f"set {instance} {field.path} {element}"
+        if key not in starts:
+            fix = f"give it one: in `{field.role}s` of `{instance}`"
+            self.sink.error("E211", f"`{path}` has no value in the simulation", span, help=fix)
+            return None
+        return field, key
+
+    def _distribution(self, node: JsonNode, path: str, scalar: Scalar) -> Distribution | None:
+        keys = self.reader.object(node, f"the distribution of `{path}`", (), (*_SPREADS, "within", "weights"))
+        if keys is None:
+            return None
+        kinds = [kind for kind in _SPREADS if kind in keys]
+        if len(kinds) != 1:
+            message = f"the distribution of `{path}` has one of {', '.join(f'`{kind}`' for kind in _SPREADS)}"
+            self.sink.error("E202", message, node.span, help=f"such as {_EXAMPLE}")
+            return None
+        (kind,) = kinds
+        for extra, of in (("within", "normal"), ("weights", "choice")):
+            if extra in keys and kind != of:
+                self.sink.error("E214", f"`{extra}` is for `{of}`", keys[extra].span)
+                return None
+        if kind == "choice":
+            return self._choice(keys, scalar)
+        if not scalar.is_float:
+            fix = 'write {"choice": […]}'
+            self.sink.error("E217", f"`{path}` is {scalar.name}; `{kind}` gives floating numbers", node.span, help=fix)
+            return None
+        if kind == "linear":
+            return self._linear(keys["linear"])
+        if kind == "uniform":
+            ends = self._pair(keys["uniform"], "`uniform` is a list of the least and the greatest value")
+            return Uniform(*ends) if ends and self._ordered(ends, keys["uniform"]) else None
+        return self._normal(keys)
+
+    def _normal(self, keys: dict[str, JsonNode]) -> Distribution | None:
+        pair = self._pair(keys["normal"], "`normal` is a list of mean and standard deviation")
+        if pair is None:
+            return None
+        if pair[1] <= 0.0:
+            self.sink.error("E204", f"a standard deviation of {pair[1]:g}", keys["normal"].span, help="it is positive")
+            return None
+        if "within" not in keys:
+            return Normal(*pair, None)
+        ends = self._pair(keys["within"], "`within` is a list of the least and the greatest value")
+        return Normal(*pair, ends) if ends and self._ordered(ends, keys["within"]) else None
+
+    def _choice(self, keys: dict[str, JsonNode], scalar: Scalar) -> Distribution | None:
+        items = self.reader.list(keys["choice"], "`choice`")
+        values = [self.reader.value(item, scalar, "a choice") for item in items]
+        if not items and keys["choice"].kind == "array":
+            self.sink.error("E204", "`choice` is empty", keys["choice"].span)
+        if not items or any(value is None for value in values):
+            return None
+        plain = tuple(value[0] for value in values if value is not None and not isinstance(value[0], str))
+        weights = [
+            self.reader.number(item, "a weight", 0.0, 1e300)
+            for item in self.reader.list(keys.get("weights"), "`weights`")
+        ]
+        if "weights" not in keys:
+            return Choice(plain, (1.0,) * len(plain))
+        given = tuple(weight for weight in weights if weight is not None)
+        if len(given) != len(plain) or not sum(given) > 0.0:
+            message = f"{len(plain)} choices have {len(plain)} weights, and not all are 0"
+            self.sink.error("E204", message, keys["weights"].span)
+            return None
+        return Choice(plain, given)
+
+    def _linear(self, node: JsonNode) -> Distribution | None:
+        items = self.reader.list(node, "`linear`")
+        if len(items) != 3:
+            self.sink.error("E207", "`linear` is a list of first value, last value and count", node.span)
+            return None
+        first, last = (self.reader.number(item, "`linear`", -1e300, 1e300) for item in items[:2])
+        count = self.reader.integer(items[2], "the count of `linear`", 2, MAX_CASES)
+        if first is None or last is None or count is None:
+            return None
+        steps = count - 1
+        values = tuple(first + (last - first) * i / steps if i < steps else last for i in range(count))
+        return Choice(values, (1.0,) * count)
+
+    def _pair(self, node: JsonNode, rule: str) -> tuple[float, float] | None:
+        items = self.reader.list(node, rule.partition(" ")[0])
+        numbers = [self.reader.number(item, "a bound", -1e300, 1e300) for item in items]
+        if len(items) != 2:
+            if node.kind == "array":
+                self.sink.error("E207", rule, node.span, help="write […, …]")
+            return None
+        if numbers[0] is None or numbers[1] is None:
+            return None
+        return numbers[0], numbers[1]
+
+    def _ordered(self, ends: tuple[float, float], node: JsonNode) -> bool:
+        if ends[0] < ends[1]:
+            return True
+        self.sink.error("E204", f"{ends[0]:g} is not below {ends[1]:g}", node.span)
+        return False
+
+    # ---- which cases ------------------------------------------------------------------------------------------------
+
+    def _design(
+        self, keys: dict[str, JsonNode], seed: int, parameters: Sequence[Dispersed], given: int | None
+    ) -> Design | None:
+        name = self.reader.choice(keys["design"], "`design`", _DESIGNS)
+        count = self.reader.integer(keys.get("cases"), "`cases`", 1, MAX_CASES)
+        if name is None or ("cases" in keys and count is None):
+            return None
+        paths, spreads = [p.path for p in parameters], [p.distribution for p in parameters]
+        if name in ("random", "latin_hypercube"):
+            if "cases" not in keys:
+                self.sink.error(
+                    "E202", f"a design `{name}` has no `cases`", keys["design"].span, help='add `"cases": 100`'
+                )
+                return None
+            kind = Random if name == "random" else LatinHypercube
+            return kind(seed, paths, spreads, given or count or 1)
+        if "cases" in keys or given is not None:
+            place = keys["cases"].span if "cases" in keys else keys["design"].span
+            self.sink.error(
+                "E214", f"the parameters say how many cases a design `{name}` has", place, help="remove `cases`"
+            )
+            return None
+        return self._grid(name, keys["design"].span, parameters)
+
+    def _grid(self, name: str, span: Span, parameters: Sequence[Dispersed]) -> Design | None:
+        levels = []
+        for p in parameters:
+            found = p.distribution.levels() if name == "sweep" else p.distribution.corners()
+            if found is None:
+                need = "`choice` or `linear`" if name == "sweep" else "bounds: `within`"
+                self.sink.error("E214", f"a design `{name}` needs {need} for `{p.path}`", span)
+                return None
+            levels.append(found)
+        grid = Grid(levels)
+        if grid.count > MAX_CASES:
+            self.sink.error("E204", f"{grid.count} cases", span, help=f"there are at most {MAX_CASES}")
+            return None
+        return grid
+
+    # ---- what is measured -------------------------------------------------------------------------------------------
+
+    def _metrics(self, node: JsonNode | None, machine: Machine) -> dict[str, Metric]:
+        found: dict[str, Metric] = {}
+        for name, (definition, span) in self.reader.named(node, "`metrics`").items():
+            if name in OWN_COLUMNS or name in FUNCTIONS:
+                what = "a column of every table" if name in OWN_COLUMNS else "a function"
+                self.sink.error("E209", f"`{name}` is {what}", span, help="give the metric another name")
+            metric = self._expression(definition, f"metric `{name}`", machine, tuple(found))
+            if metric is not None:
+                found[name] = metric
+        return found
+
+    def _expression(self, node: JsonNode | None, what: str, machine: Machine, names: tuple[str, ...]) -> Metric | None:
+        text = self.reader.string(node, what, "max(body.outputs.speed)")
+        if text is None or node is None:
+            return None
+        try:
+            return Metric(text, machine, names)
+        except MetricError as error:
+            self.sink.error("E208", f"{what}: {error}", node.span)
+            return None

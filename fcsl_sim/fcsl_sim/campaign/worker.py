@@ -1,0 +1,59 @@
+# SPDX-License-Identifier: Apache-2.0
+"""A process that flies cases: reads lines `FIRST COUNT` from standard input and writes an outcome per case, as a line of JSON,
+to the file descriptor that it is given.
+
+    python3 -m fcsl_sim.campaign.worker STUDY CASES DESCRIPTOR
+"""
+
+from __future__ import annotations
+
+import ctypes
+import json
+import os
+import signal
+import sys
+from dataclasses import astuple
+from pathlib import Path
+
+from fcsl_compiler.base.diagnostics import DiagnosticError
+from simclient.errors import TwinError
+
+from ..errors import SimError
+from .flight import Flights, Outcome
+
+_PR_SET_PDEATHSIG = 1
+#: What a worker says before its first case.
+READY = "ready"
+
+
+def line_of(outcome: Outcome) -> str:
+    """NaN and infinite numbers as Python writes and reads them."""
+    return json.dumps(astuple(outcome))
+
+
+def outcome_of(line: str) -> Outcome:
+    case, seed, values, verdict, end, ticks, digest, metrics, error = json.loads(line)
+    return Outcome(case, seed, tuple(values), verdict, end, ticks, digest, tuple(metrics), error)
+
+
+def main(study: str, cases: str, descriptor: str) -> int:
+    # A model that hangs must not outlive the campaign; Ctrl-C is the campaign's.
+    ctypes.CDLL(None).prctl(_PR_SET_PDEATHSIG, signal.SIGKILL)
+    signal.signal(signal.SIGINT, signal.SIG_IGN)
+    try:
+        flights = Flights.of(Path(study), None if cases == "-" else int(cases))
+    except (DiagnosticError, SimError, TwinError, OSError) as error:
+        print(f"fcsl-sim: error: {error}", file=sys.stderr)
+        return 2
+    with os.fdopen(int(descriptor), "w") as out:
+        print(READY, file=out, flush=True)
+        for line in sys.stdin:
+            first, count = map(int, line.split())
+            for case in range(first, first + count):
+                print(line_of(flights.fly(case)), file=out, flush=True)
+    flights.close()
+    return 0
+
+
+if __name__ == "__main__":
+    sys.exit(main(*sys.argv[1:]))

@@ -1,0 +1,383 @@
+# SPDX-License-Identifier: Apache-2.0
+"""`fcsl-sim campaign`: what it flies, measures and writes; that nothing but the study decides it; what it survives."""
+
+from __future__ import annotations
+
+import json
+import os
+import shutil
+import signal
+import subprocess
+import sys
+import time
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pyarrow.parquet as pq
+import pytest
+from scipy import stats
+
+from fcsl_compiler.base.diagnostics import DiagnosticError
+from fcsl_sim import SimError
+from fcsl_sim.campaign.report import wilson
+from fcsl_sim.campaign.study import read_study
+from fcsl_sim.cli import main
+
+TEST = Path(__file__).resolve().parent
+#: A sensor of a constant, alone: what it gives can be said without flying it.
+SENSOR: dict[str, Any] = {
+    "tick_hz": 100,
+    "seed": 1,
+    "duration": 1.0,
+    "integrator": {"method": "rk4", "hz": 1000},
+    "models": {
+        "sensor": {"source": "package://fcsl_sim/models/noisy_sensor.c"},
+        "curve": {"source": "curve.c"},
+        "faulty": {"source": "faulty.c"},
+    },
+    "instances": {
+        "gauge": {
+            "model": "sensor",
+            "parameters": {"bias": 0.0, "sigma": 0.5, "dropout": False},
+            "inputs": {"truth": 3.0},
+        },
+        "curve": {"model": "curve", "parameters": {"values": [1.0, 2.0]}, "inputs": {"x": 0.0}},
+        "bad": {"model": "faulty", "parameters": {"at_s": 0.5, "how": 0}},
+    },
+    "rates": {"gauge": 100, "bad": 100},
+}
+STUDY: dict[str, Any] = {
+    "simulation": "gauge.sim.json",
+    "seed": 9,
+    "design": "random",
+    "cases": 40,
+    "parameters": {
+        "gauge.parameters.bias": {"normal": [1.0, 0.25]},
+        "gauge.parameters.sigma": {"uniform": [0.0, 0.5]},
+    },
+    "metrics": {
+        "average": "mean(gauge.outputs.value)",
+        "offset": "average - 3.0",
+        "final": "gauge.outputs.value",
+        "above": "duration(gauge.outputs.value > 4.0)",
+    },
+    "pass": "abs(offset) < 1.3",
+}
+Write = Callable[..., Path]
+
+
+@pytest.fixture
+def write(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Write:
+    """Writes a study, changed, and its simulation into a folder, which becomes the working directory."""
+
+    def write_study(**changes: Any) -> Path:
+        for name in ("curve.c", "faulty.c"):
+            shutil.copy(TEST / "models" / name, tmp_path)
+        (tmp_path / "gauge.sim.json").write_text(json.dumps(SENSOR))
+        path = tmp_path / "gauge.study.json"
+        study = {key: value for key, value in (STUDY | changes).items() if value is not None}
+        path.write_text(json.dumps(study, indent=2))
+        return path
+
+    monkeypatch.chdir(tmp_path)
+    return write_study
+
+
+def table_of(folder: Path | str) -> dict[str, Any]:
+    table = pq.read_table(Path(folder) / "cases.parquet")
+    return {name: np.array(table[name]) for name in table.column_names}
+
+
+# ---- what it flies and measures ------------------------------------------------------------------------------------
+
+
+def test_a_campaign_from_the_command_line(write: Write, capsys: pytest.CaptureFixture[str]) -> None:
+    status = main(["campaign", str(write())])
+    said = capsys.readouterr()
+    rows = table_of("gauge.campaign")
+    bias, sigma = rows["gauge.parameters.bias"], rows["gauge.parameters.sigma"]
+    assert rows["case"].tolist() == list(range(40)) and len(set(rows["seed"])) == 40
+    # Each case flies its own bias, deviation and noise.
+    assert np.abs(rows["average"] - 3.0 - bias).max() < 5 * 0.5 / 10
+    deviates = (rows["final"] - 3.0 - bias) / sigma
+    assert stats.kstest(deviates, "norm").pvalue > 1e-3
+    assert rows["offset"] == pytest.approx(rows["average"] - 3.0)
+    assert ((rows["above"] >= 0.0) & (rows["above"] <= 1.0)).all()
+    passed = np.abs(rows["offset"]) < 1.3
+    assert (rows["verdict"] == np.where(passed, "passed", "failed")).all()
+    assert 0 < passed.sum() < 40 and status == 1
+    assert said.out.startswith(f"{passed.sum()} of 40 passed")
+    assert (rows["ticks"] == 100).all() and (rows["end"] == "duration").all()
+    assert Path("gauge.campaign/report.png").stat().st_size > 10_000
+    assert "40 of 40 cases" in said.err
+
+
+def test_one_case_again(write: Write, capsys: pytest.CaptureFixture[str]) -> None:
+    """By itself it has the values, the metrics and the hash that it has in the table, and a bag on demand."""
+    path = write()
+    main(["campaign", str(path), "--jobs", "1"])
+    rows = table_of("gauge.campaign")
+    capsys.readouterr()
+    case = int(np.flatnonzero(rows["verdict"] == "passed")[0])
+    assert main(["campaign", str(path), "--case", str(case), "--record", "bag", "--json"]) == 0
+    found = json.loads(capsys.readouterr().out)
+    assert found["hash"] == rows["hash"][case] and found["seed"] == rows["seed"][case]
+    assert found["values"]["gauge.parameters.bias"] == rows["gauge.parameters.bias"][case]
+    assert found["metrics"]["final"] == rows["final"][case]
+    assert any(Path("bag").glob("*.mcap"))
+    assert len(set(rows["hash"])) == 40
+
+
+def test_elements_and_inputs_are_dispersed(write: Write) -> None:
+    parameters = {"curve.inputs.x": {"choice": [1.0, 2.0]}, "curve.parameters.values[1]": {"linear": [0.0, 10.0, 3]}}
+    path = write(design="sweep", cases=None, parameters=parameters, metrics={"y": "curve.outputs.y"}, **{"pass": None})
+    assert main(["campaign", str(path)]) == 0
+    rows = table_of("gauge.campaign")
+    x, value = rows["curve.inputs.x"], rows["curve.parameters.values[1]"]
+    assert list(zip(x, value, strict=True)) == [(a, b) for a in (1.0, 2.0) for b in (0.0, 5.0, 10.0)]
+    assert rows["y"].tolist() == (x + 1.0 + value + 2.0 + 2.0).tolist()  # the last of the two values fills the rest
+
+
+# ---- nothing but the study decides -----------------------------------------------------------------------------------
+
+
+def test_the_table_is_the_same_file_for_any_number_of_processes_and_after_a_kill(write: Write) -> None:
+    path = write(cases=300, design="latin_hypercube")
+    for jobs in ("1", "3"):
+        main(["campaign", str(path), "--jobs", jobs, "-o", jobs])
+    line = ["fcsl-sim", "campaign", str(path), "-o", "killed"]
+    killed = subprocess.Popen([*line, "--jobs", "2"], stderr=subprocess.DEVNULL, stdout=subprocess.DEVNULL)
+    places = Path("killed/cases.bin")
+    for _ in range(3000):
+        if places.exists() and flown(places, 300) >= 20:
+            break
+        time.sleep(0.01)
+    killed.send_signal(signal.SIGKILL)
+    killed.wait()
+    before = flown(places, 300)
+    assert 20 <= before
+    assert not Path("killed/cases.parquet").exists() or before == 300
+    again = subprocess.run(line, capture_output=True, text=True, timeout=300)
+    assert again.returncode == 1 and f"{before} of 300 cases are there already" in again.stderr
+    tables = [Path(folder, "cases.parquet").read_bytes() for folder in ("1", "3", "killed")]
+    assert tables[0] == tables[1] == tables[2]
+
+
+def flown(places: Path, cases: int) -> int:
+    """How many records of the file have a verdict, their first byte."""
+    data = places.read_bytes()
+    size = len(data) // cases
+    return sum(data[i * size] != 0 for i in range(cases)) if size else 0
+
+
+def test_another_study_does_not_go_on(write: Write, capsys: pytest.CaptureFixture[str]) -> None:
+    main(["campaign", str(write())])
+    path = write(seed=10)
+    capsys.readouterr()
+    assert main(["campaign", str(path)]) == 2
+    assert "has results of another study" in capsys.readouterr().err
+    assert main(["campaign", str(path), "--restart"]) == 1
+    Path("mine").mkdir()
+    Path("mine/thesis.tex").write_text("")
+    for extra in ([], ["--restart"]):
+        assert main(["campaign", str(path), "-o", "mine", *extra]) == 2
+    assert "no campaign's folder" in capsys.readouterr().err and Path("mine/thesis.tex").exists()
+
+
+def test_a_whole_campaign_is_not_flown_again(write: Write, capsys: pytest.CaptureFixture[str]) -> None:
+    path = write()
+    main(["campaign", str(path)])
+    before = Path("gauge.campaign/cases.parquet").read_bytes()
+    capsys.readouterr()
+    assert main(["campaign", str(path), "--json"]) == 1
+    summary = json.loads(capsys.readouterr().out)
+    assert summary["cases"] == 40 == summary["passed"] + summary["failed"] and summary["errors"] == 0
+    assert Path("gauge.campaign/cases.parquet").read_bytes() == before
+
+
+# ---- what it survives ------------------------------------------------------------------------------------------------
+
+
+def test_a_model_that_crashes_or_hangs_costs_its_own_case(write: Write, capsys: pytest.CaptureFixture[str]) -> None:
+    path = write(
+        design="sweep",
+        cases=None,
+        parameters={"bad.parameters.how": {"choice": [0, 1, 3, 0, 2, 0]}},
+        metrics={"final": "gauge.outputs.value"},
+        timeout_s=1.0,
+        **{"pass": None},
+    )
+    assert main(["campaign", str(path), "--jobs", "2"]) == 1
+    rows = table_of("gauge.campaign")
+    assert rows["verdict"].tolist() == ["passed", "error", "error", "passed", "error", "passed"]
+    crashed = "a model crashed: `--case` with this number says which"
+    assert rows["error"].tolist() == ["", crashed, crashed, "", "no result within 1 s (`timeout_s`)", ""]
+    assert np.isnan(rows["final"]).tolist() == [False, True, True, False, True, False]
+    assert "case 1 error: a model crashed" in capsys.readouterr().out
+    line = ["fcsl-sim", "campaign", str(path), "--case", "1"]
+    alone = subprocess.run(line, capture_output=True, text=True, timeout=60)
+    assert alone.returncode == 2 and "`update` of `bad` crashed at 0.500000000 s: SIGSEGV" in alone.stderr
+
+
+def test_an_error_of_a_flight_is_its_outcome(write: Write) -> None:
+    """`init` refuses a negative sigma; the study goes on."""
+    path = write(design="corners", cases=None, parameters={"gauge.parameters.sigma": {"uniform": [-1.0, 1.0]}})
+    assert main(["campaign", str(path)]) == 1
+    rows = table_of("gauge.campaign")
+    assert rows["error"].tolist() == ["instance `gauge`: parameters.sigma must not be negative", ""]
+
+
+def test_no_process_is_left_after_ctrl_c(write: Write, tmp_path: Path) -> None:
+    path = write(cases=1_000_000)
+    line = ["fcsl-sim", "campaign", str(path), "--jobs", "2"]
+    campaign = subprocess.Popen(line, stderr=subprocess.PIPE, stdout=subprocess.DEVNULL, text=True)
+    assert campaign.stderr is not None
+    assert "of 1000000 cases" in campaign.stderr.readline()
+    children = [int(pid) for pid in Path(f"/proc/{campaign.pid}/task/{campaign.pid}/children").read_text().split()]
+    assert len(children) == 2
+    campaign.send_signal(signal.SIGINT)
+    assert campaign.wait(timeout=60) == 130
+    campaign.stderr.close()
+    for _ in range(1000):
+        if not any(os.path.exists(f"/proc/{pid}") for pid in children):
+            break
+        time.sleep(0.01)
+    assert not any(os.path.exists(f"/proc/{pid}") for pid in children)
+
+
+# ---- in pytest -------------------------------------------------------------------------------------------------------
+
+TEST_OF_CASES = """
+import pytest
+
+@pytest.mark.fcsl_campaign("gauge.study.json", cases=6)
+def test_each(fcsl_case):
+    assert fcsl_case["average"] == pytest.approx(3.0 + fcsl_case["gauge.parameters.bias"], abs=0.25)
+    assert fcsl_case.verdict in ("passed", "failed") and fcsl_case.ticks == 100
+    assert fcsl_case.case != 4
+
+@pytest.mark.fcsl_campaign("gauge.study.json")
+def test_all(fcsl_case):
+    assert fcsl_case.hash
+
+@pytest.mark.fcsl_campaign("broken.study.json")
+def test_errors(fcsl_case):
+    pass
+"""
+
+
+def test_a_test_of_each_case(write: Write, tmp_path: Path) -> None:
+    write(parameters={"gauge.parameters.sigma": {"uniform": [-1.0, -0.5]}}).rename("broken.study.json")
+    write(cases=3)
+    Path("test_cases.py").write_text(TEST_OF_CASES)
+    line = [
+        sys.executable,
+        "-m",
+        "pytest",
+        "-p",
+        "no:cacheprovider",
+        "-q",
+        "-n0",
+        "test_cases.py",
+        "-k",
+        "each or all or case0",
+    ]
+    done = subprocess.run(line, capture_output=True, text=True, timeout=300)
+    assert "1 failed, 8 passed" in done.stdout and "1 error" in done.stdout, done.stdout + done.stderr
+    assert "FAILED test_cases.py::test_each[case4]" in done.stdout
+    assert "test_errors[case0]" in done.stdout and "parameters.sigma must not be negative" in done.stdout
+    assert "broken.study.json --cases 40 --case 0" in done.stdout
+
+
+def test_a_test_of_cases_names_its_study(tmp_path: Path) -> None:
+    (tmp_path / "test_cases.py").write_text("def test_each(fcsl_case):\n    pass\n")
+    line = [sys.executable, "-m", "pytest", "-p", "no:cacheprovider", "-q", "-n0", "test_cases.py"]
+    done = subprocess.run(line, cwd=tmp_path, capture_output=True, text=True, timeout=300)
+    assert "is the case of a study: write @pytest.mark.fcsl_campaign" in done.stdout + done.stderr
+
+
+# ---- what is refused -------------------------------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize(
+    ("changes", "expected"),
+    [
+        ({"design": "randum"}, "E205: `design` cannot be `randum`"),
+        ({"cases": None}, "E202: a design `random` has no `cases`"),
+        ({"design": "sweep"}, "E214: the parameters say how many cases a design `sweep` has"),
+        ({"design": "sweep", "cases": None}, "E214: a design `sweep` needs `choice` or `linear` for `gauge.parameters.bias`"),
+        ({"design": "corners", "cases": None}, "E214: a design `corners` needs bounds: `within` for `gauge.parameters.bias`"),
+        ({"parameters": {"gauge.parameters.bais": {"uniform": [0.0, 1.0]}}}, "E210: there is no parameter or input `gauge.parameters.bais` of a model"),
+        ({"parameters": {"gauge.outputs.value": {"uniform": [0.0, 1.0]}}}, "E210: there is no parameter or input `gauge.outputs.value` of a model"),
+        ({"parameters": {"curve.parameters.values": {"uniform": [0.0, 1.0]}}}, "E217: `curve.parameters.values` is f64[4]; a study disperses scalars"),
+        ({"parameters": {"curve.parameters.values[4]": {"uniform": [0.0, 1.0]}}}, "E217: `curve.parameters.values` is f64[4]; a study disperses scalars"),
+        ({"parameters": {"curve.inputs.offset": {"uniform": [0.0, 1.0]}}}, "E211: `curve.inputs.offset` has no value in the simulation"),
+        ({"parameters": {"bad.parameters.how": {"uniform": [0.0, 1.0]}}}, "E217: `bad.parameters.how` is i64; `uniform` gives floating numbers"),
+        ({"parameters": {"gauge.parameters.bias": {}}}, "E202: the distribution of `gauge.parameters.bias` has one of `uniform`, `normal`, `choice`, `linear`"),
+        ({"parameters": {"gauge.parameters.bias": {"uniform": [1.0, 1.0]}}}, "E204: 1 is not below 1"),
+        ({"parameters": {"gauge.parameters.bias": {"uniform": [1.0]}}}, "E207: `uniform` is a list of the least and the greatest value"),
+        ({"parameters": {"gauge.parameters.bias": {"normal": [0.0, 0.0]}}}, "E204: a standard deviation of 0"),
+        ({"parameters": {"gauge.parameters.bias": {"uniform": [0, 1], "within": [0, 1]}}}, "E214: `within` is for `normal`"),
+        ({"parameters": {"gauge.parameters.bias": {"choice": []}}}, "E204: `choice` is empty"),
+        ({"parameters": {"gauge.parameters.bias": {"choice": [1.0], "weights": [0.0]}}}, "E204: 1 choices have 1 weights, and not all are 0"),
+        ({"parameters": {"gauge.parameters.dropout": {"choice": [1]}}}, "E207: a choice is bool, not an int"),
+        ({"metrics": {"m": "gauge.outputs.valu"}}, "E208: metric `m`: `gauge.outputs.valu`: machine `plant_only` has no such field"),
+        ({"metrics": {"m": "max(1.0)"}}, "E208: metric `m`: `max` is of all ticks, so it needs a path"),
+        ({"metrics": {"m": "max(min(gauge.outputs.value))"}}, "E208: metric `m`: `min` takes all ticks already"),
+        ({"metrics": {"m": "open(gauge.outputs.value)"}}, "E208: metric `m`: there is no function `open`"),
+        ({"metrics": {"m": "(lambda: 0)()"}}, "E208: metric `m`: `(lambda: 0)()` is neither path, number"),
+        ({"metrics": {"error": "1"}}, "E209: `error` is a column of every table"),
+        ({"metrics": {"max": "1"}}, "E209: `max` is a function"),
+        ({"metrics": {"m": "1 +"}}, "E208: metric `m`: `1 +` is no expression"),
+        ({"pass": "mean(offset) > 0"}, "E208: `pass`: `offset` is a metric, one number of a flight"),
+        ({"pass": "machine.state == 'NONE'"}, "E208: `pass`: "),
+        ({"simulation": 3}, "E208: `simulation` is a string"),
+        ({"sed": 1}, "E201: unknown key `sed` in a study"),
+    ],
+)  # fmt: skip
+def test_wrong_studies(write: Write, changes: dict[str, Any], expected: str) -> None:
+    metrics = {"parameters": {}} if "metrics" in changes or "pass" in changes else {}
+    if "metrics" in changes:
+        metrics["pass"] = None
+    with pytest.raises(DiagnosticError) as error:
+        read_study(write(**(metrics | changes)))
+    found = [f"{d.code}: {d.message}" for d in error.value.diagnostics]
+    assert found[0].startswith(expected), found
+
+
+@pytest.mark.parametrize(
+    ("arguments", "message"),
+    [
+        (["--case", "40"], "there is no case 40: the study has cases 0 to 39"),
+        (["--record", "bag"], "`--record` is for one case: give `--case` too"),
+        (["--case", "1", "--record", "."], ".: exists already"),
+        (["--engine", "ray"], "needs the Python package `ray`"),
+    ],
+)
+def test_wrong_options(
+    write: Write,
+    capsys: pytest.CaptureFixture[str],
+    monkeypatch: pytest.MonkeyPatch,
+    arguments: list[str],
+    message: str,
+) -> None:
+    monkeypatch.setitem(sys.modules, "ray", None)  # as if it were not installed
+    assert main(["campaign", str(write()), *arguments]) == 2
+    assert message in capsys.readouterr().err
+
+
+def test_no_study(write: Write, tmp_path: Path) -> None:
+    write()
+    with pytest.raises(SimError, match="none.study.json"):
+        read_study(tmp_path / "none.study.json")
+
+
+# ---- statistics ------------------------------------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize(("passed", "count"), [(0, 10), (10, 10), (7, 10), (970, 1000)])
+def test_the_confidence_interval_is_that_of_scipy(passed: int, count: int) -> None:
+    interval = stats.binomtest(passed, count).proportion_ci(0.95, method="wilson")
+    assert wilson(passed, count) == pytest.approx((interval.low, interval.high), abs=1e-12)
