@@ -121,9 +121,33 @@ def _needs(tables: Mapping[str, ModelTable], links: Sequence[Link], split: set[s
     return needs
 
 
+def _wishes(tables: Mapping[str, ModelTable], links: Sequence[Link], split: set[str]) -> dict[Step, set[Step]]:
+    """What comes before each step where no circle of updates forbids it: of a model that has `output` and `update`, an output may
+    be made by either, so what it feeds follows the update. (What `output` made before stays as it is.)"""
+    wishes: dict[Step, set[Step]] = {}
+    for link in links:
+        source = tables[link.source]
+        if source.has_output and source.has_update and link.source != link.target:
+            for step in _steps(link.target, tables[link.target], split):
+                if step[0] == UPDATE:
+                    wishes.setdefault(step, set()).add((UPDATE, link.source))
+    return wishes
+
+
 def _sorted(tables: Mapping[str, ModelTable], links: Sequence[Link], split: set[str]) -> tuple[list[Step], set[Step]]:
     """Topological order, and the steps that have none."""
-    needs = _needs(tables, links, split)
+    needs, wishes = _needs(tables, links, split), _wishes(tables, links, split)
+    while True:
+        order, stuck = _topological({step: needs[step] | wishes.get(step, set()) for step in needs})
+        refused = [step for step in stuck if step in wishes]
+        if not refused:
+            return order, stuck
+        for step in refused:
+            del wishes[step]
+
+
+def _topological(needs: Mapping[Step, set[Step]]) -> tuple[list[Step], set[Step]]:
+    """The steps in order, ties by name; and those on a circle or behind one."""
     feeds: dict[Step, set[Step]] = {step: set() for step in needs}
     for step, sources in needs.items():
         for source in sources:

@@ -150,6 +150,22 @@ def test_a_phase_delays_the_updates(open_sim: Open) -> None:
         assert sim.machine_value("pilot.outputs.pos_z") == pytest.approx(0.963, abs=1e-12)
 
 
+@pytest.mark.parametrize("name", ["a", "z"])
+def test_what_an_update_makes_is_read_after_it_whatever_the_names(name: str, open_sim: Open) -> None:
+    """Also where the model has an `output`, too."""
+
+    def change(config: dict[str, Any]) -> None:
+        config["models"]["counter"] = {"source": "counter.c"}
+        config["instances"] |= {"m": {"model": "counter"}, name: config["instances"]["altimeter"]}
+        config["connections"].append({"from": "m.count", "to": f"{name}.truth"})
+        config["rates"] |= {"m": 100, name: 100}
+
+    with open_sim(change) as sim:
+        for ticks in range(1, 5):
+            sim.run(1)
+            assert sim.get(f"{name}.outputs.value") == ticks == sim.get("m.outputs.count")
+
+
 @pytest.mark.parametrize(
     ("rate", "message"),
     [
