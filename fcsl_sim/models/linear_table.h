@@ -19,11 +19,12 @@ typedef struct {
 static inline bool table_increases(const double *x, uint32_t capacity)
 {
     for (uint32_t i = 1; i < capacity; i++) {
-        if (!(x[i] > x[i - 1] || x[i] == x[capacity - 1])) {
+        const bool fills = x[i] == x[i - 1] && x[i] == x[capacity - 1];
+        if (!(x[i] > x[i - 1] || fills)) {
             return false;
         }
     }
-    return x[0] <= x[capacity - 1];
+    return x[0] == x[0];
 }
 
 static inline table_place_t table_find(const double *x, uint32_t capacity, double at)

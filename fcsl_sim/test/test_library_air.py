@@ -701,6 +701,8 @@ NAN = float("nan")
         ("atmosphere_1976", {}, {"temperature_offset": NAN}, "temperature_offset must be more than"),
         ("wind_profile", WIND, {"height": [10.0, 10.0, 20.0]}, "height must increase"),
         ("wind_profile", WIND, {"height": [10.0, 5.0]}, "height must increase"),
+        ("wind_profile", WIND, {"height": [0.0, 20.0, 10.0]}, "height must increase"),
+        ("wind_profile", WIND, {"height": [NAN]}, "height must increase"),
         ("wind_profile", WIND, {"height": [0.0, NAN]}, "height must increase"),
         ("dryden_turbulence", TURBULENCE, {"wind_speed_20ft": -1.0}, "wind_speed_20ft must not be negative"),
         ("dryden_turbulence", TURBULENCE, {"high_intensity": NAN}, "high_intensity must not be negative"),
