@@ -11,6 +11,8 @@ import time
 from collections.abc import Callable, Iterator
 from contextlib import suppress
 from dataclasses import dataclass, field
+from tempfile import TemporaryFile
+from typing import IO
 
 from ..errors import SimError
 from .flight import CRASHED, Outcome, not_flown
@@ -23,14 +25,17 @@ _MAX_PORTION = 256
 #: To load study, models and machine, s.
 _START_S = 600.0
 _READ_BYTES = 1 << 16
+_WORDS_BYTES = 1 << 14
 
 
 @dataclass
 class _Worker:
     process: subprocess.Popen[bytes]
     results: int
+    words: IO[bytes]  # on standard error
     text: bytes = b""
     ready: bool = False
+    alone: bool = False  # the last portion is one case
     cases: list[int] = field(default_factory=list)  # handed out, without a result yet
     since: float = field(default_factory=time.monotonic)  # the case in flight began, or the process
 
@@ -54,6 +59,7 @@ class _Pool:
         self.workers: list[_Worker] = []
         self.portion = 1
         self.pending: list[int] = []  # taken from `cases`, not handed out
+        self.alone: list[int] = []  # to be flown one by one: one of them has ended a process
 
     def fly(self, jobs: int, progress: Callable[[], None]) -> Iterator[Outcome]:
         for _ in range(jobs):
@@ -76,45 +82,50 @@ class _Pool:
         results, theirs = os.pipe()
         cases = "-" if self.given_cases is None else str(self.given_cases)
         line = [sys.executable, "-m", "fcsl_sim.campaign.worker", str(self.study.path), cases, str(theirs)]
+        words = TemporaryFile()  # a pipe would fill, and a model that prints much would wait for ever
         try:
             process = subprocess.Popen(
-                line, stdin=subprocess.PIPE, stdout=subprocess.DEVNULL, stderr=subprocess.PIPE, pass_fds=[theirs]
+                line, stdin=subprocess.PIPE, stdout=subprocess.DEVNULL, stderr=words, pass_fds=[theirs]
             )
         except OSError as error:
             os.close(results)
             raise SimError(f"no process for flights: {error.strerror}") from None
         finally:
             os.close(theirs)
-        worker = _Worker(process, results)
+        worker = _Worker(process, results, words)
         self.workers.append(worker)
         self.selector.register(results, selectors.EVENT_READ, worker)
 
     def _forget(self, worker: _Worker) -> bytes:
-        """Its last words on standard error. It has ended, or was killed."""
+        """Its words on standard error. It has ended, or was killed."""
         self.workers.remove(worker)
         self.selector.unregister(worker.results)
         os.close(worker.results)
         process = worker.process
-        assert process.stdin and process.stderr
+        assert process.stdin
         with suppress(BrokenPipeError):
             process.stdin.close()
-        words = process.stderr.read()
-        process.stderr.close()
         process.wait()
-        return words
+        worker.words.seek(0)
+        with worker.words:
+            return worker.words.read(_WORDS_BYTES)
 
     # ---- cases --------------------------------------------------------------------------------------------------------
 
     def _hand_out(self, worker: _Worker) -> None:
-        """The next portion, or the end of the work."""
-        portion = self._next_portion()
+        """The next portion, before the last one is flown; or the end of the work."""
+        if worker.cases and (self.alone or worker.alone or len(worker.cases) > self.portion // 2):
+            return
+        portion = [self.alone.pop()] if self.alone else self._next_portion()
+        worker.alone = len(portion) == 1
         assert worker.process.stdin
         with suppress(BrokenPipeError):  # it has crashed: its pipe of results ends, too
             if portion:
-                worker.cases, worker.since = portion, time.monotonic()
+                worker.since = worker.since if worker.cases else time.monotonic()
+                worker.cases += portion
                 worker.process.stdin.write(f"{portion[0]} {len(portion)}\n".encode())
                 worker.process.stdin.flush()
-            else:
+            elif not worker.cases:
                 worker.process.stdin.close()
 
     def _next_portion(self) -> list[int]:
@@ -136,8 +147,8 @@ class _Pool:
             yield from self._ended(worker)
             return
         *lines, worker.text = (worker.text + data).split(b"\n")
+        now, done = time.monotonic(), 0
         for line in lines:
-            now = time.monotonic()
             if not worker.ready:
                 assert line.decode() == READY
                 worker.ready = True
@@ -146,11 +157,12 @@ class _Pool:
             outcome = outcome_of(line.decode())
             assert worker.cases and worker.cases[0] == outcome.case
             worker.cases.pop(0)
-            self._adapt(now - worker.since)
-            worker.since = now
+            done += 1
             yield outcome
-            if not worker.cases:
-                self._hand_out(worker)
+        if done:
+            self._adapt((now - worker.since) / done)
+            worker.since = now
+            self._hand_out(worker)
 
     def _adapt(self, took_s: float) -> None:
         wanted = int(_PORTION_S / max(took_s, 1e-6))
@@ -163,7 +175,7 @@ class _Pool:
                 words.removeprefix("fcsl-sim: error: ") or "a process for flights ended before its first one"
             )
         if worker.cases:
-            yield self._lost(worker, CRASHED)
+            yield from self._lost(worker, CRASHED)
 
     def _check_time(self, worker: _Worker) -> Iterator[Outcome]:
         limit = self.study.timeout_s if worker.ready else _START_S
@@ -173,11 +185,12 @@ class _Pool:
         self._forget(worker)
         if not worker.ready:
             raise SimError(f"a process for flights is not ready after {_START_S:g} s")
-        yield self._lost(worker, f"no result within {limit:g} s (`timeout_s`)")
+        yield from self._lost(worker, f"no result within {limit:g} s (`timeout_s`)")
 
-    def _lost(self, worker: _Worker, why: str) -> Outcome:
-        """Of the case in flight; another process goes on with those behind it."""
-        case, *rest = worker.cases
-        self.pending.extend(reversed(rest))
+    def _lost(self, worker: _Worker, why: str) -> Iterator[Outcome]:
+        """A case by itself is what ended the process. Others are flown one by one to find it."""
         self._start()
-        return not_flown(self.study, case, why)
+        if len(worker.cases) == 1:
+            yield not_flown(self.study, worker.cases[0], why)
+        else:
+            self.alone += reversed(worker.cases)
