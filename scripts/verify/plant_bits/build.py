@@ -53,10 +53,12 @@ void {name}(const void *of)
     }}
 }}
 """
+#: Models of the library that the flights have not.
+_OTHERS = ("serial_link", "earth_round", "earth_wgs84", "rigid_body_geodetic")
 #: By name: source, and the flags that select what is in it.
 MODELS = {
     "lander_plant": (ROOT / "examples/lander/sim/lander_plant.c", ()),
-    "noisy_sensor": (ROOT / "fcsl_sim/models/noisy_sensor.c", ()),
+    **{path.stem: (path, ()) for path in sorted((ROOT / "fcsl_sim/models").glob("*.c")) if path.stem not in _OTHERS},
     "ball": (ROOT / "fcsl_sim/test/models/ball.c", ()),
     "kepler": (ROOT / "fcsl_sim/test/models/problem.c", ("-DPROBLEM=1",)),
     "pleiades": (ROOT / "fcsl_sim/test/models/problem.c", ("-DPROBLEM=3",)),

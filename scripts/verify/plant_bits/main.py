@@ -3,8 +3,8 @@
 
     python3 scripts/verify plant_bits [--all]
 
-Simulator, models and the lander's controller are built for each target and fly: the lander with noisy sensors; bouncing balls,
-whose events end steps; Kepler's orbit and the Pleiades, with each integrator. Each flight is flown twice in one process, which must
+Simulator, models and the lander's controller are built for each target and fly: the lander with noisy sensors; an aircraft of
+nearly every model of the library; bouncing balls, whose events end steps; Kepler's orbit and the Pleiades, with each integrator. Each flight is flown twice in one process, which must
 not differ either. The first difference is named by tick and value. Then the controls: builds that must be found different.
 """
 

@@ -11,7 +11,11 @@ from fcsl_sim import load, plan
 from ..shared.cases import ROOT
 from .build import MACHINE
 
-_LANDER = ROOT / "examples/lander/sim/lander.sim.json"
+#: Simulation files.
+_FILES = {
+    "lander": ROOT / "examples/lander/sim/lander.sim.json",
+    "aircraft": ROOT / "fcsl_sim/test/library/aircraft.sim.json",
+}
 #: Steps a second of each integrator; 0: adaptive.
 _METHODS = {"euler": 300, "rk2": 200, "rk4": 100, "ab4": 700, "verlet": 250, "rk45": 0}
 #: x at the start, and rates are those of _METHODS times this.
@@ -24,7 +28,7 @@ _PROBLEMS = {
 }
 #: Their flights, seconds of 100 ticks.
 _SECONDS = 3
-PLANS = ("lander", "balls", *_PROBLEMS)
+PLANS = (*_FILES, "balls", *_PROBLEMS)
 
 
 def _bits(value: float) -> str:
@@ -85,23 +89,27 @@ def _balls(libraries: dict[str, Path]) -> list[str]:
 
 
 @cache
-def _lander() -> list[str]:
+def _of_file(name: str) -> list[str]:
     """What `fcsl-sim` flies, but for its views."""
-    lines = load(_LANDER).plan.splitlines()
+    lines = load(_FILES[name]).plan.splitlines()
     return [line for line in lines[1:-1] if not line.startswith("views ")]
 
 
-def _lander_plan(libraries: dict[str, Path]) -> list[str]:
+def _file_plan(flight: str, libraries: dict[str, Path]) -> list[str]:
+    """With the libraries of the target. A plant alone is flown beside the controller, which it does not meet."""
     lines = []
-    for line in _lander():
+    for line in _of_file(flight):
         keyword, name = line.split()[:2]
-        is_library = keyword in ("machine", "model")
-        lines.append(plan.library_statement(keyword, name, libraries[name]) if is_library else line)
+        if keyword == "machine":
+            line = plan.library_statement("machine", MACHINE, libraries[MACHINE])
+        elif keyword == "model":
+            line = plan.library_statement("model", name, libraries[name])
+        lines.append(line)
     return lines
 
 
 def plan_text(name: str, libraries: dict[str, Path]) -> str:
     """The plan of a flight, with these libraries."""
-    if name == "lander":
-        return plan.document(_lander_plan(libraries))
+    if name in _FILES:
+        return plan.document(_file_plan(name, libraries))
     return plan.document(_balls(libraries) if name == "balls" else _problem(name, libraries))
