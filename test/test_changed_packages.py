@@ -11,7 +11,9 @@ sys.path.insert(0, str(ROOT / "scripts"))
 from changed_packages import manifests, touched  # noqa: E402
 
 ALL = sorted(manifests(ROOT))
-EXAMPLES = ["ahrs", "arming", "lander", "minimal", "models", "thermal_guard"]
+EXAMPLES = [
+    "ahrs", "arming", "check_cases", "lander", "minimal", "models", "quadrotor", "satellite", "thermal_guard",
+]  # fmt: skip
 
 
 @pytest.mark.parametrize(

@@ -10,6 +10,8 @@ import jsonschema
 import pytest
 
 TIMEOUT_S = 240
+EXAMPLES = Path(__file__).resolve().parents[1] / "examples"
+QUADROTOR = EXAMPLES / "quadrotor"
 
 
 def run(*command: object, cwd: Path, status: int = 0) -> str:
@@ -136,6 +138,16 @@ def test_the_machine_of_a_plant(tmp_path: Path) -> None:
         (("plant", "slew"), "`slew.c` exists; nothing was written"),
         (("plant", "Plant"), "`Plant` is not a valid name"),
         (("plant", "../plant"), "is not a valid name"),
+        (("vehicle", "Craft2", "--like", QUADROTOR), "`Craft2` is not a name of a package"),
+        (("vehicle", "craft", "--like", QUADROTOR), "`craft` exists; nothing was written"),
+        (("vehicle", "quadrotor", "--like", QUADROTOR), "`quadrotor` is the other vehicle's name"),
+        (
+            ("vehicle", "craft2", "--like", "nowhere/at_all"),
+            "is neither a folder with a package.xml nor the name of a package",
+        ),
+        (("vehicle", "craft2", "--like", "no_such_package"), "no_such_package"),
+        (("vehicle", "craft2", "--like", "fcsl_msgs"), "is no vehicle: it has no CMakeLists.txt"),
+        (("vehicle", "craft2", "--like", EXAMPLES / "minimal"), "is no vehicle: it has no simulation in sim/"),
         (("algorithm", "transition_request"), "`TransitionRequest` is a name of the language"),
     ],
 )
@@ -147,6 +159,24 @@ def test_nothing_is_overwritten_and_names_are_checked(tmp_path: Path, arguments:
     before = files(tmp_path)
     assert message in run("fcslc", "new", *arguments, cwd=tmp_path, status=2)
     assert files(tmp_path) == before and (tmp_path / "test" / "test_slew.py").read_text() == "mine"
+
+
+@pytest.mark.parametrize("like", [QUADROTOR, "quadrotor"], ids=["folder", "package"])
+def test_a_vehicle(tmp_path: Path, like: object) -> None:
+    """Another airframe by parameters alone: heavier, and the machine knows it."""
+    run("fcslc", "new", "vehicle", "falcon", "--like", like, cwd=tmp_path)
+    made = files(tmp_path / "falcon")
+    assert {"CMakeLists.txt", "package.xml", "README.md", "fc/falcon.json", "sim/falcon.sim.json"} <= made
+    others = [name for name in made - {"README.md"} if "quadrotor" in (tmp_path / "falcon" / name).read_text()]
+    assert others == []
+    run("fcslc", "check", "--strict", "fc/falcon.json", cwd=tmp_path / "falcon")
+    assert " passed" in pytest_in(tmp_path / "falcon", "test/test_mixer.py")
+    for name, text in (("sim/falcon.sim.json", '"dry_mass": 1.2'), ("fc/falcon.json", '"mass": 1.2')):
+        path = tmp_path / "falcon" / name
+        assert text in path.read_text()
+        path.write_text(path.read_text().replace(text, text.replace("1.2", "1.5")))
+    flown = run("fcsl-sim", "run", "sim/falcon.sim.json", "--json", cwd=tmp_path / "falcon")
+    assert json.loads(flown)["until_held"] is True
 
 
 def test_a_package(tmp_path: Path) -> None:

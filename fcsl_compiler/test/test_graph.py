@@ -29,8 +29,11 @@ PICTURES = {
     "ahrs/ahrs.json": "ahrs/ahrs.svg",
     "arming/arming.json": "arming/arming.svg",
     "lander/fc/lander_control.json": "lander/lander_control.svg",
+    "quadrotor/fc/quadrotor.json": "quadrotor/quadrotor.svg",
+    "satellite/fc/satellite.json": "satellite/satellite.svg",
     "thermal_guard/thermal_guard.json": "thermal_guard/thermal_guard.svg",
 }
+BOXES = ("lander/fc/filter_alone.json", "quadrotor/sim/pilot.json")
 MACHINES = {"small": CONFIG, **{Path(p).stem: EXAMPLES / p for p in PICTURES}}
 
 
@@ -49,9 +52,9 @@ def test_the_examples_pictures_are_current(config: str) -> None:
 
 
 def test_every_example_has_a_picture() -> None:
-    """Except the lander's filter alone, a machine for a test with a single box."""
+    """Except those with a single box: the lander's filter alone, for a test, and the quadrotor's pilot, a model."""
     configs = [p for p in EXAMPLES.rglob("*.json") if '"states"' in p.read_text()]
-    assert {str(p.relative_to(EXAMPLES)) for p in configs} == {*PICTURES, "lander/fc/filter_alone.json"}
+    assert {str(p.relative_to(EXAMPLES)) for p in configs} == {*PICTURES, *BOXES}
 
 
 @pytest.mark.parametrize("path", MACHINES.values(), ids=MACHINES)

@@ -17,7 +17,6 @@ from fcsl_compiler.base.diagnostics import DiagnosticError
 
 from . import arguments as command_line
 from . import plot
-from .campaign.command import run_campaign
 from .codes import SIM_CODES
 from .config import SERIAL_LINK, SimConfig, load
 from .errors import SimError
@@ -127,6 +126,12 @@ def _describe(options: argparse.Namespace) -> int:
     table = model.table()
     print(json.dumps(describe_json(model, table), indent=2) if options.json else describe_text(model, table))
     return 0
+
+
+def _campaign(options: argparse.Namespace) -> int:
+    from .campaign.command import run_campaign  # imported here, because it takes long to load
+
+    return run_campaign(options)
 
 
 def _plot(options: argparse.Namespace) -> int:
@@ -264,7 +269,7 @@ _COMMANDS = {
     "check": _check,
     "run": _run,
     "plot": _plot,
-    "campaign": run_campaign,
+    "campaign": _campaign,
     "list-models": _list_models,
     "describe": _describe,
     "schema": _schema,

@@ -83,8 +83,8 @@ static const char *init(void *self, const fcsl_model_context_t *context)
     if (!(vehicle->parameters.dry_mass > 0.0)) {
         return "parameters.dry_mass must be positive";
     }
-    if (!(vehicle->parameters.full_propellant_mass > 0.0)) {
-        return "parameters.full_propellant_mass must be positive";
+    if (!(vehicle->parameters.full_propellant_mass >= 0.0)) {
+        return "parameters.full_propellant_mass must not be negative";
     }
     if (!is_symmetric(dry)) {
         return "parameters.dry_inertia must be symmetric";
@@ -108,8 +108,9 @@ static void output(void *self, double t, const double *x)
 {
     mass_properties_t *vehicle = self;
     (void)t, (void)x;
-    const double share = vehicle->inputs.propellant_mass / vehicle->parameters.full_propellant_mass;
-    const double share_rate = -vehicle->inputs.mass_flow / vehicle->parameters.full_propellant_mass;
+    const double full = vehicle->parameters.full_propellant_mass;
+    const double share = full > 0.0 ? vehicle->inputs.propellant_mass / full : 0.0;
+    const double share_rate = full > 0.0 ? -vehicle->inputs.mass_flow / full : 0.0;
     vehicle->outputs.mass = vehicle->parameters.dry_mass + vehicle->inputs.propellant_mass;
     for (int i = 0; i < 3; i++) {
         for (int k = 0; k < 3; k++) {
@@ -125,7 +126,7 @@ static const fcsl_field_t fields[] = {
     FCSL_MODEL_SCALAR(mass_properties_t, FCSL_ROLE_OPTIONAL_INPUT, inputs.mass_flow, "kg/s", "positive when it leaves"),
     FCSL_MODEL_SCALAR(mass_properties_t, FCSL_ROLE_PARAMETER, parameters.dry_mass, "kg", ""),
     FCSL_MODEL_MATRIX(mass_properties_t, FCSL_ROLE_PARAMETER, parameters.dry_inertia, "kg*m^2", ""),
-    FCSL_MODEL_SCALAR(mass_properties_t, FCSL_ROLE_PARAMETER, parameters.full_propellant_mass, "kg", ""),
+    FCSL_MODEL_SCALAR(mass_properties_t, FCSL_ROLE_PARAMETER, parameters.full_propellant_mass, "kg", "0: none"),
     FCSL_MODEL_MATRIX(mass_properties_t, FCSL_ROLE_PARAMETER, parameters.propellant_inertia, "kg*m^2",
                       "of the full propellant, about the centre of mass of the vehicle"),
     FCSL_MODEL_SCALAR(mass_properties_t, FCSL_ROLE_FEEDTHROUGH, outputs.mass, "kg", ""),

@@ -388,7 +388,7 @@ def test_a_thin_plate_and_a_point_mass_are_bodies() -> None:
     ("parameters", "message"),
     [
         ({"dry_mass": 0.0}, "dry_mass must be positive"),
-        ({"full_propellant_mass": 0.0}, "full_propellant_mass must be positive"),
+        ({"full_propellant_mass": -1.0}, "full_propellant_mass must not be negative"),
         ({"dry_inertia": INERTIA + np.eye(3, k=1)}, "dry_inertia must be symmetric"),
         ({"dry_inertia": np.full((3, 3), math.nan)}, "dry_inertia must be symmetric"),
         ({"propellant_inertia": INERTIA + np.eye(3, k=2)}, "propellant_inertia must be symmetric"),

@@ -24,7 +24,7 @@ def add_authoring(commands: argparse._SubParsersAction[argparse.ArgumentParser])
     schema.add_argument("--board", action="store_true", help="that of a board")
     schema.set_defaults(run=_schema)
 
-    new = commands.add_parser("new", help="start a machine, an algorithm or a plant, with a test")
+    new = commands.add_parser("new", help="start a machine, an algorithm, a plant or a vehicle, with a test")
     kinds = new.add_subparsers(required=True, metavar="KIND")
     machine = kinds.add_parser("machine", help="a folder NAME with a machine, two algorithms and a test")
     machine.add_argument("name", help="lower_snake_case")
@@ -41,6 +41,12 @@ def add_authoring(commands: argparse._SubParsersAction[argparse.ArgumentParser])
     plant.add_argument("name", help="lower_snake_case; of the model")
     plant.add_argument("--machine", type=Path, metavar="FILE", help="machine JSON that the simulation flies")
     plant.set_defaults(run=_new_plant)
+    vehicle = kinds.add_parser(
+        "vehicle", help="a package NAME with machine, simulation and tests of a vehicle that there is"
+    )
+    vehicle.add_argument("name", help="lower_snake_case")
+    vehicle.add_argument("--like", required=True, metavar="VEHICLE", help="a package, such as quadrotor, or its folder")
+    vehicle.set_defaults(run=_new_vehicle)
 
 
 def _graph(options: argparse.Namespace) -> int:
@@ -103,6 +109,17 @@ def _new_plant(options: argparse.Namespace) -> int:
         print(made.remark)
     first = f"fcsl-sim plot {made.simulation}" if made.simulation else f"fcsl-sim describe {options.name}.c"
     print(f"next: {first}; python3 -m pytest test/test_{options.name}_plant.py; then change {options.name}.c")
+    return 0
+
+
+def _new_vehicle(options: argparse.Namespace) -> int:
+    from .scaffold_vehicle import vehicle_files
+
+    files = vehicle_files(options.name, options.like)
+    if Path(options.name).exists():
+        raise UsageError(f"`{options.name}` exists; nothing was written")
+    _write(files)
+    print(f"next: python3 -m pytest {options.name}/test; then change it, as {options.name}/README.md says")
     return 0
 
 
