@@ -41,6 +41,8 @@ def _parser() -> argparse.ArgumentParser:
     _add_run(run)
     _add_plot(_add(commands, "plot", "draw a simulation or a bag"))
     _add_campaign(_add(commands, "campaign", "fly a simulation many times, with dispersed parameters"))
+    _add_trim(_add(commands, "trim", "find an equilibrium of a plant"))
+    _add_linearise(_add(commands, "linearise", "print and write the linear equations of a plant around a point"))
     _add_model_commands(commands)
     _add(commands, "schema", "print the JSON Schema of a simulation, for editors")
     why = _add(commands, "explain", "explain a diagnostic code of simulations, with an example")
@@ -135,6 +137,27 @@ def _add_campaign(command: argparse.ArgumentParser) -> None:
     help_engine = "who flies: processes of this machine (default), or a Ray cluster (needs the Python package ray)"
     command.add_argument("--engine", choices=("local", "ray"), default="local", help=help_engine)
     command.add_argument("--json", action="store_true", help="print the summary as JSON, and nothing else")
+
+
+def _add_trim(command: argparse.ArgumentParser) -> None:
+    command.add_argument("file", type=Path, help="*.trim.json (docs/design_work.md)")
+    help_output = "write a simulation that extends the file's with the inputs and parameters found"
+    command.add_argument("-o", "--output", type=Path, metavar="FILE", help=help_output)
+    command.add_argument("--json", action="store_true", help="print one JSON object")
+
+
+def _add_linearise(command: argparse.ArgumentParser) -> None:
+    command.add_argument("config", help=f"{_CONFIG}; or *.trim.json, whose equilibrium is the point")
+    help_input = "an input of the plant: instance.inputs.name, or an element of it (repeatable)"
+    command.add_argument("--input", action="append", default=[], metavar="PATH", dest="inputs", help=help_input)
+    help_result = "an output of the plant: instance.outputs.name (repeatable)"
+    command.add_argument("--output", action="append", default=[], metavar="PATH", dest="outputs", help=help_result)
+    help_states = "keep the states that match, such as 'body.*'; the others are held (repeatable; default: all)"
+    command.add_argument("--states", action="append", metavar="GLOB", help=help_states)
+    help_at = "fly with the controller until then (s); default: the beginning"
+    command.add_argument("--at", type=_seconds, metavar="S", help=help_at)
+    command.add_argument("-o", type=Path, metavar="FILE", dest="output", help="write the matrices as JSON")
+    command.add_argument("--json", action="store_true", help="print them as JSON")
 
 
 def _add_model_commands(commands: argparse._SubParsersAction[argparse.ArgumentParser]) -> None:

@@ -134,6 +134,18 @@ def _campaign(options: argparse.Namespace) -> int:
     return run_campaign(options)
 
 
+def _trim(options: argparse.Namespace) -> int:
+    from .linear.command import run_trim
+
+    return run_trim(options)
+
+
+def _linearise(options: argparse.Namespace) -> int:
+    from .linear.command import run_linearise
+
+    return run_linearise(options)
+
+
 def _plot(options: argparse.Namespace) -> int:
     options.config = options.target
     given = options.sets or options.events or options.seed is not None or options.duration is not None
@@ -270,6 +282,8 @@ _COMMANDS = {
     "run": _run,
     "plot": _plot,
     "campaign": _campaign,
+    "trim": _trim,
+    "linearise": _linearise,
     "list-models": _list_models,
     "describe": _describe,
     "schema": _schema,

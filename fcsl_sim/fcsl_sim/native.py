@@ -97,6 +97,8 @@ _PROTOTYPES: dict[str, tuple[type | None, list[type]]] = {
     "fcsl_sim_checkpoint_capacity": (c_size_t, [ptr]),
     "fcsl_sim_checkpoint": (c_size_t, [ptr, ptr]),
     "fcsl_sim_restore_checkpoint": (c_int, [ptr, c_char_p, c_size_t, _ERROR]),
+    "fcsl_sim_slope_count": (c_uint32, [ptr]),
+    "fcsl_sim_slopes": (c_int, [ptr, POINTER(c_double), _ERROR]),
     "fcsl_sim_listen": (c_int, [ptr, c_char_p, c_char_p, c_uint32, _ERROR]),
     "fcsl_sim_accept": (c_int, [ptr, c_uint32, _ERROR]),
     "fcsl_sim_read_log": (c_int, [ptr, c_char_p]),
@@ -374,6 +376,13 @@ class Simulation:
         changes nothing."""
         size = len(checkpoint)
         self._check(self._lib.fcsl_sim_restore_checkpoint(self.handle(), checkpoint, size, byref(self._error)))
+
+    def slopes(self) -> list[float]:
+        """The derivatives of all continuous states, by instance and state, from what the structs hold now; outputs are made
+        from it, too. Nothing advances. Raises SimError for one that is not finite."""
+        slopes = (c_double * self._lib.fcsl_sim_slope_count(self.handle()))()
+        self._check(self._lib.fcsl_sim_slopes(self.handle(), slopes, byref(self._error)))
+        return list(slopes)
 
     def listen(self, peer: str, timeout_ms: int, name_space: str = "") -> None:
         """A controller can connect from now on: to `wire:SPEC` or `zenoh:tcp/HOST:PORT`, as `fcsl-fc --hal` takes it.

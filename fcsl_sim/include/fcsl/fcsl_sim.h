@@ -121,6 +121,15 @@ size_t fcsl_sim_checkpoint(const fcsl_sim_t *sim, void *bytes);
  * the checkpoint's time are passed over. Other bytes are refused with the reason, and nothing is changed then. */
 int fcsl_sim_restore_checkpoint(fcsl_sim_t *sim, const void *bytes, size_t size, fcsl_error_t *error);
 
+/* ---- the plant as equations ---------------------------------------------------------------------------------------- */
+
+/* Number of continuous states of all instances. */
+uint32_t fcsl_sim_slope_count(const fcsl_sim_t *sim);
+/* Between two ticks: outputs at the present from the states and inputs that the structs of instances hold, then all derivatives,
+ * in the order of instances and of their states. Connections within a group count; inputs from a controller or a sensor stay as they
+ * are. Nothing advances. Fails where a derivative is not finite. */
+int fcsl_sim_slopes(fcsl_sim_t *sim, double *slopes, fcsl_error_t *error);
+
 /* ---- external controller ------------------------------------------------------------------------------------------- */
 
 /* `peer`: wire:SPEC (fcsl_wire.h) or zenoh:tcp/HOST:PORT (fcsl_hal.h), as the --hal of fcsl-fc, which can connect from now on;

@@ -1,0 +1,53 @@
+# SPDX-License-Identifier: Apache-2.0
+"""`fcsl-sim trim` and `fcsl-sim linearise`."""
+
+from __future__ import annotations
+
+import json
+import sys
+from pathlib import Path
+from typing import Any
+
+from ..config import SimConfig, load
+from ..errors import SimError
+from ..output import show
+from .linearise import linearise
+from .plant import Plant
+from .trim import read_trim, trim, write_trimmed
+
+EXIT_NO_EQUILIBRIUM = 1
+_TRIM = ".trim.json"
+
+
+def run_trim(options: Any) -> int:
+    """Exit status: 0, or 1 where no equilibrium was found. Raises SimError or DiagnosticError."""
+    problem = read_trim(options.file)
+    _warn(problem.config)
+    with Plant(problem.config) as plant:
+        trimmed = trim(problem, plant)
+    if options.output is not None and trimmed.is_equilibrium:
+        write_trimmed(problem, trimmed, options.output)
+    show(json.dumps(trimmed.as_json(), indent=2)) if options.json else print(trimmed.text())
+    return 0 if trimmed.is_equilibrium else EXIT_NO_EQUILIBRIUM
+
+
+def run_linearise(options: Any) -> int:
+    """Around a time of a simulation, or around the equilibrium of a trim file. Raises SimError or DiagnosticError."""
+    problem = read_trim(Path(options.config)) if options.config.endswith(_TRIM) else None
+    if problem and options.at is not None:
+        raise SimError("`--at` is a time of a simulation; a trim file says the point itself")
+    config = problem.config if problem else load(options.config)
+    _warn(config)
+    with Plant(config, options.at) as plant:
+        if problem and not (found := trim(problem, plant)).is_equilibrium:
+            raise SimError(f"{options.config}: {found.text()}")
+        linear = linearise(plant, options.inputs, options.outputs, options.states)
+    if options.output is not None:
+        linear.write(options.output)
+    show(json.dumps(linear.as_json(), indent=1)) if options.json else print(linear.text())
+    return 0
+
+
+def _warn(config: SimConfig) -> None:
+    for warning in config.warnings:
+        print(warning, file=sys.stderr)
