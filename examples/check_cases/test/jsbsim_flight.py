@@ -6,16 +6,25 @@ from __future__ import annotations
 import math
 from collections.abc import Callable
 from pathlib import Path
+from typing import Any
 
 import jsbsim
 
-#: Frames a second.
-RATE_HZ = 400
+#: Frames a second. Half of this makes every difference that is due to the steps four times as large.
+RATE_HZ = 1000
 #: JSBSim's number of the Adams-Bashforth method of second order.
 _ADAMS_BASHFORTH_2 = 3
 _DEGREE = math.pi / 180
 _SPIN = 7.292115e-5  # rad/s
-_ROUND_M = 6371007.1809
+_FOOT = 0.3048  # m
+# All in feet, pounds and slugs: JSBSim's own factors are rounded, to 1.5e-9 from metres and to 2.2e-7 from slugs to pounds.
+_ROUND_FT = 20902254.5305
+_EQUATOR_FT = 6378137.0 / _FOOT
+_POLE_FT = _EQUATOR_FT * (1 - 1 / 298.257223563)
+_GM = 3.986004418e14 / _FOOT**3  # ft^3/s^2
+_POUNDS = 32.174049  # of JSBSim, in a slug
+#: 101325 Pa, as the standard atmosphere has it; JSBSim begins with 2116.228.
+_SEA_LEVEL_PSF = 101325 / (14.593902937206364829 / _FOOT)
 
 _SPHERE = {"area": 0.1963495, "span": 1.0, "chord": 1.0, "ixx": 3.6, "iyy": 3.6, "izz": 3.6, "mass": 1.0}
 _BRICK = {
@@ -73,7 +82,7 @@ def _aircraft(case: dict[str, object]) -> str:
     """JSBSim's description of the vehicle and of its planet."""
     body = case["body"]
     assert isinstance(body, dict)
-    radii = (_ROUND_M, _ROUND_M) if case["is_round"] else (6378137.0, 6378137.0 * (1 - 1 / 298.257223563))
+    radii = (_ROUND_FT, _ROUND_FT) if case["is_round"] else (_EQUATOR_FT, _POLE_FT)
     drag = f"<property>aero/qbar-psf</property><property>metrics/Sw-sqft</property><value>{case['drag']}</value>"
     damping = case["damping"]
     moments = [
@@ -87,16 +96,16 @@ def _aircraft(case: dict[str, object]) -> str:
 <fdm_config name="vehicle" version="2.0">
   <fileheader/>
   <planet name="Earth">
-    <equatorial_radius unit="M">{radii[0]}</equatorial_radius><semiminor_axis unit="M">{radii[1]}</semiminor_axis>
+    <equatorial_radius unit="FT">{radii[0]}</equatorial_radius><semiminor_axis unit="FT">{radii[1]}</semiminor_axis>
     <rotation_rate unit="RAD/SEC">{case["spin"]}</rotation_rate>
-    <GM unit="M3/SEC2">3.986004418e14</GM><J2>{0.0 if case["is_round"] else 1.08262982e-3}</J2>
+    <GM unit="FT3/SEC2">{_GM}</GM><J2>{0.0 if case["is_round"] else 1.08262982e-3}</J2>
   </planet>
   <metrics>
     <wingarea unit="FT2">{body["area"]}</wingarea><wingspan unit="FT">{body["span"]}</wingspan>
     <chord unit="FT">{body["chord"]}</chord><location name="AERORP" unit="IN">{origin}
   </metrics>
   <mass_balance>
-    {inertia}<emptywt unit="SLUG">{body["mass"]}</emptywt><location name="CG" unit="IN">{origin}
+    {inertia}<emptywt unit="LBS">{body["mass"] * _POUNDS}</emptywt><location name="CG" unit="IN">{origin}
   </mass_balance>
   <ground_reactions/><propulsion/><flight_control name="none"/>
   <aerodynamics>
@@ -106,8 +115,9 @@ def _aircraft(case: dict[str, object]) -> str:
 """
 
 
-def fly(number: int, folder: Path) -> list[dict[str, float]]:
-    """The report's columns at 10, 20 and 30 s. `folder` gets JSBSim's files."""
+def fly(number: int, folder: Path, density: Callable[[float], float] | None = None) -> list[dict[str, float]]:
+    """The report's columns at 10, 20 and 30 s. `folder` gets JSBSim's files; `density` (slug/ft^3, of the height in ft)
+    replaces that of JSBSim's atmosphere."""
     case = _FALLING | CASES[number]
     aircraft = folder / "aircraft/vehicle"
     aircraft.mkdir(parents=True)
@@ -116,28 +126,31 @@ def fly(number: int, folder: Path) -> list[dict[str, float]]:
     fdm.set_debug_level(0)
     assert fdm.load_model("vehicle")
     fdm.set_dt(1 / RATE_HZ)
-    velocity, rate, wind = case["velocity"], case["rate"], case["wind"]
-    assert isinstance(velocity, tuple) and isinstance(rate, tuple)
-    begin = {"lat-geod-deg": 0.0, "long-gc-deg": 0.0, "h-sl-ft": case["height"], "psi-true-rad": case["yaw"]}
+    fdm["atmosphere/P-sl-psf"] = _SEA_LEVEL_PSF
+    velocity, rate, height, wind = case["velocity"], case["rate"], case["height"], case["wind"]
+    assert isinstance(velocity, tuple) and isinstance(rate, tuple) and isinstance(height, float)
+    begin: dict[str, Any] = {"lat-geod-deg": 0.0, "long-gc-deg": 0.0, "h-sl-ft": height, "psi-true-rad": case["yaw"]}
     begin |= dict(zip(("vn-fps", "ve-fps", "vd-fps"), velocity, strict=True))
     begin |= dict(zip(("p-rad_sec", "q-rad_sec", "r-rad_sec"), rate, strict=True))
+    if callable(wind):  # here a direction is where the wind goes to
+        begin |= {"vw-mag-fps": wind(height), "vw-dir-deg": 90.0}
     for name, value in begin.items():
         fdm[f"ic/{name}"] = value
     for name in ("rate/rotational", "rate/translational", "position/rotational", "position/translational"):
         fdm[f"simulation/integrator/{name}"] = _ADAMS_BASHFORTH_2
     fdm["simulation/gravity-model"] = 0 if case["is_round"] else 1
-    _blow(fdm, wind)
+    if density:
+        fdm["atmosphere/override/density"] = density(height)
     assert fdm.run_ic()
     rows = []
     for frame in range(30 * RATE_HZ + 1):
         if frame and frame % (10 * RATE_HZ) == 0:
             rows.append({name: fdm[path] * factor for name, (path, factor) in _COLUMNS.items()})
-        _blow(fdm, wind)
-        fdm.run()
+        # A frame moves the vehicle and then asks the air: it needs that of where the vehicle will be.
+        height = fdm["position/h-sl-ft"] - fdm["velocities/v-down-fps"] / RATE_HZ
+        if callable(wind):
+            fdm["atmosphere/wind-east-fps"] = wind(height)
+        if density:
+            fdm["atmosphere/override/density"] = density(height)
+        assert fdm.run()
     return rows
-
-
-def _blow(fdm: jsbsim.FGFDMExec, wind: object) -> None:
-    """The wind to the east at the height of now, ft/s."""
-    if isinstance(wind, Callable):
-        fdm["atmosphere/wind-east-fps"] = wind(fdm["position/h-sl-ft"])
