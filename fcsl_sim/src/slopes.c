@@ -55,7 +55,9 @@ int fcsl_sim_slopes(fcsl_sim_t *sim, double *slopes, fcsl_error_t *error)
                 char name[FCSL_PLACE_BYTES];
                 const uint32_t offset = instance->model->continuous_offset + k * (uint32_t)sizeof(double);
                 fcsl_sim_name_place(instance, offset, name, sizeof name);
-                return fcsl_sim_fail(error, "the derivative of %s is %g", name, slopes[k]);
+                fcsl_sim_enter(sim, 0, FCSL_IN_NONE);
+                return fcsl_sim_fail(error, "the derivative of %s is %g", name,
+                                     isnan(slopes[k]) ? (double)NAN : slopes[k]);
             }
         }
         slopes += count;

@@ -174,9 +174,72 @@ def test_no_equilibrium_is_said(write: Write, capsys: pytest.CaptureFixture[str]
     assert main(["linearise", str(path)]) == 2
 
 
+def test_large_states_have_steps_that_fit(write: Write) -> None:
+    """The density of air over the radius, at 6.4e6 m from the centre of the Earth: against differences of 1 m by hand."""
+    body = json.loads(json.dumps(FALL["instances"]["body"]))
+    body["parameters"]["position_inertial"] = [6378137.0 + 1000.0, 0.0, 0.0]
+    body["inputs"]["force_body"] = [0.0, 0.0, 0.0]
+    simulation = {
+        **{key: FALL[key] for key in ("tick_hz", "seed", "duration", "integrator")},
+        "models": {
+            "body": FALL["models"]["body"],
+            "earth": {"source": f"{LIBRARY}/earth_wgs84.c"},
+            "air": {"source": f"{LIBRARY}/atmosphere_1976.c"},
+        },
+        "instances": {
+            "body": body,
+            "earth": {"model": "earth"},
+            "air": {"model": "air", "parameters": {"temperature_offset": 0.0}},
+        },
+        "connections": [
+            {"from": "body.position_inertial", "to": "earth.position_inertial"},
+            {"from": "body.velocity_inertial", "to": "earth.velocity_inertial"},
+            {"from": "earth.height", "to": "air.height"},
+        ],
+    }
+    with Plant(load(write(simulation))) as plant:
+        linear = linearise(plant, [], ["air.outputs.density"], ["body.state.position_inertial[0]"])
+        (state,), (density,) = linear.states, plant.variables("air.outputs.density", ("output",))
+        middle, values = plant.get([state])[0], []
+        for value in (middle + 1.0, middle - 1.0):
+            plant.set([state], [value])
+            plant.slopes()
+            values.append(plant.get([density])[0])
+    assert linear.c[0][0] == pytest.approx((values[0] - values[1]) / 2.0, rel=1e-6)
+
+
+def test_a_trim_writes_whole_arrays(write: Write) -> None:
+    """The gravity in which it falls at 10 m/s."""
+    unknowns = {"body.inputs.gravity_inertial[2]": {"start": 1.0}, "body.state.velocity_inertial[2]": {"start": 9.0}}
+    problem = TRIM | {"unknowns": unknowns, "outputs": {"air.outputs.airspeed": 10.0}}
+    assert main(["trim", str(write(FALL, problem)), "-o", "trimmed.sim.json"]) == 0
+    gravity = 0.5 * 1.2 * 0.1 * 0.5 * 10.0**2 / 2.0
+    expected = {"inputs": {"gravity_inertial": [0.0, 0.0, pytest.approx(gravity, rel=1e-9)]}}
+    assert json.loads(Path("trimmed.sim.json").read_text())["instances"] == {"body": expected}
+
+
+@pytest.mark.parametrize(
+    ("unknown", "message"),
+    [
+        ("body.inputs.force_body[2]", "`body.inputs.force_body[2]` is fed by another model"),
+        ("body.parameters.velocity_inertial[2]", "changes none of the conditions"),
+    ],
+)
+def test_unknowns_that_cannot_act(write: Write, capsys: pytest.CaptureFixture[str], unknown: str, message: str) -> None:
+    assert main(["trim", str(write(FALL, TRIM | {"unknowns": {unknown: {"start": 1.0}}}))]) == 2
+    assert message in capsys.readouterr().err
+
+
+def test_a_start_without_derivatives_is_said(write: Write, capsys: pytest.CaptureFixture[str]) -> None:
+    problem = TRIM | {"unknowns": {"body.inputs.mass": {"start": 0.0}}}
+    assert main(["trim", str(write(FALL, problem))]) == 2
+    assert "the derivative of body.state.velocity_inertial[0] is" in capsys.readouterr().err
+
+
 @pytest.mark.parametrize(
     ("arguments", "message"),
     [
+        (["--at", "0.005"], "0.005 s is not a whole number of ticks (1/100 s)"),
         (["--input", "drag.inputs.densty"], "there is no input `drag.inputs.densty` of a model; did you mean `drag.inputs.density`?"),
         (["--input", "body.inputs.force_body[0]"], "`body.inputs.force_body[0]` is fed by another model"),
         (["--output", "air.outputs.velocity_air_body[3]"], "there is no such element of f64[3]"),
@@ -192,6 +255,7 @@ def test_wrong_options(write: Write, capsys: pytest.CaptureFixture[str], argumen
     ("change", "code"),
     [
         ({"unknowns": {"a.b": {"start": 1.0, "within": [2.0, 3.0]}}}, "E204"),
+        ({"unknowns": {"a.b": {"start": 2.0, "within": [2.0, 2.0]}}}, "E204"),
         ({"unknowns": {"a.b": {}}}, "E202"),
         ({"unknowns": 3}, "E208"),
         ({"steady": [3]}, "E208"),

@@ -4,7 +4,7 @@
 from __future__ import annotations
 
 import json
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from fnmatch import fnmatchcase
 from typing import Any
@@ -14,8 +14,8 @@ import numpy as np
 from ..errors import SimError
 from .plant import Array, Plant, Variable
 
-#: Of a variable of size 1: where errors of fourth order and of rounding are alike.
-_STEP = 2.0**-10
+#: The first step for a variable of size 1, and how often it is divided by 4 until two results agree so well.
+_STEP, _TIMES, _AGREE = 2.0**-10, 8, 1e-9
 
 
 @dataclass(frozen=True)
@@ -65,16 +65,21 @@ class Linear:
 def linearise(
     plant: Plant, inputs: Sequence[str], outputs: Sequence[str], states: Sequence[str] | None = None
 ) -> Linear:
-    """Around the present of the plant, by central differences with one Richardson extrapolation: the error is of fourth order in
-    the step, 1/1024 of the variable or of 1, whichever is larger. inputs, outputs: paths; an array is all of its elements. states:
+    """Around the present of the plant, by central differences with one Richardson extrapolation, so of fourth order in the
+    step. That begins at 1/1024 of the variable or of 1, whichever is larger, and becomes smaller until two results agree to
+    1e-9; what never does gets the one that has changed least. inputs, outputs: paths; an array is all of its elements. states:
     patterns of those to keep (all); the others are held. Raises SimError."""
-    chosen = [s for s in plant.states if states is None or any(fnmatchcase(s.path, pattern) for pattern in states)]
+    patterns = [pattern.replace("[", "[[]") for pattern in states or ()]  # an index, no set of characters
+    chosen = [s for s in plant.states if states is None or any(fnmatchcase(s.path, pattern) for pattern in patterns)]
     if not chosen:
         raise SimError(
             f"no continuous state matches {', '.join(states or ())}" if states else "the plant has no states"
         )
     u = [variable for path in inputs for variable in plant.variables(path, ("input",))]
     y = [variable for path in outputs for variable in plant.variables(path, ("output",))]
+    for variable in y:
+        if not plant.config.tables[variable.instance].has_output:
+            raise SimError(f"`{variable.path}` is made by an `update`: it stands still, and depends on nothing here")
     for variable in u:
         if plant.is_fed_by_a_model(variable):
             raise SimError(f"`{variable.path}` is fed by another model: it is no input of the plant")
@@ -91,16 +96,31 @@ def linearise(
 def _column(plant: Plant, variable: Variable, numbers: Sequence[int], outputs: Sequence[Variable]) -> Array:
     """What slopes and outputs change by, for a change of the variable."""
     (middle,) = plant.get([variable])
+
+    def difference(step: float) -> Array:
+        values = []
+        for value in (middle + step, middle - step):
+            plant.set([variable], [value])
+            values.append(np.concatenate([plant.slopes()[list(numbers)], plant.get(outputs)]))
+        return np.asarray((values[0] - values[1]) / (2.0 * step))
+
     step = _STEP * max(1.0, abs(middle))
-
-    def at(value: float) -> Array:
-        plant.set([variable], [value])
-        return np.concatenate([plant.slopes()[list(numbers)], plant.get(outputs)])
-
-    coarse = (at(middle + step) - at(middle - step)) / (2.0 * step)
-    fine = (at(middle + 0.5 * step) - at(middle - 0.5 * step)) / step
+    best = before = _richardson(difference, step)
+    least = np.full(best.shape, np.inf)
+    for _ in range(_TIMES):
+        step /= 4.0
+        now = _richardson(difference, step)
+        change = np.abs(now - before)
+        better = (change < least) & (least > _AGREE * np.abs(best))
+        best, least, before = np.where(better, now, best), np.where(better, change, least), now
+        if (least <= _AGREE * np.abs(best)).all():
+            break
     plant.set([variable], [middle])
-    return np.asarray((4.0 * fine - coarse) / 3.0)
+    return best
+
+
+def _richardson(difference: Callable[[float], Array], step: float) -> Array:
+    return (4.0 * difference(0.5 * step) - difference(step)) / 3.0
 
 
 def _largest(values: Array) -> float:

@@ -49,7 +49,11 @@ class Plant:
         self.config = config
         self._simulation = Simulation(config.plan, config.tables)
         # The first tick gives the inputs their first values.
-        tick = 1 if at_s is None else int(at_s * config.machine.tick_hz) + 1
+        ticks = (at_s or 0) * config.machine.tick_hz
+        if int(ticks) != ticks:
+            self.close()
+            raise SimError(f"{float(at_s or 0):g} s is not a whole number of ticks (1/{config.machine.tick_hz} s)")
+        tick = int(ticks) + 1
         while self._simulation.tick < tick and self._simulation.status == "running":
             self._simulation.run(tick - self._simulation.tick)
         if self._simulation.tick < tick:

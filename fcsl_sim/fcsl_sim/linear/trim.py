@@ -6,7 +6,7 @@ from __future__ import annotations
 import json
 import os
 import re
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -15,6 +15,7 @@ import numpy as np
 
 from fcsl_compiler.base.diagnostics import DiagnosticSink
 from fcsl_compiler.base.source import SourceError, SourceFile
+from fcsl_compiler.model.types import shape_of
 from fcsl_compiler.parse.json_reader import ConfigReader
 from fcsl_compiler.parse.json_source import JsonNode, parse_json
 from fcsl_compiler.parse.source_path import SourcePathError, resolve_source
@@ -25,6 +26,8 @@ from .plant import Array, Plant, Variable
 
 _LARGEST = 1e300
 _TOLERANCE = 1e-9
+#: A residual where the plant has none.
+_FAR = 1e30
 #: What an unknown may be.
 _ROLES = ("state", "input", "parameter")
 
@@ -51,9 +54,11 @@ class TrimProblem:
 
 @dataclass(frozen=True)
 class Trimmed:
-    """`values` of the unknowns; `residuals` of the conditions by path; whether all are within the tolerance."""
+    """`values` of the unknowns; `fields` are the whole inputs and parameters that they are or belong to; `residuals` of the
+    conditions by path; whether all are within the tolerance."""
 
     values: dict[str, float]
+    fields: dict[str, Any]
     residuals: dict[str, float]
     is_equilibrium: bool
 
@@ -110,7 +115,9 @@ def _unknowns(node: JsonNode | None, reader: ConfigReader) -> tuple[Unknown, ...
         items = reader.list(keys.get("within"), "`within`")
         ends = [reader.number(item, "a bound", -_LARGEST, _LARGEST) for item in items]
         low, high = (ends[0], ends[1]) if len(ends) == 2 else (-np.inf, np.inf)
-        if items and (len(ends) != 2 or low is None or high is None or start is None or not low <= start <= high):
+        if items and (
+            len(ends) != 2 or low is None or high is None or start is None or not low < high or not low <= start <= high
+        ):
             reader.sink.error("E204", "`within` is a list of two bounds, with `start` between", keys["within"].span)
         elif start is not None and low is not None and high is not None:
             found.append(Unknown(path, start, (low, high)))
@@ -129,9 +136,15 @@ def _outputs(node: JsonNode | None, reader: ConfigReader) -> dict[str, float]:
 
 def trim(problem: TrimProblem, plant: Plant) -> Trimmed:
     """Solves for the unknowns by least squares, and leaves the plant there. Raises SimError."""
-    from scipy.optimize import least_squares  # imported here, because it takes long to load
+    try:
+        from scipy.optimize import least_squares  # imported here, because it takes long to load
+    except ImportError:
+        raise SimError("a trim needs the Python package `scipy`: python3 -m pip install scipy") from None
 
     unknowns = [_one(plant, unknown.path, _ROLES) for unknown in problem.unknowns]
+    for variable in unknowns:
+        if plant.is_fed_by_a_model(variable):
+            raise SimError(f"`{variable.path}` is fed by another model: it cannot be chosen")
     steady = [v for path in problem.steady for v in plant.variables(path, ("state",))]
     outputs = [_one(plant, path, ("output",)) for path in problem.outputs]
     wanted = np.array(list(problem.outputs.values()))
@@ -140,16 +153,40 @@ def trim(problem: TrimProblem, plant: Plant) -> Trimmed:
 
     def residuals(values: Array) -> Array:
         plant.set(unknowns, values)
-        slopes = plant.slopes()[[state.slope for state in steady]]
+        try:
+            slopes = plant.slopes()[[state.slope for state in steady]]
+        except SimError:
+            if np.array_equal(values, start):
+                raise
+            return np.full(len(steady) + len(outputs), _FAR)  # outside of what the models take: the solver comes back
         return np.concatenate([slopes, plant.get(outputs) - wanted])
 
     scale = np.maximum(1.0, np.abs(start))
     exact = {"xtol": 1e-15, "ftol": 1e-15, "gtol": 1e-15, "jac": "3-point", "x_scale": scale}
     found = least_squares(residuals, start, bounds=bounds, max_nfev=1000, **exact)
     last = residuals(found.x)
+    idle = [variable.path for variable, column in zip(unknowns, found.jac.T, strict=True) if not column.any()]
+    if idle:
+        raise SimError(
+            f"`{idle[0]}` changes none of the conditions; a parameter that only `init` reads cannot be trimmed"
+        )
     names = [f"{state.path}'" for state in steady] + [variable.path for variable in outputs]
     values = dict(zip((variable.path for variable in unknowns), found.x.tolist(), strict=True))
-    return Trimmed(values, dict(zip(names, last.tolist(), strict=True)), bool(np.abs(last).max() <= problem.tolerance))
+    is_equilibrium = bool(np.abs(last).max() <= problem.tolerance)
+    return Trimmed(values, _fields(plant, values), dict(zip(names, last.tolist(), strict=True)), is_equilibrium)
+
+
+def _fields(plant: Plant, paths: Iterable[str]) -> dict[str, Any]:
+    """Inputs and parameters as a simulation file has them, whole."""
+    found = {}
+    for path in paths:
+        whole = re.sub(r"(\[\d+\])+$", "", path)
+        instance, record, rest = whole.split(".", 2)
+        if record != "state":
+            shape = shape_of(plant.config.tables[instance].fields[f"{record}.{rest}"].type)
+            values = plant.get(plant.variables(whole, _ROLES))
+            found[whole] = values.reshape(shape).tolist() if shape else float(values[0])
+    return found
 
 
 def _one(plant: Plant, path: str, roles: Sequence[str]) -> Variable:
@@ -163,10 +200,9 @@ def trimmed_file(problem: TrimProblem, trimmed: Trimmed, path: Path) -> dict[str
     """A simulation file beside `path` that extends the problem's with the inputs and parameters found. States begin where
     parameters of their models say, so they are not in it."""
     instances: dict[str, dict[str, dict[str, Any]]] = {}
-    for name, value in trimmed.values.items():
+    for name, value in trimmed.fields.items():
         instance, record, field = name.split(".", 2)
-        if record in ("inputs", "parameters") and not re.search(r"\[\d+\]$", field):
-            instances.setdefault(instance, {}).setdefault(record, {})[field] = value
+        instances.setdefault(instance, {}).setdefault(record, {})[field] = value
     base = os.path.relpath(problem.simulation.resolve(), path.resolve().parent)
     return {"extends": base, "description": f"Trimmed by {problem.path.name}.", "instances": instances}
 
