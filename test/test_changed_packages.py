@@ -12,7 +12,7 @@ from changed_packages import manifests, touched  # noqa: E402
 
 ALL = sorted(manifests(ROOT))
 EXAMPLES = [
-    "ahrs", "arming", "check_cases", "lander", "minimal", "models", "quadrotor", "satellite", "thermal_guard",
+    "ahrs", "arming", "check_cases", "glider", "lander", "minimal", "models", "quadrotor", "satellite", "thermal_guard",
 ]  # fmt: skip
 
 

@@ -29,6 +29,7 @@ PICTURES = {
     "ahrs/ahrs.json": "ahrs/ahrs.svg",
     "arming/arming.json": "arming/arming.svg",
     "lander/fc/lander_control.json": "lander/lander_control.svg",
+    "glider/fc/glider.json": "glider/glider.svg",
     "quadrotor/fc/quadrotor.json": "quadrotor/quadrotor.svg",
     "satellite/fc/satellite.json": "satellite/satellite.svg",
     "thermal_guard/thermal_guard.json": "thermal_guard/thermal_guard.svg",
