@@ -106,11 +106,18 @@ class Craft:
 
     def turn(self, number: int, raw: tuple[int, int, int]) -> None:
         for axis, value in zip("xyz", raw, strict=True):
-            (self.device(number) / f"in_anglvel_{axis}_raw").write_text(f"{value}\n")
+            self.write(number, axis, str(value))
 
     def fail(self, number: int) -> None:
         for axis in "xyz":
-            (self.device(number) / f"in_anglvel_{axis}_raw").write_text("broken\n")
+            self.write(number, axis, "bad")
+
+    def write(self, number: int, axis: str, three: str) -> None:
+        """At once, as the kernel's files change: a flight that reads meanwhile gets the old text or the new one."""
+        assert len(three) == 3
+        file = os.open(self.device(number) / f"in_anglvel_{axis}_raw", os.O_WRONLY | os.O_CREAT, 0o644)
+        os.pwrite(file, f"{three}\n".encode(), 0)
+        os.close(file)
 
     def write_plan(self, board: dict[str, Any], plan: str = "board.plan") -> Path:
         (self.folder / "board.json").write_text(json.dumps(board))
@@ -172,7 +179,7 @@ def test_a_gyro_is_lost_then_the_other_one(craft: Craft, fly: Callable[..., Flig
     told = re.findall(r"fcsl-fc: (sensor 'imu': .*|device .*)", said)
     assert told[:2] == [
         "sensor 'imu': primary is device 'top'",
-        "device 'top' fails: in_anglvel_x: 'broken' is no number",
+        "device 'top' fails: in_anglvel_x: 'bad' is no number",
     ]
     assert "sensor 'imu': no device is healthy; 'bottom' is silent" in told
     # The flight comes out of the readings again, bit for bit.

@@ -10,7 +10,7 @@ from functools import partial
 
 from ..guest.chips import Bmi160
 from ..guest.i2c import I2cBus
-from ..trials import Failed, expect, expect_all
+from ..trials import Failed, expect_all
 from .craft import Craft
 from .process import Flight, after, in_ms, linux, until
 
@@ -140,22 +140,27 @@ def try_pace(bus: I2cBus, craft: Craft) -> str:
     imu.set_motion(_ACCEL, _GYRO)
     with linux(craft, "paced") as flight:
         flight.until_value("machine.state", "FLIGHT")
-        paths = ("machine.tick", "hal.devices.top.samples", "odometer.outputs.spanned")
-        first, begin = flight.client.get(*paths), time.monotonic()
-        time.sleep(_WINDOW_S)
-        last, took = flight.client.get(*paths), time.monotonic() - begin
-        ticks, samples, spanned = (last[path] - first[path] for path in paths)
-        expect("rate of ticks", ticks / took, 100.0, 100.0 * _RATE_PART)
-        expect("samples of a tick", samples / ticks, 1.0, 1.5 / ticks)  # one may wait for its tick
-        expect("time of a tick", spanned / ticks, 0.01, 0.0002)
+        measured = measure_pace(flight)
         end_s = after(imu.unplug, lambda: flight.process.wait(_LIMIT_S))
         reason = "device 'top', which paces the loop, has given nothing for"
         if flight.process.returncode != 1 or reason not in flight.said():
             raise Failed(f"it ends with {flight.process.returncode}: {flight.said()}")
     imu.plug()
-    return (
-        f"{ticks} ticks and {samples} scans in {took:.2f} s; unplugged: status 1 with the reason after {in_ms(end_s)}"
-    )
+    return f"{measured}; unplugged: status 1 with the reason after {in_ms(end_s)}"
+
+
+def measure_pace(flight: Flight) -> str:
+    """A scan a tick, 100 a second: a guest that stands still for a while gives none, so this must hold in one window."""
+    paths = ("machine.tick", "hal.devices.top.samples", "odometer.outputs.spanned")
+    for _ in range(_WINDOWS):
+        first, begin = flight.client.get(*paths), time.monotonic()
+        time.sleep(_WINDOW_S)
+        last, took = flight.client.get(*paths), time.monotonic() - begin
+        ticks, samples, spanned = (last[path] - first[path] for path in paths)
+        in_time = abs(ticks / took - 100.0) <= 100.0 * _RATE_PART and abs(spanned / ticks - 0.01) <= 0.0002
+        if in_time and abs(samples - ticks) <= 1:  # one may wait for its tick
+            return f"{ticks} ticks and {samples} scans in {took:.2f} s"
+    raise Failed(f"{ticks} ticks, {samples} scans that span {spanned:g} s, in {took:.2f} s: not 100 of each a second")
 
 
 def try_buffer(bus: I2cBus, craft: Craft) -> str:
