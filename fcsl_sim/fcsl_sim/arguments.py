@@ -43,6 +43,7 @@ def _parser() -> argparse.ArgumentParser:
     _add_campaign(_add(commands, "campaign", "fly a simulation many times, with dispersed parameters"))
     _add_trim(_add(commands, "trim", "find an equilibrium of a plant"))
     _add_linearise(_add(commands, "linearise", "print and write the linear equations of a plant around a point"))
+    _add_response(_add(commands, "response", "measure the frequency response of the loop with the compiled controller"))
     _add_model_commands(commands)
     _add(commands, "schema", "print the JSON Schema of a simulation, for editors")
     why = _add(commands, "explain", "explain a diagnostic code of simulations, with an example")
@@ -160,6 +161,28 @@ def _add_linearise(command: argparse.ArgumentParser) -> None:
     command.add_argument("--json", action="store_true", help="print them as JSON")
 
 
+def _add_response(command: argparse.ArgumentParser) -> None:
+    command.add_argument("config", help=_CONFIG)
+    help_input = "where a sine is added: instance.inputs.name, an element of it, or controller.channel (repeatable)"
+    command.add_argument(
+        "--input", action="append", default=[], metavar="PATH[=WEIGHT]", dest="inputs", help=help_input
+    )
+    help_result = "a value of a model or of the machine whose response is wanted (repeatable)"
+    command.add_argument("--output", action="append", default=[], metavar="PATH", dest="outputs", help=help_result)
+    command.add_argument("--at", type=_seconds, metavar="S", help="fly until then first (s); default: the beginning")
+    help_from = "the lowest frequency (default: 1 rad/s)"
+    command.add_argument("--from", type=_positive, default=1.0, metavar="RAD_S", dest="low", help=help_from)
+    help_to = "the highest one (default: 0.9 of half of the ticks' frequency)"
+    command.add_argument("--to", type=_positive, metavar="RAD_S", dest="high", help=help_to)
+    command.add_argument("--points", type=_count, default=25, metavar="N", help="how many frequencies (default: 25)")
+    help_amplitude = "of the sine, in the unit of the input (default: 0.001)"
+    command.add_argument("--amplitude", type=_positive, default=1e-3, metavar="A", help=help_amplitude)
+    command.add_argument("-o", type=Path, metavar="FILE", dest="output", help="write the response as JSON")
+    help_plot = "draw it: .png, .svg or .pdf"
+    command.add_argument("--plot", type=Path, metavar="FILE", help=help_plot)
+    command.add_argument("--json", action="store_true", help="print it as JSON, and nothing else")
+
+
 def _add_model_commands(commands: argparse._SubParsersAction[argparse.ArgumentParser]) -> None:
     listing = _add(commands, "list-models", "list the models of installed packages and of a folder")
     help_folder = "where to look for C and C++ files with models (default: this folder)"
@@ -203,8 +226,16 @@ def _speed(text: str) -> float:
     return value
 
 
+def _positive(text: str) -> float:
+    value = float(text)
+    if not (isfinite(value) and value > 0):
+        raise ValueError
+    return value
+
+
 # argparse uses these names in its error messages.
 _count.__name__ = "number of at least 1"
 _seed.__name__ = "seed (0 to 2^64 - 1)"
 _seconds.__name__ = "number of seconds"
 _speed.__name__ = "speed (a number above zero, or 0 for as fast as possible)"
+_positive.__name__ = "number above zero"

@@ -146,6 +146,12 @@ def _linearise(options: argparse.Namespace) -> int:
     return run_linearise(options)
 
 
+def _response(options: argparse.Namespace) -> int:
+    from .linear.command import run_response
+
+    return run_response(options)
+
+
 def _plot(options: argparse.Namespace) -> int:
     options.config = options.target
     given = options.sets or options.events or options.seed is not None or options.duration is not None
@@ -284,6 +290,7 @@ _COMMANDS = {
     "campaign": _campaign,
     "trim": _trim,
     "linearise": _linearise,
+    "response": _response,
     "list-models": _list_models,
     "describe": _describe,
     "schema": _schema,

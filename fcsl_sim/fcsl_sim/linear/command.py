@@ -1,9 +1,10 @@
 # SPDX-License-Identifier: Apache-2.0
-"""`fcsl-sim trim` and `fcsl-sim linearise`."""
+"""`fcsl-sim trim`, `fcsl-sim linearise` and `fcsl-sim response`."""
 
 from __future__ import annotations
 
 import json
+import math
 import sys
 from pathlib import Path
 from typing import Any
@@ -13,10 +14,14 @@ from ..errors import SimError
 from ..output import show
 from .linearise import linearise
 from .plant import Plant
+from .response import Response, spaced
+from .response_report import Measured, check_picture, heading, row
 from .trim import read_trim, trim, write_trimmed
 
 EXIT_NO_EQUILIBRIUM = 1
 _TRIM = ".trim.json"
+#: The highest frequency of a response, as part of half of the ticks' frequency.
+_OF_NYQUIST = 0.9
 
 
 def run_trim(options: Any) -> int:
@@ -45,6 +50,35 @@ def run_linearise(options: Any) -> int:
     if options.output is not None:
         linear.write(options.output)
     show(json.dumps(linear.as_json(), indent=1)) if options.json else print(linear.text())
+    return 0
+
+
+def run_response(options: Any) -> int:
+    """Raises SimError or DiagnosticError."""
+    config = load(options.config)
+    _warn(config)
+    high = options.high or _OF_NYQUIST * math.pi * config.machine.tick_hz
+    if high >= math.pi * config.machine.tick_hz:
+        limit = math.pi * config.machine.tick_hz
+        raise SimError(f"`--to` {high:g} rad/s is not below {limit:g} rad/s, half of the ticks' frequency")
+    if not options.low < high:
+        raise SimError(f"`--from` {options.low:g} rad/s is not below `--to` {high:g} rad/s")
+    if options.plot is not None:
+        check_picture(options.plot)
+    with Response(config, options.inputs, options.outputs, options.at, options.amplitude) as response:
+        if not options.json:
+            print(heading(response))
+        points = []
+        for point in response.points(spaced(options.low, high, options.points)):
+            points.append(point)
+            if not options.json:
+                show(row(point))
+        measured = Measured(response, points)
+    if options.output is not None:
+        measured.write(options.output)
+    if options.plot is not None:
+        measured.draw(options.plot, config.path.name)
+    show(json.dumps(measured.as_json(), indent=1)) if options.json else print(measured.text())
     return 0
 
 

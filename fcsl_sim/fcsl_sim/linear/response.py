@@ -1,0 +1,286 @@
+# SPDX-License-Identifier: Apache-2.0
+"""The frequency response of a simulation with its compiled controller, by flights in which a sine is added to inputs.
+
+With c what the source gives, d the sine and u = c + d what the target gets, along the weights w of the injections (c is
+w . c_i / w . w),
+
+    loop           L = -C / U           the loop is cut where the sine is added
+    sensitivity    S = 1 / (1 + L)      U / D
+    response       Y / D                of an output
+
+C, U, D, Y are the complex amplitudes at the frequency, from samples at the ticks. Each is half of the difference of two
+flights, with the sine and with its opposite: noise, whose streams are the same in both, and whatever else the vehicle
+does at that time cancel.
+"""
+
+from __future__ import annotations
+
+import cmath
+import math
+import re
+import tempfile
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass
+from fractions import Fraction
+from pathlib import Path
+from types import TracebackType
+from typing import Any, Self
+
+import numpy as np
+
+from simclient.errors import TwinError
+
+from ..config import SimConfig, load
+from ..errors import SimError
+from ..sim_run import SimRun
+from ..sim_twin import SimTwin
+from .injection import with_injections
+
+Array = np.ndarray[Any, Any]
+
+#: Least samples and periods of a window, and most windows until two agree.
+_SAMPLES, _PERIODS, _WINDOWS = 64, 2, 60
+#: Two windows agree if no amplitude changes by more than this part of it.
+_AGREE = 1e-3
+#: Of the largest sample: amplitudes below are rounding errors, and always agree.
+_ROUNDING = 1e-12
+#: Against division by zero.
+_LEAST = 1e-300
+
+
+@dataclass(frozen=True)
+class Point:
+    """Complex amplitudes at one frequency (rad/s). `change`: of them between the last two windows, as part of them. `rest`: what
+    is not at this frequency, r.m.s., as part of what is; the largest of all signals: harmonics, where something is not linear."""
+
+    omega: float
+    source: complex
+    sine: complex
+    outputs: tuple[complex, ...]
+    change: float
+    rest: float
+
+    @property
+    def is_settled(self) -> bool:
+        return self.change <= _AGREE
+
+    @property
+    def loop(self) -> complex:
+        return -self.source / (self.source + self.sine)
+
+    @property
+    def sensitivity(self) -> complex:
+        return 1.0 + self.source / self.sine
+
+    def response(self, output: int) -> complex:
+        return self.outputs[output] / self.sine
+
+
+class Response:
+    """Flights of a simulation, from `at_s` on. Raises SimError, or DiagnosticError for what is wrong in the file.
+
+    inputs: `instance.inputs.name`, `instance.inputs.name[1]` or `controller.channel`, each with `=WEIGHT` or not. outputs: scalars of
+    the machine and of models. amplitude: of the sine, in the unit of the input.
+    """
+
+    def __init__(
+        self, config: SimConfig, inputs: Sequence[str], outputs: Sequence[str], at_s: Fraction | None, amplitude: float
+    ):
+        if not inputs:
+            raise SimError("an `--input` is needed: where the sine is added")
+        self.tick_hz = config.machine.tick_hz
+        ticks = (at_s or 0) * self.tick_hz
+        if int(ticks) != ticks:
+            raise SimError(f"{float(at_s or 0):g} s is not a whole number of ticks (1/{self.tick_hz} s)")
+        self._amplitude = amplitude
+        self._twins: list[SimTwin] = []
+        with tempfile.TemporaryDirectory(prefix="fcsl-sim-response-") as folder:
+            file = Path(folder) / config.path.name
+            self.injections = with_injections(config, inputs, file)
+            injected = load(file)
+        try:
+            for _ in range(2):
+                self._twins.append(SimTwin(SimRun(injected)))
+            self._outputs = [_Output(self._twins[0], path) for path in outputs]
+            self._start = self._fly_to(int(ticks))
+        except TwinError as error:
+            self.close()
+            raise SimError(str(error)) from None
+        except SimError:
+            self.close()
+            raise
+
+    def __enter__(self) -> Self:
+        return self
+
+    def __exit__(
+        self, kind: type[BaseException] | None, value: BaseException | None, trace: TracebackType | None
+    ) -> None:
+        self.close()
+
+    def close(self) -> None:
+        for twin in self._twins:
+            twin.close()
+
+    @property
+    def outputs(self) -> list[tuple[str, str]]:
+        """Path and unit of each."""
+        return [(output.path, output.unit) for output in self._outputs]
+
+    def _fly_to(self, ticks: int) -> bytes:
+        twin = self._twins[0]
+        if ticks:
+            twin.tick(ticks)
+        return twin.save()
+
+    def points(self, omegas: Sequence[float]) -> Iterator[Point]:
+        """A point for each frequency (rad/s, below pi times the ticks' rate), as soon as it is measured. Raises SimError."""
+        for omega in omegas:
+            try:
+                yield self._point(omega)
+            except TwinError as error:
+                raise SimError(f"at {omega:g} rad/s: {error}") from None
+
+    def _point(self, omega: float) -> Point:
+        for twin, sign in zip(self._twins, (1.0, -1.0), strict=True):
+            twin.restore(self._start)
+            start = twin.get_value("machine.tick") / self.tick_hz
+            for injection in self.injections:
+                values = {
+                    "amplitude": injection.amplitude(sign * self._amplitude),
+                    "frequency": omega,
+                    "start": start,
+                }
+                twin.set_many({f"{injection.instance}.parameters.{name}": value for name, value in values.items()})
+        period = 2.0 * math.pi * self.tick_hz / omega
+        window = math.ceil(period * max(_PERIODS, math.ceil(_SAMPLES / period)))
+        before, change, rest, flown = None, math.inf, math.inf, 0
+        for _ in range(_WINDOWS):
+            pairs = [self._samples(twin, window) for twin in self._twins]
+            found, left = _fit((pairs[0] - pairs[1]) / 2.0, omega / self.tick_hz, flown)
+            flown += window
+            floors = _ROUNDING * np.abs(pairs[0]).max(axis=0) / _AGREE + _LEAST
+            rest = float(np.max(left / (np.abs(found) + floors)))
+            phasors = self._along_weights(found, omega)
+            if before is not None:
+                ports = np.full(3, floors[: 2 * len(self.injections)].max())
+                sizes = np.abs(phasors) + np.concatenate([ports, floors[2 * len(self.injections) :]])
+                change = float(np.max(np.abs(phasors - before) / sizes))
+            if change <= _AGREE:
+                break
+            before = phasors
+        return Point(omega, phasors[0], phasors[1], tuple(phasors[3:]), change, rest)
+
+    def _along_weights(self, found: Array, omega: float) -> Array:
+        """Of source, sine, target and outputs. What a controller commands at a tick, and its sine, are seen after the next one."""
+        square = sum(injection.weight**2 for injection in self.injections)
+        source, sine = 0j, 0j
+        for i, injection in enumerate(self.injections):
+            given, passed_on = found[2 * i], found[2 * i + 1]
+            tick = cmath.exp(1j * omega / self.tick_hz) if injection.is_commanded else 1.0
+            source += injection.weight / square * given * tick
+            sine += injection.weight / square * (passed_on - given) * tick
+        return np.array([source, sine, source + sine, *found[2 * len(self.injections) :]])
+
+    def _samples(self, twin: SimTwin, ticks: int) -> Array:
+        """After each tick: what each source gives and what its target gets, then the outputs."""
+        ports = [
+            (f"{injection.instance}.{port}.value", injection.element)
+            for injection in self.injections
+            for port in ("inputs", "outputs")
+        ]
+        columns = [*ports, *((output.field, output.element) for output in self._outputs)]
+        with twin.trace(*(field for field, _ in columns)) as trace:
+            twin.tick(ticks)
+        return np.column_stack([_element(trace[field], element).astype(float) for field, element in columns])
+
+
+class _Output:
+    """A scalar: a field, or an element of one."""
+
+    def __init__(self, twin: SimTwin, path: str):
+        self.path = path
+        brackets = path[len(path.partition("[")[0]) :]
+        self.field = path.removesuffix(brackets)
+        index = tuple(int(text) for text in re.findall(r"\d+", brackets))
+        field = twin.describe(self.field)
+        is_index = re.fullmatch(r"(\[\d+\])*", brackets) and len(index) == len(field.shape)
+        if not is_index or any(i >= n for i, n in zip(index, field.shape, strict=True)):
+            raise SimError(
+                f"`{path}`: {self.field} is {field.type_text}; name one element of it, or itself if it is a number"
+            )
+        if field.type not in ("f64", "f32"):
+            raise SimError(f"`{path}` is {field.type_text}, no floating number")
+        self.element = index
+        self.unit = field.unit
+
+
+def _element(values: Array, index: tuple[int, ...]) -> Array:
+    """Of each row."""
+    return values.reshape(len(values), -1)[:, int(np.ravel_multi_index(index, values.shape[1:])) if index else 0]
+
+
+def _fit(samples: Array, step: float, first: int) -> tuple[Array, Array]:
+    """The complex amplitude of each column at `step` rad per sample, by least squares beside an offset and a trend; and the
+    amplitude of a sine as large as what is left."""
+    k = np.arange(len(samples))
+    angle = step * (first + k)
+    basis = np.column_stack([np.cos(angle), np.sin(angle), np.ones(len(k)), k / len(k)])
+    found, *_ = np.linalg.lstsq(basis, samples, rcond=None)
+    left = np.sqrt(2.0 * np.mean((samples - basis @ found) ** 2, axis=0))
+    return found[0] - 1j * found[1], left
+
+
+@dataclass(frozen=True)
+class Margins:
+    """Of a loop, between the lowest and the highest frequency that was measured; None: there is no crossing within. Angles in rad."""
+
+    gain_crossover: float | None
+    phase_margin: float | None
+    phase_crossover: float | None
+    gain_margin: float | None
+    peak_sensitivity: float
+    peak_frequency: float
+
+    @property
+    def delay_margin(self) -> float | None:
+        """s"""
+        if self.phase_margin is None or not self.gain_crossover:
+            return None
+        return self.phase_margin / self.gain_crossover
+
+
+def margins(points: Sequence[Point]) -> Margins:
+    """Of several crossings the one with the smallest margin counts. Between points gain (dB) and phase are linear in the logarithm
+    of the frequency."""
+    omega = np.log([p.omega for p in points])
+    gain = np.log(np.maximum(np.abs([p.loop for p in points]), 1e-300))
+    phase = np.unwrap(np.angle([p.loop for p in points]))
+    gains = [(_between(omega, phase, at), at) for at in _crossings(omega, gain, 0.0)]
+    phase_margins = [(abs(math.remainder(angle - math.pi, 2 * math.pi)), math.exp(at)) for angle, at in gains]
+    phase_margin, crossover = min(phase_margins, default=(None, None))
+    turns = range(math.floor(phase.min() / (2 * math.pi)) - 1, math.ceil(phase.max() / (2 * math.pi)) + 2)
+    sideways = [at for n in turns for at in _crossings(omega, phase, (2 * n + 1) * math.pi)]
+    gain_margins = [(abs(_between(omega, gain, at)), -_between(omega, gain, at), math.exp(at)) for at in sideways]
+    _, size, phase_crossover = min(gain_margins, default=(None, None, None))
+    peak = max(points, key=lambda p: abs(p.sensitivity))
+    gain_margin = None if size is None else math.exp(size)
+    return Margins(crossover, phase_margin, phase_crossover, gain_margin, abs(peak.sensitivity), peak.omega)
+
+
+def _crossings(x: Array, y: Array, level: float) -> list[float]:
+    found = []
+    for i in range(len(x) - 1):
+        low, high = y[i] - level, y[i + 1] - level
+        if low * high < 0.0 or (low == 0.0 and high != 0.0):
+            found.append(float(x[i] + (x[i + 1] - x[i]) * low / (low - high)))
+    return found
+
+
+def _between(x: Array, y: Array, at: float) -> float:
+    return float(np.interp(at, x, y))
+
+
+def spaced(low: float, high: float, count: int) -> list[float]:
+    """Frequencies of equal ratio."""
+    return [float(value) for value in np.geomspace(low, high, count)]

@@ -1,0 +1,144 @@
+# SPDX-License-Identifier: Apache-2.0
+"""What `fcsl-sim response` prints, writes and draws."""
+
+from __future__ import annotations
+
+import cmath
+import json
+import math
+from collections.abc import Sequence
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from ..errors import SimError
+from ..plot import PICTURE_SUFFIXES
+from .response import Margins, Point, Response, margins
+
+_BLUE, _RED, _GREY = "#2a78b5", "#c8442c", "#888888"
+
+
+def heading(response: Response) -> str:
+    """Of the table whose rows are `row`."""
+    columns = ["loop", "sensitivity", *(path for path, _ in response.outputs)]
+    names = "  ".join(f"{_short(name):>18}" for name in columns)
+    return f"{'rad/s':>9}  {names}   change    rest"
+
+
+def row(point: Point) -> str:
+    """Frequency; gain (dB) and phase (degrees) of the loop, the sensitivity and each output; how well they are settled, and
+    what is left."""
+    values = [point.loop, point.sensitivity, *map(point.response, range(len(point.outputs)))]
+    cells = "  ".join(f"{_decibels(v):8.2f} dB {math.degrees(cmath.phase(v)):5.0f}°" for v in values)
+    return f"{point.omega:9.4g}  {cells}  {point.change:7.0e} {point.rest:7.0e}"
+
+
+def _short(name: str) -> str:
+    return name if len(name) <= 18 else f"…{name[-17:]}"
+
+
+def _decibels(value: complex) -> float:
+    return 20.0 * math.log10(abs(value)) if value else -math.inf
+
+
+def check_picture(path: Path) -> None:
+    """Raises SimError, before a long run, for a name that is none of a picture."""
+    if path.suffix.lower() not in PICTURE_SUFFIXES:
+        raise SimError(f"{path}: the name of a picture ends in {', '.join(PICTURE_SUFFIXES)}")
+
+
+class Measured:
+    """A whole response: its points, and the margins of the loop."""
+
+    def __init__(self, response: Response, points: Sequence[Point]):
+        self.inputs = [(injection.path, injection.weight) for injection in response.injections]
+        self.outputs = response.outputs
+        self.points = points
+        #: None: what the source gives does not depend on the sine, there is no loop.
+        self.margins: Margins | None = margins(points) if any(p.source for p in points) else None
+
+    def text(self) -> str:
+        lines = []
+        found = self.margins
+        if found is None:
+            lines.append("no loop: the source does not depend on the sine")
+        else:
+            if found.phase_margin is not None and found.gain_crossover is not None:
+                lines.append(
+                    f"phase margin {math.degrees(found.phase_margin):.1f}° at {found.gain_crossover:.4g} rad/s, "
+                    f"delay margin {1e3 * (found.delay_margin or 0.0):.3g} ms"
+                )
+            if found.gain_margin is not None:
+                lines.append(
+                    f"gain margin {_decibels(found.gain_margin):.1f} dB ({found.gain_margin:.3g}) at {found.phase_crossover:.4g} rad/s"
+                )
+            lines.append(
+                f"largest sensitivity {found.peak_sensitivity:.3g} ({_decibels(found.peak_sensitivity):.1f} dB) at {found.peak_frequency:.4g} rad/s"
+            )
+        moving = [point for point in self.points if not point.is_settled]
+        if moving:
+            names = ", ".join(f"{point.omega:.4g}" for point in moving)
+            lines.append(f"not settled at {names} rad/s: the numbers there are about right, or wrong")
+        return "\n".join(lines)
+
+    def as_json(self) -> dict[str, Any]:
+        def parts(values: Sequence[complex]) -> dict[str, list[float]]:
+            return {"real": [v.real for v in values], "imag": [v.imag for v in values]}
+
+        return {
+            "inputs": [{"path": path, "weight": weight} for path, weight in self.inputs],
+            "omega": [point.omega for point in self.points],
+            "loop": parts([point.loop for point in self.points]),
+            "sensitivity": parts([point.sensitivity for point in self.points]),
+            "responses": {
+                path: {"unit": unit, **parts([point.response(i) for point in self.points])}
+                for i, (path, unit) in enumerate(self.outputs)
+            },
+            "change": [None if math.isinf(point.change) else point.change for point in self.points],
+            "rest": [point.rest for point in self.points],
+            "margins": vars(self.margins) if self.margins else None,
+        }
+
+    def write(self, path: Path) -> None:
+        path.write_text(json.dumps(self.as_json(), indent=1) + "\n")
+
+    def draw(self, path: Path, title: str) -> None:
+        """Bode diagrams of the loop with its crossings, and of sensitivity and outputs."""
+        from matplotlib.figure import Figure  # imported here, because it takes a second
+
+        omega = np.array([point.omega for point in self.points])
+        figure = Figure(figsize=(11, 6), layout="constrained")
+        axes = figure.subplots(2, 2, sharex=True)
+        found = self.margins
+        if found:
+            _bode(axes[:, 0], omega, [point.loop for point in self.points], "loop", _BLUE)
+            for crossing, level, axis in (
+                (found.gain_crossover, 0.0, axes[0, 0]),
+                (found.phase_crossover, -180.0, axes[1, 0]),
+            ):
+                axis.axhline(level, color=_GREY, linewidth=0.8)
+                for other in axes[:, 0] if crossing else ():
+                    other.axvline(crossing, color=_RED, linewidth=0.8, linestyle=":")
+            _bode(axes[:, 1], omega, [point.sensitivity for point in self.points], "sensitivity", _RED)
+        for i, (name, unit) in enumerate(self.outputs):
+            values = [point.response(i) for point in self.points]
+            _bode(axes[:, 1], omega, values, f"{name} ({unit})" if unit else name, f"C{i}")
+        for axis in axes.flat:
+            axis.grid(True, which="both", color="#dddddd", linewidth=0.5)
+        for column in (0, 1):
+            axes[0, column].set_ylabel("gain (dB)")
+            axes[1, column].set_ylabel("phase (°)")
+            axes[1, column].set_xlabel("rad/s")
+            if axes[0, column].lines:
+                axes[0, column].legend(fontsize=8)
+        figure.suptitle(f"{title}, sine at {', '.join(path for path, _ in self.inputs)}", fontsize=10)
+        figure.savefig(path, dpi=100)
+
+
+def _bode(axes: Any, omega: Any, values: Sequence[complex], label: str, colour: str) -> None:
+    gain, phase = axes
+    phases = np.degrees(np.unwrap(np.angle(values)))
+    phases -= 360.0 * round((phases[0] + 90.0) / 360.0)  # begins within -270 and 90 degrees
+    gain.semilogx(omega, [_decibels(v) for v in values], ".-", color=colour, label=label)
+    phase.semilogx(omega, phases, ".-", color=colour, label=label)
