@@ -30,11 +30,12 @@ PICTURES = {
     "arming/arming.json": "arming/arming.svg",
     "lander/fc/lander_control.json": "lander/lander_control.svg",
     "glider/fc/glider.json": "glider/glider.svg",
+    "inverted_pendulum/fc/inverted_pendulum.json": "inverted_pendulum/inverted_pendulum.svg",
     "quadrotor/fc/quadrotor.json": "quadrotor/quadrotor.svg",
     "satellite/fc/satellite.json": "satellite/satellite.svg",
     "thermal_guard/thermal_guard.json": "thermal_guard/thermal_guard.svg",
 }
-BOXES = ("lander/fc/filter_alone.json", "quadrotor/sim/pilot.json")
+BOXES = ("lander/fc/filter_alone.json", "quadrotor/sim/pilot.json", "inverted_pendulum/sim/operator.json")
 MACHINES = {"small": CONFIG, **{Path(p).stem: EXAMPLES / p for p in PICTURES}}
 
 
