@@ -13,7 +13,7 @@ from fcsl_builtins import dot, f64, matvec
 
 def best_lead(cost: f64[4][4], tilt: f64, speed: f64, rate: f64) -> f64:
     """s - r with the smallest value, m."""
-    return -(cost[0, 1] * tilt + cost[0, 2] * speed + cost[0, 3] * rate) / cost[0, 0]
+    return f64(-(cost[0, 1] * tilt + cost[0, 2] * speed + cost[0, 3] * rate) / cost[0, 0])
 
 
 def least_value(cost: f64[4][4], tilt: f64, speed: f64, rate: f64) -> f64:

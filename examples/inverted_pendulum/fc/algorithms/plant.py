@@ -16,12 +16,12 @@ G = 9.81  # m/s^2
 
 def moment_of(plant: Plant) -> f64:
     """m l, kg m."""
-    return plant.pole_mass * plant.pole_length
+    return f64(plant.pole_mass * plant.pole_length)
 
 
 def inertia_of(plant: Plant) -> f64:
     """J, kg m^2."""
-    return plant.pole_inertia + plant.pole_mass * plant.pole_length * plant.pole_length
+    return f64(plant.pole_inertia + plant.pole_mass * plant.pole_length * plant.pole_length)
 
 
 def slopes(plant: Plant, x: f64[4], force: f64) -> f64[4]:
