@@ -23,7 +23,7 @@ PACKAGES = {
 #: The folders of a package; "" are the modules beside the folders.
 FOLDERS: dict[str, Sequence[str]] = {
     "fcsl_compiler": (
-        *("base", "model", "parse", "check", "ros", "config", "lower", "emit", "coverage", "driver"),
+        *("base", "model", "parse", "check", "ros", "config", "lower", "emit", "printers", "coverage", "driver"),
         *("board", "graph", "build_report", "reference", "cli"),
     ),
     "simclient": (

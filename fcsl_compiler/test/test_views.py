@@ -12,7 +12,7 @@ from scipy.spatial.transform import Rotation
 from fcsl_compiler.base.diagnostics import DiagnosticError
 from fcsl_compiler.driver.cache import build_machine
 from fcsl_compiler.driver.passes import compile_machine
-from fcsl_compiler.emit.descriptor import layout_hash, source_hash
+from fcsl_compiler.emit.field_table import layout_hash, source_hash
 from fcsl_compiler.model.machine import Machine as Checked
 
 NAV = """class Nav:

@@ -8,7 +8,7 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from ..driver.toolchain import compile_objects
-from ..emit.header import instance_type
+from ..emit.names import instance_type
 from ..model.machine import Machine, State
 from .bound import Bound, Bounder, Memory
 from .instruction_table import most, usual

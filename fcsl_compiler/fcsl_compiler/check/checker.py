@@ -218,9 +218,7 @@ class Checker:
     def apply(self, name: str, args: tuple[ir.Expr, ...], span: Span, symbol: str = "") -> ir.Expr:
         """Applies one operation of the op table to settled scalars."""
         op = self.find(name, tuple(a.type for a in args), args, symbol or name, span)
-        fault = bool(op.faults)
-        if fault and op.proven:
-            fault = not self._cannot_fault(op, args, span)
+        fault = bool(op.faults) and not self._cannot_fault(op, args, span)
         self.scope.faults = self.scope.faults or fault
         return ir.Apply(op.result, op, args, fault, span)
 

@@ -65,7 +65,7 @@ class Freezer:
         if isinstance(node, ir.Element):
             pairs = zip(node.indices, node.checked, shape_of(node.base.type), strict=False)
             return replace(node, checked=tuple(c and not _is_within(i, extent) for i, c, extent in pairs))
-        if isinstance(node, ir.Apply) and node.fault and node.op.proven:
+        if isinstance(node, ir.Apply) and node.fault:
             bounds = exact(node.op, node.args)
             return replace(node, fault=not (bounds and fits(node.op, bounds)))
         return node
@@ -97,7 +97,7 @@ def _is_within(index: ir.Expr, extent: int) -> bool:
 
 def _reads_fault(e: ir.Expr) -> bool:
     """Whether the expression reads the fault flag without faulting itself. Only coverage probes do."""
-    if isinstance(e, ir.Apply) and not e.op.faults and "{fault}" in e.op.c:
+    if isinstance(e, ir.Apply) and e.op.sees_fault:
         return True
     return any(map(_reads_fault, ir.children(e)))
 

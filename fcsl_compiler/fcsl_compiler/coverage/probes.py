@@ -7,18 +7,25 @@ from ..base.files import digest
 from ..model.c_names import c_string
 from ..model.ops import Op
 from ..model.types import BOOL, I64, U64
+from ..printers.spelling import Spelling
 from .probe_map import CoverMap
 
 LINE = "fcsl_cover_line"
 LOOP = "fcsl_cover_loop"
-CONDITION = Op("cover.condition", (U64, I64, BOOL), BOOL, "fcsl_cover_condition(&{0}, {1}, {2})")
+CONDITION = Op("cover.condition", (U64, I64, BOOL), BOOL)
 #: True if nothing has faulted yet. After a fault, C still evaluates expressions that Python would not reach.
-SOUND = Op("cover.sound", (), BOOL, "(*{fault} == 0u)")
-_DECIDED = "fcsl_cover_decided(&{0}, {1}, {2}, {FAULT}, {3})"
+SOUND = Op("cover.sound", (), BOOL, sees_fault=True)
 #: Probe at the end of a decision, in functions that may fault and in others.
 DECIDED = {
-    faults: Op(f"cover.decided.{faults}", (U64, I64, I64, BOOL), BOOL, _DECIDED.replace("{FAULT}", fault))
-    for faults, fault in ((True, "{fault}"), (False, "NULL"))
+    faults: Op(f"cover.decided.{faults}", (U64, I64, I64, BOOL), BOOL, sees_fault=faults) for faults in (True, False)
+}
+
+#: Their C.
+C_OPERATIONS = {
+    CONDITION.id: Spelling("fcsl_cover_condition(&{0}, {1}, {2})"),
+    SOUND.id: Spelling("(*{fault} == 0u)"),
+    DECIDED[True].id: Spelling("fcsl_cover_decided(&{0}, {1}, {2}, {fault}, {3})"),
+    DECIDED[False].id: Spelling("fcsl_cover_decided(&{0}, {1}, {2}, NULL, {3})"),
 }
 
 _PRELUDE = """\

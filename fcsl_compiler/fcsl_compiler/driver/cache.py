@@ -58,7 +58,7 @@ def _build_machine(config: Path, target: str, instances: Sequence[str] | None) -
         return found
 
     def build(library: Path) -> dict[str, str]:
-        from ..emit.descriptor import source_hash
+        from ..emit.field_table import source_hash
         from .library import build_library
 
         machine = build_library([config], library, target=target, cover=cover, instances=instances)[0].checked

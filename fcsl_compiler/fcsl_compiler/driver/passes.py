@@ -3,7 +3,6 @@
 
 from __future__ import annotations
 
-import json
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
@@ -16,20 +15,21 @@ from ..config.schedule import schedule
 from ..config.strict import check_strict
 from ..config.subset import subset
 from ..coverage.instrument import instrument
-from ..coverage.probes import prelude
+from ..coverage.probes import C_OPERATIONS, prelude
 from ..coverage.settings import BUILD_NOTE
-from ..emit.c_writer import CWriter
 from ..emit.collisions import check_collisions
-from ..emit.descriptor import DescriptorEmitter, source_hash
 from ..emit.fault_places import FaultPlaces
-from ..emit.header import emit_header
-from ..emit.machine import MachineEmitter
+from ..emit.field_table import source_hash
+from ..emit.machine import emit_machine
 from ..lower.lower import lower
-from ..model.ir import HARDWARE_HEADER
 from ..model.machine import Machine
 from ..model.target import DEFAULT_TARGET, Target
 from ..parse.machine_files import ParsedMachine, parse_machine
 from ..parse.targets import choose_target
+from ..printers.c.descriptor import DescriptorEmitter
+from ..printers.c.header import print_header
+from ..printers.c.source import print_source
+from ..printers.source_map import source_map
 from .c_dependencies import CInputs, extern_inputs
 from .dump import dump_c, dump_ir, dump_machine, dump_schedule, dump_syntax, dump_types
 
@@ -92,19 +92,6 @@ def _lower(c: Compilation) -> None:
     verify_machine(c.lowered)
 
 
-#: First lines of every C file. Despite -ffp-contract=off, gcc's vectoriser can fuse two roundings into one (vfmaddsub).
-#: gcc 12's dead store elimination shortens the first of two overlapping copies and then omits the code that restores
-#: its end after a fault. Without this optimisation the code size differs by less than 1 %.
-_GCC = """\
-#if defined(__GNUC__) && !defined(__clang__)
-#pragma GCC optimize("no-tree-dse") /* gcc 12 loses stores between overlapping copies */
-#endif
-#if defined(__GNUC__) && !defined(__clang__) && defined(__FMA__)
-#pragma GCC target("no-fma,no-fma4,no-avx512f") /* gcc fuses products with sums in spite of -ffp-contract */
-#endif
-"""
-
-
 def _emit(c: Compilation) -> None:
     m, lowered = c.checked, c.lowered
     assert c.parsed is not None and lowered is not None
@@ -117,42 +104,11 @@ def _emit(c: Compilation) -> None:
     c.c_inputs = extern_inputs(c.parsed, c.target)
     linked = (*c.target.digest_parts, *c.c_inputs.digest_parts)
     c.build_hash = digest(source_hash(m), c.toolchain, *linked, *([BUILD_NOTE] if covered else []))
-    w = CWriter()
-    w.block(f"/* {m.name}.c: made by fcslc from {m.config.name}. Do not edit. */")
-    w.block(_GCC)
-    w.block(f'#include "{m.name}.h"\n\n#include <math.h>\n#include <stddef.h>\n#include <string.h>')
-    w.line()
-    if any(f.uses_hardware for f, _ in lowered.entries):
-        w.line(f"#include <{HARDWARE_HEADER}>")
-    w.line("#include <fcsl/fcsl_math.h>")
-    for header in dict.fromkeys(e.header for e in m.externs):
-        w.line(f'#include "{header}"')
-    w.line()
-    if covered is not None:
-        w.block(prelude(covered.map))
-        w.line()
     places = FaultPlaces(lowered)
-    body = MachineEmitter(lowered, places).emit()
-    w.paste((body.lines, body.origins))
+    program = emit_machine(lowered, places)
+    w = print_source(program, prelude(covered.map) if covered is not None else "", C_OPERATIONS)
     DescriptorEmitter(m, w, c.build_hash, places).emit()
-    c.header, c.source = emit_header(lowered), w.text()
-    c.map = _source_map(m, w)
-
-
-def _source_map(machine: Machine, writer: CWriter) -> str:
-    """Source map as JSON: the Python (or JSON) line of every generated line, as runs [c_first, c_last, file, line], and
-    the externs that the file calls."""
-    runs: list[list[object]] = []
-    for number, origin in enumerate(writer.origins, start=1):
-        if origin is None:
-            continue
-        file, line = origin.source.name, origin.line
-        if runs and runs[-1][1] == number - 1 and runs[-1][2:] == [file, line]:
-            runs[-1][1] = number
-        else:
-            runs.append([number, number, file, line])
-    externs = [e.name for e in machine.externs]
-    return json.dumps({"version": 1, "c": f"{machine.name}.c", "externs": externs, "runs": runs}, indent=1) + "\n"
+    c.header, c.source, c.map = print_header(program), w.text(), source_map(program, w, f"{m.name}.c")
 
 
 @dataclass(frozen=True)

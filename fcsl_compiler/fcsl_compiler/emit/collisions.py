@@ -8,9 +8,8 @@ from ..base.source import Span
 from ..model import ir
 from ..model.machine import Machine
 from ..model.types import REQUEST, element_of
-from .expressions import struct_type
-from .header import channel_member, instance_type, record_type
 from .messages import message_name, message_requests, request_constant, struct_message_name
+from .names import channel_member, instance_type, record_type, struct_type
 
 
 def check_collisions(machine: Machine, sink: DiagnosticSink) -> None:

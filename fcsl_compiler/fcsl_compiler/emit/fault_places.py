@@ -1,7 +1,7 @@
 # SPDX-License-Identifier: Apache-2.0
 """Numbers the places where an algorithm may fault, from 1: the table fault_places of fcsl_machine.h.
 
-The C of a faulting operation contains the number and stores it when the fault occurs. Instances and specialised
+The code of a faulting operation contains the number and stores it when the fault occurs. Instances and specialised
 functions share the numbers of their common source.
 """
 
@@ -47,13 +47,12 @@ class FaultPlaces:
         self.rows = (INJECTED, *sorted(found))
         self._numbers = {row: number for number, row in enumerate(self.rows, 1)}
 
-    def number(self, span: Span, cause: str) -> str:
-        """The number of a place as a C literal."""
-        return f"{self._numbers[_place(span, cause)]}u"
+    def number(self, span: Span, cause: str) -> int:
+        return self._numbers[_place(span, cause)]
 
     @property
-    def injected(self) -> str:
-        return f"{self._numbers[INJECTED]}u"
+    def injected(self) -> int:
+        return self._numbers[INJECTED]
 
 
 def _place(span: Span, cause: str) -> FaultPlace:

@@ -1,63 +1,73 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Generates C for one checked function: signature and statements. A statement that can fault ends with a test of
-*fault_."""
+"""Makes code of one checked function: signature and statements. A statement that can fault ends with a test of
+FAULT."""
 
 from __future__ import annotations
 
-from ..model import ir
+from ..model import code, ir
 from ..model.c_names import c_name
 from ..model.effects import can_fault
-from ..model.types import Array, Scalar, Struct, count_of
-from .c_writer import CWriter
-from .expressions import ExprEmitter, assigns_all, bare, is_block, zero
+from ..model.types import BOOL, U32, Array, Scalar, Struct, count_of
+from .expressions import ExprEmitter, assigns_all, is_block, zero
 from .fault_places import FaultPlaces
-from .unrolling import unroll_for
+from .names import FAULT, HOST, RESULT
+from .unrolling import unrolled_for
 
 #: Functions on arrays with at most this many elements are inlined.
 _SMALL_ELEMENTS = 16
 
+HOST_TYPE = code.Pointer(code.Named("fcsl_host_t"))
+FAULT_TYPE = code.Pointer(U32, writable=True)
+
 
 class FunctionEmitter(ExprEmitter):
-    """Generates one function."""
+    """Makes one function. `record_types`: of the records of its algorithm."""
 
     def __init__(
-        self,
-        writer: CWriter,
-        function: ir.Function,
-        machine: str,
-        places: FaultPlaces,
-        record_types: dict[str, str],
-        inlined: bool,
+        self, function: ir.Function, machine: str, places: FaultPlaces, record_types: dict[str, str], inlined: bool
     ):
-        super().__init__(writer, function, machine, places)
+        super().__init__(function, machine, places)
         self.record_types, self.inlined = record_types, inlined
 
     # ---- the function ----------------------------------------------------------------------------------------------
 
-    def signature(self) -> str:
-        """The signature, without `restrict`. With two restricted pointers, gcc 12 can confuse them and move a load
-        before a store. Measured, `restrict` makes no step faster."""
+    def emit(self) -> code.Function:
         f = self.function
-        parameters: list[str] = []
+        reads = self._reads()
+        for argument in sorted({*f.records, *(c_name(n) for n, _ in f.arguments)} - reads):
+            self.out.add(code.Unused(argument))
+        whole = self._assigned_whole()
+        for name, type_ in f.locals:
+            if name == self.returned:
+                continue
+            self.declare(c_name(name), type_, fill=name not in whole)
+            if c_name(name) not in reads:
+                self.out.add(code.Unused(c_name(name)))
+        self._statements(f.body)
+        body = self.out.taken()
+        if body and body[-1] == code.Return():
+            body = body[:-1]  # a final `return` is redundant
+        result = f.result if isinstance(f.result, Scalar) else None
+        inline = "always" if self._is_small() else "usual"
+        comment = f"{f.span}: {f.source_name}"
+        return code.Function(f.name, self._parameters(), result, body, comment, inline, span=f.span)
+
+    def _parameters(self) -> tuple[tuple[str, code.Type], ...]:
+        """Pointers are not `restrict`. With two restricted pointers, gcc 12 can confuse them and move a load before a
+        store. Measured, `restrict` makes no step faster."""
+        f = self.function
+        made: list[tuple[str, code.Type]] = []
         for record in f.records:
-            const = "" if record in ("outputs", "state") else "const "
-            parameters.append(f"{const}{self.record_types[record]} *{record}")
+            made.append((record, code.Pointer(code.Named(self.record_types[record]), record in ("outputs", "state"))))
         if f.uses_hardware:
-            parameters.append("const fcsl_host_t *host_")
+            made.append((HOST.text, HOST_TYPE))
         for name, type_ in f.arguments:
-            if isinstance(type_, Scalar):
-                parameters.append(f"{type_.c} {c_name(name)}")
-            else:
-                parameters.append(f"const {self.c_type(type_)} *{c_name(name)}")
-        result = "void"
-        if isinstance(f.result, Scalar):
-            result = f.result.c
-        elif f.result is not None:
-            parameters.append(f"{self.c_type(f.result)} *result_")
+            made.append((c_name(name), type_ if isinstance(type_, Scalar) else self.pointer_type(type_)))
+        if f.result is not None and not isinstance(f.result, Scalar):
+            made.append((RESULT.text, self.pointer_type(f.result, writable=True)))
         if f.faults:
-            parameters.append("uint32_t *fault_")
-        inline = "static inline __attribute__((always_inline))" if self._is_small() else "static"
-        return f"{inline} {result} {f.name}({', '.join(parameters) or 'void'})"
+            made.append((FAULT.text, FAULT_TYPE))
+        return tuple(made)
 
     def _is_small(self) -> bool:
         """Whether to inline. Inlined helpers on small arrays keep the elements in registers (measured: the lander's
@@ -65,29 +75,6 @@ class FunctionEmitter(ExprEmitter):
         f = self.function
         types = [t for _, t in (*f.arguments, *f.locals)] + ([f.result] if f.result is not None else [])
         return self.inlined and f.result is not None and all(count_of(t) <= _SMALL_ELEMENTS for t in types)
-
-    def emit(self) -> None:
-        f, w = self.function, self.w
-        w.origin = f.span
-        w.line(f"/* {f.span}: {f.source_name} */")
-        w.line(self.signature())
-        w.open_body()
-        reads = self._reads()
-        for argument in sorted({*f.records, *(c_name(n) for n, _ in f.arguments)} - reads):
-            w.line(f"(void){argument};")
-        whole = self._assigned_whole()
-        for name, type_ in f.locals:
-            if name == self.returned:
-                continue
-            self.declare(c_name(name), type_, fill=name not in whole)
-            if c_name(name) not in reads:
-                w.line(f"(void){c_name(name)};")
-        self._statements(f.body)
-        if w.lines[-1] == "    return;":
-            w.cut(w.mark() - 1)  # a final `return` is redundant
-        w.close()
-        w.origin = None
-        w.line()
 
     def _assigned_whole(self) -> set[str]:
         """The locals that an unconditional first statement assigns completely."""
@@ -101,7 +88,7 @@ class FunctionEmitter(ExprEmitter):
         return whole
 
     def _reads(self) -> set[str]:
-        """C names of the arguments and locals that the body reads, and of the records that it uses."""
+        """Names of the arguments and locals that the body reads, and of the records that it uses."""
         names: set[str] = set()
 
         def expression(e: ir.Expr) -> None:
@@ -147,95 +134,83 @@ class FunctionEmitter(ExprEmitter):
         for statement in statements:
             self._statement(statement)
 
+    def _body(self, statements: tuple[ir.Stmt, ...]) -> code.Body:
+        with self.out.nested() as body:
+            self._statements(statements)
+        return tuple(body)
+
     def _statement(self, s: ir.Stmt) -> None:
-        w = self.w
+        self.out.add(code.At(s.span))
         if isinstance(s, ir.Assign):
-            w.at(s.span)
             self._assign(s)
             self.release()
         elif isinstance(s, ir.Effect):
-            w.at(s.span)
             self._effect(s)
             self.release()
         elif isinstance(s, ir.If):
             self._if(s)
         elif isinstance(s, ir.For):
-            w.at(s.span)
-            if not s.body:
-                return
-            i, relation = c_name(s.variable), "<" if s.step > 0 else ">"
-            start, stop = bare(self.scalar(s.start)), bare(self.scalar(s.stop))
-            unroll_for(w, s)
-            w.open(f"for (int64_t {i} = {start}; {i} {relation} {stop}; {i} += {s.step})")
-            self._statements(s.body)
-            w.close()
+            self._for(s)
         elif isinstance(s, ir.Return):
-            w.at(s.span)
             self._return(s)
         else:
-            w.at(s.span)
-            w.line("break;" if isinstance(s, ir.Break) else "continue;")
+            self.out.add(code.Break() if isinstance(s, ir.Break) else code.Continue())
 
     def _check_fault(self) -> None:
         """Returns from the function if this statement faulted. The machine then restores outputs and state."""
         if self._fault:
             self._fault = False
-            value = f" {zero(self.function.result)}" if isinstance(self.function.result, Scalar) else ""
-            with self.w.braces("if (*fault_ != 0u)"):
-                self.w.line(f"return{value};")
+            result = self.function.result
+            value = zero(result) if isinstance(result, Scalar) else None
+            faulted = code.Binary("!=", code.Deref(FAULT), code.Literal(0, U32))
+            self.out.add(code.If(faulted, (code.Return(value),)))
 
     def _if(self, s: ir.If) -> None:
-        w = self.w
-        w.at(s.span)
         condition = self.scalar(s.condition)
         if self._fault:
-            condition = self.hold(condition, "bool")
+            condition = self.hold(condition, BOOL)
             self._check_fault()
-        w.open(f"if ({bare(condition)})")
-        self._statements(s.then)
-        self._else(s.otherwise)
-        w.close()
+        self.out.add(code.If(condition, self._body(s.then), self._otherwise(s.otherwise)))
 
-    def _else(self, otherwise: tuple[ir.Stmt, ...]) -> None:
-        """`elif` becomes `else if` unless its condition needs preceding lines."""
-        w = self.w
+    def _otherwise(self, otherwise: tuple[ir.Stmt, ...]) -> code.Body:
+        """`elif` is an If alone, unless its condition needs preceding statements."""
         if len(otherwise) == 1 and isinstance(otherwise[0], ir.If):
-            inner, mark = otherwise[0], w.mark()
-            condition = self.scalar(inner.condition)
-            lines, _ = w.cut(mark)
-            if not lines and not self._fault:
-                w.origin = inner.span
-                w.reopen(f"else if ({bare(condition)})")
-                w.at(inner.span)
-                self._statements(inner.then)
-                self._else(inner.otherwise)
-                return
+            inner = otherwise[0]
+            with self.out.nested() as before:
+                condition = self.scalar(inner.condition)
+            if not before and not self._fault:
+                chained = code.If(condition, self._body(inner.then), self._otherwise(inner.otherwise))
+                return (code.At(inner.span), chained)
             self._fault = False
-        if otherwise:
-            w.reopen("else")
-            self._statements(otherwise)
+        return self._body(otherwise)
+
+    def _for(self, s: ir.For) -> None:
+        if not s.body:
+            return
+        start, stop = self.scalar(s.start), self.scalar(s.stop)
+        body = self._body(s.body)
+        self.out.add(code.For(c_name(s.variable), start, stop, s.step, body, unrolled_for(s)))
 
     def _return(self, s: ir.Return) -> None:
-        w = self.w
         if s.value is None:
-            w.line("return;")
+            self.out.add(code.Return())
         elif not isinstance(s.value.type, Scalar):
-            self.into("(*result_)" if isinstance(s.value.type, Struct) else "result_", s.value)
+            self.into(code.Deref(RESULT), s.value)
             self._check_fault()
-            w.line("return;")
+            self.out.add(code.Return())
         else:
             value = self.scalar(s.value)
             if self._fault:
-                value = self.hold(value, s.value.type.c)
+                value = self.hold(value, s.value.type)
                 self._check_fault()
-            w.line(f"return {bare(value)};")
+            self.out.add(code.Return(value))
 
     def _assign(self, s: ir.Assign) -> None:
         if isinstance(s.value.type, Scalar):
             value = self.scalar(s.value)
             if can_fault(s.target):
                 value = self.settled(value, s.value.type)
-            self.w.line(f"{self.scalar(s.target)} = {bare(value)};")
+            self.out.add(code.Set(self.place(s.target), value))
         elif isinstance(s.target, ir.Slice) and not is_block(s.target):
             self.scatter(s.target, self._apart(s.value) if _hazard(s.target, s.value) else self.aggregate(s.value))
         elif _hazard(s.target, s.value) or (can_fault(s.target) and can_fault(s.value)):
@@ -246,35 +221,42 @@ class FunctionEmitter(ExprEmitter):
         self._check_fault()
 
     def _effect(self, s: ir.Effect) -> None:
-        operands = [*(["host_"] if s.is_hardware else []), *map(self.operand, s.args)]
+        operands = [*([HOST] if s.is_hardware else []), *map(self.operand, s.args)]
         result = s.function.result
         if s.target is None:
-            self.w.line(f"{s.function.name}({', '.join(operands)});")
+            self.out.add(code.Do(code.Call(s.function.name, tuple(operands))))
         elif isinstance(result, Scalar):
-            self.w.line(f"{self.scalar(s.target)} = {s.function.name}({', '.join(operands)});")
+            self.out.add(code.Set(self.place(s.target), code.Call(s.function.name, tuple(operands))))
         elif result is not None:
             given = self.temporary(result)
             operands.append(self.pointer(given, result))
-            self.w.line(f"{s.function.name}({', '.join(operands)});")
+            self.out.add(code.Do(code.Call(s.function.name, tuple(operands))))
             if isinstance(s.target, ir.Slice) and not is_block(s.target):
                 self.scatter(s.target, given)
             else:
                 self.copy(self._destination(s.target), given, result)
         self._check_fault()
 
-    def _apart(self, value: ir.Expr) -> str:
+    def _apart(self, value: ir.Expr) -> code.Name:
         """Computes a value into separate storage."""
         assert isinstance(value.type, Array | Struct)
         temporary = self.temporary(value.type)
         self.into(temporary, value)
         return temporary
 
-    def _destination(self, target: ir.Place) -> str:
-        """C expression of a target. A target with subscripts is evaluated once."""
-        text = self.place(target)
+    def _destination(self, target: ir.Place) -> code.Place:
+        """A target with subscripts is evaluated once."""
+        place = self.place(target)
         if isinstance(target.type, Struct):
-            return f"(*{self.hold('&' + text, self.c_type(target.type) + ' *')})" if "[" in text else text
-        return self.hold(text, f"{self.c_type(target.type)} *") if text.startswith("&") else text
+            return self.hold_pointer(place, target.type, writable=True) if _is_indexed(place) else place
+        return self.hold_pointer(place, target.type, writable=True) if isinstance(place, code.Part) else place
+
+
+def _is_indexed(place: code.Place) -> bool:
+    """Whether an index is in the path of a place."""
+    while isinstance(place, code.Member):
+        place = place.base
+    return isinstance(place, code.Element | code.Part)
 
 
 def _hazard(target: ir.Place, value: ir.Expr) -> bool:

@@ -1,109 +1,117 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Generates the C of one instance: init, execute, and the functions for injected faults and overruns."""
+"""Makes the functions of one instance: init, execute, and those for injected faults and overruns."""
 
 from __future__ import annotations
 
-from ..model import ir
-from ..model.c_names import c_literal, c_name
+from collections.abc import Iterator
+
+from ..model import code, ir
+from ..model.c_names import c_name
+from ..model.code import Deref, Function, If, Member, Name, Set, Statement, Update
 from ..model.machine import Instance, Machine, Values
-from ..model.types import HEALTH, Array, Scalar, Type, count_of, leaves, scalar_of
-from .c_writer import CWriter
+from ..model.types import HEALTH, U32, U64, Array, Scalar, Type, count_of, leaves, scalar_of
+from .expressions import code_type
 from .fault_places import FaultPlaces
 from .fault_points import written_before_fault
-from .header import HEALTH_CONSTANTS, execute_signature, instance_type, leaf_member, record_type, request_constant
+from .functions import HOST_TYPE
+from .names import health, instance_type, record_type, request_constant
 
-#: Keeps rarely executed functions away from frequently executed code.
-_RARE = "static __attribute__((cold, noinline)) void"
+_SELF = Name("self")
+_FAULT = Name("fault")
+_HOST = Name("host")
 
 
-def constant(machine: Machine, value: bool | int | float | str, scalar: Scalar) -> str:
-    """C literal for a scalar of a port. Healths and requests use the names of their enums."""
+def constant(machine: Machine, value: bool | int | float | str, scalar: Scalar) -> code.Literal | Name:
+    """A scalar of a port. Healths and requests use the names of their enums."""
     if isinstance(value, str):
-        return request_constant(machine, value or "none")
-    return HEALTH_CONSTANTS[int(value)] if scalar is HEALTH else c_literal(value, scalar)
+        return Name(request_constant(machine.name, value))
+    return health(int(value)) if scalar is HEALTH else code.Literal(value, scalar)
 
 
-def store(w: CWriter, machine: Machine, target: str, type_: Type, values: Values) -> None:
-    """Writes the values of a port, listed in the order of its leaves, into zero-initialised storage."""
+def store(machine: Machine, target: code.Place, type_: Type, values: Values) -> Iterator[Statement]:
+    """Stores the values of a port, listed in the order of its leaves, into zero-initialised storage."""
     at = 0
     for leaf in leaves(type_):
         scalar, count = scalar_of(leaf.type), count_of(leaf.type)
+        place = target
+        for step in leaf.steps:
+            place = code.Element(place, code.Sum((), step)) if isinstance(step, int) else Member(place, c_name(step))
         for position, value in enumerate(values[at : at + count]):
-            place = f"{target}{leaf_member(leaf)}" + (f"[{position}]" if isinstance(leaf.type, Array) else "")
-            if not isinstance(leaf.type, Array) or value != 0 or str(value).startswith("-"):
-                w.line(f"{place} = {constant(machine, value, scalar)};")
+            if isinstance(leaf.type, Array):
+                if value != 0 or str(value).startswith("-"):
+                    yield Set(code.Element(place, code.Sum((), position)), constant(machine, value, scalar))
+            else:
+                yield Set(place, constant(machine, value, scalar))
         at += count
 
 
-def call(function: ir.Function, fault: str, self_: str = "self->") -> str:
-    """C call of `execute` or `start` with the records of `self_`."""
-    arguments = [f"&{self_}{record}" for record in function.records]
-    arguments += ["host"] if function.uses_hardware else []
-    return f"{function.name}({', '.join([*arguments, *([fault] if function.faults else [])])});"
+def call(function: ir.Function, record: code.Place, fault: Name) -> code.Do:
+    """Calls `execute` or `start` with the records of an instance."""
+    arguments: list[code.Expr] = [code.Address(Member(record, name)) for name in function.records]
+    arguments += [_HOST] if function.uses_hardware else []
+    return code.Do(code.Call(function.name, (*arguments, *([code.Address(fault)] if function.faults else []))))
 
 
 class InstanceEmitter:
-    """Generates the functions of one instance."""
+    """Makes the functions of one instance."""
 
-    def __init__(self, machine: Machine, places: FaultPlaces, instance: Instance, writer: CWriter):
-        self.m, self.places, self.i, self.w = machine, places, instance, writer
-        self.type = instance_type(machine, instance)
+    def __init__(self, machine: Machine, places: FaultPlaces, instance: Instance):
+        self.m, self.places, self.i = machine, places, instance
+        self.pointer = code.Pointer(code.Named(instance_type(machine, instance)), writable=True)
+        self.name = f"{machine.name}_{instance.name}"
 
-    def emit(self) -> None:
-        self._init()
-        self._execute()
-        self._inject()
+    def emit(self) -> Iterator[Function]:
+        yield self._init()
+        yield self._execute()
+        yield from self._inject()
         if self.i.max_wcet_us:
-            self._overrun()
+            yield self._overrun()
 
-    def _init(self) -> None:
-        w, instance = self.w, self.i
-        w.line(f"void {self.m.name}_{instance.name}_init({self.type} *self)")
-        w.open_body()
-        w.line("memset(self, 0, sizeof *self);")
-        for record, values in (("parameters", instance.parameters), ("inputs", instance.inputs)):
-            for port in instance.algorithm.ports[record]:
+    def _function(self, name: str, body: tuple[Statement, ...], comment: str) -> Function:
+        """Rarely executed, and kept away from frequently executed code."""
+        return Function(name, ((_SELF.text, self.pointer),), None, body, comment, inline="rare")
+
+    def _init(self) -> Function:
+        body: list[Statement] = [code.Clear(Deref(_SELF), self.pointer.target)]
+        for record, values in (("parameters", self.i.parameters), ("inputs", self.i.inputs)):
+            for port in self.i.algorithm.ports[record]:
                 if port.name in values:
-                    store(w, self.m, f"self->{record}.{c_name(port.name)}", port.type, values[port.name])
-        w.line("self->outputs.health = FCSL_STALE;")
-        w.close()
-        w.line()
+                    body += store(self.m, _field(record, port), port.type, values[port.name])
+        body.append(Set(_output("health"), health(3)))
+        comment = (
+            "Zeroes the record, binds parameters and initial inputs. start() runs afterwards, in the machine's init."
+        )
+        return Function(f"{self.name}_init", ((_SELF.text, self.pointer),), None, tuple(body), comment, exported=True)
 
-    def _execute(self) -> None:
-        w, algorithm = self.w, self.i.algorithm
-        w.line(f"uint32_t {execute_signature(self.m, self.i)}")
-        w.open_body()
-        self._pulses("FCSL_NOMINAL")
+    def _execute(self) -> Function:
+        body = self._pulses(health(0))
         if not self.i.execute.faults:
-            w.line(call(self.i.execute, ""))
-            self._not_stale(algorithm)
-            w.line("return 0u;")
+            body += [call(self.i.execute, Deref(_SELF), _FAULT), *self._not_stale()]
+            body.append(code.Return(code.Literal(0, U32)))
         else:
-            restore = self._save()
-            w.line("uint32_t fault = 0u;")
-            w.line(call(self.i.execute, "&fault"))
-            with w.braces("if (fault != 0u)"):
-                for line in restore:
-                    w.line(line)
-                self._failed("fault")
-            self._not_stale(algorithm)
-            w.line("return fault;")
-        w.close()
-        w.line()
+            save, restore = self._saved()
+            body += [*save, code.Var(_FAULT.text, U32), call(self.i.execute, Deref(_SELF), _FAULT)]
+            faulted = code.Binary("!=", _FAULT, code.Literal(0, U32))
+            body += [If(faulted, (*restore, *self._failed(_FAULT))), *self._not_stale(), code.Return(_FAULT)]
+        parameters: list[tuple[str, code.Type]] = [(_SELF.text, self.pointer)]
+        if self.i.execute.uses_hardware:
+            parameters.append((_HOST.text, HOST_TYPE))
+        comment = "Runs execute once with the inputs in the record. Returns 0, or the place of a fault; outputs and state then stay."
+        return Function(f"{self.name}_execute", tuple(parameters), U32, tuple(body), comment, exported=True)
 
-    def _pulses(self, health: str) -> None:
-        self.w.line(f"self->outputs.transition_request = {request_constant(self.m, 'none')};")
-        self.w.line(f"self->outputs.health = {health};")
+    def _pulses(self, word: Name) -> list[Statement]:
+        request = Name(request_constant(self.m.name, ""))
+        return [Set(_output("transition_request"), request), Set(_output("health"), word)]
 
-    def _failed(self, place: str) -> None:
+    def _failed(self, place: code.Expr) -> list[Statement]:
         """The effects of a fault apart from the restored outputs and state."""
-        self._pulses("FCSL_FAILED")
-        self.w.line("self->faults += 1u;")
-        self.w.line(f"self->fault_place = {place};")
+        return [*self._pulses(health(2)), _increment("faults"), Set(_member("fault_place"), place)]
 
-    def _save(self) -> list[str]:
-        """Saves the fields that a fault must restore. Returns the lines that restore them. Pulses are reset instead."""
-        restore: list[str] = []
+    def _saved(self) -> tuple[list[Statement], list[Statement]]:
+        """Statements that save the fields that a fault must restore, and those that restore them. Pulses are reset
+        instead."""
+        save: list[Statement] = []
+        restore: list[Statement] = []
         written = written_before_fault(self.i.execute)
         for record in ("outputs", "state"):
             ports = [
@@ -113,65 +121,75 @@ class InstanceEmitter:
             ]
             if not ports:
                 continue
-            type_, before = record_type(self.m, self.i.algorithm, record), f"{record}_before"
+            type_, before = code.Named(record_type(self.m, self.i.algorithm, record)), Name(f"{record}_before")
             if all(p in ports or _is_pulse(record, p) for p in self.i.algorithm.ports[record]):
-                self.w.line(f"const {type_} {before} = self->{record};")
-                restore.append(f"self->{record} = {before};")
+                save.append(code.Let(before.text, type_, _member(record)))
+                restore.append(Set(_member(record), before))
                 continue
-            self.w.line(f"{type_} {before};")
+            save.append(code.Var(before.text, type_, zeroed=False))
             for port in ports:
-                self.w.line(_copy(port, before, f"self->{record}"))
-                restore.append(_copy(port, f"self->{record}", before))
-        return restore
+                save.append(self._copy(port, before, _member(record)))
+                restore.append(self._copy(port, _member(record), before))
+        return save, restore
 
-    def _not_stale(self, algorithm: ir.Algorithm) -> None:
+    def _copy(self, port: ir.Port, to: code.Place, source: code.Place) -> Statement:
+        """Copies one field between two records."""
+        name, type_ = c_name(port.name), code_type(self.m.name, port.type)
+        if isinstance(type_, code.Block):
+            return code.Copy(Member(to, name), Member(source, name), type_)
+        return Set(Member(to, name), Member(source, name))
+
+    def _not_stale(self) -> list[Statement]:
         """A running instance is never stale. If a variable can set health to stale, it becomes failed."""
-        written = ir.writes(algorithm.execute.body)
+        written = ir.writes(self.i.algorithm.execute.body)
         words = [value for target, value, _ in written if ir.variable(target) == ("outputs", "health")]
-        if any(not isinstance(word, ir.Const) for word in words):
-            with self.w.braces("if (self->outputs.health == FCSL_STALE)"):
-                self.w.line("self->outputs.health = FCSL_FAILED;")
+        if all(isinstance(word, ir.Const) for word in words):
+            return []
+        own = _output("health")
+        return [If(code.Binary("==", own, health(3)), (Set(own, health(2)),))]
 
-    def _inject(self) -> None:
-        w, own = self.w, f"{self.m.name}_{self.i.name}({self.type} *self)"
-        w.line("/* Replaces an execute with an injected fault: outputs and state stay. */")
-        w.line(f"{_RARE} fcsl_fault_{own}")
-        w.open_body()
-        w.line("self->inject_fault = 0u;")
-        self._failed(self.places.injected)
-        w.close()
-        w.line()
-        w.line("/* After an execute with an injected health: at least degraded or failed. */")
-        w.line(f"{_RARE} fcsl_worsen_{own}")
-        w.open_body()
-        w.line("const int32_t least = self->inject_fault > 2u ? FCSL_FAILED : FCSL_DEGRADED;")
-        w.line("self->inject_fault = 0u;")
-        with w.braces("if (self->outputs.health < least)"):
-            w.line("self->outputs.health = least;")
-        w.close()
-        w.line()
+    def _inject(self) -> Iterator[Function]:
+        clear = Set(_member("inject_fault"), code.Literal(0, code.U8))
+        body: tuple[Statement, ...] = (clear, *self._failed(code.Literal(self.places.injected, U32)))
+        comment = "Replaces an execute with an injected fault: outputs and state stay."
+        yield self._function(f"fcsl_fault_{self.name}", body, comment)
+        own, least = _output("health"), Name("least")
+        failed = code.Binary(">", _member("inject_fault"), code.Literal(2, code.U8))
+        body = (
+            code.Let(least.text, HEALTH, code.Choice(failed, health(2), health(1))),
+            clear,
+            If(code.Binary("<", own, least), (Set(own, least),)),
+        )
+        comment = "After an execute with an injected health: at least degraded or failed."
+        yield self._function(f"fcsl_worsen_{self.name}", body, comment)
 
-    def _overrun(self) -> None:
-        w = self.w
-        w.line("/* After an execute that overran, or with an injected overrun. */")
-        w.line(f"{_RARE} fcsl_overrun_{self.m.name}_{self.i.name}({self.type} *self)")
-        w.open_body()
-        w.line("self->inject_overrun = 0u;")
-        w.line("self->overruns += 1u;")
-        with w.braces("if (self->outputs.health == FCSL_NOMINAL)"):
-            w.line("self->outputs.health = FCSL_DEGRADED;")
-        w.close()
-        w.line()
+    def _overrun(self) -> Function:
+        own = _output("health")
+        body = (
+            Set(_member("inject_overrun"), code.Literal(0, code.U8)),
+            _increment("overruns"),
+            If(code.Binary("==", own, health(0)), (Set(own, health(1)),)),
+        )
+        comment = "After an execute that overran, or with an injected overrun."
+        return self._function(f"fcsl_overrun_{self.name}", body, comment)
+
+
+def _member(name: str) -> Member:
+    return Member(Deref(_SELF), name)
+
+
+def _output(name: str) -> Member:
+    return Member(_member("outputs"), name)
+
+
+def _field(record: str, port: ir.Port) -> Member:
+    return Member(_member(record), c_name(port.name))
+
+
+def _increment(counter: str) -> Update:
+    return Update(_member(counter), "+", code.Literal(1, U64))
 
 
 def _is_pulse(record: str, port: ir.Port) -> bool:
     """Whether the port is reset before each execute and by a fault."""
     return record == "outputs" and port.name in ("transition_request", "health")
-
-
-def _copy(port: ir.Port, to: str, source: str) -> str:
-    """Copies one field between two records."""
-    field = c_name(port.name)
-    if isinstance(port.type, Array):
-        return f"memcpy({to}.{field}, {source}.{field}, sizeof {to}.{field});"
-    return f"{to}.{field} = {source}.{field};"

@@ -1,116 +1,168 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Generates C of `step` and `force_state`: the latched state becomes active, channels age, and the tick of the state
-runs."""
+"""Makes `init`, `step` and `force_state` of the descriptor. In a step the latched state becomes active, channels age, and
+the tick of the state runs."""
 
 from __future__ import annotations
 
+from collections.abc import Iterator
+
+from ..model import code
+from ..model.code import STATE, Binary, Call, Do, Function, If, Literal, Member, Name, Set, Statement, Update
 from ..model.machine import Channel, Instance, Machine
-from .c_writer import CWriter
-from .header import channel_member, sensors, state_constant
-from .tick import TickEmitter
+from ..model.types import I32, U32, U64
+from .functions import HOST_TYPE
+from .instances import call, store
+from .names import health, machine_type, sensors, state_constant
+from .tick import (
+    MACHINE,
+    NO_INSTANCE,
+    ONE,
+    TICK,
+    TICKS_IN_STATE,
+    TickEmitter,
+    channel_place,
+    health_of,
+    one_of,
+    port_place,
+    record_of,
+)
+
+_ACTIVE = Member(MACHINE, "state_")
+_NEXT = Member(MACHINE, "next_state_")
+_CURRENT = Member(MACHINE, "current_")
+_GREATEST_AGE = Literal(0xFFFF_FFFF, U32)
 
 
 class StepEmitter:
-    """Generates the step functions of the descriptor, callees first."""
+    """Makes the functions of the descriptor, callees first."""
 
-    def __init__(self, machine: Machine, writer: CWriter):
-        self.m, self.w = machine, writer
+    def __init__(self, machine: Machine):
+        self.m = machine
+        self.pointer = code.Pointer(code.Named(machine_type(machine)), writable=True)
 
-    def emit(self) -> None:
+    def emit(self) -> Iterator[Function]:
+        yield self._init()
         if len(self.m.states) > 1:
-            self._enter()
-        TickEmitter(self.m, self.w).emit()
-        self._step()
-        self._force_state()
+            yield self._enter()
+        yield from TickEmitter(self.m).emit()
+        yield self._step()
+        yield self._force_state()
 
-    def _enter(self) -> None:
+    def _of_descriptor(
+        self,
+        entry: str,
+        more: tuple[tuple[str, code.Type], ...],
+        body: list[Statement],
+        result: code.Type | None = None,
+    ) -> Function:
+        """A function of the descriptor; `m` is its machine."""
+        machine = code.Let("m", self.pointer, code.Convert(self.pointer, Name("machine")))
+        parameters = (("machine", code.UNTYPED), *more)
+        return Function(f"fcsl_{entry}_{self.m.name}", parameters, result, (machine, *body))
+
+    def _init(self) -> Function:
+        m = self.m
+        body: list[Statement] = [code.Clear(MACHINE, self.pointer.target), Set(_CURRENT, NO_INSTANCE)]
+        body += [Set(place, state_constant(m, m.initial_state)) for place in (_ACTIVE, _NEXT)]
+        for instance in m.instances:
+            body.append(Do(Call(f"{m.name}_{instance.name}_init", (code.Address(record_of(instance)),))))
+        for connection in m.connections:
+            if connection.delayed:
+                body += store(m, port_place(m, connection.target), connection.target.type, connection.initial)
+        body += [Set(channel_place(channel, "valid"), Literal(1, code.U8)) for channel in sensors(m)]
+        for index, instance in enumerate(m.instances):
+            body += self._start(index, instance)
+        body.append(code.Return(Literal(0, I32)))
+        return self._of_descriptor("init", (), body, I32)
+
+    def _start(self, index: int, instance: Instance) -> Iterator[Statement]:
+        if instance.start is None:
+            return
+        fault = Name("fault")
+        called = call(instance.start, record_of(instance), fault)
+        if not instance.start.faults:
+            yield called
+            return
+        place = Set(Member(record_of(instance), "fault_place"), fault)
+        failed = (place, code.Return(Literal(index + 1, I32)))
+        faulted = Binary("!=", fault, Literal(0, U32))
+        yield code.Scope((code.Var(fault.text, U32), called, If(faulted, failed)))
+
+    def _enter(self) -> Function:
         """Handles the instances of a new state. Instances with the same set of states share one test. An instance in
         all states never becomes stale."""
-        w, m = self.w, self.m
+        m = self.m
         groups: dict[tuple[int, ...], list[Instance]] = {}
         for index, instance in enumerate(m.instances):
             states = tuple(n for n, s in enumerate(m.states) if any(e.instance == index for e in s.entries))
             if len(states) < len(m.states):
                 groups.setdefault(states, []).append(instance)
-        w.line(
-            "/* On entering a state: instances scheduled in it and in the previous state continue; the others are stale. */"
-        )
-        head = f"static __attribute__((cold, noinline)) void fcsl_enter_{m.name}"
-        w.line(f"{head}({m.name}_t *m, int32_t from, int32_t to)")
-        w.open_body()
-        for unused in () if any(len(states) > 1 for states in groups) else ("from", "to"):
-            w.line(f"(void){unused};")
+        body: list[Statement] = []
+        ends = (Name("left"), Name("entered"))
+        if not any(len(states) > 1 for states in groups):
+            body += [code.Unused(end.text) for end in ends]
         if not groups:
-            w.line("(void)m;")
+            body.append(code.Unused("m"))
         for states, instances in groups.items():
+            stale = [Set(health_of(instance), health(3)) for instance in instances]
             if len(states) > 1:
-                both = [" || ".join(f"{at} == {state_constant(m, n)}" for n in states) for at in ("from", "to")]
-                w.open(f"if (!(({both[0]}) && ({both[1]})))")
-            for instance in instances:
-                w.line(f"m->i_{instance.name}.outputs.health = FCSL_STALE;")
-            if len(states) > 1:
-                w.close()
-        w.close()
-        w.line()
+                both = [one_of([Binary("==", end, state_constant(m, n)) for n in states]) for end in ends]
+                body.append(If(code.Not(code.And(tuple(both))), tuple(stale)))
+            else:
+                body += stale
+        comment = (
+            "On entering a state: instances scheduled in it and in the one that is left continue; the others are stale."
+        )
+        parameters: tuple[tuple[str, code.Type], ...] = (("m", self.pointer), *((end.text, STATE) for end in ends))
+        return Function(f"fcsl_enter_{m.name}", parameters, None, tuple(body), comment, inline="rare")
 
-    def _step(self) -> None:
-        w, m = self.w, self.m
-        w.line(f"static void fcsl_step_{m.name}(void *machine, const fcsl_host_t *host)")
-        w.open_body()
-        w.line(f"{m.name}_t *const m = machine;")
+    def _step(self) -> Function:
+        m, host = self.m, Name("host")
+        body: list[Statement] = []
         if len(m.states) > 1:
-            with w.braces("if (m->state_ != m->next_state_)"):
-                w.line(f"fcsl_enter_{m.name}(m, m->state_, m->next_state_);")
-                w.line("m->state_ = m->next_state_;")
-                self._restart()
-        for channel in sensors(m):
-            self._age(channel)
-        w.open("switch (m->state_)")
+            enter = Do(Call(f"fcsl_enter_{m.name}", (MACHINE.pointer, _ACTIVE, _NEXT)))
+            body.append(If(Binary("!=", _ACTIVE, _NEXT), (enter, Set(_ACTIVE, _NEXT), *self._restart())))
+        body += map(self._age, sensors(m))
+        cases = []
         for index, state in enumerate(m.states):
-            w.line(f"case {state_constant(m, index)}:")
-            w.line(f"    fcsl_tick_{m.name}_{state.name}(m, host);")
-            w.line("    break;")
-        w.line("default:")
-        w.line("    break;")
-        w.close()
+            tick = Do(Call(f"fcsl_tick_{m.name}_{state.name}", (MACHINE.pointer, host)))
+            cases.append((state_constant(m, index), (tick,)))
+        body.append(code.Select(_ACTIVE, tuple(cases)))
         if m.counts_state_ticks:
-            w.line("m->ticks_in_state += 1u;")
-        w.line("m->tick += 1u;")
-        w.close()
-        w.line()
+            body.append(Update(TICKS_IN_STATE, "+", ONE))
+        body.append(Update(TICK, "+", ONE))
+        return self._of_descriptor("step", ((host.text, HOST_TYPE),), body)
 
-    def _restart(self) -> None:
-        if self.m.counts_state_ticks:
-            self.w.line("m->ticks_in_state = 0u;")
+    def _restart(self) -> list[Statement]:
+        return [Set(TICKS_IN_STATE, Literal(0, U64))] if self.m.counts_state_ticks else []
 
-    def _age(self, channel: Channel) -> None:
+    def _age(self, channel: Channel) -> Statement:
         """Updates a sensor channel. A sample sets its age; without one the age increases. The channel is valid up to
         its maximum age."""
-        w, c = self.w, f"m->{channel_member(channel)}"
-        w.open(f"if ({c}.fresh != 0u)")
-        w.line(f"{c}.fresh = 0u;")
-        w.line(f"{c}.age_ticks = {c}.sample_age;")
-        if channel.name in self.m.last_samples:
-            w.line(f"{c}.last_sample = m->tick + 1u;")
-        w.line(
-            f"{c}.valid = {'1u' if channel.max_age_ticks is None else f'{c}.age_ticks <= {channel.max_age_ticks}u'};"
-        )
-        w.reopen(f"else if ({c}.attached != 0u && {c}.age_ticks < UINT32_MAX)")
-        w.line(f"{c}.age_ticks += 1u;")
-        if channel.max_age_ticks is not None:
-            w.line(f"{c}.valid = {c}.age_ticks <= {channel.max_age_ticks}u;")
-        w.close()
 
-    def _force_state(self) -> None:
-        w, m = self.w, self.m
-        w.line(f"static void fcsl_force_state_{m.name}(void *machine, int32_t state)")
-        w.open_body()
-        w.line(f"{m.name}_t *const m = machine;")
+        def own(member: str) -> Member:
+            return channel_place(channel, member)
+
+        young = None
+        if channel.max_age_ticks is not None:
+            young = code.Convert(code.U8, Binary("<=", own("age_ticks"), Literal(channel.max_age_ticks, U32)))
+        sampled: list[Statement] = [Set(own("fresh"), Literal(0, code.U8)), Set(own("age_ticks"), own("sample_age"))]
+        if channel.name in self.m.last_samples:
+            sampled.append(Set(own("last_sample"), Binary("+", TICK, ONE)))
+        sampled.append(Set(own("valid"), young or Literal(1, code.U8)))
+        older: list[Statement] = [Update(own("age_ticks"), "+", Literal(1, U32))]
+        if young is not None:
+            older.append(Set(own("valid"), young))
+        is_attached = Binary("!=", own("attached"), Literal(0, code.U8))
+        can_age = code.And((is_attached, Binary("<", own("age_ticks"), _GREATEST_AGE)))
+        is_fresh = Binary("!=", own("fresh"), Literal(0, code.U8))
+        return If(is_fresh, tuple(sampled), (If(can_age, tuple(older)),))
+
+    def _force_state(self) -> Function:
+        m, state = self.m, Name("entered")
+        body: list[Statement] = [code.Let(state.text, STATE, code.Convert(STATE, Name("state")))]
         if len(m.states) > 1:
-            with w.braces("if (m->state_ != state)"):
-                w.line(f"fcsl_enter_{m.name}(m, m->state_, state);")
-        w.line("m->state_ = state;")
-        w.line("m->next_state_ = state;")
-        self._restart()
-        w.close()
-        w.line()
+            enter = Do(Call(f"fcsl_enter_{m.name}", (MACHINE.pointer, _ACTIVE, state)))
+            body.append(If(Binary("!=", _ACTIVE, state), (enter,)))
+        body += [Set(_ACTIVE, state), Set(_NEXT, state), *self._restart()]
+        return self._of_descriptor("force_state", (("state", I32),), body)

@@ -1,52 +1,91 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Generates C of a tick in each state: due tests, connections, instance calls and verdicts, and the arbitration at the
+"""Makes code of a tick in each state: due tests, connections, instance calls and verdicts, and the arbitration at the
 end."""
 
 from __future__ import annotations
 
-import re
-from collections.abc import Iterable
+from collections.abc import Iterable, Iterator, Sequence
 from itertools import groupby
 
-from ..model.c_names import c_literal, c_name
+from ..model import code
+from ..model.c_names import c_name
+from ..model.code import Binary, Call, Deref, Do, Function, If, Literal, Member, Name, Set, Statement
 from ..model.machine import Channel, Connection, Edge, Entry, Instance, Machine, PortRef, State
-from ..model.types import F64, Array
-from .c_writer import CWriter
-from .header import HEALTH_CONSTANTS, channel_member, request_constant, sensors, state_constant
+from ..model.types import BOOL, F64, I32, I64, U32, U64
+from .expressions import code_type
+from .functions import HOST_TYPE
 from .inline_size import takes_bodies_in
+from .names import (
+    channel_member,
+    health,
+    instance_member,
+    machine_type,
+    request_constant,
+    sensors,
+    state_constant,
+)
 
-#: Maximum number of instances in one C function. The time of C compilers grows faster than linearly with the size of a
+#: Maximum number of instances in one function. The time of C compilers grows faster than linearly with the size of a
 #: function.
 _PART = 50
 
+_HOST = Name("host")
+_NOW = Name("now_ns")
+MACHINE = Deref(Name("m"))
+TICK = Member(MACHINE, "tick")
+TICKS_IN_STATE = Member(MACHINE, "ticks_in_state")
+ONE = Literal(1, U64)
+#: The absent index of fcsl_machine.h.
+NO_INSTANCE = Name("FCSL_NONE")
 
-def port_place(machine: Machine, port: PortRef) -> str:
-    path = ".".join(c_name(part) for part in (port.field, *port.members))
-    return f"m->i_{machine.instances[port.instance].name}.{port.record}.{path}"
+
+def record_of(instance: Instance) -> Member:
+    return Member(MACHINE, instance_member(instance))
+
+
+def port_place(machine: Machine, port: PortRef) -> code.Place:
+    place: code.Place = Member(record_of(machine.instances[port.instance]), port.record)
+    for part in (port.field, *port.members):
+        place = Member(place, c_name(part))
+    return place
+
+
+def channel_place(channel: Channel, member: str) -> Member:
+    return Member(Member(MACHINE, channel_member(channel)), member)
+
+
+def health_of(instance: Instance) -> Member:
+    return Member(Member(record_of(instance), "outputs"), "health")
+
+
+def one_of(tests: Sequence[code.Expr]) -> code.Expr:
+    """True if one of them is; none gives false."""
+    if len(tests) > 1:
+        return code.Or(tuple(tests))
+    return tests[0] if tests else Literal(False, BOOL)
 
 
 def due_name(entry: Entry) -> str:
-    """The C variable that is true if an entry is due; "" for an entry that is due in every tick."""
+    """The variable that is true if an entry is due; "" for an entry that is due in every tick."""
     return f"due_{entry.divisor}_{entry.phase}" if entry.divisor > 1 else ""
 
 
-def _any_due(entries: list[Entry]) -> str:
-    """C condition that one of the entries is due; "" if one is due in every tick."""
-    names = dict.fromkeys(map(due_name, entries))
-    return "" if "" in names else " || ".join(names)
+def _when_due(entry: Entry, test: code.Expr) -> code.Expr:
+    return test if entry.divisor == 1 else code.And((Name(due_name(entry)), test))
 
 
-def _static(attributes: list[str], result: str) -> str:
-    """Start of the definition of a static function."""
-    return f"static __attribute__(({', '.join(attributes)})) {result}" if attributes else f"static {result}"
+def _if_any(name: str, body: Sequence[Statement]) -> tuple[Statement, ...]:
+    """The body, if the variable is true; "" stands for true."""
+    return (If(Name(name), tuple(body)),) if name else tuple(body)
 
 
 class TickEmitter:
-    """Generates one function per state, and its callees."""
+    """Makes one function per state, and its callees."""
 
-    def __init__(self, machine: Machine, writer: CWriter):
-        self.m, self.w = machine, writer
-        self.inlined = ["flatten"] if takes_bodies_in(machine) else []
+    def __init__(self, machine: Machine):
+        self.m = machine
+        self.flatten = takes_bodies_in(machine)
+        self.pointer = code.Pointer(code.Named(machine_type(machine)), writable=True)
         self.feeds: dict[int, list[Connection]] = {}
         for connection in machine.connections:
             if not connection.delayed:
@@ -55,64 +94,69 @@ class TickEmitter:
         for channel in sensors(machine):
             self.guards.setdefault(channel.port.instance, []).append(channel)
 
-    def emit(self) -> None:
+    def emit(self) -> Iterator[Function]:
         if any(i.max_wcet_us for i in self.m.instances):
-            self._clock()
+            yield self._clock()
         for state in self.m.states:
-            self._state(state)
+            yield from self._state(state)
 
-    def _clock(self) -> None:
-        w = self.w
-        w.line("/* Without a clock all times are 0. */")
-        w.line(f"static inline uint64_t fcsl_now_{self.m.name}(const fcsl_host_t *host)")
-        w.open_body()
-        w.line("return host->clock_ns != NULL ? host->clock_ns(host->ctx) : 0u;")
-        w.close()
-        w.line()
+    def _clock(self) -> Function:
+        clock = Member(Deref(_HOST), "clock_ns")
+        given = Binary("!=", clock, code.Null())
+        time = code.Choice(given, Call(clock, (Member(Deref(_HOST), "ctx"),)), Literal(0, U64))
+        name, parameters = f"fcsl_now_{self.m.name}", ((_HOST.text, HOST_TYPE),)
+        return Function(name, parameters, U64, (code.Return(time),), "Without a clock all times are 0.", "hint")
 
     # ---- one state -------------------------------------------------------------------------------------------------
 
-    def _state(self, state: State) -> None:
+    def _state(self, state: State) -> Iterator[Function]:
         entries, name = list(enumerate(state.entries)), f"fcsl_tick_{self.m.name}_{state.name}"
         readings, timed = self._readings(state), any(self._is_timed(e) for e in state.entries)
         parts = [entries[at : at + _PART] for at in range(0, len(entries), _PART)]
-        calls: list[str] = []
+        calls: list[Statement] = []
         for number, part in enumerate(parts if len(parts) > 1 else []):
-            # Each part gets now_ns, the last reading of the clock, and returns it.
-            result, given, handed = ("uint64_t", ", uint64_t now_ns", ", now_ns") if timed else ("void", "", "")
-            head = _static(["noinline", *self.inlined], result)
-            self.w.line(f"{head} {name}_{number}({self.m.name}_t *m, const fcsl_host_t *host{given})")
-            with _Body(self.w):
-                self._dues(e for at, entry in part for e in (entry, *readings.get(at, ())))
-                self._entries(part, readings)
-                if timed:
-                    self.w.line("return now_ns;")
-            calls.append(f"{'now_ns = ' if timed else ''}{name}_{number}(m, host{handed});")
-        attributes = [] if calls else self.inlined
-        self.w.line(f"{_static(attributes, 'void')} {name}({self.m.name}_t *m, const fcsl_host_t *host)")
-        with _Body(self.w):
-            self._tick(state, calls, readings, timed)
+            # Each part gets the last reading of the clock and returns its own.
+            dues = self._dues(e for at, entry in part for e in (entry, *readings.get(at, ())))
+            body = [*dues, *self._entries(part, readings)]
+            last = Name("last_ns")
+            if timed:
+                body = [code.Var(_NOW.text, U64, last), *body, code.Return(_NOW)]
+            more = ((last.text, U64),) if timed else ()
+            yield self._function(f"{name}_{number}", body, more, U64 if timed else None, apart=True)
+            called = Call(f"{name}_{number}", (MACHINE.pointer, _HOST, *([_NOW] if timed else [])))
+            calls.append(Set(_NOW, called) if timed else Do(called))
+        yield self._function(name, self._tick(state, calls, readings, timed), flatten=not calls)
 
-    def _tick(self, state: State, calls: list[str], readings: dict[int, list[Entry]], timed: bool) -> None:
-        w = self.w
-        used = [e for e in state.entries if not calls or self._tests_due(state, e)]
-        self._dues(used)
+    def _function(
+        self,
+        name: str,
+        body: list[Statement],
+        more: tuple[tuple[str, code.Type], ...] = (),
+        result: code.Type | None = None,
+        apart: bool = False,
+        flatten: bool = True,
+    ) -> Function:
+        used = code.used_names(body)
+        unused = [code.Unused(argument) for argument in ("m", _HOST.text) if argument not in used]
+        parameters = (("m", self.pointer), (_HOST.text, HOST_TYPE), *more)
+        inline = "never" if apart else "usual"
+        return Function(name, parameters, result, (*unused, *body), inline=inline, flatten=flatten and self.flatten)
+
+    def _tick(
+        self, state: State, calls: list[Statement], readings: dict[int, list[Entry]], timed: bool
+    ) -> list[Statement]:
+        body: list[Statement] = list(self._dues(e for e in state.entries if not calls or self._tests_due(state, e)))
         if timed:
-            w.line("uint64_t now_ns = 0u; /* the last reading of the clock */")
-        self._delayed(state)
-        for line in calls:
-            w.line(line)
+            body.append(code.Var(_NOW.text, U64, Literal(0, U64), comment="the last reading of the clock"))
+        body += self._delayed(state)
+        body += calls
         if not calls:
-            self._entries(list(enumerate(state.entries)), readings)
+            body += self._entries(list(enumerate(state.entries)), readings)
         elif timed:
-            w.line("(void)now_ns;")
+            body.append(code.Unused(_NOW.text))
         if state.entries:
-            w.line("*(volatile int32_t *)&m->current_ = FCSL_NONE;")
-        edges = [e for e in self.m.edges if self.m.states[e.source] is state]
-        for position, edge in enumerate(edges):
-            self._edge(state, edge, position)
-        if edges:
-            w.close()
+            body.append(Set(Member(MACHINE, "current_"), NO_INSTANCE, volatile=True))
+        return body + self._arbitration(state)
 
     def _tests_due(self, state: State, entry: Entry) -> bool:
         """Whether the function of the state itself, not one of its parts, tests if this entry is due. Delayed
@@ -125,11 +169,12 @@ class TickEmitter:
             or bool(wanted & set(self.m.requests_of(self.m.instances[entry.instance])))
         )
 
-    def _dues(self, entries: Iterable[Entry]) -> None:
+    def _dues(self, entries: Iterable[Entry]) -> Iterator[Statement]:
         """Evaluates each rate and phase once."""
         for name, entry in {due_name(e): e for e in entries}.items():
             if name:
-                self.w.line(f"const bool {name} = m->tick % {entry.divisor}u == {entry.phase}u;")
+                rest = Binary("%", TICK, Literal(entry.divisor, U64))
+                yield code.Let(name, BOOL, Binary("==", rest, Literal(entry.phase, U64)))
 
     def _is_timed(self, entry: Entry) -> bool:
         return self.m.instances[entry.instance].max_wcet_us > 0
@@ -145,192 +190,182 @@ class TickEmitter:
                 found[positions[0][0]] = [e for _, e in positions]
         return found
 
-    def _entries(self, entries: list[tuple[int, Entry]], readings: dict[int, list[Entry]]) -> None:
-        """Runs the entries in order. Consecutive entries with the same due condition share one test."""
-        w, reading = self.w, f"now_ns = fcsl_now_{self.m.name}(host);"
-        opened = ""
-        for position, entry in entries:
-            due, span = due_name(entry), _any_due(readings[position]) if position in readings else None
-            if opened and (due != opened or span not in (None, due)):
-                w.close()
-                opened = ""
-            if span is not None and span != due:
-                if span:
-                    with w.braces(f"if ({span})"):
-                        w.line(reading)
-                else:
-                    w.line(reading)
-            if due and due != opened:
-                w.open(f"if ({due})")
-                opened = due
-            if span is not None and span == due:
-                w.line(reading)
-            self._run(entry)
-        if opened:
-            w.close()
+    def _read_clock(self) -> Set:
+        return Set(_NOW, Call(f"fcsl_now_{self.m.name}", (_HOST,)))
 
-    def _delayed(self, state: State) -> None:
+    def _entries(self, entries: list[tuple[int, Entry]], readings: dict[int, list[Entry]]) -> list[Statement]:
+        """Runs the entries in order. Consecutive entries with the same due condition share one test."""
+        body: list[Statement] = []
+        shared: list[Statement] = []  # the body of the test that is open
+        opened = ""
+
+        def close() -> None:
+            if shared:
+                body.append(If(Name(opened), tuple(shared)))
+                shared.clear()
+
+        for position, entry in entries:
+            due = due_name(entry)
+            span = list(dict.fromkeys(map(due_name, readings[position]))) if position in readings else None
+            # The clock is read within the test of this entry if it alone tells whether one of the span is due.
+            within = span == [due]
+            if due != opened or not (span is None or within):
+                close()
+                opened = due
+            if span is not None and not within:
+                always = "" in span
+                body += [self._read_clock()] if always else [If(one_of(list(map(Name, span))), (self._read_clock(),))]
+            to = shared if due else body
+            if within:
+                to.append(self._read_clock())
+            to += self._run(entry)
+        close()
+        return body
+
+    def _delayed(self, state: State) -> Iterator[Statement]:
         """Copies delayed connections. This precedes all writes of the tick, so the values are those of the previous
         tick."""
-        m, w = self.m, self.w
         due = {e.instance: due_name(e) for e in state.entries}
-        delayed = [c for c in m.connections if c.delayed and c.target.instance in due]
+        delayed = [c for c in self.m.connections if c.delayed and c.target.instance in due]
         if not delayed:
             return
-        with w.braces("if (m->tick > 0u)"):
-            for name, connections in groupby(delayed, lambda c: due[c.target.instance]):
-                if name:
-                    w.open(f"if ({name})")
-                for connection in connections:
-                    self._copy(connection, None)
-                if name:
-                    w.close()
+        body: list[Statement] = []
+        for name, connections in groupby(delayed, lambda c: due[c.target.instance]):
+            body += _if_any(name, [self._copy(connection, None) for connection in connections])
+        yield If(Binary(">", TICK, Literal(0, U64)), tuple(body))
 
-    def _copy(self, connection: Connection, entry: Entry | None) -> None:
+    def _copy(self, connection: Connection, entry: Entry | None) -> Statement:
         """Copies a connection. `entry`: entry of the receiver, None for a delayed connection (its source is never
         `machine`)."""
-        target = port_place(self.m, connection.target)
+        target, type_ = port_place(self.m, connection.target), code_type(self.m.name, connection.target.type)
         if connection.source.instance < 0:
             assert entry is not None
             of = self._of_channel if connection.source.record == "channels" else self._of_machine
-            self.w.line(f"{target} = {of(connection.source, entry)};")
-        elif isinstance(connection.target.type, Array):
-            self.w.line(f"memcpy({target}, {port_place(self.m, connection.source)}, sizeof {target});")
-        else:
-            self.w.line(f"{target} = {port_place(self.m, connection.source)};")
+            return Set(target, of(connection.source, entry))
+        source = port_place(self.m, connection.source)
+        return code.Copy(target, source, type_) if isinstance(type_, code.Block) else Set(target, source)
 
-    def _of_machine(self, source: PortRef, entry: Entry) -> str:
-        hz, receiver = self.m.tick_hz, f"m->i_{self.m.instances[entry.instance].name}"
-        period, resumed = c_literal(entry.divisor / hz, F64), f"{receiver}.outputs.health == FCSL_STALE"
-        since = f"(double)(m->tick + 1u - {receiver}.last_run)"
-        return {
-            "dt": c_literal(1.0 / hz, F64),
-            # floor(tick * 1e9 / hz) without overflow: whole seconds and the remainder are computed separately.
-            "time_ns": f"(int64_t)((m->tick / {hz}u) * 1000000000u + (m->tick % {hz}u) * 1000000000u / {hz}u)",
-            "tick": "m->tick",
-            "period": period,
-            "elapsed": f"{resumed} ? {period} : {since} / {c_literal(float(hz), F64)}",
-            "resumed": resumed,
-            "ticks_in_state": "m->ticks_in_state",
-        }[source.field]
+    def _of_machine(self, source: PortRef, entry: Entry) -> code.Expr:
+        hz, receiver = self.m.tick_hz, self.m.instances[entry.instance]
+        if source.field == "tick":
+            return TICK
+        if source.field == "ticks_in_state":
+            return TICKS_IN_STATE
+        if source.field == "dt":
+            return Literal(1.0 / hz, F64)
+        if source.field == "time_ns":
+            return self._time_ns()
+        period = Literal(entry.divisor / hz, F64)
+        resumed = Binary("==", health_of(receiver), health(3))
+        if source.field == "elapsed":
+            ticks = Binary("-", Binary("+", TICK, ONE), Member(record_of(receiver), "last_run"))
+            since = Binary("/", code.Convert(F64, ticks), Literal(float(hz), F64))
+            return code.Choice(resumed, period, since)
+        return period if source.field == "period" else resumed
 
-    def _of_channel(self, source: PortRef, entry: Entry) -> str:
-        channel = f"m->{channel_member(self.m.channel(source.field))}"
-        return {
-            "valid": f"{channel}.valid != 0u",
-            "age_ticks": f"{channel}.age_ticks",
-            "fresh": f"{channel}.last_sample > m->i_{self.m.instances[entry.instance].name}.last_run",
-        }[source.members[0]]
+    def _time_ns(self) -> code.Expr:
+        """floor(tick * 1e9 / hz) without overflow: whole seconds and the remainder are computed separately."""
+        hz, second = Literal(self.m.tick_hz, U64), Literal(1_000_000_000, U64)
+        whole = Binary("*", Binary("/", TICK, hz), second)
+        rest = Binary("/", Binary("*", Binary("%", TICK, hz), second), hz)
+        return code.Convert(I64, Binary("+", whole, rest))
+
+    def _of_channel(self, source: PortRef, entry: Entry) -> code.Expr:
+        channel = self.m.channel(source.field)
+        if source.members[0] == "fresh":
+            last_run = Member(record_of(self.m.instances[entry.instance]), "last_run")
+            return Binary(">", channel_place(channel, "last_sample"), last_run)
+        if source.members[0] == "valid":
+            return Binary("!=", channel_place(channel, "valid"), Literal(0, code.U8))
+        return channel_place(channel, "age_ticks")
 
     # ---- one instance ----------------------------------------------------------------------------------------------
 
-    def _run(self, entry: Entry) -> None:
-        w, instance = self.w, self.m.instances[entry.instance]
-        record = f"m->i_{instance.name}"
-        for connection in self.feeds.get(entry.instance, []):
-            self._copy(connection, entry)
+    def _run(self, entry: Entry) -> list[Statement]:
+        instance = self.m.instances[entry.instance]
+        body = [self._copy(connection, entry) for connection in self.feeds.get(entry.instance, [])]
         if entry.instance in self.m.last_runs:
-            w.line(f"{record}.last_run = m->tick + 1u;")
+            body.append(Set(Member(record_of(instance), "last_run"), Binary("+", TICK, ONE)))
         # A watchdog thread reads it while execute runs, so the compiler must not remove the store.
-        w.line(f"*(volatile int32_t *)&m->current_ = {entry.instance};")
-        self._execute(entry, instance, record)
+        body.append(Set(Member(MACHINE, "current_"), Literal(entry.instance, I32), volatile=True))
+        body.append(self._execute(entry, instance))
         if instance.max_wcet_us:
-            self._verdict(instance, record)
+            body.append(self._verdict(instance))
         invalid = self.guards.get(entry.instance)
         if invalid:
-            test = " || ".join(f"m->{channel_member(c)}.valid == 0u" for c in invalid)
-            with w.braces(f"if ({test})"):
-                w.line(f"{record}.outputs.health = FCSL_FAILED;")
+            tests = [Binary("==", channel_place(c, "valid"), Literal(0, code.U8)) for c in invalid]
+            body.append(If(one_of(tests), (Set(health_of(instance), health(2)),)))
+        return body
 
-    def _execute(self, entry: Entry, instance: Instance, record: str) -> None:
-        """Writes exactly one call of execute, used with and without injected health: a second inlined call would add to
-        the stack."""
-        w, own = self.w, f"{self.m.name}_{instance.name}"
-        fault = f"if ({record}.inject_fault == 1u)"
-        if instance.algorithm.effects:
-            w.open(f"if (host->substitute != NULL && host->substitute(host->ctx, {entry.instance}u) != 0)")
-            w.line(f"{record}.inject_fault = 0u;")  # the substituted record contains its effect
-            w.reopen(f"else {fault}")
-        else:
-            w.open(fault)
-        w.line(f"fcsl_fault_{own}(&{record});")
-        w.reopen("else")
-        host = ", host" if instance.execute.uses_hardware else ""
-        w.line(f"(void){own}_execute(&{record}{host});")
-        with w.braces(f"if ({record}.inject_fault != 0u)"):
-            w.line(f"fcsl_worsen_{own}(&{record});")
-        w.close()
+    def _execute(self, entry: Entry, instance: Instance) -> Statement:
+        """Exactly one call of execute, used with and without injected health: a second inlined call would add to the
+        stack."""
+        record, own = record_of(instance), f"{self.m.name}_{instance.name}"
+        this = code.Address(record)
+        inject = Member(record, "inject_fault")
+        arguments = (this, _HOST) if instance.execute.uses_hardware else (this,)
+        worsen = If(Binary("!=", inject, Literal(0, code.U8)), (Do(Call(f"fcsl_worsen_{own}", (this,))),))
+        execute = Do(Call(f"{own}_execute", arguments), unused=True)
+        is_fault = Binary("==", inject, Literal(1, code.U8))
+        whole = If(is_fault, (Do(Call(f"fcsl_fault_{own}", (this,))),), (execute, worsen))
+        if not instance.algorithm.effects:
+            return whole
+        substitute = Member(Deref(_HOST), "substitute")
+        called = Call(substitute, (Member(Deref(_HOST), "ctx"), Literal(entry.instance, U32)))
+        is_substituted = code.And((Binary("!=", substitute, code.Null()), Binary("!=", called, Literal(0, I32))))
+        # The substituted record contains the effect of an injected fault.
+        return If(is_substituted, (Set(inject, Literal(0, code.U8)),), (whole,))
 
-    def _verdict(self, instance: Instance, record: str) -> None:
-        w = self.w
-        with w.braces(""):
-            w.line("const uint64_t began_ns = now_ns;")
-            w.line(f"now_ns = fcsl_now_{self.m.name}(host);")
-            limit_ns = instance.max_wcet_us * 1000
-            with w.braces(f"if ({record}.inject_overrun != 0u || now_ns - began_ns > {limit_ns}u)"):
-                w.line(f"fcsl_overrun_{self.m.name}_{instance.name}(&{record});")
+    def _verdict(self, instance: Instance) -> Statement:
+        began = Name("began_ns")
+        is_injected = Binary("!=", Member(record_of(instance), "inject_overrun"), Literal(0, code.U8))
+        is_late = Binary(">", Binary("-", _NOW, began), Literal(instance.max_wcet_us * 1000, U64))
+        overrun = Do(Call(f"fcsl_overrun_{self.m.name}_{instance.name}", (code.Address(record_of(instance)),)))
+        return code.Scope(
+            (
+                code.Let(began.text, U64, _NOW),
+                self._read_clock(),
+                If(code.Or((is_injected, is_late)), (overrun,)),
+            )
+        )
 
     # ---- the end of a tick -----------------------------------------------------------------------------------------
 
-    def _edge(self, state: State, edge: Edge, position: int) -> None:
-        """One branch of the arbitration. Edges are in falling priority; the first whose conditions are true is
-        taken."""
-        m, w = self.m, self.w
-        entries = {e.instance: e for e in state.entries}
-        tests: list[str] = []
+    def _arbitration(self, state: State) -> list[Statement]:
+        """Edges are in falling priority; the first whose conditions are true is taken."""
+        made: tuple[Statement, ...] = ()
+        for edge in reversed([e for e in self.m.edges if self.m.states[e.source] is state]):
+            taken = Set(Member(MACHINE, "next_state_"), state_constant(self.m, edge.target))
+            made = (code.At(edge.span, quoted=False), If(self._condition(state, edge), (taken,), made))
+        return [*made, code.At(None, quoted=False)] if made else []
+
+    def _condition(self, state: State, edge: Edge) -> code.Expr:
+        tests: list[code.Expr] = []
         if edge.after_ticks:
-            tests.append(f"m->ticks_in_state + 1u >= {edge.after_ticks}u")
+            tests.append(Binary(">=", Binary("+", TICKS_IN_STATE, ONE), Literal(edge.after_ticks, U64)))
         if edge.request >= 0:
-            request = m.requests[edge.request]
+            request = self.m.requests[edge.request]
             makers = []
             for entry in state.entries:
-                if request in m.requests_of(m.instances[entry.instance]):
-                    name = m.instances[entry.instance].name
-                    made = f"m->i_{name}.outputs.transition_request == {request_constant(m, request)}"
-                    makers.append(made if entry.divisor == 1 else f"({due_name(entry)} && {made})")
-            tests.append(" || ".join(makers) if makers else "false")
+                maker = self.m.instances[entry.instance]
+                if request in self.m.requests_of(maker):
+                    made = Member(Member(record_of(maker), "outputs"), "transition_request")
+                    constant = Name(request_constant(self.m.name, request))
+                    makers.append(_when_due(entry, Binary("==", made, constant)))
+            tests.append(one_of(makers))
         if edge.guard_instance >= 0:
+            entries = {e.instance: e for e in state.entries}
             tests.append(self._guard(entries.get(edge.guard_instance), edge))
-        condition = " && ".join(f"({t})" if len(tests) > 1 else t for t in tests)
-        w.origin = edge.span
-        if position == 0:
-            w.open(f"if ({condition})")
-        else:
-            w.reopen(f"else if ({condition})")
-        w.line(f"m->next_state_ = {state_constant(m, edge.target)};")
-        w.origin = None
+        return code.And(tuple(tests)) if len(tests) > 1 else tests[0]
 
-    def _guard(self, entry: Entry | None, edge: Edge) -> str:
-        """C condition of a guard. `nominal`, `degraded` and `failed` count only on ticks when the instance ran; `stale`
-        counts always."""
-        name = self.m.instances[edge.guard_instance].name
-        health = f"m->i_{name}.outputs.health"
+    def _guard(self, entry: Entry | None, edge: Edge) -> code.Expr:
+        """`nominal`, `degraded` and `failed` count only on ticks when the instance ran; `stale` counts always."""
+        own = health_of(self.m.instances[edge.guard_instance])
         words = [i for i in range(4) if edge.guard_mask >> i & 1]
-        ran = [f"{health} == {HEALTH_CONSTANTS[i]}" for i in words if i < 3]
-        tests: list[str] = []
+        ran = [Binary("==", own, health(i)) for i in words if i < 3]
+        tests: list[code.Expr] = []
         if entry is not None and ran:
-            word = " || ".join(ran)
-            tests.append(word if entry.divisor == 1 else f"({due_name(entry)} && ({word}))")
+            tests += ran if entry.divisor == 1 else [_when_due(entry, one_of(ran))]
         if 3 in words:
-            tests.append(f"{health} == FCSL_STALE")
-        return " || ".join(tests) if tests else "false"
-
-
-class _Body:
-    """Body of a function. Adds `(void)` statements for unused arguments."""
-
-    def __init__(self, writer: CWriter):
-        self.w = writer
-
-    def __enter__(self) -> None:
-        self.w.open_body()
-        self.mark = self.w.mark()
-
-    def __exit__(self, *_: object) -> None:
-        body = self.w.cut(self.mark)
-        for argument in ("m", "host"):
-            if not any(re.search(rf"\b{argument}\b", line) for line in body[0]):
-                self.w.line(f"(void){argument};")
-        self.w.paste(body)
-        self.w.close()
-        self.w.line()
+            tests.append(Binary("==", own, health(3)))
+        return one_of(tests)

@@ -12,23 +12,21 @@ from collections.abc import Iterator
 
 from ..model import ir
 from ..model.types import count_of
-from .c_writer import CWriter
 
 _MOST_ROUNDS = 4
 #: Maximum number of operations over all iterations, inner loops included.
 _MOST_OPERATIONS = 256
 
 
-def unroll(w: CWriter, rounds: int) -> None:
-    """Writes the pragma before a loop with this many iterations and a single operation."""
-    if rounds <= _MOST_ROUNDS:
-        w.line(f"#pragma GCC unroll {_MOST_ROUNDS}")
+def unrolled(rounds: int) -> int:
+    """How many iterations of a loop with so many, and a single operation, the compiler should write out; 0: as it
+    likes."""
+    return _MOST_ROUNDS if rounds <= _MOST_ROUNDS else 0
 
 
-def unroll_for(w: CWriter, loop: ir.For) -> None:
-    """Writes the pragma before a loop of the language if it is short."""
-    if 0 < _operations(loop) <= _MOST_OPERATIONS:
-        w.line(f"#pragma GCC unroll {_MOST_ROUNDS}")
+def unrolled_for(loop: ir.For) -> int:
+    """The same for a loop of the language, if it is short."""
+    return _MOST_ROUNDS if 0 < _operations(loop) <= _MOST_OPERATIONS else 0
 
 
 def _operations(loop: ir.For) -> int:

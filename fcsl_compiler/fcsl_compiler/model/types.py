@@ -61,6 +61,7 @@ HEALTH = Scalar("Health", "int32_t", "FCSL_HEALTH", "uint8", 4)
 
 SCALARS: dict[str, Scalar] = {t.name: t for t in (BOOL, I32, I64, U32, U64, F32, F64, REQUEST, HEALTH)}
 NUMBERS: tuple[Scalar, ...] = (I32, I64, U32, U64, F32, F64)
+INTEGERS: tuple[Scalar, ...] = (I32, I64, U32, U64)
 
 #: The first three are ordered from best to worst. The scheduler sets `stale` for an instance that has not run.
 HEALTH_NAMES: tuple[str, ...] = ("nominal", "degraded", "failed", "stale")

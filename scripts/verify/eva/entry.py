@@ -5,8 +5,8 @@ from __future__ import annotations
 
 import math
 
-from fcsl_compiler.emit.descriptor import FieldRow, field_table
-from fcsl_compiler.emit.header import channel_member, sensors
+from fcsl_compiler.emit.field_table import FieldRow, field_table
+from fcsl_compiler.emit.names import channel_member, sensors
 from fcsl_compiler.model.c_names import c_literal
 from fcsl_compiler.model.ir import Extern
 from fcsl_compiler.model.machine import Machine

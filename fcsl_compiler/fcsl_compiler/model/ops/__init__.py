@@ -5,9 +5,9 @@ from __future__ import annotations
 
 from ..types import BOOL, Scalar
 from . import convert, floats, integers, ordered
-from .op import Doc, Op
+from .op import Doc, Op, op_id
 
-__all__ = ["BUILTINS", "CONVERSIONS", "DOCS", "Doc", "Op", "all_ops", "arity_of", "find", "is_test"]
+__all__ = ["BUILTINS", "CONVERSIONS", "DOCS", "Doc", "Op", "all_ops", "arity_of", "find", "is_test", "op_id"]
 
 _TABLE: dict[tuple[str, tuple[Scalar, ...]], Op] = {
     (op.name, op.args): op for module in (floats, ordered, convert, integers) for op in module.operations()

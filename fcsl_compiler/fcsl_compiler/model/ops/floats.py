@@ -3,13 +3,10 @@
 
 from __future__ import annotations
 
-import math
 from collections.abc import Iterator
 
-from ..c_names import c_literal
-from ..literals import round_f32
 from ..types import BOOL, F32, F64, Scalar
-from .op import Doc, Op, c_function
+from .op import Doc, Op
 
 _ELEMENTARY_GROUP = "Elementary functions"
 _ROUNDING_GROUP = "Rounding and remainders"
@@ -43,6 +40,10 @@ _ELEMENTARY = (
 )  # fmt: skip
 
 
+#: Names and numbers of operands of the elementary functions other than sqrt.
+ELEMENTARY = tuple((call.split("(")[0], call.count(",") + 1) for call, _, _ in _ELEMENTARY)
+
+
 def operations() -> Iterator[Op]:
     for t in (F64, F32):
         yield from _arithmetic(t)
@@ -53,45 +54,26 @@ def operations() -> Iterator[Op]:
     yield from _division()
 
 
-def _suffix(t: Scalar) -> str:
-    return "f" if t is F32 else ""
-
-
-def _literal(value: float, t: Scalar) -> str:
-    return c_literal(round_f32(value) if t is F32 else value, t)
-
-
 def _arithmetic(t: Scalar) -> Iterator[Op]:
     for symbol in "+-*/":
-        yield Op(symbol, (t, t), t, f"({{0}} {symbol} {{1}})")
-    yield Op("neg", (t,), t, "(-{0})")
+        yield Op(symbol, (t, t), t)
+    yield Op("neg", (t,), t)
 
 
 def _elementary(t: Scalar) -> Iterator[Op]:
     doc = Doc(_ELEMENTARY_GROUP, "sqrt(x)", "square root", _ONCE, "x < 0: NaN; sqrt(-0.0) is -0.0")
-    yield Op("sqrt", (t,), t, f"sqrt{_suffix(t)}({{0}})", doc=doc)
-    for call, meaning, singular in _ELEMENTARY:
-        name, arity = call.split("(")[0], call.count(",") + 1
-        operands = ", ".join(f"{{{i}}}" for i in range(arity))
-        doc = Doc(_ELEMENTARY_GROUP, call, meaning, _ONCE, singular)
-        yield Op(name, (t,) * arity, t, f"cr_{name}{_suffix(t)}({operands})", doc=doc)
+    yield Op("sqrt", (t,), t, doc=doc)
+    for (name, arity), (call, meaning, singular) in zip(ELEMENTARY, _ELEMENTARY, strict=True):
+        yield Op(name, (t,) * arity, t, doc=Doc(_ELEMENTARY_GROUP, call, meaning, _ONCE, singular))
 
 
 def _rounding(t: Scalar) -> Iterator[Op]:
     none = "infinities, NaN and -0.0 stay"
     for name, how in (("floor", "toward -inf"), ("ceil", "toward +inf"), ("trunc", "toward zero")):
         doc = Doc(_ROUNDING_GROUP, f"{name}(x)", f"the integer {how}, as a float", _EXACT, none)
-        yield Op(name, (t,), t, f"{name}{_suffix(t)}({{0}})", doc=doc)
-    # Above 2^52 (f32: 2^23) every float is an integer. Below, the sum has no fraction bits left and is rounded half to
-    # even. roundeven is not available in libm before C23.
-    integral = _literal(2.0**23 if t is F32 else 2.0**52, t)
-    helper = c_function(
-        f"{t.c} fcsl_round_{t}({t.c} x)",
-        f"const {t.c} size = fabs{_suffix(t)}(x);",
-        f"return size < {integral} ? copysign{_suffix(t)}((size + {integral}) - {integral}, x) : x;",
-    )
+        yield Op(name, (t,), t, doc=doc)
     doc = Doc(_ROUNDING_GROUP, "round(x)", "the nearest integer, halves to the even one, as a float", _EXACT, none)
-    yield Op("round", (t,), t, f"fcsl_round_{t}({{0}})", helper=helper, doc=doc)
+    yield Op("round", (t,), t, doc=doc)
     doc = Doc(
         _ROUNDING_GROUP,
         "fmod(x, y)",
@@ -99,23 +81,13 @@ def _rounding(t: Scalar) -> Iterator[Op]:
         _EXACT,
         "y = 0 or x infinite: NaN; y infinite: x",
     )
-    yield Op("fmod", (t, t), t, f"fmod{_suffix(t)}({{0}}, {{1}})", doc=doc)
+    yield Op("fmod", (t, t), t, doc=doc)
 
 
 def _signs(t: Scalar) -> Iterator[Op]:
-    suffix = _suffix(t)
-    # The sign of a NaN differs between processors, so it must not affect the result.
-    helper = c_function(
-        f"{t.c} fcsl_copysign_{t}({t.c} x, {t.c} y)",
-        f"return y != y ? fabs{suffix}(x) : copysign{suffix}(x, y);",
-    )
+    # The sign of a NaN differs between processors, so it does not affect the result.
     doc = Doc(_BLENDING_GROUP, "copysign(x, y)", "|x| with the sign of y", _EXACT, "y NaN: |x|")
-    yield Op("copysign", (t, t), t, f"fcsl_copysign_{t}({{0}}, {{1}})", helper=helper, doc=doc)
-    one, half = _literal(1.0, t), _literal(0.5, t)
-    helper = c_function(
-        f"{t.c} fcsl_lerp_{t}({t.c} a, {t.c} b, {t.c} t)",
-        f"return t < {half} ? a + t * (b - a) : b - ({one} - t) * (b - a);",
-    )
+    yield Op("copysign", (t, t), t, doc=doc)
     doc = Doc(
         _BLENDING_GROUP,
         "lerp(a, b, t)",
@@ -123,13 +95,7 @@ def _signs(t: Scalar) -> Iterator[Op]:
         "a + t*(b - a) for t < 0.5, else b - (1 - t)*(b - a)",
         "b - a overflows or a, b, t is not finite: an infinity or NaN",
     )
-    yield Op("lerp", (t, t, t), t, f"fcsl_lerp_{t}({{0}}, {{1}}, {{2}})", helper=helper, doc=doc)
-    pi, turn = _literal(math.pi, t), _literal(2.0 * math.pi, t)
-    helper = c_function(
-        f"{t.c} fcsl_wrap_angle_{t}({t.c} x)",
-        f"const {t.c} rest = fmod{suffix}(x, {turn});",
-        f"return rest > {pi} ? rest - {turn} : rest < -{pi} ? rest + {turn} : rest;",
-    )
+    yield Op("lerp", (t, t, t), t, doc=doc)
     doc = Doc(
         _BLENDING_GROUP,
         "wrap_angle(x)",
@@ -138,49 +104,22 @@ def _signs(t: Scalar) -> Iterator[Op]:
         "error against the real pi is k times that of 2*pi, less than x itself was rounded by",
         "x infinite: NaN; both -pi and pi stay themselves",
     )
-    yield Op("wrap_angle", (t,), t, f"fcsl_wrap_angle_{t}({{0}})", helper=helper, doc=doc)
+    yield Op("wrap_angle", (t,), t, doc=doc)
 
 
 def _tests(t: Scalar) -> Iterator[Op]:
-    infinite = f"fabs{_suffix(t)}(x) == __builtin_inf{_suffix(t)}()"
-    for name, c, meaning in (
-        ("isnan", "x != x", "True where x is NaN"),
-        ("isinf", infinite, "True where x is an infinity"),
-        ("isfinite", "x - x == 0", "True where x is neither NaN nor infinite"),
+    for name, meaning in (
+        ("isnan", "True where x is NaN"),
+        ("isinf", "True where x is an infinity"),
+        ("isfinite", "True where x is neither NaN nor infinite"),
     ):
-        helper = c_function(f"bool fcsl_{name}_{t}({t.c} x)", f"return {c};")
         doc = Doc(_TESTS_GROUP, f"{name}(x)", meaning, _EXACT, "none")
-        yield Op(name, (t,), BOOL, f"fcsl_{name}_{t}({{0}})", helper=helper, doc=doc)
+        yield Op(name, (t,), BOOL, doc=doc)
 
 
 def _division() -> Iterator[Op]:
-    """Floor division and remainder as in CPython. A zero divisor gives NaN. f32 is computed in f64."""
-    remainder = (
-        "if (b == 0.0) {",
-        '    return __builtin_nan("");',
-        "}",
-        "double rest = fmod(a, b);",
-        "if (rest == 0.0) {",
-        "    rest = copysign(0.0, b);",
-        "} else if ((b < 0.0) != (rest < 0.0)) {",
-        "    rest += b;",
-        "}",
-    )
-    quotient = (
-        *remainder[:3],
-        "const double rest = fmod(a, b);",
-        "double quotient = (a - rest) / b;",
-        "if (rest != 0.0 && (b < 0.0) != (rest < 0.0)) {",
-        "    quotient -= 1.0;",
-        "}",
-        "if (quotient == 0.0) {",
-        "    return copysign(0.0, a / b);",
-        "}",
-        "const double whole = floor(quotient);",
-        "return quotient - whole > 0.5 ? whole + 1.0 : whole;",
-    )
-    for symbol, word, body in (("//", "floordiv", quotient), ("%", "mod", (*remainder, "return rest;"))):
-        helper = c_function(f"double fcsl_{word}_f64(double a, double b)", *body)
-        yield Op(symbol, (F64, F64), F64, f"fcsl_{word}_f64({{0}}, {{1}})", helper=helper)
-        # The operands convert exactly; the result is rounded once.
-        yield Op(symbol, (F32, F32), F32, f"((float)fcsl_{word}_f64((double){{0}}, (double){{1}}))", helper=helper)
+    """Floor division and remainder as in CPython. A zero divisor gives NaN. f32 is computed in f64: the operands convert
+    exactly, and the result is rounded once."""
+    for symbol in ("//", "%"):
+        for t in (F64, F32):
+            yield Op(symbol, (t, t), t)

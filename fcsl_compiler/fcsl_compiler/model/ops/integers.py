@@ -5,156 +5,51 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 
-from ..types import I32, I64, U32, U64, Scalar
-from .convert import greatest, least
-from .op import Doc, Op, c_function, overflow
+from ..types import INTEGERS, Scalar
+from .op import Doc, Op, overflow
 
 _GROUP = "Integer arithmetic without faults"
-_TYPES = (I32, I64, U32, U64)
 _ARITHMETIC = (("+", "add"), ("-", "sub"), ("*", "mul"))
 _ZERO_DIVISOR = "the divisor is zero"
 
 
 def operations() -> Iterator[Op]:
-    for t in _TYPES:
+    for t in INTEGERS:
         yield from _signed(t) if t.is_signed else _unsigned(t)
         yield from _bits(t)
     for symbol, word in _ARITHMETIC:
-        for t in _TYPES:
+        for t in INTEGERS:
             yield _wrapping(symbol, word, t)
     for symbol, word in _ARITHMETIC:
-        for t in _TYPES:
+        for t in INTEGERS:
             yield _saturating(symbol, word, t)
 
 
-def _faulting(signature: str, test: str, *rest: str) -> str:
-    """A C helper that faults and returns 0 if `test` is true."""
-    return c_function(signature, f"if ({test}) {{", "    fcsl_fault(place, fault);", "    return 0;", "}", *rest)
-
-
-def _plain(symbol: str, t: Scalar) -> str:
-    """C arithmetic. The cast keeps 64-bit arithmetic on two literals from being done in 32 bits."""
-    cast = "" if t is I32 else f"({t.c})"
-    return f"({cast}{{0}} {symbol} {{1}})"
-
-
 def _signed(t: Scalar) -> Iterator[Op]:
-    for symbol, word in _ARITHMETIC:
-        name = f"fcsl_{word}_{t}"
-        helper = c_function(
-            f"{t.c} {name}({t.c} a, {t.c} b, uint32_t place, uint32_t *fault)",
-            f"{t.c} result = 0;",
-            f"if (__builtin_{word}_overflow(a, b, &result)) {{",
-            "    fcsl_fault(place, fault);",
-            "    result = 0;",
-            "}",
-            "return result;",
-        )
-        yield Op(
-            symbol,
-            (t, t),
-            t,
-            f"{name}({{0}}, {{1}}, {{place}}, {{fault}})",
-            (overflow(t),),
-            helper,
-            proven=_plain(symbol, t),
-        )
-    helper = _faulting(
-        f"{t.c} fcsl_neg_{t}({t.c} a, uint32_t place, uint32_t *fault)", f"a == {least(t)}", "return -a;"
-    )
-    yield Op("neg", (t,), t, f"fcsl_neg_{t}({{0}}, {{place}}, {{fault}})", (overflow(t),), helper, proven="(-{0})")
-    yield from _floor_division(t)
-
-
-def _floor_division(t: Scalar) -> Iterator[Op]:
-    """Floor division: C truncates, Python floors. Each sign of the divisor has a separate branch without an
-    intermediate overflow. A value analysis can prove this, and a divisor of known sign leaves one branch."""
-    remainder = (f"const {t.c} remainder = a % b;",)
-    quotients = ("a < 0 ? ~(~a / b) : a / b", "a > 0 ? (a - 1) / b - 1 : a / b")
-    remainders = ("remainder < 0 ? remainder + b : remainder", "remainder > 0 ? remainder + b : remainder")
-    # MIN % -1 is 0 in Python; it is undefined in C.
-    negated = _branch(f"b == -1 && a != {least(t)}", ("return -a;",))
-    zero = _branch("b == 0", ("fcsl_fault(place, fault);",))
-    for symbol, word, first, results, last, places, causes in (
-        (
-            "//",
-            "floordiv",
-            (),
-            quotients,
-            (*negated, "fcsl_fault(b == 0 ? zero : overflow, fault);"),
-            "uint32_t zero, uint32_t overflow",
-            (_ZERO_DIVISOR, overflow(t)),
-        ),
-        ("%", "mod", remainder, remainders, zero, "uint32_t place", (_ZERO_DIVISOR,)),
-    ):
-        positive, negative = ((*first, f"return {result};") for result in results)
-        signature = f"{t.c} fcsl_{word}_{{}}{t}({t.c} a, {t.c} b{{}})"
-        yield Op(
-            symbol,
-            (t, t),
-            t,
-            f"fcsl_{word}_{t}({{0}}, {{1}}, {{place}}, {{fault}})",
-            causes,
-            c_function(
-                signature.format("", f", {places}, uint32_t *fault"),
-                *_branch("b > 0", positive),
-                *_branch("b < -1", negative),
-                *last,
-                "return 0;",
-            ),
-            None,
-            f"fcsl_{word}_proven_{t}({{0}}, {{1}})",
-            c_function(signature.format("proven_", ""), *_branch("b > 0", positive), *negative),
-        )
-
-
-def _branch(test: str, lines: tuple[str, ...]) -> tuple[str, ...]:
-    return (f"if ({test}) {{", *(f"    {line}" for line in lines), "}")
+    for symbol, _ in _ARITHMETIC:
+        yield Op(symbol, (t, t), t, (overflow(t),))
+    yield Op("neg", (t,), t, (overflow(t),))
+    # Floor division, as in Python. MIN % -1 is 0.
+    yield Op("//", (t, t), t, (_ZERO_DIVISOR, overflow(t)))
+    yield Op("%", (t, t), t, (_ZERO_DIVISOR,))
 
 
 def _unsigned(t: Scalar) -> Iterator[Op]:
     for symbol, _ in _ARITHMETIC:
-        yield Op(symbol, (t, t), t, _plain(symbol, t))
-    yield Op("neg", (t,), t, f"(({t.c})0 - {{0}})")
-    for symbol, word, c_op in (("//", "floordiv", "/"), ("%", "mod", "%")):
-        name = f"fcsl_{word}_{t}"
-        helper = _faulting(
-            f"{t.c} {name}({t.c} a, {t.c} b, uint32_t place, uint32_t *fault)", "b == 0", f"return a {c_op} b;"
-        )
-        c = f"{name}({{0}}, {{1}}, {{place}}, {{fault}})"
-        yield Op(symbol, (t, t), t, c, (_ZERO_DIVISOR,), helper, proven=f"({{0}} {c_op} {{1}})")
+        yield Op(symbol, (t, t), t)
+    yield Op("neg", (t,), t)
+    for symbol in ("//", "%"):
+        yield Op(symbol, (t, t), t, (_ZERO_DIVISOR,))
 
 
 def _bits(t: Scalar) -> Iterator[Op]:
     for symbol in "&|^":
-        yield Op(symbol, (t, t), t, f"({{0}} {symbol} {{1}})")
-    wide = f"({t.c})" if t.size == 8 else ""  # literals may have 32 bits
-    yield Op("~", (t,), t, f"(~{wide}{{0}})")
-    shifts = [("<<", "shl", "a << n")] if not t.is_signed else []
-    # A right shift of a negative number is implementation-defined in C. This gives Python's floor on every compiler.
-    shifts.append((">>", "shr", "a < 0 ? ~(~a >> n) : a >> n" if t.is_signed else "a >> n"))
-    for symbol, word, expression in shifts:
-        name = f"fcsl_{word}_{t}"
-        # Every count converts to uint64_t. A negative count becomes so large that it faults.
-        signature, test = f"{t.c} {name}({t.c} a, uint64_t n, uint32_t place, uint32_t *fault)", f"n >= {t.size * 8}u"
-        helper = _faulting(signature, test, f"return {expression};")
-        proven, proven_helper = f"({wide}{{0}} {symbol} {{1}})", ""
-        if t.is_signed:
-            proven = f"fcsl_{word}_proven_{t}({{0}}, (uint64_t){{1}})"
-            proven_helper = c_function(f"{t.c} fcsl_{word}_proven_{t}({t.c} a, uint64_t n)", f"return {expression};")
-        for count in _TYPES:
-            c = f"{name}({{0}}, (uint64_t){{1}}, {{place}}, {{fault}})"
-            yield Op(
-                symbol,
-                (t, count),
-                t,
-                c,
-                (f"the shift count is outside [0, {t.size * 8})",),
-                helper,
-                None,
-                proven,
-                proven_helper,
-            )
+        yield Op(symbol, (t, t), t)
+    yield Op("~", (t,), t)
+    # A right shift rounds down, as in Python.
+    for symbol in (">>",) if t.is_signed else ("<<", ">>"):
+        for count in INTEGERS:
+            yield Op(symbol, (t, count), t, (f"the shift count is outside [0, {t.size * 8})",))
 
 
 def _wrapping(symbol: str, word: str, t: Scalar) -> Op:
@@ -166,15 +61,7 @@ def _wrapping(symbol: str, word: str, t: Scalar) -> Op:
         "exact: the lowest n bits stay",
         "none",
     )
-    if not t.is_signed:
-        return Op(name, (t, t), t, _plain(symbol, t), doc=doc)
-    helper = c_function(
-        f"{t.c} fcsl_{name}_{t}({t.c} a, {t.c} b)",
-        f"{t.c} result = 0;",
-        f"(void)__builtin_{word}_overflow(a, b, &result); /* leaves the lowest {t.size * 8} bits */",
-        "return result;",
-    )
-    return Op(name, (t, t), t, f"fcsl_{name}_{t}({{0}}, {{1}})", helper=helper, doc=doc)
+    return Op(name, (t, t), t, doc=doc)
 
 
 def _saturating(symbol: str, word: str, t: Scalar) -> Op:
@@ -182,18 +69,4 @@ def _saturating(symbol: str, word: str, t: Scalar) -> Op:
     doc = Doc(
         _GROUP, f"{name}(a, b)", f"a {symbol} b, or the end of the type's range that it is beyond", "exact", "none"
     )
-    if not t.is_signed:
-        limit = "0" if symbol == "-" else greatest(t)
-    else:
-        # a + b overflows only if both have the same sign, a - b only if the signs differ.
-        below = "(a < 0) != (b < 0)" if symbol == "*" else "a < 0"
-        limit = f"{below} ? {least(t)} : {greatest(t)}"
-    helper = c_function(
-        f"{t.c} fcsl_{name}_{t}({t.c} a, {t.c} b)",
-        f"{t.c} result = 0;",
-        f"if (__builtin_{word}_overflow(a, b, &result)) {{",
-        f"    result = {limit};",
-        "}",
-        "return result;",
-    )
-    return Op(name, (t, t), t, f"fcsl_{name}_{t}({{0}}, {{1}})", helper=helper, doc=doc)
+    return Op(name, (t, t), t, doc=doc)

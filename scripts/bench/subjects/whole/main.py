@@ -19,6 +19,7 @@ from fcsl_compiler.emit.tick import port_place
 from fcsl_compiler.model.ir import Function
 from fcsl_compiler.model.machine import Entry, Machine
 from fcsl_compiler.model.types import Array
+from fcsl_compiler.printers.c.expressions import CExpressions
 
 from ...harness.native import BENCH, code_bytes, compile_program
 from ...harness.size import sized
@@ -66,7 +67,7 @@ def _copies(machine: Machine, instance: int, delayed: bool) -> list[str]:
     found = []
     for c in machine.connections:
         if c.target.instance == instance and c.source.instance >= 0 and c.delayed == delayed:
-            target, source = port_place(machine, c.target), port_place(machine, c.source)
+            target, source = (CExpressions({}).text(port_place(machine, port)) for port in (c.target, c.source))
             is_array = isinstance(c.target.type, Array)
             found.append(f"memcpy({target}, {source}, sizeof {target});" if is_array else f"{target} = {source};")
     return found

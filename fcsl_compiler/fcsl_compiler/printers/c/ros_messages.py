@@ -5,12 +5,12 @@ from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 
-from ..model.c_names import c_literal, c_string
-from ..model.machine import Channel
-from ..model.types import F64
-from ..ros.channels import Message
-from ..ros.plan import NONE, ComposerPlan, Guard, ReaderPlan, Row, Term
-from .c_writer import CWriter
+from ...model.c_names import c_literal, c_string
+from ...model.machine import Channel
+from ...model.types import F64
+from ...ros.channels import Message
+from ...ros.plan import NONE, ComposerPlan, Guard, ReaderPlan, Row, Term
+from .writer import CWriter
 
 #: fcsl_ros_scalar_t and fcsl_ros_code_t by number.
 _SCALARS = ("BOOL", "I8", "U8", "I16", "U16", "I32", "U32", "I64", "U64", "F32", "F64")
