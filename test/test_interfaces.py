@@ -127,6 +127,7 @@ WITHOUT_MESSAGES = [
     "glider/glider",
     "inverted_pendulum/inverted_pendulum",
     "quadrotor/quadrotor",
+    "rocket_landing/rocket_landing",
     "satellite/satellite",
 ]
 

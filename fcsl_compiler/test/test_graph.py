@@ -32,6 +32,7 @@ PICTURES = {
     "glider/fc/glider.json": "glider/glider.svg",
     "inverted_pendulum/fc/inverted_pendulum.json": "inverted_pendulum/inverted_pendulum.svg",
     "quadrotor/fc/quadrotor.json": "quadrotor/quadrotor.svg",
+    "rocket_landing/fc/rocket_landing.json": "rocket_landing/rocket_landing.svg",
     "satellite/fc/satellite.json": "satellite/satellite.svg",
     "thermal_guard/thermal_guard.json": "thermal_guard/thermal_guard.svg",
 }
