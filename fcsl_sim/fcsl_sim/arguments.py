@@ -45,7 +45,8 @@ def _parser() -> argparse.ArgumentParser:
     _add_linearise(_add(commands, "linearise", "print and write the linear equations of a plant around a point"))
     _add_response(_add(commands, "response", "measure the frequency response of the loop with the compiled controller"))
     _add_model_commands(commands)
-    _add(commands, "schema", "print the JSON Schema of a simulation, for editors")
+    schema = _add(commands, "schema", "print the JSON Schema of a simulation or a study, for editors")
+    schema.add_argument("--study", action="store_true", help="that of a study")
     why = _add(commands, "explain", "explain a diagnostic code of simulations, with an example")
     why.add_argument("code", nargs="*", help="such as E804; none: list all")
     return parser

@@ -29,8 +29,9 @@ from .runner import FREE_RUNNING, TIMEOUT_MS, Sender, Server, StateChange, Summa
 EXIT_UNTIL_NOT_HELD = 1
 EXIT_BAD_INPUT = 2
 EXIT_INCOMPLETE_BAG = 1
-#: JSON Schema of a simulation file.
+#: JSON Schemas of a simulation file and of a study.
 SCHEMA = Path(__file__).parent / "simulation.schema.json"
+STUDY_SCHEMA = Path(__file__).parent / "study.schema.json"
 #: How an address on the bus begins.
 _BUS = ("zenoh:", "zenoh-client:")
 
@@ -111,7 +112,7 @@ def _check(options: argparse.Namespace) -> int:
 
 
 def _schema(options: argparse.Namespace) -> int:
-    print(SCHEMA.read_text(encoding="utf-8"), end="")
+    print((STUDY_SCHEMA if options.study else SCHEMA).read_text(encoding="utf-8"), end="")
     return 0
 
 

@@ -149,15 +149,17 @@ def test_words_and_limits_are_those_of_the_simulator() -> None:
     assert {key: defs["truth"]["properties"][key] for key in ros} == ros
 
 
-def test_every_key_is_described() -> None:
-    def walk(place: Any) -> Iterator[tuple[str, Any]]:
-        if isinstance(place, dict):
-            yield from place.get("properties", {}).items()
-            for keyword, part in place.items():
-                if keyword not in ("if", "then", "else"):  # conditions on objects described elsewhere
-                    yield from walk(part)
+def keys_of(place: Any) -> Iterator[tuple[str, Any]]:
+    """The keys of a schema's objects, each with its part of the schema."""
+    if isinstance(place, dict):
+        yield from place.get("properties", {}).items()
+        for keyword, part in place.items():
+            if keyword not in ("if", "then", "else"):  # conditions on objects described elsewhere
+                yield from keys_of(part)
 
-    for key, place in walk(TEXT):
+
+def test_every_key_is_described() -> None:
+    for key, place in keys_of(TEXT):
         target = TEXT["$defs"][place["$ref"].split("/")[-1]] if "$ref" in place else place
         assert place.get("description") or target.get("description"), key
 

@@ -9,6 +9,7 @@ from pathlib import Path
 ALONE = {
     "board": "board",
     "bus": "bus.main",
+    "campaign": "campaign.main",
     "chain": "chain",
     "checkpoint": "checkpoint",
     "guard": "guard",

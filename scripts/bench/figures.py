@@ -19,6 +19,7 @@ from typing import Any
 from .harness.size import SUFFIX
 from .subjects.board import board_rows, board_times
 from .subjects.bus.main import bus_figures, bus_rows
+from .subjects.campaign.main import campaign_figures, campaign_rows
 from .subjects.chain import chain_summary, chain_times
 from .subjects.checkpoint import checkpoint_rows, checkpoint_times
 from .subjects.edit_loop import edit_to_test
@@ -132,6 +133,7 @@ SECTIONS = (
         simulator_figures,
         simulator_rows,
     ),
+    Section("campaign", "flying campaigns beside loops of independent processes", campaign_figures, campaign_rows),
     Section("wire", "sending messages beside MAVLink 2, and damaging them", wire_figures, wire_rows),
     Section("record", "recording", record_times, record_rows),
     Section("twin", "ticking twins from Python", lambda _: twin_times(), twin_rows),

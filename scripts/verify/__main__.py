@@ -22,6 +22,7 @@ ALONE = {
     "mutation": "mutation.main",
     "pil": "pil.main",
     "plant_bits": "plant_bits.main",
+    "ray": "ray.main",
     "receivers": "receivers.main",
     "sanitize": "sanitize.main",
 }

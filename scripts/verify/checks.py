@@ -81,6 +81,7 @@ FULL_CHECKS = scaled(
             ("-m", "pytest", "-q", *_LONGER),
             {"FCSL_VERIFY": "1"},
         ),
+        script("Ray: a campaign with a killed worker leaves the table of one process", "ray"),
     ),
 )
 

@@ -25,7 +25,8 @@ ABOUT, PLACES, TABLE, PICTURE = "campaign.json", "cases.bin", "cases.parquet", "
 _VERDICTS = ("", "passed", "failed", "error")
 _ENDS = ("", "duration", "until", "error")
 _ERROR_BYTES = 240
-_GROUP_ROWS = 1 << 16
+#: That are made to columns at a time, which bounds the memory.
+_GROUP_ROWS = 1 << 12
 
 
 class Results:

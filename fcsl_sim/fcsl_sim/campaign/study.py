@@ -39,6 +39,8 @@ from .metric import FUNCTIONS, Metric, MetricError
 MAX_CASES = 10_000_000
 #: Of the table, beside those of parameters and metrics.
 OWN_COLUMNS = ("case", "seed", "verdict", "end", "ticks", "hash", "error")
+#: Keys that say nothing about the flights.
+_FOR_READERS = ("$schema", "description")
 _DESIGNS = ("random", "latin_hypercube", "sweep", "corners")
 _SPREADS = ("uniform", "normal", "choice", "linear")
 _EXAMPLE = '{"uniform": [0.5, 1.5]}'
@@ -116,10 +118,12 @@ class _Reader:
         self.reader = ConfigReader(sink)
 
     def read(self, root: JsonNode, text: str, cases: int | None) -> Study:
-        optional = ("$schema", "description", "cases", "parameters", "metrics", "pass", "duration", "timeout_s")
+        optional = ("cases", "parameters", "metrics", "pass", "duration", "timeout_s", *_FOR_READERS)
         keys = self.reader.object(root, "a study", ("simulation", "seed", "design"), optional)
         self.sink.raise_if_failed()
         assert keys is not None
+        for key in _FOR_READERS:
+            self.reader.string(keys.get(key), f"`{key}`")
         config = self._simulation(keys)
         seed = self.reader.integer(keys["seed"], "`seed`", 0, 2**64 - 1)
         parameters = self._parameters(keys.get("parameters"), config)
