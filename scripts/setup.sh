@@ -61,6 +61,7 @@ missing_packages() {
     "$python" -c 'import os, sysconfig, sys; sys.exit(not os.path.exists(sysconfig.get_path("include") + "/Python.h"))' \
         2>/dev/null || echo python3-dev
     type -P cmake >/dev/null || echo cmake
+    type -P nim >/dev/null || echo nim
     { type -P cc && type -P c++ && type -P make; } >/dev/null || echo build-essential
     find_cargo >/dev/null || cargo_package || echo "cargo>=$min_cargo"
 }

@@ -4,17 +4,25 @@
 get_filename_component(_fcsl_prefix "${CMAKE_CURRENT_LIST_DIR}/../../.." ABSOLUTE)
 set(FCSLC "${_fcsl_prefix}/bin/fcslc" CACHE FILEPATH "the FCSL compiler")
 
-# fcsl_add_machine(<target> <machine.json> [<machine.json> ...] [STRICT] [TARGET <name>])
+# fcsl_add_machine(<target> <machine.json> [<machine.json> ...] [STRICT] [TARGET <name>] [BACKEND c|nim])
 #   Compiles machines into the shared library <target>. The name of a machine in it is its file stem. Installs the library to
 #   lib/<package> and registers it with the ament index, so that nodes find `machine:=<package>/<stem>`. STRICT is fcslc's
 #   --strict. TARGET selects one of the machines' `targets`, which defines the link inputs of externs (default: simulation).
-#   A library of another target is not registered: to run it, name its file.
+#   A library of another target is not registered: to run it, name its file. BACKEND is the language that fcslc writes
+#   (default: c); the library is the same.
 function(fcsl_add_machine target)
-  cmake_parse_arguments(PARSE_ARGV 1 arg "STRICT" "TARGET" "")
+  cmake_parse_arguments(PARSE_ARGV 1 arg "STRICT" "TARGET;BACKEND" "")
   if(NOT arg_TARGET)
     set(arg_TARGET simulation)
   endif()
-  set(options --target "${arg_TARGET}")
+  if(NOT arg_BACKEND)
+    set(arg_BACKEND c)
+  endif()
+  set(options --target "${arg_TARGET}" --backend "${arg_BACKEND}")
+  set(suffix c)
+  if(arg_BACKEND STREQUAL "nim")
+    set(suffix nim.c) # what Nim makes of <stem>.nim
+  endif()
   if(arg_STRICT)
     list(APPEND options --strict)
   endif()
@@ -25,7 +33,7 @@ function(fcsl_add_machine target)
     get_filename_component(json "${json}" ABSOLUTE)
     get_filename_component(stem "${json}" NAME_WE)
     list(APPEND configs "${json}")
-    list(APPEND made "${folder}/${stem}.c" "${folder}/${stem}.h")
+    list(APPEND made "${folder}/${stem}.${suffix}" "${folder}/${stem}.h")
     set_property(DIRECTORY APPEND PROPERTY CMAKE_CONFIGURE_DEPENDS "${json}")
     _fcsl_register_machine(${target} "${json}")
     if(arg_TARGET STREQUAL "simulation")

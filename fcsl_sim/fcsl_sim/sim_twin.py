@@ -54,6 +54,7 @@ class SimTwin(AlgTwin):
         cls,
         path: str | Path,
         target: str = "simulation",
+        backend: str = "c",
         *,
         seed: int | None = None,
         sets: Sequence[str] = (),
@@ -75,11 +76,13 @@ class SimTwin(AlgTwin):
         return cls(SimRun(_load(found, seed, sets, events, duration)))
 
     @classmethod
-    def _open_config(cls, config: Path, target: str, instances: Sequence[str] | None) -> Self:
+    def _open_config(cls, config: Path, target: str, instances: Sequence[str] | None, backend: str) -> Self:
         return cls(SimRun(_load(config, None, (), (), None)))
 
     @classmethod
-    def from_instances(cls, path: str | Path, instances: Sequence[str], target: str = "simulation") -> Self:
+    def from_instances(
+        cls, path: str | Path, instances: Sequence[str], target: str = "simulation", backend: str = "c"
+    ) -> Self:
         """Always raises TwinError: a simulation is flown whole."""
         raise TwinError(
             f"{path}: a simulation is flown whole; write a file with fewer models, with `tick_hz` in place of "

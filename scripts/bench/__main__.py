@@ -7,6 +7,7 @@ from pathlib import Path
 
 #: What can be run alone, and its module in subjects/.
 ALONE = {
+    "backends": "backends",
     "board": "board",
     "bus": "bus.main",
     "campaign": "campaign.main",

@@ -17,6 +17,7 @@ from pathlib import Path
 from typing import Any
 
 from .harness.size import SUFFIX
+from .subjects.backends import backend_rows, backend_times
 from .subjects.board import board_rows, board_times
 from .subjects.bus.main import bus_figures, bus_rows
 from .subjects.campaign.main import campaign_figures, campaign_rows
@@ -137,6 +138,7 @@ SECTIONS = (
     Section("wire", "sending messages beside MAVLink 2, and damaging them", wire_figures, wire_rows),
     Section("record", "recording", record_times, record_rows),
     Section("twin", "ticking twins from Python", lambda _: twin_times(), twin_rows),
+    Section("backends", "the backends C and Nim", backend_times, backend_rows),
     Section("checkpoint", "saving and restoring", checkpoint_times, checkpoint_rows),
     Section("process", "ticking a twin in a process of its own", lambda _: process_times(), process_rows),
     Section(

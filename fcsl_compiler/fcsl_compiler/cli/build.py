@@ -20,7 +20,7 @@ from ..driver.passes import DUMPS, Compilation, compile_machine
 from ..driver.record import SUFFIX, write_record
 from ..driver.stack import bound_text
 from ..driver.toolchain import toolchain
-from ..model.target import DEFAULT_TARGET
+from ..model.target import BACKENDS, DEFAULT_BACKEND, DEFAULT_TARGET
 from ..parse.machine_files import is_machine_name
 from .report import FORMATS, Summary, document, error_count
 
@@ -34,8 +34,9 @@ def add_build(commands: argparse._SubParsersAction[argparse.ArgumentParser]) -> 
     build.add_argument("config", type=Path, nargs="+", help="machine JSON; several go into one library")
     build.add_argument("-o", "--output", type=Path, help="output folder (default: build beside the first config)")
     build.add_argument("--name", help="library name (default: the first machine's)")
-    build.add_argument("--c-only", action="store_true", help="write C, header and map, do not compile them")
+    build.add_argument("--c-only", action="store_true", help="write C (and Nim), header and map, do not compile them")
     build.add_argument("--depfile", type=Path, help="write the dependencies of the C files, for make and ninja")
+    build.add_argument("--backend", choices=BACKENDS, default=DEFAULT_BACKEND, help="language of the generated source")
     build.add_argument("--target", default=DEFAULT_TARGET, help=TARGET_HELP)
     build.add_argument(
         "--instances", metavar="NAME,…", help="build a subset machine with only these instances (one config)"
@@ -58,7 +59,10 @@ def _build(options: argparse.Namespace) -> int:
     if options.dump:
         until, dump = DUMPS[options.dump]
         for path in options.config:
-            print(dump(compile_machine(path, toolchain(), until=until, strict=options.strict)), end="")
+            print(
+                dump(compile_machine(path, toolchain(), until=until, strict=options.strict, backend=options.backend)),
+                end="",
+            )
         return 0
     first: Path = options.config[0]
     if options.instances is not None and len(options.config) > 1:
@@ -72,11 +76,17 @@ def _build(options: argparse.Namespace) -> int:
     costs: list[Facts] = []
     library = folder / f"lib{options.name or first.stem}.so"
     if options.c_only:
-        compilations = emit(options.config, folder, options.strict, options.target, instances)
+        compilations = emit(options.config, folder, options.strict, options.target, instances, options.backend)
     else:
         inspect = _collect_facts(costs) if options.report is not None else lambda *_: None
         compilations = build_library(
-            options.config, library, options.strict, options.target, inspect=inspect, instances=instances
+            options.config,
+            library,
+            options.strict,
+            options.target,
+            inspect=inspect,
+            instances=instances,
+            backend=options.backend,
         )
     record = Path(f"{folder / 'fcsl_machines' if options.c_only else library}{SUFFIX}")
     write_record(record, compilations, "" if options.c_only else _command(options, folder))
@@ -106,6 +116,7 @@ def _command(options: argparse.Namespace, folder: Path) -> str:
     for name in ("name", "instances"):
         value = getattr(options, name)
         words += [] if value is None else [f"--{name}", value]
+    words += ["--backend", options.backend] if options.backend != DEFAULT_BACKEND else []
     words += ["--target", options.target] if options.target != DEFAULT_TARGET else []
     return shlex.join([*words, *(["--strict"] if options.strict else [])])
 

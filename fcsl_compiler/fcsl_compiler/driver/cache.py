@@ -15,8 +15,9 @@ from pathlib import Path
 from ..base.diagnostics import DiagnosticSink
 from ..base.files import digest
 from ..coverage.settings import BUILD_NOTE, COVER_DIR
-from ..model.target import DEFAULT_TARGET
+from ..model.target import DEFAULT_BACKEND, DEFAULT_TARGET
 from ..parse.machine_files import parse_machine
+from .backends import toolchain_of_backend
 from .c_dependencies import c_inputs, extern_inputs
 from .cache_entry import cached
 from .symbols import SymbolError, check_model_symbols
@@ -32,24 +33,31 @@ class BuiltMachine:
     source_hash: str
 
 
-def build_machine(config: Path, target: str = DEFAULT_TARGET, instances: Sequence[str] | None = None) -> BuiltMachine:
+def build_machine(
+    config: Path,
+    target: str = DEFAULT_TARGET,
+    instances: Sequence[str] | None = None,
+    backend: str = DEFAULT_BACKEND,
+) -> BuiltMachine:
     """The library of one machine. It is taken from the cache if config, sources, target, compiler and flags are
     unchanged.
 
-    `instances`: instances of a subset machine. If COVER_DIR is set, the result is a build for coverage. Raises
-    DiagnosticError (str() is the rendered text) and ToolchainError.
+    `instances`: instances of a subset machine. If COVER_DIR is set, the result is a build for coverage, by the C backend.
+    Raises DiagnosticError (str() is the rendered text) and ToolchainError.
     """
     try:
-        return _build_machine(config, target, instances)
+        return _build_machine(config, target, instances, backend)
     except OSError as error:
         raise unwritten(error, config) from None
 
 
-def _build_machine(config: Path, target: str, instances: Sequence[str] | None) -> BuiltMachine:
+def _build_machine(config: Path, target: str, instances: Sequence[str] | None, backend: str) -> BuiltMachine:
     cover = bool(os.environ.get(COVER_DIR))
+    if cover:
+        backend = DEFAULT_BACKEND
 
     def key() -> str:
-        found = _cache_key(config, target, cover, instances)
+        found = _cache_key(config, target, cover, instances, backend)
         if found is None:
             from .passes import compile_machine
 
@@ -61,14 +69,16 @@ def _build_machine(config: Path, target: str, instances: Sequence[str] | None) -
         from ..emit.field_table import source_hash
         from .library import build_library
 
-        machine = build_library([config], library, target=target, cover=cover, instances=instances)[0].checked
+        machine = build_library([config], library, target=target, cover=cover, instances=instances, backend=backend)[
+            0
+        ].checked
         return {"name": machine.name, "source_hash": source_hash(machine)}
 
     built = cached("machines", key, f"lib{config.stem}.so", build, config)
     return BuiltMachine(built.library, built.facts["name"], built.facts["source_hash"])
 
 
-def _cache_key(config: Path, target: str, cover: bool, instances: Sequence[str] | None) -> str | None:
+def _cache_key(config: Path, target: str, cover: bool, instances: Sequence[str] | None, backend: str) -> str | None:
     """Hash of all inputs of the library, computed without compiling. None if a source cannot be read."""
     parsed = parse_machine(config, DiagnosticSink(), trees=False)
     if parsed is None or (target not in parsed.targets and "targets" in parsed.keys):
@@ -77,7 +87,7 @@ def _cache_key(config: Path, target: str, cover: bool, instances: Sequence[str] 
         return None
     # A build for coverage contains the full paths of its files, one with a mesh that of the mesh.
     name = f"{BUILD_NOTE} {config.resolve()}" if cover else str(config.resolve()) if parsed.has_mesh else config.name
-    parts: list[str | bytes] = [name, parsed.package, parsed.source.text, toolchain(), _identity()]
+    parts: list[str | bytes] = [name, parsed.package, parsed.source.text, toolchain_of_backend(backend), _identity()]
     if target in parsed.targets:
         linked = parsed.targets[target]
         c_files = extern_inputs(parsed, linked)

@@ -10,12 +10,14 @@ from pathlib import Path
 
 from ..base.diagnostics import Diagnostic, DiagnosticError, Severity
 from ..base.files import write_whole
-from ..model.target import DEFAULT_TARGET
+from ..model.target import DEFAULT_BACKEND, DEFAULT_TARGET
+from .backends import toolchain_of_backend
 from .externs import explained, link_inputs
+from .nim import compile_modules
 from .passes import Compilation, compile_machine
 from .stack import stack_bound, stepped_machines
 from .symbols import SymbolError, check_symbols
-from .toolchain import ToolchainError, compile_objects, include_dirs, link_shared, math_library, toolchain
+from .toolchain import ToolchainError, compile_objects, include_dirs, link_shared, math_library
 
 
 def emit(
@@ -24,13 +26,15 @@ def emit(
     strict: bool = False,
     target: str = DEFAULT_TARGET,
     instances: Sequence[str] | None = None,
+    backend: str = DEFAULT_BACKEND,
 ) -> list[Compilation]:
-    """Writes <stem>.c, .h and .map.json of every machine, and fcsl_machines.c, into `folder`.
+    """Writes <stem>.c, .h and .map.json of every machine, and fcsl_machines.c, into `folder`. With backend "nim" the C
+    is <stem>.nim.c, which Nim makes of <stem>.nim.
 
     `instances`: instances of a subset machine. Writes nothing if a machine does not compile. Raises DiagnosticError,
     ToolchainError.
     """
-    compilations = compile_all(configs, strict, target, instances=instances)
+    compilations = compile_all(configs, strict, target, instances=instances, backend=backend)
     _write(compilations, folder)
     return compilations
 
@@ -41,11 +45,13 @@ def compile_all(
     target: str = DEFAULT_TARGET,
     cover: bool = False,
     instances: Sequence[str] | None = None,
+    backend: str = DEFAULT_BACKEND,
 ) -> list[Compilation]:
-    """Compiles machines to C in memory and checks that they can share a library. Raises DiagnosticError,
+    """Compiles machines to source in memory and checks that they can share a library. Raises DiagnosticError,
     ToolchainError."""
+    found = toolchain_of_backend(backend)
     compilations = [
-        compile_machine(path, toolchain(), strict=strict, target=target, cover=cover, instances=instances)
+        compile_machine(path, found, strict=strict, target=target, cover=cover, instances=instances, backend=backend)
         for path in configs
     ]
     _distinct(compilations)
@@ -56,7 +62,9 @@ def _write(compilations: list[Compilation], folder: Path) -> list[Path]:
     texts: dict[str, str] = {}
     for c in compilations:
         name = c.checked.name
-        texts |= {f"{name}.h": c.header, f"{name}.c": c.source, f"{name}.map.json": c.map}
+        texts |= {f"{name}.h": c.header, c.source_name: c.source, f"{name}.map.json": c.map}
+    modules = {c.checked.name: c.source for c in compilations if c.backend == "nim"}
+    texts |= compile_modules(modules) if modules else {}
     texts["fcsl_machines.c"] = _registry([c.checked.name for c in compilations])
     for file, text in texts.items():
         write_whole(folder / file, text)
@@ -111,6 +119,7 @@ def build_library(
     cover: bool = False,
     inspect: Inspect = lambda *_: None,
     instances: Sequence[str] | None = None,
+    backend: str = DEFAULT_BACKEND,
 ) -> list[Compilation]:
     """Compiles machines to one shared library and writes the C files beside it. Raises DiagnosticError, ToolchainError.
 
@@ -119,7 +128,7 @@ def build_library(
     Sets `extern_calls` of every compilation, and `stack_bound` if the C compiler reports frame sizes. Then calls
     `inspect` for each.
     """
-    compilations = compile_all(configs, strict, target, cover, instances)
+    compilations = compile_all(configs, strict, target, cover, instances, backend)
     absent = [p for p in (output.parent, *output.parent.parents) if not p.exists()]
 
     output.parent.mkdir(parents=True, exist_ok=True)
@@ -158,7 +167,7 @@ def _compile(compilations: list[Compilation], sources: list[Path], output: Path,
         # With coverage, the host maps the counters. Threads may still use them after the host closes the library.
         stays = ["-Wl,-z,nodelete"] if any(c.cover for c in compilations) else []
         link_shared([*objects, *foreign.files], [], output, inspect_build, [*foreign.flags, *stays])
-    made = {source.stem: compiled for source, compiled in zip(sources, objects, strict=True)}
+    made = {source.name.split(".")[0]: compiled for source, compiled in zip(sources, objects, strict=True)}
     for c in compilations:
         inspect(c, made[c.checked.name], includes)
 

@@ -23,13 +23,15 @@ from ..emit.field_table import source_hash
 from ..emit.machine import emit_machine
 from ..lower.lower import lower
 from ..model.machine import Machine
-from ..model.target import DEFAULT_TARGET, Target
+from ..model.target import DEFAULT_BACKEND, DEFAULT_TARGET, Target
 from ..parse.machine_files import ParsedMachine, parse_machine
 from ..parse.targets import choose_target
 from ..printers.c.descriptor import DescriptorEmitter
 from ..printers.c.header import print_header
 from ..printers.c.source import print_source
+from ..printers.nim.module import print_module
 from ..printers.source_map import source_map
+from ..printers.writer import Writer
 from .c_dependencies import CInputs, extern_inputs
 from .dump import dump_c, dump_ir, dump_machine, dump_schedule, dump_syntax, dump_types
 
@@ -55,7 +57,12 @@ class Compilation:
     build_hash: str = ""
     stack_bound: int | None = None  # stack of step in bytes, after compiling; None if unknown
     cover: bool = False  # True for a coverage build, which must not fly
+    backend: str = DEFAULT_BACKEND  # language of the source (BACKENDS)
     extern_calls: tuple[str, ...] = ()  # functions called by the externs' own code, known after linking
+
+    @property
+    def source_name(self) -> str:
+        return f"{self.checked.name}.{self.backend}"
 
     @property
     def checked(self) -> Machine:
@@ -106,9 +113,13 @@ def _emit(c: Compilation) -> None:
     c.build_hash = digest(source_hash(m), c.toolchain, *linked, *([BUILD_NOTE] if covered else []))
     places = FaultPlaces(lowered)
     program = emit_machine(lowered, places)
-    w = print_source(program, prelude(covered.map) if covered is not None else "", C_OPERATIONS)
-    DescriptorEmitter(m, w, c.build_hash, places).emit()
-    c.header, c.source, c.map = print_header(program), w.text(), source_map(program, w, f"{m.name}.c")
+    w: Writer
+    if c.backend == "nim":
+        w = print_module(program, lambda inner: DescriptorEmitter(m, inner, c.build_hash, places).emit())
+    else:
+        w = print_source(program, prelude(covered.map) if covered is not None else "", C_OPERATIONS)
+        DescriptorEmitter(m, w, c.build_hash, places).emit()
+    c.header, c.source, c.map = print_header(program), w.text(), source_map(program, w, c.source_name)
 
 
 @dataclass(frozen=True)
@@ -125,7 +136,7 @@ PASSES: tuple[Pass, ...] = (
     Pass("schedule", "order every state by dataflow", _schedule, lambda c: dump_schedule(c.checked)),
     Pass("verify", "verify the checked program", _verify, lambda c: dump_ir(c.checked)),
     Pass("lower", "optimise the IR for C", _lower, lambda c: dump_ir(c.lowered or c.checked)),
-    Pass("emit", "write C", _emit, lambda c: dump_c(c.header, c.source)),
+    Pass("emit", "write the source", _emit, lambda c: dump_c(c.header, c.source)),
 )
 
 #: Values of `--dump`: a pass, or a result that is available after a pass; with the last pass to run.
@@ -143,12 +154,13 @@ def compile_machine(
     target: str = DEFAULT_TARGET,
     cover: bool = False,
     instances: Sequence[str] | None = None,
+    backend: str = DEFAULT_BACKEND,
 ) -> Compilation:
     """Runs the passes up to `until` (a name of PASSES). Raises DiagnosticError if the program has an error.
 
-    `cover`: the C contains probes (coverage/instrument.py). `instances`: instances of a subset machine.
+    `cover`: the C contains probes (coverage/instrument.py); backend "c" alone has them. `instances`: instances of a subset machine.
     """
-    c = Compilation(path, toolchain, strict, target, instances, cover=cover)
+    c = Compilation(path, toolchain, strict, target, instances, cover=cover, backend=backend)
     for step in PASSES:
         step.run(c)
         # A syntax error in one file does not suppress errors in other files.

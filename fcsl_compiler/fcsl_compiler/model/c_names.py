@@ -27,7 +27,15 @@ _RESERVED = C_KEYWORDS | frozenset(
     MATH_ERREXCEPT SIZE_MAX PTRDIFF_MIN PTRDIFF_MAX SIG_ATOMIC_MIN SIG_ATOMIC_MAX WCHAR_MIN WCHAR_MAX WINT_MIN WINT_MAX
     """.split()
 )
-_PREFIXES = ("fcsl_", "FCSL_", "cr_", "alg_", "mod_", "INT", "UINT", "int", "uint", "FP_", "M_", "_")
+#: Macros and types of the C that Nim makes.
+_OF_NIM = frozenset(
+    """
+    ALLOC_0 CLANG_NO_SANITIZE_ADDRESS COMMA DL_ALLOC_0 GC_GUARD HAVE_STDINT_H IL64 INF NAN_INFINITY NIMBASE_H SEQ_DECL_SIZE
+    STRING_LITERAL paramCount nimAddInt nimAddInt64 nimModInt nimModInt64 nimMulInt nimMulInt64 nimSubInt nimSubInt64
+    NB8 NC NF NF32 NF64 NI NI8 NI16 NI32 NI64 NU NU8 NU16 NU32 NU64
+    """.split()
+)
+_PREFIXES = ("fcsl_", "FCSL_", "cr_", "alg_", "mod_", "INT", "UINT", "int", "uint", "FP_", "M_", "_", "NIM_", "N_")
 
 
 def c_name(name: str) -> str:
@@ -38,7 +46,7 @@ def c_name(name: str) -> str:
     """
     if "." in name:
         return name.replace(".", "") + "_"  # hidden local of the checker
-    if name in _RESERVED or "_tr_" in name or name.endswith("_") or name.startswith(_PREFIXES):
+    if name in _RESERVED or name in _OF_NIM or "_tr_" in name or name.endswith("_") or name.startswith(_PREFIXES):
         return name + "_"
     return name
 

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Link inputs of externs for one kind of computer."""
+"""Backends, and the link inputs of externs for one kind of computer."""
 
 from __future__ import annotations
 
@@ -8,6 +8,9 @@ from pathlib import Path
 
 #: Default target. Tests, twins and simulators use it.
 DEFAULT_TARGET = "simulation"
+#: Languages of generated source.
+BACKENDS = ("c", "nim")
+DEFAULT_BACKEND = "c"
 
 
 @dataclass(frozen=True)

@@ -121,18 +121,18 @@ def causes(trace: Trace) -> Trace:
     return [{path: list(map(cause, values)) for path, values in fields.items()} for fields in trace]
 
 
-def check(cases: Sequence[Case]) -> list[str]:
+def check(cases: Sequence[Case], backend: str = "c") -> list[str]:
     """A description of the failure for each case, "" if it passes. All cases are compiled into one library."""
     with tempfile.TemporaryDirectory(prefix="fcsl-generated-") as scratch:
         folder = Path(scratch)
         configs = [case.write(folder / f"g{n}", f"g{n}") for n, case in enumerate(cases)]
         library = folder / "out" / "libgenerated.so"
         try:
-            compiled = build_library(configs, library)
+            compiled = build_library(configs, library, backend=backend)
         except (DiagnosticError, ToolchainError) as error:
             if len(cases) == 1:
                 return [f"not compiled:\n{error}"]
-            return [check([case])[0] for case in cases]
+            return [check([case], backend)[0] for case in cases]
         return [_check(library, one, case) for one, case in zip(compiled, cases, strict=True)]
 
 

@@ -29,9 +29,9 @@ def find_config(path: str | Path, caller: str = "", what: str = "machine config"
 
 
 def build_config(
-    path: str | Path, target: str = "simulation", instances: Sequence[str] | None = None
+    path: str | Path, target: str = "simulation", instances: Sequence[str] | None = None, backend: str = "c"
 ) -> tuple[Path, str]:
-    """Compiles a machine config (cached), or the subset machine of `instances`.
+    """Compiles a machine config (cached), or the subset machine of `instances`. `backend`: "c" or "nim".
 
     Returns its library and the machine's name. Raises TwinError.
     """
@@ -39,9 +39,12 @@ def build_config(
     from fcsl_compiler.base.diagnostics import DiagnosticError
     from fcsl_compiler.driver.cache import build_machine
     from fcsl_compiler.driver.toolchain import ToolchainError
+    from fcsl_compiler.model.target import BACKENDS
 
+    if backend not in BACKENDS:
+        raise TwinError(f"backend={backend!r}: one of {', '.join(BACKENDS)} wanted")
     try:
-        built = build_machine(config, target, instances)
+        built = build_machine(config, target, instances, backend)
     except (DiagnosticError, ToolchainError) as error:
         raise TwinError(str(error)) from None
     return built.library, built.name

@@ -15,7 +15,7 @@ from fcsl_compiler.driver.externs import link_inputs
 from fcsl_compiler.driver.library import build_library, stack_bounds
 from fcsl_compiler.driver.passes import Compilation
 from fcsl_compiler.driver.toolchain import compile_objects, compiler, include_dirs, link_shared, math_library
-from fcsl_compiler.model.target import Target
+from fcsl_compiler.model.target import DEFAULT_BACKEND, Target
 
 from ..shared.cases import CheckFailed
 from .elf import Elf
@@ -36,10 +36,10 @@ class Binary:
     bound: int | None
 
 
-def build(config: Path, folder: Path) -> Binary:
+def build(config: Path, folder: Path, backend: str = DEFAULT_BACKEND) -> Binary:
     """Builds the machine twice. Raises DiagnosticError, ToolchainError, and CheckFailed should the two differ in code."""
     library = folder / "library.so"
-    made = build_library([config], library)[0]
+    made = build_library([config], library, backend=backend)[0]
     binary = compile_lined(made, folder, folder / "lined")
     both = (Elf(library), Elf(binary.lined))
     for section in _CODE:
@@ -55,6 +55,11 @@ def build(config: Path, folder: Path) -> Binary:
     return Binary(binary.machine, library, binary.lined, binary.graphs, binary.externs, binary.bound)
 
 
+def c_name(made: Compilation) -> str:
+    """The C file of a machine: what the compiler wrote, or what Nim made of it."""
+    return made.source_name if made.backend == "c" else f"{made.source_name}.c"
+
+
 def compile_lined(made: Compilation, folder: Path, output: Path, more: Target | None = None) -> Binary:
     """The C files of a machine in `folder` as they stand there, and its externs, with line numbers; unchecked.
 
@@ -66,7 +71,7 @@ def compile_lined(made: Compilation, folder: Path, output: Path, more: Target | 
     includes = [folder, *include_dirs(), *(d for t in targets for d in t.include)]
     library = output / "library.so"
     with _line_numbers():
-        sources = [folder / f"{name}.c", folder / "fcsl_machines.c"]
+        sources = [folder / c_name(made), folder / "fcsl_machines.c"]
         objects = compile_objects(sources, includes, output / "objects", graphs=True)
         foreign = link_inputs(targets, output / "externs", folder)
         link_shared([*objects, *foreign.files], [], library, flags=foreign.flags)

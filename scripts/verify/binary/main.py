@@ -58,9 +58,9 @@ def _check_all(folder: Path, ticks: int, generated: int, seed_number: int) -> No
     tools = Tools(build_runner(folder), found, ticks)
     rows: list[dict[str, Any]] = []
     built: dict[str, Binary] = {}
-    for label, config in _machines(folder, generated, seed_number):
+    for label, config, backend in _machines(folder, generated, seed_number):
         print(f"{label}: {ticks} ticks", flush=True)
-        binary = built[label] = build(config, folder / label.replace(" ", "_"))
+        binary = built[label] = build(config, folder / label.replace(" ", "_"), backend)
         rows.append({**figures(binary, _right(label, check(binary, tools))), "machine": label})
     installed = _check_installed()
     controls = _controls(folder / "controls", replace(tools, ticks=CONTROL_TICKS))
@@ -69,11 +69,14 @@ def _check_all(folder: Path, ticks: int, generated: int, seed_number: int) -> No
     write_facts("binary", {"machines": rows, "installed": installed, "leaves": _leaf_rows(found), "controls": controls})
 
 
-def _machines(folder: Path, generated: int, seed_number: int) -> Iterator[tuple[str, Path]]:
-    yield from EXAMPLES.items()
-    yield NUMBERS.stem, NUMBERS
-    yield "lander_control, timed", _timed(folder / "timed")
-    yield from generated_machines(folder, generated, seed_number)
+def _machines(folder: Path, generated: int, seed_number: int) -> Iterator[tuple[str, Path, str]]:
+    """Label, machine JSON, backend."""
+    named = {**EXAMPLES, NUMBERS.stem: NUMBERS, "lander_control, timed": _timed(folder / "timed")}
+    for label, config in named.items():
+        yield label, config, "c"
+        yield f"{label}, Nim", config, "nim"
+    for label, config in generated_machines(folder, generated, seed_number):
+        yield label, config, "c"
 
 
 def _timed(folder: Path) -> Path:

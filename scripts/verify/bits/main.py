@@ -19,6 +19,7 @@ from concurrent.futures import Future, ProcessPoolExecutor, ThreadPoolExecutor
 from pathlib import Path
 
 from fcsl_compiler.driver.library import emit
+from fcsl_compiler.model.target import BACKENDS, DEFAULT_BACKEND
 
 from ..shared.cases import EXAMPLES, NUMBERS, OUT, CheckFailed, write_facts
 from ..shared.effort import scaled
@@ -38,12 +39,13 @@ Rows = list[list[str]]
 Sides = Callable[[str, int], tuple[Rows, Rows]]
 
 
-def emit_machines(configs: list[Path], folder: Path) -> Sources:
+def emit_machines(configs: list[Path], folder: Path, backend: str = DEFAULT_BACKEND) -> Sources:
     """All machines as C in one folder, for one program."""
-    made = emit(configs, folder)
+    made = emit(configs, folder, backend=backend)
     externs = dict.fromkeys(source for c in made for source in c.target.sources)
     includes = dict.fromkeys(d for c in made for d in c.target.include)
-    names = [f"{c.checked.name}.c" for c in made] + ["fcsl_machines.c"]
+    suffix = "nim.c" if backend == "nim" else "c"
+    names = [f"{c.checked.name}.{suffix}" for c in made] + ["fcsl_machines.c"]
     return Sources((*(folder / n for n in names), *externs), (folder, *includes))
 
 
@@ -146,10 +148,12 @@ def table(rows: list[dict[str, object]], python: dict[str, dict[str, object]], w
 
 def check(seed: int, ticks: int, python_ticks: int, targets: list[Target], python_numbers: int) -> None:
     """Raises CheckFailed, DiagnosticError, ToolchainError."""
-    sources = emit_machines([*EXAMPLES.values(), NUMBERS], OUT / "bits" / "c")
+    machines = [*EXAMPLES.values(), NUMBERS]
+    by_backend = {b: emit_machines(machines, OUT / "bits" / b, b) for b in BACKENDS}
+    sources = by_backend[DEFAULT_BACKEND]
     with ProcessPoolExecutor(2) as processes, ThreadPoolExecutor(2) as threads:
         python = python_runs(processes, seed, min(python_ticks, ticks), python_numbers)
-        started = [(t, threads.submit(measure, t, sources, seed, ticks)) for t in targets]
+        started = [(t, threads.submit(measure, t, by_backend[t.backend], seed, ticks)) for t in targets]
         wanted: Hashes = {}
         rows: list[dict[str, object]] = []
         for target, future in started:

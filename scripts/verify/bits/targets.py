@@ -36,10 +36,13 @@ class Target:
     link: tuple[str, ...] = ()
     runner: tuple[str, ...] = ()
     bare: bool = False
+    backend: str = "c"
 
     @property
     def line(self) -> str:
-        return " ".join([*self.compiler, *BASE, *self.flags])
+        return " ".join(
+            [*(["fcslc --backend nim,"] if self.backend == "nim" else []), *self.compiler, *BASE, *self.flags]
+        )
 
 
 def native(compiler: str, levels: Sequence[str] = ("-O0", "-O2", "-O3", "-O3 -march=native")) -> list[Target]:
@@ -51,6 +54,11 @@ def cross(machine: str, flags: tuple[str, ...] = ("-O3",)) -> Target:
     """Of another processor, emulated."""
     compiler, emulator = f"{machine}-linux-gnu-gcc", f"qemu-{machine}-static"
     return Target(f"{machine} {' '.join(flags)}", (compiler,), flags, True, ("-static",), (emulator,))
+
+
+def by_nim(target: Target) -> Target:
+    """The same with the machines written by the Nim backend."""
+    return replace(target, name=f"Nim, {target.name}", backend="nim")
 
 
 def _cortex_m7(flags: tuple[str, ...] = ("-O3",)) -> Target:
@@ -72,6 +80,7 @@ TARGETS = [
     AARCH64,
     cross("riscv64"),
     CORTEX_M7,
+    *map(by_nim, (REFERENCE, Target("clang-19 -O3", ("clang-19",), ("-O3",)), AARCH64)),
 ]
 #: What `--all` adds.
 MORE = [

@@ -44,7 +44,7 @@ def print_source(program: code.Program, prelude: str, extensions: Mapping[str, S
     if prelude:
         w.block(prelude)
         w.line()
-    _externs(program, w)
+    print_externs(program, w)
     expressions = CExpressions(extensions)
     for table in program.tables:
         CStatements(w, expressions).table(table)
@@ -74,7 +74,7 @@ def print_record(w: CWriter, record: code.Record) -> None:
     w.line()
 
 
-def _externs(program: code.Program, w: CWriter) -> None:
+def print_externs(program: code.Program, w: CWriter) -> None:
     """Asserts that the user's header declares each extern with the types that the algorithm uses. C would convert
     silently."""
     for e in program.externs:

@@ -44,8 +44,8 @@ class AlgTwin(Twin):
     # ---- life -------------------------------------------------------------------------------------------------------
 
     @classmethod
-    def _open_config(cls, config: Path, target: str, instances: Sequence[str] | None) -> Self:
-        return cls(open_run(*build_config(config, target, instances)))
+    def _open_config(cls, config: Path, target: str, instances: Sequence[str] | None, backend: str) -> Self:
+        return cls(open_run(*build_config(config, target, instances, backend)))
 
     @classmethod
     def from_library(cls, path: str | Path, machine: str | None = None) -> Self:
@@ -227,8 +227,8 @@ class PyTwin(AlgTwin):
     """
 
     @classmethod
-    def _open_config(cls, config: Path, target: str, instances: Sequence[str] | None) -> Self:
-        return cls(open_python_run(config, *build_config(config, target, instances), target, instances))
+    def _open_config(cls, config: Path, target: str, instances: Sequence[str] | None, backend: str) -> Self:
+        return cls(open_python_run(config, *build_config(config, target, instances, backend), target, instances))
 
     @classmethod
     def from_library(cls, path: str | Path, machine: str | None = None) -> Self:

@@ -63,8 +63,8 @@ class ProcessTwin(Twin):
     # ---- life -------------------------------------------------------------------------------------------------------
 
     @classmethod
-    def _open_config(cls, config: Path, target: str, instances: Sequence[str] | None) -> Self:
-        return cls(*build_config(config, target, instances))
+    def _open_config(cls, config: Path, target: str, instances: Sequence[str] | None, backend: str) -> Self:
+        return cls(*build_config(config, target, instances, backend))
 
     @classmethod
     def from_library(cls, path: str | Path, machine: str | None = None) -> Self:

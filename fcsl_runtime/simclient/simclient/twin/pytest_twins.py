@@ -59,7 +59,7 @@ def twin_class(kind: str) -> type[Twin]:
 
 @pytest.fixture
 def fcsl(request: pytest.FixtureRequest) -> Iterator[Callable[..., Twin]]:
-    """`fcsl(config, target="simulation")` opens the machine JSON `config`, paused at tick 0.
+    """`fcsl(config, target="simulation", backend="c")` opens the machine JSON `config`, paused at tick 0.
 
     With `instances=[…]` it opens only these as a subset machine (Twin.from_instances). A relative path is relative to
     the working directory, or else to the folder of the test file.
@@ -71,13 +71,18 @@ def fcsl(request: pytest.FixtureRequest) -> Iterator[Callable[..., Twin]]:
     opened: list[Twin] = []
     boxes = request.node.stash.setdefault(_BOXES, [])
 
-    def open_twin(config: str | Path, target: str = "simulation", instances: Sequence[str] | None = None) -> Twin:
+    def open_twin(
+        config: str | Path,
+        target: str = "simulation",
+        instances: Sequence[str] | None = None,
+        backend: str = "c",
+    ) -> Twin:
         found = find_config(config, str(request.path))
 
         def open_one(kind: type[Twin]) -> Twin:
-            return (
-                kind.from_config(found, target) if instances is None else kind.from_instances(found, instances, target)
-            )
+            if instances is None:
+                return kind.from_config(found, target, backend)
+            return kind.from_instances(found, instances, target, backend)
 
         opened.append(open_one(kind))
         boxes.append(BlackBox(opened[-1], again=lambda: open_one(twin_class("native"))))

@@ -42,17 +42,20 @@ class Twin(TwinFaults):
     # ---- life -------------------------------------------------------------------------------------------------------
 
     @classmethod
-    def from_config(cls, path: str | Path, target: str = "simulation") -> Self:
+    def from_config(cls, path: str | Path, target: str = "simulation", backend: str = "c") -> Self:
         """Compiles the machine JSON (cached by config, sources, compiler and flags) and opens it, paused at tick 0.
 
         `path` is relative to the working directory, or else to the caller's file. `target` selects one of the machine's
-        `targets`, from which its externs are linked. Raises TwinError, with the compiler's diagnostics if the config or
-        an algorithm is wrong.
+        `targets`, from which its externs are linked. `backend` ("c" or "nim") is the language that the compiler writes;
+        the machine is the same. Raises TwinError, with the compiler's diagnostics if the config or an algorithm is
+        wrong.
         """
-        return cls._open_config(find_config(path, sys._getframe(1).f_code.co_filename), target, None)
+        return cls._open_config(find_config(path, sys._getframe(1).f_code.co_filename), target, None, backend)
 
     @classmethod
-    def from_instances(cls, path: str | Path, instances: Sequence[str], target: str = "simulation") -> Self:
+    def from_instances(
+        cls, path: str | Path, instances: Sequence[str], target: str = "simulation", backend: str = "c"
+    ) -> Self:
         """Opens only these instances, with the connections, channels, states and transitions between them.
 
         An input whose source is left out becomes a host input, which `set` can write (`machine.host_inputs` lists
@@ -66,11 +69,11 @@ class Twin(TwinFaults):
         if not isinstance(instances, Sequence) or not all(isinstance(name, str) for name in instances):
             raise TwinError(f"from_instances(…, {instances!r}): a list of names of instances wanted")
         config = find_config(path, sys._getframe(1).f_code.co_filename)
-        return cls._open_config(config, target, tuple(instances))
+        return cls._open_config(config, target, tuple(instances), backend)
 
     @classmethod
     @abstractmethod
-    def _open_config(cls, config: Path, target: str, instances: Sequence[str] | None) -> Self:
+    def _open_config(cls, config: Path, target: str, instances: Sequence[str] | None, backend: str) -> Self:
         """Compiles and opens a machine JSON, or the subset machine of `instances`."""
 
     def __enter__(self) -> Self:

@@ -1,0 +1,85 @@
+# SPDX-License-Identifier: Apache-2.0
+"""The Nim compiler, which makes C of the modules of the Nim backend.
+
+Only the C of the modules themselves is compiled. Nim's own system module, with its allocator, is not part of a library,
+so a machine cannot use it; the scan of symbols (symbols.py) would name what is missing.
+"""
+
+from __future__ import annotations
+
+import json
+import re
+import shlex
+import tempfile
+from pathlib import Path
+
+from ..printers.nim.names import REFUSED
+from .toolchain import Language, ToolchainError, run_compiler, toolchain
+
+#: No checks, no garbage collector, and no configuration but this.
+FLAGS = (
+    "c",
+    "--compileOnly",
+    "--noMain",
+    "--app:staticlib",
+    "--mm:none",
+    "-d:danger",
+    "--threads:off",
+    "--skipCfg",
+    "--skipUserCfg",
+    "--skipParentCfg",
+    "--skipProjCfg",
+    "--hints:off",
+    "--warnings:off",
+    "--colors:off",
+)
+#: The header of all C that Nim makes.
+BASE_HEADER = "nimbase.h"
+
+_REFUSED = re.compile(rf"\b({'|'.join(sorted(REFUSED))}|import(?! std/volatile$))\b", re.MULTILINE)
+_COMMENT_OR_TEXT = re.compile(r'""".*?"""|#[^\n]*|"(?:[^"\\\n]|\\.)*"|`[^`\n]*`', re.DOTALL)
+
+
+#: Its compiler makes C, which the C compiler compiles.
+NIM = Language("Nim", "NIM", "nim", "nim (Debian and Ubuntu: apt-get install nim)", FLAGS)
+
+
+def nim_toolchain() -> str:
+    """Versions and flags of Nim and of the C compiler, as included in build_hash. Raises ToolchainError."""
+    return f"{toolchain(NIM)}; {toolchain()}"
+
+
+def refuse_allocation(text: str, file: str) -> None:
+    """Raises ToolchainError if a generated module has a word that allocates, raises or keeps a reference."""
+    code = _COMMENT_OR_TEXT.sub(lambda found: re.sub(r"[^\n]", " ", found[0]), text)
+    found = _REFUSED.search(code)
+    if found:
+        line = code.count("\n", 0, found.start()) + 1
+        raise ToolchainError(f"{file}:{line}: `{found[0]}` has no place in control code; this is a fault of fcslc")
+
+
+def compile_modules(modules: dict[str, str]) -> dict[str, str]:
+    """C of Nim modules, by file name: <name>.nim.c for each <name>, and BASE_HEADER. `modules`: their texts by name.
+    Raises ToolchainError."""
+    for name, text in modules.items():
+        refuse_allocation(text, f"{name}.nim")
+    with tempfile.TemporaryDirectory(prefix="fcsl-nim-") as scratch:
+        folder = Path(scratch)
+        for name, text in modules.items():
+            (folder / f"{name}.nim").write_text(text, encoding="utf-8")
+        # What belongs to a program is in the C of this module, which nobody compiles.
+        program = folder / "fcsl_program.nim"
+        program.write_text("".join(f"import {name}\n" for name in modules))
+        run_compiler([*NIM.compiler(), *FLAGS, f"--nimcache:{folder / 'c'}", str(program)], language=NIM)
+        made = {f"{name}.nim.c": (folder / "c" / f"@m{name}.nim.c").read_text(encoding="utf-8") for name in modules}
+        return {**made, BASE_HEADER: _base_header(folder / "c")}
+
+
+def _base_header(folder: Path) -> str:
+    """The header, from a folder that Nim would hand to the C compiler."""
+    build = json.loads(next(folder.glob("*.json")).read_text(encoding="utf-8"))
+    for word in (word for _, command in build["compile"] for word in shlex.split(command)):
+        found = Path(word.removeprefix("-I"), BASE_HEADER)
+        if word.startswith("-I") and found.is_file():
+            return found.read_text(encoding="utf-8")
+    raise ToolchainError(f"Nim has no {BASE_HEADER}; install all of its library")

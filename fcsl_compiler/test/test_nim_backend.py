@@ -1,0 +1,212 @@
+# SPDX-License-Identifier: Apache-2.0
+"""The Nim backend: the same machine as the C backend makes, bit for bit."""
+
+import json
+import math
+import random
+import re
+import struct
+import subprocess
+from functools import partial
+from pathlib import Path
+from typing import Any
+
+import pytest
+from fcsl_generator.campaign import campaign
+from fcsl_generator.harness import check
+from fcsl_generator.machines import cases
+from fcsl_test_abi import Machine, write_machine
+from test_golden import CONFIG, GOLDEN, describe, golden
+
+from fcsl_compiler.cli.main import main
+from fcsl_compiler.driver.cache import build_machine
+from fcsl_compiler.driver.nim import refuse_allocation
+from fcsl_compiler.driver.passes import compile_machine
+from fcsl_compiler.driver.toolchain import ToolchainError, include_dirs, math_library
+
+EXAMPLES = Path(__file__).parents[2] / "examples"
+PAGE = EXAMPLES.parent / "docs/nim.md"
+
+
+def nim_machine(config: Path, **options: Any) -> Machine:
+    built = build_machine(config, backend="nim")
+    return Machine(built.library, built.name, **options)
+
+
+@pytest.mark.parametrize("single", [True, False], ids=["programs", "machines"])
+def test_generated_ones_agree(request: pytest.FixtureRequest, single: bool) -> None:
+    """Nim, CPython and the oracle: every field, tick and bit. test_generated.py compares C with these two."""
+    count = max(10, request.config.getoption("--programs") // 10)
+    campaign(cases(single=single), count, request.config.getoption("--program-seed"), partial(check, backend="nim"))
+
+
+@pytest.mark.parametrize("name", ["small", "values"])
+def test_generated_nim(name: str) -> None:
+    """`small` is a plain machine; `values` has every kind of value: structs, slices, frozen parameters, hardware."""
+    made = compile_machine(GOLDEN / f"{name}.json", "", backend="nim")
+    golden(f"{name}.nim.txt", made.source.replace(made.build_hash, "…"))
+
+
+def test_no_host_can_tell_which_backend_made_a_machine() -> None:
+    """But by the build hash."""
+    c, nim = Machine.build(CONFIG), nim_machine(CONFIG)
+    assert describe(nim) == describe(c)
+    assert nim.d.build_hash != c.d.build_hash
+
+
+#: Names that Nim takes for one, its keywords, its own names, and names that C refuses.
+NAMES = """
+class Names:
+    inputs = {"end": "f64", "result": "f64", "pos_x": "f64", "posX": "f64", "POS_X": "f64", "x_1": "f64", "INF": "f64", "CHAR_BIT": "f64"}
+    outputs = {"sum": "f64", "type": "f64", "p_os_x": "f64", "transition_request": "TransitionRequest"}
+    state = {"float64": "f64", "addr": "i64", "double": "f64", "echo": "f64", "seq": "i32"}
+
+    def execute(self):
+        array = self.end
+        arr_ay = array + self.result
+        aRRAY = arr_ay + self.pos_x
+        let = aRRAY + 10.0 * self.posX + 100.0 * self.POS_X
+        for proc in range(3):
+            let += f64(proc)
+        self.double = let
+        self.sum = self.double
+        self.echo = let
+        self.seq += 1
+        PATH_MAX = self.CHAR_BIT + 1.0
+        NI = PATH_MAX * PATH_MAX
+        self.type = self.x_1 - self.INF + NI
+        self.float64 += self.type
+        self.addr += 1
+        self.p_os_x = self.float64
+        self.transition_request = "stop_it"
+"""
+
+
+def test_names_that_are_one_to_nim_are_told_apart(tmp_path: Path) -> None:
+    instance = {"algorithm": "Names"}
+    config = write_machine(
+        tmp_path,
+        "names",
+        {
+            "tick_hz": 10,
+            "initial_state": "end",
+            "instances": {"one": instance, "o_ne": instance},
+            "states": {"end": {"schedule": {"one": 10, "o_ne": 10}}, "END": {"schedule": {"one": 10}}},
+            "requests": ["stop_it", "stopIt"],
+            "transitions": [{"from": "end", "to": "END", "request": "stop_it"}],
+        },
+        {"names": NAMES},
+    )
+    machines = [Machine.build(config), nim_machine(config)]
+    for m in machines:
+        for n, name in enumerate(("end", "result", "pos_x", "posX", "POS_X", "x_1", "INF", "CHAR_BIT"), 1):
+            m.set(f"one.inputs.{name}", float(n))
+        m.step(3)
+    found = [{path: list(m.raw(path)) for path in m.fields} for m in machines]
+    assert found[0] == found[1]
+    assert machines[1].get("one.outputs.sum") == 1 + 2 + 3 + 40 + 500 + 3
+    assert machines[1].get("machine.state") == "END"
+
+
+def test_floats_are_written_to_the_bit(tmp_path: Path) -> None:
+    numbers = random.Random(1)
+    values = [struct.unpack("<d", numbers.randbytes(8))[0] for _ in range(300)]
+    values = [v for v in values if math.isfinite(v)] + [
+        5e-324,
+        1.7976931348623157e308,
+        0.1,
+        -0.0,
+        2.0**53 + 2,
+        1e22,
+        1e23,
+    ]
+    text = "from fcsl_builtins import f32, f64\n\n"
+    text += f"WIDE: f64[{len(values)}] = [{', '.join(map(repr, values))}]\n"
+    narrow = [v for v in values if abs(v) < 3e38 and (v == 0 or abs(v) > 1e-44)]
+    text += f"NARROW: f32[{len(narrow)}] = [{', '.join(map(repr, narrow))}]\n"
+    text += f"""
+
+class Constants:
+    outputs = {{"wide": "f64[{len(values)}]", "narrow": "f32[{len(narrow)}]"}}
+
+    def execute(self):
+        self.wide = WIDE
+        self.narrow = NARROW
+"""
+    config = write_machine(
+        tmp_path,
+        "floats",
+        {
+            "tick_hz": 10,
+            "initial_state": "A",
+            "instances": {"one": {"algorithm": "Constants"}},
+            "states": {"A": {"schedule": {"one": 10}}},
+        },
+        {"constants": text},
+    )
+    machines = [Machine.build(config), nim_machine(config)]
+    for m in machines:
+        m.step()
+    for name in ("wide", "narrow"):
+        one, other = (bytes(m.raw(f"one.outputs.{name}")) for m in machines)
+        assert one == other
+    assert bytes(machines[1].raw("one.outputs.wide")) == struct.pack(f"<{len(values)}d", *values)
+
+
+def test_what_allocates_is_refused() -> None:
+    refuse_allocation('# a seq of words\nlet text = "new string"\n{.emit: ["""\nref\n"""].}\n', "a.nim")
+    for line in ("var x: seq[int]", "let y = new(Thing)", "raise e", "var s: string", "try:"):
+        with pytest.raises(ToolchainError, match="a.nim:2: .* has no place in control code"):
+            refuse_allocation(f"proc f() =\n  {line}\n", "a.nim")
+
+
+def test_a_missing_compiler_is_named(
+    monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str], tmp_path: Path
+) -> None:
+    monkeypatch.setenv("NIM", "/nowhere/nim")
+    assert main(["build", "--backend", "nim", str(CONFIG), "-o", str(tmp_path / "out")]) != 0
+    said = capsys.readouterr().err
+    assert "no Nim compiler: `/nowhere/nim` does not run; install nim" in said and "or set NIM" in said
+    assert not (tmp_path / "out").exists()
+
+
+def test_a_nim_program_hosts_a_machine(tmp_path: Path) -> None:
+    """examples/minimal/host.nim, built as its first lines say, prints what the C library computes."""
+    assert main(["build", "--backend", "nim", str(EXAMPLES / "minimal/minimal.json"), "-o", str(tmp_path)]) == 0
+    command = [
+        "nim",
+        "c",
+        "--hints:off",
+        "--mm:arc",
+        "-d:release",
+        f"--path:{tmp_path}",
+        f"--nimcache:{tmp_path / 'nim'}",
+    ]
+    command += [f"--passC:-I{include_dirs()[0]} -ffp-contract=off", f"--passL:{math_library()} -lm"]
+    host = EXAMPLES / "minimal/host.nim"
+    subprocess.run([*command, f"--out:{tmp_path / 'host'}", str(host)], check=True, capture_output=True, timeout=120)
+    printed = subprocess.run([str(tmp_path / "host")], check=True, capture_output=True, text=True).stdout
+    (shown,) = re.findall(r"<!-- file: examples/minimal/host.nim -->\n```nim\n(.*?)```", PAGE.read_text(), re.DOTALL)
+    assert host.read_text().endswith(shown)
+    m = Machine.build(EXAMPLES / "minimal/minimal.json")
+    expected = []
+    for tick in range(5):
+        m.set("sensors.outputs.theta", 0.1 * tick)
+        m.step()
+        expected.append(float(m.get("pilot.outputs.force")))
+    assert [float(line.split()[-1]) for line in printed.splitlines()] == pytest.approx(expected, rel=1e-15)
+
+
+def test_cmake(tmp_path: Path) -> None:
+    (tmp_path / "CMakeLists.txt").write_text(
+        "cmake_minimum_required(VERSION 3.22)\nproject(by_nim C)\nfind_package(fcsl_compiler REQUIRED)\n"
+        f"fcsl_add_machine(by_nim_machines {json.dumps(str(CONFIG))} BACKEND nim)\n"
+    )
+    for command in (["-S", str(tmp_path), "-B", str(tmp_path / "build")], ["--build", str(tmp_path / "build")]):
+        done = subprocess.run(["cmake", *command], capture_output=True, text=True, timeout=300)
+        assert done.returncode == 0, done.stdout + done.stderr
+    m, c = Machine(tmp_path / "build/libby_nim_machines.so", "small"), Machine.build(CONFIG)
+    for one in (m, c):
+        one.step(100)
+    assert [list(m.raw(p)) for p in m.fields] == [list(c.raw(p)) for p in c.fields]
+    assert "small: a step needs at most " in done.stdout
