@@ -42,6 +42,17 @@ def test_the_ball_bounces_until_it_rests(integrator: dict[str, Any], tmp_path: P
         assert twin.get("it.outputs.height") == 0.0
 
 
+def test_a_tank_drains_as_torricelli_says(tmp_path: Path) -> None:
+    """sqrt(level) falls by hole sqrt(2 gravity) / (2 area) each second."""
+    tank = {"area": 0.05, "hole": 1e-3, "gravity": 9.81, "rim": 2.0, "level": 1.25}
+    with open_model(tmp_path, "tank", tank, method="rk4", hz=100) as twin:
+        with twin.trace("it.outputs.level") as trace:
+            twin.step(1000)
+        rate = 1e-3 * math.sqrt(2 * 9.81) / (2 * 0.05)
+        for k, level in enumerate(trace["it.outputs.level"]):
+            assert level == pytest.approx((math.sqrt(1.25) - rate * k / 100) ** 2, rel=1e-9)
+
+
 def test_a_small_swing_has_the_period_of_its_length(tmp_path: Path) -> None:
     """T = 2 pi sqrt(I / (m g l)), here 1.006 s; an amplitude of 0.01 rad makes it longer by 6e-6."""
     pendulum = {
