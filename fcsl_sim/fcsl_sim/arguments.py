@@ -64,7 +64,7 @@ def _add_flight(command: argparse.ArgumentParser) -> None:
     command.add_argument(
         "--duration", type=_seconds, metavar="S", help="longest simulated time in s; replaces the file's"
     )
-    help_set = "sets a model parameter: altimeter.parameters.sigma=0.8 (repeatable)"
+    help_set = "sets a model parameter, or an element of one: altimeter.parameters.sigma=0.8 (repeatable)"
     command.add_argument("--set", action="append", default=[], metavar="PATH=VALUE", dest="sets", help=help_set)
     help_event = 'adds an event: "14.0 altimeter.parameters.dropout=true", at 14 s (repeatable)'
     command.add_argument("--event", action="append", default=[], metavar="EVENT", dest="events", help=help_event)
@@ -164,7 +164,10 @@ def _add_linearise(command: argparse.ArgumentParser) -> None:
 
 def _add_response(command: argparse.ArgumentParser) -> None:
     command.add_argument("config", help=_CONFIG)
-    help_input = "where a sine is added: instance.inputs.name, an element of it, or controller.channel (repeatable)"
+    help_input = (
+        "where a sine is added: instance.inputs.name, an element of it, or controller.channel, a sensor's or an "
+        "actuator's (repeatable)"
+    )
     command.add_argument(
         "--input", action="append", default=[], metavar="PATH[=WEIGHT]", dest="inputs", help=help_input
     )
@@ -178,6 +181,8 @@ def _add_response(command: argparse.ArgumentParser) -> None:
     command.add_argument("--points", type=_count, default=25, metavar="N", help="how many frequencies (default: 25)")
     help_amplitude = "of the sine, in the unit of the input (default: 0.001)"
     command.add_argument("--amplitude", type=_positive, default=1e-3, metavar="A", help=help_amplitude)
+    help_within = "two windows in a row agree if no amplitude changes by more than this part of it (default: 0.001)"
+    command.add_argument("--within", type=_positive, default=1e-3, metavar="PART", help=help_within)
     command.add_argument("-o", type=Path, metavar="FILE", dest="output", help="write the response as JSON")
     help_plot = "draw it: .png, .svg or .pdf"
     command.add_argument("--plot", type=Path, metavar="FILE", help=help_plot)

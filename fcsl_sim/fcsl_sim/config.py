@@ -20,7 +20,7 @@ from fcsl_compiler.driver.cache import build_machine
 from fcsl_compiler.driver.toolchain import ToolchainError
 from fcsl_compiler.model.types import Type, scalar_of
 from fcsl_compiler.parse.json_reader import ConfigReader, Everything
-from fcsl_compiler.parse.json_source import JsonNode, parse_json
+from fcsl_compiler.parse.json_source import JsonNode
 from fcsl_compiler.parse.source_path import SourcePathError, resolve_source
 from simclient.descriptor import Machine
 from simclient.errors import TwinError
@@ -36,6 +36,7 @@ from .models import ModelField, ModelTable, type_of, with_unit
 from .plant_only import MAX_TICK_HZ, build_plant_only
 from .plugins import model_library, model_source
 from .ros import TruthTopic
+from .set_argument import Settings, with_elements
 from .table_parameter import read_table
 from .wiring import MAX_SECONDS, Instance, Wiring, check_wiring, seconds
 
@@ -130,7 +131,7 @@ def load(
     """Reads and checks a `*.sim.json`, compiles its models and its machine (both cached).
 
     path: of the file, or package://<ROS package>/<path below its share folder>.
-    seed, duration_s: replace the file's. sets: `instance.parameters.name=value`. events, beside the file's:
+    seed, duration_s: replace the file's. sets: `instance.parameters.name=value`, or an element of it. events, beside the file's:
     `14.0 instance.parameters.name=value`. machine: library and name of a compiled controller, which replaces the
     file's. Raises DiagnosticError with all errors of the file, or SimError if the file or the simulator is missing.
     """
@@ -182,7 +183,7 @@ class _Loader:
         self.parts = _Parts()
         self.link_node: JsonNode | None = None
         self.foreign: list[Diagnostic] = []  # diagnostics of the machine's files
-        self.overrides = self._parse_sets(sets)
+        self.settings = Settings(sets, sink)
 
     def load(self, root: JsonNode, seed: int | None, duration_s: Fraction | None) -> SimConfig:
         required = ("models", "instances", "integrator", "seed", "duration")
@@ -213,7 +214,7 @@ class _Loader:
         file_seed = self.reader.integer(keys.get("seed"), "`seed`", 0, 2**64 - 1)
         parts.seed = file_seed if seed is None else seed
         self._read_duration(keys.get("duration"), duration_s)
-        self._report_unused_overrides()
+        self._report_unused_settings()
         # A shorter duration on the command line is intended; in the file, an event after the end is probably a mistake.
         file_ticks = parts.ticks if duration_s is None else None
         wiring = check_wiring(self.reader, parts.instances, parts.machines, parts.integrator, keys, file_ticks)
@@ -478,9 +479,9 @@ class _Loader:
             code = "E210" if role == "parameter" else "E216"
             self.sink.error(code, f"model `{table.name}` has no {role} `{name}`", span, help=hint)
         for name in wanted:
-            override = self.overrides.pop(f"{instance.name}.{role}s.{name}", None)
-            if override:
-                given[name] = override[1], override[0]
+            setting = self.settings.take_whole(f"{instance.name}.{role}s.{name}")
+            if setting:
+                given[name] = setting.value, setting.span
         return given
 
     def _read_tolerances(self, instance: Instance, table: ModelTable, node: JsonNode | None) -> None:
@@ -505,7 +506,8 @@ class _Loader:
             scalars: Sequence[bool | int | float | str] | None = read_table(node, target, self.reader)
         else:
             scalars = self.reader.value(node, target.type, f"{target.role} `{target.name}`")
-        for i, value in enumerate(scalars or ()):
+        elements = self.settings.take_elements(f"{instance.name}.{target.path}")
+        for i, value in enumerate(with_elements(scalars, target, elements, self.reader) if scalars else ()):
             value_bits = plan.bits(scalar_of(target.type).name, value)
             instance.sets.append(plan.statement("set", instance.name, target.path, i, value_bits))
 
@@ -525,29 +527,19 @@ class _Loader:
 
     # ---- command line ---------------------------------------------------------------------------------------------------
 
-    def _parse_sets(self, sets: Sequence[str]) -> dict[str, tuple[Span, JsonNode]]:
-        """`path=value` from the command line; each becomes a separate source for messages."""
-        overrides = {}
-        for text in sets:
-            path, equals, value_text = text.partition("=")
-            span = SourceFile("--set", text).span(0, max(1, len(path)))
-            if not equals:
-                self.sink.error("E215", "not of the form `instance.parameters.name=value`", span)
-                continue
-            value = parse_json(SourceFile(f"--set {path}", value_text), self.sink)
-            if value:
-                overrides[path] = (span, value)
-        return overrides
-
-    def _report_unused_overrides(self) -> None:
+    def _report_unused_settings(self) -> None:
         instances = self.parts.instances
-        for path, (span, _) in self.overrides.items():
+        for path, span in ((setting.path, setting.span) for setting in self.settings.left()):
             name = path.partition(".")[0]
             if name in instances and instances[name].table is None:
                 continue  # the error in its model was reported
             tables = {i.name: i.table for i in instances.values() if i.table}
-            known = [f"{i}.{f.path}" for i, table in tables.items() for f in table.of_role("parameter", "input")]
-            fix = nearest(path, known)
+            fields = {f"{i}.{f.path}": f for i, table in tables.items() for f in table.of_role("parameter", "input")}
+            if path in fields:  # an element; a whole field was taken
+                fix = f"give it one: in `{fields[path].role}s` of `{name}`, or by `--set {path}=[…]`"
+                self.sink.error("E211", f"`{path}` has no value of which an element can be set", span, help=fix)
+                continue
+            fix = nearest(path, list(fields))
             machine = self.parts.machine
             if name in self.parts.controllers or (machine and path in machine.fields):
                 fix = "`--set` sets parameters of models; those of a machine are in its own file, or `SimTwin.set` sets them"

@@ -8,12 +8,12 @@ from pathlib import Path
 
 from fcsl_compiler.base.ament import PackageNotFound, package_prefix
 from fcsl_compiler.base.diagnostics import nearest
-from fcsl_compiler.driver.cache import build_shared
 from fcsl_compiler.driver.symbols import SymbolError, check_model_symbols
 from fcsl_compiler.driver.toolchain import LANGUAGES, ToolchainError
 from fcsl_compiler.parse.source_path import SourcePathError, resolve_source
 
 from .errors import SimError
+from .model_build import build_model
 from .models import ModelTable
 from .native import describe_model
 
@@ -30,7 +30,7 @@ def compile_model(path: Path) -> ModelTable:
         raise SimError(_no_source(path.suffix))
     try:
         includes = [package_prefix(package) / "include" for package in INCLUDE_PACKAGES]
-        return describe_model(build_shared([path], includes, exports=("fcsl_models",)), path.stem)
+        return describe_model(build_model(path, includes), path.stem)
     except (PackageNotFound, ToolchainError) as error:
         raise SimError(str(error)) from None
 
@@ -39,6 +39,11 @@ def _no_source(suffix: str) -> str:
     if suffix == ".rs":
         return (
             "a model in Rust is a crate that its package builds: write `fcsl_add_model(NAME CRATE Cargo.toml)` in its "
+            f"CMakeLists.txt, and here {_AS_LIBRARY}"
+        )
+    if suffix == ".nim":
+        return (
+            "a model in Nim is built by its package: write `fcsl_add_model(NAME SOURCES NAME.nim)` in its "
             f"CMakeLists.txt, and here {_AS_LIBRARY}"
         )
     if suffix in (".so", ".a", ".o"):

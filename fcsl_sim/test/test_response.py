@@ -6,6 +6,7 @@ from __future__ import annotations
 import cmath
 import json
 import math
+import re
 from collections.abc import Callable, Sequence
 from fractions import Fraction
 from pathlib import Path
@@ -22,16 +23,30 @@ from fcsl_sim.linear.response import Point, Response, margins, spaced
 
 TICK = 0.02
 GAIN = 8.0
-#: x' = u, sampled and held: u = gain (target - x).
+#: x' = u, sampled and held: u = gain (target - x). The gain may grow from tick to tick.
 HOLD = """
 class Hold:
     inputs = {"x": "f64 m"}
     outputs = {"u": "f64 m/s"}
-    parameters = {"gain": "f64 1/s", "target": "f64 m"}
-    state = {}
+    parameters = {"gain": "f64 1/s", "target": "f64 m", "growth": "f64"}
+    state = {"ticks": "f64"}
 
     def execute(self):
-        self.u = self.gain * (self.target - self.x)
+        self.u = self.gain * (1.0 + self.growth * self.ticks) * (self.target - self.x)
+        self.ticks += 1.0
+"""
+#: Ends the control at a tick.
+CLOCK = """
+class Clock:
+    inputs = {}
+    outputs = {"transition_request": "TransitionRequest"}
+    parameters = {"end": "i64"}
+    state = {"ticks": "i64"}
+
+    def execute(self):
+        self.ticks += 1
+        if self.ticks == self.end:
+            self.transition_request = "REST"
 """
 SENSE = """
 class Sense:
@@ -46,13 +61,15 @@ class Sense:
 MACHINE: dict[str, Any] = {
     "tick_hz": 50,
     "initial_state": "RUN",
-    "algorithms": {"Sense": {"source": "sense.py"}, "Hold": {"source": "hold.py"}},
+    "algorithms": {"Sense": {"source": "sense.py"}, "Hold": {"source": "hold.py"}, "Clock": {"source": "clock.py"}},
     "instances": {
         "sense": {"algorithm": "Sense", "parameters": {}},
-        "hold": {"algorithm": "Hold", "parameters": {"gain": GAIN, "target": 1.0}},
+        "hold": {"algorithm": "Hold", "parameters": {"gain": GAIN, "target": 1.0, "growth": 0.0}},
+        "clock": {"algorithm": "Clock", "parameters": {"end": -1}},
     },
     "connections": [{"from": "sense.x", "to": "hold.x"}],
-    "states": {"RUN": {"schedule": {"sense": 50, "hold": 50}}},
+    "states": {"RUN": {"schedule": {"sense": 50, "hold": 50, "clock": 50}}, "REST": {"schedule": {"sense": 50}}},
+    "transitions": [{"from": "RUN", "request": "REST", "to": "REST", "priority": 1}],
     "channels": [
         {"name": "x", "id": 1, "field": "sense.outputs.x", "direction": "sensor"},
         {"name": "u", "id": 2, "field": "hold.outputs.u", "direction": "actuator"},
@@ -62,7 +79,6 @@ SIMULATION: dict[str, Any] = {
     "controller": {"machine": "machine.json"},
     "seed": 1,
     "duration": 3.0,
-    "until": {"field": "ramp.outputs.x", "above": 0.5},
     "integrator": {"method": "rk4", "hz": 1000},
     "models": {
         "ramp": {"source": "ramp.c"},
@@ -105,14 +121,25 @@ Measure = Callable[..., list[Point]]
 
 @pytest.fixture
 def write(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Callable[..., Path]:
-    def write_files(delay_ticks: int = 0, sigma: float = 0.0) -> Path:
+    def write_files(
+        delay_ticks: int = 0,
+        sigma: float = 0.0,
+        growth: float = 0.0,
+        end: int = -1,
+        until: dict[str, Any] | None = None,
+    ) -> Path:
+        machine = json.loads(json.dumps(MACHINE))
+        machine["instances"]["hold"]["parameters"]["growth"] = growth
+        machine["instances"]["clock"]["parameters"]["end"] = end
         simulation = json.loads(json.dumps(SIMULATION))
         simulation["controller"]["delay_ticks"] = delay_ticks
         simulation["instances"]["sensor"]["parameters"]["sigma"] = sigma
+        simulation |= {"until": until} if until else {}
         (tmp_path / "sense.py").write_text(SENSE)
         (tmp_path / "hold.py").write_text(HOLD)
         (tmp_path / "ramp.c").write_text((Path(__file__).parent / "models/ramp.c").read_text())
-        (tmp_path / "machine.json").write_text(json.dumps(MACHINE))
+        (tmp_path / "clock.py").write_text(CLOCK)
+        (tmp_path / "machine.json").write_text(json.dumps(machine))
         (tmp_path / "hold.sim.json").write_text(json.dumps(simulation, indent=1))
         return tmp_path / "hold.sim.json"
 
@@ -123,9 +150,14 @@ def write(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Callable[..., Path
 @pytest.fixture
 def measure(write: Callable[..., Path]) -> Measure:
     def points(
-        inputs: Sequence[str], outputs: Sequence[str], omegas: Sequence[float], amplitude: float = 1e-3, **changes: Any
+        inputs: Sequence[str],
+        outputs: Sequence[str],
+        omegas: Sequence[float],
+        amplitude: float = 1e-3,
+        within: float = 1e-3,
+        **changes: Any,
     ) -> list[Point]:
-        with Response(load(write(**changes)), inputs, outputs, Fraction(1, 5), amplitude) as response:
+        with Response(load(write(**changes)), inputs, outputs, Fraction(1, 5), amplitude, within) as response:
             return list(response.points(omegas))
 
     return points
@@ -137,7 +169,7 @@ def loop_by_hand(omega: float, delay_ticks: int = 0) -> complex:
     return GAIN * TICK * z**-delay_ticks / (z - 1.0)
 
 
-@pytest.mark.parametrize("place", ["ramp.inputs.rate", "ramp.rate", "controller.x"])
+@pytest.mark.parametrize("place", ["ramp.inputs.rate", "ramp.rate", "controller.x", "controller.u"])
 @pytest.mark.parametrize("delay_ticks", [0, 3])
 def test_the_loop_is_that_of_the_sampled_controller(measure: Measure, place: str, delay_ticks: int) -> None:
     """It is the same wherever it is cut, and up to the frequency at which samples alternate."""
@@ -219,6 +251,91 @@ def test_margins() -> None:
     assert margins(points[:5]).phase_margin is None
 
 
+def test_margins_are_not_sought_where_nothing_was_measured() -> None:
+    points = [Point(w, -loop_by_hand(w) / (1.0 + loop_by_hand(w)), 1.0, (), 0.0, 0.0) for w in (4.0, 6.0, 8.0, 10.0)]
+    assert margins(points).gain_crossover == pytest.approx(8.0, rel=0.02)
+    points[2] = Point(8.0, 0j, 0j, (), 0.1, 0.0, "the flight ended")
+    found = margins(points)
+    assert (found.gain_crossover, found.phase_margin) == (None, None)
+    assert found.peak_sensitivity == abs(points[3].sensitivity)
+    points[3] = Point(10.0, 0j, 1.0, (), 0.0, 0.0)  # without a loop: its sensitivity of 1 is none
+    assert margins(points).peak_sensitivity == abs(points[1].sensitivity) < 1.0
+    for value in ("loop", "sensitivity"):
+        with pytest.raises(SimError, match="nothing was measured at 8 rad/s: the flight ended"):
+            getattr(points[2], value)
+    with pytest.raises(SimError, match="no loop was measured"):
+        margins(points[2:])
+
+
+# ---- what cannot be measured ---------------------------------------------------------------------------------------
+
+
+def test_a_change_of_state_ends_a_measurement(measure: Measure) -> None:
+    """Windows of 40 rad/s agree before it, one of 2 rad/s is not over. After it the loop would be open."""
+    slow, fast = measure(["ramp.inputs.rate"], [], [2.0, 40.0], end=300)
+    assert slow.why == "the controller went from RUN to REST at 6 s (after 0 windows of 6.3 s)"
+    assert not slow.is_settled and not slow.has_loop
+    assert fast.is_settled and fast.loop == pytest.approx(loop_by_hand(40.0), rel=3e-4)
+
+
+def test_the_stop_condition_ends_a_measurement(measure: Measure) -> None:
+    held = {"field": "ramp.outputs.x", "above": 0.5, "for_s": 6.0}
+    slow, fast = measure(["ramp.inputs.rate"], [], [2.0, 40.0], until=held)
+    assert slow.why.startswith("the simulation has ended after") and "`until` held" in slow.why
+    assert fast.loop == pytest.approx(loop_by_hand(40.0), rel=3e-4)
+    with pytest.raises(SimError, match='`until` held: .*; extend the file with {"until": null}'):
+        measure(["ramp.inputs.rate"], [], [2.0], until=held | {"for_s": 0.0})
+
+
+def test_a_vehicle_that_changes_settles_within_what_it_may_change(measure: Measure) -> None:
+    """The gain grows by 2 % of its first value in a second."""
+    (point,) = measure(["ramp.inputs.rate"], [], [20.0], growth=4e-4)
+    assert re.fullmatch(
+        r"it does not settle: after 60 windows of 1.58 s, of which the last two differ by 0.00\d", point.why
+    )
+    (point,) = measure(["ramp.inputs.rate"], [], [20.0], growth=4e-4, within=0.05)
+    assert 1e-3 < point.change < 0.05
+    in_the_middle = 1.0 + 4e-4 * 50 * (0.2 + 2.5 * 1.58)  # of the third window
+    assert point.loop == pytest.approx(in_the_middle * loop_by_hand(20.0), rel=2e-3)
+    with pytest.raises(SimError, match="`--within` 1 is a part of an amplitude"):
+        measure(["ramp.inputs.rate"], [], [20.0], within=1.0)
+
+
+def test_the_command_says_what_was_not_measured(
+    write: Callable[..., Path], capsys: pytest.CaptureFixture[str], tmp_path: Path
+) -> None:
+    line = ["response", str(write(end=300)), "--input", "ramp.inputs.rate", "--output", "ramp.outputs.x", "--at", "0.2"]
+    assert main([*line, "--from", "1", "--to", "60", "--points", "4", "-o", "hold.json", "--plot", "hold.png"]) == 0
+    printed = capsys.readouterr().out
+    lines = printed.splitlines()
+    assert (
+        lines[1] == "        1  not measured: the controller went from RUN to REST at 6 s (after 0 windows of 12.6 s)"
+    )
+    assert lines[-1] == "not measured at 1, 3.915 rad/s: what is said above is of the other 2"
+    assert "largest sensitivity" in printed and "inf" not in printed and "nan" not in printed
+    assert (tmp_path / "hold.png").stat().st_size > 10_000
+    written = json.loads((tmp_path / "hold.json").read_text())
+    assert written["omega"] == pytest.approx([15.33, 60.0], rel=1e-3) and len(written["loop"]["real"]) == 2
+    assert [point["omega"] for point in written["not_measured"]] == pytest.approx([1.0, 3.915], rel=1e-3)
+    assert "RUN to REST" in written["not_measured"][0]["why"]
+    assert main([*line, "--from", "1", "--to", "2", "--points", "2", "--plot", "none.png"]) == 1
+    assert capsys.readouterr().out.splitlines()[-1] == "nothing was measured"
+    assert not (tmp_path / "none.png").exists()
+
+
+def test_without_a_loop_there_are_no_figures_of_it(
+    write: Callable[..., Path], capsys: pytest.CaptureFixture[str], tmp_path: Path
+) -> None:
+    outputs = ["--output", "servo.outputs.angle", "--output", "ramp.outputs.x"]
+    line = ["response", str(write()), "--input", "servo.inputs.command", *outputs, "--to", "9", "--points", "2"]
+    assert main([*line, "--plot", "servo.png"]) == 0
+    _, first, _, last = capsys.readouterr().out.splitlines()
+    cells = first.split()
+    assert cells[:3] == ["1", "none", "none"] and cells[6] == "none" and "inf" not in first
+    assert last == "no loop: the source does not depend on the sine"
+    assert (tmp_path / "servo.png").stat().st_size > 10_000
+
+
 def test_the_command(write: Callable[..., Path], capsys: pytest.CaptureFixture[str], tmp_path: Path) -> None:
     line = ["response", str(write()), "--input", "ramp.inputs.rate", "--output", "ramp.outputs.x", "--points", "12"]
     assert main([*line, "-o", "hold.json", "--plot", "hold.png"]) == 0
@@ -245,7 +362,10 @@ def test_the_command(write: Callable[..., Path], capsys: pytest.CaptureFixture[s
         (["body.inputs.force_body"], [], "name one element of it, `body.inputs.force_body\\[0\\]`"),
         (["body.inputs.force_body[3]"], [], "name one element"),
         (["body.inputs.inertia[0]"], [], "is f64\\[3\\]\\[3\\]: a sine is added to f64 or an element of f64\\[3\\] alone"),
-        (["controller.y"], [], "`machine` has no sensor channel `y`"),
+        (["controller.xx"], [], "`machine` has no channel `xx`; did you mean `x`?"),
+        (["controller.y9"], [], "`machine` has no channel `y9`; it has the sensor channel x, and the actuator channel u$"),
+        (["controller.u", "ramp.rate"], [], "`ramp.rate` has a sine already, by its source"),
+        (["ramp.rate", "controller.u"], [], "`controller.u` feeds an input that has a sine already"),
         (["ramp.inputs.rate"], ["ramp.outputs.y"], "ramp.outputs.y"),
         (["ramp.inputs.rate"], ["body.outputs.velocity_inertial"], "name one element of it"),
         (["ramp.inputs.rate"], ["ramp.outputs.time_ns"], "is i64, no floating number"),

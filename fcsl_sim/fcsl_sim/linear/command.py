@@ -19,6 +19,7 @@ from .response_report import Measured, check_picture, heading, row
 from .trim import read_trim, trim, write_trimmed
 
 EXIT_NO_EQUILIBRIUM = 1
+EXIT_NOTHING_MEASURED = 1
 _TRIM = ".trim.json"
 #: The highest frequency of a response, as part of half of the ticks' frequency.
 _OF_NYQUIST = 0.9
@@ -54,7 +55,7 @@ def run_linearise(options: Any) -> int:
 
 
 def run_response(options: Any) -> int:
-    """Raises SimError or DiagnosticError."""
+    """Exit status: 0, or 1 where nothing was measured. Raises SimError or DiagnosticError."""
     config = load(options.config)
     _warn(config)
     high = options.high or _OF_NYQUIST * math.pi * config.machine.tick_hz
@@ -65,7 +66,7 @@ def run_response(options: Any) -> int:
         raise SimError(f"`--from` {options.low:g} rad/s is not below `--to` {high:g} rad/s")
     if options.plot is not None:
         check_picture(options.plot)
-    with Response(config, options.inputs, options.outputs, options.at, options.amplitude) as response:
+    with Response(config, options.inputs, options.outputs, options.at, options.amplitude, options.within) as response:
         if not options.json:
             print(heading(response))
         points = []
@@ -76,10 +77,10 @@ def run_response(options: Any) -> int:
         measured = Measured(response, points)
     if options.output is not None:
         measured.write(options.output)
-    if options.plot is not None:
+    if options.plot is not None and measured.points:
         measured.draw(options.plot, config.path.name)
     show(json.dumps(measured.as_json(), indent=1)) if options.json else print(measured.text())
-    return 0
+    return 0 if measured.points else EXIT_NOTHING_MEASURED
 
 
 def _warn(config: SimConfig) -> None:

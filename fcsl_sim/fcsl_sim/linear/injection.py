@@ -13,6 +13,7 @@ from typing import Any
 from fcsl_compiler.base.diagnostics import DiagnosticSink, nearest
 from fcsl_compiler.base.source import SourceFile
 from fcsl_compiler.parse.json_source import JsonNode
+from simclient.descriptor import Machine
 
 from ..config import MAX_SECONDS, SimConfig
 from ..errors import SimError
@@ -43,7 +44,8 @@ class Injection:
 
 def with_injections(config: SimConfig, inputs: Sequence[str], file: Path) -> list[Injection]:
     """Writes `file`, which extends the simulation. inputs: `instance.inputs.name`, `instance.inputs.name[1]`, `controller.channel`,
-    each with `=WEIGHT` or not. Its stop condition is left out, and it may fly for ever. Raises SimError."""
+    each with `=WEIGHT` or not. A sensor channel gets the sum of its source and the sine; so does all that an actuator channel
+    feeds. The duration is left out; the stop condition stays. Raises SimError."""
     tree = _plain(_merged(config.path))
     assert isinstance(tree, dict)
     connections: list[dict[str, str]] = list(tree.get("connections", []))
@@ -53,7 +55,6 @@ def with_injections(config: SimConfig, inputs: Sequence[str], file: Path) -> lis
         raise SimError(f"`{twice}` is named twice; of a vector one element can be chosen")
     over: dict[str, Any] = {
         "extends": str(config.path.resolve()),
-        "until": None,
         "duration": MAX_SECONDS / 1000,
         "models": {},
         "instances": {},
@@ -79,18 +80,14 @@ def _inject(
         raise SimError(f"`{text}`: `instance.inputs.name`, or `controller.channel`, wanted")
     head, field, index, weight = parts.groups()
     target = f"{head}.{field}"
-    type_, value = _target(config, tree, head, field)
+    type_, value, is_source = _target(config, tree, head, field)
     if type_ not in _MODELS:
         raise SimError(f"`{target}` is {type_}: a sine is added to {' or an element of '.join(_MODELS)} alone")
     is_vector = type_ == "f64[3]"
     if is_vector != bool(index) or (index and int(index) > 2):
         wanted = f"one element of it, `{text.partition('[')[0]}[0]`" if is_vector else "it without an index"
         raise SimError(f"`{target}` is {type_}: name {wanted}")
-    source = next((c["from"] for c in connections if c["to"] == target), None)
-    connections[:] = [
-        *({**c, "to": f"{name}.value"} if c["to"] == target else c for c in connections),
-        {"from": f"{name}.value", "to": target},
-    ]
+    source = _connect(name, target, is_source, connections, list(over["instances"]))
     model = _MODELS[type_]
     over["models"][model] = {"source": f"package://fcsl_sim/models/{model}.c"}
     zero = [0.0, 0.0, 0.0] if is_vector else 0.0
@@ -109,6 +106,30 @@ def _inject(
     return Injection(f"{path}{element}", _weight(text, weight), name, (int(index),) if index else (), is_commanded)
 
 
+def _connect(
+    name: str, target: str, is_source: bool, connections: list[dict[str, str]], injections: Sequence[str]
+) -> str | None:
+    """Puts injection `name` before `target`, or behind it where it is a source. Returns the source of the injection, if it has
+    one. Raises SimError."""
+    if is_source:
+        behind = [c for c in connections if c["from"] == target]
+        taken = next((c["to"] for c in behind if c["to"].partition(".")[0] in injections), None)
+        if taken is not None or not behind:
+            why = "feeds an input that has a sine already" if behind else "feeds nothing"
+            raise SimError(f"`{target}` {why}")
+        connections[:] = [{**c, "from": f"{name}.value"} if c in behind else c for c in connections]
+        connections.append({"from": target, "to": f"{name}.value"})
+        return target
+    source = next((c["from"] for c in connections if c["to"] == target), None)
+    if source and source.partition(".")[0] in injections:
+        raise SimError(f"`{target}` has a sine already, by its source")
+    connections[:] = [
+        *({**c, "to": f"{name}.value"} if c["to"] == target else c for c in connections),
+        {"from": f"{name}.value", "to": target},
+    ]
+    return source
+
+
 def _weight(text: str, weight: str | None) -> float:
     try:
         value = float(weight or "1")
@@ -119,13 +140,14 @@ def _weight(text: str, weight: str | None) -> float:
     return value
 
 
-def _target(config: SimConfig, tree: dict[str, Any], head: str, field: str) -> tuple[str, Any]:
-    """The type of the input, and the value that the file gives to it, or None. Raises SimError."""
+def _target(config: SimConfig, tree: dict[str, Any], head: str, field: str) -> tuple[str, Any, bool]:
+    """The type of an input or channel; the value that the file gives to an input, or None; whether it is a source: an actuator
+    channel. Raises SimError."""
     table = config.tables.get(head)
     if table:
         inputs = {f.name: f for f in table.of_role("input")}
         if field in inputs:
-            return str(inputs[field].type), tree["instances"][head].get("inputs", {}).get(field)
+            return str(inputs[field].type), tree["instances"][head].get("inputs", {}).get(field), False
         raise SimError(
             f"`{head}` has no input `{field}`; {nearest(field, list(inputs)) or 'it has ' + ', '.join(inputs)}"
         )
@@ -136,10 +158,22 @@ def _target(config: SimConfig, tree: dict[str, Any], head: str, field: str) -> t
         raise SimError(
             f"there is no instance or controller `{head}`; {nearest(head, known) or 'there are ' + ', '.join(known)}"
         )
-    ends = {**machine.fields, **{c.name: c.field for c in machine.channels if c.direction == "sensor"}}
+    ends = {**machine.fields, **{c.name: c.field for c in machine.channels}}
     if field not in ends:
-        raise SimError(f"`{machine.name}` has no sensor channel `{field}`; {nearest(field, list(ends)) or ''}")
-    return str(type_of(ends[field].type, ends[field].shape)), None
+        hint = nearest(field, [c.name for c in machine.channels]) or _channels(machine)
+        raise SimError(f"`{machine.name}` has no channel `{field}`; {hint}")
+    directions = {c.name: c.direction for c in machine.channels}
+    is_source = directions[field] == "actuator" if field in directions else ends[field].role == "output"
+    return str(type_of(ends[field].type, ends[field].shape)), None, is_source
+
+
+def _channels(machine: Machine) -> str:
+    """It has the sensor channel x, and the actuator channels u, v."""
+    texts = []
+    for direction in ("sensor", "actuator"):
+        names = [c.name for c in machine.channels if c.direction == direction]
+        texts += [f"the {direction} channel{'s' if len(names) > 1 else ''} {', '.join(names)}"] if names else []
+    return f"it has {', and '.join(texts)}" if texts else "it has none"
 
 
 def _merged(path: Path) -> JsonNode:

@@ -11,6 +11,9 @@ w . c_i / w . w),
 C, U, D, Y are the complex amplitudes at the frequency, from samples at the ticks. Each is half of the difference of two
 flights, with the sine and with its opposite: noise, whose streams are the same in both, and whatever else the vehicle
 does at that time cancel.
+
+A frequency is measured if the amplitudes of two windows in a row agree, while no controller changes its state and the flight
+goes on. Else its point says why it is not.
 """
 
 from __future__ import annotations
@@ -19,9 +22,10 @@ import cmath
 import math
 import re
 import tempfile
-from collections.abc import Iterator, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass
 from fractions import Fraction
+from itertools import groupby
 from pathlib import Path
 from types import TracebackType
 from typing import Any, Self
@@ -29,6 +33,7 @@ from typing import Any, Self
 import numpy as np
 
 from simclient.errors import TwinError
+from simclient.twin.trace import Trace
 
 from ..config import SimConfig, load
 from ..errors import SimError
@@ -40,8 +45,8 @@ Array = np.ndarray[Any, Any]
 
 #: Least samples and periods of a window, and most windows until two agree.
 _SAMPLES, _PERIODS, _WINDOWS = 64, 2, 60
-#: Two windows agree if no amplitude changes by more than this part of it.
-_AGREE = 1e-3
+#: Two windows agree if no amplitude changes by more than this part of it, unless the caller says another one.
+WITHIN = 1e-3
 #: Of the largest sample: amplitudes below are rounding errors, and always agree.
 _ROUNDING = 1e-12
 #: Against division by zero.
@@ -51,7 +56,8 @@ _LEAST = 1e-300
 @dataclass(frozen=True)
 class Point:
     """Complex amplitudes at one frequency (rad/s). `change`: of them between the last two windows, as part of them. `rest`: what
-    is not at this frequency, r.m.s., as part of what is; the largest of all signals: harmonics, where something is not linear."""
+    is not at this frequency, r.m.s., as part of what is; the largest of all signals: harmonics, where something is not linear.
+    `why`: the reason why nothing was measured, or empty; with a reason there are no amplitudes."""
 
     omega: float
     source: complex
@@ -59,40 +65,73 @@ class Point:
     outputs: tuple[complex, ...]
     change: float
     rest: float
+    why: str = ""
 
     @property
     def is_settled(self) -> bool:
-        return self.change <= _AGREE
+        return not self.why
+
+    @property
+    def has_loop(self) -> bool:
+        """Whether what the source gives depends on the sine."""
+        return self.is_settled and self.source != 0
 
     @property
     def loop(self) -> complex:
+        """Raises SimError where nothing was measured, as the next two do."""
+        self._check()
         return -self.source / (self.source + self.sine)
 
     @property
     def sensitivity(self) -> complex:
+        self._check()
         return 1.0 + self.source / self.sine
 
     def response(self, output: int) -> complex:
+        self._check()
         return self.outputs[output] / self.sine
+
+    def _check(self) -> None:
+        if self.why:
+            raise SimError(f"nothing was measured at {self.omega:g} rad/s: {self.why}")
+
+
+def _not_measured(omega: float, change: float, why: str) -> Point:
+    return Point(omega, 0j, 0j, (), change, 0.0, why)
+
+
+class _Ended(Exception):
+    """A flight is no longer the one to be measured; str() says why."""
 
 
 class Response:
     """Flights of a simulation, from `at_s` on. Raises SimError, or DiagnosticError for what is wrong in the file.
 
     inputs: `instance.inputs.name`, `instance.inputs.name[1]` or `controller.channel`, each with `=WEIGHT` or not. outputs: scalars of
-    the machine and of models. amplitude: of the sine, in the unit of the input.
+    the machine and of models. amplitude: of the sine, in the unit of the input. within: two windows agree if no amplitude
+    changes by more than this part of it.
     """
 
     def __init__(
-        self, config: SimConfig, inputs: Sequence[str], outputs: Sequence[str], at_s: Fraction | None, amplitude: float
+        self,
+        config: SimConfig,
+        inputs: Sequence[str],
+        outputs: Sequence[str],
+        at_s: Fraction | None,
+        amplitude: float,
+        within: float = WITHIN,
     ):
         if not inputs:
             raise SimError("an `--input` is needed: where the sine is added")
+        if not 0.0 < within < 1.0:
+            raise SimError(f"`--within` {within:g} is a part of an amplitude: above 0 and below 1")
         self.tick_hz = config.machine.tick_hz
         ticks = (at_s or 0) * self.tick_hz
         if int(ticks) != ticks:
             raise SimError(f"{float(at_s or 0):g} s is not a whole number of ticks (1/{self.tick_hz} s)")
-        self._amplitude = amplitude
+        self._amplitude, self.within = amplitude, within
+        self._controllers = {"machine.state": "the controller"}
+        self._controllers |= {f"{name}.machine.state": f"controller `{name}`" for name in config.companions}
         self._twins: list[SimTwin] = []
         with tempfile.TemporaryDirectory(prefix="fcsl-sim-response-") as folder:
             file = Path(folder) / config.path.name
@@ -103,6 +142,7 @@ class Response:
                 self._twins.append(SimTwin(SimRun(injected)))
             self._outputs = [_Output(self._twins[0], path) for path in outputs]
             self._start = self._fly_to(int(ticks))
+            self._states = {path: self._twins[0].get_value(path) for path in self._controllers}
         except TwinError as error:
             self.close()
             raise SimError(str(error)) from None
@@ -134,7 +174,8 @@ class Response:
         return twin.save()
 
     def points(self, omegas: Sequence[float]) -> Iterator[Point]:
-        """A point for each frequency (rad/s, below pi times the ticks' rate), as soon as it is measured. Raises SimError."""
+        """A point for each frequency (rad/s, below pi times the ticks' rate), as soon as it is measured, or has turned out to be
+        not measurable. Raises SimError."""
         for omega in omegas:
             try:
                 yield self._point(omega)
@@ -142,6 +183,33 @@ class Response:
                 raise SimError(f"at {omega:g} rad/s: {error}") from None
 
     def _point(self, omega: float) -> Point:
+        self._add_sine(omega)
+        period = 2.0 * math.pi * self.tick_hz / omega
+        window = math.ceil(period * max(_PERIODS, math.ceil(_SAMPLES / period)))
+        before, change, flown = None, math.inf, 0
+        for number in range(_WINDOWS):
+            try:
+                pairs = [self._samples(twin, window) for twin in self._twins]
+            except _Ended as ended:
+                return _not_measured(omega, change, f"{ended} ({self._so_far(number, window, change)})")
+            found, left = _fit((pairs[0] - pairs[1]) / 2.0, omega / self.tick_hz, flown)
+            flown += window
+            floors = _ROUNDING * np.abs(pairs[0]).max(axis=0) / self.within + _LEAST
+            rest = float(np.max(left / (np.abs(found) + floors)))
+            phasors = self._along_weights(found, omega)
+            if phasors[1] == 0 or phasors[2] == 0:
+                return _not_measured(omega, change, "the sine is lost in rounding: it needs a larger amplitude")
+            if before is not None:
+                ports = np.full(3, floors[: 2 * len(self.injections)].max())
+                sizes = np.abs(phasors) + np.concatenate([ports, floors[2 * len(self.injections) :]])
+                change = float(np.max(np.abs(phasors - before) / sizes))
+            if change <= self.within:
+                return Point(omega, phasors[0], phasors[1], tuple(phasors[3:]), change, rest)
+            before = phasors
+        return _not_measured(omega, change, f"it does not settle: {self._so_far(_WINDOWS, window, change)}")
+
+    def _add_sine(self, omega: float) -> None:
+        """To both flights, at their beginning."""
         for twin, sign in zip(self._twins, (1.0, -1.0), strict=True):
             twin.restore(self._start)
             start = twin.get_value("machine.tick") / self.tick_hz
@@ -152,24 +220,10 @@ class Response:
                     "start": start,
                 }
                 twin.set_many({f"{injection.instance}.parameters.{name}": value for name, value in values.items()})
-        period = 2.0 * math.pi * self.tick_hz / omega
-        window = math.ceil(period * max(_PERIODS, math.ceil(_SAMPLES / period)))
-        before, change, rest, flown = None, math.inf, math.inf, 0
-        for _ in range(_WINDOWS):
-            pairs = [self._samples(twin, window) for twin in self._twins]
-            found, left = _fit((pairs[0] - pairs[1]) / 2.0, omega / self.tick_hz, flown)
-            flown += window
-            floors = _ROUNDING * np.abs(pairs[0]).max(axis=0) / _AGREE + _LEAST
-            rest = float(np.max(left / (np.abs(found) + floors)))
-            phasors = self._along_weights(found, omega)
-            if before is not None:
-                ports = np.full(3, floors[: 2 * len(self.injections)].max())
-                sizes = np.abs(phasors) + np.concatenate([ports, floors[2 * len(self.injections) :]])
-                change = float(np.max(np.abs(phasors - before) / sizes))
-            if change <= _AGREE:
-                break
-            before = phasors
-        return Point(omega, phasors[0], phasors[1], tuple(phasors[3:]), change, rest)
+
+    def _so_far(self, windows: int, ticks: int, change: float) -> str:
+        done = f"after {windows} window{'' if windows == 1 else 's'} of {ticks / self.tick_hz:.3g} s"
+        return done if math.isinf(change) else f"{done}, of which the last two differ by {change:.1g}"
 
     def _along_weights(self, found: Array, omega: float) -> Array:
         """Of source, sine, target and outputs. What a controller commands at a tick, and its sine, are seen after the next one."""
@@ -183,16 +237,30 @@ class Response:
         return np.array([source, sine, source + sine, *found[2 * len(self.injections) :]])
 
     def _samples(self, twin: SimTwin, ticks: int) -> Array:
-        """After each tick: what each source gives and what its target gets, then the outputs."""
+        """After each tick: what each source gives and what its target gets, then the outputs. Raises _Ended."""
         ports = [
             (f"{injection.instance}.{port}.value", injection.element)
             for injection in self.injections
             for port in ("inputs", "outputs")
         ]
         columns = [*ports, *((output.field, output.element) for output in self._outputs)]
-        with twin.trace(*(field for field, _ in columns)) as trace:
-            twin.tick(ticks)
+        with twin.trace(*self._controllers, *(field for field, _ in columns)) as trace:
+            try:
+                twin.tick(ticks)
+            except TwinError as error:
+                self._check_states(trace)
+                raise _Ended(str(error).partition("\n")[0]) from None
+        self._check_states(trace)
         return np.column_stack([_element(trace[field], element).astype(float) for field, element in columns])
+
+    def _check_states(self, trace: Trace) -> None:
+        """Raises _Ended where a controller has changed its state: from there on it is another loop."""
+        for path, controller in self._controllers.items():
+            states = trace[path]
+            changed = np.flatnonzero(states != self._states[path])
+            if len(changed):
+                at = f"{trace.time_s[changed[0]]:.6g} s"
+                raise _Ended(f"{controller} went from {self._states[path]} to {states[changed[0]]} at {at}")
 
 
 class _Output:
@@ -252,20 +320,33 @@ class Margins:
 
 def margins(points: Sequence[Point]) -> Margins:
     """Of several crossings the one with the smallest margin counts. Between points gain (dB) and phase are linear in the logarithm
-    of the frequency."""
-    omega = np.log([p.omega for p in points])
-    gain = np.log(np.maximum(np.abs([p.loop for p in points]), 1e-300))
-    phase = np.unwrap(np.angle([p.loop for p in points]))
-    gains = [(_between(omega, phase, at), at) for at in _crossings(omega, gain, 0.0)]
-    phase_margins = [(abs(math.remainder(angle - math.pi, 2 * math.pi)), math.exp(at)) for angle, at in gains]
-    phase_margin, crossover = min(phase_margins, default=(None, None))
-    turns = range(math.floor(phase.min() / (2 * math.pi)) - 1, math.ceil(phase.max() / (2 * math.pi)) + 2)
-    sideways = [at for n in turns for at in _crossings(omega, phase, (2 * n + 1) * math.pi)]
-    gain_margins = [(abs(_between(omega, gain, at)), -_between(omega, gain, at), math.exp(at)) for at in sideways]
-    _, size, phase_crossover = min(gain_margins, default=(None, None, None))
-    peak = max(points, key=lambda p: abs(p.sensitivity))
-    gain_margin = None if size is None else math.exp(size)
+    of the frequency. A point without a loop counts nowhere, and no crossing is sought across it. Raises SimError if all are so."""
+    runs = measured_runs(points, lambda point: point.has_loop)
+    if not runs:
+        raise SimError("no loop was measured at any frequency")
+    found_phase: list[tuple[float, float]] = []
+    found_gain: list[tuple[float, float, float]] = []
+    for run in runs:
+        omega = np.log([p.omega for p in run])
+        gain = np.log(np.abs([p.loop for p in run]))
+        phase = np.unwrap(np.angle([p.loop for p in run]))
+        for at in _crossings(omega, gain, 0.0):
+            angle = _between(omega, phase, at)
+            found_phase.append((abs(math.remainder(angle - math.pi, 2 * math.pi)), math.exp(at)))
+        turns = range(math.floor(phase.min() / (2 * math.pi)) - 1, math.ceil(phase.max() / (2 * math.pi)) + 2)
+        for at in (at for n in turns for at in _crossings(omega, phase, (2 * n + 1) * math.pi)):
+            size = -_between(omega, gain, at)
+            found_gain.append((abs(size), size, math.exp(at)))
+    phase_margin, crossover = min(found_phase, default=(None, None))
+    _, size_, phase_crossover = min(found_gain, default=(None, None, None))
+    peak = max((p for run in runs for p in run), key=lambda p: abs(p.sensitivity))
+    gain_margin = None if size_ is None else math.exp(size_)
     return Margins(crossover, phase_margin, phase_crossover, gain_margin, abs(peak.sensitivity), peak.omega)
+
+
+def measured_runs(points: Sequence[Point], holds: Callable[[Point], bool]) -> list[list[Point]]:
+    """The points for which it holds, those that follow one another together."""
+    return [list(run) for held, run in groupby(points, holds) if held]
 
 
 def _crossings(x: Array, y: Array, level: float) -> list[float]:

@@ -6,7 +6,8 @@ from __future__ import annotations
 import cmath
 import json
 import math
-from collections.abc import Sequence
+from collections.abc import Callable, Iterable, Sequence
+from functools import partial
 from pathlib import Path
 from typing import Any
 
@@ -14,7 +15,7 @@ import numpy as np
 
 from ..errors import SimError
 from ..plot import PICTURE_SUFFIXES
-from .response import Margins, Point, Response, margins
+from .response import Margins, Point, Response, margins, measured_runs
 
 _BLUE, _RED, _GREY = "#2a78b5", "#c8442c", "#888888"
 
@@ -28,10 +29,17 @@ def heading(response: Response) -> str:
 
 def row(point: Point) -> str:
     """Frequency; gain (dB) and phase (degrees) of the loop, the sensitivity and each output; how well they are settled, and
-    what is left."""
-    values = [point.loop, point.sensitivity, *map(point.response, range(len(point.outputs)))]
-    cells = "  ".join(f"{_decibels(v):8.2f} dB {math.degrees(cmath.phase(v)):5.0f}°" for v in values)
+    what is left. Or why nothing was measured."""
+    if not point.is_settled:
+        return f"{point.omega:9.4g}  not measured: {point.why}"
+    loop = [point.loop, point.sensitivity] if point.has_loop else [0j, 0j]
+    cells = "  ".join(_cell(value) for value in [*loop, *map(point.response, range(len(point.outputs)))])
     return f"{point.omega:9.4g}  {cells}  {point.change:7.0e} {point.rest:7.0e}"
+
+
+def _cell(value: complex) -> str:
+    """`none`: it does not depend on the sine."""
+    return f"{_decibels(value):8.2f} dB {math.degrees(cmath.phase(value)):5.0f}°" if value else f"{'none':>18}"
 
 
 def _short(name: str) -> str:
@@ -39,7 +47,8 @@ def _short(name: str) -> str:
 
 
 def _decibels(value: complex) -> float:
-    return 20.0 * math.log10(abs(value)) if value else -math.inf
+    """Of a value that is not 0."""
+    return 20.0 * math.log10(abs(value))
 
 
 def check_picture(path: Path) -> None:
@@ -53,33 +62,25 @@ class Measured:
 
     def __init__(self, response: Response, points: Sequence[Point]):
         self.inputs = [(injection.path, injection.weight) for injection in response.injections]
-        self.outputs = response.outputs
-        self.points = points
-        #: None: what the source gives does not depend on the sine, there is no loop.
-        self.margins: Margins | None = margins(points) if any(p.source for p in points) else None
+        self.outputs, self.within = response.outputs, response.within
+        self.asked = list(points)
+        #: Those that were measured.
+        self.points = [point for point in points if point.is_settled]
+        #: None: what the source gives does not depend on the sine, there is no loop; or nothing was measured.
+        self.margins: Margins | None = margins(points) if any(point.has_loop for point in points) else None
 
     def text(self) -> str:
-        lines = []
-        found = self.margins
-        if found is None:
+        lines = [_margins_text(self.margins)] if self.margins else []
+        if self.points and not self.margins:
             lines.append("no loop: the source does not depend on the sine")
-        else:
-            if found.phase_margin is not None and found.gain_crossover is not None:
-                lines.append(
-                    f"phase margin {math.degrees(found.phase_margin):.1f}° at {found.gain_crossover:.4g} rad/s, "
-                    f"delay margin {1e3 * (found.delay_margin or 0.0):.3g} ms"
-                )
-            if found.gain_margin is not None:
-                lines.append(
-                    f"gain margin {_decibels(found.gain_margin):.1f} dB ({found.gain_margin:.3g}) at {found.phase_crossover:.4g} rad/s"
-                )
-            lines.append(
-                f"largest sensitivity {found.peak_sensitivity:.3g} ({_decibels(found.peak_sensitivity):.1f} dB) at {found.peak_frequency:.4g} rad/s"
-            )
-        moving = [point for point in self.points if not point.is_settled]
-        if moving:
-            names = ", ".join(f"{point.omega:.4g}" for point in moving)
-            lines.append(f"not settled at {names} rad/s: the numbers there are about right, or wrong")
+        elif any(not point.has_loop for point in self.points):
+            names = _names(point for point in self.points if not point.has_loop)
+            lines.append(f"no loop at {names} rad/s: there the source does not depend on the sine")
+        if not self.points:
+            lines.append("nothing was measured")
+        elif len(self.points) < len(self.asked):
+            names = _names(point for point in self.asked if not point.is_settled)
+            lines.append(f"not measured at {names} rad/s: what is said above is of the other {len(self.points)}")
         return "\n".join(lines)
 
     def as_json(self) -> dict[str, Any]:
@@ -88,6 +89,7 @@ class Measured:
 
         return {
             "inputs": [{"path": path, "weight": weight} for path, weight in self.inputs],
+            "within": self.within,
             "omega": [point.omega for point in self.points],
             "loop": parts([point.loop for point in self.points]),
             "sensitivity": parts([point.sensitivity for point in self.points]),
@@ -95,9 +97,10 @@ class Measured:
                 path: {"unit": unit, **parts([point.response(i) for point in self.points])}
                 for i, (path, unit) in enumerate(self.outputs)
             },
-            "change": [None if math.isinf(point.change) else point.change for point in self.points],
+            "change": [point.change for point in self.points],
             "rest": [point.rest for point in self.points],
             "margins": vars(self.margins) if self.margins else None,
+            "not_measured": [{"omega": point.omega, "why": point.why} for point in self.asked if not point.is_settled],
         }
 
     def write(self, path: Path) -> None:
@@ -107,12 +110,10 @@ class Measured:
         """Bode diagrams of the loop with its crossings, and of sensitivity and outputs."""
         from matplotlib.figure import Figure  # imported here, because it takes a second
 
-        omega = np.array([point.omega for point in self.points])
         figure = Figure(figsize=(11, 6), layout="constrained")
         axes = figure.subplots(2, 2, sharex=True)
         found = self.margins
         if found:
-            _bode(axes[:, 0], omega, [point.loop for point in self.points], "loop", _BLUE)
             for crossing, level, axis in (
                 (found.gain_crossover, 0.0, axes[0, 0]),
                 (found.phase_crossover, -180.0, axes[1, 0]),
@@ -120,10 +121,11 @@ class Measured:
                 axis.axhline(level, color=_GREY, linewidth=0.8)
                 for other in axes[:, 0] if crossing else ():
                     other.axvline(crossing, color=_RED, linewidth=0.8, linestyle=":")
-            _bode(axes[:, 1], omega, [point.sensitivity for point in self.points], "sensitivity", _RED)
+            self._bode(axes[:, 0], lambda point: point.loop if point.has_loop else 0j, "loop", _BLUE)
+            self._bode(axes[:, 1], lambda point: point.sensitivity if point.has_loop else 0j, "sensitivity", _RED)
         for i, (name, unit) in enumerate(self.outputs):
-            values = [point.response(i) for point in self.points]
-            _bode(axes[:, 1], omega, values, f"{name} ({unit})" if unit else name, f"C{i}")
+            label = f"{name} ({unit})" if unit else name
+            self._bode(axes[:, 1], partial(Point.response, output=i), label, f"C{i}")
         for axis in axes.flat:
             axis.grid(True, which="both", color="#dddddd", linewidth=0.5)
         for column in (0, 1):
@@ -135,10 +137,34 @@ class Measured:
         figure.suptitle(f"{title}, sine at {', '.join(path for path, _ in self.inputs)}", fontsize=10)
         figure.savefig(path, dpi=100)
 
+    def _bode(self, axes: Any, value: Callable[[Point], complex], label: str, colour: str) -> None:
+        """A line for each run of frequencies with a value, so that none leads across one without."""
+        gain, phase = axes
+        for run in measured_runs(self.asked, lambda point: point.is_settled and value(point) != 0):
+            omega, values = [point.omega for point in run], [value(point) for point in run]
+            phases = np.degrees(np.unwrap(np.angle(values)))
+            phases -= 360.0 * round((phases[0] + 90.0) / 360.0)  # begins within -270 and 90 degrees
+            gain.semilogx(omega, [_decibels(v) for v in values], ".-", color=colour, label=label)
+            phase.semilogx(omega, phases, ".-", color=colour, label=label)
+            label = "_nolegend_"
 
-def _bode(axes: Any, omega: Any, values: Sequence[complex], label: str, colour: str) -> None:
-    gain, phase = axes
-    phases = np.degrees(np.unwrap(np.angle(values)))
-    phases -= 360.0 * round((phases[0] + 90.0) / 360.0)  # begins within -270 and 90 degrees
-    gain.semilogx(omega, [_decibels(v) for v in values], ".-", color=colour, label=label)
-    phase.semilogx(omega, phases, ".-", color=colour, label=label)
+
+def _margins_text(found: Margins) -> str:
+    lines = []
+    if found.phase_margin is not None and found.gain_crossover is not None:
+        lines.append(
+            f"phase margin {math.degrees(found.phase_margin):.1f}° at {found.gain_crossover:.4g} rad/s, "
+            f"delay margin {1e3 * (found.delay_margin or 0.0):.3g} ms"
+        )
+    if found.gain_margin is not None:
+        lines.append(
+            f"gain margin {_decibels(found.gain_margin):.1f} dB ({found.gain_margin:.3g}) at {found.phase_crossover:.4g} rad/s"
+        )
+    lines.append(
+        f"largest sensitivity {found.peak_sensitivity:.3g} ({_decibels(found.peak_sensitivity):.1f} dB) at {found.peak_frequency:.4g} rad/s"
+    )
+    return "\n".join(lines)
+
+
+def _names(points: Iterable[Point]) -> str:
+    return ", ".join(f"{point.omega:.4g}" for point in points)

@@ -1,0 +1,89 @@
+# SPDX-License-Identifier: Apache-2.0
+"""`--set altimeter.parameters.sigma=0.8`, `--set wind.parameters.wind_north[2]=3`: values in place of those of the file.
+
+A path is one that a study may disperse (campaign/study.py), or a whole array, or a row of one.
+"""
+
+from __future__ import annotations
+
+import math
+import re
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+from fcsl_compiler.base.diagnostics import DiagnosticSink
+from fcsl_compiler.base.source import SourceFile, Span
+from fcsl_compiler.model.types import scalar_of, shape_of
+from fcsl_compiler.parse.json_reader import ConfigReader
+from fcsl_compiler.parse.json_source import JsonNode, parse_json
+
+from .models import ModelField, type_of
+
+_OPTION = "--set"
+_PATH = re.compile(r"(.+?)((?:\[\d+\])*)")
+Value = bool | int | float | str
+
+
+@dataclass(frozen=True, eq=False)
+class Setting:
+    """`index` is empty where the whole field `path` is set."""
+
+    path: str
+    index: tuple[int, ...]
+    span: Span
+    value: JsonNode
+
+
+class Settings:
+    """Those of the command line; each is a text of its own in messages. One that was taken is gone."""
+
+    def __init__(self, sets: Sequence[str], sink: DiagnosticSink):
+        """E215: not of the form."""
+        self._left: list[Setting] = []
+        for text in sets:
+            path, equals, value_text = text.partition("=")
+            span = SourceFile(_OPTION, text).span(0, max(1, len(path)))
+            if not equals:
+                sink.error("E215", "not of the form `instance.parameters.name=value`", span)
+                continue
+            value = parse_json(SourceFile(f"{_OPTION} {path}", value_text), sink)
+            parts = _PATH.fullmatch(path)
+            whole, brackets = parts.groups() if parts else (path, "")
+            if value:
+                self._left.append(Setting(whole, tuple(map(int, re.findall(r"\d+", brackets))), span, value))
+
+    def take_whole(self, path: str) -> Setting | None:
+        """The last one of the field as a whole."""
+        found = self._take([s for s in self._left if s.path == path and not s.index])
+        return found[-1] if found else None
+
+    def take_elements(self, path: str) -> list[Setting]:
+        """Those of parts of the field, in their order."""
+        return self._take([s for s in self._left if s.path == path and s.index])
+
+    def left(self) -> Sequence[Setting]:
+        """Those that nobody took."""
+        return self._left
+
+    def _take(self, found: list[Setting]) -> list[Setting]:
+        self._left = [s for s in self._left if s not in found]
+        return found
+
+
+def with_elements(
+    scalars: Sequence[Value], target: ModelField, settings: Sequence[Setting], reader: ConfigReader
+) -> Sequence[Value]:
+    """The value of a field, row-major, with its parts replaced. E217: there is no such element."""
+    shape, changed = shape_of(target.type), list(scalars)
+    for setting in settings:
+        whole, count = setting.path, len(setting.index)
+        if count > len(shape) or any(i >= n for i, n in zip(setting.index, shape, strict=False)):
+            fix = f"name an element: `{whole}{'[0]' * len(shape)}`" if shape else f"write `{whole}`"
+            reader.sink.error("E217", f"`{whole}` is {target.type}", setting.span, help=fix)
+            continue
+        what = f"{target.role} `{target.name}{''.join(f'[{i}]' for i in setting.index)}`"
+        part = reader.value(setting.value, type_of(scalar_of(target.type).name, shape[count:]), what)
+        size = math.prod(shape[count:])
+        at = sum(i * math.prod(shape[axis + 1 :]) for axis, i in enumerate(setting.index))
+        changed[at : at + size] = part or changed[at : at + size]
+    return changed
