@@ -108,6 +108,29 @@ def test_names_that_are_one_to_nim_are_told_apart(tmp_path: Path) -> None:
     assert machines[1].get("machine.state") == "END"
 
 
+@pytest.mark.parametrize("name", ["health", "host", "system", "result"])
+def test_a_machine_may_have_a_name_of_nim(tmp_path: Path, name: str) -> None:
+    m = nim_machine(_counter(tmp_path, name))
+    m.step(3)
+    assert m.get("one.outputs.y") == 3.0
+
+
+def test_a_keyword_is_no_module(tmp_path: Path) -> None:
+    with pytest.raises(ToolchainError, match="machine `object`: no module of Nim has this name, a keyword; rename"):
+        nim_machine(_counter(tmp_path, "object"))
+
+
+def _counter(folder: Path, name: str) -> Path:
+    text = 'class A:\n    outputs = {"y": "f64"}\n\n    def execute(self):\n        self.y += 1.0\n'
+    config = {
+        "tick_hz": 10,
+        "initial_state": "S",
+        "instances": {"one": {"algorithm": "A"}},
+        "states": {"S": {"schedule": {"one": 10}}},
+    }
+    return write_machine(folder, name, config, {"a": text})
+
+
 def test_floats_are_written_to_the_bit(tmp_path: Path) -> None:
     numbers = random.Random(1)
     values = [struct.unpack("<d", numbers.randbytes(8))[0] for _ in range(300)]

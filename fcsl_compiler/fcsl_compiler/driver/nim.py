@@ -13,7 +13,7 @@ import shlex
 import tempfile
 from pathlib import Path
 
-from ..printers.nim.names import REFUSED
+from ..printers.nim.names import REFUSED, is_keyword
 from .toolchain import Language, ToolchainError, run_compiler, toolchain
 
 #: No checks, no garbage collector, and no configuration but this.
@@ -62,6 +62,9 @@ def compile_modules(modules: dict[str, str]) -> dict[str, str]:
     """C of Nim modules, by file name: <name>.nim.c for each <name>, and BASE_HEADER. `modules`: their texts by name.
     Raises ToolchainError."""
     for name, text in modules.items():
+        if is_keyword(name):
+            fix = "rename the file, or build with --backend c"
+            raise ToolchainError(f"machine `{name}`: no module of Nim has this name, a keyword; {fix}")
         refuse_allocation(text, f"{name}.nim")
     with tempfile.TemporaryDirectory(prefix="fcsl-nim-") as scratch:
         folder = Path(scratch)

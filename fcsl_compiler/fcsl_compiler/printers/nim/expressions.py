@@ -30,7 +30,7 @@ class Module:
             self.types.of(name)
         self.types_of = {"fcsl_host_t": "Host"}
         for record in (*program.records, *program.private_records):
-            self.types_of[record.name] = self.types.of(_capital(record.name.removesuffix("_t")))
+            self.types_of[record.name] = self.types.of(record.name, _capital(record.name.removesuffix("_t")))
         self.tables = {table.name for table in program.tables}
         #: Labels of enums by constant.
         self.labels: dict[str, str] = {}

@@ -37,8 +37,12 @@ def key(name: str) -> str:
     return name[0] + name[1:].replace("_", "").lower()
 
 
+def is_keyword(name: str) -> bool:
+    return key(name) in _KEYWORDS
+
+
 def quoted(name: str) -> str:
-    return f"`{name}`" if key(name) in _KEYWORDS else name
+    return f"`{name}`" if is_keyword(name) else name
 
 
 class Names:
@@ -51,11 +55,11 @@ class Names:
             set() if outer is not None else {key(word) for word in (*_SYSTEM, *REFUSED)} - _KEYWORDS | {"Inf", "Nan"}
         )
 
-    def of(self, c_identifier: str) -> str:
-        """The identifier for one of C; always the same one."""
+    def of(self, c_identifier: str, wanted: str = "") -> str:
+        """The identifier for one of C; always the same one. `wanted`: more like it than the identifier of C."""
         found = self._found(c_identifier)
         if found is None:
-            found = self._known[c_identifier] = self._new(c_identifier)
+            found = self._known[c_identifier] = self._new(wanted or c_identifier)
         return found
 
     def all(self) -> set[str]:
