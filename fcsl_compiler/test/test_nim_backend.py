@@ -16,13 +16,17 @@ from fcsl_generator.campaign import campaign
 from fcsl_generator.harness import check
 from fcsl_generator.machines import cases
 from fcsl_test_abi import Machine, write_machine
+from fcsl_test_twins import InReference
 from test_golden import CONFIG, GOLDEN, describe, golden
 
+from fcsl_compiler.base.diagnostics import DiagnosticError
 from fcsl_compiler.cli.main import main
 from fcsl_compiler.driver.cache import build_machine
+from fcsl_compiler.driver.externs import build_externs
 from fcsl_compiler.driver.nim import refuse_allocation
 from fcsl_compiler.driver.passes import compile_machine
 from fcsl_compiler.driver.toolchain import ToolchainError, include_dirs, math_library
+from fcsl_compiler.reference.externs import externs_of
 
 EXAMPLES = Path(__file__).parents[2] / "examples"
 PAGE = EXAMPLES.parent / "docs/nim.md"
@@ -176,6 +180,101 @@ class Constants:
     assert bytes(machines[1].raw("one.outputs.wide")) == struct.pack(f"<{len(values)}d", *values)
 
 
+EXTERNS = """
+from fcsl_builtins import extern, f64
+
+
+@extern(header="board.nim", lang="nim")
+def smooth(x: f64, weights: "f64[3]") -> f64: ...
+
+
+@extern(header="board.nim", lang="nim")
+def doubled(x: "f64[3]") -> "f64[3]": ...
+
+
+class Filter:
+    inputs = {"x": "f64"}
+    outputs = {"y": "f64", "twice": "f64[3]"}
+    parameters = {"weights": "f64[3]"}
+
+    def execute(self):
+        self.y = smooth(self.x, self.weights)
+        self.twice = doubled(self.weights)
+"""
+BOARD = """
+proc smooth*(x: float64, weights: ptr array[3, float64]): float64 {.exportc, cdecl.} =
+  for w in weights[]:
+    result += w * x
+
+proc doubled*(x, to: ptr array[3, float64]) {.exportc, cdecl.} =
+  for i in 0 ..< 3:
+    to[i] = 2.0 * x[i]
+"""
+
+
+def with_externs(folder: Path, board: str = BOARD) -> Path:
+    (folder / "board.nim").write_text(board)
+    config = {
+        "tick_hz": 10,
+        "initial_state": "S",
+        "instances": {"one": {"algorithm": "Filter", "parameters": {"weights": [1.0, 2.0, 3.0]}}},
+        "states": {"S": {"schedule": {"one": 10}}},
+        "targets": {"simulation": {"sources": ["board.nim"]}},
+    }
+    return write_machine(folder, "filter", config, {"filter": EXTERNS})
+
+
+def test_an_extern_in_nim_is_called_from_either_backend_and_from_python(tmp_path: Path) -> None:
+    config = with_externs(tmp_path)
+    built = build_machine(config)
+    checked = compile_machine(config, "").checked
+    python = InReference(built.library, checked, externs=externs_of(build_externs(config)))
+    for m in (Machine.build(config), nim_machine(config), python):
+        m.set("one.inputs.x", 2.0)
+        m.step()
+        assert m.get("one.outputs.y") == 12.0
+        assert list(m.raw("one.outputs.twice")) == [2.0, 4.0, 6.0]
+
+
+@pytest.mark.parametrize("c_only", [[], ["--c-only"]])
+def test_an_extern_of_other_types_is_refused(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str], c_only: list[str]
+) -> None:
+    config = with_externs(tmp_path, BOARD.replace("x: float64, weights", "x: float32, weights"))
+    assert main(["build", str(config), "-o", str(tmp_path / "out"), *c_only]) != 0
+    said = capsys.readouterr().err
+    assert (
+        "type mismatch: got" in said
+        and "x: float32" in said
+        and "The machine calls the externs doubled, smooth" in said
+    )
+    assert not list((tmp_path / "out").glob("*")) if c_only else not (tmp_path / "out").exists()
+
+
+def test_an_extern_in_nim_that_allocates_does_not_link(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    config = with_externs(tmp_path, BOARD + "\nvar log: seq[float64]\nproc more*() {.exportc.} =\n  log.add(1.0)\n")
+    assert main(["build", str(config), "-o", str(tmp_path / "out")]) != 0
+    assert "Nim's own library is not linked" in capsys.readouterr().err
+
+
+def test_a_change_of_an_extern_in_nim_builds_again(tmp_path: Path) -> None:
+    config = with_externs(tmp_path)
+    before = build_machine(config).library
+    assert build_machine(config).library == before
+    (tmp_path / "board.nim").write_text(BOARD.replace("2.0 * x", "4.0 * x"))
+    assert build_machine(config).library != before
+
+
+def test_a_struct_is_for_c_alone(tmp_path: Path) -> None:
+    config = with_externs(tmp_path)
+    whole = json.loads(config.read_text())
+    config.write_text(json.dumps({**whole, "structs": {"Pose": {"x": "f64"}}}))
+    source = next(tmp_path.rglob("filter.py"))
+    source.write_text(source.read_text().replace("def smooth(x: f64,", 'def smooth(x: "Pose",'))
+    with pytest.raises(DiagnosticError, match="`smooth` is written in Nim, which has no type for the struct `Pose`"):
+        compile_machine(config, "")
+
+
 def test_what_allocates_is_refused() -> None:
     refuse_allocation('# a seq of words\nlet text = "new string"\n{.emit: ["""\nref\n"""].}\n', "a.nim")
     for line in ("var x: seq[int]", "let y = new(Thing)", "raise e", "var s: string", "try:"):
@@ -224,6 +323,7 @@ def test_cmake(tmp_path: Path) -> None:
     (tmp_path / "CMakeLists.txt").write_text(
         "cmake_minimum_required(VERSION 3.22)\nproject(by_nim C)\nfind_package(fcsl_compiler REQUIRED)\n"
         f"fcsl_add_machine(by_nim_machines {json.dumps(str(CONFIG))} BACKEND nim)\n"
+        f"fcsl_add_machine(with_extern {json.dumps(str(with_externs(tmp_path)))})\n"
     )
     for command in (["-S", str(tmp_path), "-B", str(tmp_path / "build")], ["--build", str(tmp_path / "build")]):
         done = subprocess.run(["cmake", *command], capture_output=True, text=True, timeout=300)
@@ -233,3 +333,6 @@ def test_cmake(tmp_path: Path) -> None:
         one.step(100)
     assert [list(m.raw(p)) for p in m.fields] == [list(c.raw(p)) for p in c.fields]
     assert "small: a step needs at most " in done.stdout
+    m = Machine(tmp_path / "build/libwith_extern.so", "filter")
+    m.step()
+    assert list(m.raw("one.outputs.twice")) == [2.0, 4.0, 6.0]

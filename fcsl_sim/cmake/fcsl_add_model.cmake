@@ -25,7 +25,8 @@ function(fcsl_add_model name)
     file(CONFIGURE OUTPUT "${arg_SOURCES}" CONTENT "typedef int fcsl_no_source_t;\n")
   endif()
   if("${arg_SOURCES}" MATCHES "\\.nim(;|$)")
-    _fcsl_c_of_nim(${name} "${arg_SOURCES}" arg_SOURCES nim_library)
+    # Beside this file where FCSL is installed, and in fcsl_sim's own folder.
+    fcsl_c_of_nim(${name} "${arg_SOURCES}" "${CMAKE_CURRENT_FUNCTION_LIST_DIR}/../nim/fcsl_model.nim" arg_SOURCES nim_library)
   endif()
   if("${arg_SOURCES}" MATCHES "\\.(cpp|cc|cxx)(;|$)" AND NOT CMAKE_CXX_COMPILER_LOADED)
     message(FATAL_ERROR "${call} has C++ files: write project(${PROJECT_NAME} C CXX)")
@@ -52,45 +53,6 @@ function(fcsl_add_model name)
   endif()
   target_link_libraries(${name} PRIVATE fcsl_compiler::fcsl_math fcsl_compiler::fcsl_abi m)
   install(TARGETS ${name} LIBRARY DESTINATION lib/${PROJECT_NAME})
-endfunction()
-
-# Has Nim make C of one file and sets <source> to its path, and <library> to the folder of nimbase.h. Only this C is compiled:
-# Nim's system module, with its allocator, is no part of a model.
-function(_fcsl_c_of_nim name file source library)
-  get_filename_component(file "${file}" ABSOLUTE)
-  get_filename_component(stem "${file}" NAME_WE)
-  if(NOT EXISTS "${file}")
-    message(FATAL_ERROR "fcsl_add_model(${name} …) of package ${PROJECT_NAME}: a model in Nim is one file, and there is no ${file}")
-  endif()
-  find_program(FCSL_NIM nim)
-  if(NOT FCSL_NIM)
-    message(FATAL_ERROR "fcsl_add_model(${name} …) of package ${PROJECT_NAME}: there is no Nim compiler; install nim (Debian and Ubuntu: apt-get install nim), or set FCSL_NIM")
-  endif()
-  set(folder "${CMAKE_CURRENT_BINARY_DIR}/${name}_nim")
-  set(program "${folder}/fcsl_program.nim")
-  file(CONFIGURE OUTPUT "${program}" CONTENT "import ${stem}\n")
-  # Beside this file where FCSL is installed, and in fcsl_sim's own folder.
-  set(binding "${CMAKE_CURRENT_FUNCTION_LIST_DIR}/../nim")
-  # The flags of fcsl_compiler/driver/nim.py.
-  set(flags --compileOnly --noMain --app:staticlib --mm:none -d:danger --threads:off --skipCfg --skipUserCfg --skipParentCfg
-    --skipProjCfg --hints:off --warnings:off --colors:off)
-  execute_process(COMMAND "${FCSL_NIM}" dump --skipCfg --dump.format:json "${program}"
-    OUTPUT_VARIABLE facts ERROR_QUIET)
-  string(JSON nim_library ERROR_VARIABLE failed GET "${facts}" libpath)
-  if(failed)
-    message(FATAL_ERROR "`${FCSL_NIM} dump` does not say where Nim's library is: ${failed}")
-  endif()
-  set(made "${folder}/${stem}.nim.c")
-  add_custom_command(
-    OUTPUT "${made}"
-    COMMAND "${CMAKE_COMMAND}" -E copy "${file}" "${binding}/fcsl_model.nim" "${folder}"
-    COMMAND "${FCSL_NIM}" c ${flags} "--nimcache:${folder}/c" "${program}"
-    COMMAND "${CMAKE_COMMAND}" -E copy "${folder}/c/@m${stem}.nim.c" "${made}"
-    DEPENDS "${file}" "${binding}/fcsl_model.nim"
-    COMMENT "nim: ${name}"
-    VERBATIM)
-  set(${source} "${made}" PARENT_SCOPE)
-  set(${library} "${nim_library}" PARENT_SCOPE)
 endfunction()
 
 # Builds a crate to a static library and sets <library> to its path. The profile is the same for every model.

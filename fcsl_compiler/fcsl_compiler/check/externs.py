@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""`@extern(header="cpu_temp.h")`: the declaration of a C function that an algorithm calls."""
+"""`@extern(header="cpu_temp.h")`: the declaration of a function of C or Nim that an algorithm calls."""
 
 from __future__ import annotations
 
@@ -10,13 +10,14 @@ from ..base.diagnostics import DiagnosticSink
 from ..base.source import Span
 from ..model import ir
 from ..model.c_names import c_name
-from ..model.types import HEALTH, REQUEST, Type, leaves, scalar_of
+from ..model.types import HEALTH, REQUEST, Struct, Type, element_of, leaves, scalar_of
 from ..parse.python_source import span_of
 from .annotations import annotation_type
 from .declarations import Declarations
 from .scope import LANGUAGE_NAMES
 
 _HEADER = re.compile(r"[A-Za-z0-9_][A-Za-z0-9_.-]*(/[A-Za-z0-9_][A-Za-z0-9_.-]*)*\.h")
+_NIM_FILE = re.compile(r"[A-Za-z][A-Za-z0-9_]*\.nim")
 _SHAPE = 'write `@extern(header="name.h")` above `def name(x: f64) -> f64: ...`'
 
 
@@ -28,9 +29,10 @@ def read_extern(declarations: Declarations, node: ast.FunctionDef, sink: Diagnos
     """The declared function. Returns None after reporting E435 (the declaration) or E301 (a type)."""
     span = span_of(declarations.source, node)
     at = Span(span.source, span.line, span.column, span.line, span.column + len("def ") + len(node.name))
-    header = _header(declarations, node, sink)
-    if header is None:
+    found = _header(declarations, node, sink)
+    if found is None:
         return None
+    header, language = found
     if c_name(node.name) != node.name or node.name in LANGUAGE_NAMES:
         sink.error("E435", f"`{node.name}` is a name of C or of FCSL", at, help="wrap the function under another name")
         return None
@@ -60,10 +62,23 @@ def read_extern(declarations: Declarations, node: ast.FunctionDef, sink: Diagnos
         result = _type(declarations, node.returns, sink)
         if result is None:
             return None
-    return ir.Extern(node.name, header, tuple(arguments), result, at)
+    made = ir.Extern(node.name, header, tuple(arguments), result, at, language)
+    types = [type_ for _, type_ in arguments] + ([] if result is None else [result])
+    struct = next((element for t in types if isinstance(element := element_of(t), Struct)), None)
+    if struct is not None and language == "nim":
+        fix = "pass its members, or write the function in C"
+        sink.error(
+            "E435",
+            f"`{node.name}` is written in Nim, which has no type for the struct `{struct}`",
+            at,
+            help=fix,
+        )
+        return None
+    return made
 
 
-def _header(declarations: Declarations, node: ast.FunctionDef, sink: DiagnosticSink) -> str | None:
+def _header(declarations: Declarations, node: ast.FunctionDef, sink: DiagnosticSink) -> tuple[str, str] | None:
+    """The header, or the file in Nim, and the language."""
     decorator = node.decorator_list[0]
     span = span_of(declarations.source, decorator)
     given: dict[str, object] = {}
@@ -73,13 +88,20 @@ def _header(declarations: Declarations, node: ast.FunctionDef, sink: DiagnosticS
     header = given.get("header")
     if not isinstance(header, str) or not given.keys() <= {"header", "lang"}:
         sink.error("E435", "not a valid extern declaration", span, help=_SHAPE)
-    elif given.get("lang", "c") != "c":
-        sink.error("E435", f"`{given['lang']}` is not a language of externs", span, help='`lang="c"` is the only one')
+    elif given.get("lang", "c") not in ("c", "nim"):
+        sink.error(
+            "E435", f"`{given['lang']}` is not a language of externs", span, help='write `lang="c"` or `lang="nim"`'
+        )
+    elif given.get("lang") == "nim":
+        if _NIM_FILE.fullmatch(header):
+            return header, "nim"
+        fix = "the name of one of the target's `sources`, such as `board.nim`"
+        sink.error("E435", f"`{header}` is not a file in Nim", span, help=fix)
     elif not _HEADER.fullmatch(header) or ".." in header:
         fix = "a path below the include folders of the target, such as `board/cpu_temp.h`"
         sink.error("E435", f"`{header}` is not a header", span, help=fix)
     else:
-        return header
+        return header, "c"
     return None
 
 

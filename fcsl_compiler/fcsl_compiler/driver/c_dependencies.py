@@ -109,14 +109,17 @@ def extern_inputs(parsed: ParsedMachine, target: Target) -> CInputs:
         machine.write_text("".join(headers))
         includes = [folder, *target.include, *include_dirs()]
         try:
-            return c_inputs([machine, *target.sources], includes, parsed.folder, folder)
+            of_c = [source for source in target.sources if source.suffix != ".nim"]
+            found = c_inputs([machine, *of_c], includes, parsed.folder, folder)
         except ToolchainError as error:
             why = f"Target `{target.name}` of {parsed.source.path} cannot be preprocessed; CC must be its C compiler."
             raise ToolchainError(f"{error}\n{why}") from None
+        of_nim = tuple(_read(source.absolute(), parsed.folder) for source in target.sources if source.suffix == ".nim")
+        return CInputs((*found.files, *of_nim), found.probed)
 
 
 def _extern_headers(parsed: ParsedMachine) -> list[str]:
-    """The headers that @extern declarations of the algorithm files name. Empty for a file that is not valid Python."""
+    """The headers of C that @extern declarations of the algorithm files name. Empty for a file that is not valid Python."""
     found: dict[str, None] = {}
     for file in parsed.files:
         try:
@@ -124,6 +127,7 @@ def _extern_headers(parsed: ParsedMachine) -> list[str]:
         except (SyntaxError, ValueError, RecursionError, MemoryError):
             continue
         for keyword in (k for node in ast.walk(tree) if isinstance(node, ast.Call) for k in node.keywords):
-            if keyword.arg == "header" and isinstance(keyword.value, ast.Constant):
-                found[str(keyword.value.value)] = None
+            header = str(keyword.value.value) if isinstance(keyword.value, ast.Constant) else ""
+            if keyword.arg == "header" and header and not header.endswith(".nim"):
+                found[header] = None
     return list(found)

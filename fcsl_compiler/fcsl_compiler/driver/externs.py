@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Compiles the C of a user's externs separately from the machines. The symbol scan of machines does not apply to it."""
+"""Compiles the C and Nim of a user's externs separately from the machines. The symbol scan of machines does not apply to it."""
 
 from __future__ import annotations
 
@@ -9,9 +9,11 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from ..base.files import digest
+from ..model import ir
 from ..model.target import DEFAULT_TARGET, Target
 from .c_dependencies import extern_inputs
 from .cache_entry import cached
+from .nim import compile_externs
 from .passes import Compilation, compile_machine
 from .toolchain import ToolchainError, compile_objects, include_dirs, link_shared, toolchain, unwritten
 
@@ -24,15 +26,24 @@ class LinkInputs:
     flags: tuple[str, ...]
 
 
-def link_inputs(targets: Sequence[Target], folder: Path, headers: Path) -> LinkInputs:
-    """Compiles the C sources of targets into `folder`. `headers`: folder with the machines' headers. Raises
-    ToolchainError."""
+def link_inputs(
+    targets: Sequence[Target], folder: Path, headers: Path, externs: Sequence[ir.Extern] = ()
+) -> LinkInputs:
+    """Compiles the sources of targets into `folder`. `headers`: folder with the machines' headers. `externs`: to compare
+    with those in Nim. Raises ToolchainError."""
     files: list[Path] = []
     for number, target in enumerate(targets):
-        includes = [headers, *target.include, *include_dirs()]
-        files += compile_objects(target.sources, includes, folder / str(number), graphs=False)
+        own = folder / str(number)
+        includes = [headers, *target.include, *include_dirs(), own]
+        files += compile_objects(c_sources(target, externs, own), includes, own, graphs=False)
     archives = [a for t in targets for a in t.archives]
     return LinkInputs((*files, *archives), tuple(f"-l{name}" for t in targets for name in t.libraries))
+
+
+def c_sources(target: Target, externs: Sequence[ir.Extern], folder: Path) -> list[Path]:
+    """The sources of a target, with C in `folder` in place of Nim. Raises ToolchainError."""
+    of_c = [source for source in target.sources if source.suffix != ".nim"]
+    return [*of_c, *compile_externs(target.sources, externs, folder)]
 
 
 @contextlib.contextmanager
@@ -52,6 +63,10 @@ def explained(externs: Sequence[str], targets: Sequence[Target]) -> Iterator[Non
             sources = ", ".join(map(str, target.sources)) or "no source"
             include = ", ".join(map(str, target.include)) or "no include folder"
             lines.append(f"Target `{target.name}` has {sources}; {include}.")
+            if any(source.suffix == ".nim" for source in target.sources):
+                lines.append(
+                    "Nim's own library is not linked: an extern in Nim has no `seq`, `string`, `ref` or `echo`."
+                )
         raise ToolchainError("\n".join([str(error), *lines])) from None
 
 
@@ -82,6 +97,9 @@ def _build(made: Compilation, library: Path) -> dict[str, str]:
     empty.write_text("")  # externs that are all in the C library have no source
     (folder / f"{made.checked.name}.h").write_text(made.header)
     link_shared(
-        [empty, *target.sources], [folder, *target.include, *include_dirs()], library, flags=[*archives, *flags]
+        [empty, *c_sources(target, made.checked.externs, folder)],
+        [folder, *target.include, *include_dirs()],
+        library,
+        flags=[*archives, *flags],
     )
     return {}

@@ -13,7 +13,7 @@ from ..base.files import write_whole
 from ..model.target import DEFAULT_BACKEND, DEFAULT_TARGET
 from .backends import toolchain_of_backend
 from .externs import explained, link_inputs
-from .nim import compile_modules
+from .nim import compile_externs, compile_modules
 from .passes import Compilation, compile_machine
 from .stack import stack_bound, stepped_machines
 from .symbols import SymbolError, check_symbols
@@ -35,6 +35,9 @@ def emit(
     ToolchainError.
     """
     compilations = compile_all(configs, strict, target, instances=instances, backend=backend)
+    for c in compilations:
+        with explained(sorted(e.name for e in c.checked.externs), [c.target]), tempfile.TemporaryDirectory() as scratch:
+            compile_externs(c.target.sources, c.checked.externs, Path(scratch))  # nothing else compares their types
     _write(compilations, folder)
     return compilations
 
@@ -156,7 +159,8 @@ def _compile(compilations: list[Compilation], sources: list[Path], output: Path,
     includes = [folder, *include_dirs(), *(d for t in targets for d in t.include)]
     with explained(externs, targets):
         objects = compile_objects(sources, includes, folder / "objects", graphs=True)
-        foreign = link_inputs(targets, folder / "externs", folder)
+        declared = [e for c in compilations for e in c.checked.externs]
+        foreign = link_inputs(targets, folder / "externs", folder, declared)
 
         def inspect_build(library: Path) -> None:
             calls = tuple(check_machine(library, objects if externs else (), externs))

@@ -11,9 +11,13 @@ import json
 import re
 import shlex
 import tempfile
+from collections.abc import Sequence
 from pathlib import Path
 
+from ..model import ir
+from ..model.types import Array, Scalar, Type, scalar_of
 from ..printers.nim.names import REFUSED, is_keyword
+from ..printers.nim.operations.helpers import NIM_TYPES
 from .toolchain import Language, ToolchainError, run_compiler, toolchain
 
 #: No checks, no garbage collector, and no configuration but this.
@@ -70,12 +74,52 @@ def compile_modules(modules: dict[str, str]) -> dict[str, str]:
         folder = Path(scratch)
         for name, text in modules.items():
             (folder / f"{name}.nim").write_text(text, encoding="utf-8")
-        # What belongs to a program is in the C of this module, which nobody compiles.
-        program = folder / "fcsl_program.nim"
-        program.write_text("".join(f"import {name}\n" for name in modules))
-        run_compiler([*NIM.compiler(), *FLAGS, f"--nimcache:{folder / 'c'}", str(program)], language=NIM)
-        made = {f"{name}.nim.c": (folder / "c" / f"@m{name}.nim.c").read_text(encoding="utf-8") for name in modules}
-        return {**made, BASE_HEADER: _base_header(folder / "c")}
+        return _c_of(folder, list(modules))
+
+
+def compile_externs(sources: Sequence[Path], externs: Sequence[ir.Extern], folder: Path) -> list[Path]:
+    """C of the files in Nim among the sources of a target, in `folder`, beside BASE_HEADER. `externs`: Nim compares
+    their types with what the algorithms declare. Raises ToolchainError."""
+    files = {source.stem: source for source in sources if source.suffix == ".nim"}
+    if not files:
+        return []
+    checks = [_binding(n, e) for n, e in enumerate(externs) if e.language == "nim" and Path(e.header).stem in files]
+    with tempfile.TemporaryDirectory(prefix="fcsl-nim-") as scratch:
+        for source in files.values():
+            (Path(scratch) / source.name).write_bytes(source.read_bytes())
+        made = _c_of(Path(scratch), list(files), "proc fcsl_externs() {.used.} =\n  discard\n" + "".join(checks))
+    folder.mkdir(parents=True, exist_ok=True)
+    for name, text in made.items():
+        # An extern is visible as the flags of its compilation say, like one in C.
+        own = text if name == BASE_HEADER else text.replace("N_LIB_PRIVATE ", "")
+        (folder / name).write_text(own, encoding="utf-8")
+    return [folder / f"{name}.nim.c" for name in files]
+
+
+def _binding(number: int, e: ir.Extern) -> str:
+    """A line that compiles if the proc has the types of the extern."""
+    arguments = [f"a{n}: {_nim_type(type_)}" for n, (_, type_) in enumerate(e.arguments)]
+    returned = ""
+    if isinstance(e.result, Scalar):
+        returned = f": {_nim_type(e.result)}"
+    elif e.result is not None:
+        arguments.append(f"returned: {_nim_type(e.result)}")
+    return f"  let extern{number}: proc ({', '.join(arguments)}){returned} {{.cdecl.}} = {e.name}\n"
+
+
+def _nim_type(type_: Type) -> str:
+    scalar = NIM_TYPES[scalar_of(type_).name]
+    return f"ptr array[{type_.count}, {scalar}]" if isinstance(type_, Array) else scalar
+
+
+def _c_of(folder: Path, names: Sequence[str], program: str = "") -> dict[str, str]:
+    """C of the modules <name>.nim of a folder, by file name. `program`: what the module that imports them holds."""
+    # What belongs to a program is in the C of this module, which nobody compiles.
+    root = folder / "fcsl_program.nim"
+    root.write_text("".join(f"import {name}\n" for name in names) + program)
+    run_compiler([*NIM.compiler(), *FLAGS, f"--nimcache:{folder / 'c'}", str(root)], language=NIM)
+    made = {f"{name}.nim.c": (folder / "c" / f"@m{name}.nim.c").read_text(encoding="utf-8") for name in names}
+    return {**made, BASE_HEADER: _base_header(folder / "c")}
 
 
 def _base_header(folder: Path) -> str:

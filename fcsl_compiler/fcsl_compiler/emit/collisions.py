@@ -75,7 +75,7 @@ def _check_externs(machine: Machine, sink: DiagnosticSink) -> None:
     first: dict[str, ir.Extern] = {}
     for extern in (e for a in machine.algorithms for e in a.externs):
         known = first.setdefault(extern.name, extern)
-        signatures = [(e.header, [t for _, t in e.arguments], e.result) for e in (known, extern)]
+        signatures = [(e.header, e.language, [t for _, t in e.arguments], e.result) for e in (known, extern)]
         if signatures[0] != signatures[1]:
             notes = [(known.span, "the other declaration")]
             fix = "make both declarations equal"

@@ -50,7 +50,7 @@ def _extern(machine: Machine, e: ir.Extern) -> code.Prototype:
     if isinstance(result, code.Pointer):
         arguments.append(result)
         result = None
-    return code.Prototype(e.name, e.header, tuple(arguments), result, e.span)
+    return code.Prototype(e.name, e.header, tuple(arguments), result, e.span, e.language)
 
 
 def _parameter(machine: Machine, type_: Type, writable: bool = False) -> code.Type:

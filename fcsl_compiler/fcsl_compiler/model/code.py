@@ -501,13 +501,14 @@ class Function:
 
 @dataclass(frozen=True)
 class Prototype:
-    """An extern of the user as the algorithms call it."""
+    """An extern of the user as the algorithms call it. `header`: of C, or the file in Nim."""
 
     name: str
     header: str
     parameters: tuple[Type, ...]
     result: Type | None
     span: Span
+    language: str
 
 
 @dataclass(frozen=True)
@@ -524,3 +525,8 @@ class Program:
     tables: tuple[Table, ...]
     functions: tuple[Function, ...]
     uses_hardware: bool
+
+    @property
+    def headers(self) -> list[str]:
+        """Those of its externs in C."""
+        return list(dict.fromkeys(e.header for e in self.externs if e.language == "c"))

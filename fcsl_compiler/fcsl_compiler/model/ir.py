@@ -309,14 +309,15 @@ class Return:
 
 @dataclass(frozen=True)
 class Extern:
-    """A C function that the user declares. Scalars are passed by value; arrays and structs, also as results, by
-    pointer."""
+    """A function of C or Nim that the user declares. Scalars are passed by value; arrays and structs, also as results,
+    by pointer. `header`: of C, or the Nim file."""
 
     name: str
     header: str
     arguments: tuple[tuple[str, Type], ...]
     result: Type | None
     span: Span
+    language: str = "c"
 
 
 @dataclass(frozen=True)

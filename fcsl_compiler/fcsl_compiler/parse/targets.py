@@ -85,8 +85,9 @@ class _TargetReader:
             return None
 
     def _source(self, node: JsonNode, text: str, path: Path) -> bool:
-        if not text.endswith(".c"):
-            self._error(node, f"`{text}` is not a C file", "externs are written in C; the file's name ends in .c")
+        if not text.endswith((".c", ".nim")):
+            fix = "externs are written in C or Nim; the file's name ends in .c or .nim"
+            self._error(node, f"`{text}` is not a file in C or Nim", fix)
             return False
         try:
             SourceFile.read(path, text)

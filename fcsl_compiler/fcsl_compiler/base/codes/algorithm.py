@@ -461,8 +461,9 @@ ALGORITHM_CODES: dict[str, Code] = {
     ),
     "E435": Code(
         "not a valid extern declaration",
-        "An extern declares a C function that a target links. The decorator names its header, the annotations its "
-        "types, and the body is `...`. Scalars are passed by value, arrays and structs by pointer to const.",
+        "An extern declares a function of C or Nim that a target links. The decorator names its header or its file in "
+        "Nim, the annotations its types, and the body is `...`. Scalars are passed by value, arrays and structs (of C "
+        "alone) by pointer to const.",
         Kind.FILE,
         'from fcsl_builtins import extern\n\n\n@extern(header="cpu_temp.h")\ndef cpu_temp_c() -> f64:\n    return 20.0',
         'from fcsl_builtins import extern\n\n\n@extern(header="cpu_temp.h")\ndef cpu_temp_c() -> f64: ...',

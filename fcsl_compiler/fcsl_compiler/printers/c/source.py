@@ -38,7 +38,7 @@ def print_source(program: code.Program, prelude: str, extensions: Mapping[str, S
     if program.uses_hardware:
         w.line(f"#include <{HARDWARE_HEADER}>")
     w.line("#include <fcsl/fcsl_math.h>")
-    for header in dict.fromkeys(e.header for e in program.externs):
+    for header in program.headers:
         w.line(f'#include "{header}"')
     w.line()
     if prelude:
@@ -76,11 +76,16 @@ def print_record(w: CWriter, record: code.Record) -> None:
 
 def print_externs(program: code.Program, w: CWriter) -> None:
     """Asserts that the user's header declares each extern with the types that the algorithm uses. C would convert
-    silently."""
+    silently. Externs in Nim are declared; the Nim compiler has compared them (driver/nim.py)."""
     for e in program.externs:
         w.origin = e.span
         result = "void" if e.result is None else type_name(e.result)
-        signature = f"{result}({', '.join(map(type_name, e.parameters)) or 'void'})"
+        parameters = ", ".join(map(type_name, e.parameters)) or "void"
+        if e.language == "nim":
+            w.line(f"extern {result} {e.name}({parameters});")
+            w.origin = None
+            continue
+        signature = f"{result}({parameters})"
         test = f"__builtin_types_compatible_p(__typeof__({e.name}), {signature})"
         w.line(f'_Static_assert({test}, "{e.name} is not what {c_comment(str(e.span))} declares: {signature}");')
         w.origin = None

@@ -114,7 +114,7 @@ def print_module(program: code.Program, print_descriptor: Callable[[CWriter], No
     data = CWriter()
     print_externs(program, data)
     print_descriptor(data)
-    _emit(w, "/*VARSECTION*/\n" + "".join(f'#include "{h}"\n' for h in _headers(program)) + data.text())
+    _emit(w, "/*VARSECTION*/\n" + "".join(f'#include "{h}"\n' for h in program.headers) + data.text())
     w.line("{.pop.}")
     return w
 
@@ -134,10 +134,6 @@ def _like_macros(module: Module, variables: set[str]) -> set[str]:
     """Names of the machine that may be macros of the C library (limits.h), which nimbase.h includes."""
     fields = {field.name for fields in module.fields.values() for field in fields}
     return {name for name in fields | variables if re.fullmatch(r"[A-Z][A-Z0-9_]+", name)}
-
-
-def _headers(program: code.Program) -> list[str]:
-    return list(dict.fromkeys(e.header for e in program.externs))
 
 
 def _foreign(module: Module, program: code.Program) -> list[str]:
