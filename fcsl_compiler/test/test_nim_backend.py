@@ -40,7 +40,7 @@ def nim_machine(config: Path, **options: Any) -> Machine:
 @pytest.mark.parametrize("single", [True, False], ids=["programs", "machines"])
 def test_generated_ones_agree(request: pytest.FixtureRequest, single: bool) -> None:
     """Nim, CPython and the oracle: every field, tick and bit. test_generated.py compares C with these two."""
-    count = max(10, request.config.getoption("--programs") // 10)
+    count = max(10, request.config.getoption("--programs") // 20)
     campaign(cases(single=single), count, request.config.getoption("--program-seed"), partial(check, backend="nim"))
 
 

@@ -93,6 +93,11 @@ CHECKS = (
         "test_generated.py",
         *("-k", "test_programs or test_machines", "--programs", scaled("1000", "20000"), "--program-seed", "2"),
     ),
+    tests(
+        "generated programs: by Nim = CPython = oracle",
+        "test_nim_backend.py",
+        *("-k", "generated_ones", "--programs", scaled("1000", "40000"), "--program-seed", "2"),
+    ),
     script("sanitizers: native tests, threads, generated C", "sanitize"),
     script("fuzzers: every native parser, each with a seeded defect", "fuzz"),
     script("fuzzer: the receiver of telemetry, with seeded defects", "fuzz_telemetry"),
