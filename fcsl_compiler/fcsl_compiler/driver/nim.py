@@ -80,20 +80,26 @@ def compile_modules(modules: dict[str, str]) -> dict[str, str]:
 def compile_externs(sources: Sequence[Path], externs: Sequence[ir.Extern], folder: Path) -> list[Path]:
     """C of the files in Nim among the sources of a target, in `folder`, beside BASE_HEADER. `externs`: Nim compares
     their types with what the algorithms declare. Raises ToolchainError."""
-    files = {source.stem: source for source in sources if source.suffix == ".nim"}
-    if not files:
-        return []
-    checks = [_binding(n, e) for n, e in enumerate(externs) if e.language == "nim" and Path(e.header).stem in files]
-    with tempfile.TemporaryDirectory(prefix="fcsl-nim-") as scratch:
-        for source in files.values():
-            (Path(scratch) / source.name).write_bytes(source.read_bytes())
-        made = _c_of(Path(scratch), list(files), "proc fcsl_externs() {.used.} =\n  discard\n" + "".join(checks))
-    folder.mkdir(parents=True, exist_ok=True)
+    made = check_externs(sources, externs)
+    if made:
+        folder.mkdir(parents=True, exist_ok=True)
     for name, text in made.items():
         # An extern is visible as the flags of its compilation say, like one in C.
         own = text if name == BASE_HEADER else text.replace("N_LIB_PRIVATE ", "")
         (folder / name).write_text(own, encoding="utf-8")
-    return [folder / f"{name}.nim.c" for name in files]
+    return [folder / name for name in made if name != BASE_HEADER]
+
+
+def check_externs(sources: Sequence[Path], externs: Sequence[ir.Extern]) -> dict[str, str]:
+    """The same C in memory, by file name; nothing without a file in Nim. Raises ToolchainError."""
+    files = {source.stem: source for source in sources if source.suffix == ".nim"}
+    if not files:
+        return {}
+    checks = [_binding(n, e) for n, e in enumerate(externs) if e.language == "nim" and Path(e.header).stem in files]
+    with tempfile.TemporaryDirectory(prefix="fcsl-nim-") as scratch:
+        for source in files.values():
+            (Path(scratch) / source.name).write_bytes(source.read_bytes())
+        return _c_of(Path(scratch), list(files), "proc fcsl_externs() {.used.} =\n  discard\n" + "".join(checks))
 
 
 def _binding(number: int, e: ir.Extern) -> str:
