@@ -116,5 +116,8 @@ def _signals_seen() -> Iterator[list[int]]:
     try:
         yield seen
     finally:
+        # Blocked meanwhile: Python complains of a signal that came just before it is to be ignored.
+        signal.pthread_sigmask(signal.SIG_BLOCK, _ENDS)
         for number, handler in {**before, **stops}.items():
             signal.signal(number, signal.SIG_IGN if seen else handler)
+        signal.pthread_sigmask(signal.SIG_UNBLOCK, _ENDS)
