@@ -47,7 +47,7 @@ _DEFECTS = (
     ("an index unchecked", "fcsl_index(inputs->at, 5, 2u, fault_)", "inputs->at", "index_bound"),
     ("a division by zero", "if (b > 0) {", "if (b >= 0) {", "division_by_zero"),
     ("an overflow", "a != INT32_MIN", "a != INT32_MAX", "overflow"),
-    ("a local without its zero", "uint32_t fault = 0u;", "uint32_t fault;", "initialization"),
+    ("a local without its zero", "uint32_t fault = 0;", "uint32_t fault;", "initialization"),
     ("a machine without its zeros", "memset(m, 0, sizeof *m);", "", "initialization"),
     ("code that no run reaches", "control_pick_init(&m->i_pick);", "return 1;", "never reached"),
     ("a step that does not end", "m->tick += 1u;", "for (;;) {\n    }", "non-terminating"),
