@@ -7,9 +7,9 @@ from collections.abc import Iterator
 
 from ..model import code, ir
 from ..model.c_names import c_name
-from ..model.code import Deref, Function, If, Member, Name, Set, Statement, Update
+from ..model.code import Call, Deref, Function, If, Member, Name, Set, Statement, Update
 from ..model.machine import Instance, Machine, Values
-from ..model.types import HEALTH, U32, U64, Array, Scalar, Type, count_of, leaves, scalar_of
+from ..model.types import BOOL, HEALTH, U32, U64, Array, Scalar, Type, count_of, leaves, scalar_of
 from .expressions import code_type
 from .fault_places import FaultPlaces
 from .fault_points import written_before_fault
@@ -55,21 +55,23 @@ def call(function: ir.Function, record: code.Place, fault: Name) -> code.Do:
 class InstanceEmitter:
     """Makes the functions of one instance."""
 
-    def __init__(self, machine: Machine, places: FaultPlaces, instance: Instance):
-        self.m, self.places, self.i = machine, places, instance
+    def __init__(self, machine: Machine, places: FaultPlaces, instance: Instance, quiet: bool):
+        """`quiet`: see bookkeeping.py."""
+        self.m, self.places, self.i, self.quiet = machine, places, instance, quiet
         self.pointer = code.Pointer(code.Named(instance_type(machine, instance)), writable=True)
         self.name = f"{machine.name}_{instance.name}"
 
     def emit(self) -> Iterator[Function]:
         yield self._init()
-        yield self._execute()
-        yield from self._inject()
+        yield from self._quiet() if self.quiet else self._execute()
         if self.i.max_wcet_us:
             yield self._overrun()
 
-    def _function(self, name: str, body: tuple[Statement, ...], comment: str) -> Function:
+    def _function(
+        self, name: str, body: tuple[Statement, ...], comment: str, result: code.Type | None = None
+    ) -> Function:
         """Rarely executed, and kept away from frequently executed code."""
-        return Function(name, ((_SELF.text, self.pointer),), None, body, comment, inline="rare")
+        return Function(name, ((_SELF.text, self.pointer),), result, body, comment, inline="rare")
 
     def _init(self) -> Function:
         body: list[Statement] = [code.Clear(Deref(_SELF), self.pointer.target)]
@@ -83,25 +85,57 @@ class InstanceEmitter:
         )
         return Function(f"{self.name}_init", ((_SELF.text, self.pointer),), None, tuple(body), comment, exported=True)
 
-    def _execute(self) -> Function:
-        body = self._pulses(health(0))
-        if not self.i.execute.faults:
-            body += [call(self.i.execute, Deref(_SELF), _FAULT), *self._not_stale()]
-            body.append(code.Return(code.Literal(0, U32)))
-        else:
-            save, restore = self._saved()
-            body += [*save, code.Var(_FAULT.text, U32), call(self.i.execute, Deref(_SELF), _FAULT)]
-            faulted = code.Binary("!=", _FAULT, code.Literal(0, U32))
-            body += [If(faulted, (*restore, *self._failed(_FAULT))), *self._not_stale(), code.Return(_FAULT)]
+    def _execute(self) -> Iterator[Function]:
+        yield self._exported([*self._pulses(health(0)), *self._body()])
+        yield from self._inject()
+
+    def _quiet(self) -> Iterator[Function]:
+        """A tick calls `begin` only if the health is not nominal, or if something is injected; then it calls `run`."""
+        own = code.Address(Deref(_SELF))
+        run = f"fcsl_run_{self.name}"
+        body = [Set(_output("transition_request"), self._no_request)] if self._makes_requests else []
+        yield Function(run, ((_SELF.text, self.pointer),), U32, (*body, *self._body()), "Runs execute, but for its health.")
+        yield self._exported([Set(_output("health"), health(0)), code.Return(Call(run, (own,)))])
+        injected, none = Name("injected"), code.Literal(0, code.U8)
+        failed = (*self._failed(code.Literal(self.places.injected, U32)), code.Return(code.Literal(False, BOOL)))
+        least = code.Choice(_is("==", injected, 0), health(0), code.Choice(_is("==", injected, 2), health(1), health(2)))
+        begin = (
+            code.Let(injected.text, code.U8, _member("inject_fault")),
+            Set(_member("inject_fault"), none),
+            If(_is("==", injected, 1), failed),
+            Set(_output("health"), least),
+            code.Return(code.Literal(True, BOOL)),
+        )
+        comment = "Sets the health, nominal or injected. False if a fault is injected: outputs and state stay."
+        yield self._function(f"fcsl_begin_{self.name}", begin, comment, BOOL)
+
+    @property
+    def _makes_requests(self) -> bool:
+        return ir.writes_field(self.i.execute.body, "outputs", "transition_request")
+
+    def _exported(self, body: list[Statement]) -> Function:
         parameters: list[tuple[str, code.Type]] = [(_SELF.text, self.pointer)]
         if self.i.execute.uses_hardware:
             parameters.append((_HOST.text, HOST_TYPE))
         comment = "Runs execute once with the inputs in the record. Returns 0, or the place of a fault; outputs and state then stay."
         return Function(f"{self.name}_execute", tuple(parameters), U32, tuple(body), comment, exported=True)
 
+    def _body(self) -> list[Statement]:
+        """Calls execute. A fault has its effects. Returns 0, or the place of the fault."""
+        if not self.i.execute.faults:
+            body = [call(self.i.execute, Deref(_SELF), _FAULT), *self._not_stale()]
+            return [*body, code.Return(code.Literal(0, U32))]
+        save, restore = self._saved()
+        body = [*save, code.Var(_FAULT.text, U32), call(self.i.execute, Deref(_SELF), _FAULT)]
+        faulted = code.Binary("!=", _FAULT, code.Literal(0, U32))
+        return [*body, If(faulted, (*restore, *self._failed(_FAULT))), *self._not_stale(), code.Return(_FAULT)]
+
+    @property
+    def _no_request(self) -> Name:
+        return Name(request_constant(self.m.name, ""))
+
     def _pulses(self, word: Name) -> list[Statement]:
-        request = Name(request_constant(self.m.name, ""))
-        return [Set(_output("transition_request"), request), Set(_output("health"), word)]
+        return [Set(_output("transition_request"), self._no_request), Set(_output("health"), word)]
 
     def _failed(self, place: code.Expr) -> list[Statement]:
         """The effects of a fault apart from the restored outputs and state."""
@@ -184,6 +218,10 @@ def _output(name: str) -> Member:
 
 def _field(record: str, port: ir.Port) -> Member:
     return Member(_member(record), c_name(port.name))
+
+
+def _is(operator: str, byte: code.Expr, value: int) -> code.Expr:
+    return code.Binary(operator, byte, code.Literal(value, code.U8))
 
 
 def _increment(counter: str) -> Update:

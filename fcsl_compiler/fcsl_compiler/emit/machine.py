@@ -8,6 +8,7 @@ from collections.abc import Iterator
 from ..model import code, ir
 from ..model.machine import Machine, Values
 from ..model.types import Array, Struct, Type
+from .bookkeeping import quiet_instances
 from .expressions import code_type
 from .fault_places import FaultPlaces
 from .functions import FunctionEmitter
@@ -39,8 +40,9 @@ def _functions(machine: Machine, places: FaultPlaces) -> Iterator[code.Function]
     for function, owner in machine.emitted:
         types = {r: record_type(machine, owner, r) for r in ir.RECORDS} if owner else {}
         yield FunctionEmitter(function, machine.name, places, types, function.name in inlined).emit()
-    for instance in machine.instances:
-        yield from InstanceEmitter(machine, places, instance).emit()
+    quiet = quiet_instances(machine)
+    for index, instance in enumerate(machine.instances):
+        yield from InstanceEmitter(machine, places, instance, index in quiet).emit()
     yield from StepEmitter(machine).emit()
 
 

@@ -82,7 +82,7 @@ def _channel(with_last_sample: bool) -> Iterator[Field]:
 
 def _machine(machine: Machine) -> Iterator[Field]:
     yield Field("tick", U64, "ticks completed")
-    yield Field("current_", I32, "index of the executing instance, or -1")
+    yield Field("current_", I32, "index of the executing instance; a brief one leaves the one before; -1 outside")
     yield Field("state_", STATE, "of the last tick")
     yield Field("next_state_", STATE, "of the coming tick")
     if machine.counts_state_ticks:

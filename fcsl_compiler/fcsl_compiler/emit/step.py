@@ -123,11 +123,12 @@ class StepEmitter:
             enter = Do(Call(f"fcsl_enter_{m.name}", (MACHINE.pointer, _ACTIVE, _NEXT)))
             body.append(If(Binary("!=", _ACTIVE, _NEXT), (enter, Set(_ACTIVE, _NEXT), *self._restart())))
         body += map(self._age, sensors(m))
-        cases = []
-        for index, state in enumerate(m.states):
-            tick = Do(Call(f"fcsl_tick_{m.name}_{state.name}", (MACHINE.pointer, host)))
-            cases.append((state_constant(m, index), (tick,)))
-        body.append(code.Select(_ACTIVE, tuple(cases)))
+        ticks = [Do(Call(f"fcsl_tick_{m.name}_{state.name}", (MACHINE.pointer, host))) for state in m.states]
+        if len(ticks) > 1:
+            cases = tuple((state_constant(m, index), (tick,)) for index, tick in enumerate(ticks))
+            body.append(code.Select(_ACTIVE, cases))
+        else:
+            body += ticks
         if m.counts_state_ticks:
             body.append(Update(TICKS_IN_STATE, "+", ONE))
         body.append(Update(TICK, "+", ONE))

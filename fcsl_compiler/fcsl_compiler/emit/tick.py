@@ -12,6 +12,7 @@ from ..model.c_names import c_name
 from ..model.code import Binary, Call, Deref, Do, Function, If, Literal, Member, Name, Set, Statement
 from ..model.machine import Channel, Connection, Edge, Entry, Instance, Machine, PortRef, State
 from ..model.types import BOOL, F64, I32, I64, U32, U64
+from .bookkeeping import noted_instances, quiet_instances
 from .expressions import code_type
 from .functions import HOST_TYPE
 from .inline_size import takes_bodies_in
@@ -85,6 +86,7 @@ class TickEmitter:
     def __init__(self, machine: Machine):
         self.m = machine
         self.flatten = takes_bodies_in(machine)
+        self.noted, self.quiet = noted_instances(machine), quiet_instances(machine)
         self.pointer = code.Pointer(code.Named(machine_type(machine)), writable=True)
         self.feeds: dict[int, list[Connection]] = {}
         for connection in machine.connections:
@@ -154,7 +156,7 @@ class TickEmitter:
             body += self._entries(list(enumerate(state.entries)), readings)
         elif timed:
             body.append(code.Unused(_NOW.text))
-        if state.entries:
+        if any(e.instance in self.noted for e in state.entries):
             body.append(Set(Member(MACHINE, "current_"), NO_INSTANCE, volatile=True))
         return body + self._arbitration(state)
 
@@ -286,8 +288,9 @@ class TickEmitter:
         body = [self._copy(connection, entry) for connection in self.feeds.get(entry.instance, [])]
         if entry.instance in self.m.last_runs:
             body.append(Set(Member(record_of(instance), "last_run"), Binary("+", TICK, ONE)))
-        # A watchdog thread reads it while execute runs, so the compiler must not remove the store.
-        body.append(Set(Member(MACHINE, "current_"), Literal(entry.instance, I32), volatile=True))
+        if entry.instance in self.noted:
+            # A watchdog thread reads it while execute runs, so the compiler must not remove the store.
+            body.append(Set(Member(MACHINE, "current_"), Literal(entry.instance, I32), volatile=True))
         body.append(self._execute(entry, instance))
         if instance.max_wcet_us:
             body.append(self._verdict(instance))
@@ -303,6 +306,10 @@ class TickEmitter:
         record, own = record_of(instance), f"{self.m.name}_{instance.name}"
         this = code.Address(record)
         inject = Member(record, "inject_fault")
+        if entry.instance in self.quiet:
+            usual = (Binary("==", inject, Literal(0, code.U8)), Binary("==", health_of(instance), health(0)))
+            runs = code.Or((code.And(usual), Call(f"fcsl_begin_{own}", (this,))))
+            return If(runs, (Do(Call(f"fcsl_run_{own}", (this,)), unused=True),))
         arguments = (this, _HOST) if instance.execute.uses_hardware else (this,)
         worsen = If(Binary("!=", inject, Literal(0, code.U8)), (Do(Call(f"fcsl_worsen_{own}", (this,))),))
         execute = Do(Call(f"{own}_execute", arguments), unused=True)

@@ -54,11 +54,8 @@ def _own(body: tuple[ir.Stmt, ...]) -> Iterator[ir.Stmt]:
 
 def _rounds(loop: ir.For) -> int:
     """Number of iterations of a short loop with constant bounds, else 0."""
-    if not (isinstance(loop.start, ir.Const) and isinstance(loop.stop, ir.Const)):
-        return 0
-    assert isinstance(loop.start.value, int) and isinstance(loop.stop.value, int)
-    rounds = len(range(loop.start.value, loop.stop.value, loop.step))
-    return rounds if rounds <= _MOST_ROUNDS else 0
+    rounds = ir.constant_rounds(loop)
+    return rounds if rounds is not None and rounds <= _MOST_ROUNDS else 0
 
 
 def _calls(e: ir.Expr) -> bool:

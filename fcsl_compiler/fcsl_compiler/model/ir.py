@@ -341,6 +341,14 @@ HARDWARE_HEADER = "fcsl/fcsl_hw.h"
 Stmt = Assign | Effect | If | For | Break | Continue | Return
 
 
+def constant_rounds(loop: For) -> int | None:
+    """Number of iterations of a loop with constant bounds, unless it is left before."""
+    if not (isinstance(loop.start, Const) and isinstance(loop.stop, Const)):
+        return None
+    assert isinstance(loop.start.value, int) and isinstance(loop.stop.value, int)
+    return len(range(loop.start.value, loop.stop.value, loop.step))
+
+
 def walk(statements: tuple[Stmt, ...]) -> Iterator[Stmt]:
     """All statements of a body, nested ones included, in source order."""
     for s in statements:
@@ -383,6 +391,11 @@ def constants(body: tuple[Stmt, ...]) -> set[tuple[str, str]]:
         return own.union(*map(read, children(e)))
 
     return set().union(*(read(e) for s in walk(body) for e in expressions(s)))
+
+
+def writes_field(statements: tuple[Stmt, ...], record: str, name: str) -> bool:
+    """Whether a body writes this field, wholly or in part."""
+    return any(variable(target) == (record, name) for target, _, _ in writes(statements))
 
 
 def writes(statements: tuple[Stmt, ...]) -> list[tuple[Place, Expr | None, Span]]:
