@@ -20,6 +20,7 @@ from ..model.effects import can_fault
 from ..model.ops import Op
 from ..model.types import BOOL, HEALTH, I64, U64, Array, Scalar, Struct, Type, count_of, shape_of
 from .code_body import CodeBody
+from .copies import copied
 from .fault_places import FaultPlaces, index_cause
 from .names import FAULT, RESULT, constant_name, health, request_constant, struct_type
 from .unrolling import unrolled
@@ -308,16 +309,9 @@ class ExprEmitter:
     def copy(self, destination: code.Place, source: code.Place, type_: Array | Struct) -> None:
         if destination == source:
             return
-        block = self.type_of(type_)
-        if not isinstance(block, code.Block):
-            self.out.add(code.Set(destination, source))
-        elif isinstance(block.element, code.Named):
-            # Assignment instead of a copy of bytes: gcc 12 takes the first member for the whole destination and warns of
-            # an overflow.
-            body = (code.Set(code.Element(destination, _I), code.Element(source, _I)),)
-            self.out.add(code.Count(_I.text, block.count, body, unrolled(block.count)))
-        else:
-            self.out.add(code.Copy(destination, source, block))
+        if isinstance(source, code.Part):
+            source = self.hold_pointer(source, type_)
+        self.out.add(copied(destination, source, self.type_of(type_)))
 
     def scatter(self, target: ir.Slice, source: code.Place) -> None:
         """Copies an array into the elements of a slice that is not contiguous."""

@@ -10,6 +10,7 @@ from ..model.c_names import c_name
 from ..model.code import Call, Deref, Function, If, Member, Name, Set, Statement, Update
 from ..model.machine import Instance, Machine, Values
 from ..model.types import BOOL, HEALTH, U32, U64, Array, Scalar, Type, count_of, leaves, scalar_of
+from .copies import copied
 from .expressions import code_type
 from .fault_places import FaultPlaces
 from .fault_points import written_before_fault
@@ -168,10 +169,8 @@ class InstanceEmitter:
 
     def _copy(self, port: ir.Port, to: code.Place, source: code.Place) -> Statement:
         """Copies one field between two records."""
-        name, type_ = c_name(port.name), code_type(self.m.name, port.type)
-        if isinstance(type_, code.Block):
-            return code.Copy(Member(to, name), Member(source, name), type_)
-        return Set(Member(to, name), Member(source, name))
+        name = c_name(port.name)
+        return copied(Member(to, name), Member(source, name), code_type(self.m.name, port.type))
 
     def _not_stale(self) -> list[Statement]:
         """A running instance is never stale. If a variable can set health to stale, it becomes failed."""

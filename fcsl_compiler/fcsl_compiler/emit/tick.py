@@ -13,6 +13,7 @@ from ..model.code import Binary, Call, Deref, Do, Function, If, Literal, Member,
 from ..model.machine import Channel, Connection, Edge, Entry, Instance, Machine, PortRef, State
 from ..model.types import BOOL, F64, I32, I64, U32, U64
 from .bookkeeping import noted_instances, quiet_instances
+from .copies import copied
 from .expressions import code_type
 from .functions import HOST_TYPE
 from .inline_size import takes_bodies_in
@@ -244,8 +245,7 @@ class TickEmitter:
             assert entry is not None
             of = self._of_channel if connection.source.record == "channels" else self._of_machine
             return Set(target, of(connection.source, entry))
-        source = port_place(self.m, connection.source)
-        return code.Copy(target, source, type_) if isinstance(type_, code.Block) else Set(target, source)
+        return copied(target, port_place(self.m, connection.source), type_)
 
     def _of_machine(self, source: PortRef, entry: Entry) -> code.Expr:
         hz, receiver = self.m.tick_hz, self.m.instances[entry.instance]
