@@ -6,6 +6,7 @@ from __future__ import annotations
 from collections.abc import Iterator
 
 from ..model import code, ir
+from ..model.c_names import c_name
 from ..model.machine import Machine, Values
 from ..model.types import Array, Struct, Type
 from .bookkeeping import quiet_instances
@@ -17,6 +18,7 @@ from .instances import InstanceEmitter, constant
 from .names import constant_name, record_type, request_constant, state_constant
 from .records import records, result_records
 from .step import StepEmitter
+from .straight_line import written_out
 
 
 def emit_machine(machine: Machine, places: FaultPlaces) -> code.Program:
@@ -37,13 +39,33 @@ def emit_machine(machine: Machine, places: FaultPlaces) -> code.Program:
 
 def _functions(machine: Machine, places: FaultPlaces) -> Iterator[code.Function]:
     inlined = inlined_functions(machine)
+    bodies: dict[str, code.Function] = {}
     for function, owner in machine.emitted:
         types = {r: record_type(machine, owner, r) for r in ir.RECORDS} if owner else {}
-        yield FunctionEmitter(function, machine.name, places, types, function.name in inlined).emit()
+        made = FunctionEmitter(function, machine.name, places, types, function.name in inlined).emit()
+        if owner is not None and not function.faults:
+            made = written_out(made, _fields(machine, owner), bodies) or made
+        bodies[made.name] = made
+    yield from _called(bodies, machine)
     quiet = quiet_instances(machine)
     for index, instance in enumerate(machine.instances):
         yield from InstanceEmitter(machine, places, instance, index in quiet).emit()
     yield from StepEmitter(machine).emit()
+
+
+def _fields(machine: Machine, algorithm: ir.Algorithm) -> dict[tuple[str, str], code.Type]:
+    """The types of the fields of an algorithm by record and name."""
+    ports = ((record, port) for record, ports in algorithm.ports.items() for port in ports)
+    return {(record, c_name(port.name)): code_type(machine.name, port.type) for record, port in ports}
+
+
+def _called(functions: dict[str, code.Function], machine: Machine) -> Iterator[code.Function]:
+    """The functions of algorithms, and those that they call. Callees come first."""
+    used = {function.name for function, owner in machine.emitted if owner is not None}
+    for name in reversed(functions):
+        if name in used:
+            used |= code.used_functions(functions[name].body)
+    return (function for name, function in functions.items() if name in used)
 
 
 def _extern(machine: Machine, e: ir.Extern) -> code.Prototype:

@@ -462,6 +462,24 @@ def used_names(body: Sequence[Statement]) -> set[str]:
     return found
 
 
+def used_functions(body: Sequence[Statement]) -> set[str]:
+    """The functions that a body calls."""
+    found: set[str] = set()
+
+    def visit(e: Expr) -> None:
+        if isinstance(e, Call) and isinstance(e.function, str):
+            found.add(e.function)
+        for child in children(e):
+            visit(child)
+
+    for s in body:
+        expressions, bodies = parts(s)
+        for e in expressions:
+            visit(e)
+        found.update(*map(used_functions, bodies))
+    return found
+
+
 # ---- what a machine consists of --------------------------------------------------------------------------------------
 
 #: A literal, or those of the parts.
