@@ -20,7 +20,6 @@ from fcsl_compiler.build_report.instruction_counts import COUNTS
 from fcsl_compiler.build_report.instruction_table import most
 from fcsl_compiler.build_report.levelling import MOST_TICKS, levelled, load_per_tick
 from fcsl_compiler.build_report.objects import NotReadable, read_object
-from fcsl_compiler.build_report.operations import operations
 from fcsl_compiler.build_report.paths import Unbounded
 from fcsl_compiler.build_report.schedule_facts import MOST_SLOTS, NEVER, latency, major_cycle, slots
 from fcsl_compiler.build_report.values import Flags, State, decide, number, plus
@@ -28,6 +27,7 @@ from fcsl_compiler.cli.main import main
 from fcsl_compiler.driver.library import build_library
 from fcsl_compiler.driver.passes import compile_machine
 from fcsl_compiler.driver.toolchain import compile_objects
+from fcsl_compiler.emit.operations import operations
 from fcsl_compiler.model.machine import Entry
 
 LANDER = Path(__file__).parents[2] / "examples/lander/fc/lander_control.json"

@@ -96,8 +96,24 @@ def test_clock_decides_overruns(tmp_path: Path) -> None:
     assert next(times, None) is None  # two readings a tick
 
 
+#: Its `execute` may take long enough for a watchdog.
+BUSY = """\
+class Busy:
+    outputs = {"sum": "f64"}
+
+    def execute(self):
+        for i in range(2000):
+            self.sum += 0.5
+"""
+
+
 def test_watchdog_sees_no_instance_between_ticks(tmp_path: Path) -> None:
-    m = timed(tmp_path)
+    config = {
+        "instances": {"one": {"algorithm": "Busy", "max_wcet_us": 50}},
+        "states": {"A": {"schedule": {"one": 1000}}},
+        "transitions": [],
+    }
+    m = machine(tmp_path, config, busy=BUSY)
     during: list[int] = []
 
     def now() -> int:

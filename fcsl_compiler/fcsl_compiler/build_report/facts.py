@@ -8,12 +8,12 @@ from collections import Counter
 from dataclasses import replace
 from typing import Any
 
+from ..emit.operations import KINDS, operations
 from ..model.machine import Connection, Entry, Machine, PortRef, State
 from .instruction_counts import COUNTS
 from .instruction_table import shown_name
 from .levelling import levelled, load_per_tick
 from .machine_code import Cost, MachineCode
-from .operations import KINDS, operations
 from .paths import Unbounded
 from .schedule_facts import MOST_SLOTS, Latency, Slot, latency_of, major_cycle, slots
 

@@ -6,8 +6,8 @@ from __future__ import annotations
 from collections.abc import Sequence
 
 from ..driver.stack import LEAF_BYTES
+from ..emit.operations import KINDS
 from .facts import Facts
-from .operations import KINDS
 
 _MEASURED = ("own_instructions", "usual_instructions", "instructions", "code_bytes", "record_bytes")
 _SHORT = {"multiply": "mul", "divide": "div", "compare": "cmp", "convert": "conv", "branch": "br"}

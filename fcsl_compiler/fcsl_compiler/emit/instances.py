@@ -94,12 +94,17 @@ class InstanceEmitter:
         """A tick calls `begin` only if the health is not nominal, or if something is injected; then it calls `run`."""
         own = code.Address(Deref(_SELF))
         run = f"fcsl_run_{self.name}"
-        body = [Set(_output("transition_request"), self._no_request)] if self._makes_requests else []
-        yield Function(run, ((_SELF.text, self.pointer),), U32, (*body, *self._body()), "Runs execute, but for its health.")
+        body: list[Statement] = [Set(_output("transition_request"), self._no_request)] if self._makes_requests else []
+        body += self._body()
+        unused = [] if _SELF.text in code.used_names(body) else [code.Unused(_SELF.text)]
+        comment = "Runs execute, but for its health."
+        yield Function(run, ((_SELF.text, self.pointer),), U32, (*unused, *body), comment)
         yield self._exported([Set(_output("health"), health(0)), code.Return(Call(run, (own,)))])
         injected, none = Name("injected"), code.Literal(0, code.U8)
         failed = (*self._failed(code.Literal(self.places.injected, U32)), code.Return(code.Literal(False, BOOL)))
-        least = code.Choice(_is("==", injected, 0), health(0), code.Choice(_is("==", injected, 2), health(1), health(2)))
+        least = code.Choice(
+            _is("==", injected, 0), health(0), code.Choice(_is("==", injected, 2), health(1), health(2))
+        )
         begin = (
             code.Let(injected.text, code.U8, _member("inject_fault")),
             Set(_member("inject_fault"), none),

@@ -238,7 +238,7 @@ class _Evaluation:
                 self._assign(_cell(self._block(names, s.to), at), value)
         elif isinstance(s, code.Clear):
             for at in range(_count(s.type)):
-                self._assign(_cell(self._block(names, s.place), at), cast(code.Expr, _zero(s.type)))
+                self._assign(_cell(self._block(names, s.place), at), _zero(s.type))
         elif isinstance(s, code.Do):
             self._call(names, s.call)
         elif not isinstance(s, code.Unused | code.Comment):
