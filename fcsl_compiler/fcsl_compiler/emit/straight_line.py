@@ -25,7 +25,7 @@ from .code_body import CodeBody
 from .expressions import zero
 
 #: Maximum number of statements. Larger filters are faster as loops, whose operations are vectors.
-_MOST_STATEMENTS = 1000
+_MOST_STATEMENTS = 600
 #: Maximum number of statements that are evaluated, those that only move values included.
 _MOST_EVALUATED = 20_000
 

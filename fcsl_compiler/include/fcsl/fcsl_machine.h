@@ -222,7 +222,7 @@ typedef struct {
     uint64_t tick_hz;
     uint32_t size; /* of the struct, bytes */
     uint32_t align;
-    uint32_t current_offset; /* int32_t: index of the executing instance, or FCSL_NONE; for a watchdog */
+    uint32_t current_offset; /* int32_t: executing instance, or FCSL_NONE; a brief one leaves the one before */
     uint32_t tick_offset; /* uint64_t: ticks completed */
     uint32_t state_offset; /* int32_t: state of the last tick */
     uint32_t next_state_offset; /* int32_t: state of the coming tick */
