@@ -65,6 +65,11 @@ class Compilation:
         return f"{self.checked.name}.{self.backend}"
 
     @property
+    def c_name(self) -> str:
+        """The C file that is compiled: what a printer wrote, or what Nim makes of it."""
+        return self.source_name if self.backend == "c" else f"{self.source_name}.c"
+
+    @property
     def checked(self) -> Machine:
         assert self.machine is not None
         return self.machine
