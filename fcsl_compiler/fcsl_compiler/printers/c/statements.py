@@ -64,8 +64,6 @@ class CStatements:
         w, e = self.w, self.e
         if isinstance(s, code.At):
             self._at(s)
-        elif isinstance(s, code.Comment):
-            w.line(f"/* {s.text} */")
         elif isinstance(s, code.Let):
             w.line(f"{constant_declarator(s.type, s.name)} = {e.bare(s.value)};")
         elif isinstance(s, code.Var):

@@ -22,8 +22,6 @@ class Module:
         self.types, self.members = Names(), Names()
         self.globals = Names(self.types)
         self.fields = {r.name: r.fields for r in (*program.records, *program.private_records)}
-        #: Functions of the descriptor.
-        self.entries = {f"fcsl_{entry}_{program.name}" for entry in ("init", "step", "force_state")}
         self.state_type = f"{_capital(program.name)}State"
         self.request_type = f"{_capital(program.name)}Request"
         for name in ("Health", "Host", self.state_type, self.request_type):

@@ -24,10 +24,10 @@ import std/volatile
 {.pragma: usual, codegenDecl: "static $# $#$#".}
 {.pragma: hint, codegenDecl: "static inline $# $#$#".}
 {.pragma: always, codegenDecl: "static inline __attribute__((always_inline)) $# $#$#".}
-{.pragma: apart, codegenDecl: "static __attribute__((noinline)) $# $#$#".}
+{.pragma: never, codegenDecl: "static __attribute__((noinline)) $# $#$#".}
 {.pragma: rare, codegenDecl: "static __attribute__((cold, noinline)) $# $#$#".}
 {.pragma: flat, codegenDecl: "static __attribute__((flatten)) $# $#$#".}
-{.pragma: flat_apart, codegenDecl: "static __attribute__((noinline, flatten)) $# $#$#".}
+{.pragma: flat_never, codegenDecl: "static __attribute__((noinline, flatten)) $# $#$#".}
 """
 
 _HOST = """\

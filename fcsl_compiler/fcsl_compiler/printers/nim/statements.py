@@ -9,9 +9,6 @@ from .expressions import Module, NimExpressions
 from .names import Names
 from .writer import NimWriter
 
-#: Names of the pragmas in module.py.
-_PRAGMAS = {"always": "always", "hint": "hint", "usual": "usual", "never": "apart", "rare": "rare"}
-
 
 class NimStatements:
     """Writes the functions of a module. `helpers` collects the procs that they call."""
@@ -40,18 +37,19 @@ class NimStatements:
         w.line()
 
     def _pragmas(self, f: code.Function) -> str:
-        """Names in the library are those of the C backend, so all tools find them."""
+        """Names in the library are those of the C backend, so all tools find them. The pragmas of `inline` are in
+        module.py."""
         if f.exported:
             return f'exportc: "{f.name}", cdecl'
-        inline = _PRAGMAS[f.inline]
+        inline = f.inline
         if f.flatten:
-            inline = "flat_apart" if f.inline == "never" else "flat"
+            inline = "flat_never" if f.inline == "never" else "flat"
         return f'exportc: "{f.name}", {inline}'
 
     def body(self, statements: code.Body) -> None:
         for s in statements:
             self._statement(s)
-        if all(isinstance(s, code.At | code.Comment | code.Unused | code.Table) for s in statements):
+        if all(isinstance(s, code.At | code.Unused | code.Table) for s in statements):
             self.w.line("discard")
 
     def _nested(self, head: str, body: code.Body) -> None:
@@ -65,8 +63,6 @@ class NimStatements:
             e.indices.add(s.name)
         if isinstance(s, code.At):
             self._at(s)
-        elif isinstance(s, code.Comment):
-            w.comment(s.text)
         elif isinstance(s, code.Let):
             # A record is not set to zero before it is copied.
             pragma = " {.noinit.}" if isinstance(s.type, code.Named) else ""
