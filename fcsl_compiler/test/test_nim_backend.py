@@ -51,6 +51,29 @@ def test_generated_nim(name: str) -> None:
     golden(f"{name}.nim.txt", made.source.replace(made.build_hash, "…"))
 
 
+@pytest.mark.parametrize("name", ["small", "values"])
+def test_nim_warns_of_nothing(tmp_path: Path, name: str) -> None:
+    """A user's program imports the module."""
+    module = tmp_path / f"{name}.nim"
+    module.write_text(compile_machine(GOLDEN / f"{name}.json", "", backend="nim").source)
+    quiet = ("--hints:off", "--skipCfg", "--compileOnly", f"--nimcache:{tmp_path / 'c'}")
+    done = subprocess.run(["nim", "c", *quiet, str(module)], capture_output=True, text=True, timeout=120)
+    assert (done.returncode, done.stdout + done.stderr) == (0, "")
+
+
+def test_a_number_that_is_no_state_runs_nothing() -> None:
+    machines = [Machine.build(CONFIG), nim_machine(CONFIG)]
+    for m in machines:
+        m.step(5)
+        before = {path: bytes(m.raw(path)) for path in m.fields}
+        for path in ("machine.state", "machine.next_state"):
+            m.raw(path)[0] = 99
+            before[path] = bytes(m.raw(path))
+        m.step(3)
+        changed = {path for path in m.fields if bytes(m.raw(path)) != before[path]}
+        assert changed == {"machine.tick"}
+
+
 def test_no_host_can_tell_which_backend_made_a_machine() -> None:
     """But by the build hash."""
     c, nim = Machine.build(CONFIG), nim_machine(CONFIG)

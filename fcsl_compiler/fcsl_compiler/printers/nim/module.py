@@ -20,7 +20,7 @@ from .writer import NimWriter
 _PRELUDE = """\
 import std/volatile
 
-{.push checks: off, stackTrace: off, raises: [].}
+{.push checks: off, stackTrace: off, raises: [], warning[UnreachableElse]: off.}
 {.pragma: usual, codegenDecl: "static $# $#$#".}
 {.pragma: hint, codegenDecl: "static inline $# $#$#".}
 {.pragma: always, codegenDecl: "static inline __attribute__((always_inline)) $# $#$#".}

@@ -147,6 +147,8 @@ class NimStatements:
         self.w.line(f"case {self.e.bare(s.value)}")
         for constant, body in s.cases:
             self._nested(f"of {self.e.text(constant)}", body)
+        # Memory may hold a number that is no state. Without this line some compilers take it for impossible.
+        self.w.line("else: discard")
 
     def _count(self, s: code.Count) -> None:
         if 0 < s.count <= s.unroll:
