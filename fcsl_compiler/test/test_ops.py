@@ -17,7 +17,7 @@ from fcsl_compiler.driver.passes import compile_machine
 from fcsl_compiler.driver.toolchain import toolchain
 from fcsl_compiler.model import ops
 from fcsl_compiler.model.types import HEALTH, REQUEST
-from fcsl_compiler.printers.c.operations import spelling_of
+from fcsl_compiler.printers.c.operations import SPELLINGS
 from fcsl_compiler.reference.infer import SELF, Kind, Names
 from fcsl_compiler.reference.rewrite import Rewriter
 from fcsl_compiler.reference.runtime import runtime
@@ -216,7 +216,7 @@ def test_health_compares() -> None:
 
 def test_every_faulting_operation_says_when() -> None:
     for op in ops.all_ops():
-        spelling = spelling_of(op)
+        spelling = SPELLINGS[op.id]
         assert bool(op.faults) == ("{fault}" in spelling.text) == bool(spelling.proven), op.id
         assert "{fault}" not in spelling.proven, op.id
 

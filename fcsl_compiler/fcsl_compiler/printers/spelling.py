@@ -3,10 +3,11 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterator
 from dataclasses import dataclass
 
 from ..model.ops import op_id
-from ..model.types import Scalar
+from ..model.types import BOOL, HEALTH, NUMBERS, REQUEST, Scalar
 
 
 @dataclass(frozen=True)
@@ -31,3 +32,13 @@ def entry(
     name: str, args: tuple[Scalar, ...], text: str, helper: str = "", proven: str = "", proven_helper: str = ""
 ) -> Entry:
     return op_id(name, args), Spelling(text, helper, proven, proven_helper)
+
+
+def comparisons() -> Iterator[Entry]:
+    """Order and equality, which all languages write alike."""
+    for t in NUMBERS:
+        for symbol in ("<", "<=", ">", ">=", "==", "!="):
+            yield entry(symbol, (t, t), f"({{0}} {symbol} {{1}})")
+    for t in (BOOL, REQUEST, HEALTH):
+        for symbol in ("==", "!="):
+            yield entry(symbol, (t, t), f"({{0}} {symbol} {{1}})")
