@@ -23,13 +23,14 @@ from fcsl_compiler.base.diagnostics import DiagnosticError
 from fcsl_compiler.cli.main import main
 from fcsl_compiler.driver.cache import build_machine
 from fcsl_compiler.driver.externs import build_externs
-from fcsl_compiler.driver.nim import refuse_allocation
+from fcsl_compiler.driver.nim import FLAGS, refuse_allocation
 from fcsl_compiler.driver.passes import compile_machine
 from fcsl_compiler.driver.toolchain import ToolchainError, include_dirs, math_library
 from fcsl_compiler.reference.externs import externs_of
 
 EXAMPLES = Path(__file__).parents[2] / "examples"
 PAGE = EXAMPLES.parent / "docs/nim.md"
+C_OF_NIM = Path(__file__).parents[1] / "cmake/fcsl_c_of_nim.cmake"
 
 
 def nim_machine(config: Path, **options: Any) -> Machine:
@@ -340,6 +341,33 @@ def test_a_nim_program_hosts_a_machine(tmp_path: Path) -> None:
         m.step()
         expected.append(float(m.get("pilot.outputs.force")))
     assert [float(line.split()[-1]) for line in printed.splitlines()] == pytest.approx(expected, rel=1e-15)
+
+
+def test_cmake_has_the_flags_of_fcslc() -> None:
+    (flags,) = re.findall(r"set\(flags (.*?)\)", C_OF_NIM.read_text(), re.DOTALL)
+    assert ("c", *flags.split()) == FLAGS
+
+
+def test_cmake_takes_the_compiler_of_fcslc(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """$NIM is a command with arguments."""
+    (tmp_path / "board.nim").write_text(BOARD)
+    (tmp_path / "CMakeLists.txt").write_text(
+        f"cmake_minimum_required(VERSION 3.22)\nproject(by_nim C)\ninclude({json.dumps(str(C_OF_NIM))})\n"
+        'fcsl_c_of_nim(board board.nim "" made library)\nadd_custom_target(board ALL DEPENDS "${made}")\n'
+    )
+    wrapper, log = tmp_path / "my nim", tmp_path / "log"
+    wrapper.write_text(f'#!/bin/sh\nshift\necho "$1" >> {log}\nexec nim "$@"\n')
+    wrapper.chmod(0o755)
+    configure = ["cmake", "-S", str(tmp_path), "-B", str(tmp_path / "build")]
+    monkeypatch.setenv("NIM", f"'{wrapper}' first")
+    for command in (configure, ["cmake", "--build", str(tmp_path / "build")]):
+        subprocess.run(command, check=True, capture_output=True, timeout=120)
+    assert log.read_text().split() == ["dump", "c"]
+    assert (tmp_path / "build/board_nim/board.nim.c").is_file()
+    monkeypatch.setenv("NIM", "/nowhere/nim")
+    done = subprocess.run(configure, capture_output=True, text=True, timeout=120)
+    said = " ".join(done.stderr.split())
+    assert done.returncode != 0 and "`/nowhere/nim dump` does not say" in said and "or set NIM" in said
 
 
 def test_cmake(tmp_path: Path) -> None:
