@@ -1,6 +1,6 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Every vehicle flies on the library of the Nim backend as on that of the C backend: the last state of plant and machine is
-the same, bit for bit."""
+"""Every vehicle flies on the library of the Nim backend as on that of the C backend: the last state of plant and
+machine is the same, bit for bit."""
 
 from __future__ import annotations
 

@@ -1,9 +1,9 @@
 # C of one file in Nim.
 
 # fcsl_c_of_nim(<name> <file> <module> <source> <library>)
-#   Has Nim make C of <file> and sets <source> to its path, and <library> to the folder of nimbase.h. <module>: what the file
-#   may import, or "". Only this C is compiled: Nim's system module, with its allocator, is not linked. $NIM names the
-#   compiler, as for fcslc.
+#   Has Nim make C of <file> and sets <source> to its path, and <library> to the folder of nimbase.h. <module>: what the
+#   file may import, or "". Only this C is compiled: Nim's system module, with its allocator, is not linked. $NIM names
+#   the compiler, as for fcslc.
 function(fcsl_c_of_nim name file module source library)
   get_filename_component(file "${file}" ABSOLUTE)
   get_filename_component(stem "${file}" NAME_WE)
@@ -18,8 +18,8 @@ function(fcsl_c_of_nim name file module source library)
   set(program "${folder}/fcsl_program.nim")
   file(CONFIGURE OUTPUT "${program}" CONTENT "import ${stem}\n")
   # The flags of fcsl_compiler/driver/nim.py.
-  set(flags --compileOnly --noMain --app:staticlib --mm:none -d:danger --threads:off --skipCfg --skipUserCfg --skipParentCfg
-    --skipProjCfg --hints:off --warnings:off --colors:off)
+  set(flags --compileOnly --noMain --app:staticlib --mm:none -d:danger --threads:off --skipCfg --skipUserCfg
+    --skipParentCfg --skipProjCfg --hints:off --warnings:off --colors:off)
   execute_process(COMMAND ${nim} dump --skipCfg --dump.format:json "${program}"
     OUTPUT_VARIABLE facts ERROR_QUIET)
   string(JSON nim_library ERROR_VARIABLE failed GET "${facts}" libpath)

@@ -60,8 +60,8 @@ _OPTIONAL = ("parameters", "inputs", "integrator", "tolerances")
 class SimConfig:
     """A checked simulation. `tables` maps each instance to its model, in update order.
 
-    `controller` is the name of the first controller, `companions` are those beside it. `ros` lists the standard messages onto which truth is mapped; `until` is the stop condition as text, empty without one;
-    `warnings` are rendered texts.
+    `controller` is the name of the first controller, `companions` are those beside it. `ros` lists the standard messages
+    onto which truth is mapped; `until` is the stop condition as text, empty without one; `warnings` are rendered texts.
     """
 
     path: Path
@@ -133,10 +133,10 @@ def load(
     """Reads and checks a `*.sim.json`, compiles its models and its machine (both cached).
 
     path: of the file, or package://<ROS package>/<path below its share folder>.
-    seed, duration_s: replace the file's. sets: `instance.parameters.name=value`, or an element of it. events, beside the
-    file's: `14.0 instance.parameters.name=value`. machine: library and name of a compiled controller, which replaces the
-    file's. backend: language (BACKENDS) into which the file's machines are compiled. Raises DiagnosticError with all
-    errors of the file, or SimError if the file or the simulator is missing.
+    seed, duration_s: replace the file's. sets: `instance.parameters.name=value`, or an element of it. events, beside
+    the file's: `14.0 instance.parameters.name=value`. machine: library and name of a compiled controller, which
+    replaces the file's. backend: language (BACKENDS) into which the file's machines are compiled. Raises
+    DiagnosticError with all errors of the file, or SimError if the file or the simulator is missing.
     """
     try:
         file = resolve_source(str(path), config=Path()) if str(path).startswith("package://") else Path(path)

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""`--set altimeter.parameters.sigma=0.8`, `--set wind.parameters.wind_north[2]=3`: values in place of those of the file.
+"""`--set altimeter.parameters.sigma=0.8`, `--set wind.parameters.wind_north[2]=3`: values in place of the file's.
 
 A path is one that a study may disperse (campaign/study.py), or a whole array, or a row of one.
 """

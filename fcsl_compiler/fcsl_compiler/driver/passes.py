@@ -163,7 +163,8 @@ def compile_machine(
 ) -> Compilation:
     """Runs the passes up to `until` (a name of PASSES). Raises DiagnosticError if the program has an error.
 
-    `cover`: the C contains probes (coverage/instrument.py); backend "c" alone has them. `instances`: instances of a subset machine.
+    `cover`: the C contains probes (coverage/instrument.py); backend "c" alone has them. `instances`: instances of a
+    subset machine.
     """
     c = Compilation(path, toolchain, strict, target, instances, cover=cover, backend=backend)
     for step in PASSES:

@@ -24,8 +24,8 @@ def bare(text: str) -> str:
 
 
 class Expressions(ABC):
-    """Writes expressions. Subclasses know what differs between languages. `spellings`: those of operations by their ids.
-    `helpers` collects the functions that expressions call, by name."""
+    """Writes expressions. Subclasses know what differs between languages. `spellings`: those of operations by their
+    ids. `helpers` collects the functions that expressions call, by name."""
 
     null: str
     #: Makes a literal the number of a fault's place.

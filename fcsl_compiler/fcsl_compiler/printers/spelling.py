@@ -12,10 +12,10 @@ from ..model.types import BOOL, HEALTH, NUMBERS, REQUEST, Scalar
 
 @dataclass(frozen=True)
 class Spelling:
-    """`text` is the expression. Placeholders: {0}, {1}, … for the operands, {place} for the place number of each cause of a
-    fault, {fault} for the pointer that stores the first fault. `proven` is the expression if the operands are known not
-    to fault. `helper` and `proven_helper` are the functions that these expressions call; each is written once per
-    machine.
+    """`text` is the expression. Placeholders: {0}, {1}, … for the operands, {place} for the place number of each cause
+    of a fault, {fault} for the pointer that stores the first fault. `proven` is the expression if the operands are
+    known not to fault. `helper` and `proven_helper` are the functions that these expressions call; each is written once
+    per machine.
     """
 
     text: str

@@ -132,7 +132,7 @@ class NimExpressions(Expressions):
         if isinstance(place, code.Name):
             return f"{'unsafeAddr' if place.text in self.tables else 'addr'} {self._name(place.text)}"
         if self._table(place) and not isinstance(place, code.Part):
-            # Nim takes the value of a part of a constant. Behind a pointer that it does not see through it has an address.
+            # Nim takes the value of a part of a constant. Behind an opaque pointer it has an address.
             return f"addr {self.text(_behind_pointer(place))}"
         if isinstance(place, code.Part):
             base = _behind_pointer(place.base) if self._table(place) else place.base

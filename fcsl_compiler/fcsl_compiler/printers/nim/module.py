@@ -70,8 +70,8 @@ iterator fcsl_down(start, stop, step: int64): int64 {.inline.} =
 
 
 def print_module(program: code.Program, print_descriptor: Callable[[CWriter], None]) -> NimWriter:
-    """`print_descriptor` writes the C of the descriptor. It is constant data with addresses, valid before anything runs,
-    which Nim cannot write."""
+    """`print_descriptor` writes the C of the descriptor. It is constant data with addresses, valid before anything
+    runs, which Nim cannot write."""
     w, module = NimWriter(), Module(program)
     w.line(f"# {program.name}.nim: made by fcslc from {program.source}. Do not edit.")
     functions, helpers = NimWriter(), dict[str, str]()
