@@ -4,6 +4,7 @@ machine is the same, bit for bit."""
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from pathlib import Path
 
 import numpy as np
@@ -11,7 +12,7 @@ import pytest
 
 from fcsl_compiler.model.target import BACKENDS
 from fcsl_sim.sim_twin import SimTwin
-from simclient import AlgTwin
+from simclient.twin.twin import Twin
 
 EXAMPLES = Path(__file__).resolve().parents[1] / "examples"
 #: The simulation of each vehicle, and how long it flies, s.
@@ -40,11 +41,15 @@ def test_vehicles_fly_alike(vehicle: str) -> None:
     assert by_nim == by_c
 
 
-def test_a_twin_opens_either() -> None:
-    config = EXAMPLES / "ahrs/ahrs.json"
-    found = []
-    for backend in BACKENDS:
-        with AlgTwin.from_config(config, backend=backend) as twin:
+def test_the_fixtures_open_either(fcsl: Callable[..., Twin], fcsl_sim: Callable[..., SimTwin]) -> None:
+    """With every kind of twin (--fcsl-twin)."""
+    for twins in (
+        [fcsl(EXAMPLES / "ahrs/ahrs.json", backend=backend) for backend in BACKENDS],
+        [fcsl_sim(EXAMPLES / "lander/sim/lander.sim.json", backend=backend) for backend in BACKENDS],
+    ):
+        for twin in twins:
             twin.tick(100)
-            found.append((twin.machine.source_hash, {path: str(twin.get_value(path)) for path in twin.machine.fields}))
-    assert found[0] == found[1]
+        c, nim = (twin.machine for twin in twins)
+        assert c.build_hash != nim.build_hash and c.source_hash == nim.source_hash
+        by_c, by_nim = ({path: str(twin.get_value(path)) for path in c.fields} for twin in twins)
+        assert by_nim == by_c
