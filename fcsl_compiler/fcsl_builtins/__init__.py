@@ -21,9 +21,10 @@ _FUNCTIONS = (
     "sat_i32 sat_i64 sat_u32 sat_u64 wrap_add wrap_sub wrap_mul sat_add sat_sub sat_mul "
     # array constructors, and the numeric library
     "zeros eye "
-    "dot norm normalize cross3 outer trace diag transpose matvec matmul symmetric_product inv det lu_solve ldl_solve solve "
-    "cholesky quat_mul quat_conj quat_normalize quat_rotate quat_to_dcm quat_from_axis_angle quat_from_euler quat_to_euler "
-    "quat_slerp kf_predict_state kf_predict_cov kf_gain kf_update_state kf_update_cov kf_update_cov_joseph"
+    "dot norm normalize cross3 skew outer trace diag transpose matvec matmul symmetric_product inv det lu_solve "
+    "ldl_solve solve cholesky quat_mul quat_conj quat_normalize quat_rotate quat_to_dcm quat_from_axis_angle quat_turn "
+    "quat_from_euler quat_to_euler quat_slerp kf_predict_state kf_predict_cov kf_gain kf_update_state kf_update_cov "
+    "kf_update_cov_joseph"
 ).split()
 
 __all__ = ["extern", "pi", "inf", "nan", *_TYPES, *_HARDWARE, *_FUNCTIONS]

@@ -208,6 +208,9 @@ def normalize(a: _Array) -> _Array:
 def cross3(a: _Array, b: _Array) -> _Array:
     """cross3(a: f64[3], b: f64[3]) -> f64[3]: a × b."""
 
+def skew(v: _Array) -> _Array:
+    """skew(v: f64[3]) -> f64[3][3]: The matrix of a cross product: skew(v) w = v × w."""
+
 def outer(a: _Array, b: _Array) -> _Array:
     """outer(a: f64[n], b: f64[m]) -> f64[n][m]: a bᵀ."""
 
@@ -264,6 +267,9 @@ def quat_to_dcm(q: _Array) -> _Array:
 
 def quat_from_axis_angle(axis: _Array, angle: float) -> _Array:
     """quat_from_axis_angle(axis: f64[3], angle: f64) -> f64[4]: Rotation by angle (rad) about a unit axis: (cos(angle/2), axis sin(angle/2))."""
+
+def quat_turn(q: _Array, turn: _Array) -> _Array:
+    """quat_turn(q: f64[4], turn: f64[3]) -> f64[4]: q ⊗ exp(turn / 2): the rotation q, turned further by the rotation vector turn (rad, in body axes)."""
 
 def quat_from_euler(roll: float, pitch: float, yaw: float) -> _Array:
     """quat_from_euler(roll: f64, pitch: f64, yaw: f64) -> f64[4]: ZYX Euler angles (rad): yaw about z, then pitch about the new y, then roll about the new x."""

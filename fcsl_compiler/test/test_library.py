@@ -36,6 +36,7 @@ class Functions:
         "r_trace": "f64",
         "r_normalize": "f64[3]",
         "r_cross3": "f64[3]",
+        "r_skew": "f64[3][3]",
         "r_outer": "f64[3][3]",
         "r_diag": "f64[3][3]",
         "r_transpose": "f64[2][3]",
@@ -51,6 +52,7 @@ class Functions:
         "r_back": "f64[3]",
         "r_quat_to_dcm": "f64[3][3]",
         "r_quat_from_axis_angle": "f64[4]",
+        "r_quat_turn": "f64[4]",
         "r_quat_from_euler": "f64[4]",
         "r_quat_to_euler": "f64[3]",
         "r_quat_slerp": "f64[4]",
@@ -64,6 +66,7 @@ class Functions:
         self.r_trace = trace(self.a)
         self.r_normalize = normalize(self.v)
         self.r_cross3 = cross3(self.v, self.w)
+        self.r_skew = skew(self.v)
         self.r_outer = outer(self.v, self.w)
         self.r_diag = diag(self.v)
         self.r_transpose = transpose(self.b)
@@ -81,6 +84,7 @@ class Functions:
         self.r_back = quat_rotate(quat_conj(q), self.r_quat_rotate)
         self.r_quat_to_dcm = quat_to_dcm(q)
         self.r_quat_from_axis_angle = quat_from_axis_angle(normalize(self.v), self.angle)
+        self.r_quat_turn = quat_turn(q, self.v)
         self.r_quat_from_euler = quat_from_euler(self.v[0], self.v[1], self.v[2])
         self.r_quat_to_euler = quat_to_euler(q)
         self.r_quat_slerp = quat_slerp(p, q, self.t)
@@ -122,6 +126,8 @@ def test_vectors_and_matrices(functions: Twins) -> None:
         assert np.array_equal(found["r_symmetric"], upper + np.triu(upper, 1).T), "also of what is not symmetric"
         crossed = np.abs(np.roll(v, -1) * np.roll(w, 1)) + np.abs(np.roll(v, 1) * np.roll(w, -1))
         within(found["r_cross3"], np.cross(v, w), 2 * gamma(2) * crossed, "cross3")
+        within(found["r_skew"] @ w, np.cross(v, w), 2 * gamma(2) * crossed, "skew")
+        assert np.array_equal(found["r_skew"], -found["r_skew"].T)
         within(found["r_trace"], np.trace(a), 2 * gamma(2) * np.sum(np.abs(np.diag(a))), "trace")
         # The root halves the error of a sum of squares and adds one rounding.
         length = np.linalg.norm(v)
@@ -157,6 +163,8 @@ def test_quaternions(functions: Twins) -> None:
         euler, got = np.roll(Rotation.from_euler("ZYX", v[::-1]).as_quat(), 1), found["r_quat_from_euler"]
         bound = (16 + 4 * size) * ROUNDING
         within(got * np.sign(got @ euler), euler, bound, "quat_from_euler")
+        further, got = np.roll((world * Rotation.from_rotvec(v)).as_quat(), 1), found["r_quat_turn"]
+        within(got * np.sign(got @ further), further, bound, "quat_turn")
         yaw, pitch, roll = world.as_euler("ZYX")
         # Near the pole the angles are ill-conditioned: 1 / cos(pitch).
         bound = 64 * ROUNDING / max(1e-6, math.cos(pitch))
@@ -203,6 +211,11 @@ def test_special_values_are_the_same_bits(functions: Twins, special: float) -> N
             if isinstance(value, np.ndarray):
                 value[tuple(rng.integers(0, s) for s in value.shape)] = special
         run_both(functions, u | {"angle": special, "t": special}, f"{special} case {case}")
+
+
+def test_no_turn_leaves_a_quaternion_as_it_is(functions: Twins) -> None:
+    found = run_both(functions, random_inputs(np.random.default_rng(8)) | {"v": np.zeros(3)}, "")
+    assert np.array_equal(found["r_quat_turn"], found["r_quat_normalize"])
 
 
 def test_zero_vectors_normalize_to_nan(functions: Twins) -> None:

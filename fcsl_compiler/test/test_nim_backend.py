@@ -23,13 +23,14 @@ from fcsl_compiler.base.diagnostics import DiagnosticError
 from fcsl_compiler.cli.main import main
 from fcsl_compiler.driver.cache import build_machine
 from fcsl_compiler.driver.externs import build_externs
-from fcsl_compiler.driver.nim import refuse_allocation
+from fcsl_compiler.driver.nim import FLAGS, refuse_allocation
 from fcsl_compiler.driver.passes import compile_machine
 from fcsl_compiler.driver.toolchain import ToolchainError, include_dirs, math_library
 from fcsl_compiler.reference.externs import externs_of
 
 EXAMPLES = Path(__file__).parents[2] / "examples"
 PAGE = EXAMPLES.parent / "docs/nim.md"
+C_OF_NIM = Path(__file__).parents[1] / "cmake/fcsl_c_of_nim.cmake"
 
 
 def nim_machine(config: Path, **options: Any) -> Machine:
@@ -49,6 +50,29 @@ def test_generated_nim(name: str) -> None:
     """`small` is a plain machine; `values` has every kind of value: structs, slices, frozen parameters, hardware."""
     made = compile_machine(GOLDEN / f"{name}.json", "", backend="nim")
     golden(f"{name}.nim.txt", made.source.replace(made.build_hash, "…"))
+
+
+@pytest.mark.parametrize("name", ["small", "values"])
+def test_nim_warns_of_nothing(tmp_path: Path, name: str) -> None:
+    """A user's program imports the module."""
+    module = tmp_path / f"{name}.nim"
+    module.write_text(compile_machine(GOLDEN / f"{name}.json", "", backend="nim").source)
+    quiet = ("--hints:off", "--skipCfg", "--compileOnly", f"--nimcache:{tmp_path / 'c'}")
+    done = subprocess.run(["nim", "c", *quiet, str(module)], capture_output=True, text=True, timeout=120)
+    assert (done.returncode, done.stdout + done.stderr) == (0, "")
+
+
+def test_a_number_that_is_no_state_runs_nothing() -> None:
+    machines = [Machine.build(CONFIG), nim_machine(CONFIG)]
+    for m in machines:
+        m.step(5)
+        before = {path: bytes(m.raw(path)) for path in m.fields}
+        for path in ("machine.state", "machine.next_state"):
+            m.raw(path)[0] = 99
+            before[path] = bytes(m.raw(path))
+        m.step(3)
+        changed = {path for path in m.fields if bytes(m.raw(path)) != before[path]}
+        assert changed == {"machine.tick"}
 
 
 def test_no_host_can_tell_which_backend_made_a_machine() -> None:
@@ -317,6 +341,33 @@ def test_a_nim_program_hosts_a_machine(tmp_path: Path) -> None:
         m.step()
         expected.append(float(m.get("pilot.outputs.force")))
     assert [float(line.split()[-1]) for line in printed.splitlines()] == pytest.approx(expected, rel=1e-15)
+
+
+def test_cmake_has_the_flags_of_fcslc() -> None:
+    (flags,) = re.findall(r"set\(flags (.*?)\)", C_OF_NIM.read_text(), re.DOTALL)
+    assert ("c", *flags.split()) == FLAGS
+
+
+def test_cmake_takes_the_compiler_of_fcslc(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """$NIM is a command with arguments."""
+    (tmp_path / "board.nim").write_text(BOARD)
+    (tmp_path / "CMakeLists.txt").write_text(
+        f"cmake_minimum_required(VERSION 3.22)\nproject(by_nim C)\ninclude({json.dumps(str(C_OF_NIM))})\n"
+        'fcsl_c_of_nim(board board.nim "" made library)\nadd_custom_target(board ALL DEPENDS "${made}")\n'
+    )
+    wrapper, log = tmp_path / "my nim", tmp_path / "log"
+    wrapper.write_text(f'#!/bin/sh\nshift\necho "$1" >> {log}\nexec nim "$@"\n')
+    wrapper.chmod(0o755)
+    configure = ["cmake", "-S", str(tmp_path), "-B", str(tmp_path / "build")]
+    monkeypatch.setenv("NIM", f"'{wrapper}' first")
+    for command in (configure, ["cmake", "--build", str(tmp_path / "build")]):
+        subprocess.run(command, check=True, capture_output=True, timeout=120)
+    assert log.read_text().split() == ["dump", "c"]
+    assert (tmp_path / "build/board_nim/board.nim.c").is_file()
+    monkeypatch.setenv("NIM", "/nowhere/nim")
+    done = subprocess.run(configure, capture_output=True, text=True, timeout=120)
+    said = " ".join(done.stderr.split())
+    assert done.returncode != 0 and "`/nowhere/nim dump` does not say" in said and "or set NIM" in said
 
 
 def test_cmake(tmp_path: Path) -> None:

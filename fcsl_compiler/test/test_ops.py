@@ -17,7 +17,9 @@ from fcsl_compiler.driver.passes import compile_machine
 from fcsl_compiler.driver.toolchain import toolchain
 from fcsl_compiler.model import ops
 from fcsl_compiler.model.types import HEALTH, REQUEST
-from fcsl_compiler.printers.c.operations import spelling_of
+from fcsl_compiler.printers.c import operations as c
+from fcsl_compiler.printers.nim import operations as nim
+from fcsl_compiler.printers.spelling import Spelling
 from fcsl_compiler.reference.infer import SELF, Kind, Names
 from fcsl_compiler.reference.rewrite import Rewriter
 from fcsl_compiler.reference.runtime import runtime
@@ -214,9 +216,11 @@ def test_health_compares() -> None:
             assert op.name in ("==", "!=")
 
 
-def test_every_faulting_operation_says_when() -> None:
+@pytest.mark.parametrize("spellings", [c.SPELLINGS, nim.SPELLINGS], ids=["c", "nim"])
+def test_a_printer_spells_every_operation(spellings: dict[str, Spelling]) -> None:
+    assert spellings.keys() == {op.id for op in ops.all_ops()}
     for op in ops.all_ops():
-        spelling = spelling_of(op)
+        spelling = spellings[op.id]
         assert bool(op.faults) == ("{fault}" in spelling.text) == bool(spelling.proven), op.id
         assert "{fault}" not in spelling.proven, op.id
 

@@ -18,6 +18,7 @@ from fcsl_compiler.base.source import SourceError, SourceFile, Span
 from fcsl_compiler.config.views import Signals, read_views
 from fcsl_compiler.driver.cache import build_machine
 from fcsl_compiler.driver.toolchain import ToolchainError
+from fcsl_compiler.model.target import DEFAULT_BACKEND
 from fcsl_compiler.model.types import Type, scalar_of
 from fcsl_compiler.parse.json_reader import ConfigReader, Everything
 from fcsl_compiler.parse.json_source import JsonNode
@@ -59,8 +60,8 @@ _OPTIONAL = ("parameters", "inputs", "integrator", "tolerances")
 class SimConfig:
     """A checked simulation. `tables` maps each instance to its model, in update order.
 
-    `controller` is the name of the first controller, `companions` are those beside it. `ros` lists the standard messages onto which truth is mapped; `until` is the stop condition as text, empty without one;
-    `warnings` are rendered texts.
+    `controller` is the name of the first controller, `companions` are those beside it. `ros` lists the standard messages
+    onto which truth is mapped; `until` is the stop condition as text, empty without one; `warnings` are rendered texts.
     """
 
     path: Path
@@ -127,13 +128,15 @@ def load(
     sets: Sequence[str] = (),
     events: Sequence[str] = (),
     machine: tuple[Path, str] | None = None,
+    backend: str = DEFAULT_BACKEND,
 ) -> SimConfig:
     """Reads and checks a `*.sim.json`, compiles its models and its machine (both cached).
 
     path: of the file, or package://<ROS package>/<path below its share folder>.
-    seed, duration_s: replace the file's. sets: `instance.parameters.name=value`, or an element of it. events, beside the file's:
-    `14.0 instance.parameters.name=value`. machine: library and name of a compiled controller, which replaces the
-    file's. Raises DiagnosticError with all errors of the file, or SimError if the file or the simulator is missing.
+    seed, duration_s: replace the file's. sets: `instance.parameters.name=value`, or an element of it. events, beside
+    the file's: `14.0 instance.parameters.name=value`. machine: library and name of a compiled controller, which
+    replaces the file's. backend: language (BACKENDS) into which the file's machines are compiled. Raises
+    DiagnosticError with all errors of the file, or SimError if the file or the simulator is missing.
     """
     try:
         file = resolve_source(str(path), config=Path()) if str(path).startswith("package://") else Path(path)
@@ -148,7 +151,7 @@ def load(
     assert root is not None
     _refuse_machine(file, root)
     root = with_events(root, events, sink)
-    return _Loader(file, sink, sets, machine).load(root, seed, duration_s)
+    return _Loader(file, sink, sets, machine, backend).load(root, seed, duration_s)
 
 
 def _refuse_machine(file: Path, root: JsonNode) -> None:
@@ -177,8 +180,10 @@ def _plant_only(tick_hz: int) -> tuple[Path, str]:
 
 
 class _Loader:
-    def __init__(self, file: Path, sink: DiagnosticSink, sets: Sequence[str], machine: tuple[Path, str] | None):
-        self.file, self.sink, self.given_machine = file, sink, machine
+    def __init__(
+        self, file: Path, sink: DiagnosticSink, sets: Sequence[str], machine: tuple[Path, str] | None, backend: str
+    ):
+        self.file, self.sink, self.given_machine, self.backend = file, sink, machine, backend
         self.reader = ConfigReader(sink)
         self.parts = _Parts()
         self.link_node: JsonNode | None = None
@@ -335,7 +340,7 @@ class _Loader:
         path = resolve_source(text, config=config) if text.startswith("package://") else config.parent / text
         if not path.is_file():
             raise SourcePathError(f"no such file: {path}")
-        built = build_machine(path)
+        built = build_machine(path, backend=self.backend)
         return built.library, built.name
 
     def _read_duration(self, node: JsonNode | None, given_s: Fraction | None) -> None:

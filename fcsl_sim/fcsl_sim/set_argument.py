@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""`--set altimeter.parameters.sigma=0.8`, `--set wind.parameters.wind_north[2]=3`: values in place of those of the file.
+"""`--set altimeter.parameters.sigma=0.8`, `--set wind.parameters.wind_north[2]=3`: values in place of the file's.
 
 A path is one that a study may disperse (campaign/study.py), or a whole array, or a row of one.
 """
@@ -7,7 +7,6 @@ A path is one that a study may disperse (campaign/study.py), or a whole array, o
 from __future__ import annotations
 
 import math
-import re
 from collections.abc import Sequence
 from dataclasses import dataclass
 
@@ -17,10 +16,10 @@ from fcsl_compiler.model.types import scalar_of, shape_of
 from fcsl_compiler.parse.json_reader import ConfigReader
 from fcsl_compiler.parse.json_source import JsonNode, parse_json
 
+from .element_path import name_an_element, place_of, split_path
 from .models import ModelField, type_of
 
 _OPTION = "--set"
-_PATH = re.compile(r"(.+?)((?:\[\d+\])*)")
 Value = bool | int | float | str
 
 
@@ -47,10 +46,8 @@ class Settings:
                 sink.error("E215", "not of the form `instance.parameters.name=value`", span)
                 continue
             value = parse_json(SourceFile(f"{_OPTION} {path}", value_text), sink)
-            parts = _PATH.fullmatch(path)
-            whole, brackets = parts.groups() if parts else (path, "")
             if value:
-                self._left.append(Setting(whole, tuple(map(int, re.findall(r"\d+", brackets))), span, value))
+                self._left.append(Setting(*split_path(path), span, value))
 
     def take_whole(self, path: str) -> Setting | None:
         """The last one of the field as a whole."""
@@ -76,14 +73,14 @@ def with_elements(
     """The value of a field, row-major, with its parts replaced. E217: there is no such element."""
     shape, changed = shape_of(target.type), list(scalars)
     for setting in settings:
-        whole, count = setting.path, len(setting.index)
-        if count > len(shape) or any(i >= n for i, n in zip(setting.index, shape, strict=False)):
-            fix = f"name an element: `{whole}{'[0]' * len(shape)}`" if shape else f"write `{whole}`"
-            reader.sink.error("E217", f"`{whole}` is {target.type}", setting.span, help=fix)
+        at = place_of(setting.index, shape)
+        if at is None:
+            fix = name_an_element(setting.path, shape)
+            reader.sink.error("E217", f"`{setting.path}` is {target.type}", setting.span, help=fix)
             continue
         what = f"{target.role} `{target.name}{''.join(f'[{i}]' for i in setting.index)}`"
-        part = reader.value(setting.value, type_of(scalar_of(target.type).name, shape[count:]), what)
-        size = math.prod(shape[count:])
-        at = sum(i * math.prod(shape[axis + 1 :]) for axis, i in enumerate(setting.index))
+        rest = shape[len(setting.index) :]
+        part = reader.value(setting.value, type_of(scalar_of(target.type).name, rest), what)
+        size = math.prod(rest)
         changed[at : at + size] = part or changed[at : at + size]
     return changed

@@ -22,7 +22,7 @@ from typing import Any, Self
 from fcsl_compiler.base.diagnostics import DiagnosticError
 from simclient.descriptor import Field
 from simclient.errors import TwinError
-from simclient.machine_build import find_config
+from simclient.machine_build import check_backend, find_config
 from simclient.twin.alg_twin import AlgTwin
 from simclient.twin.black_box import BlackBox
 from simclient.twin.overwritten import warn
@@ -65,19 +65,20 @@ class SimTwin(AlgTwin):
 
         `path` is relative to the working directory, or else to the caller's file, or package://PACKAGE/PATH. `seed` and
         `duration` (s) replace those of the file; `sets` replaces parameters of models, `events` adds events:
-        ["altimeter.parameters.sigma=0.8"], ["14.0 altimeter.parameters.dropout=true"]. Raises TwinError, with the
-        diagnostics if the file is wrong.
+        ["altimeter.parameters.sigma=0.8"], ["14.0 altimeter.parameters.dropout=true"]. `backend` ("c" or "nim") is the
+        language into which its machines are compiled; the flight is the same. Raises TwinError, with the diagnostics if
+        the file is wrong.
         """
         if target != "simulation":
             raise TwinError(f"target={target!r}: the machine of a simulation is compiled for `simulation` alone")
         found: str | Path = path
         if not str(path).startswith("package://"):
             found = find_config(path, sys._getframe(1).f_code.co_filename, "simulation")
-        return cls(SimRun(_load(found, seed, sets, events, duration)))
+        return cls(SimRun(_load(found, seed, sets, events, duration, backend)))
 
     @classmethod
     def _open_config(cls, config: Path, target: str, instances: Sequence[str] | None, backend: str) -> Self:
-        return cls(SimRun(_load(config, None, (), (), None)))
+        return cls(SimRun(_load(config, None, (), (), None, backend)))
 
     @classmethod
     def from_instances(
@@ -128,15 +129,17 @@ def _load(
     sets: Sequence[str],
     events: Sequence[str],
     duration: float | Fraction | None,
+    backend: str,
 ) -> SimConfig:
     """Raises TwinError."""
+    check_backend(backend)
     for name, texts in (("sets", sets), ("events", events)):
         if isinstance(texts, str) or not all(isinstance(text, str) for text in texts):
             raise TwinError(f"{name}={texts!r}: a list of texts wanted")
     if seed is not None and (type(seed) is not int or not 0 <= seed < 2**64):
         raise TwinError(f"seed={seed!r}: an integer from 0 to 2**64 - 1 wanted")
     try:
-        return load(path, seed=seed, duration_s=_seconds(duration), sets=sets, events=events)
+        return load(path, seed=seed, duration_s=_seconds(duration), sets=sets, events=events, backend=backend)
     except (SimError, DiagnosticError) as error:
         raise TwinError(str(error)) from None
 

@@ -293,6 +293,7 @@ def test_what_is_not_for_simulations_says_what_to_do() -> None:
         (lambda: SimTwin.from_instances(FLIGHT, ["filter"]), "tick_hz"),
         (lambda: SimTwin.from_library("libx.so"), "simulation file"),
         (lambda: SimTwin.from_config(FLIGHT, "board"), "for `simulation` alone"),
+        (lambda: SimTwin.from_config(FLIGHT, backend="ada"), "one of c, nim wanted"),
         (lambda: SimTwin.from_config(FLIGHT, sets="a=1"), "a list of texts"),
         (lambda: SimTwin.from_config(FLIGHT, seed=-1), r"0 to 2\*\*64 - 1"),
         (lambda: SimTwin.from_config(FLIGHT, duration="soon"), "a number of seconds"),

@@ -42,8 +42,8 @@ def build_machine(
     """The library of one machine. It is taken from the cache if config, sources, target, compiler and flags are
     unchanged.
 
-    `instances`: instances of a subset machine. If COVER_DIR is set, the result is a build for coverage, by the C backend.
-    Raises DiagnosticError (str() is the rendered text) and ToolchainError.
+    `instances`: instances of a subset machine. If COVER_DIR is set, the result is a build for coverage, by the C
+    backend. Raises DiagnosticError (str() is the rendered text) and ToolchainError.
     """
     try:
         return _build_machine(config, target, instances, backend)

@@ -171,9 +171,9 @@ def _compile(compilations: list[Compilation], sources: list[Path], output: Path,
         # With coverage, the host maps the counters. Threads may still use them after the host closes the library.
         stays = ["-Wl,-z,nodelete"] if any(c.cover for c in compilations) else []
         link_shared([*objects, *foreign.files], [], output, inspect_build, [*foreign.flags, *stays])
-    made = {source.name.split(".")[0]: compiled for source, compiled in zip(sources, objects, strict=True)}
+    made = {source.name: compiled for source, compiled in zip(sources, objects, strict=True)}
     for c in compilations:
-        inspect(c, made[c.checked.name], includes)
+        inspect(c, made[c.c_name], includes)
 
 
 def stack_bounds(folder: Path, externs: Sequence[str] = ()) -> dict[str, int]:

@@ -65,6 +65,11 @@ class Compilation:
         return f"{self.checked.name}.{self.backend}"
 
     @property
+    def c_name(self) -> str:
+        """The C file that is compiled: what a printer wrote, or what Nim makes of it."""
+        return self.source_name if self.backend == "c" else f"{self.source_name}.c"
+
+    @property
     def checked(self) -> Machine:
         assert self.machine is not None
         return self.machine
@@ -158,7 +163,8 @@ def compile_machine(
 ) -> Compilation:
     """Runs the passes up to `until` (a name of PASSES). Raises DiagnosticError if the program has an error.
 
-    `cover`: the C contains probes (coverage/instrument.py); backend "c" alone has them. `instances`: instances of a subset machine.
+    `cover`: the C contains probes (coverage/instrument.py); backend "c" alone has them. `instances`: instances of a
+    subset machine.
     """
     c = Compilation(path, toolchain, strict, target, instances, cover=cover, backend=backend)
     for step in PASSES:

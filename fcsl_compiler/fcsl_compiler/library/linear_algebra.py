@@ -46,6 +46,15 @@ def cross3(a: "f64[3]", b: "f64[3]") -> "f64[3]":
     return [a[1] * b[2] - a[2] * b[1], a[2] * b[0] - a[0] * b[2], a[0] * b[1] - a[1] * b[0]]
 
 
+def skew(v: "f64[3]") -> "f64[3][3]":
+    """The matrix of a cross product: skew(v) w = v × w.
+
+    Order: exact.
+    Singular: none.
+    """
+    return [[0.0, -v[2], v[1]], [v[2], 0.0, -v[0]], [-v[1], v[0], 0.0]]
+
+
 def outer(a: "f64[n]", b: "f64[m]") -> "f64[n][m]":
     """a bᵀ.
 

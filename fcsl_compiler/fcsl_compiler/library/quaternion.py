@@ -82,6 +82,19 @@ def quat_from_axis_angle(axis: "f64[3]", angle: "f64") -> "f64[4]":
     return [cos(0.5 * angle), axis[0] * s, axis[1] * s, axis[2] * s]
 
 
+def quat_turn(q: "f64[4]", turn: "f64[3]") -> "f64[4]":
+    """q ⊗ exp(turn / 2): the rotation q, turned further by the rotation vector turn (rad, in body axes).
+
+    Source: Solà §2.4.
+    Order: angle = norm(turn), then quat_normalize(quat_mul(q, quat_from_axis_angle(turn / angle, angle))).
+    Singular: q as it is where the angle is exactly 0.
+    """
+    angle = norm(turn)
+    if angle == 0.0:
+        return q
+    return quat_normalize(quat_mul(q, quat_from_axis_angle(turn / angle, angle)))
+
+
 def quat_from_euler(roll: "f64", pitch: "f64", yaw: "f64") -> "f64[4]":
     """ZYX Euler angles (rad): yaw about z, then pitch about the new y, then roll about the new x.
 

@@ -260,11 +260,6 @@ class At:
 
 
 @dataclass(frozen=True)
-class Comment:
-    text: str
-
-
-@dataclass(frozen=True)
 class Let:
     """A variable that keeps this value."""
 
@@ -404,7 +399,6 @@ class Continue:
 
 Statement = (
     At
-    | Comment
     | Let
     | Var
     | Table

@@ -10,8 +10,8 @@ from .writer import Writer
 
 
 def source_map(program: code.Program, writer: Writer, file: str) -> str:
-    """The Python (or JSON) line of every generated line as JSON, as runs [first, last, file, line], and the externs that
-    the file calls."""
+    """The Python (or JSON) line of every generated line as JSON, as runs [first, last, file, line], and the externs
+    that the file calls."""
     runs: list[list[object]] = []
     for number, origin in enumerate(writer.origins, start=1):
         if origin is None:

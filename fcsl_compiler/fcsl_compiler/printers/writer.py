@@ -3,6 +3,7 @@
 
 from __future__ import annotations
 
+from abc import ABC, abstractmethod
 from collections.abc import Iterator
 from contextlib import contextmanager
 
@@ -11,7 +12,7 @@ from ..base.source import Span
 Lines = tuple[list[str], list[Span | None]]
 
 
-class Writer:
+class Writer(ABC):
     """Collects lines. `origins[i]` is the span that line i was generated from, or None."""
 
     step = "    "
@@ -32,8 +33,19 @@ class Writer:
         for part in text.rstrip("\n").split("\n"):
             self.line(part)
 
-    def comment(self, text: str) -> None:
-        raise NotImplementedError
+    @abstractmethod
+    def comment(self, text: str) -> None: ...
+
+    @abstractmethod
+    def open(self, head: str) -> None:
+        """Begins a block of statements."""
+
+    @abstractmethod
+    def reopen(self, head: str) -> None:
+        """Ends a block and begins the next branch of the same statement."""
+
+    @abstractmethod
+    def close(self) -> None: ...
 
     @contextmanager
     def indented(self) -> Iterator[None]:

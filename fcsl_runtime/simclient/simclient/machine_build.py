@@ -28,6 +28,14 @@ def find_config(path: str | Path, caller: str = "", what: str = "machine config"
     raise TwinError(f"no such {what}: {' nor '.join(str(p.absolute()) for p in tried)}")
 
 
+def check_backend(backend: str) -> None:
+    """Raises TwinError if there is no such backend."""
+    from fcsl_compiler.model.target import BACKENDS
+
+    if backend not in BACKENDS:
+        raise TwinError(f"backend={backend!r}: one of {', '.join(BACKENDS)} wanted")
+
+
 def build_config(
     path: str | Path, target: str = "simulation", instances: Sequence[str] | None = None, backend: str = "c"
 ) -> tuple[Path, str]:
@@ -39,10 +47,8 @@ def build_config(
     from fcsl_compiler.base.diagnostics import DiagnosticError
     from fcsl_compiler.driver.cache import build_machine
     from fcsl_compiler.driver.toolchain import ToolchainError
-    from fcsl_compiler.model.target import BACKENDS
 
-    if backend not in BACKENDS:
-        raise TwinError(f"backend={backend!r}: one of {', '.join(BACKENDS)} wanted")
+    check_backend(backend)
     try:
         built = build_machine(config, target, instances, backend)
     except (DiagnosticError, ToolchainError) as error:

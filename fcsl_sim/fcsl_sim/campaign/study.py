@@ -4,7 +4,6 @@
 from __future__ import annotations
 
 import hashlib
-import re
 from collections.abc import Sequence
 from dataclasses import dataclass
 from fractions import Fraction
@@ -12,13 +11,14 @@ from pathlib import Path
 
 from fcsl_compiler.base.diagnostics import DiagnosticSink, nearest
 from fcsl_compiler.base.source import SourceError, SourceFile, Span
-from fcsl_compiler.model.types import Scalar, count_of, scalar_of, shape_of
+from fcsl_compiler.model.types import Scalar, scalar_of, shape_of
 from fcsl_compiler.parse.json_reader import ConfigReader
 from fcsl_compiler.parse.json_source import JsonNode, parse_json
 from fcsl_compiler.parse.source_path import SourcePathError, resolve_source
 from simclient.descriptor import Machine
 
 from ..config import SimConfig, load
+from ..element_path import name_an_element, place_of, split_path
 from ..errors import SimError
 from ..models import ModelField
 from ..sim_run import SimRun
@@ -45,7 +45,6 @@ _DESIGNS = ("random", "latin_hypercube", "sweep", "corners")
 _SPREADS = ("uniform", "normal", "choice", "linear")
 _EXAMPLE = '{"uniform": [0.5, 1.5]}'
 _DEFAULT_TIMEOUT_S = 60.0
-_ELEMENT = re.compile(r"(.+?)((?:\[\d+\])*)")
 
 
 @dataclass(frozen=True)
@@ -180,8 +179,7 @@ class _Reader:
 
     def _target(self, path: str, span: Span, config: SimConfig, starts: set[str]) -> tuple[ModelField, str] | None:
         """The field, and how the statement that sets it begins."""
-        parts = _ELEMENT.fullmatch(path)
-        whole, brackets = parts.groups() if parts else (path, "")
+        whole, index = split_path(path)
         instance, _, rest = whole.partition(".")
         table = config.tables.get(instance)
         field = table.fields.get(rest) if table else None
@@ -191,17 +189,12 @@ class _Reader:
             self.sink.error("E210", f"there is no parameter or input `{whole}` of a model", span, help=fix)
             return None
         shape = shape_of(field.type)
-        index = [int(text) for text in re.findall(r"\d+", brackets)]
-        if len(index) != len(shape) or any(i >= extent for i, extent in zip(index, shape, strict=True)):
-            what = f"`{whole}` is {field.type}"
-            fix = f"name an element: `{whole}{'[0]' * len(shape)}`" if shape else f"write `{whole}`"
-            self.sink.error("E217", f"{what}; a study disperses scalars", span, help=fix)
+        place = place_of(index, shape)
+        if place is None or len(index) < len(shape):
+            what = f"`{whole}` is {field.type}; a study disperses scalars"
+            self.sink.error("E217", what, span, help=name_an_element(whole, shape))
             return None
-        element = 0
-        for i, extent in zip(index, shape, strict=True):
-            element = element * extent + i
-        assert element < count_of(field.type)
-        key = f"set {instance} {field.path} {element}"
+        key = f"set {instance} {field.path} {place}"
         if key not in starts:
             fix = f"give it one: in `{field.role}s` of `{instance}`"
             self.sink.error("E211", f"`{path}` has no value in the simulation", span, help=fix)

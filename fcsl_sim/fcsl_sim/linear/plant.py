@@ -4,7 +4,6 @@
 from __future__ import annotations
 
 import ctypes
-import re
 import struct
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -18,12 +17,12 @@ from fcsl_compiler.base.diagnostics import nearest
 from fcsl_compiler.model.types import scalar_of, shape_of
 
 from ..config import SimConfig
+from ..element_path import place_of, split_path
 from ..errors import SimError
 from ..models import ModelField
 from ..native import Simulation
 
 Array = np.ndarray[Any, Any]
-_ELEMENT = re.compile(r"([a-zA-Z]\w*)\.(.+?)((?:\[\d+\])*)")
 _FORMATS = {"f64": "d", "f32": "f"}
 
 
@@ -88,28 +87,27 @@ class Plant:
 
     def variables(self, path: str, roles: Sequence[str]) -> list[Variable]:
         """The scalar at a path, or all of an array. Raises SimError."""
-        parts = _ELEMENT.fullmatch(path)
-        instance, rest, brackets = parts.groups() if parts else ("", path, "")
+        whole, index = split_path(path)
+        instance, _, rest = whole.partition(".")
         table = self.config.tables.get(instance)
         field = table.fields.get(rest) if table else None
         if field is None or field.role not in roles:
             known = [f"{i}.{f.path}" for i, t in self.config.tables.items() for f in t.of_role(*roles)]
             kinds = " or ".join(roles)
-            hint = nearest(f"{instance}.{rest}", known)
+            hint = nearest(whole, known)
             raise SimError(f"there is no {kinds} `{path}` of a model" + (f"; {hint}" if hint else ""))
         scalar = scalar_of(field.type).name
         if scalar not in _FORMATS:
             raise SimError(f"`{path}` is {field.type}, no floating number")
-        index = tuple(int(text) for text in re.findall(r"\d+", brackets))
         shape = shape_of(field.type)
-        if index and (len(index) != len(shape) or any(i >= n for i, n in zip(index, shape, strict=True))):
+        if index and (len(index) < len(shape) or place_of(index, shape) is None):
             raise SimError(f"`{path}`: there is no such element of {field.type}")
         wanted = [index] if index or not shape else list(np.ndindex(*shape))
         size = struct.calcsize(_FORMATS[scalar])
         found = []
         for place in wanted:
             number = int(np.ravel_multi_index(place, shape)) if shape else 0
-            text = f"{instance}.{rest}" + "".join(f"[{i}]" for i in place)
+            text = whole + "".join(f"[{i}]" for i in place)
             found.append(Variable(text, field.unit, instance, field.offset + number * size, _FORMATS[scalar]))
         if field.role == "state":
             by_path = {state.path: state for state in self.states}
@@ -121,7 +119,7 @@ class Plant:
 
     def is_fed_by_a_model(self, variable: Variable) -> bool:
         """Whether a connection within the plant sets this input."""
-        path = re.sub(r"(\[\d+\])+$", "", variable.path.partition(".")[2])
+        path, _ = split_path(variable.path.partition(".")[2])
         ends = [line.split(" ") for line in self.config.plan.splitlines() if line.startswith("link ")]
         return any(words[3:] == [variable.instance, path] for words in ends)
 

@@ -20,7 +20,6 @@ from __future__ import annotations
 
 import cmath
 import math
-import re
 import tempfile
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass
@@ -36,6 +35,7 @@ from simclient.errors import TwinError
 from simclient.twin.trace import Trace
 
 from ..config import SimConfig, load
+from ..element_path import place_of, split_path
 from ..errors import SimError
 from ..sim_run import SimRun
 from ..sim_twin import SimTwin
@@ -268,18 +268,14 @@ class _Output:
 
     def __init__(self, twin: SimTwin, path: str):
         self.path = path
-        brackets = path[len(path.partition("[")[0]) :]
-        self.field = path.removesuffix(brackets)
-        index = tuple(int(text) for text in re.findall(r"\d+", brackets))
+        self.field, self.element = split_path(path)
         field = twin.describe(self.field)
-        is_index = re.fullmatch(r"(\[\d+\])*", brackets) and len(index) == len(field.shape)
-        if not is_index or any(i >= n for i, n in zip(index, field.shape, strict=True)):
+        if len(self.element) < len(field.shape) or place_of(self.element, field.shape) is None:
             raise SimError(
                 f"`{path}`: {self.field} is {field.type_text}; name one element of it, or itself if it is a number"
             )
         if field.type not in ("f64", "f32"):
             raise SimError(f"`{path}` is {field.type_text}, no floating number")
-        self.element = index
         self.unit = field.unit
 
 

@@ -5,7 +5,6 @@ from __future__ import annotations
 
 import json
 import os
-import re
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 from pathlib import Path
@@ -21,6 +20,7 @@ from fcsl_compiler.parse.json_source import JsonNode, parse_json
 from fcsl_compiler.parse.source_path import SourcePathError, resolve_source
 
 from ..config import SimConfig, load
+from ..element_path import split_path
 from ..errors import SimError
 from .plant import Array, Plant, Variable
 
@@ -180,7 +180,7 @@ def _fields(plant: Plant, paths: Iterable[str]) -> dict[str, Any]:
     """Inputs and parameters as a simulation file has them, whole."""
     found = {}
     for path in paths:
-        whole = re.sub(r"(\[\d+\])+$", "", path)
+        whole, _ = split_path(path)
         instance, record, rest = whole.split(".", 2)
         if record != "state":
             shape = shape_of(plant.config.tables[instance].fields[f"{record}.{rest}"].type)

@@ -55,11 +55,6 @@ def build(config: Path, folder: Path, backend: str = DEFAULT_BACKEND) -> Binary:
     return Binary(binary.machine, library, binary.lined, binary.graphs, binary.externs, binary.bound)
 
 
-def c_name(made: Compilation) -> str:
-    """The C file of a machine: what the compiler wrote, or what Nim made of it."""
-    return made.source_name if made.backend == "c" else f"{made.source_name}.c"
-
-
 def compile_lined(made: Compilation, folder: Path, output: Path, more: Target | None = None) -> Binary:
     """The C files of a machine in `folder` as they stand there, and its externs, with line numbers; unchecked.
 
@@ -71,7 +66,7 @@ def compile_lined(made: Compilation, folder: Path, output: Path, more: Target | 
     includes = [folder, *include_dirs(), *(d for t in targets for d in t.include)]
     library = output / "library.so"
     with _line_numbers():
-        sources = [folder / c_name(made), folder / "fcsl_machines.c"]
+        sources = [folder / made.c_name, folder / "fcsl_machines.c"]
         objects = compile_objects(sources, includes, output / "objects", graphs=True)
         foreign = link_inputs(targets, output / "externs", folder)
         link_shared([*objects, *foreign.files], [], library, flags=foreign.flags)

@@ -115,7 +115,7 @@ class Builder:
         sources: list[Path] = []
         includes = [folder, *include_dirs()]
         for compilation in emit(list(EXAMPLES.values()), folder):
-            sources += [folder / f"{compilation.checked.name}.c", *compilation.target.sources]
+            sources += [folder / compilation.c_name, *compilation.target.sources]
             includes += compilation.target.include
         return [compiled(s, includes, ["-Wno-unused"]) for s in [*sources, folder / "fcsl_machines.c"]]
 

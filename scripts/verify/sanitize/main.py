@@ -139,7 +139,7 @@ def machines(build: Build) -> Row:
     sources = [HERE / "machines.c", SHARED / "stimulus.c", folder / "fcsl_machines.c"]
     includes = [SHARED, folder, *include_dirs()]
     for c in compilations:
-        sources += [folder / f"{c.checked.name}.c", *c.target.sources]
+        sources += [folder / c.c_name, *c.target.sources]
         includes += c.target.include
     line = [
         "-std=c11",

@@ -58,7 +58,7 @@ def emit_case(config: Path, folder: Path) -> Case:
         compilation.checked.name,
         config,
         folder,
-        (folder / f"{compilation.checked.name}.c", folder / "fcsl_machines.c"),
+        (folder / compilation.c_name, folder / "fcsl_machines.c"),
         target.sources,
         (folder, *include_dirs(), *target.include),
     )

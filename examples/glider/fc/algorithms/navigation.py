@@ -21,12 +21,13 @@ from fcsl_builtins import (
     quat_rotate,
     quat_to_dcm,
     quat_to_euler,
+    quat_turn,
+    skew,
     sqrt,
     symmetric_product,
     transpose,
     zeros,
 )
-from rotations import skew, turned
 
 # Errors: angle 0 to 2 (body axes), velocity 3 (NED), gyro bias 6, accelerometer bias 9, wind 12 (north, east),
 # height 14.
@@ -184,9 +185,9 @@ class Navigation:
             push = self.delta_velocity - self.accelerometer_bias * self.dt
             f = transition(self.attitude, angle, push, self.dt)
             before = self.velocity
-            self.velocity = before + quat_rotate(turned(self.attitude, 0.5 * angle), push)
+            self.velocity = before + quat_rotate(quat_turn(self.attitude, 0.5 * angle), push)
             self.velocity[2] += self.gravity * self.dt
-            self.attitude = turned(self.attitude, angle)
+            self.attitude = quat_turn(self.attitude, angle)
             self.position = self.position + (before + self.velocity) * (0.5 * self.dt)
             self.height -= 0.5 * (before[2] + self.velocity[2]) * self.dt
             q = zeros(N)
@@ -260,7 +261,7 @@ class Navigation:
                 _taken, found, p = corrected_by_one(self.P, h, self.sideslip_white * self.sideslip_white, lacking)
                 error = error + found
                 self.P = p
-            self.attitude = turned(self.attitude, error[0:3])
+            self.attitude = quat_turn(self.attitude, error[0:3])
             self.velocity = self.velocity + error[3:6]
             self.gyro_bias = self.gyro_bias + error[6:9]
             self.accelerometer_bias = self.accelerometer_bias + error[9:12]

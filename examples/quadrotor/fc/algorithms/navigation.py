@@ -17,13 +17,15 @@ from fcsl_builtins import (
     quat_conj,
     quat_rotate,
     quat_to_dcm,
+    quat_turn,
+    skew,
     sqrt,
     symmetric_product,
     transpose,
     wrap_angle,
     zeros,
 )
-from rotations import DOWN, heading, skew, turned
+from rotations import DOWN, heading
 
 # Errors: angle 0 to 2 (body axes), velocity 3, position 6, gyro bias 9, accelerometer bias 12, drift of the GNSS 15,
 # barometer bias 18.
@@ -219,11 +221,11 @@ class Navigation:
             push = self.delta_velocity - self.accelerometer_bias * self.dt
             keep = exp(-self.dt / self.drift_time)
             f = transition(self.attitude, angle, push, keep, self.dt)
-            velocity = self.velocity + quat_rotate(turned(self.attitude, 0.5 * angle), push)
+            velocity = self.velocity + quat_rotate(quat_turn(self.attitude, 0.5 * angle), push)
             velocity[2] += self.gravity * self.dt
             self.position = self.position + (self.velocity + velocity) * (0.5 * self.dt)
             self.velocity = velocity
-            self.attitude = turned(self.attitude, angle)
+            self.attitude = quat_turn(self.attitude, angle)
             q = zeros(N)
             for i in range(3):
                 q[i] = self.gyro_noise * self.gyro_noise * self.dt
@@ -274,7 +276,7 @@ class Navigation:
                 self.P = p
                 if taken:
                     self.magnetometer_age = 0.0
-            self.attitude = turned(self.attitude, error[0:3])
+            self.attitude = quat_turn(self.attitude, error[0:3])
             self.velocity = self.velocity + error[3:6]
             self.position = self.position + error[6:9]
             self.gyro_bias = self.gyro_bias + error[9:12]

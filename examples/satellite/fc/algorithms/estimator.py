@@ -16,12 +16,13 @@ from fcsl_builtins import (
     quat_conj,
     quat_mul,
     quat_normalize,
+    skew,
     sqrt,
     symmetric_product,
     transpose,
     zeros,
 )
-from rotations import rotation_vector, skew, turned
+from rotations import rotation_vector, turned
 
 GATE = 30.0  # chi squared of 3 degrees of freedom: 1.4e-6 are beyond it
 BLIND_NOISE = 0.1  # rad/s/sqrt(Hz): how the attitude may turn while the gyroscope says nothing

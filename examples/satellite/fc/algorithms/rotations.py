@@ -7,11 +7,6 @@ from fcsl_builtins import atan2, cos, f64, norm, quat_mul, quat_normalize, sin, 
 SMALL = 1e-12  # rad
 
 
-def skew(a: f64[3]) -> f64[3][3]:
-    """The matrix of a x."""
-    return [[0.0, -a[2], a[1]], [a[2], 0.0, -a[0]], [-a[1], a[0], 0.0]]
-
-
 def turned(q: f64[4], angle: f64[3]) -> f64[4]:
     """q turned further by a rotation vector in body axes."""
     size = norm(angle)

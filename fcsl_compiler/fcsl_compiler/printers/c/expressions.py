@@ -8,8 +8,9 @@ from collections.abc import Mapping
 from ...model import code
 from ...model.c_names import c_literal
 from ...model.types import HEALTH, REQUEST, Scalar
+from ..expressions import Expressions
 from ..spelling import Spelling
-from .operations import spelling_of
+from .operations import SPELLINGS
 
 INDEX_HELPER = """static inline int64_t fcsl_index(int64_t index, int64_t size, uint32_t place, uint32_t *fault)
 {
@@ -57,111 +58,65 @@ def literal(e: code.Literal) -> str:
     return str(int(e.value)) if e.type in (REQUEST, HEALTH) else c_literal(e.value, e.type)
 
 
-def bare(text: str) -> str:
-    """The expression without the parentheses that enclose all of it."""
-    if not (text.startswith("(") and text.endswith(")")):
-        return text
-    depth = 0
-    for position, char in enumerate(text):
-        depth += (char == "(") - (char == ")")
-        if depth == 0 and position < len(text) - 1:
-            return text
-    return text[1:-1]
+class CExpressions(Expressions):
+    """Writes expressions. `extensions`: operations beside those of the language."""
 
-
-class CExpressions:
-    """Writes expressions. `helpers` collects the C functions that they call. `extensions`: operations beside those of the
-    language."""
+    null = "NULL"
+    place_suffix = "u"
 
     def __init__(self, extensions: Mapping[str, Spelling]):
-        self.extensions = extensions
-        self.helpers: dict[str, str] = {}
-
-    def bare(self, e: code.Expr) -> str:
-        return bare(self.text(e))
-
-    def text(self, e: code.Expr) -> str:
-        if isinstance(e, code.Name):
-            return e.text
-        if isinstance(e, code.Literal):
-            return literal(e)
-        if isinstance(e, code.Deref):
-            return f"*{self.text(e.pointer)}"
-        if isinstance(e, code.Member):
-            if isinstance(e.base, code.Deref):
-                return f"{self.text(e.base.pointer)}->{e.name}"
-            return f"{self.text(e.base)}.{e.name}"
-        if isinstance(e, code.Element):
-            return self._element(e.base, [self.text(e.index)])
-        if isinstance(e, code.Part):
-            return f"&{self._element(e.base, [self.text(e.start)])}"
-        if isinstance(e, code.Address):
-            return self._address(e)
-        if isinstance(e, code.Operation):
-            return self._operation(e)
-        if isinstance(e, code.Choice):
-            return f"({self.text(e.condition)} ? {self.text(e.then)} : {self.text(e.otherwise)})"
-        if isinstance(e, code.And | code.Or):
-            return f"({(' && ' if isinstance(e, code.And) else ' || ').join(map(self.text, e.args))})"
-        if isinstance(e, code.Not):
-            return f"!{self._operand(e.arg)}"
-        if isinstance(e, code.Binary):
-            return f"{self._operand(e.left)} {e.symbol} {self._operand(e.right)}"
-        if isinstance(e, code.Convert):
-            return f"({type_name(e.type).rstrip()}){self._operand(e.arg)}"
-        if isinstance(e, code.Sum):
-            return self._sum(e)
-        if isinstance(e, code.CheckedIndex):
-            return self._checked(e)
-        if isinstance(e, code.Null):
-            return "NULL"
-        function = e.function if isinstance(e.function, str) else self.text(e.function)
-        return f"{function}({', '.join(map(self.bare, e.args))})"
-
-    def _operand(self, e: code.Expr) -> str:
-        text = self.text(e)
-        return f"({text})" if isinstance(e, code.Binary) else text
-
-    def _element(self, base: code.Place, index: list[str]) -> str:
-        if isinstance(base, code.Part):
-            return self._element(base.base, [self.text(base.start), *index])
-        return f"{self.elements(base)}[{' + '.join(index)}]"
+        super().__init__({**SPELLINGS, **extensions}, {})
 
     def elements(self, block: code.Place) -> str:
         """Pointer to the elements of a block."""
         return self.text(block.pointer) if isinstance(block, code.Deref) else self.text(block)
+
+    def _name(self, text: str) -> str:
+        return text
+
+    def _literal(self, e: code.Literal) -> str:
+        return literal(e)
+
+    def _deref(self, e: code.Deref) -> str:
+        return f"*{self.text(e.pointer)}"
+
+    def _member(self, e: code.Member) -> str:
+        if isinstance(e.base, code.Deref):
+            return f"{self.text(e.base.pointer)}->{e.name}"
+        return f"{self.text(e.base)}.{e.name}"
+
+    def _indexed(self, block: code.Place) -> str:
+        return self.elements(block)
+
+    def _part(self, e: code.Part) -> str:
+        return f"&{self._element(e.base, [self.text(e.start)])}"
 
     def _address(self, e: code.Address) -> str:
         if isinstance(e.place, code.Deref):
             return self.text(e.place.pointer)
         return self.text(e.place) if e.block else f"&{self.text(e.place)}"
 
-    def _operation(self, e: code.Operation) -> str:
-        spelling = self.extensions.get(e.op.id) or spelling_of(e.op)
-        proven = bool(e.op.faults) and not e.places
-        text, helper = (spelling.proven, spelling.proven_helper) if proven else (spelling.text, spelling.helper)
-        if helper:
-            self._help(helper)
-        operands = list(map(self.text, e.args))
-        if text.startswith("("):
-            operands = [f"({o})" if o.startswith("-") else o for o in operands]
-        else:
-            operands = list(map(bare, operands))
-        place = ", ".join(f"{number}u" for number in e.places)
-        return text.format(*operands, place=place, fault="" if e.fault is None else self.text(e.fault))
+    def _choice(self, e: code.Choice) -> str:
+        return f"({self.text(e.condition)} ? {self.text(e.then)} : {self.text(e.otherwise)})"
 
-    def _help(self, helper: str) -> None:
-        self.helpers[helper.split("(", 1)[0].rsplit(" ", 1)[1]] = helper
+    def _and(self, e: code.And) -> str:
+        return f"({' && '.join(map(self.text, e.args))})"
 
-    def _sum(self, e: code.Sum) -> str:
-        terms = [self.text(term) if stride == 1 else f"{self.text(term)} * {stride}" for term, stride in e.terms]
-        if e.constant or not terms:
-            terms.append(str(e.constant))
-        return " + ".join(terms)
+    def _or(self, e: code.Or) -> str:
+        return f"({' || '.join(map(self.text, e.args))})"
+
+    def _not(self, e: code.Not) -> str:
+        return f"!{self._operand(e.arg)}"
+
+    def _convert(self, e: code.Convert) -> str:
+        return f"({type_name(e.type).rstrip()}){self._operand(e.arg)}"
+
+    def _within(self, operand: str) -> str:
+        return f"({operand})" if operand.startswith("-") else operand
 
     def _checked(self, e: code.CheckedIndex) -> str:
         self._help(INDEX_HELPER)
         index = self.text(e.index)
         # An index beyond INT64_MAX is always out of range; -1 stands for it.
-        wide = f"({index} > (uint64_t)INT64_MAX ? -1 : (int64_t){index})" if e.is_u64 else bare(index)
+        wide = f"({index} > (uint64_t)INT64_MAX ? -1 : (int64_t){index})" if e.is_u64 else self.unwrapped(index)
         return f"fcsl_index({wide}, {e.extent}, {e.place}u, {self.text(e.fault)})"

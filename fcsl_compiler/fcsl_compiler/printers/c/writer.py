@@ -16,18 +16,12 @@ class CWriter(Writer):
 
     @contextmanager
     def braces(self, head: str, tail: str = "}") -> Iterator[None]:
-        self.line(f"{head} {{" if head else "{")
-        with self.indented():
-            yield
-        self.line(tail)
+        self.open(head)
+        yield
+        self.close(tail)
 
     def open(self, head: str) -> None:
-        self.line(f"{head} {{")
-        self._indent += 1
-
-    def open_body(self) -> None:
-        """Writes the opening brace of a function on a separate line."""
-        self.line("{")
+        self.line(f"{head} {{" if head else "{")
         self._indent += 1
 
     def reopen(self, head: str) -> None:

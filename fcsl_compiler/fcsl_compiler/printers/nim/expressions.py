@@ -7,8 +7,9 @@ from dataclasses import replace
 
 from ...model import code
 from ...model.types import HEALTH, I64, REQUEST, Scalar
+from ..expressions import Expressions
 from .names import Names
-from .operations import spelling_of
+from .operations import SPELLINGS
 from .operations.helpers import FAULT_HELPER, INDEX_HELPER, NIM_TYPES, literal
 
 #: FCSL_NONE of fcsl_machine.h.
@@ -22,8 +23,6 @@ class Module:
         self.types, self.members = Names(), Names()
         self.globals = Names(self.types)
         self.fields = {r.name: r.fields for r in (*program.records, *program.private_records)}
-        #: Functions of the descriptor.
-        self.entries = {f"fcsl_{entry}_{program.name}" for entry in ("init", "step", "force_state")}
         self.state_type = f"{_capital(program.name)}State"
         self.request_type = f"{_capital(program.name)}Request"
         for name in ("Health", "Host", self.state_type, self.request_type):
@@ -67,75 +66,32 @@ def _capital(name: str) -> str:
     return name[:1].upper() + name[1:]
 
 
-def bare(text: str) -> str:
-    """The expression without the parentheses that enclose all of it. `if` keeps them."""
-    if not (text.startswith("(") and text.endswith(")")) or text.startswith("(if "):
-        return text
-    depth = 0
-    for position, char in enumerate(text):
-        depth += (char == "(") - (char == ")")
-        if depth == 0 and position < len(text) - 1:
-            return text
-    return text[1:-1]
+class NimExpressions(Expressions):
+    """Writes the expressions of one function."""
 
-
-class NimExpressions:
-    """Writes the expressions of one function. `helpers` collects the procs that they call."""
+    null = "nil"
+    place_suffix = "'u32"
 
     def __init__(self, module: Module, helpers: dict[str, str]):
-        self.module, self.helpers = module, helpers
+        super().__init__(SPELLINGS, helpers)
+        self.module = module
         self.names = Names(module.globals)
         #: Tables of the function itself.
         self.tables = set(module.tables)
         #: Variables that count a loop, or are int64.
         self.indices: set[str] = set()
 
-    def bare(self, e: code.Expr) -> str:
-        return bare(self.text(e))
-
-    def text(self, e: code.Expr) -> str:
-        if isinstance(e, code.Name):
-            return self._name(e.text)
-        if isinstance(e, code.Literal):
-            return self._literal(e)
-        if isinstance(e, code.Deref):
-            return f"{self.text(e.pointer)}[]"
-        if isinstance(e, code.Member):
-            return f"{self._base(e.base)}.{self.module.members.of(e.name)}"
-        if isinstance(e, code.Element):
-            return self._element(e.base, [self.text(e.index)])
-        if isinstance(e, code.Part):
-            return f"{self._pointer(e)}[]"
-        if isinstance(e, code.Address):
-            return self._pointer(e.place)
-        if isinstance(e, code.Operation):
-            return self._operation(e)
-        if isinstance(e, code.Choice):
-            return f"(if {self.bare(e.condition)}: {self.bare(e.then)} else: {self.bare(e.otherwise)})"
-        if isinstance(e, code.And | code.Or):
-            return f"({(' and ' if isinstance(e, code.And) else ' or ').join(map(self._operand, e.args))})"
-        if isinstance(e, code.Not):
-            return f"(not {self._operand(e.arg)})"
-        if isinstance(e, code.Binary):
-            return f"{self._operand(e.left)} {self._symbol(e)} {self._operand(e.right)}"
-        if isinstance(e, code.Convert):
-            return self._convert(e)
-        if isinstance(e, code.Sum):
-            return self._sum(e)
-        if isinstance(e, code.CheckedIndex):
-            return self._checked(e)
-        if isinstance(e, code.Null):
-            return "nil"
-        if isinstance(e.function, str):
-            function = self.module.overloads.get(e.function) or self._name(e.function)
-        else:
-            function = self.text(e.function)
-        return f"{function}({', '.join(map(self.bare, e.args))})"
+    def unwrapped(self, text: str) -> str:
+        """An `if` keeps its parentheses."""
+        return text if text.startswith("(if ") else super().unwrapped(text)
 
     def _name(self, text: str) -> str:
         if text == _NONE:
             return "-1'i32"
         return self.module.labels.get(text) or self.names.of(text)
+
+    def _function(self, name: str) -> str:
+        return self.module.overloads.get(name) or self._name(name)
 
     def _literal(self, e: code.Literal) -> str:
         if e.type is HEALTH:
@@ -147,11 +103,13 @@ class NimExpressions:
     def _symbol(self, e: code.Binary) -> str:
         return {"%": "mod", "/": "/" if _is_float(e) else "div"}.get(e.symbol, e.symbol)
 
-    def _operand(self, e: code.Expr) -> str:
-        text = self.text(e)
-        return f"({text})" if isinstance(e, code.Binary) else text
+    def _deref(self, e: code.Deref) -> str:
+        return f"{self.text(e.pointer)}[]"
 
-    def _base(self, place: code.Place) -> str:
+    def _member(self, e: code.Member) -> str:
+        return f"{self._indexed(e.base)}.{self.module.members.of(e.name)}"
+
+    def _indexed(self, place: code.Place) -> str:
         """A place of which a member or an element is taken: a pointer stands for what it points to."""
         if not isinstance(place, code.Deref):
             return self.text(place)
@@ -161,10 +119,11 @@ class NimExpressions:
         self._help(_OPAQUE)
         return f"fcsl_opaque({text})"
 
-    def _element(self, base: code.Place, index: list[str]) -> str:
-        if isinstance(base, code.Part):
-            return self._element(base.base, [self.text(base.start), *index])
-        return f"{self._base(base)}[{' + '.join(index)}]"
+    def _part(self, e: code.Part) -> str:
+        return f"{self._pointer(e)}[]"
+
+    def _address(self, e: code.Address) -> str:
+        return self._pointer(e.place)
 
     def _pointer(self, place: code.Place) -> str:
         """Pointer to a place."""
@@ -173,7 +132,7 @@ class NimExpressions:
         if isinstance(place, code.Name):
             return f"{'unsafeAddr' if place.text in self.tables else 'addr'} {self._name(place.text)}"
         if self._table(place) and not isinstance(place, code.Part):
-            # Nim takes the value of a part of a constant. Behind a pointer that it does not see through it has an address.
+            # Nim takes the value of a part of a constant. Behind an opaque pointer it has an address.
             return f"addr {self.text(_behind_pointer(place))}"
         if isinstance(place, code.Part):
             base = _behind_pointer(place.base) if self._table(place) else place.base
@@ -186,24 +145,25 @@ class NimExpressions:
             place = place.base
         return isinstance(place, code.Name) and place.text in self.tables
 
-    def _operation(self, e: code.Operation) -> str:
-        spelling = spelling_of(e.op)
-        proven = bool(e.op.faults) and not e.places
-        text, helper = (spelling.proven, spelling.proven_helper) if proven else (spelling.text, spelling.helper)
-        for part in filter(None, helper.split("\n\n")):
-            self._help(part)
-        operands = list(map(self.text, e.args))
-        if e.args and all(isinstance(a, code.Literal) for a in e.args):
-            # Nim computes with literals itself, f32 as f64.
-            self._help(_OPAQUE)
-            operands = [f"fcsl_opaque({o})" for o in operands]
-        if not text.startswith("("):
-            operands = list(map(bare, operands))
-        place = ", ".join(f"{number}'u32" for number in e.places)
-        return text.format(*operands, place=place, fault="" if e.fault is None else self.text(e.fault))
+    def _choice(self, e: code.Choice) -> str:
+        return f"(if {self.bare(e.condition)}: {self.bare(e.then)} else: {self.bare(e.otherwise)})"
 
-    def _help(self, helper: str) -> None:
-        self.helpers[helper.split("(", 1)[0].split("[", 1)[0].rsplit(" ", 1)[1]] = helper
+    def _and(self, e: code.And) -> str:
+        return f"({' and '.join(map(self._operand, e.args))})"
+
+    def _or(self, e: code.Or) -> str:
+        return f"({' or '.join(map(self._operand, e.args))})"
+
+    def _not(self, e: code.Not) -> str:
+        return f"(not {self._operand(e.arg)})"
+
+    def _operands(self, e: code.Operation) -> list[str]:
+        operands = super()._operands(e)
+        if not e.args or not all(isinstance(a, code.Literal) for a in e.args):
+            return operands
+        # Nim computes with literals itself, f32 as f64.
+        self._help(_OPAQUE)
+        return [f"fcsl_opaque({o})" for o in operands]
 
     def _convert(self, e: code.Convert) -> str:
         if e.type is code.U8 or e.type is code.STATE:
@@ -211,12 +171,6 @@ class NimExpressions:
         if isinstance(e.type, Scalar) and e.type.is_float:
             return f"{NIM_TYPES[e.type.name]}({self.bare(e.arg)})"
         return f"cast[{self.module.type_name(e.type)}]({self.bare(e.arg)})"
-
-    def _sum(self, e: code.Sum) -> str:
-        terms = [self._index(term) if stride == 1 else f"{self._index(term)} * {stride}" for term, stride in e.terms]
-        if e.constant or not terms:
-            terms.append(str(e.constant))
-        return " + ".join(terms)
 
     def _index(self, e: code.Expr) -> str:
         """An index as an int64. Nim converts between integers on request alone."""
@@ -235,7 +189,7 @@ class NimExpressions:
         wide = (
             f"(if {index} > 0x7fff_ffff_ffff_ffff'u64: -1'i64 else: cast[int64]({index}))"
             if e.is_u64
-            else f"int64({bare(index)})"
+            else f"int64({self.unwrapped(index)})"
         )
         return f"fcsl_index({wide}, {e.extent}'i64, {e.place}'u32, {self.text(e.fault)})"
 

@@ -20,14 +20,14 @@ from .writer import NimWriter
 _PRELUDE = """\
 import std/volatile
 
-{.push checks: off, stackTrace: off, raises: [].}
+{.push checks: off, stackTrace: off, raises: [], warning[UnreachableElse]: off.}
 {.pragma: usual, codegenDecl: "static $# $#$#".}
 {.pragma: hint, codegenDecl: "static inline $# $#$#".}
 {.pragma: always, codegenDecl: "static inline __attribute__((always_inline)) $# $#$#".}
-{.pragma: apart, codegenDecl: "static __attribute__((noinline)) $# $#$#".}
+{.pragma: never, codegenDecl: "static __attribute__((noinline)) $# $#$#".}
 {.pragma: rare, codegenDecl: "static __attribute__((cold, noinline)) $# $#$#".}
 {.pragma: flat, codegenDecl: "static __attribute__((flatten)) $# $#$#".}
-{.pragma: flat_apart, codegenDecl: "static __attribute__((noinline, flatten)) $# $#$#".}
+{.pragma: flat_never, codegenDecl: "static __attribute__((noinline, flatten)) $# $#$#".}
 """
 
 _HOST = """\
@@ -70,8 +70,8 @@ iterator fcsl_down(start, stop, step: int64): int64 {.inline.} =
 
 
 def print_module(program: code.Program, print_descriptor: Callable[[CWriter], None]) -> NimWriter:
-    """`print_descriptor` writes the C of the descriptor. It is constant data with addresses, valid before anything runs,
-    which Nim cannot write."""
+    """`print_descriptor` writes the C of the descriptor. It is constant data with addresses, valid before anything
+    runs, which Nim cannot write."""
     w, module = NimWriter(), Module(program)
     w.line(f"# {program.name}.nim: made by fcslc from {program.source}. Do not edit.")
     functions, helpers = NimWriter(), dict[str, str]()

@@ -11,10 +11,10 @@ import re
 
 _KEYWORDS = frozenset(
     """
-    addr and as asm bind block break case cast concept const continue converter defer discard distinct div do elif else end
-    enum except export finally for from func if import in include interface is isnot iterator let macro method mixin mod
-    nil not notin object of or out proc ptr raise ref return shl shr static template try tuple type using var when while
-    xor yield
+    addr and as asm bind block break case cast concept const continue converter defer discard distinct div do elif else
+    end enum except export finally for from func if import in include interface is isnot iterator let macro method mixin
+    mod nil not notin object of or out proc ptr raise ref return shl shr static template try tuple type using var when
+    while xor yield
     """.split()
 )
 #: Words that allocate, raise or keep a reference. No generated code has them; keywords among them stand in backquotes
@@ -25,10 +25,11 @@ REFUSED = frozenset(
     newString raise realloc ref seq setLen string thread try HashSet Table
     """.split()
 )
-#: What generated code uses of the module system.
+#: What generated code uses of the module system, after the macros of nimbase.h.
 _SYSTEM = """
-    NB8 NC NF NF32 NF64 NI NI8 NI16 NI32 NI64 NU NU8 NU16 NU32 NU64 IL64 COMMA array bool cdecl copyMem cstring false float32 float64 high inf int int32 int64 low nan pointer result sizeof true uint32 uint64
-    uint8 unsafeAddr uncheckedArray zeroMem
+    NB8 NC NF NF32 NF64 NI NI8 NI16 NI32 NI64 NU NU8 NU16 NU32 NU64 IL64 COMMA
+    array bool cdecl copyMem cstring false float32 float64 high inf int int32 int64 low nan pointer result sizeof true
+    uint32 uint64 uint8 unsafeAddr uncheckedArray zeroMem
     """.split()
 
 

@@ -5,16 +5,21 @@ from __future__ import annotations
 
 from ...model import code
 from ...model.types import I32, I64, Scalar
+from ..statements import Statements
 from .expressions import Module, NimExpressions
 from .names import Names
 from .writer import NimWriter
 
-#: Names of the pragmas in module.py.
-_PRAGMAS = {"always": "always", "hint": "hint", "usual": "usual", "never": "apart", "rare": "rare"}
 
-
-class NimStatements:
+class NimStatements(Statements):
     """Writes the functions of a module. `helpers` collects the procs that they call."""
+
+    w: NimWriter
+    e: NimExpressions
+    end = ""
+    scope = "block"
+    discard = "discard "
+    else_if = "elif"
 
     def __init__(self, writer: NimWriter, module: Module, helpers: dict[str, str]):
         self.w, self.module, self.helpers = writer, module, helpers
@@ -40,117 +45,68 @@ class NimStatements:
         w.line()
 
     def _pragmas(self, f: code.Function) -> str:
-        """Names in the library are those of the C backend, so all tools find them."""
+        """Names in the library are those of the C backend, so all tools find them. The pragmas of `inline` are in
+        module.py."""
         if f.exported:
             return f'exportc: "{f.name}", cdecl'
-        inline = _PRAGMAS[f.inline]
+        inline = f.inline
         if f.flatten:
-            inline = "flat_apart" if f.inline == "never" else "flat"
+            inline = "flat_never" if f.inline == "never" else "flat"
         return f'exportc: "{f.name}", {inline}'
 
-    def body(self, statements: code.Body) -> None:
-        for s in statements:
-            self._statement(s)
-        if all(isinstance(s, code.At | code.Comment | code.Unused | code.Table) for s in statements):
-            self.w.line("discard")
+    def table(self, s: code.Table) -> None:
+        self.e.tables.add(s.name)
+        print_table(self.w, self.module, s, self.e.names)
 
-    def _nested(self, head: str, body: code.Body) -> None:
-        self.w.line(f"{head}:")
-        with self.w.indented():
-            self.body(body)
+    def body(self, statements: code.Body) -> None:
+        super().body(statements)
+        if all(isinstance(s, code.At | code.Unused | code.Table) for s in statements):
+            self._line("discard")
 
     def _statement(self, s: code.Statement) -> None:
-        w, e = self.w, self.e
         if isinstance(s, code.Count | code.For) or (isinstance(s, code.Let | code.Var) and s.type is I64):
-            e.indices.add(s.name)
-        if isinstance(s, code.At):
-            self._at(s)
-        elif isinstance(s, code.Comment):
-            w.comment(s.text)
-        elif isinstance(s, code.Let):
-            # A record is not set to zero before it is copied.
-            pragma = " {.noinit.}" if isinstance(s.type, code.Named) else ""
-            value = e.bare(s.value)
-            w.line(f"let {e.names.of(s.name)}{pragma}: {self.module.type_name(s.type)} = {value}")
-        elif isinstance(s, code.Var):
-            self._var(s)
-        elif isinstance(s, code.Table):
-            e.tables.add(s.name)
-            print_table(w, self.module, s, e.names)
-        elif isinstance(s, code.Set):
-            self._set(s)
-        elif isinstance(s, code.Update):
-            place = e.text(s.place)
-            w.line(f"{place} = {place} {s.symbol} {e.text(s.value)}")
-        elif isinstance(s, code.Copy):
-            self._copy(s)
-        elif isinstance(s, code.Clear):
-            w.line(f"zeroMem({e.text(code.Address(s.place))}, sizeof({self.module.type_name(s.type)}))")
-        elif isinstance(s, code.Do):
-            w.line(f"{'discard ' if s.unused else ''}{e.text(s.call)}")
-        elif isinstance(s, code.Unused):
-            pass
-        elif isinstance(s, code.If):
-            self._nested(f"if {e.bare(s.condition)}", s.then)
-            self._otherwise(s.otherwise)
-        elif isinstance(s, code.Select):
-            self._select(s)
-        elif isinstance(s, code.Count):
-            self._count(s)
-        elif isinstance(s, code.For):
-            self._for(s)
-        elif isinstance(s, code.Scope):
-            self._nested("block", s.body)
-        elif isinstance(s, code.Return):
-            w.line("return" if s.value is None else f"return {e.bare(s.value)}")
-        else:
-            w.line("break" if isinstance(s, code.Break) else "continue")
+            self.e.indices.add(s.name)
+        super()._statement(s)
 
-    def _at(self, s: code.At) -> None:
-        if s.quoted and s.span is not None:
-            self.w.at(s.span)
-        else:
-            self.w.origin = s.span
+    def _let(self, s: code.Let) -> None:
+        # A record is not set to zero before it is copied.
+        pragma = " {.noinit.}" if isinstance(s.type, code.Named) else ""
+        value = self.e.bare(s.value)
+        self._line(f"let {self.e.names.of(s.name)}{pragma}: {self.module.type_name(s.type)} = {value}")
 
     def _var(self, s: code.Var) -> None:
         name, type_ = self.e.names.of(s.name), self.module.type_name(s.type)
         value = "" if s.value is None else f" = {self.e.bare(s.value)}"
         pragma = "" if value or s.zeroed else " {.noinit.}"
         comment = f" # {s.comment}" if s.comment else ""
-        self.w.line(f"var {name}{pragma}: {type_}{value}{comment}")
+        self._line(f"var {name}{pragma}: {type_}{value}{comment}")
 
     def _copy(self, s: code.Copy) -> None:
         if isinstance(s.to, code.Part) or isinstance(s.source, code.Part):
             ends = ", ".join(self.e.text(code.Address(end, block=True)) for end in (s.to, s.source))
-            self.w.line(f"copyMem({ends}, sizeof({self.module.type_name(s.type)}))")
+            self._line(f"copyMem({ends}, sizeof({self.module.type_name(s.type)}))")
         else:
-            self.w.line(f"{self.e.text(s.to)} = {self.e.text(s.source)}")
+            self._line(f"{self.e.text(s.to)} = {self.e.text(s.source)}")
 
-    def _set(self, s: code.Set) -> None:
-        if s.volatile:
-            self.w.line(f"volatileStore({self.e.text(code.Address(s.place))}, {self.e.bare(s.value)})")
-        else:
-            self.w.line(f"{self.e.text(s.place)} = {self.e.bare(s.value)}")
+    def _clear(self, s: code.Clear) -> None:
+        self._line(f"zeroMem({self.e.text(code.Address(s.place))}, sizeof({self.module.type_name(s.type)}))")
 
-    def _otherwise(self, body: code.Body) -> None:
-        last = body[-1] if body else None
-        if isinstance(last, code.If) and (len(body) == 1 or (len(body) == 2 and isinstance(body[0], code.At))):
-            mark = body[0]
-            if isinstance(mark, code.At):
-                self.w.origin = mark.span
-            self.w.line(f"elif {self.e.bare(last.condition)}:")
-            with self.w.indented():
-                if isinstance(mark, code.At):
-                    self._at(mark)
-                self.body(last.then)
-            self._otherwise(last.otherwise)
-        elif body:
-            self._nested("else", body)
+    def _store(self, s: code.Set) -> None:
+        self._line(f"volatileStore({self.e.text(code.Address(s.place))}, {self.e.bare(s.value)})")
+
+    def _update(self, s: code.Update) -> None:
+        place = self.e.text(s.place)
+        self._line(f"{place} = {place} {s.symbol} {self.e.text(s.value)}")
+
+    def _unused(self, s: code.Unused) -> None:
+        """Nim warns of no argument."""
 
     def _select(self, s: code.Select) -> None:
         self.w.line(f"case {self.e.bare(s.value)}")
         for constant, body in s.cases:
             self._nested(f"of {self.e.text(constant)}", body)
+        # Memory may hold a number that is no state. Without this line some compilers take it for impossible.
+        self.w.line("else: discard")
 
     def _count(self, s: code.Count) -> None:
         if 0 < s.count <= s.unroll:

@@ -11,3 +11,14 @@ class NimWriter(Writer):
 
     def comment(self, text: str) -> None:
         self.line(f"# {text}")
+
+    def open(self, head: str) -> None:
+        self.line(f"{head}:")
+        self._indent += 1
+
+    def reopen(self, head: str) -> None:
+        self.close()
+        self.open(head)
+
+    def close(self) -> None:
+        self._indent -= 1

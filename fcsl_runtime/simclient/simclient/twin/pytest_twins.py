@@ -95,7 +95,7 @@ def fcsl(request: pytest.FixtureRequest) -> Iterator[Callable[..., Twin]]:
 
 @pytest.fixture
 def fcsl_sim(request: pytest.FixtureRequest) -> Iterator[Callable[..., Any]]:
-    """`fcsl_sim(path, seed=…, sets=…, events=…, duration=…)` opens a simulation as a SimTwin, paused at tick 0.
+    """`fcsl_sim(path, backend=…, seed=…, sets=…, events=…, duration=…)` opens a simulation as a SimTwin at tick 0.
 
     A relative path is relative to the working directory, or else to the folder of the test file. Raises ImportError
     without the package `fcsl_sim`.

@@ -5,20 +5,16 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 
-from ....model.types import BOOL, F32, HEALTH, NUMBERS, REQUEST, Scalar
-from ...spelling import Entry, entry
+from ....model.types import BOOL, F32, NUMBERS, Scalar
+from ...spelling import Entry, comparisons, entry
 from .helpers import c_function
 
 
 def spellings() -> Iterator[Entry]:
+    yield from comparisons()
     for t in NUMBERS:
-        for symbol in ("<", "<=", ">", ">=", "==", "!="):
-            yield entry(symbol, (t, t), f"({{0}} {symbol} {{1}})")
         yield from _choosing(t)
         yield from _powers(t)
-    for t in (BOOL, REQUEST, HEALTH):
-        for symbol in ("==", "!="):
-            yield entry(symbol, (t, t), f"({{0}} {symbol} {{1}})")
     yield entry("not", (BOOL,), "(!{0})")
 
 

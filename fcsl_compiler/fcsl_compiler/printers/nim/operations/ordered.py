@@ -5,22 +5,18 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 
-from ....model.types import BOOL, HEALTH, NUMBERS, REQUEST, Scalar
-from ...spelling import Entry, entry
+from ....model.types import BOOL, NUMBERS, Scalar
+from ...spelling import Entry, comparisons, entry
 from .floats import c_function
 from .helpers import FAULT, FAULT_HELPER, literal, nim, proc
 from .integers import overflowing
 
 
 def spellings() -> Iterator[Entry]:
+    yield from comparisons()
     for t in NUMBERS:
-        for symbol in ("<", "<=", ">", ">=", "==", "!="):
-            yield entry(symbol, (t, t), f"({{0}} {symbol} {{1}})")
         yield from _choosing(t)
         yield from _powers(t)
-    for t in (BOOL, REQUEST, HEALTH):
-        for symbol in ("==", "!="):
-            yield entry(symbol, (t, t), f"({{0}} {symbol} {{1}})")
     yield entry("not", (BOOL,), "(not {0})")
 
 
