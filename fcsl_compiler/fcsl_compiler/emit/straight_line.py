@@ -241,7 +241,7 @@ class _Evaluation:
                 self._assign(_cell(self._block(names, s.place), at), _zero(s.type))
         elif isinstance(s, code.Do):
             self._call(names, s.call)
-        elif not isinstance(s, code.Unused | code.Comment):
+        elif not isinstance(s, code.Unused):
             raise _Unfit
 
     def _assign_to(self, names: _Names, place: code.Place, value: code.Expr) -> None:

@@ -18,8 +18,6 @@ from .statements import NimStatements, print_table
 from .writer import NimWriter
 
 _PRELUDE = """\
-import std/volatile
-
 {.push checks: off, stackTrace: off, raises: [], warning[UnreachableElse]: off.}
 {.pragma: usual, codegenDecl: "static $# $#$#".}
 {.pragma: hint, codegenDecl: "static inline $# $#$#".}
@@ -78,6 +76,10 @@ def print_module(program: code.Program, print_descriptor: Callable[[CWriter], No
     statements = NimStatements(functions, module, helpers)
     for function in program.functions:
         statements.function(function)
+    text = functions.text()
+    if "volatileStore(" in text:
+        w.line("import std/volatile")
+        w.line()
     w.block(_PRELUDE)
     own_types = f"#define {program.name.upper()}_H /* the types of {program.name}.h are below */\n"
     freed = "".join(f"#undef {name}\n" for name in sorted(_like_macros(module, statements.variables)))
@@ -94,7 +96,6 @@ def print_module(program: code.Program, print_descriptor: Callable[[CWriter], No
         print_table(w, module, table, module.globals)
     if program.tables:
         w.line()
-    text = functions.text()
     foreign = _foreign(module, program)
     for line in foreign:
         w.line(line)
