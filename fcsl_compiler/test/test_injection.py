@@ -96,6 +96,29 @@ def test_clock_decides_overruns(tmp_path: Path) -> None:
     assert next(times, None) is None  # two readings a tick
 
 
+READS_HEALTH = """\
+class Reader:
+    outputs = {"seen": "bool"}
+
+    def execute(self):
+        self.seen = self.health == "nominal"
+"""
+
+
+@pytest.mark.parametrize("inject", [2, 3])
+def test_an_algorithm_does_not_see_the_health_that_is_injected(tmp_path: Path, inject: int) -> None:
+    """It makes the health worse after `execute`."""
+    config = {
+        "instances": {"one": {"algorithm": "Reader"}},
+        "states": {"A": {"schedule": {"one": 1000}}},
+        "transitions": [],
+    }
+    m = machine(tmp_path, config, reader=READS_HEALTH)
+    m.byte(m.instances["one"].inject_fault_offset)[0] = inject
+    m.step()
+    assert (m.get("one.outputs.seen"), m.get("one.outputs.health")) == (True, ["degraded", "failed"][inject - 2])
+
+
 #: Its `execute` may take long enough for a watchdog.
 BUSY = """\
 class Busy:

@@ -117,7 +117,7 @@ class InstanceEmitter:
 
     @property
     def _makes_requests(self) -> bool:
-        return ir.writes_field(self.i.execute.body, "outputs", "transition_request")
+        return ir.names_field(self.i.execute.body, "outputs", "transition_request")
 
     def _exported(self, body: list[Statement]) -> Function:
         parameters: list[tuple[str, code.Type]] = [(_SELF.text, self.pointer)]

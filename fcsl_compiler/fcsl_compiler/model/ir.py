@@ -393,9 +393,9 @@ def constants(body: tuple[Stmt, ...]) -> set[tuple[str, str]]:
     return set().union(*(read(e) for s in walk(body) for e in expressions(s)))
 
 
-def writes_field(statements: tuple[Stmt, ...], record: str, name: str) -> bool:
-    """Whether a body writes this field, wholly or in part."""
-    return any(variable(target) == (record, name) for target, _, _ in writes(statements))
+def names_field(statements: tuple[Stmt, ...], record: str, name: str) -> bool:
+    """Whether a body reads or writes this field, wholly or in part."""
+    return any((record, name) in variables(e) for s in walk(statements) for e in expressions(s))
 
 
 def writes(statements: tuple[Stmt, ...]) -> list[tuple[Place, Expr | None, Span]]:
