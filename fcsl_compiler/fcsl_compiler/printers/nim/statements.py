@@ -105,7 +105,7 @@ class NimStatements(Statements):
         self.w.line(f"case {self.e.bare(s.value)}")
         for constant, body in s.cases:
             self._nested(f"of {self.e.text(constant)}", body)
-        # Memory may hold a number that is no state. Without this line some compilers take it for impossible.
+        # Memory may hold a number that is no state. Without this line Nim 2 tells the C compiler that it cannot be.
         self.w.line("else: discard")
 
     def _count(self, s: code.Count) -> None:
