@@ -38,7 +38,7 @@ class FieldRow:
 
 #: Part of layout_hash. Increase it when the struct changes in a way that the hashed rows do not show, because a
 #: checkpoint contains the bytes of the struct.
-_STRUCT_VERSION = 4
+_STRUCT_VERSION = 5
 
 
 def field_table(machine: Machine) -> list[FieldRow]:
@@ -105,11 +105,12 @@ def _instance_rows(machine: Machine, index: int, instance: Instance) -> list[Fie
         ("faults", "FCSL_U64", "uint64_t", "executes that faulted"),
         ("overruns", "FCSL_U64", "uint64_t", "executes longer than max_wcet_us"),
     ]
+    counters.append(("fault_place", "FCSL_U32", "uint32_t", "number of the last fault's place; 0: none so far"))
     if index in machine.last_runs:
         counters.append(("last_run", "FCSL_U64", "uint64_t", "ticks completed after its last run; 0: it has not run"))
-    counters.append(("fault_place", "FCSL_U32", "uint32_t", "number of the last fault's place; 0: none so far"))
     for counter, abi_type, c_type, doc in counters:
-        path, member = f"{instance.name}.counters.{counter}", f"i_{instance.name}.{counter}"
+        path = f"{instance.name}.counters.{counter}"
+        member = f"i_{instance.name}.{'last_run' if counter == 'last_run' else f'counters.{counter}'}"
         rows.append(FieldRow(path, "COUNTER", abi_type, (), (), 1, member, c_type, index, "", doc))
     return rows
 

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Makes the functions of one instance: init, execute, and those for injected faults and overruns."""
+"""Makes the functions of one instance: init and execute."""
 
 from __future__ import annotations
 
@@ -7,15 +7,15 @@ from collections.abc import Iterator
 
 from ..model import code, ir
 from ..model.c_names import c_name
-from ..model.code import Call, Deref, Function, If, Member, Name, Set, Statement, Update
+from ..model.code import Call, Deref, Function, If, Member, Name, Set, Statement
 from ..model.machine import Instance, Machine, Values
-from ..model.types import BOOL, HEALTH, U32, U64, Array, Scalar, Type, count_of, leaves, scalar_of
+from ..model.types import HEALTH, U32, Array, Scalar, Type, count_of, leaves, scalar_of
 from .copies import copied
 from .expressions import code_type
-from .fault_places import FaultPlaces
 from .fault_points import written_before_fault
 from .functions import HOST_TYPE
 from .names import health, instance_type, record_type, request_constant
+from .rare import failed
 
 _SELF = Name("self")
 _FAULT = Name("fault")
@@ -56,23 +56,18 @@ def call(function: ir.Function, record: code.Place, fault: Name) -> code.Do:
 class InstanceEmitter:
     """Makes the functions of one instance."""
 
-    def __init__(self, machine: Machine, places: FaultPlaces, instance: Instance, quiet: bool):
+    def __init__(self, machine: Machine, instance: Instance, quiet: bool):
         """`quiet`: see bookkeeping.py."""
-        self.m, self.places, self.i, self.quiet = machine, places, instance, quiet
+        self.m, self.i, self.quiet = machine, instance, quiet
         self.pointer = code.Pointer(code.Named(instance_type(machine, instance)), writable=True)
         self.name = f"{machine.name}_{instance.name}"
 
     def emit(self) -> Iterator[Function]:
         yield self._init()
-        yield from self._quiet() if self.quiet else self._execute()
-        if self.i.max_wcet_us:
-            yield self._overrun()
-
-    def _function(
-        self, name: str, body: tuple[Statement, ...], comment: str, result: code.Type | None = None
-    ) -> Function:
-        """Rarely executed, and kept away from frequently executed code."""
-        return Function(name, ((_SELF.text, self.pointer),), result, body, comment, inline="rare")
+        if self.quiet:
+            yield from self._quiet()
+        else:
+            yield self._execute([*self._pulses(health(0)), *self._body()])
 
     def _init(self) -> Function:
         body: list[Statement] = [code.Clear(Deref(_SELF), self.pointer.target)]
@@ -86,12 +81,8 @@ class InstanceEmitter:
         )
         return Function(f"{self.name}_init", ((_SELF.text, self.pointer),), None, tuple(body), comment, exported=True)
 
-    def _execute(self) -> Iterator[Function]:
-        yield self._exported([*self._pulses(health(0)), *self._body()])
-        yield from self._inject()
-
     def _quiet(self) -> Iterator[Function]:
-        """A tick calls `begin` only if the health is not nominal, or if something is injected; then it calls `run`."""
+        """A tick calls `run`. If the health is not nominal, or something is injected, it calls `begin` before."""
         own = code.Address(Deref(_SELF))
         run = f"fcsl_run_{self.name}"
         body: list[Statement] = [Set(_output("transition_request"), self._no_request)] if self._makes_requests else []
@@ -99,27 +90,13 @@ class InstanceEmitter:
         unused = [] if _SELF.text in code.used_names(body) else [code.Unused(_SELF.text)]
         comment = "Runs execute, but for its health."
         yield Function(run, ((_SELF.text, self.pointer),), U32, (*unused, *body), comment)
-        yield self._exported([Set(_output("health"), health(0)), code.Return(Call(run, (own,)))])
-        injected, none = Name("injected"), code.Literal(0, code.U8)
-        failed = (*self._failed(code.Literal(self.places.injected, U32)), code.Return(code.Literal(False, BOOL)))
-        least = code.Choice(
-            _is("==", injected, 0), health(0), code.Choice(_is("==", injected, 2), health(1), health(2))
-        )
-        begin = (
-            code.Let(injected.text, code.U8, _member("inject_fault")),
-            Set(_member("inject_fault"), none),
-            If(_is("==", injected, 1), failed),
-            Set(_output("health"), least),
-            code.Return(code.Literal(True, BOOL)),
-        )
-        comment = "Sets the health, nominal or injected. False if a fault is injected: outputs and state stay."
-        yield self._function(f"fcsl_begin_{self.name}", begin, comment, BOOL)
+        yield self._execute([Set(_output("health"), health(0)), code.Return(Call(run, (own,)))])
 
     @property
     def _makes_requests(self) -> bool:
         return ir.names_field(self.i.execute.body, "outputs", "transition_request")
 
-    def _exported(self, body: list[Statement]) -> Function:
+    def _execute(self, body: list[Statement]) -> Function:
         parameters: list[tuple[str, code.Type]] = [(_SELF.text, self.pointer)]
         if self.i.execute.uses_hardware:
             parameters.append((_HOST.text, HOST_TYPE))
@@ -145,7 +122,7 @@ class InstanceEmitter:
 
     def _failed(self, place: code.Expr) -> list[Statement]:
         """The effects of a fault apart from the restored outputs and state."""
-        return [*self._pulses(health(2)), _increment("faults"), Set(_member("fault_place"), place)]
+        return [*failed(self.m, _member("counters"), _output("health"), _output("transition_request"), place)]
 
     def _saved(self) -> tuple[list[Statement], list[Statement]]:
         """Statements that save the fields that a fault must restore, and those that restore them. Pulses are reset
@@ -186,31 +163,6 @@ class InstanceEmitter:
         own = _output("health")
         return [If(code.Binary("==", own, health(3)), (Set(own, health(2)),))]
 
-    def _inject(self) -> Iterator[Function]:
-        clear = Set(_member("inject_fault"), code.Literal(0, code.U8))
-        body: tuple[Statement, ...] = (clear, *self._failed(code.Literal(self.places.injected, U32)))
-        comment = "Replaces an execute with an injected fault: outputs and state stay."
-        yield self._function(f"fcsl_fault_{self.name}", body, comment)
-        own, least = _output("health"), Name("least")
-        failed = code.Binary(">", _member("inject_fault"), code.Literal(2, code.U8))
-        body = (
-            code.Let(least.text, HEALTH, code.Choice(failed, health(2), health(1))),
-            clear,
-            If(code.Binary("<", own, least), (Set(own, least),)),
-        )
-        comment = "After an execute with an injected health: at least degraded or failed."
-        yield self._function(f"fcsl_worsen_{self.name}", body, comment)
-
-    def _overrun(self) -> Function:
-        own = _output("health")
-        body = (
-            Set(_member("inject_overrun"), code.Literal(0, code.U8)),
-            _increment("overruns"),
-            If(code.Binary("==", own, health(0)), (Set(own, health(1)),)),
-        )
-        comment = "After an execute that overran, or with an injected overrun."
-        return self._function(f"fcsl_overrun_{self.name}", body, comment)
-
 
 def _member(name: str) -> Member:
     return Member(Deref(_SELF), name)
@@ -222,14 +174,6 @@ def _output(name: str) -> Member:
 
 def _field(record: str, port: ir.Port) -> Member:
     return Member(_member(record), c_name(port.name))
-
-
-def _is(operator: str, byte: code.Expr, value: int) -> code.Expr:
-    return code.Binary(operator, byte, code.Literal(value, code.U8))
-
-
-def _increment(counter: str) -> Update:
-    return Update(_member(counter), "+", code.Literal(1, U64))
 
 
 def _is_pulse(record: str, port: ir.Port) -> bool:

@@ -16,6 +16,7 @@ from .functions import FunctionEmitter
 from .inline_size import inlined_functions
 from .instances import InstanceEmitter, constant
 from .names import constant_name, record_type, request_constant, state_constant
+from .rare import RareEmitter
 from .records import records, result_records
 from .step import StepEmitter
 from .straight_line import written_out
@@ -48,8 +49,9 @@ def _functions(machine: Machine, places: FaultPlaces) -> Iterator[code.Function]
         bodies[made.name] = made
     yield from _called(bodies, machine)
     quiet = quiet_instances(machine)
+    yield from RareEmitter(machine, places, quiet).emit()
     for index, instance in enumerate(machine.instances):
-        yield from InstanceEmitter(machine, places, instance, index in quiet).emit()
+        yield from InstanceEmitter(machine, instance, index in quiet).emit()
     yield from StepEmitter(machine).emit()
 
 

@@ -21,6 +21,7 @@ from .names import (
     sensors,
     struct_type,
 )
+from .rare import counters_record, counters_type
 
 
 def records(machine: Machine) -> Iterator[Record]:
@@ -36,6 +37,8 @@ def records(machine: Machine) -> Iterator[Record]:
             if algorithm.ports[record]:
                 ports = tuple(_port(machine, port) for port in algorithm.ports[record])
                 yield Record(record_type(machine, algorithm, record), ports)
+    if machine.instances:
+        yield counters_record(machine)
     for index, instance in enumerate(machine.instances):
         yield Record(instance_type(machine, instance), tuple(_instance(machine, index, instance)))
     for with_last_sample in sorted({c.name in machine.last_samples for c in sensors(machine)}):
@@ -59,14 +62,9 @@ def _instance(machine: Machine, index: int, instance: Instance) -> Iterator[Fiel
     for record in ir.RECORDS:
         if instance.algorithm.ports[record]:
             yield Field(record, Named(record_type(machine, instance.algorithm, record)))
-    yield Field("faults", U64)
-    yield Field("overruns", U64)
+    yield Field("counters", Named(counters_type(machine)))
     if index in machine.last_runs:
         yield Field("last_run", U64, "ticks completed after its last run; 0: none yet")
-    yield Field("fault_place", U32, "of the last fault: row of fault_places, from 1; 0: none")
-    if instance.max_wcet_us:
-        yield Field("inject_overrun", U8, "1: its next run counts as an overrun")
-    yield Field("inject_fault", U8, "1: its next run counts as a fault; 2, 3: its health is at least degraded, failed")
 
 
 def _channel(with_last_sample: bool) -> Iterator[Field]:

@@ -83,7 +83,7 @@ class StepEmitter:
         if not instance.start.faults:
             yield called
             return
-        place = Set(Member(record_of(instance), "fault_place"), fault)
+        place = Set(Member(Member(record_of(instance), "counters"), "fault_place"), fault)
         failed = (place, code.Return(Literal(index + 1, I32)))
         faulted = Binary("!=", fault, Literal(0, U32))
         yield code.Scope((code.Var(fault.text, U32), called, If(faulted, failed)))

@@ -26,6 +26,7 @@ from .names import (
     sensors,
     state_constant,
 )
+from .rare import call_begin, call_fault, call_overrun, call_worsen
 
 #: Maximum number of instances in one function. The time of C compilers grows faster than linearly with the size of a
 #: function.
@@ -305,16 +306,16 @@ class TickEmitter:
         stack."""
         record, own = record_of(instance), f"{self.m.name}_{instance.name}"
         this = code.Address(record)
-        inject = Member(record, "inject_fault")
+        inject = Member(Member(record, "counters"), "inject_fault")
         if entry.instance in self.quiet:
             usual = (Binary("==", inject, Literal(0, code.U8)), Binary("==", health_of(instance), health(0)))
-            runs = code.Or((code.And(usual), Call(f"fcsl_begin_{own}", (this,))))
+            runs = code.Or((code.And(usual), call_begin(self.m, instance)))
             return If(runs, (Do(Call(f"fcsl_run_{own}", (this,)), unused=True),))
         arguments = (this, _HOST) if instance.execute.uses_hardware else (this,)
-        worsen = If(Binary("!=", inject, Literal(0, code.U8)), (Do(Call(f"fcsl_worsen_{own}", (this,))),))
+        worsen = If(Binary("!=", inject, Literal(0, code.U8)), (call_worsen(self.m, instance),))
         execute = Do(Call(f"{own}_execute", arguments), unused=True)
         is_fault = Binary("==", inject, Literal(1, code.U8))
-        whole = If(is_fault, (Do(Call(f"fcsl_fault_{own}", (this,))),), (execute, worsen))
+        whole = If(is_fault, (call_fault(self.m, instance),), (execute, worsen))
         if not instance.algorithm.effects:
             return whole
         substitute = Member(Deref(_HOST), "substitute")
@@ -325,14 +326,15 @@ class TickEmitter:
 
     def _verdict(self, instance: Instance) -> Statement:
         began = Name("began_ns")
-        is_injected = Binary("!=", Member(record_of(instance), "inject_overrun"), Literal(0, code.U8))
+        is_injected = Binary(
+            "!=", Member(Member(record_of(instance), "counters"), "inject_overrun"), Literal(0, code.U8)
+        )
         is_late = Binary(">", Binary("-", _NOW, began), Literal(instance.max_wcet_us * 1000, U64))
-        overrun = Do(Call(f"fcsl_overrun_{self.m.name}_{instance.name}", (code.Address(record_of(instance)),)))
         return code.Scope(
             (
                 code.Let(began.text, U64, _NOW),
                 self._read_clock(),
-                If(code.Or((is_injected, is_late)), (overrun,)),
+                If(code.Or((is_injected, is_late)), (call_overrun(self.m, instance),)),
             )
         )
 
