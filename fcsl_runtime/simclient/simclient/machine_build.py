@@ -39,7 +39,7 @@ def build_config(
     from fcsl_compiler.base.diagnostics import DiagnosticError
     from fcsl_compiler.driver.cache import build_machine
     from fcsl_compiler.driver.toolchain import ToolchainError
-    from fcsl_compiler.model.target import BACKENDS
+    from fcsl_compiler.model.choices import BACKENDS
 
     if backend not in BACKENDS:
         raise TwinError(f"backend={backend!r}: one of {', '.join(BACKENDS)} wanted")
