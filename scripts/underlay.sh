@@ -7,6 +7,15 @@ if [ ! -f "$_fcsl_root/.venv/fcsl-underlay.sh" ]; then
     echo "fcsl: no environment in $_fcsl_root/.venv; run 'make setup' first" >&2
 else
     . "$_fcsl_root/.venv/fcsl-underlay.sh"
+    # Without these, the ROS wheels start every Python a second time so that it finds their libraries, which takes 25 ms.
+    # scripts/ros_wheels.sh wrote the file.
+    if [ -z "${_ROS_WHEELS_BOOTSTRAP_COMPLETE:-}" ] && [ -f "$VIRTUAL_ENV/local_setup.sh" ]; then
+        for _fcsl_libs in "$VIRTUAL_ENV"/lib/python3*/site-packages/ros_*.libs "$VIRTUAL_ENV/lib"; do
+            LD_LIBRARY_PATH="$_fcsl_libs${LD_LIBRARY_PATH:+:$LD_LIBRARY_PATH}"
+        done
+        export LD_LIBRARY_PATH _ROS_WHEELS_BOOTSTRAP_COMPLETE=1
+        unset _fcsl_libs
+    fi
     export COLCON_DEFAULTS_FILE="$_fcsl_root/scripts/colcon.yaml"
     export ROS_LOG_DIR="${ROS_LOG_DIR:-$_fcsl_root/log/ros}"
     # DDS would otherwise multicast on every network interface.

@@ -1,5 +1,6 @@
 # SPDX-License-Identifier: Apache-2.0
-"""The command line of `fcsl-sim`: commands, options and the forms of their values."""
+"""The command line of `fcsl-sim`: commands, options and the forms of their values. It imports no command, so that help
+and errors of usage come at once."""
 
 from __future__ import annotations
 
@@ -11,7 +12,7 @@ from pathlib import Path
 
 from fcsl_compiler.base.version import add_version
 
-from .runner import TIMEOUT_MS
+from .external import TIMEOUT_MS
 
 _CONFIG = "*.sim.json, or package://PACKAGE/PATH below its share folder"
 

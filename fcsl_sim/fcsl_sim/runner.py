@@ -16,6 +16,7 @@ from simclient.errors import TwinError
 
 from .config import SimConfig
 from .errors import SimError
+from .external import FREE_RUNNING, TIMEOUT_MS
 from .models import Scalar
 from .native import Simulation
 from .watchdog import Watchdog
@@ -24,10 +25,6 @@ from .watchdog import Watchdog
 #: `tick`.
 _CHUNK_TICKS = 1000
 _PROGRESS_PERIOD_S = 2.0
-#: Behind an address on the bus: neither side waits for the other.
-FREE_RUNNING = ",free-running"
-#: Default timeout for an external controller.
-TIMEOUT_MS = 30_000
 
 
 @dataclass(frozen=True)

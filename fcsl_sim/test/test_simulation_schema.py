@@ -17,7 +17,8 @@ from fcsl_compiler.base.diagnostics import DiagnosticError
 from fcsl_compiler.cli.scaffold import machine_files
 from fcsl_compiler.parse.json_reader import ConfigReader
 from fcsl_sim import SimError, load
-from fcsl_sim.cli import SCHEMA, main
+from fcsl_sim.cli import main
+from fcsl_sim.command import SCHEMA
 from fcsl_sim.integrators import MAX_HZ, METHODS
 from fcsl_sim.wiring import MAX_SECONDS
 

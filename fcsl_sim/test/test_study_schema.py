@@ -18,7 +18,8 @@ from fcsl_compiler.parse.json_reader import ConfigReader
 from fcsl_sim import SimError
 from fcsl_sim.campaign.metric import FUNCTIONS
 from fcsl_sim.campaign.study import MAX_CASES, OWN_COLUMNS, read_study
-from fcsl_sim.cli import SCHEMA, STUDY_SCHEMA, main
+from fcsl_sim.cli import main
+from fcsl_sim.command import SCHEMA, STUDY_SCHEMA
 
 ROOT = Path(__file__).resolve().parents[2]
 STUDIES = sorted((ROOT / "examples").rglob("*.study.json"))

@@ -20,6 +20,7 @@ ALONE = {
     "process": "process",
     "record": "record",
     "simulator": "simulator.main",
+    "start": "start",
     "telemetry": "telemetry",
     "twin": "twin",
     "vars": "vars.main",

@@ -14,7 +14,7 @@ class PackageNotFound(LookupError):
 def package_prefix(name: str) -> Path:
     """Install prefix of ROS package `name`. Raises PackageNotFound."""
     for entry in os.environ.get("AMENT_PREFIX_PATH", "").split(os.pathsep):
-        if entry and (Path(entry) / "share/ament_index/resource_index/packages" / name).is_file():
+        if entry and os.path.isfile(f"{entry}/share/ament_index/resource_index/packages/{name}"):
             return Path(entry)
     raise PackageNotFound(f"package `{name}` is not installed in this environment; source install/setup.bash")
 

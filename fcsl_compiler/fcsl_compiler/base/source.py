@@ -17,6 +17,7 @@ MAX_NAME = 100
 MAX_SOURCE_BYTES = 1 << 20
 
 
+_NEWLINE = re.compile("\n")
 #: Bidirectional control characters. They can make an editor show text in an order other than that of the compiler.
 _REORDERING = re.compile("[\u061c\u200e\u200f\u202a-\u202e\u2066-\u2069]")
 
@@ -59,7 +60,7 @@ class SourceFile:
 
     def __post_init__(self) -> None:
         starts = [0]
-        starts.extend(i + 1 for i, c in enumerate(self.text) if c == "\n")
+        starts.extend(found.end() for found in _NEWLINE.finditer(self.text))
         object.__setattr__(self, "_starts", starts)
 
     @classmethod

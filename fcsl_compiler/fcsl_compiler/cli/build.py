@@ -1,15 +1,12 @@
 # SPDX-License-Identifier: Apache-2.0
-"""`fcslc build`, and functions shared with other commands."""
+"""`fcslc build`, and what other commands share with it."""
 
 from __future__ import annotations
 
 import argparse
 import shlex
-import sys
-from collections.abc import Sequence
 from pathlib import Path
 
-from ..base.diagnostics import Diagnostic
 from ..base.files import write_whole
 from ..base.usage import UsageError
 from ..build_report import compiled_facts, refuse_foreign, report_text
@@ -20,38 +17,12 @@ from ..driver.passes import DUMPS, Compilation, compile_machine
 from ..driver.record import SUFFIX, write_record
 from ..driver.stack import bound_text
 from ..driver.toolchain import toolchain
-from ..model.target import BACKENDS, DEFAULT_BACKEND, DEFAULT_TARGET
+from ..model.choices import DEFAULT_BACKEND, DEFAULT_TARGET
 from ..parse.machine_files import is_machine_name
-from .report import FORMATS, Summary, document, error_count
-
-TARGET_HELP = f"which of the machine's `targets` its externs are linked from (default: {DEFAULT_TARGET})"
-STRICT_HELP = "every input without connection or channel must be listed in the `inputs` of its instance"
+from .report import Summary, print_extern_calls, print_report
 
 
-def add_build(commands: argparse._SubParsersAction[argparse.ArgumentParser]) -> None:
-    """Adds the command to fcslc's parser."""
-    build = commands.add_parser("build", help="compile to a shared library, or to C only")
-    build.add_argument("config", type=Path, nargs="+", help="machine JSON; several go into one library")
-    build.add_argument("-o", "--output", type=Path, help="output folder (default: build beside the first config)")
-    build.add_argument("--name", help="library name (default: the first machine's)")
-    build.add_argument("--c-only", action="store_true", help="write C (and Nim), header and map, do not compile them")
-    build.add_argument("--depfile", type=Path, help="write the dependencies of the C files, for make and ninja")
-    build.add_argument("--backend", choices=BACKENDS, default=DEFAULT_BACKEND, help="language of the generated source")
-    build.add_argument("--target", default=DEFAULT_TARGET, help=TARGET_HELP)
-    build.add_argument(
-        "--instances", metavar="NAME,…", help="build a subset machine with only these instances (one config)"
-    )
-    build.add_argument("--strict", action="store_true", help=STRICT_HELP)
-    build.add_argument(
-        "--dump", choices=list(DUMPS), help="print the result of a pass, or the types of locals, and stop"
-    )
-    what = "print a resource report: order, latencies, operations, instructions, stack, sizes, load; FILE: also as JSON"
-    build.add_argument("--report", nargs="?", const="", metavar="FILE.json", help=what)
-    add_format(build)
-    build.set_defaults(run=_build)
-
-
-def _build(options: argparse.Namespace) -> int:
+def run(options: argparse.Namespace) -> int:
     if options.dump and options.format != "text":
         raise UsageError("--dump prints the result of a pass; it has no --format")
     if options.dump and options.report is not None:
@@ -72,7 +43,7 @@ def _build(options: argparse.Namespace) -> int:
     if options.name is not None and not is_machine_name(options.name):
         raise UsageError(f"--name `{options.name}` is not a valid library name: lower_snake_case, not a keyword of C")
     refuse_file(folder)
-    _checkprint_report(options)
+    _check_report(options)
     costs: list[Facts] = []
     library = folder / f"lib{options.name or first.stem}.so"
     if options.c_only:
@@ -121,7 +92,7 @@ def _command(options: argparse.Namespace, folder: Path) -> str:
     return shlex.join([*words, *(["--strict"] if options.strict else [])])
 
 
-def _checkprint_report(options: argparse.Namespace) -> None:
+def _check_report(options: argparse.Namespace) -> None:
     if options.report is None:
         return
     if options.c_only:
@@ -150,30 +121,6 @@ def _write_depfile(path: Path, target: Path, compilations: list[Compilation]) ->
 def _make_word(path: Path) -> str:
     """A file name escaped for make."""
     return str(path).replace(" ", "\\ ").replace("#", "\\#").replace("$", "$$")
-
-
-def print_report(options: argparse.Namespace, found: Sequence[Diagnostic], machines: Sequence[Summary] = ()) -> None:
-    """Prints the results: text on stderr, or the requested document on stdout."""
-    form = getattr(options, "format", "text")
-    if form != "text":
-        print(document(form, found, machines), end="")
-        return
-    for diagnostic in found:
-        print(diagnostic.render(), file=sys.stderr)
-    if error_count(found):
-        print(f"\n{error_count(found)}", file=sys.stderr)
-
-
-def add_format(command: argparse.ArgumentParser) -> None:
-    """Adds the option --format."""
-    what = "text for people (default); json or sarif: one document on stdout, for editors and other programs"
-    command.add_argument("--format", choices=FORMATS, default="text", help=what)
-
-
-def print_extern_calls(calls: Sequence[str]) -> None:
-    """Prints the external functions that the externs of a library call."""
-    if calls:
-        print(f"functions called by its externs: {', '.join(calls)}")
 
 
 def refuse_file(folder: Path) -> None:

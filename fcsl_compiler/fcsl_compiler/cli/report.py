@@ -18,7 +18,9 @@ there when the tool itself could not do its work (no C compiler, a full disk).
 
 from __future__ import annotations
 
+import argparse
 import json
+import sys
 from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
@@ -28,8 +30,6 @@ from ..base.codes.pages import explain, table
 from ..base.diagnostics import Diagnostic, Severity
 from ..base.source import Span
 from ..model.machine import Machine
-
-FORMATS = ("text", "json", "sarif")
 
 
 @dataclass(frozen=True)
@@ -54,6 +54,24 @@ def error_count(diagnostics: Sequence[Diagnostic]) -> str:
     """`2 errors`, or "" for none."""
     errors = sum(d.severity is Severity.ERROR for d in diagnostics)
     return _count(errors, "error") if errors else ""
+
+
+def print_report(options: argparse.Namespace, found: Sequence[Diagnostic], machines: Sequence[Summary] = ()) -> None:
+    """Prints the results: text on stderr, or the requested document on stdout."""
+    form = getattr(options, "format", "text")
+    if form != "text":
+        print(document(form, found, machines), end="")
+        return
+    for diagnostic in found:
+        print(diagnostic.render(), file=sys.stderr)
+    if error_count(found):
+        print(f"\n{error_count(found)}", file=sys.stderr)
+
+
+def print_extern_calls(calls: Sequence[str]) -> None:
+    """Prints the external functions that the externs of a library call."""
+    if calls:
+        print(f"functions called by its externs: {', '.join(calls)}")
 
 
 def document(form: str, diagnostics: Sequence[Diagnostic], machines: Sequence[Summary] = (), failure: str = "") -> str:

@@ -10,8 +10,9 @@ from ..base.diagnostics import DiagnosticSink
 from ..base.source import Span
 from ..model.machine import Channel, Machine, PortRef, Values, seconds
 from ..model.types import BOOL, Struct, Type
-from ..parse.json_reader import ConfigReader, example
+from ..parse.json_reader import ConfigReader
 from ..parse.json_source import JsonNode
+from ..parse.json_values import example
 from .ports import PortResolver
 
 #: Longest time without a command. The slowest machine has one tick in a second, so it misses 60 of them.

@@ -10,7 +10,8 @@ from pathlib import Path
 
 from ..base.files import digest
 from ..model import ir
-from ..model.target import DEFAULT_TARGET, Target
+from ..model.choices import DEFAULT_TARGET
+from ..model.target import Target
 from .c_dependencies import extern_inputs
 from .cache_entry import cached
 from .nim import compile_externs

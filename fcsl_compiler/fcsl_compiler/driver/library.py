@@ -10,7 +10,7 @@ from pathlib import Path
 
 from ..base.diagnostics import Diagnostic, DiagnosticError, Severity
 from ..base.files import write_whole
-from ..model.target import DEFAULT_BACKEND, DEFAULT_TARGET
+from ..model.choices import DEFAULT_BACKEND, DEFAULT_TARGET
 from .backends import toolchain_of_backend
 from .externs import explained, link_inputs
 from .nim import check_externs, compile_modules

@@ -18,39 +18,14 @@ from ..model import ir
 from ..model.types import Array, Scalar, Type, scalar_of
 from ..printers.nim.names import REFUSED, is_keyword
 from ..printers.nim.operations.helpers import NIM_TYPES
-from .toolchain import Language, ToolchainError, run_compiler, toolchain
+from .backends import NIM
+from .toolchain import ToolchainError, run_compiler
 
-#: No checks, no garbage collector, and no configuration but this.
-FLAGS = (
-    "c",
-    "--compileOnly",
-    "--noMain",
-    "--app:staticlib",
-    "--mm:none",
-    "-d:danger",
-    "--threads:off",
-    "--skipCfg",
-    "--skipUserCfg",
-    "--skipParentCfg",
-    "--skipProjCfg",
-    "--hints:off",
-    "--warnings:off",
-    "--colors:off",
-)
 #: The header of all C that Nim makes.
 BASE_HEADER = "nimbase.h"
 
 _REFUSED = re.compile(rf"\b({'|'.join(sorted(REFUSED))}|import(?! std/volatile$))\b", re.MULTILINE)
 _COMMENT_OR_TEXT = re.compile(r'""".*?"""|#[^\n]*|"(?:[^"\\\n]|\\.)*"|`[^`\n]*`', re.DOTALL)
-
-
-#: Its compiler makes C, which the C compiler compiles.
-NIM = Language("Nim", "NIM", "nim", "nim (Debian and Ubuntu: apt-get install nim)", FLAGS)
-
-
-def nim_toolchain() -> str:
-    """Versions and flags of Nim and of the C compiler, as included in build_hash. Raises ToolchainError."""
-    return f"{toolchain(NIM)}; {toolchain()}"
 
 
 def refuse_allocation(text: str, file: str) -> None:
@@ -123,7 +98,7 @@ def _c_of(folder: Path, names: Sequence[str], program: str = "") -> dict[str, st
     # What belongs to a program is in the C of this module, which nobody compiles.
     root = folder / "fcsl_program.nim"
     root.write_text("".join(f"import {name}\n" for name in names) + program)
-    run_compiler([*NIM.compiler(), *FLAGS, f"--nimcache:{folder / 'c'}", str(root)], language=NIM)
+    run_compiler([*NIM.compiler(), *NIM.flags, f"--nimcache:{folder / 'c'}", str(root)], language=NIM)
     made = {f"{name}.nim.c": (folder / "c" / f"@m{name}.nim.c").read_text(encoding="utf-8") for name in names}
     return {**made, BASE_HEADER: _base_header(folder / "c")}
 

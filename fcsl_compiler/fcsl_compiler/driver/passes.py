@@ -22,8 +22,9 @@ from ..emit.fault_places import FaultPlaces
 from ..emit.field_table import source_hash
 from ..emit.machine import emit_machine
 from ..lower.lower import lower
+from ..model.choices import DEFAULT_BACKEND, DEFAULT_TARGET
 from ..model.machine import Machine
-from ..model.target import DEFAULT_BACKEND, DEFAULT_TARGET, Target
+from ..model.target import Target
 from ..parse.machine_files import ParsedMachine, parse_machine
 from ..parse.targets import choose_target
 from ..printers.c.descriptor import DescriptorEmitter

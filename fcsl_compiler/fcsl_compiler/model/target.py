@@ -1,16 +1,10 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Backends, and the link inputs of externs for one kind of computer."""
+"""The link inputs of externs for one kind of computer."""
 
 from __future__ import annotations
 
 from dataclasses import dataclass, field
 from pathlib import Path
-
-#: Default target. Tests, twins and simulators use it.
-DEFAULT_TARGET = "simulation"
-#: Languages of generated source.
-BACKENDS = ("c", "nim")
-DEFAULT_BACKEND = "c"
 
 
 @dataclass(frozen=True)

@@ -3,15 +3,16 @@
 
 from __future__ import annotations
 
-import math
 import re
 from collections.abc import Sequence
+from typing import TYPE_CHECKING
 
 from ..base.diagnostics import DiagnosticSink, misspelt, nearest
 from ..base.source import MAX_NAME, Span
-from ..model.literals import LiteralError, fit
-from ..model.types import BOOL, HEALTH, HEALTH_NAMES, REQUEST, Array, Scalar, Struct, Type
-from .json_source import JsonNode
+from .json_source import JsonNode, article
+
+if TYPE_CHECKING:
+    from ..model.types import Type
 
 #: Valid user-defined names. They become parts of C identifiers and of paths.
 _NAME = re.compile(r"[A-Za-z][A-Za-z0-9]*(_[A-Za-z0-9]+)*")
@@ -152,81 +153,9 @@ class ConfigReader:
 
     def value(self, node: JsonNode, type_: Type, what: str) -> tuple[bool | int | float | str, ...] | None:
         """A literal of type `type_`, as scalars in the order of its leaves."""
-        if isinstance(type_, Struct):
-            return self._struct(node, type_, what)
-        if isinstance(type_, Array):
-            if node.kind != "array" or len(node.items) != type_.shape[0]:
-                have = f"a list of {len(node.items)}" if node.kind == "array" else _article(node.kind)
-                self.sink.error("E207", f"{what} is {type_}, not {have}", node.span, help=f"write {example(type_)}")
-                return None
-            if len(type_.shape) == 1 and any(item.kind == "array" for item in node.items):
-                self.sink.error(
-                    "E207", f"{what} is {type_}, not a list of lists", node.span, help=f"write {example(type_)}"
-                )
-                return None
-            rest: Type = Array(type_.element, type_.shape[1:]) if len(type_.shape) > 1 else type_.element
-            parts = [self.value(item, rest, what) for item in node.items]
-            return None if any(p is None for p in parts) else tuple(v for p in parts if p is not None for v in p)
-        return self._scalar(node, type_, what)
+        from .json_values import read_value  # here: an unchanged machine is found in the cache without its types
 
-    def _struct(self, node: JsonNode, type_: Struct, what: str) -> tuple[bool | int | float | str, ...] | None:
-        if type_.partial:
-            return None
-        if node.kind != "object":
-            fix = "write {" + ", ".join(f'"{m.name}": …' for m in type_.members) + "}"
-            self.sink.error("E207", f"{what} is {type_}, not {_article(node.kind)}", node.span, help=fix)
-            return None
-        keys = self.object(node, f"{what} ({type_})", [m.name for m in type_.members]) or {}
-        values: list[bool | int | float | str] = []
-        complete = keys.keys() == node.members.keys() and len(keys) == len(type_.members)
-        for member in type_.members:
-            part = self.value(keys[member.name], member.type, f"{what}.{member.name}") if member.name in keys else None
-            complete &= part is not None
-            values += part or ()
-        return tuple(values) if complete else None
-
-    def _scalar(self, node: JsonNode, type_: Scalar, what: str) -> tuple[bool | int | float | str, ...] | None:
-        if type_ is BOOL:
-            if node.kind == "bool":
-                return (bool(node.value),)
-        elif type_ is REQUEST:
-            name = self.string(node, what)
-            if name:
-                self.requests.setdefault(name, node.span)
-            return None if name is None else (name,)
-        elif type_ is HEALTH:
-            word = self.choice(node, what, HEALTH_NAMES)
-            return None if word is None else (HEALTH_NAMES.index(word),)
-        elif node.is_number and isinstance(node.value, int | float):
-            try:
-                number = fit(node.value, type_)
-                if not isinstance(number, float) or math.isfinite(number):
-                    return (number,)
-            except LiteralError as error:
-                if type_.is_integer and node.kind == "float":
-                    fix = f"write {int(node.value)}" if node.value == int(node.value) else "write an integer"
-                    self.sink.error("E207", f"{what} is {type_}, not a number with a point", node.span, help=fix)
-                    return None
-                self.sink.error("E207", f"{what}: {error.args[0]}", node.span, help=str(error.args[1]))
-                return None
-        fix = "true or false" if type_ is BOOL else "an integer" if type_.is_integer else "a finite number"
-        self.sink.error("E207", f"{what} is {type_}, not {_article(node.kind)}", node.span, help=f"write {fix}")
-        return None
+        return read_value(self, node, type_, what)
 
     def wrong(self, node: JsonNode, message: str, fix: str) -> None:
-        self.sink.error("E208", f"{message}, not {_article(node.kind)}", node.span, help=f"write {fix}" if fix else "")
-
-
-def _article(kind: str) -> str:
-    return {"int": "an integer", "object": "an object", "array": "a list", "null": "null"}.get(kind, f"a {kind}")
-
-
-def example(type_: Scalar | Array) -> str:
-    """A value of this type, to write in the JSON."""
-    element, shape = (type_, ()) if isinstance(type_, Scalar) else (type_.element, type_.shape)
-    if isinstance(element, Struct) or math.prod(shape) > 16:
-        return f"a list of {shape[0]}"
-    inner = "0.0" if element.is_float else {BOOL: "false", HEALTH: '"nominal"', REQUEST: '""'}.get(element, "0")
-    for extent in reversed(shape):
-        inner = "[" + ", ".join([inner] * extent) + "]"
-    return inner
+        self.sink.error("E208", f"{message}, not {article(node.kind)}", node.span, help=f"write {fix}" if fix else "")

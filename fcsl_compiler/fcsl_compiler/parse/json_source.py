@@ -55,6 +55,11 @@ class JsonNode:
         return member.value if member else None
 
 
+def article(kind: str) -> str:
+    """A kind of node with its article."""
+    return {"int": "an integer", "object": "an object", "array": "a list", "null": "null"}.get(kind, f"a {kind}")
+
+
 class _SyntaxError(Exception):
     def __init__(self, message: str, start: int, end: int, help_text: str = ""):
         self.message, self.start, self.end, self.help = message, start, end, help_text
@@ -176,8 +181,9 @@ class _Parser:
                 "close it with a double quote",
             )
         self.at = match.end()
-        text = json.loads(match.group())
-        if any(0xD800 <= ord(c) <= 0xDFFF for c in text):
+        written = match.group()
+        text = json.loads(written) if "\\" in written else written[1:-1]
+        if not text.isascii() and any(0xD800 <= ord(c) <= 0xDFFF for c in text):
             raise _SyntaxError("a surrogate is not a character", match.start(), match.end())
         return text, self.source.span(match.start(), match.end())
 

@@ -16,24 +16,37 @@ use. Each of these packages imports only those above it:
 from importlib import import_module
 from typing import TYPE_CHECKING, Any
 
-from .descriptor import Channel, FaultPlace, Field, Instance, Machine, Transition
-from .errors import BagError, MapError, OverwrittenWarning, TwinError
-from .twin.alg_twin import AlgTwin, PyTwin
-from .twin.snapshot import diff
-from .twin.twin import Twin
-
 if TYPE_CHECKING:
+    from .descriptor import Channel, FaultPlace, Field, Instance, Machine, Transition
+    from .errors import BagError, MapError, OverwrittenWarning, TwinError
     from .telemetry.receiver import Telemetry
+    from .twin.alg_twin import AlgTwin, PyTwin
     from .twin.process_twin import ProcessTwin
+    from .twin.snapshot import diff
+    from .twin.twin import Twin
     from .vars.client import VarClient
     from .vars.wire import VarError
 
-#: Imported on first use: not every user needs sockets and processes.
-_LATER = {
+#: Where each name is. It is imported on first use: a command that talks to a socket needs no twin.
+_HOME = {
+    "AlgTwin": "twin.alg_twin",
+    "BagError": "errors",
+    "Channel": "descriptor",
+    "FaultPlace": "descriptor",
+    "Field": "descriptor",
+    "Instance": "descriptor",
+    "Machine": "descriptor",
+    "MapError": "errors",
+    "OverwrittenWarning": "errors",
     "ProcessTwin": "twin.process_twin",
+    "PyTwin": "twin.alg_twin",
     "Telemetry": "telemetry.receiver",
+    "Transition": "descriptor",
+    "Twin": "twin.twin",
+    "TwinError": "errors",
     "VarClient": "vars.client",
     "VarError": "vars.wire",
+    "diff": "twin.snapshot",
 }
 #: In a package that needs this one.
 _SIM = "fcsl_sim"
@@ -61,11 +74,18 @@ __all__ = [
 
 
 def __getattr__(name: str) -> Any:
-    if name in _LATER:
-        return getattr(import_module(f".{_LATER[name]}", __name__), name)
-    if name == "SimTwin":
-        return getattr(_sim_module("sim_twin", name), name)
-    raise AttributeError(f"module {__name__!r} has no attribute {name!r}")
+    if name in _HOME:
+        found = getattr(import_module(f".{_HOME[name]}", __name__), name)
+    elif name == "SimTwin":
+        found = getattr(_sim_module("sim_twin", name), name)
+    else:
+        raise AttributeError(f"module {__name__!r} has no attribute {name!r}")
+    globals()[name] = found
+    return found
+
+
+def __dir__() -> list[str]:
+    return sorted({*globals(), *__all__})
 
 
 def _sim_module(module: str, what: str) -> Any:

@@ -1,18 +1,13 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Shared parts of the command-line tools: errors as one message, progress, output that is complete or absent."""
+"""Shared parts of the command-line tools: errors as one message, progress."""
 
 from __future__ import annotations
 
-import errno
 import os
-import shutil
 import signal
 import sys
-import tempfile
 import time
-from collections.abc import Callable, Iterator, Sequence
-from contextlib import contextmanager
-from pathlib import Path
+from collections.abc import Callable, Sequence
 from typing import NoReturn
 
 from .errors import BagError, BusError, MapError, TwinError, ViewError
@@ -26,8 +21,6 @@ folder with <package>/msg/<name>.msg, for bags without definitions; may be repea
 _PROGRESS_PERIOD_S = 2.0
 _BAR_PERIOD_S = 0.2
 _BAR_WIDTH = 30
-#: Errors that only writing raises; they name no file.
-_NO_ROOM = (errno.ENOSPC, errno.EDQUOT, errno.EFBIG)
 
 
 def run_tool(name: str, main: Callable[[Sequence[str]], int]) -> NoReturn:
@@ -92,36 +85,3 @@ class Progress:
         if self._drawn:
             print("\r\x1b[K", end="", file=sys.stderr, flush=True)
             self._drawn = False
-
-
-@contextmanager
-def complete_or_absent(target: str | Path) -> Iterator[Path]:
-    """A temporary path for a file or directory: renamed to `target` if the block succeeds, deleted if it fails.
-
-    The last component of the path is that of `target`, because bags name their files after their directory. Errors of
-    the operating system name `target`, because the temporary path means nothing to a user.
-    """
-    wanted = Path(target).absolute()
-    if not wanted.parent.is_dir():
-        raise BagError(f"{wanted.parent}: no such directory")
-    if wanted.is_dir():
-        raise BagError(f"{target}: a directory; name the file to write")
-    try:
-        scratch = Path(tempfile.mkdtemp(prefix=f".{wanted.name}.", dir=wanted.parent))
-    except OSError as error:
-        raise BagError(f"{target}: cannot be written: {error.strerror}") from None
-    try:
-        partial = scratch / wanted.name
-        yield partial
-        partial.replace(wanted)
-    except OSError as error:
-        if error.errno not in _NO_ROOM and str(scratch) not in str(error.filename):
-            raise
-        reason = os.strerror(error.errno) if error.errno else str(error)
-        raise BagError(f"{target}: cannot be written: {reason}") from None
-    except (BagError, TwinError) as error:
-        if str(scratch) not in str(error):
-            raise
-        raise type(error)(str(error).replace(str(scratch), str(wanted.parent))) from None
-    finally:
-        shutil.rmtree(scratch, ignore_errors=True)

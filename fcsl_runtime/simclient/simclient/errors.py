@@ -3,7 +3,6 @@
 
 from __future__ import annotations
 
-import difflib
 from collections.abc import Iterable
 
 
@@ -33,5 +32,7 @@ class MapError(ValueError):
 
 def did_you_mean(word: str, choices: Iterable[str]) -> str:
     """'; did you mean `…`?' for the closest choice, or the empty string."""
+    import difflib  # here: most runs make no mistake
+
     close = difflib.get_close_matches(word, list(choices), n=1, cutoff=0.5)
     return f"; did you mean `{close[0]}`?" if close else ""

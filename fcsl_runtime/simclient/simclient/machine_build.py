@@ -30,7 +30,7 @@ def find_config(path: str | Path, caller: str = "", what: str = "machine config"
 
 def check_backend(backend: str) -> None:
     """Raises TwinError if there is no such backend."""
-    from fcsl_compiler.model.target import BACKENDS
+    from fcsl_compiler.model.choices import BACKENDS
 
     if backend not in BACKENDS:
         raise TwinError(f"backend={backend!r}: one of {', '.join(BACKENDS)} wanted")

@@ -25,14 +25,14 @@ import pytest
 from kill_points import CannotTrace, calls_until_killed
 from native import Fc, flying
 
-from simclient.vars import cli
+from simclient.vars.arguments import make_parser
 from simclient.vars.cli import main
 from simclient.vars.client import VarClient
 from simclient.vars.complete import SHELLS, complete
 from simclient.vars.find import Server, find_server, named_address, running_servers
-from simclient.vars.show import read_value
 from simclient.vars.subscription import Sample, Subscription
 from simclient.vars.terminal_plot import Canvas, draw_panel
+from simclient.vars.value_text import read_value
 from simclient.vars.watch import _draw, _Table, _until
 from simclient.vars.wire import VarError
 
@@ -330,10 +330,12 @@ def test_plot_of_a_ramp(tell: Tell) -> None:
 
 
 def test_completion_knows_every_command_and_option() -> None:
-    (commands,) = [a.choices for a in cli._parser()._actions if isinstance(a.choices, dict)]
+    (commands,) = [a.choices for a in make_parser()._actions if isinstance(a.choices, dict)]
     assert sorted(complete([""])) == sorted(commands)
     for name, parser in commands.items():
-        options = [option for action in parser._actions for option in action.option_strings if option[:2] == "--"]
+        options = [
+            option for action in parser.filled()._actions for option in action.option_strings if option[:2] == "--"
+        ]
         assert set(options) <= set(complete([name, "--"])), name
 
 

@@ -59,6 +59,15 @@ def test_every_command(client: VarClient) -> None:
     assert client.stats()["requests"] > 10 and client.describe("sensors.outputs.gyro")["type"].startswith("f")
 
 
+def test_many_paths_are_described_together(client: VarClient) -> None:
+    paths = [*client.list()] * 20
+    assert len(paths) > 250  # more than are pending at a time
+    assert [told["path"] for told in client.describe_all(paths)] == paths
+    with pytest.raises(VarError, match="sensors.outputs.giro"):
+        client.describe_all(["machine.tick", "sensors.outputs.giro", "machine.state"])
+    assert client.state()["tick"] == 0  # replies that were left are dropped
+
+
 def test_numbers_that_json_lacks(client: VarClient) -> None:
     with pytest.raises(VarError, match="not finite") as refused:
         client.set({"sensors.outputs.gyro[0]": math.inf})

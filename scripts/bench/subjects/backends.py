@@ -14,7 +14,7 @@ from pathlib import Path
 from typing import Any
 
 from fcsl_compiler.driver.library import build_library
-from fcsl_compiler.model.target import BACKENDS
+from fcsl_compiler.model.choices import BACKENDS
 
 from ..harness.native import BENCH, compile_program
 from ..harness.size import sized

@@ -15,7 +15,8 @@ from fcsl_compiler.driver.externs import link_inputs
 from fcsl_compiler.driver.library import build_library, stack_bounds
 from fcsl_compiler.driver.passes import Compilation
 from fcsl_compiler.driver.toolchain import compile_objects, compiler, include_dirs, link_shared, math_library
-from fcsl_compiler.model.target import DEFAULT_BACKEND, Target
+from fcsl_compiler.model.choices import DEFAULT_BACKEND
+from fcsl_compiler.model.target import Target
 
 from ..shared.cases import CheckFailed
 from .elf import Elf

@@ -19,7 +19,7 @@ from concurrent.futures import Future, ProcessPoolExecutor, ThreadPoolExecutor
 from pathlib import Path
 
 from fcsl_compiler.driver.library import emit
-from fcsl_compiler.model.target import BACKENDS, DEFAULT_BACKEND
+from fcsl_compiler.model.choices import BACKENDS, DEFAULT_BACKEND
 
 from ..shared.cases import EXAMPLES, NUMBERS, OUT, CheckFailed, write_facts
 from ..shared.effort import scaled

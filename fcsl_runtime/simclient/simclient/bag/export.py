@@ -21,7 +21,8 @@ from typing import Any
 
 import numpy as np
 
-from ..cli import Progress, complete_or_absent
+from ..cli import Progress
+from ..complete_output import complete_or_absent
 from ..errors import BagError, did_you_mean
 from .bag import Array, Bag, RecordedMachine
 from .fields import flat

@@ -144,20 +144,19 @@ class Scan:
         """
         for record in listed[np.isin(listed["opcode"], (Opcode.CHANNEL, Opcode.SCHEMA))]:
             self._definition(_parse_definition(int(record["opcode"]), data[int(record["begin"]) : int(record["end"])]))
-        messages = listed[listed["opcode"] == Opcode.MESSAGE]
-        numbers = np.unique(messages["channel"]).tolist()
+        messages = np.flatnonzero(listed["opcode"] == Opcode.MESSAGE)
+        channels = listed["channel"][messages]
+        numbers = np.unique(channels).tolist()
         defined = [n for n in numbers if n in self.channels]
-        if len(defined) < len(numbers):
-            there = np.isin(messages["channel"], defined)
-            self._losses.undefined += int((~there).sum())
-            messages = messages[there]
-        self.count += len(messages)
         wanted = [n for n in defined if topics is None or self.channels[n].topic in topics]
-        if len(wanted) < len(defined):
-            messages = messages[np.isin(messages["channel"], wanted)]
+        undefined = 0 if len(defined) == len(numbers) else int((~np.isin(channels, defined)).sum())
+        self._losses.undefined += undefined
+        self.count += len(messages) - undefined
+        if len(wanted) < len(numbers):
+            messages = messages[np.isin(channels, wanted)]
         entries = np.empty(len(messages), ENTRY)
         for name, column in (("number", "channel"), ("log_ns", "log_ns"), ("begin", "begin"), ("end", "end")):
-            entries[name] = messages[column]
+            entries[name] = listed[column][messages]
         return entries
 
 

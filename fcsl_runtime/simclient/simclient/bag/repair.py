@@ -21,7 +21,7 @@ import yaml
 from mcap.data_stream import RecordBuilder
 from mcap.opcode import Opcode
 
-from ..cli import complete_or_absent
+from ..complete_output import complete_or_absent
 from ..errors import BagError
 from .files import mcap_files, metadata_of
 from .mcap_file import Scan, check_begin, read_summary

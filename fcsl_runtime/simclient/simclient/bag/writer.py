@@ -13,7 +13,7 @@ from rosbags.interfaces import Connection, Qos
 from rosbags.rosbag2 import StoragePlugin, Writer
 from rosbags.rosbag2.metadata import parse_qos
 
-from ..cli import complete_or_absent
+from ..complete_output import complete_or_absent
 from ..errors import BagError
 from .bag import Bag, Topic
 

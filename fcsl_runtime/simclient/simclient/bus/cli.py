@@ -20,7 +20,8 @@ from typing import Any
 from fcsl_compiler.base.version import add_version
 
 from ..errors import BusError, did_you_mean
-from ..vars.show import jsonable, read_value, show_value, table, with_unit
+from ..vars.show import jsonable, show_value, table, with_unit
+from ..vars.value_text import read_value
 from .feed import Feed
 from .machine import BusChannel, BusMachine, read_machine
 from .session import Session

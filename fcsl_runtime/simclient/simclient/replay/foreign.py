@@ -15,7 +15,18 @@ from ..errors import BagError, MapError, did_you_mean
 from ..run import Run
 from ..samples import SAMPLE
 from .expect import Comparison, table
-from .grid import JUMP_NS, Array, Coverage, Grid, Oddities, first_ticks_at, place, tick_count
+from .grid import (
+    JUMP_NS,
+    Array,
+    Coverage,
+    Grid,
+    Oddities,
+    first_ticks_at,
+    joined_rows,
+    place,
+    taken_rows,
+    tick_count,
+)
 from .intake import Intake, Wish, gather, refusals, wish
 from .mapping import Entry, Map
 from .outputs import SLICE_TICKS, Outputs
@@ -190,29 +201,51 @@ def _grid(chart: Map, intakes: Mapping[str, Intake], bag: Bag, tick_hz: int) -> 
     return Grid(first_ns, ticks, tick_hz)
 
 
-def _deliveries(channel: Channel, intake: Intake, timeout_ns: int, grid: Grid) -> tuple[Array, Array, Fate]:
-    """(samples of one channel as SAMPLE, with payload offsets from 0; its payload bytes; its Fate).
+@dataclass(frozen=True)
+class _Delivery:
+    """The samples that a channel gets, in the order of their ticks. `rows` are those of `values`, an array of bytes."""
+
+    channel: Channel
+    ticks: Array
+    ages: Array
+    stamps_ns: Array
+    rows: Array
+    values: Array
+
+    def between(self, begin: int, end: int, payload: int) -> tuple[Array, Array]:
+        """(the samples of these ticks as SAMPLE, with payload offsets from `payload` on; their values)."""
+        low, high = np.searchsorted(self.ticks, (begin, end))
+        samples = np.zeros(high - low, SAMPLE)
+        samples["tick"], samples["age_ticks"] = self.ticks[low:high], self.ages[low:high]
+        samples["stamp_ns"], samples["channel"] = self.stamps_ns[low:high], self.channel.index
+        samples["payload"] = payload + np.arange(high - low) * self.channel.field.size
+        return samples, self.values[self.rows[low:high]]
+
+
+def _delivery(
+    channel: Channel, intake: Intake, placed: tuple[Array, Array, Coverage], timeout_ns: int, grid: Grid
+) -> tuple[_Delivery, Fate]:
+    """What one channel gets; `placed` is `place` of the intake.
 
     If `timeout_ms` ends before the machine's own max_age_ticks, the channel gets its last sample once more, with the
     first age that is too old.
     """
-    ticks, chosen, coverage = place(intake.times_ns, grid.first_ns, grid.ticks, grid.tick_hz)
-    samples = np.zeros(len(ticks), SAMPLE)
-    samples["tick"], samples["stamp_ns"], samples["channel"] = ticks, intake.stamps_ns[chosen], channel.index
-    samples["payload"] = np.arange(len(ticks)) * channel.field.size
+    ticks, chosen, coverage = placed
     until = np.append(ticks[1:], grid.ticks)[: len(ticks)]
     old = ticks + channel.max_age_ticks + 1
+    ages = np.zeros(len(ticks), np.int64)
+    due, rows = ticks, chosen
     if timeout_ns:
         silent = first_ticks_at(intake.times_ns[chosen] + timeout_ns + 1, grid.first_ns, grid.tick_hz)
         too_late = silent < np.minimum(until, old)
-        late = samples[too_late]
-        late["tick"], late["age_ticks"] = silent[too_late], channel.max_age_ticks + 1
+        due = np.concatenate((ticks, silent[too_late]))
+        order = np.argsort(due, kind="stable")
+        due, rows = due[order], np.concatenate((chosen, chosen[too_late]))[order]
+        ages = np.concatenate((ages, np.full(int(too_late.sum()), channel.max_age_ticks + 1)))[order]
         old = np.minimum(old, silent)
-        samples = np.concatenate((samples, late))
     invalid = int(np.maximum(until - old, 0).sum())
-    payloads = np.ascontiguousarray(intake.values[chosen]).reshape(-1).view(np.uint8)
-    fate = Fate(intake.messages, coverage, intake.refused, invalid)
-    return samples, payloads, fate
+    delivery = _Delivery(channel, due, ages, intake.stamps_ns[rows], rows, intake.values)
+    return delivery, Fate(intake.messages, coverage, intake.refused, invalid)
 
 
 def run_foreign(
@@ -233,21 +266,20 @@ def run_foreign(
     total = sum(bag.topics[topic].count for topic in {w.topic.name for w in wishes})
     intakes, oddities = gather(bag, wishes, chart.header_time, lambda done: progress("reading", done, total))
     grid = _grid(chart, intakes, bag, machine.tick_hz)
-    samples, payloads, fates = [], [], {}
-    size = 0
+    deliveries, fates = [], {}
+    # By the identity of the times, which the channels of a topic share.
+    placed: dict[int, tuple[Array, Array, Coverage]] = {}
     for name, channel in sensors_of(machine).items():
         if name not in intakes:
             continue
         intake = intakes[name]
+        times = id(intake.times_ns)
+        if times not in placed:
+            placed[times] = place(intake.times_ns, grid.first_ns, grid.ticks, grid.tick_hz)
         timeouts = [w.entry.timeout_ns for w in wishes if w.entry.target == name and w.entry.timeout_ns]
-        found, bytes_of, fates[name] = _deliveries(channel, intake, min(timeouts, default=0), grid)
-        found["payload"] += size
-        size += bytes_of.nbytes
-        samples.append(found)
-        payloads.append(bytes_of.data)
-    order = np.argsort(np.concatenate([found["tick"] for found in samples]), kind="stable")
-    every = np.concatenate(samples)[order]
-    _drive(run, every, b"".join(payloads), grid.ticks, outputs, record, progress)
+        delivery, fates[name] = _delivery(channel, intake, placed[times], min(timeouts, default=0), grid)
+        deliveries.append(delivery)
+    _drive(run, deliveries, grid.ticks, outputs, record, progress)
     return ForeignRun(
         grid=grid,
         header_time=chart.header_time,
@@ -262,8 +294,7 @@ def run_foreign(
 
 def _drive(
     run: Run,
-    samples: Array,
-    payloads: bytes,
+    deliveries: Sequence[_Delivery],
     ticks: int,
     outputs: Outputs | None,
     record: tuple[Path, str] | None,
@@ -273,14 +304,24 @@ def _drive(
     run.attach()
     if record is not None:
         run.record(*record, lossless=True)
-    due = samples["tick"].astype(np.int64)
     slice_ticks = outputs.slice_ticks if outputs else SLICE_TICKS
     for begin in range(0, ticks, slice_ticks):
         end = min(begin + slice_ticks, ticks)
-        low, high = np.searchsorted(due, (begin, end))
-        run.feed(samples[low:high].tobytes(), payloads, end)
+        run.feed(*_fed(deliveries, begin, end), end)
         if outputs:
             outputs.collect()
         progress("running", end, ticks)
     if record is not None:
         run.record_stop()
+
+
+def _fed(deliveries: Sequence[_Delivery], begin: int, end: int) -> tuple[bytes, bytes]:
+    """(samples of these ticks, sorted by tick, those of one tick in the order of `deliveries`; their payloads)."""
+    parts, payloads, size = [], [], 0
+    for delivery in deliveries:
+        samples, values = delivery.between(begin, end, size)
+        parts.append(samples)
+        payloads.append(values.tobytes())
+        size += len(payloads[-1])
+    order = np.argsort(np.concatenate([samples["tick"] for samples in parts]), kind="stable")
+    return taken_rows(joined_rows(parts), order).tobytes(), b"".join(payloads)

@@ -9,6 +9,7 @@ in ns.
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Any
 
@@ -19,6 +20,18 @@ Array = np.ndarray[Any, Any]
 _NS = 1_000_000_000
 #: A larger step of a topic's times is a jump of its clock and not a late message.
 JUMP_NS = _NS
+
+
+def joined_rows(parts: Sequence[Array]) -> Array:
+    """np.concatenate of arrays of one structured type. NumPy copies the fields of those one by one, but rows of bytes as
+    a whole, which takes a tenth of the time."""
+    kind = parts[0].dtype
+    return np.concatenate([part.view(f"V{kind.itemsize}") for part in parts]).view(kind)
+
+
+def taken_rows(array: Array, chosen: Array) -> Array:
+    """array[chosen] of a structured type, for the same reason."""
+    return np.take(array.view(f"V{array.dtype.itemsize}"), chosen).view(array.dtype)
 
 
 @dataclass(frozen=True)

@@ -14,7 +14,7 @@ from ..bag import Bag, Topic
 from ..errors import BagError, MapError
 from ..ros.reader import REASONS, Reader
 from ..ros.types import definitions_of
-from .grid import Array, Oddities, screen
+from .grid import Array, Oddities, joined_rows, screen
 from .mapping import Entry
 
 #: Reasons besides REASONS for which a message is not used.
@@ -121,7 +121,7 @@ class _Column:
         log_ns, stamps_ns, others = (_joined(parts) for parts in (self.log_ns, self.stamps_ns, self.other))
         other = others != 0
         status = np.concatenate(self.status) if self.status else np.empty((0, len(self.wishes)), np.uint8)
-        values = np.concatenate(self.values) if self.values else np.empty(0, self.reader.dtype)
+        values = joined_rows(self.values) if self.values else np.empty(0, self.reader.dtype)
         # One pick is enough: a fault of a message as a whole appears in all picks.
         unread = np.isin(status[:, 0], _UNREAD)
         readable = ~other & ~unread
@@ -139,10 +139,10 @@ class _Column:
             masks = whole | {REASONS[code]: judged & (status[:, i] == code) for code in found if code}
             refused = {reason: (int(m.sum()), int(m.argmax())) for reason, m in masks.items() if m.any()}
             taken = timed & (status[:, i] == 0)
-            # Usually all are used; then no copy is made.
-            kept = slice(None) if taken.all() else taken
-            column = values[w.pick.name][kept]
-            intakes.append(Intake(times_ns[kept], stamps_ns[kept], column, len(log_ns), refused))
+            times, stamps, column = times_ns, stamps_ns, values[w.pick.name]
+            if not taken.all():  # usually all are used; then no copy is made, and all intakes share their times
+                times, stamps, column = times[taken], stamps[taken], column[taken]
+            intakes.append(Intake(times, stamps, column, len(log_ns), refused))
         return intakes, oddities
 
 

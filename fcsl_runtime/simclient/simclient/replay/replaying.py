@@ -12,7 +12,8 @@ import numpy as np
 
 from ..bag import Bag, RecordedMachine
 from ..bag.formats import open_bag
-from ..cli import Progress, complete_or_absent
+from ..cli import Progress
+from ..complete_output import complete_or_absent
 from ..descriptor import Field
 from ..errors import BagError, TwinError
 from ..machine_build import build_config

@@ -21,8 +21,8 @@ from typing import Any, NamedTuple
 from .subscription import Subscription
 from .wire import NON_FINITE, VarError, VarWire
 
-#: Most requests of `tick_by_tick` without a reply.
-_PAIRS_MAX, _UNREAD_BYTES = 100, 1 << 16
+#: Most requests (of `tick_by_tick`: pairs) without a reply.
+_PENDING_MAX, _UNREAD_BYTES = 100, 1 << 16
 #: Bytes of a checkpoint per request, so that its text fits the largest request.
 _PORTION_BYTES = 48_000
 
@@ -84,6 +84,15 @@ class VarClient(VarWire):
         """Role, type, unit, documentation, range of a field; without a path, the machine."""
         return self._call("describe") if path is None else self._call("describe", path=path)
 
+    def describe_all(self, paths: Sequence[str]) -> Sequence[dict[str, Any]]:
+        """What `describe` says of each path. Several requests are pending at a time."""
+        found = []
+        for at in range(0, len(paths), _PENDING_MAX):
+            some = paths[at : at + _PENDING_MAX]
+            first = self._send([("describe", {"path": path}) for path in some])
+            found += [self._reply(number) for number in range(first, first + len(some))]
+        return found
+
     # ---- commands that write -----------------------------------------------------------------------------------------
 
     def set(self, values: Mapping[str, Any], allow_non_finite: bool = False) -> dict[str, Any]:
@@ -127,7 +136,7 @@ class VarClient(VarWire):
                 self._reply(number)
                 found.append(self._whole(self._reply(number + 1)))
             # One pair at a time if a checkpoint comes in portions, because the next save discards the remaining ones.
-            pairs = min(_PAIRS_MAX, max(1, _UNREAD_BYTES // (2 * len(found[0]))))
+            pairs = min(_PENDING_MAX, max(1, _UNREAD_BYTES // (2 * len(found[0]))))
         return found
 
     def set_state(self, state: str) -> dict[str, Any]:

@@ -3,6 +3,7 @@
 
 from __future__ import annotations
 
+import argparse
 import contextlib
 import shlex
 
@@ -53,6 +54,10 @@ _OF_COMMAND = {
 }
 _TAKE_PATHS = ("list", "get", "set", "watch", "plot", "describe")
 _TIMEOUT_S = 1.0
+
+
+def print_script(chosen: argparse.Namespace) -> None:
+    print(SHELLS[chosen.shell])
 
 
 def words_of(line: str) -> list[str]:

@@ -1,17 +1,11 @@
 # SPDX-License-Identifier: Apache-2.0
-"""How fcsl-var prints values, and parses them from the command line."""
+"""How fcsl-var prints values."""
 
 from __future__ import annotations
 
-import contextlib
-import json
 import math
-import re
 from collections.abc import Mapping, Sequence
 from typing import Any
-
-_SCALAR = re.compile(r'"(?:[^"\\]|\\.)*"|[^\s,\[\]"]+')
-_WORDS = {"nan": math.nan, "inf": math.inf, "-inf": -math.inf, "True": True, "False": False}
 
 
 def show_value(value: Any) -> str:
@@ -38,21 +32,6 @@ def jsonable(value: Any) -> Any:
     if isinstance(value, float) and not math.isfinite(value):
         return "nan" if math.isnan(value) else "inf" if value > 0 else "-inf"
     return value
-
-
-def read_value(text: str) -> Any:
-    """Parses a number, true, false, nan, inf, a name (quoted or not), or a list of those."""
-    for json_text in (text, _SCALAR.sub(_as_json, text)):
-        with contextlib.suppress(ValueError):
-            return json.loads(json_text)
-    return text
-
-
-def _as_json(scalar: re.Match[str]) -> str:
-    try:
-        return json.dumps(json.loads(scalar[0]))
-    except ValueError:
-        return json.dumps(_WORDS.get(scalar[0], scalar[0]))
 
 
 def table(rows: Sequence[Sequence[str]]) -> str:

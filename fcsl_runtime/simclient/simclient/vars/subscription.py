@@ -3,16 +3,12 @@
 
 from __future__ import annotations
 
-import re
-import struct
 from collections import deque
-from collections.abc import Callable, Iterator, Mapping
+from collections.abc import Iterator, Mapping
 from typing import TYPE_CHECKING, Any, NamedTuple, Self
 
-from ..c_machine import HEALTH_NAMES, TYPE_FORMATS
-from ..values import nest
-
 if TYPE_CHECKING:
+    from .binary_sample import Layout
     from .client import VarClient
 
 #: Samples buffered until they are read; beyond it the oldest are lost, and counted.
@@ -39,7 +35,11 @@ class Subscription:
         self._samples: deque[Sample] = deque()
         self._dropped = 0
         self._open = True
-        self._fields = [_Layout(path, kind, now[path], machine) for path, kind in types.items()] if machine else []
+        self._fields: list[Layout] = []
+        if machine:
+            from .binary_sample import Layout  # here: most commands of fcsl-var read no samples
+
+            self._fields = [Layout(path, kind, now[path], machine) for path, kind in types.items()]
 
     def close(self) -> None:
         """Ends the subscription; received samples can still be read. Idempotent."""
@@ -89,39 +89,3 @@ class Subscription:
             values[field.path] = field.read(payload, at)
             at += field.size
         return values
-
-
-class _Layout:
-    """Layout of a path's scalars in a binary sample.
-
-    `now` is a current value, which gives the shape: a path may be a slice.
-    """
-
-    def __init__(self, path: str, kind: str, now: Any, machine: dict[str, Any]):
-        self.path = path
-        self._shape: tuple[int, ...] = ()
-        while isinstance(now, list):
-            self._shape += (len(now),)
-            now = now[0] if now else None
-        count = 1
-        for extent in self._shape:
-            count *= extent
-        scalar = re.split(r"[\[ ]", kind)[0]
-        self._format = struct.Struct(f"<{count}{TYPE_FORMATS[scalar]}")
-        self.size = self._format.size
-        self._scalar = _reader(scalar, machine)
-
-    def read(self, payload: bytes, at: int) -> Any:
-        flat = [self._scalar(value) for value in self._format.unpack_from(payload, at)]
-        return nest(flat, self._shape) if self._shape else flat[0]
-
-
-def _reader(scalar: str, machine: dict[str, Any]) -> Callable[[Any], Any]:
-    names = {
-        "Health": HEALTH_NAMES,
-        "state": machine.get("states", []),
-        "TransitionRequest": ["", *(f"tr_{request}" for request in machine.get("requests", []))],
-    }.get(scalar)
-    if names is not None:
-        return lambda index: names[index] if 0 <= index < len(names) else f"<invalid {index}>"
-    return bool if scalar == "bool" else lambda value: value

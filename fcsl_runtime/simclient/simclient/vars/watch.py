@@ -11,6 +11,7 @@ from collections import deque
 from collections.abc import Iterator, Sequence
 from typing import Any, Protocol
 
+from .answers import units_of
 from .client import VarClient
 from .show import flat, jsonable, show_value, with_unit
 from .subscription import Sample, Subscription
@@ -31,11 +32,6 @@ class Display(Protocol):
     def take(self, sample: Sample) -> None: ...
 
     def lines(self, width: int, height: int) -> list[str]: ...
-
-
-def units_of(client: VarClient, paths: Sequence[str]) -> dict[str, str]:
-    """The unit of each path."""
-    return {path: client.describe(path)["unit"] for path in paths}
 
 
 def watch(client: VarClient, paths: Sequence[str], every: int, ticks: int | None, as_json: bool) -> None:

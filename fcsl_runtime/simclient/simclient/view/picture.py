@@ -19,7 +19,7 @@ import matplotlib
 import numpy as np
 
 from ..bag import Array, Bag
-from ..cli import complete_or_absent
+from ..complete_output import complete_or_absent
 from ..errors import BagError, ViewError
 from .panels import Choice, Curve, Panel, choose_by_paths, choose_by_views, choose_default, demand, label_of
 from .recorded import RecordedRun, Rows, Span, curve

@@ -14,7 +14,8 @@ import rerun as rr
 
 from ..bag import Bag
 from ..bag.states import StateReader
-from ..cli import Progress, complete_or_absent
+from ..cli import Progress
+from ..complete_output import complete_or_absent
 from ..errors import BagError
 from .blueprint import Plan
 from .feed import Feed

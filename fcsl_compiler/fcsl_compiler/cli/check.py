@@ -1,0 +1,28 @@
+# SPDX-License-Identifier: Apache-2.0
+"""`fcslc check`: reports errors and writes nothing."""
+
+from __future__ import annotations
+
+import argparse
+
+from ..base.diagnostics import Diagnostic, DiagnosticError
+from ..driver.passes import compile_machine
+from .report import Summary, print_report
+
+
+def run(options: argparse.Namespace) -> int:
+    found: list[Diagnostic] = []
+    passed: list[Summary] = []
+    for path in options.config:
+        try:
+            compilation = compile_machine(path, "", until="verify", strict=options.strict)
+        except DiagnosticError as error:
+            found += error.diagnostics
+            continue
+        found += compilation.sink.diagnostics
+        passed.append(Summary(path, compilation.checked))
+    if options.format == "text":
+        for machine in passed:
+            print(machine.text())
+    print_report(options, found, passed)
+    return 1 if len(passed) < len(options.config) else 0

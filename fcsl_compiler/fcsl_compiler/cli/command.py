@@ -1,0 +1,40 @@
+# SPDX-License-Identifier: Apache-2.0
+"""Runs a command of fcslc, and reports why it cannot do its work."""
+
+from __future__ import annotations
+
+import argparse
+import sys
+from importlib import import_module
+
+from ..base.diagnostics import DiagnosticError
+from ..base.usage import UsageError
+from ..check.verify import IrError
+from ..driver.toolchain import ToolchainError
+from .report import document, print_report
+
+
+def run_command(options: argparse.Namespace) -> int:
+    """The exit status. Imports the module of the command, which has its name."""
+    try:
+        status: int = import_module(f".{options.subcommand}", __package__).run(options)
+        return status
+    except DiagnosticError as error:
+        print_report(options, error.diagnostics)
+    except UsageError as error:
+        print(f"fcslc: {error}", file=sys.stderr)
+        return 2
+    except (ToolchainError, IrError) as error:
+        _fail(options, str(error))
+    except BrokenPipeError:
+        sys.stderr.close()
+    except OSError as error:
+        _fail(options, f"{error.filename or ''}: {error.strerror}")
+    return 1
+
+
+def _fail(options: argparse.Namespace, failure: str) -> None:
+    """Reports that the tool could not complete its work."""
+    print(f"fcslc: {failure}", file=sys.stderr)
+    if getattr(options, "format", "text") != "text":
+        print(document(options.format, (), failure=failure), end="")
