@@ -10,7 +10,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from fcsl_compiler.model.target import BACKENDS
+from fcsl_compiler.model.choices import BACKENDS
 from fcsl_sim.sim_twin import SimTwin
 from simclient.twin.twin import Twin
 

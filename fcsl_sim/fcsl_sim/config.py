@@ -18,7 +18,7 @@ from fcsl_compiler.base.source import SourceError, SourceFile, Span
 from fcsl_compiler.config.views import Signals, read_views
 from fcsl_compiler.driver.cache import build_machine
 from fcsl_compiler.driver.toolchain import ToolchainError
-from fcsl_compiler.model.target import DEFAULT_BACKEND
+from fcsl_compiler.model.choices import DEFAULT_BACKEND
 from fcsl_compiler.model.types import Type, scalar_of
 from fcsl_compiler.parse.json_reader import ConfigReader, Everything
 from fcsl_compiler.parse.json_source import JsonNode
