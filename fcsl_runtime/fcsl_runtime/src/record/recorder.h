@@ -24,7 +24,7 @@ fcsl_record_drops_t fcsl_recorder_drops(const fcsl_recorder_t *recorder);
 void fcsl_recorder_write(fcsl_recorder_t *recorder, uint64_t tick, const fcsl_write_t *write);
 /* A change of state that the host forced. */
 void fcsl_recorder_forced(fcsl_recorder_t *recorder, uint64_t tick, const fcsl_state_t *from, const fcsl_state_t *to);
-/* Whether a tick may begin: of a lossless recording only while writing has not failed. Fetches what its record will need. */
+/* Whether a tick may begin: a lossless recording ends with its writing. Fetches where its record will go. */
 int fcsl_recorder_begin_tick(fcsl_recorder_t *recorder, fcsl_error_t *error);
 /* Everything that the tick just completed has to show. */
 void fcsl_recorder_tick(fcsl_recorder_t *recorder, uint64_t tick);

@@ -31,7 +31,7 @@ static uint8_t *claim_tick(fcsl_recorder_t *recorder, uint32_t kind, uint64_t ti
 
 __attribute__((hot)) int fcsl_recorder_begin_tick(fcsl_recorder_t *recorder, fcsl_error_t *error)
 {
-    /* Nobody has been for seconds where the record of this tick will go. It comes into the cache while the machine steps. */
+    /* Nobody has been for seconds where this tick's record will go. It comes into the cache while the machine steps. */
     const fcsl_ring_t *ring = &recorder->ring;
     const uint64_t head = atomic_load_explicit(&ring->head, memory_order_relaxed);
     const uint64_t end = head + recorder->range_bytes;

@@ -33,7 +33,7 @@ int fcsl_ring_open(fcsl_ring_t *ring, size_t capacity)
     if (ring->bytes == NULL) {
         return -1;
     }
-    /* A tick writes where none has written for seconds: fewer pages are fewer walks through page tables. The kernel may refuse. */
+    /* A tick writes where none has for seconds: with fewer pages it walks fewer page tables. The kernel may refuse. */
     (void)madvise(ring->bytes, rounded, MADV_HUGEPAGE);
     if (sem_init(&ring->wake_consumer, 0, 0) != 0) {
         free(ring->bytes);

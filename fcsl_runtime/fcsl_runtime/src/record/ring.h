@@ -37,9 +37,9 @@ typedef struct {
     char after_constants[FCSL_RING_LINE_BYTES];
     _Atomic uint64_t head; /* bytes ever written; producer, as the next four */
     uint64_t claimed;      /* where head goes when the claimed record is published */
-    uint64_t sure;         /* records up to here find room, behind one another, for any policy; nobody is to be woken */
+    uint64_t sure; /* records up to here find room, behind one another, for any policy; nobody is to be woken */
     uint64_t seen_tail;
-    uint64_t wake_at;      /* where head next wakes the consumer */
+    uint64_t wake_at; /* where head next wakes the consumer */
     char after_producer[FCSL_RING_LINE_BYTES];
     _Atomic uint64_t tail; /* bytes ever consumed; consumer, as the next */
     uint64_t seen_head;
@@ -57,8 +57,8 @@ void fcsl_ring_free(fcsl_ring_t *ring);
 
 /* What a producer does when there is no room. */
 typedef enum {
-    FCSL_RING_WAIT,        /* until the consumer has made some */
-    FCSL_RING_DROP,        /* gives up */
+    FCSL_RING_WAIT, /* until the consumer has made some */
+    FCSL_RING_DROP, /* gives up */
     FCSL_RING_DROP_EARLIER /* gives up while there is still room for others: an eighth of the ring */
 } fcsl_ring_policy_t;
 

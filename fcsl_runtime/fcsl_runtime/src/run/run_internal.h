@@ -14,7 +14,7 @@ typedef struct fcsl_journal fcsl_journal_t;
 /* Instead of a time: tick k is at k / tick_hz. */
 #define FCSL_TICK_TIME UINT64_MAX
 
-/* What the overrun verdict of an instance with max_wcet_us was before a tick, to tell a measured overrun from an injected one. */
+/* An instance with max_wcet_us before a tick, to tell a measured overrun from an injected one. */
 typedef struct {
     uint32_t overruns_offset;
     uint32_t inject_offset;
@@ -63,7 +63,7 @@ struct fcsl_run {
     fcsl_board_close_fn *close_board;
 };
 
-/* The room of a machine struct, and the alignment that goes with it: whole cache lines, so that whole blocks may be copied. */
+/* The room of a machine struct, and its alignment: whole cache lines, so that whole blocks may be copied. */
 static inline size_t fcsl_run_data_align(const fcsl_machine_t *machine)
 {
     return machine->align < 64u ? 64u : machine->align;
