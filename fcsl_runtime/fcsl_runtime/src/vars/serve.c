@@ -132,6 +132,9 @@ void fcsl_vars_serve(fcsl_vars_t *vars)
     if (command == NULL) {
         return;
     }
+    if (command->kind == COMMAND_SAVE && command->file[0] != '\0') {
+        fcsl_vars_leave(vars); /* the server's thread waits for the disk */
+    }
     const int attends = fcsl_vars_begin_work(vars);
     command->status = act(vars, command);
     vars->host.publish(vars->host.ctx);
