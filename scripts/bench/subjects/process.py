@@ -26,7 +26,7 @@ MANY = sized(20_000, 100)
 def process_times() -> dict[str, dict[str, float]]:
     """us per call: median, quartiles and 99th percentile.
 
-    `tick_bytes`, `state_bytes`: a request of constant bytes, whose reply is received and not looked at. `echo` sends and
+    `tick_bytes`, `state_bytes`: a request of constant bytes, whose reply is received and not read. `echo` sends and
     receives as many as `tick_bytes`.
     """
     library = build_machine(CONFIG).library
