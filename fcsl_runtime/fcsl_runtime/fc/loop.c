@@ -228,11 +228,21 @@ int loop_may_tick(const loop_t *loop)
 static void idle(loop_t *loop)
 {
     const uint64_t deadline = now_ns() + SLICE_NS;
-    if (loop->vars != NULL) {
+    if (loop->vars != NULL && loop->attends) {
+        fcsl_vars_attend(loop->vars, deadline);
+    } else if (loop->vars != NULL) {
         fcsl_vars_wait(loop->vars, deadline);
     } else {
         const struct timespec pause = {.tv_nsec = (long)SLICE_NS};
         (void)nanosleep(&pause, NULL);
+    }
+}
+
+/* When the pause is over, or the run. */
+static void leave_clients(loop_t *loop)
+{
+    if (loop->vars != NULL) {
+        fcsl_vars_leave(loop->vars);
     }
 }
 
@@ -293,6 +303,9 @@ int loop_run(loop_t *loop)
             idle(loop);
             loop->hal.alive(loop->hal.ctx);
             loop_serve(loop);
+            if (!loop->paused) {
+                leave_clients(loop);
+            }
             pacing.anchor_ns = hal->now_ns(hal->ctx);
             pacing.next = 0;
         } else if (!loop->realtime || hal->paces != FCSL_PACED_BY_HOST || keep_time(loop, &pacing)) {
@@ -304,6 +317,7 @@ int loop_run(loop_t *loop)
             loop_serve(loop);
         }
     }
+    leave_clients(loop);
     if (loop->armed) {
         if (hal->arm(hal->ctx, 0) != FCSL_HAL_OK && loop->failure[0] == '\0') {
             fail(loop, hal->explain(hal->ctx));

@@ -181,6 +181,7 @@ static int open_hardware(program_t *program)
         return complain("--missed-deadline is for ticks that the clock paces; here a simulator or a device paces them");
     }
     /* Beside a rig there is but one time. */
+    loop->attends = program->options.priority == 0; /* clients shall not take the processor from others */
     loop->realtime = (program->options.realtime || loop->hal.serves) && loop->hal.paces != FCSL_PACED_BY_SIMULATOR;
     if (loop->realtime && !program->options.no_overrun_check) {
         /* Only here: in lock-step a clock would make the results depend on the computer. */

@@ -6,6 +6,7 @@
 #include "vars/json_read.c"
 #include "vars/json_write.c"
 
+#include <inttypes.h>
 #include <stdlib.h>
 
 #include "vars/base64.c"
@@ -197,6 +198,25 @@ static void test_floats_as_text(void)
     }
 }
 
+static void test_integers_as_printf(void)
+{
+    char text[32];
+    char expected[32];
+    json_out_t out;
+    for (int i = 0; i < 100000; i++) {
+        const uint64_t value = i < 3 ? UINT64_MAX - (uint64_t)i : random_u64() >> (i % 64);
+        fcsl_json_begin(&out, text, sizeof text);
+        fcsl_json_u64(&out, value);
+        (void)snprintf(expected, sizeof expected, "%" PRIu64, value);
+        CHECK(strcmp(text, expected) == 0);
+        const int64_t integer = i == 0 ? INT64_MIN : i % 2 != 0 ? -(int64_t)(value / 2) : (int64_t)(value / 2);
+        fcsl_json_begin(&out, text, sizeof text);
+        fcsl_json_i64(&out, integer);
+        (void)snprintf(expected, sizeof expected, "%" PRId64, integer);
+        CHECK(strcmp(text, expected) == 0);
+    }
+}
+
 static void test_writer_is_bounded(void)
 {
     char text[8];
@@ -207,6 +227,10 @@ static void test_writer_is_bounded(void)
     fcsl_json_begin(&out, text, sizeof text);
     fcsl_json_quoted(&out, "a\"b");
     CHECK(!out.overflow && strcmp(text, "\"a\\\"b\"") == 0);
+    fcsl_json_text(&out, "1");
+    CHECK(!out.overflow);
+    fcsl_json_text(&out, "2");
+    CHECK(out.overflow && strcmp(text, "\"a\\\"b\"1") == 0);
 }
 
 /* Whatever bytes a text holds (a path that was cut, a name of a file), what is written is JSON; what is UTF-8 reads back. */
@@ -267,6 +291,7 @@ int main(void)
     test_members();
     test_floats_round_trip();
     test_floats_as_text();
+    test_integers_as_printf();
     test_writer_is_bounded();
     test_any_bytes_are_quoted();
     test_base64();

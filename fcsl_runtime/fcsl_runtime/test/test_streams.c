@@ -28,7 +28,7 @@ static void subscribe(size_t client, size_t subscription, size_t bytes)
 
 static void nobody(void)
 {
-    vars = (fcsl_vars_t){.history = &history};
+    vars = (fcsl_vars_t){.history = &history, .used = CLIENTS_MAX};
     for (size_t i = 0; i < CLIENTS_MAX; i++) {
         vars.clients[i].fd = -1;
     }

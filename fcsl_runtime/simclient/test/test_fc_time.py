@@ -169,6 +169,21 @@ def test_signal_while_a_step_hangs(napping: Path, tmp_path: Path, number: int) -
     assert state["tick"] == 0 and state["instances"]["sleepy"]["health"] == "stale"
 
 
+def test_who_looks_is_served_while_a_command_hangs(napping: Path, tmp_path: Path) -> None:
+    """Though the step thread of a paused program serves clients itself."""
+    path = tmp_path / "fc.sock"
+    with flying("--socket", path, "--paused", library=nap_machine(napping, 600_000)) as fc:
+        ticking, looking = fc.client(path), fc.client(path)
+        for _ in range(10):  # by the last one the step thread serves
+            ticking.ok("pause")
+            time.sleep(0.01)
+        ticking.send(b'{"cmd":"tick"}\n')
+        time.sleep(0.01)
+        assert [looking.ok("state")["tick"] for _ in range(3)] == [0, 0, 0]
+        ticking.close()
+        looking.close()
+
+
 # ---- signals in every phase
 
 

@@ -82,7 +82,12 @@ const char *fcsl_vars_address(const fcsl_vars_t *vars);
 void fcsl_vars_serve(fcsl_vars_t *vars);
 /* Step thread of a paused host: sleeps until a command waits, but at most until `deadline_ns` of the monotonic clock. */
 void fcsl_vars_wait(fcsl_vars_t *vars, uint64_t deadline_ns);
-/* Any thread: ends that sleep. */
+/* The same, and serves clients meanwhile in place of the server's thread: to be woken for a command takes longer than
+ * most commands. Then fcsl_vars_serve sends the reply, too. Not for a thread of high priority. */
+void fcsl_vars_attend(fcsl_vars_t *vars, uint64_t deadline_ns);
+/* Leaves clients to the server's thread again: before the host runs on, or ends. */
+void fcsl_vars_leave(fcsl_vars_t *vars);
+/* Any thread: ends either sleep. */
 void fcsl_vars_wake(fcsl_vars_t *vars);
 
 /* Members of the reply to `stats`: a number, and an object of what is written until its end. */

@@ -110,7 +110,7 @@ static int allocate(fcsl_recorder_t *recorder, fcsl_error_t *error)
     const uint32_t count = recorder->machine->instance_count;
     recorder->scratch_size = scratch_bytes(recorder);
     recorder->scratch = malloc(recorder->scratch_size);
-    recorder->data = calloc(1, recorder->machine->size);
+    recorder->data = calloc(1, fcsl_run_data_bytes(recorder->machine));
     recorder->health = calloc(count + 1u, sizeof *recorder->health);
     recorder->faults = calloc(count + 1u, sizeof *recorder->faults);
     recorder->overruns = calloc(count + 1u, sizeof *recorder->overruns);
@@ -242,11 +242,6 @@ void fcsl_recorder_set_lossless(fcsl_recorder_t *recorder, int lossless)
 {
     recorder->write_policy = lossless ? FCSL_RING_WAIT : FCSL_RING_DROP;
     recorder->tick_policy = lossless ? FCSL_RING_WAIT : FCSL_RING_DROP_EARLIER;
-}
-
-int fcsl_recorder_may_step(const fcsl_recorder_t *recorder, fcsl_error_t *error)
-{
-    return recorder->tick_policy == FCSL_RING_WAIT ? fcsl_recorder_check(recorder, error) : 0;
 }
 
 fcsl_record_drops_t fcsl_recorder_drops(const fcsl_recorder_t *recorder)

@@ -18,14 +18,14 @@ int fcsl_recorder_close(fcsl_recorder_t *recorder, fcsl_error_t *error);
 int fcsl_recorder_check(const fcsl_recorder_t *recorder, fcsl_error_t *error);
 /* What comes from here on waits for the writer, or is left out when there is no room. */
 void fcsl_recorder_set_lossless(fcsl_recorder_t *recorder, int lossless);
-/* The same, of a lossless recording alone: whether a step may begin. */
-int fcsl_recorder_may_step(const fcsl_recorder_t *recorder, fcsl_error_t *error);
 fcsl_record_drops_t fcsl_recorder_drops(const fcsl_recorder_t *recorder);
 
 /* `tick` is the first tick to see it. */
 void fcsl_recorder_write(fcsl_recorder_t *recorder, uint64_t tick, const fcsl_write_t *write);
 /* A change of state that the host forced. */
 void fcsl_recorder_forced(fcsl_recorder_t *recorder, uint64_t tick, const fcsl_state_t *from, const fcsl_state_t *to);
+/* Whether a tick may begin: a lossless recording ends with its writing. Fetches where its record will go. */
+int fcsl_recorder_begin_tick(fcsl_recorder_t *recorder, fcsl_error_t *error);
 /* Everything that the tick just completed has to show. */
 void fcsl_recorder_tick(fcsl_recorder_t *recorder, uint64_t tick);
 

@@ -35,16 +35,15 @@ struct fcsl_recorder {
     const fcsl_run_t *run;
     const fcsl_machine_t *machine;
 
-    /* The thread that owns the run. */
+    /* The thread that owns the run; the writer sees those that do not change. What a tick reads lies together. */
+    _Atomic uint64_t ring_full;
+    uint32_t topic_count; /* with added topics; 0 while there are none */
+    int stepped;
     fcsl_ring_policy_t write_policy; /* of host writes, without which the run cannot be reproduced */
     fcsl_ring_policy_t tick_policy;
-    int stepped;
-    uint32_t topic_count; /* with added topics; 0 while there are none */
     fcsl_range_t *ranges; /* of the machine struct, recorded every tick */
     uint32_t range_count;
     uint32_t range_bytes;
-    _Atomic uint64_t ring_full;
-
     fcsl_ring_t ring;
 
     /* The writer. */

@@ -7,8 +7,8 @@
 #include "fcsl/fcsl_scalar.h"
 #include "recorder_internal.h"
 
-/* Ranges closer than this are copied as one: a copy costs more than a few bytes. */
-enum { NEAR_BYTES = 32 };
+/* Whole blocks of the machine struct are copied: no call, no branch for each size. */
+enum { BLOCK_BYTES = FCSL_RING_ALIGNMENT };
 
 /* Room for one record, or null when there is none, which is counted. */
 static uint8_t *claim(fcsl_recorder_t *recorder, const fcsl_record_t *record, fcsl_ring_policy_t policy)
@@ -29,14 +29,35 @@ static uint8_t *claim_tick(fcsl_recorder_t *recorder, uint32_t kind, uint64_t ti
     return claim(recorder, &record, policy);
 }
 
-void fcsl_recorder_tick(fcsl_recorder_t *recorder, uint64_t tick)
+__attribute__((hot)) int fcsl_recorder_begin_tick(fcsl_recorder_t *recorder, fcsl_error_t *error)
+{
+    /* Nobody has been for seconds where this tick's record will go. It comes into the cache while the machine steps. */
+    const fcsl_ring_t *ring = &recorder->ring;
+    const uint64_t head = atomic_load_explicit(&ring->head, memory_order_relaxed);
+    const uint64_t end = head + recorder->range_bytes;
+    for (uint64_t at = head; at < end; at += FCSL_RING_LINE_BYTES) {
+        __builtin_prefetch(ring->bytes + (size_t)(at & (ring->capacity - 1u)), 1);
+    }
+    return recorder->tick_policy == FCSL_RING_WAIT ? fcsl_recorder_check(recorder, error) : 0;
+}
+
+static uint8_t *copy_blocks(uint8_t *restrict out, const uint8_t *restrict in, uint32_t size)
+{
+    for (const uint8_t *end = in + size; in != end; in += BLOCK_BYTES) {
+        memcpy(out, in, BLOCK_BYTES);
+        out += BLOCK_BYTES;
+    }
+    return out;
+}
+
+__attribute__((hot)) void fcsl_recorder_tick(fcsl_recorder_t *recorder, uint64_t tick)
 {
     uint8_t *out = claim_tick(recorder, FCSL_RECORD_TICK, tick, recorder->range_bytes, recorder->tick_policy);
     if (out != NULL) {
-        for (uint32_t i = 0; i < recorder->range_count; i++) {
-            const fcsl_range_t range = recorder->ranges[i];
-            memcpy(out, recorder->run->data + range.offset, range.size);
-            out += range.size;
+        const uint8_t *data = recorder->run->data;
+        const fcsl_range_t *end = recorder->ranges + recorder->range_count;
+        for (const fcsl_range_t *range = recorder->ranges; range != end; range++) {
+            out = copy_blocks(out, data + range->offset, range->size);
         }
         fcsl_ring_publish(&recorder->ring);
     }
@@ -108,16 +129,27 @@ static int by_offset(const void *a, const void *b)
     return (x > y) - (x < y);
 }
 
-/* Sorts ranges and makes one of those that touch or nearly do; returns how many are left. */
+/* The blocks that a range touches; a machine struct has room for whole blocks. */
+static fcsl_range_t whole_blocks(fcsl_range_t range)
+{
+    const uint32_t begin = range.offset / BLOCK_BYTES * BLOCK_BYTES;
+    const uint32_t end = (range.offset + range.size + BLOCK_BYTES - 1u) / BLOCK_BYTES * BLOCK_BYTES;
+    return (fcsl_range_t){begin, end - begin};
+}
+
+/* Makes whole blocks of ranges, in order, and one range of those that touch; returns how many are left. */
 static uint32_t merge(fcsl_range_t *ranges, uint32_t count)
 {
     uint32_t kept = 0;
+    for (uint32_t i = 0; i < count; i++) {
+        ranges[i] = whole_blocks(ranges[i]);
+    }
     qsort(ranges, count, sizeof *ranges, by_offset);
     for (uint32_t i = 1; i < count; i++) {
         fcsl_range_t *last = &ranges[kept];
         const uint32_t last_end = last->offset + last->size;
         const uint32_t end = ranges[i].offset + ranges[i].size;
-        if (ranges[i].offset > last_end + NEAR_BYTES) {
+        if (ranges[i].offset > last_end) {
             ranges[++kept] = ranges[i];
         } else if (end > last_end) {
             last->size = end - last->offset;

@@ -8,13 +8,13 @@
 #include <errno.h>
 #include <stdlib.h>
 #include <string.h>
+#include <sys/mman.h>
 #include <time.h>
 
-/* Records begin at multiples of the record header, so a header never wraps around the end. */
-enum { ALIGNMENT = sizeof(fcsl_record_t) };
 /* The consumer looks by itself this often, so that a producer at moderate rates never makes a system call. */
 enum { LOOK_EVERY_NS = 10000000 };
-_Static_assert(ALIGNMENT == 32, "the size of a record header is a power of two");
+enum { HUGE_PAGE_BYTES = 2 << 20 };
+_Static_assert(FCSL_RING_ALIGNMENT == 32, "the size of a record header is a power of two");
 
 /* A record of this kind only fills the rest of the ring, because the next one must be contiguous. */
 #define FILLER UINT32_MAX
@@ -28,10 +28,13 @@ int fcsl_ring_open(fcsl_ring_t *ring, size_t capacity)
     memset(ring, 0, sizeof *ring);
     ring->capacity = rounded;
     ring->wake_at = rounded / 4u;
-    ring->bytes = calloc(1, rounded);
+    const size_t aligned = rounded < HUGE_PAGE_BYTES ? rounded : HUGE_PAGE_BYTES;
+    ring->bytes = aligned_alloc(aligned, rounded);
     if (ring->bytes == NULL) {
         return -1;
     }
+    /* A tick writes where none has for seconds: with fewer pages it walks fewer page tables. The kernel may refuse. */
+    (void)madvise(ring->bytes, rounded, MADV_HUGEPAGE);
     if (sem_init(&ring->wake_consumer, 0, 0) != 0) {
         free(ring->bytes);
         return -1;
@@ -73,11 +76,6 @@ static void nap_on(sem_t *semaphore)
     (void)sem_clockwait(semaphore, CLOCK_MONOTONIC, &until);
 }
 
-static size_t record_bytes(uint32_t size)
-{
-    return ALIGNMENT + ((size_t)size + ALIGNMENT - 1u) / ALIGNMENT * ALIGNMENT;
-}
-
 static void wake_if(atomic_int *sleeps, sem_t *semaphore)
 {
     if (atomic_exchange(sleeps, 0)) {
@@ -109,38 +107,40 @@ static void wait_for_room(fcsl_ring_t *ring, uint64_t head, size_t needed)
     }
 }
 
-uint8_t *fcsl_ring_claim(fcsl_ring_t *ring, const fcsl_record_t *record, fcsl_ring_policy_t policy)
+static uint64_t least(uint64_t a, uint64_t b)
 {
-    const size_t bytes = record_bytes(record->size);
+    return a < b ? a : b;
+}
+
+uint8_t *fcsl_ring_claim_beyond(fcsl_ring_t *ring, const fcsl_record_t *record, fcsl_ring_policy_t policy)
+{
+    const size_t bytes = fcsl_ring_record_bytes(record->size);
     if (bytes > ring->capacity / 2) {
         return NULL;
     }
     uint64_t head = atomic_load_explicit(&ring->head, memory_order_relaxed);
+    if (head >= ring->wake_at) {
+        ring->wake_at = head + ring->capacity / 4u;
+        wake_if(&ring->consumer_sleeps, &ring->wake_consumer);
+    }
     const size_t at = (size_t)(head & (ring->capacity - 1u));
     const size_t filler = ring->capacity - at < bytes ? ring->capacity - at : 0;
+    const size_t kept = ring->capacity / 8u;
     if (policy == FCSL_RING_WAIT) {
         wait_for_room(ring, head, filler + bytes);
-    } else if (!has_room(ring, head, filler + bytes + (policy == FCSL_RING_DROP ? 0 : ring->capacity / 8u))) {
+    } else if (!has_room(ring, head, filler + bytes + (policy == FCSL_RING_DROP ? 0 : kept))) {
         return NULL;
     }
     if (filler > 0) {
-        const fcsl_record_t skip = {.size = (uint32_t)(filler - ALIGNMENT), .kind = FILLER};
+        const fcsl_record_t skip = {.size = (uint32_t)(filler - sizeof skip), .kind = FILLER};
         memcpy(ring->bytes + at, &skip, sizeof skip);
         head += filler;
     }
-    uint8_t *out = ring->bytes + (size_t)(head & (ring->capacity - 1u));
-    memcpy(out, record, sizeof *record);
+    const size_t begin = (size_t)(head & (ring->capacity - 1u));
+    memcpy(ring->bytes + begin, record, sizeof *record);
     ring->claimed = head + bytes;
-    return out + ALIGNMENT;
-}
-
-void fcsl_ring_publish(fcsl_ring_t *ring)
-{
-    atomic_store_explicit(&ring->head, ring->claimed, memory_order_release);
-    if (ring->claimed >= ring->wake_at) {
-        ring->wake_at = ring->claimed + ring->capacity / 4u;
-        wake_if(&ring->consumer_sleeps, &ring->wake_consumer);
-    }
+    ring->sure = least(least(ring->seen_tail + ring->capacity - kept, head - begin + ring->capacity), ring->wake_at);
+    return ring->bytes + begin + sizeof *record;
 }
 
 void fcsl_ring_wake(fcsl_ring_t *ring)
@@ -178,7 +178,7 @@ fcsl_ring_status_t fcsl_ring_front(fcsl_ring_t *ring, fcsl_record_t *record, con
         in = ring->bytes;
         memcpy(record, in, sizeof *record);
     }
-    *data = in + ALIGNMENT;
+    *data = in + sizeof *record;
     return FCSL_RING_RECORD;
 }
 
@@ -187,7 +187,7 @@ void fcsl_ring_pop(fcsl_ring_t *ring)
     uint64_t tail = atomic_load_explicit(&ring->tail, memory_order_relaxed);
     fcsl_record_t record;
     memcpy(&record, ring->bytes + (size_t)(tail & (ring->capacity - 1u)), sizeof record);
-    tail += record_bytes(record.size);
+    tail += fcsl_ring_record_bytes(record.size);
     atomic_store(&ring->tail, tail);
     /* Half of the ring at a time: a producer that waits is not woken for every record. */
     if (atomic_load(&ring->producer_sleeps) && atomic_load(&ring->head) - tail <= ring->capacity / 2u) {

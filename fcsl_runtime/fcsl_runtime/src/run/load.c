@@ -77,8 +77,8 @@ const fcsl_machine_t *fcsl_library_machine(const char *library, const char *name
 static int allocate(fcsl_run_t *run, fcsl_error_t *error)
 {
     const fcsl_machine_t *machine = run->machine;
-    const size_t align = machine->align < 64u ? 64u : machine->align;
-    const size_t size = ((size_t)machine->size + align - 1u) / align * align;
+    const size_t align = fcsl_run_data_align(machine);
+    const size_t size = fcsl_run_data_bytes(machine);
     run->data = aligned_alloc(align, size);
     run->staging = aligned_alloc(align, size);
     run->layouts = calloc(machine->instance_count + 1u, sizeof *run->layouts);
@@ -97,8 +97,14 @@ static int allocate(fcsl_run_t *run, fcsl_error_t *error)
         (void)fcsl_gate(machine, run->safe);
     }
     for (uint32_t i = 0; i < machine->instance_count; i++) {
-        if (fcsl_layout_build(machine, &machine->instances[i], &run->layouts[i], error) != 0) {
+        const fcsl_instance_t *instance = &machine->instances[i];
+        if (fcsl_layout_build(machine, instance, &run->layouts[i], error) != 0) {
             return -1;
+        }
+        if (instance->max_wcet_us != 0) {
+            run->verdicts[run->verdict_count++] = (fcsl_verdict_t){.overruns_offset = instance->overruns_offset,
+                                                                   .inject_offset = instance->inject_overrun_offset,
+                                                                   .instance = instance->name};
         }
     }
     fcsl_hardware_init(run);

@@ -139,23 +139,20 @@ uint64_t fcsl_run_monotonic_ns(void *ctx)
 
 static void keep_verdicts(fcsl_run_t *run)
 {
-    for (uint32_t i = 0; i < run->machine->instance_count; i++) {
-        const fcsl_instance_t *instance = &run->machine->instances[i];
-        if (instance->max_wcet_us != 0) {
-            run->verdicts[i].overruns = fcsl_read_u64(run->data, instance->overruns_offset);
-            run->verdicts[i].injected = run->data[instance->inject_overrun_offset];
-        }
+    for (uint32_t i = 0; i < run->verdict_count; i++) {
+        fcsl_verdict_t *verdict = &run->verdicts[i];
+        verdict->overruns = fcsl_read_u64(run->data, verdict->overruns_offset);
+        verdict->injected = run->data[verdict->inject_offset];
     }
 }
 
 /* Overruns that the clock found in `tick`: an input of the run, so a replay injects them. */
 static void note_new_overruns(fcsl_run_t *run, uint64_t tick)
 {
-    for (uint32_t i = 0; i < run->machine->instance_count; i++) {
-        const fcsl_instance_t *instance = &run->machine->instances[i];
-        if (instance->max_wcet_us != 0 && run->verdicts[i].injected == 0 &&
-            fcsl_read_u64(run->data, instance->overruns_offset) != run->verdicts[i].overruns) {
-            fcsl_note_write_at(run, tick, &(fcsl_write_t){.kind = FCSL_WRITE_OVERRUN, .path = instance->name});
+    for (uint32_t i = 0; i < run->verdict_count; i++) {
+        const fcsl_verdict_t *verdict = &run->verdicts[i];
+        if (verdict->injected == 0 && fcsl_read_u64(run->data, verdict->overruns_offset) != verdict->overruns) {
+            fcsl_note_write_at(run, tick, &(fcsl_write_t){.kind = FCSL_WRITE_OVERRUN, .path = verdict->instance});
         }
     }
 }
@@ -164,7 +161,9 @@ static void note_new_overruns(fcsl_run_t *run, uint64_t tick)
 static int step_once(fcsl_run_t *run, uint64_t tick, fcsl_error_t *error)
 {
     run->machine->step(run->data, &run->host);
-    fcsl_substitution_settle(run);
+    if (run->impure_count > 0) {
+        fcsl_substitution_settle(run);
+    }
     if (fcsl_run_tick(run) == tick) {
         return fcsl_fail(error, "tick %" PRIu64 " was not completed", tick);
     }
@@ -174,34 +173,38 @@ static int step_once(fcsl_run_t *run, uint64_t tick, fcsl_error_t *error)
     return 0;
 }
 
-int fcsl_run_step(fcsl_run_t *run, uint64_t ticks, fcsl_error_t *error)
+/* The same, of a run of which somebody is told. */
+__attribute__((hot)) static int step_noted(fcsl_run_t *run, fcsl_error_t *error)
 {
-    if (!fcsl_writes_noted(run)) {
-        for (uint64_t i = 0; i < ticks; i++) {
-            if (step_once(run, fcsl_run_tick(run), error) != 0) {
-                return -1;
-            }
-        }
-        return 0;
-    }
     const int timed = run->host.clock_ns != NULL;
-    for (uint64_t i = 0; i < ticks; i++) {
-        if (run->recorder != NULL && fcsl_recorder_may_step(run->recorder, error) != 0) {
-            return -1;
-        }
-        const uint64_t tick = fcsl_run_tick(run);
-        if (timed) {
-            keep_verdicts(run);
-        }
-        if (step_once(run, tick, error) != 0) {
-            return -1;
-        }
+    if (run->recorder != NULL && fcsl_recorder_begin_tick(run->recorder, error) != 0) {
+        return -1;
+    }
+    const uint64_t tick = fcsl_run_tick(run);
+    if (timed) {
+        keep_verdicts(run);
+    }
+    if (step_once(run, tick, error) != 0) {
+        return -1;
+    }
+    if (run->impure_count > 0) {
         fcsl_substitution_note(run, tick);
-        if (timed) {
-            note_new_overruns(run, tick);
-        }
-        if (run->recorder != NULL) {
-            fcsl_recorder_tick(run->recorder, tick);
+    }
+    if (timed) {
+        note_new_overruns(run, tick);
+    }
+    if (run->recorder != NULL) {
+        fcsl_recorder_tick(run->recorder, tick);
+    }
+    return 0;
+}
+
+__attribute__((hot)) int fcsl_run_step(fcsl_run_t *run, uint64_t ticks, fcsl_error_t *error)
+{
+    const int noted = fcsl_writes_noted(run);
+    for (uint64_t i = 0; i < ticks; i++) {
+        if ((noted ? step_noted(run, error) : step_once(run, fcsl_run_tick(run), error)) != 0) {
+            return -1;
         }
     }
     return 0;

@@ -14,8 +14,11 @@ typedef struct fcsl_journal fcsl_journal_t;
 /* Instead of a time: tick k is at k / tick_hz. */
 #define FCSL_TICK_TIME UINT64_MAX
 
-/* What an instance's overrun verdict was before a tick, to tell a measured overrun from an injected one. */
+/* An instance with max_wcet_us before a tick, to tell a measured overrun from an injected one. */
 typedef struct {
+    uint32_t overruns_offset;
+    uint32_t inject_offset;
+    const char *instance;
     uint64_t overruns;
     uint8_t injected;
 } fcsl_verdict_t;
@@ -38,7 +41,8 @@ struct fcsl_run {
     uint64_t (*clock_ns)(void *ctx); /* null: nothing is timed */
     void *clock_ctx;
     fcsl_layout_t *layouts;   /* per instance */
-    fcsl_verdict_t *verdicts; /* per instance */
+    fcsl_verdict_t *verdicts;
+    uint32_t verdict_count;
     uint32_t impure_count;    /* instances that are */
     uint64_t impure_executes; /* that no substitute took the place of */
     fcsl_substitute_t *impure;    /* per instance */
@@ -58,6 +62,18 @@ struct fcsl_run {
     void *board_library; /* null: the board is the caller's */
     fcsl_board_close_fn *close_board;
 };
+
+/* The room of a machine struct, and its alignment: whole cache lines, so that whole blocks may be copied. */
+static inline size_t fcsl_run_data_align(const fcsl_machine_t *machine)
+{
+    return machine->align < 64u ? 64u : machine->align;
+}
+
+static inline size_t fcsl_run_data_bytes(const fcsl_machine_t *machine)
+{
+    const size_t align = fcsl_run_data_align(machine);
+    return ((size_t)machine->size + align - 1u) / align * align;
+}
 
 static inline int32_t fcsl_read_i32(const uint8_t *data, uint32_t offset)
 {

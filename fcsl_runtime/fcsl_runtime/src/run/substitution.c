@@ -120,16 +120,13 @@ uint64_t fcsl_run_impure_executes(const fcsl_run_t *run)
 
 void fcsl_substitution_settle(fcsl_run_t *run)
 {
-    for (uint32_t i = 0; run->impure_count > 0 && i < run->machine->instance_count; i++) {
+    for (uint32_t i = 0; i < run->machine->instance_count; i++) {
         run->impure[i].substituted = 0;
     }
 }
 
 void fcsl_substitution_note(fcsl_run_t *run, uint64_t tick)
 {
-    if (run->impure_count == 0) {
-        return;
-    }
     const fcsl_machine_t *machine = run->machine;
     const int32_t number = fcsl_read_i32(run->data, machine->state_offset);
     const fcsl_state_t *state = &machine->states[number];

@@ -14,7 +14,8 @@ void fcsl_substitution_free(fcsl_run_t *run);
 
 /* fcsl_host_t.substitute of every run. */
 int32_t fcsl_substitution_apply(void *ctx, uint32_t instance);
-/* After a step: forgets substitutes of instances that did not execute. */
+/* Both are for runs that have impure instances (run->impure_count).
+ * After a step: forgets substitutes of instances that did not execute. */
 void fcsl_substitution_settle(fcsl_run_t *run);
 /* After the step of `tick`: notes what the impure instances that executed have left. */
 void fcsl_substitution_note(fcsl_run_t *run, uint64_t tick);

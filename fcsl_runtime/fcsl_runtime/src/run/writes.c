@@ -17,11 +17,6 @@
 
 enum { RANGE_BYTES = 64 };
 
-int fcsl_writes_noted(const fcsl_run_t *run)
-{
-    return run->recorder != NULL || fcsl_journal_is_followed(run->journal);
-}
-
 void fcsl_note_write_at(fcsl_run_t *run, uint64_t tick, const fcsl_write_t *write)
 {
     if (run->recorder != NULL) {

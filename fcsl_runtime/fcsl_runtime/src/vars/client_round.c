@@ -17,6 +17,9 @@ void fcsl_vars_close_client(fcsl_vars_t *vars, client_t *client)
         vars->poster = CLIENTS_MAX;
     }
     fcsl_client_close(client);
+    while (vars->used > 0 && vars->clients[vars->used - 1u].fd < 0) {
+        vars->used--;
+    }
 }
 
 void fcsl_vars_send(fcsl_vars_t *vars, client_t *client)
@@ -184,6 +187,8 @@ void fcsl_vars_accept(fcsl_vars_t *vars)
         }
         client_t *client = find_place(vars);
         if (client != NULL) {
+            const uint32_t place = (uint32_t)(client - vars->clients);
+            vars->used = place < vars->used ? vars->used : place + 1u;
             client->number = vars->connections++;
             fcsl_client_begin(client, fd, vars->listener.secret[0] == '\0', fcsl_run_monotonic_ns(NULL));
             continue;

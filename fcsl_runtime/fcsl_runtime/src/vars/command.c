@@ -60,7 +60,10 @@ static int check_members(request_t *request, const command_entry_t *entry)
         if (fcsl_json_string(&request->json, index, key, sizeof key) != 0) {
             return fcsl_request_refuse(request, "bad_request", "", "a member's name is too long or not plain");
         }
-        (void)snprintf(pattern, sizeof pattern, " %s ", key);
+        const size_t key_length = strlen(key);
+        memcpy(pattern, " ", 1);
+        memcpy(pattern + 1, key, key_length);
+        memcpy(pattern + 1 + key_length, " ", 2);
         const int known = strchr(key, ' ') == NULL && (strcmp(key, "cmd") == 0 || strcmp(key, "id") == 0 ||
                                                        strstr(entry->members, pattern) != NULL);
         if (!known || fcsl_json_member(&request->json, 0, key) != index + 1) {
@@ -87,9 +90,10 @@ static int note_id(request_t *request)
         return fcsl_request_refuse(request, "bad_request", "",
                                    "\"id\" must be a number or a string of at most %d bytes", ID_BYTES);
     }
-    const char *quote = id->type == JSON_STRING ? "\"" : "";
-    (void)snprintf(request->session->id, sizeof request->session->id, "%s%.*s%s", quote, (int)(id->end - id->start),
-                   request->json.text + id->start, quote);
+    const uint32_t quote = id->type == JSON_STRING;
+    const size_t length = id->end - id->start + 2u * quote;
+    memcpy(request->session->id, request->json.text + id->start - quote, length);
+    request->session->id[length] = '\0';
     return 0;
 }
 
@@ -99,9 +103,11 @@ static void begin_reply(json_out_t *out, const session_t *session, const char *o
 {
     out->at = 0;
     out->overflow = 0;
-    fcsl_json_raw(out, "{\"ok\":%s", ok);
+    fcsl_json_text(out, "{\"ok\":");
+    fcsl_json_text(out, ok);
     if (session != NULL && session->id[0] != '\0') {
-        fcsl_json_raw(out, ",\"id\":%s", session->id);
+        fcsl_json_text(out, ",\"id\":");
+        fcsl_json_text(out, session->id);
     }
 }
 
@@ -130,7 +136,7 @@ void fcsl_commander_error(json_out_t *out, const char *code, const char *message
 static void end_reply(request_t *request, int status)
 {
     if (status == 0) {
-        fcsl_json_raw(request->out, "}\n");
+        fcsl_json_text(request->out, "}\n");
         if (!request->out->overflow) {
             return;
         }

@@ -2,7 +2,6 @@
  *
  * Commands that only look: they read one publication of the history and never meet the step thread.
  */
-#include <inttypes.h>
 #include <string.h>
 
 #include "expression.h"
@@ -34,13 +33,21 @@ int fcsl_request_snapshot_at(request_t *request, uint64_t number)
                : fcsl_request_snapshot(request);
 }
 
+static void put_tick(const commander_t *commander, json_out_t *out)
+{
+    fcsl_json_text(out, ",\"tick\":");
+    fcsl_json_u64(out, commander->moment.tick);
+}
+
 static void put_state(const commander_t *commander, json_out_t *out, const char *name, uint32_t offset)
 {
     const catalog_t *catalog = &commander->catalog;
     char text[NAME_BYTES];
     int32_t state = 0;
     memcpy(&state, commander->snapshot + catalog->bases[catalog->machine] + offset, sizeof state);
-    fcsl_json_raw(out, ",\"%s\":", name);
+    fcsl_json_text(out, ",\"");
+    fcsl_json_text(out, name);
+    fcsl_json_text(out, "\":");
     fcsl_json_quoted(out,
                      fcsl_value_name(catalog->blocks[catalog->machine].machine, FCSL_STATE, state, text, sizeof text));
 }
@@ -48,13 +55,13 @@ static void put_state(const commander_t *commander, json_out_t *out, const char 
 void fcsl_request_status(const commander_t *commander, json_out_t *out)
 {
     const catalog_t *catalog = &commander->catalog;
-    fcsl_json_raw(out, ",\"tick\":%" PRIu64, commander->moment.tick);
+    put_tick(commander, out);
     if (catalog->machine < catalog->block_count) {
         const fcsl_machine_t *machine = catalog->blocks[catalog->machine].machine;
         put_state(commander, out, "state", machine->state_offset);
         put_state(commander, out, "next_state", machine->next_state_offset);
     }
-    fcsl_json_raw(out, ",\"paused\":%s", commander->moment.paused ? "true" : "false");
+    fcsl_json_text(out, commander->moment.paused ? ",\"paused\":true" : ",\"paused\":false");
 }
 
 const fcsl_machine_t *fcsl_request_machine(request_t *request)
@@ -79,14 +86,14 @@ static int get_group(request_t *request, const char *path)
         const char *member = fcsl_catalog_member(entry, path);
         if (member != NULL) {
             const target_t target = fcsl_catalog_target(&commander->catalog, entry);
-            fcsl_json_raw(request->out, found ? "," : "{");
+            fcsl_json_text(request->out, found ? "," : "{");
             fcsl_json_quoted(request->out, member);
-            fcsl_json_raw(request->out, ":");
+            fcsl_json_text(request->out, ":");
             fcsl_value_write(&target, commander->snapshot + target.at, request->out);
             found = 1;
         }
     }
-    fcsl_json_raw(request->out, found ? "}" : "");
+    fcsl_json_text(request->out, found ? "}" : "");
     return found;
 }
 
@@ -96,7 +103,9 @@ static int get_one(request_t *request, uint32_t token)
     const json_token_t *path = &request->json.tokens[token];
     target_t target;
     const int known = fcsl_request_target(request, token, &target) == 0;
-    fcsl_json_raw(request->out, "\"%.*s\":", (int)(path->end - path->start), request->json.text + path->start);
+    fcsl_json_text(request->out, "\"");
+    fcsl_json_bytes(request->out, request->json.text + path->start, path->end - path->start);
+    fcsl_json_text(request->out, "\":");
     if (known) {
         fcsl_value_write(&target, commander->snapshot + target.at, request->out);
         return 0;
@@ -118,15 +127,16 @@ int fcsl_handle_get(request_t *request)
     if (fcsl_request_paths(request, PATHS_MAX, &token, &count) != 0 || fcsl_request_snapshot(request) != 0) {
         return -1;
     }
-    fcsl_json_raw(request->out, ",\"tick\":%" PRIu64 ",\"values\":{", request->commander->moment.tick);
+    put_tick(request->commander, request->out);
+    fcsl_json_text(request->out, ",\"values\":{");
     for (uint32_t i = 0; i < count; i++) {
-        fcsl_json_raw(request->out, i > 0 ? "," : "");
+        fcsl_json_text(request->out, i > 0 ? "," : "");
         if (get_one(request, token) != 0) {
             return -1;
         }
         token = request->json.tokens[token].next;
     }
-    fcsl_json_raw(request->out, "}");
+    fcsl_json_text(request->out, "}");
     return 0;
 }
 
@@ -151,7 +161,8 @@ int fcsl_handle_eval(request_t *request)
         return fcsl_request_refuse(request, error.code, error.hint, "%s at character %zu of the expression", error.text,
                                    error.at + 1u);
     }
-    fcsl_json_raw(request->out, ",\"tick\":%" PRIu64 ",\"value\":", commander->moment.tick);
+    put_tick(commander, request->out);
+    fcsl_json_text(request->out, ",\"value\":");
     fcsl_expression_write(&value, request->out);
     return 0;
 }

@@ -56,11 +56,15 @@ typedef struct json_out {
 } json_out_t;
 
 void fcsl_json_begin(json_out_t *out, char *text, size_t capacity);
-/* Raw JSON text, as printf. */
+/* Raw JSON text; and as printf, which takes longer than most of what else a request needs. */
+void fcsl_json_bytes(json_out_t *out, const char *text, size_t length);
+void fcsl_json_text(json_out_t *out, const char *text);
 __attribute__((format(printf, 2, 3))) void fcsl_json_raw(json_out_t *out, const char *format, ...);
 /* A quoted string; control characters are escaped, and what is not UTF-8 (a text that was cut, a name of a file) is told as
  * U+FFFD. */
 void fcsl_json_quoted(json_out_t *out, const char *text);
+void fcsl_json_u64(json_out_t *out, uint64_t value);
+void fcsl_json_i64(json_out_t *out, int64_t value);
 /* Round-trips; NaN and infinities as the strings "nan", "inf", "-inf". */
 void fcsl_json_f64(json_out_t *out, double value);
 void fcsl_json_f32(json_out_t *out, float value);

@@ -54,7 +54,13 @@ int fcsl_json_string(const json_t *json, uint32_t token, char *out, size_t capac
     if (string->type != JSON_STRING) {
         return -1;
     }
-    size_t length = 0;
+    size_t length = string->end - string->start;
+    if (length < capacity && memchr(json->text + string->start, '\\', length) == NULL) {
+        memcpy(out, json->text + string->start, length);
+        out[length] = '\0';
+        return 0;
+    }
+    length = 0;
     for (uint32_t at = string->start; at < string->end; at++) {
         char piece[4] = {json->text[at]};
         size_t bytes = 1;

@@ -60,11 +60,15 @@ int fcsl_mailbox_done(mailbox_t *mailbox)
     if (atomic_load_explicit(&mailbox->phase, memory_order_acquire) != ANSWERED) {
         return 0;
     }
-    uint64_t count = 0;
-    const ssize_t got = read(mailbox->answered, &count, sizeof count);
-    (void)got; /* there may be nothing to take back yet: then the next poll wakes once for nothing */
     atomic_store_explicit(&mailbox->phase, FREE, memory_order_release);
     return 1;
+}
+
+void fcsl_mailbox_hear(mailbox_t *mailbox)
+{
+    uint64_t count = 0;
+    const ssize_t got = read(mailbox->answered, &count, sizeof count);
+    (void)got; /* the phase tells; an answer that was noticed before it was told wakes once for nothing */
 }
 
 command_t *fcsl_mailbox_take(mailbox_t *mailbox)
@@ -72,14 +76,16 @@ command_t *fcsl_mailbox_take(mailbox_t *mailbox)
     return atomic_load_explicit(&mailbox->phase, memory_order_acquire) == POSTED ? &mailbox->command : NULL;
 }
 
-void fcsl_mailbox_answer(mailbox_t *mailbox)
+void fcsl_mailbox_answer(mailbox_t *mailbox, int tell)
 {
     /* The token of this command may still be there when it was noticed by its phase: take it back. */
     (void)sem_trywait(&mailbox->arrived);
     atomic_store_explicit(&mailbox->phase, ANSWERED, memory_order_release);
-    const uint64_t one = 1;
-    const ssize_t written = write(mailbox->answered, &one, sizeof one);
-    (void)written; /* an eventfd that is read after every command takes its increment */
+    if (tell) {
+        const uint64_t one = 1;
+        const ssize_t written = write(mailbox->answered, &one, sizeof one);
+        (void)written; /* one that is full wakes as well */
+    }
 }
 
 void fcsl_mailbox_wait(mailbox_t *mailbox, uint64_t deadline_ns)

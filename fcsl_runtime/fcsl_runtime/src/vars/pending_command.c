@@ -9,7 +9,7 @@ static const uint64_t TICK_PATIENCE_NS = 1000000000u;
 
 static int subscribers_have_room(const fcsl_vars_t *vars)
 {
-    for (size_t i = 0; i < CLIENTS_MAX; i++) {
+    for (size_t i = 0; i < vars->used; i++) {
         const client_t *client = &vars->clients[i];
         if (client->fd >= 0 && fcsl_client_unsent(client) > SAMPLES_BYTES_MAX / 2u) {
             return 0;
@@ -36,7 +36,7 @@ static void finish_command(fcsl_vars_t *vars)
 {
     fcsl_commander_complete(&vars->commander);
     client_t *client = vars->poster < CLIENTS_MAX ? &vars->clients[vars->poster] : NULL;
-    for (size_t i = 0; i < CLIENTS_MAX; i++) {
+    for (size_t i = 0; i < vars->used; i++) {
         vars->clients[i].blocked = 0;
     }
     vars->next = vars->poster < CLIENTS_MAX ? (vars->poster + 1u) % CLIENTS_MAX : vars->next;

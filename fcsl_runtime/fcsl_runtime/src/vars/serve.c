@@ -4,6 +4,7 @@
  */
 #include <stdio.h>
 #include <string.h>
+#include <unistd.h>
 
 #include "server.h"
 
@@ -131,10 +132,18 @@ void fcsl_vars_serve(fcsl_vars_t *vars)
     if (command == NULL) {
         return;
     }
+    if (command->kind == COMMAND_SAVE && command->file[0] != '\0') {
+        fcsl_vars_leave(vars); /* the server's thread waits for the disk */
+    }
+    const int attends = fcsl_vars_begin_work(vars);
     command->status = act(vars, command);
     vars->host.publish(vars->host.ctx);
     command->published = fcsl_history_published(vars->history);
-    fcsl_mailbox_answer(&vars->mailbox);
+    const int replies = attends && fcsl_vars_end_work(vars);
+    fcsl_mailbox_answer(&vars->mailbox, !replies);
+    if (replies) {
+        fcsl_vars_serve_command(vars);
+    }
 }
 
 void fcsl_vars_wait(fcsl_vars_t *vars, uint64_t deadline_ns)
@@ -144,5 +153,8 @@ void fcsl_vars_wait(fcsl_vars_t *vars, uint64_t deadline_ns)
 
 void fcsl_vars_wake(fcsl_vars_t *vars)
 {
+    const uint64_t one = 1;
     fcsl_mailbox_wake(&vars->mailbox);
+    const ssize_t written = write(vars->attention, &one, sizeof one);
+    (void)written; /* one that is full has been written before */
 }

@@ -1,12 +1,11 @@
 /* SPDX-License-Identifier: Apache-2.0
  *
- * The server's thread: one round looks at every client once, in turn, and serves a few requests of each.
+ * The server's life: what it needs, its thread, its end. What it does: rounds.c.
  */
 #define _GNU_SOURCE
 #include "server.h"
 
 #include <errno.h>
-#include <poll.h>
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
@@ -18,65 +17,10 @@
 #include "base/error.h"
 
 enum {
-    STREAM_POLL_MS = 2, /* for publications, which wake nobody */
-    ENTRIES = CLIENTS_MAX + 3,
-    FILES_MIN = ENTRIES + 16, /* that may be open: poll refuses more entries than that, and the host has files, too */
+    FILES_MIN = ENTRIES_MAX +
+        16, /* that may be open: poll refuses more entries than that, and the host has files, too */
     FILES_WANTED = 512
 };
-
-/* ---- rounds -------------------------------------------------------------------------------------------------------- */
-
-/* 0 when the server is to end. */
-static int run_round(fcsl_vars_t *vars)
-{
-    struct pollfd entries[ENTRIES];
-    int timeout = fcsl_vars_prepare_streams(vars) ? STREAM_POLL_MS : POLL_MS;
-    for (size_t i = 0; i < CLIENTS_MAX; i++) {
-        timeout = fcsl_vars_watch(&vars->clients[i], &entries[i]) ? 0 : timeout;
-    }
-    const int may_accept = fcsl_run_monotonic_ns(NULL) >= vars->accept_at_ns;
-    entries[CLIENTS_MAX] = (struct pollfd){.fd = may_accept ? vars->listener.fd : -1, .events = POLLIN};
-    entries[CLIENTS_MAX + 1] = (struct pollfd){.fd = vars->mailbox.answered, .events = POLLIN};
-    entries[CLIENTS_MAX + 2] = (struct pollfd){.fd = vars->stop, .events = POLLIN};
-    int ready = poll(entries, ENTRIES, timeout);
-    if (ready < 0 && errno != EINTR) {
-        /* Short of memory, or of files since the start. What was asked waits; the end does not. */
-        ready = poll(&entries[CLIENTS_MAX + 2], 1, POLL_MS);
-    }
-    if (ready > 0 && entries[CLIENTS_MAX + 2].revents != 0) {
-        return 0;
-    }
-    fcsl_vars_serve_command(vars);
-    fcsl_vars_stream(vars, fcsl_run_monotonic_ns(NULL));
-    const uint32_t first = vars->next;
-    for (uint32_t i = 0; i < CLIENTS_MAX; i++) {
-        const uint32_t number = (first + i) % CLIENTS_MAX;
-        if (vars->clients[number].fd >= 0) {
-            fcsl_vars_serve_client(vars, &vars->clients[number], (short)(ready > 0 ? entries[number].revents : 0));
-        }
-    }
-    if (ready > 0 && entries[CLIENTS_MAX].revents != 0) {
-        fcsl_vars_accept(vars);
-    }
-    return 1;
-}
-
-static void *run_server(void *argument)
-{
-    fcsl_vars_t *vars = argument;
-    while (run_round(vars)) {
-    }
-    if (vars->poster < CLIENTS_MAX) {
-        client_t *client = &vars->clients[vars->poster];
-        json_out_t out = fcsl_client_room(client, REPLY_BYTES_MAX);
-        fcsl_commander_abandon(&vars->commander, &client->session, &out);
-        fcsl_client_put(client, &out, fcsl_run_monotonic_ns(NULL));
-        fcsl_vars_send(vars, client);
-    }
-    return NULL;
-}
-
-/* ---- the library's interface --------------------------------------------------------------------------------------- */
 
 static int allocate(fcsl_vars_t *vars, const fcsl_vars_block_t *blocks, uint32_t block_count)
 {
@@ -151,7 +95,7 @@ fcsl_vars_t *fcsl_vars_open(const fcsl_vars_options_t *options, const fcsl_vars_
         return NULL;
     }
     vars->listener.fd = -1;
-    vars->stop = -1;
+    vars->attention = -1;
     vars->mailbox.answered = -1;
     vars->poster = CLIENTS_MAX;
     vars->history = history;
@@ -164,8 +108,8 @@ fcsl_vars_t *fcsl_vars_open(const fcsl_vars_options_t *options, const fcsl_vars_
         fcsl_vars_close(vars);
         return NULL;
     }
-    vars->stop = eventfd(0, EFD_CLOEXEC);
-    if (vars->stop < 0 || allocate(vars, blocks, block_count) != 0) {
+    vars->attention = eventfd(0, EFD_CLOEXEC | EFD_NONBLOCK);
+    if (vars->attention < 0 || sem_init(&vars->returned, 0, 0) != 0 || allocate(vars, blocks, block_count) != 0) {
         (void)snprintf(error->text, sizeof error->text, "out of memory for the variable server");
         fcsl_vars_close(vars);
         return NULL;
@@ -179,7 +123,7 @@ fcsl_vars_t *fcsl_vars_open(const fcsl_vars_options_t *options, const fcsl_vars_
 
 int fcsl_vars_start(fcsl_vars_t *vars, fcsl_error_t *error)
 {
-    const int code = pthread_create(&vars->thread, NULL, run_server, vars);
+    const int code = pthread_create(&vars->thread, NULL, fcsl_vars_make_rounds, vars);
     if (code != 0) {
         (void)snprintf(error->text, sizeof error->text, "cannot start the variable server: %s", strerror(code));
         return -1;
@@ -194,9 +138,7 @@ void fcsl_vars_close(fcsl_vars_t *vars)
         return;
     }
     if (vars->started) {
-        const uint64_t one = 1;
-        const ssize_t written = write(vars->stop, &one, sizeof one);
-        (void)written; /* an eventfd takes its first increment */
+        fcsl_vars_end_rounds(vars);
         (void)pthread_join(vars->thread, NULL);
     }
     for (size_t i = 0; i < CLIENTS_MAX; i++) {
@@ -209,8 +151,8 @@ void fcsl_vars_close(fcsl_vars_t *vars)
     fcsl_catalog_free(&vars->commander.catalog);
     fcsl_mailbox_free(&vars->mailbox);
     fcsl_listener_close(&vars->listener);
-    if (vars->stop >= 0) {
-        (void)close(vars->stop);
+    if (vars->attention >= 0) {
+        (void)close(vars->attention);
     }
     free(vars->sample);
     free(vars);

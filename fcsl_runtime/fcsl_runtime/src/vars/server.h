@@ -12,6 +12,7 @@
 #include "listen.h"
 
 enum { POLL_MS = 200 }; /* how long a round waits at most: for the time limits */
+enum { ENTRIES_MAX = CLIENTS_MAX + 3 }; /* of poll */
 
 struct fcsl_vars {
     const fcsl_history_t *history;
@@ -19,12 +20,15 @@ struct fcsl_vars {
     mailbox_t mailbox;
     listener_t listener;
     char checkpoints[FOLDER_BYTES]; /* the folder of named ones; "" for none */
-    int stop; /* eventfd */
+    int attention; /* eventfd: ends the wait of a round */
+    atomic_int rounds; /* who makes them: rounds.c */
+    sem_t returned; /* ends the sleep of the server's thread while it makes none */
     int started;
     pthread_t thread;
     service_counters_t counters;
     commander_t commander;
     client_t clients[CLIENTS_MAX];
+    uint32_t used; /* places at the front, beyond which all are free */
     uint64_t connections; /* accepted so far */
     uint64_t accept_at_ns; /* no connection is taken before: there was no room for one */
     uint32_t next;       /* client that is served first in the coming round */
@@ -34,6 +38,13 @@ struct fcsl_vars {
     uint8_t *sample;     /* the one they are looking at */
     uint64_t tick_by_ns; /* when the `tick` under way goes on, whatever subscribers have read */
 };
+
+/* rounds.c: the server's thread; and what ends it. */
+void *fcsl_vars_make_rounds(void *vars);
+void fcsl_vars_end_rounds(fcsl_vars_t *vars);
+/* Step thread, around its work on a command: whether it makes the rounds; whether it still does. */
+int fcsl_vars_begin_work(fcsl_vars_t *vars);
+int fcsl_vars_end_work(fcsl_vars_t *vars);
 
 /* client_round.c: what a client is waited for; whether it has a request that was left for the coming round. */
 int fcsl_vars_watch(const client_t *client, struct pollfd *entry);

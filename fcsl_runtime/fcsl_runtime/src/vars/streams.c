@@ -18,7 +18,7 @@ static size_t bytes_of(const client_t *client)
 int fcsl_vars_prepare_streams(fcsl_vars_t *vars)
 {
     size_t most = 0;
-    for (size_t i = 0; i < CLIENTS_MAX; i++) {
+    for (size_t i = 0; i < vars->used; i++) {
         const size_t bytes = bytes_of(&vars->clients[i]);
         most = bytes > most ? bytes : most;
     }
@@ -77,7 +77,7 @@ void fcsl_vars_stream(fcsl_vars_t *vars, uint64_t now_ns)
             continue;
         }
         vars->cursor++;
-        for (size_t c = 0; c < CLIENTS_MAX; c++) {
+        for (size_t c = 0; c < vars->used; c++) {
             client_t *client = &vars->clients[c];
             for (size_t s = 0; client->fd >= 0 && !client->closing && s < SUBSCRIPTIONS_MAX; s++) {
                 if (client->session.subscriptions[s].number != 0) {

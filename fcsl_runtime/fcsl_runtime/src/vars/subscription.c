@@ -109,11 +109,11 @@ void fcsl_subscription_write(const subscription_t *subscription, const fcsl_mome
     }
     fcsl_json_raw(out, "{\"subscription\":%" PRIu32 ",\"tick\":%" PRIu64 ",\"time_ns\":%" PRIu64 ",\"lost\":%" PRIu64,
                   subscription->number, moment->tick, moment->time_ns, subscription->lost);
-    fcsl_json_raw(out, ",\"values\":{");
+    fcsl_json_text(out, ",\"values\":{");
     for (uint32_t i = 0; i < subscription->count; i++) {
-        fcsl_json_raw(out, i > 0 ? "," : "");
+        fcsl_json_text(out, i > 0 ? "," : "");
         fcsl_json_quoted(out, subscription->paths + (size_t)i * PATH_BYTES_MAX);
-        fcsl_json_raw(out, ":");
+        fcsl_json_text(out, ":");
         fcsl_value_write(&subscription->targets[i], snapshot + subscription->targets[i].at, out);
     }
     fcsl_json_raw(out, "}}\n");

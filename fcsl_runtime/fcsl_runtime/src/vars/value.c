@@ -44,23 +44,23 @@ static void write_scalar(const target_t *target, const uint8_t *bytes, json_out_
     double f64 = 0.0;
     switch (target->field->type) {
     case FCSL_BOOL:
-        fcsl_json_raw(out, bytes[0] != 0 ? "true" : "false");
+        fcsl_json_text(out, bytes[0] != 0 ? "true" : "false");
         return;
     case FCSL_I32:
         memcpy(&i32, bytes, sizeof i32);
-        fcsl_json_raw(out, "%" PRId32, i32);
+        fcsl_json_i64(out, i32);
         return;
     case FCSL_I64:
         memcpy(&i64, bytes, sizeof i64);
-        fcsl_json_raw(out, "%" PRId64, i64);
+        fcsl_json_i64(out, i64);
         return;
     case FCSL_U32:
         memcpy(&u32, bytes, sizeof u32);
-        fcsl_json_raw(out, "%" PRIu32, u32);
+        fcsl_json_u64(out, u32);
         return;
     case FCSL_U64:
         memcpy(&u64, bytes, sizeof u64);
-        fcsl_json_raw(out, "%" PRIu64, u64);
+        fcsl_json_u64(out, u64);
         return;
     case FCSL_F32:
         memcpy(&f32, bytes, sizeof f32);
@@ -83,12 +83,12 @@ static void write_axis(const target_t *target, uint32_t level, int64_t at, const
         write_scalar(target, field + at, out);
         return;
     }
-    fcsl_json_raw(out, "[");
+    fcsl_json_text(out, "[");
     for (uint32_t i = 0; i < target->view.axes[level].count && !out->overflow; i++) {
-        fcsl_json_raw(out, i > 0 ? "," : "");
+        fcsl_json_text(out, i > 0 ? "," : "");
         write_axis(target, level + 1, at + (int64_t)i * target->view.axes[level].stride, field, out);
     }
-    fcsl_json_raw(out, "]");
+    fcsl_json_text(out, "]");
 }
 
 void fcsl_value_write(const target_t *target, const uint8_t *field, json_out_t *out)

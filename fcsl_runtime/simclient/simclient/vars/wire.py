@@ -21,7 +21,7 @@ _REQUEST_BYTES_MAX = 64 * 1024
 #: Bytes of one recv(): above 128 KiB every call would map new memory.
 _RECEIVE_BYTES = 1 << 16
 _encode = json.JSONEncoder(separators=(",", ":")).encode
-_decode = json.JSONDecoder().decode
+_decode = json.JSONDecoder().raw_decode
 _FRAME_MARK = 0xFF
 #: Mark, version, subscription, payload bytes, tick, time_ns, lost.
 _FRAME = struct.Struct("<BBHIQQQ")
@@ -72,6 +72,8 @@ class VarWire:
         self._buffer = b""
         self._number = 0
         self._subscriptions: dict[int, Subscription] = {}
+        #: The kernel's timeout for receiving.
+        self._receive_limit_s: float | None = None
         self._socket = self._connect()
 
     def close(self) -> None:
@@ -158,7 +160,10 @@ class VarWire:
                 return None
             self._buffer = rest
             try:
-                message = _decode(line.decode())
+                text = line.decode()
+                message, end = _decode(text)
+                if end != len(text):
+                    raise ValueError("there is more than a message")
                 if "ok" in message:
                     return _Reply(message)
                 values = {path: self._numbers(path, value) for path, value in message["values"].items()}
@@ -220,7 +225,7 @@ class VarWire:
         Raises VarError if the server is gone.
         """
         try:
-            _limit(self._socket, socket.SO_RCVTIMEO, None if deadline is None else deadline - time.monotonic())
+            self._limit_receiving(None if deadline is None else deadline - time.monotonic())
             data = self._socket.recv(_RECEIVE_BYTES)
         except BlockingIOError:
             return deadline is None or time.monotonic() < deadline
@@ -230,6 +235,17 @@ class VarWire:
             raise VarError("closed", f"{self.address}: the server has closed the connection")
         self._buffer += data
         return deadline is None or time.monotonic() < deadline
+
+    def _limit_receiving(self, limit_s: float | None) -> None:
+        """Leaves a timeout that is right to a hundredth: setting one is a system call, and each request has its own."""
+        known_s = self._receive_limit_s
+        if limit_s is None or known_s is None:
+            right = limit_s is known_s
+        else:
+            right = abs(limit_s - known_s) * 100 < limit_s
+        if not right:
+            _limit(self._socket, socket.SO_RCVTIMEO, limit_s)
+            self._receive_limit_s = limit_s
 
     def _lost(self, error: OSError) -> VarError:
         return VarError("closed", f"{self.address}: {error.strerror or error}")

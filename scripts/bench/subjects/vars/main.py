@@ -27,11 +27,13 @@ from fcsl_compiler.driver.cache import build_machine
 
 from ...harness.native import compile_program
 from ...harness.size import sized
+from ...harness.trips import connect, echo, in_turns, trip
 
 ROOT = Path(__file__).resolve().parents[4]
 SLOW = ROOT / "scripts/bench/machines/slow/slow.json"
 VEHICLE = ROOT / "scripts/bench/machines/vehicle/vehicle.json"
-ROUND_TRIPS, TICKS, CLIENTS = sized(20_000, 100), sized(60, 5), 64
+TICKS, CLIENTS = sized(60, 5), 64
+GET = b'{"cmd":"get","paths":["machine.tick"]}\n'
 #: Of a run whose steps are timed.
 SECONDS = sized(5.0, 0.5)
 Requests = list[dict[str, Any]]
@@ -47,10 +49,10 @@ SETTING: Requests = [{"cmd": "set", "values": {"one.inputs.x": 1.5}}]
 
 
 def vars_figures(folder: Path) -> dict[str, Any]:
-    """us: quantiles of a `get` of one client, machine running, and of a `tick`; `instructions`: per scenario how many
-    stretches of the step thread had so many instructions, as pairs."""
+    """`trips_us`: quantiles of a `get` of one client, machine running, and of an echo of as many bytes; `instructions`:
+    per scenario how many stretches of the step thread had so many instructions, as pairs."""
     program = compile_program(["subjects/vars/steps.c"], folder / "vars_steps")
-    facts: dict[str, Any] = _round_trips(folder)
+    facts: dict[str, Any] = {"trips_us": _round_trips(folder)}
     slow = build_machine(SLOW).library
     floods: dict[str, Requests] = {"alone": [], "64 looking": LOOKING, "64 setting": SETTING}
     facts["instructions"] = {
@@ -79,33 +81,14 @@ def _flying(folder: Path, library: Path, *options: str) -> Iterator[tuple[subpro
         process.wait(20)
 
 
-def _connect(path: Path) -> socket.socket:
-    client = socket.socket(socket.AF_UNIX)
-    client.settimeout(20)
-    while client.connect_ex(str(path)) != 0:
-        time.sleep(0.01)
-    return client
-
-
 def _round_trips(folder: Path) -> dict[str, Any]:
-    def quantiles(client: socket.socket, request: dict[str, Any]) -> dict[str, float]:
-        line = json.dumps(request).encode() + b"\n"
-        times = []
-        for _ in range(ROUND_TRIPS):
-            begun = time.perf_counter_ns()
-            client.sendall(line)
-            client.recv(4096)
-            times.append(time.perf_counter_ns() - begun)
-        times.sort()
-        return {name: times[int(len(times) * q)] / 1e3 for name, q in (("p50", 0.5), ("p99", 0.99))}
-
     library = build_machine(VEHICLE).library
-    facts: dict[str, Any] = {}
-    with _flying(folder, library) as (_, path), _connect(path) as client:
-        facts["get_us"] = quantiles(client, {"cmd": "get", "paths": ["machine.tick"]})
-    with _flying(folder, library, "--paused") as (_, path), _connect(path) as client:
-        facts["tick_us"] = quantiles(client, {"cmd": "tick"})
-    return facts
+    with (
+        _flying(folder, library) as (_, path),
+        connect(path) as client,
+        echo(folder, trip(client, GET)) as echoing,
+    ):
+        return in_turns({"get": lambda: trip(client, GET), "echo": lambda: trip(echoing, GET)})
 
 
 @contextmanager
@@ -130,7 +113,7 @@ def _flood(path: Path, requests: Requests, count: int = CLIENTS) -> Iterator[lis
             dropped.append(error)
 
     with ExitStack() as stack:
-        clients = [stack.enter_context(_connect(path)) for _ in range(count if requests else 0)]
+        clients = [stack.enter_context(connect(path)) for _ in range(count if requests else 0)]
         for client in clients:
             client.setblocking(False)
         thread = threading.Thread(target=push, args=(clients,))
@@ -178,7 +161,7 @@ def instructions(
 
 def _step_time(folder: Path, requests: Requests) -> dict[str, int]:
     """The step's own histogram at 1 kHz (fcsl-fc's `stats`), of a run of a few seconds."""
-    with _flying(folder, build_machine(VEHICLE).library) as (_, path), _connect(path) as client:
+    with _flying(folder, build_machine(VEHICLE).library) as (_, path), connect(path) as client:
         with _flood(path, requests, CLIENTS - 1):  # who asks for the figures is a client, too
             time.sleep(SECONDS)
             client.sendall(b'{"cmd":"stats"}\n')
@@ -187,10 +170,13 @@ def _step_time(folder: Path, requests: Requests) -> dict[str, int]:
 
 
 def vars_rows(facts: dict[str, Any]) -> list[tuple[str, str]]:
-    get, tick = facts["get_us"], facts["tick_us"]
+    trips = facts["trips_us"]
     rows = [
-        ("get of one client, p50 / p99", f"{get['p50']:.1f} / {get['p99']:.1f} µs (goal 50)"),
-        ("tick by a client, p50 / p99", f"{tick['p50']:.1f} / {tick['p99']:.1f} µs (goal 40)"),
+        (what, f"{trips[name]['median']:.1f} / {trips[name]['p99']:.1f} µs{goal}")
+        for name, what, goal in (
+            ("get", "get of one client, p50 / p99", " (goal 12)"),
+            ("echo", "    a bare echo in C of the same bytes", ""),
+        )
     ]
     for name, counts in facts["instructions"].items():
         times = [n for n, count in counts for _ in range(count)]

@@ -36,6 +36,7 @@ static void open_connections(fcsl_vars_t *vars, int *ends)
     vars->poster = CLIENTS_MAX;
     vars->cursor = 0;
     vars->overtaken = 0;
+    vars->used = CLIENTS;
     for (size_t i = 0; i < CLIENTS; i++) {
         int pair[2];
         FUZZ_CHECK(socketpair(AF_UNIX, SOCK_STREAM | SOCK_NONBLOCK, 0, pair) == 0);
