@@ -190,7 +190,7 @@ def test_lines_and_names_stay() -> None:
     """In a debugger: the lines of the file, locals under their names, and no other names."""
     text = law("y: f64", "a = self.x / 2.0", "", "b = [a, 1 / a]", "self.y = b[0]", "self.y += a")
     self = run(text, x=8.0)
-    assert self.__slots__ == ("x", "y", "health") and repr(self) == "Law(x=8.0, y=8.0, health='nominal')"
+    assert tuple(vars(self)) == ("x", "y", "health") and repr(self) == "Law(x=8.0, y=8.0, health='nominal')"
     code = type(self).execute.__code__  # type: ignore[attr-defined]
     assert code.co_filename == "law.py" and code.co_name == "execute" and code.co_varnames == ("self", "a", "b")
     first = text.splitlines().index("        a = self.x / 2.0") + 1

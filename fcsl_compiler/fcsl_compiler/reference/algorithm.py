@@ -102,7 +102,7 @@ class SourceModule:
         value, kind = rewriter.constant(node.value, declared)
         self.run([ast.copy_location(ast.Assign([target], value), node)])
         self.known.constants[target.id] = kind
-        if type(self.names[target.id]) is Array:
+        if isinstance(self.names[target.id], Array):
             self.names[target.id] = self.names[target.id].as_constant()
         for base in ("f64", "f32") if kind.base in ("int", "float") else ():
             name = self.known.literal(target.id, base)
@@ -159,6 +159,7 @@ class Algorithm:
             module.names[name] = before
         for m in methods:
             setattr(self.type.construct, m.name, getattr(cls, m.name))
+        self.execute: Callable[[Any], None] = cls.execute
 
     def run(self, name: str, self_: Any) -> None:
         """Calls start or execute. Raises Fault; other exceptions pass unchanged."""

@@ -17,7 +17,7 @@ from types import FunctionType
 from typing import Any
 
 from .annotations import split_type
-from .arrays import Array
+from .arrays import Array, array_type
 from .infer import SELF, Kind, Names, annotation_text, kind_of
 from .rewrite import Rewriter
 from .runtime import runtime
@@ -88,15 +88,15 @@ def _generic(function: FunctionType, patterns: list[str]) -> Callable[..., Any]:
     special: dict[tuple[tuple[int, ...], ...], FunctionType] = {}
 
     def call(*args: Any) -> Any:
-        if function.__name__ in _PRODUCTS and any(arg.constant for arg in args):
+        if function.__name__ in _PRODUCTS and any(arg.zeros for arg in args):
             return _skipping_zeros(*args, symmetric=function.__name__ == "symmetric_product")
-        shapes = tuple([arg.shape if type(arg) is Array else () for arg in args])
+        shapes = tuple([arg.shape if isinstance(arg, Array) else () for arg in args])
         found = special.get(shapes)
         if found is None:
             sizes = _bind(function.__name__, extents, shapes)
             found = special[shapes] = FunctionType(function.__code__, {**function.__globals__, **sizes})
         result = found(*args)
-        return result.as_constant() if function.__name__ == "transpose" and args[0].constant else result
+        return result.as_constant() if function.__name__ == "transpose" and args[0].zeros else result
 
     return call
 
@@ -115,9 +115,9 @@ def _skipping_zeros(a: Array, b: Array, *, symmetric: bool) -> Array:
                 data.append(data[j * width + i])
                 continue
             pairs = [(a.data[i * inner + p], b.data[p * width + j]) for p in range(inner)]
-            products = [x * y for x, y in pairs if not (a.constant and x == 0.0 or b.constant and y == 0.0)]
+            products = [x * y for x, y in pairs if not (a.zeros and x == 0.0 or b.zeros and y == 0.0)]
             data.append(reduce(operator.add, products) if products else 0.0)
-    return Array(a.type, (rows, *columns), data)
+    return array_type(a.type, (rows, *columns)).of(data)
 
 
 def _bind(name: str, extents: list[list[str]], shapes: tuple[tuple[int, ...], ...]) -> dict[str, int]:

@@ -14,6 +14,11 @@ class Type(Protocol):
 
     name: str
 
+    @property
+    def arrays(self) -> dict[tuple[int, ...], Any]:
+        """The types of arrays of it by their shape, as far as there are any (arrays.py)."""
+        ...
+
     def __hash__(self) -> int: ...
 
     def zero(self) -> Any:
@@ -32,6 +37,7 @@ class Scalar:
     def __init__(self, name: str, code: str, zero: Any, store: Callable[[Any], Any], of: Callable[[Any], Any]):
         self.name, self.code, self.store = name, code, store
         self.of = of  # converts the plain number in memory to the value
+        self.arrays: dict[tuple[int, ...], Any] = {}
         self._zero = zero
 
     def zero(self) -> Any:
