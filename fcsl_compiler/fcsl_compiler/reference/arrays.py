@@ -156,36 +156,44 @@ class Array:
         return self.__fcsl_type__.of([-a for a in self.data])
 
 
+def _maker(cls: type[Array]) -> Callable[[list[Any]], Array]:
+    def of(data: list[Any]) -> Array:
+        made = _new(cls)
+        made.data = data
+        return made
+
+    return of
+
+
 class ArrayType:
     """Type of an array: fixed shape of scalars or structs. Made by `array_type`."""
 
-    __slots__ = ("_constants", "construct", "count", "element", "name", "shape")
+    __slots__ = ("_constants", "construct", "count", "element", "name", "of", "shape")
 
     def __init__(self, element: Type, shape: tuple[int, ...]):
         self.element, self.shape, self.count = element, shape, math.prod(shape)
         self.name = element.name + "".join(f"[{extent}]" for extent in shape)
         self.construct: type[Array] = self._class(Array, {"__fcsl_type__": self, "type": element, "shape": shape})
+        #: Makes the array of exactly these elements, which it then owns.
+        self.of = _maker(self.construct)
         self._constants: dict[tuple[bool, ...], type[Array]] = {}
 
     def _class(self, base: type[Array], own: dict[str, Any]) -> type[Array]:
         return type(self.name, (base,), {"__slots__": (), **own})
 
-    def of(self, data: list[Any]) -> Array:
-        """The array of exactly these elements, which it then owns."""
-        made = _new(self.construct)
-        made.data = data
-        return made
-
     def constant(self, data: list[Any]) -> Array:
         """A constant array of these elements. Only zeros of floats are structural."""
         if self.element.name not in _FLOATS:
             return self.of(data)
-        zeros = tuple([item == 0 for item in data])
-        if zeros not in self._constants:
-            self._constants[zeros] = self._class(self.construct, {"zeros": zeros})
-        made = _new(self._constants[zeros])
+        made = _new(self.constant_class(tuple([item == 0 for item in data])))
         made.data = data
         return made
+
+    def constant_class(self, zeros: tuple[bool, ...]) -> type[Array]:
+        """The class of constants with these zeros."""
+        if zeros not in self._constants:
+            self._constants[zeros] = self._class(self.construct, {"zeros": zeros})
+        return self._constants[zeros]
 
     def zero(self) -> Array:
         return self.of([self.element.zero() for _ in range(self.count)])

@@ -18,7 +18,7 @@ import json
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any
+from typing import Any, Protocol
 
 from ..model.machine import Channel, Connection, Edge, Instance, Machine, PortRef, State
 from .algorithm import HARDWARE, Algorithm, Extern, SourceModule, declare_structs
@@ -34,11 +34,22 @@ _NONE, _LONG = -1, 2**64 - 1
 _NOMINAL, _DEGRADED, _FAILED, _STALE = range(len(HEALTH))
 
 
-@dataclass
-class Host:
+class Offered(Protocol):
     """What `step` may use of its host (fcsl_host_t): a monotonic clock (ns); callables for the hardware builtins, by
     name; and `substitute`, called before an impure instance executes. It returns True if it has stored the results of
     this execute itself."""
+
+    @property
+    def clock_ns(self) -> Callable[[], int] | None: ...
+    @property
+    def hardware(self) -> Mapping[str, Callable[..., Any]] | None: ...
+    @property
+    def substitute(self) -> Callable[[int], bool] | None: ...
+
+
+@dataclass
+class Host:
+    """A host that offers these."""
 
     clock_ns: Callable[[], int] | None = None
     hardware: Mapping[str, Callable[..., Any]] | None = None
@@ -220,7 +231,8 @@ class ReferenceMachine:
         places: Sequence[Place],
         externs: Callable[[Extern], Callable[..., Any]] | None = None,
     ):
-        self.machine, self.layout, self.host = machine, layout, Host()
+        self.machine, self.layout = machine, layout
+        self.host: Offered = Host()
         self.places, self.movers = FaultPlaces(places, machine.sources), Movers(layout, machine.requests)
         self._image = Image(bytearray())
         self._tick, self._ticks_in_state = _cell("machine.tick", layout, 8), _optional("machine.ticks_in_state", layout)
@@ -391,7 +403,7 @@ class ReferenceMachine:
                 return index + 1
         return 0
 
-    def step(self, memory: Memory, host: Host | None = None) -> None:
+    def step(self, memory: Memory, host: Offered | None = None) -> None:
         """Runs one tick."""
         self.host = host or Host()
         image = self._image_of(memory)
