@@ -196,13 +196,18 @@ class ArrayType:
         return self._constants[zeros]
 
     def zero(self) -> Array:
+        if isinstance(self.element, Scalar):
+            return self.of([self.element.zero()] * self.count)
         return self.of([self.element.zero() for _ in range(self.count)])
 
     def store(self, value: Any) -> Array:
         if not isinstance(value, self.construct):
             raise IllTyped(f"{value!r} where {self.name} is needed")
-        # Only struct elements could be shared.
-        return self.of(list(value.data) if isinstance(self.element, Scalar) else list(map(copy_of, value.data)))
+        return self.copy(value)
+
+    def copy(self, value: Array) -> Array:
+        """A copy of an array of this type. Only elements that are structs could be shared."""
+        return self.of(value.data[:] if isinstance(self.element, Scalar) else list(map(copy_of, value.data)))
 
 
 def array_type(element: Type, shape: tuple[int, ...]) -> ArrayType:

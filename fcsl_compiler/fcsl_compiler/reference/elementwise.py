@@ -5,7 +5,8 @@ from __future__ import annotations
 
 import ast
 import operator
-from collections.abc import Callable, Sequence
+from collections.abc import Callable
+from functools import cache
 from typing import Any
 
 from .arrays import Array, ArrayType
@@ -22,7 +23,8 @@ OPERATIONS: dict[type[ast.AST], tuple[str, Callable[..., Any]]] = {
 _LONGEST = 64
 
 
-def elementwise(op: type[ast.AST], arrays: Sequence[bool], type_: ArrayType) -> Callable[..., Array]:
+@cache
+def elementwise(op: type[ast.AST], arrays: tuple[bool, ...], type_: ArrayType) -> Callable[..., Array]:
     """The operation on operands of which these are arrays of this type and the others scalars."""
     sign, general = OPERATIONS[op]
     if type_.count > _LONGEST:

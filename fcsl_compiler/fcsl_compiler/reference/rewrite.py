@@ -20,7 +20,7 @@ from collections.abc import Collection, Mapping
 from functools import reduce
 from typing import Any
 
-from .arrays import Array, array_type
+from .arrays import Array, ArrayType, array_type
 from .elementwise import OPERATIONS, elementwise
 from .functions import CONVERSIONS
 from .infer import PLAIN, SELF, Inference, Kind, Names
@@ -88,6 +88,10 @@ class Rewriter:
         """A named value that is created once, not at each use."""
         self.names.literals[name] = value
         return ast.Name(name, ast.Load())
+
+    def _call_named(self, name: str, function: Any, *args: ast.expr) -> ast.expr:
+        """A call of a function that is known for the types at hand."""
+        return ast.Call(self._named(name, function), list(args), [])
 
     def _float_literal(self, node: ast.expr, base: str) -> ast.expr:
         if isinstance(node, ast.Constant):
@@ -217,10 +221,7 @@ class Rewriter:
         if op not in OPERATIONS or not arrays or None in classes or any(cls.zeros for cls in arrays):
             return None
         type_, ranks = arrays[0].__fcsl_type__, [cls is not float for cls in classes]
-        name = f"fcsl.{op.__name__} {ranks} {type_.name}"
-        if name not in self.names.literals:
-            self.names.literals[name] = elementwise(op, ranks, type_)
-        return ast.Call(ast.Name(name, ast.Load()), args, [])
+        return self._call_named(f"fcsl.{op.__name__} {ranks} {type_.name}", elementwise(op, tuple(ranks), type_), *args)
 
     def _class(self, node: ast.expr) -> type[Any] | None:
         """The class of an f64 or of an array of f64, if the value is certain to have it."""
@@ -231,7 +232,15 @@ class Rewriter:
             return float
         if self.names.is_constant(node) and isinstance(node, ast.Name) and node.id not in self.types.locals:
             return type(self.names.values[node.id])
-        return None if self._may_be_constant(node) else array_type(SCALARS["f64"], kind.shape).construct  # type: ignore[arg-type]
+        type_ = self._array_type(node)
+        return None if type_ is None or self._may_be_constant(node) else type_.construct
+
+    def _array_type(self, node: ast.expr) -> ArrayType | None:
+        """The type of an array of scalars, if it is certain."""
+        kind = self.types.certain(node)
+        if kind is None or not kind.rank or kind.base not in SCALARS:
+            return None
+        return array_type(SCALARS[kind.base], kind.shape)  # type: ignore[arg-type]
 
     def _may_be_constant(self, node: ast.expr) -> bool:
         """Whether an array may be an argument that is a constant, a frozen parameter, or the transpose of one."""
@@ -263,19 +272,18 @@ class Rewriter:
         return self._runtime("copy", chosen) if self.types.kind(node).rank else chosen  # a chosen array is not constant
 
     def _on_list(self, node: ast.List) -> ast.expr:
-        kind = self.types.certain(node)
-        items = _items(node)
-        if kind is not None and kind.base in SCALARS and all(self.types.certain(i) == Kind(kind.base) for i in items):
-            type_ = array_type(SCALARS[kind.base], kind.shape)  # type: ignore[arg-type]
+        type_, items = self._array_type(node), _items(node)
+        if type_ is not None and all(self.types.certain(item) == Kind(type_.element.name) for item in items):
             data = ast.copy_location(ast.List([self.expr(item) for item in items], ast.Load()), node)
-            return ast.Call(self._named(f"fcsl.of {type_.name}", type_.of), [data], [])
+            return self._call_named(f"fcsl.of {type_.name}", type_.of, data)
         return self._runtime(f"array_{self.types.kind(node).base}", *map(self.expr, node.elts))
 
     def _on_call(self, node: ast.Call) -> ast.expr:
         assert isinstance(node.func, ast.Name)
         name = self.names.function(node)
         if name in ("zeros", "eye"):
-            return node
+            type_ = self._array_type(node)
+            return node if type_ is None or name == "eye" else self._call_named(f"fcsl.zero {type_.name}", type_.zero)
         if name == "len":
             base = self.types.kind(node).base
             size = self._call_of(node, name)
@@ -338,8 +346,15 @@ class Rewriter:
     def _stored(self, node: ast.expr) -> ast.expr:
         """The value stored in a local or result. Arrays and structs are copied if the value is a place."""
         value, kind = self.expr(node), self.types.kind(node)
-        copied = (kind.rank or kind.base in self.names.members) and _is_place(node)
-        return ast.copy_location(self._runtime("copy", value), node) if copied else value
+        if not (kind.rank or kind.base in self.names.members) or not _is_place(node):
+            return value
+        type_ = self._array_type(node)
+        copied = (
+            self._runtime("copy", value)
+            if type_ is None
+            else self._call_named(f"fcsl.copy {type_.name}", type_.copy, value)
+        )
+        return ast.copy_location(copied, node)
 
     def _values(self, node: ast.Tuple | ast.List) -> ast.expr:
         """Several values, each stored."""
@@ -350,8 +365,11 @@ class Rewriter:
         if not isinstance(target, ast.Tuple):
             kind = self.types.certain(value)
             return ast.Assign([self._target(target, kind)], self._stored(value))
+        written = value.elts if isinstance(value, ast.Tuple | ast.List) else []
         whole = self._values(value) if isinstance(value, ast.Tuple | ast.List) else self.expr(value)
-        return ast.Assign([ast.Tuple([self._target(part, None) for part in target.elts], ast.Store())], whole)
+        kinds = [self.types.certain(part) for part in written] or [None] * len(target.elts)
+        places = [self._target(part, kind) for part, kind in zip(target.elts, kinds, strict=True)]
+        return ast.Assign([ast.Tuple(places, ast.Store())], whole)
 
     def _target(self, target: ast.expr, value: Kind | None) -> ast.expr:
         """The place of an assignment. Unless the value is certain to have its kind, the place checks and copies it."""
