@@ -16,7 +16,6 @@ from typing import Any
 from .annotations import split_type
 from .functions import CONVERSIONS, ON_INTEGERS, PREDICATES
 
-
 #: Sizes of an array: numbers, and names where they are not known yet (UNKNOWN: never).
 Shape = tuple[int | str, ...]
 UNKNOWN = "?"

@@ -10,13 +10,14 @@ from __future__ import annotations
 import ast
 from collections.abc import Callable, Collection, Mapping, Sequence
 from dataclasses import replace
-from functools import cache
+from functools import cache, partial
 from pathlib import Path
 from typing import Any
 
 from .annotations import split_type
-from .arrays import Array, array_type
+from .arrays import Array
 from .infer import SELF, Kind, Names, annotation_text, kind_of
+from .products import large_product
 from .rewrite import Rewriter
 from .runtime import runtime
 from .unroll import PRODUCTS, Classes, TooLarge, unrolled
@@ -125,7 +126,7 @@ class Library:
     def _with_loops(self, name: str, classes: Classes, sizes: Mapping[str, int]) -> Callable[..., Any]:
         """The function as it is written, for arrays that are too large."""
         if name in PRODUCTS:
-            return lambda a, b: _product(a, b, symmetric=name == "symmetric_product")
+            return partial(large_product, symmetric=name == "symmetric_product")
         node, path = self._nodes[name], self._files[name]
         namespace, known = {**self._names, **sizes}, {**self.signatures, name: signature(self._nodes[name], sizes)}
         names = Names({}, known, text=self._texts[path], values=namespace, library=self.makers())
@@ -140,27 +141,6 @@ class Library:
 @cache
 def library() -> Library:
     return Library()
-
-
-def _product(a: Array, b: Array, *, symmetric: bool) -> Array:
-    """A product of large arrays. Terms with the zeros of a constant are omitted; an empty sum is 0."""
-    (rows, inner), columns = a.shape, b.shape[1] if len(b.shape) == 2 else 1
-    left = [a.data[i * inner : (i + 1) * inner] for i in range(rows)]
-    right = [b.data[j::columns] for j in range(columns)]
-    data = list[float]()
-    for i, row in enumerate(left):
-        for j, column in enumerate(right):
-            if symmetric and j < i:
-                data.append(data[j * columns + i])
-                continue
-            pairs = zip(row, column, strict=True)
-            if a.zeros or b.zeros:
-                pairs = ((x, y) for x, y in pairs if not (a.zeros and x == 0.0 or b.zeros and y == 0.0))  # type: ignore[assignment]
-            total = None
-            for x, y in pairs:
-                total = x * y if total is None else total + x * y
-            data.append(0.0 if total is None else total)
-    return array_type(a.type, (rows, *b.shape[1:])).of(data)
 
 
 def _bind(name: str, extents: list[list[str]], shapes: Sequence[tuple[int, ...]]) -> dict[str, int]:

@@ -209,7 +209,9 @@ class _State:
         self.spans: dict[int, int] = {}
         for before, entry in zip((None, *state.entries), state.entries, strict=False):
             if instances[entry.instance].limit_ns:
-                self.spans[entry.instance] = self.spans.get(before.instance, entry.instance) if before else entry.instance
+                self.spans[entry.instance] = (
+                    self.spans.get(before.instance, entry.instance) if before else entry.instance
+                )
 
     def due(self, tick: int) -> list[int]:
         """The instances that run in a tick, in order."""
@@ -246,11 +248,11 @@ class ReferenceMachine:
         for instance in machine.instances:
             written = config["instances"][instance.name]
             given = {**written.get("parameters", {}), **written.get("inputs", {})}
-            given |= {c["to"].partition(".")[2]: c["initial"] for c in delayed if c["to"].startswith(f"{instance.name}.")}
+            given |= {
+                c["to"].partition(".")[2]: c["initial"] for c in delayed if c["to"].startswith(f"{instance.name}.")
+            }
             self._instances.append(_Instance(instance, self._algorithms[instance.algorithm.name], given, self))
-        self._sensors_of = [
-            [s for s in self._sensors.values() if s.instance == i] for i in range(len(self._instances))
-        ]
+        self._sensors_of = [[s for s in self._sensors.values() if s.instance == i] for i in range(len(self._instances))]
         self._states = [_State(n, s, machine.edges, self._instances) for n, s in enumerate(machine.states)]
         self._delayed = [(c.target.instance, self._copies(c)) for c in machine.connections if c.delayed]
         self._read_span: int | None = None  # span of this tick whose clock reading is current

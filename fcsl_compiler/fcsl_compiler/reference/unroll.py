@@ -294,7 +294,9 @@ class Activation:
             return self._of_numbers(op, left, right)
         whole = left if isinstance(left, Elements) else right
         assert isinstance(whole, Elements)
-        rows = [v.items if isinstance(v, Elements) else [self.writer.named(v)] * len(whole.items) for v in (left, right)]
+        rows = [
+            v.items if isinstance(v, Elements) else [self.writer.named(v)] * len(whole.items) for v in (left, right)
+        ]
         items = [self.writer.named(self._of_numbers(op, a, b)) for a, b in zip(*rows, strict=True)]
         if isinstance(left, Elements) and isinstance(right, Elements):
             items = [

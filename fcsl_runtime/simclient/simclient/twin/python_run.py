@@ -21,7 +21,7 @@ from ..run import Run
 
 if TYPE_CHECKING:
     from fcsl_compiler.reference.fault_places import Place
-    from fcsl_compiler.reference.machine import Host, ReferenceMachine
+    from fcsl_compiler.reference.machine import ReferenceMachine
 
 
 class CHardware(Structure):
