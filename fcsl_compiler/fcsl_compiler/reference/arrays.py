@@ -10,7 +10,7 @@ import math
 from collections.abc import Callable, Iterator
 from typing import Any, ClassVar
 
-from .types import SCALARS, Scalar, Type
+from .types import SCALARS, Element, Scalar
 from .values import Fault, IllTyped, divide
 
 _F64 = SCALARS["f64"]
@@ -43,7 +43,7 @@ class Array:
     __slots__ = ("data",)
     data: list[Any]
     __fcsl_type__: ClassVar[ArrayType]
-    type: ClassVar[Type]
+    type: ClassVar[Element]
     shape: ClassVar[tuple[int, ...]]
     zeros: ClassVar[tuple[bool, ...] | None] = None
 
@@ -170,7 +170,7 @@ class ArrayType:
 
     __slots__ = ("_constants", "construct", "count", "element", "name", "of", "shape")
 
-    def __init__(self, element: Type, shape: tuple[int, ...]):
+    def __init__(self, element: Element, shape: tuple[int, ...]):
         self.element, self.shape, self.count = element, shape, math.prod(shape)
         self.name = element.name + "".join(f"[{extent}]" for extent in shape)
         self.construct: type[Array] = self._class(Array, {"__fcsl_type__": self, "type": element, "shape": shape})
@@ -210,7 +210,7 @@ class ArrayType:
         return self.of(value.data[:] if isinstance(self.element, Scalar) else list(map(copy_of, value.data)))
 
 
-def array_type(element: Type, shape: tuple[int, ...]) -> ArrayType:
+def array_type(element: Element, shape: tuple[int, ...]) -> ArrayType:
     """The one type of arrays of this element and shape."""
     found = element.arrays.get(shape)
     if found is None:
@@ -218,7 +218,7 @@ def array_type(element: Type, shape: tuple[int, ...]) -> ArrayType:
     return found
 
 
-def array_of(element: Type) -> Callable[..., Array]:
+def array_of(element: Element) -> Callable[..., Array]:
     """Constructor of `[a, b, …]` for this element type: from scalars, structs or rows."""
 
     def build(*items: Any) -> Array:

@@ -5,8 +5,7 @@ from __future__ import annotations
 
 import ast
 import operator
-from collections.abc import Callable
-from functools import cache
+from collections.abc import Callable, Sequence
 from typing import Any
 
 from .arrays import Array, ArrayType
@@ -23,8 +22,7 @@ OPERATIONS: dict[type[ast.AST], tuple[str, Callable[..., Any]]] = {
 _LONGEST = 64
 
 
-@cache
-def elementwise(op: type[ast.AST], arrays: tuple[bool, ...], type_: ArrayType) -> Callable[..., Array]:
+def elementwise(op: type[ast.AST], arrays: Sequence[bool], type_: ArrayType) -> Callable[..., Array]:
     """The operation on operands of which these are arrays of this type and the others scalars."""
     sign, general = OPERATIONS[op]
     if type_.count > _LONGEST:

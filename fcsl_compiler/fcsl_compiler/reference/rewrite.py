@@ -221,7 +221,10 @@ class Rewriter:
         if op not in OPERATIONS or not arrays or None in classes or any(cls.zeros for cls in arrays):
             return None
         type_, ranks = arrays[0].__fcsl_type__, [cls is not float for cls in classes]
-        return self._call_named(f"fcsl.{op.__name__} {ranks} {type_.name}", elementwise(op, tuple(ranks), type_), *args)
+        name = f"fcsl.{op.__name__} {ranks} {type_.name}"
+        if name not in self.names.literals:
+            self.names.literals[name] = elementwise(op, ranks, type_)
+        return ast.Call(ast.Name(name, ast.Load()), args, [])
 
     def _class(self, node: ast.expr) -> type[Any] | None:
         """The class of an f64 or of an array of f64, if the value is certain to have it."""

@@ -14,11 +14,6 @@ class Type(Protocol):
 
     name: str
 
-    @property
-    def arrays(self) -> dict[tuple[int, ...], Any]:
-        """The types of arrays of it by their shape, as far as there are any (arrays.py)."""
-        ...
-
     def __hash__(self) -> int: ...
 
     def zero(self) -> Any:
@@ -28,6 +23,15 @@ class Type(Protocol):
     def store(self, value: Any) -> Any:
         """The value of a place of this type after assignment of `value`: a copy; literals adopt the type. Raises
         IllTyped, Fault."""
+        ...
+
+
+class Element(Type, Protocol):
+    """A scalar or struct type: one of which there are arrays."""
+
+    @property
+    def arrays(self) -> dict[tuple[int, ...], Any]:
+        """The types of arrays of it by their shape, as far as they are made (arrays.py)."""
         ...
 
 

@@ -51,12 +51,12 @@ class Elements:
     zeros: tuple[bool, ...] | None = None
 
     @property
-    def type(self) -> ArrayType:
+    def array_type(self) -> ArrayType:
         return array_type(SCALARS["f64"], self.shape)
 
     @property
     def cls(self) -> type[Array]:
-        return self.type.construct if self.zeros is None else self.type.constant_class(self.zeros)
+        return self.array_type.construct if self.zeros is None else self.array_type.constant_class(self.zeros)
 
 
 #: A number that is known, an expression of one that is not, or an array.
@@ -379,9 +379,9 @@ def unrolled(
             return [ast.Return(writer.named(value))]
         data: ast.expr = ast.List(value.items, ast.Load())
         if not plain:
-            make = value.type.of if value.zeros is None else value.type.constant
-            needed[f"fcsl.{make.__name__} {value.type.name}"] = make
-            data = ast.Call(_name(f"fcsl.{make.__name__} {value.type.name}"), [data], [])
+            make = value.array_type.of if value.zeros is None else value.array_type.constant
+            needed[f"fcsl.{make.__name__} {value.array_type.name}"] = make
+            data = ast.Call(_name(f"fcsl.{make.__name__} {value.array_type.name}"), [data], [])
         return [ast.Return(data)]
 
     if returns_early(node):
