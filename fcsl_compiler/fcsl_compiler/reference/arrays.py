@@ -57,44 +57,40 @@ class Array:
     # ---- elements and parts ----------------------------------------------------------------------------------------
 
     def __getitem__(self, index: Any) -> Any:
-        # The two most frequent forms are tested first, because they dominate the time of a tick.
-        try:
-            if type(index) is int:
-                (rows,) = self.shape
-                if 0 <= index < rows:
-                    return self.data[index]
-            else:
-                i, j = index
-                rows, columns = self.shape
-                if type(i) is type(j) is int and 0 <= i < rows and 0 <= j < columns:
-                    return self.data[i * columns + j]
-        except (TypeError, ValueError):
-            pass  # another form of subscript
+        # The most frequent forms are tested first, because they dominate the time of a tick.
+        position = self._position(index)
+        if position >= 0:
+            return self.data[position]
+        if isinstance(index, int) and 0 <= index < self.shape[0]:
+            size = len(self.data) // self.shape[0]
+            return array_type(self.type, self.shape[1:]).of(self.data[index * size : index * size + size])
+        if type(index) is slice and len(self.shape) == 1:
+            data = self.data[index]
+            return array_type(self.type, (len(data),)).of(data)
         positions, shape = self._part(index)
         data = [self.data[p] for p in positions]
         return array_type(self.type, shape).of(data) if shape else data[0]
 
     def __setitem__(self, index: Any, value: Any) -> None:
-        at = -1
-        try:
-            if type(index) is int:
-                (rows,) = self.shape
-                if 0 <= index < rows:
-                    at = index
-            else:
-                i, j = index
-                rows, columns = self.shape
-                if type(i) is type(j) is int and 0 <= i < rows and 0 <= j < columns:
-                    at = i * columns + j
-        except (TypeError, ValueError):
-            pass
-        if at >= 0:
-            self.data[at] = self.type.store(value)
+        position = self._position(index)
+        if position >= 0:
+            self.data[position] = self.type.store(value)
             return
         positions, shape = self._part(index)
         items = array_type(self.type, shape).store(value).data if shape else [self.type.store(value)]
         for position, item in zip(positions, items, strict=True):
             self.data[position] = item
+
+    def _position(self, index: Any) -> int:
+        """The position of an element of a vector or matrix. -1 for any other selection."""
+        shape = self.shape
+        if isinstance(index, int):
+            return index if len(shape) == 1 and 0 <= index < shape[0] else -1
+        if type(index) is tuple and len(index) == len(shape) == 2:
+            i, j = index
+            if isinstance(i, int) and isinstance(j, int) and 0 <= i < shape[0] and 0 <= j < shape[1]:
+                return int(i) * shape[1] + int(j)
+        return -1
 
     def _part(self, index: Any) -> tuple[list[int], tuple[int, ...]]:
         """Positions and shape of any selection: indices, slices, fewer subscripts than dimensions. Raises Fault."""

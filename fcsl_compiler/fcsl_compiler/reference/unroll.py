@@ -333,6 +333,11 @@ class Activation:
         array = self.expr(node.value)
         assert isinstance(array, Elements)
         parts = node.slice.elts if isinstance(node.slice, ast.Tuple) else [node.slice]
+        if not any(isinstance(part, ast.Slice) for part in parts):
+            position = 0
+            for part, extent in zip(parts, array.shape, strict=True):
+                position = position * extent + self._whole(part)
+            return array, [position], ()
         positions, shape = [0], list[int]()
         for part, extent in zip(parts, array.shape, strict=True):
             wanted = range(extent) if isinstance(part, ast.Slice) else [self._whole(part)]
