@@ -108,6 +108,7 @@ class _Instance:
         """Loads the ports. A connected input comes from its source. Health and request are cleared."""
         skipped = {f"s.{slot(name)}" for name in (*self.frozen, "health", "transition_request")}
         connected, given = reference.connected(self.name)
+        self.is_connected = bool(connected or given)
         skipped |= {leaf.place for leaf in connected} | given.keys()
         wanted = [leaf for record in own.values() for leaf in record if leaf.place not in skipped]
         pulses = {f"s.{slot('health')}": "nominal"}
@@ -459,7 +460,8 @@ class ReferenceMachine:
         if span is not None and span != self._read_span:
             self._read_span, self._now_ns = span, self._clock_ns()
         instance.load(instance.self_, image.bytes)
-        instance.store_inputs(instance.self_, image.bytes)
+        if instance.is_connected:
+            instance.store_inputs(instance.self_, image.bytes)
         if instance.last_run is not None:
             image.longs[instance.last_run] = tick + 1
         image.words[self._current] = index
@@ -496,17 +498,22 @@ class ReferenceMachine:
     def _holds(self, image: Image, edge: Edge, due: list[int]) -> bool:
         """Whether an edge is true. Requests and healths count on ticks when their instance ran; `stale` counts always.
         A timed edge requires that the state has lasted long enough, this tick included."""
+        words = image.words
+        if edge.guard_instance >= 0:
+            health = words[self._instances[edge.guard_instance].health]
+            if not edge.guard_mask >> health & 1 or health != _STALE and edge.guard_instance not in due:
+                return False
         if edge.after_ticks:
             assert self._ticks_in_state is not None
             if image.longs[self._ticks_in_state] + 1 < edge.after_ticks:
                 return False
         wanted = edge.request + 1
-        if wanted and all(image.words[self._instances[i].request] != wanted for i in due):
-            return False
-        if edge.guard_instance < 0:
+        if wanted == 0:
             return True
-        health = image.words[self._instances[edge.guard_instance].health]
-        return bool(edge.guard_mask >> health & 1) and (health == _STALE or edge.guard_instance in due)
+        for index in due:
+            if words[self._instances[index].request] == wanted:
+                return True
+        return False
 
 
 def _typed(value: Any, type_: Scalar) -> Any:
