@@ -1,7 +1,8 @@
 # SPDX-License-Identifier: Apache-2.0
 """Fixed-shape arrays: row-major lists of numbers or structs. A value is copied where it is stored.
 
-Each element type and shape has a class of its own, so that the class of a value says everything about it but its numbers.
+Each element type and shape has a class of its own, so that the class of a value says everything about it but its
+numbers.
 """
 
 from __future__ import annotations

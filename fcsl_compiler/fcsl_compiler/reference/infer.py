@@ -23,8 +23,8 @@ UNKNOWN = "?"
 
 @dataclass(frozen=True)
 class Kind:
-    """A type. Bases are those of values and, in addition, `int`, `float` and `str` for names that denote literals, and PLAIN for
-    indices computed from literals and loop variables alone, which are Python integers."""
+    """A type. Bases are those of values and, in addition, `int`, `float` and `str` for names that denote literals,
+    and PLAIN for indices computed from literals and loop variables alone, which are Python integers."""
 
     base: str
     shape: Shape = ()
@@ -159,7 +159,8 @@ class Inference:
         return Kind(seen.node.base, seen.shape)
 
     def certain(self, node: ast.expr) -> Kind | None:
-        """The kind of an expression if all that it meets agrees on it, as in every program that the compiler accepts."""
+        """The kind of an expression if all that it meets agrees on it, as in every program that the compiler
+        accepts."""
         seen = self.seen.get(node)
         if seen is None or seen.node.mixed or not all(isinstance(extent, int) for extent in seen.shape):
             return None

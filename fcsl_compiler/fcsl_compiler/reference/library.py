@@ -1,8 +1,8 @@
 # SPDX-License-Identifier: Apache-2.0
 """The numeric library: the compiler's sources (library/*.py).
 
-A function is generic in the sizes of its arguments. Each combination of classes of arguments gets a function of its own: without
-loops (unroll.py) or, for large arrays, after the same rewrite as for algorithms.
+A function is generic in the sizes of its arguments. Each combination of classes of arguments gets a function of its
+own: without loops (unroll.py) or, for large arrays, after the same rewrite as for algorithms.
 """
 
 from __future__ import annotations
@@ -95,7 +95,8 @@ class Library:
         return call
 
     def _function(self, name: str, classes: Classes, plain: bool = False) -> Callable[..., Any]:
-        """The function for arguments of these classes, made at its first use. `plain`: of numbers in the place of arrays."""
+        """The function for arguments of these classes, made at its first use. `plain`: of numbers in the place of
+        arrays."""
         key = name, classes, plain
         if key not in self._made:
             shapes = [cls.shape if issubclass(cls, Array) else () for cls in classes]

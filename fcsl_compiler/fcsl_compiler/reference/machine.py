@@ -307,8 +307,8 @@ class ReferenceMachine:
     # ---- connections -----------------------------------------------------------------------------------------------
 
     def connected(self, target: str) -> tuple[list[Leaf], dict[str, Any]]:
-        """Inputs of an instance that are copied before each execute: leaves of their sources with the places of the inputs; and,
-        by place, values and functions for those that no field holds."""
+        """Inputs of an instance that are copied before each execute: leaves of their sources with the places of the
+        inputs; and, by place, values and functions for those that no field holds."""
         found, given = list[Leaf](), dict[str, Any]()
         names = [i.name for i in self.machine.instances]
         for connection in self.machine.connections:

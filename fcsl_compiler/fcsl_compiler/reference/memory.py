@@ -1,8 +1,9 @@
 # SPDX-License-Identifier: Apache-2.0
 """Values in the flat memory of a machine, by paths of its field table.
 
-A value is a tree of objects (structs, arrays) whose leaves are numbers and words. For each group of values that a tick moves
-together, one function is made as text, once: it moves all their leaves with as few calls of `struct` as possible.
+A value is a tree of objects (structs, arrays) whose leaves are numbers and words. For each group of values that a
+tick moves together, one function is made as text, once: it moves all their leaves with as few calls of `struct` as
+possible.
 """
 
 from __future__ import annotations
@@ -82,8 +83,8 @@ class Movers:
     # ---- from memory to values -------------------------------------------------------------------------------------
 
     def loader(self, wanted: Iterable[Leaf], given: Mapping[str, Any] | None = None) -> Callable[[Any, Memory], None]:
-        """A function that puts leaves into the objects of a tree `s`, several of one offset too, and then assigns what is `given`: by
-        place, a value or a function that returns it."""
+        """A function that puts leaves into the objects of a tree `s`, several of one offset too, and then assigns
+        what is `given`: by place, a value or a function that returns it."""
         found = sorted(wanted, key=lambda leaf: leaf.offset)
         distinct = {leaf.offset: leaf for leaf in found}
         ends = accumulate(leaf.count or 1 for leaf in distinct.values())

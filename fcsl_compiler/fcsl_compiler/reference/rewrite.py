@@ -6,8 +6,9 @@
 - Arrays and structs are copied where a place of either is bound to a local, returned or unpacked. Fields and elements copy what
   is stored in them.
 - `[a, b]` builds an array; `x[i][j]` is `x[i, j]`; a constant negative index counts from the end, any other is out of range.
-- Where the kinds of values are certain, what is known is not asked again: members are read and stored in their slots, elements in
-  the list of the array (if the index is known to be inside), functions of the library are those for the sizes at hand.
+- Where the kinds of values are certain, what is known is not asked again: members are read and stored in their slots,
+  elements in the list of the array (if the index is known to be inside), functions of the library are those for the
+  sizes at hand.
 - `x += v` is `x = x + v`; a subscript of x that reaches outside the machine is evaluated once, before. Annotations, imports and
   the dictionaries of a class are taken out.
 """
@@ -303,8 +304,8 @@ class Rewriter:
         return ast.Call(function, [self.expr(arg) for arg in node.args], named)
 
     def _special(self, name: str, args: list[ast.expr]) -> str:
-        """The name of a library function for the classes of its arguments, if they are certain. It is made when it is first
-        called."""
+        """The name of a library function for the classes of its arguments, if they are certain. It is made when it is
+        first called."""
         classes = [self._class(arg) for arg in args]
         if None in classes:
             return name

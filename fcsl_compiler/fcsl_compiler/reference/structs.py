@@ -1,8 +1,8 @@
 # SPDX-License-Identifier: Apache-2.0
 """Structs as values. The records of an algorithm (inputs, parameters, outputs, state) and its `self` are structs, too.
 
-Member `x` is kept in the slot `_x`, which rewritten code uses where the types are known. The property `x` checks and copies what
-is stored, also what a debugger's console assigns. No name of a program begins with `_`.
+Member `x` is kept in the slot `_x`, which rewritten code uses where the types are known. The property `x` checks and
+copies what is stored, also what a debugger's console assigns. No name of a program begins with `_`.
 """
 
 from __future__ import annotations

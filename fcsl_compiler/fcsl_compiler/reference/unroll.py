@@ -1,9 +1,9 @@
 # SPDX-License-Identifier: Apache-2.0
 """Library functions for the classes of their arguments: executed with names in the place of numbers.
 
-What depends on sizes alone (loops, indices, conditions) is done here; operations of numbers become statements of a new function. So
-an array is a list of names, a loop is its rounds one after another, and a called function becomes part of its caller. The order of
-operations on each number is that of the source.
+What depends on sizes alone (loops, indices, conditions) is done here; operations of numbers become statements of a
+new function. So an array is a list of names, a loop is its rounds one after another, and a called function becomes
+part of its caller. The order of operations on each number is that of the source.
 """
 
 from __future__ import annotations
@@ -76,8 +76,8 @@ def names_of(classes: Classes) -> list[Value]:
 
 
 class Writer:
-    """Statements of a function. `separate`: makes the function for a call that cannot become part of its caller, and returns its
-    name."""
+    """Statements of a function. `separate`: makes the function for a call that cannot become part of its caller, and
+    returns its name."""
 
     def __init__(self, definitions: Definitions, separate: Callable[[str, Classes], str]):
         self.definitions, self.separate = definitions, separate
@@ -155,8 +155,8 @@ _RETURNED = object()
 
 
 class Activation:
-    """One call of a function. `returned` writes the statements that return a value; without it the only return is the last
-    statement."""
+    """One call of a function. `returned` writes the statements that return a value; without it the only return is the
+    last statement."""
 
     def __init__(
         self,
@@ -374,8 +374,8 @@ def unrolled(
     *,
     plain: bool,
 ) -> tuple[ast.FunctionDef, dict[str, Any]]:
-    """The function for arguments of these classes, and names that it needs. `plain`: it takes and returns numbers in the place of
-    arrays. Raises TooLarge."""
+    """The function for arguments of these classes, and names that it needs. `plain`: it takes and returns numbers in
+    the place of arrays. Raises TooLarge."""
     writer, args, needed = Writer(definitions, separate), names_of(classes), dict[str, Any]()
     node = definitions[name]
 
@@ -418,8 +418,8 @@ def _taken_apart(given: list[list[str]]) -> list[ast.stmt]:
 
 
 def _without_single_uses(statements: list[ast.stmt]) -> list[ast.stmt]:
-    """Names that are assigned once and used once give way to their values. Every operation has no effect but its result, so
-    it does not matter when it is done."""
+    """Names that are assigned once and used once give way to their values. Every operation has no effect but its
+    result, so it does not matter when it is done."""
     assigned, used = Counter[str](), Counter[str]()
     for node in (n for s in statements for n in ast.walk(s)):
         if isinstance(node, ast.Name):

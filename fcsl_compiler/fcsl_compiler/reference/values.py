@@ -340,7 +340,8 @@ def divide(a: Any, b: Any) -> Any:
 
 
 class Zero:
-    """A divisor that is an f64 zero. Code that divides often replaces a zero by it, which costs nothing where it is none."""
+    """A divisor that is an f64 zero. Code that divides often replaces a zero by it, which costs nothing where it is
+    none."""
 
     __slots__ = ("zero",)
 

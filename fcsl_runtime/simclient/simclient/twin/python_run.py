@@ -119,7 +119,8 @@ def places_of(machine: Machine) -> list[Place]:
 
 
 class _Host:
-    """What `step` may use of the host at `address`, read from there only where it is used (fcsl_compiler.reference.machine.Host)."""
+    """What `step` may use of the host at `address`, read from there only where it is used
+    (fcsl_compiler.reference.machine.Host)."""
 
     def __init__(self, address: int):
         self.address, self._host = address, CHost.from_address(address)

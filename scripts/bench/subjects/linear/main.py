@@ -234,8 +234,8 @@ def _twins(
 
 
 def _twin(config: Path, columns: dict[str, Matrix], outputs: tuple[str, ...]) -> tuple[Matrix, float]:
-    """The outputs after the last tick, one after the other, and ns per tick. The first one is left out: it makes the functions
-    for the sizes at hand."""
+    """The outputs after the last tick, one after the other, and ns per tick. The first one is left out: it makes the
+    functions for the sizes at hand."""
     with PyTwin.from_config(config) as twin:
         spent = 0
         for step in range(TWIN_STEPS):
