@@ -76,7 +76,7 @@ def _compute(name: str, args: tuple[Any, ...]) -> Any:
         return builtins()[name](*args)
     from fcsl_compiler.reference.library import library
 
-    functions, _ = library()
+    functions = library().functions
     variant = f"{name}__{len(args)}"  # one overload for each number of arguments
     return functions[variant if variant in functions else name](*map(_as_f64, args))
 

@@ -235,10 +235,10 @@ def test_a_health_that_is_not_forced_is_a_difference(who: str, monkeypatch: pyte
     else:
         execute = reference_machine._Instance.execute
 
-        def forgetful(instance: Any, memory: Any) -> None:
-            if memory[instance.inject_fault] > 1:
-                memory[instance.inject_fault] = 0
-            execute(instance, memory)
+        def forgetful(instance: Any, image: Any) -> None:
+            if image.bytes[instance.inject_fault] > 1:
+                image.bytes[instance.inject_fault] = 0
+            execute(instance, image)
 
         monkeypatch.setattr(reference_machine._Instance, "execute", forgetful)
     made = [case for case in generate(cases(), 16, 1) if _has_health(case)]

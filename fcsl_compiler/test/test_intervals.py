@@ -16,6 +16,7 @@ from fcsl_compiler.driver.passes import compile_machine
 from fcsl_compiler.driver.toolchain import toolchain
 from fcsl_compiler.model import ir, ops
 from fcsl_compiler.reference.runtime import runtime
+from fcsl_compiler.reference.structs import slot
 from fcsl_compiler.reference.types import SCALARS as REFERENCE
 from fcsl_compiler.reference.values import Fault
 
@@ -50,7 +51,7 @@ def test_no_value_is_outside(op: ops.Op) -> None:
         assert found is not None
         for values in itertools.product(*(values_in(*r, rng) for r in ranges)):
             for letter, t, value in zip("abc", op.args, values, strict=False):
-                setattr(fields, f"{letter}_{t}", REFERENCE[str(t)].of(value))
+                setattr(fields, slot(f"{letter}_{t}"), REFERENCE[str(t)].of(value))
             try:
                 result = int(eval(code, namespace))
             except Fault:

@@ -23,6 +23,7 @@ from fcsl_compiler.printers.spelling import Spelling
 from fcsl_compiler.reference.infer import SELF, Kind, Names
 from fcsl_compiler.reference.rewrite import Rewriter
 from fcsl_compiler.reference.runtime import runtime
+from fcsl_compiler.reference.structs import slot
 from fcsl_compiler.reference.types import SCALARS as REFERENCE
 from fcsl_compiler.reference.values import Fault, round_int_to_f32
 
@@ -156,7 +157,7 @@ def test_operation(machine: Machine, name: str) -> None:
         for values in cases(op):
             for letter, t, value in zip("abc", op.args, values, strict=False):
                 inputs[f"{letter}_{t}"][0] = value
-                setattr(fields, f"{letter}_{t}", REFERENCE[str(t)].of(value))
+                setattr(fields, slot(f"{letter}_{t}"), REFERENCE[str(t)].of(value))
             before = faults[0]
             machine.step()
             try:
@@ -195,7 +196,7 @@ def test_operation_that_cannot_fault(proven: Machine, number: int) -> None:
     for values in cases(op):
         for letter, t, value in zip("abc", op.args, values, strict=False):
             proven.raw(f"one.inputs.{letter}_{t}")[0] = value
-            setattr(fields, f"{letter}_{t}", REFERENCE[str(t)].of(value))
+            setattr(fields, slot(f"{letter}_{t}"), REFERENCE[str(t)].of(value))
         proven.step()
         assert bits(result[0]) == bits(eval(code, namespace)), f"{op.id}{values} within {ranges}: {result[0]!r}"
         seen += 1

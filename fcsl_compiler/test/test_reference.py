@@ -2,12 +2,20 @@
 """The reference itself: operations of its values, and their errors, without compiled code."""
 
 import math
+import random
+import re
+import struct
+from functools import reduce
 from typing import Any
 
 import pytest
 
 from fcsl_compiler.reference.algorithm import Algorithm, SourceModule, declare_structs
+from fcsl_compiler.reference.arrays import Array, array_type
+from fcsl_compiler.reference.library import library
 from fcsl_compiler.reference.structs import Struct
+from fcsl_compiler.reference.types import SCALARS
+from fcsl_compiler.reference.unroll import TooLarge
 from fcsl_compiler.reference.values import F32, I32, I64, U32, U64, Fault, IllTyped, as_f32
 
 
@@ -190,7 +198,7 @@ def test_lines_and_names_stay() -> None:
     """In a debugger: the lines of the file, locals under their names, and no other names."""
     text = law("y: f64", "a = self.x / 2.0", "", "b = [a, 1 / a]", "self.y = b[0]", "self.y += a")
     self = run(text, x=8.0)
-    assert self.__slots__ == ("x", "y", "health") and repr(self) == "Law(x=8.0, y=8.0, health='nominal')"
+    assert tuple(vars(self)) == ("x", "y", "health") and repr(self) == "Law(x=8.0, y=8.0, health='nominal')"
     code = type(self).execute.__code__  # type: ignore[attr-defined]
     assert code.co_filename == "law.py" and code.co_name == "execute" and code.co_varnames == ("self", "a", "b")
     first = text.splitlines().index("        a = self.x / 2.0") + 1
@@ -202,3 +210,72 @@ def test_self_has_the_ports_and_nothing_else() -> None:
     for line in ("self.z = 1.0", "self.inputs = 1.0", "t = self.z"):
         with pytest.raises((KeyError, AttributeError)):
             run(law("y: f64", line))
+
+
+def test_indices_of_loop_variables_fault_only_outside() -> None:
+    text = law("y: f64[4]", "for i in range(4):", "    self.y[3 - i] = f64(i)", "    self.y[i] += self.y[i - 1 + 1]")
+    assert repr(run(text).y) == "[3.0, 2.0, 2.0, 0.0]"
+    for line in ("self.y[i + 1] = 1.0", "self.y[i - 1] = 1.0", "self.y[2 * i] = 1.0"):
+        with pytest.raises(Fault, match=r"the index is outside \[0, 4\)"):
+            run(law("y: f64[4]", "for i in range(4):", f"    {line}"))
+
+
+def test_what_a_debugger_assigns_is_checked() -> None:
+    self = run(law("y: f64; n: i32; v: f64[2]", "self.y = self.x"), x=2.0)
+    self.n = 7  # type: ignore[attr-defined]
+    assert type(self.n) is I32  # type: ignore[attr-defined]
+    for name, value in (("y", "high"), ("y", I32(1)), ("n", 2**31), ("v", [1.0, 2.0])):
+        with pytest.raises((IllTyped, Fault)):
+            setattr(self, name, value)
+    assert repr(self) == "Law(x=2.0, y=2.0, n=7, v=[0.0, 0.0], health='nominal')"
+
+
+# ---- the library ------------------------------------------------------------------------------------------------------
+
+
+def argument(pattern: str, sizes: dict[str, int], rng: random.Random, constant: bool) -> Any:
+    """A random argument: a symmetric array where it is square, so that some of its factorisations exist."""
+    extents = [int(e) if e.isdigit() else sizes[e] for e in re.findall(r"\[(\w+)\]", pattern)]
+    if not extents:
+        return rng.uniform(-2, 2)
+    numbers = [rng.choice((0.0, -0.0, 1.0, rng.uniform(-9, 9))) for _ in range(math.prod(extents))]
+    if len(extents) == 2 and extents[0] == extents[1] and not constant:
+        n = extents[0]
+        numbers = [numbers[min(i, j) * n + max(i, j)] + 20.0 * (i == j) for i in range(n) for j in range(n)]
+    made = array_type(SCALARS["f64"], tuple(extents)).of(numbers)
+    return made.as_constant() if constant else made
+
+
+def packed(value: Any) -> Any:
+    numbers = value.data if isinstance(value, Array) else [value]
+    return type(value), ["nan" if math.isnan(n) else struct.pack("<d", n) for n in numbers]
+
+
+@pytest.mark.parametrize("name", sorted(library().functions))
+def test_a_library_function_without_loops_gives_the_bits_of_its_source(name: str) -> None:
+    functions, rng = library(), random.Random(name)
+    for round_ in range(12):
+        sizes = {size: rng.randint(1, 4) for size in "nmk"}
+        patterns = functions._patterns(name)
+        args = [argument(p, sizes, rng, constant=round_ > 5 and rng.random() < 0.5) for p in patterns]
+        classes, shapes = tuple(map(type, args)), [getattr(arg, "shape", ()) for arg in args]
+        used = {e: sizes[e] for p in patterns for e in re.findall(r"\[([a-z])\]", p)}
+        loops = functions._with_loops(name, classes, used)(*args)
+        assert packed(functions._unrolled(name, classes, plain=False)(*args)) == packed(loops), f"{shapes}: {args}"
+
+
+def test_large_products_are_made_row_by_row() -> None:
+    rng, sizes = random.Random(1), {"n": 14, "k": 14, "m": 14}
+    a, b = (argument("f64[n][n]", sizes, rng, constant=False) for _ in "ab")
+    with pytest.raises(TooLarge):
+        library()._unrolled("matmul", (type(a), type(b)), plain=False)
+    row, column = a.data[28:42], b.data[3::14]
+    total = row[0] * column[0]
+    for x, y in zip(row[1:], column[1:], strict=True):
+        total += x * y
+    assert library().functions["matmul"](a, b)[2, 3] == total
+    constant = a.as_constant()
+    dense = [x * y for x, y in zip(row, column, strict=True) if x != 0.0]
+    assert library().functions["matmul"](constant, b)[2, 3] == reduce(float.__add__, dense)
+    mirrored = library().functions["symmetric_product"](a, b)
+    assert mirrored[3, 2] == mirrored[2, 3] == total

@@ -70,39 +70,47 @@ class SourceModule:
         load: Callable[[str], SourceModule] | None = None,
     ):
         self.path, self.tree, self.structs = path, ast.parse(text, path), structs
-        functions, signatures = library()
         found = [n for n in self.tree.body if isinstance(n, ast.FunctionDef)]
         stubs = [n for n in found if n.decorator_list]
         members = {s.name: {m: _kind(t) for m, t in s.members.items()} for s in structs.values()}
         imported = {name: load(module) for module, name in _imports(self.tree) if load is not None}
         own = {f.name: signature(f) for f in found}
         own |= {n: m.known.functions[n] for n, m in imported.items() if n in m.known.functions}
-        others = {n: s for n, s in signatures.items() if n.split("__")[0] not in own}  # hidden with all overloads
-        self.known: Names = Names(members, {**HARDWARE, **others, **own}, text=text)
+        # A function of the file hides one of the library with all its overloads.
+        others = {n: s for n, s in library().signatures.items() if n.split("__")[0] not in own}
+        makers = {n: make for n, make in library().makers().items() if n in others}
+        self.names: dict[str, Any] = {**runtime(structs), **library().functions}
+        self.names |= {n: m.names[n] for n, m in imported.items()}
+        functions = {**HARDWARE, **others, **own}
+        self.known: Names = Names(members, functions, text=text, values=self.names, library=makers)
         for name, module in imported.items():
             self.known.constants |= {n: k for n, k in module.known.constants.items() if n == name}
             self.known.literals |= module.known.literals_of(name)
-        self.names: dict[str, Any] = {**runtime(structs), **functions, **{n: m.names[n] for n, m in imported.items()}}
-        self._define([f for f in found if f not in stubs])
-        self.sizes = {n: self.names[n] for n, k in self.known.constants.items() if k == Kind("int")}
+        self._define(found, stubs)
+        self.sizes = self._sizes()
         self.externs = {f.name: self._extern(f) for f in stubs}
 
-    def _define(self, functions: list[ast.FunctionDef]) -> None:
+    def _define(self, functions: list[ast.FunctionDef], stubs: list[ast.FunctionDef]) -> None:
         """Evaluates the constants in order, then defines the helpers."""
         for node in self.tree.body:
             if isinstance(node, ast.Assign | ast.AnnAssign):
                 self._constant(node)
-        self.run([define(f, self.known, {}) for f in functions])
+        self.known.functions |= {f.name: signature(f, self._sizes()) for f in functions}
+        self.run([define(f, self.known, {}) for f in functions if f not in stubs])
+
+    def _sizes(self) -> dict[str, int]:
+        """The constants that may be sizes of arrays, as far as they are known."""
+        return {n: self.names[n] for n, k in self.known.constants.items() if k == Kind("int")}
 
     def _constant(self, node: ast.Assign | ast.AnnAssign) -> None:
         target = node.target if isinstance(node, ast.AnnAssign) else node.targets[0]
         assert isinstance(target, ast.Name) and node.value is not None
-        declared = kind_of(node.annotation) if isinstance(node, ast.AnnAssign) else None
+        declared = kind_of(node.annotation, self._sizes()) if isinstance(node, ast.AnnAssign) else None
         rewriter = Rewriter(self.known, {})
         value, kind = rewriter.constant(node.value, declared)
         self.run([ast.copy_location(ast.Assign([target], value), node)])
         self.known.constants[target.id] = kind
-        if type(self.names[target.id]) is Array:
+        if isinstance(self.names[target.id], Array):
             self.names[target.id] = self.names[target.id].as_constant()
         for base in ("f64", "f32") if kind.base in ("int", "float") else ():
             name = self.known.literal(target.id, base)
@@ -144,8 +152,8 @@ class Algorithm:
         }
         self.type = StructType(name, {n: t for record in self.records.values() for n, t in record.members.items()})
         methods = [n for n in node.body if isinstance(n, ast.FunctionDef)]
-        members = {**module.known.members, SELF: {n: kind_of(a) for n, a in annotations.items()}}
-        known = replace(module.known, members=members)
+        members = {**module.known.members, SELF: {n: kind_of(a, module.sizes) for n, a in annotations.items()}}
+        known = replace(module.known, members=members, parameters=declared["parameters"].keys())
         #: Whether it reads or writes hardware, or calls externs.
         self.impure = bool(_called(methods) & {*HARDWARE, *module.externs})
         self.has_start = any(m.name == "start" for m in methods)
@@ -159,6 +167,7 @@ class Algorithm:
             module.names[name] = before
         for m in methods:
             setattr(self.type.construct, m.name, getattr(cls, m.name))
+        self.execute: Callable[[Any], None] = cls.execute
 
     def run(self, name: str, self_: Any) -> None:
         """Calls start or execute. Raises Fault; other exceptions pass unchanged."""

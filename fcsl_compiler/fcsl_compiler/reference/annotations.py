@@ -7,7 +7,7 @@ import re
 from collections.abc import Mapping
 from typing import Any
 
-from .arrays import ArrayType
+from .arrays import array_type
 from .types import SCALARS, Type
 
 _TYPE = re.compile(r"\s*(\w+)\s*((?:\[[^\]]*\]\s*)*)")
@@ -25,4 +25,4 @@ def parse_type(text: str, sizes: Mapping[str, int], structs: Mapping[str, Type])
     name, extents = split_type(text)
     element: Any = SCALARS[name] if name in SCALARS else structs[name]
     shape = tuple(int(e) if e.isdigit() else int(sizes[e]) for e in extents)
-    return ArrayType(element, shape) if shape else element
+    return array_type(element, shape) if shape else element

@@ -10,7 +10,7 @@ from pathlib import Path
 from typing import Any
 
 from .algorithm import Extern
-from .arrays import Array, ArrayType
+from .arrays import ArrayType
 from .structs import StructType
 from .types import Scalar, Type
 
@@ -48,7 +48,7 @@ def _from_c(type_: Type, value: Any) -> Any:
     if isinstance(type_, StructType):
         return type_.of({name: _from_c(member, getattr(value, f"m_{name}")) for name, member in type_.members.items()})
     if isinstance(type_, ArrayType):
-        return Array(type_.element, type_.shape, [_from_c(type_.element, item) for item in value])
+        return type_.of([_from_c(type_.element, item) for item in value])
     assert isinstance(type_, Scalar)
     return type_.of(value)
 

@@ -5,7 +5,7 @@ from __future__ import annotations
 
 import ctypes
 import math
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from functools import cache
 from typing import Any
 
@@ -37,8 +37,22 @@ def settle(*args: Any) -> list[Any]:
     return [as_f64(a) for a in args] if any(type(a) is float for a in args) else list(args)
 
 
+def _alike(args: Sequence[Any]) -> Sequence[Any]:
+    """Like `settle`, which does nothing to numbers of one type."""
+    kind = type(args[0])
+    for arg in args:
+        if type(arg) is not kind:
+            return settle(*args)
+    return args
+
+
 def settle_floats(*args: Any) -> list[Any]:
     """Like `settle`, for functions of floats only."""
+    for arg in args:
+        if type(arg) is not float:
+            break
+    else:
+        return list(args)
     settled = settle(*args)
     if isinstance(settled[0], TypedInt):
         raise IllTyped("an integer where a float is needed")
@@ -66,11 +80,14 @@ def _elementary(name: str, count: int) -> Callable[..., Any]:
     double.argtypes, double.restype = [ctypes.c_double] * count, ctypes.c_double
     single.argtypes, single.restype = [ctypes.c_float] * count, ctypes.c_float
 
-    def call(*args: Any) -> Any:
+    def general(*args: Any) -> Any:
         settled = settle_floats(*args)
         return F32(single(*settled)) if type(settled[0]) is F32 else double(*settled)
 
-    return call
+    def unary(x: Any) -> Any:
+        return double(x) if type(x) is float else general(x)
+
+    return unary if count == 1 else general
 
 
 def _like(model: Any, value: float) -> Any:
@@ -80,13 +97,15 @@ def _like(model: Any, value: float) -> Any:
 
 def _to_whole(f: Callable[[float], int]) -> Callable[[Any], Any]:
     def call(x: Any) -> Any:
-        (v,) = settle_floats(x)
+        v = x if type(x) is float else settle_floats(x)[0]
         return _like(v, math.copysign(float(f(v)), v)) if math.isfinite(v) else v
 
     return call
 
 
 def sqrt(x: Any) -> Any:
+    if type(x) is float:
+        return math.sqrt(x) if x >= 0.0 else math.nan
     (v,) = settle_floats(x)
     return _like(v, math.nan if v < 0.0 else math.sqrt(v))
 
@@ -115,7 +134,7 @@ def wrap_angle(x: Any) -> Any:
 
 
 def _predicate(f: Callable[[float], bool]) -> Callable[[Any], bool]:
-    return lambda x: f(settle_floats(x)[0])
+    return lambda x: f(x if type(x) is float else settle_floats(x)[0])
 
 
 # ---- every number --------------------------------------------------------------------------------------------------
@@ -126,21 +145,22 @@ def absolute(x: Any) -> Any:
 
 
 def minimum(*args: Any) -> Any:
-    best, *rest = settle(*args)
+    best, *rest = _alike(args)
     for x in rest:
         best = x if x < best else best
     return best
 
 
 def maximum(*args: Any) -> Any:
-    best, *rest = settle(*args)
+    best, *rest = _alike(args)
     for x in rest:
         best = x if x > best else best
     return best
 
 
 def clamp(x: Any, low: Any, high: Any) -> Any:
-    x, low, high = settle(x, low, high)
+    if not type(x) is type(low) is type(high):
+        x, low, high = settle(x, low, high)
     return low if x < low else high if high < x else x
 
 
@@ -174,6 +194,8 @@ def to_f32(x: Any) -> Any:
 
 
 def to_f64(x: Any) -> float:
+    if type(x) is float:
+        return x
     return float(_number(x))
 
 

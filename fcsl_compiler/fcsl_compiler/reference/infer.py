@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Infers scalar type and number of dimensions of every expression of a function before the rewrite.
+"""Infers scalar type and shape of every expression of a function before the rewrite.
 
 Expressions that share one scalar type are neighbours in a graph. A declared type propagates from neighbour to
 neighbour. Without one, a float literal makes a group f64, otherwise it is i64. The compiler has accepted the program,
@@ -9,30 +9,38 @@ so nothing is checked here.
 from __future__ import annotations
 
 import ast
-from collections.abc import Mapping
-from dataclasses import dataclass, field
+from collections.abc import Callable, Collection, Mapping
+from dataclasses import dataclass, field, replace
 from typing import Any
 
 from .annotations import split_type
 from .functions import CONVERSIONS, ON_INTEGERS, PREDICATES
 
+#: Sizes of an array: numbers, and names where they are not known yet (UNKNOWN: never).
+Shape = tuple[int | str, ...]
+UNKNOWN = "?"
+
 
 @dataclass(frozen=True)
 class Kind:
-    """A type without sizes. Bases are those of values and, in addition, `int`, `float` and `str` for names that denote
-    literals, and PLAIN for indices computed from literals and loop variables alone, which are Python integers."""
+    """A type. Bases are those of values and, in addition, `int`, `float` and `str` for names that denote literals,
+    and PLAIN for indices computed from literals and loop variables alone, which are Python integers."""
 
     base: str
-    rank: int = 0
+    shape: Shape = ()
     parts: tuple[Kind, ...] = ()  # kinds of several results
 
+    @property
+    def rank(self) -> int:
+        return len(self.shape)
 
-def kind_of(annotation: ast.expr) -> Kind:
-    """The kind that an annotation declares."""
+
+def kind_of(annotation: ast.expr, sizes: Mapping[str, int] | None = None) -> Kind:
+    """The kind that an annotation declares. `sizes`: names of sizes that are known."""
     if isinstance(annotation, ast.Subscript) and isinstance(annotation.slice, ast.Tuple):  # tuple[f64, f64]
-        return Kind("tuple", 0, tuple(map(kind_of, annotation.slice.elts)))
+        return Kind("tuple", (), tuple(kind_of(part, sizes) for part in annotation.slice.elts))
     name, extents = split_type(annotation_text(annotation))
-    return Kind(name, len(extents))
+    return Kind(name, tuple(int(e) if e.isdigit() else (sizes or {}).get(e, e) for e in extents))
 
 
 def annotation_text(annotation: ast.expr) -> str:
@@ -54,6 +62,10 @@ class Names:
     functions: dict[str, tuple[list[Kind], Kind]]  # arguments and result
     constants: dict[str, Kind] = field(default_factory=dict)
     text: str = ""  # text of the file
+    values: dict[str, Any] = field(default_factory=dict)  # of all names, as far as they are known
+    parameters: Collection[str] = ()  # of an algorithm: those that an instance may freeze
+    #: Makers of library functions for classes of arguments, by name (library.py).
+    library: Mapping[str, Callable[..., Callable[..., Any]]] = field(default_factory=dict)
     #: Additional names in rewritten code: literals, and constants that denote literals, each with a type.
     literals: dict[str, Any] = field(default_factory=dict)
 
@@ -85,11 +97,11 @@ class Names:
 class Node:
     """An unknown scalar type, with the nodes of equal type."""
 
-    __slots__ = ("base", "index", "is_float", "near", "named")
+    __slots__ = ("base", "index", "is_float", "mixed", "named", "near")
 
     def __init__(self, base: str = "", is_float: bool = False, named: bool = False):
         self.base, self.is_float, self.named = base, is_float, named
-        self.index = False
+        self.index = self.mixed = False
         self.near: list[Node] = []
 
 
@@ -98,9 +110,13 @@ class Seen:
     """An expression: scalar type, dimensions, and whether it consists of literals only."""
 
     node: Node
-    rank: int = 0
+    shape: Shape = ()
     literal: bool = False
     parts: tuple[Kind, ...] = ()
+
+    @property
+    def rank(self) -> int:
+        return len(self.shape)
 
 
 _CONSTANTS = {"pi": Kind("float"), "inf": Kind("float"), "nan": Kind("float")}
@@ -134,12 +150,21 @@ class Inference:
                 group = _reached(seen.node)
                 done.update(map(id, group))
                 found = _base(group) or _default(group)
+                mixed = len({node.base for node in group if node.base}) > 1
                 for node in group:
-                    node.base = found
+                    node.base, node.mixed = found, mixed
 
     def kind(self, node: ast.expr) -> Kind:
         seen = self.seen[node]
-        return Kind(seen.node.base, seen.rank)
+        return Kind(seen.node.base, seen.shape)
+
+    def certain(self, node: ast.expr) -> Kind | None:
+        """The kind of an expression if all that it meets agrees on it, as in every program that the compiler
+        accepts."""
+        seen = self.seen.get(node)
+        if seen is None or seen.node.mixed or not all(isinstance(extent, int) for extent in seen.shape):
+            return None
+        return Kind(seen.node.base, seen.shape)
 
     def is_literal(self, node: ast.expr) -> bool:
         return node in self.seen and self.seen[node].literal
@@ -198,7 +223,7 @@ class Inference:
                 parts = [self.expr(part) for part in value.elts]
             else:
                 whole = self.expr(value)
-                rows = [Seen(whole.node, whole.rank - 1)] * len(target.elts)
+                rows = [Seen(whole.node, whole.shape[1:])] * len(target.elts)
                 parts = [_declared(kind) for kind in whole.parts] or rows
             for place, part in zip(target.elts, parts, strict=True):
                 self._bind(place, part)
@@ -207,9 +232,9 @@ class Inference:
 
     def _bind(self, target: ast.expr, value: Seen) -> None:
         if isinstance(target, ast.Name) and target.id not in self.locals:
-            self.locals[target.id] = Seen(Node(named=True), value.rank)
+            self.locals[target.id] = Seen(Node(named=True), value.shape)
             if value.node.base in self.names.members:
-                self.locals[target.id] = Seen(value.node, value.rank)
+                self.locals[target.id] = Seen(value.node, value.shape)
         place = self.locals[target.id] if isinstance(target, ast.Name) else self.expr(target)
         self._same(place, value)
 
@@ -231,12 +256,12 @@ class Inference:
         """Gives all operands one scalar type. The result has the largest number of dimensions."""
         for part in parts[1:]:
             _connect(parts[0].node, part.node)
-        return Seen(parts[0].node, max(part.rank for part in parts))
+        return Seen(parts[0].node, max((part.shape for part in parts), key=len))
 
     def _on_constant(self, node: ast.Constant) -> Seen:
         number = type(node.value) in (int, float)
         base = "bool" if type(node.value) is bool else ""
-        return Seen(Node(base, is_float=type(node.value) is float), 0, number)
+        return Seen(Node(base, is_float=type(node.value) is float), (), number)
 
     def _on_name(self, node: ast.Name) -> Seen:
         if node.id in self._loops:
@@ -244,10 +269,10 @@ class Inference:
             return Seen(Node())
         if node.id in self.locals:
             found = self.locals[node.id]
-            return Seen(found.node, found.rank)
+            return Seen(found.node, found.shape)
         kind = self.names.constants.get(node.id) or _CONSTANTS[node.id]
         if kind.base in ("int", "float"):
-            return Seen(Node(is_float=kind.base == "float"), 0, True)
+            return Seen(Node(is_float=kind.base == "float"), (), True)
         if kind.base == "str":
             return Seen(Node())
         return _declared(kind)
@@ -261,7 +286,24 @@ class Inference:
         base = self.expr(node.value)
         for part in parts:
             self._index(part)
-        return Seen(base.node, base.rank - sum(not isinstance(part, ast.Slice) for part in parts))
+        sliced = [self._extent(s, e) for s, e in zip(parts, base.shape, strict=False) if isinstance(s, ast.Slice)]
+        return Seen(base.node, (*sliced, *base.shape[len(parts) :]))
+
+    def _extent(self, part: ast.Slice, extent: int | str) -> int | str:
+        """The number of elements that a slice selects."""
+        bounds = [None if bound is None else self.value(bound) for bound in (part.lower, part.upper)]
+        known = all(bound is None or self.value(bound) is not None for bound in (part.lower, part.upper))
+        return len(range(extent)[slice(*bounds)]) if isinstance(extent, int) and known else UNKNOWN
+
+    def value(self, node: ast.expr) -> int | None:
+        """An integer that the source states: a literal, its negation, or a constant."""
+        if isinstance(node, ast.UnaryOp) and isinstance(node.op, ast.USub):
+            inner = self.value(node.operand)
+            return None if inner is None else -inner
+        found = node.value if isinstance(node, ast.Constant) else None
+        if isinstance(node, ast.Name) and self.names.is_constant(node) and node.id not in self.locals:
+            found = self.names.values.get(node.id)
+        return int(found) if isinstance(found, int) and type(found) is not bool else None
 
     def _index(self, node: ast.expr) -> None:
         """A subscript or a bound of a range."""
@@ -286,14 +328,14 @@ class Inference:
                 self._shifts.append((left.node, right.node))
             elif not right.literal:
                 left.node.named = True  # a 64-bit number: the count may be too large
-            return Seen(left.node, 0, literal)
+            return Seen(left.node, (), literal)
         found = self._same(left, right)
-        return Seen(found.node, found.rank, literal)
+        return Seen(found.node, found.shape, literal)
 
     def _power(self, base: Seen, node: ast.expr, exponent: Seen) -> Seen:
         if exponent.literal and not any(n.is_float for n in _reached(exponent.node)):
             exponent.node.index = True
-            return Seen(base.node, 0, base.literal)
+            return Seen(base.node, (), base.literal)
         self._powers.append((base.node, exponent.node))
         return Seen(base.node)
 
@@ -310,15 +352,15 @@ class Inference:
         self.expr(node.test)
         then, other = self.expr(node.body), self.expr(node.orelse)
         if then.node.base in self.names.members:
-            return Seen(then.node, then.rank)
+            return Seen(then.node, then.shape)
         return self._same(then, other)
 
     def _on_list(self, node: ast.List) -> Seen:
         items = [self.expr(item) for item in node.elts]
         first = items[0]
         if first.node.base in self.names.members:
-            return Seen(first.node, first.rank + 1)
-        return Seen(self._same(*items).node, first.rank + 1)
+            return Seen(first.node, (len(items), *first.shape))
+        return Seen(self._same(*items).node, (len(items), *first.shape))
 
     def _on_call(self, node: ast.Call) -> Seen:
         assert isinstance(node.func, ast.Name)
@@ -335,11 +377,12 @@ class Inference:
             wanted, result = self.names.functions[name]
             for kind, seen in zip(wanted, given, strict=False):
                 self._same(_declared(kind), seen)
-            return _declared(result)
+            return _declared(_bound(result, wanted, given))
         if name in ("zeros", "eye"):
             for seen in given:
                 seen.node.index = True
-            return Seen(Node("f64"), len(given) if name == "zeros" else 2)
+            sizes = [UNKNOWN if size is None else size for size in map(self.value, node.args)]
+            return Seen(Node("f64"), tuple(sizes if name == "zeros" else sizes * 2))
         if name == "len":
             self.variables.add(node)
             return Seen(Node())
@@ -349,7 +392,7 @@ class Inference:
         operand.node.is_float |= name not in ON_INTEGERS
         if name in PREDICATES:
             return Seen(Node("bool"))
-        return Seen(operand.node, 0, name == "sqrt" and given[0].literal)
+        return Seen(operand.node, (), name == "sqrt" and given[0].literal)
 
     def _conversion(self, name: str, given: Seen) -> Seen:
         """`f32(0.1)` is a literal of that type; `i32(3.7)` converts a literal."""
@@ -362,7 +405,15 @@ class Inference:
 
 
 def _declared(kind: Kind) -> Seen:
-    return Seen(Node(kind.base, named=True), kind.rank, parts=kind.parts)
+    return Seen(Node(kind.base, named=True), kind.shape, parts=kind.parts)
+
+
+def _bound(result: Kind, wanted: list[Kind], given: list[Seen]) -> Kind:
+    """The result of a function with the sizes that its arguments have."""
+    sizes: dict[int | str, int | str] = {}
+    for kind, seen in zip(wanted, given, strict=False):
+        sizes |= zip(kind.shape, seen.shape, strict=False)
+    return replace(result, shape=tuple(e if isinstance(e, int) else sizes.get(e, e) for e in result.shape))
 
 
 def _connect(one: Node, other: Node) -> None:

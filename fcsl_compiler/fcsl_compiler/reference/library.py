@@ -1,44 +1,41 @@
 # SPDX-License-Identifier: Apache-2.0
-"""The numeric library: the compiler's sources (library/*.py) after the same rewrite as for algorithms.
+"""The numeric library: the compiler's sources (library/*.py).
 
-A function is generic in the sizes of its arguments. Each combination of sizes gets a separate function whose globals
-bind the size variables.
+A function is generic in the sizes of its arguments. Each combination of classes of arguments gets a function of its
+own: without loops (unroll.py) or, for large arrays, after the same rewrite as for algorithms.
 """
 
 from __future__ import annotations
 
 import ast
-import operator
-from collections.abc import Callable, Collection, Mapping
+from collections.abc import Callable, Collection, Mapping, Sequence
 from dataclasses import replace
-from functools import cache, reduce
+from functools import cache, partial
 from pathlib import Path
-from types import FunctionType
 from typing import Any
 
 from .annotations import split_type
 from .arrays import Array
 from .infer import SELF, Kind, Names, annotation_text, kind_of
+from .products import large_product
 from .rewrite import Rewriter
 from .runtime import runtime
+from .unroll import PRODUCTS, Classes, TooLarge, unrolled
 from .values import IllTyped
-
-#: Functions that omit products with zeros of a constant array.
-_PRODUCTS = ("matmul", "matvec", "symmetric_product")
 
 #: Arguments and result of every function of a file.
 Signatures = dict[str, tuple[list[Kind], Kind]]
 
 
-def signature(node: ast.FunctionDef) -> tuple[list[Kind], Kind]:
+def signature(node: ast.FunctionDef, sizes: Mapping[str, int] | None = None) -> tuple[list[Kind], Kind]:
     """Kinds of the arguments and the result as annotated. A function without result has Kind("None")."""
-    arguments = [kind_of(a.annotation) for a in node.args.args if a.annotation is not None]
-    return arguments, kind_of(node.returns) if node.returns is not None else Kind("None")
+    arguments = [kind_of(a.annotation, sizes) for a in node.args.args if a.annotation is not None]
+    return arguments, kind_of(node.returns, sizes) if node.returns is not None else Kind("None")
 
 
 def define(node: ast.FunctionDef, names: Names, extra: Mapping[str, Kind]) -> ast.FunctionDef:
     """The rewritten function without annotations. `extra`: additional constants it can use."""
-    arguments, result = signature(node)
+    arguments, result = names.functions[node.name]
     known = {a.arg: kind for a, kind in zip(node.args.args, arguments, strict=True)}
     rewriter = Rewriter(
         replace(names, constants={**names.constants, **extra}), known, result if result.base != "None" else None
@@ -62,65 +59,92 @@ def execute(body: list[ast.stmt], path: str, namespace: dict[str, Any]) -> None:
     exec(compile(tree, path, "exec"), namespace)
 
 
-@cache
-def library() -> tuple[dict[str, Any], Signatures]:
-    """All library functions by name, and their signatures."""
-    paths = sorted((Path(__file__).parent.parent / "library").glob("*.py"))
-    files = {path: path.read_text("utf-8") for path in paths}
-    found = [(path, n) for path, text in files.items() for n in ast.parse(text).body if isinstance(n, ast.FunctionDef)]
-    signatures: Signatures = {f.name: signature(f) for _, f in found}
-    shared = runtime({})
-    functions: dict[str, Any] = {}
-    for path, node in found:
-        patterns = [annotation_text(a.annotation) for a in node.args.args if a.annotation is not None]
-        sizes = {e for pattern in patterns for e in split_type(pattern)[1] if not e.isdigit()}
-        names = Names({}, signatures, text=files[path])
+class Library:
+    """All library functions. `functions` are generic; `signatures` are theirs."""
+
+    def __init__(self) -> None:
+        paths = sorted((Path(__file__).parent.parent / "library").glob("*.py"))
+        files = {path: path.read_text("utf-8") for path in paths}
+        found = [
+            (path, n) for path, text in files.items() for n in ast.parse(text).body if isinstance(n, ast.FunctionDef)
+        ]
+        self._nodes = {node.name: node for _, node in found}
+        self._files = {node.name: path for path, node in found}
+        self._texts = files
+        self._names = runtime({})
+        self._made: dict[tuple[str, Classes, bool], Callable[..., Any]] = {}
+        self.signatures: Signatures = {name: signature(node) for name, node in self._nodes.items()}
+        self.functions: dict[str, Callable[..., Any]] = {name: self._generic(name) for name in self._nodes}
+        self._names.update(self.functions)
+
+    def makers(self) -> dict[str, Callable[..., Callable[..., Any]]]:
+        """By name, what returns a function for the classes of its arguments."""
+        return {name: lambda *classes, name=name: self._function(name, classes) for name in self._nodes}
+
+    def _generic(self, name: str) -> Callable[..., Any]:
+        """The function for any sizes."""
+        special: dict[Classes, Callable[..., Any]] = {}
+
+        def call(*args: Any) -> Any:
+            classes = tuple(map(type, args))
+            found = special.get(classes)
+            if found is None:
+                found = special[classes] = self._function(name, classes)
+            return found(*args)
+
+        return call
+
+    def _function(self, name: str, classes: Classes, plain: bool = False) -> Callable[..., Any]:
+        """The function for arguments of these classes, made at its first use. `plain`: of numbers in the place of
+        arrays."""
+        key = name, classes, plain
+        if key not in self._made:
+            shapes = [cls.shape if issubclass(cls, Array) else () for cls in classes]
+            sizes = _bind(name, [split_type(pattern)[1] for pattern in self._patterns(name)], shapes)
+            try:
+                self._made[key] = self._unrolled(name, classes, plain)
+            except TooLarge:
+                if plain:
+                    raise
+                self._made[key] = self._with_loops(name, classes, sizes)
+        return self._made[key]
+
+    def _patterns(self, name: str) -> list[str]:
+        return [annotation_text(a.annotation) for a in self._nodes[name].args.args if a.annotation is not None]
+
+    def _unrolled(self, name: str, classes: Classes, plain: bool) -> Callable[..., Any]:
+        node, needed = unrolled(name, classes, self._nodes, self._separate, plain=plain)
+        namespace = {**self._names, **needed}
+        execute([node], str(self._files[name]), namespace)
+        function: Callable[..., Any] = namespace[name]
+        return function
+
+    def _separate(self, name: str, classes: Classes) -> str:
+        label = f"fcsl.{name} {[(cls.__name__, getattr(cls, 'zeros', None)) for cls in classes]}"
+        self._names[label] = self._function(name, classes, plain=True)
+        return label
+
+    def _with_loops(self, name: str, classes: Classes, sizes: Mapping[str, int]) -> Callable[..., Any]:
+        """The function as it is written, for arrays that are too large."""
+        if name in PRODUCTS:
+            return partial(large_product, symmetric=name == "symmetric_product")
+        node, path = self._nodes[name], self._files[name]
+        namespace, known = {**self._names, **sizes}, {**self.signatures, name: signature(self._nodes[name], sizes)}
+        names = Names({}, known, text=self._texts[path], values=namespace, library=self.makers())
         made = define(node, names, {size: Kind("int") for size in sizes})
-        shared.update(names.literals)
-        execute([made], str(path), shared)
-        functions[node.name] = shared[node.name] = _generic(shared[node.name], patterns)
-    return functions, signatures
+        namespace.update(names.literals)
+        execute([made], str(path), namespace)
+        function: Callable[..., Any] = namespace[name]
+        constant = name == "transpose" and classes[0].zeros is not None
+        return (lambda a: function(a).as_constant()) if constant else function
 
 
-def _generic(function: FunctionType, patterns: list[str]) -> Callable[..., Any]:
-    """The function for the sizes of its arguments, created at the first call."""
-    extents = [split_type(pattern)[1] for pattern in patterns]
-    special: dict[tuple[tuple[int, ...], ...], FunctionType] = {}
-
-    def call(*args: Any) -> Any:
-        if function.__name__ in _PRODUCTS and any(arg.constant for arg in args):
-            return _skipping_zeros(*args, symmetric=function.__name__ == "symmetric_product")
-        shapes = tuple([arg.shape if type(arg) is Array else () for arg in args])
-        found = special.get(shapes)
-        if found is None:
-            sizes = _bind(function.__name__, extents, shapes)
-            found = special[shapes] = FunctionType(function.__code__, {**function.__globals__, **sizes})
-        result = found(*args)
-        return result.as_constant() if function.__name__ == "transpose" and args[0].constant else result
-
-    return call
+@cache
+def library() -> Library:
+    return Library()
 
 
-def _skipping_zeros(a: Array, b: Array, *, symmetric: bool) -> Array:
-    """matmul, matvec or symmetric_product with a constant argument: products with its zeros are omitted; an empty sum
-    is 0."""
-    (rows, inner), columns = a.shape, b.shape[1:]
-    width = columns[0] if columns else 1
-    if b.shape[0] != inner or symmetric and width != rows:
-        raise IllTyped(f"a product of arrays with shapes {a.shape} and {b.shape}")
-    data: list[Any] = []
-    for i in range(rows):
-        for j in range(width):
-            if symmetric and j < i:
-                data.append(data[j * width + i])
-                continue
-            pairs = [(a.data[i * inner + p], b.data[p * width + j]) for p in range(inner)]
-            products = [x * y for x, y in pairs if not (a.constant and x == 0.0 or b.constant and y == 0.0)]
-            data.append(reduce(operator.add, products) if products else 0.0)
-    return Array(a.type, (rows, *columns), data)
-
-
-def _bind(name: str, extents: list[list[str]], shapes: tuple[tuple[int, ...], ...]) -> dict[str, int]:
+def _bind(name: str, extents: list[list[str]], shapes: Sequence[tuple[int, ...]]) -> dict[str, int]:
     """Sizes that match the declared shapes. Raises IllTyped."""
     sizes: dict[str, int] = {}
     for declared, shape in zip(extents, shapes, strict=True):

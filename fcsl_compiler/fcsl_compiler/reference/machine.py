@@ -15,151 +15,157 @@ fault places, of which only the numbers are taken. Of the machine only the wirin
 from __future__ import annotations
 
 import json
-import struct
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any
+from typing import Any, Protocol
 
 from ..model.machine import Channel, Connection, Edge, Instance, Machine, PortRef, State
 from .algorithm import HARDWARE, Algorithm, Extern, SourceModule, declare_structs
 from .arrays import Array
 from .fault_places import FaultPlaces, Place
 from .functions import wrap
-from .memory import HEALTH, Layout, Memory, RecordCodec, codec, from_json
-from .structs import Struct
-from .types import SCALARS, Type
+from .memory import HEALTH, Image, Layout, Leaf, Memory, Movers, from_json, leaves
+from .structs import Struct, slot
+from .types import SCALARS, Scalar, Type
 from .values import I64, Fault
 
-_I32, _U32, _U64 = struct.Struct("=i"), struct.Struct("=I"), struct.Struct("=Q")
-_NONE = -1
-_STALE = HEALTH.index("stale")
+_NONE, _LONG = -1, 2**64 - 1
+_NOMINAL, _DEGRADED, _FAILED, _STALE = range(len(HEALTH))
+
+
+class Offered(Protocol):
+    """What `step` may use of its host (fcsl_host_t): a monotonic clock (ns); callables for the hardware builtins, by
+    name; and `substitute`, called before an impure instance executes. It returns True if it has stored the results of
+    this execute itself."""
+
+    @property
+    def clock_ns(self) -> Callable[[], int] | None: ...
+    @property
+    def hardware(self) -> Mapping[str, Callable[..., Any]] | None: ...
+    @property
+    def substitute(self) -> Callable[[int], bool] | None: ...
 
 
 @dataclass
 class Host:
-    """What `step` may use of its host (fcsl_host_t): a monotonic clock (ns); callables for the hardware builtins, by
-    name; and `substitute`, called before an impure instance executes. It returns True if it has stored the results of
-    this execute itself."""
+    """A host that offers these."""
 
     clock_ns: Callable[[], int] | None = None
     hardware: Mapping[str, Callable[..., Any]] | None = None
     substitute: Callable[[int], bool] | None = None
 
 
-class _Cell:
-    """One number of the machine struct."""
-
-    def __init__(self, one: struct.Struct, offset: int):
-        self.one, self.offset = one, offset
-
-    def get(self, memory: Memory) -> int:
-        return int(self.one.unpack_from(memory, self.offset)[0])
-
-    def set(self, memory: Memory, value: int) -> None:
-        self.one.pack_into(memory, self.offset, value)
-
-    def increment(self, memory: Memory) -> None:
-        self.set(memory, (self.get(memory) + 1) % 2**64)
+def _cell(path: str, layout: Layout, size: int) -> int:
+    """Number of a cell of `size` bytes."""
+    return layout[path] // size
 
 
-def _optional(path: str, layout: Layout) -> _Cell | None:
-    """A counter that only machines have that need it."""
-    return _Cell(_U64, layout[path]) if path in layout else None
+def _optional(path: str, layout: Layout) -> int | None:
+    """Number of a 64-bit cell that only machines have that need it."""
+    return _cell(path, layout, 8) if path in layout else None
 
 
 class _Instance:
-    """One instance: its algorithm and the locations of its records."""
+    """One instance: its algorithm, and `self`, into which each execute loads what the memory holds."""
 
     def __init__(self, instance: Instance, algorithm: Algorithm, given: Mapping[str, Any], reference: ReferenceMachine):
         self.name, self.algorithm, layout = instance.name, algorithm, reference.layout
-        self.limit_ns = instance.max_wcet_us * 1000
-        self.codecs = {
-            record: RecordCodec(type_, f"{self.name}.{record}", layout, reference.machine.requests)
-            for record, type_ in algorithm.records.items()
-        }
-        self.initial = {
-            record: {n: from_json(algorithm.records[record].members[n], v) for n, v in given.get(record, {}).items()}
-            for record in ("parameters", "inputs")
-        }
-        self.frozen = {name: _constant(self.initial["parameters"][name]) for name in instance.frozen}
-        self.health = _Cell(_I32, layout[f"{self.name}.outputs.health"])
-        self.request = _Cell(_I32, layout[f"{self.name}.outputs.transition_request"])
-        self.faults = _Cell(_U64, layout[f"{self.name}.counters.faults"])
-        self.fault_place = _Cell(_U32, layout[f"{self.name}.counters.fault_place"])
-        self.places = reference.places
-        self.overruns = _Cell(_U64, layout[f"{self.name}.counters.overruns"])
+        self.limit_ns, self.places = instance.max_wcet_us * 1000, reference.places
+        self.given, self.frozen = given, frozenset(instance.frozen)
+        self.self_ = self._initial()
+        self.health, self.request = (
+            _cell(f"{self.name}.outputs.{port}", layout, 4) for port in ("health", "transition_request")
+        )
+        self.faults, self.overruns = (_cell(f"{self.name}.counters.{n}", layout, 8) for n in ("faults", "overruns"))
+        self.fault_place = _cell(f"{self.name}.counters.fault_place", layout, 4)
         self.inject_overrun = layout.get(f"{self.name}.inject_overrun", -1)
         self.inject_fault = layout[f"{self.name}.inject_fault"]
         self.last_run = _optional(f"{self.name}.counters.last_run", layout)
+        own = {record: list(self._leaves(record, layout)) for record in algorithm.records}
+        written = [*own["outputs"], *own["state"]]
+        if "transition_request" not in algorithm.records["outputs"].members:
+            written.append(Leaf(layout[f"{self.name}.outputs.transition_request"], SCALARS["i32"], "0"))
+        self.store_inputs = reference.movers.storer(own["inputs"])
+        self.store_parameters = reference.movers.storer(own["parameters"])
+        self.store = reference.movers.storer(written)
+        self.load = self._loader(own, reference)
+        self._load_for_start = reference.movers.loader([*own["parameters"], *own["outputs"], *own["state"]])
 
-    def init(self, memory: Memory) -> None:
-        for record, values in self.initial.items():
-            whole = self.algorithm.records[record].zero()
-            for name, value in values.items():
-                setattr(whole, name, value)
-            self.codecs[record].write(memory, whole)
-        self.health.set(memory, _STALE)
+    def _initial(self) -> Struct:
+        """`self` before init: values of the JSON and zeros. Frozen parameters are constants."""
+        made = self.algorithm.type.zero()
+        for name, value in self.given.items():
+            stored = from_json(self.algorithm.type.members[name], value)
+            setattr(made, slot(name), _constant(stored) if name in self.frozen else stored)
+        return made
 
-    def _self(self, memory: Memory) -> Struct:
-        """`self` of a method: the ports of all four records as fields."""
-        values: dict[str, Any] = {}
-        for codec_ in self.codecs.values():
-            values |= codec_.values(memory)
-        return self.algorithm.type.of(values | self.frozen)
+    def _leaves(self, record: str, layout: Layout) -> Iterator[Leaf]:
+        for name, type_ in self.algorithm.records[record].members.items():
+            yield from leaves(type_, f"s.{slot(name)}", f"{self.name}.{record}.{name}", layout)
 
-    def start(self, memory: Memory) -> bool:
+    def _loader(self, own: Mapping[str, list[Leaf]], reference: ReferenceMachine) -> Callable[[Any, Memory], None]:
+        """Loads the ports. A connected input comes from its source. Health and request are cleared."""
+        skipped = {f"s.{slot(name)}" for name in (*self.frozen, "health", "transition_request")}
+        connected, given = reference.connected(self.name)
+        self.is_connected = bool(connected or given)
+        skipped |= {leaf.place for leaf in connected} | given.keys()
+        wanted = [leaf for record in own.values() for leaf in record if leaf.place not in skipped]
+        pulses = {f"s.{slot('health')}": "nominal"}
+        if "transition_request" in self.algorithm.records["outputs"].members:
+            pulses[f"s.{slot('transition_request')}"] = ""
+        return reference.movers.loader([*wanted, *connected], given | pulses)
+
+    def init(self, image: Image) -> None:
+        self.self_ = self._initial()
+        self.store_inputs(self.self_, image.bytes)
+        self.store_parameters(self.self_, image.bytes)
+        image.words[self.health] = _STALE
+
+    def start(self, image: Image) -> bool:
         """Runs start. Returns False if it faulted."""
         if not self.algorithm.has_start:
             return True
-        self_ = self._self(memory)
+        self._load_for_start(self.self_, image.bytes)
         try:
-            self.algorithm.run("start", self_)
+            self.algorithm.run("start", self.self_)
         except Fault as fault:
-            self.fault_place.set(memory, self.places.number(fault))
+            image.naturals[self.fault_place] = self.places.number(fault)
             return False
-        self._write(memory, self_)
-        self.health.set(memory, _STALE)  # health and request set in `start` have no effect
-        self.request.set(memory, 0)
+        self.store(self.self_, image.bytes)
+        image.words[self.health] = _STALE  # health and request set in `start` have no effect
+        image.words[self.request] = 0
         return True
 
-    def execute(self, memory: Memory) -> None:
-        """Runs execute once. A fault, also an injected one, leaves outputs and state unchanged."""
-        self.request.set(memory, 0)
-        self.health.set(memory, HEALTH.index("nominal"))
-        inject, memory[self.inject_fault] = memory[self.inject_fault], 0
+    def execute(self, image: Image) -> None:
+        """Runs execute once, on what is loaded. A fault, also an injected one, leaves outputs and state unchanged."""
+        self_, inject = self.self_, image.bytes[self.inject_fault]
+        if inject:
+            image.bytes[self.inject_fault] = 0
         if inject == 1:
-            self._failed(memory, self.places.injected)
+            self._failed(image, self.places.injected)
             return
-        self._run(memory)
-        if inject > 1:
-            least = HEALTH.index("failed" if inject > 2 else "degraded")
-            self.health.set(memory, max(self.health.get(memory), least))
-
-    def _run(self, memory: Memory) -> None:
-        self_ = self._self(memory)
         try:
-            self.algorithm.run("execute", self_)
+            self.algorithm.execute(self_)
         except Fault as fault:
-            self._failed(memory, self.places.number(fault))
+            self._failed(image, self.places.number(fault))
             return
-        self._write(memory, self_)
-        if self.health.get(memory) == _STALE:  # a running instance is not stale
-            self.health.set(memory, HEALTH.index("failed"))
+        self.store(self_, image.bytes)
+        if image.words[self.health] == _STALE:  # a running instance is not stale
+            image.words[self.health] = _FAILED
+        if inject > 1:
+            image.words[self.health] = max(image.words[self.health], _FAILED if inject > 2 else _DEGRADED)
 
-    def _failed(self, memory: Memory, place: int) -> None:
-        self.health.set(memory, HEALTH.index("failed"))
-        self.faults.increment(memory)
-        self.fault_place.set(memory, place)
-
-    def _write(self, memory: Memory, self_: Struct) -> None:
-        for record in ("outputs", "state"):
-            self.codecs[record].write(memory, self_)
+    def _failed(self, image: Image, place: int) -> None:
+        image.words[self.request] = 0
+        image.words[self.health] = _FAILED
+        image.longs[self.faults] = image.longs[self.faults] + 1 & _LONG
+        image.naturals[self.fault_place] = place
 
 
 def _constant(value: Any) -> Any:
     """A frozen parameter as an array constant."""
-    return value.as_constant() if type(value) is Array else value
+    return value.as_constant() if isinstance(value, Array) else value
 
 
 class _Sensor:
@@ -168,26 +174,51 @@ class _Sensor:
     def __init__(self, channel: Channel, layout: Layout):
         path = f"channels.{channel.name}"
         self.instance, self.limit = channel.port.instance, channel.max_age_ticks
-        self.attached, self.fresh = layout[f"{path}.attached"], layout[f"{path}.fresh"]
-        self.valid, self.age = layout[f"{path}.valid"], _Cell(_U32, layout[f"{path}.age_ticks"])
-        self.sample_age = _Cell(_U32, layout[f"{path}.sample_age"])
+        self.attached, self.fresh, self.valid = (layout[f"{path}.{name}"] for name in ("attached", "fresh", "valid"))
+        self.age, self.sample_age = (_cell(f"{path}.{name}", layout, 4) for name in ("age_ticks", "sample_age"))
         self.last_sample = _optional(f"{path}.last_sample", layout)
 
-    def advance(self, memory: Memory, tick: int) -> None:
-        age = self.age.get(memory)
-        if memory[self.fresh]:
-            memory[self.fresh] = 0
-            age = self.sample_age.get(memory)
-            memory[self.valid] = 1
+    def advance(self, image: Image, tick: int) -> None:
+        age = image.naturals[self.age]
+        if image.bytes[self.fresh]:
+            image.bytes[self.fresh] = 0
+            age = image.naturals[self.sample_age]
+            image.bytes[self.valid] = 1
             if self.last_sample is not None:
-                self.last_sample.set(memory, tick + 1)
-        elif memory[self.attached] and age < 2**32 - 1:
+                image.longs[self.last_sample] = tick + 1
+        elif image.bytes[self.attached] and age < 2**32 - 1:
             age += 1
         else:
             return
-        self.age.set(memory, age)
+        image.naturals[self.age] = age
         if self.limit is not None:
-            memory[self.valid] = age <= self.limit
+            image.bytes[self.valid] = age <= self.limit
+
+
+class _State:
+    """What a tick of a state does: entries in order, and edges, the highest priority first."""
+
+    def __init__(self, number: int, state: State, edges: Sequence[Edge], instances: Sequence[_Instance]):
+        self.scheduled = frozenset(entry.instance for entry in state.entries)
+        self.divisors = {entry.instance: entry.divisor for entry in state.entries}
+        self.edges = sorted((e for e in edges if e.source == number), key=lambda e: e.priority, reverse=True)
+        self._entries = [(entry.instance, entry.divisor, entry.phase) for entry in state.entries]
+        at_once = all(divisor == 1 for divisor in self.divisors.values())
+        self._always = [entry.instance for entry in state.entries] if at_once else None
+        #: Span number of each timed instance. Consecutive timed instances share clock readings: the end of one is the
+        #: beginning of the next.
+        self.spans: dict[int, int] = {}
+        for before, entry in zip((None, *state.entries), state.entries, strict=False):
+            if instances[entry.instance].limit_ns:
+                self.spans[entry.instance] = (
+                    self.spans.get(before.instance, entry.instance) if before else entry.instance
+                )
+
+    def due(self, tick: int) -> list[int]:
+        """The instances that run in a tick, in order."""
+        if self._always is not None:
+            return self._always
+        return [instance for instance, divisor, phase in self._entries if tick % divisor == phase]
 
 
 class ReferenceMachine:
@@ -203,25 +234,28 @@ class ReferenceMachine:
         places: Sequence[Place],
         externs: Callable[[Extern], Callable[..., Any]] | None = None,
     ):
-        self.machine, self.layout, self.host = machine, layout, Host()
-        self.places = FaultPlaces(places, machine.sources)
+        self.machine, self.layout = machine, layout
+        self.host: Offered = Host()
+        self.places, self.movers = FaultPlaces(places, machine.sources), Movers(layout, machine.requests)
+        self._image = Image(bytearray())
+        self._tick, self._ticks_in_state = _cell("machine.tick", layout, 8), _optional("machine.ticks_in_state", layout)
+        self._state, self._next = (_cell(f"machine.{name}", layout, 4) for name in ("state", "next_state"))
+        self._current = _cell("machine.current", layout, 4)
         config = json.loads(machine.config.text)
-        algorithms = self._load(config, externs)
-        self._instances = [
-            _Instance(i, algorithms[i.algorithm.name], config["instances"][i.name], self) for i in machine.instances
-        ]
-        initial = {tuple(c["to"].split(".")): c["initial"] for c in config.get("connections", []) if c.get("delayed")}
+        self._algorithms = self._load(config, externs)
         self._sensors = {c.name: _Sensor(c, layout) for c in machine.channels if c.direction == "sensor"}
-        self._delayed = [self._copier(c) for c in machine.connections if c.delayed]
-        self._direct = [self._copier(c) for c in machine.connections if not c.delayed]
-        own = {i.name for i in machine.instances}  # a subset machine lacks some instances of the JSON text
-        inputs = {to: f"{to[0]}.inputs.{to[1]}" for to in initial if to[0] in own}
-        self._initial = [(path, self._input(path), initial[to]) for to, path in inputs.items()]
-        self._tick = _Cell(_U64, layout["machine.tick"])
-        self._state, self._next = _Cell(_I32, layout["machine.state"]), _Cell(_I32, layout["machine.next_state"])
-        self._current = _Cell(_I32, layout["machine.current"])
-        self._ticks_in_state = _optional("machine.ticks_in_state", layout)
-        self._spans = {state.name: self._timed_spans(state) for state in machine.states}
+        self._instances: list[_Instance] = []
+        delayed = [c for c in config.get("connections", []) if c.get("delayed")]
+        for instance in machine.instances:
+            written = config["instances"][instance.name]
+            given = {**written.get("parameters", {}), **written.get("inputs", {})}
+            given |= {
+                c["to"].partition(".")[2]: c["initial"] for c in delayed if c["to"].startswith(f"{instance.name}.")
+            }
+            self._instances.append(_Instance(instance, self._algorithms[instance.algorithm.name], given, self))
+        self._sensors_of = [[s for s in self._sensors.values() if s.instance == i] for i in range(len(self._instances))]
+        self._states = [_State(n, s, machine.edges, self._instances) for n, s in enumerate(machine.states)]
+        self._delayed = [(c.target.instance, self._copies(c)) for c in machine.connections if c.delayed]
         self._read_span: int | None = None  # span of this tick whose clock reading is current
         self._now_ns = 0
 
@@ -272,184 +306,218 @@ class ReferenceMachine:
 
     # ---- connections -----------------------------------------------------------------------------------------------
 
-    def _input(self, to: str) -> Type:
-        instance, _, field = to.split(".", 2)
-        index = [i.name for i in self._instances].index(instance)
-        return self._instances[index].algorithm.records["inputs"].members[field]
-
-    def _copier(self, connection: Connection) -> tuple[int, Callable[[Memory], None]]:
-        """The target's instance, and the function that copies the value."""
+    def connected(self, target: str) -> tuple[list[Leaf], dict[str, Any]]:
+        """Inputs of an instance that are copied before each execute: leaves of their sources with the places of the
+        inputs; and, by place, values and functions for those that no field holds."""
+        found, given = list[Leaf](), dict[str, Any]()
         names = [i.name for i in self.machine.instances]
-        target, source = connection.target, connection.source
-        to = f"{names[target.instance]}.inputs.{target.path}"
-        type_ = self._input(to)
-        write = codec(type_, to, self.layout, self.machine.requests).write
-        if source.instance >= 0:
-            path = f"{names[source.instance]}.{source.record}.{source.path}"
-            read = codec(type_, path, self.layout, self.machine.requests).read
-        else:
-            read = self._channel_source(source, target) if source.members else self._machine_source(source, target)
-        return target.instance, lambda memory: write(memory, read(memory))
+        for connection in self.machine.connections:
+            to, source = connection.target, connection.source
+            if connection.delayed or names[to.instance] != target:
+                continue
+            place, type_ = f"s.{slot(to.path)}", self._input(to)
+            if source.instance >= 0:
+                path = f"{names[source.instance]}.{source.record}.{source.path}"
+                found += leaves(type_, place, path, self.layout)
+            else:
+                assert isinstance(type_, Scalar)
+                value = self._channel_source(source, to) if source.members else self._machine_source(source, to)
+                given[place] = _typed(value, type_)
+        return found, given
 
-    def _machine_source(self, source: PortRef, target: PortRef) -> Callable[[Memory], Any]:
+    def _input(self, target: PortRef) -> Type:
+        algorithm = self._algorithms[self.machine.instances[target.instance].algorithm.name]
+        return algorithm.records["inputs"].members[target.path]
+
+    def _copies(self, connection: Connection) -> list[tuple[slice, slice]]:
+        """Bytes of the input of a delayed connection, and those of its source."""
+        names, to, source = [i.name for i in self.machine.instances], connection.target, connection.source
+        paths = f"{names[to.instance]}.inputs.{to.path}", f"{names[source.instance]}.{source.record}.{source.path}"
+        found, wanted = (list(leaves(self._input(to), "", path, self.layout)) for path in paths)
+        return [(slice(a.offset, a.end), slice(b.offset, b.end)) for a, b in zip(found, wanted, strict=True)]
+
+    def _machine_source(self, source: PortRef, target: PortRef) -> Any:
+        """The value of `machine.<field>`, or the function that returns it."""
         hz, receiver = self.machine.tick_hz, target.instance
-        divisors = [{e.instance: e.divisor for e in state.entries} for state in self.machine.states]
 
-        def elapsed(memory: Memory) -> float:
+        def period() -> float:
+            return self._states[self._image.words[self._state]].divisors[receiver] / hz
+
+        def resumed() -> bool:
+            return self._image.words[self._instances[receiver].health] == _STALE
+
+        def elapsed() -> float:
             last_run = self._instances[receiver].last_run
             assert last_run is not None
-            if sources["resumed"](memory):
-                return float(sources["period"](memory))
-            return (self._tick.get(memory) + 1 - last_run.get(memory)) / hz
+            if resumed():
+                return period()
+            return (self._image.longs[self._tick] + 1 - self._image.longs[last_run]) / hz
 
-        def ticks_in_state(memory: Memory) -> int:
+        def ticks_in_state() -> int:
             assert self._ticks_in_state is not None
-            return self._ticks_in_state.get(memory)
+            return self._image.longs[self._ticks_in_state]
 
-        sources: dict[str, Callable[[Memory], Any]] = {
-            "dt": lambda memory: 1.0 / hz,
-            "time_ns": lambda memory: wrap(I64, self._tick.get(memory) * 1_000_000_000 // hz),
-            "tick": lambda memory: self._tick.get(memory),
-            "period": lambda memory: divisors[self._state.get(memory)][receiver] / hz,
+        sources: dict[str, Any] = {
+            "dt": 1.0 / hz,
+            "time_ns": lambda: wrap(I64, self._image.longs[self._tick] * 1_000_000_000 // hz),
+            "tick": lambda: self._image.longs[self._tick],
+            "period": period,
             "elapsed": elapsed,
-            "resumed": lambda memory: self._instances[receiver].health.get(memory) == _STALE,
+            "resumed": resumed,
             "ticks_in_state": ticks_in_state,
         }
         return sources[source.field]
 
-    def _channel_source(self, source: PortRef, target: PortRef) -> Callable[[Memory], Any]:
-        sensor, receiver = self._sensors[source.field], self._instances[target.instance]
+    def _channel_source(self, source: PortRef, target: PortRef) -> Callable[[], Any]:
+        sensor, receiver = self._sensors[source.field], target.instance
 
-        def fresh(memory: Memory) -> bool:
-            assert sensor.last_sample is not None and receiver.last_run is not None
-            return sensor.last_sample.get(memory) > receiver.last_run.get(memory)
+        def fresh() -> bool:
+            last_run = self._instances[receiver].last_run
+            assert sensor.last_sample is not None and last_run is not None
+            return self._image.longs[sensor.last_sample] > self._image.longs[last_run]
 
-        sources: dict[str, Callable[[Memory], Any]] = {
-            "valid": lambda memory: memory[sensor.valid] != 0,
-            "age_ticks": lambda memory: sensor.age.get(memory),
+        sources: dict[str, Callable[[], Any]] = {
+            "valid": lambda: self._image.bytes[sensor.valid] != 0,
+            "age_ticks": lambda: self._image.naturals[sensor.age],
             "fresh": fresh,
         }
         return sources[source.members[0]]
 
     # ---- the three entries -----------------------------------------------------------------------------------------
 
+    def _image_of(self, memory: Memory) -> Image:
+        if memory is not self._image.memory:
+            self._image = Image(memory)
+        return self._image
+
     def init(self, memory: Memory) -> int:
         """Zeroes the memory, binds values, runs every start in JSON order. Returns 0, or 1 + the index of the instance
         that faulted."""
-        memory[:] = bytes(len(memory))
-        self._current.set(memory, _NONE)
-        self._state.set(memory, self.machine.initial_state)
-        self._next.set(memory, self.machine.initial_state)
+        image = self._image_of(memory)
+        image.bytes[:] = bytes(len(image.bytes))
+        image.words[self._current] = _NONE
+        image.words[self._state] = image.words[self._next] = self.machine.initial_state
         for instance in self._instances:
-            instance.init(memory)
-        for to, type_, value in self._initial:
-            codec(type_, to, self.layout, self.machine.requests).write(memory, from_json(type_, value))
+            instance.init(image)
         for sensor in self._sensors.values():
-            memory[sensor.valid] = 1
+            image.bytes[sensor.valid] = 1
         for index, instance in enumerate(self._instances):
-            if not instance.start(memory):
+            if not instance.start(image):
                 return index + 1
         return 0
 
-    def step(self, memory: Memory, host: Host | None = None) -> None:
+    def step(self, memory: Memory, host: Offered | None = None) -> None:
         """Runs one tick."""
         self.host = host or Host()
-        if self._state.get(memory) != self._next.get(memory):
-            self._enter(memory, self._next.get(memory))
-            self._restart(memory)
+        image = self._image_of(memory)
+        words, tick = image.words, image.longs[self._tick]
+        if words[self._state] != words[self._next]:
+            self._enter(image, words[self._next])
+            self._restart(image)
         for sensor in self._sensors.values():
-            sensor.advance(memory, self._tick.get(memory))
-        tick, state = self._tick.get(memory), self.machine.states[self._state.get(memory)]
-        due = [e.instance for e in state.entries if tick % e.divisor == e.phase]
+            sensor.advance(image, tick)
+        state = self._states[words[self._state]]
+        due = state.due(tick)
         if tick > 0:
-            for target, carry in self._delayed:
+            for target, copies in self._delayed:
                 if target in due:
-                    carry(memory)
+                    for to, source in copies:
+                        image.bytes[to] = image.bytes[source]
         self._read_span = None
         for index in due:
-            self._run(memory, index, self._spans[state.name].get(index))
-        if state.entries:
-            self._current.set(memory, _NONE)
-        self._arbitrate(memory, state, due)
+            self._run(image, index, state.spans.get(index), tick)
+        if state.scheduled:
+            words[self._current] = _NONE
+        self._arbitrate(image, state, due)
         if self._ticks_in_state is not None:
-            self._ticks_in_state.increment(memory)
-        self._tick.increment(memory)
+            image.longs[self._ticks_in_state] = image.longs[self._ticks_in_state] + 1 & _LONG
+        image.longs[self._tick] = tick + 1 & _LONG
 
     def force_state(self, memory: Memory, state: int) -> None:
         """Enters a state immediately and cancels a latched transition."""
-        if self._state.get(memory) != state:
-            self._enter(memory, state)
-        self._next.set(memory, state)
-        self._restart(memory)
+        image = self._image_of(memory)
+        if image.words[self._state] != state:
+            self._enter(image, state)
+        image.words[self._next] = state
+        self._restart(image)
 
-    def _restart(self, memory: Memory) -> None:
+    def _restart(self, image: Image) -> None:
         """The coming tick becomes the first of its state."""
         if self._ticks_in_state is not None:
-            self._ticks_in_state.set(memory, 0)
+            image.longs[self._ticks_in_state] = 0
 
-    def _timed_spans(self, state: State) -> dict[int, int]:
-        """Span number of each timed instance of a state. Consecutive timed instances share clock readings: the end of
-        one is the beginning of the next."""
-        spans: dict[int, int] = {}
-        for before, entry in zip((None, *state.entries), state.entries, strict=False):
-            if self._instances[entry.instance].limit_ns:
-                spans[entry.instance] = spans.get(before.instance, entry.instance) if before else entry.instance
-        return spans
-
-    def _enter(self, memory: Memory, state: int) -> None:
+    def _enter(self, image: Image, state: int) -> None:
         """Instances scheduled in both the old and the new state continue. All others are stale until they run."""
-        before, after = ({e.instance for e in self.machine.states[n].entries} for n in (self._state.get(memory), state))
+        before, after = (self._states[n].scheduled for n in (image.words[self._state], state))
         for index, instance in enumerate(self._instances):
             if index not in before & after:
-                instance.health.set(memory, _STALE)
-        self._state.set(memory, state)
+                image.words[instance.health] = _STALE
+        image.words[self._state] = state
 
-    def _run(self, memory: Memory, index: int, span: int | None) -> None:
+    def _run(self, image: Image, index: int, span: int | None, tick: int) -> None:
         """Runs one due instance: inputs, execute, health."""
         instance = self._instances[index]
-        clock = self.host.clock_ns or (lambda: 0)
         if span is not None and span != self._read_span:
-            self._read_span, self._now_ns = span, clock()
-        for target, carry in self._direct:
-            if target == index:
-                carry(memory)
+            self._read_span, self._now_ns = span, self._clock_ns()
+        instance.load(instance.self_, image.bytes)
+        if instance.is_connected:
+            instance.store_inputs(instance.self_, image.bytes)
         if instance.last_run is not None:
-            instance.last_run.set(memory, self._tick.get(memory) + 1)
-        self._current.set(memory, index)
+            image.longs[instance.last_run] = tick + 1
+        image.words[self._current] = index
         substitute = self.host.substitute if instance.algorithm.impure else None
         if substitute is None or not substitute(index):
-            instance.execute(memory)
+            instance.execute(image)
         else:
-            memory[instance.inject_fault] = 0  # the substituted record contains its effect
+            image.bytes[instance.inject_fault] = 0  # the substituted record contains its effect
         if instance.limit_ns:
-            began, self._now_ns = self._now_ns, clock()
-            spent = self._now_ns - began
-            if memory[instance.inject_overrun] or spent > instance.limit_ns:
-                memory[instance.inject_overrun] = 0
-                instance.overruns.increment(memory)
-                if instance.health.get(memory) == HEALTH.index("nominal"):
-                    instance.health.set(memory, HEALTH.index("degraded"))
-        if any(s.instance == index and not memory[s.valid] for s in self._sensors.values()):
-            instance.health.set(memory, HEALTH.index("failed"))
+            self._judge_time(image, instance)
+        for sensor in self._sensors_of[index]:
+            if not image.bytes[sensor.valid]:
+                image.words[instance.health] = _FAILED
 
-    def _arbitrate(self, memory: Memory, state: State, due: list[int]) -> None:
+    def _clock_ns(self) -> int:
+        return self.host.clock_ns() if self.host.clock_ns is not None else 0
+
+    def _judge_time(self, image: Image, instance: _Instance) -> None:
+        """An execute that took too long, or that is said to have done so, is at most degraded."""
+        began, self._now_ns = self._now_ns, self._clock_ns()
+        if image.bytes[instance.inject_overrun] or self._now_ns - began > instance.limit_ns:
+            image.bytes[instance.inject_overrun] = 0
+            image.longs[instance.overruns] = image.longs[instance.overruns] + 1 & _LONG
+            if image.words[instance.health] == _NOMINAL:
+                image.words[instance.health] = _DEGRADED
+
+    def _arbitrate(self, image: Image, state: _State, due: list[int]) -> None:
         """Latches the target of the true edge with the highest priority."""
-        here = self.machine.states.index(state)
-        edges = [e for e in self.machine.edges if e.source == here and self._holds(memory, e, due)]
-        if edges:
-            self._next.set(memory, max(edges, key=lambda e: e.priority).target)
+        for edge in state.edges:
+            if self._holds(image, edge, due):
+                image.words[self._next] = edge.target
+                return
 
-    def _holds(self, memory: Memory, edge: Edge, due: list[int]) -> bool:
+    def _holds(self, image: Image, edge: Edge, due: list[int]) -> bool:
         """Whether an edge is true. Requests and healths count on ticks when their instance ran; `stale` counts always.
         A timed edge requires that the state has lasted long enough, this tick included."""
+        words = image.words
+        if edge.guard_instance >= 0:
+            health = words[self._instances[edge.guard_instance].health]
+            if not edge.guard_mask >> health & 1 or health != _STALE and edge.guard_instance not in due:
+                return False
         if edge.after_ticks:
             assert self._ticks_in_state is not None
-            if self._ticks_in_state.get(memory) + 1 < edge.after_ticks:
+            if image.longs[self._ticks_in_state] + 1 < edge.after_ticks:
                 return False
         wanted = edge.request + 1
-        if wanted and not any(self._instances[i].request.get(memory) == wanted for i in due):
-            return False
-        if edge.guard_instance < 0:
+        if wanted == 0:
             return True
-        health = self._instances[edge.guard_instance].health.get(memory)
-        return bool(edge.guard_mask >> health & 1) and (health == _STALE or edge.guard_instance in due)
+        for index in due:
+            if words[self._instances[index].request] == wanted:
+                return True
+        return False
+
+
+def _typed(value: Any, type_: Scalar) -> Any:
+    """A value of `machine` or of a channel in the type of its input, or the function that returns it."""
+    if not callable(value):
+        return type_.of(value)
+    return lambda: type_.of(value())

@@ -1,15 +1,21 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Reads and writes values in the flat memory of a machine by paths of its field table."""
+"""Values in the flat memory of a machine, by paths of its field table.
+
+A value is a tree of objects (structs, arrays) whose leaves are numbers and words. For each group of values that a
+tick moves together, one function is made as text, once: it moves all their leaves with as few calls of `struct` as
+possible.
+"""
 
 from __future__ import annotations
 
 import struct
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
+from itertools import accumulate, product
 from typing import Any
 
-from .arrays import Array, ArrayType
-from .structs import StructType
+from .arrays import ArrayType
+from .structs import StructType, slot
 from .types import SCALARS, Scalar, Type
 
 #: Offsets (bytes) of every field by its path (fcsl_machine.h), and of items that the table does not list:
@@ -20,127 +26,139 @@ Memory = bytearray | memoryview
 HEALTH = ("nominal", "degraded", "failed", "stale")
 
 
+class Image:
+    """A machine's memory, as bytes and as cells of other types."""
+
+    __slots__ = ("bytes", "longs", "memory", "naturals", "words")
+
+    def __init__(self, memory: Memory):
+        self.memory, self.bytes = memory, memoryview(memory)
+        self.words, self.naturals, self.longs = (self.bytes.cast(code) for code in ("i", "I", "Q"))
+
+
 @dataclass(frozen=True)
-class Codec:
-    """Reads and writes a value of one type at one path."""
+class Leaf:
+    """Numbers at one place of the memory. `place`: the expression of the value that has them."""
 
-    read: Callable[[Memory], Any]
-    write: Callable[[Memory, Any], None]
+    offset: int
+    type: Scalar
+    place: str
+    count: int = 0  # of an array's elements; 0 is a scalar
+
+    @property
+    def format(self) -> str:
+        return f"{self.count or ''}{self.type.code}"
+
+    @property
+    def end(self) -> int:
+        return self.offset + struct.calcsize(f"={self.format}")
 
 
-def codec(type_: Type, path: str, layout: Layout, requests: Sequence[str]) -> Codec:
-    """Codec for a scalar, array or struct whose leaves are below `path`. `requests`: the machine's requests in
-    order."""
+def leaves(type_: Type, place: str, path: str, layout: Layout) -> Iterator[Leaf]:
+    """Leaves of a value of a struct, array or scalar type at `path` that is the value of `place`."""
     if isinstance(type_, StructType):
-        return _of_struct(type_, path, layout, requests)
-    if isinstance(type_, ArrayType):
-        if type_.element is SCALARS["Health"]:
-            return _of_words(type_, layout[path], HEALTH)
-        if type_.element is SCALARS["TransitionRequest"]:
-            return _of_words(type_, layout[path], ("", *requests))
-        if isinstance(type_.element, Scalar):
-            return _of_numbers(type_, type_.element, layout[path])
-        return _of_structs(type_, path, layout, requests)
-    assert isinstance(type_, Scalar)
-    if type_ is SCALARS["Health"]:
-        return _of_word(layout[path], HEALTH)
-    if type_ is SCALARS["TransitionRequest"]:
-        return _of_word(layout[path], ("", *requests))
-    return _of_number(type_, layout[path])
+        for name, member in type_.members.items():
+            yield from leaves(member, f"{place}.{slot(name)}", f"{path}.{name}", layout)
+    elif isinstance(type_, Scalar):
+        yield Leaf(layout[path], type_, place)
+    elif isinstance(type_, ArrayType) and isinstance(type_.element, Scalar):
+        yield Leaf(layout[path], type_.element, place, type_.count)
+    else:
+        assert isinstance(type_, ArrayType)
+        for n, indices in enumerate(product(*map(range, type_.shape))):
+            subscript = "".join(f"[{i}]" for i in indices)
+            yield from leaves(type_.element, f"{place}.data[{n}]", path + subscript, layout)
 
 
-def _of_number(type_: Scalar, offset: int) -> Codec:
-    one, of = struct.Struct(f"={type_.code}"), type_.of
+class Movers:
+    """Makes functions that move values. `requests`: the machine's requests in order."""
 
-    def read(memory: Memory) -> Any:
-        return of(one.unpack_from(memory, offset)[0])
+    def __init__(self, layout: Layout, requests: Sequence[str]):
+        self._starts = sorted(set(layout.values()))
+        words = {"Health": HEALTH, "TransitionRequest": ("", *requests)}
+        self._names: dict[str, Any] = {f"words_{name}": known for name, known in words.items()}
+        self._names |= {f"number_{name}": {word: n for n, word in enumerate(known)} for name, known in words.items()}
+        self._names |= {f"of_{name}": scalar.of for name, scalar in SCALARS.items()}
 
-    def write(memory: Memory, value: Any) -> None:
-        one.pack_into(memory, offset, value)
+    # ---- from memory to values -------------------------------------------------------------------------------------
 
-    return Codec(read, write)
+    def loader(self, wanted: Iterable[Leaf], given: Mapping[str, Any] | None = None) -> Callable[[Any, Memory], None]:
+        """A function that puts leaves into the objects of a tree `s`, several of one offset too, and then assigns
+        what is `given`: by place, a value or a function that returns it."""
+        found = sorted(wanted, key=lambda leaf: leaf.offset)
+        distinct = {leaf.offset: leaf for leaf in found}
+        ends = accumulate(leaf.count or 1 for leaf in distinct.values())
+        at = dict(zip(distinct, (0, *ends), strict=False))
+        names, lines = dict(self._names), list[str]()
+        if found:
+            names["unpack"] = struct.Struct("=" + self._format(list(distinct.values()))).unpack_from
+            lines.append(f"v = unpack(memory, {found[0].offset})")
+        lines += [self._put(leaf, at[leaf.offset]) for leaf in found]
+        for n, (place, value) in enumerate((given or {}).items()):
+            names[f"given{n}"] = value
+            lines.append(f"{place} = given{n}{'()' if callable(value) else ''}")
+        return _function("load", lines, names)
+
+    def _put(self, leaf: Leaf, at: int) -> str:
+        if not leaf.count:
+            return f"{leaf.place} = {self._read(leaf.type, f'v[{at}]')}"
+        whole = f"v[{at}:{at + leaf.count}]"
+        each = self._read(leaf.type, "n")
+        if leaf.count <= 4:
+            items = [self._read(leaf.type, f"v[{n}]") for n in range(at, at + leaf.count)]
+            return f"{leaf.place}.data = [{', '.join(items)}]"
+        return f"{leaf.place}.data = {f'[*{whole}]' if each == 'n' else f'[{each} for n in {whole}]'}"
+
+    def _read(self, type_: Scalar, number: str) -> str:
+        """The value of a number in memory. Floats and bools are what unpacking returns."""
+        if f"words_{type_.name}" in self._names:
+            return f"words_{type_.name}[{number}]"
+        return number if type_.of in (float, bool) else f"of_{type_.name}({number})"
+
+    # ---- from values to memory -------------------------------------------------------------------------------------
+
+    def storer(self, wanted: Iterable[Leaf]) -> Callable[[Any, Memory], None]:
+        """A function that writes leaves of a tree `s`, and nothing between them but padding."""
+        names, lines, run = dict(self._names), list[str](), list[Leaf]()
+        for leaf in sorted(wanted, key=lambda leaf: leaf.offset):
+            if run and self._between(run[-1].end, leaf.offset):
+                self._pack(run, lines, names)
+                run = []
+            run.append(leaf)
+        if run:
+            self._pack(run, lines, names)
+        return _function("store", lines, names)
+
+    def _between(self, end: int, start: int) -> bool:
+        """Whether something else lies between two leaves."""
+        return any(end <= other < start for other in self._starts)
+
+    def _pack(self, run: list[Leaf], lines: list[str], names: dict[str, Any]) -> None:
+        name = f"pack{len(lines)}"
+        names[name] = struct.Struct("=" + self._format(run)).pack_into
+        lines.append(f"{name}(memory, {run[0].offset}, {', '.join(map(self._written, run))})")
+
+    def _written(self, leaf: Leaf) -> str:
+        words = f"number_{leaf.type.name}"
+        if not leaf.count:
+            return f"{words}[{leaf.place}]" if words in self._names else leaf.place
+        return f"*[{words}[n] for n in {leaf.place}.data]" if words in self._names else f"*{leaf.place}.data"
+
+    @staticmethod
+    def _format(run: Sequence[Leaf]) -> str:
+        """Format of leaves in order of their offsets, with bytes that are left out between them."""
+        parts, end = list[str](), run[0].offset
+        for leaf in run:
+            parts += [f"{leaf.offset - end}x" if leaf.offset > end else "", leaf.format]
+            end = leaf.end
+        return "".join(parts)
 
 
-def _of_word(offset: int, words: Sequence[str]) -> Codec:
-    one = struct.Struct("=i")
-
-    def read(memory: Memory) -> Any:
-        return words[one.unpack_from(memory, offset)[0]]
-
-    def write(memory: Memory, value: Any) -> None:
-        one.pack_into(memory, offset, words.index(value))
-
-    return Codec(read, write)
-
-
-def _of_words(type_: ArrayType, offset: int, words: Sequence[str]) -> Codec:
-    all_ = struct.Struct(f"={type_.count}i")
-
-    def read(memory: Memory) -> Any:
-        return Array(type_.element, type_.shape, [words[n] for n in all_.unpack_from(memory, offset)])
-
-    def write(memory: Memory, value: Any) -> None:
-        all_.pack_into(memory, offset, *map(words.index, value.data))
-
-    return Codec(read, write)
-
-
-def _of_numbers(type_: ArrayType, element: Scalar, offset: int) -> Codec:
-    all_, of = struct.Struct(f"={type_.count}{element.code}"), element.of
-    plain = of in (float, bool)  # unpacking already returns this type
-
-    def read(memory: Memory) -> Any:
-        found = all_.unpack_from(memory, offset)
-        return Array(element, type_.shape, list(found) if plain else [of(v) for v in found])
-
-    def write(memory: Memory, value: Any) -> None:
-        all_.pack_into(memory, offset, *value.data)
-
-    return Codec(read, write)
-
-
-def _of_structs(type_: ArrayType, path: str, layout: Layout, requests: Sequence[str]) -> Codec:
-    indices = [""]
-    for extent in type_.shape:
-        indices = [f"{index}[{i}]" for index in indices for i in range(extent)]
-    parts = [codec(type_.element, path + index, layout, requests) for index in indices]
-
-    def read(memory: Memory) -> Any:
-        return Array(type_.element, type_.shape, [part.read(memory) for part in parts])
-
-    def write(memory: Memory, value: Any) -> None:
-        for part, item in zip(parts, value.data, strict=True):
-            part.write(memory, item)
-
-    return Codec(read, write)
-
-
-class RecordCodec:
-    """Reads and writes the fields of an instance's record below `path`."""
-
-    def __init__(self, type_: StructType, path: str, layout: Layout, requests: Sequence[str]):
-        self._parts = [(n, codec(member, f"{path}.{n}", layout, requests)) for n, member in type_.members.items()]
-
-    def values(self, memory: Memory) -> dict[str, Any]:
-        return {name: part.read(memory) for name, part in self._parts}
-
-    def write(self, memory: Memory, value: Any) -> None:
-        """Writes the record's fields from `value`, which may have additional fields."""
-        for name, part in self._parts:
-            part.write(memory, getattr(value, name))
-
-
-def _of_struct(type_: StructType, path: str, layout: Layout, requests: Sequence[str]) -> Codec:
-    parts = {name: codec(member, f"{path}.{name}", layout, requests) for name, member in type_.members.items()}
-
-    def read(memory: Memory) -> Any:
-        return type_.of({name: part.read(memory) for name, part in parts.items()})
-
-    def write(memory: Memory, value: Any) -> None:
-        for name, part in parts.items():
-            part.write(memory, getattr(value, name))
-
-    return Codec(read, write)
+def _function(name: str, lines: list[str], names: dict[str, Any]) -> Callable[[Any, Memory], None]:
+    body = "\n".join(f"    {line}" for line in lines or ["pass"])
+    exec(f"def {name}(s, memory):\n{body}\n", names)
+    function: Callable[[Any, Memory], None] = names[name]
+    return function
 
 
 def from_json(type_: Type, value: Any) -> Any:
@@ -151,5 +169,5 @@ def from_json(type_: Type, value: Any) -> Any:
         flat = [value]
         for _ in type_.shape:
             flat = [item for row in flat for item in row]
-        return Array(type_.element, type_.shape, [from_json(type_.element, item) for item in flat])
+        return type_.of([from_json(type_.element, item) for item in flat])
     return type_.store(value)

@@ -6,6 +6,9 @@
 - Arrays and structs are copied where a place of either is bound to a local, returned or unpacked. Fields and elements copy what
   is stored in them.
 - `[a, b]` builds an array; `x[i][j]` is `x[i, j]`; a constant negative index counts from the end, any other is out of range.
+- Where the kinds of values are certain, what is known is not asked again: members are read and stored in their slots,
+  elements in the list of the array (if the index is known to be inside), functions of the library are those for the
+  sizes at hand.
 - `x += v` is `x = x + v`; a subscript of x that reaches outside the machine is evaluated once, before. Annotations, imports and
   the dictionaries of a class are taken out.
 """
@@ -15,12 +18,18 @@ from __future__ import annotations
 import ast
 import copy
 from collections.abc import Collection, Mapping
+from functools import reduce
 from typing import Any
 
+from .arrays import Array, ArrayType, array_type
+from .elementwise import OPERATIONS, elementwise
 from .functions import CONVERSIONS
-from .infer import PLAIN, Inference, Kind, Names
+from .infer import PLAIN, SELF, Inference, Kind, Names
+from .structs import slot
+from .types import SCALARS
 from .values import F32, INTEGERS, decimal_f32
 
+_F64 = Kind("f64")
 _CALLED = {ast.Div: "divide", ast.FloorDiv: "floor_divide", ast.Mod: "modulo"}
 
 
@@ -36,6 +45,8 @@ class Rewriter:
     ):
         self.names, self.outside = names, outside
         self.types = Inference(names, arguments, result)
+        self._arguments = arguments
+        self._ranges: dict[str, range] = {}  # of loop variables
         self._once = 0
 
     def function(self, statements: list[ast.stmt]) -> list[ast.stmt]:
@@ -78,6 +89,10 @@ class Rewriter:
         """A named value that is created once, not at each use."""
         self.names.literals[name] = value
         return ast.Name(name, ast.Load())
+
+    def _call_named(self, name: str, function: Any, *args: ast.expr) -> ast.expr:
+        """A call of a function that is known for the types at hand."""
+        return ast.Call(self._named(name, function), list(args), [])
 
     def _float_literal(self, node: ast.expr, base: str) -> ast.expr:
         if isinstance(node, ast.Constant):
@@ -124,17 +139,58 @@ class Rewriter:
         return node if base == PLAIN else self._runtime(f"as_{base}", node)
 
     def _on_attribute(self, node: ast.Attribute) -> ast.expr:
-        return ast.Attribute(self.expr(node.value), node.attr, node.ctx)
+        return ast.Attribute(self.expr(node.value), slot(node.attr), node.ctx)
 
     def _on_subscript(self, node: ast.Subscript) -> ast.expr:
-        base: ast.expr = node
-        parts: list[ast.expr] = []
-        while isinstance(base, ast.Subscript):
-            parts = [*(base.slice.elts if isinstance(base.slice, ast.Tuple) else [base.slice]), *parts]
-            base = base.value
+        base, parts = _subscripts(node)
+        inside = self._inside(base, parts)
+        if inside is not None:
+            return ast.Subscript(ast.Attribute(self.expr(base), "data", ast.Load()), inside, node.ctx)
+        return self._checked(base, parts, node.ctx)
+
+    def _checked(self, base: ast.expr, parts: list[ast.expr], ctx: ast.expr_context) -> ast.expr:
+        """An element or a part of an array that checks its indices, and what is stored in it."""
         rewritten = [self._index(part) for part in parts]
         subscript = rewritten[0] if len(rewritten) == 1 else ast.Tuple(rewritten, ast.Load())
-        return ast.Subscript(self.expr(base), subscript, node.ctx)
+        return ast.Subscript(self.expr(base), subscript, ctx)
+
+    def _inside(self, base: ast.expr, parts: list[ast.expr]) -> ast.expr | None:
+        """The position of an element in the list of its array. None if it is a part, or an index may be outside."""
+        kind = self.types.certain(base)
+        if kind is None or len(parts) != kind.rank or any(isinstance(part, ast.Slice) for part in parts):
+            return None
+        terms, known, stride = list[ast.expr](), 0, 1
+        for part, extent in reversed(list(zip(parts, kind.shape, strict=True))):
+            value, bounds = self.types.value(part), self._bounds(part)
+            assert isinstance(extent, int)
+            if value is not None and -extent <= value < extent:
+                known += stride * (value % extent)
+            elif bounds is not None and 0 <= bounds[0] and bounds[1] < extent:
+                index = self.expr(part)
+                terms.append(index if stride == 1 else ast.BinOp(index, ast.Mult(), ast.Constant(stride)))
+            else:
+                return None
+            stride *= extent
+        if known or not terms:
+            terms.append(ast.Constant(known))
+        return ast.copy_location(reduce(lambda one, other: ast.BinOp(one, ast.Add(), other), terms), base)
+
+    def _bounds(self, node: ast.expr) -> tuple[int, int] | None:
+        """The least and the largest value of an index of literals and loop variables."""
+        value = self.types.value(node)
+        if value is not None:
+            return value, value
+        if self.types.kind(node).base != PLAIN:
+            return None
+        if isinstance(node, ast.Name) and self._ranges.get(node.id):
+            values = self._ranges[node.id]
+            return min(values[0], values[-1]), max(values[0], values[-1])
+        if isinstance(node, ast.BinOp) and isinstance(node.op, ast.Add | ast.Sub):
+            left, right = self._bounds(node.left), self._bounds(node.right)
+            if left is not None and right is not None:
+                adds = isinstance(node.op, ast.Add)
+                return (left[0] + right[0], left[1] + right[1]) if adds else (left[0] - right[1], left[1] - right[0])
+        return None
 
     def _index(self, node: ast.expr) -> ast.expr:
         if isinstance(node, ast.Slice):
@@ -145,19 +201,68 @@ class Rewriter:
         return self._runtime("constant_index", index) if known and not nonnegative else index
 
     def _on_unaryop(self, node: ast.UnaryOp) -> ast.expr:
-        return ast.UnaryOp(node.op, self.expr(node.operand))
+        operand = self.expr(node.operand)
+        whole = self._elementwise(type(node.op), [node.operand], [operand])
+        return ast.UnaryOp(node.op, operand) if whole is None else whole
 
     def _on_binop(self, node: ast.BinOp) -> ast.expr:
         left = self.expr(node.left)
         if not isinstance(node.op, ast.Pow):
-            return self._operation(node.op, left, self.expr(node.right), node.right)
+            right = self.expr(node.right)
+            whole = self._elementwise(type(node.op), [node.left, node.right], [left, right])
+            return self._operation(node.op, left, right, node.right) if whole is None else whole
         if self.types.is_literal(node.right) and self.types.kind(node.right).base == PLAIN:
             return self._runtime("power", left, node.right)
         return self._runtime("pow", left, self.expr(node.right))
 
+    def _elementwise(self, op: type[ast.AST], written: list[ast.expr], args: list[ast.expr]) -> ast.expr | None:
+        """An operation of arrays that are no constants, by the function for their size."""
+        classes = [self._class(node) for node in written]
+        arrays = [cls for cls in classes if cls is not None and issubclass(cls, Array)]
+        if op not in OPERATIONS or not arrays or None in classes or any(cls.zeros for cls in arrays):
+            return None
+        type_, ranks = arrays[0].__fcsl_type__, [cls is not float for cls in classes]
+        name = f"fcsl.{op.__name__} {ranks} {type_.name}"
+        if name not in self.names.literals:
+            self.names.literals[name] = elementwise(op, ranks, type_)
+        return ast.Call(ast.Name(name, ast.Load()), args, [])
+
+    def _class(self, node: ast.expr) -> type[Any] | None:
+        """The class of an f64 or of an array of f64, if the value is certain to have it."""
+        kind = self.types.certain(node)
+        if kind is None or kind.base != "f64":
+            return None
+        if not kind.rank:
+            return float
+        if self.names.is_constant(node) and isinstance(node, ast.Name) and node.id not in self.types.locals:
+            return type(self.names.values[node.id])
+        type_ = self._array_type(node)
+        return None if type_ is None or self._may_be_constant(node) else type_.construct
+
+    def _array_type(self, node: ast.expr) -> ArrayType | None:
+        """The type of an array of scalars, if it is certain."""
+        kind = self.types.certain(node)
+        if kind is None or not kind.rank or kind.base not in SCALARS:
+            return None
+        return array_type(SCALARS[kind.base], kind.shape)  # type: ignore[arg-type]
+
+    def _may_be_constant(self, node: ast.expr) -> bool:
+        """Whether an array may be an argument that is a constant, a frozen parameter, or the transpose of one."""
+        if isinstance(node, ast.Name):
+            return node.id in self._arguments
+        if isinstance(node, ast.Attribute) and self.types.kind(node.value).base == SELF:
+            return node.attr in self.names.parameters
+        if isinstance(node, ast.Call) and isinstance(node.func, ast.Name) and node.func.id == "transpose":
+            return True
+        return isinstance(node, ast.IfExp)
+
     def _operation(self, op: ast.operator, left: ast.expr, right: ast.expr, written: ast.expr) -> ast.expr:
         name = _CALLED.get(type(op))
         nonzero = isinstance(written, ast.Constant) and written.value != 0
+        if isinstance(op, ast.Div) and _is_simple(right) and self.types.certain(written) == _F64:
+            # Not a call unless the divisor is zero. Such a one is replaced by an object that knows how to divide by it.
+            zero = ast.copy_location(self._runtime("zero", right), written)
+            right, name = ast.copy_location(ast.BoolOp(ast.Or(), [right, zero]), written), None
         return ast.BinOp(left, op, right) if name is None or nonzero else self._runtime(name, left, right)
 
     def _on_compare(self, node: ast.Compare) -> ast.expr:
@@ -171,13 +276,18 @@ class Rewriter:
         return self._runtime("copy", chosen) if self.types.kind(node).rank else chosen  # a chosen array is not constant
 
     def _on_list(self, node: ast.List) -> ast.expr:
+        type_, items = self._array_type(node), _items(node)
+        if type_ is not None and all(self.types.certain(item) == Kind(type_.element.name) for item in items):
+            data = ast.copy_location(ast.List([self.expr(item) for item in items], ast.Load()), node)
+            return self._call_named(f"fcsl.of {type_.name}", type_.of, data)
         return self._runtime(f"array_{self.types.kind(node).base}", *map(self.expr, node.elts))
 
     def _on_call(self, node: ast.Call) -> ast.expr:
         assert isinstance(node.func, ast.Name)
         name = self.names.function(node)
         if name in ("zeros", "eye"):
-            return node
+            type_ = self._array_type(node)
+            return node if type_ is None or name == "eye" else self._call_named(f"fcsl.zero {type_.name}", type_.zero)
         if name == "len":
             base = self.types.kind(node).base
             size = self._call_of(node, name)
@@ -187,9 +297,27 @@ class Rewriter:
         return self._call_of(node, name)
 
     def _call_of(self, node: ast.Call, name: str) -> ast.expr:
+        if name in self.names.library:
+            name = self._special(name, node.args)
         function = ast.copy_location(ast.Name(name, ast.Load()), node.func)
         named = [ast.keyword(keyword.arg, self.expr(keyword.value)) for keyword in node.keywords]
         return ast.Call(function, [self.expr(arg) for arg in node.args], named)
+
+    def _special(self, name: str, args: list[ast.expr]) -> str:
+        """The name of a library function for the classes of its arguments, if they are certain. It is made when it is
+        first called."""
+        classes = [self._class(arg) for arg in args]
+        if None in classes:
+            return name
+        known = self.names.library[name]
+        label = f"fcsl.{name} {[cls and (cls.__name__, getattr(cls, 'zeros', None)) for cls in classes]}"
+
+        def first(*args: Any) -> Any:
+            self.names.values[label] = made = known(*classes)
+            return made(*args)
+
+        self.names.literals.setdefault(label, first)
+        return label
 
     # ---- statements ------------------------------------------------------------------------------------------------
 
@@ -222,8 +350,15 @@ class Rewriter:
     def _stored(self, node: ast.expr) -> ast.expr:
         """The value stored in a local or result. Arrays and structs are copied if the value is a place."""
         value, kind = self.expr(node), self.types.kind(node)
-        copied = (kind.rank or kind.base in self.names.members) and _is_place(node)
-        return ast.copy_location(self._runtime("copy", value), node) if copied else value
+        if not (kind.rank or kind.base in self.names.members) or not _is_place(node):
+            return value
+        type_ = self._array_type(node)
+        copied = (
+            self._runtime("copy", value)
+            if type_ is None
+            else self._call_named(f"fcsl.copy {type_.name}", type_.copy, value)
+        )
+        return ast.copy_location(copied, node)
 
     def _values(self, node: ast.Tuple | ast.List) -> ast.expr:
         """Several values, each stored."""
@@ -232,16 +367,33 @@ class Rewriter:
 
     def _assign(self, target: ast.expr, value: ast.expr) -> ast.stmt:
         if not isinstance(target, ast.Tuple):
-            return ast.Assign([self._target(target)], self._stored(value))
+            kind = self.types.certain(value)
+            return ast.Assign([self._target(target, kind)], self._stored(value))
+        written = value.elts if isinstance(value, ast.Tuple | ast.List) else []
         whole = self._values(value) if isinstance(value, ast.Tuple | ast.List) else self.expr(value)
-        return ast.Assign([ast.Tuple([self._target(part) for part in target.elts], ast.Store())], whole)
+        kinds = [self.types.certain(part) for part in written] or [None] * len(target.elts)
+        places = [self._target(part, kind) for part, kind in zip(target.elts, kinds, strict=True)]
+        return ast.Assign([ast.Tuple(places, ast.Store())], whole)
 
-    def _target(self, target: ast.expr) -> ast.expr:
-        return target if isinstance(target, ast.Name) else self.expr(target)
+    def _target(self, target: ast.expr, value: Kind | None) -> ast.expr:
+        """The place of an assignment. Unless the value is certain to have its kind, the place checks and copies it."""
+        if isinstance(target, ast.Name):
+            return target
+        exact = value is not None and value == self.types.certain(target)
+        if isinstance(target, ast.Attribute):
+            name = slot(target.attr) if exact else target.attr
+            return ast.copy_location(ast.Attribute(self.expr(target.value), name, target.ctx), target)
+        assert isinstance(target, ast.Subscript)
+        base, parts = _subscripts(target)
+        place = self._on_subscript(target) if exact else self._checked(base, parts, target.ctx)
+        return ast.copy_location(place, target)
 
     def _augmented(self, node: ast.AugAssign, out: list[ast.stmt]) -> ast.stmt:
         """`x += v`. In `x[f()] += v`, an `f` that reaches outside the machine is called on a preceding line."""
-        place = self._target(node.target)
+        kind, by = self.types.certain(node.target), self.types.certain(node.value)
+        kept = isinstance(node.op, ast.Pow | ast.LShift | ast.RShift) or by == kind
+        scaled = isinstance(node.op, ast.Mult | ast.Div) and kind is not None and by == Kind(kind.base)
+        place = self._target(node.target, kind if kept or scaled else None)
         self._settle_subscripts(place, out)
         loaded = copy.deepcopy(place)
         loaded.ctx = ast.Load()  # type: ignore[attr-defined]
@@ -250,7 +402,8 @@ class Rewriter:
         if isinstance(node.op, ast.Pow):
             combined = self._runtime("power" if literal else "pow", loaded, value)
         else:
-            combined = self._operation(node.op, loaded, value, node.value)
+            whole = self._elementwise(type(node.op), [node.target, node.value], [loaded, value])
+            combined = self._operation(node.op, loaded, value, node.value) if whole is None else whole
         return ast.Assign([place], ast.copy_location(combined, node))
 
     def _settle_subscripts(self, place: ast.expr, out: list[ast.stmt]) -> None:
@@ -282,10 +435,35 @@ class Rewriter:
         return ast.copy_location(ast.Name(name, ast.Load()), value)
 
     def _for(self, node: ast.For) -> ast.stmt:
-        assert isinstance(node.iter, ast.Call)
+        assert isinstance(node.iter, ast.Call) and isinstance(node.target, ast.Name)
         bounds = [self.expr(bound) for bound in node.iter.args]
         iterable = ast.copy_location(ast.Call(node.iter.func, bounds, []), node.iter)
-        return ast.For(node.target, iterable, self._body(node.body), [])
+        values = [self.types.value(bound) for bound in node.iter.args]
+        if None not in values:
+            self._ranges[node.target.id] = range(*values)  # type: ignore[arg-type]
+        body = self._body(node.body)
+        self._ranges.pop(node.target.id, None)
+        return ast.For(node.target, iterable, body, [])
+
+
+def _subscripts(node: ast.Subscript) -> tuple[ast.expr, list[ast.expr]]:
+    """An array and all its subscripts: `x` and `[i, j]` of `x[i][j]`."""
+    base: ast.expr = node
+    parts: list[ast.expr] = []
+    while isinstance(base, ast.Subscript):
+        parts = [*(base.slice.elts if isinstance(base.slice, ast.Tuple) else [base.slice]), *parts]
+        base = base.value
+    return base, parts
+
+
+def _items(node: ast.List) -> list[ast.expr]:
+    """The elements that a list display, and those in it, have."""
+    return [item for part in node.elts for item in (_items(part) if isinstance(part, ast.List) else [part])]
+
+
+def _is_simple(node: ast.expr) -> bool:
+    """Whether an expression is quickly evaluated twice."""
+    return isinstance(node, ast.Name) or isinstance(node, ast.Attribute) and _is_simple(node.value)
 
 
 def _is_place(node: ast.expr) -> bool:

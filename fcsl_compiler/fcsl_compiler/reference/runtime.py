@@ -10,7 +10,7 @@ from .arrays import array_of, constant_index, copy_of
 from .functions import builtins
 from .structs import StructType
 from .types import SCALARS
-from .values import divide, floor_divide, modulo, power
+from .values import Zero, divide, floor_divide, modulo, power
 
 
 def _power(base: Any, exponent: int) -> Any:
@@ -20,7 +20,7 @@ def _power(base: Any, exponent: int) -> Any:
 
 def runtime(structs: Mapping[str, StructType]) -> dict[str, Any]:
     """Builtins, constructors of structs, and the functions that the rewrite inserts (rewrite.py)."""
-    names: dict[str, Any] = {"divide": divide, "floor_divide": floor_divide, "modulo": modulo}
+    names: dict[str, Any] = {"divide": divide, "zero": Zero, "floor_divide": floor_divide, "modulo": modulo}
     names |= {"power": _power, "pow": builtins()["pow"], "copy": copy_of, "constant_index": constant_index}
     names |= {f"as_{name}": type_.store for name, type_ in SCALARS.items()}
     names |= {f"array_{name}": array_of(type_) for name, type_ in (SCALARS | dict(structs)).items()}

@@ -1,23 +1,32 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Structs as values. The records of an algorithm (inputs, parameters, outputs, state) and its `self` are structs,
-too."""
+"""Structs as values. The records of an algorithm (inputs, parameters, outputs, state) and its `self` are structs, too.
+
+Member `x` is kept in the slot `_x`, which rewritten code uses where the types are known. The property `x` checks and
+copies what is stored, also what a debugger's console assigns. No name of a program begins with `_`.
+"""
 
 from __future__ import annotations
 
 from collections.abc import Mapping
-from typing import Any
+from operator import attrgetter
+from typing import Any, ClassVar
 
 from .types import Type
 from .values import IllTyped
 
-_put = object.__setattr__
+_new = object.__new__
+
+
+def slot(name: str) -> str:
+    """The slot of a member."""
+    return f"_{name}"
 
 
 class Struct:
     """A value with named members. `__fcsl_type__` of its class is its StructType. Members may have any name."""
 
     __slots__ = ()
-    __fcsl_type__: StructType
+    __fcsl_type__: ClassVar[StructType]
 
     def __init__(self, *values: Any, **named: Any):
         members = self.__fcsl_type__.members
@@ -25,10 +34,7 @@ class Struct:
         if len(given) != len(members) or len(values) + len(named) != len(members):
             raise IllTyped(f"{self.__fcsl_type__.name}({', '.join(members)}) built of {', '.join(given)}")
         for name, type_ in members.items():
-            _put(self, name, type_.store(given[name]))
-
-    def __setattr__(self, name: str, value: Any) -> None:
-        _put(self, name, self.__fcsl_type__.members[name].store(value))
+            setattr(self, slot(name), type_.store(given[name]))
 
     @property
     def __dict__(self) -> dict[str, Any]:  # type: ignore[override]
@@ -40,18 +46,30 @@ class Struct:
         return f"{self.__fcsl_type__.name}({', '.join(parts)})"
 
 
+def _checked(name: str, type_: Type) -> property:
+    """Member `name` for readers, and for writers whose value is not known to have its type."""
+
+    def put(struct: Struct, value: Any) -> None:
+        setattr(struct, slot(name), type_.store(value))
+
+    return property(attrgetter(slot(name)), put)
+
+
 class StructType:
     """Members by name, in order. `construct` is the class of its values and constructs one."""
 
     def __init__(self, name: str, members: Mapping[str, Type]):
         self.name, self.members = name, dict(members)
-        self.construct: type[Struct] = type(name, (Struct,), {"__slots__": tuple(members), "__fcsl_type__": self})
+        self.arrays: dict[tuple[int, ...], Any] = {}
+        own = {"__slots__": tuple(map(slot, members)), "__fcsl_type__": self}
+        checked = {member: _checked(member, type_) for member, type_ in members.items()}
+        self.construct: type[Struct] = type(name, (Struct,), own | checked)
 
     def of(self, values: Mapping[str, Any]) -> Struct:
         """A struct that holds exactly these objects, without copies or checks."""
-        made = self.construct.__new__(self.construct)
+        made = _new(self.construct)
         for name, value in values.items():
-            _put(made, name, value)
+            setattr(made, slot(name), value)
         return made
 
     def zero(self) -> Struct:
@@ -60,4 +78,4 @@ class StructType:
     def store(self, value: Any) -> Struct:
         if type(value) is not self.construct:
             raise IllTyped(f"{value!r} where {self.name} is needed")
-        return self.of({name: type_.store(getattr(value, name)) for name, type_ in self.members.items()})
+        return self.of({name: type_.store(getattr(value, slot(name))) for name, type_ in self.members.items()})

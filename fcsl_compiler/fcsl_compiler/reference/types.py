@@ -26,12 +26,22 @@ class Type(Protocol):
         ...
 
 
+class Element(Type, Protocol):
+    """A scalar or struct type: one of which there are arrays."""
+
+    @property
+    def arrays(self) -> dict[tuple[int, ...], Any]:
+        """The types of arrays of it by their shape, as far as they are made (arrays.py)."""
+        ...
+
+
 class Scalar:
     """A scalar type. `code`: its format for the struct module."""
 
     def __init__(self, name: str, code: str, zero: Any, store: Callable[[Any], Any], of: Callable[[Any], Any]):
         self.name, self.code, self.store = name, code, store
         self.of = of  # converts the plain number in memory to the value
+        self.arrays: dict[tuple[int, ...], Any] = {}
         self._zero = zero
 
     def zero(self) -> Any:

@@ -339,6 +339,19 @@ def divide(a: Any, b: Any) -> Any:
         return _ieee_divide(float(a), float(b))
 
 
+class Zero:
+    """A divisor that is an f64 zero. Code that divides often replaces a zero by it, which costs nothing where it is
+    none."""
+
+    __slots__ = ("zero",)
+
+    def __init__(self, zero: float):
+        self.zero = zero
+
+    def __rtruediv__(self, a: float) -> float:
+        return _ieee_divide(a, self.zero)
+
+
 def floor_divide(a: Any, b: Any) -> Any:
     """a // b. A zero divisor faults for integers and gives NaN for floats."""
     try:

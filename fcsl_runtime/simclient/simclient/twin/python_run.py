@@ -21,7 +21,7 @@ from ..run import Run
 
 if TYPE_CHECKING:
     from fcsl_compiler.reference.fault_places import Place
-    from fcsl_compiler.reference.machine import Host, ReferenceMachine
+    from fcsl_compiler.reference.machine import ReferenceMachine
 
 
 class CHardware(Structure):
@@ -49,7 +49,7 @@ class CHost(Structure):
 
 
 _Init = CFUNCTYPE(c_int32, ptr)
-_Step = CFUNCTYPE(None, ptr, POINTER(CHost))
+_Step = CFUNCTYPE(None, ptr, ptr)
 _ForceState = CFUNCTYPE(None, ptr, c_int32)
 _MACHINES_MAX = 1024
 
@@ -118,6 +118,28 @@ def places_of(machine: Machine) -> list[Place]:
     return [(p.file, p.line, p.column, p.cause) for p in machine.fault_places]
 
 
+class _Host:
+    """What `step` may use of the host at `address`, read from there only where it is used
+    (fcsl_compiler.reference.machine.Host)."""
+
+    def __init__(self, address: int):
+        self.address, self._host = address, CHost.from_address(address)
+
+    @property
+    def clock_ns(self) -> Callable[[], int] | None:
+        clock, context = self._host.clock_ns, self._host.ctx
+        return (lambda: int(clock(context))) if clock else None
+
+    @property
+    def hardware(self) -> dict[str, Callable[..., Any]] | None:
+        return _hardware(self._host.hw.contents) if self._host.hw else None
+
+    @property
+    def substitute(self) -> Callable[[int], bool] | None:
+        substitute, context = self._host.substitute, self._host.ctx
+        return (lambda instance: bool(substitute(context, instance))) if substitute else None
+
+
 class PythonMachine:
     """`descriptor` is a copy of the compiled machine's descriptor whose functions call the reference.
 
@@ -126,14 +148,20 @@ class PythonMachine:
 
     def __init__(self, compiled: CMachine, reference: ReferenceMachine):
         self._reference, self._size = reference, compiled.size
+        self._address, self._memory = 0, memoryview(b"")
+        self._host: _Host | None = None
         self.failure: BaseException | None = None
         self._callbacks = (_Init(self._init), _Step(self._step), _ForceState(self._force_state))
         self.descriptor = CMachine.from_buffer_copy(compiled)
         for name, callback in zip(("init", "step", "force_state"), self._callbacks, strict=True):
             setattr(self.descriptor, name, ctypes.cast(callback, ptr).value)
 
-    def _memory(self, address: int) -> memoryview:
-        return memoryview((c_char * self._size).from_address(address)).cast("B")
+    def _memory_at(self, address: int) -> memoryview:
+        """The memory of the machine, which stays at one address while it runs."""
+        if address != self._address:
+            self._address = address
+            self._memory = memoryview((c_char * self._size).from_address(address)).cast("B")
+        return self._memory
 
     @contextlib.contextmanager
     def _kept(self) -> Iterator[None]:
@@ -145,30 +173,25 @@ class PythonMachine:
     def _init(self, address: int) -> int:
         status = -1
         with self._kept():
-            status = self._reference.init(self._memory(address))
+            status = self._reference.init(self._memory_at(address))
         return status
 
-    def _step(self, address: int, host: Any) -> None:
-        memory = self._memory(address)
+    def _step(self, address: int, host: int) -> None:
+        if self.failure is not None:  # it ended the ticks of this call
+            return
+        memory = self._memory_at(address)
         before = bytes(memory)
-        with self._kept():
-            self._reference.step(memory, self._host(host.contents))
-        if self.failure is not None:
+        if self._host is None or self._host.address != host:
+            self._host = _Host(host)
+        try:
+            self._reference.step(memory, self._host)
+        except BaseException as error:
+            self.failure = error
             memory[:] = before
 
     def _force_state(self, address: int, state: int) -> None:
         with self._kept():
-            self._reference.force_state(self._memory(address), state)
-
-    def _host(self, host: CHost) -> Host:
-        from fcsl_compiler.reference.machine import Host
-
-        clock, substitute, context = host.clock_ns, host.substitute, host.ctx
-        return Host(
-            (lambda: int(clock(context))) if clock else None,
-            _hardware(host.hw.contents) if host.hw else None,
-            (lambda instance: bool(substitute(context, instance))) if substitute else None,
-        )
+            self._reference.force_state(self._memory_at(address), state)
 
 
 class PythonRun(Run):
