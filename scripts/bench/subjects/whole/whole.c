@@ -194,7 +194,7 @@ static void report(const whole_t *w, int rounds)
     static const char *const names[] = {"step_ns", "connected_ns", "bodies_ns", "by_hand_ns", "sense_ns"};
     enum { FIGURES = 5 };
     static const char *const of[FIGURES] = {"connected_ratio", "bodies_ratio", "besides_connected_ns",
-                                            "besides_bodies_ns", "over_by_hand_ns"};
+                                            "besides_bodies_ns", "step_ratio"};
     double *figures[FIGURES];
     for (int f = 0; f < FIGURES; ++f) {
         figures[f] = allocate((size_t)rounds * sizeof(double));
@@ -205,7 +205,7 @@ static void report(const whole_t *w, int rounds)
         figures[1][r] = (w->ns[BODIES][r] - empty) / (by_hand - empty);
         figures[2][r] = step - w->ns[CONNECTED][r];
         figures[3][r] = step - w->ns[BODIES][r];
-        figures[4][r] = step - by_hand;
+        figures[4][r] = (step - empty) / (by_hand - empty);
     }
     for (int f = 0; f < FIGURES; ++f) {
         print_spread(of[f], figures[f], rounds);
