@@ -114,10 +114,6 @@ class Seen:
     literal: bool = False
     parts: tuple[Kind, ...] = ()
 
-    @property
-    def rank(self) -> int:
-        return len(self.shape)
-
 
 _CONSTANTS = {"pi": Kind("float"), "inf": Kind("float"), "nan": Kind("float")}
 
