@@ -17,7 +17,7 @@ function(fcsl_c_of_nim name file module source library)
   set(folder "${CMAKE_CURRENT_BINARY_DIR}/${name}_nim")
   set(program "${folder}/fcsl_program.nim")
   file(CONFIGURE OUTPUT "${program}" CONTENT "import ${stem}\n")
-  # The flags of fcsl_compiler/driver/nim.py.
+  # The flags of fcsl_compiler/driver/backends.py.
   set(flags --compileOnly --noMain --app:staticlib --mm:none -d:danger --threads:off --skipCfg --skipUserCfg
     --skipParentCfg --skipProjCfg --hints:off --warnings:off --colors:off)
   execute_process(COMMAND ${nim} dump --skipCfg --dump.format:json "${program}"

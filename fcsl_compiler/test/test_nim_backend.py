@@ -21,9 +21,10 @@ from test_golden import CONFIG, GOLDEN, describe, golden
 
 from fcsl_compiler.base.diagnostics import DiagnosticError
 from fcsl_compiler.cli.main import main
+from fcsl_compiler.driver.backends import NIM
 from fcsl_compiler.driver.cache import build_machine
 from fcsl_compiler.driver.externs import build_externs
-from fcsl_compiler.driver.nim import FLAGS, refuse_allocation
+from fcsl_compiler.driver.nim import refuse_allocation
 from fcsl_compiler.driver.passes import compile_machine
 from fcsl_compiler.driver.toolchain import ToolchainError, include_dirs, math_library
 from fcsl_compiler.reference.externs import externs_of
@@ -345,7 +346,7 @@ def test_a_nim_program_hosts_a_machine(tmp_path: Path) -> None:
 
 def test_cmake_has_the_flags_of_fcslc() -> None:
     (flags,) = re.findall(r"set\(flags (.*?)\)", C_OF_NIM.read_text(), re.DOTALL)
-    assert ("c", *flags.split()) == FLAGS
+    assert ("c", *flags.split()) == NIM.flags
 
 
 def test_cmake_takes_the_compiler_of_fcslc(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:

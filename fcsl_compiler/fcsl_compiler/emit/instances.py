@@ -4,6 +4,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterator
+from dataclasses import replace
 
 from ..model import code, ir
 from ..model.c_names import c_name
@@ -53,6 +54,26 @@ def call(function: ir.Function, record: code.Place, fault: Name) -> code.Do:
     return code.Do(code.Call(function.name, (*arguments, *([code.Address(fault)] if function.faults else []))))
 
 
+def run_quiet(machine: Machine, instance: Instance, record: code.Place) -> code.Do:
+    """Runs execute of a quiet instance (bookkeeping.py), but for its health."""
+    if _is_plain(instance):
+        return call(instance.execute, record, _FAULT)
+    return code.Do(Call(_run_name(machine, instance), (code.Address(record),)), unused=True)
+
+
+def _run_name(machine: Machine, instance: Instance) -> str:
+    return f"fcsl_run_{machine.name}_{instance.name}"
+
+
+def _makes_requests(instance: Instance) -> bool:
+    return ir.names_field(instance.execute.body, "outputs", "transition_request")
+
+
+def _is_plain(instance: Instance) -> bool:
+    """Whether to run a quiet instance is nothing but the call of its algorithm."""
+    return not instance.execute.faults and not _makes_requests(instance)
+
+
 class InstanceEmitter:
     """Makes the functions of one instance."""
 
@@ -82,19 +103,18 @@ class InstanceEmitter:
         return Function(f"{self.name}_init", ((_SELF.text, self.pointer),), None, tuple(body), comment, exported=True)
 
     def _quiet(self) -> Iterator[Function]:
-        """A tick calls `run`. If the health is not nominal, or something is injected, it calls `begin` before."""
-        own = code.Address(Deref(_SELF))
-        run = f"fcsl_run_{self.name}"
-        body: list[Statement] = [Set(_output("transition_request"), self._no_request)] if self._makes_requests else []
-        body += self._body()
-        unused = [] if _SELF.text in code.used_names(body) else [code.Unused(_SELF.text)]
-        comment = "Runs execute, but for its health."
-        yield Function(run, ((_SELF.text, self.pointer),), U32, (*unused, *body), comment)
-        yield self._execute([Set(_output("health"), health(0)), code.Return(Call(run, (own,)))])
-
-    @property
-    def _makes_requests(self) -> bool:
-        return ir.names_field(self.i.execute.body, "outputs", "transition_request")
+        """A tick makes the call of run_quiet. If the health is not nominal, or something is injected, it calls `begin`
+        before."""
+        nominal = Set(_output("health"), health(0))
+        if _is_plain(self.i):
+            yield self._execute([nominal, *self._body()])
+            return
+        body: list[Statement] = (
+            [Set(_output("transition_request"), self._no_request)] if _makes_requests(self.i) else []
+        )
+        run = Function(_run_name(self.m, self.i), ((_SELF.text, self.pointer),), U32, (*body, *self._body()))
+        yield replace(run, comment="Runs execute, but for its health.")
+        yield self._execute([nominal, code.Return(Call(run.name, (code.Address(Deref(_SELF)),)))])
 
     def _execute(self, body: list[Statement]) -> Function:
         parameters: list[tuple[str, code.Type]] = [(_SELF.text, self.pointer)]

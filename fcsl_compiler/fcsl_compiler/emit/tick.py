@@ -17,6 +17,7 @@ from .copies import copied
 from .expressions import code_type
 from .functions import HOST_TYPE
 from .inline_size import takes_bodies_in
+from .instances import run_quiet
 from .names import (
     channel_member,
     health,
@@ -310,7 +311,7 @@ class TickEmitter:
         if entry.instance in self.quiet:
             usual = (Binary("==", inject, Literal(0, code.U8)), Binary("==", health_of(instance), health(0)))
             runs = code.Or((code.And(usual), call_begin(self.m, instance)))
-            return If(runs, (Do(Call(f"fcsl_run_{own}", (this,)), unused=True),))
+            return If(runs, (run_quiet(self.m, instance, record),))
         arguments = (this, _HOST) if instance.execute.uses_hardware else (this,)
         worsen = If(Binary("!=", inject, Literal(0, code.U8)), (call_worsen(self.m, instance),))
         execute = Do(Call(f"{own}_execute", arguments), unused=True)
