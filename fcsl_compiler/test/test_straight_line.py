@@ -2,9 +2,11 @@
 """An `execute` on small constant matrices that becomes one sequence of scalar operations: the bits of CPython, whatever
 the matrices, the inputs and the path through the code. Which functions are written out, and which stay as they are."""
 
+import math
 import re
 from pathlib import Path
 from typing import Any
+from unittest.mock import patch
 
 import numpy as np
 import pytest
@@ -14,6 +16,7 @@ from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 
 from fcsl_compiler.driver.library import emit
+from fcsl_compiler.emit import straight_line
 
 FILTER = """\
 class Filter:
@@ -82,8 +85,9 @@ def test_bits_are_those_of_cpython(tmp_path_factory: pytest.TempPathFactory, dat
         )
     folder = tmp_path_factory.mktemp("straight")
     config = machine(folder, FILTER, n, m, parameters, True)
-    assert "for (" not in body(config, folder)
-    twins = Twins(config)
+    with patch.object(straight_line, "_MOST_STATEMENTS", 5000):
+        assert "for (" not in body(config, folder)
+        twins = Twins(config)
     for _ in range(12):
         twins.set("one.inputs.z", data.draw(st.lists(INPUTS, min_size=m, max_size=m)))
         for name in ("skip", "again"):
@@ -135,6 +139,40 @@ def test_fields_that_change_places(tmp_path: Path) -> None:
         twins.step()
         assert twins.get("one.outputs.x") == [(-1.0) ** tick * i for i in range(5)]
         assert np.array_equal(np.reshape(twins.get("one.outputs.turned"), (5, 5)), np.reshape(before, (5, 5)).T)
+
+
+SIGNS = """\
+class Filter:
+    inputs = {"a": "f64[N][N]", "up": "bool"}
+    outputs = {"x": "f64[N]", "sign": "f64", "early": "f64"}
+
+    def execute(self):
+        self.x = matvec(transpose(self.a), self.x)
+        zero = -0.0
+        if self.up:
+            zero = 0.0
+        self.sign = zero
+        for i in range(N):
+            if self.x[i] > 1.0:
+                self.early = f64(i)
+                return
+            self.x[i] = 1.5
+"""
+
+
+def test_zeros_of_both_signs_and_a_return_from_each_iteration(tmp_path: Path) -> None:
+    config = machine(tmp_path, SIGNS.replace("(N)", "(5)"), 5, 1, {}, True)
+    assert "for (" not in body(config, tmp_path)
+    twins = Twins(config)
+    for up in (True, False):
+        twins.set("one.inputs.up", up)
+        twins.step(4)
+        assert math.copysign(1.0, twins.get("one.outputs.sign")) == (1.0 if up else -1.0)
+
+
+def test_many_iterations_that_may_return_stay_a_loop(tmp_path: Path) -> None:
+    text = SIGNS.replace("range(N)", "range(5000)").replace("self.x[i]", "self.x[0]")
+    assert "for (" in body(machine(tmp_path, text, 5, 1, {}, True), tmp_path)
 
 
 STAYS = {

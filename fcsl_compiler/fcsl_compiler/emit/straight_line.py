@@ -14,6 +14,7 @@ _Unfit, and the function stays as it is.
 from __future__ import annotations
 
 import operator
+from collections import deque
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from typing import cast
@@ -28,6 +29,8 @@ from .expressions import zero
 _MOST_STATEMENTS = 600
 #: Maximum number of statements that are evaluated, those that only move values included.
 _MOST_EVALUATED = 20_000
+#: Maximum depth of branches, as in a loop that may return in each iteration.
+_MOST_NESTED = 40
 
 _INTEGERS: dict[str, Callable[[int, int], int]] = {"+": operator.add, "-": operator.sub, "*": operator.mul}
 _RELATIONS: dict[str, Callable[[int, int], bool]] = {
@@ -103,7 +106,7 @@ class _Evaluation:
         self.cells: dict[_Cell, code.Expr | None] = {}  # None: not assigned yet
         self.records: dict[tuple[str, str], _Window] = {}
         self.before: dict[_Cell, code.Place] = {}  # where the cells of outputs and states are stored
-        self.evaluated = self.made = self.calls = 0
+        self.evaluated = self.made = self.calls = self.nested = 0
 
     def of(self, function: Function) -> code.Body:
         for (record, name), type_ in self.fields.items():
@@ -159,10 +162,11 @@ class _Evaluation:
 
     # ---- statements --------------------------------------------------------------------------------------------------
 
-    def _run(self, items: list[_Item]) -> None:
+    def _run(self, statements: Iterable[_Item]) -> None:
         """Evaluates statements up to a return."""
+        items = deque(statements)
         while items:
-            (names, s), items = items[0], items[1:]
+            names, s = items.popleft()
             self.evaluated += 1
             if self.evaluated > _MOST_EVALUATED:
                 raise _Unfit
@@ -171,13 +175,13 @@ class _Evaluation:
                     self._assign_to(names, _RETURNED, s.value)
                 return
             if isinstance(s, code.For | code.Count | code.Scope):
-                items = [*self._opened(names, s), *items]
+                items.extendleft(reversed(self._opened(names, s)))
             elif isinstance(s, code.If):
                 is_true = self._decided(names, s.condition)
                 if is_true is not None:
-                    items = [*_items(names, s.then if is_true else s.otherwise), *items]
+                    items.extendleft(reversed(_items(names, s.then if is_true else s.otherwise)))
                 elif _returns(s):
-                    return self._if(names, s, items)
+                    return self._if(names, s, list(items))
                 else:
                     self._if(names, s, [])
             elif isinstance(s, code.At):
@@ -194,19 +198,25 @@ class _Evaluation:
             values = range(s.count)
         else:
             values = range(self._integer(names, s.start), self._integer(names, s.stop), s.step)
+        if len(values) * len(s.body) > _MOST_EVALUATED:
+            raise _Unfit
         return [item for value in values for item in _items({**names, s.name: value}, s.body)]
 
     def _if(self, names: _Names, s: code.If, rest: list[_Item]) -> None:
         """Evaluates both branches, each with the rest. A cell whose values differ then becomes a variable."""
         condition, before = self._value(names, s.condition), dict(self.cells)
+        self.nested += 1
+        if self.nested > _MOST_NESTED:
+            raise _Unfit
         with self.out.nested() as then:
             self._run([*_items(dict(names), s.then), *rest])
         one, self.cells = self.cells, dict(before)
         with self.out.nested() as otherwise:
             self._run([*_items(dict(names), s.otherwise), *rest])
         other, self.cells = self.cells, before
+        self.nested -= 1
         for cell in before:
-            if one[cell] == other[cell]:
+            if _is_same(one[cell], other[cell]):
                 self.cells[cell] = one[cell]
                 continue
             variable = Name(self._new())
@@ -379,6 +389,11 @@ def _returns(s: Statement) -> bool:
 def _is_constant(value: code.Expr) -> bool:
     """Whether the value can be used again: variables are assigned once, and fields are stored at the end."""
     return isinstance(value, Literal | Name | Element | Member)
+
+
+def _is_same(one: code.Expr | None, other: code.Expr | None) -> bool:
+    """Whether two values of a cell are equal in every bit: 0.0 and -0.0 are not."""
+    return one == other and not (isinstance(one, Literal) and str(one) != str(other))
 
 
 def _cell(block: _Window | _Memory, at: int) -> _Cell:
