@@ -7,6 +7,8 @@ import pytest
 from fcsl_test_abi import Machine
 from fcsl_test_tables import PUPPET, kind, machine
 
+from fcsl_compiler.driver.library import emit
+
 __all__ = ["kind"]  # runs all tests here on both kinds of machine
 
 
@@ -128,6 +130,21 @@ class Busy:
         for i in range(2000):
             self.sum += 0.5
 """
+
+
+def test_a_brief_instance_leaves_no_number(tmp_path: Path) -> None:
+    for name, text, noted in (("brief", BUSY.replace("2000", "200"), False), ("busy", BUSY, True)):
+        config = {
+            "instances": {"one": {"algorithm": name.capitalize()}},
+            "states": {"A": {"schedule": {"one": 1000}}},
+            "transitions": [],
+        }
+        folder = tmp_path / name
+        folder.mkdir()
+        machine(folder, config, **{name: text.replace("Busy", name.capitalize())})
+        (path,) = folder.glob("*.json")
+        emit([path], folder)
+        assert ("current_ = 0" in path.with_suffix(".c").read_text()) == noted
 
 
 def test_watchdog_sees_no_instance_between_ticks(tmp_path: Path) -> None:

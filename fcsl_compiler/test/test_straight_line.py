@@ -41,7 +41,7 @@ class Filter:
         self.steps += 1 if self.again else 2
 """
 
-ELEMENTS = st.sampled_from([0.0, 0.0, 0.0, 1.0, -1.0, 0.25, -3.0, 1e-3])
+ELEMENTS = st.sampled_from([0.0, 0.0, -0.0, 1.0, -1.0, 0.25, -3.0, 1e-3])
 INPUTS = st.sampled_from([-0.0, 1.5, -2.0, 1e300, float("inf"), float("nan")])
 
 
@@ -168,6 +168,43 @@ def test_zeros_of_both_signs_and_a_return_from_each_iteration(tmp_path: Path) ->
         twins.set("one.inputs.up", up)
         twins.step(4)
         assert math.copysign(1.0, twins.get("one.outputs.sign")) == (1.0 if up else -1.0)
+
+
+UNSIGNED = """\
+ONE: u32 = 1
+TWO: u32 = 2
+BIG: u64 = 4294967296
+
+
+def big(n: "u32", a: "f64[N][N]") -> "f64[N][N]":
+    if n - u32(2) > u32(5):
+        return transpose(a)
+    return a
+
+
+class Filter:
+    inputs = {"a": "f64[N][N]"}
+    outputs = {"x": "f64[N][N]", "wraps": "f64"}
+
+    def execute(self):
+        self.x = big(u32(1), self.a)
+        if ONE - TWO > 5:
+            self.wraps += 1.0
+        if BIG * BIG == 0:
+            self.wraps += 2.0
+"""
+
+
+def test_unsigned_numbers_wrap(tmp_path: Path) -> None:
+    twins = Twins(machine(tmp_path, UNSIGNED, 6, 1, {}, True))
+    twins.set("one.inputs.a", [float(i) for i in range(36)])
+    twins.step(2)
+    assert (twins.get("one.outputs.x")[1], twins.get("one.outputs.wraps")) == (6.0, 6.0)
+
+
+def test_tables_that_nothing_reads_any_more_are_left_out(tmp_path: Path) -> None:
+    body(machine(tmp_path, FILTER, 6, 2, of_model(6, 2), True), tmp_path)
+    assert "alg_Filter__one__f" not in (tmp_path / "straight.c").read_text()
 
 
 def test_many_iterations_that_may_return_stay_a_loop(tmp_path: Path) -> None:

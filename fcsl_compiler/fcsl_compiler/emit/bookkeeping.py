@@ -3,13 +3,17 @@
 
 from __future__ import annotations
 
+from collections import Counter
+
 from ..model import ir
 from ..model.machine import Machine
 from .names import sensors
-from .operations import operations
+from .operations import KINDS, operations
 
-#: Operations of an `execute` up to which it is brief: less than a tenth of a millisecond, elementary functions included.
+#: Operations of an `execute` up to which it is brief: it ends within a tenth of a millisecond.
 _BRIEF = 1000
+#: What a division or a function counts, of which some take 2 µs (measured: `%`, `atan2`, `**`).
+_LONG = 20
 
 
 def quiet_instances(machine: Machine) -> frozenset[int]:
@@ -31,5 +35,9 @@ def noted_instances(machine: Machine) -> frozenset[int]:
     for instance in machine.instances:
         f = instance.execute
         if f.name not in brief:
-            brief[f.name] = not instance.algorithm.effects and operations(f, machine.program).total() <= _BRIEF
+            brief[f.name] = not instance.algorithm.effects and _work(operations(f, machine.program)) <= _BRIEF
     return frozenset(n for n, i in enumerate(machine.instances) if not brief[i.execute.name])
+
+
+def _work(counts: Counter[str]) -> int:
+    return sum(n * (1 if kind in KINDS and kind != "divide" else _LONG) for kind, n in counts.items())

@@ -7,7 +7,7 @@ from ..model import code
 
 #: Blocks of at most this many elements are copied one by one. Of a short memcpy gcc makes loads of two elements at once.
 #: These wait until the stores of both have reached the cache, and keep the block out of registers (measured: a step of
-#: the lander takes 74 ns with memcpy and 39 ns without).
+#: the lander takes 73 ns with memcpy and 39 ns without).
 _SHORT_ELEMENTS = 16
 
 _I = code.Name("i_")

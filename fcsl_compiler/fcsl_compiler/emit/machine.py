@@ -24,6 +24,8 @@ from .straight_line import written_out
 
 def emit_machine(machine: Machine, places: FaultPlaces) -> code.Program:
     """`machine`: lowered. `places`: of its faults."""
+    functions = tuple(_functions(machine, places))
+    used = set().union(*(code.used_names(f.body) for f in functions))
     return code.Program(
         name=machine.name,
         source=machine.config.name,
@@ -32,8 +34,8 @@ def emit_machine(machine: Machine, places: FaultPlaces) -> code.Program:
         records=tuple(records(machine)),
         private_records=tuple(result_records(machine)),
         externs=tuple(_extern(machine, e) for e in machine.externs),
-        tables=tuple(_tables(machine)),
-        functions=tuple(_functions(machine, places)),
+        tables=tuple(_tables(machine, used)),
+        functions=functions,
         uses_hardware=any(f.uses_hardware for f, _ in machine.entries),
     )
 
@@ -84,16 +86,15 @@ def _parameter(machine: Machine, type_: Type, writable: bool = False) -> code.Ty
     return code.Pointer(made, writable) if isinstance(type_, Array | Struct) else made
 
 
-def _tables(machine: Machine) -> Iterator[code.Table]:
-    """Constants of modules with storage, and frozen parameters, that are used."""
-    read = set().union(*(ir.constants(f.body) for f, _ in machine.emitted))
+def _tables(machine: Machine, used: set[str]) -> Iterator[code.Table]:
+    """Constants of modules with storage, and frozen parameters, that functions use."""
     for (owner, name), (type_, values) in machine.program.constants.items():
-        if (owner, name) in read:
+        if constant_name(owner, name) in used:
             yield _table(machine, owner, name, type_, values)
     for instance in machine.instances:
         owner = f"{instance.algorithm.owner}__{instance.name}"
         for port in instance.algorithm.ports["parameters"]:
-            if port.name in instance.frozen and (owner, port.name) in read:
+            if port.name in instance.frozen and constant_name(owner, port.name) in used:
                 yield _table(machine, owner, port.name, port.type, instance.parameters[port.name])
 
 

@@ -83,13 +83,14 @@ class RareEmitter:
         self.m, self.places, self.quiet = machine, places, quiet
 
     def emit(self) -> Iterator[Function]:
-        if self.m.instances:
+        run = {entry.instance for state in self.m.states for entry in state.entries}
+        if run:
             yield self._fault()
-        if self.quiet:
+        if run & self.quiet:
             yield self._begin()
-        if len(self.quiet) < len(self.m.instances):
+        if run - self.quiet:
             yield self._worsen()
-        if any(i.max_wcet_us for i in self.m.instances):
+        if any(self.m.instances[n].max_wcet_us for n in run):
             yield self._overrun()
 
     def _function(

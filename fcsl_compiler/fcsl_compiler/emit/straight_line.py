@@ -4,7 +4,7 @@ sequence of scalar operations, whose intermediate values are constants.
 
 C compilers keep these values in registers, share equal ones and order all operations of a filter together. Arrays that
 pass from function to function stay in memory (measured, a Kalman filter of 6 states with constant matrices: 88 ns as
-calls of functions, 52 ns written out). Each operation, and its place in a sum, stays as it was: results keep their bits.
+calls of functions, 56 ns written out). Each operation, and its place in a sum, stays as it was: results keep their bits.
 
 The function is evaluated symbolically. The state is a table of cells, one for each scalar variable and each element of
 an array. Outputs and states are cells, too; their new values are stored at the end. What cannot be written out raises
@@ -14,7 +14,7 @@ _Unfit, and the function stays as it is.
 from __future__ import annotations
 
 import operator
-from collections import deque
+from collections import ChainMap, deque
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from typing import cast
@@ -25,7 +25,7 @@ from ..model.types import I64, Scalar
 from .code_body import CodeBody
 from .expressions import zero
 
-#: Maximum number of statements. Larger filters are faster as loops, whose operations are vectors.
+#: Maximum number of constants and variables. Larger filters are faster as loops, whose operations are vectors.
 _MOST_STATEMENTS = 600
 #: Maximum number of statements that are evaluated, those that only move values included.
 _MOST_EVALUATED = 20_000
@@ -103,10 +103,11 @@ class _Evaluation:
         self.fields, self.functions = fields, functions
         self.out = CodeBody()
         self.types: list[Scalar] = []  # by storage
-        self.cells: dict[_Cell, code.Expr | None] = {}  # None: not assigned yet
+        #: Values of cells; None: not assigned yet. A branch has what it assigns in a layer of its own.
+        self.cells: ChainMap[_Cell, code.Expr | None] = ChainMap()
         self.records: dict[tuple[str, str], _Window] = {}
         self.before: dict[_Cell, code.Place] = {}  # where the cells of outputs and states are stored
-        self.evaluated = self.made = self.calls = self.nested = 0
+        self.evaluated = self.made = self.calls = 0
 
     def of(self, function: Function) -> code.Body:
         for (record, name), type_ in self.fields.items():
@@ -123,7 +124,7 @@ class _Evaluation:
             raise _Unfit
         window = _Window(len(self.types))
         self.types.append(element)
-        self.cells |= {(window.storage, at): value for at, value in enumerate(values)}
+        self.cells.update({(window.storage, at): value for at, value in enumerate(values)})
         return window
 
     def _field(self, record: str, name: str, type_: code.Type) -> None:
@@ -204,28 +205,30 @@ class _Evaluation:
 
     def _if(self, names: _Names, s: code.If, rest: list[_Item]) -> None:
         """Evaluates both branches, each with the rest. A cell whose values differ then becomes a variable."""
-        condition, before = self._value(names, s.condition), dict(self.cells)
-        self.nested += 1
-        if self.nested > _MOST_NESTED:
+        condition, before = self._value(names, s.condition), self.cells
+        if len(before.maps) > _MOST_NESTED:
             raise _Unfit
-        with self.out.nested() as then:
-            self._run([*_items(dict(names), s.then), *rest])
-        one, self.cells = self.cells, dict(before)
-        with self.out.nested() as otherwise:
-            self._run([*_items(dict(names), s.otherwise), *rest])
-        other, self.cells = self.cells, before
-        self.nested -= 1
-        for cell in before:
-            if _is_same(one[cell], other[cell]):
-                self.cells[cell] = one[cell]
+        branches: list[list[Statement]] = []
+        layers: list[ChainMap[_Cell, code.Expr | None]] = []
+        for body in (s.then, s.otherwise):
+            self.cells = before.new_child()
+            with self.out.nested() as branch:
+                self._run([*_items(dict(names), body), *rest])
+            branches.append(branch)
+            layers.append(self.cells)
+        self.cells = before
+        for cell in dict.fromkeys(cell for layer in layers for cell in layer.maps[0] if cell in before):
+            one, other = (layer[cell] for layer in layers)
+            if _is_same(one, other):
+                before[cell] = one
                 continue
             variable = Name(self._new())
             self.out.add(code.Var(variable.text, self.types[cell[0]]))
-            for branch, value in ((then, one[cell]), (otherwise, other[cell])):
+            for branch, value in zip(branches, (one, other), strict=True):
                 if value is not None:
                     branch.append(Set(variable, value))
-            self.cells[cell] = variable
-        self.out.add(code.If(condition, tuple(then), tuple(otherwise)))
+            before[cell] = variable
+        self.out.add(code.If(condition, *map(tuple, branches)))
 
     def _statement(self, names: _Names, s: Statement) -> None:
         if isinstance(s, Let) and isinstance(s.type, Pointer):
@@ -360,9 +363,9 @@ class _Evaluation:
                 return found.value
         if isinstance(e, Sum):
             return e.constant + sum(self._integer(names, term) * stride for term, stride in e.terms)
-        if isinstance(e, code.Convert):
+        if isinstance(e, code.Convert) and e.type == I64:
             return self._integer(names, e.arg)
-        if isinstance(e, code.Operation) and e.op.name in _INTEGERS and len(e.args) == 2:
+        if isinstance(e, code.Operation) and e.op.name in _INTEGERS and len(e.args) == 2 and e.op.result == I64:
             return _INTEGERS[e.op.name](*(self._integer(names, a) for a in e.args))
         raise _Unfit
 

@@ -383,16 +383,6 @@ def records(body: tuple[Stmt, ...]) -> tuple[str, ...]:
     return tuple(r for r in RECORDS if r in used)
 
 
-def constants(body: tuple[Stmt, ...]) -> set[tuple[str, str]]:
-    """(owner, name) of every ModuleConst that a body reads."""
-
-    def read(e: Expr) -> set[tuple[str, str]]:
-        own = {(e.owner, e.name)} if isinstance(e, ModuleConst) else set()
-        return own.union(*map(read, children(e)))
-
-    return set().union(*(read(e) for s in walk(body) for e in expressions(s)))
-
-
 def names_field(statements: tuple[Stmt, ...], record: str, name: str) -> bool:
     """Whether a body reads or writes this field, wholly or in part."""
     return any((record, name) in variables(e) for s in walk(statements) for e in expressions(s))
