@@ -260,7 +260,8 @@ class Law:
     instance = {"algorithm": "Law", "parameters": {"fast": True, "n": 4}, "frozen": True, "inputs": {"a": 1.5}}
     path = write_machine(tmp_path, "m", {**ONE, "instances": {"one": instance}}, {"a": source})
     c = compile_machine(path, "").source
-    body = c[c.index("alg_Law__one__execute(") : c.index("void m_one_init")]
+    begun = c.index("alg_Law__one__execute(")
+    body = c[begun : c.index("\n}", begun)]
     assert "if (" not in body and "?" not in body and "fault" not in body and "outputs->x = 0.0" not in body
     machine = Machine.build(path)
     machine.step()
