@@ -229,6 +229,9 @@ def test_a_guard_has_the_device(tmp_path: Path) -> None:
     line = ["fcsl-guard", "-c", "import time; time.sleep(60)", "--actuator", f"motors=log:{tmp_path / 'log'}"]
     with subprocess.Popen(line, executable=sys.executable) as guard:
         try:
+            deadline = time.monotonic() + 60.0
+            while not Path(f"/proc/{guard.pid}/cmdline").read_bytes().startswith(b"fcsl-guard"):  # exec sets it late
+                assert time.monotonic() < deadline
             done = run(tmp_path, "calibrate", "esc", plan, "--output", "motors", "--yes-move-it", status=1)
         finally:
             guard.kill()
