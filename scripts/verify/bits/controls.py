@@ -18,7 +18,7 @@ _LIBM = [
 #: The lander's tick, 0.01 s; its last bit is the change.
 CONSTANT = ("0x1.47ae147ae147bp-7", "0x1.47ae147ae147cp-7")
 #: What an injected health becomes; so it is always degraded.
-_HEALTH = ("self->inject_fault > 2u ? FCSL_FAILED", "self->inject_fault > 3u ? FCSL_FAILED")
+_HEALTH = ("counters->inject_fault > 2u ? FCSL_FAILED", "counters->inject_fault > 3u ? FCSL_FAILED")
 
 SEEDED = replace(REFERENCE, name="control: last bit of one constant")
 _FORCED = replace(REFERENCE, name="control: a forced health")
