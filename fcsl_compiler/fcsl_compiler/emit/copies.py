@@ -18,7 +18,8 @@ def copied(to: code.Place, source: code.Place, type_: code.Type) -> code.Stateme
     if not isinstance(type_, code.Block):
         return code.Set(to, source)
     # Records are assigned: gcc 12 takes the first member of one for all bytes of a memcpy, and warns of an overflow.
-    if isinstance(type_.element, code.Named) or type_.count <= _SHORT_ELEMENTS:
+    is_short = type_.count <= _SHORT_ELEMENTS
+    if is_short or isinstance(type_.element, code.Named):
         element = code.Set(code.Element(to, _I), code.Element(source, _I))
-        return code.Count(_I.text, type_.count, (element,), type_.count if type_.count <= _SHORT_ELEMENTS else 0)
+        return code.Count(_I.text, type_.count, (element,), type_.count if is_short else 0)
     return code.Copy(to, source, type_)

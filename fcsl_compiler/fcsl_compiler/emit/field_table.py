@@ -102,15 +102,17 @@ def _instance_rows(machine: Machine, index: int, instance: Instance) -> list[Fie
                     )
                 )
     counters = [
-        ("faults", "FCSL_U64", "uint64_t", "executes that faulted"),
-        ("overruns", "FCSL_U64", "uint64_t", "executes longer than max_wcet_us"),
+        ("counters.faults", "FCSL_U64", "uint64_t", "executes that faulted"),
+        ("counters.overruns", "FCSL_U64", "uint64_t", "executes longer than max_wcet_us"),
     ]
-    counters.append(("fault_place", "FCSL_U32", "uint32_t", "number of the last fault's place; 0: none so far"))
+    counters.append(
+        ("counters.fault_place", "FCSL_U32", "uint32_t", "number of the last fault's place; 0: none so far")
+    )
     if index in machine.last_runs:
         counters.append(("last_run", "FCSL_U64", "uint64_t", "ticks completed after its last run; 0: it has not run"))
-    for counter, abi_type, c_type, doc in counters:
-        path = f"{instance.name}.counters.{counter}"
-        member = f"i_{instance.name}.{'last_run' if counter == 'last_run' else f'counters.{counter}'}"
+    for member_of_record, abi_type, c_type, doc in counters:
+        path = f"{instance.name}.counters.{member_of_record.removeprefix('counters.')}"
+        member = f"i_{instance.name}.{member_of_record}"
         rows.append(FieldRow(path, "COUNTER", abi_type, (), (), 1, member, c_type, index, "", doc))
     return rows
 

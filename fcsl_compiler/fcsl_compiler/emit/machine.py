@@ -54,7 +54,7 @@ def _functions(machine: Machine, places: FaultPlaces) -> Iterator[code.Function]
     yield from RareEmitter(machine, places, quiet).emit()
     for index, instance in enumerate(machine.instances):
         yield from InstanceEmitter(machine, instance, index in quiet).emit()
-    yield from StepEmitter(machine).emit()
+    yield from StepEmitter(machine, quiet).emit()
 
 
 def _fields(machine: Machine, algorithm: ir.Algorithm) -> dict[tuple[str, str], code.Type]:

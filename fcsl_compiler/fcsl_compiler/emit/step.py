@@ -36,15 +36,16 @@ _GREATEST_AGE = Literal(0xFFFF_FFFF, U32)
 class StepEmitter:
     """Makes the functions of the descriptor, callees first."""
 
-    def __init__(self, machine: Machine):
-        self.m = machine
+    def __init__(self, machine: Machine, quiet: frozenset[int]):
+        """`quiet`: instances, see bookkeeping.py."""
+        self.m, self.quiet = machine, quiet
         self.pointer = code.Pointer(code.Named(machine_type(machine)), writable=True)
 
     def emit(self) -> Iterator[Function]:
         yield self._init()
         if len(self.m.states) > 1:
             yield self._enter()
-        yield from TickEmitter(self.m).emit()
+        yield from TickEmitter(self.m, self.quiet).emit()
         yield self._step()
         yield self._force_state()
 

@@ -12,7 +12,7 @@ from ..model.c_names import c_name
 from ..model.code import Binary, Call, Deref, Do, Function, If, Literal, Member, Name, Set, Statement
 from ..model.machine import Channel, Connection, Edge, Entry, Instance, Machine, PortRef, State
 from ..model.types import BOOL, F64, I32, I64, U32, U64
-from .bookkeeping import noted_instances, quiet_instances
+from .bookkeeping import noted_instances
 from .copies import copied
 from .expressions import code_type
 from .functions import HOST_TYPE
@@ -86,10 +86,11 @@ def _if_any(name: str, body: Sequence[Statement]) -> tuple[Statement, ...]:
 class TickEmitter:
     """Makes one function per state, and its callees."""
 
-    def __init__(self, machine: Machine):
-        self.m = machine
+    def __init__(self, machine: Machine, quiet: frozenset[int]):
+        """`quiet`: instances, see bookkeeping.py."""
+        self.m, self.quiet = machine, quiet
         self.flatten = takes_bodies_in(machine)
-        self.noted, self.quiet = noted_instances(machine), quiet_instances(machine)
+        self.noted = noted_instances(machine)
         self.pointer = code.Pointer(code.Named(machine_type(machine)), writable=True)
         self.feeds: dict[int, list[Connection]] = {}
         for connection in machine.connections:
