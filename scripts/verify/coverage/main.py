@@ -162,7 +162,8 @@ def compare(
     file = counts.map.files[0]
     records: dict[int, list[list[Any]]] = {}
     for record in sorted(clang["mcdc_records"], key=lambda r: (r[0], r[1])):
-        records.setdefault(lines[record[0]], []).append(record[-1])
+        if record[0] in lines:  # not a decision of the machine's own
+            records.setdefault(lines[record[0]], []).append(record[-1])
     decisions = [d for d in file.decisions.values() if len(d.conditions) > 1]
     for decision in decisions:
         at = f"line {decision.at[0]}"
