@@ -11,7 +11,7 @@ import pytest
 from fcsl_test_abi import FROM_MACHINE, NONE, ROLES, TYPES, Machine
 
 from fcsl_compiler.driver.passes import PASSES, compile_machine
-from fcsl_compiler.driver.toolchain import FLAGS, compiler, include_dirs
+from fcsl_compiler.driver.toolchain import CXX, FLAGS, compiler, include_dirs
 from fcsl_compiler.emit.messages import message_name, message_text
 
 GOLDEN = Path(__file__).parent / "golden"
@@ -153,6 +153,9 @@ int main(void)
     small_law_t one;
     small_law_init(&one);
     if (one.parameters.step != 1 || small_law_execute(&one) != 0 || one.outputs.count != 1) { return 3; }
+    small_int_t alike;
+    small_int_init(&alike);
+    if (alike.inputs.echo != 5 || small_int_execute(&alike) != 0 || alike.outputs.count != -2) { return 5; }
     return m.tick == 1 && small_tr_REST == 1 && small_tr_none == 0 && small_STATE_REST == 1 ? 0 : 4;
 }
 """)
@@ -163,6 +166,8 @@ int main(void)
     subprocess.run([*command, *sources, str(math), "-lm", "-o", str(binary)], check=True)
     done = subprocess.run([str(binary)], capture_output=True, text=True, check=False)
     assert done.returncode == 0, done.stdout
+    in_cpp = [*CXX.compiler(), "-std=c++17", "-fsyntax-only", *command[3:], "-x", "c++", str(tmp_path / "small.h")]
+    subprocess.run(in_cpp, check=True)
 
 
 def emit_small(folder: Path) -> None:

@@ -22,12 +22,12 @@ _KIND = "fcslc build report"
 
 def compiled_facts(compilation: Compilation, compiled: Path, includes: Sequence[Path]) -> Facts:
     """Facts about a machine with object file `compiled`. Raises ToolchainError if the C compiler fails."""
+    assert compilation.lowered is not None
     try:
-        code: MachineCode | None = MachineCode(compilation.checked, compiled, compiled.parent, includes)
+        code: MachineCode | None = MachineCode(compilation.lowered, compiled, compiled.parent, includes)
         why = ""
     except NotReadable as error:
         code, why = None, str(error)
-    assert compilation.lowered is not None
     return machine_facts(compilation.lowered, compilation.stack_bound, code, why)
 
 

@@ -8,6 +8,8 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from ..driver.toolchain import compile_objects
+from ..emit.alike import alike
+from ..emit.instances import execute_name
 from ..emit.names import instance_type
 from ..model.machine import Machine, State
 from .bound import Bound, Bounder, Memory
@@ -57,7 +59,7 @@ def _cost(bounds: list[tuple[Bound, Bound, Bound]]) -> Cost:
 
 
 class MachineCode:
-    """The object file of one machine. Raises NotReadable if it cannot be analysed."""
+    """The object file of one machine, lowered. Raises NotReadable if it cannot be analysed."""
 
     def __init__(self, machine: Machine, compiled: Path, folder: Path, includes: Sequence[Path]):
         self.machine = machine
@@ -75,8 +77,8 @@ class MachineCode:
 
     def execute(self, instance: int) -> Cost:
         """Cost of one call of the instance's execute, including the code around the algorithm. Raises Unbounded."""
-        name = f"{self.machine.name}_{self.machine.instances[instance].name}_execute"
-        return _cost([self._bounds(name)])
+        first = self.machine.instances[alike(self.machine)[instance]]
+        return _cost([self._bounds(execute_name(self.machine, first))])
 
     def step(self, state: State, slot: Slot | None) -> Cost:
         """Cost of one tick in this state in which these entries are due (None: any of them, or all), with any previous

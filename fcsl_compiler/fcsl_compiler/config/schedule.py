@@ -49,19 +49,20 @@ def _edges(machine: Machine, state: State) -> list[Connection]:
 def _order(machine: Machine, state: State) -> list[int] | None:
     due = sorted(e.instance for e in state.entries)
     before: dict[int, set[int]] = {i: set() for i in due}
+    after: dict[int, set[int]] = {i: set() for i in due}
     for c in _edges(machine, state):
         before[c.target.instance].add(c.source.instance)
+        after[c.source.instance].add(c.target.instance)
     ready = [i for i in due if not before[i]]
     heapq.heapify(ready)
     order: list[int] = []
     while ready:
         instance = heapq.heappop(ready)
         order.append(instance)
-        for other in due:
-            if instance in before[other]:
-                before[other].discard(instance)
-                if not before[other]:
-                    heapq.heappush(ready, other)
+        for other in after[instance]:
+            before[other].discard(instance)
+            if not before[other]:
+                heapq.heappush(ready, other)
     return order if len(order) == len(due) else None
 
 
@@ -162,7 +163,8 @@ def _warn_old_values(machine: Machine, sink: DiagnosticSink) -> None:
     """Warns about a state that runs a reader but not its source. The reader then gets a value that another state
     left."""
     reads_health = {(c.source.instance, c.target.instance) for c in machine.connections if c.source.field == "health"}
-    running = {e.instance for state in machine.states for e in state.entries}
+    entries = [{e.instance: e for e in state.entries} for state in machine.states]
+    running = set().union(*entries)
     for c in machine.connections:
         source, target = c.source.instance, c.target.instance
         if source not in running or (source, target) in reads_health:
@@ -170,14 +172,13 @@ def _warn_old_values(machine: Machine, sink: DiagnosticSink) -> None:
         writer, reader = machine.instances[source], machine.instances[target]
         if c.source.field not in dict(assigned_outputs(writer.algorithm)):
             continue  # the writer is not scheduled by states
-        for state in machine.states:
-            entry = next((e for e in state.entries if e.instance == target), None)
-            if entry is not None and all(e.instance != source for e in state.entries):
+        for state, here in zip(machine.states, entries, strict=True):
+            if target in here and source not in here:
                 reads_health.add((source, target))
                 sink.warning(
                     "W206",
                     f"in state `{state.name}`, `{reader.name}` reads `{writer.name}`, which does not run there",
-                    entry.span,
+                    here[target].span,
                     why="the outputs keep old values",
                     help=f"schedule `{writer.name}` here, or connect `{writer.name}.outputs.health`: it is then stale",
                     notes=[(c.span, "it reads this")],

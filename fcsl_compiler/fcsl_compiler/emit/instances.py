@@ -54,11 +54,16 @@ def call(function: ir.Function, record: code.Place, fault: Name) -> code.Do:
     return code.Do(code.Call(function.name, (*arguments, *([code.Address(fault)] if function.faults else []))))
 
 
-def run_quiet(machine: Machine, instance: Instance, record: code.Place) -> code.Do:
-    """Runs execute of a quiet instance (bookkeeping.py), but for its health."""
-    if _is_plain(instance):
-        return call(instance.execute, record, _FAULT)
-    return code.Do(Call(_run_name(machine, instance), (code.Address(record),)), unused=True)
+def run_quiet(machine: Machine, first: Instance, record: code.Place) -> code.Do:
+    """Runs execute of a quiet instance (bookkeeping.py), but for its health. `first`: of those alike."""
+    if _is_plain(first):
+        return call(first.execute, record, _FAULT)
+    return code.Do(Call(_run_name(machine, first), (code.Address(record),)), unused=True)
+
+
+def execute_name(machine: Machine, instance: Instance) -> str:
+    """`instance`: the first of those alike for the definition that is compiled with the machine."""
+    return f"{machine.name}_{instance.name}_execute"
 
 
 def _run_name(machine: Machine, instance: Instance) -> str:
@@ -77,15 +82,17 @@ def _is_plain(instance: Instance) -> bool:
 class InstanceEmitter:
     """Makes the functions of one instance."""
 
-    def __init__(self, machine: Machine, instance: Instance, quiet: bool):
-        """`quiet`: see bookkeeping.py."""
-        self.m, self.i, self.quiet = machine, instance, quiet
+    def __init__(self, machine: Machine, instance: Instance, quiet: bool, first: Instance):
+        """`quiet`: see bookkeeping.py. `first`: of those alike (alike.py)."""
+        self.m, self.i, self.quiet, self.first = machine, instance, quiet, first
         self.pointer = code.Pointer(code.Named(instance_type(machine, instance)), writable=True)
         self.name = f"{machine.name}_{instance.name}"
 
     def emit(self) -> Iterator[Function]:
         yield self._init()
-        if self.quiet:
+        if self.first is not self.i:
+            yield self._as_first()
+        elif self.quiet:
             yield from self._quiet()
         else:
             yield self._execute([*self._pulses(health(0)), *self._body()])
@@ -100,7 +107,13 @@ class InstanceEmitter:
         comment = (
             "Zeroes the record, binds parameters and initial inputs. start() runs afterwards, in the machine's init."
         )
-        return Function(f"{self.name}_init", ((_SELF.text, self.pointer),), None, tuple(body), comment, exported=True)
+        parameters = ((_SELF.text, self.pointer),)
+        return Function(f"{self.name}_init", parameters, None, tuple(body), comment, exported=True, in_header=True)
+
+    def _as_first(self) -> Function:
+        host = (_HOST,) if self.i.execute.uses_hardware else ()
+        run = Call(execute_name(self.m, self.first), (_SELF, *host))
+        return replace(self._execute([code.Return(run)]), in_header=True)
 
     def _quiet(self) -> Iterator[Function]:
         """A tick makes the call of run_quiet. If the health is not nominal, or something is injected, it calls `begin`
@@ -121,7 +134,7 @@ class InstanceEmitter:
         if self.i.execute.uses_hardware:
             parameters.append((_HOST.text, HOST_TYPE))
         comment = "Runs execute once with the inputs in the record. Returns 0, or the place of a fault; outputs and state then stay."
-        return Function(f"{self.name}_execute", tuple(parameters), U32, tuple(body), comment, exported=True)
+        return Function(execute_name(self.m, self.i), tuple(parameters), U32, tuple(body), comment, exported=True)
 
     def _body(self) -> list[Statement]:
         """Calls execute. A fault has its effects. Returns 0, or the place of the fault."""

@@ -9,6 +9,7 @@ from ..model import code, ir
 from ..model.c_names import c_name
 from ..model.machine import Machine, Values
 from ..model.types import Array, Struct, Type
+from .alike import alike
 from .bookkeeping import quiet_instances
 from .expressions import code_type
 from .fault_places import FaultPlaces
@@ -52,8 +53,8 @@ def _functions(machine: Machine, places: FaultPlaces) -> Iterator[code.Function]
     yield from _called(bodies, machine)
     quiet = quiet_instances(machine)
     yield from RareEmitter(machine, places, quiet).emit()
-    for index, instance in enumerate(machine.instances):
-        yield from InstanceEmitter(machine, instance, index in quiet).emit()
+    for index, (instance, first) in enumerate(zip(machine.instances, alike(machine), strict=True)):
+        yield from InstanceEmitter(machine, instance, index in quiet, machine.instances[first]).emit()
     yield from StepEmitter(machine, quiet).emit()
 
 

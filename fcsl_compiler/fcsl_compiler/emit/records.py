@@ -10,6 +10,7 @@ from ..model.c_names import c_name
 from ..model.code import STATE, U8, Field, Named, Record
 from ..model.machine import Channel, Instance, Machine
 from ..model.types import I32, I64, U32, U64, Results
+from .alike import alike
 from .expressions import code_type
 from .names import (
     channel_member,
@@ -39,8 +40,9 @@ def records(machine: Machine) -> Iterator[Record]:
                 yield Record(record_type(machine, algorithm, record), ports)
     if machine.instances:
         yield counters_record(machine)
-    for index, instance in enumerate(machine.instances):
-        yield Record(instance_type(machine, instance), tuple(_instance(machine, index, instance)))
+    for index, (instance, first) in enumerate(zip(machine.instances, alike(machine), strict=True)):
+        like = instance_type(machine, machine.instances[first]) if first != index else ""
+        yield Record(instance_type(machine, instance), tuple(_instance(machine, index, instance)), like)
     for with_last_sample in sorted({c.name in machine.last_samples for c in sensors(machine)}):
         yield Record(channel_type(machine, with_last_sample), tuple(_channel(with_last_sample)))
     yield Record(machine_type(machine), tuple(_machine(machine)))

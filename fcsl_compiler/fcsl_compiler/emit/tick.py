@@ -12,12 +12,13 @@ from ..model.c_names import c_name
 from ..model.code import Binary, Call, Deref, Do, Function, If, Literal, Member, Name, Set, Statement
 from ..model.machine import Channel, Connection, Edge, Entry, Instance, Machine, PortRef, State
 from ..model.types import BOOL, F64, I32, I64, U32, U64
+from .alike import alike
 from .bookkeeping import noted_instances
 from .copies import copied
 from .expressions import code_type
 from .functions import HOST_TYPE
 from .inline_size import takes_bodies_in
-from .instances import run_quiet
+from .instances import execute_name, run_quiet
 from .names import (
     channel_member,
     health,
@@ -31,7 +32,7 @@ from .rare import call_begin, call_fault, call_overrun, call_worsen
 
 #: Maximum number of instances in one function. The time of C compilers grows faster than linearly with the size of a
 #: function.
-_PART = 50
+_PART = 25
 
 _HOST = Name("host")
 _NOW = Name("now_ns")
@@ -91,7 +92,9 @@ class TickEmitter:
         self.m, self.quiet = machine, quiet
         self.flatten = takes_bodies_in(machine)
         self.noted = noted_instances(machine)
+        self.alike = alike(machine)
         self.pointer = code.Pointer(code.Named(machine_type(machine)), writable=True)
+        self.delayed = {c.target.instance for c in machine.connections if c.delayed}
         self.feeds: dict[int, list[Connection]] = {}
         for connection in machine.connections:
             if not connection.delayed:
@@ -170,7 +173,7 @@ class TickEmitter:
         here = [e for e in self.m.edges if self.m.states[e.source] is state]
         wanted = {self.m.requests[e.request] for e in here if e.request >= 0}
         return (
-            any(c.delayed and c.target.instance == entry.instance for c in self.m.connections)
+            entry.instance in self.delayed
             or any(e.guard_instance == entry.instance and e.guard_mask & 7 for e in here)
             or bool(wanted & set(self.m.requests_of(self.m.instances[entry.instance])))
         )
@@ -306,16 +309,16 @@ class TickEmitter:
     def _execute(self, entry: Entry, instance: Instance) -> Statement:
         """Exactly one call of execute, used with and without injected health: a second inlined call would add to the
         stack."""
-        record, own = record_of(instance), f"{self.m.name}_{instance.name}"
+        record, first = record_of(instance), self.m.instances[self.alike[entry.instance]]
         this = code.Address(record)
         inject = Member(Member(record, "counters"), "inject_fault")
         if entry.instance in self.quiet:
             usual = (Binary("==", inject, Literal(0, code.U8)), Binary("==", health_of(instance), health(0)))
             runs = code.Or((code.And(usual), call_begin(self.m, instance)))
-            return If(runs, (run_quiet(self.m, instance, record),))
+            return If(runs, (run_quiet(self.m, first, record),))
         arguments = (this, _HOST) if instance.execute.uses_hardware else (this,)
         worsen = If(Binary("!=", inject, Literal(0, code.U8)), (call_worsen(self.m, instance),))
-        execute = Do(Call(f"{own}_execute", arguments), unused=True)
+        execute = Do(Call(execute_name(self.m, first), arguments), unused=True)
         is_fault = Binary("==", inject, Literal(1, code.U8))
         whole = If(is_fault, (call_fault(self.m, instance),), (execute, worsen))
         if not instance.algorithm.effects:

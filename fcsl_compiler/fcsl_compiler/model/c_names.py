@@ -80,18 +80,12 @@ def _float(value: float, suffix: str) -> str:
 
 def c_string(text: str) -> str:
     """A C string literal, ASCII only, without trigraphs."""
-    out = []
-    for byte in text.encode():
-        char = chr(byte)
-        if char in '"\\?':
-            out.append("\\" + char)
-        elif char == "\n":
-            out.append("\\n")
-        elif 32 <= byte < 127:
-            out.append(char)
-        else:
-            out.append(f"\\{byte:03o}")
-    return '"' + "".join(out) + '"'
+    return f'"{text.encode().decode("latin-1").translate(_ESCAPES)}"'
+
+
+#: What stands for a byte in a string literal, if not its character.
+_ESCAPES = {byte: f"\\{byte:03o}" for byte in (*range(32), *range(127, 256))}
+_ESCAPES |= {ord(char): f"\\{char}" for char in '"\\?'} | {ord("\n"): "\\n"}
 
 
 def c_comment(text: str) -> str:

@@ -8,7 +8,7 @@ variable, what a pointer points to, a member, an element, or a block of elements
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 from ..base.source import Span
@@ -239,12 +239,16 @@ def children(e: Expr) -> tuple[Expr, ...]:
     return ()
 
 
-def names(e: Expr) -> Iterator[str]:
+def names(e: Expr) -> list[str]:
     """The names in an expression."""
-    if isinstance(e, Name):
-        yield e.text
-    for child in children(e):
-        yield from names(child)
+    found, rest = [], [e]
+    while rest:
+        part = rest.pop()
+        if isinstance(part, Name):
+            found.append(part.text)
+        else:
+            rest += children(part)
+    return found
 
 
 # ---- statements ----------------------------------------------------------------------------------------------------
@@ -491,14 +495,18 @@ class Field:
 
 @dataclass(frozen=True)
 class Record:
+    """`like`: an earlier record with these fields, of which this is another name."""
+
     name: str
     fields: tuple[Field, ...]
+    like: str = ""
 
 
 @dataclass(frozen=True)
 class Function:
     """`inline`: "always", "hint", "usual" (as the compiler likes), "never" or "rare" (never, and far from other code).
-    `flatten`: its callees are inlined. `exported`: hosts may call it."""
+    `flatten`: its callees are inlined. `exported`: hosts may call it. `in_header`: it is defined in the header, so that
+    no compiler spends time on it where nobody calls it."""
 
     name: str
     parameters: tuple[tuple[str, Type], ...]
@@ -508,6 +516,7 @@ class Function:
     inline: str = "usual"
     flatten: bool = False
     exported: bool = False
+    in_header: bool = False
     span: Span | None = None
 
 

@@ -6,8 +6,9 @@ from __future__ import annotations
 
 from ...model import code
 from ...model.c_names import c_comment
+from .expressions import CExpressions
 from .source import print_record
-from .statements import prototype
+from .statements import CStatements, prototype
 from .writer import CWriter
 
 
@@ -15,9 +16,8 @@ def print_header(program: code.Program) -> str:
     w, name = CWriter(), program.name
     guard = f"{name.upper()}_H"
     w.block(f"/* {name}.h: made by fcslc from {c_comment(program.source)}. Do not edit. */")
-    w.block(
-        f"#ifndef {guard}\n#define {guard}\n\n#include <stdbool.h>\n#include <stdint.h>\n\n#include <fcsl/fcsl_machine.h>\n"
-    )
+    w.block(f"#ifndef {guard}\n#define {guard}\n\n#include <stdbool.h>\n#include <stdint.h>\n#include <string.h>")
+    w.block("\n#include <fcsl/fcsl_machine.h>\n")
     w.block('#ifdef __cplusplus\nextern "C" {\n#endif\n')
     w.line()
     for constants in (program.states, program.requests):
@@ -27,8 +27,11 @@ def print_header(program: code.Program) -> str:
         w.line()
     for record in program.records:
         print_record(w, record)
+    statements = CStatements(w, CExpressions({}))
     for function in program.functions:
-        if function.exported:
+        if function.in_header:
+            statements.function(function)
+        elif function.exported:
             w.line(f"/* {function.comment} */")
             w.line(f"{prototype(function)};")
             w.line()

@@ -54,7 +54,8 @@ def print_source(program: code.Program, prelude: str, extensions: Mapping[str, S
     functions = CWriter()
     statements = CStatements(functions, expressions)
     for function in program.functions:
-        statements.function(function)
+        if not function.in_header:
+            statements.function(function)
     helpers = expressions.helpers
     if any("fcsl_fault(" in text for text in helpers.values()):
         w.block(FAULT_HELPER)
@@ -67,6 +68,10 @@ def print_source(program: code.Program, prelude: str, extensions: Mapping[str, S
 
 
 def print_record(w: CWriter, record: code.Record) -> None:
+    if record.like:
+        w.line(f"typedef {record.like} {record.name};")
+        w.line()
+        return
     with w.braces("typedef struct", f"}} {record.name};"):
         for field in record.fields:
             comment = f" /* {c_comment(field.comment)} */" if field.comment else ""

@@ -45,9 +45,10 @@ class CStatements(Statements):
     def function(self, f: code.Function) -> None:
         w = self.w
         w.origin = f.span
-        if f.comment and not f.exported:
+        is_declared = f.exported and not f.in_header
+        if f.comment and not is_declared:
             w.line(f"/* {f.comment} */")
-        head = "" if f.exported else _ATTRIBUTES[f.inline] + " "
+        head = "" if is_declared else _ATTRIBUTES["hint" if f.in_header else f.inline] + " "
         if f.flatten:
             head = (
                 "static __attribute__((noinline, flatten)) "

@@ -40,7 +40,7 @@ class Module:
         for name in ("init", "execute", "initMachine", "step", "forceState", "volatileStore"):
             self.globals.of(name)
         #: Procs that are overloaded, by their names in C.
-        self.overloads = {f.name: f.name.rsplit("_", 1)[1] for f in program.functions if f.exported}
+        self.overloads = _overloads(program)
 
     def _enum(self, constants: tuple[str, ...], prefix: str, type_: str) -> None:
         names = Names()
@@ -49,7 +49,7 @@ class Module:
 
     def proc_name(self, f: code.Function) -> str:
         """Those of instances are overloaded: `init` and `execute` of a record."""
-        return f"{self.overloads[f.name]}*" if f.exported else self.globals.of(f.name)
+        return (self.overloads.get(f.name) or self.globals.of(f.name)) + ("*" if f.exported else "")
 
     def type_name(self, type_: code.Type) -> str:
         if isinstance(type_, Scalar):
@@ -60,6 +60,13 @@ class Module:
         if isinstance(type_, code.Block):
             return f"array[{type_.count}, {self.type_name(type_.element)}]"
         return "pointer" if type_ == code.UNTYPED else f"ptr {self.type_name(type_.target)}"
+
+
+def _overloads(program: code.Program) -> dict[str, str]:
+    """The names of exported procs. Of instances with one record the first alone has the short names."""
+    like = {r.name.removesuffix("_t") for r in program.records if r.like}
+    names = ((f.name, *f.name.rsplit("_", 1)) for f in program.functions if f.exported)
+    return {name: entry for name, record, entry in names if record not in like}
 
 
 def _capital(name: str) -> str:

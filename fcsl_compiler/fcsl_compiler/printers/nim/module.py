@@ -11,7 +11,7 @@ from ...model import code
 from ...model.effects import HARDWARE
 from ...model.ir import HARDWARE_HEADER
 from ...model.types import Scalar
-from ..c.source import GCC, print_externs
+from ..c.source import GCC, print_externs, print_record
 from ..c.writer import CWriter
 from .expressions import Module
 from .statements import NimStatements, print_table
@@ -113,9 +113,14 @@ def print_module(program: code.Program, print_descriptor: Callable[[CWriter], No
     w.paste((functions.lines, functions.origins))
     _face(w, module, program)
     data = CWriter()
+    if program.headers:
+        for record in (r for r in program.records if r.like):
+            print_record(data, record)
+    for header in program.headers:
+        data.line(f'#include "{header}"')
     print_externs(program, data)
     print_descriptor(data)
-    _emit(w, "/*VARSECTION*/\n" + "".join(f'#include "{h}"\n' for h in program.headers) + data.text())
+    _emit(w, "/*VARSECTION*/\n" + data.text())
     w.line("{.pop.}")
     return w
 
@@ -165,6 +170,9 @@ def _enum(w: NimWriter, module: Module, name: str, constants: tuple[str, ...]) -
 
 
 def _record(w: NimWriter, module: Module, record: code.Record) -> None:
+    if record.like:
+        w.line(f"  {module.types_of[record.name]}* = {module.types_of[record.like]}")
+        return
     w.line(f'  {module.types_of[record.name]}* {{.exportc: "{record.name}".}} = object')
     for field in record.fields:
         name = module.members.of(field.name)
