@@ -14,7 +14,8 @@ from fractions import Fraction
 from pathlib import Path
 
 from fcsl_compiler.base.diagnostics import Diagnostic, DiagnosticError, DiagnosticSink, Severity, nearest
-from fcsl_compiler.base.source import SourceError, SourceFile, Span
+from fcsl_compiler.base.files import SourceError
+from fcsl_compiler.base.source import SourceFile, Span
 from fcsl_compiler.config.views import Signals, read_views
 from fcsl_compiler.driver.cache import build_machine
 from fcsl_compiler.driver.toolchain import ToolchainError

@@ -1,12 +1,41 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Atomic writing of files, and digests of contents."""
+"""Bounded reading and atomic writing of files, and digests of contents."""
 
 from __future__ import annotations
 
 import hashlib
 import os
+import stat
 import tempfile
 from pathlib import Path
+from typing import TYPE_CHECKING
+
+if TYPE_CHECKING:
+    from .source import Span
+
+#: Maximum size of an input file. Larger files are rejected before parsing.
+MAX_SOURCE_BYTES = 1 << 20
+
+
+class SourceError(Exception):
+    """A source file that cannot be read as text. str() gives the reason, `span` the place in the file if there is
+    one."""
+
+    def __init__(self, message: str, span: Span | None = None):
+        super().__init__(message)
+        self.span = span
+
+
+def read_regular(path: Path, limit: int) -> bytes:
+    """Reads a regular file. Does not block on pipes or devices. Raises SourceError if it is not a regular file or too
+    large, and OSError."""
+    with open(path, "rb", opener=lambda name, flags: os.open(name, flags | os.O_NONBLOCK | os.O_NOCTTY)) as file:
+        if not stat.S_ISREG(os.fstat(file.fileno()).st_mode):
+            raise SourceError("it is not a regular file")
+        data = file.read(limit + 1)
+    if len(data) > limit:
+        raise SourceError(f"larger than {limit} bytes")
+    return data
 
 
 def digest(*parts: str | bytes) -> str:

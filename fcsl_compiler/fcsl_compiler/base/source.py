@@ -3,44 +3,20 @@
 
 from __future__ import annotations
 
-import os
 import re
-import stat
 from bisect import bisect_right
 from dataclasses import dataclass, field
 from pathlib import Path
 
+from .files import MAX_SOURCE_BYTES, SourceError, read_regular
+
 #: Maximum number of characters of a name. Names become identifiers, paths and ROS fields (runtimes accept 255 bytes of
 #: each).
 MAX_NAME = 100
-#: Maximum size of an input file. Larger files are rejected before parsing.
-MAX_SOURCE_BYTES = 1 << 20
-
 
 _NEWLINE = re.compile("\n")
 #: Bidirectional control characters. They can make an editor show text in an order other than that of the compiler.
 _REORDERING = re.compile("[\u061c\u200e\u200f\u202a-\u202e\u2066-\u2069]")
-
-
-class SourceError(Exception):
-    """A source file that cannot be read as text. str() gives the reason, `span` the place in the file if there is
-    one."""
-
-    def __init__(self, message: str, span: Span | None = None):
-        super().__init__(message)
-        self.span = span
-
-
-def read_regular(path: Path, limit: int) -> bytes:
-    """Reads a regular file. Does not block on pipes or devices. Raises SourceError if it is not a regular file or too
-    large, and OSError."""
-    with open(path, "rb", opener=lambda name, flags: os.open(name, flags | os.O_NONBLOCK | os.O_NOCTTY)) as file:
-        if not stat.S_ISREG(os.fstat(file.fileno()).st_mode):
-            raise SourceError("it is not a regular file")
-        data = file.read(limit + 1)
-    if len(data) > limit:
-        raise SourceError(f"larger than {limit} bytes")
-    return data
 
 
 def _lines(text: str) -> str:

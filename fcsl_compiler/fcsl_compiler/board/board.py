@@ -7,7 +7,8 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from ..base.diagnostics import Diagnostic, DiagnosticError, DiagnosticSink, Severity
-from ..base.source import SourceError, SourceFile
+from ..base.files import SourceError
+from ..base.source import SourceFile
 from ..model.machine import Machine
 from ..parse.json_reader import ConfigReader
 from ..parse.json_source import JsonNode, parse_json

@@ -6,7 +6,8 @@ from __future__ import annotations
 from pathlib import Path
 
 from ..base.diagnostics import Diagnostic, DiagnosticError
-from ..base.source import SourceError, SourceFile
+from ..base.files import SourceError
+from ..base.source import SourceFile
 from ..driver.passes import compile_machine
 from ..model.machine import Machine
 from ..parse.json_reader import ConfigReader

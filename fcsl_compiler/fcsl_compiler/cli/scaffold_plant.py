@@ -8,7 +8,7 @@ import os
 from dataclasses import dataclass
 from pathlib import Path
 
-from ..base.source import SourceError, read_regular
+from ..base.files import SourceError, read_regular
 from ..base.usage import UsageError
 from ..driver.passes import compile_machine
 from ..model.machine import Machine

@@ -8,7 +8,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
 
-from ..base.source import SourceError, read_regular
+from ..base.files import SourceError, read_regular
 from .mcdc import Vector, is_evaluation
 from .probe_map import MAX_WORDS, CoverError, CoverMap, Decision, FileMap, read_map
 

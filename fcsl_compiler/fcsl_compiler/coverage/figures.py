@@ -7,8 +7,8 @@ from collections.abc import Iterator
 from dataclasses import dataclass, replace
 from pathlib import Path
 
-from ..base.files import digest
-from ..base.source import SourceError, SourceFile, Span
+from ..base.files import SourceError, digest
+from ..base.source import SourceFile, Span
 from .counts import Counts
 from .mcdc import MAX_CONDITIONS, Tree, conditions, outcome_with, required, shown
 from .probe_map import Decision, FileMap, Loop, Place

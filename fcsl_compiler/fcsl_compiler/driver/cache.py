@@ -7,25 +7,31 @@ A cached machine loads in milliseconds, because the compiler is imported only if
 from __future__ import annotations
 
 import os
-from collections.abc import Sequence
-from dataclasses import dataclass
+from collections.abc import Iterator, Sequence
 from functools import cache
 from pathlib import Path
+from typing import NamedTuple
 
-from ..base.diagnostics import DiagnosticSink
 from ..base.files import digest
 from ..coverage.settings import BUILD_NOTE, COVER_DIR
 from ..model.choices import DEFAULT_BACKEND, DEFAULT_TARGET
-from ..parse.machine_files import parse_machine
+from ..parse.machine_texts import MachineTexts, package_of, read_texts
 from .backends import toolchain_of_backend
-from .c_dependencies import c_inputs, extern_inputs
 from .cache_entry import cached
-from .symbols import SymbolError, check_model_symbols
-from .toolchain import LANGUAGES, C, ToolchainError, include_dirs, link_shared, math_library, toolchain, unwritten
+from .toolchain import (
+    LANGUAGES,
+    C,
+    ToolchainError,
+    ask_version,
+    include_dirs,
+    link_shared,
+    math_library,
+    toolchain,
+    unwritten,
+)
 
 
-@dataclass(frozen=True)
-class BuiltMachine:
+class BuiltMachine(NamedTuple):
     """A compiled machine: its library, its name within the library, and its source hash (hex)."""
 
     library: Path
@@ -80,29 +86,40 @@ def _build_machine(config: Path, target: str, instances: Sequence[str] | None, b
 
 def _cache_key(config: Path, target: str, cover: bool, instances: Sequence[str] | None, backend: str) -> str | None:
     """Hash of all inputs of the library, computed without compiling. None if a source cannot be read."""
-    parsed = parse_machine(config, DiagnosticSink(), trees=False)
-    if parsed is None or (target not in parsed.targets and "targets" in parsed.keys):
-        return None
-    if any(algorithm.file is None for algorithm in parsed.algorithms.values()):
+    ask_version()
+    texts = read_texts(config)
+    externs = _extern_parts(config, target, texts) if texts is not None else None
+    if texts is None or externs is None:
         return None
     # A build for coverage contains the full paths of its files, one with a mesh that of the mesh.
-    name = f"{BUILD_NOTE} {config.resolve()}" if cover else str(config.resolve()) if parsed.has_mesh else config.name
-    parts: list[str | bytes] = [name, parsed.package, parsed.source.text, toolchain_of_backend(backend), _identity()]
-    if target in parsed.targets:
-        linked = parsed.targets[target]
-        c_files = extern_inputs(parsed, linked)
-        parts += [*linked.digest_parts, *c_files.digest_parts, c_files.probed]
-    for file in parsed.files:
-        parts += [file.source.name, file.source.text]
+    name = f"{BUILD_NOTE} {config.resolve()}" if cover else str(config.resolve()) if texts.has_mesh else config.name
+    parts = [name, package_of(config, config.stem), texts.text, _identity(), toolchain_of_backend(backend), *externs]
+    for file in texts.files.items():
+        parts += file
     return digest(*parts, *(() if instances is None else ("subset", *sorted(instances))))
+
+
+def _extern_parts(config: Path, target: str, texts: MachineTexts) -> list[str | bytes] | None:
+    """What the externs of a target are compiled from. None if the machine has targets, and not a valid one of this name."""
+    if "targets" not in texts.keys:
+        return []
+    from ..base.diagnostics import DiagnosticSink
+    from ..parse.machine_files import parse_machine
+    from .c_dependencies import extern_inputs
+
+    parsed = parse_machine(config, DiagnosticSink())
+    if parsed is None or target not in parsed.targets:
+        return None
+    linked = parsed.targets[target]
+    c_files = extern_inputs(parsed, linked)
+    return [*linked.digest_parts, *c_files.digest_parts, c_files.probed]
 
 
 @cache
 def _identity() -> str:
     """Hash of the compiler itself, the headers of generated C and the math library."""
-    # Without Path.rglob and Path.read_bytes, which take 1 ms of the 15 in which an unchanged machine loads.
-    package = Path(__file__).parents[1]
-    files = sorted(os.path.join(at, name) for at, _, names in os.walk(package) for name in names if name[-3:] == ".py")
+    # Without pathlib and file objects, which take 3 ms of the 15 in which an unchanged machine loads.
+    files = sorted(_python_files(str(Path(__file__).parents[1])))
     files += [f"{include_dirs()[0]}/fcsl/{name}" for name in ("fcsl_machine.h", "fcsl_hw.h", "fcsl_cover.h")]
     try:
         return digest(*map(_content, files), _math_stamp())
@@ -110,9 +127,21 @@ def _identity() -> str:
         raise ToolchainError(f"fcsl_compiler is not installed completely: {error}") from None
 
 
+def _python_files(folder: str) -> Iterator[str]:
+    with os.scandir(folder) as entries:
+        for entry in entries:
+            if entry.name.endswith(".py"):
+                yield entry.path
+            elif entry.name != "__pycache__" and entry.is_dir(follow_symlinks=False):
+                yield from _python_files(entry.path)
+
+
 def _content(path: str) -> bytes:
-    with open(path, "rb", buffering=0) as file:
-        return file.readall()
+    handle = os.open(path, os.O_RDONLY)
+    try:
+        return os.read(handle, os.fstat(handle).st_size)
+    finally:
+        os.close(handle)
 
 
 def _math_stamp() -> str:
@@ -126,6 +155,8 @@ def build_shared(sources: Sequence[Path], include: Sequence[Path], exports: Sequ
     exports: if there are any, the library has no other symbols. Raises ToolchainError, also if the sources call what a
     model must not call.
     """
+    from .c_dependencies import c_inputs
+
     includes = [*include, *include_dirs()]
     language = LANGUAGES.get(sources[0].suffix, C)
 
@@ -145,6 +176,8 @@ def build_shared(sources: Sequence[Path], include: Sequence[Path], exports: Sequ
 
 
 def _check_model(library: Path) -> None:
+    from .symbols import SymbolError, check_model_symbols
+
     try:
         check_model_symbols(library)
     except SymbolError as error:

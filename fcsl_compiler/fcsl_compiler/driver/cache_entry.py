@@ -10,8 +10,8 @@ from __future__ import annotations
 import json
 import os
 from collections.abc import Callable
-from dataclasses import dataclass
 from pathlib import Path
+from typing import NamedTuple
 
 from ..base.files import digest
 from .cache_folder import entry_folder, make_entry_folder
@@ -23,8 +23,7 @@ _FACTS = "built.json"
 _ATTEMPTS = 3
 
 
-@dataclass(frozen=True)
-class Built:
+class Built(NamedTuple):
     """A library of the cache, and what its builder noted about it."""
 
     library: Path

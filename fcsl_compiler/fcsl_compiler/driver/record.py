@@ -13,8 +13,7 @@ from collections.abc import Callable, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from ..base.files import digest, write_whole
-from ..base.source import SourceError, SourceFile
+from ..base.files import SourceError, digest, write_whole
 from .toolchain import ToolchainError, compiler, toolchain, toolchain_of
 
 if TYPE_CHECKING:  # a process that only loads a library does not import the compiler
@@ -87,6 +86,8 @@ def _changes(record: dict[str, Any], found: dict[str, Any]) -> list[str]:
 
 
 def _text(path: Path) -> str:
+    from ..base.source import SourceFile
+
     return SourceFile.read(path, path.name).text
 
 

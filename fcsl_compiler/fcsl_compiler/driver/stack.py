@@ -7,9 +7,6 @@ import re
 from collections.abc import Iterable, Sequence
 from pathlib import Path
 
-#: Makes gcc write one .ci file per source beside its output. It does not change the code.
-CALL_GRAPH_FLAG = "-fcallgraph-info=su,da"
-
 #: Stack in bytes of a leaf function of libc or libm (memcpy, fma, …), whose frame size is not reported, and of the red
 #: zone below the stack pointer (x86-64). `make verify` compares LEAF_BYTES with the code of every function that
 #: symbols.py allows.

@@ -10,12 +10,11 @@ import subprocess
 import tempfile
 from collections.abc import Callable, Mapping, Sequence
 from contextlib import suppress
-from dataclasses import dataclass
 from functools import cache
 from pathlib import Path
+from typing import NamedTuple
 
 from ..base.ament import PackageNotFound, package_prefix
-from .stack import CALL_GRAPH_FLAG
 
 #: Flags for every machine, the same as in fcsl_add_machine. Contraction and fast-math stay off, because they would
 #: change results.
@@ -23,6 +22,8 @@ FLAGS = ("-std=c11", "-O3", "-ffp-contract=off", "-fno-math-errno", "-fPIC", "-f
 #: Linker flags. Symbols are bound at link or load time, never later. The functions of fcsl_math are bound within the
 #: library, so that other libraries of the process cannot replace them.
 LINK_FLAGS = ("-Wl,-z,now", "-Wl,--no-undefined", "-Wl,--exclude-libs,libfcsl_math.a")
+#: Makes gcc write one .ci file per source beside its output. It does not change the code.
+_CALL_GRAPH_FLAG = "-fcallgraph-info=su,da"
 _COMPILE_TIMEOUT_S = 300
 
 
@@ -31,8 +32,7 @@ class ToolchainError(RuntimeError):
     own."""
 
 
-@dataclass(frozen=True)
-class Language:
+class Language(NamedTuple):
     """A language of sources: the variable that names its compiler, the command without it, and the flags."""
 
     name: str
@@ -63,16 +63,34 @@ def compiler() -> list[str]:
     return C.compiler()
 
 
+def ask_version() -> None:
+    """Begins to ask the C compiler for its version: it answers while the caller does something else."""
+    with suppress(OSError):
+        _asked(tuple(compiler()))
+
+
+@cache
+def _asked(command: tuple[str, ...]) -> subprocess.Popen[str]:
+    return subprocess.Popen(
+        [*command, "--version"], stdout=subprocess.PIPE, stderr=subprocess.DEVNULL, text=True, errors="replace"
+    )
+
+
 @cache
 def _version(command: tuple[str, ...], language: Language) -> str:
     try:
-        done = subprocess.run([*command, "--version"], capture_output=True, text=True, timeout=30, check=False)
-    except (OSError, subprocess.TimeoutExpired):
+        asked = _asked(command)
+    except OSError:
         raise language.absent(" ".join(command)) from None
-    if done.returncode != 0:
+    try:
+        printed, _ = asked.communicate(timeout=30)
+    except subprocess.TimeoutExpired:
+        asked.kill()
+        raise language.absent(" ".join(command)) from None
+    if asked.returncode != 0:
         fix = f"set {language.variable} to a {language.name} compiler"
         raise ToolchainError(f"`{' '.join(command)} --version` failed; {fix}")
-    return done.stdout.splitlines()[0] if done.stdout else ""
+    return printed.splitlines()[0] if printed else ""
 
 
 def toolchain(language: Language = C) -> str:
@@ -125,11 +143,11 @@ def math_library() -> Path:
 def call_graph_flag(command: tuple[str, ...]) -> list[str]:
     """The flag for call graphs, if the compiler supports it (gcc since 10; clang does not)."""
     try:
-        probe = [*command, CALL_GRAPH_FLAG, "-E", "-x", "c", os.devnull]
+        probe = [*command, _CALL_GRAPH_FLAG, "-E", "-x", "c", os.devnull]
         done = subprocess.run(probe, capture_output=True, text=True, timeout=30, check=False)
     except (OSError, subprocess.TimeoutExpired):
         return []
-    return [CALL_GRAPH_FLAG] if done.returncode == 0 else []
+    return [_CALL_GRAPH_FLAG] if done.returncode == 0 else []
 
 
 def run_compiler(command: Sequence[str], environment: Mapping[str, str] | None = None, language: Language = C) -> bytes:

@@ -9,10 +9,12 @@ from dataclasses import dataclass, field
 from pathlib import Path
 
 from ..base.diagnostics import DiagnosticSink
-from ..base.source import MAX_NAME, SourceError, SourceFile, Span
+from ..base.files import SourceError
+from ..base.source import MAX_NAME, SourceFile, Span
 from ..model.target import Target
 from .json_reader import ConfigReader
 from .json_source import JsonNode, parse_json, text_without
+from .machine_texts import package_of
 from .python_source import is_ignored_module, parse_python, span_of
 from .source_path import SourcePathError, resolve_source
 from .targets import read_targets
@@ -25,9 +27,6 @@ _TAKEN = re.compile(
     r"lldiv|fpos|locale|math|string|strings|stdint|stddef|stdbool|stdlib|stdio|limits|errno|features|assert|ctype|fenv|setjmp|"
     r"signal|stdarg|complex|tgmath|iso646|inttypes|endian|alloca|memory"
 )
-
-#: Matches an import anywhere in the text, also across lines. A false match is harmless.
-_IMPORT = re.compile(r"\bfrom[\s\\]+([A-Za-z_]\w*(?:[\s\\]*\.[\s\\]*[A-Za-z_]\w*)*)[\s\\]*\bimport\b")
 
 #: Maximum length of a chain of imports. They are read recursively.
 MAX_IMPORTS = 32
@@ -55,7 +54,7 @@ _OPTIONAL = (
 
 @dataclass(frozen=True)
 class ParsedFile:
-    """One algorithm file. `tree` is None if it is not valid Python (reported) or was not requested."""
+    """One algorithm file. `tree` is None if it is not valid Python (reported)."""
 
     source: SourceFile
     tree: ast.Module | None
@@ -108,23 +107,14 @@ class ParsedMachine:
         return Path(self.source.path).parent
 
     @property
-    def has_mesh(self) -> bool:
-        """Whether `views` name the file of a mesh."""
-        body = self.keys["views"].get("body") if "views" in self.keys else None
-        return body is not None and body.get("mesh") is not None
-
-    @property
     def files(self) -> list[ParsedFile]:
         """All algorithm files, each once, in JSON order."""
         files = [file for a in self.algorithms.values() if a.file is not None for file in a.file.all]
         return list({file.source.name: file for file in files}.values())
 
 
-def parse_machine(path: Path, sink: DiagnosticSink, trees: bool = True) -> ParsedMachine | None:
-    """Reads a machine and reports errors. Returns None if the machine JSON itself is unusable.
-
-    If `trees` is false, algorithm files are read but not parsed.
-    """
+def parse_machine(path: Path, sink: DiagnosticSink) -> ParsedMachine | None:
+    """Reads a machine and reports errors. Returns None if the machine JSON itself is unusable."""
     name = path.stem
     try:
         source = SourceFile.read(path, path.name)
@@ -151,14 +141,14 @@ def parse_machine(path: Path, sink: DiagnosticSink, trees: bool = True) -> Parse
         return None
     for key in ("$schema", "description"):
         reader.string(keys.get(key), f"`{key}`")
-    files = _Files(path, reader.sink, trees)
+    files = _Files(path, reader.sink)
     algorithms = {
         key: _parse_algorithm(key, definition, span, files, reader)
         for key, (definition, span) in reader.named(keys.get("algorithms"), "`algorithms`").items()
     }
     targets = read_targets(keys.get("targets"), path, reader)
     hashed_text = text_without(source, root, "views")
-    return ParsedMachine(name, source, _package_of(path, name), keys, algorithms, targets, hashed_text)
+    return ParsedMachine(name, source, package_of(path, name), keys, algorithms, targets, hashed_text)
 
 
 def is_machine_name(name: str) -> bool:
@@ -200,8 +190,8 @@ def _parse_algorithm(
 class _Files:
     """Reads each file and its imports once."""
 
-    def __init__(self, config: Path, sink: DiagnosticSink, trees: bool):
-        self.config, self.sink, self.trees = config, sink, trees
+    def __init__(self, config: Path, sink: DiagnosticSink):
+        self.config, self.sink = config, sink
         self._read: dict[Path, ParsedFile | None] = {}
 
     def read(self, text: str, at: Span, depth: int = 0) -> ParsedFile | None:
@@ -224,7 +214,7 @@ class _Files:
             fix = "remove it, or save the file as UTF-8" if error.span else fix
             self.sink.error("E100", f"cannot read `{text}`: {error}", error.span or at, help=fix)
             return None
-        file = ParsedFile(source, parse_python(source, self.sink) if self.trees else None)
+        file = ParsedFile(source, parse_python(source, self.sink))
         self._read[path] = file
         for module, span in self._modules(file):
             beside = f"{module.replace('.', '/')}.py"
@@ -234,13 +224,9 @@ class _Files:
         return file
 
     def _modules(self, file: ParsedFile) -> list[tuple[str, Span]]:
-        """Modules that a file may import from, in file order. Without a tree (for a cache key), everything that matches
-        _IMPORT."""
-        if file.tree is None:
-            whole = file.source.whole()
-            found = [(re.sub(r"[\s\\]", "", m[1]), whole) for m in _IMPORT.finditer(file.source.text)]
-        else:
-            found = [(module, span_of(file.source, node)) for node in file.tree.body for module in _imported(node)]
+        """Modules that a file may import from, in file order. None of one that is not valid Python."""
+        body = file.tree.body if file.tree is not None else []
+        found = [(module, span_of(file.source, node)) for node in body for module in _imported(node)]
         return [(module, span) for module, span in found if not is_ignored_module(module)]
 
 
@@ -256,15 +242,3 @@ def _imported(node: ast.stmt) -> list[str]:
     if isinstance(node, ast.Import):
         return [alias.name for alias in node.names]
     return [node.module] if isinstance(node, ast.ImportFrom) and node.level == 0 and node.module else []
-
-
-def _package_of(path: Path, name: str) -> str:
-    """The ROS package that contains the machine (from the nearest package.xml above it). The machine's name if there is
-    none."""
-    for folder in path.resolve().parents:
-        manifest = folder / "package.xml"
-        if manifest.is_file():
-            match = re.search(r"<name>\s*([a-z][a-z0-9_]*)\s*</name>", manifest.read_text(errors="replace"))
-            if match:
-                return match.group(1)
-    return name

@@ -3,6 +3,7 @@
 
 from __future__ import annotations
 
+import os
 from pathlib import Path
 
 from ..base.ament import PackageNotFound, package_share
@@ -41,8 +42,7 @@ def resolve_source(text: str, *, config: Path) -> Path:
 def _stays(path: Path, config: Path) -> bool:
     """Whether a path is in the folder of `config`, also after resolving symbolic links. If `config` is a link (colcon
     installs links), the folder of its target is allowed too."""
-    try:
-        target = path.resolve()
-        return any(target.is_relative_to(folder) for folder in (config.parent.resolve(), config.resolve().parent))
-    except (OSError, RuntimeError):  # a cycle of links; reading the file reports it
-        return True
+    # Of a cycle of links realpath resolves as much as it can; reading the file reports it.
+    target = os.path.realpath(path)
+    folders = os.path.realpath(config.parent), os.path.dirname(os.path.realpath(config))
+    return any(target == folder or target.startswith(f"{folder.rstrip(os.sep)}{os.sep}") for folder in folders)

@@ -7,7 +7,8 @@ import re
 from pathlib import Path
 
 from ..base.diagnostics import Diagnostic, DiagnosticError, Severity, nearest
-from ..base.source import SourceError, SourceFile, Span, read_regular
+from ..base.files import SourceError, read_regular
+from ..base.source import SourceFile, Span
 from ..model.target import Target
 from .json_reader import ConfigReader
 from .json_source import JsonNode

@@ -44,13 +44,19 @@ def build_config(
     Returns its library and the machine's name. Raises TwinError.
     """
     config = find_config(path)
-    from fcsl_compiler.base.diagnostics import DiagnosticError
     from fcsl_compiler.driver.cache import build_machine
-    from fcsl_compiler.driver.toolchain import ToolchainError
 
     check_backend(backend)
     try:
         built = build_machine(config, target, instances, backend)
-    except (DiagnosticError, ToolchainError) as error:
+    except _refusals() as error:
         raise TwinError(str(error)) from None
     return built.library, built.name
+
+
+def _refusals() -> tuple[type[Exception], ...]:
+    """The compiler's errors. Their module is imported where one was raised, not for a machine of the cache."""
+    from fcsl_compiler.base.diagnostics import DiagnosticError
+    from fcsl_compiler.driver.toolchain import ToolchainError
+
+    return DiagnosticError, ToolchainError

@@ -81,6 +81,29 @@ def threads(process: int) -> int:
     return len(os.listdir(f"/proc/{process}/task"))
 
 
+def waits(process: int) -> dict[str, int]:
+    """How often each thread has gone to sleep."""
+    found = {}
+    for task in Path(f"/proc/{process}/task").iterdir():
+        lines = (task / "status").read_text().splitlines()
+        found[task.name] = int(next(line.split()[1] for line in lines if line.startswith("voluntary_ctxt_switches:")))
+    return found
+
+
+def test_the_server_sleeps_until_somebody_asks(path: Path) -> None:
+    with flying("--socket", path) as fc:
+        client = fc.client(path)
+        client.ok("state")  # no time limit runs for whoever has asked
+        time.sleep(0.1)
+        begun = waits(fc.process.pid)
+        time.sleep(1)
+        slept = waits(fc.process.pid)
+        client.ok("state")
+        time.sleep(0.1)
+        woken = waits(fc.process.pid)
+        assert any(slept[t] == begun[t] and woken[t] > slept[t] for t in begun), (begun, slept, woken)
+
+
 def resident_kib(process: int) -> int:
     text = Path(f"/proc/{process}/status").read_text()
     return int(next(line.split()[1] for line in text.splitlines() if line.startswith("VmRSS:")))

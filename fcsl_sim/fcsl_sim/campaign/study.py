@@ -10,7 +10,8 @@ from fractions import Fraction
 from pathlib import Path
 
 from fcsl_compiler.base.diagnostics import DiagnosticSink, nearest
-from fcsl_compiler.base.source import SourceError, SourceFile, Span
+from fcsl_compiler.base.files import SourceError
+from fcsl_compiler.base.source import SourceFile, Span
 from fcsl_compiler.model.types import Scalar, scalar_of, shape_of
 from fcsl_compiler.parse.json_reader import ConfigReader
 from fcsl_compiler.parse.json_source import JsonNode, parse_json

@@ -13,7 +13,8 @@ from typing import Any
 import numpy as np
 
 from fcsl_compiler.base.diagnostics import DiagnosticSink
-from fcsl_compiler.base.source import SourceError, SourceFile
+from fcsl_compiler.base.files import SourceError
+from fcsl_compiler.base.source import SourceFile
 from fcsl_compiler.model.types import shape_of
 from fcsl_compiler.parse.json_reader import ConfigReader
 from fcsl_compiler.parse.json_source import JsonNode, parse_json

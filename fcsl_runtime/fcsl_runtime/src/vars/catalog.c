@@ -112,6 +112,9 @@ static const entry_t *look_up(const catalog_t *catalog, const char *path, size_t
 {
     char own[2 * PATH_BYTES_MAX];
     size_t at = 0;
+    if (path[length] == '\0' && strchr(path, ',') == NULL) {
+        return fcsl_catalog_entry(catalog, path);
+    }
     for (size_t i = 0; i < length; i++) {
         if (path[i] == ',') {
             own[at++] = ']';

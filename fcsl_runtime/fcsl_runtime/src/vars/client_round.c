@@ -22,25 +22,24 @@ void fcsl_vars_close_client(fcsl_vars_t *vars, client_t *client)
     }
 }
 
-void fcsl_vars_send(fcsl_vars_t *vars, client_t *client)
+void fcsl_vars_send(fcsl_vars_t *vars, client_t *client, uint64_t now_ns)
 {
-    if (!fcsl_client_send(client, fcsl_run_monotonic_ns(NULL)) ||
-        (client->closing && fcsl_client_unsent(client) == 0)) {
+    if (!fcsl_client_send(client, now_ns) || (client->closing && fcsl_client_unsent(client) == 0)) {
         fcsl_vars_close_client(vars, client);
     }
 }
 
 /* Tells it why, as far as it still reads, and closes. */
-static void drop(fcsl_vars_t *vars, client_t *client, const char *code, const char *why)
+static void drop(fcsl_vars_t *vars, client_t *client, const char *code, const char *why, uint64_t now_ns)
 {
     json_out_t out = fcsl_client_room(client, OUT_BYTES);
     fcsl_commander_error(&out, code, why);
     if (!out.overflow) {
-        fcsl_client_put(client, &out, fcsl_run_monotonic_ns(NULL));
+        fcsl_client_put(client, &out, now_ns);
     }
     atomic_fetch_add(&vars->counters.clients_dropped, 1);
     client->closing = 1;
-    fcsl_vars_send(vars, client);
+    fcsl_vars_send(vars, client, now_ns);
 }
 
 /* A reply of the longest kind fits behind what is unsent. */
@@ -51,14 +50,14 @@ static int may_reply(const client_t *client)
 }
 
 /* Serves one line; 0 when there is none that can be served now. */
-static int serve_line(fcsl_vars_t *vars, client_t *client)
+static int serve_line(fcsl_vars_t *vars, client_t *client, uint64_t now_ns)
 {
     size_t size = 0;
     const char *line = may_reply(client) ? fcsl_client_line(client, &size) : NULL;
     if (line == NULL) {
         if (size > REQUEST_BYTES_MAX) {
             atomic_fetch_add(&vars->counters.requests_refused, 1);
-            drop(vars, client, "too_large", "a request has at most 65536 bytes");
+            drop(vars, client, "too_large", "a request has at most 65536 bytes", now_ns);
         }
         return 0;
     }
@@ -68,50 +67,50 @@ static int serve_line(fcsl_vars_t *vars, client_t *client)
     if (client->blocked) {
         return 0;
     }
-    fcsl_client_next(client, size, fcsl_run_monotonic_ns(NULL));
+    fcsl_client_next(client, size, now_ns);
     client->waiting = serving == POSTED;
     if (client->waiting) {
         vars->poster = (uint32_t)(client - vars->clients);
         vars->tick_by_ns = 0;
         return 0;
     }
-    fcsl_client_put(client, &out, fcsl_run_monotonic_ns(NULL));
+    fcsl_client_put(client, &out, now_ns);
     if (serving == UNTRUSTED) {
         atomic_fetch_add(&vars->counters.clients_dropped, 1);
         client->closing = 1;
     } else if (client->session.bad_in_a_row >= BAD_IN_A_ROW_MAX) {
-        drop(vars, client, "bad_json", "16 requests in a row were no JSON");
+        drop(vars, client, "bad_json", "16 requests in a row were no JSON", now_ns);
         return 0;
     }
-    fcsl_vars_send(vars, client);
+    fcsl_vars_send(vars, client, now_ns);
     return 1;
 }
 
-void fcsl_vars_serve_client(fcsl_vars_t *vars, client_t *client, short events)
+void fcsl_vars_serve_client(fcsl_vars_t *vars, client_t *client, short events, uint64_t now_ns)
 {
     size_t size = 0;
     if (client->waiting && (events & (POLLHUP | POLLERR)) != 0) {
         fcsl_vars_close_client(vars, client); /* nobody is there for the reply, nor for the rest of a long `tick` */
         return;
     }
-    if ((events & (POLLIN | POLLHUP | POLLERR)) != 0 && !fcsl_client_receive(client, fcsl_run_monotonic_ns(NULL))) {
+    if ((events & (POLLIN | POLLHUP | POLLERR)) != 0 && !fcsl_client_receive(client, now_ns)) {
         fcsl_vars_close_client(vars, client);
         return;
     }
-    for (int i = 0; i < REQUESTS_PER_ROUND && client->fd >= 0 && serve_line(vars, client); i++) {
+    for (int i = 0; i < REQUESTS_PER_ROUND && client->fd >= 0 && serve_line(vars, client, now_ns); i++) {
     }
     if (client->fd >= 0 && client->ended && !client->waiting && !client->blocked &&
         fcsl_client_line(client, &size) == NULL) {
         client->closing = 1;
     }
     if (client->fd >= 0 && (fcsl_client_unsent(client) > 0 || client->closing)) {
-        fcsl_vars_send(vars, client);
+        fcsl_vars_send(vars, client, now_ns);
     }
-    const char *why = client->fd >= 0 ? fcsl_client_overdue(client, fcsl_run_monotonic_ns(NULL)) : NULL;
+    const char *why = client->fd >= 0 ? fcsl_client_overdue(client, now_ns) : NULL;
     if (why != NULL && client->closing) {
         fcsl_vars_close_client(vars, client);
     } else if (why != NULL) {
-        drop(vars, client, "too_slow", why);
+        drop(vars, client, "too_slow", why, now_ns);
         if (client->fd >= 0 && client->unsent_since_ns != 0) {
             fcsl_vars_close_client(vars, client);
         }
@@ -151,12 +150,12 @@ static client_t *find_untrusted(fcsl_vars_t *vars)
 }
 
 /* A free place, or null. Whoever has not sent the token cannot keep it from those who have. */
-static client_t *find_place(fcsl_vars_t *vars)
+static client_t *find_place(fcsl_vars_t *vars, uint64_t now_ns)
 {
     client_t *untrusted = find_untrusted(vars);
     if (untrusted != NULL) {
         drop(vars, untrusted, "too_many_clients",
-             "too many connections have sent no token: this one has waited longest");
+             "too many connections have sent no token: this one has waited longest", now_ns);
         if (untrusted->fd >= 0) {
             fcsl_vars_close_client(vars, untrusted);
         }
@@ -169,7 +168,7 @@ static client_t *find_place(fcsl_vars_t *vars)
     return NULL;
 }
 
-void fcsl_vars_accept(fcsl_vars_t *vars)
+void fcsl_vars_accept(fcsl_vars_t *vars, uint64_t now_ns)
 {
     for (size_t i = 0; i <= CLIENTS_MAX; i++) {
         const int fd = accept4(vars->listener.fd, NULL, NULL, SOCK_CLOEXEC | SOCK_NONBLOCK);
@@ -178,19 +177,19 @@ void fcsl_vars_accept(fcsl_vars_t *vars)
         }
         if (fd < 0) {
             /* Out of descriptors, say. It would be tried in every round, and nothing would have changed. */
-            vars->accept_at_ns = fcsl_run_monotonic_ns(NULL) + POLL_MS * UINT64_C(1000000);
+            vars->accept_at_ns = now_ns + POLL_MS * UINT64_C(1000000);
             atomic_fetch_add(&vars->counters.clients_dropped, 1);
             return;
         }
         if (vars->listener.tcp) {
             tune_tcp(fd);
         }
-        client_t *client = find_place(vars);
+        client_t *client = find_place(vars, now_ns);
         if (client != NULL) {
             const uint32_t place = (uint32_t)(client - vars->clients);
             vars->used = place < vars->used ? vars->used : place + 1u;
             client->number = vars->connections++;
-            fcsl_client_begin(client, fd, vars->listener.secret[0] == '\0', fcsl_run_monotonic_ns(NULL));
+            fcsl_client_begin(client, fd, vars->listener.secret[0] == '\0', now_ns);
             continue;
         }
         char text[256];
@@ -209,9 +208,12 @@ int fcsl_vars_watch(const client_t *client, struct pollfd *entry)
     const int more = client->received <= REQUEST_BYTES_MAX && may_reply(client) && !client->ended;
     *entry = (struct pollfd){.fd = -1};
     if (client->fd < 0) {
-        return 0;
+        return FOREVER;
     }
     entry->events = (short)((more ? POLLIN : 0) | (fcsl_client_unsent(client) > 0 ? POLLOUT : 0));
     entry->fd = entry->events != 0 || client->waiting ? client->fd : -1; /* poll tells of a hang-up unasked */
-    return may_reply(client) && client->received > 0 && fcsl_client_line(client, &size) != NULL;
+    if (may_reply(client) && client->received > 0 && fcsl_client_line(client, &size) != NULL) {
+        return 0; /* a request was left for the coming round */
+    }
+    return client->unsent_since_ns != 0 || client->unread_since_ns != 0 || client->closing ? POLL_MS : FOREVER;
 }

@@ -15,63 +15,77 @@
 
 typedef struct {
     const char *name;
-    const char *members; /* names it takes besides "cmd" and "id", each between blanks */
+    const char *members; /* names it takes, between blanks */
     int acts;            /* it needs the step thread */
     int (*handle)(request_t *request);
 } command_entry_t;
 
+/* What every command takes. */
+#define COMMON "cmd id "
+enum { COMMON_BYTES = sizeof COMMON - 1 };
+
 static const command_entry_t COMMANDS[] = {
-    {"get", " paths ", 0, fcsl_handle_get},
-    {"set", " values allow_non_finite ", 1, fcsl_handle_set},
-    {"eval", " expression ", 0, fcsl_handle_eval},
-    {"pause", " ", 1, fcsl_handle_pause},
-    {"resume", " ", 1, fcsl_handle_resume},
-    {"tick", " count ", 1, fcsl_handle_tick},
-    {"state", " ", 0, fcsl_handle_state},
-    {"set_state", " state ", 1, fcsl_handle_set_state},
-    {"save", " file ", 1, fcsl_handle_save},
-    {"saved", " at ", 0, fcsl_handle_saved},
-    {"load", " bytes at data ", 0, fcsl_handle_load},
-    {"restore", " file data ignore_source_hash ", 1, fcsl_handle_restore},
-    {"inject", " instance what ", 1, fcsl_handle_inject},
-    {"attach", " channel ", 1, fcsl_handle_attach},
-    {"sample", " channel value age_ticks stamp_ns allow_non_finite ", 1, fcsl_handle_sample},
-    {"record", " bag namespace ", 1, fcsl_handle_record},
-    {"stop_recording", " ", 1, fcsl_handle_stop_recording},
-    {"hardware", " bank number value ", 1, fcsl_handle_hardware},
-    {"list", " prefix ", 0, fcsl_handle_list},
-    {"describe", " path ", 0, fcsl_handle_describe},
-    {"subscribe", " paths every format ", 0, fcsl_handle_subscribe},
-    {"unsubscribe", " subscription ", 0, fcsl_handle_unsubscribe},
-    {"stats", " ", 0, fcsl_handle_stats},
-    {"authenticate", " token ", 0, fcsl_handle_authenticate},
+    {"get", COMMON "paths", 0, fcsl_handle_get},
+    {"set", COMMON "values allow_non_finite", 1, fcsl_handle_set},
+    {"eval", COMMON "expression", 0, fcsl_handle_eval},
+    {"pause", COMMON, 1, fcsl_handle_pause},
+    {"resume", COMMON, 1, fcsl_handle_resume},
+    {"tick", COMMON "count", 1, fcsl_handle_tick},
+    {"state", COMMON, 0, fcsl_handle_state},
+    {"set_state", COMMON "state", 1, fcsl_handle_set_state},
+    {"save", COMMON "file", 1, fcsl_handle_save},
+    {"saved", COMMON "at", 0, fcsl_handle_saved},
+    {"load", COMMON "bytes at data", 0, fcsl_handle_load},
+    {"restore", COMMON "file data ignore_source_hash", 1, fcsl_handle_restore},
+    {"inject", COMMON "instance what", 1, fcsl_handle_inject},
+    {"attach", COMMON "channel", 1, fcsl_handle_attach},
+    {"sample", COMMON "channel value age_ticks stamp_ns allow_non_finite", 1, fcsl_handle_sample},
+    {"record", COMMON "bag namespace", 1, fcsl_handle_record},
+    {"stop_recording", COMMON, 1, fcsl_handle_stop_recording},
+    {"hardware", COMMON "bank number value", 1, fcsl_handle_hardware},
+    {"list", COMMON "prefix", 0, fcsl_handle_list},
+    {"describe", COMMON "path", 0, fcsl_handle_describe},
+    {"subscribe", COMMON "paths every format", 0, fcsl_handle_subscribe},
+    {"unsubscribe", COMMON "subscription", 0, fcsl_handle_unsubscribe},
+    {"stats", COMMON, 0, fcsl_handle_stats},
+    {"authenticate", COMMON "token", 0, fcsl_handle_authenticate},
 };
 enum { COMMAND_COUNT = sizeof COMMANDS / sizeof COMMANDS[0] };
 
 /* ---- members ------------------------------------------------------------------------------------------------------- */
 
+/* A bit of its own for each name among `names`, which blanks divide; 0 where it is none of them. */
+static uint32_t member_bit(const char *names, const char *name, size_t length)
+{
+    uint32_t bit = 1;
+    for (const char *at = names; *at != '\0'; bit <<= 1) {
+        const size_t size = strcspn(at, " ");
+        if (size == length && memcmp(at, name, length) == 0) {
+            return bit;
+        }
+        at += size + (at[size] == ' ');
+    }
+    return 0;
+}
+
 /* Refuses members that the command does not have, and repeated ones: a misspelt name must not be ignored. */
 static int check_members(request_t *request, const command_entry_t *entry)
 {
-    char key[NAME_BYTES];
-    char pattern[NAME_BYTES + 4];
+    uint32_t seen = 0;
     uint32_t index = 1;
     for (uint32_t i = 0; i < request->json.tokens[0].count; i++) {
-        if (fcsl_json_string(&request->json, index, key, sizeof key) != 0) {
-            return fcsl_request_refuse(request, "bad_request", "", "a member's name is too long or not plain");
+        const json_token_t *name = &request->json.tokens[index];
+        const uint32_t bit = member_bit(entry->members, request->json.text + name->start, name->end - name->start);
+        if (bit == 0 || (seen & bit) != 0) {
+            char key[NAME_BYTES];
+            if (fcsl_json_string(&request->json, index, key, sizeof key) != 0) {
+                return fcsl_request_refuse(request, "bad_request", "", "a member's name is too long or not plain");
+            }
+            return fcsl_request_refuse(request, "bad_request", bit != 0 ? "" : entry->members + COMMON_BYTES,
+                                       "\"%s\" %s", key,
+                                       bit != 0 ? "is given twice" : "is not a member of this command");
         }
-        const size_t key_length = strlen(key);
-        memcpy(pattern, " ", 1);
-        memcpy(pattern + 1, key, key_length);
-        memcpy(pattern + 1 + key_length, " ", 2);
-        const int known = strchr(key, ' ') == NULL && (strcmp(key, "cmd") == 0 || strcmp(key, "id") == 0 ||
-                                                       strstr(entry->members, pattern) != NULL);
-        if (!known || fcsl_json_member(&request->json, 0, key) != index + 1) {
-            const size_t length = strlen(entry->members);
-            (void)snprintf(pattern, sizeof pattern, "%.*s", length > 2 ? (int)length - 2 : 0, entry->members + 1);
-            return fcsl_request_refuse(request, "bad_request", known ? "" : pattern, "\"%s\" %s", key,
-                                       known ? "is given twice" : "is not a member of this command");
-        }
+        seen |= bit;
         index = request->json.tokens[index + 1].next;
     }
     return 0;
@@ -151,7 +165,7 @@ static void end_reply(request_t *request, int status)
 
 static int find_command(request_t *request, const command_entry_t **entry)
 {
-    const char *names[COMMAND_COUNT + 1] = {0};
+    const char *names[COMMAND_COUNT + 1];
     const char *name = fcsl_request_text(request, "cmd", NAME_BYTES);
     if (name == NULL) {
         return -1;
@@ -163,6 +177,7 @@ static int find_command(request_t *request, const command_entry_t **entry)
             return check_members(request, *entry);
         }
     }
+    names[COMMAND_COUNT] = NULL;
     return fcsl_request_refuse(request, "unknown_command", fcsl_nearest(names, name), "no command '%s'", name);
 }
 

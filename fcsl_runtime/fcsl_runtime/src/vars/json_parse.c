@@ -31,7 +31,7 @@ static char peek(const parser_t *p)
 
 static void skip_blanks(parser_t *p)
 {
-    while (p->at < p->size && strchr(" \t\r\n", p->text[p->at]) != NULL && p->text[p->at] != '\0') {
+    for (char c = peek(p); c == ' ' || c == '\t' || c == '\r' || c == '\n'; c = peek(p)) {
         p->at++;
     }
 }
@@ -251,14 +251,24 @@ size_t fcsl_json_character(const char *text, size_t left)
     return outside ? 0 : length;
 }
 
+/* Eight characters of ASCII, most of what there is. */
+static int ascii_word(const char *text, size_t left)
+{
+    uint64_t word = UINT64_MAX;
+    if (left >= sizeof word) {
+        memcpy(&word, text, sizeof word);
+    }
+    return (word & UINT64_C(0x8080808080808080)) == 0;
+}
+
 const char *fcsl_json_parse(const char *text, size_t size, json_token_t *tokens, uint32_t capacity, json_t *json)
 {
-    size_t step = 1;
-    for (size_t i = 0; i < size; i += step) {
-        step = fcsl_json_character(text + i, size - i);
+    for (size_t i = 0; i < size;) {
+        const size_t step = ascii_word(text + i, size - i) ? 8 : fcsl_json_character(text + i, size - i);
         if (step == 0) {
             return "not UTF-8";
         }
+        i += step;
     }
     parser_t p = {.text = text, .size = (uint32_t)size, .tokens = tokens, .capacity = capacity};
     if (parse_value(&p, 0) != 0) {

@@ -7,9 +7,7 @@
 
 #include <stdlib.h>
 #include <string.h>
-#include <sys/eventfd.h>
 #include <time.h>
-#include <unistd.h>
 
 #include "base/timespec.h"
 
@@ -21,9 +19,8 @@ int fcsl_mailbox_open(mailbox_t *mailbox, size_t bytes)
     mailbox->command.bytes = calloc(1, bytes);
     mailbox->command.writes = calloc(WRITES_MAX, sizeof *mailbox->command.writes);
     mailbox->command.hardware = calloc(1, sizeof *mailbox->command.hardware);
-    mailbox->answered = eventfd(0, EFD_CLOEXEC | EFD_NONBLOCK);
     if (mailbox->command.bytes == NULL || mailbox->command.writes == NULL || mailbox->command.hardware == NULL ||
-        mailbox->answered < 0 || sem_init(&mailbox->arrived, 0, 0) != 0) {
+        sem_init(&mailbox->arrived, 0, 0) != 0) {
         fcsl_mailbox_free(mailbox);
         return -1;
     }
@@ -35,13 +32,9 @@ void fcsl_mailbox_free(mailbox_t *mailbox)
     free(mailbox->command.bytes);
     free(mailbox->command.writes);
     free(mailbox->command.hardware);
-    if (mailbox->answered >= 0) {
-        (void)close(mailbox->answered);
-    }
     mailbox->command.bytes = NULL;
     mailbox->command.writes = NULL;
     mailbox->command.hardware = NULL;
-    mailbox->answered = -1;
 }
 
 int fcsl_mailbox_is_free(const mailbox_t *mailbox)
@@ -64,28 +57,16 @@ int fcsl_mailbox_done(mailbox_t *mailbox)
     return 1;
 }
 
-void fcsl_mailbox_hear(mailbox_t *mailbox)
-{
-    uint64_t count = 0;
-    const ssize_t got = read(mailbox->answered, &count, sizeof count);
-    (void)got; /* the phase tells; an answer that was noticed before it was told wakes once for nothing */
-}
-
 command_t *fcsl_mailbox_take(mailbox_t *mailbox)
 {
     return atomic_load_explicit(&mailbox->phase, memory_order_acquire) == POSTED ? &mailbox->command : NULL;
 }
 
-void fcsl_mailbox_answer(mailbox_t *mailbox, int tell)
+void fcsl_mailbox_answer(mailbox_t *mailbox)
 {
     /* The token of this command may still be there when it was noticed by its phase: take it back. */
     (void)sem_trywait(&mailbox->arrived);
     atomic_store_explicit(&mailbox->phase, ANSWERED, memory_order_release);
-    if (tell) {
-        const uint64_t one = 1;
-        const ssize_t written = write(mailbox->answered, &one, sizeof one);
-        (void)written; /* one that is full wakes as well */
-    }
 }
 
 void fcsl_mailbox_wait(mailbox_t *mailbox, uint64_t deadline_ns)

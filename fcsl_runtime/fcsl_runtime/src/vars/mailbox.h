@@ -68,7 +68,6 @@ typedef struct {
     command_t command;
     atomic_int phase;
     sem_t arrived;
-    int answered; /* eventfd, for the server's poll */
 } mailbox_t;
 
 /* `bytes`: room for the values of a command. */
@@ -79,12 +78,10 @@ void fcsl_mailbox_free(mailbox_t *mailbox);
 int fcsl_mailbox_is_free(const mailbox_t *mailbox);
 void fcsl_mailbox_post(mailbox_t *mailbox);
 int fcsl_mailbox_done(mailbox_t *mailbox);
-/* Server: `answered` is readable; so that it is not any more. */
-void fcsl_mailbox_hear(mailbox_t *mailbox);
 
-/* Step thread: the waiting command, or null. Every command taken must be answered; `tell`: the server waits in poll. */
+/* Step thread: the waiting command, or null. Every command taken must be answered. */
 command_t *fcsl_mailbox_take(mailbox_t *mailbox);
-void fcsl_mailbox_answer(mailbox_t *mailbox, int tell);
+void fcsl_mailbox_answer(mailbox_t *mailbox);
 /* Step thread: sleeps until a command arrives, but at most until `deadline_ns` of the monotonic clock. */
 void fcsl_mailbox_wait(mailbox_t *mailbox, uint64_t deadline_ns);
 /* Any thread: ends that sleep. */

@@ -19,12 +19,11 @@ static int subscribers_have_room(const fcsl_vars_t *vars)
 }
 
 /* Hands over the next ticks of a `tick`, once subscribers, if there are any, have taken those before. */
-static void continue_ticks(fcsl_vars_t *vars)
+static void continue_ticks(fcsl_vars_t *vars, uint64_t now_ns)
 {
     commander_t *commander = &vars->commander;
-    const uint64_t now = fcsl_run_monotonic_ns(NULL);
-    vars->tick_by_ns = vars->tick_by_ns == 0 ? now + TICK_PATIENCE_NS : vars->tick_by_ns;
-    if (commander->ticks_at_once != 0 && !subscribers_have_room(vars) && now < vars->tick_by_ns) {
+    vars->tick_by_ns = vars->tick_by_ns == 0 ? now_ns + TICK_PATIENCE_NS : vars->tick_by_ns;
+    if (commander->ticks_at_once != 0 && !subscribers_have_room(vars) && now_ns < vars->tick_by_ns) {
         return;
     }
     vars->mailbox.command.count = fcsl_commander_portion(commander);
@@ -32,7 +31,7 @@ static void continue_ticks(fcsl_vars_t *vars)
     fcsl_mailbox_post(&vars->mailbox);
 }
 
-static void finish_command(fcsl_vars_t *vars)
+static void finish_command(fcsl_vars_t *vars, uint64_t now_ns)
 {
     fcsl_commander_complete(&vars->commander);
     client_t *client = vars->poster < CLIENTS_MAX ? &vars->clients[vars->poster] : NULL;
@@ -47,29 +46,29 @@ static void finish_command(fcsl_vars_t *vars)
     json_out_t out = fcsl_client_room(client, REPLY_BYTES_MAX);
     fcsl_commander_finish(&vars->commander, &client->session, &out);
     client->waiting = 0;
-    fcsl_client_put(client, &out, fcsl_run_monotonic_ns(NULL));
-    fcsl_vars_send(vars, client);
+    fcsl_client_put(client, &out, now_ns);
+    fcsl_vars_send(vars, client, now_ns);
 }
 
-void fcsl_vars_serve_command(fcsl_vars_t *vars)
+void fcsl_vars_serve_command(fcsl_vars_t *vars, uint64_t now_ns)
 {
     commander_t *commander = &vars->commander;
     if (fcsl_mailbox_done(&vars->mailbox)) {
         const int goes_on = vars->mailbox.command.kind == COMMAND_TICK &&
                             vars->mailbox.command.status == FCSL_VARS_OK && vars->poster < CLIENTS_MAX;
         commander->ticks_left = goes_on ? commander->ticks_left : 0;
-        fcsl_vars_stream(vars, fcsl_run_monotonic_ns(NULL));
+        fcsl_vars_stream(vars, now_ns);
         if (commander->ticks_left == 0) {
-            finish_command(vars);
+            finish_command(vars, now_ns);
         }
     }
     if (commander->ticks_left == 0 || !fcsl_mailbox_is_free(&vars->mailbox)) {
         return;
     }
     if (commander->ticks_stopped) {
-        finish_command(vars);
+        finish_command(vars, now_ns);
         commander->ticks_left = 0;
     } else {
-        continue_ticks(vars);
+        continue_ticks(vars, now_ns);
     }
 }

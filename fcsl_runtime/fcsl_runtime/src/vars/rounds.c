@@ -29,64 +29,67 @@ enum {
 };
 
 /* Entries of a round: these, then one for each place in use. */
-enum { LISTENER, ANSWER, ATTENTION, FIRST_CLIENT };
+enum { LISTENER, ATTENTION, FIRST_CLIENT };
 _Static_assert(FIRST_CLIENT + CLIENTS_MAX == ENTRIES_MAX, "every place may be in use");
 
-static void call(const fcsl_vars_t *vars)
+void fcsl_vars_call(const fcsl_vars_t *vars)
 {
     const uint64_t one = 1;
     const ssize_t written = write(vars->attention, &one, sizeof one);
     (void)written; /* one that is full has been written before */
 }
 
-/* What a round waits for; returns how long it may, in ms. */
-static int prepare(fcsl_vars_t *vars, struct pollfd *entries, uint32_t used, int most_ms)
+static int least(int a_ms, int b_ms)
 {
-    const int poll_ms = fcsl_vars_prepare_streams(vars) ? STREAM_POLL_MS : POLL_MS;
-    int timeout = poll_ms < most_ms ? poll_ms : most_ms;
-    for (uint32_t i = 0; i < used; i++) {
-        timeout = fcsl_vars_watch(&vars->clients[i], &entries[FIRST_CLIENT + i]) ? 0 : timeout;
-    }
-    const int may_accept = fcsl_run_monotonic_ns(NULL) >= vars->accept_at_ns;
-    entries[LISTENER] = (struct pollfd){.fd = may_accept ? vars->listener.fd : -1, .events = POLLIN};
-    entries[ANSWER] = (struct pollfd){.fd = vars->mailbox.answered, .events = POLLIN};
-    entries[ATTENTION] = (struct pollfd){.fd = vars->attention, .events = POLLIN};
-    return timeout;
+    return b_ms == FOREVER || (a_ms != FOREVER && a_ms < b_ms) ? a_ms : b_ms;
 }
 
-/* Returns whether it was called to attention. */
-static int make_round(fcsl_vars_t *vars, int most_ms)
+/* What a round waits for; returns how long it may, in ms. It has no end where no time limit runs: one would cost each round
+ * a timer. */
+static int prepare(fcsl_vars_t *vars, struct pollfd *entries, uint32_t used, int most_ms)
+{
+    const int streams = fcsl_vars_prepare_streams(vars) || vars->tick_by_ns != 0;
+    int timeout_ms = least(most_ms, streams ? STREAM_POLL_MS : FOREVER);
+    for (uint32_t i = 0; i < used; i++) {
+        timeout_ms = least(timeout_ms, fcsl_vars_watch(&vars->clients[i], &entries[FIRST_CLIENT + i]));
+    }
+    if (vars->accept_at_ns != 0) {
+        vars->accept_at_ns = fcsl_run_monotonic_ns(NULL) < vars->accept_at_ns ? vars->accept_at_ns : 0;
+        timeout_ms = least(timeout_ms, POLL_MS);
+    }
+    entries[LISTENER] = (struct pollfd){.fd = vars->accept_at_ns == 0 ? vars->listener.fd : -1, .events = POLLIN};
+    entries[ATTENTION] = (struct pollfd){.fd = vars->attention, .events = POLLIN};
+    return timeout_ms;
+}
+
+static void make_round(fcsl_vars_t *vars, int most_ms)
 {
     struct pollfd entries[ENTRIES_MAX];
     const uint32_t used = vars->used;
     int ready = poll(entries, FIRST_CLIENT + used, prepare(vars, entries, used, most_ms));
     if (ready < 0 && errno != EINTR) {
         /* Short of memory, or of files since the start. What was asked waits; the end does not. */
-        ready = poll(&entries[ATTENTION], 1, most_ms < POLL_MS ? most_ms : POLL_MS);
+        ready = poll(&entries[ATTENTION], 1, least(most_ms, POLL_MS));
     }
     if (ready > 0 && entries[ATTENTION].revents != 0) {
         uint64_t calls = 0;
         const ssize_t got = read(vars->attention, &calls, sizeof calls);
-        (void)got; /* that it was called is all there is to know */
-        return 1;
+        (void)got; /* what it was called for shows elsewhere */
     }
-    if (ready > 0 && entries[ANSWER].revents != 0) {
-        fcsl_mailbox_hear(&vars->mailbox);
-    }
-    fcsl_vars_serve_command(vars);
-    fcsl_vars_stream(vars, fcsl_run_monotonic_ns(NULL));
+    const uint64_t now_ns = fcsl_run_monotonic_ns(NULL);
+    fcsl_vars_serve_command(vars, now_ns);
+    fcsl_vars_stream(vars, now_ns);
     const uint32_t first = vars->next < used ? vars->next : 0;
     for (uint32_t i = 0; i < used; i++) {
         const uint32_t number = (first + i) % used;
         if (vars->clients[number].fd >= 0) {
             fcsl_vars_serve_client(vars, &vars->clients[number],
-                                   (short)(ready > 0 ? entries[FIRST_CLIENT + number].revents : 0));
+                                   (short)(ready > 0 ? entries[FIRST_CLIENT + number].revents : 0), now_ns);
         }
     }
     if (ready > 0 && entries[LISTENER].revents != 0) {
-        fcsl_vars_accept(vars);
+        fcsl_vars_accept(vars, now_ns);
     }
-    return 0;
 }
 
 /* ---- the server's thread ---------------------------------------------------------------------------------------- */
@@ -107,7 +110,7 @@ static void sleep_aside(fcsl_vars_t *vars)
     } while (!pass(vars, AT_WORK, BY_SERVER));
 }
 
-/* Called to attention: hands the rounds over if they are asked for. 0 when they are over. */
+/* Hands the rounds over if they are asked for. 0 when they are over. */
 static int stand_aside(fcsl_vars_t *vars)
 {
     if (pass(vars, ASKED_FOR, BY_STEP_THREAD)) {
@@ -120,14 +123,16 @@ static int stand_aside(fcsl_vars_t *vars)
 void *fcsl_vars_make_rounds(void *argument)
 {
     fcsl_vars_t *vars = argument;
-    while (!make_round(vars, POLL_MS) || stand_aside(vars)) {
-    }
+    do {
+        make_round(vars, FOREVER);
+    } while (stand_aside(vars));
     if (vars->poster < CLIENTS_MAX) {
         client_t *client = &vars->clients[vars->poster];
         json_out_t out = fcsl_client_room(client, REPLY_BYTES_MAX);
+        const uint64_t now_ns = fcsl_run_monotonic_ns(NULL);
         fcsl_commander_abandon(&vars->commander, &client->session, &out);
-        fcsl_client_put(client, &out, fcsl_run_monotonic_ns(NULL));
-        fcsl_vars_send(vars, client);
+        fcsl_client_put(client, &out, now_ns);
+        fcsl_vars_send(vars, client, now_ns);
     }
     return NULL;
 }
@@ -144,7 +149,7 @@ static void give_back(fcsl_vars_t *vars, int rounds)
 void fcsl_vars_end_rounds(fcsl_vars_t *vars)
 {
     give_back(vars, OVER);
-    call(vars);
+    fcsl_vars_call(vars);
 }
 
 int fcsl_vars_begin_work(fcsl_vars_t *vars)
@@ -168,12 +173,12 @@ void fcsl_vars_attend(fcsl_vars_t *vars, uint64_t deadline_ns)
 {
     if (atomic_load(&vars->rounds) != BY_STEP_THREAD) {
         if (pass(vars, BY_SERVER, ASKED_FOR)) {
-            call(vars);
+            fcsl_vars_call(vars);
         }
         fcsl_mailbox_wait(&vars->mailbox, deadline_ns);
         return;
     }
     const uint64_t now_ns = fcsl_run_monotonic_ns(NULL);
     const int waits = fcsl_mailbox_take(&vars->mailbox) == NULL && now_ns < deadline_ns;
-    (void)make_round(vars, waits ? (int)((deadline_ns - now_ns) / 1000000u) + 1 : 0);
+    make_round(vars, waits ? (int)((deadline_ns - now_ns) / 1000000u) + 1 : 0);
 }

@@ -4,7 +4,6 @@
  */
 #include <stdio.h>
 #include <string.h>
-#include <unistd.h>
 
 #include "server.h"
 
@@ -140,9 +139,11 @@ void fcsl_vars_serve(fcsl_vars_t *vars)
     vars->host.publish(vars->host.ctx);
     command->published = fcsl_history_published(vars->history);
     const int replies = attends && fcsl_vars_end_work(vars);
-    fcsl_mailbox_answer(&vars->mailbox, !replies);
+    fcsl_mailbox_answer(&vars->mailbox);
     if (replies) {
-        fcsl_vars_serve_command(vars);
+        fcsl_vars_serve_command(vars, fcsl_run_monotonic_ns(NULL));
+    } else {
+        fcsl_vars_call(vars);
     }
 }
 
@@ -153,8 +154,6 @@ void fcsl_vars_wait(fcsl_vars_t *vars, uint64_t deadline_ns)
 
 void fcsl_vars_wake(fcsl_vars_t *vars)
 {
-    const uint64_t one = 1;
     fcsl_mailbox_wake(&vars->mailbox);
-    const ssize_t written = write(vars->attention, &one, sizeof one);
-    (void)written; /* one that is full has been written before */
+    fcsl_vars_call(vars);
 }

@@ -96,7 +96,6 @@ fcsl_vars_t *fcsl_vars_open(const fcsl_vars_options_t *options, const fcsl_vars_
     }
     vars->listener.fd = -1;
     vars->attention = -1;
-    vars->mailbox.answered = -1;
     vars->poster = CLIENTS_MAX;
     vars->history = history;
     vars->host = *host;

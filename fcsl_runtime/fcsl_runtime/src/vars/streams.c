@@ -64,6 +64,9 @@ static void sample(fcsl_vars_t *vars, client_t *client, subscription_t *subscrip
 void fcsl_vars_stream(fcsl_vars_t *vars, uint64_t now_ns)
 {
     fcsl_moment_t moment;
+    if (!fcsl_vars_prepare_streams(vars)) {
+        return;
+    }
     /* Bounded: a host that publishes faster than this reads is caught up with in the coming round. */
     for (uint32_t i = 0; i < 2u * vars->history->slots; i++) {
         const fcsl_history_status_t status = fcsl_history_read(vars->history, vars->cursor, &moment, vars->sample);

@@ -7,8 +7,8 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from fcsl_compiler.base.diagnostics import DiagnosticError, DiagnosticSink
-from fcsl_compiler.base.files import write_whole
-from fcsl_compiler.base.source import SourceError, SourceFile, read_regular
+from fcsl_compiler.base.files import SourceError, read_regular, write_whole
+from fcsl_compiler.base.source import SourceFile
 from fcsl_compiler.board.backends import Backend
 from fcsl_compiler.board.board import check_board
 from fcsl_compiler.parse.json_source import JsonNode, parse_json

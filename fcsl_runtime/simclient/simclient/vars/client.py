@@ -15,11 +15,12 @@ import base64
 import math
 from collections import deque
 from collections.abc import Mapping, Sequence
+from functools import lru_cache
 from pathlib import Path
 from typing import Any, NamedTuple
 
 from .subscription import Subscription
-from .wire import NON_FINITE, VarError, VarWire
+from .wire import NON_FINITE, VarError, VarWire, encoded
 
 #: Most requests (of `tick_by_tick`: pairs) without a reply.
 _PENDING_MAX, _UNREAD_BYTES = 100, 1 << 16
@@ -53,7 +54,7 @@ class VarClient(VarWire):
 
         The path of an instance or a struct gives a dict of the values below it.
         """
-        values = self._call("get", paths=list(paths))["values"]
+        values = self._call_encoded("get", _encoded_paths(paths))["values"]
         if not isinstance(values, dict):
             raise VarError("protocol", f"{self.address}: not a variable server: its values are no object")
         return {path: self._numbers(path, value) for path, value in values.items()}
@@ -116,10 +117,7 @@ class VarClient(VarWire):
         """Runs ticks, while paused; returns the number completed since init."""
         if type(count) is not int:
             return int(self._call("tick", count=_jsonable(count))["tick"])
-        self._number += 1
-        # Formatted here, because the JSON encoder would take a tenth of the time of a tick.
-        self._transmit(b'{"cmd":"tick","id":%d,"count":%d}\n' % (self._number, count))
-        done: int = self._reply(self._number)["tick"]
+        done: int = self._call_encoded("tick", b',"count":%d}' % count)["tick"]
         return done
 
     def tick_by_tick(self, count: int) -> Sequence[bytes]:
@@ -224,6 +222,12 @@ class VarClient(VarWire):
     def _unsubscribe(self, number: int) -> None:
         self._call("unsubscribe", subscription=number)
         self._subscriptions.pop(number, None)
+
+
+@lru_cache(maxsize=64)
+def _encoded_paths(paths: tuple[str, ...]) -> bytes:
+    """The members of a `get`, made once for those that are read again and again."""
+    return encoded({"paths": paths})
 
 
 def _text(data: bytes) -> str:

@@ -8,7 +8,7 @@ import math
 import socket
 import struct
 import time
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from pathlib import Path
 from types import TracebackType
 from typing import Any, Self
@@ -54,6 +54,11 @@ def _limit(connected: socket.socket, option: int, limit_s: float | None) -> None
     """Sets a timeout in the kernel (0: none): Python's timeouts cost a poll() for every recv()."""
     limit_us = 0 if limit_s is None else max(1, int(limit_s * 1e6))
     connected.setsockopt(socket.SOL_SOCKET, option, struct.pack("@ll", *divmod(limit_us, 1_000_000)))
+
+
+def encoded(members: Mapping[str, Any]) -> bytes:
+    """The members of a request behind its "cmd" and "id", to the closing brace."""
+    return f",{_encode(members)[1:]}".encode() if members else b"}"
 
 
 class _Reply(dict[str, Any]):
@@ -103,25 +108,31 @@ class VarWire:
 
     def _call(self, cmd: str, **members: Any) -> dict[str, Any]:
         """Runs one command. Raises VarError for a refusal, and if no reply comes."""
-        return self._reply(self._send([(cmd, members)]))
+        return self._call_encoded(cmd, encoded(members))
+
+    def _call_encoded(self, cmd: str, members: bytes) -> dict[str, Any]:
+        """As `_call`. `members` is what `encoded` makes of them: encoding takes a fifth of the time of a `get`."""
+        self._transmit(self._line(cmd, members))
+        return self._reply(self._number)
 
     def _send(self, commands: Sequence[tuple[str, dict[str, Any]]]) -> int:
-        """Sends several requests together; returns the number of the first. Numbers are consecutive.
-
-        Replies carry these numbers, so that the reply to an interrupted call (Ctrl-C) is recognised and dropped.
-        """
+        """Sends several requests together; returns the number of the first. Numbers are consecutive."""
         first = self._number + 1
-        lines = []
-        for cmd, members in commands:
-            self._number += 1
-            line = _encode({"cmd": cmd, "id": self._number, **members}).encode() + b"\n"
-            if len(line) > _REQUEST_BYTES_MAX:
-                raise VarError(
-                    "too_large", f"{cmd}: a request has at most {_REQUEST_BYTES_MAX} bytes, this one {len(line)}"
-                )
-            lines.append(line)
-        self._transmit(b"".join(lines))
+        self._transmit(b"".join([self._line(cmd, encoded(members)) for cmd, members in commands]))
         return first
+
+    def _line(self, cmd: str, members: bytes) -> bytes:
+        """A request with the next number.
+
+        The reply carries it, so that the reply to an interrupted call (Ctrl-C) is recognised and dropped.
+        """
+        self._number += 1
+        line = b'{"cmd":"%b","id":%d%b\n' % (cmd.encode(), self._number, members)
+        if len(line) > _REQUEST_BYTES_MAX:
+            raise VarError(
+                "too_large", f"{cmd}: a request has at most {_REQUEST_BYTES_MAX} bytes, this one {len(line)}"
+            )
+        return line
 
     def _transmit(self, lines: bytes) -> None:
         try:
