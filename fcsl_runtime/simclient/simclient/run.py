@@ -11,7 +11,7 @@ from ctypes import c_void_p as ptr
 from pathlib import Path
 
 from .c_machine import HEALTH_NAMES, CMachine
-from .c_run import CError, CMessage, CRecordOptions, load_runtime
+from .c_run import CError, CMessage, CRecordOptions, CSeries, load_runtime
 from .descriptor import Machine, read_machine
 from .errors import TwinError
 from .forks import FORKED, for_children, not_for_children
@@ -302,6 +302,10 @@ class Run:
         count = len(samples) // SAMPLE_BYTES
         handle, error = self.handle(), byref(self._error)
         self._check(self._lib.fcsl_run_feed(handle, samples, count, payloads, len(payloads), end, error))
+
+    def feed_series(self, series: ctypes.Array[CSeries], end: int) -> None:
+        """The same with an array of CSeries, which goes on where the last call left it."""
+        self._check(self._lib.fcsl_run_feed_series(self.handle(), series, len(series), end, byref(self._error)))
 
     def record(self, bag: Path, name_space: str, lossless: bool, fields: str | None = None) -> None:
         """Records to the directory `bag`, which must not exist. `lossless`: waits for the disk instead of dropping
