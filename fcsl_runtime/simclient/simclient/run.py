@@ -9,6 +9,7 @@ from collections.abc import Mapping, Sequence
 from ctypes import byref, c_char, c_int64, c_uint64
 from ctypes import c_void_p as ptr
 from pathlib import Path
+from typing import Any
 
 from .c_machine import HEALTH_NAMES, CMachine
 from .c_run import CError, CMessage, CRecordOptions, CSeries, load_runtime
@@ -365,12 +366,16 @@ class RunTrace:
 
     def read(self, first: int, count: int) -> bytearray:
         """`count` rows from row `first` on. Raises TwinError if they were discarded."""
-        self._run.handle()
         rows = bytearray(count * self.row_bytes)
-        room = (c_char * len(rows)).from_buffer(rows) if rows else None
+        self.read_into(first, count, rows)
+        return rows
+
+    def read_into(self, first: int, count: int, rows: Any) -> None:
+        """The same into a buffer that has room for them."""
+        self._run.handle()
+        room = (c_char * (count * self.row_bytes)).from_buffer(rows) if count else None
         status = self._run._lib.fcsl_run_trace_read(self._trace, first, count, room, byref(self._run._error))
         self._run._check(status)
-        return rows
 
     def close(self) -> None:
         """Ends the trace; closing the run ends it, too."""
