@@ -176,6 +176,12 @@ static inline fcsl_ros_status_t store(uint8_t type, number_t *number, int nan_al
     return number->kind == FLOAT && !make_integer(number) ? FCSL_ROS_RANGE : store_integer(type, *number, out);
 }
 
+/* Whether the row has the number of its only term, and nothing is computed. */
+static int is_exact(const fcsl_ros_row_t *row, const fcsl_ros_term_t *term)
+{
+    return row->term_count == 1 && term->factor == 1.0 && !row->scaled;
+}
+
 /* Number `n` of a row. */
 static fcsl_ros_status_t apply(const fcsl_ros_row_t *row, const fcsl_ros_term_t *term, const uint8_t *const *anchors,
                                uint32_t n, int nan_allowed, uint8_t *out)
@@ -195,19 +201,39 @@ static fcsl_ros_status_t apply(const fcsl_ros_row_t *row, const fcsl_ros_term_t 
         const double product = term[i].factor * as_double(&number);
         sum = i == 0 ? product : sum + product;
     }
-    const int exact = row->term_count == 1 && term->factor == 1.0 && !row->scaled;
-    if (!exact) {
+    if (!is_exact(row, term)) {
         number = (number_t){.kind = FLOAT, .f = row->scaled ? sum * row->scale + row->bias : sum};
     }
     return store(row->type, &number, nan_allowed, out + row->offset + (size_t)n * fcsl_ros_scalar_size(row->type));
 }
 
+/* Most numbers are doubles that stay as they are. Returns how many of the row were; the first that is not is a NaN. */
+static uint32_t copied_doubles(const fcsl_ros_row_t *row, const fcsl_ros_term_t *term, const uint8_t *const *anchors,
+                               uint8_t *out)
+{
+    const uint8_t *from = anchors[term->anchor];
+    if (!is_exact(row, term) || term->type != FCSL_ROS_F64 || row->type != FCSL_ROS_F64 || from == NULL) {
+        return 0;
+    }
+    for (uint32_t n = 0; n <= row->more; n++) {
+        double value = 0.0;
+        memcpy(&value, from + term->offset + sizeof value * (size_t)n, sizeof value);
+        if (value != value) {
+            return n;
+        }
+        memcpy(out + row->offset + sizeof value * (size_t)n, &value, sizeof value);
+    }
+    return row->more + 1u;
+}
+
 fcsl_ros_status_t fcsl_ros_row_apply(const fcsl_ros_row_t *row, const fcsl_ros_term_t *terms,
                                      const uint8_t *const *anchors, int nan_allowed, uint8_t *out)
 {
+    const fcsl_ros_term_t *term = &terms[row->first_term];
     fcsl_ros_status_t status = FCSL_ROS_TAKEN;
-    for (uint32_t n = 0; n <= row->more && status == FCSL_ROS_TAKEN; n++) {
-        status = apply(row, &terms[row->first_term], anchors, n, nan_allowed, out);
+    uint32_t n = copied_doubles(row, term, anchors, out);
+    for (; n <= row->more && status == FCSL_ROS_TAKEN; n++) {
+        status = apply(row, term, anchors, n, nan_allowed, out);
     }
     return status;
 }

@@ -3,15 +3,17 @@
  * Recording to MCAP, the container of ROS 2 bags. Link fcsl_hal::fcsl_io (a Rust library; it allocates and writes to
  * disk, so never call it from the thread that steps a machine).
  *
- * Messages are gathered into compressed chunks of about FCSL_MCAP_CHUNK_BYTES. A complete chunk is handed to the operating
- * system at once, together with an end that the next chunk writes over: the file is MCAP at any time, so that after kill -9
- * everything but the last, unfinished chunk is readable by any reader that does without the summary. Call fcsl_mcap_flush
- * from time to time where data comes slowly. After a power failure what the operating system had not yet written is missing
- * too; fcsl_mcap_close waits for the disk.
+ * Messages are gathered into compressed chunks of about FCSL_MCAP_CHUNK_BYTES. A thread of the recording's own compresses a
+ * complete chunk and hands it to the operating system while the next one is gathered, together with an end that the next chunk
+ * writes over: the file is MCAP at any time, so that after kill -9 everything but the last, unfinished chunk, and one that was
+ * being compressed, is readable by any reader that does without the summary. Call fcsl_mcap_flush from time to time where data
+ * comes slowly; it waits for that thread. After a power failure what the operating system had not yet written is missing too;
+ * fcsl_mcap_close waits for the disk.
  *
  * One thread at a time may use a recording; different recordings are independent. Strings are UTF-8 and copied. A null
  * pointer where there must be something is refused like any other wrong argument. After a failed write (full disk) every
- * further call on that recording fails with the same reason; what was written before stays readable, as after kill -9.
+ * further call on that recording fails with the same reason, from the next one on that ends a chunk; what was written before
+ * stays readable, as after kill -9.
  */
 #ifndef FCSL_MCAP_WRITER_H
 #define FCSL_MCAP_WRITER_H

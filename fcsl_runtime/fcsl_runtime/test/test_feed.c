@@ -63,6 +63,89 @@ static void test_feeding_is_writing_and_stepping(const char *library)
     CHECK(fcsl_run_close(many, &error) == 0);
 }
 
+static const int64_t GYRO_TICKS[] = {0, 7, 7, 39};
+static const int64_t GYRO_AGES[] = {0, 3, 0, 0};
+static const int64_t GYRO_STAMPS[] = {11, 13, 14, -1};
+static const int64_t GYRO_ROWS[] = {0, 2, 1, 2};
+static const double GYRO_VALUES[3][4] = {{1.5, -2.5, 0.0, 99.0}, {7.0, 8.0, 9.0, 99.0}, {0.1, 0.2, 0.3, 99.0}};
+
+static fcsl_series_t gyro_series(void)
+{
+    return (fcsl_series_t){.ticks = GYRO_TICKS,
+                           .ages_ticks = GYRO_AGES,
+                           .stamps_ns = GYRO_STAMPS,
+                           .rows = GYRO_ROWS,
+                           .values = (const uint8_t *)GYRO_VALUES,
+                           .row_bytes = sizeof GYRO_VALUES[0],
+                           .row_count = 3,
+                           .count = 4,
+                           .channel = GYRO};
+}
+
+/* Series are the same as one sample after another, whatever the slices. */
+static void test_series_are_samples(const char *library)
+{
+    static const int64_t zero[] = {0};
+    static const uint8_t armed[] = {1};
+    const fcsl_series_t armed_series = {.ticks = zero,
+                                        .ages_ticks = zero,
+                                        .stamps_ns = zero,
+                                        .rows = zero,
+                                        .values = armed,
+                                        .row_bytes = 1,
+                                        .row_count = 1,
+                                        .count = 1,
+                                        .channel = ARMED};
+    fcsl_error_t error;
+    fcsl_run_t *one = open_attached(library);
+    CHECK(fcsl_run_write_channel(one, ARMED, armed, 1, 0, 0, &error) == 0);
+    for (int i = 0; i < 4; i++) {
+        CHECK(fcsl_run_step(one, (uint64_t)GYRO_TICKS[i] - fcsl_run_tick(one), &error) == 0);
+        CHECK(fcsl_run_write_channel(one, GYRO, GYRO_VALUES[GYRO_ROWS[i]], 24, (uint32_t)GYRO_AGES[i], GYRO_STAMPS[i],
+                                     &error) == 0);
+    }
+    CHECK(fcsl_run_step(one, TICKS - fcsl_run_tick(one), &error) == 0);
+    const uint64_t ends[][3] = {{TICKS, TICKS, TICKS}, {5, 7, TICKS}, {8, 39, TICKS}};
+    for (size_t i = 0; i < sizeof ends / sizeof ends[0]; i++) {
+        fcsl_run_t *fed = open_attached(library);
+        fcsl_series_t series[] = {gyro_series(), armed_series};
+        for (int j = 0; j < 3; j++) {
+            CHECK(fcsl_run_feed_series(fed, series, 2, ends[i][j], &error) == 0);
+            CHECK(fcsl_run_tick(fed) == ends[i][j]);
+        }
+        CHECK(series[0].next == 4 && series[1].next == 1);
+        CHECK(memcmp(fcsl_run_data(one), fcsl_run_data(fed), machine_size(one)) == 0);
+        CHECK(fcsl_run_close(fed, &error) == 0);
+    }
+    CHECK(fcsl_run_close(one, &error) == 0);
+}
+
+static void refuse_series(fcsl_run_t *run, fcsl_series_t series, const char *reason)
+{
+    fcsl_error_t error = {0};
+    CHECK(fcsl_run_feed_series(run, &series, 1, TICKS, &error) != 0);
+    CHECK(strstr(error.text, reason) != NULL);
+}
+
+static void test_series_that_cannot_be_fed(const char *library)
+{
+    fcsl_error_t error;
+    fcsl_run_t *run = open_attached(library);
+    fcsl_series_t series = gyro_series();
+    series.channel = 99;
+    refuse_series(run, series, "no channel number 99");
+    series = gyro_series();
+    series.row_count = 0;
+    refuse_series(run, series, "a sample of 'imu.gyro' lies outside its values");
+    series = gyro_series();
+    series.row_bytes = 23;
+    refuse_series(run, series, "lies outside its values");
+    CHECK(fcsl_run_step(run, 1, &error) == 0);
+    refuse_series(run, gyro_series(), "a sample of tick 0 is out of turn: tick 1 is due");
+    CHECK(fcsl_run_tick(run) == 1);
+    CHECK(fcsl_run_close(run, &error) == 0);
+}
+
 static void refuse(fcsl_run_t *run, fcsl_sample_t sample, size_t payload_bytes, uint64_t end, const char *reason)
 {
     const uint8_t payloads[24] = {2}; /* no bool */
@@ -131,6 +214,8 @@ int main(int argc, char **argv)
     CHECK(argc == 2);
     test_feeding_is_writing_and_stepping(argv[1]);
     test_what_cannot_be_fed(argv[1]);
+    test_series_are_samples(argv[1]);
+    test_series_that_cannot_be_fed(argv[1]);
     test_records_of_a_chunk();
     return 0;
 }

@@ -11,7 +11,7 @@
 #include <unistd.h>
 
 #include "fcsl/fcsl_allocations.h"
-#include "messages/cdr.c" /* not part of the library's interface */
+#include "fcsl/fcsl_cdr.h"
 #include "fcsl/fcsl_check.h"
 #include "fcsl/fcsl_ros_inlet.h"
 #include "ros_plan.h"

@@ -6,12 +6,11 @@
 
 #include <dlfcn.h>
 
+#include "fcsl/fcsl_cdr.h"
 #include "fcsl/fcsl_check.h"
 #include "base/error.c"
 #include "run/range.c"
 #include "messages/message.c"
-
-#include "messages/cdr.c"
 
 enum { IN_GYRO = 12, GAIN = 13 }; /* pilot.inputs.gyro, connected; pilot.parameters.gain, -100 to 100 */
 

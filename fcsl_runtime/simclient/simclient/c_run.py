@@ -38,6 +38,23 @@ class CMessage(Structure):
     ]
 
 
+class CSeries(Structure):
+    """fcsl_series_t"""
+
+    _fields_ = [
+        ("ticks", ptr),
+        ("ages_ticks", ptr),
+        ("stamps_ns", ptr),
+        ("rows", ptr),
+        ("values", ptr),
+        ("row_bytes", c_uint64),
+        ("row_count", c_uint64),
+        ("count", c_uint64),
+        ("next", c_uint64),
+        ("channel", c_uint32),
+    ]
+
+
 _ERROR = POINTER(CError)
 #: Result type and argument types of every function used here.
 _PROTOTYPES: dict[str, tuple[type | None, list[type]]] = {
@@ -79,6 +96,7 @@ _PROTOTYPES: dict[str, tuple[type | None, list[type]]] = {
     "fcsl_run_trace_rows": (c_uint64, [ptr]),
     "fcsl_run_trace_read": (c_int, [ptr, c_uint64, c_uint64, ptr, _ERROR]),
     "fcsl_run_trace_end": (None, [ptr, ptr]),
+    "fcsl_run_feed_series": (c_int, [ptr, POINTER(CSeries), c_uint32, c_uint64, _ERROR]),
     "fcsl_run_feed": (c_int, [ptr, c_char_p, c_size_t, c_char_p, c_uint64, c_uint64, _ERROR]),
     "fcsl_run_record": (c_int, [ptr, POINTER(CRecordOptions), _ERROR]),
     "fcsl_run_record_stop": (c_int, [ptr, _ERROR]),

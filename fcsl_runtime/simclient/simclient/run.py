@@ -9,9 +9,10 @@ from collections.abc import Mapping, Sequence
 from ctypes import byref, c_char, c_int64, c_uint64
 from ctypes import c_void_p as ptr
 from pathlib import Path
+from typing import Any
 
 from .c_machine import HEALTH_NAMES, CMachine
-from .c_run import CError, CMessage, CRecordOptions, load_runtime
+from .c_run import CError, CMessage, CRecordOptions, CSeries, load_runtime
 from .descriptor import Machine, read_machine
 from .errors import TwinError
 from .forks import FORKED, for_children, not_for_children
@@ -303,6 +304,10 @@ class Run:
         handle, error = self.handle(), byref(self._error)
         self._check(self._lib.fcsl_run_feed(handle, samples, count, payloads, len(payloads), end, error))
 
+    def feed_series(self, series: ctypes.Array[CSeries], end: int) -> None:
+        """The same with an array of CSeries, which goes on where the last call left it."""
+        self._check(self._lib.fcsl_run_feed_series(self.handle(), series, len(series), end, byref(self._error)))
+
     def record(self, bag: Path, name_space: str, lossless: bool, fields: str | None = None) -> None:
         """Records to the directory `bag`, which must not exist. `lossless`: waits for the disk instead of dropping
         records.
@@ -361,12 +366,16 @@ class RunTrace:
 
     def read(self, first: int, count: int) -> bytearray:
         """`count` rows from row `first` on. Raises TwinError if they were discarded."""
-        self._run.handle()
         rows = bytearray(count * self.row_bytes)
-        room = (c_char * len(rows)).from_buffer(rows) if rows else None
+        self.read_into(first, count, rows)
+        return rows
+
+    def read_into(self, first: int, count: int, rows: Any) -> None:
+        """The same into a buffer that has room for them."""
+        self._run.handle()
+        room = (c_char * (count * self.row_bytes)).from_buffer(rows) if count else None
         status = self._run._lib.fcsl_run_trace_read(self._trace, first, count, room, byref(self._run._error))
         self._run._check(status)
-        return rows
 
     def close(self) -> None:
         """Ends the trace; closing the run ends it, too."""

@@ -8,11 +8,15 @@ use super::records::{self, Put};
 
 /// zstd's fastest regular level: a recorder must keep up, and telemetry compresses well at any level.
 const COMPRESSION_LEVEL: i32 = 1;
+/// Of zstd's hash table, as a power of two: with 16 KiB it stays in a processor's first cache. Messages repeat at short
+/// distances, so that a larger one finds no more.
+const HASH_LOG: u32 = 12;
 /// Of a message: opcode, length, channel, sequence, two times.
 const MESSAGE_HEAD_BYTES: usize = 1 + 8 + 2 + 4 + 8 + 8;
 
-/// Times of messages, and where each lies in its chunk.
-type Index = Vec<(u64, u64)>;
+/// Times of messages, and where each lies in its chunk, as the file has them.
+type Index = Vec<u8>;
+const INDEX_ENTRY_BYTES: usize = 16;
 
 pub struct Chunk {
     records: Vec<u8>,
@@ -40,13 +44,15 @@ pub struct Sealed {
 
 impl Chunk {
     pub fn new() -> io::Result<Self> {
+        let mut compressor = zstd::bulk::Compressor::new(COMPRESSION_LEVEL)?;
+        compressor.set_parameter(zstd::zstd_safe::CParameter::HashLog(HASH_LOG))?;
         Ok(Self {
             records: Vec::new(),
             indexes: Vec::new(),
             used: Vec::new(),
             first_ns: u64::MAX,
             last_ns: 0,
-            compressor: zstd::bulk::Compressor::new(COMPRESSION_LEVEL)?,
+            compressor,
             compressed: Vec::new(),
         })
     }
@@ -68,7 +74,10 @@ impl Chunk {
         if index.is_empty() {
             self.used.push(channel);
         }
-        index.push((log_ns, self.records.len() as u64));
+        let mut entry = [0; INDEX_ENTRY_BYTES];
+        entry[..8].copy_from_slice(&log_ns.to_le_bytes());
+        entry[8..].copy_from_slice(&(self.records.len() as u64).to_le_bytes());
+        index.extend_from_slice(&entry);
         self.first_ns = self.first_ns.min(log_ns);
         self.last_ns = self.last_ns.max(log_ns);
 
@@ -79,6 +88,7 @@ impl Chunk {
         head[11..15].copy_from_slice(&sequence.to_le_bytes());
         head[15..23].copy_from_slice(&log_ns.to_le_bytes());
         head[23..31].copy_from_slice(&publish_ns.to_le_bytes());
+        self.records.reserve(MESSAGE_HEAD_BYTES + data.len());
         self.records.extend_from_slice(&head);
         self.records.extend_from_slice(data);
     }
@@ -127,10 +137,6 @@ impl Chunk {
 fn put_index(out: &mut Vec<u8>, channel: u16, index: &Index) {
     records::record(out, records::MESSAGE_INDEX, |put: &mut Put| {
         put.u16(channel);
-        put.u32(index.len() as u32 * 16);
-        for &(time_ns, offset) in index {
-            put.u64(time_ns);
-            put.u64(offset);
-        }
+        put.bytes(index);
     });
 }

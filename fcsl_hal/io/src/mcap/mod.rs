@@ -2,7 +2,9 @@
 //! fcsl_mcap_*: contracts are in fcsl/fcsl_mcap_writer.h.
 
 mod chunk;
+mod chunk_file;
 mod growing_file;
+mod packer;
 mod records;
 mod writer;
 

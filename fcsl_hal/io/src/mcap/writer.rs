@@ -5,8 +5,9 @@ use std::collections::{BTreeMap, HashMap};
 use std::fs::File;
 use std::io;
 
-use super::chunk::{Chunk, Sealed};
-use super::growing_file::GrowingFile;
+use super::chunk::Chunk;
+use super::chunk_file::ChunkFile;
+use super::packer::Packer;
 use super::records::{self, alone, record};
 
 /// FCSL_MCAP_CHUNK_BYTES of the header.
@@ -20,16 +21,15 @@ struct Definitions {
 }
 
 pub struct Writer {
-    file: GrowingFile,
-    data_crc: crc32fast::Hasher,
+    /// None while the packer has it.
+    file: Option<Box<ChunkFile>>,
     chunk: Chunk,
-    /// What goes to the file next.
-    staging: Vec<u8>,
+    /// The next one to gather in; None while the packer has it.
+    spare: Option<Chunk>,
+    packer: Option<Packer>,
     schemas: Definitions,
     channels: Definitions,
     message_counts: Vec<u64>,
-    chunk_indexes: Vec<u8>,
-    chunk_count: u32,
     metadata_indexes: Vec<u8>,
     metadata_count: u32,
     /// Of all messages; none yet: None.
@@ -38,27 +38,26 @@ pub struct Writer {
 
 impl Writer {
     pub fn new(file: File, profile: &str, library: &str) -> io::Result<Self> {
-        let mut writer = Self {
-            file: GrowingFile::new(file),
-            data_crc: crc32fast::Hasher::new(),
-            chunk: Chunk::new()?,
-            staging: records::MAGIC.to_vec(),
-            schemas: Definitions::default(),
-            channels: Definitions::default(),
-            message_counts: Vec::new(),
-            chunk_indexes: Vec::new(),
-            chunk_count: 0,
-            metadata_indexes: Vec::new(),
-            metadata_count: 0,
-            bounds_ns: None,
-        };
-        record(&mut writer.staging, records::HEADER, |put| {
+        let mut file = Box::new(ChunkFile::new(file));
+        file.staging.extend_from_slice(records::MAGIC);
+        record(&mut file.staging, records::HEADER, |put| {
             put.string(profile);
             put.string(library);
         });
-        writer.put_staging();
-        writer.file.flush()?; // a recording from the start, if an empty one
-        Ok(writer)
+        file.put_staging();
+        file.file.flush()?; // a recording from the start, if an empty one
+        Ok(Self {
+            file: Some(file),
+            chunk: Chunk::new()?,
+            spare: Some(Chunk::new()?),
+            packer: None,
+            schemas: Definitions::default(),
+            channels: Definitions::default(),
+            message_counts: Vec::new(),
+            metadata_indexes: Vec::new(),
+            metadata_count: 0,
+            bounds_ns: None,
+        })
     }
 
     /// A number from 1 on, or None when there are none left.
@@ -109,78 +108,75 @@ impl Writer {
         self.bounds_ns = Some((first.min(log_ns), last.max(log_ns)));
         self.chunk.message(channel, sequence, log_ns, publish_ns, data);
         if self.chunk.bytes() >= CHUNK_BYTES {
-            self.flush()?;
+            self.hand_over()?;
         }
         Ok(true)
     }
 
     pub fn add_metadata(&mut self, name: &str, metadata: &BTreeMap<String, String>) -> io::Result<()> {
-        self.end_chunk()?;
-        let begin = self.file.position();
-        record(&mut self.staging, records::METADATA, |put| {
+        self.flush()?;
+        let file = self.file()?;
+        let begin = file.file.position();
+        record(&mut file.staging, records::METADATA, |put| {
             put.string(name);
             put.strings(metadata);
         });
-        let length = self.staging.len() as u64;
+        let length = file.staging.len() as u64;
+        file.put_staging();
+        file.file.flush()?;
         record(&mut self.metadata_indexes, records::METADATA_INDEX, |put| {
             put.u64(begin);
             put.u64(length);
             put.string(name);
         });
         self.metadata_count += 1;
-        self.put_staging();
-        self.file.flush()
+        Ok(())
     }
 
     /// Ends the chunk and hands all to the operating system.
     pub fn flush(&mut self) -> io::Result<()> {
-        self.end_chunk()?;
-        self.file.flush()
+        self.file()?;
+        let Self { file: Some(file), chunk, .. } = self else { return Err(lost()) };
+        file.put(chunk)
     }
 
     /// Writes the summary and waits until the disk has all of it.
     pub fn finish(mut self) -> io::Result<()> {
-        self.end_chunk()?;
-        let crc = self.data_crc.clone().finalize();
-        self.staging.extend_from_slice(&alone(records::DATA_END, |put| put.u32(crc)));
-        self.put_summary();
-        self.put_staging();
-        self.file.flush()?;
-        self.file.into_complete()?.sync_all()
+        self.flush()?;
+        self.file()?;
+        let mut file = self.file.take().ok_or_else(lost)?;
+        let crc = file.data_crc();
+        file.staging.extend_from_slice(&alone(records::DATA_END, |put| put.u32(crc)));
+        self.put_summary(&mut file);
+        file.put_staging();
+        file.file.flush()?;
+        file.file.into_complete()?.sync_all()
     }
 
-    fn put_staging(&mut self) {
-        self.data_crc.update(&self.staging);
-        self.file.write(&self.staging);
-        self.staging.clear();
-    }
-
-    fn end_chunk(&mut self) -> io::Result<()> {
-        if self.chunk.bytes() > 0 {
-            let sealed = self.chunk.seal(&mut self.staging)?;
-            self.index(&sealed);
-            self.put_staging();
+    /// The file, once the packer is done with the chunk that it has.
+    fn file(&mut self) -> io::Result<&mut ChunkFile> {
+        if self.file.is_none() {
+            let (file, chunk, put) = self.packer.as_ref().and_then(Packer::wait).ok_or_else(lost)?;
+            self.file = Some(file);
+            self.spare = Some(chunk);
+            put?;
         }
+        self.file.as_deref_mut().ok_or_else(lost)
+    }
+
+    /// The chunk is full: gathers in the other one while the packer puts this one into the file.
+    fn hand_over(&mut self) -> io::Result<()> {
+        self.file()?;
+        if self.packer.is_none() {
+            self.packer = Packer::new().ok();
+        }
+        let (Some(packer), Some(spare)) = (&self.packer, self.spare.take()) else { return self.flush() };
+        let full = std::mem::replace(&mut self.chunk, spare);
+        packer.put(self.file.take().ok_or_else(lost)?, full);
         Ok(())
     }
 
-    fn index(&mut self, sealed: &Sealed) {
-        let begin = self.file.position();
-        self.chunk_count += 1;
-        record(&mut self.chunk_indexes, records::CHUNK_INDEX, |put| {
-            put.u64(sealed.first_ns);
-            put.u64(sealed.last_ns);
-            put.u64(begin);
-            put.u64(sealed.chunk_bytes);
-            put.numbers(sealed.index_offsets.iter().map(|&(channel, offset)| (channel, begin + offset)));
-            put.u64(sealed.index_bytes);
-            put.string("zstd");
-            put.u64(sealed.compressed_bytes);
-            put.u64(sealed.uncompressed_bytes);
-        });
-    }
-
-    fn statistics(&self) -> Vec<u8> {
+    fn statistics(&self, chunk_count: u32) -> Vec<u8> {
         let (first_ns, last_ns) = self.bounds_ns.unwrap_or((0, 0));
         let counts: Vec<_> = (0u16..).zip(self.message_counts.iter().copied()).filter(|&(_, n)| n > 0).collect();
         alone(records::STATISTICS, |put| {
@@ -189,7 +185,7 @@ impl Writer {
             put.u32(self.channels.ids.len() as u32);
             put.u32(0);
             put.u32(self.metadata_count);
-            put.u32(self.chunk_count);
+            put.u32(chunk_count);
             put.u64(first_ns);
             put.u64(last_ns);
             put.numbers(counts.into_iter());
@@ -197,38 +193,43 @@ impl Writer {
     }
 
     /// Appends summary, its offsets, footer and magic to what is staged.
-    fn put_summary(&mut self) {
-        let base = self.file.position();
-        let begin = self.staging.len();
+    fn put_summary(&mut self, file: &mut ChunkFile) {
+        let base = file.file.position();
+        let begin = file.staging.len();
         let groups = [
             (records::SCHEMA, std::mem::take(&mut self.schemas.records)),
             (records::CHANNEL, std::mem::take(&mut self.channels.records)),
-            (records::STATISTICS, self.statistics()),
-            (records::CHUNK_INDEX, std::mem::take(&mut self.chunk_indexes)),
+            (records::STATISTICS, self.statistics(file.count)),
+            (records::CHUNK_INDEX, std::mem::take(&mut file.indexes)),
             (records::METADATA_INDEX, std::mem::take(&mut self.metadata_indexes)),
         ];
         let mut offsets = Vec::new();
         for (opcode, bytes) in groups.iter().filter(|(_, bytes)| !bytes.is_empty()) {
             record(&mut offsets, records::SUMMARY_OFFSET, |put| {
                 put.u8(*opcode);
-                put.u64(base + self.staging.len() as u64);
+                put.u64(base + file.staging.len() as u64);
                 put.u64(bytes.len() as u64);
             });
-            self.staging.extend_from_slice(bytes);
+            file.staging.extend_from_slice(bytes);
         }
-        let offsets_at = self.staging.len();
-        self.staging.extend_from_slice(&offsets);
+        let offsets_at = file.staging.len();
+        file.staging.extend_from_slice(&offsets);
         let mut footer = alone(records::FOOTER, |put| {
             put.u64(base + begin as u64);
             put.u64(base + offsets_at as u64);
             put.u32(0);
         });
         footer.truncate(footer.len() - 4); // the checksum covers all before itself
-        self.staging.extend_from_slice(&footer);
-        let crc = crc32fast::hash(&self.staging[begin..]);
-        self.staging.extend_from_slice(&crc.to_le_bytes());
-        self.staging.extend_from_slice(records::MAGIC);
+        file.staging.extend_from_slice(&footer);
+        let crc = crc32fast::hash(&file.staging[begin..]);
+        file.staging.extend_from_slice(&crc.to_le_bytes());
+        file.staging.extend_from_slice(records::MAGIC);
     }
+}
+
+/// The packer's thread is gone, which no call explains.
+fn lost() -> io::Error {
+    io::Error::other("the thread that compresses has ended")
 }
 
 /// The number of a definition, `next` if it is new: then it goes into the chunk.

@@ -135,10 +135,27 @@ typedef struct {
     uint32_t size;
 } fcsl_sample_t;
 
+/* Samples of one channel, in order of tick; sample i has the scalars at values + rows[i] * row_bytes. */
+typedef struct {
+    const int64_t *ticks; /* the first that sees each */
+    const int64_t *ages_ticks;
+    const int64_t *stamps_ns;
+    const int64_t *rows;
+    const uint8_t *values;
+    uint64_t row_bytes;
+    uint64_t row_count;
+    uint64_t count;
+    uint64_t next; /* the first sample that was not delivered */
+    uint32_t channel;
+} fcsl_series_t;
+
 /* Runs all ticks from the coming one to before tick `end`, delivering each of `count` samples (in order of tick, all of
  * these ticks) before its tick. Fails where fcsl_run_write_channel, fcsl_run_set or fcsl_run_step do; what came before is done. */
 int fcsl_run_feed(fcsl_run_t *run, const fcsl_sample_t *samples, size_t count, const void *payloads,
                   uint64_t payload_bytes, uint64_t end, fcsl_error_t *error);
+/* The same with samples of several channels; those of one tick are delivered in the order of `series`. A series goes on where
+ * the last call left it. */
+int fcsl_run_feed_series(fcsl_run_t *run, fcsl_series_t *series, uint32_t count, uint64_t end, fcsl_error_t *error);
 
 /* What a host did, as recorded on /<ns>/<machine>/record/writes (fcsl_msgs/HostWrite) at the tick that is the first to see
  * it: doing the same again before that tick reproduces the run. `data` is little-endian with canonical NaNs. */

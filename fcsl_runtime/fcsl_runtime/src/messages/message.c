@@ -107,9 +107,16 @@ int fcsl_layout_append(fcsl_layout_t *layout, const fcsl_field_t *field)
     if (size > FCSL_MESSAGE_BYTES_MAX) {
         return -1;
     }
+    layout->size = (uint32_t)size;
+    /* Fields that lie behind one another here and there are copied as one. */
+    fcsl_copy_t *last = layout->copy_count > 0 ? &layout->copies[layout->copy_count - 1u] : NULL;
+    if (last != NULL && last->type == field->type && last->target + scalar * last->count == target &&
+        last->source + (uint64_t)fcsl_scalar_size(field->type) * last->count == field->offset) {
+        last->count += field->count;
+        return 0;
+    }
     layout->copies[layout->copy_count++] =
         (fcsl_copy_t){.source = field->offset, .target = (uint32_t)target, .count = field->count, .type = field->type};
-    layout->size = (uint32_t)size;
     return 0;
 }
 
@@ -279,24 +286,40 @@ void fcsl_layout_free(fcsl_layout_t *layout)
     layout->copies = NULL;
 }
 
-void fcsl_layout_write(const fcsl_layout_t *layout, const void *data, uint64_t tick, uint64_t time_ns, uint8_t *cdr)
+void fcsl_layout_begin(const fcsl_layout_t *layout, uint8_t *cdr)
 {
-    const uint8_t *base = data;
     memset(cdr, 0, layout->size);
     fcsl_cdr_t header;
     fcsl_cdr_begin(&header, cdr, FIRST_OUTPUT_AT);
-    fcsl_cdr_header(&header, time_ns);
-    fcsl_cdr_u64(&header, tick);
-    for (uint32_t i = 0; i < layout->copy_count; i++) {
-        const fcsl_copy_t *copy = &layout->copies[i];
+    fcsl_cdr_header(&header, 0);
+}
+
+static void export_healths(uint8_t *out, const uint8_t *in, uint32_t count)
+{
+    for (uint32_t i = 0; i < count; i++) {
+        int32_t health = 0;
+        memcpy(&health, in + 4u * (size_t)i, sizeof health);
+        out[i] = (uint8_t)health;
+    }
+}
+
+void fcsl_layout_fill(const fcsl_layout_t *layout, const void *data, uint64_t tick, uint64_t time_ns, uint8_t *cdr)
+{
+    const uint8_t *base = data;
+    fcsl_cdr_t stamp = {.bytes = cdr, .capacity = FIRST_OUTPUT_AT, .at = FCSL_CDR_ENCAPSULATION_BYTES};
+    fcsl_cdr_time(&stamp, time_ns);
+    fcsl_put_u64(cdr + TICK_AT, tick);
+    for (const fcsl_copy_t *copy = layout->copies, *end = copy + layout->copy_count; copy != end; copy++) {
         if (copy->type == FCSL_HEALTH) {
-            for (uint32_t j = 0; j < copy->count; j++) {
-                int32_t health = 0;
-                memcpy(&health, base + copy->source + 4u * (size_t)j, sizeof health);
-                cdr[copy->target + j] = (uint8_t)health;
-            }
+            export_healths(cdr + copy->target, base + copy->source, copy->count);
         } else {
             fcsl_scalars_export(cdr + copy->target, base + copy->source, copy->type, copy->count);
         }
     }
+}
+
+void fcsl_layout_write(const fcsl_layout_t *layout, const void *data, uint64_t tick, uint64_t time_ns, uint8_t *cdr)
+{
+    fcsl_layout_begin(layout, cdr);
+    fcsl_layout_fill(layout, data, tick, time_ns, cdr);
 }

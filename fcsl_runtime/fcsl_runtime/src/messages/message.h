@@ -38,7 +38,11 @@ void fcsl_layout_free(fcsl_layout_t *layout);
 /* The ROS 2 name of a field's type: "float64" or "float64[9]". */
 void fcsl_ros_type(const fcsl_field_t *field, char *text, size_t size);
 
-/* Writes the message of a tick; `cdr` has room for layout->size bytes. */
+/* Puts into `cdr`, which has room for layout->size bytes, what all messages of a layout have in common. */
+void fcsl_layout_begin(const fcsl_layout_t *layout, uint8_t *cdr);
+/* Makes it the message of a tick; it may have been that of another one. */
+void fcsl_layout_fill(const fcsl_layout_t *layout, const void *data, uint64_t tick, uint64_t time_ns, uint8_t *cdr);
+/* Both. */
 void fcsl_layout_write(const fcsl_layout_t *layout, const void *data, uint64_t tick, uint64_t time_ns, uint8_t *cdr);
 
 #endif /* FCSL_MESSAGE_H */

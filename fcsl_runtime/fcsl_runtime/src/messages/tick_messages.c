@@ -13,13 +13,6 @@ typedef struct {
     const uint8_t *data;
 } left_t;
 
-void fcsl_tick_message_begin(fcsl_cdr_t *cdr, fcsl_stamp_t stamp, uint8_t *bytes, size_t capacity)
-{
-    fcsl_cdr_begin(cdr, bytes, capacity);
-    fcsl_cdr_header(cdr, stamp.time_ns);
-    fcsl_cdr_u64(cdr, stamp.tick);
-}
-
 /* The state at `offset` of the struct, or null when its number is none (a struct that something else damaged). */
 static const fcsl_state_t *state_at(const left_t *left, uint32_t offset)
 {

@@ -17,7 +17,12 @@ typedef struct {
 } fcsl_stamp_t;
 
 /* Begins a message of a tick with the header and tick number that all of them begin with. */
-void fcsl_tick_message_begin(fcsl_cdr_t *cdr, fcsl_stamp_t stamp, uint8_t *bytes, size_t capacity);
+static inline void fcsl_tick_message_begin(fcsl_cdr_t *cdr, fcsl_stamp_t stamp, uint8_t *bytes, size_t capacity)
+{
+    fcsl_cdr_begin(cdr, bytes, capacity);
+    fcsl_cdr_header(cdr, stamp.time_ns);
+    fcsl_cdr_u64(cdr, stamp.tick);
+}
 
 /* The message of a tick from the machine struct `data` that it left. Of the struct only the current and the next state are
  * read, and health, request and counters of each instance. Returns as fcsl_run_tick_message does. */

@@ -156,6 +156,19 @@ static int build(builder_t *b)
     return add_channels(b);
 }
 
+static int begin_messages(builder_t *b)
+{
+    for (uint32_t i = 0; i < b->count; i++) {
+        fcsl_record_topic_t *shown = &b->shown[i];
+        shown->message = malloc(shown->layout.size);
+        if (shown->message == NULL) {
+            return fcsl_fail(b->error, "out of memory for messages");
+        }
+        fcsl_layout_begin(&shown->layout, shown->message);
+    }
+    return 0;
+}
+
 int fcsl_record_topics_build(const fcsl_machine_t *machine, const char *globs, fcsl_record_topic_t **shown,
                              uint32_t *count, fcsl_error_t *error)
 {
@@ -168,6 +181,9 @@ int fcsl_record_topics_build(const fcsl_machine_t *machine, const char *globs, f
         (void)fcsl_fail(error, "out of memory for messages");
     } else if (choose(machine, globs, chosen, error) == 0) {
         status = build(&b);
+    }
+    if (status == 0) {
+        status = begin_messages(&b);
     }
     free(chosen);
     free((void *)b.leaves);
@@ -182,6 +198,7 @@ void fcsl_record_topics_free(fcsl_record_topic_t *shown, uint32_t count)
         free(shown[i].topic);
         free(shown[i].type);
         free(shown[i].schema);
+        free(shown[i].message);
         fcsl_layout_free(&shown[i].layout);
     }
     free(shown);

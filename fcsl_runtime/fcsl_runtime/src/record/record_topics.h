@@ -18,6 +18,7 @@ typedef struct {
     char *type;
     char *schema; /* complete ros2msg text */
     fcsl_layout_t layout;
+    uint8_t *message; /* of the last tick that was written: the next one changes stamp and values */
 } fcsl_record_topic_t;
 
 /* Makes the messages of the fields that `globs` choose (see fcsl_record_options_t): *count of them at *shown. 0, or -1 when

@@ -105,9 +105,9 @@ static int put_tick(fcsl_recorder_t *recorder, fcsl_stamp_t stamp, const uint8_t
         data += range.size;
     }
     for (uint32_t i = 0; i < recorder->shown_count; i++) {
-        const fcsl_layout_t *layout = &recorder->shown[i].layout;
-        fcsl_layout_write(layout, recorder->data, stamp.tick, stamp.time_ns, recorder->scratch);
-        if (put(recorder, FCSL_TOPIC_FIRST_SHOWN + i, stamp.time_ns, recorder->scratch, layout->size) != 0) {
+        const fcsl_record_topic_t *shown = &recorder->shown[i];
+        fcsl_layout_fill(&shown->layout, recorder->data, stamp.tick, stamp.time_ns, shown->message);
+        if (put(recorder, FCSL_TOPIC_FIRST_SHOWN + i, stamp.time_ns, shown->message, shown->layout.size) != 0) {
             return -1;
         }
     }

@@ -276,11 +276,14 @@ int fcsl_run_write_channel(fcsl_run_t *run, uint32_t channel, const void *bytes,
         return fcsl_fail(error, "channel '%s' cannot hold this value", target->name);
     }
     fcsl_scalars_import(run->data + field->offset, bytes, field->type, field->count);
-    /* Out again, so that the record has canonical NaNs whatever the caller had. */
-    fcsl_scalars_export(run->staging, run->data + field->offset, field->type, field->count);
     memcpy(run->data + target->sample_age_offset, &age_ticks, sizeof age_ticks);
     memcpy(run->data + target->stamp_offset, &stamp_ns, sizeof stamp_ns);
     run->data[target->fresh_offset] = 1u;
+    if (!fcsl_writes_noted(run)) {
+        return 0;
+    }
+    /* Out again, so that the record has canonical NaNs whatever the caller had. */
+    fcsl_scalars_export(run->staging, run->data + field->offset, field->type, field->count);
     fcsl_note_write(run, &(fcsl_write_t){.kind = FCSL_WRITE_CHANNEL,
                                          .path = target->name,
                                          .data = run->staging,

@@ -13,11 +13,11 @@ from __future__ import annotations
 import hashlib
 import struct
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 
 from ..errors import BagError
-from ..ros.cdr import bits
 from .bag import Array, Bag
 from .states import StateReader
 
@@ -25,6 +25,13 @@ _COUNT = struct.Struct("<Q")
 _SIZE = struct.Struct("<I")
 #: Message fields that are not values of the machine.
 _FRAME = ("header.stamp.sec", "header.stamp.nanosec", "tick")
+
+
+def _samples(ticks: Array, kind: np.dtype[Any], shape: tuple[int, ...]) -> Array:
+    """Samples as they are hashed, without gaps: their `tick`, and room for a `value`."""
+    samples = np.empty(len(ticks), [("tick", "<u8"), ("value", kind, shape)])
+    samples["tick"] = ticks
+    return samples
 
 
 class Sums:
@@ -35,13 +42,14 @@ class Sums:
 
     def add(self, path: str, ticks: Array, values: Array) -> None:
         """N samples: their `ticks`, u64 of shape (N,), and their `values` as in messages, of shape (N,) or (N, count)."""
-        self._add(path, ticks, bits(values).view(np.uint8).reshape(len(values), -1))
+        samples = _samples(ticks, values.dtype, values.shape[1:])
+        column = samples["value"]
+        column[:] = values
+        if column.dtype.kind == "f" and (nan := np.isnan(column)).any():
+            column[nan] = np.nan
+        self._add(path, samples)
 
-    def _add(self, path: str, ticks: Array, values: Array) -> None:
-        """`values`: bytes, u8 of shape (N, size)."""
-        samples = np.empty((len(ticks), 8 + values.shape[1]), np.uint8)
-        samples[:, :8] = ticks.view(np.uint8).reshape(-1, 8)
-        samples[:, 8:] = values
+    def _add(self, path: str, samples: Array) -> None:
         running, count = self._sums.setdefault(path, (hashlib.sha256(), [0]))
         running.update(samples.data)
         count[0] += len(samples)
@@ -49,8 +57,10 @@ class Sums:
     def add_states(self, ticks: Array, state: str, next_state: str) -> None:
         """The same states in all of `ticks`, u64 of shape (N,)."""
         for name, text in (("state", state.encode()), ("next_state", next_state.encode())):
-            value = np.frombuffer(_SIZE.pack(len(text)) + text, np.uint8)
-            self._add(f"machine.{name}", ticks, np.broadcast_to(value, (len(ticks), len(value))))
+            value = np.void(_SIZE.pack(len(text)) + text)
+            samples = _samples(ticks, value.dtype, ())
+            samples["value"] = value
+            self._add(f"machine.{name}", samples)
 
     def total(self) -> str:
         """The digest, as hex."""

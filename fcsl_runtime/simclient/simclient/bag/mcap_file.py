@@ -9,6 +9,7 @@ import os
 import struct
 import zlib
 from collections.abc import Collection, Iterator
+from contextlib import closing
 from io import BytesIO
 from pathlib import Path
 from typing import Any, BinaryIO, NamedTuple
@@ -21,6 +22,7 @@ from mcap.reader import SeekingReader
 
 from ..errors import BagError
 from ..library import runtime_library
+from .ahead import ahead
 from .losses import Loss, Losses
 from .mcap_walk import CHUNK_HEAD, LOST, LOST_MARK, MAGIC, RECORD_HEAD, Gap, Record, Walk
 from .unpack import LIMIT_BYTES, TooLarge, unlz4, unzstd
@@ -44,11 +46,19 @@ _FREE_BYTES, _RATIO = 1 << 30, 1000
 _BLOCK_BYTES = 1 << 20
 
 
-#: A message: the number of its channel in its file, the time of recording, and the range of its bytes.
-ENTRY = np.dtype([("number", "<i8"), ("log_ns", "<i8"), ("begin", "<i8"), ("end", "<i8")])
 #: fcsl_mcap_record_t
 _RECORD = np.dtype(
     [("begin", "<u8"), ("end", "<u8"), ("log_ns", "<i8"), ("channel", "<u4"), ("opcode", "<u4")], align=True
+)
+#: A message: the number of its channel in its file, the time of recording, and the range of its bytes. In memory it is a
+#: _RECORD, so that nothing is copied where all records are messages.
+ENTRY = np.dtype(
+    {
+        "names": ["number", "log_ns", "begin", "end"],
+        "formats": ["<u4", "<i8", "<i8", "<i8"],
+        "offsets": [24, 16, 0, 8],
+        "itemsize": 32,
+    }
 )
 #: Records listed in one call.
 _LISTED = 1 << 16
@@ -107,12 +117,13 @@ class Scan:
         """The messages of `topics` (None: all), many at a time; some batches are empty."""
         with self.file.open("rb") as stream:
             walk = Walk(stream)
-            for block in _blocks(stream, walk):
-                self.position = block.end
-                if block.why:
-                    self._losses.parts.append(Loss(block.begin, block.end, block.why, block.span_ns))
-                else:
-                    yield from self._listed(block, topics)
+            with closing(ahead(_blocks(stream, walk), lambda block: len(block.data))) as blocks:
+                for block in blocks:
+                    self.position = block.end
+                    if block.why:
+                        self._losses.parts.append(Loss(block.begin, block.end, block.why, block.span_ns))
+                    else:
+                        yield from self._listed(block, topics)
         self.ended, self.behind = walk.ended, self.file.stat().st_size - walk.end
 
     def _listed(self, block: _Block, topics: Collection[str] | None) -> Iterator[Batch]:
@@ -142,22 +153,35 @@ class Scan:
 
         Raises mcap's errors for damaged records.
         """
-        for record in listed[np.isin(listed["opcode"], (Opcode.CHANNEL, Opcode.SCHEMA))]:
-            self._definition(_parse_definition(int(record["opcode"]), data[int(record["begin"]) : int(record["end"])]))
-        messages = np.flatnonzero(listed["opcode"] == Opcode.MESSAGE)
-        channels = listed["channel"][messages]
-        numbers = np.unique(channels).tolist()
+        is_message = listed["opcode"] == Opcode.MESSAGE
+        if not is_message.all():
+            for record in listed[np.isin(listed["opcode"], (Opcode.CHANNEL, Opcode.SCHEMA))]:
+                content = data[int(record["begin"]) : int(record["end"])]
+                self._definition(_parse_definition(int(record["opcode"]), content))
+            listed = _chosen(listed, is_message)
+        channels = listed["channel"]
+        numbers = distinct(channels)
         defined = [n for n in numbers if n in self.channels]
         wanted = [n for n in defined if topics is None or self.channels[n].topic in topics]
         undefined = 0 if len(defined) == len(numbers) else int((~np.isin(channels, defined)).sum())
         self._losses.undefined += undefined
-        self.count += len(messages) - undefined
+        self.count += len(listed) - undefined
         if len(wanted) < len(numbers):
-            messages = messages[np.isin(channels, wanted)]
-        entries = np.empty(len(messages), ENTRY)
-        for name, column in (("number", "channel"), ("log_ns", "log_ns"), ("begin", "begin"), ("end", "end")):
-            entries[name] = listed[column][messages]
-        return entries
+            listed = _chosen(listed, np.isin(channels, wanted))
+        return listed.view(ENTRY)
+
+
+def _chosen(listed: np.ndarray[Any, Any], mask: np.ndarray[Any, Any]) -> np.ndarray[Any, Any]:
+    """listed[mask]; NumPy copies the fields of structures one by one, but rows of bytes as a whole."""
+    return listed.view(f"V{_RECORD.itemsize}")[mask].view(_RECORD)
+
+
+def distinct(numbers: np.ndarray[Any, Any]) -> list[int]:
+    """The different ones among these, ascending. Often there is but one, which is soon found."""
+    if len(numbers) and (numbers == numbers[0]).all():
+        return [int(numbers[0])]
+    found: list[int] = np.unique(numbers).tolist()
+    return found
 
 
 def _list(data: bytes, begin: int) -> np.ndarray[Any, Any]:

@@ -10,10 +10,10 @@ from pathlib import Path
 import numpy as np
 
 from ..bag import Bag
+from ..c_run import CSeries
 from ..descriptor import Channel, Machine
 from ..errors import BagError, MapError, did_you_mean
 from ..run import Run
-from ..samples import SAMPLE
 from .expect import Comparison, table
 from .grid import (
     JUMP_NS,
@@ -22,9 +22,7 @@ from .grid import (
     Grid,
     Oddities,
     first_ticks_at,
-    joined_rows,
     place,
-    taken_rows,
     tick_count,
 )
 from .intake import Intake, Wish, gather, refusals, wish
@@ -203,7 +201,7 @@ def _grid(chart: Map, intakes: Mapping[str, Intake], bag: Bag, tick_hz: int) -> 
 
 @dataclass(frozen=True)
 class _Delivery:
-    """The samples that a channel gets, in the order of their ticks. `rows` are those of `values`, an array of bytes."""
+    """The samples that a channel gets, in the order of their ticks. `rows` are those of `values`; all others are i64."""
 
     channel: Channel
     ticks: Array
@@ -212,14 +210,16 @@ class _Delivery:
     rows: Array
     values: Array
 
-    def between(self, begin: int, end: int, payload: int) -> tuple[Array, Array]:
-        """(the samples of these ticks as SAMPLE, with payload offsets from `payload` on; their values)."""
-        low, high = np.searchsorted(self.ticks, (begin, end))
-        samples = np.zeros(high - low, SAMPLE)
-        samples["tick"], samples["age_ticks"] = self.ticks[low:high], self.ages[low:high]
-        samples["stamp_ns"], samples["channel"] = self.stamps_ns[low:high], self.channel.index
-        samples["payload"] = payload + np.arange(high - low) * self.channel.field.size
-        return samples, self.values[self.rows[low:high]]
+    def series(self) -> CSeries:
+        """For `Run.feed_series`; valid as long as this object."""
+        columns = (self.ticks, self.ages, self.stamps_ns, self.rows, self.values)
+        return CSeries(
+            *(column.ctypes.data for column in columns),
+            row_bytes=self.values.strides[0],
+            row_count=len(self.values),
+            count=len(self.ticks),
+            channel=self.channel.index,
+        )
 
 
 def _delivery(
@@ -304,24 +304,13 @@ def _drive(
     run.attach()
     if record is not None:
         run.record(*record, lossless=True)
+    series = (CSeries * len(deliveries))(*(delivery.series() for delivery in deliveries))
     slice_ticks = outputs.slice_ticks if outputs else SLICE_TICKS
     for begin in range(0, ticks, slice_ticks):
         end = min(begin + slice_ticks, ticks)
-        run.feed(*_fed(deliveries, begin, end), end)
+        run.feed_series(series, end)
         if outputs:
             outputs.collect()
         progress("running", end, ticks)
     if record is not None:
         run.record_stop()
-
-
-def _fed(deliveries: Sequence[_Delivery], begin: int, end: int) -> tuple[bytes, bytes]:
-    """(samples of these ticks, sorted by tick, those of one tick in the order of `deliveries`; their payloads)."""
-    parts, payloads, size = [], [], 0
-    for delivery in deliveries:
-        samples, values = delivery.between(begin, end, size)
-        parts.append(samples)
-        payloads.append(values.tobytes())
-        size += len(payloads[-1])
-    order = np.argsort(np.concatenate([samples["tick"] for samples in parts]), kind="stable")
-    return taken_rows(joined_rows(parts), order).tobytes(), b"".join(payloads)

@@ -11,6 +11,7 @@ import numpy as np
 from fcsl_compiler.ros.reader import Pick
 
 from ..bag import Bag, Topic
+from ..bag.mcap_file import distinct
 from ..errors import BagError, MapError
 from ..ros.reader import REASONS, Reader
 from ..ros.types import definitions_of
@@ -109,25 +110,29 @@ class _Column:
         # A message of another type is treated as empty: counted, not decoded.
         sizes = entries["end"] - entries["begin"]
         samples = self.reader.read_many(data, entries["begin"], np.zeros_like(sizes) if other else sizes)
-        self.log_ns.append(entries["log_ns"])
+        self.log_ns.append(entries["log_ns"].copy())
         self.stamps_ns.append(samples.stamps)
         self.values.append(samples.values)
         self.status.append(samples.status)
-        self.other.append(np.full(len(entries), int(other)))
+        self.other.append(np.full(len(entries), other))
 
     def sorted_out(self, stamped: bool) -> tuple[list[Intake], Oddities]:
         """One intake per wish. `stamped`: samples are placed by the header stamp, where the type has one."""
         header_time = stamped and self.reader.has_stamp
         log_ns, stamps_ns, others = (_joined(parts) for parts in (self.log_ns, self.stamps_ns, self.other))
-        other = others != 0
+        other = others.astype(bool)
         status = np.concatenate(self.status) if self.status else np.empty((0, len(self.wishes)), np.uint8)
         values = joined_rows(self.values) if self.values else np.empty(0, self.reader.dtype)
+        all_read = not status.any()
         # One pick is enough: a fault of a message as a whole appears in all picks.
-        unread = np.isin(status[:, 0], _UNREAD)
+        unread = np.zeros(len(log_ns), bool) if all_read else np.isin(status[:, 0], _UNREAD)
         readable = ~other & ~unread
         times_ns = stamps_ns if header_time else log_ns
-        timed = np.zeros(len(log_ns), bool)
-        timed[readable], oddities = screen(times_ns[readable], log_ns[readable], header_time)
+        if readable.all():
+            timed, oddities = screen(times_ns, log_ns, header_time)
+        else:
+            timed = np.zeros(len(log_ns), bool)
+            timed[readable], oddities = screen(times_ns[readable], log_ns[readable], header_time)
         if stamped and not header_time:
             oddities = replace(oddities, headerless=len(log_ns))
         unset = readable & (times_ns == 0) & header_time
@@ -135,7 +140,7 @@ class _Column:
         intakes = []
         for i, w in enumerate(self.wishes):
             judged = timed | (unread & ~other)
-            found = np.flatnonzero(np.bincount(status[:, i]))
+            found: list[int] = [] if all_read else np.flatnonzero(np.bincount(status[:, i])).tolist()
             masks = whole | {REASONS[code]: judged & (status[:, i] == code) for code in found if code}
             refused = {reason: (int(m.sum()), int(m.argmax())) for reason, m in masks.items() if m.any()}
             taken = timed & (status[:, i] == 0)
@@ -157,10 +162,11 @@ def gather(
     done = 0
     for batch, announced in bag.batches(columns.keys()):
         numbers = batch.entries["number"]
-        for number in np.unique(numbers).tolist():
+        present = distinct(numbers)
+        for number in present:
             topic = announced[number]
-            mine = numbers == number
-            columns[topic.name].add(batch.data, batch.entries if mine.all() else batch.entries[mine], topic)
+            mine = batch.entries if len(present) == 1 else batch.entries[numbers == number]
+            columns[topic.name].add(batch.data, mine, topic)
         done += len(numbers)
         progress(done)
     parts: dict[str, list[Intake]] = {}

@@ -53,12 +53,14 @@ class Outputs:
         #: Most ticks that the run may make between two calls of `collect`.
         self.slice_ticks = max(1, min(SLICE_TICKS, _SLICE_BYTES // self._row.itemsize))
         self._trace = run.trace([(f.offset, f.size) for f in chosen], self.slice_ticks)
+        self._rows = np.empty(self.slice_ticks, self._row)
         self._done = 0
 
     def collect(self) -> None:
         """Takes the ticks made since the last call."""
         count = self._trace.rows() - self._done
-        rows = np.frombuffer(self._trace.read(self._done, count), self._row)
+        rows = self._rows[:count]
+        self._trace.read_into(self._done, count, rows)
         ticks = np.arange(self._first + self._done, self._first + self._done + count, dtype=np.uint64)
         self._done += count
         for path in self._hashed:
