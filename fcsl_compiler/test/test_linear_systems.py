@@ -19,7 +19,7 @@ from fcsl_test_numbers import ROUNDING, Array, gamma, run, run_both, within
 from fcsl_test_programs import build
 from fcsl_test_twins import Twins
 
-SIZES = (1, 2, 3, 5, 8)
+SIZES = (1, 2, 3, 5, 8, 9)
 #: Allowance for second-order terms, and for L and U that differ from SciPy's by rounding.
 SLACK = 1.1
 

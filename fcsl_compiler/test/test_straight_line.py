@@ -212,8 +212,10 @@ def test_many_iterations_that_may_return_stay_a_loop(tmp_path: Path) -> None:
     assert "for (" in body(machine(tmp_path, text, 5, 1, {}, True), tmp_path)
 
 
+#: Sizes of filters whose matrices are set at run time: sums written out, in loops of pairs, in loops.
+AT_RUN_TIME = {"at_run_time": 9, "at_run_time_pairs": 6, "at_run_time_long": 15}
 STAYS = {
-    "at_run_time": (FILTER, False),
+    **dict.fromkeys(AT_RUN_TIME, (FILTER, False)),
     "an_index_at_run_time": (
         FILTER.replace("self.gain = ", "self.x[i32(self.steps % u32(3))] = 1.0\n        self.gain = "),
         True,
@@ -231,7 +233,7 @@ STAYS = {
 @pytest.mark.parametrize("case", STAYS)
 def test_what_cannot_be_written_out_stays(tmp_path: Path, case: str) -> None:
     text, frozen = STAYS[case]
-    n = 9 if case == "at_run_time" else 6
+    n = AT_RUN_TIME.get(case, 6)
     config = machine(tmp_path, text.replace("range(N)", f"range({n})"), n, 2, of_model(n, 2), frozen)
     assert "fcsl_" in body(config, tmp_path)
     twins = Twins(config)

@@ -31,8 +31,8 @@ _INLINE_ELEMENTS = 4
 _LONG_ELEMENTS = 32
 _LONG_UNROLL = 4
 #: Larger results are set to zero before they are computed. EVA unrolls loops with up to this many iterations
-#: (scripts/verify/eva_run.py).
-_UNFILLED_ELEMENTS = 128
+#: (scripts/verify/eva/run.py).
+_UNFILLED_ELEMENTS = 256
 
 _I = code.Name("i_")
 

@@ -5,6 +5,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 
+from ..lower.structural_zeros import PRODUCTS
 from ..model import code, ir
 from ..model.c_names import c_name
 from ..model.machine import Machine, Values
@@ -47,7 +48,7 @@ def _functions(machine: Machine, places: FaultPlaces) -> Iterator[code.Function]
     for function, owner in machine.emitted:
         types = {r: record_type(machine, owner, r) for r in ir.RECORDS} if owner else {}
         made = FunctionEmitter(function, machine.name, places, types, function.name in inlined).emit()
-        if owner is not None and not function.faults:
+        if owner is not None and not function.faults and not _is_dense(machine, function):
             made = written_out(made, _fields(machine, owner), bodies) or made
         bodies[made.name] = made
     yield from _called(bodies, machine)
@@ -56,6 +57,14 @@ def _functions(machine: Machine, places: FaultPlaces) -> Iterator[code.Function]
     for index, (instance, first) in enumerate(zip(machine.instances, alike(machine), strict=True)):
         yield from InstanceEmitter(machine, instance, index in quiet, machine.instances[first]).emit()
     yield from StepEmitter(machine, quiet).emit()
+
+
+def _is_dense(machine: Machine, function: ir.Function) -> bool:
+    """Whether it multiplies matrices of which none is constant. As loops, the operations of such products are
+    vectors."""
+    callees = [machine.program.functions[name] for name in function.calls]
+    products = [f for f in callees if f.source_name in PRODUCTS - {"matvec"}]
+    return bool(products) and all(len(f.arguments) == 2 for f in products)  # a constant is no argument
 
 
 def _fields(machine: Machine, algorithm: ir.Algorithm) -> dict[tuple[str, str], code.Type]:

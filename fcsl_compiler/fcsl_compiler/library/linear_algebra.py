@@ -128,12 +128,15 @@ def matmul(a: "f64[n][k]", b: "f64[k][m]") -> "f64[n][m]":
     Singular: none.
     """
     c = zeros(n, m)
+    row = zeros(m)  # a local, so that C compilers keep it in registers
     for i in range(n):
         for j in range(m):
-            c[i, j] = a[i, 0] * b[0, j]
+            row[j] = a[i, 0] * b[0, j]
         for p in range(1, k):
             for j in range(m):
-                c[i, j] = c[i, j] + a[i, p] * b[p, j]
+                row[j] = row[j] + a[i, p] * b[p, j]
+        for j in range(m):
+            c[i, j] = row[j]
     return c
 
 
@@ -272,32 +275,45 @@ def ldl_solve(a: "f64[n][n]", b: "f64[n][m]") -> "f64[n][m]":
     Source: N. Higham, "Accuracy and Stability of Numerical Algorithms", 2nd ed., §10.1; G. Golub, C. Van Loan, "Matrix
     Computations", 4th ed., §4.1.
     Order: for each column of a: factor (element / pivot, of the element right of the pivot) times the pivot's row is subtracted
-    from those below, then the pivot's row of the right-hand side is divided by the pivot; then from the last row up: that
-    row less the products with the factors from left to right.
+    from those below. From each row of b the products of the factors with the rows above are subtracted from left to right;
+    then from the last row up: that row divided by the pivot, less the products with the factors from left to right.
     Singular: all NaN when a is not positive definite (a pivot is not above zero) or contains a NaN.
     """
     left = a
-    x = b
     for c in range(n):
         if not (left[c, c] > 0.0):
-            for i in range(n):
-                for j in range(m):
-                    x[i, j] = nan
-            return x
+            left[c, c] = nan
         for i in range(c + 1, n):
             factor = left[c, i] / left[c, c]
             left[i, c] = factor
             for j in range(i, n):
                 left[i, j] = left[i, j] - factor * left[c, j]
+    if n > 8:  # by rows, whose operations are vectors
+        x = b
+        for i in range(1, n):
+            for p in range(i):
+                for j in range(m):
+                    x[i, j] = x[i, j] - left[i, p] * x[p, j]
+        for i in range(n - 1, -1, -1):
             for j in range(m):
-                x[i, j] = x[i, j] - factor * x[c, j]
-        pivot = left[c, c]
+                x[i, j] = x[i, j] / left[i, i]
+            for p in range(i + 1, n):
+                for j in range(m):
+                    x[i, j] = x[i, j] - left[p, i] * x[p, j]
+    else:  # by columns, each in a local, so that C compilers keep it in registers
+        column = zeros(n)
+        x = zeros(n, m)
         for j in range(m):
-            x[c, j] = x[c, j] / pivot
-    for i in range(n - 1, -1, -1):
-        for p in range(i + 1, n):
-            for j in range(m):
-                x[i, j] = x[i, j] - left[p, i] * x[p, j]
+            for i in range(n):
+                column[i] = b[i, j]
+                for p in range(i):
+                    column[i] = column[i] - left[i, p] * column[p]
+            for i in range(n - 1, -1, -1):
+                column[i] = column[i] / left[i, i]
+                for p in range(i + 1, n):
+                    column[i] = column[i] - left[p, i] * column[p]
+            for i in range(n):
+                x[i, j] = column[i]
     return x
 
 

@@ -16,6 +16,7 @@ from ..model.machine import Machine, Values
 from ..model.types import Array
 from .common_subexpressions import share_calls
 from .dead_stores import without_dead_stores
+from .short_triangles import taken, without_short_triangles
 from .structural_zeros import PRODUCTS, Constant, product
 
 #: A sum with more non-zero elements than this becomes a loop over a table with a test.
@@ -53,7 +54,10 @@ class _Lowering:
         """Lowers a function whose arguments `known` are constant. Returns f itself if nothing changes."""
         if _is_library(f) and f.source_name in PRODUCTS:
             f = product(f, f.name, {})
-        body = _Body(self, known or {}).rewrite(without_dead_stores(f))
+        simple = replace(f, body=taken(f.body)) if _is_library(f) else f
+        body = _Body(self, known or {}).rewrite(without_dead_stores(simple))
+        if _is_library(f):
+            body = without_short_triangles(body)
         made = share_calls(replace(f, body=body), self._is_library)
         return f if made.body == f.body else replace(made, calls=_calls(made.body))
 

@@ -19,6 +19,13 @@ from ..model.types import BOOL, F64, I64, Array, Type
 #: Library functions that omit terms with a zero of a constant argument.
 PRODUCTS = frozenset({"matmul", "matvec", "symmetric_product"})
 
+#: Symmetric products with longer sums become loops: their factors would not fit in the registers. With an even number of
+#: columns, pairs of elements are aligned in every row, and loops are faster for all but short sums.
+_WRITTEN_SUM = 12
+_WRITTEN_SUM_OF_PAIRS = 5
+#: Symmetric products with more rows than this stay as they are in the library.
+_WRITTEN_ROWS = 24
+
 #: Products with more terms than this become loops over a table with a test for zero, because unrolled code grows with
 #: the number of terms.
 _UNROLLED_TERMS = 512
@@ -62,17 +69,21 @@ class _Product:
         #: Dimensions that the unrolled form writes out. The others are loops.
         self.by_row = self.a in known or self.is_symmetric
         self.by_column = self.b in known or self.is_vector
+        self.row = ir.Local(replace(f.result, shape=(self.m,)), "row", self.span)
         self.result = ir.Local(f.result, "c" if "c" not in (self.a, self.b) else "result", self.span)
 
     @property
     def is_better(self) -> bool:
         if self.known:
             return any(c.has_zeros for c in self.known.values())
-        return self.is_symmetric and self._terms() <= _UNROLLED_TERMS
+        return self.is_symmetric and self.n <= _WRITTEN_ROWS
 
     def function(self, name: str) -> ir.Function:
         more: tuple[tuple[str, Type], ...] = ()
-        if self._terms() <= _UNROLLED_TERMS:
+        if not self.known and self.k > (_WRITTEN_SUM if self.m % 2 else _WRITTEN_SUM_OF_PAIRS):
+            arguments = self.f.arguments
+            body, more = self._by_rows(), ((self.row.name, self.row.type),)
+        elif self._terms() <= _UNROLLED_TERMS:
             arguments = tuple((n, t) for n, t in self.f.arguments if n not in self.known)
             body = self._unrolled()
         else:
@@ -150,6 +161,35 @@ class _Product:
             if value == -1.0:
                 return self._apply("neg", other)
         return self._apply("*", left, right)
+
+    # ---- the symmetric form with long sums: rows are accumulated in a local array, which C compilers keep in registers
+
+    def _by_rows(self) -> tuple[ir.Stmt, ...]:
+        """Two rows at a time, from the diagonal on; then what is below it, row by row. Of the second row, the element
+        left of the diagonal is computed in vain."""
+        above = tuple(self._accumulated(r, min(r + 2, self.n)) for r in range(0, self.n, 2))
+        return above + tuple(s for r in range(1, self.n) for s in self._below(r))
+
+    def _accumulated(self, start: int, stop: int) -> ir.Stmt:
+        i, j = _variable("i", start, stop, self.span), _variable("j", start, self.m, self.span)
+        p, first = _variable("p", 1, self.k, self.span), self._number(0)
+        total = self._at(self.row, j, first)
+        product = self._apply("*", self._element(self.a, i, first), self._element(self.b, first, j))
+        term = self._apply("*", self._element(self.a, i, p), self._element(self.b, p, j))
+        rows = (
+            _loop(j, (ir.Assign(total, product, self.span),)),
+            _loop(p, (_loop(j, (ir.Assign(total, self._apply("+", total, term), self.span),)),)),
+            _loop(j, (ir.Assign(self._result(i, j), total, self.span),)),
+        )
+        return _loop(i, rows)
+
+    def _below(self, r: int) -> tuple[ir.Stmt, ...]:
+        row, j = self._number(r), _variable("j", 0, r, self.span)
+        element = self._at(self.row, j, row)
+        return (
+            _loop(j, (ir.Assign(element, self._result(j, row), self.span),)),
+            _loop(j, (ir.Assign(self._result(row, j), element, self.span),)),
+        )
 
     # ---- the compact form --------------------------------------------------------------------------------------------
 

@@ -35,6 +35,7 @@ _EXACT: dict[type[ast.AST], Callable[[int, int], Any]] = {
     ast.Sub: operator.sub,
     ast.Eq: operator.eq,
     ast.NotEq: operator.ne,
+    ast.Gt: operator.gt,
 }
 
 

@@ -24,7 +24,7 @@ _OPTIONS = (
     *("-kernel-warn-key", "parser:decimal-float=inactive,annot:missing-spec=error"),
     *("-eva", "-eva-precision", "0", "-eva-msg-key=-initial-state,-final-states"),
     # So many rounds as a local has elements that is not filled before a library function computes it (emit/expressions.py).
-    *("-eva-auto-loop-unroll", "128"),
+    *("-eva-auto-loop-unroll", "256"),
     # Only math_contract.h says what the math library does; copies and fills are modelled byte by byte.
     *("-eva-no-builtins-auto", "-eva-builtin", "memcpy:Frama_C_memcpy,memset:Frama_C_memset"),
     # NaN and infinities are values of the language; arithmetic on them is no error, a cast of them to an integer is.
