@@ -42,6 +42,8 @@ _LONGER = (
     "fcsl_bridge/test/test_bus_parties.py",
     "fcsl_bridge/test/test_controller.py",
     "fcsl_bridge/test/test_robustness_bags.py",
+    "fcsl_compiler/test/test_board_schema.py",
+    "fcsl_compiler/test/test_schema.py",
     "fcsl_runtime/simclient/test/test_socket.py",
 )
 
@@ -77,9 +79,15 @@ FULL_CHECKS = scaled(
     (
         script("mutants: tests notice small changes of the C runtime and of simclient", "mutation"),
         Check(
-            "longer tests: faults on the bus and of nodes, sockets",
+            "longer tests: faults on the bus and of nodes, sockets, schemas",
             ("-m", "pytest", "-q", *_LONGER),
             {"FCSL_VERIFY": "1"},
+        ),
+        tests(
+            "elementary functions: mpmath at each of 100 000 hard points",
+            "test_rounding.py",
+            *("-k", "test_correctly_rounded"),
+            FCSL_VERIFY="1",
         ),
         script("Ray: a campaign with a killed worker leaves the table of one process", "ray"),
     ),
@@ -91,12 +99,12 @@ CHECKS = (
     tests(
         "generated programs: compiled = CPython = oracle",
         "test_generated.py",
-        *("-k", "test_programs or test_machines", "--programs", scaled("1000", "20000"), "--program-seed", "2"),
+        *("-k", "test_programs or test_machines", "--programs", scaled("400", "20000"), "--program-seed", "2"),
     ),
     tests(
         "generated programs: by Nim = CPython = oracle",
         "test_nim_backend.py",
-        *("-k", "generated_ones", "--programs", scaled("1000", "40000"), "--program-seed", "2"),
+        *("-k", "generated_ones", "--programs", scaled("400", "40000"), "--program-seed", "2"),
     ),
     script("sanitizers: native tests, threads, generated C", "sanitize"),
     script("fuzzers: every native parser, each with a seeded defect", "fuzz"),
@@ -107,12 +115,6 @@ CHECKS = (
     script("no allocation, bounded stack, no foreign call: every example's binary", "binary"),
     script("coverage: fcslc and clang agree on lines, branches and MC/DC", "coverage"),
     script("instruction bounds: what a step executes is counted and never exceeds them", "instructions"),
-    tests(
-        "elementary functions: correctly rounded at 100 000 hard points each",
-        "test_rounding.py",
-        *("-k", "test_correctly_rounded"),
-        FCSL_VERIFY="1",
-    ),
     tests(
         "broken programs and configs: always a diagnostic",
         "test_fuzz.py",
