@@ -1,7 +1,7 @@
 # SPDX-License-Identifier: Apache-2.0
-"""`make verify`: the evidence of docs/evidence.md, one line a check, two checks at a time.
+"""`make verify`: the evidence of docs/evidence.md, one line a check, three checks at a time.
 
-    python3 scripts/verify [--at-once 2] [--only WORDS]
+    python3 scripts/verify [--at-once 3] [--only WORDS]
     python3 scripts/verify NAME [--help]         one check alone; NAME is its folder, or fuzz_telemetry
 
 The same every time. `make verify EFFORT=full` (FCSL_EFFORT) does more of everything, and lets fuzzers search for minutes. A
@@ -65,8 +65,8 @@ class Check:
         return [line for line in self.log.read_text(errors="replace").split("\n") if line.strip()][-count:]
 
 
-def script(label: str, name: str) -> Check:
-    return Check(label, ("scripts/verify", name))
+def script(label: str, name: str, *arguments: str) -> Check:
+    return Check(label, ("scripts/verify", name, *arguments))
 
 
 def tests(label: str, file: str, *arguments: str, **environment: str) -> Check:
@@ -93,20 +93,27 @@ FULL_CHECKS = scaled(
     ),
 )
 
-#: The longest first, so that at the end no core waits for one of them.
+#: First those that wait more than they compute, beside which others compute; then the longest, so that at the end no core
+#: waits for one of them.
 CHECKS = (
     *FULL_CHECKS,
+    script("sanitizers, address and undefined: native tests, generated C", "sanitize", "--only", "address"),
+    script("sanitizers, threads: native tests", "sanitize", "--only", "thread"),
     tests(
         "generated programs: compiled = CPython = oracle",
         "test_generated.py",
         *("-k", "test_programs or test_machines", "--programs", scaled("400", "20000"), "--program-seed", "2"),
+    ),
+    Check(
+        "benchmarks: every one of make bench runs, in its smallest size",
+        ("scripts/bench",),
+        {"FCSL_BENCH_SIZE": "smallest"},
     ),
     tests(
         "generated programs: by Nim = CPython = oracle",
         "test_nim_backend.py",
         *("-k", "generated_ones", "--programs", scaled("400", "40000"), "--program-seed", "2"),
     ),
-    script("sanitizers: native tests, threads, generated C", "sanitize"),
     script("fuzzers: every native parser, each with a seeded defect", "fuzz"),
     script("fuzzer: the receiver of telemetry, with seeded defects", "fuzz_telemetry"),
     script("EVA: no run-time error in generated C", "eva"),
@@ -124,11 +131,6 @@ CHECKS = (
     script("EVA: no run-time error in parsers of receivers, any stream, with seeded defects", "receivers"),
     script("link layer: every state of two small ends, with seeded defects", "link"),
     script("processor in the loop: the lander's controller on a Cortex-M7", "pil"),
-    Check(
-        "benchmarks: every one of make bench runs, in its smallest size",
-        ("scripts/bench",),
-        {"FCSL_BENCH_SIZE": "smallest"},
-    ),
     script("real kernel drivers: sensors, outputs and flights in user-mode Linux", "hardware"),
     script("recordings: Foxglove's own packages read the values that rosbags reads", "foxglove"),
 )
@@ -219,7 +221,7 @@ def run_all(checks: Sequence[Check], at_once: int) -> list[Check]:
 def main() -> int:
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument(
-        "--at-once", type=int, default=2, help="checks at a time; some use every core alone (default 2)"
+        "--at-once", type=int, default=3, help="checks at a time; some wait, some use two cores alone (default 3)"
     )
     parser.add_argument("--only", action="append", metavar="WORDS", help="checks whose line holds this; more than once")
     given = parser.parse_args()
