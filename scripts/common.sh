@@ -1,5 +1,7 @@
 # Sourced by the other scripts: the workspace's root, messages, progress.
 root=$(pwd -P)
+# Builds, tests and checks start thousands of Python processes: each file is compiled once, not by each of them.
+unset PYTHONDONTWRITEBYTECODE
 
 say() { printf 'fcsl: %s\n' "$*"; }
 die() {

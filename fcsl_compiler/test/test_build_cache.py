@@ -34,12 +34,12 @@ class Law:
 """
 GAINS = "GAIN = 2.0\n"
 
-#: A C compiler that logs every run, and blocks in the run with number $FCSL_TEST_STOP.
+#: A C compiler that logs every run in $FCSL_TEST_LOG, and blocks in the run with number $FCSL_TEST_STOP.
 WRAPPER = """\
 #!/bin/sh
 case "$*" in *--version*|*" -E "*) exec cc "$@";; esac
-echo "$*" >> "{log}"
-if [ "$(wc -l < "{log}")" = "$FCSL_TEST_STOP" ]; then echo $$ > "{log}.stopped"; kill -STOP $$; fi
+echo "$*" >> "$FCSL_TEST_LOG"
+if [ "$(wc -l < "$FCSL_TEST_LOG")" = "$FCSL_TEST_STOP" ]; then echo $$ > "$FCSL_TEST_LOG.stopped"; kill -STOP $$; fi
 exec cc "$@"
 """
 
@@ -54,8 +54,9 @@ IMPORTED = (
 class Place:
     """A machine, a separate cache, and a C compiler that counts its runs."""
 
-    def __init__(self, folder: Path):
+    def __init__(self, folder: Path, compiler: Path):
         self.cache, self.log, self.config = folder / "cache", folder / "log", folder / "craft.json"
+        self.compiler = compiler
         (folder / "law.py").write_text(ALGORITHM)
         (folder / "gains.py").write_text(GAINS)
         said = {
@@ -66,12 +67,14 @@ class Place:
             "states": {"RUN": {"schedule": {"a": 10}}},
         }
         self.config.write_text(json.dumps(said))
-        self.compiler = folder / "wrapped"
-        self.compiler.write_text(WRAPPER.format(log=self.log))
-        self.compiler.chmod(0o755)
 
     def start(self, stop: int = 0, before: Sequence[str] = (), **options: object) -> subprocess.Popen[str]:
-        given = {"CC": str(self.compiler), "FCSL_CACHE_DIR": str(self.cache), "FCSL_TEST_STOP": str(stop)}
+        given = {
+            "CC": str(self.compiler),
+            "FCSL_CACHE_DIR": str(self.cache),
+            "FCSL_TEST_LOG": str(self.log),
+            "FCSL_TEST_STOP": str(stop),
+        }
         return subprocess.Popen(
             [*before, sys.executable, "-c", BUILD, str(self.config)],
             env={**os.environ, **given},
@@ -90,9 +93,32 @@ class Place:
         return [p for p in self.cache.rglob(".*")]
 
 
+@pytest.fixture(scope="module")
+def compiler(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    path = tmp_path_factory.mktemp("compiler") / "wrapped"
+    path.write_text(WRAPPER)
+    path.chmod(0o755)
+    return path
+
+
 @pytest.fixture
-def place(tmp_path: Path) -> Place:
-    return Place(tmp_path)
+def place(tmp_path: Path, compiler: Path) -> Place:
+    return Place(tmp_path, compiler)
+
+
+@pytest.fixture(scope="module")
+def filled(tmp_path_factory: pytest.TempPathFactory, compiler: Path) -> Path:
+    """A cache with the library of the machine."""
+    first = Place(tmp_path_factory.mktemp("filled"), compiler)
+    built(first.start())
+    return first.cache
+
+
+@pytest.fixture
+def library(place: Place, filled: Path) -> Path:
+    """The library of the machine, in the cache of `place`, as if it had been built there."""
+    shutil.copytree(filled, place.cache)
+    return next(place.cache.glob("machines/*/libcraft.so"))
 
 
 def built(process: subprocess.Popen[str]) -> Path:
@@ -188,17 +214,19 @@ DAMAGES: dict[str, Callable[[bytes], bytes]] = {
 
 @pytest.mark.parametrize("damage", DAMAGES.values(), ids=DAMAGES)
 @pytest.mark.parametrize("file", ["libcraft.so", "built.json"])
-def test_a_damaged_entry_is_built_again(place: Place, file: str, damage: Callable[[bytes], bytes]) -> None:
-    library = built(place.start())
+def test_a_damaged_entry_is_built_again(
+    place: Place, library: Path, file: str, damage: Callable[[bytes], bytes]
+) -> None:
     whole = library.read_bytes()
     damaged = library.with_name(file)
     content = damaged.read_bytes()
-    damaged.unlink()  # this process has loaded the library
     damaged.write_bytes(damage(content))
     process = place.start()
     out, error = process.communicate(timeout=120)
     assert (process.returncode, error) == (0, "") and library.read_bytes() == whole
-    assert built(place.start()) == Path(out.strip())
+    once = place.runs()
+    assert bool(once) == (damage(content) != content)  # built.json is shorter than what "cut short" leaves
+    assert built(place.start()) == Path(out.strip()) == library and place.runs() == once
 
 
 def test_a_damaged_model_is_built_again(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
@@ -271,20 +299,18 @@ def test_folders_of_the_cache_are_closed_to_others(place: Place) -> None:
 
 @pytest.mark.parametrize("depth", [0, 1, 2])
 @pytest.mark.parametrize("mode", [0o720, 0o702, 0o777])
-def test_a_cache_in_which_others_may_write_is_refused(place: Place, depth: int, mode: int) -> None:
-    library = built(place.start())
+def test_a_cache_in_which_others_may_write_is_refused(place: Place, library: Path, depth: int, mode: int) -> None:
     folder = [place.cache, library.parents[1], library.parent][depth]
     folder.chmod(mode)
     error = refused(place.start())
     assert f"{folder}: not used as a cache of builds, because others may write in it (mode 0{mode:o})" in error
     assert f"run `chmod 700 {folder}`, or set FCSL_CACHE_DIR to a folder of your own" in error
     folder.chmod(0o700)
-    assert built(place.start()) == library
+    assert built(place.start()) == library and not place.runs()
 
 
 @pytest.mark.skipif(os.geteuid() != 0, reason="only root can give a folder away")
-def test_a_cache_of_somebody_else_is_refused(place: Place) -> None:
-    built(place.start())
+def test_a_cache_of_somebody_else_is_refused(place: Place, library: Path) -> None:
     os.chown(place.cache, 12345, -1)
     error = refused(place.start())
     assert (
@@ -297,8 +323,7 @@ def test_a_cache_of_somebody_else_is_refused(place: Place) -> None:
 BOUND = ["setpriv", "--bounding-set", "-dac_override", "--inh-caps", "-dac_override"] if os.geteuid() == 0 else []
 
 
-def test_a_cache_that_is_read_only_is_read(place: Place) -> None:
-    library = built(place.start())
+def test_a_cache_that_is_read_only_is_read(place: Place, library: Path) -> None:
     folders = [place.cache, *(p for p in place.cache.rglob("*") if p.is_dir())]
     for folder in folders:
         folder.chmod(0o555)

@@ -357,7 +357,7 @@ def test_generated_machines(request: pytest.FixtureRequest) -> None:
 
 def test_a_wrong_probe_would_be_found(monkeypatch: pytest.MonkeyPatch) -> None:
     """A probe that inverts a decision, and a line that is counted as another."""
-    made = generate(cases(), 6, 1)
+    made = generate(cases(), 2, 1)
     right = probes._PRELUDE
     for old, new in (
         ("    return outcome;\n}\n", "    return !outcome;\n}\n"),

@@ -11,6 +11,7 @@ import re
 import signal
 from collections.abc import Sequence
 from dataclasses import replace
+from functools import cache
 from typing import Any
 
 import pytest
@@ -38,6 +39,16 @@ def test_machines(request: pytest.FixtureRequest) -> None:
     campaign(cases(), max(1, count - count // 3), request.config.getoption("--program-seed"))
 
 
+@cache
+def _machine(n: int) -> Case:
+    return generate(cases(), 1, 1, first=n)[0]
+
+
+def machines(count: int) -> list[Case]:
+    """Of seed 1; each is generated once for all tests."""
+    return [_machine(n) for n in range(count)]
+
+
 def test_the_generator_repeats_itself() -> None:
     """A failure is reproducible from its seed."""
     one, other = ([str(case) for case in generate(cases(), 10, 3)] for _ in range(2))
@@ -46,7 +57,7 @@ def test_the_generator_repeats_itself() -> None:
 
 def test_generated_machines_use_the_language() -> None:
     """Coverage of the generator: every construct occurs, faults and transitions occur, and most ticks do not fault."""
-    made = generate(cases(), 100, 1)
+    made = machines(100)
     text = "\n".join(str(case) for case in made)
     words = [
         "for ",
@@ -220,7 +231,7 @@ def _has_health(case: Case) -> bool:
 
 def test_forced_healths_decide_guards() -> None:
     """The comparison of forced healths is effective: without them, other states are reached."""
-    made = [case for case in generate(cases(), 120, 1) if _has_health(case)]
+    made = [case for case in machines(120) if _has_health(case)]
     pairs = [(harness.by_oracle(case), harness.by_oracle(without(case, "health"))) for case in made]
     states = [[[fields["machine.next_state"] for fields in trace[1:]] for trace in pair] for pair in pairs]
     assert sum(one != other for one, other in states) > 4
@@ -241,7 +252,7 @@ def test_a_health_that_is_not_forced_is_a_difference(who: str, monkeypatch: pyte
             execute(instance, image)
 
         monkeypatch.setattr(reference_machine._Instance, "execute", forgetful)
-    made = [case for case in generate(cases(), 16, 1) if _has_health(case)]
+    made = [case for case in machines(16) if _has_health(case)]
     problems = [p for p in harness.check(made) if p]
     assert problems and all(f", {who} " in p for p in problems) and any("health" in p for p in problems)
 
@@ -268,7 +279,7 @@ def test_what_is_told_of_time_and_samples_is_compared(what: str, monkeypatch: py
     monkeypatch.setattr(OracleMachine, "_of_machine", machine)
     monkeypatch.setattr(OracleMachine, "_of_channel", channel)
     monkeypatch.setattr(OracleMachine, "_has_lasted", lasted)
-    made = [case for case in generate(cases(), 60, 1) if what in str(case)][:12]
+    made = [case for case in machines(60) if what in str(case)][:4]
     problems = [p for p in harness.check(made) if p]
     assert problems and all(", oracle " in p for p in problems)
 

@@ -1,7 +1,7 @@
 # SPDX-License-Identifier: Apache-2.0
-"""`make verify`: the evidence of docs/evidence.md, one line a check, two checks at a time.
+"""`make verify`: the evidence of docs/evidence.md, one line a check, three checks at a time.
 
-    python3 scripts/verify [--at-once 2] [--only WORDS]
+    python3 scripts/verify [--at-once 3] [--only WORDS]
     python3 scripts/verify NAME [--help]         one check alone; NAME is its folder, or fuzz_telemetry
 
 The same every time. `make verify EFFORT=full` (FCSL_EFFORT) does more of everything, and lets fuzzers search for minutes. A
@@ -42,6 +42,8 @@ _LONGER = (
     "fcsl_bridge/test/test_bus_parties.py",
     "fcsl_bridge/test/test_controller.py",
     "fcsl_bridge/test/test_robustness_bags.py",
+    "fcsl_compiler/test/test_board_schema.py",
+    "fcsl_compiler/test/test_schema.py",
     "fcsl_runtime/simclient/test/test_socket.py",
 )
 
@@ -63,8 +65,8 @@ class Check:
         return [line for line in self.log.read_text(errors="replace").split("\n") if line.strip()][-count:]
 
 
-def script(label: str, name: str) -> Check:
-    return Check(label, ("scripts/verify", name))
+def script(label: str, name: str, *arguments: str) -> Check:
+    return Check(label, ("scripts/verify", name, *arguments))
 
 
 def tests(label: str, file: str, *arguments: str, **environment: str) -> Check:
@@ -77,28 +79,41 @@ FULL_CHECKS = scaled(
     (
         script("mutants: tests notice small changes of the C runtime and of simclient", "mutation"),
         Check(
-            "longer tests: faults on the bus and of nodes, sockets",
+            "longer tests: faults on the bus and of nodes, sockets, schemas",
             ("-m", "pytest", "-q", *_LONGER),
             {"FCSL_VERIFY": "1"},
+        ),
+        tests(
+            "elementary functions: mpmath at each of 100 000 hard points",
+            "test_rounding.py",
+            *("-k", "test_correctly_rounded"),
+            FCSL_VERIFY="1",
         ),
         script("Ray: a campaign with a killed worker leaves the table of one process", "ray"),
     ),
 )
 
-#: The longest first, so that at the end no core waits for one of them.
+#: First those that wait more than they compute, beside which others compute; then the longest, so that at the end no core
+#: waits for one of them.
 CHECKS = (
     *FULL_CHECKS,
+    script("sanitizers, address and undefined: native tests, generated C", "sanitize", "--only", "address"),
+    script("sanitizers, threads: native tests", "sanitize", "--only", "thread"),
     tests(
         "generated programs: compiled = CPython = oracle",
         "test_generated.py",
-        *("-k", "test_programs or test_machines", "--programs", scaled("1000", "20000"), "--program-seed", "2"),
+        *("-k", "test_programs or test_machines", "--programs", scaled("400", "20000"), "--program-seed", "2"),
+    ),
+    Check(
+        "benchmarks: every one of make bench runs, in its smallest size",
+        ("scripts/bench",),
+        {"FCSL_BENCH_SIZE": "smallest"},
     ),
     tests(
         "generated programs: by Nim = CPython = oracle",
         "test_nim_backend.py",
-        *("-k", "generated_ones", "--programs", scaled("1000", "40000"), "--program-seed", "2"),
+        *("-k", "generated_ones", "--programs", scaled("400", "40000"), "--program-seed", "2"),
     ),
-    script("sanitizers: native tests, threads, generated C", "sanitize"),
     script("fuzzers: every native parser, each with a seeded defect", "fuzz"),
     script("fuzzer: the receiver of telemetry, with seeded defects", "fuzz_telemetry"),
     script("EVA: no run-time error in generated C", "eva"),
@@ -108,12 +123,6 @@ CHECKS = (
     script("coverage: fcslc and clang agree on lines, branches and MC/DC", "coverage"),
     script("instruction bounds: what a step executes is counted and never exceeds them", "instructions"),
     tests(
-        "elementary functions: correctly rounded at 100 000 hard points each",
-        "test_rounding.py",
-        *("-k", "test_correctly_rounded"),
-        FCSL_VERIFY="1",
-    ),
-    tests(
         "broken programs and configs: always a diagnostic",
         "test_fuzz.py",
         *("--fuzz", scaled("500", "5000"), "--fuzz-seed", "2"),
@@ -122,11 +131,6 @@ CHECKS = (
     script("EVA: no run-time error in parsers of receivers, any stream, with seeded defects", "receivers"),
     script("link layer: every state of two small ends, with seeded defects", "link"),
     script("processor in the loop: the lander's controller on a Cortex-M7", "pil"),
-    Check(
-        "benchmarks: every one of make bench runs, in its smallest size",
-        ("scripts/bench",),
-        {"FCSL_BENCH_SIZE": "smallest"},
-    ),
     script("real kernel drivers: sensors, outputs and flights in user-mode Linux", "hardware"),
     script("recordings: Foxglove's own packages read the values that rosbags reads", "foxglove"),
 )
@@ -217,7 +221,7 @@ def run_all(checks: Sequence[Check], at_once: int) -> list[Check]:
 def main() -> int:
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument(
-        "--at-once", type=int, default=2, help="checks at a time; some use every core alone (default 2)"
+        "--at-once", type=int, default=3, help="checks at a time; some wait, some use two cores alone (default 3)"
     )
     parser.add_argument("--only", action="append", metavar="WORDS", help="checks whose line holds this; more than once")
     given = parser.parse_args()

@@ -28,6 +28,7 @@ from fcsl_compiler.driver.library import emit
 from fcsl_compiler.driver.toolchain import include_dirs
 
 from ..shared.cases import CheckFailed, compile_c, run, write_facts
+from ..shared.effort import scaled
 
 CLANG = "clang-19"
 FLAGS = ["-std=c11", "-O1", "-ffp-contract=off", "-fprofile-instr-generate", "-fcoverage-mapping", "-fcoverage-mcdc"]
@@ -291,7 +292,9 @@ def controls(seed: int, tally: dict[str, int]) -> dict[str, str]:
 
 def main() -> int:
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
-    parser.add_argument("--trials", type=int, default=40, help="how many random algorithms (default 40)")
+    parser.add_argument(
+        "--trials", type=int, default=scaled(20, 40), help="how many random algorithms (default 20, or 40)"
+    )
     parser.add_argument("--seed", type=int, default=1, help="which ones (default 1)")
     options = parser.parse_args()
     if options.trials < 1:

@@ -255,8 +255,8 @@ def main() -> int:
     for row in rows:
         print(f"{row.what:70} {row.tests or '':>6} {row.seconds:6.1f} {row.cpu_s:7.1f}")
     print("no report")
-    if options.only is None:
-        write_facts("sanitize", {"all": options.all, "rows": [vars(row) for row in rows]})
+    name = f"sanitize_{options.only}" if options.only else "sanitize"
+    write_facts(name, {"all": options.all, "rows": [vars(row) for row in rows]})
     return 0
 
 
