@@ -1,63 +1,61 @@
 // SPDX-License-Identifier: Apache-2.0
-//! A thread that puts one chunk into the file while the next one is gathered. It begins with the first chunk that is full:
-//! short recordings have none.
+//! A thread that puts one chunk into the file while the next one is gathered. It ends with the chunk: what it has done is
+//! known by waiting for its end, which tools that watch threads see.
 
 use std::io;
-use std::sync::mpsc::{channel, Receiver, Sender};
+use std::sync::{Arc, Mutex};
 use std::thread::{self, JoinHandle};
 
 use super::chunk::Chunk;
 use super::chunk_file::ChunkFile;
 
 /// The file goes along, so that only one thread has it.
-struct Parcel {
-    file: Box<ChunkFile>,
-    chunk: Chunk,
-    put: io::Result<()>,
+pub struct Parcel {
+    pub file: Box<ChunkFile>,
+    pub chunk: Chunk,
+    /// Whether it succeeded.
+    pub put: io::Result<()>,
 }
 
+/// One chunk on its way.
 pub struct Packer {
-    /// None once the packer is being dropped.
-    to: Option<Sender<Parcel>>,
-    from: Receiver<Parcel>,
-    thread: Option<JoinHandle<()>>,
+    parcel: Arc<Mutex<Parcel>>,
+    thread: Thread,
 }
 
 impl Packer {
-    /// The thread ends with the packer. It blocks the signals that its maker blocks.
-    pub fn new() -> io::Result<Self> {
-        let (to, parcels) = channel::<Parcel>();
-        let (back, from) = channel();
-        let thread = thread::Builder::new().name("fcsl-pack".into()).spawn(move || {
-            while let Ok(mut parcel) = parcels.recv() {
-                parcel.put = parcel.file.put(&mut parcel.chunk);
-                if back.send(parcel).is_err() {
-                    break;
-                }
-            }
-        })?;
-        Ok(Self { to: Some(to), from, thread: Some(thread) })
-    }
-
-    /// Begins to put `chunk` into `file`; `wait` follows before the next one.
-    pub fn put(&self, file: Box<ChunkFile>, chunk: Chunk) {
-        if let Some(to) = &self.to {
-            // The thread receives for as long as there is the packer.
-            let _ = to.send(Parcel { file, chunk, put: Ok(()) });
+    /// Begins to put `chunk` into `file`; puts it there if no thread can be started. The thread blocks the signals that
+    /// the caller blocks.
+    pub fn begin(file: Box<ChunkFile>, chunk: Chunk) -> Self {
+        let parcel = Arc::new(Mutex::new(Parcel { file, chunk, put: Ok(()) }));
+        let theirs = Arc::clone(&parcel);
+        let thread = thread::Builder::new().name("fcsl-pack".into()).spawn(move || pack(&theirs)).ok();
+        if thread.is_none() {
+            pack(&parcel);
         }
+        Self { parcel, thread: Thread(thread) }
     }
 
-    /// The file, an empty chunk, and whether the putting succeeded.
-    pub fn wait(&self) -> Option<(Box<ChunkFile>, Chunk, io::Result<()>)> {
-        self.from.recv().ok().map(|parcel| (parcel.file, parcel.chunk, parcel.put))
+    /// The file, and an empty chunk. None: the thread has failed in a way that no call explains.
+    pub fn wait(self) -> Option<Parcel> {
+        drop(self.thread);
+        Arc::into_inner(self.parcel)?.into_inner().ok()
     }
 }
 
-impl Drop for Packer {
-    /// Waits for the thread, so that nothing is written once a recording is closed.
+fn pack(parcel: &Mutex<Parcel>) {
+    if let Ok(mut parcel) = parcel.lock() {
+        let Parcel { file, chunk, put } = &mut *parcel;
+        *put = file.put(chunk);
+    }
+}
+
+/// Whoever drops it waits for its end, so that nothing is written once a recording is closed.
+struct Thread(Option<JoinHandle<()>>);
+
+impl Drop for Thread {
     fn drop(&mut self) {
-        self.to = None;
-        if let Some(thread) = self.thread.take() {
+        if let Some(thread) = self.0.take() {
             let _ = thread.join();
         }
     }

@@ -26,6 +26,7 @@ pub struct Writer {
     chunk: Chunk,
     /// The next one to gather in; None while the packer has it.
     spare: Option<Chunk>,
+    /// Has the file and a chunk.
     packer: Option<Packer>,
     schemas: Definitions,
     channels: Definitions,
@@ -155,11 +156,11 @@ impl Writer {
 
     /// The file, once the packer is done with the chunk that it has.
     fn file(&mut self) -> io::Result<&mut ChunkFile> {
-        if self.file.is_none() {
-            let (file, chunk, put) = self.packer.as_ref().and_then(Packer::wait).ok_or_else(lost)?;
-            self.file = Some(file);
-            self.spare = Some(chunk);
-            put?;
+        if let Some(packer) = self.packer.take() {
+            let parcel = packer.wait().ok_or_else(lost)?;
+            self.file = Some(parcel.file);
+            self.spare = Some(parcel.chunk);
+            parcel.put?;
         }
         self.file.as_deref_mut().ok_or_else(lost)
     }
@@ -167,12 +168,8 @@ impl Writer {
     /// The chunk is full: gathers in the other one while the packer puts this one into the file.
     fn hand_over(&mut self) -> io::Result<()> {
         self.file()?;
-        if self.packer.is_none() {
-            self.packer = Packer::new().ok();
-        }
-        let (Some(packer), Some(spare)) = (&self.packer, self.spare.take()) else { return self.flush() };
-        let full = std::mem::replace(&mut self.chunk, spare);
-        packer.put(self.file.take().ok_or_else(lost)?, full);
+        let full = std::mem::replace(&mut self.chunk, self.spare.take().ok_or_else(lost)?);
+        self.packer = Some(Packer::begin(self.file.take().ok_or_else(lost)?, full));
         Ok(())
     }
 
