@@ -8,6 +8,7 @@ import shlex
 import signal
 import subprocess
 import tempfile
+import threading
 from collections.abc import Callable, Mapping, Sequence
 from contextlib import suppress
 from functools import cache
@@ -69,25 +70,37 @@ def ask_version() -> None:
         _asked(tuple(compiler()))
 
 
-@cache
-def _asked(command: tuple[str, ...]) -> subprocess.Popen[str]:
-    return subprocess.Popen(
-        [*command, "--version"], stdout=subprocess.PIPE, stderr=subprocess.DEVNULL, text=True, errors="replace"
-    )
+class _Version:
+    """The answer of a command to --version. Any thread may wait for it."""
+
+    def __init__(self, command: tuple[str, ...]):
+        self._lock, self._printed = threading.Lock(), ""
+        self._process = subprocess.Popen(
+            [*command, "--version"], stdout=subprocess.PIPE, stderr=subprocess.DEVNULL, text=True, errors="replace"
+        )
+
+    def wait(self) -> tuple[int, str]:
+        """Exit status, and what it printed. Raises TimeoutExpired."""
+        with self._lock:
+            if self._process.returncode is None:
+                try:
+                    self._printed, _ = self._process.communicate(timeout=30)
+                except subprocess.TimeoutExpired:
+                    self._process.kill()
+                    raise
+        return self._process.returncode, self._printed
+
+
+_asked = cache(_Version)
 
 
 @cache
 def _version(command: tuple[str, ...], language: Language) -> str:
     try:
-        asked = _asked(command)
-    except OSError:
+        status, printed = _asked(command).wait()
+    except (OSError, subprocess.TimeoutExpired):
         raise language.absent(" ".join(command)) from None
-    try:
-        printed, _ = asked.communicate(timeout=30)
-    except subprocess.TimeoutExpired:
-        asked.kill()
-        raise language.absent(" ".join(command)) from None
-    if asked.returncode != 0:
+    if status != 0:
         fix = f"set {language.variable} to a {language.name} compiler"
         raise ToolchainError(f"`{' '.join(command)} --version` failed; {fix}")
     return printed.splitlines()[0] if printed else ""
