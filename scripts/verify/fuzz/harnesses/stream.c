@@ -27,6 +27,7 @@ static void open_connections(fcsl_vars_t *vars, int *ends)
         block = hosted_block();
         vars->history = &hosted.history;
         vars->listener.fd = -1;
+        vars->attention = -1; /* no other thread waits */
         FUZZ_CHECK(allocate(vars, &block, 1) == 0);
     }
     vars->host = hosted_host(); /* of this input's run */
@@ -49,15 +50,16 @@ static void open_connections(fcsl_vars_t *vars, int *ends)
 static void run(fcsl_vars_t *vars, size_t i, const int *ends)
 {
     client_t *client = &vars->clients[i];
+    const uint64_t now_ns = fcsl_run_monotonic_ns(NULL);
     struct pollfd entry;
     (void)fcsl_vars_prepare_streams(vars);
     (void)fcsl_vars_watch(client, &entry);
     if (client->fd >= 0) {
-        fcsl_vars_serve_client(vars, client, entry.fd >= 0 ? entry.events : 0);
+        fcsl_vars_serve_client(vars, client, entry.fd >= 0 ? entry.events : 0, now_ns);
     }
     fcsl_vars_serve(vars);
-    fcsl_vars_serve_command(vars);
-    fcsl_vars_stream(vars, fcsl_run_monotonic_ns(NULL));
+    fcsl_vars_serve_command(vars, now_ns);
+    fcsl_vars_stream(vars, now_ns);
     for (size_t c = 0; c < CLIENTS; c++) {
         FUZZ_CHECK(vars->clients[c].received <= REQUEST_BYTES_MAX + 1u);
         FUZZ_CHECK(vars->clients[c].out_from <= vars->clients[c].out_to && vars->clients[c].out_to <= OUT_BYTES);
