@@ -9,6 +9,7 @@ from pathlib import Path
 
 from ..driver.toolchain import compile_objects
 from ..emit.alike import alike
+from ..emit.bookkeeping import quiet_instances
 from ..emit.instances import execute_name
 from ..emit.names import instance_type
 from ..model.machine import Machine, State
@@ -77,7 +78,7 @@ class MachineCode:
 
     def execute(self, instance: int) -> Cost:
         """Cost of one call of the instance's execute, including the code around the algorithm. Raises Unbounded."""
-        first = self.machine.instances[alike(self.machine)[instance]]
+        first = self.machine.instances[alike(self.machine, quiet_instances(self.machine))[instance]]
         return _cost([self._bounds(execute_name(self.machine, first))])
 
     def step(self, state: State, slot: Slot | None) -> Cost:

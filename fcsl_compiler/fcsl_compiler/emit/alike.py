@@ -4,15 +4,12 @@
 from __future__ import annotations
 
 from ..model.machine import Machine
-from .bookkeeping import quiet_instances
 
 
-def alike(machine: Machine) -> tuple[int, ...]:
+def alike(machine: Machine, quiet: frozenset[int]) -> tuple[int, ...]:
     """For each instance of a lowered machine the first one with an equal record and an equal `execute`, often itself.
-
-    Their parameters may differ, unless they are frozen.
-    """
-    quiet, first = quiet_instances(machine), dict[tuple[str, str, bool, bool], int]()
+    Their parameters may differ, unless they are frozen. `quiet`: see bookkeeping.py."""
+    first: dict[tuple[str, str, bool, bool], int] = {}
     return tuple(
         first.setdefault((i.algorithm.name, i.execute.name, n in quiet, n in machine.last_runs), n)
         for n, i in enumerate(machine.instances)

@@ -3,7 +3,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 
 from ..lower.structural_zeros import PRODUCTS
 from ..model import code, ir
@@ -26,14 +26,16 @@ from .straight_line import written_out
 
 def emit_machine(machine: Machine, places: FaultPlaces) -> code.Program:
     """`machine`: lowered. `places`: of its faults."""
-    functions = tuple(_functions(machine, places))
+    quiet = quiet_instances(machine)
+    firsts = alike(machine, quiet)
+    functions = tuple(_functions(machine, places, quiet, firsts))
     used = set().union(*(code.used_names(f.body) for f in functions))
     return code.Program(
         name=machine.name,
         source=machine.config.name,
         states=tuple(state_constant(machine, n).text for n in range(len(machine.states))),
         requests=tuple(request_constant(machine.name, name) for name in ("", *machine.requests)),
-        records=tuple(records(machine)),
+        records=tuple(records(machine, firsts)),
         private_records=tuple(result_records(machine)),
         externs=tuple(_extern(machine, e) for e in machine.externs),
         tables=tuple(_tables(machine, used)),
@@ -42,7 +44,9 @@ def emit_machine(machine: Machine, places: FaultPlaces) -> code.Program:
     )
 
 
-def _functions(machine: Machine, places: FaultPlaces) -> Iterator[code.Function]:
+def _functions(
+    machine: Machine, places: FaultPlaces, quiet: frozenset[int], firsts: Sequence[int]
+) -> Iterator[code.Function]:
     inlined = inlined_functions(machine)
     bodies: dict[str, code.Function] = {}
     for function, owner in machine.emitted:
@@ -52,11 +56,10 @@ def _functions(machine: Machine, places: FaultPlaces) -> Iterator[code.Function]
             made = written_out(made, _fields(machine, owner), bodies) or made
         bodies[made.name] = made
     yield from _called(bodies, machine)
-    quiet = quiet_instances(machine)
     yield from RareEmitter(machine, places, quiet).emit()
-    for index, (instance, first) in enumerate(zip(machine.instances, alike(machine), strict=True)):
+    for index, (instance, first) in enumerate(zip(machine.instances, firsts, strict=True)):
         yield from InstanceEmitter(machine, instance, index in quiet, machine.instances[first]).emit()
-    yield from StepEmitter(machine, quiet).emit()
+    yield from StepEmitter(machine, quiet, firsts).emit()
 
 
 def _is_dense(machine: Machine, function: ir.Function) -> bool:

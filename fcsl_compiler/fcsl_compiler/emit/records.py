@@ -3,14 +3,13 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 
 from ..model import ir
 from ..model.c_names import c_name
 from ..model.code import STATE, U8, Field, Named, Record
 from ..model.machine import Channel, Instance, Machine
 from ..model.types import I32, I64, U32, U64, Results
-from .alike import alike
 from .expressions import code_type
 from .names import (
     channel_member,
@@ -25,8 +24,8 @@ from .names import (
 from .rare import counters_record, counters_type
 
 
-def records(machine: Machine) -> Iterator[Record]:
-    """Each after those that it contains."""
+def records(machine: Machine, firsts: Sequence[int]) -> Iterator[Record]:
+    """Each after those that it contains. `firsts`: see alike.py."""
     for struct in machine.structs:
         fields = [
             Field(c_name(m.name), code_type(machine.name, m.type), f"[{m.unit}]" if m.unit else "")
@@ -40,7 +39,7 @@ def records(machine: Machine) -> Iterator[Record]:
                 yield Record(record_type(machine, algorithm, record), ports)
     if machine.instances:
         yield counters_record(machine)
-    for index, (instance, first) in enumerate(zip(machine.instances, alike(machine), strict=True)):
+    for index, (instance, first) in enumerate(zip(machine.instances, firsts, strict=True)):
         like = instance_type(machine, machine.instances[first]) if first != index else ""
         yield Record(instance_type(machine, instance), tuple(_instance(machine, index, instance)), like)
     for with_last_sample in sorted({c.name in machine.last_samples for c in sensors(machine)}):

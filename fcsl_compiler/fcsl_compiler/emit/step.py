@@ -4,7 +4,7 @@ the tick of the state runs."""
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 
 from ..model import code
 from ..model.code import STATE, Binary, Call, Do, Function, If, Literal, Member, Name, Set, Statement, Update
@@ -36,16 +36,16 @@ _GREATEST_AGE = Literal(0xFFFF_FFFF, U32)
 class StepEmitter:
     """Makes the functions of the descriptor, callees first."""
 
-    def __init__(self, machine: Machine, quiet: frozenset[int]):
-        """`quiet`: instances, see bookkeeping.py."""
-        self.m, self.quiet = machine, quiet
+    def __init__(self, machine: Machine, quiet: frozenset[int], firsts: Sequence[int]):
+        """`quiet`: instances, see bookkeeping.py. `firsts`: see alike.py."""
+        self.m, self.quiet, self.firsts = machine, quiet, firsts
         self.pointer = code.Pointer(code.Named(machine_type(machine)), writable=True)
 
     def emit(self) -> Iterator[Function]:
         yield self._init()
         if len(self.m.states) > 1:
             yield self._enter()
-        yield from TickEmitter(self.m, self.quiet).emit()
+        yield from TickEmitter(self.m, self.quiet, self.firsts).emit()
         yield self._step()
         yield self._force_state()
 

@@ -12,7 +12,6 @@ from ..model.c_names import c_name
 from ..model.code import Binary, Call, Deref, Do, Function, If, Literal, Member, Name, Set, Statement
 from ..model.machine import Channel, Connection, Edge, Entry, Instance, Machine, PortRef, State
 from ..model.types import BOOL, F64, I32, I64, U32, U64
-from .alike import alike
 from .bookkeeping import noted_instances
 from .copies import copied
 from .expressions import code_type
@@ -87,12 +86,11 @@ def _if_any(name: str, body: Sequence[Statement]) -> tuple[Statement, ...]:
 class TickEmitter:
     """Makes one function per state, and its callees."""
 
-    def __init__(self, machine: Machine, quiet: frozenset[int]):
-        """`quiet`: instances, see bookkeeping.py."""
-        self.m, self.quiet = machine, quiet
+    def __init__(self, machine: Machine, quiet: frozenset[int], firsts: Sequence[int]):
+        """`quiet`: instances, see bookkeeping.py. `firsts`: see alike.py."""
+        self.m, self.quiet, self.firsts = machine, quiet, firsts
         self.flatten = takes_bodies_in(machine)
         self.noted = noted_instances(machine)
-        self.alike = alike(machine)
         self.pointer = code.Pointer(code.Named(machine_type(machine)), writable=True)
         self.delayed = {c.target.instance for c in machine.connections if c.delayed}
         self.feeds: dict[int, list[Connection]] = {}
@@ -309,7 +307,7 @@ class TickEmitter:
     def _execute(self, entry: Entry, instance: Instance) -> Statement:
         """Exactly one call of execute, used with and without injected health: a second inlined call would add to the
         stack."""
-        record, first = record_of(instance), self.m.instances[self.alike[entry.instance]]
+        record, first = record_of(instance), self.m.instances[self.firsts[entry.instance]]
         this = code.Address(record)
         inject = Member(Member(record, "counters"), "inject_fault")
         if entry.instance in self.quiet:

@@ -80,6 +80,7 @@ def test_numbers_that_json_lacks(client: VarClient) -> None:
 def test_refusals(client: VarClient) -> None:
     for call, code, hint in (
         (lambda: client.get("sensors.outputs.giro"), "unknown_path", "sensors.outputs.gyro"),
+        (lambda: client.get(["machine.tick"]), "bad_request", ""),  # type: ignore[arg-type]
         (lambda: client.set({"machine.tick": 1}), "refused", ""),
         (lambda: client.set_state("IDEL"), "unknown_state", "IDLE"),
         (lambda: client.eval("1 +"), "bad_expression", ""),

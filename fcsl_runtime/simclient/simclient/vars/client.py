@@ -54,7 +54,11 @@ class VarClient(VarWire):
 
         The path of an instance or a struct gives a dict of the values below it.
         """
-        values = self._call_encoded("get", _encoded_paths(paths))["values"]
+        try:
+            members = _encoded_paths(paths)
+        except TypeError:  # a list in place of its paths, which the server refuses
+            members = encoded({"paths": paths})
+        values = self._call_encoded("get", members)["values"]
         if not isinstance(values, dict):
             raise VarError("protocol", f"{self.address}: not a variable server: its values are no object")
         return {path: self._numbers(path, value) for path, value in values.items()}
