@@ -34,12 +34,13 @@ class Law:
 """
 GAINS = "GAIN = 2.0\n"
 
-#: A C compiler that logs every run in $FCSL_TEST_LOG, and blocks in the run with number $FCSL_TEST_STOP.
+#: A C compiler that logs every run in $FCSL_TEST_LOG, and blocks in the run with number $FCSL_TEST_STOP. Two may run
+#: at once.
 WRAPPER = """\
 #!/bin/sh
 case "$*" in *--version*|*" -E "*) exec cc "$@";; esac
-echo "$*" >> "$FCSL_TEST_LOG"
-if [ "$(wc -l < "$FCSL_TEST_LOG")" = "$FCSL_TEST_STOP" ]; then echo $$ > "$FCSL_TEST_LOG.stopped"; kill -STOP $$; fi
+run=$(flock "$FCSL_TEST_LOG" sh -c 'echo "$1" >> "$0"; wc -l < "$0"' "$FCSL_TEST_LOG" "$*")
+if [ "$run" = "$FCSL_TEST_STOP" ]; then echo $$ > "$FCSL_TEST_LOG.stopped"; kill -STOP $$; fi
 exec cc "$@"
 """
 

@@ -9,11 +9,12 @@ import signal
 import subprocess
 import tempfile
 import threading
+from collections import deque
 from collections.abc import Callable, Mapping, Sequence
 from contextlib import suppress
 from functools import cache
 from pathlib import Path
-from typing import NamedTuple
+from typing import NamedTuple, cast
 
 from ..base.ament import PackageNotFound, package_prefix
 
@@ -25,6 +26,7 @@ FLAGS = ("-std=c11", "-O3", "-ffp-contract=off", "-fno-math-errno", "-fPIC", "-f
 LINK_FLAGS = ("-Wl,-z,now", "-Wl,--no-undefined", "-Wl,--exclude-libs,libfcsl_math.a")
 #: Makes gcc write one .ci file per source beside its output. It does not change the code.
 _CALL_GRAPH_FLAG = "-fcallgraph-info=su,da"
+_CALL_GRAPH_PROBE = (_CALL_GRAPH_FLAG, "-E", "-x", "c", os.devnull)
 _COMPILE_TIMEOUT_S = 300
 
 
@@ -67,16 +69,22 @@ def compiler() -> list[str]:
 def ask_version() -> None:
     """Begins to ask the C compiler for its version: it answers while the caller does something else."""
     with suppress(OSError):
-        _asked(tuple(compiler()))
+        _asked((*compiler(), "--version"))
 
 
-class _Version:
-    """The answer of a command to --version. Any thread may wait for it."""
+def ask_call_graphs() -> None:
+    """Likewise begins to ask it whether it writes call graphs."""
+    with suppress(OSError):
+        _asked((*compiler(), *_CALL_GRAPH_PROBE))
+
+
+class _Answer:
+    """What a command prints to its standard output. Any thread may wait for it."""
 
     def __init__(self, command: tuple[str, ...]):
         self._lock, self._printed = threading.Lock(), ""
         self._process = subprocess.Popen(
-            [*command, "--version"], stdout=subprocess.PIPE, stderr=subprocess.DEVNULL, text=True, errors="replace"
+            command, stdout=subprocess.PIPE, stderr=subprocess.DEVNULL, text=True, errors="replace"
         )
 
     def wait(self) -> tuple[int, str]:
@@ -91,13 +99,13 @@ class _Version:
         return self._process.returncode, self._printed
 
 
-_asked = cache(_Version)
+_asked = cache(_Answer)
 
 
 @cache
 def _version(command: tuple[str, ...], language: Language) -> str:
     try:
-        status, printed = _asked(command).wait()
+        status, printed = _asked((*command, "--version")).wait()
     except (OSError, subprocess.TimeoutExpired):
         raise language.absent(" ".join(command)) from None
     if status != 0:
@@ -156,33 +164,60 @@ def math_library() -> Path:
 def call_graph_flag(command: tuple[str, ...]) -> list[str]:
     """The flag for call graphs, if the compiler supports it (gcc since 10; clang does not)."""
     try:
-        probe = [*command, _CALL_GRAPH_FLAG, "-E", "-x", "c", os.devnull]
-        done = subprocess.run(probe, capture_output=True, text=True, timeout=30, check=False)
+        status, _ = _asked((*command, *_CALL_GRAPH_PROBE)).wait()
     except (OSError, subprocess.TimeoutExpired):
         return []
-    return [_CALL_GRAPH_FLAG] if done.returncode == 0 else []
+    return [_CALL_GRAPH_FLAG] if status == 0 else []
 
 
 def run_compiler(command: Sequence[str], environment: Mapping[str, str] | None = None, language: Language = C) -> bytes:
     """What a compiler prints. `environment` adds variables. Raises ToolchainError with the compiler's errors."""
+    child = _start(command, environment or {}, language)
     try:
-        child = subprocess.Popen(
+        return _end(child)
+    finally:
+        _end_group(child)
+
+
+def run_compilers(commands: Sequence[Sequence[str]], language: Language = C) -> None:
+    """Runs so many at once as there are cores. Raises ToolchainError with the errors of the first command that fails."""
+    running: deque[subprocess.Popen[bytes]] = deque()
+    try:
+        for command in commands:
+            if len(running) >= len(os.sched_getaffinity(0)):
+                _end(running[0])
+                running.popleft()
+            running.append(_start(command, {}, language))
+        while running:
+            _end(running[0])
+            running.popleft()
+    finally:
+        for child in running:
+            _end_group(child)
+
+
+def _start(command: Sequence[str], environment: Mapping[str, str], language: Language) -> subprocess.Popen[bytes]:
+    try:
+        return subprocess.Popen(
             command,
             stdout=subprocess.PIPE,
             stderr=subprocess.PIPE,
-            env={**os.environ, **(environment or {})},
+            env={**os.environ, **environment},
             start_new_session=True,
         )
     except OSError:
         raise language.absent(command[0]) from None
+
+
+def _end(child: subprocess.Popen[bytes]) -> bytes:
+    """What it prints until it ends. Raises ToolchainError with its errors."""
+    name = cast(Sequence[str], child.args)[0]
     try:
         printed, errors = child.communicate(timeout=_COMPILE_TIMEOUT_S)
     except subprocess.TimeoutExpired:
-        raise ToolchainError(f"`{command[0]}` took longer than {_COMPILE_TIMEOUT_S} s") from None
-    finally:
-        _end_group(child)
+        raise ToolchainError(f"`{name}` took longer than {_COMPILE_TIMEOUT_S} s") from None
     if child.returncode != 0:
-        raise ToolchainError(f"`{command[0]}` failed:\n{errors.decode(errors='replace').strip()}")
+        raise ToolchainError(f"`{name}` failed:\n{errors.decode(errors='replace').strip()}")
     return printed
 
 
@@ -203,8 +238,9 @@ def compile_objects(sources: Sequence[Path], includes: Sequence[Path], folder: P
     flags = [*FLAGS, *(call_graph_flag(tuple(compiler())) if graphs else []), *(f"-I{d}" for d in includes)]
     # Numbered, because sources of two folders may have the same name.
     objects = [folder / f"{number}-{source.stem}.o" for number, source in enumerate(sources)]
-    for source, made in zip(sources, objects, strict=True):
-        run_compiler([*compiler(), *flags, "-c", str(source), "-o", str(made)])
+    run_compilers(
+        [[*compiler(), *flags, "-c", str(s), "-o", str(made)] for s, made in zip(sources, objects, strict=True)]
+    )
     return objects
 
 

@@ -25,8 +25,24 @@ def unrolled(rounds: int) -> int:
 
 
 def unrolled_for(loop: ir.For) -> int:
-    """The same for a loop of the language, if it is short."""
+    """The same for a loop of the language, if it is short, or adds to eight elements."""
+    if _adds_to_eight(loop):
+        return _MOST_ROUNDS
     return _MOST_ROUNDS if 0 < _operations(loop) <= _MOST_OPERATIONS else 0
+
+
+def _adds_to_eight(loop: ir.For) -> bool:
+    """Whether it adds to each of eight elements: gcc makes vectors of such a loop only if it writes out a part of it
+    (measured: matmul of 8 × 8 matrices takes 70 ns instead of 174)."""
+    if ir.constant_rounds(loop) != 8 or len(loop.body) != 1:
+        return False
+    match loop.body[0]:
+        case ir.Assign(
+            target=ir.Element(base=ir.Local(name=row), indices=(ir.RangeVar(name=j),)),
+            value=ir.Apply(args=(ir.Element(base=ir.Local(name=again), indices=(ir.RangeVar(name=same),)), _)),
+        ):
+            return (row, j) == (again, same)
+    return False
 
 
 def _operations(loop: ir.For) -> int:
