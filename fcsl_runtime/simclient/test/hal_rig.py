@@ -99,12 +99,15 @@ class Iio:
     """An IIO device of a fake sysfs, with a scale of 1e-6 in its own units for every channel."""
 
     def __init__(self, sysfs: Path, number: int, name: str, **vectors: tuple[float, float, float]):
-        self.folder = sysfs / "bus/iio/devices" / f"iio:device{number}"
+        self.folder = sysfs / f"made/iio:device{number}"
         self.folder.mkdir(parents=True)
         (self.folder / "name").write_text(f"{name}\n")
         for channel, values in vectors.items():
             (self.folder / f"in_{channel}_scale").write_text("0.000001\n")
             self.set(channel, values)
+        devices = sysfs / "bus/iio/devices"  # whole when it appears: whoever runs already may look at any time
+        devices.mkdir(parents=True, exist_ok=True)
+        self.folder = self.folder.rename(devices / self.folder.name)
 
     def set(self, channel: str, values: tuple[float, float, float]) -> None:
         """anglvel in rad/s, accel in m/s^2, magn in gauss."""

@@ -272,8 +272,9 @@ def test_a_device_that_hangs(library: Path, stuck: Path, tmp_path: Path) -> None
         wait_for(lambda: (tmp_path / "bad.taken").read_text() == "1100\n")
         with armed_flight(guard, library, tmp_path) as (_, client):
             wait_for(lambda: valve() == 1000.0)
-            bad.touch()
+            wait_for(lambda: (tmp_path / "bad.taken").read_text() == "1400\n")
             begin_s = time.monotonic()
+            bad.touch()
             guard.wait_line("a device did not take a write: it has ended no write for 200 ms")
             for wanted in (True, False, True):
                 client.set("pilot.outputs.valve", wanted)
