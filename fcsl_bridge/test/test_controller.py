@@ -190,13 +190,19 @@ def test_topics_and_services_come_and_go(domain: Domain, library: Path) -> None:
 
     def graph() -> set[str]:
         node = client._listener.node
+        if "controller_node" not in node.get_node_names():
+            return set()  # not discovered yet
         services = node.get_service_names_and_types_by_node("controller_node", "/")
         topics = node.get_publisher_names_and_types_by_node("controller_node", "/")
         taken = node.get_subscriber_names_and_types_by_node("controller_node", "/")
         return {name for name, _ in (*services, *topics, *taken)}
 
+    lifecycle = "change_state get_available_states get_available_transitions get_state get_transition_graph transition_event"
+    parameters = "describe_parameters get_parameter_types get_parameters list_parameters set_parameters"
+    own = f"{lifecycle} {parameters} set_parameters_atomically".split()
+    before = {"/rosout", "/parameter_events", *(f"/controller_node/{name}" for name in own)}
     assert client.state == "unconfigured"
-    before = graph()
+    client._listener.until(lambda: graph() == before)
     assert client.change(CONFIGURE)
     made = {
         "/motor/torque",
