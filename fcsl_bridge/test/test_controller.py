@@ -197,7 +197,9 @@ def test_topics_and_services_come_and_go(domain: Domain, library: Path) -> None:
         taken = node.get_subscriber_names_and_types_by_node("controller_node", "/")
         return {name for name, _ in (*services, *topics, *taken)}
 
-    lifecycle = "change_state get_available_states get_available_transitions get_state get_transition_graph transition_event"
+    lifecycle = (
+        "change_state get_available_states get_available_transitions get_state get_transition_graph transition_event"
+    )
     parameters = "describe_parameters get_parameter_types get_parameters list_parameters set_parameters"
     own = f"{lifecycle} {parameters} set_parameters_atomically".split()
     before = {"/rosout", "/parameter_events", *(f"/controller_node/{name}" for name in own)}
