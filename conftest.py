@@ -4,6 +4,12 @@
 import os
 import signal
 
+from hypothesis import settings
+
+# No test fails for its time: a computer may be busy.
+settings.register_profile("fcsl", deadline=None)
+settings.load_profile("fcsl")
+
 # What scripts/test.sh asks of pytest is asked of its own runs alone, not of those that tests start as users would.
 os.environ.pop("PYTEST_ADDOPTS", None)
 
