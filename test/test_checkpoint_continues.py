@@ -181,7 +181,6 @@ def by_file(first: Twin, second: Twin) -> None:
 #: No shrinking: a failure names its subject and history, and each shrinking step runs three machines.
 _SETTINGS = settings(
     max_examples=60,
-    deadline=None,
     suppress_health_check=[HealthCheck.function_scoped_fixture, HealthCheck.too_slow, HealthCheck.data_too_large],
     phases=[Phase.explicit, Phase.generate],
 )

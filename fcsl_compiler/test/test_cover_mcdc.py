@@ -103,7 +103,7 @@ def test_the_definition() -> None:
     assert not is_shown(tree, [masked, true_true], 2)
 
 
-@settings(max_examples=150, deadline=None)
+@settings(max_examples=150)
 @given(TREES, st.data())
 def test_what_is_shown_is_what_the_definition_says(tree: Tree, data: st.DataObject) -> None:
     every = [evaluate(tree, values) for values in assignments(tree)]
@@ -118,7 +118,7 @@ def test_what_is_shown_is_what_the_definition_says(tree: Tree, data: st.DataObje
         assert (len(pairs[condition]) == 2) == is_shown(tree, seen, condition)
 
 
-@settings(max_examples=100, deadline=None)
+@settings(max_examples=100)
 @given(TREES)
 def test_every_condition_can_be_shown_and_the_advice_leads_there(tree: Tree) -> None:
     distinct = list(dict.fromkeys(evaluate(tree, values) for values in assignments(tree)))
@@ -136,7 +136,7 @@ def test_every_condition_can_be_shown_and_the_advice_leads_there(tree: Tree) -> 
         )
 
 
-@settings(max_examples=50, deadline=None)
+@settings(max_examples=50)
 @given(TREES, st.integers(0, 2**64 - 1))
 def test_a_word_that_is_no_evaluation_is_known(tree: Tree, word: int) -> None:
     possible = {evaluate(tree, values).pack() for values in assignments(tree)}

@@ -85,7 +85,7 @@ def test_calls_are_those_of_cpython(name: str, twins: Twins) -> None:
     seen: set[bool] = set()
 
     @seed(1)
-    @settings(max_examples=40, deadline=None, database=None, suppress_health_check=list(HealthCheck))
+    @settings(max_examples=40, database=None, suppress_health_check=list(HealthCheck))
     @given(st.integers(0, 3), st.integers(0, 2), st.booleans(), st.lists(st.integers(0, 3), min_size=7, max_size=7))
     def run(i: int, d: int, on: bool, readings: list[int]) -> None:
         inputs = {"i": i, "d": d, "on": on}

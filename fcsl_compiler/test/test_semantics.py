@@ -45,7 +45,7 @@ def test_program(name: str, tmp_path_factory: pytest.TempPathFactory) -> None:
     outcomes: set[bool] = set()
 
     @seed(1)
-    @settings(max_examples=60, deadline=None, database=None, suppress_health_check=list(HealthCheck))
+    @settings(max_examples=60, database=None, suppress_health_check=list(HealthCheck))
     @given(st.lists(one_tick, min_size=1, max_size=4))
     def run(ticks: list[dict[str, Any]]) -> None:
         twins.init()

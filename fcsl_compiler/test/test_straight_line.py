@@ -72,7 +72,7 @@ def of_model(n: int, m: int, q: float = 0.01, r: float = 0.5) -> dict[str, Any]:
     return {name: value.tolist() for name, value in model.items()} | {"scale": 2.0}
 
 
-@settings(max_examples=10, deadline=None, suppress_health_check=[HealthCheck.function_scoped_fixture])
+@settings(max_examples=10, suppress_health_check=[HealthCheck.function_scoped_fixture])
 @given(st.data())
 def test_bits_are_those_of_cpython(tmp_path_factory: pytest.TempPathFactory, data: st.DataObject) -> None:
     """Matrices with any zeros and ones, also such for which the gain is NaN; inputs that are not finite, too."""

@@ -20,7 +20,7 @@ from fcsl_compiler.driver.cache import build_machine
 from fcsl_compiler.driver.externs import build_externs
 from fcsl_compiler.driver.library import build_library
 from fcsl_compiler.driver.symbols import SymbolError, check_symbols
-from fcsl_compiler.driver.toolchain import FLAGS, ToolchainError, call_graph_flag, compiler
+from fcsl_compiler.driver.toolchain import FLAGS, ToolchainError, call_graph_flag, compile_objects, compiler
 from fcsl_compiler.parse.machine_files import parse_machine
 
 LAW = '''
@@ -196,6 +196,23 @@ def test_another_prototype_is_refused(tmp_path: Path) -> None:
         ToolchainError, match=r"probe is not what law.py:6:1 declares: double\(double, const double \*\)"
     ):
         build_machine(config)
+
+
+def test_an_object_that_does_not_compile_ends_those_beside_it(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    wrapper, pids = tmp_path / "cc", tmp_path / "pids"
+    wrapper.write_text(f"""#!/bin/sh
+case "$*" in *hangs.c*) echo $$ >> {pids}; exec sleep 600;; esac
+while [ ! -s {pids} ]; do sleep 0.01; done
+exec cc "$@"
+""")
+    wrapper.chmod(0o755)
+    monkeypatch.setenv("CC", str(wrapper))
+    monkeypatch.setattr(os, "sched_getaffinity", lambda _: {0, 1})
+    (tmp_path / "wrong.c").write_text("int wrong = ;\n")
+    (tmp_path / "hangs.c").write_text("int right = 1;\n")
+    with pytest.raises(ToolchainError, match="wrong.c:1"):
+        compile_objects([tmp_path / "wrong.c", tmp_path / "hangs.c"], [], tmp_path / "objects", graphs=False)
+    assert not Path(f"/proc/{int(pids.read_text())}").exists()
 
 
 def test_the_build_tells_what_it_cannot_know(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:

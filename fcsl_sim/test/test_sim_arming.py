@@ -131,7 +131,7 @@ def test_the_message_says_what_the_output_says(config: SimConfig) -> None:
 
 
 @given(commands=st.lists(st.tuples(st.booleans(), st.floats(-1e6, 1e6), st.booleans()), min_size=1, max_size=40))
-@settings(max_examples=50, deadline=None)
+@settings(max_examples=50)
 def test_a_disarmed_plant_gets_nothing_but_safe_values(
     config: SimConfig, commands: Sequence[tuple[bool, float, bool]]
 ) -> None:
@@ -152,7 +152,7 @@ def inputs(sim: Simulation) -> tuple[float, bool]:
 
 
 @given(switched=st.lists(st.booleans(), min_size=2, max_size=30))
-@settings(max_examples=20, deadline=None)
+@settings(max_examples=20)
 def test_the_machine_arms_in_the_tick_that_says_so(folder: Path, switched: list[bool]) -> None:
     """The switch of tick k arms the command of tick k, which the plant has until t_k+1."""
     simulation = json.loads(FILES["drive.sim.json"])

@@ -545,7 +545,7 @@ def damaged(tmp_path_factory: pytest.TempPathFactory) -> Iterator[tuple[SimTwin,
         yield twin, saved
 
 
-SOME = settings(max_examples=300, deadline=None, suppress_health_check=[HealthCheck.function_scoped_fixture])
+SOME = settings(max_examples=300, suppress_health_check=[HealthCheck.function_scoped_fixture])
 
 
 @SOME

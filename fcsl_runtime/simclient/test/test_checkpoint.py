@@ -134,7 +134,7 @@ def test_a_process_takes_it_and_gives_it(probe: Path, tmp_path: Path) -> None:
         assert process.save() == twin.save()
 
 
-@settings(max_examples=100, deadline=None)
+@settings(max_examples=100)
 @given(st.data())
 def test_every_nan_is_the_same_in_it(probe: Path, data: st.DataObject) -> None:
     """Whatever bits the machine left in memory; the reference is NumPy's isnan."""
@@ -227,7 +227,7 @@ def test_every_damaged_bit_and_every_cut_is_refused(twin: AlgTwin) -> None:
     assert "damaged" in refused(twin, content + b"\0")
 
 
-@settings(max_examples=300, deadline=None)
+@settings(max_examples=300)
 @given(st.binary(max_size=600))
 def test_any_bytes_are_refused(probe: Path, noise: bytes) -> None:
     with AlgTwin.from_library(probe) as twin:

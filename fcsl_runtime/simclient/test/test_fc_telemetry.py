@@ -191,7 +191,7 @@ PARTS = st.lists(
 )
 
 
-@settings(max_examples=25, deadline=None)
+@settings(max_examples=25)
 @given(st.lists(PARTS.map(".".join), min_size=1, max_size=3))
 def test_globs_choose_as_those_of_the_shell_do(globs: list[str]) -> None:
     """Channels are those that Python's fnmatch finds, in the machine's order; a glob that matches nothing is refused."""

@@ -7,7 +7,7 @@ import json
 from typing import Any
 
 import pytest
-from hypothesis import given, settings
+from hypothesis import given
 from hypothesis import strategies as st
 
 from fcsl_compiler.base.diagnostics import DiagnosticSink
@@ -56,7 +56,6 @@ def merged(value: Any, changes: Any) -> Any:
     return {**value, **{key: merged(value.get(key), change) for key, change in changes.items()}}
 
 
-@settings(deadline=None)
 @given(OBJECTS, OBJECTS, st.sampled_from([None, 2, "\t"]))
 def test_any_edit_is_a_merge(value: dict[str, Any], changes: dict[str, Any], indent: int | str | None) -> None:
     text = json.dumps(value, indent=indent)

@@ -11,6 +11,7 @@ import signal
 import subprocess
 import time
 from collections.abc import Iterator
+from itertools import islice
 from pathlib import Path
 from typing import Any
 
@@ -56,7 +57,7 @@ def test_values_rates_and_a_device_that_comes(tmp_path: Path, sysfs: Path) -> No
 
         Iio(sysfs, 2, "bmi088", anglvel=(0.0, 0.0, 0.0), accel=(0.0, 0.0, 9.8))
         news = "device 'spare' is there"  # told once a second at most, so perhaps after it was shown
-        told = next(told for told in objects(process) if news in errors.read_text())
+        told = next(told for told in islice(objects(process), 60) if news in errors.read_text())
         assert by_name(told["devices"])["spare"]["there"]
         process.send_signal(signal.SIGINT)
         assert process.wait(timeout=10) == 0

@@ -56,7 +56,7 @@ def check(summary: Summary, values: list[int]) -> None:
             assert exact <= getattr(summary, name) <= exact + exact // 32, name
 
 
-@settings(max_examples=100, deadline=None, suppress_health_check=[HealthCheck.too_slow])
+@settings(max_examples=100, suppress_health_check=[HealthCheck.too_slow])
 @given(st.lists(st.one_of(st.integers(0, 200), st.integers(0, 10**7), st.integers(0, 2**64 - 1)), max_size=300))
 def test_quantiles(code: ctypes.CDLL, values: list[int]) -> None:
     histogram, summary = fill(code, values)

@@ -12,7 +12,7 @@ from pathlib import Path
 
 import pytest
 from cobs import cobs
-from hypothesis import given, settings
+from hypothesis import given
 from hypothesis import strategies as st
 
 from simclient.link import End, Full, Policy
@@ -233,7 +233,6 @@ def test_bytes_that_are_no_frame_are_refused(data: bytes) -> None:
         assert frame.to_bytes() == candidate
 
 
-@settings(deadline=None)
 @given(data=st.binary(min_size=1, max_size=FRAME_MAX), before=st.binary(max_size=40), piece=st.integers(1, 300))
 def test_cobs_is_that_of_the_cobs_package(native: ctypes.CDLL, data: bytes, before: bytes, piece: int) -> None:
     out, decoder = ctypes.create_string_buffer(FRAME_MAX + 8), ctypes.create_string_buffer(4096)

@@ -208,7 +208,7 @@ def sealed(body: bytes) -> bytes:
     return body + struct.pack("<I", zlib.crc32(body))
 
 
-@settings(deadline=None, max_examples=150)
+@settings(max_examples=150)
 @given(messages())
 def test_both_write_the_same_bytes_and_read_the_same_values(
     native: ctypes.CDLL, case: tuple[list[Channel], Message]
@@ -223,7 +223,7 @@ def test_both_write_the_same_bytes_and_read_the_same_values(
     assert same(c.decode(data, message.kind), message)
 
 
-@settings(deadline=None, max_examples=150)
+@settings(max_examples=150)
 @given(messages(), st.lists(st.tuples(UNKNOWN, st.integers(0, 3)), max_size=3), st.randoms(use_true_random=False))
 def test_both_take_channels_in_any_order_and_skip_what_they_do_not_know(
     native: ctypes.CDLL,
@@ -245,7 +245,7 @@ def test_both_take_channels_in_any_order_and_skip_what_they_do_not_know(
     assert same(Native(native, table).decode(other, message.kind), expected)
 
 
-@settings(deadline=None, max_examples=300)
+@settings(max_examples=300)
 @given(messages(), st.sampled_from(KINDS), st.data())
 def test_both_refuse_alike(
     native: ctypes.CDLL, case: tuple[list[Channel], Message], asked: Kind, data: st.DataObject

@@ -113,7 +113,7 @@ def check_grid(coming: list[Coming], missed_deadline: int, hz: int, anchor: int)
         assert one.behind == one.number + one.found.skipped + (one.found.verdict == TICK)
 
 
-@settings(max_examples=100, deadline=None, suppress_health_check=[HealthCheck.too_slow])
+@settings(max_examples=100, suppress_health_check=[HealthCheck.too_slow])
 @given(st.sampled_from([CATCH_UP, SKIP, STOP]), rates, anchors, flights)
 def test_never_early_and_never_off_the_grid(
     pacing_c: ctypes.CDLL, missed_deadline: int, hz: int, anchor: int, delays: list[tuple[int, int]]
@@ -121,7 +121,7 @@ def test_never_early_and_never_off_the_grid(
     check_grid(fly(pacing_c, missed_deadline, hz, anchor, delays), missed_deadline, hz, anchor)
 
 
-@settings(max_examples=100, deadline=None, suppress_health_check=[HealthCheck.too_slow])
+@settings(max_examples=100, suppress_health_check=[HealthCheck.too_slow])
 @given(rates, anchors, flights)
 def test_skip_makes_no_tick_a_period_late(
     pacing_c: ctypes.CDLL, hz: int, anchor: int, delays: list[tuple[int, int]]
@@ -133,7 +133,7 @@ def test_skip_makes_no_tick_a_period_late(
         assert one.found.missed == one.found.skipped
 
 
-@settings(max_examples=100, deadline=None, suppress_health_check=[HealthCheck.too_slow])
+@settings(max_examples=100, suppress_health_check=[HealthCheck.too_slow])
 @given(rates, anchors, flights)
 def test_catch_up_makes_the_ticks_of_the_last_tenth_of_a_second(
     pacing_c: ctypes.CDLL, hz: int, anchor: int, delays: list[tuple[int, int]]
@@ -144,7 +144,7 @@ def test_catch_up_makes_the_ticks_of_the_last_tenth_of_a_second(
         assert one.found.skipped == max(owed - max(hz // 10, 1), 0)
 
 
-@settings(max_examples=100, deadline=None, suppress_health_check=[HealthCheck.too_slow])
+@settings(max_examples=100, suppress_health_check=[HealthCheck.too_slow])
 @given(st.sampled_from([CATCH_UP, SKIP]), rates, anchors, flights)
 @example(CATCH_UP, 1, 1, [(0, 2_000_000_000), (0, 0)])  # at 1 Hz one tick is made up for, and it is the newest
 def test_every_deadline_is_counted_once(

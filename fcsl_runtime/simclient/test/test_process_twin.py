@@ -48,7 +48,7 @@ def gone(pid: int) -> bool:
 
 
 @pytest.mark.filterwarnings("ignore::simclient.OverwrittenWarning")
-@settings(max_examples=15, deadline=None, suppress_health_check=[HealthCheck.function_scoped_fixture])
+@settings(max_examples=15, suppress_health_check=[HealthCheck.function_scoped_fixture])
 @given(st.lists(st.tuples(st.sampled_from(["tick", "set", "state", "restore"]), st.integers(0, 40)), max_size=12))
 def test_it_leaves_what_an_in_process_twin_leaves(twin: ProcessTwin, probe: Path, steps: list[tuple[str, int]]) -> None:
     """Bit for bit, whatever is done to both."""

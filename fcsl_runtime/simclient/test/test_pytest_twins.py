@@ -233,7 +233,7 @@ ACTIONS: dict[str, Callable[[Twin, float], object]] = {
 }
 
 
-@settings(max_examples=40, deadline=None, suppress_health_check=[HealthCheck.function_scoped_fixture])
+@settings(max_examples=40, suppress_health_check=[HealthCheck.function_scoped_fixture])
 @given(st.lists(st.tuples(st.sampled_from(sorted(ACTIONS)), st.floats(0, 100)), max_size=40))
 def test_the_bag_is_what_recording_would_have_given(
     open_twin: Callable[..., Twin],

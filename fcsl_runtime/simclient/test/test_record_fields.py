@@ -173,7 +173,7 @@ def globs(draw: st.DrawFn) -> str:
     return path[:begin] + draw(st.sampled_from(["*", "?", "**", "*?", ""])) + path[end:]
 
 
-@settings(max_examples=40, deadline=None)
+@settings(max_examples=40)
 @given(patterns=st.lists(globs().filter(bool), min_size=1, max_size=3))
 def test_globs_are_those_of_the_shell(patterns: list[str]) -> None:
     """An independent matcher chooses the same fields; it knows brackets, too, which no path here has."""

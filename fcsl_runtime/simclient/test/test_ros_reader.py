@@ -61,7 +61,7 @@ def read_one(name: str, data: bytes, pick: Pick) -> tuple[Any, str]:
 # ---- conversions --------------------------------------------------------------------------------------------------------
 
 
-@settings(deadline=None, max_examples=400)
+@settings(max_examples=400)
 @given(st.data(), st.sampled_from(sorted(WIRE_LIMITS)), st.sampled_from([*LIMITS, "f32", "f64"]))
 def test_integers(data: st.DataObject, wire: str, target: str) -> None:
     low, high = WIRE_LIMITS[wire]
@@ -91,7 +91,7 @@ FLOATS = st.floats(allow_nan=True) | st.sampled_from(
 )
 
 
-@settings(deadline=None, max_examples=400)
+@settings(max_examples=400)
 @given(FLOATS, st.sampled_from([*LIMITS, "f32", "f64"]))
 def test_floats(number: float, target: str) -> None:
     name = "std_msgs/msg/Float64"
@@ -111,7 +111,6 @@ def test_floats(number: float, target: str) -> None:
         assert (value, reason) == (0, "range")
 
 
-@settings(deadline=None)
 @given(
     st.lists(st.floats(-1e6, 1e6), min_size=3, max_size=3),
     st.sampled_from([(), (2.5,), (1.0, -0.5, 3.0)]),

@@ -130,7 +130,7 @@ def read_with_rosbags(path: Path) -> list[tuple[str, str, int, bytes]]:
         return [(c.topic, c.msgtype, time, bytes(data)) for c, time, data in reader.messages()]
 
 
-@settings(deadline=None, max_examples=10)
+@settings(max_examples=10)
 @given(first=st.integers(0, 99), length=st.integers(0, 99))
 def test_a_cut_holds_exactly_the_messages_of_its_time(
     first: int, length: int, probe: Path, tmp_path_factory: pytest.TempPathFactory

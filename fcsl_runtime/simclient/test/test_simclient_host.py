@@ -119,7 +119,7 @@ def test_a_value_is_taken_where_it_lies_in_the_range(twin: AlgTwin, name: str) -
     kind, low, high = BOUNDS[name]
     where = f"law.parameters.{name}"
 
-    @settings(max_examples=150, deadline=None)
+    @settings(max_examples=150)
     @given(values_near(kind, low, high))
     @example(math.nan if kind in _FLOATS else 0)
     def check(value: Any) -> None:

@@ -32,7 +32,6 @@ def tick_ns(k: int, first_ns: int, hz: int) -> int:
     return first_ns + k * 1_000_000_000 // hz
 
 
-@settings(deadline=None)
 @given(
     first=st.integers(0, 10**18),
     span=st.integers(0, 10**9),
@@ -48,7 +47,7 @@ def test_grid_arithmetic_is_exact(first: int, span: int, hz: int) -> None:
     assert nearest_ticks(times[:1], first, hz).tolist() == [min(distances, key=lambda k: (distances[k], k))]
 
 
-@settings(deadline=None, max_examples=300)
+@settings(max_examples=300)
 @given(
     stamps=st.lists(st.tuples(st.integers(0, 200), st.sampled_from("ab")), min_size=1, max_size=30),
     hz=st.sampled_from([3, 7, 60, 1000]),

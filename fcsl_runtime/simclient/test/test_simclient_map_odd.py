@@ -116,7 +116,7 @@ def test_a_clock_that_jumps_ahead_is_told_from_silence(run: Runs) -> None:
         assert fate.invalid == 500 - (1 + 5 + 1)
 
 
-@settings(deadline=None, max_examples=200)
+@settings(max_examples=200)
 @given(
     times=st.lists(st.integers(-3, 3).map(lambda s: s * JUMP_NS // 2), min_size=1, max_size=40), stamps=st.booleans()
 )

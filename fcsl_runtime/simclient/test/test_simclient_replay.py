@@ -267,7 +267,7 @@ def flipped(bag: Path, wanted: tuple[str, int], at: int, bit: int = 0) -> Path:
     return edited(bag, target, flip)
 
 
-@settings(deadline=None, max_examples=25, suppress_health_check=[HealthCheck.function_scoped_fixture])
+@settings(max_examples=25, suppress_health_check=[HealthCheck.function_scoped_fixture])
 @given(byte=st.integers(0, 31), bit=st.integers(0, 7), index=st.integers(0, 29).filter(lambda i: i != NAN_AT))
 def test_digest_sees_every_bit_of_every_output(bag: Path, byte: int, bit: int, index: int) -> None:
     assert digest(flipped(bag, ("/probe/echo", index), SUM_AT + byte, bit)) != digest(bag)
@@ -453,7 +453,7 @@ def test_another_layout_can_only_be_compared_from_tick_0(
 # ---- incomplete bags --------------------------------------------------------------------------------------------------
 
 
-@settings(deadline=None, max_examples=25, suppress_health_check=[HealthCheck.function_scoped_fixture])
+@settings(max_examples=25, suppress_health_check=[HealthCheck.function_scoped_fixture])
 @given(data=st.data())
 def test_a_truncated_bag_is_read_as_far_as_it_goes(bag: Path, probe: Path, data: st.DataObject) -> None:
     whole = (bag / "run_0.mcap").read_bytes()

@@ -208,7 +208,7 @@ def test_styles_and_legends_are_those_of_pictures(tmp_path: Path) -> None:
     assert [f"#{colour:06X}" for colour in colours] == [style.rerun_colour for style in styles(roles)]
 
 
-@settings(deadline=None, max_examples=10)
+@settings(max_examples=10)
 @given(cuts=st.lists(st.integers(0, 60), max_size=6))
 def test_batches_do_not_show(cuts: list[int], tmp_path_factory: pytest.TempPathFactory) -> None:
     folder = tmp_path_factory.mktemp("batches")

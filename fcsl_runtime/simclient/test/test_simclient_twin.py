@@ -82,7 +82,7 @@ def test_starts_paused_at_tick_0_in_the_initial_state(twin: AlgTwin) -> None:
 
 
 @pytest.mark.filterwarnings("ignore::simclient.OverwrittenWarning")
-@settings(deadline=None, max_examples=300, suppress_health_check=[HealthCheck.function_scoped_fixture])
+@settings(max_examples=300, suppress_health_check=[HealthCheck.function_scoped_fixture])
 @given(data=st.data())
 def test_what_is_set_is_read_back(twin: AlgTwin, data: st.DataObject) -> None:
     field = data.draw(st.sampled_from([f for f in twin.fields() if f.writable]))

@@ -16,7 +16,7 @@ from typing import Any
 import foreign_bags
 import numpy as np
 import pytest
-from hypothesis import given, settings
+from hypothesis import given
 from hypothesis import strategies as st
 from hypothesis.extra.numpy import arrays
 from two_estimators import STEP_S, TICKS, TRACK_FROM, TRACK_UNTIL, VIEWS, fly, height, turn, write_config
@@ -319,7 +319,6 @@ def test_missing_messages_are_a_gap_in_whatever_batches() -> None:
         assert np.concatenate([part[0] for part in parts]).tolist() == pytest.approx(whole[0].tolist())
 
 
-@settings(deadline=None)
 @given(values=arrays(np.float64, st.integers(1, 3000), elements=st.floats(-1e6, 1e6) | st.just(math.nan)))
 def test_thinning_keeps_every_extreme_and_every_gap(values: np.ndarray) -> None:
     t, thin = thinned(np.arange(len(values)) * 0.01, values, 200)

@@ -226,7 +226,7 @@ def _subsets(draw: st.DrawFn, known: tuple[str, ...]) -> list[str]:
 
 @pytest.mark.parametrize("kind", [AlgTwin, PyTwin])
 @pytest.mark.parametrize("example", sorted(EXAMPLES))
-@settings(max_examples=4, deadline=None)
+@settings(max_examples=4)
 @given(data=st.data(), seed=st.integers(0, 2**32))
 def test_a_subset_of_an_example_has_its_bits(kind: type[Twin], example: str, data: st.DataObject, seed: int) -> None:
     known = tuple(_instances(EXAMPLES[example]))
@@ -234,7 +234,7 @@ def test_a_subset_of_an_example_has_its_bits(kind: type[Twin], example: str, dat
 
 
 @pytest.mark.parametrize("kind", [AlgTwin, PyTwin])
-@settings(max_examples=6, deadline=None)
+@settings(max_examples=6)
 @given(data=st.data(), seed=st.integers(0, 2**32))
 def test_a_subset_with_everything_has_its_bits(craft: Path, kind: type[Twin], data: st.DataObject, seed: int) -> None:
     known = tuple(_instances(craft))

@@ -240,7 +240,7 @@ options = st.dictionaries(
 )
 
 
-@settings(max_examples=40, deadline=None, suppress_health_check=[HealthCheck.function_scoped_fixture])
+@settings(max_examples=40, suppress_health_check=[HealthCheck.function_scoped_fixture])
 @given(
     st.fixed_dictionaries(
         {}, optional={"kind": st.just("flight") | json_values, "file": json_values, "options": options}
@@ -251,7 +251,7 @@ def test_whatever_json_comes_is_answered(supervisor: Supervisor, wanted: dict[st
     assert answer.status in (400, 403, 404, 409) and answer.code
 
 
-@settings(max_examples=300, deadline=None, suppress_health_check=[HealthCheck.function_scoped_fixture])
+@settings(max_examples=300, suppress_health_check=[HealthCheck.function_scoped_fixture])
 @given(st.sampled_from(sorted(KINDS)), options)
 def test_no_value_becomes_an_argument_of_its_own(root: Path, kind: str, wanted: dict[str, object]) -> None:
     """Every argument begins with the flag of an option that was asked for."""

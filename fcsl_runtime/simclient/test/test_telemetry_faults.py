@@ -59,7 +59,7 @@ def deliveries(draw: st.DrawFn) -> tuple[Sender, list[tuple[int, int, str]], ran
     return sender, [arriving[i] for i in order], source
 
 
-@settings(max_examples=150, deadline=None)
+@settings(max_examples=150)
 @given(deliveries())
 def test_any_loss_reordering_duplication_and_truncation(
     case: tuple[Sender, list[tuple[int, int, str]], random.Random],
@@ -96,7 +96,7 @@ def test_any_loss_reordering_duplication_and_truncation(
     assert_truth(telemetry.window(), sender, whole_packets)
 
 
-@settings(max_examples=100, deadline=None)
+@settings(max_examples=100)
 @given(st.lists(st.integers(0, 60), max_size=80), st.integers(1, 20))
 def test_a_small_window_has_the_newest(arriving: list[int], rows: int) -> None:
     sender = Sender()

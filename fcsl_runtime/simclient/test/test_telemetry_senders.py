@@ -113,7 +113,7 @@ def test_a_slow_session_is_not_silent_between_its_packets() -> None:
     assert_truth(window(collector), other, [0, 1, 2, 3])
 
 
-@settings(max_examples=15, deadline=None)
+@settings(max_examples=15)
 @given(st.integers(0, 2**32), st.integers(1, 12))
 def test_a_flood_of_sessions_throws_nobody_out(seed: int, each: int) -> None:
     """Strangers with whole configurations, more of them than there is room for, between any two packets of the live one."""
@@ -237,7 +237,7 @@ def test_a_window_of_huge_packets_is_smaller() -> None:
     assert collector.stream is not None and collector.stream.ring.raw.nbytes <= 256 << 20
 
 
-@settings(max_examples=300, deadline=None)
+@settings(max_examples=300)
 @given(st.data())
 def test_no_configuration_with_the_right_crc_makes_it_raise(drawn: st.DataObject) -> None:
     """Mutated ones, each with the CRCs that it should have: shown or malformed, and never an exception."""

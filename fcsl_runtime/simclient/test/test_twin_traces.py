@@ -25,7 +25,7 @@ Open = Callable[..., Twin]
 # ---- traces -----------------------------------------------------------------------------------------------------------
 
 
-@settings(max_examples=15, deadline=None, suppress_health_check=[HealthCheck.function_scoped_fixture])
+@settings(max_examples=15, suppress_health_check=[HealthCheck.function_scoped_fixture])
 @given(st.lists(st.tuples(st.integers(0, 9), st.floats(-1e6, 99.0)), min_size=1, max_size=8))
 def test_a_trace_has_what_each_tick_left(twin: Twin, runs: list[tuple[int, float]]) -> None:
     """Against reading every value after every tick."""

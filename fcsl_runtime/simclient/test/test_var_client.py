@@ -103,7 +103,7 @@ def test_refusals(client: VarClient) -> None:
         assert refused.value.code == "not_paused"
 
 
-@settings(max_examples=15, deadline=None, suppress_health_check=[HealthCheck.function_scoped_fixture])
+@settings(max_examples=15, suppress_health_check=[HealthCheck.function_scoped_fixture])
 @given(
     st.booleans(), st.integers(1, 4), st.lists(st.tuples(st.integers(1, 30), st.floats(-9, 9)), min_size=1, max_size=4)
 )

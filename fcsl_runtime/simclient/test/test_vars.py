@@ -65,7 +65,7 @@ def numpy_part(array: np.ndarray[Any, Any], text: str) -> np.ndarray[Any, Any]:
     return result
 
 
-@settings(max_examples=150, deadline=None)
+@settings(max_examples=150)
 @given(field=st.sampled_from(sorted(SHAPES)), text=brackets)
 def test_parts_are_numpys(client: Client, field: str, text: str) -> None:
     array = np.array(client.get(field))
@@ -77,7 +77,7 @@ def test_parts_are_numpys(client: Client, field: str, text: str) -> None:
     assert client.get(field + text) == expected
 
 
-@settings(max_examples=80, deadline=None)
+@settings(max_examples=80)
 @given(field=st.sampled_from(sorted(SHAPES)), text=brackets, data=st.data())
 def test_parts_are_set_as_numpy_would(client: Client, field: str, text: str, data: st.DataObject) -> None:
     array = np.array(client.get(field))
@@ -123,7 +123,7 @@ def bits(value: Any, kind: str) -> bytes:
     return struct.pack(kind, float(value))
 
 
-@settings(max_examples=60, deadline=None)
+@settings(max_examples=60)
 @given(st.floats(), st.floats(width=32))
 def test_floats_round_trip(client: Client, wide: float, narrow: float) -> None:
     def told(value: float) -> float | str:
@@ -139,7 +139,7 @@ def test_floats_round_trip(client: Client, wide: float, narrow: float) -> None:
     assert math.isnan(narrow) or bits(got["hold.state.line[2]"], "<f") == bits(narrow, "<f")
 
 
-@settings(max_examples=60, deadline=None)
+@settings(max_examples=60)
 @given(st.integers(-(2**65), 2**65))
 def test_integers_round_trip_or_are_refused(client: Client, value: int) -> None:
     for field, low, high in (
@@ -169,7 +169,7 @@ def test_a_number_of_a_request_is_taken_as_it_is_or_refused(library: str, tmp_pa
 # ---- sets
 
 
-@settings(max_examples=60, deadline=None)
+@settings(max_examples=60)
 @given(st.permutations(range(4)), st.integers(0, 3))
 def test_a_set_is_all_or_nothing(client: Client, order: list[int], bad: int) -> None:
     """One bad member anywhere, of any kind, and nothing is written."""
@@ -343,7 +343,7 @@ def python_value(text: str, names: dict[str, Any]) -> Any:
     return walk(ast.parse(text, mode="eval").body)
 
 
-@settings(max_examples=200, deadline=None)
+@settings(max_examples=200)
 @given(text=arithmetic | logic)
 @example(text="((-7) // 2)")
 @example(text="(7 % (-2))")
@@ -507,7 +507,7 @@ requests = st.one_of(
 )
 
 
-@settings(max_examples=60, deadline=None)
+@settings(max_examples=60)
 @given(st.lists(requests.map(lambda r: r.replace(b"\n", b" ")), max_size=8))
 def test_whatever_bytes_come_each_line_has_its_reply(client: Client, lines: list[bytes]) -> None:
     for line in lines:

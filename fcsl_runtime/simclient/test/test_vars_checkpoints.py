@@ -206,7 +206,7 @@ def test_the_reasons_of_files(client: Client, library: str, tmp_path: Path) -> N
     assert saved(client) == here
 
 
-@settings(max_examples=80, deadline=None)
+@settings(max_examples=80)
 @given(data=st.data())
 def test_a_byte_that_changed_changes_nothing(client: Client, data: st.DataObject) -> None:
     here = saved(client)

@@ -65,7 +65,7 @@ def chosen(
     return np.asarray(numpy_part(structs, outer)), np.asarray(numpy_part(scalars, inner) if inner else scalars)
 
 
-@settings(max_examples=150, deadline=None)
+@settings(max_examples=150)
 @given(array=st.sampled_from(ARRAYS), outer=brackets.filter(bool), inner=brackets, data=st.data())
 def test_slices_are_numpys(client: Client, array: Any, outer: str, inner: str, data: st.DataObject) -> None:
     path = f"{array[0]}{outer}.{array[2]}{inner}"
