@@ -166,10 +166,12 @@ def check_bag_or_none(bag: Path, library: Path, closed: bool) -> None:
 
 
 def limited(domain: Domain, kilobytes: int, parameters: Sequence[str]) -> Process:
-    """A controller that cannot write files larger than this, which emulates a full disk for one process."""
+    """A controller that cannot write files larger than this, which emulates a full disk for one process. No compiled
+    import of Python is cut short for later processes."""
     path = package_prefix("fcsl_bridge") / "lib" / "fcsl_bridge" / "controller_node"
     arguments = ["--ros-args", *(word for parameter in parameters for word in ("-p", parameter))]
-    return domain.run(["bash", "-c", f'ulimit -f {kilobytes}; exec "$@"', "-", path, *arguments])
+    limits = f"export PYTHONDONTWRITEBYTECODE=1; ulimit -f {kilobytes}"
+    return domain.run(["bash", "-c", f'{limits}; exec "$@"', "-", path, *arguments])
 
 
 def test_full_disk_free_running(domain: Domain, library: Path) -> None:

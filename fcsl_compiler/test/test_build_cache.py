@@ -76,8 +76,8 @@ class Place:
             "FCSL_TEST_LOG": str(self.log),
             "FCSL_TEST_STOP": str(stop),
         }
-        return subprocess.Popen(
-            [*before, sys.executable, "-c", BUILD, str(self.config)],
+        return subprocess.Popen(  # -B: no compiled import is cut short for later processes when files may not grow
+            [*before, sys.executable, "-B", "-c", BUILD, str(self.config)],
             env={**os.environ, **given},
             stdout=subprocess.PIPE,
             stderr=subprocess.PIPE,

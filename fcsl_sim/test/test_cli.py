@@ -242,7 +242,9 @@ def test_a_full_disk_costs_no_tick_that_was_written(sim_json: Path, tmp_path: Pa
 
     assert fcsl_sim("check", sim_json).returncode == 0  # the machine is compiled without the limit
     bag = tmp_path / "bag"
-    done = fcsl_sim("run", sim_json, "--duration", "1000", "--record", bag, "--namespace", "/ns/", preexec_fn=limit)
+    options = ("--duration", "1000", "--record", bag, "--namespace", "/ns/")
+    uncached = {**os.environ, "PYTHONDONTWRITEBYTECODE": "1"}  # no compiled import is cut short for later processes
+    done = fcsl_sim("run", sim_json, *options, env=uncached, preexec_fn=limit)
     failed = f"fcsl-sim: error: recording failed: cannot write to bag '{bag}': File too large"
     told = f"; {bag} has the ticks recorded until then" if kept else ""
     assert (done.returncode, done.stderr) == (2, f"{failed}{told}\n")

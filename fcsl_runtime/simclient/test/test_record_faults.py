@@ -89,7 +89,8 @@ def child(
             resource.setrlimit(resource.RLIMIT_FSIZE, (limit_bytes, limit_bytes))
 
     code = CHILD.format(folder=str(Path(__file__).parent))
-    arguments = [sys.executable, "-c", code, str(bag), policy, str(hundreds), then]
+    # -B: no compiled import is cut short for later processes
+    arguments = [sys.executable, "-B", "-c", code, str(bag), policy, str(hundreds), then]
     return subprocess.Popen(
         arguments, stdout=subprocess.PIPE, text=True, preexec_fn=limit, env={**os.environ, **environment}
     )

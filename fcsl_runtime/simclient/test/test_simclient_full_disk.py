@@ -24,7 +24,7 @@ def limited(size: int) -> Callable[[], None]:
 
 
 def tool(size: int, *arguments: object) -> subprocess.CompletedProcess[str]:
-    command = [sys.executable, "-m", *map(str, arguments)]
+    command = [sys.executable, "-B", "-m", *map(str, arguments)]  # no compiled import is cut short for later processes
     return subprocess.run(command, capture_output=True, text=True, timeout=120, preexec_fn=limited(size))
 
 
