@@ -58,14 +58,14 @@ function(fcsl_add_machine target)
   target_include_directories(${target} PUBLIC "$<BUILD_INTERFACE:${folder}>")
   set_target_properties(${target} PROPERTIES
     C_STANDARD 11 C_STANDARD_REQUIRED ON C_EXTENSIONS OFF C_VISIBILITY_PRESET hidden POSITION_INDEPENDENT_CODE ON)
-  # The compile and link flags of fcsl_compiler/driver/toolchain.py; -O3 overrides CMake's level.
+  # The compile and link flags, here and below, of fcsl_compiler/driver/toolchain.py; -O3 overrides CMake's level.
   target_compile_options(${target} PRIVATE -O3 -ffp-contract=off -fno-math-errno)
   target_link_options(${target} PRIVATE "LINKER:-z,now" "LINKER:--no-undefined" "LINKER:--exclude-libs,libfcsl_math.a")
   target_link_libraries(${target} PRIVATE fcsl_compiler::fcsl_math m)
   target_link_libraries(${target} PUBLIC fcsl_compiler::fcsl_abi)
   _fcsl_link_externs(${target} "${folder}" ${arg_TARGET} ${configs})
-  if(CMAKE_C_COMPILER_ID STREQUAL "GNU" AND CMAKE_C_COMPILER_VERSION VERSION_GREATER_EQUAL 10)
-    target_compile_options(${target} PRIVATE -fcallgraph-info=su,da)
+  if(CMAKE_C_COMPILER_ID STREQUAL "GNU" AND CMAKE_C_COMPILER_VERSION VERSION_GREATER_EQUAL 11)
+    target_compile_options(${target} PRIVATE -fcallgraph-info=su,da -fno-ipa-modref)
   endif()
   # Every build scans the binary (no allocation, no system call, no inexact function) and bounds the stack of a step.
   add_custom_command(TARGET ${target} POST_BUILD

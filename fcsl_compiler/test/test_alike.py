@@ -1,6 +1,8 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Instances of one algorithm share a record and its execute where both are equal."""
+"""Instances of one algorithm share a record and its execute where both are equal, and init where they begin alike."""
 
+import math
+import re
 from pathlib import Path
 
 import pytest
@@ -67,3 +69,25 @@ def test_each_has_its_own_data(config: Path, backend: str) -> None:
     assert machine.get("timed.outputs.y") == 6.0 / (6.0 - 0.1)
     assert [machine.get(f"{name}.counters.faults") for name in ("first", "second")] == [0, 2]
     assert [machine.get(f"{name}.state.ran") for name in ("first", "second")] == [[2, 0], [0, 0]]
+
+
+@pytest.mark.parametrize("backend", ["c", "nim"])
+def test_init_is_shared_where_the_values_are_equal(tmp_path: Path, backend: str) -> None:
+    """Bit for bit: 0.0 and -0.0 are different beginnings."""
+    gains = {"first": 0.0, "same": 0.0, "negative": -0.0, "other": 2.5}
+    machine = {
+        "tick_hz": 10,
+        "initial_state": "A",
+        "instances": {name: {"algorithm": "Gain", "parameters": {"k": k}} for name, k in gains.items()},
+        "states": {"A": {"schedule": dict.fromkeys(gains, 10)}},
+        "transitions": [],
+    }
+    config = write_machine(tmp_path, "m", machine, {"gain": GAIN})
+    header = compile_machine(config, "").header
+    inits = dict(re.findall(r"void m_(\w+)_init\(\w+ \*self\)\n\{\n(.*?)\n\}", header, re.S))
+    assert {name for name, body in inits.items() if "memset" in body} == {"first", "negative", "other"}
+    assert inits["same"] == "    m_first_init(self);"
+    built = build_machine(config, backend=backend)
+    twin = Machine(built.library, built.name)
+    found = {name: twin.get(f"{name}.parameters.k") for name in gains}
+    assert found == gains and [n for n, k in found.items() if math.copysign(1.0, k) < 0] == ["negative"]

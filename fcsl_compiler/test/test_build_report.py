@@ -221,7 +221,7 @@ def test_operations_with_structural_zeros_do_not_count(tmp_path: Path) -> None:
 def bound_of(tmp_path: Path, text: str, function: str) -> int:
     source = tmp_path / "c.c"
     source.write_text("#include <stdint.h>\n" + text)
-    code = read_object(compile_objects([source], [], tmp_path / "o", graphs=False)[0])
+    code = read_object(compile_objects([source], [], tmp_path / "o")[0])
     return Bounder(code, price=most).of(function).instructions
 
 
@@ -256,7 +256,7 @@ def test_given_iteration_limits_bound_a_loop_over_data(tmp_path: Path) -> None:
         double f(const double *t, double x) { return s(t, 1000, x); }"""
     source = tmp_path / "c.c"
     source.write_text(text)
-    code = read_object(compile_objects([source], [], tmp_path / "o", graphs=False)[0])
+    code = read_object(compile_objects([source], [], tmp_path / "o")[0])
     with pytest.raises(Unbounded, match="has no bound that the analysis can prove"):
         Bounder(code).of("s")
     few, many = (Bounder(code, turns={"s": (("nop", n),)}).of("s").instructions for n in (10, 20))

@@ -20,7 +20,7 @@ from fcsl_compiler.driver.cache import build_machine
 from fcsl_compiler.driver.externs import build_externs
 from fcsl_compiler.driver.library import build_library
 from fcsl_compiler.driver.symbols import SymbolError, check_symbols
-from fcsl_compiler.driver.toolchain import FLAGS, ToolchainError, call_graph_flag, compile_objects, compiler
+from fcsl_compiler.driver.toolchain import FLAGS, ToolchainError, compile_objects, compiler, gcc_flags
 from fcsl_compiler.parse.machine_files import parse_machine
 
 LAW = '''
@@ -201,8 +201,10 @@ def test_another_prototype_is_refused(tmp_path: Path) -> None:
 def test_an_object_that_does_not_compile_ends_those_beside_it(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     wrapper, pids = tmp_path / "cc", tmp_path / "pids"
     wrapper.write_text(f"""#!/bin/sh
-case "$*" in *hangs.c*) echo $$ >> {pids}; exec sleep 600;; esac
-while [ ! -s {pids} ]; do sleep 0.01; done
+case "$*" in
+*hangs.c*) echo $$ >> {pids}; exec sleep 600;;
+*wrong.c*) while [ ! -s {pids} ]; do sleep 0.01; done;;
+esac
 exec cc "$@"
 """)
     wrapper.chmod(0o755)
@@ -211,7 +213,7 @@ exec cc "$@"
     (tmp_path / "wrong.c").write_text("int wrong = ;\n")
     (tmp_path / "hangs.c").write_text("int right = 1;\n")
     with pytest.raises(ToolchainError, match="wrong.c:1"):
-        compile_objects([tmp_path / "wrong.c", tmp_path / "hangs.c"], [], tmp_path / "objects", graphs=False)
+        compile_objects([tmp_path / "wrong.c", tmp_path / "hangs.c"], [], tmp_path / "objects")
     assert not Path(f"/proc/{int(pids.read_text())}").exists()
 
 
@@ -220,7 +222,7 @@ def test_the_build_tells_what_it_cannot_know(tmp_path: Path, capsys: pytest.Capt
     assert main(["build", str(config), "-o", str(tmp_path / "out"), "--target", "board"]) == 0
     out = capsys.readouterr().out
     assert out.endswith("functions called by its externs: getpid\n")
-    if call_graph_flag(tuple(compiler())):
+    if gcc_flags(tuple(compiler())):
         assert ", without its externs: probe\n" in out
     compilation = build_library([config], tmp_path / "sim/libcraft.so")[0]
     assert compilation.extern_calls == ()

@@ -12,7 +12,7 @@ from scipy.spatial.transform import Rotation
 from fcsl_compiler.base.diagnostics import DiagnosticError
 from fcsl_compiler.driver.cache import build_machine
 from fcsl_compiler.driver.passes import compile_machine
-from fcsl_compiler.emit.field_table import layout_hash, source_hash
+from fcsl_compiler.emit.field_table import field_table, layout_hash, source_hash
 from fcsl_compiler.model.machine import Machine as Checked
 
 NAV = """class Nav:
@@ -178,7 +178,7 @@ def test_source_hash_leaves_them_out(tmp_path: Path, at: int, indent: int | None
     def hashes(config: dict[str, Any]) -> tuple[str, str]:
         path.write_text(json.dumps(config, indent=indent))
         machine = compile_machine(path, "", until="schedule").checked
-        return source_hash(machine), layout_hash(machine)
+        return source_hash(machine), layout_hash(machine, field_table(machine))
 
     members = list(plain.items())
     members.insert(at, ("views", VIEWS))

@@ -139,5 +139,5 @@ def _layout(machine: Machine, folder: Path, includes: Sequence[Path]) -> Layout:
         f'#include "{machine.name}.h"\n#include <stddef.h>\nextern const uint64_t fcsl_layout[];\n'
         f"const uint64_t fcsl_layout[] = {{{lines}}};\n"
     )
-    found = read_words(compile_objects([source], includes, folder, graphs=False)[0], ".rodata")
+    found = read_words(compile_objects([source], includes, folder)[0], ".rodata")
     return Layout(found[0], found[1], found[2], found[3], tuple(found[4 : len(values)]))

@@ -17,7 +17,7 @@ from .nim import check_externs, compile_modules
 from .passes import Compilation, compile_machine
 from .stack import stack_bound, stepped_machines
 from .symbols import SymbolError, check_symbols
-from .toolchain import ToolchainError, ask_call_graphs, compile_objects, include_dirs, link_shared, math_library
+from .toolchain import ToolchainError, ask_features, compile_objects, include_dirs, link_shared, math_library
 
 
 def emit(
@@ -131,7 +131,7 @@ def build_library(
     Sets `extern_calls` of every compilation, and `stack_bound` if the C compiler reports frame sizes. Then calls
     `inspect` for each.
     """
-    ask_call_graphs()
+    ask_features()
     compilations = compile_all(configs, strict, target, cover, instances, backend)
     absent = [p for p in (output.parent, *output.parent.parents) if not p.exists()]
 
@@ -159,7 +159,7 @@ def _compile(compilations: list[Compilation], sources: list[Path], output: Path,
     targets = list(dict.fromkeys(c.target for c in compilations if not c.target.is_empty))
     includes = [folder, *include_dirs(), *(d for t in targets for d in t.include)]
     with explained(externs, targets):
-        objects = compile_objects(sources, includes, folder / "objects", graphs=True)
+        objects = compile_objects(sources, includes, folder / "objects")
         declared = [e for c in compilations for e in c.checked.externs]
         foreign = link_inputs(targets, folder / "externs", folder, declared)
 

@@ -5,6 +5,7 @@ from __future__ import annotations
 
 import hashlib
 import re
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
 from ..base.files import digest
@@ -166,11 +167,11 @@ def _channel_rows(machine: Machine, channel: Channel) -> list[FieldRow]:
     ]
 
 
-def layout_hash(machine: Machine) -> str:
+def layout_hash(machine: Machine, table: Sequence[FieldRow]) -> str:
     """SHA-256 over everything that must match to restore a checkpoint: paths, types, shapes and order of all fields,
-    and the states."""
+    and the states. `table`: from field_table."""
     rows = [f"struct {_STRUCT_VERSION}"]
-    rows += [f"{r.path} {r.abi_type} {list(r.shape)}" for r in field_table(machine)]
+    rows += [f"{r.path} {r.abi_type} {list(r.shape)}" for r in table]
     rows += [f"timed {i.name}" for i in machine.instances if i.max_wcet_us]
     rows += [f"frozen {i.name}.{n} {i.parameters[n]}" for i in machine.instances for n in i.frozen]
     rows += [s.name for s in machine.states] + list(machine.requests)

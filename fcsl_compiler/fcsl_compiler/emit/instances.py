@@ -66,6 +66,13 @@ def execute_name(machine: Machine, instance: Instance) -> str:
     return f"{machine.name}_{instance.name}_execute"
 
 
+def init_name(machine: Machine, instance: Instance, first: Instance) -> str:
+    """`first`: of those alike. It has the code for all that begin with the values that it begins with."""
+    # In text, 0.0 differs from -0.0.
+    same = repr((instance.parameters, instance.inputs)) == repr((first.parameters, first.inputs))
+    return f"{machine.name}_{(first if same else instance).name}_init"
+
+
 def _run_name(machine: Machine, instance: Instance) -> str:
     return f"fcsl_run_{machine.name}_{instance.name}"
 
@@ -98,17 +105,21 @@ class InstanceEmitter:
             yield self._execute([*self._pulses(health(0)), *self._body()])
 
     def _init(self) -> Function:
-        body: list[Statement] = [code.Clear(Deref(_SELF), self.pointer.target)]
-        for record, values in (("parameters", self.i.parameters), ("inputs", self.i.inputs)):
-            for port in self.i.algorithm.ports[record]:
-                if port.name in values:
-                    body += store(self.m, _field(record, port), port.type, values[port.name])
-        body.append(Set(_output("health"), health(3)))
+        name = init_name(self.m, self.i, self.first)
+        body = self._initial() if name == f"{self.name}_init" else [code.Do(Call(name, (_SELF,)))]
         comment = (
             "Zeroes the record, binds parameters and initial inputs. start() runs afterwards, in the machine's init."
         )
         parameters = ((_SELF.text, self.pointer),)
         return Function(f"{self.name}_init", parameters, None, tuple(body), comment, exported=True, in_header=True)
+
+    def _initial(self) -> list[Statement]:
+        body: list[Statement] = [code.Clear(Deref(_SELF), self.pointer.target)]
+        for record, values in (("parameters", self.i.parameters), ("inputs", self.i.inputs)):
+            for port in self.i.algorithm.ports[record]:
+                if port.name in values:
+                    body += store(self.m, _field(record, port), port.type, values[port.name])
+        return [*body, Set(_output("health"), health(3))]
 
     def _as_first(self) -> Function:
         host = (_HOST,) if self.i.execute.uses_hardware else ()

@@ -5,13 +5,14 @@ the tick of the state runs."""
 from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
+from dataclasses import replace
 
 from ..model import code
 from ..model.code import STATE, Binary, Call, Do, Function, If, Literal, Member, Name, Set, Statement, Update
 from ..model.machine import Channel, Instance, Machine
 from ..model.types import I32, U32, U64
 from .functions import HOST_TYPE
-from .instances import call, store
+from .instances import call, init_name, store
 from .names import health, machine_type, sensors, state_constant
 from .tick import (
     MACHINE,
@@ -65,8 +66,9 @@ class StepEmitter:
         m = self.m
         body: list[Statement] = [code.Clear(MACHINE, self.pointer.target), Set(_CURRENT, NO_INSTANCE)]
         body += [Set(place, state_constant(m, m.initial_state)) for place in (_ACTIVE, _NEXT)]
-        for instance in m.instances:
-            body.append(Do(Call(f"{m.name}_{instance.name}_init", (code.Address(record_of(instance)),))))
+        for instance, first in zip(m.instances, self.firsts, strict=True):
+            called = Call(init_name(m, instance, m.instances[first]), (code.Address(record_of(instance)),))
+            body.append(Do(called))
         for connection in m.connections:
             if connection.delayed:
                 body += store(m, port_place(m, connection.target), connection.target.type, connection.initial)
@@ -74,7 +76,8 @@ class StepEmitter:
         for index, instance in enumerate(m.instances):
             body += self._start(index, instance)
         body.append(code.Return(Literal(0, I32)))
-        return self._of_descriptor("init", (), body, I32)
+        # Cold, so that C compilers do not spend time on a copy of init for every instance.
+        return replace(self._of_descriptor("init", (), body, I32), inline="rare")
 
     def _start(self, index: int, instance: Instance) -> Iterator[Statement]:
         if instance.start is None:

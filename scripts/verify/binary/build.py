@@ -68,7 +68,7 @@ def compile_lined(made: Compilation, folder: Path, output: Path, more: Target | 
     library = output / "library.so"
     with _line_numbers():
         sources = [folder / made.c_name, folder / "fcsl_machines.c"]
-        objects = compile_objects(sources, includes, output / "objects", graphs=True)
+        objects = compile_objects(sources, includes, output / "objects")
         foreign = link_inputs(targets, output / "externs", folder)
         link_shared([*objects, *foreign.files], [], library, flags=foreign.flags)
     externs += [more.name] if more is not None else []

@@ -109,7 +109,7 @@ class Steps:
 def measure(case: Case, ticks: int, seed: int, bounder: type[bound_module.Bounder]) -> list[StateFigures] | None:
     """One row for each state that had a tick; None when the machine's start faults. Raises CheckFailed, Unbounded."""
     machine = compile_machine(case.config, "", until="schedule").checked
-    compiled = compile_objects([case.sources[0]], case.includes, case.folder / "objects", graphs=False)[0]
+    compiled = compile_objects([case.sources[0]], case.includes, case.folder / "objects")[0]
     code = MachineCode(machine, compiled, case.folder / "objects", case.includes)
     apart = code.whole.apart
     code.whole, code.own = bounder(code.code, apart, price), bounder(code.code, apart)

@@ -191,7 +191,7 @@ class DescriptorEmitter:
             "abi_version": "FCSL_ABI_VERSION",
             "name": c_string(m.name),
             "source_hash": c_string(source_hash(m)),
-            "layout_hash": c_string(layout_hash(m)),
+            "layout_hash": c_string(layout_hash(m, self.rows)),
             "build_hash": c_string(self.build_hash),
             "tick_hz": f"{m.tick_hz}u",
             "size": f"(uint32_t)sizeof({self.struct})",
