@@ -19,6 +19,7 @@ from typing import Any
 
 import pytest
 
+import fcsl_compiler
 from fcsl_compiler.driver.cache import build_shared
 
 ALGORITHM = """
@@ -361,6 +362,22 @@ def test_a_full_disk_is_an_error_and_leaves_nothing_wrong(place: Place, size: in
     refused(place.start(preexec_fn=_limit(size)))
     assert not list(place.cache.glob("machines/*/built.json"))
     built(place.start())
+
+
+def test_another_compiler_builds_anew(place: Place, tmp_path: Path) -> None:
+    package = tmp_path / "python/fcsl_compiler"
+    shutil.copytree(Path(fcsl_compiler.__file__).parent, package, ignore=shutil.ignore_patterns("__pycache__"))
+    before = ["env", "PYTHONSAFEPATH=1", f"PYTHONPATH={package.parent}:{os.environ['PYTHONPATH']}"]
+
+    def runs_of_a_build() -> int:
+        earlier = place.runs()
+        built(place.start(before=before))
+        return place.runs() - earlier
+
+    assert [runs_of_a_build() > 0 for _ in range(2)] == [True, False]
+    changed = package / "emit/tick.py"
+    changed.write_text(changed.read_text() + "\n")
+    assert [runs_of_a_build() > 0 for _ in range(2)] == [True, False]
 
 
 def test_a_file_that_is_imported_is_part_of_the_build(place: Place) -> None:
