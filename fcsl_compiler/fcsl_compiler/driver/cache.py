@@ -119,7 +119,7 @@ def _extern_parts(config: Path, target: str, texts: MachineTexts) -> list[str | 
 def _identity() -> str:
     """Names, sizes and times of change of the compiler's files, of the headers of generated C and of the math
     library."""
-    # Their contents, and pathlib, would take 7 ms and 1 ms of the 15 in which an unchanged machine loads.
+    # Reading their contents took 6 to 13 ms where this takes 4, without pathlib.
     files = sorted(_python_files(str(Path(__file__).parents[1])))
     files += [f"{include_dirs()[0]}/fcsl/{name}" for name in ("fcsl_machine.h", "fcsl_hw.h", "fcsl_cover.h")]
     try:

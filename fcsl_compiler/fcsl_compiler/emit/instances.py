@@ -67,7 +67,7 @@ def execute_name(machine: Machine, instance: Instance) -> str:
 
 
 def init_name(machine: Machine, instance: Instance, first: Instance) -> str:
-    """`first`: of those alike. It has the code for all that begin with the values that it begins with."""
+    """The function that fills its record at the start: of the first of those alike, if both begin with the same values."""
     # In text, 0.0 differs from -0.0.
     same = repr((instance.parameters, instance.inputs)) == repr((first.parameters, first.inputs))
     return f"{machine.name}_{(first if same else instance).name}_init"
