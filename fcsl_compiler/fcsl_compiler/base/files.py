@@ -3,12 +3,19 @@
 
 from __future__ import annotations
 
-import hashlib
 import os
 import stat
 import tempfile
 from pathlib import Path
 from typing import TYPE_CHECKING
+
+try:  # As random.py does: hashlib would load OpenSSL, a quarter of the time in which an unchanged machine loads.
+    from _sha2 import sha256  # type: ignore[import-not-found]  # CPython 3.12
+except ImportError:
+    try:
+        from _sha256 import sha256  # type: ignore[import-not-found]  # CPython 3.11
+    except ImportError:
+        from hashlib import sha256
 
 if TYPE_CHECKING:
     from .source import Span
@@ -41,7 +48,7 @@ def read_regular(path: Path, limit: int) -> bytes:
 def digest(*parts: str | bytes) -> str:
     """SHA-256 (hex) of the parts. Each part is prefixed with its length, so that different lists give different
     digests."""
-    total = hashlib.sha256()
+    total = sha256()
     for part in parts:
         data = part.encode() if isinstance(part, str) else part
         total.update(len(data).to_bytes(8, "little") + data)
