@@ -138,8 +138,9 @@ def _python_files(folder: str) -> Iterator[str]:
 
 
 def _stamp(path: str) -> str:
+    """Of a file, which may be installed as a link: its path may change, its name does not."""
     found = os.stat(path)
-    return f"{path} {found.st_size} {found.st_mtime_ns}"
+    return f"{os.path.basename(path)} {found.st_size} {found.st_mtime_ns}"
 
 
 def build_shared(sources: Sequence[Path], include: Sequence[Path], exports: Sequence[str] = ()) -> Path:
