@@ -56,17 +56,11 @@ function(fcsl_add_machine target)
   add_library(${target} SHARED ${made})
   add_dependencies(${target} ${target}_c)
   target_include_directories(${target} PUBLIC "$<BUILD_INTERFACE:${folder}>")
-  set_target_properties(${target} PROPERTIES
-    C_STANDARD 11 C_STANDARD_REQUIRED ON C_EXTENSIONS OFF C_VISIBILITY_PRESET hidden POSITION_INDEPENDENT_CODE ON)
-  # The compile and link flags, here and below, of fcsl_compiler/driver/toolchain.py; -O3 overrides CMake's level.
-  target_compile_options(${target} PRIVATE -O3 -ffp-contract=off -fno-math-errno)
+  _fcsl_compile_flags(${target})
   target_link_options(${target} PRIVATE "LINKER:-z,now" "LINKER:--no-undefined" "LINKER:--exclude-libs,libfcsl_math.a")
   target_link_libraries(${target} PRIVATE fcsl_compiler::fcsl_math m)
   target_link_libraries(${target} PUBLIC fcsl_compiler::fcsl_abi)
   _fcsl_link_externs(${target} "${folder}" ${arg_TARGET} ${configs})
-  if(CMAKE_C_COMPILER_ID STREQUAL "GNU" AND CMAKE_C_COMPILER_VERSION VERSION_GREATER_EQUAL 11)
-    target_compile_options(${target} PRIVATE -fcallgraph-info=su,da -fno-ipa-modref)
-  endif()
   # Every build scans the binary (no allocation, no system call, no inexact function) and bounds the stack of a step.
   add_custom_command(TARGET ${target} POST_BUILD
     COMMAND ${CMAKE_COMMAND} -E env "NM=${CMAKE_NM}" "${FCSLC}" scan "$<TARGET_FILE:${target}>"
@@ -79,6 +73,16 @@ function(fcsl_add_machine target)
     VERBATIM)
   install(FILES "${folder}/fcsl_machines.sources.json" DESTINATION lib/${PROJECT_NAME} RENAME "${record}")
   install(TARGETS ${target} LIBRARY DESTINATION lib/${PROJECT_NAME} ARCHIVE DESTINATION lib/${PROJECT_NAME})
+endfunction()
+
+# The flags of fcsl_compiler/driver/toolchain.py, as are those of the linker above. -O3 overrides CMake's level.
+function(_fcsl_compile_flags target)
+  set_target_properties(${target} PROPERTIES
+    C_STANDARD 11 C_STANDARD_REQUIRED ON C_EXTENSIONS OFF C_VISIBILITY_PRESET hidden POSITION_INDEPENDENT_CODE ON)
+  target_compile_options(${target} PRIVATE -O3 -ffp-contract=off -fno-math-errno)
+  if(CMAKE_C_COMPILER_ID STREQUAL "GNU" AND CMAKE_C_COMPILER_VERSION VERSION_GREATER_EQUAL 11)
+    target_compile_options(${target} PRIVATE -fcallgraph-info=su,da -fno-ipa-modref)
+  endif()
 endfunction()
 
 # The externs of the machines <json>...: a static library of their sources. It is separate from the machines' code, because
@@ -109,9 +113,7 @@ function(_fcsl_link_externs target folder name)
     target_include_directories(${target}_externs PRIVATE "${folder}" ${all_include} ${nim_library})
     add_dependencies(${target}_externs ${target}_c)
     target_link_libraries(${target}_externs PRIVATE fcsl_compiler::fcsl_abi)
-    set_target_properties(${target}_externs PROPERTIES
-      C_STANDARD 11 C_STANDARD_REQUIRED ON C_EXTENSIONS OFF C_VISIBILITY_PRESET hidden POSITION_INDEPENDENT_CODE ON)
-    target_compile_options(${target}_externs PRIVATE -O3 -ffp-contract=off -fno-math-errno)
+    _fcsl_compile_flags(${target}_externs)
     target_link_libraries(${target} PRIVATE ${target}_externs)
   endif()
   target_link_libraries(${target} PRIVATE ${all_archive} ${all_library})

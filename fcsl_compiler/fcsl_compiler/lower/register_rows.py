@@ -2,8 +2,8 @@
 """Products whose rows are accumulated in registers: those with long rows, and symmetric ones with long sums.
 
 The library's matmul keeps a row in a local array, whose elements C compilers put in registers if they are few. A longer
-row is computed in parts. The rows of a symmetric_product have different lengths, and C compilers
-vectorise only loops of known length, so its rows are loops of their own. Every element is the library's sum.
+row is computed in parts. The rows of a symmetric_product have different lengths, and C compilers vectorise only loops of
+known length, so its rows are loops of their own. Every element is the library's sum.
 """
 
 from __future__ import annotations
