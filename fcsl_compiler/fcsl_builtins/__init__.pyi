@@ -134,7 +134,7 @@ def max(a: _Number, b: _Number, *more: _Number) -> _Number:
     """b if b > a else a."""
 
 def clamp(x: _Number, low: _Number, high: _Number) -> _Number:
-    """low if x < low else high if high < x else x."""
+    """min(max(x, low), high)."""
 
 def sign(x: _Number) -> _Number:
     """1, -1, or x itself when it is zero or NaN."""

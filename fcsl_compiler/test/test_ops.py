@@ -9,6 +9,7 @@ from collections.abc import Iterator
 from pathlib import Path
 from typing import Any
 
+import numpy as np
 import pytest
 from fcsl_test_abi import Machine, write_machine
 from fcsl_test_twins import Twins, bits
@@ -171,6 +172,22 @@ def test_operation(machine: Machine, name: str) -> None:
             assert bits(result[0]) == bits(expected), f"{op.id}{values}: machine {result[0]!r}, CPython {expected!r}"
     can_fault = any(op.faults for op in OPS if op.name == name)
     assert (faulted > 0) == can_fault, f"{faulted} faults seen of {name}"
+
+
+@pytest.mark.parametrize("t", ["i32", "i64", "f64"])
+def test_clamp_is_numpys_clip(machine: Machine, t: str) -> None:
+    """Also where low is above high. Only a bound that is NaN differs: in FCSL it does not bind."""
+    x, low, high = (machine.raw(f"one.inputs.{letter}_{t}") for letter in "abc")
+    number = next(n for n, op in enumerate(OPS) if op.name == "clamp" and str(op.result) == t)
+    machine.raw("one.inputs.which")[0] = number
+    result, crossed = machine.raw(f"one.outputs.r_{t}"), 0
+    for values in cases(OPS[number]):
+        x[0], low[0], high[0] = values
+        machine.step()
+        if values[1] == values[1] and values[2] == values[2]:
+            crossed += low[0] > high[0]
+            np.testing.assert_array_equal(result[0], np.clip(x[0], low[0], high[0]), f"clamp{values}")
+    assert crossed > 100
 
 
 PROVEN = [op for op in OPS if op.faults and all(t.is_integer for t in op.args)]

@@ -22,7 +22,8 @@ def interval(expr: ir.Expr) -> Interval | None:
         return None
     whole = (expr.type.low, expr.type.high)
     if isinstance(expr, ir.Choose):
-        return _union([interval(expr.then) or whole, interval(expr.otherwise) or whole])
+        then, otherwise = interval(expr.then) or whole, interval(expr.otherwise) or whole
+        return min(then[0], otherwise[0]), max(then[1], otherwise[1])
     if not isinstance(expr, ir.Apply):
         return whole
     bounds = exact(expr.op, expr.args)
@@ -59,12 +60,9 @@ def exact(op: Op, args: tuple[ir.Expr, ...]) -> Interval | None:
     if len(known) == 1:
         return _unary(name, op.result, known[0])
     if name == "clamp":
-        return _clamp(known[0], known[1], known[2])
+        x, (low, high), (least, most) = known
+        return min(max(x[0], low), least), min(max(x[1], high), most)
     return _binary(name, known[0], known[1])
-
-
-def _union(parts: list[Interval]) -> Interval:
-    return min(low for low, _ in parts), max(high for _, high in parts)
 
 
 def _unary(name: str, type_: Scalar, operand: Interval) -> Interval | None:
@@ -88,17 +86,6 @@ def _power(base: Interval, exponent: int) -> Interval:
     if base[0] < 0 < base[1]:
         ends.append(0**exponent)
     return min(ends), max(ends)
-
-
-def _clamp(x: Interval, low: Interval, high: Interval) -> Interval:
-    """Union of the intervals of those arguments that clamp can return."""
-    between = max(x[0], low[0]), min(x[1], high[1])
-    parts = [between] if between[0] <= between[1] else []
-    if x[0] < low[1]:
-        parts.append(low)
-    if high[0] < x[1]:
-        parts.append(high)
-    return _union(parts)
 
 
 def _binary(name: str, left: Interval, right: Interval) -> Interval | None:

@@ -161,7 +161,8 @@ def maximum(*args: Any) -> Any:
 def clamp(x: Any, low: Any, high: Any) -> Any:
     if not type(x) is type(low) is type(high):
         x, low, high = settle(x, low, high)
-    return low if x < low else high if high < x else x
+    raised = low if low > x else x
+    return high if high < raised else raised
 
 
 def sign(x: Any) -> Any:

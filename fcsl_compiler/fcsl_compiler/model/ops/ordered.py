@@ -22,9 +22,9 @@ _MAX = Doc(_GROUP, "max(a, b)", "b if b > a else a", _MIN.order, "as min")
 _CLAMP = Doc(
     _GROUP,
     "clamp(x, low, high)",
-    "low if x < low else high if high < x else x",
-    "exact; compared with low first",
-    "x NaN: NaN; a bound that is NaN does not bind",
+    "min(max(x, low), high)",
+    "exact",
+    "x NaN: NaN; a bound that is NaN does not bind; low above high: high",
 )
 _SIGN = Doc(_GROUP, "sign(x)", "1, -1, or x itself when it is zero or NaN", _EXACT, "none")
 _ABS = Doc(_GROUP, "abs(x)", "|x|", _EXACT, "the smallest integer of a signed type faults")

@@ -172,7 +172,7 @@ def _eigen(folder: Path, kernel: str, flags: list[str]) -> Path:
 def _library(command: list[str], sources: list[str], folder: Path, name: str) -> Path:
     library = folder / f"lib{name}.so"
     include = [f"-I{PEERS}", f"-I{folder}"]
-    _run([*command, "-fvisibility=default", "-shared", *include, *sources, "-lm", "-o", str(library)])
+    _run([*command, "-shared", *include, *sources, "-lm", "-o", str(library)])
     return library
 
 

@@ -37,7 +37,8 @@ def _choosing(t: Scalar) -> Iterator[Entry]:
         f"fcsl_clamp_{t}",
         f"x, low, high: {nim(t)}",
         nim(t),
-        "if x < low: low elif high < x: high else: x",
+        "let raised = if low > x: low else: x",
+        "if high < raised: high else: raised",
     )
     yield entry("clamp", (t, t, t), f"fcsl_clamp_{t}({{0}}, {{1}}, {{2}})", helper)
     if t.is_float or t.is_signed:
