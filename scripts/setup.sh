@@ -96,6 +96,7 @@ build_crates_ahead() {
     PATH="$(dirname "$cargo"):$PATH" "$cargo" build --release --locked --manifest-path fcsl_hal/io/Cargo.toml \
         --target-dir build/fcsl_hal/cargo > log/Rust-crates-ahead.txt 2>&1 < /dev/null &
     trap "kill $! 2> /dev/null || true" EXIT
+    renice -n 10 -p $$ > /dev/null # half of the packages wait for these crates, so everything else yields to them
 }
 
 write_underlay() { # the machine's choices, as one file that scripts/underlay.sh reads

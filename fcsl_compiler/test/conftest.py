@@ -10,7 +10,7 @@ import pytest
 
 def pytest_addoption(parser: pytest.Parser) -> None:
     group = parser.getgroup("fcsl", "generated programs (test_generated.py)")
-    group.addoption("--programs", type=int, default=150, help="how many programs and machines (default 150)")
+    group.addoption("--programs", type=int, default=50, help="how many programs and machines (default 50)")
     group.addoption("--program-seed", type=int, default=1, help="which ones: a failure names its seed (default 1)")
     fuzz = parser.getgroup("fcsl-fuzz", "broken input (test_fuzz.py)")
     fuzz.addoption("--fuzz", type=int, default=80, help="how many inputs of each kind (default 80)")

@@ -32,7 +32,7 @@ from .subjects.link.main import link_figures, link_rows
 from .subjects.process import process_rows, process_times
 from .subjects.record import record_rows, record_times
 from .subjects.replay_map import RATES_HZ, replay_map
-from .subjects.ros.main import DECIMATE, LOCKSTEP_DECIMATES, PICTURE, lockstep, realtime
+from .subjects.ros.main import AXES, DECIMATE, LOCKSTEP_DECIMATES, PICTURE, lockstep, realtime
 from .subjects.simulator.main import simulator_figures, simulator_rows
 from .subjects.start import start_rows, start_times
 from .subjects.telemetry import telemetry_figures, telemetry_rows
@@ -107,7 +107,7 @@ def realtime_rows(sides: dict[str, Any]) -> Rows:
         latency, deadlines = side["latency"], side["ticks"] + side["missed"]
         rows += [
             (
-                f"{title}, 20 topics, 1 of {DECIMATE} published",
+                f"{title}, {AXES} topics, 1 of {DECIMATE} published",
                 f"{side['processor_percent']:.0f} % of a core{goals[0]}",
             ),
             ("    ticks missed", f"{side['missed']} of {deadlines}{goals[1]}"),
@@ -157,7 +157,7 @@ SECTIONS = (
     Section("lockstep_ticks_per_s", "flying the lander over ROS 2", lambda _: lockstep(), lockstep_rows),
     Section(
         "realtime",
-        "listening to twenty topics (the first time their package is built, which takes a minute)",
+        f"listening to {AXES} topics (the first time their package is built, which can take minutes)",
         lambda _: realtime(),
         realtime_rows,
     ),

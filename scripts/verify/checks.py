@@ -102,7 +102,7 @@ CHECKS = (
     tests(
         "generated programs: compiled = CPython = oracle",
         "test_generated.py",
-        *("-k", "test_programs or test_machines", "--programs", scaled("400", "20000"), "--program-seed", "2"),
+        *("-k", "test_programs or test_machines", "--programs", scaled("200", "20000"), "--program-seed", "2"),
     ),
     Check(
         "benchmarks: every one of make bench runs, in its smallest size",
@@ -125,7 +125,7 @@ CHECKS = (
     tests(
         "broken programs and configs: always a diagnostic",
         "test_fuzz.py",
-        *("--fuzz", scaled("500", "5000"), "--fuzz-seed", "2"),
+        *("--fuzz", scaled("250", "5000"), "--fuzz-seed", "2"),
     ),
     script("EVA: no run-time error in the codec, any bytes, with seeded defects", "codec"),
     script("EVA: no run-time error in parsers of receivers, any stream, with seeded defects", "receivers"),

@@ -1,5 +1,8 @@
 # SPDX-License-Identifier: Apache-2.0
-"""What subjects/ros/rig.json does, as an ordinary rclpy node: a timer at 1 kHz, twenty publishers, every twentieth result published.
+"""What the machine of subjects/ros does, as an ordinary rclpy node: a timer at 1 kHz, a publisher for each axis, every twentieth
+result published.
+
+    python3 plain_node.py AXES
 
 The stamp is the deadline that the timer served, on a grid from its creation, so that delays compare with controller_node's.
 """
@@ -8,6 +11,7 @@ from __future__ import annotations
 
 import json
 import math
+import sys
 import time
 
 import bench_rig.msg
@@ -16,7 +20,6 @@ from rclpy._rclpy_pybind11 import RCLError
 from rclpy.executors import ExternalShutdownException
 from rclpy.node import Node
 
-AXES = 20
 DT = 0.001
 PERIOD_NS = 1_000_000
 DECIMATE = 20
@@ -39,10 +42,10 @@ class Axis:
 
 
 class PlainNode(Node):
-    def __init__(self) -> None:
+    def __init__(self, axes: int) -> None:
         super().__init__("plain_node")
-        self.axes = [Axis(1.0 + i / 2) for i in range(AXES)]
-        self.kinds = [getattr(bench_rig.msg, f"RigAxis{i:02d}") for i in range(AXES)]
+        self.axes = [Axis(1.0 + i / 2) for i in range(axes)]
+        self.kinds = [getattr(bench_rig.msg, f"RigAxis{i:02d}") for i in range(axes)]
         self.outputs = [self.create_publisher(kind, f"rig/axis_{i:02d}", 10) for i, kind in enumerate(self.kinds)]
         self.begun_ns, self.offset_ns = time.monotonic_ns(), time.time_ns() - time.monotonic_ns()
         self.tick = self.deadline = self.missed = 0
@@ -74,7 +77,7 @@ class PlainNode(Node):
 
 def main() -> None:
     rclpy.init()
-    node = PlainNode()
+    node = PlainNode(int(sys.argv[1]))
     try:
         rclpy.spin(node)
     except (

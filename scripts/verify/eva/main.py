@@ -70,7 +70,7 @@ def main() -> int:
 def _options() -> argparse.Namespace:
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument(
-        "--machines", type=int, default=scaled(50, 500), help="how many generated machines (default 50, or 500)"
+        "--machines", type=int, default=scaled(25, 500), help="how many generated machines (default 25, or 500)"
     )
     parser.add_argument("--seed", type=int, default=7, help="which ones: the same for the same number (default 7)")
     parser.add_argument("--jobs", type=int, default=os.cpu_count() or 1, help="analyses at once (default: every core)")

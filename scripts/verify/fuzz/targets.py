@@ -24,7 +24,7 @@ class Target:
     takes: str
     defect: Defect
     longest: int = 4096
-    inputs: int = 60_000  # of `make verify`, from a fixed seed
+    inputs: int = 20_000  # of `make verify`, from a fixed seed
     seconds: int = 60  # of `make verify EFFORT=full`
     machines: str = ""  # "fixture", or "examples": what fcsl_machines is
     plugins: tuple[str, ...] = ()  # libraries that it loads, from these sources
@@ -59,7 +59,7 @@ TARGETS = (
         "frames of the link layer",
         "serial lines, UDP, TCP",
         Defect(f"{_HAL}/link_outgoing.c", "more > out->sent_max - out->confirmed", "0"),
-        inputs=20_000,
+        inputs=7_000,
     ),
     Target(
         "receivers",
@@ -100,7 +100,7 @@ TARGETS = (
         "socket",
         Defect(f"{_VARS}/view.c", "number < 0 || number >= count", "number < 0"),
         longest=8192,
-        inputs=20_000,
+        inputs=7_000,
         seconds=_SEARCHED_S,
         machines="fixture",
     ),
@@ -114,7 +114,7 @@ TARGETS = (
             "REQUEST_BYTES_MAX + 1u, MSG_DONTWAIT",
         ),
         longest=1 << 14,
-        inputs=6_000,
+        inputs=2_000,
         seconds=_SEARCHED_S,
         machines="fixture",
     ),
@@ -128,7 +128,7 @@ TARGETS = (
             "if (length + 1u >= sizeof value->name) {",
         ),
         longest=1024,
-        inputs=30_000,
+        inputs=10_000,
         seconds=_SEARCHED_S,
         machines="fixture",
     ),
@@ -154,7 +154,7 @@ TARGETS = (
         "plans of simulations, and what they name",
         "file",
         Defect(f"{_SIM}/assembly.c", "if (set->element >= field->count) {", "if (0) {"),
-        inputs=30_000,
+        inputs=10_000,
         plugins=_MODELS,
     ),
     Target(
@@ -163,7 +163,7 @@ TARGETS = (
         "file",
         Defect(f"{_SIM}/group_build.c", "if (tolerance->state >= instance->model->continuous_count) {", "if (0) {"),
         longest=512,
-        inputs=20_000,
+        inputs=7_000,
         plugins=_MODELS,
     ),
     Target(
@@ -172,7 +172,7 @@ TARGETS = (
         "model library",
         Defect(f"{_SIM}/model.c", "if (end > model->size || model", "if (model"),
         longest=256,
-        inputs=30_000,
+        inputs=10_000,
         plugins=_MODELS[:1],
     ),
     Target(
@@ -181,7 +181,7 @@ TARGETS = (
         "files",
         Defect(f"{_SIM}/checkpoint.c", "data[fields[i].offset + k] > 1u", "0"),
         longest=256,
-        inputs=20_000,
+        inputs=7_000,
         plugins=_MODELS,
     ),
     Target(

@@ -15,6 +15,10 @@ PACKAGES = ("fcsl_compiler", "fcsl_hal", "fcsl_runtime", "fcsl_sim")
 GCC = "/usr/bin/gcc"
 #: Programs of ours, whose leaks are looked for; those of others (Python, a C compiler) leak what they like at their end.
 PROGRAMS = ("fcsl-fc", "fcsl-guard", "wire_sim", "mcap_write", "control", "layout")
+#: C test programs with threads of their own or around a machine: TSan is for them and for the tests of fcsl-fc.
+THREADED = (
+    "test_bus_queues|test_ring|test_history|test_wire_pair|test_guard_slot|test_run|test_allocation|test_telemetry"
+)
 _COMMON = ("-fno-omit-frame-pointer", "-fno-sanitize-recover=all")
 #: float-cast-overflow: undefined in C, and no part of -fsanitize=undefined.
 _FLAGS = {
@@ -61,14 +65,19 @@ class Build:
             # Rust is the same with or without a sanitizer for C; cargo sees that there is nothing to do.
             cargo.parent.mkdir(parents=True, exist_ok=True)
             cargo.symlink_to(ROOT / "build/fcsl_hal/cargo")
+        packages, tests, below = ["--packages-up-to", "fcsl_sim"], ".", ""
+        if self.kind == "thread":  # fcsl_math has no threads: the workspace's own is linked
+            packages, tests = ["--packages-select", "fcsl_hal", "fcsl_runtime"], f"{THREADED}|wire_sim|mcap_write"
+            below = "COLCON_CURRENT_PREFIX=$PWD/install/fcsl_compiler . install/fcsl_compiler/share/fcsl_compiler/package.sh; "
         line = [
-            *("colcon", "--log-base", str(self.folder / "log"), "build", "--packages-up-to", "fcsl_sim"),
+            *("colcon", "--log-base", str(self.folder / "log"), "build", *packages),
             *("--build-base", str(self.folder / "build"), "--install-base", str(self.folder / "install")),
             *("--cmake-args", "-DCMAKE_BUILD_TYPE=Release", f"-DCMAKE_C_COMPILER={self.compiler}"),
+            f"-DFCSL_C_TESTS={tests}",
         ]
         # As scripts/build.sh: on the underlay alone, whatever the calling shell had sourced.
         script = (
-            "unset CC AMENT_PREFIX_PATH CMAKE_PREFIX_PATH COLCON_PREFIX_PATH PYTHONPATH; . scripts/underlay.sh; "
+            f"unset CC AMENT_PREFIX_PATH CMAKE_PREFIX_PATH COLCON_PREFIX_PATH PYTHONPATH; . scripts/underlay.sh; {below}"
             f"if type -P ninja > /dev/null; then export CMAKE_GENERATOR=Ninja; fi; {shlex.join(line)}"
         )
         done = subprocess.run(["bash", "-c", script], cwd=ROOT, capture_output=True, text=True, check=False)

@@ -25,13 +25,9 @@ from fcsl_compiler.driver.toolchain import include_dirs, math_library
 
 from ..shared.cases import EXAMPLES, ROOT, SHARED, CheckFailed, run, write_facts
 from ..shared.effort import scaled
-from .build import GCC, Build
+from .build import GCC, THREADED, Build
 
 HERE = Path(__file__).resolve().parent
-#: C test programs with threads of their own or around a machine.
-_THREADED = (
-    "test_bus_queues|test_ring|test_history|test_wire_pair|test_guard_slot|test_run|test_allocation|test_telemetry"
-)
 _MACHINE_TICKS = 10000
 #: Processor time of all commands so far, seconds.
 _spent = [0.0]
@@ -213,7 +209,7 @@ def check_threads() -> list[Row]:
     # TSan wants its shadow where a kernel's larger randomisation may put libraries.
     fixed = ("setarch", os.uname().machine, "-R")
     rows = [timed_build(build), told(controls(build, {"race": "data race"}, python=False))]
-    rows += [told(ctest(build, p, _THREADED, fixed)) for p in ("fcsl_hal", "fcsl_runtime")]
+    rows += [told(ctest(build, p, THREADED, fixed)) for p in ("fcsl_hal", "fcsl_runtime")]
     return [*rows, told(pytest(build, SUITES[0], fixed))]
 
 

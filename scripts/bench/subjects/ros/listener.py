@@ -1,8 +1,8 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Takes the rig's twenty topics raw, and prints as JSON what it saw in a window of time: delays in nanoseconds from the
+"""Takes the topics of the rig's axes raw, and prints as JSON what it saw in a window of time: delays in nanoseconds from the
 deadline in the stamp to the callback here, ticks, and the processor time that process PID used meanwhile.
 
-    python3 listener.py PID WARM_UP_S WINDOW_S
+    python3 listener.py PID AXES WARM_UP_S WINDOW_S
 
 The warm-up begins with the first message: on a busy computer a node needs seconds to start.
 """
@@ -24,7 +24,6 @@ from rclpy.experimental import EventsExecutor
 from rclpy.node import Node
 from rclpy.qos import QoSProfile
 
-AXES = 20
 #: A node that published nothing by then is given up, seconds.
 FIRST_WITHIN_S = 60.0
 _NS = 1_000_000_000
@@ -39,11 +38,11 @@ def processor_s(pid: int) -> float:
 
 
 class Listener(Node):
-    def __init__(self) -> None:
+    def __init__(self, axes: int) -> None:
         super().__init__("listener")
         self.seen: list[tuple[int, int, int]] = []  # stamp, tick, delay
         self.figures: dict[str, str] = {}
-        for i in range(AXES):
+        for i in range(axes):
             kind = getattr(bench_rig.msg, f"RigAxis{i:02d}")
             self.create_subscription(kind, f"rig/axis_{i:02d}", self.take, QoSProfile(depth=1000), raw=True)
         self.create_subscription(DiagnosticArray, "/diagnostics", self.diagnosed, 10)
@@ -65,9 +64,9 @@ class Listener(Node):
 
 
 def main() -> None:
-    pid, warm_up_s, window_s = int(sys.argv[1]), float(sys.argv[2]), float(sys.argv[3])
+    pid, axes, warm_up_s, window_s = int(sys.argv[1]), int(sys.argv[2]), float(sys.argv[3]), float(sys.argv[4])
     rclpy.init()
-    node = Listener()
+    node = Listener(axes)
     executor = EventsExecutor()
     executor.add_node(node)
     given_up = time.monotonic() + FIRST_WITHIN_S

@@ -1,7 +1,8 @@
 # SPDX-License-Identifier: Apache-2.0
-"""The nodes of ROS 2: a 1 kHz machine with twenty topics in controller_node, the same as a plain rclpy node, and lock-step.
+"""The nodes of ROS 2: a 1 kHz machine with a topic for each of its axes in controller_node, the same as a plain rclpy node, and lock-step.
 
-The package in this folder is built once below out/bench_ros. Both nodes are heard by the same listener, one after the other.
+The package in this folder, with a machine of AXES axes, is built once below OUT. Both nodes are heard by the same listener, one
+after the other.
 """
 
 from __future__ import annotations
@@ -31,10 +32,12 @@ from ...harness.size import SUFFIX, sized
 ROOT = Path(__file__).resolve().parents[4]
 PACKAGE = ROOT / "scripts/bench/subjects/ros"
 PLAIN_NODE = ROOT / "scripts/bench/peers/plain_node.py"
-OUT = ROOT / "out/bench_ros"
+OUT = ROOT / f"out/bench_ros{SUFFIX}"
 PICTURE = ROOT / f"out/bench_ros{SUFFIX}.png"
 WARM_UP_S, WINDOW_S = sized((4.0, 10.0), (0.5, 1.0))
 LIMIT_S = 300
+#: Each has a message of its own, which takes seconds to build.
+AXES = sized(20, 2)
 #: 1 of 20 ticks is published: 50 Hz.
 DECIMATE = 20
 LOCKSTEP_DECIMATES = (100, 1)
@@ -56,14 +59,34 @@ def with_package(env: dict[str, str]) -> dict[str, str]:
     return {**env, **{name: f"{path}:{env.get(name, '')}" for name, path in added.items()}}
 
 
+def write_package() -> Path:
+    """The package with the machine. A file that is the same keeps its time."""
+    folder, names = OUT / "package", [f"axis_{i:02d}" for i in range(AXES)]
+    config = {
+        "description": "Axes at 1 kHz, each with a topic of its own.",
+        "tick_hz": 1000,
+        "initial_state": "RUN",
+        "algorithms": {"Axis": {"source": "algorithms/axis.py"}},
+        "instances": {n: {"algorithm": "Axis", "parameters": {"frequency": 1 + i / 2}} for i, n in enumerate(names)},
+        "connections": [{"from": "machine.dt", "to": f"{name}.dt"} for name in names],
+        "states": {"RUN": {"schedule": dict.fromkeys(names, 1000)}},
+    }
+    for file in ("CMakeLists.txt", "package.xml", "algorithms/axis.py"):
+        (folder / file).parent.mkdir(parents=True, exist_ok=True)
+        shutil.copy2(PACKAGE / file, folder / file)
+    rig, text = folder / "rig.json", json.dumps(config, indent=2)
+    if not rig.exists() or rig.read_text() != text:
+        rig.write_text(text)
+    return folder
+
+
 def build() -> None:
     """As colcon would; at once when nothing changed."""
-    folder = OUT / "build"
-    OUT.mkdir(parents=True, exist_ok=True)
+    package, folder = write_package(), OUT / "build"
     (OUT / "COLCON_IGNORE").touch()  # what is installed here is no package of the workspace
     if not (folder / "CMakeCache.txt").exists():
         generator = ["-G", "Ninja"] if shutil.which("ninja") else []
-        configure = [*generator, "-S", PACKAGE, "-B", folder, f"-DCMAKE_INSTALL_PREFIX={OUT / 'install'}"]
+        configure = [*generator, "-S", package, "-B", folder, f"-DCMAKE_INSTALL_PREFIX={OUT / 'install'}"]
         _cmake(*configure, "-DCMAKE_BUILD_TYPE=Release", "-DBUILD_TESTING=OFF")
     _cmake("--build", folder, "--target", "install", "--parallel", str(os.cpu_count()))
 
@@ -90,8 +113,10 @@ def _heard(command: Sequence[str], env: dict[str, str]) -> dict[str, Any]:
     pipes: dict[str, Any] = {"stdout": subprocess.PIPE, "stderr": subprocess.PIPE, "text": True, "env": env}
     with subprocess.Popen(command, **pipes) as node:
         try:
-            line = [sys.executable, str(PACKAGE / "listener.py"), str(node.pid), str(WARM_UP_S), str(WINDOW_S)]
-            said = subprocess.run(line, stdout=subprocess.PIPE, text=True, check=True, env=env, timeout=LIMIT_S).stdout
+            line = [sys.executable, PACKAGE / "listener.py", node.pid, AXES, WARM_UP_S, WINDOW_S]
+            said = subprocess.run(
+                [*map(str, line)], stdout=subprocess.PIPE, text=True, check=True, env=env, timeout=LIMIT_S
+            ).stdout
         finally:
             node.send_signal(signal.SIGINT)
             own, errors = node.communicate(timeout=LIMIT_S)
@@ -114,7 +139,7 @@ def realtime() -> dict[str, Any]:
     """Both nodes: percent of one core, deadlines without a tick, delay from deadline to subscriber; and a picture."""
     build()
     machine = _node("controller_node", machine="bench_rig/rig", mode="realtime", decimate=DECIMATE)
-    sides = {"machine": heard(machine), "plain": heard([sys.executable, str(PLAIN_NODE)])}
+    sides = {"machine": heard(machine), "plain": heard([sys.executable, str(PLAIN_NODE), str(AXES)])}
     figures = {name: _summary(facts) for name, facts in sides.items()}
     draw({name: np.asarray(facts["delays_ns"]) / 1000 for name, facts in sides.items()}, figures)
     return figures
