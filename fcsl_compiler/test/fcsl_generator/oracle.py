@@ -242,7 +242,7 @@ def builtin(name: str, type_: Type, args: list[Any]) -> Any:
         "isnan": lambda: bool(np.isnan(a)),
         "isinf": lambda: bool(np.isinf(a)),
         "isfinite": lambda: bool(np.isfinite(a)),
-        "clamp": lambda: args[1] if a < args[1] else args[2] if args[2] < a else a,
+        "clamp": lambda: _clamp(a, *args[1:]),
         "sign": lambda: typed(type_, 1) if a > 0 else typed(type_, -1) if a < 0 else a,
         "copysign": lambda: np.abs(a) if np.isnan(args[1]) else np.copysign(a, args[1]),
         "lerp": lambda: _lerp(type_, *args),
@@ -258,6 +258,12 @@ def builtin(name: str, type_: Type, args: list[Any]) -> Any:
     if name in (*ELEMENTARY_1, *ELEMENTARY_2):
         return elementary(name, type_, *args)
     return oracle_library.call(name, args)
+
+
+def _clamp(x: Any, low: Any, high: Any) -> Any:
+    if x < low:
+        return high if high < low else low
+    return high if high < x else x
 
 
 def _lerp(type_: Type, a: Any, b: Any, t_: Any) -> Any:
