@@ -242,7 +242,7 @@ def builtin(name: str, type_: Type, args: list[Any]) -> Any:
         "isnan": lambda: bool(np.isnan(a)),
         "isinf": lambda: bool(np.isinf(a)),
         "isfinite": lambda: bool(np.isfinite(a)),
-        "clamp": lambda: _clamp(a, *args[1:]),
+        "clamp": lambda: _clamp(*args),
         "sign": lambda: typed(type_, 1) if a > 0 else typed(type_, -1) if a < 0 else a,
         "copysign": lambda: np.abs(a) if np.isnan(args[1]) else np.copysign(a, args[1]),
         "lerp": lambda: _lerp(type_, *args),

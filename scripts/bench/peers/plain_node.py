@@ -1,6 +1,6 @@
 # SPDX-License-Identifier: Apache-2.0
-"""What the machine of subjects/ros does, as an ordinary rclpy node: a timer at 1 kHz, a publisher for each axis, every twentieth
-result published.
+"""What the machine of subjects/ros does, as an ordinary rclpy node: a timer at 1 kHz, a publisher for each axis, every
+twentieth result published.
 
     python3 plain_node.py AXES
 

@@ -1,6 +1,6 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Takes the topics of the rig's axes raw, and prints as JSON what it saw in a window of time: delays in nanoseconds from the
-deadline in the stamp to the callback here, ticks, and the processor time that process PID used meanwhile.
+"""Takes the topics of the rig's axes raw, and prints as JSON what it saw in a window of time: delays in nanoseconds from
+the deadline in the stamp to the callback here, ticks, and the processor time that process PID used meanwhile.
 
     python3 listener.py PID AXES WARM_UP_S WINDOW_S
 

@@ -1,8 +1,9 @@
 # SPDX-License-Identifier: Apache-2.0
-"""The nodes of ROS 2: a 1 kHz machine with a topic for each of its axes in controller_node, the same as a plain rclpy node, and lock-step.
+"""The nodes of ROS 2: a 1 kHz machine with a topic for each of its axes in controller_node, the same as a plain rclpy
+node, and lock-step.
 
-The package in this folder, with a machine of AXES axes, is built once below OUT. Both nodes are heard by the same listener, one
-after the other.
+The package in this folder, with a machine of AXES axes, is built once below OUT. Both nodes are heard by the same
+listener, one after the other.
 """
 
 from __future__ import annotations
