@@ -60,7 +60,7 @@ class Alg:
         self.r1[:] = self.r1
         v0 = [-5, 4, self.a2[2], self.r0[0], self.a2[3], self.a2[4], self.a2[5]]
         v2 = self.r0
-        v0 *= clamp(i64(7) % 6, 5, abs(v2[5]))
+        v0 *= clamp(i64(7) % 6, 5, 5 + (abs(v2[5]) & 1))
 """
 
 
