@@ -7,10 +7,10 @@ cd "$(dirname "$0")/.."
 . scripts/env.sh
 # Results of an earlier run must not count.
 if [ -d build ]; then colcon test-result --test-result-base build --delete-yes > /dev/null; fi
-# Each package's tests, and those that cross packages, run on all cores, three at a time on two of them, because many wait:
-# colcon itself goes from package to package, because each waits for those that it needs. Tests share no port, path or ROS
+# Each package's tests, and those that cross packages, run on all cores, two at a time on each, because many wait: colcon
+# itself goes from package to package, because each waits for those that it needs. Tests share no port, path or ROS
 # domain; conftest.py keeps this from pytest's own children.
-workers=$((($(nproc) * 3 + 1) / 2))
+workers=$(($(nproc) * 2))
 parallel=(-n$((workers < 8 ? workers : 8)) --dist=worksteal)
 export PYTEST_ADDOPTS="${parallel[*]}"
 failed=()
