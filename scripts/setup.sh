@@ -96,7 +96,8 @@ build_crates_ahead() {
     PATH="$(dirname "$cargo"):$PATH" "$cargo" build --release --locked --manifest-path fcsl_hal/io/Cargo.toml \
         --target-dir build/fcsl_hal/cargo > log/Rust-crates-ahead.txt 2>&1 < /dev/null &
     trap "kill $! 2> /dev/null || true" EXIT
-    renice -n 10 -p $$ > /dev/null # half of the packages wait for these crates, so everything else yields to them
+    # Half of the packages wait for these crates, so everything else yields to them; who already yields more may not be raised.
+    renice -n 10 -p $$ > /dev/null 2>&1 || true
 }
 
 write_underlay() { # the machine's choices, as one file that scripts/underlay.sh reads

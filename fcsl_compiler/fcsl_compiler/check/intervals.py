@@ -60,8 +60,8 @@ def exact(op: Op, args: tuple[ir.Expr, ...]) -> Interval | None:
     if len(known) == 1:
         return _unary(name, op.result, known[0])
     if name == "clamp":
-        x, (low, high), (least, most) = known
-        return min(max(x[0], low), least), min(max(x[1], high), most)
+        x, low, high = known
+        return min(max(x[0], low[0]), high[0]), min(max(x[1], low[1]), high[1])
     return _binary(name, known[0], known[1])
 
 

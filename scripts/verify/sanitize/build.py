@@ -65,15 +65,16 @@ class Build:
             # Rust is the same with or without a sanitizer for C; cargo sees that there is nothing to do.
             cargo.parent.mkdir(parents=True, exist_ok=True)
             cargo.symlink_to(ROOT / "build/fcsl_hal/cargo")
-        packages, tests, below = ["--packages-up-to", "fcsl_sim"], ".", ""
-        if self.kind == "thread":  # fcsl_math has no threads: the workspace's own is linked
-            packages, tests = ["--packages-select", "fcsl_hal", "fcsl_runtime"], f"{THREADED}|wire_sim|mcap_write"
+        packages, tests, below = ["--packages-up-to", "fcsl_sim"], [], ""
+        if self.kind == "thread":  # fcsl_math and fcsl_sim have no threads: the workspace's own are used
+            packages = ["--packages-select", "fcsl_hal", "fcsl_runtime"]
+            tests = [f"-DFCSL_C_TESTS={THREADED}|wire_sim|mcap_write"]
             below = "COLCON_CURRENT_PREFIX=$PWD/install/fcsl_compiler . install/fcsl_compiler/share/fcsl_compiler/package.sh; "
         line = [
             *("colcon", "--log-base", str(self.folder / "log"), "build", *packages),
             *("--build-base", str(self.folder / "build"), "--install-base", str(self.folder / "install")),
             *("--cmake-args", "-DCMAKE_BUILD_TYPE=Release", f"-DCMAKE_C_COMPILER={self.compiler}"),
-            f"-DFCSL_C_TESTS={tests}",
+            *tests,
         ]
         # As scripts/build.sh: on the underlay alone, whatever the calling shell had sourced.
         script = (

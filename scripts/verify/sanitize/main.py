@@ -1,9 +1,10 @@
 # SPDX-License-Identifier: Apache-2.0
 """ASan and UBSan over the native test suite, and TSan over its threads.
 
-The native packages (fcsl_math, fcsl_hal, fcsl_runtime, fcsl_sim) are built by gcc with -fsanitize=address,undefined and
-once more with -fsanitize=thread, in out/verify/sanitize-*; the tests' own C (machines, models, boards, what fcslc
-compiles) goes through compilers that add the same flags. Any report of any process is a failure, whoever swallows it.
+The native packages (fcsl_math, fcsl_hal, fcsl_runtime, fcsl_sim) are built by gcc with -fsanitize=address,undefined, and
+those that have threads (fcsl_hal, fcsl_runtime) once more with -fsanitize=thread, in out/verify/sanitize-*; the tests'
+own C (machines, models, boards, what fcslc compiles) goes through compilers that add the same flags. Any report of any
+process is a failure, whoever swallows it.
 Leaks are looked for in our programs, not in Python. Rust (fcsl_io) is not instrumented.
 """
 

@@ -37,7 +37,7 @@ def _choosing(t: Scalar) -> Iterator[Entry]:
     for name, test in (("min", "b < a"), ("max", "b > a")):
         helper = c_function(f"{t.c} fcsl_{name}_{t}({t.c} a, {t.c} b)", f"return {test} ? b : a;")
         yield entry(name, (t, t), f"fcsl_{name}_{t}({{0}}, {{1}})", helper)
-    helper = c_function(  # two selections, one after the other: instructions for minimum and maximum, no branch
+    helper = c_function(  # gcc makes maxsd and minsd of it, and no branch
         f"{t.c} fcsl_clamp_{t}({t.c} x, {t.c} low, {t.c} high)",
         f"const {t.c} raised = low > x ? low : x;",
         "return high < raised ? high : raised;",
