@@ -18,7 +18,7 @@ from typing import Any
 
 import pytest
 
-from fcsl_sim import SimError, Simulation
+from fcsl_sim import SimError, Simulation, load
 from simclient import VarClient
 from simclient.bus.free_port import free_endpoint
 from simclient.bus.session import Session
@@ -28,6 +28,8 @@ SIM = Path(__file__).resolve().parents[2] / "examples/lander/sim/lander.sim.json
 MACHINE = SIM.parent.parent / "fc/lander_control.json"
 LONG_S = 60
 SPEED = 5
+#: Of the lander's 2951 ticks.
+LAST_TOGETHER = 2500
 #: Fewer than the history of the simulator has, so that none is lost.
 TICKS = 50
 #: Observes from its first message on. It tries to connect until somebody listens.
@@ -96,28 +98,40 @@ def test_frozen_observers_change_nothing(tmp_path: Path) -> None:
 
 
 def test_two_simulations_at_one_address(tmp_path: Path) -> None:
-    """One listens, and the other one is its client; each meets its own controller. Neither disturbs the other."""
+    """One listens, and the other one is its client; each meets its own controller. Neither disturbs the other. Who listens
+    ends last: its last ticks wait until the other flight is over."""
     run("fcslc", "build", MACHINE, "-o", tmp_path)
     run("fcsl-sim", "run", SIM, "--record", tmp_path / "alone")
-    endpoint = free_endpoint()
-    names = {"two": ("zenoh-client", 20), "one": ("zenoh", 5)}  # who listens ends last
+    endpoint, config = free_endpoint(), load(SIM)
     with contextlib.ExitStack() as stack:
         begin = lambda *line: stack.enter_context(started(*line))  # noqa: E731
-        sims, controllers = [], []
-        for name, (how, speed) in names.items():
-            peer = ["--external", f"{how}:{endpoint}", "--namespace", name]
-            sims.append(begin("fcsl-sim", "run", SIM, *peer, "--speed", str(speed), "--json"))
-        for name in names:
-            where = ["--hal", f"zenoh:{endpoint}", "--namespace", name, "--timeout-ms", "60000"]
-            controllers.append(begin("fcsl-fc", tmp_path / "liblander_control.so", *where, "--record", tmp_path / name))
-            give_up_s = time.monotonic() + LONG_S
-            while not (tmp_path / name).exists():  # it flies
-                assert time.monotonic() < give_up_s
-                time.sleep(0.01)
-        for process in (*controllers, *sims):
+
+        def controller(name: str) -> subprocess.Popen[str]:
+            where = ["--hal", f"zenoh:{endpoint}", "--namespace", name, "--timeout-ms", str(1000 * LONG_S)]
+            return begin("fcsl-fc", tmp_path / "liblander_control.so", *where, "--record", tmp_path / name)
+
+        one = stack.enter_context(Simulation(config.plan, config.tables))
+        one.set_speed(SPEED)
+        one.listen(f"zenoh:{endpoint}", 1000 * LONG_S, "one")
+        peer = ["--external", f"zenoh-client:{endpoint}", "--namespace", "two"]
+        two = begin("fcsl-sim", "run", SIM, *peer, "--speed", str(4 * SPEED))
+        controllers = [controller("one")]
+        assert one.accept(1000 * LONG_S), one.problem
+        controllers.append(controller("two"))
+        ticks_together = 0
+        while controllers[1].poll() is None:
+            flies = (tmp_path / "two").exists()
+            done = one.run(1) if one.tick < LAST_TOGETHER else 0
+            ticks_together += done if flies else 0
+            time.sleep(0.001)
+        while one.status == "running":
+            one.run(LAST_TOGETHER)
+        one.close()
+        for process in (*controllers, two):
             _, complaint = process.communicate(timeout=LONG_S)
             assert process.returncode == 0, complaint
-    for name in names:
+    assert ticks_together > 0
+    for name in ("one", "two"):
         assert digest(tmp_path / name) == digest(tmp_path / "alone")
 
 
