@@ -72,7 +72,7 @@ def started(*line: str | Path) -> Iterator[subprocess.Popen[str]]:
 
 def test_frozen_observers_change_nothing(tmp_path: Path) -> None:
     """Three of them are stopped while the lander flies in lock-step over the bus: two links are closed after a second, one
-    stays open and full."""
+    stays open and full. A flight that waited for that one would not end in time."""
     run("fcslc", "build", MACHINE, "-o", tmp_path)
     run("fcsl-sim", "run", SIM, "--record", tmp_path / "alone")
     control, mirror = free_endpoint(), free_endpoint()
@@ -81,7 +81,7 @@ def test_frozen_observers_change_nothing(tmp_path: Path) -> None:
     with contextlib.ExitStack() as stack:
         begin = lambda *line: stack.enter_context(started(*line))  # noqa: E731
         simulator = begin("fcsl-sim", "run", SIM, "--external", f"zenoh:{control}", "--speed", str(SPEED), "--json")
-        observers = [begin(sys.executable, "-c", OBSERVER, mirror, lease_ms) for lease_ms in ("1000", "1000", "10000")]
+        observers = [begin(sys.executable, "-c", OBSERVER, mirror, lease_ms) for lease_ms in ("1000", "1000", "600000")]
         fc = begin("fcsl-fc", tmp_path / "liblander_control.so", *options, "--record", bag, "--summary", summary)
         for observer in observers:
             assert observer.stdout and observer.stdout.readline() == "observing\n"
@@ -91,8 +91,7 @@ def test_frozen_observers_change_nothing(tmp_path: Path) -> None:
     assert (fc.returncode, simulator.returncode) == (0, 0), complaint + why
     assert digest(bag) == digest(tmp_path / "alone")
     assert json.loads(summary.read_text())["ended"] == "closed by the HAL"
-    flight = json.loads(ended)
-    assert flight["end"] == "until" and flight["wall_s"] < flight["time_s"] / SPEED + 3.0
+    assert json.loads(ended)["end"] == "until"
     (ticks,) = re.findall(r"observers (\d+) ticks, \d+ dropped", said)
     assert int(ticks) > 100
 
