@@ -80,8 +80,8 @@ function(_fcsl_compile_flags target)
   set_target_properties(${target} PROPERTIES
     C_STANDARD 11 C_STANDARD_REQUIRED ON C_EXTENSIONS OFF C_VISIBILITY_PRESET hidden POSITION_INDEPENDENT_CODE ON)
   target_compile_options(${target} PRIVATE -O3 -ffp-contract=off -fno-math-errno)
-  if(CMAKE_C_COMPILER_ID STREQUAL "GNU" AND CMAKE_C_COMPILER_VERSION VERSION_GREATER_EQUAL 11)
-    target_compile_options(${target} PRIVATE -fcallgraph-info=su,da -fno-ipa-modref)
+  if(CMAKE_C_COMPILER_ID STREQUAL "GNU" AND CMAKE_C_COMPILER_VERSION VERSION_GREATER_EQUAL 10)
+    target_compile_options(${target} PRIVATE -fcallgraph-info=su,da)
   endif()
 endfunction()
 

@@ -11,7 +11,7 @@ import pytest
 from fcsl_test_abi import Machine
 from fcsl_test_wrong import CONFIG, GOOD
 
-from fcsl_compiler.driver.toolchain import compiler, gcc_flags
+from fcsl_compiler.driver.toolchain import compiler, call_graph_flags
 
 CMAKE = """cmake_minimum_required(VERSION 3.22)
 project(two_craft C)
@@ -80,7 +80,7 @@ def test_rebuild(package: Path) -> None:
     (package / "fc" / "alg.py").write_text(f"from shared import OFFSET\n{changed}")
     printed = run("cmake", "--build", package / "build")
     assert "fcslc" in printed
-    if gcc_flags(tuple(compiler())):
+    if call_graph_flags(tuple(compiler())):
         assert all(f"{m}: a step needs at most " in printed for m in ("first", "second")), printed
     assert (output_of(package, "first"), output_of(package, "second")) == (4.0, 4.0)
     (package / "fc" / "second.json").write_text(json.dumps(CONFIG).replace("1.5", "2.5"))

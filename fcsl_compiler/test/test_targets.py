@@ -20,7 +20,7 @@ from fcsl_compiler.driver.cache import build_machine
 from fcsl_compiler.driver.externs import build_externs
 from fcsl_compiler.driver.library import build_library
 from fcsl_compiler.driver.symbols import SymbolError, check_symbols
-from fcsl_compiler.driver.toolchain import FLAGS, ToolchainError, compile_objects, compiler, gcc_flags
+from fcsl_compiler.driver.toolchain import FLAGS, ToolchainError, compile_objects, compiler, call_graph_flags
 from fcsl_compiler.parse.machine_files import parse_machine
 
 LAW = '''
@@ -222,7 +222,7 @@ def test_the_build_tells_what_it_cannot_know(tmp_path: Path, capsys: pytest.Capt
     assert main(["build", str(config), "-o", str(tmp_path / "out"), "--target", "board"]) == 0
     out = capsys.readouterr().out
     assert out.endswith("functions called by its externs: getpid\n")
-    if gcc_flags(tuple(compiler())):
+    if call_graph_flags(tuple(compiler())):
         assert ", without its externs: probe\n" in out
     compilation = build_library([config], tmp_path / "sim/libcraft.so")[0]
     assert compilation.extern_calls == ()

@@ -24,10 +24,9 @@ FLAGS = ("-std=c11", "-O3", "-ffp-contract=off", "-fno-math-errno", "-fPIC", "-f
 #: Linker flags. Symbols are bound at link or load time, never later. The functions of fcsl_math are bound within the
 #: library, so that other libraries of the process cannot replace them.
 LINK_FLAGS = ("-Wl,-z,now", "-Wl,--no-undefined", "-Wl,--exclude-libs,libfcsl_math.a")
-#: Only gcc since 11 has these. The first makes it write one .ci file per source beside its output. The second omits an
-#: analysis that takes up to a quarter of its time and makes no step faster. Results are the same without them.
-_GCC_FLAGS = ("-fcallgraph-info=su,da", "-fno-ipa-modref")
-_GCC_PROBE = (*_GCC_FLAGS, "-E", "-x", "c", os.devnull)
+#: Makes gcc, since version 10, write one .ci file per source beside its output.
+_CALL_GRAPH_FLAGS = ("-fcallgraph-info=su,da",)
+_CALL_GRAPH_PROBE = (*_CALL_GRAPH_FLAGS, "-E", "-x", "c", os.devnull)
 _COMPILE_TIMEOUT_S = 300
 
 
@@ -73,10 +72,10 @@ def ask_version() -> None:
         _asked((*compiler(), "--version"))
 
 
-def ask_features() -> None:
-    """Likewise begins to ask it whether it has the flags of gcc."""
+def ask_call_graphs() -> None:
+    """Likewise begins to ask it whether it writes call graphs."""
     with suppress(OSError):
-        _asked((*compiler(), *_GCC_PROBE))
+        _asked((*compiler(), *_CALL_GRAPH_PROBE))
 
 
 class _Answer:
@@ -162,13 +161,13 @@ def math_library() -> Path:
 
 
 @cache
-def gcc_flags(command: tuple[str, ...]) -> tuple[str, ...]:
-    """The flags of gcc, if this compiler supports them; clang does not."""
+def call_graph_flags(command: tuple[str, ...]) -> tuple[str, ...]:
+    """The flags for call graphs, if this compiler has them; clang does not."""
     try:
-        status, _ = _asked((*command, *_GCC_PROBE)).wait()
+        status, _ = _asked((*command, *_CALL_GRAPH_PROBE)).wait()
     except (OSError, subprocess.TimeoutExpired):
         return ()
-    return _GCC_FLAGS if status == 0 else ()
+    return _CALL_GRAPH_FLAGS if status == 0 else ()
 
 
 def run_compiler(command: Sequence[str], environment: Mapping[str, str] | None = None, language: Language = C) -> bytes:
@@ -236,7 +235,7 @@ def compile_objects(sources: Sequence[Path], includes: Sequence[Path], folder: P
     Raises ToolchainError with the compiler's output.
     """
     folder.mkdir(parents=True, exist_ok=True)
-    flags = [*FLAGS, *gcc_flags(tuple(compiler())), *(f"-I{d}" for d in includes)]
+    flags = [*FLAGS, *call_graph_flags(tuple(compiler())), *(f"-I{d}" for d in includes)]
     # Numbered, because sources of two folders may have the same name.
     objects = [folder / f"{number}-{source.stem}.o" for number, source in enumerate(sources)]
     run_compilers(
