@@ -11,7 +11,7 @@ import pytest
 from fcsl_test_abi import Machine
 from fcsl_test_wrong import CONFIG, GOOD
 
-from fcsl_compiler.driver.toolchain import compiler, call_graph_flags
+from fcsl_compiler.driver.toolchain import call_graph_flags, compiler
 
 CMAKE = """cmake_minimum_required(VERSION 3.22)
 project(two_craft C)

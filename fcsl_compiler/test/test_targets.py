@@ -20,7 +20,7 @@ from fcsl_compiler.driver.cache import build_machine
 from fcsl_compiler.driver.externs import build_externs
 from fcsl_compiler.driver.library import build_library
 from fcsl_compiler.driver.symbols import SymbolError, check_symbols
-from fcsl_compiler.driver.toolchain import FLAGS, ToolchainError, compile_objects, compiler, call_graph_flags
+from fcsl_compiler.driver.toolchain import FLAGS, ToolchainError, call_graph_flags, compile_objects, compiler
 from fcsl_compiler.parse.machine_files import parse_machine
 
 LAW = '''
