@@ -13,6 +13,8 @@ from .entry import any_externs, entry
 from .run import Subject
 
 HERE = Path(__file__).resolve().parent
+#: EVA did not end within ten minutes for the glider. The others are larger.
+LARGE = ("glider", "quadrotor", "rocket_landing")
 
 
 def subject(config: Path, folder: Path, dead_helpers: bool = False) -> Subject:
@@ -27,7 +29,8 @@ def subject(config: Path, folder: Path, dead_helpers: bool = False) -> Subject:
 
 
 def examples(folder: Path) -> list[Subject]:
-    return [subject(config, folder / name) for name, config in cases.EXAMPLES.items()]
+    named = cases.EXAMPLES.items()
+    return [subject(config, folder / name) for name, config in named if name not in LARGE]
 
 
 def generated(folder: Path, count: int, seed: int) -> list[Subject]:

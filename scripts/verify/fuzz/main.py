@@ -25,7 +25,7 @@ from fcsl_compiler.base.ament import package_prefix
 from fcsl_compiler.driver.library import emit
 from fcsl_compiler.driver.toolchain import include_dirs, math_library
 
-from ..shared.cases import EXAMPLES, OUT, ROOT, CheckFailed, run, write_facts
+from ..shared.cases import OUT, ROOT, SMALL_EXAMPLES, CheckFailed, run, write_facts
 from ..shared.effort import EFFORT
 from .targets import TARGETS, Defect, Target
 
@@ -114,7 +114,7 @@ class Builder:
         folder = FOLDER / "examples"
         sources: list[Path] = []
         includes = [folder, *include_dirs()]
-        for compilation in emit(list(EXAMPLES.values()), folder):
+        for compilation in emit(list(SMALL_EXAMPLES.values()), folder):
             sources += [folder / compilation.c_name, *compilation.target.sources]
             includes += compilation.target.include
         return [compiled(s, includes, ["-Wno-unused"]) for s in [*sources, folder / "fcsl_machines.c"]]

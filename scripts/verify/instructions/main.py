@@ -1,6 +1,6 @@
 #!/usr/bin/env python3
 # SPDX-License-Identifier: Apache-2.0
-"""Instruction bounds of `fcslc build --report` against what is executed, in every state of every example and of generated
+"""Instruction bounds of `fcslc build --report` against what is executed, in every state of four examples and of generated
 machines: no step takes more instructions than the bound, neither of the generated code alone nor with the math functions that
 it calls; and the bound of the generated code is at most 2.5 times what the costliest step takes. Generated machines have
 code behind conditions that never hold, which no compiler sees: theirs that are further off are named, and must be few. What the bound
@@ -32,7 +32,7 @@ from fcsl_compiler.driver.passes import compile_machine
 from fcsl_compiler.driver.toolchain import FLAGS, compile_objects, compiler
 from fcsl_compiler.model.machine import Machine
 
-from ..shared.cases import EXAMPLES, ROOT, SHARED, Case, CheckFailed, compile_c, emit_case, run, write_facts
+from ..shared.cases import ROOT, SHARED, SMALL_EXAMPLES, Case, CheckFailed, compile_c, emit_case, run, write_facts
 from .table import check_table
 
 sys.path.insert(0, str(ROOT / "fcsl_compiler" / "test"))
@@ -225,13 +225,15 @@ def check(ticks: int, generated: int, seed: int, points: int) -> int:
         )
         table = check_table(folder, points)
         print(f"table: {table}", flush=True)
-        configs = list(EXAMPLES.values())
+        configs = list(SMALL_EXAMPLES.values())
         for n, machine in enumerate(generate(generated_cases(), generated, seed)):
             configs.append(machine.write(folder / f"in{n}", f"g{n}"))
         for config in configs:
             case = emit_case(config, folder / f"out_{config.stem}")
             try:
-                found = measure(case, ticks if config in EXAMPLES.values() else ticks // 2, seed, bound_module.Bounder)
+                found = measure(
+                    case, ticks if config in SMALL_EXAMPLES.values() else ticks // 2, seed, bound_module.Bounder
+                )
             except Unbounded as error:
                 unbounded.append(f"{case.name}: {error}")
                 continue
@@ -239,7 +241,7 @@ def check(ticks: int, generated: int, seed: int, points: int) -> int:
             rows += found or []
             if wrong := judge(found or []):
                 raise CheckFailed(wrong)
-            if config in EXAMPLES.values():
+            if config in SMALL_EXAMPLES.values():
                 for r in found or []:
                     print(_line(r), flush=True)
     return _conclude(rows, unbounded, faulted, table, tight, time.monotonic() - began)
@@ -258,8 +260,8 @@ def _conclude(
     tight: StateFigures,
     spent: float,
 ) -> int:
-    wide = [r for r in rows if r.machine in EXAMPLES and r.ratio > MOST_RATIO]
-    generated = [r for r in rows if r.machine not in EXAMPLES]
+    wide = [r for r in rows if r.machine in SMALL_EXAMPLES and r.ratio > MOST_RATIO]
+    generated = [r for r in rows if r.machine not in SMALL_EXAMPLES]
     further = [r for r in generated if r.ratio > MOST_RATIO]
     loose = [r for r in rows if r.reached_ratio > MOST_REACHED_RATIO]
     ratios = sorted(r.ratio for r in rows)

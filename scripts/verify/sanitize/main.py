@@ -24,7 +24,7 @@ from pathlib import Path
 from fcsl_compiler.driver.library import emit
 from fcsl_compiler.driver.toolchain import include_dirs, math_library
 
-from ..shared.cases import EXAMPLES, ROOT, SHARED, CheckFailed, run, write_facts
+from ..shared.cases import ROOT, SHARED, SMALL_EXAMPLES, CheckFailed, run, write_facts
 from ..shared.effort import scaled
 from .build import GCC, THREADED, Build
 
@@ -132,7 +132,7 @@ def machines(build: Build) -> Row:
     """The C of every example with externs and fcsl_math, under the stimulus; the same hashes as without. Raises CheckFailed."""
     started = time.monotonic()
     folder = build.folder / "machines"
-    compilations = emit(list(EXAMPLES.values()), folder)
+    compilations = emit(list(SMALL_EXAMPLES.values()), folder)
     sources = [HERE / "machines.c", SHARED / "stimulus.c", folder / "fcsl_machines.c"]
     includes = [SHARED, folder, *include_dirs()]
     for c in compilations:

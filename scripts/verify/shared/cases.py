@@ -18,14 +18,26 @@ from fcsl_compiler.driver.toolchain import include_dirs, math_library
 ROOT = Path(__file__).resolve().parents[3]
 OUT = ROOT / "out" / "verify"
 
-#: The machine of every example; their externs are linked from the target `simulation`.
-EXAMPLES = {
+#: Machines of examples; their externs are linked from the target `simulation`.
+SMALL_EXAMPLES = {
     path.stem: path
     for path in (
         ROOT / "examples/minimal/minimal.json",
         ROOT / "examples/lander/fc/lander_control.json",
         ROOT / "examples/thermal_guard/thermal_guard.json",
         ROOT / "examples/ahrs/ahrs.json",
+    )
+}
+#: The machine of every example.
+EXAMPLES = SMALL_EXAMPLES | {
+    path.stem: path
+    for path in (
+        ROOT / "examples/arming/arming.json",
+        ROOT / "examples/glider/fc/glider.json",
+        ROOT / "examples/inverted_pendulum/fc/inverted_pendulum.json",
+        ROOT / "examples/quadrotor/fc/quadrotor.json",
+        ROOT / "examples/rocket_landing/fc/rocket_landing.json",
+        ROOT / "examples/satellite/fc/satellite.json",
     )
 }
 #: Calls every function of the math library, hardware, and the clock; integers of every width, matrices.
@@ -62,11 +74,6 @@ def emit_case(config: Path, folder: Path) -> Case:
         target.sources,
         (folder, *include_dirs(), *target.include),
     )
-
-
-def examples(folder: Path) -> list[Case]:
-    """Every example, each in a folder of its own below `folder`."""
-    return [emit_case(config, folder / name) for name, config in EXAMPLES.items()]
 
 
 def generated(folder: Path, count: int, seed: int) -> Iterator[tuple[str, Path]]:

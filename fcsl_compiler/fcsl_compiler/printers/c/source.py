@@ -17,13 +17,17 @@ from .writer import CWriter
 #: First lines of every C file. gcc 12's dead store elimination shortens the first of two overlapping copies, and its
 #: analysis of what a function modifies (modref) misses what is left of it: the caller does not restore that after a
 #: fault. Without both, gcc takes up to a third less time, and steps are as fast. Despite -ffp-contract=off, gcc's
-#: vectoriser can fuse two roundings into one (vfmaddsub).
-GCC = """\
+#: vectoriser can fuse two roundings into one (vfmaddsub). clang 19 takes `c < 1.0 ? c : 1.0` for c where c is `1.0 < x ?
+#: 1.0 : x`, which is wrong if x is NaN; it does not where exceptions may trap.
+PRAGMAS = """\
 #if defined(__GNUC__) && __GNUC__ > 10 && !defined(__clang__)
 #pragma GCC optimize("no-ipa-modref,no-tree-dse") /* gcc 12 misses what a shortened copy modifies */
 #endif
 #if defined(__GNUC__) && !defined(__clang__) && defined(__FMA__)
 #pragma GCC target("no-fma,no-fma4,no-avx512f") /* gcc fuses products with sums in spite of -ffp-contract */
+#endif
+#if defined(__clang__)
+#pragma clang fp exceptions(maytrap) /* clang 19 takes min(min(x, c), c) for min(x, c), also where x is NaN */
 #endif
 """
 
@@ -33,7 +37,7 @@ def print_source(program: code.Program, prelude: str, extensions: Mapping[str, S
     language."""
     w = CWriter()
     w.block(f"/* {program.name}.c: made by fcslc from {program.source}. Do not edit. */")
-    w.block(GCC)
+    w.block(PRAGMAS)
     w.block(f'#include "{program.name}.h"\n\n#include <math.h>\n#include <stddef.h>\n#include <string.h>')
     w.line()
     if program.uses_hardware:

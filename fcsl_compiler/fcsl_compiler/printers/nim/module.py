@@ -11,7 +11,7 @@ from ...model import code
 from ...model.effects import HARDWARE
 from ...model.ir import HARDWARE_HEADER
 from ...model.types import Scalar
-from ..c.source import GCC, print_externs, print_record
+from ..c.source import PRAGMAS, print_externs, print_record
 from ..c.writer import CWriter
 from .expressions import Module
 from .statements import NimStatements, print_table
@@ -83,7 +83,7 @@ def print_module(program: code.Program, print_descriptor: Callable[[CWriter], No
     w.block(_PRELUDE)
     own_types = f"#define {program.name.upper()}_H /* the types of {program.name}.h are below */\n"
     freed = "".join(f"#undef {name}\n" for name in sorted(_like_macros(module, statements.variables)))
-    _emit(w, "/*INCLUDESECTION*/\n" + GCC + _INCLUDES + own_types)
+    _emit(w, "/*INCLUDESECTION*/\n" + PRAGMAS + _INCLUDES + own_types)
     _emit(w, "/*TYPESECTION*/\n" + _QUIET + freed)
     w.line()
     w.block(_HOST)

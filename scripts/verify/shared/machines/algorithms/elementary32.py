@@ -36,6 +36,7 @@ class Elementary32:
     outputs = {
         "one": "f32[22]",  # of x
         "two": "f32[9]",  # of x and z
+        "nested": "f32[2]",  # of x: clang 19 by itself makes NaN of NaN here
     }
 
     def execute(self):
@@ -61,6 +62,8 @@ class Elementary32:
         self.one[19] = trunc(self.x)
         self.one[20] = round(self.x)
         self.one[21] = wrap_angle(self.x)
+        self.nested[0] = min(1.0, min(self.x, 1.0))
+        self.nested[1] = max(0.0, max(self.x, 0.0))
         self.two[0] = atan2(self.x, self.z)
         self.two[1] = pow(self.x / 16.0, self.z / 16.0)
         self.two[2] = hypot(self.x, self.z)
