@@ -105,8 +105,8 @@ def tool(*arguments: str | Path, status: int = 0) -> tuple[str, str]:
     return done.stdout, done.stderr
 
 
-def follow_to_the_end(library: Path, *arguments: str | Path) -> str:
-    """What a tool prints about a flight that ends a second after the tool's first line."""
+def follow_to_the_end(library: Path, *arguments: str | Path) -> tuple[str, int]:
+    """What a tool prints about a flight that ends a second after the tool's first line, and the ticks of the flight."""
     where = free_endpoint()
     line = [sys.executable, str(TOOL), *(str(a) for a in arguments), "-c", where]
     with flying(library, where) as fc, subprocess.Popen(line, stdout=subprocess.PIPE, text=True) as follower:
@@ -117,7 +117,7 @@ def follow_to_the_end(library: Path, *arguments: str | Path) -> str:
         said, _ = fc.communicate(timeout=LONG_S)
         rest, _ = follower.communicate(timeout=LONG_S)
     assert (fc.returncode, follower.returncode) == (0, 0) and ", 0 dropped" in said
-    return first + rest
+    return first + rest, int(re.findall(r"(\d+) ticks,", said)[0])
 
 
 @pytest.fixture(scope="module")
@@ -215,15 +215,15 @@ def test_an_interrupted_recording_is_complete(endpoint: str, number: signal.Sign
 
 
 def test_the_end_of_the_flight_ends_a_recording(library: Path, tmp_path: Path) -> None:
-    out = follow_to_the_end(library, "record", "-o", tmp_path / "bag")
+    out, ticks = follow_to_the_end(library, "record", "-o", tmp_path / "bag")
     bag = Bag(tmp_path / "bag")
     assert int(out.split(" messages")[0].split()[-1]) == sum(topic.count for topic in bag.topics.values())
-    last = rows_of(bag, "/rig/count")["tick"][-1]
-    assert re.search(f"rig: reproduces ticks [0-9]+ to {last}$", out)
+    assert rows_of(bag, "/rig/count")["tick"][-1] == ticks - 1
+    assert re.search(f"rig: reproduces ticks [0-9]+ to {ticks - 1}$", out)
 
 
 def test_the_end_of_the_flight_ends_hz(library: Path) -> None:
-    assert follow_to_the_end(library, "hz").startswith("1 s  rig/packet ")
+    assert follow_to_the_end(library, "hz")[0].startswith("1 s  rig/packet ")
 
 
 def test_put(endpoint: str, rig: BusMachine, tmp_path: Path) -> None:

@@ -14,7 +14,7 @@ from typing import Any
 from ..shared import cases
 
 HERE = Path(__file__).resolve().parent
-#: Nothing of a machine comes near; an analysis that does has lost its way.
+#: No machine of subjects.py comes near; an analysis that does has lost its way.
 LIMIT_S = 600.0
 
 #: The model of the machine: LP64, little-endian, IEEE 754, as gcc on x86-64.
@@ -39,7 +39,6 @@ _NEVER_EXACT = (
 _AFTER = ("-then", "-metrics-eva-cover", "-nonterm", "-report-csv")
 #: What runs an instance or a tick, as the compiler names it.
 _TICK = re.compile(r"fcsl_(init|step|tick|force_state|enter)_\w+|\w+_(init|execute)|\w+__(start|execute)")
-#: EVA does not reach it where it proves that no operation of the machine can fault.
 _FAULT = "fcsl_fault"
 #: The world around a machine, whose functions are not counted.
 _WORLD = re.compile(r"main|substitute|host_writes|(eva_)?any_\w+")
@@ -56,6 +55,8 @@ class Subject:
     #: The test generator writes conditions that are constant, so helpers behind them may never run; hand-written code is
     #: to be reached whole, and so is everything that the tick itself calls.
     dead_helpers: bool = False
+    #: EVA proves what fcslc does not, that no operation can fault, so it does not reach `fcsl_fault`.
+    never_faults: bool = False
 
 
 @dataclass(frozen=True)
@@ -165,7 +166,8 @@ def _silent(subject: Subject, text: str) -> list[str]:
         warnings = re.findall(r"^\[\S+\].*Warning:.*(?:\n  .*)?", text.split("= ANALYSIS SUMMARY =")[0], re.M)
         problems.append("EVA warns: " + "; ".join(w for w in warnings if "[eva:alarm]" not in w))
     for name in _unreached(subject, text):
-        if name != _FAULT and (not subject.dead_helpers or _TICK.fullmatch(name)):
+        dead = subject.dead_helpers or (subject.never_faults and name == _FAULT)
+        if not dead or _TICK.fullmatch(name):
             problems.append(f"EVA never reached {name}")
     endless = re.findall(r"^\[nonterm:stmt\] (\S+) Warning: *\n  (.*)", text, re.M)
     problems += [f"{where} {what}" for where, what in endless if subject.sources[0].name in where]

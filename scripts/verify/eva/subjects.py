@@ -15,9 +15,10 @@ from .run import Subject
 HERE = Path(__file__).resolve().parent
 #: EVA did not end within ten minutes for the glider. The others are larger.
 LARGE = ("glider", "quadrotor", "rocket_landing")
+NEVER_FAULTS = ("inverted_pendulum",)
 
 
-def subject(config: Path, folder: Path, dead_helpers: bool = False) -> Subject:
+def subject(config: Path, folder: Path, dead_helpers: bool = False, never_faults: bool = False) -> Subject:
     """A machine as C in `folder`, with its entry. Raises DiagnosticError, ToolchainError."""
     compilation = emit([config], folder)[0]
     machine, target = compilation.checked, compilation.target
@@ -25,12 +26,13 @@ def subject(config: Path, folder: Path, dead_helpers: bool = False) -> Subject:
     program.write_text(entry(machine))
     externs = () if any_externs(machine) else target.sources
     sources = (folder / f"{machine.name}.c", program, HERE / "world.c", *externs)
-    return Subject(machine.name, folder, sources, (folder, *include_dirs(), *target.include), dead_helpers)
+    includes = (folder, *include_dirs(), *target.include)
+    return Subject(machine.name, folder, sources, includes, dead_helpers, never_faults)
 
 
 def examples(folder: Path) -> list[Subject]:
-    named = cases.EXAMPLES.items()
-    return [subject(config, folder / name) for name, config in named if name not in LARGE]
+    chosen = {name: config for name, config in cases.EXAMPLES.items() if name not in LARGE}
+    return [subject(c, folder / name, never_faults=name in NEVER_FAULTS) for name, c in chosen.items()]
 
 
 def generated(folder: Path, count: int, seed: int) -> list[Subject]:

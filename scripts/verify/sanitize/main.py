@@ -129,7 +129,7 @@ def pytest(build: Build, suite: Suite, wrapped: tuple[str, ...] = ()) -> Row:
 
 
 def machines(build: Build) -> Row:
-    """The C of every example with externs and fcsl_math, under the stimulus; the same hashes as without. Raises CheckFailed."""
+    """The C of four examples with externs and fcsl_math, under the stimulus; the same hashes as without. Raises CheckFailed."""
     started = time.monotonic()
     folder = build.folder / "machines"
     compilations = emit(list(SMALL_EXAMPLES.values()), folder)
