@@ -17,7 +17,7 @@ from xml.etree import ElementTree
 
 ROOT = Path(__file__).resolve().parents[1]
 #: Of the workspace: they decide what every package is built and tested with.
-EVERYTHING = {"constraints.txt", "requirements.txt", "colcon.meta", "conftest.py", "pyproject.toml"}
+EVERYTHING = {"constraints.txt", "colcon.meta", "conftest.py", "pyproject.toml"}
 EVERYTHING_BELOW = ("scripts/setup", "scripts/build", "scripts/ros", "scripts/test", "scripts/colcon")
 _DEPENDS = ("depend", "build_depend", "build_export_depend", "exec_depend", "test_depend")
 

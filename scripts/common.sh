@@ -32,6 +32,15 @@ progress() {
     say "$label: done in $((SECONDS - start)) s"
 }
 
+# python_packages LABEL OPTION...: installs what is missing of the groups of pyproject.toml that the options of `uv pip install`
+# name, as constraints.txt pins it. Into .venv, or where --target says.
+python_packages() {
+    local label=$1 install
+    shift
+    install=("$root/.venv/bin/uv" pip install --python "$root/.venv/bin/python" -c constraints.txt "$@")
+    if ! "${install[@]}" --quiet --offline 2> /dev/null; then progress "$label" "${install[@]}"; fi
+}
+
 # The names of all Python files that an installation links, as one hash.
 python_sources() { find fcsl_* examples -name '*.py' ! -path '*/test/*' | sort | sha256sum; }
 

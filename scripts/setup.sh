@@ -84,7 +84,7 @@ tools_key() {
     find_python
     "$(find_python)" -VV
     ls -d "$ros" 2>/dev/null || true
-    cat requirements.txt constraints.txt scripts/ros-wheels.txt scripts/ros_wheels.sh "${cargo_manifests[@]/Cargo.toml/Cargo.lock}"
+    cat pyproject.toml constraints.txt scripts/ros_wheels.sh "${cargo_manifests[@]/Cargo.toml/Cargo.lock}"
 }
 
 # Starts to build the crates that take longest while packages are downloaded. colcon's cargo waits for this one and finds all
@@ -93,8 +93,8 @@ build_crates_ahead() {
     local cargo
     cargo=$(find_cargo)
     mkdir -p log
-    PATH="$(dirname "$cargo"):$PATH" "$cargo" build --release --locked --manifest-path fcsl_hal/io/Cargo.toml \
-        --target-dir build/fcsl_hal/cargo > log/Rust-crates-ahead.txt 2>&1 < /dev/null &
+    (cd fcsl_hal/io && PATH="$(dirname "$cargo"):$PATH" exec "$cargo" build --release --locked \
+        --target-dir "$root/build/fcsl_hal/cargo") > log/Rust-crates-ahead.txt 2>&1 < /dev/null &
     trap "kill $! 2> /dev/null || true" EXIT
     # Half of the packages wait for these crates, so everything else yields to them; who already yields more may not be raised.
     renice -n 10 -p $$ > /dev/null 2>&1 || true
@@ -133,10 +133,10 @@ tools() {
     fi
     touch "$venv/COLCON_IGNORE"
     echo "$python" > "$venv/.fcsl-python"
-    local files=(-r requirements.txt)
-    if [ ! -d "$ros" ]; then files+=(-r scripts/ros-wheels.txt); fi
-    progress "Python packages (about 300 MB to download)" env -u _ROS_WHEELS_BOOTSTRAP_COMPLETE -u LD_LIBRARY_PATH -u PYTHONPATH \
-        "$venv/bin/python" -m pip install --disable-pip-version-check --progress-bar off --no-compile -c constraints.txt "${files[@]}"
+    local groups=(--group workspace)
+    if [ ! -d "$ros" ]; then groups+=(--group ros-wheels); fi
+    "$venv/bin/python" -m pip install --disable-pip-version-check --quiet --no-compile -c constraints.txt uv
+    python_packages "Python packages (about 300 MB to download)" "${groups[@]}"
     if [ ! -d "$ros" ]; then bash scripts/ros_wheels.sh "$venv"; fi
     local manifest cargo
     cargo=$(find_cargo)

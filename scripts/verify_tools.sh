@@ -5,10 +5,7 @@ cd "$(dirname "$0")/.."
 . scripts/common.sh
 . scripts/apt.sh
 . scripts/underlay.sh
-if ! python3 -m pip install --no-index --dry-run --quiet -c constraints.txt -r scripts/verify/requirements.txt &> /dev/null; then
-    progress "tools of make verify (100 MB to download)" \
-        python3 -m pip install --disable-pip-version-check --progress-bar off -c constraints.txt -r scripts/verify/requirements.txt
-fi
+python_packages "tools of make verify (100 MB to download)" --group verify
 missing() { comm -23 <(grep -o '^[^ #]*' scripts/verify-packages.txt | sort) <(dpkg-query -W -f '${db:Status-Abbrev} ${Package}\n' 2> /dev/null | sed -n 's/^ii  *//p' | sort -u); }
 if [ -z "$(missing)" ]; then exit; fi
 package_lists

@@ -27,6 +27,12 @@ function(fcsl_cargo_fetch manifest)
   set_property(DIRECTORY APPEND PROPERTY CMAKE_CONFIGURE_DEPENDS "${manifest}")
 endfunction()
 
+# fcsl_cargo_command(<variable> <argument> ...): sets <variable> to a command that runs cargo. What it compiles is told on
+# standard output, and errors alone on standard error, which colcon shows: for them cargo runs once more.
+function(fcsl_cargo_command variable)
+  set(${variable} sh -c [["$@" 2>&1 || exec "$@" --quiet]] sh "${FCSL_CARGO}" ${ARGN} PARENT_SCOPE)
+endfunction()
+
 # fcsl_cargo_source_dir(<Cargo.toml> <crate> <variable>): sets <variable> to the folder with a locked crate's sources.
 function(fcsl_cargo_source_dir manifest crate variable)
   fcsl_cargo_fetch("${manifest}")

@@ -1,5 +1,7 @@
 # ROS 2 interfaces of a package's machines.
 
+set(_fcsl_cmake_folder "${CMAKE_CURRENT_LIST_DIR}")
+
 # fcsl_generate_interfaces([MSGS <file> ...] [SRVS <file> ...] [DEPENDENCIES <package> ...])
 #   Generates one ROS 2 message per published instance of the machines that fcsl_add_machine() compiles in this package, and
 #   one per struct in these messages. Since rosidl can be called only once in a package, the call includes the package's own
@@ -15,7 +17,17 @@ macro(fcsl_generate_interfaces) # a macro like rosidl_generate_interfaces(): bot
   _fcsl_check_interfaces(_fcsl_dependencies ${ARGN})
   _fcsl_interface_files(_fcsl_interfaces ${ARGN})
   if(_fcsl_interfaces)
+    foreach(_fcsl_extension ${AMENT_EXTENSIONS_rosidl_generate_idl_interfaces})
+      string(REGEX REPLACE ":.*" "" _fcsl_generator "${_fcsl_extension}")
+      _fcsl_keep_unchanged(${_fcsl_generator})
+    endforeach()
     rosidl_generate_interfaces(${PROJECT_NAME} ${_fcsl_interfaces} DEPENDENCIES ${_fcsl_dependencies})
+    # Their files are short, and the headers that each includes are long: compiled several at a time.
+    foreach(_fcsl_support rosidl_typesupport_c rosidl_typesupport_cpp rosidl_typesupport_fastrtps_c rosidl_typesupport_fastrtps_cpp)
+      if(TARGET ${PROJECT_NAME}__${_fcsl_support})
+        set_target_properties(${PROJECT_NAME}__${_fcsl_support} PROPERTIES UNITY_BUILD ON)
+      endif()
+    endforeach()
     _fcsl_describe_python_once()
   endif()
 endmacro()
@@ -96,6 +108,16 @@ function(_fcsl_interface_files files)
   endforeach()
   set(${files} ${listed} ${arg_MSGS} ${arg_SRVS} PARENT_SCOPE)
 endfunction()
+
+# Puts fcsl_rosidl.py before a generator of rosidl: results with unchanged text are not compiled again.
+macro(_fcsl_keep_unchanged generator)
+  set(_fcsl_script "${CMAKE_CURRENT_BINARY_DIR}/fcsl_rosidl/${generator}")
+  file(CONFIGURE OUTPUT "${_fcsl_script}" CONTENT "import runpy, sys
+sys.argv.insert(1, '${${generator}_BIN}')
+runpy.run_path('${_fcsl_cmake_folder}/fcsl_rosidl.py', run_name='__main__')
+")
+  set(${generator}_BIN "${_fcsl_script}")
+endmacro()
 
 # ament runs `setup.py egg_info` of the generated Python package in every build (0.6 s), although its inputs do not change.
 # Here it runs only if there is no result yet, or name or version changed.

@@ -76,10 +76,11 @@ function(_fcsl_build_crate name manifest library)
     list(APPEND options --config "profile.release.${setting}")
   endforeach()
   file(GLOB_RECURSE sources CONFIGURE_DEPENDS "${folder}/src/*.rs" "${model_crate}/src/*.rs")
+  fcsl_cargo_command(cargo_rustc rustc --release --lib --crate-type staticlib --locked --offline ${options}
+    --manifest-path "${manifest}" --target-dir "${target_dir}")
   add_custom_command(
     OUTPUT "${made}"
-    COMMAND "${FCSL_CARGO}" rustc --release --lib --crate-type staticlib --locked --offline ${options}
-      --manifest-path "${manifest}" --target-dir "${target_dir}"
+    COMMAND ${cargo_rustc}
     # cargo leaves an unchanged library's time alone, and the build system would call it for ever
     COMMAND "${CMAKE_COMMAND}" -E touch "${made}"
     DEPENDS "${manifest}" "${folder}/Cargo.lock" "${model_crate}/Cargo.toml" ${sources}

@@ -9,8 +9,7 @@ for tool in cmake g++; do
 done
 libclang=build/interop/libclang
 if [ ! -d "$libclang/clang/native" ]; then
-    progress "libclang for make interop (25 MB to download)" python3 -m pip install --disable-pip-version-check --progress-bar off \
-        --no-deps --target "$libclang" -c constraints.txt -r scripts/interop/requirements.txt
+    python_packages "libclang for make interop (25 MB to download)" --no-deps --target "$libclang" --group interop
 fi
 # libclang of PyPI brings no headers of the compiler: bindgen takes gcc's.
 export LIBCLANG_PATH="$PWD/$libclang/clang/native"

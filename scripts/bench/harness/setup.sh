@@ -5,13 +5,9 @@ cd "$(dirname "$0")/../../.."
 . scripts/common.sh
 . scripts/apt.sh
 . scripts/underlay.sh
-pip_install() { python3 -m pip install --disable-pip-version-check --progress-bar off -c constraints.txt "$@"; }
-if ! python3 -c 'import casadi, colorama, jsbsim, numba, pymavlink, tqdm' 2> /dev/null; then
-    progress "peers of make bench (160 MB to download)" pip_install -r scripts/bench/harness/requirements.txt
-fi
-if ! python3 -c 'import Basilisk' 2> /dev/null; then
-    progress "Basilisk for make bench (73 MB to download, 270 MB on disk)" pip_install --no-deps bsk
-fi
+python_packages "peers of make bench (160 MB to download)" --group bench
+# Basilisk asks for older versions of packages that FCSL has.
+python_packages "Basilisk for make bench (73 MB to download, 270 MB on disk)" --no-deps --group basilisk
 if [ ! -d /usr/include/eigen3 ] || ! type -P cyclictest > /dev/null; then
     package_lists
     install_packages "peers of make bench" "make bench" libeigen3-dev rt-tests

@@ -2,7 +2,7 @@
 """A campaign on a real Ray cluster, one of whose workers is killed on the way, leaves the table of one process, byte for byte.
 
 `fcsl-sim campaign --engine ray` starts a cluster with three workers on this computer. When some cases are flown, SIGKILL ends one
-of the workers. Its cases.parquet is compared with that of `--jobs 1`. Ray (requirements.txt) is installed on first use into
+of the workers. Its cases.parquet is compared with that of `--jobs 1`. Ray (pyproject.toml) is installed on first use into
 a folder of its own, out/verify/ray/packages: 70 MB to download, 190 MB on disk.
 
 The control: an engine that gives lost cases up instead of flying them again (forgetful.py) leaves another table.
@@ -36,15 +36,14 @@ _LIMIT_S = 600.0
 
 
 def installed(folder: Path) -> Path:
-    """The folder of Ray and of what it needs: pip runs only where their versions have changed."""
-    wanted = (ROOT / "constraints.txt").read_text() + (FOLDER / "requirements.txt").read_text()
+    """The folder of Ray and of what it needs: uv runs only where versions have changed."""
+    wanted = (ROOT / "constraints.txt").read_text()
     done = folder / "installed.txt"
     if not done.is_file() or done.read_text() != wanted:
         print("ray: installing it, 70 MB to download", flush=True)
         shutil.rmtree(folder, ignore_errors=True)
-        options = ("--disable-pip-version-check", "--quiet", "--no-compile", "--target", folder)
-        files = ("-c", ROOT / "constraints.txt", "-r", FOLDER / "requirements.txt")
-        run([sys.executable, "-m", "pip", "install", *options, *files], timeout_s=_LIMIT_S)
+        what = ("-c", ROOT / "constraints.txt", "--group", f"{ROOT}/pyproject.toml:ray")
+        run([Path(sys.executable).with_name("uv"), "pip", "install", "--quiet", "--target", folder, *what], timeout_s=_LIMIT_S)
         done.write_text(wanted)
     return folder
 

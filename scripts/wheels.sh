@@ -1,0 +1,20 @@
+#!/usr/bin/env bash
+# `make wheels`: the wheel `fcsl` in out/wheels, from the packages up to fcsl_sim and their own CMake install. zig compiles them
+# anew, for any x86-64 with glibc 2.28; Rust is the workspace's.
+set -euo pipefail
+cd "$(dirname "$0")/.."
+. scripts/common.sh
+unset AMENT_PREFIX_PATH CMAKE_PREFIX_PATH COLCON_PREFIX_PATH PYTHONPATH CC CFLAGS LDFLAGS
+. scripts/underlay.sh
+unset COLCON_DEFAULTS_FILE # no links: what is installed here is packed
+python_packages "tools of make wheels (100 MB to download)" --group wheels
+build=build/wheels
+mkdir -p "$build/fcsl_hal"
+ln -sfn "$root/build/fcsl_hal/cargo" "$build/fcsl_hal/cargo"
+export PYTHONPATH="$root/fcsl_compiler" CMAKE_GENERATOR=Ninja
+progress "native parts of the wheel" colcon --log-base log/wheels build --packages-up-to fcsl_sim \
+    --build-base "$build" --install-base "$build/install" --merge-install --cmake-args \
+    -DCMAKE_BUILD_TYPE=Release -DCMAKE_C_COMPILER="$root/scripts/wheels/cc" -DCMAKE_EXE_LINKER_FLAGS=-pie -DBUILD_TESTING=OFF \
+    -DCMAKE_INSTALL_RPATH_USE_LINK_PATH=OFF -DAMENT_CMAKE_ENVIRONMENT_PACKAGE_GENERATION=OFF \
+    -DAMENT_CMAKE_ENVIRONMENT_PARENT_PREFIX_PATH_GENERATION=OFF
+python3 scripts/wheels/pack.py "$build" out/wheels
