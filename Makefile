@@ -18,7 +18,8 @@ setup: ## install what is missing and build; a second run returns at once
 build: ## rebuild what changed (colcon)
 	@scripts/build.sh
 
-demo: setup ## the whole promise on the lander: compile, fly, ROS 2, record, replay, look
+demo: ## the whole promise on the lander: compile, fly, ROS 2, record, replay, look
+	@scripts/setup.sh fcsl_bridge lander ahrs
 	@$(ENV) python3 scripts/demo.py
 
 test: setup lint ## lint, every package's tests, then those that cross packages; CHANGED=origin/main: what differs from there

@@ -1,5 +1,6 @@
 #!/usr/bin/env bash
 # `make build`: colcon build of all packages, or of those named as arguments with what they depend on.
+#   scripts/build.sh [--no-tests] [PACKAGE ...]    --no-tests: leaves out programs that only tests run, until the next build
 set -euo pipefail
 cd "$(dirname "$0")/.."
 . scripts/common.sh
@@ -9,12 +10,17 @@ unset AMENT_PREFIX_PATH CMAKE_PREFIX_PATH COLCON_PREFIX_PATH PYTHONPATH
 [ -n "${COLCON_DEFAULTS_FILE:-}" ] || exit 1
 # Ninja looks at an unchanged package in a tenth of make's time. A folder that was built before keeps what it was built with.
 if type -P ninja > /dev/null; then export CMAKE_GENERATOR="${CMAKE_GENERATOR:-Ninja}"; fi
+tests=ON
+if [ "${1:-}" = --no-tests ]; then
+    tests=OFF
+    shift
+fi
 started=$(mktemp)
 # colcon names packages as they start and finish; between, show every 10 s what the compiler is at.
 heartbeat log/latest_build &
 heartbeat=$!
 trap 'kill "$heartbeat" 2> /dev/null || true; rm -f "$started"' EXIT
-if ! colcon build ${1:+--packages-up-to "$@"}; then
+if ! colcon build ${1:+--packages-up-to "$@"} --cmake-args "-DBUILD_TESTING=$tests"; then
     for rc in build/*/colcon_build.rc; do
         package=$(basename "$(dirname "$rc")")
         if [[ $(cat "$rc") =~ ^[1-9] ]]; then tail -n 40 "log/latest_build/$package/stderr.log" >&2 2> /dev/null || true; fi
@@ -24,7 +30,9 @@ fi
 # What is installed is links to the sources; colcon leaves those behind whose source has moved away.
 find install -xtype l -delete
 # The stamp bears the time of the start, so that a file saved during the build counts as newer.
-if [ $# = 0 ]; then
-    python_sources > build/.fcsl-built
-    touch -r "$started" build/.fcsl-built
+stamp=
+if [ $# = 0 ]; then stamp=build/.fcsl-built; elif [ $tests = OFF ]; then stamp=build/.fcsl-built-part; fi
+if [ -n "$stamp" ]; then
+    python_sources > "$stamp"
+    touch -r "$started" "$stamp"
 fi

@@ -1,5 +1,6 @@
 #!/usr/bin/env bash
 # `make setup`: from a fresh machine to a built workspace; a second run finds everything in place and returns at once.
+#   scripts/setup.sh [PACKAGE ...]    builds no more than these packages need, and no tests of theirs
 # Optional: PYTHON=/path/to/python3 chooses the interpreter.
 set -euo pipefail
 cd "$(dirname "$0")/.."
@@ -148,16 +149,18 @@ tools() {
 }
 
 # Python sources are installed as links, so of them only additions and removals count; algorithms are compiled.
-built() {
-    [ -e build/.fcsl-built ] && [ "$(python_sources)" = "$(cat build/.fcsl-built)" ] &&
-        [ -z "$(find fcsl_* examples colcon.meta scripts/build.sh .venv/.fcsl-stamp -type f -newer build/.fcsl-built \
+built() { # built STAMP
+    [ -e "$1" ] && [ "$(python_sources)" = "$(cat "$1")" ] &&
+        [ -z "$(find fcsl_* examples colcon.meta scripts/build.sh .venv/.fcsl-stamp -type f -newer "$1" \
             \( ! -name '*.py' -o -path '*/algorithms/*' \) ! -path '*/__pycache__/*' ! -path '*/.pytest_cache/*' \
             ! -path '*/.hypothesis/*' ! -path '*/test/*' -print -quit)" ]
 }
 
 tools
-if built; then
+if built build/.fcsl-built || { [ $# != 0 ] && built build/.fcsl-built-part; }; then
     say "set up: environment and build are up to date"
+elif [ $# != 0 ] && [ ! -e build/.fcsl-built ]; then
+    scripts/build.sh --no-tests "$@"
 else
     scripts/build.sh
     say "set up. To use it in a shell:  . scripts/env.sh"
