@@ -11,15 +11,13 @@ grep -rlE 'INTERFACE_INCLUDE_DIRECTORIES "/opt/python/' "$venv/share" --include=
 # 2. Fast DDS names the build host's tinyxml2 by absolute path; it is linked into the wheel's library already.
 sed -i -E 's#/usr/lib64/libtinyxml2\.so;?##g' "$venv/share/fastrtps/cmake/fastrtps-shared-targets.cmake"
 
-# 3. Message packages get only the type support that is used here: C++ programs cannot link messages against the wheels (there is no
-# rclcpp), and rmw_fastrtps_cpp needs no introspection. The files may be links into uv's cache: replaced, never written.
-for generator in rosidl_generator_cpp rosidl_typesupport_cpp rosidl_typesupport_fastrtps_cpp \
-    rosidl_typesupport_introspection_cpp rosidl_typesupport_introspection_c; do
+# 3. C++ programs cannot link messages against the wheels (there is no rclcpp): message packages get no type support for C++.
+# The files may be links into uv's cache: replaced, never written.
+for generator in rosidl_generator_cpp rosidl_typesupport_cpp rosidl_typesupport_fastrtps_cpp rosidl_typesupport_introspection_cpp; do
     generate="$venv/share/$generator/cmake/${generator}_generate_interfaces.cmake"
     rm -f "$generate"
     echo "# emptied by scripts/ros_wheels.sh" > "$generate"
 done
-rm -f "$venv/share/ament_index/resource_index/rosidl_typesupport_c/rosidl_typesupport_introspection_c"
 
 # 4. The wheels carry no prefix-level set-up files; with them, install/setup.bash of any workspace chains this underlay.
 for sh in sh bash zsh; do
