@@ -10,7 +10,7 @@ from hypothesis import settings
 settings.register_profile("fcsl", deadline=None)
 settings.load_profile("fcsl")
 
-# What scripts/test.sh asks of pytest is asked of its own runs alone, not of those that tests start as users would.
+# What scripts/test.py asks of pytest is asked of its own runs alone, not of those that tests start as users would.
 os.environ.pop("PYTEST_ADDOPTS", None)
 
 # A shell starts background jobs with SIGINT ignored, and programs that the tests interrupt would inherit that.

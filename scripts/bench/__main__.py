@@ -19,6 +19,7 @@ ALONE = {
     "linear": "linear.main",
     "process": "process",
     "record": "record",
+    "set_up": "set_up",
     "simulator": "simulator.main",
     "start": "start",
     "telemetry": "telemetry",

@@ -33,6 +33,7 @@ from .subjects.process import process_rows, process_times
 from .subjects.record import record_rows, record_times
 from .subjects.replay_map import RATES_HZ, replay_map
 from .subjects.ros.main import AXES, DECIMATE, LOCKSTEP_DECIMATES, PICTURE, lockstep, realtime
+from .subjects.set_up import set_up_rows, set_up_times
 from .subjects.simulator.main import simulator_figures, simulator_rows
 from .subjects.start import start_rows, start_times
 from .subjects.telemetry import telemetry_figures, telemetry_rows
@@ -147,6 +148,9 @@ SECTIONS = (
     ),
     Section("telemetry", "sending telemetry, and receiving it", telemetry_figures, telemetry_rows),
     Section("start", "starting commands", start_times, start_rows),
+    Section(
+        "set_up", "setting a fresh clone up (some minutes), and building a package again", set_up_times, set_up_rows
+    ),
     Section("build", "timing the edit loop", lambda _: edit_to_test(), edit_rows),
     Section("replay_map", "replaying bags of other makers", replay_map, replay_rows),
     Section("link", "flying in lock-step over every wire, and losing frames", link_figures, link_rows),

@@ -25,6 +25,8 @@ ALONE = {
     "ray": "ray.main",
     "receivers": "receivers.main",
     "sanitize": "sanitize.main",
+    "workspace": "workspace.main",
+    "wheel": "wheel.main",
 }
 
 # The modules here are those of the package `verify`, which is found from the folder that holds it.

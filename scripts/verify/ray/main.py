@@ -43,7 +43,10 @@ def installed(folder: Path) -> Path:
         print("ray: installing it, 70 MB to download", flush=True)
         shutil.rmtree(folder, ignore_errors=True)
         what = ("-c", ROOT / "constraints.txt", "--group", f"{ROOT}/pyproject.toml:ray")
-        run([Path(sys.executable).with_name("uv"), "pip", "install", "--quiet", "--target", folder, *what], timeout_s=_LIMIT_S)
+        run(
+            [Path(sys.executable).with_name("uv"), "pip", "install", "--quiet", "--target", folder, *what],
+            timeout_s=_LIMIT_S,
+        )
         done.write_text(wanted)
     return folder
 

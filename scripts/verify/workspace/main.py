@@ -1,0 +1,89 @@
+# SPDX-License-Identifier: Apache-2.0
+"""FCSL in a user's own colcon workspace: plain `colcon build`, without this workspace's scripts and settings.
+
+A copy of the tracked files lies under src/fcsl, beside a package that `fcslc new machine my_robot --package` wrote. The build
+takes the packages that docs/ros2.md names, writes nothing to standard error, which colcon would report as if something
+were wrong, and takes no example; then the package's tests pass. Only the tools and ROS 2 come from this workspace.
+
+The control: a package that prints to standard error is noticed.
+"""
+
+from __future__ import annotations
+
+import argparse
+import os
+import shutil
+import subprocess
+import sys
+from pathlib import Path
+
+from ..shared.cases import ROOT, CheckFailed, write_facts
+
+#: What may be built for fcsl_bridge and a user's package.
+WANTED = {"fcsl_compiler", "fcsl_hal", "fcsl_runtime", "simclient", "fcsl_sim", "fcsl_msgs", "fcsl_bridge", "my_robot"}
+_LIMIT_S = 3000.0
+
+
+def copy_sources(folder: Path) -> None:
+    names = subprocess.run(["git", "ls-files", "-z"], cwd=ROOT, stdout=subprocess.PIPE, text=True, check=True).stdout
+    for name in filter(None, names.split("\0")):
+        if (ROOT / name).is_file():
+            (folder / name).parent.mkdir(parents=True, exist_ok=True)
+            shutil.copy2(ROOT / name, folder / name)
+
+
+def in_shell(workspace: Path, line: str) -> str:
+    """Runs a line of bash in the workspace, on the underlay alone. Raises CheckFailed unless it ends with 0."""
+    ours = ("AMENT_PREFIX_PATH", "CMAKE_PREFIX_PATH", "COLCON_PREFIX_PATH", "PYTHONPATH")
+    environment = {name: value for name, value in os.environ.items() if name not in ours}
+    script = f". {ROOT}/scripts/underlay.sh; unset COLCON_DEFAULTS_FILE; {line}"
+    done = subprocess.run(
+        ["bash", "-c", script], cwd=workspace, env=environment, capture_output=True, text=True, timeout=_LIMIT_S
+    )
+    if done.returncode != 0:
+        raise CheckFailed(f"`{line}`: exit status {done.returncode}\n{done.stdout[-4000:]}{done.stderr[-4000:]}")
+    return done.stdout
+
+
+def complaints(workspace: Path) -> list[str]:
+    """What the packages of the last build wrote to standard error."""
+    logs = sorted((workspace / "log/latest_build").glob("*/stderr.log"))
+    return [f"{log.parent.name}: {log.read_text(errors='replace')}" for log in logs if log.stat().st_size]
+
+
+def check(workspace: Path) -> list[str]:
+    shutil.rmtree(workspace, ignore_errors=True)
+    copy_sources(workspace / "src/fcsl")
+    in_shell(workspace, f". {ROOT}/scripts/env.sh; cd src && fcslc new machine my_robot --package")
+    print("workspace: building", flush=True)
+    in_shell(workspace, "colcon build --packages-up-to fcsl_bridge my_robot")
+    built = {path.name for path in (workspace / "install").iterdir() if path.is_dir()}
+    if built != WANTED:
+        raise CheckFailed(f"built {sorted(built - WANTED)} without need, not {sorted(WANTED - built)}")
+    if said := complaints(workspace):
+        raise CheckFailed("packages wrote to standard error:\n" + "\n".join(said))
+    in_shell(workspace, ". install/local_setup.bash; python3 -m pytest -q src/my_robot/test")
+    cmake = workspace / "src/my_robot/CMakeLists.txt"
+    cmake.write_text(cmake.read_text() + 'message(WARNING "control")\n')
+    in_shell(workspace, "colcon build --packages-select my_robot --allow-overriding my_robot")
+    if not complaints(workspace):
+        raise CheckFailed("control: a package that warns was not noticed")
+    return sorted(built)
+
+
+def main() -> int:
+    argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter).parse_args()
+    try:
+        built = check(ROOT / "build/verify_workspace")  # colcon ignores the folder build
+    except CheckFailed as error:
+        print(f"workspace: {error}", file=sys.stderr)
+        return 1
+    write_facts("workspace", {"packages": built})
+    print(
+        f"workspace: {len(built)} packages, nothing on standard error, the package's tests pass; the control is noticed"
+    )
+    return 0
+
+
+if __name__ == "__main__":
+    sys.exit(main())
