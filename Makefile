@@ -3,7 +3,7 @@
 SHELL := /bin/bash
 .SHELLFLAGS := -euo pipefail -c
 .DEFAULT_GOAL := help
-.PHONY: help setup build demo test verify bench interop hardware lint format clean
+.PHONY: help setup build demo test wheels verify bench interop hardware lint format clean
 
 ENV := . scripts/env.sh &&
 PYTHON_DIRS := conftest.py fcsl_compiler fcsl_hal fcsl_runtime fcsl_sim fcsl_bridge fcsl_msgs examples scripts test
@@ -24,6 +24,9 @@ demo: ## the whole promise on the lander: compile, fly, ROS 2, record, replay, l
 
 test: setup lint ## lint, every package's tests, then those that cross packages; CHANGED=origin/main: what differs from there
 	@scripts/test.sh $(CHANGED)
+
+wheels: setup ## one wheel, out/wheels/fcsl-….whl, for any x86-64 Linux with glibc 2.28: FCSL without ROS and without this workspace
+	@scripts/wheels.sh
 
 verify: setup ## the evidence: EVA, binaries, other processors, sanitizers, fuzzers, generated programs (installs its tools); EFFORT=full goes further
 	@FCSL_EFFORT=$(EFFORT) scripts/verify.sh

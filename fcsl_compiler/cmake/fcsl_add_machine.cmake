@@ -63,7 +63,7 @@ function(fcsl_add_machine target)
   _fcsl_link_externs(${target} "${folder}" ${arg_TARGET} ${configs})
   # Every build scans the binary (no allocation, no system call, no inexact function) and bounds the stack of a step.
   add_custom_command(TARGET ${target} POST_BUILD
-    COMMAND ${CMAKE_COMMAND} -E env "NM=${CMAKE_NM}" "${FCSLC}" scan "$<TARGET_FILE:${target}>"
+    COMMAND "${FCSLC}" scan "$<TARGET_FILE:${target}>"
       --objects "CMakeFiles/${target}.dir" --emitted "${folder}"
     VERBATIM)
   # Record of its sources beside the library: loaders use it to detect a changed source.
@@ -75,7 +75,7 @@ function(fcsl_add_machine target)
   install(TARGETS ${target} LIBRARY DESTINATION lib/${PROJECT_NAME} ARCHIVE DESTINATION lib/${PROJECT_NAME})
 endfunction()
 
-# The flags of fcsl_compiler/driver/toolchain.py, as are those of the linker above. -O3 overrides CMake's level.
+# The flags of fcsl_compiler/driver/toolchain.py; those of the linker above do the same as there. -O3 overrides CMake's level.
 function(_fcsl_compile_flags target)
   set_target_properties(${target} PROPERTIES
     C_STANDARD 11 C_STANDARD_REQUIRED ON C_EXTENSIONS OFF C_VISIBILITY_PRESET hidden POSITION_INDEPENDENT_CODE ON)

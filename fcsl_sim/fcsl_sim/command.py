@@ -13,6 +13,7 @@ from types import FrameType
 
 from fcsl_compiler.base.codes.pages import UnknownCode, pages
 from fcsl_compiler.base.diagnostics import DiagnosticError
+from simclient.cli import missing_package
 
 from . import plot
 from .codes import SIM_CODES
@@ -58,6 +59,9 @@ def run_command(options: argparse.Namespace) -> int:
     except SimError as error:
         _fail_as_json(options, str(error))
         print(f"fcsl-sim: error: {error}", file=sys.stderr)
+    except ModuleNotFoundError as error:
+        _fail_as_json(options, missing_package(error))
+        print(f"fcsl-sim: error: {missing_package(error)}", file=sys.stderr)
     except BrokenPipeError:
         os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
         return 128 + signal.SIGPIPE

@@ -18,7 +18,7 @@ from fcsl_compiler.base.files import SourceError
 from fcsl_compiler.base.source import SourceFile, Span
 from fcsl_compiler.config.views import Signals, read_views
 from fcsl_compiler.driver.cache import build_machine
-from fcsl_compiler.driver.toolchain import ToolchainError
+from fcsl_compiler.driver.toolchain import ToolchainError, toolchain
 from fcsl_compiler.model.choices import DEFAULT_BACKEND
 from fcsl_compiler.model.types import Type, scalar_of
 from fcsl_compiler.parse.json_reader import ConfigReader, Everything
@@ -152,6 +152,8 @@ def load(
     assert root is not None
     _refuse_machine(file, root)
     root = with_events(root, events, sink)
+    if machine is None:
+        _require_compiler()
     return _Loader(file, sink, sets, machine, backend).load(root, seed, duration_s)
 
 
@@ -160,6 +162,14 @@ def _refuse_machine(file: Path, root: JsonNode) -> None:
     if root.kind == "object" and {"tick_hz", "states"} <= root.members.keys() and "models" not in root.members:
         fix = f'name a simulation whose `controller` is {{"machine": "{file.name}"}}, such as {file.stem}.sim.json'
         raise SimError(f"{file}: this is a machine, not a simulation; {fix}; `fcslc check {file}` checks it alone")
+
+
+def _require_compiler() -> None:
+    """Raises SimError where no C compiler is: one error, not one at each place that needs it."""
+    try:
+        toolchain()
+    except ToolchainError as error:
+        raise SimError(str(error)) from None
 
 
 def _duration_problem(duration_s: Fraction, tick_hz: int) -> str | None:

@@ -9,6 +9,7 @@ from collections.abc import Iterator
 from dataclasses import dataclass
 from pathlib import Path
 
+from fcsl_compiler.base.ament import Package, PackageNotFound, installed_packages
 from fcsl_compiler.base.diagnostics import nearest
 from fcsl_compiler.base.files import MAX_SOURCE_BYTES, SourceError, read_regular
 from fcsl_compiler.driver.toolchain import LANGUAGES
@@ -51,8 +52,8 @@ class Found:
 
 
 def find_models(folder: Path) -> list[Found]:
-    """Models of installed packages in the order of AMENT_PREFIX_PATH, then those below `folder`. Raises SimError if
-    there is no such folder."""
+    """Models of installed packages, then those below `folder`. Raises SimError if there is no such folder, or if a
+    package is installed incompletely."""
     if not folder.is_dir():
         raise SimError(f"{folder}: no such folder")
     return [*_installed(), *_below(folder)]
@@ -92,30 +93,28 @@ def _named(name: str) -> Found:
 
 
 def _installed() -> Iterator[Found]:
-    seen: set[str] = set()
-    for prefix in map(Path, filter(None, os.environ.get("AMENT_PREFIX_PATH", "").split(os.pathsep))):
-        index = prefix / "share/ament_index/resource_index/packages"
-        packages = sorted(p.name for p in index.iterdir()) if index.is_dir() else []
-        for package in packages:
-            if package not in seen:  # an earlier prefix hides a later one
-                seen.add(package)
-                yield from _of_package(prefix, package)
+    try:
+        for package in installed_packages():
+            yield from _of_package(package)
+    except PackageNotFound as error:
+        raise SimError(str(error)) from None
 
 
-def _of_package(prefix: Path, package: str) -> Iterator[Found]:
+def _of_package(package: Package) -> Iterator[Found]:
     for inside in _SHARED:
-        for path in sorted((prefix / "share" / package / inside).glob("*")):
+        for path in sorted((package.share / inside).glob("*")):
             if _is_source(path):
-                yield Found(path.stem, "source", f"package://{package}/{inside}/{path.name}", path)
-    for path in sorted((prefix / "lib" / package).glob("lib*.so")):
+                yield Found(path.stem, "source", f"package://{package.name}/{inside}/{path.name}", path)
+    for path in sorted((package.prefix / "lib" / package.name).glob("lib*.so")):
         if _contains(path, _SYMBOL, _MAX_LIBRARY_BYTES):
             name = path.stem.removeprefix("lib")
-            yield Found(name, "library", f"package://{package}/{name}", path)
+            yield Found(name, "library", f"package://{package.name}/{name}", path)
 
 
 def _below(folder: Path) -> Iterator[Found]:
     for place, folders, files in os.walk(folder):
-        folders[:] = sorted(f for f in folders if not f.startswith(".") and f not in _BUILT)
+        wanted = [] if "pyvenv.cfg" in files else folders  # in a virtual environment lies what is installed
+        folders[:] = sorted(f for f in wanted if not f.startswith(".") and f not in _BUILT)
         for path in (Path(place) / name for name in sorted(files)):
             if _is_source(path):
                 yield Found(path.stem, "source", path.relative_to(folder).as_posix(), path)

@@ -157,7 +157,7 @@ def _load(prefix: Path) -> ctypes.CDLL:
 
 
 def simulator_library() -> ctypes.CDLL:
-    """The native simulator of the environment (AMENT_PREFIX_PATH). Raises SimError."""
+    """The native simulator of the environment. Raises SimError."""
     try:
         return _load(package_prefix("fcsl_sim"))
     except PackageNotFound as error:

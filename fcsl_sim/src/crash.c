@@ -16,6 +16,7 @@
 enum { STACK_BYTES = 1 << 16, TEXT_BYTES = 1024, EXIT_FAILED = 2 };
 
 static const int SIGNALS[] = {SIGSEGV, SIGBUS, SIGFPE, SIGILL, SIGABRT};
+static const char *const SIGNAL_NAMES[] = {"SIGSEGV", "SIGBUS", "SIGFPE", "SIGILL", "SIGABRT"};
 #define SIGNAL_COUNT (sizeof SIGNALS / sizeof *SIGNALS)
 static const char *const FUNCTIONS[] = {"", "init", "derivative", "output", "update", "event", "reset"};
 
@@ -99,8 +100,10 @@ static void put_crash(line_t *line, int number, const fcsl_sim_place_t *at)
     put_digits(line, (uint64_t)at->time_ns / FCSL_NS_PER_S, 1);
     put(line, ".");
     put_digits(line, (uint64_t)at->time_ns % FCSL_NS_PER_S, 9);
-    put(line, " s: SIG");
-    put(line, sigabbrev_np(number));
+    put(line, " s: ");
+    for (uint32_t i = 0; i < SIGNAL_COUNT; i++) {
+        put(line, SIGNALS[i] == number ? SIGNAL_NAMES[i] : "");
+    }
 }
 
 /* The handlers before ours, such as those of Python's faulthandler. */

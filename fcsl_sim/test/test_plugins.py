@@ -488,7 +488,7 @@ def reported(load_sim: Load, change: Callable[[dict[str, Any]], None]) -> str:
             "has no such library (<prefix>/lib/plugins/libeverything_go.so); ",
         ),
         ({"library": "package://plugins/cart"}, "write `fcsl_add_model(cart …)` in its CMakeLists.txt, and build it"),
-        ({"library": "package://plugins/text"}, "libtext.so: file format not recognized"),
+        ({"library": "package://plugins/text"}, "libtext.so: not an ELF file"),
         ({"library": 1}, "E208]: `library` is a string, not an integer"),
     ],
 )
@@ -529,7 +529,7 @@ def test_the_compilers_own_words(load_sim: Load, tmp_path: Path, name: str, line
 def test_no_cpp_compiler(load_sim: Load, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     (tmp_path / "cart.cpp").write_text(CART)
     monkeypatch.setenv("CXX", "no-such-compiler")
-    fix = "no C++ compiler: `no-such-compiler` does not run; install g++, or set CXX"
+    fix = "no C++ compiler: `no-such-compiler` does not run; install g++ or the Python package ziglang"
     assert fix in reported(load_sim, models(source="cart.cpp"))
 
 

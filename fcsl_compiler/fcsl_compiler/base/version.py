@@ -6,7 +6,10 @@ from __future__ import annotations
 import argparse
 import re
 from collections.abc import Sequence
+from contextlib import suppress
 from pathlib import Path
+
+from .ament import PackageNotFound, package_share
 
 
 def add_version(parser: argparse.ArgumentParser, package: str, file: str) -> None:
@@ -17,11 +20,15 @@ def add_version(parser: argparse.ArgumentParser, package: str, file: str) -> Non
 
 def package_version(package: str, file: str) -> str:
     """The version in the package.xml that belongs to a Python file, installed or not; `of no package` without one."""
-    for folder in Path(file).absolute().parents:
-        for manifest in (folder / "share" / package / "package.xml", folder / "package.xml"):
-            if manifest.is_file():
-                found = re.search(r"<version>\s*([^<\s]+)\s*</version>", manifest.read_text(errors="replace"))
-                return found[1] if found else "of no package"
+    manifests = [
+        m for f in Path(file).absolute().parents for m in (f / "share" / package / "package.xml", f / "package.xml")
+    ]
+    with suppress(PackageNotFound):
+        manifests.append(package_share(package) / "package.xml")  # in a wheel it does not lie above the file
+    for manifest in (m for m in manifests if m.is_file()):
+        text = manifest.read_text(errors="replace")
+        if re.search(rf"<name>\s*{package}\s*</name>", text) and (found := re.search(r"<version>\s*([^<\s]+)", text)):
+            return found[1]
     return "of no package"
 
 

@@ -6,7 +6,7 @@ from __future__ import annotations
 import re
 from pathlib import Path
 
-from ..base.ament import PackageNotFound, package_prefix
+from ..base.ament import PackageNotFound, package_share
 from ..base.source import MAX_NAME
 from ..base.usage import UsageError
 
@@ -66,7 +66,7 @@ def _source(like: str) -> Path:
     if not _NAME.fullmatch(like):
         raise UsageError(f"`{like}` is neither a folder with a package.xml nor the name of a package")
     try:
-        return package_prefix(like) / "share" / like
+        return package_share(like)
     except PackageNotFound as error:
         raise UsageError(str(error)) from None
 

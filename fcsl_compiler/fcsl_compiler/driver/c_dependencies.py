@@ -14,7 +14,7 @@ from pathlib import Path
 from ..base.files import digest
 from ..model.target import Target
 from ..parse.machine_files import ParsedMachine
-from .toolchain import LANGUAGES, C, Language, ToolchainError, include_dirs, run_compiler
+from .toolchain import LANGUAGES, C, Language, ToolchainError, include_dirs, run_compiler, run_compilers
 
 #: A word in a dependency list of make: everything but an unescaped blank.
 _WORD = re.compile(r"(?:\\.|\$\$|[^\s\\])+", re.DOTALL)
@@ -61,8 +61,9 @@ def c_inputs(sources: Sequence[Path], includes: Sequence[Path], root: Path, gene
     # Absolute, so that only a missing file is listed with a relative path.
     files = [str(source.absolute()) for source in sources]
     options = [*language.flags, *(f"-I{folder.absolute()}" for folder in includes)]
-    command = [*language.compiler(), *options, "-MM", "-MG", "-MT", "x", *files]
-    listed = os.fsdecode(run_compiler(command, language=language))
+    command = [*language.compiler(), *options, "-MM", "-MG", "-MT", "x"]
+    # Of one file at a time: zig lists those of several by another compiler, which does not know its options.
+    listed = os.fsdecode(b"\n".join(run_compilers([[*command, file] for file in files], language)))
     paths = [Path(word) for word in dict.fromkeys(_words(listed))]
     found = [_read(path, root) for path in paths if generated is None or not path.is_relative_to(generated)]
     asks = any(file.content is not None and b"__has_include" in file.content for file in found)

@@ -10,6 +10,8 @@ import subprocess
 from collections.abc import Collection, Sequence
 from pathlib import Path
 
+from .elf import Symbols, read_symbols
+
 #: Allowed functions: those whose result is exact or correctly rounded on every machine; rounding mode and flags; memory
 #: moves. The `cr_` functions of fcsl_math are linked in. The last line is what hardened compilers insert around arrays
 #: and memory moves.
@@ -68,8 +70,11 @@ _UNREPEATABLE = {
     **dict.fromkeys("time clock clock_gettime gettimeofday timespec_get ftime times getrusage".split(), _TIME),
     **dict.fromkeys("getenv secure_getenv".split(), "use a parameter"),
 }
-#: The same of the C++ library, by the beginning of the symbol and its name in a source.
+#: The same of the C++ libraries of gcc and clang, by the beginning of the symbol and its name in a source.
 _UNREPEATABLE_CXX = {
+    "_ZNSt3__113random_device": ("std::random_device", _NOISE),
+    "_ZNSt3__16chrono12system_clock3now": ("std::chrono::system_clock::now", _TIME),
+    "_ZNSt3__16chrono12steady_clock3now": ("std::chrono::steady_clock::now", _TIME),
     "_ZNSt13random_device": ("std::random_device", _NOISE),
     "_ZNSt6chrono3_V212system_clock3now": ("std::chrono::system_clock::now", _TIME),
     "_ZNSt6chrono3_V212steady_clock3now": ("std::chrono::steady_clock::now", _TIME),
@@ -86,11 +91,11 @@ def check_symbols(library: Path, objects: Sequence[Path] = (), externs: Collecti
     `objects`: object files of the machines alone; without externs the library is sufficient. Returns the other
     functions that the library needs: the calls of the externs' own code, for which their author is responsible.
     """
-    needed, _ = _symbols(["-D", "--undefined-only"], [library])
+    needed, _ = _symbols([library], dynamic=True)
     besides = needed - ALLOWED - set(externs)
     own: set[str] = set()
     if objects:
-        undefined, defined = _symbols([], objects)
+        undefined, defined = _symbols(objects, dynamic=False)
         own = undefined - defined - ALLOWED - _LINKED - set(externs)
         own = {name for name in own if not name.startswith(_LINKED_PREFIX)}
     wrong = own if externs else besides | own
@@ -103,7 +108,9 @@ def check_symbols(library: Path, objects: Sequence[Path] = (), externs: Collecti
 def check_model_symbols(library: Path) -> None:
     """Raises SymbolError if a model calls what has other results on another machine or in another run. The first line
     of its text names the functions; each has a line of its own, with what to write in its place."""
-    needed, _ = _symbols(["-D", "--undefined-only"], [library])
+    needed, _ = _symbols([library], dynamic=True)
+    # zig links its C++ library into the model.
+    needed |= {name for name in _symbols([library], dynamic=False).defined if name.startswith(tuple(_UNREPEATABLE_CXX))}
     refused = list(dict.fromkeys(found for found in map(_refused_in_models, sorted(needed)) if found))
     if refused:
         lines = [f"  {name}: {fix} ({why})" for name, why, fix in refused]
@@ -128,18 +135,32 @@ def _refused_in_models(symbol: str) -> tuple[str, str, str] | None:
     return None
 
 
-def _symbols(options: list[str], files: Sequence[Path]) -> tuple[set[str], set[str]]:
-    """Symbols that these files need and define, from nm."""
-    tool = shlex.split(os.environ.get("NM", "")) or ["nm"]
+def _symbols(files: Sequence[Path], dynamic: bool) -> Symbols:
+    """Symbols that these files need and define: read from ELF, or asked of $NM."""
+    if os.environ.get("NM"):
+        return _symbols_by_nm(files, dynamic)
+    found = Symbols(set(), set())
+    for file in files:
+        try:
+            one = read_symbols(file, dynamic)
+        except OSError as error:
+            raise SymbolError(f"{file}: {error.strerror}") from None
+        except ValueError as error:
+            raise SymbolError(f"{file}: {error}") from None
+        found.needed.update(one.needed)
+        found.defined.update(one.defined)
+    return found
+
+
+def _symbols_by_nm(files: Sequence[Path], dynamic: bool) -> Symbols:
+    command = [*shlex.split(os.environ["NM"]), *(["-D"] if dynamic else []), *map(str, files)]
     try:
-        done = subprocess.run(
-            [*tool, *options, *map(str, files)], capture_output=True, text=True, timeout=60, check=False
-        )
+        done = subprocess.run(command, capture_output=True, text=True, timeout=60, check=False)
     except (OSError, subprocess.TimeoutExpired):
-        raise SymbolError(f"`{tool[0]}` does not run; install binutils, or set NM") from None
+        raise SymbolError(f"`{command[0]}` does not run; unset NM, which names it") from None
     if done.returncode != 0:
         raise SymbolError(f"{files[0]}: {done.stderr.strip() or 'not a library'}")
     # Rows are "[address] kind name". Kind U is undefined; weak symbols are hooks of the loader.
     rows = [r for r in (line.split() for line in done.stdout.splitlines()) if len(r) > 1]
     needed = {r[-1].split("@")[0] for r in rows if r[-2] == "U"}
-    return needed, {r[-1] for r in rows if len(r) > 2}
+    return Symbols(needed, {r[-1] for r in rows if len(r) > 2})

@@ -5,6 +5,7 @@ from __future__ import annotations
 
 import os
 import shlex
+import shutil
 import signal
 import subprocess
 import tempfile
@@ -13,6 +14,7 @@ from collections import deque
 from collections.abc import Callable, Mapping, Sequence
 from contextlib import suppress
 from functools import cache
+from importlib.util import find_spec
 from pathlib import Path
 from typing import NamedTuple, cast
 
@@ -21,9 +23,12 @@ from ..base.ament import PackageNotFound, package_prefix
 #: Flags for every machine, the same as in fcsl_add_machine. Contraction and fast-math stay off, because they would
 #: change results.
 FLAGS = ("-std=c11", "-O3", "-ffp-contract=off", "-fno-math-errno", "-fPIC", "-fvisibility=hidden")
-#: Linker flags. Symbols are bound at link or load time, never later. The functions of fcsl_math are bound within the
-#: library, so that other libraries of the process cannot replace them.
-LINK_FLAGS = ("-Wl,-z,now", "-Wl,--no-undefined", "-Wl,--exclude-libs,libfcsl_math.a")
+#: Linker flags. Symbols are bound at link or load time, never later.
+LINK_FLAGS = ("-Wl,-z,now", "-Wl,--no-undefined")
+#: The functions of fcsl_math are bound within the library, so that other libraries of the process cannot replace them.
+_MATH_FUNCTIONS = "cr_*"
+#: What zig compiles for: what every processor of this kind has, and the oldest glibc on which FCSL runs.
+ZIG_TARGET = ("-target", f"{os.uname().machine}-linux-gnu.2.28", "-mcpu=baseline")
 #: Makes gcc, since version 10, write one .ci file per source beside its output.
 _CALL_GRAPH_FLAGS = ("-fcallgraph-info=su,da",)
 _CALL_GRAPH_PROBE = (*_CALL_GRAPH_FLAGS, "-E", "-x", "c", os.devnull)
@@ -36,33 +41,47 @@ class ToolchainError(RuntimeError):
 
 
 class Language(NamedTuple):
-    """A language of sources: the variable that names its compiler, the command without it, and the flags."""
+    """A language of sources: the variable that names its compiler, the command without it, the distribution's package
+    that brings this command, the flags, and what the Python package ziglang calls its compiler."""
 
     name: str
     variable: str
     command: str
     package: str
     flags: tuple[str, ...]
+    zig: str = ""
 
     def compiler(self) -> list[str]:
         """The compiler command."""
-        return shlex.split(os.environ.get(self.variable, "")) or [self.command]
+        given = shlex.split(os.environ.get(self.variable, ""))
+        if given or not self.zig or shutil.which(self.command):
+            return given or [self.command]
+        return zig_compiler(self.zig) or [self.command]
 
     def absent(self, command: str) -> ToolchainError:
         """The error for a command that does not run."""
-        fix = f"install {self.package}, or set {self.variable}"
+        or_zig = " or the Python package ziglang (pip install 'fcsl[cc]')" if self.zig else ""
+        fix = f"install {self.package}{or_zig}, or set {self.variable}"
         return ToolchainError(f"no {self.name} compiler: `{command}` does not run; {fix}")
 
 
-C = Language("C", "CC", "cc", "gcc", FLAGS)
+def zig_compiler(name: str) -> list[str]:
+    """The command of zig's compiler, `cc` or `c++`; empty without the Python package ziglang."""
+    found = find_spec("ziglang")
+    if found is None or not found.submodule_search_locations:
+        return []
+    return [f"{found.submodule_search_locations[0]}/zig", name, *ZIG_TARGET]
+
+
+C = Language("C", "CC", "cc", "gcc", FLAGS, "cc")
 #: Only models are written in C++. No exception may leave one.
-CXX = Language("C++", "CXX", "c++", "g++", ("-std=c++17", *FLAGS[1:], "-fno-exceptions", "-fno-rtti"))
+CXX = Language("C++", "CXX", "c++", "g++", ("-std=c++17", *FLAGS[1:], "-fno-exceptions", "-fno-rtti"), "c++")
 #: The language of a source by the suffix of its name.
 LANGUAGES = {".c": C, ".cpp": CXX, ".cc": CXX, ".cxx": CXX}
 
 
 def compiler() -> list[str]:
-    """The C compiler command: $CC, else cc."""
+    """The C compiler command: $CC, else cc, else zig of the Python package ziglang."""
     return C.compiler()
 
 
@@ -179,18 +198,21 @@ def run_compiler(command: Sequence[str], environment: Mapping[str, str] | None =
         _end_group(child)
 
 
-def run_compilers(commands: Sequence[Sequence[str]], language: Language = C) -> None:
-    """Runs so many at once as there are cores. Raises ToolchainError with the errors of the first command that fails."""
+def run_compilers(commands: Sequence[Sequence[str]], language: Language = C) -> list[bytes]:
+    """Runs so many at once as there are cores, and returns what each prints. Raises ToolchainError with the errors of
+    the first command that fails."""
     running: deque[subprocess.Popen[bytes]] = deque()
+    printed: list[bytes] = []
     try:
         for command in commands:
             if len(running) >= len(os.sched_getaffinity(0)):
-                _end(running[0])
+                printed.append(_end(running[0]))
                 running.popleft()
             running.append(_start(command, {}, language))
         while running:
-            _end(running[0])
+            printed.append(_end(running[0]))
             running.popleft()
+        return printed
     finally:
         for child in running:
             _end_group(child)
@@ -264,10 +286,12 @@ def link_shared(
         made = Path(folder) / output.name
         command = [*language.compiler(), *language.flags, "-shared", *(f"-I{d}" for d in includes), *map(str, inputs)]
         command += [str(math_library()), *flags, "-lm", *LINK_FLAGS, "-o", str(made)]
-        if exports:
-            names = Path(folder) / "exports.map"
-            names.write_text(f"{{ global: {' '.join(f'{name};' for name in exports)} local: *; }};\n")
-            command.append(f"-Wl,--version-script={names}")
+        names = Path(folder) / "exports.map"
+        shared = (
+            f"global: {' '.join(f'{name};' for name in exports)} local: *;" if exports else f"local: {_MATH_FUNCTIONS};"
+        )
+        names.write_text(f"{{ {shared} }};\n")
+        command.append(f"-Wl,--version-script={names}")
         run_compiler(command, language=language)
         check(made)
         made.replace(output)

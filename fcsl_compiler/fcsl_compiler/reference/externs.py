@@ -55,10 +55,12 @@ def _from_c(type_: Type, value: Any) -> Any:
 
 def externs_of(library: Path) -> Callable[[Extern], Callable[..., Any]]:
     """Makes callables of declared externs for ReferenceMachine: numbers by value, arrays and structs as pointers."""
-    loaded = ctypes.CDLL(str(library))
+    # Behind it the process, which has the C library: zig does not name that in a library which calls nothing of it.
+    loaded = ctypes.CDLL(str(library)), ctypes.CDLL(None)
 
     def bind(extern: Extern) -> Callable[..., Any]:
-        function, result = loaded[extern.name], extern.result
+        function = loaded[not hasattr(loaded[0], extern.name)][extern.name]
+        result = extern.result
         out = None if isinstance(result, Scalar | None) else _layout(result)
         function.argtypes = [_parameter(t) for t in extern.arguments] + ([ctypes.POINTER(out)] if out else [])
         function.restype = _layout(result) if isinstance(result, Scalar) else None

@@ -31,6 +31,9 @@ def run_tool(name: str, main: Callable[[Sequence[str]], int]) -> NoReturn:
     except (TwinError, BagError, BusError, MapError, ViewError) as error:
         print(f"{name}: error: {error}", file=sys.stderr)
         status = EXIT_BAD_INPUT
+    except ModuleNotFoundError as error:
+        print(f"{name}: error: {missing_package(error)}", file=sys.stderr)
+        status = EXIT_BAD_INPUT
     except OSError as error:
         if isinstance(error, BrokenPipeError):
             os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
@@ -42,6 +45,14 @@ def run_tool(name: str, main: Callable[[Sequence[str]], int]) -> NoReturn:
     except KeyboardInterrupt:
         status = 128 + signal.SIGINT
     sys.exit(status)
+
+
+def missing_package(error: ModuleNotFoundError) -> str:
+    """The message for a Python package that is not installed. Raises the error again if it is one of FCSL."""
+    module = (error.name or "").partition(".")[0]
+    if not module or module.startswith(("fcsl", "simclient")):
+        raise error
+    return f"it needs the Python package `{module}`, which is not installed: python3 -m pip install 'fcsl[all]'"
 
 
 def completeness(name: str, damage: str) -> int:

@@ -29,7 +29,7 @@ def _library_of(prefix: Path) -> Path:
 
 
 def runtime_library() -> Path:
-    """`libfcsl_run.so` of the environment (AMENT_PREFIX_PATH). Raises TwinError."""
+    """`libfcsl_run.so` of the environment. Raises TwinError."""
     try:
         return _library_of(package_prefix(RUNTIME_PACKAGE))
     except PackageNotFound as error:

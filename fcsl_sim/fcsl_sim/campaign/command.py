@@ -9,6 +9,7 @@ import sys
 import time
 from collections.abc import Callable, Iterator
 from dataclasses import asdict
+from importlib.util import find_spec
 from pathlib import Path
 from typing import Any
 
@@ -35,6 +36,8 @@ def run_campaign(options: Any) -> int:
         return _fly_one(study, options)
     if options.record is not None:
         raise SimError("`--record` is for one case: give `--case` too")
+    if find_spec("pyarrow") is None:  # not when hours have been flown
+        raise SimError("the table of a campaign needs the Python package `pyarrow`: python3 -m pip install pyarrow")
     results = Results(study, options.output or _folder(options.study), options.restart)
     if results.done:
         print(f"{results.folder}: {results.done} of {study.cases} cases are there already", file=sys.stderr)

@@ -11,7 +11,7 @@ from typing import Any
 from rosbags.interfaces import Nodetype
 from rosbags.typesys import Stores, get_types_from_msg, get_typestore
 
-from fcsl_compiler.base.ament import PackageNotFound, package_prefix
+from fcsl_compiler.base.ament import PackageNotFound, package_share
 
 from ..errors import BagError
 
@@ -77,7 +77,7 @@ class Definitions:
             if found is not None:
                 return found
         try:
-            installed = package_prefix(package) / "share" / package / inner
+            installed = package_share(package) / inner
         except PackageNotFound:
             return None
         return installed if installed.is_file() else None

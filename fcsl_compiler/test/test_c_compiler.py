@@ -1,0 +1,63 @@
+# SPDX-License-Identifier: Apache-2.0
+"""Which C compiler is taken, and what is said where there is none. `make verify` flies with zig."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from pathlib import Path
+
+import pytest
+
+from fcsl_compiler.driver.toolchain import CXX, C, ToolchainError, _asked, _version, toolchain
+
+
+@pytest.fixture
+def tools(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Iterator[Path]:
+    """The folder of PATH, which is empty; nothing else says what the compiler is. Versions are asked for anew."""
+    folder = tmp_path / "bin"
+    folder.mkdir()
+    monkeypatch.setenv("PATH", str(folder))
+    for name in ("CC", "CXX"):
+        monkeypatch.delenv(name, raising=False)
+    _asked.cache_clear()
+    _version.cache_clear()
+    yield folder
+    _asked.cache_clear()
+    _version.cache_clear()
+
+
+@pytest.fixture
+def zig(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
+    """The Python package ziglang, whose compiler says how it was called."""
+    folder = tmp_path / "packages/ziglang"
+    folder.mkdir(parents=True)
+    (folder / "__init__.py").write_text("")
+    program(folder / "zig", 'echo "zig $*"')
+    monkeypatch.syspath_prepend(folder.parent)
+    return folder / "zig"
+
+
+def program(path: Path, line: str) -> None:
+    path.write_text(f"#!/bin/sh\n{line}\n")
+    path.chmod(0o755)
+
+
+def test_zig_where_no_other_compiler_is(tools: Path, zig: Path) -> None:
+    assert C.compiler()[:2] == [str(zig), "cc"] and CXX.compiler()[:2] == [str(zig), "c++"]
+    # No hash of a build depends on where zig lies; all depend on the processor that it compiles for.
+    assert str(zig.parent) not in toolchain() and "-mcpu=baseline" in toolchain()
+
+
+def test_the_computers_own_compiler_comes_first(tools: Path, zig: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    program(tools / "cc", "echo gcc 12")
+    assert C.compiler() == ["cc"] and toolchain().startswith("gcc 12 ")
+    monkeypatch.setenv("CC", "clang -m32")
+    assert C.compiler() == ["clang", "-m32"]
+
+
+def test_no_compiler(tools: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr("fcsl_compiler.driver.toolchain.find_spec", lambda name: None)
+    with pytest.raises(ToolchainError) as error:
+        toolchain()
+    fix = "install gcc or the Python package ziglang (pip install 'fcsl[cc]'), or set CC"
+    assert str(error.value) == f"no C compiler: `cc` does not run; {fix}"
