@@ -40,8 +40,9 @@ def package_job(name: str) -> Job:
     """Python packages get pytest's options by colcon, which sets PYTEST_ADDOPTS itself; the others by PYTEST_ADDOPTS. The space
     keeps an option from being taken for colcon's own."""
     options = [f" {option}" for option in workers()]
-    line = ("colcon", "--log-base", f"log/test/{name}", "test", "--packages-select", name, "--pytest-args", *options)
-    return Job(f"tests of {name}", line, {"PYTEST_ADDOPTS": " ".join(workers())})
+    line = ["colcon", "--log-base", f"log/test/{name}", "test", "--packages-select", name]
+    line += ["--event-handlers", "console_direct+", "summary-", "--pytest-args", *options]
+    return Job(f"tests of {name}", tuple(line), {"PYTEST_ADDOPTS": " ".join(workers())})
 
 
 def workspace_job() -> Job:

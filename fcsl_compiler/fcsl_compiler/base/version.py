@@ -6,10 +6,7 @@ from __future__ import annotations
 import argparse
 import re
 from collections.abc import Sequence
-from contextlib import suppress
 from pathlib import Path
-
-from .ament import PackageNotFound, package_share
 
 
 def add_version(parser: argparse.ArgumentParser, package: str, file: str) -> None:
@@ -20,16 +17,23 @@ def add_version(parser: argparse.ArgumentParser, package: str, file: str) -> Non
 
 def package_version(package: str, file: str) -> str:
     """The version in the package.xml that belongs to a Python file, installed or not; `of no package` without one."""
-    manifests = [
-        m for f in Path(file).absolute().parents for m in (f / "share" / package / "package.xml", f / "package.xml")
-    ]
-    with suppress(PackageNotFound):
-        manifests.append(package_share(package) / "package.xml")  # in a wheel it does not lie above the file
-    for manifest in (m for m in manifests if m.is_file()):
-        text = manifest.read_text(errors="replace")
-        if re.search(rf"<name>\s*{package}\s*</name>", text) and (found := re.search(r"<version>\s*([^<\s]+)", text)):
-            return found[1]
-    return "of no package"
+    for folder in Path(file).absolute().parents:
+        for manifest in (folder / "share" / package / "package.xml", folder / "package.xml"):
+            if found := _version_in(manifest, package):
+                return found
+    from .ament import PackageNotFound, package_share  # in a wheel the manifest does not lie above the file
+
+    try:
+        return _version_in(package_share(package) / "package.xml", package) or "of no package"
+    except PackageNotFound:
+        return "of no package"
+
+
+def _version_in(manifest: Path, package: str) -> str:
+    """The version in the manifest of a package; empty where the file is not there or another package's."""
+    text = manifest.read_text(errors="replace") if manifest.is_file() else ""
+    found = re.search(r"<version>\s*([^<\s]+)", text)
+    return found[1] if found and re.search(rf"<name>\s*{package}\s*</name>", text) else ""
 
 
 class _PrintVersion(argparse.Action):
