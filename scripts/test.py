@@ -4,8 +4,8 @@ anything failed.
 
     python3 scripts/test.py [BASE]    of the packages' tests only those that a change since commit BASE touches
 
-Many tests wait, and at the end of each run some workers have nothing to do: three runs share the computer, the longest first,
-and each has as many workers of pytest as there are cores. Tests share no port, path or ROS domain.
+Many tests wait, and at the end of each run some workers have nothing to do: two runs share the computer, the longest first, and
+each has three workers of pytest for two cores. Tests share no port, path or ROS domain.
 """
 
 from __future__ import annotations
@@ -20,7 +20,7 @@ from pathlib import Path
 from changed_packages import changed_files, touched
 from jobs import ROOT, Job, repeat_failures, run_all, say
 
-AT_ONCE = 3
+AT_ONCE = 2
 #: Those that take longest, in this order; the others follow.
 LONGEST = ("fcsl_compiler", "simclient", "test", "fcsl_bridge", "fcsl_sim", "quadrotor")
 RESULTS = ROOT / "build"
@@ -33,7 +33,8 @@ _LINES_MAX, _CHARACTERS_MAX = 12, 300
 
 def workers() -> list[str]:
     """Options of pytest-xdist."""
-    return [f"-n{min(os.cpu_count() or 1, 4)}", "--dist=worksteal"]
+    cores = len(os.sched_getaffinity(0))
+    return [f"-n{min(cores + cores // 2, 6)}", "--dist=worksteal"]
 
 
 def package_job(name: str) -> Job:
