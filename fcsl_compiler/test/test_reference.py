@@ -133,6 +133,14 @@ def test_a_local_has_one_type() -> None:
     assert outputs.y == as_f32(0.1) * as_f32(0.1) and type(outputs.n) is I32
 
 
+@pytest.mark.parametrize("targets", ["a, a, b", "a, b, a", "b, a, a", "a, a, a"])
+def test_the_last_value_of_a_name_that_is_bound_twice_counts(targets: str) -> None:
+    """CPython 3.11.2 keeps an earlier one, where the values are written beside each other."""
+    last = {name: float(value) for value, name in enumerate(targets.split(", "))}
+    found = run(law("y: f64; z: f64", "b = 9.0", f"{targets} = 0.0, 1.0, 2.0", "self.y = a", "self.z = b"))
+    assert (found.y, found.z) == (last["a"], last.get("b", 9.0))
+
+
 def test_values_are_copied() -> None:
     text = law(
         "a: f64[2]; b: f64[2]; m: f64[2][2]",

@@ -57,7 +57,8 @@ def _package(name: str) -> Package:
     for prefix in _prefixes():
         if os.path.isfile(f"{prefix}/{_INDEX}/{name}"):
             return _built(name, prefix)
-    if module := _registered(tuple(sys.path)).get(name):
+    # A name that is a path is nobody's, and no file is read for it.
+    if name.isidentifier() and (module := _registered(tuple(sys.path)).get(name)):
         return _distributed(name, module)
     raise PackageNotFound(f"package `{name}` is not installed in this environment; source install/setup.bash")
 

@@ -372,7 +372,7 @@ class Rewriter:
         written = value.elts if isinstance(value, ast.Tuple | ast.List) else []
         whole = self._values(value) if isinstance(value, ast.Tuple | ast.List) else self.expr(value)
         kinds = [self.types.certain(part) for part in written] or [None] * len(target.elts)
-        places = [self._target(part, kind) for part, kind in zip(target.elts, kinds, strict=True)]
+        places = [self._target(part, kind) for part, kind in zip(_once_each(target.elts), kinds, strict=True)]
         return ast.Assign([ast.Tuple(places, ast.Store())], whole)
 
     def _target(self, target: ast.expr, value: Kind | None) -> ast.expr:
@@ -454,6 +454,18 @@ def _subscripts(node: ast.Subscript) -> tuple[ast.expr, list[ast.expr]]:
         parts = [*(base.slice.elts if isinstance(base.slice, ast.Tuple) else [base.slice]), *parts]
         base = base.value
     return base, parts
+
+
+def _once_each(targets: list[ast.expr]) -> list[ast.expr]:
+    """Another name for a local that the same assignment binds again: CPython 3.11.2 keeps the first value of
+    `v, v, w = 1, 2, 3`."""
+    names = [target.id if isinstance(target, ast.Name) else "" for target in targets]
+    return [
+        ast.copy_location(ast.Name(f"fcsl.overwritten{i}", ast.Store()), target)
+        if name and name in names[i + 1 :]
+        else target
+        for i, (name, target) in enumerate(zip(names, targets, strict=True))
+    ]
 
 
 def _items(node: ast.List) -> list[ast.expr]:
