@@ -22,7 +22,7 @@ from jobs import ROOT, Job, repeat_failures, run_all, say
 
 AT_ONCE = 2
 #: Those that take longest, in this order; the others follow.
-LONGEST = ("fcsl_compiler", "simclient", "test", "fcsl_bridge", "fcsl_sim", "quadrotor")
+LONGEST = ("fcsl_compiler", "simclient", "test", "fcsl_bridge", "fcsl_sim", "fcsl_hal", "quadrotor")
 RESULTS = ROOT / "build"
 WORKSPACE_RESULTS = RESULTS / "workspace_tests.xml"
 #: What no run takes, seconds.
@@ -32,9 +32,9 @@ _LINES_MAX, _CHARACTERS_MAX = 12, 300
 
 
 def workers() -> list[str]:
-    """Options of pytest-xdist."""
+    """Options of pytest-xdist. The tests of a file stay together: what the file builds once is built once."""
     cores = len(os.sched_getaffinity(0))
-    return [f"-n{min(cores + cores // 2, 6)}", "--dist=worksteal"]
+    return [f"-n{min(cores + cores // 2, 6)}", "--dist=loadfile"]
 
 
 def package_job(name: str) -> Job:

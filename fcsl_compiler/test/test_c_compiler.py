@@ -8,6 +8,7 @@ from pathlib import Path
 
 import pytest
 
+from fcsl_compiler.driver.library import build_library
 from fcsl_compiler.driver.toolchain import CXX, C, ToolchainError, _asked, _version, toolchain
 
 
@@ -61,3 +62,12 @@ def test_no_compiler(tools: Path, monkeypatch: pytest.MonkeyPatch) -> None:
         toolchain()
     fix = "install gcc or the Python package ziglang (pip install 'fcsl[cc]'), or set CC"
     assert str(error.value) == f"no C compiler: `cc` does not run; {fix}"
+
+
+def test_a_folder_with_a_comma_and_a_blank(tmp_path: Path) -> None:
+    """`-Wl,` would split an option for the linker there."""
+    folder = tmp_path / "out, of"
+    folder.mkdir()
+    config = Path(__file__).resolve().parents[2] / "examples/minimal/minimal.json"
+    [made] = build_library([config], folder / "libminimal.so")
+    assert (folder / "libminimal.so").is_file() and made.checked.name == "minimal"

@@ -291,7 +291,7 @@ def link_shared(
             f"global: {' '.join(f'{name};' for name in exports)} local: *;" if exports else f"local: {_MATH_FUNCTIONS};"
         )
         names.write_text(f"{{ {shared} }};\n")
-        command.append(f"-Wl,--version-script={names}")
+        command += ["-Xlinker", f"--version-script={names}"]  # -Wl would split a path at its commas
         run_compiler(command, language=language)
         check(made)
         made.replace(output)
