@@ -77,6 +77,7 @@ CHECKS = (
         "test_generated.py",
         *("-k", "test_programs or test_machines", "--programs", scaled("200", "20000"), "--program-seed", "2"),
     ),
+    script("wheel: the lander flies in empty environments, by gcc and by zig, with the bits of the workspace", "wheel"),
     python(
         "benchmarks: every one of make bench runs, in its smallest size",
         "scripts/bench",
@@ -105,7 +106,6 @@ CHECKS = (
     script("link layer: every state of two small ends, with seeded defects", "link"),
     script("processor in the loop: the lander's controller on a Cortex-M7", "pil"),
     script("real kernel drivers: sensors, outputs and flights in user-mode Linux", "hardware"),
-    script("wheel: the lander flies in empty environments, by gcc and by zig, with the bits of the workspace", "wheel"),
     script("recordings: Foxglove's own packages read the values that rosbags reads", "foxglove"),
 )
 
