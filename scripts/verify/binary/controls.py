@@ -172,9 +172,9 @@ static void seeded(void) { chosen(); }""",
     ),
     Control(
         "a function that another library may replace",
-        """__attribute__((visibility("default"), noinline)) double cr_shown(double x) { __asm__ volatile(""); return x; }
-static void seeded(void) { volatile double x = cr_shown(1.0); (void)x; }""",
-        {"symbols": "calls its own cr_shown through the loader", "code": "a call of cr_shown"},
+        """__attribute__((visibility("default"), noinline)) double shown(double x) { __asm__ volatile(""); return x; }
+static void seeded(void) { volatile double x = shown(1.0); (void)x; }""",
+        {"symbols": "calls its own shown through the loader", "code": "a call of shown"},
     ),
     Control(
         "a changed rounding mode",
