@@ -297,6 +297,11 @@ def msg_times(zoo: Path) -> dict[str, int]:
     return {file.name: file.stat().st_mtime_ns for file in (zoo / "build/fcsl_messages/msg").glob("*.msg")}
 
 
+def generated_times(zoo: Path) -> dict[str, int]:
+    """Of what the generator of C wrote."""
+    return {f.name: f.stat().st_mtime_ns for f in (zoo / "build/rosidl_generator_c/zoo/msg").rglob("*.[ch]")}
+
+
 def edit(file: Path, old: str, new: str) -> None:
     assert old in file.read_text()
     file.write_text(file.read_text().replace(old, new))
@@ -326,7 +331,8 @@ def test_the_steps_of_a_build(editable: Path) -> None:
     assert msg_times(zoo) == before
     assert work_of_a_build(zoo) == []
 
-    # A changed message is written alone. rosidl also regenerates its package; the test waits for the fast part only.
+    # A changed message is written alone. rosidl also regenerates its package; the test waits for two of its generators.
+    c_before = generated_times(zoo)
     edit(zoo / "algorithms/quiet.py", "    def execute", '    outputs = {"level": "f64 m"}\n\n    def execute')
     work_of_a_build(zoo, "--target", "zoo__rosidl_generator_type_description")
     after = msg_times(zoo)
@@ -334,6 +340,15 @@ def test_the_steps_of_a_build(editable: Path) -> None:
     text = (zoo / "build/fcsl_messages/msg/ProbeQuiet.msg").read_text()
     described = json.loads((zoo / "build/rosidl_generator_type_description/zoo/msg/ProbeQuiet.json").read_text())
     assert described["type_hashes"][0]["hash_string"] == hash_by_rosbags("zoo/msg/ProbeQuiet", text)
+
+    work = work_of_a_build(zoo, "--target", "zoo__rosidl_generator_c")
+    c_after = generated_times(zoo)
+    changed = {name for name in c_after if c_after[name] != c_before.get(name)}
+    assert "probe_quiet__struct.h" in changed and {name[:13] for name in changed} == {"probe_quiet__"}
+    compiled = [line for line in work if "Building C object" in line]
+    assert compiled and not [line for line in compiled if "/probe_quiet__" not in line], "only what has changed"
+    work = work_of_a_build(zoo, "--target", "zoo__rosidl_generator_c")
+    assert not [line for line in work if "Building" in line]
 
 
 # ---- what is refused -----------------------------------------------------------------------------------------------

@@ -5,6 +5,8 @@ A generator writes the files of all messages anew when one message has changed, 
 file whose text is as before gets its time back. Ninja then compiles what has changed alone, and so does make; make would also
 run the generator in each build to come, since its results stay older than the changed message: it returns at once unless
 something that it reads has changed since.
+
+Generators list what they include in the order of a set, which is another in each process unless the seed of hashes is given.
 """
 
 from __future__ import annotations
@@ -52,6 +54,8 @@ def is_done(record: Path, key: str) -> bool:
 
 
 def main() -> None:
+    if os.environ.get("PYTHONHASHSEED") != "0":
+        os.execve(sys.executable, sys.orig_argv, {**os.environ, "PYTHONHASHSEED": "0"})
     generator, *options = sys.argv[1:]
     arguments_file = Path(options[options.index(ARGUMENTS) + 1])
     arguments = json.loads(arguments_file.read_text(encoding="utf-8"))
