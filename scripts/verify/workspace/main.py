@@ -34,7 +34,7 @@ def copy_sources(folder: Path) -> None:
 
 def in_shell(workspace: Path, line: str) -> str:
     """Runs a line of bash in the workspace, on the underlay alone. Raises CheckFailed unless it ends with 0."""
-    ours = ("AMENT_PREFIX_PATH", "CMAKE_PREFIX_PATH", "COLCON_PREFIX_PATH", "PYTHONPATH")
+    ours = ("AMENT_PREFIX_PATH", "CMAKE_PREFIX_PATH", "COLCON_PREFIX_PATH", "PYTHONDONTWRITEBYTECODE", "PYTHONPATH")
     environment = {name: value for name, value in os.environ.items() if name not in ours}
     script = f". {ROOT}/scripts/underlay.sh; unset COLCON_DEFAULTS_FILE; {line}"
     done = subprocess.run(
