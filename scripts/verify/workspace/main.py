@@ -65,7 +65,7 @@ def check(workspace: Path) -> list[str]:
     in_shell(workspace, ". install/local_setup.bash; python3 -m pytest -q src/my_robot/test")
     cmake = workspace / "src/my_robot/CMakeLists.txt"
     cmake.write_text(cmake.read_text() + 'message(WARNING "control")\n')
-    in_shell(workspace, "colcon build --packages-select my_robot --allow-overriding my_robot")
+    in_shell(workspace, "colcon build --packages-select my_robot")
     if not complaints(workspace):
         raise CheckFailed("control: a package that warns was not noticed")
     return sorted(built)
