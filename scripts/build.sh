@@ -14,6 +14,7 @@ tests=ON
 if [ "${1:-}" = --no-tests ]; then
     tests=OFF
     shift
+    rm -f build/.fcsl-built # the programs of tests are no longer up to date
 fi
 started=$(mktemp)
 # colcon names packages as they start and finish; between, show every 10 s what the compiler is at.
@@ -29,10 +30,10 @@ if ! colcon build ${1:+--packages-up-to "$@"} --cmake-args "-DBUILD_TESTING=$tes
 fi
 # What is installed is links to the sources; colcon leaves those behind whose source has moved away.
 find install -xtype l -delete
-# The stamp bears the time of the start, so that a file saved during the build counts as newer.
+# The stamp bears the time of the start, so that a file saved during the build counts as newer; in it, what was built of what.
 stamp=
 if [ $# = 0 ]; then stamp=build/.fcsl-built; elif [ $tests = OFF ]; then stamp=build/.fcsl-built-part; fi
 if [ -n "$stamp" ]; then
-    python_sources > "$stamp"
+    built_of "$@" > "$stamp"
     touch -r "$started" "$stamp"
 fi

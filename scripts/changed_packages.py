@@ -18,9 +18,17 @@ from xml.etree import ElementTree
 ROOT = Path(__file__).resolve().parents[1]
 #: Of the workspace: they decide what every package is built and tested with.
 EVERYTHING = {"constraints.txt", "colcon.meta", "conftest.py", "pyproject.toml"}
-EVERYTHING_BELOW = ("scripts/setup", "scripts/build", "scripts/ros", "scripts/test", "scripts/colcon")
-#: What tests fly although their package does not depend on it: who builds the bridge gets no examples.
-_FLOWN = {"fcsl_bridge": {"ahrs", "lander"}}
+EVERYTHING_BELOW = (
+    "scripts/setup",
+    "scripts/build",
+    "scripts/common",
+    "scripts/ros",
+    "scripts/test",
+    "scripts/jobs",
+    "scripts/colcon",
+)
+#: Examples that tests fly although their package does not depend on them: whoever builds the bridge gets no examples.
+_TESTED_WITH = {"fcsl_bridge": {"ahrs", "lander"}}
 _DEPENDS = ("depend", "build_depend", "build_export_depend", "exec_depend", "test_depend")
 
 
@@ -40,7 +48,7 @@ def dependents(root: Path, packages: Mapping[str, PurePosixPath]) -> dict[str, s
         name: {
             str(e.text) for e in ElementTree.parse(root / folder / "package.xml").getroot().iter() if e.tag in _DEPENDS
         }
-        | _FLOWN.get(name, set())
+        | _TESTED_WITH.get(name, set())
         for name, folder in packages.items()
     }
     found: dict[str, set[str]] = {name: {name} for name in packages}

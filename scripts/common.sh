@@ -38,11 +38,19 @@ python_packages() {
     local label=$1 install
     shift
     install=("$root/.venv/bin/uv" pip install --python "$root/.venv/bin/python" -c constraints.txt "$@")
-    if ! "${install[@]}" --quiet --offline 2> /dev/null; then progress "$label" "${install[@]}"; fi
+    if "${install[@]}" --quiet --offline 2> /dev/null; then return; fi
+    # uv reads none of pip's settings; who has a mirror or certificates of their own told pip.
+    local index=${PIP_INDEX_URL:-$("$root/.venv/bin/python" -m pip config get global.index-url 2> /dev/null || true)}
+    if [ -n "$index" ]; then export UV_DEFAULT_INDEX="${UV_DEFAULT_INDEX:-$index}"; fi
+    if [ -n "${PIP_CERT:-}" ]; then export SSL_CERT_FILE="${SSL_CERT_FILE:-$PIP_CERT}"; fi
+    progress "$label" "${install[@]}"
 }
 
-# The names of all Python files that an installation links, as one hash.
-python_sources() { find fcsl_* examples -name '*.py' ! -path '*/test/*' | sort | sha256sum; }
+# built_of [PACKAGE ...]: the packages that a build was asked for, and the names of all Python files that an installation links.
+built_of() {
+    echo "$*"
+    find fcsl_* examples -name '*.py' ! -path '*/test/*' | sort | sha256sum
+}
 
 # heartbeat FOLDER: in the background, every 10 s the last line of the newest log in FOLDER; ends with the script.
 heartbeat() {

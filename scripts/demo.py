@@ -19,7 +19,7 @@ from pathlib import Path
 from typing import Any
 
 from fcsl_bridge.domain import own_domain
-from fcsl_compiler.base.ament import package_prefix
+from fcsl_compiler.base.packages import package_prefix
 from simclient import bag as bags
 
 ROOT = Path(__file__).resolve().parent.parent

@@ -136,7 +136,7 @@ tools() {
     echo "$python" > "$venv/.fcsl-python"
     local groups=(--group workspace)
     if [ ! -d "$ros" ]; then groups+=(--group ros-wheels); fi
-    "$venv/bin/python" -m pip install --disable-pip-version-check --quiet --no-compile -c constraints.txt uv
+    progress "uv" "$venv/bin/python" -m pip install --disable-pip-version-check --no-compile -c constraints.txt uv
     python_packages "Python packages (about 300 MB to download)" "${groups[@]}"
     if [ ! -d "$ros" ]; then bash scripts/ros_wheels.sh "$venv"; fi
     local manifest cargo
@@ -149,15 +149,15 @@ tools() {
 }
 
 # Python sources are installed as links, so of them only additions and removals count; algorithms are compiled.
-built() { # built STAMP
-    [ -e "$1" ] && [ "$(python_sources)" = "$(cat "$1")" ] &&
+built() { # built STAMP [PACKAGE ...]
+    [ -e "$1" ] && [ "$(built_of "${@:2}")" = "$(cat "$1")" ] &&
         [ -z "$(find fcsl_* examples colcon.meta scripts/build.sh .venv/.fcsl-stamp -type f -newer "$1" \
             \( ! -name '*.py' -o -path '*/algorithms/*' \) ! -path '*/__pycache__/*' ! -path '*/.pytest_cache/*' \
             ! -path '*/.hypothesis/*' ! -path '*/test/*' -print -quit)" ]
 }
 
 tools
-if built build/.fcsl-built || { [ $# != 0 ] && built build/.fcsl-built-part; }; then
+if built build/.fcsl-built || { [ $# != 0 ] && built build/.fcsl-built-part "$@"; }; then
     say "set up: environment and build are up to date"
 elif [ $# != 0 ] && [ ! -e build/.fcsl-built ]; then
     scripts/build.sh --no-tests "$@"

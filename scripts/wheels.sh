@@ -4,7 +4,9 @@
 set -euo pipefail
 cd "$(dirname "$0")/.."
 . scripts/common.sh
-unset AMENT_PREFIX_PATH CMAKE_PREFIX_PATH COLCON_PREFIX_PATH PYTHONPATH CC CFLAGS LDFLAGS
+unset AMENT_PREFIX_PATH CMAKE_PREFIX_PATH COLCON_PREFIX_PATH PYTHONPATH
+# Nothing that is for this processor alone. cargo notices if the workspace was built with other flags, and compiles anew.
+unset CC CFLAGS CPPFLAGS CXXFLAGS LDFLAGS RUSTFLAGS CARGO_ENCODED_RUSTFLAGS CARGO_BUILD_RUSTFLAGS
 . scripts/underlay.sh
 unset COLCON_DEFAULTS_FILE # no links: what is installed here is packed
 python_packages "tools of make wheels (100 MB to download)" --group wheels
@@ -15,7 +17,7 @@ if [ "$key" != "$(cat "$build/.key" 2> /dev/null)" ]; then rm -rf "$build"; fi
 mkdir -p "$build/fcsl_hal"
 echo "$key" > "$build/.key"
 ln -sfn "$root/build/fcsl_hal/cargo" "$build/fcsl_hal/cargo"
-export PYTHONPATH="$root/fcsl_compiler" CMAKE_GENERATOR=Ninja
+export PYTHONPATH="$root/fcsl_compiler${PYTHONPATH:+:$PYTHONPATH}" CMAKE_GENERATOR=Ninja
 progress "native parts of the wheel" colcon --log-base log/wheels build --packages-up-to fcsl_sim \
     --build-base "$build" --install-base "$build/install" --merge-install --cmake-args \
     -DCMAKE_BUILD_TYPE=Release -DCMAKE_C_COMPILER="$root/scripts/wheels/cc" -DCMAKE_EXE_LINKER_FLAGS=-pie -DCMAKE_SHARED_LINKER_FLAGS=-Wl,--no-undefined -DBUILD_TESTING=OFF \

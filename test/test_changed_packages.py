@@ -30,6 +30,7 @@ EXAMPLES = [
         (["fcsl_msgs/msg/Checkpoint.msg", "fcsl_hal/test/test_codec.c"], ["fcsl_bridge", "fcsl_hal", "fcsl_msgs"]),
         (["constraints.txt"], ALL),
         (["scripts/build.sh"], ALL),
+        (["scripts/jobs.py"], ALL),
     ],
 )
 def test_what_a_change_touches(files: list[str], packages: list[str]) -> None:

@@ -16,7 +16,7 @@ from pathlib import Path
 import pytest
 from ament_index_python.packages import get_package_share_directory
 
-from fcsl_compiler.base.ament import package_prefix
+from fcsl_compiler.base.packages import package_prefix
 from simclient import VarClient
 from simclient.replay import replay
 from simclient.vars.wire import VarError

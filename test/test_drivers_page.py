@@ -14,7 +14,7 @@ from pathlib import Path
 
 import pytest
 
-from fcsl_compiler.base.ament import package_prefix
+from fcsl_compiler.base.packages import package_prefix
 from fcsl_compiler.driver.cache import build_machine
 
 ROOT = Path(__file__).resolve().parents[1]

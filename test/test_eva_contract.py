@@ -10,7 +10,7 @@ import subprocess
 from collections.abc import Callable
 from pathlib import Path
 
-from fcsl_compiler.base.ament import package_prefix
+from fcsl_compiler.base.packages import package_prefix
 
 HEADER = Path(__file__).parents[1] / "scripts/verify/eva/math_contract.h"
 CONTRACT = re.findall(r"/\*@ assigns \\result \\from ([xy, ]+); \*/\n(double|float) (\w+)\((.*)\);", HEADER.read_text())

@@ -6,7 +6,7 @@ import subprocess
 import time
 from pathlib import Path
 
-from fcsl_compiler.base.ament import package_prefix
+from fcsl_compiler.base.packages import package_prefix
 
 DOCUMENT = Path(__file__).resolve().parents[1] / "docs/protocol.md"
 

@@ -60,7 +60,7 @@ def test_simclient_loads_no_twin_before_it_is_used() -> None:
 def test_a_twin_loads_neither_numpy_nor_the_compiler() -> None:
     modules = loaded("from simclient import AlgTwin")
     assert "simclient.twin.alg_twin" in modules
-    assert {name for name in modules if name.startswith("fcsl_compiler.")} <= {*VERSION, "fcsl_compiler.base.ament"}
+    assert {name for name in modules if name.startswith("fcsl_compiler.")} <= {*VERSION, "fcsl_compiler.base.packages"}
     assert modules & (HEAVY - {"ctypes", "dataclasses", "inspect"}) == set()
 
 

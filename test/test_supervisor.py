@@ -13,7 +13,7 @@ from pathlib import Path
 
 import pytest
 
-from fcsl_compiler.base.ament import package_prefix
+from fcsl_compiler.base.packages import package_prefix
 from simclient import VarClient
 from simclient.supervisor.limits import STALLED_S
 

@@ -13,7 +13,7 @@ from typing import Any
 import pytest
 
 import simclient
-from fcsl_compiler.base.ament import package_prefix
+from fcsl_compiler.base.packages import package_prefix
 
 DOC = Path(__file__).resolve().parents[1] / "docs/telemetry.md"
 

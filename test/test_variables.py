@@ -10,7 +10,7 @@ from pathlib import Path
 
 import pytest
 
-from fcsl_compiler.base.ament import package_prefix
+from fcsl_compiler.base.packages import package_prefix
 
 DOC = Path(__file__).resolve().parents[1] / "docs/variables.md"
 

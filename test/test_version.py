@@ -11,7 +11,7 @@ from xml.etree import ElementTree
 
 import pytest
 
-from fcsl_compiler.base.ament import package_prefix
+from fcsl_compiler.base.packages import package_prefix
 
 ROOT = Path(__file__).resolve().parents[1]
 PROGRAMS = {

@@ -20,7 +20,7 @@ from rclpy.node import Node
 from rclpy.qos import QoSProfile
 
 from fcsl_bridge.bus_address import endpoint
-from fcsl_compiler.base.ament import package_prefix, package_share
+from fcsl_compiler.base.packages import package_prefix, package_share
 
 LIMIT_S = 120.0
 SIM = package_share("lander") / "sim" / "lander.sim.json"

@@ -13,8 +13,16 @@ from pathlib import Path
 import pytest
 
 from fcsl_bridge.loopback import loopback_environment
+from fcsl_compiler.base.packages import PackageNotFound, package_share
 
 os.environ.update(loopback_environment(os.environ))
+try:
+    for example in ("ahrs", "lander"):
+        package_share(example)
+except PackageNotFound:
+    raise pytest.UsageError(
+        "the tests of fcsl_bridge fly the examples ahrs and lander: build these packages too"
+    ) from None
 
 from bridge_harness import SIM, Domain  # noqa: E402
 

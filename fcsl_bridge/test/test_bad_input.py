@@ -15,7 +15,7 @@ from fcsl_bridge.errors import BridgeError
 from fcsl_bridge.loopback import loopback_environment
 from fcsl_bridge.machine_index import find_machine
 from fcsl_bridge.node_main import Option
-from fcsl_compiler.base.ament import package_prefix
+from fcsl_compiler.base.packages import package_prefix
 
 CONTROLLER, SIMULATOR = "controller_node", "sim_node"
 

@@ -16,7 +16,7 @@ from rclpy.serialization import deserialize_message
 
 from fcsl_bridge import qos
 from fcsl_bridge.board_status import BoardStatus
-from fcsl_compiler.base.ament import package_prefix
+from fcsl_compiler.base.packages import package_prefix
 
 ROOT = Path(__file__).resolve().parents[2]
 LIBRARY = package_prefix("lander") / "lib/lander/liblander_machines.so"

@@ -9,7 +9,7 @@ from pathlib import Path
 import pytest
 from bridge_harness import Domain
 
-from fcsl_compiler.base.ament import package_share
+from fcsl_compiler.base.packages import package_share
 from simclient.bag import Bag
 
 pytest.importorskip("launch_ros", reason="launch_ros is not installed; CONTRIBUTING.md says how to have it")

@@ -20,7 +20,7 @@ from rosbags.highlevel import AnyReader
 
 from fcsl_bridge import start
 from fcsl_bridge.machine_index import find_machine
-from fcsl_compiler.base.ament import package_prefix
+from fcsl_compiler.base.packages import package_prefix
 from simclient.bag import Bag
 from simclient.errors import BagError
 from simclient.replay import replay

@@ -21,7 +21,7 @@ from sensor_msgs.msg import Range
 
 from fcsl_bridge import qos
 from fcsl_bridge.sim_topics import below
-from fcsl_compiler.base.ament import package_share
+from fcsl_compiler.base.packages import package_share
 from fcsl_msgs.msg import PlantTruth
 from fcsl_msgs.srv import Step
 from fcsl_sim.config import load

@@ -16,7 +16,7 @@ import pytest
 from rclpy.serialization import deserialize_message, serialize_message
 
 from fcsl_bridge.interfaces import message_class
-from fcsl_compiler.base.ament import package_prefix
+from fcsl_compiler.base.packages import package_prefix
 from fcsl_compiler.ros.composer import Source
 from fcsl_compiler.ros.message_fields import fields_of, select
 from fcsl_compiler.ros.reader import Pick

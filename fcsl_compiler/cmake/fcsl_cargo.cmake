@@ -27,8 +27,8 @@ function(fcsl_cargo_fetch manifest)
   set_property(DIRECTORY APPEND PROPERTY CMAKE_CONFIGURE_DEPENDS "${manifest}")
 endfunction()
 
-# fcsl_cargo_command(<variable> <argument> ...): sets <variable> to a command that runs cargo. What it compiles is told on
-# standard output, and errors alone on standard error, which colcon shows: for them cargo runs once more.
+# fcsl_cargo_command(<variable> <argument> ...): sets <variable> to a command that runs cargo. Progress goes to standard output.
+# On failure cargo runs again with --quiet, so that only errors go to standard error, which colcon shows.
 function(fcsl_cargo_command variable)
   set(${variable} sh -c [["$@" 2>&1 || exec "$@" --quiet]] sh "${FCSL_CARGO}" ${ARGN} PARENT_SCOPE)
 endfunction()

@@ -109,12 +109,12 @@ function(_fcsl_interface_files files)
   set(${files} ${listed} ${arg_MSGS} ${arg_SRVS} PARENT_SCOPE)
 endfunction()
 
-# Puts fcsl_rosidl.py before a generator of rosidl: results with unchanged text are not compiled again.
+# Puts fcsl_keep_unchanged.py before a generator of rosidl: results with unchanged text are not compiled again.
 macro(_fcsl_keep_unchanged generator)
-  set(_fcsl_script "${CMAKE_CURRENT_BINARY_DIR}/fcsl_rosidl/${generator}")
+  set(_fcsl_script "${CMAKE_CURRENT_BINARY_DIR}/fcsl_keep_unchanged/${generator}")
   file(CONFIGURE OUTPUT "${_fcsl_script}" CONTENT "import runpy, sys
 sys.argv.insert(1, '${${generator}_BIN}')
-runpy.run_path('${_fcsl_cmake_folder}/fcsl_rosidl.py', run_name='__main__')
+runpy.run_path('${_fcsl_cmake_folder}/fcsl_keep_unchanged.py', run_name='__main__')
 ")
   set(${generator}_BIN "${_fcsl_script}")
 endmacro()

@@ -13,8 +13,8 @@ import pytest
 from fcsl_test_boards import BOARD, write_board, write_machine
 from test_schema import EVERY, agree, mutants
 
-from fcsl_compiler.base.ament import package_share
 from fcsl_compiler.base.diagnostics import DiagnosticError
+from fcsl_compiler.base.packages import package_share
 from fcsl_compiler.board import devices, drivers, hardware, health, limits, pulses
 from fcsl_compiler.board import machine as board_machine
 from fcsl_compiler.board.board import SCHEMA, check_board

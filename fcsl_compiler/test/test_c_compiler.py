@@ -60,7 +60,7 @@ def test_no_compiler(tools: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr("fcsl_compiler.driver.toolchain.find_spec", lambda name: None)
     with pytest.raises(ToolchainError) as error:
         toolchain()
-    fix = "install gcc or the Python package ziglang (pip install 'fcsl[cc]'), or set CC"
+    fix = "install gcc or the Python package ziglang (python3 -m pip install ziglang), or set CC"
     assert str(error.value) == f"no C compiler: `cc` does not run; {fix}"
 
 

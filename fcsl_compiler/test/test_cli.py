@@ -13,8 +13,8 @@ import pytest
 from fcsl_test_abi import Machine
 from fcsl_test_wrong import CONFIG, LEAN
 
-from fcsl_compiler.base.ament import package_prefix
 from fcsl_compiler.base.files import write_whole
+from fcsl_compiler.base.packages import package_prefix
 from fcsl_compiler.cli.function_page import function_names
 from fcsl_compiler.cli.main import main
 from fcsl_compiler.driver import library

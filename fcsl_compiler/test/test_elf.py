@@ -9,7 +9,7 @@ from pathlib import Path
 
 import pytest
 
-from fcsl_compiler.base.ament import package_prefix
+from fcsl_compiler.base.packages import package_prefix
 from fcsl_compiler.driver.elf import read_symbols
 from fcsl_compiler.driver.symbols import SymbolError, check_symbols
 from fcsl_compiler.driver.toolchain import compile_objects
@@ -65,11 +65,13 @@ def test_a_library() -> None:
 
 
 def test_what_is_no_library(tmp_path: Path) -> None:
-    text, cut = tmp_path / "text.so", tmp_path / "cut.so"
+    text, cut, start = tmp_path / "text.so", tmp_path / "cut.so", tmp_path / "start.so"
     text.write_text("not a library")
     cut.write_bytes((package_prefix("fcsl_compiler") / "lib/libfcsl_math.so").read_bytes()[:5000])
+    start.write_bytes(b"\x7fELF")
     for path, why in (
         (text, "not an ELF file"),
+        (start, "not an ELF file"),
         (cut, "a damaged ELF file"),
         (tmp_path / "none", "No such file or directory"),
     ):

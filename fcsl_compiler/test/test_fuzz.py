@@ -29,8 +29,8 @@ from fcsl_test_wrong import ALGORITHMS, BODIES, PORTS, execute
 from fcsl_test_wrong import CONFIG as WRONG_CONFIG
 
 import fcsl_compiler
-from fcsl_compiler.base.ament import package_prefix
 from fcsl_compiler.base.diagnostics import DiagnosticError
+from fcsl_compiler.base.packages import package_prefix
 from fcsl_compiler.cli.main import main
 from fcsl_compiler.cli.report import document
 from fcsl_compiler.driver.library import emit

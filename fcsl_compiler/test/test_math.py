@@ -9,7 +9,7 @@ from pathlib import Path
 
 from fcsl_test_points import ONE_ARGUMENT, TWO_ARGUMENTS
 
-from fcsl_compiler.base.ament import package_prefix
+from fcsl_compiler.base.packages import package_prefix
 from fcsl_compiler.driver.symbols import ALLOWED
 from fcsl_compiler.driver.toolchain import link_shared
 

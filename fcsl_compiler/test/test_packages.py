@@ -7,7 +7,7 @@ from pathlib import Path
 
 import pytest
 
-from fcsl_compiler.base.ament import PackageNotFound, installed_packages, package_prefix, package_share
+from fcsl_compiler.base.packages import PackageNotFound, installed_packages, package_prefix, package_share
 from fcsl_compiler.base.version import package_version
 from fcsl_compiler.cli.main import main
 

@@ -12,7 +12,7 @@ import pytest
 from fcsl_test_points import ONE_ARGUMENT, TWO_ARGUMENTS, Doubles, points
 from fcsl_test_rounding import misrounded
 
-from fcsl_compiler.base.ament import package_prefix
+from fcsl_compiler.base.packages import package_prefix
 
 FUNCTIONS = (*ONE_ARGUMENT, *TWO_ARGUMENTS)
 POINTS = 100_000

@@ -13,8 +13,8 @@ from typing import Any
 import jsonschema
 import pytest
 
-from fcsl_compiler.base.ament import package_share
 from fcsl_compiler.base.diagnostics import DiagnosticError
+from fcsl_compiler.base.packages import package_share
 from fcsl_compiler.base.source import MAX_NAME
 from fcsl_compiler.cli.main import main
 from fcsl_compiler.cli.scaffold import SCHEMA, algorithm_files, machine_files

@@ -1,8 +1,8 @@
 /* SPDX-License-Identifier: Apache-2.0
  *
- * sem_clockwait() of programs that are built for a glibc before 2.30, as those of the wheel are. Where they run, there mostly is a
- * newer one, whose own function then waits. Else sem_timedwait() waits by the clock of the day: set back meanwhile, it makes a wait
- * as much longer; set forward, it ends no wait early.
+ * sem_clockwait() of programs that are built for a glibc before 2.30, as those of the wheel are. Where they run, glibc is
+ * usually newer, and its own function waits. Otherwise sem_timedwait() waits by CLOCK_REALTIME: if somebody sets that clock back
+ * meanwhile, the wait lasts as much longer; if forward, no wait ends early.
  */
 #define _GNU_SOURCE
 #include <semaphore.h>
@@ -16,7 +16,7 @@
 
 enum { NS_PER_S = 1000000000 };
 
-static int wait_by_the_day(sem_t *semaphore, clockid_t clock, const struct timespec *until)
+static int wait_on_realtime(sem_t *semaphore, clockid_t clock, const struct timespec *until)
 {
     for (;;) {
         struct timespec now, day;
@@ -56,7 +56,7 @@ __attribute__((visibility("hidden"))) int sem_clockwait(sem_t *semaphore, clocki
 {
     static pthread_once_t once = PTHREAD_ONCE_INIT;
     (void)pthread_once(&once, find_system_wait);
-    return (system_wait != NULL ? system_wait : wait_by_the_day)(semaphore, clock, until);
+    return (system_wait != NULL ? system_wait : wait_on_realtime)(semaphore, clock, until);
 }
 
 #endif

@@ -39,13 +39,13 @@ int main(void)
     pthread_t thread;
     CHECK(sem_init(&semaphore, 0, 1) == 0);
     struct timespec until = in_ms(-1000);
-    CHECK(wait_by_the_day(&semaphore, CLOCK_MONOTONIC, &until) == 0); /* posted: no matter that it is late */
-    CHECK(wait_by_the_day(&semaphore, CLOCK_MONOTONIC, &until) == -1 && errno == ETIMEDOUT);
+    CHECK(wait_on_realtime(&semaphore, CLOCK_MONOTONIC, &until) == 0); /* posted: no matter that it is late */
+    CHECK(wait_on_realtime(&semaphore, CLOCK_MONOTONIC, &until) == -1 && errno == ETIMEDOUT);
     until = in_ms(SHORT_MS);
-    CHECK(wait_by_the_day(&semaphore, CLOCK_MONOTONIC, &until) == -1 && errno == ETIMEDOUT && is_past(until));
+    CHECK(wait_on_realtime(&semaphore, CLOCK_MONOTONIC, &until) == -1 && errno == ETIMEDOUT && is_past(until));
     until = in_ms(60000);
     CHECK(pthread_create(&thread, NULL, post_later, &semaphore) == 0);
-    CHECK(wait_by_the_day(&semaphore, CLOCK_MONOTONIC, &until) == 0 && !is_past(until));
+    CHECK(wait_on_realtime(&semaphore, CLOCK_MONOTONIC, &until) == 0 && !is_past(until));
     CHECK(pthread_join(thread, NULL) == 0);
     return 0;
 }

@@ -60,8 +60,9 @@ def run_command(options: argparse.Namespace) -> int:
         _fail_as_json(options, str(error))
         print(f"fcsl-sim: error: {error}", file=sys.stderr)
     except ModuleNotFoundError as error:
-        _fail_as_json(options, missing_package(error))
-        print(f"fcsl-sim: error: {missing_package(error)}", file=sys.stderr)
+        message = missing_package(error)
+        _fail_as_json(options, message)
+        print(f"fcsl-sim: error: {message}", file=sys.stderr)
     except BrokenPipeError:
         os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
         return 128 + signal.SIGPIPE

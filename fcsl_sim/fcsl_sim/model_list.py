@@ -9,9 +9,9 @@ from collections.abc import Iterator
 from dataclasses import dataclass
 from pathlib import Path
 
-from fcsl_compiler.base.ament import Package, PackageNotFound, installed_packages
 from fcsl_compiler.base.diagnostics import nearest
 from fcsl_compiler.base.files import MAX_SOURCE_BYTES, SourceError, read_regular
+from fcsl_compiler.base.packages import Package, PackageNotFound, installed_packages
 from fcsl_compiler.driver.toolchain import LANGUAGES
 from fcsl_compiler.parse.source_path import SourcePathError, resolve_source
 

@@ -13,7 +13,7 @@ from dataclasses import dataclass
 from pathlib import Path
 from types import TracebackType
 
-from fcsl_compiler.base.ament import PackageNotFound, package_prefix
+from fcsl_compiler.base.packages import PackageNotFound, package_prefix
 from fcsl_compiler.model.types import count_of, shape_of
 from simclient.c_machine import CMachine
 from simclient.c_run import CError

@@ -6,8 +6,8 @@ from __future__ import annotations
 import re
 from pathlib import Path
 
-from fcsl_compiler.base.ament import PackageNotFound, package_prefix
 from fcsl_compiler.base.diagnostics import nearest
+from fcsl_compiler.base.packages import PackageNotFound, package_prefix
 from fcsl_compiler.driver.symbols import SymbolError, check_model_symbols
 from fcsl_compiler.driver.toolchain import LANGUAGES, ToolchainError
 from fcsl_compiler.parse.source_path import SourcePathError, resolve_source

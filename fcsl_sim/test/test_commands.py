@@ -12,7 +12,7 @@ from typing import Any
 import pytest
 from test_cli import HOPPER, PILOT, SENSORS, fcsl_sim
 
-from fcsl_compiler.base.ament import package_share
+from fcsl_compiler.base.packages import package_share
 from fcsl_sim import SimConfig, load
 
 PNG = b"\x89PNG"

@@ -12,8 +12,8 @@ import jsonschema
 import pytest
 from conftest import RAMP
 
-from fcsl_compiler.base.ament import package_share
 from fcsl_compiler.base.diagnostics import DiagnosticError
+from fcsl_compiler.base.packages import package_share
 from fcsl_compiler.cli.scaffold import machine_files
 from fcsl_compiler.parse.json_reader import ConfigReader
 from fcsl_sim import SimError, load

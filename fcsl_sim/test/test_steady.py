@@ -10,7 +10,7 @@ from typing import Any
 
 import pytest
 
-from fcsl_compiler.base.ament import package_prefix
+from fcsl_compiler.base.packages import package_prefix
 from fcsl_sim import SimConfig
 
 TEST = Path(__file__).resolve().parent

@@ -12,8 +12,8 @@ import jsonschema
 import pytest
 from test_simulation_schema import keys_of, mutants
 
-from fcsl_compiler.base.ament import package_share
 from fcsl_compiler.base.diagnostics import DiagnosticError
+from fcsl_compiler.base.packages import package_share
 from fcsl_compiler.parse.json_reader import ConfigReader
 from fcsl_sim import SimError
 from fcsl_sim.campaign.metric import FUNCTIONS

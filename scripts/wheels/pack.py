@@ -26,7 +26,7 @@ from pathlib import Path
 from typing import Any
 from xml.etree import ElementTree
 
-from fcsl_compiler.base.ament import ENTRY_POINTS
+from fcsl_compiler.base.packages import ENTRY_POINTS
 from fcsl_compiler.driver.toolchain import ZIG_TARGET
 
 ROOT = Path(__file__).resolve().parents[2]
@@ -36,6 +36,10 @@ PLATFORM = re.sub(r"(.*)-linux-gnu\.(\d+)\.(\d+)", r"manylinux_\2_\3_\1", ZIG_TA
 #: Of the prefix: what only colcon, CMake and ROS read, and who builds with them has a workspace. Machines are linked with
 #: libfcsl_math.a, and with nothing else that is static.
 LEFT_OUT = ("share/*/cmake/*", "share/*/environment/*", "lib/fcsl_*/*", "lib/libfcsl_[!m]*.a", "*.egg-info/*", "*.pyc")
+#: The licences of the crates that are linked into the libraries.
+THIRD_PARTY = "THIRD-PARTY-LICENSES.txt"
+_CRATES = ("fcsl_compiler/math", "fcsl_hal/io")
+_LICENCE_FILES = ("LICEN[CS]E*", "COPYING*", "COPYRIGHT*", "NOTICE*", "UNLICENSE*")
 #: So that the same files make the same wheel.
 _TIME = (1980, 1, 1, 0, 0, 0)
 
@@ -79,6 +83,7 @@ def metadata(version: str, licence: str) -> bytes:
     message["Summary"] = " ".join(readme.split("\n\n")[1].split(". ")[0].split()) + "."
     message["License-Expression"] = licence
     message["License-File"] = "LICENSE"
+    message["License-File"] = THIRD_PARTY
     message["Requires-Python"] = f">={project['tool']['mypy']['python_version']}"
     for requirement in requirements(groups, PREFIX):
         message["Requires-Dist"] = requirement
@@ -88,6 +93,31 @@ def metadata(version: str, licence: str) -> bytes:
             message["Requires-Dist"] = f'{requirement}; extra == "{extra}"'
     message["Description-Content-Type"] = "text/markdown"
     return f"{message}{readme}".encode()
+
+
+def third_party_licences() -> bytes:
+    """Each text once, below the crates that bring it. Raises PackError for a crate of others without a licence."""
+    crates: dict[str, list[str]] = {}
+    for folder in _CRATES:
+        line = ["cargo", "metadata", "--locked", "--offline", "--format-version", "1"]
+        line += ["--filter-platform", "x86_64-unknown-linux-gnu", "--manifest-path", str(ROOT / folder / "Cargo.toml")]
+        listed = json.loads(subprocess.run(line, check=True, capture_output=True, text=True).stdout)
+        for crate in (c for c in listed["packages"] if c["source"]):
+            crate_folder = Path(crate["manifest_path"]).parent
+            texts = {
+                t.read_text(errors="replace").strip()
+                for p in _LICENCE_FILES
+                for t in crate_folder.glob(p)
+                if t.is_file()
+            }
+            if not texts and not crate["license"]:
+                raise PackError(f"crate {crate['name']} {crate['version']} says nothing of its licence")
+            for text in texts or {f"{crate['license']} (the crate brings no text)"}:
+                crates.setdefault(text, []).append(f"{crate['name']} {crate['version']}")
+    parts = [
+        f"{', '.join(sorted(set(names)))}\n\n{text}\n" for text, names in sorted(crates.items(), key=lambda c: c[1])
+    ]
+    return f"\n{'-' * 80}\n".join(parts).encode()
 
 
 def requirements(groups: dict[str, Any], group: str) -> list[str]:
@@ -139,6 +169,7 @@ def members(staged: Path) -> Iterator[tuple[str, bytes, bool]]:
     yield f"{about}.dist-info/METADATA", metadata(version, licence), False
     yield f"{about}.dist-info/entry_points.txt", entry_points(staged, native), False
     yield f"{about}.dist-info/licenses/LICENSE", (ROOT / "LICENSE").read_bytes(), False
+    yield f"{about}.dist-info/licenses/{THIRD_PARTY}", third_party_licences(), False
 
 
 def check_search_path(path: Path) -> None:
@@ -157,6 +188,8 @@ def write(out: Path, staged: Path) -> Path:
     lines = [f"{name},sha256={digest(data)},{len(data)}" for name, data, _ in found]
     found.append((record, "\n".join([*lines, f"{record},,", ""]).encode(), False))
     out.mkdir(parents=True, exist_ok=True)
+    for old in out.glob(f"{PREFIX}-*.whl"):
+        old.unlink()
     wheel = out / f"{about.removesuffix('.dist-info')}-py3-none-{PLATFORM}.whl"
     with zipfile.ZipFile(wheel, "w", zipfile.ZIP_DEFLATED, compresslevel=9) as archive:
         for name, data, executable in found:

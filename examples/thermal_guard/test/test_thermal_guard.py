@@ -9,7 +9,7 @@ from pathlib import Path
 
 import pytest
 
-from fcsl_compiler.base.ament import package_prefix
+from fcsl_compiler.base.packages import package_prefix
 from fcsl_compiler.driver.toolchain import FLAGS, compiler
 from simclient import AlgTwin, PyTwin
 from simclient.replay import replay

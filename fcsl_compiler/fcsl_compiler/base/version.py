@@ -21,7 +21,7 @@ def package_version(package: str, file: str) -> str:
         for manifest in (folder / "share" / package / "package.xml", folder / "package.xml"):
             if found := _version_in(manifest, package):
                 return found
-    from .ament import PackageNotFound, package_share  # in a wheel the manifest does not lie above the file
+    from .packages import PackageNotFound, package_share  # in a wheel the manifest does not lie above the file
 
     try:
         return _version_in(package_share(package) / "package.xml", package) or "of no package"

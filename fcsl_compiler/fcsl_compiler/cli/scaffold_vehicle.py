@@ -6,7 +6,7 @@ from __future__ import annotations
 import re
 from pathlib import Path
 
-from ..base.ament import PackageNotFound, package_share
+from ..base.packages import PackageNotFound, package_share
 from ..base.source import MAX_NAME
 from ..base.usage import UsageError
 

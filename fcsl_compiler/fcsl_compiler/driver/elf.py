@@ -24,7 +24,7 @@ def read_symbols(path: Path, dynamic: bool) -> Symbols:
     """The symbols of an object or, `dynamic`, those that a library shares with others. Raises OSError, and ValueError
     for a file that is not ELF or is damaged."""
     data = path.read_bytes()
-    if data[:4] != b"\x7fELF" or data[4] not in (1, 2) or data[5] not in (1, 2):
+    if data[:4] != b"\x7fELF" or len(data) < 6 or data[4] not in (1, 2) or data[5] not in (1, 2):
         raise ValueError("not an ELF file")
     wide, order = data[4] == 2, "<>"[data[5] - 1]
     header = struct.Struct(f"{order}40xQ10xHH" if wide else f"{order}32xI10xHH")

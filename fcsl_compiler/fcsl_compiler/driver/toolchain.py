@@ -18,7 +18,7 @@ from importlib.util import find_spec
 from pathlib import Path
 from typing import NamedTuple, cast
 
-from ..base.ament import PackageNotFound, package_prefix
+from ..base.packages import PackageNotFound, package_prefix
 
 #: Flags for every machine, the same as in fcsl_add_machine. Contraction and fast-math stay off, because they would
 #: change results.
@@ -60,7 +60,7 @@ class Language(NamedTuple):
 
     def absent(self, command: str) -> ToolchainError:
         """The error for a command that does not run."""
-        or_zig = " or the Python package ziglang (pip install 'fcsl[cc]')" if self.zig else ""
+        or_zig = " or the Python package ziglang (python3 -m pip install ziglang)" if self.zig else ""
         fix = f"install {self.package}{or_zig}, or set {self.variable}"
         return ToolchainError(f"no {self.name} compiler: `{command}` does not run; {fix}")
 

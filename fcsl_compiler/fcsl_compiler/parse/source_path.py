@@ -6,7 +6,7 @@ from __future__ import annotations
 import os
 from pathlib import Path
 
-from ..base.ament import PackageNotFound, package_share
+from ..base.packages import PackageNotFound, package_share
 
 _MAX_PATH = 1000
 _SHARE = "share files between machines through package://"

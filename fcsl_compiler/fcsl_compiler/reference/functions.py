@@ -9,7 +9,7 @@ from collections.abc import Callable, Sequence
 from functools import cache
 from typing import Any
 
-from ..base.ament import package_prefix
+from ..base.packages import package_prefix
 from .arrays import eye, zeros
 from .values import F32, I64, INTEGERS, Fault, IllTyped, TypedInt, as_f32, as_f64, round_int_to_f32
 

@@ -18,7 +18,7 @@ from typing import Any
 
 import numpy as np
 
-from fcsl_compiler.base.ament import package_prefix
+from fcsl_compiler.base.packages import package_prefix
 
 from . import oracle_library
 from . import tree as t

@@ -47,12 +47,17 @@ def run_tool(name: str, main: Callable[[Sequence[str]], int]) -> NoReturn:
     sys.exit(status)
 
 
+#: The names of packages that are not those of their modules.
+_PACKAGES = {"prometheus_client": "prometheus-client", "rerun": "rerun-sdk", "yaml": "pyyaml", "zenoh": "eclipse-zenoh"}
+
+
 def missing_package(error: ModuleNotFoundError) -> str:
     """The message for a Python package that is not installed. Raises the error again if it is one of FCSL."""
     module = (error.name or "").partition(".")[0]
     if not module or module.startswith(("fcsl", "simclient")):
         raise error
-    return f"it needs the Python package `{module}`, which is not installed: python3 -m pip install 'fcsl[all]'"
+    package = _PACKAGES.get(module, module)
+    return f"it needs the Python package {package}: python3 -m pip install {package}"
 
 
 def completeness(name: str, damage: str) -> int:

@@ -10,6 +10,7 @@ from pathlib import Path
 import pytest
 
 from simclient import TwinError
+from simclient.cli import missing_package
 from simclient.library import RUNTIME_LIBRARY, RUNTIME_PACKAGE, bind_runtime, runtime_library, runtime_program
 
 FINDERS: dict[str, Callable[[], Path]] = {
@@ -55,3 +56,13 @@ def test_another_library_is_no_runtime(tmp_path: Path) -> None:
         bind_runtime(tmp_path / "text.so", {})
     with pytest.raises(TwinError, match="cannot be used as the FCSL runtime: .*fcsl_no_function"):
         bind_runtime(runtime_library(), {"fcsl_no_function": (c_int, [])})
+
+
+@pytest.mark.parametrize(
+    ("module", "package"), [("zenoh.handlers", "eclipse-zenoh"), ("rerun", "rerun-sdk"), ("scipy.optimize", "scipy")]
+)
+def test_a_missing_package_is_called_as_pip_calls_it(module: str, package: str) -> None:
+    error = ModuleNotFoundError(f"No module named '{module}'", name=module)
+    assert missing_package(error) == f"it needs the Python package {package}: python3 -m pip install {package}"
+    with pytest.raises(ModuleNotFoundError):
+        missing_package(ModuleNotFoundError("No module named 'simclient.nope'", name="simclient.nope"))

@@ -16,7 +16,7 @@ import time
 from pathlib import Path
 from typing import Any
 
-from fcsl_compiler.base.ament import package_prefix
+from fcsl_compiler.base.packages import package_prefix
 from fcsl_compiler.driver.cache import build_machine
 from simclient import AlgTwin
 from simclient.library import runtime_library

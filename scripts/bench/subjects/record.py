@@ -12,7 +12,7 @@ import tempfile
 from pathlib import Path
 from typing import Any
 
-from fcsl_compiler.base.ament import package_prefix
+from fcsl_compiler.base.packages import package_prefix
 from fcsl_compiler.driver.cache import build_machine
 from simclient.bag import Bag
 from simclient.library import runtime_library

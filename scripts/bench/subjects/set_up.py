@@ -9,27 +9,18 @@ from __future__ import annotations
 import json
 import os
 import resource
-import shutil
 import subprocess
 import sys
 import tempfile
 import time
 from pathlib import Path
 
+from fresh_clone import copy_tracked, outside
+
 from ..harness.size import sized
 
-ROOT = Path(__file__).resolve().parents[3]
 #: What says where caches are; the fresh home has none. rustup's toolchains stay: they are a system package's concern.
 CACHES = ("CARGO_HOME", "FCSL_CACHE_DIR", "PIP_CACHE_DIR", "UV_CACHE_DIR", "XDG_CACHE_HOME", "XDG_CONFIG_HOME")
-#: What an environment of this workspace leaves; the fresh clone shall not find it.
-OURS = (
-    "AMENT_PREFIX_PATH",
-    "CMAKE_PREFIX_PATH",
-    "COLCON_DEFAULTS_FILE",
-    "COLCON_PREFIX_PATH",
-    "PYTHONPATH",
-    "VIRTUAL_ENV",
-)
 INSTANCES = tuple(f"stage_{number}" for number in range(9))
 _ALGORITHM = '''class Stage:
     """One of nine instances."""
@@ -78,14 +69,9 @@ def first_demo(folder: Path) -> dict[str, float]:
     """`make demo` in a copy of the tracked files, with a home of its own."""
     clone, home = folder / "clone", folder / "home"
     home.mkdir()
-    tracked = subprocess.run(["git", "ls-files", "-z"], cwd=ROOT, stdout=subprocess.PIPE, text=True, check=True).stdout
-    for name in filter(None, tracked.split("\0")):
-        if (ROOT / name).is_file():
-            (clone / name).parent.mkdir(parents=True, exist_ok=True)
-            shutil.copy2(ROOT / name, clone / name)
-    environment = {n: v for n, v in os.environ.items() if n not in (*CACHES, *OURS)} | {
+    copy_tracked(clone)
+    environment = {name: value for name, value in outside().items() if name not in CACHES} | {
         "HOME": str(home),
-        "PATH": os.pathsep.join(p for p in os.environ["PATH"].split(os.pathsep) if not p.startswith(str(ROOT))),
         "RUSTUP_HOME": os.environ.get("RUSTUP_HOME", str(Path.home() / ".rustup")),
     }
     seconds, processors = timed(["make", "demo"], clone, environment)

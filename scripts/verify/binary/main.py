@@ -19,8 +19,8 @@ from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
-from fcsl_compiler.base.ament import PackageNotFound, package_prefix
 from fcsl_compiler.base.diagnostics import DiagnosticError
+from fcsl_compiler.base.packages import PackageNotFound, package_prefix
 from fcsl_compiler.driver.stack import LEAF_BYTES
 from fcsl_compiler.driver.toolchain import ToolchainError
 

@@ -18,7 +18,7 @@ import sys
 import time
 from pathlib import Path
 
-from fcsl_compiler.base.ament import package_prefix
+from fcsl_compiler.base.packages import package_prefix
 from fcsl_sim import SimConfig, Simulation, load
 from fcsl_sim.native import simulator_library
 

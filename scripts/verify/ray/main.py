@@ -44,7 +44,17 @@ def installed(folder: Path) -> Path:
         shutil.rmtree(folder, ignore_errors=True)
         what = ("-c", ROOT / "constraints.txt", "--group", f"{ROOT}/pyproject.toml:ray")
         run(
-            [Path(sys.executable).with_name("uv"), "pip", "install", "--quiet", "--target", folder, *what],
+            [
+                Path(sys.executable).with_name("uv"),
+                "pip",
+                "install",
+                "--python",
+                sys.executable,
+                "--quiet",
+                "--target",
+                folder,
+                *what,
+            ],
             timeout_s=_LIMIT_S,
         )
         done.write_text(wanted)

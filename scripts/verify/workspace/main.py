@@ -5,17 +5,23 @@ A copy of the tracked files lies under src/fcsl, beside a package that `fcslc ne
 takes the packages that docs/ros2.md names, writes nothing to standard error, which colcon would report as if something
 were wrong, and takes no example; then the package's tests pass. Only the tools and ROS 2 come from this workspace.
 
+A flight computer's packages, built without Zenoh in a second workspace, compile none of its crates; fcsl-fc flies there, and says
+why it opens no session of the bus.
+
 The control: a package that prints to standard error is noticed.
 """
 
 from __future__ import annotations
 
 import argparse
-import os
 import shutil
 import subprocess
 import sys
 from pathlib import Path
+
+from fresh_clone import copy_tracked, outside
+
+from fcsl_compiler.base.packages import package_prefix
 
 from ..shared.cases import ROOT, CheckFailed, write_facts
 
@@ -24,21 +30,11 @@ WANTED = {"fcsl_compiler", "fcsl_hal", "fcsl_runtime", "simclient", "fcsl_sim", 
 _LIMIT_S = 3000.0
 
 
-def copy_sources(folder: Path) -> None:
-    names = subprocess.run(["git", "ls-files", "-z"], cwd=ROOT, stdout=subprocess.PIPE, text=True, check=True).stdout
-    for name in filter(None, names.split("\0")):
-        if (ROOT / name).is_file():
-            (folder / name).parent.mkdir(parents=True, exist_ok=True)
-            shutil.copy2(ROOT / name, folder / name)
-
-
 def in_shell(workspace: Path, line: str) -> str:
     """Runs a line of bash in the workspace, on the underlay alone. Raises CheckFailed unless it ends with 0."""
-    ours = ("AMENT_PREFIX_PATH", "CMAKE_PREFIX_PATH", "COLCON_PREFIX_PATH", "PYTHONDONTWRITEBYTECODE", "PYTHONPATH")
-    environment = {name: value for name, value in os.environ.items() if name not in ours}
     script = f". {ROOT}/scripts/underlay.sh; unset COLCON_DEFAULTS_FILE; {line}"
     done = subprocess.run(
-        ["bash", "-c", script], cwd=workspace, env=environment, capture_output=True, text=True, timeout=_LIMIT_S
+        ["bash", "-c", script], cwd=workspace, env=outside(), capture_output=True, text=True, timeout=_LIMIT_S
     )
     if done.returncode != 0:
         raise CheckFailed(f"`{line}`: exit status {done.returncode}\n{done.stdout[-4000:]}{done.stderr[-4000:]}")
@@ -51,9 +47,24 @@ def complaints(workspace: Path) -> list[str]:
     return [f"{log.parent.name}: {log.read_text(errors='replace')}" for log in logs if log.stat().st_size]
 
 
+def check_without_zenoh(workspace: Path, sources: Path) -> None:
+    shutil.rmtree(workspace, ignore_errors=True)
+    print("workspace: building without Zenoh", flush=True)
+    options = "-DFCSL_ZENOH=OFF -DBUILD_TESTING=OFF --no-warn-unused-cli"
+    workspace.mkdir()
+    in_shell(workspace, f"colcon build --base-paths {sources} --packages-up-to fcsl_runtime --cmake-args {options}")
+    if crates := list((workspace / "build/fcsl_hal/cargo").rglob("*zenoh*")):
+        raise CheckFailed(f"without Zenoh, cargo made {crates[0]}")
+    fly = f"install/fcsl_runtime/bin/fcsl-fc {package_prefix('lander')}/lib/lander/liblander_machines.so --machine lander_control"
+    in_shell(workspace, f"{fly} --rate max --ticks 10")
+    refused = in_shell(workspace, f"{fly} --hal zenoh:tcp/127.0.0.1:7447 2>&1 || true")
+    if "built without the bus" not in refused:
+        raise CheckFailed(f"without Zenoh, fcsl-fc says of an address of the bus: {refused}")
+
+
 def check(workspace: Path) -> list[str]:
     shutil.rmtree(workspace, ignore_errors=True)
-    copy_sources(workspace / "src/fcsl")
+    copy_tracked(workspace / "src/fcsl")
     in_shell(workspace, f". {ROOT}/scripts/env.sh; cd src && fcslc new machine my_robot --package")
     print("workspace: building", flush=True)
     in_shell(workspace, "colcon build --packages-up-to fcsl_bridge my_robot")
@@ -63,6 +74,7 @@ def check(workspace: Path) -> list[str]:
     if said := complaints(workspace):
         raise CheckFailed("packages wrote to standard error:\n" + "\n".join(said))
     in_shell(workspace, ". install/local_setup.bash; python3 -m pytest -q src/my_robot/test")
+    check_without_zenoh(workspace.with_name("verify_workspace_without_zenoh"), workspace / "src/fcsl")
     cmake = workspace / "src/my_robot/CMakeLists.txt"
     cmake.write_text(cmake.read_text() + 'message(WARNING "control")\n')
     in_shell(workspace, "colcon build --packages-select my_robot")

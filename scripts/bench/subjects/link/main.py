@@ -18,7 +18,7 @@ import threading
 from pathlib import Path
 from typing import Any
 
-from fcsl_compiler.base.ament import package_prefix
+from fcsl_compiler.base.packages import package_prefix
 
 from ...harness.native import BENCH, compile_program
 from ...harness.size import sized

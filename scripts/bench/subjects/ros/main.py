@@ -25,7 +25,7 @@ import numpy as np
 
 from fcsl_bridge.domain import own_domain
 from fcsl_bridge.loopback import loopback_environment
-from fcsl_compiler.base.ament import package_prefix
+from fcsl_compiler.base.packages import package_prefix
 from fcsl_compiler.driver.cache import build_machine
 
 from ...harness.size import SUFFIX, sized

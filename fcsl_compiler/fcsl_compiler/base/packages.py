@@ -54,12 +54,12 @@ def installed_packages() -> Iterator[Package]:
 
 
 def _package(name: str) -> Package:
-    for prefix in _prefixes():
-        if os.path.isfile(f"{prefix}/{_INDEX}/{name}"):
-            return _built(name, prefix)
-    # A name that is a path is nobody's, and no file is read for it.
-    if name.isidentifier() and (module := _registered(tuple(sys.path)).get(name)):
-        return _distributed(name, module)
+    if name.isidentifier():  # else it may be a path, for which no file is looked at
+        for prefix in _prefixes():
+            if os.path.isfile(f"{prefix}/{_INDEX}/{name}"):
+                return _built(name, prefix)
+        if module := _registered(tuple(sys.path)).get(name):
+            return _distributed(name, module)
     raise PackageNotFound(f"package `{name}` is not installed in this environment; source install/setup.bash")
 
 

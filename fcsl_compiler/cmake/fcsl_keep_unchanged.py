@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""`python3 fcsl_rosidl.py GENERATOR [OPTIONS]` runs a generator of rosidl in a build by fcsl_generate_interfaces().
+"""`python3 fcsl_keep_unchanged.py GENERATOR [OPTIONS]` runs a generator of rosidl in a build by fcsl_generate_interfaces().
 
 A generator writes the files of all messages anew when one message has changed, and all of them would be compiled again. Here a
 file whose text is as before gets its time back. Ninja then compiles what has changed alone, and so does make; make would also
@@ -78,4 +78,5 @@ def main() -> None:
     record.write_text("\n".join([key, *map(str, files_in(folder))]), encoding="utf-8")
 
 
-main()
+if __name__ == "__main__":
+    main()
