@@ -32,9 +32,9 @@ _LINES_MAX, _CHARACTERS_MAX = 12, 300
 
 
 def workers() -> list[str]:
-    """Options of pytest-xdist. The tests of a file stay together: what the file builds once is built once."""
+    """Options of pytest-xdist."""
     cores = len(os.sched_getaffinity(0))
-    return [f"-n{min(cores + cores // 2, 6)}", "--dist=loadfile"]
+    return [f"-n{min(cores + cores // 2, 6)}", "--dist=worksteal"]
 
 
 def package_job(name: str) -> Job:

@@ -4,6 +4,7 @@
 import copy
 import json
 from collections.abc import Callable, Mapping
+from functools import cache
 from typing import Any
 
 PORTS = """class Alg:
@@ -1160,6 +1161,7 @@ CONFIGS: dict[str, str] = {
 }
 
 
+@cache
 def all_cases() -> dict[str, tuple[str, dict[str, str]]]:
     """Machine JSON and files by name. The name begins with the code."""
     good = json.dumps(CONFIG, indent=1)
