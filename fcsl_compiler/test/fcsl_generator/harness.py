@@ -59,6 +59,13 @@ def _requests(m: Machine) -> list[str]:
     return ["", *(m.d.requests[i].decode() for i in range(m.d.request_count))]
 
 
+def _inject(m: Machine, instance: str, what: int) -> None:
+    """As hosts do: the worst counts, and a fault (1) is worse than a health (2, 3)."""
+    injected = m.byte(m.instances[instance].inject_fault_offset)
+    if injected[0] != 1 and (what == 1 or what > injected[0]):
+        injected[0] = what
+
+
 def _act(m: Machine, action: Action) -> None:
     if action.kind == "set":
         words = _requests(m) if TYPES[m.fields[action.target].type] == "request" else HEALTH
@@ -66,9 +73,9 @@ def _act(m: Machine, action: Action) -> None:
     elif action.kind == "overrun":
         m.byte(m.instances[action.target].inject_overrun_offset)[0] = 1
     elif action.kind == "fault":
-        m.byte(m.instances[action.target].inject_fault_offset)[0] = 1
+        _inject(m, action.target, 1)
     elif action.kind == "health":
-        m.byte(m.instances[action.target].inject_fault_offset)[0] = 1 + HEALTH.index(action.value)
+        _inject(m, action.target, 1 + HEALTH.index(action.value))
     elif action.kind == "force":
         m.force_state(action.target)
     elif action.kind == "attach":

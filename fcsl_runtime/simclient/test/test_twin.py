@@ -87,6 +87,21 @@ def test_a_forced_health_is_no_better_than_the_real_one(twin: Twin) -> None:
     assert twin.get_value("sensors.outputs.health") == twin.get_value("watch.outputs.health") == "failed"
 
 
+@pytest.mark.parametrize(
+    "words", [("fault", "degraded"), ("failed", "fault"), ("failed", "degraded"), ("fault", "fault")]
+)
+def test_of_several_injections_the_worst_counts(twin: Twin, words: tuple[str, str]) -> None:
+    twin.set("sensors.outputs.altitude", 5.0)
+    twin.tick(3)
+    for word in words:
+        twin.fault("watch") if word == "fault" else twin.force_health("watch", word)
+    twin.tick()
+    faulted = "fault" in words
+    assert twin.get_value("watch.outputs.health") == "failed"
+    assert twin.get_value("watch.counters.faults") == faulted
+    assert twin.get_value("watch.outputs.count") == (3 if faulted else 4)
+
+
 def test_wrong_names(twin: Twin) -> None:
     for refused in (twin.fault, twin.overrun, lambda name: twin.force_health(name, "failed")):
         with pytest.raises(TwinError, match="did you mean `watch`"):

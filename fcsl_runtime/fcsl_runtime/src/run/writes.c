@@ -166,13 +166,22 @@ static const fcsl_instance_t *injectable(const fcsl_run_t *run, uint32_t instanc
     return target;
 }
 
+/* Adds to what is injected into the next execute: the worst counts, and a fault (1) is worse than a health (2, 3). */
+static void inject(fcsl_run_t *run, const fcsl_instance_t *target, uint8_t what)
+{
+    uint8_t *injected = &run->data[target->inject_fault_offset];
+    if (*injected != 1u && (what == 1u || what > *injected)) {
+        *injected = what;
+    }
+}
+
 int fcsl_run_inject_fault(fcsl_run_t *run, uint32_t instance, fcsl_error_t *error)
 {
     const fcsl_instance_t *target = injectable(run, instance, error);
     if (target == NULL) {
         return -1;
     }
-    run->data[target->inject_fault_offset] = 1u;
+    inject(run, target, 1u);
     fcsl_note_write(run, &(fcsl_write_t){.kind = FCSL_WRITE_FAULT, .path = target->name});
     return 0;
 }
@@ -186,7 +195,7 @@ int fcsl_run_inject_health(fcsl_run_t *run, uint32_t instance, fcsl_health_t hea
     if (health != FCSL_DEGRADED && health != FCSL_FAILED) {
         return fcsl_fail(error, "instance '%s' can be made degraded or failed, no other health", target->name);
     }
-    run->data[target->inject_fault_offset] = (uint8_t)(1u + (unsigned)health);
+    inject(run, target, (uint8_t)(1u + (unsigned)health));
     fcsl_note_write(run, &(fcsl_write_t){.kind = FCSL_WRITE_HEALTH, .path = target->name, .element = health});
     return 0;
 }
