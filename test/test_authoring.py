@@ -177,6 +177,46 @@ def test_a_rover_that_changes_its_mode(twin, after):
     assert "8 passed" in run_tests(rover)
 
 
+def test_a_fault_of_a_controller_makes_no_bump(rover: Path) -> None:
+    """At any tick, also in the first run of a controller whose last output was large."""
+    write(rover, BLOCK.findall(CHANGES[1]) + BLOCK.findall(CHANGES[2]))
+    (rover / "test" / "test_rover.py").write_text("""
+import pytest
+from simclient import AlgTwin, PyTwin
+
+
+def forces(twin, faults_at):
+    with twin.from_config("../rover.json") as twin:
+        twin.set("watch.inputs.go", True)
+        twin.set("drive.inputs.wanted", 3.0)
+        twin.set("sensors.outputs.distance", 10.0)
+        twin.tick(120)
+        assert twin.state() == "DRIVE" and twin.get_value("drive.outputs.force") > 20.0
+        twin.set("sensors.outputs.distance", 0.5)
+        twin.tick(50)
+        assert twin.state() == "HOLD" and abs(twin.get_value("motor.outputs.force")) < 1e-9
+        twin.set("drive.inputs.wanted", 0.0)
+        found = []
+        for tick in range(60):
+            twin.set("sensors.outputs.distance", 10.0 if tick < 40 else 1.5)
+            if tick == faults_at:
+                twin.fault("drive")
+                twin.fault("creep")
+            twin.tick()
+            found.append(twin.get_value("motor.outputs.force"))
+        assert twin.state() == "CREEP"
+        return found
+
+
+@pytest.mark.parametrize("twin", [AlgTwin, PyTwin])
+def test_no_bump(twin):
+    for faults_at in range(-1, 60):
+        found = forces(twin, faults_at)
+        assert max(abs(f) for f in found) < 2.0, (faults_at, found)
+""")
+    assert "2 passed" in run_tests(rover)
+
+
 def test_the_estimate_settles(rover: Path) -> None:
     """On the true speed, without a lasting lag, in both twins, with a sample in every tick or in every fifth."""
     write(rover, BLOCK.findall(CHANGES[3]))

@@ -68,6 +68,10 @@ CONFIG: dict[str, Any] = {
 }
 
 
+#: What a machine struct has only where a source needs it.
+KEPT = ("last_run", "completed", "last_sample", "ticks_in_state")
+
+
 def craft(tmp_path: Path, **more: Any) -> Machine:
     return machine(tmp_path, {**CONFIG, **more}, hearer=HEARER, sensors=SENSORS)
 
@@ -126,15 +130,39 @@ def test_elapsed_is_rounded_once(tmp_path: Path) -> None:
     assert inputs(m, "elapsed") == [5 / 3]
 
 
-def test_a_run_that_faults_counts_as_one(tmp_path: Path) -> None:
+@pytest.mark.parametrize("injected", [False, True])
+def test_a_run_that_faults_consumes_nothing(tmp_path: Path, injected: bool) -> None:
+    """The next run sees the same reset, the whole time and the same sample."""
     m = craft(tmp_path)
-    m.step(2)
-    m.set("nav.inputs.divisor", 0)
+
+    def fault() -> None:
+        if injected:
+            m.byte(m.instances["nav"].inject_fault_offset)[0] = 1
+        m.set("nav.inputs.divisor", 1 if injected else 0)
+        m.step(1)
+        assert (m.get("nav.outputs.health"), inputs(m, "fresh")) == ("failed", [True])
+        m.set("nav.inputs.divisor", 1)
+
     m.sample("baro")
-    m.step(1)
-    assert m.get("nav.outputs.health") == "failed" and inputs(m, "fresh") == [True]
+    fault()
+    fault()
+    m.step(1)  # the first completed run
+    assert (*inputs(m, "elapsed", "resumed", "fresh"), m.get("nav.counters.last_run")) == (0.001, True, True, 3)
     m.step(1)
     assert inputs(m, "elapsed", "resumed", "fresh") == [0.001, False, False]
+    m.sample("baro")
+    fault()
+    fault()
+    m.step(1)
+    assert inputs(m, "elapsed", "resumed", "fresh") == [0.003, False, True]
+    m.force_state("OUT")
+    m.step(2)
+    m.force_state("A")
+    m.sample("baro")
+    fault()
+    m.step(1)
+    assert inputs(m, "elapsed", "resumed", "fresh") == [0.001, True, True]
+    assert m.get("nav.counters.completed") and m.get("nav.counters.faults") == 5
 
 
 def test_the_first_tick_of_a_state_is_0(tmp_path: Path) -> None:
@@ -212,10 +240,12 @@ def test_a_checkpoint_keeps_what_is_fresh(tmp_path: Path) -> None:
 
 def test_nothing_is_kept_that_nobody_reads(tmp_path: Path) -> None:
     m = craft(tmp_path, connections=[{"from": "channels.baro.valid", "to": "nav.valid"}])
-    assert not [p for p in m.fields if p.endswith(("last_run", "last_sample", "ticks_in_state"))]
+    assert not [p for p in m.fields if p.endswith(KEPT)]
     m = craft(tmp_path / "fresh", connections=[{"from": "channels.baro.fresh", "to": "nav.fresh"}])
-    kept = [p for p in m.fields if p.endswith(("last_run", "last_sample", "ticks_in_state"))]
+    kept = [p for p in m.fields if p.endswith(KEPT)]
     assert kept == ["nav.counters.last_run", "channels.baro.last_sample"]
+    m = craft(tmp_path / "resumed", connections=[{"from": "machine.resumed", "to": "nav.resumed"}])
+    assert [p for p in m.fields if p.endswith(KEPT)] == ["nav.counters.completed"]
 
 
 def test_the_field_table_gives_the_source(tmp_path: Path) -> None:

@@ -1,6 +1,6 @@
 """The laws of the two modes, and what becomes of their commands: roll, pitch, throttle, yaw from -1 to 1."""
 
-from fcsl_builtins import clamp
+from fcsl_builtins import Health, clamp
 from rc import THROTTLE
 
 
@@ -35,6 +35,11 @@ class Auto:
         self.command = [clamp(roll, -1.0, 1.0), clamp(pitch, -1.0, 1.0), self.throttle, clamp(yaw, -1.0, 1.0)]
 
 
+def commands(law: Health) -> bool:
+    """Whether it has made its output. After a fault it has not: the output is an old one, and the last command stays."""
+    return law == "nominal" or law == "degraded"
+
+
 class Selector:
     """The command of the law that runs in this state, or an idle one."""
 
@@ -43,9 +48,9 @@ class Selector:
     parameters = {"idle": "f64[4]"}
 
     def execute(self):
-        if self.manual_health != "stale":
+        if commands(self.manual_health):
             self.command = self.manual
-        elif self.auto_health != "stale":
+        elif commands(self.auto_health):
             self.command = self.auto
-        else:
+        elif self.manual_health == "stale" and self.auto_health == "stale":
             self.command = self.idle

@@ -9,8 +9,10 @@ from ..model.machine import Machine
 def alike(machine: Machine, quiet: frozenset[int]) -> tuple[int, ...]:
     """For each instance of a lowered machine the first one with an equal record and an equal `execute`, often itself.
     Their parameters may differ, unless they are frozen. `quiet`: see bookkeeping.py."""
-    first: dict[tuple[str, str, bool, bool], int] = {}
+    first: dict[tuple[str | bool, ...], int] = {}
     return tuple(
-        first.setdefault((i.algorithm.name, i.execute.name, n in quiet, n in machine.last_runs), n)
+        first.setdefault(
+            (i.algorithm.name, i.execute.name, n in quiet, n in machine.last_runs, n in machine.completed), n
+        )
         for n, i in enumerate(machine.instances)
     )

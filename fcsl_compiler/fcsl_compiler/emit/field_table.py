@@ -110,7 +110,10 @@ def _instance_rows(machine: Machine, index: int, instance: Instance) -> list[Fie
         ("counters.fault_place", "FCSL_U32", "uint32_t", "number of the last fault's place; 0: none so far")
     )
     if index in machine.last_runs:
-        counters.append(("last_run", "FCSL_U64", "uint64_t", "ticks completed after its last run; 0: it has not run"))
+        text = "ticks completed after its last completed run; 0: none so far"
+        counters.append(("last_run", "FCSL_U64", "uint64_t", text))
+    if index in machine.completed:
+        counters.append(("completed", "FCSL_BOOL", "uint8_t", "whether a run has completed since it was stale"))
     for member_of_record, abi_type, c_type, doc in counters:
         path = f"{instance.name}.counters.{member_of_record.removeprefix('counters.')}"
         member = f"i_{instance.name}.{member_of_record}"

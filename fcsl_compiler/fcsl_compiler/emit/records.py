@@ -65,7 +65,9 @@ def _instance(machine: Machine, index: int, instance: Instance) -> Iterator[Fiel
             yield Field(record, Named(record_type(machine, instance.algorithm, record)))
     yield Field("counters", Named(counters_type(machine)))
     if index in machine.last_runs:
-        yield Field("last_run", U64, "ticks completed after its last run; 0: none yet")
+        yield Field("last_run", U64, "ticks completed after its last completed run; 0: none yet")
+    if index in machine.completed:
+        yield Field("completed", U8, "whether a run has completed since it was stale")
 
 
 def _channel(with_last_sample: bool) -> Iterator[Field]:

@@ -96,11 +96,11 @@ class StepEmitter:
         """Handles the instances of a new state. Instances with the same set of states share one test. An instance in
         all states never becomes stale."""
         m = self.m
-        groups: dict[tuple[int, ...], list[Instance]] = {}
-        for index, instance in enumerate(m.instances):
+        groups: dict[tuple[int, ...], list[int]] = {}
+        for index in range(len(m.instances)):
             states = tuple(n for n, s in enumerate(m.states) if any(e.instance == index for e in s.entries))
             if len(states) < len(m.states):
-                groups.setdefault(states, []).append(instance)
+                groups.setdefault(states, []).append(index)
         body: list[Statement] = []
         ends = (Name("left"), Name("entered"))
         if not any(len(states) > 1 for states in groups):
@@ -108,7 +108,7 @@ class StepEmitter:
         if not groups:
             body.append(code.Unused("m"))
         for states, instances in groups.items():
-            stale = [Set(health_of(instance), health(3)) for instance in instances]
+            stale = [store for instance in instances for store in self._made_stale(instance)]
             if len(states) > 1:
                 both = [one_of([Binary("==", end, state_constant(m, n)) for n in states]) for end in ends]
                 body.append(If(code.Not(code.And(tuple(both))), tuple(stale)))
@@ -119,6 +119,12 @@ class StepEmitter:
         )
         parameters: tuple[tuple[str, code.Type], ...] = (("m", self.pointer), *((end.text, STATE) for end in ends))
         return Function(f"fcsl_enter_{m.name}", parameters, None, tuple(body), comment, inline="rare")
+
+    def _made_stale(self, index: int) -> Iterator[Statement]:
+        instance = self.m.instances[index]
+        yield Set(health_of(instance), health(3))
+        if index in self.m.completed:
+            yield Set(Member(record_of(instance), "completed"), Literal(0, code.U8))
 
     def _step(self) -> Function:
         m, host = self.m, Name("host")

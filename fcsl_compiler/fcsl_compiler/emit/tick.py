@@ -262,7 +262,7 @@ class TickEmitter:
         if source.field == "time_ns":
             return self._time_ns()
         period = Literal(entry.divisor / hz, F64)
-        resumed = Binary("==", health_of(receiver), health(3))
+        resumed = Binary("==", Member(record_of(receiver), "completed"), Literal(0, code.U8))
         if source.field == "elapsed":
             ticks = Binary("-", Binary("+", TICK, ONE), Member(record_of(receiver), "last_run"))
             since = Binary("/", code.Convert(F64, ticks), Literal(float(hz), F64))
@@ -290,12 +290,10 @@ class TickEmitter:
     def _run(self, entry: Entry) -> list[Statement]:
         instance = self.m.instances[entry.instance]
         body = [self._copy(connection, entry) for connection in self.feeds.get(entry.instance, [])]
-        if entry.instance in self.m.last_runs:
-            body.append(Set(Member(record_of(instance), "last_run"), Binary("+", TICK, ONE)))
         if entry.instance in self.noted:
             # A watchdog thread reads it while execute runs, so the compiler must not remove the store.
             body.append(Set(Member(MACHINE, "current_"), Literal(entry.instance, I32), volatile=True))
-        body.append(self._execute(entry, instance))
+        body.append(self._completed(entry.instance, self._execute(entry, instance)))
         if instance.max_wcet_us:
             body.append(self._verdict(instance))
         invalid = self.guards.get(entry.instance)
@@ -303,6 +301,21 @@ class TickEmitter:
             tests = [Binary("==", channel_place(c, "valid"), Literal(0, code.U8)) for c in invalid]
             body.append(If(one_of(tests), (Set(health_of(instance), health(2)),)))
         return body
+
+    def _completed(self, index: int, execute: Statement) -> Statement:
+        """An execute, after which what needs it is stored, unless it faulted, by itself, injected or substituted."""
+        record = record_of(self.m.instances[index])
+        stores: list[Statement] = []
+        if index in self.m.last_runs:
+            stores.append(Set(Member(record, "last_run"), Binary("+", TICK, ONE)))
+        if index in self.m.completed:
+            stores.append(Set(Member(record, "completed"), Literal(1, code.U8)))
+        if not stores:
+            return execute
+        before, faults = Name("faults_before"), Member(Member(record, "counters"), "faults")
+        return code.Scope(
+            (code.Let(before.text, U64, faults), execute, If(Binary("==", faults, before), tuple(stores)))
+        )
 
     def _execute(self, entry: Entry, instance: Instance) -> Statement:
         """Exactly one call of execute, used with and without injected health: a second inlined call would add to the

@@ -235,8 +235,16 @@ class Machine:
 
     @cached_property
     def last_runs(self) -> frozenset[int]:
-        """Instances for which the struct stores the tick of the last run."""
+        """Instances for which the struct stores the tick of the last completed run."""
         readers = [c for c in self.connections if c.source.is_of_machine("elapsed") or c.source.is_of_channel("fresh")]
+        return frozenset(c.target.instance for c in readers)
+
+    @cached_property
+    def completed(self) -> frozenset[int]:
+        """Instances for which the struct stores whether a run has completed since they were stale."""
+        readers = [
+            c for c in self.connections if c.source.is_of_machine("resumed") or c.source.is_of_machine("elapsed")
+        ]
         return frozenset(c.target.instance for c in readers)
 
     @cached_property

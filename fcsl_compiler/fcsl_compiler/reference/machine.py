@@ -82,6 +82,7 @@ class _Instance:
         self.inject_overrun = layout.get(f"{self.name}.inject_overrun", -1)
         self.inject_fault = layout[f"{self.name}.inject_fault"]
         self.last_run = _optional(f"{self.name}.counters.last_run", layout)
+        self.completed = layout.get(f"{self.name}.counters.completed")
         own = {record: list(self._leaves(record, layout)) for record in algorithm.records}
         written = [*own["outputs"], *own["state"]]
         if "transition_request" not in algorithm.records["outputs"].members:
@@ -344,7 +345,9 @@ class ReferenceMachine:
             return self._states[self._image.words[self._state]].divisors[receiver] / hz
 
         def resumed() -> bool:
-            return self._image.words[self._instances[receiver].health] == _STALE
+            completed = self._instances[receiver].completed
+            assert completed is not None
+            return not self._image.bytes[completed]
 
         def elapsed() -> float:
             last_run = self._instances[receiver].last_run
@@ -452,6 +455,8 @@ class ReferenceMachine:
         for index, instance in enumerate(self._instances):
             if index not in before & after:
                 image.words[instance.health] = _STALE
+                if instance.completed is not None:
+                    image.bytes[instance.completed] = 0
         image.words[self._state] = state
 
     def _run(self, image: Image, index: int, span: int | None, tick: int) -> None:
@@ -462,19 +467,26 @@ class ReferenceMachine:
         instance.load(instance.self_, image.bytes)
         if instance.is_connected:
             instance.store_inputs(instance.self_, image.bytes)
-        if instance.last_run is not None:
-            image.longs[instance.last_run] = tick + 1
-        image.words[self._current] = index
+        image.words[self._current], faults = index, image.longs[instance.faults]
         substitute = self.host.substitute if instance.algorithm.impure else None
         if substitute is None or not substitute(index):
             instance.execute(image)
         else:
             image.bytes[instance.inject_fault] = 0  # the substituted record contains its effect
+        if image.longs[instance.faults] == faults:
+            self._note_completed(image, instance, tick)
         if instance.limit_ns:
             self._judge_time(image, instance)
         for sensor in self._sensors_of[index]:
             if not image.bytes[sensor.valid]:
                 image.words[instance.health] = _FAILED
+
+    @staticmethod
+    def _note_completed(image: Image, instance: _Instance, tick: int) -> None:
+        if instance.last_run is not None:
+            image.longs[instance.last_run] = tick + 1
+        if instance.completed is not None:
+            image.bytes[instance.completed] = 1
 
     def _clock_ns(self) -> int:
         return self.host.clock_ns() if self.host.clock_ns is not None else 0

@@ -31,7 +31,8 @@ class OracleMachine:
         }
         self.overrun: set[str] = set()
         self.injected: dict[str, str] = {}  # "fault", or the minimum health
-        self.last_run: dict[str, int] = {}  # tick of an instance's last run
+        self.last_run: dict[str, int] = {}  # tick of an instance's last run without a fault
+        self.resumes = set(self.names)  # that have not run without a fault since they were stale
         self.channels: dict[str, dict[str, Any]] = {
             c["name"]: {"attached": False, "fresh": False, "valid": True, "age": 0, "sample": 0, "stamp": 0, **c}
             for c in self.config.get("channels", [])
@@ -82,7 +83,10 @@ class OracleMachine:
         elif action.kind == "fault":
             self.injected[action.target] = "fault"
         elif action.kind == "health":
-            self.injected[action.target] = action.value
+            # A fault is worse than any health.
+            self.injected[action.target] = max(
+                self.injected.get(action.target, "nominal"), action.value, key=(*HEALTH_NAMES[:3], "fault").index
+            )
         elif action.kind == "force":
             self._enter(action.target)
             self.next_state, self.ticks_in_state = action.target, 0
@@ -167,11 +171,10 @@ class OracleMachine:
         if name == "period":
             every = rate.get("every") or hz // rate["hz"] if isinstance(rate, dict) else hz // rate
             return np.float64(every / hz)
-        resumed = self.records[receiver]["outputs"]["health"] == "stale"
         if name == "resumed":
-            return resumed
+            return receiver in self.resumes
         if name == "elapsed":
-            if resumed:
+            if receiver in self.resumes:
                 return self._of_machine("period", receiver)
             return np.float64(self.tick - self.last_run[receiver]) / np.float64(hz)
         if name == "ticks_in_state":
@@ -191,7 +194,6 @@ class OracleMachine:
         for connection in self.connections:
             if connection["to"].split(".")[0] == name and not connection.get("delayed"):
                 self._deliver(connection, self._source(connection))
-        self.last_run[name] = self.tick
         records = self.records[name]
         outputs = records["outputs"]
         outputs["transition_request"], outputs["health"] = "", "nominal"
@@ -201,6 +203,8 @@ class OracleMachine:
             if injected == "fault":
                 raise oracle.Fault("injected")
             oracle.call(self.algorithm(name).execute, records, self.board)
+            self.last_run[name] = self.tick
+            self.resumes.discard(name)
         except oracle.Fault as fault:
             self.counters[name]["fault_place"] = str(fault)  # the oracle knows only the cause of a fault, not its place
             records["outputs"], records["state"] = before
@@ -264,6 +268,7 @@ class OracleMachine:
         for name, records in self.records.items():
             if name not in before or name not in after:
                 records["outputs"]["health"] = "stale"
+                self.resumes.add(name)
         self.state = state
 
     # ---- what a host sees ------------------------------------------------------------------------------------------
@@ -281,8 +286,10 @@ class OracleMachine:
             found["machine.ticks_in_state"] = [self.ticks_in_state]
         for connection in self.connections:
             owner, *path = connection["from"].split(".")
+            receiver = connection["to"].split(".")[0]
+            if connection["from"] in ("machine.elapsed", "machine.resumed"):
+                found[f"{receiver}.counters.completed"] = [receiver not in self.resumes]
             if connection["from"] == "machine.elapsed" or (owner == "channels" and path[-1] == "fresh"):
-                receiver = connection["to"].split(".")[0]
                 found[f"{receiver}.counters.last_run"] = [self.last_run.get(receiver, -1) + 1]
             if owner == "channels" and path[-1] == "fresh":
                 sensor = ".".join(path[:-1])
