@@ -100,6 +100,18 @@ def test_structs_in_structs(tmp_path: Path) -> None:
     assert set(codes(craft(tmp_path, held.format(17), structs=structs(18), views=views))) == {"E232"}
 
 
+@pytest.mark.parametrize("order", [1, -1], ids=["inner first", "outer first"])
+def test_a_chain_of_structs(tmp_path: Path, order: int) -> None:
+    """Its length has one bound, whatever the order in the file."""
+    held = 'class Law:\n    state = {{"s": "S{}"}}\n\n    def execute(self): ...\n'
+    for length, expected in ((33, set()), (34, {"E232"}), (700, {"E232"})):
+        chain = [(f"S{n}", {"m": f"S{n - 1}" if n else "f64"}) for n in range(length)]
+        folder = tmp_path / str(length)
+        folder.mkdir()
+        found = codes(craft(folder, held.format(length - 1), structs=dict(chain[::order])))
+        assert {code for code in found if code[0] == "E"} == expected
+
+
 def test_a_c_compiler_that_does_not_end_is_ended_with_what_it_started(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:

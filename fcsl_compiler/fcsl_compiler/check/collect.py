@@ -187,6 +187,9 @@ def _free(declarations: Declarations, name: str, span: Span, sink: DiagnosticSin
     """Registers a name. Returns False after reporting that the name is already in use."""
     if name in LANGUAGE_NAMES:
         sink.error("E302", f"`{name}` is a name of the language", span, help="use another name")
+    elif name.startswith("__") and not name.endswith("__"):
+        why = "CPython gives such a name another one within a class"
+        sink.error("E302", f"`{name}` begins with two underscores", span, why=why, help="begin it with one")
     elif name in declarations.names.structs:
         sink.error("E302", f"`{name}` is a struct of the machine", span, help="use another name")
     elif name in declarations.defined:

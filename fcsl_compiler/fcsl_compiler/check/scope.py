@@ -35,6 +35,9 @@ LANGUAGE_NAMES = frozenset(
         "range",
         "len",
         "__debug__",
+        # names of a method
+        "self",
+        "__class__",
     }
 )
 

@@ -34,6 +34,7 @@ class _Structs:
     def __init__(self, definitions: dict[str, tuple[JsonNode, Span]], reader: ConfigReader):
         self.definitions, self.reader = definitions, reader
         self.found: dict[str, Struct] = {}
+        self.levels: dict[str, int] = {}  # structs one in another, itself included
 
     def resolve(self, name: str, outside: tuple[str, ...]) -> None:
         """Resolves a struct after the structs it contains. `outside`: the chain of structs that contain it."""
@@ -41,8 +42,9 @@ class _Structs:
         if name in self.found:
             return
         if not self._check_name(name, span):
-            self.found[name] = Struct(name, (), partial=True, span=span)
+            self.found[name], self.levels[name] = Struct(name, (), partial=True, span=span), 1
             return
+        self.levels[name] = 1
         members: list[Member] = []
         for member, (text_node, at) in self.reader.named(definition, f"struct `{name}`").items():
             text = self.reader.string(text_node, f"the type of `{member}`", "f64[3] rad/s")
@@ -62,10 +64,12 @@ class _Structs:
             if inner.group(1) in outside:
                 self._error(f"`{struct}` would contain itself: {' → '.join(chain)}", span, "a value has a fixed size")
                 return None
-            if len(outside) > _MAX_DEPTH:
+            if len(outside) <= _MAX_DEPTH:
+                self.resolve(inner.group(1), outside)
+            if len(outside) > _MAX_DEPTH or self.levels[inner.group(1)] > _MAX_DEPTH:
                 self._error(f"structs nested deeper than {_MAX_DEPTH}", span, "flatten them")
                 return None
-            self.resolve(inner.group(1), outside)
+            self.levels[struct] = max(self.levels[struct], self.levels[inner.group(1)] + 1)
         try:
             type_, unit = parse_type(text, TypeNames({}, self.found), True)
             check_size(type_)
