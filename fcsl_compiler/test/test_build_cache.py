@@ -214,6 +214,7 @@ DAMAGES: dict[str, Callable[[bytes], bytes]] = {
     "zeros in its code": lambda whole: whole[:4096] + bytes(len(whole[4096:])),
     "one bit": lambda whole: whole[:-10] + bytes([whole[-10] ^ 1]) + whole[-9:],
     "empty": lambda whole: b"",
+    "nested deeply": lambda whole: b"[" * 100_000,
 }
 
 
@@ -232,6 +233,23 @@ def test_a_damaged_entry_is_built_again(
     once = place.runs()
     assert bool(once) == (damage(content) != content)  # built.json is shorter than what "cut short" leaves
     assert built(place.start()) == Path(out.strip()) == library and place.runs() == once
+
+
+@pytest.mark.parametrize("file", ["libcraft.so", "built.json"])
+def test_a_pipe_in_the_place_of_a_file_is_replaced(place: Place, library: Path, file: str) -> None:
+    """And nobody waits for who writes into it."""
+    whole = library.read_bytes()
+    library.with_name(file).unlink()
+    os.mkfifo(library.with_name(file))
+    assert built(place.start()) == library and library.read_bytes() == whole
+    assert library.with_name(file).is_file()
+
+
+def test_a_pipe_in_the_place_of_the_lock_is_named(place: Place, library: Path) -> None:
+    (library.with_name("built.json")).unlink()
+    library.with_name("lock").unlink()
+    os.mkfifo(library.with_name("lock"))
+    assert str(library.with_name("lock")) in refused(place.start())
 
 
 def test_a_damaged_model_is_built_again(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:

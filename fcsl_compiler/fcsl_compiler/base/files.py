@@ -33,12 +33,20 @@ class SourceError(Exception):
         self.span = span
 
 
+def open_regular(name: str, flags: int) -> int:
+    """Opener of `open` for regular files alone: pipes and devices neither block nor are read. Raises SourceError and
+    OSError."""
+    handle = os.open(name, flags | os.O_NONBLOCK | os.O_NOCTTY, 0o666)
+    if not stat.S_ISREG(os.fstat(handle).st_mode):
+        os.close(handle)
+        raise SourceError("it is not a regular file")
+    return handle
+
+
 def read_regular(path: Path, limit: int) -> bytes:
     """Reads a regular file. Does not block on pipes or devices. Raises SourceError if it is not a regular file or too
     large, and OSError."""
-    with open(path, "rb", opener=lambda name, flags: os.open(name, flags | os.O_NONBLOCK | os.O_NOCTTY)) as file:
-        if not stat.S_ISREG(os.fstat(file.fileno()).st_mode):
-            raise SourceError("it is not a regular file")
+    with open(path, "rb", opener=open_regular) as file:
         data = file.read(limit + 1)
     if len(data) > limit:
         raise SourceError(f"larger than {limit} bytes")

@@ -7,6 +7,7 @@ import json
 from collections.abc import Sequence
 from pathlib import Path
 
+from ..base.json_file import read_json
 from ..base.usage import UsageError
 from ..driver.passes import Compilation
 from .facts import Facts, machine_facts
@@ -44,7 +45,7 @@ def refuse_foreign(path: Path) -> None:
     if not path.exists():
         return
     try:
-        is_ours = json.loads(path.read_text()).get("kind") == _KIND
+        is_ours = read_json(path).get("kind") == _KIND
     except (OSError, ValueError, AttributeError):
         is_ours = False
     if not is_ours:

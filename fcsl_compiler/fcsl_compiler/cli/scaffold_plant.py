@@ -9,6 +9,7 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from ..base.files import SourceError, read_regular
+from ..base.json_file import json_value
 from ..base.usage import UsageError
 from ..driver.passes import compile_machine
 from ..model.machine import Machine
@@ -227,8 +228,8 @@ def _machines() -> list[Path]:
 
 def _is_machine(path: Path) -> bool:
     try:
-        content = json.loads(read_regular(path, _MACHINE_BYTES))
-    except (OSError, SourceError, ValueError, RecursionError):
+        content = json_value(read_regular(path, _MACHINE_BYTES))
+    except (OSError, SourceError, ValueError):
         return False
     return isinstance(content, dict) and {"tick_hz", "states"} <= content.keys()
 

@@ -4,9 +4,9 @@
 from __future__ import annotations
 
 import argparse
-import json
 from pathlib import Path
 
+from ..base.json_file import read_json
 from ..base.usage import UsageError
 from ..driver.library import check_machine, stack_bounds
 from ..driver.stack import bound_text
@@ -27,6 +27,6 @@ def run(options: argparse.Namespace) -> int:
 
 def _externs_of(map_file: Path) -> list[str]:
     try:
-        return [str(name) for name in json.loads(map_file.read_text())["externs"]]
+        return [str(name) for name in read_json(map_file)["externs"]]
     except (ValueError, KeyError, TypeError):
         raise UsageError(f"--emitted: `{map_file}` is not a map of this fcslc version") from None

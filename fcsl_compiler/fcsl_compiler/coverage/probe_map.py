@@ -8,6 +8,7 @@ import json
 from dataclasses import dataclass, field
 from typing import Any
 
+from ..base.json_file import json_value
 from ..base.source import Span
 from .mcdc import MAX_CONDITIONS, MAX_VECTORS, Tree, combinations, conditions
 
@@ -107,7 +108,7 @@ class CoverMap:
 def read_map(text: bytes) -> CoverMap:
     """Reads the output of `to_json`. Raises CoverError for any other text."""
     try:
-        data = json.loads(text)
+        data = json_value(text)
         if data["version"] != MAP_VERSION:
             raise CoverError(f"its map has version {data['version']!r}; this fcslc reads {MAP_VERSION}")
         made = CoverMap(_text(data["machine"]), _text(data["config"]), [], _number(data["words"], 0, MAX_WORDS))
@@ -117,7 +118,7 @@ def read_map(text: bytes) -> CoverMap:
         return made
     except CoverError:
         raise
-    except (ValueError, KeyError, TypeError, IndexError, AttributeError, RecursionError):
+    except (ValueError, KeyError, TypeError, IndexError, AttributeError):
         raise CoverError("its map has an invalid format") from None
 
 

@@ -11,6 +11,7 @@ from pathlib import Path
 from typing import Any
 
 from ..base.diagnostics import excerpt
+from ..base.json_file import read_json
 from .counts import Counts, added, read_folder
 from .figures import KINDS, NAMES, FileFigures, Miss, Share, figures
 from .probe_map import CoverError
@@ -85,7 +86,7 @@ def refuse_foreign(path: Path) -> None:
     if not path.exists():
         return
     try:
-        is_ours = json.loads(path.read_text(encoding="utf-8")).get("kind") == _KIND
+        is_ours = read_json(path).get("kind") == _KIND
     except (OSError, ValueError, AttributeError):
         is_ours = False
     if not is_ours:

@@ -13,12 +13,15 @@ from collections.abc import Callable
 from pathlib import Path
 from typing import NamedTuple
 
-from ..base.files import digest
+from ..base.files import SourceError, digest, read_regular
+from ..base.json_file import read_json
 from .cache_folder import entry_folder, make_entry_folder
 from .cache_lock import building
 from .toolchain import ToolchainError
 
 _FACTS = "built.json"
+#: Maximum size of a library.
+_LIBRARY_BYTES = 1 << 30
 #: Builds in a row whose inputs changed meanwhile, until the change counts as an error.
 _ATTEMPTS = 3
 
@@ -49,6 +52,7 @@ def cached(
             found = _load(folder, library)
             if found is not None:
                 return found
+            (folder / library).unlink(missing_ok=True)  # whatever stands there: a compiler would write into a pipe
             facts = build(folder / library)
             built_from, now = now, key()
             if now == built_from:
@@ -60,21 +64,22 @@ def cached(
 def _load(folder: Path, library: str) -> Built | None:
     """The entry in a folder. None if there is none, or if a file is damaged, for example by a system crash."""
     try:
-        read = json.loads((folder / _FACTS).read_bytes())
+        read = read_json(folder / _FACTS)
         if read["sha256"] == _sha256(folder / library, read["facts"]):
             return Built(folder / library, read["facts"])
-    except (OSError, ValueError, KeyError, TypeError):
+    except (OSError, SourceError, ValueError, KeyError, TypeError):
         pass
     return None
 
 
 def _sha256(library: Path, facts: dict[str, str]) -> str:
-    return digest(library.read_bytes(), json.dumps(facts))
+    return digest(read_regular(library, _LIBRARY_BYTES), json.dumps(facts))
 
 
 def _publish(folder: Path, library: str, facts: dict[str, str]) -> None:
     for file in folder.iterdir():
-        _sync(file)
+        if file.is_file() or file.is_dir():
+            _sync(file)
     _sync(folder)
     unfinished = folder / f".{_FACTS}-"
     unfinished.write_text(json.dumps({"sha256": _sha256(folder / library, facts), "facts": facts}))

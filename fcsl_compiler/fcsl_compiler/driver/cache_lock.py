@@ -4,10 +4,13 @@
 from __future__ import annotations
 
 import contextlib
+import errno
 import fcntl
 import shutil
 from collections.abc import Iterator
 from pathlib import Path
+
+from ..base.files import SourceError, open_regular
 
 _NAME = "lock"
 
@@ -21,7 +24,12 @@ def building(folder: Path) -> Iterator[None]:
     removed here. Readers need no lock, because results appear atomically by a rename.
     """
     folder.mkdir(parents=True, exist_ok=True)
-    with open(folder / _NAME, "w", encoding="utf-8") as file:
+    path = folder / _NAME
+    try:
+        file = open(path, "w", encoding="utf-8", opener=open_regular)
+    except SourceError as error:
+        raise OSError(errno.EINVAL, str(error), str(path)) from None
+    with file:
         fcntl.flock(file, fcntl.LOCK_EX)
         for left in folder.glob(".*-*"):
             shutil.rmtree(left, ignore_errors=True) if left.is_dir() else left.unlink(missing_ok=True)

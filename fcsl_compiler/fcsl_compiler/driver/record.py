@@ -14,6 +14,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from ..base.files import SourceError, digest, write_whole
+from ..base.json_file import read_json
 from .toolchain import ToolchainError, compiler, toolchain, toolchain_of
 
 if TYPE_CHECKING:  # a process that only loads a library does not import the compiler
@@ -54,7 +55,7 @@ def check_record(library: Path, machine: str, build_hash: str) -> None:
     if not path.is_file():
         return
     try:
-        record = json.loads(path.read_text(encoding="utf-8"))
+        record = read_json(path)
         found = record["machines"].get(machine)
         if record["version"] != _VERSION:
             raise ValueError

@@ -7,7 +7,6 @@ compile, so that the cache has no entry of it.
 
 from __future__ import annotations
 
-import json
 import os
 import re
 from collections.abc import Iterable
@@ -15,6 +14,7 @@ from pathlib import Path
 from typing import Any
 
 from ..base.files import MAX_SOURCE_BYTES, SourceError, read_regular
+from ..base.json_file import json_value
 from .source_path import SourcePathError, resolve_source
 
 #: Matches an import anywhere in the text, also across lines. A false match is harmless.
@@ -40,9 +40,9 @@ def read_texts(config: Path) -> MachineTexts | None:
     """None where the machine JSON or a file that it names cannot be read."""
     try:
         text = _read(config)
-        keys = json.loads(text)
+        keys = json_value(text)
         sources = [algorithm["source"] for algorithm in keys["algorithms"].values()]
-    except (OSError, SourceError, ValueError, RecursionError, LookupError, TypeError, AttributeError):
+    except (OSError, SourceError, ValueError, LookupError, TypeError, AttributeError):
         return None
     files = _files(config, sources) if all(isinstance(source, str) for source in sources) else {}
     return MachineTexts(text, keys, files) if files.keys() >= set(sources) else None

@@ -15,6 +15,8 @@ from typing import Any
 
 import numpy as np
 
+from fcsl_compiler.base.json_file import read_json
+
 from ..errors import SimError
 from .flight import Outcome
 from .study import Study
@@ -61,7 +63,7 @@ class Results:
         if not file.is_file():
             return
         try:
-            found = json.loads(file.read_text())
+            found = read_json(file)
             size = (folder / PLACES).stat().st_size
         except (OSError, ValueError):
             found, size = None, 0

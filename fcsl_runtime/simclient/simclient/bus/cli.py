@@ -17,6 +17,7 @@ from itertools import count, islice
 from pathlib import Path
 from typing import Any
 
+from fcsl_compiler.base.json_file import read_json
 from fcsl_compiler.base.version import add_version
 
 from ..errors import BusError, did_you_mean
@@ -240,7 +241,7 @@ def _machines(session: Session) -> list[BusMachine]:
 
 def _read_descriptors(path: Path) -> list[BusMachine]:
     try:
-        told = json.loads(path.read_text(encoding="utf-8"))
+        told = read_json(path)
         return [read_machine(str(machine["prefix"]), json.dumps(machine["descriptor"])) for machine in told]
     except (ValueError, LookupError, TypeError):
         raise BusError(f"{path}: not what `fcsl-bus list --json` prints") from None

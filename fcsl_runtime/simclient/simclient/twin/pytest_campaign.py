@@ -8,7 +8,6 @@ def test_every_landing_is_soft(fcsl_case):
 
 from __future__ import annotations
 
-import json
 from collections.abc import Iterator
 from pathlib import Path
 from typing import Any
@@ -63,8 +62,10 @@ def _named(node: Any) -> tuple[Path, int]:
     found = path if path.is_absolute() or path.is_file() else node.path.parent / path
     cases = mark.kwargs.get("cases")
     if cases is None:
+        from fcsl_compiler.base.json_file import read_json  # here, because every pytest loads this file
+
         try:
-            cases = json.loads(found.read_text())["cases"]
+            cases = read_json(found)["cases"]
         except (OSError, ValueError, KeyError, TypeError):
             raise pytest.UsageError(f"{node.nodeid}: {found} says no number of `cases`: write {_FORM}") from None
     if type(cases) is not int or cases < 1:

@@ -16,7 +16,7 @@ _WORDS = {"nan": math.nan, "inf": math.inf, "-inf": -math.inf, "True": True, "Fa
 def read_value(text: str) -> Any:
     """Parses a number, true, false, nan, inf, a name (quoted or not), or a list of those."""
     for json_text in (text, _SCALAR.sub(_as_json, text)):
-        with contextlib.suppress(ValueError):
+        with contextlib.suppress(ValueError, RecursionError):
             return json.loads(json_text)
     return text
 
