@@ -25,19 +25,27 @@ static const uint8_t PVT[PVT_BYTES] = {
 /* A request for NAV-PVT, with the checksum that u-blox gives. */
 static const uint8_t POLL[] = {0xB5, 0x62, 0x01, 0x07, 0x00, 0x00, 0x08, 0x19};
 
-static void frame_pvt(const uint8_t payload[PVT_BYTES], uint8_t frame[PVT_FRAME])
+/* A frame of the first `bytes` of a payload. Returns its size. */
+static uint32_t frame_of(const uint8_t *payload, uint32_t bytes, uint8_t frame[PVT_FRAME])
 {
-    static const uint8_t HEAD[] = {0xB5, 0x62, 0x01, 0x07, PVT_BYTES, 0};
+    const uint8_t head[] = {0xB5, 0x62, 0x01, 0x07, (uint8_t)bytes, 0};
+    const uint32_t end = (uint32_t)sizeof head + bytes;
     uint8_t a = 0;
     uint8_t b = 0;
-    memcpy(frame, HEAD, sizeof HEAD);
-    memcpy(frame + sizeof HEAD, payload, PVT_BYTES);
-    for (uint32_t i = 2; i < PVT_FRAME - 2u; i++) {
+    memcpy(frame, head, sizeof head);
+    memcpy(frame + sizeof head, payload, bytes);
+    for (uint32_t i = 2; i < end; i++) {
         a = (uint8_t)(a + frame[i]);
         b = (uint8_t)(b + a);
     }
-    frame[PVT_FRAME - 2] = a;
-    frame[PVT_FRAME - 1] = b;
+    frame[end] = a;
+    frame[end + 1u] = b;
+    return end + 2u;
+}
+
+static void frame_pvt(const uint8_t payload[PVT_BYTES], uint8_t frame[PVT_FRAME])
+{
+    CHECK(frame_of(payload, PVT_BYTES, frame) == PVT_FRAME);
 }
 
 static int feed_ubx(gnss_ubx_t *ubx, const uint8_t *bytes, uint32_t size, gnss_fix_t *fix)
@@ -66,6 +74,9 @@ static void check_pvt(void)
     CHECK(fix.velocity_ned_mps[2] == -0.337f && fix.ground_speed_mps == 2.453f && fix.course_deg == 289.47874f);
     CHECK(fix.horizontal_m == 31.657f && fix.vertical_m == 19.972f && fix.speed_mps == 3.215f);
     CHECK(fix.dilution == 28.46f);
+    const uint32_t size = frame_of(PVT, 84, frame); /* u-blox 7 */
+    CHECK(feed_ubx(&ubx, frame, size, &fix) == 1 && fix.dilution == 28.46f && ubx.others == 1);
+    CHECK(feed_ubx(&ubx, frame, frame_of(PVT, 83, frame), &fix) == 0 && ubx.others == 2);
     memcpy(payload, PVT, sizeof payload);
     payload[5] = 0xFF; /* of the year */
     frame_pvt(payload, frame);
@@ -162,6 +173,38 @@ static void check_signs_and_order(void)
     CHECK(fix.kind == GNSS_NO_FIX && !fix.has_utc && isnan(fix.latitude_deg) && nmea.refused == 0);
 }
 
+/* What both sentences must say for a fix, in either order. */
+static void check_what_is_a_fix(void)
+{
+    static const struct {
+        const char *quality;
+        const char *status;
+        const char *rest; /* of RMC: mode and integrity */
+        gnss_fix_kind_t kind;
+    } CASES[] = {
+        {"1", "A", ",A", GNSS_3D},       {"2", "A", ",D,S", GNSS_3D},     {"3", "A", ",P,C", GNSS_3D},
+        {"4", "A", ",R,V", GNSS_3D},     {"5", "A", ",F", GNSS_3D},       {"9", "A", ",D", GNSS_3D},
+        {"1", "A", "", GNSS_3D}, /* before NMEA 2.3 */
+        {"0", "A", ",A", GNSS_NO_FIX},   {"6", "A", ",A", GNSS_NO_FIX},   {"7", "A", ",A", GNSS_NO_FIX},
+        {"8", "A", ",A", GNSS_NO_FIX},   {"", "A", ",A", GNSS_NO_FIX},    {"12", "A", ",A", GNSS_NO_FIX},
+        {"1", "V", ",A", GNSS_NO_FIX},   {"1", "", ",A", GNSS_NO_FIX},    {"1", "A", ",N", GNSS_NO_FIX},
+        {"1", "A", ",E", GNSS_NO_FIX},   {"1", "A", ",M", GNSS_NO_FIX},   {"1", "A", ",S", GNSS_NO_FIX},
+        {"1", "A", ",A,U", GNSS_NO_FIX}, {"6", "V", ",E,V", GNSS_NO_FIX},
+    };
+    for (size_t i = 0; i < 2u * sizeof CASES / sizeof CASES[0]; i++) {
+        gnss_nmea_t nmea = {0};
+        gnss_fix_t fix;
+        char lines[2][LINE_BYTES];
+        snprintf(lines[0], sizeof lines[0], "GNGGA,123500.00,4807.0,N,01131.0,E,%s,07,0.9,545.4,M,46.9,M,,",
+                 CASES[i / 2u].quality);
+        snprintf(lines[1], sizeof lines[1], "GNRMC,123500.00,%s,4807.0,N,01131.0,E,22.4,84.4,230324,,%s",
+                 CASES[i / 2u].status, CASES[i / 2u].rest);
+        CHECK(feed_nmea(&nmea, lines[i % 2u], &fix) == 0);
+        CHECK(feed_nmea(&nmea, lines[1u - i % 2u], &fix) == 1);
+        CHECK(fix.kind == CASES[i / 2u].kind && fix.satellites == 7 && nmea.refused == 0);
+    }
+}
+
 /* A count that a receiver cannot have counts for nothing; the sentence does. */
 static void check_satellites(void)
 {
@@ -251,6 +294,7 @@ int main(void)
     check_damaged_ubx();
     check_published_nmea();
     check_signs_and_order();
+    check_what_is_a_fix();
     check_satellites();
     check_refused();
     check_garbage();

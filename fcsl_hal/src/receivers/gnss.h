@@ -54,6 +54,7 @@ typedef struct {
     gnss_fix_t fix; /* of what came of it so far */
     int64_t ns_of_day;
     uint32_t seen;
+    int has_fix; /* as its RMC says */
     byte_stream_t stream;
 } gnss_nmea_t;
 

@@ -203,27 +203,48 @@ static int read_time(field_t field, int64_t *ns_of_day)
 
 /* ---- sentences ----------------------------------------------------------------------------------------------------------- */
 
-/* `--GGA,time,latitude,N,longitude,E,quality,satellites,hdop,altitude,M,separation,M,…` */
+/* Whether a field of one letter is among these. */
+static int is_one_of(field_t field, const char *letters)
+{
+    int found = 0;
+    //@ loop unroll FIELDS_MAX;
+    for (uint32_t i = 0; letters[i] != '\0'; i++) {
+        found = found || (field.size == 1u && field.text[0] == letters[i]);
+    }
+    return found;
+}
+
+/* `--GGA,time,latitude,N,longitude,E,quality,satellites,hdop,altitude,M,separation,M,…`. Of the qualities these are measured: 1
+ * autonomous, 2 differential, 3 precise, 4 RTK, 5 RTK with floating ambiguities, 9 SBAS (NovAtel). The others are not: 0 none, 6 dead
+ * reckoning, 7 entered by hand, 8 simulated. */
 static int read_gga(const sentence_t *s, gnss_fix_t *fix)
 {
-    double quality = 0.0;
     double dilution = 0.0;
     double separation = 0.0;
     if (s->count < 12u || read_angle(s->fields[2], s->fields[3], "NS", 90, &fix->latitude_deg) != 0 ||
         read_angle(s->fields[4], s->fields[5], "EW", 180, &fix->longitude_deg) != 0 ||
-        read_number(s->fields[6], &quality) != 0 || read_count(s->fields[7], &fix->satellites) != 0 ||
-        read_number(s->fields[8], &dilution) != 0 || read_number(s->fields[9], &fix->altitude_m) != 0 ||
-        read_number(s->fields[11], &separation) != 0) {
+        read_count(s->fields[7], &fix->satellites) != 0 || read_number(s->fields[8], &dilution) != 0 ||
+        read_number(s->fields[9], &fix->altitude_m) != 0 || read_number(s->fields[11], &separation) != 0) {
         return -1;
     }
     fix->dilution = (float)dilution;
     fix->height_m = fix->altitude_m + separation;
-    const int is_there = quality > 0.0 && isfinite(fix->latitude_deg) && isfinite(fix->longitude_deg);
+    const int is_there =
+        is_one_of(s->fields[6], "123459") && isfinite(fix->latitude_deg) && isfinite(fix->longitude_deg);
     fix->kind = !is_there ? GNSS_NO_FIX : isfinite(fix->altitude_m) ? GNSS_3D : GNSS_2D;
     return 0;
 }
 
-/* `--RMC,time,A,latitude,N,longitude,E,knots,course,ddmmyy,…` */
+/* Whether an RMC tells of a fix. Its status is A. Its mode, which came with NMEA 2.3, is autonomous, differential, float RTK, precise or
+ * RTK; not estimated (E), by hand (M), simulated (S) or none (N). Its integrity (NMEA 4.1) is not U, unsafe; u-blox always sends V
+ * there, which is that it tells none. */
+static int has_fix(const sentence_t *s)
+{
+    return is_one_of(s->fields[2], "A") && (s->fields[12].size == 0u || is_one_of(s->fields[12], "ADFPR")) &&
+           !is_one_of(s->fields[13], "U");
+}
+
+/* `--RMC,time,status,latitude,N,longitude,E,knots,course,ddmmyy,variation,E,mode,integrity` */
 static int read_rmc(const sentence_t *s, int64_t ns_of_day, gnss_fix_t *fix)
 {
     double knots = 0.0;
@@ -279,6 +300,9 @@ int gnss_nmea_take(gnss_nmea_t *nmea, uint8_t byte, gnss_fix_t *fix)
         nmea->ns_of_day = ns_of_day;
         nmea->seen = 0;
     }
+    if (kind == RMC) {
+        nmea->has_fix = has_fix(&sentence);
+    }
     if ((kind == GGA ? read_gga(&sentence, &nmea->fix) : read_rmc(&sentence, ns_of_day, &nmea->fix)) != 0) {
         nmea->refused++;
         nmea->seen = 0;
@@ -290,5 +314,6 @@ int gnss_nmea_take(gnss_nmea_t *nmea, uint8_t byte, gnss_fix_t *fix)
     }
     nmea->seen = 0;
     *fix = nmea->fix;
+    fix->kind = nmea->has_fix ? fix->kind : GNSS_NO_FIX; /* what one of the two doubts is no fix */
     return 1;
 }

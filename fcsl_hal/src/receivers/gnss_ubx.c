@@ -16,6 +16,7 @@ enum {
     CLASS_NAV = 0x01,
     NUMBER_PVT = 0x07,
     PVT_BYTES = 92,
+    PVT_BYTES_OF_7 = 84, /* up to u-blox 7, which lacks the last fields; none of them is read */
     VALID_DATE_TIME = 3,
     YEAR_MIN = 1980,
     YEAR_MAX = 2200, /* 64 bits hold its nanoseconds */
@@ -119,7 +120,8 @@ int gnss_ubx_take(gnss_ubx_t *ubx, uint8_t byte, gnss_fix_t *fix)
     if (size == 0u) {
         return 0;
     }
-    if (bytes[2] != CLASS_NAV || bytes[3] != NUMBER_PVT || size != PVT_BYTES + FRAME) {
+    if (bytes[2] != CLASS_NAV || bytes[3] != NUMBER_PVT ||
+        (size != PVT_BYTES + FRAME && size != PVT_BYTES_OF_7 + FRAME)) {
         ubx->others++;
         return 0;
     }
