@@ -88,6 +88,15 @@ def test_build(config: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str])
     assert machine.get("one.outputs.y") == 3.0
 
 
+def test_a_folder_named_like_an_option(
+    config: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    shutil.copytree(config.parent, tmp_path / "-dash")
+    monkeypatch.chdir(tmp_path)
+    assert fcslc(capsys, "build", f"./-dash/{config.name}", "-o", "./-dash/out")[0] == 0
+    assert (tmp_path / "-dash" / "out" / "libcraft.so").is_file()
+
+
 def test_build_beside_the_config_and_under_a_name(config: Path, capsys: pytest.CaptureFixture[str]) -> None:
     assert fcslc(capsys, "build", config, "--name", "both")[0] == 0
     assert (config.parent / "build" / "libboth.so").is_file()

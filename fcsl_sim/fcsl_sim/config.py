@@ -40,6 +40,7 @@ from .plugins import model_library, model_source
 from .ros import TruthTopic
 from .set_argument import Settings, with_elements
 from .table_parameter import read_table
+from .whole_ticks import whole_ticks
 from .wiring import MAX_SECONDS, Instance, Wiring, check_wiring, seconds
 
 MAX_TICKS = 10**12
@@ -174,15 +175,18 @@ def _require_compiler() -> None:
 
 def _duration_problem(duration_s: Fraction, tick_hz: int) -> str | None:
     """The reason why a duration is invalid; None if it is valid."""
-    ticks = duration_s * tick_hz
     text = f"{float(duration_s):g} s"
     if duration_s <= 0:
         return f"{text} is not above zero"
     if duration_s > MAX_SECONDS:
         return f"{text} is more than {MAX_SECONDS:g} s"
-    if ticks > MAX_TICKS:
+    if duration_s * tick_hz > MAX_TICKS:
         return f"{text} is more than {MAX_TICKS:g} ticks (1/{tick_hz} s)"
-    return None if ticks.denominator == 1 else f"{text} is not a whole number of ticks (1/{tick_hz} s)"
+    try:
+        whole_ticks(duration_s, tick_hz)
+    except ValueError as error:
+        return str(error)
+    return None
 
 
 def _plant_only(tick_hz: int) -> tuple[Path, str]:

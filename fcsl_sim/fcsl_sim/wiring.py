@@ -111,7 +111,9 @@ class _Edge:
 def seconds(reader: ConfigReader, node: JsonNode | None, what: str) -> Fraction | None:
     """A duration in s, as the exact decimal number in the file."""
     value = reader.number(node, what, 0.0, MAX_SECONDS)
-    return None if value is None else Fraction(repr(value))
+    if value is None or node is None:
+        return None
+    return Fraction(node.text) if value > 0.0 else Fraction(0)  # 1e-99999999 would take minutes
 
 
 def first(span: Span) -> Span:

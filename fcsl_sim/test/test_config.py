@@ -57,7 +57,11 @@ EVENT = {"at_s": 0.1, "set": "altimeter.parameters.bias", "value": 1.0}
         (edit("seed", value=-1), ["E204: `seed` is -1"]),
         (edit("seed", value=1.0), ["E208: `seed` is an integer, not a float"]),
         (edit("duration", value=0), ["E805: 0 s is not above zero"]),
-        (edit("duration", value=0.015), ["E805: 0.015 s is not a whole number of ticks (1/100 s)"]),
+        (edit("duration", value=0.015), ["E805: 0.015 s is not a whole number of ticks (1/100 s); write 0.01 or 0.02"]),
+        (
+            edit("duration", value=0.1 + 0.2),
+            ["E805: 0.30000000000000004 s is not a whole number of ticks (1/100 s); write 0.3 or 0.31"],
+        ),
         (edit("duration", value="1"), ["E208: `duration` is a number, not a string"]),
         (edit("integrator", "method", value="rk5"), ["E205: `method` cannot be `rk5`"]),
         (edit("integrator", "hz", value=250), ["E805: the integrator's 250 Hz is not a multiple of tick_hz (100)"]),
@@ -282,7 +286,7 @@ def test_the_command_line_is_checked(text: str, expected: str, load_sim: Load) -
 @pytest.mark.parametrize(
     ("duration_s", "message"),
     [
-        (Fraction("0.005"), "duration: 0.005 s is not a whole number of ticks (1/100 s)"),
+        (Fraction("0.005"), "duration: 0.005 s is not a whole number of ticks (1/100 s); write 0.01"),
         (Fraction(0), "duration: 0 s is not above zero"),
         (Fraction("1e300"), "duration: 1e+300 s is more than 1e+09 s"),
     ],

@@ -13,7 +13,7 @@ from ..base.diagnostics import DiagnosticSink, nearest
 from ..base.source import Span
 from ..model import ir, ops
 from ..model.literals import STRING_LITERAL
-from ..model.types import BOOL, F64, HEALTH, HEALTH_NAMES, REQUEST, Array, Results, Scalar, Type
+from ..model.types import BOOL, F64, HEALTH, HEALTH_NAMES, REQUEST, SCALARS, Array, Results, Scalar, Type
 from ..parse.python_source import span_of
 from .folding import DoesNotFit, fold
 from .inference import Inference
@@ -253,7 +253,9 @@ class Checker:
             why = "requests and healths have no arithmetic and no order"
             fix = "compare with `==` or `!=`"
         elif BOOL in scalars:
-            fix = "write `1.0 if condition else 0.0`" if len(set(scalars)) > 1 or symbol in "+-*/" else ""
+            is_number = symbol in SCALARS or len(set(scalars)) > 1 or symbol in "+-*/"
+            one, zero = ("1", "0") if symbol in SCALARS and SCALARS[symbol].is_integer else ("1.0", "0.0")
+            fix = f"write `{one} if condition else {zero}`" if is_number else ""
             fix = fix or ("write `not x`" if len(types) == 1 else "")
             why = "a bool has no arithmetic and no order"
         elif len(set(types)) > 1:

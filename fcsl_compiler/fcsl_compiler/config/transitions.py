@@ -7,7 +7,7 @@ from fractions import Fraction
 
 from ..base.diagnostics import nearest
 from ..base.source import Span
-from ..model.machine import Edge, Instance, seconds
+from ..model.machine import Edge, Instance, nearest_seconds
 from ..model.types import HEALTH_NAMES
 from ..parse.json_reader import ConfigReader, is_name
 from ..parse.json_source import JsonNode
@@ -159,20 +159,10 @@ def _after(node: JsonNode, tick_hz: int, reader: ConfigReader) -> int | None:
     ticks = Fraction(node.text) * tick_hz
     if ticks.denominator == 1:
         return ticks.numerator
-    fix = f"write {' or '.join(seconds(n, tick_hz) for n in _writable(ticks, tick_hz))}"
+    fix = f"write {' or '.join(nearest_seconds(ticks, tick_hz))}"
     message = f"{node.text} s is not a whole number of ticks at {tick_hz} Hz"
     reader.sink.error("E244", message, node.span, why="a state lasts a whole number of ticks", help=fix)
     return None
-
-
-def _writable(ticks: Fraction, tick_hz: int) -> list[int]:
-    """The nearest numbers of ticks, below and above, whose time in s has a finite decimal representation."""
-    step = tick_hz
-    for prime in (2, 5):
-        while step % prime == 0:
-            step //= prime
-    below = ticks // step * step
-    return [n for n in (below, below + step) if n > 0]
 
 
 def _sources(node: JsonNode, states: list[str], target: int, reader: ConfigReader) -> list[int]:

@@ -251,6 +251,11 @@ def _end_group(child: subprocess.Popen[bytes]) -> None:
         child.wait()
 
 
+def as_argument(path: Path) -> str:
+    """A path that a compiler does not take for an option."""
+    return f"./{path}" if str(path).startswith("-") else str(path)
+
+
 def compile_objects(sources: Sequence[Path], includes: Sequence[Path], folder: Path) -> list[Path]:
     """Compiles each C source to an object in `folder`, with its call graph beside it if the compiler writes them.
 
@@ -261,7 +266,7 @@ def compile_objects(sources: Sequence[Path], includes: Sequence[Path], folder: P
     # Numbered, because sources of two folders may have the same name.
     objects = [folder / f"{number}-{source.stem}.o" for number, source in enumerate(sources)]
     run_compilers(
-        [[*compiler(), *flags, "-c", str(s), "-o", str(made)] for s, made in zip(sources, objects, strict=True)]
+        [[*compiler(), *flags, "-c", as_argument(s), "-o", str(made)] for s, made in zip(sources, objects, strict=True)]
     )
     return objects
 
@@ -284,7 +289,13 @@ def link_shared(
     output.parent.mkdir(parents=True, exist_ok=True)
     with tempfile.TemporaryDirectory(dir=output.parent, prefix=".build-") as folder:
         made = Path(folder) / output.name
-        command = [*language.compiler(), *language.flags, "-shared", *(f"-I{d}" for d in includes), *map(str, inputs)]
+        command = [
+            *language.compiler(),
+            *language.flags,
+            "-shared",
+            *(f"-I{d}" for d in includes),
+            *map(as_argument, inputs),
+        ]
         command += [str(math_library()), *flags, "-lm", *LINK_FLAGS, "-o", str(made)]
         names = Path(folder) / "exports.map"
         shared = (

@@ -6,6 +6,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 from dataclasses import field as dataclass_field
 from decimal import Decimal, localcontext
+from fractions import Fraction
 from functools import cached_property
 
 from ..base.source import SourceFile, Span
@@ -115,6 +116,16 @@ def seconds(ticks: int, tick_hz: int) -> str:
     """Time of `ticks` in s, as an exact decimal if it is finite (else 60 digits)."""
     with localcontext(prec=60):
         return f"{Decimal(ticks) / tick_hz:f}"
+
+
+def nearest_seconds(ticks: Fraction, tick_hz: int) -> list[str]:
+    """The times in s nearest to `ticks` ticks, below and above, that are a whole number of them and a finite decimal."""
+    step = tick_hz
+    for prime in (2, 5):
+        while step % prime == 0:
+            step //= prime
+    below = ticks // step * step
+    return [seconds(n, tick_hz) for n in (below, below + step) if n > 0]
 
 
 @dataclass(frozen=True)

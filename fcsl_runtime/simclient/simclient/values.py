@@ -34,6 +34,12 @@ NAMED_TYPES = ("Health", "TransitionRequest", "state")
 Value = Any
 
 
+def whole_number(value: Any) -> int | None:
+    """An int, also one of NumPy; None for anything else, a bool included."""
+    number = value.tolist() if hasattr(value, "tolist") else value
+    return number if type(number) is int else None
+
+
 def _named(index: int, names: Sequence[str]) -> str:
     return names[index] if 0 <= index < len(names) else f"<invalid {index}>"
 

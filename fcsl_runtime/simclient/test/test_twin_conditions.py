@@ -41,7 +41,9 @@ def test_a_condition_is_true_or_false(twin: Twin) -> None:
     for wrong in (None, 3, True):
         with pytest.raises(TwinError, match="is not a condition; write an expression as a text, or a function"):
             twin.run_until(wrong, 5)  # type: ignore[arg-type]
-    for ticks in (10.5, -1, None, True):
+    now = twin.tick(np.int64(3))
+    assert twin.run_until(f"machine.tick == {now + 1}", np.uint8(2)) == 1
+    for ticks in (10.5, -1, None, True, np.float64(3.0), np.bool_(True)):
         with pytest.raises(TwinError, match=r"run_until\(…, .*\): a number of ticks from 0"):
             twin.run_until("machine.tick > 5", ticks)  # type: ignore[arg-type]
 

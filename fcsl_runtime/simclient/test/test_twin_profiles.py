@@ -66,6 +66,13 @@ def test_what_cannot_be_injected(twin: Twin, profile: Any, reason: str) -> None:
         reason = "a struct; give an array for each of its fields"
     with pytest.raises(TwinError, match=reason):
         twin.inject(profile)
+    assert twin.get_value("machine.tick") == 0  # nothing of it was applied
+
+
+def test_a_masked_element_may_be_anything(twin: Twin) -> None:
+    limit = np.ma.MaskedArray([5.0, 5000.0], mask=[False, True])
+    assert twin.inject({"watch.parameters.limit": limit}) == 2
+    assert twin.get_value("watch.parameters.limit") == 5.0
 
 
 def test_a_bag_is_injected(twin: Twin, open_twin: Open, craft: Path, tmp_path: Path) -> None:

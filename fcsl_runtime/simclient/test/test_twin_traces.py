@@ -56,6 +56,8 @@ def test_shapes_and_types(twin: Twin) -> None:
     trace.stop()
     twin.tick()
     assert len(trace) == 200
+    assert list(trace) == [field.path for field in twin.fields()] and all(path in trace for path in trace)
+    assert "watch.outputs.table[1]" in trace and "watch.outputs.nothing" not in trace and 0 not in trace
     assert trace["watch.outputs.table"].shape == (200, 2, 3) and trace["watch.outputs.table[1]"].shape == (200, 3)
     assert trace["watch.outputs.table[1][2]"].tolist() == [1.5] * 200
     assert trace["watch.outputs.ok"].dtype == bool and trace["watch.outputs.count"].dtype == np.int64

@@ -21,6 +21,7 @@ from ..element_path import place_of, split_path
 from ..errors import SimError
 from ..models import ModelField
 from ..native import Simulation
+from ..whole_ticks import whole_ticks
 
 Array = np.ndarray[Any, Any]
 _FORMATS = {"f64": "d", "f32": "f"}
@@ -48,11 +49,11 @@ class Plant:
         self.config = config
         self._simulation = Simulation(config.plan, config.tables)
         # The first tick gives the inputs their first values.
-        ticks = (at_s or 0) * config.machine.tick_hz
-        if int(ticks) != ticks:
+        try:
+            tick = whole_ticks(at_s or Fraction(0), config.machine.tick_hz) + 1
+        except ValueError as error:
             self.close()
-            raise SimError(f"{float(at_s or 0):g} s is not a whole number of ticks (1/{config.machine.tick_hz} s)")
-        tick = int(ticks) + 1
+            raise SimError(str(error)) from None
         while self._simulation.tick < tick and self._simulation.status == "running":
             self._simulation.run(tick - self._simulation.tick)
         if self._simulation.tick < tick:

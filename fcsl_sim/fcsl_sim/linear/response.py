@@ -39,6 +39,7 @@ from ..element_path import place_of, split_path
 from ..errors import SimError
 from ..sim_run import SimRun
 from ..sim_twin import SimTwin
+from ..whole_ticks import whole_ticks
 from .injection import with_injections
 
 Array = np.ndarray[Any, Any]
@@ -126,9 +127,10 @@ class Response:
         if not 0.0 < within < 1.0:
             raise SimError(f"`--within` {within:g} is a part of an amplitude: above 0 and below 1")
         self.tick_hz = config.machine.tick_hz
-        ticks = (at_s or 0) * self.tick_hz
-        if int(ticks) != ticks:
-            raise SimError(f"{float(at_s or 0):g} s is not a whole number of ticks (1/{self.tick_hz} s)")
+        try:
+            ticks = whole_ticks(at_s or Fraction(0), self.tick_hz)
+        except ValueError as error:
+            raise SimError(str(error)) from None
         self._amplitude, self.within = amplitude, within
         self._controllers = {"machine.state": "the controller"}
         self._controllers |= {f"{name}.machine.state": f"controller `{name}`" for name in config.companions}
@@ -141,7 +143,7 @@ class Response:
             for _ in range(2):
                 self._twins.append(SimTwin(SimRun(injected)))
             self._outputs = [_Output(self._twins[0], path) for path in outputs]
-            self._start = self._fly_to(int(ticks))
+            self._start = self._fly_to(ticks)
             self._states = {path: self._twins[0].get_value(path) for path in self._controllers}
         except TwinError as error:
             self.close()

@@ -8,7 +8,7 @@ from typing import Any
 
 from ..descriptor import Channel, FaultPlace
 from ..errors import TwinError, did_you_mean
-from ..values import Value, encode_part
+from ..values import Value, encode_part, whole_number
 from .host import TwinHost
 
 #: max_age_ticks of a channel whose samples never expire.
@@ -16,8 +16,8 @@ _NEVER = 2**32 - 1
 
 
 def _integer(value: Any, what: str, low: int, high: int) -> int:
-    number = value.tolist() if hasattr(value, "tolist") else value
-    if type(number) is not int or not low <= number <= high:
+    number = whole_number(value)
+    if number is None or not low <= number <= high:
         raise TwinError(f"sample(): {what} is an integer from {low} to {high}, not {value!r}")
     return number
 

@@ -146,6 +146,8 @@ def _masked(array: Any) -> Array:
 def _encoded(path: str, array: Any, part: Selection, machine: Machine) -> bytes:
     """The scalars of all ticks as bytes, tick by tick."""
     field = part.field
+    if field.bounded:
+        _check_range(path, array, field)
     if isinstance(array, np.ma.MaskedArray):
         array = array.filled(np.zeros(1, array.dtype)[0])
     if field.type not in ("bool", "i32", "i64", "u32", "u64", "f32", "f64"):
@@ -158,6 +160,14 @@ def _encoded(path: str, array: Any, part: Selection, machine: Machine) -> bytes:
         raise TwinError(f"{path}: an array of {wanted} wanted, got one of {' × '.join(map(str, given.shape))}")
     _check_kind(path, given, field)
     return np.ascontiguousarray(given.astype(f"={TYPE_FORMATS[field.type]}")).tobytes()
+
+
+def _check_range(path: str, array: Any, field: Field) -> None:
+    """Before the first tick: a host may not set what is outside. Masked elements are not set."""
+    values = np.ma.compressed(array) if isinstance(array, np.ma.MaskedArray) else np.asarray(array).ravel()
+    outside = values[~((values >= field.minimum) & (values <= field.maximum))] if values.dtype.kind in "iuf" else []
+    if len(outside):
+        raise TwinError(f"{path}: lies in [{field.minimum:g}, {field.maximum:g}], not {outside[0]:g}")
 
 
 def _check_kind(path: str, given: Array, field: Field) -> None:

@@ -9,7 +9,7 @@ machine is 0), `time_s` its time in s.
 from __future__ import annotations
 
 import csv
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from pathlib import Path
 from types import TracebackType
 from typing import TYPE_CHECKING, Any, Self
@@ -62,6 +62,17 @@ class Columns:
 
     def __len__(self) -> int:
         return len(self._raw())
+
+    def __iter__(self) -> Iterator[str]:
+        """The paths of the fields that were traced."""
+        return iter(self._at)
+
+    def __contains__(self, path: object) -> bool:
+        """Whether `[path]` has a column."""
+        try:
+            return isinstance(path, str) and self[path] is not None
+        except TwinError:
+            return False
 
     def __getitem__(self, path: str) -> Array:
         """The column of a field, a struct or a part of either. Raises TwinError if it was not traced."""

@@ -24,7 +24,7 @@ from ..descriptor import Channel, Field, Instance, why_read_only
 from ..errors import TwinError, did_you_mean
 from ..machine_build import find_config
 from ..paths import Selection, Struct, StructArray
-from ..values import Value, encode_part, read_part
+from ..values import Value, encode_part, read_part, whole_number
 from .condition import Condition
 from .faults import TwinFaults
 
@@ -34,6 +34,13 @@ if TYPE_CHECKING:
     from .trace import Trace
 
 _MAX_TICKS = 2**63
+
+
+def _ticks(value: Any, call: str) -> int:
+    number = whole_number(value)
+    if number is None or not 0 <= number < _MAX_TICKS:
+        raise TwinError(f"{call}: a number of ticks from 0 to 2**63 - 1 wanted")
+    return number
 
 
 class Twin(TwinFaults):
@@ -91,9 +98,7 @@ class Twin(TwinFaults):
 
         Ctrl-C stops it between two ticks. Raises TwinError while running, and for an invalid `n`.
         """
-        if type(n) is not int or not 0 <= n < _MAX_TICKS:
-            raise TwinError(f"tick({n!r}): a number of ticks from 0 to 2**63 - 1 wanted")
-        return self._advance(n)
+        return self._advance(_ticks(n, f"tick({n!r})"))
 
     def run_until(self, condition: str | Callable[[Self], bool], timeout_ticks: int) -> int:
         """Runs tick by tick until `condition` holds; returns the ticks run, 0 if it held already.
@@ -103,8 +108,7 @@ class Twin(TwinFaults):
         1e-3 and machine.state == 'COAST'". Its value, and the operands of `and or not`, must be True or False. Raises
         TwinError otherwise, and if it does not hold after `timeout_ticks` ticks, with the values that it read last.
         """
-        if type(timeout_ticks) is not int or not 0 <= timeout_ticks < _MAX_TICKS:
-            raise TwinError(f"run_until(…, {timeout_ticks!r}): a number of ticks from 0 to 2**63 - 1 wanted")
+        timeout_ticks = _ticks(timeout_ticks, f"run_until(…, {timeout_ticks!r})")
         holds = Condition(condition, self)
         for ticks in range(timeout_ticks + 1):
             if holds():
