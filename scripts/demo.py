@@ -221,7 +221,8 @@ def real_robot() -> bool:
     headline("8. a real robot's bag through the attitude filter")
     if not JACKAL.is_dir():
         say(
-            f"no bag at {JACKAL}: this step is left out (FCSL_JACKAL_BAG names a bag with sensor_msgs/Imu on /imu/data)"
+            "left out: the bag of a robot is not part of the project; name one with sensor_msgs/Imu on /imu/data:  "
+            "FCSL_JACKAL_BAG=BAG make demo"
         )
         return False
     bag, config = OUT / "ahrs", "examples/ahrs/ahrs.json"

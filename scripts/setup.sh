@@ -136,7 +136,7 @@ tools() {
     echo "$python" > "$venv/.fcsl-python"
     local groups=(--group workspace)
     if [ ! -d "$ros" ]; then groups+=(--group ros-wheels); fi
-    progress "uv" "$venv/bin/python" -m pip install --disable-pip-version-check --no-compile -c constraints.txt uv
+    progress "uv" "$venv/bin/python" -m pip install --progress-bar off --disable-pip-version-check --no-compile -c constraints.txt uv
     python_packages "Python packages (about 300 MB to download)" "${groups[@]}"
     if [ ! -d "$ros" ]; then bash scripts/ros_wheels.sh "$venv"; fi
     local manifest cargo

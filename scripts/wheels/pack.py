@@ -92,7 +92,13 @@ def metadata(version: str, licence: str) -> bytes:
         for requirement in requirements(groups, extra):
             message["Requires-Dist"] = f'{requirement}; extra == "{extra}"'
     message["Description-Content-Type"] = "text/markdown"
-    return f"{message}{readme}".encode()
+    return f"{message}{introduction(readme)}".encode()
+
+
+def introduction(readme: str) -> str:
+    """What stands before the first heading below the title, without pictures and links: the folder is not there."""
+    begin = re.sub(r"^!\[.*\n", "", readme.partition("\n## ")[0], flags=re.MULTILINE)
+    return re.sub(r"\[([^\]]+)\]\([^)]+\)", r"\1", begin).rstrip() + "\n"
 
 
 def third_party_licences() -> bytes:

@@ -57,7 +57,7 @@ def missing_package(error: ModuleNotFoundError) -> str:
     if not module or module.startswith(("fcsl", "simclient")):
         raise error
     package = _PACKAGES.get(module, module)
-    return f"it needs the Python package {package}: python3 -m pip install {package}"
+    return f"it needs the Python package {package}: python3 -m pip install {package}; the wheel's extra `fcsl[all]` brings all"
 
 
 def completeness(name: str, damage: str) -> int:
