@@ -165,7 +165,9 @@ def _encoded(path: str, array: Any, part: Selection, machine: Machine) -> bytes:
 def _check_range(path: str, array: Any, field: Field) -> None:
     """Before the first tick: a host may not set what is outside. Masked elements are not set."""
     values = np.ma.compressed(array) if isinstance(array, np.ma.MaskedArray) else np.asarray(array).ravel()
-    outside = values[~((values >= field.minimum) & (values <= field.maximum))] if values.dtype.kind in "iuf" else []
+    if values.dtype.kind not in "iuf":
+        return  # refused by its kind
+    outside = values[~((values >= field.minimum) & (values <= field.maximum))]
     if len(outside):
         raise TwinError(f"{path}: lies in [{field.minimum:g}, {field.maximum:g}], not {outside[0]:g}")
 
