@@ -8,8 +8,6 @@
 #include "receivers/rc.h"
 
 enum { SBUS_BYTES = 25, CRSF_BYTES = 26 };
-static const uint64_t BYTE_NS = 120000; /* 12 bits at 100000 baud */
-static const uint64_t PAUSE_NS = 4000000;
 
 /* The example of the crate sbus-protocol, and the channels that it tells. */
 static const uint8_t SBUS[SBUS_BYTES] = {0x0F, 0xE0, 0x03, 0x1F, 0x58, 0xC0, 0x07, 0x16, 0xB0, 0x80, 0x05, 0x2C, 0x60,
@@ -27,14 +25,12 @@ static const int CRSF_CHANNELS[] = {189, 993, 978, 983, 991, 991, 991, 2015, 145
 /* ---- SBUS --------------------------------------------------------------------------------------------------------------- */
 
 /* Frames that come of these bytes; the last one is *frame. */
-static int feed_sbus(rc_sbus_t *sbus, const uint8_t *bytes, uint32_t size, uint64_t *time_ns, rc_frame_t *frame)
+static int feed_sbus(rc_sbus_t *sbus, const uint8_t *bytes, uint32_t size, rc_frame_t *frame)
 {
     int frames = 0;
     for (uint32_t i = 0; i < size; i++) {
-        *time_ns += BYTE_NS;
-        frames += rc_sbus_take(sbus, bytes[i], *time_ns, frame);
+        frames += rc_sbus_take(sbus, bytes[i], frame);
     }
-    *time_ns += PAUSE_NS;
     return frames;
 }
 
@@ -52,8 +48,8 @@ static void check_published_sbus(void)
 {
     rc_sbus_t sbus = {0};
     rc_frame_t frame;
-    uint64_t time_ns = PAUSE_NS;
-    CHECK(feed_sbus(&sbus, SBUS, SBUS_BYTES, &time_ns, &frame) == 1);
+    CHECK(feed_sbus(&sbus, SBUS, SBUS_BYTES, &frame) == 0);
+    CHECK(feed_sbus(&sbus, SBUS, SBUS_BYTES, &frame) == 1);
     CHECK(has_channels(&frame, SBUS_CHANNELS));
     CHECK(frame.count == 18 && frame.pulse_us[16] == 2000.0f && frame.pulse_us[17] == 2000.0f);
     CHECK(!frame.frame_lost && !frame.failsafe && sbus.stream.garbage == 0);
@@ -73,29 +69,68 @@ static void check_sbus_flags(void)
         rc_sbus_t sbus = {0};
         rc_frame_t frame;
         uint8_t bytes[SBUS_BYTES];
-        uint64_t time_ns = PAUSE_NS;
+        CHECK(feed_sbus(&sbus, SBUS, SBUS_BYTES, &frame) + feed_sbus(&sbus, SBUS, SBUS_BYTES, &frame) == 1);
         memcpy(bytes, SBUS, sizeof bytes);
         bytes[23] = CASES[i].flags;
         bytes[24] = CASES[i].end;
-        CHECK(feed_sbus(&sbus, bytes, sizeof bytes, &time_ns, &frame) == CASES[i].taken);
+        CHECK(feed_sbus(&sbus, bytes, sizeof bytes, &frame) == CASES[i].taken);
         CHECK(!CASES[i].taken || (frame.frame_lost == CASES[i].frame_lost && frame.failsafe == CASES[i].failsafe));
     }
 }
 
-/* One byte is lost in every other frame: the pause begins the next one. */
+/* A byte is lost in a frame, or one comes in addition: the frame behind it tells where they begin, and the next one is taken. */
 static void check_sbus_loses_bytes(void)
 {
     rc_sbus_t sbus = {0};
     rc_frame_t frame;
-    uint64_t time_ns = PAUSE_NS;
-    for (uint32_t lost = 0; lost < SBUS_BYTES; lost++) {
-        uint8_t bytes[SBUS_BYTES];
-        memcpy(bytes, SBUS, lost);
-        memcpy(bytes + lost, SBUS + lost + 1, SBUS_BYTES - lost - 1u);
-        CHECK(feed_sbus(&sbus, bytes, SBUS_BYTES - 1u, &time_ns, &frame) == 0);
-        CHECK(feed_sbus(&sbus, SBUS, SBUS_BYTES, &time_ns, &frame) == 1 && has_channels(&frame, SBUS_CHANNELS));
+    CHECK(feed_sbus(&sbus, SBUS, SBUS_BYTES, &frame) + feed_sbus(&sbus, SBUS, SBUS_BYTES, &frame) == 1);
+    for (uint32_t at = 0; at < 2u * SBUS_BYTES - 1u; at++) {
+        const int is_more = at >= SBUS_BYTES;
+        const uint32_t place = is_more ? at - SBUS_BYTES + 1u : at;
+        uint8_t bytes[SBUS_BYTES + 1] = {0};
+        memcpy(bytes, SBUS, place);
+        bytes[place] = 0x55;
+        memcpy(bytes + place + is_more, SBUS + place + !is_more, SBUS_BYTES - place - !is_more);
+        CHECK(feed_sbus(&sbus, bytes, is_more ? SBUS_BYTES + 1u : SBUS_BYTES - 1u, &frame) == 0);
+        CHECK(feed_sbus(&sbus, SBUS, SBUS_BYTES, &frame) == 0);
+        CHECK(feed_sbus(&sbus, SBUS, SBUS_BYTES, &frame) == 1 && has_channels(&frame, SBUS_CHANNELS));
+        CHECK(feed_sbus(&sbus, SBUS, SBUS_BYTES, &frame) == 1 && has_channels(&frame, SBUS_CHANNELS));
     }
-    CHECK(sbus.stream.frames == SBUS_BYTES && sbus.stream.garbage == SBUS_BYTES * (SBUS_BYTES - 1u));
+}
+
+/* The receiver was heard from the middle of a frame on, wherever that is. */
+static void check_sbus_begins_anywhere(void)
+{
+    for (uint32_t first = 1; first < SBUS_BYTES; first++) {
+        rc_sbus_t sbus = {0};
+        rc_frame_t frame;
+        CHECK(feed_sbus(&sbus, SBUS + first, SBUS_BYTES - first, &frame) == 0);
+        int frames = 0;
+        for (int i = 0; i < 4; i++) {
+            frames += feed_sbus(&sbus, SBUS, SBUS_BYTES, &frame);
+            CHECK(frames == 0 || has_channels(&frame, SBUS_CHANNELS));
+        }
+        CHECK(frames >= 2);
+    }
+}
+
+/* Channels that look like a frame across two of them, at sticks that do not move: neither is taken until one does. */
+static void check_sbus_that_looks_like_two(void)
+{
+    rc_sbus_t sbus = {0};
+    rc_frame_t frame;
+    uint8_t twin[SBUS_BYTES] = {0x0F};
+    memcpy(twin + 10, (const uint8_t[]){0x00, 0x04, 0x0F}, 3);
+    CHECK(feed_sbus(&sbus, twin + 12, SBUS_BYTES - 12, &frame) == 0);
+    for (int i = 0; i < 20; i++) {
+        CHECK(feed_sbus(&sbus, twin, SBUS_BYTES, &frame) == 0);
+    }
+    int frames = 0;
+    for (int i = 0; i < 4; i++) {
+        frames += feed_sbus(&sbus, SBUS, SBUS_BYTES, &frame);
+        CHECK(frames == 0 || has_channels(&frame, SBUS_CHANNELS));
+    }
+    CHECK(frames >= 2);
 }
 
 /* ---- CRSF --------------------------------------------------------------------------------------------------------------- */
@@ -159,6 +194,8 @@ int main(void)
     check_published_sbus();
     check_sbus_flags();
     check_sbus_loses_bytes();
+    check_sbus_begins_anywhere();
+    check_sbus_that_looks_like_two();
     check_published_crsf();
     check_crsf_link();
     check_damaged_crsf();

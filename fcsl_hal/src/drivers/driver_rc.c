@@ -61,7 +61,7 @@ static int take_sbus(void *self, const uint8_t *bytes, uint32_t count, uint64_t 
     int found = 0;
     for (uint32_t i = 0; i < count; i++) {
         rc_frame_t frame;
-        if (rc_sbus_take(&sbus->sbus, bytes[i], time_ns, &frame) != 0 && (!frame.frame_lost || frame.failsafe)) {
+        if (rc_sbus_take(&sbus->sbus, bytes[i], &frame) != 0 && (!frame.frame_lost || frame.failsafe)) {
             put_sticks(&frame, sbus->sticks);
             sbus->failsafe = frame.failsafe != 0;
             *sample_ns = time_ns;

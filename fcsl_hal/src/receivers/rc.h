@@ -27,13 +27,13 @@ typedef struct {
 /* Futaba's SBUS: 100000 baud, 8 data bits, even parity, 2 stop bits, inverted. 16 channels and two switches, which are channels 17 and 18
  * with 1000 or 2000 us. */
 typedef struct {
-    uint64_t last_ns;
+    int is_found; /* it is known where frames begin */
     byte_stream_t stream;
 } rc_sbus_t;
 
-/* Takes a byte that came at `time_ns`. Returns 1 with *frame when it completes a frame, else 0. After a pause of 2 ms, which there is
- * between frames alone, a byte begins a frame. */
-int rc_sbus_take(rc_sbus_t *sbus, uint8_t byte, uint64_t time_ns, rc_frame_t *frame);
+/* Takes a byte. Returns 1 with *frame when it completes a frame, else 0. At first, and after bytes that belong to no frame, it takes
+ * the second of two. */
+int rc_sbus_take(rc_sbus_t *sbus, uint8_t byte, rc_frame_t *frame);
 
 /* TBS's Crossfire, and ExpressLRS: 420000 baud, 8N1, 16 channels. It has no failsafe: a receiver that hears nothing is silent. */
 typedef struct {

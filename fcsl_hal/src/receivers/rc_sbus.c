@@ -1,7 +1,11 @@
 /* SPDX-License-Identifier: Apache-2.0
  *
  * SBUS: 0x0F, 22 bytes of channels, a byte of flags, and an end byte, which of SBUS2 says which telemetry slot follows. There is
- * no checksum; the UART's parity is the only one.
+ * no checksum; the UART's parity is the only one. The pauses between frames tell nothing either: an adapter with a latency timer
+ * delivers the bytes in pieces of its own.
+ *
+ * So a frame is what follows a frame. At first, and after something else, bytes of the channels may look like a frame, and do so
+ * again in the next one while no stick moves: there two frames must follow each other, and no others lie across them.
  */
 #include "rc.h"
 
@@ -17,7 +21,6 @@ enum {
     UNUSED_FLAGS = 0xF0,
     CHANNELS = 18
 };
-static const uint64_t PAUSE_NS = 2000000u;
 static const float LOW_US = 1000.0f;
 static const float HIGH_US = 2000.0f;
 
@@ -27,28 +30,46 @@ static int is_end(uint8_t byte)
     return byte == 0u || (byte & 0xCFu) == 0x04u;
 }
 
+static int is_frame(const uint8_t *bytes)
+{
+    return bytes[0] == BEGINNING && (bytes[FLAGS] & UNUSED_FLAGS) == 0 && is_end(bytes[END]);
+}
+
 static int32_t judge(const uint8_t *bytes, uint32_t size)
 {
     if (bytes[0] != BEGINNING) {
         return -1;
     }
-    if (size < BYTES) {
-        return 0;
-    }
-    return (bytes[FLAGS] & UNUSED_FLAGS) == 0 && is_end(bytes[END]) ? BYTES : -1;
+    return size < BYTES ? 0 : is_frame(bytes) ? BYTES : -1;
 }
 
-int rc_sbus_take(rc_sbus_t *sbus, uint8_t byte, uint64_t time_ns, rc_frame_t *frame)
+/* Two frames, of which the second one counts. */
+static int32_t judge_pair(const uint8_t *bytes, uint32_t size)
 {
-    if (time_ns - sbus->last_ns >= PAUSE_NS) {
-        byte_stream_break(&sbus->stream);
+    const int32_t first = judge(bytes, size);
+    if (first <= 0 || size < 2 * BYTES) {
+        return first < 0 ? -1 : 0;
     }
-    sbus->last_ns = time_ns;
-    if (byte_stream_take(&sbus->stream, byte, judge) == 0u) {
+    int others = 0;
+    //@ loop unroll BYTES;
+    for (uint32_t i = 1; i < BYTES; i++) {
+        others += is_frame(bytes + i);
+    }
+    return is_frame(bytes + BYTES) && others == 0 ? 2 * BYTES : -1;
+}
+
+int rc_sbus_take(rc_sbus_t *sbus, uint8_t byte, rc_frame_t *frame)
+{
+    const uint64_t garbage = sbus->stream.garbage;
+    const uint32_t size = byte_stream_take(&sbus->stream, byte, sbus->is_found ? judge : judge_pair);
+    if (size < BYTES) {
+        sbus->is_found = sbus->is_found && sbus->stream.garbage == garbage;
         return 0;
     }
-    const uint8_t flags = sbus->stream.bytes[FLAGS];
-    rc_unpack(sbus->stream.bytes + 1, frame->pulse_us);
+    sbus->is_found = 1;
+    const uint8_t *bytes = sbus->stream.bytes + (size - BYTES);
+    const uint8_t flags = bytes[FLAGS];
+    rc_unpack(bytes + 1, frame->pulse_us);
     frame->pulse_us[16] = flags & CHANNEL_17 ? HIGH_US : LOW_US;
     frame->pulse_us[17] = flags & CHANNEL_18 ? HIGH_US : LOW_US;
     frame->count = CHANNELS;

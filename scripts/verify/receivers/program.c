@@ -155,8 +155,8 @@ static void take_sbus(void)
     static rc_sbus_t sbus;
     rc_frame_t frame;
     any_stream(&sbus.stream);
-    sbus.last_ns = any_u64;
-    if (rc_sbus_take(&sbus, any_u8, any_u64, &frame) != 0) {
+    sbus.is_found = any_i32;
+    if (rc_sbus_take(&sbus, any_u8, &frame) != 0) {
         check_frame(&frame, RC_CHANNELS_MAX);
     }
     check_stream(&sbus.stream);

@@ -58,7 +58,7 @@ static void feed(uint32_t protocol, uint8_t byte)
         }
         count(&nmea.stream);
     } else if (protocol == 2u) {
-        if (rc_sbus_take(&sbus, byte, fed * (byte == 0xAAu ? 2000000u : 1u), &frame)) {
+        if (rc_sbus_take(&sbus, byte, &frame)) {
             check_rc(&frame);
         }
         count(&sbus.stream);
