@@ -4,6 +4,7 @@
 from __future__ import annotations
 
 import json
+import math
 import os
 import shutil
 import signal
@@ -21,6 +22,7 @@ from scipy import stats
 
 from fcsl_compiler.base.diagnostics import DiagnosticError
 from fcsl_sim import SimError
+from fcsl_sim.campaign.metric import Metric
 from fcsl_sim.campaign.report import wilson
 from fcsl_sim.campaign.study import read_study
 from fcsl_sim.cli import main
@@ -298,6 +300,12 @@ def test_a_test_of_cases_names_its_study(tmp_path: Path) -> None:
     assert "is the case of a study: write @pytest.mark.fcsl_campaign" in done.stdout + done.stderr
 
 
+def test_a_power_has_the_digits_of_a_double() -> None:
+    """And not the 370 million that 9**9**9 has."""
+    assert Metric("9**9**9", None)(None, {}) == math.inf  # type: ignore[arg-type]
+    assert Metric("2**-2 + 2**10", None)(None, {}) == 1024.25  # type: ignore[arg-type]
+
+
 # ---- what is refused -------------------------------------------------------------------------------------------------
 
 
@@ -320,6 +328,7 @@ def test_a_test_of_cases_names_its_study(tmp_path: Path) -> None:
         ({"parameters": {"gauge.parameters.bias": {"uniform": [1.0]}}}, "E207: `uniform` is a list of the least and the greatest value"),
         ({"parameters": {"gauge.parameters.bias": {"normal": [0.0, 0.0]}}}, "E204: a standard deviation of 0"),
         ({"parameters": {"gauge.parameters.bias": {"uniform": [0, 1], "within": [0, 1]}}}, "E214: `within` is for `normal`"),
+        ({"parameters": {"gauge.parameters.bias": {"normal": [0, 1], "within": [1000, 1001]}}}, "E204: `within` is far from the mean"),
         ({"parameters": {"gauge.parameters.bias": {"choice": []}}}, "E204: `choice` is empty"),
         ({"parameters": {"gauge.parameters.bias": {"choice": [1.0], "weights": [0.0]}}}, "E204: 1 choices have 1 weights, and not all are 0"),
         ({"parameters": {"gauge.parameters.dropout": {"choice": [1]}}}, "E207: a choice is bool, not an int"),

@@ -53,15 +53,19 @@ class Normal:
     deviation: float
     within: tuple[float, float] | None
 
+    def shares(self) -> tuple[float, float]:
+        """Which share of all values is below `within`, and which below its end."""
+        if not self.within:
+            return 0.0, 1.0
+        low, high = (NormalDist().cdf((end - self.mean) / self.deviation) for end in self.within)
+        return low, high
+
     def at(self, share: float) -> Value:
-        standard = NormalDist()
-        low, high = 0.0, 1.0
-        if self.within:
-            low, high = (standard.cdf((end - self.mean) / self.deviation) for end in self.within)
+        low, high = self.shares()
         inside = low + share * (high - low)
         if not 0.0 < inside < 1.0:  # the farthest that a double can say
             inside = min(max(inside, 2.0**-53), 1.0 - 2.0**-53)
-        value = self.mean + self.deviation * standard.inv_cdf(inside)
+        value = self.mean + self.deviation * NormalDist().inv_cdf(inside)
         return min(max(value, self.within[0]), self.within[1]) if self.within else value
 
     def levels(self) -> None:

@@ -43,6 +43,8 @@ OWN_COLUMNS = ("case", "seed", "verdict", "end", "ticks", "hash", "error")
 #: Keys that say nothing about the flights.
 _FOR_READERS = ("$schema", "description")
 _DESIGNS = ("random", "latin_hypercube", "sweep", "corners")
+#: Of all values of a normal distribution, those that `within` must leave: doubles below 1 tell no fewer apart.
+LEAST_SHARE = 1e-12
 _SPREADS = ("uniform", "normal", "choice", "linear")
 _EXAMPLE = '{"uniform": [0.5, 1.5]}'
 _DEFAULT_TIMEOUT_S = 60.0
@@ -239,7 +241,15 @@ class _Reader:
         if "within" not in keys:
             return Normal(*pair, None)
         ends = self._pair(keys["within"], "`within` is a list of the least and the greatest value")
-        return Normal(*pair, ends) if ends and self._ordered(ends, keys["within"]) else None
+        if not ends or not self._ordered(ends, keys["within"]):
+            return None
+        normal = Normal(*pair, ends)
+        low, high = normal.shares()
+        if high - low < LEAST_SHARE:
+            why = f"mean {pair[0]:g}, standard deviation {pair[1]:g}: too few values would lie there to draw any"
+            self.sink.error("E204", "`within` is far from the mean", keys["within"].span, why=why, help="use `uniform`")
+            return None
+        return normal
 
     def _choice(self, keys: dict[str, JsonNode], scalar: Scalar) -> Distribution | None:
         items = self.reader.list(keys["choice"], "`choice`")
