@@ -30,7 +30,7 @@ int __lsan_is_turned_off(void)
 #endif
 
 /* Long: the machine may be busy. */
-enum { LONG_S = 30, LONG_MS = 30000, CLOSE_MS = 20000, RING_BYTES = 1 << 16 };
+enum { LONG_S = 90, LONG_MS = 90000, CLOSE_MS = 20000, RING_BYTES = 1 << 16 };
 
 static inline uint64_t now_ns(void)
 {

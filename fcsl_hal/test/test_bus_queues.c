@@ -12,7 +12,7 @@
 #include "bus_ring.h"
 #include "fcsl/fcsl_check.h"
 
-enum { MESSAGES = 200000, BYTES = 48, LEAST = 2, CAPACITY = 208, DEPTH = 3 };
+enum { MESSAGES = 20000, BYTES = 48, LEAST = 2, CAPACITY = 208, DEPTH = 3 };
 
 static size_t fill(uint8_t *message, uint32_t number)
 {

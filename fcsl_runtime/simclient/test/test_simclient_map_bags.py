@@ -17,6 +17,7 @@ from foreign_bags import (
     ROS2_FORMATS,
     STORE,
     Content,
+    encoded,
     imu,
     in_order,
     make,
@@ -147,6 +148,22 @@ def test_a_topic_that_changes_its_type(run: Runs, tmp_path: Path) -> None:
     done = run(write_mcap(tmp_path / "bag.mcap", mixed))
     assert done.fates["level"].refused == {"type": (1, 1)} and done.fates["level"].coverage.used == 12
     assert "level: refused: 1 of another type than the topic's first (first: message 1)" in str(done)
+
+
+def test_definitions_that_differ_in_comments_are_one(run: Runs, wanted: str, tmp_path: Path) -> None:
+    """Files of two distributions, merged."""
+
+    def with_comments(message: object) -> object:
+        data, kind, text = encoded(message)
+        lines = [
+            line if line.startswith(("=", "MSG:")) else f"  {line}   # {n}" for n, line in enumerate(text.splitlines())
+        ]
+        return data, kind, "# ours\n\n" + "\n".join(lines)
+
+    messages = [(at, topic, with_comments(m) if n % 2 else m) for n, (at, topic, m) in enumerate(in_order(content()))]
+    assert run(write_mcap(tmp_path / "bag.mcap", messages)).digest == wanted
+    swapped = [(at, topic, m if n % 2 else with_comments(m)) for n, (at, topic, m) in enumerate(in_order(content()))]
+    assert run(write_mcap(tmp_path / "swapped.mcap", swapped)).digest == wanted
 
 
 def test_a_type_of_ones_own(run: Runs, wanted: str, tmp_path: Path) -> None:

@@ -22,6 +22,13 @@ _NAME = re.compile(r"[A-Za-z]\w*/msg/[A-Za-z]\w*", re.ASCII)
 _MAX_BYTES = 1 << 20
 
 
+def declarations(text: str) -> tuple[str, ...]:
+    """The lines of a definition (of .msg files) that say what bytes a message has: without comments, and spaces that
+    tell nothing apart."""
+    lines = (" ".join(line.partition("#")[0].split()) for line in text.splitlines())
+    return tuple(line for line in lines if line)
+
+
 class Definitions:
     """Definitions by name. Those in `folders` come first, then Jazzy's, then those of installed packages."""
 

@@ -5,12 +5,14 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
+from functools import cache
 
 import numpy as np
 
 from fcsl_compiler.ros.reader import Pick
 
 from ..bag import Bag, Topic
+from ..bag.definitions import declarations
 from ..bag.mcap_file import distinct
 from ..errors import BagError, MapError
 from ..ros.reader import REASONS, Reader
@@ -92,6 +94,12 @@ def refusals(refused: Mapping[str, tuple[int, int]]) -> list[str]:
     return [f"{count} {_REFUSED[reason]} (first: message {first})" for reason, (count, first) in refused.items()]
 
 
+@cache
+def _is_same(schema: str, first: str) -> bool:
+    """Whether messages with one definition can be read with the other. Distributions differ in their comments."""
+    return schema in ("", first) or declarations(schema) == declarations(first)
+
+
 @dataclass
 class _Column:
     """All messages of one topic read so far."""
@@ -106,7 +114,7 @@ class _Column:
 
     def add(self, data: bytes, entries: Array, announced: Topic) -> None:
         topic = self.wishes[0].topic
-        other = announced.type != topic.type or announced.schema not in ("", topic.schema)
+        other = announced.type != topic.type or not _is_same(announced.schema, topic.schema)
         # A message of another type is treated as empty: counted, not decoded.
         sizes = entries["end"] - entries["begin"]
         samples = self.reader.read_many(data, entries["begin"], np.zeros_like(sizes) if other else sizes)
