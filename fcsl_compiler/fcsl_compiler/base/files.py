@@ -37,10 +37,11 @@ def open_regular(name: str, flags: int) -> int:
     """Opener of `open` for regular files alone: pipes and devices neither block nor are read. Raises SourceError and
     OSError."""
     handle = os.open(name, flags | os.O_NONBLOCK | os.O_NOCTTY, 0o666)
-    if not stat.S_ISREG(os.fstat(handle).st_mode):
-        os.close(handle)
-        raise SourceError("it is not a regular file")
-    return handle
+    mode = os.fstat(handle).st_mode
+    if stat.S_ISREG(mode) or stat.S_ISDIR(mode):  # `open` itself refuses a folder
+        return handle
+    os.close(handle)
+    raise SourceError("it is not a regular file")
 
 
 def read_regular(path: Path, limit: int) -> bytes:
