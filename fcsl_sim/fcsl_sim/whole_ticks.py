@@ -3,16 +3,9 @@
 
 from __future__ import annotations
 
-from decimal import Decimal, localcontext
 from fractions import Fraction
 
-from fcsl_compiler.model.machine import nearest_seconds
-
-
-def seconds_text(time_s: Fraction) -> str:
-    """A finite decimal with all its digits, up to 60."""
-    with localcontext(prec=60):
-        return f"{Decimal(time_s.numerator) / time_s.denominator:f} s"
+from fcsl_compiler.model.machine import nearest_seconds, seconds
 
 
 def whole_ticks(time_s: Fraction, tick_hz: int) -> int:
@@ -20,5 +13,7 @@ def whole_ticks(time_s: Fraction, tick_hz: int) -> int:
     ticks = time_s * tick_hz
     if ticks.denominator != 1:
         near = " or ".join(nearest_seconds(ticks, tick_hz))
-        raise ValueError(f"{seconds_text(time_s)} is not a whole number of ticks (1/{tick_hz} s); write {near}")
+        raise ValueError(
+            f"{seconds(time_s.numerator, time_s.denominator)} s is not a whole number of ticks (1/{tick_hz} s); write {near}"
+        )
     return ticks.numerator

@@ -13,11 +13,10 @@ from .files import SourceError, read_regular
 MAX_JSON_BYTES = 1 << 28
 
 
-def json_value(text: str | bytes, **hooks: Any) -> Any:
-    """The value of a JSON text. `hooks`: those of json.loads. Raises ValueError, also where lists and objects nest too
-    deeply for Python's parser."""
+def json_value(text: str | bytes) -> Any:
+    """The value of a JSON text. Raises ValueError, also where lists and objects nest too deeply for Python's parser."""
     try:
-        return json.loads(text, **hooks)
+        return json.loads(text)
     except RecursionError:
         raise ValueError("nested too deeply") from None
 

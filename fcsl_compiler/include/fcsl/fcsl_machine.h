@@ -60,7 +60,7 @@ typedef enum {
     FCSL_ROLE_OUTPUT = 2,    /* <instance>.outputs.<field>, transition_request and health included */
     FCSL_ROLE_PARAMETER = 3, /* <instance>.parameters.<field> */
     FCSL_ROLE_STATE = 4,     /* <instance>.state.<field> */
-    FCSL_ROLE_COUNTER = 5,   /* <instance>.counters.faults|overruns|last_run|fault_place */
+    FCSL_ROLE_COUNTER = 5,   /* <instance>.counters.faults|overruns|fault_place|last_run|completed */
     FCSL_ROLE_CHANNEL = 6    /* channels.<channel>.valid|age_ticks|stamp_ns|last_sample */
 } fcsl_role_t;
 

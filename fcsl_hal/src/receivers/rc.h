@@ -27,7 +27,7 @@ typedef struct {
 /* Futaba's SBUS: 100000 baud, 8 data bits, even parity, 2 stop bits, inverted. 16 channels and two switches, which are channels 17 and 18
  * with 1000 or 2000 us. */
 typedef struct {
-    int is_found; /* it is known where frames begin */
+    int in_sync; /* it is known where frames begin */
     byte_stream_t stream;
 } rc_sbus_t;
 

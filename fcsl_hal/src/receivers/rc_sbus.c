@@ -61,12 +61,12 @@ static int32_t judge_pair(const uint8_t *bytes, uint32_t size)
 int rc_sbus_take(rc_sbus_t *sbus, uint8_t byte, rc_frame_t *frame)
 {
     const uint64_t garbage = sbus->stream.garbage;
-    const uint32_t size = byte_stream_take(&sbus->stream, byte, sbus->is_found ? judge : judge_pair);
+    const uint32_t size = byte_stream_take(&sbus->stream, byte, sbus->in_sync ? judge : judge_pair);
     if (size < BYTES) {
-        sbus->is_found = sbus->is_found && sbus->stream.garbage == garbage;
+        sbus->in_sync = sbus->in_sync && sbus->stream.garbage == garbage;
         return 0;
     }
-    sbus->is_found = 1;
+    sbus->in_sync = 1;
     const uint8_t *bytes = sbus->stream.bytes + (size - BYTES);
     const uint8_t flags = bytes[FLAGS];
     rc_unpack(bytes + 1, frame->pulse_us);

@@ -44,7 +44,7 @@ OWN_COLUMNS = ("case", "seed", "verdict", "end", "ticks", "hash", "error")
 _FOR_READERS = ("$schema", "description")
 _DESIGNS = ("random", "latin_hypercube", "sweep", "corners")
 #: Of all values of a normal distribution, those that `within` must leave: doubles below 1 tell no fewer apart.
-LEAST_SHARE = 1e-12
+_LEAST_SHARE = 1e-12
 _SPREADS = ("uniform", "normal", "choice", "linear")
 _EXAMPLE = '{"uniform": [0.5, 1.5]}'
 _DEFAULT_TIMEOUT_S = 60.0
@@ -245,7 +245,7 @@ class _Reader:
             return None
         normal = Normal(*pair, ends)
         low, high = normal.shares()
-        if high - low < LEAST_SHARE:
+        if high - low < _LEAST_SHARE:
             why = f"mean {pair[0]:g}, standard deviation {pair[1]:g}: too few values would lie there to draw any"
             self.sink.error("E204", "`within` is far from the mean", keys["within"].span, why=why, help="use `uniform`")
             return None

@@ -155,7 +155,7 @@ static void take_sbus(void)
     static rc_sbus_t sbus;
     rc_frame_t frame;
     any_stream(&sbus.stream);
-    sbus.is_found = any_i32;
+    sbus.in_sync = any_i32;
     if (rc_sbus_take(&sbus, any_u8, &frame) != 0) {
         check_frame(&frame, RC_CHANNELS_MAX);
     }
