@@ -67,8 +67,9 @@ def run_command(options: argparse.Namespace) -> int:
         os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
         return 128 + signal.SIGPIPE
     except OSError as error:
-        place = f"{error.filename}: " if error.filename else ""
-        print(f"fcsl-sim: error: {place}{error.strerror}", file=sys.stderr)
+        message = (f"{error.filename}: " if error.filename else "") + (error.strerror or str(error))
+        _fail_as_json(options, message)
+        print(f"fcsl-sim: error: {message}", file=sys.stderr)
     except _Terminated:
         return _interrupted(options, signal.SIGTERM)
     except KeyboardInterrupt:

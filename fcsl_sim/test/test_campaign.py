@@ -132,6 +132,32 @@ def test_one_case_again(write: Write, capsys: pytest.CaptureFixture[str]) -> Non
     assert len(set(rows["hash"])) == 40
 
 
+@pytest.mark.parametrize(
+    ("condition", "failed_by"),
+    [
+        ("average < 3.0", "average = {average:.9g}, not < 3.0: by {over:.3g}"),
+        ("0.0 <= average <= final - 9.0", "average = {average:.9g}, not <= final - 9.0 = {low:.9g}: by {gap:.3g}"),
+        ("above == 7 or not above >= 0.0", "above = 1, not == 7; `not above >= 0.0` does not hold"),
+        ("average > 0.0 and gauge.outputs.sampled and bad.outputs.y", "`bad.outputs.y` does not hold"),
+        ("sqrt(-average) > 1.0 and average == average", "sqrt(-average) = nan, not > 1.0"),
+    ],
+)
+def test_a_case_that_failed_says_by_how_much(
+    write: Write, capsys: pytest.CaptureFixture[str], condition: str, failed_by: str
+) -> None:
+    parameters = {"gauge.parameters.bias": {"choice": [3.0]}}
+    path = write(cases=2, parameters=parameters, **{"pass": condition})
+    assert main(["campaign", str(path)]) == 1
+    rows = table_of("gauge.campaign")
+    average, final = rows["average"][0], rows["final"][0]
+    low = final - 9.0
+    wanted = failed_by.format(average=average, over=average - 3.0, low=low, gap=average - low)
+    assert rows["failed_by"][0] == wanted and rows["error"].tolist() == ["", ""]
+    assert f"case 0 failed: {wanted}; gauge.parameters.bias = 3\n" in capsys.readouterr().out
+    main(["campaign", str(path), "--case", "0"])
+    assert f"case 0 failed, seed {rows['seed'][0]}: {wanted}\n" in capsys.readouterr().out
+
+
 def test_elements_and_inputs_are_dispersed(write: Write) -> None:
     parameters = {"curve.inputs.x": {"choice": [1.0, 2.0]}, "curve.parameters.values[1]": {"linear": [0.0, 10.0, 3]}}
     path = write(design="sweep", cases=None, parameters=parameters, metrics={"y": "curve.outputs.y"}, **{"pass": None})
@@ -229,6 +255,102 @@ def test_an_error_of_a_flight_is_its_outcome(write: Write) -> None:
     assert main(["campaign", str(path)]) == 1
     rows = table_of("gauge.campaign")
     assert rows["error"].tolist() == ["instance `gauge`: parameters.sigma must not be negative", ""]
+
+
+def _cut(data: bytes) -> bytes:
+    return data[:-1]
+
+
+def _flip(data: bytes) -> bytes:
+    """A bit of the last metric of case 1, near the end of its row."""
+    place = 2 * len(data) // 40 - 12
+    return data[:place] + bytes([data[place] ^ 4]) + data[place + 1 :]
+
+
+def _swap(data: bytes) -> bytes:
+    row = len(data) // 40
+    return data[row : 2 * row] + data[:row] + data[2 * row :]
+
+
+@pytest.mark.parametrize(
+    ("damage", "said"),
+    [
+        (_cut, "cases.bin: damaged, so flown again: case 39"),
+        (_flip, "cases.bin: damaged, so flown again: case 1\n"),
+        (_swap, "cases.bin: damaged, so flown again: case 0, 1\n"),
+        (lambda data: b"\xc8" + data[1:], "cases.bin: damaged, so flown again: case 0\n"),
+        (lambda data: b"\xff" * len(data), "cases.bin: damaged, so flown again: case 0, 1, 2, 3, 4 and 35 more\n"),
+        (lambda data: data + b"more", "cases.bin: has 12244 bytes, not 12240"),
+        (lambda data: b"", "cases.bin: has 0 bytes, not 12240"),
+        (lambda data: bytes(len(data) // 2) + data[len(data) // 2 :], "20 of 40 cases are there already"),
+    ],
+    ids=["cut", "bit", "rows swapped", "verdict", "overwritten", "longer", "empty", "zeros"],
+)
+def test_damaged_results_are_found_named_and_flown_again(
+    write: Write, capsys: pytest.CaptureFixture[str], damage: Callable[[bytes], bytes], said: str
+) -> None:
+    path = write()
+    main(["campaign", str(path), "--jobs", "1"])
+    table, rows = Path("gauge.campaign/cases.parquet"), Path("gauge.campaign/cases.bin")
+    whole, right = table.read_bytes(), rows.read_bytes()
+    rows.write_bytes(damage(right))
+    capsys.readouterr()
+    assert main(["campaign", str(path), "--jobs", "1"]) == 1
+    assert said in capsys.readouterr().err
+    assert table.read_bytes() == whole and rows.read_bytes() == right
+
+
+def test_rows_of_another_campaign_are_not_taken(write: Write, capsys: pytest.CaptureFixture[str]) -> None:
+    main(["campaign", str(write(seed=10)), "-o", "other"])
+    path = write()
+    main(["campaign", str(path)])
+    whole = Path("gauge.campaign/cases.parquet").read_bytes()
+    shutil.copy("other/cases.bin", "gauge.campaign/cases.bin")
+    capsys.readouterr()
+    main(["campaign", str(path)])
+    assert "flown again: case 0, 1, 2, 3, 4 and 35 more" in capsys.readouterr().err
+    assert Path("gauge.campaign/cases.parquet").read_bytes() == whole
+
+
+@pytest.mark.parametrize("text", ["[" * 100_000, "", "[]", "\xe9", '{"study": [[1]]}', '{"check": "0"}'])
+def test_a_damaged_description_of_a_campaign(write: Write, capsys: pytest.CaptureFixture[str], text: str) -> None:
+    """The rows say themselves whose they are. Without any, nothing does, and nothing is touched."""
+    path = write()
+    main(["campaign", str(path)])
+    about, rows = Path("gauge.campaign/campaign.json"), Path("gauge.campaign/cases.bin")
+    right = about.read_text()
+    about.write_bytes(text.encode("latin-1"))
+    capsys.readouterr()
+    assert main(["campaign", str(path)]) == 1
+    said = capsys.readouterr().err
+    assert "campaign.json: was damaged, and is written anew" in said and "40 of 40 cases are there already" in said
+    assert about.read_text() == right
+    about.write_bytes(text.encode("latin-1"))
+    rows.write_bytes(b"results of another study")
+    assert main(["campaign", str(path)]) == 2
+    assert "campaign.json: is damaged" in capsys.readouterr().err
+    assert rows.read_bytes() == b"results of another study"
+
+
+@pytest.mark.parametrize(
+    ("limit", "said"),
+    [
+        (8_000, "cases.bin: no room for 12240 bytes: File too large"),
+        (16_000, "report.png: File too large; cases that are flown are kept, and the same command goes on"),
+    ],
+)
+def test_a_disk_that_takes_no_more(write: Write, limit: int, said: str) -> None:
+    """As a full one does: a limit of the size of files."""
+    path = write()
+    line = [sys.executable, "-c", f"import resource; resource.setrlimit(resource.RLIMIT_FSIZE, ({limit}, {limit}))\n"]
+    line[-1] += "import sys; from fcsl_sim.cli import main; sys.exit(main())"
+    line += ["campaign", str(path), "--jobs", "1"]
+    full = subprocess.run(line, capture_output=True, text=True, timeout=600)
+    assert full.returncode == 2 and said in full.stderr, full
+    assert {file.name for file in Path("gauge.campaign").iterdir()} <= {"campaign.json", "cases.bin", "cases.parquet"}
+    again = subprocess.run(["fcsl-sim", "campaign", str(path)], capture_output=True, text=True, timeout=600)
+    assert again.returncode == 1, again
+    assert ("40 of 40 cases are there already" in again.stderr) == (limit > 12_240)
 
 
 def test_no_process_is_left_after_ctrl_c(write: Write, tmp_path: Path) -> None:

@@ -39,6 +39,8 @@ def run_campaign(options: Any) -> int:
     if find_spec("pyarrow") is None:  # not when hours have been flown
         raise SimError("the table of a campaign needs the Python package `pyarrow`: python3 -m pip install pyarrow")
     results = Results(study, options.output or _folder(options.study), options.restart)
+    for line in results.damage:
+        print(f"fcsl-sim: warning: {line}", file=sys.stderr)
     if results.done:
         print(f"{results.folder}: {results.done} of {study.cases} cases are there already", file=sys.stderr)
     _fly_missing(study, results, options)
@@ -100,6 +102,8 @@ def _lines(study: Study, outcome: Outcome) -> str:
     lines += [f"  {p.path} = {value}" for p, value in zip(study.parameters, outcome.values, strict=True)]
     if outcome.error:
         return "\n".join([*lines, outcome.error])
+    if outcome.failed_by:
+        lines[0] += f": {outcome.failed_by}"
     lines += [f"  {name} = {value:.9g}" for name, value in zip(study.metrics, outcome.metrics, strict=True)]
     return "\n".join([*lines, f"{outcome.ticks} ticks, hash {outcome.hash}"])
 

@@ -20,6 +20,7 @@ from ..native import Simulation
 from ..sim_run import SimRun
 from ..watchdog import Watchdog
 from .metric import MetricError
+from .shortfall import shortfall
 from .study import Study, read_study
 
 #: Of the rows that a flight may leave for its metrics.
@@ -30,7 +31,7 @@ _TICK = "machine.tick"
 @dataclass(frozen=True)
 class Outcome:
     """What a case has given. `verdict` is `passed`, `failed` or `error`; `hash` is that of the last state of machine and plant, 16
-    digits; `metrics` are NaN after an error."""
+    digits; `metrics` are NaN after an error; `failed_by` says what of `pass` did not hold, and by how much."""
 
     case: int
     seed: int
@@ -41,6 +42,7 @@ class Outcome:
     hash: str
     metrics: tuple[float, ...]
     error: str = ""
+    failed_by: str = ""
 
 
 #: Of a case that ended its process.
@@ -108,10 +110,12 @@ class Flights:
                 metrics: dict[str, float | bool] = {}
                 for name, metric in self.study.metrics.items():
                     metrics[name] = metric(columns, metrics)
-                passed = self.study.passes is None or bool(self.study.passes(columns, metrics))
+                passes = self.study.passes
+                passed = passes is None or bool(passes(columns, metrics))
+                failed_by = "" if passes is None or passed else shortfall(passes, columns, metrics)
                 digest = hashlib.sha256(sim.checkpoint()).hexdigest()[:16]
                 verdict, numbers = "passed" if passed else "failed", tuple(map(float, metrics.values()))
-                return Outcome(*given, verdict, sim.status, sim.tick, digest, numbers)
+                return Outcome(*given, verdict, sim.status, sim.tick, digest, numbers, failed_by=failed_by)
         except (SimError, TwinError, MetricError) as error:
             return not_flown(self.study, case, str(error))
 

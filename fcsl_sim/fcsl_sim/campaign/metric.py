@@ -97,6 +97,7 @@ class Metric:
             raise MetricError(f"`{text}` is no expression: {error}") from None
         if sum(1 for _ in ast.walk(tree)) > _MAX_NODES:
             raise MetricError(f"`{text}` is too long: write parts of it as metrics of their own")
+        self.tree = tree
         self._value = self._node(tree, within=False)
 
     def __call__(self, columns: Columns, metrics: Mapping[str, Any]) -> float | bool:
@@ -110,6 +111,14 @@ class Metric:
             what = f"an array of shape {value.shape}" if value.shape else f"`{value}`"
             raise MetricError(f"`{self.text}` is {what}, not a number: take an element, or `norm`")
         return bool(value) if value.dtype.kind == "b" else float(value)
+
+    def part(self, node: ast.expr, columns: Columns, metrics: Mapping[str, Any]) -> Any:
+        """The value of a part of `tree` in a flight."""
+        with np.errstate(all="ignore"):
+            return self._node(node, within=False)(columns, metrics)
+
+    def text_of(self, node: ast.expr) -> str:
+        return ast.get_source_segment(self.text.strip(), node) or ast.unparse(node)
 
     # ---- parsing --------------------------------------------------------------------------------------------------------
 
@@ -143,9 +152,8 @@ class Metric:
         raise self._wrong(node)
 
     def _wrong(self, node: ast.expr) -> MetricError:
-        part = ast.get_source_segment(self.text.strip(), node) or type(node).__name__
         return MetricError(
-            f"`{part}` is neither path, number, name in quotes, arithmetic, comparison, and/or/not nor one of "
+            f"`{self.text_of(node)}` is neither path, number, name in quotes, arithmetic, comparison, and/or/not nor one of "
             f"{', '.join(FUNCTIONS)}"
         )
 

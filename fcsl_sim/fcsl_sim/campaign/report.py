@@ -10,6 +10,7 @@ from typing import Any
 
 import numpy as np
 
+from .case_rows import written_whole
 from .results import PICTURE, Results
 
 #: Of failed cases and of errors that the text names.
@@ -45,7 +46,8 @@ def text(results: Results) -> str:
         for case in results.cases_of(verdict, _NAMED):
             outcome = results.outcome(case)
             values = ", ".join(f"{p.path} = {v:.6g}" for p, v in zip(study.parameters, outcome.values, strict=True))
-            lines.append(f"case {case} {verdict}: {outcome.error or values}")
+            why = "; ".join(filter(None, [outcome.error or outcome.failed_by, values if not outcome.error else ""]))
+            lines.append(f"case {case} {verdict}: {why}")
         if count > _NAMED:
             lines.append(f"… and {count - _NAMED} more of `{verdict}`: {results.folder}/cases.parquet has all")
     return "\n".join(lines)
@@ -93,7 +95,8 @@ def draw(results: Results) -> Path:
         axes = figure.add_subplot(rows, _PER_ROW, number + 1)
         _scatter(axes, (path, values), (name, heights[shown]), passed[shown])
     picture = results.folder / PICTURE
-    figure.savefig(picture, dpi=90, metadata={"Software": ""})
+    with written_whole(picture) as temporary:
+        figure.savefig(temporary, format="png", dpi=90, metadata={"Software": ""})
     return picture
 
 

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""The results of a campaign: a file with a place for each case, which survives a kill, and the table that is made of it.
+"""The results of a campaign: a row for each case, which survives a kill, and the table that is made of them.
 
 Both are the same whatever the order in which cases were flown, and by how many processes.
 """
@@ -7,117 +7,159 @@ Both are the same whatever the order in which cases were flown, and by how many 
 from __future__ import annotations
 
 import json
-import os
-import shutil
 from collections.abc import Iterator
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 
+from fcsl_compiler.base.files import digest
 from fcsl_compiler.base.json_file import read_json
 
 from ..errors import SimError
+from .case_rows import GROUP_ROWS, TEXT_BYTES, CaseRows, written_whole
 from .flight import Outcome
 from .study import Study
 
 #: In the folder of a campaign.
-ABOUT, PLACES, TABLE, PICTURE = "campaign.json", "cases.bin", "cases.parquet", "report.png"
+ABOUT, ROWS, TABLE, PICTURE = "campaign.json", "cases.bin", "cases.parquet", "report.png"
+#: Of the rows; another one cannot be read.
+_FORMAT = 2
 #: By its number; 0: not flown yet.
 _VERDICTS = ("", "passed", "failed", "error")
 _ENDS = ("", "duration", "until", "error")
-_ERROR_BYTES = 240
-#: That are made to columns at a time, which bounds the memory.
-_GROUP_ROWS = 1 << 12
+#: Of damaged cases that a message names.
+_NAMED = 5
 
 
 class Results:
-    """The folder of a campaign. `done` counts cases."""
+    """The folder of a campaign. `done` counts cases; `damage` says what was damaged in the folder, a line each: these cases count
+    as not flown."""
 
     def __init__(self, study: Study, folder: Path, restart: bool = False):
-        """Makes the folder, or goes on with it. restart: what it holds is removed. Raises SimError if it holds another
-        campaign, or no campaign."""
+        """Makes the folder, or goes on with it. restart: the results that it holds are removed. Raises SimError if it holds
+        another campaign, or no campaign."""
         self.study, self.folder = study, folder
-        about = {"study": study.path.name, "cases": study.cases, "fingerprint": study.fingerprint}
+        self.damage: list[str] = []
+        about = {"format": _FORMAT, "study": study.path.name, "cases": study.cases, "fingerprint": study.fingerprint}
         if restart and (folder / ABOUT).is_file():
-            shutil.rmtree(folder)
-        self._refuse_others(about)
-        folder.mkdir(parents=True, exist_ok=True)
-        kind = [("verdict", "u1"), ("end", "u1"), ("ticks", "<u8"), ("hash", "S16"), ("error", f"S{_ERROR_BYTES}")]
-        self._dtype = np.dtype([*kind, ("metrics", "<f8", (len(study.metrics),))])
-        places = folder / PLACES
-        if not (folder / ABOUT).is_file():
-            with places.open("wb") as stream:
-                stream.truncate(study.cases * self._dtype.itemsize)
-            _replace(folder / ABOUT, json.dumps(about, indent=2) + "\n")
-        self._places: Any = np.memmap(places, self._dtype, "r+", shape=(study.cases,))
-        self.done = int(np.count_nonzero(self._places["verdict"]))
+            for name in (ROWS, TABLE, PICTURE, ABOUT):
+                (folder / name).unlink(missing_ok=True)
+        there = self._look(about)
+        if there is False:
+            folder.mkdir(parents=True, exist_ok=True)
+            self._write_about(about)
+        self._rows = CaseRows(folder / ROWS, study.cases, len(study.metrics), study.fingerprint)
+        self._verdicts = self._check_rows()
+        self.done = int(np.count_nonzero(self._verdicts))
+        if there is None:
+            self._restore_about(about)
+        if there and self._rows.size != self._rows.bytes:
+            self.damage.append(f"{self._rows.path}: has {self._rows.size} bytes, not {self._rows.bytes}")
+        self._rows.reserve()
 
-    def _refuse_others(self, about: dict[str, Any]) -> None:
-        folder = self.folder
+    def _look(self, about: dict[str, Any]) -> bool | None:
+        """Whether the folder has results of this campaign; None: its campaign.json is damaged, so only the rows can tell."""
+        folder, file = self.folder, self.folder / ABOUT
         if not folder.exists():
-            return
-        file = folder / ABOUT
+            return False
         if not folder.is_dir() or (any(folder.iterdir()) and not file.is_file()):
             raise SimError(f"{folder}: there already, and no campaign's folder; choose another one with `-o`")
         if not file.is_file():
-            return
+            return False
         try:
             found = read_json(file)
-            size = (folder / PLACES).stat().st_size
-        except (OSError, ValueError):
-            found, size = None, 0
-        if found != about or size == 0:
+        except ValueError:
+            return None
+        is_flat = isinstance(found, dict) and all(isinstance(value, str | int) for value in found.values())
+        if not is_flat or found.pop("check", None) != digest(json.dumps(found)):
+            return None
+        if found != about:
             raise SimError(
-                f"{folder}: has results of another study, or of this one before it, its models or its machine changed; "
-                "`--restart` removes them, `-o` chooses another folder"
+                f"{folder}: has results of another study, or of this one before it, its models, its machine or FCSL "
+                "changed; `--restart` removes them, `-o` chooses another folder"
             )
+        return True
+
+    def _write_about(self, about: dict[str, Any]) -> None:
+        with written_whole(self.folder / ABOUT) as path:
+            path.write_text(json.dumps(about | {"check": digest(json.dumps(about))}, indent=2) + "\n")
+
+    def _restore_about(self, about: dict[str, Any]) -> None:
+        """Rows with right checksums are of this campaign."""
+        file = self.folder / ABOUT
+        if not self.done:
+            raise SimError(
+                f"{file}: is damaged, or another version of FCSL wrote it, and no case in the folder is of this study; "
+                "`--restart` removes the results, `-o` chooses another folder"
+            )
+        self._write_about(about)
+        self.damage.append(f"{file}: was damaged, and is written anew")
+
+    def _check_rows(self) -> np.ndarray[Any, np.dtype[np.uint8]]:
+        """The verdicts of all rows, 0 for a damaged one."""
+        verdicts = np.zeros(self.study.cases, np.uint8)
+        wrong: list[int] = []
+        for first, rows in self._rows.groups():
+            verdicts[first : first + len(rows)] = rows["verdict"]
+            wrong += [case for case, row in enumerate(rows, first) if not self._rows.is_right(case, row)]
+        verdicts[wrong] = 0
+        if wrong:
+            more = f" and {len(wrong) - _NAMED} more" if len(wrong) > _NAMED else ""
+            named = ", ".join(map(str, wrong[:_NAMED])) + more
+            self.damage.append(f"{self._rows.path}: damaged, so flown again: case {named}")
+        return verdicts
 
     def missing(self) -> Iterator[int]:
         """Cases that are not flown yet, in their order."""
-        for first in range(0, self.study.cases, _GROUP_ROWS):
-            for place in np.flatnonzero(self._places["verdict"][first : first + _GROUP_ROWS] == 0):
+        for first in range(0, self.study.cases, GROUP_ROWS):
+            for place in np.flatnonzero(self._verdicts[first : first + GROUP_ROWS] == 0):
                 yield first + int(place)
 
     def add(self, outcome: Outcome) -> None:
-        place = self._places[outcome.case]
-        if place["verdict"] == 0:
-            self.done += 1
-        place["end"], place["ticks"], place["hash"] = _ENDS.index(outcome.end), outcome.ticks, outcome.hash
-        place["error"] = outcome.error.encode("utf-8", "replace")[:_ERROR_BYTES]
-        place["metrics"][:] = outcome.metrics
-        place["verdict"] = _VERDICTS.index(outcome.verdict)  # last: then the case is flown
+        verdict = _VERDICTS.index(outcome.verdict)
+        self._rows.write(
+            outcome.case,
+            verdict=verdict,
+            end=_ENDS.index(outcome.end),
+            ticks=outcome.ticks,
+            hash=outcome.hash,
+            text=(outcome.error or outcome.failed_by).encode("utf-8", "replace")[:TEXT_BYTES],
+            metrics=outcome.metrics,
+        )
+        self.done += self._verdicts[outcome.case] == 0
+        self._verdicts[outcome.case] = verdict
 
     def count(self, verdict: str) -> int:
-        return int(np.count_nonzero(self._places["verdict"] == _VERDICTS.index(verdict)))
+        return int(np.count_nonzero(self._verdicts == _VERDICTS.index(verdict)))
 
     def outcome(self, case: int) -> Outcome:
-        place = self._places[case]
+        (row,) = self._rows.read(case, case + 1)
+        verdict, text = _VERDICTS[row["verdict"]], bytes(row["text"]).decode("utf-8", "replace")
         return Outcome(
             case,
             self.study.seed_of(case),
             self.study.values(case),
-            _VERDICTS[place["verdict"]],
-            _ENDS[place["end"]],
-            int(place["ticks"]),
-            bytes(place["hash"]).decode(),
-            tuple(place["metrics"].tolist()),
-            bytes(place["error"]).decode("utf-8", "replace"),
+            verdict,
+            _ENDS[row["end"]],
+            int(row["ticks"]),
+            bytes(row["hash"]).decode(),
+            tuple(row["metrics"].tolist()),
+            error=text if verdict == "error" else "",
+            failed_by=text if verdict == "failed" else "",
         )
 
     def metric(self, name: str) -> np.ndarray[Any, Any]:
-        """Of all cases; NaN where a case has none."""
+        """Of all cases. All must be flown."""
         index = list(self.study.metrics).index(name)
-        values = np.array(self._places["metrics"][:, index])
-        values[self._places["verdict"] == 0] = np.nan
-        return values
+        return np.concatenate([np.array(rows["metrics"][:, index]) for _, rows in self._rows.groups()])
 
     def passed(self) -> np.ndarray[Any, Any]:
         """Whether each case has passed."""
-        return np.array(self._places["verdict"] == _VERDICTS.index("passed"))
+        return np.asarray(self._verdicts == _VERDICTS.index("passed"))
 
     def cases_of(self, verdict: str, at_most: int) -> list[int]:
-        return [int(i) for i in np.flatnonzero(self._places["verdict"] == _VERDICTS.index(verdict))[:at_most]]
+        return [int(i) for i in np.flatnonzero(self._verdicts == _VERDICTS.index(verdict))[:at_most]]
 
     def write_table(self) -> Path:
         """cases.parquet, a row for each case in their order. All cases must be flown."""
@@ -125,23 +167,20 @@ class Results:
         import pyarrow.parquet as pq
 
         path = self.folder / TABLE
-        temporary = path.with_suffix(".new")
-        writer = None
-        try:
-            for first in range(0, self.study.cases, _GROUP_ROWS):
-                table = pa.table(self._columns(range(first, min(first + _GROUP_ROWS, self.study.cases))))
-                writer = writer or pq.ParquetWriter(temporary, table.schema, compression="zstd")
+        with written_whole(path) as temporary, temporary.open("wb") as stream:
+            writer = None
+            for first, rows in self._rows.groups():
+                table = pa.table(self._columns(first, rows))
+                writer = writer or pq.ParquetWriter(stream, table.schema, compression="zstd")
                 writer.write_table(table)
-        finally:
             if writer:
                 writer.close()
-        os.replace(temporary, path)
         return path
 
-    def _columns(self, cases: range) -> dict[str, Any]:
+    def _columns(self, first: int, rows: np.ndarray[Any, Any]) -> dict[str, Any]:
         import pyarrow as pa
 
-        places = self._places[cases.start : cases.stop]
+        cases = range(first, first + len(rows))
         columns: dict[str, Any] = {
             "case": pa.array(cases, pa.int64()),
             "seed": pa.array([self.study.seed_of(case) for case in cases], pa.uint64()),
@@ -150,17 +189,14 @@ class Results:
         for dispersed, column in zip(self.study.parameters, values, strict=True):
             columns[dispersed.path] = pa.array(column)
         for index, name in enumerate(self.study.metrics):
-            columns[name] = pa.array(np.ascontiguousarray(places["metrics"][:, index]))
-        columns["verdict"] = pa.array([_VERDICTS[number] for number in places["verdict"]])
-        columns["end"] = pa.array([_ENDS[number] for number in places["end"]])
-        columns["ticks"] = pa.array(np.ascontiguousarray(places["ticks"]))
-        columns["hash"] = pa.array([bytes(digest).decode() for digest in places["hash"]])
-        columns["error"] = pa.array([bytes(text).decode("utf-8", "replace") for text in places["error"]])
+            columns[name] = pa.array(np.ascontiguousarray(rows["metrics"][:, index]))
+        verdicts = [_VERDICTS[number] for number in rows["verdict"]]
+        texts = [bytes(text).decode("utf-8", "replace") for text in rows["text"]]
+        columns["verdict"] = pa.array(verdicts)
+        columns["end"] = pa.array([_ENDS[number] for number in rows["end"]])
+        columns["ticks"] = pa.array(np.ascontiguousarray(rows["ticks"]))
+        columns["hash"] = pa.array([bytes(digest).decode() for digest in rows["hash"]])
+        for name, verdict in (("error", "error"), ("failed_by", "failed")):
+            said = [text if of == verdict else "" for text, of in zip(texts, verdicts, strict=True)]
+            columns[name] = pa.array(said)
         return columns
-
-
-def _replace(path: Path, text: str) -> None:
-    """Writes the whole file, or nothing."""
-    temporary = path.with_suffix(".new")
-    temporary.write_text(text)
-    os.replace(temporary, path)

@@ -39,7 +39,7 @@ from .metric import FUNCTIONS, Metric, MetricError
 
 MAX_CASES = 10_000_000
 #: Of the table, beside those of parameters and metrics.
-OWN_COLUMNS = ("case", "seed", "verdict", "end", "ticks", "hash", "error")
+OWN_COLUMNS = ("case", "seed", "verdict", "end", "ticks", "hash", "error", "failed_by")
 #: Keys that say nothing about the flights.
 _FOR_READERS = ("$schema", "description")
 _DESIGNS = ("random", "latin_hypercube", "sweep", "corners")
@@ -141,7 +141,9 @@ class _Reader:
         self.sink.raise_if_failed()
         assert seed is not None and design is not None
         print_of = hashlib.sha256("\n".join([text, str(design.count), config.plan]).encode())
-        for library in sorted({config.library, *(table.library for table in config.tables.values())}):
+        libraries = {config.library, *(table.library for table in config.tables.values())}
+        libraries |= {companion.library for companion in config.companions.values()}
+        for library in sorted(libraries):
             print_of.update(library.read_bytes())
         return Study(
             self.path, config, machine, seed, parameters, design, metrics, passes, timeout_s, print_of.hexdigest()

@@ -35,8 +35,8 @@ def line_of(outcome: Outcome) -> str:
 
 
 def outcome_of(line: str) -> Outcome:
-    case, seed, values, verdict, end, ticks, digest, metrics, error = json.loads(line)
-    return Outcome(case, seed, tuple(values), verdict, end, ticks, digest, tuple(metrics), error)
+    case, seed, values, verdict, end, ticks, digest, metrics, error, failed_by = json.loads(line)
+    return Outcome(case, seed, tuple(values), verdict, end, ticks, digest, tuple(metrics), error, failed_by)
 
 
 def main(study: str, cases: str, descriptor: str) -> int:

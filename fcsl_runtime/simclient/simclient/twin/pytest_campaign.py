@@ -31,7 +31,8 @@ class Case:
 
     def __init__(self, study: Any, outcome: Any):
         self.case, self.seed, self.verdict = outcome.case, outcome.seed, outcome.verdict
-        self.end, self.ticks, self.hash, self.error = outcome.end, outcome.ticks, outcome.hash, outcome.error
+        self.end, self.ticks, self.hash = outcome.end, outcome.ticks, outcome.hash
+        self.error, self.failed_by = outcome.error, outcome.failed_by
         self.values = dict(zip((p.path for p in study.parameters), outcome.values, strict=True))
         self.metrics = dict(zip(study.metrics, outcome.metrics, strict=True))
 
