@@ -101,6 +101,11 @@ def in_order(content: Content) -> list[tuple[int, str, Any]]:
 def write(path: Path, content: Content, form: str = "mcap", ordered: bool = True) -> Path:
     """Writes a bag in one of FORMATS and returns what to open; `ordered` False: topic by topic."""
     messages = in_order(content) if ordered else [(t, topic, m) for topic in content for t, m in content[topic]]
+    return write_as_given(path, messages, form)
+
+
+def write_as_given(path: Path, messages: Sequence[tuple[int, str, Any]], form: str) -> Path:
+    """Like `write`, with the messages in this order: (log time in ns, topic, message)."""
     if form in ROS1_FORMATS:
         return _write_ros1(path.with_suffix(".bag"), messages, ROS1_FORMATS[form])
     plugin, mode = ROS2_FORMATS[form]

@@ -102,7 +102,7 @@ def test_a_message_that_is_too_large_is_empty(form: str, tmp_path: Path, monkeyp
 
 def test_large_messages_come_in_several_batches(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     bag = write(tmp_path / "bag", CONTENT, "sqlite3-message")
-    monkeypatch.setattr("simclient.bag.foreign._BATCH_BYTES", 30)
+    monkeypatch.setattr("simclient.bag.packed._BATCH_BYTES", 30)
     assert max(len(batch.entries) for batch, _ in open_bag(bag).batches()) == 3
     assert read_all(bag) == (21, "")
 
@@ -111,8 +111,9 @@ def test_large_messages_come_in_several_batches(tmp_path: Path, monkeypatch: pyt
 def test_a_chunk_of_ros1_that_is_too_large(form: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     bag = write(tmp_path / "bag", CONTENT, form)
     monkeypatch.setattr(unpack, "LIMIT_BYTES", 100)
-    reason = "bag.bag breaks off after 0 messages (unpacks to more than 256 MiB, the limit)"
-    assert read_all(bag) == (0, reason)
+    count, missing = read_all(bag)
+    assert count == 0 and missing.startswith("bag.bag lacks bytes ")
+    assert missing.endswith(" (a chunk that unpacks to more than 256 MiB, the limit)")
 
 
 def test_a_file_that_does_not_fit_the_disk(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:

@@ -7,8 +7,10 @@ A recording that is damaged or was cut off (power loss, kill -9) is read as far 
 
 from __future__ import annotations
 
-from collections.abc import Collection, Iterable, Iterator, Mapping
+from collections.abc import Callable, Collection, Iterable, Iterator
+from contextlib import ExitStack
 from dataclasses import dataclass, field, replace
+from functools import partial
 from pathlib import Path
 from typing import Any
 
@@ -20,8 +22,10 @@ from rosbags.typesys.store import Typestore
 from ..cli import Progress
 from ..errors import BagError, did_you_mean
 from ..ros.cdr import Layout, fixed_layout
+from .batch import Batch
 from .files import bag_files
-from .mcap_file import BARE_END_BYTES, Batch, Scan, check_begin, read_summary
+from .mcap_file import BARE_END_BYTES, Scan, check_begin, read_summary
+from .time_order import Block, Part, in_time_order
 
 Array = np.ndarray[Any, Any]
 
@@ -102,6 +106,8 @@ class Bag:
         self.topics: dict[str, Topic] = {}
         self.read_bytes = 0
         self._summaries: dict[Path, Any] = {}
+        #: What defines channels: the summary, or a pass over the file if it has none.
+        self._known: dict[Path, Any] = {}
         self._damage: dict[Path, str] = {}
         self._stores: dict[str, Typestore] = {}
         self._layouts: dict[str, Layout | None] = {}
@@ -120,13 +126,14 @@ class Bag:
 
     def _take_inventory(self, file: Path) -> None:
         """Fills `topics` from the file's summary, or from all its messages if it has none."""
-        summary = self._summaries[file] = read_summary(file)
+        summary = self._summaries[file] = self._known[file] = read_summary(file)
         if summary is not None:
             counts = summary.statistics.channel_message_counts
             for number, channel in summary.channels.items():
                 self._add_topic(channel, summary.schemas.get(channel.schema_id), counts.get(number, 0))
             return
         scan, progress = Scan(file), Progress(f"reading {file.name}", file.stat().st_size)
+        self._known[file] = scan
         counts = dict.fromkeys(scan.channels, 0)
         for batch in scan.batches(None):
             progress.at(scan.position)
@@ -156,44 +163,77 @@ class Bag:
         return topic
 
     def messages(self, topics: Collection[str] | None = None) -> Iterator[tuple[str, int, bytes]]:
-        """(topic, log time in ns, CDR bytes) in the order of the file; only those of `topics`, if given.
+        """(topic, log time in ns, CDR bytes); only those of `topics`, if given.
 
+        They come in the order of their log times, and those of one time in the order of the file. The topics of a
+        recorded machine come in the order of the file, which is that of its ticks: the clock may have been set back.
         Passes over what is damaged, and then sets `truncated`.
         """
         return _one_by_one(self.batches(topics))
 
     def messages_before_damage(self, topics: Collection[str] | None = None) -> Iterator[tuple[str, int, bytes]]:
-        """Like `messages`, but ends where the first of them may be missing."""
-        return _one_by_one(self._batches(topics, beyond_damage=False))
+        """In the order of the file; ends where the first of them may be missing."""
+        return _one_by_one(self._in_file_order(topics, beyond_damage=False))
 
-    def batches(self, topics: Collection[str] | None = None) -> Iterator[tuple[Batch, Mapping[int, Topic]]]:
+    def batches(self, topics: Collection[str] | None = None) -> Iterator[Block]:
         """Like `messages`, many at a time; some batches are empty.
 
         The mapping gives the topic of each channel number in the batch (with count 0).
         """
-        return self._batches(topics, beyond_damage=True)
+        wanted = self.topics.keys() if topics is None else topics
+        own = tuple(f"{machine.prefix}/" for machine in self.machines(by_bystanders=True))
+        if any(name.startswith(own) for name in wanted):
+            return self._in_file_order(topics, beyond_damage=True)
+        return self._in_time_order(topics)
 
-    def _batches(
-        self, topics: Collection[str] | None, beyond_damage: bool
-    ) -> Iterator[tuple[Batch, Mapping[int, Topic]]]:
+    def _in_file_order(self, topics: Collection[str] | None, beyond_damage: bool) -> Iterator[Block]:
         self.read_bytes = before = 0
         for file in self.files:
-            summary = self._summaries.get(file)
-            scan = Scan(file, summary)
+            scan = Scan(file, self._summaries.get(file))
             announced: dict[int, Topic] = {}
             for batch in scan.batches(topics):
                 self.read_bytes = before + scan.position
                 if scan.lost and not beyond_damage:
                     break
-                for number in scan.channels.keys() - announced.keys():
-                    announced[number] = self._announce(scan, number)
+                self._announce_all(scan, announced)
                 yield batch, announced
-            found = scan.damage or _too_few(scan, summary)
-            if found and (beyond_damage or file not in self._damage):
-                self._damaged(file, found)
+            found = self._judged(scan, beyond_damage)
             if found and not beyond_damage:
                 return
             before += file.stat().st_size
+
+    def _in_time_order(self, topics: Collection[str] | None) -> Iterator[Block]:
+        self.read_bytes = 0
+        scans = [Scan(file, self._known.get(file)) for file in self.files]
+        with ExitStack() as opened:
+            parts = [
+                Part(first_ns, partial(self._announcing, scan, announced, batches))
+                for scan, announced in [(scan, dict[int, Topic]()) for scan in scans]
+                for first_ns, batches in opened.enter_context(scan.parts_by_time(topics))
+            ]
+            for block in in_time_order(parts, str(self.path)):
+                self.read_bytes = sum(scan.position for scan in scans)
+                yield block
+        for scan in scans:
+            self._judged(scan, beyond_damage=True)
+
+    def _announcing(
+        self, scan: Scan, announced: dict[int, Topic], batches: Callable[[], Iterator[Batch]]
+    ) -> Iterator[Block]:
+        for batch in batches():
+            self._announce_all(scan, announced)
+            yield batch, announced
+
+    def _judged(self, scan: Scan, beyond_damage: bool) -> str:
+        """What a pass over a file found to be damaged, which `truncated` then tells, too."""
+        found = scan.damage or _too_few(scan, self._summaries.get(scan.file))
+        if found and (beyond_damage or scan.file not in self._damage):
+            self._damaged(scan.file, found)
+        return found
+
+    def _announce_all(self, scan: Scan, announced: dict[int, Topic]) -> None:
+        for number in scan.channels.keys() - announced.keys():
+            announced[number] = self._announce(scan, number)
 
     def _announce(self, scan: Scan, number: int) -> Topic:
         channel = scan.channels[number]
@@ -202,7 +242,7 @@ class Bag:
         return topic
 
     def topic_batches(self, topics: Collection[str]) -> Iterator[tuple[str, Batch]]:
-        """Like `messages`, one topic's messages of a batch at a time. Each topic's messages are in file order."""
+        """Like `messages`, one topic's messages of a batch at a time. Each topic's messages are in their order."""
         for batch, announced in self.batches(topics):
             numbers = batch.entries["number"]
             of: dict[str, list[int]] = {}
@@ -368,7 +408,7 @@ def is_made_for_a_record(topic: Topic) -> bool:
     return topic.type.partition("/")[0].endswith("_fields")
 
 
-def _one_by_one(batches: Iterable[tuple[Batch, Mapping[int, Topic]]]) -> Iterator[tuple[str, int, bytes]]:
+def _one_by_one(batches: Iterable[Block]) -> Iterator[tuple[str, int, bytes]]:
     for batch, announced in batches:
         for number, log_ns, begin, end in batch.entries.tolist():
             yield announced[number].name, log_ns, batch.data[begin:end]

@@ -16,6 +16,8 @@ from ..errors import BagError
 STORAGE = (".mcap", ".db3", ".bag")
 #: Second suffixes of files that are compressed as a whole.
 ZSTD = ".zstd"
+#: That of a ROS 1 bag that was not closed.
+_ACTIVE = ".active"
 #: Most bytes of a metadata.yaml that are read. Recorders write some KB; parsing takes seconds per MB.
 _MAX_METADATA_BYTES = 1 << 20
 _DIGITS = re.compile(r"(\d+)")
@@ -71,7 +73,7 @@ def mcap_files(folder: Path) -> list[Path]:
 
 def storage_suffix(file: Path) -> str:
     """`.mcap`, `.db3` or `.bag`, wherever it is in the name."""
-    return Path(file.name.removesuffix(ZSTD)).suffix
+    return Path(file.name.removesuffix(ZSTD).removesuffix(_ACTIVE)).suffix
 
 
 def _listed(path: Path) -> list[Path]:

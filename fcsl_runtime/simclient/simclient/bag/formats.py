@@ -19,7 +19,9 @@ from ..errors import BagError
 from .bag import Bag
 from .definitions import JAZZY, Definitions
 from .files import STORAGE, ZSTD, bag_files, metadata_of, storage_suffix
-from .foreign import PackedMcapBag, PackedSqliteBag, Ros1Bag, SqliteBag
+from .packed import PackedMcapBag, PackedSqliteBag
+from .ros1_bag import Ros1Bag
+from .sqlite_bag import SqliteBag
 from .unpack import TooLarge, unzstd_file
 
 #: By suffix: the reader class, and the one for bags whose messages are each compressed.

@@ -27,17 +27,21 @@ class Loss:
 
 @dataclass
 class Losses:
-    """Those of one file. `undefined`: messages whose topic's definition is lost."""
+    """Those of one file. `undefined`: messages whose topic's definition is lost. `misdated`: messages that were read too
+    late to be in the order of time, because their chunk gives a later first time."""
 
     parts: list[Loss] = field(default_factory=list)
     undefined: int = 0
+    misdated: int = 0
 
     def __str__(self) -> str:
         """What is missing; empty if nothing is."""
-        texts = [f"lacks {part}" for part in self.parts[:_MAX_LISTED]]
+        texts = [f"lacks {part}" for part in sorted(self.parts, key=lambda part: part.begin)[:_MAX_LISTED]]
         if len(self.parts) > _MAX_LISTED:
             lost = sum(part.end - part.begin for part in self.parts)
             texts.append(f"and {len(self.parts) - _MAX_LISTED} more parts, {lost} bytes in all")
         if self.undefined:
             texts.append(f"has {self.undefined} messages of topics whose definitions are lost")
+        if self.misdated:
+            texts.append(f"has {self.misdated} messages of before the first time of their chunk")
         return "; ".join(texts)

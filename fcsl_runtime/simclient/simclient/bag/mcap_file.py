@@ -8,8 +8,9 @@ import functools
 import os
 import struct
 import zlib
-from collections.abc import Collection, Iterator
-from contextlib import closing
+from collections.abc import Callable, Collection, Generator, Iterable, Iterator
+from contextlib import closing, contextmanager
+from functools import partial
 from io import BytesIO
 from pathlib import Path
 from typing import Any, BinaryIO, NamedTuple
@@ -23,8 +24,10 @@ from mcap.reader import SeekingReader
 from ..errors import BagError
 from ..library import runtime_library
 from .ahead import ahead
+from .batch import ENTRY, Batch
 from .losses import Loss, Losses
 from .mcap_walk import CHUNK_HEAD, LOST, LOST_MARK, MAGIC, RECORD_HEAD, Gap, Record, Walk
+from .time_order import sorted_by_time
 from .unpack import LIMIT_BYTES, TooLarge, unlz4, unzstd
 
 #: First bytes of other bag formats.
@@ -44,31 +47,18 @@ _LOOSE = (Opcode.MESSAGE, Opcode.CHANNEL, Opcode.SCHEMA)
 _FREE_BYTES, _RATIO = 1 << 30, 1000
 #: Most bytes of records outside chunks that are read in one call.
 _BLOCK_BYTES = 1 << 20
+#: Content of a message record up to its data: channel, number, times of recording and of publishing.
+_MESSAGE_HEAD = struct.Struct("<HIQQ")
+#: No message is earlier.
+_FIRST_NS = -(1 << 63)
 
 
 #: fcsl_mcap_record_t
 _RECORD = np.dtype(
     [("begin", "<u8"), ("end", "<u8"), ("log_ns", "<i8"), ("channel", "<u4"), ("opcode", "<u4")], align=True
 )
-#: A message: the number of its channel in its file, the time of recording, and the range of its bytes. In memory it is a
-#: _RECORD, so that nothing is copied where all records are messages.
-ENTRY = np.dtype(
-    {
-        "names": ["number", "log_ns", "begin", "end"],
-        "formats": ["<u4", "<i8", "<i8", "<i8"],
-        "offsets": [24, 16, 0, 8],
-        "itemsize": 32,
-    }
-)
 #: Records listed in one call.
 _LISTED = 1 << 16
-
-
-class Batch(NamedTuple):
-    """Messages of one file in file order; each ENTRY gives a message's bytes as data[begin:end]."""
-
-    data: bytes
-    entries: np.ndarray[Any, Any]
 
 
 class Scan:
@@ -114,20 +104,45 @@ class Scan:
                 yield number, log_ns, data[begin:end]
 
     def batches(self, topics: Collection[str] | None) -> Iterator[Batch]:
-        """The messages of `topics` (None: all), many at a time; some batches are empty."""
+        """The messages of `topics` (None: all) in the order of the file, many at a time; some batches are empty."""
         with self.file.open("rb") as stream:
             walk = Walk(stream)
-            with closing(ahead(_blocks(stream, walk), lambda block: len(block.data))) as blocks:
+            with closing(_read_ahead(self.file, _pieces(stream, walk))) as blocks:
                 for block in blocks:
                     self.position = block.end
-                    if block.why:
-                        self._losses.parts.append(Loss(block.begin, block.end, block.why, block.span_ns))
-                    else:
-                        yield from self._listed(block, topics)
+                    yield from self._listed(block, topics)
+        self._ends(walk)
+
+    @contextmanager
+    def parts_by_time(
+        self, topics: Collection[str] | None
+    ) -> Iterator[list[tuple[int, Callable[[], Iterator[Batch]]]]]:
+        """The parts of the file in the order in which they must be read: the time of the first message, and a function
+        that gives the messages of `topics` (None: all) in the order of time.
+        """
+        with self.file.open("rb") as stream:
+            walk = Walk(stream)
+            pieces = sorted(_pieces(stream, walk), key=lambda piece: piece.first_ns)
+        self._ends(walk)
+        with closing(_read_ahead(self.file, pieces)) as blocks:
+            yield [(p.first_ns, partial(self._by_time, blocks, p.first_ns, topics)) for p in pieces]
+
+    def _by_time(self, blocks: Iterator[_Block], first_ns: int, topics: Collection[str] | None) -> Iterator[Batch]:
+        block = next(blocks)
+        self.position += block.end - block.begin
+        found = [batch.entries for batch in self._listed(block, topics)]
+        if found:
+            batch = sorted_by_time(Batch(block.data, np.concatenate(found)))
+            self._losses.misdated += int(np.count_nonzero(batch.entries["log_ns"] < first_ns))
+            yield batch
+
+    def _ends(self, walk: Walk) -> None:
         self.ended, self.behind = walk.ended, self.file.stat().st_size - walk.end
 
     def _listed(self, block: _Block, topics: Collection[str] | None) -> Iterator[Batch]:
         """The messages of a block up to where it is damaged."""
+        if block.why:
+            self._losses.parts.append(Loss(block.begin, block.end, block.why, block.span_ns))
         at = 0
         while at < len(block.data):
             listed = _list(block.data, at)
@@ -205,6 +220,16 @@ def _native() -> ctypes.CDLL:
     return library
 
 
+class _Piece(NamedTuple):
+    """file[begin:end]: a chunk, records outside chunks, or what cannot be read. No message is earlier than `first_ns`."""
+
+    begin: int
+    end: int
+    first_ns: int = _FIRST_NS
+    chunk: Record | None = None
+    why: str = ""
+
+
 class _Block(NamedTuple):
     """The records of file[begin:end], or `why` they cannot be read; `span_ns` are the times that their chunk gives."""
 
@@ -215,49 +240,79 @@ class _Block(NamedTuple):
     span_ns: tuple[int, int] | None = None
 
 
-def _blocks(stream: BinaryIO, walk: Walk) -> Iterator[_Block]:
-    """The records of a file in blocks: the content of each chunk, and the records between chunks, collected."""
-    allowance = _FREE_BYTES + _RATIO * os.fstat(stream.fileno()).st_size
-    loose = bytearray()
-    begin = 0
+def _pieces(stream: BinaryIO, walk: Walk) -> Iterator[_Piece]:
+    """The pieces of a file in its order."""
+    loose: _Piece | None = None
     for part in walk:
         opcode = part.opcode if isinstance(part, Record) else None
-        if loose and (opcode not in _LOOSE or len(loose) > _BLOCK_BYTES):
-            yield _Block(begin, part.begin, bytes(loose))
-            loose.clear()
+        if loose and (opcode not in _LOOSE or loose.end - loose.begin > _BLOCK_BYTES):
+            yield loose
+            loose = None
         if isinstance(part, Gap):
-            yield _Block(part.begin, part.end, b"", "no record of MCAP")
+            yield _Piece(part.begin, part.end, why="no record of MCAP")
         elif opcode == LOST and _content(stream, part).endswith(LOST_MARK):
-            yield _Block(part.begin, part.end, b"", "damaged before a repair")
+            yield _Piece(part.begin, part.end, why="damaged before a repair")
         elif opcode == Opcode.CHUNK:
-            block = _unpacked(part, _content(stream, part), allowance)
-            allowance -= len(block.data)
-            yield block
+            span_ns = _span_ns(_content(stream, part, CHUNK_HEAD.size))
+            yield _Piece(part.begin, part.end, span_ns[0] if span_ns else _FIRST_NS, part)
         elif opcode in _LOOSE:
-            begin = begin if loose else part.begin
-            content = _content(stream, part)
-            loose += RECORD_HEAD.pack(part.opcode, len(content)) + content
+            first_ns = _first_ns(stream, part)
+            loose = loose or _Piece(part.begin, part.end, first_ns)
+            loose = _Piece(loose.begin, part.end, min(loose.first_ns, first_ns))
     if loose:
-        yield _Block(begin, walk.end, bytes(loose))
+        yield loose
 
 
-def _content(stream: BinaryIO, record: Record) -> bytes:
+def _first_ns(stream: BinaryIO, record: Record) -> int:
+    """The time of a message outside of chunks. Definitions have none: they come before all messages."""
+    content = _content(stream, record, _MESSAGE_HEAD.size) if record.opcode == Opcode.MESSAGE else b""
+    log_ns = int(_MESSAGE_HEAD.unpack(content)[2]) if len(content) == _MESSAGE_HEAD.size else 0
+    return log_ns if 0 < log_ns < 1 << 63 else _FIRST_NS
+
+
+def _span_ns(chunk: bytes) -> tuple[int, int] | None:
+    """The first and the last time that a chunk gives, if they make sense."""
+    if len(chunk) < CHUNK_HEAD.size:
+        return None
+    first_ns, last_ns, *_ = CHUNK_HEAD.unpack_from(chunk)
+    return (first_ns, last_ns) if first_ns <= last_ns < 1 << 63 else None
+
+
+def _read_ahead(file: Path, pieces: Iterable[_Piece]) -> Generator[_Block, None, None]:
+    return ahead(_blocks(file, pieces), lambda block: len(block.data))
+
+
+def _blocks(file: Path, pieces: Iterable[_Piece]) -> Iterator[_Block]:
+    """The records in each piece."""
+    with file.open("rb") as stream:
+        allowance = _FREE_BYTES + _RATIO * os.fstat(stream.fileno()).st_size
+        for piece in pieces:
+            if piece.chunk is not None:
+                block = _unpacked(piece.chunk, _content(stream, piece.chunk), allowance)
+                allowance -= len(block.data)
+                yield block
+            else:
+                stream.seek(piece.begin)
+                data = b"" if piece.why else stream.read(piece.end - piece.begin)
+                yield _Block(piece.begin, piece.end, data, piece.why)
+
+
+def _content(stream: BinaryIO, record: Record, size: int | None = None) -> bytes:
+    """The content of a record, or its first bytes."""
     stream.seek(record.content)
-    return stream.read(record.end - record.content)
+    return stream.read(min(record.end - record.content, record.end if size is None else size))
 
 
 def _unpacked(record: Record, chunk: bytes, allowance: int) -> _Block:
     """The records of a chunk, if there are no more bytes of them than `allowance`."""
-    data, why, span_ns = b"", "", None
+    data, why = b"", ""
     try:
-        first_ns, last_ns, *_ = CHUNK_HEAD.unpack_from(chunk)
-        span_ns = (first_ns, last_ns) if first_ns <= last_ns < 1 << 63 else None
         data = _records_of(chunk, allowance)
     except TooLarge as error:
         why = f"a chunk that {error}"
     except Exception:  # noqa: BLE001  damaged bytes can make the decompressors raise anything
         why = "a damaged chunk"
-    return _Block(record.begin, record.end, data, why, span_ns)
+    return _Block(record.begin, record.end, data, why, _span_ns(chunk))
 
 
 def _records_of(chunk: bytes, allowance: int) -> bytes:

@@ -12,7 +12,7 @@ import numpy as np
 from ..errors import BagError, did_you_mean
 from ..ros.cdr import gathered
 from .bag import Array, Bag, RecordedMachine
-from .mcap_file import Batch
+from .batch import Batch
 from .rows import has_stamps
 
 #: Seconds and nanoseconds of the header stamp.

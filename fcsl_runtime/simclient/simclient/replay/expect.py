@@ -168,9 +168,11 @@ def _texts(bag: Bag, entry: Entry, header_time: bool) -> tuple[Array, Array, int
         stamps.append(header.stamp.sec * 10**9 + header.stamp.nanosec if header else log_ns)
         logs.append(log_ns)
         texts.append(text)
-    times_ns, log_times = np.array(stamps, np.int64), np.array(logs, np.int64)
+    times_ns, log_times, found = np.array(stamps, np.int64), np.array(logs, np.int64), np.array(texts, dtype=np.str_)
+    order = np.lexsort((found, times_ns, log_times))
+    times_ns, log_times, found = times_ns[order], log_times[order], found[order]
     usable, _ = screen(times_ns, log_times, header_time)
-    return times_ns[usable], np.array(texts, dtype=np.str_)[usable], len(texts)
+    return times_ns[usable], found[usable], len(texts)
 
 
 def _aligned(times_ns: Array, grid: Grid, nearest: bool) -> tuple[Array, Array]:

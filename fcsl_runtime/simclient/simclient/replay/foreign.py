@@ -188,7 +188,8 @@ def _grid(chart: Map, intakes: Mapping[str, Intake], bag: Bag, tick_hz: int) -> 
             )
     times = [intake.times_ns for intake in intakes.values() if len(intake.times_ns)]
     if not times:
-        raise BagError(f"{bag.path}: there is no message on the mapped topics")
+        damage = f" ({bag.truncated})" if bag.truncated else ""
+        raise BagError(f"{bag.path}: there is no message on the mapped topics{damage}")
     first_ns, last_ns = min(int(t.min()) for t in times), max(int(t.max()) for t in times)
     ticks = tick_count(first_ns, last_ns, tick_hz)
     if ticks > MAX_TICKS:

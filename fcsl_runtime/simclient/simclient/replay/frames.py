@@ -183,6 +183,9 @@ def _add(found: dict[tuple[str, str, str], _Samples], topic: str, log_ns: int, t
 def _link(topic: str, parent: str, child: str, samples: _Samples, header_time: bool) -> Link:
     numbers, log_ns = np.array(samples.numbers, np.float64), np.array(samples.log_ns, np.int64)
     seconds, rest = np.array(samples.stamps, np.int64).T
+    # Of one time of recording by stamp and content, so that it does not matter in which order a file has them.
+    order = np.lexsort((*numbers.T, rest, seconds, log_ns))
+    numbers, log_ns, seconds, rest = numbers[order], log_ns[order], seconds[order], rest[order]
     with np.errstate(over="ignore", invalid="ignore"):
         length = np.linalg.norm(numbers[:, 3:], axis=1)
     sound = {

@@ -131,6 +131,9 @@ class _Column:
         other = others.astype(bool)
         status = np.concatenate(self.status) if self.status else np.empty((0, len(self.wishes)), np.uint8)
         values = joined_rows(self.values) if self.values else np.empty(0, self.reader.dtype)
+        if not (log_ns[1:] > log_ns[:-1]).all():
+            order = self._order(log_ns, stamps_ns, other, status, values)
+            log_ns, stamps_ns, other, status, values = (a[order] for a in (log_ns, stamps_ns, other, status, values))
         all_read = not status.any()
         # One pick is enough: a fault of a message as a whole appears in all picks.
         unread = np.zeros(len(log_ns), bool) if all_read else np.isin(status[:, 0], _UNREAD)
@@ -157,6 +160,17 @@ class _Column:
                 times, stamps, column = times[taken], stamps[taken], column[taken]
             intakes.append(Intake(times, stamps, column, len(log_ns), refused))
         return intakes, oddities
+
+    def _order(self, log_ns: Array, stamps_ns: Array, other: Array, status: Array, values: Array) -> Array:
+        """The order of the messages: by time of recording, of one time by stamp, and of one stamp by their content. So
+        it does not matter in which order a file has them.
+        """
+        keys = [log_ns, np.where(other, 0, stamps_ns), other]
+        for i, w in enumerate(self.wishes):
+            taken = (status[:, i] == 0) & ~other
+            column = np.ascontiguousarray(values[w.pick.name]).reshape(len(log_ns), -1)
+            keys += [status[:, i], *np.where(taken[:, None], column, 0).T]
+        return np.lexsort(keys[::-1])
 
 
 def gather(

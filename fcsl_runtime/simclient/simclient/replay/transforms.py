@@ -13,7 +13,7 @@ import numpy as np
 from rosbags.typesys import Stores, get_typestore
 
 from ..bag import Bag, Topic
-from ..bag.mcap_file import ENTRY, Batch
+from ..bag.batch import ENTRY, Batch
 from ..errors import BagError, MapError
 from .frames import Chain, Frames
 from .mapping import Entry
