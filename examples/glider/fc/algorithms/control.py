@@ -2,7 +2,12 @@
 
 from __future__ import annotations
 
-from fcsl_builtins import atan, clamp, cos, max, sin, sqrt, tan, wrap_angle
+from fcsl_builtins import Health, atan, clamp, cos, max, sin, sqrt, tan, wrap_angle
+
+
+def commands(law: Health) -> bool:
+    """Whether it has made its outputs. After a fault it has not: they are old ones, and the last command stays."""
+    return law == "nominal" or law == "degraded"
 
 
 class Reference:
@@ -61,21 +66,21 @@ class Reference:
     state = {"integral": "f64 rad", "pulled": "bool"}
 
     def execute(self):
-        c = Command(self.speed, self.course, 0.0, self.pitch, self.pitch, True, False)
-        if self.launch_health != "stale":
+        c = Command(self.speed, self.course, 0.0, self.pitch, self.pitch, True, self.pulled)
+        if commands(self.launch_health):
             c = self.launch
-        elif self.glide_health != "stale":
+        elif commands(self.glide_health):
             c = self.glide
-        elif self.waypoint_health != "stale":
+        elif commands(self.waypoint_health):
             c = self.waypoint
             self.waypoints_done = self.waypoints_over
-        elif self.loiter_health != "stale":
+        elif commands(self.loiter_health):
             c = self.loiter
-        elif self.land_health != "stale":
+        elif commands(self.land_health):
             c = self.land
-        elif self.flare_health != "stale":
+        elif commands(self.flare_health):
             c = self.flare
-        elif self.safe_health != "stale":
+        elif commands(self.safe_health):
             c = self.safe
         if self.resumed:
             self.pitch = self.here_pitch

@@ -1,6 +1,11 @@
-from fcsl_builtins import max
+from fcsl_builtins import Health, max
 
 G0 = 9.80665  # standard gravity, m/s^2: part of the definition of specific impulse
+
+
+def commands(law: Health) -> bool:
+    """Whether it has made its outputs. After a fault it has not: they are old ones, and the last command stays."""
+    return law == "nominal" or law == "degraded"
 
 
 class Engine:
@@ -42,16 +47,18 @@ class Engine:
         self.mass = self.wet_mass
 
     def execute(self):
-        self.throttle = 0.0
-        self.landed = False
-        if self.ascent_health != "stale":
+        if commands(self.ascent_health):
             self.throttle = self.ascent_throttle
-        elif self.descent_health != "stale":
+            self.landed = False
+        elif commands(self.descent_health):
             self.throttle = self.descent_throttle
             self.landed = self.descent_landed
-        elif self.safe_health != "stale":
+        elif commands(self.safe_health):
             self.throttle = self.safe_throttle
             self.landed = self.safe_landed
+        elif self.ascent_health == "stale" and self.descent_health == "stale" and self.safe_health == "stale":
+            self.throttle = 0.0
+            self.landed = False
         self.armed = not self.landed
         thrust = self.throttle * self.max_thrust
         self.acceleration = thrust / self.mass - self.gravity

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from fcsl_builtins import (
+    Health,
     clamp,
     cross3,
     dot,
@@ -18,6 +19,11 @@ from fcsl_builtins import (
     zeros,
 )
 from rotations import DOWN, pointed
+
+
+def commands(law: Health) -> bool:
+    """Whether it has made its outputs. After a fault it has not: they are old ones."""
+    return law == "nominal" or law == "degraded"
 
 
 class Position:
@@ -79,13 +85,13 @@ class Position:
     }
 
     def execute(self):
-        safe = self.reference_health == "stale"
+        safe = not commands(self.reference_health)  # also when it failed: its outputs may be those of another flight
         blind = safe and self.barometer_age > self.barometer_patience
         if self.resumed:
             self.integral = zeros(3)
             self.ground = self.position[2]
             self.flying = False
-        if self.position[2] < self.ground - self.leave_height or safe:
+        if self.position[2] < self.ground - self.leave_height or self.reference_health == "stale":
             self.flying = True
 
         # ---- position: what velocity is wanted, and how far that is away

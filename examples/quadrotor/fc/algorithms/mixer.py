@@ -1,6 +1,6 @@
 from __future__ import annotations
 
-from fcsl_builtins import clamp, f64, max, min, sqrt, zeros
+from fcsl_builtins import Health, clamp, f64, max, min, sqrt, zeros
 
 ACROSS = [-1.0, 1.0, 1.0, -1.0]  # roll torque by thrust, times the arm: rotor 1 front right, 2 rear left,
 ALONG = [1.0, -1.0, 1.0, -1.0]  # pitch torque                          3 front left, 4 rear right
@@ -14,6 +14,11 @@ def share(low: f64, high: f64, value: f64, step: f64) -> f64:
     if step < 0.0:
         return clamp((low - value) / step, 0.0, 1.0)
     return 1.0
+
+
+def commands(law: Health) -> bool:
+    """Whether it has made its outputs. After a fault it has not: they are old ones, and the last command stays."""
+    return law == "nominal" or law == "degraded"
 
 
 class Mixer:
@@ -70,10 +75,11 @@ class Mixer:
         if self.running and (not self.imu_valid or (self.descent_health != "stale" and self.landed)):
             self.cut = True
         self.running = self.running and not self.cut
-        self.limited = False
-        self.given = zeros(3)
-        self.thrusts = zeros(4)
-        if self.running:
+        if not self.running:
+            self.limited = False
+            self.given = zeros(3)
+            self.thrusts = zeros(4)
+        elif commands(self.position_health) and commands(self.rate_health):
             # The most of a rotor: the positive root of R kq kv w^2 + w / kv + R i0 - voltage = 0.
             a = self.resistance * self.torque_factor * self.kv
             b = 1.0 / self.kv

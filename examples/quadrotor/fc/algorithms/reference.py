@@ -1,4 +1,9 @@
-from fcsl_builtins import exp, quat_to_euler, zeros
+from fcsl_builtins import Health, exp, quat_to_euler, zeros
+
+
+def commands(law: Health) -> bool:
+    """Whether it has made its outputs. After a fault it has not: they are old ones, and the last command stays."""
+    return law == "nominal" or law == "degraded"
 
 
 class Reference:
@@ -45,15 +50,15 @@ class Reference:
             self.velocity = zeros(3)
             self.acceleration = zeros(3)
             self.yaw = quat_to_euler(self.attitude)[2]
-        if self.take_off_health != "stale":
+        if commands(self.take_off_health):
             self.spool = self.take_off_spool
             self.target = self.take_off_target
-        elif self.hold_health != "stale":
+        elif commands(self.hold_health):
             self.target = self.hold_target
-        elif self.mission_health != "stale":
+        elif commands(self.mission_health):
             self.target = self.mission_target
             self.mission_done = self.mission_over
-        elif self.land_health != "stale":
+        elif commands(self.land_health):
             self.target = self.land_target
         left = exp(-self.pole * self.dt)
         c0 = self.position - self.target

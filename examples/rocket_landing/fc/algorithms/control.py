@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from fcsl_builtins import (
+    Health,
     abs,
     asin,
     clamp,
@@ -29,6 +30,11 @@ STANDARD_GRAVITY = 9.80665
 def shortened(v: f64[3], most: f64) -> f64[3]:
     """v, with at most that length."""
     return v * min(1.0, most / max(norm(v), 1e-6))
+
+
+def commands(law: Health) -> bool:
+    """Whether it has made its outputs. After a fault it has not: they are old ones, and the last command stays."""
+    return law == "nominal" or law == "degraded"
 
 
 class Propulsion:
@@ -132,28 +138,27 @@ class Steering:
         "most_thrust": "f64 N",
         "leave_height": "f64 m",
     }
-    state = {"slope": "f64[3] m/s^3"}
+    state = {"wanted": "f64[3] m/s^2", "slope": "f64[3] m/s^3"}
 
     def execute(self):
-        wanted = zeros(3)
-        if self.ascent_health != "stale":
-            wanted = self.ascent
-        elif self.descent_health != "stale":
-            wanted = self.descent
-        elif self.terminal_health != "stale":
-            wanted = self.terminal
-        elif self.safe_health != "stale":
-            wanted = self.safe
+        if commands(self.ascent_health):
+            self.wanted = self.ascent
+        elif commands(self.descent_health):
+            self.wanted = self.descent
+        elif commands(self.terminal_health):
+            self.wanted = self.terminal
+        elif commands(self.safe_health):
+            self.wanted = self.safe
         if self.height > self.leave_height:
             self.flying = True
 
         least = self.least_thrust * self.factor / self.mass
         most = self.most_thrust * self.factor / self.mass
-        up = clamp(-wanted[2], least, most)
-        side = hypot(wanted[0], wanted[1])
+        up = clamp(-self.wanted[2], least, most)
+        side = hypot(self.wanted[0], self.wanted[1])
         room = min(up * tan(self.tilt_limit), sqrt(max(most * most - up * up, 0.0)))
         fit = min(1.0, room / max(side, 1e-6))
-        limited = [wanted[0] * fit, wanted[1] * fit, -up]
+        limited = [self.wanted[0] * fit, self.wanted[1] * fit, -up]
         if self.resumed:
             self.acceleration = limited
             self.slope = zeros(3)
@@ -274,10 +279,15 @@ class Actuators:
         if self.running and not self.imu_valid:
             self.cut = True
         self.running = self.running and not self.cut
-        self.limited = False
-        self.throttle = 0.0
-        nozzle = zeros(2)
-        if self.running:
+        if not self.running:
+            self.limited = False
+            self.throttle = 0.0
+            self.nozzle_x = 0.0
+            self.nozzle_y = 0.0
+            self.roll = 0.0
+        elif commands(self.steering_health) and commands(self.attitude_health):
+            self.limited = False
+            nozzle = zeros(2)
             throttle = (self.thrust / self.factor + self.back_pressure) / self.max_thrust
             self.throttle = clamp(throttle, self.min_throttle, 1.0)
             inertia = self.dry_inertia + self.full_inertia * self.propellant / self.full
@@ -292,8 +302,6 @@ class Actuators:
                 self.roll = 0.0
             elif abs(ahead) > self.roll_on:
                 self.roll = 1.0 if ahead > 0.0 else -1.0
-        else:
-            self.roll = 0.0
-        self.nozzle_x, self.nozzle_y = nozzle
+            self.nozzle_x, self.nozzle_y = nozzle
         self.roll_right = max(self.roll, 0.0)
         self.roll_left = max(-self.roll, 0.0)

@@ -1,7 +1,12 @@
 from __future__ import annotations
 
-from fcsl_builtins import abs, clamp, cross3, matvec, max, norm, quat_conj, quat_mul, quat_rotate, zeros
+from fcsl_builtins import Health, abs, clamp, cross3, matvec, max, norm, quat_conj, quat_mul, quat_rotate, zeros
 from rotations import rotation_vector
+
+
+def commands(law: Health) -> bool:
+    """Whether it has made its outputs. After a fault it has not: they are old ones, and the last command stays."""
+    return law == "nominal" or law == "degraded"
 
 
 class Damping:
@@ -137,13 +142,14 @@ class WheelDrive:
     def execute(self):
         speed = [self.speed_1, self.speed_2, self.speed_3, self.speed_4]
         self.momentum = matvec(self.axes, speed) * self.wheel_inertia
-        self.torque = zeros(3)
-        if self.safe_health != "stale":
+        if commands(self.safe_health):
             self.torque = self.safe_torque
-        elif self.point_health != "stale":
+        elif commands(self.point_health):
             self.torque = self.point_torque
-        elif self.detumble_health != "stale":
+        elif commands(self.detumble_health):
             self.torque = self.detumble_torque
+        elif self.safe_health == "stale" and self.point_health == "stale" and self.detumble_health == "stale":
+            self.torque = zeros(3)
         self.saturated = False
         for i in range(4):
             self.saturated = self.saturated or abs(speed[i]) > 0.99 * self.max_speed
