@@ -38,7 +38,12 @@ function(fcsl_add_model name)
     POSITION_INDEPENDENT_CODE ON LINK_DEPENDS "${CMAKE_CURRENT_FUNCTION_LIST_DIR}/fcsl_model.map;${crate}")
   # The flags of fcsl_compiler/driver/toolchain.py; -O3 overrides CMake's level.
   target_compile_options(${name} PRIVATE -O3 -ffp-contract=off -fno-math-errno
-    $<$<COMPILE_LANGUAGE:CXX>:-fno-exceptions> $<$<COMPILE_LANGUAGE:CXX>:-fno-rtti>)
+    $<$<COMPILE_LANGUAGE:CXX>:-fno-exceptions> $<$<COMPILE_LANGUAGE:CXX>:-fno-rtti>
+    $<$<COMPILE_LANGUAGE:CXX>:-Werror=narrowing>
+    $<$<COMPILE_LANGUAGE:C>:-Werror=incompatible-pointer-types>
+    $<$<COMPILE_LANGUAGE:C>:-Werror=int-conversion>
+    $<$<COMPILE_LANGUAGE:C>:-Werror=implicit-function-declaration>
+    -Werror=cast-function-type -Werror=return-type)
   target_link_options(${name} PRIVATE
     "LINKER:-z,now" "LINKER:--no-undefined" "LINKER:--version-script=${CMAKE_CURRENT_FUNCTION_LIST_DIR}/fcsl_model.map")
   target_include_directories(${name} PRIVATE $<TARGET_PROPERTY:fcsl_sim::fcsl_sim,INTERFACE_INCLUDE_DIRECTORIES>)

@@ -37,6 +37,13 @@ _WIND = (
     "  }\n"
     "}"
 )
+_MODELS = (
+    '"models": {\n'
+    '  "ramp": {"source": "ramp.c"},\n'
+    '  "sensor": {"source": "package://fcsl_sim/models/noisy_sensor.c"},\n'
+    '  "pulse": {"source": "MODEL.c"}\n'
+    "}"
+)
 _BIAS = '"events": [{"at_s": 0.5, "set": "altimeter.parameters.bias", "value": 1.0}]'
 
 SIM_CODES: dict[str, Code] = {
@@ -148,5 +155,14 @@ SIM_CODES: dict[str, Code] = {
         Kind.SIMULATION,
         '"events": [{"at_s": 0.5, "set": "altimeter.inputs.truth", "value": 1.0}]',
         _BIAS,
+    ),
+    "W805": Code(
+        "a model that compares its time",
+        "A function of the model that compares its time `t` usually jumps there. A step of the integrator that reaches over "
+        "a jump takes it for a smooth slope: a pulse shorter than a step counts twice, or not at all. The function `next_time` "
+        "of a model announces such times, and steps end at them. Only the text of the file is looked at.",
+        Kind.SIMULATION,
+        _MODELS.replace("MODEL", "silent_pulse"),
+        _MODELS.replace("MODEL", "pulse"),
     ),
 }

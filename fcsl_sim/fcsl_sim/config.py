@@ -36,10 +36,11 @@ from .integrators import Integrator, read_integrator
 from .machine_model import machine_model
 from .models import ModelField, ModelTable, type_of, with_unit
 from .plant_only import MAX_TICK_HZ, build_plant_only
-from .plugins import model_library, model_source
+from .plugins import model_library, model_source, source_text
 from .ros import TruthTopic
 from .set_argument import Settings, with_elements
 from .table_parameter import read_table
+from .time_comparison import time_comparison
 from .whole_ticks import whole_ticks
 from .wiring import MAX_SECONDS, Instance, Wiring, check_wiring, seconds
 
@@ -421,12 +422,23 @@ class _Loader:
         if key == "machine":
             return self._machine_model(text, node.span)
         try:
-            return model_source(text, file_of(node.span)) if key == "source" else model_library(text)
+            if key == "library":
+                return model_library(text)
+            table = model_source(text, file_of(node.span))
+            self._warn_of_time(table, text, node.span)
+            return table
         except SimError as error:
             reason, _, output = str(error).partition("\n")
             reason = reason.removesuffix(":")
             self.sink.error("E801", f"the model `{text}` cannot be used: {reason}", node.span, output=output)
             return None
+
+    def _warn_of_time(self, table: ModelTable, text: str, span: Span) -> None:
+        line = None if table.has_next_time else time_comparison(source_text(text, file_of(span)))
+        if line is not None:
+            message = f"`{text}` compares its time in line {line}, and announces no times at which it jumps"
+            why = "a step of the integrator that reaches over a jump takes it for a smooth slope"
+            self.sink.warning("W805", message, span, why=why, help="give the model a function `next_time`")
 
     def _machine_model(self, text: str, span: Span) -> ModelTable | None:
         """A machine with one instance: its algorithm is the model."""

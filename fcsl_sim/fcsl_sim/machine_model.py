@@ -28,4 +28,4 @@ def machine_model(library: Path, name: str) -> ModelTable:
             path = field.path.partition(".")[2]
             type_ = type_of(field.type, field.shape)
             fields[path] = ModelField(path, field.role, False, False, False, type_, field.offset, field.unit, field.doc)
-    return ModelTable(name, library, 0, 0, False, True, False, "", (), fields, machine.tick_hz)
+    return ModelTable(name, library, 0, 0, False, True, False, False, "", (), fields, machine.tick_hz)

@@ -25,7 +25,7 @@ from .errors import SimError
 from .model_list import find_model
 from .models import Scalar
 
-ABI_VERSION = 3
+ABI_VERSION = 4
 NO_OFFSET = 2**32 - 1
 _ROLES = {1: "input", 2: "output", 3: "parameter", 4: "state"}
 _FEEDTHROUGH, _OPTIONAL, _TABLE = 1 << 4, 1 << 5, 1 << 6
@@ -76,6 +76,7 @@ class _CModel(ctypes.Structure):
         ("update", CFUNCTYPE(None, ptr, POINTER(_CContext))),
         ("event", CFUNCTYPE(None, ptr, c_double, POINTER(c_double), POINTER(c_double))),
         ("reset", CFUNCTYPE(None, ptr, POINTER(_CContext), c_uint32)),
+        ("next_time", CFUNCTYPE(c_double, ptr, c_double)),
     ]
 
 
@@ -140,7 +141,7 @@ class ModelInstance:
         return cls(table.library, table.name, **noise)
 
     def has(self, function: str) -> bool:
-        """Whether the model has init, derivative, output, update, event or reset."""
+        """Whether the model has init, derivative, output, update, event, reset or next_time."""
         return bool(getattr(self._model, function))
 
     def get(self, path: str) -> Scalar | list[Scalar]:
@@ -199,6 +200,10 @@ class ModelInstance:
     def reset(self, number: int, time_ns: int = 0) -> None:
         """As if event `number` had happened."""
         self._function("reset")(self._self, self._context(time_ns), number)
+
+    def next_time(self, t: float) -> float:
+        """The next time after t, s, at which the functions jump; infinite: none."""
+        return float(self._function("next_time")(self._self, t))
 
     def _function(self, name: str) -> Callable[..., Any]:
         if not self.has(name):

@@ -72,6 +72,7 @@ class ModelTable:
     has_output: bool
     has_update: bool
     second_order: bool
+    has_next_time: bool
     doc: str
     events: tuple[ModelEvent, ...]
     fields: dict[str, ModelField]
@@ -127,6 +128,7 @@ def parse_description(text: str, library: Path) -> ModelTable:
         "output" in has,
         "update" in has,
         "second_order" in has,
+        "next_time" in has,
         doc,
         events,
         fields,

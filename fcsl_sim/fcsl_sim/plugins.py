@@ -62,6 +62,11 @@ def model_source(text: str, config: Path) -> ModelTable:
     return compile_model(path)
 
 
+def source_text(text: str, config: Path) -> str:
+    """The text of a `source` that is a model."""
+    return resolve_source(text, config=config).read_text(encoding="utf-8", errors="replace")
+
+
 def model_library(text: str) -> ModelTable:
     """The model of a `library`, package://PACKAGE/NAME, which fcsl_add_model() of that package has installed. Raises
     SimError."""

@@ -23,7 +23,8 @@
 ##     field(Tank, Output, outputs.level, "m", ""),
 ##   ])
 ##
-## The procs are those of fcsl_model_t, by their names: `init`, `derivative`, `output`, `update`, `event`, `reset`.
+## The procs are those of fcsl_model_t, by their names: `init`, `derivative`, `output`, `update`, `event`,
+## `reset`, `next_time`.
 
 import std/macros
 
@@ -182,6 +183,37 @@ proc descriptor(name, doc: string, fields: openArray[Field], events: openArray[E
   for f in functions: result.add("." & f & " = (void *)" & f & ",\n")
   result.add("};\n__attribute__((visibility(\"default\"))) const fcsl_model_t *const fcsl_models[] = {&fcsl_model, NULL};\n")
 
+type
+  InitProc[M] = proc (self: ptr M, context: ptr Context): cstring {.cdecl.}
+  DerivativeProc[M] = proc (self: ptr M, t: float64, x, dx: States) {.cdecl.}
+  OutputProc[M] = proc (self: ptr M, t: float64, x: States) {.cdecl.}
+  UpdateProc[M] = proc (self: ptr M, context: ptr Context) {.cdecl.}
+  EventProc[M] = proc (self: ptr M, t: float64, x, value: States) {.cdecl.}
+  ResetProc[M] = proc (self: ptr M, context: ptr Context, number: uint32) {.cdecl.}
+  NextTimeProc[M] = proc (self: ptr M, t: float64): float64 {.cdecl.}
+
+macro checkFunctions(Model: typedesc, functions: static openArray[string]): untyped =
+  ## Refuses procs of other types than fcsl_model_t has: C does not see them.
+  result = newStmtList()
+  for name in functions:
+    let kind = case name
+      of "init": bindSym"InitProc"
+      of "derivative": bindSym"DerivativeProc"
+      of "output": bindSym"OutputProc"
+      of "update": bindSym"UpdateProc"
+      of "event": bindSym"EventProc"
+      of "reset": bindSym"ResetProc"
+      of "next_time": bindSym"NextTimeProc"
+      else:
+        error("there is no function `" & name & "`: see the first lines of fcsl_model")
+        return
+    let wanted = nnkBracketExpr.newTree(kind, Model)
+    let wrong = newLit("`" & name & "` has other parameters or another result than fcsl_model says")
+    let function = ident(name)
+    result.add quote do:
+      when `function` isnot `wanted`:
+        {.error: `wrong`.}
+
 macro emitted(text: static string): untyped =
   nnkPragma.newTree(nnkExprColonExpr.newTree(ident("emit"), nnkBracket.newTree(newStrLitNode(text))))
 
@@ -195,6 +227,7 @@ template exportModel*(name, doc: static string, Model: typedesc, fields: untyped
     const at = offsetOf(Model, state)
   else:
     const at = 0
+  checkFunctions(Model, functions)
   const text = descriptor(name, doc, fields, events, functions, sizeof(Model), alignof(Model), at, continuous,
                           secondOrder, sampled)
   emitted(text)

@@ -18,7 +18,7 @@ enum { STACK_BYTES = 1 << 16, TEXT_BYTES = 1024, EXIT_FAILED = 2 };
 static const int SIGNALS[] = {SIGSEGV, SIGBUS, SIGFPE, SIGILL, SIGABRT};
 static const char *const SIGNAL_NAMES[] = {"SIGSEGV", "SIGBUS", "SIGFPE", "SIGILL", "SIGABRT"};
 #define SIGNAL_COUNT (sizeof SIGNALS / sizeof *SIGNALS)
-static const char *const FUNCTIONS[] = {"", "init", "derivative", "output", "update", "event", "reset"};
+static const char *const FUNCTIONS[] = {"", "init", "derivative", "output", "update", "event", "reset", "next_time"};
 
 /* The simulation that was opened last, since the handlers are those of the process. */
 static const fcsl_sim_t *_Atomic current;

@@ -67,8 +67,8 @@ static void put_type(text_t *text, const fcsl_field_t *field)
 static void put_functions(text_t *text, const fcsl_model_t *model)
 {
     char names[64];
-    (void)snprintf(names, sizeof names, "%s%s%s", model->output ? "output," : "", model->update ? "update," : "",
-                   model->is_second_order ? "second_order," : "");
+    (void)snprintf(names, sizeof names, "%s%s%s%s", model->output ? "output," : "", model->update ? "update," : "",
+                   model->is_second_order ? "second_order," : "", model->next_time ? "next_time," : "");
     put(text, names, '\t');
 }
 

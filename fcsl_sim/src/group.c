@@ -97,6 +97,7 @@ static void slope(void *context, double t, const double *x, double *dx)
 {
     fcsl_group_t *group = context;
     fcsl_sim_t *sim = group->sim;
+    t = fcsl_group_before_jump(group, t);
     evaluate_stages(group, t, x);
     for (uint32_t i = 0; i < group->derived_count; i++) {
         const fcsl_instance_state_t *instance = &sim->instances[group->derived[i]];
@@ -111,7 +112,7 @@ static void slope_of_one(void *context, double t, const double *x, double *dx)
 {
     const fcsl_group_t *group = context;
     fcsl_sim_enter(group->sim, group->derived[0], FCSL_IN_DERIVATIVE);
-    group->derivative(group->derivative_of, t, x, dx);
+    group->derivative(group->derivative_of, fcsl_group_before_jump(group, t), x, dx);
 }
 
 static fcsl_slope_t choose_slope(fcsl_group_t *group)
@@ -128,6 +129,7 @@ static fcsl_slope_t choose_slope(fcsl_group_t *group)
 int fcsl_group_events(fcsl_group_t *group, double t, const double *x, double *value, fcsl_error_t *error)
 {
     fcsl_sim_t *sim = group->sim;
+    t = fcsl_group_before_jump(group, t);
     evaluate_stages(group, t, x);
     for (uint32_t i = 0; i < group->eventful_count; i++) {
         const fcsl_instance_state_t *instance = &sim->instances[group->eventful[i]];
@@ -144,7 +146,8 @@ double fcsl_group_time_s(const fcsl_group_t *group)
 {
     const fcsl_group_state_t *state = &group->state;
     const int on_grid = group->plan->hz > 0 && state->time_ns == state->begin_ns;
-    return on_grid ? (double)state->step / (double)group->plan->hz : (double)state->time_ns / FCSL_NS_PER_S;
+    const double t = on_grid ? (double)state->step / (double)group->plan->hz : (double)state->time_ns / FCSL_NS_PER_S;
+    return t > state->since_s ? t : state->since_s;
 }
 
 /* To the next step of the grid. Its times are those of fcsl_grid_time_ns, without a division. */
@@ -222,7 +225,7 @@ static void move_to(fcsl_group_t *group, int64_t time_ns)
 
 static int step_fixed(fcsl_group_t *group, int64_t time_ns, fcsl_error_t *error)
 {
-    const step_t step = next_step(group, time_ns);
+    const step_t step = next_step(group, group->jump_ns < time_ns ? group->jump_ns : time_ns);
     const int64_t from_ns = group->state.time_ns;
     int64_t length_ns = step.length_ns;
     fcsl_integrator_step(&group->integrator, step.t, step.h, step.regular, group->x, group->x1);
@@ -263,7 +266,19 @@ int fcsl_group_start(fcsl_group_t *group, fcsl_error_t *error)
     return group->event_count > 0 ? fcsl_group_events(group, 0.0, group->x, group->g, error) : 0;
 }
 
-/* The states and inputs that the group goes on with. Events that a jump has caused happen now. */
+int fcsl_group_resume(fcsl_group_t *group, fcsl_error_t *error)
+{
+    fcsl_group_restart(group);
+    if (group->event_count > 0) {
+        return fcsl_group_events(group, fcsl_group_time_s(group), group->x, group->g1, error) ||
+                       fcsl_group_fire(group, group->g1, error)
+                   ? -1
+                   : 0;
+    }
+    return 0;
+}
+
+/* The states and inputs that the group goes on with. */
 static int begin(fcsl_group_t *group, fcsl_error_t *error)
 {
     fcsl_group_state_t *state = &group->state;
@@ -276,15 +291,8 @@ static int begin(fcsl_group_t *group, fcsl_error_t *error)
     if (is_open) {
         (void)fcsl_group_gather(group, group->x);
     }
-    fcsl_group_restart(group);
     state->disturbed = 0;
-    if (group->event_count > 0) {
-        return fcsl_group_events(group, fcsl_group_time_s(group), group->x, group->g1, error) ||
-                       fcsl_group_fire(group, group->g1, error)
-                   ? -1
-                   : 0;
-    }
-    return 0;
+    return fcsl_group_resume(group, error);
 }
 
 int fcsl_group_advance(fcsl_group_t *group, int64_t time_ns, int64_t barrier_ns, fcsl_error_t *error)
@@ -299,7 +307,8 @@ int fcsl_group_advance(fcsl_group_t *group, int64_t time_ns, int64_t barrier_ns,
         return fcsl_group_advance_adaptive(group, time_ns, barrier_ns, error);
     }
     while (group->state.time_ns < time_ns) { /* each step ends later than it began */
-        if (step_fixed(group, time_ns, error)) {
+        if (fcsl_group_find_jump(group, error) || step_fixed(group, time_ns, error) ||
+            (group->state.time_ns == group->jump_ns && fcsl_group_jump(group, error))) {
             return -1;
         }
     }
@@ -314,6 +323,8 @@ int fcsl_group_open(fcsl_group_t *group, fcsl_sim_t *sim, fcsl_error_t *error)
     const size_t n = fcsl_vector_room(group->n);
     const size_t events = group->event_count;
     group->sim = sim;
+    group->last_s = INFINITY;
+    group->jump_ns = INT64_MAX;
     group->memory = calloc(4u * n + 3u * events + fcsl_integrator_memory(group->n) + 1u, sizeof(double));
     if (!group->memory) {
         return fcsl_sim_fail(error, "no memory for the states");
@@ -346,6 +357,7 @@ void fcsl_group_free(fcsl_group_t *group)
     free(group->stages);
     free(group->outputs);
     free(group->timed);
+    free(group->announcing);
     free(group->outer);
     free(group->sampling);
     free(group->companions);

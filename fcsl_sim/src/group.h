@@ -28,6 +28,7 @@ typedef struct {
     int64_t to_ns;
     int64_t event_ns; /* RK45: of the first event in that step; 0: none */
     double next_s;    /* RK45: the step to try; 0: not known */
+    double since_s;   /* the last announced jump (jump.c) that is at the present or before it */
     int64_t last_event_ns;
     uint32_t events_in_a_row;
     uint8_t has_slope; /* of the integrator */
@@ -61,6 +62,11 @@ struct fcsl_group {
     uint32_t sampling_count;
     uint8_t *companions;  /* by companion: whether it meets the group */
     uint32_t next_write;  /* in event_order: no write to the group is before it */
+    uint32_t *announcing; /* instances with next_time */
+    uint32_t announcing_count;
+    double jump_s;        /* the next announced jump; infinite: none */
+    int64_t jump_ns;      /* its nanosecond */
+    double last_s;        /* the largest time before it */
     uint32_t *outer;      /* copies from outside of the group */
     uint32_t outer_count;
     double *memory;       /* all vectors below, and the integrator's */
@@ -124,6 +130,18 @@ void fcsl_group_name_state(const fcsl_group_t *group, uint32_t state, char *text
 typedef void (*fcsl_probe_t)(fcsl_group_t *group, int64_t offset_ns, double *x);
 /* The first offset in (0, length_ns] at which an event has happened; group->g1 is at the end of the step, where one has. */
 int64_t fcsl_group_locate(fcsl_group_t *group, int64_t from_ns, int64_t length_ns, fcsl_probe_t probe);
+
+/* jump.c: the next announced jump, behind the present. Returns 0, or -1. */
+int fcsl_group_find_jump(fcsl_group_t *group, fcsl_error_t *error);
+/* Once the present is the nanosecond of that jump: goes to its other side. Returns 0, or -1. */
+int fcsl_group_jump(fcsl_group_t *group, fcsl_error_t *error);
+/* A time of a step, which does not reach the jump at its end. */
+static inline double fcsl_group_before_jump(const fcsl_group_t *group, double t)
+{
+    return t < group->last_s ? t : group->last_s;
+}
+/* Goes on from states or inputs that have jumped. Events that this has caused happen now. Returns 0, or -1. */
+int fcsl_group_resume(fcsl_group_t *group, fcsl_error_t *error);
 
 /* group_adaptive.c */
 int fcsl_group_advance_adaptive(fcsl_group_t *group, int64_t time_ns, int64_t barrier_ns, fcsl_error_t *error);

@@ -58,7 +58,8 @@ static int make_step(fcsl_group_t *group, int64_t barrier_ns, fcsl_error_t *erro
 {
     fcsl_group_state_t *state = &group->state;
     const fcsl_plan_group_t *plan = group->plan;
-    const double t = (double)state->time_ns / FCSL_NS_PER_S;
+    const double t = fcsl_group_time_s(group);
+    barrier_ns = group->jump_ns < barrier_ns ? group->jump_ns : barrier_ns;
     if (state->next_s == 0.0) {
         state->next_s =
             fcsl_rk45_first_step(&group->integrator, t, group->x, group->atol, plan->rtol, plan->max_step_s);
@@ -137,6 +138,9 @@ int fcsl_group_advance_adaptive(fcsl_group_t *group, int64_t time_ns, int64_t ba
 {
     fcsl_group_state_t *state = &group->state;
     for (;;) { /* each turn ends a step or the loop */
+        if (fcsl_group_find_jump(group, error)) {
+            return -1;
+        }
         if (state->to_ns <= state->time_ns) {
             if (state->time_ns >= time_ns) {
                 break;
@@ -159,6 +163,9 @@ int fcsl_group_advance_adaptive(fcsl_group_t *group, int64_t time_ns, int64_t ba
             probe_adaptive(group, time_ns - state->from_ns, group->probe);
             fcsl_group_scatter(group, group->probe);
             return 0;
+        }
+        if (state->time_ns == group->jump_ns && fcsl_group_jump(group, error)) {
+            return -1;
         }
     }
     fcsl_group_scatter(group, group->x);

@@ -98,6 +98,9 @@ static int add_members(fcsl_sim_t *sim, fcsl_group_t *group, uint32_t number, fc
             instance->first_event = group->event_count;
             group->event_count += model->event_count;
         }
+        if (model->next_time) {
+            group->announcing[group->announcing_count++] = i;
+        }
         if (model->update) {
             group->timed[group->timed_count++] = i;
         }
@@ -189,13 +192,14 @@ static int build_group(fcsl_sim_t *sim, uint32_t number, fcsl_error_t *error)
     group->blocks = calloc(count, sizeof *group->blocks);
     group->eventful = calloc(count, sizeof *group->eventful);
     group->timed = calloc(count, sizeof *group->timed);
+    group->announcing = calloc(count, sizeof *group->announcing);
     group->stages = calloc(sim->call_count + 1u, sizeof *group->stages);
     group->outputs = calloc(sim->call_count + 1u, sizeof *group->outputs);
     group->outer = calloc(sim->copy_count + 1u, sizeof *group->outer);
     group->sampling = calloc(count, sizeof *group->sampling);
     group->companions = calloc(sim->companion_count + 1u, sizeof *group->companions);
     if (!group->derived || !group->blocks || !group->eventful || !group->timed || !group->sampling ||
-        !group->companions || !group->stages || !group->outputs || !group->outer) {
+        !group->announcing || !group->companions || !group->stages || !group->outputs || !group->outer) {
         return fcsl_sim_fail(error, "no memory for a group of models");
     }
     add_calls(sim, group, number);

@@ -130,6 +130,10 @@ static int call_both(const trial_t *trial, uint8_t *self, const double *x, uint6
         fcsl_sim_enter(trial->sim, trial->index, FCSL_IN_EVENT);
         model->event(self, 0.0, x, events);
     }
+    if (model->next_time) {
+        fcsl_sim_enter(trial->sim, trial->index, FCSL_IN_NEXT_TIME);
+        (void)model->next_time(self, 0.0);
+    }
     for (uint32_t i = 0; i < GUARDS; i++) {
         if (memcmp(&values[n + i], &mark, sizeof mark) != 0 ||
             memcmp(&events[model->event_count + i], &mark, sizeof mark) != 0) {
@@ -240,7 +244,7 @@ static int try_functions(const trial_t *trial, fcsl_error_t *error)
     /* `before` went through both functions. */
     memcpy(trial->after, trial->before, model->size);
     memcpy(trial->before, trial->instance->data, model->size);
-    if (check_unchanged(trial, "derivative or event", 0, error)) {
+    if (check_unchanged(trial, "derivative`, `event` or `next_time", 0, error)) {
         return -1;
     }
     if (model->output) {

@@ -252,9 +252,9 @@ static int init_models(fcsl_sim_t *sim, fcsl_error_t *error)
         fcsl_sim_enter(sim, i, FCSL_IN_INIT);
         const char *wrong = instance->model->init ? instance->model->init(instance->data, &context) : NULL;
         if (wrong) {
-            return fcsl_sim_fail(error, "instance `%s`: %s", instance->name, wrong);
+            return fcsl_sim_fail(error, "instance `%s`: %s", instance->name, fcsl_sim_init_reason(wrong));
         }
-        if (fcsl_sim_check_purity(sim, i, error)) {
+        if (fcsl_sim_check_purity(sim, i, error) || fcsl_sim_check_prototypes(sim, i, error)) {
             return -1;
         }
     }

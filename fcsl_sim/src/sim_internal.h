@@ -85,7 +85,8 @@ typedef enum {
     FCSL_IN_OUTPUT,
     FCSL_IN_UPDATE,
     FCSL_IN_EVENT,
-    FCSL_IN_RESET
+    FCSL_IN_RESET,
+    FCSL_IN_NEXT_TIME
 } fcsl_function_t;
 
 /* What the actuators get (actuators.c). */
@@ -215,6 +216,10 @@ int fcsl_sim_check_outputs(const fcsl_sim_t *sim, fcsl_error_t *error);
 
 /* purity.c: tries the functions of an instance that is initialised. Returns 0, or -1. */
 int fcsl_sim_check_purity(fcsl_sim_t *sim, uint32_t index, fcsl_error_t *error);
+/* prototypes.c: what `init` returned that is not null, as a text. */
+const char *fcsl_sim_init_reason(const char *returned);
+/* Tries whether functions of an instance take their time as a double. Returns 0, or -1. */
+int fcsl_sim_check_prototypes(fcsl_sim_t *sim, uint32_t index, fcsl_error_t *error);
 /* sim.c: the next events of a simulation between two ticks, from its instances. */
 void fcsl_sim_refill_queue(fcsl_sim_t *sim);
 /* sim.c: something besides the plant itself has changed a value of an instance. */

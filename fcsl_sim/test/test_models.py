@@ -32,7 +32,7 @@ Open = Callable[..., Simulation]
         (6, "model `broken`: field `outputs.x`: models have no such type"),
         (7, "model `broken`: field `outputs.x`: its count is not the product of its shape"),
         (8, "model `broken`: field `outputs.x` is there twice"),
-        (9, "model ABI 4, this simulator has 3: compile the model again"),
+        (9, "model ABI 5, this simulator has 4: compile the model again"),
         (10, "no model `broken` in it (it has `other`)"),
         (11, "model `broken`: its continuous states lie outside the struct or unaligned"),
         (12, "model `broken`: it must have a derivative exactly when it has continuous states"),

@@ -19,7 +19,7 @@ from fcsl_compiler.base.diagnostics import DiagnosticError
 from fcsl_compiler.driver.cache import build_shared
 from fcsl_compiler.driver.symbols import SymbolError, check_model_symbols
 from fcsl_compiler.driver.toolchain import ToolchainError, include_dirs, link_shared
-from fcsl_sim import SimConfig, Simulation
+from fcsl_sim import SimConfig, SimError, Simulation
 from fcsl_sim.model_instance import ModelInstance
 
 TEST = Path(__file__).resolve().parent
@@ -132,6 +132,8 @@ def test_every_function(everything: ModelInstance) -> None:
     everything.continuous = [0.0, -6.0]
     everything.reset(1)
     assert everything.continuous == [0.0, 6.0] and everything.get("state.last_event") == 1
+    everything.set("parameters.identity", 3)
+    assert everything.has("next_time") and everything.next_time(0.5) == 3.5
 
 
 @pytest.mark.parametrize("language", LANGUAGES)
@@ -238,12 +240,148 @@ _EXPORT = 'FCSL_MODEL_EXPORT(cart, "", fields);'
         ("double position; } outputs", "short position; } outputs", "a field is bool, int32_t, int64_t"),
         (_EXPORT, 'FCSL_MODEL_EXPORT_SENSOR(cart, "", fields, outputs.position);', "outputs.position is a bool"),
         ("return {-x.position};", "throw x.position;", "exception handling disabled"),
+        ("derivative(double,", "derivative(float,", "narrowing conversion of"),
+        ("void output(double,", "void output(float,", "narrowing conversion of"),
+        (
+            "continuous state;",
+            "continuous state; double next_time(float) const { return 1.0; }",
+            "narrowing conversion of",
+        ),
+        ("return {-x.position};", "", "no return statement in function returning non-void"),
     ],
 )
 def test_cpp_that_does_not_compile(tmp_path: Path, before: str, after: str, message: str) -> None:
     assert CART.count(before) >= 1
     with pytest.raises(ToolchainError, match=message):
         build(tmp_path, "cart.cpp", CART.replace(before, after, 1))
+
+
+#: A model in C; its functions are those of fcsl_model.h.
+RAMP = """#include "fcsl/fcsl_model.h"
+
+typedef struct {
+    struct { double x; } state;
+    struct { double x; } outputs;
+} ramp_t;
+
+static const char *init(void *self, const fcsl_model_context_t *context) { (void)self, (void)context; return NULL; }
+static void derivative(const void *self, double t, const double *x, double *dx)
+{
+    (void)self, (void)x;
+    dx[0] = t < 2.0 ? 1.0 : 0.0;
+}
+static void output(void *self, double t, const double *x) { (void)t; ((ramp_t *)self)->outputs.x = x[0]; }
+static const fcsl_field_t fields[] = {FCSL_MODEL_SCALAR(ramp_t, FCSL_ROLE_OUTPUT, outputs.x, "s", "")};
+static const fcsl_model_t model = {
+    .abi_version = FCSL_MODEL_ABI_VERSION, .name = "ramp", .doc = "x = t", .fields = fields, .field_count = 1,
+    .size = sizeof(ramp_t), .align = _Alignof(ramp_t), .continuous_offset = 0, .continuous_count = 1,
+    .sampled_offset = FCSL_NO_OFFSET, .init = init, .derivative = derivative, .output = output,
+};
+const fcsl_model_t *const fcsl_models[] = {&model, NULL};
+"""
+_DERIVATIVE = "(void (*)(const void *, double, const double *, double *))derivative"
+
+
+@pytest.mark.parametrize(
+    ("before", "after", "message"),
+    [
+        ("self, double t, const double *x, double", "self, float t, const double *x, double", "incompatible pointer type"),
+        ("const char *init", "void init", "incompatible pointer type"),
+        ("return NULL; }", "}", "no return statement in function returning non-void"),
+        ("const void *self, double t, const double *x, double *dx", "const void *self, const double *x, double *dx, double t", "incompatible pointer type"),
+        ("(void)self, (void)x;", "(void)self, (void)x; t = cr_sin_of(t);", "implicit declaration of function"),
+        (".continuous_offset = 0", '.doc = 1', "makes pointer from integer"),
+    ],
+)  # fmt: skip
+def test_c_that_does_not_compile(tmp_path: Path, before: str, after: str, message: str) -> None:
+    assert RAMP.count(before) == 1
+    with pytest.raises(ToolchainError, match=message):
+        build(tmp_path, "ramp.c", RAMP.replace(before, after))
+
+
+def test_a_cast_hides_no_wrong_function(tmp_path: Path) -> None:
+    text = RAMP.replace("self, double t, const double *x, double", "self, float t, const double *x, double")
+    with pytest.raises(ToolchainError, match="cast between incompatible function types"):
+        build(tmp_path, "ramp.c", text.replace(".derivative = derivative", f".derivative = {_DERIVATIVE}"))
+
+
+@pytest.mark.parametrize(
+    ("name", "before", "after", "message"),
+    [
+        ("ramp.c", "const char *init", "void init", "incompatible pointer type"),
+        (
+            "tank.nim",
+            "t: float64, x: States",
+            "t: float32, x: States",
+            "`output` has other parameters or another result",
+        ),
+        ("tank.nim", '"event", "reset"]', '"event", "resett"]', "there is no function `resett`"),
+    ],
+)
+def test_fcsl_add_model_makes_the_same_checks(tmp_path: Path, name: str, before: str, after: str, message: str) -> None:
+    text = RAMP if name == "ramp.c" else (TEST.parents[1] / "examples/models/tank.nim").read_text()
+    assert text.count(before) == 1
+    (tmp_path / name).write_text(text.replace(before, after))
+    (tmp_path / "CMakeLists.txt").write_text(
+        "cmake_minimum_required(VERSION 3.22)\nproject(models C)\nfind_package(ament_cmake REQUIRED)\n"
+        f"find_package(fcsl_sim REQUIRED)\nfcsl_add_model({name.partition('.')[0]} SOURCES {name})\n"
+    )
+    said = ""
+    for step in (["-S", tmp_path, "-B", tmp_path / "build"], ["--build", tmp_path / "build"]):
+        done = subprocess.run(["cmake", *step], capture_output=True, text=True, check=False)
+        said += done.stdout + done.stderr
+    assert done.returncode != 0 and message in said
+
+
+@pytest.mark.parametrize(
+    ("before", "after", "message"),
+    [
+        (
+            "self, double t, const double *x, double",
+            "self, float t, const double *x, double",
+            "`derivative` of model `ramp` takes its time as a float, and fcsl_model.h says `double t`",
+        ),
+        (
+            "self, double t, const double *x) { (void)t; ((ramp_t *)self)->outputs.x = x[0]; }",
+            "self, float t, const double *x) { ((ramp_t *)self)->outputs.x = x[0] + (double)t; }",
+            "`output` of model `ramp` takes its time as a float, and fcsl_model.h says `double t`",
+        ),
+        ("return NULL; }", "return (char *)self + 1; }", "instance `ramp`: `init` returned neither null nor a text"),
+        ("return NULL; }", 'return "x\\1"; }', "instance `ramp`: `init` returned neither null nor a text"),
+        ("return NULL; }", 'return "no such ramp"; }', "instance `ramp`: no such ramp"),
+        ("t < 2.0 ? 1.0", "fmod(t, 0.5) > 0.0 ? 1.0", ""),
+        ("t < 2.0 ? 1.0", "t < 2.0 ? t", ""),
+    ],
+)
+def test_a_library_that_was_compiled_without_checks(
+    open_sim: Callable[..., Simulation],
+    package: Path,
+    monkeypatch: pytest.MonkeyPatch,
+    tmp_path: Path,
+    before: str,
+    after: str,
+    message: str,
+) -> None:
+    """What its functions do says it, where it can."""
+    assert RAMP.count(before) == 1
+    monkeypatch.setenv("AMENT_PREFIX_PATH", f"{package}:{os.environ['AMENT_PREFIX_PATH']}")
+    (tmp_path / "ramp.c").write_text(RAMP.replace(before, after))
+    library = package / f"lib/plugins/lib{tmp_path.name}.so"
+    (tmp_path / "ramp.c").write_text((tmp_path / "ramp.c").read_text().replace('"ramp"', f'"{library.stem[3:]}"'))
+    link_shared([tmp_path / "ramp.c"], [*INCLUDE, *include_dirs()], library)
+
+    def change(config: dict[str, Any]) -> None:
+        config["models"]["old"] = {"library": f"package://plugins/{library.stem[3:]}"}
+        config["instances"]["old"] = {"model": "old"}
+
+    wanted = message.replace("`ramp`", f"`{library.stem[3:]}`", 1) if "model `ramp`" in message else message
+    wanted = wanted.replace("instance `ramp`", "instance `old`")
+    if not message:
+        open_sim(change).close()
+        return
+    with pytest.raises(SimError) as error:
+        open_sim(change)
+    assert wanted in str(error.value)
 
 
 SPRING = """#![no_std]

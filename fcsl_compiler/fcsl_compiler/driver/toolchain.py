@@ -42,7 +42,8 @@ class ToolchainError(RuntimeError):
 
 class Language(NamedTuple):
     """A language of sources: the variable that names its compiler, the command without it, the distribution's package
-    that brings this command, the flags, and what the Python package ziglang calls its compiler."""
+    that brings this command, the flags, what the Python package ziglang calls its compiler, and flags that make errors
+    of warnings."""
 
     name: str
     variable: str
@@ -50,6 +51,7 @@ class Language(NamedTuple):
     package: str
     flags: tuple[str, ...]
     zig: str = ""
+    checks: tuple[str, ...] = ()
 
     def compiler(self) -> list[str]:
         """The compiler command."""
@@ -73,9 +75,24 @@ def zig_compiler(name: str) -> list[str]:
     return [f"{found.submodule_search_locations[0]}/zig", name, *ZIG_TARGET]
 
 
-C = Language("C", "CC", "cc", "gcc", FLAGS, "cc")
+#: What a model's functions must not do: have another prototype than fcsl_model.h says, or return nothing. The same as in
+#: fcsl_add_model.
+_C_CHECKS = tuple(
+    f"-Werror={name}"
+    for name in (
+        "incompatible-pointer-types",
+        "int-conversion",
+        "implicit-function-declaration",
+        "cast-function-type",
+        "return-type",
+    )
+)
+_CXX_CHECKS = ("-Werror=narrowing", "-Werror=cast-function-type", "-Werror=return-type")
+C = Language("C", "CC", "cc", "gcc", FLAGS, "cc", _C_CHECKS)
 #: Only models are written in C++. No exception may leave one.
-CXX = Language("C++", "CXX", "c++", "g++", ("-std=c++17", *FLAGS[1:], "-fno-exceptions", "-fno-rtti"), "c++")
+CXX = Language(
+    "C++", "CXX", "c++", "g++", ("-std=c++17", *FLAGS[1:], "-fno-exceptions", "-fno-rtti"), "c++", _CXX_CHECKS
+)
 #: The language of a source by the suffix of its name.
 LANGUAGES = {".c": C, ".cpp": CXX, ".cc": CXX, ".cxx": CXX}
 

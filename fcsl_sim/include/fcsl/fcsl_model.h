@@ -19,7 +19,7 @@
 extern "C" {
 #endif
 
-#define FCSL_MODEL_ABI_VERSION 3u
+#define FCSL_MODEL_ABI_VERSION 4u
 
 /* Streams of noise that each instance has, numbered from 0. A model uses one for each kind of random number, so that one
  * that it stops drawing changes none of the others. */
@@ -90,6 +90,10 @@ typedef struct fcsl_model {
     void (*event)(const void *self, double t, const double *x, double *value);
     /* Event `number` happened, at most 1 ns ago; inputs, states and outputs are those of now. May change any state. */
     void (*reset)(void *self, const fcsl_model_context_t *context, uint32_t number);
+    /* The next time later than t (s) at which `derivative`, `event` or `output` jumps as a function of t; INFINITY: it never does.
+     * It depends on parameters and the other states d. A step ends there: t is below that time before, and not below it after.
+     * Null: they do not jump. */
+    double (*next_time)(const void *self, double t);
 } fcsl_model_t;
 
 /* Exported regardless of compiler flags. */

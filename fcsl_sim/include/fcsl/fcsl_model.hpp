@@ -168,6 +168,7 @@ FCSL_DETECT(output);
 FCSL_DETECT(update);
 FCSL_DETECT(event);
 FCSL_DETECT(reset);
+FCSL_DETECT(next_time);
 FCSL_DETECT(events);
 FCSL_DETECT(is_second_order);
 #undef FCSL_DETECT
@@ -189,7 +190,8 @@ template <typename M> typename continuous<M>::type states(const double *x) noexc
     return copy;
 }
 
-/* noexcept: an exception ends the simulator, with its message, instead of crossing the ABI. */
+/* noexcept: an exception ends the simulator, with its message, instead of crossing the ABI.
+ * {t}: so a function that takes its time as a float does not compile. */
 template <typename M> const char *init(void *self, const fcsl_model_context_t *given) noexcept
 {
     return static_cast<M *>(self)->init(context(*given));
@@ -197,16 +199,16 @@ template <typename M> const char *init(void *self, const fcsl_model_context_t *g
 
 template <typename M> void derivative(const void *self, double t, const double *x, double *dx) noexcept
 {
-    const typename M::continuous rates = static_cast<const M *>(self)->derivative(t, states<M>(x));
+    const typename M::continuous rates = static_cast<const M *>(self)->derivative({t}, states<M>(x));
     std::memcpy(dx, &rates, sizeof rates);
 }
 
 template <typename M> void output(void *self, double t, [[maybe_unused]] const double *x) noexcept
 {
     if constexpr (is_integrated<M>) {
-        static_cast<M *>(self)->output(t, states<M>(x));
+        static_cast<M *>(self)->output({t}, states<M>(x));
     } else {
-        static_cast<M *>(self)->output(t);
+        static_cast<M *>(self)->output({t});
     }
 }
 
@@ -218,15 +220,20 @@ template <typename M> void update(void *self, const fcsl_model_context_t *given)
 template <typename M> void event(const void *self, double t, [[maybe_unused]] const double *x, double *value) noexcept
 {
     if constexpr (is_integrated<M>) {
-        static_cast<const M *>(self)->event(t, states<M>(x), value);
+        static_cast<const M *>(self)->event({t}, states<M>(x), value);
     } else {
-        static_cast<const M *>(self)->event(t, value);
+        static_cast<const M *>(self)->event({t}, value);
     }
 }
 
 template <typename M> void reset(void *self, const fcsl_model_context_t *given, uint32_t number) noexcept
 {
     static_cast<M *>(self)->reset(context(*given), number);
+}
+
+template <typename M> double next_time(const void *self, double t) noexcept
+{
+    return static_cast<const M *>(self)->next_time({t});
 }
 
 /* ---- the descriptor ---------------------------------------------------------------------------------------------- */
@@ -307,6 +314,9 @@ constexpr fcsl_model_t model(const char *name, const char *doc, const fcsl_field
     }
     if constexpr (has_reset<M>) {
         made.reset = reset<M>;
+    }
+    if constexpr (has_next_time<M>) {
+        made.next_time = next_time<M>;
     }
     return made;
 }

@@ -76,6 +76,12 @@ static void reset(void *self, const fcsl_model_context_t *context, uint32_t numb
     m->state.last_event = number;
 }
 
+static double next_time(const void *self, double t)
+{
+    const everything_t *it = self;
+    return t + (double)it->parameters.identity;
+}
+
 #define FIELD(kind, role, path, unit, doc) FCSL_MODEL_##kind(everything_t, FCSL_ROLE_##role, path, unit, doc)
 
 static const fcsl_field_t fields[] = {
@@ -120,6 +126,7 @@ static const fcsl_model_t model = {
     .update = update,
     .event = event,
     .reset = reset,
+    .next_time = next_time,
 };
 
 const fcsl_model_t *const fcsl_models[] = {&model, NULL};

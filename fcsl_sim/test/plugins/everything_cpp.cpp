@@ -75,6 +75,11 @@ struct everything_cpp {
         state.x.speed = -state.x.speed;
         state.last_event = number;
     }
+
+    double next_time(double t) const
+    {
+        return t + static_cast<double>(parameters.identity);
+    }
 };
 
 #define FIELD(kind, role, path, unit, doc) FCSL_MODEL_##kind(everything_cpp, FCSL_ROLE_##role, path, unit, doc)

@@ -4,7 +4,7 @@
 
 use core::ffi::{c_char, c_void};
 
-pub const MODEL_ABI_VERSION: u32 = 3;
+pub const MODEL_ABI_VERSION: u32 = 4;
 pub const NO_OFFSET: u32 = u32::MAX;
 pub const NONE: i32 = -1;
 
@@ -60,6 +60,7 @@ pub type OutputFn = unsafe extern "C" fn(*mut c_void, f64, *const f64);
 pub type UpdateFn = unsafe extern "C" fn(*mut c_void, *const ModelContext);
 pub type EventFn = unsafe extern "C" fn(*const c_void, f64, *const f64, *mut f64);
 pub type ResetFn = unsafe extern "C" fn(*mut c_void, *const ModelContext, u32);
+pub type NextTimeFn = unsafe extern "C" fn(*const c_void, f64) -> f64;
 
 /// fcsl_model_t
 #[repr(C)]
@@ -83,6 +84,7 @@ pub struct ModelDescriptor {
     pub update: Option<UpdateFn>,
     pub event: Option<EventFn>,
     pub reset: Option<ResetFn>,
+    pub next_time: Option<NextTimeFn>,
 }
 
 /// A constant table of C structs. Their pointers lead to constants, so any thread may read it.

@@ -8,8 +8,8 @@ use core::ffi::{c_char, c_void};
 use core::marker::PhantomData;
 use core::ptr::NonNull;
 
-use crate::abi::{DerivativeFn, EventFn, InitFn, ModelContext, OutputFn, ResetFn, UpdateFn};
-use crate::{Context, Derivative, Event, Init, Instance, Instant, Model, Output, Reset, Update};
+use crate::abi::{DerivativeFn, EventFn, InitFn, ModelContext, NextTimeFn, OutputFn, ResetFn, UpdateFn};
+use crate::{Context, Derivative, Event, Init, Instance, Instant, Model, NextTime, Output, Reset, Update};
 
 /// A model without continuous states gets a null pointer, and its `Continuous` has no member.
 unsafe fn states<'a, M: Model>(x: *const f64) -> &'a M::Continuous {
@@ -56,6 +56,11 @@ unsafe extern "C" fn reset<M: Reset>(instance: *mut c_void, context: *const Mode
     M::reset(&mut *instance.cast(), &Context(&*context), number as usize);
 }
 
+unsafe extern "C" fn next_time<M: NextTime>(instance: *const c_void, t: f64) -> f64 {
+    let instance = instance.cast::<Instance<M>>();
+    M::next_time(t, &(*instance).parameters, &(*instance).state)
+}
+
 /// The functions that a model has. `Functions::<M, N>::INIT` is the inherent constant, with the function, where M
 /// implements the trait, else that of `Without`.
 pub struct Functions<M, const N: usize>(PhantomData<M>);
@@ -67,6 +72,7 @@ pub trait Without {
     const UPDATE: Option<UpdateFn> = None;
     const EVENT: Option<EventFn> = None;
     const RESET: Option<ResetFn> = None;
+    const NEXT_TIME: Option<NextTimeFn> = None;
 }
 impl<M, const N: usize> Without for Functions<M, N> {}
 
@@ -87,4 +93,7 @@ impl<M: Event, const N: usize> Functions<M, N> {
 }
 impl<M: Reset, const N: usize> Functions<M, N> {
     pub const RESET: Option<ResetFn> = Some(reset::<M>);
+}
+impl<M: NextTime, const N: usize> Functions<M, N> {
+    pub const NEXT_TIME: Option<NextTimeFn> = Some(next_time::<M>);
 }

@@ -112,3 +112,9 @@ pub trait Reset: Model {
     /// Event `number` happened, at most 1 ns ago. May change any state.
     fn reset(instance: &mut Instance<Self>, context: &Context, number: usize);
 }
+
+/// For a model whose functions jump as functions of `t`.
+pub trait NextTime: Model {
+    /// The next time after `t`, in seconds, at which one of them jumps; `f64::INFINITY`: none. A step ends there.
+    fn next_time(t: f64, parameters: &Self::Parameters, state: &Self::State) -> f64;
+}

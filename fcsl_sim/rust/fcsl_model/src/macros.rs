@@ -123,6 +123,7 @@ macro_rules! model {
                 update: Functions::UPDATE,
                 event: Functions::EVENT,
                 reset: Functions::RESET,
+                next_time: Functions::NEXT_TIME,
             }]);
 
             #[allow(non_upper_case_globals)]

@@ -4,7 +4,7 @@
 
 use core::ffi::CStr;
 
-use fcsl_model::{Context, Derivative, Event, Init, Instance, Instant, Math, Output, Reset, Update};
+use fcsl_model::{Context, Derivative, Event, Init, Instance, Instant, Math, NextTime, Output, Reset, Update};
 
 fcsl_model::model! {
     /// every function, every type
@@ -88,5 +88,11 @@ impl Reset for Everything {
     fn reset(it: &mut Instance<Everything>, _: &Context, number: usize) {
         it.continuous.speed = -it.continuous.speed;
         it.state.last_event = number as u32;
+    }
+}
+
+impl NextTime for Everything {
+    fn next_time(t: f64, parameters: &Parameters, _: &State) -> f64 {
+        t + parameters.identity as f64
     }
 }
