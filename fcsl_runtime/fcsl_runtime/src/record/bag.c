@@ -3,7 +3,7 @@
  * A bag on disk: the folder, metadata.yaml and the MCAP file.
  */
 #define _GNU_SOURCE
-#include "bag.h"
+#include "fcsl/fcsl_bag.h"
 
 #include <errno.h>
 #include <fcntl.h>
@@ -16,6 +16,7 @@
 #include <unistd.h>
 
 #include "fcsl/fcsl_mcap_writer.h"
+#include "base/error.h"
 #include "metadata.h"
 #include "messages/type_hash.h"
 

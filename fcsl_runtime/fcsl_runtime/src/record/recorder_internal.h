@@ -5,7 +5,7 @@
 #include <pthread.h>
 #include <stdatomic.h>
 
-#include "bag.h"
+#include "fcsl/fcsl_bag.h"
 #include "recorder.h"
 #include "ring.h"
 #include "record_topics.h"

@@ -9,13 +9,8 @@ from collections.abc import Callable, Iterable, Iterator
 from contextlib import contextmanager
 from pathlib import Path
 
-from rosbags.interfaces import Connection
-from rosbags.rosbag2 import StoragePlugin, Writer
-from rosbags.rosbag2.errors import WriterError
-from rosbags.typesys import Stores, get_types_from_msg, get_typestore
-
 from ..bag.bus_topics import topic_of
-from ..errors import BusError
+from ..bag.native_bag import NativeBag
 from .machine import BusMachine
 from .messages import (
     CHECKPOINT,
@@ -36,35 +31,30 @@ from .writes import Checkpoint, Write, tick_of
 _NS = 1_000_000_000
 #: Whoever is on the bus may put any tick.
 _TIME_NS_MAX = (1 << 63) - 1
-#: The format version of metadata.yaml that Jazzy writes.
-_FORMAT = 9
 
 
 class _Part:
     """A machine's part of the bag."""
 
-    def __init__(self, writer: Writer, machine: BusMachine, reproduction: Reproduction, tell: Callable[[str], None]):
+    def __init__(self, bag: NativeBag, machine: BusMachine, reproduction: Reproduction, tell: Callable[[str], None]):
         self.reproduction = reproduction
         self.messages = 0
-        self._writer, self._machine, self._tell = writer, machine, tell
+        self._bag, self._machine, self._tell = bag, machine, tell
         types = type_names(machine)
         self._channels = [self._add(c.name, types[c.name], definition_of(c)) for c in machine.channels]
         self._record = {name: self._add(name, *row) for name, row in RECORD_TOPICS.items()}
         self._is_described = self._has_told = False
 
-    def _add(self, name: str, kind: str, definition: str) -> Connection:
-        store = get_typestore(Stores.EMPTY)
-        store.register(get_types_from_msg(definition, kind))
-        topic = topic_of(self._machine.prefix, name)
-        return self._writer.add_connection(topic, kind, msgdef=definition, rihs01=store.hash_rihs01(kind))
+    def _add(self, name: str, kind: str, definition: str) -> int:
+        return self._bag.add(topic_of(self._machine.prefix, name), kind, definition)
 
-    def _write(self, connection: Connection, tick: int, message: bytes) -> None:
+    def _write(self, topic: int, tick: int, message: bytes) -> None:
         time_ns = min(tick * _NS // self._machine.tick_hz, _TIME_NS_MAX)
         if not self._is_described:
             self._is_described = True
-            self._writer.write(self._record[DESCRIPTOR], time_ns, string_of(self._machine.text))
+            self._bag.write(self._record[DESCRIPTOR], time_ns, string_of(self._machine.text))
             self.messages += 1
-        self._writer.write(connection, time_ns, message)
+        self._bag.write(topic, time_ns, message)
         self.messages += 1
 
     def take(self, event: Event | None) -> None:
@@ -99,8 +89,9 @@ class _Part:
 class Recording:
     """An open bag."""
 
-    def __init__(self, writer: Writer, machines: Iterable[BusMachine], session: Session, tell: Callable[[str], None]):
-        self._parts = {m.prefix: _Part(writer, m, Reproduction(m, session), tell) for m in machines}
+    def __init__(self, bag: NativeBag, machines: Iterable[BusMachine], session: Session, tell: Callable[[str], None]):
+        self._bag = bag
+        self._parts = {m.prefix: _Part(bag, m, Reproduction(m, session), tell) for m in machines}
 
     @property
     def messages(self) -> int:
@@ -115,9 +106,10 @@ class Recording:
         """What came; None: nothing more has come yet."""
         if found is not None:
             self._parts[found[0].prefix].take(found[1])
-            return
-        for part in self._parts.values():
-            part.take(None)
+        else:
+            for part in self._parts.values():
+                part.take(None)
+        self._bag.flush_when_due()
 
     def end(self) -> None:
         for part in self._parts.values():
@@ -128,20 +120,11 @@ class Recording:
 def recording(
     folder: Path, machines: Iterable[BusMachine], session: Session, tell: Callable[[str], None]
 ) -> Iterator[Recording]:
-    """A bag in the new directory `folder`, complete when the block is left in whatever way. `tell` gets what a user may
-    want to know meanwhile. Raises BusError.
+    """A bag in the new directory `folder`, complete when the block ends. After `kill -9` it has what a host's recorder
+    would have left. `tell` gets what a user may want to know meanwhile. Raises BagError.
     """
-    try:
-        writer = Writer(folder, version=_FORMAT, storage_plugin=StoragePlugin.MCAP)
-        writer.open()
-    except (WriterError, OSError) as error:
-        reason = "exists already; name a new one" if folder.exists() else str(error)
-        raise BusError(f"{folder}: {reason}") from None
-    try:
-        bag = Recording(writer, machines, session, tell)
-        try:
-            yield bag
-        finally:
-            bag.end()
-    finally:
-        writer.close()
+    with NativeBag(folder) as bag:
+        recorded = Recording(bag, machines, session, tell)
+        bag.publish()
+        yield recorded
+        recorded.end()

@@ -7,7 +7,13 @@
 #ifndef FCSL_BAG_H
 #define FCSL_BAG_H
 
-#include "base/error.h"
+#include <stdint.h>
+
+#include "fcsl/fcsl_run.h"
+
+#ifdef __cplusplus
+extern "C" {
+#endif
 
 enum { FCSL_BAG_TOPICS_MAX = 4096 };
 
@@ -34,5 +40,9 @@ int fcsl_bag_flush(fcsl_bag_t *bag, fcsl_error_t *error);
 int fcsl_bag_close(fcsl_bag_t *bag, fcsl_error_t *error);
 /* Closes and removes what was created: for a recording that could not start. */
 void fcsl_bag_abandon(fcsl_bag_t *bag);
+
+#ifdef __cplusplus
+}
+#endif
 
 #endif /* FCSL_BAG_H */
