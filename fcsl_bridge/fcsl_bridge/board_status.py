@@ -2,8 +2,8 @@
 """The sensors and devices of a board as statuses of /diagnostics.
 
 A sensor is OK while its first device is primary and all its devices are healthy, ERROR while it has no primary, WARN
-otherwise. A device is ERROR while it is not there, WARN if reads failed, samples were dropped or it was lost since the
-previous look, OK otherwise.
+otherwise. A device is ERROR while it is not there, WARN while it is silent and if reads failed, samples were dropped,
+bytes were rejected or it was lost since the previous look, OK otherwise.
 """
 
 from __future__ import annotations
@@ -13,11 +13,12 @@ from collections.abc import Mapping
 from diagnostic_msgs.msg import DiagnosticStatus
 
 from simclient.board.frontends import CONDITIONS
+from simclient.board.native import why_text
 
 from .diagnostic_status import make_status
 
-#: Counts of a device that may not grow.
-_TROUBLES = ("errors", "dropped", "lost")
+#: Counts of a device that may not grow, and how they are called.
+_TROUBLES = {"errors": "errors", "dropped": "dropped", "lost": "lost", "rejected": "bytes rejected"}
 Counts = dict[str, int]
 
 
@@ -53,9 +54,11 @@ class BoardStatus:
     def _device(self, name: str, counts: Counts) -> DiagnosticStatus:
         before = self._before.get(name, counts)
         self._before[name] = counts
-        grown = [f"{counts[key] - before[key]} {key}" for key in _TROUBLES if counts[key] > before[key]]
-        level = DiagnosticStatus.WARN if grown else DiagnosticStatus.OK
+        grown = [f"{counts[key] - before[key]} {text}" for key, text in _TROUBLES.items() if counts[key] > before[key]]
+        why = why_text(counts["why"])
+        level = DiagnosticStatus.WARN if grown or why else DiagnosticStatus.OK
         if not counts["open"]:
             level = DiagnosticStatus.ERROR
-        text = "; ".join(["there" if counts["open"] else "not there", *grown])
-        return make_status(f"{self._name}: device {name}", level, text, self._machine, counts)
+        silence = [f"silent: {why}"] if why else []
+        text = "; ".join(["there" if counts["open"] else "not there", *silence, *grown])
+        return make_status(f"{self._name}: device {name}", level, text, self._machine, {**counts, "why": why})

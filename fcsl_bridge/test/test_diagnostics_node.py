@@ -116,7 +116,10 @@ def test_a_flight_loses_its_lidars(domain: Domain, vehicle: Vehicle) -> None:
     assert found[SENSOR].level == WARN
     assert values(found[SENSOR]) == {"primary": "top", "condition.top": "healthy", "condition.bottom": "silent"}
     assert (found[TOP].level, found[TOP].message) == (OK, "there")
-    assert list(values(found[TOP])) == ["open", "samples", "errors", "dropped", "lost"]
+    assert list(values(found[TOP])) == [
+        *("open", "samples", "errors", "dropped", "lost"),
+        *("bytes", "frames", "rejected", "why"),
+    ]
     assert (found[BOTTOM].level, found[BOTTOM].message) == (ERROR, "not there")
     (domain.folder / "away").rename(vehicle.device("bottom"))
     found = vehicle.until(lambda all_: all(status.level == OK for status in all_.values()))
@@ -187,15 +190,19 @@ def test_a_sensor(primary: int, conditions: tuple[int, int], level: bytes, text:
 def test_counts_of_a_device_grow() -> None:
     """What was counted before the first look is old."""
     board = BoardStatus("rover", "rover")
-    for (is_open, samples, errors, dropped, lost), level, text in (
-        ((1, 10, 4, 4, 1), OK, "there"),
-        ((1, 20, 4, 4, 1), OK, "there"),
-        ((1, 30, 6, 4, 1), WARN, "there; 2 errors"),
-        ((1, 40, 6, 5, 2), WARN, "there; 1 dropped; 1 lost"),
-        ((0, 40, 7, 5, 2), ERROR, "not there; 1 errors"),
-        ((1, 50, 7, 5, 2), OK, "there"),
+    names = ("open", "samples", "errors", "dropped", "lost", "bytes", "frames", "rejected", "why")
+    for numbers, level, text in (
+        ((1, 10, 4, 4, 1, 50, 5, 7, 0), OK, "there"),
+        ((1, 20, 4, 4, 1, 60, 6, 7, 0), OK, "there"),
+        ((1, 30, 6, 4, 1, 60, 6, 7, 0), WARN, "there; 2 errors"),
+        ((1, 40, 6, 5, 2, 60, 6, 7, 0), WARN, "there; 1 dropped; 1 lost"),
+        ((1, 50, 6, 5, 2, 80, 6, 17, 0), WARN, "there; 10 bytes rejected"),
+        ((1, 50, 6, 5, 2, 80, 6, 17, 1), WARN, "there; silent: no bytes arrive"),
+        ((0, 50, 7, 5, 2, 80, 6, 17, 0), ERROR, "not there; 1 errors"),
+        ((1, 60, 7, 5, 2, 80, 6, 17, 0), OK, "there"),
     ):
-        counts = {"open": is_open, "samples": samples, "errors": errors, "dropped": dropped, "lost": lost}
+        counts = dict(zip(names, numbers, strict=True))
         (status,) = board.look({f"devices.gyro.{name}": count for name, count in counts.items()})
         assert (status.name, status.level, status.message) == ("rover: device gyro", level, text)
-        assert values(status) == {name: str(count) for name, count in counts.items()}
+        why = text.partition("silent: ")[2]
+        assert values(status) == {name: str(count) for name, count in counts.items()} | {"why": why}

@@ -22,6 +22,7 @@ typedef struct {
     alignas(16) uint8_t self[RIG_STATE_BYTES];
     uint64_t sample_ns; /* of the last read */
     uint64_t took_ns;
+    fcsl_driver_input_t input; /* of all reads: the sums, and the largest reason */
     char why[RIG_WHY_BYTES];
 } rig_t;
 
@@ -45,13 +46,29 @@ static inline fcsl_driver_status_t rig_open(rig_t *rig, const fcsl_driver_t *dri
     return rig_open_needed(rig, driver, device, 0);
 }
 
+/* What the driver tells of a read. */
+static inline void rig_add_input(rig_t *rig)
+{
+    fcsl_driver_input_t input;
+    memcpy(&input, rig->self + rig->driver->input, sizeof input);
+    rig->input.bytes += input.bytes;
+    rig->input.frames += input.frames;
+    rig->input.rejected += input.rejected;
+    rig->input.why = input.why > rig->input.why ? input.why : rig->input.why;
+}
+
 static inline fcsl_driver_status_t rig_read(rig_t *rig)
 {
+    const uint32_t at = rig->driver->input;
+    memset(rig->self + at, 0, at != 0u ? sizeof(fcsl_driver_input_t) : 0u);
     const uint64_t before_ns = monotonic_ns();
     const uint64_t last_ns = rig->sample_ns;
     rig->why[0] = '\0';
     const fcsl_driver_status_t status = rig->driver->read(rig->self, &rig->sample_ns, rig->why, sizeof rig->why);
     rig->took_ns = monotonic_ns() - before_ns;
+    if (at != 0u) {
+        rig_add_input(rig);
+    }
     CHECK(status == FCSL_DRIVER_OK || rig->sample_ns == last_ns);
     CHECK((status == FCSL_DRIVER_OK || status == FCSL_DRIVER_NOTHING) == (rig->why[0] == '\0'));
     return status;

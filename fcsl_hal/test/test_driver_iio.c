@@ -103,6 +103,37 @@ static void check_samples(void)
     rig_close(&rig);
 }
 
+/* What the device tree says of the mounting is applied to the vectors, the own matrix of a type before the shared ones. */
+static void check_mounting(void)
+{
+    static const char *const WRONG[] = {"1, 0, 0; 0, 1, 0; 0, 0, -1", "1, 0, 0; 0, 1, 0; 0, 0, 2", "1, 0, 0; 0, 1, 0",
+                                        "1, 0, 0, 0, 1, 0, 0, 0, 1",  "1 0 0; 0 1 0; 0 0 1",       "",
+                                        "1, 0, 0; 0, 1, 0; 0, 0, 1;", "0, 0, 0; 0, 0, 0; 0, 0, 0"};
+    rig_t rig;
+    put(IMU "in_mount_matrix", "0, 1, 0; 1, 0, 0; 0, 0, -1\n");
+    put(IMU "in_accel_mount_matrix", "0, -1, 0; 1, 0, 0; 0, 0, 1\n");
+    CHECK(rig_open(&rig, iio, "icm42688", "gyro accel field") == FCSL_DRIVER_OK);
+    for (int i = 0; i < 2; i++) {
+        CHECK(rig_read(&rig) == FCSL_DRIVER_OK);
+        CHECK(is_near(value_at(&rig, "gyro", 0), -1.064724) && is_near(value_at(&rig, "gyro", 1), 1.064724));
+        CHECK(is_near(value_at(&rig, "accel", 0), -30.0) && is_near(value_at(&rig, "accel", 1), 55.0));
+        CHECK(is_near(value_at(&rig, "accel", 2), -16.0) && is_near(value_at(&rig, "field", 2), 67.5e-6));
+    }
+    rig_close(&rig);
+    CHECK(unlink(in_tree(IMU "in_anglvel_y_raw")) == 0); /* an axis that is not told becomes another one */
+    CHECK(rig_open(&rig, iio, "icm42688", "gyro") == FCSL_DRIVER_OK && rig_read(&rig) == FCSL_DRIVER_OK);
+    CHECK(isnan(value_at(&rig, "gyro", 0)) && is_near(value_at(&rig, "gyro", 1), 1.064724));
+    rig_close(&rig);
+    put(IMU "in_anglvel_y_raw", "-1000\n");
+    for (size_t i = 0; i < sizeof WRONG / sizeof WRONG[0]; i++) {
+        put(IMU "in_accel_mount_matrix", WRONG[i]);
+        CHECK(rig_open_fails(iio, "icm42688", "accel", FCSL_DRIVER_FAILED, "in_accel_mount_matrix"));
+        CHECK(rig_open(&rig, iio, "icm42688", "gyro") == FCSL_DRIVER_OK); /* nobody asks for it */
+        rig_close(&rig);
+    }
+    CHECK(unlink(in_tree(IMU "in_accel_mount_matrix")) == 0 && unlink(in_tree(IMU "in_mount_matrix")) == 0);
+}
+
 /* ---- devices ------------------------------------------------------------------------------------------------------------ */
 
 static void check_names(void)
@@ -319,6 +350,7 @@ int main(void)
     const int files = count_files();
     check_units();
     check_other_units();
+    check_mounting();
     check_samples();
     check_names();
     check_missing_channels();

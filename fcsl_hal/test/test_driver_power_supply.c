@@ -60,6 +60,23 @@ static void check_signs(void)
     rig_close(&rig);
 }
 
+/* A charge that is not known is none. */
+static void check_unknown_charge(void)
+{
+    static const char *const UNKNOWN[] = {"255\n", "101\n", "-1\n", "65535\n"};
+    rig_t rig;
+    CHECK(rig_open(&rig, supply, "BAT0", "charge voltage") == FCSL_DRIVER_OK);
+    for (size_t i = 0; i < sizeof UNKNOWN / sizeof UNKNOWN[0]; i++) {
+        put(BATTERY "capacity", UNKNOWN[i]);
+        CHECK(rig_read(&rig) == FCSL_DRIVER_OK && isnan(value_at(&rig, "charge", 0)));
+        CHECK(value_at(&rig, "voltage", 0) == 15.4);
+    }
+    put(BATTERY "capacity", "100\n");
+    CHECK(rig_read(&rig) == FCSL_DRIVER_OK && value_at(&rig, "charge", 0) == 1.0);
+    put(BATTERY "capacity", "87\n");
+    rig_close(&rig);
+}
+
 static void check_missing(void)
 {
     rig_t rig;
@@ -90,6 +107,7 @@ int main(void)
     const int files = count_files();
     check_values();
     check_signs();
+    check_unknown_charge();
     check_missing();
     CHECK(count_files() == files);
     remove_tree();

@@ -65,7 +65,7 @@ static void check_pvt(void)
     uint8_t frame[PVT_FRAME];
     frame_pvt(PVT, frame);
     CHECK(frame[PVT_FRAME - 2] == 0x80 && frame[PVT_FRAME - 1] == 0xB6);
-    CHECK(feed_ubx(&ubx, POLL, sizeof POLL, &fix) == 0 && ubx.others == 1 && ubx.stream.garbage == 0);
+    CHECK(feed_ubx(&ubx, POLL, sizeof POLL, &fix) == 0 && ubx.stream.garbage == 0);
     CHECK(feed_ubx(&ubx, frame, sizeof frame, &fix) == 1 && fix.kind == GNSS_NO_FIX);
     CHECK(fix.has_utc && fix.utc_ns == INT64_C(1614121674) * 1000000000 - 162676);
     CHECK(fix.satellites == 4 && fix.longitude_deg == 8.3891846 && fix.latitude_deg == 49.0301623);
@@ -75,8 +75,8 @@ static void check_pvt(void)
     CHECK(fix.horizontal_m == 31.657f && fix.vertical_m == 19.972f && fix.speed_mps == 3.215f);
     CHECK(fix.dilution == 28.46f);
     const uint32_t size = frame_of(PVT, 84, frame); /* u-blox 7 */
-    CHECK(feed_ubx(&ubx, frame, size, &fix) == 1 && fix.dilution == 28.46f && ubx.others == 1);
-    CHECK(feed_ubx(&ubx, frame, frame_of(PVT, 83, frame), &fix) == 0 && ubx.others == 2);
+    CHECK(feed_ubx(&ubx, frame, size, &fix) == 1 && fix.dilution == 28.46f);
+    CHECK(feed_ubx(&ubx, frame, frame_of(PVT, 83, frame), &fix) == 0 && ubx.stream.why == FCSL_DRIVER_REFUSED);
     memcpy(payload, PVT, sizeof payload);
     payload[5] = 0xFF; /* of the year */
     frame_pvt(payload, frame);
@@ -146,7 +146,7 @@ static void check_published_nmea(void)
     gnss_fix_t fix;
     CHECK(feed_text(&nmea, "$GPGGA,092725.00,4717.11399,N,00833.91590,E,1,08,1.01,499.6,M,48.0,M,,*5B\r\n", &fix) == 0);
     CHECK(feed_text(&nmea, "$GPRMC,083559.00,A,4717.11437,N,00833.91522,E,0.004,77.52,091202,,,A*57\r\n", &fix) == 0);
-    CHECK(nmea.refused == 0 && nmea.others == 0 && nmea.stream.garbage == 0);
+    CHECK(nmea.stream.why == FCSL_DRIVER_RMC_ALONE && nmea.stream.garbage == 0);
     CHECK(feed_text(&nmea, "$GPGGA,123519,4807.038,N,01131.000,E,1,08,0.9,545.4,M,46.9,M,,*47\r\n", &fix) == 0);
     CHECK(feed_text(&nmea, "$GPRMC,123519,A,4807.038,N,01131.000,E,022.4,084.4,230394,003.1,W*6A\r\n", &fix) == 1);
     CHECK(fix.kind == GNSS_3D && fix.satellites == 8 && fix.dilution == 0.9f);
@@ -162,7 +162,7 @@ static void check_signs_and_order(void)
     static gnss_nmea_t nmea;
     gnss_fix_t fix;
     CHECK(feed_nmea(&nmea, "GNRMC,235959.75,A,3351.4,S,15112.3,W,,,311299,,,D", &fix) == 0);
-    CHECK(feed_nmea(&nmea, "GNGSA,A,3,01,02,,,,,,,,,,,1.5,1.0,1.1", &fix) == 0 && nmea.others == 1);
+    CHECK(feed_nmea(&nmea, "GNGSA,A,3,01,02,,,,,,,,,,,1.5,1.0,1.1", &fix) == 0);
     CHECK(feed_nmea(&nmea, "GNGGA,235959.75,3351.4,S,15112.3,W,4,12,0.5,-3.25,M,-10.0,M,1.0,0000", &fix) == 1);
     CHECK(fix.latitude_deg < -33.8 && fix.longitude_deg < -151.2 && fix.altitude_m == -3.25 && fix.height_m == -13.25);
     CHECK(isnan(fix.ground_speed_mps) && isnan(fix.course_deg));
@@ -170,7 +170,7 @@ static void check_signs_and_order(void)
     /* A receiver that has no position yet. */
     CHECK(feed_nmea(&nmea, "GNRMC,000000.00,V,,,,,,,,,,N", &fix) == 0);
     CHECK(feed_nmea(&nmea, "GNGGA,000000.00,,,,,0,00,99.99,,,,,,", &fix) == 1);
-    CHECK(fix.kind == GNSS_NO_FIX && !fix.has_utc && isnan(fix.latitude_deg) && nmea.refused == 0);
+    CHECK(fix.kind == GNSS_NO_FIX && !fix.has_utc && isnan(fix.latitude_deg) && nmea.stream.why < FCSL_DRIVER_NO_TIME);
 }
 
 /* What both sentences must say for a fix, in either order. */
@@ -201,7 +201,7 @@ static void check_what_is_a_fix(void)
                  CASES[i / 2u].status, CASES[i / 2u].rest);
         CHECK(feed_nmea(&nmea, lines[i % 2u], &fix) == 0);
         CHECK(feed_nmea(&nmea, lines[1u - i % 2u], &fix) == 1);
-        CHECK(fix.kind == CASES[i / 2u].kind && fix.satellites == 7 && nmea.refused == 0);
+        CHECK(fix.kind == CASES[i / 2u].kind && fix.satellites == 7);
     }
 }
 
@@ -246,12 +246,12 @@ static void check_refused(void)
         "GPRMC,123519,A,4717.1,N,00833.9,E,0.0,0.0,011302,,,A",
         "GPRMC,123519,A,4717.1,N,00833.9,E,0.0,0.0,0101,,,A",
     };
-    static gnss_nmea_t nmea;
-    gnss_fix_t fix;
     for (size_t i = 0; i < sizeof LINES / sizeof LINES[0]; i++) {
-        CHECK(feed_nmea(&nmea, LINES[i], &fix) == 0 && nmea.refused == i + 1u);
+        gnss_nmea_t nmea = {0};
+        gnss_fix_t fix;
+        CHECK(feed_nmea(&nmea, LINES[i], &fix) == 0 && nmea.stream.garbage == 0);
+        CHECK(nmea.stream.why == (i == 0u ? FCSL_DRIVER_NO_TIME : FCSL_DRIVER_REFUSED));
     }
-    CHECK(nmea.stream.garbage == 0);
 }
 
 /* What is no sentence is dropped and counted; the next sentence is heard. */

@@ -153,7 +153,7 @@ static void check_published_crsf(void)
     CHECK(frame.count == 16 && has_channels(&frame, CRSF_CHANNELS) && !frame.failsafe);
     CHECK(feed_crsf(&crsf, CRSF[1], CRSF_BYTES, &frame, &link) == 1);
     CHECK(frame.pulse_us[3] == 1500.0f + (981.0f - 992.0f) * 0.625f);
-    CHECK(crsf.stream.garbage == 0 && crsf.others == 0);
+    CHECK(crsf.stream.garbage == 0 && crsf.stream.why == FCSL_DRIVER_NOT_TOLD);
 }
 
 /* Of two antennas the second hears better: -45 dBm; quality 100 %, SNR -10 dB. */
@@ -189,10 +189,28 @@ static void check_damaged_crsf(void)
     }
 }
 
+/* All channels at zero, which FrSky's receivers send without a flag, is failsafe; a single other bit is none. */
+static void check_empty_frames(void)
+{
+    static const uint8_t NO_CRSF[CRSF_BYTES] = {[0] = 0xC8, [1] = 0x18, [2] = 0x16, [CRSF_BYTES - 1] = 0xEF};
+    rc_sbus_t sbus = {0};
+    rc_crsf_t crsf = {0};
+    rc_frame_t frame;
+    rc_link_t link;
+    uint8_t bytes[SBUS_BYTES] = {0x0F};
+    CHECK(feed_sbus(&sbus, SBUS, SBUS_BYTES, &frame) + feed_sbus(&sbus, SBUS, SBUS_BYTES, &frame) == 1);
+    CHECK(feed_sbus(&sbus, bytes, sizeof bytes, &frame) == 1 && frame.failsafe);
+    bytes[9] = 0x10;
+    CHECK(feed_sbus(&sbus, bytes, sizeof bytes, &frame) == 1 && !frame.failsafe);
+    CHECK(feed_crsf(&crsf, NO_CRSF, CRSF_BYTES, &frame, &link) == 1 && frame.failsafe);
+    CHECK(feed_crsf(&crsf, CRSF[0], CRSF_BYTES, &frame, &link) == 1 && !frame.failsafe);
+}
+
 int main(void)
 {
     check_published_sbus();
     check_sbus_flags();
+    check_empty_frames();
     check_sbus_loses_bytes();
     check_sbus_begins_anywhere();
     check_sbus_that_looks_like_two();

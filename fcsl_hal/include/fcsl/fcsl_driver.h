@@ -16,7 +16,7 @@
 extern "C" {
 #endif
 
-#define FCSL_DRIVER_ABI_VERSION 2u
+#define FCSL_DRIVER_ABI_VERSION 3u
 
 enum { FCSL_DRIVER_WAIT_MS = 100 }; /* a read that waits does so for this long at most */
 
@@ -34,6 +34,31 @@ typedef enum {
     FCSL_DRIVER_NEEDED = 1,  /* open fails where the device does not have it */
     FCSL_DRIVER_OPTIONAL = 2 /* sensors: NaN where the device does not have it */
 } fcsl_driver_use_t;
+
+/* Why no sample comes of what a device sends. Of several the host tells the last one of this list, which is the nearest to a
+ * sample. Its texts are the host's. */
+typedef enum {
+    FCSL_DRIVER_NOT_TOLD = 0,
+    FCSL_DRIVER_NO_BYTES = 1, /* found by the host: nothing arrives */
+    FCSL_DRIVER_NO_FRAMES = 2, /* what arrives is no frame of the protocol */
+    FCSL_DRIVER_LINE_ENDS = 3, /* lines do not end as those of the protocol do */
+    FCSL_DRIVER_NO_CHECKSUMS = 4, /* sentences have none */
+    FCSL_DRIVER_OTHER_FRAMES = 5, /* frames, of none of the kinds that are read */
+    FCSL_DRIVER_GGA_ALONE = 6, /* without an RMC of the same time */
+    FCSL_DRIVER_RMC_ALONE = 7, /* without a GGA of the same time */
+    FCSL_DRIVER_NO_TIME = 8, /* the receiver knows none yet */
+    FCSL_DRIVER_REFUSED = 9, /* a field that cannot be */
+    FCSL_DRIVER_REPEATED = 10, /* the values of the last frame once more: the receiver missed one */
+    FCSL_DRIVER_WHYS = 11
+} fcsl_driver_why_t;
+
+/* What a read of a stream took in. */
+typedef struct {
+    uint32_t bytes;
+    uint32_t frames; /* whole ones of the protocol, of any kind */
+    uint32_t rejected; /* bytes that belong to no frame */
+    uint32_t why; /* fcsl_driver_why_t */
+} fcsl_driver_input_t;
 
 /* A value that a device takes or gives. */
 typedef struct {
@@ -61,6 +86,9 @@ typedef struct {
     /* Sensors: 1 when read waits for the next sample (FCSL_DRIVER_WAIT_MS at most, then NOTHING) and so sets the pace; 0 when it takes
      * a sample at each call, and the host calls it at the rate that the user gave. */
     uint8_t waits;
+    /* Sensors: where the struct has a fcsl_driver_input_t, which is zero before each read and which the read fills; 0: nowhere, so it is
+     * not the first member. The host says that a device with one is silent when no sample comes for 2 s. */
+    uint32_t input;
 
     /* Whether the device of this name is there; takes nothing into use and changes nothing. `device` is the text that the user gave, "" for none. */
     fcsl_driver_status_t (*probe)(const char *device, char *why, size_t size);

@@ -29,6 +29,7 @@ typedef struct {
     double horizontal_accuracy;
     double vertical_accuracy;
     double speed_accuracy;
+    fcsl_driver_input_t input;
     int fd;
     gnss_ubx_t ubx; /* of the driver ubx */
     gnss_nmea_t nmea; /* of the driver nmea */
@@ -114,7 +115,10 @@ static int take_ubx(void *self, const uint8_t *bytes, uint32_t count, uint64_t t
 
 static fcsl_driver_status_t read_ubx(void *self, uint64_t *sample_ns, char *why, size_t size)
 {
-    return serial_sample(((gnss_t *)self)->fd, take_ubx, self, sample_ns, why, size);
+    gnss_t *gnss = self;
+    const fcsl_driver_status_t status = serial_sample(gnss->fd, take_ubx, gnss, &gnss->input, sample_ns, why, size);
+    byte_stream_report(&gnss->ubx.stream, &gnss->input);
+    return status;
 }
 
 const fcsl_driver_t fcsl_driver_ubx = {
@@ -128,6 +132,7 @@ const fcsl_driver_t fcsl_driver_ubx = {
     .state_size = sizeof(gnss_t),
     .state_align = _Alignof(gnss_t),
     .waits = 1,
+    .input = offsetof(gnss_t, input),
     .probe = serial_probe,
     .open = open_ubx,
     .read = read_ubx,
@@ -184,7 +189,10 @@ static int take_nmea(void *self, const uint8_t *bytes, uint32_t count, uint64_t 
 
 static fcsl_driver_status_t read_nmea(void *self, uint64_t *sample_ns, char *why, size_t size)
 {
-    return serial_sample(((gnss_t *)self)->fd, take_nmea, self, sample_ns, why, size);
+    gnss_t *gnss = self;
+    const fcsl_driver_status_t status = serial_sample(gnss->fd, take_nmea, gnss, &gnss->input, sample_ns, why, size);
+    byte_stream_report(&gnss->nmea.stream, &gnss->input);
+    return status;
 }
 
 const fcsl_driver_t fcsl_driver_nmea = {
@@ -197,6 +205,7 @@ const fcsl_driver_t fcsl_driver_nmea = {
     .state_size = sizeof(gnss_t),
     .state_align = _Alignof(gnss_t),
     .waits = 1,
+    .input = offsetof(gnss_t, input),
     .probe = serial_probe,
     .open = open_nmea,
     .read = read_nmea,

@@ -21,6 +21,7 @@ typedef struct {
     iio_values_t values; /* the signals */
     input_t inputs[IIO_VALUES];
     uint32_t input_count;
+    iio_mounts_t mounts;
     char folder[SYSFS_PATH_BYTES];
 } iio_t;
 
@@ -79,7 +80,10 @@ static fcsl_driver_status_t open_iio(void *self, const char *device, const uint8
     if (status != FCSL_DRIVER_OK) {
         return status;
     }
-    status = iio_add_channels(iio, used, add_input, &iio->values, why, size);
+    status = iio_get_mounts(iio->folder, used, &iio->mounts, why, size);
+    if (status == FCSL_DRIVER_OK) {
+        status = iio_add_channels(iio, used, add_input, &iio->values, why, size);
+    }
     if (status != FCSL_DRIVER_OK) {
         close_iio(iio);
     }
@@ -100,6 +104,7 @@ static fcsl_driver_status_t read_iio(void *self, uint64_t *sample_ns, char *why,
         }
         iio_put_value(&values, input->channel, &input->conversion, raw);
     }
+    iio_turn(&iio->mounts, &values);
     iio->values = values;
     *sample_ns = begin_ns;
     return FCSL_DRIVER_OK;

@@ -42,6 +42,7 @@ typedef struct {
     iio_element_t elements[ELEMENTS]; /* in their order in the scan */
     uint32_t element_count;
     uint32_t scan_bytes;
+    iio_mounts_t mounts;
     uint64_t last_ns; /* the time of the last sample */
     int file;
     char folder[SYSFS_PATH_BYTES];
@@ -153,7 +154,10 @@ static fcsl_driver_status_t add_timestamp(iio_buffer_t *buffer, char *why, size_
 
 static fcsl_driver_status_t add_elements(iio_buffer_t *buffer, const uint8_t *used, char *why, size_t size)
 {
-    fcsl_driver_status_t status = iio_add_channels(buffer, used, add_element, &buffer->values, why, size);
+    fcsl_driver_status_t status = iio_get_mounts(buffer->folder, used, &buffer->mounts, why, size);
+    if (status == FCSL_DRIVER_OK) {
+        status = iio_add_channels(buffer, used, add_element, &buffer->values, why, size);
+    }
     if (status == FCSL_DRIVER_OK) {
         status = add_timestamp(buffer, why, size);
     }
@@ -379,6 +383,7 @@ static fcsl_driver_status_t read_iio_buffer(void *self, uint64_t *sample_ns, cha
                        buffer->last_ns);
         return FCSL_DRIVER_FAILED;
     }
+    iio_turn(&buffer->mounts, &values);
     buffer->values = values;
     buffer->last_ns = (uint64_t)time_ns;
     *sample_ns = (uint64_t)time_ns;

@@ -28,7 +28,7 @@ typedef struct {
 static const fcsl_driver_signal_t signals[SIGNALS] = {
     [VOLTAGE] = FCSL_DRIVER_SIGNAL(power_supply_t, voltage, "V", "voltage of the battery"),
     [CURRENT] = FCSL_DRIVER_SIGNAL(power_supply_t, current, "A", "current, positive: out of the battery"),
-    [CHARGE] = FCSL_DRIVER_SIGNAL(power_supply_t, charge, "", "what is left of its charge, 0 to 1"),
+    [CHARGE] = FCSL_DRIVER_SIGNAL(power_supply_t, charge, "", "what is left of its charge, 0 to 1; NaN: not known"),
     [TEMPERATURE] = FCSL_DRIVER_SIGNAL(power_supply_t, temperature, "degC", "temperature of the battery"),
 };
 
@@ -132,6 +132,12 @@ static fcsl_driver_status_t fix_sign(const power_supply_t *supply, double *curre
     return FCSL_DRIVER_OK;
 }
 
+/* The kernel's capacity is 0 to 100 %; fuel gauges that know none give 255, or another number beyond. */
+static double charge_of(double percent)
+{
+    return percent >= 0.0 && percent <= 100.0 ? percent : (double)NAN;
+}
+
 static fcsl_driver_status_t read_power_supply(void *self, uint64_t *sample_ns, char *why, size_t size)
 {
     power_supply_t *supply = self;
@@ -148,7 +154,7 @@ static fcsl_driver_status_t read_power_supply(void *self, uint64_t *sample_ns, c
         if (status != FCSL_DRIVER_OK) {
             return status;
         }
-        values[i] /= ATTRIBUTES[i].per_unit;
+        values[i] = (i == CHARGE ? charge_of(values[i]) : values[i]) / ATTRIBUTES[i].per_unit;
     }
     supply->voltage = values[VOLTAGE];
     supply->current = values[CURRENT];

@@ -37,13 +37,15 @@ static void clear_sticks(double sticks[RC_CHANNELS_MAX])
 typedef struct {
     double sticks[RC_CHANNELS_MAX];
     bool failsafe;
+    fcsl_driver_input_t input;
     int fd;
     rc_sbus_t sbus;
 } sbus_t;
 
 static const fcsl_driver_signal_t sbus_signals[] = {
     FCSL_DRIVER_SIGNAL(sbus_t, sticks, "us", STICKS_DOC),
-    FCSL_DRIVER_SIGNAL(sbus_t, failsafe, "", "the receiver has lost the transmitter"),
+    FCSL_DRIVER_SIGNAL(sbus_t, failsafe, "",
+                       "the receiver has lost the transmitter: it says so, or all channels are 0"),
 };
 
 static fcsl_driver_status_t open_sbus(void *self, const char *device, const uint8_t *used, char *why, size_t size)
@@ -61,7 +63,12 @@ static int take_sbus(void *self, const uint8_t *bytes, uint32_t count, uint64_t 
     int found = 0;
     for (uint32_t i = 0; i < count; i++) {
         rc_frame_t frame;
-        if (rc_sbus_take(&sbus->sbus, bytes[i], &frame) != 0 && (!frame.frame_lost || frame.failsafe)) {
+        if (rc_sbus_take(&sbus->sbus, bytes[i], &frame) == 0) {
+            continue;
+        }
+        if (frame.frame_lost && !frame.failsafe) {
+            byte_stream_tell(&sbus->sbus.stream, FCSL_DRIVER_REPEATED);
+        } else {
             put_sticks(&frame, sbus->sticks);
             sbus->failsafe = frame.failsafe != 0;
             *sample_ns = time_ns;
@@ -73,7 +80,10 @@ static int take_sbus(void *self, const uint8_t *bytes, uint32_t count, uint64_t 
 
 static fcsl_driver_status_t read_sbus(void *self, uint64_t *sample_ns, char *why, size_t size)
 {
-    return serial_sample(((sbus_t *)self)->fd, take_sbus, self, sample_ns, why, size);
+    sbus_t *sbus = self;
+    const fcsl_driver_status_t status = serial_sample(sbus->fd, take_sbus, sbus, &sbus->input, sample_ns, why, size);
+    byte_stream_report(&sbus->sbus.stream, &sbus->input);
+    return status;
 }
 
 static void close_sbus(void *self)
@@ -92,6 +102,7 @@ const fcsl_driver_t fcsl_driver_sbus = {
     .state_size = sizeof(sbus_t),
     .state_align = _Alignof(sbus_t),
     .waits = 1,
+    .input = offsetof(sbus_t, input),
     .probe = serial_probe,
     .open = open_sbus,
     .read = read_sbus,
@@ -105,6 +116,7 @@ typedef struct {
     bool failsafe;
     double rssi;
     double link_quality;
+    fcsl_driver_input_t input;
     int fd;
     rc_crsf_t crsf;
     rc_frame_t frame; /* the last ones; count is 0 before the first channels */
@@ -114,7 +126,8 @@ typedef struct {
 
 static const fcsl_driver_signal_t crsf_signals[] = {
     FCSL_DRIVER_SIGNAL(crsf_t, sticks, "us", STICKS_DOC),
-    FCSL_DRIVER_SIGNAL(crsf_t, failsafe, "", "no packet of the transmitter arrives: the link quality is 0"),
+    FCSL_DRIVER_SIGNAL(crsf_t, failsafe, "",
+                       "no packet of the transmitter arrives: the link quality is 0, or all channels are"),
     FCSL_DRIVER_SIGNAL(crsf_t, rssi, "dBm", "signal strength at the better antenna; NaN: not told yet"),
     FCSL_DRIVER_SIGNAL(crsf_t, link_quality, "", "packets that arrive, 0 to 1; NaN: not told yet"),
 };
@@ -144,7 +157,7 @@ static int take_crsf(void *self, const uint8_t *bytes, uint32_t count, uint64_t 
         return 0;
     }
     put_sticks(&crsf->frame, crsf->sticks);
-    crsf->failsafe = crsf->has_link && crsf->link.quality_percent == 0u;
+    crsf->failsafe = crsf->frame.failsafe || (crsf->has_link && crsf->link.quality_percent == 0u);
     if (crsf->has_link) {
         crsf->rssi = crsf->link.rssi_dbm;
         crsf->link_quality = crsf->link.quality_percent / 100.0;
@@ -155,7 +168,10 @@ static int take_crsf(void *self, const uint8_t *bytes, uint32_t count, uint64_t 
 
 static fcsl_driver_status_t read_crsf(void *self, uint64_t *sample_ns, char *why, size_t size)
 {
-    return serial_sample(((crsf_t *)self)->fd, take_crsf, self, sample_ns, why, size);
+    crsf_t *crsf = self;
+    const fcsl_driver_status_t status = serial_sample(crsf->fd, take_crsf, crsf, &crsf->input, sample_ns, why, size);
+    byte_stream_report(&crsf->crsf.stream, &crsf->input);
+    return status;
 }
 
 static void close_crsf(void *self)
@@ -173,6 +189,7 @@ const fcsl_driver_t fcsl_driver_crsf = {
     .state_size = sizeof(crsf_t),
     .state_align = _Alignof(crsf_t),
     .waits = 1,
+    .input = offsetof(crsf_t, input),
     .probe = serial_probe,
     .open = open_crsf,
     .read = read_crsf,

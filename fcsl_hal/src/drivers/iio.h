@@ -8,7 +8,7 @@
 
 #include "sysfs.h"
 
-enum { IIO_VECTOR = 3, IIO_VOLTAGES = 8, IIO_VALUES = 3 * IIO_VECTOR + 3 + IIO_VOLTAGES };
+enum { IIO_VECTORS = 3, IIO_VECTOR = 3, IIO_VOLTAGES = 8, IIO_VALUES = 3 * IIO_VECTOR + 3 + IIO_VOLTAGES };
 enum { IIO_ATTRIBUTE_BYTES = 64 }; /* of a name, with its zero */
 
 typedef struct {
@@ -63,6 +63,19 @@ fcsl_driver_status_t iio_add_channels(void *self, const uint8_t *used, iio_add_t
 /* Reads offset and scale of a channel, its own before those of its type. NOTHING, without a reason: the channel has no unit. */
 fcsl_driver_status_t iio_get_conversion(const char *folder, const iio_channel_t *channel, iio_conversion_t *conversion,
                                         char *why, size_t size);
+
+/* Rotations from the axes of the chip to those of what it is mounted on, as the kernel knows them from its device tree: of IIO_GYRO,
+ * IIO_ACCEL and IIO_FIELD. */
+typedef struct {
+    double rows[IIO_VECTORS][IIO_VECTOR][IIO_VECTOR];
+} iio_mounts_t;
+
+/* Reads those of the used signals; where the device has none, nothing is turned. FAILED: what it has is no rotation. */
+fcsl_driver_status_t iio_get_mounts(const char *folder, const uint8_t *used, iio_mounts_t *mounts, char *why,
+                                    size_t size);
+
+/* Turns the vectors. An axis that the device does not tell stays out where the rotation does not need it. */
+void iio_turn(const iio_mounts_t *mounts, iio_values_t *values);
 
 void iio_put_value(iio_values_t *values, const iio_channel_t *channel, const iio_conversion_t *conversion, double raw);
 

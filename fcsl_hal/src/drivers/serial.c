@@ -172,7 +172,8 @@ static fcsl_driver_status_t read_chunk(int fd, uint64_t deadline_ns, uint8_t *by
     return FCSL_DRIVER_NOTHING;
 }
 
-fcsl_driver_status_t serial_sample(int fd, serial_take_t take, void *self, uint64_t *sample_ns, char *why, size_t size)
+fcsl_driver_status_t serial_sample(int fd, serial_take_t take, void *self, fcsl_driver_input_t *input,
+                                   uint64_t *sample_ns, char *why, size_t size)
 {
     const uint64_t deadline_ns = monotonic_ns() + (uint64_t)FCSL_DRIVER_WAIT_MS * NS_PER_MS;
     uint8_t bytes[CHUNK_BYTES];
@@ -184,6 +185,7 @@ fcsl_driver_status_t serial_sample(int fd, serial_take_t take, void *self, uint6
         if (status != FCSL_DRIVER_OK) {
             return status;
         }
+        input->bytes += count;
         found = take(self, bytes, count, monotonic_ns(), sample_ns);
     }
     return FCSL_DRIVER_OK;

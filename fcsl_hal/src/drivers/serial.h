@@ -29,8 +29,9 @@ int serial_set_mode(int fd, const serial_mode_t *mode, char *why, size_t size);
 /* Takes the bytes of one read, which came at `time_ns`. Returns 1 with a new sample in `self` and its time, else 0. */
 typedef int (*serial_take_t)(void *self, const uint8_t *bytes, uint32_t count, uint64_t time_ns, uint64_t *sample_ns);
 
-/* The read function of a driver: reads until `take` has a sample, FCSL_DRIVER_WAIT_MS at most. Bytes that are read together
+/* The read function of a driver: reads until `take` has a sample, FCSL_DRIVER_WAIT_MS at most, and counts the bytes in *input. Bytes that are read together
  * have one time, so of several frames in them the last one is the sample. */
-fcsl_driver_status_t serial_sample(int fd, serial_take_t take, void *self, uint64_t *sample_ns, char *why, size_t size);
+fcsl_driver_status_t serial_sample(int fd, serial_take_t take, void *self, fcsl_driver_input_t *input,
+                                   uint64_t *sample_ns, char *why, size_t size);
 
 #endif /* FCSL_SERIAL_H */

@@ -41,6 +41,7 @@ uint32_t byte_stream_take(byte_stream_t *stream, uint8_t byte, byte_stream_judge
         if (length >= 0) {
             return 0;
         }
+        byte_stream_tell(stream, (uint32_t)-(int64_t)length);
         drop(stream, 1);
         stream->garbage++;
     }
@@ -52,4 +53,19 @@ void byte_stream_break(byte_stream_t *stream)
     stream->garbage += stream->size - stream->taken;
     stream->size = 0;
     stream->taken = 0;
+}
+
+void byte_stream_tell(byte_stream_t *stream, uint32_t why)
+{
+    stream->why = why > stream->why ? why : stream->why;
+}
+
+void byte_stream_report(byte_stream_t *stream, fcsl_driver_input_t *input)
+{
+    input->frames += (uint32_t)stream->frames;
+    input->rejected += (uint32_t)stream->garbage;
+    input->why = stream->why > input->why ? stream->why : input->why;
+    stream->frames = 0;
+    stream->garbage = 0;
+    stream->why = FCSL_DRIVER_NOT_TOLD;
 }

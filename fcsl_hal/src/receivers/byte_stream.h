@@ -5,12 +5,12 @@
 #ifndef FCSL_HAL_BYTE_STREAM_H
 #define FCSL_HAL_BYTE_STREAM_H
 
-#include <stdint.h>
+#include "fcsl/fcsl_driver.h"
 
 enum { BYTE_STREAM_MAX = 1024 }; /* bytes of the longest frame */
 
 /* Looks at bytes that begin a frame, or do not: the length of a complete frame that they begin with, 0 while it may still become one,
- * -1 when it is none. */
+ * or when it is none the reason (fcsl_driver_why_t), negative. */
 typedef int32_t (*byte_stream_judge_t)(const uint8_t *bytes, uint32_t size);
 
 /* The bytes are last, and a stream is the last member of what holds it: what is read or written behind them lies outside of the
@@ -20,6 +20,7 @@ typedef struct {
     uint32_t taken; /* of them, the frame that was returned last */
     uint64_t frames;
     uint64_t garbage; /* bytes that belong to no frame */
+    uint32_t why; /* fcsl_driver_why_t: the largest one that was told */
     uint8_t bytes[BYTE_STREAM_MAX];
 } byte_stream_t;
 
@@ -29,5 +30,11 @@ uint32_t byte_stream_take(byte_stream_t *stream, uint8_t byte, byte_stream_judge
 
 /* What came so far does not go on: the next byte begins a frame. */
 void byte_stream_break(byte_stream_t *stream);
+
+/* Why no sample came of what was taken. */
+void byte_stream_tell(byte_stream_t *stream, uint32_t why);
+
+/* Adds what the stream has counted to *input, and counts anew. */
+void byte_stream_report(byte_stream_t *stream, fcsl_driver_input_t *input);
 
 #endif /* FCSL_HAL_BYTE_STREAM_H */

@@ -40,7 +40,6 @@ int64_t gnss_utc_ns(int year, int month, int day, int64_t ns_of_day);
 
 /* UBX, of which NAV-PVT is read. */
 typedef struct {
-    uint64_t others; /* messages of other kinds */
     byte_stream_t stream;
 } gnss_ubx_t;
 
@@ -49,8 +48,6 @@ int gnss_ubx_take(gnss_ubx_t *ubx, uint8_t byte, gnss_fix_t *fix);
 
 /* NMEA 0183, of which GGA and RMC of any talker are read. A solution has both, of the same time. */
 typedef struct {
-    uint64_t others; /* sentences of other kinds */
-    uint64_t refused; /* GGA and RMC with a field that cannot be, or without a time */
     gnss_fix_t fix; /* of what came of it so far */
     int64_t ns_of_day;
     uint32_t seen;

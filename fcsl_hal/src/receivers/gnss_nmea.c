@@ -32,8 +32,8 @@ static int hex_of(uint8_t digit)
     return letter >= 0 && letter < 6 ? letter + 10 : -1;
 }
 
-/* The place of the line feed that ends it; `size` where it is not among the first SENTENCE_MAX bytes, and -1 where something is no
- * text. */
+/* The place of the line feed that ends it; `size` where it is not among the first SENTENCE_MAX bytes, and minus the reason where
+ * something is no text. */
 static int32_t end_of(const uint8_t *bytes, uint32_t size)
 {
     //@ loop unroll SENTENCE_MAX;
@@ -41,8 +41,11 @@ static int32_t end_of(const uint8_t *bytes, uint32_t size)
         if (bytes[i] == '\n') {
             return (int32_t)i;
         }
-        if (bytes[i] == '$' || (bytes[i] != '\r' && (bytes[i] < 0x20u || bytes[i] > 0x7Eu))) {
-            return -1;
+        if (bytes[i] == '$') { /* behind a carriage return alone, or a sentence that was cut */
+            return bytes[i - 1u] == '\r' ? -FCSL_DRIVER_LINE_ENDS : -FCSL_DRIVER_NO_FRAMES;
+        }
+        if (bytes[i] != '\r' && (bytes[i] < 0x20u || bytes[i] > 0x7Eu)) {
+            return -FCSL_DRIVER_NO_FRAMES;
         }
     }
     return (int32_t)size;
@@ -50,16 +53,19 @@ static int32_t end_of(const uint8_t *bytes, uint32_t size)
 
 static int32_t judge(const uint8_t *bytes, uint32_t size)
 {
-    const int32_t end = bytes[0] == '$' ? end_of(bytes, size) : -1;
+    const int32_t end = bytes[0] == '$' ? end_of(bytes, size) : -FCSL_DRIVER_NO_FRAMES;
     if (end < 0 || end >= SENTENCE_MAX) {
-        return -1;
+        return end < 0 ? end : -FCSL_DRIVER_NO_FRAMES;
     }
     if ((uint32_t)end == size) {
         return 0;
     }
     const uint32_t length = (uint32_t)end + 1u;
-    if (length < TAIL + 1u || bytes[length - 2u] != '\r' || bytes[length - TAIL] != '*') {
-        return -1;
+    if (length < TAIL + 1u || bytes[length - 2u] != '\r') {
+        return -FCSL_DRIVER_LINE_ENDS;
+    }
+    if (bytes[length - TAIL] != '*') {
+        return -FCSL_DRIVER_NO_CHECKSUMS;
     }
     int sum = 0;
     //@ loop unroll SENTENCE_MAX;
@@ -68,7 +74,7 @@ static int32_t judge(const uint8_t *bytes, uint32_t size)
     }
     const int high = hex_of(bytes[length - 4u]);
     const int low = hex_of(bytes[length - 3u]);
-    return high >= 0 && low >= 0 && sum == high * 16 + low ? (int32_t)length : -1;
+    return high >= 0 && low >= 0 && sum == high * 16 + low ? (int32_t)length : -FCSL_DRIVER_NO_FRAMES;
 }
 
 /* ---- fields ------------------------------------------------------------------------------------------------------------- */
@@ -288,11 +294,11 @@ int gnss_nmea_take(gnss_nmea_t *nmea, uint8_t byte, gnss_fix_t *fix)
     const sentence_t sentence = split(nmea->stream.bytes, size);
     const uint32_t kind = kind_of(&sentence);
     if (kind == 0u) {
-        nmea->others++;
+        byte_stream_tell(&nmea->stream, FCSL_DRIVER_OTHER_FRAMES);
         return 0;
     }
     if (sentence.count < 2u || read_time(sentence.fields[1], &ns_of_day) != 0) {
-        nmea->refused++;
+        byte_stream_tell(&nmea->stream, sentence.fields[1].size == 0u ? FCSL_DRIVER_NO_TIME : FCSL_DRIVER_REFUSED);
         return 0;
     }
     if (nmea->seen == 0u || ns_of_day != nmea->ns_of_day) { /* a new solution */
@@ -304,12 +310,13 @@ int gnss_nmea_take(gnss_nmea_t *nmea, uint8_t byte, gnss_fix_t *fix)
         nmea->has_fix = has_fix(&sentence);
     }
     if ((kind == GGA ? read_gga(&sentence, &nmea->fix) : read_rmc(&sentence, ns_of_day, &nmea->fix)) != 0) {
-        nmea->refused++;
+        byte_stream_tell(&nmea->stream, FCSL_DRIVER_REFUSED);
         nmea->seen = 0;
         return 0;
     }
     nmea->seen |= kind;
     if (nmea->seen != BOTH) {
+        byte_stream_tell(&nmea->stream, kind == GGA ? FCSL_DRIVER_GGA_ALONE : FCSL_DRIVER_RMC_ALONE);
         return 0;
     }
     nmea->seen = 0;

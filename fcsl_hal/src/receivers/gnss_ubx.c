@@ -44,14 +44,14 @@ static int32_t i32(const uint8_t *bytes)
 static int32_t judge(const uint8_t *bytes, uint32_t size)
 {
     if (bytes[0] != FIRST || (size > 1u && bytes[1] != SECOND)) {
-        return -1;
+        return -FCSL_DRIVER_NO_FRAMES;
     }
     if (size < PAYLOAD) {
         return 0;
     }
     const uint32_t length = u16(bytes + LENGTH) + FRAME;
     if (length > BYTE_STREAM_MAX) {
-        return -1;
+        return -FCSL_DRIVER_NO_FRAMES;
     }
     if (size < length) {
         return 0;
@@ -63,7 +63,7 @@ static int32_t judge(const uint8_t *bytes, uint32_t size)
         a = (a + bytes[i]) & 0xFFu;
         b = (b + a) & 0xFFu;
     }
-    return a == bytes[length - 2u] && b == bytes[length - 1u] ? (int32_t)length : -1;
+    return a == bytes[length - 2u] && b == bytes[length - 1u] ? (int32_t)length : -FCSL_DRIVER_NO_FRAMES;
 }
 
 /* The receiver's own number of the kind of fix: 3 and 4 (with dead reckoning) have an altitude. */
@@ -120,9 +120,12 @@ int gnss_ubx_take(gnss_ubx_t *ubx, uint8_t byte, gnss_fix_t *fix)
     if (size == 0u) {
         return 0;
     }
-    if (bytes[2] != CLASS_NAV || bytes[3] != NUMBER_PVT ||
-        (size != PVT_BYTES + FRAME && size != PVT_BYTES_OF_7 + FRAME)) {
-        ubx->others++;
+    if (bytes[2] != CLASS_NAV || bytes[3] != NUMBER_PVT) {
+        byte_stream_tell(&ubx->stream, FCSL_DRIVER_OTHER_FRAMES);
+        return 0;
+    }
+    if (size != PVT_BYTES + FRAME && size != PVT_BYTES_OF_7 + FRAME) {
+        byte_stream_tell(&ubx->stream, FCSL_DRIVER_REFUSED);
         return 0;
     }
     *fix = read_pvt(bytes + PAYLOAD);

@@ -14,7 +14,7 @@ typedef struct {
     float pulse_us[RC_CHANNELS_MAX];
     uint32_t count; /* of channels */
     int frame_lost; /* the receiver missed a frame, and repeats the last one */
-    int failsafe; /* it has lost the transmitter: these are the values that it was told to give then */
+    int failsafe; /* it has lost the transmitter: it says so, or all channels are zero, which no transmitter sends */
 } rc_frame_t;
 
 /* How well a receiver hears the transmitter. */
@@ -35,9 +35,8 @@ typedef struct {
  * the second of two. */
 int rc_sbus_take(rc_sbus_t *sbus, uint8_t byte, rc_frame_t *frame);
 
-/* TBS's Crossfire, and ExpressLRS: 420000 baud, 8N1, 16 channels. It has no failsafe: a receiver that hears nothing is silent. */
+/* TBS's Crossfire, and ExpressLRS: 420000 baud, 8N1, 16 channels. It has no failsafe flag: a receiver that hears nothing is silent. */
 typedef struct {
-    uint64_t others; /* frames of other types */
     byte_stream_t stream;
 } rc_crsf_t;
 
@@ -49,5 +48,7 @@ rc_crsf_kind_t rc_crsf_take(rc_crsf_t *crsf, uint8_t byte, rc_frame_t *frame, rc
 /* 16 channels of 11 bits, the lowest bit first: what both have in common. */
 enum { RC_PACKED_CHANNELS = 16, RC_PACKED_BYTES = 22 };
 void rc_unpack(const uint8_t packed[RC_PACKED_BYTES], float pulse_us[RC_PACKED_CHANNELS]);
+/* Whether all of them are zero. FrSky's receivers send that without a failsafe flag when they have lost the transmitter. */
+int rc_is_empty(const uint8_t packed[RC_PACKED_BYTES]);
 
 #endif /* FCSL_HAL_RC_H */

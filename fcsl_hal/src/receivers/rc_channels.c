@@ -20,3 +20,12 @@ void rc_unpack(const uint8_t packed[RC_PACKED_BYTES], float pulse_us[RC_PACKED_C
         have -= 11u;
     }
 }
+
+int rc_is_empty(const uint8_t packed[RC_PACKED_BYTES])
+{
+    uint32_t bits = 0;
+    for (uint32_t i = 0; i < RC_PACKED_BYTES; i++) {
+        bits |= packed[i];
+    }
+    return bits == 0u;
+}

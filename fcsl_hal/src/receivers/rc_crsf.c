@@ -39,20 +39,20 @@ static uint8_t crc_of(const uint8_t *bytes, uint32_t size)
 static int32_t judge(const uint8_t *bytes, uint32_t size)
 {
     if (!is_address(bytes[0])) {
-        return -1;
+        return -FCSL_DRIVER_NO_FRAMES;
     }
     if (size <= LENGTH) {
         return 0;
     }
     const uint32_t length = bytes[LENGTH];
     if (length < LENGTH_MIN || length > LENGTH_MAX) {
-        return -1;
+        return -FCSL_DRIVER_NO_FRAMES;
     }
     if (size < length + TYPE) {
         return 0;
     }
     const uint32_t covered = length - 1u;
-    return crc_of(bytes + TYPE, covered) == bytes[TYPE + covered] ? (int32_t)length + TYPE : -1;
+    return crc_of(bytes + TYPE, covered) == bytes[TYPE + covered] ? (int32_t)length + TYPE : -FCSL_DRIVER_NO_FRAMES;
 }
 
 /* Signal strengths are sent as -dBm; that of the second antenna is 0 where there is none. */
@@ -77,13 +77,13 @@ rc_crsf_kind_t rc_crsf_take(rc_crsf_t *crsf, uint8_t byte, rc_frame_t *frame, rc
         rc_unpack(bytes + PAYLOAD, frame->pulse_us);
         frame->count = RC_PACKED_CHANNELS;
         frame->frame_lost = 0;
-        frame->failsafe = 0;
+        frame->failsafe = rc_is_empty(bytes + PAYLOAD);
         return RC_CRSF_CHANNELS;
     }
+    byte_stream_tell(&crsf->stream, FCSL_DRIVER_OTHER_FRAMES);
     if (bytes[TYPE] == TYPE_LINK && payload_size == LINK_BYTES) {
         read_link(bytes + PAYLOAD, link);
         return RC_CRSF_LINK;
     }
-    crsf->others++;
     return RC_CRSF_NOTHING;
 }

@@ -38,9 +38,9 @@ static int is_frame(const uint8_t *bytes)
 static int32_t judge(const uint8_t *bytes, uint32_t size)
 {
     if (bytes[0] != BEGINNING) {
-        return -1;
+        return -FCSL_DRIVER_NO_FRAMES;
     }
-    return size < BYTES ? 0 : is_frame(bytes) ? BYTES : -1;
+    return size < BYTES ? 0 : is_frame(bytes) ? BYTES : -FCSL_DRIVER_NO_FRAMES;
 }
 
 /* Two frames, of which the second one counts. */
@@ -48,14 +48,14 @@ static int32_t judge_pair(const uint8_t *bytes, uint32_t size)
 {
     const int32_t first = judge(bytes, size);
     if (first <= 0 || size < 2 * BYTES) {
-        return first < 0 ? -1 : 0;
+        return first < 0 ? first : 0;
     }
     int others = 0;
     //@ loop unroll BYTES;
     for (uint32_t i = 1; i < BYTES; i++) {
         others += is_frame(bytes + i);
     }
-    return is_frame(bytes + BYTES) && others == 0 ? 2 * BYTES : -1;
+    return is_frame(bytes + BYTES) && others == 0 ? 2 * BYTES : -FCSL_DRIVER_NO_FRAMES;
 }
 
 int rc_sbus_take(rc_sbus_t *sbus, uint8_t byte, rc_frame_t *frame)
@@ -66,6 +66,7 @@ int rc_sbus_take(rc_sbus_t *sbus, uint8_t byte, rc_frame_t *frame)
         sbus->in_sync = sbus->in_sync && sbus->stream.garbage == garbage;
         return 0;
     }
+    sbus->stream.frames += size / BYTES - 1u; /* a pair is two */
     sbus->in_sync = 1;
     const uint8_t *bytes = sbus->stream.bytes + (size - BYTES);
     const uint8_t flags = bytes[FLAGS];
@@ -74,6 +75,6 @@ int rc_sbus_take(rc_sbus_t *sbus, uint8_t byte, rc_frame_t *frame)
     frame->pulse_us[17] = flags & CHANNEL_18 ? HIGH_US : LOW_US;
     frame->count = CHANNELS;
     frame->frame_lost = (flags & FRAME_LOST) != 0;
-    frame->failsafe = (flags & FAILSAFE) != 0;
+    frame->failsafe = (flags & FAILSAFE) != 0 || rc_is_empty(bytes + 1);
     return 1;
 }

@@ -20,6 +20,10 @@ static const struct {
     {"errors", "reads or writes that failed"},
     {"dropped", "samples that no tick got: a tick was late, or the flight was paused"},
     {"lost", "times that it was gone"},
+    {"bytes", "bytes that arrived; 0 where the driver does not tell, as of the next ones"},
+    {"frames", "whole frames of its protocol among them"},
+    {"rejected", "bytes among them that belong to no frame"},
+    {"why", "why no sample comes, by the numbers of board.md; 0: samples come"},
 };
 enum { DEVICE_COUNTERS = sizeof OF_DEVICE / sizeof OF_DEVICE[0] };
 

@@ -16,7 +16,7 @@ typedef struct {
 } counters_t;
 
 /* For each sensor `sensors.<sensor>.primary` and `sensors.<sensor>.condition.<device>`; then for each device `devices.<device>.open`,
- * `samples`, `errors`, `dropped`, `lost`. 0, or -1. */
+ * `samples`, `errors`, `dropped`, `lost`, `bytes`, `frames`, `rejected`, `why`. 0, or -1. */
 int counters_open(counters_t *counters, const board_plan_t *plan, fcsl_error_t *error);
 void counters_free(counters_t *counters);
 

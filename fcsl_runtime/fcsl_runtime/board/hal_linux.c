@@ -159,6 +159,10 @@ static void linux_count(void *ctx)
         *at++ = counts.errors;
         *at++ = counts.dropped;
         *at++ = counts.lost;
+        *at++ = counts.bytes;
+        *at++ = counts.frames;
+        *at++ = counts.rejected;
+        *at++ = counts.why;
     }
 }
 

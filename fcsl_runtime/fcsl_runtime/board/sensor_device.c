@@ -26,9 +26,10 @@ static const uint64_t LOOK_AGAIN_NS = 500000000u; /* for a device that is not th
 static const uint64_t FAILED_NS = 10000000u; /* after a read that failed, of a driver that waits */
 static const uint64_t END_NS = 1000000000u;
 static const uint64_t AHEAD_NS = 1000000u; /* a sample that is further in the future has a wrong time */
+static const uint64_t SILENT_NS = 2000000000u; /* without a sample, of a driver that tells what arrives */
 static const uint64_t NEWS_NS = 1000000000u; /* between two texts for people */
 
-typedef enum { DEVICE_MISSING, DEVICE_OPEN, DEVICE_FAILING } condition_t;
+typedef enum { DEVICE_MISSING, DEVICE_OPEN, DEVICE_SILENT, DEVICE_FAILING } condition_t;
 
 struct sensor_device {
     const board_device_t *plan;
@@ -54,11 +55,19 @@ struct sensor_device {
     _Atomic uint64_t errors;
     _Atomic uint64_t dropped;
     _Atomic uint64_t lost;
+    _Atomic uint64_t bytes;
+    _Atomic uint64_t frames;
+    _Atomic uint64_t rejected;
+    _Atomic uint64_t why;
     atomic_int condition; /* condition_t */
+
+    uint32_t why_now; /* of the thread: why nothing has come since */
+    uint64_t since_ns;
 
     pthread_mutex_t reason_lock; /* the step thread only tries it */
     char reason[DEVICE_REASON_BYTES];
     condition_t told;
+    uint64_t told_why;
     uint64_t told_ns;
     char news[NEWS_BYTES];
 };
@@ -138,11 +147,12 @@ int sensor_device_use(sensor_device_t *device, const char *signal, const char *u
 
 /* ---- the thread ----------------------------------------------------------------------------------------------------- */
 
-static void set_condition(sensor_device_t *device, condition_t condition, const char *reason)
+static void set_condition(sensor_device_t *device, condition_t condition, uint32_t why, const char *reason)
 {
     (void)pthread_mutex_lock(&device->reason_lock);
     (void)snprintf(device->reason, sizeof device->reason, "%s",
                    reason[0] != '\0' ? reason : "the driver gives no reason");
+    atomic_store(&device->why, why);
     atomic_store(&device->condition, (int)condition);
     (void)pthread_mutex_unlock(&device->reason_lock);
 }
@@ -157,6 +167,8 @@ static int open_device(sensor_device_t *device, char *why, size_t size)
     }
     why[size - 1u] = '\0';
     atomic_store(&device->opened, status == FCSL_DRIVER_OK);
+    device->why_now = FCSL_DRIVER_NOT_TOLD;
+    device->since_ns = now_ns();
     return (int)status;
 }
 
@@ -201,13 +213,72 @@ static void keep_sample(sensor_device_t *device, uint64_t sample_ns)
     }
 }
 
+/* ---- what arrives */
+
+static fcsl_driver_input_t *input_of(const sensor_device_t *device)
+{
+    void *input = (uint8_t *)device->state + device->driver->input;
+    return device->driver->input != 0u ? input : NULL;
+}
+
+/* Of what a read took in without giving a sample. */
+static uint32_t why_of(const fcsl_driver_input_t *input)
+{
+    if (input->why != FCSL_DRIVER_NOT_TOLD && input->why < FCSL_DRIVER_WHYS) {
+        return input->why;
+    }
+    return input->bytes > 0u ? (uint32_t)FCSL_DRIVER_NO_FRAMES : (uint32_t)FCSL_DRIVER_NO_BYTES;
+}
+
+/* Counts it. Returns why no sample has come for SILENT_NS, or 0. */
+static uint32_t count_input(sensor_device_t *device, int has_sample)
+{
+    const fcsl_driver_input_t *input = input_of(device);
+    if (input == NULL) {
+        return FCSL_DRIVER_NOT_TOLD;
+    }
+    atomic_fetch_add_explicit(&device->bytes, input->bytes, memory_order_relaxed);
+    atomic_fetch_add_explicit(&device->frames, input->frames, memory_order_relaxed);
+    atomic_fetch_add_explicit(&device->rejected, input->rejected, memory_order_relaxed);
+    const uint64_t now = now_ns();
+    const uint32_t why = why_of(input);
+    const uint32_t told = why > device->why_now ? why : device->why_now;
+    const int begins_anew = has_sample || now - device->since_ns >= SILENT_NS;
+    device->why_now = begins_anew ? (uint32_t)FCSL_DRIVER_NOT_TOLD : told;
+    device->since_ns = begins_anew ? now : device->since_ns;
+    return begins_anew && !has_sample ? told : (uint32_t)FCSL_DRIVER_NOT_TOLD;
+}
+
+const char *board_why_text(uint64_t why)
+{
+    static const char *const TEXTS[FCSL_DRIVER_WHYS] = {
+        [FCSL_DRIVER_NOT_TOLD] = "",
+        [FCSL_DRIVER_NO_BYTES] = "no bytes arrive",
+        [FCSL_DRIVER_NO_FRAMES] = "bytes arrive, and none are a frame of this protocol: another protocol or baud rate?",
+        [FCSL_DRIVER_LINE_ENDS] = "lines arrive that do not end with CR LF",
+        [FCSL_DRIVER_NO_CHECKSUMS] = "sentences arrive without a checksum",
+        [FCSL_DRIVER_OTHER_FRAMES] = "frames arrive, and none of the kinds that the driver reads",
+        [FCSL_DRIVER_GGA_ALONE] = "GGA arrives without an RMC of the same time",
+        [FCSL_DRIVER_RMC_ALONE] = "RMC arrives without a GGA of the same time",
+        [FCSL_DRIVER_NO_TIME] = "sentences arrive without a time: the receiver knows none yet",
+        [FCSL_DRIVER_REFUSED] = "frames arrive with a field that cannot be",
+        [FCSL_DRIVER_REPEATED] = "the receiver repeats its last frame: it does not hear the transmitter",
+    };
+    return why < FCSL_DRIVER_WHYS ? TEXTS[why] : "unknown";
+}
+
 /* Reads once. Returns how long to wait before the next read of a driver that waits by itself. */
 static uint64_t read_device(sensor_device_t *device)
 {
     char why[DEVICE_REASON_BYTES] = "";
     uint64_t sample_ns = 0;
+    fcsl_driver_input_t *input = input_of(device);
+    if (input != NULL) {
+        *input = (fcsl_driver_input_t){0};
+    }
     fcsl_driver_status_t status = device->driver->read(device->state, &sample_ns, why, sizeof why);
     why[sizeof why - 1u] = '\0';
+    const uint32_t silence = count_input(device, status == FCSL_DRIVER_OK);
     if (status == FCSL_DRIVER_OK && sample_ns > now_ns() + AHEAD_NS) {
         (void)snprintf(why, sizeof why, "its sample has a time in the future");
         status = FCSL_DRIVER_FAILED;
@@ -215,11 +286,14 @@ static uint64_t read_device(sensor_device_t *device)
     if (status == FCSL_DRIVER_OK) {
         keep_sample(device, sample_ns);
         if (atomic_load(&device->condition) != DEVICE_OPEN) {
-            set_condition(device, DEVICE_OPEN, "");
+            set_condition(device, DEVICE_OPEN, FCSL_DRIVER_NOT_TOLD, "");
         }
         return 0;
     }
     if (status == FCSL_DRIVER_NOTHING) {
+        if (silence != FCSL_DRIVER_NOT_TOLD) {
+            set_condition(device, DEVICE_SILENT, silence, board_why_text(silence));
+        }
         return 0;
     }
     atomic_fetch_add_explicit(&device->errors, 1, memory_order_relaxed);
@@ -227,11 +301,11 @@ static uint64_t read_device(sensor_device_t *device)
         device->driver->close(device->state);
         atomic_store(&device->opened, 0);
         atomic_fetch_add_explicit(&device->lost, 1, memory_order_relaxed);
-        set_condition(device, DEVICE_MISSING, why);
+        set_condition(device, DEVICE_MISSING, FCSL_DRIVER_NOT_TOLD, why);
         return LOOK_AGAIN_NS;
     }
     if (atomic_load(&device->condition) != DEVICE_FAILING) {
-        set_condition(device, DEVICE_FAILING, why);
+        set_condition(device, DEVICE_FAILING, FCSL_DRIVER_NOT_TOLD, why);
     }
     return FAILED_NS;
 }
@@ -260,7 +334,7 @@ static int look_again(sensor_device_t *device)
     if (status == FCSL_DRIVER_FAILED) {
         atomic_fetch_add_explicit(&device->errors, 1, memory_order_relaxed);
         if (atomic_load(&device->condition) != DEVICE_FAILING) {
-            set_condition(device, DEVICE_FAILING, why);
+            set_condition(device, DEVICE_FAILING, FCSL_DRIVER_NOT_TOLD, why);
         }
     }
     return status == FCSL_DRIVER_OK;
@@ -300,7 +374,7 @@ int sensor_device_start(sensor_device_t *device, int priority, fcsl_error_t *err
         return fcsl_fail(error, "device '%.60s' (%.200s) cannot be opened: %s", device->plan->name,
                          device->plan->address, why[0] != '\0' ? why : "the driver gives no reason");
     }
-    set_condition(device, status == FCSL_DRIVER_OK ? DEVICE_OPEN : DEVICE_MISSING, why);
+    set_condition(device, status == FCSL_DRIVER_OK ? DEVICE_OPEN : DEVICE_MISSING, FCSL_DRIVER_NOT_TOLD, why);
     device->told = DEVICE_OPEN;
     const int code = device_thread_start(&device->thread, priority, run, device);
     device->started = code == 0;
@@ -349,7 +423,8 @@ int sensor_device_has_sample(const sensor_device_t *device)
 
 int sensor_device_is_well(const sensor_device_t *device)
 {
-    return atomic_load(&device->condition) == DEVICE_OPEN;
+    const int condition = atomic_load(&device->condition);
+    return condition == DEVICE_OPEN || condition == DEVICE_SILENT;
 }
 
 device_counts_t sensor_device_counts(const sensor_device_t *device)
@@ -360,20 +435,27 @@ device_counts_t sensor_device_counts(const sensor_device_t *device)
         .dropped = atomic_load_explicit(&device->dropped, memory_order_relaxed),
         .lost = atomic_load_explicit(&device->lost, memory_order_relaxed),
         .open = atomic_load_explicit(&device->opened, memory_order_relaxed) != 0,
+        .bytes = atomic_load_explicit(&device->bytes, memory_order_relaxed),
+        .frames = atomic_load_explicit(&device->frames, memory_order_relaxed),
+        .rejected = atomic_load_explicit(&device->rejected, memory_order_relaxed),
+        .why = atomic_load_explicit(&device->why, memory_order_relaxed),
     };
 }
 
 const char *sensor_device_news(sensor_device_t *device)
 {
-    static const char *const SAY[] = {
-        [DEVICE_MISSING] = "is not there: ", [DEVICE_OPEN] = "is there", [DEVICE_FAILING] = "fails: "};
+    static const char *const SAY[] = {[DEVICE_MISSING] = "is not there: ",
+                                      [DEVICE_OPEN] = "is there",
+                                      [DEVICE_SILENT] = "is silent: ",
+                                      [DEVICE_FAILING] = "fails: "};
     const uint64_t now = now_ns();
-    if (atomic_load(&device->condition) == (int)device->told || now - device->told_ns < NEWS_NS ||
-        pthread_mutex_trylock(&device->reason_lock) != 0) {
+    if ((atomic_load(&device->condition) == (int)device->told && atomic_load(&device->why) == device->told_why) ||
+        now - device->told_ns < NEWS_NS || pthread_mutex_trylock(&device->reason_lock) != 0) {
         return NULL;
     }
     device->told_ns = now;
     device->told = (condition_t)atomic_load(&device->condition);
+    device->told_why = atomic_load(&device->why);
     (void)snprintf(device->news, sizeof device->news, "device '%.60s' %s%s", device->plan->name, SAY[device->told],
                    device->told == DEVICE_OPEN ? "" : device->reason);
     (void)pthread_mutex_unlock(&device->reason_lock);

@@ -25,6 +25,10 @@ typedef struct {
     uint64_t dropped; /* samples that no tick took: newer ones came */
     uint64_t lost; /* how often the device was gone */
     uint64_t open; /* 1: it is there */
+    uint64_t bytes; /* that arrived; 0 where the driver does not tell, as of the next ones */
+    uint64_t frames;
+    uint64_t rejected; /* bytes that belong to no frame */
+    uint64_t why; /* fcsl_driver_why_t: why it is silent */
 } device_counts_t;
 
 typedef struct sensor_device sensor_device_t;
@@ -43,12 +47,14 @@ int sensor_device_start(sensor_device_t *device, int priority, fcsl_error_t *err
 int sensor_device_take(sensor_device_t *device, device_sample_t *sample);
 /* Drops the oldest samples until `most` are left at most, and counts them. */
 void sensor_device_skip(sensor_device_t *device, uint32_t most);
+/* Of a fcsl_driver_why_t, for people; "" for 0. */
+const char *board_why_text(uint64_t why);
 /* Whether the device is there, and its last read did not fail. */
 int sensor_device_is_well(const sensor_device_t *device);
 /* Whether one waits. */
 int sensor_device_has_sample(const sensor_device_t *device);
 device_counts_t sensor_device_counts(const sensor_device_t *device);
-/* Whether the device came, went or began to fail since the last text: a text for people, once a second at most; or null. */
+/* Whether the device came, went, fell silent or began to fail since the last text: a text for people, once a second at most; or null. */
 const char *sensor_device_news(sensor_device_t *device);
 /* Ends the thread and closes the device. 0, or -1: a driver that hangs was left alone after 1 s; plan and device stay in use. */
 int sensor_device_free(sensor_device_t *device);

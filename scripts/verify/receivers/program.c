@@ -32,6 +32,7 @@ static void any_stream(byte_stream_t *stream)
     stream->taken = any_u32 % (BYTE_STREAM_MAX + 1u);
     stream->frames = any_u64;
     stream->garbage = any_u64;
+    stream->why = any_u32;
 }
 
 static void check_stream(const byte_stream_t *stream)
@@ -72,6 +73,15 @@ static void count_turns(void)
     //@ assert stream.garbage <= TURNS;
 }
 
+static void report_stream(void)
+{
+    static byte_stream_t stream;
+    fcsl_driver_input_t input = {.why = any_u32};
+    any_stream(&stream);
+    byte_stream_report(&stream, &input);
+    //@ assert stream.garbage == 0 && stream.frames == 0;
+}
+
 static void break_stream(void)
 {
     static byte_stream_t stream;
@@ -93,7 +103,6 @@ static void take_ubx(void)
     static gnss_ubx_t ubx;
     gnss_fix_t fix;
     any_stream(&ubx.stream);
-    ubx.others = any_u64;
     if (gnss_ubx_take(&ubx, any_u8, &fix) != 0) {
         check_fix(&fix);
     }
@@ -128,8 +137,6 @@ static void take_nmea(void)
     gnss_fix_t fix;
     any_stream(&nmea.stream);
     any_fix(&nmea.fix);
-    nmea.others = any_u64;
-    nmea.refused = any_u64;
     nmea.ns_of_day = any_i64;
     nmea.seen = any_u32;
     if (gnss_nmea_take(&nmea, any_u8, &fix) != 0) {
@@ -168,7 +175,6 @@ static void take_crsf(void)
     rc_frame_t frame;
     rc_link_t link;
     any_stream(&crsf.stream);
-    crsf.others = any_u64;
     const rc_crsf_kind_t kind = rc_crsf_take(&crsf, any_u8, &frame, &link);
     if (kind == RC_CRSF_CHANNELS) {
         check_frame(&frame, RC_PACKED_CHANNELS);
@@ -183,6 +189,7 @@ int main(void)
     if ((PARTS & STREAM) != 0) {
         take_any_frame();
         break_stream();
+        report_stream();
     }
     if ((PARTS & END) != 0) {
         count_turns();

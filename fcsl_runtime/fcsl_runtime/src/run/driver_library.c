@@ -47,6 +47,11 @@ static const char *flaw(const fcsl_driver_t *driver)
         (driver->write != NULL) != (driver->direction == FCSL_ACTUATOR)) {
         return "a sensor has read and no write, an actuator write and no read";
     }
+    if (driver->input != 0u &&
+        (driver->input % _Alignof(fcsl_driver_input_t) != 0u || driver->input > driver->state_size ||
+         driver->state_size - driver->input < sizeof(fcsl_driver_input_t))) {
+        return "its input lies outside the state";
+    }
     const uint32_t align = driver->state_align;
     if (driver->state_size == 0u || driver->state_size > STATE_BYTES_MAX || align == 0u || align > ALIGN_MAX ||
         (align & (align - 1u)) != 0u) {

@@ -37,7 +37,10 @@ class COutput(Structure):
 class CCounts(Structure):
     """device_counts_t"""
 
-    _fields_ = [(name, c_uint64) for name in ("samples", "errors", "dropped", "lost", "open")]
+    _fields_ = [
+        (name, c_uint64)
+        for name in ("samples", "errors", "dropped", "lost", "open", "bytes", "frames", "rejected", "why")
+    ]
 
 
 #: DEVICE_VALUES_MAX
@@ -69,6 +72,7 @@ _PROTOTYPES: dict[str, tuple[type | None, list[type]]] = {
     "board_devices_counts": (CCounts, [ptr, c_uint32]),
     "board_devices_news": (c_char_p, [ptr]),
     "board_devices_free": (None, [ptr]),
+    "board_why_text": (c_char_p, [c_uint64]),
 }
 
 
@@ -80,3 +84,8 @@ def _load(path: Path) -> ctypes.CDLL:
 def board_library() -> ctypes.CDLL:
     """Raises TwinError."""
     return _load(runtime_library().with_name("libfcsl_board.so"))
+
+
+def why_text(number: int) -> str:
+    """Why a device is silent, by its fcsl_driver_why_t; "" where it is not. Raises TwinError."""
+    return str(board_library().board_why_text(number).decode())

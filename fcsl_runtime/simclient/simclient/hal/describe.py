@@ -55,22 +55,24 @@ def _first_sample(device: Device, seconds: float) -> Sample:
             return sample
         if not device.driver.waits:
             time.sleep(_POLL_S)
-    raise Refused(f"device '{device.address}' of driver '{device.driver.name}' gave no sample in {seconds:g} s")
+    why = f": {device.silence()}" if device.silence() else ""
+    raise Refused(f"device '{device.address}' of driver '{device.driver.name}' gave no sample in {seconds:g} s{why}")
 
 
 def _lines(driver: Driver, sample: Sample | None) -> list[str]:
     rows = []
     for signal in driver.signals:
-        value = [] if sample is None else [show_numbers(sample.values[signal.name])]
+        value = [] if sample is None else [show_numbers(sample.values[signal.name], unit=signal.unit)]
         rows.append([f"  {signal.name}", signal.type_text, signal.unit or "-", *value, signal.doc])
     kind = "sensor" if driver.direction == SENSOR else "actuator"
     pace = "" if kind == "actuator" else ", it sets the pace" if driver.waits else ", polled: it needs a rate_hz"
     return [f"{driver.name} ({kind}{pace}): {driver.doc}", table(rows)]
 
 
-def show_numbers(values: Iterable[float], digits: int = 6) -> str:
-    """So many digits of each; where all are NaN, that nothing is told."""
-    texts = ["-" if math.isnan(value) else f"{value:.{digits}g}" for value in values]
+def show_numbers(values: Iterable[float], digits: int = 6, unit: str = "") -> str:
+    """So many digits of each, of a coordinate those to a centimetre; where all are NaN, that nothing is told."""
+    form = ".7f" if unit == "deg" else f".{digits}g"
+    texts = ["-" if math.isnan(value) else f"{value:{form}}" for value in values]
     if all(text == "-" for text in texts):
         return "not told"
     return texts[0] if len(texts) == 1 else f"[{', '.join(texts)}]"

@@ -9,10 +9,13 @@ from collections.abc import Iterable, Mapping
 from ctypes import byref, c_uint64
 from dataclasses import dataclass
 
+from ..board.native import why_text
 from .driver_abi import (
     ABSENT,
     ACTUATOR,
     NEEDED,
+    NO_BYTES,
+    NO_FRAMES,
     NOTHING,
     OK,
     OPTIONAL,
@@ -20,6 +23,7 @@ from .driver_abi import (
     SCALARS,
     SENSOR,
     UNUSED,
+    CInput,
     find_driver,
 )
 from .errors import Refused
@@ -102,6 +106,8 @@ class Device:
         self._address = ctypes.create_string_buffer(os.fsencode(address))  # the driver may keep it until close
         self._why = ctypes.create_string_buffer(REASON_BYTES)
         self._values = {name: values for name, values in driver.bind(self._state).items() if name in uses}
+        self._input = CInput.from_address(self._state + abi.input) if abi.input else None
+        self._silence = 0
         self._is_open = False
         self._open()
 
@@ -128,7 +134,12 @@ class Device:
     def read(self) -> Sample | None:
         """A sample; None: there is none yet. A driver that waits does so for 0.1 s at most. Raises Refused."""
         sample_ns = c_uint64()
+        if self._input is not None:
+            ctypes.memset(byref(self._input), 0, ctypes.sizeof(CInput))
         status = self.driver.abi.read(self._state, byref(sample_ns), *self._reason())
+        if self._input is not None:
+            told = self._input.why or (NO_FRAMES if self._input.bytes else NO_BYTES)
+            self._silence = 0 if status == OK else max(self._silence, told)
         if status == NOTHING:
             return None
         if status != OK:
@@ -136,6 +147,10 @@ class Device:
                 self.close()
             raise Refused(f"device '{self.address}' of driver '{self.driver.name}': {self._said()}")
         return Sample(sample_ns.value, {name: [float(v) for v in values] for name, values in self._values.items()})
+
+    def silence(self) -> str:
+        """Why no sample has come since the last one; "" where the driver does not tell what arrives."""
+        return why_text(self._silence)
 
     def write(self, values: Mapping[str, float]) -> None:
         """Sets scalars and drives the device with all used signals. Raises Refused."""

@@ -18,6 +18,8 @@ from ..library import bind_runtime, runtime_library
 SENSOR, ACTUATOR = 0, 1
 #: fcsl_driver_status_t
 OK, NOTHING, ABSENT, FAILED = range(4)
+#: fcsl_driver_why_t, those that a host finds itself
+NO_BYTES, NO_FRAMES = 1, 2
 #: fcsl_driver_use_t
 UNUSED, NEEDED, OPTIONAL = range(3)
 REASON_BYTES = 256
@@ -46,6 +48,12 @@ class CSignal(Structure):
     ]
 
 
+class CInput(Structure):
+    """fcsl_driver_input_t"""
+
+    _fields_ = [("bytes", c_uint32), ("frames", c_uint32), ("rejected", c_uint32), ("why", c_uint32)]
+
+
 class CDriver(Structure):
     """fcsl_driver_t. A reason is a buffer of its own, not a Python string."""
 
@@ -59,6 +67,7 @@ class CDriver(Structure):
         ("state_size", c_uint32),
         ("state_align", c_uint32),
         ("waits", c_uint8),
+        ("input", c_uint32),
         ("probe", CFUNCTYPE(c_int, c_char_p, ptr, c_size_t)),
         ("open", CFUNCTYPE(c_int, ptr, c_char_p, ptr, ptr, c_size_t)),
         ("read", CFUNCTYPE(c_int, ptr, POINTER(c_uint64), ptr, c_size_t)),

@@ -45,7 +45,7 @@ class Curves:
         for (s, name), rows in told.items():
             sensor = self._watch.plan.sensors[s]
             unit = next(p.unit for p in places_of(sensor.kind) if p.name == name)
-            title = f"{sensor.name}.{name} = {with_unit(show_numbers(rows[-1]), unit)}"
+            title = f"{sensor.name}.{name} = {with_unit(show_numbers(rows[-1], unit=unit), unit)}"
             count = max(map(len, rows))
             curves = [[row[i] if i < len(row) else math.nan for row in rows] for i in range(count)]
             lines += draw_panel(title, list(self._ticks), curves, width, each)

@@ -11,7 +11,7 @@ from fcsl_compiler.board.kinds import KINDS
 from ..vars.show import table, with_unit
 from .describe import show_numbers
 
-_HEAD = ("device", "", "rate", "age", "errors", "dropped", "lost", "")
+_HEAD = ("device", "", "rate", "age", "errors", "dropped", "lost", "rejected", "")
 
 
 def table_lines(snapshot: dict[str, Any]) -> list[str]:
@@ -41,8 +41,9 @@ def _quantity_rows(sensor: dict[str, Any]) -> list[tuple[str, ...]]:
     rows: list[tuple[str, ...]] = [("", "corrected", *heads)]
     for quantity in KINDS[sensor["kind"]]:
         if any(quantity.name in column for column in columns):
-            texts = (show_numbers(column[quantity.name], 4) if quantity.name in column else "-" for column in columns)
-            rows.append((with_unit(quantity.name, quantity.unit or ""), *texts))
+            unit = quantity.unit or ""
+            texts = (show_numbers(c[quantity.name], 4, unit) if quantity.name in c else "-" for c in columns)
+            rows.append((with_unit(quantity.name, unit), *texts))
     return rows
 
 
@@ -54,7 +55,11 @@ def sensor_lines(snapshot: dict[str, Any], time_s: float) -> list[str]:
         for backend in sensor["backends"]:
             device = devices[backend["device"]]
             condition = backend["condition"] if device["there"] else "not there"
-            states.append(f"{device['name']} {_rate(device['rate_hz'])} {condition}, {device['errors']} errors")
+            counts = f"{device['errors']} errors"
+            if device["rejected"]:
+                counts += f", {device['rejected']} of {device['bytes']} bytes rejected"
+            why = f": {device['why']}" if device["why"] else ""
+            states.append(f"{device['name']} {_rate(device['rate_hz'])} {condition}, {counts}{why}")
         values = _values(sensor["kind"], sensor["values"])
         lines.append(
             f"{time_s:.1f} s  {sensor['name']}: {sensor['primary'] or 'no healthy device'}  {values}  ({'; '.join(states)})"
@@ -67,7 +72,7 @@ def sensor_lines(snapshot: dict[str, Any], time_s: float) -> list[str]:
 
 def _device_row(device: dict[str, Any]) -> tuple[str, ...]:
     age = "-" if math.isnan(device["age_s"]) else f"{device['age_s']:.3f} s"
-    counts = (str(device[name]) for name in ("errors", "dropped", "lost"))
+    counts = (str(device[name]) for name in ("errors", "dropped", "lost", "rejected"))
     state = "there" if device["there"] else "not there"
     return (device["name"], state, _rate(device["rate_hz"]), age, *counts, device["note"])
 
@@ -81,4 +86,6 @@ def _values(kind: str, values: dict[str, list[float]] | None) -> str:
     if not values:
         return "-"
     units = {quantity.name: quantity.unit or "" for quantity in KINDS[kind]}
-    return "  ".join(f"{name} {with_unit(show_numbers(told), units[name])}" for name, told in values.items())
+    return "  ".join(
+        f"{name} {with_unit(show_numbers(told, unit=units[name]), units[name])}" for name, told in values.items()
+    )

@@ -14,6 +14,7 @@ from typing import Any
 from fcsl_compiler.board.kinds import KINDS
 
 from ..board.frontends import Frontends
+from ..board.native import why_text
 from ..board.plan import Plan, Sensor
 from .sensor_devices import SensorDevices
 
@@ -113,6 +114,10 @@ class Watch:
             "errors": counts.errors,
             "dropped": counts.dropped,
             "lost": counts.lost,
+            "bytes": counts.bytes,
+            "frames": counts.frames,
+            "rejected": counts.rejected,
+            "why": why_text(counts.why),
             "note": self._notes[name],
         }
 
