@@ -97,9 +97,23 @@ static const uint8_t *values_of(const fcsl_machine_t *machine, fcsl_message_kind
     return entry->values + *size == entry->end ? bytes + entry->values : NULL;
 }
 
+/* Whether these are the values of a sensor that measures a rotation, and are none: all are zero, of either sign. */
+static int is_no_rotation(const fcsl_channel_t *channel, const fcsl_field_t *field, const uint8_t *values)
+{
+    if (channel->direction != FCSL_SENSOR || channel->as != FCSL_AS_QUATERNION) {
+        return 0;
+    }
+    const uint32_t scalar = field->size / field->count;
+    uint32_t bits = 0;
+    for (uint32_t i = 0; i < field->size; i++) {
+        bits |= i % scalar == scalar - 1u ? values[i] & 0x7Fu : values[i];
+    }
+    return bits == 0u;
+}
+
 /* Checks the entry of a channel. */
 static fcsl_message_status_t check_channel(const fcsl_machine_t *machine, fcsl_message_kind_t kind, uint32_t index,
-                                           const uint8_t *bytes, const raw_entry_t *entry)
+                                           const uint8_t *bytes, const raw_entry_t *entry, uint32_t *skipped)
 {
     //@ split index;
     const fcsl_channel_t *channel = &machine->channels[index];
@@ -110,6 +124,7 @@ static fcsl_message_status_t check_channel(const fcsl_machine_t *machine, fcsl_m
         return carries(kind, channel) ? FCSL_MESSAGE_TYPE : FCSL_MESSAGE_ENTRY;
     }
     if (channel->as == FCSL_AS_BLOB || fcsl_scalars_valid(machine, values, field->type, field->count)) {
+        *skipped += (uint32_t)is_no_rotation(channel, field, values);
         return FCSL_MESSAGE_OK;
     }
     return FCSL_MESSAGE_VALUE;
@@ -139,7 +154,7 @@ static fcsl_message_status_t check_entries(const fcsl_machine_t *machine, fcsl_m
         }
         const uint32_t index = find_channel(machine, entry.id, next);
         if (index < machine->channel_count) {
-            status = check_channel(machine, kind, index, bytes, &entry);
+            status = check_channel(machine, kind, index, bytes, &entry, skipped);
             if (status != FCSL_MESSAGE_OK) {
                 return status;
             }
@@ -262,7 +277,7 @@ static void take_channel(const fcsl_machine_t *machine, uint8_t *data, const fcs
     const fcsl_field_t *field = &machine->fields[channel->field];
     size_t size = 0;
     const uint8_t *values = values_of(machine, message->kind, index, message->bytes, entry, &size);
-    if (values == NULL) {
+    if (values == NULL || is_no_rotation(channel, field, values)) {
         return;
     }
     if (channel->as == FCSL_AS_BLOB) {

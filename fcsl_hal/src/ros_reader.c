@@ -140,6 +140,19 @@ static fcsl_ros_status_t read_stamp(const fcsl_ros_reader_t *reader, int64_t *st
     return FCSL_ROS_TAKEN;
 }
 
+/* Whether all numbers of a value are 0; that of an integer or a bool has no sign. */
+static int is_null(const fcsl_ros_value_t *value, uint8_t type, const uint8_t *row)
+{
+    const uint32_t scalar = fcsl_ros_scalar_size(type);
+    const int is_float = type == FCSL_ROS_F32 || type == FCSL_ROS_F64;
+    uint8_t bits = 0;
+    for (uint32_t i = 0; i < value->size; i++) {
+        const int has_sign = is_float && i % scalar == scalar - 1u;
+        bits |= row[value->offset + i] & (has_sign ? 0x7Fu : 0xFFu);
+    }
+    return bits == 0u;
+}
+
 static fcsl_ros_status_t read_value(const fcsl_ros_reader_t *reader, const fcsl_ros_value_t *value, uint8_t *row)
 {
     const fcsl_ros_reader_plan_t *plan = reader->plan;
@@ -156,6 +169,11 @@ static fcsl_ros_status_t read_value(const fcsl_ros_reader_t *reader, const fcsl_
             memset(row + value->offset, 0, value->size);
             return status;
         }
+    }
+    if (value->rotation != 0u && plan->nan_allowed == 0u && value->row_count > 0u &&
+        is_null(value, plan->rows[value->first_row].type, row)) {
+        memset(row + value->offset, 0, value->size);
+        return FCSL_ROS_ROTATION;
     }
     return FCSL_ROS_TAKEN;
 }

@@ -310,7 +310,10 @@ static void test_entries(void)
         ENTRIES(FCSL_MESSAGE_TYPE, 0, 150, 0, 0x40, 6, 0, 1, 2, 3, 4, 5, 6),  /* one that is too long */
         ENTRIES(FCSL_MESSAGE_TYPE, 0, 150, 0, 0x33, 1, 0, 1, 2, 3, 4),        /* not a blob */
         ENTRIES(FCSL_MESSAGE_TYPE, 0, 0, 0, 0x35, 4, 0, [20] = 0),            /* not a quaternion */
-        ENTRIES(FCSL_MESSAGE_OK, 0, 0, 0, 0x25, [18] = 0),
+        ENTRIES(FCSL_MESSAGE_OK, 0, 0, 0, 0x25, [3] = 1, [18] = 0),
+        ENTRIES(FCSL_MESSAGE_OK, 1, 0, 0, 0x25, [18] = 0),              /* a quaternion of length zero */
+        ENTRIES(FCSL_MESSAGE_OK, 1, 0, 0, 0x25, [6] = 0x80, [18] = 0x80), /* of two negative zeros */
+        ENTRIES(FCSL_MESSAGE_OK, 0, 0, 0, 0x25, [6] = 0x80, [18] = 0x81),
         ENTRIES(FCSL_MESSAGE_SHORT, 0, 150, 0, 0x40, 3, 0, 1, 2),
         ENTRIES(FCSL_MESSAGE_SHORT, 0, FLAG, 7),
         ENTRIES(FCSL_MESSAGE_SHORT, 0, FLAG, 7, 0, 4, 1, 2, 3, 4, 5, 6, 7),

@@ -48,7 +48,7 @@ def message_of(channels: Sequence[Channel]) -> Message:
     for i, c in enumerate(channels):
         type_, count = scalar_of(c.port.type).name, count_of(c.port.type)
         sources.append(Source(c.ros.field, type_, count, 0, axes=c.ros.axes, memory=i, name=c.name))
-        picks.append(Pick(c.name, (c.ros.field,), type_, count, axes=c.ros.axes))
+        picks.append(Pick(c.name, (c.ros.field,), type_, count, axes=c.ros.axes, null_refused=True))
     message = full_name(ros.type)
     composer = composer_plan(STANDARD, message, sources, ros.frame, ros.child_frame)
     reader = reader_plan(STANDARD, message, picks, ros.frame, ros.child_frame)
@@ -58,7 +58,7 @@ def message_of(channels: Sequence[Channel]) -> Message:
 def payload_of(channel: Channel) -> Message:
     """The message of a channel alone, as it lies on the bus: that of its `ros` block, else one of std_msgs.
 
-    A NaN is a value there, as it is without a message.
+    A NaN and a quaternion of length zero are values there, as they are without a message.
     """
     if channel.kind == "blob":
         blob = full_name(BLOB)

@@ -102,6 +102,7 @@ class Value:
     row_count: int
     first_guard: int
     guard_count: int
+    rotation: bool
 
 
 @dataclass(frozen=True)

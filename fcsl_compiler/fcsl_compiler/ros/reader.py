@@ -24,7 +24,8 @@ class Pick:
     `fields`: paths such as "angular_velocity", "axes[1]", "position[left_wheel]", whose numbers are concatenated.
     `axes`: the axes of the value, `source_axes` those of the message; the empty string means ROS's axes. `order`:
     "xyzw" or "wxyz", for four numbers that are a quaternion in the message; the value is always w, x, y, z. A
-    geometry_msgs/Quaternion needs none. `scale`, `offset`: none, one, or one per scalar; applied last.
+    geometry_msgs/Quaternion needs none. `scale`, `offset`: none, one, or one per scalar; applied last. `null_refused`: a
+    quaternion of length zero is no value.
     """
 
     name: str
@@ -36,6 +37,7 @@ class Pick:
     order: str = ""
     scale: tuple[float, ...] = ()
     offset: tuple[float, ...] = ()
+    null_refused: bool = False
 
 
 def has_stamp(definitions: Definitions, message: str) -> bool:
@@ -85,7 +87,8 @@ def _plan(
         targets = [(at + size * i, type_) for i in range(pick.count)]
         rows.add(_matrix(pick, selection), sources, targets, pick.scale, pick.offset)
         row_count = len(rows.rows) - first
-        values.append(Value(at, size * pick.count, first, row_count, len(all_guards), len(found)))
+        rotation = pick.null_refused and _is_rotation(pick, selection)
+        values.append(Value(at, size * pick.count, first, row_count, len(all_guards), len(found), rotation))
         all_guards += [Guard(_places(walk, piece)[0].term(), value) for piece, value in found]
         at += size * pick.count
     stamp_anchor, stamp_offset = walk.places[stamps[0]] if stamps else (NONE, 0)
@@ -128,9 +131,13 @@ def _selection(definitions: Definitions, message: str, pick: Pick) -> Selection:
     return selection
 
 
+def _is_rotation(pick: Pick, selection: Selection) -> bool:
+    return selection.kind is Kind.QUATERNION or bool(pick.order)
+
+
 def _matrix(pick: Pick, selection: Selection) -> axes.Matrix | None:
     """The matrix from the numbers of the message to those of the value, None where they are the same. Raises PlanError."""
-    is_quaternion = selection.kind is Kind.QUATERNION or bool(pick.order)
+    is_quaternion = _is_rotation(pick, selection)
     if not is_quaternion and not pick.source_axes and not pick.axes:
         return None
     kind = Kind.QUATERNION if is_quaternion else selection.kind

@@ -21,7 +21,7 @@ extern "C" {
 #endif
 
 /* Incremented when a struct below, in fcsl_ros_plan.h or in fcsl_hw.h changes its meaning or layout. A host rejects any other value. */
-#define FCSL_ABI_VERSION 10u
+#define FCSL_ABI_VERSION 11u
 
 /* Bytes of fcsl_machine_t.views. */
 #define FCSL_VIEWS_BYTES_MAX UINT16_MAX

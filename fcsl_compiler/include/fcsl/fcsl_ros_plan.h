@@ -96,6 +96,7 @@ typedef struct {
     uint32_t row_count;
     uint32_t first_guard;
     uint32_t guard_count;
+    uint8_t rotation; /* a quaternion, refused where all its numbers are 0 */
 } fcsl_ros_value_t;
 
 typedef struct {
@@ -117,7 +118,7 @@ typedef struct {
     uint32_t size; /* bytes of a row of values */
     uint32_t stamp_anchor; /* of a header's stamp (int32 s, uint32 ns), or FCSL_ROS_NONE */
     uint32_t stamp_offset;
-    uint8_t nan_allowed; /* a NaN is a value of a float, else it is refused */
+    uint8_t nan_allowed; /* a NaN is a value of a float, and any quaternion one; else they are refused */
 } fcsl_ros_reader_plan_t;
 
 typedef struct {

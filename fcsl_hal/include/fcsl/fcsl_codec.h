@@ -60,7 +60,7 @@ typedef struct {
     uint64_t tick;
     uint64_t time_ns; /* time message; else 0 */
     fcsl_message_kind_t kind;
-    uint32_t skipped; /* entries of ids that the table does not have */
+    uint32_t skipped; /* entries of ids that the table does not have, and quaternions of length zero from sensors */
     uint8_t armed; /* actuator message: 0 or 1; else 0 */
 } fcsl_message_t;
 

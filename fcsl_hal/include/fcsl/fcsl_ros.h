@@ -42,11 +42,12 @@ typedef enum {
     FCSL_ROS_RANGE = 7, /* a number that its target cannot hold; a bool other than 0 and 1 */
     FCSL_ROS_NAN = 8,
     FCSL_ROS_UNMEASURED = 9, /* the message itself says so (REP-145: a covariance that begins with -1) */
+    FCSL_ROS_ROTATION = 10, /* a quaternion of length zero */
     /* of a message that comes in while the machine runs */
-    FCSL_ROS_FUTURE = 10,   /* stamped more than FCSL_ROS_AHEAD_NS ahead of now */
-    FCSL_ROS_OLDER = 11,    /* stamped before the last one taken */
-    FCSL_ROS_REPEATED = 12, /* stamped as the last one taken */
-    FCSL_ROS_STATUSES = 13
+    FCSL_ROS_FUTURE = 11,   /* stamped more than FCSL_ROS_AHEAD_NS ahead of now */
+    FCSL_ROS_OLDER = 12,    /* stamped before the last one taken */
+    FCSL_ROS_REPEATED = 13, /* stamped as the last one taken */
+    FCSL_ROS_STATUSES = 14
 } fcsl_ros_status_t;
 
 typedef struct fcsl_ros_reader fcsl_ros_reader_t;

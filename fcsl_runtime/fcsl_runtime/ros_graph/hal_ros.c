@@ -54,6 +54,7 @@ static const fcsl_field_t FIELDS[] = {
     REFUSED("range", FCSL_ROS_RANGE, "values that their channel cannot hold"),
     REFUSED("nan", FCSL_ROS_NAN, "values that are NaN"),
     REFUSED("unmeasured", FCSL_ROS_UNMEASURED, "values that the message marks as not measured"),
+    REFUSED("rotation", FCSL_ROS_ROTATION, "quaternions of length zero"),
     REFUSED("future", FCSL_ROS_FUTURE, "messages stamped more than 50 ms ahead of now"),
     REFUSED("older", FCSL_ROS_OLDER, "messages stamped before the last one"),
     REFUSED("repeated", FCSL_ROS_REPEATED, "messages stamped as the last one"),

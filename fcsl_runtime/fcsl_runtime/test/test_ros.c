@@ -217,7 +217,7 @@ static void test_inlet(const char *library)
         {1.0, 1, 0, FCSL_ROS_F64}, {1.0, 1, 8, FCSL_ROS_F64}, {1.0, 1, 16, FCSL_ROS_F64}};
     static const fcsl_ros_row_t rows[] = {
         {0, 1, 0, FCSL_ROS_F64, 0, 0, 0, 0}, {1, 1, 8, FCSL_ROS_F64, 0, 0, 0, 0}, {2, 1, 16, FCSL_ROS_F64, 0, 0, 0, 0}};
-    static const fcsl_ros_value_t values[] = {{0, 24, 0, 3, 0, 0}};
+    static const fcsl_ros_value_t values[] = {{0, 24, 0, 3, 0, 0, 0}};
     const fcsl_ros_reader_plan_t plan = {.parts = parts,
                                          .picks = picks,
                                          .values = values,

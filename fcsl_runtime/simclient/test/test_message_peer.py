@@ -10,6 +10,7 @@ import re
 import struct
 import subprocess
 import zlib
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -193,6 +194,14 @@ UNKNOWN = st.one_of(
 )
 
 
+def taken(message: Message, table: list[Channel]) -> Message:
+    """What a receiver makes of it: a sensor's quaternion of length zero is skipped."""
+    rotations = {c.id for c in table if c.kind == "quaternion" and not c.actuator}
+    null = {number for number, values in message.values.items() if number in rotations and not any(values)}
+    kept = {number: values for number, values in message.values.items() if number not in null}
+    return replace(message, values=kept, skipped=message.skipped + len(null))
+
+
 def unknown_entry(number: int, kind: int, count: int) -> bytes:
     shape, scalar = kind >> 4, kind & 15
     values = (1, 3, 4)[shape] if shape < 3 else count
@@ -219,8 +228,8 @@ def test_both_write_the_same_bytes_and_read_the_same_values(
     assert c.hash == table_hash(table)
     assert c.encode(message, len(data)) == data
     assert c.encode(message, len(data) - 1) is None
-    assert same(decode(data, message.kind, table), message)
-    assert same(c.decode(data, message.kind), message)
+    assert same(decode(data, message.kind, table), taken(message, table))
+    assert same(c.decode(data, message.kind), taken(message, table))
 
 
 @settings(max_examples=150)
@@ -240,7 +249,7 @@ def test_both_take_channels_in_any_order_and_skip_what_they_do_not_know(
     middle = parts[head:-1] + added
     r.shuffle(middle)
     other = sealed(b"".join(parts[:head] + middle))
-    expected = Message(message.kind, message.tick, message.values, message.armed, message.time_ns, len(added))
+    expected = taken(replace(message, skipped=len(added)), table)
     assert same(decode(other, message.kind, table), expected)
     assert same(Native(native, table).decode(other, message.kind), expected)
 
@@ -342,8 +351,8 @@ def test_vectors_of_the_page(native: ctypes.CDLL, vector: dict[str, Any]) -> Non
     c = Native(native, table)
     if not message.skipped:
         assert encode(message, table) == c.encode(message, len(data)) == data
-    assert same(decode(data, message.kind, table), message)
-    assert same(c.decode(data, message.kind), message)
+    assert same(decode(data, message.kind, table), taken(message, table))
+    assert same(c.decode(data, message.kind), taken(message, table))
 
 
 @pytest.mark.parametrize("vector", REFUSED, ids=lambda v: f"{v['message']}-{v['refused']}")

@@ -237,6 +237,23 @@ def test_quaternions_come_in_both_orders() -> None:
         assert value == (expected or [-0.1, 0.5, 0.3, -0.2])
 
 
+@pytest.mark.parametrize("numbers", [[0.0] * 4, [-0.0, 0.0, -0.0, 0.0], [0.0, 0.0, 0.0, 1e-200]])
+@pytest.mark.parametrize("type_", ["f64", "f32"])
+def test_a_quaternion_of_length_zero(numbers: list[float], type_: str) -> None:
+    """As the target has it: what an f32 rounds to zero is none."""
+    name, each = "geometry_msgs/msg/Pose", tuple(f"orientation.{axis}" for axis in "wxyz")
+    pose = T[name](T["geometry_msgs/msg/Point"](1.0, 2.0, 3.0), T["geometry_msgs/msg/Quaternion"](*numbers))
+    expected = "taken" if any(numbers) and type_ == "f64" else "rotation"
+    for pick, reason in (
+        (Pick("q", ("orientation",), type_, 4, null_refused=True), expected),
+        (Pick("q", ("orientation",), type_, 4, axes="ned/frd", null_refused=True), expected),
+        (Pick("q", each, type_, 4, order="wxyz", null_refused=True), expected),
+        (Pick("q", each, type_, 4, null_refused=True), "taken"),  # four numbers
+        (Pick("q", ("orientation",), type_, 4), "taken"),
+    ):
+        assert read_one(name, cdr(pose, name), pick)[1] == reason
+
+
 # ---- what a pick cannot be --------------------------------------------------------------------------------------------------
 
 

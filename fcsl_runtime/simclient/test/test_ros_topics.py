@@ -143,11 +143,12 @@ def header(stamp_ns: int, frame: str) -> Any:
     return T["std_msgs/msg/Header"](time, frame)
 
 
-def imu(stamp_ns: int, rate: float = 1.0, frame: str = "imu_link", measured: bool = True) -> bytes:
+def imu(
+    stamp_ns: int, rate: float = 1.0, frame: str = "imu_link", measured: bool = True, half: float = math.sqrt(0.5)
+) -> bytes:
     vector, quaternion = T["geometry_msgs/msg/Vector3"], T["geometry_msgs/msg/Quaternion"]
     covariance = np.array([0.0 if measured else -1.0, *[0.0] * 8])
     none = np.zeros(9)
-    half = math.sqrt(0.5)
     parts = (quaternion(0.0, 0.0, half, half), covariance, vector(rate, 2.0, 3.0), none, vector(0.0, 0.0, 9.8), none)
     return bytes(STORE.serialize_cdr(T["sensor_msgs/msg/Imu"](header(stamp_ns, frame), *parts), "sensor_msgs/msg/Imu"))
 
@@ -208,6 +209,21 @@ def test_each_channel_is_taken_or_not(run: Run) -> None:
     run.step(1)
     assert value(run, "show.inputs.stick") == 0.25 and value(run, "show.inputs.arm") is True
     assert inlet.counts() == {"taken": 2, "range": 1, "shape": 1}
+
+
+def test_a_quaternion_of_length_zero_is_no_rotation(run: Run) -> None:
+    """Unless the message says that it has none (REP-145): then nothing was to be refused."""
+    inlet = Inlet(run, topic(run, "imu"))
+    assert inlet.deliver(imu(SECOND), SECOND) == 2
+    run.step(1)
+    before = value(run, "show.outputs.attitude")
+    assert inlet.deliver(imu(SECOND + 1, rate=4.0, half=0.0), SECOND + 1) == 1
+    assert inlet.deliver(imu(SECOND + 2, rate=5.0, half=-0.0), SECOND + 2) == 1
+    assert inlet.deliver(imu(SECOND + 3, rate=6.0, half=0.0, measured=False), SECOND + 3) == 1
+    run.step(1)
+    assert value(run, "show.outputs.attitude") == before and value(run, "show.outputs.gyro")[0] == 6.0
+    assert inlet.counts() == {"taken": 4, "rotation": 2, "unmeasured": 1}
+    assert inlet.deliver(imu(SECOND + 4, half=1e-300), SECOND + 4) == 2  # any other length is one
 
 
 def test_a_missing_channel_gets_nothing_and_the_others_of_its_message_do(run: Run) -> None:

@@ -75,7 +75,7 @@ class MessageEmitter:
         ]
         picks = [f"{{{p.anchor}u, {p.count}u, {p.element}u, {_index(p.name)}}}" for p in plan.picks]
         values = [
-            f"{{{v.offset}u, {v.size}u, {v.first_row}u, {v.row_count}u, {v.first_guard}u, {v.guard_count}u}}"
+            f"{{{v.offset}u, {v.size}u, {v.first_row}u, {v.row_count}u, {v.first_guard}u, {v.guard_count}u, {int(v.rotation)}}}"
             for v in plan.values
         ]
         tables = {

@@ -79,7 +79,8 @@ class Channel:
 
 @dataclass(frozen=True)
 class Message:
-    """`values`: by channel id, as many as the channel has, row by row; of a blob its bytes. `skipped`: entries that the table does not have."""
+    """`values`: by channel id, as many as the channel has, row by row; of a blob its bytes. `skipped`: entries that the
+    table does not have, and of sensors rotations of length zero."""
 
     kind: Kind
     tick: int
@@ -193,9 +194,10 @@ def _values(data: bytes, kind: int, count: int, at: int) -> tuple[Value, ...]:
 def _channels(
     data: bytes, start: int, end: int, kind: Kind, table: Sequence[Channel]
 ) -> tuple[dict[int, Sequence[Value]], int]:
-    """The values of the channels in [start, end), and how many entries are of none."""
+    """The values of the channels in [start, end), and how many entries are of none, or rotations of length zero."""
     channels = {channel.id: channel for channel in table}
     values: dict[int, Sequence[Value]] = {}
+    taken: set[int] = set()
     skipped = 0
     for entry in entries(data[:end], start):
         channel = channels.get(entry.id)
@@ -208,8 +210,12 @@ def _channels(
         if entry.type != channel.type or not fits:
             raise MessageError("type")
         found = _values(data, channel.type, entry.elements, entry.values)
-        if entry.id in values:
+        if entry.id in taken:
             raise MessageError("entry")
+        taken.add(entry.id)
+        if channel.kind == "quaternion" and not channel.actuator and not any(found):
+            skipped += 1
+            continue
         values[entry.id] = found
     if kind is Kind.ACTUATORS and any(channel.actuator and channel.id not in values for channel in table):
         raise MessageError("entry")

@@ -31,6 +31,7 @@ REASONS = (
     "range",
     "nan",
     "unmeasured",
+    "rotation",
     "future",
     "older",
     "repeated",
@@ -86,6 +87,7 @@ class CValue(Structure):
         ("row_count", c_uint32),
         ("first_guard", c_uint32),
         ("guard_count", c_uint32),
+        ("rotation", c_uint8),
     ]
 
 
@@ -193,7 +195,9 @@ def _row_tables(plan: ReaderPlan | ComposerPlan) -> dict[str, Any]:
 
 def reader_plan(plan: ReaderPlan) -> CReaderPlan:
     """The plan as C has it."""
-    values = [(v.offset, v.size, v.first_row, v.row_count, v.first_guard, v.guard_count) for v in plan.values]
+    values = [
+        (v.offset, v.size, v.first_row, v.row_count, v.first_guard, v.guard_count, v.rotation) for v in plan.values
+    ]
     return CReaderPlan(
         parts=_table(CPart, [(p.code, p.align, p.size, p.first, p.count) for p in plan.parts]),
         picks=_table(CPick, [(p.anchor, p.count, p.element, p.name) for p in plan.picks]),

@@ -53,7 +53,10 @@ def topics_of(machine: Machine) -> tuple[RosTopic, ...]:
 
 def reader_of(topic: RosTopic) -> Reader:
     """A reader of the topic's messages, with a column for each channel by name. Raises MapError."""
-    picks = [Pick(c.name, (c.ros_field,), c.field.type, c.field.count, axes=c.ros_axes) for c in topic.channels]
+    picks = [
+        Pick(c.name, (c.ros_field,), c.field.type, c.field.count, axes=c.ros_axes, null_refused=True)
+        for c in topic.channels
+    ]
     return Reader(STANDARD, topic.type, picks, topic.frame, topic.child_frame)
 
 

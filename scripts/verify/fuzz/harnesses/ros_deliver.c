@@ -18,7 +18,7 @@ static const fcsl_ros_term_t TERMS[] = {
     {1.0, 1, 0, FCSL_ROS_F64}, {1.0, 1, 8, FCSL_ROS_F64}, {1.0, 1, 16, FCSL_ROS_F64}};
 static const fcsl_ros_row_t ROWS[] = {
     {0, 1, 0, FCSL_ROS_F64, 0, 0, 0, 0}, {1, 1, 8, FCSL_ROS_F64, 0, 0, 0, 0}, {2, 1, 16, FCSL_ROS_F64, 0, 0, 0, 0}};
-static const fcsl_ros_value_t ROW_VALUES[] = {{0, 24, 0, 3, 0, 0}};
+static const fcsl_ros_value_t ROW_VALUES[] = {{0, 24, 0, 3, 0, 0, 0}};
 static const fcsl_ros_reader_plan_t PLAN = {.parts = PARTS,
                                             .picks = PICKS,
                                             .values = ROW_VALUES,
