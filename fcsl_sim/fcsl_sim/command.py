@@ -251,11 +251,14 @@ def _factor_text(factor: float) -> str:
 def _print_summary(config: SimConfig, summary: Summary) -> None:
     why = "the stop condition held" if summary.end == "until" else "the duration is over"
     show(f"{summary.time_s:10.3f} s  end: {why}")
+    values = []
     for name, table in config.tables.items():
         if table.integrated or table.name == SERIAL_LINK:
             for field in table.of_role("output"):
                 value = _value_text(summary.truth[f"{name}.{field.path}"])
-                show(f"  {name}.{field.path} = {value}{' ' + field.unit if field.unit else ''}")
+                values.append(f"  {name}.{field.path} = {value}{' ' + field.unit if field.unit else ''}")
+    if values:
+        show("\n".join([f"{summary.truth_time_s:10.3f} s  values of the last tick:", *values]))
     show(
         f"seed {summary.seed}: {summary.ticks - summary.from_tick} ticks in {summary.wall_s:.3f} s, "
         f"{_factor_text(summary.real_time_factor)} times real time"

@@ -39,8 +39,8 @@ class StateChange:
 
 @dataclass(frozen=True)
 class Summary:
-    """`from_tick` is that of the restored checkpoint, else 0; `ticks` were completed in the end. `end` is `duration` or `until`; `until_held` is None without a stop condition; `truth` maps
-    `<instance>.outputs.<field>` to its last value. `companions` are the controllers beside the first one: `state`, `ticks`, `bag`.
+    """`from_tick` is that of the restored checkpoint, else 0; `ticks` were completed in the end. `end` is `duration` or `until`; `until_held` is None without a stop condition; `time_s` is when the next tick would be. `truth` maps
+    `<instance>.outputs.<field>` to its value in the last tick, at `truth_time_s`. `companions` are the controllers beside the first one: `state`, `ticks`, `bag`.
     """
 
     config: str
@@ -55,6 +55,7 @@ class Summary:
     state: str | None
     transitions: list[StateChange]
     companions: dict[str, dict[str, Any]]
+    truth_time_s: float
     truth: dict[str, Scalar | list[Scalar]]
     bag: str | None
     telemetry: dict[str, int] | None
@@ -271,6 +272,7 @@ def _summary(
             name: {"state": state, "ticks": ticks, "bag": f"{bag}_{name}" if bag else None}
             for name, (state, ticks) in sim.companions().items()
         },
+        truth_time_s=sim.machine.time_ns(max(sim.tick - 1, 0)) / 1e9,
         truth={
             f"{name}.{f.path}": sim.get(f"{name}.{f.path}")
             for name in config.tables

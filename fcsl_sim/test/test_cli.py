@@ -84,9 +84,10 @@ def fcsl_sim(*arguments: str | Path, **options: Any) -> subprocess.CompletedProc
 def test_run_tells_what_happened(sim_json: Path, tmp_path: Path) -> None:
     done = fcsl_sim("run", sim_json, "--record", tmp_path / "bag")
     assert (done.returncode, done.stderr) == (0, "")
-    change, end, *truth, speed, bag = done.stdout.splitlines()
+    change, end, last, *truth, speed, bag = done.stdout.splitlines()
     assert change == "     0.520 s  UP -> DOWN"
     assert end == "     1.000 s  end: the duration is over"
+    assert last == "     0.990 s  values of the last tick:"
     assert truth == [
         "  ramp.outputs.x = 0.99 m",
         "  ramp.outputs.seen_rate = 1",
@@ -105,6 +106,8 @@ def test_run_as_json(sim_json: Path) -> None:
     assert (summary["seed"], summary["ticks"], summary["end"], summary["state"]) == (5, 100, "duration", "DOWN")
     assert summary["until_held"] is None
     assert summary["truth"]["altimeter.outputs.value"] == pytest.approx(1.24)
+    assert (summary["time_s"], summary["truth_time_s"]) == (1.0, 0.99)
+    assert summary["truth"]["ramp.outputs.time_ns"] == 990_000_000
     assert summary["bag"] is None and summary["real_time_factor"] > 0
 
 
