@@ -103,9 +103,12 @@ _RECORDS = ("inputs", "outputs", "parameters", "state")
 
 @dataclass(frozen=True)
 class _Edge:
+    """`first_ns`: a sensor channel gets no sample before."""
+
     source: _Port
     target: _Port
     span: Span
+    first_ns: int = 0
 
 
 def seconds(reader: ConfigReader, node: JsonNode | None, what: str) -> Fraction | None:
@@ -141,6 +144,7 @@ def check_wiring(
         lines += instances[name].sets + instances[name].tolerances
     lead = next(iter(machines), "")
     lines += [_edge_statement(edge, lead) for edge in checker.edges]
+    lines += [_first_sample(edge, lead) for edge in checker.edges if edge.first_ns]
     lines += checker.read_events(keys.get("events"), ticks)
     checker.warn_unfed(keys.get("connections") or keys.get("controller"))
     until, condition = checker.read_until(keys.get("until"))
@@ -162,6 +166,11 @@ def _edge_statement(edge: _Edge, lead: str) -> str:
             return plan.statement("sensor", source.instance, source.path, target.path)
         return plan.statement("companion_sensor", source.instance, source.path, target.controller, target.path)
     return plan.statement("link", source.instance, source.path, target.instance, target.path)
+
+
+def _first_sample(edge: _Edge, lead: str) -> str:
+    controller = edge.target.controller
+    return plan.statement("first_sample", "-" if controller == lead else controller, edge.target.path, edge.first_ns)
 
 
 class _Checker:
@@ -226,7 +235,7 @@ class _Checker:
         fed: dict[tuple[str, str], Span] = {}
         broken = False
         for item in self.reader.list(node, "`connections`"):
-            keys = self.reader.object(item, "a connection", ("from", "to"))
+            keys = self.reader.object(item, "a connection", ("from", "to"), ("first_sample_s",))
             if keys is None or "from" not in keys or "to" not in keys:
                 broken = True
                 continue
@@ -249,9 +258,17 @@ class _Checker:
                 message = f"`{keys['to'].value}` has a value and a connection"
                 self.sink.error("E212", message, value, help="remove one of them", notes=[(fed[where], "connected")])
             if self._compatible(source, target, keys["from"], keys["to"]):
-                self.edges.append(_Edge(source, target, keys["from"].span))
+                self.edges.append(_Edge(source, target, keys["from"].span, self._first_ns(target, keys)))
         values = {(name, path) for name, instance in self.instances.items() for path in instance.given}
         self._fed = None if broken else set(fed) | values
+
+    def _first_ns(self, target: _Port, keys: Mapping[str, JsonNode]) -> int:
+        node = keys.get("first_sample_s")
+        time = seconds(self.reader, node, "`first_sample_s`")
+        if node is not None and (target.instance or not target.channel):
+            message = "`first_sample_s` is for a connection to a sensor channel"
+            self.sink.error("E214", message, node.span, help="remove it")
+        return round((time or 0) * 10**9)
 
     def _compatible(self, source: _Port, target: _Port, source_node: JsonNode, target_node: JsonNode) -> bool:
         notes = [(source_node.span, f"the source is {with_unit(source.type, source.unit)}")]

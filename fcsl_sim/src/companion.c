@@ -60,7 +60,9 @@ void fcsl_sensors_sample(fcsl_sim_t *sim, fcsl_sensor_t *sensors, uint32_t count
     for (uint32_t i = 0; i < count; i++) {
         fcsl_sensor_t *sensor = &sensors[i];
         const uint64_t samples = sim->instances[sensor->instance].samples;
-        if (samples != sensor->samples) {
+        if (sim->time_ns < sensor->first_ns) {
+            sensor->samples = samples;
+        } else if (samples != sensor->samples) {
             memcpy(sensor->to, sensor->from, sensor->size);
             select[sensor->channel] = 1;
             sensor->samples = samples;

@@ -21,6 +21,7 @@ typedef struct {
     uint32_t instance; /* instance of the output */
     uint32_t channel;
     uint64_t samples; /* of the instance, when the channel got the last one */
+    int64_t first_ns; /* those taken before are lost */
 } fcsl_sensor_t;
 
 typedef struct {

@@ -31,17 +31,17 @@ static int check_pair(const fcsl_plan_link_t *link, const fcsl_field_t *from, co
                          link->from_field, link->to_field);
 }
 
-/* The companion of a connection; null: the first controller. Returns 0, or -1. */
-static int find_companion(const fcsl_sim_t *sim, const fcsl_plan_link_t *link, fcsl_companion_t **companion,
+/* The companion of this name; null: the first controller. Returns 0, or -1. */
+static int find_companion(const fcsl_sim_t *sim, uint32_t line, const char *name, fcsl_companion_t **companion,
                           fcsl_error_t *error)
 {
     *companion = NULL;
-    for (uint32_t i = 0; link->companion && i < sim->companion_count; i++) {
-        if (strcmp(sim->companions[i].name, link->companion) == 0) {
+    for (uint32_t i = 0; name && i < sim->companion_count; i++) {
+        if (strcmp(sim->companions[i].name, name) == 0) {
             *companion = &sim->companions[i];
         }
     }
-    return link->companion && !*companion ? fcsl_sim_fail_line(error, link->line, "no controller", link->companion) : 0;
+    return name && !*companion ? fcsl_sim_fail_line(error, line, "no controller", name) : 0;
 }
 
 static int find_channel(const fcsl_machine_t *machine, uint32_t line, const char *name, fcsl_direction_t direction,
@@ -85,7 +85,7 @@ static const fcsl_field_t *find_source(fcsl_sim_t *sim, const fcsl_plan_link_t *
         sim->reads_fields = 1;
         return field;
     }
-    if (find_companion(sim, link, &companion, error)) {
+    if (find_companion(sim, link->line, link->companion, &companion, error)) {
         return NULL;
     }
     const fcsl_machine_t *machine = companion ? companion->machine : sim->machine;
@@ -194,7 +194,7 @@ static int build_copies(fcsl_sim_t *sim, fcsl_error_t *error)
 static int add_sensor(fcsl_sim_t *sim, const fcsl_plan_link_t *link, fcsl_error_t *error)
 {
     fcsl_companion_t *companion = NULL;
-    if (find_companion(sim, link, &companion, error)) {
+    if (find_companion(sim, link->line, link->companion, &companion, error)) {
         return -1;
     }
     const fcsl_machine_t *machine = companion ? companion->machine : sim->machine;
@@ -225,6 +225,27 @@ static int add_sensor(fcsl_sim_t *sim, const fcsl_plan_link_t *link, fcsl_error_
     return 0;
 }
 
+/* After the sensors: when one of them gets its first sample. */
+static int delay_first_sample(fcsl_sim_t *sim, const fcsl_plan_first_sample_t *first, fcsl_error_t *error)
+{
+    fcsl_companion_t *companion = NULL;
+    uint32_t channel = 0;
+    if (find_companion(sim, first->line, first->companion, &companion, error) ||
+        find_channel(companion ? companion->machine : sim->machine, first->line, first->channel, FCSL_SENSOR, &channel,
+                     error)) {
+        return -1;
+    }
+    fcsl_sensor_t *sensors = companion ? companion->sensors : sim->sensors;
+    const uint32_t count = companion ? companion->sensor_count : sim->sensor_count;
+    for (uint32_t i = 0; i < count; i++) {
+        if (sensors[i].channel == channel) {
+            sensors[i].first_ns = (int64_t)first->time_ns;
+            return 0;
+        }
+    }
+    return fcsl_sim_fail_line(error, first->line, "nothing feeds channel", first->channel);
+}
+
 static int build_sensors(fcsl_sim_t *sim, fcsl_error_t *error)
 {
     const fcsl_plan_t *plan = &sim->plan;
@@ -239,6 +260,11 @@ static int build_sensors(fcsl_sim_t *sim, fcsl_error_t *error)
     }
     for (uint32_t i = 0; i < plan->sensor_count; i++) {
         if (add_sensor(sim, &plan->sensors[i], error)) {
+            return -1;
+        }
+    }
+    for (uint32_t i = 0; i < plan->first_sample_count; i++) {
+        if (delay_first_sample(sim, &plan->first_samples[i], error)) {
             return -1;
         }
     }

@@ -290,6 +290,21 @@ static int on_companion_sensor(parser_t *parser)
     return 0;
 }
 
+/* Of the controller `-`, the first one, or of a companion. */
+static int on_first_sample(parser_t *parser)
+{
+    char *const *word = parser->word;
+    fcsl_plan_first_sample_t *first = &parser->plan->first_samples[parser->plan->first_sample_count++];
+    const int is_lead = strcmp(word[1], "-") == 0;
+    *first = (fcsl_plan_first_sample_t){parser->line, is_lead ? NULL : word[1], word[2], 0};
+    if ((!is_lead && !fcsl_plan_is_name(word[1])) || !fcsl_plan_is_path(word[2])) {
+        return bad(parser, "not a name or channel");
+    }
+    return fcsl_plan_number(word[3], INT64_MAX, &first->time_ns)
+               ? bad(parser, "the time is not a number of nanoseconds")
+               : 0;
+}
+
 static int on_companion_actuator(parser_t *parser)
 {
     char *const *word = parser->word;
@@ -388,6 +403,7 @@ enum {
     SENSOR,
     ACTUATOR,
     COMPANION_SENSOR,
+    FIRST_SAMPLE,
     COMPANION_ACTUATOR,
     READ,
     WRITE,
@@ -415,6 +431,7 @@ static const statement_t statements[STATEMENTS] = {
     [SENSOR] = {"sensor", 4, 0, on_sensor, FCSL_PLAN_MAX_LINKS},
     [ACTUATOR] = {"actuator", 4, 0, on_actuator, FCSL_PLAN_MAX_LINKS},
     [COMPANION_SENSOR] = {"companion_sensor", 5, 0, on_companion_sensor, FCSL_PLAN_MAX_LINKS},
+    [FIRST_SAMPLE] = {"first_sample", 4, 0, on_first_sample, FCSL_PLAN_MAX_LINKS},
     [COMPANION_ACTUATOR] = {"companion_actuator", 5, 0, on_companion_actuator, FCSL_PLAN_MAX_LINKS},
     [READ] = {"read", 4, 0, on_read, FCSL_PLAN_MAX_LINKS},
     [WRITE] = {"write", 4, 0, on_write, FCSL_PLAN_MAX_LINKS},
@@ -476,14 +493,15 @@ static int allocate(fcsl_plan_t *plan, const uint32_t counts[STATEMENTS], fcsl_e
     plan->sets = calloc(counts[SET] + 1u, sizeof *plan->sets);
     plan->links = calloc(counts[LINK] + 1u, sizeof *plan->links);
     plan->sensors = calloc(counts[SENSOR] + counts[COMPANION_SENSOR] + 1u, sizeof *plan->sensors);
+    plan->first_samples = calloc(counts[FIRST_SAMPLE] + 1u, sizeof *plan->first_samples);
     plan->actuators = calloc(counts[ACTUATOR] + counts[COMPANION_ACTUATOR] + 1u, sizeof *plan->actuators);
     plan->companions = calloc(counts[COMPANION] + 1u, sizeof *plan->companions);
     plan->reads = calloc(counts[READ] + 1u, sizeof *plan->reads);
     plan->writes = calloc(counts[WRITE] + 1u, sizeof *plan->writes);
     plan->events = calloc(counts[EVENT] + 1u, sizeof *plan->events);
     if (!plan->companions || !plan->reads || !plan->writes || !plan->models || !plan->groups || !plan->instances ||
-        !plan->tolerances || !plan->calls || !plan->sets || !plan->links || !plan->sensors || !plan->actuators ||
-        !plan->events) {
+        !plan->tolerances || !plan->calls || !plan->sets || !plan->links || !plan->sensors || !plan->first_samples ||
+        !plan->actuators || !plan->events) {
         return fcsl_sim_fail(error, "no memory for the plan");
     }
     return 0;
@@ -578,6 +596,7 @@ void fcsl_plan_free(fcsl_plan_t *plan)
     free(plan->reads);
     free(plan->writes);
     free(plan->sensors);
+    free(plan->first_samples);
     free(plan->actuators);
     free(plan->events);
     free(plan->text);

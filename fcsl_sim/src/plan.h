@@ -122,6 +122,14 @@ typedef struct {
     const char *to_field;
 } fcsl_plan_link_t;
 
+/* A sensor channel that gets no sample before. */
+typedef struct {
+    uint32_t line;
+    const char *companion; /* null: of the first controller */
+    const char *channel;
+    uint64_t time_ns;
+} fcsl_plan_first_sample_t;
+
 typedef enum { FCSL_UNTIL_NONE = 0, FCSL_UNTIL_EQUALS, FCSL_UNTIL_ABOVE, FCSL_UNTIL_BELOW } fcsl_until_t;
 
 typedef struct {
@@ -150,6 +158,8 @@ typedef struct {
     uint32_t link_count;
     fcsl_plan_link_t *sensors;
     uint32_t sensor_count;
+    fcsl_plan_first_sample_t *first_samples;
+    uint32_t first_sample_count;
     fcsl_plan_link_t *actuators;
     uint32_t actuator_count;
     fcsl_plan_link_t *reads;

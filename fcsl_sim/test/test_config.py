@@ -106,6 +106,11 @@ EVENT = {"at_s": 0.1, "set": "altimeter.parameters.bias", "value": 1.0}
             add(("ramp.x", "controller.throttle")),
             ["E215: a connection goes `to` an input or a sensor, but `throttle` is the other kind of channel"],
         ),
+        (
+            edit("connections", 0, "first_sample_s", value=1.0),
+            ["E214: `first_sample_s` is for a connection to a sensor channel"],
+        ),
+        (edit("connections", 2, "first_sample_s", value=-1.0), ["E204: `first_sample_s` is -1.0"]),
         (edit("connections", 0, "from", value="ramp.time_ns"), ["E217: i64 cannot be connected to f64"]),
         (edit("connections", 2, "from", value="ramp.time_ns"), ["E217: i64 cannot be connected to f64"]),
         (edit("connections", 3, "from", value="ramp.x"), ["E218: unit `m` cannot be connected to `m/s`"]),

@@ -128,6 +128,21 @@ def test_each_has_its_rate(hz: int, load_two: Load) -> None:
         assert x == pytest.approx(between, rel=1e-9)
 
 
+def test_a_companion_gets_its_first_sample_late(load_two: Load) -> None:
+    """Both carts begin where they shall be; the second controller sees 0 until 0.5 s, and drives away."""
+
+    def change(config: dict[str, Any]) -> None:
+        config["instances"] = {
+            name: {"model": "chain", "parameters": {"gain": 0.0, "rate": 1.0, "x": 1.0}} for name in "ab"
+        }
+        config["connections"][1]["first_sample_s"] = 0.5
+
+    config = load_two(change)
+    assert flown(config, "a.outputs.free") == [1.0] * 200
+    away = flown(config, "b.outputs.free")
+    assert away[:51] == pytest.approx([1.0 + 0.02 * k for k in range(51)]) and max(away) == pytest.approx(2.0)
+
+
 @pytest.mark.parametrize("delay", [1, 3, 7])
 def test_commands_act_after_the_delay(delay: int, load_two: Load) -> None:
     def change(config: dict[str, Any]) -> None:

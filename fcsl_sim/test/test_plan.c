@@ -23,6 +23,7 @@ static const char good[] = "fcsl-sim-plan 2\n"
                            "set lander parameters.dry_mass 0 4079000000000000\n"
                            "link lander outputs.pos_z altimeter inputs.truth\n"
                            "sensor altimeter outputs.value imu.altitude\n"
+                           "first_sample - imu.altitude 250000000\n"
                            "actuator throttle lander inputs.throttle\n"
                            "event 3000000000 altimeter parameters.dropout 0 0000000000000001\n"
                            "until lander outputs.landed equals 0000000000000001 200\n"
@@ -44,6 +45,8 @@ static void reads_all(void)
     CHECK(plan.set_count == 1 && plan.sets[0].bits == UINT64_C(0x4079000000000000) && plan.sets[0].line == 13);
     CHECK(plan.link_count == 1 && strcmp(plan.links[0].to_field, "inputs.truth") == 0);
     CHECK(plan.sensor_count == 1 && strcmp(plan.sensors[0].to_field, "imu.altitude") == 0);
+    CHECK(plan.first_sample_count == 1 && !plan.first_samples[0].companion &&
+          plan.first_samples[0].time_ns == UINT64_C(250000000));
     CHECK(plan.actuator_count == 1 && strcmp(plan.actuators[0].from_field, "throttle") == 0);
     CHECK(plan.event_count == 1 && plan.events[0].time_ns == UINT64_C(3000000000));
     CHECK(plan.until == FCSL_UNTIL_EQUALS && plan.until_ticks == 200);
@@ -106,10 +109,12 @@ static void names_the_line(void)
     refuses_with("0 4079", "0 0x79", "plan line 13: the value is not 16 hexadecimal digits");
     refuses_with("0 4079", "0 79", "plan line 13: the value is not 16 hexadecimal digits");
     refuses_with("0 4079", "4294967296 4079", "plan line 13: the element is not a number");
-    refuses_with("event 3", "event 9999999999", "plan line 17: the time is not a number of nanoseconds");
-    refuses_with("equals", "is", "plan line 18: the comparison is not `equals`, `above` or `below`");
-    refuses_with("end\n", "end\nend\n", "plan line 20: text after `end`");
-    refuses_with("end\n", "", "plan line 18: the plan has no `end`: it is truncated");
+    refuses_with("- imu", "-- imu", "plan line 16: not a name or channel");
+    refuses_with("250000000", "0.25", "plan line 16: the time is not a number of nanoseconds");
+    refuses_with("event 3", "event 9999999999", "plan line 18: the time is not a number of nanoseconds");
+    refuses_with("equals", "is", "plan line 19: the comparison is not `equals`, `above` or `below`");
+    refuses_with("end\n", "end\nend\n", "plan line 21: text after `end`");
+    refuses_with("end\n", "", "plan line 19: the plan has no `end`: it is truncated");
 }
 
 static void refuses_long_lines(void)

@@ -54,6 +54,7 @@ RICH: dict[str, Any] = copy.deepcopy(RAMP) | {
     "views": {"panels": [{"title": "x", "truth": ["ramp.outputs.x"]}]},
 }
 RICH["controller"]["link"] = "line"
+RICH["connections"][2]["first_sample_s"] = 0.25
 RICH["models"]["serial_link"] = {"source": "package://fcsl_sim/models/serial_link.c"}
 RICH["instances"]["ramp"] |= {"integrator": {"method": "rk45", "atol": 1e-6}, "tolerances": {"state.x": 1e-6}}
 RICH["instances"]["line"] = {

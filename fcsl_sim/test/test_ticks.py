@@ -72,6 +72,23 @@ def test_a_dropout_leaves_the_channel_out_of_the_message(open_sim: Open) -> None
         assert health == ["nominal"] * 35 + ["failed"] * 25 + ["nominal"] * 40
 
 
+@pytest.mark.parametrize(("first_s", "first_tick"), [(0.0, 0), (0.25, 25), (0.251, 26), (60.0, 100)])
+def test_a_channel_gets_its_first_sample_late(first_s: float, first_tick: int, open_sim: Open) -> None:
+    """What the sensor took before is lost: the first sample is a new one."""
+
+    def change(config: dict[str, Any]) -> None:
+        config["connections"][2]["first_sample_s"] = first_s
+        config["rates"]["altimeter"] = 50
+
+    with open_sim(change) as sim:
+        seen = []
+        for _ in range(100):
+            sim.run(1)
+            seen.append(sim.machine_value("pilot.outputs.samples"))
+    first_even = first_tick + first_tick % 2
+    assert seen == [max(0, (tick - first_even) // 2 + 1) for tick in range(100)]
+
+
 def test_events_at_one_time_apply_in_the_order_of_the_file(open_sim: Open) -> None:
     def change(config: dict[str, Any]) -> None:
         set_bias = {"at_s": 0.5, "set": "altimeter.parameters.bias"}
