@@ -20,7 +20,7 @@ from typing import Any, TypeVar, cast
 
 import zenoh
 from ament_index_python.packages import get_package_share_directory
-from geometry_msgs.msg import PointStamped, TwistStamped
+from geometry_msgs.msg import PointStamped, PoseWithCovarianceStamped, TwistStamped
 from lander.msg import LanderControlDescent
 from rclpy.serialization import deserialize_message, serialize_message
 from rosgraph_msgs.msg import Clock
@@ -263,10 +263,11 @@ class Gauge:
 
 class Pump:
     inputs = {"now": "i64"}
-    outputs = {"speed": "f64 m/s", "armed": "bool"}
+    outputs = {"speed": "f64 m/s", "height": "f64 m", "armed": "bool"}
 
     def execute(self):
         self.speed = 3.0
+        self.height = 4.0
         self.armed = self.now < 2000000000
 """
 TANK = {
@@ -284,6 +285,10 @@ TANK = {
         | {"ros": {"type": "geometry_msgs/PointStamped", "field": "point.z", "topic": "level", "frame": "tank"}},
         {"name": "speed", "id": 2, "field": "pump.outputs.speed", "direction": "actuator", "safe": -1.0}
         | {"ros": {"type": "geometry_msgs/TwistStamped", "field": "twist.linear.x", "topic": "/cmd_vel"}},
+        {"name": "height", "id": 3, "field": "pump.outputs.height", "direction": "report"}
+        | {
+            "ros": {"type": "geometry_msgs/PoseWithCovarianceStamped", "field": "pose.pose.position.z", "topic": "pose"}
+        },
     ],
 }
 TANK_SIM = {
@@ -299,7 +304,8 @@ TANK_SIM = {
 
 
 def test_mapped_channels_of_a_simulation(tmp_path: Path) -> None:
-    """Sensors when they are sampled, actuators in every tick: the machine's value while it is armed, then the safe one."""
+    """Sensors when they are sampled, actuators in every tick: the machine's value while it is armed, then the safe one.
+    A report is the machine's value all the time, and a covariance that nobody gave is unknown."""
     (tmp_path / "pump.py").write_text(PUMP)
     (tmp_path / "tank.json").write_text(json.dumps(TANK))
     (tmp_path / "tank.sim.json").write_text(json.dumps(TANK_SIM))
@@ -307,11 +313,13 @@ def test_mapped_channels_of_a_simulation(tmp_path: Path) -> None:
     options = ["--ros", endpoint, "--namespace", "r1", "--speed", "2"]
     levels: list[PointStamped] = []
     commands: list[TwistStamped] = []
+    poses: list[PoseWithCovarianceStamped] = []
     with started("fcsl-sim", "run", tmp_path / "tank.sim.json", *options) as sim, bridge(endpoint) as session:
         declared = tokens(session)
         subscribers = [
             session.declare_subscriber("r1/level", lambda s: levels.append(read(s, PointStamped))),
             session.declare_subscriber("cmd_vel", lambda s: commands.append(read(s, TwistStamped))),
+            session.declare_subscriber("r1/pose", lambda s: poses.append(read(s, PoseWithCovarianceStamped))),
         ]
         said, complaint = sim.communicate(timeout=LONG_S)
         for subscriber in subscribers:
@@ -319,7 +327,7 @@ def test_mapped_channels_of_a_simulation(tmp_path: Path) -> None:
     assert sim.returncode == 0, complaint
     of_machine = {"state": LATCHED, "health": LATCHED, "faults": LATCHED, "transitions": EVENT}
     wanted = {f"r1/tank/{name}": quality for name, quality in of_machine.items()}
-    wanted |= {"clock": STREAM, "r1/level": STREAM, "cmd_vel": COMMAND}
+    wanted |= {"clock": STREAM, "r1/level": STREAM, "cmd_vel": COMMAND, "r1/pose": COMMAND}
     assert declared == {topic: ("MP", quality) for topic, quality in wanted.items()}
     assert "ROS 2 topics: 400 ticks, 0 dropped" in said
     assert {(m.point.z, m.header.frame_id, tick_of(m) % 2) for m in levels} == {(7.5, "tank", 0)}
@@ -327,3 +335,5 @@ def test_mapped_channels_of_a_simulation(tmp_path: Path) -> None:
     assert [tick_of(m) for m in commands] == [tick_of(commands[0]) + i for i in range(len(commands))]
     assert len(levels) > HZ / 2 and len(commands) > HZ
     assert all(m.twist.linear.x == (3.0 if tick_of(m) < 200 else -1.0) for m in commands)
+    assert {(m.pose.pose.position.z, m.pose.covariance[0], m.pose.covariance[7]) for m in poses} == {(4.0, -1.0, 0.0)}
+    assert max(tick_of(m) for m in poses) > 200

@@ -112,10 +112,14 @@ class Diagnostics:
         run, lacks = self._run, []
         for channel in run.machine.channels:
             if channel.direction == "sensor" and channel.field.instance == instance:
-                valid, age = (run.machine.fields[f"channels.{channel.name}.{what}"] for what in ("valid", "age_ticks"))
+                valid, waiting, age = (
+                    run.machine.fields[f"channels.{channel.name}.{what}"] for what in ("valid", "waiting", "age_ticks")
+                )
                 if not run.read(valid.offset, 1)[0]:
                     ticks = int.from_bytes(run.read(age.offset, age.size), sys.byteorder)
-                    if ticks == _OLDEST:
+                    if run.read(waiting.offset, 1)[0]:
+                        lacks.append(f"{channel.name}: waiting for its first sample, {ticks} ticks so far")
+                    elif ticks == _OLDEST:
                         lacks.append(f"{channel.name}: its samples have stamps of another clock")
                     else:
                         lacks.append(f"{channel.name}: no sample for {ticks} ticks ({channel.max_age_ticks} allowed)")

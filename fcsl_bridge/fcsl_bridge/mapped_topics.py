@@ -127,49 +127,51 @@ class _Input:
 
 
 class Outputs:
-    """Actuator topics: the machine's actuator outputs, published at every tick; their safe values while it is
+    """Topics of actuators and reports, published at every tick: of actuators their safe values while the machine is
     disarmed. `chosen`: those whose poses go to /tf, too."""
 
     def __init__(self, node: Node, run: Run, forward: Forward, messages: RunTopics, chosen: Sequence[str]):
         self._node, self._run, self._messages = node, run, messages
-        topics = [topic for topic in topics_of(run.machine) if topic.direction == "actuator"]
-        ready = [(t.name, composer_of(t), message_class(t.type)) for t in topics]
-        self._outlets: list[tuple[str, Any, Any]] = [
-            (name, composer, qos.publisher(node, kind, name, qos.COMMAND)) for name, composer, kind in ready
+        topics = [topic for topic in topics_of(run.machine) if topic.direction != "sensor"]
+        ready = [(t, composer_of(t), message_class(t.type)) for t in topics]
+        self._outlets: list[tuple[RosTopic, Any, Any]] = [
+            (topic, composer, qos.publisher(node, kind, topic.name, qos.COMMAND)) for topic, composer, kind in ready
         ]
         self._contested = dict.fromkeys((t.name for t in topics), 0)
-        self._numbers = {name: forward.add(publisher) for name, _, publisher in self._outlets}
-        for name, composer, _ in self._outlets:
-            messages.add_actuators(self._numbers[name], composer)
+        self._numbers = {topic.name: forward.add(publisher) for topic, _, publisher in self._outlets}
+        for topic, composer, _ in self._outlets:
+            messages.add_channels(self._numbers[topic.name], topic.direction, composer)
+        directions = {topic.name: topic.direction for topic in topics}
         posed = [tf.Posed(t.name, t.type, t.frame, t.child_frame, sources_of(t)) for t in topics]
         transforms = tf.broadcasts(chosen, posed)
         self._tf = qos.publisher(node, message_class(tf.MESSAGE), tf.TOPIC, qos.TF) if transforms else None
-        for composer in transforms.values():
-            messages.add_actuators(forward.add(self._tf), composer)
+        for name, composer in transforms.items():
+            messages.add_channels(forward.add(self._tf), directions[name], composer)
 
     def make_safe(self, time_ns: int) -> None:
         """Publishes the safe values of a machine that something arms, stamped time_ns, and waits a moment for their
         receivers. For the end of ticking: no command follows."""
         if self._run.safe_address is None:
             return
-        for _, composer, publisher in self._outlets:
+        actuators = [(c, publisher) for topic, c, publisher in self._outlets if topic.direction == "actuator"]
+        for composer, publisher in actuators:
             data = composer.compose([self._run.safe_address], time_ns)
             if data is not None:
                 publisher.publish(data)
-        wait_for_receivers((publisher for _, _, publisher in self._outlets), _SAFE_WAIT_S)
+        wait_for_receivers((publisher for _, publisher in actuators), _SAFE_WAIT_S)
 
     def figures(self) -> dict[str, int]:
         return {}
 
     def troubles(self) -> dict[str, int]:
         """Numbers of messages that could not be composed, because a value does not fit its field; and how often
-        another node was found to publish the same actuator."""
-        for name, _, publisher in self._outlets:
-            self._contested[name] += self._node.count_publishers(publisher.topic_name) > 1
+        another node was found to publish the same topic."""
+        for topic, _, publisher in self._outlets:
+            self._contested[topic.name] += self._node.count_publishers(publisher.topic_name) > 1
         contested = {f"hal.{name} published by others": count for name, count in self._contested.items()}
         refused = {
-            f"hal.{name} does not fit": composer.refused + self._messages.refused(self._numbers[name])
-            for name, composer, _ in self._outlets
+            f"hal.{topic.name} does not fit": composer.refused + self._messages.refused(self._numbers[topic.name])
+            for topic, composer, _ in self._outlets
         }
         return refused | contested
 

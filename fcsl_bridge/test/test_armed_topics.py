@@ -98,6 +98,34 @@ def test_a_disarmed_machine_publishes_safe_values(
     run.close()
 
 
+def test_reports_are_published_armed_or_not(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    publishers: list[Publisher] = []
+
+    def publisher(*_: object) -> Publisher:
+        publishers.append(Publisher())
+        return publishers[-1]
+
+    monkeypatch.setattr(mapped_topics.qos, "publisher", publisher)
+    report = {**FORCE, "name": "other", "id": 2, "field": "pilot.outputs.other", "direction": "report"}
+    report["ros"] = {**FORCE["ros"], "topic": "estimate"}
+    run = opened(tmp_path, channels=[{**FORCE, "safe": -1.0}, report], arm="pilot.armed")
+    forward = Forward(lossless=False)
+    messages = RunTopics(run, forward.outbox)
+    outputs = mapped_topics.Outputs(None, run, forward, messages, ())  # type: ignore[arg-type]  # the node is for publishers only
+    fields = run.machine.fields
+    for on in (False, True, False):
+        run.set(fields["pilot.inputs.go"].index, 0, bytes([on]))
+        run.set(fields["pilot.outputs.other"].index, 0, struct.pack("<d", 7.0 + on))
+        run.step(1)
+        messages.put(0)
+        forward.all()
+    outputs.make_safe(0)
+    assert [p.values for p in publishers] == [[-1.0, 3.0, -1.0, -1.0], [7.0, 8.0, 7.0]]
+    messages.close()
+    forward.close()
+    run.close()
+
+
 @pytest.mark.parametrize(
     ("arm", "published"), [({"arm": "pilot.armed"}, [-1.0, -2.0]), ({}, [])], ids=["arm", "no arm"]
 )

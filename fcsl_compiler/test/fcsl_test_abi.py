@@ -67,7 +67,10 @@ class Channel(c.Structure):
         ("name", c.c_char_p),
         ("id", c.c_uint16),
         ("direction", c.c_uint8),
-        *[(n, c.c_uint32) for n in ("field", "max_age_ticks", "attached", "fresh", "valid", "age")],
+        *[
+            (n, c.c_uint32)
+            for n in ("field", "max_age_ticks", "grace_ticks", "attached", "fresh", "valid", "waiting", "age")
+        ],
         *[(n, c.c_uint32) for n in ("sample_age", "stamp")],
         *[(f"ros_{n}", c.c_char_p) for n in ("type", "field", "topic", "frame", "child_frame", "axes")],
         ("safe", c.c_void_p),

@@ -954,6 +954,12 @@ CONFIGS: dict[str, str] = {
     "E206 no channel": heard("channels.v.b.fresh"),
     "E206 channels alone": heard("channels"),
     "E215 of an actuator": heard("channels.force.valid"),
+    "E215 of a report": patch(
+        lambda c: c.update(
+            channels=[{"name": "y", "id": 1, "field": "two.outputs.y", "direction": "report"}],
+            connections=[{"from": "channels.y.valid", "to": "one.on"}],
+        )
+    ),
     "E214 of a channel and delayed": heard("channels.v.a.fresh", delayed=True, initial=False),
     "E217 an age is u32": heard("channels.v.a.age_ticks"),
     "E205 a direction, and nothing of its sources": heard("channels.v.a.fresh", direction="sensr"),
@@ -1040,10 +1046,22 @@ CONFIGS: dict[str, str] = {
             "ros": {"type": "geometry_msgs/Twist", "field": "angular"},
         },
     ),
+    "E241 an actuator and a report": channel(
+        {"field": "two.outputs.v", "direction": "actuator"}
+        | {"ros": {"type": "geometry_msgs/Pose", "field": "position", "topic": "t"}},
+        {"name": "b", "id": 2, "field": "one.outputs.v", "direction": "report"}
+        | {"ros": {"type": "geometry_msgs/Pose", "field": "position", "topic": "t"}},
+    ),
     "E206 what arms, misspelt": armed("oen.on_out"),
     "E206 what arms is the machine's": armed("machine.resumed"),
     "E208 what arms is no text": armed(True),
+    "E204 a grace below 0": channel({"start_grace_s": -0.5}),
+    "E208 a grace that is no time": channel({"start_grace_s": "3 s"}),
+    "E244 a grace between ticks": put("start_grace_s", value=0.0123),
     "E214 a sensor's safe value": channel({"safe": 0.0}),
+    "E214 a report's safe value": channel({"field": "one.outputs.y", "direction": "report", "safe": 0.0}),
+    "E214 a report's age": channel({"field": "one.outputs.y", "direction": "report", "max_age_ticks": 1}),
+    "E214 an actuator's grace": channel({"field": "one.outputs.y", "direction": "actuator", "start_grace_s": 1}),
     "E214 arm without actuators": put("arm", value="one.b"),
     "E214 a time-out and sensors alone": patch(
         lambda c: c.update(

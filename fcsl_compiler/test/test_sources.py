@@ -189,7 +189,7 @@ def test_what_a_sensor_offers(tmp_path: Path) -> None:
         m.step()
         seen.append(inputs(m, "valid", "age", "fresh", "also_fresh"))
     assert seen == [
-        [True, 1, False, False],
+        [False, 1, False, False],  # no sample has come yet
         [True, 0, True, False],
         [True, 1, False, False],
         [True, 2, False, False],

@@ -64,9 +64,11 @@ static inline size_t head_bytes(fcsl_message_kind_t kind)
     return EXTRA_AT + (size_t)extra[kind];
 }
 
+/* No message carries a report. */
 static inline int carries(fcsl_message_kind_t kind, const fcsl_channel_t *channel)
 {
-    return kind == (channel->direction == FCSL_SENSOR ? FCSL_SENSOR_MESSAGE : FCSL_ACTUATOR_MESSAGE);
+    return (kind == FCSL_SENSOR_MESSAGE && channel->direction == FCSL_SENSOR) ||
+           (kind == FCSL_ACTUATOR_MESSAGE && channel->direction == FCSL_ACTUATOR);
 }
 
 #endif /* FCSL_CODEC_LAYOUT_H */

@@ -6,8 +6,8 @@
  *   0      8   tick
  *   8      8   simulated time in ns; of a controller 0
  *   16     4   channel-table hash
- *   20     1   direction: 0 sensors, 1 actuators
- *   21     1   1: the actuators are armed; of sensors 0
+ *   20     1   direction: 0 sensors, 1 actuators, 2 reports
+ *   21     1   1: the actuators are armed; of others 0
  *   22     2   channels in the table
  *   24     n   a bit for each channel of the table, the first one the lowest of the first byte: it has a value
  */
@@ -50,7 +50,7 @@ static inline void commit_write(const commit_t *commit, const uint8_t *fresh, ui
 /* Returns 0, or -1 where the bytes are no commit of so many channels. */
 static inline int commit_read(const uint8_t *bytes, size_t size, uint32_t channels, commit_t *commit, uint8_t *fresh)
 {
-    if (size != commit_bytes(channels) || fcsl_get_u16(bytes + 22) != channels || bytes[20] > FCSL_ACTUATOR ||
+    if (size != commit_bytes(channels) || fcsl_get_u16(bytes + 22) != channels || bytes[20] > FCSL_REPORT ||
         bytes[21] > 1u) {
         return -1;
     }

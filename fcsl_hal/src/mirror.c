@@ -90,11 +90,21 @@ static int post_direction(fcsl_mirror_t *mirror, const commit_t *commit, const u
     int failed = 0;
     for (uint32_t i = 0; i < machine->channel_count && !failed; i++) {
         mirror->fresh[i] = machine->channels[i].direction == commit->direction &&
-                           (commit->direction == FCSL_ACTUATOR || is_sampled(mirror, i, data, commit->tick));
+                           (commit->direction != FCSL_SENSOR || is_sampled(mirror, i, data, commit->tick));
         failed = mirror->fresh[i] != 0u && post_value(mirror, i, data, time_ns) != 0;
     }
     commit_write(commit, mirror->fresh, mirror->value);
     return failed || fcsl_bus_post(mirror->bus, COMMIT, mirror->value, commit_bytes(commit->channels)) != 0;
+}
+
+static int has_reports(const fcsl_machine_t *machine)
+{
+    for (uint32_t i = 0; i < machine->channel_count; i++) {
+        if (machine->channels[i].direction == FCSL_REPORT) {
+            return 1;
+        }
+    }
+    return 0;
 }
 
 int fcsl_mirror_post(fcsl_mirror_t *mirror, const void *data, uint64_t tick, uint64_t time_ns)
@@ -111,7 +121,12 @@ int fcsl_mirror_post(fcsl_mirror_t *mirror, const void *data, uint64_t tick, uin
     commit.direction = FCSL_ACTUATOR;
     commit.time_ns = 0;
     commit.armed = fcsl_is_armed(machine, bytes);
-    failed = failed || post_direction(mirror, &commit, bytes, time_ns);
+    failed = failed || post_direction(mirror, &commit, bytes, time_ns) != 0;
+    if (!failed && has_reports(machine)) {
+        commit.direction = FCSL_REPORT;
+        commit.armed = 0;
+        failed = post_direction(mirror, &commit, bytes, time_ns) != 0;
+    }
     mirror->tick = tick;
     mirror->has_begun = !failed;
     return failed ? -1 : 0;
@@ -241,7 +256,7 @@ static fcsl_mirror_t *allocate(const fcsl_machine_t *machine, char *error, size_
 static uint32_t size_ring(fcsl_mirror_t *mirror, uint32_t write_bytes)
 {
     const fcsl_machine_t *machine = mirror->table.machine;
-    uint64_t tick_bytes = 2u * (commit_bytes(machine->channel_count) + ENTRY_BYTES_MAX);
+    uint64_t tick_bytes = 3u * (commit_bytes(machine->channel_count) + ENTRY_BYTES_MAX);
     for (uint32_t i = 0; i < machine->channel_count; i++) {
         tick_bytes += payload_bytes(machine, i) + ENTRY_BYTES_MAX;
     }

@@ -35,7 +35,7 @@ int fcsl_wire_runs_free(const char *address)
 
 static int comes_in(const named_wire_t *wire, const fcsl_channel_t *channel)
 {
-    return (channel->direction == FCSL_SENSOR) == (wire->peer.side == FCSL_WIRE_CONNECT);
+    return channel->direction == (wire->peer.side == FCSL_WIRE_CONNECT ? FCSL_SENSOR : FCSL_ACTUATOR);
 }
 
 static named_wire_t *allocate(const fcsl_channel_table_t *table, fcsl_wire_side_t side, char *error, size_t error_size)

@@ -63,8 +63,10 @@ static const fcsl_field_t FIELDS[] = {
      FCSL_SENSOR,                                                                                                      \
      field_,                                                                                                           \
      UINT32_MAX,                                                                                                       \
+     UINT32_MAX,                                                                                                       \
      FCSL_NO_OFFSET,                                                                                                   \
      (uint32_t)offsetof(data_t, fresh) + slot_,                                                                        \
+     FCSL_NO_OFFSET,                                                                                                   \
      FCSL_NO_OFFSET,                                                                                                   \
      FCSL_NO_OFFSET,                                                                                                   \
      (uint32_t)offsetof(data_t, sample_age) + 4u * slot_,                                                              \
@@ -78,6 +80,8 @@ static const fcsl_field_t FIELDS[] = {
      FCSL_ACTUATOR,                                                                                                    \
      field_,                                                                                                           \
      0,                                                                                                                \
+     0,                                                                                                                \
+     FCSL_NO_OFFSET,                                                                                                   \
      FCSL_NO_OFFSET,                                                                                                   \
      FCSL_NO_OFFSET,                                                                                                   \
      FCSL_NO_OFFSET,                                                                                                   \

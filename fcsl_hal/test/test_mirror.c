@@ -12,6 +12,7 @@ enum {
     ALTITUDE,
     PACKET,
     THROTTLE,
+    ARMED,
     CHANNELS,
     WRITES = CHANNELS + 1,
     WRITTEN,
@@ -48,6 +49,7 @@ static const fcsl_channel_t CHANNEL_TABLE[] = {
     {.name = "altitude", .id = 1, .field = 0, SENSOR},
     {.name = "gps.packet", .id = 2, .field = 1, .as = FCSL_AS_BLOB, SENSOR},
     {.name = "throttle", .id = 3, .field = 2, .direction = FCSL_ACTUATOR},
+    {.name = "armed", .id = 4, .field = 3, .direction = FCSL_REPORT},
 };
 static const fcsl_machine_t MACHINE = {.name = "craft",
                                        .tick_hz = 100,
@@ -73,6 +75,7 @@ static fcsl_bus_t *observe(const char *endpoint)
     const fcsl_bus_input_t inputs[] = {{.key = "north/craft/altitude", .bytes = 8, .least = 8, .depth = DEPTH},
                                        {.key = "north/craft/gps.packet", .bytes = 3, .depth = DEPTH},
                                        {.key = "north/craft/throttle", .bytes = 8, .least = 8, .depth = DEPTH},
+                                       {.key = "north/craft/armed", .bytes = 1, .least = 1, .depth = DEPTH},
                                        {.key = "north/craft/tick", .bytes = COMMIT_BYTES, .depth = DEPTH},
                                        {.key = "north/craft/@writes", .bytes = WRITE_BYTES, .depth = DEPTH},
                                        {.key = "north/craft/@written", .bytes = 16, .least = 16, .depth = DEPTH}};
@@ -103,6 +106,7 @@ static void expect_commit(fcsl_bus_t *bus, uint64_t tick, uint8_t direction, uin
     CHECK(commit[20] == direction && commit[21] == armed && commit[24] == bits);
 }
 
+/* And what is reported, armed or not, with a commit of its own. */
 static void expect_actuators(fcsl_bus_t *bus, uint64_t tick, uint8_t armed)
 {
     static const uint8_t values[] = {0, 0, 0, 0x3f, 0, 0, 0xc0, 0x7f}; /* 0.5, and a NaN whose sign is gone */
@@ -110,6 +114,10 @@ static void expect_actuators(fcsl_bus_t *bus, uint64_t tick, uint8_t armed)
     take_one(bus, THROTTLE, throttle, sizeof throttle);
     CHECK(memcmp(throttle, values, sizeof values) == 0);
     expect_commit(bus, tick, FCSL_ACTUATOR, armed, 1u << THROTTLE);
+    uint8_t reported = 2;
+    take_one(bus, ARMED, &reported, 1);
+    CHECK(reported == armed);
+    expect_commit(bus, tick, FCSL_REPORT, 0, 1u << ARMED);
 }
 
 static void expect_sensors(fcsl_bus_t *bus, uint64_t tick, const uint8_t *packet, size_t size)
@@ -145,7 +153,7 @@ static void meet(fcsl_mirror_t *mirror, fcsl_bus_t *bus)
     post(mirror, &data, LAST);
     do {
         take_one(bus, CHANNELS, bytes, COMMIT_BYTES);
-    } while (fcsl_get_u64(bytes) != LAST || bytes[20] != FCSL_ACTUATOR);
+    } while (fcsl_get_u64(bytes) != LAST || bytes[20] != FCSL_REPORT);
     for (uint32_t i = 0; i < KEYS; i++) {
         while (fcsl_bus_take(bus, i, bytes, &size)) {
         }

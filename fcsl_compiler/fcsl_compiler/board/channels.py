@@ -81,7 +81,7 @@ def _misfit(quantity: Quantity, channel: Channel) -> str:
     """Why the quantity cannot go to the channel; "" if it can."""
     element, count = element_of(channel.port.type), count_of(channel.port.type)
     if channel.direction != "sensor":
-        return "that is an actuator"
+        return f"that is {'an actuator' if channel.direction == 'actuator' else 'a report'}"
     if not isinstance(element, Scalar) or not element.is_float:
         return f"it is a floating-point number, and the channel is {channel.port.type}"
     if count != quantity.count and not (quantity == STICKS and count < quantity.count):

@@ -178,7 +178,7 @@ def _misfit(channel: Channel) -> str:
     """Why the channel cannot be an output; "" if it can."""
     element = element_of(channel.port.type)
     if channel.direction != "actuator":
-        return "it is a sensor's"
+        return f"it is a {channel.direction}'s"
     if not isinstance(element, Scalar) or not element.is_float:
         return f"only f64 and f32 have values between the ends of an output, and it is {channel.port.type}"
     if count_of(channel.port.type) > MAX_PULSES:

@@ -35,7 +35,7 @@ def read_arming(
 
 def read_safe(node: JsonNode, type_: Type, direction: str, reader: ConfigReader) -> Values | None:
     """The safe value of a channel whose field has this type."""
-    if direction == "sensor":
+    if direction != "actuator":
         why = "only an actuator has a value in which it is safe"
         reader.sink.error("E214", "`safe` is for actuators", node.span, why=why, help="remove it")
         return None
@@ -75,7 +75,7 @@ def _check_channels(what: str, at: Span, node: JsonNode | None, channels: list[C
     """Reports a machine without actuators, and all actuators without `safe`; of those that were read, with a value."""
     items = node.items if node is not None and node.kind == "array" else []
     directions = [direction.value if (direction := item.get("direction")) else None for item in items]
-    if all(direction == "sensor" for direction in directions) and (node is None or node.kind == "array"):
+    if all(direction in ("sensor", "report") for direction in directions) and (node is None or node.kind == "array"):
         message, fix = f"{what} in a machine without actuators", "remove it, or add a channel that is an actuator"
         sink.error("E214", message, at, why="there is nothing to keep safe", help=fix)
     spans = [i.span for i, d in zip(items, directions, strict=True) if d == "actuator" and i.get("safe") is None]

@@ -14,6 +14,7 @@ from ..parse.json_source import JsonNode
 from .arming import read_safe
 from .ports import PortResolver
 from .ros import check_channels
+from .times import read_ticks
 
 _NAME = re.compile(r"[a-z][a-z0-9_]*(\.[a-z][a-z0-9_]*)*")
 _ROS_TYPE = re.compile(r"[a-z][a-z0-9_]*/[A-Z][A-Za-z0-9]*")
@@ -26,6 +27,8 @@ AXES = ("enu", "ned", "flu", "frd", "enu/flu", "ned/frd", "ned/flu", "enu/frd")
 _MAX_AGE = 2**32 - 2
 #: Of the field of a channel: an entry counts its values in 16 bits (docs/wire.md), and hosts refuse a longer field.
 _MAX_BYTES = 2**16 - 1
+#: A sensor writes a field, an actuator reads one. A report reads one too, and nothing moves by it.
+DIRECTIONS = ("sensor", "actuator", "report")
 #: Values as they are, or a ROS 2 message of each channel.
 PAYLOADS = ("raw", "cdr")
 #: Ids from 0xFF00 on are reserved for entries of messages that are no channels (docs/wire.md).
@@ -33,15 +36,17 @@ MAX_ID = 0xFEFF
 
 
 def read_channels(
-    node: JsonNode | None, ports: PortResolver, connections: list[Connection], reader: ConfigReader
+    keys: dict[str, JsonNode], tick_hz: int, ports: PortResolver, connections: list[Connection], reader: ConfigReader
 ) -> list[Channel]:
     """Checked channels in JSON order. Names, ids and bound fields are unique."""
+    node = keys.get("channels")
+    of_machine = _grace(keys["start_grace_s"], tick_hz, reader) if "start_grace_s" in keys else None
     channels: list[Channel] = []
     names: dict[str, Span] = {}
     ids: dict[int, Span] = {}
     fields: dict[tuple[int, str, str], Span] = {}
     for item in reader.list(node, "`channels`"):
-        channel = _channel(item, ports, connections, reader)
+        channel = _channel(item, tick_hz, of_machine, ports, connections, reader)
         if channel is None:
             continue
         field = (channel.port.instance, channel.port.record, channel.port.path)
@@ -66,11 +71,21 @@ def read_payload(node: JsonNode | None, reader: ConfigReader) -> str:
     return (reader.choice(keys.get("payload"), "`payload`", PAYLOADS) if keys else None) or PAYLOADS[0]
 
 
+def _grace(node: JsonNode, tick_hz: int, reader: ConfigReader) -> int | None:
+    why = "a channel waits for a whole number of ticks"
+    return read_ticks(node, "start_grace_s", tick_hz, _MAX_AGE, why, reader, may_be_zero=True)
+
+
 def _channel(
-    item: JsonNode, ports: PortResolver, connections: list[Connection], reader: ConfigReader
+    item: JsonNode,
+    tick_hz: int,
+    machine_grace: int | None,
+    ports: PortResolver,
+    connections: list[Connection],
+    reader: ConfigReader,
 ) -> Channel | None:
     keys = reader.object(
-        item, "a channel", ("name", "id", "field", "direction"), ("max_age_ticks", "safe", "as", "ros")
+        item, "a channel", ("name", "id", "field", "direction"), ("max_age_ticks", "start_grace_s", "safe", "as", "ros")
     )
     if keys is None:
         return None
@@ -81,10 +96,14 @@ def _channel(
         )
         name = None
     number = reader.integer(keys.get("id"), "`id`", 0, MAX_ID)
-    direction = reader.choice(keys.get("direction"), "`direction`", ("sensor", "actuator"))
+    direction = reader.choice(keys.get("direction"), "`direction`", DIRECTIONS)
     age = reader.integer(keys.get("max_age_ticks"), "`max_age_ticks`", 0, _MAX_AGE)
-    if direction == "actuator" and "max_age_ticks" in keys:
-        reader.sink.error("E214", "`max_age_ticks` is for sensors", keys["max_age_ticks"].span, help="remove it")
+    for key in ("max_age_ticks", "start_grace_s"):
+        if direction in ("actuator", "report") and key in keys:
+            reader.sink.error("E214", f"`{key}` is for sensors", keys[key].span, help="remove it")
+    grace = machine_grace if machine_grace is not None else age
+    if direction == "sensor" and "start_grace_s" in keys:
+        grace = _grace(keys["start_grace_s"], tick_hz, reader)
     ros = read_ros(keys["ros"], default_topic(name or ""), reader) if "ros" in keys else NOT_MAPPED
     port = _bound(keys.get("field"), direction, ports, connections, reader)
     kind = _kind(keys, port, reader)
@@ -98,7 +117,7 @@ def _channel(
         reader.sink.error(
             "E250", message, keys["safe"].span, why=why, help="write a 0 first, for example, for no bytes"
         )
-    return Channel(name, number, port, direction, age, ros, item.span, safe or (), safe_span, kind)
+    return Channel(name, number, port, direction, age, grace, ros, item.span, safe or (), safe_span, kind)
 
 
 def _kind(keys: dict[str, JsonNode], port: PortRef | None, reader: ConfigReader) -> str | None:
@@ -172,14 +191,16 @@ def _bound(
     connections: list[Connection],
     reader: ConfigReader,
 ) -> PortRef | None:
-    """The port of a channel. A sensor writes an output of a source block or a host input; an actuator reads an
-    output."""
+    """The port of a channel. A sensor writes an output of a source block or a host input; an actuator and a report read
+    an output."""
     if node is None or direction is None:
         return None
-    if direction == "actuator":
-        port = ports.port(node, ("outputs",), "an actuator is an output")
-    else:
+    if direction == "sensor":
         port = ports.port(node, ("outputs", "inputs"), "a sensor is an output or an input")
+    else:
+        port = ports.port(
+            node, ("outputs",), f"{'an actuator' if direction == 'actuator' else 'a report'} is an output"
+        )
     if port is not None and not isinstance(element_of(port.type), Scalar):
         fix = f"name a member: `{node.value}.…`"
         reader.sink.error("E217", "a channel carries a scalar or an array, not a struct", node.span, help=fix)
@@ -198,7 +219,7 @@ def _bound(
             help="use several channels",
         )
         return None
-    if port is None or direction == "actuator":
+    if port is None or direction != "sensor":
         return port
     if port.record == "inputs":
         connection = next(

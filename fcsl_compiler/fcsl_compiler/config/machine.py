@@ -51,7 +51,7 @@ def check_machine(parsed: ParsedMachine, sink: DiagnosticSink) -> Machine | None
     _warn_unused(parsed, algorithms, instances, incomplete, sink)
     ports = PortResolver(instances, incomplete, SourceResolver(keys.get("channels"), sink), sink)
     connections = _read_connections(keys.get("connections"), ports, reader)
-    channels = read_channels(keys.get("channels"), ports, connections, reader)
+    channels = read_channels(keys, tick_hz, ports, connections, reader)
     payload = read_payload(keys.get("bus"), reader)
     arm, command_timeout_ns = read_arming(keys, tick_hz, ports, channels, reader)
     instances = _with_initial_inputs(keys.get("instances"), instances, connections, reader)

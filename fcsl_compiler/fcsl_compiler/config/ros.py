@@ -24,8 +24,8 @@ _UNITS = {"Nm": "N*m", "m/s2": "m/s^2", "m/s/s": "m/s^2", "rad/s2": "rad/s^2", "
 
 @dataclass(frozen=True)
 class Mapped:
-    """A value that a message carries: its name in errors, its direction ("sensor": read from the message, "actuator":
-    written to it), its mapping in the JSON, its type and unit, and its safe value, if it has one."""
+    """A value that a message carries: its name in errors, its direction ("sensor": read from the message, "actuator",
+    "report": written to it), its mapping in the JSON, its type and unit, and its safe value, if it has one."""
 
     name: str
     direction: str
@@ -174,7 +174,7 @@ def _converts(ros: str, scalar: Scalar, direction: str) -> bool:
     if scalar is REQUEST:
         return False
     if ros.startswith("float"):
-        return scalar.is_float or (scalar.is_integer and direction == "actuator")
+        return scalar.is_float or (scalar.is_integer and direction != "sensor")
     return not scalar.is_float or (ros != "bool" and direction == "sensor")
 
 
@@ -236,7 +236,10 @@ def _check_topic(found: list[tuple[Mapped, Selection]], sink: DiagnosticSink) ->
     filled: dict[tuple[str, int | str], Mapped] = {}
     for value, selection in found:
         if value.direction != first.direction:
-            text = f"topic `{value.ros.topic}` is both received and sent by this machine"
+            both = "is both received and sent by this machine"
+            if "sensor" not in (value.direction, first.direction):
+                both = "has an actuator, which is safe while the machine is disarmed, and a report, which stays"
+            text = f"topic `{value.ros.topic}` {both}"
             _report(text, value, "topic", "give one of them another `topic`", first, sink)
             continue
         for key in ("type", "frame", "child_frame"):

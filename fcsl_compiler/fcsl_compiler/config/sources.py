@@ -58,9 +58,10 @@ class SourceResolver:
 
     def _of_known(self, channel: str, name: str, node: JsonNode) -> PortRef | None:
         direction = self._directions[channel]
-        if direction == "actuator":
-            message = f"channel `{channel}` is an actuator: it has no samples"
-            fix = f"only a sensor has `{name}`; connect from the output that the actuator sends"
+        if direction in ("actuator", "report"):
+            what = "an actuator" if direction == "actuator" else "a report"
+            message = f"channel `{channel}` is {what}: it has no samples"
+            fix = f"only a sensor has `{name}`; connect from the output that the channel sends"
             self.sink.error("E215", message, node.span, help=fix)
         if direction != "sensor":
             return None

@@ -3,15 +3,14 @@
 
 from __future__ import annotations
 
-from fractions import Fraction
-
 from ..base.diagnostics import nearest
 from ..base.source import Span
-from ..model.machine import Edge, Instance, nearest_seconds
+from ..model.machine import Edge, Instance
 from ..model.types import HEALTH_NAMES
 from ..parse.json_reader import ConfigReader, is_name
 from ..parse.json_source import JsonNode
 from .states import MAX_TICKS
+from .times import read_ticks
 
 
 def read_transitions(
@@ -126,7 +125,9 @@ def _edge(
         guard_instance, guard_mask = guard
     after_ticks = 0
     if "after_s" in keys:
-        time = _after(keys["after_s"], tick_hz, reader)
+        time = read_ticks(
+            keys["after_s"], "after_s", tick_hz, MAX_TICKS, "a state lasts a whole number of ticks", reader
+        )
         if time is None:
             return []
         after_ticks = time
@@ -141,28 +142,6 @@ def _edge(
         Edge(source, target, request, priority or 0, guard_instance, guard_mask, after_ticks, item.span)
         for source in _sources(keys["from"], states, target, reader)
     ]
-
-
-def _after(node: JsonNode, tick_hz: int, reader: ConfigReader) -> int | None:
-    """Number of ticks of a time in s, computed exactly from its decimal text."""
-    if not node.is_number:
-        reader.wrong(node, "`after_s` is a number", "a time in s, such as 5.0")
-        return None
-    if not tick_hz:  # reported earlier
-        return None
-    highest = Fraction(MAX_TICKS, tick_hz)
-    assert isinstance(node.value, int | float)
-    if not 0 < node.value or Fraction(node.text) > highest:
-        fix = f"it is positive and at most {int(highest)} s, {MAX_TICKS} ticks"
-        reader.sink.error("E204", f"`after_s` is {node.text}", node.span, help=fix)
-        return None
-    ticks = Fraction(node.text) * tick_hz
-    if ticks.denominator == 1:
-        return ticks.numerator
-    fix = f"write {' or '.join(nearest_seconds(ticks, tick_hz))}"
-    message = f"{node.text} s is not a whole number of ticks at {tick_hz} Hz"
-    reader.sink.error("E244", message, node.span, why="a state lasts a whole number of ticks", help=fix)
-    return None
 
 
 def _sources(node: JsonNode, states: list[str], target: int, reader: ConfigReader) -> list[int]:

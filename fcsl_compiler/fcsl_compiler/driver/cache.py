@@ -160,14 +160,10 @@ def build_shared(sources: Sequence[Path], include: Sequence[Path], exports: Sequ
         read = c_inputs(sources, includes, sources[0].parent)
         rules = Path(__file__).with_name("symbols.py").read_bytes()
         stamp = _stamp(str(math_library()))
-        return digest(
-            toolchain(language), *language.checks, stamp, rules, *exports, *read.digest_parts, read.probed
-        )
+        return digest(toolchain(language), *language.checks, stamp, rules, *exports, *read.digest_parts, read.probed)
 
     def build(library: Path) -> dict[str, str]:
-        link_shared(
-            list(sources), includes, library, _check_model, language.checks, language=language, exports=exports
-        )
+        link_shared(list(sources), includes, library, _check_model, language.checks, language=language, exports=exports)
         return {}
 
     try:

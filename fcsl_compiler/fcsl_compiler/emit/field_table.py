@@ -163,6 +163,7 @@ def _channel_rows(machine: Machine, channel: Channel) -> list[FieldRow]:
         FieldRow(f"{path}.{name}", "CHANNEL", abi_type, (), (), 1, f"{member}.{name}", c_type, index, unit, doc)
         for name, abi_type, c_type, unit, doc in (
             ("valid", "FCSL_BOOL", "uint8_t", "", "young enough"),
+            ("waiting", "FCSL_BOOL", "uint8_t", "", "no sample has come yet"),
             ("age_ticks", "FCSL_U32", "uint32_t", "", "since a sample"),
             ("stamp_ns", "FCSL_I64", "int64_t", "ns", "the last sample's own time; 0 when it has none"),
             *([last_sample] if channel.name in machine.last_samples else []),

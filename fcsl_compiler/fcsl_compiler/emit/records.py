@@ -78,6 +78,7 @@ def _channel(with_last_sample: bool) -> Iterator[Field]:
     yield Field("sample_age", U32)
     yield Field("attached", U8)
     yield Field("fresh", U8)
+    yield Field("waiting", U8)
     yield Field("valid", U8)
 
 

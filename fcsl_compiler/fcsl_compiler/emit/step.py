@@ -72,7 +72,8 @@ class StepEmitter:
         for connection in m.connections:
             if connection.delayed:
                 body += store(m, port_place(m, connection.target), connection.target.type, connection.initial)
-        body += [Set(channel_place(channel, "valid"), Literal(1, code.U8)) for channel in sensors(m)]
+        for channel in sensors(m):
+            body += [Set(channel_place(channel, member), Literal(1, code.U8)) for member in ("valid", "waiting")]
         for index, instance in enumerate(m.instances):
             body += self._start(index, instance)
         body.append(code.Return(Literal(0, I32)))
@@ -148,26 +149,27 @@ class StepEmitter:
         return [Set(TICKS_IN_STATE, Literal(0, U64))] if self.m.counts_state_ticks else []
 
     def _age(self, channel: Channel) -> Statement:
-        """Updates a sensor channel. A sample sets its age; without one the age increases. The channel is valid up to
-        its maximum age."""
+        """Updates a sensor channel. A sample sets its age; without one the age increases. From its first sample on, the
+        channel is valid up to its maximum age."""
 
         def own(member: str) -> Member:
             return channel_place(channel, member)
 
-        young = None
+        tests: list[code.Expr] = []
         if channel.max_age_ticks is not None:
-            young = code.Convert(code.U8, Binary("<=", own("age_ticks"), Literal(channel.max_age_ticks, U32)))
+            tests.append(Binary("<=", own("age_ticks"), Literal(channel.max_age_ticks, U32)))
+        young = code.Convert(code.U8, tests[0]) if tests else Literal(1, code.U8)
+        tests.append(Binary("==", own("waiting"), Literal(0, code.U8)))
+        heard = code.And(tuple(tests)) if len(tests) > 1 else tests[0]
         sampled: list[Statement] = [Set(own("fresh"), Literal(0, code.U8)), Set(own("age_ticks"), own("sample_age"))]
         if channel.name in self.m.last_samples:
             sampled.append(Set(own("last_sample"), Binary("+", TICK, ONE)))
-        sampled.append(Set(own("valid"), young or Literal(1, code.U8)))
-        older: list[Statement] = [Update(own("age_ticks"), "+", Literal(1, U32))]
-        if young is not None:
-            older.append(Set(own("valid"), young))
+        sampled += [Set(own("waiting"), Literal(0, code.U8)), Set(own("valid"), young)]
+        older = (Update(own("age_ticks"), "+", Literal(1, U32)), Set(own("valid"), code.Convert(code.U8, heard)))
         is_attached = Binary("!=", own("attached"), Literal(0, code.U8))
         can_age = code.And((is_attached, Binary("<", own("age_ticks"), _GREATEST_AGE)))
         is_fresh = Binary("!=", own("fresh"), Literal(0, code.U8))
-        return If(is_fresh, tuple(sampled), (If(can_age, tuple(older)),))
+        return If(is_fresh, tuple(sampled), (If(can_age, older),))
 
     def _force_state(self) -> Function:
         m, state = self.m, Name("entered")

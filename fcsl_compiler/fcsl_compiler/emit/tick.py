@@ -299,8 +299,25 @@ class TickEmitter:
         invalid = self.guards.get(entry.instance)
         if invalid:
             tests = [Binary("==", channel_place(c, "valid"), Literal(0, code.U8)) for c in invalid]
-            body.append(If(one_of(tests), (Set(health_of(instance), health(2)),)))
+            body.append(If(one_of(tests), self._invalid(instance, invalid)))
         return body
+
+    @staticmethod
+    def _invalid(instance: Instance, channels: list[Channel]) -> tuple[Statement, ...]:
+        """The health of an instance of which a channel is invalid: failed, or at least degraded while all that are
+        invalid may still wait for their first sample."""
+        failed = Set(health_of(instance), health(2))
+        gone: list[code.Expr] = []
+        for channel in channels:
+            may_wait: list[code.Expr] = [Binary("!=", channel_place(channel, "waiting"), Literal(0, code.U8))]
+            if channel.grace_ticks is not None:
+                age = channel_place(channel, "age_ticks")
+                may_wait.append(Binary("<=", age, Literal(channel.grace_ticks, U32)))
+            waits = code.And(tuple(may_wait)) if len(may_wait) > 1 else may_wait[0]
+            invalid = Binary("==", channel_place(channel, "valid"), Literal(0, code.U8))
+            gone.append(code.And((invalid, code.Not(waits))))
+        is_nominal = Binary("==", health_of(instance), health(0))
+        return (If(one_of(gone), (failed,), (If(is_nominal, (Set(health_of(instance), health(1)),)),)),)
 
     def _completed(self, index: int, execute: Statement) -> Statement:
         """An execute, after which what needs it is stored, unless it faulted, by itself, injected or substituted."""

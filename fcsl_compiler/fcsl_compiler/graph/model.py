@@ -120,7 +120,7 @@ def dataflow(m: Machine, state: State | None = None) -> Picture:
         picture.wires.append(Wire(place[c.source.instance], at, place[c.target.instance], to, c.delayed))
     for channel in m.channels:
         key = (channel.port.instance, channel.port.path)
-        if channel.direction == "actuator" and key in outputs:
+        if channel.direction != "sensor" and key in outputs:
             picture.boxes.append(Box(channel.name, "channel", rows=[Row(left=_channel(channel))]))
             picture.wires.append(Wire(place[key[0]], outputs[key], len(picture.boxes) - 1, 0))
     return picture

@@ -150,8 +150,9 @@ class Channel:
     name: str
     id: int
     port: PortRef
-    direction: str  # sensor, actuator
+    direction: str  # sensor, actuator, report
     max_age_ticks: int | None
+    grace_ticks: int | None  # for how long an attached sensor may wait for its first sample; None: for ever
     ros: RosMapping
     span: Span
     safe: Values = ()  # of an actuator; () if not declared

@@ -46,6 +46,7 @@ _OPTIONAL = (
         "bus",
         "arm",
         "command_timeout_s",
+        "start_grace_s",
         "targets",
         "views",
     ),

@@ -174,8 +174,10 @@ class _Sensor:
 
     def __init__(self, channel: Channel, layout: Layout):
         path = f"channels.{channel.name}"
-        self.instance, self.limit = channel.port.instance, channel.max_age_ticks
-        self.attached, self.fresh, self.valid = (layout[f"{path}.{name}"] for name in ("attached", "fresh", "valid"))
+        self.instance, self.limit, self.grace = channel.port.instance, channel.max_age_ticks, channel.grace_ticks
+        self.attached, self.fresh, self.valid, self.waiting = (
+            layout[f"{path}.{name}"] for name in ("attached", "fresh", "valid", "waiting")
+        )
         self.age, self.sample_age = (_cell(f"{path}.{name}", layout, 4) for name in ("age_ticks", "sample_age"))
         self.last_sample = _optional(f"{path}.last_sample", layout)
 
@@ -184,7 +186,7 @@ class _Sensor:
         if image.bytes[self.fresh]:
             image.bytes[self.fresh] = 0
             age = image.naturals[self.sample_age]
-            image.bytes[self.valid] = 1
+            image.bytes[self.waiting] = 0
             if self.last_sample is not None:
                 image.longs[self.last_sample] = tick + 1
         elif image.bytes[self.attached] and age < 2**32 - 1:
@@ -192,8 +194,14 @@ class _Sensor:
         else:
             return
         image.naturals[self.age] = age
-        if self.limit is not None:
-            image.bytes[self.valid] = age <= self.limit
+        image.bytes[self.valid] = not image.bytes[self.waiting] and (self.limit is None or age <= self.limit)
+
+    def health(self, image: Image) -> int:
+        """The best health of its instance."""
+        if image.bytes[self.valid]:
+            return _NOMINAL
+        may_wait = image.bytes[self.waiting] and (self.grace is None or image.naturals[self.age] <= self.grace)
+        return _DEGRADED if may_wait else _FAILED
 
 
 class _State:
@@ -403,7 +411,7 @@ class ReferenceMachine:
         for instance in self._instances:
             instance.init(image)
         for sensor in self._sensors.values():
-            image.bytes[sensor.valid] = 1
+            image.bytes[sensor.valid] = image.bytes[sensor.waiting] = 1
         for index, instance in enumerate(self._instances):
             if not instance.start(image):
                 return index + 1
@@ -478,8 +486,7 @@ class ReferenceMachine:
         if instance.limit_ns:
             self._judge_time(image, instance)
         for sensor in self._sensors_of[index]:
-            if not image.bytes[sensor.valid]:
-                image.words[instance.health] = _FAILED
+            image.words[instance.health] = max(image.words[instance.health], sensor.health(image))
 
     @staticmethod
     def _note_completed(image: Image, instance: _Instance, tick: int) -> None:

@@ -265,6 +265,9 @@ DEFAULTS: dict[str, tuple[Default, ...]] = {
         Default(f"{group}_covariance[0]", -1.0, absent=group)
         for group in ("orientation", "angular_velocity", "linear_acceleration")
     ),
+    # No receiver may take an unknown covariance for a perfect estimate.
+    "geometry_msgs/msg/PoseWithCovariance": (Default("covariance[0]", -1.0, absent="covariance"),),
+    "geometry_msgs/msg/TwistWithCovariance": (Default("covariance[0]", -1.0, absent="covariance"),),
     "sensor_msgs/msg/MagneticField": tuple(Default(f"magnetic_field.{axis}", math.nan) for axis in "xyz"),
     "sensor_msgs/msg/NavSatStatus": (Default("status", -2.0),),
     "sensor_msgs/msg/NavSatFix": (

@@ -61,7 +61,7 @@ typedef enum {
     FCSL_ROLE_PARAMETER = 3, /* <instance>.parameters.<field> */
     FCSL_ROLE_STATE = 4,     /* <instance>.state.<field> */
     FCSL_ROLE_COUNTER = 5,   /* <instance>.counters.faults|overruns|fault_place|last_run|completed */
-    FCSL_ROLE_CHANNEL = 6    /* channels.<channel>.valid|age_ticks|stamp_ns|last_sample */
+    FCSL_ROLE_CHANNEL = 6    /* channels.<channel>.valid|waiting|age_ticks|stamp_ns|last_sample */
 } fcsl_role_t;
 
 enum {
@@ -140,7 +140,11 @@ typedef struct {
     uint32_t guard_mask; /* bit h set: true while the health of that instance is h */
 } fcsl_transition_t;
 
-typedef enum { FCSL_SENSOR = 0, FCSL_ACTUATOR = 1 } fcsl_direction_t;
+typedef enum {
+    FCSL_SENSOR = 0, /* writes its field */
+    FCSL_ACTUATOR = 1, /* reads its field; what it gets is safe while the machine is disarmed */
+    FCSL_REPORT = 2 /* reads its field; nothing moves by it, so that it is the same armed or not */
+} fcsl_direction_t;
 
 /* What a channel says of its field beyond the field's type. */
 typedef enum {
@@ -155,16 +159,21 @@ typedef struct {
     uint8_t direction; /* fcsl_direction_t */
     uint32_t field; /* index into fields */
     uint32_t max_age_ticks; /* sensors: older is invalid; UINT32_MAX: never */
+    uint32_t grace_ticks; /* sensors: waiting for the first sample for longer is a failure; UINT32_MAX: never */
     /* Sensors only (else FCSL_NO_OFFSET). One byte each unless a type is given:
      * attached   1 if a HAL serves this channel; age and validity are updated only then (a twin leaves it 0)
      * fresh      set to 1 by a host that has written the field for the coming tick; cleared by step
-     * valid      1 while age_ticks <= max_age_ticks; an invalid channel makes the health of its field's instance failed
+     * valid      1 while age_ticks <= max_age_ticks, and until a HAL serves the channel. It is 0 while an attached channel
+     *            waits. An invalid channel makes the health of its field's instance failed; one that waits for at most
+     *            grace_ticks makes it at least degraded
+     * waiting    1 until the first sample is taken
      * age_ticks  uint32_t: ticks since the last sample was taken
      * sample_age uint32_t: age of the fresh sample in ticks; the host writes it whenever it sets `fresh`
      * stamp_ns   int64_t: time of the sample (stamp of a ROS header), 0 without one; written together with `fresh` */
     uint32_t attached_offset;
     uint32_t fresh_offset;
     uint32_t valid_offset;
+    uint32_t waiting_offset;
     uint32_t age_offset;
     uint32_t sample_age_offset;
     uint32_t stamp_offset;

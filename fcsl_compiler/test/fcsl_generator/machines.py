@@ -214,7 +214,7 @@ class _Maker:
                 words = c.some(HEALTH_NAMES, 40) or [c.pick(HEALTH_NAMES)]
                 edge["health"] = {"instance": c.pick(names), "in": words}
             if "time" in kind:
-                edge["after_s"] = c.between(1, 4) * (3 if hz % 3 == 0 else 1) / hz  # finite decimal
+                edge["after_s"] = self._seconds(c.between(1, 4))
             edges.append(edge)
         return edges
 
@@ -237,8 +237,15 @@ class _Maker:
                     channel = {"name": f"c.n{at}", "id": at, "field": path, "direction": direction}
                     if direction == "sensor" and c.chance(70):
                         channel["max_age_ticks"] = c.upto(2)
+                    if direction == "sensor" and c.chance(30):
+                        channel["start_grace_s"] = self._seconds(c.upto(3))
                     found.append(channel)
         return found
+
+    def _seconds(self, ticks: int) -> float:
+        """A time with a finite decimal text, of at least so many ticks."""
+        hz = self.config["tick_hz"]
+        return ticks * (3 if hz % 3 == 0 else 1) / hz
 
     def _connect_channels(self, names: list[str]) -> None:
         """Connects some inputs without connection and channel to values of sensor channels."""

@@ -220,8 +220,16 @@ class OracleMachine:
             self.counters[name]["overruns"] += 1
             outputs["health"] = _worse(outputs["health"], "degraded")
         fields = (c for c in self.channels.values() if c["field"].split(".")[0] == name)
-        if any(not c["valid"] for c in fields):
-            outputs["health"] = "failed"
+        for channel in (c for c in fields if not c["valid"]):
+            outputs["health"] = _worse(outputs["health"], "degraded" if self._may_wait(channel) else "failed")
+
+    def _may_wait(self, channel: dict[str, Any]) -> bool:
+        """Whether its first sample may still come."""
+        grace = channel.get("start_grace_s", self.config.get("start_grace_s"))
+        most = channel.get("max_age_ticks", 1 << 32)
+        if grace is not None:
+            most = Fraction(str(grace)) * self.config["tick_hz"]
+        return "came" not in channel and channel["age"] <= most
 
     def _age(self, channel: dict[str, Any]) -> None:
         if channel["fresh"]:
@@ -230,7 +238,7 @@ class OracleMachine:
             channel["age"] = min(channel["age"] + 1, 2**32 - 1)
         else:
             return
-        channel["valid"] = channel["age"] <= channel.get("max_age_ticks", 1 << 32)
+        channel["valid"] = "came" in channel and channel["age"] <= channel.get("max_age_ticks", 1 << 32)
 
     def _arbitrate(self, ran: list[str]) -> None:
         edges = sorted(self.config.get("transitions", []), key=lambda e: -e["priority"])
@@ -306,6 +314,7 @@ class OracleMachine:
                 found[f"{name}.counters.{counter}"] = [count]
         for name, channel in self.channels.items():
             found[f"channels.{name}.valid"] = [channel["valid"]]
+            found[f"channels.{name}.waiting"] = ["came" not in channel]
             found[f"channels.{name}.age_ticks"] = [channel["age"]]
             found[f"channels.{name}.stamp_ns"] = [channel["stamp"]]
         return found

@@ -30,6 +30,7 @@ static const fcsl_channel_t CHANNELS[] = {
      .attached_offset = FCSL_NO_OFFSET,
      .fresh_offset = offsetof(data_t, fresh),
      .valid_offset = FCSL_NO_OFFSET,
+     .waiting_offset = FCSL_NO_OFFSET,
      .age_offset = FCSL_NO_OFFSET,
      .sample_age_offset = offsetof(data_t, sample_age),
      .stamp_offset = offsetof(data_t, stamp_ns)},

@@ -49,11 +49,12 @@ static void put_channel(json_out_t *out, const fcsl_machine_t *machine, uint32_t
     const fcsl_channel_t *channel = &machine->channels[number];
     const fcsl_field_t *field = &machine->fields[channel->field];
     static const char *const types[] = {"bool", "i32", "i64", "u32", "u64", "f32", "f64"};
+    static const char *const directions[] = {"sensor", "actuator", "report"};
     static const char *const as[] = {"field", "quaternion", "blob"};
     fcsl_json_raw(out, "{\"name\":");
     fcsl_json_quoted(out, channel->name);
     fcsl_json_raw(out, ",\"id\":%u,\"direction\":\"%s\"", channel->id,
-                  channel->direction == FCSL_SENSOR ? "sensor" : "actuator");
+                  directions[channel->direction <= FCSL_REPORT ? channel->direction : FCSL_SENSOR]);
     fcsl_json_raw(out, ",\"type\":\"%s\"", types[field->type <= FCSL_F64 ? field->type : FCSL_I32]);
     put_shape(out, channel, field);
     fcsl_json_raw(out, ",\"as\":\"%s\"", as[channel->as <= FCSL_AS_BLOB ? channel->as : FCSL_AS_FIELD]);

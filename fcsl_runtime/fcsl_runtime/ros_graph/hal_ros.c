@@ -58,7 +58,7 @@ static const fcsl_field_t FIELDS[] = {
     REFUSED("future", FCSL_ROS_FUTURE, "messages stamped more than 50 ms ahead of now"),
     REFUSED("older", FCSL_ROS_OLDER, "messages stamped before the last one"),
     REFUSED("repeated", FCSL_ROS_REPEATED, "messages stamped as the last one"),
-    COUNTER(commands, "actuator messages that were put on the bus"),
+    COUNTER(commands, "messages of actuators and reports that were put on the bus"),
     COUNTER(commands_refused, "actuator messages not made: a value does not fit its field"),
     COUNTER(commands_dropped, "actuator messages without room on the bus"),
 };
@@ -71,7 +71,8 @@ typedef struct {
 typedef struct {
     fcsl_ros_composer_t *composer;
     uint32_t size;
-} actuator_t;
+    uint8_t direction; /* FCSL_ACTUATOR, FCSL_REPORT */
+} output_t;
 
 typedef struct {
     fcsl_hal_t base; /* the stub: its clock and its log */
@@ -81,8 +82,8 @@ typedef struct {
     fcsl_bus_t *bus;
     sensor_t *sensors; /* the bus's inputs */
     uint32_t sensor_count;
-    actuator_t *actuators; /* its outputs */
-    uint32_t actuator_count;
+    output_t *outputs; /* its outputs, actuators and reports */
+    uint32_t output_count;
     uint8_t *message;
     int64_t now_ns; /* ROS time of the tick */
     counters_t counters;
@@ -114,15 +115,18 @@ static fcsl_hal_status_t ros_sample(void *ctx, uint64_t tick, uint8_t *bytes, si
     return FCSL_HAL_NONE;
 }
 
-/* Commands from this struct of the machine. */
-static void post(hal_t *hal, const uint8_t *memory)
+/* The messages of outputs of one direction, from this struct of the machine. */
+static void post(hal_t *hal, uint8_t direction, const uint8_t *memory)
 {
-    for (uint32_t i = 0; i < hal->actuator_count; i++) {
-        const actuator_t *actuator = &hal->actuators[i];
-        if (fcsl_ros_compose(actuator->composer, &memory, hal->now_ns, hal->message) != FCSL_ROS_TAKEN) {
+    for (uint32_t i = 0; i < hal->output_count; i++) {
+        const output_t *output = &hal->outputs[i];
+        if (output->direction != direction) {
+            continue;
+        }
+        if (fcsl_ros_compose(output->composer, &memory, hal->now_ns, hal->message) != FCSL_ROS_TAKEN) {
             hal->counters.commands_refused++;
         } else if (fcsl_bus_matched(hal->bus, i)) {
-            const int dropped = fcsl_bus_post(hal->bus, i, hal->message, actuator->size) != 0;
+            const int dropped = fcsl_bus_post(hal->bus, i, hal->message, output->size) != 0;
             hal->counters.commands += dropped ? 0u : 1u;
             hal->counters.commands_dropped += dropped ? 1u : 0u;
         }
@@ -133,7 +137,8 @@ static fcsl_hal_status_t ros_command(void *ctx, const fcsl_message_t *message)
 {
     hal_t *hal = ctx;
     (void)message; /* the same values, in another form */
-    post(hal, fcsl_run_actuator_data(hal->run));
+    post(hal, FCSL_ACTUATOR, fcsl_run_actuator_data(hal->run));
+    post(hal, FCSL_REPORT, fcsl_run_data(hal->run));
     return FCSL_HAL_OK;
 }
 
@@ -143,7 +148,7 @@ static fcsl_hal_status_t ros_arm(void *ctx, int armed)
     hal_t *hal = ctx;
     const uint8_t *safe = fcsl_run_safe_data(hal->run);
     if (!armed && safe != NULL) {
-        post(hal, safe);
+        post(hal, FCSL_ACTUATOR, safe);
     }
     return FCSL_HAL_OK;
 }
@@ -217,19 +222,19 @@ static void ros_close(void *ctx)
         fcsl_ros_inlet_free(hal->sensors[i].inlet);
         fcsl_ros_reader_free(hal->sensors[i].reader);
     }
-    for (uint32_t i = 0; i < hal->actuator_count; i++) {
-        fcsl_ros_composer_free(hal->actuators[i].composer);
+    for (uint32_t i = 0; i < hal->output_count; i++) {
+        fcsl_ros_composer_free(hal->outputs[i].composer);
     }
     if (hal->base.close != NULL) {
         hal->base.close(hal->base.ctx);
     }
     free(hal->sensors);
-    free(hal->actuators);
+    free(hal->outputs);
     free(hal->message);
     free(hal);
 }
 
-/* Keys and tokens of all topics, those of sensors before those of actuators. */
+/* Keys and tokens of all topics, those of sensors before those of outputs. */
 typedef struct {
     char key[FCSL_BUS_KEY_MAX + 1];
     char token[FCSL_BUS_TOKEN_MAX + 1];
@@ -238,7 +243,7 @@ typedef struct {
 static int name_topics(const hal_t *hal, names_t *names, fcsl_error_t *error)
 {
     const fcsl_machine_t *machine = fcsl_run_machine(hal->run);
-    uint32_t places[] = {[FCSL_SENSOR] = 0, [FCSL_ACTUATOR] = hal->sensor_count};
+    uint32_t places[] = {hal->sensor_count, 0};
     for (uint32_t i = 0; i < machine->ros_message_count; i++) {
         const fcsl_ros_message_t *message = &machine->ros_messages[i];
         const int is_sensor = message->direction == FCSL_SENSOR;
@@ -247,7 +252,7 @@ static int name_topics(const hal_t *hal, names_t *names, fcsl_error_t *error)
                                        .hash = ros_type_hash(message->type),
                                        .reliable = !is_sensor,
                                        .depth = DEPTH};
-        names_t *at = &names[places[message->direction]++];
+        names_t *at = &names[places[is_sensor]++];
         if (quality.hash == NULL) {
             return fcsl_fail(error, "topic %.100s: there is no type hash of %.200s", message->topic, message->type);
         }
@@ -262,7 +267,7 @@ static int name_topics(const hal_t *hal, names_t *names, fcsl_error_t *error)
 static int open_session(hal_t *hal, const names_t *names, const char **texts, fcsl_bus_input_t *inputs, char *error,
                         size_t error_size)
 {
-    const uint32_t count = hal->sensor_count + hal->actuator_count;
+    const uint32_t count = hal->sensor_count + hal->output_count;
     uint32_t tick_bytes = RING_BYTES_MIN / TICKS_POSTED;
     for (uint32_t i = 0; i < count; i++) {
         texts[i] = names[i].key;
@@ -271,14 +276,14 @@ static int open_session(hal_t *hal, const names_t *names, const char **texts, fc
     for (uint32_t i = 0; i < hal->sensor_count; i++) {
         inputs[i] = (fcsl_bus_input_t){.key = names[i].key, .bytes = MESSAGE_BYTES, .depth = 1};
     }
-    for (uint32_t i = 0; i < hal->actuator_count; i++) {
-        tick_bytes += hal->actuators[i].size + ENTRY_BYTES_MAX;
+    for (uint32_t i = 0; i < hal->output_count; i++) {
+        tick_bytes += hal->outputs[i].size + ENTRY_BYTES_MAX;
     }
     const fcsl_bus_options_t options = {.role = FCSL_BUS_LISTEN,
                                         .endpoint = hal->endpoint,
                                         .ring_bytes = TICKS_POSTED * tick_bytes,
                                         .outputs = texts + hal->sensor_count,
-                                        .output_count = hal->actuator_count,
+                                        .output_count = hal->output_count,
                                         .inputs = inputs,
                                         .input_count = hal->sensor_count,
                                         .tokens = texts + count,
@@ -290,7 +295,7 @@ static int ros_open(fcsl_hal_t *handle, char *error, size_t error_size)
 {
     hal_t *hal = handle->ctx;
     fcsl_error_t reason;
-    const size_t count = (size_t)hal->sensor_count + hal->actuator_count;
+    const size_t count = (size_t)hal->sensor_count + hal->output_count;
     names_t *names = calloc(count, sizeof *names);
     const char **texts = calloc(2u * count, sizeof *texts);
     fcsl_bus_input_t *inputs = calloc(count, sizeof *inputs);
@@ -320,13 +325,14 @@ static int add_sensor(hal_t *hal, const fcsl_ros_message_t *message, fcsl_error_
     return sensor->inlet != NULL ? 0 : -1;
 }
 
-static int add_actuator(hal_t *hal, const fcsl_ros_message_t *message, fcsl_error_t *error)
+static int add_output(hal_t *hal, const fcsl_ros_message_t *message, fcsl_error_t *error)
 {
     char reason[256];
-    actuator_t *actuator = &hal->actuators[hal->actuator_count++];
-    actuator->size = message->composer->size;
-    actuator->composer = fcsl_ros_composer_new(message->composer, reason, sizeof reason);
-    return actuator->composer != NULL ? 0 : fcsl_fail(error, "topic %.100s: %s", message->topic, reason);
+    output_t *output = &hal->outputs[hal->output_count++];
+    output->size = message->composer->size;
+    output->direction = message->direction;
+    output->composer = fcsl_ros_composer_new(message->composer, reason, sizeof reason);
+    return output->composer != NULL ? 0 : fcsl_fail(error, "topic %.100s: %s", message->topic, reason);
 }
 
 static int add_topics(hal_t *hal, fcsl_error_t *error)
@@ -334,16 +340,15 @@ static int add_topics(hal_t *hal, fcsl_error_t *error)
     const fcsl_machine_t *machine = fcsl_run_machine(hal->run);
     size_t longest = MESSAGE_BYTES;
     hal->sensors = calloc(machine->ros_message_count + 1u, sizeof *hal->sensors);
-    hal->actuators = calloc(machine->ros_message_count + 1u, sizeof *hal->actuators);
-    if (hal->sensors == NULL || hal->actuators == NULL) {
+    hal->outputs = calloc(machine->ros_message_count + 1u, sizeof *hal->outputs);
+    if (hal->sensors == NULL || hal->outputs == NULL) {
         return fcsl_fail(error, "out of memory for the ROS 2 graph");
     }
     int failed = 0;
     for (uint32_t i = 0; i < machine->ros_message_count && !failed; i++) {
         const fcsl_ros_message_t *message = &machine->ros_messages[i];
         longest = message->composer->size > longest ? message->composer->size : longest;
-        failed =
-            message->direction == FCSL_SENSOR ? add_sensor(hal, message, error) : add_actuator(hal, message, error);
+        failed = message->direction == FCSL_SENSOR ? add_sensor(hal, message, error) : add_output(hal, message, error);
     }
     hal->message = malloc(longest);
     return failed ? -1 : hal->message == NULL ? fcsl_fail(error, "out of memory for the ROS 2 graph") : 0;

@@ -133,7 +133,7 @@ static int add_mapped(ros_topics_t *topics, const fcsl_ros_message_t *message, c
                                    .type = message->type,
                                    .hash = ros_type_hash(message->type),
                                    .reliable = 1,
-                                   .depth = message->direction == FCSL_ACTUATOR ? DEPTH_COMMAND : DEPTH_STREAM};
+                                   .depth = message->direction == FCSL_SENSOR ? DEPTH_STREAM : DEPTH_COMMAND};
     topic->kind = ROS_MAPPED;
     topic->mapped = message;
     topic->longest = message->composer->size;
@@ -173,7 +173,7 @@ int ros_topics_build(ros_topics_t *topics, const fcsl_ros_graph_options_t *optio
     }
     for (uint32_t i = 0; i < machine->ros_message_count && !failed; i++) {
         const fcsl_ros_message_t *message = &machine->ros_messages[i];
-        if (message->direction == FCSL_ACTUATOR ? options->actuators : options->sensors) {
+        if (message->direction == FCSL_SENSOR ? options->sensors : options->actuators) {
             failed = add_mapped(topics, message, name_space, error);
         }
     }
@@ -238,7 +238,7 @@ static size_t write_mapped(ros_topics_t *topics, const ros_topic_t *topic, const
 {
     const fcsl_machine_t *machine = topics->machine;
     const int is_actuator = topic->mapped->direction == FCSL_ACTUATOR;
-    if (!is_actuator && !is_sampled(machine, topic->mapped, data)) {
+    if (topic->mapped->direction == FCSL_SENSOR && !is_sampled(machine, topic->mapped, data)) {
         return 0;
     }
     const int is_armed = fcsl_is_armed(machine, data);

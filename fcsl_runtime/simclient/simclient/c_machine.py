@@ -27,7 +27,7 @@ TYPE_FORMATS = {
 HEALTH_NAMES = ("nominal", "degraded", "failed", "stale")
 #: fcsl_role_t by number.
 ROLE_NAMES = ("machine", "input", "output", "parameter", "state", "counter", "channel")
-DIRECTION_NAMES = ("sensor", "actuator")
+DIRECTION_NAMES = ("sensor", "actuator", "report")
 
 #: fcsl_field_t.connected_from of an input that the machine itself provides (machine.dt) and not a field.
 FROM_MACHINE = -2
@@ -103,9 +103,11 @@ class CChannel(Structure):
         ("direction", c_uint8),
         ("field", c_uint32),
         ("max_age_ticks", c_uint32),
+        ("grace_ticks", c_uint32),
         ("attached_offset", c_uint32),
         ("fresh_offset", c_uint32),
         ("valid_offset", c_uint32),
+        ("waiting_offset", c_uint32),
         ("age_offset", c_uint32),
         ("sample_age_offset", c_uint32),
         ("stamp_offset", c_uint32),

@@ -101,10 +101,11 @@ class Instance:
 
 @dataclass(frozen=True)
 class Channel:
-    """A sensor or actuator of the machine.
+    """A sensor, an actuator or a report of the machine.
 
-    `id` is its number in messages, `direction` "sensor" or "actuator", `field` the field that it carries. A sensor whose
-    last sample is older than `max_age_ticks` is invalid (2**32 - 1: never). The ROS names select a part of a message
+    `id` is its number in messages, `direction` "sensor", "actuator" or "report", `field` the field that it carries. A
+    sensor whose last sample is older than `max_age_ticks` is invalid. One that waits for its first sample for longer than
+    `grace_ticks` is a failure (both: 2**32 - 1: never). The ROS names select a part of a message
     (fcsl_machine.h); all are empty if the channel has no ROS message.
     """
 
@@ -114,6 +115,7 @@ class Channel:
     direction: str
     field: Field
     max_age_ticks: int
+    grace_ticks: int
     ros_type: str
     ros_field: str
     ros_topic: str
@@ -284,6 +286,7 @@ def _read_channels(machine: Any, fields: dict[str, Field]) -> tuple[Channel, ...
             direction=DIRECTION_NAMES[c.direction],
             field=by_index[c.field],
             max_age_ticks=c.max_age_ticks,
+            grace_ticks=c.grace_ticks,
             ros_type=_text(c.ros_type),
             ros_field=_text(c.ros_field),
             ros_topic=_text(c.ros_topic),

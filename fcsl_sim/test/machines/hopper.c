@@ -15,7 +15,7 @@
 typedef struct {
     uint64_t tick;
     int32_t state, next_state, current;
-    uint8_t attached[2], fresh[2], valid[2];
+    uint8_t attached[2], fresh[2], valid[2], waiting[2];
     uint32_t age[2], sample_age[2];
     int64_t stamp[2];
     struct {
@@ -83,9 +83,11 @@ static const fcsl_transition_t transitions[] = {{UP, DOWN, 0, 1, FCSL_NONE, 0}};
      FCSL_SENSOR,                                                                                                      \
      field,                                                                                                            \
      5,                                                                                                                \
+     5,                                                                                                                \
      AT(attached[i]),                                                                                                  \
      AT(fresh[i]),                                                                                                     \
      AT(valid[i]),                                                                                                     \
+     AT(waiting[i]),                                                                                                   \
      AT(age[i]),                                                                                                       \
      AT(sample_age[i]),                                                                                                \
      AT(stamp[i]),                                                                                                     \
@@ -100,8 +102,27 @@ static const fcsl_transition_t transitions[] = {{UP, DOWN, 0, 1, FCSL_NONE, 0}};
 static const fcsl_channel_t channels[] = {
     SENSOR("altitude", 1, POS_Z, 0),
     SENSOR("velocity", 2, VEL_Z, 1),
-    {"throttle", 16, FCSL_ACTUATOR, THROTTLE, UINT32_MAX, FCSL_NO_OFFSET, FCSL_NO_OFFSET, FCSL_NO_OFFSET,
-     FCSL_NO_OFFSET, FCSL_NO_OFFSET, FCSL_NO_OFFSET, "", "", "", "", "", "", NULL, FCSL_AS_FIELD},
+    {"throttle",
+     16,
+     FCSL_ACTUATOR,
+     THROTTLE,
+     UINT32_MAX,
+     UINT32_MAX,
+     FCSL_NO_OFFSET,
+     FCSL_NO_OFFSET,
+     FCSL_NO_OFFSET,
+     FCSL_NO_OFFSET,
+     FCSL_NO_OFFSET,
+     FCSL_NO_OFFSET,
+     FCSL_NO_OFFSET,
+     "",
+     "",
+     "",
+     "",
+     "",
+     "",
+     NULL,
+     FCSL_AS_FIELD},
 };
 
 static int32_t init(void *machine)

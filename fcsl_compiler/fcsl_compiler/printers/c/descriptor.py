@@ -145,14 +145,14 @@ class DescriptorEmitter:
         rows = []
         for c in self.m.channels:
             path = self._path(c.port)
-            age = "UINT32_MAX" if c.max_age_ticks is None else f"{c.max_age_ticks}u"
-            names = ("attached", "fresh", "valid", "age_ticks", "sample_age", "stamp_ns")
+            age, grace = ("UINT32_MAX" if n is None else f"{n}u" for n in (c.max_age_ticks, c.grace_ticks))
+            names = ("attached", "fresh", "valid", "waiting", "age_ticks", "sample_age", "stamp_ns")
             kept = ["FCSL_NO_OFFSET"] * len(names)
             if c.direction == "sensor":
                 kept = [self._offset(f"{channel_member(c)}.{n}") for n in names]
             ros = (c.ros.type, c.ros.field, c.ros.topic, c.ros.frame, c.ros.child_frame, c.ros.axes)
             rows.append(
-                f"{{{c_string(c.name)}, {c.id}u, FCSL_{c.direction.upper()}, {self.by_path[path]}u, {age}, {', '.join(kept)}, "
+                f"{{{c_string(c.name)}, {c.id}u, FCSL_{c.direction.upper()}, {self.by_path[path]}u, {age}, {grace}, {', '.join(kept)}, "
                 f"{', '.join(map(c_string, ros))}, {self._safe(c)}, FCSL_AS_{c.kind.upper()}}}"
             )
         self.channels = self._table("fcsl_channel_t", f"fcsl_channels_{self.m.name}", rows)

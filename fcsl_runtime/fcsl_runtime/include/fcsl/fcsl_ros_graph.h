@@ -24,7 +24,7 @@ typedef struct {
     const fcsl_machine_t *machine; /* its struct is part 0 of the history */
     const void *safe; /* the machine's struct with safe values (fcsl_run_safe_data), or null */
     int sensors;      /* with the topics of mapped sensor channels */
-    int actuators;    /* with those of actuators */
+    int actuators;    /* with those of actuators and reports */
     int simulated; /* time is the machine's own, and `clock` tells it; else stamps are ROS time, of the system's clock */
 } fcsl_ros_graph_options_t;
 

@@ -27,9 +27,9 @@ int fcsl_topics_add_instance(fcsl_topics_t *topics, uint32_t topic, uint32_t ins
                              fcsl_error_t *error);
 /* State, health and faults: where something changed. Transitions: each one. */
 int fcsl_topics_add_tick_message(fcsl_topics_t *topics, uint32_t topic, fcsl_tick_message_t what, fcsl_error_t *error);
-/* A message of actuator channels, every tick; the composer must outlive the topics. */
-int fcsl_topics_add_actuators(fcsl_topics_t *topics, uint32_t topic, const fcsl_ros_composer_t *composer, uint32_t size,
-                              fcsl_error_t *error);
+/* A message of actuator or of report channels, every tick; the composer must outlive the topics. */
+int fcsl_topics_add_channels(fcsl_topics_t *topics, uint32_t topic, fcsl_direction_t direction,
+                             const fcsl_ros_composer_t *composer, uint32_t size, fcsl_error_t *error);
 
 /* What the last completed tick has to show, stamped `stamp_ns`. */
 void fcsl_topics_put(fcsl_topics_t *topics, int64_t stamp_ns);

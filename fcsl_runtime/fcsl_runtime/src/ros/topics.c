@@ -18,7 +18,7 @@ enum {
     HEAD_BYTES = 4 + 8 + 8 + 8,
 };
 
-typedef enum { OF_INSTANCE, OF_TICK, OF_ACTUATORS } kind_t;
+typedef enum { OF_INSTANCE, OF_TICK, OF_ACTUATORS, OF_REPORTS } kind_t;
 
 typedef struct {
     kind_t kind;
@@ -99,10 +99,13 @@ int fcsl_topics_add_tick_message(fcsl_topics_t *topics, uint32_t topic, fcsl_tic
     return 0;
 }
 
-int fcsl_topics_add_actuators(fcsl_topics_t *topics, uint32_t topic, const fcsl_ros_composer_t *composer, uint32_t size,
-                              fcsl_error_t *error)
+int fcsl_topics_add_channels(fcsl_topics_t *topics, uint32_t topic, fcsl_direction_t direction,
+                             const fcsl_ros_composer_t *composer, uint32_t size, fcsl_error_t *error)
 {
-    const entry_t entry = {.kind = OF_ACTUATORS, .topic = topic, .composer = composer, .size = size};
+    const entry_t entry = {.kind = direction == FCSL_REPORT ? OF_REPORTS : OF_ACTUATORS,
+                           .topic = topic,
+                           .composer = composer,
+                           .size = size};
     return add(topics, &entry, error);
 }
 
@@ -146,9 +149,10 @@ static void put_tick_message(fcsl_topics_t *topics, entry_t *entry, int64_t stam
     }
 }
 
-static void put_actuators(fcsl_topics_t *topics, entry_t *entry, int64_t stamp_ns)
+static void put_channels(fcsl_topics_t *topics, entry_t *entry, int64_t stamp_ns)
 {
-    const uint8_t *memory = fcsl_run_actuator_data(topics->run);
+    const uint8_t *memory =
+        entry->kind == OF_REPORTS ? fcsl_run_data(topics->run) : fcsl_run_actuator_data(topics->run);
     if (fcsl_ros_compose(entry->composer, &memory, stamp_ns, topics->scratch) != FCSL_ROS_TAKEN) {
         entry->refused++;
         return;
@@ -173,7 +177,7 @@ void fcsl_topics_put(fcsl_topics_t *topics, int64_t stamp_ns)
             put_tick_message(topics, entry, stamp_ns);
             break;
         default:
-            put_actuators(topics, entry, stamp_ns);
+            put_channels(topics, entry, stamp_ns);
         }
     }
 }

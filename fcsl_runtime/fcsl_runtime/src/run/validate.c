@@ -125,7 +125,7 @@ static int is_kind(const fcsl_channel_t *channel, const fcsl_field_t *field)
 static int check_channel(const fcsl_machine_t *machine, uint32_t index)
 {
     const fcsl_channel_t *channel = &machine->channels[index];
-    if (!is_name(channel->name) || channel->direction > FCSL_ACTUATOR || channel->field >= machine->field_count ||
+    if (!is_name(channel->name) || channel->direction > FCSL_REPORT || channel->field >= machine->field_count ||
         machine->fields[channel->field].size > UINT16_MAX || channel->id >= FCSL_RESERVED_ID_FIRST ||
         !is_kind(channel, &machine->fields[channel->field])) {
         return -1;
@@ -139,12 +139,16 @@ static int check_channel(const fcsl_machine_t *machine, uint32_t index)
         channel->ros_frame == NULL || channel->ros_child_frame == NULL || channel->ros_axes == NULL) {
         return -1;
     }
+    if (channel->direction == FCSL_REPORT) {
+        return channel->safe == NULL ? 0 : -1;
+    }
     if (channel->direction == FCSL_ACTUATOR) {
         const int gated = machine->arm_field != FCSL_NONE || machine->command_timeout_ns > 0;
         return gated && channel->safe == NULL ? -1 : 0;
     }
     return in_struct(machine, channel->attached_offset, 1, 1) && in_struct(machine, channel->fresh_offset, 1, 1) &&
-                   in_struct(machine, channel->valid_offset, 1, 1) && in_struct(machine, channel->age_offset, 4, 4) &&
+                   in_struct(machine, channel->valid_offset, 1, 1) &&
+                   in_struct(machine, channel->waiting_offset, 1, 1) && in_struct(machine, channel->age_offset, 4, 4) &&
                    in_struct(machine, channel->sample_age_offset, 4, 4) &&
                    in_struct(machine, channel->stamp_offset, 8, 8)
                ? 0

@@ -10,6 +10,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Any
 
+from ..c_machine import DIRECTION_NAMES
 from ..errors import BusError
 from .payload import Payload
 
@@ -171,7 +172,7 @@ def read_machine(prefix: str, text: str) -> BusMachine:
 
 def _read_channel(index: int, told: dict[str, Any], cdr: bool) -> BusChannel:
     shape = tuple(_integer(extent, _COUNT_MAX) for extent in told["shape"])
-    words_fit = told["type"] in _FORMATS and told["as"] in _AS and told["direction"] in ("sensor", "actuator")
+    words_fit = told["type"] in _FORMATS and told["as"] in _AS and told["direction"] in DIRECTION_NAMES
     shape_fits = len(shape) == 1 if told["as"] == "blob" else len(shape) <= _RANK_MAX
     if not words_fit or not shape_fits or math.prod(shape) > _COUNT_MAX:
         raise ValueError

@@ -104,7 +104,7 @@ class Tape:
             self._take_write(current, data)
             return
         for channel, value_of in self._parts[topic]:
-            if channel.direction == "sensor" and self._from_writes:
+            if channel.direction == "report" or (channel.direction == "sensor" and self._from_writes):
                 continue
             value = value_of(data)
             if channel.decode(value) is None:

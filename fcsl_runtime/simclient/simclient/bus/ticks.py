@@ -10,10 +10,10 @@ from __future__ import annotations
 import struct
 from dataclasses import dataclass, field
 
+from ..c_machine import DIRECTION_NAMES
 from .machine import BusChannel, BusMachine
 
 _COMMIT = struct.Struct("<QQIBBH")
-_DIRECTIONS = ("sensor", "actuator")
 
 
 @dataclass(frozen=True)
@@ -54,7 +54,7 @@ class TickReader:
         self.machine = machine
         self._missing = self._refused = 0
         self._channels = {channel.name: channel for channel in machine.channels}
-        self._directions = {name: _Direction() for name in _DIRECTIONS}
+        self._directions = {name: _Direction() for name in DIRECTION_NAMES}
         self._commit_bytes = _COMMIT.size + (len(machine.channels) + 7) // 8
 
     @property
@@ -86,10 +86,10 @@ class TickReader:
             return None
         tick, _, table, direction, _, count = _COMMIT.unpack_from(data)
         bits = int.from_bytes(data[_COMMIT.size :], "little")
-        if direction > 1 or table != self.machine.table_hash or count != len(self.machine.channels):
+        if direction >= len(DIRECTION_NAMES) or table != self.machine.table_hash or count != len(self.machine.channels):
             self._refused += 1
             return None
-        state = self._directions[_DIRECTIONS[direction]]
+        state = self._directions[DIRECTION_NAMES[direction]]
         last, waiting, is_known = state.last, state.waiting, state.is_known or tick == 0
         state.last, state.waiting, state.is_known = tick, {}, False
         if last is None and not is_known:  # what came before it may be a part

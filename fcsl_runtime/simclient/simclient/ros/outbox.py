@@ -8,6 +8,7 @@ import struct
 from collections.abc import Iterator
 from ctypes import byref
 
+from ..c_machine import DIRECTION_NAMES
 from ..c_run import CError
 from ..errors import TwinError
 from ..run import TICK_MESSAGES, Run
@@ -94,12 +95,17 @@ class RunTopics:
         number = TICK_MESSAGES[what]
         self._check(self._library.fcsl_topics_add_tick_message(self._handle, topic, number, byref(self._error)))
 
-    def add_actuators(self, topic: int, composer: Composer) -> None:
-        """A message of actuator channels, each tick."""
+    def add_channels(self, topic: int, direction: str, composer: Composer) -> None:
+        """A message of "actuator" or "report" channels, each tick."""
         self._kept.append(composer)
         self._check(
-            self._library.fcsl_topics_add_actuators(
-                self._handle, topic, composer.handle, composer.size, byref(self._error)
+            self._library.fcsl_topics_add_channels(
+                self._handle,
+                topic,
+                DIRECTION_NAMES.index(direction),
+                composer.handle,
+                composer.size,
+                byref(self._error),
             )
         )
 

@@ -28,7 +28,7 @@ class RosTopic:
     """A topic of a machine's `ros` blocks.
 
     `name` is relative to the node's namespace unless it begins with a slash; `type` is the full name of its message;
-    `direction` is "sensor" (the machine receives it) or "actuator" (the machine sends it); frames may be empty.
+    `direction` is "sensor" (the machine receives it) or "actuator" or "report" (the machine sends it); frames may be empty.
     """
 
     name: str

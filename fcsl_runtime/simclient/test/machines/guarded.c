@@ -15,7 +15,7 @@ typedef struct {
     int32_t state, next_state, current;
     double gauge;
     struct {
-        uint8_t attached, fresh, valid;
+        uint8_t attached, fresh, valid, waiting;
         uint32_t age_ticks, sample_age;
         int64_t stamp_ns;
     } channel;
@@ -75,15 +75,34 @@ static const double safe_force = -1.0;
 static const uint8_t safe_valve = 1;
 #define NO FCSL_NO_OFFSET
 static const fcsl_channel_t channels[] = {
-    {"panel.gauge", 1, FCSL_SENSOR, GAUGE, 5, AT(channel.attached), AT(channel.fresh), AT(channel.valid),
-     AT(channel.age_ticks), AT(channel.sample_age), AT(channel.stamp_ns), "", "", "", "", "", "", NULL, FCSL_AS_FIELD},
-    {"cart.force", 513, FCSL_ACTUATOR, FORCE, 0, NO, NO, NO, NO, NO, NO, "", "", "", "", "", "", &safe_force,
+    {"panel.gauge",
+     1,
+     FCSL_SENSOR,
+     GAUGE,
+     5,
+     5,
+     AT(channel.attached),
+     AT(channel.fresh),
+     AT(channel.valid),
+     AT(channel.waiting),
+     AT(channel.age_ticks),
+     AT(channel.sample_age),
+     AT(channel.stamp_ns),
+     "",
+     "",
+     "",
+     "",
+     "",
+     "",
+     NULL,
      FCSL_AS_FIELD},
-    {"panel.valve", 514, FCSL_ACTUATOR, VALVE, 0, NO, NO, NO, NO, NO, NO, "", "", "", "", "", "", &safe_valve,
-     FCSL_AS_FIELD},
+    {"cart.force", 513, FCSL_ACTUATOR, FORCE,        0, 0, NO, NO, NO, NO, NO, NO, NO, "", "", "", "",
+     "",           "",  &safe_force,   FCSL_AS_FIELD},
+    {"panel.valve", 514,          FCSL_ACTUATOR, VALVE, 0, 0, NO, NO, NO, NO, NO, NO, NO, "", "", "", "", "", "",
+     &safe_valve,   FCSL_AS_FIELD},
 #ifdef TWO_FORCES
-    {"cart.other", 515, FCSL_ACTUATOR, FORCE, 0, NO, NO, NO, NO, NO, NO, "", "", "", "", "", "", &safe_force,
-     FCSL_AS_FIELD},
+    {"cart.other", 515, FCSL_ACTUATOR, FORCE,        0, 0, NO, NO, NO, NO, NO, NO, NO, "", "", "", "",
+     "",           "",  &safe_force,   FCSL_AS_FIELD},
 #endif
 };
 

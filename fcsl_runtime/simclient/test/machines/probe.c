@@ -25,7 +25,7 @@
 typedef struct {
     uint64_t tick;
     int32_t state, next_state, current;
-    uint8_t attached[4], fresh[4], valid[4];
+    uint8_t attached[4], fresh[4], valid[4], waiting[4];
     uint32_t age[4], sample_age[4];
     int64_t stamp[4];
     struct {
@@ -175,9 +175,11 @@ static const fcsl_transition_t transitions[] = {
      FCSL_SENSOR,                                                                                                      \
      field,                                                                                                            \
      5,                                                                                                                \
+     5,                                                                                                                \
      AT(attached[i]),                                                                                                  \
      AT(fresh[i]),                                                                                                     \
      AT(valid[i]),                                                                                                     \
+     AT(waiting[i]),                                                                                                   \
      AT(age[i]),                                                                                                       \
      AT(sample_age[i]),                                                                                                \
      AT(stamp[i]),                                                                                                     \

@@ -113,13 +113,13 @@ static void patch_instance(bytes_t *bytes, fcsl_instance_t *instance)
 
 static void patch_channel(bytes_t *bytes, fcsl_channel_t *channel)
 {
-    uint32_t *const words[] = {&channel->field,        &channel->attached_offset, &channel->fresh_offset,
-                               &channel->valid_offset, &channel->age_offset,      &channel->sample_age_offset,
-                               &channel->stamp_offset};
-    const uint64_t which = take_number(bytes, 1) % 9u;
-    if (which == 7) {
+    uint32_t *const words[] = {
+        &channel->field,          &channel->attached_offset, &channel->fresh_offset,      &channel->valid_offset,
+        &channel->waiting_offset, &channel->age_offset,      &channel->sample_age_offset, &channel->stamp_offset};
+    const uint64_t which = take_number(bytes, 1) % 10u;
+    if (which == 8) {
         PATCH(*channel, id);
-    } else if (which == 8) {
+    } else if (which == 9) {
         PATCH(*channel, direction);
     } else {
         patch_words(bytes, words[which], 4, 1);
