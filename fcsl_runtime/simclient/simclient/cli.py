@@ -18,6 +18,7 @@ VIEWS_HELP = """\
 machine JSON, simulation JSON or a file with a `views` block alone: its panels and body, instead of the run's own"""
 MSG_PATH_HELP = """\
 folder with <package>/msg/<name>.msg, for bags without definitions; may be repeated; before installed packages"""
+TIME_HELP = "the one clock of all times (default: header, if all topics have headers; else log, the time of recording)"
 _PROGRESS_PERIOD_S = 2.0
 _BAR_PERIOD_S = 0.2
 _BAR_WIDTH = 30

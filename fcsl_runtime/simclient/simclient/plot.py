@@ -12,7 +12,7 @@ from pathlib import Path
 
 from fcsl_compiler.base.version import add_version
 
-from .cli import VIEWS_HELP, completeness, run_tool
+from .cli import MSG_PATH_HELP, TIME_HELP, VIEWS_HELP, completeness, run_tool
 
 _EPILOG = """\
 Each PATH is a panel; paths with commas between them share one:
@@ -31,26 +31,27 @@ def main(arguments: Sequence[str]) -> int:
         formatter_class=argparse.RawDescriptionHelpFormatter,
     )
     add_version(parser, "simclient", __file__)
-    parser.add_argument("bag", help="directory or .mcap file")
+    parser.add_argument("bag", help="directory, or one of its files")
     parser.add_argument("paths", nargs="*", metavar="PATH", help="what to draw: a panel for each")
     parser.add_argument("-o", "--output", required=True, help="picture to write: .png, .svg or .pdf")
     parser.add_argument("--against", default="", metavar="PATH", help="the horizontal axis, instead of time")
+    parser.add_argument("--time", default="", choices=("header", "log"), help=TIME_HELP)
     parser.add_argument("--views", default="", metavar="FILE", help=VIEWS_HELP)
     parser.add_argument("--machine", default="", help="the machine, if the bag holds several")
     parser.add_argument("--truth", default="", help="topic of the plant's truth (default: all below /<namespace>/sim/)")
+    parser.add_argument("--msg-path", action="append", default=[], metavar="FOLDER", help=MSG_PATH_HELP)
     options = parser.parse_intermixed_args(arguments)
     if options.paths and options.views:
         parser.error("PATH and --views both choose the panels; give one of them")
     # Imported here, because the imports take a second; inside run_tool, Ctrl-C meanwhile gives no traceback.
-    from .bag import Bag
+    from .bag.formats import open_bag
     from .view.picture import plot
     from .view.views import read_views
 
     views = read_views(options.views) if options.views else None
-    bag = Bag(options.bag)
-    left_out = plot(
-        bag, options.output, options.machine, options.truth, paths=options.paths, views=views, against=options.against
-    )
+    bag = open_bag(options.bag, options.msg_path)
+    chosen = {"paths": options.paths, "views": views, "against": options.against, "time": options.time}
+    left_out = plot(bag, options.output, options.machine, options.truth, **chosen)
     print(f"{options.output}: {Path(options.output).stat().st_size} bytes")
     if left_out:
         print(f"left out: {', '.join(left_out)}; simclient.plot BAG PATH… chooses what is drawn")

@@ -22,19 +22,19 @@ def main(arguments: Sequence[str]) -> int:
         description="Converts a recorded run for rerun. The first page has the panels and the body of the run's views.",
     )
     add_version(parser, "simclient", __file__)
-    parser.add_argument("bag", help="directory or .mcap file")
+    parser.add_argument("bag", help="directory, or one of its files")
     parser.add_argument("-o", "--output", required=True, help="file to write: run.rrd")
     parser.add_argument("--views", default="", metavar="FILE", help=VIEWS_HELP)
     parser.add_argument("--machine", default="", help="the machine, if the bag holds several")
     parser.add_argument("--truth", default="", help="topic of the plant's truth (default: all below /<namespace>/sim/)")
     options = parser.parse_args(arguments)
     # Imported here, because the imports take a second; inside run_tool, Ctrl-C meanwhile gives no traceback.
-    from .bag import Bag
+    from .bag.formats import open_bag
     from .view.rrd import to_rerun
     from .view.views import read_views
 
     views = read_views(options.views) if options.views else None
-    bag = Bag(options.bag)
+    bag = open_bag(options.bag)
     left_out = to_rerun(bag, options.output, options.machine, options.truth, views=views)
     print(f"{options.output}: {Path(options.output).stat().st_size} bytes; view it with: rerun {options.output}")
     if left_out:

@@ -15,16 +15,19 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from foreign_bags import ROS2_FORMATS
 from hypothesis import example, given, settings
 from hypothesis import strategies as st
 from rosbags.highlevel import AnyReader
 from rosbags.rosbag2 import StoragePlugin, Writer
+from rosbags.rosbag2.enums import CompressionFormat
 from rosbags.typesys import Stores, get_typestore
 
 from simclient import AlgTwin, BagError
 from simclient.bag import Bag, columns
 from simclient.bag.compare import Tolerance
 from simclient.bag.diff import diff
+from simclient.bag.digest import digest
 from simclient.bag.export import select, write
 from simclient.bag.formats import open_bag
 from simclient.bag.info import describe
@@ -231,6 +234,29 @@ def test_a_cut_of_a_bag_without_metadata_has_the_hashes_of_its_types(fly: Fly, t
     cut(Bag(bag), tmp_path / "part", 0, 50 * TICK_NS)
     found = hashes(tmp_path / "part")
     assert found and found == {name: expected[name] for name in found}
+
+
+@pytest.mark.parametrize("form", ["sqlite3", "sqlite3-message", "mcap-file"])
+def test_a_record_in_another_format_is_the_same_run(form: str, fly: Fly, probe: Path, tmp_path: Path) -> None:
+    """As `ros2 bag convert` leaves it."""
+    run, other = Bag(fly()), tmp_path / "other"
+    plugin, mode = ROS2_FORMATS[form]
+    writer = Writer(other, version=9, storage_plugin=plugin)
+    if mode is not None:
+        writer.set_compression(mode, CompressionFormat.ZSTD)
+    with writer:
+        connections = {
+            t.name: writer.add_connection(t.name, t.type, msgdef=t.schema, rihs01="x") for t in run.topics.values()
+        }
+        for topic, log_ns, data in run.messages():
+            writer.write(connections[topic], log_ns, data)
+    assert digest(other) == digest(run)
+    assert replay(other, library=str(probe)).identical
+    assert diff(run, open_bag(other)).same
+    assert np.array_equal(*(columns(bag, "source.outputs.big")[1] for bag in (run, str(other))))
+    for module, file in (("plot", "x.png"), ("to_rerun", "x.rrd")):
+        done = subprocess.run([sys.executable, "-m", f"simclient.{module}", other, "-o", tmp_path / file])
+        assert done.returncode == 0 and (tmp_path / file).stat().st_size > 1000
 
 
 @pytest.mark.parametrize(

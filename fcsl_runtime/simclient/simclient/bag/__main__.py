@@ -23,10 +23,11 @@ from pathlib import Path
 
 from fcsl_compiler.base.version import add_version
 
-from ..cli import MSG_PATH_HELP, completeness, run_tool
+from ..cli import MSG_PATH_HELP, TIME_HELP, completeness, run_tool
 from ..errors import BagError
 from .bag import Bag
 from .formats import open_bag
+from .stamps import CLOCKS
 
 _CUT_LOSES = """\
 What a cut loses. A record replays from a checkpoint: the machine's memory before the first tick of the record. A cut that
@@ -43,7 +44,7 @@ def _info(options: argparse.Namespace) -> int:
     from .info import describe
 
     bag = open_bag(options.bag, options.msg_path)
-    print(describe(bag, options.machine))
+    print(describe(bag, options.machine, options.time))
     return completeness("simclient.bag", bag.truncated)
 
 
@@ -63,7 +64,7 @@ def _cut(options: argparse.Namespace) -> int:
             run = open_run(library, machine.name)
             opened.callback(run.close)
             replayed = machine, run
-        print(f"{options.output}: {cut(bag, options.output, begin_ns, end_ns, replayed)}")
+        print(f"{options.output}: {cut(bag, options.output, begin_ns, end_ns, replayed, options.time)}")
     return completeness("simclient.bag", bag.truncated)
 
 
@@ -97,9 +98,12 @@ def _export(options: argparse.Namespace) -> int:
     from .export import select, write
 
     bag = open_bag(options.bag, options.msg_path)
-    found = select(bag, options.columns or (), options.machine)
+    found = select(bag, options.columns or (), options.machine, options.time)
     rows = write(found, options.output)
-    print(f"{options.output}: {rows} rows, {sum(len(series.columns) for series in found.series)} fields")
+    fields = sum(len(series.columns) for series in found.series)
+    print(f"{options.output}: {rows} rows, {fields} fields, by {found.clock}")
+    if found.clock.timeless:
+        print(f"left out, because they have no time: {'; '.join(found.clock.timeless)}")
     if found.left_out:
         print(f"left out, because their size differs between messages: {', '.join(found.left_out)}")
     return completeness("simclient.bag", bag.truncated)
@@ -108,7 +112,7 @@ def _export(options: argparse.Namespace) -> int:
 def _digest(options: argparse.Namespace) -> int:
     from .digest import digest
 
-    bag = Bag(options.bag)
+    bag = open_bag(options.bag)
     print(digest(bag, options.machine))
     return completeness("simclient.bag", bag.truncated)
 
@@ -154,6 +158,8 @@ def _parser() -> argparse.ArgumentParser:
             command.add_argument("bag", help="directory, or one of its files")
         if name not in ("diff", "repair"):
             command.add_argument("--machine", default="", help="the machine, if the bag holds several")
+        if name in ("info", "cut", "export"):
+            command.add_argument("--time", default="", choices=CLOCKS, help=TIME_HELP)
         if name not in ("digest", "repair"):
             command.add_argument("--msg-path", action="append", default=[], metavar="FOLDER", help=MSG_PATH_HELP)
         return command
@@ -175,13 +181,13 @@ telling of it. A bag that is being recorded is refused. Bags of other formats ar
 _EXPORT_NAMES = """\
 Columns are <instance>.outputs.<field> and machine.state of a recorded machine, <topic>:<field> of any other topic.
 CSV and Parquet hold one table with a row per time and a column per array element. NumPy's .npz keeps arrays whole
-and has the times of each topic. Times are stamps: seconds in CSV, nanoseconds in the other formats. States, healths and
-transition requests are words."""
+and has the times of each topic: seconds in CSV, nanoseconds in the other formats. States, healths and transition requests
+are words."""
 
 
 def _add_cut(command: argparse.ArgumentParser) -> None:
     command.add_argument("-o", "--output", required=True, help="bag directory to write; must not exist")
-    time = "in seconds of the stamps, as info shows them"
+    time = "in seconds, as info shows them"
     command.add_argument("--from", dest="begin", type=_seconds, metavar="SECONDS", help=f"first time, {time}")
     command.add_argument("--to", dest="end", type=_seconds, metavar="SECONDS", help=f"last time, {time}")
     command.add_argument("--state", default="", help="only the time in which the machine was in this state")

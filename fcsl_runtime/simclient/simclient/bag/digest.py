@@ -18,6 +18,7 @@ from typing import Any
 import numpy as np
 
 from ..errors import BagError
+from . import formats
 from .bag import Array, Bag
 from .states import StateReader
 
@@ -73,7 +74,7 @@ class Sums:
 
 def digest(bag: str | Path | Bag, machine: str = "") -> str:
     """Hex SHA-256 of the run of `machine` (default: the only one) in `bag`. Raises BagError."""
-    opened = bag if isinstance(bag, Bag) else Bag(bag)
+    opened = formats.opened(bag)
     recorded = opened.machine(machine)
     instance_of = {topic: instance for instance, topic in recorded.outputs.items()}
     layouts = {topic: opened.fixed_layout(topic) for topic in instance_of}

@@ -5,9 +5,9 @@ Columns are named `<instance>.outputs.<field>`, `<instance>.inputs.<field>` and 
 and `<topic>:<field>` for any other topic; an array has a column per element. CSV and Parquet hold one table, ordered by
 time. It has a row for each time at which a chosen topic has a message. Cells are empty where a topic has no message of
 that time; a topic's second message of one time has its own row. NumPy's .npz keeps topics separate and arrays whole:
-`<column>` of shape (N,) or (N, count), with `<instance>.time_ns` or `<topic>:time_ns` of shape (N,). Times are stamps
-(where there is none, times of recording) in ns since the epoch or the start of simulated time. States, healths and
-requests of a machine are words (words.py).
+`<column>` of shape (N,) or (N, count), with `<instance>.time_ns` or `<topic>:time_ns` of shape (N,). Times are those of
+one clock (stamps.Clock) in ns since the epoch or the start of simulated time. States, healths and requests of a machine
+are words (words.py).
 """
 
 from __future__ import annotations
@@ -27,7 +27,7 @@ from ..errors import BagError, did_you_mean
 from .bag import Array, Bag, RecordedMachine
 from .fields import flat
 from .seconds import seconds
-from .stamps import Stamps
+from .stamps import Clock
 from .words import spelled, words_of
 
 FORMATS = (".csv", ".parquet", ".npz")
@@ -120,23 +120,27 @@ class Export:
     """The chosen columns of a bag. `left_out` names fields without a column: their size differs between messages."""
 
     series: list[Series]
+    clock: Clock
     left_out: list[str] = field(default_factory=list)
 
 
-def select(bag: Bag, patterns: Sequence[str] = (), machine: str = "") -> Export:
+def select(bag: Bag, patterns: Sequence[str] = (), machine: str = "", time: str = "") -> Export:
     """The columns that match one of `patterns` (shell patterns of column names or whole topics).
 
     Without patterns: all topics of the machine and its plant, or of a foreign bag, all topics. All chosen columns are
-    held in memory. Raises BagError when nothing matches.
+    held in memory. `time` chooses the clock (stamps.Clock). Raises BagError when nothing matches.
     """
     prefixes = _prefixes(bag, machine)
     collectors = {topic: _Collector(bag, topic, prefix) for topic, prefix in prefixes.items()
                   if not patterns or _may_match(topic, prefix, patterns)}  # fmt: skip
-    stamps, progress = Stamps(bag), Progress("reading", sum(bag.topics[topic].count for topic in collectors))
+    clock = Clock(bag, collectors, time)
+    progress = Progress("reading", sum(bag.topics[topic].count for topic in collectors))
     for done, (topic, log_ns, data) in enumerate(bag.messages(set(collectors))):
-        collectors[topic].take(stamps.time_ns(topic, log_ns, data), data)
+        time_ns = clock.time_ns(topic, log_ns, data)
+        if time_ns is not None:
+            collectors[topic].take(time_ns, data)
         progress.at(done)
-    found = Export([])
+    found = Export([], clock)
     for collector in collectors.values():
         series = collector.series()
         every = [collector.prefix + name for name in collector.left_out]

@@ -52,6 +52,11 @@ def open_bag(path: str | Path, msg_path: Sequence[str | Path] = ()) -> Bag:
     return bag
 
 
+def opened(bag: str | Path | Bag) -> Bag:
+    """The bag itself, or the one at this place. Raises BagError."""
+    return bag if isinstance(bag, Bag) else open_bag(bag)
+
+
 def _unpacked(path: Path, files: Sequence[Path], reader: type[Bag]) -> Bag:
     """The bag whose files are compressed as a whole, read from a copy that is deleted with the Bag."""
     scratch = tempfile.TemporaryDirectory(prefix="simclient-bag-")

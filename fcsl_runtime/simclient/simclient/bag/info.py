@@ -15,7 +15,7 @@ from ..cli import Progress
 from ..errors import BagError
 from .bag import Bag, RecordedMachine
 from .seconds import seconds
-from .stamps import Stamps
+from .stamps import Clock
 from .states import visits
 
 #: Most visits to states that are listed.
@@ -24,22 +24,26 @@ _MAX_VISITS = 200
 
 @dataclass
 class TopicSpan:
-    """The number of intact messages of a topic, and the first and last of their times in ns."""
+    """The number of intact messages of a topic, and of those that have a time the number, the first and the last time
+    in ns."""
 
     count: int = 0
+    timed: int = 0
     first_ns: int = 0
     last_ns: int = 0
 
-    def add(self, time_ns: int) -> None:
-        self.first_ns = min(self.first_ns, time_ns) if self.count else time_ns
-        self.last_ns = max(self.last_ns, time_ns) if self.count else time_ns
+    def add(self, time_ns: int | None) -> None:
         self.count += 1
+        if time_ns is not None:
+            self.first_ns = min(self.first_ns, time_ns) if self.timed else time_ns
+            self.last_ns = max(self.last_ns, time_ns) if self.timed else time_ns
+            self.timed += 1
 
     @property
     def hertz(self) -> str:
         """Average rate in Hz as text; empty if it is undefined."""
         long = self.last_ns - self.first_ns
-        return f"{(self.count - 1) * 1e9 / long:.2f} Hz" if long > 0 else ""
+        return f"{(self.timed - 1) * 1e9 / long:.2f} Hz" if long > 0 else ""
 
 
 @dataclass
@@ -51,16 +55,16 @@ class Contents:
     writes: dict[str, Counter[str]] = field(default_factory=dict)
 
 
-def _scan(bag: Bag, machines: Sequence[RecordedMachine]) -> Contents:
+def _scan(bag: Bag, machines: Sequence[RecordedMachine], clock: Clock) -> Contents:
     checkpoints = {machine.checkpoint for machine in machines}
     writes = {machine.writes: _write_kinds(bag, machine.writes) for machine in machines if machine.writes in bag.topics}
     found = Contents({topic: TopicSpan() for topic in bag.topics}, writes={topic: Counter() for topic in writes})
-    stamps, progress = Stamps(bag), Progress("reading", sum(file.stat().st_size for file in bag.files))
+    progress = Progress("reading", sum(file.stat().st_size for file in bag.files))
     for batch, announced in bag.batches():
         progress.at(bag.read_bytes)
         for number, log_ns, begin, end in batch.entries.tolist():
             topic, data = announced[number].name, batch.data[begin:end]
-            found.spans.setdefault(topic, TopicSpan()).add(stamps.time_ns(topic, log_ns, data))
+            found.spans.setdefault(topic, TopicSpan()).add(clock.time_ns(topic, log_ns, data))
             if topic in checkpoints:
                 found.checkpoints.setdefault(topic, data)
             elif topic in writes:
@@ -76,32 +80,34 @@ def _write_kinds(bag: Bag, topic: str) -> dict[int, str]:
     return {value: name for name, _, value in constants if isinstance(value, int)}
 
 
-def describe(bag: Bag, machine: str = "") -> str:
-    """The text. `machine` selects one of several machines. Raises BagError."""
+def describe(bag: Bag, machine: str = "", time: str = "") -> str:
+    """The text. `machine` selects one of several machines, `time` the clock (stamps.Clock). Raises BagError."""
     machines = [bag.machine(machine, True)] if machine else bag.machines(by_bystanders=True)
-    found = _scan(bag, machines)
-    spans = [span for span in found.spans.values() if span.count]
-    lines = _head(bag, spans)
+    clock = Clock(bag, bag.topics, time)
+    found = _scan(bag, machines, clock)
+    lines = _head(bag, list(found.spans.values()), clock)
     lines += ["", *_topics(bag, found.spans)]
     for recorded in machines:
         lines += ["", *_machine(bag, recorded, found)]
     return "\n".join(lines)
 
 
-def _head(bag: Bag, spans: Sequence[TopicSpan]) -> list[str]:
+def _head(bag: Bag, spans: Sequence[TopicSpan], clock: Clock) -> list[str]:
     size = sum(file.stat().st_size for file in bag.files)
     lines = [
         f"bag        {bag.path}",
         f"files      {', '.join(file.name for file in bag.files)} ({size / 1e6:.3f} MB)",
         f"messages   {sum(span.count for span in spans)}",
     ]
-    if spans:
-        first, last = min(span.first_ns for span in spans), max(span.last_ns for span in spans)
+    if timed := [span for span in spans if span.timed]:
+        first, last = min(span.first_ns for span in timed), max(span.last_ns for span in timed)
         lines += [
+            f"time       {clock}",
             f"duration   {seconds(last - first)} s",
             f"from       {seconds(first)} s",
             f"to         {seconds(last)} s",
         ]
+    lines += [f"timeless   {text}" for text in clock.timeless]
     return [*lines, f"damage     {bag.truncated or 'none'}"]
 
 

@@ -9,6 +9,7 @@ import numpy as np
 
 from ..errors import BagError
 from ..ros.cdr import Layout
+from . import formats
 from .bag import Array, Bag
 from .fields import field_value
 
@@ -64,7 +65,7 @@ def columns(bag: Bag | str, path: str, machine: str = "") -> tuple[Array, Array]
     requests are numbers as in the message's constants. `machine` selects one of several in a bag. Raises BagError,
     which lists the valid paths.
     """
-    opened = bag if isinstance(bag, Bag) else Bag(bag)
+    opened = formats.opened(bag)
     topic, field = _locate(opened, path, machine)
     layout = opened.layout(topic)
     if layout is None or field not in layout.leaves or not _all_fit(opened, topic):

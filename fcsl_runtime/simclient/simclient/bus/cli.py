@@ -266,13 +266,13 @@ def _record(options: argparse.Namespace) -> None:
 
 
 def _play(options: argparse.Namespace) -> int:
-    from ..bag import Bag  # here, because these imports take as long as all others
+    from ..bag.formats import open_bag  # here, because these imports take as long as all others
     from ..replay.replaying import open_machine
     from .controller import Controller
     from .play import Player
     from .tape import read_tape
 
-    bag = Bag(options.bag)
+    bag = open_bag(options.bag)
     with ExitStack() as opened:
         run = open_machine(options.config, options.library, None) if options.config or options.library else None
         if run is not None:

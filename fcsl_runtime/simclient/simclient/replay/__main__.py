@@ -31,7 +31,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     parser.description = "Replays a recorded run, bit for bit; or runs a machine on a bag that FCSL did not record."
     parser.epilog = mapping.__doc__
     parser.formatter_class = argparse.RawDescriptionHelpFormatter
-    parser.add_argument("bag", help="directory or .mcap file; with --map also .db3, .bag (ROS 1), .zstd")
+    parser.add_argument("bag", help="directory, or one of its files: .mcap, .db3, .bag (ROS 1), .zstd")
     which = parser.add_mutually_exclusive_group(required=True)
     which.add_argument("--config", default="", help="machine JSON")
     which.add_argument("--library", default="", help="compiled machine library")

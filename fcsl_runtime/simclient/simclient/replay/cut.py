@@ -1,15 +1,16 @@
 # SPDX-License-Identifier: Apache-2.0
 """Writes a part of a bag as a new bag: `python -m simclient.bag cut`.
 
-Messages are selected by time: the stamp of their header, else the time of recording. All messages of a machine's first
-tick belong to the cut, too: on a robot's clock, a write before a tick has the stamp of the tick before it. A record of
-FCSL is more than its messages: a replay starts from a checkpoint and repeats the host's writes from there. So a cut
-that starts after the first checkpoint needs a new one, which is made by replaying the bag up to there.
+Messages are selected by one clock: header stamps, or log times. By header stamps, a message that has none belongs to the
+cut if it was recorded between the first and the last that are selected. All messages of a machine's first tick belong to
+the cut, too: on a robot's clock, a write before a tick has the stamp of the tick before it. A record of FCSL is more than
+its messages: a replay starts from a checkpoint and repeats the host's writes from there. So a cut that starts after the
+first checkpoint needs a new one, which is made by replaying the bag up to there.
 """
 
 from __future__ import annotations
 
-from collections.abc import Collection, Iterator
+from collections.abc import Collection, Iterator, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
@@ -18,7 +19,7 @@ import numpy as np
 
 from ..bag import Bag, RecordedMachine
 from ..bag.seconds import seconds
-from ..bag.stamps import Stamps
+from ..bag.stamps import Clock, Stamps
 from ..bag.writer import can_be_copied, copy_of
 from ..cli import Progress
 from ..errors import BagError
@@ -26,20 +27,27 @@ from ..run import Run
 from .reproduce import Replay
 
 _NS = 1_000_000_000
+#: Later than every time, in ns.
+_NEVER = 1 << 63
 
 
 @dataclass
 class Cut:
-    """The result. `machines` maps each machine's prefix to the reason why the cut does not reproduce it, or to ""."""
+    """The result, with its times by `clock`. `machines` maps each machine's prefix to the reason why the cut does not
+    reproduce it, or to "".
+    """
 
     messages: int
     first_ns: int
     last_ns: int
+    clock: Clock
     machines: dict[str, str]
     left_out: list[str]
 
     def __str__(self) -> str:
-        lines = [f"{self.messages} messages, {seconds(self.first_ns)} s to {seconds(self.last_ns)} s"]
+        span = f"{seconds(self.first_ns)} s to {seconds(self.last_ns)} s"
+        lines = [f"{self.messages} messages, {span}, by {self.clock}"]
+        lines += [f"  cut where the others were recorded: {text}" for text in self.clock.timeless]
         lines += [f"  {prefix}: {f'shows but does not reproduce: {why}' if why else 'replays'}"
                   for prefix, why in self.machines.items()]  # fmt: skip
         lines += [f"  left out: {name}: not ROS 2 messages with a definition" for name in self.left_out]
@@ -108,11 +116,17 @@ def _check_same(bag: Bag, machine: RecordedMachine, checkpoint: Any, run: Run) -
 
 
 def cut(
-    bag: Bag, target: str | Path, begin_ns: int, end_ns: int, replayed: tuple[RecordedMachine, Run] | None = None
+    bag: Bag,
+    target: str | Path,
+    begin_ns: int,
+    end_ns: int,
+    replayed: tuple[RecordedMachine, Run] | None = None,
+    time: str = "",
 ) -> Cut:
     """Writes the messages of `bag` from `begin_ns` to `end_ns` (both included) to `target`, complete or not at all.
 
-    `replayed`: a machine and a new run of it, which make the checkpoint of the cut. Raises BagError.
+    `replayed`: a machine and a new run of it, which make the checkpoint of the cut. `time` chooses the clock
+    (stamps.Clock). Raises BagError.
     """
     firsts = {machine.prefix: _first_tick(bag, machine, begin_ns, end_ns) for machine in bag.machines()}
     machines = {machine.prefix: _why_not(bag, machine, firsts[machine.prefix]) for machine in bag.machines()}
@@ -128,8 +142,11 @@ def cut(
         machines[machine.prefix] = ""
     opening += _views(bag, begin_ns)
     topics = [name for name, topic in bag.topics.items() if can_be_copied(topic)]
-    found = Cut(0, end_ns, begin_ns, machines, [name for name in bag.topics if name not in topics])
+    clock, left_out = Clock(bag, topics, time), [name for name in bag.topics if name not in topics]
+    found = Cut(0, end_ns, begin_ns, clock, machines, left_out)
     stamps, progress = Stamps(bag), Progress("cutting", sum(bag.topics[name].count for name in topics))
+    log_first_ns, log_last_ns = _recorded_within(bag, topics, begin_ns, end_ns, time)
+    earliest_ns, latest_ns = _NEVER, -_NEVER
     first_ticks = {
         topic: first[0]
         for prefix, first in firsts.items()
@@ -141,15 +158,36 @@ def cut(
             copy.write(*message)
         for done, (topic, log_ns, data) in enumerate(bag.messages(set(topics))):
             progress.at(done)
-            time_ns = stamps.time_ns(topic, log_ns, data)
-            begun = time_ns >= begin_ns or (topic in first_ticks and stamps.tick(topic, data) == first_ticks[topic])
-            if begun and time_ns <= end_ns:
-                found.first_ns, found.last_ns = min(found.first_ns, time_ns), max(found.last_ns, time_ns)
+            at_ns = clock.time_ns(topic, log_ns, data)
+            if at_ns is None:
+                if log_first_ns <= log_ns <= log_last_ns:
+                    copy.write(topic, log_ns, data)
+                continue
+            earliest_ns, latest_ns = min(earliest_ns, at_ns), max(latest_ns, at_ns)
+            in_first_tick = topic in first_ticks and stamps.tick(topic, data) == first_ticks[topic]
+            if (at_ns >= begin_ns or in_first_tick) and at_ns <= end_ns:
+                found.first_ns, found.last_ns = min(found.first_ns, at_ns), max(found.last_ns, at_ns)
                 copy.write(topic, log_ns, data)
         found.messages = copy.messages
         if copy.messages == len(opening):
-            raise BagError(f"{bag.path}: no message from {seconds(begin_ns)} s to {seconds(end_ns)} s")
+            there = f"; its {clock} go from {seconds(earliest_ns)} s to {seconds(latest_ns)} s"
+            raise BagError(
+                f"{bag.path}: no message from {seconds(begin_ns)} s to {seconds(end_ns)} s"
+                f"{there if earliest_ns <= latest_ns else ''}; --time chooses the clock"
+            )
     return found
+
+
+def _recorded_within(bag: Bag, topics: Sequence[str], begin_ns: int, end_ns: int, time: str) -> tuple[int, int]:
+    """The log times between which the messages from `begin_ns` to `end_ns` of the clock were recorded."""
+    clock, first_ns, last_ns = Clock(bag, topics, time), end_ns, begin_ns
+    if clock.by_header:
+        first_ns, last_ns = _NEVER, -_NEVER
+        for topic, log_ns, data in bag.messages(set(topics)):
+            time_ns = clock.time_ns(topic, log_ns, data)
+            if time_ns is not None and begin_ns <= time_ns <= end_ns:
+                first_ns, last_ns = min(first_ns, log_ns), max(last_ns, log_ns)
+    return first_ns, last_ns
 
 
 def _views(bag: Bag, begin_ns: int) -> list[tuple[str, int, bytes]]:

@@ -10,8 +10,7 @@ from typing import Any
 
 import numpy as np
 
-from ..bag import Bag, RecordedMachine
-from ..bag.formats import open_bag
+from ..bag import Bag, RecordedMachine, formats
 from ..cli import Progress
 from ..complete_output import complete_or_absent
 from ..descriptor import Field
@@ -132,7 +131,7 @@ def replay(
     differing parameters. With the plan of a `board` the recorded readings of its devices go through its frontends again;
     without it the recorded samples of the channels are used.
     """
-    opened = bag if isinstance(bag, Bag) else Bag(bag)
+    opened = formats.opened(bag)
     recorded = opened.machine(machine, by_bystanders=True)
     if lacks := opened.lacks(recorded):
         raise BagError(f"{opened.path}: it does not reproduce the run of `{recorded.name}`: {lacks}")
@@ -169,7 +168,7 @@ def replay_foreign(
     Afterwards the outputs are compared with the map's expectations, or those of the file `expect` (`comparisons` of the
     result). `machine` selects one of several in the library. Raises MapError, BagError or TwinError for bad input.
     """
-    opened = bag if isinstance(bag, Bag) else open_bag(bag)
+    opened = formats.opened(bag)
     parsed = mapping.read_map(chart)
     expectations = mapping.read_map(expect, only_expect=True).expectations if expect else parsed.expectations
     if output is not None and Path(output).exists():

@@ -64,10 +64,11 @@ def read_profile(twin: Twin, source: Mapping[str, Any] | str | Path | Bag) -> Pr
     if isinstance(source, Mapping):
         return _from_arrays(twin, source)
     from ..bag import Bag
+    from ..bag.formats import opened
 
     if not isinstance(source, str | Path | Bag):
         raise TwinError(f"inject({source!r}): a dict of paths and arrays, or a bag or its path, wanted")
-    return _from_bag(twin.machine, source if isinstance(source, Bag) else Bag(source))
+    return _from_bag(twin.machine, opened(source))
 
 
 # ---- arrays -----------------------------------------------------------------------------------------------------------

@@ -18,7 +18,7 @@ from typing import Any
 import matplotlib
 import numpy as np
 
-from ..bag import Array, Bag
+from ..bag import Array, Bag, formats
 from ..complete_output import complete_or_absent
 from ..errors import BagError, ViewError
 from .panels import Choice, Curve, Panel, choose_by_paths, choose_by_views, choose_default, demand, label_of
@@ -64,16 +64,20 @@ def plot(
     paths: Sequence[str] = (),
     views: Views | None = None,
     against: str = "",
+    time: str = "",
 ) -> list[str]:
     """Writes the picture of a run to `output` (.png, .svg or .pdf), complete or not at all.
 
     It has a panel for each of `paths`, else those of `views` or of the bag's own, else one for each name and unit.
-    `against` is the path of the horizontal axis, instead of time. Returns what is left out. Raises BagError and ViewError.
+    `against` is the path of the horizontal axis, instead of time. `time` chooses the clock of other topics
+    (bag/stamps.py); the axis names it. Returns what is left out. Raises BagError and ViewError.
     """
     if Path(output).suffix.lower() not in SUFFIXES:
         raise BagError(f"{output}: the name of a picture ends in {', '.join(SUFFIXES)}")
-    opened = bag if isinstance(bag, Bag) else Bag(bag)
-    run = RecordedRun(opened, machine, truth, foreign=any(path.startswith("/") for path in (*paths, against)))
+    opened = formats.opened(bag)
+    run = RecordedRun(
+        opened, machine, truth, foreign=any(path.startswith("/") for path in (*paths, against)), time=time
+    )
     chosen = choose(run, paths, views)
     duration = run.spans[-1].end_s - run.spans[0].start_s if run.spans else 0.0
     what = [run.name, f"{duration:.2f} s"] if run.machine else []
@@ -83,7 +87,7 @@ def plot(
         save(figure, output)
     finally:
         pyplot.close(figure)
-    return chosen.left_out
+    return chosen.left_out + (run.clock.timeless if run.clock else [])
 
 
 def save(figure: Any, output: str | Path) -> None:
@@ -121,7 +125,7 @@ def draw(run: RecordedRun, chosen: Choice, title: str, against: str = "") -> Any
     curves = [c for panel in chosen.panels for c in panel.curves] + ([axis_curve] if axis_curve else [])
     rows = run.read(c.value for c in curves)
     origin_s = 0.0 if axis_curve else _origin_s(run, rows)
-    figure, axes = new_figure(len(chosen.panels), title, _axis_label(axis_curve, origin_s))
+    figure, axes = new_figure(len(chosen.panels), title, _axis_label(axis_curve, origin_s, run))
     if axis_curve is None and run.spans:
         spans = [replace(s, start_s=s.start_s - origin_s, end_s=s.end_s - origin_s) for s in run.spans]
         _draw_states(figure, axes, spans, run.states)
@@ -150,11 +154,12 @@ def _origin_s(run: RecordedRun, rows: dict[str, Rows]) -> float:
     return float(first_s) if first_s > _LONGEST_RUN_S else 0.0
 
 
-def _axis_label(wanted: Curve | None, origin_s: float) -> str:
+def _axis_label(wanted: Curve | None, origin_s: float, run: RecordedRun) -> str:
+    clock = f" ({run.clock})" if run.clock else ""
     if wanted is None and origin_s > 0:
-        return f"time since {datetime.fromtimestamp(origin_s, UTC):%Y-%m-%d %H:%M:%S.%f} UTC, s"
+        return f"time since {datetime.fromtimestamp(origin_s, UTC):%Y-%m-%d %H:%M:%S.%f} UTC, s{clock}"
     if wanted is None:
-        return "time, s"
+        return f"time, s{clock}"
     return ", ".join(filter(None, (wanted.label, wanted.value.unit)))
 
 

@@ -11,7 +11,7 @@ import numpy as np
 
 from ..bag import Array, Bag, RecordedMachine, has_stamps, stacks, stamps_s
 from ..bag.fields import field_value, leaf_names
-from ..bag.stamps import Stamps
+from ..bag.stamps import Clock
 from ..bag.states import Visit, visits
 from ..cli import Progress
 from ..errors import BagError
@@ -48,11 +48,14 @@ class RecordedRun:
 
     `machine` selects one of several; `truth` is the plant's topic, by default every topic below /<namespace>/sim/. With
     `foreign` other topics have values, too, with paths like `/imu/data:angular_velocity.x`; the bag may then be without
-    a machine. `spans` are the visits to states; `states` their names in order of first appearance.
+    a machine. `time` chooses their clock (bag/stamps.py), which is `clock` when they were read. `spans` are the visits to
+    states; `states` their names in order of first appearance.
     """
 
-    def __init__(self, bag: Bag, machine: str = "", truth: str = "", foreign: bool = False):
+    def __init__(self, bag: Bag, machine: str = "", truth: str = "", foreign: bool = False, time: str = ""):
         self.bag = bag
+        self.clock: Clock | None = None
+        self._time = time
         self.machine: RecordedMachine | None = None
         self.signals: list[Signals] = []
         if bag.machines() or machine or not foreign:
@@ -141,17 +144,23 @@ class RecordedRun:
         """Topics whose messages may vary in size. Arrays that differ in size from the first are NaN."""
         times: dict[str, list[float]] = {topic: [] for topic in wanted}
         found: dict[str, dict[str, list[Any]]] = {t: {name: [] for name in names} for t, names in wanted.items()}
-        stamps, progress = Stamps(self.bag), Progress("reading", sum(self.bag.topics[t].count for t in wanted))
+        progress = Progress("reading", sum(self.bag.topics[t].count for t in wanted))
+        clock = self.clock = Clock(self.bag, wanted, self._time) if wanted else None
         for done, (topic, log_ns, data) in enumerate(self.bag.messages(wanted) if wanted else ()):
+            progress.at(done)
+            time_ns = clock.time_ns(topic, log_ns, data) if clock else None
+            if time_ns is None:
+                continue
             message = self.bag.decode(topic, data)
-            times[topic].append(stamps.time_ns(topic, log_ns, data) * 1e-9)
+            times[topic].append(time_ns * 1e-9)
             for name, numbers in found[topic].items():
                 numbers.append(field_value(self.bag.topic(topic), message, name))
-            progress.at(done)
-        return {
-            topic: Rows(np.array(times[topic]), {name: _alike(numbers) for name, numbers in found[topic].items()})
-            for topic in wanted
-        }
+        rows = {}
+        for topic in wanted:
+            t_s = np.array(times[topic], dtype=np.float64)
+            order = np.argsort(t_s, kind="stable")  # stamps may be out of order
+            rows[topic] = Rows(t_s[order], {name: _alike(numbers)[order] for name, numbers in found[topic].items()})
+        return rows
 
     def _with_gaps(self, signals: Signals, rows: dict[str, Rows], health_topic: str, fields: set[str]) -> Rows:
         mine = rows[signals.topic]

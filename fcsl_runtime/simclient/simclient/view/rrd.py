@@ -12,7 +12,7 @@ from pathlib import Path
 
 import rerun as rr
 
-from ..bag import Bag
+from ..bag import Bag, formats
 from ..bag.states import StateReader
 from ..cli import Progress
 from ..complete_output import complete_or_absent
@@ -38,7 +38,7 @@ def to_rerun(
     `machine` selects one of several; `truth` is the plant's topic, by default every topic below /<namespace>/sim/.
     `views` takes the place of the bag's own.
     """
-    opened = bag if isinstance(bag, Bag) else Bag(bag)
+    opened = formats.opened(bag)
     run = RecordedRun(opened, machine, truth)
     assert run.machine is not None
     signals = [its for its in run.signals if its.name != MACHINE]
