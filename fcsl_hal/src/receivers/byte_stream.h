@@ -13,14 +13,14 @@ enum { BYTE_STREAM_MAX = 1024 }; /* bytes of the longest frame */
  * or when it is none the reason (fcsl_driver_why_t), negative. */
 typedef int32_t (*byte_stream_judge_t)(const uint8_t *bytes, uint32_t size);
 
-/* The bytes are last, and a stream is the last member of what holds it: what is read or written behind them lies outside of the
- * object, where EVA and the sanitizers see it. */
+/* The bytes are last, with no padding behind them, and a stream is the last member of what holds it: what is read or written behind
+ * them lies outside of the object, where EVA and the sanitizers see it. */
 typedef struct {
     uint32_t size; /* of what came, and was not dropped */
     uint32_t taken; /* of them, the frame that was returned last */
+    uint32_t why; /* fcsl_driver_why_t: the largest one that was told */
     uint64_t frames;
     uint64_t garbage; /* bytes that belong to no frame */
-    uint32_t why; /* fcsl_driver_why_t: the largest one that was told */
     uint8_t bytes[BYTE_STREAM_MAX];
 } byte_stream_t;
 
