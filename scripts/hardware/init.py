@@ -22,6 +22,7 @@ from typing import Any
 ORDERS = "orders.json"  # machine.ORDERS
 _CANNOT_START = 127
 _RB_POWER_OFF = 0x4321FEDC
+_MS_RDONLY = 1
 _SIOCGIFFLAGS, _SIOCSIFFLAGS, _IFF_UP = 0x8913, 0x8914, 1
 #: Folder, file system, options. /proc and /sys are folders of the host, empty in the guest until they are mounted.
 _MOUNTS = (
@@ -38,18 +39,18 @@ _OUTPUT, _ERRORS = "/dev/tty1", "/dev/tty2"
 _libc = ctypes.CDLL(None, use_errno=True)
 
 
-def mount(folder: str, kind: str, options: str) -> None:
-    if _libc.mount(b"none", folder.encode(), kind.encode(), 0, options.encode()) != 0:
+def mount(folder: str, kind: str, options: str, flags: int = 0) -> None:
+    if _libc.mount(b"none", folder.encode(), kind.encode(), flags, options.encode()) != 0:
         raise OSError(ctypes.get_errno(), f"mount {kind}", folder)
 
 
-def mount_all(writable: list[str]) -> None:
+def mount_all(readable: list[str], writable: list[str]) -> None:
     for folder, kind, options in _MOUNTS:
         Path(folder).mkdir(exist_ok=True)
         mount(folder, kind, options)
-    for folder in writable:
+    for folder, flags in (*((folder, _MS_RDONLY) for folder in readable), *((folder, 0) for folder in writable)):
         Path(folder).mkdir(parents=True, exist_ok=True)
-        mount(folder, "hostfs", folder)
+        mount(folder, "hostfs", folder, flags)
     os.symlink("/proc/self/fd", "/dev/fd")
 
 
@@ -86,7 +87,7 @@ def run(orders: dict[str, Any]) -> int:
 
 def main() -> None:
     orders = json.loads((Path(sys.argv[1]) / ORDERS).read_text())
-    mount_all(orders["writable"])
+    mount_all(orders["readable"], orders["writable"])
     raise_loopback()
     status = run(orders)
     Path("/proc/exitcode").write_text(f"{status}\n")

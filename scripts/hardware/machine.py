@@ -21,6 +21,8 @@ HERE = Path(__file__).resolve().parent
 ORDERS = "orders.json"
 #: Exit status of a run that took too long, as timeout(1) has it; of one whose kernel failed.
 TIMED_OUT, KERNEL_FAILED = 124, 125
+#: Folders that are the guest's own; init.py mounts them.
+_OWN = ("/tmp", "/run", "/dev/shm")
 _PANIC = "Kernel panic"
 _CHUNK_BYTES = 65536
 _MEMORY_MIB = 512
@@ -29,7 +31,8 @@ _MEMORY_MIB = 512
 @dataclass(frozen=True)
 class Machine:
     """`kernel` is what build.sh printed. The host's files are the guest's, and cannot be written, but for `writable`:
-    /tmp, /run and /dev/shm are the guest's own and empty."""
+    /tmp, /run and /dev/shm are the guest's own and empty, but for what it needs below them: this workspace, its Python, the
+    kernel's folder and this one."""
 
     kernel: Path
     writable: Sequence[Path] = field(default=())
@@ -46,7 +49,14 @@ class Machine:
         paths = [str(HERE.parent), *filter(None, [inside.get("PYTHONPATH")])]
         inside |= {"PYTHONPATH": ":".join(paths), "FCSL_I2C_STUB": str(self.kernel.with_name("i2c-stub.ko"))}
         writable = [str(path.resolve(strict=True)) for path in self.writable]
-        return {"command": list(command), "env": inside, "cwd": os.getcwd(), "writable": writable}
+        places = {"cwd": os.getcwd(), "readable": self._hidden(), "writable": writable}
+        return {"command": list(command), "env": inside, **places}
+
+    def _hidden(self) -> list[str]:
+        """Folders that the guest needs and would not see, those that hold others first."""
+        needed = (HERE.parents[1], Path(sys.prefix), self.kernel.parent, Path.cwd())
+        found = {path.resolve() for path in needed}
+        return sorted(str(path) for path in found if any(Path(own) in path.parents for own in _OWN))
 
     def _line(self, folder: Path, output: int, errors: int) -> list[str]:
         """The kernel's command line: its messages go to standard output, tty1 and tty2 are the command's output."""
