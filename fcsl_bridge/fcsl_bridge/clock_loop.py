@@ -21,6 +21,8 @@ from .polled import SERVE_PERIOD_S
 class ClockLoop(FreeRunning):
     """Before the first message of /clock there is no tick."""
 
+    _LACKS = "with mode clock there is no tick until a simulator or `ros2 bag play --clock` publishes it"
+
     def __init__(self, node: Node, hosted: Hosted, serve: Callable[[], None], options: Mapping[str, Any]):
         super().__init__(node, hosted, serve, simulated=True)
         self._ticks = ClockTicks(hosted.run.machine.tick_hz, options["max_ticks_per_clock"])

@@ -8,6 +8,7 @@ topics and in the bag. Tick numbers count steps: a tick that was skipped is none
 from __future__ import annotations
 
 import gc
+import math
 import time
 from collections.abc import Callable
 
@@ -18,15 +19,22 @@ from .hosted import Hosted
 from .mapped_topics import Inputs
 from .ros_time import RosTime
 
+#: Without a message of /clock for so long after the start a node says what it lacks, in s.
+_NO_CLOCK_S = 2.0
+
 
 class FreeRunning:
     """`serve` runs the node's other callbacks, and raises what ends the ticking. `simulated`: ROS time is that of /clock."""
+
+    #: What a node without /clock cannot do.
+    _LACKS = "with use_sim_time all stamps are 0 until a simulator or `ros2 bag play --clock` publishes it"
 
     def __init__(self, node: Node, hosted: Hosted, serve: Callable[[], None], simulated: bool):
         self._node, self._hosted, self._serve = node, hosted, serve
         self._inputs = Inputs(node, hosted.run)
         self._time = RosTime(node, simulated)
         self._stamp_ns = 0
+        self._clockless_at_s = 0.0
         hosted.sources.append(self)
         hosted.run.time_executes()
         unmapped = [c.name for c in hosted.run.machine.channels if c.direction == "sensor" and not c.ros_type]
@@ -42,6 +50,7 @@ class FreeRunning:
         self._hosted.run.record_time(self._stamp_ns)
         self._hosted.record()
         self._hosted.show_changes(self._stamp_ns)
+        self._clockless_at_s = time.monotonic() + _NO_CLOCK_S
         self._inputs.forget()
         gc.unfreeze()
         gc.collect()
@@ -67,7 +76,14 @@ class FreeRunning:
             self._time.follow()
             if self.now_ns() > 0:
                 self._inputs.warn_of_other_clocks("/clock" if self._time.simulated else "the system's clock")
+            self._warn_of_no_clock()
             self._hosted.diagnostics.publish(self._stamp_ns)
+
+    def _warn_of_no_clock(self) -> None:
+        """Logs once after each start."""
+        if self._time.simulated and not self._time.heard and time.monotonic() >= self._clockless_at_s:
+            self._clockless_at_s = math.inf
+            self._node.get_logger().warning(f"no message of /clock has come within {_NO_CLOCK_S:g} s: {self._LACKS}")
 
     def rest(self) -> None:
         """While inactive there is nothing to do."""

@@ -5,6 +5,7 @@ published topics.
 
 from __future__ import annotations
 
+import struct
 from collections.abc import Callable, Sequence
 from typing import Any
 
@@ -26,6 +27,10 @@ _SAFE_WAIT_S = 0.2
 
 #: A topic that many publish by design: a receiver picks what it needs by frame.
 _SHARED = "tf2_msgs/msg/TFMessage"
+#: Where a message has its frame: behind the encapsulation and the stamp; its length stands before it.
+_FRAMES_AT, _LENGTH = 12, struct.Struct("<I")
+#: Bytes of a frame that are shown.
+_FRAME_SHOWN = 80
 #: Stamps that lie this far from ROS time are of another clock, in ns.
 _OTHER_CLOCK_NS = 60_000_000_000
 
@@ -38,7 +43,7 @@ class Inputs:
         self._node = node
         topics = [topic for topic in topics_of(run.machine) if topic.direction == "sensor"]
         ready = [(topic, Inlet(run, topic), message_class(topic.type)) for topic in topics]
-        self._inlets = [_Input(t, inlet, Polled(node, kind, t.name, qos.SENSOR)) for t, inlet, kind in ready]
+        self._inlets = [_Input(node, t, inlet, Polled(node, kind, t.name, qos.SENSOR)) for t, inlet, kind in ready]
 
     def poll(self, now_ns: int, missing: frozenset[str]) -> None:
         """Delivers received messages for the next tick. now_ns: ROS time. Channels in `missing` get nothing."""
@@ -92,8 +97,9 @@ _HARMLESS = ("taken", "superseded")
 
 
 class _Input:
-    def __init__(self, topic: RosTopic, inlet: Inlet, polled: Polled):
-        self.topic, self._inlet, self._polled = topic, inlet, polled
+    def __init__(self, node: Node, topic: RosTopic, inlet: Inlet, polled: Polled):
+        self._node, self.topic, self._inlet, self._polled = node, topic, inlet, polled
+        self._frame_told = False
         self._superseded = self.contested = 0
         self.odd, self.warned = 0, False
 
@@ -110,9 +116,21 @@ class _Input:
     def poll(self, now_ns: int, missing: frozenset[str]) -> None:
         waiting = self._polled.take_all()
         while waiting:
-            if self._inlet.deliver(waiting.pop(), now_ns, missing):
+            message = waiting.pop()
+            if self._inlet.deliver(message, now_ns, missing):
                 break
+            if not self._frame_told and "frame" in self._inlet.counts():
+                self._frame_told = True
+                self._tell_frame(message)
         self._superseded += len(waiting)
+
+    def _tell_frame(self, data: bytes) -> None:
+        """Logs the frames of the first message that was refused for them."""
+        wanted = [text for text in (self.topic.frame, self.topic.child_frame) if text]
+        came = _frames(data, 2 if self.topic.child_frame else 1)[-len(wanted) :]
+        self._node.get_logger().warning(
+            f"{self.name}: refused: its frame is {' -> '.join(came)}, that of its channels {' -> '.join(map(repr, wanted))}"
+        )
 
     def forget(self) -> None:
         while self._polled.take_all():
@@ -124,6 +142,18 @@ class _Input:
 
     def close(self) -> None:
         self._polled.close()
+
+
+def _frames(data: bytes, count: int) -> list[str]:
+    """The first strings of a message behind its stamp, which may be cut: of the header, then of the child."""
+    found, at = [], _FRAMES_AT
+    for _ in range(count):
+        at += -at % _LENGTH.size
+        (size,) = _LENGTH.unpack_from(data, at) if at + _LENGTH.size <= len(data) else (0,)
+        at += _LENGTH.size
+        found.append(repr(data[at : at + size].rstrip(b"\0")[:_FRAME_SHOWN].decode(errors="replace")))
+        at += size
+    return found
 
 
 class Outputs:

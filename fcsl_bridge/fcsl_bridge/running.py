@@ -11,6 +11,8 @@ from dataclasses import dataclass
 from typing import Any
 
 import rclpy
+from lifecycle_msgs.msg import State
+from lifecycle_msgs.srv import GetState
 from rclpy.context import Context
 from rclpy.event_handler import SubscriptionEventCallbacks
 from rclpy.executors import SingleThreadedExecutor
@@ -64,6 +66,24 @@ class Watch:
             self._dead()
 
 
+class _LifeCycle:
+    """Whether the node of a machine ticks, as it was when this looked first."""
+
+    def __init__(self, node: Node, machine: Running):
+        self._client = node.create_client(GetState, f"{machine.node}/get_state")
+        self._answer: Any = None
+
+    def ask(self) -> None:
+        if self._answer is None and self._client.service_is_ready():
+            self._answer = self._client.call_async(GetState.Request())
+
+    @property
+    def is_active(self) -> bool:
+        """Also of a node that has not answered."""
+        told = self._answer.result() if self._answer is not None and self._answer.done() else None
+        return told is None or told.current_state.id == State.PRIMARY_STATE_ACTIVE
+
+
 class Graph:
     """A hidden node that looks for machines. Raises BridgeError: each message says what to do."""
 
@@ -93,17 +113,25 @@ class Graph:
             return []
 
     def states(self, seconds: float) -> dict[Running, str]:
-        """The machines that are found within this time, and their states; "" for one that has published none."""
+        """The machines that are found within this time, and their states; "" for one that has published none. One that
+        does not tick is `inactive`: the state that it published last is that of its last tick.
+        """
         watches: dict[Running, Watch] = {}
+        cycles = {}
 
         def look() -> bool:
             for machine in self.machines():
                 if machine not in watches:
                     watches[machine] = Watch(self._node, machine)
+                    cycles[machine] = _LifeCycle(self._node, machine)
+                cycles[machine].ask()
             return False
 
         self.until(look, seconds)
-        return {m: watch.states[-1].state if watch.states else "" for m, watch in sorted(watches.items())}
+        states = {m: watch.states[-1].state if watch.states else "" for m, watch in sorted(watches.items())}
+        return {
+            m: state if cycles[m].is_active else " ".join((state or "-", "(inactive)")) for m, state in states.items()
+        }
 
     def find(self, text: str, timeout_s: float) -> Running:
         """The machine of this name, or of this path where several have the name."""

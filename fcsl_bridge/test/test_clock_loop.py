@@ -50,6 +50,7 @@ class Clocked(Robot):
 
 def test_ticks_are_those_of_the_clock(domain: Domain, library: Path) -> None:
     robot = Clocked(domain, library)
+    robot.process.wait_for("no message of /clock has come within 2 s: with mode clock there is no tick until")
     robot.time_and_ticks(NS, 1)
     robot.sense(3.0, NS)
     robot.time_and_ticks(NS + 5 * NS // HZ, 6)

@@ -133,6 +133,7 @@ def test_the_newest_sample_counts_and_what_is_refused_is_counted(robot: Robot) -
     robot.sense(1.0, now)
     robot.listener.until(lambda: robot.torque() == 1.25)
     robot.sense(7.0, frame="other_link")
+    robot.process.wait_for("imu/data: refused: its frame is 'other_link', that of its channels 'imu_link'")
     robot.sense(float("nan"))
     robot.sense(7.0, now - NS)  # older than the one taken
     robot.sense(7.0, now + 3600 * NS)  # in the future
@@ -253,12 +254,13 @@ def test_a_killed_controller_leaves_a_bag_that_replays(robot: Robot) -> None:
 
 
 def test_simulated_time_that_stops_stops_no_tick(domain: Domain, library: Path) -> None:
-    """With use_sim_time and without /clock: stamps do not advance, the machine does."""
+    """With use_sim_time and without /clock: stamps do not advance, the machine does, and the node says what it lacks."""
     robot = Robot(domain, library, use_sim_time=True)
     (first,) = robot.memory("machine.tick")
     count = len(robot.torques)
     robot.listener.until(lambda: len(robot.torques) >= count + 20)
     assert robot.memory("machine.tick")[0] > first
+    robot.process.wait_for("no message of /clock has come within 2 s: with use_sim_time all stamps are 0 until")
     assert robot.end() == 0
 
 

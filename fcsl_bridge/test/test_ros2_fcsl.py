@@ -12,6 +12,7 @@ import pytest
 import rig
 import run_verb
 from bridge_harness import Domain
+from controller_client import ACTIVATE, DEACTIVATE, ControllerClient
 
 from simclient.run import open_run
 
@@ -50,7 +51,7 @@ def fleet(domain: Domain, library: Path, monkeypatch: pytest.MonkeyPatch, capsys
     return Fleet(domain, library, monkeypatch, capsys)
 
 
-def test_verbs(fleet: Fleet, library: Path) -> None:
+def test_verbs(domain: Domain, fleet: Fleet, library: Path) -> None:
     nothing, no_machine = fleet.empty
     assert nothing == "" and "error: no machine `rig` runs; no controller_node runs in ROS_DOMAIN_ID" in no_machine
 
@@ -64,6 +65,12 @@ def test_verbs(fleet: Fleet, library: Path) -> None:
         "/one/rig  SLOW  /one/controller_node",
         "/two/rig  FLY   /two/controller_node",
     ]
+
+    client = ControllerClient(domain.listener(), "/two/controller_node")
+    assert client.change(DEACTIVATE)
+    assert "/two/rig  FLY (inactive)  /two/controller_node" in fleet.says("list").splitlines()
+    assert client.change(ACTIVATE)
+    assert "(inactive)" not in fleet.says("list")
 
     refused = {
         ("set-state", "/one/rig", "SLO"): "/one/rig: no state `SLO`; did you mean `SLOW`?",
