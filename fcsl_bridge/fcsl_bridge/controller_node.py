@@ -20,12 +20,18 @@ from typing import Any
 from lifecycle_msgs.srv import ChangeState
 from rclpy._rclpy_pybind11 import RCLError
 from rclpy.lifecycle import LifecycleNode, LifecycleState, TransitionCallbackReturn
+from rclpy.node import Node
+from rclpy.parameter import Parameter
+
+from simclient.run import open_run
 
 from . import bus_address, tf
 from .clock_loop import ClockLoop
 from .errors import BridgeError, Stopped
 from .hosted import Hosted
 from .lockstep_loop import LockstepLoop
+from .machine_index import find_machine
+from .namesake import Namesake
 from .node_main import (
     BAD_INPUT,
     Option,
@@ -63,6 +69,7 @@ MODES: dict[str, type[LockstepLoop | RealtimeLoop | ClockLoop]] = {
     "realtime": RealtimeLoop,
     "clock": ClockLoop,
 }
+_NAME = "controller_node"
 _SUCCESS, _FAILURE, _ERROR = (
     TransitionCallbackReturn.SUCCESS,
     TransitionCallbackReturn.FAILURE,
@@ -85,6 +92,7 @@ class ControllerNode(LifecycleNode):
         self._failure: Exception | None = None
         self._ending = "shut down"
         self._given: dict[str, Any] = {}
+        self._namesake = Namesake(self)
         for service in self.services:
             if service.srv_type is ChangeState:
                 service.callback = _refusing(service.callback)
@@ -248,6 +256,7 @@ class ControllerNode(LifecycleNode):
         if self._hosted is None or self._mode is None or self._active:
             return
         self._mode.rest()
+        self._namesake.look()
         self._hosted.topics.say_alive()
         if self._hosted.diagnostics.due(active=False):
             self._hosted.diagnostics.publish(self._mode.now_ns(), active=False)
@@ -256,6 +265,7 @@ class ControllerNode(LifecycleNode):
         self._housekeeping.serve()
         if not self._active or self._hosted is None:
             raise _Inactive
+        self._namesake.look()
         self._hosted.topics.say_alive()
 
 
@@ -287,5 +297,20 @@ def _body(node: ControllerNode, stop: Stop) -> int:
     return node.serve(stop)
 
 
+def _called_like_its_machine(node: Node) -> str:
+    """Two machines of a namespace are two nodes. One that cannot be found yet is named when it is configured."""
+    try:
+        library, machine = find_machine(str(node.get_parameter_or("machine", Parameter("machine", value="")).value))
+        run = open_run(library, machine)
+    except BAD_INPUT:
+        return _NAME
+    try:
+        return run.machine.name
+    finally:
+        run.close()
+
+
 def main() -> None:
-    sys.exit(run_node("controller_node", OPTIONS, _body, kind=ControllerNode, parameter_services=True))
+    sys.exit(
+        run_node(_NAME, OPTIONS, _body, kind=ControllerNode, parameter_services=True, called=_called_like_its_machine)
+    )

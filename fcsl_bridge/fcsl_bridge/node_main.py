@@ -35,7 +35,8 @@ from .loopback import loopback_environment
 
 _MATCH_POLL_S = 0.02
 #: Parameters that rclpy itself declares.
-_ROS_PARAMETERS = ("use_sim_time", "start_type_description_service", "qos_overrides")
+_DESCRIBES_TYPES = "start_type_description_service"
+_ROS_PARAMETERS = ("use_sim_time", _DESCRIBES_TYPES, "qos_overrides")
 #: Errors of input or environment; str() is the complete message.
 BAD_INPUT = (BridgeError, TwinError, MapError, ViewError, SimError, PackageNotFound)
 _ROS_ERRORS = (RCLError, RCLInvalidROSArgsError, UnknownROSArgsError)
@@ -79,9 +80,11 @@ def run_node(
     body: Callable[[Any, Stop], int],
     kind: type[Node] = Node,
     parameter_services: bool = False,
+    called: Callable[[Node], str] | None = None,
 ) -> int:
     """Runs `body` in a node of class `kind` called `name`; returns the exit status. An error is one message and
-    status 1. Without `parameter_services` the parameters hold for the whole run.
+    status 1. Without `parameter_services` the parameters hold for the whole run. `called`: another name, which follows
+    from the parameters of a node called `name`; `-r __node:=…` wins over both.
 
     `-h` and `--help` print the options, `--version` name and version, and do nothing else.
     """
@@ -97,12 +100,17 @@ def run_node(
         _refuse_arguments(sys.argv[1:])
         os.environ.update(loopback_environment(os.environ))
         rclpy.init(args=sys.argv, signal_handler_options=SignalHandlerOptions.NO)
+        # Saves one entity in each wait of the executor.
+        given = {_DESCRIBES_TYPES: Parameter(_DESCRIBES_TYPES, value=False)}
+        own_name = name
+        if called is not None:
+            own_name, parameters = _look_ahead(name, called)
+            given = parameters | given
         node = kind(
-            name,
+            own_name,
             automatically_declare_parameters_from_overrides=True,
             start_parameter_services=parameter_services,
-            # Saves one entity in each wait of the executor.
-            parameter_overrides=[Parameter("start_type_description_service", value=False)],
+            parameter_overrides=list(given.values()),
         )
         status = body(node, stop)
         sys.stdout.flush()
@@ -126,6 +134,21 @@ def run_node(
             node.destroy_node()
         rclpy.try_shutdown()
     return 1
+
+
+def _look_ahead(name: str, called: Callable[[Node], str]) -> tuple[str, dict[str, Parameter]]:
+    """What the node is to be called, and its parameters, which a file may give to `name`."""
+    node = Node(
+        name,
+        automatically_declare_parameters_from_overrides=True,
+        start_parameter_services=False,
+        enable_rosout=False,
+        parameter_overrides=[Parameter(_DESCRIBES_TYPES, value=False)],
+    )
+    try:
+        return called(node), dict(node.get_parameters_by_prefix(""))
+    finally:
+        node.destroy_node()
 
 
 def _report(node: Node | None, name: str, text: str) -> None:

@@ -28,7 +28,7 @@ SHUTDOWN = {
 class ControllerClient:
     """Calls the services of one controller node through a listener."""
 
-    def __init__(self, listener: Listener, node: str = "/controller_node"):
+    def __init__(self, listener: Listener, node: str = "/rig"):
         self._listener, self._node = listener, node
         self._clients: dict[str, Any] = {}
 

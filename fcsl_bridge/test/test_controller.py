@@ -53,7 +53,7 @@ def locked(domain: Domain, **parameters: Any) -> tuple[Process, ControllerClient
     listener = domain.listener()
     sim = domain.simulator(listener)
     process = domain.start("controller_node", machine=MACHINE, record=domain.folder / "bag", **parameters)
-    return process, ControllerClient(listener), sim
+    return process, ControllerClient(listener, "/lander_control"), sim
 
 
 def free(domain: Domain, library: Path, **parameters: Any) -> tuple[Process, ControllerClient]:
@@ -162,7 +162,7 @@ def test_a_signal_at_any_moment_leaves_a_bag_or_none(domain: Domain, library: Pa
 def test_what_fails_leads_back_to_unconfigured(domain: Domain, library: Path) -> None:
     later = domain.folder / "later" / library.name
     process = domain.start("controller_node", machine=later, autostart=False, start_timeout_s=0.3)
-    client = ControllerClient(domain.listener())
+    client = ControllerClient(domain.listener(), "/controller_node")
     assert not client.change(CONFIGURE) and client.state == "unconfigured"
     process.wait_for(f"no such library: {later}")
     later.parent.symlink_to(library.parent)
@@ -190,11 +190,11 @@ def test_topics_and_services_come_and_go(domain: Domain, library: Path) -> None:
 
     def graph() -> set[str]:
         node = client._listener.node
-        if "controller_node" not in node.get_node_names():
+        if "rig" not in node.get_node_names():
             return set()  # not discovered yet
-        services = node.get_service_names_and_types_by_node("controller_node", "/")
-        topics = node.get_publisher_names_and_types_by_node("controller_node", "/")
-        taken = node.get_subscriber_names_and_types_by_node("controller_node", "/")
+        services = node.get_service_names_and_types_by_node("rig", "/")
+        topics = node.get_publisher_names_and_types_by_node("rig", "/")
+        taken = node.get_subscriber_names_and_types_by_node("rig", "/")
         return {name for name, _ in (*services, *topics, *taken)}
 
     lifecycle = (
@@ -202,7 +202,7 @@ def test_topics_and_services_come_and_go(domain: Domain, library: Path) -> None:
     )
     parameters = "describe_parameters get_parameter_types get_parameters list_parameters set_parameters"
     own = f"{lifecycle} {parameters} set_parameters_atomically".split()
-    before = {"/rosout", "/parameter_events", *(f"/controller_node/{name}" for name in own)}
+    before = {"/rosout", "/parameter_events", *(f"/rig/{name}" for name in own)}
     assert client.state == "unconfigured"
     client._listener.until(lambda: graph() == before)
     assert client.change(CONFIGURE)
@@ -215,10 +215,23 @@ def test_topics_and_services_come_and_go(domain: Domain, library: Path) -> None:
         "/rig/transitions",
         "/diagnostics",
     }
-    made |= {f"/controller_node/{name}" for name in ("describe", "set_state", "save", "restore", "inject_fault")}
+    made |= {f"/rig/{name}" for name in ("describe", "set_state", "save", "restore", "inject_fault")}
     client._listener.until(lambda: graph() == before | made)
     assert client.change(CLEANUP)
     client._listener.until(lambda: graph() == before)
+
+
+def test_two_of_one_name_say_so(domain: Domain, library: Path) -> None:
+    """A node is called like its machine, or as the user says; a machine that cannot be found names none."""
+    one, client = free(domain, library)
+    assert client.state == "active"
+    other = domain.start("controller_node", "-r", "__node:=other", machine=library, mode="realtime")
+    assert ControllerClient(domain.listener(), "/other").state == "active"
+    assert domain.start("controller_node", machine="none/none").finish() == 1
+    two = domain.start("controller_node", machine=library, mode="realtime")
+    for process in (one, two):
+        process.wait_for("another node is called /rig, too: parameters and services reach either")
+    assert "is called" not in other.err
 
 
 def grown(process: Process) -> tuple[int, int]:
@@ -289,7 +302,7 @@ def test_a_controller_that_waits_for_subscribers_or_is_inactive_is_alive(domain:
     waiting = Watcher(client, "/rig/state")
     client._listener.until(lambda: waiting.alive[-1:] == [1])
     domain.start("controller_node", "-r", "__ns:=/b", machine=library, mode="realtime", autostart=False)
-    client = ControllerClient(domain.listener(), "/b/controller_node")
+    client = ControllerClient(domain.listener(), "/b/rig")
     inactive = Watcher(client, "/b/rig/state")
     assert client.change(CONFIGURE)
     client._listener.until(lambda: inactive.alive[-1:] == [1])

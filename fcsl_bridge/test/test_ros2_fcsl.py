@@ -62,13 +62,13 @@ def test_verbs(domain: Domain, fleet: Fleet, library: Path) -> None:
     while fleet.says("state", "/one/rig") != "SLOW\n":
         pass
     assert fleet.says("list").splitlines() == [
-        "/one/rig  SLOW  /one/controller_node",
-        "/two/rig  FLY   /two/controller_node",
+        "/one/rig  SLOW  /one/rig",
+        "/two/rig  FLY   /two/rig",
     ]
 
-    client = ControllerClient(domain.listener(), "/two/controller_node")
+    client = ControllerClient(domain.listener(), "/two/rig")
     assert client.change(DEACTIVATE)
-    assert "/two/rig  FLY (inactive)  /two/controller_node" in fleet.says("list").splitlines()
+    assert "/two/rig  FLY (inactive)  /two/rig" in fleet.says("list").splitlines()
     assert client.change(ACTIVATE)
     assert "(inactive)" not in fleet.says("list")
 
