@@ -15,7 +15,8 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from foreign_bags import ROS2_FORMATS
+from foreign_bags import ROS2_FORMATS, header, imu, make
+from foreign_bags import write as write_foreign
 from hypothesis import example, given, settings
 from hypothesis import strategies as st
 from rosbags.highlevel import AnyReader
@@ -370,6 +371,35 @@ def test_columns_are_chosen_by_pattern_and_gaps_stay_empty(tmp_path: Path, fly: 
     assert [(r["time_s"], r["/engine/temperature:temperature"]) for r in csv.DictReader(out.open())] == [
         ("0.000000005", "1.0"), ("0.000000007", "2.0"), ("0.000000007", "3.0")
     ]  # fmt: skip
+
+
+@pytest.mark.parametrize("suffix", [".csv", ".npz", ".parquet"])
+def test_large_arrays_have_no_columns_without_being_named(
+    suffix: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """A column for each byte of an image would fill the memory; so would many images that wait to be converted."""
+    monkeypatch.setattr("simclient.bag.export._STACK_BYTES", 100_000)
+    pixels = np.arange(48_000) % 251
+    image = make("sensor_msgs/msg/Image", header=header(10**9), height=120, width=400, data=pixels.astype(np.uint8))
+    poses = [make("geometry_msgs/msg/PoseStamped", header=header(10**9)) for _ in range(1200)]
+    path = make("nav_msgs/msg/Path", header=header(10**9), poses=poses)
+    messages = {
+        "/image": [(10**9 + i, image) for i in range(5)],
+        "/path": [(10**9, path)],
+        "/imu": [(10**9, imu(10**9))],
+    }
+    bag, target = write_foreign(tmp_path / "bag", messages), tmp_path / f"x{suffix}"
+    done = tool("export", bag, "-o", target)
+    assert done.returncode == 0, done.stderr
+    assert (
+        "left out, as arrays of over 1000 elements (--columns NAME takes one): /image:data, /path:poses" in done.stdout
+    )
+    assert target.stat().st_size < 100_000
+    found = select(open_bag(bag), ["/image:data"])
+    assert found.series[0].columns["/image:data"].shape == (5, 48_000) and not found.too_large
+    assert (found.series[0].columns["/image:data"][4] == pixels).all()
+    with pytest.raises(BagError, match="nothing to export but arrays of over 1000 elements.*: /path:poses"):
+        select(open_bag(bag), ["/path:poses*"])
 
 
 def test_parquet_without_pyarrow_is_a_message(fly: Fly, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:

@@ -31,6 +31,7 @@ from mcap.writer import CompressionType
 from simclient import BagError, MapError
 from simclient.bag.digest import digest
 from simclient.bag.formats import open_bag
+from simclient.bag.ros1_file import Ros1File
 from simclient.replay import replay_foreign
 from simclient.replay.foreign import ForeignRun
 
@@ -178,6 +179,49 @@ def test_a_type_of_ones_own(run: Runs, wanted: str, tmp_path: Path) -> None:
         for time_ns, topic, message in in_order(content())
     ]
     assert run(write_mcap(tmp_path / "bag.mcap", messages)).digest == wanted
+
+
+def long(count: int) -> dict[str, list[tuple[int, object]]]:
+    """More than one chunk of ROS 1."""
+    times = [START + i * MS for i in range(count)]
+    return {
+        "/imu": [(time_ns, imu(time_ns, (i, 0, 0))) for i, time_ns in enumerate(times)],
+        "/level": [(START, number(0))],
+    }
+
+
+@pytest.mark.parametrize("form", ["sqlite3", "sqlite3-message", "ros1", "ros1-bz2", "ros1-lz4"])
+def test_a_bag_that_is_cut_off_runs_as_far_as_it_goes(form: str, run: Runs, tmp_path: Path) -> None:
+    bag = write(tmp_path / "bag", long(9000), form)
+    file = bag if bag.is_file() else next(bag.glob("*.db3"))
+    file.write_bytes(file.read_bytes()[: file.stat().st_size * 6 // 10])
+    done = run(bag)
+    assert 2000 < done.fates["imu.gyro"].messages < 6500 and not done.fates["imu.gyro"].refused
+    assert file.name in done.truncated
+
+
+def test_a_bag_of_ros1_that_was_not_closed(run: Runs, tmp_path: Path) -> None:
+    """The recorder was killed: the header names no index, and the last chunk has no length yet."""
+    bag, active = write(tmp_path / "bag", long(9000), "ros1"), tmp_path / "bag.bag.active"
+    data, last = bytearray(bag.read_bytes()), Ros1File(bag).pieces[-1]
+    index = data.index(b"index_pos=") + len(b"index_pos=")
+    data[index : index + 8] = bytes(8)
+    data[last.begin - 4 : last.begin] = bytes(4)
+    active.write_bytes(data[: last.end - 100])
+    done = run(active)
+    assert done.fates["imu.gyro"].messages > 8900
+    assert done.truncated.startswith("bag.bag.active breaks off after 9000 messages")
+
+
+@pytest.mark.parametrize("form", ["ros1", "ros1-bz2"])
+def test_what_is_behind_a_bad_chunk_of_ros1_is_read(form: str, run: Runs, tmp_path: Path) -> None:
+    bag = write(tmp_path / "bag", long(9000), form)
+    data, first = bytearray(bag.read_bytes()), Ros1File(bag).pieces[0]
+    data[first.begin : first.begin + 40] = b"\xff" * 40
+    bag.write_bytes(data)
+    done = run(bag)
+    assert 1000 < done.fates["imu.gyro"].messages < 9000
+    assert f"bag.bag lacks bytes {first.begin} to {first.end} (a damaged chunk)" in done.truncated
 
 
 @pytest.mark.parametrize("form", ["sqlite3", "ros1", "ros1-lz4"])

@@ -95,7 +95,7 @@ def _diff(options: argparse.Namespace) -> int:
 
 
 def _export(options: argparse.Namespace) -> int:
-    from .export import select, write
+    from .export import ELEMENTS_MAX, select, write
 
     bag = open_bag(options.bag, options.msg_path)
     found = select(bag, options.columns or (), options.machine, options.time)
@@ -106,6 +106,10 @@ def _export(options: argparse.Namespace) -> int:
         print(f"left out, because they have no time: {'; '.join(found.clock.timeless)}")
     if found.left_out:
         print(f"left out, because their size differs between messages: {', '.join(found.left_out)}")
+    if found.too_large:
+        print(
+            f"left out, as arrays of over {ELEMENTS_MAX} elements (--columns NAME takes one): {', '.join(found.too_large)}"
+        )
     return completeness("simclient.bag", bag.truncated)
 
 

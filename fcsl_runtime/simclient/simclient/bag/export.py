@@ -14,7 +14,7 @@ from __future__ import annotations
 
 import csv
 import fnmatch
-from collections.abc import Iterator, Sequence
+from collections.abc import Collection, Iterator, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
@@ -31,8 +31,10 @@ from .stamps import Clock
 from .words import spelled, words_of
 
 FORMATS = (".csv", ".parquet", ".npz")
-#: Messages converted to numbers in one call.
-_STACK = 4096
+#: Messages converted to numbers in one call, and about their bytes.
+_STACK, _STACK_BYTES = 4096, 16 << 20
+#: Most elements of an array that has columns without being named.
+ELEMENTS_MAX = 1000
 #: Rows of a CSV file written in one call.
 _CSV_ROWS = 10_000
 _FRAME = ("header.stamp.sec", "header.stamp.nanosec", "header.frame_id")
@@ -49,24 +51,33 @@ class Series:
 
 
 class _Collector:
-    """Gathers the values of one topic's messages."""
+    """Gathers the values of one topic's messages. Arrays of more than ELEMENTS_MAX only if `named` has their column."""
 
-    def __init__(self, bag: Bag, topic: str, prefix: str):
+    def __init__(self, bag: Bag, topic: str, prefix: str, named: Collection[str]):
         self.topic, self.prefix = topic, prefix
-        self._bag = bag
+        self._bag, self._named = bag, named
         # One tick column serves all topics of a machine: that of its states.
         self._unwanted = _FRAME if prefix.endswith(":") or prefix == "machine." else (*_FRAME, "tick")
         self._layout = bag.layout(topic)
         self._waiting: list[bytes] = []
+        self._bytes = 0
         self._times: list[int] = []
         self._parts: list[dict[str, Array]] = []
         self.left_out: set[str] = set()
+        self.too_large: set[str] = set()
 
     def take(self, time_ns: int, data: bytes) -> None:
         self._times.append(time_ns)
         self._waiting.append(data)
-        if len(self._waiting) == _STACK:
+        self._bytes += len(data)
+        if len(self._waiting) == _STACK or self._bytes > _STACK_BYTES:
             self._convert()
+
+    def _is_too_large(self, name: str, elements: int) -> bool:
+        if elements <= ELEMENTS_MAX or self.prefix + name in self._named:
+            return False
+        self.too_large.add(name)
+        return True
 
     def _convert(self) -> None:
         if not self._waiting:
@@ -74,19 +85,26 @@ class _Collector:
         layout = self._layout
         if layout is not None and all(layout.fits(data) for data in self._waiting):
             rows = layout.stack(self._waiting)
-            part = {name: rows[name] for name in layout.leaves if name not in self._unwanted}
+            part = {
+                name: rows[name]
+                for name in layout.leaves
+                if name not in self._unwanted and not self._is_too_large(name, rows[name].size // len(rows))
+            }
             part |= {n: c.astype(bool) for n, c in part.items() if layout.leaves[n].ros_type == "bool"}
         else:
             part = self._one_by_one()
         self._parts.append(part)
         self._waiting.clear()
+        self._bytes = 0
 
     def _one_by_one(self) -> dict[str, Array]:
         """Numbers, strings and arrays of numbers. Fields whose size differs between messages are left out."""
         gathered: dict[str, list[Any]] = {}
         for data in self._waiting:
-            for name, value in flat(self._bag.decode(self.topic, data)):
-                gathered.setdefault(name, []).append(value)
+            for name, value in flat(self._bag.decode(self.topic, data), most=ELEMENTS_MAX):
+                # A string is one value, whatever its length.
+                if not self._is_too_large(name, 1 if isinstance(value, str) else np.size(value)):
+                    gathered.setdefault(name, []).append(value)
         part = {}
         for name, values in gathered.items():
             if name in self._unwanted:
@@ -102,7 +120,7 @@ class _Collector:
         """All gathered values; healths and requests of a machine as words. Fields whose size changes are left out."""
         self._convert()
         columns = {}
-        for name in dict.fromkeys(name for part in self._parts for name in part):
+        for name in dict.fromkeys(name for part in self._parts for name in part if name not in self.too_large):
             parts = [part[name] for part in self._parts if name in part]
             if len(parts) != len(self._parts) or len({part.shape[1:] for part in parts}) != 1:
                 self.left_out.add(name)
@@ -117,11 +135,14 @@ class _Collector:
 
 @dataclass
 class Export:
-    """The chosen columns of a bag. `left_out` names fields without a column: their size differs between messages."""
+    """The chosen columns of a bag. `left_out` names fields without a column, because their size differs between messages;
+    `too_large` arrays of more than ELEMENTS_MAX.
+    """
 
     series: list[Series]
     clock: Clock
     left_out: list[str] = field(default_factory=list)
+    too_large: list[str] = field(default_factory=list)
 
 
 def select(bag: Bag, patterns: Sequence[str] = (), machine: str = "", time: str = "") -> Export:
@@ -131,7 +152,7 @@ def select(bag: Bag, patterns: Sequence[str] = (), machine: str = "", time: str 
     held in memory. `time` chooses the clock (stamps.Clock). Raises BagError when nothing matches.
     """
     prefixes = _prefixes(bag, machine)
-    collectors = {topic: _Collector(bag, topic, prefix) for topic, prefix in prefixes.items()
+    collectors = {topic: _Collector(bag, topic, prefix, patterns) for topic, prefix in prefixes.items()
                   if not patterns or _may_match(topic, prefix, patterns)}  # fmt: skip
     clock = Clock(bag, collectors, time)
     progress = Progress("reading", sum(bag.topics[topic].count for topic in collectors))
@@ -143,16 +164,19 @@ def select(bag: Bag, patterns: Sequence[str] = (), machine: str = "", time: str 
     found = Export([], clock)
     for collector in collectors.values():
         series = collector.series()
-        every = [collector.prefix + name for name in collector.left_out]
-        if patterns and not _matches(series.topic, patterns):
+        whole = not patterns or _matches(series.topic, patterns)
+        if not whole:
             series.columns = {n: c for n, c in series.columns.items() if _matches(n, patterns)}
-            every = [name for name in every if _matches(name, patterns)]
-        found.left_out += sorted(every)
+        for told, without in ((found.left_out, collector.left_out), (found.too_large, collector.too_large)):
+            every = [collector.prefix + name for name in sorted(without)]
+            told += [name for name in every if whole or _matches(name, patterns)]
         if series.columns and len(series.times):
             found.series.append(series)
     if not found.series:
         names = [*prefixes, *(prefix for prefix in prefixes.values())]
         hint = did_you_mean(patterns[0], names) if patterns else ""
+        if found.too_large:
+            hint = f" but arrays of over {ELEMENTS_MAX} elements, which --columns takes by name: {', '.join(found.too_large)}"
         raise BagError(f"{bag.path}: nothing to export{hint}; it holds {', '.join(sorted(prefixes))}")
     return found
 

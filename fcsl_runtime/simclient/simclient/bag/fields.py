@@ -52,16 +52,21 @@ def leaf_names(message: Any, prefix: str = "") -> list[str]:
     return names
 
 
-def flat(message: Any, prefix: str = "") -> Iterator[tuple[str, Any]]:
-    """(path, value) of every leaf of a decoded message; messages in sequences one by one, arrays of numbers whole."""
+def flat(message: Any, prefix: str = "", most: int | None = None) -> Iterator[tuple[str, Any]]:
+    """(path, value) of every leaf of a decoded message; messages in sequences one by one, arrays of numbers whole.
+
+    Sequences of more than `most` messages are whole, too.
+    """
     for name in message.__dataclass_fields__:
         if name == "__msgtype__":
             continue
         value = getattr(message, name)
         if hasattr(value, "__msgtype__"):
-            yield from flat(value, f"{prefix}{name}.")
-        elif isinstance(value, list) and value and hasattr(value[0], "__msgtype__"):
+            yield from flat(value, f"{prefix}{name}.", most)
+        elif (
+            isinstance(value, list) and value and hasattr(value[0], "__msgtype__") and (not most or len(value) <= most)
+        ):
             for i, item in enumerate(value):
-                yield from flat(item, f"{prefix}{name}[{i}].")
+                yield from flat(item, f"{prefix}{name}[{i}].", most)
         else:
             yield prefix + name, value

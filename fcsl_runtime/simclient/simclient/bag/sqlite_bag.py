@@ -17,6 +17,7 @@ from ..errors import BagError
 from .bag import Array, Bag, Topic
 from .batch import Message, batch_of
 from .files import bag_files
+from .sqlite_pages import SqlitePages
 from .time_order import Block, Part, in_time_order
 
 #: Messages per batch.
@@ -32,13 +33,14 @@ _SQLITE_ERRORS = (sqlite3.Error, TypeError, ValueError, OverflowError)
 class _File:
     """A file: its topics by number; of each message in the order of recording its row, topic and time.
 
-    `damage`: why there are no more.
+    `damage`: why there are no more. `pages` has them where sqlite does not find them.
     """
 
     path: Path
     topics: dict[int, Topic]
     rows: Array
     damage: str = ""
+    pages: SqlitePages | None = None
 
     def chosen(self, topics: Collection[str] | None) -> Array:
         """The rows of messages of `topics` (None: all)."""
@@ -69,6 +71,10 @@ class SqliteBag(Bag):
                 raise BagError(f"{file}: not an sqlite3 bag, or a damaged one ({error})") from None
             self._damaged(file, f"{file.name} cannot be read ({error})")
         if found.damage:
+            pages = SqlitePages(file)
+            if len(pages.rows) > len(found.rows):
+                found.pages = pages
+                found.rows = np.array([row[:3] for row in pages.rows.values()], _ROW)
             self._damaged(file, f"{file.name} breaks off after {len(found.rows)} messages ({found.damage})")
         unmerged = file.with_name(file.name + "-wal")
         if unmerged.is_file() and unmerged.stat().st_size:
@@ -100,9 +106,7 @@ class SqliteBag(Bag):
                 some: list[Message] = []
                 for row, number, log_ns in rows[begin : begin + _BATCH].tolist():
                     try:
-                        (data,) = database.execute("SELECT data FROM messages WHERE rowid = ?", (row,)).fetchone()
-                        # No type accepts empty bytes, so text counts as a damaged message.
-                        some.append((number, log_ns, data if isinstance(data, bytes) else b""))
+                        some.append((number, log_ns, file.pages.data(row) if file.pages else _data(database, row)))
                     except _SQLITE_ERRORS as error:
                         lost, why = lost + 1, str(error)
                 batch = batch_of(some)
@@ -140,3 +144,8 @@ def _rows(database: sqlite3.Connection) -> tuple[Array, str]:
     except _SQLITE_ERRORS as error:
         damage = str(error)
     return np.concatenate(parts), damage
+
+
+def _data(database: sqlite3.Connection, row: int) -> bytes:
+    (data,) = database.execute("SELECT data FROM messages WHERE rowid = ?", (row,)).fetchone()
+    return data if isinstance(data, bytes) else b""  # no type accepts empty bytes: text counts as a damaged message
