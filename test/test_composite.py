@@ -26,6 +26,7 @@ SIM = ROOT / "examples/lander/sim/lander.sim.json"
 LIBRARY = Path(get_package_share_directory("lander")).parents[1] / "lib/lander/liblander_machines.so"
 FC = package_prefix("fcsl_runtime") / "bin/fcsl-fc"
 LONG_S = 60
+LATE = re.compile(r"the simulator is [2-9](\.\d+)? s behind real time at tick \d+: beside real devices")
 BOARD = {
     "machine": str(ROOT / "examples/lander/fc/lander_control.json"),
     "devices": {"lidar": {"driver": "iio", "device": "lidar", "rate_hz": 200}},
@@ -93,8 +94,19 @@ def connected(socket: Path) -> VarClient:
 
 
 def test_one_sensor_is_real(plan: Path, tmp_path: Path) -> None:
-    """It cannot be paused, it replays, and a simulator that stops is told."""
-    wire, socket, bag = f"unix:{tmp_path / 'wire'}", tmp_path / "socket", tmp_path / "bag"
+    """It cannot be paused, it replays, and a simulator that stops is told. On a busy computer the simulator may fall behind
+    real time before the test stops it: then this is tried again."""
+    for attempt in range(8):
+        folder = tmp_path / str(attempt)
+        folder.mkdir()
+        if fly_with_one_real_sensor(plan, folder):
+            return
+    raise AssertionError("the simulator was late in every attempt")
+
+
+def fly_with_one_real_sensor(plan: Path, folder: Path) -> bool:
+    """False if the simulator was late by itself."""
+    wire, socket, bag = f"unix:{folder / 'wire'}", folder / "socket", folder / "bag"
     hal = f"composite:{plan},wire:{wire}"
     with simulated(wire, "--speed", "1") as sim, flown(hal, "--socket", socket, "--record", bag) as fc:
         client = connected(socket)
@@ -102,22 +114,26 @@ def test_one_sensor_is_real(plan: Path, tmp_path: Path) -> None:
         def get(path: str) -> object:
             return client.get(path)[path]
 
-        until(lambda: get("hal.sensors.altimeter.primary") == 1 and int(str(get("machine.tick"))) > 30)
-        assert get("sensors.outputs.pos_z") == 3.25
-        assert get("sensors.outputs.vel_z") not in (0.0, 3.25)
-        assert get("hal.commands") and get("hal.devices.lidar.samples")
-        with pytest.raises(VarError, match="real devices, which do not wait"):
-            client.pause()
+        try:
+            until(lambda: get("hal.sensors.altimeter.primary") == 1 and int(str(get("machine.tick"))) > 30)
+            assert get("sensors.outputs.pos_z") == 3.25
+            assert get("sensors.outputs.vel_z") not in (0.0, 3.25)
+            assert get("hal.commands") and get("hal.devices.lidar.samples")
+            with pytest.raises(VarError, match="real devices, which do not wait"):
+                client.pause()
+        except VarError:
+            _, complaint = fc.communicate(timeout=LONG_S)
+            assert LATE.search(complaint), complaint
+            return False
         sim.send_signal(signal.SIGSTOP)
         out, complaint = fc.communicate(timeout=LONG_S)
         client.close()
     assert fc.returncode == 1
-    assert re.search(
-        r"the simulator is [2-9](\.\d+)? s behind real time at tick \d+: beside real devices", complaint
-    ), complaint
+    assert LATE.search(complaint), complaint
     assert f"sensors of the board {plan} instead of the simulator's" in out and "paced in real time" in out
     whole = replay(bag, library=str(LIBRARY), machine="lander_control", board=plan)
     assert whole.identical and whole.ticks > 30, str(whole)
+    return True
 
 
 def test_a_simulator_that_is_too_fast(plan: Path, tmp_path: Path) -> None:

@@ -42,25 +42,30 @@ typedef struct {
     const uint8_t *bytes;
     size_t size;
     size_t first; /* bytes of the first part */
+    atomic_int sent; /* the second part, too */
 } serial_parts_t;
 
 static inline void *serial_rig_send_parts(void *argument)
 {
-    const serial_parts_t *parts = argument;
+    serial_parts_t *parts = argument;
     serial_rig_send(parts->line, parts->bytes, parts->first);
     monotonic_wait(monotonic_ns() + 500000u);
     serial_rig_send(parts->line, parts->bytes + parts->first, parts->size - parts->first);
+    atomic_store(&parts->sent, 1);
     return NULL;
 }
 
-/* Reads while the bytes come in two parts. */
+/* Reads while the bytes come in two parts. On a busy computer the sender may be late, and reads give nothing until then. */
 static inline fcsl_driver_status_t serial_rig_read_parts(rig_t *rig, serial_parts_t parts)
 {
     pthread_t sender;
     CHECK(pthread_create(&sender, NULL, serial_rig_send_parts, &parts) == 0);
-    const fcsl_driver_status_t status = rig_read(rig);
+    fcsl_driver_status_t status = rig_read(rig);
+    while (status == FCSL_DRIVER_NOTHING && atomic_load(&parts.sent) == 0) {
+        status = rig_read(rig);
+    }
     CHECK(pthread_join(sender, NULL) == 0);
-    return status;
+    return status == FCSL_DRIVER_NOTHING ? rig_read(rig) : status;
 }
 
 /* ---- bytes without end -------------------------------------------------------------------------------------------------- */
