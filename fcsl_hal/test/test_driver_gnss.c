@@ -85,7 +85,7 @@ static void check_ubx(void)
     check_no_values(&rig, 3.0);
     for (size_t first = 1; first < PVT_FRAME; first++) {
         serial_rig_send(&line, GARBAGE, sizeof GARBAGE);
-        CHECK(serial_rig_read_parts(&rig, (serial_parts_t){&line, PVT, PVT_FRAME, first}) == FCSL_DRIVER_OK);
+        CHECK(serial_rig_read_parts(&rig, (serial_parts_t){&line, PVT, PVT_FRAME, first, 0}) == FCSL_DRIVER_OK);
         check_pvt(&rig);
     }
     rig_close(&rig);
@@ -164,7 +164,7 @@ static void check_nmea(void)
     CHECK(serial_rig_mode(&line).c_ospeed == 9600u);
     for (size_t first = 1; first < (size_t)size; first++) {
         serial_rig_send(&line, GARBAGE, sizeof GARBAGE);
-        CHECK(serial_rig_read_parts(&rig, (serial_parts_t){&line, (const uint8_t *)both, (size_t)size, first}) ==
+        CHECK(serial_rig_read_parts(&rig, (serial_parts_t){&line, (const uint8_t *)both, (size_t)size, first, 0}) ==
               FCSL_DRIVER_OK);
         check_motion(&rig);
     }

@@ -101,7 +101,7 @@ static void check_split_sbus(void)
     CHECK(rig_open(&rig, &fcsl_driver_sbus, line.name) == FCSL_DRIVER_OK);
     begin_sbus(&rig, &line);
     for (size_t first = 1; first < SBUS_BYTES; first++) {
-        CHECK(serial_rig_read_parts(&rig, (serial_parts_t){&line, SBUS, SBUS_BYTES, first}) == FCSL_DRIVER_OK);
+        CHECK(serial_rig_read_parts(&rig, (serial_parts_t){&line, SBUS, SBUS_BYTES, first, 0}) == FCSL_DRIVER_OK);
         CHECK(has_steps(&rig, SBUS_STEPS));
     }
     for (size_t i = 0; i < 6; i++) { /* an adapter's pieces, which end anywhere, with pauses */
@@ -198,7 +198,7 @@ static void check_split_crsf(void)
     CHECK(rig_open(&rig, &fcsl_driver_crsf, line.name) == FCSL_DRIVER_OK);
     for (size_t first = 1; first < CRSF_BYTES; first++) {
         serial_rig_send(&line, GARBAGE, sizeof GARBAGE);
-        CHECK(serial_rig_read_parts(&rig, (serial_parts_t){&line, CRSF, CRSF_BYTES, first}) == FCSL_DRIVER_OK);
+        CHECK(serial_rig_read_parts(&rig, (serial_parts_t){&line, CRSF, CRSF_BYTES, first, 0}) == FCSL_DRIVER_OK);
         CHECK(has_steps(&rig, CRSF_STEPS));
     }
     rig_close(&rig);
