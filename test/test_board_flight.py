@@ -224,7 +224,7 @@ def test_it_ends_while_it_waits_for_a_slow_device(craft: Craft, fly: Callable[..
 
 
 def test_plans_that_cannot_fly(craft: Craft) -> None:
-    good = craft.plan.read_text()
+    good = re.sub(r"end \w{8}\n", "end\n", craft.plan.read_text())  # as if it were written by hand
     craft.plan.rename(craft.folder / "away.plan")
     assert f"cannot read '{craft.plan}': No such file or directory" in craft.refusal()
     for old, new, reason in (

@@ -8,6 +8,8 @@ changes.
 
 from __future__ import annotations
 
+import errno
+import os
 import sys
 import threading
 from collections.abc import Awaitable, Callable
@@ -21,7 +23,7 @@ from rclpy.task import Future
 
 from fcsl_msgs.msg import Channel, Checkpoint
 from fcsl_msgs.srv import Describe, InjectFault, Restore, Save, SetState
-from simclient.checkpoint import read_checkpoint
+from simclient.checkpoint import read_checkpoint, write_checkpoint
 from simclient.errors import TwinError, did_you_mean
 from simclient.run import Run
 
@@ -55,8 +57,9 @@ class Allowed:
 
 
 def _write(path: Path, content: bytes) -> None:
-    with path.open("xb") as file:
-        file.write(content)
+    if path.exists():
+        raise FileExistsError(errno.EEXIST, os.strerror(errno.EEXIST), str(path))
+    write_checkpoint(path, content)
 
 
 async def _elsewhere(work: Callable[..., Any], *arguments: Any) -> Any:

@@ -5,6 +5,7 @@ from __future__ import annotations
 
 import struct
 from collections.abc import Iterator
+from zlib import crc32
 
 from .backends import Backend
 from .board import Board
@@ -29,7 +30,8 @@ def plan_text(board: Board) -> str:
         lines += _output(output)
     lines += [f"undriven {name}" for name in board.undriven]
     lines += _hardware(board.hardware)
-    return "\n".join([*lines, "end", ""])
+    text = "".join(f"{line}\n" for line in lines)
+    return f"{text}end {crc32(text.encode()):08x}\n"
 
 
 def _sensor(sensor: Sensor) -> Iterator[str]:

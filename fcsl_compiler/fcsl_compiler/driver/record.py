@@ -21,7 +21,7 @@ if TYPE_CHECKING:  # a process that only loads a library does not import the com
     from .passes import Compilation
 
 SUFFIX = ".sources.json"
-_VERSION = 1
+_VERSION = 2
 
 
 class StaleBuild(RuntimeError):
@@ -32,7 +32,12 @@ def write_record(path: Path, compilations: Sequence[Compilation], command: str) 
     """Writes the record. `command` rebuilds the library; it is empty if a build system does. Raises OSError."""
     machines = {c.checked.name: _machine(c) for c in compilations}
     head = {"version": _VERSION, "command": command, "compiler": compiler(), "toolchain": toolchain()}
-    write_whole(path, json.dumps({**head, "machines": machines}, indent=1) + "\n")
+    record = {**head, "machines": machines}
+    write_whole(path, json.dumps({"sha256": _sha256(record), **record}, indent=1) + "\n")
+
+
+def _sha256(record: dict[str, Any]) -> str:
+    return digest(json.dumps(record))
 
 
 def _machine(c: Compilation) -> dict[str, Any]:
@@ -56,15 +61,17 @@ def check_record(library: Path, machine: str, build_hash: str) -> None:
         return
     try:
         record = read_json(path)
-        found = record["machines"].get(machine)
-        if record["version"] != _VERSION:
+        if record.pop("sha256", None) != _sha256(record) or record["version"] != _VERSION:
             raise ValueError
+        found = record["machines"].get(machine)
         if found is not None and not Path(found["config"]).is_file():
             return
         changes = _changes(record, found) if found is not None and found["build_hash"] == build_hash else None
         again = _again(record["command"], "" if found is None else found["config"])
-    except (OSError, ValueError, KeyError, TypeError, AttributeError):
-        raise StaleBuild(f"{path}: not a source record of this fcslc version; build the library again") from None
+    except (OSError, ValueError, KeyError, TypeError, AttributeError, RecursionError):
+        raise StaleBuild(
+            f"{path}: damaged, or not a source record of this fcslc version; build the library again"
+        ) from None
     if changes is None:
         raise StaleBuild(f"{library}: it belongs to a different build than its source record, {path.name}\n{again}")
     if changes:

@@ -14,6 +14,7 @@
 #include <sys/stat.h>
 
 #include "base/error.h"
+#include "fcsl/fcsl_codec.h"
 #include "fcsl/fcsl_plan_text.h"
 
 enum { WORDS_MAX = 18, LINE_MAX_BYTES = 4096, HZ_MAX = 1000000 };
@@ -451,10 +452,38 @@ static const char *take_line(parser_t *parser, char *line)
     return "unknown statement";
 }
 
+/* Whether a line is the last one of a plan. */
+static int is_last(const char *line)
+{
+    return strcmp(line, "end") == 0 || strncmp(line, "end ", 4) == 0;
+}
+
+/* The checksum behind `end`, if there is one. */
+static const char *check_sum(const char *text, size_t size)
+{
+    size_t begin = size > 0 ? size - 1u : 0;
+    while (begin > 0 && text[begin - 1u] != '\n') {
+        begin--;
+    }
+    char wanted[16];
+    (void)snprintf(wanted, sizeof wanted, "end %08" PRIx32 "\n", fcsl_crc32(0, text, begin));
+    const size_t length = size - begin;
+    if (length < 4u || memcmp(text + begin, "end ", 4) != 0) {
+        return NULL;
+    }
+    return length == strlen(wanted) && memcmp(text + begin, wanted, length) == 0
+               ? NULL
+               : "the plan is damaged, or edited: write it with `fcslc board board.json`";
+}
+
 static int parse(board_plan_t *plan, const char *file, size_t size, fcsl_error_t *error)
 {
     parser_t parser = {.plan = plan};
     uint32_t lines = 0;
+    const char *damaged = check_sum(plan->text, size);
+    if (damaged != NULL) {
+        return fcsl_fail(error, "%.300s: %s", file, damaged);
+    }
     const char *wrong = fcsl_plan_cut_lines(plan->text, size, LINE_MAX_BYTES, &lines);
     if (wrong != NULL) {
         return fcsl_fail(error, "%.300s:%u: %s", file, lines, wrong);
@@ -462,7 +491,7 @@ static int parse(board_plan_t *plan, const char *file, size_t size, fcsl_error_t
     char *at = plan->text;
     for (uint32_t line = 1; line <= lines; line++) {
         char *next = at + strlen(at) + 1;
-        const int is_end = strcmp(at, "end") == 0;
+        const int is_end = is_last(at);
         if (line == 1u ? strcmp(at, FIRST_LINE) != 0 : is_end != (line == lines)) {
             wrong = line == 1u ? "not a plan, or of another version: `fcslc board board.json` writes it"
                     : is_end   ? "text after `end`"

@@ -25,7 +25,8 @@
  *   adc CHANNEL DEVICE SIGNAL                    what hw_read_adc of the channel gives
  *   registers ADDRESS BYTES OFFSET ACCESS FILE   what hw_read_u32 and hw_write_u32 reach: BYTES of FILE from OFFSET on, as if they were
  *                                                at ADDRESS; ACCESS: read or read_write
- *   end
+ *   end CRC                                      8 hexadecimal digits: the CRC-32 of all before this line. A plan written by hand
+ *                                                ends with `end` alone
  *
  * BITS are 16 hexadecimal digits, those of a double. A plan that was cut off lacks `end`.
  */

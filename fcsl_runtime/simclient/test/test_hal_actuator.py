@@ -3,6 +3,7 @@
 
 from __future__ import annotations
 
+import re
 import signal
 import struct
 import subprocess
@@ -128,7 +129,7 @@ def test_a_board_without_the_output(tmp_path: Path) -> None:
 )
 def test_a_signal_that_is_no_number(tmp_path: Path, signal_name: str, says: str) -> None:
     plan = write_plan(tmp_path, "log", tmp_path / "log")
-    plan.write_text(plan.read_text().replace("number", signal_name))
+    plan.write_text(re.sub(r"end \w{8}\n", "end\n", plan.read_text().replace("number", signal_name)))
     words = ("motors", "--command", "0", "--seconds", "1", "--yes-move-it")
     assert says in run(tmp_path, "test-actuator", plan, *words, status=2).stderr
 

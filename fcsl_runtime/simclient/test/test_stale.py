@@ -168,6 +168,16 @@ def test_a_damaged_record_is_refused(library: Path, text: str) -> None:
     assert "not a source record of this fcslc version; build the library again" in refusal(library)
 
 
+def test_a_record_with_a_changed_letter_is_refused(library: Path) -> None:
+    """Also in the path of the machine: it would be that of a computer without its sources."""
+    record = Path(f"{library}.sources.json")
+    text = record.read_text()
+    for old in ("craft.json", '"build_hash": "', "alg.py"):
+        assert old in text
+        record.write_text(text.replace(old, old.replace("a", "b", 1) if "a" in old else f"{old}0", 1))
+        assert "damaged, or not a source record" in refusal(library)
+
+
 def test_a_subset_says_how_it_is_built(craft: Path, library: Path) -> None:
     assert main(["build", str(craft), "-o", str(library.parent), "--instances", "a"]) == 0
     load(library)

@@ -13,7 +13,7 @@ from typing import Any
 import numpy as np
 
 from fcsl_compiler.base.diagnostics import DiagnosticSink
-from fcsl_compiler.base.files import SourceError
+from fcsl_compiler.base.files import SourceError, write_whole
 from fcsl_compiler.base.source import SourceFile
 from fcsl_compiler.model.types import shape_of
 from fcsl_compiler.parse.json_reader import ConfigReader
@@ -211,4 +211,4 @@ def trimmed_file(problem: TrimProblem, trimmed: Trimmed, path: Path) -> dict[str
 def write_trimmed(problem: TrimProblem, trimmed: Trimmed, path: Path) -> None:
     if path.exists():
         raise SimError(f"{path}: exists already")
-    path.write_text(json.dumps(trimmed_file(problem, trimmed, path), indent=2) + "\n")
+    write_whole(path, json.dumps(trimmed_file(problem, trimmed, path), indent=2) + "\n")

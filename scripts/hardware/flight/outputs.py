@@ -162,7 +162,8 @@ def try_guard_end(bus: I2cBus, craft: Craft) -> str:
 def try_guard_kill(bus: I2cBus, craft: Craft) -> str:
     """kill -9 of the guard leaves the pulses; the next one makes them safe, at a frequency that the running chip did not have."""
     servos, fast = plug(bus), Path("/tmp/fast.plan")
-    fast.write_text(craft.plan("outputs").read_text().replace(" 0-0041\n", " 0-0041@100\n"))
+    edited = craft.plan("outputs").read_text().replace(" 0-0041\n", " 0-0041@100\n")
+    fast.write_text(edited[: edited.rindex("end")] + "end\n")
     with Guard(craft, craft.plan("outputs")) as guard, arm(craft, guard, servos):
         guard.process.kill()
         guard.process.wait()

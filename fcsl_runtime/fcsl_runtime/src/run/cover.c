@@ -52,7 +52,8 @@ static int cannot(const plan_t *plan, const char *why, fcsl_error_t *error)
     return fcsl_fail(error, "coverage cannot be kept in %s: %s", plan->path, why);
 }
 
-/* Makes the file as long as it must be; one that holds something else is refused. */
+/* Makes the file as long as it must be; one that holds something else is refused. Its room is reserved, of an older one too, which
+ * may have holes: a write through the map to a full disk would be SIGBUS. */
 static int prepare(int file, const plan_t *plan, fcsl_error_t *error)
 {
     struct stat state;
@@ -62,14 +63,11 @@ static int prepare(int file, const plan_t *plan, fcsl_error_t *error)
     if (!S_ISREG(state.st_mode)) {
         return cannot(plan, "it is not a regular file", error);
     }
-    if (state.st_size == 0) {
-        const int status = posix_fallocate(file, 0, (off_t)plan->size);
-        return status == 0 ? 0 : cannot(plan, strerror(status), error);
-    }
-    if ((uint64_t)state.st_size != plan->size) {
+    if (state.st_size != 0 && (uint64_t)state.st_size != plan->size) {
         return cannot(plan, "it is damaged, remove it", error);
     }
-    return 0;
+    const int status = posix_fallocate(file, 0, (off_t)plan->size);
+    return status == 0 ? 0 : cannot(plan, strerror(status), error);
 }
 
 /* Writes what stands before the words, its first word last, or compares it. */
