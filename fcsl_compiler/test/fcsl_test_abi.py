@@ -83,7 +83,13 @@ class FaultPlace(c.Structure):
 
 
 class Host(c.Structure):
-    _fields_ = [("ctx", c.c_void_p), ("clock_ns", Clock), ("hw", c.c_void_p), ("substitute", c.c_void_p)]
+    _fields_ = [
+        ("ctx", c.c_void_p),
+        ("clock_ns", Clock),
+        ("hw", c.c_void_p),
+        ("substitute", c.c_void_p),
+        ("executed", c.c_void_p),
+    ]
 
 
 _CALLS = {

@@ -3,13 +3,14 @@
 
 from __future__ import annotations
 
+import subprocess
 from collections.abc import Iterator
 from pathlib import Path
 
 import pytest
 
 from fcsl_compiler.driver.library import build_library
-from fcsl_compiler.driver.toolchain import CXX, C, ToolchainError, _asked, _version, toolchain
+from fcsl_compiler.driver.toolchain import CXX, C, ToolchainError, _asked, _version, include_dirs, toolchain
 
 
 @pytest.fixture
@@ -71,3 +72,20 @@ def test_a_folder_with_a_comma_and_a_blank(tmp_path: Path) -> None:
     config = Path(__file__).resolve().parents[2] / "examples/minimal/minimal.json"
     [made] = build_library([config], folder / "libminimal.so")
     assert (folder / "libminimal.so").is_file() and made.checked.name == "minimal"
+
+
+@pytest.mark.parametrize("option", ["-ffast-math", "-Ofast", "-freciprocal-math", "-mfpmath=387"])
+def test_options_that_change_results(option: str, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setenv("CC", f"cc {option}")
+    with pytest.raises(ToolchainError, match=f"CC has {option}, which changes results"):
+        toolchain()
+
+
+@pytest.mark.parametrize("option", ["-ffast-math", "-ffinite-math-only", "-Ofast"])
+def test_a_source_refuses_them_wherever_it_is_compiled(option: str, tmp_path: Path) -> None:
+    (tmp_path / "m.c").write_text("#include <fcsl/fcsl_exact_math.h>\nint x;\n")
+    line = ["cc", "-O3", option, f"-I{include_dirs()[0]}", "-c", str(tmp_path / "m.c"), "-o", str(tmp_path / "m.o")]
+    done = subprocess.run(line, capture_output=True, text=True, check=False)
+    assert done.returncode != 0 and "change results" in done.stderr
+    line.remove(option)
+    subprocess.run(line, check=True)

@@ -9,6 +9,7 @@
 #include "actuators.h"
 #include "clock.h"
 #include "fail.h"
+#include "fcsl/fcsl_fp_mode.h"
 #include "fcsl/fcsl_scalar.h"
 #include "plant_state.h"
 
@@ -180,16 +181,32 @@ static int call_update(fcsl_sim_t *sim, uint32_t index)
     return schedule_update(sim, index);
 }
 
+/* After a model has run: a mode that it left would change the bits of all others. */
+static int check_mode(const char *who, fcsl_error_t *error)
+{
+    if (fcsl_fp_mode() == FCSL_FP_DEFAULT) {
+        return 0;
+    }
+    return fcsl_sim_fail(error,
+                         "%s left another floating-point mode (rounding, or small numbers become zero): its code, or a "
+                         "library that it loaded, changed it, and bits depend on it",
+                         who);
+}
+
 /* Outputs and due updates, sources before what they feed. */
-static int evaluate(fcsl_sim_t *sim)
+static int evaluate(fcsl_sim_t *sim, fcsl_error_t *error)
 {
     for (uint32_t i = 0; i < sim->call_count; i++) {
         const fcsl_call_t *call = &sim->calls[i];
+        const char *name = sim->instances[call->instance].name;
         if (call->kind != FCSL_CALL_UPDATE) {
             if (is_present(sim, call->instance)) {
                 call_output(sim, call->instance);
             }
         } else if (sim->instances[call->instance].due && call_update(sim, call->instance)) {
+            return fcsl_sim_fail(error, "the event queue overflowed");
+        }
+        if (check_mode(name, error)) {
             return -1;
         }
     }
@@ -219,7 +236,8 @@ static int do_instant(fcsl_sim_t *sim, int *ticked, fcsl_error_t *error)
         return fcsl_sim_fail(error, "the event queue ran empty");
     }
     const int64_t write_ns = next_write_ns(sim);
-    if (advance(sim, write_ns < event.time_ns ? write_ns : event.time_ns, error)) {
+    if (advance(sim, write_ns < event.time_ns ? write_ns : event.time_ns, error) ||
+        check_mode("a model with continuous states", error)) {
         return -1;
     }
     make_writes(sim);
@@ -236,8 +254,8 @@ static int do_instant(fcsl_sim_t *sim, int *ticked, fcsl_error_t *error)
             sim->instances[event.index].due = 1;
         }
     }
-    if (evaluate(sim)) {
-        return fcsl_sim_fail(error, "the event queue overflowed");
+    if (evaluate(sim, error)) {
+        return -1;
     }
     return tick_companions(sim, error);
 }
@@ -251,6 +269,9 @@ static int init_models(fcsl_sim_t *sim, fcsl_error_t *error)
         const fcsl_model_context_t context = fcsl_sim_context(sim, i, 0);
         fcsl_sim_enter(sim, i, FCSL_IN_INIT);
         const char *wrong = instance->model->init ? instance->model->init(instance->data, &context) : NULL;
+        if (check_mode(instance->name, error)) {
+            return -1;
+        }
         if (wrong) {
             return fcsl_sim_fail(error, "instance `%s`: %s", instance->name, fcsl_sim_init_reason(wrong));
         }
@@ -265,6 +286,14 @@ static int init_models(fcsl_sim_t *sim, fcsl_error_t *error)
     }
     fcsl_sim_enter(sim, 0, FCSL_IN_NONE);
     return 0;
+}
+
+static int start_models(fcsl_sim_t *sim, fcsl_error_t *error)
+{
+    const fcsl_fp_mode_t callers = fcsl_fp_enter(); /* that of the libraries of models, now that they are loaded */
+    const int failed = init_models(sim, error);
+    fcsl_fp_leave(callers);
+    return failed;
 }
 
 void fcsl_sim_refill_queue(fcsl_sim_t *sim)
@@ -315,7 +344,7 @@ fcsl_sim_t *fcsl_sim_open(const char *plan, size_t size, fcsl_error_t *error)
         return NULL;
     }
     fcsl_sim_is_open(sim, 1);
-    if (fcsl_plan_parse(&sim->plan, plan, size, error) || fcsl_assembly_build(sim, error) || init_models(sim, error) ||
+    if (fcsl_plan_parse(&sim->plan, plan, size, error) || fcsl_assembly_build(sim, error) || start_models(sim, error) ||
         fill_queue(sim, error) || attach(sim, error)) {
         (void)fcsl_sim_close(sim, NULL);
         return NULL;
@@ -331,8 +360,7 @@ int64_t fcsl_sim_sense(fcsl_sim_t *sim, uint8_t *bytes, size_t capacity, fcsl_er
     return fcsl_sim_sense_message(sim, bytes, capacity, &message, error) == 0 ? (int64_t)message.size : -1;
 }
 
-int fcsl_sim_sense_message(fcsl_sim_t *sim, uint8_t *bytes, size_t capacity, fcsl_message_t *message,
-                           fcsl_error_t *error)
+static int sense(fcsl_sim_t *sim, uint8_t *bytes, size_t capacity, fcsl_message_t *message, fcsl_error_t *error)
 {
     if (sim->status != FCSL_SIM_RUNNING) {
         return fcsl_sim_fail(error, "the simulation is over");
@@ -367,6 +395,15 @@ int fcsl_sim_sense_message(fcsl_sim_t *sim, uint8_t *bytes, size_t capacity, fcs
     }
     const char *wrong = sim->link ? fcsl_sim_link_sense(sim->link, message, bytes, capacity) : NULL;
     return wrong ? fcsl_sim_fail(error, "tick %llu: %s", (unsigned long long)sim->tick, wrong) : 0;
+}
+
+int fcsl_sim_sense_message(fcsl_sim_t *sim, uint8_t *bytes, size_t capacity, fcsl_message_t *message,
+                           fcsl_error_t *error)
+{
+    const fcsl_fp_mode_t callers = fcsl_fp_enter();
+    const int failed = sense(sim, bytes, capacity, message, error);
+    fcsl_fp_leave(callers);
+    return failed;
 }
 
 void fcsl_sim_take_command(void *context, const fcsl_message_t *command)

@@ -6,6 +6,7 @@
 
 #include "clock.h"
 #include "fail.h"
+#include "fcsl/fcsl_fp_mode.h"
 #include "fcsl/fcsl_sim.h"
 #include "sim_internal.h"
 
@@ -29,7 +30,7 @@ uint32_t fcsl_sim_slope_count(const fcsl_sim_t *sim)
     return count;
 }
 
-int fcsl_sim_slopes(fcsl_sim_t *sim, double *slopes, fcsl_error_t *error)
+static int compute(fcsl_sim_t *sim, double *slopes, fcsl_error_t *error)
 {
     const double t = (double)sim->time_ns / FCSL_NS_PER_S;
     for (uint32_t i = 0; i < sim->call_count; i++) {
@@ -64,4 +65,12 @@ int fcsl_sim_slopes(fcsl_sim_t *sim, double *slopes, fcsl_error_t *error)
     }
     fcsl_sim_enter(sim, 0, FCSL_IN_NONE);
     return 0;
+}
+
+int fcsl_sim_slopes(fcsl_sim_t *sim, double *slopes, fcsl_error_t *error)
+{
+    const fcsl_fp_mode_t callers = fcsl_fp_enter();
+    const int failed = compute(sim, slopes, error);
+    fcsl_fp_leave(callers);
+    return failed;
 }

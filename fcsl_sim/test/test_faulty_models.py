@@ -55,6 +55,12 @@ def test_a_crash_names_the_model(how: int, name: str, write: Write) -> None:
     assert json.loads(done.stdout) == {"end": "error", "error": message}
 
 
+@pytest.mark.parametrize("how", [5, 15])
+def test_a_model_that_leaves_another_rounding_is_named(how: int, write: Write) -> None:
+    done = fly(write(how))
+    assert done.returncode == 2 and "bad left another floating-point mode" in done.stderr, done.stderr
+
+
 def test_a_model_that_hangs_is_named_and_the_bag_is_whole(write: Write, tmp_path: Path) -> None:
     done = fly(write(2), "--record", tmp_path / "bag")
     message = "`update` of `bad` does not return, at 1.250000000 s"

@@ -35,6 +35,14 @@ _CALL_GRAPH_PROBE = (*_CALL_GRAPH_FLAGS, "-E", "-x", "c", os.devnull)
 _COMPILE_TIMEOUT_S = 300
 
 
+#: Options of compilers that change results. The header fcsl_exact_math.h finds some of them wherever a compiler is called.
+_CHANGES_BITS = {
+    *("-ffast-math", "-Ofast", "-funsafe-math-optimizations", "-fassociative-math", "-freciprocal-math"),
+    *("-ffinite-math-only", "-fno-signed-zeros", "-fapprox-func", "-ffp-model=fast", "-ffp-model=aggressive"),
+    *("-fsingle-precision-constant", "-mfpmath=387", "-mdaz-ftz"),
+}
+
+
 class ToolchainError(RuntimeError):
     """The C compiler is missing or failed. str() gives the remedy; what the compiler printed follows on lines of its
     own."""
@@ -54,8 +62,14 @@ class Language(NamedTuple):
     checks: tuple[str, ...] = ()
 
     def compiler(self) -> list[str]:
-        """The compiler command."""
+        """The compiler command. Raises ToolchainError for options that change results."""
         given = shlex.split(os.environ.get(self.variable, ""))
+        changing = [word for word in given if word in _CHANGES_BITS]
+        if changing:
+            raise ToolchainError(
+                f"{self.variable} has {changing[0]}, which changes results: machines and models have the same bits "
+                "everywhere; remove it"
+            )
         if given or not self.zig or shutil.which(self.command):
             return given or [self.command]
         return zig_compiler(self.zig) or [self.command]
@@ -104,13 +118,13 @@ def compiler() -> list[str]:
 
 def ask_version() -> None:
     """Begins to ask the C compiler for its version: it answers while the caller does something else."""
-    with suppress(OSError):
+    with suppress(OSError, ToolchainError):
         _asked((*compiler(), "--version"))
 
 
 def ask_call_graphs() -> None:
     """Likewise begins to ask it whether it writes call graphs."""
-    with suppress(OSError):
+    with suppress(OSError, ToolchainError):
         _asked((*compiler(), *_CALL_GRAPH_PROBE))
 
 

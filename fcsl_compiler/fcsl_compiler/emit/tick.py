@@ -355,7 +355,10 @@ class TickEmitter:
         called = Call(substitute, (Member(Deref(_HOST), "ctx"), Literal(entry.instance, U32)))
         is_substituted = code.And((Binary("!=", substitute, code.Null()), Binary("!=", called, Literal(0, I32))))
         # The substituted record contains the effect of an injected fault.
-        return If(is_substituted, (Set(inject, Literal(0, code.U8)),), (whole,))
+        executed = Member(Deref(_HOST), "executed")
+        told = Do(Call(executed, (Member(Deref(_HOST), "ctx"), Literal(entry.instance, U32))))
+        tells = If(Binary("!=", executed, code.Null()), (told,))
+        return If(is_substituted, (Set(inject, Literal(0, code.U8)),), (whole, tells))
 
     def _verdict(self, instance: Instance) -> Statement:
         began = Name("began_ns")

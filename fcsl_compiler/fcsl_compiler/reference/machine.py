@@ -36,8 +36,8 @@ _NOMINAL, _DEGRADED, _FAILED, _STALE = range(len(HEALTH))
 
 class Offered(Protocol):
     """What `step` may use of its host (fcsl_host_t): a monotonic clock (ns); callables for the hardware builtins, by
-    name; and `substitute`, called before an impure instance executes. It returns True if it has stored the results of
-    this execute itself."""
+    name; `substitute`, called before an impure instance executes, which returns True if it has stored the results of
+    this execute itself; and `executed`, called after such an execute."""
 
     @property
     def clock_ns(self) -> Callable[[], int] | None: ...
@@ -45,6 +45,8 @@ class Offered(Protocol):
     def hardware(self) -> Mapping[str, Callable[..., Any]] | None: ...
     @property
     def substitute(self) -> Callable[[int], bool] | None: ...
+    @property
+    def executed(self) -> Callable[[int], None] | None: ...
 
 
 @dataclass
@@ -54,6 +56,7 @@ class Host:
     clock_ns: Callable[[], int] | None = None
     hardware: Mapping[str, Callable[..., Any]] | None = None
     substitute: Callable[[int], bool] | None = None
+    executed: Callable[[int], None] | None = None
 
 
 def _cell(path: str, layout: Layout, size: int) -> int:
@@ -479,6 +482,9 @@ class ReferenceMachine:
         substitute = self.host.substitute if instance.algorithm.impure else None
         if substitute is None or not substitute(index):
             instance.execute(image)
+            executed = self.host.executed if instance.algorithm.impure else None
+            if executed is not None:
+                executed(index)
         else:
             image.bytes[instance.inject_fault] = 0  # the substituted record contains its effect
         if image.longs[instance.faults] == faults:

@@ -55,6 +55,22 @@ def conversion(kind: Kind, count: int, source: str, target: str) -> Matrix:
     return _both_sides(matrix) if kind is Kind.COVARIANCE else matrix
 
 
+def rotation(kind: Kind, count: int, matrix: tuple[float, ...]) -> Matrix:
+    """The matrix that turns `count` numbers of one `kind` from the axes of a sensor into those of the body that it sits
+    on. `matrix`, 3x3 row by row, turns vectors so. An orientation is that of the body instead of the sensor's.
+
+    Raises AxesError.
+    """
+    if kind is Kind.QUATERNION:
+        back = _conjugate(_quaternion_of(matrix))
+        return tuple(zip(*(_multiply(_unit(i), back) for i in range(4)), strict=True))
+    if not kind.axes:
+        raise AxesError(f"a `rotation` of {kind.value}: they have no axes")
+    rows: Matrix = (matrix[0:3], matrix[3:6], matrix[6:9])
+    turned = _blocks(rows, 2 if kind is Kind.VECTORS or count == 36 else 1)
+    return _both_sides(turned) if kind is Kind.COVARIANCE else turned
+
+
 def identity(count: int) -> Matrix:
     return tuple(tuple(float(i == j) for j in range(count)) for i in range(count))
 
@@ -117,6 +133,17 @@ def _quaternion(source: str, target: str) -> Matrix:
         world = _WORLD_TURN["enu"]
     columns = [_multiply(_multiply(world, _unit(i)), body) for i in range(4)]
     return tuple(zip(*columns, strict=True))
+
+
+def _quaternion_of(m: tuple[float, ...]) -> Quaternion:
+    """The rotation of a matrix. Of the four ways to begin, the one without cancellation (Shepperd)."""
+    squares = (1 + m[0] + m[4] + m[8], 1 + m[0] - m[4] - m[8], 1 - m[0] + m[4] - m[8], 1 - m[0] - m[4] + m[8])
+    largest = squares.index(max(squares))
+    x, y, z = m[7] - m[5], m[2] - m[6], m[3] - m[1]
+    xy, xz, yz = m[3] + m[1], m[2] + m[6], m[7] + m[5]
+    sums = ((squares[0], x, y, z), (x, squares[1], xy, xz), (y, xy, squares[2], yz), (z, xz, yz, squares[3]))[largest]
+    twice = 2.0 * squares[largest] ** 0.5
+    return (sums[0] / twice, sums[1] / twice, sums[2] / twice, sums[3] / twice)
 
 
 def _unit(i: int) -> Quaternion:

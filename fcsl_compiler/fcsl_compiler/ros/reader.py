@@ -24,7 +24,8 @@ class Pick:
     `fields`: paths such as "angular_velocity", "axes[1]", "position[left_wheel]", whose numbers are concatenated.
     `axes`: the axes of the value, `source_axes` those of the message; the empty string means ROS's axes. `order`:
     "xyzw" or "wxyz", for four numbers that are a quaternion in the message; the value is always w, x, y, z. A
-    geometry_msgs/Quaternion needs none. `scale`, `offset`: none, one, or one per scalar; applied last. `null_refused`: a
+    geometry_msgs/Quaternion needs none. `rotation`: 3x3 row by row, from the axes of the sensor into those of its body,
+    before the change of axes. `scale`, `offset`: none, one, or one per scalar; applied last. `null_refused`: a
     quaternion of length zero is no value.
     """
 
@@ -35,6 +36,7 @@ class Pick:
     axes: str = ""
     source_axes: str = ""
     order: str = ""
+    rotation: tuple[float, ...] = ()
     scale: tuple[float, ...] = ()
     offset: tuple[float, ...] = ()
     null_refused: bool = False
@@ -138,11 +140,13 @@ def _is_rotation(pick: Pick, selection: Selection) -> bool:
 def _matrix(pick: Pick, selection: Selection) -> axes.Matrix | None:
     """The matrix from the numbers of the message to those of the value, None where they are the same. Raises PlanError."""
     is_quaternion = _is_rotation(pick, selection)
-    if not is_quaternion and not pick.source_axes and not pick.axes:
+    if not is_quaternion and not (pick.source_axes or pick.axes or pick.rotation):
         return None
     kind = Kind.QUATERNION if is_quaternion else selection.kind
     try:
         matrix = axes.conversion(kind, pick.count, pick.source_axes, pick.axes)
+        if pick.rotation:
+            matrix = axes.product(matrix, axes.rotation(kind, pick.count, pick.rotation))
     except axes.AxesError as error:
         raise PlanError(f"`{pick.name}`: {error}") from None
     if is_quaternion and pick.order != "wxyz":

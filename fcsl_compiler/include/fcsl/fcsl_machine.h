@@ -220,6 +220,8 @@ typedef struct {
     /* Called before execute of an instance that reads hardware or calls externs; may be null. A result other than 0 means
      * that the host has stored the results of this execute (in a replay, from the record). The execute is then skipped. */
     int32_t (*substitute)(void *ctx, uint32_t instance);
+    /* Called after execute of such an instance, unless it was skipped; may be null. */
+    void (*executed)(void *ctx, uint32_t instance);
 } fcsl_host_t;
 
 typedef struct {

@@ -101,12 +101,28 @@ static int goes_on(loop_t *loop, fcsl_hal_status_t status)
     return 0;
 }
 
+/* The first change is told; the instance that made it makes it in every tick. */
+static void watch_mode(loop_t *loop)
+{
+    const char *by = NULL;
+    const uint64_t changes = fcsl_run_mode_changes(loop->run, &by);
+    if (changes > 0 && loop->mode_changes == 0) {
+        char text[FCSL_LOG_BYTES];
+        (void)snprintf(text, sizeof text,
+                       "instance `%.100s` left another floating-point mode: bits of its tick may differ in a replay",
+                       by);
+        loop->hal.log(loop->hal.ctx, text);
+    }
+    loop->mode_changes = changes;
+}
+
 /* Only a lossless recording makes a step fail. Of the others the end tells: a disk must not disturb a tick. A client that has
  * asked for both ticks and recording hears of it (serve.c), and may go on without. */
 static int step(loop_t *loop)
 {
     fcsl_error_t error;
     if (fcsl_run_step(loop->run, 1, &error) == 0) {
+        watch_mode(loop);
         return 1;
     }
     if (!loop->paused || !loop->record_by_command) {

@@ -37,6 +37,7 @@ typedef struct {
     hal_topic_t hal_topic;
     int paused;
     int armed; /* the last command */
+    uint64_t mode_changes; /* of the floating-point mode, that were logged */
 
     fcsl_message_t sensors; /* the last one */
     uint8_t *sensor_bytes; /* of the messages */

@@ -6,7 +6,7 @@ from __future__ import annotations
 import ctypes
 import struct
 from collections.abc import Mapping, Sequence
-from ctypes import byref, c_char, c_int64, c_uint64
+from ctypes import byref, c_char, c_char_p, c_int64, c_uint64
 from ctypes import c_void_p as ptr
 from pathlib import Path
 from typing import Any
@@ -46,6 +46,7 @@ class Run:
         if not self._handle:
             raise self._failure()
         self.machine: Machine = read_machine(self._lib.fcsl_run_machine(self._handle))
+        self._calls_c, self._mode_changes = any(f.impure for f in self.machine.fields.values()), 0
         descriptor = self._lib.fcsl_run_machine(self._handle)
         self._message_capacity = self._lib.fcsl_message_capacity(descriptor, _SENSOR)
         self._actuator_message = ctypes.create_string_buffer(self._lib.fcsl_message_capacity(descriptor, _ACTUATOR))
@@ -277,6 +278,20 @@ class Run:
             slice_ticks = min(ticks, _SLICE_TICKS)
             self._check(self._lib.fcsl_run_step(self.handle(), slice_ticks, byref(self._error)))
             ticks -= slice_ticks
+        if self._calls_c:
+            self._check_mode()
+
+    def _check_mode(self) -> None:
+        """Raises TwinError where C code that an instance calls left another floating-point mode."""
+        by = c_char_p()
+        changes = int(self._lib.fcsl_run_mode_changes(self.handle(), byref(by)))
+        if changes > self._mode_changes:
+            self._mode_changes = changes
+            raise TwinError(
+                f"instance `{(by.value or b'').decode()}` left another floating-point mode (rounding, or small numbers "
+                "become zero): the C code that it calls, or a library that this loads, changed it, and bits depend on "
+                "it. The mode is restored; let that code give it back itself"
+            )
 
     def step_once(self) -> int:
         """Runs one tick; returns the number completed since init."""
@@ -285,6 +300,8 @@ class Run:
         done: int = self._once(*self._once_arguments)
         if done < 0:
             raise self._failure()
+        if self._calls_c:
+            self._check_mode()
         return done
 
     def trace(self, ranges: Sequence[tuple[int, int]], rows: int) -> RunTrace:

@@ -12,6 +12,7 @@
 
 #include <math.h>
 
+#include "fcsl/fcsl_exact_math.h"
 #include "fcsl/fcsl_machine.h"
 #include "fcsl/fcsl_math.h"
 

@@ -1,7 +1,9 @@
 /* SPDX-License-Identifier: Apache-2.0
  *
- * A model that goes wrong at `at_s`, as `how` says: 1 crashes, 2 never returns, 3 aborts, 4 recurses for ever; 10 more: in init.
+ * A model that goes wrong at `at_s`, as `how` says: 1 crashes, 2 never returns, 3 aborts, 4 recurses for ever, 5 changes
+ * the rounding; 10 more: in init.
  */
+#include <fenv.h>
 #include <stdlib.h>
 
 #include "fcsl/fcsl_model.h"
@@ -39,6 +41,9 @@ static void go_wrong(faulty_t *faulty, int64_t how)
         abort();
     case 4:
         faulty->outputs.y = recurse(&depth);
+        break;
+    case 5:
+        (void)fesetround(FE_UPWARD);
         break;
     default:
         break;

@@ -9,7 +9,7 @@ from dataclasses import replace
 from typing import Any
 
 from ..shared.cases import CheckFailed
-from .targets import AARCH64, REFERENCE, Sources, Target, with_flags
+from .targets import AARCH64, FAST_MATH, REFERENCE, Sources, Target, with_flags
 
 #: fcsl_math's functions under the names of libm's.
 _LIBM = [
@@ -48,7 +48,7 @@ def controls(
     """What each control was found by. Raises CheckFailed when one was not."""
     cases = [
         (with_flags(AARCH64, "control: contraction on aarch64", "-ffp-contract=fast"), sources),
-        (with_flags(REFERENCE, "control: -ffast-math", "-ffast-math"), sources),
+        (with_flags(REFERENCE, "control: -ffast-math", *FAST_MATH), sources),
         (with_flags(REFERENCE, "control: libm's functions", *_LIBM), sources),
         (SEEDED, seeded(sources, CONSTANT, "seeded")),
         (_FORCED, seeded(sources, _HEALTH, "forced")),

@@ -169,6 +169,14 @@ def run_program(target: Target, program: Path, arguments: Sequence[str]) -> list
     return [row.split() for row in done.stdout.splitlines()]
 
 
+#: Fast math, without what tells the sources of it: they refuse it (fcsl_exact_math.h).
+FAST_MATH = (
+    "-ffast-math",
+    *(f"-U__{name}__" for name in ("FAST_MATH", "FINITE_MATH_ONLY", "ASSOCIATIVE_MATH", "RECIPROCAL_MATH")),
+    "-U__NO_SIGNED_ZEROS__",
+)
+
+
 def with_flags(target: Target, name: str, *flags: str) -> Target:
     """The same target, its machines compiled with more flags."""
     return replace(target, name=name, flags=(*target.flags, *flags))

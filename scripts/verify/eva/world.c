@@ -63,6 +63,12 @@ static int32_t any_write_u32(void *ctx, uint32_t address, uint32_t value)
     return eva_any_i32;
 }
 
+static void any_executed(void *ctx, uint32_t instance)
+{
+    (void)ctx;
+    (void)instance;
+}
+
 void eva_any_host(fcsl_host_t *host, struct fcsl_hw *hw, int32_t (*substitute)(void *ctx, uint32_t instance))
 {
     hw->ctx = NULL;
@@ -75,4 +81,5 @@ void eva_any_host(fcsl_host_t *host, struct fcsl_hw *hw, int32_t (*substitute)(v
     host->clock_ns = eva_any_bool() ? any_clock : NULL;
     host->hw = eva_any_bool() ? hw : NULL;
     host->substitute = eva_any_bool() ? substitute : NULL;
+    host->executed = eva_any_bool() ? any_executed : NULL;
 }

@@ -20,7 +20,7 @@ from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass, replace
 from pathlib import Path
 
-from ..bits.targets import AARCH64, REFERENCE, Target, cross, native, with_flags
+from ..bits.targets import AARCH64, FAST_MATH, REFERENCE, Target, cross, native, with_flags
 from ..shared.cases import CheckFailed, write_facts
 from ..shared.effort import scaled
 from .build import FOLDER, SIMULATOR, Builder, Built
@@ -146,7 +146,7 @@ def seeded(defect: Defect) -> Path:
 def control_builds() -> list[tuple[Target, Path | None]]:
     return [
         (with_flags(AARCH64, "control: contraction on aarch64", "-ffp-contract=fast"), None),
-        (with_flags(REFERENCE, "control: -ffast-math", "-ffast-math"), None),
+        (with_flags(REFERENCE, "control: -ffast-math", *FAST_MATH), None),
         *((with_flags(REFERENCE, d.name), seeded(d)) for d in DEFECTS),
     ]
 

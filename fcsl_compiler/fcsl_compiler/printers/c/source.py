@@ -42,6 +42,7 @@ def print_source(program: code.Program, prelude: str, extensions: Mapping[str, S
     w.line()
     if program.uses_hardware:
         w.line(f"#include <{HARDWARE_HEADER}>")
+    w.line("#include <fcsl/fcsl_exact_math.h>")
     w.line("#include <fcsl/fcsl_math.h>")
     for header in program.headers:
         w.line(f'#include "{header}"')

@@ -38,6 +38,7 @@ type
     clock_ns*: proc (ctx: pointer): uint64 {.cdecl, raises: [].}
     hw*: pointer
     substitute*: proc (ctx: pointer, instance: uint32): int32 {.cdecl, raises: [].}
+    executed*: proc (ctx: pointer, instance: uint32) {.cdecl, raises: [].}
 """
 
 #: Nim has no pointers to constants.

@@ -113,6 +113,14 @@ uint64_t fcsl_run_hardware_failures(const fcsl_run_t *run);
 int fcsl_run_substitute(fcsl_run_t *run, uint32_t instance, const void *bytes, uint32_t size, fcsl_error_t *error);
 /* Executes of such instances that no substitute took the place of: a replay whose record is complete has none. */
 uint64_t fcsl_run_impure_executes(const fcsl_run_t *run);
+/* Ticks run in the floating-point mode of IEEE 754, whatever the caller's is. How often such an instance left another one, and
+ * the last that did (null: none): its C code changed it, or loaded a library that does. Its own results of that execute may
+ * have other bits. */
+uint64_t fcsl_run_mode_changes(const fcsl_run_t *run, const char **by);
+/* Sets that mode in the calling thread, and returns the caller's, for what a host computes itself. */
+uint64_t fcsl_run_enter_mode(void);
+void fcsl_run_leave_mode(uint64_t callers);
+uint64_t fcsl_run_ieee_mode(void); /* what fcsl_run_enter_mode returns where nobody changed it */
 
 /* Runs `ticks` ticks. Fails when a lossless recording fails, or when the machine leaves its tick where it was (compiled ones never do:
  * a descriptor of the caller's may have had to give up); the ticks before it are done. */

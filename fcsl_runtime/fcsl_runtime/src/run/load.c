@@ -9,6 +9,7 @@
 
 #include "cover.h"
 #include "fault_place.h"
+#include "fcsl/fcsl_fp_mode.h"
 #include "fcsl/fcsl_gate.h"
 #include "fcsl/fcsl_library.h"
 #include "fcsl/fcsl_scalar.h"
@@ -110,13 +111,16 @@ static int allocate(fcsl_run_t *run, fcsl_error_t *error)
     fcsl_hardware_init(run);
     run->host.ctx = run;
     run->host.substitute = fcsl_substitution_apply;
+    run->host.executed = fcsl_substitution_executed;
     return fcsl_substitution_open(run, error);
 }
 
 static int initialise(fcsl_run_t *run, fcsl_error_t *error)
 {
     const fcsl_machine_t *machine = run->machine;
+    const fcsl_fp_mode_t callers = fcsl_fp_enter();
     const int32_t faulted = machine->init(run->data);
+    fcsl_fp_leave(callers);
     if (faulted == 0) {
         return 0;
     }

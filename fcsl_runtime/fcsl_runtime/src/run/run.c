@@ -7,6 +7,7 @@
 #include <stdlib.h>
 #include <time.h>
 
+#include "fcsl/fcsl_fp_mode.h"
 #include "fcsl/fcsl_gate.h"
 #include "fcsl/fcsl_scalar.h"
 #include "substitution.h"
@@ -202,12 +203,28 @@ __attribute__((hot)) static int step_noted(fcsl_run_t *run, fcsl_error_t *error)
 __attribute__((hot)) int fcsl_run_step(fcsl_run_t *run, uint64_t ticks, fcsl_error_t *error)
 {
     const int noted = fcsl_writes_noted(run);
-    for (uint64_t i = 0; i < ticks; i++) {
-        if ((noted ? step_noted(run, error) : step_once(run, fcsl_run_tick(run), error)) != 0) {
-            return -1;
-        }
+    const fcsl_fp_mode_t callers = fcsl_fp_enter();
+    int failed = 0;
+    for (uint64_t i = 0; i < ticks && !failed; i++) {
+        failed = (noted ? step_noted(run, error) : step_once(run, fcsl_run_tick(run), error)) != 0;
     }
-    return 0;
+    fcsl_fp_leave(callers);
+    return failed ? -1 : 0;
+}
+
+uint64_t fcsl_run_enter_mode(void)
+{
+    return (uint64_t)fcsl_fp_enter();
+}
+
+uint64_t fcsl_run_ieee_mode(void)
+{
+    return (uint64_t)FCSL_FP_DEFAULT;
+}
+
+void fcsl_run_leave_mode(uint64_t callers)
+{
+    fcsl_fp_leave((fcsl_fp_mode_t)callers);
 }
 
 int64_t fcsl_run_step_once(fcsl_run_t *run, fcsl_error_t *error)

@@ -45,6 +45,8 @@ struct fcsl_run {
     uint32_t verdict_count;
     uint32_t impure_count;    /* instances that are */
     uint64_t impure_executes; /* that no substitute took the place of */
+    uint64_t mode_changes;    /* of the floating-point mode, by such an instance */
+    const char *mode_changed_by;
     fcsl_substitute_t *impure;    /* per instance */
     uint8_t *left;
     uint64_t messages_refused;

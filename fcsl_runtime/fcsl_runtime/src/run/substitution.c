@@ -7,6 +7,7 @@
 #include <inttypes.h>
 #include <stdlib.h>
 
+#include "fcsl/fcsl_fp_mode.h"
 #include "fcsl/fcsl_scalar.h"
 #include "writes.h"
 
@@ -99,6 +100,22 @@ int fcsl_run_substitute(fcsl_run_t *run, uint32_t instance, const void *bytes, u
     memcpy(run->left + run->impure[instance].offset, bytes, size);
     run->impure[instance].substituted = 1;
     return 0;
+}
+
+/* C code that an instance calls may leave another floating-point mode. What follows has the right one. */
+void fcsl_substitution_executed(void *ctx, uint32_t instance)
+{
+    fcsl_run_t *run = ctx;
+    if (fcsl_fp_enter() != FCSL_FP_DEFAULT && instance < run->machine->instance_count) {
+        run->mode_changes++;
+        run->mode_changed_by = run->machine->instances[instance].name;
+    }
+}
+
+uint64_t fcsl_run_mode_changes(const fcsl_run_t *run, const char **by)
+{
+    *by = run->mode_changed_by;
+    return run->mode_changes;
 }
 
 int32_t fcsl_substitution_apply(void *ctx, uint32_t instance)

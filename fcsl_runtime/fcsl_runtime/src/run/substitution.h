@@ -14,6 +14,8 @@ void fcsl_substitution_free(fcsl_run_t *run);
 
 /* fcsl_host_t.substitute of every run. */
 int32_t fcsl_substitution_apply(void *ctx, uint32_t instance);
+/* fcsl_host_t.executed */
+void fcsl_substitution_executed(void *ctx, uint32_t instance);
 /* Both are for runs that have impure instances (run->impure_count).
  * After a step: forgets substitutes of instances that did not execute. */
 void fcsl_substitution_settle(fcsl_run_t *run);

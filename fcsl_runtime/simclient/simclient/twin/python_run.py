@@ -45,6 +45,7 @@ class CHost(Structure):
         ("clock_ns", CFUNCTYPE(c_uint64, ptr)),
         ("hw", POINTER(CHardware)),
         ("substitute", CFUNCTYPE(c_int32, ptr, c_uint32)),
+        ("executed", CFUNCTYPE(None, ptr, c_uint32)),
     ]
 
 
@@ -138,6 +139,11 @@ class _Host:
     def substitute(self) -> Callable[[int], bool] | None:
         substitute, context = self._host.substitute, self._host.ctx
         return (lambda instance: bool(substitute(context, instance))) if substitute else None
+
+    @property
+    def executed(self) -> Callable[[int], None] | None:
+        executed, context = self._host.executed, self._host.ctx
+        return (lambda instance: executed(context, instance)) if executed else None
 
 
 class PythonMachine:

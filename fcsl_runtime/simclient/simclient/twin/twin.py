@@ -22,6 +22,7 @@ from typing import TYPE_CHECKING, Any, Self
 from ..checkpoint import read_checkpoint, write_checkpoint
 from ..descriptor import Channel, Field, Instance, why_read_only
 from ..errors import TwinError, did_you_mean
+from ..fp_mode import ieee_mode
 from ..machine_build import find_config
 from ..paths import Selection, Struct, StructArray
 from ..values import Value, encode_part, read_part, whole_number
@@ -57,7 +58,9 @@ class Twin(TwinFaults):
         the machine is the same. Raises TwinError, with the compiler's diagnostics if the config or an algorithm is
         wrong.
         """
-        return cls._open_config(find_config(path, sys._getframe(1).f_code.co_filename), target, None, backend)
+        config = find_config(path, sys._getframe(1).f_code.co_filename)
+        with ieee_mode():
+            return cls._open_config(config, target, None, backend)
 
     @classmethod
     def from_instances(
@@ -76,7 +79,8 @@ class Twin(TwinFaults):
         if not isinstance(instances, Sequence) or not all(isinstance(name, str) for name in instances):
             raise TwinError(f"from_instances(…, {instances!r}): a list of names of instances wanted")
         config = find_config(path, sys._getframe(1).f_code.co_filename)
-        return cls._open_config(config, target, tuple(instances), backend)
+        with ieee_mode():
+            return cls._open_config(config, target, tuple(instances), backend)
 
     @classmethod
     @abstractmethod
