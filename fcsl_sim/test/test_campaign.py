@@ -200,6 +200,14 @@ def flown(places: Path, cases: int) -> int:
     return sum(data[i * size] != 0 for i in range(cases)) if size else 0
 
 
+def test_a_campaign_that_was_killed_when_it_began_goes_on(write: Write) -> None:
+    path = write(cases=2)
+    Path("gauge.campaign").mkdir()
+    Path("gauge.campaign/campaign.new").write_text('{"form')
+    main(["campaign", str(path)])
+    assert len(table_of("gauge.campaign")["case"]) == 2
+
+
 def test_another_study_does_not_go_on(write: Write, capsys: pytest.CaptureFixture[str]) -> None:
     main(["campaign", str(write())])
     path = write(seed=10)

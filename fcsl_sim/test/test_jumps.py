@@ -35,6 +35,55 @@ def test_a_pulse_is_integrated_exactly(integrator: dict[str, Any], open_sim: Ope
         assert [sim.get(f"{name}.outputs.x") for name in pulses] == pytest.approx([1.0] * len(pulses), abs=1e-11)
 
 
+SOURCE = """
+#include "fcsl/fcsl_model.h"
+
+typedef struct {
+    struct { double on_s, off_s; } parameters;
+    struct { double rate; } outputs;
+} pulse_source_t;
+
+static void output(void *self, double t, const double *x)
+{
+    pulse_source_t *it = self;
+    (void)x;
+    it->outputs.rate = t >= it->parameters.on_s && t < it->parameters.off_s ? 1.0 : 0.0;
+}
+
+static double next_time(const void *self, double t)
+{
+    const pulse_source_t *it = self;
+    return t < it->parameters.on_s ? it->parameters.on_s : t < it->parameters.off_s ? it->parameters.off_s : (double)INFINITY;
+}
+
+#define FIELD(role, path) FCSL_MODEL_SCALAR(pulse_source_t, FCSL_ROLE_##role, path, "", "")
+static const fcsl_field_t fields[] = {
+    FIELD(PARAMETER, parameters.on_s), FIELD(PARAMETER, parameters.off_s), FIELD(OUTPUT, outputs.rate)};
+static const fcsl_model_t model = {
+    .abi_version = FCSL_MODEL_ABI_VERSION, .name = "pulse_source", .doc = "", .fields = fields, .field_count = 3,
+    .size = sizeof(pulse_source_t), .align = _Alignof(pulse_source_t), .sampled_offset = FCSL_NO_OFFSET,
+    .output = output, .next_time = next_time,
+};
+const fcsl_model_t *const fcsl_models[] = {&model, NULL};
+"""
+
+
+@pytest.mark.parametrize("integrator", INTEGRATORS)
+def test_what_another_model_of_the_group_announces(integrator: dict[str, Any], open_sim: Open, tmp_path: Path) -> None:
+    """The source has no states; the ramp, which integrates its output, announces nothing."""
+    (tmp_path / "pulse_source.c").write_text(SOURCE)
+
+    def change(config: dict[str, Any]) -> None:
+        config["integrator"] = integrator
+        config["models"]["source"] = {"source": "pulse_source.c"}
+        config["instances"]["source"] = {"model": "source", "parameters": {"on_s": 0.30037, "off_s": 0.30077}}
+        config["connections"][-1]["from"] = "source.rate"
+
+    with open_sim(change) as sim:
+        sim.run(100)
+        assert sim.get("ramp.outputs.x") == pytest.approx(0.0004, abs=1e-12)
+
+
 @pytest.mark.parametrize("integrator", INTEGRATORS)
 def test_a_checkpoint_on_a_jump_goes_on_alike(integrator: dict[str, Any], open_sim: Open) -> None:
     """0.25 s is a tick, at which the pulse begins: it has begun then, and no step makes up for it."""

@@ -34,10 +34,14 @@ def not_written(path: Path, error: OSError) -> SimError:
     return SimError(f"{path}: {error.strerror or error}; cases that are flown are kept, and the same command goes on")
 
 
+def temporary_of(path: Path) -> Path:
+    return path.with_suffix(".new")
+
+
 @contextmanager
 def written_whole(path: Path) -> Iterator[Path]:
     """A path to write to. The file takes the place of `path` when all went well. Raises SimError if it cannot be written."""
-    temporary = path.with_suffix(".new")
+    temporary = temporary_of(path)
     try:
         yield temporary
         os.replace(temporary, path)

@@ -17,12 +17,14 @@ from fcsl_compiler.base.files import digest
 from fcsl_compiler.base.json_file import read_json
 
 from ..errors import SimError
-from .case_rows import GROUP_ROWS, TEXT_BYTES, CaseRows, written_whole
+from .case_rows import GROUP_ROWS, TEXT_BYTES, CaseRows, temporary_of, written_whole
 from .flight import Outcome
 from .study import Study
 
 #: In the folder of a campaign.
 ABOUT, ROWS, TABLE, PICTURE = "campaign.json", "cases.bin", "cases.parquet", "report.png"
+#: All that a campaign leaves which is killed when it begins.
+_UNFINISHED = temporary_of(Path(ABOUT)).name
 #: Of the rows; another one cannot be read.
 _FORMAT = 2
 #: By its number; 0: not flown yet.
@@ -63,10 +65,10 @@ class Results:
         folder, file = self.folder, self.folder / ABOUT
         if not folder.exists():
             return False
-        if not folder.is_dir() or (any(folder.iterdir()) and not file.is_file()):
-            raise SimError(f"{folder}: there already, and no campaign's folder; choose another one with `-o`")
-        if not file.is_file():
+        if folder.is_dir() and not file.is_file() and {other.name for other in folder.iterdir()} <= {_UNFINISHED}:
             return False
+        if not file.is_file():
+            raise SimError(f"{folder}: there already, and no campaign's folder; choose another one with `-o`")
         try:
             found = read_json(file)
         except ValueError:
