@@ -55,7 +55,7 @@ def conversion(kind: Kind, count: int, source: str, target: str) -> Matrix:
     return _both_sides(matrix) if kind is Kind.COVARIANCE else matrix
 
 
-def rotation(kind: Kind, count: int, matrix: tuple[float, ...]) -> Matrix:
+def mounting(kind: Kind, count: int, matrix: tuple[float, ...]) -> Matrix:
     """The matrix that turns `count` numbers of one `kind` from the axes of a sensor into those of the body that it sits
     on. `matrix`, 3x3 row by row, turns vectors so. An orientation is that of the body instead of the sensor's.
 

@@ -146,7 +146,7 @@ def _matrix(pick: Pick, selection: Selection) -> axes.Matrix | None:
     try:
         matrix = axes.conversion(kind, pick.count, pick.source_axes, pick.axes)
         if pick.rotation:
-            matrix = axes.product(matrix, axes.rotation(kind, pick.count, pick.rotation))
+            matrix = axes.product(matrix, axes.mounting(kind, pick.count, pick.rotation))
     except axes.AxesError as error:
         raise PlanError(f"`{pick.name}`: {error}") from None
     if is_quaternion and pick.order != "wxyz":

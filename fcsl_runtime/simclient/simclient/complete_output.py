@@ -17,6 +17,19 @@ from .errors import BagError, TwinError
 _NO_ROOM = (errno.ENOSPC, errno.EDQUOT, errno.EFBIG)
 
 
+def check_target(target: str | Path, is_new: bool = False) -> None:
+    """Raises BagError if nothing can be written there; `is_new`: nor if something is there. For tools to call before
+    they work.
+    """
+    wanted = Path(target).absolute()
+    if is_new and (wanted.exists() or wanted.is_symlink()):
+        raise BagError(f"{target}: exists already; name a new one")
+    if not wanted.parent.is_dir():
+        raise BagError(f"{wanted.parent}: no such directory")
+    if wanted.is_dir():
+        raise BagError(f"{target}: a directory; name the file to write")
+
+
 @contextmanager
 def complete_or_absent(target: str | Path) -> Iterator[Path]:
     """A temporary path for a file or directory: renamed to `target` if the block succeeds, deleted if it fails.
@@ -24,11 +37,8 @@ def complete_or_absent(target: str | Path) -> Iterator[Path]:
     The last component of the path is that of `target`, because bags name their files after their directory. Errors of
     the operating system name `target`, because the temporary path means nothing to a user.
     """
+    check_target(target)
     wanted = Path(target).absolute()
-    if not wanted.parent.is_dir():
-        raise BagError(f"{wanted.parent}: no such directory")
-    if wanted.is_dir():
-        raise BagError(f"{target}: a directory; name the file to write")
     try:
         scratch = Path(tempfile.mkdtemp(prefix=f".{wanted.name}.", dir=wanted.parent))
     except OSError as error:

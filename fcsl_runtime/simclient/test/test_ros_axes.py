@@ -11,7 +11,8 @@ import numpy as np
 import pytest
 from scipy.spatial.transform import Rotation
 
-from fcsl_compiler.ros.axes import XYZW, AxesError, conversion, inverse, permutation, product
+from fcsl_compiler.board.rotations import from_angles
+from fcsl_compiler.ros.axes import XYZW, AxesError, conversion, inverse, mounting, permutation, product
 from fcsl_compiler.ros.message_fields import QUATERNION_AXES, Kind
 
 Array = np.ndarray[Any, Any]
@@ -120,3 +121,18 @@ def test_order_of_a_quaternion() -> None:
 def test_what_does_not_go_together(kind: Kind, count: int, source: str, target: str, text: str) -> None:
     with pytest.raises(AxesError, match=text):
         conversion(kind, count, source, target)
+
+
+@pytest.mark.parametrize("angles", [(90, 0, 0), (0, 45, 0), (180, 0, 90), (315, 135, 225)])
+def test_a_turned_sensor_is_turned_back(angles: tuple[int, int, int]) -> None:
+    """Of whatever kind its numbers are: a vector v becomes R v, a covariance R C R', an orientation q conj(r)."""
+    matrix = from_angles(*angles)
+    turn = np.reshape(matrix, (3, 3))
+    assert np.array_equal(mounting(Kind.VECTOR, 3, matrix), turn)
+    twist = np.array(mounting(Kind.VECTORS, 6, matrix))
+    assert np.array_equal(twist[:3, :3], turn) and np.array_equal(twist[3:, 3:], turn) and not twist[:3, 3:].any()
+    covariance = np.arange(9.0).reshape(3, 3)
+    turned = np.array(mounting(Kind.COVARIANCE, 9, matrix)) @ covariance.ravel()
+    assert turned.reshape(3, 3) == pytest.approx(turn @ covariance @ turn.T, abs=1e-12)
+    back = np.array(mounting(Kind.QUATERNION, 4, matrix)) @ (1.0, 0.0, 0.0, 0.0)
+    assert rotation(back).as_matrix() == pytest.approx(turn.T, abs=1e-12)

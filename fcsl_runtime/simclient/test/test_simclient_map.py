@@ -5,7 +5,7 @@ from __future__ import annotations
 
 import subprocess
 import sys
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from pathlib import Path
 from typing import Any
 
@@ -137,7 +137,7 @@ def test_a_mapped_bag_becomes_one_of_ours(
         "  channel       messages  used  superseded  refused  held ticks  waiting ticks  invalid ticks  largest gap\n"
         "  imu.gyro             6     6           0        0           5              0              0    20.000 ms\n"
         "  imu.attitude         6     6           0        0           5              0              0    20.000 ms\n"
-        "  not mapped: level, switch\n"
+        "  not mapped: level, switch; without samples, these instances are failed: source\n"
         f"  digest {digest(out)}\n"
     )
     _, gyro = columns(out, "source.outputs.vec")
@@ -149,6 +149,8 @@ def test_a_mapped_bag_becomes_one_of_ours(
     assert sorted(p.name for p in tmp_path.iterdir()) == ["foreign", "map.yaml", "out"]
     again = command(foreign, "--library", probe, "--map", tmp_path / "map.yaml", "-o", out)
     assert again.returncode == 2 and "exists already" in again.stderr
+    missing = command(tmp_path / "none", "--library", probe, "--map", tmp_path / "none.yaml", "-o", out)
+    assert missing.returncode == 2 and "exists already" in missing.stderr  # told before any work
 
 
 def test_log_time_several_fields_indices_and_conversions(
@@ -188,7 +190,56 @@ def test_two_topics_may_feed_one_channel(
     assert vec[0].tolist() == [1.0, 2.0, 3.0] and vec[2].tolist() == [1.0, 2.0, -1.0]
 
 
+TURNS = {
+    "roll_90": [1.0, -3.0, 2.0],
+    "roll_180": [1.0, -2.0, -3.0],
+    "yaw_90": [-2.0, 1.0, 3.0],
+    "roll_90_yaw_90": [3.0, 1.0, 2.0],
+    "[[0, 0, 1], [1, 0, 0], [0, 1, 0]]": [3.0, 1.0, 2.0],
+}
+
+
+@pytest.mark.parametrize(("rotation", "vector"), TURNS.items())
+def test_a_sensor_that_is_mounted_turned(
+    rotation: str, vector: list[float], probe: Path, write_map: Callable[[str], Path], tmp_path: Path
+) -> None:
+    """Its vectors come in the body's axes, and its orientation is the body's: both name the same direction in the world."""
+    attitude = np.array([0.9, 0.1, 0.2, 0.3]) / np.linalg.norm([0.9, 0.1, 0.2, 0.3])
+    bag = write(tmp_path / "bag", {"/imu": [(10**11, imu(10**11, (1, 2, 3), attitude))]})
+    chart = write_map(
+        "channels:\n"
+        f"  imu.gyro: {{topic: /imu, field: angular_velocity, rotation: {rotation}}}\n"
+        f"  imu.attitude: {{topic: /imu, field: orientation, rotation: {rotation}}}\n"
+    )
+    replay_foreign(bag, chart, library=str(probe), output=tmp_path / "out")
+    assert columns(tmp_path / "out", "source.outputs.vec")[1].tolist() == [vector]
+    body = columns(tmp_path / "out", "source.outputs.quat")[1][0]
+    assert np.linalg.norm(body) == pytest.approx(1.0, abs=1e-12)
+    assert rotated(body, vector) == pytest.approx(rotated(attitude, [1.0, 2.0, 3.0]), abs=1e-12)
+
+
+def rotated(q: np.ndarray[Any, Any], v: Sequence[float]) -> Any:
+    """q v q*, scalar first."""
+    return np.asarray(v) + 2 * np.cross(q[1:], np.cross(q[1:], v) + q[0] * np.asarray(v))
+
+
 REFUSALS = [
+    (
+        "channels:\n  imu.gyro: {topic: /imu, field: angular_velocity, rotation: rol_90}",
+        "map.yaml:2:62: no rotation `rol_90`; did you mean `roll_90`?; angles are multiples of 45",
+    ),
+    (
+        "channels:\n  imu.gyro: {topic: /imu, field: angular_velocity, rotation: [1, 2, 3]}",
+        "map.yaml:2:62: `rotation` must be a name, such as roll_180_yaw_90, or a matrix",
+    ),
+    (
+        "channels:\n  imu.gyro: {topic: /imu, field: angular_velocity, rotation: [[1, 0, 0], [0, 1, 0], [0, 0, -1]]}",
+        "map.yaml:2:62: the matrix is no rotation: its determinant is -1",
+    ),
+    (
+        "channels:\n  level: {topic: /level, field: data, rotation: roll_90}",
+        "map.yaml:2:10: `level`: a `rotation` of numbers: they have no axes",
+    ),
     ("", "map.yaml: empty; a map has `channels`"),
     ("channels: [", "map.yaml:1:12: expected the node content, but found '<stream end>'"),
     ("channels:\n\t- x", "map.yaml:2:1: found character '\\t' that cannot start any token"),

@@ -79,6 +79,50 @@ def test_two_messages_in_a_tick(run: Runs) -> None:
     assert done.oddities["/imu"] == Oddities()
 
 
+def test_a_quaternion_of_length_zero_is_no_sample(run: Runs) -> None:
+    """Here, as in a live node; the other values of its message are taken."""
+    attitudes = [(1.0, 0.0, 0.0, 0.0), (0.0, 0.0, 0.0, 0.0), (-0.0, 0.0, 0.0, 0.0), (math.nan, 0.0, 0.0, 0.0)]
+    messages = [(START + i * 10 * MS, imu(START + i * 10 * MS, (i, 0, 0), q)) for i, q in enumerate(attitudes)]
+    done, out = run(messages, GYRO + "  imu.attitude: {topic: /imu, field: orientation}\n")
+    assert refused(done, "imu.attitude") == {"rotation": 2, "nan": 1} and refused(done) == {}
+    assert done.fates["imu.attitude"].coverage.used == 1 and done.fates["imu.gyro"].coverage.used == 4
+    assert columns(out, "source.outputs.quat")[1].tolist() == [[1.0, 0.0, 0.0, 0.0]] * 4
+    assert "2 with a rotation of length zero (first: message 1)" in str(done)
+
+
+@pytest.mark.parametrize(
+    ("ahead_s", "told"),
+    [
+        (18, "/imu: stamps 18.000 s ahead of the times of recording, the offset of GPS and UTC (18 s)"),
+        (-18, "/imu: stamps 18.000 s behind the times of recording, the offset of GPS and UTC (18 s)"),
+        (37, "/imu: stamps 37.000 s ahead of the times of recording, the offset of TAI and UTC (37 s)"),
+        (
+            50,
+            "/imu: stamps 50.000 s ahead of the times of recording; those of other topics are not: is it another clock?",
+        ),
+        (0.1, ""),
+    ],
+)
+def test_stamps_of_another_clock(ahead_s: float, told: str, run: Runs) -> None:
+    ahead_ns = int(ahead_s * 10**9)
+    content = {
+        "/imu": [(START + i * 20 * MS, imu(START + i * 20 * MS + ahead_ns)) for i in range(9)],
+        "/other": [(START + i * 20 * MS, imu(START + i * 20 * MS)) for i in range(9)],
+    }
+    chart = GYRO + "  imu.attitude: {topic: /other, field: orientation}\n"
+    done, _ = run(content, chart)
+    lines = [line.strip() for line in str(done).splitlines() if "times of recording" in line]
+    assert lines == ([told] if told else [])
+    by_log, _ = run(content, "time: log\n" + chart)
+    assert "times of recording" not in str(by_log)
+
+
+def test_stamps_that_are_all_of_one_other_clock_are_as_good(run: Runs) -> None:
+    """A bag of a simulation, recorded by the clock on the wall."""
+    done, _ = run([(10**18 + i * 20 * MS, imu(START + i * 20 * MS)) for i in range(9)])
+    assert "times of recording" not in str(done)
+
+
 def test_stamps_of_zero_are_no_times(run: Runs) -> None:
     done, out = run(stamped([0, None, 20, None]))
     assert seen(out) == [1, 1, 3]
@@ -141,7 +185,7 @@ def test_screening_agrees_with_a_walk(times: list[int], stamps: bool) -> None:
         expected.append(not stuck)
         newest, last = max(time, time if newest is None else newest), time
     assert usable.tolist() == expected
-    assert vars(oddities) == counts
+    assert oddities == Oddities(**counts)
 
 
 # ---- values -----------------------------------------------------------------------------------------------------------

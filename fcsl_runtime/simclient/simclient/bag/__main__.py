@@ -24,6 +24,7 @@ from pathlib import Path
 from fcsl_compiler.base.version import add_version
 
 from ..cli import MSG_PATH_HELP, TIME_HELP, completeness, run_tool
+from ..complete_output import check_target
 from ..errors import BagError
 from .bag import Bag
 from .formats import open_bag
@@ -51,6 +52,7 @@ def _info(options: argparse.Namespace) -> int:
 def _cut(options: argparse.Namespace) -> int:
     from ..replay.cut import cut
 
+    check_target(options.output, is_new=True)
     bag = open_bag(options.bag, options.msg_path)
     begin_ns, end_ns = _range(bag, options)
     with ExitStack() as opened:
@@ -95,8 +97,9 @@ def _diff(options: argparse.Namespace) -> int:
 
 
 def _export(options: argparse.Namespace) -> int:
-    from .export import ELEMENTS_MAX, select, write
+    from .export import ELEMENTS_MAX, check_name, select, write
 
+    check_name(options.output)
     bag = open_bag(options.bag, options.msg_path)
     found = select(bag, options.columns or (), options.machine, options.time)
     rows = write(found, options.output)

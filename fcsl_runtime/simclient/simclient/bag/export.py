@@ -22,7 +22,7 @@ from typing import Any
 import numpy as np
 
 from ..cli import Progress
-from ..complete_output import complete_or_absent
+from ..complete_output import check_target, complete_or_absent
 from ..errors import BagError, did_you_mean
 from .bag import Array, Bag, RecordedMachine
 from .fields import flat
@@ -208,16 +208,23 @@ def _may_match(topic: str, prefix: str, patterns: Sequence[str]) -> bool:
     return _matches(topic, patterns) or any(prefix.startswith(f) or f.startswith(prefix) for f in fixed)
 
 
+def check_name(output: str | Path) -> None:
+    """Raises BagError for what cannot be written."""
+    suffix = Path(output).suffix.lower()
+    if suffix not in FORMATS:
+        raise BagError(f"{output}: the name of a table ends in {', '.join(FORMATS)}")
+    if suffix == ".parquet":
+        _pyarrow()
+    check_target(output)
+
+
 def write(found: Export, output: str | Path) -> int:
     """Writes to `output`, complete or not at all, in the format that its suffix names; returns the number of rows.
 
     Raises BagError.
     """
+    check_name(output)
     suffix = Path(output).suffix.lower()
-    if suffix not in FORMATS:
-        raise BagError(f"{output}: the name of a table ends in {', '.join(FORMATS)}")
-    if suffix == ".parquet":
-        _pyarrow()  # before anything is computed
     with complete_or_absent(output) as partial:
         if suffix == ".npz":
             return _write_npz(found, partial)

@@ -13,7 +13,7 @@ from rosbags.interfaces import Connection, Qos
 from rosbags.rosbag2 import StoragePlugin, Writer
 from rosbags.rosbag2.metadata import parse_qos
 
-from ..complete_output import complete_or_absent
+from ..complete_output import check_target, complete_or_absent
 from ..errors import BagError
 from .bag import Bag, Topic
 
@@ -45,8 +45,7 @@ def copy_of(bag: Bag, target: str | Path, topics: Iterable[str]) -> Iterator[Cop
 
     Definitions, type hashes and offered qualities of service are those of `bag`. Raises BagError.
     """
-    if Path(target).exists():
-        raise BagError(f"{target}: exists already")
+    check_target(target, is_new=True)
     offered = _offered(bag)
     with complete_or_absent(target) as partial:
         with Writer(partial, version=_FORMAT, storage_plugin=StoragePlugin.MCAP) as writer:

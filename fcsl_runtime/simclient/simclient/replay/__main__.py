@@ -21,6 +21,7 @@ from fcsl_compiler.base.version import add_version
 
 from ..bag.formats import open_bag
 from ..cli import MSG_PATH_HELP, completeness, run_tool
+from ..complete_output import check_target
 from ..errors import MapError
 from . import mapping
 from .replaying import replay, replay_foreign
@@ -59,6 +60,9 @@ def _main_foreign(options: argparse.Namespace) -> int:
         from . import expect_plot
 
         expect_plot.check_name(options.plot)
+        check_target(options.plot)
+    if options.output:
+        check_target(options.output, is_new=True)
     opened = open_bag(options.bag, options.msg_path)
     done = replay_foreign(
         opened,

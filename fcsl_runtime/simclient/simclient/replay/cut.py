@@ -22,6 +22,7 @@ from ..bag.seconds import seconds
 from ..bag.stamps import Clock, Stamps
 from ..bag.writer import can_be_copied, copy_of
 from ..cli import Progress
+from ..complete_output import check_target
 from ..errors import BagError
 from ..run import Run
 from .reproduce import Replay
@@ -128,6 +129,7 @@ def cut(
     `replayed`: a machine and a new run of it, which make the checkpoint of the cut. `time` chooses the clock
     (stamps.Clock). Raises BagError.
     """
+    check_target(target, is_new=True)
     firsts = {machine.prefix: _first_tick(bag, machine, begin_ns, end_ns) for machine in bag.machines()}
     machines = {machine.prefix: _why_not(bag, machine, firsts[machine.prefix]) for machine in bag.machines()}
     opening: list[tuple[str, int, bytes]] = []

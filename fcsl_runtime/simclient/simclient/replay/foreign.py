@@ -45,6 +45,10 @@ _ODD = {
 }
 
 
+#: Offsets between clocks in s, since 2017.
+_CLOCKS_S = {18: "GPS and UTC (18 s)", 37: "TAI and UTC (37 s)", 19: "TAI and GPS (19 s)"}
+
+
 @dataclass(frozen=True)
 class Fate:
     """The use of one channel's messages: `coverage` counts the used ones; the others by reason (number, first one).
@@ -70,6 +74,7 @@ class ForeignRun:
     fates: dict[str, Fate]
     oddities: dict[str, Oddities]
     unmapped: tuple[str, ...]
+    starved: tuple[str, ...]  # the instances that will be failed, because a channel of theirs is not mapped
     notes: tuple[str, ...]
     truncated: str
     comparisons: tuple[Comparison, ...] = ()
@@ -87,11 +92,13 @@ class ForeignRun:
             if fate.refused:
                 lines.append(f"  {name}: refused: {', '.join(refusals(fate.refused))}")
         for topic, odd in self.oddities.items():
-            found = [f"{count} {_ODD[name]}" for name, count in vars(odd).items() if count]
+            found = [f"{count} {text}" for name, text in _ODD.items() if (count := getattr(odd, name))]
             if found:
                 lines.append(f"  {topic}: {', '.join(found)}")
+        lines += [f"  {text}" for text in _clocks({topic: odd.offset_ns for topic, odd in self.oddities.items()})]
         if self.unmapped:
-            lines.append(f"  not mapped: {', '.join(self.unmapped)}")
+            failed = f"; without samples, these instances are failed: {', '.join(self.starved)}" if self.starved else ""
+            lines.append(f"  not mapped: {', '.join(self.unmapped)}{failed}")
         lines += [f"  note: {note}" for note in self.notes]
         if self.comparisons:
             lines.append(table(self.comparisons))
@@ -117,6 +124,21 @@ class ForeignRun:
 def _seconds(time_ns: int) -> str:
     """Exact decimal; a float cannot hold today's times in ns."""
     return f"{time_ns // 10**9}.{time_ns % 10**9:09d}"
+
+
+def _clocks(offsets_ns: Mapping[str, int]) -> list[str]:
+    """Topics whose stamps are of another clock than that of the recorder, where it matters: their offset is one of those
+    between the known clocks, or differs from that of another topic.
+    """
+    found = []
+    for topic, offset_ns in offsets_ns.items():
+        known = [text for s, text in _CLOCKS_S.items() if abs(abs(offset_ns) - s * 10**9) < JUMP_NS // 2]
+        apart = max(abs(offset_ns - other) for other in offsets_ns.values()) > JUMP_NS
+        if abs(offset_ns) > JUMP_NS and (known or apart):
+            way = "ahead of" if offset_ns > 0 else "behind"
+            why = f", the offset of {known[0]}" if known else "; those of other topics are not: is it another clock?"
+            found.append(f"{topic}: stamps {abs(offset_ns) / 1e9:.3f} s {way} the times of recording{why}")
+    return found
 
 
 def sensors_of(machine: Machine) -> dict[str, Channel]:
@@ -172,7 +194,7 @@ def _wishes(chart: Map, machine: Machine, bag: Bag) -> list[Wish]:
         if key in seen:
             raise MapError(f"{entry.place}: channel `{key[0]}` is mapped from `{key[1]}` twice; first at {seen[key]}")
         seen[key] = entry.place
-        wishes.append(wish(bag, entry, channel.field.type, channel.field.count))
+        wishes.append(wish(bag, entry, channel.field.type, channel.field.count, null_refused=True))
     return wishes
 
 
@@ -281,12 +303,14 @@ def run_foreign(
         delivery, fates[name] = _delivery(channel, intake, placed[times], min(timeouts, default=0), grid)
         deliveries.append(delivery)
     _drive(run, deliveries, grid.ticks, outputs, record, progress)
+    unmapped = [channel for name, channel in sensors_of(machine).items() if name not in fates]
     return ForeignRun(
         grid=grid,
         header_time=chart.header_time,
         fates=fates,
         oddities=oddities,
-        unmapped=tuple(name for name in sensors_of(machine) if name not in fates),
+        unmapped=tuple(channel.name for channel in unmapped),
+        starved=tuple(dict.fromkeys(c.field.path.partition(".")[0] for c in unmapped if c.grace_ticks != NEVER)),
         notes=tuple(bag.notes),
         truncated=bag.truncated,
         digest=outputs.digest() if outputs else "",

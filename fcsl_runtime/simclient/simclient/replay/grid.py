@@ -10,7 +10,7 @@ in ns.
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from typing import Any
 
 import numpy as np
@@ -46,6 +46,7 @@ class Oddities:
     JUMP_NS. jumps_back: earlier by more than JUMP_NS. stuck: messages after such a jump, up to the first that is newer
     than all before it. jumps_ahead: steps forward that exceed those of the recording times by more than JUMP_NS.
     headerless: messages of a type without a stamp, where stamps were requested; their recording time is used.
+    offset_ns: by how much the stamps are ahead of the recording times, in the middle; 0 without stamps.
     """
 
     unset: int = 0
@@ -55,6 +56,7 @@ class Oddities:
     stuck: int = 0
     jumps_ahead: int = 0
     headerless: int = 0
+    offset_ns: int = field(default=0, compare=False)
 
 
 def screen(times_ns: Array, log_ns: Array, stamps: bool) -> tuple[Array, Oddities]:
@@ -66,9 +68,10 @@ def screen(times_ns: Array, log_ns: Array, stamps: bool) -> tuple[Array, Odditie
     times, log = times_ns[usable], log_ns[usable]
     if not len(times):
         return usable, Oddities(unset=len(times_ns))
+    offset_ns = int(np.median(times - log)) if stamps else 0
     steps = np.diff(times, prepend=times[0])
     if len(times) > 1 and steps[1:].min() > 0 and steps.max() <= JUMP_NS:  # as usual: in order, and nothing jumps
-        return usable, Oddities(unset=len(times_ns) - len(times))
+        return usable, Oddities(unset=len(times_ns) - len(times), offset_ns=offset_ns)
     newest_before = np.concatenate((times[:1], np.maximum.accumulate(times)[:-1]))
     behind = newest_before - times
     index = np.arange(len(times))
@@ -84,6 +87,7 @@ def screen(times_ns: Array, log_ns: Array, stamps: bool) -> tuple[Array, Odditie
         jumps_back=int(np.count_nonzero(steps < -JUMP_NS)),
         stuck=int(np.count_nonzero(stuck)),
         jumps_ahead=int(np.count_nonzero(ahead & (steps > JUMP_NS))),
+        offset_ns=offset_ns,
     )
     usable[usable] = ~stuck
     return usable, oddities

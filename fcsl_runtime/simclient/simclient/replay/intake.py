@@ -53,8 +53,10 @@ class Wish:
     pick: Pick
 
 
-def wish(bag: Bag, entry: Entry, scalar: str, count: int) -> Wish:
-    """The scalars that `entry` takes for a target of `count` scalars. Raises MapError with the entry's place."""
+def wish(bag: Bag, entry: Entry, scalar: str, count: int, null_refused: bool = False) -> Wish:
+    """The scalars that `entry` takes for a target of `count` scalars. `null_refused`: a quaternion of length zero is
+    none. Raises MapError with the entry's place.
+    """
     try:
         topic = bag.topic(entry.topic)
     except BagError as error:
@@ -67,8 +69,10 @@ def wish(bag: Bag, entry: Entry, scalar: str, count: int) -> Wish:
         axes=entry.axes,
         source_axes=entry.source_axes,
         order=entry.order,
+        rotation=entry.rotation,
         scale=entry.scale,
         offset=entry.offset,
+        null_refused=null_refused,
     )
     return Wish(entry, topic, pick)
 

@@ -13,6 +13,9 @@
                                      # orientations enu/flu, ned/frd, ned/flu, enu/frd (world/body)
         from: flu                    # axes in the bag; needed where it does not follow REP-103 (enu, flu)
         quaternion: wxyz             # order of four numbers in the message; a geometry_msgs/Quaternion is xyzw
+        rotation: roll_90            # how the sensor sits in the body: from its axes to the body's, by a name as in board
+                                     # files (roll_180_yaw_90: first roll, then pitch, then yaw) or a 3x3 matrix; of
+                                     # vectors, covariances and orientations; in the axes of the bag
         scale: 9.80665               # channel = field * scale + offset, after the change of axes: for other units;
         offset: 0.0                  # a number, or one per element
         timeout_ms: 50               # a channel without a sample for longer is invalid, even before
@@ -40,7 +43,7 @@ next. Of several samples for one tick the newest is used; the others are superse
 messages with the same time the later one is used. Refused and counted are: a zero stamp; messages after a backward step
 of more than 1 s, until the clock has caught up; messages of another type than the topic's first; damaged messages; a
 list of another length; a NaN; a value out of range of an integer or bool; values that the message marks as not
-measured. An expected quaternion of length zero is refused, too. A channel without a usable message is an error.
+measured; quaternions of length zero. A channel without a usable message is an error.
 """
 
 from __future__ import annotations
@@ -54,13 +57,14 @@ from typing import Any
 
 import yaml
 
+from fcsl_compiler.board.rotations import NAMED, from_angles, matrix_problem
 from fcsl_compiler.ros.message_fields import QUATERNION_AXES, VECTOR_AXES
 
 from ..errors import MapError, did_you_mean
 
 _MAX_MAP_BYTES = 1 << 20
 _FROM_MACHINE = "from machine"
-_SOURCE_KEYS = ("topic", "field", "axes", "from", "quaternion", "scale", "offset")
+_SOURCE_KEYS = ("topic", "field", "axes", "from", "quaternion", "rotation", "scale", "offset")
 _CHANNEL_KEYS = (*_SOURCE_KEYS, "timeout_ms")
 _EXPECT_KEYS = (*_SOURCE_KEYS, "compare", "abs", "rel", "from_s", "until_s", "align")
 _AXES = (*VECTOR_AXES, *QUATERNION_AXES)
@@ -79,6 +83,7 @@ class Entry:
     axes: str = ""
     source_axes: str = ""
     order: str = ""
+    rotation: tuple[float, ...] = ()
     scale: tuple[float, ...] = ()
     offset: tuple[float, ...] = ()
     timeout_ns: int = 0
@@ -174,6 +179,28 @@ class _Reader:
     def numbers(self, members: _Members, key: str) -> tuple[float, ...]:
         return tuple(self.number(n, f"`{key}`") for n in self.listed(members[key][1])) if key in members else ()
 
+    def rotation(self, node: yaml.Node) -> tuple[float, ...]:
+        """3x3, row by row."""
+        if isinstance(node, yaml.ScalarNode):
+            if node.value in NAMED:
+                return from_angles(*NAMED[node.value])
+            raise self.fail(
+                node,
+                f"no rotation `{node.value}`{did_you_mean(node.value, NAMED)}; angles are multiples of 45 from 45 to 315, "
+                "in the order roll, pitch, yaw (roll_90_yaw_180); or write a 3x3 matrix",
+            )
+        rows = [[self.number(n, "`rotation`") for n in self.listed(row)] for row in self.listed(node)]
+        if [len(row) for row in rows] != [3, 3, 3]:
+            raise self.fail(
+                node, "`rotation` must be a name, such as roll_180_yaw_90, or a matrix: three rows of three numbers"
+            )
+        matrix = tuple(number for row in rows for number in row)
+        if problem := matrix_problem(matrix):
+            raise self.fail(
+                node, f"the matrix is no rotation: {problem}; write the body's axes in the sensor's, row by row"
+            )
+        return matrix
+
     def milliseconds(self, node: yaml.Node, what: str) -> int:
         """Nanoseconds, exactly."""
         try:
@@ -202,6 +229,7 @@ def _entry(reader: _Reader, what: str, target: str, node: yaml.Node, members: _M
         axes=word("axes", _AXES),
         source_axes=word("from", _AXES),
         order=word("quaternion", ("xyzw", "wxyz")),
+        rotation=reader.rotation(members["rotation"][1]) if "rotation" in members else (),
         scale=reader.numbers(members, "scale"),
         offset=reader.numbers(members, "offset"),
         timeout_ns=reader.milliseconds(members["timeout_ms"][1], "`timeout_ms`") if "timeout_ms" in members else 0,

@@ -12,7 +12,7 @@ import numpy as np
 
 from ..bag import Bag, RecordedMachine, formats
 from ..cli import Progress
-from ..complete_output import complete_or_absent
+from ..complete_output import check_target, complete_or_absent
 from ..descriptor import Field
 from ..errors import BagError, TwinError
 from ..machine_build import build_config
@@ -168,11 +168,11 @@ def replay_foreign(
     Afterwards the outputs are compared with the map's expectations, or those of the file `expect` (`comparisons` of the
     result). `machine` selects one of several in the library. Raises MapError, BagError or TwinError for bad input.
     """
+    if output is not None:
+        check_target(output, is_new=True)
     opened = formats.opened(bag)
     parsed = mapping.read_map(chart)
     expectations = mapping.read_map(expect, only_expect=True).expectations if expect else parsed.expectations
-    if output is not None and Path(output).exists():
-        raise BagError(f"{output}: exists already")
     entries = [*parsed.entries, *(expectation.entry for expectation in expectations)]
     opened = with_transforms(opened, entries, parsed.header_time)
     stages = _Stages()
