@@ -95,6 +95,7 @@ def _method(
         {},
         declarations.names,
         wrong=declarations.wrong,
+        uses_library=declarations.uses_library,
         algorithm=found,
         method=name,
     )

@@ -14,6 +14,7 @@ from ..base.source import MAX_NAME, SourceFile, Span
 from ..model import ir
 from ..model.c_names import C_KEYWORDS
 from ..model.ranges import UNBOUNDED, Range, parse_range, split_range
+from ..model.ros_names import ros_field
 from ..model.types import HEALTH, REQUEST, Type, TypeNames, TypeSyntaxError
 from ..parse.python_source import span_of
 from .annotations import MAX_TYPE, annotation_type
@@ -250,13 +251,17 @@ class _Reader:
         elif record != "outputs" or name == "transition_request":
             return True
         else:
-            why = "every output becomes a field of a ROS 2 message"
-            if name in ("header", "tick"):
+            why = "every output becomes a field of a ROS 2 message, in lower case"
+            field = ros_field(name)
+            same = next((p.name for p in self.found.ports["outputs"] if ros_field(p.name) == field), "")
+            if same:
+                fix = f"`{same}` is that field already; use another name"
+            elif field in ("header", "tick"):
                 fix = "every message has one already"
-            elif name in C_KEYWORDS:
+            elif field in C_KEYWORDS:
                 fix = "it is a keyword of C or C++; use another name"
-            elif not _SNAKE.fullmatch(name):
-                fix = "write it in lower_snake_case"
+            elif not _SNAKE.fullmatch(field):
+                fix = "use single underscores between letters and digits"
             else:
                 return True
         what = "an output" if record == "outputs" else "a port"

@@ -18,7 +18,7 @@ from .declarations import Declarations
 from .externs import is_extern, read_extern
 from .library_files import library_names
 from .python_habits import instead_of_function, instead_of_import
-from .scope import BUILTIN_CONSTANTS, CONSTRUCTORS, LANGUAGE_NAMES
+from .scope import BUILTIN_CONSTANTS, CONSTRUCTORS, LANGUAGE_NAMES, SHADOWABLE
 
 #: Names that fcsl_builtins offers in addition to the library.
 IMPORTABLE = (
@@ -51,7 +51,7 @@ def collect(
     `modules`: the imported files by module name, None for a file with a reported error. `used`: the classes that the
     machine uses.
     """
-    declarations = Declarations(source, owner, TypeNames({}, structs))
+    declarations = Declarations(source, owner, TypeNames({}, structs), tree=tree)
     beginning = True  # True while only the docstring and __future__ imports have been read
     for position, node in enumerate(tree.body):
         span = span_of(source, node)
@@ -183,9 +183,9 @@ def check_imported_names(declarations: Declarations, tree: ast.Module, sink: Dia
 # ---- names of the module -------------------------------------------------------------------------------------------
 
 
-def _free(declarations: Declarations, name: str, span: Span, sink: DiagnosticSink) -> bool:
+def _free(declarations: Declarations, name: str, span: Span, sink: DiagnosticSink, function: bool = True) -> bool:
     """Registers a name. Returns False after reporting that the name is already in use."""
-    if name in LANGUAGE_NAMES:
+    if name in LANGUAGE_NAMES and (function or name not in SHADOWABLE or declarations.uses_library(name)):
         sink.error("E302", f"`{name}` is a name of the language", span, help="use another name")
     elif name.startswith("__") and not name.endswith("__"):
         why = "CPython gives such a name another one within a class"
@@ -228,7 +228,7 @@ def _constant(declarations: Declarations, node: ast.Assign | ast.AnnAssign, sink
     ):
         sink.error("E303", "this is not a module constant", span, help="write `NAME = value`, one name a line")
         return
-    if not _free(declarations, target.id, span, sink):
+    if not _free(declarations, target.id, span, sink, function=False):
         return
     declarations.wrong.add(target.id)
     annotation = node.annotation if isinstance(node, ast.AnnAssign) else None

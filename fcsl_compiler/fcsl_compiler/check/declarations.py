@@ -5,6 +5,7 @@ from __future__ import annotations
 
 import ast
 from dataclasses import dataclass, field
+from functools import cached_property
 
 from ..base.source import SourceFile, Span
 from ..model import ir
@@ -26,9 +27,25 @@ class Declarations:
     externs: dict[str, ir.Extern] = field(default_factory=dict)
     #: Imported helpers by name.
     imported: dict[str, Declarations] = field(default_factory=dict)
+    tree: ast.Module = field(default_factory=lambda: ast.Module([], []))
     #: The definition of each module-level name.
     defined: dict[str, Span] = field(default_factory=dict)
     #: Constants, functions and classes with a reported declaration error. Their uses are not reported again.
     wrong: set[str] = field(default_factory=set)
     declared: bool = True  # True if no error was reported in its classes and constants
     sound: bool = True  # True if, in addition, no error was reported in its helpers and in the files it imports from
+
+    def uses_library(self, name: str) -> bool:
+        """Whether the file imports this name of the library, calls it, or defines it at module level: then nothing else
+        may have it."""
+        return name in self.defined or name in self._used_names
+
+    @cached_property
+    def _used_names(self) -> frozenset[str]:
+        found = set()
+        for node in ast.walk(self.tree):
+            if isinstance(node, ast.ImportFrom):
+                found.update(alias.name for alias in node.names)
+            elif isinstance(node, ast.Call) and isinstance(node.func, ast.Name):
+                found.add(node.func.id)
+        return frozenset(found)

@@ -23,7 +23,7 @@ from .call_order import CallGraph, call_graph, call_order
 from .collect import collect
 from .declarations import Declarations
 from .library_files import library_files, library_names, overloads
-from .scope import LANGUAGE_NAMES, Scope, Signature
+from .scope import LANGUAGE_NAMES, SHADOWABLE, Scope, Signature
 from .statements import BodyChecker
 
 LIBRARY_PREFIX = "fcsl"
@@ -264,7 +264,8 @@ def check_function(
         return None
     for argument in node.args.args:
         at = span_of(source, argument)
-        if argument.arg in LANGUAGE_NAMES:
+        free = argument.arg in SHADOWABLE and not declarations.uses_library(argument.arg)
+        if argument.arg in LANGUAGE_NAMES and not free:
             sink.error("E422", f"`{argument.arg}` is a name of the language", at, help="use another name")
             plain = False
             continue
@@ -285,7 +286,16 @@ def check_function(
     result = result_type(source, node.returns, names, sink)
     if result is None or not plain:
         return None
-    scope = Scope(source, declarations.constants, table, arguments, names, result, wrong=declarations.wrong)
+    scope = Scope(
+        source,
+        declarations.constants,
+        table,
+        arguments,
+        names,
+        result,
+        wrong=declarations.wrong,
+        uses_library=declarations.uses_library,
+    )
     before = sink.errors
     body = BodyChecker(scope, sink).function(node.body)
     if not scope.unreachable and sink.errors == before:

@@ -63,7 +63,8 @@ class Inference:
 
     def __init__(self, scope: Scope):
         self._scope = scope
-        self.names = LiteralNames(scope.source, scope.constants, scope.names.sizes)
+        self.names = LiteralNames(scope.source, scope.constants, scope.names.sizes, self._is_bound)
+        self._statements: list[ast.stmt] = []
         self._literals: dict[ast.expr, Group] = {}  # every expression of literals only
         self._variables: dict[ast.expr, Group] = {}  # uses of loop variables and of `len`
         self._locals: dict[str, Value] = {}
@@ -72,8 +73,15 @@ class Inference:
         self._shifts: list[tuple[Group, Group]] = []  # pairs of operand and count, for literal operands
 
     def function(self, statements: list[ast.stmt]) -> None:
+        self._statements = statements
         self._body(statements)
         self._lend()
+
+    def _is_bound(self, name: str) -> bool:
+        nodes = (node for statement in self._statements for node in ast.walk(statement))
+        return name in self._scope.arguments or any(
+            isinstance(node, ast.Name) and node.id == name and isinstance(node.ctx, ast.Store) for node in nodes
+        )
 
     def expression(self, node: ast.expr, want: Type | None = None) -> None:
         """Infers one expression whose context expects type `want`, if given."""

@@ -46,6 +46,7 @@ class LiteralNames:
     source: SourceFile
     constants: Mapping[str, Constant]
     sizes: Mapping[str, int]
+    is_bound: Callable[[str], bool] = lambda name: False  # whether the function has a local of this name
 
     def is_literal(self, node: ast.expr) -> bool:
         """Whether a name or a constant is a literal number."""
@@ -55,7 +56,7 @@ class LiteralNames:
             return False
         if node.id in self.constants:
             return isinstance(self.constants[node.id], UntypedConstant)
-        return node.id in self.sizes or node.id in BUILTIN_CONSTANTS
+        return node.id in self.sizes or (node.id in BUILTIN_CONSTANTS and not self.is_bound(node.id))
 
     def holds_float(self, node: ast.expr) -> bool:
         """Whether such a literal is a float."""

@@ -4,6 +4,7 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Callable
 from dataclasses import dataclass, field
 from typing import Protocol
 
@@ -40,6 +41,8 @@ LANGUAGE_NAMES = frozenset(
         "__class__",
     }
 )
+#: Those that a constant or a local may have as its name, in a file that does not use them otherwise.
+SHADOWABLE = frozenset({*ops.BUILTINS, *CONSTRUCTORS, *BUILTIN_CONSTANTS}) - ops.CONVERSIONS - frozenset(SCALARS)
 
 
 @dataclass(frozen=True)
@@ -106,6 +109,7 @@ class Scope:
     arguments: dict[str, Type]
     names: TypeNames
     result: Type | None = None
+    uses_library: Callable[[str], bool] = lambda name: True  # whether the file means that name of the library
     algorithm: AlgorithmClass | None = None  # the class that `self` refers to, None in helpers
     method: str = ""  # start or execute
     wrong: set[str] = field(default_factory=set)  # module-level names with a reported declaration error

@@ -16,8 +16,9 @@ from .checker import Stop
 from .expressions import ExprChecker
 from .hoist import Hoister, reaches_outside
 from .intervals import interval, is_static
+from .library_files import library_names
 from .loop_bounds import BEYOND, MAX_BOUND, MAX_ITERATIONS, TOO_MANY, parameters_in
-from .scope import LANGUAGE_NAMES, Scope
+from .scope import LANGUAGE_NAMES, SHADOWABLE, Scope
 
 STALE = HEALTH_NAMES.index("stale")
 
@@ -262,6 +263,8 @@ class BodyChecker:
             self._fail("E422", f"`{name}` is the variable of the loop", span, why="loop variables are read-only")
         if name in scope.constants or name in scope.names.sizes:
             self._fail("E422", f"`{name}` is a module constant", span, help="use another name")
+        if (name in SHADOWABLE or name in library_names()) and not scope.uses_library(name):
+            return
         if name in LANGUAGE_NAMES or name in scope.names.structs:
             whose = "the language" if name in LANGUAGE_NAMES else "the machine: a struct"
             self._fail("E422", f"`{name}` is a name of {whose}", span, help="use another name")

@@ -8,6 +8,7 @@ import re
 from ..base.source import MAX_NAME, Span
 from ..check.scope import LANGUAGE_NAMES
 from ..model.c_names import C_KEYWORDS
+from ..model.ros_names import ros_field
 from ..model.types import SCALARS, Member, Struct, TypeNames, TypeSyntaxError, check_size, parse_type
 from ..parse.json_reader import ConfigReader
 from ..parse.json_source import JsonNode
@@ -50,6 +51,11 @@ class _Structs:
             text = self.reader.string(text_node, f"the type of `{member}`", "f64[3] rad/s")
             if text is None or not self._member_name(member, at):
                 continue
+            same = next((m.name for m in members if ros_field(m.name) == ros_field(member)), "")
+            if same:
+                message = f"`{member}` and `{same}` would be one field of a ROS 2 message"
+                self._error(message, at, "fields are in lower case; use another name")
+                continue
             found = self._member(name, member, text, text_node.span, (*outside, name))
             if found is not None:
                 members.append(found)
@@ -90,10 +96,11 @@ class _Structs:
         return True
 
     def _member_name(self, name: str, span: Span) -> bool:
-        if name in C_KEYWORDS:
+        if ros_field(name) in C_KEYWORDS:
             self._error(f"`{name}` is a keyword of C or C++", span, "use another name")
-        elif not _MEMBER.fullmatch(name) or len(name) > MAX_NAME:
-            self._error(f"`{name}` cannot be the name of a member", span, "write it in lower_snake_case")
+        elif not _MEMBER.fullmatch(ros_field(name)) or len(name) > MAX_NAME:
+            fix = "a name begins with a letter, and single underscores separate letters and digits"
+            self._error(f"`{name}` cannot be the name of a member", span, fix)
         else:
             return True
         return False

@@ -6,6 +6,7 @@ from __future__ import annotations
 
 from ..model import ir
 from ..model.machine import Instance, Machine
+from ..model.ros_names import ros_field
 from ..model.types import HEALTH, HEALTH_NAMES, REQUEST, Array, Scalar, Struct, Type, element_of
 
 _SEPARATOR = "=" * 80 + "\n"
@@ -125,7 +126,7 @@ def _declaration(machine: Machine, name: str, type_: Type, unit: str, doc: str) 
     )
     text = "; ".join(filter(None, (words, rows, doc.translate(_DOC_FOR_ROSIDL))))
     comment = " ".join(filter(None, (f"[{unit}]" if unit else "", text)))
-    return f"{ros_type(machine, type_)}{shape} {name}" + (f" # {comment}" if comment else "")
+    return f"{ros_type(machine, type_)}{shape} {ros_field(name)}" + (f" # {comment}" if comment else "")
 
 
 def request_constant(request: str) -> str:

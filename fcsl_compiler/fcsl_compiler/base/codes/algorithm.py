@@ -102,12 +102,13 @@ ALGORITHM_CODES: dict[str, Code] = {
     ),
     "E307": Code(
         "a port name that cannot be used",
-        "Every output becomes a field of a ROS 2 message and of a C struct. Its name must be lower_snake_case, "
-        "must not be a keyword of C or C++, and must not be `header` or `tick`. The names inputs, outputs, "
+        "Every output becomes a field of a C struct and, in lower case, of a ROS 2 message: `P` becomes `p`. Single "
+        "underscores separate letters and digits. No two outputs become the same field, and none a keyword of C or "
+        "C++, `header` or `tick`. The names inputs, outputs, "
         "parameters, state, start, execute and health are reserved. `transition_request` is reserved for the "
         "output that requests a transition.",
         Kind.FILE,
-        'class Law:\n    outputs = {"isReady": "bool"}\n\n    def execute(self):\n        self.isReady = True',
+        'class Law:\n    outputs = {"is__ready": "bool"}\n\n    def execute(self):\n        self.is__ready = True',
         'class Law:\n    outputs = {"is_ready": "bool"}\n\n    def execute(self):\n        self.is_ready = True',
     ),
     "E308": Code(

@@ -436,8 +436,8 @@ MACHINE_CODES: dict[str, Code] = {
     "E232": Code(
         "an invalid struct",
         "A struct is a plain value of fixed size, declared once for the whole machine. Its name is CamelCase. Its "
-        "members are in lower_snake_case and are numbers, bools, arrays of them, or other structs without "
-        "recursion. It becomes a C struct and a ROS message.",
+        "members become fields of a ROS message, in lower case, and are numbers, bools, arrays of them, or other structs "
+        "without recursion. It becomes a C struct and a ROS message.",
         Kind.JSON,
         '"structs": {"Goal": {"position": "f64[3] m", "speed": "f64 m/s", "next": "Goal"}}',
         '"structs": {"Goal": {"position": "f64[3] m", "speed": "f64 m/s"}}',

@@ -140,12 +140,25 @@ static const fcsl_field_t *leaf(const builder_t *b)
     return b->next < b->instance->field_count ? &b->machine->fields[b->instance->first_field + b->next] : NULL;
 }
 
+/* Whether the first `length` letters of a path are these of a message, whose fields have no capitals. */
+static int is_named(const char *path, const char *name, size_t length)
+{
+    for (size_t i = 0; i < length; i++) {
+        const char letter = path[i];
+        const char small = letter >= 'A' && letter <= 'Z' ? (char)(letter - 'A' + 'a') : letter;
+        if (letter != name[i] && small != name[i]) {
+            return 0;
+        }
+    }
+    return 1;
+}
+
 /* Whether the next leaf lies in the output whose path is `path`: it is the output, a member, or a member of an element. */
 static int is_inside(const builder_t *b, const char *path)
 {
     const fcsl_field_t *field = leaf(b);
     const size_t length = strlen(path);
-    return field != NULL && field->role == FCSL_ROLE_OUTPUT && strncmp(field->path, path, length) == 0 &&
+    return field != NULL && field->role == FCSL_ROLE_OUTPUT && is_named(field->path, path, length) &&
            (field->path[length] == '\0' || field->path[length] == '.' || field->path[length] == '[');
 }
 
@@ -159,7 +172,8 @@ static int append_leaf(builder_t *b, const declaration_t *declaration, const cha
     const char *last = strrchr(field->path, '.');
     char expected[WORD_BYTES];
     fcsl_ros_type(field, expected, sizeof expected);
-    if (last == NULL || strcmp(last + 1, declaration->name) != 0 || strcmp(expected, declaration->type) != 0) {
+    if (last == NULL || strlen(last + 1) != strlen(declaration->name) ||
+        !is_named(last + 1, declaration->name, strlen(declaration->name)) || strcmp(expected, declaration->type) != 0) {
         return refuse(b, "an output of another type: ", declaration->name);
     }
     fcsl_layout_t *layout = b->layout;

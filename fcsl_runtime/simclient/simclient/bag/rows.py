@@ -7,6 +7,8 @@ from collections.abc import Collection, Iterator
 
 import numpy as np
 
+from fcsl_compiler.model.ros_names import ros_field
+
 from ..errors import BagError
 from ..ros.cdr import Layout
 from . import formats
@@ -104,7 +106,7 @@ def _locate(bag: Bag, path: str, machine: str) -> tuple[str, str]:
         raise BagError(
             f"{bag.path}: `{path}`: no instance `{instance}`; it holds {', '.join(sorted(recorded.outputs))}"
         )
-    return recorded.outputs[instance], field
+    return recorded.outputs[instance], ros_field(field)
 
 
 def _all_fit(bag: Bag, topic: str) -> bool:
