@@ -80,6 +80,7 @@ void fcsl_bus_count(const fcsl_bus_t *bus, fcsl_bus_counters_t *counters)
         .replaced = read_counter(&now->replaced),
         .overflowed = read_counter(&now->overflowed),
         .wrong_size = read_counter(&now->wrong_size),
+        .misfits = read_counter(&now->misfits),
         .deletions = read_counter(&now->deletions),
         .strays = read_counter(&now->strays),
         .connects = read_counter(&now->connects),
@@ -138,6 +139,8 @@ static int allocate(fcsl_bus_t *bus, const fcsl_bus_options_t *options)
             return -1;
         }
         bus->inboxes[i].quiet = input->quiet;
+        bus->inboxes[i].fits = input->fits;
+        bus->inboxes[i].what = input->what;
     }
     return 0;
 }

@@ -26,6 +26,9 @@ static void put(fcsl_bus_t *bus, uint32_t input, const uint8_t *bytes, size_t si
     case INBOX_WRONG_SIZE:
         bus_count(&counters->wrong_size, 1);
         return;
+    case INBOX_MISFIT:
+        bus_count(&counters->misfits, 1);
+        return;
     default:
         break;
     }

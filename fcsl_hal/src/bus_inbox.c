@@ -52,6 +52,10 @@ inbox_result_t inbox_put(inbox_t *inbox, const uint8_t *bytes, size_t size)
     if (size > inbox->bytes || size < inbox->least) {
         return INBOX_WRONG_SIZE;
     }
+    /* Before it takes a place: what nobody wants must not keep out what is waited for. */
+    if (inbox->fits != NULL && !inbox->fits(inbox->what, bytes, size)) {
+        return INBOX_MISFIT;
+    }
     if (inbox->depth == 1) {
         fill(inbox, inbox->back, bytes, size);
         const uint32_t before = atomic_exchange_explicit(&inbox->middle, inbox->back | NEW, memory_order_acq_rel);

@@ -9,13 +9,15 @@
 #include <stddef.h>
 #include <stdint.h>
 
-typedef enum { INBOX_TAKEN, INBOX_REPLACED, INBOX_OVERFLOWED, INBOX_WRONG_SIZE } inbox_result_t;
+typedef enum { INBOX_TAKEN, INBOX_REPLACED, INBOX_OVERFLOWED, INBOX_WRONG_SIZE, INBOX_MISFIT } inbox_result_t;
 
 typedef struct {
     uint32_t bytes; /* of a slot */
     uint32_t least; /* of a message */
     uint32_t depth;
-    int quiet; /* see fcsl_bus_input_t */
+    int quiet; /* see fcsl_bus_input_t, as of the next two */
+    int (*fits)(uint64_t what, const uint8_t *bytes, size_t size);
+    uint64_t what;
     uint8_t *slots;
     uint32_t *sizes; /* of what lies in the slots */
     /* depth > 1: a queue. Messages that ever came in and went out. */

@@ -26,6 +26,7 @@ typedef struct {
     _Atomic uint64_t replaced;
     _Atomic uint64_t overflowed;
     _Atomic uint64_t wrong_size;
+    _Atomic uint64_t misfits;
     _Atomic uint64_t deletions;
     _Atomic uint64_t strays;
     _Atomic uint64_t connects;

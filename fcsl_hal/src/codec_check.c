@@ -180,6 +180,15 @@ static int begins(const uint8_t *at, uint16_t id, uint8_t type)
     return fcsl_get_u16(at) == id && at[2] == type;
 }
 
+int message_is_whole(const uint8_t *bytes, size_t size)
+{
+    if (size < CRC_BYTES || !begins(bytes + size - CRC_BYTES, CRC_ID, FCSL_U32)) {
+        return 0;
+    }
+    const size_t sum_at = size - CRC_BYTES + ENTRY_BYTES;
+    return fcsl_get_u32(bytes + sum_at) == fcsl_crc32(0, bytes, sum_at);
+}
+
 /* Checks the reserved entries, which stand at fixed places, and sets what they say in *message. */
 static fcsl_message_status_t check_reserved(const fcsl_channel_table_t *table, fcsl_message_kind_t kind,
                                             const uint8_t *bytes, size_t size, fcsl_message_t *message)
@@ -190,11 +199,10 @@ static fcsl_message_status_t check_reserved(const fcsl_channel_table_t *table, f
     if (!begins(bytes, (uint16_t)(SENSORS_ID + (unsigned)kind), FCSL_U64)) {
         return FCSL_MESSAGE_KIND;
     }
-    const size_t crc_at = size - CRC_BYTES;
-    if (!begins(bytes + crc_at, CRC_ID, FCSL_U32)) {
+    if (!begins(bytes + size - CRC_BYTES, CRC_ID, FCSL_U32)) {
         return FCSL_MESSAGE_SHORT;
     }
-    if (fcsl_get_u32(bytes + crc_at + ENTRY_BYTES) != fcsl_crc32(0, bytes, crc_at + ENTRY_BYTES)) {
+    if (!message_is_whole(bytes, size)) {
         return FCSL_MESSAGE_CRC;
     }
     if (!begins(bytes + TABLE_AT, TABLE_ID, FCSL_U32)) {

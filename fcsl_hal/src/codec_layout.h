@@ -31,6 +31,9 @@ static inline int is_array(uint8_t type)
     return type >> 4 >= ARRAY;
 }
 
+/* Whether the bytes end with the sum of those before it, as messages of channels do. */
+int message_is_whole(const uint8_t *bytes, size_t size);
+
 /* The type of the channel's entry. `field`: the channel's. */
 static inline uint8_t entry_type(const fcsl_channel_t *channel, const fcsl_field_t *field)
 {

@@ -32,6 +32,12 @@ static inline size_t commit_bytes(uint32_t channels)
     return COMMIT_HEAD_BYTES + ((size_t)channels + 7u) / 8u;
 }
 
+/* Whether the bytes may be a commit of this direction for this table; `what`: the table's hash, above it the direction. */
+static inline int commit_fits(uint64_t what, const uint8_t *bytes, size_t size)
+{
+    return size >= COMMIT_HEAD_BYTES && fcsl_get_u32(bytes + 16) == (uint32_t)what && bytes[20] == what >> 32;
+}
+
 /* `fresh`: a byte for each channel. */
 static inline void commit_write(const commit_t *commit, const uint8_t *fresh, uint8_t *bytes)
 {

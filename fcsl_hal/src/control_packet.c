@@ -15,10 +15,17 @@ enum { VERSION = 1 };
 
 static const uint8_t MAGIC[4] = {'F', 'C', 'S', 'W'};
 
+int control_fits(uint64_t what, const uint8_t *bytes, size_t size)
+{
+    (void)what;
+    return size >= CONTROL_HEADER_BYTES && size <= CONTROL_PACKET_MAX && memcmp(bytes, MAGIC, sizeof MAGIC) == 0 &&
+           fcsl_get_u16(bytes + 4) == VERSION && bytes[6] >= CONTROL_HELLO && bytes[6] <= CONTROL_ALIVE &&
+           bytes[7] <= 1u;
+}
+
 int control_parse(const uint8_t *bytes, size_t size, control_packet_t *packet)
 {
-    if (size < CONTROL_HEADER_BYTES || size > CONTROL_PACKET_MAX || memcmp(bytes, MAGIC, sizeof MAGIC) != 0 ||
-        fcsl_get_u16(bytes + 4) != VERSION || bytes[6] < CONTROL_HELLO || bytes[6] > CONTROL_ALIVE || bytes[7] > 1u) {
+    if (!control_fits(0, bytes, size)) {
         return -1;
     }
     memset(packet, 0, sizeof *packet);

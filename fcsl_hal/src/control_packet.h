@@ -43,6 +43,9 @@ typedef struct {
     char text[CONTROL_TEXT_MAX + 1];
 } control_packet_t;
 
+/* Whether the bytes are a control packet of this version: of an input of the bus, which gives it no `what`. */
+int control_fits(uint64_t what, const uint8_t *bytes, size_t size);
+
 /* Returns 0, or -1 when the bytes are not a control packet of this version. */
 int control_parse(const uint8_t *bytes, size_t size, control_packet_t *packet);
 

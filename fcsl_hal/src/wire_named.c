@@ -26,7 +26,8 @@ static const fcsl_field_t FIELDS[] = {
     COUNTER("bus.connects", bus.connects, "sessions that connected to this one"),
     COUNTER("bus.disconnects", bus.disconnects, "sessions that went"),
     COUNTER("bus.values_refused", values_refused, "values that their type, or their message, does not have"),
-    COUNTER("bus.commits_refused", commits_refused, "commits that are none, or made for another machine"),
+    COUNTER("bus.commits_refused", commits_refused,
+            "commits and control packets that are none, or made for another machine"),
 };
 
 const fcsl_wire_counters_t fcsl_wire_named_counters = {
@@ -107,9 +108,11 @@ static const char *named_explain(void *ctx)
 
 static void named_count(void *ctx, void *values)
 {
-    named_wire_t *wire = ctx;
-    fcsl_bus_count(wire->peer.bus, &wire->counters.bus);
-    memcpy(values, &wire->counters, sizeof wire->counters);
+    const named_wire_t *wire = ctx;
+    named_counters_t now = wire->counters;
+    fcsl_bus_count(wire->peer.bus, &now.bus);
+    now.commits_refused += now.bus.misfits;
+    memcpy(values, &now, sizeof now);
 }
 
 void named_drain(named_wire_t *wire, uint32_t first)

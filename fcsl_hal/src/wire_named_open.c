@@ -87,6 +87,7 @@ static void fill_plan(named_wire_t *wire, const char *name_space)
     named_plan_t *plan = &wire->plan;
     const fcsl_machine_t *machine = wire->table->machine;
     const uint32_t commit_size = (uint32_t)commit_bytes(machine->channel_count);
+    const uint8_t theirs = wire->peer.side == FCSL_WIRE_LISTEN ? FCSL_ACTUATOR : FCSL_SENSOR;
     uint32_t keys = 0;
     const char *control = add_key(wire, &keys, name_space, "@control");
     const char *commit = add_key(wire, &keys, name_space, "tick");
@@ -96,10 +97,14 @@ static void fill_plan(named_wire_t *wire, const char *name_space)
     plan->token = plan->watched[wire->peer.side == FCSL_WIRE_LISTEN ? BUS_SIMULATORS : BUS_CONTROLLERS];
     plan->outputs[plan->output_count++] = control;
     plan->outputs[plan->output_count++] = commit;
-    plan->inputs[plan->input_count++] =
-        (fcsl_bus_input_t){.key = control, .bytes = CONTROL_PACKET_MAX, .depth = CONTROLS_WAITING};
     plan->inputs[plan->input_count++] = (fcsl_bus_input_t){
-        .key = commit, .bytes = commit_size, .least = commit_size, .depth = wire->runs_free ? 1u : COMMITS_WAITING};
+        .key = control, .bytes = CONTROL_PACKET_MAX, .depth = CONTROLS_WAITING, .fits = control_fits};
+    plan->inputs[plan->input_count++] = (fcsl_bus_input_t){.key = commit,
+                                                           .bytes = commit_size,
+                                                           .least = commit_size,
+                                                           .depth = wire->runs_free ? 1u : COMMITS_WAITING,
+                                                           .fits = commit_fits,
+                                                           .what = (uint64_t)theirs << 32 | wire->table->hash};
     plan->tick_bytes = CONTROL_PACKET_MAX + commit_size + NAMED_CHANNELS * (uint64_t)ENTRY_BYTES_MAX;
     for (uint32_t i = 0; i < machine->channel_count; i++) {
         const fcsl_channel_t *channel = &machine->channels[i];

@@ -11,6 +11,7 @@
 
 #include "bus_peer.h"
 #include "codec_layout.h"
+#include "control_packet.h"
 #include "monotonic.h"
 
 enum {
@@ -52,6 +53,7 @@ static const fcsl_field_t FIELDS[] = {
     COUNTER("wire.received", received, "messages that came"),
     COUNTER("wire.overflowed", overflowed, "messages dropped because earlier ones were not read"),
     COUNTER("wire.too_large", wrong_size, "messages dropped because they were too long"),
+    COUNTER("wire.misfits", misfits, "messages dropped because they are none"),
     COUNTER("wire.deletions", deletions, "deletions, which are no messages"),
     COUNTER("wire.connects", connects, "sessions that connected to this one"),
     COUNTER("wire.disconnects", disconnects, "sessions that went"),
@@ -84,6 +86,12 @@ static fcsl_wire_status_t zenoh_send(void *ctx, const uint8_t *message, size_t s
     }
     return fcsl_bus_post(wire->peer.bus, output_of(wire, message, size), message, size) == 0 ? FCSL_WIRE_OK
                                                                                              : FCSL_WIRE_NONE;
+}
+
+/* Control packets, and messages of channels whose sum is right. */
+static int is_message(uint64_t what, const uint8_t *bytes, size_t size)
+{
+    return control_fits(what, bytes, size) || message_is_whole(bytes, size);
 }
 
 /* The oldest message that fits, if there is one. What a peer sent comes before the news that it is gone. */
@@ -144,8 +152,10 @@ static int open_session(wire_t *wire, const char *endpoint, uint64_t deadline_ns
 {
     const int listens = wire->peer.side == FCSL_WIRE_LISTEN;
     const uint64_t now_ns = monotonic_ns();
-    const fcsl_bus_input_t input = {
-        .key = listens ? CONTROLLER_ALL : SIMULATOR_ALL, .bytes = (uint32_t)wire->message_max, .depth = WAITING_MAX};
+    const fcsl_bus_input_t input = {.key = listens ? CONTROLLER_ALL : SIMULATOR_ALL,
+                                    .bytes = (uint32_t)wire->message_max,
+                                    .depth = WAITING_MAX,
+                                    .fits = is_message};
     const fcsl_bus_options_t options = {
         .role = listens ? FCSL_BUS_LISTEN : FCSL_BUS_CLIENT,
         .endpoint = endpoint,

@@ -3,11 +3,14 @@
  * Named values as docs/bus.md defines them: the test is the simulator, byte by byte, and the controller says what does not fit.
  */
 #define _GNU_SOURCE
+#include <signal.h>
+
 #include "commit.h"
+#include "monotonic.h"
 #include "wire_fixture.h"
 #include "fcsl/fcsl_scalar.h"
 
-enum { CONTROL = 0, TICK = 1, FLAG = 2, PACKET = 3, SHORT_MS = 300, HELLO_BYTES = 20, COMMIT_MAX = 64 };
+enum { CONTROL = 0, TICK = 1, FLAG = 2, PACKET = 3, SHORT_MS = 300, HELLO_BYTES = 20, COMMIT_MAX = 64, GARBAGE = 12 };
 
 static const char *const OUTPUTS[] = {"fleet/channels/@control", "fleet/channels/tick", "fleet/channels/flag",
                                       "fleet/channels/packet"};
@@ -63,17 +66,28 @@ static void post_commit(fcsl_bus_t *bus, uint64_t tick, int flag, int packet, si
     CHECK(fcsl_bus_post(bus, TICK, bytes, commit_bytes(CHANNEL_COUNT) - less) == 0);
 }
 
-/* A tick that the controller makes: what it answers lies on the bus under the names of its channels. */
-static void fly_tick(fcsl_bus_t *bus, uint64_t tick)
+static void post_tick(fcsl_bus_t *bus, uint64_t tick)
 {
     static const uint8_t on = 1;
-    uint8_t bytes[COMMIT_MAX];
     CHECK(fcsl_bus_post(bus, FLAG, &on, 1) == 0 && fcsl_bus_post(bus, PACKET, "abc", 3) == 0);
     post_commit(bus, tick, 1, 1, 0, 0);
+}
+
+/* What the controller answers lies on the bus under the names of its channels. */
+static void take_answer(fcsl_bus_t *bus, uint64_t tick)
+{
+    uint8_t bytes[COMMIT_MAX];
     take_one(bus, TICK, bytes, commit_bytes(CHANNEL_COUNT));
     CHECK(fcsl_get_u64(bytes) == tick && bytes[20] == FCSL_ACTUATOR && bytes[21] == 1);
     take_one(bus, COMMANDS, bytes, 16);
     take_one(bus, REPLIES, bytes, 0);
+}
+
+/* A tick that the controller makes. */
+static void fly_tick(fcsl_bus_t *bus, uint64_t tick)
+{
+    post_tick(bus, tick);
+    take_answer(bus, tick);
 }
 
 typedef void (*sender_t)(fcsl_bus_t *bus);
@@ -149,6 +163,32 @@ static void test_a_tick_behind_bad_commits(void)
     join(child);
 }
 
+/* More commits of another machine, and packets that are none, than there are places, before the simulator answers and begins; the
+ * controller stands still meanwhile, so that all of them are there before it looks. The answer and tick 0 must find a place. */
+static void test_a_start_behind_garbage(void)
+{
+    uint8_t hello[256];
+    const pid_t child = start_controller(&MACHINE, WAIT_MS, FCSL_HAL_ERROR, "went away before tick 1");
+    fcsl_bus_t *bus = listen_on_the_bus();
+    take_one(bus, CONTROL, hello, HELLO_BYTES);
+    CHECK(kill(child, SIGSTOP) == 0);
+    for (uint32_t i = 0; i < GARBAGE; i++) {
+        post_commit(bus, 0, 0, 0, 0, 1);
+        CHECK(fcsl_bus_post(bus, CONTROL, "garbage", 7) == 0);
+    }
+    hello[7] = 1;
+    CHECK(fcsl_bus_post(bus, CONTROL, hello, HELLO_BYTES) == 0);
+    post_tick(bus, 0);
+    for (fcsl_bus_counters_t counters = {0}; counters.put == 0 || counters.put < counters.posted;) {
+        monotonic_wait(monotonic_ns() + NS_PER_MS);
+        fcsl_bus_count(bus, &counters);
+    }
+    CHECK(kill(child, SIGCONT) == 0);
+    take_answer(bus, 0);
+    (void)fcsl_bus_close(bus, WAIT_MS);
+    join(child);
+}
+
 /* It would send values faster than they are taken, and a commit would have those of the next one. */
 static void test_a_rig(void)
 {
@@ -205,6 +245,7 @@ int main(void)
     check_alone(test_value_that_is_none);
     check_alone(test_bad_commits);
     check_alone(test_a_tick_behind_bad_commits);
+    check_alone(test_a_start_behind_garbage);
     check_alone(test_a_rig);
     check_alone(test_a_simulator_that_does_not_answer);
     return 0;

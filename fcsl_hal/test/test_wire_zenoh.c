@@ -5,6 +5,8 @@
  */
 #define _GNU_SOURCE
 #include "bus_rig.h"
+#include "fcsl/fcsl_codec.h"
+#include "fcsl/fcsl_scalar.h"
 #include "fcsl/fcsl_wire.h"
 
 enum { MESSAGE_MAX = 64, ROUNDS = 200, IN_A_ROUND = 6, SOON_MS = 500, TEXT_BYTES = 256 };
@@ -24,14 +26,18 @@ static fcsl_wire_t open_wire(const char *endpoint, fcsl_wire_side_t side)
     return wire;
 }
 
-/* Message `number`: in turn it begins as sensors, time and a control packet do, and goes under their keys. */
+/* Message `number`: in turn it begins as sensors, time and a control packet do, and goes under their keys. It ends with its sum,
+ * without which it would be none. */
 static size_t fill(uint8_t *message, uint32_t number)
 {
     static const uint8_t begins[3][2] = {{0x00, 0xff}, {0x02, 0xff}, {'F', 'C'}};
-    const size_t size = 6u + number % 50u;
+    const size_t size = 13u + number % 50u;
     memset(message, (int)(number & 0xffu), size);
     memcpy(message, begins[number % 3u], 2);
     memcpy(message + 2, &number, sizeof number);
+    fcsl_put_u16(message + size - 7u, 0xFFFFu);
+    message[size - 5u] = FCSL_U32;
+    fcsl_put_u32(message + size - 4u, fcsl_crc32(0, message, size - 4u));
     return size;
 }
 

@@ -38,6 +38,9 @@ typedef struct {
     uint32_t least; /* of the shortest one */
     uint32_t depth; /* 1: fcsl_bus_take gets the newest message; more: as many wait, and the next one is dropped */
     int quiet; /* its messages do not end fcsl_bus_wait: others follow that do */
+    /* Whether a message takes a place; null: each does. Zenoh's threads call it with `what`. */
+    int (*fits)(uint64_t what, const uint8_t *bytes, size_t size);
+    uint64_t what;
 } fcsl_bus_input_t;
 
 /* A key that answers queries, with these bytes until fcsl_bus_answer replaces them; with none it is silent. They are copied. */
@@ -86,6 +89,7 @@ typedef struct {
     uint64_t overflowed; /* of these, dropped because `depth` messages waited */
     uint64_t
         wrong_size; /* of these, dropped because they are longer than the input's `bytes` or shorter than its `least` */
+    uint64_t misfits; /* of these, dropped because they do not fit the input */
     uint64_t deletions; /* of these, no message but Zenoh's delete: dropped */
     uint64_t strays; /* messages under `strays` on keys that no input has */
     uint64_t connects; /* sessions that were connected to this one, looked at every 50 ms */
