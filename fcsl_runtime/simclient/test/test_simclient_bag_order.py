@@ -20,6 +20,7 @@ from simclient import AlgTwin, BagError
 from simclient.bag import Bag, columns
 from simclient.bag.digest import digest
 from simclient.bag.formats import open_bag
+from simclient.bag.info import describe
 from simclient.replay import replay_foreign
 
 START = 100 * 10**9
@@ -114,6 +115,7 @@ def test_chunks_are_not_all_in_memory(tmp_path: Path, monkeypatch: pytest.Monkey
     shuffled = random.Random(1).sample(ramp(), 120)
     with pytest.raises(BagError, match=r"shuffled\.mcap: its messages are not in the order of time.*`mcap sort`"):
         seen(write_mcap(tmp_path / "shuffled.mcap", shuffled))
+    assert "messages   120" in describe(open_bag(tmp_path / "shuffled.mcap"))
 
 
 def test_a_chunk_that_gives_a_wrong_time_is_told(tmp_path: Path) -> None:

@@ -199,3 +199,10 @@ def test_a_layout_that_explodes(tmp_path: Path) -> None:
         assert (layout is not None) == fits
         assert layout is None or len(layout.leaves) == layout.size - 4 == 2 * 170 * count
         assert time.monotonic() - begun < 15
+
+
+def test_a_definition_of_ros1_that_lacks_a_type(tmp_path: Path) -> None:
+    bag = write(tmp_path / "bag", CONTENT, "ros1")
+    bag.write_bytes(bag.read_bytes().replace(b"MSG: std_msgs/Header", b"MSG: std_msgs/Leader"))
+    with pytest.raises(BagError, match="the definition of .* is not valid: .*std_msgs/msg/Header"):
+        open_bag(bag)

@@ -175,14 +175,15 @@ class Bag:
         """In the order of the file; ends where the first of them may be missing."""
         return _one_by_one(self._in_file_order(topics, beyond_damage=False))
 
-    def batches(self, topics: Collection[str] | None = None) -> Iterator[Block]:
+    def batches(self, topics: Collection[str] | None = None, in_order: bool = True) -> Iterator[Block]:
         """Like `messages`, many at a time; some batches are empty.
 
-        The mapping gives the topic of each channel number in the batch (with count 0).
+        The mapping gives the topic of each channel number in the batch (with count 0). `in_order` False: for who needs no
+        order, which costs memory where a file is not in order.
         """
         wanted = self.topics.keys() if topics is None else topics
         own = tuple(f"{machine.prefix}/" for machine in self.machines(by_bystanders=True))
-        if any(name.startswith(own) for name in wanted):
+        if not in_order or any(name.startswith(own) for name in wanted):
             return self._in_file_order(topics, beyond_damage=True)
         return self._in_time_order(topics)
 

@@ -60,7 +60,7 @@ def _scan(bag: Bag, machines: Sequence[RecordedMachine], clock: Clock) -> Conten
     writes = {machine.writes: _write_kinds(bag, machine.writes) for machine in machines if machine.writes in bag.topics}
     found = Contents({topic: TopicSpan() for topic in bag.topics}, writes={topic: Counter() for topic in writes})
     progress = Progress("reading", sum(file.stat().st_size for file in bag.files))
-    for batch, announced in bag.batches():
+    for batch, announced in bag.batches(in_order=False):
         progress.at(bag.read_bytes)
         for number, log_ns, begin, end in batch.entries.tolist():
             topic, data = announced[number].name, batch.data[begin:end]

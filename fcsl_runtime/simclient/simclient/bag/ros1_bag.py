@@ -46,7 +46,7 @@ class Ros1Bag(Bag):
 
     def _open(self) -> None:
         self.files = bag_files(self.path)
-        self._stores1: dict[tuple[str, str], Typestore] = {}
+        self._types: dict[tuple[str, str], tuple[Typestore, str]] = {}
         self._ros1 = [Ros1File(file) for file in self.files]
         for file in self._ros1:
             for number, connection in file.connections.items():
@@ -111,25 +111,25 @@ class Ros1Bag(Bag):
     def _converted(self, connection: Connection, message: Message) -> Message:
         number, log_ns, data = message
         try:
-            return number, log_ns, bytes(self._types_of(connection).ros1_to_cdr(data, connection.type))
+            return number, log_ns, bytes(self._types_of(connection)[0].ros1_to_cdr(data, connection.type))
         except SerdeError:
             return number, log_ns, b""  # no type accepts empty bytes, so the message counts as damaged
 
     def _topic_of(self, connection: Connection) -> Topic:
-        schema = self._types_of(connection).generate_msgdef(connection.type, ros_version=2)[0]
-        return Topic(connection.topic, connection.type, 0, "cdr", "ros2msg", schema)
+        return Topic(connection.topic, connection.type, 0, "cdr", "ros2msg", self._types_of(connection)[1])
 
-    def _types_of(self, connection: Connection) -> Typestore:
-        """The types of a connection, with ROS 2's header. Raises BagError."""
+    def _types_of(self, connection: Connection) -> tuple[Typestore, str]:
+        """The types of a connection, with ROS 2's header, and their definition in ROS 2. Raises BagError."""
         kind, text = connection.type, connection.definition
-        store = self._stores1.get((kind, text))
-        if store is None:
-            store = self._stores1[kind, text] = get_typestore(Stores.EMPTY)
+        found = self._types.get((kind, text))
+        if found is None:
+            store = get_typestore(Stores.EMPTY)
             try:
                 types = get_types_from_msg(text, kind)
                 if _HEADER in types:
                     types[_HEADER] = get_typestore(Stores.ROS2_JAZZY).fielddefs[_HEADER]
                 store.register(types)
+                found = self._types[kind, text] = store, store.generate_msgdef(kind, ros_version=2)[0]
             except Exception as error:  # noqa: BLE001  damaged text can make the parser below raise anything
                 raise BagError(f"{self.path}: the definition of {kind} is not valid: {error}") from None
-        return store
+        return found

@@ -90,7 +90,7 @@ def in_time_order(parts: Sequence[Part], name: str) -> Iterator[Block]:
         if sum(len(part.data) for part in going.values()) > HELD_BYTES_MAX:
             raise BagError(
                 f"{name}: its messages are not in the order of time, and its chunks overlap by more than "
-                f"{HELD_BYTES_MAX >> 30} GiB; `mcap sort` writes a file that is in order"
+                f"{HELD_BYTES_MAX >> 30} GiB; `mcap sort` or `rosbags-convert` writes one that is in order"
             )
 
 

@@ -63,10 +63,12 @@ class _BagWithTransforms(Bag):
         made = {n: Topic(n, _TYPE, len(batch.entries), "cdr", "ros2msg", schema) for n, batch in self._made.items()}
         self.files, self.topics = self._bag.files, self._bag.topics | made
 
-    def batches(self, topics: Collection[str] | None = None) -> Iterator[tuple[Batch, Mapping[int, Topic]]]:
+    def batches(
+        self, topics: Collection[str] | None = None, in_order: bool = True
+    ) -> Iterator[tuple[Batch, Mapping[int, Topic]]]:
         wanted = self.topics.keys() if topics is None else topics
         if others := [name for name in wanted if name not in self._made]:
-            yield from self._bag.batches(others)
+            yield from self._bag.batches(others, in_order)
             self.truncated = self._bag.truncated
         for name in wanted:
             if name in self._made:
