@@ -406,7 +406,7 @@ class Law:
         ({"A": {"b": "A[2]"}}, "contain itself"),
         ({"pose": {"a": "f64"}}, "CamelCase"),
         ({"A": {"x": "f65"}}, "unknown type `f65`"),
-        ({"A": {"X": "f64"}}, "lower_snake_case"),
+        ({"A": {"X": "f64", "x": "f64"}}, "one field of a ROS 2 message"),
         ({"A": {"int": "f64"}}, "word of C"),
         ({"A": {}}, "no members"),
         ({"A": {"x": "f64[100000]"}}, "at most 65536"),

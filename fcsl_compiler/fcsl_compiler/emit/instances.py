@@ -10,7 +10,7 @@ from ..model import code, ir
 from ..model.c_names import c_name
 from ..model.code import Call, Deref, Function, If, Member, Name, Set, Statement
 from ..model.machine import Instance, Machine, Values
-from ..model.types import HEALTH, U32, Array, Scalar, Type, count_of, leaves, scalar_of
+from ..model.types import HEALTH, U32, Array, Scalar, Struct, Type, count_of
 from .copies import copied
 from .expressions import code_type
 from .fault_points import written_before_fault
@@ -18,6 +18,8 @@ from .functions import HOST_TYPE
 from .names import health, instance_type, record_type, request_constant
 from .rare import failed
 
+#: An array of more values is copied from a constant table. C compilers take quadratic time for so many assignments.
+_TABLE_VALUES = 64
 _SELF = Name("self")
 _FAULT = Name("fault")
 _HOST = Name("host")
@@ -30,21 +32,56 @@ def constant(machine: Machine, value: bool | int | float | str, scalar: Scalar) 
     return health(int(value)) if scalar is HEALTH else code.Literal(value, scalar)
 
 
+def nested(machine: Machine, type_: Type, values: Iterator[bool | int | float | str]) -> code.Values:
+    """Values in the order of the leaves of a type, nested as the type is."""
+    if isinstance(type_, Array):
+        return tuple(nested(machine, type_.element, values) for _ in range(type_.count))
+    if isinstance(type_, Struct):
+        return tuple(nested(machine, m.type, values) for m in type_.members)
+    return constant(machine, next(values), type_)
+
+
 def store(machine: Machine, target: code.Place, type_: Type, values: Values) -> Iterator[Statement]:
     """Stores the values of a port, listed in the order of its leaves, into zero-initialised storage."""
-    at = 0
-    for leaf in leaves(type_):
-        scalar, count = scalar_of(leaf.type), count_of(leaf.type)
-        place = target
-        for step in leaf.steps:
-            place = code.Element(place, code.Sum((), step)) if isinstance(step, int) else Member(place, c_name(step))
-        for position, value in enumerate(values[at : at + count]):
-            if isinstance(leaf.type, Array):
-                if value != 0 or str(value).startswith("-"):
-                    yield Set(code.Element(place, code.Sum((), position)), constant(machine, value, scalar))
-            else:
-                yield Set(place, constant(machine, value, scalar))
-        at += count
+    if isinstance(type_, Struct):
+        for member in type_.members:
+            size = count_of(member.type)
+            yield from store(machine, Member(target, c_name(member.name)), member.type, values[:size])
+            values = values[size:]
+    elif isinstance(type_, Array):
+        yield from _store_array(machine, target, type_, values)
+    else:
+        yield Set(target, constant(machine, values[0], type_))
+
+
+def _store_array(machine: Machine, target: code.Place, type_: Array, values: Values) -> Iterator[Statement]:
+    if all(_is_zero(value) for value in values):
+        return
+    if len(values) > _TABLE_VALUES:
+        made = code_type(machine.name, type_)
+        table = code.Table(f"fcsl_{'_'.join(_steps(target))}", made, nested(machine, type_, iter(values)))
+        yield table
+        yield copied(target, Name(table.name), made)
+        return
+    size = count_of(type_.element)
+    for position in range(type_.count):
+        own = values[position * size : (position + 1) * size]
+        if isinstance(type_.element, Struct) or not _is_zero(own[0]):
+            yield from store(machine, code.Element(target, code.Sum((), position)), type_.element, own)
+
+
+def _is_zero(value: bool | int | float | str) -> bool:
+    return value == 0 and not str(value).startswith("-")
+
+
+def _steps(place: code.Place) -> Iterator[str]:
+    """The names in a place, for a name that no other place has."""
+    if isinstance(place, Member):
+        yield from _steps(place.base)
+        yield place.name
+    elif isinstance(place, code.Element) and isinstance(place.index, code.Sum):
+        yield from _steps(place.base)
+        yield str(place.index.constant)
 
 
 def call(function: ir.Function, record: code.Place, fault: Name) -> code.Do:

@@ -16,7 +16,7 @@ from .expressions import code_type
 from .fault_places import FaultPlaces
 from .functions import FunctionEmitter
 from .inline_size import inlined_functions
-from .instances import InstanceEmitter, constant
+from .instances import InstanceEmitter, nested
 from .names import constant_name, record_type, request_constant, state_constant
 from .rare import RareEmitter
 from .records import records, result_records
@@ -112,13 +112,4 @@ def _tables(machine: Machine, used: set[str]) -> Iterator[code.Table]:
 
 
 def _table(machine: Machine, owner: str, name: str, type_: Type, values: Values) -> code.Table:
-    nested = _nested(machine, type_, iter(values))
-    return code.Table(constant_name(owner, name), code_type(machine.name, type_), nested)
-
-
-def _nested(machine: Machine, type_: Type, values: Iterator[bool | int | float | str]) -> code.Values:
-    if isinstance(type_, Array):
-        return tuple(_nested(machine, type_.element, values) for _ in range(type_.count))
-    if isinstance(type_, Struct):
-        return tuple(_nested(machine, m.type, values) for m in type_.members)
-    return constant(machine, next(values), type_)
+    return code.Table(constant_name(owner, name), code_type(machine.name, type_), nested(machine, type_, iter(values)))
