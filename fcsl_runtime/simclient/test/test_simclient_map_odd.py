@@ -81,13 +81,13 @@ def test_two_messages_in_a_tick(run: Runs) -> None:
 
 def test_a_quaternion_of_length_zero_is_no_sample(run: Runs) -> None:
     """Here, as in a live node; the other values of its message are taken."""
-    attitudes = [(1.0, 0.0, 0.0, 0.0), (0.0, 0.0, 0.0, 0.0), (-0.0, 0.0, 0.0, 0.0), (math.nan, 0.0, 0.0, 0.0)]
+    attitudes = [(1.0, 0.0, 0.0, 0.0), (0.0, 0.0, 0.0, 0.0), (math.inf, 0.0, 0.0, 0.0), (math.nan, 0.0, 0.0, 0.0)]
     messages = [(START + i * 10 * MS, imu(START + i * 10 * MS, (i, 0, 0), q)) for i, q in enumerate(attitudes)]
     done, out = run(messages, GYRO + "  imu.attitude: {topic: /imu, field: orientation}\n")
     assert refused(done, "imu.attitude") == {"rotation": 2, "nan": 1} and refused(done) == {}
     assert done.fates["imu.attitude"].coverage.used == 1 and done.fates["imu.gyro"].coverage.used == 4
     assert columns(out, "source.outputs.quat")[1].tolist() == [[1.0, 0.0, 0.0, 0.0]] * 4
-    assert "2 with a rotation of length zero (first: message 1)" in str(done)
+    assert "2 with a rotation of length zero or infinity (first: message 1)" in str(done)
 
 
 @pytest.mark.parametrize(

@@ -166,7 +166,8 @@ class Bag:
         """(topic, log time in ns, CDR bytes); only those of `topics`, if given.
 
         They come in the order of their log times, and those of one time in the order of the file. The topics of a
-        recorded machine come in the order of the file, which is that of its ticks: the clock may have been set back.
+        recorded machine come in the order of the file, which is that of the run: the clock may have been set back, or an
+        earlier checkpoint restored.
         Passes over what is damaged, and then sets `truncated`.
         """
         return _one_by_one(self.batches(topics))

@@ -105,6 +105,8 @@ class Ros1Bag(Bag):
             why = f"a chunk that {error}" if isinstance(error, TooLarge) else "a damaged chunk"
             reading.losses.parts.append(Loss(piece.begin, piece.end, why))
         reading.position += piece.end - piece.begin
+        # An index may give a later first time.
+        reading.losses.misdated += sum(message[1] < (piece.first_ns or 0) for message in messages)
         if messages:
             yield sorted_by_time(batch_of(messages)), reading.topics
 

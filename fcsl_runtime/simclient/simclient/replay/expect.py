@@ -24,6 +24,7 @@ from .grid import Array, Grid, first_ticks_at, nearest_ticks, place, screen
 from .intake import Wish, gather, refusals, wish
 from .mapping import Entry, Expectation
 from .outputs import STATE, Outputs
+from .poses import are_rotations
 
 
 @dataclass(frozen=True)
@@ -42,7 +43,7 @@ class Comparison:
     states.
 
     `error` is the largest over the elements; `exceeded` marks messages with an element beyond its tolerance. `refused`
-    messages were expected quaternions of length zero, which are no orientation. `nothing`: why nothing is compared.
+    messages were expected quaternions of length zero or infinity, which are no orientation. `nothing`: why nothing is compared.
     """
 
     target: Target
@@ -133,7 +134,7 @@ def _compared(target: Target, grid: Grid, times_ns: Array, ours: Array, theirs: 
         if not inside.any():
             nothing = f"{span} none is within `from_s` and `until_s`"
         elif not turned.any():
-            nothing = f"{span} all that count are quaternions of length zero"
+            nothing = f"{span} all that count are quaternions of length zero or infinity"
         else:
             nothing = f"{span} none that counts is within the run, which ends at {grid.ticks / grid.tick_hz:.3f} s"
     chosen = np.flatnonzero(turned)[chosen]
@@ -143,11 +144,8 @@ def _compared(target: Target, grid: Grid, times_ns: Array, ours: Array, theirs: 
 
 
 def _turned(target: Target, theirs: Array) -> Array:
-    """Which messages can be compared: quaternions of length zero cannot."""
-    if target.measure in ("angle", "tilt"):
-        usable: Array = np.linalg.norm(theirs, axis=1) > 0
-        return usable
-    return np.ones(len(theirs), bool)
+    """Which messages can be compared: quaternions that are no rotation cannot."""
+    return are_rotations(theirs) if target.measure in ("angle", "tilt") else np.ones(len(theirs), bool)
 
 
 def _texts(bag: Bag, entry: Entry, header_time: bool) -> tuple[Array, Array, int]:
@@ -253,7 +251,7 @@ def table(comparisons: Sequence[Comparison]) -> str:
     for c in comparisons:
         name = c.target.expectation.entry.target
         if c.refused:
-            lines.append(f"  {name}: refused: {c.refused} expected quaternions of length zero")
+            lines.append(f"  {name}: refused: {c.refused} expected quaternions of length zero or infinity")
         if c.nothing:
             lines.append(f"  {name}: nothing to compare: {c.nothing}")
     return "\n".join(lines)

@@ -18,7 +18,7 @@ from ..cli import Progress
 from ..errors import BagError, did_you_mean
 from .grid import Array, screen
 from .intake import NO_STAMP, STUCK, refusals
-from .poses import Poses, compose, identity, interpolate, inverse
+from .poses import Poses, are_rotations, compose, identity, interpolate, inverse
 
 TF, TF_STATIC = "/tf", "/tf_static"
 #: The types of both topics, in ROS 2 and in the oldest bags of ROS 1.
@@ -186,11 +186,9 @@ def _link(topic: str, parent: str, child: str, samples: _Samples, header_time: b
     # Of one time of recording by stamp and content, so that it does not matter in which order a file has them.
     order = np.lexsort((*numbers.T, rest, seconds, log_ns))
     numbers, log_ns, seconds, rest = numbers[order], log_ns[order], seconds[order], rest[order]
-    with np.errstate(over="ignore", invalid="ignore"):
-        length = np.linalg.norm(numbers[:, 3:], axis=1)
     sound = {
         "nan": np.isfinite(numbers).all(axis=1),
-        "rotation": (length > 0) & np.isfinite(length),
+        "rotation": are_rotations(numbers[:, 3:]),
         "stamp": (seconds >= 0) & (rest >= 0) & (rest < 10**9) | (topic == TF_STATIC) | (not header_time),
     }
     usable = np.ones(len(log_ns), bool)
@@ -213,7 +211,8 @@ def _link(topic: str, parent: str, child: str, samples: _Samples, header_time: b
         timed[usable], _ = screen(times_ns[usable], log_ns[usable], header_time)
         keep(STUCK, timed)
     chosen = _last_of_each_time(times_ns, usable) if topic == TF else np.flatnonzero(usable)[-1:]
-    poses = Poses(numbers[chosen, :3], numbers[chosen, 3:] / length[chosen, None])
+    rotation = numbers[chosen, 3:]
+    poses = Poses(numbers[chosen, :3], rotation / np.linalg.norm(rotation, axis=1, keepdims=True))
     return Link(parent, child, times_ns[chosen] if topic == TF else None, poses, tuple(refusals(refused)))
 
 

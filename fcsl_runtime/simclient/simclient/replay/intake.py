@@ -19,6 +19,7 @@ from ..ros.reader import REASONS, Reader
 from ..ros.types import definitions_of
 from .grid import Array, Oddities, joined_rows, screen
 from .mapping import Entry
+from .poses import are_rotations
 
 #: Reasons besides REASONS for which a message is not used.
 OTHER_TYPE = "type"
@@ -38,7 +39,7 @@ _REFUSED = {
     "range": "out of range",
     "nan": "with a NaN",
     "unmeasured": "not measured",
-    "rotation": "with a rotation of length zero",
+    "rotation": "with a rotation of length zero or infinity",
 }
 #: Reasons for which a message as a whole is not decoded, so that it has no stamp either.
 _UNREAD = [REASONS.index(reason) for reason in ("encoding", "truncated", "malformed", "stamp", "frame")]
@@ -122,6 +123,10 @@ class _Column:
         # A message of another type is treated as empty: counted, not decoded.
         sizes = entries["end"] - entries["begin"]
         samples = self.reader.read_many(data, entries["begin"], np.zeros_like(sizes) if other else sizes)
+        for i, w in enumerate(self.wishes):
+            if self.reader.rotations[i]:
+                taken = samples.status[:, i] == 0
+                samples.status[taken & ~are_rotations(samples.values[w.pick.name]), i] = REASONS.index("rotation")
         self.log_ns.append(entries["log_ns"].copy())
         self.stamps_ns.append(samples.stamps)
         self.values.append(samples.values)

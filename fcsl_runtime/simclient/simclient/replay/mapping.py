@@ -43,7 +43,7 @@ next. Of several samples for one tick the newest is used; the others are superse
 messages with the same time the later one is used. Refused and counted are: a zero stamp; messages after a backward step
 of more than 1 s, until the clock has caught up; messages of another type than the topic's first; damaged messages; a
 list of another length; a NaN; a value out of range of an integer or bool; values that the message marks as not
-measured; quaternions of length zero. A channel without a usable message is an error.
+measured; quaternions of length zero or infinity. A channel without a usable message is an error.
 """
 
 from __future__ import annotations

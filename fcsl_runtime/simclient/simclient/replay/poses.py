@@ -21,6 +21,14 @@ class Poses(NamedTuple):
     rotation: Array
 
 
+def are_rotations(quaternions: Array) -> Array:
+    """Which of n quaternions, shape (n, 4), are rotations: their length is neither zero nor infinite nor NaN."""
+    with np.errstate(over="ignore", invalid="ignore"):
+        length = np.linalg.norm(quaternions, axis=1)
+    sound: Array = (length > 0) & np.isfinite(length)
+    return sound
+
+
 def identity() -> Poses:
     return Poses(np.zeros((1, 3)), np.array([[0.0, 0.0, 0.0, 1.0]]))
 

@@ -63,6 +63,8 @@ class Reader:
             raise MapError(str(error)) from None
         self.has_stamp = has_stamp(definitions, message)
         self.dtype = _dtype(picks, plan)
+        #: Of each pick, whether it is a rotation, of which a quaternion of length zero is refused.
+        self.rotations = tuple(value.rotation for value in plan.values)
         self._plan = native.reader_plan(plan)  # the reader keeps its address
         library, failure = native.library(), ctypes.create_string_buffer(native.ERROR_BYTES)
         handle = library.fcsl_ros_reader_new(byref(self._plan), failure, len(failure))
