@@ -34,7 +34,7 @@ LONG_S = 120
 #: Some seconds of the slowest recorder: several chunks, which are a second old at most.
 TICKS = 400
 #: A recording has its metadata.yaml, and then some chunks.
-DISK_BYTES = 300_000
+DISK_BYTES = 150_000
 TWIN = """
 import sys, time
 from simclient import AlgTwin
@@ -91,10 +91,13 @@ def twin(bag: Path, library: Path, speed: int, limit: Callable[[], None]) -> Ite
 
 @contextlib.contextmanager
 def bystander(bag: Path, library: Path, speed: int, limit: Callable[[], None]) -> Iterator[subprocess.Popen[str]]:
-    where = free_endpoint()
-    with process(["fcsl-sim", "run", SIM, "--speed", speed, "--observers", where]):
-        with process([sys.executable, "-B", BUS, "record", "-c", where, "-o", bag], limit) as recorder:
-            yield recorder
+    where, socket = free_endpoint(), bag.with_suffix(".socket")
+    simulator = ["fcsl-sim", "run", SIM, "--speed", speed, "--observers", where, "--socket", socket, "--paused"]
+    with process(simulator), process([sys.executable, "-B", BUS, "record", "-c", where, "-o", bag], limit) as recorder:
+        assert recorder.stdout and recorder.stdout.readline().startswith("recording ")
+        with VarClient(socket) as client:
+            client.resume()
+        yield recorder
 
 
 RECORDERS: dict[str, Recorder] = {
