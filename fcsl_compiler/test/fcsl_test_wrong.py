@@ -1170,6 +1170,14 @@ CONFIGS: dict[str, str] = {
             c["transitions"].append({"from": ["B", "C"], "to": "A", "health": GUARD}),
         )
     ),
+    "W213 before the first run": patch(
+        lambda c: (
+            c["states"]["B"].update(schedule={"one": 10}),
+            c["transitions"].append({"from": "B", "to": "A", "health": {"instance": "one", "in": ["failed", "stale"]}}),
+            c["transitions"][0].update(health={"instance": "two", "in": ["failed"]}),
+            c["states"]["A"].update(schedule={"two": 50}),
+        )
+    ),
     "W203 unreachable": put("transitions", value=[]),
     "W204 in no schedule": put("states", "A", "schedule", value={"one": 100}),
     "W204 what arms never runs": patch(

@@ -12,6 +12,7 @@ from ..model.machine import Connection, Machine, State, seconds
 from .arming import warn_old_arm
 from .channels import assigned_outputs
 from .idle_transitions import warn_idle_transitions
+from .stale_guards import warn_stale_guards
 
 
 def schedule(machine: Machine, sink: DiagnosticSink) -> Machine:
@@ -31,6 +32,7 @@ def schedule(machine: Machine, sink: DiagnosticSink) -> Machine:
             by_instance = {e.instance: e for e in state.entries}
             states.append(replace(state, entries=tuple(by_instance[i] for i in order)))
     warn_idle_transitions(machine, sink)
+    warn_stale_guards(machine, sink)
     _warn_unreachable(machine, sink)
     _warn_too_late(machine, sink)
     _warn_idle(machine, sink)

@@ -725,4 +725,24 @@ MACHINE_CODES: dict[str, Code] = {
         '"channels": [{"name": "force", "id": 1, "field": "control.outputs.force", "direction": "actuator", "safe": 0.0}],\n'
         '"states": {"COAST": {"schedule": {"nav": 100, "control": 50}}, "SAFE": {"schedule": {"nav": 10, "control": 10}}}',
     ),
+    "W213": Code(
+        "a guard that may be true because a state has just been entered",
+        "An instance that a state starts is stale until it first runs there. If it is slower than the tick, this takes "
+        "between zero ticks and its period, depending on the tick in which the state is entered. A guard with `stale` "
+        "then leaves the state at once, or not at all. With an `after_s` of at least one period, the instance has run "
+        "before the guard counts.",
+        Kind.JSON,
+        '"states": {"COAST": {"schedule": {"control": 50}}, "SAFE": {"schedule": {"nav": 10}}},\n'
+        '"connections": [],\n'
+        '"transitions": [\n'
+        '  {"from": "COAST", "to": "SAFE", "health": {"instance": "control", "in": ["failed"]}},\n'
+        '  {"from": "SAFE", "to": "COAST", "health": {"instance": "nav", "in": ["failed", "stale"]}}\n'
+        "]",
+        '"states": {"COAST": {"schedule": {"control": 50}}, "SAFE": {"schedule": {"nav": 10}}},\n'
+        '"connections": [],\n'
+        '"transitions": [\n'
+        '  {"from": "COAST", "to": "SAFE", "health": {"instance": "control", "in": ["failed"]}},\n'
+        '  {"from": "SAFE", "to": "COAST", "after_s": 0.1, "health": {"instance": "nav", "in": ["failed", "stale"]}}\n'
+        "]",
+    ),
 }
