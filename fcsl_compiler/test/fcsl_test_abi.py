@@ -155,6 +155,7 @@ class Descriptor(c.Structure):
         ("fault_places", c.POINTER(FaultPlace)),
         ("fault_place_count", c.c_uint32),
         ("views", c.c_char_p),
+        ("stack_bytes", c.c_uint32),
         ("init", c.CFUNCTYPE(c.c_int32, c.c_void_p)),
         ("step", c.CFUNCTYPE(None, c.c_void_p, c.POINTER(Host))),
         ("force_state", c.CFUNCTYPE(None, c.c_void_p, c.c_int32)),

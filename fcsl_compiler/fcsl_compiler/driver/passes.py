@@ -121,10 +121,12 @@ def _emit(c: Compilation) -> None:
     program = emit_machine(lowered, places)
     w: Writer
     if c.backend == "nim":
-        w = print_module(program, lambda inner: DescriptorEmitter(m, inner, c.build_hash, places).emit())
+        w = print_module(
+            program, lambda inner: DescriptorEmitter(m, inner, c.build_hash, places, program.stack_bytes).emit()
+        )
     else:
         w = print_source(program, prelude(covered.map) if covered is not None else "", C_OPERATIONS)
-        DescriptorEmitter(m, w, c.build_hash, places).emit()
+        DescriptorEmitter(m, w, c.build_hash, places, program.stack_bytes).emit()
     c.header, c.source, c.map = print_header(program), w.text(), source_map(program, w, c.source_name)
 
 

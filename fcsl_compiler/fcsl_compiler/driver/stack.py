@@ -19,6 +19,8 @@ _EDGE = re.compile(r'edge: \{ sourcename: "([^"]+)" targetname: "([^"]+)"')
 _INDIRECT = "__indirect_call"
 
 
+#: A bound above it comes with a warning: an eighth of what the main thread has by default, and more than many threads.
+_LARGE_BYTES = 1 << 20
 _STEP = re.compile(r'node: \{ title: "[^"]*:fcsl_step_(\w+)"')
 
 
@@ -30,7 +32,13 @@ def stepped_machines(graphs: Iterable[Path]) -> list[str]:
 def bound_text(machine: str, bound: int, externs: Sequence[str] = ()) -> str:
     """Text for users: a bound, its assumption, and the externs it excludes."""
     text = f"{machine}: a step needs at most {bound} bytes of stack ({LEAF_BYTES} assumed where it calls libc or libm)"
-    return text + (f", without its externs: {', '.join(externs)}" if externs else "")
+    text += f", without its externs: {', '.join(externs)}" if externs else ""
+    if bound > _LARGE_BYTES:
+        text += (
+            f"\n{machine}: warning: that is more than {_LARGE_BYTES} bytes. Hosts refuse it where a thread has no more: make "
+            "the arrays smaller that helpers copy"
+        )
+    return text
 
 
 def stack_bound(machine: str, graphs: Iterable[Path], externs: Iterable[str] = ()) -> int | None:

@@ -20,6 +20,7 @@ from .instances import InstanceEmitter, nested
 from .names import constant_name, record_type, request_constant, state_constant
 from .rare import RareEmitter
 from .records import records, result_records
+from .stack_bytes import stack_bytes
 from .step import StepEmitter
 from .straight_line import written_out
 
@@ -30,17 +31,19 @@ def emit_machine(machine: Machine, places: FaultPlaces) -> code.Program:
     firsts = alike(machine, quiet)
     functions = tuple(_functions(machine, places, quiet, firsts))
     used = set().union(*(code.used_names(f.body) for f in functions))
+    described, private = tuple(records(machine, firsts)), tuple(result_records(machine))
     return code.Program(
         name=machine.name,
         source=machine.config.name,
         states=tuple(state_constant(machine, n).text for n in range(len(machine.states))),
         requests=tuple(request_constant(machine.name, name) for name in ("", *machine.requests)),
-        records=tuple(records(machine, firsts)),
-        private_records=tuple(result_records(machine)),
+        records=described,
+        private_records=private,
         externs=tuple(_extern(machine, e) for e in machine.externs),
         tables=tuple(_tables(machine, used)),
         functions=functions,
         uses_hardware=any(f.uses_hardware for f, _ in machine.entries),
+        stack_bytes=stack_bytes((*described, *private), functions, f"fcsl_step_{machine.name}"),
     )
 
 

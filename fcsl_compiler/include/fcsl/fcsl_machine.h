@@ -265,6 +265,8 @@ typedef struct {
     /* What plots and viewers show of it: the JSON of docs/language.md, compact, at most FCSL_VIEWS_BYTES_MAX bytes; or "". No
      * host interprets it. */
     const char *views;
+    /* About how much stack a step needs: the arrays along its deepest calls; 0: unknown. Hosts refuse a machine that does not fit. */
+    uint32_t stack_bytes;
 
     /* Zeroes the struct, binds parameters and initial values, runs every start() in JSON order.
      * Returns 0, or 1 + the index of the instance whose start() faulted; see its fault place. */

@@ -162,6 +162,7 @@ class CMachine(Structure):
         ("fault_places", POINTER(CFaultPlace)),
         ("fault_place_count", c_uint32),
         ("views", c_char_p),
+        ("stack_bytes", c_uint32),
         ("init", c_void_p),
         ("step", c_void_p),
         ("force_state", c_void_p),

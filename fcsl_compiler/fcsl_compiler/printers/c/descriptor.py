@@ -44,8 +44,9 @@ def _bound(number: int | float) -> str:
 class DescriptorEmitter:
     """Writes the constant tables and the fcsl_machine_t of a machine."""
 
-    def __init__(self, machine: Machine, writer: CWriter, build_hash: str, places: FaultPlaces):
+    def __init__(self, machine: Machine, writer: CWriter, build_hash: str, places: FaultPlaces, stack_bytes: int):
         self.m, self.w, self.build_hash, self.places = machine, writer, build_hash, places
+        self.stack_bytes = stack_bytes
         self.rows = field_table(machine)
         self.by_path = {r.path: n for n, r in enumerate(self.rows)}
         self.struct = f"{machine.name}_t"
@@ -202,6 +203,7 @@ class DescriptorEmitter:
             "next_state_offset": self._offset("next_state_"),
             "arm_field": str(self.by_path[self._path(m.arm)]) if m.arm is not None else "FCSL_NONE",
             "views": c_string(m.views),
+            "stack_bytes": f"{min(self.stack_bytes, 2**32 - 1)}u",
         }
         for name, table, count in (
             ("field", self.fields, len(self.rows)),

@@ -4,6 +4,7 @@
  */
 #define _GNU_SOURCE
 #include <dlfcn.h>
+#include <inttypes.h>
 #include <stdio.h>
 #include <stdlib.h>
 
@@ -14,12 +15,17 @@
 #include "fcsl/fcsl_library.h"
 #include "fcsl/fcsl_scalar.h"
 #include "hardware.h"
+#include "stack_left.h"
 #include "record/journal.h"
 #include "substitution.h"
 #include "trace.h"
 #include "validate.h"
 
-enum { MACHINES_MAX = 1024, LIST_BYTES = 256 };
+enum {
+    MACHINES_MAX = 1024,
+    LIST_BYTES = 256,
+    STACK_SPARE = 65536, /* of what runs beside the arrays of a step */
+};
 
 static void list_names(const fcsl_machine_t *const *machines, char *text, size_t size)
 {
@@ -157,10 +163,26 @@ static void release(fcsl_run_t *run)
     free(run);
 }
 
+/* Whether the stack of this thread holds a step: else it would end in a crash without a word. */
+static int check_stack(const fcsl_machine_t *machine, fcsl_error_t *error)
+{
+    const size_t needed = (size_t)machine->stack_bytes + machine->stack_bytes / 2u + STACK_SPARE;
+    const size_t left = fcsl_stack_left();
+    if (machine->stack_bytes == 0 || needed <= left) {
+        return 0;
+    }
+    return fcsl_fail(error,
+                     "machine '%.100s' needs about %" PRIu32
+                     " bytes of stack in a tick, and this thread has %zu left: make "
+                     "the arrays that its helpers copy smaller, or raise the limit (ulimit -s)",
+                     machine->name, machine->stack_bytes, left);
+}
+
 /* Initialises the machine of a run, which was checked; frees the run when that fails (or when there is no machine). */
 static fcsl_run_t *begin(fcsl_run_t *run, fcsl_error_t *error)
 {
-    if (run->machine == NULL || allocate(run, error) != 0 || initialise(run, error) != 0) {
+    if (run->machine == NULL || check_stack(run->machine, error) != 0 || allocate(run, error) != 0 ||
+        initialise(run, error) != 0) {
         release(run);
         return NULL;
     }

@@ -159,6 +159,7 @@ class PythonMachine:
         self.failure: BaseException | None = None
         self._callbacks = (_Init(self._init), _Step(self._step), _ForceState(self._force_state))
         self.descriptor = CMachine.from_buffer_copy(compiled)
+        self.descriptor.stack_bytes = 0  # Python keeps its arrays elsewhere
         for name, callback in zip(("init", "step", "force_state"), self._callbacks, strict=True):
             setattr(self.descriptor, name, ctypes.cast(callback, ptr).value)
 
