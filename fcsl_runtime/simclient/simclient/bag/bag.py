@@ -159,7 +159,8 @@ class Bag:
         if topic is None:
             listed = "".join(f"\n  {t.name} [{t.type}], {t.count} messages" for t in self.topics.values())
             hint = did_you_mean(name, self.topics)
-            raise BagError(f"{self.path}: no topic `{name}`{hint}; it holds:{listed or ' nothing'}")
+            damage = f" ({self.truncated})" if self.truncated else ""
+            raise BagError(f"{self.path}: no topic `{name}`{hint}; it holds:{listed or ' nothing'}{damage}")
         return topic
 
     def messages(self, topics: Collection[str] | None = None) -> Iterator[tuple[str, int, bytes]]:

@@ -11,7 +11,7 @@ from __future__ import annotations
 import struct
 from collections.abc import Callable, Iterator, Mapping
 from pathlib import Path
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 from rosbags.typesys.msg import normalize_msgtype
@@ -28,7 +28,7 @@ _SIZE, _TIME = struct.Struct("<I"), struct.Struct("<II")
 _INDEXED = np.dtype([("sec", "<u4"), ("nanosec", "<u4"), ("offset", "<u4")])
 #: Most bytes of a record's header, and about those of messages outside chunks that are read in one call.
 _HEADER_BYTES_MAX, _LOOSE_BYTES = 1 << 20, 1 << 20
-_UNPACK: dict[bytes, Callable[[bytes], bytes]] = {b"none": bytes, b"bz2": unpack.unbz2, b"lz4": unpack.unlz4}
+_UNPACK: dict[bytes, Any] = {b"none": None, b"bz2": unpack.unbz2, b"lz4": unpack.unlz4}
 #: (position, number) to the bytes there, fewer at the end.
 _Read = Callable[[int, int], bytes]
 
@@ -46,12 +46,15 @@ class Connection(NamedTuple):
 
 
 class Piece(NamedTuple):
-    """file[begin:end]: the packed records of a chunk, or messages outside chunks. None is earlier than `first_ns`."""
+    """file[begin:end]: the packed records of a chunk, or messages outside chunks. None is earlier than `first_ns`.
+    `is_part`: the file ends within it.
+    """
 
     begin: int
     end: int
     compression: bytes = b"none"
     first_ns: int | None = None
+    is_part: bool = False
 
 
 class _Record(NamedTuple):
@@ -69,16 +72,13 @@ class _Record(NamedTuple):
 
 
 def _record(read: _Read, at: int, size: int) -> _Record:
-    """The record at `at` of `size` bytes. Raises Damaged if it is not there whole."""
+    """The record at `at` of `size` bytes, which its data may exceed. Raises Damaged if its header is not there."""
     header = at + _SIZE.size
     behind = header + _length(read, at)
     if behind - header > _HEADER_BYTES_MAX or behind > size:
         raise Damaged
     begin = behind + _SIZE.size
-    end = begin + _length(read, behind)
-    if end > size:
-        raise Damaged
-    return _Record(_fields(read(header, behind - header)), begin, end)
+    return _Record(_fields(read(header, behind - header)), begin, begin + _length(read, behind))
 
 
 def _length(read: _Read, at: int) -> int:
@@ -132,6 +132,7 @@ class Ros1File:
             while at < self._size and not self.broken:
                 try:
                     record = _record(read, at, self._size)
+                    self.broken = record.end > self._size
                     self._take(at, record, read)
                     at = record.end
                 except Damaged:
@@ -142,7 +143,10 @@ class Ros1File:
         if op == _BAG and record.fields.get(b"encryptor"):
             raise BagError(f"{self.path}: it is encrypted; `rosbag decrypt` of ROS 1 writes one that is not")
         if op == _CHUNK:
-            self.pieces.append(Piece(record.begin, record.end, record.fields.get(b"compression", b"")))
+            end, compression = min(record.end, self._size), record.fields.get(b"compression", b"")
+            self.pieces.append(Piece(record.begin, end, compression, is_part=self.broken))
+        elif self.broken:
+            return
         elif op == _INDEX and self.pieces:
             self._take_index(record, read(record.begin, record.end - record.begin))
         elif op == _CONNECTION:
@@ -195,7 +199,14 @@ class Ros1File:
         data = self._unpacked(piece)
         at = 0
         while at < len(data):
-            record = _record(lambda begin, count: data[begin : begin + count], at, len(data))
+            try:
+                record = _record(lambda begin, count: data[begin : begin + count], at, len(data))
+                if record.end > len(data):
+                    raise Damaged
+            except Damaged:
+                if piece.is_part:
+                    return
+                raise
             op, at = record.fields.get(b"op", b""), record.end
             if op == _CONNECTION:
                 self._define(record, data[record.begin : record.end])
@@ -213,7 +224,8 @@ class Ros1File:
         if len(packed) > unpack.LIMIT_BYTES:
             raise unpack.TooLarge
         try:
-            return _UNPACK[piece.compression](packed)
+            unpacked = _UNPACK[piece.compression]
+            return unpacked(packed, part=piece.is_part) if unpacked else packed
         except unpack.TooLarge:
             raise
         except Exception:  # noqa: BLE001  damaged bytes can make the decompressors raise anything

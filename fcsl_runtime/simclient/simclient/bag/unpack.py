@@ -39,17 +39,21 @@ def unzstd(packed: Any, limit: int | None = None) -> bytes:
         return _gathered(lambda: stream.read(_STEP_BYTES), limit)
 
 
-def unlz4(packed: Any, limit: int | None = None) -> bytes:
-    """Unpacks the first frame in a buffer. Raises TooLarge, or RuntimeError or EOFError if it is damaged."""
-    return _stepwise(lz4.frame.LZ4FrameDecompressor(), packed, limit)
+def unlz4(packed: Any, limit: int | None = None, part: bool = False) -> bytes:
+    """Unpacks the first frame in a buffer, or what there is of it. Raises TooLarge, or RuntimeError or EOFError if it is
+    damaged.
+    """
+    return _stepwise(lz4.frame.LZ4FrameDecompressor(), packed, limit, part)
 
 
-def unbz2(packed: Any) -> bytes:
-    """Unpacks the first stream in a buffer. Raises TooLarge, or OSError or EOFError if it is damaged."""
-    return _stepwise(bz2.BZ2Decompressor(), packed)
+def unbz2(packed: Any, limit: int | None = None, part: bool = False) -> bytes:
+    """Unpacks the first stream in a buffer, or what there is of it. Raises TooLarge, or OSError or EOFError if it is
+    damaged.
+    """
+    return _stepwise(bz2.BZ2Decompressor(), packed, limit, part)
 
 
-def _stepwise(stream: Any, packed: Any, limit: int | None = None) -> bytes:
+def _stepwise(stream: Any, packed: Any, limit: int | None, part: bool) -> bytes:
     """Unpacks a buffer with a decompressor that has the standard library's interface."""
     inputs = iter((packed,))
 
@@ -57,7 +61,7 @@ def _stepwise(stream: Any, packed: Any, limit: int | None = None) -> bytes:
         if stream.eof:
             return b""
         found: bytes = stream.decompress(next(inputs, b""), max_length=_STEP_BYTES)
-        if not found and not stream.eof:
+        if not found and not stream.eof and not part:
             raise EOFError("cut off")
         return found
 
