@@ -9,8 +9,9 @@ from itertools import count
 from pathlib import Path
 from typing import Any
 
+import numpy as np
 import pytest
-from foreign_bags import MS, imu, number, split, write_as_given, write_mcap
+from foreign_bags import MS, imu, make, number, split, write_as_given, write_mcap
 from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 from mcap.reader import make_reader
@@ -116,6 +117,18 @@ def test_chunks_are_not_all_in_memory(tmp_path: Path, monkeypatch: pytest.Monkey
     with pytest.raises(BagError, match=r"shuffled\.mcap: its messages are not in the order of time.*`mcap sort`"):
         seen(write_mcap(tmp_path / "shuffled.mcap", shuffled))
     assert "messages   120" in describe(open_bag(tmp_path / "shuffled.mcap"))
+
+
+def test_of_chunks_that_overlap_only_what_is_wanted_is_in_memory(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    image = make("sensor_msgs/msg/Image", data=np.zeros(5000, np.uint8))
+    messages = ramp() + [(START + i * 25 * MS, "/image", image) for i in range(120)]
+    bag = write_mcap(tmp_path / "bag.mcap", random.Random(1).sample(messages, len(messages)), chunk_bytes=20_000)
+    monkeypatch.setattr("simclient.bag.time_order.HELD_BYTES_MAX", 120_000)
+    assert seen(bag) == list(range(120))
+    with pytest.raises(BagError, match="not in the order of time"):
+        list(open_bag(bag).messages())
 
 
 def test_a_chunk_that_gives_a_wrong_time_is_told(tmp_path: Path) -> None:

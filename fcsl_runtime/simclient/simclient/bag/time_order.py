@@ -49,6 +49,11 @@ class _Open:
                 return True
         return False
 
+    def drop_others(self) -> None:
+        """Keeps only the bytes of the messages, where they are less than half."""
+        if 2 * int((self._entries["end"] - self._entries["begin"]).sum()) < len(self.data):
+            (self.data, self._entries), self._announced = _joined([(Batch(self.data, self._entries), self._announced)])
+
     @property
     def last_ns(self) -> int:
         return int(self._entries["log_ns"][-1])
@@ -82,8 +87,11 @@ def in_time_order(parts: Sequence[Part], name: str) -> Iterator[Block]:
             going[number] = _Open(parts[number])
         else:
             blocks = [going[n].taken(until_ns, n <= number) for n in sorted(going)]
-            yield _joined([block for block in blocks if len(block[0].entries)])
+            blocks = [block for block in blocks if len(block[0].entries)]
+            yield _joined(blocks) if len(blocks) > 1 else blocks[0]
         if going[number].load():
+            if len(going) > 1:
+                going[number].drop_others()
             heapq.heappush(bounds, (going[number].last_ns, number))
         else:
             del going[number]
@@ -96,8 +104,6 @@ def in_time_order(parts: Sequence[Part], name: str) -> Iterator[Block]:
 
 def _joined(blocks: Sequence[Block]) -> Block:
     """The messages of several blocks in the order of time; channels that share a number get numbers of their own."""
-    if len(blocks) == 1:
-        return blocks[0]
     announced: dict[int, Topic] = {}
     data, parts, at = [], [], 0
     for batch, topics in blocks:
