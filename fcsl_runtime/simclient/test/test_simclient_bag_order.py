@@ -76,6 +76,15 @@ def test_a_permuted_bag_gives_the_run_of_the_sorted_one(form: str, probe: Path, 
     check()
 
 
+@pytest.mark.parametrize("form", ["chunks", "sqlite3"])
+def test_a_topic_has_the_type_of_most_of_its_messages(form: str, tmp_path: Path) -> None:
+    other = [(START + i * MS, "/level", imu(START + i * MS)) for i in range(3)]
+    most = [(START + i * MS, "/level", number(i)) for i in range(5)]
+    for name, messages in (("first", other + most), ("last", most + other)):
+        topic = open_bag(write_in(form, tmp_path / name, messages)).topics["/level"]
+        assert (topic.type, topic.count) == ("std_msgs/msg/Float64", 8)
+
+
 def ramp(begin: int = 0, end: int = 120) -> Made:
     times = [(i, START + i * 25 * MS) for i in range(begin, end)]
     return [(time_ns, "/imu", imu(time_ns, (i, 0, 0))) for i, time_ns in times]

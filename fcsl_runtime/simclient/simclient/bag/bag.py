@@ -104,6 +104,8 @@ class Bag:
         self.truncated = ""
         self.notes: list[str] = []
         self.topics: dict[str, Topic] = {}
+        #: By topic, its types and definitions.
+        self._kinds: dict[str, dict[tuple[str, str, str], Topic]] = {}
         self.read_bytes = 0
         self._summaries: dict[Path, Any] = {}
         #: What defines channels: the summary, or a pass over the file if it has none.
@@ -130,7 +132,7 @@ class Bag:
         if summary is not None:
             counts = summary.statistics.channel_message_counts
             for number, channel in summary.channels.items():
-                self._add_topic(channel, summary.schemas.get(channel.schema_id), counts.get(number, 0))
+                self._count(_topic(channel, summary.schemas.get(channel.schema_id), counts.get(number, 0)))
             return
         scan, progress = Scan(file), Progress(f"reading {file.name}", file.stat().st_size)
         self._known[file] = scan
@@ -141,17 +143,22 @@ class Bag:
                 counts[int(number)] = counts.get(int(number), 0) + int(count)
         progress.finish()
         for number, channel in scan.channels.items():
-            self._add_topic(channel, scan.schemas.get(channel.schema_id), counts.get(number, 0))
+            self._count(_topic(channel, scan.schemas.get(channel.schema_id), counts.get(number, 0)))
         self._damaged(file, scan.damage or f"{file.name} {_without_summary(scan)}")
 
     def _damaged(self, file: Path, text: str) -> None:
         self._damage[file] = text
         self.truncated = "; ".join(self._damage.values())
 
-    def _add_topic(self, channel: records.Channel, schema: records.Schema | None, count: int) -> None:
-        """If a topic changes its type within the bag, `topics` keeps the first type."""
-        known = self.topics.setdefault(channel.topic, _topic(channel, schema))
-        self.topics[channel.topic] = replace(known, count=known.count + count)
+    def _count(self, topic: Topic) -> None:
+        """Adds messages of a topic. Of several types or definitions `topics` has that of most of its messages, so that it
+        does not matter which of them come first.
+        """
+        kinds = self._kinds.setdefault(topic.name, {})
+        kind = topic.type, topic.schema_encoding, topic.schema
+        kinds[kind] = replace(topic, count=topic.count + (kinds[kind].count if kind in kinds else 0))
+        chosen = min(kinds, key=lambda kind: (not kind[2], -kinds[kind].count, kind))
+        self.topics[topic.name] = replace(kinds[chosen], count=sum(part.count for part in kinds.values()))
 
     def topic(self, name: str) -> Topic:
         """The topic called `name`. Raises BagError, which lists the topics of the bag."""
@@ -431,11 +438,11 @@ def _without_summary(scan: Scan) -> str:
     return f"was not closed after {scan.count} messages"
 
 
-def _topic(channel: records.Channel, schema: records.Schema | None) -> Topic:
+def _topic(channel: records.Channel, schema: records.Schema | None, count: int = 0) -> Topic:
     return Topic(
         name=channel.topic,
         type=schema.name if schema else "",
-        count=0,
+        count=count,
         encoding=channel.message_encoding,
         schema_encoding=schema.encoding if schema else "",
         schema=schema.data.decode("utf-8", "replace") if schema else "",

@@ -50,9 +50,7 @@ class Ros1Bag(Bag):
         self._ros1 = [Ros1File(file) for file in self.files]
         for file in self._ros1:
             for number, connection in file.connections.items():
-                topic = self._topic_of(connection)
-                known = self.topics.setdefault(topic.name, topic)
-                self.topics[topic.name] = replace(known, count=known.count + file.counts.get(number, 0))
+                self._count(replace(self._topic_of(connection), count=file.counts.get(number, 0)))
             if damage := self._pass(file, ()).damage:
                 self._damaged(file.path, damage)
 

@@ -56,9 +56,7 @@ class SqliteBag(Bag):
         self._databases = [self._survey(file) for file in self.files]
         for file in self._databases:
             for number, topic in file.topics.items():
-                known = self.topics.setdefault(topic.name, topic)
-                count = int(np.count_nonzero(file.rows["topic"] == number))
-                self.topics[topic.name] = replace(known, count=known.count + count)
+                self._count(replace(topic, count=int(np.count_nonzero(file.rows["topic"] == number))))
 
     def _survey(self, file: Path) -> _File:
         found = _File(file, {}, np.empty(0, _ROW))

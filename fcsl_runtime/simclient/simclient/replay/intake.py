@@ -27,7 +27,7 @@ NO_STAMP = "unset"
 STUCK = "stuck"
 #: Texts of the reasons.
 _REFUSED = {
-    OTHER_TYPE: "of another type than the topic's first",
+    OTHER_TYPE: "of another type than most of the topic's",
     NO_STAMP: "with the stamp zero",
     STUCK: "after a backward jump of the clock",
     "encoding": "not in little-endian CDR",

@@ -41,7 +41,7 @@ does, and never extrapolated.
 A sample is delivered at the first tick at or after its time, with age 0 and its header's stamp, and held until the
 next. Of several samples for one tick the newest is used; the others are superseded. Late samples are sorted in; of
 messages with the same time the later one is used. Refused and counted are: a zero stamp; messages after a backward step
-of more than 1 s, until the clock has caught up; messages of another type than the topic's first; damaged messages; a
+of more than 1 s, until the clock has caught up; messages of another type than most of the topic's; damaged messages; a
 list of another length; a NaN; a value out of range of an integer or bool; values that the message marks as not
 measured; quaternions of length zero or infinity. A channel without a usable message is an error.
 """
