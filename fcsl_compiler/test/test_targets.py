@@ -133,6 +133,20 @@ def test_an_unknown_target_is_refused(tmp_path: Path, capsys: pytest.CaptureFixt
 # ---- building ---------------------------------------------------------------------------------------------------------
 
 
+@pytest.mark.parametrize("backend", ["c", "nim"])
+def test_a_header_of_an_extern_may_be_called_like_the_machine(tmp_path: Path, backend: str) -> None:
+    """Also with the guard that everybody gives it; and a change of it is another build."""
+    guarded = f"#ifndef CRAFT_H\n#define CRAFT_H\n{HEADER}#endif\n"
+    path = machine(tmp_path, law_py=LAW.replace("probe.h", "craft.h"), c_stub_c=STUB.replace("probe.h", "craft.h"))
+    (tmp_path / "c/include/craft.h").write_text(guarded)
+    built = [build_library([path], tmp_path / "out/libcraft.so", backend=backend)]
+    assert output_of(tmp_path / "out/libcraft.so") == 9.0
+    (tmp_path / "c/include/craft.h").write_text(guarded.replace("OFFSET 1.0", "OFFSET 2.0"))
+    built.append(build_library([path], tmp_path / "other/libcraft.so", backend=backend))
+    assert output_of(tmp_path / "other/libcraft.so") == 10.0
+    assert built[0][0].build_hash != built[1][0].build_hash
+
+
 def test_each_target_links_its_own(tmp_path: Path) -> None:
     config = machine(tmp_path)
     simulation, board = build_machine(config), build_machine(config, "board")

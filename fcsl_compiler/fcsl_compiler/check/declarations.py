@@ -42,7 +42,7 @@ class Declarations:
 
     @cached_property
     def _used_names(self) -> frozenset[str]:
-        found = set()
+        found: set[str] = set()
         for node in ast.walk(self.tree):
             if isinstance(node, ast.ImportFrom):
                 found.update(alias.name for alias in node.names)

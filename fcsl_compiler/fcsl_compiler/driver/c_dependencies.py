@@ -105,10 +105,10 @@ def extern_inputs(parsed: ParsedMachine, target: Target) -> CInputs:
         folder = Path(scratch).resolve()
         # In place of the generated header: it defines no macro, so that the preprocessor needs only what it includes.
         (folder / f"{parsed.name}.h").write_text("#include <fcsl/fcsl_machine.h>\n")
-        headers = [f'#include "{header}"\n' for header in [f"{parsed.name}.h", *_extern_headers(parsed)]]
+        headers = [f'#include "{parsed.name}.h"\n', *(f"#include <{header}>\n" for header in _extern_headers(parsed))]
         machine = folder / "machine.c"
         machine.write_text("".join(headers))
-        includes = [folder, *target.include, *include_dirs()]
+        includes = [*target.include, folder, *include_dirs()]
         try:
             of_c = [source for source in target.sources if source.suffix != ".nim"]
             found = c_inputs([machine, *of_c], includes, parsed.folder, folder)

@@ -35,7 +35,7 @@ def link_inputs(
     files: list[Path] = []
     for number, target in enumerate(targets):
         own = folder / str(number)
-        includes = [headers, *target.include, *include_dirs(), own]
+        includes = [*target.include, headers, *include_dirs(), own]
         files += compile_objects(c_sources(target, externs, own), includes, own)
     archives = [a for t in targets for a in t.archives]
     return LinkInputs((*files, *archives), tuple(f"-l{name}" for t in targets for name in t.libraries))

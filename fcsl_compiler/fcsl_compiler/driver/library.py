@@ -157,7 +157,8 @@ def _compile(compilations: list[Compilation], sources: list[Path], output: Path,
     folder = output.parent
     externs = sorted({e.name for c in compilations for e in c.checked.externs})
     targets = list(dict.fromkeys(c.target for c in compilations if not c.target.is_empty))
-    includes = [folder, *include_dirs(), *(d for t in targets for d in t.include)]
+    # The headers of externs come first: one may be called like a machine.
+    includes = [*(d for t in targets for d in t.include), folder, *include_dirs()]
     with explained(externs, targets):
         objects = compile_objects(sources, includes, folder / "objects")
         declared = [e for c in compilations for e in c.checked.externs]

@@ -12,9 +12,14 @@ from .statements import CStatements, prototype
 from .writer import CWriter
 
 
+def header_guard(machine: str) -> str:
+    """The macro of the header of a machine, which no header of a user has."""
+    return f"FCSL_MACHINE_{machine.upper()}_H"
+
+
 def print_header(program: code.Program) -> str:
     w, name = CWriter(), program.name
-    guard = f"{name.upper()}_H"
+    guard = header_guard(name)
     w.block(f"/* {name}.h: made by fcslc from {c_comment(program.source)}. Do not edit. */")
     w.block(f"#ifndef {guard}\n#define {guard}\n\n#include <stdbool.h>\n#include <stdint.h>\n#include <string.h>")
     w.block("\n#include <fcsl/fcsl_machine.h>\n")

@@ -45,7 +45,7 @@ def print_source(program: code.Program, prelude: str, extensions: Mapping[str, S
     w.line("#include <fcsl/fcsl_exact_math.h>")
     w.line("#include <fcsl/fcsl_math.h>")
     for header in program.headers:
-        w.line(f'#include "{header}"')
+        w.line(f"#include <{header}>")  # not the file of this name beside this one, which is the machine's
     w.line()
     if prelude:
         w.block(prelude)

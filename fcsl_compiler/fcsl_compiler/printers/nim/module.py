@@ -11,6 +11,7 @@ from ...model import code
 from ...model.effects import HARDWARE
 from ...model.ir import HARDWARE_HEADER
 from ...model.types import Scalar
+from ..c.header import header_guard
 from ..c.source import PRAGMAS, print_externs, print_record
 from ..c.writer import CWriter
 from .expressions import Module
@@ -82,7 +83,7 @@ def print_module(program: code.Program, print_descriptor: Callable[[CWriter], No
         w.line("import std/volatile")
         w.line()
     w.block(_PRELUDE)
-    own_types = f"#define {program.name.upper()}_H /* the types of {program.name}.h are below */\n"
+    own_types = f"#define {header_guard(program.name)} /* the types of {program.name}.h are below */\n"
     freed = "".join(f"#undef {name}\n" for name in sorted(_like_macros(module, statements.variables)))
     _emit(w, "/*INCLUDESECTION*/\n" + PRAGMAS + _INCLUDES + own_types)
     _emit(w, "/*TYPESECTION*/\n" + _QUIET + freed)
@@ -118,7 +119,7 @@ def print_module(program: code.Program, print_descriptor: Callable[[CWriter], No
         for record in (r for r in program.records if r.like):
             print_record(data, record)
     for header in program.headers:
-        data.line(f'#include "{header}"')
+        data.line(f"#include <{header}>")  # not a machine's of the same name
     print_externs(program, data)
     print_descriptor(data)
     _emit(w, "/*VARSECTION*/\n" + data.text())
