@@ -87,7 +87,7 @@ def build(folder: Path, tick_hz: int = 100, publish: tuple[str, ...] = (), safe:
             "SLOW": {"schedule": {"slow": tick_hz}},
             "FLY": {"schedule": {"imu": tick_hz, "pilot": tick_hz}},
         },
-        "transitions": [{"from": "IDLE", "to": "FLY", "health": {"instance": "imu", "in": ["nominal"]}}],
+        "transitions": [{"from": "IDLE", "to": "FLY", "health": {"instance": "imu", "in": ["nominal", "degraded"]}}],
         "requests": ["LAND", "HOLD"],
         "channels": [
             {

@@ -254,6 +254,12 @@ def test_what_nothing_fills_is_rosidls_default(name: str) -> None:
         "sensor_msgs/msg/MagneticField": [math.nan] * 3,
         "sensor_msgs/msg/NavSatFix": [math.nan],
         "sensor_msgs/msg/BatteryState": [math.nan] * 6,
+        **{
+            f"geometry_msgs/msg/{what}WithCovariance{stamped}": [-1.0]
+            for what in ("Pose", "Twist")
+            for stamped in ("", "Stamped")
+        },
+        "nav_msgs/msg/Odometry": [-1.0] * 2,
     }.get(name, [])
     data = Composer(STANDARD, name, []).compose([0], 0)
     assert data is not None
