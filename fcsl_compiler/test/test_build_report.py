@@ -14,6 +14,7 @@ from test_golden import golden
 
 from fcsl_compiler.base.source import SourceFile
 from fcsl_compiler.build_report import compiled_facts, report_text
+from fcsl_compiler.build_report.arithmetic import binary
 from fcsl_compiler.build_report.bound import Bounder
 from fcsl_compiler.build_report.facts import machine_facts
 from fcsl_compiler.build_report.instruction_counts import COUNTS
@@ -22,7 +23,7 @@ from fcsl_compiler.build_report.levelling import MOST_TICKS, levelled, load_per_
 from fcsl_compiler.build_report.objects import NotReadable, read_object
 from fcsl_compiler.build_report.paths import Unbounded
 from fcsl_compiler.build_report.schedule_facts import MOST_SLOTS, NEVER, latency, major_cycle, slots
-from fcsl_compiler.build_report.values import Flags, State, decide, number, plus
+from fcsl_compiler.build_report.values import Flags, State, decide, greatest, minus, number, part, plus
 from fcsl_compiler.cli.main import main
 from fcsl_compiler.driver.library import build_library
 from fcsl_compiler.driver.passes import compile_machine
@@ -249,6 +250,31 @@ def test_a_loop_entered_in_its_middle_is_counted_turn_by_turn(tmp_path: Path) ->
     assert 3 + 9 * 11 < bound < 3 + 10 * 13
 
 
+@pytest.mark.parametrize("size", [296, 301, 4099])
+def test_string_instructions_from_the_next_multiple_of_8_on_are_counted(tmp_path: Path, size: int) -> None:
+    """After the first bytes, at an address of any alignment, gcc's `rep movsq` and `rep stosq` do the rest."""
+    text = f"""#include <string.h>
+        void copy(char *to, const char *from) {{ memcpy(to, from, {size}); }}
+        void clear(char *to) {{ memset(to, 0, {size}); }}
+        void later(char *to, const char *from, int some) {{ if (some) to[3] = 1; else memset(to + 5, 0, {size});
+            memcpy(to + 3, from, {size}); memcpy(to + {size} + 8, from, {size}); }}"""
+    for function, times in (("copy", 1), ("clear", 1), ("later", 3)):
+        turns = size // 8 * times
+        assert turns - 2 * times <= bound_of(tmp_path, text, function) <= turns + 30 * times, function
+
+
+def test_a_count_that_depends_on_an_address_is_known_up_to_a_step() -> None:
+    """(address - multiple of 8 + size) / 8, in 32 bits: one number or two, by the size."""
+    for size, least, last in ((160, 19, 19), (163, 19, 20)):
+        start = ("rcx", 0x20)
+        multiple = binary("and", plus(start, number(8)), number(-8), 64)
+        rest = minus(part(start, 32), part(multiple, 32), 32)
+        count = binary("shr", plus(rest, number(size), 32), number(3), 32)
+        assert count is not None and (count[1], greatest(count)) == (least, last)
+        assert minus(count, count) == number(0)
+        assert decide("e", Flags(count, number(19), 32)) is (True if least == last else None)
+
+
 def test_given_iteration_limits_bound_a_loop_over_data(tmp_path: Path) -> None:
     """A binary search. The bound uses the given iteration limit, independent of how gcc jumps to the function."""
     text = """double s(const double *t, int n, double x) { int a = 0; while (a + 1 < n) { int m = (a + n) / 2; if (t[m] <= x) a = m; else n = m;
@@ -371,6 +397,34 @@ def shape(facts: Any) -> Any:
     if isinstance(facts, dict):
         return {k: shape(v) for k, v in facts.items()}
     return [shape(v) for v in facts] if isinstance(facts, list) and facts and isinstance(facts[0], dict) else None
+
+
+@pytest.mark.parametrize("states", [6, 9])
+def test_a_kalman_filter_has_a_bound(tmp_path: Path, states: int) -> None:
+    text = f"""class Filter:
+    inputs = {{"z": "f64[3]", "f": "f64[{states}][{states}]", "h": "f64[3][{states}]"}}
+    outputs = {{"x": "f64[{states}]"}}
+    state = {{"p": "f64[{states}][{states}]"}}
+
+    def start(self):
+        self.p = eye({states})
+
+    def execute(self):
+        self.x = kf_predict_state(self.f, self.x)
+        self.p = kf_predict_cov(self.f, self.p, 0.001 * eye({states}))
+        k = kf_gain(self.p, self.h, 0.1 * eye(3))
+        self.x = kf_update_state(self.x, k, self.z, self.h)
+        self.p = kf_update_cov_joseph(self.p, k, self.h, 0.1 * eye(3))
+"""
+    facts = facts_of(write_machine(tmp_path, {"filter": text}, {"filter": 100}), tmp_path / "out")
+    assert facts["instances"][0]["own_instructions"] > states**3 and not facts["instances"][0]["why_no_bound"]
+    assert facts["states"][0]["own_instructions"] > states**3 and not facts["states"][0]["why_no_bound"]
+
+
+@pytest.mark.parametrize("example", ["inverted_pendulum", "satellite"])  # `make verify` bounds every example
+def test_examples_have_bounds(tmp_path: Path, example: str) -> None:
+    facts = facts_of(LANDER.parents[2] / example / "fc" / f"{example}.json", tmp_path / "out")
+    assert [i["name"] for i in facts["instances"] + facts["states"] if i["why_no_bound"]] == []
 
 
 def test_a_tick_of_few_costs_less_than_one_of_many(tmp_path: Path) -> None:

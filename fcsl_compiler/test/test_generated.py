@@ -284,6 +284,21 @@ def test_what_is_told_of_time_and_samples_is_compared(what: str, monkeypatch: py
     assert problems and all(", oracle " in p for p in problems)
 
 
+def test_a_lost_request_that_is_not_counted_is_a_difference(monkeypatch: pytest.MonkeyPatch) -> None:
+    """The control: generated machines lose requests, and an oracle that does not count them disagrees."""
+    arbitrate = OracleMachine._arbitrate
+    made = [case for case in machines(120) if any(harness.by_oracle(case)[-1].get("machine.lost_requests", []))][:4]
+
+    def forgetful(m: OracleMachine, ran: list[str]) -> None:
+        before = dict(m.lost)
+        arbitrate(m, ran)
+        m.lost = before
+
+    monkeypatch.setattr(OracleMachine, "_arbitrate", forgetful)
+    problems = [p for p in harness.check(made) if p]
+    assert problems and all("machine.lost_requests" in p and ", oracle " in p for p in problems)
+
+
 def test_a_failure_is_shrunk() -> None:
     """Here a case is a list, and one with a number beyond 50 is wrong."""
 

@@ -5,6 +5,7 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
+import pytest
 from fcsl_test_tables import kind, machine
 
 from fcsl_compiler.driver.passes import compile_machine
@@ -41,3 +42,25 @@ def test_large_initial_values_are_copied_from_tables(tmp_path: Path) -> None:
     assert m.get("law.outputs.y") == values["a"][69][2] + 2.5 - 13.0
     header = compile_machine(next(tmp_path.glob("**/*.json")), "").header
     assert header.count("static const") == 4 and header.count("] = ") < 10
+
+
+@pytest.mark.parametrize(
+    ("body", "warned"),
+    [
+        ("self.values[self.head] = self.x", True),  # the index may be out of range
+        ("self.values[i32(self.x)] = 1.0", True),
+        ("self.values[self.count % 4096] = self.x\n        self.head = self.head + 1", True),  # it overflows behind it
+        ("self.head = self.head + 1\n        self.values[self.count % 4096] = self.x", False),
+        ("self.values[self.count % 4096] = self.x", False),
+        ("self.small[self.head] = self.x", False),
+    ],
+)
+def test_a_large_copy_is_told(tmp_path: Path, body: str, warned: bool) -> None:
+    state = '{"values": "f64[4096]", "small": "f64[8]", "head": "i32", "count": "u32"}'
+    law = f'class Law:\n    inputs = {{"x": "f64"}}\n    state = {state}\n    def execute(self):\n        {body}\n'
+    config = {"instances": {"law": {"algorithm": "Law"}}, "states": {"A": {"schedule": {"law": 1000}}}}
+    machine(tmp_path, config, law=law)
+    found = compile_machine(next(tmp_path.glob("**/*.json")), "").sink.diagnostics
+    assert [d.message for d in found if d.code == "W307"] == [
+        "each run copies the 32768 bytes of `values`, so that a fault can undo what is written to it"
+    ] * warned

@@ -9,8 +9,8 @@ import pytest
 from fcsl_test_abi import Machine, write_machine
 from fcsl_test_twins import InReference
 
+from fcsl_compiler.check.fault_points import written_before_fault
 from fcsl_compiler.driver.passes import compile_machine
-from fcsl_compiler.emit.fault_points import written_before_fault
 
 COUNT = """
 class Count:

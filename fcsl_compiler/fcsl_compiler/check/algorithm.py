@@ -12,6 +12,7 @@ from ..model.effects import warn_fault_after_effect
 from ..parse.python_source import span_of
 from .algorithm_class import AlgorithmClass, name_span
 from .declarations import Declarations
+from .fault_points import warn_copies
 from .functions import FunctionTable
 from .scope import Scope
 from .statements import BodyChecker
@@ -42,6 +43,7 @@ def check_algorithm(
     for helper in _reached(execute, start, table):
         requests.update({n: s for n, s in helper.requests if n not in requests})
     ports = {record: tuple(ports) for record, ports in found.ports.items()}
+    warn_copies(execute, ports, sink)
     return ir.Algorithm(
         name,
         declarations.source.name,

@@ -6,6 +6,7 @@ from __future__ import annotations
 from collections.abc import Iterator
 from dataclasses import replace
 
+from ..check.fault_points import written_before_fault
 from ..model import code, ir
 from ..model.c_names import c_name
 from ..model.code import Call, Deref, Function, If, Member, Name, Set, Statement
@@ -13,7 +14,6 @@ from ..model.machine import Instance, Machine, Values
 from ..model.types import HEALTH, U32, Array, Scalar, Struct, Type, count_of
 from .copies import copied
 from .expressions import code_type
-from .fault_points import written_before_fault
 from .functions import HOST_TYPE
 from .names import health, instance_type, record_type, request_constant
 from .rare import failed

@@ -4,6 +4,7 @@
 from __future__ import annotations
 
 from fractions import Fraction
+from itertools import combinations
 from typing import Any
 
 import numpy as np
@@ -41,6 +42,8 @@ class OracleMachine:
         self.connections = self.config.get("connections", [])
         self.state = self.next_state = self.config["initial_state"]
         self.tick = self.ticks_in_state = 0
+        #: Requests that were lost to another transition, by state and priority.
+        self.lost = {(s, e["priority"]): 0 for s in self.config["states"] for e in self._edges(s)}
         self.board = Board(case.board, Calls())
         self.failed_start = self._init()
 
@@ -241,15 +244,19 @@ class OracleMachine:
         channel["valid"] = "came" in channel and channel["age"] <= channel.get("max_age_ticks", 1 << 32)
 
     def _arbitrate(self, ran: list[str]) -> None:
+        true = [
+            e for e in self._edges(self.state) if self._has_lasted(e) and self._asked(e, ran) and self._holds(e, ran)
+        ]
+        if true:
+            self.next_state = true[0]["to"]
+        for other in true[1:]:
+            self.lost[self.state, other["priority"]] += _loses(other, true[0])
+
+    def _edges(self, state: str) -> list[dict[str, Any]]:
+        """The transitions from a state, the one that is preferred first."""
         edges = sorted(self.config.get("transitions", []), key=lambda e: -e["priority"])
-        for edge in edges:
-            sources = [edge["from"]] if isinstance(edge["from"], str) else edge["from"]
-            leaves_here = self.state in sources or sources == ["*"]
-            if not leaves_here or edge["to"] == self.state or not self._has_lasted(edge):
-                continue
-            if self._asked(edge, ran) and self._holds(edge, ran):
-                self.next_state = edge["to"]
-                return
+        sources = [[e["from"]] if isinstance(e["from"], str) else e["from"] for e in edges]
+        return [e for e, s in zip(edges, sources, strict=True) if (state in s or s == ["*"]) and e["to"] != state]
 
     def _has_lasted(self, edge: dict[str, Any]) -> bool:
         """Whether the state has lasted long enough, this tick included."""
@@ -292,6 +299,9 @@ class OracleMachine:
         timed = any("after_s" in e for e in self.config.get("transitions", []))
         if timed or any(c["from"] == "machine.ticks_in_state" for c in self.connections):
             found["machine.ticks_in_state"] = [self.ticks_in_state]
+        pairs = [pair for s in self.config["states"] for pair in combinations(self._edges(s), 2)]
+        if any(_loses(other, edge) for edge, other in pairs):
+            found["machine.lost_requests"] = list(self.lost.values())
         for connection in self.connections:
             owner, *path = connection["from"].split(".")
             receiver = connection["to"].split(".")[0]
@@ -318,6 +328,11 @@ class OracleMachine:
             found[f"channels.{name}.age_ticks"] = [channel["age"]]
             found[f"channels.{name}.stamp_ns"] = [channel["stamp"]]
         return found
+
+
+def _loses(other: dict[str, Any], taken: dict[str, Any]) -> bool:
+    """Whether the request of a transition that also holds is lost: what is taken answers another and leads elsewhere."""
+    return "request" in other and other["request"] != taken.get("request") and other["to"] != taken["to"]
 
 
 def _scalars(scalar: str, value: Any) -> Any:
