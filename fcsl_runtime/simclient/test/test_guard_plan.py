@@ -168,7 +168,7 @@ def test_two_channels_of_one_signal(build_guarded: Callable[..., Path], drivers:
 
 #: Macro → what is wrong with the driver `arm`.
 DEFECTS = {
-    "ABI=7": "driver ABI 7, this program has 2: compile the drivers again",
+    "ABI=7": "driver ABI 7, this program has 3: compile the drivers again",
     "SIGNALS=0": "driver 'arm': it has no signals, or too many",
     "STATE=8": "a signal lacks its name, unit, doc or type, or lies outside the state",
     "STATE=0": "its state_size or state_align is impossible",
