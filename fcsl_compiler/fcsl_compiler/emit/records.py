@@ -7,7 +7,7 @@ from collections.abc import Iterator, Sequence
 
 from ..model import ir
 from ..model.c_names import c_name
-from ..model.code import STATE, U8, Field, Named, Record
+from ..model.code import STATE, U8, Block, Field, Named, Record
 from ..model.machine import Channel, Instance, Machine
 from ..model.types import I32, I64, U32, U64, Results
 from .expressions import code_type
@@ -89,6 +89,8 @@ def _machine(machine: Machine) -> Iterator[Field]:
     yield Field("next_state_", STATE, "of the coming tick")
     if machine.counts_state_ticks:
         yield Field("ticks_in_state", U64, "ticks completed since the state was entered")
+    if machine.preferred:
+        yield Field("lost_requests", Block(U64, len(machine.edges)), "of each edge, by another that was taken")
     for instance in machine.instances:
         yield Field(instance_member(instance), Named(instance_type(machine, instance)))
     for channel in sensors(machine):

@@ -9,7 +9,7 @@ from itertools import groupby
 
 from ..model import code
 from ..model.c_names import c_name
-from ..model.code import Binary, Call, Deref, Do, Function, If, Literal, Member, Name, Set, Statement
+from ..model.code import Binary, Call, Deref, Do, Function, If, Literal, Member, Name, Set, Statement, Update
 from ..model.machine import Channel, Connection, Edge, Entry, Instance, Machine, PortRef, State
 from ..model.types import BOOL, F64, I32, I64, U32, U64
 from .bookkeeping import noted_instances
@@ -132,6 +132,8 @@ class TickEmitter:
             yield self._function(f"{name}_{number}", body, more, U64 if timed else None, apart=True)
             called = Call(f"{name}_{number}", (MACHINE.pointer, _HOST, *([_NOW] if timed else [])))
             calls.append(Set(_NOW, called) if timed else Do(called))
+        if self._losing(state):
+            yield self._lost(state)
         yield self._function(name, self._tick(state, calls, readings, timed), flatten=not calls)
 
     def _function(
@@ -379,10 +381,34 @@ class TickEmitter:
     def _arbitration(self, state: State) -> list[Statement]:
         """Edges are in falling priority; the first whose conditions are true is taken."""
         made: tuple[Statement, ...] = ()
-        for edge in reversed([e for e in self.m.edges if self.m.states[e.source] is state]):
-            taken = Set(Member(MACHINE, "next_state_"), state_constant(self.m, edge.target))
-            made = (code.At(edge.span, quoted=False), If(self._condition(state, edge), (taken,), made))
+        losing = self._losing(state)
+        for number, edge in reversed([(n, e) for n, e in enumerate(self.m.edges) if self.m.states[e.source] is state]):
+            taken: list[Statement] = [Set(Member(MACHINE, "next_state_"), state_constant(self.m, edge.target))]
+            if any(number in self.m.preferred[loser] for loser in losing):
+                taken.append(Do(Call(self._lost_name(state), (MACHINE.pointer, Literal(number, U32)))))
+            made = (code.At(edge.span, quoted=False), If(self._condition(state, edge), tuple(taken), made))
         return [*made, code.At(None, quoted=False)] if made else []
+
+    def _losing(self, state: State) -> list[int]:
+        """The edges of a state that can lose their request to another one."""
+        return [n for n in self.m.preferred if self.m.states[self.m.edges[n].source] is state]
+
+    def _lost_name(self, state: State) -> str:
+        return f"fcsl_lost_{self.m.name}_{state.name}"
+
+    def _lost(self, state: State) -> Function:
+        """Counts the requests that a taken edge leaves unanswered. Apart from the tick, which most often takes none."""
+        taken, body = Name("taken"), list[Statement]()
+        for number in self._losing(state):
+            one = one_of([Binary("==", taken, Literal(n, U32)) for n in self.m.preferred[number]])
+            count = code.Element(Member(MACHINE, "lost_requests"), Literal(number, U32))
+            condition = code.And((one, self._condition(state, self.m.edges[number])))
+            body.append(If(condition, (Update(count, "+", ONE),)))
+        used = code.used_names(body)
+        entries = [e for e in state.entries if due_name(e) in used]
+        parameters: tuple[tuple[str, code.Type], ...] = (("m", self.pointer), (taken.text, U32))
+        comment = "Counts requests that are lost because this edge is taken."
+        return Function(self._lost_name(state), parameters, None, (*self._dues(entries), *body), comment, inline="rare")
 
     def _condition(self, state: State, edge: Edge) -> code.Expr:
         tests: list[code.Expr] = []

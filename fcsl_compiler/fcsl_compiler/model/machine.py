@@ -171,7 +171,7 @@ class Machine:
     connections: tuple[Connection, ...]
     states: tuple[State, ...]
     requests: tuple[str, ...]
-    edges: tuple[Edge, ...]
+    edges: tuple[Edge, ...]  # those of a state in falling priority
     channels: tuple[Channel, ...]
     program: Program
     sources: tuple[SourceFile, ...] = dataclass_field(default=())  # algorithm files, in JSON order
@@ -244,6 +244,20 @@ class Machine:
         return any(e.after_ticks for e in self.edges) or any(
             c.source.is_of_machine("ticks_in_state") for c in self.connections
         )
+
+    @cached_property
+    def preferred(self) -> dict[int, tuple[int, ...]]:
+        """For each edge that can lose its request: the edges that are taken instead. They are of the same state, with a
+        larger priority, another target and another request."""
+        found: dict[int, tuple[int, ...]] = {}
+        for source in range(len(self.states)):
+            before: list[tuple[int, Edge]] = []
+            for n, edge in ((n, e) for n, e in enumerate(self.edges) if e.source == source):
+                others = [i for i, e in before if e.target != edge.target and e.request != edge.request]
+                if others and edge.request >= 0:
+                    found[n] = tuple(others)
+                before.append((n, edge))
+        return found
 
     @cached_property
     def last_runs(self) -> frozenset[int]:

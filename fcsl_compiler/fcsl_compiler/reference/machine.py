@@ -208,12 +208,13 @@ class _Sensor:
 
 
 class _State:
-    """What a tick of a state does: entries in order, and edges, the highest priority first."""
+    """What a tick of a state does: entries in order, and numbered edges, the highest priority first."""
 
     def __init__(self, number: int, state: State, edges: Sequence[Edge], instances: Sequence[_Instance]):
         self.scheduled = frozenset(entry.instance for entry in state.entries)
         self.divisors = {entry.instance: entry.divisor for entry in state.entries}
-        self.edges = sorted((e for e in edges if e.source == number), key=lambda e: e.priority, reverse=True)
+        here = ((n, e) for n, e in enumerate(edges) if e.source == number)
+        self.edges = sorted(here, key=lambda numbered: numbered[1].priority, reverse=True)
         self._entries = [(entry.instance, entry.divisor, entry.phase) for entry in state.entries]
         at_once = all(divisor == 1 for divisor in self.divisors.values())
         self._always = [entry.instance for entry in state.entries] if at_once else None
@@ -251,6 +252,7 @@ class ReferenceMachine:
         self.places, self.movers = FaultPlaces(places, machine.sources), Movers(layout, machine.requests)
         self._image = Image(bytearray())
         self._tick, self._ticks_in_state = _cell("machine.tick", layout, 8), _optional("machine.ticks_in_state", layout)
+        self._lost_requests = _optional("machine.lost_requests", layout)
         self._state, self._next = (_cell(f"machine.{name}", layout, 4) for name in ("state", "next_state"))
         self._current = _cell("machine.current", layout, 4)
         config = json.loads(machine.config.text)
@@ -514,10 +516,17 @@ class ReferenceMachine:
                 image.words[instance.health] = _DEGRADED
 
     def _arbitrate(self, image: Image, state: _State, due: list[int]) -> None:
-        """Latches the target of the true edge with the highest priority."""
-        for edge in state.edges:
+        """Latches the target of the true edge with the highest priority. Requests of the others for another state are
+        lost, and counted."""
+        for rank, (_, edge) in enumerate(state.edges):
             if self._holds(image, edge, due):
                 image.words[self._next] = edge.target
+                for number, other in state.edges[rank + 1 :]:
+                    asks = other.request >= 0 and other.request != edge.request and other.target != edge.target
+                    if asks and self._holds(image, other, due):
+                        assert self._lost_requests is not None
+                        at = self._lost_requests + number
+                        image.longs[at] = image.longs[at] + 1 & _LONG
                 return
 
     def _holds(self, image: Image, edge: Edge, due: list[int]) -> bool:

@@ -55,7 +55,7 @@ typedef enum {
 } fcsl_health_t;
 
 typedef enum {
-    FCSL_ROLE_MACHINE = 0,   /* machine.tick, machine.state, machine.next_state, machine.ticks_in_state */
+    FCSL_ROLE_MACHINE = 0,   /* machine.tick|state|next_state|ticks_in_state|lost_requests (u64[transition_count]) */
     FCSL_ROLE_INPUT = 1,     /* <instance>.inputs.<field> */
     FCSL_ROLE_OUTPUT = 2,    /* <instance>.outputs.<field>, transition_request and health included */
     FCSL_ROLE_PARAMETER = 3, /* <instance>.parameters.<field> */

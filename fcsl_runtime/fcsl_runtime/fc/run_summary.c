@@ -10,6 +10,7 @@
 
 #include "summary_file.h"
 #include "log.h"
+#include "lost_requests.h"
 
 enum { CLIENTS_BYTES = 128, HAL_BYTES = 1024 };
 
@@ -66,6 +67,16 @@ static void report_hal(const loop_t *loop, const uint8_t *data)
     }
 }
 
+/* One line for each transition that has lost requests. */
+static void report_lost_requests(const fcsl_machine_t *machine, const uint8_t *data)
+{
+    uint32_t next = 0;
+    lost_request_t lost;
+    while (lost_request_next(machine, data, &next, &lost)) {
+        log_info("lost requests: %s %" PRIu64, lost.name, lost.count);
+    }
+}
+
 /* `data` is what was published after the last tick. */
 static void report_counters(const loop_t *loop, const uint8_t *data)
 {
@@ -88,6 +99,7 @@ static void report_counters(const loop_t *loop, const uint8_t *data)
              fcsl_tick_stats_get(&stats->ticks_skipped), fcsl_tick_stats_get(&stats->watchdog_trips), faults, overruns,
              fcsl_tick_stats_get(&stats->hardware_failures), fcsl_tick_stats_get(&stats->messages_refused),
              fcsl_tick_stats_get(&stats->records_dropped), clients);
+    report_lost_requests(fcsl_run_machine(loop->run), data);
     if (loop->telemetry != NULL) {
         report_telemetry(loop->telemetry);
     }

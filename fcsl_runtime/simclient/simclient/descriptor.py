@@ -5,6 +5,7 @@ from __future__ import annotations
 
 import ctypes
 import math
+from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Any
 
@@ -142,6 +143,9 @@ class Transition:
     guard_health: tuple[str, ...]
     after_ticks: int
 
+    def __str__(self) -> str:
+        return f"{self.source} -> {self.target}" + (f": {self.request}" if self.request else "")
+
 
 @dataclass(frozen=True)
 class FaultPlace:
@@ -193,6 +197,14 @@ class Machine:
     def fault_place(self, number: int) -> FaultPlace | None:
         """The place that a value of `counters.fault_place` means; None for 0 (no fault so far) and for unknown numbers."""
         return self.fault_places[number - 1] if 0 < number <= len(self.fault_places) else None
+
+    def named_lost_requests(self, counts: Sequence[int]) -> dict[str, int]:
+        """What `machine.lost_requests` counts, by transition, without the zeros: {"HOVER -> SAFE: ABORT": 1}."""
+        named: dict[str, int] = {}
+        for transition, count in zip(self.transitions, counts, strict=False):
+            if count:
+                named[str(transition)] = named.get(str(transition), 0) + count
+        return named
 
     def time_ns(self, tick: int) -> int:
         """Time of tick `tick` in ns: floor(tick * 1e9 / tick_hz)."""

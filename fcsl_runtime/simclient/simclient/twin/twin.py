@@ -200,6 +200,14 @@ class Twin(TwinFaults):
             raise TwinError(f"`{state}` is not a state{did_you_mean(str(state), self.machine.states)}; states: {shown}")
         self._do("set_state", self.machine.states.index(state))
 
+    def lost_requests(self) -> dict[str, int]:
+        """How many requests each transition has lost because another one was taken: {"HOVER -> SAFE: ABORT": 1}.
+        Transitions that have lost none are left out.
+        """
+        path = "machine.lost_requests"
+        counts = self.get_value(path) if path in self.machine.fields else []
+        return self.machine.named_lost_requests(counts) if counts else {}
+
     def snapshot(self) -> Snapshot:
         """All current values, to compare with another snapshot (snapshot.py)."""
         from .snapshot import Snapshot
