@@ -377,6 +377,9 @@ ALGORITHMS: dict[str, str] = {
     "E302 an argument twice": GOOD + "def f(a: f64, a: f64) -> f64:\n    return a\n",
     "E307 a message's own": GOOD.replace('"b": "bool"', '"tick": "bool"'),
     "E307 a message's header": GOOD.replace('"b": "bool"', '"header": "bool"'),
+    "E424 in the library": LEAN.replace(
+        "    def execute", '    state = {"a": "f64[256][256]"}\n\n    def execute'
+    ).replace("self.y =", "self.a = matmul(self.a, self.a)\n        self.y ="),
     "W307 a ring": LEAN.replace(
         "    def execute", '    state = {"ring": "f64[9][100]", "at": "i32"}\n\n    def execute'
     ).replace("self.y =", "self.ring[self.at, 0] = self.x\n        self.at = 7\n        self.y ="),

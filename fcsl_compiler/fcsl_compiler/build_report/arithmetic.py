@@ -3,7 +3,8 @@
 
 from __future__ import annotations
 
-from .values import WORD, Value, minus, plus, signed
+from .bases import Aligned, Between
+from .values import WORD, Value, greatest, minus, plus, signed
 
 
 def binary(name: str, a: Value, b: Value, bits: int) -> Value:
@@ -14,11 +15,13 @@ def binary(name: str, a: Value, b: Value, bits: int) -> Value:
         return minus(a, b, bits)
     if name == "and" and ("", 0) in (a, b):
         return ("", 0)
-    if name == "and" and a is not None and a[0] in ("rsp", "rdi") and b == ("", WORD - 7):
-        # On entry the stack pointer is a multiple of 8 (System V ABI). So is the machine, which contains its 64-bit
-        # tick.
-        return (a[0], a[1] & ~7)
-    if a is None or b is None or a[0] != "" or b[0] != "":
+    if a is None or b is None:
+        return None
+    if name == "and" and b[0] == "" and bits == 64 and a[0] != "":
+        return _aligned(a, WORD + 1 - b[1])
+    if name == "shr" and b[0] == "" and isinstance(a[0], Between):
+        return _shifted(a, b[1] & (63 if bits == 64 else 31))
+    if a[0] != "" or b[0] != "":
         return a if name in ("and", "or") and a == b else None
     x, y, mask = a[1], b[1], (1 << bits) - 1
     count = y & (63 if bits == 64 else 31)
@@ -34,3 +37,22 @@ def binary(name: str, a: Value, b: Value, bits: int) -> Value:
     if name in ("and", "or", "xor"):
         return ("", {"and": x & y, "or": x | y, "xor": x ^ y}[name] & mask)
     return None
+
+
+def _aligned(address: tuple[object, int], step: int) -> Value:
+    """An address without its lowest bits: the greatest multiple of `step` up to it."""
+    base, at = address
+    if step & (step - 1) or not isinstance(base, str) or base in ("byte", "low"):
+        return None
+    if base == "rsp":
+        return (base, at & -step) if step <= 8 else None  # on entry a multiple of 8 (System V ABI)
+    return (Aligned(base, at, step), 0)
+
+
+def _shifted(value: tuple[object, int], count: int) -> Value:
+    most = greatest(value)
+    if most is None:
+        return None
+    low = value[1] >> count
+    spread = (most >> count) - low
+    return (Between(("shifted", value, count), spread), low) if spread else ("", low)

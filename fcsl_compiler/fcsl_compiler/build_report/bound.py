@@ -20,7 +20,7 @@ from .objects import Address, Instruction, ObjectFile
 from .operands import REGISTERS
 from .paths import Block, Loop, Region, Unbounded, blocks_from, blocks_of, callee, region_of
 from .semantics import Decoder
-from .values import CALLER_SAVED, NAMES, Cell, State, Value, decide, number
+from .values import CALLER_SAVED, NAMES, Cell, State, Value, decide, greatest, number
 
 #: Maximum number of blocks executed for one bound (some seconds).
 _MOST_BLOCKS = 200_000
@@ -255,12 +255,12 @@ def _repeating(effect: Effect | None) -> Calling:
     """A string instruction counts once for each repetition."""
 
     def run(s: State) -> int:
-        turns = s.registers[NAMES.index("rcx")]
-        if turns is None or turns[0] != "":
+        most = greatest(s.registers[NAMES.index("rcx")])
+        if most is None:
             raise Unbounded("a repeated string instruction of unknown length")
         if effect is not None:
             effect(s)
-        return max(turns[1], 1)
+        return max(most, 1)
 
     return run
 

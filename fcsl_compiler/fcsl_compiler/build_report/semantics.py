@@ -78,7 +78,9 @@ class Decoder(Operands):
                     write_word(s, v)
                     return
                 v = part(v, from_size * 8)
-                write(s, number(signed(v[1], from_size * 8)) if v is not None and with_sign else v)
+                if with_sign:
+                    v = number(signed(v[1], from_size * 8)) if v is not None and v[0] == "" else None
+                write(s, v)
 
             n = REGISTERS.get(i.operands[1][1:], (0, 0))[0]
 

@@ -2,13 +2,15 @@
 """Known values of a machine's registers, flags and memory at one point of its code.
 
 A value is (base, offset): a number if the base is "" (unsigned, 64 bits), else an address relative to the base ("rdi":
-the value of this register on entry; a section: its start). For registers only: "byte": only the lowest 8 bits are
-known; "low": all but these are known. None: unknown.
+the value of this register on entry; a section: its start; more in bases.py). For registers only: "byte": only the lowest 8
+bits are known; "low": all but these are known. None: unknown.
 """
 
 from __future__ import annotations
 
 from dataclasses import dataclass, field
+
+from .bases import Aligned, Between, Low
 
 Value = tuple[object, int] | None
 #: Base and offset of a value in memory.
@@ -101,9 +103,24 @@ def part(value: Value, bits: int) -> Value:
     """The lowest bits, zero-extended."""
     if value is None or value[0] == "low":
         return None
-    if value[0] == "" or value[0] == "byte" and bits == 8:
-        return ("", value[1] & ((1 << bits) - 1))
-    return value if bits == 64 and value[0] != "byte" else None
+    base, lowest = value[0], value[1] & ((1 << bits) - 1)
+    if base == "" or base == "byte" and bits == 8:
+        return ("", lowest)
+    if isinstance(base, Between):
+        return (base, lowest) if bits == 64 or lowest + base.most < 1 << bits else None
+    if isinstance(base, Low):
+        return value if bits >= 32 else None
+    if base == "byte" or bits < 32:
+        return None
+    return value if bits == 64 else (Low(base), lowest)
+
+
+def greatest(value: Value) -> int | None:
+    """The greatest number that a value may be. None if it may be any."""
+    if value is None or value[0] != "" and not isinstance(value[0], Between):
+        return None
+    most = value[1] + (value[0].most if isinstance(value[0], Between) else 0)
+    return most if most <= WORD else None
 
 
 def signed(value: int, bits: int) -> int:
@@ -116,10 +133,14 @@ def plus(a: Value, b: Value, bits: int = 64) -> Value:
         return None
     if a[0] == "" and b[0] == "":
         return ("", (a[1] + b[1]) & ((1 << bits) - 1))
-    if bits != 64 or "" not in (a[0], b[0]):
+    if "" not in (a[0], b[0]):
         return _table_entry(a, b)
-    pointer, distance = (a, b) if b[0] == "" else (b, a)
-    return (pointer[0], pointer[1] + signed(distance[1], 64)) if pointer[0] != "byte" else None
+    (base, offset), distance = (a, b[1]) if b[0] == "" else (b, a[1])
+    if isinstance(base, Between):
+        return part((base, offset + distance), bits)
+    if isinstance(base, Low) or bits != 64:
+        return part((base, offset + distance), bits) if isinstance(base, Low) and bits == 32 else None
+    return (base, offset + signed(distance, 64)) if base != "byte" else None
 
 
 def _table_entry(a: Value, b: Value) -> Value:
@@ -137,11 +158,17 @@ def minus(a: Value, b: Value, bits: int = 64) -> Value:
         return None
     if a[0] == "" and b[0] == "":
         return ("", (a[1] - b[1]) & ((1 << bits) - 1))
+    if b[0] == "":
+        return plus(a, number(-b[1]), bits)
+    if isinstance(a[0], Low) and isinstance(b[0], Low):
+        return part(minus((a[0].base, a[1]), (b[0].base, b[1])), 32) if bits == 32 else None
     if bits != 64 or "byte" in (a[0], b[0]):
         return None
     if a[0] == b[0]:
         return number(a[1] - b[1])
-    return (a[0], a[1] - signed(b[1], 64)) if b[0] == "" else None
+    if isinstance(b[0], Aligned) and b[0].base == a[0]:
+        return part((Between(("beyond", b[0]), b[0].step - 1), a[1] - b[0].at - b[1]), 64)
+    return None
 
 
 def decide(condition: str, flags: Flags | None) -> bool | None:
@@ -159,7 +186,7 @@ def decide(condition: str, flags: Flags | None) -> bool | None:
         if condition in ("e", "s"):
             return left[1] == 0 if condition == "e" else signed(left[1], flags.bits) < 0
         return _of_test(condition, signed(left[1], flags.bits)) if not flags.is_result else None
-    if left[0] != flags.right[0] or left[0] == "byte":
+    if left[0] != flags.right[0] or left[0] == "byte" or isinstance(left[0], (Between, Low)):
         return None
     return _of_comparison(condition, left, flags.right[1], flags.bits)
 

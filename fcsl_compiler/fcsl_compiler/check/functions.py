@@ -12,7 +12,7 @@ import re
 from collections.abc import Mapping
 from functools import cache
 
-from ..base.diagnostics import DiagnosticError, DiagnosticSink
+from ..base.diagnostics import DiagnosticSink
 from ..base.source import SourceFile, Span
 from ..model import ir
 from ..model.program import Program
@@ -174,17 +174,32 @@ class FunctionTable:
             if problem:
                 self.sink.error("E418", f"`{name}`: {problem}", argument.span, help=shown)
                 return None
-        declarations = library()[node.name][0]
         unique = "_".join([LIBRARY_PREFIX, node.name, *map(str, binding.sizes.values())])
-        if unique not in self.program.functions:
-            table = FunctionTable(declarations, self.program, self.sink)
-            function = check_function(declarations, node, unique, binding.sizes, table, self.sink)
-            if function is None:
-                raise DiagnosticError(self.sink.diagnostics)  # the library itself has an error
-            self.program.functions[unique] = function
-        function = self.program.functions[unique]
+        function = self.program.functions.get(unique) or self._sized(name, node, unique, binding.sizes, span)
+        if function is None:
+            return None
+        self.program.functions[unique] = function
         assert function.result
         return Signature(unique, tuple(t for _, t in function.arguments), function.result, function.faults)
+
+    def _sized(
+        self, name: str, node: ast.FunctionDef, unique: str, sizes: dict[str, int], span: Span
+    ) -> ir.Function | None:
+        """A library function for these sizes. Returns None after reporting that they are too large: the mistake is the
+        call in the user's file, whichever line of the library finds it."""
+        declarations = library()[node.name][0]
+        if self.declarations.owner == LIBRARY_PREFIX:
+            table = FunctionTable(declarations, self.program, self.sink)
+            return check_function(declarations, node, unique, sizes, table, self.sink)
+        sink = DiagnosticSink()
+        table = FunctionTable(declarations, self.program, sink)
+        function = check_function(declarations, node, unique, sizes, table, sink)
+        if function is None:
+            found = sink.diagnostics[0]
+            notes = [(found.span, "here, for arguments of these sizes")]
+            fix = "use smaller arrays; for a large product, a loop over some of its rows in each tick"
+            self.sink.error(found.code, f"`{name}`: {found.message}", span, why=found.why, help=fix, notes=notes)
+        return function
 
 
 class _Binding:
