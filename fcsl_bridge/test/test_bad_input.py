@@ -69,7 +69,9 @@ def test_bad_parameter(domain: Domain, executable: str, parameters: dict[str, An
     process = domain.start(executable, **parameters)
     assert process.finish() == 1
     # A controller's node is called like its machine, once that is known.
-    assert re.search(rf"({executable}: error|{executable}\]|lander_control\]): ", process.err) and message in process.err
+    assert (
+        re.search(rf"({executable}: error|{executable}\]|lander_control\]): ", process.err) and message in process.err
+    )
 
 
 def test_bad_simulation(domain: Domain, tmp_path: Path) -> None:
