@@ -133,12 +133,12 @@ int64_t fcsl_run_step_once(fcsl_run_t *run, fcsl_error_t *error);
 /* A sample, or the value of a field, and when it is delivered. The scalars of a sample are as fcsl_run_write_channel takes
  * them, those of a field as fcsl_run_set does. */
 typedef struct {
-    uint64_t tick;      /* the first tick that sees it */
+    uint64_t tick; /* the first tick that sees it */
     int64_t stamp_ns;
-    uint32_t channel;   /* FCSL_NO_CHANNEL: a value of `field` */
+    uint32_t channel; /* FCSL_NO_CHANNEL: a value of `field` */
     uint32_t age_ticks; /* in that tick */
-    uint64_t payload;   /* where its scalars begin */
-    uint32_t field;     /* these three of values of fields alone */
+    uint64_t payload; /* where its scalars begin */
+    uint32_t field; /* these three of values of fields alone */
     uint32_t element;
     uint32_t size;
 } fcsl_sample_t;
@@ -168,11 +168,11 @@ int fcsl_run_feed_series(fcsl_run_t *run, fcsl_series_t *series, uint32_t count,
 /* What a host did, as recorded on /<ns>/<machine>/record/writes (fcsl_msgs/HostWrite) at the tick that is the first to see
  * it: doing the same again before that tick reproduces the run. `data` is little-endian with canonical NaNs. */
 typedef enum {
-    FCSL_WRITE_SET = 0,       /* path: a field; element: its first scalar; data: the scalars */
+    FCSL_WRITE_SET = 0, /* path: a field; element: its first scalar; data: the scalars */
     FCSL_WRITE_SET_STATE = 1, /* path: the state */
-    FCSL_WRITE_RESTORE = 2,   /* data: the machine struct */
-    FCSL_WRITE_CHANNEL = 3,   /* path: a sensor channel; data: its sample; age_ticks, stamp_ns: of the sample */
-    FCSL_WRITE_OVERRUN = 4,   /* path: an instance; injected, or found by the clock in that very tick */
+    FCSL_WRITE_RESTORE = 2, /* data: the machine struct */
+    FCSL_WRITE_CHANNEL = 3, /* path: a sensor channel; data: its sample; age_ticks, stamp_ns: of the sample */
+    FCSL_WRITE_OVERRUN = 4, /* path: an instance; injected, or found by the clock in that very tick */
     /* path: a sensor channel, or empty for all; one that precedes the record shows in its checkpoint instead */
     FCSL_WRITE_ATTACH = 5,
     /* path: an instance that reads hardware or calls externs; data: its outputs, state and count of faults as its execute
