@@ -1,4 +1,7 @@
-/* SPDX-License-Identifier: Apache-2.0 */
+/* SPDX-License-Identifier: Apache-2.0
+ *
+ * Asks the C library where the stack of the calling thread ends.
+ */
 #define _GNU_SOURCE /* pthread_getattr_np */
 #include "stack_left.h"
 
