@@ -43,7 +43,8 @@ def check_algorithm(
     for helper in _reached(execute, start, table):
         requests.update({n: s for n, s in helper.requests if n not in requests})
     ports = {record: tuple(ports) for record, ports in found.ports.items()}
-    warn_copies(execute, ports, sink)
+    if complete:
+        warn_copies(execute, ports, sink)
     return ir.Algorithm(
         name,
         declarations.source.name,

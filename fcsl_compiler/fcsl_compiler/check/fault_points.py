@@ -31,8 +31,10 @@ def warn_copies(found: ir.Function, ports: Mapping[str, Sequence[ir.Port]], sink
     places = _places(found)
     for record in ("outputs", "state"):
         for port in ports[record]:
+            if (record, port.name) not in places:
+                continue
             size = sum(count_of(leaf.type) * scalar_of(leaf.type).size for leaf in leaves(port.type))
-            if (record, port.name) not in places or size <= _LARGE_BYTES:
+            if size <= _LARGE_BYTES:
                 continue
             message = (
                 f"each run copies the {size} bytes of `{port.name}`, so that a fault can undo what is written to it"
