@@ -126,7 +126,11 @@ static void test_damage(void)
     REFUSED(channels[1].field = 99, "channel 1");
     REFUSED(channels[1].id = channels[0].id, "channel 1");
     REFUSED(channels[1].id = FCSL_RESERVED_ID_FIRST, "channel 1");
-    REFUSED(channels[1].direction = 2, "channel 1");
+    REFUSED(channels[1].direction = FCSL_REPORT + 1, "channel 1");
+    static const double safe = 0.0;
+    REFUSED((channels[2].direction = FCSL_REPORT, channels[2].safe = &safe),
+            "channel 2"); /* nothing makes a report safe */
+    REFUSED(channels[1].waiting_offset = FCSL_NO_OFFSET, "channel 1");
     REFUSED(channels[1].fresh_offset = FCSL_NO_OFFSET, "channel 1");
     REFUSED(channels[1].sample_age_offset = machine.size - 2, "channel 1");
     REFUSED(channels[1].stamp_offset = 4, "channel 1");
