@@ -17,6 +17,7 @@ import pytest
 import rig
 from bridge_harness import LIMIT_S, MACHINE, SIM, Domain, Process
 from rosbags.highlevel import AnyReader
+from rosbags.typesys import Stores, get_typestore
 
 from fcsl_bridge import start
 from fcsl_bridge.machine_index import find_machine
@@ -42,7 +43,8 @@ def tool(*arguments: str | Path) -> subprocess.CompletedProcess[str]:
 
 
 def messages_for_rosbags(bag: Path) -> int:
-    with AnyReader([bag]) as reader:
+    # A recording in which nothing was written yet has no types.
+    with AnyReader([bag], default_typestore=get_typestore(Stores.EMPTY)) as reader:
         return sum(1 for _ in reader.messages())
 
 
