@@ -4,6 +4,7 @@
 from __future__ import annotations
 
 import csv
+import json
 import math
 import os
 import random
@@ -19,6 +20,7 @@ from foreign_bags import ROS2_FORMATS, header, imu, make
 from foreign_bags import write as write_foreign
 from hypothesis import example, given, settings
 from hypothesis import strategies as st
+from native import PROGRAM
 from rosbags.highlevel import AnyReader
 from rosbags.rosbag2 import StoragePlugin, Writer
 from rosbags.rosbag2.enums import CompressionFormat
@@ -439,3 +441,26 @@ def test_damage_anywhere_is_a_message_or_a_result(fly: Fly, tmp_path: Path) -> N
                 outcomes["refused"] += 1
     assert all(outcomes.values()), outcomes
     assert not [p for p in tmp_path.iterdir() if p.name.startswith(".")]
+
+
+def test_outputs_with_capitals_are_found_by_their_own_names(tmp_path: Path) -> None:
+    """A bag has them in lower case."""
+    (tmp_path / "law.py").write_text(
+        'class Law:\n    outputs = {"P": "f64[2]", "qDot": "f64"}\n\n    def execute(self):\n'
+        "        self.P[1] = self.P[1] + 1.0\n        self.qDot = self.P[1] * 2.0\n"
+    )
+    config = {
+        "tick_hz": 100,
+        "initial_state": "RUN",
+        "algorithms": {"Law": {"source": "law.py"}},
+        "instances": {"law": {"algorithm": "Law"}},
+        "states": {"RUN": {"schedule": {"law": 100}}},
+    }
+    (tmp_path / "m.json").write_text(json.dumps(config))
+    subprocess.run(["fcslc", "build", tmp_path / "m.json", "-o", tmp_path], check=True, capture_output=True)
+    line = [PROGRAM, tmp_path / "libm.so", "--ticks", "3", "--record", tmp_path / "bag"]
+    subprocess.run(line, check=True, capture_output=True)
+    bag = Bag(tmp_path / "bag")
+    found = {name: list(column) for one in select(bag, ["law.outputs.P", "law.outputs.qDot"]).series
+             for name, column in one.columns.items()}  # fmt: skip
+    assert found["law.outputs.qdot"] == [2.0, 4.0, 6.0] and len(found) == 2

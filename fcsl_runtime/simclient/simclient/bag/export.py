@@ -21,6 +21,8 @@ from typing import Any
 
 import numpy as np
 
+from fcsl_compiler.model.ros_names import recorded_path
+
 from ..cli import Progress
 from ..complete_output import check_target, complete_or_absent
 from ..errors import BagError, did_you_mean
@@ -151,7 +153,7 @@ def select(bag: Bag, patterns: Sequence[str] = (), machine: str = "", time: str 
     Without patterns: all topics of the machine and its plant, or of a foreign bag, all topics. All chosen columns are
     held in memory. `time` chooses the clock (stamps.Clock). Raises BagError when nothing matches.
     """
-    prefixes = _prefixes(bag, machine)
+    prefixes, patterns = _prefixes(bag, machine), [recorded_path(pattern) for pattern in patterns]
     collectors = {topic: _Collector(bag, topic, prefix, patterns) for topic, prefix in prefixes.items()
                   if not patterns or _may_match(topic, prefix, patterns)}  # fmt: skip
     clock = Clock(bag, collectors, time)

@@ -10,6 +10,8 @@ from dataclasses import dataclass, field
 from fnmatch import fnmatchcase
 from itertools import product
 
+from fcsl_compiler.model.ros_names import recorded_path
+
 from ..ros.cdr import Layout
 
 #: A declaration of a generated message, whose comment may begin with a unit: `float64 pos_z # [m] …`.
@@ -138,7 +140,7 @@ class Catalogue:
 
         A shell pattern selects health and request of instances only where it selects nothing else.
         """
-        found = self.find(pattern)
+        found = self.find(pattern) or self.find(recorded_path(pattern))
         if found is not None:
             return [found]
         below = [value for path, value in self.values.items() if path.startswith((f"{pattern}.", f"{pattern}["))]
