@@ -45,7 +45,7 @@ def print_source(program: code.Program, prelude: str, extensions: Mapping[str, S
     w.line("#include <fcsl/fcsl_exact_math.h>")
     w.line("#include <fcsl/fcsl_math.h>")
     for header in program.headers:
-        w.line(f"#include <{header}>")  # not the file of this name beside this one, which is the machine's
+        w.line(include_of(program, header))
     w.line()
     if prelude:
         w.block(prelude)
@@ -71,6 +71,12 @@ def print_source(program: code.Program, prelude: str, extensions: Mapping[str, S
         w.line()
     w.paste((functions.lines, functions.origins))
     return w
+
+
+def include_of(program: code.Program, header: str) -> str:
+    """The line that includes the header of an extern. If it is called like the machine, the file of this name beside the
+    source is the machine's own."""
+    return f"#include <{header}>" if header == f"{program.name}.h" else f'#include "{header}"'
 
 
 def print_record(w: CWriter, record: code.Record) -> None:

@@ -12,7 +12,7 @@ from ...model.effects import HARDWARE
 from ...model.ir import HARDWARE_HEADER
 from ...model.types import Scalar
 from ..c.header import header_guard
-from ..c.source import PRAGMAS, print_externs, print_record
+from ..c.source import PRAGMAS, include_of, print_externs, print_record
 from ..c.writer import CWriter
 from .expressions import Module
 from .statements import NimStatements, print_table
@@ -119,7 +119,7 @@ def print_module(program: code.Program, print_descriptor: Callable[[CWriter], No
         for record in (r for r in program.records if r.like):
             print_record(data, record)
     for header in program.headers:
-        data.line(f"#include <{header}>")  # not a machine's of the same name
+        data.line(include_of(program, header))
     print_externs(program, data)
     print_descriptor(data)
     _emit(w, "/*VARSECTION*/\n" + data.text())
