@@ -36,7 +36,7 @@ DEFECTS = (
     defect("a message shorter than its head is read", CHECK, "size < head_bytes(kind) + CRC_BYTES", "size < CRC_BYTES",
            (12, 12)),
     defect("bytes that change after the check are believed", CHECK,
-           "    if (values == NULL) {\n        return;\n    }\n", ""),
+           "values == NULL || is_no_rotation", "values != NULL && is_no_rotation"),
     defect("values are stored beside their field", CHECK, "scalars_import(data + field->offset,",
            "scalars_import(data + field->offset + 1,"),
     defect("no room is kept for the CRC", ENCODE, "*at < size + CRC_BYTES", "*at < size"),
