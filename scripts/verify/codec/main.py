@@ -4,7 +4,7 @@
 
     python3 scripts/verify codec
 
-program.c hands them any bytes of every size up to 40, and frames of the largest size; its memory ends where the bytes end.
+program.c hands them any bytes of every size up to 44, and frames of the largest size; its memory ends where the bytes end.
 There must be no alarm, and what it asserts must hold.
 """
 
@@ -24,7 +24,7 @@ PROOF = Proof(
 )
 
 
-def defect(what: str, file: str, old: str, new: str, sizes: tuple[int, int] = (40, 40)) -> Defect:
+def defect(what: str, file: str, old: str, new: str, sizes: tuple[int, int] = (44, 44)) -> Defect:
     """EVA must find it with bytes of these sizes."""
     return Defect(what, file, old, new, (f"-DSMALLEST={sizes[0]}", f"-DLARGEST={sizes[1]}"))
 

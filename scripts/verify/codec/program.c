@@ -14,7 +14,7 @@
 #define SMALLEST 0
 #endif
 #ifndef LARGEST
-#define LARGEST 40
+#define LARGEST 44
 #endif
 enum { STREAM_MAX = 12 }; /* in one piece */
 
@@ -22,15 +22,15 @@ volatile uint8_t any_u8;
 volatile uint32_t any_u32;
 
 /* A channel of every way in which values are read, checked and stored. Nothing writes what lies between the fields. */
-enum { GAPS = 12, GAP_BYTES = 8 };
+enum { GAPS = 13, GAP_BYTES = 8 };
 typedef struct {
     uint8_t flags[3];
     uint8_t gap0[GAP_BYTES];
-    uint8_t fresh[7];
+    uint8_t fresh[10];
     uint8_t gap1[GAP_BYTES];
-    uint32_t age[7];
+    uint32_t age[10];
     uint8_t gap2[GAP_BYTES];
-    int64_t stamp[7];
+    int64_t stamp[10];
     uint8_t gap3[GAP_BYTES];
     int32_t health;
     uint8_t gap4[GAP_BYTES];
@@ -48,6 +48,8 @@ typedef struct {
     uint8_t gap8[GAP_BYTES];
     uint8_t enable;
     uint8_t gap9[GAP_BYTES];
+    float attitude[4];
+    uint8_t gap12[GAP_BYTES];
 } data_t;
 
 #define FIELD(type_, member_, count_, rank_)                                                                           \
@@ -80,11 +82,13 @@ static const fcsl_field_t FIELDS[] = {
     FIELD(FCSL_BOOL, flags, 3, 1),   FIELD(FCSL_HEALTH, health, 1, 0), FIELD(FCSL_F32, rate, 3, 1),
     FIELD(FCSL_F64, position, 1, 1), FIELD(FCSL_U64, count, 1, 0),     FIELD(FCSL_U32, packet, 4, 1),
     FIELD(FCSL_F32, command, 1, 1),  FIELD(FCSL_BOOL, enable, 1, 0),   FIELD(FCSL_U32, reply, 3, 1),
+    FIELD(FCSL_F32, attitude, 4, 1),
 };
-static const fcsl_channel_t CHANNELS[] = {
-    SENSOR(900, 0, FCSL_AS_FIELD), ACTUATOR(1, 6, FCSL_AS_FIELD), SENSOR(800, 1, FCSL_AS_FIELD),
-    SENSOR(3, 2, FCSL_AS_FIELD),   SENSOR(700, 3, FCSL_AS_FIELD), SENSOR(4, 4, FCSL_AS_FIELD),
-    SENSOR(5, 5, FCSL_AS_BLOB),    ACTUATOR(2, 7, FCSL_AS_FIELD), ACTUATOR(6, 8, FCSL_AS_BLOB)};
+static const fcsl_channel_t CHANNELS[] = {SENSOR(900, 0, FCSL_AS_FIELD), ACTUATOR(1, 6, FCSL_AS_FIELD),
+                                          SENSOR(800, 1, FCSL_AS_FIELD), SENSOR(3, 2, FCSL_AS_FIELD),
+                                          SENSOR(700, 3, FCSL_AS_FIELD), SENSOR(4, 4, FCSL_AS_FIELD),
+                                          SENSOR(5, 5, FCSL_AS_BLOB),    ACTUATOR(2, 7, FCSL_AS_FIELD),
+                                          ACTUATOR(6, 8, FCSL_AS_BLOB),  SENSOR(7, 9, FCSL_AS_QUATERNION)};
 enum { CHANNEL_COUNT = sizeof CHANNELS / sizeof CHANNELS[0] };
 static const fcsl_machine_t MACHINE = {
     .name = "any",
@@ -108,9 +112,9 @@ static void any_bytes(uint8_t *bytes, size_t size)
 
 static void check_gaps(void)
 {
-    const uint8_t *const gaps[GAPS] = {received.gap0, received.gap1, received.gap2,  received.gap3,
-                                       received.gap4, received.gap5, received.gap6,  received.gap7,
-                                       received.gap8, received.gap9, received.gap10, received.gap11};
+    const uint8_t *const gaps[GAPS] = {received.gap0,  received.gap1,  received.gap2, received.gap3, received.gap4,
+                                       received.gap5,  received.gap6,  received.gap7, received.gap8, received.gap9,
+                                       received.gap10, received.gap11, received.gap12};
     for (int i = 0; i < GAPS; i++) {
         for (int j = 0; j < GAP_BYTES; j++) {
             //@ assert gaps[i][j] == 0;

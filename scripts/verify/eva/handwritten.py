@@ -22,7 +22,7 @@ from .run import LIMIT_S, count_alarms, statements, unproven
 _OPTIONS = (
     *("-machdep", "gcc_x86_64", "-kernel-warn-key", "parser:decimal-float=inactive"),
     *("-eva", "-eva-precision", "0", "-eva-msg-key=-initial-state,-final-states"),
-    *("-eva-auto-loop-unroll", "260", "-eva-min-loop-unroll", "8", "-eva-no-builtins-auto", "-eva-builtin"),
+    *("-eva-auto-loop-unroll", "260", "-eva-min-loop-unroll", "10", "-eva-no-builtins-auto", "-eva-builtin"),
     ",".join(f"{name}:Frama_C_{name}" for name in ("memcpy", "memset", "memchr", "memmove")),
     *("-warn-special-float", "none", "-warn-right-shift-negative", "-warn-invalid-pointer"),
     "-eva-warn-pointer-subtraction",
