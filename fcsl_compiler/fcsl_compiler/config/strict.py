@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""`--strict`: requires explicit values that are otherwise optional."""
+"""`--strict`: requires explicit values that are otherwise optional, and warns about requests that circle."""
 
 from __future__ import annotations
 
@@ -7,9 +7,15 @@ from ..base.diagnostics import DiagnosticSink
 from ..model import ir
 from ..model.machine import Machine
 from ..model.types import BOOL, HEALTH, REQUEST, Array, Scalar, Struct, Type
+from .circling_requests import warn_circling_requests
 
 
 def check_strict(machine: Machine, sink: DiagnosticSink) -> None:
+    _check_open_inputs(machine, sink)
+    warn_circling_requests(machine, sink)
+
+
+def _check_open_inputs(machine: Machine, sink: DiagnosticSink) -> None:
     """Reports E240 for every instance with an input that has no connection, no channel and no initial value."""
     fed = {(c.target.instance, c.target.field) for c in machine.connections}
     fed |= {(c.port.instance, c.port.field) for c in machine.channels if c.port.record == "inputs"}

@@ -745,4 +745,26 @@ MACHINE_CODES: dict[str, Code] = {
         '  {"from": "SAFE", "to": "COAST", "after_s": 0.1, "health": {"instance": "nav", "in": ["failed", "stale"]}}\n'
         "]",
     ),
+    "W214": Code(
+        "a request that leads round a circle of states",
+        "With --strict. The same request has transitions from one state to another and back, the instance that makes it "
+        "runs in both, and makes it by the level of its inputs: it keeps nothing from one run to the next. As long as an "
+        "input such as a switch lasts, the state then changes in each run of the instance. Make the request in one run "
+        "only, when the input changes, with its last value in `state`. Or use one request for each direction. There is "
+        "no warning if each of the transitions has an `after_s`.",
+        Kind.STRICT,
+        '"algorithms": {"Pilot": {"source": "pilot.py"}},\n'
+        '"instances": {"pilot": {"algorithm": "Pilot", "parameters": {"on_done": "ABORT"}}},\n'
+        '"connections": [],\n'
+        '"states": {"COAST": {"schedule": {"pilot": 100}}, "SAFE": {"schedule": {"pilot": 10}}},\n'
+        '"transitions": [\n'
+        '  {"from": "COAST", "to": "SAFE", "request": "ABORT"},\n'
+        '  {"from": "SAFE", "to": "COAST", "request": "ABORT"}\n'
+        "]",
+        '"algorithms": {"Pilot": {"source": "pilot.py"}},\n'
+        '"instances": {"pilot": {"algorithm": "Pilot", "parameters": {"on_done": "ABORT"}}},\n'
+        '"connections": [],\n'
+        '"states": {"COAST": {"schedule": {"pilot": 100}}, "SAFE": {"schedule": {"pilot": 10}}},\n'
+        '"transitions": [{"from": "COAST", "to": "SAFE", "request": "ABORT"}]',
+    ),
 }
