@@ -64,14 +64,14 @@ def field_table(machine: Machine) -> list[FieldRow]:
     if machine.counts_state_ticks:
         path, doc = "machine.ticks_in_state", "ticks completed since the state was entered"
         rows.append(FieldRow(path, "MACHINE", "FCSL_U64", (), (), 1, "ticks_in_state", "uint64_t", -1, "", doc))
-    if machine.preferred:
-        path, doc, n = "machine.lost_requests", "of each transition: requests lost to another one", len(machine.edges)
-        rows.append(FieldRow(path, "MACHINE", "FCSL_U64", (), (n,), n, "lost_requests", "uint64_t", -1, "", doc))
     for index, instance in enumerate(machine.instances):
         rows += _instance_rows(machine, index, instance)
     rows = [replace(r, doc=_opened(r, machine.left_out[r.path])) if r.path in machine.left_out else r for r in rows]
     for channel in sensors(machine):
         rows += _channel_rows(machine, channel)
+    if machine.preferred:
+        path, doc, n = "machine.lost_requests", "of each transition: requests lost to another one", len(machine.edges)
+        rows.append(FieldRow(path, "MACHINE", "FCSL_U64", (), (n,), n, "lost_requests", "uint64_t", -1, "", doc))
     return rows
 
 
