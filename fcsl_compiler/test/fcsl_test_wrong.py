@@ -382,7 +382,10 @@ ALGORITHMS: dict[str, str] = {
     ).replace("self.y =", "self.a = matmul(self.a, self.a)\n        self.y ="),
     "W307 a ring": LEAN.replace(
         "    def execute", '    state = {"ring": "f64[9][100]", "at": "i32"}\n\n    def execute'
-    ).replace("self.y =", "self.ring[self.at, 0] = self.x\n        self.at = 7\n        self.y ="),
+    ).replace(
+        "self.y =",
+        "for k in range(2):\n            self.ring[self.at, k] = self.x\n        self.at = 7\n        self.y =",
+    ),
     "E307 one field of a message": GOOD.replace('"b": "bool"', '"isOn": "bool", "ison": "bool"'),
     "E307 a word of C": GOOD.replace('"b": "bool"', '"float": "bool"'),
     "E307 two underscores": GOOD.replace('"b": "bool"', '"is__on": "bool"'),

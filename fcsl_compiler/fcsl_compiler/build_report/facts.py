@@ -8,6 +8,7 @@ from collections import Counter
 from dataclasses import replace
 from typing import Any
 
+from ..check.fault_points import rollback_bytes
 from ..emit.operations import KINDS, operations
 from ..model.machine import Connection, Entry, Machine, PortRef, State
 from .instruction_counts import COUNTS
@@ -49,6 +50,7 @@ def _instance(machine: Machine, n: int, code: MachineCode | None) -> Facts:
         "algorithm": instance.algorithm.name,
         "operations": _counts(operations(instance.execute, machine.program)),
         "record_bytes": code.layout.instances[n] if code else None,
+        "rollback_bytes": rollback_bytes(instance.execute, instance.algorithm.ports),
         "code_bytes": None,
         **_instructions(None),
         "math": [],

@@ -9,7 +9,7 @@ from ..driver.stack import LEAF_BYTES
 from ..emit.operations import KINDS
 from .facts import Facts
 
-_MEASURED = ("own_instructions", "usual_instructions", "instructions", "code_bytes", "record_bytes")
+_MEASURED = ("own_instructions", "usual_instructions", "instructions", "code_bytes", "record_bytes", "rollback_bytes")
 _SHORT = {"multiply": "mul", "divide": "div", "compare": "cmp", "convert": "conv", "branch": "br"}
 
 
@@ -48,6 +48,7 @@ def _instances(facts: Facts) -> list[str]:
             "worst math",
             "code B",
             "record B",
+            "rollback B",
             *(_SHORT.get(k, k) for k in KINDS),
             "functions",
         ]

@@ -28,6 +28,8 @@ class FunctionEmitter(ExprEmitter):
     ):
         super().__init__(function, machine, places)
         self.record_types, self.inlined = record_types, inlined
+        #: Locals that hold what a fault restores from here on.
+        self._remembered: set[str] = set()
 
     # ---- the function ----------------------------------------------------------------------------------------------
 
@@ -128,6 +130,8 @@ class FunctionEmitter(ExprEmitter):
                     expression(s.value)
 
         body(self.function.body)
+        for undo in self.function.undone:
+            expression(undo.before)
         return names
 
     def _statements(self, statements: tuple[ir.Stmt, ...]) -> None:
@@ -157,13 +161,18 @@ class FunctionEmitter(ExprEmitter):
             self.out.add(code.Break() if isinstance(s, ir.Break) else code.Continue())
 
     def _check_fault(self) -> None:
-        """Returns from the function if this statement faulted. The machine then restores outputs and state."""
+        """Returns from the function if this statement faulted. The machine then restores outputs and state, but for parts
+        that the function restores itself."""
         if self._fault:
             self._fault = False
             result = self.function.result
             value = zero(result) if isinstance(result, Scalar) else None
             faulted = code.Binary("!=", code.Deref(FAULT), code.Literal(0, U32))
-            self.out.add(code.If(faulted, (code.Return(value),)))
+            with self.out.nested() as restored:
+                for undo in reversed(self.function.undone):
+                    if undo.before.name in self._remembered:
+                        self._assign(ir.Assign(undo.part, undo.before, undo.part.span))
+            self.out.add(code.If(faulted, (*restored, code.Return(value))))
 
     def _if(self, s: ir.If) -> None:
         condition = self.scalar(s.condition)
@@ -219,6 +228,7 @@ class FunctionEmitter(ExprEmitter):
         else:
             self.into(self._destination(s.target), s.value)
         self._check_fault()
+        self._remembered |= {u.before.name for u in self.function.undone if u.before == s.target}
 
     def _effect(self, s: ir.Effect) -> None:
         operands = [*([HOST] if s.is_hardware else []), *map(self.operand, s.args)]

@@ -6,7 +6,7 @@ from __future__ import annotations
 from collections.abc import Iterator
 from dataclasses import replace
 
-from ..check.fault_points import written_before_fault
+from ..check.fault_points import PULSES, written_before_fault
 from ..model import code, ir
 from ..model.c_names import c_name
 from ..model.code import Call, Deref, Function, If, Member, Name, Set, Statement
@@ -206,34 +206,30 @@ class InstanceEmitter:
         return [*failed(self.m, _member("counters"), _output("health"), _output("transition_request"), place)]
 
     def _saved(self) -> tuple[list[Statement], list[Statement]]:
-        """Statements that save the fields that a fault must restore, and those that restore them. Pulses are reset
-        instead."""
+        """Statements that save the fields that a fault must restore, and those that restore them."""
         save: list[Statement] = []
         restore: list[Statement] = []
         written = written_before_fault(self.i.execute)
         for record in ("outputs", "state"):
-            ports = [
-                port
-                for port in self.i.algorithm.ports[record]
-                if (record, port.name) in written and not _is_pulse(record, port)
-            ]
+            fields = self.i.algorithm.ports[record]
+            ports = [port for port in fields if (record, port.name) in written]
             if not ports:
                 continue
-            type_, before = code.Named(record_type(self.m, self.i.algorithm, record)), Name(f"{record}_before")
-            if all(p in ports or _is_pulse(record, p) for p in self.i.algorithm.ports[record]):
-                save.append(code.Let(before.text, type_, _member(record)))
-                restore.append(Set(_member(record), before))
+            before = f"{record}_before"
+            if all(port in ports or (record, port.name) in PULSES for port in fields):
+                type_ = code.Named(record_type(self.m, self.i.algorithm, record))
+                save.append(code.Let(before, type_, _member(record)))
+                restore.append(Set(_member(record), Name(before)))
                 continue
-            save.append(code.Var(before.text, type_, zeroed=False))
             for port in ports:
-                save.append(self._copy(port, before, _member(record)))
-                restore.append(self._copy(port, _member(record), before))
+                field, held = _field(record, port), Name(f"{before}_{c_name(port.name)}")
+                of = code_type(self.m.name, port.type)
+                if isinstance(of, code.Block):
+                    save += [code.Var(held.text, of, zeroed=False), copied(held, field, of)]
+                else:
+                    save.append(code.Let(held.text, of, field))
+                restore.append(copied(field, held, of))
         return save, restore
-
-    def _copy(self, port: ir.Port, to: code.Place, source: code.Place) -> Statement:
-        """Copies one field between two records."""
-        name = c_name(port.name)
-        return copied(Member(to, name), Member(source, name), code_type(self.m.name, port.type))
 
     def _not_stale(self) -> list[Statement]:
         """A running instance is never stale. If a variable can set health to stale, it becomes failed."""
@@ -255,8 +251,3 @@ def _output(name: str) -> Member:
 
 def _field(record: str, port: ir.Port) -> Member:
     return Member(_member(record), c_name(port.name))
-
-
-def _is_pulse(record: str, port: ir.Port) -> bool:
-    """Whether the port is reset before each execute and by a fault."""
-    return record == "outputs" and port.name in ("transition_request", "health")

@@ -18,6 +18,7 @@ from .common_subexpressions import share_calls
 from .dead_stores import without_dead_stores
 from .short_triangles import taken, without_short_triangles
 from .structural_zeros import PRODUCTS, Constant, product
+from .undo import with_undo
 
 #: A sum with more non-zero elements than this becomes a loop over a table with a test.
 _WRITTEN_ELEMENTS = 128
@@ -30,7 +31,11 @@ def lower(machine: Machine) -> Machine:
     for name, function in program.functions.items():
         lowering.functions[name] = lowering.function(function)
     instances = tuple(
-        replace(i, execute=lowering.function(i.execute), start=None if i.start is None else lowering.function(i.start))
+        replace(
+            i,
+            execute=with_undo(lowering.function(i.execute)),
+            start=None if i.start is None else lowering.function(i.start),
+        )
         for i in machine.instances
     )
     return replace(machine, instances=instances, program=replace(program, functions=lowering.functions))

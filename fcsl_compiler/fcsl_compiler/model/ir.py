@@ -403,6 +403,15 @@ def writes(statements: tuple[Stmt, ...]) -> list[tuple[Place, Expr | None, Span]
 
 
 @dataclass(frozen=True)
+class Undo:
+    """What a fault restores in the function itself: a part of a field, with the local that holds its value from before the
+    write. Its indices are constants and locals."""
+
+    part: Place
+    before: Local
+
+
+@dataclass(frozen=True)
 class Function:
     """`execute`, `start`, a helper, or a library function at fixed sizes."""
 
@@ -418,6 +427,7 @@ class Function:
     span: Span
     requests: tuple[tuple[str, Span], ...] = ()  # every literal request, with its first use
     loop_parameters: tuple[tuple[str, Span], ...] = ()  # parameters that bound a loop and must be frozen
+    undone: tuple[Undo, ...] = ()  # in the order of the writes; made by lowering
 
     @property
     def uses_hardware(self) -> bool:

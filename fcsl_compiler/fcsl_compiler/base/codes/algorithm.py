@@ -582,22 +582,25 @@ ALGORITHM_CODES: dict[str, Code] = {
     ),
     "W307": Code(
         "a large array that each run copies",
-        "After a fault, outputs and state are what they were before the run. So whatever is written before a statement "
-        "that may fault is copied at the beginning of each run: half a megabyte takes 20 µs, and as much stack. Nothing is "
-        "copied where no statement can fault: write an index as `% SIZE` of an unsigned number, and use `wrap_add` and its "
-        "kind. Or write to the array when all that may fault is done.",
+        "After a fault, outputs and state are what they were before the run. Of a large array, a run remembers the elements "
+        "that it writes one by one. An array that it writes as a whole or in a loop, before a statement that may fault, is "
+        "copied at the beginning of each run: half a megabyte takes 20 µs, and as much stack. Nothing is copied where no "
+        "statement can fault: write an index as `% SIZE` of an unsigned number, and use `wrap_add` and its kind. Or write to "
+        "the array when all that may fault is done.",
         Kind.FILE,
         "class Law:\n"
-        '    inputs = {"x": "f64"}\n'
+        '    inputs = {"x": "f64[2]"}\n'
         '    state = {"values": "f64[4096]", "head": "i32"}\n\n'
         "    def execute(self):\n"
-        "        self.values[self.head] = self.x\n"
-        "        self.head = (self.head + 1) % 4096",
+        "        for k in range(2):\n"
+        "            self.values[self.head + k] = self.x[k]\n"
+        "        self.head = (self.head + 2) % 4096",
         "class Law:\n"
-        '    inputs = {"x": "f64"}\n'
-        '    state = {"values": "f64[4096]", "head": "u32"}\n\n'
+        '    inputs = {"x": "f64[2]"}\n'
+        '    state = {"values": "f64[4096]", "head": "i32"}\n\n'
         "    def execute(self):\n"
-        "        self.values[self.head % 4096] = self.x\n"
-        "        self.head = wrap_add(self.head, 1)",
+        "        self.values[self.head] = self.x[0]\n"
+        "        self.values[self.head + 1] = self.x[1]\n"
+        "        self.head = (self.head + 2) % 4096",
     ),
 }
