@@ -11,7 +11,7 @@ from typing import Any
 import numpy as np
 import pytest
 
-from simclient import Twin, TwinError, diff
+from simclient import AlgTwin, PyTwin, Twin, TwinError, diff
 from simclient.bag import Bag
 from simclient.replay import replay
 
@@ -150,6 +150,13 @@ def test_arguments_of_another_kind(twin: Twin, craft: Path) -> None:
             call()
     twin.set_many({})
     assert twin.inject({"alt": np.zeros(0), "gyro": np.zeros((0, 3))}) == 0
+
+
+@pytest.mark.parametrize("kind", [AlgTwin, PyTwin])
+def test_a_path_is_no_run(kind: Callable[[Any], Twin], craft: Path) -> None:
+    for path in (craft, str(craft)):
+        with pytest.raises(TypeError, match=r"Twin\.from_config\(path\) opens a machine"):
+            kind(path)
 
 
 def test_a_silent_channel_is_stale_until_the_next_sample(twin: Twin) -> None:

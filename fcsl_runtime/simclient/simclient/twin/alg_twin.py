@@ -33,6 +33,9 @@ class AlgTwin(Twin):
     """The compiled machine, in this process."""
 
     def __init__(self, run: Run):
+        if isinstance(run, str | Path):
+            name = type(self).__name__
+            raise TypeError(f"{name}.from_config(path) opens a machine, {name}.from_library(path) a compiled library")
         super().__init__()
         self._run = run
         self._hardware = Hardware(RunBoard(run, self._lock))
