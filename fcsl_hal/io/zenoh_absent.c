@@ -4,7 +4,7 @@
  */
 #include <stdio.h>
 
-#include "zenoh_session.h"
+#include "bus/zenoh_session.h"
 
 #pragma GCC diagnostic ignored "-Wunused-parameter" /* nothing here looks at a session: there is none */
 

@@ -11,9 +11,9 @@
 #include <stdlib.h>
 #include <string.h>
 
+#include "base/monotonic.h"
 #include "fcsl/fcsl_check.h"
 #include "fcsl/fcsl_driver.h"
-#include "monotonic.h"
 
 enum { RIG_STATE_BYTES = 1 << 16, RIG_WHY_BYTES = 200, RIG_SIGNALS_MAX = 16 };
 

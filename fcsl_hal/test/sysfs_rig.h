@@ -18,9 +18,9 @@
 #include <sys/syscall.h>
 #include <unistd.h>
 
+#include "base/monotonic.h"
 #include "drivers/drivers.h"
 #include "fcsl/fcsl_check.h"
-#include "monotonic.h"
 
 enum { TREE_BYTES = 256, STATE_BYTES = 4096, WHY_BYTES = 256, SIGNALS_MAX = 16, NOBODY = 65534 };
 

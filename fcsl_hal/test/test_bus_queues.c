@@ -8,8 +8,8 @@
 #include <string.h>
 #include <time.h>
 
-#include "bus_inbox.h"
-#include "bus_ring.h"
+#include "bus/bus_inbox.h"
+#include "bus/bus_ring.h"
 #include "fcsl/fcsl_check.h"
 
 enum { MESSAGES = 20000, BYTES = 48, LEAST = 2, CAPACITY = 208, DEPTH = 3 };

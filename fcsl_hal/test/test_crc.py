@@ -28,12 +28,13 @@ MARGIN = 16
 class Kind:
     """`bits` wide, beginning with `first`; `peer` computes the same of bytes, continuing."""
 
+    file: str
     bits: int
     first: int
     peer: Callable[[bytes, int], int]
 
     def source(self) -> str:
-        return (HAL / f"src/crc{self.bits}.c").read_text()
+        return (HAL / "src" / self.file).read_text()
 
     def build(self, folder: Path, text: str) -> Crc:
         """The function of this source."""
@@ -47,7 +48,7 @@ class Kind:
         return lambda data, offset, size, crc: int(function(crc, ctypes.addressof(data) + offset, size))
 
 
-KINDS = (Kind(32, 0, zlib.crc32), Kind(16, 0xFFFF, binascii.crc_hqx))
+KINDS = (Kind("codec/crc32.c", 32, 0, zlib.crc32), Kind("link/crc16.c", 16, 0xFFFF, binascii.crc_hqx))
 
 
 @pytest.fixture(scope="module", params=KINDS, ids=lambda kind: f"crc{kind.bits}")

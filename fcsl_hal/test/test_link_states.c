@@ -16,11 +16,11 @@
 #define FCSL_LINK_HELLO_TICKS 1
 #define FCSL_LINK_HELLO_TRIES 1
 
-#include "../src/crc16.c"
-#include "../src/link.c"
-#include "../src/link_frame.c"
-#include "../src/link_incoming.c"
-#include "../src/link_outgoing.c"
+#include "../src/link/crc16.c"
+#include "../src/link/link.c"
+#include "../src/link/link_frame.c"
+#include "../src/link/link_incoming.c"
+#include "../src/link/link_outgoing.c"
 
 #include <inttypes.h>
 #include <stdbool.h>

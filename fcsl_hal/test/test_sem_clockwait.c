@@ -3,7 +3,7 @@
  * Waiting on a semaphore where glibc has no sem_clockwait(): it is posted before, meanwhile, or not at all.
  */
 #define FCSL_TEST_SEM_CLOCKWAIT
-#include "../src/sem_clockwait.c"
+#include "../src/base/sem_clockwait.c"
 
 #include "fcsl/fcsl_check.h"
 

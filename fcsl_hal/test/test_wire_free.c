@@ -4,10 +4,11 @@
  * them. The other end is a session that puts byte by byte.
  */
 #define _GNU_SOURCE
-#include "commit.h"
-#include "wire_fixture.h"
-#include "wire_named_internal.h"
 #include "fcsl/fcsl_scalar.h"
+#include "named_values/commit.h"
+#include "named_values/wire_named.h"
+#include "named_values/wire_named_internal.h"
+#include "wire_fixture.h"
 
 enum { TICK = 0, COMMAND = 1, ENABLE = 2, REPLY = 3, FLAG = 1, PACKET = 2 };
 

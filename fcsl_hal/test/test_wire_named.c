@@ -5,10 +5,10 @@
 #define _GNU_SOURCE
 #include <signal.h>
 
-#include "commit.h"
-#include "monotonic.h"
-#include "wire_fixture.h"
+#include "base/monotonic.h"
 #include "fcsl/fcsl_scalar.h"
+#include "named_values/commit.h"
+#include "wire_fixture.h"
 
 enum { CONTROL = 0, TICK = 1, FLAG = 2, PACKET = 3, SHORT_MS = 300, HELLO_BYTES = 20, COMMIT_MAX = 64, GARBAGE = 12 };
 

@@ -28,7 +28,7 @@ def absent(tmp_path_factory: pytest.TempPathFactory) -> ctypes.CDLL:
 
 
 def test_it_has_every_function_of_a_session(absent: ctypes.CDLL) -> None:
-    declared = set(re.findall(r"\b(fcsl_zenoh_\w+)\(", (HAL / "src/zenoh_session.h").read_text()))
+    declared = set(re.findall(r"\b(fcsl_zenoh_\w+)\(", (HAL / "src/bus/zenoh_session.h").read_text()))
     assert len(declared) > 10
     assert [name for name in sorted(declared) if not hasattr(absent, name)] == []
 

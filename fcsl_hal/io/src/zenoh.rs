@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-//! fcsl_zenoh_*: contracts are in fcsl_hal/src/zenoh_session.h.
+//! fcsl_zenoh_*: contracts are in fcsl_hal/src/bus/zenoh_session.h.
 
 use std::collections::HashSet;
 use std::ffi::{c_char, c_void};

@@ -6,9 +6,9 @@
 #include <stdio.h>
 #include <unistd.h>
 
+#include "base/monotonic.h"
 #include "drivers.h"
 #include "iio.h"
-#include "monotonic.h"
 
 enum { INPUTS = 16 };
 

@@ -24,8 +24,8 @@
 #include <time.h>
 #include <unistd.h>
 
+#include "base/monotonic.h"
 #include "can_signal.h"
-#include "monotonic.h"
 
 enum { SIGNALS_MAX = 8 };
 

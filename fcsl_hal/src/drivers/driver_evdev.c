@@ -16,9 +16,9 @@
 #include <time.h>
 #include <unistd.h>
 
+#include "base/monotonic.h"
 #include "evdev_find.h"
 #include "evdev_sticks.h"
-#include "monotonic.h"
 
 enum { EVENTS_MAX = 64, BITS_PER_BYTE = 8, NS_PER_US = 1000 };
 

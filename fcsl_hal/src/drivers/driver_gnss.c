@@ -12,7 +12,7 @@
 #include <unistd.h>
 
 #include "receivers/gnss.h"
-#include "serial.h"
+#include "serial/serial.h"
 
 static const serial_mode_t UBX_MODE = {.baud = 38400};
 static const serial_mode_t NMEA_MODE = {.baud = 9600};

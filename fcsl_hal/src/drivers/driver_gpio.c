@@ -8,9 +8,9 @@
 #include <string.h>
 #include <unistd.h>
 
+#include "base/monotonic.h"
 #include "drivers.h"
 #include "gpio_chip.h"
-#include "monotonic.h"
 
 static const uint64_t LOOK_AGAIN_NS = 100000000u; /* for a chip that has gone */
 

@@ -9,7 +9,7 @@
 #include <stdio.h>
 #include <unistd.h>
 
-#include "monotonic.h"
+#include "base/monotonic.h"
 
 typedef struct {
     const iio_channel_t *channel;

@@ -18,7 +18,7 @@
 #include <string.h>
 #include <unistd.h>
 
-#include "monotonic.h"
+#include "base/monotonic.h"
 
 enum {
     ELEMENTS = IIO_VALUES + 1, /* and the timestamp */

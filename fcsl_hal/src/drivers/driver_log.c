@@ -18,7 +18,7 @@
 #include <sys/stat.h>
 #include <unistd.h>
 
-#include "monotonic.h"
+#include "base/monotonic.h"
 
 enum { LINES = 4096, LINE_BYTES = 256, FILE_BYTES = LINES * LINE_BYTES, SIGNALS = 4 };
 

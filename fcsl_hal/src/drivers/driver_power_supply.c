@@ -12,7 +12,7 @@
 #include <string.h>
 #include <unistd.h>
 
-#include "monotonic.h"
+#include "base/monotonic.h"
 
 typedef enum { VOLTAGE, CURRENT, CHARGE, TEMPERATURE, SIGNALS } signal_t;
 

@@ -19,7 +19,7 @@
 #include <time.h>
 #include <unistd.h>
 
-#include "monotonic.h"
+#include "base/monotonic.h"
 
 enum { CHANNELS = 16, TEXT_BYTES = 32, WHY_BYTES = 256, EXPORT_TRIES = 50 };
 static const double HZ = 50.0; /* of most servos */

@@ -10,7 +10,7 @@
 #include <unistd.h>
 
 #include "receivers/rc.h"
-#include "serial.h"
+#include "serial/serial.h"
 
 static const serial_mode_t SBUS_MODE = {.baud = 100000, .even_parity = 1, .two_stop_bits = 1};
 static const serial_mode_t CRSF_MODE = {.baud = 420000};

@@ -43,8 +43,9 @@ class CTable(ctypes.Structure):
 def native(tmp_path_factory: pytest.TempPathFactory) -> ctypes.CDLL:
     """The C implementation as a library."""
     library = tmp_path_factory.mktemp("codec") / "libcodec.so"
-    sources = [*sorted((ROOT / "fcsl_hal/src").glob("codec*.c")), ROOT / "fcsl_hal/src/crc32.c"]
-    include = ["-I", ROOT / "fcsl_hal/include", "-I", ROOT / "fcsl_compiler/include"]
+    sources = sorted((ROOT / "fcsl_hal/src/codec").glob("*.c"))
+    folders = (ROOT / "fcsl_hal/include", ROOT / "fcsl_hal/src", ROOT / "fcsl_compiler/include")
+    include = [f"-I{folder}" for folder in folders]
     subprocess.run(["cc", "-std=c11", "-O1", "-fPIC", "-shared", *include, *sources, "-o", library], check=True)
     loaded = ctypes.CDLL(str(library))
     loaded.fcsl_channel_table.restype = CTable

@@ -20,7 +20,7 @@ PROOF = Proof(
     "codec",
     Path(__file__).resolve().parent / "program.c",
     ROOT / "fcsl_hal/src",
-    ("codec.c", "codec_check.c", "crc32.c", "crc16.c", "cobs.c", "link_frame.c"),
+    ("codec/codec.c", "codec/codec_check.c", "codec/crc32.c", "link/crc16.c", "link/cobs.c", "link/link_frame.c"),
 )
 
 
@@ -29,7 +29,7 @@ def defect(what: str, file: str, old: str, new: str, sizes: tuple[int, int] = (4
     return Defect(what, file, old, new, (f"-DSMALLEST={sizes[0]}", f"-DLARGEST={sizes[1]}"))
 
 
-CHECK, ENCODE, COBS, FRAME = "codec_check.c", "codec.c", "cobs.c", "link_frame.c"
+CHECK, ENCODE, COBS, FRAME = "codec/codec_check.c", "codec/codec.c", "link/cobs.c", "link/link_frame.c"
 DEFECTS = (
     defect("an entry may end behind its message", CHECK, "if (behind > end) {", "if (0) {"),
     defect("the count of an array is not compared", CHECK, "entry->values + *size == entry->end", "entry->end > 0"),
@@ -40,8 +40,8 @@ DEFECTS = (
     defect("values are stored beside their field", CHECK, "scalars_import(data + field->offset,",
            "scalars_import(data + field->offset + 1,"),
     defect("no room is kept for the CRC", ENCODE, "*at < size + CRC_BYTES", "*at < size"),
-    defect("the last bytes of a message are summed as eight", "crc32.c", "i + 8u <= size", "i < size", (37, 37)),
-    defect("the last bytes of a frame are summed as eight", "crc16.c", "i + 8u <= size", "i < size"),
+    defect("the last bytes of a message are summed as eight", "codec/crc32.c", "i + 8u <= size", "i < size", (37, 37)),
+    defect("the last bytes of a frame are summed as eight", "link/crc16.c", "i + 8u <= size", "i < size"),
     defect("a frame may grow without end", COBS, "at < end && size < FCSL_LINK_FRAME_MAX", "at < end"),
     defect("a frame shorter than its header is read", FRAME, "size < begin + FCSL_LINK_CRC_BYTES", "0", (8, 8)),
 )  # fmt: skip

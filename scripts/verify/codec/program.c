@@ -7,7 +7,7 @@
 
 #include "fcsl/fcsl_cobs.h"
 #include "fcsl/fcsl_codec.h"
-#include "link_frame.h"
+#include "link/link_frame.h"
 
 /* Bytes: of messages, capacities and frames. Each entry below fits into the longest message. */
 #ifndef SMALLEST

@@ -67,7 +67,10 @@ def analyse(proof: Proof, folder: Path, sources: Sequence[Path], defines: Sequen
     """Runs EVA on the program with these sources. Raises CheckFailed when it does not come to an end."""
     folder.mkdir(parents=True, exist_ok=True)
     table = folder / "properties.csv"
-    words = [*defines, *(f"-I{path}" for path in (ROOT / "fcsl_hal/include", *include_dirs(), proof.folder))]
+    # A source with a seeded defect lies elsewhere, so it finds the headers beside it by their folder.
+    beside = {(proof.folder / name).parent: None for name in proof.sources}
+    includes = (ROOT / "fcsl_hal/include", *include_dirs(), proof.folder, *beside)
+    words = [*defines, *(f"-I{path}" for path in includes)]
     line = ["frama-c", f"-cpp-extra-args={' '.join(words)}", *_OPTIONS, *proof.options, str(proof.program)]
     line += [*map(str, sources), "-then", "-metrics-eva-cover", "-report-csv", str(table)]
     try:
@@ -96,7 +99,7 @@ def _endless(text: str, proof: Proof) -> list[str]:
     return [
         f"{file}:{line}: a loop that EVA does not follow to its end"
         for file, line in places
-        if Path(file).name in proof.sources
+        if Path(file).name in {Path(name).name for name in proof.sources}
     ]
 
 
@@ -113,7 +116,7 @@ def _find(proof: Proof, defect: Defect, folder: Path) -> str:
     text = (proof.folder / defect.file).read_text()
     if text.count(defect.old) != 1:
         raise CheckFailed(f"`{defect.old}` stands {text.count(defect.old)} times in {defect.file}; change this defect")
-    folder.mkdir(parents=True)
+    (folder / defect.file).parent.mkdir(parents=True)
     (folder / defect.file).write_text(text.replace(defect.old, defect.new))
     sources = [(folder if name == defect.file else proof.folder) / name for name in proof.sources]
     found = analyse(proof, folder, sources, defect.defines)

@@ -36,7 +36,7 @@ class Defect:
     budget: Budget
 
 
-LINK, OUT, IN = "link.c", "link_outgoing.c", "link_incoming.c"
+LINK, OUT, IN = "link/link.c", "link/link_outgoing.c", "link/link_incoming.c"
 DEFECTS = (
     Defect("frames out of order are taken", IN, "header->sequence != in->sequence", "0", (1, 0, 0, 0, 2, 3)),
     Defect("an acknowledgement of nothing counts", OUT, "more > out->sent_max - out->confirmed", "0", (0, 1, 0, 1, 2, 2)),

@@ -57,8 +57,8 @@ def _compiles_python(_: Point) -> bool:
 def _compiles_c(file: str, source: bytes, point: Point) -> bool:
     """Whether types allow the mutant: the grammar does not know them."""
     text = with_switches(source, [Mutant(1, file, point)], c_switch)
-    folders = [ROOT / file, _RUNTIME / "src/x", _RUNTIME / "fc/x", _RUNTIME / "include/x", ROOT / "fcsl_hal/include/x"]
-    includes = [f"-I{d}" for d in (*(f.parent for f in folders), *include_dirs())]
+    own = [_RUNTIME / "src", _RUNTIME / "fc", _RUNTIME / "include", ROOT / "fcsl_hal/src", ROOT / "fcsl_hal/include"]
+    includes = [f"-I{d}" for d in ((ROOT / file).parent, *own, *include_dirs())]
     line = [_GCC, "-fsyntax-only", "-std=c11", "-w", '-DFCSL_VERSION=""', *includes, "-x", "c", "-"]
     return subprocess.run(line, input=with_declaration(text), capture_output=True, check=False).returncode == 0
 

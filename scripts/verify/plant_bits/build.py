@@ -35,10 +35,8 @@ _MOVERS = {
 #: left out: in their place are functions that end the program, but for those that close nothing.
 _CARRIERS = (
     *(_RUNTIME / "run", _RUNTIME / "base", _RUNTIME / "history", _RUNTIME / "messages"),
-    *(
-        _HAL / f"{name}.c"
-        for name in ("codec", "codec_check", "crc16", "crc32", "fcsl_hw", "gate", "payload", "plan_text")
-    ),
+    *(_HAL / "codec", _HAL / "link/crc16.c", _HAL / "hal/fcsl_hw.c", _HAL / "guard/gate.c"),
+    *(_HAL / "named_values/payload.c", _HAL / "base/plan_text.c"),
 )
 _INCLUDES = (
     *(ROOT / f"{package}/include" for package in ("fcsl_hal", "fcsl_runtime/fcsl_runtime", "fcsl_sim")),

@@ -47,21 +47,9 @@ def generate(folder: Path) -> Path:
 def wire_figures(folder: Path) -> dict[str, Any]:
     mavlink = generate(folder)
     sources = [*sorted(HERE.glob("*.c")), BENCH / "harness/timing.c"]
-    for name in (
-        "codec",
-        "codec_check",
-        "crc32",
-        "crc16",
-        "cobs",
-        "link",
-        "link_frame",
-        "link_incoming",
-        "link_outgoing",
-    ):
-        sources.append(HAL / f"src/{name}.c")
-    program = compile_program(
-        sources, folder / "wire", [HERE, HAL / "include", *include_dirs()], ["-isystem", str(mavlink)]
-    )
+    sources += [source for name in ("codec", "link") for source in sorted((HAL / "src" / name).glob("*.c"))]
+    includes = [HERE, HAL / "include", HAL / "src", *include_dirs()]
+    program = compile_program(sources, folder / "wire", includes, ["-isystem", str(mavlink)])
     line = [str(program), str(ROUNDS), str(MESSAGES), str(FRAMES)]
     done = subprocess.run(line, stdout=subprocess.PIPE, text=True, check=True)
     facts: dict[str, Any] = json.loads(done.stdout)

@@ -16,7 +16,7 @@
 #include <sys/stat.h>
 #include <unistd.h>
 
-#include "monotonic.h"
+#include "base/monotonic.h"
 
 enum { PATH_BYTES = 256, BAUD_DIGITS_MAX = 8, CHUNK_BYTES = 256 };
 

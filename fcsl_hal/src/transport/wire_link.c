@@ -16,8 +16,8 @@
 #include <sys/eventfd.h>
 #include <unistd.h>
 
-#include "link_frame.h"
-#include "monotonic.h"
+#include "base/monotonic.h"
+#include "link/link_frame.h"
 
 enum {
     PORT = 0,

@@ -6,9 +6,9 @@
 #ifndef FCSL_WIRE_NAMED_INTERNAL_H
 #define FCSL_WIRE_NAMED_INTERNAL_H
 
-#include "bus_peer.h"
+#include "fcsl/fcsl_codec.h"
 #include "payload.h"
-#include "wire_named.h"
+#include "transport/bus_peer.h"
 
 enum {
     NAMED_TEXT_BYTES = 256,

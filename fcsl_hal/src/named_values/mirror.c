@@ -8,7 +8,7 @@
 #include <stdlib.h>
 #include <string.h>
 
-#include "codec_layout.h"
+#include "codec/codec_layout.h"
 #include "commit.h"
 #include "fcsl/fcsl_bus.h"
 #include "fcsl/fcsl_gate.h"

@@ -10,10 +10,10 @@
 #include <stdlib.h>
 #include <string.h>
 
-#include "control_packet.h"
-#include "monotonic.h"
+#include "base/monotonic.h"
+#include "named_values/wire_named.h"
 #include "presence.h"
-#include "wire_named.h"
+#include "transport/control_packet.h"
 
 enum {
     TEXT_BYTES = 512,

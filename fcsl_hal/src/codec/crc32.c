@@ -5,7 +5,7 @@
  */
 #include "fcsl/fcsl_codec.h"
 
-#include "crc_table.h"
+#include "base/crc_table.h"
 
 /* What byte i of eight leaves behind the eighth. The last number is the reflected polynomial; each other one follows from its
  * right neighbour (the last of a row from the first of the row below): n >> 1, ^ 0xedb88320 where n is odd. */

@@ -3,8 +3,8 @@
  * The thread that hands to Zenoh what was posted. A put may wait for a receiver; then the ring fills, and posts are refused.
  */
 #define _GNU_SOURCE
+#include "base/monotonic.h"
 #include "bus_session.h"
-#include "monotonic.h"
 
 enum { LOOK_NS = 50 * NS_PER_MS, TURN = 64, REASON_BYTES = 256 };
 

@@ -7,7 +7,7 @@
 
 #include <stdio.h>
 
-#include "monotonic.h"
+#include "base/monotonic.h"
 
 int bus_peer_lives(const bus_peer_t *peer)
 {

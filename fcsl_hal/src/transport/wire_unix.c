@@ -14,8 +14,8 @@
 #include <sys/socket.h>
 #include <unistd.h>
 
+#include "base/monotonic.h"
 #include "fcsl/fcsl_socket.h"
-#include "monotonic.h"
 
 enum { BACKLOG = 4, TEXT_BYTES = 256, PATH_BYTES = 128, RETRY_MS = 20 };
 

@@ -7,12 +7,13 @@
 #include <stdlib.h>
 #include <string.h>
 
-#include "codec_layout.h"
+#include "base/monotonic.h"
+#include "codec/codec_layout.h"
 #include "commit.h"
-#include "control_packet.h"
 #include "fcsl/fcsl_address.h"
-#include "monotonic.h"
 #include "name_space.h"
+#include "transport/control_packet.h"
+#include "wire_named.h"
 #include "wire_named_internal.h"
 
 enum {

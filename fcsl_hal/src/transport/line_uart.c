@@ -11,9 +11,9 @@
 #include <termios.h>
 #include <unistd.h>
 
-#include "drivers/serial.h"
+#include "base/monotonic.h"
 #include "line.h"
-#include "monotonic.h"
+#include "serial/serial.h"
 
 enum { BITS_PER_BYTE = 10 };
 

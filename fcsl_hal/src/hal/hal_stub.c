@@ -6,8 +6,8 @@
 #include <stdio.h>
 #include <stdlib.h>
 
+#include "base/monotonic.h"
 #include "fcsl/fcsl_hal.h"
-#include "monotonic.h"
 
 static int stub_open(fcsl_hal_t *hal, char *error, size_t error_size)
 {

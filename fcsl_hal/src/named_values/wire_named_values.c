@@ -6,7 +6,7 @@
 #include <stdio.h>
 #include <string.h>
 
-#include "codec_layout.h"
+#include "codec/codec_layout.h"
 #include "commit.h"
 #include "fcsl/fcsl_tick_time.h"
 #include "wire_named_internal.h"

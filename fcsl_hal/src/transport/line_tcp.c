@@ -11,9 +11,9 @@
 #include <string.h>
 #include <unistd.h>
 
+#include "base/monotonic.h"
 #include "fcsl/fcsl_address.h"
 #include "line.h"
-#include "monotonic.h"
 
 enum { BACKLOG = 4, RETRY_MS = 20 };
 

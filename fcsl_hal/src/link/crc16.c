@@ -4,7 +4,7 @@
  */
 #include "fcsl/fcsl_link.h"
 
-#include "crc_table.h"
+#include "base/crc_table.h"
 
 /* What byte i of eight leaves behind the eighth. The first number of the last row is the polynomial; each other one follows from
  * its left neighbour (the first of a row from the last of the row below): n << 1, ^ 0x1021 where n has its highest bit. */

@@ -10,8 +10,8 @@
 #include <string.h>
 #include <sys/un.h>
 
+#include "base/monotonic.h"
 #include "fcsl/fcsl_address.h"
-#include "monotonic.h"
 #include "wire_link.h"
 #include "wire_unix.h"
 #include "wire_zenoh.h"

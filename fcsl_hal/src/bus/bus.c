@@ -10,9 +10,9 @@
 #include <stdlib.h>
 #include <string.h>
 
+#include "base/monotonic.h"
 #include "bus_config.h"
 #include "bus_session.h"
-#include "monotonic.h"
 
 /* ---- the thread that steps ------------------------------------------------------------------------------------------ */
 

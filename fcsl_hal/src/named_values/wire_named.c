@@ -7,7 +7,8 @@
 #include <stdlib.h>
 #include <string.h>
 
-#include "control_packet.h"
+#include "transport/control_packet.h"
+#include "wire_named.h"
 #include "wire_named_internal.h"
 
 #define COUNTER(path, member, doc) FCSL_WIRE_COUNTER(named_counters_t, path, member, doc)

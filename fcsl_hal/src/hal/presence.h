@@ -6,8 +6,8 @@
 #ifndef FCSL_PRESENCE_H
 #define FCSL_PRESENCE_H
 
-#include "control_packet.h"
 #include "fcsl/fcsl_log.h"
+#include "transport/control_packet.h"
 
 enum { PRESENCE_TEXT_BYTES = 320 };
 

@@ -8,8 +8,8 @@
 #include <stdlib.h>
 #include <string.h>
 
-#include "codec_blob.h"
-#include "ros_walk.h"
+#include "codec/codec_blob.h"
+#include "ros/ros_walk.h"
 
 enum {
     /* Of a message that another program made: strings may be longer than ours, or layouts of arrays be filled in, */

@@ -8,7 +8,7 @@
 #include <stdio.h>
 #include <string.h>
 
-#include "monotonic.h"
+#include "base/monotonic.h"
 
 presence_t presence_of(fcsl_wire_side_t peer, const fcsl_channel_table_t *table, fcsl_log_t *log)
 {

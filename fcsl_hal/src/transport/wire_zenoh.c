@@ -9,10 +9,10 @@
 #include <stdlib.h>
 #include <string.h>
 
+#include "base/monotonic.h"
 #include "bus_peer.h"
-#include "codec_layout.h"
+#include "codec/codec_layout.h"
 #include "control_packet.h"
-#include "monotonic.h"
 
 enum {
     WAITING_MAX = 8, /* messages; in lock-step there are two */
