@@ -17,7 +17,7 @@
 #include <unistd.h>
 
 #include "fcsl/fcsl_bus.h"
-#include "fcsl/fcsl_check.h"
+#include "fcsl_check.h"
 
 #ifdef __SANITIZE_ADDRESS__
 /* Zenoh leaves some memory behind when a session ends. LeakSanitizer asks this. */

@@ -12,8 +12,8 @@
 #include <string.h>
 
 #include "base/monotonic.h"
-#include "fcsl/fcsl_check.h"
 #include "fcsl/fcsl_driver.h"
+#include "fcsl_check.h"
 
 enum { RIG_STATE_BYTES = 1 << 16, RIG_WHY_BYTES = 200, RIG_SIGNALS_MAX = 16 };
 

@@ -21,7 +21,7 @@ def run_example(page: str, file: str, macro: str, program: Path, folder: Path) -
     (folder / file).write_text(source)
     build = Path(os.environ.get("FCSL_TEST_PROGRAMS", HAL.parent / "build/fcsl_hal"))
     libraries = [build / "libfcsl_hal.a", build / "cargo/release/libfcsl_io.a", "-Wl,--gc-sections"]
-    includes = [f"-I{path}" for path in (*include_dirs(), HAL / "include", HAL / "test")]
+    includes = [f"-I{path}" for path in (*include_dirs(), HAL / "include", HAL / "test", HAL / "test/support")]
     define = f'-D{macro}="{folder / file}"'
     out = folder / "program"
     subprocess.run(["cc", *STRICT, define, *includes, program, *libraries, "-lpthread", "-lm", "-o", out], check=True)

@@ -20,7 +20,7 @@
 
 #include "base/monotonic.h"
 #include "drivers/drivers.h"
-#include "fcsl/fcsl_check.h"
+#include "fcsl_check.h"
 
 enum { TREE_BYTES = 256, STATE_BYTES = 4096, WHY_BYTES = 256, SIGNALS_MAX = 16, NOBODY = 65534 };
 

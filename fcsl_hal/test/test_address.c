@@ -10,7 +10,7 @@
 #include <stdio.h>
 #include <string.h>
 
-#include "fcsl/fcsl_check.h"
+#include "fcsl_check.h"
 
 typedef struct {
     const char *text;

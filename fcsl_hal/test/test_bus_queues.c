@@ -10,7 +10,7 @@
 
 #include "bus/bus_inbox.h"
 #include "bus/bus_ring.h"
-#include "fcsl/fcsl_check.h"
+#include "fcsl_check.h"
 
 enum { MESSAGES = 20000, BYTES = 48, LEAST = 2, CAPACITY = 208, DEPTH = 3 };
 

@@ -12,7 +12,7 @@
 #include <sys/syscall.h>
 
 #include "bus_rig.h"
-#include "fcsl/fcsl_allocations.h"
+#include "fcsl_allocations.h"
 
 enum { ROUNDS = 2000, VALUES = 4, NO_FILTERS = 77 /* skipped */, ALLOCATES = 78 };
 

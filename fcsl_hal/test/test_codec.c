@@ -6,10 +6,10 @@
 #include <string.h>
 
 #include "channel_fixture.h"
-#include "messages.h"
-#include "fcsl/fcsl_check.h"
 #include "fcsl/fcsl_codec.h"
 #include "fcsl/fcsl_scalar.h"
+#include "fcsl_check.h"
+#include "messages.h"
 
 enum { PACKET_BYTES = 5, REPLY_BYTES = 2 };
 enum { MESSAGE_BYTES = 1024, ROUNDS = 2000, HEAD_BYTES = 18, ARMED_AT = 21, TIME_AT = 21, CRC_BYTES = 7 };

@@ -6,8 +6,8 @@
 #include <stdlib.h>
 #include <string.h>
 
-#include "fcsl/fcsl_check.h"
 #include "fcsl/fcsl_frontend.h"
+#include "fcsl_check.h"
 
 enum { MS = 1000000 };
 

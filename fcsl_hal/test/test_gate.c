@@ -6,8 +6,8 @@
 #include <string.h>
 
 #include "channel_fixture.h"
-#include "fcsl/fcsl_check.h"
 #include "fcsl/fcsl_gate.h"
+#include "fcsl_check.h"
 
 enum { MESSAGE_BYTES = 256, ROUNDS = 20000, TIMEOUT_NS = 100 };
 enum { COMMAND_CHANNEL = 1, ENABLE_CHANNEL = 9 }; /* in CHANNELS */

@@ -8,7 +8,7 @@
 #include <string.h>
 #include <time.h>
 
-#include "fcsl/fcsl_check.h"
+#include "fcsl_check.h"
 #include "receivers/gnss.h"
 
 enum { LINE_BYTES = 256, PVT_BYTES = 92, PVT_FRAME = PVT_BYTES + 8 };

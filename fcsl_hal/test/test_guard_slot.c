@@ -16,8 +16,8 @@
 #include <unistd.h>
 
 #include "channel_fixture.h"
-#include "fcsl/fcsl_check.h"
 #include "fcsl/fcsl_guard.h"
+#include "fcsl_check.h"
 
 enum { PATH_BYTES = 64, TEXT_BYTES = 512, TAKES = 500, SECONDS_MAX = 2 };
 

@@ -4,8 +4,8 @@
  */
 #include <string.h>
 
-#include "fcsl/fcsl_check.h"
 #include "fcsl/fcsl_hal.h"
+#include "fcsl_check.h"
 
 enum { MESSAGE_BYTES = 64, TEXT_BYTES = 512 };
 

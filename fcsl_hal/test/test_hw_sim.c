@@ -5,8 +5,8 @@
 #include <stdlib.h>
 #include <string.h>
 
-#include "fcsl/fcsl_check.h"
 #include "fcsl/fcsl_hw_sim.h"
+#include "fcsl_check.h"
 
 enum { ADDRESSES = 1500, ROUNDS = 20000 };
 

@@ -6,8 +6,8 @@
 #include <stdlib.h>
 #include <string.h>
 
-#include "fcsl/fcsl_check.h"
 #include "fcsl/fcsl_cobs.h"
+#include "fcsl_check.h"
 
 enum { LATEST = 5, SEQUENCED = 6, RELIABLE = 7, OTHER_RELIABLE = 15, RETRANSMIT_TICKS = 3, MESSAGES = 400 };
 

@@ -25,7 +25,7 @@
 #include <inttypes.h>
 #include <stdbool.h>
 
-#include "fcsl/fcsl_check.h"
+#include "fcsl_check.h"
 
 enum { WIRE_FRAMES = 4, MESSAGES_MAX = 4, BUDGETS = 6, ENDS = 2, RETRANSMIT_TICKS = 2, ROUNDS = 60 };
 

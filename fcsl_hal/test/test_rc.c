@@ -4,7 +4,7 @@
  */
 #include <string.h>
 
-#include "fcsl/fcsl_check.h"
+#include "fcsl_check.h"
 #include "receivers/rc.h"
 
 enum { SBUS_BYTES = 25, CRSF_BYTES = 26 };

@@ -5,7 +5,7 @@
 #define FCSL_TEST_SEM_CLOCKWAIT
 #include "../src/base/sem_clockwait.c"
 
-#include "fcsl/fcsl_check.h"
+#include "fcsl_check.h"
 
 enum { SHORT_MS = 30 };
 

@@ -15,8 +15,8 @@
 #include <sys/un.h>
 #include <unistd.h>
 
-#include "fcsl/fcsl_check.h"
 #include "fcsl/fcsl_socket.h"
+#include "fcsl_check.h"
 
 enum { ROUNDS = 2000, PATH_BYTES = 108, BACKLOG = 16 };
 

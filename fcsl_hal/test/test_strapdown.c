@@ -5,7 +5,7 @@
 #include <math.h>
 #include <stdint.h>
 
-#include "fcsl/fcsl_check.h"
+#include "fcsl_check.h"
 #include "frontends/strapdown.h"
 
 enum { SAMPLES = 20, FINE = 200 }; /* in a tick of 20 ms */

@@ -6,9 +6,9 @@
 #include <string.h>
 #include <time.h>
 
-#include "fcsl/fcsl_check.h"
 #include "fcsl/fcsl_link.h"
 #include "fcsl/fcsl_wire.h"
+#include "fcsl_check.h"
 
 enum { MESSAGE_MAX = 4096, MESSAGES = 2000, WAIT_S = 20 };
 

@@ -13,10 +13,10 @@
 
 #include "bus_rig.h"
 #include "channel_fixture.h"
-#include "messages.h"
 #include "fcsl/fcsl_address.h"
-#include "fcsl/fcsl_check.h"
 #include "fcsl/fcsl_external.h"
+#include "fcsl_check.h"
+#include "messages.h"
 
 enum { MESSAGE_BYTES = 512, TEXT_BYTES = 512, WAIT_MS = 5000 };
 

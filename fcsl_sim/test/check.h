@@ -4,7 +4,7 @@
 
 #include <stdint.h>
 
-#include "fcsl/fcsl_check.h"
+#include "fcsl_check.h"
 
 /* A small generator for test inputs, independent of the code under test. */
 static inline uint64_t next_random(uint64_t *state)

@@ -26,6 +26,7 @@ def program(tmp_path_factory: pytest.TempPathFactory) -> Path:
     path = tmp_path_factory.mktemp("steady") / "steady_sim"
     prefixes = [package_prefix(name) for name in ("fcsl_sim", "fcsl_runtime", "fcsl_hal", "fcsl_compiler")]
     options = [f"-I{prefix}/include" for prefix in prefixes] + [f"-L{prefix}/lib" for prefix in prefixes]
+    options.append(f"-I{TEST.parents[1]}/fcsl_hal/test/support")
     options += [f"-Wl,-rpath,{prefix}/lib" for prefix in prefixes]
     line = [
         "cc",

@@ -6,10 +6,19 @@
 #include <linux/gpio.h>
 #include <stdarg.h>
 #include <stdio.h>
+#include <stdlib.h>
 #include <string.h>
 
-#include <fcsl/fcsl_check.h>
 #include <fcsl/fcsl_hw.h>
+
+/* Ends the program with the place and the text of a condition that does not hold. */
+#define CHECK(condition)                                                                                               \
+    do {                                                                                                               \
+        if (!(condition)) {                                                                                            \
+            (void)fprintf(stderr, "%s:%d: does not hold: %s\n", __FILE__, __LINE__, #condition);                       \
+            exit(1);                                                                                                   \
+        }                                                                                                              \
+    } while (0)
 
 enum { CHIP = 1000, FIRST_LINE = 2000 };
 

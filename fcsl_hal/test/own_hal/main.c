@@ -8,7 +8,7 @@
 #include <math.h>
 #include <stddef.h>
 
-#include "fcsl/fcsl_check.h"
+#include "fcsl_check.h"
 
 typedef struct {
     double measurement;

@@ -8,8 +8,8 @@
 #include <sys/wait.h>
 
 #include "channel_fixture.h"
-#include "fcsl/fcsl_check.h"
 #include "fcsl/fcsl_external.h"
+#include "fcsl_check.h"
 
 enum { TICKS = 2000, WAIT_MS = 10000, ROOM = 1024 };
 

@@ -8,10 +8,10 @@
 #include <string.h>
 #include <unistd.h>
 
-#include "fcsl/fcsl_allocations.h"
-#include "fcsl/fcsl_check.h"
 #include "fcsl/fcsl_hal.h"
 #include "fcsl/fcsl_run.h"
+#include "fcsl_allocations.h"
+#include "fcsl_check.h"
 
 enum { TICKS = 5000, MESSAGE_BYTES = 256 };
 

@@ -7,7 +7,7 @@
 #include <dlfcn.h>
 #include <stdlib.h>
 
-#include "fcsl/fcsl_check.h"
+#include "fcsl_check.h"
 
 typedef struct {
     uint64_t before;

@@ -8,7 +8,7 @@
 #include "vars/catalog_slice.c"
 #include "vars/view.c"
 
-#include "fcsl/fcsl_check.h"
+#include "fcsl_check.h"
 
 enum { OUTER = 3, INNER = 2, FIELDS = OUTER * INNER, STRIDE = 64 };
 

@@ -7,8 +7,8 @@
 #include <string.h>
 #include <unistd.h>
 
-#include "fcsl/fcsl_check.h"
 #include "fcsl/fcsl_run.h"
+#include "fcsl_check.h"
 
 static fcsl_run_t *open_fixture(const char *library)
 {

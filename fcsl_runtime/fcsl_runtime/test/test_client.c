@@ -4,7 +4,7 @@
  */
 #include "vars/client.c"
 
-#include "fcsl/fcsl_check.h"
+#include "fcsl_check.h"
 
 #define SECOND UINT64_C(1000000000)
 

@@ -7,7 +7,7 @@
 
 #include <stdlib.h>
 
-#include "fcsl/fcsl_check.h"
+#include "fcsl_check.h"
 #include "base/error.c"
 
 enum { WORDS = 5 };

@@ -4,9 +4,9 @@
  */
 #include <string.h>
 
-#include "fcsl/fcsl_check.h"
 #include "fcsl/fcsl_mcap_records.h"
 #include "fcsl/fcsl_run.h"
+#include "fcsl_check.h"
 
 enum { GYRO = 0, ARMED = 1, TICKS = 40, RECORDS = 8 };
 

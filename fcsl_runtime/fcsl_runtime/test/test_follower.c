@@ -5,7 +5,7 @@
  */
 #include "../observers/follower.c"
 
-#include "fcsl/fcsl_check.h"
+#include "fcsl_check.h"
 
 enum { SLOTS = 8, SEEN_MAX = 256 };
 

@@ -27,7 +27,7 @@ static void before_store(void);
 
 #include <pthread.h>
 
-#include "fcsl/fcsl_check.h"
+#include "fcsl_check.h"
 
 enum { WORDS = 61, SLOTS = 4, PUBLICATIONS = 50000, READERS = 2 };
 

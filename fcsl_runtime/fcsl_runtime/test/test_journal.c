@@ -8,8 +8,8 @@
 #include <stdlib.h>
 #include <string.h>
 
-#include "fcsl/fcsl_check.h"
 #include "fcsl/fcsl_journal.h"
+#include "fcsl_check.h"
 
 enum { MESSAGE_BYTES = 1 << 16, HEAD_BYTES = 28, MANY = 20000, LAST_STEPS = 8 };
 

@@ -10,7 +10,7 @@
 #include <stdlib.h>
 
 #include "vars/base64.c"
-#include "fcsl/fcsl_check.h"
+#include "fcsl_check.h"
 
 enum { TOKENS = 64 };
 

@@ -6,9 +6,9 @@
 #include <stdlib.h>
 #include <string.h>
 
-#include "fcsl/fcsl_check.h"
 #include "fcsl/fcsl_outbox.h"
 #include "fcsl/fcsl_scalar.h"
+#include "fcsl_check.h"
 
 enum { MESSAGES = 200000, HEAD_BYTES = 8 };
 

@@ -5,7 +5,7 @@
  */
 #include "../board/output_map.c"
 
-#include "fcsl/fcsl_check.h"
+#include "fcsl_check.h"
 
 enum { RULES = 2000, COMMANDS = 200 };
 

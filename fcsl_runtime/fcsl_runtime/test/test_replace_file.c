@@ -13,7 +13,7 @@
 #include <sys/stat.h>
 #include <unistd.h>
 
-#include "fcsl/fcsl_check.h"
+#include "fcsl_check.h"
 
 static char folder[] = "/tmp/test_replace_XXXXXX";
 static char path[PATH_MAX];

@@ -7,7 +7,7 @@
 
 #include <pthread.h>
 
-#include "fcsl/fcsl_check.h"
+#include "fcsl_check.h"
 
 enum { RECORDS = 200000, SIZE_MAX_BYTES = 700 };
 

@@ -10,10 +10,10 @@
 #include <sys/mman.h>
 #include <unistd.h>
 
-#include "fcsl/fcsl_allocations.h"
 #include "fcsl/fcsl_cdr.h"
-#include "fcsl/fcsl_check.h"
 #include "fcsl/fcsl_ros_inlet.h"
+#include "fcsl_allocations.h"
+#include "fcsl_check.h"
 #include "ros_plan.h"
 
 enum { PAGE = 4096, MUTATIONS = 200000 };

@@ -5,9 +5,9 @@
 #include <math.h>
 #include <string.h>
 
-#include "fcsl/fcsl_check.h"
 #include "fcsl/fcsl_run.h"
 #include "fcsl/fcsl_scalar.h"
+#include "fcsl_check.h"
 
 enum { MESSAGE_BYTES = 256 };
 

@@ -13,7 +13,7 @@
 #include "vars/value.c"
 #include "vars/view.c"
 
-#include "fcsl/fcsl_check.h"
+#include "fcsl_check.h"
 
 enum { SLOTS = 64 };
 

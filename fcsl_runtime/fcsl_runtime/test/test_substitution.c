@@ -5,7 +5,7 @@
  */
 #include "run/substitution.c"
 
-#include "fcsl/fcsl_check.h"
+#include "fcsl_check.h"
 
 enum { BEFORE, IMPURE, AFTER, INSTANCES, FIELDS_EACH = 5, BYTES_LEFT = 8 + 8 + 8 + 4 };
 

@@ -12,10 +12,10 @@
 #include <unistd.h>
 
 #define COUNTED_THREADS /* all of them */
-#include "fcsl/fcsl_allocations.h"
-#include "fcsl/fcsl_check.h"
 #include "fcsl/fcsl_scalar.h"
 #include "fcsl/fcsl_telemetry.h"
+#include "fcsl_allocations.h"
+#include "fcsl_check.h"
 #include "telemetry/resend.h"
 
 enum { HEADER = 40, KIND = 5, DATAGRAM = 2048, MANY = 20000, BIG = 3 << 20, LONG_NAME = 70000 };

@@ -6,8 +6,8 @@
 #include <stdlib.h>
 #include <string.h>
 
-#include "fcsl/fcsl_check.h"
 #include "fcsl/fcsl_run.h"
+#include "fcsl_check.h"
 
 enum { CAPACITY = 7, TICKS = 40 };
 

@@ -9,7 +9,7 @@
 #include <pthread.h>
 #include <semaphore.h>
 
-#include "fcsl/fcsl_check.h"
+#include "fcsl_check.h"
 
 enum { WORDS = 64, PUTS = 200000 };
 

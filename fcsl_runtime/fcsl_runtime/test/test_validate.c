@@ -7,7 +7,7 @@
 #include <dlfcn.h>
 
 #include "fcsl/fcsl_cdr.h"
-#include "fcsl/fcsl_check.h"
+#include "fcsl_check.h"
 #include "base/error.c"
 #include "run/range.c"
 #include "messages/message.c"

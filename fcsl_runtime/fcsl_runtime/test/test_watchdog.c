@@ -6,7 +6,7 @@
 
 #include <string.h>
 
-#include "fcsl/fcsl_check.h"
+#include "fcsl_check.h"
 
 int main(int argc, char **argv)
 {

@@ -11,9 +11,9 @@
 #include <string.h>
 #include <unistd.h>
 
-#include "fcsl/fcsl_check.h"
-#include "fcsl/fcsl_run.h"
 #include "fcsl/fcsl_external.h"
+#include "fcsl/fcsl_run.h"
+#include "fcsl_check.h"
 
 enum { MESSAGE_BYTES = 256, WAIT_MS = 10000 };
 

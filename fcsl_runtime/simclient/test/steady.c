@@ -26,7 +26,7 @@
 #include <time.h>
 #include <unistd.h>
 
-#include "fcsl/fcsl_allocations.h"
+#include "fcsl_allocations.h"
 
 enum { FORBIDDEN = 90, CANNOT = 77, LOOK_NS = 2000000 };
 

@@ -111,7 +111,7 @@ def folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
     (folder / "misbehave.c").write_text(EXTERN)
     (folder / "misbehave.h").write_text("#include <stdint.h>\nint64_t misbehave(int64_t kind);\n")
     source = ROOT / "fcsl_runtime/simclient/test/steady.c"
-    include = f"-I{ROOT}/fcsl_hal/include"
+    include = f"-I{ROOT}/fcsl_hal/test/support"
     subprocess.run(["cc", *CFLAGS, include, str(source), "-o", str(folder / "libsteady.so"), "-lpthread"], check=True)
     return folder
 

@@ -12,8 +12,8 @@
 #include <sys/syscall.h>
 #include <unistd.h>
 
-#include "fcsl/fcsl_allocations.h"
 #include "fcsl/fcsl_sim.h"
+#include "fcsl_allocations.h"
 
 enum { PLAN_BYTES = 1 << 20, FIRST_TICKS = 10, CANNOT = 77 };
 

@@ -58,7 +58,7 @@ _INCLUDES = (
         "fcsl_runtime/fcsl_runtime/fc",
         "fcsl_runtime/fcsl_runtime/board",
     ),
-    *("fcsl_runtime/fcsl_runtime/test", "fcsl_hal/test", "fcsl_sim/src"),
+    *("fcsl_runtime/fcsl_runtime/test", "fcsl_hal/test", "fcsl_hal/test/support", "fcsl_sim/src"),
 )
 
 

@@ -59,7 +59,7 @@ DEFECTS = (
 
 
 def build(hal: Path, program: Path) -> None:
-    include = [flag for folder in (hal / "include", hal / "src") for flag in ("-I", str(folder))]
+    include = [flag for folder in (hal / "include", hal / "src", hal / "test/support") for flag in ("-I", str(folder))]
     subprocess.run(["cc", "-std=c11", "-O2", *include, hal / "test" / PROGRAM, "-o", program], check=True)
 
 
