@@ -25,6 +25,7 @@ from fcsl_generator.types import HEALTH_NAMES, RANGE, REQUESTS, WORDS, Array, St
 from hypothesis import strategies as st
 
 import fcsl_compiler.reference.machine as reference_machine
+from fcsl_compiler.check import fault_points
 
 
 def test_programs(request: pytest.FixtureRequest) -> None:
@@ -37,6 +38,12 @@ def test_machines(request: pytest.FixtureRequest) -> None:
     """Several instances, rates, states, connections, guards, channels: the tick."""
     count = request.config.getoption("--programs")
     campaign(cases(), max(1, count - count // 3), request.config.getoption("--program-seed"))
+
+
+def test_elements_of_small_arrays_are_undone(monkeypatch: pytest.MonkeyPatch) -> None:
+    """As those of large ones are, which no generated machine has."""
+    monkeypatch.setattr(fault_points, "_UNDONE_BYTES", 1)
+    campaign(cases(), 20, 1)
 
 
 @cache

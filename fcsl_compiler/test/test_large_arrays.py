@@ -9,8 +9,6 @@ from typing import Any
 
 import numpy as np
 import pytest
-from fcsl_generator.campaign import campaign
-from fcsl_generator.machines import cases
 from fcsl_test_tables import kind, machine
 
 from fcsl_compiler.check import fault_points
@@ -150,11 +148,6 @@ def _at(index: int) -> int:
     if not 0 <= index < 64:
         raise IndexError
     return index
-
-
-def test_generated_machines_undo_elements_of_small_arrays(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(fault_points, "_UNDONE_BYTES", 1)
-    campaign(cases(), 15, 1)
 
 
 def test_elements_are_remembered_and_not_the_array(tmp_path: Path) -> None:
