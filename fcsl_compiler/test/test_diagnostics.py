@@ -89,7 +89,7 @@ def test_diagnostic(name: str, tmp_path: Path) -> None:
 
 def test_every_code_has_a_case() -> None:
     # E230 needs two machines, see below. E240 and W214 belong to --strict, see test_strict and test_circling_requests;
-    # E242 to subsets, see test_subset; E5xx and W5xx to boards, see test_board.
+    # E242 to subsets, see test_subset_machine; E5xx and W5xx to boards, see test_board.
     of_machines = {code for code in table() if code[1] != "5"}
     assert of_machines - {"E230", "E240", "E242", "W214"} == {name.split()[0] for name in all_cases()}
 

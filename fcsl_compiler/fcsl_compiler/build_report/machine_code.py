@@ -8,10 +8,10 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from ..driver.toolchain import compile_objects
-from ..emit.alike import alike
-from ..emit.bookkeeping import quiet_instances
+from ..emit.identical_code_folding import first_identical
 from ..emit.instances import execute_name
 from ..emit.names import instance_type
+from ..emit.status_elision import quiet_instances
 from ..model.machine import Machine, State
 from .bound import Bound, Bounder, Memory
 from .instruction_table import most, usual
@@ -78,7 +78,7 @@ class MachineCode:
 
     def execute(self, instance: int) -> Cost:
         """Cost of one call of the instance's execute, including the code around the algorithm. Raises Unbounded."""
-        first = self.machine.instances[alike(self.machine, quiet_instances(self.machine))[instance]]
+        first = self.machine.instances[first_identical(self.machine, quiet_instances(self.machine))[instance]]
         return _cost([self._bounds(execute_name(self.machine, first))])
 
     def step(self, state: State, slot: Slot | None) -> Cost:

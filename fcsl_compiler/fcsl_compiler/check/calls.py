@@ -14,8 +14,8 @@ from ..model.literals import fit
 from ..model.types import F64, MAX_ELEMENTS, Array, Scalar, Struct
 from .algorithm_class import METHODS
 from .checker import Checker, Stop
-from .python_habits import MODULES, instead_of, instead_of_function
 from .scope import CONSTRUCTORS
+from .unsupported_python import MODULES, instead_of, instead_of_function
 
 
 class CallChecker(Checker):

@@ -17,8 +17,8 @@ from .constants import check_constant
 from .declarations import Declarations
 from .externs import is_extern, read_extern
 from .library_files import library_names
-from .python_habits import instead_of_function, instead_of_import
 from .scope import BUILTIN_CONSTANTS, CONSTRUCTORS, LANGUAGE_NAMES, SHADOWABLE
+from .unsupported_python import instead_of_function, instead_of_import
 
 #: Names that fcsl_builtins offers in addition to the library.
 IMPORTABLE = (

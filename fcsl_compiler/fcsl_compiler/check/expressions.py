@@ -11,7 +11,7 @@ from ..model.effects import can_fault
 from ..model.literals import STRING_LITERAL, LiteralError
 from ..model.types import BOOL, HEALTH, REQUEST, Array, Scalar, Struct, Type, shape_of
 from .calls import CallChecker
-from .hoist import reaches_outside
+from .effect_order import reaches_outside
 from .places import PlaceChecker
 
 _BINARY = {

@@ -14,8 +14,8 @@ from ..model.types import BOOL, HEALTH_NAMES, I64, REQUEST, SCALARS, Array, Scal
 from .algorithm_class import METHODS, AlgorithmClass
 from .checker import Checker, Stop
 from .intervals import interval
-from .python_habits import instead_of
 from .scope import BUILTIN_CONSTANTS, ScalarConstant, StoredConstant
+from .unsupported_python import instead_of
 
 
 class PlaceChecker(Checker):

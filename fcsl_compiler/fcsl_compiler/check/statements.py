@@ -13,8 +13,8 @@ from ..model.effects import can_fault
 from ..model.types import BOOL, HEALTH_NAMES, I64, Array, Results, Scalar, Type
 from .annotations import annotation_type
 from .checker import Stop
+from .effect_order import Hoister, reaches_outside
 from .expressions import ExprChecker
-from .hoist import Hoister, reaches_outside
 from .intervals import interval, is_static
 from .library_files import library_names
 from .loop_bounds import BEYOND, MAX_BOUND, MAX_ITERATIONS, TOO_MANY, parameters_in

@@ -11,7 +11,7 @@ from ..base.diagnostics import DiagnosticSink
 from ..model.machine import Connection, Machine, State, seconds
 from .arming import warn_old_arm
 from .channels import assigned_outputs
-from .idle_transitions import warn_idle_transitions
+from .dead_transitions import warn_dead_transitions
 from .stale_guards import warn_stale_guards
 
 
@@ -31,7 +31,7 @@ def schedule(machine: Machine, sink: DiagnosticSink) -> Machine:
         else:
             by_instance = {e.instance: e for e in state.entries}
             states.append(replace(state, entries=tuple(by_instance[i] for i in order)))
-    warn_idle_transitions(machine, sink)
+    warn_dead_transitions(machine, sink)
     warn_stale_guards(machine, sink)
     _warn_unreachable(machine, sink)
     _warn_too_late(machine, sink)

@@ -96,7 +96,7 @@ def _validate_decision(counts: Counts, decision: Decision, file: str) -> None:
 
 def added(every: Sequence[Counts]) -> list[Counts]:
     """Combines builds of one machine JSON with the same sources: the whole machine and its subsets
-    (config/subset.py)."""
+    (config/subset_machine.py)."""
     groups: list[list[Counts]] = []
     for counts in every:
         group = next((g for g in groups if all(_fits(counts.map, other.map) for other in g)), None)

@@ -13,7 +13,7 @@ from ..check.verify import verify_machine
 from ..config.machine import check_machine
 from ..config.schedule import schedule
 from ..config.strict import check_strict
-from ..config.subset import subset
+from ..config.subset_machine import subset_machine
 from ..coverage.instrument import instrument
 from ..coverage.probes import C_OPERATIONS, prelude
 from ..coverage.settings import BUILD_NOTE
@@ -97,7 +97,7 @@ def _schedule(c: Compilation) -> None:
     # Errors are reported for the whole machine; the order is that of the subset.
     if c.instances is not None and not c.sink.failed:
         assert c.parsed is not None
-        c.machine = subset(c.machine, c.instances, c.parsed.keys["instances"].span, c.sink)
+        c.machine = subset_machine(c.machine, c.instances, c.parsed.keys["instances"].span, c.sink)
 
 
 def _lower(c: Compilation) -> None:

@@ -12,11 +12,11 @@ from ..model.c_names import c_name
 from ..model.code import Call, Deref, Function, If, Member, Name, Set, Statement
 from ..model.machine import Instance, Machine, Values
 from ..model.types import HEALTH, U32, Array, Scalar, Struct, Type, count_of
+from .cold_paths import failed
 from .copies import copied
 from .expressions import code_type
 from .functions import HOST_TYPE
 from .names import health, instance_type, record_type, request_constant
-from .rare import failed
 
 #: An array of more values is copied from a constant table. C compilers take quadratic time for so many assignments.
 _TABLE_VALUES = 64
@@ -92,7 +92,7 @@ def call(function: ir.Function, record: code.Place, fault: Name) -> code.Do:
 
 
 def run_quiet(machine: Machine, first: Instance, record: code.Place) -> code.Do:
-    """Runs execute of a quiet instance (bookkeeping.py), but for its health. `first`: of those alike."""
+    """Runs execute of a quiet instance (status_elision.py), but for its health. `first`: of those alike."""
     if _is_plain(first):
         return call(first.execute, record, _FAULT)
     return code.Do(Call(_run_name(machine, first), (code.Address(record),)), unused=True)
@@ -127,7 +127,7 @@ class InstanceEmitter:
     """Makes the functions of one instance."""
 
     def __init__(self, machine: Machine, instance: Instance, quiet: bool, first: Instance):
-        """`quiet`: see bookkeeping.py. `first`: of those alike (alike.py)."""
+        """`quiet`: see status_elision.py. `first`: of those alike (identical_code_folding.py)."""
         self.m, self.i, self.quiet, self.first = machine, instance, quiet, first
         self.pointer = code.Pointer(code.Named(instance_type(machine, instance)), writable=True)
         self.name = f"{machine.name}_{instance.name}"

@@ -10,17 +10,17 @@ from ..model import code, ir
 from ..model.c_names import c_name
 from ..model.machine import Machine, Values
 from ..model.types import Array, Struct, Type
-from .alike import alike
-from .bookkeeping import quiet_instances
+from .cold_paths import ColdPathEmitter
 from .expressions import code_type
 from .fault_places import FaultPlaces
 from .functions import FunctionEmitter
+from .identical_code_folding import first_identical
 from .inline_size import inlined_functions
 from .instances import InstanceEmitter, nested
 from .names import constant_name, record_type, request_constant, state_constant
-from .rare import RareEmitter
 from .records import records, result_records
 from .stack_bytes import stack_bytes
+from .status_elision import quiet_instances
 from .step import StepEmitter
 from .straight_line import written_out
 
@@ -28,7 +28,7 @@ from .straight_line import written_out
 def emit_machine(machine: Machine, places: FaultPlaces) -> code.Program:
     """`machine`: lowered. `places`: of its faults."""
     quiet = quiet_instances(machine)
-    firsts = alike(machine, quiet)
+    firsts = first_identical(machine, quiet)
     functions = tuple(_functions(machine, places, quiet, firsts))
     used = set().union(*(code.used_names(f.body) for f in functions))
     described, private = tuple(records(machine, firsts)), tuple(result_records(machine))
@@ -59,7 +59,7 @@ def _functions(
             made = written_out(made, _fields(machine, owner), bodies) or made
         bodies[made.name] = made
     yield from _called(bodies, machine)
-    yield from RareEmitter(machine, places, quiet).emit()
+    yield from ColdPathEmitter(machine, places, quiet).emit()
     for index, (instance, first) in enumerate(zip(machine.instances, firsts, strict=True)):
         yield from InstanceEmitter(machine, instance, index in quiet, machine.instances[first]).emit()
     yield from StepEmitter(machine, quiet, firsts).emit()

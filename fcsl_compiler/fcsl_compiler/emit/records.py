@@ -10,6 +10,7 @@ from ..model.c_names import c_name
 from ..model.code import STATE, U8, Block, Field, Named, Record
 from ..model.machine import Channel, Instance, Machine
 from ..model.types import I32, I64, U32, U64, Results
+from .cold_paths import counters_record, counters_type
 from .expressions import code_type
 from .names import (
     channel_member,
@@ -21,11 +22,10 @@ from .names import (
     sensors,
     struct_type,
 )
-from .rare import counters_record, counters_type
 
 
 def records(machine: Machine, firsts: Sequence[int]) -> Iterator[Record]:
-    """Each after those that it contains. `firsts`: see alike.py."""
+    """Each after those that it contains. `firsts`: see identical_code_folding.py."""
     for struct in machine.structs:
         fields = [
             Field(c_name(m.name), code_type(machine.name, m.type), f"[{m.unit}]" if m.unit else "")

@@ -38,7 +38,7 @@ class StepEmitter:
     """Makes the functions of the descriptor, callees first."""
 
     def __init__(self, machine: Machine, quiet: frozenset[int], firsts: Sequence[int]):
-        """`quiet`: instances, see bookkeeping.py. `firsts`: see alike.py."""
+        """`quiet`: instances, see status_elision.py. `firsts`: see identical_code_folding.py."""
         self.m, self.quiet, self.firsts = machine, quiet, firsts
         self.pointer = code.Pointer(code.Named(machine_type(machine)), writable=True)
 

@@ -12,7 +12,7 @@ from ..model.c_names import c_name
 from ..model.code import Binary, Call, Deref, Do, Function, If, Literal, Member, Name, Set, Statement, Update
 from ..model.machine import Channel, Connection, Edge, Entry, Instance, Machine, PortRef, State
 from ..model.types import BOOL, F64, I32, I64, U32, U64
-from .bookkeeping import noted_instances
+from .cold_paths import call_begin, call_fault, call_overrun, call_worsen
 from .copies import copied
 from .expressions import code_type
 from .functions import HOST_TYPE
@@ -27,7 +27,7 @@ from .names import (
     sensors,
     state_constant,
 )
-from .rare import call_begin, call_fault, call_overrun, call_worsen
+from .status_elision import noted_instances
 
 #: Maximum number of instances in one function. The time of C compilers grows faster than linearly with the size of a
 #: function.
@@ -87,7 +87,7 @@ class TickEmitter:
     """Makes one function per state, and its callees."""
 
     def __init__(self, machine: Machine, quiet: frozenset[int], firsts: Sequence[int]):
-        """`quiet`: instances, see bookkeeping.py. `firsts`: see alike.py."""
+        """`quiet`: instances, see status_elision.py. `firsts`: see identical_code_folding.py."""
         self.m, self.quiet, self.firsts = machine, quiet, firsts
         self.flatten = takes_bodies_in(machine)
         self.noted = noted_instances(machine)

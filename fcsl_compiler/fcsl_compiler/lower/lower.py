@@ -15,7 +15,7 @@ from ..model import ir
 from ..model.machine import Machine, Values
 from ..model.types import Array
 from .common_subexpressions import share_calls
-from .dead_stores import without_dead_stores
+from .dead_fills import without_dead_fills
 from .short_triangles import taken, without_short_triangles
 from .structural_zeros import PRODUCTS, Constant, product
 from .undo import with_undo
@@ -60,7 +60,7 @@ class _Lowering:
         if _is_library(f) and f.source_name in PRODUCTS:
             f = product(f, f.name, {})
         simple = replace(f, body=taken(f.body)) if _is_library(f) else f
-        body = _Body(self, known or {}).rewrite(without_dead_stores(simple))
+        body = _Body(self, known or {}).rewrite(without_dead_fills(simple))
         if _is_library(f):
             body = without_short_triangles(body)
         made = share_calls(replace(f, body=body), self._is_library)

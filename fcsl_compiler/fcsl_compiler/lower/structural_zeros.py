@@ -14,7 +14,7 @@ from functools import cached_property
 from ..model import ir
 from ..model.types import BOOL, F64, Array, Type
 from .product import WRITTEN_ROWS, Product, loop
-from .register_rows import by_rows
+from .register_blocking import by_rows
 
 #: Library functions that omit terms with a zero of a constant argument.
 PRODUCTS = frozenset({"matmul", "matvec", "symmetric_product"})

@@ -196,8 +196,8 @@ class Call:
 
 @dataclass(frozen=True)
 class EffectCall:
-    """The result of a call that reaches outside the machine, within an expression. check/hoist.py replaces it by a
-    statement (Effect)."""
+    """The result of a call that reaches outside the machine, within an expression. check/effect_order.py replaces it
+    by a statement (Effect)."""
 
     type: Type
     function: Extern

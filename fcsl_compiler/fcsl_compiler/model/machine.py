@@ -178,7 +178,7 @@ class Machine:
     targets: dict[str, Target] = dataclass_field(default_factory=dict)
     hashed_text: str = ""  # of the machine JSON, as source_hash covers it
     views: str = ""  # canonical text (config/views.py); "" without `views`
-    subset: tuple[str, ...] = ()  # names of the instances of a subset machine (config/subset.py)
+    subset: tuple[str, ...] = ()  # names of the instances of a subset machine (config/subset_machine.py)
     left_out: dict[str, str] = dataclass_field(default_factory=dict)  # source by omitted input
     arm: PortRef | None = None  # the bool output that arms the actuators
     command_timeout_ns: int = 0  # 0: none

@@ -1,14 +1,14 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Finds instances that can share a record and the code of `execute`."""
+"""Identical code folding: finds instances that can share a record and the code of `execute`."""
 
 from __future__ import annotations
 
 from ..model.machine import Machine
 
 
-def alike(machine: Machine, quiet: frozenset[int]) -> tuple[int, ...]:
+def first_identical(machine: Machine, quiet: frozenset[int]) -> tuple[int, ...]:
     """For each instance of a lowered machine the first one with an equal record and an equal `execute`, often itself.
-    Their parameters may differ, unless they are frozen. `quiet`: see bookkeeping.py."""
+    Their parameters may differ, unless they are frozen. `quiet`: see status_elision.py."""
     first: dict[tuple[str | bool, ...], int] = {}
     return tuple(
         first.setdefault(

@@ -16,7 +16,7 @@ from ..model.types import leaves
 from .arming import subset_arm
 
 
-def subset(machine: Machine, names: Sequence[str], at: Span, sink: DiagnosticSink) -> Machine | None:
+def subset_machine(machine: Machine, names: Sequence[str], at: Span, sink: DiagnosticSink) -> Machine | None:
     """The machine with the instances `names` only, in the order of the whole machine. Returns None after reporting an
     error `at` the given span.
 

@@ -1,6 +1,6 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Moves calls that reach outside the machine (externs, hardware) out of expressions. Each becomes a statement that
-stores its result in a hidden local.
+"""Gives calls that reach outside the machine (externs, hardware) their order in time: moves them out of expressions. Each
+becomes a statement that stores its result in a hidden local.
 
 Python evaluates from left to right. Operands to the left of such a call that may fault are therefore computed before
 it: their fault prevents the call, and a fault to its right does not. Arguments that may fault are computed before the

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Warnings about transitions that cannot occur in the states they leave: W202, W209, W210."""
+"""Warnings about dead transitions, which cannot occur in the states they leave: W202, W209, W210."""
 
 from __future__ import annotations
 
@@ -12,7 +12,7 @@ from ..model.types import HEALTH_NAMES
 _STALE = 1 << HEALTH_NAMES.index("stale")
 
 
-def warn_idle_transitions(machine: Machine, sink: DiagnosticSink) -> None:
+def warn_dead_transitions(machine: Machine, sink: DiagnosticSink) -> None:
     """Checks all transitions. A transition from several states has one edge for each. If one of these edges can occur,
     there is no warning."""
     transitions: dict[tuple[str, int, int], list[Edge]] = {}

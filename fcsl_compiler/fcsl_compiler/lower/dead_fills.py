@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Removes `c = zeros(…)` if every element of c is assigned before any is read."""
+"""Removes dead fills: `c = zeros(…)` if every element of c is assigned before any is read."""
 
 from __future__ import annotations
 
@@ -7,7 +7,7 @@ from ..model import ir
 from ..model.types import shape_of
 
 
-def without_dead_stores(f: ir.Function) -> tuple[ir.Stmt, ...]:
+def without_dead_fills(f: ir.Function) -> tuple[ir.Stmt, ...]:
     """The statements of a function without redundant fills. A fill at the beginning is redundant if the array is still
     zero, or if loops assign all its elements before it is returned."""
     body, returned = f.body, f.returned

@@ -12,7 +12,7 @@ import pytest
 from fcsl_test_abi import write_machine
 from fcsl_test_twins import Twins, bits
 
-from fcsl_compiler.lower.register_rows import _parts
+from fcsl_compiler.lower.register_blocking import _parts
 
 #: Rows, terms, columns.
 PRODUCTS = [(2, 1, 16), (3, 2, 31), (1, 5, 17), (8, 8, 8), (2, 9, 15), (2, 3, 46)]

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Selects the instances for which a tick can leave out a part of its bookkeeping."""
+"""Status elision: selects the instances whose health, or whose number for the watchdog, a tick need not store."""
 
 from __future__ import annotations
 

@@ -1,6 +1,6 @@
 # SPDX-License-Identifier: Apache-2.0
-"""What rarely happens to an instance in a tick: an injected fault or health, an overrun, a health to reset. One function
-for all instances of a machine, kept away from frequently executed code."""
+"""The cold paths of a tick: an injected fault or health, an overrun, a health to reset. Each is one function for all
+instances of a machine, kept away from frequently executed code."""
 
 from __future__ import annotations
 
@@ -76,8 +76,8 @@ def _call(machine: Machine, instance: Instance, what: str) -> Call:
     return Call(f"fcsl_{what}_{machine.name}", tuple(map(code.Address, places)))
 
 
-class RareEmitter:
-    """Makes the functions that a machine needs. `quiet`: see bookkeeping.py."""
+class ColdPathEmitter:
+    """Makes the functions that a machine needs. `quiet`: see status_elision.py."""
 
     def __init__(self, machine: Machine, places: FaultPlaces, quiet: frozenset[int]):
         self.m, self.places, self.quiet = machine, places, quiet

@@ -1,5 +1,6 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Products whose rows are accumulated in registers: those with long rows, and symmetric ones with long sums.
+"""Register blocking: products whose rows are accumulated in registers, those with long rows and symmetric ones with long
+sums.
 
 The library's matmul keeps a row in a local array, whose elements C compilers put in registers if they are few. A longer
 row is computed in parts. The rows of a symmetric_product have different lengths, and C compilers vectorise only loops of
