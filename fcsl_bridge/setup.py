@@ -23,24 +23,24 @@ setup(
     ],
     # Without this colcon runs unittest, which finds nothing.
     extras_require={"test": ["pytest"]},
-    # One line per node: "sim_node = fcsl_bridge.start:sim_node" becomes install/.../lib/fcsl_bridge/sim_node.
+    # One line per node: "sim_node = fcsl_bridge.nodes.start:sim_node" becomes install/.../lib/fcsl_bridge/sim_node.
     entry_points={
         "console_scripts": [
-            "controller_node = fcsl_bridge.start:controller_node",
-            "diagnostics_node = fcsl_bridge.start:diagnostics_node",
-            "rerun_node = fcsl_bridge.start:rerun_node",
-            "sim_node = fcsl_bridge.start:sim_node",
-            "topic_count = fcsl_bridge.start:topic_count",
+            "controller_node = fcsl_bridge.nodes.start:controller_node",
+            "diagnostics_node = fcsl_bridge.nodes.start:diagnostics_node",
+            "rerun_node = fcsl_bridge.nodes.start:rerun_node",
+            "sim_node = fcsl_bridge.nodes.start:sim_node",
+            "topic_count = fcsl_bridge.nodes.start:topic_count",
         ],
         # Read by ros2cli where it is installed: `ros2 fcsl VERB`.
-        "ros2cli.command": ["fcsl = fcsl_bridge.ros2_fcsl:FcslCommand"],
-        "ros2cli.extension_point": ["ros2fcsl.verb = fcsl_bridge.ros2_fcsl:Verb"],
+        "ros2cli.command": ["fcsl = fcsl_bridge.client.ros2_fcsl:FcslCommand"],
+        "ros2cli.extension_point": ["ros2fcsl.verb = fcsl_bridge.client.ros2_fcsl:Verb"],
         "ros2fcsl.verb": [
-            "info = fcsl_bridge.ros2_fcsl:InfoVerb",
-            "list = fcsl_bridge.ros2_fcsl:ListVerb",
-            "replay = fcsl_bridge.ros2_fcsl:ReplayVerb",
-            "set-state = fcsl_bridge.ros2_fcsl:SetStateVerb",
-            "state = fcsl_bridge.ros2_fcsl:StateVerb",
+            "info = fcsl_bridge.client.ros2_fcsl:InfoVerb",
+            "list = fcsl_bridge.client.ros2_fcsl:ListVerb",
+            "replay = fcsl_bridge.client.ros2_fcsl:ReplayVerb",
+            "set-state = fcsl_bridge.client.ros2_fcsl:SetStateVerb",
+            "state = fcsl_bridge.client.ros2_fcsl:StateVerb",
         ],
     },
 )

@@ -23,7 +23,7 @@ EXAMPLES = [
         ([], []),
         (["README.md", "docs/flight.md", "scripts/demo.py", "test/test_layers.py", "fcsl_sim/README.md"], []),
         (["fcsl_compiler/test/test_tick.py"], ["fcsl_compiler"]),
-        (["fcsl_bridge/fcsl_bridge/qos.py"], ["fcsl_bridge"]),
+        (["fcsl_bridge/fcsl_bridge/topics/qos.py"], ["fcsl_bridge"]),
         (["fcsl_runtime/simclient/test/test_fc.py"], ["simclient"]),
         (["fcsl_runtime/simclient/simclient/run.py"], sorted(["simclient", "fcsl_sim", "fcsl_bridge", *EXAMPLES])),
         (["examples/lander/sim/lander.sim.json"], ["fcsl_bridge", "lander"]),

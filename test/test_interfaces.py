@@ -182,8 +182,8 @@ CHECK = """
 import dataclasses, random, struct
 from rclpy.serialization import deserialize_message, serialize_message
 from fcsl_bridge.errors import BridgeError
-from fcsl_bridge.interfaces import instance_class
-from fcsl_bridge.machine_index import find_machine
+from fcsl_bridge.topics.interfaces import instance_class
+from fcsl_bridge.base.machine_index import find_machine
 from rosbags.typesys import Stores, get_types_from_msg, get_typestore
 from simclient import AlgTwin
 from simclient.ros.cdr import fixed_layout

@@ -43,7 +43,7 @@ FOLDERS: dict[str, Sequence[str]] = {
         "hal",
     ),
     "fcsl_sim": ("",),
-    "fcsl_bridge": ("",),
+    "fcsl_bridge": ("", "base", "topics", "diagnostics", "services", "loops", "simulator", "client", "nodes"),
     "verify": (
         *("shared", "binary", "bits", "coverage", "eva", "foxglove", "fuzz", "hardware", "instructions", "link"),
         *("mutation", "pil", "sanitize", ""),
@@ -171,6 +171,14 @@ def test_an_import_against_the_order_is_found(tmp_path: Path) -> None:
         "bag/files.py:2: simclient.twin.host",
         "run.py:2: simclient.bag",
     ]
+
+
+@pytest.mark.parametrize("name", [name for name, folders in FOLDERS.items() if len(folders) > 1])
+def test_an_import_from_the_lowest_folder_of_the_highest_is_found(name: str, tmp_path: Path) -> None:
+    lowest, *_, highest = (Path(folder, "x.py") for folder in FOLDERS[name])
+    module = module_name(tmp_path / name / highest, tmp_path / name)
+    root = write(tmp_path / name, {str(lowest): f"import {module}\n", str(highest): ""})
+    assert against_the_order(root, FOLDERS[name]) == [f"{lowest}:1: {module}"]
 
 
 def test_a_circle_is_found(tmp_path: Path) -> None:

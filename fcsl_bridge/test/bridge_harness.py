@@ -19,7 +19,7 @@ from rclpy.executors import SingleThreadedExecutor
 from rclpy.node import Node
 from rclpy.qos import QoSProfile
 
-from fcsl_bridge.bus_address import endpoint
+from fcsl_bridge.base.bus_address import endpoint
 from fcsl_compiler.base.packages import package_prefix, package_share
 
 LIMIT_S = 120.0

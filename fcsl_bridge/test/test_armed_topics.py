@@ -13,8 +13,8 @@ from typing import Any
 import pytest
 from rclpy.duration import Duration
 
-from fcsl_bridge import mapped_topics
-from fcsl_bridge.forward import Forward
+from fcsl_bridge.topics import mapped_topics
+from fcsl_bridge.topics.forward import Forward
 from simclient.ros.outbox import RunTopics
 from simclient.run import Run, open_run
 

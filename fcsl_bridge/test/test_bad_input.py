@@ -10,11 +10,11 @@ from typing import Any
 import pytest
 from bridge_harness import MACHINE, SIM, Domain
 
-from fcsl_bridge import controller_node, sim_node, topic_count
+from fcsl_bridge.base.machine_index import find_machine
+from fcsl_bridge.base.node_main import Option
 from fcsl_bridge.errors import BridgeError
 from fcsl_bridge.loopback import loopback_environment
-from fcsl_bridge.machine_index import find_machine
-from fcsl_bridge.node_main import Option
+from fcsl_bridge.nodes import controller_node, sim_node, topic_count
 from fcsl_compiler.base.packages import package_prefix
 
 CONTROLLER, SIMULATOR = "controller_node", "sim_node"

@@ -14,10 +14,10 @@ from rclpy.time import Time
 from rosgraph_msgs.msg import Clock
 from test_realtime_loop import HZ, NS, Robot
 
-from fcsl_bridge import qos
-from fcsl_bridge.clock_loop import ClockLoop
-from fcsl_bridge.clock_ticks import ClockTicks
 from fcsl_bridge.errors import Stopped
+from fcsl_bridge.loops.clock_loop import ClockLoop
+from fcsl_bridge.loops.clock_ticks import ClockTicks
+from fcsl_bridge.topics import qos
 from simclient.bag import Bag
 from simclient.replay import replay
 

@@ -6,7 +6,7 @@ from __future__ import annotations
 from hypothesis import given
 from hypothesis import strategies as st
 
-from fcsl_bridge.clock_ticks import ClockTicks
+from fcsl_bridge.loops.clock_ticks import ClockTicks
 
 NS = 10**9
 

@@ -29,8 +29,8 @@ from rcl_interfaces.msg import Log
 from rclpy.event_handler import SubscriptionEventCallbacks
 from rclpy.serialization import deserialize_message
 
-from fcsl_bridge import qos
-from fcsl_bridge.interfaces import instance_class
+from fcsl_bridge.topics import qos
+from fcsl_bridge.topics.interfaces import instance_class
 from fcsl_msgs.msg import Checkpoint, MachineState
 from fcsl_msgs.srv import InjectFault, Restore, Save, SetState
 from simclient import AlgTwin
@@ -430,7 +430,7 @@ def test_in_lockstep_a_checkpoint_of_another_tick_is_refused(domain: Domain) -> 
 
 
 def lander_library() -> Path:
-    from fcsl_bridge.machine_index import find_machine
+    from fcsl_bridge.base.machine_index import find_machine
 
     return find_machine(MACHINE)[0]
 

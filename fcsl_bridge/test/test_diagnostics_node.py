@@ -14,8 +14,8 @@ from bridge_harness import Domain, Process
 from diagnostic_msgs.msg import DiagnosticArray, DiagnosticStatus
 from rclpy.serialization import deserialize_message
 
-from fcsl_bridge import qos
-from fcsl_bridge.board_status import BoardStatus
+from fcsl_bridge.diagnostics.board_status import BoardStatus
+from fcsl_bridge.topics import qos
 from fcsl_compiler.base.packages import package_prefix
 
 ROOT = Path(__file__).resolve().parents[2]

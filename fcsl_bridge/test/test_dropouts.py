@@ -9,10 +9,10 @@ from typing import Any, cast
 
 import pytest
 
-from fcsl_bridge import mapped_topics
-from fcsl_bridge.dropouts import Dropouts
+from fcsl_bridge.base.machine_index import find_machine
 from fcsl_bridge.errors import BridgeError
-from fcsl_bridge.machine_index import find_machine
+from fcsl_bridge.services.dropouts import Dropouts
+from fcsl_bridge.topics import mapped_topics
 from simclient.run import open_run
 
 

@@ -16,7 +16,7 @@ import pytest
 import yaml
 from bridge_harness import Domain, Process
 
-from fcsl_bridge import controller_node, rerun_node, sim_node
+from fcsl_bridge.nodes import controller_node, rerun_node, sim_node
 from fcsl_compiler.base.packages import package_share
 
 pytest.importorskip("launch_ros", reason="launch_ros is not installed; CONTRIBUTING.md says how to have it")

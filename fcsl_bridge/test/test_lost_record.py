@@ -7,7 +7,7 @@ from pathlib import Path
 from types import SimpleNamespace
 from typing import Any
 
-from fcsl_bridge.hosted import Hosted
+from fcsl_bridge.loops.hosted import Hosted
 from simclient.errors import TwinError
 
 FAILED = TwinError("the disk is full")

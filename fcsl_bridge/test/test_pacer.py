@@ -9,7 +9,7 @@ from fractions import Fraction
 
 import pytest
 
-from fcsl_bridge.pacer import BINS_US, Pacer, sleep_until
+from fcsl_bridge.loops.pacer import BINS_US, Pacer, sleep_until
 
 NS = 10**9
 #: An arbitrary value of CLOCK_MONOTONIC at activation.

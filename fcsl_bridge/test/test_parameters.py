@@ -13,7 +13,7 @@ import rig
 from bridge_harness import Domain, Process
 from controller_client import ACTIVATE, CLEANUP, CONFIGURE, ControllerClient
 
-from fcsl_bridge.controller_node import OPTIONS
+from fcsl_bridge.nodes.controller_node import OPTIONS
 from fcsl_msgs.srv import Restore, Save
 from simclient import AlgTwin
 from simclient.bag import Bag

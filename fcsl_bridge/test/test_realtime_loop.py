@@ -20,7 +20,7 @@ from rosgraph_msgs.msg import Clock
 from sensor_msgs.msg import Imu
 from std_msgs.msg import Float64
 
-from fcsl_bridge import qos
+from fcsl_bridge.topics import qos
 from fcsl_msgs.msg import MachineState
 from fcsl_msgs.srv import Save, SetState
 from simclient import AlgTwin

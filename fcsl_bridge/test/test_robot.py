@@ -10,8 +10,8 @@ from bridge_harness import Domain
 from rclpy.serialization import deserialize_message
 from sensor_msgs.msg import Imu
 
-from fcsl_bridge import qos
-from fcsl_bridge.machine_index import find_machine
+from fcsl_bridge.base.machine_index import find_machine
+from fcsl_bridge.topics import qos
 from simclient.replay import replay
 
 ROLL = 0.3

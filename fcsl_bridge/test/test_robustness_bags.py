@@ -19,8 +19,8 @@ from bridge_harness import LIMIT_S, MACHINE, SIM, Domain, Process
 from rosbags.highlevel import AnyReader
 from rosbags.typesys import Stores, get_typestore
 
-from fcsl_bridge import start
-from fcsl_bridge.machine_index import find_machine
+from fcsl_bridge.base.machine_index import find_machine
+from fcsl_bridge.nodes import start
 from fcsl_compiler.base.packages import package_prefix
 from simclient.bag import Bag
 from simclient.errors import BagError

@@ -10,8 +10,8 @@ from typing import Any
 
 import pytest
 
-from fcsl_bridge import ros_time
-from fcsl_bridge.ros_time import RosTime
+from fcsl_bridge.loops import ros_time
+from fcsl_bridge.loops.ros_time import RosTime
 
 MS = 10**6
 DAY_NS = 86_400_000 * MS

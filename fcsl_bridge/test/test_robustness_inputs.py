@@ -18,7 +18,7 @@ from rclpy.serialization import deserialize_message, serialize_message
 from sensor_msgs.msg import Imu
 from std_msgs.msg import Float64, String
 
-from fcsl_bridge import qos
+from fcsl_bridge.topics import qos
 from simclient.replay import replay
 
 #: CDR of an Imu: encapsulation, stamp, frame_id "imu_link" with its NUL.

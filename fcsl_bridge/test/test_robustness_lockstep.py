@@ -12,7 +12,7 @@ from pathlib import Path
 from bridge_harness import MACHINE, SIM, Domain, Process
 from rosgraph_msgs.msg import Clock
 
-from fcsl_bridge import qos
+from fcsl_bridge.topics import qos
 from simclient.bag import Bag
 from simclient.bag.digest import digest
 

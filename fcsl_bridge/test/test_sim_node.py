@@ -22,9 +22,9 @@ from rclpy.parameter import Parameter
 from rosgraph_msgs.msg import Clock
 from std_srvs.srv import Trigger
 
-from fcsl_bridge import qos
-from fcsl_bridge.sim_control import Control
-from fcsl_bridge.sim_progress import verdict
+from fcsl_bridge.simulator.sim_control import Control
+from fcsl_bridge.simulator.sim_progress import verdict
+from fcsl_bridge.topics import qos
 from fcsl_msgs.msg import PlantTruth
 from fcsl_msgs.srv import Step
 from simclient.bag import Bag
@@ -308,7 +308,7 @@ def test_bad_parameters(domain: Domain, parameters: dict[str, Any], said: str) -
 def test_clock_is_its_cdr() -> None:
     from rclpy.serialization import deserialize_message
 
-    from fcsl_bridge.sim_node import _CLOCK_ZERO
+    from fcsl_bridge.nodes.sim_node import _CLOCK_ZERO
 
     clock = deserialize_message(_CLOCK_ZERO, Clock)
     assert (clock.clock.sec, clock.clock.nanosec) == (0, 0)

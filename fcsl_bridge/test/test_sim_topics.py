@@ -19,8 +19,8 @@ from rclpy.serialization import deserialize_message
 from rosgraph_msgs.msg import Clock
 from sensor_msgs.msg import Range
 
-from fcsl_bridge import qos
-from fcsl_bridge.sim_topics import below
+from fcsl_bridge.simulator.sim_topics import below
+from fcsl_bridge.topics import qos
 from fcsl_compiler.base.packages import package_share
 from fcsl_msgs.msg import PlantTruth
 from fcsl_msgs.srv import Step

@@ -15,7 +15,7 @@ import numpy as np
 import pytest
 from rclpy.serialization import deserialize_message, serialize_message
 
-from fcsl_bridge.interfaces import message_class
+from fcsl_bridge.topics.interfaces import message_class
 from fcsl_compiler.base.packages import package_prefix
 from fcsl_compiler.ros.composer import Source
 from fcsl_compiler.ros.message_fields import fields_of, select

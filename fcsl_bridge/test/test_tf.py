@@ -20,8 +20,8 @@ from rclpy.serialization import deserialize_message
 from rosbags.rosbag2 import StoragePlugin, Writer
 from rosbags.typesys import Stores, get_typestore
 
-from fcsl_bridge import qos, tf
 from fcsl_bridge.errors import BridgeError
+from fcsl_bridge.topics import qos, tf
 from simclient.bag import Bag
 from simclient.replay.frames import Chain, Frames
 from simclient.ros.composer import Source

@@ -16,10 +16,10 @@ from rclpy.qos import DurabilityPolicy, ReliabilityPolicy
 from rclpy.serialization import deserialize_message
 from rosgraph_msgs.msg import Clock
 
-from fcsl_bridge import qos
+from fcsl_bridge.base.machine_index import find_machine
 from fcsl_bridge.errors import BridgeError
-from fcsl_bridge.interfaces import instance_class, message_class
-from fcsl_bridge.machine_index import find_machine
+from fcsl_bridge.topics import qos
+from fcsl_bridge.topics.interfaces import instance_class, message_class
 from fcsl_msgs.msg import FaultCounters, InstanceHealth, MachineState, TransitionEvent
 from simclient.bag import Bag
 from simclient.c_machine import TYPE_FORMATS

@@ -4,7 +4,7 @@
  *
  * Deadline k lies floor(k * 1e9 / tick_hz) ns after the anchor, an absolute time: no error adds up, and the deadlines keep
  * their places whatever happens to a tick. A deadline is missed when the next one has come before its tick begins; the
- * policy decides what happens to missed deadlines. The ROS node's pacer (fcsl_bridge/pacer.py) is the policy skip.
+ * policy decides what happens to missed deadlines. The ROS node's pacer (fcsl_bridge/loops/pacer.py) is the policy skip.
  */
 #ifndef FC_PACING_H
 #define FC_PACING_H

@@ -1,0 +1,2 @@
+# SPDX-License-Identifier: Apache-2.0
+"""Statuses of /diagnostics: of a machine and of a board."""

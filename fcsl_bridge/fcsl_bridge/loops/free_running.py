@@ -1,0 +1,111 @@
+# SPDX-License-Identifier: Apache-2.0
+"""What running on a robot's topics has in common, whatever makes a tick due: realtime_loop.py, clock_loop.py.
+
+The thread that steps does all other work in the slack between ticks; no callback causes a tick. Stamps are ROS time, in
+topics and in the bag. Tick numbers count steps: a tick that was skipped is none.
+"""
+
+from __future__ import annotations
+
+import gc
+import math
+import time
+from collections.abc import Callable
+
+from rclpy.node import Node
+
+from ..diagnostics.machine_status import Figures
+from ..topics.mapped_topics import Inputs
+from .hosted import Hosted
+from .ros_time import RosTime
+
+#: Without a message of /clock for so long after the start a node says what it lacks, in s.
+_NO_CLOCK_S = 2.0
+
+
+class FreeRunning:
+    """`serve` runs the node's other callbacks, and raises what ends the ticking. `simulated`: ROS time is that of /clock."""
+
+    #: What a node without /clock cannot do.
+    _LACKS = "with use_sim_time all stamps are 0 until a simulator or `ros2 bag play --clock` publishes it"
+
+    def __init__(self, node: Node, hosted: Hosted, serve: Callable[[], None], simulated: bool):
+        self._node, self._hosted, self._serve = node, hosted, serve
+        self._inputs = Inputs(node, hosted.run)
+        self._time = RosTime(node, simulated)
+        self._stamp_ns = 0
+        self._clockless_at_s = 0.0
+        hosted.sources.append(self)
+        hosted.run.time_executes()
+        unmapped = [c.name for c in hosted.run.machine.channels if c.direction == "sensor" and not c.ros_type]
+        if unmapped:
+            node.get_logger().warning(
+                f"nothing fills {', '.join(unmapped)}: outside lock-step a sensor channel needs `ros`"
+            )
+
+    def activate(self) -> None:
+        """Publishes the latched topics; ticks become due from now on."""
+        self._time.start()
+        self._stamp_ns = self.now_ns()
+        self._hosted.run.record_time(self._stamp_ns)
+        self._hosted.record()
+        self._hosted.show_changes(self._stamp_ns)
+        self._clockless_at_s = time.monotonic() + _NO_CLOCK_S
+        self._inputs.forget()
+        gc.unfreeze()
+        gc.collect()
+        gc.freeze()  # the garbage collector ignores objects that exist now
+        self._start()
+
+    def _start(self) -> None:
+        """The first tick is due now, or with what makes ticks due."""
+        raise NotImplementedError
+
+    def _tick(self, stamp_ns: int, now_ns: int) -> None:
+        """Makes the tick that was due at stamp_ns, with what came until now_ns; both in ROS time."""
+        hosted, self._stamp_ns = self._hosted, stamp_ns
+        hosted.run.record_time(stamp_ns)
+        self._inputs.poll(now_ns, hosted.dropouts.missing())
+        hosted.run.step(1)
+        hosted.show(stamp_ns)
+
+    def _diagnose(self) -> None:
+        """Once per second, in the slack."""
+        if self._hosted.diagnostics.due():
+            self._hosted.check_record()
+            self._time.follow()
+            if self.now_ns() > 0:
+                self._inputs.warn_of_other_clocks("/clock" if self._time.simulated else "the system's clock")
+            self._warn_of_no_clock()
+            self._hosted.diagnostics.publish(self._stamp_ns)
+
+    def _warn_of_no_clock(self) -> None:
+        """Logs once after each start."""
+        if self._time.simulated and not self._time.heard and time.monotonic() >= self._clockless_at_s:
+            self._clockless_at_s = math.inf
+            self._node.get_logger().warning(f"no message of /clock has come within {_NO_CLOCK_S:g} s: {self._LACKS}")
+
+    def rest(self) -> None:
+        """While inactive there is nothing to do."""
+
+    def now_ns(self) -> int:
+        """The time that a message of now is stamped with."""
+        return self._time.at(time.monotonic_ns())
+
+    def leave(self) -> None:
+        """Nothing to do: no simulator waits for this node."""
+
+    def figures(self) -> Figures:
+        return self._inputs.figures()
+
+    def troubles(self) -> dict[str, int]:
+        return {
+            "system clock set": self._time.sets,
+            "/clock malformed": self._time.malformed,
+            **self._inputs.troubles(),
+        }
+
+    def close(self) -> None:
+        gc.unfreeze()
+        self._inputs.close()
+        self._time.close()

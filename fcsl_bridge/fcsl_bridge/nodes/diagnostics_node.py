@@ -1,0 +1,99 @@
+# SPDX-License-Identifier: Apache-2.0
+"""Shows the board of a running flight program, fcsl-fc, on /diagnostics: its sensors and devices, once per second.
+
+It asks the variable server of the program (`fcsl-fc --socket`). It waits for a program, and for the next one when that
+has ended; the statuses are STALE meanwhile.
+"""
+
+from __future__ import annotations
+
+import sys
+import time
+
+from diagnostic_msgs.msg import DiagnosticArray, DiagnosticStatus
+from rclpy.node import Node
+
+from simclient.vars.client import VarClient
+from simclient.vars.wire import VarError
+
+from ..base.node_main import Option, Stop, read_options, run_node
+from ..diagnostics.board_status import BoardStatus
+from ..errors import BridgeError, Stopped
+from ..topics import qos
+
+OPTIONS = (
+    Option("socket", str, None, "that of the flight program: a path, or tcp:HOST:PORT"),
+    Option("token", str, "", "the file with the token of a TCP server"),
+)
+_PERIOD_S, _POLL_S = 1.0, 0.05
+#: How long the program may take to answer, in s.
+_TIMEOUT_S = 1.0
+#: Codes of a program that is not there, or hangs; any other error is one of the user.
+_ABSENT = ("unreachable", "closed", "timeout")
+
+
+class BoardWatch:
+    """Publishes what the flight program at `address` says of its board. Raises BridgeError where waiting cannot help."""
+
+    def __init__(self, node: Node, address: str, token: str):
+        self._node, self._address, self._token = node, address, token or None
+        self._publisher = qos.publisher(node, DiagnosticArray, "/diagnostics", qos.EVENT)
+        self._client: VarClient | None = None
+        self._board: BoardStatus | None = None
+        self._statuses: list[DiagnosticStatus] = []
+        print(f"waiting for a flight program at {address}", flush=True)
+
+    def publish(self) -> None:
+        try:
+            self._look()
+        except VarError as error:
+            if error.code not in _ABSENT:
+                raise BridgeError(str(error)) from None
+            self._lose(str(error))
+        if self._statuses:
+            message = DiagnosticArray(status=self._statuses)
+            message.header.stamp = self._node.get_clock().now().to_msg()
+            self._publisher.publish(message)
+
+    def _look(self) -> None:
+        if self._client is None:
+            self._client = VarClient(self._address, self._token, _TIMEOUT_S)
+        if self._board is None:
+            machine = self._client.describe()["machine"]
+            if not self._client.list("hal.devices."):
+                raise BridgeError(
+                    f"the flight program at {self._address} has no board with devices: --hal linux:PLAN has one"
+                )
+            self._board = BoardStatus(f"{self._node.get_namespace().rstrip('/')}/{machine}"[1:], machine)
+            print(f"{machine}: its board is on /diagnostics", flush=True)
+        self._statuses = self._board.look(self._client.get_value("hal"))
+
+    def _lose(self, why: str) -> None:
+        if self._client is not None:
+            self._client.close()
+            self._client = None
+        if self._board is not None:
+            self._board = None
+            print(f"{why}; waiting for the next flight program", flush=True)
+        for status in self._statuses:
+            status.level, status.message = DiagnosticStatus.STALE, why
+
+
+def _body(node: Node, stop: Stop) -> int:
+    options = read_options(node, OPTIONS)
+    if not options["socket"]:
+        raise BridgeError("parameter `socket` is missing: -p socket:=<that of fcsl-fc>")
+    watch, due = BoardWatch(node, options["socket"], options["token"]), 0.0
+    try:
+        while True:
+            stop.check()
+            if time.monotonic() >= due:
+                due = time.monotonic() + _PERIOD_S
+                watch.publish()
+            time.sleep(_POLL_S)
+    except Stopped:
+        return 0
+
+
+def main() -> None:
+    sys.exit(run_node("diagnostics_node", OPTIONS, _body))

@@ -1,0 +1,57 @@
+# SPDX-License-Identifier: Apache-2.0
+"""One vehicle of a simulation: its plant, the address at which its controller finds it, its topics."""
+
+from __future__ import annotations
+
+from rclpy.node import Node
+
+from fcsl_sim.config import SimConfig
+from fcsl_sim.native import Simulation
+
+from ..topics.forward import Forward
+from ..topics.tf import Chosen
+from .sim_topics import SimTopics
+
+
+class Vehicle:
+    """name_space: of its topics, empty for the node's own. address: where its controller finds it, or it the bus."""
+
+    def __init__(
+        self,
+        node: Node,
+        config: SimConfig,
+        name_space: str,
+        decimate: int,
+        chosen: Chosen,
+        address: str,
+        timeout_s: float,
+        forward: Forward,
+    ):
+        self.name_space = name_space
+        self._config, self._address, self._timeout_ms = config, address, int(1000 * timeout_s)
+        inside = node.get_namespace()
+        self._keys = name_space if name_space.startswith("/") else f"{inside}/{name_space}"
+        self.accepted = False
+        self.sim = Simulation(config.plan, config.tables)
+        self.topics = SimTopics(node, self.sim, config.ros, name_space, decimate, chosen, forward)
+
+    def listen(self) -> None:
+        """A controller can connect from now on. Raises SimError."""
+        self.sim.listen(self._address, self._timeout_ms, self._keys)
+        self.accepted = False
+
+    def accept(self, wait_ms: int) -> None:
+        """Waits for the controller, for up to wait_ms; sets `accepted`. Raises SimError."""
+        self.accepted = self.sim.accept(wait_ms)
+
+    @property
+    def running(self) -> bool:
+        return self.sim.status == "running"
+
+    def reset(self) -> None:
+        """Back to tick 0, in a new run; nobody is connected."""
+        self.sim.close()
+        self.sim = Simulation(self._config.plan, self._config.tables)
+
+    def close(self) -> None:
+        self.sim.close()

@@ -1,0 +1,212 @@
+# SPDX-License-Identifier: Apache-2.0
+"""The channels of a machine that the JSON maps onto standard messages: subscribed topics, read at each tick, and
+published topics.
+"""
+
+from __future__ import annotations
+
+import struct
+from collections.abc import Callable, Sequence
+from typing import Any
+
+from rclpy.node import Node
+
+from simclient.ros.outbox import RunTopics
+from simclient.ros.topics import Inlet, RosTopic, composer_of, sources_of, topics_of
+from simclient.run import Run
+
+from ..base.node_main import wait_for_receivers
+from ..base.polled import Polled
+from . import qos, tf
+from .forward import Forward
+from .interfaces import message_class
+
+#: For all receivers together to have the last commands.
+_SAFE_WAIT_S = 0.2
+
+
+#: A topic that many publish by design: a receiver picks what it needs by frame.
+_SHARED = "tf2_msgs/msg/TFMessage"
+#: Where a message has its frame: behind the encapsulation and the stamp; its length stands before it.
+_FRAMES_AT, _LENGTH = 12, struct.Struct("<I")
+#: Bytes of a frame that are shown.
+_FRAME_SHOWN = 80
+#: Stamps that lie this far from ROS time are of another clock, in ns.
+_OTHER_CLOCK_NS = 60_000_000_000
+
+
+class Inputs:
+    """Sensor topics, polled. Of several messages since the last tick the newest is used; if it is refused, the one
+    before."""
+
+    def __init__(self, node: Node, run: Run):
+        self._node = node
+        topics = [topic for topic in topics_of(run.machine) if topic.direction == "sensor"]
+        ready = [(topic, Inlet(run, topic), message_class(topic.type)) for topic in topics]
+        self._inlets = [_Input(node, t, inlet, Polled(node, kind, t.name, qos.SENSOR)) for t, inlet, kind in ready]
+
+    def poll(self, now_ns: int, missing: frozenset[str]) -> None:
+        """Delivers received messages for the next tick. now_ns: ROS time. Channels in `missing` get nothing."""
+        for one in self._inlets:
+            one.poll(now_ns, missing)
+
+    def forget(self) -> None:
+        """Drops all received messages, which are too old."""
+        for one in self._inlets:
+            one.forget()
+
+    def figures(self) -> dict[str, int]:
+        """Numbers of messages that became samples, and of messages superseded by newer ones."""
+        return self._counts(lambda reason: reason in _HARMLESS)
+
+    def troubles(self) -> dict[str, int]:
+        """Numbers of refused messages, by reason; and how often a topic was found to have several publishers."""
+        for one in self._inlets:
+            one.contested += one.topic.type != _SHARED and self._node.count_publishers(one.name) > 1
+        contested = {f"hal.{one.topic.name} has several publishers": one.contested for one in self._inlets}
+        return self._counts(lambda reason: reason not in _HARMLESS) | contested
+
+    def warn_of_other_clocks(self, clock: str) -> None:
+        """Logs once for each topic whose stamps are far from ROS time, which is that of `clock`, at two calls in succession:
+        a clock may have been set between them."""
+        for one in self._inlets:
+            one.odd = one.odd + 1 if abs(one.behind_ns) > _OTHER_CLOCK_NS else 0
+            if one.odd == 2 and not one.warned:
+                one.warned = True
+                direction = "before" if one.behind_ns > 0 else "after"
+                self._node.get_logger().warning(
+                    f"{one.name}: stamped {abs(one.behind_ns) / 1e9:.0f} s {direction} the time of this node, which is "
+                    f"that of {clock}: its sender has another clock"
+                )
+
+    def _counts(self, wanted: Callable[[str], bool]) -> dict[str, int]:
+        return {
+            f"hal.{one.topic.name} {reason}": count
+            for one in self._inlets
+            for reason, count in one.counts().items()
+            if wanted(reason)
+        }
+
+    def close(self) -> None:
+        for one in self._inlets:
+            one.close()
+
+
+#: Counts of an inlet that do not indicate a problem.
+_HARMLESS = ("taken", "superseded")
+
+
+class _Input:
+    def __init__(self, node: Node, topic: RosTopic, inlet: Inlet, polled: Polled):
+        self._node, self.topic, self._inlet, self._polled = node, topic, inlet, polled
+        self._frame_told = False
+        self._superseded = self.contested = 0
+        self.odd, self.warned = 0, False
+
+    @property
+    def name(self) -> str:
+        """The topic's full name, remapped."""
+        return self._polled.topic
+
+    @property
+    def behind_ns(self) -> int:
+        """How far the newest stamp lay behind ROS time."""
+        return self._inlet.behind_ns
+
+    def poll(self, now_ns: int, missing: frozenset[str]) -> None:
+        waiting = self._polled.take_all()
+        while waiting:
+            message = waiting.pop()
+            if self._inlet.deliver(message, now_ns, missing):
+                break
+            if not self._frame_told and "frame" in self._inlet.counts():
+                self._frame_told = True
+                self._tell_frame(message)
+        self._superseded += len(waiting)
+
+    def _tell_frame(self, data: bytes) -> None:
+        """Logs the frames of the first message that was refused for them."""
+        wanted = [text for text in (self.topic.frame, self.topic.child_frame) if text]
+        came = _frames(data, 2 if self.topic.child_frame else 1)[-len(wanted) :]
+        self._node.get_logger().warning(
+            f"{self.name}: refused: its frame is {' -> '.join(came)}, that of its channels {' -> '.join(map(repr, wanted))}"
+        )
+
+    def forget(self) -> None:
+        while self._polled.take_all():
+            pass
+
+    def counts(self) -> dict[str, int]:
+        counts = self._inlet.counts()
+        return counts | {"superseded": counts.get("superseded", 0) + self._superseded}
+
+    def close(self) -> None:
+        self._polled.close()
+
+
+def _frames(data: bytes, count: int) -> list[str]:
+    """The first strings of a message behind its stamp, which may be cut: of the header, then of the child."""
+    found, at = [], _FRAMES_AT
+    for _ in range(count):
+        at += -at % _LENGTH.size
+        (size,) = _LENGTH.unpack_from(data, at) if at + _LENGTH.size <= len(data) else (0,)
+        at += _LENGTH.size
+        found.append(repr(data[at : at + size].rstrip(b"\0")[:_FRAME_SHOWN].decode(errors="replace")))
+        at += size
+    return found
+
+
+class Outputs:
+    """Topics of actuators and reports, published at every tick: of actuators their safe values while the machine is
+    disarmed. `chosen`: those whose poses go to /tf, too."""
+
+    def __init__(self, node: Node, run: Run, forward: Forward, messages: RunTopics, chosen: Sequence[str]):
+        self._node, self._run, self._messages = node, run, messages
+        topics = [topic for topic in topics_of(run.machine) if topic.direction != "sensor"]
+        ready = [(t, composer_of(t), message_class(t.type)) for t in topics]
+        self._outlets: list[tuple[RosTopic, Any, Any]] = [
+            (topic, composer, qos.publisher(node, kind, topic.name, qos.COMMAND)) for topic, composer, kind in ready
+        ]
+        self._contested = dict.fromkeys((t.name for t in topics), 0)
+        self._numbers = {topic.name: forward.add(publisher) for topic, _, publisher in self._outlets}
+        for topic, composer, _ in self._outlets:
+            messages.add_channels(self._numbers[topic.name], topic.direction, composer)
+        directions = {topic.name: topic.direction for topic in topics}
+        posed = [tf.Posed(t.name, t.type, t.frame, t.child_frame, sources_of(t)) for t in topics]
+        transforms = tf.broadcasts(chosen, posed)
+        self._tf = qos.publisher(node, message_class(tf.MESSAGE), tf.TOPIC, qos.TF) if transforms else None
+        for name, composer in transforms.items():
+            messages.add_channels(forward.add(self._tf), directions[name], composer)
+
+    def make_safe(self, time_ns: int) -> None:
+        """Publishes the safe values of a machine that something arms, stamped time_ns, and waits a moment for their
+        receivers. For the end of ticking: no command follows."""
+        if self._run.safe_address is None:
+            return
+        actuators = [(c, publisher) for topic, c, publisher in self._outlets if topic.direction == "actuator"]
+        for composer, publisher in actuators:
+            data = composer.compose([self._run.safe_address], time_ns)
+            if data is not None:
+                publisher.publish(data)
+        wait_for_receivers((publisher for _, publisher in actuators), _SAFE_WAIT_S)
+
+    def figures(self) -> dict[str, int]:
+        return {}
+
+    def troubles(self) -> dict[str, int]:
+        """Numbers of messages that could not be composed, because a value does not fit its field; and how often
+        another node was found to publish the same topic."""
+        for topic, _, publisher in self._outlets:
+            self._contested[topic.name] += self._node.count_publishers(publisher.topic_name) > 1
+        contested = {f"hal.{name} published by others": count for name, count in self._contested.items()}
+        refused = {
+            f"hal.{topic.name} does not fit": composer.refused + self._messages.refused(self._numbers[topic.name])
+            for topic, composer, _ in self._outlets
+        }
+        return refused | contested
+
+    def close(self) -> None:
+        for _, _, publisher in self._outlets:
+            self._node.destroy_publisher(publisher)
+        if self._tf is not None:
+            self._node.destroy_publisher(self._tf)
