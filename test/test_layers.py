@@ -70,10 +70,43 @@ def for_types_alone(tree: ast.Module) -> set[ast.AST]:
     return {inner for guard in guards for inner in ast.walk(guard)}
 
 
+def known_text(e: ast.expr, names: Mapping[str, str]) -> str:
+    """The constant beginning of a text: of a constant, a name that is assigned one, or an f-string."""
+    if isinstance(e, ast.Constant):
+        return e.value if isinstance(e.value, str) else ""
+    if not isinstance(e, ast.JoinedStr):
+        return names.get(ast.unparse(e), "")
+    found = ""
+    for part in e.values:
+        text = known_text(part.value if isinstance(part, ast.FormattedValue) else part, names)
+        found += text
+        if not text:
+            break
+    return found
+
+
+def imports_by_call(tree: ast.Module) -> Iterator[tuple[int, str]]:
+    """Line and name, as far as it is constant, of what import_module() and __import__() get."""
+    names: dict[str, str] = {}
+    for node in ast.walk(tree):
+        if isinstance(node, ast.Assign):
+            names |= {ast.unparse(target): known_text(node.value, names) for target in node.targets}
+    for node in ast.walk(tree):
+        if (
+            isinstance(node, ast.Call)
+            and ast.unparse(node.func).endswith(("import_module", "__import__"))
+            and node.args
+        ):
+            name = known_text(node.args[0], names).rstrip(".")
+            if name:
+                yield node.lineno, name
+
+
 def imports(path: Path, root: Path, modules: Mapping[str, Path], with_types: bool = True) -> Iterator[tuple[int, str]]:
-    """Line and full name of every module that a file imports, anywhere in the file."""
+    """Line and full name of every module that a file imports, anywhere in the file, by a statement or by a call."""
     package = module_name(path, root) if path.name == "__init__.py" else module_name(path, root).rpartition(".")[0]
     tree = ast.parse(path.read_text(encoding="utf-8"))
+    yield from ((line, resolve_name(name, package)) for line, name in imports_by_call(tree))
     passed_over = set() if with_types else for_types_alone(tree)
     for node in ast.walk(tree):
         if node in passed_over:
@@ -135,18 +168,22 @@ def test_no_file_imports_itself_through_others(name: str) -> None:
     assert circles(PACKAGES[name]) == []
 
 
+def of_later_packages(root: Path) -> list[str]:
+    """Imports of the package at `root` that violate the order of packages."""
+    order = list(PACKAGES)
+    later = order[order.index(root.name) + 1 :]
+    return [
+        f"{path.relative_to(root)}:{line}: {module}"
+        for path in sources(root)
+        for line, module in imports(path, root, {})
+        if module.partition(".")[0] in later
+    ]
+
+
 @pytest.mark.parametrize("name", PACKAGES)
 def test_packages_know_those_before_them_alone(name: str) -> None:
     """fcsl_builtins, which algorithm files import, calls the reference and belongs to the compiler."""
-    order = list(PACKAGES)
-    later = order[order.index(name) + 1 :]
-    found = [
-        f"{path.relative_to(ROOT)}:{line}: {module}"
-        for path in sources(PACKAGES[name])
-        for line, module in imports(path, PACKAGES[name], {})
-        if module.partition(".")[0] in later
-    ]
-    assert found == []
+    assert of_later_packages(PACKAGES[name]) == []
 
 
 def write(root: Path, files: Mapping[str, str]) -> Path:
@@ -179,6 +216,25 @@ def test_an_import_from_the_lowest_folder_of_the_highest_is_found(name: str, tmp
     module = module_name(tmp_path / name / highest, tmp_path / name)
     root = write(tmp_path / name, {str(lowest): f"import {module}\n", str(highest): ""})
     assert against_the_order(root, FOLDERS[name]) == [f"{lowest}:1: {module}"]
+
+
+def test_an_import_by_a_call_is_found(tmp_path: Path) -> None:
+    by_call = """
+import importlib
+from importlib import import_module
+_SIM = "fcsl_sim"
+importlib.import_module("fcsl_sim.native")
+def f(module):
+    import_module(f"{_SIM}.{module}")
+    name = f"{_SIM}.{module}"
+    import_module(name)
+    import_module(".twin.host", __package__)
+    import_module(f".{module}", __package__)
+    __import__(module)
+"""
+    root = write(tmp_path / "simclient", {"__init__.py": "", "run.py": by_call, "twin/host.py": ""})
+    assert of_later_packages(root) == ["run.py:5: fcsl_sim.native", "run.py:7: fcsl_sim", "run.py:9: fcsl_sim"]
+    assert against_the_order(root, FOLDERS["simclient"]) == ["run.py:10: simclient.twin.host"]
 
 
 def test_a_circle_is_found(tmp_path: Path) -> None:

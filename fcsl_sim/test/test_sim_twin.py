@@ -671,5 +671,8 @@ def test_simclient_has_it_and_says_where_it_is_missing() -> None:
         return subprocess.run(line, capture_output=True, text=True, check=False, timeout=60)
 
     assert run("from simclient import SimTwin; print(SimTwin.__module__)").stdout == "fcsl_sim.sim_twin\n"
-    missing = run("import sys; sys.modules['fcsl_sim'] = None; from simclient import SimTwin")
-    assert missing.returncode == 1 and "ImportError: SimTwin is in the package `fcsl_sim`" in missing.stderr
+    removed = "import sys; sys.modules['fcsl_sim'] = None"
+    never_there = "from simclient import simulation; simulation.entry_points = lambda **which: ()"
+    for environment in (removed, never_there):
+        missing = run(f"{environment}; from simclient import SimTwin")
+        assert missing.returncode == 1 and "ImportError: SimTwin is in the package `fcsl_sim`" in missing.stderr

@@ -48,8 +48,6 @@ _HOME = {
     "VarError": "vars.wire",
     "diff": "twin.snapshot",
 }
-#: In a package that needs this one.
-_SIM = "fcsl_sim"
 
 __all__ = [
     "AlgTwin",
@@ -77,7 +75,9 @@ def __getattr__(name: str) -> Any:
     if name in _HOME:
         found = getattr(import_module(f".{_HOME[name]}", __name__), name)
     elif name == "SimTwin":
-        found = getattr(_sim_module("sim_twin", name), name)
+        from .simulation import simulation_part
+
+        found = getattr(simulation_part("twin", name), name)
     else:
         raise AttributeError(f"module {__name__!r} has no attribute {name!r}")
     globals()[name] = found
@@ -86,15 +86,3 @@ def __getattr__(name: str) -> Any:
 
 def __dir__() -> list[str]:
     return sorted({*globals(), *__all__})
-
-
-def _sim_module(module: str, what: str) -> Any:
-    """A module of the simulator, where `what` is. Raises ImportError, which says what is missing."""
-    name = f"{_SIM}.{module}"
-    try:
-        return import_module(name)
-    except ModuleNotFoundError as error:
-        if error.name not in (_SIM, name):
-            raise
-        fix = "build it (colcon build --packages-up-to fcsl_sim) and source the workspace's setup.bash"
-        raise ImportError(f"{what} is in the package `{_SIM}`, which this environment does not have: {fix}") from None

@@ -14,8 +14,6 @@ from typing import Any
 
 import pytest
 
-from .. import _sim_module
-
 _MARK = "fcsl_campaign"
 _FORM = '@pytest.mark.fcsl_campaign("NAME.study.json"), or with cases=100'
 
@@ -88,8 +86,10 @@ def fcsl_case(request: pytest.FixtureRequest, _fcsl_studies: dict[tuple[Path, in
     """A case of the study of the mark `fcsl_campaign`, flown. A flight that ends with an error fails the test."""
     path, cases = named = _named(request.node)
     if named not in _fcsl_studies:
+        from ..simulation import simulation_part
+
         given = request.node.get_closest_marker(_MARK).kwargs.get("cases")
-        _fcsl_studies[named] = _sim_module("campaign.flight", "fcsl_case").Flights.of(path, given)
+        _fcsl_studies[named] = simulation_part("campaign", "fcsl_case").Flights.of(path, given)
     flights = _fcsl_studies[named]
     case = Case(flights.study, flights.fly(request.param))
     if case.verdict == "error":

@@ -100,10 +100,10 @@ def fcsl_sim(request: pytest.FixtureRequest) -> Iterator[Callable[..., Any]]:
     A relative path is relative to the working directory, or else to the folder of the test file. Raises ImportError
     without the package `fcsl_sim`.
     """
-    from .. import _sim_module
     from ..machine_build import find_config
+    from ..simulation import simulation_part
 
-    module = _sim_module("sim_twin", "SimTwin")
+    module = simulation_part("twin", "SimTwin")
     opened: list[Twin] = []
     boxes = request.node.stash.setdefault(_BOXES, [])
 
