@@ -1,5 +1,6 @@
 # SPDX-License-Identifier: Apache-2.0
-"""`diagnostics_node`: the sensors and devices of a flight with a board, on /diagnostics. Folders stand for the kernel's devices."""
+"""`diagnostics_node`: sensors and devices of a flight with a board, and its lost requests, on /diagnostics. Folders stand for
+the kernel's devices."""
 
 from __future__ import annotations
 
@@ -15,8 +16,10 @@ from diagnostic_msgs.msg import DiagnosticArray, DiagnosticStatus
 from rclpy.serialization import deserialize_message
 
 from fcsl_bridge.diagnostics.board_status import BoardStatus
+from fcsl_bridge.diagnostics.lost_request_status import LostRequestStatus
 from fcsl_bridge.topics import qos
 from fcsl_compiler.base.packages import package_prefix
+from simclient import VarClient
 
 ROOT = Path(__file__).resolve().parents[2]
 LIBRARY = package_prefix("lander") / "lib/lander/liblander_machines.so"
@@ -73,8 +76,8 @@ class Vehicle:
         line = [program, LIBRARY, "--machine", "lander_control", "--socket", self.socket, *options]
         return self._domain.run(line)
 
-    def fly_with_board(self) -> Process:
-        return self.fly("--hal", f"linux:{self._domain.folder / 'board.plan'}")
+    def fly_with_board(self, *options: str) -> Process:
+        return self.fly("--hal", f"linux:{self._domain.folder / 'board.plan'}", *options)
 
     def until(self, holds: Callable[[dict[str, DiagnosticStatus]], bool]) -> dict[str, DiagnosticStatus]:
         """The statuses by name, of the first message from now on for which it holds."""
@@ -153,6 +156,23 @@ def test_a_flight_that_hangs_is_stale(domain: Domain, vehicle: Vehicle) -> None:
     node.wait_for("waiting for the next flight program\nlander_control: its board is on /diagnostics\n")
 
 
+def test_a_flight_loses_a_request(domain: Domain, vehicle: Vehicle) -> None:
+    """`ascent` asks for COAST in the tick in which `monitor` fails, which leads to SAFE."""
+    vehicle.fly_with_board("--paused")
+    domain.start("diagnostics_node", "-r", "__ns:=/one", socket=vehicle.socket)
+    assert list(vehicle.until(lambda all_: True)) == [SENSOR, TOP, BOTTOM]
+    with VarClient(vehicle.socket) as client:
+        client.set({"ascent.parameters.target_altitude": -1000.0})
+        client.inject("monitor", "failed")
+        client.tick()
+    found = vehicle.until(lambda all_: len(all_) == 4)
+    lost = found["one/lander_control"]
+    assert (lost.level, lost.message) == (WARN, "ASCENT; 1 lost requests ASCENT -> COAST: START_COAST")
+    assert values(lost) == {"lost requests ASCENT -> COAST: START_COAST": "1"}
+    found = vehicle.until(lambda all_: all_["one/lander_control"].level == OK)
+    assert found["one/lander_control"].message == "ASCENT" and found[SENSOR].level == OK
+
+
 def test_a_flight_without_a_board(domain: Domain, vehicle: Vehicle) -> None:
     vehicle.fly()
     node = domain.start("diagnostics_node", socket=vehicle.socket)
@@ -185,6 +205,23 @@ def test_a_sensor(primary: int, conditions: tuple[int, int], level: bytes, text:
     counters |= {"sensors.imu.condition.top": top, "sensors.imu.condition.bottom": bottom}
     (status,) = BoardStatus("rover", "rover").look(counters)
     assert (status.name, status.level, status.message) == ("rover: sensor imu", level, text)
+
+
+def test_counts_of_lost_requests_grow() -> None:
+    """What was lost before the first look is old."""
+    status = LostRequestStatus("rover", "rover")
+    assert status.look("RUN", {}) == []
+    for lost, text in (
+        ({"A -> B": 2}, "2 lost requests A -> B"),
+        ({"A -> B": 2}, ""),
+        ({"A -> B": 5, "A -> C": 1}, "3 lost requests A -> B; 1 lost requests A -> C"),
+        ({"A -> B": 1}, ""),  # a checkpoint was restored
+    ):
+        (found,) = status.look("RUN", lost)
+        assert (found.level, found.message) == ((WARN, f"RUN; {text}") if text else (OK, "RUN"))
+        assert values(found) == {f"lost requests {name}": str(count) for name, count in lost.items()}
+    (found,) = LostRequestStatus("rover", "rover").look("RUN", {"A -> B": 2})
+    assert (found.name, found.level, found.message) == ("rover", OK, "RUN")
 
 
 def test_counts_of_a_device_grow() -> None:

@@ -263,6 +263,8 @@ def _print_summary(config: SimConfig, summary: Summary) -> None:
         f"seed {summary.seed}: {summary.ticks - summary.from_tick} ticks in {summary.wall_s:.3f} s, "
         f"{_factor_text(summary.real_time_factor)} times real time"
     )
+    for transition, count in (summary.lost_requests or {}).items():
+        show(f"lost requests: {transition} {count}")
     if summary.telemetry:
         counts = summary.telemetry
         show(
@@ -283,6 +285,8 @@ def _print_summary(config: SimConfig, summary: Summary) -> None:
         )
     for name, companion in summary.companions.items():
         show(f"controller {name}: {companion['ticks']} ticks, {companion['state']}")
+        for transition, count in companion["lost_requests"].items():
+            show(f"controller {name}: lost requests: {transition} {count}")
     if summary.bag:
         show(f"bag: {', '.join([summary.bag, *(str(c['bag']) for c in summary.companions.values())])}")
     if summary.until_held is False:

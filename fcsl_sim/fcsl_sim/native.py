@@ -77,7 +77,7 @@ class _Part(ctypes.Structure):
 
 
 _ERROR = POINTER(CError)
-#: Result type and argument types of every function used here.
+#: Result type and argument types of every function used here. The simulator brings those of libfcsl_run.so.
 _PROTOTYPES: dict[str, tuple[type | None, list[type]]] = {
     "fcsl_sim_open": (ptr, [c_char_p, c_size_t, _ERROR]),
     "fcsl_sim_close": (c_int, [ptr, _ERROR]),
@@ -137,6 +137,8 @@ _PROTOTYPES: dict[str, tuple[type | None, list[type]]] = {
     "fcsl_sim_place": (c_int, [POINTER(_Place)]),
     "fcsl_sim_watch_crashes": (c_int, [c_int, c_int, _ERROR]),
     "fcsl_sim_describe_model": (c_int64, [c_char_p, c_char_p, ptr, c_size_t, _ERROR]),
+    "fcsl_run_machine": (POINTER(CMachine), [ptr]),
+    "fcsl_run_data": (ptr, [ptr]),
 }
 
 #: fcsl_sim_status_t by number.
@@ -319,6 +321,15 @@ class Simulation:
             state = self._lib.fcsl_sim_companion_state(self.handle(), i, byref(ticks)).decode()
             found[self._lib.fcsl_sim_companion_name(self.handle(), i).decode()] = state, ticks.value
         return found
+
+    def lost_requests(self, run: int | None = None) -> dict[str, int]:
+        """How many requests each transition of the hosted machine has lost to another one: {"HOVER -> SAFE: ABORT": 1}.
+        `run`: of the controller with this fcsl_run_t.
+        """
+        run = self.hosted() if run is None else run
+        base = self._lib.fcsl_run_data(run)
+        machine = read_machine(self._lib.fcsl_run_machine(run))
+        return machine.lost_requests(lambda offset, size: ctypes.string_at(base + offset, size))
 
     def run(self, ticks: int) -> int:
         """Runs up to `ticks` ticks; returns early at the end, after a change of state and after a wait. Returns ticks done."""

@@ -39,8 +39,11 @@ class StateChange:
 
 @dataclass(frozen=True)
 class Summary:
-    """`from_tick` is that of the restored checkpoint, else 0; `ticks` were completed in the end. `end` is `duration` or `until`; `until_held` is None without a stop condition; `time_s` is when the next tick would be. `truth` maps
-    `<instance>.outputs.<field>` to its value in the last tick, at `truth_time_s`. `companions` are the controllers beside the first one: `state`, `ticks`, `bag`.
+    """`from_tick` is that of the restored checkpoint, else 0; `ticks` were completed in the end. `end` is `duration` or
+    `until`; `until_held` is None without a stop condition; `time_s` is when the next tick would be. `lost_requests` counts
+    by transition, without the zeros; None with an external controller. `truth` maps `<instance>.outputs.<field>` to its
+    value in the last tick, at `truth_time_s`. `companions` are the controllers beside the first one: `state`, `ticks`,
+    `lost_requests`, `bag`.
     """
 
     config: str
@@ -54,6 +57,7 @@ class Summary:
     real_time_factor: float
     state: str | None
     transitions: list[StateChange]
+    lost_requests: dict[str, int] | None
     companions: dict[str, dict[str, Any]]
     truth_time_s: float
     truth: dict[str, Scalar | list[Scalar]]
@@ -212,6 +216,19 @@ def _left(bag: Path, machine: str) -> str:
     return ""
 
 
+def _companions(sim: Simulation, bag: Path | None) -> dict[str, dict[str, Any]]:
+    runs = sim.companion_runs()
+    return {
+        name: {
+            "state": state,
+            "ticks": ticks,
+            "lost_requests": sim.lost_requests(runs[name]),
+            "bag": f"{bag}_{name}" if bag else None,
+        }
+        for name, (state, ticks) in sim.companions().items()
+    }
+
+
 @dataclass(frozen=True)
 class _Flight:
     """`state`: the last one, for a machine hosted in this process."""
@@ -268,10 +285,8 @@ def _summary(
         real_time_factor=flown_s / flight.wall_s if flight.wall_s > 0 else 0.0,
         state=flight.state,
         transitions=flight.changes,
-        companions={
-            name: {"state": state, "ticks": ticks, "bag": f"{bag}_{name}" if bag else None}
-            for name, (state, ticks) in sim.companions().items()
-        },
+        lost_requests=sim.lost_requests() if flight.state is not None else None,
+        companions=_companions(sim, bag),
         truth_time_s=sim.machine.time_ns(max(sim.tick - 1, 0)) / 1e9,
         truth={
             f"{name}.{f.path}": sim.get(f"{name}.{f.path}")

@@ -111,6 +111,34 @@ def test_run_as_json(sim_json: Path) -> None:
     assert summary["bag"] is None and summary["real_time_factor"] > 0
 
 
+def test_a_run_names_transitions_that_lost_requests(sim_json: Path) -> None:
+    """When the time leads to HELD, TURN has asked for DOWN; likewise of a second controller."""
+    machine = json.loads(json.dumps(HOPPER))
+    machine["states"]["HELD"] = machine["states"]["UP"]
+    machine["transitions"][0]["after_s"] = 0.8
+    machine["transitions"].append({"from": "UP", "to": "HELD", "priority": 2, "after_s": 0.8})
+    (sim_json.parent / "hopper.json").write_text(json.dumps(machine))
+    done = fcsl_sim("run", sim_json)
+    assert (done.returncode, done.stderr) == (0, "")
+    change, *_, lost = done.stdout.splitlines()
+    assert (change, lost) == ("     0.800 s  UP -> HELD", "lost requests: UP -> DOWN: TURN 1")
+    summary = json.loads(fcsl_sim("run", sim_json, "--json").stdout)
+    assert summary["lost_requests"] == {"UP -> DOWN: TURN": 1}
+    text = sim_json.read_text().replace("controller.", "one.")
+    config = json.loads(text) | {"controllers": {name: {"machine": "hopper.json"} for name in ("one", "two")}}
+    del config["controller"]
+    config["connections"] += [
+        {"from": "altimeter.value", "to": "two.altitude"},
+        {"from": "velocimeter.value", "to": "two.velocity"},
+    ]
+    sim_json.write_text(json.dumps(config))
+    done = fcsl_sim("run", sim_json)
+    told = ["controller two: 100 ticks, HELD", "controller two: lost requests: UP -> DOWN: TURN 1"]
+    assert done.stdout.splitlines()[-3:] == [lost, *told], done.stderr
+    summary = json.loads(fcsl_sim("run", sim_json, "--json").stdout)
+    assert summary["companions"]["two"]["lost_requests"] == summary["lost_requests"] == {"UP -> DOWN: TURN": 1}
+
+
 def test_a_run_in_which_until_never_holds_says_so(sim_json: Path, tmp_path: Path) -> None:
     """By its status, its last line and its summary; the bag is whole."""
     config = json.loads(sim_json.read_text())

@@ -1,9 +1,10 @@
 # SPDX-License-Identifier: Apache-2.0
 """A machine's health for ROS 2's own tools: /diagnostics.
 
-The machine's status is that of its worst instance; at least WARN while counts grow (missed deadlines, refused inputs, dropped
-records, lost requests), and STALE while inactive. Each instance has a status: nominal OK, degraded WARN, failed ERROR, stale (the active
-state does not schedule it) STALE; at least WARN if it faulted or overran since the previous message.
+The machine's status is that of its worst instance; at least WARN while counts grow (missed deadlines, refused inputs,
+dropped records, lost requests), and STALE while inactive. Each instance has a status: nominal OK, degraded WARN, failed
+ERROR, stale (the active state does not schedule it) STALE; at least WARN if it faulted or overran since the previous
+message.
 """
 
 from __future__ import annotations
@@ -79,7 +80,9 @@ class Diagnostics:
 
     def _machine(self, state: MachineState, statuses: list[DiagnosticStatus], active: bool) -> DiagnosticStatus:
         troubles = {key: count for source in self._sources for key, count in source.troubles().items()}
-        troubles |= {f"lost requests {name}": count for name, count in self._lost_requests().items()}
+        troubles |= {
+            f"lost requests {name}": count for name, count in self._run.machine.lost_requests(self._run.read).items()
+        }
         shown = {key: value for source in self._sources for key, value in source.figures().items()}
         grown = self._grown("", troubles)
         running = [s.level for s in statuses if s.level != DiagnosticStatus.STALE]
@@ -95,12 +98,6 @@ class Diagnostics:
         }
         text = "; ".join([state.state if active else "inactive", *grown])
         return self._status(self._name, level, text, figures)
-
-    def _lost_requests(self) -> dict[str, int]:
-        field = self._run.machine.fields.get("machine.lost_requests")
-        if field is None:
-            return {}
-        return self._run.machine.named_lost_requests(memoryview(self._run.read(field.offset, field.size)).cast("Q"))
 
     def _instance(self, name: str, health: int, faults: int, overruns: int, fault_place: str) -> DiagnosticStatus:
         counts = {"faults": faults, "overruns": overruns}

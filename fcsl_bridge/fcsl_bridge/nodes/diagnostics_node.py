@@ -1,5 +1,6 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Shows the board of a running flight program, fcsl-fc, on /diagnostics: its sensors and devices, once per second.
+"""Shows the board of a running flight program, fcsl-fc, on /diagnostics: its sensors and devices, once per second; and
+requests that its machine has lost.
 
 It asks the variable server of the program (`fcsl-fc --socket`). It waits for a program, and for the next one when that
 has ended; the statuses are STALE meanwhile.
@@ -18,6 +19,7 @@ from simclient.vars.wire import VarError
 
 from ..base.node_main import Option, Stop, read_options, run_node
 from ..diagnostics.board_status import BoardStatus
+from ..diagnostics.lost_request_status import LostRequestStatus
 from ..errors import BridgeError, Stopped
 from ..topics import qos
 
@@ -33,13 +35,14 @@ _ABSENT = ("unreachable", "closed", "timeout")
 
 
 class BoardWatch:
-    """Publishes what the flight program at `address` says of its board. Raises BridgeError where waiting cannot help."""
+    """Publishes what the flight program at `address` says of its board and of lost requests. Raises BridgeError where
+    waiting cannot help."""
 
     def __init__(self, node: Node, address: str, token: str):
         self._node, self._address, self._token = node, address, token or None
         self._publisher = qos.publisher(node, DiagnosticArray, "/diagnostics", qos.EVENT)
         self._client: VarClient | None = None
-        self._board: BoardStatus | None = None
+        self._flight: tuple[BoardStatus, LostRequestStatus] | None = None
         self._statuses: list[DiagnosticStatus] = []
         print(f"waiting for a flight program at {address}", flush=True)
 
@@ -58,22 +61,26 @@ class BoardWatch:
     def _look(self) -> None:
         if self._client is None:
             self._client = VarClient(self._address, self._token, _TIMEOUT_S)
-        if self._board is None:
+        if self._flight is None:
             machine = self._client.describe()["machine"]
             if not self._client.list("hal.devices."):
                 raise BridgeError(
                     f"the flight program at {self._address} has no board with devices: --hal linux:PLAN has one"
                 )
-            self._board = BoardStatus(f"{self._node.get_namespace().rstrip('/')}/{machine}"[1:], machine)
+            name = f"{self._node.get_namespace().rstrip('/')}/{machine}"[1:]
+            self._flight = BoardStatus(name, machine), LostRequestStatus(name, machine)
             print(f"{machine}: its board is on /diagnostics", flush=True)
-        self._statuses = self._board.look(self._client.get_value("hal"))
+        board, requests = self._flight
+        counters, stats = self._client.get_value("hal"), self._client.stats()
+        lost = stats.get("lost_requests", {})  # a program of an older version does not tell
+        self._statuses = requests.look(stats["state"], lost) + board.look(counters)
 
     def _lose(self, why: str) -> None:
         if self._client is not None:
             self._client.close()
             self._client = None
-        if self._board is not None:
-            self._board = None
+        if self._flight is not None:
+            self._flight = None
             print(f"{why}; waiting for the next flight program", flush=True)
         for status in self._statuses:
             status.level, status.message = DiagnosticStatus.STALE, why

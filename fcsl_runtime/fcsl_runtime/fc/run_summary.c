@@ -10,7 +10,7 @@
 
 #include "summary_file.h"
 #include "log.h"
-#include "lost_requests.h"
+#include "run/lost_requests.h"
 
 enum { CLIENTS_BYTES = 128, HAL_BYTES = 1024 };
 
@@ -71,8 +71,8 @@ static void report_hal(const loop_t *loop, const uint8_t *data)
 static void report_lost_requests(const fcsl_machine_t *machine, const uint8_t *data)
 {
     uint32_t next = 0;
-    lost_request_t lost;
-    while (lost_request_next(machine, data, &next, &lost)) {
+    fcsl_lost_request_t lost;
+    while (fcsl_lost_request_next(machine, data, &next, &lost)) {
         log_info("lost requests: %s %" PRIu64, lost.name, lost.count);
     }
 }

@@ -12,7 +12,6 @@
 
 #include "base/error.h"
 #include "guard_link.h"
-#include "lost_requests.h"
 #include "run/fault_place.h"
 #include "run/health_name.h"
 #include "base/replace_file.h"
@@ -78,21 +77,6 @@ static void put_counters(json_out_t *out, const fcsl_machine_t *machine, const f
                   fcsl_tick_stats_get(&stats->messages_refused), fcsl_tick_stats_get(&stats->records_dropped));
 }
 
-static void put_lost_requests(json_out_t *out, const fcsl_machine_t *machine, const uint8_t *data)
-{
-    uint32_t next = 0;
-    lost_request_t lost;
-    const char *comma = "";
-    fcsl_json_raw(out, "\"lost_requests\":{");
-    while (lost_request_next(machine, data, &next, &lost)) {
-        fcsl_json_raw(out, "%s", comma);
-        fcsl_json_quoted(out, lost.name);
-        fcsl_json_raw(out, ":%" PRIu64, lost.count);
-        comma = ",";
-    }
-    fcsl_json_raw(out, "},\n");
-}
-
 static void put_hal(json_out_t *out, const loop_t *loop, const uint8_t *data)
 {
     fcsl_json_raw(out, "\"hal\":{");
@@ -126,10 +110,10 @@ static void put_all(json_out_t *out, const loop_t *loop, const uint8_t *data, co
     put_text(out, "next_state", state_name(machine, data, machine->next_state_offset));
     fcsl_json_raw(out, "\"paused\":%s,\n", moment->paused != 0 ? "true" : "false");
     put_instances(out, machine, data);
-    put_lost_requests(out, machine, data);
     put_hal(out, loop, data);
     put_text(out, "guard", guard_state_name(loop->guard_state));
     put_counters(out, machine, &loop->stats, data);
+    fcsl_vars_lost_requests(out, machine, data);
     fcsl_vars_histogram(out, "lateness_ns", &loop->stats.lateness);
     fcsl_vars_histogram(out, "tick_time_ns", &loop->stats.tick_time);
     fcsl_json_raw(out, "}\n");

@@ -5,7 +5,7 @@ from __future__ import annotations
 
 import ctypes
 import math
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from typing import Any
 
@@ -205,6 +205,13 @@ class Machine:
             if count:
                 named[str(transition)] = named.get(str(transition), 0) + count
         return named
+
+    def lost_requests(self, read: Callable[[int, int], bytes]) -> dict[str, int]:
+        """Likewise, of a machine struct of which `read(offset, size)` gives the bytes; {} for a machine that loses none."""
+        field = self.fields.get("machine.lost_requests")
+        if field is None:
+            return {}
+        return self.named_lost_requests(memoryview(read(field.offset, field.size)).cast("Q"))
 
     def time_ns(self, tick: int) -> int:
         """Time of tick `tick` in ns: floor(tick * 1e9 / tick_hz)."""

@@ -98,3 +98,16 @@ def test_a_flight_names_them_at_its_end(tmp_path: Path) -> None:
         told = [line for line in out.splitlines() if "lost requests" in line]
         assert (code, err, told) == (0, "", [f"fcsl-fc: lost requests: {name} {n}" for name, n in lost.items()])
         assert json.loads(summary.read_text())["lost_requests"] == lost
+
+
+def test_the_variable_server_names_them(tmp_path: Path) -> None:
+    built = build_machine(write(tmp_path))
+    with flying("--socket", tmp_path / "s", "--paused", library=str(built.library)) as fc:
+        client = fc.client(tmp_path / "s")
+        assert client.ok("stats")["lost_requests"] == {}
+        for path, value in BOTH.items():
+            client.set(path, value)
+        client.ok("tick")
+        assert client.ok("stats")["lost_requests"] == {"HOVER -> SAFE: ABORT": 2}
+        client.close()
+        fc.stop()

@@ -98,6 +98,8 @@ void fcsl_vars_end(fcsl_vars_out_t *out);
 void fcsl_vars_histogram(fcsl_vars_out_t *out, const char *name, const fcsl_histogram_t *histogram);
 /* What every tick loop counts and times; of deadlines and the watchdog writes who has them. */
 void fcsl_vars_tick_stats(fcsl_vars_out_t *out, const fcsl_tick_stats_t *stats);
+/* `lost_requests`: of each transition that has lost any in `data`, a machine struct. */
+void fcsl_vars_lost_requests(fcsl_vars_out_t *out, const fcsl_machine_t *machine, const uint8_t *data);
 
 /* What the server itself counts. */
 typedef struct {

@@ -5,6 +5,7 @@
 #include <inttypes.h>
 
 #include "run/fault_place.h"
+#include "run/lost_requests.h"
 #include "request.h"
 
 void fcsl_vars_number(fcsl_vars_out_t *out, const char *name, uint64_t value)
@@ -54,6 +55,21 @@ void fcsl_vars_tick_stats(fcsl_vars_out_t *out, const fcsl_tick_stats_t *stats)
     fcsl_vars_histogram(out, "tick_time_ns", &stats->tick_time);
 }
 
+void fcsl_vars_lost_requests(fcsl_vars_out_t *out, const fcsl_machine_t *machine, const uint8_t *data)
+{
+    uint32_t next = 0;
+    fcsl_lost_request_t lost;
+    const char *comma = "";
+    fcsl_vars_begin(out, "lost_requests");
+    while (fcsl_lost_request_next(machine, data, &next, &lost)) {
+        fcsl_json_raw(out, "%s", comma);
+        fcsl_json_quoted(out, lost.name);
+        fcsl_json_raw(out, ":%" PRIu64, lost.count);
+        comma = ",";
+    }
+    fcsl_vars_end(out);
+}
+
 /* Where the instances that have faulted did so last, by their names. */
 static void put_fault_places(json_out_t *out, const fcsl_machine_t *machine, const uint8_t *data)
 {
@@ -94,6 +110,7 @@ int fcsl_handle_stats(request_t *request)
         fcsl_vars_number(out, "faults", faults);
         fcsl_vars_number(out, "overruns", overruns);
         put_fault_places(out, machine, data);
+        fcsl_vars_lost_requests(out, machine, data);
     }
     fcsl_vars_number(out, "requests", atomic_load(&service->requests));
     fcsl_vars_number(out, "requests_refused", atomic_load(&service->requests_refused));

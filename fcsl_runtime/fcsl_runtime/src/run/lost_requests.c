@@ -7,7 +7,7 @@
 #include <stdio.h>
 #include <string.h>
 
-#include "run/run_internal.h"
+#include "run_internal.h"
 
 /* Null where the machine has no such counts. */
 static const fcsl_field_t *counts_of(const fcsl_machine_t *machine)
@@ -49,7 +49,8 @@ static uint64_t sum_of(const fcsl_machine_t *machine, const fcsl_field_t *counts
     return sum;
 }
 
-int lost_request_next(const fcsl_machine_t *machine, const uint8_t *data, uint32_t *next, lost_request_t *found)
+int fcsl_lost_request_next(const fcsl_machine_t *machine, const uint8_t *data, uint32_t *next,
+                           fcsl_lost_request_t *found)
 {
     const fcsl_field_t *counts = counts_of(machine);
     for (uint32_t i = *next; counts != NULL && i < machine->transition_count; i++) {
