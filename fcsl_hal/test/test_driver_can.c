@@ -392,6 +392,31 @@ static void check_frames(void)
     rig_close(&rig);
 }
 
+/* What arrives is counted as the kernel hands it over; frames of others are not. */
+static void check_counts(void)
+{
+    static rig_t rig;
+    const struct canfd_frame long_frame = {.can_id = 0x1A0, .len = 64, .data = {9, 2, 3}};
+    open_device(&rig, "can0:1A0/0:8@1+,1A0/16:8@1+,1A1/0:8@1+", 3);
+    CHECK(rig_read(&rig) == FCSL_DRIVER_NOTHING && rig.input.bytes == 0u && rig.input.why == FCSL_DRIVER_NOT_TOLD);
+    send_frame(0x1A0, 8, 1);
+    send_bytes(&long_frame, sizeof long_frame);
+    CHECK(rig_read(&rig) == FCSL_DRIVER_OK && rig_read(&rig) == FCSL_DRIVER_OK);
+    CHECK(rig.input.bytes == CAN_MTU + CANFD_MTU && rig.input.frames == 2u);
+    CHECK(rig.input.rejected == 0u && rig.input.why == FCSL_DRIVER_NOT_TOLD);
+    send_frame(0x1A2, 0, 1);
+    send_bytes(&long_frame, 20);
+    CHECK(rig_read(&rig) == FCSL_DRIVER_NOTHING);
+    CHECK(rig.input.bytes == CAN_MTU + CANFD_MTU + 20u && rig.input.rejected == 20u);
+    CHECK(rig.input.why == FCSL_DRIVER_NO_FRAMES);
+    send_frame(0x1A0, 2, 5); /* long enough for value0 alone */
+    send_frame(0x1A1, 0, 5);
+    CHECK(rig_read(&rig) == FCSL_DRIVER_NOTHING && values_are(&rig, 9.0, 3.0, NAN));
+    CHECK(rig.input.frames == 2u && rig.input.rejected == 20u + 2u * CAN_MTU);
+    CHECK(rig.input.why == FCSL_DRIVER_SHORT_FRAMES);
+    rig_close(&rig);
+}
+
 /* Frames that waited have the times of their arrival, not of their reading. */
 static void check_arrival(void)
 {
@@ -451,6 +476,7 @@ int main(void)
     check_probe();
     check_open();
     check_frames();
+    check_counts();
     check_arrival();
     check_no_arrival();
     check_errors();

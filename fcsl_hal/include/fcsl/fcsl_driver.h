@@ -49,14 +49,15 @@ typedef enum {
     FCSL_DRIVER_NO_TIME = 8, /* the receiver knows none yet */
     FCSL_DRIVER_REFUSED = 9, /* a field that cannot be */
     FCSL_DRIVER_REPEATED = 10, /* the values of the last frame once more: the receiver missed one */
-    FCSL_DRIVER_WHYS = 11
+    FCSL_DRIVER_SHORT_FRAMES = 11, /* frames that end before a signal does */
+    FCSL_DRIVER_WHYS = 12
 } fcsl_driver_why_t;
 
 /* What a read of a stream took in. */
 typedef struct {
     uint32_t bytes;
     uint32_t frames; /* whole ones of the protocol, of any kind */
-    uint32_t rejected; /* bytes that belong to no frame */
+    uint32_t rejected; /* bytes that belong to no frame, or to one that is too short */
     uint32_t why; /* fcsl_driver_why_t */
 } fcsl_driver_input_t;
 

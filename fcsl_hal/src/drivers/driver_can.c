@@ -37,6 +37,7 @@ typedef struct {
 
 typedef struct {
     double values[SIGNALS_MAX];
+    fcsl_driver_input_t input;
     device_t device;
     int fd;
     uint64_t last_ns; /* of the last sample */
@@ -231,8 +232,14 @@ static uint64_t arrival_ns(struct msghdr *message)
     return age_ns < now_ns ? now_ns - age_ns : 0u;
 }
 
-/* 1 with a frame and its time, 0 where none came, -1 with errno. Short or odd messages are no frames. */
-static int receive(int fd, struct canfd_frame *frame, uint64_t *time_ns)
+static void reject(fcsl_driver_input_t *input, uint32_t bytes, uint32_t why)
+{
+    input->rejected += bytes;
+    input->why = why > input->why ? why : input->why;
+}
+
+/* The bytes of a message, with its frame and time; 0 where none came, -1 with errno. Short or odd messages are no frames. */
+static int receive(can_t *can, struct canfd_frame *frame, uint64_t *time_ns)
 {
     union {
         struct cmsghdr header;
@@ -241,30 +248,46 @@ static int receive(int fd, struct canfd_frame *frame, uint64_t *time_ns)
     struct iovec part = {.iov_base = frame, .iov_len = sizeof *frame};
     struct msghdr message = {
         .msg_iov = &part, .msg_iovlen = 1, .msg_control = &control, .msg_controllen = sizeof control};
-    const ssize_t size = recvmsg(fd, &message, MSG_DONTWAIT);
+    const ssize_t size = recvmsg(can->fd, &message, MSG_DONTWAIT);
     if (size < 0) {
         return errno == EAGAIN || errno == EINTR ? 0 : -1;
     }
     *time_ns = arrival_ns(&message);
     const int is_classic = size == CAN_MTU && frame->len <= CAN_MAX_DLEN;
-    return is_classic || (size == CANFD_MTU && frame->len <= CANFD_MAX_DLEN);
+    if (is_classic || (size == CANFD_MTU && frame->len <= CANFD_MAX_DLEN)) {
+        return (int)size;
+    }
+    can->input.bytes += (uint32_t)size;
+    reject(&can->input, (uint32_t)size, FCSL_DRIVER_NO_FRAMES);
+    return 0;
 }
 
-/* Whether the frame carries one of the signals. A frame that is too short for one of its signals is dropped. */
-static int take_frame(can_t *can, const struct canfd_frame *frame)
+/* Whether the frame, a message of so many bytes, carries one of the signals. A frame that is too short for one of its signals is
+ * dropped, and counted. */
+static int take_frame(can_t *can, const struct canfd_frame *frame, uint32_t bytes)
 {
     double values[SIGNALS_MAX];
-    int found = 0;
+    int is_ours = 0;
+    int is_short = 0;
     memcpy(values, can->values, sizeof values);
     for (uint32_t i = 0; i < can->device.count; i++) {
         const can_signal_t *signal = &can->device.signals[i];
-        if (signal->id == frame->can_id && !can_signal_take(signal, frame, &values[i])) {
-            return 0;
+        if (signal->id == frame->can_id) {
+            is_ours = 1;
+            is_short = is_short || !can_signal_take(signal, frame, &values[i]);
         }
-        found = found || signal->id == frame->can_id;
     }
+    if (!is_ours) {
+        return 0;
+    }
+    can->input.bytes += bytes;
+    if (is_short) {
+        reject(&can->input, bytes, FCSL_DRIVER_SHORT_FRAMES);
+        return 0;
+    }
+    can->input.frames++;
     memcpy(can->values, values, sizeof values);
-    return found;
+    return 1;
 }
 
 static fcsl_driver_status_t judge_error(const can_t *can, char *why, size_t size)
@@ -284,11 +307,11 @@ static fcsl_driver_status_t read_can(void *self, uint64_t *sample_ns, char *why,
         struct pollfd wait = {.fd = can->fd, .events = POLLIN};
         const struct timespec left = time_left(deadline_ns);
         const int ready = ppoll(&wait, 1, &left, NULL);
-        const int got = ready > 0 ? receive(can->fd, &frame, &time_ns) : ready;
+        const int got = ready > 0 ? receive(can, &frame, &time_ns) : ready;
         if (got < 0 && errno != EINTR) {
             return judge_error(can, why, size);
         }
-        if (got > 0 && take_frame(can, &frame)) {
+        if (got > 0 && take_frame(can, &frame, (uint32_t)got)) {
             can->last_ns = time_ns > can->last_ns ? time_ns : can->last_ns + 1u; /* samples keep their order */
             *sample_ns = can->last_ns;
             return FCSL_DRIVER_OK;
@@ -312,6 +335,7 @@ const fcsl_driver_t fcsl_driver_can = {
     .state_size = sizeof(can_t),
     .state_align = _Alignof(can_t),
     .waits = 1,
+    .input = offsetof(can_t, input),
     .probe = probe_can,
     .open = open_can,
     .read = read_can,

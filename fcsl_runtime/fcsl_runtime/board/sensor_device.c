@@ -263,6 +263,7 @@ const char *board_why_text(uint64_t why)
         [FCSL_DRIVER_NO_TIME] = "sentences arrive without a time: the receiver knows none yet",
         [FCSL_DRIVER_REFUSED] = "frames arrive with a field that cannot be",
         [FCSL_DRIVER_REPEATED] = "the receiver repeats its last frame: it does not hear the transmitter",
+        [FCSL_DRIVER_SHORT_FRAMES] = "frames arrive that are too short for a signal of the device",
     };
     return why < FCSL_DRIVER_WHYS ? TEXTS[why] : "unknown";
 }
