@@ -5,12 +5,12 @@ published topics.
 
 from __future__ import annotations
 
-import struct
 from collections.abc import Callable, Sequence
 from typing import Any
 
 from rclpy.node import Node
 
+from simclient.ros import frame_names
 from simclient.ros.outbox import RunTopics
 from simclient.ros.topics import Inlet, RosTopic, composer_of, sources_of, topics_of
 from simclient.run import Run
@@ -27,10 +27,6 @@ _SAFE_WAIT_S = 0.2
 
 #: A topic that many publish by design: a receiver picks what it needs by frame.
 _SHARED = "tf2_msgs/msg/TFMessage"
-#: Where a message has its frame: behind the encapsulation and the stamp; its length stands before it.
-_FRAMES_AT, _LENGTH = 12, struct.Struct("<I")
-#: Bytes of a frame that are shown.
-_FRAME_SHOWN = 80
 #: Stamps that lie this far from ROS time are of another clock, in ns.
 _OTHER_CLOCK_NS = 60_000_000_000
 
@@ -126,11 +122,8 @@ class _Input:
 
     def _tell_frame(self, data: bytes) -> None:
         """Logs the frames of the first message that was refused for them."""
-        wanted = [text for text in (self.topic.frame, self.topic.child_frame) if text]
-        came = _frames(data, 2 if self.topic.child_frame else 1)[-len(wanted) :]
-        self._node.get_logger().warning(
-            f"{self.name}: refused: its frame is {' -> '.join(came)}, that of its channels {' -> '.join(map(repr, wanted))}"
-        )
+        came, wanted = frame_names.differing(data, self.topic.frame, self.topic.child_frame)
+        self._node.get_logger().warning(f"{self.name}: refused: its frame is {came}, that of its channels {wanted}")
 
     def forget(self) -> None:
         while self._polled.take_all():
@@ -142,18 +135,6 @@ class _Input:
 
     def close(self) -> None:
         self._polled.close()
-
-
-def _frames(data: bytes, count: int) -> list[str]:
-    """The first strings of a message behind its stamp, which may be cut: of the header, then of the child."""
-    found, at = [], _FRAMES_AT
-    for _ in range(count):
-        at += -at % _LENGTH.size
-        (size,) = _LENGTH.unpack_from(data, at) if at + _LENGTH.size <= len(data) else (0,)
-        at += _LENGTH.size
-        found.append(repr(data[at : at + size].rstrip(b"\0")[:_FRAME_SHOWN].decode(errors="replace")))
-        at += size
-    return found
 
 
 class Outputs:

@@ -20,6 +20,7 @@ from simclient.bag import columns
 from simclient.machine_build import build_config
 from simclient.replay import replay_foreign
 from simclient.replay.foreign import ForeignRun
+from simclient.ros.frame_names import differing
 
 START = 100 * 10**9
 SENSORS = '''\
@@ -149,10 +150,36 @@ def test_the_channels_frame_counts_where_the_map_takes_its_field(run: Runs) -> N
     messages[1].header.frame_id = "base_link"
     content = {"/imu/data": every(10, messages)}
     done, out = run(content, "channels: {imu.rate: /imu/data}")
-    assert done.fates["imu.rate"].refused == {"frame": (1, 1)} and "1 with another frame" in str(done)
+    assert done.fates["imu.rate"].refused == {"frame": (1, 1)}
+    told = "imu.rate: refused: 1 with another frame (first: message 1: 'base_link', not 'imu_link')"
+    assert told in str(done)
     assert output(out, "sensors.outputs.rate") == [[1, 0, 0], [1, 0, 0], [3, 0, 0]]
     done, _ = run(content, "channels: {imu.rate: {topic: /imu/data, field: angular_velocity}}")
     assert done.fates["imu.rate"].refused == {}
+    for message in messages:
+        message.header.frame_id = "lidar_link"
+    with pytest.raises(MapError, match=r"3 with another frame \(first: message 0: 'lidar_link', not 'imu_link'\)"):
+        run(content, "channels: {imu.rate: /imu/data}")
+
+
+def test_the_first_message_with_another_frame_is_named_wherever_the_file_has_it(run: Runs) -> None:
+    messages = [imu(START + 10 * i * MS, (i + 1, 0, 0)) for i in range(4)]
+    messages[1].header.frame_id, messages[2].header.frame_id = "first_link", "second_link"
+    content = every(10, messages)
+    for order in ((0, 1, 2, 3), (0, 2, 3, 1)):
+        done, _ = run({"/imu/data": [content[i] for i in order]}, "channels: {imu.rate: /imu/data}")
+        assert "2 with another frame (first: message 1: 'first_link', not 'imu_link')" in str(done)
+
+
+def test_frames_in_texts() -> None:
+    """Of a message that is cut, too; a long one is cut."""
+    odometry = bytes(12) + b"\4\0\0\0map\0" + b"\5\0\0\0body\0"
+    assert differing(odometry, "odom", "") == ("'map'", "'odom'")
+    assert differing(odometry, "odom", "base") == ("'map' -> 'body'", "'odom' -> 'base'")
+    assert differing(odometry, "", "base") == ("'body'", "'base'")
+    assert differing(odometry[:22], "odom", "base") == ("'map' -> ''", "'odom' -> 'base'")
+    assert differing(b"", "odom", "base") == ("'' -> ''", "'odom' -> 'base'")
+    assert differing(bytes(12) + b"\xff\0\0\0" + 255 * b"a", "odom", "")[0] == repr(80 * "a")
 
 
 def test_what_has_no_header_has_the_time_of_recording(run: Runs) -> None:

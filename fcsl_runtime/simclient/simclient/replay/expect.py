@@ -111,7 +111,7 @@ def compare(targets: Sequence[Target], bag: Bag, outputs: Outputs, grid: Grid, h
         else:
             intake = intakes[name]
             times_ns, theirs = intake.times_ns, intake.values.reshape(len(intake.times_ns), target.wish.pick.count)
-            none = "" if len(times_ns) else ", ".join(refusals(intake.refused)) or _NO_MESSAGE
+            none = "" if len(times_ns) else ", ".join(refusals(intake.refused, intake.frames)) or _NO_MESSAGE
             values = outputs.column(name)
             ours = values.reshape(len(values), -1).astype(np.float64)
         found.append(_compared(target, grid, times_ns, ours, theirs, none))

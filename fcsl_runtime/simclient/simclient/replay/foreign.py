@@ -51,7 +51,8 @@ _CLOCKS_S = {18: "GPS and UTC (18 s)", 37: "TAI and UTC (37 s)", 19: "TAI and GP
 
 @dataclass(frozen=True)
 class Fate:
-    """The use of one channel's messages: `coverage` counts the used ones; the others by reason (number, first one).
+    """The use of one channel's messages: `coverage` counts the used ones; the others by reason (number, first one), with
+    `frames` as those of an Intake.
 
     `invalid`: ticks after the first sample whose last sample was older than max_age_ticks or timeout_ms allow.
     """
@@ -60,6 +61,7 @@ class Fate:
     coverage: Coverage
     refused: dict[str, tuple[int, int]]
     invalid: int
+    frames: str = ""
 
 
 @dataclass(frozen=True)
@@ -90,7 +92,7 @@ class ForeignRun:
         ]
         for name, fate in self.fates.items():
             if fate.refused:
-                lines.append(f"  {name}: refused: {', '.join(refusals(fate.refused))}")
+                lines.append(f"  {name}: refused: {', '.join(refusals(fate.refused, fate.frames))}")
         for topic, odd in self.oddities.items():
             found = [f"{count} {text}" for name, text in _ODD.items() if (count := getattr(odd, name))]
             if found:
@@ -206,7 +208,8 @@ def _grid(chart: Map, intakes: Mapping[str, Intake], bag: Bag, tick_hz: int) -> 
     for name, intake in intakes.items():
         if intake.messages and not len(intake.times_ns):
             raise MapError(
-                f"{chart.path}: channel `{name}`: no message can be used: {', '.join(refusals(intake.refused))}"
+                f"{chart.path}: channel `{name}`: no message can be used: "
+                f"{', '.join(refusals(intake.refused, intake.frames))}"
             )
     times = [intake.times_ns for intake in intakes.values() if len(intake.times_ns)]
     if not times:
@@ -268,7 +271,7 @@ def _delivery(
         old = np.minimum(old, silent)
     invalid = int(np.maximum(until - old, 0).sum())
     delivery = _Delivery(channel, due, ages, intake.stamps_ns[rows], rows, intake.values)
-    return delivery, Fate(intake.messages, coverage, intake.refused, invalid)
+    return delivery, Fate(intake.messages, coverage, intake.refused, invalid, intake.frames)
 
 
 def run_foreign(

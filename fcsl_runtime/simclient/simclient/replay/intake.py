@@ -15,6 +15,7 @@ from ..bag import Bag, Topic
 from ..bag.definitions import declarations
 from ..bag.mcap_file import distinct
 from ..errors import BagError, MapError
+from ..ros import frame_names
 from ..ros.reader import REASONS, Reader
 from ..ros.types import definitions_of
 from .grid import Array, Oddities, joined_rows, screen
@@ -25,6 +26,8 @@ from .poses import are_rotations
 OTHER_TYPE = "type"
 NO_STAMP = "unset"
 STUCK = "stuck"
+#: One of REASONS.
+FRAME = "frame"
 #: Texts of the reasons.
 _REFUSED = {
     OTHER_TYPE: "of another type than most of the topic's",
@@ -34,7 +37,7 @@ _REFUSED = {
     "truncated": "truncated",
     "malformed": "malformed",
     "stamp": "with an invalid stamp",
-    "frame": "with another frame",
+    FRAME: "with another frame",
     "shape": "with another length",
     "range": "out of range",
     "nan": "with a NaN",
@@ -42,7 +45,7 @@ _REFUSED = {
     "rotation": "with a rotation of length zero or infinity",
 }
 #: Reasons for which a message as a whole is not decoded, so that it has no stamp either.
-_UNREAD = [REASONS.index(reason) for reason in ("encoding", "truncated", "malformed", "stamp", "frame")]
+_UNREAD = [REASONS.index(reason) for reason in ("encoding", "truncated", "malformed", "stamp", FRAME)]
 
 
 @dataclass(frozen=True)
@@ -84,7 +87,7 @@ class Intake:
 
     `times_ns` place them on the grid, `stamps_ns` are header stamps (0 without one), `values` has a row of bytes for
     each. `messages` is the number of messages; `refused` maps a reason to (number of unused messages, index of the
-    first).
+    first). `frames` tells the frames of the first message with others than the channels have: "'map', not 'odom'".
     """
 
     times_ns: Array
@@ -92,11 +95,15 @@ class Intake:
     values: Array
     messages: int
     refused: dict[str, tuple[int, int]]
+    frames: str = ""
 
 
-def refusals(refused: Mapping[str, tuple[int, int]]) -> list[str]:
-    """As text; messages count from 0 in their topic."""
-    return [f"{count} {_REFUSED[reason]} (first: message {first})" for reason, (count, first) in refused.items()]
+def refusals(refused: Mapping[str, tuple[int, int]], frames: str = "") -> list[str]:
+    """As text; messages count from 0 in their topic. `frames`: those of an intake."""
+    return [
+        f"{count} {_REFUSED[reason]} (first: message {first}{f': {frames}' if frames and reason == FRAME else ''})"
+        for reason, (count, first) in refused.items()
+    ]
 
 
 @cache
@@ -111,6 +118,10 @@ class _Column:
 
     reader: Reader
     wishes: list[Wish]
+    frame: str = ""
+    child_frame: str = ""
+    #: Time of recording and frames of the first message with others; of one time, the first by their text.
+    other_frames: tuple[int, str] | None = None
     log_ns: list[Array] = field(default_factory=list)
     stamps_ns: list[Array] = field(default_factory=list)
     values: list[Array] = field(default_factory=list)
@@ -132,6 +143,18 @@ class _Column:
         self.values.append(samples.values)
         self.status.append(samples.status)
         self.other.append(np.full(len(entries), other))
+        if self.frame or self.child_frame:
+            self._note_frames(data, entries[samples.status[:, 0] == REASONS.index(FRAME)])
+
+    def _note_frames(self, data: bytes, entries: Array) -> None:
+        """Looks at messages with another frame."""
+        if not len(entries):
+            return
+        first_ns = int(entries["log_ns"].min())
+        for entry in entries[entries["log_ns"] == first_ns]:
+            came, wanted = frame_names.differing(data[entry["begin"] : entry["end"]], self.frame, self.child_frame)
+            found = first_ns, f"{came}, not {wanted}"
+            self.other_frames = found if self.other_frames is None else min(found, self.other_frames)
 
     def sorted_out(self, stamped: bool) -> tuple[list[Intake], Oddities]:
         """One intake per wish. `stamped`: samples are placed by the header stamp, where the type has one."""
@@ -167,7 +190,8 @@ class _Column:
             times, stamps, column = times_ns, stamps_ns, values[w.pick.name]
             if not taken.all():  # usually all are used; then no copy is made, and all intakes share their times
                 times, stamps, column = times[taken], stamps[taken], column[taken]
-            intakes.append(Intake(times, stamps, column, len(log_ns), refused))
+            frames = self.other_frames[1] if self.other_frames else ""
+            intakes.append(Intake(times, stamps, column, len(log_ns), refused, frames))
         return intakes, oddities
 
     def _order(self, log_ns: Array, stamps_ns: Array, other: Array, status: Array, values: Array) -> Array:
@@ -215,7 +239,7 @@ def _column(bag: Bag, topic: str, wishes: Sequence[Wish]) -> _Column:
     frame, child_frame = (_agreed(mine, key) for key in ("frame", "child_frame"))
     kind = mine[0].topic.type
     try:
-        return _Column(Reader(definitions, kind, [w.pick for w in mine], frame, child_frame), mine)
+        return _Column(Reader(definitions, kind, [w.pick for w in mine], frame, child_frame), mine, frame, child_frame)
     except MapError:
         for w in mine:  # which of them it is
             try:
@@ -254,4 +278,5 @@ def _merged(parts: Sequence[Intake]) -> Intake:
         values=np.concatenate([part.values for part in parts]),
         messages=sum(part.messages for part in parts),
         refused=refused,
+        frames=next((part.frames for part in parts if part.frames), ""),
     )
