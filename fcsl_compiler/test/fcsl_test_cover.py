@@ -10,7 +10,7 @@ from typing import Any
 
 from fcsl_test_abi import Machine, write_machine
 
-from fcsl_compiler.coverage.counts import Counts, validate
+from fcsl_compiler.coverage.counts import Counts, confirmed, validate
 from fcsl_compiler.coverage.figures import FileFigures, Miss, figures
 from fcsl_compiler.coverage.probe_map import read_map
 from fcsl_compiler.driver.library import build_library
@@ -33,7 +33,7 @@ class CCover(c.Structure):
 def counts(machine: Machine) -> Counts:
     """Counts in the library of a machine."""
     table = CCover.in_dll(machine.dll, f"fcsl_cover_{machine.d.name.decode()}")
-    found = Counts(read_map(table.map[: table.map_bytes]), tuple(table.words[: table.word_count]))
+    found = Counts(read_map(table.map[: table.map_bytes]), confirmed(table.words[: 2 * table.word_count]))
     validate(found)
     return found
 

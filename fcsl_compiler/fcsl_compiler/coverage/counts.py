@@ -4,6 +4,7 @@
 from __future__ import annotations
 
 import struct
+import zlib
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
@@ -12,9 +13,11 @@ from ..base.files import SourceError, read_regular
 from .mcdc import Vector, is_evaluation
 from .probe_map import MAX_WORDS, CoverError, CoverMap, Decision, FileMap, read_map
 
-_MAGIC = 0x31564F434C534346  # FCSL_COVER_MAGIC
-_HEAD = struct.Struct("<3Q")
+_MAGIC = 0x32564F434C534346  # FCSL_COVER_MAGIC
+_HEAD = struct.Struct("<4Q")
 _MAX_MAP = 1 << 26
+#: Of fcsl_cover_check_of.
+_CHECK_FACTOR, _ALL_BITS = 0x9E3779B97F4A7C15, 2**64 - 1
 SUFFIX = ".cover"
 
 
@@ -47,7 +50,7 @@ def read_folder(folder: Path) -> list[Counts]:
 def read_counts(path: Path) -> Counts:
     """Reads one coverage file. Raises CoverError with file and reason, and OSError."""
     try:
-        return _parse(read_regular(path, _HEAD.size + _MAX_MAP + 8 * MAX_WORDS))
+        return _parse(read_regular(path, _HEAD.size + _MAX_MAP + 16 * MAX_WORDS))
     except (CoverError, SourceError) as error:
         raise CoverError(f"{path}: not the coverage of a machine: {error}; remove it and run again") from None
 
@@ -55,16 +58,35 @@ def read_counts(path: Path) -> Counts:
 def _parse(data: bytes) -> Counts:
     if len(data) < _HEAD.size or _HEAD.unpack_from(data)[0] != _MAGIC:
         raise CoverError("it does not begin like a coverage file")
-    _, length, count = _HEAD.unpack_from(data)
+    _, length, count, checksum = _HEAD.unpack_from(data)
     room = (length + 7) // 8 * 8
-    if length > _MAX_MAP or count > MAX_WORDS or len(data) != _HEAD.size + room + 8 * count:
+    if length > _MAX_MAP or count > MAX_WORDS or len(data) != _HEAD.size + room + 16 * count:
         raise CoverError("its size differs from the size in its header")
-    found = read_map(data[_HEAD.size : _HEAD.size + length])
+    text = data[_HEAD.size : _HEAD.size + length]
+    if zlib.crc32(text) != checksum:
+        raise CoverError("its map does not match its checksum")
+    found = read_map(text)
     if max(1, found.word_count) not in (count, max(1, count)):
         raise CoverError(f"it has {count} words, but its map has {found.word_count}")
-    counts = Counts(found, struct.unpack_from(f"<{count}Q", data, _HEAD.size + room))
+    counts = Counts(found, confirmed(struct.unpack_from(f"<{2 * count}Q", data, _HEAD.size + room)))
     validate(counts)
     return counts
+
+
+def check_of(word: int, value: int) -> int:
+    """The check that a word of this value has (fcsl_cover.h)."""
+    return (~value ^ (word + 1) * _CHECK_FACTOR) & _ALL_BITS
+
+
+def confirmed(memory: Sequence[int]) -> tuple[int, ...]:
+    """The words of a memory that has their checks behind them. A word without a check does not count: its process was
+    killed before it stored that. Raises CoverError for a word with a wrong one."""
+    count = len(memory) // 2
+    words, checks = memory[:count], memory[count:]
+    for word, (value, check) in enumerate(zip(words, checks, strict=True)):
+        if check and check != check_of(word, value):
+            raise CoverError(f"count {word} does not match its check")
+    return tuple(value if check else 0 for value, check in zip(words, checks, strict=True))
 
 
 def validate(counts: Counts) -> None:

@@ -33,7 +33,7 @@ _PRELUDE = """\
 
 static const char fcsl_cover_map_[] =
 @MAP@;
-static uint64_t fcsl_cover_words_[@COUNT@];
+static uint64_t fcsl_cover_words_[2 * @COUNT@];
 __attribute__((visibility("default"))) fcsl_cover_t fcsl_cover_@MACHINE@ = {
     FCSL_COVER_VERSION, 0u, "@ID@", fcsl_cover_map_, sizeof fcsl_cover_map_ - 1u, @COUNT@u, fcsl_cover_words_,
 };
@@ -43,11 +43,24 @@ static inline uint64_t *fcsl_cover_word(int64_t word)
     return &__atomic_load_n(&fcsl_cover_@MACHINE@.words, __ATOMIC_RELAXED)[word];
 }
 
+/* Whether a word has its check, which stands behind all words. */
+static inline bool fcsl_cover_is_set(int64_t word)
+{
+    return __atomic_load_n(fcsl_cover_word(word + @COUNT@), __ATOMIC_RELAXED) != 0u;
+}
+
+/* Stores the check of a word that has this value. */
+static inline void fcsl_cover_check(int64_t word, uint64_t value)
+{
+    __atomic_store_n(fcsl_cover_word(word + @COUNT@), fcsl_cover_check_of((uint64_t)word, value), __ATOMIC_RELEASE);
+}
+
 /* Most words are already set. A store would invalidate the cache line in other threads. */
 static inline void fcsl_cover_set(int64_t word)
 {
-    if (__atomic_load_n(fcsl_cover_word(word), __ATOMIC_RELAXED) == 0u) {
+    if (!fcsl_cover_is_set(word)) {
         __atomic_store_n(fcsl_cover_word(word), 1u, __ATOMIC_RELAXED);
+        fcsl_cover_check(word, 1u);
     }
 }
 
@@ -88,6 +101,9 @@ static inline bool fcsl_cover_decided(uint64_t *vector, int64_t word, int64_t sl
                                               __ATOMIC_RELAXED);
         }
         if (seen == 0u || seen == found) {
+            if (!fcsl_cover_is_set(word + 3 + slot)) {
+                fcsl_cover_check(word + 3 + slot, found);
+            }
             return outcome;
         }
     }

@@ -10,11 +10,11 @@
 #include "fcsl_check.h"
 #include "base/error.c"
 
-enum { WORDS = 5 };
+enum { WORDS = 5, FILE_WORDS = 4 + 2 + 2 * WORDS, ROOM = FILE_WORDS + 8 };
 #define MAP "{\"lines\":1}" /* 11 bytes: padded with zeros to 16 */
 #define ID  "0123abcd"
 
-static uint64_t own_words[WORDS];
+static uint64_t own_words[2 * WORDS]; /* and their checks */
 extern fcsl_cover_t fcsl_cover_probe;
 __attribute__((visibility("default"))) fcsl_cover_t fcsl_cover_probe;
 
@@ -86,26 +86,26 @@ static void test_no_folder(void)
     check_refused("'libprobe.so' is built for coverage");
 }
 
-/* What is counted is in the file, behind the map; who comes later goes on with it. */
+/* What is counted is in the file, behind the map, with its checks; who comes later goes on with it. */
 static void test_counts_are_in_the_file(void)
 {
     fcsl_error_t error;
-    uint64_t content[16];
-    const uint64_t expected[] = {FCSL_COVER_MAGIC, sizeof MAP - 1u, WORDS};
+    uint64_t content[ROOM];
+    const uint64_t expected[] = {FCSL_COVER_MAGIC, sizeof MAP - 1u, WORDS, fcsl_crc32(0, MAP, sizeof MAP - 1u)};
     reload();
     CHECK(attach_it(&error) == 0 && fcsl_cover_probe.attached == 1u && fcsl_cover_probe.words != own_words);
     uint64_t *const first = fcsl_cover_probe.words;
-    for (uint64_t i = 0; i < WORDS; i++) {
+    for (uint64_t i = 0; i < 2u * WORDS; i++) {
         CHECK(first[i] == 0u);
         first[i] = i + 7u;
     }
-    CHECK(read_file(content, sizeof content) == (3u + 2u + WORDS) * 8u);
-    CHECK(memcmp(content, expected, sizeof expected) == 0 && memcmp(content + 3, MAP "\0\0\0\0", 16) == 0);
-    CHECK(memcmp(content + 5, first, WORDS * sizeof *first) == 0);
+    CHECK(read_file(content, sizeof content) == FILE_WORDS * 8u);
+    CHECK(memcmp(content, expected, sizeof expected) == 0 && memcmp(content + 4, MAP "\0\0\0\0", 16) == 0);
+    CHECK(memcmp(content + 6, first, 2 * WORDS * sizeof *first) == 0);
     CHECK(attach_it(&error) == 0 && fcsl_cover_probe.words == first); /* once a library */
     reload();
     CHECK(attach_it(&error) == 0 && fcsl_cover_probe.words != first);
-    CHECK(memcmp(fcsl_cover_probe.words, first, WORDS * sizeof *first) == 0);
+    CHECK(memcmp(fcsl_cover_probe.words, first, 2 * WORDS * sizeof *first) == 0);
     fcsl_cover_probe.words[2] = 99u;
     CHECK(first[2] == 99u); /* one memory */
 }
@@ -113,11 +113,11 @@ static void test_counts_are_in_the_file(void)
 /* A file of another build of this name, or of another program, is left as it is. */
 static void test_damaged_files(void)
 {
-    uint64_t good[16];
-    uint64_t bad[16];
-    uint64_t after[16];
+    uint64_t good[ROOM];
+    uint64_t bad[ROOM];
+    uint64_t after[ROOM];
     const size_t size = read_file(good, sizeof good);
-    for (size_t byte = 0; byte < 3u * 8u + sizeof MAP - 1u; byte++) {
+    for (size_t byte = 0; byte < 4u * 8u + sizeof MAP - 1u; byte++) {
         memcpy(bad, good, size);
         ((uint8_t *)bad)[byte] ^= 0x10u;
         write_file(bad, size);

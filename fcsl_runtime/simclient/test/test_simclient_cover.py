@@ -298,9 +298,36 @@ def test_counts_that_cannot_be_kept_are_told(gate: Path) -> None:
     assert "coverage cannot be kept in" in done.stderr and "No such file or directory" in done.stderr
 
 
+def test_a_count_without_its_check_does_not_count(gate: Path, tmp_path: Path) -> None:
+    """Of a process that was killed between the two. The next one that gets there counts."""
+    from fcsl_compiler.coverage.counts import read_counts
+
+    environment = {**os.environ, "FCSL_COVER_DIR": str(tmp_path)}
+
+    def tick() -> None:
+        subprocess.run([sys.executable, "tick.py", "1", "1"], env=environment, cwd=gate, check=True, timeout=120)
+
+    tick()
+    (file,) = tmp_path.glob("*.cover")
+    right, found = file.read_bytes(), read_counts(file)
+    count = found.map.word_count
+    words = len(right) - 16 * count
+    never = found.words.index(0)
+    data = bytearray(right)
+    data[words + 8 * never] = 1
+    file.write_bytes(data)
+    assert read_counts(file) == found
+    data = bytearray(right)
+    data[words + 8 * count :] = bytes(8 * count)
+    file.write_bytes(data)
+    assert set(read_counts(file).words) == {0}
+    tick()
+    assert file.read_bytes() == right
+
+
 def test_damaged_files_are_refused(gate: Path, tmp_path: Path) -> None:
     """By the reader, whatever was changed; and by the next process that would count into one of another size or head."""
-    from fcsl_compiler.coverage.counts import read_counts
+    from fcsl_compiler.coverage.counts import check_of, read_counts
     from fcsl_compiler.coverage.probe_map import CoverError
 
     counts = tmp_path / "counts"
@@ -319,12 +346,12 @@ def test_damaged_files_are_refused(gate: Path, tmp_path: Path) -> None:
         kind = random_.random()
         copy.write_bytes(bytes(data[: random_.randrange(len(data))] if kind < 0.2 else data + b"\0" * 8 * (kind < 0.3)))
         try:
-            assert read_counts(copy).map.word_count == found.map.word_count
+            assert read_counts(copy) == found
         except CoverError as error:
             refused += 1
             assert str(copy) in str(error) and "remove it and run again" in str(error)
-    assert refused > 200
-    words = len(right) - 8 * found.map.word_count
+    assert refused > 350
+    words = len(right) - 16 * found.map.word_count
     decision = next(iter(found.map.files[0].decisions.values()))
     for word, value in (
         (decision.word + 3, 7),
@@ -333,7 +360,8 @@ def test_damaged_files_are_refused(gate: Path, tmp_path: Path) -> None:
         (decision.word + 4, 2**64 - 1),
     ):
         data = bytearray(right)
-        data[words + 8 * word : words + 8 * word + 8] = value.to_bytes(8, "little")
+        for at, number in ((word, value), (word + found.map.word_count, check_of(word, value))):
+            data[words + 8 * at : words + 8 * at + 8] = number.to_bytes(8, "little")
         copy.write_bytes(data)
         with pytest.raises(CoverError, match="not the coverage of a machine"):
             read_counts(copy)

@@ -18,9 +18,10 @@
 #include <sys/stat.h>
 #include <unistd.h>
 
+#include "fcsl/fcsl_codec.h"
 #include "fcsl/fcsl_cover.h"
 
-enum { PATH_BYTES = 4096, SYMBOL_BYTES = 512, HEAD_WORDS = 3, MODE = 0644 };
+enum { PATH_BYTES = 4096, SYMBOL_BYTES = 512, HEAD_WORDS = 4, MODE = 0644 };
 #define MAP_MAX   ((uint64_t)1 << 26)
 #define WORDS_MAX ((uint64_t)1 << 22)
 
@@ -43,7 +44,7 @@ static int make_plan(const fcsl_cover_t *cover, const char *folder, const char *
         return fcsl_fail(error, "the path of the coverage of machine '%s' is too long", name);
     }
     plan->map_room = (size_t)(cover->map_bytes + 7u) / 8u * 8u;
-    plan->size = HEAD_WORDS * sizeof(uint64_t) + plan->map_room + (size_t)cover->word_count * sizeof(uint64_t);
+    plan->size = HEAD_WORDS * sizeof(uint64_t) + plan->map_room + 2u * (size_t)cover->word_count * sizeof(uint64_t);
     return 0;
 }
 
@@ -73,18 +74,20 @@ static int prepare(int file, const plan_t *plan, fcsl_error_t *error)
 /* Writes what stands before the words, its first word last, or compares it. */
 static int fill_head(uint64_t *memory, const fcsl_cover_t *cover, const plan_t *plan, fcsl_error_t *error)
 {
+    const uint64_t checksum = fcsl_crc32(0, cover->map, (size_t)cover->map_bytes);
     if (memory[0] == 0u) {
         memory[1] = cover->map_bytes;
         memory[2] = cover->word_count;
+        memory[3] = checksum;
         memcpy(memory + HEAD_WORDS, cover->map, (size_t)cover->map_bytes);
         memory[0] = FCSL_COVER_MAGIC;
     }
     const int same = memory[0] == FCSL_COVER_MAGIC && memory[1] == cover->map_bytes && memory[2] == cover->word_count &&
-                     memcmp(memory + HEAD_WORDS, cover->map, (size_t)cover->map_bytes) == 0;
+                     memory[3] == checksum && memcmp(memory + HEAD_WORDS, cover->map, (size_t)cover->map_bytes) == 0;
     return same ? 0 : cannot(plan, "it is damaged, remove it", error);
 }
 
-/* The words in the file, shared by every process that counts into it; null with `error`. */
+/* The words in the file, with their checks behind them, shared by every process that counts into it; null with `error`. */
 static uint64_t *map_words(int file, const fcsl_cover_t *cover, const plan_t *plan, fcsl_error_t *error)
 {
     if (flock(file, LOCK_EX) != 0) {
