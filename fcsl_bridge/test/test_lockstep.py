@@ -13,7 +13,7 @@ from collections.abc import Callable, Iterator
 from pathlib import Path
 
 import pytest
-from bridge_harness import MACHINE, SIM, Domain
+from bridge_harness import MACHINE, SIM, Domain, Process
 
 from simclient.bag import Bag
 from simclient.bag.digest import digest
@@ -138,10 +138,24 @@ def test_interrupted_after_the_other_end_was_killed(domain: Domain, killed: str)
     dead, other = (sim, controller) if killed == "sim_node" else (controller, sim)
     dead.signal(signal.SIGKILL)
     dead.finish()
-    began = time.monotonic()
+    began, before = time.monotonic(), processor_s(other)
     other.signal(signal.SIGINT)
+    last = before
+    while other.process.poll() is None:
+        last = max(last, processor_s(other))
+        time.sleep(0.02)
+    slept = time.monotonic() - began - (last - before)
     assert other.finish() == 0 if other is controller else other.finish() in (1, 128 + signal.SIGINT)
-    assert time.monotonic() - began < 4.0
+    assert slept < 4.0, "its main thread waited, and not for a processor"
+
+
+def processor_s(process: Process) -> float:
+    """Seconds in which its main thread has run or waited for a processor; 0 if it has ended."""
+    try:
+        ran, waited, _ = Path(f"/proc/{process.process.pid}/schedstat").read_text().split()
+    except OSError:
+        return 0.0
+    return (int(ran) + int(waited)) / 1e9
 
 
 def test_interrupted_after_the_flight(domain: Domain) -> None:

@@ -181,11 +181,11 @@ def test_a_definition_that_explodes(tmp_path: Path) -> None:
     line = "=" * 80
     text = f"B[100000] b\nfloat64 data\n{line}\nMSG: a_msgs/B\nC[100000] c\n{line}\nMSG: a_msgs/C\nuint8 d\n"
     bag = write_mcap(tmp_path / "bag.mcap", [(START, "/level", (b"\0\1\0\0", "a_msgs/msg/A", text))])
-    begun = time.monotonic()
+    begun = time.process_time()
     definitions = definitions_of(open_bag(bag).store("/level").fielddefs)
     with pytest.raises(MapError, match="has too many parts"):
         Reader(definitions, "a_msgs/msg/A", [Pick(name="level", fields=("data",), type="f64", count=1)])
-    assert time.monotonic() - begun < 15
+    assert time.process_time() - begun < 15
 
 
 def test_a_layout_that_explodes(tmp_path: Path) -> None:
@@ -194,11 +194,11 @@ def test_a_layout_that_explodes(tmp_path: Path) -> None:
     for count, fits in ((511, True), (513, False), (100000, False)):
         text = f"B[{count}] b\n{line}\nMSG: a_msgs/B\nC[170] c\n{line}\nMSG: a_msgs/C\nuint8 d\nuint8 e\n"
         bag = write_mcap(tmp_path / f"{count}.mcap", [(START, "/level", (b"\0\1\0\0", "a_msgs/msg/A", text))])
-        begun = time.monotonic()
+        begun = time.process_time()
         layout = open_bag(bag).layout("/level")
         assert (layout is not None) == fits
         assert layout is None or len(layout.leaves) == layout.size - 4 == 2 * 170 * count
-        assert time.monotonic() - begun < 15
+        assert time.process_time() - begun < 15
 
 
 def test_a_definition_of_ros1_that_lacks_a_type(tmp_path: Path) -> None:
