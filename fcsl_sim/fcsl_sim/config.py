@@ -45,7 +45,7 @@ from .whole_ticks import whole_ticks
 from .wiring import MAX_SECONDS, Instance, Wiring, check_wiring, seconds
 
 MAX_TICKS = 10**12
-#: Of a controller's commands (src/delay.h).
+#: Of a controller's commands (src/plan/plan.h).
 MAX_DELAY_TICKS = 1000
 #: Keys that say nothing about the flight; `extends` was followed before.
 FOR_READERS = ("$schema", "description", "extends")

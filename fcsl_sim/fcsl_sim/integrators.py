@@ -11,7 +11,7 @@ from fcsl_compiler.parse.json_source import JsonNode
 
 from . import plan
 
-#: Limits of the native simulator (src/plan.h).
+#: Limits of the native simulator (src/plan/plan.h).
 MAX_HZ = 1_000_000
 #: Methods of fixed steps: Euler, midpoint, Runge-Kutta, Adams-Bashforth, velocity Verlet.
 FIXED = ("euler", "rk2", "rk4", "ab4", "verlet")

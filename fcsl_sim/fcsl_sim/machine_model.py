@@ -14,7 +14,7 @@ _ROLES = ("input", "output", "parameter", "state")
 
 
 def machine_model(library: Path, name: str) -> ModelTable:
-    """The model's table, as src/machine_model.c makes it: ports of the instance, without requests and health. Its
+    """The model's table, as src/models/machine_model.c makes it: ports of the instance, without requests and health. Its
     parameters have the values of the machine JSON. Raises SimError and TwinError."""
     run = open_run(library, name)
     machine = run.machine

@@ -144,7 +144,7 @@ _PROTOTYPES: dict[str, tuple[type | None, list[type]]] = {
 #: fcsl_sim_status_t by number.
 STATUS_NAMES = ("running", "duration", "until")
 _LIBRARY = "libfcsl_sim.so"
-#: Largest truth message in bytes: a model struct has at most 1 MiB (src/model.h), plus padding and header.
+#: Largest truth message in bytes: a model struct has at most 1 MiB (src/models/model.h), plus padding and header.
 _MAX_TRUTH_BYTES = 3 << 20
 _MAX_DESCRIPTION_BYTES = 1 << 20
 

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""The flat plan, the input of the native simulator; src/plan.h defines its format."""
+"""The flat plan, the input of the native simulator; src/plan/plan.h defines its format."""
 
 from __future__ import annotations
 

@@ -372,7 +372,7 @@ class SimTrace:
 
 
 class _Sources:
-    """What feeds fields of machines and inputs of models, from the plan (src/plan.h)."""
+    """What feeds fields of machines and inputs of models, from the plan (src/plan/plan.h)."""
 
     def __init__(self, config: SimConfig, machines: Mapping[str, Machine]):
         #: `<instance>.<output>` by sensor channel of the first controller.

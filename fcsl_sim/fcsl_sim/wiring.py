@@ -23,7 +23,7 @@ from .models import FIELD_TYPES, ModelField, ModelTable, type_of, with_unit
 from .ros import TruthTopic, read_truth
 
 MAX_SECONDS = 1e9
-#: Of the grid on which updates with a phase lie (src/plan.h).
+#: Of the grid on which updates with a phase lie (src/plan/plan.h).
 _MAX_GRID_HZ = 1_000_000_000
 _COMPARISONS = ("equals", "above", "below")
 

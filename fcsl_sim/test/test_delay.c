@@ -5,7 +5,7 @@
 #include <string.h>
 
 #include "check.h"
-#include "delay.h"
+#include "controllers/delay.h"
 #include "machines/hopper.c"
 
 enum { TICKS = 50 };

@@ -5,7 +5,7 @@
 #include <stdint.h>
 
 #include "check.h"
-#include "event_queue.h"
+#include "engine/event_queue.h"
 
 enum { EVENTS = 500 };
 

@@ -7,8 +7,8 @@
 #include <string.h>
 
 #include "check.h"
-#include "clock.h"
-#include "integrate.h"
+#include "base/clock.h"
+#include "integrators/integrate.h"
 
 enum { STATES_MAX = 4 };
 

@@ -7,7 +7,7 @@
 #include <string.h>
 
 #include "check.h"
-#include "noise.h"
+#include "models/noise.h"
 
 enum { SAMPLES = 1000000 };
 

@@ -6,7 +6,7 @@
 #include <string.h>
 
 #include "check.h"
-#include "plan.h"
+#include "plan/plan.h"
 
 static const char good[] = "fcsl-sim-plan 2\n"
                            "machine hopper /path with spaces/libhopper.so\n"

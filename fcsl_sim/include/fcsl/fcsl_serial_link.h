@@ -1,7 +1,7 @@
 /* SPDX-License-Identifier: Apache-2.0
  *
  * The variables of the model serial_link: a serial line between the plant and its controller. The simulator itself moves the
- * frames (fcsl_sim/src/serial_link.c); the model declares and checks what is said about the line.
+ * frames (fcsl_sim/src/controllers/serial_link.c); the model declares and checks what is said about the line.
  */
 #ifndef FCSL_SERIAL_LINK_H
 #define FCSL_SERIAL_LINK_H

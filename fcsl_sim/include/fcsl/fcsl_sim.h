@@ -7,7 +7,7 @@
  * (fcsl_codec.h), whether the controller is hosted here, in another process or in a ROS 2 node: the bits are the same.
  *
  * A simulation is built from a plan: a flat text that the front end (fcsl_sim, Python) makes from a checked *.sim.json
- * (format: src/plan.h). Not thread-safe: one thread owns a simulation.
+ * (format: src/plan/plan.h). Not thread-safe: one thread owns a simulation.
  */
 #ifndef FCSL_SIM_H
 #define FCSL_SIM_H
@@ -236,7 +236,7 @@ uint32_t fcsl_sim_truth_values(const fcsl_sim_t *sim, double *values, uint32_t c
 
 /* ---- for the front end -------------------------------------------------------------------------------------------- */
 
-/* Tab-separated description of a model (format: describe.c), validated as by fcsl_sim_open. Writes at most `capacity`
+/* Tab-separated description of a model (format: src/output/describe.c), validated as by fcsl_sim_open. Writes at most `capacity`
  * bytes; returns the bytes of the whole text, or -1. */
 int64_t fcsl_sim_describe_model(const char *library, const char *name, char *text, size_t capacity,
                                 fcsl_error_t *error);

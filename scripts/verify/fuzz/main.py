@@ -45,7 +45,7 @@ FLAGS = (
 _NATIVE = (
     "fcsl_hal/src/*",
     *(f"fcsl_runtime/fcsl_runtime/{folder}" for folder in ("src/*", "fc", "observers", "ros_graph", "board")),
-    "fcsl_sim/src",
+    "fcsl_sim/src/*",
 )
 _INCLUDES = (
     *("fcsl_hal/include", "fcsl_runtime/fcsl_runtime/include", "fcsl_sim/include", "fcsl_compiler/include"),
@@ -58,7 +58,7 @@ _INCLUDES = (
         "fcsl_runtime/fcsl_runtime/fc",
         "fcsl_runtime/fcsl_runtime/board",
     ),
-    *("fcsl_runtime/fcsl_runtime/test", "fcsl_hal/test", "fcsl_hal/test/support", "fcsl_sim/src"),
+    *("fcsl_runtime/fcsl_runtime/test", "fcsl_hal/test", "fcsl_hal/test/support", "fcsl_sim/src", "fcsl_sim/src/*/"),
 )
 
 

@@ -40,7 +40,7 @@ _CARRIERS = (
 )
 _INCLUDES = (
     *(ROOT / f"{package}/include" for package in ("fcsl_hal", "fcsl_runtime/fcsl_runtime", "fcsl_sim")),
-    *(SIMULATOR, _RUNTIME, _RUNTIME / "run", _HAL),
+    *(SIMULATOR, *sorted(SIMULATOR.glob("*/")), _RUNTIME, _RUNTIME / "run", _HAL),
 )
 _STUB = """void {name}(const void *of);
 void {name}(const void *of)
@@ -97,7 +97,7 @@ class Builder:
     def _make_shared(self, target: Target) -> list[Path]:
         folder = FOLDER / self._key(target)
         sources = [s for p in _CARRIERS for s in (sorted(p.glob("*.c")) if p.is_dir() else [p])]
-        sources += [HERE / "plant.c", *(SIMULATOR / f"{name}.c" for name in sorted(_MOVERS))]
+        sources += [HERE / "plant.c", *(s for s in sorted(SIMULATOR.glob("*/*.c")) if s.stem in _MOVERS)]
         flags = ("-O1", "-w")
         objects = [_compile(target, flags, s, folder / f"{s.parent.name}-{s.stem}.o", self.includes) for s in sources]
         if not target.own_math:
@@ -109,7 +109,7 @@ class Builder:
     def build(self, target: Target, patched: Path | None = None) -> Built:
         """The program of a target; `patched` stands in for the simulator's file of its name. Raises CheckFailed."""
         folder = FOLDER / target.name.replace(" ", "_").replace(":", "")
-        sources = [s for s in sorted(SIMULATOR.glob("*.c")) if s.stem not in _MOVERS]
+        sources = [s for s in sorted(SIMULATOR.glob("*/*.c")) if s.stem not in _MOVERS]
         sources = [patched if patched is not None and s.name == patched.name else s for s in sources]
         core = [_compile(target, target.flags, s, folder / f"{s.stem}.o", self.includes) for s in sources]
         shared = self._shared[self._key(target)].result()

@@ -61,10 +61,10 @@ class Defect:
 
 #: The last bit of one constant; and numbers that depend on what the process has drawn before.
 DEFECTS = (
-    Defect("control: last bit of one constant", "rk45.c", "44.0 / 45.0", "0x1.f49f49f49f49ep-1"),
+    Defect("control: last bit of one constant", "integrators/rk45.c", "44.0 / 45.0", "0x1.f49f49f49f49ep-1"),
     Defect(
         "control: noise remembers the run before",
-        "noise.c",
+        "models/noise.c",
         "const uint64_t number = noise->streams[stream].drawn++",
         "static uint64_t drawn;\n    const uint64_t number = drawn++",
     ),

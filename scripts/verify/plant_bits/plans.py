@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""The flights of the check `plant_bits`, as plans of the simulator (fcsl_sim/src/plan.h)."""
+"""The flights of the check `plant_bits`, as plans of the simulator (fcsl_sim/src/plan/plan.h)."""
 
 from __future__ import annotations
 

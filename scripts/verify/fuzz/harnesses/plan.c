@@ -6,7 +6,7 @@
 #include <math.h>
 
 #include "fuzz.h"
-#include "plan.h"
+#include "plan/plan.h"
 
 static void check_groups(const fcsl_plan_t *plan)
 {

@@ -8,7 +8,7 @@
 
 #include "fcsl/fcsl_sim.h"
 #include "fuzz.h"
-#include "plan.h"
+#include "plan/plan.h"
 
 /* Plans that take long by what they say are left out: what they do is seen in shorter ones. */
 #define RATE_MAX   20000u

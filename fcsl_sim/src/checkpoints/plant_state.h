@@ -1,0 +1,16 @@
+/* SPDX-License-Identifier: Apache-2.0
+ *
+ * All that a simulation needs to go on, besides the first machine and its hardware, as bytes: models, noise, integrators, events,
+ * channels, gates, delays, the line, companions. Between two ticks.
+ */
+#ifndef FCSL_SIM_PLANT_STATE_H
+#define FCSL_SIM_PLANT_STATE_H
+
+#include "engine/sim_internal.h"
+
+size_t fcsl_plant_state_bytes(const fcsl_sim_t *sim);
+void fcsl_plant_state_save(const fcsl_sim_t *sim, void *bytes);
+/* Returns 0, or -1: a machine has refused its part, and the simulation is of no use until another one is restored. */
+int fcsl_plant_state_restore(fcsl_sim_t *sim, const void *bytes);
+
+#endif /* FCSL_SIM_PLANT_STATE_H */

@@ -1,0 +1,150 @@
+/* SPDX-License-Identifier: Apache-2.0
+ *
+ * Simulations with external controllers, in step with each other: all that run are sensed and asked, then all answers are taken.
+ */
+#include "base/clock.h"
+#include "base/fail.h"
+#include "engine/sim_internal.h"
+
+static int ask(fcsl_sim_t *sim, fcsl_error_t *error)
+{
+    fcsl_message_t sensors;
+    if (!sim->external || fcsl_external_runs_free(sim->external)) {
+        return fcsl_sim_fail(error, "only simulations in lock-step with an external controller run together");
+    }
+    if (fcsl_sim_sense_message(sim, sim->message_bytes, sim->message_capacity, &sensors, error)) {
+        return -1;
+    }
+    const fcsl_hal_status_t status = fcsl_external_send(sim->external, &sensors, (uint64_t)sim->time_ns);
+    if (status != FCSL_HAL_OK) {
+        return fcsl_sim_external_failed(sim, status, "cannot send the sensor message", error);
+    }
+    sim->asked = 1;
+    fcsl_sim_topics_put(sim);
+    return 0;
+}
+
+/* Takes the answer, if it comes in a moment. */
+static int take_answer(fcsl_sim_t *sim, fcsl_error_t *error)
+{
+    fcsl_message_t command;
+    const fcsl_hal_status_t status = fcsl_external_await(sim->external, sim->tick, sim->external_timeout_ms, &command);
+    if (status == FCSL_HAL_WAITING || status == FCSL_HAL_NONE) {
+        return 0;
+    }
+    if (status != FCSL_HAL_OK) {
+        return fcsl_sim_external_failed(sim, status, "no actuator message from the controller", error);
+    }
+    sim->asked = 0;
+    if (fcsl_sim_actuate_message(sim, &command, error)) {
+        return -1;
+    }
+    if (sim->status != FCSL_SIM_RUNNING) {
+        fcsl_sim_end(sim, 0);
+    }
+    return 0;
+}
+
+/* How many wait for an answer, or run. */
+static uint32_t how_many(fcsl_sim_t *const *sims, uint32_t count, int waiting)
+{
+    uint32_t found = 0;
+    for (uint32_t i = 0; i < count; i++) {
+        found += waiting ? sims[i]->asked != 0 : sims[i]->status == FCSL_SIM_RUNNING;
+    }
+    return found;
+}
+
+static int ask_all(fcsl_sim_t *const *sims, uint32_t count, uint32_t *failed, fcsl_error_t *error)
+{
+    for (uint32_t i = 0; i < count; i++) {
+        *failed = i;
+        if (sims[i]->status == FCSL_SIM_RUNNING && ask(sims[i], error)) {
+            return -1;
+        }
+    }
+    return 0;
+}
+
+/* To controllers that have no tick to answer. */
+static void say_alive(fcsl_sim_t *const *sims, uint32_t count)
+{
+    for (uint32_t i = 0; i < count; i++) {
+        if (!sims[i]->asked) {
+            fcsl_sim_alive(sims[i]);
+        }
+    }
+}
+
+/* One turn; controllers that have answered wait for the others. */
+static int take_answers(fcsl_sim_t *const *sims, uint32_t count, uint32_t *failed, fcsl_error_t *error)
+{
+    for (uint32_t i = 0; i < count; i++) {
+        *failed = i;
+        if (sims[i]->asked && take_answer(sims[i], error)) {
+            return -1;
+        }
+    }
+    if (how_many(sims, count, 1) > 0) {
+        say_alive(sims, count);
+    }
+    return 0;
+}
+
+/* Waits until a tick is due; 0 if it is not within the slice. */
+static int is_due(fcsl_sim_t *first, uint64_t end_ns)
+{
+    fcsl_sim_forgive(first);
+    const uint64_t due_ns = fcsl_sim_wait_until(first);
+    if (due_ns == 0) {
+        return 1;
+    }
+    fcsl_sim_sleep_until(due_ns < end_ns ? due_ns : end_ns);
+    return 0;
+}
+
+static int64_t run(fcsl_sim_t *const *sims, uint32_t count, uint64_t ticks, uint64_t end_ns, uint32_t *failed,
+                   fcsl_error_t *error)
+{
+    int64_t done = 0;
+    while (((uint64_t)done < ticks || how_many(sims, count, 1) > 0) && how_many(sims, count, 0) > 0 &&
+           fcsl_run_monotonic_ns(NULL) < end_ns) {
+        if (how_many(sims, count, 1) == 0) {
+            if (!is_due(sims[0], end_ns)) {
+                say_alive(sims, count);
+                continue;
+            }
+            if (ask_all(sims, count, failed, error)) {
+                return -1;
+            }
+        }
+        if (take_answers(sims, count, failed, error)) {
+            return -1;
+        }
+        done += how_many(sims, count, 1) == 0;
+    }
+    return done;
+}
+
+int64_t fcsl_sim_run_together(fcsl_sim_t *const *sims, uint32_t count, uint64_t ticks, uint32_t slice_ms,
+                              uint32_t *failed, fcsl_error_t *error)
+{
+    const uint64_t end_ns = fcsl_run_monotonic_ns(NULL) + (uint64_t)slice_ms * (FCSL_NS_PER_S / 1000u);
+    const int64_t done = run(sims, count, ticks, end_ns, failed, error);
+    fcsl_sim_topics_wake(sims[0]);
+    return done;
+}
+
+void fcsl_sim_alive(fcsl_sim_t *sim)
+{
+    if (sim->external && sim->status == FCSL_SIM_RUNNING) {
+        fcsl_external_alive(sim->external);
+    }
+}
+
+void fcsl_sim_end(fcsl_sim_t *sim, int another_follows)
+{
+    if (sim->external) {
+        fcsl_external_end(sim->external, another_follows);
+    }
+}

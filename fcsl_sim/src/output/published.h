@@ -1,0 +1,27 @@
+/* SPDX-License-Identifier: Apache-2.0
+ *
+ * The data that the simulation publishes to other threads: the memory of the hosted machine and of every model after the
+ * last ticks, and the tables that describe it.
+ */
+#ifndef FCSL_SIM_PUBLISHED_H
+#define FCSL_SIM_PUBLISHED_H
+
+#include "engine/sim_internal.h"
+#include "fcsl/fcsl_vars.h"
+
+struct fcsl_sim_published {
+    fcsl_history_t history;
+    fcsl_vars_block_t *blocks; /* the machine, if it is hosted here, then the instances */
+    fcsl_part_t *parts;
+    uint32_t count;
+    uint32_t instance_count;
+    uint32_t first_model;  /* block of instance 0 */
+    fcsl_field_t **fields; /* per instance: the model's table, with write access for clients */
+    const char ***writers; /* per instance and field */
+    char **texts;          /* per instance: the strings of `writers` */
+};
+
+/* Creates sim->published, if it does not exist, and publishes; only before the first tick. */
+int fcsl_sim_publish_begin(fcsl_sim_t *sim, fcsl_error_t *error);
+
+#endif /* FCSL_SIM_PUBLISHED_H */
