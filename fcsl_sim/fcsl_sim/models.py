@@ -106,7 +106,7 @@ def with_unit(type_: Type, unit: str) -> str:
 
 
 def parse_description(text: str, library: Path) -> ModelTable:
-    """Parses the text of fcsl_sim_describe_model (src/output/describe.c)."""
+    """Parses the text of fcsl_sim_describe_model (src/output/describe_model.c)."""
     head, *rows = (line.split("\t") for line in text.splitlines())
     _, name, offset, count, functions, doc = head
     events = tuple(ModelEvent(*row[1:]) for row in rows if row[0] == "event")

@@ -236,7 +236,7 @@ uint32_t fcsl_sim_truth_values(const fcsl_sim_t *sim, double *values, uint32_t c
 
 /* ---- for the front end -------------------------------------------------------------------------------------------- */
 
-/* Tab-separated description of a model (format: src/output/describe.c), validated as by fcsl_sim_open. Writes at most `capacity`
+/* Tab-separated description of a model (format: src/output/describe_model.c), validated as by fcsl_sim_open. Writes at most `capacity`
  * bytes; returns the bytes of the whole text, or -1. */
 int64_t fcsl_sim_describe_model(const char *library, const char *name, char *text, size_t capacity,
                                 fcsl_error_t *error);

@@ -275,7 +275,7 @@ static int init_models(fcsl_sim_t *sim, fcsl_error_t *error)
         if (wrong) {
             return fcsl_sim_fail(error, "instance `%s`: %s", instance->name, fcsl_sim_init_reason(wrong));
         }
-        if (fcsl_sim_check_purity(sim, i, error) || fcsl_sim_check_prototypes(sim, i, error)) {
+        if (fcsl_sim_check_contract(sim, i, error) || fcsl_sim_check_prototypes(sim, i, error)) {
             return -1;
         }
     }

@@ -8,7 +8,7 @@
 #include <stdatomic.h>
 #include <string.h>
 
-#include "controllers/companion.h"
+#include "controllers/companion_controller.h"
 #include "controllers/serial_link.h"
 #include "event_queue.h"
 #include "fcsl/fcsl_external.h"
@@ -97,7 +97,7 @@ typedef struct {
     char *texts;          /* the model's name, and the paths of the channels */
 } fcsl_actuators_t;
 
-/* When ticks may run (pace.c). */
+/* When ticks may run (pacing.c). */
 typedef struct {
     double speed; /* limit on simulated seconds per second; 0: as fast as possible */
     int anchored; /* tick from_tick was due at from_ns of the monotonic clock */
@@ -206,17 +206,17 @@ static inline fcsl_model_context_t fcsl_sim_context(fcsl_sim_t *sim, uint32_t in
                                   sim->instances[instance].model};
 }
 
-/* place.c: the field at an offset in the struct of an instance: "lander.state.pos_z", "wheel.state.rate[2]". */
-#define FCSL_PLACE_BYTES 320u
-void fcsl_sim_name_place(const fcsl_instance_state_t *instance, size_t offset, char *text, size_t size);
-/* crash.c: the simulation exists, or no longer. */
+/* value_names.c: the field at an offset in the struct of an instance: "lander.state.pos_z", "wheel.state.rate[2]". */
+#define FCSL_VALUE_NAME_BYTES 320u
+void fcsl_sim_name_value(const fcsl_instance_state_t *instance, size_t offset, char *text, size_t size);
+/* crash_handler.c: the simulation exists, or no longer. */
 void fcsl_sim_is_open(const fcsl_sim_t *sim, int is_open);
-/* place.c: fails where an output of an instance is not finite. */
+/* value_names.c: fails where an output of an instance is not finite. */
 int fcsl_sim_check_outputs(const fcsl_sim_t *sim, fcsl_error_t *error);
 
-/* purity.c: tries the functions of an instance that is initialised. Returns 0, or -1. */
-int fcsl_sim_check_purity(fcsl_sim_t *sim, uint32_t index, fcsl_error_t *error);
-/* prototypes.c: what `init` returned that is not null, as a text. */
+/* model_contract.c: tries the functions of an instance that is initialised. Returns 0, or -1. */
+int fcsl_sim_check_contract(fcsl_sim_t *sim, uint32_t index, fcsl_error_t *error);
+/* model_prototypes.c: what `init` returned that is not null, as a text. */
 const char *fcsl_sim_init_reason(const char *returned);
 /* Tries whether functions of an instance take their time as a double. Returns 0, or -1. */
 int fcsl_sim_check_prototypes(fcsl_sim_t *sim, uint32_t index, fcsl_error_t *error);
@@ -237,31 +237,31 @@ int fcsl_sim_tick_once(fcsl_sim_t *sim, fcsl_error_t *error);
 /* host.c: says what became of a message to or from the external controller; returns -1. */
 int fcsl_sim_external_failed(const fcsl_sim_t *sim, fcsl_hal_status_t status, const char *doing, fcsl_error_t *error);
 
-/* topics.c: what the sensed tick shows, into the outbox. */
+/* ros_topics.c: what the sensed tick shows, into the outbox. */
 void fcsl_sim_topics_put(fcsl_sim_t *sim);
 /* Who takes from the outbox looks at once. */
 void fcsl_sim_topics_wake(const fcsl_sim_t *sim);
 void fcsl_sim_topics_free(fcsl_sim_t *sim);
 
-/* published.c: publishes the current values to clients, telemetry and observers. */
+/* publish.c: publishes the current values to clients, telemetry and observers. */
 void fcsl_sim_publish(fcsl_sim_t *sim);
 void fcsl_sim_publish_end(fcsl_sim_t *sim);
-/* serve.c: executes a waiting command; waits a while and returns 0 if no tick may run now. */
+/* variable_server.c: executes a waiting command; waits a while and returns 0 if no tick may run now. */
 int fcsl_sim_attend(fcsl_sim_t *sim);
-/* serve.c: updates the tick counters of `stats`; does nothing without a variable server. */
+/* variable_server.c: updates the tick counters of `stats`; does nothing without a variable server. */
 uint64_t fcsl_sim_tick_begins(const fcsl_sim_t *sim);
 void fcsl_sim_tick_ends(fcsl_sim_t *sim, uint64_t begun_ns);
 void fcsl_sim_end_service(fcsl_sim_t *sim);
-/* serve.c: whether a client keeps the simulation paused. */
+/* variable_server.c: whether a client keeps the simulation paused. */
 int fcsl_sim_paused(const fcsl_sim_t *sim);
-/* pace.c: the time of the monotonic clock to wait for, at most a short while ahead even if the next tick is due later. 0 if
+/* pacing.c: the time of the monotonic clock to wait for, at most a short while ahead even if the next tick is due later. 0 if
  * it is due. */
 uint64_t fcsl_sim_wait_until(fcsl_sim_t *sim);
-/* pace.c: sleeps until then, or until a signal. */
+/* pacing.c: sleeps until then, or until a signal. */
 void fcsl_sim_sleep_until(uint64_t deadline_ns);
-/* pace.c: a simulation that is late by more than 0.1 s does not make up for it. */
+/* pacing.c: a simulation that is late by more than 0.1 s does not make up for it. */
 void fcsl_sim_forgive(fcsl_sim_t *sim);
-/* pace.c: the next tick is due at once, later ones relative to it. */
+/* pacing.c: the next tick is due at once, later ones relative to it. */
 void fcsl_sim_pace_anew(fcsl_sim_t *sim);
 
 /* sim.c: a command arrives at the plant. */
@@ -288,12 +288,12 @@ void fcsl_assembly_free(fcsl_sim_t *sim);
 /* Writes a scalar of `size` bytes given as zero-extended bits. */
 void fcsl_write_bits(uint8_t *to, uint32_t size, uint64_t bits);
 
-/* truth.c: a scalar from its zero-extended bits; integers beyond 2^53 are rounded. */
+/* truth_messages.c: a scalar from its zero-extended bits; integers beyond 2^53 are rounded. */
 double fcsl_as_double(uint64_t bits, uint8_t type);
-/* truth.c: type, schema and size of every instance's message, and of the actuators'. */
+/* truth_messages.c: type, schema and size of every instance's message, and of the actuators'. */
 int fcsl_truth_build(fcsl_sim_t *sim, fcsl_error_t *error);
 void fcsl_truth_free(fcsl_sim_t *sim);
-/* truth.c: the outputs as CDR, stamped with the present time. Returns its bytes, or 0 when it does not fit. */
+/* truth_messages.c: the outputs as CDR, stamped with the present time. Returns its bytes, or 0 when it does not fit. */
 size_t fcsl_truth_write(const fcsl_sim_t *sim, const fcsl_instance_state_t *instance, uint8_t *cdr_bytes,
                         size_t capacity);
 

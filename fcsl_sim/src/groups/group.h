@@ -28,7 +28,7 @@ typedef struct {
     int64_t to_ns;
     int64_t event_ns; /* RK45: of the first event in that step; 0: none */
     double next_s;    /* RK45: the step to try; 0: not known */
-    double since_s;   /* the last announced jump (jump.c) that is at the present or before it */
+    double since_s;   /* the last announced jump (announced_jumps.c) that is at the present or before it */
     int64_t last_event_ns;
     uint32_t events_in_a_row;
     uint8_t has_slope; /* of the integrator */
@@ -131,7 +131,7 @@ typedef void (*fcsl_probe_t)(fcsl_group_t *group, int64_t offset_ns, double *x);
 /* The first offset in (0, length_ns] at which an event has happened; group->g1 is at the end of the step, where one has. */
 int64_t fcsl_group_locate(fcsl_group_t *group, int64_t from_ns, int64_t length_ns, fcsl_probe_t probe);
 
-/* jump.c: the next announced jump, behind the present. Returns 0, or -1. */
+/* announced_jumps.c: the next announced jump, behind the present. Returns 0, or -1. */
 int fcsl_group_find_jump(fcsl_group_t *group, fcsl_error_t *error);
 /* Once the present is the nanosecond of that jump: goes to its other side. Returns 0, or -1. */
 int fcsl_group_jump(fcsl_group_t *group, fcsl_error_t *error);

@@ -4,7 +4,7 @@
  * for it.
  */
 #include "base/fail.h"
-#include "published.h"
+#include "publish.h"
 
 int fcsl_sim_observers(fcsl_sim_t *sim, const char *endpoint, const char *name_space, fcsl_error_t *error)
 {

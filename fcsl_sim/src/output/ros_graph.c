@@ -3,7 +3,7 @@
  * The hosted machine in a ROS 2 graph, by a bridge (fcsl_ros_graph.h). Its thread reads the published data; no tick waits for it.
  */
 #include "base/fail.h"
-#include "published.h"
+#include "publish.h"
 
 int fcsl_sim_ros(fcsl_sim_t *sim, const char *endpoint, const char *name_space, fcsl_error_t *error)
 {

@@ -3,7 +3,7 @@
  * The simulation's values as UDP (fcsl_telemetry.h). The sender's thread reads the published data; no tick waits for it.
  */
 #include "base/fail.h"
-#include "published.h"
+#include "publish.h"
 
 int fcsl_sim_telemetry(fcsl_sim_t *sim, const char *address, const char *fields, fcsl_error_t *error)
 {

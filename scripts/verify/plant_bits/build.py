@@ -20,16 +20,16 @@ SIMULATOR = ROOT / "fcsl_sim" / "src"
 _RUNTIME, _HAL = ROOT / "fcsl_runtime/fcsl_runtime/src", ROOT / "fcsl_hal/src"
 #: Files of the simulator that move values to others, and compute none.
 _MOVERS = {
-    "crash",
-    "describe",
+    "crash_handler",
+    "describe_model",
+    "lockstep",
     "observers",
-    "pace",
-    "published",
+    "pacing",
+    "publish",
     "ros_graph",
-    "serve",
+    "ros_topics",
     "telemetry",
-    "together",
-    "topics",
+    "variable_server",
 }
 #: The rest of what a flight calls: hosting a machine, and messages of channels. Not under test. Recording, sockets and the bus are
 #: left out: in their place are functions that end the program, but for those that close nothing.

@@ -2,7 +2,7 @@
  *
  * Controllers beside the first one.
  */
-#include "companion.h"
+#include "companion_controller.h"
 
 #include <stdlib.h>
 #include <string.h>

@@ -3,8 +3,8 @@
  * Companions: further controllers that are hosted beside the first one, each at its own rate. They meet the plant in messages of
  * channels, as the first one does.
  */
-#ifndef FCSL_SIM_COMPANION_H
-#define FCSL_SIM_COMPANION_H
+#ifndef FCSL_SIM_COMPANION_CONTROLLER_H
+#define FCSL_SIM_COMPANION_CONTROLLER_H
 
 #include "delay.h"
 #include "fcsl/fcsl_gate.h"
@@ -54,4 +54,4 @@ int fcsl_companion_tick(fcsl_companion_t *companion, struct fcsl_sim *sim, fcsl_
 void fcsl_sensors_sample(struct fcsl_sim *sim, fcsl_sensor_t *sensors, uint32_t count, uint8_t *select,
                          uint32_t channels);
 
-#endif /* FCSL_SIM_COMPANION_H */
+#endif /* FCSL_SIM_COMPANION_CONTROLLER_H */

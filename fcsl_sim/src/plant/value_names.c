@@ -21,7 +21,7 @@ static void name_element(const fcsl_field_t *field, uint32_t element, char *text
     }
 }
 
-void fcsl_sim_name_place(const fcsl_instance_state_t *instance, size_t offset, char *text, size_t size)
+void fcsl_sim_name_value(const fcsl_instance_state_t *instance, size_t offset, char *text, size_t size)
 {
     const fcsl_model_t *model = instance->model;
     for (uint32_t i = 0; i < model->field_count; i++) {
@@ -61,8 +61,8 @@ static int check_field(const fcsl_sim_t *sim, const fcsl_instance_state_t *insta
     for (uint32_t i = 0; i < field->count; i++) {
         const double value = value_at(instance->data + field->offset + (size_t)i * scalar, field->type);
         if (!isfinite(value)) {
-            char name[FCSL_PLACE_BYTES];
-            fcsl_sim_name_place(instance, field->offset + (size_t)i * scalar, name, sizeof name);
+            char name[FCSL_VALUE_NAME_BYTES];
+            fcsl_sim_name_value(instance, field->offset + (size_t)i * scalar, name, sizeof name);
             return fcsl_sim_fail(error, "%s became %g at %.9f s", name, isnan(value) ? (double)NAN : value,
                                  (double)sim->time_ns / 1e9);
         }

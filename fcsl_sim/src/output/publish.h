@@ -3,8 +3,8 @@
  * The data that the simulation publishes to other threads: the memory of the hosted machine and of every model after the
  * last ticks, and the tables that describe it.
  */
-#ifndef FCSL_SIM_PUBLISHED_H
-#define FCSL_SIM_PUBLISHED_H
+#ifndef FCSL_SIM_PUBLISH_H
+#define FCSL_SIM_PUBLISH_H
 
 #include "engine/sim_internal.h"
 #include "fcsl/fcsl_vars.h"
@@ -24,4 +24,4 @@ struct fcsl_sim_published {
 /* Creates sim->published, if it does not exist, and publishes; only before the first tick. */
 int fcsl_sim_publish_begin(fcsl_sim_t *sim, fcsl_error_t *error);
 
-#endif /* FCSL_SIM_PUBLISHED_H */
+#endif /* FCSL_SIM_PUBLISH_H */

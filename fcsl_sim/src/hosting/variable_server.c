@@ -10,7 +10,7 @@
 #include "base/fail.h"
 #include "checkpoints/snapshot.h"
 #include "fcsl/fcsl_scalar.h"
-#include "output/published.h"
+#include "output/publish.h"
 
 struct fcsl_sim_service {
     fcsl_vars_t *vars;

@@ -2,7 +2,7 @@
  *
  * Publishes the memory of machine and models to other threads.
  */
-#include "published.h"
+#include "publish.h"
 
 #include <stdlib.h>
 #include <string.h>
