@@ -109,15 +109,6 @@ KNOWN: Mapping[str, Sequence[str]] = {
     f"{_RUNTIME}/src/vars/expression.c": ("arithmetic.h", "expression_parser.h"),
     # It opens a simulation, too.
     "fcsl_sim/src/engine/sim.c": ("checkpoints/plant_state.h",),
-    # Parts of a simulation, whose functions take the simulation.
-    "fcsl_sim/src/controllers/companion_controller.c": ("engine/sim_internal.h",),
-    "fcsl_sim/src/groups/group.c": ("engine/sim_internal.h",),
-    "fcsl_sim/src/groups/group_adaptive.c": ("engine/sim_internal.h",),
-    "fcsl_sim/src/groups/group_events.c": ("engine/sim_internal.h",),
-    "fcsl_sim/src/groups/announced_jumps.c": ("engine/sim_internal.h",),
-    "fcsl_sim/src/plant/value_names.c": ("engine/sim_internal.h",),
-    "fcsl_sim/src/plant/model_prototypes.c": ("engine/sim_internal.h",),
-    "fcsl_sim/src/plant/model_contract.c": ("engine/sim_internal.h",),
 }
 INCLUDE = re.compile(r'\s*#\s*include\s*([<"])([^>"]+)[>"]')
 

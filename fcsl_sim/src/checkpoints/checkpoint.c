@@ -61,8 +61,8 @@ static uint64_t layout_of(const fcsl_sim_t *sim)
     uint64_t hash = UINT64_C(0xcbf29ce484222325);
     mix_number(&hash, sizeof(fcsl_group_state_t));
     mix_number(&hash, sizeof(fcsl_noise_t));
-    for (uint32_t i = 0; i < sim->instance_count; i++) {
-        const fcsl_instance_state_t *instance = &sim->instances[i];
+    for (uint32_t i = 0; i < sim->plant.instance_count; i++) {
+        const fcsl_instance_state_t *instance = &sim->plant.instances[i];
         mix_text(&hash, instance->name);
         mix_model(&hash, instance->model);
         mix_number(&hash, instance->group);
@@ -83,12 +83,13 @@ static uint64_t layout_of(const fcsl_sim_t *sim)
         mix(&hash, &sim->groups[i].plan->max_step_s, sizeof sim->groups[i].plan->max_step_s);
         mix(&hash, sim->groups[i].atol, sim->groups[i].n * sizeof *sim->groups[i].atol);
     }
-    for (uint32_t i = 0; i < sim->copy_count; i++) {
-        const fcsl_copy_t *copy = &sim->copies[i];
+    for (uint32_t i = 0; i < sim->plant.copy_count; i++) {
+        const fcsl_copy_t *copy = &sim->plant.copies[i];
         mix_number(&hash, copy->instance);
         mix_number(&hash, copy->source);
-        mix_number(&hash, (uint64_t)(copy->to - sim->instances[copy->instance].data));
-        mix_number(&hash, copy->source != UINT32_MAX ? (uint64_t)(copy->from - sim->instances[copy->source].data) : 0u);
+        mix_number(&hash, (uint64_t)(copy->to - sim->plant.instances[copy->instance].data));
+        mix_number(&hash,
+                   copy->source != UINT32_MAX ? (uint64_t)(copy->from - sim->plant.instances[copy->source].data) : 0u);
     }
     for (uint32_t i = 0; i < sim->sensor_count; i++) {
         mix_number(&hash, sim->sensors[i].instance);
@@ -156,7 +157,7 @@ static int check_head(const fcsl_sim_t *sim, const uint8_t *in, size_t size, fcs
 /* Whether the next update of an instance is the first one behind the present: PHASE + i * EVERY of its grid. */
 static int is_update_possible(const fcsl_sim_t *sim, uint32_t index, int64_t now_ns)
 {
-    const fcsl_instance_state_t *instance = &sim->instances[index];
+    const fcsl_instance_state_t *instance = &sim->plant.instances[index];
     const uint64_t phase = sim->plan.instances[index].phase;
     const uint64_t next = instance->next_update;
     if (instance->hz == 0 || sim->tick == 0 || next == phase) {
@@ -221,7 +222,7 @@ static int is_companion_possible(const fcsl_companion_t *companion, const fcsl_s
     if (sim->tick == 0 || tick == 0) {
         return sim->tick == 0 && tick == 0;
     }
-    return companion->next_tick_ns > sim->time_ns && fcsl_grid_time_ns(tick - 1u, hz) <= sim->time_ns;
+    return companion->next_tick_ns > sim->plant.time_ns && fcsl_grid_time_ns(tick - 1u, hz) <= sim->plant.time_ns;
 }
 
 /* Where an instance is a machine, its struct holds what a machine may hold. */
@@ -235,12 +236,12 @@ static int is_possible(const fcsl_sim_t *sim, uint64_t machine_tick)
 {
     int possible = sim->tick == machine_tick && are_channels_possible(sim->machine, sim->image, &sim->gate);
     const int64_t now_ns = sim->tick > 0 ? fcsl_grid_time_ns(sim->tick - 1u, sim->machine->tick_hz) : 0;
-    possible = possible && sim->time_ns == now_ns;
-    for (uint32_t i = 0; possible && i < sim->instance_count; i++) {
-        const fcsl_model_t *model = sim->instances[i].model;
+    possible = possible && sim->plant.time_ns == now_ns;
+    for (uint32_t i = 0; possible && i < sim->plant.instance_count; i++) {
+        const fcsl_model_t *model = sim->plant.instances[i].model;
         possible = is_update_possible(sim, i, now_ns) &&
-                   are_bools(model->fields, model->field_count, sim->instances[i].data) &&
-                   is_machine_possible(&sim->instances[i]);
+                   are_bools(model->fields, model->field_count, sim->plant.instances[i].data) &&
+                   is_machine_possible(&sim->plant.instances[i]);
     }
     for (uint32_t i = 0; possible && i < sim->companion_count; i++) {
         possible = is_companion_possible(&sim->companions[i], sim);

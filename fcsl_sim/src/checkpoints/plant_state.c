@@ -86,13 +86,13 @@ static void walk_companion(walk_t *walk, fcsl_companion_t *companion)
 static void walk_all(walk_t *walk, fcsl_sim_t *sim)
 {
     part(walk, &sim->tick, sizeof sim->tick);
-    part(walk, &sim->time_ns, sizeof sim->time_ns);
+    part(walk, &sim->plant.time_ns, sizeof sim->plant.time_ns);
     part(walk, &sim->until_held, sizeof sim->until_held);
     part(walk, sim->image, sim->machine->size);
     part(walk, &sim->gate.command_ns, sizeof sim->gate.command_ns);
     part(walk, &sim->gate.state, sizeof sim->gate.state);
-    for (uint32_t i = 0; i < sim->instance_count; i++) {
-        fcsl_instance_state_t *instance = &sim->instances[i];
+    for (uint32_t i = 0; i < sim->plant.instance_count; i++) {
+        fcsl_instance_state_t *instance = &sim->plant.instances[i];
         part(walk, instance->data, instance->model->size);
         part(walk, &instance->noise, sizeof instance->noise);
         part(walk, &instance->next_update, sizeof instance->next_update);
@@ -127,7 +127,7 @@ static void pass_events(fcsl_sim_t *sim)
 {
     sim->next_event = 0;
     while (sim->tick > 0 && sim->next_event < sim->plan.event_count &&
-           (int64_t)sim->plan.events[sim->event_order[sim->next_event]].time_ns <= sim->time_ns) {
+           (int64_t)sim->plan.events[sim->event_order[sim->next_event]].time_ns <= sim->plant.time_ns) {
         sim->next_event++;
     }
 }
@@ -136,8 +136,8 @@ int fcsl_plant_state_restore(fcsl_sim_t *sim, const void *bytes)
 {
     walk_t walk = {.direction = RESTORE, .at = (uint8_t *)(uintptr_t)bytes}; /* reads only */
     walk_all(&walk, sim);
-    for (uint32_t i = 0; i < sim->instance_count; i++) {
-        fcsl_instance_state_t *instance = &sim->instances[i];
+    for (uint32_t i = 0; i < sim->plant.instance_count; i++) {
+        fcsl_instance_state_t *instance = &sim->plant.instances[i];
         instance->next_update_ns =
             instance->hz > 0 ? fcsl_grid_time_ns(instance->next_update, instance->hz) : INT64_MAX;
         instance->due = 0;

@@ -7,9 +7,9 @@
 #include <stdlib.h>
 #include <string.h>
 
+#include "base/aligned_memory.h"
 #include "base/clock.h"
 #include "base/fail.h"
-#include "engine/sim_internal.h"
 
 int fcsl_companion_open(fcsl_companion_t *companion, const fcsl_plan_companion_t *plan, fcsl_error_t *error)
 {
@@ -54,13 +54,14 @@ int fcsl_companion_close(fcsl_companion_t *companion, fcsl_error_t *error)
     return status;
 }
 
-void fcsl_sensors_sample(fcsl_sim_t *sim, fcsl_sensor_t *sensors, uint32_t count, uint8_t *select, uint32_t channels)
+void fcsl_sensors_sample(const fcsl_plant_t *plant, fcsl_sensor_t *sensors, uint32_t count, uint8_t *select,
+                         uint32_t channels)
 {
     memset(select, 0, channels);
     for (uint32_t i = 0; i < count; i++) {
         fcsl_sensor_t *sensor = &sensors[i];
-        const uint64_t samples = sim->instances[sensor->instance].samples;
-        if (sim->time_ns < sensor->first_ns) {
+        const uint64_t samples = plant->instances[sensor->instance].samples;
+        if (plant->time_ns < sensor->first_ns) {
             sensor->samples = samples;
         } else if (samples != sensor->samples) {
             memcpy(sensor->to, sensor->from, sensor->size);
@@ -70,13 +71,13 @@ void fcsl_sensors_sample(fcsl_sim_t *sim, fcsl_sensor_t *sensors, uint32_t count
     }
 }
 
-int fcsl_companion_tick(fcsl_companion_t *companion, fcsl_sim_t *sim, fcsl_error_t *error)
+int fcsl_companion_tick(fcsl_companion_t *companion, fcsl_plant_t *plant, fcsl_error_t *error)
 {
     const fcsl_channel_table_t *channels = fcsl_run_channels(companion->run);
-    const uint64_t now_ns = (uint64_t)sim->time_ns;
+    const uint64_t now_ns = (uint64_t)plant->time_ns;
     fcsl_message_t message;
     fcsl_message_t due;
-    fcsl_sensors_sample(sim, companion->sensors, companion->sensor_count, companion->select,
+    fcsl_sensors_sample(plant, companion->sensors, companion->sensor_count, companion->select,
                         companion->machine->channel_count);
     if (fcsl_message_encode_sensors(channels, companion->image, companion->tick, companion->select, companion->bytes,
                                     companion->capacity, &message) != FCSL_MESSAGE_OK) {

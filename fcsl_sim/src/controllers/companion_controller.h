@@ -10,8 +10,7 @@
 #include "fcsl/fcsl_gate.h"
 #include "fcsl/fcsl_run.h"
 #include "plan/plan.h"
-
-struct fcsl_sim;
+#include "plant/plant.h"
 
 /* One output copied to a sensor channel. */
 typedef struct {
@@ -47,11 +46,11 @@ int fcsl_companion_open(fcsl_companion_t *companion, const fcsl_plan_companion_t
 int fcsl_companion_start(fcsl_companion_t *companion, fcsl_error_t *error);
 int fcsl_companion_close(fcsl_companion_t *companion, fcsl_error_t *error);
 /* One tick at the present: sensors, step, actuators. Returns 0, or -1. */
-int fcsl_companion_tick(fcsl_companion_t *companion, struct fcsl_sim *sim, fcsl_error_t *error);
+int fcsl_companion_tick(fcsl_companion_t *companion, fcsl_plant_t *plant, fcsl_error_t *error);
 
 /* Copies the sensors whose instance has a sample since their last one into the image, and selects their channels. Clears those of
  * other channels. Also those of the first controller. */
-void fcsl_sensors_sample(struct fcsl_sim *sim, fcsl_sensor_t *sensors, uint32_t count, uint8_t *select,
+void fcsl_sensors_sample(const fcsl_plant_t *plant, fcsl_sensor_t *sensors, uint32_t count, uint8_t *select,
                          uint32_t channels);
 
 #endif /* FCSL_SIM_COMPANION_CONTROLLER_H */

@@ -102,8 +102,8 @@ int fcsl_actuators_build(fcsl_sim_t *sim, fcsl_error_t *error)
     if (machine->arm_field == FCSL_NONE && machine->command_timeout_ns == 0) {
         return 0;
     }
-    for (uint32_t i = 0; i < sim->instance_count; i++) {
-        if (strcmp(sim->instances[i].name, NAME) == 0) {
+    for (uint32_t i = 0; i < sim->plant.instance_count; i++) {
+        if (strcmp(sim->plant.instances[i].name, NAME) == 0) {
             return fcsl_sim_fail(
                 error, "model instance `%s` is named like the topic of what the actuators get: rename it", NAME);
         }

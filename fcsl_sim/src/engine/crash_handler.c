@@ -20,19 +20,19 @@ static const char *const SIGNAL_NAMES[] = {"SIGSEGV", "SIGBUS", "SIGFPE", "SIGIL
 #define SIGNAL_COUNT (sizeof SIGNALS / sizeof *SIGNALS)
 static const char *const FUNCTIONS[] = {"", "init", "derivative", "output", "update", "event", "reset", "next_time"};
 
-/* The simulation that was opened last, since the handlers are those of the process. */
-static const fcsl_sim_t *_Atomic current;
+/* The plant of the simulation that was opened last, since the handlers are those of the process. */
+static const fcsl_plant_t *_Atomic current;
 /* Threads that look into it: it is not freed meanwhile. */
 static _Atomic uint32_t looking;
 static volatile sig_atomic_t as_json;
 static struct sigaction previous[SIGNAL_COUNT];
 static int watching;
 
-void fcsl_sim_is_open(const fcsl_sim_t *sim, int is_open)
+void fcsl_sim_is_open(const fcsl_plant_t *plant, int is_open)
 {
-    const fcsl_sim_t *before = sim;
+    const fcsl_plant_t *before = plant;
     if (is_open) {
-        atomic_store(&current, sim);
+        atomic_store(&current, plant);
     } else {
         (void)atomic_compare_exchange_strong(&current, &before, NULL);
         while (atomic_load(&looking) > 0) {
@@ -41,15 +41,16 @@ void fcsl_sim_is_open(const fcsl_sim_t *sim, int is_open)
     }
 }
 
-static void look_into(const fcsl_sim_t *sim, fcsl_sim_place_t *at)
+static void look_into(const fcsl_plant_t *plant, fcsl_sim_place_t *at)
 {
-    const uint64_t place = atomic_load_explicit(&sim->place, memory_order_relaxed);
+    const uint64_t place = atomic_load_explicit(&plant->place, memory_order_relaxed);
     const uint32_t instance = (uint32_t)(place >> 8) & 0xffffu;
     const uint32_t number = (uint32_t)(place & 0xffu);
     at->entry = place;
     at->function = FUNCTIONS[number < sizeof FUNCTIONS / sizeof *FUNCTIONS ? number : 0];
-    at->time_ns = sim->time_ns;
-    const char *name = number != FCSL_IN_NONE && instance < sim->instance_count ? sim->instances[instance].name : "";
+    at->time_ns = plant->time_ns;
+    const char *name =
+        number != FCSL_IN_NONE && instance < plant->instance_count ? plant->instances[instance].name : "";
     for (uint32_t i = 0; name[i] && i + 1u < sizeof at->instance; i++) {
         at->instance[i] = name[i];
     }
@@ -59,9 +60,9 @@ int fcsl_sim_place(fcsl_sim_place_t *at)
 {
     *at = (fcsl_sim_place_t){.function = ""};
     (void)atomic_fetch_add(&looking, 1u);
-    const fcsl_sim_t *sim = atomic_load(&current);
-    if (sim) {
-        look_into(sim, at);
+    const fcsl_plant_t *plant = atomic_load(&current);
+    if (plant) {
+        look_into(plant, at);
     }
     (void)atomic_fetch_sub(&looking, 1u);
     return at->instance[0] != '\0';

@@ -9,9 +9,13 @@
 #include "actuators.h"
 #include "base/clock.h"
 #include "base/fail.h"
+#include "base/scalar_bits.h"
 #include "checkpoints/plant_state.h"
 #include "fcsl/fcsl_fp_mode.h"
 #include "fcsl/fcsl_scalar.h"
+#include "plant/model_contract.h"
+#include "plant/model_prototypes.h"
+#include "plant/value_names.h"
 
 enum { EVENT_UPDATE, EVENT_COMPANION, EVENT_TICK };
 
@@ -32,7 +36,7 @@ static int schedule_tick(fcsl_sim_t *sim, uint64_t tick)
 static int schedule_update(fcsl_sim_t *sim, uint32_t index)
 {
     const fcsl_event_t event = {
-        .time_ns = sim->instances[index].next_update_ns, .kind = EVENT_UPDATE, .index = index, .priority = index};
+        .time_ns = sim->plant.instances[index].next_update_ns, .kind = EVENT_UPDATE, .index = index, .priority = index};
     return fcsl_event_queue_push(&sim->queue, event);
 }
 
@@ -78,7 +82,7 @@ static int64_t barrier_ns(const fcsl_sim_t *sim, fcsl_group_t *group)
         barrier = group->companions[i] && due_ns < barrier ? due_ns : barrier;
     }
     for (uint32_t i = 0; i < group->timed_count; i++) {
-        const int64_t update_ns = sim->instances[group->timed[i]].next_update_ns;
+        const int64_t update_ns = sim->plant.instances[group->timed[i]].next_update_ns;
         barrier = update_ns < barrier ? update_ns : barrier;
     }
     return barrier;
@@ -89,7 +93,7 @@ static int64_t barrier_ns(const fcsl_sim_t *sim, fcsl_group_t *group)
 static int is_read(const fcsl_sim_t *sim, const fcsl_group_t *group, int64_t time_ns)
 {
     for (uint32_t i = 0; i < group->sampling_count; i++) {
-        if (sim->instances[group->sampling[i]].next_update_ns == time_ns) {
+        if (sim->plant.instances[group->sampling[i]].next_update_ns == time_ns) {
             return 1;
         }
     }
@@ -106,21 +110,21 @@ static int advance(fcsl_sim_t *sim, int64_t time_ns, fcsl_error_t *error)
             return -1;
         }
     }
-    sim->time_ns = time_ns;
+    sim->plant.time_ns = time_ns;
     return 0;
 }
 
 /* Its group sees at its next step what has been written. */
 void fcsl_sim_disturb(fcsl_sim_t *sim, uint32_t instance)
 {
-    if (sim->instances[instance].group != FCSL_PLAN_NO_GROUP) {
-        sim->groups[sim->instances[instance].group].state.disturbed = 1;
+    if (sim->plant.instances[instance].group != FCSL_PLAN_NO_GROUP) {
+        sim->groups[sim->plant.instances[instance].group].state.disturbed = 1;
     }
 }
 
 static void make_writes(fcsl_sim_t *sim)
 {
-    while (next_write_ns(sim) == sim->time_ns) {
+    while (next_write_ns(sim) == sim->plant.time_ns) {
         const fcsl_write_t *write = &sim->events[sim->event_order[sim->next_event++]];
         fcsl_write_bits(write->to, write->size, write->bits);
         fcsl_sim_disturb(sim, write->instance);
@@ -130,31 +134,31 @@ static void make_writes(fcsl_sim_t *sim)
 /* The inputs of an instance; its group hears of a jump. */
 static void take_inputs(fcsl_sim_t *sim, uint32_t index)
 {
-    const fcsl_instance_state_t *instance = &sim->instances[index];
-    const fcsl_copy_t *copies = &sim->copies[instance->first_copy];
+    const fcsl_instance_state_t *instance = &sim->plant.instances[index];
+    const fcsl_copy_t *copies = &sim->plant.copies[instance->first_copy];
     for (uint32_t i = 0; i < instance->outer_count; i++) {
-        if (fcsl_sim_copy_changed(&copies[i])) {
+        if (fcsl_plant_copy_changed(&copies[i])) {
             fcsl_sim_disturb(sim, index);
         }
     }
-    fcsl_sim_copy(sim, instance->first_copy + instance->outer_count, instance->inner_count);
+    fcsl_plant_copy(&sim->plant, instance->first_copy + instance->outer_count, instance->inner_count);
 }
 
 /* Whether the states of an instance are those of the present. */
 static int is_present(const fcsl_sim_t *sim, uint32_t index)
 {
-    const uint32_t group = sim->instances[index].group;
-    return group == FCSL_PLAN_NO_GROUP || sim->groups[group].state.time_ns == sim->time_ns;
+    const uint32_t group = sim->plant.instances[index].group;
+    return group == FCSL_PLAN_NO_GROUP || sim->groups[group].state.time_ns == sim->plant.time_ns;
 }
 
 static void call_output(fcsl_sim_t *sim, uint32_t index)
 {
-    fcsl_instance_state_t *instance = &sim->instances[index];
+    fcsl_instance_state_t *instance = &sim->plant.instances[index];
     const fcsl_model_t *model = instance->model;
     const double *x = (const double *)(const void *)(instance->data + model->continuous_offset);
     take_inputs(sim, index);
-    fcsl_sim_enter(sim, index, FCSL_IN_OUTPUT);
-    model->output(instance->data, (double)sim->time_ns / FCSL_NS_PER_S, model->continuous_count > 0 ? x : NULL);
+    fcsl_plant_enter(&sim->plant, index, FCSL_IN_OUTPUT);
+    model->output(instance->data, (double)sim->plant.time_ns / FCSL_NS_PER_S, model->continuous_count > 0 ? x : NULL);
     if (model->sampled_offset == FCSL_NO_OFFSET) {
         instance->samples++;
     }
@@ -162,14 +166,14 @@ static void call_output(fcsl_sim_t *sim, uint32_t index)
 
 static int call_update(fcsl_sim_t *sim, uint32_t index)
 {
-    fcsl_instance_state_t *instance = &sim->instances[index];
+    fcsl_instance_state_t *instance = &sim->plant.instances[index];
     const fcsl_model_t *model = instance->model;
-    const fcsl_model_context_t context = fcsl_sim_context(sim, index, sim->time_ns);
+    const fcsl_model_context_t context = fcsl_plant_context(&sim->plant, index, sim->plant.time_ns);
     take_inputs(sim, index);
-    fcsl_sim_enter(sim, index, FCSL_IN_UPDATE);
+    fcsl_plant_enter(&sim->plant, index, FCSL_IN_UPDATE);
     model->update(instance->data, &context);
     if (sim->link && index == sim->link_instance) {
-        fcsl_sim_link_tick(sim->link, sim->time_ns);
+        fcsl_sim_link_tick(sim->link, sim->plant.time_ns);
     }
     if (model->sampled_offset == FCSL_NO_OFFSET || instance->data[model->sampled_offset]) {
         instance->samples++;
@@ -196,21 +200,21 @@ static int check_mode(const char *who, fcsl_error_t *error)
 /* Outputs and due updates, sources before what they feed. */
 static int evaluate(fcsl_sim_t *sim, fcsl_error_t *error)
 {
-    for (uint32_t i = 0; i < sim->call_count; i++) {
-        const fcsl_call_t *call = &sim->calls[i];
-        const char *name = sim->instances[call->instance].name;
+    for (uint32_t i = 0; i < sim->plant.call_count; i++) {
+        const fcsl_call_t *call = &sim->plant.calls[i];
+        const char *name = sim->plant.instances[call->instance].name;
         if (call->kind != FCSL_CALL_UPDATE) {
             if (is_present(sim, call->instance)) {
                 call_output(sim, call->instance);
             }
-        } else if (sim->instances[call->instance].due && call_update(sim, call->instance)) {
+        } else if (sim->plant.instances[call->instance].due && call_update(sim, call->instance)) {
             return fcsl_sim_fail(error, "the event queue overflowed");
         }
         if (check_mode(name, error)) {
             return -1;
         }
     }
-    fcsl_sim_enter(sim, 0, FCSL_IN_NONE);
+    fcsl_plant_enter(&sim->plant, 0, FCSL_IN_NONE);
     return 0;
 }
 
@@ -220,7 +224,7 @@ static int tick_companions(fcsl_sim_t *sim, fcsl_error_t *error)
         fcsl_companion_t *companion = &sim->companions[i];
         if (companion->due) {
             companion->due = 0;
-            if (fcsl_companion_tick(companion, sim, error) || schedule_companion(sim, i)) {
+            if (fcsl_companion_tick(companion, &sim->plant, error) || schedule_companion(sim, i)) {
                 return -1;
             }
         }
@@ -244,14 +248,14 @@ static int do_instant(fcsl_sim_t *sim, int *ticked, fcsl_error_t *error)
     if (write_ns < event.time_ns) {
         return 0;
     }
-    while (fcsl_event_queue_peek(&sim->queue, &event) == 0 && event.time_ns == sim->time_ns) {
+    while (fcsl_event_queue_peek(&sim->queue, &event) == 0 && event.time_ns == sim->plant.time_ns) {
         (void)fcsl_event_queue_pop(&sim->queue, &event);
         if (event.kind == EVENT_TICK) {
             *ticked = 1;
         } else if (event.kind == EVENT_COMPANION) {
             sim->companions[event.index].due = 1;
         } else {
-            sim->instances[event.index].due = 1;
+            sim->plant.instances[event.index].due = 1;
         }
     }
     if (evaluate(sim, error)) {
@@ -264,10 +268,10 @@ static int do_instant(fcsl_sim_t *sim, int *ticked, fcsl_error_t *error)
 
 static int init_models(fcsl_sim_t *sim, fcsl_error_t *error)
 {
-    for (uint32_t i = 0; i < sim->instance_count; i++) {
-        fcsl_instance_state_t *instance = &sim->instances[i];
-        const fcsl_model_context_t context = fcsl_sim_context(sim, i, 0);
-        fcsl_sim_enter(sim, i, FCSL_IN_INIT);
+    for (uint32_t i = 0; i < sim->plant.instance_count; i++) {
+        fcsl_instance_state_t *instance = &sim->plant.instances[i];
+        const fcsl_model_context_t context = fcsl_plant_context(&sim->plant, i, 0);
+        fcsl_plant_enter(&sim->plant, i, FCSL_IN_INIT);
         const char *wrong = instance->model->init ? instance->model->init(instance->data, &context) : NULL;
         if (check_mode(instance->name, error)) {
             return -1;
@@ -275,7 +279,7 @@ static int init_models(fcsl_sim_t *sim, fcsl_error_t *error)
         if (wrong) {
             return fcsl_sim_fail(error, "instance `%s`: %s", instance->name, fcsl_sim_init_reason(wrong));
         }
-        if (fcsl_sim_check_contract(sim, i, error) || fcsl_sim_check_prototypes(sim, i, error)) {
+        if (fcsl_sim_check_contract(&sim->plant, i, error) || fcsl_sim_check_prototypes(&sim->plant, i, error)) {
             return -1;
         }
     }
@@ -284,7 +288,7 @@ static int init_models(fcsl_sim_t *sim, fcsl_error_t *error)
             return -1;
         }
     }
-    fcsl_sim_enter(sim, 0, FCSL_IN_NONE);
+    fcsl_plant_enter(&sim->plant, 0, FCSL_IN_NONE);
     return 0;
 }
 
@@ -303,8 +307,8 @@ void fcsl_sim_refill_queue(fcsl_sim_t *sim)
     for (uint32_t i = 0; i < sim->companion_count; i++) {
         (void)schedule_companion(sim, i);
     }
-    for (uint32_t i = 0; i < sim->instance_count; i++) {
-        if (sim->instances[i].hz > 0) {
+    for (uint32_t i = 0; i < sim->plant.instance_count; i++) {
+        if (sim->plant.instances[i].hz > 0) {
             (void)schedule_update(sim, i);
         }
     }
@@ -312,7 +316,7 @@ void fcsl_sim_refill_queue(fcsl_sim_t *sim)
 
 static int fill_queue(fcsl_sim_t *sim, fcsl_error_t *error)
 {
-    if (fcsl_event_queue_init(&sim->queue, sim->instance_count + sim->companion_count + 1u)) {
+    if (fcsl_event_queue_init(&sim->queue, sim->plant.instance_count + sim->companion_count + 1u)) {
         return fcsl_sim_fail(error, "no memory for the event queue");
     }
     fcsl_sim_refill_queue(sim);
@@ -343,7 +347,7 @@ fcsl_sim_t *fcsl_sim_open(const char *plan, size_t size, fcsl_error_t *error)
         (void)fcsl_sim_fail(error, "no memory for a simulation");
         return NULL;
     }
-    fcsl_sim_is_open(sim, 1);
+    fcsl_sim_is_open(&sim->plant, 1);
     if (fcsl_plan_parse(&sim->plan, plan, size, error) || fcsl_assembly_build(sim, error) || start_models(sim, error) ||
         fill_queue(sim, error) || attach(sim, error)) {
         (void)fcsl_sim_close(sim, NULL);
@@ -375,15 +379,15 @@ static int sense(fcsl_sim_t *sim, uint8_t *bytes, size_t capacity, fcsl_message_
     sim->failed = 1;
     for (int ticked = 0; !ticked;) { /* the next tick is in the queue, with finitely many events before it */
         if (do_instant(sim, &ticked, error)) {
-            fcsl_sim_enter(sim, 0, FCSL_IN_NONE);
+            fcsl_plant_enter(&sim->plant, 0, FCSL_IN_NONE);
             return -1;
         }
     }
-    if (fcsl_sim_check_outputs(sim, error) || schedule_tick(sim, sim->tick + 1u)) {
+    if (fcsl_sim_check_outputs(&sim->plant, error) || schedule_tick(sim, sim->tick + 1u)) {
         return -1;
     }
     sim->failed = 0;
-    fcsl_sensors_sample(sim, sim->sensors, sim->sensor_count, sim->select, sim->machine->channel_count);
+    fcsl_sensors_sample(&sim->plant, sim->sensors, sim->sensor_count, sim->select, sim->machine->channel_count);
     sim->sensed = 1;
     const fcsl_message_status_t status = fcsl_message_encode_sensors(fcsl_run_channels(sim->run), sim->image, sim->tick,
                                                                      sim->select, bytes, capacity, message);
@@ -412,7 +416,7 @@ void fcsl_sim_take_command(void *context, const fcsl_message_t *command)
     /* Behind a line it is as old as its tick: one from before an outage does not open the gate again. */
     const int64_t made_ns = fcsl_grid_time_ns(command->tick, sim->machine->tick_hz);
     fcsl_gate_command(&sim->gate, command, (uint64_t)made_ns, sim->image);
-    fcsl_gate_wait(&sim->gate, (uint64_t)sim->time_ns, sim->image);
+    fcsl_gate_wait(&sim->gate, (uint64_t)sim->plant.time_ns, sim->image);
 }
 
 static int until_holds(const fcsl_sim_t *sim)
@@ -465,7 +469,7 @@ static void complete_tick(fcsl_sim_t *sim)
 void fcsl_sim_hold(fcsl_sim_t *sim)
 {
     fcsl_message_t due;
-    fcsl_gate_wait(&sim->gate, (uint64_t)sim->time_ns, sim->image);
+    fcsl_gate_wait(&sim->gate, (uint64_t)sim->plant.time_ns, sim->image);
     if (fcsl_delay_pass(&sim->delay, fcsl_run_channels(sim->run), sim->tick, NULL, &due)) {
         fcsl_sim_take_command(sim, &due);
     }
@@ -482,7 +486,8 @@ int fcsl_sim_actuate_message(fcsl_sim_t *sim, const fcsl_message_t *message, fcs
         return fcsl_sim_fail(error, "actuator message of tick %llu where that of tick %llu is due",
                              (unsigned long long)message->tick, (unsigned long long)sim->tick);
     }
-    fcsl_gate_wait(&sim->gate, (uint64_t)sim->time_ns, sim->image); /* a link may have delivered nothing for long */
+    fcsl_gate_wait(&sim->gate, (uint64_t)sim->plant.time_ns,
+                   sim->image); /* a link may have delivered nothing for long */
     fcsl_message_t due;
     const int is_due = fcsl_delay_pass(&sim->delay, fcsl_run_channels(sim->run), sim->tick, message, &due);
     const char *wrong = is_due && sim->link ? fcsl_sim_link_command(sim->link, &due) : NULL;
@@ -535,11 +540,11 @@ fcsl_run_t *fcsl_sim_hosted(fcsl_sim_t *sim)
 int fcsl_sim_write(fcsl_sim_t *sim, uint32_t instance, uint32_t offset, const void *bytes, uint32_t size,
                    fcsl_error_t *error)
 {
-    if (sim->sensed || instance >= sim->instance_count || offset > sim->instances[instance].model->size ||
-        size > sim->instances[instance].model->size - offset) {
+    if (sim->sensed || instance >= sim->plant.instance_count || offset > sim->plant.instances[instance].model->size ||
+        size > sim->plant.instances[instance].model->size - offset) {
         return fcsl_sim_fail(error, "a write that is not between two ticks, or not within an instance");
     }
-    uint8_t *to = sim->instances[instance].data + offset;
+    uint8_t *to = sim->plant.instances[instance].data + offset;
     if (memcmp(to, bytes, size) != 0) {
         memcpy(to, bytes, size);
         fcsl_sim_disturb(sim, instance);
@@ -556,7 +561,7 @@ const fcsl_machine_t *fcsl_sim_machine(const fcsl_sim_t *sim)
 
 int64_t fcsl_sim_time_ns(const fcsl_sim_t *sim)
 {
-    return sim->time_ns;
+    return sim->plant.time_ns;
 }
 
 uint64_t fcsl_sim_tick(const fcsl_sim_t *sim)
@@ -581,17 +586,17 @@ size_t fcsl_sim_message_capacity(const fcsl_sim_t *sim)
 
 uint32_t fcsl_sim_instance_count(const fcsl_sim_t *sim)
 {
-    return sim->instance_count;
+    return sim->plant.instance_count;
 }
 
 const char *fcsl_sim_instance_name(const fcsl_sim_t *sim, uint32_t instance)
 {
-    return instance < sim->instance_count ? sim->instances[instance].name : NULL;
+    return instance < sim->plant.instance_count ? sim->plant.instances[instance].name : NULL;
 }
 
 const fcsl_model_t *fcsl_sim_instance_model(const fcsl_sim_t *sim, uint32_t instance)
 {
-    return instance < sim->instance_count ? sim->instances[instance].model : NULL;
+    return instance < sim->plant.instance_count ? sim->plant.instances[instance].model : NULL;
 }
 
 const void *fcsl_sim_channel_data(const fcsl_sim_t *sim)
@@ -606,5 +611,5 @@ int fcsl_sim_sampled(const fcsl_sim_t *sim, uint32_t channel)
 
 const void *fcsl_sim_instance_data(const fcsl_sim_t *sim, uint32_t instance)
 {
-    return instance < sim->instance_count ? sim->instances[instance].data : NULL;
+    return instance < sim->plant.instance_count ? sim->plant.instances[instance].data : NULL;
 }

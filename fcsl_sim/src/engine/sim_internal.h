@@ -5,9 +5,6 @@
 #ifndef FCSL_SIM_INTERNAL_H
 #define FCSL_SIM_INTERNAL_H
 
-#include <stdatomic.h>
-#include <string.h>
-
 #include "controllers/companion_controller.h"
 #include "controllers/serial_link.h"
 #include "event_queue.h"
@@ -15,20 +12,8 @@
 #include "fcsl/fcsl_gate.h"
 #include "fcsl/fcsl_sim.h"
 #include "groups/group.h"
-#include "models/machine_model.h"
-#include "models/noise.h"
 #include "plan/plan.h"
-
-/* One value copied from an output (or an actuator channel) to an input. */
-typedef struct {
-    const uint8_t *from;
-    uint8_t *to;
-    uint32_t size;
-    uint32_t instance; /* instance of the input */
-    uint32_t source;   /* of the output; UINT32_MAX: a controller */
-    const fcsl_companion_t *companion; /* whose actuator it is; null: not a companion's */
-    uint32_t is_inner; /* 1: an output that is evaluated whenever the input is used, within a group */
-} fcsl_copy_t;
+#include "plant/plant.h"
 
 /* A field of the hosted machine beside its channels, connected with a model. */
 typedef struct {
@@ -45,49 +30,6 @@ typedef struct {
     uint32_t instance;
     uint32_t group; /* of the instance */
 } fcsl_write_t;
-
-typedef struct {
-    const char *name; /* in the plan */
-    const fcsl_model_t *model;
-    const fcsl_machine_model_t *machine; /* null: a plugin */
-    uint8_t *data;
-    fcsl_noise_t noise;
-    uint32_t group;       /* or FCSL_PLAN_NO_GROUP */
-    uint32_t first_state; /* in the vectors of its group */
-    uint32_t first_event;
-    uint64_t hz; /* of the grid of its updates; 0: it is not updated */
-    uint64_t every;
-    int64_t next_update_ns; /* INT64_MAX: none */
-    uint64_t next_update;   /* the step of the grid */
-    uint32_t first_copy;  /* its inputs: copies[first_copy .. first_copy + copy_count) */
-    uint32_t copy_count;
-    uint32_t outer_count; /* of them, those from outside of its group, which come first */
-    uint32_t inner_count;
-    uint8_t due;      /* its update is at the present */
-    uint64_t samples; /* taken so far */
-    char *truth_type;
-    char *truth_schema;
-    uint32_t truth_size; /* bytes of its message */
-    int truth_topic;
-} fcsl_instance_state_t;
-
-/* What models do at an instant, in order. */
-typedef struct {
-    uint32_t instance;
-    fcsl_call_kind_t kind;
-} fcsl_call_t;
-
-/* Which function of which instance runs (for whoever finds that it does not end). */
-typedef enum {
-    FCSL_IN_NONE,
-    FCSL_IN_INIT,
-    FCSL_IN_DERIVATIVE,
-    FCSL_IN_OUTPUT,
-    FCSL_IN_UPDATE,
-    FCSL_IN_EVENT,
-    FCSL_IN_RESET,
-    FCSL_IN_NEXT_TIME
-} fcsl_function_t;
 
 /* What the actuators get (actuators.c). */
 typedef struct {
@@ -110,16 +52,13 @@ struct fcsl_sim_published;
 struct fcsl_sim_topics;
 
 struct fcsl_sim {
+    fcsl_plant_t plant;
     fcsl_plan_t plan;
     fcsl_run_t *run;
     const fcsl_machine_t *machine;
     void **handles; /* of the model libraries */
     fcsl_machine_model_t **machine_models; /* by model; null: a plugin */
     const fcsl_model_t **models;
-    fcsl_instance_state_t *instances;
-    uint32_t instance_count;
-    fcsl_copy_t *copies;
-    uint32_t copy_count;
     fcsl_sensor_t *sensors;
     uint32_t sensor_count;
     fcsl_delay_t delay;
@@ -131,12 +70,8 @@ struct fcsl_sim {
     fcsl_write_t *events;
     uint32_t *event_order; /* by time, then as in the plan */
     uint32_t next_event;   /* in event_order */
-    fcsl_call_t *calls;
-    uint32_t call_count;
     fcsl_group_t *groups;
     uint32_t group_count;
-    _Atomic uint64_t place; /* call, instance and function that run (fcsl_sim_enter) */
-    uint64_t entries;       /* calls so far */
     uint8_t *image;  /* the plant's copy of the machine's struct: only its channel fields are defined */
     uint8_t *select; /* per channel: included in the next sensor message */
     uint8_t *message_bytes;
@@ -150,7 +85,6 @@ struct fcsl_sim {
     uint8_t until_type;
     uint64_t until_held; /* ticks in a row that the stop condition has held */
     uint64_t tick;
-    int64_t time_ns;
     double *group_scratch; /* the vectors of one group, for checkpoints */
     uint8_t *before;       /* the plant before a checkpoint was restored */
     int sensed; /* between sense and actuate */
@@ -172,54 +106,8 @@ struct fcsl_sim {
     fcsl_error_t failure;
 };
 
-/* Copies inputs. */
-static inline void fcsl_sim_copy(const fcsl_sim_t *sim, uint32_t first, uint32_t count)
-{
-    for (const fcsl_copy_t *copy = sim->copies + first, *end = copy + count; copy < end; copy++) {
-        if (copy->size == sizeof(double)) {
-            memcpy(copy->to, copy->from, sizeof(double));
-        } else {
-            memcpy(copy->to, copy->from, copy->size);
-        }
-    }
-}
-
-/* Copies one input; whether it was another one. */
-static inline int fcsl_sim_copy_changed(const fcsl_copy_t *copy)
-{
-    const int changed = memcmp(copy->to, copy->from, copy->size) != 0;
-    if (changed) {
-        memcpy(copy->to, copy->from, copy->size);
-    }
-    return changed;
-}
-
-static inline void fcsl_sim_enter(fcsl_sim_t *sim, uint32_t instance, fcsl_function_t function)
-{
-    const uint64_t place = ++sim->entries << 24 | (uint64_t)instance << 8 | (uint64_t)function;
-    atomic_store_explicit(&sim->place, place, memory_order_relaxed);
-}
-
-static inline fcsl_model_context_t fcsl_sim_context(fcsl_sim_t *sim, uint32_t instance, int64_t time_ns)
-{
-    return (fcsl_model_context_t){time_ns, &sim->instances[instance].noise, fcsl_noise_gaussian, fcsl_noise_uniform,
-                                  sim->instances[instance].model};
-}
-
-/* value_names.c: the field at an offset in the struct of an instance: "lander.state.pos_z", "wheel.state.rate[2]". */
-#define FCSL_VALUE_NAME_BYTES 320u
-void fcsl_sim_name_value(const fcsl_instance_state_t *instance, size_t offset, char *text, size_t size);
 /* crash_handler.c: the simulation exists, or no longer. */
-void fcsl_sim_is_open(const fcsl_sim_t *sim, int is_open);
-/* value_names.c: fails where an output of an instance is not finite. */
-int fcsl_sim_check_outputs(const fcsl_sim_t *sim, fcsl_error_t *error);
-
-/* model_contract.c: tries the functions of an instance that is initialised. Returns 0, or -1. */
-int fcsl_sim_check_contract(fcsl_sim_t *sim, uint32_t index, fcsl_error_t *error);
-/* model_prototypes.c: what `init` returned that is not null, as a text. */
-const char *fcsl_sim_init_reason(const char *returned);
-/* Tries whether functions of an instance take their time as a double. Returns 0, or -1. */
-int fcsl_sim_check_prototypes(fcsl_sim_t *sim, uint32_t index, fcsl_error_t *error);
+void fcsl_sim_is_open(const fcsl_plant_t *plant, int is_open);
 /* sim.c: the next events of a simulation between two ticks, from its instances. */
 void fcsl_sim_refill_queue(fcsl_sim_t *sim);
 /* sim.c: something besides the plant itself has changed a value of an instance. */
@@ -279,17 +167,10 @@ int fcsl_sim_fail_line(fcsl_error_t *error, uint32_t line, const char *what, con
 int fcsl_sim_build_connections(fcsl_sim_t *sim, fcsl_error_t *error);
 /* group_build.c: the order of calls, and the groups of models that integrate together. */
 int fcsl_sim_build_groups(fcsl_sim_t *sim, fcsl_error_t *error);
-/* assembly.c: zeroed memory for a struct, or null. */
-void *fcsl_sim_allocate(size_t size, size_t align);
 /* assembly.c: builds everything that the plan names. The plan must be parsed, the rest zero. */
 int fcsl_assembly_build(fcsl_sim_t *sim, fcsl_error_t *error);
 void fcsl_assembly_free(fcsl_sim_t *sim);
 
-/* Writes a scalar of `size` bytes given as zero-extended bits. */
-void fcsl_write_bits(uint8_t *to, uint32_t size, uint64_t bits);
-
-/* truth_messages.c: a scalar from its zero-extended bits; integers beyond 2^53 are rounded. */
-double fcsl_as_double(uint64_t bits, uint8_t type);
 /* truth_messages.c: type, schema and size of every instance's message, and of the actuators'. */
 int fcsl_truth_build(fcsl_sim_t *sim, fcsl_error_t *error);
 void fcsl_truth_free(fcsl_sim_t *sim);

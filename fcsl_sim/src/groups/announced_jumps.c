@@ -9,7 +9,6 @@
 
 #include "base/clock.h"
 #include "base/fail.h"
-#include "engine/sim_internal.h"
 #include "group.h"
 
 /* Jumps within one nanosecond. A model that announces more never comes to an end of them. */
@@ -18,11 +17,11 @@ enum { JUMPS_MAX = 1000 };
 /* The earliest time that a model of the group announces, after t. */
 static int ask(fcsl_group_t *group, double t, fcsl_error_t *error)
 {
-    fcsl_sim_t *sim = group->sim;
+    fcsl_plant_t *plant = group->plant;
     group->jump_s = INFINITY;
     for (uint32_t i = 0; i < group->announcing_count; i++) {
-        const fcsl_instance_state_t *instance = &sim->instances[group->announcing[i]];
-        fcsl_sim_enter(sim, group->announcing[i], FCSL_IN_NEXT_TIME);
+        const fcsl_instance_state_t *instance = &plant->instances[group->announcing[i]];
+        fcsl_plant_enter(plant, group->announcing[i], FCSL_IN_NEXT_TIME);
         const double next_s = instance->model->next_time(instance->data, t);
         if (!(next_s > t)) { /* also where it is not a number */
             return fcsl_sim_fail(error, "`next_time` of `%s` is %.17g at %.17g s: a later time, or INFINITY is wanted",

@@ -11,7 +11,7 @@
 
 #include "base/clock.h"
 #include "base/fail.h"
-#include "engine/sim_internal.h"
+#include "plant/value_names.h"
 
 /* ---- states of models ------------------------------------------------------------------------------------------------ */
 
@@ -29,7 +29,7 @@ static const double *part_of(const fcsl_instance_state_t *instance, const double
 void fcsl_group_scatter(const fcsl_group_t *group, const double *x)
 {
     for (uint32_t i = 0; i < group->derived_count; i++) {
-        const fcsl_instance_state_t *instance = &group->sim->instances[group->derived[i]];
+        const fcsl_instance_state_t *instance = &group->plant->instances[group->derived[i]];
         memcpy(states_of(instance), x + instance->first_state, instance->model->continuous_count * sizeof *x);
     }
 }
@@ -38,7 +38,7 @@ int fcsl_group_gather(const fcsl_group_t *group, double *x)
 {
     int changed = 0;
     for (uint32_t i = 0; i < group->derived_count; i++) {
-        const fcsl_instance_state_t *instance = &group->sim->instances[group->derived[i]];
+        const fcsl_instance_state_t *instance = &group->plant->instances[group->derived[i]];
         const size_t size = instance->model->continuous_count * sizeof *x;
         if (memcmp(x + instance->first_state, states_of(instance), size) != 0) {
             memcpy(x + instance->first_state, states_of(instance), size);
@@ -51,7 +51,7 @@ int fcsl_group_gather(const fcsl_group_t *group, double *x)
 void fcsl_group_name_state(const fcsl_group_t *group, uint32_t state, char *text, size_t size)
 {
     for (uint32_t i = 0; i < group->derived_count; i++) {
-        const fcsl_instance_state_t *instance = &group->sim->instances[group->derived[i]];
+        const fcsl_instance_state_t *instance = &group->plant->instances[group->derived[i]];
         if (state - instance->first_state < instance->model->continuous_count) {
             fcsl_sim_name_value(instance,
                                 instance->model->continuous_offset + (state - instance->first_state) * sizeof(double),
@@ -84,11 +84,11 @@ int fcsl_group_check_finite(const fcsl_group_t *group, const double *x, int64_t 
 
 static void evaluate_stages(fcsl_group_t *group, double t, const double *x)
 {
-    fcsl_sim_t *sim = group->sim;
+    fcsl_plant_t *plant = group->plant;
     for (uint32_t i = 0; i < group->stage_count; i++) {
-        const fcsl_instance_state_t *instance = &sim->instances[group->stages[i]];
-        fcsl_sim_copy(sim, instance->first_copy + instance->outer_count, instance->inner_count);
-        fcsl_sim_enter(sim, group->stages[i], FCSL_IN_OUTPUT);
+        const fcsl_instance_state_t *instance = &plant->instances[group->stages[i]];
+        fcsl_plant_copy(plant, instance->first_copy + instance->outer_count, instance->inner_count);
+        fcsl_plant_enter(plant, group->stages[i], FCSL_IN_OUTPUT);
         instance->model->output(instance->data, t, part_of(instance, x));
     }
 }
@@ -96,13 +96,13 @@ static void evaluate_stages(fcsl_group_t *group, double t, const double *x)
 static void slope(void *context, double t, const double *x, double *dx)
 {
     fcsl_group_t *group = context;
-    fcsl_sim_t *sim = group->sim;
+    fcsl_plant_t *plant = group->plant;
     t = fcsl_group_before_jump(group, t);
     evaluate_stages(group, t, x);
     for (uint32_t i = 0; i < group->derived_count; i++) {
-        const fcsl_instance_state_t *instance = &sim->instances[group->derived[i]];
-        fcsl_sim_copy(sim, instance->first_copy + instance->outer_count, instance->inner_count);
-        fcsl_sim_enter(sim, group->derived[i], FCSL_IN_DERIVATIVE);
+        const fcsl_instance_state_t *instance = &plant->instances[group->derived[i]];
+        fcsl_plant_copy(plant, instance->first_copy + instance->outer_count, instance->inner_count);
+        fcsl_plant_enter(plant, group->derived[i], FCSL_IN_DERIVATIVE);
         instance->model->derivative(instance->data, t, x + instance->first_state, dx + instance->first_state);
     }
 }
@@ -111,13 +111,13 @@ static void slope(void *context, double t, const double *x, double *dx)
 static void slope_of_one(void *context, double t, const double *x, double *dx)
 {
     const fcsl_group_t *group = context;
-    fcsl_sim_enter(group->sim, group->derived[0], FCSL_IN_DERIVATIVE);
+    fcsl_plant_enter(group->plant, group->derived[0], FCSL_IN_DERIVATIVE);
     group->derivative(group->derivative_of, fcsl_group_before_jump(group, t), x, dx);
 }
 
 static fcsl_slope_t choose_slope(fcsl_group_t *group)
 {
-    const fcsl_instance_state_t *first = &group->sim->instances[group->derived[0]];
+    const fcsl_instance_state_t *first = &group->plant->instances[group->derived[0]];
     if (group->derived_count != 1u || group->stage_count > 0 || first->inner_count > 0) {
         return slope;
     }
@@ -128,13 +128,13 @@ static fcsl_slope_t choose_slope(fcsl_group_t *group)
 
 int fcsl_group_events(fcsl_group_t *group, double t, const double *x, double *value, fcsl_error_t *error)
 {
-    fcsl_sim_t *sim = group->sim;
+    fcsl_plant_t *plant = group->plant;
     t = fcsl_group_before_jump(group, t);
     evaluate_stages(group, t, x);
     for (uint32_t i = 0; i < group->eventful_count; i++) {
-        const fcsl_instance_state_t *instance = &sim->instances[group->eventful[i]];
-        fcsl_sim_copy(sim, instance->first_copy + instance->outer_count, instance->inner_count);
-        fcsl_sim_enter(sim, group->eventful[i], FCSL_IN_EVENT);
+        const fcsl_instance_state_t *instance = &plant->instances[group->eventful[i]];
+        fcsl_plant_copy(plant, instance->first_copy + instance->outer_count, instance->inner_count);
+        fcsl_plant_enter(plant, group->eventful[i], FCSL_IN_EVENT);
         instance->model->event(instance->data, t, part_of(instance, x), value + instance->first_event);
     }
     return fcsl_group_check_events(group, t, value, error);
@@ -178,7 +178,7 @@ static int take_inputs(fcsl_group_t *group)
 {
     int changed = 0;
     for (uint32_t i = 0; i < group->outer_count; i++) {
-        changed |= fcsl_sim_copy_changed(&group->sim->copies[group->outer[i]]);
+        changed |= fcsl_plant_copy_changed(&group->plant->copies[group->outer[i]]);
     }
     return changed;
 }
@@ -318,11 +318,11 @@ int fcsl_group_advance(fcsl_group_t *group, int64_t time_ns, int64_t barrier_ns,
 
 /* ---- life --------------------------------------------------------------------------------------------------------------- */
 
-int fcsl_group_open(fcsl_group_t *group, fcsl_sim_t *sim, fcsl_error_t *error)
+int fcsl_group_open(fcsl_group_t *group, fcsl_plant_t *plant, fcsl_error_t *error)
 {
     const size_t n = fcsl_vector_room(group->n);
     const size_t events = group->event_count;
-    group->sim = sim;
+    group->plant = plant;
     group->last_s = INFINITY;
     group->jump_ns = INT64_MAX;
     group->memory = calloc(4u * n + 3u * events + fcsl_integrator_memory(group->n) + 1u, sizeof(double));

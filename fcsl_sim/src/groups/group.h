@@ -9,8 +9,8 @@
 #include "fcsl/fcsl_model.h"
 #include "integrators/integrate.h"
 #include "plan/plan.h"
+#include "plant/plant.h"
 
-struct fcsl_sim;
 typedef struct fcsl_group fcsl_group_t;
 
 /* A group that comes to a stop: this many events in a row, each within FCSL_CHATTER_NS of the one before. */
@@ -37,7 +37,7 @@ typedef struct {
 } fcsl_group_state_t;
 
 struct fcsl_group {
-    struct fcsl_sim *sim;
+    fcsl_plant_t *plant;
     const fcsl_plan_group_t *plan;
     fcsl_integrator_t integrator;
     fcsl_group_state_t state;
@@ -80,7 +80,7 @@ struct fcsl_group {
 };
 
 /* Once the lists and the plan of a group are there: allocates its vectors. Returns 0, or -1. */
-int fcsl_group_open(fcsl_group_t *group, struct fcsl_sim *sim, fcsl_error_t *error);
+int fcsl_group_open(fcsl_group_t *group, fcsl_plant_t *plant, fcsl_error_t *error);
 /* After init of the models: refuses models that the method cannot integrate. */
 int fcsl_group_check(fcsl_group_t *group, fcsl_error_t *error);
 void fcsl_group_free(fcsl_group_t *group);

@@ -8,8 +8,8 @@
 
 #include "base/clock.h"
 #include "base/fail.h"
-#include "engine/sim_internal.h"
 #include "group.h"
+#include "plant/value_names.h"
 
 enum { REJECTED_MAX = 200 }; /* each makes the step smaller by 10 % at least */
 

@@ -7,7 +7,6 @@
 
 #include "base/clock.h"
 #include "base/fail.h"
-#include "engine/sim_internal.h"
 #include "group.h"
 
 enum { ROUNDS_MAX = 64 }; /* a step of 2^63 ns is halved 63 times */
@@ -16,11 +15,11 @@ enum { ROUNDS_MAX = 64 }; /* a step of 2^63 ns is halved 63 times */
 static const fcsl_instance_state_t *instance_of(const fcsl_group_t *group, uint32_t event, uint32_t *number)
 {
     uint32_t i = 0;
-    while (event - group->sim->instances[group->eventful[i]].first_event >=
-           group->sim->instances[group->eventful[i]].model->event_count) {
+    while (event - group->plant->instances[group->eventful[i]].first_event >=
+           group->plant->instances[group->eventful[i]].model->event_count) {
         i++; /* one of them has it */
     }
-    const fcsl_instance_state_t *instance = &group->sim->instances[group->eventful[i]];
+    const fcsl_instance_state_t *instance = &group->plant->instances[group->eventful[i]];
     *number = event - instance->first_event;
     return instance;
 }
@@ -146,18 +145,18 @@ int64_t fcsl_group_locate(fcsl_group_t *group, int64_t from_ns, int64_t length_n
 /* Inputs within the group, and outputs, at the present. */
 static void evaluate(fcsl_group_t *group)
 {
-    fcsl_sim_t *sim = group->sim;
+    fcsl_plant_t *plant = group->plant;
     const double t = fcsl_group_time_s(group);
     for (uint32_t i = 0; i < group->output_count; i++) {
-        const fcsl_instance_state_t *instance = &sim->instances[group->outputs[i]];
-        fcsl_sim_copy(sim, instance->first_copy + instance->outer_count, instance->inner_count);
-        fcsl_sim_enter(sim, group->outputs[i], FCSL_IN_OUTPUT);
+        const fcsl_instance_state_t *instance = &plant->instances[group->outputs[i]];
+        fcsl_plant_copy(plant, instance->first_copy + instance->outer_count, instance->inner_count);
+        fcsl_plant_enter(plant, group->outputs[i], FCSL_IN_OUTPUT);
         instance->model->output(instance->data, t,
                                 instance->model->continuous_count > 0 ? group->x + instance->first_state : NULL);
     }
     for (uint32_t i = 0; i < group->eventful_count; i++) {
-        const fcsl_instance_state_t *instance = &sim->instances[group->eventful[i]];
-        fcsl_sim_copy(sim, instance->first_copy + instance->outer_count, instance->inner_count);
+        const fcsl_instance_state_t *instance = &plant->instances[group->eventful[i]];
+        fcsl_plant_copy(plant, instance->first_copy + instance->outer_count, instance->inner_count);
     }
 }
 
@@ -183,11 +182,11 @@ static int reset(fcsl_group_t *group, uint32_t event, fcsl_error_t *error)
 {
     uint32_t number = 0;
     const fcsl_instance_state_t *instance = instance_of(group, event, &number);
-    const uint32_t index = (uint32_t)(instance - group->sim->instances);
+    const uint32_t index = (uint32_t)(instance - group->plant->instances);
     fcsl_group_scatter(group, group->x);
     evaluate(group);
-    const fcsl_model_context_t context = fcsl_sim_context(group->sim, index, group->state.time_ns);
-    fcsl_sim_enter(group->sim, index, FCSL_IN_RESET);
+    const fcsl_model_context_t context = fcsl_plant_context(group->plant, index, group->state.time_ns);
+    fcsl_plant_enter(group->plant, index, FCSL_IN_RESET);
     instance->model->reset(instance->data, &context, number);
     (void)fcsl_group_gather(group, group->x);
     return fcsl_group_check_finite(group, group->x, group->state.time_ns, error);

@@ -13,8 +13,8 @@
 static int record_truth(fcsl_sim_t *sim, const fcsl_instance_state_t *instance, fcsl_error_t *error)
 {
     const size_t bytes = fcsl_truth_write(sim, instance, sim->truth, instance->truth_size);
-    return fcsl_run_record_write(sim->run, instance->truth_topic, (uint64_t)sim->time_ns, sim->truth, (uint32_t)bytes,
-                                 error);
+    return fcsl_run_record_write(sim->run, instance->truth_topic, (uint64_t)sim->plant.time_ns, sim->truth,
+                                 (uint32_t)bytes, error);
 }
 
 /* Outputs of models into fields of the machine, where they have another value. */
@@ -38,8 +38,8 @@ static int ask_machine(fcsl_sim_t *sim, fcsl_message_t *message, fcsl_error_t *e
     if (fcsl_run_sense_message(sim->run, message, error) || write_fields(sim, error)) {
         return -1;
     }
-    for (uint32_t i = 0; sim->recording && i < sim->instance_count; i++) {
-        if (record_truth(sim, &sim->instances[i], error)) {
+    for (uint32_t i = 0; sim->recording && i < sim->plant.instance_count; i++) {
+        if (record_truth(sim, &sim->plant.instances[i], error)) {
             return -1;
         }
     }
@@ -63,7 +63,7 @@ int fcsl_sim_external_failed(const fcsl_sim_t *sim, fcsl_hal_status_t status, co
 
 static int ask_external(fcsl_sim_t *sim, fcsl_message_t *message, fcsl_error_t *error)
 {
-    fcsl_hal_status_t status = fcsl_external_send(sim->external, message, (uint64_t)sim->time_ns);
+    fcsl_hal_status_t status = fcsl_external_send(sim->external, message, (uint64_t)sim->plant.time_ns);
     if (status != FCSL_HAL_OK) {
         return fcsl_sim_external_failed(sim, status, "cannot send the sensor message", error);
     }
@@ -78,7 +78,7 @@ static int ask_external(fcsl_sim_t *sim, fcsl_message_t *message, fcsl_error_t *
 static int exchange_newest(fcsl_sim_t *sim, const fcsl_message_t *sensors, fcsl_error_t *error)
 {
     fcsl_message_t command = {0};
-    const fcsl_hal_status_t status = fcsl_external_send(sim->external, sensors, (uint64_t)sim->time_ns);
+    const fcsl_hal_status_t status = fcsl_external_send(sim->external, sensors, (uint64_t)sim->plant.time_ns);
     if (status != FCSL_HAL_OK) {
         return fcsl_sim_external_failed(sim, status, "cannot send the sensor message", error);
     }
@@ -192,8 +192,8 @@ int fcsl_sim_record(fcsl_sim_t *sim, const char *bag, const char *name_space, fc
         return -1;
     }
     int failed = 0;
-    for (uint32_t i = 0; i < sim->instance_count && !failed; i++) {
-        failed = add_truth_topic(sim, &sim->instances[i], name_space, error);
+    for (uint32_t i = 0; i < sim->plant.instance_count && !failed; i++) {
+        failed = add_truth_topic(sim, &sim->plant.instances[i], name_space, error);
     }
     if (!failed && sim->actuators) {
         failed = add_truth_topic(sim, &sim->actuators->as_instance, name_space, error);
@@ -282,7 +282,7 @@ int fcsl_sim_close(fcsl_sim_t *sim, fcsl_error_t *error)
         return 0;
     }
     int status = 0;
-    fcsl_sim_is_open(sim, 0);
+    fcsl_sim_is_open(&sim->plant, 0);
     fcsl_sim_end_service(sim);
     fcsl_telemetry_close(sim->telemetry);
     fcsl_sim_publish_end(sim);

@@ -15,7 +15,7 @@ static int ask(fcsl_sim_t *sim, fcsl_error_t *error)
     if (fcsl_sim_sense_message(sim, sim->message_bytes, sim->message_capacity, &sensors, error)) {
         return -1;
     }
-    const fcsl_hal_status_t status = fcsl_external_send(sim->external, &sensors, (uint64_t)sim->time_ns);
+    const fcsl_hal_status_t status = fcsl_external_send(sim->external, &sensors, (uint64_t)sim->plant.time_ns);
     if (status != FCSL_HAL_OK) {
         return fcsl_sim_external_failed(sim, status, "cannot send the sensor message", error);
     }

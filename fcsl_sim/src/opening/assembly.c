@@ -6,8 +6,10 @@
 #include <stdlib.h>
 #include <string.h>
 
+#include "base/aligned_memory.h"
 #include "base/clock.h"
 #include "base/fail.h"
+#include "base/scalar_bits.h"
 #include "engine/actuators.h"
 #include "engine/sim_internal.h"
 #include "fcsl/fcsl_scalar.h"
@@ -16,31 +18,6 @@
 int fcsl_sim_fail_line(fcsl_error_t *error, uint32_t line, const char *what, const char *name)
 {
     return fcsl_sim_fail(error, "plan line %u: %s `%s`", line, what, name);
-}
-
-void fcsl_write_bits(uint8_t *to, uint32_t size, uint64_t bits)
-{
-    const uint32_t low = (uint32_t)bits;
-    if (size == 8) {
-        memcpy(to, &bits, 8);
-    } else if (size == 4) {
-        memcpy(to, &low, 4);
-    } else {
-        *to = (uint8_t)low;
-    }
-}
-
-void *fcsl_sim_allocate(size_t size, size_t align)
-{
-    if (align < sizeof(void *)) {
-        align = sizeof(void *);
-    }
-    const size_t rounded = (size + align) / align * align; /* never zero */
-    void *memory = aligned_alloc(align, rounded);
-    if (memory) {
-        memset(memory, 0, rounded);
-    }
-    return memory;
 }
 
 /* ---- machine, models, instances ---------------------------------------------------------------------------------------- */
@@ -119,7 +96,7 @@ static int build_instance(fcsl_sim_t *sim, uint32_t index, fcsl_error_t *error)
 {
     const fcsl_plan_t *plan = &sim->plan;
     const fcsl_plan_instance_t *from = &plan->instances[index];
-    fcsl_instance_state_t *instance = &sim->instances[index];
+    fcsl_instance_state_t *instance = &sim->plant.instances[index];
     instance->name = from->name;
     for (uint32_t i = 0; i < plan->model_count; i++) {
         if (strcmp(plan->models[i].name, from->model) == 0) {
@@ -153,11 +130,11 @@ static int build_instance(fcsl_sim_t *sim, uint32_t index, fcsl_error_t *error)
 static int build_instances(fcsl_sim_t *sim, fcsl_error_t *error)
 {
     const uint32_t count = sim->plan.instance_count;
-    sim->instances = calloc(count + 1u, sizeof *sim->instances);
-    if (!sim->instances) {
+    sim->plant.instances = calloc(count + 1u, sizeof *sim->plant.instances);
+    if (!sim->plant.instances) {
         return fcsl_sim_fail(error, "no memory for the instances");
     }
-    sim->instance_count = count;
+    sim->plant.instance_count = count;
     for (uint32_t i = 0; i < count; i++) {
         if (build_instance(sim, i, error)) {
             return -1;
@@ -170,8 +147,8 @@ static int build_instances(fcsl_sim_t *sim, fcsl_error_t *error)
 
 int fcsl_sim_find_instance(const fcsl_sim_t *sim, uint32_t line, const char *name, uint32_t *index, fcsl_error_t *error)
 {
-    for (uint32_t i = 0; i < sim->instance_count; i++) {
-        if (strcmp(sim->instances[i].name, name) == 0) {
+    for (uint32_t i = 0; i < sim->plant.instance_count; i++) {
+        if (strcmp(sim->plant.instances[i].name, name) == 0) {
             *index = i;
             return 0;
         }
@@ -185,7 +162,7 @@ const fcsl_field_t *fcsl_sim_find_field(const fcsl_sim_t *sim, uint32_t line, co
     if (fcsl_sim_find_instance(sim, line, name, index, error)) {
         return NULL;
     }
-    const fcsl_field_t *field = fcsl_model_field(sim->instances[*index].model, path);
+    const fcsl_field_t *field = fcsl_model_field(sim->plant.instances[*index].model, path);
     if (!field) {
         (void)fcsl_sim_fail(error, "plan line %u: instance `%s` has no field `%s`", line, name, path);
     }
@@ -210,8 +187,8 @@ static int build_write(const fcsl_sim_t *sim, const fcsl_plan_set_t *set, fcsl_w
     if (set->bits > limit) {
         return fcsl_sim_fail_line(error, set->line, "these bits are no value of", set->field);
     }
-    *write = (fcsl_write_t){sim->instances[index].data + field->offset + set->element * size, size, set->bits, index,
-                            sim->instances[index].group};
+    *write = (fcsl_write_t){sim->plant.instances[index].data + field->offset + set->element * size, size, set->bits,
+                            index, sim->plant.instances[index].group};
     return 0;
 }
 
@@ -284,7 +261,7 @@ static int build_writes(fcsl_sim_t *sim, fcsl_error_t *error)
     if (field->count != 1) {
         return fcsl_sim_fail_line(error, until->line, "not a scalar:", until->field);
     }
-    sim->until_field = sim->instances[index].data + field->offset;
+    sim->until_field = sim->plant.instances[index].data + field->offset;
     sim->until_type = field->type;
     return 0;
 }
@@ -300,8 +277,8 @@ static int is_serial_link(const fcsl_model_t *model)
 static int build_link(fcsl_sim_t *sim, fcsl_error_t *error)
 {
     const fcsl_plan_library_t *wanted = &sim->plan.serial_link;
-    for (uint32_t i = 0; wanted->name && i < sim->instance_count; i++) {
-        fcsl_instance_state_t *instance = &sim->instances[i];
+    for (uint32_t i = 0; wanted->name && i < sim->plant.instance_count; i++) {
+        fcsl_instance_state_t *instance = &sim->plant.instances[i];
         if (strcmp(instance->name, wanted->name) == 0 && is_serial_link(instance->model)) {
             sim->link_instance = i;
             sim->link = fcsl_sim_link_open(fcsl_run_channels(sim->run), (fcsl_serial_link_t *)(void *)instance->data,
@@ -334,8 +311,8 @@ void fcsl_assembly_free(fcsl_sim_t *sim)
         fcsl_group_free(&sim->groups[i]);
     }
     free(sim->groups);
-    for (uint32_t i = 0; i < sim->instance_count; i++) {
-        free(sim->instances[i].data);
+    for (uint32_t i = 0; i < sim->plant.instance_count; i++) {
+        free(sim->plant.instances[i].data);
     }
     for (uint32_t i = 0; sim->handles && i < sim->plan.model_count; i++) {
         fcsl_model_unload(sim->handles[i]);
@@ -346,12 +323,12 @@ void fcsl_assembly_free(fcsl_sim_t *sim)
     free(sim->handles);
     free(sim->machine_models);
     free(sim->models);
-    free(sim->instances);
-    free(sim->copies);
+    free(sim->plant.instances);
+    free(sim->plant.copies);
     free(sim->sensors);
     free(sim->events);
     free(sim->event_order);
-    free(sim->calls);
+    free(sim->plant.calls);
     free(sim->writes);
     fcsl_delay_free(&sim->delay);
     free(sim->companions);

@@ -93,14 +93,15 @@ static const fcsl_field_t *find_source(fcsl_sim_t *sim, const fcsl_plan_link_t *
         return NULL;
     }
     const fcsl_field_t *field = &machine->fields[machine->channels[channel].field];
-    copy->companion = companion;
+    copy->companion = companion ? (uint32_t)(companion - sim->companions) : FCSL_NO_COMPANION;
     copy->from = (companion ? companion->image : sim->image) + field->offset;
     return field;
 }
 
 static int add_copy(fcsl_sim_t *sim, const fcsl_plan_link_t *link, int is_field, fcsl_error_t *error)
 {
-    fcsl_copy_t *copy = &sim->copies[sim->copy_count];
+    fcsl_copy_t *copy = &sim->plant.copies[sim->plant.copy_count];
+    copy->companion = FCSL_NO_COMPANION;
     const fcsl_field_t *to =
         fcsl_sim_find_field(sim, link->line, link->to_instance, link->to_field, &copy->instance, error);
     if (!to) {
@@ -119,11 +120,11 @@ static int add_copy(fcsl_sim_t *sim, const fcsl_plan_link_t *link, int is_field,
         if (from->role != FCSL_ROLE_OUTPUT) {
             return fcsl_sim_fail_line(error, link->line, "not an output:", link->from_field);
         }
-        const fcsl_instance_state_t *feeds = &sim->instances[source];
-        const fcsl_instance_state_t *fed = &sim->instances[copy->instance];
+        const fcsl_instance_state_t *feeds = &sim->plant.instances[source];
+        const fcsl_instance_state_t *fed = &sim->plant.instances[copy->instance];
         copy->is_inner = feeds->model->output != NULL && feeds->group == fed->group && fed->group != FCSL_PLAN_NO_GROUP;
         copy->source = source;
-        copy->from = sim->instances[source].data + from->offset;
+        copy->from = sim->plant.instances[source].data + from->offset;
     } else {
         from = find_source(sim, link, is_field, copy, error);
         if (!from) {
@@ -133,14 +134,14 @@ static int add_copy(fcsl_sim_t *sim, const fcsl_plan_link_t *link, int is_field,
     if (check_pair(link, from, to, error)) {
         return -1;
     }
-    copy->to = sim->instances[copy->instance].data + to->offset;
+    copy->to = sim->plant.instances[copy->instance].data + to->offset;
     copy->size = to->size;
-    for (uint32_t i = 0; i < sim->copy_count; i++) {
-        if (sim->copies[i].to == copy->to) {
+    for (uint32_t i = 0; i < sim->plant.copy_count; i++) {
+        if (sim->plant.copies[i].to == copy->to) {
             return fcsl_sim_fail_line(error, link->line, "two sources for", link->to_field);
         }
     }
-    sim->copy_count++;
+    sim->plant.copy_count++;
     return 0;
 }
 
@@ -160,8 +161,9 @@ static int by_instance(const void *left, const void *right)
 static int build_copies(fcsl_sim_t *sim, fcsl_error_t *error)
 {
     const fcsl_plan_t *plan = &sim->plan;
-    sim->copies = calloc(plan->link_count + plan->actuator_count + plan->read_count + 1u, sizeof *sim->copies);
-    if (!sim->copies) {
+    sim->plant.copies =
+        calloc(plan->link_count + plan->actuator_count + plan->read_count + 1u, sizeof *sim->plant.copies);
+    if (!sim->plant.copies) {
         return fcsl_sim_fail(error, "no memory for the connections");
     }
     for (uint32_t i = 0; i < plan->link_count; i++) {
@@ -179,13 +181,13 @@ static int build_copies(fcsl_sim_t *sim, fcsl_error_t *error)
             return -1;
         }
     }
-    qsort(sim->copies, sim->copy_count, sizeof *sim->copies, by_instance);
-    for (uint32_t i = sim->copy_count; i-- > 0;) {
-        fcsl_instance_state_t *instance = &sim->instances[sim->copies[i].instance];
+    qsort(sim->plant.copies, sim->plant.copy_count, sizeof *sim->plant.copies, by_instance);
+    for (uint32_t i = sim->plant.copy_count; i-- > 0;) {
+        fcsl_instance_state_t *instance = &sim->plant.instances[sim->plant.copies[i].instance];
         instance->first_copy = i;
         instance->copy_count++;
-        instance->inner_count += sim->copies[i].is_inner;
-        instance->outer_count += !sim->copies[i].is_inner;
+        instance->inner_count += sim->plant.copies[i].is_inner;
+        instance->outer_count += !sim->plant.copies[i].is_inner;
     }
     return 0;
 }
@@ -218,7 +220,7 @@ static int add_sensor(fcsl_sim_t *sim, const fcsl_plan_link_t *link, fcsl_error_
             return fcsl_sim_fail_line(error, link->line, "two sources for channel", link->to_field);
         }
     }
-    sensor->from = sim->instances[sensor->instance].data + from->offset;
+    sensor->from = sim->plant.instances[sensor->instance].data + from->offset;
     sensor->to = (companion ? companion->image : sim->image) + to->offset;
     sensor->size = to->size;
     (*count)++;
@@ -292,8 +294,8 @@ static int build_field_writes(fcsl_sim_t *sim, fcsl_error_t *error)
             return fcsl_sim_fail_line(error, link->line,
                                       "not from an output to a field that a host may write:", link->to_field);
         }
-        sim->writes[sim->write_count++] = (fcsl_field_link_t){(uint32_t)(to - sim->machine->fields),
-                                                              sim->instances[source].data + from->offset, from->size};
+        sim->writes[sim->write_count++] = (fcsl_field_link_t){
+            (uint32_t)(to - sim->machine->fields), sim->plant.instances[source].data + from->offset, from->size};
     }
     return 0;
 }

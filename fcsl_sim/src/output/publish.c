@@ -15,8 +15,8 @@ enum { HISTORY_SLOTS = 64, WRITER_BYTES = 256 };
 /* The path of the value at this address: an output of an instance, or an actuator channel's field. */
 static void name_source(const fcsl_sim_t *sim, const uint8_t *from, char *text)
 {
-    for (uint32_t i = 0; i < sim->instance_count; i++) {
-        const fcsl_instance_state_t *instance = &sim->instances[i];
+    for (uint32_t i = 0; i < sim->plant.instance_count; i++) {
+        const fcsl_instance_state_t *instance = &sim->plant.instances[i];
         for (uint32_t f = 0; f < instance->model->field_count; f++) {
             const fcsl_field_t *field = &instance->model->fields[f];
             const uint8_t *begin = instance->data + field->offset;
@@ -39,13 +39,13 @@ static void name_source(const fcsl_sim_t *sim, const uint8_t *from, char *text)
 /* The writer of a field of an instance: the source of a connected input, or the instance's update; "" if there is none. */
 static void name_writer(const fcsl_sim_t *sim, uint32_t number, const fcsl_field_t *field, char *text)
 {
-    const fcsl_instance_state_t *instance = &sim->instances[number];
+    const fcsl_instance_state_t *instance = &sim->plant.instances[number];
     text[0] = '\0';
     if (field->role == FCSL_ROLE_OUTPUT) {
         (void)snprintf(text, WRITER_BYTES, "instance %s", instance->name);
     }
     for (uint32_t i = 0; i < instance->copy_count; i++) {
-        const fcsl_copy_t *copy = &sim->copies[instance->first_copy + i];
+        const fcsl_copy_t *copy = &sim->plant.copies[instance->first_copy + i];
         const uint8_t *begin = instance->data + field->offset;
         if (copy->to >= begin && copy->to < begin + field->size) {
             name_source(sim, copy->from, text);
@@ -55,7 +55,7 @@ static void name_writer(const fcsl_sim_t *sim, uint32_t number, const fcsl_field
 
 static int describe_instance(fcsl_sim_t *sim, struct fcsl_sim_published *published, uint32_t number)
 {
-    const fcsl_instance_state_t *instance = &sim->instances[number];
+    const fcsl_instance_state_t *instance = &sim->plant.instances[number];
     const uint32_t count = instance->model->field_count;
     fcsl_field_t *fields = calloc(count + 1u, sizeof *fields);
     const char **writers = calloc(count + 1u, sizeof *writers);
@@ -82,7 +82,7 @@ static int describe_instance(fcsl_sim_t *sim, struct fcsl_sim_published *publish
 static int allocate(fcsl_sim_t *sim, struct fcsl_sim_published *published)
 {
     const fcsl_machine_t *machine = sim->machine;
-    const uint32_t count = sim->instance_count;
+    const uint32_t count = sim->plant.instance_count;
     published->first_model = sim->external ? 0u : 1u;
     published->instance_count = count;
     published->count = count + published->first_model + (sim->actuators ? 1u : 0u);
@@ -118,8 +118,8 @@ static int allocate(fcsl_sim_t *sim, struct fcsl_sim_published *published)
 /* Paths must be unique: instances of models and of the machine, and what the actuators get, have different names. */
 static int check_names(const fcsl_sim_t *sim, fcsl_error_t *error)
 {
-    for (uint32_t i = 0; i < sim->instance_count; i++) {
-        const char *name = sim->instances[i].name;
+    for (uint32_t i = 0; i < sim->plant.instance_count; i++) {
+        const char *name = sim->plant.instances[i].name;
         int taken = strcmp(name, "machine") == 0 || strcmp(name, "channels") == 0;
         for (uint32_t m = 0; m < sim->machine->instance_count && !sim->external; m++) {
             taken = taken || strcmp(name, sim->machine->instances[m].name) == 0;
@@ -191,7 +191,7 @@ void fcsl_sim_publish(fcsl_sim_t *sim)
 {
     if (sim->published) {
         const fcsl_moment_t moment = {.tick = sim->tick,
-                                      .time_ns = (uint64_t)sim->time_ns,
+                                      .time_ns = (uint64_t)sim->plant.time_ns,
                                       .paused = (uint64_t)fcsl_sim_paused(sim),
                                       .next_write = sim->external ? 0u : fcsl_run_next_write(sim->run)};
         fcsl_history_publish(&sim->published->history, &moment);

@@ -72,7 +72,7 @@ static int add(fcsl_sim_t *sim, fcsl_outbox_t *outbox, topic_t *topic, fcsl_erro
     }
     struct fcsl_sim_topics *all = sim->topics;
     if (all && !all->memories) {
-        all->memories = calloc(sim->instance_count + 1u, sizeof *all->memories);
+        all->memories = calloc(sim->plant.instance_count + 1u, sizeof *all->memories);
         all->values = calloc(fcsl_sim_truth_values(sim, NULL, 0) + 1u, sizeof *all->values);
     }
     topic_t *topics =
@@ -137,9 +137,9 @@ int fcsl_sim_show_instances(fcsl_sim_t *sim, fcsl_outbox_t *outbox, uint32_t num
                      .size = size,
                      .numbers = copy_numbers(instances, count),
                      .count = count};
-    int valid = topic.numbers && every > 0 && count <= sim->instance_count;
+    int valid = topic.numbers && every > 0 && count <= sim->plant.instance_count;
     for (uint32_t i = 0; valid && i < count; i++) {
-        valid = instances[i] < sim->instance_count;
+        valid = instances[i] < sim->plant.instance_count;
     }
     return valid ? add(sim, outbox, &topic, error) : no_memory(&topic, error);
 }
@@ -169,7 +169,7 @@ static void make_truth(const fcsl_sim_t *sim, const topic_t *topic, uint8_t *byt
 {
     const uint32_t values = (topic->size - topic->head_size) / (uint32_t)sizeof(double);
     memcpy(bytes, topic->head, topic->head_size);
-    put_stamp(bytes + STAMP_AT, sim->time_ns);
+    put_stamp(bytes + STAMP_AT, sim->plant.time_ns);
     fcsl_put_u64(bytes + TICK_AT, sim->tick);
     /* The encapsulation moves doubles of a message out of line: they are made elsewhere. */
     double *made = sim->topics->values;
@@ -194,20 +194,20 @@ static int make(const fcsl_sim_t *sim, const topic_t *topic, uint8_t *bytes)
     switch (topic->kind) {
     case CLOCK:
         memcpy(bytes, "\0\1\0\0", STAMP_AT);
-        put_stamp(bytes + STAMP_AT, sim->time_ns);
+        put_stamp(bytes + STAMP_AT, sim->plant.time_ns);
         return 1;
     case TRUTH:
         make_truth(sim, topic, bytes);
         return 1;
     case INSTANCES:
         for (uint32_t i = 0; i < topic->count; i++) {
-            memories[i] = sim->instances[topic->numbers[i]].data;
+            memories[i] = sim->plant.instances[topic->numbers[i]].data;
         }
-        return fcsl_ros_compose(topic->composer, memories, sim->time_ns, bytes) == FCSL_ROS_TAKEN;
+        return fcsl_ros_compose(topic->composer, memories, sim->plant.time_ns, bytes) == FCSL_ROS_TAKEN;
     default:
         memories[0] = sim->image;
         return is_sampled(sim, topic) &&
-               fcsl_ros_compose(topic->composer, memories, sim->time_ns, bytes) == FCSL_ROS_TAKEN;
+               fcsl_ros_compose(topic->composer, memories, sim->plant.time_ns, bytes) == FCSL_ROS_TAKEN;
     }
 }
 

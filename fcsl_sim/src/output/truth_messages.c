@@ -7,6 +7,7 @@
 
 #include "base/clock.h"
 #include "base/fail.h"
+#include "base/scalar_bits.h"
 #include "engine/sim_internal.h"
 #include "fcsl/fcsl_cdr.h"
 #include "fcsl/fcsl_scalar.h"
@@ -116,7 +117,7 @@ size_t fcsl_truth_write(const fcsl_sim_t *sim, const fcsl_instance_state_t *inst
     const fcsl_model_t *model = instance->model;
     fcsl_cdr_t cdr;
     fcsl_cdr_begin(&cdr, cdr_bytes, capacity);
-    fcsl_cdr_header(&cdr, (uint64_t)sim->time_ns);
+    fcsl_cdr_header(&cdr, (uint64_t)sim->plant.time_ns);
     for (uint32_t i = 0; i < model->field_count; i++) {
         const fcsl_field_t *field = &model->fields[i];
         const uint32_t scalar = fcsl_scalar_size(field->type);
@@ -153,16 +154,16 @@ static int describe(fcsl_sim_t *sim, fcsl_instance_state_t *instance, size_t lar
 int fcsl_truth_build(fcsl_sim_t *sim, fcsl_error_t *error)
 {
     size_t largest = sim->actuators ? message_bytes_max(&sim->actuators->model) : 0;
-    for (uint32_t i = 0; i < sim->instance_count; i++) {
-        const size_t size = message_bytes_max(sim->instances[i].model);
+    for (uint32_t i = 0; i < sim->plant.instance_count; i++) {
+        const size_t size = message_bytes_max(sim->plant.instances[i].model);
         largest = size > largest ? size : largest;
     }
     sim->truth = malloc(largest);
     if (!sim->truth) {
         return fcsl_sim_fail(error, "no memory for messages");
     }
-    for (uint32_t i = 0; i < sim->instance_count; i++) {
-        if (describe(sim, &sim->instances[i], largest, error)) {
+    for (uint32_t i = 0; i < sim->plant.instance_count; i++) {
+        if (describe(sim, &sim->plant.instances[i], largest, error)) {
             return -1;
         }
     }
@@ -177,8 +178,8 @@ static void free_texts(fcsl_instance_state_t *instance)
 
 void fcsl_truth_free(fcsl_sim_t *sim)
 {
-    for (uint32_t i = 0; i < sim->instance_count; i++) {
-        free_texts(&sim->instances[i]);
+    for (uint32_t i = 0; i < sim->plant.instance_count; i++) {
+        free_texts(&sim->plant.instances[i]);
     }
     if (sim->actuators) {
         free_texts(&sim->actuators->as_instance);
@@ -188,50 +189,29 @@ void fcsl_truth_free(fcsl_sim_t *sim)
 
 const char *fcsl_sim_truth_type(const fcsl_sim_t *sim, uint32_t instance)
 {
-    return instance < sim->instance_count ? sim->instances[instance].truth_type : NULL;
+    return instance < sim->plant.instance_count ? sim->plant.instances[instance].truth_type : NULL;
 }
 
 const char *fcsl_sim_truth_schema(const fcsl_sim_t *sim, uint32_t instance)
 {
-    return instance < sim->instance_count ? sim->instances[instance].truth_schema : NULL;
+    return instance < sim->plant.instance_count ? sim->plant.instances[instance].truth_schema : NULL;
 }
 
 int64_t fcsl_sim_truth_message(const fcsl_sim_t *sim, uint32_t instance, uint8_t *cdr, size_t capacity)
 {
-    if (instance >= sim->instance_count || capacity < sim->instances[instance].truth_size) {
+    if (instance >= sim->plant.instance_count || capacity < sim->plant.instances[instance].truth_size) {
         return -1;
     }
-    return (int64_t)fcsl_truth_write(sim, &sim->instances[instance], cdr, capacity);
+    return (int64_t)fcsl_truth_write(sim, &sim->plant.instances[instance], cdr, capacity);
 }
 
 /* ---- as numbers ---------------------------------------------------------------------------------------------------------- */
 
-double fcsl_as_double(uint64_t bits, uint8_t type)
-{
-    const uint32_t low = (uint32_t)bits;
-    float f32;
-    double f64;
-    switch (type) {
-    case FCSL_I32:
-        return (double)(int32_t)low;
-    case FCSL_I64:
-        return (double)(int64_t)bits;
-    case FCSL_F32:
-        memcpy(&f32, &low, sizeof f32);
-        return (double)f32;
-    case FCSL_F64:
-        memcpy(&f64, &bits, sizeof f64);
-        return f64;
-    default:
-        return (double)bits;
-    }
-}
-
 uint32_t fcsl_sim_truth_values(const fcsl_sim_t *sim, double *values, uint32_t capacity)
 {
     uint32_t count = 0;
-    for (uint32_t i = 0; i < sim->instance_count; i++) {
-        const fcsl_instance_state_t *instance = &sim->instances[i];
+    for (uint32_t i = 0; i < sim->plant.instance_count; i++) {
+        const fcsl_instance_state_t *instance = &sim->plant.instances[i];
         for (uint32_t f = 0; f < instance->model->field_count; f++) {
             const fcsl_field_t *field = &instance->model->fields[f];
             for (uint32_t j = 0; field->role == FCSL_ROLE_OUTPUT && j < field->count; j++, count++) {

@@ -3,16 +3,19 @@
  * Finds models that break the rules of fcsl_model.h, by trying their functions once on a copy: functions that change what they may
  * only read, and outputs that depend on an input without saying so.
  */
+#include "model_contract.h"
+
 #include <math.h>
 #include <stdlib.h>
 #include <string.h>
 
+#include "base/aligned_memory.h"
 #include "base/fail.h"
-#include "engine/sim_internal.h"
 #include "fcsl/fcsl_scalar.h"
+#include "value_names.h"
 
 typedef struct {
-    fcsl_sim_t *sim;
+    fcsl_plant_t *plant;
     uint32_t index;
     const fcsl_instance_state_t *instance;
     uint8_t *before;
@@ -123,15 +126,15 @@ static int call_both(const trial_t *trial, uint8_t *self, const double *x, uint6
         memcpy(&values[i], &mark, sizeof mark);
     }
     if (model->derivative) {
-        fcsl_sim_enter(trial->sim, trial->index, FCSL_IN_DERIVATIVE);
+        fcsl_plant_enter(trial->plant, trial->index, FCSL_IN_DERIVATIVE);
         model->derivative(self, 0.0, x, values);
     }
     if (model->event) {
-        fcsl_sim_enter(trial->sim, trial->index, FCSL_IN_EVENT);
+        fcsl_plant_enter(trial->plant, trial->index, FCSL_IN_EVENT);
         model->event(self, 0.0, x, events);
     }
     if (model->next_time) {
-        fcsl_sim_enter(trial->sim, trial->index, FCSL_IN_NEXT_TIME);
+        fcsl_plant_enter(trial->plant, trial->index, FCSL_IN_NEXT_TIME);
         (void)model->next_time(self, 0.0);
     }
     for (uint32_t i = 0; i < GUARDS; i++) {
@@ -248,7 +251,7 @@ static int try_functions(const trial_t *trial, fcsl_error_t *error)
         return -1;
     }
     if (model->output) {
-        fcsl_sim_enter(trial->sim, trial->index, FCSL_IN_OUTPUT);
+        fcsl_plant_enter(trial->plant, trial->index, FCSL_IN_OUTPUT);
         if (!model->update && check_outputs_written(trial, error)) { /* what `update` writes holds */
             return -1;
         }
@@ -259,11 +262,11 @@ static int try_functions(const trial_t *trial, fcsl_error_t *error)
     return 0;
 }
 
-int fcsl_sim_check_contract(fcsl_sim_t *sim, uint32_t index, fcsl_error_t *error)
+int fcsl_sim_check_contract(fcsl_plant_t *plant, uint32_t index, fcsl_error_t *error)
 {
-    const fcsl_instance_state_t *instance = &sim->instances[index];
+    const fcsl_instance_state_t *instance = &plant->instances[index];
     const fcsl_model_t *model = instance->model;
-    trial_t trial = {.sim = sim, .index = index, .instance = instance};
+    trial_t trial = {.plant = plant, .index = index, .instance = instance};
     trial.before = fcsl_sim_allocate(model->size, model->align);
     trial.after = fcsl_sim_allocate(model->size, model->align);
     trial.scratch =

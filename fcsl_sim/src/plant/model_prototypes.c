@@ -4,12 +4,14 @@
  * a library that was compiled elsewhere shows it only by what its functions do.
  */
 #define _GNU_SOURCE
+#include "model_prototypes.h"
+
 #include <dlfcn.h>
 #include <stdlib.h>
 #include <string.h>
 
+#include "base/aligned_memory.h"
 #include "base/fail.h"
-#include "engine/sim_internal.h"
 
 enum { REASON_BYTES_MAX = 1000 };
 
@@ -31,7 +33,7 @@ const char *fcsl_sim_init_reason(const char *returned)
 
 /* An instance's struct, and behind it the values of `derivative` and `event`. */
 typedef struct {
-    fcsl_sim_t *sim;
+    fcsl_plant_t *plant;
     uint32_t index;
     const fcsl_instance_state_t *instance;
     size_t bytes;
@@ -55,7 +57,7 @@ static void call(const trial_t *trial, fcsl_function_t function, uint8_t *memory
     const double *x = model->continuous_count > 0
                           ? (const double *)(const void *)(trial->instance->data + model->continuous_offset)
                           : NULL;
-    fcsl_sim_enter(trial->sim, trial->index, function);
+    fcsl_plant_enter(trial->plant, trial->index, function);
     if (function == FCSL_IN_DERIVATIVE) {
         model->derivative(memory, t, x, values);
     } else if (function == FCSL_IN_EVENT) {
@@ -98,12 +100,12 @@ static const char *find_float(const trial_t *trial)
     return model->output && takes_float(trial, FCSL_IN_OUTPUT) ? "output" : NULL;
 }
 
-int fcsl_sim_check_prototypes(fcsl_sim_t *sim, uint32_t index, fcsl_error_t *error)
+int fcsl_sim_check_prototypes(fcsl_plant_t *plant, uint32_t index, fcsl_error_t *error)
 {
-    const fcsl_instance_state_t *instance = &sim->instances[index];
+    const fcsl_instance_state_t *instance = &plant->instances[index];
     const fcsl_model_t *model = instance->model;
     const size_t values = (size_t)model->continuous_count + model->event_count;
-    trial_t trial = {.sim = sim, .index = index, .instance = instance};
+    trial_t trial = {.plant = plant, .index = index, .instance = instance};
     trial.bytes = ((size_t)model->size + 7u) / 8u * 8u + values * sizeof(double);
     trial.first = fcsl_sim_allocate(trial.bytes, model->align);
     trial.second = fcsl_sim_allocate(trial.bytes, model->align);

@@ -2,11 +2,12 @@
  *
  * Names of values within models, and the search for one that is no number.
  */
+#include "value_names.h"
+
 #include <math.h>
 #include <stdio.h>
 
 #include "base/fail.h"
-#include "engine/sim_internal.h"
 #include "fcsl/fcsl_scalar.h"
 
 /* "[2]", or "[1][2]"; "" for a scalar. */
@@ -54,7 +55,7 @@ static double value_at(const uint8_t *from, uint8_t type)
     return value;
 }
 
-static int check_field(const fcsl_sim_t *sim, const fcsl_instance_state_t *instance, const fcsl_field_t *field,
+static int check_field(const fcsl_plant_t *plant, const fcsl_instance_state_t *instance, const fcsl_field_t *field,
                        fcsl_error_t *error)
 {
     const uint32_t scalar = fcsl_scalar_size(field->type);
@@ -64,20 +65,20 @@ static int check_field(const fcsl_sim_t *sim, const fcsl_instance_state_t *insta
             char name[FCSL_VALUE_NAME_BYTES];
             fcsl_sim_name_value(instance, field->offset + (size_t)i * scalar, name, sizeof name);
             return fcsl_sim_fail(error, "%s became %g at %.9f s", name, isnan(value) ? (double)NAN : value,
-                                 (double)sim->time_ns / 1e9);
+                                 (double)plant->time_ns / 1e9);
         }
     }
     return 0;
 }
 
-int fcsl_sim_check_outputs(const fcsl_sim_t *sim, fcsl_error_t *error)
+int fcsl_sim_check_outputs(const fcsl_plant_t *plant, fcsl_error_t *error)
 {
-    for (uint32_t i = 0; i < sim->instance_count; i++) {
-        const fcsl_model_t *model = sim->instances[i].model;
+    for (uint32_t i = 0; i < plant->instance_count; i++) {
+        const fcsl_model_t *model = plant->instances[i].model;
         for (uint32_t f = 0; f < model->field_count; f++) {
             const fcsl_field_t *field = &model->fields[f];
             if (field->role == FCSL_ROLE_OUTPUT && (field->type == FCSL_F64 || field->type == FCSL_F32) &&
-                check_field(sim, &sim->instances[i], field, error)) {
+                check_field(plant, &plant->instances[i], field, error)) {
                 return -1;
             }
         }
