@@ -14,6 +14,7 @@
 #include "base/fail.h"
 #include "fcsl/fcsl_mcap_writer.h"
 #include "fcsl/fcsl_scalar.h"
+#include "output/publish.h"
 #include "plant_state.h"
 
 static const char MAGIC[8] = {'F', 'C', 'S', 'L', 'S', 'I', 'M', 'C'};

@@ -8,6 +8,8 @@
 
 #include "base/clock.h"
 #include "engine/actuators.h"
+#include "engine/instants.h"
+#include "engine/pacing.h"
 
 typedef enum { COUNT, SAVE, RESTORE } direction_t;
 

@@ -6,7 +6,7 @@
 #ifndef FCSL_SIM_PLANT_STATE_H
 #define FCSL_SIM_PLANT_STATE_H
 
-#include "engine/sim_internal.h"
+#include "engine/simulation.h"
 
 size_t fcsl_plant_state_bytes(const fcsl_sim_t *sim);
 void fcsl_plant_state_save(const fcsl_sim_t *sim, void *bytes);

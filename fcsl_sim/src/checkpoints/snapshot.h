@@ -6,7 +6,7 @@
 #ifndef FCSL_SIM_SNAPSHOT_H
 #define FCSL_SIM_SNAPSHOT_H
 
-#include "engine/sim_internal.h"
+#include "engine/simulation.h"
 
 typedef struct fcsl_sim_snapshot fcsl_sim_snapshot_t;
 

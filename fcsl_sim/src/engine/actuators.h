@@ -5,7 +5,7 @@
 #ifndef FCSL_SIM_ACTUATORS_H
 #define FCSL_SIM_ACTUATORS_H
 
-#include "sim_internal.h"
+#include "simulation.h"
 
 /* Closes the gate. For a machine that arms or has a time-out, makes sim->actuators: a table of the outputs `gate` and one for
  * each actuator channel, named like it, and their values. Returns 0, or -1. */

@@ -3,6 +3,8 @@
  * Where a simulation is, for whoever finds that it crashes or hangs.
  */
 #define _GNU_SOURCE
+#include "crash_handler.h"
+
 #include <sched.h>
 #include <signal.h>
 #include <stdlib.h>
@@ -11,7 +13,7 @@
 
 #include "base/clock.h"
 #include "base/fail.h"
-#include "sim_internal.h"
+#include "fcsl/fcsl_sim.h"
 
 enum { STACK_BYTES = 1 << 16, TEXT_BYTES = 1024, EXIT_FAILED = 2 };
 

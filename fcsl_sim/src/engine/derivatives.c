@@ -9,7 +9,7 @@
 #include "fcsl/fcsl_fp_mode.h"
 #include "fcsl/fcsl_sim.h"
 #include "plant/value_names.h"
-#include "sim_internal.h"
+#include "simulation.h"
 
 static double *states_of(const fcsl_instance_state_t *instance)
 {

@@ -5,12 +5,13 @@
  * tick does not delay the next. The clock only decides when a tick runs: results are the same at every speed.
  */
 #define _GNU_SOURCE
+#include "pacing.h"
+
 #include <math.h>
 #include <time.h>
 
 #include "base/clock.h"
 #include "base/fail.h"
-#include "sim_internal.h"
 
 /* Longest wait before fcsl_sim_run returns to its caller. */
 static const double SLICE_NS = 50e6;
@@ -52,7 +53,7 @@ void fcsl_sim_forgive(fcsl_sim_t *sim)
 uint64_t fcsl_sim_wait_until(fcsl_sim_t *sim)
 {
     fcsl_pace_t *pace = &sim->pace;
-    const int paused = fcsl_sim_paused(sim);
+    const int paused = pace->paused;
     if (!paused && !(pace->speed > 0)) {
         return 0;
     }

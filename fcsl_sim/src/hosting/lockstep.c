@@ -4,7 +4,10 @@
  */
 #include "base/clock.h"
 #include "base/fail.h"
-#include "engine/sim_internal.h"
+#include "engine/pacing.h"
+#include "engine/tick.h"
+#include "external_controller.h"
+#include "output/ros_topics.h"
 
 static int ask(fcsl_sim_t *sim, fcsl_error_t *error)
 {
@@ -133,18 +136,4 @@ int64_t fcsl_sim_run_together(fcsl_sim_t *const *sims, uint32_t count, uint64_t 
     const int64_t done = run(sims, count, ticks, end_ns, failed, error);
     fcsl_sim_topics_wake(sims[0]);
     return done;
-}
-
-void fcsl_sim_alive(fcsl_sim_t *sim)
-{
-    if (sim->external && sim->status == FCSL_SIM_RUNNING) {
-        fcsl_external_alive(sim->external);
-    }
-}
-
-void fcsl_sim_end(fcsl_sim_t *sim, int another_follows)
-{
-    if (sim->external) {
-        fcsl_external_end(sim->external, another_follows);
-    }
 }

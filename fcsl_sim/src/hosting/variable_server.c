@@ -3,21 +3,18 @@
  * The simulation behind the variable server: the hosted machine's fields by their own paths, every model's below the name of
  * its instance. Commands are executed between ticks.
  */
+#include "variable_server.h"
+
 #include <inttypes.h>
 #include <stdlib.h>
 #include <string.h>
 
 #include "base/fail.h"
-#include "checkpoints/snapshot.h"
+#include "engine/pacing.h"
+#include "exchange.h"
 #include "fcsl/fcsl_scalar.h"
 #include "output/publish.h"
-
-struct fcsl_sim_service {
-    fcsl_vars_t *vars;
-    fcsl_sim_snapshot_t *snapshot;
-    int paused;
-    fcsl_tick_stats_t stats;
-};
+#include "service.h"
 
 /* ---- callbacks of the server---------------------------------------------------------------------------------------- */
 
@@ -48,7 +45,7 @@ static fcsl_vars_status_t set_paused(void *ctx, int paused, fcsl_error_t *error)
 {
     fcsl_sim_t *sim = ctx;
     (void)error;
-    sim->service->paused = paused;
+    sim->pace.paused = paused;
     if (paused) {
         fcsl_sim_pace_anew(sim);
     }
@@ -58,7 +55,7 @@ static fcsl_vars_status_t set_paused(void *ctx, int paused, fcsl_error_t *error)
 static fcsl_vars_status_t run_ticks(void *ctx, uint64_t count, fcsl_error_t *error)
 {
     fcsl_sim_t *sim = ctx;
-    if (!sim->service->paused) {
+    if (!sim->pace.paused) {
         return FCSL_VARS_NOT_PAUSED;
     }
     for (uint64_t i = 0; i < count; i++) {
@@ -111,7 +108,7 @@ int fcsl_sim_serve(fcsl_sim_t *sim, const char *address, const char *token, cons
     if (!service) {
         return fcsl_sim_fail(error, "no memory for the variable server");
     }
-    service->paused = paused;
+    sim->pace.paused = paused;
     service->snapshot = fcsl_sim_snapshot_open(sim);
     if (!service->snapshot) {
         fcsl_sim_end_service(sim);
@@ -142,29 +139,6 @@ const char *fcsl_sim_address(const fcsl_sim_t *sim)
     return sim->service ? fcsl_vars_address(sim->service->vars) : NULL;
 }
 
-uint64_t fcsl_sim_tick_begins(const fcsl_sim_t *sim)
-{
-    return sim->service ? fcsl_run_monotonic_ns(NULL) : 0;
-}
-
-void fcsl_sim_tick_ends(fcsl_sim_t *sim, uint64_t begun_ns)
-{
-    if (!sim->service) {
-        return;
-    }
-    fcsl_tick_stats_t *stats = &sim->service->stats;
-    fcsl_tick_stats_put(&stats->ticks, fcsl_tick_stats_get(&stats->ticks) + 1u);
-    fcsl_tick_stats_put(&stats->messages_refused, fcsl_run_messages_refused(sim->run));
-    fcsl_tick_stats_put(&stats->hardware_failures, fcsl_run_hardware_failures(sim->run));
-    fcsl_tick_stats_put(&stats->records_dropped, fcsl_run_record_dropped(sim->run));
-    fcsl_histogram_add(&stats->tick_time, fcsl_run_monotonic_ns(NULL) - begun_ns);
-}
-
-int fcsl_sim_paused(const fcsl_sim_t *sim)
-{
-    return sim->service && sim->service->paused;
-}
-
 int fcsl_sim_attend(fcsl_sim_t *sim)
 {
     struct fcsl_sim_service *service = sim->service;
@@ -192,5 +166,6 @@ void fcsl_sim_end_service(fcsl_sim_t *sim)
         fcsl_sim_snapshot_free(sim->service->snapshot);
         free(sim->service);
         sim->service = NULL;
+        sim->pace.paused = 0;
     }
 }

@@ -3,6 +3,8 @@
  * Builds the simulation from the plan: loads the named libraries, checks every name once, and fills tables of pointers, so
  * that the run loop needs no look-up by name.
  */
+#include "assembly.h"
+
 #include <stdlib.h>
 #include <string.h>
 
@@ -10,15 +12,14 @@
 #include "base/clock.h"
 #include "base/fail.h"
 #include "base/scalar_bits.h"
+#include "connections.h"
 #include "engine/actuators.h"
-#include "engine/sim_internal.h"
+#include "engine/tick.h"
 #include "fcsl/fcsl_scalar.h"
+#include "group_build.h"
 #include "models/model.h"
-
-int fcsl_sim_fail_line(fcsl_error_t *error, uint32_t line, const char *what, const char *name)
-{
-    return fcsl_sim_fail(error, "plan line %u: %s `%s`", line, what, name);
-}
+#include "output/truth_messages.h"
+#include "plan_names.h"
 
 /* ---- machine, models, instances ---------------------------------------------------------------------------------------- */
 
@@ -145,34 +146,10 @@ static int build_instances(fcsl_sim_t *sim, fcsl_error_t *error)
 
 /* ---- fields ---------------------------------------------------------------------------------------------------------- */
 
-int fcsl_sim_find_instance(const fcsl_sim_t *sim, uint32_t line, const char *name, uint32_t *index, fcsl_error_t *error)
-{
-    for (uint32_t i = 0; i < sim->plant.instance_count; i++) {
-        if (strcmp(sim->plant.instances[i].name, name) == 0) {
-            *index = i;
-            return 0;
-        }
-    }
-    return fcsl_sim_fail_line(error, line, "no instance", name);
-}
-
-const fcsl_field_t *fcsl_sim_find_field(const fcsl_sim_t *sim, uint32_t line, const char *name, const char *path,
-                                        uint32_t *index, fcsl_error_t *error)
-{
-    if (fcsl_sim_find_instance(sim, line, name, index, error)) {
-        return NULL;
-    }
-    const fcsl_field_t *field = fcsl_model_field(sim->plant.instances[*index].model, path);
-    if (!field) {
-        (void)fcsl_sim_fail(error, "plan line %u: instance `%s` has no field `%s`", line, name, path);
-    }
-    return field;
-}
-
 static int build_write(const fcsl_sim_t *sim, const fcsl_plan_set_t *set, fcsl_write_t *write, fcsl_error_t *error)
 {
     uint32_t index = 0;
-    const fcsl_field_t *field = fcsl_sim_find_field(sim, set->line, set->instance, set->field, &index, error);
+    const fcsl_field_t *field = fcsl_sim_find_field(&sim->plant, set->line, set->instance, set->field, &index, error);
     if (!field) {
         return -1;
     }
@@ -254,7 +231,8 @@ static int build_writes(fcsl_sim_t *sim, fcsl_error_t *error)
     }
     uint32_t index = 0;
     const fcsl_plan_set_t *until = &plan->until_value;
-    const fcsl_field_t *field = fcsl_sim_find_field(sim, until->line, until->instance, until->field, &index, error);
+    const fcsl_field_t *field =
+        fcsl_sim_find_field(&sim->plant, until->line, until->instance, until->field, &index, error);
     if (!field) {
         return -1;
     }

@@ -2,11 +2,13 @@
  *
  * The connections of the plan: checks each once, and makes a table of copies from pointer to pointer.
  */
+#include "connections.h"
+
 #include <stdlib.h>
 #include <string.h>
 
 #include "base/fail.h"
-#include "engine/sim_internal.h"
+#include "plan_names.h"
 
 static int same_kind(const fcsl_field_t *a, const fcsl_field_t *b)
 {
@@ -103,7 +105,7 @@ static int add_copy(fcsl_sim_t *sim, const fcsl_plan_link_t *link, int is_field,
     fcsl_copy_t *copy = &sim->plant.copies[sim->plant.copy_count];
     copy->companion = FCSL_NO_COMPANION;
     const fcsl_field_t *to =
-        fcsl_sim_find_field(sim, link->line, link->to_instance, link->to_field, &copy->instance, error);
+        fcsl_sim_find_field(&sim->plant, link->line, link->to_instance, link->to_field, &copy->instance, error);
     if (!to) {
         return -1;
     }
@@ -113,7 +115,7 @@ static int add_copy(fcsl_sim_t *sim, const fcsl_plan_link_t *link, int is_field,
     const fcsl_field_t *from;
     if (link->from_instance) {
         uint32_t source = 0;
-        from = fcsl_sim_find_field(sim, link->line, link->from_instance, link->from_field, &source, error);
+        from = fcsl_sim_find_field(&sim->plant, link->line, link->from_instance, link->from_field, &source, error);
         if (!from) {
             return -1;
         }
@@ -204,7 +206,7 @@ static int add_sensor(fcsl_sim_t *sim, const fcsl_plan_link_t *link, fcsl_error_
     uint32_t *count = companion ? &companion->sensor_count : &sim->sensor_count;
     fcsl_sensor_t *sensor = &sensors[*count];
     const fcsl_field_t *from =
-        fcsl_sim_find_field(sim, link->line, link->from_instance, link->from_field, &sensor->instance, error);
+        fcsl_sim_find_field(&sim->plant, link->line, link->from_instance, link->from_field, &sensor->instance, error);
     if (!from || find_channel(machine, link->line, link->to_field, FCSL_SENSOR, &sensor->channel, error)) {
         return -1;
     }
@@ -285,7 +287,7 @@ static int build_field_writes(fcsl_sim_t *sim, fcsl_error_t *error)
         const fcsl_plan_link_t *link = &plan->writes[i];
         uint32_t source = 0;
         const fcsl_field_t *from =
-            fcsl_sim_find_field(sim, link->line, link->from_instance, link->from_field, &source, error);
+            fcsl_sim_find_field(&sim->plant, link->line, link->from_instance, link->from_field, &source, error);
         const fcsl_field_t *to = from ? find_machine_field(sim, link->line, link->to_field, error) : NULL;
         if (!to || check_pair(link, from, to, error)) {
             return -1;

@@ -2,10 +2,12 @@
  *
  * Builds the groups of a simulation: lists of instances, so that a step needs no look-up.
  */
+#include "group_build.h"
+
 #include <stdlib.h>
 
 #include "base/fail.h"
-#include "engine/sim_internal.h"
+#include "plan_names.h"
 
 /* ---- calls ----------------------------------------------------------------------------------------------------------- */
 
@@ -52,8 +54,8 @@ static int build_calls(fcsl_sim_t *sim, fcsl_error_t *error)
     sim->plant.call_count = plan->call_count;
     for (uint32_t i = 0; i < plan->call_count; i++) {
         sim->plant.calls[i].kind = plan->calls[i].kind;
-        if (fcsl_sim_find_instance(sim, plan->calls[i].line, plan->calls[i].instance, &sim->plant.calls[i].instance,
-                                   error) ||
+        if (fcsl_sim_find_instance(&sim->plant, plan->calls[i].line, plan->calls[i].instance,
+                                   &sim->plant.calls[i].instance, error) ||
             check_call(sim, &plan->calls[i], &sim->plant.calls[i], error)) {
             return -1;
         }
@@ -164,7 +166,7 @@ static int add_link(const fcsl_sim_t *sim, fcsl_group_t *group, fcsl_error_t *er
     uint32_t index = 0;
     for (uint32_t i = 0; link->name && i < group->outer_count; i++) {
         if (sim->plant.copies[group->outer[i]].source == UINT32_MAX) {
-            if (fcsl_sim_find_instance(sim, link->line, link->name, &index, error)) {
+            if (fcsl_sim_find_instance(&sim->plant, link->line, link->name, &index, error)) {
                 return -1;
             }
             add_once(group->timed, &group->timed_count, index);
@@ -226,7 +228,7 @@ static int build_tolerances(fcsl_sim_t *sim, fcsl_error_t *error)
     for (uint32_t i = 0; i < sim->plan.tolerance_count; i++) {
         const fcsl_plan_tolerance_t *tolerance = &sim->plan.tolerances[i];
         uint32_t index = 0;
-        if (fcsl_sim_find_instance(sim, tolerance->line, tolerance->instance, &index, error)) {
+        if (fcsl_sim_find_instance(&sim->plant, tolerance->line, tolerance->instance, &index, error)) {
             return -1;
         }
         const fcsl_instance_state_t *instance = &sim->plant.instances[index];

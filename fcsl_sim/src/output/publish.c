@@ -192,7 +192,7 @@ void fcsl_sim_publish(fcsl_sim_t *sim)
     if (sim->published) {
         const fcsl_moment_t moment = {.tick = sim->tick,
                                       .time_ns = (uint64_t)sim->plant.time_ns,
-                                      .paused = (uint64_t)fcsl_sim_paused(sim),
+                                      .paused = (uint64_t)sim->pace.paused,
                                       .next_write = sim->external ? 0u : fcsl_run_next_write(sim->run)};
         fcsl_history_publish(&sim->published->history, &moment);
     }

@@ -6,7 +6,7 @@
 #ifndef FCSL_SIM_PUBLISH_H
 #define FCSL_SIM_PUBLISH_H
 
-#include "engine/sim_internal.h"
+#include "engine/simulation.h"
 #include "fcsl/fcsl_vars.h"
 
 struct fcsl_sim_published {
@@ -23,5 +23,9 @@ struct fcsl_sim_published {
 
 /* Creates sim->published, if it does not exist, and publishes; only before the first tick. */
 int fcsl_sim_publish_begin(fcsl_sim_t *sim, fcsl_error_t *error);
+
+/* Publishes the current values to clients, telemetry and observers. */
+void fcsl_sim_publish(fcsl_sim_t *sim);
+void fcsl_sim_publish_end(fcsl_sim_t *sim);
 
 #endif /* FCSL_SIM_PUBLISH_H */

@@ -2,12 +2,13 @@
  *
  * The ROS 2 topics of a simulation: what each tick shows, into an outbox.
  */
+#include "ros_topics.h"
+
 #include <stdlib.h>
 #include <string.h>
 
 #include "base/clock.h"
 #include "base/fail.h"
-#include "engine/sim_internal.h"
 #include "fcsl/fcsl_scalar.h"
 
 enum {

@@ -2,13 +2,14 @@
  *
  * The plant's outputs as ROS 2 messages: a type generated from each model's field table, and its CDR.
  */
+#include "truth_messages.h"
+
 #include <stdlib.h>
 #include <string.h>
 
 #include "base/clock.h"
 #include "base/fail.h"
 #include "base/scalar_bits.h"
-#include "engine/sim_internal.h"
 #include "fcsl/fcsl_cdr.h"
 #include "fcsl/fcsl_scalar.h"
 #include "models/model.h"
@@ -111,13 +112,12 @@ static void write_scalar(fcsl_cdr_t *cdr, const uint8_t *from, uint8_t type)
     }
 }
 
-size_t fcsl_truth_write(const fcsl_sim_t *sim, const fcsl_instance_state_t *instance, uint8_t *cdr_bytes,
-                        size_t capacity)
+size_t fcsl_truth_write(int64_t time_ns, const fcsl_instance_state_t *instance, uint8_t *cdr_bytes, size_t capacity)
 {
     const fcsl_model_t *model = instance->model;
     fcsl_cdr_t cdr;
     fcsl_cdr_begin(&cdr, cdr_bytes, capacity);
-    fcsl_cdr_header(&cdr, (uint64_t)sim->plant.time_ns);
+    fcsl_cdr_header(&cdr, (uint64_t)time_ns);
     for (uint32_t i = 0; i < model->field_count; i++) {
         const fcsl_field_t *field = &model->fields[i];
         const uint32_t scalar = fcsl_scalar_size(field->type);
@@ -147,7 +147,7 @@ static int describe(fcsl_sim_t *sim, fcsl_instance_state_t *instance, size_t lar
     if (!instance->truth_type || !instance->truth_schema) {
         return fcsl_sim_fail(error, "no memory for message types");
     }
-    instance->truth_size = (uint32_t)fcsl_truth_write(sim, instance, sim->truth, largest);
+    instance->truth_size = (uint32_t)fcsl_truth_write(sim->plant.time_ns, instance, sim->truth, largest);
     return 0;
 }
 
@@ -202,7 +202,7 @@ int64_t fcsl_sim_truth_message(const fcsl_sim_t *sim, uint32_t instance, uint8_t
     if (instance >= sim->plant.instance_count || capacity < sim->plant.instances[instance].truth_size) {
         return -1;
     }
-    return (int64_t)fcsl_truth_write(sim, &sim->plant.instances[instance], cdr, capacity);
+    return (int64_t)fcsl_truth_write(sim->plant.time_ns, &sim->plant.instances[instance], cdr, capacity);
 }
 
 /* ---- as numbers ---------------------------------------------------------------------------------------------------------- */

@@ -1,0 +1,16 @@
+/* SPDX-License-Identifier: Apache-2.0
+ *
+ * The plant's outputs as ROS 2 messages.
+ */
+#ifndef FCSL_SIM_TRUTH_MESSAGES_H
+#define FCSL_SIM_TRUTH_MESSAGES_H
+
+#include "engine/simulation.h"
+
+/* Type, schema and size of every instance's message, and of the actuators'. */
+int fcsl_truth_build(fcsl_sim_t *sim, fcsl_error_t *error);
+void fcsl_truth_free(fcsl_sim_t *sim);
+/* The outputs as CDR, stamped with a time. Returns its bytes, or 0 when it does not fit. */
+size_t fcsl_truth_write(int64_t time_ns, const fcsl_instance_state_t *instance, uint8_t *cdr_bytes, size_t capacity);
+
+#endif /* FCSL_SIM_TRUTH_MESSAGES_H */
