@@ -9,7 +9,7 @@
 #include "base/clock.h"
 #include "engine/actuators.h"
 #include "engine/instants.h"
-#include "engine/pacing.h"
+#include "engine/tick_pacing.h"
 
 typedef enum { COUNT, SAVE, RESTORE } direction_t;
 

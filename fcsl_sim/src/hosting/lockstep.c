@@ -4,10 +4,10 @@
  */
 #include "base/clock.h"
 #include "base/fail.h"
-#include "engine/pacing.h"
+#include "engine/tick_pacing.h"
 #include "engine/tick.h"
 #include "external_controller.h"
-#include "output/ros_topics.h"
+#include "output/simulation_topics.h"
 
 static int ask(fcsl_sim_t *sim, fcsl_error_t *error)
 {

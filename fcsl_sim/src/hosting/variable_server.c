@@ -10,7 +10,7 @@
 #include <string.h>
 
 #include "base/fail.h"
-#include "engine/pacing.h"
+#include "engine/tick_pacing.h"
 #include "exchange.h"
 #include "fcsl/fcsl_scalar.h"
 #include "output/publish.h"

@@ -12,7 +12,7 @@
 #include "fcsl/fcsl_fp_mode.h"
 #include "hosting/variable_server.h"
 #include "output/publish.h"
-#include "output/ros_topics.h"
+#include "output/simulation_topics.h"
 #include "plant/model_contract.h"
 #include "plant/model_prototypes.h"
 

@@ -1,7 +1,7 @@
 /* SPDX-License-Identifier: Apache-2.0 */
 #include "ball.h"
 
-#include "plant.h"
+#include "bench_plant.h"
 
 PLANT(ball)
 PLANT_EVENTS(ball)

@@ -1,7 +1,7 @@
 /* SPDX-License-Identifier: Apache-2.0 */
 #include "lander.h"
 
-#include "plant.h"
+#include "bench_plant.h"
 
 PLANT(lander)
 PLANT_EVENTS(lander)

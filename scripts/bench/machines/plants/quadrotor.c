@@ -1,7 +1,7 @@
 /* SPDX-License-Identifier: Apache-2.0 */
 #include "quadrotor.h"
 
-#include "plant.h"
+#include "bench_plant.h"
 
 PLANT(quadrotor)
 

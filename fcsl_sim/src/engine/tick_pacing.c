@@ -5,7 +5,7 @@
  * tick does not delay the next. The clock only decides when a tick runs: results are the same at every speed.
  */
 #define _GNU_SOURCE
-#include "pacing.h"
+#include "tick_pacing.h"
 
 #include <math.h>
 #include <time.h>

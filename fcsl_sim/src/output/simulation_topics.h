@@ -2,8 +2,8 @@
  *
  * The ROS 2 topics of a simulation.
  */
-#ifndef FCSL_SIM_ROS_TOPICS_H
-#define FCSL_SIM_ROS_TOPICS_H
+#ifndef FCSL_SIM_SIMULATION_TOPICS_H
+#define FCSL_SIM_SIMULATION_TOPICS_H
 
 #include "engine/simulation.h"
 
@@ -13,4 +13,4 @@ void fcsl_sim_topics_put(fcsl_sim_t *sim);
 void fcsl_sim_topics_wake(const fcsl_sim_t *sim);
 void fcsl_sim_topics_free(fcsl_sim_t *sim);
 
-#endif /* FCSL_SIM_ROS_TOPICS_H */
+#endif /* FCSL_SIM_SIMULATION_TOPICS_H */

@@ -2,8 +2,8 @@
  *
  * When ticks may run.
  */
-#ifndef FCSL_SIM_PACING_H
-#define FCSL_SIM_PACING_H
+#ifndef FCSL_SIM_TICK_PACING_H
+#define FCSL_SIM_TICK_PACING_H
 
 #include "simulation.h"
 
@@ -17,4 +17,4 @@ void fcsl_sim_forgive(fcsl_sim_t *sim);
 /* The next tick is due at once, later ones relative to it. */
 void fcsl_sim_pace_anew(fcsl_sim_t *sim);
 
-#endif /* FCSL_SIM_PACING_H */
+#endif /* FCSL_SIM_TICK_PACING_H */

@@ -2,7 +2,7 @@
  *
  * The ROS 2 topics of a simulation: what each tick shows, into an outbox.
  */
-#include "ros_topics.h"
+#include "simulation_topics.h"
 
 #include <stdlib.h>
 #include <string.h>
