@@ -36,7 +36,7 @@ static int ask_machine(fcsl_sim_t *sim, fcsl_message_t *message, fcsl_error_t *e
         return -1;
     }
     for (uint32_t i = 0; sim->recording && i < sim->plant.instance_count; i++) {
-        if (fcsl_sim_record_truth(sim, &sim->plant.instances[i], error)) {
+        if (fcsl_sim_record_truth(sim, &sim->plant.instances[i], &sim->truths[i], error)) {
             return -1;
         }
     }
@@ -119,7 +119,8 @@ int fcsl_sim_tick_once(fcsl_sim_t *sim, fcsl_error_t *error)
         exchange(sim, &message, error)) {
         return -1;
     }
-    if (sim->recording && sim->actuators && fcsl_sim_record_truth(sim, &sim->actuators->as_instance, error)) {
+    if (sim->recording && sim->actuators &&
+        fcsl_sim_record_truth(sim, &sim->actuators->as_instance, &sim->actuators->truth, error)) {
         return -1;
     }
     fcsl_sim_publish(sim);

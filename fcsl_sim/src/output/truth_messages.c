@@ -140,14 +140,15 @@ static size_t message_bytes_max(const fcsl_model_t *model)
 
 /* ---- building ------------------------------------------------------------------------------------------------------------ */
 
-static int describe(fcsl_sim_t *sim, fcsl_instance_state_t *instance, size_t largest, fcsl_error_t *error)
+static int describe(const fcsl_sim_t *sim, const fcsl_instance_state_t *instance, fcsl_truth_t *truth, size_t largest,
+                    fcsl_error_t *error)
 {
-    instance->truth_type = build_type(instance->model->name);
-    instance->truth_schema = build_schema(instance->model);
-    if (!instance->truth_type || !instance->truth_schema) {
+    truth->type = build_type(instance->model->name);
+    truth->schema = build_schema(instance->model);
+    if (!truth->type || !truth->schema) {
         return fcsl_sim_fail(error, "no memory for message types");
     }
-    instance->truth_size = (uint32_t)fcsl_truth_write(sim->plant.time_ns, instance, sim->truth, largest);
+    truth->size = (uint32_t)fcsl_truth_write(sim->plant.time_ns, instance, sim->truth_bytes, largest);
     return 0;
 }
 
@@ -158,48 +159,51 @@ int fcsl_truth_build(fcsl_sim_t *sim, fcsl_error_t *error)
         const size_t size = message_bytes_max(sim->plant.instances[i].model);
         largest = size > largest ? size : largest;
     }
-    sim->truth = malloc(largest);
-    if (!sim->truth) {
+    sim->truths = calloc(sim->plant.instance_count + 1u, sizeof *sim->truths);
+    sim->truth_bytes = malloc(largest);
+    if (!sim->truths || !sim->truth_bytes) {
         return fcsl_sim_fail(error, "no memory for messages");
     }
     for (uint32_t i = 0; i < sim->plant.instance_count; i++) {
-        if (describe(sim, &sim->plant.instances[i], largest, error)) {
+        if (describe(sim, &sim->plant.instances[i], &sim->truths[i], largest, error)) {
             return -1;
         }
     }
-    return sim->actuators ? describe(sim, &sim->actuators->as_instance, largest, error) : 0;
+    fcsl_actuators_t *actuators = sim->actuators;
+    return actuators ? describe(sim, &actuators->as_instance, &actuators->truth, largest, error) : 0;
 }
 
-static void free_texts(fcsl_instance_state_t *instance)
+static void free_texts(fcsl_truth_t *truth)
 {
-    free(instance->truth_type);
-    free(instance->truth_schema);
+    free(truth->type);
+    free(truth->schema);
 }
 
 void fcsl_truth_free(fcsl_sim_t *sim)
 {
-    for (uint32_t i = 0; i < sim->plant.instance_count; i++) {
-        free_texts(&sim->plant.instances[i]);
+    for (uint32_t i = 0; sim->truths && i < sim->plant.instance_count; i++) {
+        free_texts(&sim->truths[i]);
     }
     if (sim->actuators) {
-        free_texts(&sim->actuators->as_instance);
+        free_texts(&sim->actuators->truth);
     }
-    free(sim->truth);
+    free(sim->truths);
+    free(sim->truth_bytes);
 }
 
 const char *fcsl_sim_truth_type(const fcsl_sim_t *sim, uint32_t instance)
 {
-    return instance < sim->plant.instance_count ? sim->plant.instances[instance].truth_type : NULL;
+    return instance < sim->plant.instance_count ? sim->truths[instance].type : NULL;
 }
 
 const char *fcsl_sim_truth_schema(const fcsl_sim_t *sim, uint32_t instance)
 {
-    return instance < sim->plant.instance_count ? sim->plant.instances[instance].truth_schema : NULL;
+    return instance < sim->plant.instance_count ? sim->truths[instance].schema : NULL;
 }
 
 int64_t fcsl_sim_truth_message(const fcsl_sim_t *sim, uint32_t instance, uint8_t *cdr, size_t capacity)
 {
-    if (instance >= sim->plant.instance_count || capacity < sim->plant.instances[instance].truth_size) {
+    if (instance >= sim->plant.instance_count || capacity < sim->truths[instance].size) {
         return -1;
     }
     return (int64_t)fcsl_truth_write(sim->plant.time_ns, &sim->plant.instances[instance], cdr, capacity);

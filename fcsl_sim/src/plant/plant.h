@@ -44,10 +44,6 @@ typedef struct {
     uint32_t inner_count;
     uint8_t due;      /* its update is at the present */
     uint64_t samples; /* taken so far */
-    char *truth_type;
-    char *truth_schema;
-    uint32_t truth_size; /* bytes of its message */
-    int truth_topic;
 } fcsl_instance_state_t;
 
 /* What models do at an instant, in order. */
