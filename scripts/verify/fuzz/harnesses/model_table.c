@@ -8,7 +8,7 @@
 
 #include "fuzz.h"
 #define fcsl_model_load load_library
-#include "models/model.c"
+#include "model.c"
 #undef fcsl_model_load
 
 #include "fcsl/fcsl_sim.h"
