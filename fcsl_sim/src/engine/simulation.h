@@ -48,7 +48,7 @@ typedef struct {
     char *texts;          /* the model's name, and the paths of the channels */
 } fcsl_actuators_t;
 
-/* When ticks may run (pacing.c). */
+/* When ticks may run (tick_pacing.c). */
 typedef struct {
     double speed; /* limit on simulated seconds per second; 0: as fast as possible */
     int paused;   /* a client of the variable server keeps it paused */

@@ -24,11 +24,11 @@ _MOVERS = {
     "describe_model",
     "lockstep",
     "observers",
-    "pacing",
     "publish",
     "ros_graph",
-    "ros_topics",
+    "simulation_topics",
     "telemetry",
+    "tick_pacing",
     "variable_server",
 }
 #: The rest of what a flight calls: hosting a machine, and messages of channels. Not under test. Recording, sockets and the bus are
