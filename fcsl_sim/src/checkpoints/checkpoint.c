@@ -10,10 +10,10 @@
 #include <inttypes.h>
 #include <string.h>
 
-#include "base/clock.h"
-#include "base/fail.h"
 #include "fcsl/fcsl_mcap_writer.h"
 #include "fcsl/fcsl_scalar.h"
+#include "base/clock.h"
+#include "base/fail.h"
 #include "output/publish.h"
 #include "plant_state.h"
 

@@ -8,8 +8,8 @@
 #include <stdlib.h>
 #include <string.h>
 
-#include "base/fail.h"
 #include "fcsl/fcsl_scalar.h"
+#include "base/fail.h"
 #include "plant_state.h"
 
 struct fcsl_sim_snapshot {

@@ -6,9 +6,9 @@
 #ifndef FCSL_SIM_COMPANION_CONTROLLER_H
 #define FCSL_SIM_COMPANION_CONTROLLER_H
 
-#include "delay.h"
 #include "fcsl/fcsl_gate.h"
 #include "fcsl/fcsl_run.h"
+#include "delay.h"
 #include "plan/plan.h"
 #include "plant/plant.h"
 

@@ -7,9 +7,9 @@
 #include <stdlib.h>
 #include <string.h>
 
-#include "base/clock.h"
 #include "fcsl/fcsl_cobs.h"
 #include "fcsl/fcsl_link.h"
+#include "base/clock.h"
 
 enum {
     PLANT = 0,

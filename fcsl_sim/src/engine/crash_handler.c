@@ -11,9 +11,9 @@
 #include <string.h>
 #include <unistd.h>
 
+#include "fcsl/fcsl_sim.h"
 #include "base/clock.h"
 #include "base/fail.h"
-#include "fcsl/fcsl_sim.h"
 
 enum { STACK_BYTES = 1 << 16, TEXT_BYTES = 1024, EXIT_FAILED = 2 };
 

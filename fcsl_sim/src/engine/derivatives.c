@@ -4,10 +4,10 @@
  */
 #include <math.h>
 
-#include "base/clock.h"
-#include "base/fail.h"
 #include "fcsl/fcsl_fp_mode.h"
 #include "fcsl/fcsl_sim.h"
+#include "base/clock.h"
+#include "base/fail.h"
 #include "plant/value_names.h"
 #include "simulation.h"
 

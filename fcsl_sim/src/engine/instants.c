@@ -5,10 +5,10 @@
  */
 #include "instants.h"
 
+#include "fcsl/fcsl_fp_mode.h"
 #include "base/clock.h"
 #include "base/fail.h"
 #include "base/scalar_bits.h"
-#include "fcsl/fcsl_fp_mode.h"
 
 enum { EVENT_UPDATE, EVENT_COMPANION, EVENT_TICK };
 

@@ -5,12 +5,12 @@
 #ifndef FCSL_SIM_SIMULATION_H
 #define FCSL_SIM_SIMULATION_H
 
-#include "controllers/companion_controller.h"
-#include "controllers/serial_link.h"
-#include "event_queue.h"
 #include "fcsl/fcsl_external.h"
 #include "fcsl/fcsl_gate.h"
 #include "fcsl/fcsl_sim.h"
+#include "controllers/companion_controller.h"
+#include "controllers/serial_link.h"
+#include "event_queue.h"
 #include "groups/group.h"
 #include "plan/plan.h"
 #include "plant/plant.h"

@@ -6,12 +6,12 @@
 
 #include <string.h>
 
+#include "fcsl/fcsl_fp_mode.h"
+#include "fcsl/fcsl_scalar.h"
 #include "actuators.h"
 #include "base/clock.h"
 #include "base/fail.h"
 #include "base/scalar_bits.h"
-#include "fcsl/fcsl_fp_mode.h"
-#include "fcsl/fcsl_scalar.h"
 #include "instants.h"
 #include "plant/value_names.h"
 

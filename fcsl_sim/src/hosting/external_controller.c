@@ -6,8 +6,8 @@
 
 #include <string.h>
 
-#include "base/fail.h"
 #include "fcsl/fcsl_external.h"
+#include "base/fail.h"
 
 int fcsl_sim_external_failed(const fcsl_sim_t *sim, fcsl_hal_status_t status, const char *doing, fcsl_error_t *error)
 {

@@ -4,8 +4,8 @@
  */
 #include "base/clock.h"
 #include "base/fail.h"
-#include "engine/tick_pacing.h"
 #include "engine/tick.h"
+#include "engine/tick_pacing.h"
 #include "external_controller.h"
 #include "output/simulation_topics.h"
 

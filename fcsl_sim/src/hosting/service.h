@@ -5,8 +5,8 @@
 #ifndef FCSL_SIM_SERVICE_H
 #define FCSL_SIM_SERVICE_H
 
-#include "checkpoints/snapshot.h"
 #include "fcsl/fcsl_vars.h"
+#include "checkpoints/snapshot.h"
 
 struct fcsl_sim_service {
     fcsl_vars_t *vars;

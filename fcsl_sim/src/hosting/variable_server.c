@@ -9,10 +9,10 @@
 #include <stdlib.h>
 #include <string.h>
 
+#include "fcsl/fcsl_scalar.h"
 #include "base/fail.h"
 #include "engine/tick_pacing.h"
 #include "exchange.h"
-#include "fcsl/fcsl_scalar.h"
 #include "output/publish.h"
 #include "service.h"
 

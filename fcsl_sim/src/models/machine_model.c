@@ -7,8 +7,8 @@
 #include <stdlib.h>
 #include <string.h>
 
-#include "base/fail.h"
 #include "fcsl/fcsl_hw.h"
+#include "base/fail.h"
 #include "model.h"
 
 struct fcsl_machine_model {

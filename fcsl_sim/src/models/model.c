@@ -7,9 +7,9 @@
 #include <dlfcn.h>
 #include <string.h>
 
-#include "base/fail.h"
 #include "fcsl/fcsl_library.h"
 #include "fcsl/fcsl_scalar.h"
+#include "base/fail.h"
 
 /* A longer table counts as one without its null terminator. */
 #define MAX_MODELS_PER_LIBRARY 256

@@ -8,6 +8,7 @@
 #include <stdlib.h>
 #include <string.h>
 
+#include "fcsl/fcsl_scalar.h"
 #include "base/aligned_memory.h"
 #include "base/clock.h"
 #include "base/fail.h"
@@ -15,7 +16,6 @@
 #include "connections.h"
 #include "engine/actuators.h"
 #include "engine/tick.h"
-#include "fcsl/fcsl_scalar.h"
 #include "group_build.h"
 #include "models/model.h"
 #include "output/truth_messages.h"

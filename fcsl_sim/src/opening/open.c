@@ -4,12 +4,12 @@
  */
 #include <stdlib.h>
 
+#include "fcsl/fcsl_fp_mode.h"
 #include "assembly.h"
 #include "base/fail.h"
 #include "checkpoints/plant_state.h"
 #include "engine/crash_handler.h"
 #include "engine/instants.h"
-#include "fcsl/fcsl_fp_mode.h"
 #include "hosting/variable_server.h"
 #include "output/publish.h"
 #include "output/simulation_topics.h"

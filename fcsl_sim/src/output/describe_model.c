@@ -11,8 +11,8 @@
  */
 #include <string.h>
 
-#include "base/fail.h"
 #include "fcsl/fcsl_sim.h"
+#include "base/fail.h"
 #include "models/model.h"
 
 typedef struct {

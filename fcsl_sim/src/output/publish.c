@@ -7,8 +7,8 @@
 #include <stdlib.h>
 #include <string.h>
 
-#include "base/fail.h"
 #include "fcsl/fcsl_journal.h"
+#include "base/fail.h"
 
 enum { HISTORY_SLOTS = 64, WRITER_BYTES = 256 };
 

@@ -6,8 +6,8 @@
 #ifndef FCSL_SIM_PUBLISH_H
 #define FCSL_SIM_PUBLISH_H
 
-#include "engine/simulation.h"
 #include "fcsl/fcsl_vars.h"
+#include "engine/simulation.h"
 
 struct fcsl_sim_published {
     fcsl_history_t history;

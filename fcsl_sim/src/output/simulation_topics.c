@@ -7,9 +7,9 @@
 #include <stdlib.h>
 #include <string.h>
 
+#include "fcsl/fcsl_scalar.h"
 #include "base/clock.h"
 #include "base/fail.h"
-#include "fcsl/fcsl_scalar.h"
 
 enum {
     CLOCK_BYTES = 12, /* encapsulation, s, ns */

@@ -7,11 +7,11 @@
 #include <stdlib.h>
 #include <string.h>
 
+#include "fcsl/fcsl_cdr.h"
+#include "fcsl/fcsl_scalar.h"
 #include "base/clock.h"
 #include "base/fail.h"
 #include "base/scalar_bits.h"
-#include "fcsl/fcsl_cdr.h"
-#include "fcsl/fcsl_scalar.h"
 #include "models/model.h"
 
 static const char *ros_type(uint8_t type)

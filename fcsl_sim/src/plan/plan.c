@@ -8,8 +8,8 @@
 #include <stdlib.h>
 #include <string.h>
 
-#include "base/fail.h"
 #include "fcsl/fcsl_plan_text.h"
+#include "base/fail.h"
 
 #define MAX_WORDS 7
 

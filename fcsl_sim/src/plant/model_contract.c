@@ -9,9 +9,9 @@
 #include <stdlib.h>
 #include <string.h>
 
+#include "fcsl/fcsl_scalar.h"
 #include "base/aligned_memory.h"
 #include "base/fail.h"
-#include "fcsl/fcsl_scalar.h"
 #include "value_names.h"
 
 typedef struct {

@@ -7,8 +7,8 @@
 #include <math.h>
 #include <stdio.h>
 
-#include "base/fail.h"
 #include "fcsl/fcsl_scalar.h"
+#include "base/fail.h"
 
 /* "[2]", or "[1][2]"; "" for a scalar. */
 static void name_element(const fcsl_field_t *field, uint32_t element, char *text, size_t size)
