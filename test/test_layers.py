@@ -5,6 +5,7 @@ from __future__ import annotations
 
 import ast
 from collections.abc import Iterator, Mapping, Sequence
+from importlib import import_module
 from importlib.util import resolve_name
 from pathlib import Path
 
@@ -24,7 +25,7 @@ PACKAGES = {
 FOLDERS: dict[str, Sequence[str]] = {
     "fcsl_compiler": (
         *("base", "model", "parse", "check", "ros", "config", "lower", "emit", "printers", "coverage", "driver"),
-        *("board", "graph", "build_report", "reference", "cli"),
+        *("board", "graph", "build_report", "reference", "cli", "api"),
     ),
     "simclient": (
         "",
@@ -50,6 +51,9 @@ FOLDERS: dict[str, Sequence[str]] = {
     ),
     "bench": ("harness", "machines", "peers", "subjects", ""),
 }
+#: What other packages use of the compiler, and those packages. Checks and benchmarks look inside.
+FACE = "fcsl_compiler.api"
+USERS = ("simclient", "fcsl_sim", "fcsl_bridge")
 #: Commands, and the package's __init__, are above its folders.
 FACES = {"__main__.py", "plot.py", "to_rerun.py"}
 
@@ -186,6 +190,38 @@ def test_packages_know_those_before_them_alone(name: str) -> None:
     assert of_later_packages(PACKAGES[name]) == []
 
 
+def around_the_face(root: Path) -> list[str]:
+    """Imports of modules of the compiler by the package at `root` that do not go through fcsl_compiler/api."""
+    return [
+        f"{path.relative_to(root)}:{line}: {module}"
+        for path in sources(root)
+        for line, module in imports(path, root, {})
+        if module.split(".")[0] == "fcsl_compiler" and module.split(".")[1:2] != ["api"]
+    ]
+
+
+def names_of_the_face(root: Path) -> set[str]:
+    """Modules of the face and their names, as the package at `root` imports them."""
+    trees = [ast.parse(path.read_text(encoding="utf-8")) for path in sources(root)]
+    nodes = [node for tree in trees for node in ast.walk(tree) if isinstance(node, ast.ImportFrom)]
+    return {f"{node.module}.{a.name}" for node in nodes for a in node.names if str(node.module).startswith(FACE)}
+
+
+@pytest.mark.parametrize("name", USERS)
+def test_other_packages_use_the_compiler_by_its_face_alone(name: str) -> None:
+    assert around_the_face(PACKAGES[name]) == []
+
+
+def test_the_face_of_the_compiler_offers_what_is_used_alone() -> None:
+    folder = PACKAGES["fcsl_compiler"] / "api"
+    offered = {
+        f"{FACE}.{path.stem}.{name}"
+        for path in sources(folder)
+        for name in getattr(import_module(f"{FACE}.{path.stem}"), "__all__", ())
+    }
+    assert offered == set().union(*(names_of_the_face(PACKAGES[name]) for name in USERS))
+
+
 def write(root: Path, files: Mapping[str, str]) -> Path:
     for name, text in files.items():
         (root / name).parent.mkdir(parents=True, exist_ok=True)
@@ -235,6 +271,14 @@ def f(module):
     root = write(tmp_path / "simclient", {"__init__.py": "", "run.py": by_call, "twin/host.py": ""})
     assert of_later_packages(root) == ["run.py:5: fcsl_sim.native", "run.py:7: fcsl_sim", "run.py:9: fcsl_sim"]
     assert against_the_order(root, FOLDERS["simclient"]) == ["run.py:10: simclient.twin.host"]
+
+
+def test_a_way_around_the_face_is_found(tmp_path: Path) -> None:
+    text = (
+        "from fcsl_compiler.api.types import Type\nfrom fcsl_compiler import driver\nimport fcsl_compiler.model.types\n"
+    )
+    root = write(tmp_path / "simclient", {"run.py": text})
+    assert around_the_face(root) == ["run.py:2: fcsl_compiler", "run.py:3: fcsl_compiler.model.types"]
 
 
 def test_a_circle_is_found(tmp_path: Path) -> None:

@@ -5,7 +5,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 
-from fcsl_compiler.base.packages import package_share
+from fcsl_compiler.api.packages import package_share
 
 #: Fast DDS reads both variables; if the user set one of them, it has precedence.
 _PROFILE_VARIABLES = ("FASTRTPS_DEFAULT_PROFILES_FILE", "FASTDDS_DEFAULT_PROFILES_FILE")

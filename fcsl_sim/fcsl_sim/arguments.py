@@ -10,7 +10,7 @@ from fractions import Fraction
 from math import isfinite, isnan
 from pathlib import Path
 
-from fcsl_compiler.base.version import add_version
+from fcsl_compiler.api.command_line import add_version
 
 from .external import TIMEOUT_MS
 

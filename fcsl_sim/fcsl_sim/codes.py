@@ -8,7 +8,7 @@ tests run them.
 
 from __future__ import annotations
 
-from fcsl_compiler.base.codes.code import Code, Kind
+from fcsl_compiler.api.codes import Code, Kind
 
 _CONNECTIONS = (
     '"connections": [\n'

@@ -11,8 +11,8 @@ import sys
 from pathlib import Path
 from types import FrameType
 
-from fcsl_compiler.base.codes.pages import UnknownCode, pages
-from fcsl_compiler.base.diagnostics import DiagnosticError
+from fcsl_compiler.api.codes import UnknownCode, pages
+from fcsl_compiler.api.diagnostics import DiagnosticError
 from simclient.cli import missing_package
 
 from . import plot

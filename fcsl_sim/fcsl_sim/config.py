@@ -13,17 +13,20 @@ from dataclasses import dataclass, field, replace
 from fractions import Fraction
 from pathlib import Path
 
-from fcsl_compiler.base.diagnostics import Diagnostic, DiagnosticError, DiagnosticSink, Severity, nearest
-from fcsl_compiler.base.files import SourceError
-from fcsl_compiler.base.source import SourceFile, Span
-from fcsl_compiler.config.views import Signals, read_views
-from fcsl_compiler.driver.cache import build_machine
-from fcsl_compiler.driver.toolchain import ToolchainError, toolchain
-from fcsl_compiler.model.choices import DEFAULT_BACKEND
-from fcsl_compiler.model.types import Type, scalar_of
-from fcsl_compiler.parse.json_reader import ConfigReader, Everything
-from fcsl_compiler.parse.json_source import JsonNode
-from fcsl_compiler.parse.source_path import SourcePathError, resolve_source
+from fcsl_compiler.api.build import DEFAULT_BACKEND, ToolchainError, build_machine, toolchain
+from fcsl_compiler.api.diagnostics import (
+    Diagnostic,
+    DiagnosticError,
+    DiagnosticSink,
+    Severity,
+    SourceFile,
+    Span,
+    nearest,
+)
+from fcsl_compiler.api.files import SourceError
+from fcsl_compiler.api.json_files import ConfigReader, Everything, JsonNode, SourcePathError, resolve_source
+from fcsl_compiler.api.sections import Signals, read_views
+from fcsl_compiler.api.types import Type, scalar_of
 from simclient.descriptor import Machine
 from simclient.errors import TwinError
 from simclient.run import open_run

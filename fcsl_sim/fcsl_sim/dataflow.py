@@ -12,7 +12,7 @@ import heapq
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 
-from fcsl_compiler.base.source import Span
+from fcsl_compiler.api.diagnostics import Span
 
 from .models import ModelField, ModelTable
 

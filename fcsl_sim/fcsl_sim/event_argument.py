@@ -6,9 +6,8 @@ from __future__ import annotations
 import re
 from collections.abc import Sequence
 
-from fcsl_compiler.base.diagnostics import DiagnosticSink
-from fcsl_compiler.base.source import SourceFile
-from fcsl_compiler.parse.json_source import JsonNode, Member, parse_json
+from fcsl_compiler.api.diagnostics import DiagnosticSink, SourceFile
+from fcsl_compiler.api.json_files import JsonNode, Member, parse_json
 
 _OPTION = "--event"
 _EVENT = re.compile(r"\s*(?P<at>-?\d+(?:\.\d+)?(?:[eE][+-]?\d+)?)\s+(?P<path>[^\s=]+)\s*=")

@@ -9,12 +9,9 @@ from __future__ import annotations
 
 from pathlib import Path
 
-from fcsl_compiler.base.diagnostics import DiagnosticSink
-from fcsl_compiler.base.files import SourceError
-from fcsl_compiler.base.source import SourceFile, Span
-from fcsl_compiler.parse.json_reader import ConfigReader
-from fcsl_compiler.parse.json_source import JsonNode, Member, parse_json
-from fcsl_compiler.parse.source_path import SourcePathError, resolve_source
+from fcsl_compiler.api.diagnostics import DiagnosticSink, SourceFile, Span
+from fcsl_compiler.api.files import SourceError
+from fcsl_compiler.api.json_files import ConfigReader, JsonNode, Member, SourcePathError, parse_json, resolve_source
 
 _KEY = "extends"
 

@@ -5,9 +5,8 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
-from fcsl_compiler.base.source import Span
-from fcsl_compiler.parse.json_reader import ConfigReader
-from fcsl_compiler.parse.json_source import JsonNode
+from fcsl_compiler.api.diagnostics import Span
+from fcsl_compiler.api.json_files import ConfigReader, JsonNode
 
 from . import plan
 

@@ -15,11 +15,17 @@ from collections.abc import Sequence
 from functools import lru_cache
 from pathlib import Path
 
-from fcsl_compiler import driver
-from fcsl_compiler.base.files import digest
-from fcsl_compiler.driver.cache import build_shared
-from fcsl_compiler.driver.cache_entry import cached
-from fcsl_compiler.driver.toolchain import LANGUAGES, include_dirs, math_library, toolchain, unwritten
+from fcsl_compiler.api.build import (
+    LANGUAGES,
+    SHARED_RULES,
+    build_shared,
+    cached,
+    include_dirs,
+    math_library,
+    toolchain,
+    unwritten,
+)
+from fcsl_compiler.api.files import digest
 
 _EXPORTS = ("fcsl_models",)
 _CONTINUED = re.compile(rb"\\[ \t]*\r?\n")
@@ -32,8 +38,6 @@ _DIRECTIVE = re.compile(
 _OTHER_WAYS = (b"??/", b"__has_include", b"__has_embed", b"incbin")
 #: They add folders to those that are searched.
 _VARIABLES = ("CPATH", "C_INCLUDE_PATH", "CPLUS_INCLUDE_PATH")
-#: What decides how a library is made.
-_RULES = tuple(Path(driver.__path__[0]) / f"{name}.py" for name in ("cache", "c_dependencies", "symbols", "toolchain"))
 
 
 class _Unsaid(Exception):
@@ -66,7 +70,7 @@ def _key(source: Path, folders: Sequence[Path]) -> str:
     if len(language.compiler()) > 1 or any(os.environ.get(name) for name in _VARIABLES):
         raise _Unsaid
     made_by = toolchain(language), str(math_library().stat().st_mtime_ns)
-    rules = [file.read_bytes() for file in _RULES]
+    rules = [file.read_bytes() for file in SHARED_RULES]
     return digest(*made_by, *rules, *_EXPORTS, source.name, *_closure(source, folders))
 
 

@@ -9,11 +9,11 @@ from collections.abc import Iterator
 from dataclasses import dataclass
 from pathlib import Path
 
-from fcsl_compiler.base.diagnostics import nearest
-from fcsl_compiler.base.files import MAX_SOURCE_BYTES, SourceError, read_regular
-from fcsl_compiler.base.packages import Package, PackageNotFound, installed_packages
-from fcsl_compiler.driver.toolchain import LANGUAGES
-from fcsl_compiler.parse.source_path import SourcePathError, resolve_source
+from fcsl_compiler.api.build import LANGUAGES
+from fcsl_compiler.api.diagnostics import nearest
+from fcsl_compiler.api.files import MAX_SOURCE_BYTES, SourceError, read_regular
+from fcsl_compiler.api.json_files import SourcePathError, resolve_source
+from fcsl_compiler.api.packages import Package, PackageNotFound, installed_packages
 
 from .errors import SimError
 from .models import ModelTable

@@ -7,7 +7,7 @@ import json
 from collections.abc import Sequence
 from typing import Any
 
-from fcsl_compiler.model.types import Type, scalar_of, shape_of
+from fcsl_compiler.api.types import Type, scalar_of, shape_of
 
 from .errors import SimError
 from .model_list import Found

@@ -7,7 +7,7 @@ import struct
 from dataclasses import dataclass
 from pathlib import Path
 
-from fcsl_compiler.model.types import SCALARS, Array, Type, count_of, scalar_of, shape_of
+from fcsl_compiler.api.types import SCALARS, Array, Type, count_of, scalar_of, shape_of
 
 #: A value of a model's field.
 Scalar = bool | int | float

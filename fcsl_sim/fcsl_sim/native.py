@@ -13,8 +13,8 @@ from dataclasses import dataclass
 from pathlib import Path
 from types import TracebackType
 
-from fcsl_compiler.base.packages import PackageNotFound, package_prefix
-from fcsl_compiler.model.types import count_of, shape_of
+from fcsl_compiler.api.packages import PackageNotFound, package_prefix
+from fcsl_compiler.api.types import count_of, shape_of
 from simclient.c_machine import CMachine
 from simclient.c_run import CError
 from simclient.descriptor import Machine, read_machine

@@ -5,10 +5,8 @@ from __future__ import annotations
 
 import json
 
-from fcsl_compiler.base.files import write_whole
-from fcsl_compiler.driver.cache import BuiltMachine, build_machine
-from fcsl_compiler.driver.cache_folder import make_entry_folder
-from fcsl_compiler.driver.toolchain import cache_dir, unwritten
+from fcsl_compiler.api.build import BuiltMachine, build_machine, cache_dir, make_entry_folder, unwritten
+from fcsl_compiler.api.files import write_whole
 
 NAME = "plant_only"
 #: Of any machine (fcsl_compiler/config/machine.py, which would import the compiler).

@@ -6,11 +6,10 @@ from __future__ import annotations
 import re
 from pathlib import Path
 
-from fcsl_compiler.base.diagnostics import nearest
-from fcsl_compiler.base.packages import PackageNotFound, package_prefix
-from fcsl_compiler.driver.symbols import SymbolError, check_model_symbols
-from fcsl_compiler.driver.toolchain import LANGUAGES, ToolchainError
-from fcsl_compiler.parse.source_path import SourcePathError, resolve_source
+from fcsl_compiler.api.build import LANGUAGES, SymbolError, ToolchainError, check_model_symbols
+from fcsl_compiler.api.diagnostics import nearest
+from fcsl_compiler.api.json_files import SourcePathError, resolve_source
+from fcsl_compiler.api.packages import PackageNotFound, package_prefix
 
 from .errors import SimError
 from .model_build import build_model

@@ -12,13 +12,10 @@ from __future__ import annotations
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 
-from fcsl_compiler.config.channels import read_ros
-from fcsl_compiler.config.ros import Mapped, check_mapped
-from fcsl_compiler.model.types import count_of, scalar_of
-from fcsl_compiler.parse.json_reader import ConfigReader
-from fcsl_compiler.parse.json_source import JsonNode
-from fcsl_compiler.ros.composer import Source
-from fcsl_compiler.ros.standard_messages import STANDARD, full_name
+from fcsl_compiler.api.json_files import ConfigReader, JsonNode
+from fcsl_compiler.api.ros import STANDARD, Source, full_name
+from fcsl_compiler.api.sections import Mapped, check_mapped, read_ros
+from fcsl_compiler.api.types import count_of, scalar_of
 from simclient.ros.composer import Composer
 
 from .models import ModelField

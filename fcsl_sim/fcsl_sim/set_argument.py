@@ -10,11 +10,9 @@ import math
 from collections.abc import Sequence
 from dataclasses import dataclass
 
-from fcsl_compiler.base.diagnostics import DiagnosticSink
-from fcsl_compiler.base.source import SourceFile, Span
-from fcsl_compiler.model.types import scalar_of, shape_of
-from fcsl_compiler.parse.json_reader import ConfigReader
-from fcsl_compiler.parse.json_source import JsonNode, parse_json
+from fcsl_compiler.api.diagnostics import DiagnosticSink, SourceFile, Span
+from fcsl_compiler.api.json_files import ConfigReader, JsonNode, parse_json
+from fcsl_compiler.api.types import scalar_of, shape_of
 
 from .element_path import name_an_element, place_of, split_path
 from .models import ModelField, type_of

@@ -16,8 +16,8 @@ from dataclasses import dataclass, replace
 from itertools import groupby
 from pathlib import Path
 
-from fcsl_compiler.base.files import digest
-from fcsl_compiler.model.types import count_of, scalar_of, shape_of
+from fcsl_compiler.api.files import digest
+from fcsl_compiler.api.types import count_of, scalar_of, shape_of
 from simclient.descriptor import Field, Machine, read_machine
 from simclient.errors import TwinError
 from simclient.forks import for_children, not_for_children

@@ -19,7 +19,7 @@ from fractions import Fraction
 from pathlib import Path
 from typing import Any, Self
 
-from fcsl_compiler.base.diagnostics import DiagnosticError
+from fcsl_compiler.api.diagnostics import DiagnosticError
 from simclient.descriptor import Field
 from simclient.errors import TwinError
 from simclient.machine_build import check_backend, find_config

@@ -7,11 +7,9 @@ import csv
 import math
 from pathlib import Path
 
-from fcsl_compiler.base.diagnostics import nearest
-from fcsl_compiler.model.types import Array, scalar_of, shape_of
-from fcsl_compiler.parse.json_reader import ConfigReader
-from fcsl_compiler.parse.json_source import JsonNode
-from fcsl_compiler.parse.source_path import SourcePathError, resolve_source
+from fcsl_compiler.api.diagnostics import nearest
+from fcsl_compiler.api.json_files import ConfigReader, JsonNode, SourcePathError, resolve_source
+from fcsl_compiler.api.types import Array, scalar_of, shape_of
 
 from .extends import file_of
 from .models import ModelField

@@ -5,7 +5,7 @@ from __future__ import annotations
 
 from fractions import Fraction
 
-from fcsl_compiler.model.machine import nearest_seconds, seconds
+from fcsl_compiler.api.sections import nearest_seconds, seconds
 
 
 def whole_ticks(time_s: Fraction, tick_hz: int) -> int:

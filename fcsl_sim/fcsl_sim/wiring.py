@@ -9,11 +9,9 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from fractions import Fraction
 
-from fcsl_compiler.base.diagnostics import nearest
-from fcsl_compiler.base.source import Span
-from fcsl_compiler.model.types import Array, Type, scalar_of
-from fcsl_compiler.parse.json_reader import ConfigReader
-from fcsl_compiler.parse.json_source import JsonNode
+from fcsl_compiler.api.diagnostics import Span, nearest
+from fcsl_compiler.api.json_files import ConfigReader, JsonNode
+from fcsl_compiler.api.types import Array, Type, scalar_of
 from simclient.descriptor import Field, Machine, why_read_only
 
 from . import dataflow, plan

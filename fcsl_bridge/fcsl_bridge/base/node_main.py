@@ -24,9 +24,9 @@ from rclpy.parameter import Parameter
 from rclpy.publisher import Publisher
 from rclpy.signals import SignalHandlerOptions
 
-from fcsl_compiler.base.diagnostics import DiagnosticError
-from fcsl_compiler.base.packages import PackageNotFound
-from fcsl_compiler.base.version import package_version
+from fcsl_compiler.api.command_line import package_version
+from fcsl_compiler.api.diagnostics import DiagnosticError
+from fcsl_compiler.api.packages import PackageNotFound
 from fcsl_sim.errors import SimError
 from simclient.errors import MapError, TwinError, ViewError
 

@@ -9,7 +9,7 @@ from dataclasses import dataclass, replace
 from geometry_msgs.msg import TransformStamped
 from rclpy.node import Node
 
-from fcsl_compiler.ros.standard_messages import STANDARD, short_name
+from fcsl_compiler.api.ros import STANDARD, short_name
 from simclient.errors import did_you_mean
 from simclient.ros.composer import Composer, Source
 from simclient.view.views import Frame, views_or_remark

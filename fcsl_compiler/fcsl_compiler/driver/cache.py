@@ -30,6 +30,11 @@ from .toolchain import (
     unwritten,
 )
 
+#: The files that decide how build_shared() makes a library.
+SHARED_RULES = tuple(
+    Path(__file__).with_name(f"{name}.py") for name in ("cache", "c_dependencies", "symbols", "toolchain")
+)
+
 
 class BuiltMachine(NamedTuple):
     """A compiled machine: its library, its name within the library, and its source hash (hex)."""

@@ -9,7 +9,7 @@ from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
-from fcsl_compiler.base.packages import PackageNotFound, package_prefix
+from fcsl_compiler.api.packages import PackageNotFound, package_prefix
 
 from .errors import TwinError
 

@@ -30,7 +30,7 @@ def find_config(path: str | Path, caller: str = "", what: str = "machine config"
 
 def check_backend(backend: str) -> None:
     """Raises TwinError if there is no such backend."""
-    from fcsl_compiler.model.choices import BACKENDS
+    from fcsl_compiler.api.build import BACKENDS
 
     if backend not in BACKENDS:
         raise TwinError(f"backend={backend!r}: one of {', '.join(BACKENDS)} wanted")
@@ -44,7 +44,7 @@ def build_config(
     Returns its library and the machine's name. Raises TwinError.
     """
     config = find_config(path)
-    from fcsl_compiler.driver.cache import build_machine
+    from fcsl_compiler.api.build import build_machine
 
     check_backend(backend)
     try:
@@ -56,7 +56,7 @@ def build_config(
 
 def _refusals() -> tuple[type[Exception], ...]:
     """The compiler's errors. Their module is imported where one was raised, not for a machine of the cache."""
-    from fcsl_compiler.base.diagnostics import DiagnosticError
-    from fcsl_compiler.driver.toolchain import ToolchainError
+    from fcsl_compiler.api.build import ToolchainError
+    from fcsl_compiler.api.diagnostics import DiagnosticError
 
     return DiagnosticError, ToolchainError

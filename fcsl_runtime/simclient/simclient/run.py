@@ -406,7 +406,7 @@ def open_run(library: Path, machine: str | None) -> Run:
 
     Raises TwinError, also if it is older than its sources.
     """
-    from fcsl_compiler.driver.record import StaleBuild, check_record
+    from fcsl_compiler.api.build import StaleBuild, check_record
 
     if not library.is_file():
         raise TwinError(f"{library}: no such machine library")

@@ -17,7 +17,7 @@ from typing import Any
 
 import numpy as np
 
-from fcsl_compiler.base.files import SourceError, open_regular
+from fcsl_compiler.api.files import SourceError, open_regular
 
 from ..errors import SimError
 

@@ -9,7 +9,7 @@ import math
 from dataclasses import dataclass, replace
 from pathlib import Path
 
-from fcsl_compiler.model.types import scalar_of
+from fcsl_compiler.api.types import scalar_of
 from simclient.errors import TwinError
 from simclient.twin.trace import Columns, merged, places
 

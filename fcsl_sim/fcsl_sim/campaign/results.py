@@ -13,8 +13,7 @@ from typing import Any
 
 import numpy as np
 
-from fcsl_compiler.base.files import digest
-from fcsl_compiler.base.json_file import read_json
+from fcsl_compiler.api.files import digest, read_json
 
 from ..errors import SimError
 from .case_rows import GROUP_ROWS, TEXT_BYTES, CaseRows, temporary_of, written_whole

@@ -9,13 +9,10 @@ from dataclasses import dataclass
 from fractions import Fraction
 from pathlib import Path
 
-from fcsl_compiler.base.diagnostics import DiagnosticSink, nearest
-from fcsl_compiler.base.files import SourceError
-from fcsl_compiler.base.source import SourceFile, Span
-from fcsl_compiler.model.types import Scalar, scalar_of, shape_of
-from fcsl_compiler.parse.json_reader import ConfigReader
-from fcsl_compiler.parse.json_source import JsonNode, parse_json
-from fcsl_compiler.parse.source_path import SourcePathError, resolve_source
+from fcsl_compiler.api.diagnostics import DiagnosticSink, SourceFile, Span, nearest
+from fcsl_compiler.api.files import SourceError
+from fcsl_compiler.api.json_files import ConfigReader, JsonNode, SourcePathError, parse_json, resolve_source
+from fcsl_compiler.api.types import Scalar, scalar_of, shape_of
 from simclient.descriptor import Machine
 
 from ..config import SimConfig, load

@@ -16,7 +16,7 @@ import time
 from dataclasses import astuple
 from pathlib import Path
 
-from fcsl_compiler.base.diagnostics import DiagnosticError
+from fcsl_compiler.api.diagnostics import DiagnosticError
 from simclient.errors import TwinError
 
 from ..errors import SimError

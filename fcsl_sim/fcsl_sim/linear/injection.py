@@ -10,9 +10,8 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
-from fcsl_compiler.base.diagnostics import DiagnosticSink, nearest
-from fcsl_compiler.base.source import SourceFile
-from fcsl_compiler.parse.json_source import JsonNode
+from fcsl_compiler.api.diagnostics import DiagnosticSink, SourceFile, nearest
+from fcsl_compiler.api.json_files import JsonNode
 from simclient.descriptor import Machine
 
 from ..config import MAX_SECONDS, SimConfig

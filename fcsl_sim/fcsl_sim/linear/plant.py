@@ -13,8 +13,8 @@ from typing import Any, Self
 
 import numpy as np
 
-from fcsl_compiler.base.diagnostics import nearest
-from fcsl_compiler.model.types import scalar_of, shape_of
+from fcsl_compiler.api.diagnostics import nearest
+from fcsl_compiler.api.types import scalar_of, shape_of
 
 from ..config import SimConfig
 from ..element_path import place_of, split_path

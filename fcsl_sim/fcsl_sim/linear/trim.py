@@ -12,13 +12,10 @@ from typing import Any
 
 import numpy as np
 
-from fcsl_compiler.base.diagnostics import DiagnosticSink
-from fcsl_compiler.base.files import SourceError, write_whole
-from fcsl_compiler.base.source import SourceFile
-from fcsl_compiler.model.types import shape_of
-from fcsl_compiler.parse.json_reader import ConfigReader
-from fcsl_compiler.parse.json_source import JsonNode, parse_json
-from fcsl_compiler.parse.source_path import SourcePathError, resolve_source
+from fcsl_compiler.api.diagnostics import DiagnosticSink, SourceFile
+from fcsl_compiler.api.files import SourceError, write_whole
+from fcsl_compiler.api.json_files import ConfigReader, JsonNode, SourcePathError, parse_json, resolve_source
+from fcsl_compiler.api.types import shape_of
 
 from ..config import SimConfig, load
 from ..element_path import split_path

@@ -21,7 +21,7 @@ from contextlib import ExitStack
 from decimal import Decimal, InvalidOperation
 from pathlib import Path
 
-from fcsl_compiler.base.version import add_version
+from fcsl_compiler.api.command_line import add_version
 
 from ..cli import MSG_PATH_HELP, TIME_HELP, completeness, run_tool
 from ..complete_output import check_target

@@ -11,7 +11,7 @@ from typing import Any
 from rosbags.interfaces import Nodetype
 from rosbags.typesys import Stores, get_types_from_msg, get_typestore
 
-from fcsl_compiler.base.packages import PackageNotFound, package_share
+from fcsl_compiler.api.packages import PackageNotFound, package_share
 
 from ..errors import BagError
 

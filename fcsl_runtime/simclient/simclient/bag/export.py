@@ -21,7 +21,7 @@ from typing import Any
 
 import numpy as np
 
-from fcsl_compiler.model.ros_names import recorded_path
+from fcsl_compiler.api.ros_names import recorded_path
 
 from ..cli import Progress
 from ..complete_output import check_target, complete_or_absent

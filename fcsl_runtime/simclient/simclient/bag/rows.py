@@ -7,7 +7,7 @@ from collections.abc import Collection, Iterator
 
 import numpy as np
 
-from fcsl_compiler.model.ros_names import ros_field
+from fcsl_compiler.api.ros_names import ros_field
 
 from ..errors import BagError
 from ..ros.cdr import Layout

@@ -10,7 +10,7 @@ from ctypes import byref
 from dataclasses import dataclass, field
 from pathlib import Path
 
-from fcsl_compiler.board.pulses import Line
+from fcsl_compiler.api.board import Line
 
 from ..c_run import CError
 from ..errors import TwinError, did_you_mean

@@ -17,8 +17,8 @@ from itertools import count, islice
 from pathlib import Path
 from typing import Any
 
-from fcsl_compiler.base.json_file import read_json
-from fcsl_compiler.base.version import add_version
+from fcsl_compiler.api.command_line import add_version
+from fcsl_compiler.api.files import read_json
 
 from ..errors import BusError, did_you_mean
 from ..vars.show import jsonable, show_value, table, with_unit

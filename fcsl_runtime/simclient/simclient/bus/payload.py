@@ -55,8 +55,7 @@ class Payload:
 
     @cached_property
     def _reader(self) -> Reader:
-        from fcsl_compiler.ros.reader import Pick
-        from fcsl_compiler.ros.standard_messages import STANDARD, full_name
+        from fcsl_compiler.api.ros import STANDARD, Pick, full_name
 
         from ..ros.reader import Reader
 
@@ -69,8 +68,7 @@ class Payload:
 
     @cached_property
     def _composer(self) -> Composer:
-        from fcsl_compiler.ros.composer import Source
-        from fcsl_compiler.ros.standard_messages import STANDARD, full_name
+        from fcsl_compiler.api.ros import STANDARD, Source, full_name
 
         from ..ros.composer import Composer
 

@@ -7,9 +7,8 @@ import json
 from collections.abc import Iterator, Mapping
 from typing import Any
 
-from fcsl_compiler.base.diagnostics import DiagnosticSink
-from fcsl_compiler.base.source import SourceFile
-from fcsl_compiler.parse.json_source import JsonNode, parse_json
+from fcsl_compiler.api.diagnostics import DiagnosticSink, SourceFile
+from fcsl_compiler.api.json_files import JsonNode, parse_json
 
 #: Members by key: objects are merged, anything else replaces what is there.
 Changes = Mapping[str, Any]

@@ -6,12 +6,10 @@ from __future__ import annotations
 from dataclasses import dataclass
 from pathlib import Path
 
-from fcsl_compiler.base.diagnostics import DiagnosticError, DiagnosticSink
-from fcsl_compiler.base.files import SourceError, read_regular, write_whole
-from fcsl_compiler.base.source import SourceFile
-from fcsl_compiler.board.backends import Backend
-from fcsl_compiler.board.board import check_board
-from fcsl_compiler.parse.json_source import JsonNode, parse_json
+from fcsl_compiler.api.board_files import Backend, check_board
+from fcsl_compiler.api.diagnostics import DiagnosticError, DiagnosticSink, SourceFile
+from fcsl_compiler.api.files import SourceError, read_regular, write_whole
+from fcsl_compiler.api.json_files import JsonNode, parse_json
 
 from ..errors import TwinError, did_you_mean
 from .board_edit import Changes, changed_text

@@ -8,7 +8,7 @@ import math
 import sys
 from collections.abc import Callable, Sequence
 
-from fcsl_compiler.base.version import add_version
+from fcsl_compiler.api.command_line import add_version
 
 from ..errors import TwinError
 from .errors import Refused

@@ -9,7 +9,7 @@ from collections.abc import Iterator, Sequence
 
 import numpy as np
 
-from fcsl_compiler.board.kinds import KINDS
+from fcsl_compiler.api.board import KINDS
 
 from ..errors import TwinError
 from .board_file import Target

@@ -11,8 +11,7 @@ from pathlib import Path
 
 import numpy as np
 
-from fcsl_compiler.board.kinds import KINDS
-from fcsl_compiler.board.rotations import IDENTITY
+from fcsl_compiler.api.board import IDENTITY, KINDS
 
 from ..board.plan import Backend, Correction, Output, Plan, Pulse, Sensor, read_plan
 from ..vars.show import jsonable, table

@@ -6,7 +6,7 @@ from __future__ import annotations
 import math
 from typing import Any
 
-from fcsl_compiler.board.kinds import KINDS
+from fcsl_compiler.api.board import KINDS
 
 from ..vars.show import table, with_unit
 from .describe import show_numbers

@@ -11,7 +11,7 @@ from dataclasses import dataclass
 from itertools import accumulate
 from typing import Any
 
-from fcsl_compiler.board.kinds import KINDS
+from fcsl_compiler.api.board import KINDS
 
 from ..board.frontends import Frontends
 from ..board.native import why_text

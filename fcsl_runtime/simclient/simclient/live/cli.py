@@ -14,7 +14,7 @@ from collections.abc import Callable, Sequence
 from typing import TYPE_CHECKING
 from urllib.parse import urlsplit
 
-from fcsl_compiler.base.version import add_version
+from fcsl_compiler.api.command_line import add_version
 
 from ..cli import VIEWS_HELP
 from ..errors import ViewError

@@ -17,7 +17,7 @@ import sys
 from collections.abc import Sequence
 from pathlib import Path
 
-from fcsl_compiler.base.version import add_version
+from fcsl_compiler.api.command_line import add_version
 
 from ..bag.formats import open_bag
 from ..cli import MSG_PATH_HELP, completeness, run_tool

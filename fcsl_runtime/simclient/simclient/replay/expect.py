@@ -12,9 +12,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from fcsl_compiler.ros.message_fields import Kind
-from fcsl_compiler.ros.plan import PlanError
-from fcsl_compiler.ros.rows import select_all
+from fcsl_compiler.api.ros import Kind, PlanError, select_all
 
 from ..bag import Bag, field_value
 from ..descriptor import Machine

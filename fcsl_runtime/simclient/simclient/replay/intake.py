@@ -9,7 +9,7 @@ from functools import cache
 
 import numpy as np
 
-from fcsl_compiler.ros.reader import Pick
+from fcsl_compiler.api.ros import Pick
 
 from ..bag import Bag, Topic
 from ..bag.definitions import declarations

@@ -57,8 +57,8 @@ from typing import Any
 
 import yaml
 
-from fcsl_compiler.board.rotations import NAMED, from_angles, matrix_problem
-from fcsl_compiler.ros.message_fields import QUATERNION_AXES, VECTOR_AXES
+from fcsl_compiler.api.board import NAMED, from_angles, matrix_problem
+from fcsl_compiler.api.ros import QUATERNION_AXES, VECTOR_AXES
 
 from ..errors import MapError, did_you_mean
 

@@ -8,9 +8,7 @@ import weakref
 from collections.abc import Sequence
 from ctypes import byref
 
-from fcsl_compiler.ros.composer import Source, composer_plan
-from fcsl_compiler.ros.plan import PlanError
-from fcsl_compiler.ros.standard_messages import Definitions
+from fcsl_compiler.api.ros import Definitions, PlanError, Source, composer_plan
 
 from ..errors import MapError, TwinError
 from . import native

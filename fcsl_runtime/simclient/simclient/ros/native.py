@@ -11,7 +11,7 @@ from ctypes import c_void_p as ptr
 from pathlib import Path
 from typing import Any
 
-from fcsl_compiler.ros.plan import ComposerPlan, ReaderPlan, Term
+from fcsl_compiler.api.ros import ComposerPlan, ReaderPlan, Term
 
 from ..c_run import CError
 from ..library import bind_runtime, runtime_library

@@ -12,9 +12,7 @@ from typing import Any
 
 import numpy as np
 
-from fcsl_compiler.ros.plan import PlanError, ReaderPlan
-from fcsl_compiler.ros.reader import Pick, has_stamp, reader_plan
-from fcsl_compiler.ros.standard_messages import Definitions
+from fcsl_compiler.api.ros import Definitions, Pick, PlanError, ReaderPlan, has_stamp, reader_plan
 
 from ..errors import MapError, TwinError
 from . import native

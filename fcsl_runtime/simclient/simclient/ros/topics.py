@@ -10,9 +10,7 @@ import weakref
 from ctypes import byref, c_uint32
 from dataclasses import dataclass
 
-from fcsl_compiler.ros.composer import Source
-from fcsl_compiler.ros.reader import Pick
-from fcsl_compiler.ros.standard_messages import STANDARD, full_name
+from fcsl_compiler.api.ros import STANDARD, Pick, Source, full_name
 
 from ..c_run import CError
 from ..descriptor import Channel, Machine

@@ -7,7 +7,7 @@ from typing import Any
 
 from rosbags.interfaces import Nodetype
 
-from fcsl_compiler.ros.standard_messages import Definitions, Member
+from fcsl_compiler.api.ros import Definitions, Member
 
 
 def definitions_of(fielddefs: Any) -> Definitions:

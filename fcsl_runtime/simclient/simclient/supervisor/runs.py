@@ -14,7 +14,7 @@ from concurrent.futures import ThreadPoolExecutor
 from pathlib import Path
 from typing import Any
 
-from fcsl_compiler.base.packages import PackageNotFound, package_prefix
+from fcsl_compiler.api.packages import PackageNotFound, package_prefix
 
 from ..errors import TwinError
 from ..private_folder import PrivateFolder

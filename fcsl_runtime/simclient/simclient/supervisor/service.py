@@ -16,7 +16,7 @@ import uvicorn
 from starlette.applications import Starlette
 from starlette.concurrency import run_in_threadpool
 
-from fcsl_compiler.base.version import add_version
+from fcsl_compiler.api.command_line import add_version
 
 from ..errors import TwinError
 from .app import make_app

@@ -61,7 +61,7 @@ def _named(node: Any) -> tuple[Path, int]:
     found = path if path.is_absolute() or path.is_file() else node.path.parent / path
     cases = mark.kwargs.get("cases")
     if cases is None:
-        from fcsl_compiler.base.json_file import read_json  # here, because every pytest loads this file
+        from fcsl_compiler.api.files import read_json  # here, because every pytest loads this file
 
         try:
             cases = read_json(found)["cases"]

@@ -24,7 +24,7 @@ from .pytest_twins import fcsl_sim as fcsl_sim
 from .pytest_twins import pytest_runtest_makereport as pytest_runtest_makereport
 
 if TYPE_CHECKING:
-    from fcsl_compiler.coverage.report import Report
+    from fcsl_compiler.api.coverage import Report
 
 
 def pytest_addoption(parser: pytest.Parser) -> None:
@@ -68,9 +68,7 @@ class _Coverage:
     """Measures coverage from start to end of the session, in this process and its child processes."""
 
     def __init__(self, config: pytest.Config):
-        from fcsl_compiler.coverage.probe_map import CoverError
-        from fcsl_compiler.coverage.report import parse_limits, refuse_foreign
-        from fcsl_compiler.coverage.settings import COVER_DIR
+        from fcsl_compiler.api.coverage import COVER_DIR, CoverError, parse_limits, refuse_foreign
 
         try:
             self._limits = parse_limits(config.getoption("--fcsl-cover-fail-under"))
@@ -98,9 +96,8 @@ class _Coverage:
         self._folder = Path(os.environ[COVER_DIR])
 
     def pytest_sessionfinish(self, session: pytest.Session) -> None:
-        from fcsl_compiler.base.files import write_whole
-        from fcsl_compiler.coverage.probe_map import CoverError
-        from fcsl_compiler.coverage.report import make_report
+        from fcsl_compiler.api.coverage import CoverError, make_report
+        from fcsl_compiler.api.files import write_whole
 
         try:
             self._report = make_report(self._folder, self._configs)
@@ -124,7 +121,7 @@ class _Coverage:
             terminalreporter.write_line(f"--fcsl-cover: {failure}", red=True)
 
     def pytest_unconfigure(self) -> None:
-        from fcsl_compiler.coverage.settings import COVER_DIR
+        from fcsl_compiler.api.coverage import COVER_DIR
 
         if self._own is not None:
             os.environ.pop(COVER_DIR, None)

@@ -20,8 +20,7 @@ from ..errors import TwinError
 from ..run import Run
 
 if TYPE_CHECKING:
-    from fcsl_compiler.reference.fault_places import Place
-    from fcsl_compiler.reference.machine import ReferenceMachine
+    from fcsl_compiler.api.reference import Place, ReferenceMachine
 
 
 class CHardware(Structure):
@@ -233,12 +232,9 @@ def open_python_run(
 
     `instances`: those of a subset machine. Raises TwinError.
     """
-    from fcsl_compiler.base.diagnostics import DiagnosticError
-    from fcsl_compiler.driver.externs import build_externs
-    from fcsl_compiler.driver.passes import compile_machine
-    from fcsl_compiler.driver.toolchain import ToolchainError, toolchain
-    from fcsl_compiler.reference.externs import externs_of
-    from fcsl_compiler.reference.machine import ReferenceMachine
+    from fcsl_compiler.api.build import ToolchainError, toolchain
+    from fcsl_compiler.api.diagnostics import DiagnosticError
+    from fcsl_compiler.api.reference import ReferenceMachine, build_externs, compile_machine, externs_of
 
     try:
         checked = compile_machine(config, toolchain(), until="schedule", target=target, instances=instances).checked

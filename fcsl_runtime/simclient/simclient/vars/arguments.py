@@ -7,8 +7,7 @@ import argparse
 from collections.abc import Callable
 from functools import partial
 
-from fcsl_compiler.base.command import Command
-from fcsl_compiler.base.version import add_version
+from fcsl_compiler.api.command_line import Command, add_version
 
 #: Adds the options of a command.
 Fill = Callable[[argparse.ArgumentParser], object]

@@ -10,7 +10,7 @@ from dataclasses import dataclass, field
 from fnmatch import fnmatchcase
 from itertools import product
 
-from fcsl_compiler.model.ros_names import recorded_path
+from fcsl_compiler.api.ros_names import recorded_path
 
 from ..ros.cdr import Layout
 

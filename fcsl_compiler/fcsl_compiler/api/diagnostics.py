@@ -1,0 +1,15 @@
+# SPDX-License-Identifier: Apache-2.0
+"""Diagnostics, and the places in source texts that they show."""
+
+from ..base.diagnostics import Diagnostic, DiagnosticError, DiagnosticSink, Severity, nearest
+from ..base.source import SourceFile, Span
+
+__all__ = [
+    "Diagnostic",
+    "DiagnosticError",
+    "DiagnosticSink",
+    "Severity",
+    "SourceFile",
+    "Span",
+    "nearest",
+]

@@ -1,0 +1,16 @@
+# SPDX-License-Identifier: Apache-2.0
+"""JSON files as text with places, readers that report what is wrong in them, paths that they give."""
+
+from ..parse.json_reader import ConfigReader, Everything
+from ..parse.json_source import JsonNode, Member, parse_json
+from ..parse.source_path import SourcePathError, resolve_source
+
+__all__ = [
+    "ConfigReader",
+    "Everything",
+    "JsonNode",
+    "Member",
+    "SourcePathError",
+    "parse_json",
+    "resolve_source",
+]

@@ -1,0 +1,16 @@
+# SPDX-License-Identifier: Apache-2.0
+"""The reference, which runs a machine in CPython, and what it needs of the compiler."""
+
+from ..driver.externs import build_externs
+from ..driver.passes import compile_machine
+from ..reference.externs import externs_of
+from ..reference.fault_places import Place
+from ..reference.machine import ReferenceMachine
+
+__all__ = [
+    "Place",
+    "ReferenceMachine",
+    "build_externs",
+    "compile_machine",
+    "externs_of",
+]
