@@ -3,7 +3,9 @@
 
 from __future__ import annotations
 
+import os
 import re
+import subprocess
 from pathlib import Path
 from typing import Any
 
@@ -100,6 +102,17 @@ def test_help(domain: Domain, executable: str, options: tuple[Option, ...], word
     process = domain.run([package_prefix("fcsl_bridge") / "lib/fcsl_bridge" / executable, word])
     assert process.finish() == 0 and process.err == ""
     assert all(f"  {option.name} " in process.out and option.doc in process.out for option in options)
+
+
+@pytest.mark.parametrize("word", ["--help", "--version"])
+def test_help_that_nobody_reads(word: str) -> None:
+    """As by `| head`: the pipe is closed before anything is written."""
+    read_end, write_end = os.pipe()
+    os.close(read_end)
+    node = [package_prefix("fcsl_bridge") / "lib/fcsl_bridge" / CONTROLLER, word]
+    done = subprocess.run(node, stdout=write_end, stderr=subprocess.PIPE, text=True, check=False, timeout=60)
+    os.close(write_end)
+    assert done.stderr == "" and done.returncode == 1
 
 
 def test_bad_ros_arguments(domain: Domain) -> None:

@@ -88,15 +88,15 @@ def run_node(
 
     `-h` and `--help` print the options, `--version` name and version, and do nothing else.
     """
-    if any(word in ("-h", "--help") for word in sys.argv[1:]):
-        print(_help(name, options))
-        return 0
-    if "--version" in sys.argv[1:]:
-        print(f"{name} {package_version('fcsl_bridge', __file__)}")
-        return 0
     stop = Stop()
     node = None
     try:
+        if any(word in ("-h", "--help") for word in sys.argv[1:]):
+            print(_help(name, options), flush=True)
+            return 0
+        if "--version" in sys.argv[1:]:
+            print(f"{name} {package_version('fcsl_bridge', __file__)}", flush=True)
+            return 0
         _refuse_arguments(sys.argv[1:])
         os.environ.update(loopback_environment(os.environ))
         rclpy.init(args=sys.argv, signal_handler_options=SignalHandlerOptions.NO)
