@@ -96,9 +96,10 @@ def bags(library: Path, tmp_path_factory: pytest.TempPathFactory) -> Path:
         begin("fcsl-sim", "run", SIM, "--external", f"zenoh:{control}", "--speed", "10")
         fc = begin("fcsl-fc", *line, "--paused", "--record", folder / "own")
         wait_until(socket.exists)
-        recorder = begin(*RECORD, "-c", mirror, "-o", folder / "bag")
-        assert recorder.stdout and recorder.stdout.readline().startswith("recording lander_control to ")
         with VarClient(socket) as client:
+            client.pause()  # it answers when all is open, the observers' bus too
+            recorder = begin(*RECORD, "-c", mirror, "-o", folder / "bag")
+            assert recorder.stdout and recorder.stdout.readline().startswith("recording lander_control to ")
             while not select.select([recorder.stdout], [], [], 0.05)[0]:
                 client.pause()  # once more: what is published then has the first checkpoint
             client.resume()
