@@ -32,9 +32,9 @@ def written_before_fault(function: ir.Function) -> Written:
     return frozenset(_places(function)) - PULSES - {ir.variable(u.part) for u in function.undone}
 
 
-def writes_of_undone(function: ir.Function) -> dict[Field, list[ir.Assign]]:
-    """Large fields of which a fault can restore single parts, with all that writes to them: few assignments to parts,
-    outside loops."""
+def undoable_writes(function: ir.Function) -> dict[Field, list[ir.Assign]]:
+    """Large fields of which a fault can restore single parts, with the assignments that write those parts: all writes to
+    the field, few and outside loops."""
     found: dict[Field, list[ir.Assign]] = {field: [] for field in _places(function)}
     for s, in_loop in _statements(function.body, False):
         for field in _target(s):
@@ -88,7 +88,7 @@ def rollback_bytes(function: ir.Function, ports: Mapping[str, Sequence[ir.Port]]
 def warn_copies(found: ir.Function, ports: Mapping[str, Sequence[ir.Port]], sink: DiagnosticSink) -> None:
     """W307: large fields that a fault would have to restore."""
     places = _places(found)
-    undone = writes_of_undone(found)
+    undone = undoable_writes(found)
     for record in ("outputs", "state"):
         for port in ports[record]:
             if (record, port.name) not in places or (record, port.name) in undone:

@@ -12,15 +12,15 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import replace
 
-from ..check.fault_points import writes_of_undone
+from ..check.fault_points import undoable_writes
 from ..model import ir
 from ..model.effects import can_fault
 from ..model.types import Type
 
 
 def with_undo(execute: ir.Function) -> ir.Function:
-    """Rewrites an `execute`. Returns it itself if nothing changes."""
-    writes = [w for written in writes_of_undone(execute).values() for w in written]
+    """Rewrites an `execute`. Returns the same one if nothing changes."""
+    writes = [w for written in undoable_writes(execute).values() for w in written]
     if not writes:
         return execute
     made = _Undo(writes, execute.body)
