@@ -6,6 +6,7 @@ from __future__ import annotations
 
 import os
 import re
+import resource
 import signal
 import subprocess
 import time
@@ -49,9 +50,18 @@ class Running:
     output: IO[bytes]
     process: subprocess.Popen[bytes]
     started: float
+    core_s: float = 0.0
 
     def seconds(self) -> float:
         return time.monotonic() - self.started
+
+    def over(self) -> bool:
+        """Whether it has ended; if so, `core_s` is the processor time that it and what it waited for took, seconds."""
+        before = _core_s_of_ended()
+        if self.process.poll() is None:
+            return False
+        self.core_s = _core_s_of_ended() - before
+        return True
 
     def end(self) -> None:
         """Like Ctrl-C, upon which a job ends what it has started."""
@@ -61,6 +71,11 @@ class Running:
         except subprocess.TimeoutExpired:
             self.process.kill()
             self.process.wait()
+
+
+def _core_s_of_ended() -> float:
+    spent = resource.getrusage(resource.RUSAGE_CHILDREN)
+    return spent.ru_utime + spent.ru_stime
 
 
 def say(text: str) -> None:
@@ -86,7 +101,7 @@ def ended(one: Running) -> bool:
     """Says how a job ended; whether it succeeded."""
     one.output.close()
     if one.process.returncode == 0:
-        say(f"{one.job.label}: done in {one.seconds():.0f} s")
+        say(f"{one.job.label}: done in {one.seconds():.0f} s ({one.core_s:.0f} s of a core)")
         return True
     if one.process.returncode == LEFT_OUT:
         say(f"{one.job.label}: left out: {''.join(one.job.last_lines(1))}")
@@ -108,7 +123,7 @@ def run_all(jobs: Sequence[Job], at_once: int, limit_s: float) -> list[Job]:
             for one in [r for r in running if r.seconds() > limit_s]:
                 say(f"{one.job.label}: not over after {limit_s:.0f} s, ended")
                 one.end()
-            for one in [r for r in running if r.process.poll() is not None]:
+            for one in [r for r in running if r.over()]:
                 running.remove(one)
                 if not ended(one):
                     failed.append(one.job)
