@@ -51,7 +51,7 @@ int main(int argc, char **argv)
             CHECK(fcsl_bus_post(bus, 0, message, size) == 0);
         }
         alive = fcsl_bus_alive(bus, 0) > alive ? fcsl_bus_alive(bus, 0) : alive;
-        (void)fcsl_bus_wait(bus, now_ns() + LOOK_NS);
+        (void)fcsl_bus_wait(bus, fcsl_monotonic_ns() + LOOK_NS);
     }
     const fcsl_bus_counters_t counters = counted(bus);
     (void)printf("{\"received\": %" PRIu64 ", \"wrong_size\": %" PRIu64 ", \"deletions\": %" PRIu64

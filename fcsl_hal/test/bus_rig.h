@@ -13,10 +13,10 @@
 #include <sys/prctl.h>
 #include <sys/socket.h>
 #include <sys/wait.h>
-#include <time.h>
 #include <unistd.h>
 
 #include "fcsl/fcsl_bus.h"
+#include "fcsl/fcsl_monotonic.h"
 #include "fcsl_check.h"
 
 #ifdef __SANITIZE_ADDRESS__
@@ -32,16 +32,9 @@ int __lsan_is_turned_off(void)
 /* Long: the machine may be busy. */
 enum { LONG_S = 90, LONG_MS = 90000, CLOSE_MS = 20000, RING_BYTES = 1 << 16 };
 
-static inline uint64_t now_ns(void)
-{
-    struct timespec now;
-    CHECK(clock_gettime(CLOCK_MONOTONIC, &now) == 0);
-    return (uint64_t)now.tv_sec * 1000000000u + (uint64_t)now.tv_nsec;
-}
-
 static inline uint64_t later_ns(void)
 {
-    return now_ns() + LONG_S * UINT64_C(1000000000);
+    return fcsl_monotonic_ns() + (uint64_t)LONG_S * FCSL_NS_PER_S;
 }
 
 /* A TCP socket bound to a free port of 127.0.0.1. */
@@ -91,8 +84,8 @@ static inline fcsl_bus_counters_t counted(const fcsl_bus_t *bus)
 /* Waits until the condition holds; what it tells of changes by itself. */
 #define WAIT_UNTIL(bus, condition)                                                                                     \
     for (const uint64_t give_up_ns = later_ns(); !(condition);) {                                                      \
-        CHECK(now_ns() < give_up_ns);                                                                                  \
-        (void)fcsl_bus_wait(bus, now_ns() + 20000000u);                                                                \
+        CHECK(fcsl_monotonic_ns() < give_up_ns);                                                                       \
+        (void)fcsl_bus_wait(bus, fcsl_monotonic_ns() + 20000000u);                                                     \
     }
 
 /* The next message of an input, which is `bytes` long. */
@@ -101,7 +94,7 @@ static inline void take_one(fcsl_bus_t *bus, uint32_t input, void *bytes, size_t
     size_t size = 0;
     const uint64_t give_up_ns = later_ns();
     while (!fcsl_bus_take(bus, input, bytes, &size)) {
-        CHECK(now_ns() < give_up_ns);
+        CHECK(fcsl_monotonic_ns() < give_up_ns);
         (void)fcsl_bus_wait(bus, give_up_ns);
     }
     CHECK(size == bytes_size);

@@ -11,7 +11,7 @@
 #include <stdlib.h>
 #include <string.h>
 
-#include "base/monotonic.h"
+#include "fcsl/fcsl_monotonic.h"
 #include "fcsl/fcsl_driver.h"
 #include "fcsl_check.h"
 
@@ -61,11 +61,11 @@ static inline fcsl_driver_status_t rig_read(rig_t *rig)
 {
     const uint32_t at = rig->driver->input;
     memset(rig->self + at, 0, at != 0u ? sizeof(fcsl_driver_input_t) : 0u);
-    const uint64_t before_ns = monotonic_ns();
+    const uint64_t before_ns = fcsl_monotonic_ns();
     const uint64_t last_ns = rig->sample_ns;
     rig->why[0] = '\0';
     const fcsl_driver_status_t status = rig->driver->read(rig->self, &rig->sample_ns, rig->why, sizeof rig->why);
-    rig->took_ns = monotonic_ns() - before_ns;
+    rig->took_ns = fcsl_monotonic_ns() - before_ns;
     if (at != 0u) {
         rig_add_input(rig);
     }
@@ -113,11 +113,11 @@ static inline int rig_is_silent(rig_t *rig)
 {
     enum { TRIES = 5, SILENT_MS = 200 };
     uint64_t shortest_ns = UINT64_MAX;
-    for (int i = 0; i < TRIES && shortest_ns >= (uint64_t)SILENT_MS * NS_PER_MS; i++) {
+    for (int i = 0; i < TRIES && shortest_ns >= (uint64_t)SILENT_MS * FCSL_NS_PER_MS; i++) {
         CHECK(rig_read(rig) == FCSL_DRIVER_NOTHING);
         shortest_ns = rig->took_ns < shortest_ns ? rig->took_ns : shortest_ns;
     }
-    return shortest_ns < (uint64_t)SILENT_MS * NS_PER_MS;
+    return shortest_ns < (uint64_t)SILENT_MS * FCSL_NS_PER_MS;
 }
 
 #endif /* FCSL_DRIVER_RIG_H */

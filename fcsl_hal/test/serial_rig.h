@@ -49,7 +49,7 @@ static inline void *serial_rig_send_parts(void *argument)
 {
     serial_parts_t *parts = argument;
     serial_rig_send(parts->line, parts->bytes, parts->first);
-    monotonic_wait(monotonic_ns() + 500000u);
+    fcsl_monotonic_wait(fcsl_monotonic_ns() + 500000u);
     serial_rig_send(parts->line, parts->bytes + parts->first, parts->size - parts->first);
     atomic_store(&parts->sent, 1);
     return NULL;

@@ -18,7 +18,7 @@
 #include <sys/syscall.h>
 #include <unistd.h>
 
-#include "base/monotonic.h"
+#include "fcsl/fcsl_monotonic.h"
 #include "drivers/drivers.h"
 #include "fcsl_check.h"
 

@@ -53,11 +53,11 @@ static void end(pid_t process, int number)
 static void fill_up(fcsl_bus_t *bus)
 {
     static const uint8_t message[MESSAGE_BYTES];
-    uint64_t put_ns = now_ns();
-    while (now_ns() - put_ns < STUCK_NS && fcsl_bus_matched(bus, 0)) {
+    uint64_t put_ns = fcsl_monotonic_ns();
+    while (fcsl_monotonic_ns() - put_ns < STUCK_NS && fcsl_bus_matched(bus, 0)) {
         const uint64_t before = counted(bus).put;
         const int refused = fcsl_bus_post(bus, 0, message, sizeof message);
-        put_ns = !refused || counted(bus).put != before ? now_ns() : put_ns;
+        put_ns = !refused || counted(bus).put != before ? fcsl_monotonic_ns() : put_ns;
     }
 }
 
@@ -70,23 +70,23 @@ static void post_to_a_frozen_peer(int observer)
     fcsl_bus_t *bus = open_client(endpoint, observer);
     WAIT_UNTIL(bus, fcsl_bus_matched(bus, 0) && fcsl_bus_alive(bus, 0) == 1);
     CHECK(kill(process, SIGSTOP) == 0);
-    const uint64_t stopped_ns = now_ns();
+    const uint64_t stopped_ns = fcsl_monotonic_ns();
     if (!observer) {
         fill_up(bus);
     }
-    const uint64_t posting_ns = now_ns();
+    const uint64_t posting_ns = fcsl_monotonic_ns();
     for (int i = 0; i < POSTS; i++) {
         (void)fcsl_bus_post(bus, 0, message, sizeof message);
     }
-    const uint64_t posted_ns = now_ns() - posting_ns;
+    const uint64_t posted_ns = fcsl_monotonic_ns() - posting_ns;
     CHECK(posted_ns < A_WHILE_NS / 2u);
     WAIT_UNTIL(bus, fcsl_bus_alive(bus, 0) == 0);
-    const uint64_t noticed_ns = now_ns() - stopped_ns;
+    const uint64_t noticed_ns = fcsl_monotonic_ns() - stopped_ns;
     WAIT_UNTIL(bus, !fcsl_bus_matched(bus, 0) && fcsl_bus_peers(bus) == 0);
     CHECK(noticed_ns < A_WHILE_NS);
-    const uint64_t closing_ns = now_ns();
+    const uint64_t closing_ns = fcsl_monotonic_ns();
     const int closed = fcsl_bus_close(bus, SOON_MS);
-    const uint64_t closed_ns = now_ns() - closing_ns;
+    const uint64_t closed_ns = fcsl_monotonic_ns() - closing_ns;
     CHECK(closed_ns < SOON_MS * UINT64_C(1000000) + A_WHILE_NS / 2u);
     (void)printf("%s, peer frozen: %d posts in %.1f ms, noticed after %.2f s, close gave %d after %.2f s\n",
                  observer ? "observer" : "control", POSTS, (double)posted_ns * 1e-6, (double)noticed_ns * 1e-9, closed,
@@ -113,9 +113,9 @@ static void test_closing_with_a_frozen_peer(void)
     WAIT_UNTIL(bus, fcsl_bus_matched(bus, 0));
     CHECK(kill(process, SIGSTOP) == 0);
     fill_up(bus);
-    const uint64_t closing_ns = now_ns();
+    const uint64_t closing_ns = fcsl_monotonic_ns();
     const int closed = fcsl_bus_close(bus, 200);
-    const uint64_t closed_ns = now_ns() - closing_ns;
+    const uint64_t closed_ns = fcsl_monotonic_ns() - closing_ns;
     CHECK(closed_ns < A_WHILE_NS / 2u);
     (void)printf("peer frozen, ring full: close gave %d after %.2f s\n", closed, (double)closed_ns * 1e-9);
     end(process, SIGKILL);
@@ -140,19 +140,19 @@ static void test_a_peer_that_is_killed_and_returns(void)
     const pid_t second = in_process(live_later, endpoint);
     fcsl_bus_t *bus = open_client(endpoint, 0);
     WAIT_UNTIL(bus, fcsl_bus_matched(bus, 0) && fcsl_bus_alive(bus, 0) == 1);
-    const uint64_t killed_ns = now_ns();
+    const uint64_t killed_ns = fcsl_monotonic_ns();
     end(first, SIGKILL);
     WAIT_UNTIL(bus, fcsl_bus_alive(bus, 0) == 0);
-    const uint64_t noticed_ns = now_ns() - killed_ns;
+    const uint64_t noticed_ns = fcsl_monotonic_ns() - killed_ns;
     CHECK(noticed_ns < A_WHILE_NS);
     WAIT_UNTIL(bus, !fcsl_bus_matched(bus, 0) && fcsl_bus_peers(bus) == 0);
     CHECK(fcsl_bus_post(bus, 0, message, sizeof message) == 0); /* to nobody: taken, and lost */
     WAIT_UNTIL(bus, counted(bus).put == 1);
-    const uint64_t started_ns = now_ns();
+    const uint64_t started_ns = fcsl_monotonic_ns();
     CHECK(write(may_start[1], "x", 1) == 1);
     WAIT_UNTIL(bus, fcsl_bus_matched(bus, 0) && fcsl_bus_alive(bus, 0) == 1 && fcsl_bus_peers(bus) == 1);
     (void)printf("peer killed: noticed after %.3f s; its successor found after %.2f s\n", (double)noticed_ns * 1e-9,
-                 (double)(now_ns() - started_ns) * 1e-9);
+                 (double)(fcsl_monotonic_ns() - started_ns) * 1e-9);
     const fcsl_bus_counters_t counters = counted(bus);
     CHECK(counters.connects == 2 && counters.disconnects == 1 && counters.put == 1 && counters.put_failed == 0);
     CHECK(fcsl_bus_close(bus, CLOSE_MS) == 0);

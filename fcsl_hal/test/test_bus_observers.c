@@ -82,14 +82,14 @@ static uint64_t fly_tick(fcsl_bus_t *control, fcsl_bus_t *mirror, uint64_t tick)
 {
     static const uint8_t copy[MIRROR_BYTES];
     uint64_t got = 0;
-    const uint64_t begun_ns = now_ns();
+    const uint64_t begun_ns = fcsl_monotonic_ns();
     CHECK(fcsl_bus_post(control, 0, &tick, sizeof tick) == 0);
     for (int i = 0; i < 4; i++) {
         (void)fcsl_bus_post(mirror, 0, copy, sizeof copy); /* refused when their ring is full */
     }
     take_one(control, 0, &got, sizeof got);
     CHECK(got == tick);
-    return now_ns() - begun_ns;
+    return fcsl_monotonic_ns() - begun_ns;
 }
 
 int main(void)

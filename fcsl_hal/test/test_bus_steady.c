@@ -87,7 +87,7 @@ static void step(fcsl_bus_t *bus, uint64_t tick, int waits)
     }
     const uint64_t deadline_ns = later_ns();
     while (!fcsl_bus_take(bus, 0, &got, &size)) {
-        CHECK(now_ns() < deadline_ns);
+        CHECK(fcsl_monotonic_ns() < deadline_ns);
         if (waits) {
             (void)fcsl_bus_wait(bus, deadline_ns);
         }

@@ -13,8 +13,8 @@ static void check_counts(void)
 {
     rig_t rig;
     CHECK(rig_open(&rig, adc, "ads1015", "counts3 counts9") == FCSL_DRIVER_OK);
-    const uint64_t before_ns = monotonic_ns();
-    CHECK(rig_read(&rig) == FCSL_DRIVER_OK && rig.sample_ns >= before_ns && rig.sample_ns <= monotonic_ns());
+    const uint64_t before_ns = fcsl_monotonic_ns();
+    CHECK(rig_read(&rig) == FCSL_DRIVER_OK && rig.sample_ns >= before_ns && rig.sample_ns <= fcsl_monotonic_ns());
     CHECK(value_at(&rig, "counts3", 0) == 2047.0 && value_at(&rig, "counts9", 0) == -12.0);
     put(ADC "in_voltage3_raw", "4095\n");
     CHECK(rig_read(&rig) == FCSL_DRIVER_OK && value_at(&rig, "counts3", 0) == 4095.0);

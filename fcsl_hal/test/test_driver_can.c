@@ -423,18 +423,18 @@ static void check_arrival(void)
     enum { WAIT_MS = 30 };
     static rig_t rig;
     open_device(&rig, "can0:1A0/0:8@1+", 1);
-    const uint64_t first_ns = monotonic_ns();
+    const uint64_t first_ns = fcsl_monotonic_ns();
     send_frame(0x1A0, 8, 1);
-    const uint64_t between_ns = monotonic_ns();
-    monotonic_wait(between_ns + WAIT_MS * NS_PER_MS);
-    const uint64_t second_ns = monotonic_ns();
+    const uint64_t between_ns = fcsl_monotonic_ns();
+    fcsl_monotonic_wait(between_ns + WAIT_MS * FCSL_NS_PER_MS);
+    const uint64_t second_ns = fcsl_monotonic_ns();
     send_frame(0x1A0, 8, 2);
-    const uint64_t end_ns = monotonic_ns();
-    monotonic_wait(end_ns + WAIT_MS * NS_PER_MS);
+    const uint64_t end_ns = fcsl_monotonic_ns();
+    fcsl_monotonic_wait(end_ns + WAIT_MS * FCSL_NS_PER_MS);
     CHECK(rig_read(&rig) == FCSL_DRIVER_OK && rig_value(&rig, "value0", 0) == 1.0);
-    CHECK(rig.sample_ns + NS_PER_MS > first_ns && rig.sample_ns < second_ns);
+    CHECK(rig.sample_ns + FCSL_NS_PER_MS > first_ns && rig.sample_ns < second_ns);
     CHECK(rig_read(&rig) == FCSL_DRIVER_OK && rig_value(&rig, "value0", 0) == 2.0);
-    CHECK(rig.sample_ns + NS_PER_MS > second_ns && rig.sample_ns < end_ns + WAIT_MS * NS_PER_MS);
+    CHECK(rig.sample_ns + FCSL_NS_PER_MS > second_ns && rig.sample_ns < end_ns + WAIT_MS * FCSL_NS_PER_MS);
     rig_close(&rig);
 }
 
@@ -446,8 +446,8 @@ static void check_no_arrival(void)
     open_device(&rig, "can0:1A0/0:8@1+", 1);
     kernel.no_time = 0;
     send_frame(0x1A0, 8, 1);
-    const uint64_t before_ns = monotonic_ns();
-    CHECK(rig_read(&rig) == FCSL_DRIVER_OK && rig.sample_ns > before_ns && rig.sample_ns <= monotonic_ns());
+    const uint64_t before_ns = fcsl_monotonic_ns();
+    CHECK(rig_read(&rig) == FCSL_DRIVER_OK && rig.sample_ns > before_ns && rig.sample_ns <= fcsl_monotonic_ns());
     rig_close(&rig);
 }
 

@@ -291,7 +291,7 @@ static void send_event(int device, uint16_t type, uint16_t code, int32_t value, 
 
 static void check_reports(rig_t *rig, int device)
 {
-    const uint64_t now_us = monotonic_ns() / NS_PER_US;
+    const uint64_t now_us = fcsl_monotonic_ns() / NS_PER_US;
     send_event(device, EV_ABS, ABS_X, 1024, now_us - 30u);
     send_event(device, EV_KEY, BTN_JOYSTICK, 1, now_us - 30u);
     send_event(device, EV_SYN, SYN_REPORT, 0, now_us - 30u);
@@ -310,7 +310,7 @@ static void check_reports(rig_t *rig, int device)
 /* Lost events: the state comes from the device. */
 static void check_resync(rig_t *rig, int device)
 {
-    const uint64_t now_us = monotonic_ns() / NS_PER_US;
+    const uint64_t now_us = fcsl_monotonic_ns() / NS_PER_US;
     kernel.axis[ABS_X].value = 256;
     kernel.axis[ABS_RZ].value = 768;
     set_bit(kernel.pressed, BTN_TRIGGER_HAPPY40, 0);
@@ -326,13 +326,14 @@ static void check_rest(rig_t *rig)
 {
     enum { REST_MS = 90, SILENT_MS = 200, TRIES = 5 };
     uint64_t shortest_ns = UINT64_MAX;
-    for (int i = 0; i < TRIES && shortest_ns >= (uint64_t)SILENT_MS * NS_PER_MS; i++) {
-        const uint64_t before_ns = monotonic_ns();
+    for (int i = 0; i < TRIES && shortest_ns >= (uint64_t)SILENT_MS * FCSL_NS_PER_MS; i++) {
+        const uint64_t before_ns = fcsl_monotonic_ns();
         CHECK(rig_read(rig) == FCSL_DRIVER_OK && sticks_are(rig, 1250.0, 1750.0, 1500.0, 1000.0, 1000.0));
-        CHECK(rig->sample_ns - before_ns >= (uint64_t)REST_MS * NS_PER_MS && rig->sample_ns <= monotonic_ns());
+        CHECK(rig->sample_ns - before_ns >= (uint64_t)REST_MS * FCSL_NS_PER_MS &&
+              rig->sample_ns <= fcsl_monotonic_ns());
         shortest_ns = rig->took_ns < shortest_ns ? rig->took_ns : shortest_ns;
     }
-    CHECK(shortest_ns < (uint64_t)SILENT_MS * NS_PER_MS);
+    CHECK(shortest_ns < (uint64_t)SILENT_MS * FCSL_NS_PER_MS);
 }
 
 static void check_driver(void)
@@ -349,7 +350,7 @@ static void check_driver(void)
     kernel.gone = 1; /* unplugged while nothing moves */
     CHECK(rig_read(&rig) == FCSL_DRIVER_ABSENT && strstr(rig.why, "No such device") != NULL);
     CHECK(close(device) == 0); /* and while it is read */
-    CHECK(rig_read(&rig) == FCSL_DRIVER_ABSENT && rig.took_ns < (uint64_t)FCSL_DRIVER_WAIT_MS * NS_PER_MS);
+    CHECK(rig_read(&rig) == FCSL_DRIVER_ABSENT && rig.took_ns < (uint64_t)FCSL_DRIVER_WAIT_MS * FCSL_NS_PER_MS);
     rig_close(&rig);
 }
 

@@ -100,10 +100,10 @@ static void check_ubx_time(void)
     CHECK(rig_open(&rig, &fcsl_driver_ubx, line.name) == FCSL_DRIVER_OK);
     serial_rig_send(&line, GARBAGE, sizeof GARBAGE);
     CHECK(rig_read(&rig) == FCSL_DRIVER_NOTHING);
-    const uint64_t begin_ns = monotonic_ns();
+    const uint64_t begin_ns = fcsl_monotonic_ns();
     serial_rig_send(&line, PVT, 1);
     CHECK(rig_read(&rig) == FCSL_DRIVER_NOTHING);
-    const uint64_t rest_ns = monotonic_ns();
+    const uint64_t rest_ns = fcsl_monotonic_ns();
     serial_rig_send(&line, PVT + 1, PVT_FRAME - 1);
     CHECK(rig_read(&rig) == FCSL_DRIVER_OK);
     CHECK(rig.sample_ns > begin_ns && rig.sample_ns < rest_ns);
@@ -119,15 +119,15 @@ static void check_hidden_ubx(void)
     CHECK(rig_open(&rig, &fcsl_driver_ubx, line.name) == FCSL_DRIVER_OK);
     serial_rig_send(&line, FALSE_HEAD, sizeof FALSE_HEAD);
     CHECK(rig_read(&rig) == FCSL_DRIVER_NOTHING);
-    const uint64_t begin_ns = monotonic_ns();
+    const uint64_t begin_ns = fcsl_monotonic_ns();
     serial_rig_send(&line, PVT, PVT_FRAME);
     CHECK(rig_read(&rig) == FCSL_DRIVER_NOTHING);
-    const uint64_t second_ns = monotonic_ns();
+    const uint64_t second_ns = fcsl_monotonic_ns();
     for (int i = 1; i < 10; i++) { /* 1006 bytes, 2 short of the message's end */
         serial_rig_send(&line, PVT, PVT_FRAME);
         CHECK(rig_read(&rig) == FCSL_DRIVER_NOTHING);
     }
-    const uint64_t end_ns = monotonic_ns();
+    const uint64_t end_ns = fcsl_monotonic_ns();
     serial_rig_send(&line, NO_FIX, 2);
     CHECK(rig_read(&rig) == FCSL_DRIVER_OK && rig.sample_ns > begin_ns && rig.sample_ns < second_ns);
     serial_rig_send(&line, NO_FIX + 2, PVT_FRAME - 2);
@@ -186,10 +186,10 @@ static void check_nmea_time(void)
     CHECK(rig_open(&rig, &fcsl_driver_nmea, line.name) == FCSL_DRIVER_OK);
     serial_rig_send(&line, NO_COURSE, sizeof GGA - 1); /* a GGA that stays alone */
     CHECK(rig_read(&rig) == FCSL_DRIVER_NOTHING);
-    const uint64_t begin_ns = monotonic_ns();
+    const uint64_t begin_ns = fcsl_monotonic_ns();
     serial_rig_send(&line, RMC, 1);
     CHECK(rig_read(&rig) == FCSL_DRIVER_NOTHING);
-    const uint64_t rest_ns = monotonic_ns();
+    const uint64_t rest_ns = fcsl_monotonic_ns();
     serial_rig_send(&line, RMC + 1, sizeof RMC - 2);
     CHECK(rig_read(&rig) == FCSL_DRIVER_NOTHING);
     serial_rig_send(&line, GGA, sizeof GGA - 1);

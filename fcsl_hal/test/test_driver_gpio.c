@@ -161,7 +161,7 @@ static void check_inputs(void)
     kernel.levels[0] = 1ull << 4 | 1ull << 63;
     CHECK(open_lines(&rig, &fcsl_driver_gpio, "pinctrl-test", (const uint32_t[]){3, 4, 63}, 3) == FCSL_DRIVER_OK);
     CHECK(flags_of_last() == GPIO_V2_LINE_FLAG_INPUT);
-    const uint64_t before_ns = monotonic_ns();
+    const uint64_t before_ns = fcsl_monotonic_ns();
     CHECK(rig_read(&rig) == FCSL_DRIVER_OK && rig.sample_ns >= before_ns);
     CHECK(value_at(&rig, "line3", 0) == 0.0 && value_at(&rig, "line4", 0) == 1.0 && value_at(&rig, "line63", 0) == 1.0);
     kernel.levels[0] = 1ull << 3;
@@ -254,7 +254,7 @@ static void check_return(void)
     kernel.levels[0] = 0;
     fcsl_driver_status_t status = FCSL_DRIVER_FAILED;
     for (int i = 0; i < 500 && status != FCSL_DRIVER_OK; i++) {
-        monotonic_wait(monotonic_ns() + 10u * NS_PER_MS);
+        fcsl_monotonic_wait(fcsl_monotonic_ns() + 10u * FCSL_NS_PER_MS);
         status = write_lines(&rig);
     }
     CHECK(status == FCSL_DRIVER_OK && kernel.levels[0] == 1ull << 1);

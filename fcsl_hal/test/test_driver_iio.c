@@ -58,9 +58,9 @@ static void check_units(void)
 {
     rig_t rig;
     CHECK(rig_open(&rig, iio, "icm42688", "gyro accel field temperature") == FCSL_DRIVER_OK);
-    const uint64_t before_ns = monotonic_ns();
+    const uint64_t before_ns = fcsl_monotonic_ns();
     CHECK(rig_read(&rig) == FCSL_DRIVER_OK);
-    CHECK(rig.sample_ns >= before_ns && rig.sample_ns <= monotonic_ns());
+    CHECK(rig.sample_ns >= before_ns && rig.sample_ns <= fcsl_monotonic_ns());
     CHECK(is_near(value_at(&rig, "gyro", 0), 1.064724) && is_near(value_at(&rig, "gyro", 1), -1.064724));
     CHECK(is_near(value_at(&rig, "gyro", 2), 0.007453068));
     CHECK(is_near(value_at(&rig, "accel", 0), (10.0 + 100.0) * 0.5));

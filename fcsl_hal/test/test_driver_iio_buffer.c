@@ -243,7 +243,7 @@ static void check_values(void)
 {
     uint8_t scan[SCAN_BYTES_MAX];
     rig_t rig;
-    const int64_t now_ns = (int64_t)monotonic_ns();
+    const int64_t now_ns = (int64_t)fcsl_monotonic_ns();
     CHECK(rig_open(&rig, iio_buffer, "imu@200", "accel temperature") == FCSL_DRIVER_OK);
     send(scan, fill(scan, 19, -21, INT16_MIN, -300, now_ns - 20));
     send(scan, fill(scan, 1, 2, 3, 2047, now_ns - 10));
@@ -254,9 +254,9 @@ static void check_values(void)
     CHECK(rig_read(&rig) == FCSL_DRIVER_OK && rig.sample_ns == (uint64_t)now_ns - 10u); /* one scan per read */
     CHECK(is_near(value_at(&rig, "temperature", 0), 204.7));
     CHECK(rig_read(&rig) == FCSL_DRIVER_OK && is_near(value_at(&rig, "temperature", 0), -204.8));
-    const uint64_t before_ns = monotonic_ns();
+    const uint64_t before_ns = fcsl_monotonic_ns();
     CHECK(rig_read(&rig) == FCSL_DRIVER_NOTHING);
-    CHECK(monotonic_ns() - before_ns >= (uint64_t)FCSL_DRIVER_WAIT_MS * NS_PER_MS - NS_PER_MS);
+    CHECK(fcsl_monotonic_ns() - before_ns >= (uint64_t)FCSL_DRIVER_WAIT_MS * FCSL_NS_PER_MS - FCSL_NS_PER_MS);
     rig_close(&rig);
 }
 
@@ -265,7 +265,7 @@ static void check_optional_signals(void)
     uint8_t scan[SCAN_BYTES_MAX];
     rig_t rig;
     CHECK(rig_open(&rig, iio_buffer, "imu@200", "accel temperature? pressure?") == FCSL_DRIVER_OK);
-    send(scan, fill(scan, 1, 2, 3, 10, (int64_t)monotonic_ns()));
+    send(scan, fill(scan, 1, 2, 3, 10, (int64_t)fcsl_monotonic_ns()));
     CHECK(rig_read(&rig) == FCSL_DRIVER_OK && value_at(&rig, "accel", 0) == 1.0);
     CHECK(is_near(value_at(&rig, "temperature", 0), 1.0) && isnan(value_at(&rig, "pressure", 0)));
     rig_close(&rig);
@@ -275,7 +275,7 @@ static void check_torn_scans(void)
 {
     uint8_t scan[SCAN_BYTES_MAX];
     rig_t rig;
-    const int64_t now_ns = (int64_t)monotonic_ns();
+    const int64_t now_ns = (int64_t)fcsl_monotonic_ns();
     CHECK(rig_open(&rig, iio_buffer, "imu@200", "accel temperature") == FCSL_DRIVER_OK);
     for (uint32_t part = 1; part < 16u; part++) {
         CHECK(fill(scan, 1, 2, 3, 4, now_ns) == 16u);
@@ -291,8 +291,8 @@ static void check_timestamps(void)
 {
     uint8_t scan[SCAN_BYTES_MAX];
     rig_t rig;
-    const int64_t now_ns = (int64_t)monotonic_ns();
-    const int64_t BAD[] = {0, -1, INT64_MIN, INT64_MAX, now_ns, now_ns - 1, now_ns + (int64_t)3600 * NS_PER_S};
+    const int64_t now_ns = (int64_t)fcsl_monotonic_ns();
+    const int64_t BAD[] = {0, -1, INT64_MIN, INT64_MAX, now_ns, now_ns - 1, now_ns + (int64_t)3600 * FCSL_NS_PER_S};
     CHECK(rig_open(&rig, iio_buffer, "imu@200", "accel temperature") == FCSL_DRIVER_OK);
     send(scan, fill(scan, 1, 2, 3, 4, now_ns));
     CHECK(rig_read(&rig) == FCSL_DRIVER_OK);
@@ -319,7 +319,7 @@ static void check_end(void)
     uint8_t scan[SCAN_BYTES_MAX];
     rig_t rig;
     CHECK(rename(in_tree(FIFO), in_tree("fifo")) == 0);
-    put_bytes(FIFO, scan, fill(scan, 3, 2, 1, 0, (int64_t)monotonic_ns()));
+    put_bytes(FIFO, scan, fill(scan, 3, 2, 1, 0, (int64_t)fcsl_monotonic_ns()));
     CHECK(rig_open(&rig, iio_buffer, "imu@200", "accel temperature") == FCSL_DRIVER_OK);
     CHECK(rig_read(&rig) == FCSL_DRIVER_OK && value_at(&rig, "accel", 0) == 2.0);
     CHECK(rig_read(&rig) == FCSL_DRIVER_ABSENT && strstr(rig.why, "buffer: ") != NULL);
@@ -353,7 +353,7 @@ static void check_layout(const uint32_t *bits, const uint32_t *order)
     while (end % 8u != 0u) {
         end++;
     }
-    const uint64_t time_ns = monotonic_ns();
+    const uint64_t time_ns = fcsl_monotonic_ns();
     store(scan + end, time_ns, 8, 0);
     CHECK(rig_open(&rig, iio_buffer, "imu@200", "accel") == FCSL_DRIVER_OK);
     send(scan, end + 8u);

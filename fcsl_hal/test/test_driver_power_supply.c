@@ -25,9 +25,9 @@ static void check_values(void)
 {
     rig_t rig;
     CHECK(rig_open(&rig, supply, "BAT0", "voltage current charge temperature") == FCSL_DRIVER_OK);
-    const uint64_t before_ns = monotonic_ns();
+    const uint64_t before_ns = fcsl_monotonic_ns();
     CHECK(rig_read(&rig) == FCSL_DRIVER_OK);
-    CHECK(rig.sample_ns >= before_ns && rig.sample_ns <= monotonic_ns());
+    CHECK(rig.sample_ns >= before_ns && rig.sample_ns <= fcsl_monotonic_ns());
     CHECK(value_at(&rig, "voltage", 0) == 15.4 && value_at(&rig, "current", 0) == 2.5);
     CHECK(value_at(&rig, "charge", 0) == 0.87 && value_at(&rig, "temperature", 0) == -12.5);
     rig_close(&rig);

@@ -45,7 +45,7 @@ static void *play_kernel(void *unused)
 {
     (void)unused;
     while (!has(CHIP "export", "2")) {
-        monotonic_wait(monotonic_ns() + NS_PER_MS);
+        fcsl_monotonic_wait(fcsl_monotonic_ns() + FCSL_NS_PER_MS);
     }
     make_channel(CHIP, 2, "0\n", "0\n", "0\n");
     return NULL;
@@ -167,16 +167,16 @@ static void test_rewrite(void)
     make_channel(CHIP, 0, "20000000\n", "0\n", "0\n");
     CHECK(open_pulses(&rig, "pwmchip0", "0") == FCSL_DRIVER_OK);
     set_pulse(&rig, 0, 1000.0);
-    const uint64_t begin_ns = monotonic_ns();
+    const uint64_t begin_ns = fcsl_monotonic_ns();
     CHECK(write_pulses(&rig) == FCSL_DRIVER_OK && has_number(CHIP "pwm0/duty_cycle", 1000000));
     put(CHIP "pwm0/duty_cycle", "1\n");
     put(CHIP "pwm0/enable", "0\n");
     while (!has_number(CHIP "pwm0/duty_cycle", 1000000)) {
         CHECK(write_pulses(&rig) == FCSL_DRIVER_OK);
-        monotonic_wait(monotonic_ns() + 10u * NS_PER_MS);
-        CHECK(monotonic_ns() < begin_ns + 20u * (uint64_t)NS_PER_S);
+        fcsl_monotonic_wait(fcsl_monotonic_ns() + 10u * FCSL_NS_PER_MS);
+        CHECK(fcsl_monotonic_ns() < begin_ns + 20u * (uint64_t)FCSL_NS_PER_S);
     }
-    CHECK(monotonic_ns() >= begin_ns + NS_PER_S && has_number(CHIP "pwm0/enable", 1));
+    CHECK(fcsl_monotonic_ns() >= begin_ns + FCSL_NS_PER_S && has_number(CHIP "pwm0/enable", 1));
     driver->close(rig.self);
 }
 
@@ -324,10 +324,10 @@ static void test_a_chip_that_comes_back(void)
     remove_below("gone/pwm0");
     CHECK(rename(in_tree("gone"), in_tree("class/pwm/pwmchip5")) == 0);
     make_channel("class/pwm/pwmchip5/", 0, "0\n", "0\n", "0\n");
-    const uint64_t begin_ns = monotonic_ns();
+    const uint64_t begin_ns = fcsl_monotonic_ns();
     while (write_pulses(&rig) != FCSL_DRIVER_OK) {
-        monotonic_wait(monotonic_ns() + NS_PER_MS);
-        CHECK(monotonic_ns() < begin_ns + 20u * (uint64_t)NS_PER_S);
+        fcsl_monotonic_wait(fcsl_monotonic_ns() + FCSL_NS_PER_MS);
+        CHECK(fcsl_monotonic_ns() < begin_ns + 20u * (uint64_t)FCSL_NS_PER_S);
     }
     CHECK(has_number("class/pwm/pwmchip5/pwm0/duty_cycle", 1200000));
     CHECK(has_number("class/pwm/pwmchip5/pwm0/period", 20000000) && has_number("class/pwm/pwmchip5/pwm0/enable", 1));

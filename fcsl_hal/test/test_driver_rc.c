@@ -36,7 +36,7 @@ static int has_steps(const rig_t *rig, const int *steps)
 /* As long as adapters keep bytes. */
 static void pause_line(void)
 {
-    monotonic_wait(monotonic_ns() + 5u * NS_PER_MS);
+    fcsl_monotonic_wait(fcsl_monotonic_ns() + 5u * FCSL_NS_PER_MS);
 }
 
 /* ---- SBUS --------------------------------------------------------------------------------------------------------------- */
@@ -57,9 +57,9 @@ static void check_sbus(void)
     const struct termios2 mode = serial_rig_mode(&line);
     CHECK(mode.c_ospeed == 100000u && (mode.c_cflag & CSTOPB) != 0u && (mode.c_iflag & INPCK) != 0u);
     CHECK(isnan(rig_value(&rig, "sticks", 0)) && mode.c_lflag == 0u && mode.c_oflag == 0u);
-    const uint64_t before_ns = monotonic_ns();
+    const uint64_t before_ns = fcsl_monotonic_ns();
     begin_sbus(&rig, &line);
-    CHECK(rig.sample_ns > before_ns && rig.sample_ns <= monotonic_ns());
+    CHECK(rig.sample_ns > before_ns && rig.sample_ns <= fcsl_monotonic_ns());
     CHECK(rig_value(&rig, "sticks", 16) == 2000.0 && rig_value(&rig, "sticks", 17) == 2000.0);
     CHECK(rig_value(&rig, "failsafe", 0) == 0.0);
     rig_close(&rig);

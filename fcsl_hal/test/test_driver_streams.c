@@ -60,7 +60,7 @@ static void *send_pieces(void *argument)
     for (size_t at = 0; at < stream->size; at += pieces->piece) {
         const size_t left = stream->size - at;
         serial_rig_send(pieces->line, stream->bytes + at, left < pieces->piece ? left : pieces->piece);
-        monotonic_wait(monotonic_ns() + 100000u);
+        fcsl_monotonic_wait(fcsl_monotonic_ns() + 100000u);
     }
     return NULL;
 }

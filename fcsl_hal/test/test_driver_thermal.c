@@ -23,9 +23,9 @@ static void check_values(void)
 {
     rig_t rig;
     CHECK(rig_open(&rig, thermal, "cpu-thermal", "value") == FCSL_DRIVER_OK);
-    const uint64_t before_ns = monotonic_ns();
+    const uint64_t before_ns = fcsl_monotonic_ns();
     CHECK(rig_read(&rig) == FCSL_DRIVER_OK && value_at(&rig, "value", 0) == 48.312);
-    CHECK(rig.sample_ns >= before_ns && rig.sample_ns <= monotonic_ns());
+    CHECK(rig.sample_ns >= before_ns && rig.sample_ns <= fcsl_monotonic_ns());
     put(ZONE "0/temp", "48 C\n");
     CHECK(rig_read(&rig) == FCSL_DRIVER_FAILED && strstr(rig.why, "'48 C' is no number") != NULL);
     put(ZONE "0/temp", "50000\n");

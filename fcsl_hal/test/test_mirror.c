@@ -92,7 +92,7 @@ static void post(fcsl_mirror_t *mirror, const data_t *data, uint64_t tick)
 {
     const uint64_t give_up_ns = later_ns();
     while (!fcsl_mirror_ready(mirror)) {
-        CHECK(now_ns() < give_up_ns);
+        CHECK(fcsl_monotonic_ns() < give_up_ns);
     }
     CHECK(fcsl_mirror_post(mirror, data, tick, tick * 10u) == 0);
 }
@@ -142,10 +142,10 @@ static void meet(fcsl_mirror_t *mirror, fcsl_bus_t *bus)
     uint32_t seen = 0;
     const uint64_t give_up_ns = later_ns();
     for (uint64_t tick = 0; seen != (1u << KEYS) - 1u; tick++) {
-        CHECK(now_ns() < give_up_ns);
+        CHECK(fcsl_monotonic_ns() < give_up_ns);
         post(mirror, &data, tick);
         CHECK(fcsl_mirror_post_write(mirror, "w", 1) == 0 && fcsl_mirror_post_written(mirror, tick, 0) == 0);
-        (void)fcsl_bus_wait(bus, now_ns() + 20000000u);
+        (void)fcsl_bus_wait(bus, fcsl_monotonic_ns() + 20000000u);
         for (uint32_t i = 0; i < KEYS; i++) {
             seen |= fcsl_bus_take(bus, i, bytes, &size) ? 1u << i : 0u;
         }
@@ -225,7 +225,7 @@ static void check_writes(fcsl_mirror_t *mirror, fcsl_bus_t *bus)
     CHECK(fcsl_mirror_writes_watched(mirror));
     const uint64_t give_up_ns = later_ns();
     while (!fcsl_mirror_ready(mirror)) {
-        CHECK(now_ns() < give_up_ns);
+        CHECK(fcsl_monotonic_ns() < give_up_ns);
     }
     CHECK(fcsl_mirror_post_write(mirror, "write", 5) == 0);
     CHECK(fcsl_mirror_post_write(mirror, bytes, sizeof bytes) == 0);
@@ -248,7 +248,7 @@ static void check_room_beside_writes(fcsl_mirror_t *mirror)
     uint32_t posted = 0;
     const uint64_t give_up_ns = later_ns();
     while (!fcsl_mirror_ready(mirror)) {
-        CHECK(now_ns() < give_up_ns);
+        CHECK(fcsl_monotonic_ns() < give_up_ns);
     }
     while (fcsl_mirror_post_write(mirror, bytes, sizeof bytes) == 0) {
         posted++;
@@ -303,7 +303,7 @@ int main(void)
     fcsl_bus_t *bus = observe(endpoint);
     const uint64_t give_up_ns = later_ns();
     while (!fcsl_mirror_watched(mirror) || !fcsl_mirror_writes_watched(mirror)) {
-        CHECK(now_ns() < give_up_ns);
+        CHECK(fcsl_monotonic_ns() < give_up_ns);
     }
     meet(mirror, bus);
     check_ticks(mirror, bus);

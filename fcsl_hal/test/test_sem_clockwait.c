@@ -5,6 +5,7 @@
 #define FCSL_TEST_SEM_CLOCKWAIT
 #include "../src/base/sem_clockwait.c"
 
+#include "fcsl/fcsl_monotonic.h"
 #include "fcsl_check.h"
 
 enum { SHORT_MS = 30 };
@@ -14,8 +15,8 @@ static struct timespec in_ms(long ms)
     struct timespec at;
     (void)clock_gettime(CLOCK_MONOTONIC, &at);
     at.tv_nsec += ms * 1000000;
-    at.tv_sec += at.tv_nsec / NS_PER_S;
-    at.tv_nsec %= NS_PER_S;
+    at.tv_sec += at.tv_nsec / FCSL_NS_PER_S;
+    at.tv_nsec %= FCSL_NS_PER_S;
     return at;
 }
 

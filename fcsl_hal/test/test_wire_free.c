@@ -55,7 +55,7 @@ static fcsl_wire_status_t take(const fcsl_wire_t *wire, uint64_t received, fcsl_
     size_t size = 0;
     const uint64_t give_up_ns = later_ns();
     while (count(wire).bus.received < received) {
-        CHECK(now_ns() < give_up_ns);
+        CHECK(fcsl_monotonic_ns() < give_up_ns);
         (void)usleep(1000);
     }
     const fcsl_wire_status_t status = wire->receive(wire->ctx, 0, bytes, MESSAGE_BYTES, &size);

@@ -5,7 +5,7 @@
 #define _GNU_SOURCE
 #include <signal.h>
 
-#include "base/monotonic.h"
+#include "fcsl/fcsl_monotonic.h"
 #include "fcsl/fcsl_scalar.h"
 #include "named_values/commit.h"
 #include "wire_fixture.h"
@@ -180,7 +180,7 @@ static void test_a_start_behind_garbage(void)
     CHECK(fcsl_bus_post(bus, CONTROL, hello, HELLO_BYTES) == 0);
     post_tick(bus, 0);
     for (fcsl_bus_counters_t counters = {0}; counters.put == 0 || counters.put < counters.posted;) {
-        monotonic_wait(monotonic_ns() + NS_PER_MS);
+        fcsl_monotonic_wait(fcsl_monotonic_ns() + FCSL_NS_PER_MS);
         fcsl_bus_count(bus, &counters);
     }
     CHECK(kill(child, SIGCONT) == 0);

@@ -4,9 +4,9 @@
  */
 #define _GNU_SOURCE
 #include <string.h>
-#include <time.h>
 
 #include "fcsl/fcsl_link.h"
+#include "fcsl/fcsl_monotonic.h"
 #include "fcsl/fcsl_wire.h"
 #include "fcsl_check.h"
 
@@ -14,9 +14,7 @@ enum { MESSAGE_MAX = 4096, MESSAGES = 2000, WAIT_S = 20 };
 
 static uint64_t soon(void)
 {
-    struct timespec now;
-    CHECK(clock_gettime(CLOCK_MONOTONIC, &now) == 0);
-    return (uint64_t)(now.tv_sec + WAIT_S) * 1000000000u + (uint64_t)now.tv_nsec;
+    return fcsl_monotonic_ns() + (uint64_t)WAIT_S * FCSL_NS_PER_S;
 }
 
 static void open_pair(fcsl_wire_t ends[2])

@@ -4,6 +4,8 @@
 
 #include <stdint.h>
 
+enum { FCSL_NS_PER_MS = 1000000, FCSL_NS_PER_S = 1000000000 };
+
 /* Time of tick k: floor(k * 1e9 / tick_hz) ns, exact for every k that fits. tick_hz: 1 to 1e9. */
 static inline uint64_t fcsl_tick_time_ns(uint64_t tick_hz, uint64_t tick)
 {

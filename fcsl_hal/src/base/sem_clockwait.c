@@ -14,7 +14,7 @@
 #include <pthread.h>
 #include <time.h>
 
-enum { NS_PER_S = 1000000000 };
+#include "fcsl/fcsl_monotonic.h"
 
 static int wait_on_realtime(sem_t *semaphore, clockid_t clock, const struct timespec *until)
 {
@@ -25,10 +25,10 @@ static int wait_on_realtime(sem_t *semaphore, clockid_t clock, const struct time
         day.tv_sec += until->tv_sec - now.tv_sec;
         day.tv_nsec += until->tv_nsec - now.tv_nsec;
         if (day.tv_nsec < 0) {
-            day.tv_nsec += NS_PER_S;
+            day.tv_nsec += FCSL_NS_PER_S;
             day.tv_sec--;
-        } else if (day.tv_nsec >= NS_PER_S) {
-            day.tv_nsec -= NS_PER_S;
+        } else if (day.tv_nsec >= FCSL_NS_PER_S) {
+            day.tv_nsec -= FCSL_NS_PER_S;
             day.tv_sec++;
         }
         if (sem_timedwait(semaphore, &day) == 0) {

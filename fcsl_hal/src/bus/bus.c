@@ -10,7 +10,7 @@
 #include <stdlib.h>
 #include <string.h>
 
-#include "base/monotonic.h"
+#include "fcsl/fcsl_monotonic.h"
 #include "bus_config.h"
 #include "bus_session.h"
 
@@ -41,8 +41,8 @@ int fcsl_bus_wait(fcsl_bus_t *bus, uint64_t deadline_ns)
             bus->news_seen = count;
             return 1;
         }
-        const struct timespec left = time_left(deadline_ns);
-        if (monotonic_ns() >= deadline_ns || event_sleep(&bus->news, &left) != 0) {
+        const struct timespec left = fcsl_time_left(deadline_ns);
+        if (fcsl_monotonic_ns() >= deadline_ns || event_sleep(&bus->news, &left) != 0) {
             return 0;
         }
     }
@@ -277,8 +277,8 @@ int fcsl_bus_open(const fcsl_bus_options_t *options, fcsl_bus_t **bus, char *err
 
 int fcsl_bus_close(fcsl_bus_t *bus, uint32_t timeout_ms)
 {
-    const uint64_t deadline_ns = monotonic_ns() + (uint64_t)timeout_ms * NS_PER_MS;
-    const struct timespec deadline = timespec_of(deadline_ns);
+    const uint64_t deadline_ns = fcsl_monotonic_ns() + (uint64_t)timeout_ms * FCSL_NS_PER_MS;
+    const struct timespec deadline = fcsl_timespec_of(deadline_ns);
     int code = 0;
     atomic_store(&bus->stopping, 1);
     event_signal(&bus->posted);

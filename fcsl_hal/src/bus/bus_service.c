@@ -3,10 +3,11 @@
  * The thread that hands to Zenoh what was posted. A put may wait for a receiver; then the ring fills, and posts are refused.
  */
 #define _GNU_SOURCE
-#include "base/monotonic.h"
 #include "bus_session.h"
 
-enum { LOOK_NS = 50 * NS_PER_MS, TURN = 64, REASON_BYTES = 256 };
+#include "fcsl/fcsl_monotonic.h"
+
+enum { LOOK_NS = 50 * FCSL_NS_PER_MS, TURN = 64, REASON_BYTES = 256 };
 
 /* Puts what is in the ring, at most TURN messages: 1 when there may be more. */
 static int put_some(fcsl_bus_t *bus)
@@ -28,7 +29,7 @@ static int put_some(fcsl_bus_t *bus)
 /* Zenoh does not tell of sessions that come and go: they are looked at. */
 static void look_at_peers(fcsl_bus_t *bus, uint64_t *looked_ns)
 {
-    const uint64_t now_ns = monotonic_ns();
+    const uint64_t now_ns = fcsl_monotonic_ns();
     if (now_ns < *looked_ns + LOOK_NS) {
         return;
     }
@@ -50,7 +51,7 @@ static void sleep_until_posted(fcsl_bus_t *bus)
     size_t size = 0;
     event_arm(&bus->posted);
     if (!ring_front(&bus->ring, &output, &bytes, &size) && !atomic_load(&bus->stopping)) {
-        const struct timespec look = timespec_of(LOOK_NS);
+        const struct timespec look = fcsl_timespec_of(LOOK_NS);
         (void)event_sleep(&bus->posted, &look);
     }
 }
@@ -62,7 +63,7 @@ static void connect_later(fcsl_bus_t *bus)
     const uint8_t *bytes = NULL;
     size_t size = 0;
     char reason[REASON_BYTES];
-    const struct timespec pause = timespec_of(LOOK_NS);
+    const struct timespec pause = fcsl_timespec_of(LOOK_NS);
     while (bus->zenoh == NULL && !atomic_load(&bus->stopping)) { /* until the session is closed at the latest */
         if (bus_connect(bus, &bus->options, reason, sizeof reason) != 0) {
             (void)nanosleep(&pause, NULL);

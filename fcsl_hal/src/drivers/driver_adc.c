@@ -6,7 +6,8 @@
 #include <stdio.h>
 #include <unistd.h>
 
-#include "base/monotonic.h"
+#include "fcsl/fcsl_monotonic.h"
+
 #include "drivers.h"
 #include "iio.h"
 
@@ -90,7 +91,7 @@ static fcsl_driver_status_t read_adc(void *self, uint64_t *sample_ns, char *why,
 {
     adc_t *adc = self;
     double counts[INPUTS] = {0.0};
-    const uint64_t begin_ns = monotonic_ns();
+    const uint64_t begin_ns = fcsl_monotonic_ns();
     for (unsigned i = 0; i < INPUTS; i++) {
         char name[IIO_ATTRIBUTE_BYTES];
         name_input(i, name);

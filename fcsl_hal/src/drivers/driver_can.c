@@ -24,7 +24,7 @@
 #include <time.h>
 #include <unistd.h>
 
-#include "base/monotonic.h"
+#include "fcsl/fcsl_monotonic.h"
 #include "can_signal.h"
 
 enum { SIGNALS_MAX = 8 };
@@ -211,7 +211,7 @@ static fcsl_driver_status_t open_can(void *self, const char *text, const uint8_t
 
 static uint64_t ns_of(const struct timespec *time)
 {
-    return (uint64_t)time->tv_sec * NS_PER_S + (uint64_t)time->tv_nsec;
+    return (uint64_t)time->tv_sec * FCSL_NS_PER_S + (uint64_t)time->tv_nsec;
 }
 
 /* The kernel tells arrivals in CLOCK_REALTIME: the frame's age in it gives the monotonic time. A clock that was set back meanwhile
@@ -220,7 +220,7 @@ static uint64_t arrival_ns(struct msghdr *message)
 {
     struct timespec arrived = {0};
     struct timespec real = {0};
-    const uint64_t now_ns = monotonic_ns();
+    const uint64_t now_ns = fcsl_monotonic_ns();
     const struct cmsghdr *header = CMSG_FIRSTHDR(message);
     if (header == NULL || header->cmsg_level != SOL_SOCKET || header->cmsg_type != SCM_TIMESTAMPNS ||
         header->cmsg_len < CMSG_LEN(sizeof arrived)) {
@@ -300,12 +300,12 @@ static fcsl_driver_status_t judge_error(const can_t *can, char *why, size_t size
 static fcsl_driver_status_t read_can(void *self, uint64_t *sample_ns, char *why, size_t size)
 {
     can_t *can = self;
-    const uint64_t deadline_ns = monotonic_ns() + (uint64_t)FCSL_DRIVER_WAIT_MS * NS_PER_MS;
-    while (monotonic_ns() < deadline_ns) {
+    const uint64_t deadline_ns = fcsl_monotonic_ns() + (uint64_t)FCSL_DRIVER_WAIT_MS * FCSL_NS_PER_MS;
+    while (fcsl_monotonic_ns() < deadline_ns) {
         struct canfd_frame frame = {0};
         uint64_t time_ns = 0;
         struct pollfd wait = {.fd = can->fd, .events = POLLIN};
-        const struct timespec left = time_left(deadline_ns);
+        const struct timespec left = fcsl_time_left(deadline_ns);
         const int ready = ppoll(&wait, 1, &left, NULL);
         const int got = ready > 0 ? receive(can, &frame, &time_ns) : ready;
         if (got < 0 && errno != EINTR) {

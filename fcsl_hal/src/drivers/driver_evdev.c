@@ -16,7 +16,7 @@
 #include <time.h>
 #include <unistd.h>
 
-#include "base/monotonic.h"
+#include "fcsl/fcsl_monotonic.h"
 #include "evdev_find.h"
 #include "evdev_sticks.h"
 
@@ -164,9 +164,9 @@ static fcsl_driver_status_t open_evdev(void *self, const char *device, const uin
 /* Waits for events and reads what there are, or NOTHING at the deadline. */
 static fcsl_driver_status_t read_events(evdev_t *evdev, uint64_t deadline_ns, char *why, size_t size)
 {
-    while (monotonic_ns() < deadline_ns) {
+    while (fcsl_monotonic_ns() < deadline_ns) {
         struct pollfd wait = {.fd = evdev->fd, .events = POLLIN};
-        const struct timespec left = time_left(deadline_ns);
+        const struct timespec left = fcsl_time_left(deadline_ns);
         const int ready = ppoll(&wait, 1, &left, NULL);
         const ssize_t got = ready > 0 ? read(evdev->fd, evdev->events, sizeof evdev->events) : ready;
         if (got > 0) {
@@ -206,7 +206,7 @@ static fcsl_driver_status_t take_events(evdev_t *evdev, uint64_t *sample_ns, cha
         if (kind != EVDEV_NOTHING) {
             const uint64_t seconds = (uint64_t)event->input_event_sec;
             const uint64_t microseconds = (uint64_t)event->input_event_usec;
-            return give(evdev, seconds * NS_PER_S + microseconds * NS_PER_US, sample_ns);
+            return give(evdev, seconds * FCSL_NS_PER_S + microseconds * NS_PER_US, sample_ns);
         }
     }
     return FCSL_DRIVER_NOTHING;
@@ -216,7 +216,7 @@ static fcsl_driver_status_t take_events(evdev_t *evdev, uint64_t *sample_ns, cha
  * silent. So where nothing came, the state of the device is a sample, if the device still gives it. */
 static fcsl_driver_status_t take_state(evdev_t *evdev, uint64_t *sample_ns, char *why, size_t size)
 {
-    const uint64_t now_ns = monotonic_ns();
+    const uint64_t now_ns = fcsl_monotonic_ns();
     if (read_state(evdev->fd, &evdev->state) != 0) {
         return judge_error("read the state of", why, size);
     }
@@ -226,7 +226,7 @@ static fcsl_driver_status_t take_state(evdev_t *evdev, uint64_t *sample_ns, char
 static fcsl_driver_status_t read_evdev(void *self, uint64_t *sample_ns, char *why, size_t size)
 {
     evdev_t *evdev = self;
-    const uint64_t deadline_ns = monotonic_ns() + (uint64_t)FCSL_DRIVER_WAIT_MS * NS_PER_MS;
+    const uint64_t deadline_ns = fcsl_monotonic_ns() + (uint64_t)FCSL_DRIVER_WAIT_MS * FCSL_NS_PER_MS;
     fcsl_driver_status_t status = take_events(evdev, sample_ns, why, size);
     while (status == FCSL_DRIVER_NOTHING) { /* read_events ends it at the deadline */
         status = read_events(evdev, deadline_ns, why, size);

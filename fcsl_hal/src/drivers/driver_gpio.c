@@ -8,7 +8,8 @@
 #include <string.h>
 #include <unistd.h>
 
-#include "base/monotonic.h"
+#include "fcsl/fcsl_monotonic.h"
+
 #include "drivers.h"
 #include "gpio_chip.h"
 
@@ -58,7 +59,7 @@ static fcsl_driver_status_t open_inputs(void *self, const char *device, const ui
 static fcsl_driver_status_t read_inputs(void *self, uint64_t *sample_ns, char *why, size_t size)
 {
     gpio_t *gpio = self;
-    const uint64_t begin_ns = monotonic_ns();
+    const uint64_t begin_ns = fcsl_monotonic_ns();
     const fcsl_driver_status_t status = gpio_get(gpio->file, gpio->used, gpio->lines, why, size);
     if (status == FCSL_DRIVER_OK) {
         *sample_ns = begin_ns;
@@ -99,7 +100,7 @@ static fcsl_driver_status_t open_outputs(void *self, const char *device, const u
 
 static fcsl_driver_status_t claim_outputs(gpio_t *gpio, char *why, size_t size)
 {
-    const uint64_t now_ns = monotonic_ns();
+    const uint64_t now_ns = fcsl_monotonic_ns();
     if (now_ns < gpio->look_ns) {
         (void)snprintf(why, size, "the GPIO chip '%.100s' has gone", gpio->device);
         return FCSL_DRIVER_FAILED;

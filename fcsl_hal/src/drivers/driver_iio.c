@@ -9,7 +9,7 @@
 #include <stdio.h>
 #include <unistd.h>
 
-#include "base/monotonic.h"
+#include "fcsl/fcsl_monotonic.h"
 
 typedef struct {
     const iio_channel_t *channel;
@@ -94,7 +94,7 @@ static fcsl_driver_status_t read_iio(void *self, uint64_t *sample_ns, char *why,
 {
     iio_t *iio = self;
     iio_values_t values = iio->values;
-    const uint64_t begin_ns = monotonic_ns();
+    const uint64_t begin_ns = fcsl_monotonic_ns();
     for (uint32_t i = 0; i < iio->input_count; i++) {
         const input_t *input = &iio->inputs[i];
         double raw = 0.0;

@@ -18,7 +18,7 @@
 #include <string.h>
 #include <unistd.h>
 
-#include "base/monotonic.h"
+#include "fcsl/fcsl_monotonic.h"
 
 enum {
     ELEMENTS = IIO_VALUES + 1, /* and the timestamp */
@@ -357,7 +357,8 @@ static fcsl_driver_status_t read_scan(const iio_buffer_t *buffer, uint8_t *scan,
 /* Whether a sample can have this time: after the last one, and not in the future, as the times of other clocks are. */
 static int is_plausible(const iio_buffer_t *buffer, int64_t time_ns)
 {
-    return time_ns > 0 && (uint64_t)time_ns > buffer->last_ns && (uint64_t)time_ns <= monotonic_ns() + NS_PER_S;
+    return time_ns > 0 && (uint64_t)time_ns > buffer->last_ns &&
+           (uint64_t)time_ns <= fcsl_monotonic_ns() + FCSL_NS_PER_S;
 }
 
 static fcsl_driver_status_t read_iio_buffer(void *self, uint64_t *sample_ns, char *why, size_t size)

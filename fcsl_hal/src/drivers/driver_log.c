@@ -18,7 +18,7 @@
 #include <sys/stat.h>
 #include <unistd.h>
 
-#include "base/monotonic.h"
+#include "fcsl/fcsl_monotonic.h"
 
 enum { LINES = 4096, LINE_BYTES = 256, FILE_BYTES = LINES * LINE_BYTES, SIGNALS = 4 };
 
@@ -103,7 +103,7 @@ static fcsl_driver_status_t write_log(void *self, char *why, size_t size)
     (void)size;
     log_t *log = self;
     char line[LINE_BYTES];
-    size_t at = (size_t)snprintf(line, sizeof line, "%20" PRIu64, monotonic_ns());
+    size_t at = (size_t)snprintf(line, sizeof line, "%20" PRIu64, fcsl_monotonic_ns());
     for (uint32_t i = 0; i < SIGNALS; i++) {
         at = log->used[i] != 0u ? put_signal(line, at, &signals[i], log) : at;
     }

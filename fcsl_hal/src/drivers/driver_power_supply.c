@@ -12,7 +12,7 @@
 #include <string.h>
 #include <unistd.h>
 
-#include "base/monotonic.h"
+#include "fcsl/fcsl_monotonic.h"
 
 typedef enum { VOLTAGE, CURRENT, CHARGE, TEMPERATURE, SIGNALS } signal_t;
 
@@ -142,7 +142,7 @@ static fcsl_driver_status_t read_power_supply(void *self, uint64_t *sample_ns, c
 {
     power_supply_t *supply = self;
     double values[SIGNALS] = {supply->voltage, supply->current, supply->charge, supply->temperature};
-    const uint64_t begin_ns = monotonic_ns();
+    const uint64_t begin_ns = fcsl_monotonic_ns();
     for (uint32_t i = 0; i < SIGNALS; i++) {
         if (supply->files[i] < 0) {
             continue;

@@ -19,7 +19,7 @@
 #include <time.h>
 #include <unistd.h>
 
-#include "base/monotonic.h"
+#include "fcsl/fcsl_monotonic.h"
 
 enum { CHANNELS = 16, TEXT_BYTES = 32, WHY_BYTES = 256, EXPORT_TRIES = 50 };
 static const double HZ = 50.0; /* of most servos */
@@ -252,7 +252,7 @@ static fcsl_driver_status_t open_channel(pwm_t *pwm, unsigned index, const char 
 /* The kernel shows the files of a channel when it is exported. */
 static fcsl_driver_status_t export_and_open(pwm_t *pwm, unsigned index, char *why, size_t size)
 {
-    const struct timespec wait = timespec_of(EXPORT_WAIT_NS);
+    const struct timespec wait = fcsl_timespec_of(EXPORT_WAIT_NS);
     char folder[SYSFS_PATH_BYTES];
     char number[TEXT_BYTES];
     if (channel_folder(pwm, index, folder) != 0) {
@@ -430,7 +430,7 @@ static fcsl_driver_status_t write_channels(pwm_t *pwm, char *why, size_t size)
 static fcsl_driver_status_t write_pwm(void *self, char *why, size_t size)
 {
     pwm_t *pwm = self;
-    const uint64_t now_ns = monotonic_ns();
+    const uint64_t now_ns = fcsl_monotonic_ns();
     if (!pwm->is_open) {
         if (now_ns < pwm->look_ns) {
             (void)snprintf(why, size, "the PWM chip has gone");

@@ -9,7 +9,7 @@
 #include <stdio.h>
 #include <unistd.h>
 
-#include "base/monotonic.h"
+#include "fcsl/fcsl_monotonic.h"
 
 static const double MILLI_PER_ONE = 1e3;
 
@@ -52,7 +52,7 @@ static fcsl_driver_status_t read_thermal(void *self, uint64_t *sample_ns, char *
 {
     thermal_t *thermal = self;
     double millidegrees = 0.0;
-    const uint64_t begin_ns = monotonic_ns();
+    const uint64_t begin_ns = fcsl_monotonic_ns();
     const fcsl_driver_status_t status = sysfs_read_number(thermal->file, "temp", &millidegrees, why, size);
     if (status == FCSL_DRIVER_OK) {
         thermal->value = millidegrees / MILLI_PER_ONE;

@@ -10,7 +10,7 @@
 #include <stdlib.h>
 #include <string.h>
 
-#include "base/monotonic.h"
+#include "fcsl/fcsl_monotonic.h"
 #include "named_values/wire_named.h"
 #include "presence.h"
 #include "transport/control_packet.h"
@@ -21,10 +21,10 @@ enum {
     TIME_BYTES = 64,
     JOIN_MS = 10000,
     MESSAGES_MAX = 64, /* that one call takes */
-    LOOK_NS = 20 * NS_PER_MS, /* a moment */
+    LOOK_NS = 20 * FCSL_NS_PER_MS, /* a moment */
 };
 
-static const struct timespec PAUSE = {.tv_nsec = 20 * NS_PER_MS};
+static const struct timespec PAUSE = {.tv_nsec = 20 * FCSL_NS_PER_MS};
 
 struct fcsl_external {
     fcsl_channel_table_t table;
@@ -116,7 +116,7 @@ int fcsl_external_open_bus(const char *address, const char *name_space, const fc
     self->runs_free = fcsl_wire_runs_free(address);
     self->presence = presence_of(FCSL_WIRE_CONNECT, &self->table, &self->log);
     /* A client of another simulator, which may be started later; who listens waits for nobody. */
-    const uint64_t deadline_ns = monotonic_ns() + JOIN_MS * (uint64_t)NS_PER_MS;
+    const uint64_t deadline_ns = fcsl_monotonic_ns() + JOIN_MS * (uint64_t)FCSL_NS_PER_MS;
     if (fcsl_wire_open_named(self->spec, name_space, &self->table, FCSL_WIRE_LISTEN, deadline_ns, &self->wire, error,
                              error_size) != 0) {
         release(self);
@@ -135,7 +135,7 @@ static fcsl_hal_status_t wire_failed(fcsl_external_t *external)
 /* Waits for a message, for a short time at most. */
 static fcsl_wire_status_t receive(fcsl_external_t *external, uint64_t deadline_ns, size_t *size)
 {
-    const uint64_t look_ns = monotonic_ns() + LOOK_NS;
+    const uint64_t look_ns = fcsl_monotonic_ns() + LOOK_NS;
     return external->wire.receive(external->wire.ctx, look_ns < deadline_ns ? look_ns : deadline_ns, external->inbox,
                                   external->inbox_size, size);
 }
@@ -143,7 +143,7 @@ static fcsl_wire_status_t receive(fcsl_external_t *external, uint64_t deadline_n
 /* Whether a wait that began then, and brought nothing, was ended by a signal. */
 static int is_early(uint64_t begun_ns, uint64_t deadline_ns)
 {
-    const uint64_t now_ns = monotonic_ns();
+    const uint64_t now_ns = fcsl_monotonic_ns();
     return now_ns < begun_ns + LOOK_NS && now_ns < deadline_ns;
 }
 
@@ -189,10 +189,10 @@ static fcsl_hal_status_t meet(fcsl_external_t *external, fcsl_wire_status_t stat
 
 fcsl_hal_status_t fcsl_external_accept(fcsl_external_t *external, uint32_t timeout_ms)
 {
-    const uint64_t deadline_ns = monotonic_ns() + (uint64_t)timeout_ms * NS_PER_MS;
+    const uint64_t deadline_ns = fcsl_monotonic_ns() + (uint64_t)timeout_ms * FCSL_NS_PER_MS;
     do { /* every turn takes a message or waits; whoever is no controller is passed over */
         size_t size = 0;
-        const uint64_t begun_ns = monotonic_ns();
+        const uint64_t begun_ns = fcsl_monotonic_ns();
         const fcsl_wire_status_t status = receive(external, deadline_ns, &size);
         if (status == FCSL_WIRE_NONE && is_early(begun_ns, deadline_ns)) {
             return FCSL_HAL_NONE;
@@ -201,7 +201,7 @@ fcsl_hal_status_t fcsl_external_accept(fcsl_external_t *external, uint32_t timeo
         if (met != FCSL_HAL_NONE) {
             return met;
         }
-    } while (monotonic_ns() < deadline_ns);
+    } while (fcsl_monotonic_ns() < deadline_ns);
     (void)snprintf(external->text, sizeof external->text, "no controller on %s within %" PRIu32 " ms", external->spec,
                    timeout_ms);
     return FCSL_HAL_TIMEOUT;
@@ -246,7 +246,7 @@ fcsl_hal_status_t fcsl_external_send(fcsl_external_t *external, const fcsl_messa
 
 static void wait_anew(fcsl_external_t *external, uint32_t timeout_ms)
 {
-    external->deadline_ns = monotonic_ns() + (uint64_t)timeout_ms * NS_PER_MS;
+    external->deadline_ns = fcsl_monotonic_ns() + (uint64_t)timeout_ms * FCSL_NS_PER_MS;
     external->waits = 1;
 }
 
@@ -298,7 +298,7 @@ static fcsl_hal_status_t wait_once(fcsl_external_t *external, uint64_t tick, uin
                                    fcsl_message_t *message)
 {
     size_t size = 0;
-    const uint64_t begun_ns = monotonic_ns();
+    const uint64_t begun_ns = fcsl_monotonic_ns();
     const fcsl_wire_status_t status = receive(external, external->deadline_ns, &size);
     if (status == FCSL_WIRE_ERROR) {
         return wire_failed(external);
@@ -317,7 +317,7 @@ static fcsl_hal_status_t wait_once(fcsl_external_t *external, uint64_t tick, uin
     } else if (seen != FCSL_HAL_NONE) {
         return seen;
     }
-    return monotonic_ns() < external->deadline_ns ? FCSL_HAL_WAITING : timed_out(external, tick, timeout_ms);
+    return fcsl_monotonic_ns() < external->deadline_ns ? FCSL_HAL_WAITING : timed_out(external, tick, timeout_ms);
 }
 
 fcsl_hal_status_t fcsl_external_await(fcsl_external_t *external, uint64_t tick, uint32_t timeout_ms,
@@ -343,7 +343,7 @@ fcsl_hal_status_t fcsl_external_receive(fcsl_external_t *external, uint64_t tick
 
 void fcsl_external_alive(fcsl_external_t *external)
 {
-    const uint64_t now_ns = monotonic_ns();
+    const uint64_t now_ns = fcsl_monotonic_ns();
     if (external->runs_free) {
         presence_tell(&external->presence, &external->wire);
     } else if (now_ns >= external->alive_ns) {

@@ -6,7 +6,7 @@
 #include <stdio.h>
 #include <stdlib.h>
 
-#include "base/monotonic.h"
+#include "fcsl/fcsl_monotonic.h"
 #include "fcsl/fcsl_hal.h"
 
 static int stub_open(fcsl_hal_t *hal, char *error, size_t error_size)
@@ -44,13 +44,13 @@ static fcsl_hal_status_t stub_arm(void *ctx, int armed)
 static uint64_t stub_now_ns(void *ctx)
 {
     (void)ctx;
-    return monotonic_ns();
+    return fcsl_monotonic_ns();
 }
 
 static void stub_wait(void *ctx, uint64_t until_ns)
 {
     (void)ctx;
-    monotonic_wait(until_ns);
+    fcsl_monotonic_wait(until_ns);
 }
 
 /* All that there is of it. */

@@ -9,7 +9,7 @@
 #include <stdlib.h>
 #include <string.h>
 
-#include "base/monotonic.h"
+#include "fcsl/fcsl_monotonic.h"
 #include "fcsl/fcsl_hal.h"
 #include "named_values/wire_named.h"
 #include "presence.h"
@@ -18,7 +18,7 @@
 enum {
     TEXT_BYTES = 512,
     SPEC_BYTES = 256,
-    LOOK_NS = 20 * NS_PER_MS, /* a wait looks as often whether it is interrupted */
+    LOOK_NS = 20 * FCSL_NS_PER_MS, /* a wait looks as often whether it is interrupted */
     MESSAGES_MAX = 4096 /* that a tick takes of a rig: more than a buffer holds */
 };
 
@@ -190,7 +190,7 @@ static fcsl_hal_status_t nothing_came(hal_t *hal, fcsl_wire_status_t status, uin
 
 static void wait_anew(hal_t *hal)
 {
-    hal->deadline_ns = monotonic_ns() + (uint64_t)hal->timeout_ms * NS_PER_MS;
+    hal->deadline_ns = fcsl_monotonic_ns() + (uint64_t)hal->timeout_ms * FCSL_NS_PER_MS;
     hal->waits = 1;
 }
 
@@ -230,7 +230,7 @@ static fcsl_hal_status_t hear(hal_t *hal, uint64_t tick, size_t size, uint8_t *b
 static fcsl_hal_status_t sample_paced(hal_t *hal, uint64_t tick, uint8_t *bytes, size_t capacity,
                                       fcsl_message_t *message)
 {
-    const uint64_t look_ns = monotonic_ns() + LOOK_NS;
+    const uint64_t look_ns = fcsl_monotonic_ns() + LOOK_NS;
     fcsl_hal_status_t status = FCSL_HAL_OK;
     if (!hal->waits) {
         wait_anew(hal);
@@ -242,9 +242,9 @@ static fcsl_hal_status_t sample_paced(hal_t *hal, uint64_t tick, uint8_t *bytes,
                 ? FCSL_WIRE_NONE
                 : receive(hal, look_ns < hal->deadline_ns ? look_ns : hal->deadline_ns, &size);
         status = came == FCSL_WIRE_OK ? hear(hal, tick, size, bytes, capacity, message) : nothing_came(hal, came, tick);
-        if (status == FCSL_HAL_OK && monotonic_ns() >= hal->deadline_ns) {
+        if (status == FCSL_HAL_OK && fcsl_monotonic_ns() >= hal->deadline_ns) {
             status = timed_out(hal, tick);
-        } else if (status == FCSL_HAL_OK && monotonic_ns() >= look_ns) {
+        } else if (status == FCSL_HAL_OK && fcsl_monotonic_ns() >= look_ns) {
             return FCSL_HAL_WAITING;
         }
     }
@@ -259,7 +259,7 @@ static fcsl_hal_status_t sample_paced(hal_t *hal, uint64_t tick, uint8_t *bytes,
 static void wire_alive(void *ctx)
 {
     hal_t *hal = ctx;
-    const uint64_t now_ns = monotonic_ns();
+    const uint64_t now_ns = fcsl_monotonic_ns();
     if (hal->runs_free) {
         presence_tell(&hal->presence, &hal->wire);
     } else if (hal->paces && now_ns >= hal->alive_ns) {
@@ -396,13 +396,13 @@ static fcsl_hal_status_t wire_arm(void *ctx, int armed)
 static uint64_t wire_now_ns(void *ctx)
 {
     const hal_t *hal = ctx;
-    return hal->paces ? hal->time_ns : monotonic_ns();
+    return hal->paces ? hal->time_ns : fcsl_monotonic_ns();
 }
 
 static void wire_wait(void *ctx, uint64_t until_ns)
 {
     if (!((const hal_t *)ctx)->paces) {
-        monotonic_wait(until_ns);
+        fcsl_monotonic_wait(until_ns);
     }
 }
 
@@ -446,8 +446,9 @@ static int hear_hello(hal_t *hal, uint64_t deadline_ns, control_packet_t *packet
     fcsl_wire_status_t status = FCSL_WIRE_NONE;
     size_t size = 0;
     int answered = 0;
-    while (!answered && status < FCSL_WIRE_CLOSED && monotonic_ns() < deadline_ns && !atomic_load(&hal->interrupted)) {
-        const uint64_t look_ns = monotonic_ns() + LOOK_NS;
+    while (!answered && status < FCSL_WIRE_CLOSED && fcsl_monotonic_ns() < deadline_ns &&
+           !atomic_load(&hal->interrupted)) {
+        const uint64_t look_ns = fcsl_monotonic_ns() + LOOK_NS;
         status = receive(hal, look_ns < deadline_ns ? look_ns : deadline_ns, &size);
         answered =
             status == FCSL_WIRE_OK && control_parse(hal->inbox, size, packet) == 0 && packet->kind <= CONTROL_REFUSAL;
@@ -479,7 +480,7 @@ static int shake_hands(hal_t *hal, uint64_t deadline_ns, char *error, size_t err
         (void)snprintf(error, error_size, "cannot send the handshake: the other end is gone");
         return -1;
     }
-    hal->greeted_ns = hal->greets ? hal->greeted_ns : monotonic_ns();
+    hal->greeted_ns = hal->greets ? hal->greeted_ns : fcsl_monotonic_ns();
     hal->greets = 1;
     const int unheard = hear_hello(hal, deadline_ns, &packet, error, error_size);
     if (unheard) {
@@ -521,7 +522,7 @@ static int open_spec(hal_t *hal, uint64_t deadline_ns, char *error, size_t error
 /* A link that is cut takes a hello with it that was under way, and nobody tells: after a while a new session sends another one. */
 static void begin_anew(hal_t *hal)
 {
-    if (hal->has_wire && hal->is_named && monotonic_ns() - hal->greeted_ns > GREETING_NS) {
+    if (hal->has_wire && hal->is_named && fcsl_monotonic_ns() - hal->greeted_ns > GREETING_NS) {
         hal->wire.close(hal->wire.ctx);
         hal->has_wire = 0;
         hal->greets = 0;
@@ -531,7 +532,7 @@ static void begin_anew(hal_t *hal)
 static int wire_open(fcsl_hal_t *handle, char *error, size_t error_size)
 {
     hal_t *hal = handle->ctx;
-    const uint64_t deadline_ns = monotonic_ns() + (uint64_t)hal->open_ms * NS_PER_MS;
+    const uint64_t deadline_ns = fcsl_monotonic_ns() + (uint64_t)hal->open_ms * FCSL_NS_PER_MS;
     int failed = hal->has_wire ? 0 : open_spec(hal, deadline_ns, error, error_size);
     if (hal->runs_free) {
         return failed;

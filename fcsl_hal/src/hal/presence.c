@@ -8,7 +8,7 @@
 #include <stdio.h>
 #include <string.h>
 
-#include "base/monotonic.h"
+#include "fcsl/fcsl_monotonic.h"
 
 presence_t presence_of(fcsl_wire_side_t peer, const fcsl_channel_table_t *table, fcsl_log_t *log)
 {
@@ -22,7 +22,7 @@ presence_t presence_of(fcsl_wire_side_t peer, const fcsl_channel_table_t *table,
 
 void presence_tell(presence_t *presence, const fcsl_wire_t *wire)
 {
-    const uint64_t now_ns = monotonic_ns();
+    const uint64_t now_ns = fcsl_monotonic_ns();
     if (now_ns >= presence->hello_ns) {
         presence->hello_ns = now_ns + CONTROL_ALIVE_NS;
         (void)control_send_hello(wire, presence->table, presence->sends); /* the next one comes soon */

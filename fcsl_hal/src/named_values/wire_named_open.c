@@ -7,7 +7,7 @@
 #include <stdlib.h>
 #include <string.h>
 
-#include "base/monotonic.h"
+#include "fcsl/fcsl_monotonic.h"
 #include "codec/codec_layout.h"
 #include "commit.h"
 #include "fcsl/fcsl_address.h"
@@ -151,8 +151,8 @@ static fcsl_bus_role_t role_of(const char *address, fcsl_wire_side_t side, char 
 
 static int open_session(named_wire_t *wire, const char *address, uint64_t deadline_ns, char *error, size_t error_size)
 {
-    const uint64_t now_ns = monotonic_ns();
-    const uint32_t wait_ms = deadline_ns > now_ns ? (uint32_t)((deadline_ns - now_ns) / NS_PER_MS) : 0u;
+    const uint64_t now_ns = fcsl_monotonic_ns();
+    const uint32_t wait_ms = deadline_ns > now_ns ? (uint32_t)((deadline_ns - now_ns) / FCSL_NS_PER_MS) : 0u;
     named_plan_t *plan = &wire->plan;
     const fcsl_bus_role_t role = role_of(address, wire->peer.side, plan->endpoint);
     const fcsl_bus_options_t options = {

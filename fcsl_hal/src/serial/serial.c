@@ -16,7 +16,7 @@
 #include <sys/stat.h>
 #include <unistd.h>
 
-#include "base/monotonic.h"
+#include "fcsl/fcsl_monotonic.h"
 
 enum { PATH_BYTES = 256, BAUD_DIGITS_MAX = 8, CHUNK_BYTES = 256 };
 
@@ -150,9 +150,9 @@ fcsl_driver_status_t serial_open(const char *text, const serial_mode_t *mode, in
 static fcsl_driver_status_t read_chunk(int fd, uint64_t deadline_ns, uint8_t *bytes, uint32_t *count, char *why,
                                        size_t size)
 {
-    while (monotonic_ns() < deadline_ns) {
+    while (fcsl_monotonic_ns() < deadline_ns) {
         struct pollfd wait = {.fd = fd, .events = POLLIN};
-        const struct timespec left = time_left(deadline_ns);
+        const struct timespec left = fcsl_time_left(deadline_ns);
         const int ready = ppoll(&wait, 1, &left, NULL);
         const ssize_t got = ready > 0 ? read(fd, bytes, CHUNK_BYTES) : ready;
         if (got > 0) {
@@ -175,7 +175,7 @@ static fcsl_driver_status_t read_chunk(int fd, uint64_t deadline_ns, uint8_t *by
 fcsl_driver_status_t serial_sample(int fd, serial_take_t take, void *self, fcsl_driver_input_t *input,
                                    uint64_t *sample_ns, char *why, size_t size)
 {
-    const uint64_t deadline_ns = monotonic_ns() + (uint64_t)FCSL_DRIVER_WAIT_MS * NS_PER_MS;
+    const uint64_t deadline_ns = fcsl_monotonic_ns() + (uint64_t)FCSL_DRIVER_WAIT_MS * FCSL_NS_PER_MS;
     uint8_t bytes[CHUNK_BYTES];
     uint32_t count = 0;
     fcsl_driver_status_t status = FCSL_DRIVER_OK;
@@ -186,7 +186,7 @@ fcsl_driver_status_t serial_sample(int fd, serial_take_t take, void *self, fcsl_
             return status;
         }
         input->bytes += count;
-        found = take(self, bytes, count, monotonic_ns(), sample_ns);
+        found = take(self, bytes, count, fcsl_monotonic_ns(), sample_ns);
     }
     return FCSL_DRIVER_OK;
 }

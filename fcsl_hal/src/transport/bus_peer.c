@@ -7,7 +7,7 @@
 
 #include <stdio.h>
 
-#include "base/monotonic.h"
+#include "fcsl/fcsl_monotonic.h"
 
 int bus_peer_lives(const bus_peer_t *peer)
 {
@@ -44,10 +44,10 @@ fcsl_wire_status_t bus_peer_receive(const bus_peer_t *peer, bus_take_t take, voi
 {
     for (;;) { /* ends at the deadline, whatever arrives */
         const fcsl_wire_status_t status = take(ctx, message, capacity, size);
-        if (status != FCSL_WIRE_NONE || monotonic_ns() >= deadline_ns) {
+        if (status != FCSL_WIRE_NONE || fcsl_monotonic_ns() >= deadline_ns) {
             return status;
         }
-        if (!fcsl_bus_wait(peer->bus, deadline_ns) && monotonic_ns() < deadline_ns) {
+        if (!fcsl_bus_wait(peer->bus, deadline_ns) && fcsl_monotonic_ns() < deadline_ns) {
             return FCSL_WIRE_NONE; /* a signal */
         }
     }
@@ -55,7 +55,7 @@ fcsl_wire_status_t bus_peer_receive(const bus_peer_t *peer, bus_take_t take, voi
 
 int bus_peer_wait(bus_peer_t *peer, const char *endpoint, uint64_t deadline_ns, char *error, size_t error_size)
 {
-    while (monotonic_ns() < deadline_ns) {
+    while (fcsl_monotonic_ns() < deadline_ns) {
         if (listens(peer) && fcsl_bus_alive(peer->bus, BUS_CONTROLLERS) == 0) {
             peer->met = 1;
             return 0;

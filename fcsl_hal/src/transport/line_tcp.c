@@ -11,7 +11,7 @@
 #include <string.h>
 #include <unistd.h>
 
-#include "base/monotonic.h"
+#include "fcsl/fcsl_monotonic.h"
 #include "fcsl/fcsl_address.h"
 #include "line.h"
 
@@ -67,7 +67,7 @@ static int connect_once(const struct sockaddr_storage *there, socklen_t length, 
     int code = connect(fd, (const struct sockaddr *)there, length) == 0 ? 0 : errno;
     if (code == EINPROGRESS) {
         struct pollfd entry = {.fd = fd, .events = POLLOUT};
-        const struct timespec left = time_left(deadline_ns);
+        const struct timespec left = fcsl_time_left(deadline_ns);
         socklen_t size = sizeof code;
         if (ppoll(&entry, 1, &left, NULL) <= 0 || getsockopt(fd, SOL_SOCKET, SO_ERROR, &code, &size) != 0) {
             code = ETIMEDOUT;
@@ -96,8 +96,8 @@ int line_open_tcp(line_t *line, const char *address, fcsl_wire_side_t side, uint
         return line->listener >= 0 ? 0 : -1;
     }
     int fd = connect_once(&there, length, deadline_ns);
-    while (fd < 0 && monotonic_ns() < deadline_ns) { /* nobody listens yet, or the host is not up yet */
-        const struct timespec pause = {.tv_nsec = RETRY_MS * NS_PER_MS};
+    while (fd < 0 && fcsl_monotonic_ns() < deadline_ns) { /* nobody listens yet, or the host is not up yet */
+        const struct timespec pause = {.tv_nsec = RETRY_MS * FCSL_NS_PER_MS};
         (void)nanosleep(&pause, NULL);
         fd = connect_once(&there, length, deadline_ns);
     }

@@ -11,7 +11,8 @@
 #include <termios.h>
 #include <unistd.h>
 
-#include "base/monotonic.h"
+#include "fcsl/fcsl_monotonic.h"
+
 #include "line.h"
 #include "serial/serial.h"
 
@@ -69,7 +70,7 @@ int line_open_uart(line_t *line, const char *device, uint32_t baud, char *error,
         (void)snprintf(error, error_size, "uart:%s:%" PRIu32 ": no serial device has this speed", device, baud);
         return -1;
     }
-    line->frame_ns = (uint64_t)FCSL_COBS_BYTES_MAX * BITS_PER_BYTE * NS_PER_S / baud;
+    line->frame_ns = (uint64_t)FCSL_COBS_BYTES_MAX * BITS_PER_BYTE * FCSL_NS_PER_S / baud;
     /* O_NONBLOCK: opening does not wait for a carrier. */
     const int fd = open(device, O_RDWR | O_NOCTTY | O_NONBLOCK | O_CLOEXEC);
     if (fd < 0 || isatty(fd) == 0) {

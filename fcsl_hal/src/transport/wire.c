@@ -10,7 +10,7 @@
 #include <string.h>
 #include <sys/un.h>
 
-#include "base/monotonic.h"
+#include "fcsl/fcsl_monotonic.h"
 #include "fcsl/fcsl_address.h"
 #include "wire_link.h"
 #include "wire_unix.h"
@@ -132,7 +132,7 @@ int fcsl_wire_open(const char *spec, fcsl_wire_side_t side, size_t message_max, 
 {
     parsed_t parsed;
     line_t line;
-    const uint64_t deadline_ns = monotonic_ns() + (uint64_t)timeout_ms * NS_PER_MS;
+    const uint64_t deadline_ns = fcsl_monotonic_ns() + (uint64_t)timeout_ms * FCSL_NS_PER_MS;
     if (parse(spec, &parsed, error, error_size) != 0) {
         return -1;
     }

@@ -16,7 +16,7 @@
 #include <sys/eventfd.h>
 #include <unistd.h>
 
-#include "base/monotonic.h"
+#include "fcsl/fcsl_monotonic.h"
 #include "link/link_frame.h"
 
 enum {
@@ -24,10 +24,11 @@ enum {
     RETRANSMIT_TICKS = 10,
     RETRANSMIT_TICKS_TCP = 250, /* it loses nothing by itself */
     WAITING_MAX = 4,            /* messages; in lock-step there are two. Commands that wait longer are of no use */
-    TICK_NS = 2 * NS_PER_MS,   /* without anything to send */
-    TICK_MIN_NS = NS_PER_MS / 5, /* a burst of messages makes no faster ticks: they count the time to retransmission */
-    CLOSE_NS = 300 * NS_PER_MS, /* for the peer to take what was sent last */
-    LOOK_NS = NS_PER_MS,
+    TICK_NS = 2 * FCSL_NS_PER_MS,   /* without anything to send */
+    TICK_MIN_NS = FCSL_NS_PER_MS /
+        5, /* a burst of messages makes no faster ticks: they count the time to retransmission */
+    CLOSE_NS = 300 * FCSL_NS_PER_MS, /* for the peer to take what was sent last */
+    LOOK_NS = FCSL_NS_PER_MS,
     TEXT_BYTES = 128
 };
 
@@ -199,7 +200,7 @@ static void attend(wire_t *wire, pump_t *pump)
     };
     /* Where the line has no room, no tick is due. */
     const uint64_t wait_ns = line->serial ? LOOK_NS : wire->tick_ns;
-    const struct timespec left = pump->sending ? timespec_of(wait_ns) : time_left(next_tick_ns(wire, pump));
+    const struct timespec left = pump->sending ? fcsl_timespec_of(wait_ns) : fcsl_time_left(next_tick_ns(wire, pump));
     if (ppoll(entries, 3, &left, NULL) <= 0) {
         return;
     }
@@ -228,7 +229,7 @@ static void *run(void *argument)
     wire_t *wire = argument;
     pump_t pump = {.asked = 1, .heard = 1};
     while (!stopped(wire)) {
-        const uint64_t now_ns = monotonic_ns();
+        const uint64_t now_ns = fcsl_monotonic_ns();
         if (!pump.sending && now_ns >= next_tick_ns(wire, &pump)) {
             tick(wire, &pump, now_ns);
         }
@@ -236,7 +237,7 @@ static void *run(void *argument)
         attend(wire, &pump);
     }
     /* The last acknowledgements. */
-    tick(wire, &pump, monotonic_ns());
+    tick(wire, &pump, fcsl_monotonic_ns());
     write_frames(wire, &pump);
     return NULL;
 }
@@ -306,11 +307,11 @@ static fcsl_wire_status_t link_receive(void *ctx, uint64_t deadline_ns, uint8_t 
     for (;;) { /* ends at the deadline, whatever arrives */
         clear(wire->news);
         const fcsl_wire_status_t status = take(wire, message, capacity, size);
-        if (status != FCSL_WIRE_NONE || monotonic_ns() >= deadline_ns) {
+        if (status != FCSL_WIRE_NONE || fcsl_monotonic_ns() >= deadline_ns) {
             return status;
         }
         struct pollfd entry = {.fd = wire->news, .events = POLLIN};
-        const struct timespec left = time_left(deadline_ns);
+        const struct timespec left = fcsl_time_left(deadline_ns);
         if (ppoll(&entry, 1, &left, NULL) < 0) {
             return FCSL_WIRE_NONE; /* a signal */
         }
@@ -363,9 +364,9 @@ static void release(wire_t *wire)
 static void link_close(void *ctx)
 {
     wire_t *wire = ctx;
-    const uint64_t deadline_ns = monotonic_ns() + CLOSE_NS;
+    const uint64_t deadline_ns = fcsl_monotonic_ns() + CLOSE_NS;
     const struct timespec look = {.tv_nsec = LOOK_NS};
-    while (!is_delivered(wire) && monotonic_ns() < deadline_ns) {
+    while (!is_delivered(wire) && fcsl_monotonic_ns() < deadline_ns) {
         (void)nanosleep(&look, NULL);
     }
     (void)pthread_mutex_lock(&wire->lock);
@@ -413,7 +414,7 @@ static int start(wire_t *wire)
 /* Differs from start to start, of one program and of several: the nanoseconds and the process number, mixed. */
 static uint16_t new_session(fcsl_wire_side_t side)
 {
-    uint64_t mixed = (monotonic_ns() ^ ((uint64_t)getpid() << 32u)) * UINT64_C(0x9E3779B97F4A7C15);
+    uint64_t mixed = (fcsl_monotonic_ns() ^ ((uint64_t)getpid() << 32u)) * UINT64_C(0x9E3779B97F4A7C15);
     const uint16_t session = (uint16_t)(mixed >> 48u);
     /* The two ends never take the same one. */
     return side == FCSL_WIRE_LISTEN ? (uint16_t)((session & 0xfffeu) | (session < 2u ? 2u : 0u))

@@ -14,7 +14,7 @@
 #include <sys/socket.h>
 #include <unistd.h>
 
-#include "base/monotonic.h"
+#include "fcsl/fcsl_monotonic.h"
 #include "fcsl/fcsl_socket.h"
 
 enum { BACKLOG = 4, TEXT_BYTES = 256, PATH_BYTES = 128, RETRY_MS = 20 };
@@ -144,14 +144,14 @@ static fcsl_wire_status_t unix_receive(void *ctx, uint64_t deadline_ns, uint8_t 
         const int listens = wire->listener >= 0 && (wire->fd < 0 || !wire->spoken);
         struct pollfd entries[2] = {{.fd = wire->fd, .events = POLLIN},
                                     {.fd = listens ? wire->listener : -1, .events = POLLIN}}; /* -1 is passed over */
-        const struct timespec left = time_left(deadline_ns);
+        const struct timespec left = fcsl_time_left(deadline_ns);
         const int ready = ppoll(entries, 2, &left, NULL);
         if (ready <= 0) {
             return ready == 0 || errno == EINTR ? FCSL_WIRE_NONE : fail(wire, "cannot wait for a message");
         }
         /* What a peer has said comes before the next peer. */
         status = entries[0].revents != 0 ? take_packet(wire, message, capacity, size) : take_peer(wire);
-    } while (status == FCSL_WIRE_NONE && monotonic_ns() < deadline_ns);
+    } while (status == FCSL_WIRE_NONE && fcsl_monotonic_ns() < deadline_ns);
     return status;
 }
 
@@ -182,10 +182,10 @@ static int connect_until(wire_t *wire, uint64_t deadline_ns, char *error, size_t
 {
     for (;;) {
         wire->fd = fcsl_socket_connect(wire->path, SOCK_SEQPACKET, error, error_size);
-        if (wire->fd >= 0 || monotonic_ns() >= deadline_ns) {
+        if (wire->fd >= 0 || fcsl_monotonic_ns() >= deadline_ns) {
             break;
         }
-        const struct timespec pause = {.tv_nsec = RETRY_MS * NS_PER_MS};
+        const struct timespec pause = {.tv_nsec = RETRY_MS * FCSL_NS_PER_MS};
         (void)nanosleep(&pause, NULL);
     }
     if (wire->fd >= 0 && size_buffer(wire->fd, wire->message_max) != 0) {

@@ -9,7 +9,7 @@
 #include <stdlib.h>
 #include <string.h>
 
-#include "base/monotonic.h"
+#include "fcsl/fcsl_monotonic.h"
 #include "bus_peer.h"
 #include "codec/codec_layout.h"
 #include "control_packet.h"
@@ -151,7 +151,7 @@ static void zenoh_close(void *ctx)
 static int open_session(wire_t *wire, const char *endpoint, uint64_t deadline_ns, char *error, size_t error_size)
 {
     const int listens = wire->peer.side == FCSL_WIRE_LISTEN;
-    const uint64_t now_ns = monotonic_ns();
+    const uint64_t now_ns = fcsl_monotonic_ns();
     const fcsl_bus_input_t input = {.key = listens ? CONTROLLER_ALL : SIMULATOR_ALL,
                                     .bytes = (uint32_t)wire->message_max,
                                     .depth = WAITING_MAX,
@@ -159,7 +159,7 @@ static int open_session(wire_t *wire, const char *endpoint, uint64_t deadline_ns
     const fcsl_bus_options_t options = {
         .role = listens ? FCSL_BUS_LISTEN : FCSL_BUS_CLIENT,
         .endpoint = endpoint,
-        .timeout_ms = deadline_ns > now_ns ? (uint32_t)((deadline_ns - now_ns) / NS_PER_MS) : 0u,
+        .timeout_ms = deadline_ns > now_ns ? (uint32_t)((deadline_ns - now_ns) / FCSL_NS_PER_MS) : 0u,
         .ring_bytes = WAITING_MAX * ((uint32_t)wire->message_max + ENTRY_BYTES_MAX),
         .outputs = listens ? SIMULATOR_KEYS : CONTROLLER_KEYS,
         .output_count = wire->peer.output_count,

@@ -13,7 +13,7 @@
 #include <time.h>
 
 #include "base/error.h"
-#include "base/timespec.h"
+#include "fcsl/fcsl_monotonic.h"
 
 /* How long a sample stands for what is on a pin. */
 static const uint64_t LATEST_NS = 500000000u;
@@ -174,7 +174,7 @@ int board_devices_free(board_devices_t *devices)
 int board_devices_wait(board_devices_t *devices, uint64_t deadline_ns)
 {
     const sensor_device_t *pacing = devices->devices[devices->plan->pacing];
-    const struct timespec deadline = timespec_of(deadline_ns);
+    const struct timespec deadline = fcsl_timespec_of(deadline_ns);
     int waited = 0;
     /* The semaphore may have been posted for samples that were taken already: each of them costs a turn. */
     while (!sensor_device_has_sample(pacing) && waited == 0 && atomic_load(&devices->interrupted) == 0) {
@@ -256,7 +256,7 @@ static int has_feed(const board_devices_t *devices, uint32_t d)
 uint32_t board_devices_take(board_devices_t *devices, sensor_reading_t *readings, uint32_t capacity)
 {
     const uint32_t share = devices->feed_count > 0u ? capacity / devices->feed_count : 0u; /* of a device */
-    const uint64_t now_ns = fcsl_run_monotonic_ns(NULL);
+    const uint64_t now_ns = fcsl_monotonic_ns();
     uint32_t count = 0;
     for (uint32_t d = 0; d < devices->plan->device_count; d++) {
         uint32_t samples = DEVICE_RING_SAMPLES; /* of one that makes no readings */

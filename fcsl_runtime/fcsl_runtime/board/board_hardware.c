@@ -12,6 +12,7 @@
 #include <time.h>
 
 #include "base/error.h"
+#include "fcsl/fcsl_monotonic.h"
 #include "output_device.h"
 #include "register_window.h"
 
@@ -44,11 +45,6 @@ struct board_hardware {
     char news[NEWS_BYTES];
 };
 
-static uint64_t now_ns(void)
-{
-    return fcsl_run_monotonic_ns(NULL);
-}
-
 /* ---- levels --------------------------------------------------------------------------------------------------------- */
 
 static void put_levels(board_hardware_t *hardware, uint32_t device)
@@ -62,7 +58,7 @@ static void put_levels(board_hardware_t *hardware, uint32_t device)
             memcpy(values + hardware->pin_at[i], &level, sizeof level);
         }
     }
-    output_device_put(output, now_ns());
+    output_device_put(output, fcsl_monotonic_ns());
 }
 
 static int is_open(const output_t *output)
@@ -339,7 +335,7 @@ static const char *reason_of(const output_t *output)
 
 const char *board_hardware_news(board_hardware_t *hardware)
 {
-    const uint64_t now = now_ns();
+    const uint64_t now = fcsl_monotonic_ns();
     for (uint32_t d = 0; d < hardware->plan->device_count; d++) {
         output_t *output = &hardware->outputs[d];
         if (output->is_failing == output->is_told || now - output->told_ns < NEWS_NS) {
@@ -378,7 +374,7 @@ static uint32_t count_unsafe(board_hardware_t *hardware, int puts, uint32_t *one
 int board_hardware_end(board_hardware_t *hardware, fcsl_error_t *error)
 {
     const struct timespec look = {.tv_nsec = LOOK_NS};
-    const uint64_t end_ns = now_ns() + END_NS;
+    const uint64_t end_ns = fcsl_monotonic_ns() + END_NS;
     uint32_t one = 0;
     if (!hardware->is_started) {
         return 0;
@@ -392,7 +388,7 @@ int board_hardware_end(board_hardware_t *hardware, fcsl_error_t *error)
         }
     }
     uint32_t missing = count_unsafe(hardware, 0, &one);
-    while (missing > 0u && now_ns() < end_ns) {
+    while (missing > 0u && fcsl_monotonic_ns() < end_ns) {
         (void)nanosleep(&look, NULL);
         missing = count_unsafe(hardware, 1, &one);
     }
@@ -411,7 +407,7 @@ void board_hardware_free(board_hardware_t *hardware)
         return;
     }
     (void)board_hardware_end(hardware, &ignored);
-    const uint64_t until_ns = now_ns() + END_NS;
+    const uint64_t until_ns = fcsl_monotonic_ns() + END_NS;
     for (uint32_t d = 0; d < hardware->plan->device_count; d++) {
         if (hardware->outputs[d].device != NULL) {
             output_device_end(hardware->outputs[d].device);

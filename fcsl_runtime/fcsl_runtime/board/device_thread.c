@@ -12,7 +12,7 @@
 #include <string.h>
 #include <time.h>
 
-#include "base/timespec.h"
+#include "fcsl/fcsl_monotonic.h"
 
 enum { STACK_BYTES = 256 << 10, LINE_BYTES = 64 /* of a cache */ };
 
@@ -53,7 +53,7 @@ int device_thread_start(pthread_t *thread, int priority, void *(*run)(void *), v
 
 int device_thread_end(pthread_t thread, sem_t *finished, uint64_t until_ns)
 {
-    const struct timespec until = timespec_of(until_ns);
+    const struct timespec until = fcsl_timespec_of(until_ns);
     int waited = 0;
     do {
         waited = sem_clockwait(finished, CLOCK_MONOTONIC, &until);

@@ -2,6 +2,7 @@
  *
  * The composite HAL.
  */
+#define _GNU_SOURCE
 #include "hal_composite.h"
 
 #include <inttypes.h>
@@ -10,6 +11,7 @@
 #include <string.h>
 
 #include "base/error.h"
+#include "fcsl/fcsl_monotonic.h"
 #include "hal_linux.h"
 
 static const uint64_t AHEAD_NS = 250000000u; /* of real time: the simulator goes too fast */
@@ -31,11 +33,6 @@ typedef struct {
     const fcsl_hal_t *culprit;
 } hal_t;
 
-static uint64_t now_ns(void)
-{
-    return fcsl_run_monotonic_ns(NULL);
-}
-
 /* ---- a tick --------------------------------------------------------------------------------------------------------- */
 
 static fcsl_hal_status_t fail(hal_t *hal, const char *what, uint64_t by_ns)
@@ -51,7 +48,7 @@ static fcsl_hal_status_t fail(hal_t *hal, const char *what, uint64_t by_ns)
 /* Whether the simulator is where the world is, at a tick that has come or is waited for. */
 static fcsl_hal_status_t keep_real_time(hal_t *hal, fcsl_hal_status_t sampled)
 {
-    const uint64_t now = now_ns();
+    const uint64_t now = fcsl_monotonic_ns();
     if (hal->simulated.paces != FCSL_PACED_BY_SIMULATOR) {
         return sampled;
     }

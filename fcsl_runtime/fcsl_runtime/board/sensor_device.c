@@ -16,7 +16,7 @@
 #include <time.h>
 
 #include "base/error.h"
-#include "base/timespec.h"
+#include "fcsl/fcsl_monotonic.h"
 #include "device_thread.h"
 #include "fcsl/fcsl_library.h"
 #include "fcsl/fcsl_scalar.h"
@@ -71,11 +71,6 @@ struct sensor_device {
     uint64_t told_ns;
     char news[NEWS_BYTES];
 };
-
-static uint64_t now_ns(void)
-{
-    return fcsl_run_monotonic_ns(NULL);
-}
 
 /* ---- before the thread ---------------------------------------------------------------------------------------------- */
 
@@ -168,7 +163,7 @@ static int open_device(sensor_device_t *device, char *why, size_t size)
     why[size - 1u] = '\0';
     atomic_store(&device->opened, status == FCSL_DRIVER_OK);
     device->why_now = FCSL_DRIVER_NOT_TOLD;
-    device->since_ns = now_ns();
+    device->since_ns = fcsl_monotonic_ns();
     return (int)status;
 }
 
@@ -240,7 +235,7 @@ static uint32_t count_input(sensor_device_t *device, int has_sample)
     atomic_fetch_add_explicit(&device->bytes, input->bytes, memory_order_relaxed);
     atomic_fetch_add_explicit(&device->frames, input->frames, memory_order_relaxed);
     atomic_fetch_add_explicit(&device->rejected, input->rejected, memory_order_relaxed);
-    const uint64_t now = now_ns();
+    const uint64_t now = fcsl_monotonic_ns();
     const uint32_t why = why_of(input);
     const uint32_t told = why > device->why_now ? why : device->why_now;
     const int begins_anew = has_sample || now - device->since_ns >= SILENT_NS;
@@ -280,7 +275,7 @@ static uint64_t read_device(sensor_device_t *device)
     fcsl_driver_status_t status = device->driver->read(device->state, &sample_ns, why, sizeof why);
     why[sizeof why - 1u] = '\0';
     const uint32_t silence = count_input(device, status == FCSL_DRIVER_OK);
-    if (status == FCSL_DRIVER_OK && sample_ns > now_ns() + AHEAD_NS) {
+    if (status == FCSL_DRIVER_OK && sample_ns > fcsl_monotonic_ns() + AHEAD_NS) {
         (void)snprintf(why, sizeof why, "its sample has a time in the future");
         status = FCSL_DRIVER_FAILED;
     }
@@ -314,7 +309,7 @@ static uint64_t read_device(sensor_device_t *device)
 /* Until then, or until the end. */
 static void sleep_until(sensor_device_t *device, uint64_t until_ns)
 {
-    const struct timespec until = timespec_of(until_ns);
+    const struct timespec until = fcsl_timespec_of(until_ns);
     while (atomic_load(&device->over) == 0 && sem_clockwait(&device->wake, CLOCK_MONOTONIC, &until) != 0 &&
            errno == EINTR) {
     }
@@ -323,7 +318,7 @@ static void sleep_until(sensor_device_t *device, uint64_t until_ns)
 /* The next time in the grid of the period that has not passed. */
 static uint64_t next_due(uint64_t due_ns, uint64_t period_ns)
 {
-    const uint64_t now = now_ns();
+    const uint64_t now = fcsl_monotonic_ns();
     return now < due_ns + period_ns ? due_ns + period_ns : due_ns + ((now - due_ns) / period_ns + 1u) * period_ns;
 }
 
@@ -344,10 +339,10 @@ static int look_again(sensor_device_t *device)
 static void *run(void *ctx)
 {
     sensor_device_t *device = ctx;
-    uint64_t due_ns = now_ns();
+    uint64_t due_ns = fcsl_monotonic_ns();
     while (atomic_load(&device->over) == 0) {
         if (!atomic_load(&device->opened) && !look_again(device)) {
-            sleep_until(device, now_ns() + LOOK_AGAIN_NS);
+            sleep_until(device, fcsl_monotonic_ns() + LOOK_AGAIN_NS);
             continue;
         }
         const uint64_t wait_ns = read_device(device);
@@ -355,7 +350,7 @@ static void *run(void *ctx)
             due_ns = next_due(due_ns, device->plan->period_ns);
             sleep_until(device, due_ns);
         } else if (wait_ns > 0u) {
-            sleep_until(device, now_ns() + wait_ns);
+            sleep_until(device, fcsl_monotonic_ns() + wait_ns);
         }
     }
     (void)sem_post(&device->finished);
@@ -449,7 +444,7 @@ const char *sensor_device_news(sensor_device_t *device)
                                       [DEVICE_OPEN] = "is there",
                                       [DEVICE_SILENT] = "is silent: ",
                                       [DEVICE_FAILING] = "fails: "};
-    const uint64_t now = now_ns();
+    const uint64_t now = fcsl_monotonic_ns();
     if ((atomic_load(&device->condition) == (int)device->told && atomic_load(&device->why) == device->told_why) ||
         now - device->told_ns < NEWS_NS || pthread_mutex_trylock(&device->reason_lock) != 0) {
         return NULL;
@@ -467,7 +462,7 @@ static int end_thread(sensor_device_t *device)
 {
     atomic_store(&device->over, 1);
     (void)sem_post(&device->wake);
-    return device_thread_end(device->thread, &device->finished, now_ns() + END_NS);
+    return device_thread_end(device->thread, &device->finished, fcsl_monotonic_ns() + END_NS);
 }
 
 int sensor_device_free(sensor_device_t *device)

@@ -11,6 +11,8 @@
 #include <string.h>
 #include <time.h>
 
+#include "fcsl/fcsl_monotonic.h"
+
 /* A sleeping loop looks up this often for a stop signal and for commands. */
 static const uint64_t SLICE_NS = 50000000u;
 /* How many publications a reader may be behind; less for machines so large that they would fill the memory. */
@@ -51,11 +53,6 @@ void loop_free(loop_t *loop)
     fcsl_history_free(&loop->history);
 }
 
-static uint64_t now_ns(void)
-{
-    return fcsl_run_monotonic_ns(NULL);
-}
-
 static void publish(loop_t *loop, uint64_t time_ns)
 {
     loop->hal.count(loop->hal.ctx);
@@ -68,7 +65,7 @@ static void publish(loop_t *loop, uint64_t time_ns)
 
 void loop_publish(loop_t *loop)
 {
-    publish(loop, now_ns());
+    publish(loop, fcsl_monotonic_ns());
 }
 
 uint64_t loop_hal_count(const loop_t *loop, const uint8_t *published, uint32_t field)
@@ -213,7 +210,7 @@ static int make_tick(loop_t *loop, fcsl_hal_status_t sampled)
     if (!goes_on(loop, sampled)) {
         return 0;
     }
-    const uint64_t begun_ns = now_ns();
+    const uint64_t begun_ns = fcsl_monotonic_ns();
     fcsl_tick_stats_put(&loop->stats.tick, fcsl_run_tick(loop->run));
     fcsl_tick_stats_put(&loop->stats.begun_ns, begun_ns);
     if (sampled == FCSL_HAL_OK) {
@@ -222,7 +219,7 @@ static int make_tick(loop_t *loop, fcsl_hal_status_t sampled)
     }
     const int on = act_on_sensors(loop, begun_ns);
     fcsl_tick_stats_put(&loop->stats.begun_ns, 0);
-    fcsl_histogram_add(&loop->stats.tick_time, now_ns() - begun_ns);
+    fcsl_histogram_add(&loop->stats.tick_time, fcsl_monotonic_ns() - begun_ns);
     return on;
 }
 
@@ -243,7 +240,7 @@ int loop_may_tick(const loop_t *loop)
 
 static void idle(loop_t *loop)
 {
-    const uint64_t deadline = now_ns() + SLICE_NS;
+    const uint64_t deadline = fcsl_monotonic_ns() + SLICE_NS;
     if (loop->vars != NULL && loop->attends) {
         fcsl_vars_attend(loop->vars, deadline);
     } else if (loop->vars != NULL) {

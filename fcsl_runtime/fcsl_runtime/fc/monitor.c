@@ -10,6 +10,7 @@
 #include <time.h>
 #include <unistd.h>
 
+#include "fcsl/fcsl_monotonic.h"
 #include "guard_link.h"
 #include "log.h"
 
@@ -83,7 +84,7 @@ static void *run_monitor(void *argument)
     uint64_t give_up = UINT64_MAX;
     for (;;) {
         const int number = sigtimedwait(&monitor->signals, NULL, &wait);
-        const uint64_t now = fcsl_run_monotonic_ns(NULL);
+        const uint64_t now = fcsl_monotonic_ns();
         if (atomic_load(&monitor->loop_over)) {
             print_log(monitor); /* the last ticks */
             fault_log_update(&monitor->faults);

@@ -2,10 +2,12 @@
  *
  * Binds the elements of channels to the outputs of a board.
  */
+#define _GNU_SOURCE
 #include <inttypes.h>
 #include <string.h>
 
 #include "base/error.h"
+#include "fcsl/fcsl_monotonic.h"
 #include "fcsl/fcsl_scalar.h"
 #include "outputs.h"
 
@@ -58,7 +60,7 @@ static int add_pulse(outputs_t *outputs, output_device_t *device, const fcsl_cha
                                       .size = scalar,
                                       .type = field->type,
                                       .rule = rule,
-                                      .map = output_map(rule, fcsl_run_monotonic_ns(NULL))};
+                                      .map = output_map(rule, fcsl_monotonic_ns())};
     return outputs_bind(outputs, &binding, (uint32_t)signal, error);
 }
 

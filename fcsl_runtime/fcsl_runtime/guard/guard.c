@@ -2,12 +2,14 @@
  *
  * What the guard does in a period.
  */
+#define _GNU_SOURCE
 #include "guard.h"
 
 #include <stdlib.h>
 #include <string.h>
 
 #include "base/error.h"
+#include "fcsl/fcsl_monotonic.h"
 
 static const uint64_t SAFE_NS = 2000000000u; /* for how long safe values are waited for */
 
@@ -72,7 +74,7 @@ static void take_command(guard_t *guard)
         fcsl_message_check(&guard->table, FCSL_ACTUATOR_MESSAGE, guard->bytes, size, &message);
     if (status != FCSL_MESSAGE_OK) {
         refuse(guard, fcsl_message_status_text(status));
-    } else if (begun_ns > fcsl_run_monotonic_ns(NULL)) {
+    } else if (begun_ns > fcsl_monotonic_ns()) {
         refuse(guard, "its time is in the future");
     } else {
         guard->commands++;
@@ -96,7 +98,7 @@ void guard_period(guard_t *guard)
     const fcsl_gate_state_t before = guard->gate.state;
     look_at_programs(guard);
     take_command(guard);
-    const uint64_t now_ns = fcsl_run_monotonic_ns(NULL);
+    const uint64_t now_ns = fcsl_monotonic_ns();
     fcsl_gate_wait(&guard->gate, now_ns, guard->data);
     guard->changes += guard->gate.state != before;
     guard->silences += guard->gate.state != before && guard->gate.state == FCSL_GATE_SILENT;

@@ -11,7 +11,7 @@
 #include <time.h>
 
 #include "base/error.h"
-#include "base/timespec.h"
+#include "fcsl/fcsl_monotonic.h"
 #include "fcsl/fcsl_library.h"
 #include "guard_options.h"
 #include "log.h"
@@ -179,10 +179,10 @@ static void announce(const program_t *program)
 static void wait_period(program_t *program, uint64_t period_ns, uint64_t *due_ns)
 {
     *due_ns += period_ns;
-    const struct timespec due = timespec_of(*due_ns);
+    const struct timespec due = fcsl_timespec_of(*due_ns);
     while (stop == 0 && clock_nanosleep(CLOCK_MONOTONIC, TIMER_ABSTIME, &due, NULL) == EINTR) {
     }
-    const uint64_t now_ns = fcsl_run_monotonic_ns(NULL);
+    const uint64_t now_ns = fcsl_monotonic_ns();
     if (now_ns >= *due_ns + period_ns) {
         const uint64_t missed = (now_ns - *due_ns) / period_ns;
         program->guard.periods_missed += missed;
@@ -193,11 +193,11 @@ static void wait_period(program_t *program, uint64_t period_ns, uint64_t *due_ns
 static int run(program_t *program)
 {
     const uint64_t period_ns = period_of(&program->options);
-    uint64_t due_ns = fcsl_run_monotonic_ns(NULL);
+    uint64_t due_ns = fcsl_monotonic_ns();
     announce(program);
     while (stop == 0) {
         guard_period(&program->guard);
-        report_changes(&program->report, &program->guard, fcsl_run_monotonic_ns(NULL));
+        report_changes(&program->report, &program->guard, fcsl_monotonic_ns());
         wait_period(program, period_ns, &due_ns);
     }
     const uint32_t failed = guard_make_safe(&program->guard, period_ns);

@@ -10,15 +10,11 @@
 #include <time.h>
 
 #include "base/error.h"
+#include "fcsl/fcsl_monotonic.h"
 #include "fcsl/fcsl_scalar.h"
 
 enum { LOOK_NS = 1000000 }; /* between two looks at devices that are waited for */
 static const uint64_t END_NS = 1000000000u; /* for the threads to end */
-
-static uint64_t now_ns(void)
-{
-    return fcsl_run_monotonic_ns(NULL);
-}
 
 int outputs_open(outputs_t *outputs, const fcsl_machine_t *machine, uint32_t devices, uint32_t bindings,
                  fcsl_error_t *error)
@@ -92,7 +88,7 @@ int outputs_start(outputs_t *outputs, const void *data, int priority, uint64_t p
         output_device_t *device = outputs->devices[i];
         fcsl_error_t why;
         if (output_device_start(device, priority, patience_ns, &why) == 0) {
-            put_device(outputs, device, data, 0, now_ns()); /* the next one may take its time to open */
+            put_device(outputs, device, data, 0, fcsl_monotonic_ns()); /* the next one may take its time to open */
         } else if (status == 0) {
             *error = why;
             status = -1;
@@ -118,7 +114,7 @@ static void put_safe(outputs_t *outputs, const void *data)
     for (uint32_t i = 0; i < outputs->device_count; i++) {
         output_device_t *device = outputs->devices[i];
         if (output_device_is_open(device) && !output_device_is_busy(device)) {
-            put_device(outputs, device, data, 0, now_ns());
+            put_device(outputs, device, data, 0, fcsl_monotonic_ns());
         }
     }
 }
@@ -142,17 +138,17 @@ static uint32_t count_missing(const outputs_t *outputs)
 uint32_t outputs_make_safe(outputs_t *outputs, const void *data, uint64_t period_ns, uint64_t limit_ns)
 {
     const struct timespec look = {.tv_nsec = LOOK_NS};
-    const uint64_t begin_ns = now_ns();
+    const uint64_t begin_ns = fcsl_monotonic_ns();
     uint64_t again_ns = begin_ns + period_ns;
     outputs_put(outputs, data, 0, begin_ns);
     await(outputs);
     uint32_t missing = count_missing(outputs);
-    while (missing > 0u && now_ns() < begin_ns + limit_ns) {
+    while (missing > 0u && fcsl_monotonic_ns() < begin_ns + limit_ns) {
         (void)nanosleep(&look, NULL);
         missing = count_missing(outputs);
-        if (missing > 0u && now_ns() >= again_ns) {
+        if (missing > 0u && fcsl_monotonic_ns() >= again_ns) {
             put_safe(outputs, data);
-            again_ns = now_ns() + period_ns;
+            again_ns = fcsl_monotonic_ns() + period_ns;
         }
     }
     return missing;
@@ -169,7 +165,7 @@ uint64_t outputs_missed(const outputs_t *outputs)
 
 void outputs_close(outputs_t *outputs)
 {
-    const uint64_t until_ns = now_ns() + END_NS;
+    const uint64_t until_ns = fcsl_monotonic_ns() + END_NS;
     for (uint32_t i = 0; i < outputs->device_count; i++) {
         output_device_end(outputs->devices[i]);
     }

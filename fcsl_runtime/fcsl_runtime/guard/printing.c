@@ -16,6 +16,7 @@
 
 #include "base/error.h"
 #include "fcsl/fcsl_log.h"
+#include "fcsl/fcsl_monotonic.h"
 #include "log.h"
 
 enum { END_S = 1, INFO = 'i', ERROR = 'e' };
@@ -75,9 +76,7 @@ void printing_end(void)
     if (!started) {
         return;
     }
-    struct timespec until = {0};
-    (void)clock_gettime(CLOCK_MONOTONIC, &until);
-    until.tv_sec += END_S;
+    const struct timespec until = fcsl_timespec_of(fcsl_monotonic_ns() + END_S * (uint64_t)FCSL_NS_PER_S);
     atomic_store(&over, 1);
     (void)sem_post(&written);
     int waited = 0;

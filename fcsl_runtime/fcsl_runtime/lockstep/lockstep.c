@@ -2,6 +2,7 @@
  *
  * Ticks of a run in lock-step with a simulator, some at a time.
  */
+#define _POSIX_C_SOURCE 200809L
 #include "fcsl/fcsl_lockstep.h"
 
 #include <stdarg.h>
@@ -10,8 +11,9 @@
 #include <string.h>
 
 #include "fcsl/fcsl_hal.h"
+#include "fcsl/fcsl_monotonic.h"
 
-enum { SPEC_BYTES = 512, NS_PER_MS = 1000000 };
+enum { SPEC_BYTES = 512 };
 
 struct fcsl_lockstep {
     fcsl_run_t *run;
@@ -225,9 +227,9 @@ static int make_tick(fcsl_lockstep_t *lockstep, fcsl_hal_status_t sampled, fcsl_
 int fcsl_lockstep_run(fcsl_lockstep_t *lockstep, uint32_t slice_ms, fcsl_error_t *error)
 {
     fcsl_hal_t *hal = &lockstep->hal;
-    const uint64_t end_ns = fcsl_run_monotonic_ns(NULL) + (uint64_t)slice_ms * NS_PER_MS;
+    const uint64_t end_ns = fcsl_monotonic_ns() + (uint64_t)slice_ms * FCSL_NS_PER_MS;
     int status = lockstep->connected ? FCSL_LOCKSTEP_RUNNING : fail(error, "no simulator is connected");
-    while (status == FCSL_LOCKSTEP_RUNNING && fcsl_run_monotonic_ns(NULL) < end_ns) {
+    while (status == FCSL_LOCKSTEP_RUNNING && fcsl_monotonic_ns() < end_ns) {
         const fcsl_hal_status_t sampled = hal->sample(hal->ctx, fcsl_run_tick(lockstep->run), lockstep->sensor_bytes,
                                                       lockstep->sensor_capacity, &lockstep->sensors);
         if (sampled == FCSL_HAL_OK || sampled == FCSL_HAL_NONE) {

@@ -10,6 +10,7 @@
 #include <time.h>
 
 #include "base/error.h"
+#include "fcsl/fcsl_monotonic.h"
 
 /* How long the last ticks may take to leave. */
 static const uint64_t LAST_NS = 1000000000u;
@@ -106,9 +107,9 @@ static uint64_t left_behind(follower_t *f)
 /* The host publishes nothing more. */
 static void finish(follower_t *f)
 {
-    const uint64_t deadline_ns = fcsl_run_monotonic_ns(NULL) + LAST_NS;
+    const uint64_t deadline_ns = fcsl_monotonic_ns() + LAST_NS;
     (void)follow(f);
-    while (!at_end(f) && fcsl_run_monotonic_ns(NULL) < deadline_ns) {
+    while (!at_end(f) && fcsl_monotonic_ns() < deadline_ns) {
         nap(f);
         (void)follow(f);
     }

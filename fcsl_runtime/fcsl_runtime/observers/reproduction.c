@@ -2,10 +2,12 @@
  *
  * Every message begins with a number: that of the write, or of the first one behind the checkpoint.
  */
+#define _GNU_SOURCE
 #include "reproduction.h"
 
 #include <stdlib.h>
 
+#include "fcsl/fcsl_monotonic.h"
 #include "fcsl/fcsl_scalar.h"
 
 enum { NUMBER_BYTES = 8 };
@@ -47,7 +49,7 @@ static int put_writes(reproduction_t *reproduction, fcsl_mirror_t *mirror, const
 static void answer_checkpoint(reproduction_t *reproduction, fcsl_mirror_t *mirror, const fcsl_moment_t *moment,
                               const uint8_t *publication)
 {
-    const uint64_t now_ns = fcsl_run_monotonic_ns(NULL);
+    const uint64_t now_ns = fcsl_monotonic_ns();
     if (now_ns - reproduction->answered_ns < CHECKPOINT_NS) {
         return;
     }

@@ -3,6 +3,7 @@
  * The machine's topics on a session of the bus, fed with every tick.
  */
 #define _GNU_SOURCE
+#include "fcsl/fcsl_monotonic.h"
 #include "fcsl/fcsl_ros_graph.h"
 
 #include <stdlib.h>
@@ -72,7 +73,7 @@ static uint64_t time_of(const fcsl_ros_graph_t *g, const followed_tick_t *tick)
     if (g->simulated) {
         return fcsl_tick_time_ns(g->topics.machine->tick_hz, tick->number);
     }
-    return clock_ns(CLOCK_REALTIME) - (fcsl_run_monotonic_ns(NULL) - tick->begun_ns);
+    return clock_ns(CLOCK_REALTIME) - (fcsl_monotonic_ns() - tick->begun_ns);
 }
 
 /* The messages of the first `count` topics. Returns 0, or -1: one found no room. */

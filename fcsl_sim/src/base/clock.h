@@ -8,7 +8,7 @@
 
 #include <stdint.h>
 
-#define FCSL_NS_PER_S 1000000000u
+#include "fcsl/fcsl_tick_time.h"
 
 /* Time of step `step` of a grid of `hz` (at most 1e9): floor(step * 1e9 / hz), never accumulated. The remainder is below
  * hz, so no product overflows before the result itself would. */

@@ -12,6 +12,7 @@
 
 #include "base/clock.h"
 #include "base/fail.h"
+#include "fcsl/fcsl_monotonic.h"
 
 /* Longest wait before fcsl_sim_run returns to its caller. */
 static const double SLICE_NS = 50e6;
@@ -45,7 +46,7 @@ static double left_ns(const fcsl_sim_t *sim, uint64_t now)
 void fcsl_sim_forgive(fcsl_sim_t *sim)
 {
     const fcsl_pace_t *pace = &sim->pace;
-    if (pace->anchored && pace->speed > 0 && left_ns(sim, fcsl_run_monotonic_ns(NULL)) < -FORGIVEN_NS) {
+    if (pace->anchored && pace->speed > 0 && left_ns(sim, fcsl_monotonic_ns()) < -FORGIVEN_NS) {
         fcsl_sim_pace_anew(sim);
     }
 }
@@ -57,7 +58,7 @@ uint64_t fcsl_sim_wait_until(fcsl_sim_t *sim)
     if (!paused && !(pace->speed > 0)) {
         return 0;
     }
-    const uint64_t now = fcsl_run_monotonic_ns(NULL);
+    const uint64_t now = fcsl_monotonic_ns();
     if (paused) {
         return now + (uint64_t)SLICE_NS;
     }

@@ -3,6 +3,7 @@
  * One tick with the controller: a machine hosted in this process, or another process (an external controller). Both get the same
  * bytes.
  */
+#define _GNU_SOURCE
 #include "exchange.h"
 
 #include <string.h>
@@ -10,6 +11,7 @@
 #include "base/fail.h"
 #include "engine/tick.h"
 #include "external_controller.h"
+#include "fcsl/fcsl_monotonic.h"
 #include "output/publish.h"
 #include "recording.h"
 #include "service.h"
@@ -93,7 +95,7 @@ static int exchange(fcsl_sim_t *sim, fcsl_message_t *message, fcsl_error_t *erro
 
 static uint64_t begin_tick(const fcsl_sim_t *sim)
 {
-    return sim->service ? fcsl_run_monotonic_ns(NULL) : 0;
+    return sim->service ? fcsl_monotonic_ns() : 0;
 }
 
 static void end_tick(fcsl_sim_t *sim, uint64_t begun_ns)
@@ -106,7 +108,7 @@ static void end_tick(fcsl_sim_t *sim, uint64_t begun_ns)
     fcsl_tick_stats_put(&stats->messages_refused, fcsl_run_messages_refused(sim->run));
     fcsl_tick_stats_put(&stats->hardware_failures, fcsl_run_hardware_failures(sim->run));
     fcsl_tick_stats_put(&stats->records_dropped, fcsl_run_record_dropped(sim->run));
-    fcsl_histogram_add(&stats->tick_time, fcsl_run_monotonic_ns(NULL) - begun_ns);
+    fcsl_histogram_add(&stats->tick_time, fcsl_monotonic_ns() - begun_ns);
 }
 
 /* ---- all ---------------------------------------------------------------------------------------------------------------- */

@@ -2,11 +2,13 @@
  *
  * Simulations with external controllers, in step with each other: all that run are sensed and asked, then all answers are taken.
  */
+#define _POSIX_C_SOURCE 200809L
 #include "base/clock.h"
 #include "base/fail.h"
 #include "engine/tick.h"
 #include "engine/tick_pacing.h"
 #include "external_controller.h"
+#include "fcsl/fcsl_monotonic.h"
 #include "output/simulation_topics.h"
 
 static int ask(fcsl_sim_t *sim, fcsl_error_t *error)
@@ -111,7 +113,7 @@ static int64_t run(fcsl_sim_t *const *sims, uint32_t count, uint64_t ticks, uint
 {
     int64_t done = 0;
     while (((uint64_t)done < ticks || how_many(sims, count, 1) > 0) && how_many(sims, count, 0) > 0 &&
-           fcsl_run_monotonic_ns(NULL) < end_ns) {
+           fcsl_monotonic_ns() < end_ns) {
         if (how_many(sims, count, 1) == 0) {
             if (!is_due(sims[0], end_ns)) {
                 say_alive(sims, count);
@@ -132,7 +134,7 @@ static int64_t run(fcsl_sim_t *const *sims, uint32_t count, uint64_t ticks, uint
 int64_t fcsl_sim_run_together(fcsl_sim_t *const *sims, uint32_t count, uint64_t ticks, uint32_t slice_ms,
                               uint32_t *failed, fcsl_error_t *error)
 {
-    const uint64_t end_ns = fcsl_run_monotonic_ns(NULL) + (uint64_t)slice_ms * (FCSL_NS_PER_S / 1000u);
+    const uint64_t end_ns = fcsl_monotonic_ns() + (uint64_t)slice_ms * (FCSL_NS_PER_S / 1000u);
     const int64_t done = run(sims, count, ticks, end_ns, failed, error);
     fcsl_sim_topics_wake(sims[0]);
     return done;

@@ -11,6 +11,8 @@
 #include <sys/mman.h>
 #include <time.h>
 
+#include "fcsl/fcsl_monotonic.h"
+
 /* The consumer looks by itself this often, so that a producer at moderate rates never makes a system call. */
 enum { LOOK_EVERY_NS = 10000000 };
 enum { HUGE_PAGE_BYTES = 2 << 20 };
@@ -66,13 +68,7 @@ static void sleep_on(sem_t *semaphore)
 /* Returns early when woken; the caller looks again in any case. */
 static void nap_on(sem_t *semaphore)
 {
-    struct timespec until = {0};
-    (void)clock_gettime(CLOCK_MONOTONIC, &until);
-    until.tv_nsec += LOOK_EVERY_NS;
-    if (until.tv_nsec >= 1000000000L) {
-        until.tv_nsec -= 1000000000L;
-        until.tv_sec++;
-    }
+    const struct timespec until = fcsl_timespec_of(fcsl_monotonic_ns() + LOOK_EVERY_NS);
     (void)sem_clockwait(semaphore, CLOCK_MONOTONIC, &until);
 }
 

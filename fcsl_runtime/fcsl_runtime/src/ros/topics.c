@@ -2,6 +2,7 @@
  *
  * What a tick shows as ROS 2 messages, put into an outbox.
  */
+#include "fcsl/fcsl_tick_time.h"
 #include "fcsl/fcsl_topics.h"
 
 #include <stdlib.h>
@@ -12,7 +13,6 @@
 #include "messages/message.h"
 
 enum {
-    NS_PER_S = 1000000000,
     STAMP_AT = 4,
     /* Encapsulation, stamp, empty frame_id and tick: in these alone do messages of the same content differ. */
     HEAD_BYTES = 4 + 8 + 8 + 8,
@@ -111,9 +111,10 @@ int fcsl_topics_add_channels(fcsl_topics_t *topics, uint32_t topic, fcsl_directi
 
 static void put_stamp(uint8_t *message, int64_t stamp_ns)
 {
-    const int64_t seconds = stamp_ns >= 0 ? stamp_ns / NS_PER_S : -((NS_PER_S - 1 - stamp_ns) / NS_PER_S);
+    const int64_t seconds =
+        stamp_ns >= 0 ? stamp_ns / FCSL_NS_PER_S : -((FCSL_NS_PER_S - 1 - stamp_ns) / FCSL_NS_PER_S);
     fcsl_put_u32(message + STAMP_AT, (uint32_t)(int32_t)seconds);
-    fcsl_put_u32(message + STAMP_AT + 4, (uint32_t)(stamp_ns - seconds * NS_PER_S));
+    fcsl_put_u32(message + STAMP_AT + 4, (uint32_t)(stamp_ns - seconds * FCSL_NS_PER_S));
 }
 
 static void put_instance(fcsl_topics_t *topics, const entry_t *entry, uint64_t tick, int64_t stamp_ns)

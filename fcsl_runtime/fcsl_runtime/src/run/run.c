@@ -9,6 +9,7 @@
 
 #include "fcsl/fcsl_fp_mode.h"
 #include "fcsl/fcsl_gate.h"
+#include "fcsl/fcsl_monotonic.h"
 #include "fcsl/fcsl_scalar.h"
 #include "substitution.h"
 #include "record/recorder.h"
@@ -133,9 +134,7 @@ void fcsl_run_set_clock(fcsl_run_t *run, uint64_t (*clock_ns)(void *ctx), void *
 uint64_t fcsl_run_monotonic_ns(void *ctx)
 {
     (void)ctx;
-    struct timespec now = {0};
-    (void)clock_gettime(CLOCK_MONOTONIC, &now);
-    return (uint64_t)now.tv_sec * 1000000000u + (uint64_t)now.tv_nsec;
+    return fcsl_monotonic_ns();
 }
 
 static void keep_verdicts(fcsl_run_t *run)

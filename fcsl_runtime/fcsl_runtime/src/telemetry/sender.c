@@ -7,15 +7,11 @@
 
 #include <time.h>
 
+#include "fcsl/fcsl_monotonic.h"
 #include "fcsl/fcsl_tick_time.h"
 
 /* Datagrams of the configuration in one round: what a socket of the usual size holds while its reader is busy. */
 enum { BURST = 32 };
-
-static uint64_t now_ns(void)
-{
-    return fcsl_run_monotonic_ns(NULL);
-}
 
 static void count(_Atomic uint64_t *number, uint64_t more)
 {
@@ -65,7 +61,7 @@ static void send_data(fcsl_telemetry_t *t, uint64_t tick)
     const data_head_t head = {.tick = tick,
                               .time_ns = fcsl_tick_time_ns(t->tick_hz, tick),
                               .overwritten = atomic_load_explicit(&t->overwritten, memory_order_relaxed)};
-    if (fcsl_resend_due(&t->resend, t->data.sequence, 1, now_ns())) {
+    if (fcsl_resend_due(&t->resend, t->data.sequence, 1, fcsl_monotonic_ns())) {
         begin_configuration(t);
     }
     fcsl_channels_pack(&t->channels, &head, t->publication, t->body);
@@ -113,7 +109,7 @@ void *fcsl_telemetry_send(void *telemetry)
 {
     fcsl_telemetry_t *t = telemetry;
     const struct timespec nap = {.tv_nsec = (long)t->nap_ns};
-    t->resend = fcsl_resend_begin(now_ns());
+    t->resend = fcsl_resend_begin(fcsl_monotonic_ns());
     begin_configuration(t);
     for (;;) {
         const int last = atomic_load(&t->stop);
@@ -124,7 +120,7 @@ void *fcsl_telemetry_send(void *telemetry)
         }
         if (t->configuration_at < t->configuration.total) {
             continue_configuration(t, BURST);
-        } else if (fcsl_resend_due(&t->resend, t->data.sequence, 0, now_ns())) {
+        } else if (fcsl_resend_due(&t->resend, t->data.sequence, 0, fcsl_monotonic_ns())) {
             begin_configuration(t);
         }
         if (all) {

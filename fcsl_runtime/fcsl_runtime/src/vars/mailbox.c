@@ -9,7 +9,7 @@
 #include <string.h>
 #include <time.h>
 
-#include "base/timespec.h"
+#include "fcsl/fcsl_monotonic.h"
 
 enum { FREE, POSTED, ANSWERED };
 
@@ -71,7 +71,7 @@ void fcsl_mailbox_answer(mailbox_t *mailbox)
 
 void fcsl_mailbox_wait(mailbox_t *mailbox, uint64_t deadline_ns)
 {
-    const struct timespec until = timespec_of(deadline_ns);
+    const struct timespec until = fcsl_timespec_of(deadline_ns);
     (void)sem_clockwait(&mailbox->arrived, CLOCK_MONOTONIC, &until);
 }
 

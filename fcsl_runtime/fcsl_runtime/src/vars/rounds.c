@@ -11,7 +11,8 @@
 #include <time.h>
 #include <unistd.h>
 
-#include "base/timespec.h"
+#include "fcsl/fcsl_monotonic.h"
+
 #include "server.h"
 
 enum { STREAM_POLL_MS = 2 }; /* for publications, which wake nobody */
@@ -54,7 +55,7 @@ static int prepare(fcsl_vars_t *vars, struct pollfd *entries, uint32_t used, int
         timeout_ms = least(timeout_ms, fcsl_vars_watch(&vars->clients[i], &entries[FIRST_CLIENT + i]));
     }
     if (vars->accept_at_ns != 0) {
-        vars->accept_at_ns = fcsl_run_monotonic_ns(NULL) < vars->accept_at_ns ? vars->accept_at_ns : 0;
+        vars->accept_at_ns = fcsl_monotonic_ns() < vars->accept_at_ns ? vars->accept_at_ns : 0;
         timeout_ms = least(timeout_ms, POLL_MS);
     }
     entries[LISTENER] = (struct pollfd){.fd = vars->accept_at_ns == 0 ? vars->listener.fd : -1, .events = POLLIN};
@@ -76,7 +77,7 @@ static void make_round(fcsl_vars_t *vars, int most_ms)
         const ssize_t got = read(vars->attention, &calls, sizeof calls);
         (void)got; /* what it was called for shows elsewhere */
     }
-    const uint64_t now_ns = fcsl_run_monotonic_ns(NULL);
+    const uint64_t now_ns = fcsl_monotonic_ns();
     fcsl_vars_serve_command(vars, now_ns);
     fcsl_vars_stream(vars, now_ns);
     const uint32_t first = vars->next < used ? vars->next : 0;
@@ -103,7 +104,7 @@ static int pass(fcsl_vars_t *vars, int from, int to)
 static void sleep_aside(fcsl_vars_t *vars)
 {
     do {
-        const struct timespec until = timespec_of(fcsl_run_monotonic_ns(NULL) + LOOK_EVERY_NS);
+        const struct timespec until = fcsl_timespec_of(fcsl_monotonic_ns() + LOOK_EVERY_NS);
         if (sem_clockwait(&vars->returned, CLOCK_MONOTONIC, &until) == 0) {
             return;
         }
@@ -129,7 +130,7 @@ void *fcsl_vars_make_rounds(void *argument)
     if (vars->poster < CLIENTS_MAX) {
         client_t *client = &vars->clients[vars->poster];
         json_out_t out = fcsl_client_room(client, REPLY_BYTES_MAX);
-        const uint64_t now_ns = fcsl_run_monotonic_ns(NULL);
+        const uint64_t now_ns = fcsl_monotonic_ns();
         fcsl_commander_abandon(&vars->commander, &client->session, &out);
         fcsl_client_put(client, &out, now_ns);
         fcsl_vars_send(vars, client, now_ns);
@@ -178,7 +179,7 @@ void fcsl_vars_attend(fcsl_vars_t *vars, uint64_t deadline_ns)
         fcsl_mailbox_wait(&vars->mailbox, deadline_ns);
         return;
     }
-    const uint64_t now_ns = fcsl_run_monotonic_ns(NULL);
+    const uint64_t now_ns = fcsl_monotonic_ns();
     const int waits = fcsl_mailbox_take(&vars->mailbox) == NULL && now_ns < deadline_ns;
     make_round(vars, waits ? (int)((deadline_ns - now_ns) / 1000000u) + 1 : 0);
 }

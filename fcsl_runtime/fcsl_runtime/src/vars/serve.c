@@ -2,8 +2,11 @@
  *
  * The variable server's end on the step thread.
  */
+#define _GNU_SOURCE
 #include <stdio.h>
 #include <string.h>
+
+#include "fcsl/fcsl_monotonic.h"
 
 #include "server.h"
 
@@ -141,7 +144,7 @@ void fcsl_vars_serve(fcsl_vars_t *vars)
     const int replies = attends && fcsl_vars_end_work(vars);
     fcsl_mailbox_answer(&vars->mailbox);
     if (replies) {
-        fcsl_vars_serve_command(vars, fcsl_run_monotonic_ns(NULL));
+        fcsl_vars_serve_command(vars, fcsl_monotonic_ns());
     } else {
         fcsl_vars_call(vars);
     }
