@@ -73,8 +73,8 @@ PACKAGES = {
             "src/guard": ("fcsl_gate.h", "fcsl_guard.h"),
             "src/drivers": (),
             "src/frontends": ("fcsl_frontend.h",),
-            "src/receivers": (),
             "src/serial": (),
+            "src/sysfs": (),
             "io": ("fcsl_mcap_writer.h",),
             "src/bus": ("fcsl_bus.h",),
             "src/link": ("fcsl_cobs.h", "fcsl_link.h"),
@@ -175,7 +175,9 @@ class Tree:
 
 
 def _belongs(file: Path, folder: str, package: Package) -> bool:
-    return file.name in package.layers[folder] if file.parts[0] == "include" else str(file.parent) == folder
+    if file.parts[0] == "include":
+        return file.name in package.layers[folder]
+    return Path(folder) in file.parents
 
 
 def unit(file: str) -> str:

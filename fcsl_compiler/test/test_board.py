@@ -27,7 +27,7 @@ from fcsl_test_boards import (
 )
 
 from fcsl_compiler.board.board import check_board
-from fcsl_compiler.board.drivers import ACTUATORS, BUFFERED, POLLED, WAITING
+from fcsl_compiler.board.drivers import known_drivers
 from fcsl_compiler.board.kinds import KINDS, MAX_BACKENDS, MAX_SECTIONS, STICKS
 from fcsl_compiler.board.limits import (
     MAX_CONVERTERS,
@@ -138,18 +138,22 @@ def test_kinds_are_those_of_the_runtime() -> None:
     assert {kind: [(n, u, c, g) for n, u, _, c, g in of_kind] for kind, of_kind in rows.items()} == known
 
 
-def test_drivers_are_those_that_come_with_fcsl() -> None:
-    sources = "".join(f.read_text() for f in sorted((ROOT / "fcsl_hal/src/drivers").glob("driver_*.c")))
+def test_each_row_of_the_table_of_drivers_is_a_driver_in_a_folder() -> None:
+    """fcsl_hal builds those that its table lists, and the compiler reads the same table."""
+    sources = "".join(f.read_text() for f in sorted((ROOT / "fcsl_hal/src/drivers").glob("*/driver_*.c")))
     rows = re.findall(r"^const fcsl_driver_t \w+ = \{(.*?)^\};", sources, re.DOTALL | re.MULTILINE)
-    found: dict[tuple[str, bool], set[str]] = {}
+    found = {}
     for row in rows:
-        name, direction = re.findall(r'\.name = "(\w+)"|\.direction = FCSL_(\w+)', row)
-        found.setdefault((direction[1], ".waits = 1" in row), set()).add(name[0])
-    assert found == {
-        ("SENSOR", False): set(POLLED),
-        ("SENSOR", True): {*BUFFERED, *WAITING},
-        ("ACTUATOR", False): set(ACTUATORS),
-    }
+        (name,), (direction,) = re.findall(r'\.name = "(\w+)"', row), re.findall(r"\.direction = FCSL_(\w+)", row)
+        found[name] = "actuator" if direction == "ACTUATOR" else "waits" if ".waits = 1" in row else "polled"
+    kinds = {name: driver.kind for name, driver in known_drivers().items()}
+    assert found == {n: k.replace("buffered", "waits").replace("waiting", "waits") for n, k in kinds.items()}
+
+
+def test_drivers_are_unknown_without_the_hal(folder: Path, monkeypatch: pytest.MonkeyPatch, capfd: Any) -> None:
+    monkeypatch.setenv("AMENT_PREFIX_PATH", "")
+    assert main(["board", str(write_board(folder, BOARD))]) == 1
+    assert "package `fcsl_hal` is not installed" in capfd.readouterr().err
 
 
 @pytest.mark.parametrize(
@@ -272,7 +276,7 @@ def test_machine_of_a_package(folder: Path, monkeypatch: pytest.MonkeyPatch) -> 
     (prefix / "share/ament_index/resource_index/packages/craft").touch()
     (prefix / "share/craft").mkdir()
     write_machine(prefix / "share/craft")
-    monkeypatch.setenv("AMENT_PREFIX_PATH", str(prefix))
+    monkeypatch.setenv("AMENT_PREFIX_PATH", str(prefix), prepend=":")
     (folder / "quad.json").unlink()
     assert found(folder, edited("machine", value="package://craft/quad.json")) == []
 

@@ -19,7 +19,7 @@
 #include <unistd.h>
 
 #include "fcsl/fcsl_monotonic.h"
-#include "drivers/drivers.h"
+#include "drivers.h"
 #include "fcsl_check.h"
 
 enum { TREE_BYTES = 256, STATE_BYTES = 4096, WHY_BYTES = 256, SIGNALS_MAX = 16, NOBODY = 65534 };

@@ -20,8 +20,8 @@
 #include <unistd.h>
 
 #include "driver_rig.h"
-#include "drivers/can_signal.h"
-#include "drivers/drivers.h"
+#include "drivers/can/can_signal.h"
+#include "drivers.h"
 
 enum { FILTERS_MAX = 16, INDEX = 7 };
 

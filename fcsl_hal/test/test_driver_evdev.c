@@ -17,8 +17,8 @@
 #include <unistd.h>
 
 #include "driver_rig.h"
-#include "drivers/drivers.h"
-#include "drivers/evdev_sticks.h"
+#include "drivers.h"
+#include "drivers/evdev/evdev_sticks.h"
 
 enum { PATH_BYTES = 256, AXES = 3, NS_PER_US = 1000 };
 

@@ -5,7 +5,7 @@
 #define _GNU_SOURCE
 #include <math.h>
 
-#include "drivers/drivers.h"
+#include "drivers.h"
 #include "serial_rig.h"
 
 enum { PVT_FRAME = 100 };

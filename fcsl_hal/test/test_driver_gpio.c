@@ -8,7 +8,7 @@
 #include <stdarg.h>
 #include <sys/ioctl.h>
 
-#include "drivers/gpio_chip.h"
+#include "drivers/gpio/gpio_chip.h"
 #include "sysfs_rig.h"
 
 enum { CHIPS = 3, LINES = 70, REQUEST_FILE = 900, REQUESTS = 16 };

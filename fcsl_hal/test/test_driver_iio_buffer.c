@@ -6,7 +6,7 @@
 #include <inttypes.h>
 #include <stdint.h>
 
-#include "drivers/iio_scan.h"
+#include "drivers/iio/iio_scan.h"
 #include "sysfs_rig.h"
 
 #define DEVICES "bus/iio/devices/"

@@ -5,7 +5,7 @@
 #define _GNU_SOURCE
 #include <math.h>
 
-#include "drivers/drivers.h"
+#include "drivers.h"
 #include "serial_rig.h"
 
 enum { SBUS_BYTES = 25, CRSF_BYTES = 26, LINK_BYTES = 14, FLAGS = 23 };

@@ -9,7 +9,7 @@
 #include <time.h>
 
 #include "fcsl_check.h"
-#include "receivers/gnss.h"
+#include "drivers/gnss/gnss.h"
 
 enum { LINE_BYTES = 256, PVT_BYTES = 92, PVT_FRAME = PVT_BYTES + 8 };
 

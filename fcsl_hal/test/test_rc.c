@@ -5,7 +5,7 @@
 #include <string.h>
 
 #include "fcsl_check.h"
-#include "receivers/rc.h"
+#include "drivers/rc/rc.h"
 
 enum { SBUS_BYTES = 25, CRSF_BYTES = 26 };
 

@@ -1,6 +1,7 @@
 # SPDX-License-Identifier: Apache-2.0
-"""What boards consist of: kinds of sensors, rotations, pulses."""
+"""What boards consist of: drivers, kinds of sensors, rotations, pulses."""
 
+from ..board.drivers import known_drivers
 from ..board.kinds import KINDS
 from ..board.pulses import Line
 from ..board.rotations import IDENTITY, NAMED, from_angles, matrix_problem
@@ -11,5 +12,6 @@ __all__ = [
     "Line",
     "NAMED",
     "from_angles",
+    "known_drivers",
     "matrix_problem",
 ]

@@ -10,7 +10,7 @@ from ..parse.json_reader import ConfigReader
 from ..parse.json_source import JsonNode
 from .corrections import Correction, read_corrections
 from .devices import Device, read_device_name
-from .drivers import ACTUATORS, check_signal, read_signal
+from .drivers import ACTUATOR, check_signal, kind_of, read_signal
 from .filters import Filter, Section, sections_for
 from .kinds import KINDS, MAX_BACKENDS
 from .quantities import by_quantity, measured
@@ -71,7 +71,7 @@ class BackendReader:
             message, notes = f"device `{name}` twice in one sensor", [(first, "the first time")]
             self.reader.sink.error("E509", message, node.span, help="remove this", notes=notes)
         device = self.devices[name]
-        if device is not None and device.driver in ACTUATORS:
+        if device is not None and kind_of(device.driver) == ACTUATOR:
             message, why = f"device `{name}` cannot be a backend", f"`{device.driver}` drives actuators"
             self.reader.sink.error("E518", message, node.span, why=why, notes=[(device.span, "the device")])
         return device

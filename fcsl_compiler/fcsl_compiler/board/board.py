@@ -15,13 +15,14 @@ from ..parse.json_source import JsonNode, parse_json
 from .backends import BackendReader
 from .channels import ChannelBinder
 from .devices import Device, read_devices
+from .drivers import known_drivers
 from .hardware import Hardware, HardwareReader, warn_unreached
 from .machine import load_machine
 from .outputs import Output, OutputReader
 from .pace import Pace, read_pace
 from .sensors import Sensor, read_sensors
 
-SCHEMA = Path(__file__).parent / "board.schema.json"
+_SCHEMA = Path(__file__).parent / "board.schema.json"
 
 
 @dataclass(frozen=True)
@@ -39,8 +40,15 @@ class Board:
     warnings: tuple[Diagnostic, ...]
 
 
+def board_schema() -> str:
+    """The JSON Schema of boards, with the drivers that come with FCSL. Raises PackageNotFound where there are none."""
+    drivers = ", ".join(f'"{name}"' for name in known_drivers())
+    return _SCHEMA.read_text(encoding="utf-8").replace('"DRIVERS"', drivers)
+
+
 def check_board(path: Path) -> Board:
-    """Reads and checks a board. Raises DiagnosticError with all errors, those of the machine first."""
+    """Reads and checks a board. Raises DiagnosticError with all errors, those of the machine first; PackageNotFound where the
+    drivers that come with FCSL are not installed."""
     sink = DiagnosticSink()
     root = _parse(path, sink)
     sink.raise_if_failed()

@@ -10,7 +10,7 @@ from ..base.diagnostics import nearest
 from ..base.source import Span
 from ..parse.json_reader import ConfigReader
 from ..parse.json_source import JsonNode
-from .drivers import ACTUATORS, BUFFERED, DRIVERS, POLLED, WAITING
+from .drivers import ACTUATOR, BUFFERED, POLLED, WAITING, kind_of, known_drivers
 from .limits import MAX_DEVICES, check_count, check_name, check_text
 
 MIN_RATE_HZ, MAX_RATE_HZ = 0.001, 100_000.0
@@ -74,26 +74,28 @@ def _device(name: str, span: Span, definition: JsonNode, reader: ConfigReader) -
 
 def _driver(node: JsonNode | None, reader: ConfigReader) -> str | None:
     text = check_text(node, "`driver`", reader)
-    if node is None or text is None or text in DRIVERS or _OF_LIBRARY.fullmatch(text):
+    if node is None or text is None or kind_of(text) or _OF_LIBRARY.fullmatch(text):
         return text
     if "/" in text or ".so" in text or ":" in text:
         hint = "write LIBRARY.so:NAME, without spaces"
     else:
-        hint = nearest(text, tuple(DRIVERS)) or f"there are {', '.join(DRIVERS)}; one of a library is LIBRARY.so:NAME"
+        known = tuple(known_drivers())
+        hint = nearest(text, known) or f"there are {', '.join(known)}; one of a library is LIBRARY.so:NAME"
     reader.sink.error("E503", f"no driver `{text}`", node.span, help=hint)
     return None
 
 
 def _check_rate(name: str, driver: str, definition: JsonNode, node: JsonNode | None, reader: ConfigReader) -> bool:
     """Whether the device has a rate if and only if its driver needs one; that of a library may have one."""
-    if driver in (*POLLED, *BUFFERED) and node is None:
-        why = "it is read at this rate" if driver in POLLED else "filters need to know how often it samples"
+    kind = kind_of(driver)
+    if kind in (POLLED, BUFFERED) and node is None:
+        why = "it is read at this rate" if kind == POLLED else "filters need to know how often it samples"
         fix = 'add `"rate_hz": …`'
         reader.sink.error("E504", f"device `{name}` has no `rate_hz`", definition.span, why=why, help=fix)
         return False
-    if driver in (*WAITING, *ACTUATORS) and node is not None:
+    if kind in (WAITING, ACTUATOR) and node is not None:
         waits = f"`{driver}` waits for the device, which sends when it likes"
-        why = waits if driver in WAITING else f"`{driver}` is written as often as the guard writes"
+        why = waits if kind == WAITING else f"`{driver}` is written as often as the guard writes"
         reader.sink.error("E504", f"device `{name}` has a rate", node.span, why=why, help="remove `rate_hz`")
         return False
     return True

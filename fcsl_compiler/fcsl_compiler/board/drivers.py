@@ -1,11 +1,18 @@
 # SPDX-License-Identifier: Apache-2.0
-"""The drivers that come with FCSL, and their signals: fcsl_hal/src/drivers/drivers_built_in.c."""
+"""The drivers that come with FCSL, and their signals: drivers.json of fcsl_hal."""
 
 from __future__ import annotations
 
+import json
 import re
+from collections.abc import Iterator
+from dataclasses import dataclass
+from functools import cache
+from pathlib import Path
+from typing import Any
 
 from ..base.diagnostics import nearest
+from ..base.packages import package_share
 from ..base.source import Span
 from ..parse.json_reader import ConfigReader
 from ..parse.json_source import JsonNode
@@ -14,41 +21,49 @@ from .limits import check_name
 _SIGNAL = re.compile(r"[A-Za-z_]\w*", re.ASCII)
 
 
-def _numbered(name: str, count: int) -> tuple[str, ...]:
-    return tuple(f"{name}{i}" for i in range(count))
+#: Kinds of drivers: read at a rate; waits, and the device samples at the rate that it is set to; waits for the next sample;
+#: writes.
+POLLED, BUFFERED, WAITING, ACTUATOR = "polled", "buffered", "waiting", "actuator"
 
 
-_IIO = ("gyro", "accel", "field", "pressure", "temperature", "distance", *_numbered("voltage", 8))
-_LINES = _numbered("line", 64)
-_RC = ("sticks", "failsafe")
-_GNSS = (
-    *("fix", "latitude", "longitude", "altitude", "height", "velocity", "satellites"),
-    *("horizontal_accuracy", "vertical_accuracy", "speed_accuracy"),
-)
+@dataclass(frozen=True)
+class Driver:
+    """A driver that comes with FCSL. `signals`: of an actuator, those that an output can drive, one f64 each. `pins`: whether
+    they may be "levels" or "counts" of the machine's hardware. `pulse_hz`: how often they are pulses of so many microseconds,
+    where the address says nothing else; 0: they are none. `serial`: its device is a serial port."""
 
-#: Those of sensors that are read at a rate; the others wait for the next sample.
-POLLED = {
-    "iio": _IIO,
-    "power_supply": ("voltage", "current", "charge", "temperature"),
-    "thermal": ("value",),
-    "adc": _numbered("counts", 16),
-    "gpio": _LINES,
-}
-#: Waits, and the device samples at the rate that it is set to.
-BUFFERED = {"iio_buffer": _IIO}
-WAITING = {
-    "evdev": _RC,
-    "sbus": _RC,
-    "crsf": (*_RC, "rssi", "link_quality"),
-    "ubx": _GNSS,
-    "nmea": _GNSS,
-    "can": _numbered("value", 8),
-}
-SENSORS = {**POLLED, **BUFFERED, **WAITING}
-#: The signals that an output can drive: one f64 each.
-ACTUATORS = {"pwm": _numbered("pulse", 16), "gpio_out": _LINES, "log": ("number",)}
-#: Signals by driver.
-DRIVERS = {**SENSORS, **ACTUATORS}
+    kind: str
+    signals: tuple[str, ...]
+    serial: bool
+    pins: tuple[str, ...]
+    pulse_hz: float
+
+
+def known_drivers() -> dict[str, Driver]:
+    """By name. Raises PackageNotFound where `fcsl_hal` is not installed."""
+    return _read(package_share("fcsl_hal") / "drivers.json")
+
+
+def kind_of(driver: str) -> str:
+    """ "" of a driver of a library, of which nothing is known."""
+    known = known_drivers().get(driver)
+    return known.kind if known else ""
+
+
+@cache
+def _read(path: Path) -> dict[str, Driver]:
+    return {row["name"]: _driver(row) for row in json.loads(path.read_text(encoding="utf-8"))}
+
+
+def _driver(row: dict[str, Any]) -> Driver:
+    signals = tuple(name for text in row["signals"] for name in _numbered(text))
+    return Driver(row["kind"], signals, row.get("serial", False), tuple(row.get("pins", ())), row.get("pulse_hz", 0.0))
+
+
+def _numbered(text: str) -> Iterator[str]:
+    """`line0..63` is short for line0, line1 and so on."""
+    match = re.fullmatch(r"(\w*\D)(\d+)\.\.(\d+)", text, re.ASCII)
+    yield from (f"{match[1]}{i}" for i in range(int(match[2]), int(match[3]) + 1)) if match else (text,)
 
 
 def read_signal(node: JsonNode | None, what: str, reader: ConfigReader) -> str | None:
@@ -65,9 +80,9 @@ def read_signal(node: JsonNode | None, what: str, reader: ConfigReader) -> str |
 
 def check_signal(name: str, driver: str, span: Span, reader: ConfigReader) -> None:
     """Reports a signal that the driver does not have, or that no output can drive. Nothing is known of the drivers of libraries."""
-    known = DRIVERS.get(driver)
-    if known is not None and name not in known:
-        hint = nearest(name, known) or f"it has {_listed(known)}"
+    known = known_drivers().get(driver)
+    if known is not None and name not in known.signals:
+        hint = nearest(name, known.signals) or f"it has {_listed(known.signals)}"
         reader.sink.error("E521", f"driver `{driver}` has no signal `{name}`", span, help=hint)
 
 

@@ -4,7 +4,7 @@
 from __future__ import annotations
 
 import re
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator
 from dataclasses import dataclass
 
 from ..base.source import Span
@@ -13,7 +13,7 @@ from ..model.machine import Machine
 from ..parse.json_reader import ConfigReader
 from ..parse.json_source import JsonNode
 from .devices import Device, read_device_name
-from .drivers import ACTUATORS, DRIVERS, check_signal, read_signal
+from .drivers import ACTUATOR, check_signal, kind_of, known_drivers, read_signal
 from .limits import MAX_CONVERTERS, MAX_PINS, MAX_REGISTERS, check_count, check_text
 from .outputs import OutputReader, check_driven, misfit_as_output
 
@@ -25,8 +25,8 @@ _NUMBER = re.compile(r"0|[1-9][0-9]{0,9}")
 _ADDRESS = re.compile(r"0x[0-9a-fA-F]{1,8}|0|[1-9][0-9]{0,9}")
 #: Builtins by their names in C.
 _BUILTINS = {function.name: name for name, function in HARDWARE.items()}
-#: Built-in drivers whose signals are levels, or counts; what comes on a CAN bus may be either.
-_LEVELS, _LEVELS_OUT, _COUNTS = ("gpio", "can"), ("gpio_out", "log"), ("adc", "can")
+#: What the signals of drivers may be; those that come on a CAN bus are either.
+_LEVELS, _COUNTS = "levels", "counts"
 
 
 @dataclass(frozen=True)
@@ -132,7 +132,7 @@ class HardwareReader:
             return None
         safe = self.reader.boolean(keys.get("safe"), "`safe`")
         is_output = "safe" in keys
-        device, signal = self._signal(keys, is_output, _LEVELS_OUT if is_output else _LEVELS)
+        device, signal = self._signal(keys, is_output, _LEVELS)
         if number is None or device is None or signal is None or (safe is None and "safe" in keys):
             return None
         return Pin(number, device, signal, safe)
@@ -142,11 +142,9 @@ class HardwareReader:
         device, signal = self._signal(keys, False, _COUNTS) if keys is not None else (None, None)
         return None if number is None or device is None or signal is None else Converter(number, device, signal)
 
-    def _signal(
-        self, keys: dict[str, JsonNode], is_output: bool, drivers: Sequence[str]
-    ) -> tuple[Device | None, str | None]:
+    def _signal(self, keys: dict[str, JsonNode], is_output: bool, wanted: str) -> tuple[Device | None, str | None]:
         node = keys.get("signal")
-        device = self._device(keys.get("device"), is_output, drivers)
+        device = self._device(keys.get("device"), is_output, wanted)
         signal = read_signal(node, "`signal`", self.reader)
         if node is not None and device is not None and signal is not None:
             check_signal(signal, device.driver, node.span, self.reader)
@@ -154,17 +152,18 @@ class HardwareReader:
                 check_driven(self._driven, signal, device, node.span, self.reader)
         return device, signal
 
-    def _device(self, node: JsonNode | None, is_output: bool, drivers: Sequence[str]) -> Device | None:
+    def _device(self, node: JsonNode | None, is_output: bool, wanted: str) -> Device | None:
         name = read_device_name(node, self.devices, self.used, self.reader)
         device = self.devices[name] if name is not None else None
         if node is None or name is None or device is None:
             return None
         problem = self._misfit(device, is_output)
-        if not problem and device.driver in DRIVERS and device.driver not in drivers:
-            problem = f"`{device.driver}` has no {'counts' if drivers is _COUNTS else 'levels'}; {_either(drivers)} has"
+        driver = known_drivers().get(device.driver)
+        if not problem and driver is not None and wanted not in driver.pins:
+            problem = f"`{device.driver}` has no {wanted}; {_which_have(wanted, is_output)} has"
         if problem:
             what, fix = ("be driven", "") if is_output else ("be read", 'an output has `"safe": false` or true')
-            fix = fix if device.driver in ACTUATORS else ""
+            fix = fix if kind_of(device.driver) == ACTUATOR else ""
             notes = [(device.span, "the device")]
             message = f"device `{name}` cannot {what} here"
             self.reader.sink.error("E518", message, node.span, why=problem, help=fix, notes=notes)
@@ -177,7 +176,7 @@ class HardwareReader:
             return "fcsl-guard drives it, and a device belongs to one program"
         if is_output:
             return misfit_as_output(device, self._of_sensors | self._inputs)
-        if device.driver in ACTUATORS:
+        if kind_of(device.driver) == ACTUATOR:
             return f"`{device.driver}` drives actuators"
         return "another pin drives it, and a driver reads or writes" if device.name in self._outputs else ""
 
@@ -246,5 +245,6 @@ def warn_unreached(hardware: Hardware, machine: Machine | None, node: JsonNode, 
                 reader.sink.warning("W507", message, node.span, why=why, help=fix, notes=notes)
 
 
-def _either(drivers: Sequence[str]) -> str:
-    return " or ".join(f"`{driver}`" for driver in drivers)
+def _which_have(wanted: str, is_output: bool) -> str:
+    found = (n for n, d in known_drivers().items() if wanted in d.pins and (d.kind == ACTUATOR) is is_output)
+    return " or ".join(f"`{name}`" for name in found)

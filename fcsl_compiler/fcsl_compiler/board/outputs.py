@@ -12,12 +12,9 @@ from ..model.types import Scalar, count_of, element_of
 from ..parse.json_reader import ConfigReader
 from ..parse.json_source import JsonNode
 from .devices import Device, read_device_name
-from .drivers import SENSORS, check_signal
+from .drivers import BUFFERED, POLLED, WAITING, check_signal, kind_of, known_drivers
 from .limits import MAX_OUTPUTS, MAX_PULSES, check_count
 from .pulses import Pulse, read_pulse
-
-#: Of the driver pwm, without an @ in the address.
-_PWM_HZ = 50.0
 
 
 @dataclass(frozen=True)
@@ -136,8 +133,8 @@ class OutputReader:
         return tuple(p for p in pulses if p is not None)
 
     def _check_period(self, pulse: Pulse, device: Device, span: Span) -> None:
-        """Pulses of the driver pwm fit into its period, which is in the address."""
-        hz = _pwm_hz(device)
+        """Pulses fit into the period of a driver that has one."""
+        hz = _pulse_hz(device)
         longest = max(pulse.line.minimum, pulse.line.middle, pulse.line.maximum, pulse.safe)
         if hz and longest > 1e6 / hz:
             message = f"a pulse of {longest:g} us, and `{device.name}` has one every {1e6 / hz:g} us"
@@ -158,18 +155,20 @@ def check_driven(
 
 def misfit_as_output(device: Device, read: set[str]) -> str:
     """Why the device cannot be driven; "" if it can. `read`: the names of those that something reads."""
-    if device.driver in SENSORS:
+    if kind_of(device.driver) in (POLLED, BUFFERED, WAITING):
         return f"`{device.driver}` reads sensors"
     if device.name in read:
         return "something reads it, and a driver reads or writes"
     return "it has a `rate_hz`, as sensors have" if device.rate_hz else ""
 
 
-def _pwm_hz(device: Device) -> float:
-    """The frequency of a chip of the driver pwm; 0 for other drivers, and where it is no number (the driver refuses it)."""
+def _pulse_hz(device: Device) -> float:
+    """How often the device gives a pulse, which may stand behind the @ of its address; 0 for drivers without pulses, and where
+    it is no number (the driver refuses it)."""
+    driver = known_drivers().get(device.driver)
     _, at, text = device.address.rpartition("@")
     try:
-        return 0.0 if device.driver != "pwm" else float(text) if at else _PWM_HZ
+        return 0.0 if driver is None or not driver.pulse_hz else float(text) if at else driver.pulse_hz
     except ValueError:
         return 0.0
 

@@ -8,7 +8,7 @@ from dataclasses import dataclass
 from ..parse.json_reader import ConfigReader
 from ..parse.json_source import JsonNode
 from .devices import Device
-from .drivers import POLLED
+from .drivers import POLLED, kind_of
 
 MIN_TIMEOUT_S, MAX_TIMEOUT_S = 0.001, 60.0
 
@@ -44,7 +44,7 @@ def read_pace(
         message, fix = f"device `{device.name}` paces the loop, and no sensor uses it", "make it a backend of a sensor"
         reader.sink.error("E520", message, keys["device"].span, why=why, help=fix)
         return None
-    if device is not None and device.driver in POLLED:
+    if device is not None and kind_of(device.driver) == POLLED:
         why = f"`{device.driver}` is read by a clock of this computer, so that paces the loop already"
         message, fix = (
             f"device `{device.name}` cannot pace the loop",

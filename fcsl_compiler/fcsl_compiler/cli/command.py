@@ -8,6 +8,7 @@ import sys
 from importlib import import_module
 
 from ..base.diagnostics import DiagnosticError
+from ..base.packages import PackageNotFound
 from ..base.usage import UsageError
 from ..check.verify import IrError
 from ..driver.toolchain import ToolchainError
@@ -24,7 +25,7 @@ def run_command(options: argparse.Namespace) -> int:
     except UsageError as error:
         print(f"fcslc: {error}", file=sys.stderr)
         return 2
-    except (ToolchainError, IrError) as error:
+    except (ToolchainError, IrError, PackageNotFound) as error:
         _fail(options, str(error))
     except BrokenPipeError:
         sys.stderr.close()

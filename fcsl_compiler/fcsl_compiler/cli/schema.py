@@ -5,10 +5,10 @@ from __future__ import annotations
 
 import argparse
 
-from ..board.board import SCHEMA as BOARD_SCHEMA
+from ..board.board import board_schema
 from .scaffold import SCHEMA
 
 
 def run(options: argparse.Namespace) -> int:
-    print((BOARD_SCHEMA if options.board else SCHEMA).read_text(), end="")
+    print(board_schema() if options.board else SCHEMA.read_text(), end="")
     return 0

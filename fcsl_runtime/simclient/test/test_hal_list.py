@@ -12,7 +12,7 @@ from pathlib import Path
 import pytest
 from hal_rig import Iio, run, write_plan
 
-from fcsl_compiler.board.drivers import ACTUATORS, DRIVERS
+from fcsl_compiler.board.drivers import ACTUATOR, known_drivers
 from simclient.hal.driver import any_driver
 
 
@@ -76,7 +76,7 @@ def test_each_kind_of_device_and_the_text_for_the_board(sysfs: Path) -> None:
         "thermal zone cpu-thermal": [("thermal", "cpu-thermal")],
         "input device RadioMaster TX16S": [("evdev", "RadioMaster TX16S")],
         "input device Power Button": [],
-        "serial port ttyUSB0": [(name, f"{sysfs}/dev/ttyUSB0") for name in ("sbus", "crsf", "ubx", "nmea")],
+        "serial port ttyUSB0": [(name, f"{sysfs}/dev/ttyUSB0") for name in ("sbus", "crsf", "ubx", "nmea", "tfmini")],
         "CAN interface can0": [("can", "can0:1A0/16:12@1-*0.1")],
         "IIO device ads1015": [("iio", "ads1015"), ("adc", "ads1015")],
         "GPIO chip gpiochip0": [("gpio", "gpiochip0"), ("gpio_out", "gpiochip0")],
@@ -105,7 +105,7 @@ def test_a_serial_port_by_its_id(sysfs: Path, tmp_path: Path) -> None:
     (dev / "serial/by-id/usb-u-blox").symlink_to("../../ttyUSB0")
     one = listed(sysfs, dev)["serial port ttyUSB0"]
     assert devices(one)[0] == ("sbus", f"{dev}/serial/by-id/usb-u-blox")
-    assert [candidate["ready"] for candidate in one["candidates"]] == [True] * 4  # type: ignore[attr-defined]
+    assert [candidate["ready"] for candidate in one["candidates"]] == [True] * 5  # type: ignore[attr-defined]
     os.close(primary)
     os.close(secondary)
 
@@ -216,9 +216,9 @@ def test_describe_hardware(tmp_path: Path) -> None:
 
 def test_signals_of_drivers_are_those_that_the_compiler_knows() -> None:
     """An output needs a signal that is one f64."""
-    for name, known in DRIVERS.items():
-        signals = [s for s in any_driver(name).signals if name not in ACTUATORS or s.type_text == "f64"]
-        assert tuple(s.name for s in signals) == known, name
+    for name, known in known_drivers().items():
+        signals = [s for s in any_driver(name).signals if known.kind != ACTUATOR or s.type_text == "f64"]
+        assert tuple(s.name for s in signals) == known.signals, name
 
 
 def test_describe_what_paces_and_what_is_not_driven(tmp_path: Path) -> None:

@@ -43,7 +43,7 @@ FLAGS = (
     *(f"-fsanitize={SANITIZE}", "-fno-sanitize-recover=all"),
 )
 _NATIVE = (
-    "fcsl_hal/src/*",
+    *("fcsl_hal/src/*", "fcsl_hal/src/drivers/*", "build/fcsl_hal/drivers"),
     *(f"fcsl_runtime/fcsl_runtime/{folder}" for folder in ("src/*", "fc", "observers", "ros_graph", "board")),
     "fcsl_sim/src/*",
 )
@@ -52,6 +52,7 @@ _INCLUDES = (
     *(
         "fcsl_hal/src",
         "fcsl_hal/src/*/",
+        "fcsl_hal/src/drivers/*/",
         "fcsl_runtime/fcsl_runtime",
         "fcsl_runtime/fcsl_runtime/src",
         "fcsl_runtime/fcsl_runtime/src/*/",

@@ -63,9 +63,9 @@ TARGETS = (
     ),
     Target(
         "receivers",
-        "streams of UBX, NMEA 0183, SBUS and CRSF",
+        "streams of UBX, NMEA 0183, SBUS, CRSF and TFmini",
         "serial lines",
-        Defect(f"{_HAL}/receivers/gnss_nmea.c", "} else if (sentence.count < FIELDS_MAX) {", "} else if (1) {"),
+        Defect(f"{_HAL}/drivers/gnss/gnss_nmea.c", "} else if (sentence.count < FIELDS_MAX) {", "} else if (1) {"),
         longest=2048,
     ),
     Target(

@@ -1,6 +1,6 @@
 #!/usr/bin/env python3
 # SPDX-License-Identifier: Apache-2.0
-"""Parsers of receivers (UBX, NMEA 0183, SBUS, CRSF) under Frama-C's EVA, and seeded defects that it must find.
+"""Parsers of receivers (UBX, NMEA 0183, SBUS, CRSF, TFmini) under Frama-C's EVA, and seeded defects that it must find.
 
     python3 scripts/verify receivers
 
@@ -24,14 +24,19 @@ _LENGTHS = 1025
 #: Functions whose paths stay apart, at most so many: a number is tied to its digits, and a result to what it says.
 _PATHS = {
     **{"read_decimal": 3000, "read_angle": 3000, "read_time": 400, "read_triple": 20, "read_rmc": 20},
-    **{f"{name}_take": 20 for name in ("gnss_ubx", "gnss_nmea", "rc_sbus", "rc_crsf")},
-    **{f"take_{name}": 20 for name in ("ubx", "nmea", "sbus", "crsf")},
+    **{f"{name}_take": 20 for name in ("gnss_ubx", "gnss_nmea", "rc_sbus", "rc_crsf", "tfmini")},
+    **{f"take_{name}": 20 for name in ("ubx", "nmea", "sbus", "crsf", "tfmini")},
 }
 PROOF = Proof(
     "receivers",
     Path(__file__).resolve().parent / "program.c",
-    ROOT / "fcsl_hal/src/receivers",
-    ("byte_stream.c", "gnss_fix.c", "gnss_nmea.c", "gnss_ubx.c", "rc_channels.c", "rc_crsf.c", "rc_sbus.c"),
+    ROOT / "fcsl_hal/src",
+    (
+        "serial/byte_stream.c",
+        *(f"drivers/gnss/{name}.c" for name in ("gnss_fix", "gnss_nmea", "gnss_ubx")),
+        *(f"drivers/rc/{name}.c" for name in ("rc_channels", "rc_crsf", "rc_sbus")),
+        "drivers/tfmini/tfmini.c",
+    ),
     (f"-DTURNS={_TURNS}",),
     (
         *("-eva-split-limit", str(_LENGTHS), "-eva-plevel", "300", "-eva-split-return", "auto"),
@@ -44,7 +49,8 @@ PROOF = Proof(
 
 def defect(what: str, part: str, file: str, old: str, new: str) -> Defect:
     """EVA must find it in this part of the program, with fewer turns to count."""
-    return Defect(what, f"{file}.c", old, new, (f"-DPARTS={part}", "-DTURNS=64"))
+    source = next(name for name in PROOF.sources if Path(name).stem == file)
+    return Defect(what, source, old, new, (f"-DPARTS={part}", "-DTURNS=64"))
 
 
 DEFECTS = (
@@ -62,6 +68,7 @@ DEFECTS = (
     defect("SBUS: a channel more than there is room for", "SBUS", "rc_sbus", "pulse_us[17]", "pulse_us[18]"),
     defect("CRSF: a length too short for type and CRC", "CRSF", "rc_crsf", "length < LENGTH_MIN || ", ""),
     defect("CRSF: a sum longer than the longest frame", "CRSF", "rc_crsf", " || length > LENGTH_MAX", ""),
+    defect("TFmini: a sum that reaches behind the stream", "TFMINI", "tfmini", "i < SUM", "i <= BYTE_STREAM_MAX"),
 )  # fmt: skip
 
 if __name__ == "__main__":

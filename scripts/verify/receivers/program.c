@@ -5,10 +5,11 @@
  */
 #include "gnss.h"
 #include "rc.h"
+#include "tfmini.h"
 
-enum { STREAM = 1, END = 2, UBX = 4, NMEA = 8, SBUS = 16, CRSF = 32 };
+enum { STREAM = 1, END = 2, UBX = 4, NMEA = 8, SBUS = 16, CRSF = 32, TFMINI = 64 };
 #ifndef PARTS
-#define PARTS (STREAM | END | UBX | NMEA | SBUS | CRSF)
+#define PARTS (STREAM | END | UBX | NMEA | SBUS | CRSF | TFMINI)
 #endif
 #ifndef TURNS
 #define TURNS BYTE_STREAM_MAX
@@ -184,6 +185,20 @@ static void take_crsf(void)
     check_stream(&crsf.stream);
 }
 
+/* ---- a range finder ------------------------------------------------------------------------------------------------------ */
+
+static void take_tfmini(void)
+{
+    static tfmini_t tfmini;
+    tfmini_reading_t reading;
+    any_stream(&tfmini.stream);
+    if (tfmini_take(&tfmini, any_u8, &reading) != 0) {
+        //@ assert reading.distance_cm <= 65535 && reading.strength <= 65535;
+        //@ assert -256.0 <= reading.temperature_degc <= 7935.875;
+    }
+    check_stream(&tfmini.stream);
+}
+
 int main(void)
 {
     if ((PARTS & STREAM) != 0) {
@@ -205,6 +220,9 @@ int main(void)
     }
     if ((PARTS & CRSF) != 0) {
         take_crsf();
+    }
+    if ((PARTS & TFMINI) != 0) {
+        take_tfmini();
     }
     return 0;
 }

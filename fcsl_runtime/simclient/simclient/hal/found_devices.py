@@ -6,6 +6,8 @@ from __future__ import annotations
 import struct
 from collections.abc import Callable
 
+from fcsl_compiler.api.board import known_drivers
+
 from .found import Candidate, Found, first_unique
 from .found_gpio import find_gpio
 from .found_iio import find_iio
@@ -85,20 +87,20 @@ def _input_devices() -> list[Found]:
     return found
 
 
-_SERIAL = ("sbus", "crsf", "ubx", "nmea")
 #: PORT_UNKNOWN: a place for a port that the computer does not have.
 _NO_UART = "0"
 
 
 def _serial_ports() -> list[Found]:
     found = []
+    drivers = [name for name, driver in known_drivers().items() if driver.serial]
     links = [dev_root() / "serial/by-id" / name for name in sorted(names_in(dev_root() / "serial/by-id"))]
     by_id = {link_name(link): str(link) for link in links}
     for path in folders("class/tty"):
         if not (path / "device").exists() or attribute(path, "type") == _NO_UART:
             continue
         device = by_id.get(path.name, str(dev_root() / path.name))
-        found.append(Found("serial port", path.name, str(path), [], [Candidate(driver, device) for driver in _SERIAL]))
+        found.append(Found("serial port", path.name, str(path), [], [Candidate(driver, device) for driver in drivers]))
     return found
 
 

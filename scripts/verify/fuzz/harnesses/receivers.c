@@ -1,6 +1,6 @@
 /* SPDX-License-Identifier: Apache-2.0
  *
- * gnss.h, rc.h: streams of receivers. Input: which protocol, then the stream; or, since chance finds no checksums, the bodies of
+ * gnss.h, rc.h, tfmini.h: streams of receivers. Input: which protocol, then the stream; or, since chance finds no checksums, the bodies of
  * messages, which this puts into frames. Every byte is part of a frame, garbage or still waiting, and what comes out can be.
  */
 #include <math.h>
@@ -8,6 +8,7 @@
 #include "fuzz.h"
 #include "gnss.h"
 #include "rc.h"
+#include "tfmini.h"
 
 enum { PVT_BYTES = 92, FIELDS_BYTES = 92 };
 
@@ -15,6 +16,7 @@ static gnss_ubx_t ubx;
 static gnss_nmea_t nmea;
 static rc_sbus_t sbus;
 static rc_crsf_t crsf;
+static tfmini_t tfmini;
 static uint64_t fed;
 static uint64_t framed; /* bytes of frames */
 
@@ -45,6 +47,7 @@ static void feed(uint32_t protocol, uint8_t byte)
     gnss_fix_t fix;
     rc_frame_t frame;
     rc_link_t link;
+    tfmini_reading_t reading;
     if (protocol == 0u) {
         if (gnss_ubx_take(&ubx, byte, &fix)) {
             check_fix(&fix);
@@ -62,11 +65,16 @@ static void feed(uint32_t protocol, uint8_t byte)
             check_rc(&frame);
         }
         count(&sbus.stream);
-    } else {
+    } else if (protocol == 3u) {
         if (rc_crsf_take(&crsf, byte, &frame, &link) == RC_CRSF_CHANNELS) {
             check_rc(&frame);
         }
         count(&crsf.stream);
+    } else {
+        if (tfmini_take(&tfmini, byte, &reading)) {
+            FUZZ_CHECK(reading.distance_cm > 0u || !reading.is_reliable);
+        }
+        count(&tfmini.stream);
     }
 }
 
@@ -112,22 +120,24 @@ static void feed_sentence(const uint8_t *body, size_t size, int is_rmc)
 int LLVMFuzzerTestOneInput(const uint8_t *data, size_t size)
 {
     bytes_t bytes = {data, size};
-    const uint32_t what = (uint32_t)take_number(&bytes, 1) % 7u;
+    const uint32_t what = (uint32_t)take_number(&bytes, 1) % 8u;
+    const int is_raw = what < 4u || what == 7u;
     memset(&ubx, 0, sizeof ubx);
     memset(&nmea, 0, sizeof nmea);
     memset(&sbus, 0, sizeof sbus);
     memset(&crsf, 0, sizeof crsf);
+    memset(&tfmini, 0, sizeof tfmini);
     fed = 0;
     framed = 0;
     while (bytes.left > 0) {
-        size_t length = what < 4u ? bytes.left : what == 4u ? PVT_BYTES : FIELDS_BYTES;
+        size_t length = is_raw ? bytes.left : what == 4u ? PVT_BYTES : FIELDS_BYTES;
         uint8_t *body = take_copy(&bytes, &length);
-        for (size_t i = 0; i < length && what < 4u; i++) {
-            feed(what, body[i]);
+        for (size_t i = 0; i < length && is_raw; i++) {
+            feed(what == 7u ? 4u : what, body[i]);
         }
         if (what == 4u) {
             feed_ubx_message(body, length);
-        } else if (what > 4u) {
+        } else if (!is_raw) {
             feed_sentence(body, length, what == 6u);
         }
         free(body);

@@ -3,13 +3,13 @@
  * The drivers `sbus` and `crsf`: receivers of remote controls on a serial device. The time of a sample is that at which the last byte
  * of its frame was read; what the radio and the receiver take before is not known.
  */
-#include "drivers.h"
+#include "fcsl/fcsl_driver.h"
 
 #include <math.h>
 #include <stdbool.h>
 #include <unistd.h>
 
-#include "receivers/rc.h"
+#include "rc.h"
 #include "serial/serial.h"
 
 static const serial_mode_t SBUS_MODE = {.baud = 100000, .even_parity = 1, .two_stop_bits = 1};

@@ -4,7 +4,7 @@
  * at which it was taken. The device's character device is below /dev, or where the environment's FCSL_DEV says.
  */
 #define _GNU_SOURCE
-#include "drivers.h"
+#include "fcsl/fcsl_driver.h"
 #include "iio_trigger.h"
 
 #include <dirent.h>

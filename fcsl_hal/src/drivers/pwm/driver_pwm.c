@@ -7,8 +7,8 @@
  * a second program on a channel would write over the safe pulses of the first.
  */
 #define _GNU_SOURCE
-#include "drivers.h"
-#include "sysfs.h"
+#include "fcsl/fcsl_driver.h"
+#include "sysfs/sysfs.h"
 
 #include <errno.h>
 #include <fcntl.h>

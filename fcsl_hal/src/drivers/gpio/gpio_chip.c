@@ -14,7 +14,7 @@
 #include <sys/ioctl.h>
 #include <unistd.h>
 
-#include "sysfs.h"
+#include "sysfs/sysfs.h"
 
 static const char PREFIX[] = "gpiochip";
 static const double ON = 0.5; /* the least value that is on */

@@ -10,7 +10,7 @@
 #include <stdio.h>
 #include <string.h>
 
-#include "sysfs.h"
+#include "sysfs/sysfs.h"
 
 /* The number of `event<number>`; 0, or -1. */
 static int event_number(const char *name, uint32_t *number)

@@ -3,8 +3,8 @@
  * The driver `thermal`: a thermal zone of the kernel, a temperature of the computer itself.
  */
 #define _POSIX_C_SOURCE 200809L
-#include "drivers.h"
-#include "sysfs.h"
+#include "fcsl/fcsl_driver.h"
+#include "sysfs/sysfs.h"
 
 #include <stdio.h>
 #include <unistd.h>

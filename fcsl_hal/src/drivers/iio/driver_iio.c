@@ -3,7 +3,7 @@
  * The driver `iio`: a sensor of the kernel's industrial I/O, read value by value from sysfs.
  */
 #define _POSIX_C_SOURCE 200809L
-#include "drivers.h"
+#include "fcsl/fcsl_driver.h"
 #include "iio.h"
 
 #include <stdio.h>

@@ -8,7 +8,7 @@
 
 #include "fcsl/fcsl_monotonic.h"
 
-#include "drivers.h"
+#include "fcsl/fcsl_driver.h"
 #include "iio.h"
 
 enum { INPUTS = 16 };

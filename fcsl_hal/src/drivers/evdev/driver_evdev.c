@@ -3,7 +3,7 @@
  * The driver `evdev`: an RC transmitter or a joystick that is an input device of Linux. The kernel tells the time of each event.
  */
 #define _GNU_SOURCE
-#include "drivers.h"
+#include "fcsl/fcsl_driver.h"
 
 #include <errno.h>
 #include <fcntl.h>

@@ -5,7 +5,7 @@
 #ifndef FCSL_HAL_GNSS_H
 #define FCSL_HAL_GNSS_H
 
-#include "byte_stream.h"
+#include "serial/byte_stream.h"
 
 typedef enum {
     GNSS_NO_FIX = 0,

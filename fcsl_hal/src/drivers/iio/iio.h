@@ -6,7 +6,7 @@
 #ifndef FCSL_IIO_H
 #define FCSL_IIO_H
 
-#include "sysfs.h"
+#include "sysfs/sysfs.h"
 
 enum { IIO_VECTORS = 3, IIO_VECTOR = 3, IIO_VOLTAGES = 8, IIO_VALUES = 3 * IIO_VECTOR + 3 + IIO_VOLTAGES };
 enum { IIO_ATTRIBUTE_BYTES = 64 }; /* of a name, with its zero */

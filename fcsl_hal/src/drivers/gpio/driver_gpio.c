@@ -10,7 +10,7 @@
 
 #include "fcsl/fcsl_monotonic.h"
 
-#include "drivers.h"
+#include "fcsl/fcsl_driver.h"
 #include "gpio_chip.h"
 
 static const uint64_t LOOK_AGAIN_NS = 100000000u; /* for a chip that has gone */

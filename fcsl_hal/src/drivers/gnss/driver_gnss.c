@@ -5,13 +5,13 @@
  * The time of a sample is that at which the first byte of the solution was read, the moment closest to the epoch. The receiver's own
  * delay, from the epoch to this byte, is not known (tens of milliseconds are usual), and not subtracted.
  */
-#include "drivers.h"
+#include "fcsl/fcsl_driver.h"
 
 #include <math.h>
 #include <stdio.h>
 #include <unistd.h>
 
-#include "receivers/gnss.h"
+#include "gnss.h"
 #include "serial/serial.h"
 
 static const serial_mode_t UBX_MODE = {.baud = 38400};

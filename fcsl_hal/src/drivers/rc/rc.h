@@ -5,7 +5,7 @@
 #ifndef FCSL_HAL_RC_H
 #define FCSL_HAL_RC_H
 
-#include "byte_stream.h"
+#include "serial/byte_stream.h"
 
 enum { RC_CHANNELS_MAX = 18 };
 

@@ -7,7 +7,7 @@
  * whose frames may stop independently belong to devices of their own.
  */
 #define _GNU_SOURCE
-#include "drivers.h"
+#include "fcsl/fcsl_driver.h"
 
 #include <errno.h>
 #include <inttypes.h>

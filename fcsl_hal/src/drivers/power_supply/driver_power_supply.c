@@ -4,8 +4,8 @@
  * (Documentation/ABI/testing/sysfs-class-power of the kernel).
  */
 #define _POSIX_C_SOURCE 200809L
-#include "drivers.h"
-#include "sysfs.h"
+#include "fcsl/fcsl_driver.h"
+#include "sysfs/sysfs.h"
 
 #include <math.h>
 #include <stdio.h>

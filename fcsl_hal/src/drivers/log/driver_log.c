@@ -5,7 +5,7 @@
  * what was written is there whatever becomes of the process.
  */
 #define _GNU_SOURCE
-#include "driver_log.h"
+#include "fcsl/fcsl_driver.h"
 
 #include <errno.h>
 #include <fcntl.h>
