@@ -80,6 +80,7 @@ PACKAGES = {
             "src/link": ("fcsl_cobs.h", "fcsl_link.h"),
             "src/ros": ("fcsl_ros.h",),
             "src/codec": ("fcsl_codec.h",),
+            "src/queues": ("fcsl_latest.h", "fcsl_seqlock.h"),
             "src/base": (
                 *(
                     "fcsl_address.h",

@@ -1,6 +1,10 @@
 /* SPDX-License-Identifier: Apache-2.0
  *
  * Messages of one key that came and were not yet taken. One thread at a time puts, another one takes, and neither waits.
+ *
+ * Of depth 1 it is the newest message (fcsl_latest.h), else a queue of slots. Its `head` and `tail` count messages: who puts stores head
+ * with release behind the slot's bytes, who takes loads it with acquire before it reads them; and the other way round with tail, so that a
+ * slot is used again only when it has been read. Zenoh calls from several threads, one at a time for each key.
  */
 #ifndef FCSL_BUS_INBOX_H
 #define FCSL_BUS_INBOX_H
@@ -8,6 +12,8 @@
 #include <stdatomic.h>
 #include <stddef.h>
 #include <stdint.h>
+
+#include "fcsl/fcsl_latest.h"
 
 typedef enum { INBOX_TAKEN, INBOX_REPLACED, INBOX_OVERFLOWED, INBOX_WRONG_SIZE, INBOX_MISFIT } inbox_result_t;
 
@@ -18,16 +24,10 @@ typedef struct {
     int quiet; /* see fcsl_bus_input_t, as of the next two */
     int (*fits)(uint64_t what, const uint8_t *bytes, size_t size);
     uint64_t what;
-    uint8_t *slots;
-    uint32_t *sizes; /* of what lies in the slots */
-    /* depth > 1: a queue. Messages that ever came in and went out. */
-    _Atomic uint64_t head;
-    _Atomic uint64_t tail;
-    /* depth 1: three slots. One belongs to who puts, one to who takes; the third changes hands, and is marked while its
-     * message is new. */
-    uint32_t back;
-    uint32_t front;
-    _Atomic uint32_t middle;
+    fcsl_latest_t latest; /* depth 1; a slot is a size and that many bytes, here as below */
+    uint8_t *slots; /* depth > 1 */
+    _Atomic uint64_t head; /* messages that ever came in */
+    _Atomic uint64_t tail; /* and went out */
 } inbox_t;
 
 /* Bytes that inbox_open allocates. */

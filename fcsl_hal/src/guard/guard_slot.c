@@ -1,25 +1,20 @@
 /* SPDX-License-Identifier: Apache-2.0
  *
- * Commands in the slot of fcsl-guard: writing and taking. Words are stored with release and loaded with acquire, so a reader
- * that has seen one word of a command also sees the odd sequence that was stored before it; on x86 both are plain moves.
+ * Commands in the slot of fcsl-guard, a seqlock between two processes: the step thread of the flight program writes, the loop of the
+ * guard takes. The guard trusts nothing that lies there: a writer that does not keep to the rules, or dies in between, costs it a
+ * bounded number of tries and no command, or one whose bytes do not pass the check of messages.
  */
 #include "fcsl/fcsl_guard.h"
 
-#include <string.h>
+#include "fcsl/fcsl_seqlock.h"
 
 /* Times that a reader looks again when the writer was at work meanwhile. */
-enum { TRIES = 8, WORD_BYTES = 8 };
-
-_Static_assert(ATOMIC_LLONG_LOCK_FREE == 2, "the words of the slot need no lock");
-
-static size_t words_of(size_t bytes)
-{
-    return (bytes + WORD_BYTES - 1u) / WORD_BYTES;
-}
+enum { TRIES = 8 };
 
 size_t fcsl_guard_slot_bytes(const fcsl_machine_t *machine)
 {
-    return sizeof(fcsl_guard_slot_t) + words_of(fcsl_message_capacity(machine, FCSL_ACTUATOR_MESSAGE)) * WORD_BYTES;
+    return sizeof(fcsl_guard_slot_t) +
+           fcsl_seqlock_words(fcsl_message_capacity(machine, FCSL_ACTUATOR_MESSAGE)) * FCSL_SEQLOCK_WORD_BYTES;
 }
 
 int fcsl_guard_command(const fcsl_guard_link_t *link, const fcsl_message_t *message, uint64_t begun_ns)
@@ -32,16 +27,11 @@ int fcsl_guard_command(const fcsl_guard_link_t *link, const fcsl_message_t *mess
         return -1;
     }
     const uint64_t sequence = atomic_load_explicit(&slot->sequence, memory_order_relaxed) | 1u;
-    atomic_store_explicit(&slot->sequence, sequence, memory_order_relaxed);
+    fcsl_seqlock_begin(&slot->sequence, sequence);
     atomic_store_explicit(&slot->begun_ns, begun_ns, memory_order_release);
     atomic_store_explicit(&slot->size, message->size, memory_order_release);
-    for (size_t at = 0; at < message->size; at += WORD_BYTES) {
-        const size_t left = message->size - at;
-        uint64_t word = 0;
-        memcpy(&word, message->bytes + at, left < WORD_BYTES ? left : WORD_BYTES);
-        atomic_store_explicit(&slot->message[at / WORD_BYTES], word, memory_order_release);
-    }
-    atomic_store_explicit(&slot->sequence, sequence + 1u, memory_order_release);
+    fcsl_seqlock_store(slot->message, message->bytes, message->size);
+    fcsl_seqlock_end(&slot->sequence, sequence + 1u);
     return 0;
 }
 
@@ -52,11 +42,7 @@ static void copy(const fcsl_guard_server_t *server, uint8_t *bytes, size_t *size
     *begun_ns = atomic_load_explicit(&slot->begun_ns, memory_order_acquire);
     const uint64_t said = atomic_load_explicit(&slot->size, memory_order_acquire);
     *size = said <= server->capacity ? (size_t)said : 0u;
-    for (size_t at = 0; at < *size; at += WORD_BYTES) {
-        const size_t left = *size - at;
-        const uint64_t word = atomic_load_explicit(&slot->message[at / WORD_BYTES], memory_order_acquire);
-        memcpy(bytes + at, &word, left < WORD_BYTES ? left : WORD_BYTES);
-    }
+    fcsl_seqlock_load(bytes, slot->message, *size);
 }
 
 int fcsl_guard_take(fcsl_guard_server_t *server, uint8_t *bytes, size_t *size, uint64_t *begun_ns)
@@ -67,7 +53,7 @@ int fcsl_guard_take(fcsl_guard_server_t *server, uint8_t *bytes, size_t *size, u
             return 0;
         }
         copy(server, bytes, size, begun_ns);
-        if (atomic_load_explicit(&server->slot->sequence, memory_order_relaxed) == sequence) {
+        if (fcsl_seqlock_unchanged(&server->slot->sequence, sequence)) {
             server->taken = sequence;
             return 1;
         }

@@ -15,9 +15,9 @@
 
 #include "base/error.h"
 #include "device_thread.h"
+#include "fcsl/fcsl_latest.h"
 #include "fcsl/fcsl_library.h"
 #include "fcsl/fcsl_scalar.h"
-#include "triple_buffer.h"
 
 struct output_device {
     char *name; /* of its driver as the user writes it */
@@ -33,8 +33,8 @@ struct output_device {
     atomic_int over;
     sem_t wake;
     sem_t finished; /* posted by the thread, at its end */
-    triple_buffer_t values; /* from the loop */
-    triple_buffer_t reasons; /* from the thread */
+    fcsl_latest_t values; /* from the loop */
+    fcsl_latest_t reasons; /* from the thread */
     _Atomic uint64_t ended; /* the number of the values of the last write */
     _Atomic uint64_t taken; /* of the last write that went well */
     _Atomic uint64_t failed;
@@ -55,8 +55,8 @@ static int allocate(output_device_t *device, fcsl_error_t *error)
     const fcsl_driver_t *driver = device->driver;
     device->state = device_state_new(driver);
     device->used = calloc(driver->signal_count, 1);
-    if (device->state == NULL || device->used == NULL || triple_buffer_open(&device->values, driver->state_size) != 0 ||
-        triple_buffer_open(&device->reasons, OUTPUT_REASON_BYTES) != 0) {
+    if (device->state == NULL || device->used == NULL || fcsl_latest_open(&device->values, driver->state_size) != 0 ||
+        fcsl_latest_open(&device->reasons, OUTPUT_REASON_BYTES) != 0) {
         return fcsl_fail(error, "out of memory for driver '%.100s'", device->name);
     }
     return 0;
@@ -64,8 +64,8 @@ static int allocate(output_device_t *device, fcsl_error_t *error)
 
 static void free_memory(output_device_t *device)
 {
-    triple_buffer_close(&device->values);
-    triple_buffer_close(&device->reasons);
+    fcsl_latest_close(&device->values);
+    fcsl_latest_close(&device->reasons);
     (void)sem_destroy(&device->wake);
     (void)sem_destroy(&device->finished);
     free(device->state);
@@ -127,7 +127,7 @@ int output_device_use(output_device_t *device, uint32_t signal)
 static void take_values(output_device_t *device)
 {
     const fcsl_driver_t *driver = device->driver;
-    const uint8_t *values = triple_buffer_front(&device->values);
+    const uint8_t *values = fcsl_latest_front(&device->values);
     for (uint32_t i = 0; i < driver->signal_count; i++) {
         const fcsl_driver_signal_t *signal = &driver->signals[i];
         if (device->used[i] != FCSL_DRIVER_UNUSED) {
@@ -139,14 +139,14 @@ static void take_values(output_device_t *device)
 
 static void write_values(output_device_t *device, uint64_t number)
 {
-    char *why = triple_buffer_back(&device->reasons);
+    char *why = fcsl_latest_back(&device->reasons);
     memset(why, 0, OUTPUT_REASON_BYTES);
     take_values(device);
     if (device->driver->write(device->state, why, OUTPUT_REASON_BYTES) == FCSL_DRIVER_OK) {
         atomic_store(&device->taken, number);
     } else {
         why[OUTPUT_REASON_BYTES - 1] = '\0';
-        (void)triple_buffer_put(&device->reasons);
+        (void)fcsl_latest_put(&device->reasons);
         atomic_fetch_add(&device->failed, 1);
     }
     atomic_store(&device->ended, number);
@@ -158,7 +158,7 @@ static void *run(void *ctx)
     for (;;) {
         while (sem_wait(&device->wake) != 0) {
         }
-        const uint64_t number = triple_buffer_take(&device->values);
+        const uint64_t number = fcsl_latest_take(&device->values);
         if (number > 0u) {
             write_values(device, number);
         } else if (atomic_load(&device->over) != 0) {
@@ -207,7 +207,7 @@ int output_device_is_open(const output_device_t *device)
 
 void *output_device_values(output_device_t *device)
 {
-    return triple_buffer_back(&device->values);
+    return fcsl_latest_back(&device->values);
 }
 
 /* A thread that gets no processor is as bad as a write that hangs. */
@@ -219,7 +219,7 @@ static void look_after_write(output_device_t *device, uint64_t now_ns)
         device->since_ns = now_ns;
     } else if (now_ns > device->since_ns && now_ns - device->since_ns > device->patience_ns) {
         device->late++;
-        (void)triple_buffer_take(&device->reasons); /* of a write before */
+        (void)fcsl_latest_take(&device->reasons); /* of a write before */
         (void)snprintf(device->reason, sizeof device->reason, "it has ended no write for %.6g ms",
                        (double)device->patience_ns / 1e6);
     }
@@ -228,7 +228,7 @@ static void look_after_write(output_device_t *device, uint64_t now_ns)
 void output_device_put(output_device_t *device, uint64_t now_ns)
 {
     look_after_write(device, now_ns);
-    if (triple_buffer_put(&device->values)) {
+    if (fcsl_latest_put(&device->values)) {
         (void)sem_post(&device->wake);
     }
 }
@@ -255,8 +255,8 @@ uint64_t output_device_missed(const output_device_t *device)
 
 const char *output_device_reason(output_device_t *device)
 {
-    if (triple_buffer_take(&device->reasons) > 0u) {
-        memcpy(device->reason, triple_buffer_front(&device->reasons), sizeof device->reason);
+    if (fcsl_latest_take(&device->reasons) > 0u) {
+        memcpy(device->reason, fcsl_latest_front(&device->reasons), sizeof device->reason);
     }
     return device->reason;
 }

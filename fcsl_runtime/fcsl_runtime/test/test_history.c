@@ -165,9 +165,9 @@ static void publish_unmarked(shared_t *shared, uint64_t number)
     fcsl_history_t *history = &shared->history;
     _Atomic uint64_t *slot = slot_of(history, number);
     fill(shared, number);
-    store_words(slot + 1, (const uint8_t *)&moment, sizeof moment);
-    store_words(slot + HEAD_WORDS, (const uint8_t *)shared->words, sizeof shared->words);
-    store_words(slot + HEAD_WORDS + WORDS, shared->tail, sizeof shared->tail);
+    fcsl_seqlock_store(slot + 1, &moment, sizeof moment);
+    fcsl_seqlock_store(slot + HEAD_WORDS, shared->words, sizeof shared->words);
+    fcsl_seqlock_store(slot + HEAD_WORDS + WORDS, shared->tail, sizeof shared->tail);
     atomic_store_explicit(&slot[0], sequence_of(number), memory_order_release);
     atomic_store_explicit(&history->published, number + 1u, memory_order_release);
 }

@@ -16,9 +16,7 @@ GCC = "/usr/bin/gcc"
 #: Programs of ours, whose leaks are looked for; those of others (Python, a C compiler) leak what they like at their end.
 PROGRAMS = ("fcsl-fc", "fcsl-guard", "wire_sim", "mcap_write", "control", "layout")
 #: C test programs with threads of their own or around a machine: TSan is for them and for the tests of fcsl-fc.
-THREADED = (
-    "test_bus_queues|test_ring|test_history|test_wire_pair|test_guard_slot|test_run|test_allocation|test_telemetry"
-)
+THREADED = "test_latest|test_bus_queues|test_ring|test_history|test_wire_pair|test_guard_slot|test_run|test_allocation|test_telemetry"
 _COMMON = ("-fno-omit-frame-pointer", "-fno-sanitize-recover=all")
 #: float-cast-overflow: undefined in C, and no part of -fsanitize=undefined.
 _FLAGS = {

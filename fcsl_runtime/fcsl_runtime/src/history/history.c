@@ -1,22 +1,19 @@
 /* SPDX-License-Identifier: Apache-2.0
  *
- * A slot is a sequence word, the moment's words and the memory's words. The writer makes the sequence odd, writes, and
- * makes it the even number of its publication; a reader that finds the same even number before and behind its copy has one
- * publication whole. Words are stored with release and loaded with acquire, so a reader that has seen one new word also
- * sees the odd sequence; on x86 both are plain moves.
+ * A ring of seqlocks (fcsl_seqlock.h). A slot is a sequence, the moment's words and the memory's words; its even sequence is the number
+ * of its publication. The publishing thread is the step thread; readers are any number of others. A reader that is slower than the ring
+ * is long finds another number in its slot.
  */
 #include "fcsl/fcsl_history.h"
 
 #include <stdlib.h>
 #include <string.h>
 
+#include "fcsl/fcsl_seqlock.h"
+#include "fcsl/fcsl_tick_time.h"
+
 enum { MOMENT_WORDS = sizeof(fcsl_moment_t) / 8, HEAD_WORDS = 1 + MOMENT_WORDS, TRIES = 64 };
 _Static_assert(sizeof(fcsl_moment_t) % 8 == 0, "a moment is whole words");
-
-static size_t words_of(uint32_t bytes)
-{
-    return ((size_t)bytes + 7u) / 8u;
-}
 
 static uint64_t sequence_of(uint64_t number)
 {
@@ -30,7 +27,7 @@ int fcsl_history_open(fcsl_history_t *history, const fcsl_part_t *parts, uint32_
     history->part_count = part_count;
     history->slot_words = HEAD_WORDS;
     for (uint32_t i = 0; i < part_count; i++) {
-        history->slot_words += words_of(parts[i].size);
+        history->slot_words += fcsl_seqlock_words(parts[i].size);
     }
     history->parts = malloc((part_count + 1u) * sizeof *history->parts);
     history->words = calloc(history->slot_words * slots, sizeof *history->words);
@@ -61,7 +58,7 @@ size_t fcsl_history_part(const fcsl_history_t *history, uint32_t part)
 {
     size_t words = 0;
     for (uint32_t i = 0; i < part; i++) {
-        words += words_of(history->parts[i].size);
+        words += fcsl_seqlock_words(history->parts[i].size);
     }
     return words * 8u;
 }
@@ -71,41 +68,18 @@ static _Atomic uint64_t *slot_of(const fcsl_history_t *history, uint64_t number)
     return history->words + (size_t)(number & (history->slots - 1u)) * history->slot_words;
 }
 
-static void store_words(_Atomic uint64_t *words, const uint8_t *bytes, uint32_t size)
-{
-    const uint32_t whole = size / 8u;
-    uint64_t word = 0;
-    for (uint32_t i = 0; i < whole; i++) {
-        memcpy(&word, bytes + (size_t)i * 8u, 8);
-        atomic_store_explicit(&words[i], word, memory_order_release);
-    }
-    if (size % 8u != 0) {
-        word = 0;
-        memcpy(&word, bytes + (size_t)whole * 8u, size % 8u);
-        atomic_store_explicit(&words[whole], word, memory_order_release);
-    }
-}
-
-static void load_words(uint8_t *bytes, const _Atomic uint64_t *words, size_t count)
-{
-    for (size_t i = 0; i < count; i++) {
-        const uint64_t word = atomic_load_explicit(&words[i], memory_order_acquire);
-        memcpy(bytes + i * 8u, &word, 8);
-    }
-}
-
 void fcsl_history_publish(fcsl_history_t *history, const fcsl_moment_t *moment)
 {
     const uint64_t number = atomic_load_explicit(&history->published, memory_order_relaxed);
     _Atomic uint64_t *slot = slot_of(history, number);
-    atomic_store_explicit(&slot[0], sequence_of(number) - 1u, memory_order_relaxed);
-    store_words(slot + 1, (const uint8_t *)moment, sizeof *moment);
+    fcsl_seqlock_begin(slot, sequence_of(number) - 1u);
+    fcsl_seqlock_store(slot + 1, moment, sizeof *moment);
     _Atomic uint64_t *words = slot + HEAD_WORDS;
     for (uint32_t i = 0; i < history->part_count; i++) {
-        store_words(words, history->parts[i].data, history->parts[i].size);
-        words += words_of(history->parts[i].size);
+        fcsl_seqlock_store(words, history->parts[i].data, history->parts[i].size);
+        words += fcsl_seqlock_words(history->parts[i].size);
     }
-    atomic_store_explicit(&slot[0], sequence_of(number), memory_order_release);
+    fcsl_seqlock_end(slot, sequence_of(number));
     atomic_store_explicit(&history->published, number + 1u, memory_order_release);
 }
 
@@ -121,13 +95,12 @@ fcsl_history_status_t fcsl_history_read(const fcsl_history_t *history, uint64_t 
         return FCSL_HISTORY_COMING;
     }
     const _Atomic uint64_t *slot = slot_of(history, number);
-    if (atomic_load_explicit(&slot[0], memory_order_acquire) != sequence_of(number)) {
+    if (atomic_load_explicit(slot, memory_order_acquire) != sequence_of(number)) {
         return FCSL_HISTORY_GONE;
     }
-    load_words((uint8_t *)moment, slot + 1, MOMENT_WORDS);
-    load_words(bytes, slot + HEAD_WORDS, history->slot_words - HEAD_WORDS);
-    return atomic_load_explicit(&slot[0], memory_order_relaxed) == sequence_of(number) ? FCSL_HISTORY_OK
-                                                                                       : FCSL_HISTORY_GONE;
+    fcsl_seqlock_load(moment, slot + 1, sizeof *moment);
+    fcsl_seqlock_load(bytes, slot + HEAD_WORDS, fcsl_history_bytes(history));
+    return fcsl_seqlock_unchanged(slot, sequence_of(number)) ? FCSL_HISTORY_OK : FCSL_HISTORY_GONE;
 }
 
 uint64_t fcsl_history_catch_up(const fcsl_history_t *history, uint64_t number)
@@ -141,7 +114,7 @@ uint64_t fcsl_history_nap_ns(const fcsl_history_t *history, uint64_t tick_hz)
 {
     const uint64_t least_ns = 50000u;
     const uint64_t most_ns = 2000000u;
-    const uint64_t nap_ns = UINT64_C(1000000000) / tick_hz * history->slots / 8u;
+    const uint64_t nap_ns = FCSL_NS_PER_S / tick_hz * history->slots / 8u;
     return nap_ns < least_ns ? least_ns : nap_ns > most_ns ? most_ns : nap_ns;
 }
 
