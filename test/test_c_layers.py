@@ -84,6 +84,7 @@ PACKAGES = {
             "src/base": (
                 *(
                     "fcsl_address.h",
+                    "fcsl_channels.h",
                     "fcsl_driver.h",
                     "fcsl_log.h",
                     "fcsl_monotonic.h",

@@ -8,30 +8,21 @@
 #include <string.h>
 
 #include "base/error.h"
+#include "fcsl/fcsl_channels.h"
 #include "fcsl/fcsl_scalar.h"
 #include "fcsl/fcsl_tick_time.h"
-
-static int find_channel(const fcsl_machine_t *machine, const char *name, uint32_t *index)
-{
-    for (uint32_t i = 0; i < machine->channel_count; i++) {
-        if (strcmp(machine->channels[i].name, name) == 0) {
-            *index = i;
-            return 0;
-        }
-    }
-    return -1;
-}
 
 static int bind(board_sensor_run_t *sensor, const board_binding_t *binding, board_channel_t *bound,
                 const fcsl_machine_t *machine, fcsl_error_t *error)
 {
     fcsl_frontend_config_t *config = &sensor->plan->config;
     const fcsl_quantity_t *quantity = &fcsl_sensor_kinds[config->kind].quantities[binding->quantity];
-    if (find_channel(machine, binding->channel, &bound->channel) != 0) {
+    const fcsl_channel_t *channel = fcsl_find_channel(machine, binding->channel, strlen(binding->channel));
+    if (channel == NULL) {
         return fcsl_fail(error, "machine '%.60s' has no channel '%.100s': the plan was made for another one",
                          machine->name, binding->channel);
     }
-    const fcsl_channel_t *channel = &machine->channels[bound->channel];
+    bound->channel = (uint32_t)(channel - machine->channels);
     const fcsl_field_t *field = &machine->fields[channel->field];
     const int is_float = field->type == FCSL_F64 || field->type == FCSL_F32;
     const int fits = field->count == quantity->count || (config->kind == FCSL_RC && field->count < quantity->count);

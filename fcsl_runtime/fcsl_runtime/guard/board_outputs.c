@@ -7,21 +7,10 @@
 #include <string.h>
 
 #include "base/error.h"
+#include "fcsl/fcsl_channels.h"
 #include "fcsl/fcsl_monotonic.h"
 #include "fcsl/fcsl_scalar.h"
 #include "outputs.h"
-
-/* The actuator channel of this name, or null. */
-static const fcsl_channel_t *find_channel(const fcsl_machine_t *machine, const char *name)
-{
-    for (uint32_t i = 0; i < machine->channel_count; i++) {
-        const fcsl_channel_t *channel = &machine->channels[i];
-        if (channel->direction == FCSL_ACTUATOR && strcmp(channel->name, name) == 0) {
-            return channel;
-        }
-    }
-    return NULL;
-}
 
 /* The driver's signal of this name, which must be a double. Returns its index, or -1. */
 static int64_t find_pulse_signal(const fcsl_driver_t *driver, const char *name)
@@ -67,8 +56,8 @@ static int add_pulse(outputs_t *outputs, output_device_t *device, const fcsl_cha
 static int add_output(outputs_t *outputs, const board_plan_t *plan, const board_output_t *output, fcsl_error_t *error)
 {
     const board_device_t *device = &plan->devices[output->device];
-    const fcsl_channel_t *channel = find_channel(outputs->machine, output->channel);
-    if (channel == NULL) {
+    const fcsl_channel_t *channel = fcsl_find_channel(outputs->machine, output->channel, strlen(output->channel));
+    if (channel == NULL || channel->direction != FCSL_ACTUATOR) {
         return fcsl_fail(error, "output '%.60s': machine '%.60s' has no such actuator channel", output->channel,
                          outputs->machine->name);
     }

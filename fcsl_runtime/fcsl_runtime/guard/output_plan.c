@@ -8,6 +8,7 @@
 #include <string.h>
 
 #include "base/error.h"
+#include "fcsl/fcsl_channels.h"
 #include "fcsl/fcsl_library.h"
 
 enum { LIST_BYTES = 256 };
@@ -25,17 +26,15 @@ static void list_actuators(const fcsl_machine_t *machine, char *text, size_t siz
     }
 }
 
-static int find_channel(const fcsl_machine_t *machine, const char *name, size_t length, uint32_t *channel,
-                        fcsl_error_t *error)
+static int find_actuator(const fcsl_machine_t *machine, const char *name, size_t length, uint32_t *index,
+                         fcsl_error_t *error)
 {
-    for (uint32_t i = 0; i < machine->channel_count; i++) {
-        const fcsl_channel_t *found = &machine->channels[i];
-        if (strlen(found->name) == length && strncmp(found->name, name, length) == 0) {
-            *channel = i;
-            return found->direction == FCSL_ACTUATOR
-                       ? 0
-                       : fcsl_fail(error, "--actuator %s: channel '%s' is a sensor", name, found->name);
-        }
+    const fcsl_channel_t *channel = fcsl_find_channel(machine, name, length);
+    if (channel != NULL) {
+        *index = (uint32_t)(channel - machine->channels);
+        return channel->direction == FCSL_ACTUATOR
+                   ? 0
+                   : fcsl_fail(error, "--actuator %s: channel '%s' is a sensor", name, channel->name);
     }
     char names[LIST_BYTES];
     list_actuators(machine, names, sizeof names);
@@ -75,7 +74,7 @@ static int read_entry(const fcsl_machine_t *machine, const char *text, plan_entr
     if (equals == NULL) {
         return fcsl_fail(error, "--actuator %.200s: write CHANNEL=DRIVER[.SIGNAL][:DEVICE], or CHANNEL=none", text);
     }
-    return find_channel(machine, text, (size_t)(equals - text), &entry->channel, error) == 0
+    return find_actuator(machine, text, (size_t)(equals - text), &entry->channel, error) == 0
                ? read_driver(text, equals + 1, entry, error)
                : -1;
 }

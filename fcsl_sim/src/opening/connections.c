@@ -8,6 +8,7 @@
 #include <string.h>
 
 #include "base/fail.h"
+#include "fcsl/fcsl_channels.h"
 #include "plan_names.h"
 
 static int same_kind(const fcsl_field_t *a, const fcsl_field_t *b)
@@ -49,17 +50,12 @@ static int find_companion(const fcsl_sim_t *sim, uint32_t line, const char *name
 static int find_channel(const fcsl_machine_t *machine, uint32_t line, const char *name, fcsl_direction_t direction,
                         uint32_t *channel, fcsl_error_t *error)
 {
-    for (uint32_t i = 0; i < machine->channel_count; i++) {
-        if (strcmp(machine->channels[i].name, name) != 0) {
-            continue;
-        }
-        if (machine->channels[i].direction != direction) {
-            return fcsl_sim_fail_line(error, line, "wrong direction of channel", name);
-        }
-        *channel = i;
-        return 0;
+    const fcsl_channel_t *found = fcsl_find_channel(machine, name, strlen(name));
+    if (!found) {
+        return fcsl_sim_fail_line(error, line, "the machine has no channel", name);
     }
-    return fcsl_sim_fail_line(error, line, "the machine has no channel", name);
+    *channel = (uint32_t)(found - machine->channels);
+    return found->direction == direction ? 0 : fcsl_sim_fail_line(error, line, "wrong direction of channel", name);
 }
 
 static const fcsl_field_t *find_machine_field(const fcsl_sim_t *sim, uint32_t line, const char *path,

@@ -4,6 +4,7 @@
  */
 #include <string.h>
 
+#include "fcsl/fcsl_channels.h"
 #include "fcsl/fcsl_scalar.h"
 #include "request.h"
 #include "value.h"
@@ -49,10 +50,9 @@ static const fcsl_channel_t *find_sensor(request_t *request)
 {
     const fcsl_machine_t *machine = fcsl_request_machine(request);
     const char *name = machine != NULL ? fcsl_request_text(request, "channel", NAME_BYTES) : NULL;
-    for (uint32_t i = 0; name != NULL && i < machine->channel_count; i++) {
-        if (machine->channels[i].direction == FCSL_SENSOR && strcmp(machine->channels[i].name, name) == 0) {
-            return &machine->channels[i];
-        }
+    const fcsl_channel_t *channel = name != NULL ? fcsl_find_channel(machine, name, strlen(name)) : NULL;
+    if (channel != NULL && channel->direction == FCSL_SENSOR) {
+        return channel;
     }
     if (name != NULL) {
         (void)fcsl_request_refuse(request, "bad_value", fcsl_nearest_sensor(machine, name), "no sensor channel '%s'",
