@@ -237,7 +237,7 @@ def test_plans_that_cannot_fly(craft: Craft) -> None:
         ("machine craft 100", "machine raft 100", "is for machine 'raft' at 100 Hz, and this is 'craft' at 100 Hz"),
         ("sensor imu inertial", "sensor imu internal", "board.plan:5: not a kind of sensor"),
         ("bind gyro imu.gyro", "bind gyro imu.giro", "machine 'craft' has no channel 'imu.giro'"),
-        ("iio imu-top", "no_driver imu-top", "device 'top': no driver 'no_driver' comes with FCSL; there is: "),
+        ("iio imu-top", "no_driver imu-top", "device 'top': FCSL has no driver 'no_driver' for sensors; it has: iio, "),
         ("iio imu-top", "ubx imu-top", "device 'top': driver 'ubx' has no signal 'gyro'"),
     ):
         assert old in good
