@@ -61,6 +61,7 @@ PACKAGES = {
             "src/run": ("fcsl_fp_mode.h", "fcsl_library.h"),
             "src/record": ("fcsl_bag.h", "fcsl_journal.h", "fcsl_mcap_records.h"),
             "src/messages": ("fcsl_cdr.h",),
+            "src/machine": (),
             "src/base": ("fcsl_run.h",),
         },
         searched=("src", ".", "fc"),
@@ -104,18 +105,6 @@ PACKAGES = {
         },
         unchecked=("test", "math", "build"),
     ),
-}
-#: What violates a rule today: of a file, the headers that it includes upwards, or that close a circle. This list only shrinks.
-KNOWN: Mapping[str, Sequence[str]] = {
-    # A run records, and what it records is made of its struct.
-    f"{_RUNTIME}/src/messages/record_messages.c": ("run/run_internal.h",),
-    f"{_RUNTIME}/src/messages/tick_messages.c": ("run/fault_place.h", "run/run_internal.h"),
-    f"{_RUNTIME}/src/record/journal.c": ("run/run_internal.h",),
-    f"{_RUNTIME}/src/record/recorder.c": ("run/fault_place.h", "recorder_internal.h"),
-    f"{_RUNTIME}/src/record/recorder.h": ("run/run_internal.h",),
-    f"{_RUNTIME}/src/telemetry/channels.c": ("configuration.h",),
-    f"{_RUNTIME}/src/vars/command.c": ("request.h",),
-    f"{_RUNTIME}/src/vars/expression.c": ("arithmetic.h", "expression_parser.h"),
 }
 INCLUDE = re.compile(r'\s*#\s*include\s*([<"])([^>"]+)[>"]')
 
@@ -221,30 +210,23 @@ def circles(graph: Graph) -> list[list[Include]]:
     return list(found.values())
 
 
-def violations(root: Path, known: Mapping[str, Sequence[str]] = KNOWN) -> list[str]:
-    """What is against the rules in the workspace at `root`, or known to be and is not."""
+def violations(root: Path) -> list[str]:
+    """What is against the rules in the workspace at `root`."""
     tree = Tree(root)
     includes = list(tree.includes())
-    excused = [i for i in includes if i.name in known.get(i.file, ())]
-    others = [i for i in includes if i not in excused]
-    graph = graph_of(others)
     said = [f"{file} stands in no folder of the table" for file, folder in tree.files.items() if not folder]
     said += [
         f"{name} of the table does not exist" for name in sorted(tree.listed() - {*tree.files, *tree.files.values()})
     ]
-    for i in others:
+    for i in includes:
         if i.to is None:
             said.append(f"{i.file}:{i.line}: {i.name} is neither a public header nor a file of this package")
         elif tree.is_upward(i):
             folder, above = tree.files[i.file], tree.files[i.to]
             said.append(f"{i.file}:{i.line}: {folder} may not include {i.to}: {above} stands above it")
-    for circle in circles(graph):
+    for circle in circles(graph_of(includes)):
         said.append("a circle: " + ", ".join(f"{i.file}:{i.line} includes {i.to}" for i in circle))
-    wanted = {(file, name) for file, names in known.items() for name in names}
-    needed = {(i.file, i.name) for i in excused if tree.is_upward(i) or way(graph, unit(str(i.to)), unit(i.file))}
-    return said + [
-        f"{file}: {name} violates no rule any more: take it from KNOWN" for file, name in sorted(wanted - needed)
-    ]
+    return said
 
 
 def test_includes_point_down() -> None:
@@ -314,15 +296,6 @@ def test_a_forbidden_include_is_found(copied: Path, what: str) -> None:
     assert f"{file}:1: {wanted}" in violations(copied)
 
 
-def test_what_is_known_of_a_file_excuses_no_other_include(copied: Path) -> None:
-    file = f"{_RUNTIME}/src/record/journal.c"
-    put_first(copied, file, "fcsl/fcsl_library.h")
-    assert violations(copied) == [
-        f"{file}:1: {_RUNTIME}/src/record may not include {_RUNTIME}/include/fcsl/fcsl_library.h: "
-        f"{_RUNTIME}/src/run stands above it"
-    ]
-
-
 def test_a_circle_is_found(copied: Path) -> None:
     """Between files of one folder, through a C file: link_frame.c and link_frame.h are one."""
     put_first(copied, "fcsl_hal/src/link/link_frame.c", "link_port.h")
@@ -355,22 +328,4 @@ def test_a_folder_and_a_header_that_are_gone_are_found(copied: Path) -> None:
     (copied / _RUNTIME / "include/fcsl/fcsl_lockstep.h").unlink()
     assert violations(copied) == [
         f"{_RUNTIME}/{name} of the table does not exist" for name in ("include/fcsl/fcsl_lockstep.h", "lockstep")
-    ]
-
-
-@pytest.mark.parametrize(
-    ("file", "name"),
-    [(f"{_RUNTIME}/src/record/journal.c", "run/run_internal.h"), (f"{_RUNTIME}/src/vars/command.c", "request.h")],
-)
-def test_a_known_violation_that_is_gone_is_found(copied: Path, file: str, name: str) -> None:
-    path = copied / file
-    path.write_text(path.read_text().replace(f'#include "{name}"\n', ""))
-    assert violations(copied) == [f"{file}: {name} violates no rule any more: take it from KNOWN"]
-
-
-def test_an_include_that_violates_nothing_is_no_known_violation(copied: Path) -> None:
-    """It is upwards, or closes a circle."""
-    known = {**KNOWN, "fcsl_hal/src/link/link.c": ("link_port.h",)}
-    assert violations(copied, known) == [
-        "fcsl_hal/src/link/link.c: link_port.h violates no rule any more: take it from KNOWN"
     ]

@@ -7,8 +7,8 @@
 #include <inttypes.h>
 #include <stdlib.h>
 
-#include "run/fault_place.h"
-#include "run/run_internal.h"
+#include "machine/fault_place.h"
+#include "machine/machine_struct.h"
 #include "log.h"
 
 int fault_log_open(fault_log_t *log, const loop_t *loop)

@@ -12,7 +12,7 @@
 
 #include "base/error.h"
 #include "guard_link.h"
-#include "run/fault_place.h"
+#include "machine/fault_place.h"
 #include "run/health_name.h"
 #include "base/replace_file.h"
 #include "vars/json.h"

@@ -12,7 +12,7 @@
 #include "fcsl/fcsl_scalar.h"
 #include "messages/schema.h"
 #include "messages/type_hash.h"
-#include "run/fault_place.h"
+#include "machine/fault_place.h"
 #include "type_hashes.h"
 
 enum {

@@ -2,7 +2,7 @@
  *
  * What leaves the process has one NaN, whichever the processor made. Argument: the fixture library. The source is compiled in.
  */
-#include "run/canonical.c"
+#include "machine/canonical.c"
 
 #include <dlfcn.h>
 #include <stdlib.h>

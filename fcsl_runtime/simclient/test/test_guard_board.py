@@ -369,7 +369,7 @@ PLANS = {
     plan(*GOOD, *OTHER, pulse("pulse", *VALVE)): "driver 'log' has no signal 'pulse' that is one f64",
     plan(*GOOD, *OTHER, pulse("flag", *VALVE)): "driver 'log' has no signal 'flag' that is one f64",
     plan(*GOOD, *OTHER, pulse("three", *VALVE)): "driver 'log' has no signal 'three' that is one f64",
-    plan(*GOOD, "device b 0 bog T/b", "output panel.valve b"): "device 'b': no driver 'bog' comes with FCSL",
+    plan(*GOOD, "device b 0 bog T/b", "output panel.valve b"): "device 'b': FCSL has no driver 'bog' for actuators",
     plan(*GOOD, "device b 0 sbus T/b", "output panel.valve b"): "device 'b': driver 'sbus' is for sensors",
     plan(*GOOD, *OTHER[:2], pulse("number", 1.0, 1.0, *VALVE[2:])): "output 'panel.valve', the pulse of element 0: low",
     plan(*GOOD, *OTHER[:2], pulse("number", *VALVE[:6], float("nan"))): "a number is not finite, or beyond 1e9",

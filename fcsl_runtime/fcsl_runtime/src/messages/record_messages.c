@@ -6,7 +6,7 @@
 
 #include <string.h>
 
-#include "run/run_internal.h"
+#include "machine/machine_struct.h"
 
 size_t fcsl_write_message(const fcsl_write_t *write, fcsl_stamp_t stamp, uint8_t *bytes, size_t capacity)
 {

@@ -4,8 +4,8 @@
  */
 #include "tick_messages.h"
 
-#include "run/fault_place.h"
-#include "run/run_internal.h"
+#include "machine/fault_place.h"
+#include "machine/machine_struct.h"
 
 /* The machine and the struct that a tick left. */
 typedef struct {
@@ -151,12 +151,4 @@ int64_t fcsl_tick_message_write(const fcsl_machine_t *machine, const uint8_t *da
     }
     const size_t size = fcsl_cdr_end(&cdr);
     return size == 0 ? -1 : (int64_t)size;
-}
-
-int64_t fcsl_run_tick_message(const fcsl_run_t *run, fcsl_tick_message_t what, uint8_t *cdr, size_t capacity)
-{
-    const uint64_t completed = fcsl_run_tick(run);
-    const uint64_t tick = completed == 0 ? 0 : completed - 1u;
-    const fcsl_stamp_t stamp = {.tick = tick, .time_ns = fcsl_run_tick_time_ns(run, tick)};
-    return fcsl_tick_message_write(run->machine, run->data, what, stamp, cdr, capacity);
 }

@@ -10,6 +10,9 @@
 #include "fcsl/fcsl_machine.h"
 #include "fcsl/fcsl_run.h"
 
+/* Instead of a time: tick k is at k / tick_hz. */
+#define FCSL_TICK_TIME UINT64_MAX
+
 /* A tick and its time, in ns. */
 typedef struct {
     uint64_t tick;

@@ -7,7 +7,6 @@
 #include <stdlib.h>
 #include <string.h>
 
-#include "run/run_internal.h"
 #include "fcsl/fcsl_tick_time.h"
 
 /* Of a message, besides data and names; and of the ring, of which an entry may take a half. */
@@ -39,31 +38,20 @@ static size_t longest_message(const fcsl_machine_t *machine)
     return HEAD_BYTES + longest + machine->size;
 }
 
-static fcsl_journal_t *open_journal(const fcsl_run_t *run)
+fcsl_journal_t *fcsl_journal_open(const fcsl_machine_t *machine)
 {
     fcsl_journal_t *journal = calloc(1, sizeof *journal);
     if (journal == NULL) {
         return NULL;
     }
-    journal->machine = run->machine;
-    journal->capacity = longest_message(run->machine);
+    journal->machine = machine;
+    journal->capacity = longest_message(machine);
     const size_t ring = RING_MESSAGES * journal->capacity;
     if (fcsl_ring_open(&journal->ring, ring > RING_BYTES_MIN ? ring : RING_BYTES_MIN) != 0) {
         free(journal);
         return NULL;
     }
     return journal;
-}
-
-fcsl_journal_t *fcsl_run_journal(fcsl_run_t *run, fcsl_error_t *error)
-{
-    if (run->journal == NULL) {
-        run->journal = open_journal(run);
-    }
-    if (run->journal == NULL) {
-        (void)fcsl_fail(error, "out of memory for the journal");
-    }
-    return run->journal;
 }
 
 void fcsl_journal_close(fcsl_journal_t *journal)
@@ -74,12 +62,8 @@ void fcsl_journal_close(fcsl_journal_t *journal)
     }
 }
 
-uint64_t fcsl_run_next_write(fcsl_run_t *run)
+uint64_t fcsl_journal_next_write(fcsl_journal_t *journal)
 {
-    fcsl_journal_t *journal = run->journal;
-    if (journal == NULL) {
-        return 0;
-    }
     const int wanted = atomic_load_explicit(&journal->wanted, memory_order_relaxed);
     journal->next += wanted && !journal->followed; /* who was here before finds the gap */
     journal->followed = wanted;

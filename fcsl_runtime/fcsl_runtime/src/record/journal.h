@@ -20,6 +20,11 @@ struct fcsl_journal {
     uint64_t next; /* write's number */
 };
 
+/* Null: out of memory. */
+fcsl_journal_t *fcsl_journal_open(const fcsl_machine_t *machine);
+/* What fcsl_run_next_write returns. */
+uint64_t fcsl_journal_next_write(fcsl_journal_t *journal);
+
 /* Accepts null. */
 static inline int fcsl_journal_is_followed(const fcsl_journal_t *journal)
 {

@@ -3,8 +3,7 @@
  * The recorder's life: topics, the ring and its writer thread, errors. What is copied in a tick: recorder_tick.c; what is made of it: recorder_writer.c.
  */
 #define _GNU_SOURCE
-#include "run/fault_place.h"
-#include "recorder_internal.h"
+#include "recorder.h"
 
 #include <ctype.h>
 #include <inttypes.h>
@@ -12,7 +11,11 @@
 #include <stdio.h>
 #include <stdlib.h>
 
+#include "fcsl/fcsl_tick_time.h"
+#include "machine/fault_place.h"
+#include "machine/machine_struct.h"
 #include "messages/schema.h"
+#include "recorder_internal.h"
 
 enum { TOPIC_BYTES = 1024, SCHEMA_BYTES_MAX = 1 << 20, RING_BYTES_MIN = 8 << 20, SCRATCH_BASE_BYTES = 4096 };
 
@@ -89,11 +92,11 @@ static int add_shown_topics(fcsl_recorder_t *recorder, const char *name_space, f
 }
 
 /* Room for the largest message the recorder itself writes. */
-static size_t scratch_bytes(const fcsl_recorder_t *recorder)
+static size_t scratch_bytes(const fcsl_recorder_t *recorder, const char *views)
 {
     const fcsl_machine_t *machine = recorder->machine;
     const size_t fault_bytes = fcsl_fault_text_bytes(machine);
-    size_t bytes = SCRATCH_BASE_BYTES + machine->size + strlen(fcsl_run_views(recorder->run));
+    size_t bytes = SCRATCH_BASE_BYTES + machine->size + strlen(views);
     size_t largest = 0;
     for (uint32_t i = 0; i < machine->instance_count; i++) {
         bytes += strlen(machine->instances[i].name) + fault_bytes + 40u;
@@ -105,10 +108,10 @@ static size_t scratch_bytes(const fcsl_recorder_t *recorder)
     return bytes + largest;
 }
 
-static int allocate(fcsl_recorder_t *recorder, fcsl_error_t *error)
+static int allocate(fcsl_recorder_t *recorder, const char *views, fcsl_error_t *error)
 {
     const uint32_t count = recorder->machine->instance_count;
-    recorder->scratch_size = scratch_bytes(recorder);
+    recorder->scratch_size = scratch_bytes(recorder, views);
     recorder->scratch = malloc(recorder->scratch_size);
     recorder->data = calloc(1, fcsl_run_data_bytes(recorder->machine));
     recorder->health = calloc(count + 1u, sizeof *recorder->health);
@@ -156,9 +159,8 @@ static int start_writer(fcsl_recorder_t *recorder, fcsl_error_t *error)
 }
 
 /* The one message of its topic, written before the writer thread begins; none where there is nothing to say. */
-static int put_views(fcsl_recorder_t *recorder, uint64_t time_ns, fcsl_error_t *error)
+static int put_views(fcsl_recorder_t *recorder, const char *views, uint64_t time_ns, fcsl_error_t *error)
 {
-    const char *views = fcsl_run_views(recorder->run);
     if (views[0] == '\0') {
         return 0;
     }
@@ -172,18 +174,18 @@ static int put_views(fcsl_recorder_t *recorder, uint64_t time_ns, fcsl_error_t *
     return status;
 }
 
-static int prepare(fcsl_recorder_t *recorder, const fcsl_record_options_t *options, const char *name_space,
-                   fcsl_error_t *error)
+static int prepare(fcsl_recorder_t *recorder, const fcsl_record_start_t *start, const fcsl_record_options_t *options,
+                   const char *name_space, fcsl_error_t *error)
 {
-    const fcsl_run_t *run = recorder->run;
+    const fcsl_stamp_t first = start->first;
     const uint64_t start_ns =
-        run->record_time_ns == FCSL_TICK_TIME ? fcsl_run_tick_time_ns(run, fcsl_run_tick(run)) : run->record_time_ns;
+        first.time_ns == FCSL_TICK_TIME ? fcsl_tick_time_ns(start->machine->tick_hz, first.tick) : first.time_ns;
     recorder->bag = fcsl_bag_open(options->bag, start_ns, error);
     if (recorder->bag == NULL) {
         return -1;
     }
     if (add_fixed_topics(recorder, name_space, error) != 0 || add_shown_topics(recorder, name_space, error) != 0 ||
-        fcsl_bag_publish(recorder->bag, error) != 0 || put_views(recorder, start_ns, error) != 0 ||
+        fcsl_bag_publish(recorder->bag, error) != 0 || put_views(recorder, start->views, start_ns, error) != 0 ||
         start_writer(recorder, error) != 0) {
         fcsl_bag_abandon(recorder->bag);
         return -1;
@@ -191,7 +193,8 @@ static int prepare(fcsl_recorder_t *recorder, const fcsl_record_options_t *optio
     return 0;
 }
 
-fcsl_recorder_t *fcsl_recorder_open(const fcsl_run_t *run, const fcsl_record_options_t *options, fcsl_error_t *error)
+fcsl_recorder_t *fcsl_recorder_open(const fcsl_record_start_t *start, const fcsl_record_options_t *options,
+                                    fcsl_error_t *error)
 {
     const char *name_space = options->name_space != NULL ? options->name_space : "";
     const char *fields = options->fields != NULL ? options->fields : FCSL_RECORD_FIELDS;
@@ -204,16 +207,16 @@ fcsl_recorder_t *fcsl_recorder_open(const fcsl_run_t *run, const fcsl_record_opt
         (void)fcsl_fail(error, "out of memory for the recorder");
         return NULL;
     }
-    recorder->run = run;
-    recorder->machine = run->machine;
+    recorder->machine = start->machine;
+    recorder->live = start->data;
     fcsl_recorder_set_lossless(recorder, options->lossless);
-    if (fcsl_record_topics_build(run->machine, fields, &recorder->shown, &recorder->shown_count, error) != 0 ||
-        fcsl_recorder_choose_ranges(recorder, error) != 0 || allocate(recorder, error) != 0 ||
-        prepare(recorder, options, name_space, error) != 0) {
+    if (fcsl_record_topics_build(start->machine, fields, &recorder->shown, &recorder->shown_count, error) != 0 ||
+        fcsl_recorder_choose_ranges(recorder, error) != 0 || allocate(recorder, start->views, error) != 0 ||
+        prepare(recorder, start, options, name_space, error) != 0) {
         free_recorder(recorder);
         return NULL;
     }
-    fcsl_recorder_checkpoint(recorder);
+    fcsl_recorder_checkpoint(recorder, start->first);
     return recorder;
 }
 

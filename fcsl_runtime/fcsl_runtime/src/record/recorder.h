@@ -6,11 +6,22 @@
 #ifndef FCSL_RECORDER_H
 #define FCSL_RECORDER_H
 
+#include "base/error.h"
 #include "messages/record_messages.h"
-#include "run/run_internal.h"
+
+typedef struct fcsl_recorder fcsl_recorder_t;
+
+/* What is recorded, from which tick on. */
+typedef struct {
+    const fcsl_machine_t *machine;
+    const uint8_t *data; /* the machine struct; it stays where it is */
+    const char *views;
+    fcsl_stamp_t first; /* of the initial checkpoint */
+} fcsl_record_start_t;
 
 /* Opens the bag and records the initial checkpoint; null with `error` filled. */
-fcsl_recorder_t *fcsl_recorder_open(const fcsl_run_t *run, const fcsl_record_options_t *options, fcsl_error_t *error);
+fcsl_recorder_t *fcsl_recorder_open(const fcsl_record_start_t *start, const fcsl_record_options_t *options,
+                                    fcsl_error_t *error);
 /* Flushes, writes metadata.yaml, frees; 0, or -1 when something of the record is missing on disk. */
 int fcsl_recorder_close(fcsl_recorder_t *recorder, fcsl_error_t *error);
 
@@ -20,14 +31,15 @@ int fcsl_recorder_check(const fcsl_recorder_t *recorder, fcsl_error_t *error);
 void fcsl_recorder_set_lossless(fcsl_recorder_t *recorder, int lossless);
 fcsl_record_drops_t fcsl_recorder_drops(const fcsl_recorder_t *recorder);
 
-/* `tick` is the first tick to see it. */
-void fcsl_recorder_write(fcsl_recorder_t *recorder, uint64_t tick, const fcsl_write_t *write);
+/* Of the tick that is the first to see it, as below. */
+void fcsl_recorder_write(fcsl_recorder_t *recorder, fcsl_stamp_t stamp, const fcsl_write_t *write);
 /* A change of state that the host forced. */
-void fcsl_recorder_forced(fcsl_recorder_t *recorder, uint64_t tick, const fcsl_state_t *from, const fcsl_state_t *to);
+void fcsl_recorder_forced(fcsl_recorder_t *recorder, fcsl_stamp_t stamp, const fcsl_state_t *from,
+                          const fcsl_state_t *to);
 /* Whether a tick may begin: a lossless recording ends with its writing. Fetches where its record will go. */
 int fcsl_recorder_begin_tick(fcsl_recorder_t *recorder, fcsl_error_t *error);
 /* Everything that the tick just completed has to show. */
-void fcsl_recorder_tick(fcsl_recorder_t *recorder, uint64_t tick);
+void fcsl_recorder_tick(fcsl_recorder_t *recorder, fcsl_stamp_t stamp);
 
 int fcsl_recorder_add_topic(fcsl_recorder_t *recorder, const char *topic, const char *type, const char *schema,
                             fcsl_error_t *error);

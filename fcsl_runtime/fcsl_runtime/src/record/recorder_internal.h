@@ -5,10 +5,13 @@
 #include <pthread.h>
 #include <stdatomic.h>
 
+#include "base/error.h"
 #include "fcsl/fcsl_bag.h"
-#include "recorder.h"
+#include "messages/tick_messages.h"
 #include "ring.h"
 #include "record_topics.h"
+
+typedef struct fcsl_recorder fcsl_recorder_t;
 
 /* Topic numbers in the bag: fixed ones, then what is shown of every tick, then added ones. */
 enum {
@@ -32,8 +35,8 @@ enum {
 };
 
 struct fcsl_recorder {
-    const fcsl_run_t *run;
     const fcsl_machine_t *machine;
+    const uint8_t *live; /* the machine struct of the run */
 
     /* The thread that owns the run; the writer sees those that do not change. What a tick reads lies together. */
     _Atomic uint64_t ring_full;
@@ -68,7 +71,7 @@ struct fcsl_recorder {
 /* Works out what a tick copies: what the shown messages and those on change need. 0, or -1. */
 int fcsl_recorder_choose_ranges(fcsl_recorder_t *recorder, fcsl_error_t *error);
 /* Records the whole machine struct as it is now. */
-void fcsl_recorder_checkpoint(fcsl_recorder_t *recorder);
+void fcsl_recorder_checkpoint(fcsl_recorder_t *recorder, fcsl_stamp_t stamp);
 /* The writer thread: makes messages of the records of the ring until it ends. */
 void *fcsl_recorder_run_writer(void *recorder);
 

@@ -5,6 +5,7 @@
 #include <stdlib.h>
 
 #include "fcsl/fcsl_scalar.h"
+#include "recorder.h"
 #include "recorder_internal.h"
 
 /* Whole blocks of the machine struct are copied: no call, no branch for each size. */
@@ -21,11 +22,10 @@ static uint8_t *claim(fcsl_recorder_t *recorder, const fcsl_record_t *record, fc
     return out;
 }
 
-/* Room for a record of `tick`, at the time that the host gave. */
-static uint8_t *claim_tick(fcsl_recorder_t *recorder, uint32_t kind, uint64_t tick, uint32_t size,
+static uint8_t *claim_tick(fcsl_recorder_t *recorder, uint32_t kind, fcsl_stamp_t stamp, uint32_t size,
                            fcsl_ring_policy_t policy)
 {
-    const fcsl_record_t record = {.tick = tick, .time_ns = recorder->run->record_time_ns, .size = size, .kind = kind};
+    const fcsl_record_t record = {.tick = stamp.tick, .time_ns = stamp.time_ns, .size = size, .kind = kind};
     return claim(recorder, &record, policy);
 }
 
@@ -50,11 +50,11 @@ static uint8_t *copy_blocks(uint8_t *restrict out, const uint8_t *restrict in, u
     return out;
 }
 
-__attribute__((hot)) void fcsl_recorder_tick(fcsl_recorder_t *recorder, uint64_t tick)
+__attribute__((hot)) void fcsl_recorder_tick(fcsl_recorder_t *recorder, fcsl_stamp_t stamp)
 {
-    uint8_t *out = claim_tick(recorder, FCSL_RECORD_TICK, tick, recorder->range_bytes, recorder->tick_policy);
+    uint8_t *out = claim_tick(recorder, FCSL_RECORD_TICK, stamp, recorder->range_bytes, recorder->tick_policy);
     if (out != NULL) {
-        const uint8_t *data = recorder->run->data;
+        const uint8_t *data = recorder->live;
         const fcsl_range_t *end = recorder->ranges + recorder->range_count;
         for (const fcsl_range_t *range = recorder->ranges; range != end; range++) {
             out = copy_blocks(out, data + range->offset, range->size);
@@ -64,21 +64,20 @@ __attribute__((hot)) void fcsl_recorder_tick(fcsl_recorder_t *recorder, uint64_t
     recorder->stepped = 1;
 }
 
-void fcsl_recorder_checkpoint(fcsl_recorder_t *recorder)
+void fcsl_recorder_checkpoint(fcsl_recorder_t *recorder, fcsl_stamp_t stamp)
 {
     const uint32_t size = recorder->machine->size;
-    uint8_t *out =
-        claim_tick(recorder, FCSL_RECORD_CHECKPOINT, fcsl_run_tick(recorder->run), size, recorder->write_policy);
+    uint8_t *out = claim_tick(recorder, FCSL_RECORD_CHECKPOINT, stamp, size, recorder->write_policy);
     if (out != NULL) {
-        memcpy(out, recorder->run->data, size);
+        memcpy(out, recorder->live, size);
         fcsl_ring_publish(&recorder->ring);
     }
 }
 
-void fcsl_recorder_write(fcsl_recorder_t *recorder, uint64_t tick, const fcsl_write_t *write)
+void fcsl_recorder_write(fcsl_recorder_t *recorder, fcsl_stamp_t stamp, const fcsl_write_t *write)
 {
     const uint32_t size = (uint32_t)sizeof *write + write->size;
-    uint8_t *out = claim_tick(recorder, FCSL_RECORD_WRITE, tick, size, recorder->write_policy);
+    uint8_t *out = claim_tick(recorder, FCSL_RECORD_WRITE, stamp, size, recorder->write_policy);
     if (out != NULL) {
         memcpy(out, write, sizeof *write);
         if (write->size > 0) {
@@ -88,10 +87,11 @@ void fcsl_recorder_write(fcsl_recorder_t *recorder, uint64_t tick, const fcsl_wr
     }
 }
 
-void fcsl_recorder_forced(fcsl_recorder_t *recorder, uint64_t tick, const fcsl_state_t *from, const fcsl_state_t *to)
+void fcsl_recorder_forced(fcsl_recorder_t *recorder, fcsl_stamp_t stamp, const fcsl_state_t *from,
+                          const fcsl_state_t *to)
 {
     const fcsl_state_t *states[] = {from, to};
-    uint8_t *out = claim_tick(recorder, FCSL_RECORD_FORCED, tick, sizeof states, recorder->write_policy);
+    uint8_t *out = claim_tick(recorder, FCSL_RECORD_FORCED, stamp, sizeof states, recorder->write_policy);
     if (out != NULL) {
         memcpy(out, states, sizeof states);
         fcsl_ring_publish(&recorder->ring);

@@ -6,7 +6,9 @@
 #include <inttypes.h>
 #include <time.h>
 
+#include "recorder.h"
 #include "recorder_internal.h"
+#include "machine/machine_struct.h"
 #include "messages/tick_messages.h"
 #include "fcsl/fcsl_tick_time.h"
 

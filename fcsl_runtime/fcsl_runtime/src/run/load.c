@@ -9,12 +9,12 @@
 #include <stdlib.h>
 
 #include "cover.h"
-#include "fault_place.h"
 #include "fcsl/fcsl_fp_mode.h"
 #include "fcsl/fcsl_gate.h"
 #include "fcsl/fcsl_library.h"
 #include "fcsl/fcsl_scalar.h"
 #include "hardware.h"
+#include "machine/fault_place.h"
 #include "stack_left.h"
 #include "record/journal.h"
 #include "substitution.h"

@@ -194,7 +194,7 @@ __attribute__((hot)) static int step_noted(fcsl_run_t *run, fcsl_error_t *error)
         note_new_overruns(run, tick);
     }
     if (run->recorder != NULL) {
-        fcsl_recorder_tick(run->recorder, tick);
+        fcsl_recorder_tick(run->recorder, fcsl_run_stamp(run, tick));
     }
     return 0;
 }
@@ -251,80 +251,4 @@ int fcsl_run_set_views(fcsl_run_t *run, const char *views, fcsl_error_t *error)
     free(run->views);
     run->views = copy;
     return 0;
-}
-
-int fcsl_run_record(fcsl_run_t *run, const fcsl_record_options_t *options, fcsl_error_t *error)
-{
-    if (run->recorder != NULL) {
-        return fcsl_fail(error, "this run is being recorded already");
-    }
-    run->recorder = fcsl_recorder_open(run, options, error);
-    return run->recorder != NULL ? 0 : -1;
-}
-
-int fcsl_run_record_stop(fcsl_run_t *run, fcsl_error_t *error)
-{
-    if (run->recorder == NULL) {
-        return fcsl_fail(error, "this run is not being recorded");
-    }
-    fcsl_recorder_t *recorder = run->recorder;
-    run->recorder = NULL;
-    return fcsl_recorder_close(recorder, error);
-}
-
-void fcsl_run_record_time(fcsl_run_t *run, uint64_t time_ns)
-{
-    run->record_time_ns = time_ns;
-}
-
-void fcsl_run_record_lossless(fcsl_run_t *run, int lossless)
-{
-    if (run->recorder != NULL) {
-        fcsl_recorder_set_lossless(run->recorder, lossless);
-    }
-}
-
-int fcsl_run_record_check(const fcsl_run_t *run, fcsl_error_t *error)
-{
-    return run->recorder != NULL ? fcsl_recorder_check(run->recorder, error) : 0;
-}
-
-fcsl_record_drops_t fcsl_run_record_drops(const fcsl_run_t *run)
-{
-    return run->recorder != NULL ? fcsl_recorder_drops(run->recorder) : (fcsl_record_drops_t){0};
-}
-
-uint64_t fcsl_run_record_dropped(const fcsl_run_t *run)
-{
-    const fcsl_record_drops_t drops = fcsl_run_record_drops(run);
-    return drops.ring_full + drops.disk_failed;
-}
-
-int fcsl_run_record_add_topic(fcsl_run_t *run, const char *topic, const char *type, const char *schema,
-                              fcsl_error_t *error)
-{
-    if (run->recorder == NULL) {
-        return fcsl_fail(error, "this run is not being recorded");
-    }
-    return fcsl_recorder_add_topic(run->recorder, topic, type, schema, error);
-}
-
-int fcsl_run_record_write(fcsl_run_t *run, int topic, uint64_t time_ns, const uint8_t *cdr, uint32_t size,
-                          fcsl_error_t *error)
-{
-    if (run->recorder == NULL) {
-        return fcsl_fail(error, "this run is not being recorded");
-    }
-    return fcsl_recorder_message(run->recorder, topic, time_ns, cdr, size, error);
-}
-
-int64_t fcsl_run_message(const fcsl_run_t *run, uint32_t instance, uint8_t *cdr, size_t capacity)
-{
-    if (instance >= run->machine->instance_count || capacity < run->layouts[instance].size) {
-        return -1;
-    }
-    const uint64_t completed = fcsl_run_tick(run);
-    const uint64_t tick = completed == 0 ? 0 : completed - 1u;
-    fcsl_layout_write(&run->layouts[instance], run->data, tick, fcsl_run_tick_time_ns(run, tick), cdr);
-    return run->layouts[instance].size;
 }

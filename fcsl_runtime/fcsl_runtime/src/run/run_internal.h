@@ -2,17 +2,12 @@
 #ifndef FCSL_RUN_INTERNAL_H
 #define FCSL_RUN_INTERNAL_H
 
-#include <string.h>
-
 #include "base/error.h"
 #include "fcsl/fcsl_hw_sim.h"
+#include "machine/machine_struct.h"
 #include "messages/message.h"
-
-typedef struct fcsl_recorder fcsl_recorder_t;
-typedef struct fcsl_journal fcsl_journal_t;
-
-/* Instead of a time: tick k is at k / tick_hz. */
-#define FCSL_TICK_TIME UINT64_MAX
+#include "record/journal.h"
+#include "record/recorder.h"
 
 /* An instance with max_wcet_us before a tick, to tell a measured overrun from an injected one. */
 typedef struct {
@@ -65,40 +60,10 @@ struct fcsl_run {
     fcsl_board_close_fn *close_board;
 };
 
-/* The room of a machine struct, and its alignment: whole cache lines, so that whole blocks may be copied. */
-static inline size_t fcsl_run_data_align(const fcsl_machine_t *machine)
+/* Of what is recorded of `tick` now. */
+static inline fcsl_stamp_t fcsl_run_stamp(const fcsl_run_t *run, uint64_t tick)
 {
-    return machine->align < 64u ? 64u : machine->align;
+    return (fcsl_stamp_t){.tick = tick, .time_ns = run->record_time_ns};
 }
-
-static inline size_t fcsl_run_data_bytes(const fcsl_machine_t *machine)
-{
-    const size_t align = fcsl_run_data_align(machine);
-    return ((size_t)machine->size + align - 1u) / align * align;
-}
-
-static inline int32_t fcsl_read_i32(const uint8_t *data, uint32_t offset)
-{
-    int32_t value = 0;
-    memcpy(&value, data + offset, sizeof value);
-    return value;
-}
-
-static inline uint32_t fcsl_read_u32(const uint8_t *data, uint32_t offset)
-{
-    uint32_t value = 0;
-    memcpy(&value, data + offset, sizeof value);
-    return value;
-}
-
-static inline uint64_t fcsl_read_u64(const uint8_t *data, uint32_t offset)
-{
-    uint64_t value = 0;
-    memcpy(&value, data + offset, sizeof value);
-    return value;
-}
-
-/* Copies the struct with canonical NaNs in every float field: what leaves the process does not depend on the processor. */
-void fcsl_copy_canonical(const fcsl_machine_t *machine, uint8_t *out, const uint8_t *in);
 
 #endif /* FCSL_RUN_INTERNAL_H */

@@ -20,7 +20,7 @@ enum { RANGE_BYTES = 64 };
 void fcsl_note_write_at(fcsl_run_t *run, uint64_t tick, const fcsl_write_t *write)
 {
     if (run->recorder != NULL) {
-        fcsl_recorder_write(run->recorder, tick, write);
+        fcsl_recorder_write(run->recorder, fcsl_run_stamp(run, tick), write);
     }
     if (fcsl_journal_is_followed(run->journal)) {
         fcsl_journal_note(run->journal, tick, write);
@@ -132,7 +132,8 @@ int fcsl_run_set_state(fcsl_run_t *run, int32_t state, fcsl_error_t *error)
     machine->force_state(run->data, state);
     fcsl_note_write(run, &(fcsl_write_t){.kind = FCSL_WRITE_SET_STATE, .path = machine->states[state].name});
     if (run->recorder != NULL && before != state && before >= 0 && (uint32_t)before < machine->state_count) {
-        fcsl_recorder_forced(run->recorder, fcsl_run_tick(run), &machine->states[before], &machine->states[state]);
+        fcsl_recorder_forced(run->recorder, fcsl_run_stamp(run, fcsl_run_tick(run)), &machine->states[before],
+                             &machine->states[state]);
     }
     return 0;
 }

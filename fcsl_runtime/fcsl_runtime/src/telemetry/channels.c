@@ -8,7 +8,6 @@
 #include <string.h>
 
 #include "base/path_glob.h"
-#include "configuration.h"
 #include "datagram.h"
 #include "base/error.h"
 #include "fcsl/fcsl_scalar.h"

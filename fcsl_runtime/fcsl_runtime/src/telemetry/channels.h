@@ -5,7 +5,7 @@
 #ifndef FCSL_TELEMETRY_CHANNELS_H
 #define FCSL_TELEMETRY_CHANNELS_H
 
-#include "vars/catalog.h"
+#include "configuration.h"
 
 /* Scalars of one type that lie one behind the other, in a publication and so in a packet. */
 typedef struct {
@@ -21,14 +21,6 @@ typedef struct {
     uint8_t *configuration;
     uint32_t configuration_bytes;
 } channels_t;
-
-/* What a configuration says besides its channels. */
-typedef struct {
-    const fcsl_machine_t *machine;
-    const char *views; /* at most FCSL_VIEWS_BYTES_MAX bytes, which is what a text can have */
-    uint32_t every;
-    int64_t wall_ns;
-} announcement_t;
 
 /* What stands before the values in a data packet. */
 typedef struct {

@@ -5,7 +5,7 @@
 #ifndef FCSL_VARS_ARITHMETIC_H
 #define FCSL_VARS_ARITHMETIC_H
 
-#include "expression.h"
+#include "expression_value.h"
 
 typedef enum { OP_ADD, OP_SUBTRACT, OP_MULTIPLY, OP_DIVIDE, OP_FLOOR_DIVIDE, OP_MODULO } operator_t;
 typedef enum { OP_LESS, OP_LESS_EQUAL, OP_GREATER, OP_GREATER_EQUAL, OP_EQUAL, OP_NOT_EQUAL } comparison_t;

@@ -5,7 +5,7 @@
 #ifndef FCSL_VARS_CLIENT_H
 #define FCSL_VARS_CLIENT_H
 
-#include "command.h"
+#include "commander.h"
 
 enum { OUT_BYTES = SAMPLES_BYTES_MAX + REPLY_BYTES_MAX };
 

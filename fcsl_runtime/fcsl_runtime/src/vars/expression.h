@@ -13,24 +13,8 @@
 #ifndef FCSL_VARS_EXPRESSION_H
 #define FCSL_VARS_EXPRESSION_H
 
-#include "catalog.h"
+#include "expression_value.h"
 #include "json.h"
-
-typedef enum { VALUE_BOOL, VALUE_INTEGER, VALUE_FLOAT, VALUE_NAME } value_kind_t;
-
-typedef struct {
-    value_kind_t kind;
-    int64_t integer; /* a bool's, too */
-    double real;
-    char name[PATH_BYTES_MAX];
-} expression_value_t;
-
-typedef struct {
-    const char *code; /* bad_expression, unknown_path or bad_index */
-    const char *hint;
-    char text[128];
-    size_t at; /* byte of the expression */
-} expression_error_t;
 
 /* Evaluates over one publication; 0, or -1 with `error`. */
 int fcsl_expression_evaluate(const char *text, const catalog_t *catalog, const uint8_t *snapshot,

@@ -5,7 +5,7 @@
 #ifndef FCSL_VARS_EXPRESSION_PARSER_H
 #define FCSL_VARS_EXPRESSION_PARSER_H
 
-#include "expression.h"
+#include "expression_value.h"
 
 typedef struct {
     const char *text;

@@ -5,7 +5,7 @@
 #ifndef FCSL_VARS_REQUEST_H
 #define FCSL_VARS_REQUEST_H
 
-#include "command.h"
+#include "commander.h"
 
 enum { NAME_BYTES = 256, TEXT_BYTES = 1024 };
 

@@ -4,7 +4,7 @@
  */
 #include <inttypes.h>
 
-#include "run/fault_place.h"
+#include "machine/fault_place.h"
 #include "run/lost_requests.h"
 #include "request.h"
 

@@ -1,8 +1,8 @@
 /* SPDX-License-Identifier: Apache-2.0
  *
- * command.h: one request line of the variable server after the other, on a machine. Each reply is one line, of JSON.
+ * commander.h: one request line of the variable server after the other, on a machine. Each reply is one line, of JSON.
  */
-#include "vars/command.h"
+#include "vars/commander.h"
 #include "hosted.h"
 
 /* Short, so that a reply that does not fit is met, too. */

@@ -2,8 +2,9 @@
  *
  * The machine struct with one NaN for all. NaNs are rare: a field is looked at first, which vector registers do.
  */
+#include "machine_struct.h"
+
 #include "fcsl/fcsl_scalar.h"
-#include "run_internal.h"
 
 /* The top bit of what is gathered tells of a NaN: without its sign it is above infinity. */
 static int has_nan_f64(const uint8_t *at, uint32_t count)

@@ -3,7 +3,7 @@
  * Requests and replies: which command it is, what it may hold, how its errors are told.
  */
 #define _GNU_SOURCE
-#include "command.h"
+#include "commander.h"
 
 #include <inttypes.h>
 #include <stdio.h>

@@ -2,8 +2,8 @@
  *
  * The protocol of the variable server: one JSON object per line in, one out (docs/protocol.md).
  */
-#ifndef FCSL_VARS_COMMAND_H
-#define FCSL_VARS_COMMAND_H
+#ifndef FCSL_VARS_COMMANDER_H
+#define FCSL_VARS_COMMANDER_H
 
 #include <stdatomic.h>
 
@@ -93,4 +93,4 @@ void fcsl_commander_abandon(commander_t *commander, session_t *session, json_out
 /* Writes an error reply that answers no request. */
 void fcsl_commander_error(json_out_t *out, const char *code, const char *message);
 
-#endif /* FCSL_VARS_COMMAND_H */
+#endif /* FCSL_VARS_COMMANDER_H */

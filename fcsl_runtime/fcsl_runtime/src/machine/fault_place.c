@@ -8,7 +8,7 @@
 #include <stdio.h>
 #include <string.h>
 
-#include "run_internal.h"
+#include "machine_struct.h"
 
 /* ":<line>:<column>: " and the end of the text. */
 enum { NUMBERS_BYTES = 32 };
