@@ -14,7 +14,7 @@ import pytest
 from rclpy.duration import Duration
 
 from fcsl_bridge.topics import mapped_topics
-from fcsl_bridge.topics.forward import Forward
+from fcsl_bridge.topics.outbox_publisher import OutboxPublisher
 from simclient.ros.outbox import RunTopics
 from simclient.run import Run, open_run
 
@@ -83,7 +83,7 @@ def test_a_disarmed_machine_publishes_safe_values(
     publisher = Publisher()
     monkeypatch.setattr(mapped_topics.qos, "publisher", lambda *_: publisher)
     run = opened(tmp_path, **keys)
-    forward = Forward(lossless=False)
+    forward = OutboxPublisher(lossless=False)
     messages = RunTopics(run, forward.outbox)
     mapped_topics.Outputs(None, run, forward, messages, ())  # type: ignore[arg-type]  # the node is for publishers only
     go = run.machine.fields["pilot.inputs.go"].index
@@ -109,7 +109,7 @@ def test_reports_are_published_armed_or_not(tmp_path: Path, monkeypatch: pytest.
     report = {**FORCE, "name": "other", "id": 2, "field": "pilot.outputs.other", "direction": "report"}
     report["ros"] = {**FORCE["ros"], "topic": "estimate"}
     run = opened(tmp_path, channels=[{**FORCE, "safe": -1.0}, report], arm="pilot.armed")
-    forward = Forward(lossless=False)
+    forward = OutboxPublisher(lossless=False)
     messages = RunTopics(run, forward.outbox)
     outputs = mapped_topics.Outputs(None, run, forward, messages, ())  # type: ignore[arg-type]  # the node is for publishers only
     fields = run.machine.fields
@@ -137,7 +137,7 @@ def test_the_end_of_ticking_waits_once_for_all_actuators(
     monkeypatch.setattr(mapped_topics.qos, "publisher", lambda *_: publisher)
     other = {**FORCE, "name": "other", "id": 2, "field": "pilot.outputs.other"}
     run = opened(tmp_path, channels=[{**FORCE, "safe": -1.0}, {**other, "safe": -2.0}], **arm)
-    forward = Forward(lossless=False)
+    forward = OutboxPublisher(lossless=False)
     messages = RunTopics(run, forward.outbox)
     outputs = mapped_topics.Outputs(None, run, forward, messages, ())  # type: ignore[arg-type]  # the node is for publishers only
     outputs.make_safe(0)

@@ -7,18 +7,18 @@ from pathlib import Path
 from types import SimpleNamespace
 from typing import Any
 
-from fcsl_bridge.loops.hosted import Hosted
+from fcsl_bridge.loops.configured_machine import ConfiguredMachine
 from simclient.errors import TwinError
 
 FAILED = TwinError("the disk is full")
 
 
-def hosted(said: list[str], failure: TwinError | None) -> Any:
+def configured(said: list[str], failure: TwinError | None) -> Any:
     def answer() -> None:
         if failure is not None:
             raise failure
 
-    made: Any = object.__new__(Hosted)
+    made: Any = object.__new__(ConfiguredMachine)
     made.run, made.bag, made._recording = SimpleNamespace(record_stop=answer, record_check=answer), Path("bag"), True
     made._node = SimpleNamespace(get_logger=lambda: SimpleNamespace(error=said.append))
     return made
@@ -26,7 +26,7 @@ def hosted(said: list[str], failure: TwinError | None) -> Any:
 
 def test_a_record_that_fails_is_given_up() -> None:
     said: list[str] = []
-    one = hosted(said, FAILED)
+    one = configured(said, FAILED)
     one.check_record()
     one.check_record()  # there is no record any more
     assert one.bag is None and said == ["the disk is full; flying on without a record"]
@@ -34,6 +34,6 @@ def test_a_record_that_fails_is_given_up() -> None:
 
 def test_one_that_is_written_is_kept() -> None:
     said: list[str] = []
-    one = hosted(said, None)
+    one = configured(said, None)
     one.check_record()
     assert one.bag == Path("bag") and one._recording and not said

@@ -20,7 +20,7 @@ from fcsl_compiler.api.files import digest
 from fcsl_compiler.api.types import count_of, scalar_of, shape_of
 from simclient.descriptor import Field, Machine, read_machine
 from simclient.errors import TwinError
-from simclient.forks import for_children, not_for_children
+from simclient.fork_safety import for_children, not_for_children
 from simclient.run import Run
 
 from .config import SimConfig

@@ -1,7 +1,7 @@
 # SPDX-License-Identifier: Apache-2.0
 """`ros2 fcsl`: running machines from the command line. The command and its verbs are entry points in setup.py.
 
-Only the command needs ros2cli; it is imported when `ros2` runs it. running.py does the work. An error is one line on
+Only the command needs ros2cli; it is imported when `ros2` runs it. running_machines.py does the work. An error is one line on
 standard error and status 1.
 """
 
@@ -79,7 +79,7 @@ class ListVerb(Verb):
         _timeout(parser, _FIND_S, "how long to look for machines")
 
     def run(self, args: argparse.Namespace) -> int:
-        from .running import graph
+        from .running_machines import graph
 
         with graph() as opened:
             states = opened.states(args.timeout)
@@ -94,7 +94,7 @@ class InfoVerb(Verb):
         _of_a_machine(parser)
 
     def run(self, args: argparse.Namespace) -> int:
-        from .running import graph
+        from .running_machines import graph
 
         with graph() as opened:
             machine = opened.find(args.machine, args.timeout)
@@ -126,7 +126,7 @@ class StateVerb(Verb):
         parser.add_argument("-f", "--follow", action="store_true", help=follow)
 
     def run(self, args: argparse.Namespace) -> int:
-        from .running import graph
+        from .running_machines import graph
 
         with graph() as opened:
             machine = opened.find(args.machine, args.timeout)
@@ -152,7 +152,7 @@ class SetStateVerb(Verb):
         parser.add_argument("state", help="one of the machine's states")
 
     def run(self, args: argparse.Namespace) -> int:
-        from .running import graph
+        from .running_machines import graph
 
         with graph() as opened:
             opened.set_state(opened.find(args.machine, args.timeout), args.state, args.timeout)

@@ -1,2 +1,2 @@
 # SPDX-License-Identifier: Apache-2.0
-"""A hosted machine and what makes its ticks: a simulator, real time or /clock."""
+"""A configured machine and what makes its ticks: a simulator, real time or /clock."""

@@ -12,10 +12,10 @@ from typing import Any
 
 from rclpy.node import Node
 
-from ..base.polled import SERVE_PERIOD_S
+from ..base.polling import SERVE_PERIOD_S
 from .clock_ticks import ClockTicks
+from .configured_machine import ConfiguredMachine
 from .free_running import FreeRunning
-from .hosted import Hosted
 
 
 class ClockLoop(FreeRunning):
@@ -23,9 +23,11 @@ class ClockLoop(FreeRunning):
 
     _LACKS = "with mode clock there is no tick until a simulator or `ros2 bag play --clock` publishes it"
 
-    def __init__(self, node: Node, hosted: Hosted, serve: Callable[[], None], options: Mapping[str, Any]):
-        super().__init__(node, hosted, serve, simulated=True)
-        self._ticks = ClockTicks(hosted.run.machine.tick_hz, options["max_ticks_per_clock"])
+    def __init__(
+        self, node: Node, configured: ConfiguredMachine, serve: Callable[[], None], options: Mapping[str, Any]
+    ):
+        super().__init__(node, configured, serve, simulated=True)
+        self._ticks = ClockTicks(configured.run.machine.tick_hz, options["max_ticks_per_clock"])
         self._heard = 0  # messages of /clock whose ticks were made
 
     def _start(self) -> None:

@@ -16,7 +16,7 @@ from rclpy.node import Node
 
 from ..diagnostics.machine_status import Figures
 from ..topics.mapped_topics import Inputs
-from .hosted import Hosted
+from .configured_machine import ConfiguredMachine
 from .ros_time import RosTime
 
 #: Without a message of /clock for so long after the start a node says what it lacks, in s.
@@ -29,15 +29,15 @@ class FreeRunning:
     #: What a node without /clock cannot do.
     _LACKS = "with use_sim_time all stamps are 0 until a simulator or `ros2 bag play --clock` publishes it"
 
-    def __init__(self, node: Node, hosted: Hosted, serve: Callable[[], None], simulated: bool):
-        self._node, self._hosted, self._serve = node, hosted, serve
-        self._inputs = Inputs(node, hosted.run)
+    def __init__(self, node: Node, configured: ConfiguredMachine, serve: Callable[[], None], simulated: bool):
+        self._node, self._configured, self._serve = node, configured, serve
+        self._inputs = Inputs(node, configured.run)
         self._time = RosTime(node, simulated)
         self._stamp_ns = 0
         self._clockless_at_s = 0.0
-        hosted.sources.append(self)
-        hosted.run.time_executes()
-        unmapped = [c.name for c in hosted.run.machine.channels if c.direction == "sensor" and not c.ros_type]
+        configured.sources.append(self)
+        configured.run.time_executes()
+        unmapped = [c.name for c in configured.run.machine.channels if c.direction == "sensor" and not c.ros_type]
         if unmapped:
             node.get_logger().warning(
                 f"nothing fills {', '.join(unmapped)}: outside lock-step a sensor channel needs `ros`"
@@ -47,9 +47,9 @@ class FreeRunning:
         """Publishes the latched topics; ticks become due from now on."""
         self._time.start()
         self._stamp_ns = self.now_ns()
-        self._hosted.run.record_time(self._stamp_ns)
-        self._hosted.record()
-        self._hosted.show_changes(self._stamp_ns)
+        self._configured.run.record_time(self._stamp_ns)
+        self._configured.record()
+        self._configured.show_changes(self._stamp_ns)
         self._clockless_at_s = time.monotonic() + _NO_CLOCK_S
         self._inputs.forget()
         gc.unfreeze()
@@ -63,21 +63,21 @@ class FreeRunning:
 
     def _tick(self, stamp_ns: int, now_ns: int) -> None:
         """Makes the tick that was due at stamp_ns, with what came until now_ns; both in ROS time."""
-        hosted, self._stamp_ns = self._hosted, stamp_ns
-        hosted.run.record_time(stamp_ns)
-        self._inputs.poll(now_ns, hosted.dropouts.missing())
-        hosted.run.step(1)
-        hosted.show(stamp_ns)
+        configured, self._stamp_ns = self._configured, stamp_ns
+        configured.run.record_time(stamp_ns)
+        self._inputs.poll(now_ns, configured.dropouts.missing())
+        configured.run.step(1)
+        configured.show(stamp_ns)
 
     def _diagnose(self) -> None:
         """Once per second, in the slack."""
-        if self._hosted.diagnostics.due():
-            self._hosted.check_record()
+        if self._configured.diagnostics.due():
+            self._configured.check_record()
             self._time.follow()
             if self.now_ns() > 0:
                 self._inputs.warn_of_other_clocks("/clock" if self._time.simulated else "the system's clock")
             self._warn_of_no_clock()
-            self._hosted.diagnostics.publish(self._stamp_ns)
+            self._configured.diagnostics.publish(self._stamp_ns)
 
     def _warn_of_no_clock(self) -> None:
         """Logs once after each start."""

@@ -19,8 +19,8 @@ from simclient.ros.lockstep import Lockstep
 from ..base.bus_address import endpoint
 from ..diagnostics.machine_status import Figures
 from ..errors import BridgeError
-from ..topics.forward import NativeThread
-from .hosted import Hosted
+from ..topics.outbox_publisher import NativeThread
+from .configured_machine import ConfiguredMachine
 
 #: How long native code runs before the node's callbacks are served, in ms.
 SLICE_MS = 50
@@ -33,24 +33,26 @@ _TROUBLES = ("messages_dropped", "messages_late", "bus.wrong_size", "bus.strays"
 class LockstepLoop:
     """`serve` runs the node's other callbacks, and raises what ends the ticking."""
 
-    def __init__(self, node: Node, hosted: Hosted, serve: Callable[[], None], options: Mapping[str, Any]):
-        self._node, self._hosted, self._serve_node = node, hosted, serve
+    def __init__(
+        self, node: Node, configured: ConfiguredMachine, serve: Callable[[], None], options: Mapping[str, Any]
+    ):
+        self._node, self._configured, self._serve_node = node, configured, serve
         self._endpoint = endpoint(options["bus"])
         where = (f"zenoh:{self._endpoint}", node.get_namespace())
-        self._lockstep = Lockstep(hosted.run, hosted.messages, hosted.forward.outbox, *where)
-        self._native = NativeThread(hosted.forward)
+        self._lockstep = Lockstep(configured.run, configured.messages, configured.forward.outbox, *where)
+        self._native = NativeThread(configured.forward)
         self._start_timeout_s, self._timeout_s = options["start_timeout_s"], options["timeout_s"]
         self._timeout_ms = int(1000 * self._timeout_s)
         self._running = False
         self._lost = ""  # why the simulator before is gone
-        hosted.sources.append(self)
+        configured.sources.append(self)
 
     def activate(self) -> None:
         """Publishes the latched topics; ticks follow the simulator's commits."""
-        hosted, run = self._hosted, self._hosted.run
-        hosted.show_changes(run.machine.time_ns(max(run.tick - 1, 0)))
+        configured, run = self._configured, self._configured.run
+        configured.show_changes(run.machine.time_ns(max(run.tick - 1, 0)))
         if run.tick == 0 or self._running:  # otherwise the next tick starts over, and begins a bag
-            hosted.record()
+            configured.record()
         if not self._running:
             print(f"{run.machine.name}: waiting for a simulator on {self._endpoint}", flush=True)
 
@@ -67,7 +69,7 @@ class LockstepLoop:
             self._running = status == "running"
             if status == "gone":
                 self._gone()
-        self._hosted.forward.all()
+        self._configured.forward.all()
 
     def _gone(self) -> None:
         """Another simulator may take the place of this one: it begins a new run."""
@@ -82,18 +84,18 @@ class LockstepLoop:
             if time.monotonic() > deadline:
                 raise BridgeError(self._lost or f"no simulator within {limit_s} s: {self._lockstep.problem}")
             self._serve()
-        if self._hosted.run.tick != 0:
-            self._hosted.start_over()
+        if self._configured.run.tick != 0:
+            self._configured.start_over()
             self._lockstep.drop_none()
         self._running, self._lost = True, ""
 
     def _drop(self) -> None:
-        for channel, ticks in self._hosted.dropouts.take():
+        for channel, ticks in self._configured.dropouts.take():
             self._lockstep.drop(channel, ticks)
 
     def _serve(self) -> None:
         self._serve_node()
-        diagnostics, run = self._hosted.diagnostics, self._hosted.run
+        diagnostics, run = self._configured.diagnostics, self._configured.run
         if diagnostics.due():
             diagnostics.publish(run.machine.time_ns(max(run.tick - 1, 0)))
 
@@ -103,7 +105,7 @@ class LockstepLoop:
 
     def now_ns(self) -> int:
         """The time that a message of now is stamped with: that of the coming tick."""
-        return self._hosted.run.machine.time_ns(self._hosted.run.tick)
+        return self._configured.run.machine.time_ns(self._configured.run.tick)
 
     def leave(self) -> None:
         """Makes a running simulator end at once instead of waiting for an answer."""

@@ -12,11 +12,11 @@ from typing import Any
 
 from rclpy.node import Node
 
-from ..base.polled import SERVE_PERIOD_S
+from ..base.polling import SERVE_PERIOD_S
 from ..diagnostics.machine_status import Figures
 from .clock_drift import ClockDrift
+from .configured_machine import ConfiguredMachine
 from .free_running import FreeRunning
-from .hosted import Hosted
 from .pacer import Pacer, sleep_until
 
 _NS = 1_000_000_000
@@ -28,11 +28,13 @@ _SERVE_AT_LEAST_NS = 5 * _SLICE_NS
 class RealtimeLoop(FreeRunning):
     """On CLOCK_MONOTONIC; with use_sim_time (as set when the node was configured) /clock gives the stamps alone."""
 
-    def __init__(self, node: Node, hosted: Hosted, serve: Callable[[], None], options: Mapping[str, Any]):
-        super().__init__(node, hosted, serve, bool(node.get_parameter("use_sim_time").value))
-        self._pacer = Pacer(hosted.run.machine.tick_hz)
-        self._drift = ClockDrift(node, hosted.run.machine) if self._time.simulated else None
-        self._roomy_ns = _NS // hosted.run.machine.tick_hz // 2
+    def __init__(
+        self, node: Node, configured: ConfiguredMachine, serve: Callable[[], None], options: Mapping[str, Any]
+    ):
+        super().__init__(node, configured, serve, bool(node.get_parameter("use_sim_time").value))
+        self._pacer = Pacer(configured.run.machine.tick_hz)
+        self._drift = ClockDrift(node, configured.run.machine) if self._time.simulated else None
+        self._roomy_ns = _NS // configured.run.machine.tick_hz // 2
         self._serve_by_ns = 0
 
     def _start(self) -> None:
@@ -57,7 +59,7 @@ class RealtimeLoop(FreeRunning):
 
     def _diagnose(self) -> None:
         if self._drift is not None:
-            self._drift.look(self._hosted.run.tick, self._stamp_ns)
+            self._drift.look(self._configured.run.tick, self._stamp_ns)
         super()._diagnose()
 
     def figures(self) -> Figures:

@@ -14,7 +14,7 @@ import time
 from rclpy.node import Node
 from rosgraph_msgs.msg import Clock
 
-from ..base.polled import Polled
+from ..base.polling import Polled
 from ..topics import qos
 
 #: An offset is ignored if reading it took longer than this; a change by more than the second value is a set clock.

@@ -27,7 +27,7 @@ from simclient.run import open_run
 
 from ..base import bus_address
 from ..base.machine_index import find_machine
-from ..base.namesake import Namesake
+from ..base.name_clash import NameClash
 from ..base.node_main import (
     BAD_INPUT,
     Option,
@@ -39,10 +39,10 @@ from ..base.node_main import (
     take_dotted,
     wait_for_subscribers,
 )
-from ..base.polled import SERVE_PERIOD_S, Housekeeping
+from ..base.polling import SERVE_PERIOD_S, Housekeeping
 from ..errors import BridgeError, Stopped
 from ..loops.clock_loop import ClockLoop
-from ..loops.hosted import Hosted
+from ..loops.configured_machine import ConfiguredMachine
 from ..loops.lockstep_loop import LockstepLoop
 from ..loops.realtime_loop import RealtimeLoop
 from ..services.machine_services import Allowed
@@ -87,13 +87,13 @@ class ControllerNode(LifecycleNode):
 
     def __init__(self, name: str, **arguments: Any):
         super().__init__(name, **arguments)
-        self._hosted: Hosted | None = None
+        self._configured: ConfiguredMachine | None = None
         self._mode: LockstepLoop | RealtimeLoop | ClockLoop | None = None
         self._active = self._finalized = self._starting = False
         self._failure: Exception | None = None
         self._ending = "shut down"
         self._given: dict[str, Any] = {}
-        self._namesake = Namesake(self)
+        self._namesake = NameClash(self)
         for service in self.services:
             if service.srv_type is ChangeState:
                 service.callback = _refusing(service.callback)
@@ -149,35 +149,35 @@ class ControllerNode(LifecycleNode):
             options["allow_set_state"], leaving_tick=not locked, faults=faults, folder=options["checkpoints"]
         )
         try:
-            self._hosted = Hosted(self, options, self._given, allowed)
-            self._mode = MODES[options["mode"]](self, self._hosted, self._serve_active, options)
+            self._configured = ConfiguredMachine(self, options, self._given, allowed)
+            self._mode = MODES[options["mode"]](self, self._configured, self._serve_active, options)
         except Exception:
             self._close()
             raise
 
     def _activate(self) -> None:
-        assert self._hosted is not None and self._mode is not None
+        assert self._configured is not None and self._mode is not None
         count, limit_s = self._options["wait_for_subscribers"], self._options["start_timeout_s"]
-        wait_for_subscribers(self._hosted.topics.all, count, limit_s, self._waiting)
+        wait_for_subscribers(self._configured.topics.all, count, limit_s, self._waiting)
         self._mode.activate()
         self._active, self._ending = True, "shut down"
 
     def _waiting(self) -> None:
         self._stop.check()
-        assert self._hosted is not None
-        self._hosted.topics.say_alive()
+        assert self._configured is not None
+        self._configured.topics.say_alive()
 
     def _end_ticking(self) -> None:
         """The actuators on topics get their safe values: no command follows."""
         ended, self._active = self._active, False
-        if ended and self._hosted is not None and self._mode is not None:
-            self._hosted.forward.all()  # what the last ticks put; commands come before safe values
-            self._hosted.outputs.make_safe(self._mode.now_ns())
+        if ended and self._configured is not None and self._mode is not None:
+            self._configured.forward.all()  # what the last ticks put; commands come before safe values
+            self._configured.outputs.make_safe(self._mode.now_ns())
 
     def _release(self, why: str) -> None:
-        if self._hosted is None or self._mode is None:
+        if self._configured is None or self._mode is None:
             return
-        run, bag = self._hosted.run, self._hosted.bag
+        run, bag = self._configured.run, self._configured.bag
         record = f"; recorded to {bag}" if bag else ""
         text = f"{why}: {run.tick} ticks, {run.machine.time_ns(run.tick) / 1e9:.3f} s{record}"
         self._close()
@@ -188,12 +188,12 @@ class ControllerNode(LifecycleNode):
         try:
             self._end_ticking()
         finally:
-            mode, hosted, self._mode, self._hosted = self._mode, self._hosted, None, None
+            mode, configured, self._mode, self._configured = self._mode, self._configured, None, None
             if mode is not None:
                 mode.leave()
                 mode.close()
-            if hosted is not None:
-                hosted.close()
+            if configured is not None:
+                configured.close()
 
     # ---- running --------------------------------------------------------------------------------------------------
 
@@ -236,14 +236,14 @@ class ControllerNode(LifecycleNode):
                 self._housekeeping.idle(SERVE_PERIOD_S)
                 self._rest()
                 continue
-            assert self._mode is not None and self._hosted is not None
+            assert self._mode is not None and self._configured is not None
             try:
                 self._mode.run()
                 self._ending = "the simulator ended the run"
-                self._hosted.topics.wait_for_receivers()
+                self._configured.topics.wait_for_receivers()
                 if self._options["autostart"]:
                     return
-                self._hosted.end_record()
+                self._configured.end_record()
             except _Inactive:
                 continue
             except BAD_INPUT as error:
@@ -254,20 +254,20 @@ class ControllerNode(LifecycleNode):
 
     def _rest(self) -> None:
         """Not active."""
-        if self._hosted is None or self._mode is None or self._active:
+        if self._configured is None or self._mode is None or self._active:
             return
         self._mode.rest()
         self._namesake.look()
-        self._hosted.topics.say_alive()
-        if self._hosted.diagnostics.due(active=False):
-            self._hosted.diagnostics.publish(self._mode.now_ns(), active=False)
+        self._configured.topics.say_alive()
+        if self._configured.diagnostics.due(active=False):
+            self._configured.diagnostics.publish(self._mode.now_ns(), active=False)
 
     def _serve_active(self) -> None:
         self._housekeeping.serve()
-        if not self._active or self._hosted is None:
+        if not self._active or self._configured is None:
             raise _Inactive
         self._namesake.look()
-        self._hosted.topics.say_alive()
+        self._configured.topics.say_alive()
 
 
 def _check(options: dict[str, Any]) -> None:

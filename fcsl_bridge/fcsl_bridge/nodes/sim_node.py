@@ -37,14 +37,14 @@ from ..base.node_main import (
     wait_for_receivers,
     wait_for_subscribers,
 )
-from ..base.polled import Housekeeping
+from ..base.polling import Housekeeping
 from ..errors import BridgeError, Stopped
 from ..simulator.sim_control import Control, Reset, speed_problem
 from ..simulator.sim_progress import Progress
 from ..simulator.sim_topics import below
 from ..simulator.sim_vehicle import Vehicle
 from ..topics import qos, tf
-from ..topics.forward import Forward, NativeThread
+from ..topics.outbox_publisher import NativeThread, OutboxPublisher
 
 OPTIONS = (
     Option("sim", str, None, "the path of a *.sim.json, or package://<package>/<path below its share folder>"),
@@ -77,7 +77,7 @@ class Simulator:
         self._endpoint = endpoint(options["bus"])
         self._housekeeping = Housekeeping(node, stop)
         self._control = Control(node, self._housekeeping, options["speed"], options["paused"])
-        self._forward = Forward(lossless=options["wait_for_subscribers"] > 0)
+        self._forward = OutboxPublisher(lossless=options["wait_for_subscribers"] > 0)
         self._native = NativeThread(self._forward)
         self._vehicles: list[Vehicle] = []
         self._clock = qos.publisher(node, Clock, "/clock", qos.STREAM)

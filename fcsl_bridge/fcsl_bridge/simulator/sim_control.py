@@ -22,7 +22,7 @@ from std_srvs.srv import Trigger
 
 from fcsl_msgs.srv import Step
 
-from ..base.polled import SERVE_PERIOD_S, Housekeeping
+from ..base.polling import SERVE_PERIOD_S, Housekeeping
 
 #: More ticks than any simulation has.
 _ALL = 2**63

@@ -20,8 +20,8 @@ from fcsl_sim.ros import TruthTopic
 from simclient.ros.topics import composer_of, topics_of
 
 from ..topics import qos, tf
-from ..topics.forward import Forward
 from ..topics.interfaces import message_class
+from ..topics.outbox_publisher import OutboxPublisher
 
 
 def below(name_space: str, topic: str) -> str:
@@ -46,7 +46,7 @@ class SimTopics:
         name_space: str,
         decimate: int,
         chosen: tf.Chosen,
-        forward: Forward,
+        forward: OutboxPublisher,
     ):
         self._decimate, self._outbox = decimate, forward.outbox
         self.plant_publisher = qos.publisher(node, PlantTruth, below(name_space, "sim/truth"), qos.STREAM)

@@ -16,7 +16,7 @@ from simclient.descriptor import Machine
 from simclient.ros.cdr import Layout, Leaf, fixed_layout
 from simclient.view.signals import Signals, signals_of
 
-from ..base.polled import Polled
+from ..base.polling import Polled
 from ..errors import BridgeError
 from . import qos
 from .interfaces import instance_class

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""A hosted machine as ROS 2 topics. The runtime makes the messages, the same that it records, at the ticks at which they are
+"""A configured machine as ROS 2 topics. The runtime makes the messages, the same that it records, at the ticks at which they are
 due, and puts them into the outbox.
 
 Topics below the node's namespace, all stamped with the time of the tick (time_ns below; in lock-step the machine's own time):
@@ -24,8 +24,8 @@ from simclient.run import Run
 
 from ..base.node_main import wait_for_receivers
 from . import qos
-from .forward import Forward
 from .interfaces import instance_class
+from .outbox_publisher import OutboxPublisher
 
 #: Latched topics, and their types.
 _LATCHED = {"state": MachineState, "health": InstanceHealth, "faults": FaultCounters}
@@ -46,7 +46,7 @@ class MachineTopics:
         node: Node,
         run: Run,
         decimation: int,
-        forward: Forward,
+        forward: OutboxPublisher,
         messages: RunTopics,
         transition: Callable[[bytes], None],
     ):

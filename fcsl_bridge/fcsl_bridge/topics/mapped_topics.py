@@ -16,10 +16,10 @@ from simclient.ros.topics import Inlet, RosTopic, composer_of, sources_of, topic
 from simclient.run import Run
 
 from ..base.node_main import wait_for_receivers
-from ..base.polled import Polled
+from ..base.polling import Polled
 from . import qos, tf
-from .forward import Forward
 from .interfaces import message_class
+from .outbox_publisher import OutboxPublisher
 
 #: For all receivers together to have the last commands.
 _SAFE_WAIT_S = 0.2
@@ -141,7 +141,7 @@ class Outputs:
     """Topics of actuators and reports, published at every tick: of actuators their safe values while the machine is
     disarmed. `chosen`: those whose poses go to /tf, too."""
 
-    def __init__(self, node: Node, run: Run, forward: Forward, messages: RunTopics, chosen: Sequence[str]):
+    def __init__(self, node: Node, run: Run, forward: OutboxPublisher, messages: RunTopics, chosen: Sequence[str]):
         self._node, self._run, self._messages = node, run, messages
         topics = [topic for topic in topics_of(run.machine) if topic.direction != "sensor"]
         ready = [(t, composer_of(t), message_class(t.type)) for t in topics]

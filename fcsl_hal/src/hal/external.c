@@ -13,7 +13,7 @@
 #include "fcsl/fcsl_monotonic.h"
 #include "named_values/wire_named.h"
 #include "presence.h"
-#include "transport/control_packet.h"
+#include "transport/handshake.h"
 
 enum {
     TEXT_BYTES = 512,
@@ -49,7 +49,7 @@ struct fcsl_external {
 static size_t inbox_bytes(const fcsl_machine_t *machine)
 {
     const size_t actuators = fcsl_message_capacity(machine, FCSL_ACTUATOR_MESSAGE);
-    return actuators > CONTROL_PACKET_MAX ? actuators : CONTROL_PACKET_MAX;
+    return actuators > HANDSHAKE_PACKET_MAX ? actuators : HANDSHAKE_PACKET_MAX;
 }
 
 /* Everything but the wire. Returns null with `error` filled. */
@@ -150,20 +150,20 @@ static int is_early(uint64_t begun_ns, uint64_t deadline_ns)
 /* ---- meeting ------------------------------------------------------------------------------------------------------- */
 
 /* Answers a hello: OK, ERROR, or NONE when the controller has left in the meantime. */
-static fcsl_hal_status_t answer(fcsl_external_t *external, const control_packet_t *hello)
+static fcsl_hal_status_t answer(fcsl_external_t *external, const handshake_packet_t *hello)
 {
-    char text[CONTROL_TEXT_MAX + 1];
-    int refused = control_differs(hello, &external->table, text, sizeof text);
+    char text[HANDSHAKE_TEXT_MAX + 1];
+    int refused = handshake_differs(hello, &external->table, text, sizeof text);
     if (!refused && hello->flag) {
         (void)snprintf(text, sizeof text, "one of them runs free: write ,free-running behind both addresses, or none");
         refused = 1;
     }
     if (refused) {
-        (void)control_send_refusal(&external->wire, text);
+        (void)handshake_send_refusal(&external->wire, text);
         (void)snprintf(external->text, sizeof external->text, "controller refused: %s", text);
         return FCSL_HAL_ERROR;
     }
-    const fcsl_wire_status_t status = control_send_hello(&external->wire, &external->table, 1);
+    const fcsl_wire_status_t status = handshake_send_hello(&external->wire, &external->table, 1);
     if (status == FCSL_WIRE_ERROR) {
         return wire_failed(external);
     }
@@ -173,14 +173,15 @@ static fcsl_hal_status_t answer(fcsl_external_t *external, const control_packet_
 /* Looks at what came, or did not: OK when the controller is there, NONE to wait on. */
 static fcsl_hal_status_t meet(fcsl_external_t *external, fcsl_wire_status_t status, size_t size)
 {
-    control_packet_t hello;
+    handshake_packet_t hello;
     if (status == FCSL_WIRE_ERROR) {
         return wire_failed(external);
     }
     if (status == FCSL_WIRE_CLOSED) { /* a wire that cannot be connected again says so at once, again and again */
         (void)nanosleep(&PAUSE, NULL);
     }
-    if (status == FCSL_WIRE_OK && control_parse(external->inbox, size, &hello) == 0 && hello.kind == CONTROL_HELLO) {
+    if (status == FCSL_WIRE_OK && handshake_parse(external->inbox, size, &hello) == 0 &&
+        hello.kind == HANDSHAKE_HELLO) {
         return answer(external, &hello);
     }
     external->messages_dropped += status == FCSL_WIRE_OK ? 1u : 0u;
@@ -251,24 +252,24 @@ static void wait_anew(fcsl_external_t *external, uint32_t timeout_ms)
 }
 
 /* The controller's run is over, or it began another one. */
-static fcsl_hal_status_t controller_left(fcsl_external_t *external, control_kind_t kind, uint64_t tick)
+static fcsl_hal_status_t controller_left(fcsl_external_t *external, handshake_kind_t kind, uint64_t tick)
 {
     (void)snprintf(external->text, sizeof external->text, "the controller %s before actuator message of tick %" PRIu64,
-                   kind == CONTROL_END ? "ended its run" : "was started again", tick);
+                   kind == HANDSHAKE_END ? "ended its run" : "was started again", tick);
     return FCSL_HAL_CLOSED;
 }
 
 /* Looks at what came: OK when it is the message of `tick`, NONE when it counts for nothing, WAITING for a sign of life. */
 static fcsl_hal_status_t look_at(fcsl_external_t *external, uint64_t tick, size_t size, fcsl_message_t *message)
 {
-    control_packet_t packet;
-    const int is_control = control_parse(external->inbox, size, &packet) == 0;
-    if (is_control && packet.kind == CONTROL_HELLO && packet.flag) { /* another one, which runs free */
+    handshake_packet_t packet;
+    const int is_control = handshake_parse(external->inbox, size, &packet) == 0;
+    if (is_control && packet.kind == HANDSHAKE_HELLO && packet.flag) { /* another one, which runs free */
         external->messages_dropped++;
         return FCSL_HAL_NONE;
     }
-    if (is_control && packet.kind != CONTROL_REFUSAL) {
-        return packet.kind == CONTROL_ALIVE ? FCSL_HAL_WAITING : controller_left(external, packet.kind, tick);
+    if (is_control && packet.kind != HANDSHAKE_REFUSAL) {
+        return packet.kind == HANDSHAKE_ALIVE ? FCSL_HAL_WAITING : controller_left(external, packet.kind, tick);
     }
     if (fcsl_message_check(&external->table, FCSL_ACTUATOR_MESSAGE, external->inbox, size, message) !=
             FCSL_MESSAGE_OK ||
@@ -347,8 +348,8 @@ void fcsl_external_alive(fcsl_external_t *external)
     if (external->runs_free) {
         presence_tell(&external->presence, &external->wire);
     } else if (now_ns >= external->alive_ns) {
-        external->alive_ns = now_ns + CONTROL_ALIVE_NS;
-        (void)control_send_alive(&external->wire); /* the next one comes soon */
+        external->alive_ns = now_ns + HANDSHAKE_ALIVE_NS;
+        (void)handshake_send_alive(&external->wire); /* the next one comes soon */
     }
 }
 
@@ -408,7 +409,7 @@ fcsl_external_counters_t fcsl_external_counters(const fcsl_external_t *external)
 void fcsl_external_end(fcsl_external_t *external, int another_follows)
 {
     external->ended = 1;
-    (void)control_send_end(&external->wire, another_follows); /* to nobody, when the controller is gone */
+    (void)handshake_send_end(&external->wire, another_follows); /* to nobody, when the controller is gone */
 }
 
 const char *fcsl_external_explain(const fcsl_external_t *external)

@@ -13,7 +13,7 @@
 #include "fcsl/fcsl_hal.h"
 #include "named_values/wire_named.h"
 #include "presence.h"
-#include "transport/control_packet.h"
+#include "transport/handshake.h"
 
 enum {
     TEXT_BYTES = 512,
@@ -109,19 +109,19 @@ typedef enum {
 /* What the `size` bytes in the inbox are. */
 static heard_t judge(hal_t *hal, size_t size, fcsl_message_t *message)
 {
-    control_packet_t packet;
+    handshake_packet_t packet;
     if (fcsl_message_check(&hal->table, FCSL_SENSOR_MESSAGE, hal->inbox, size, message) == FCSL_MESSAGE_OK) {
         return HEARD_SENSORS;
     }
     if (fcsl_message_check(&hal->table, FCSL_TIME_MESSAGE, hal->inbox, size, message) == FCSL_MESSAGE_OK) {
         return HEARD_TIME;
     }
-    const int is_control = control_parse(hal->inbox, size, &packet) == 0;
-    if (is_control && packet.kind == CONTROL_END && !control_is_leave(&packet)) {
+    const int is_control = handshake_parse(hal->inbox, size, &packet) == 0;
+    if (is_control && packet.kind == HANDSHAKE_END && !handshake_is_leave(&packet)) {
         hal->is_over = 1;
         return packet.flag ? HEARD_AGAIN : HEARD_END;
     }
-    if (is_control && packet.kind == CONTROL_ALIVE) {
+    if (is_control && packet.kind == HANDSHAKE_ALIVE) {
         return HEARD_ALIVE;
     }
     hal->counters.messages_dropped++;
@@ -263,8 +263,8 @@ static void wire_alive(void *ctx)
     if (hal->runs_free) {
         presence_tell(&hal->presence, &hal->wire);
     } else if (hal->paces && now_ns >= hal->alive_ns) {
-        hal->alive_ns = now_ns + CONTROL_ALIVE_NS;
-        (void)control_send_alive(&hal->wire); /* the next one comes soon */
+        hal->alive_ns = now_ns + HANDSHAKE_ALIVE_NS;
+        (void)handshake_send_alive(&hal->wire); /* the next one comes soon */
     }
 }
 
@@ -429,7 +429,7 @@ static void wire_close(void *ctx)
     hal_t *hal = ctx;
     if (hal->has_wire) {
         if (!hal->is_over) {
-            (void)control_send_leave(&hal->wire); /* where it finds no room, the peer waits for its time-out */
+            (void)handshake_send_leave(&hal->wire); /* where it finds no room, the peer waits for its time-out */
         }
         hal->wire.close(hal->wire.ctx);
     }
@@ -441,7 +441,7 @@ static void wire_close(void *ctx)
 /* ---- opening ------------------------------------------------------------------------------------------------------- */
 
 /* Waits for the peer's answer to the hello. A rig may still send what was for a controller before this one. */
-static int hear_hello(hal_t *hal, uint64_t deadline_ns, control_packet_t *packet, char *error, size_t error_size)
+static int hear_hello(hal_t *hal, uint64_t deadline_ns, handshake_packet_t *packet, char *error, size_t error_size)
 {
     fcsl_wire_status_t status = FCSL_WIRE_NONE;
     size_t size = 0;
@@ -450,8 +450,8 @@ static int hear_hello(hal_t *hal, uint64_t deadline_ns, control_packet_t *packet
            !atomic_load(&hal->interrupted)) {
         const uint64_t look_ns = fcsl_monotonic_ns() + LOOK_NS;
         status = receive(hal, look_ns < deadline_ns ? look_ns : deadline_ns, &size);
-        answered =
-            status == FCSL_WIRE_OK && control_parse(hal->inbox, size, packet) == 0 && packet->kind <= CONTROL_REFUSAL;
+        answered = status == FCSL_WIRE_OK && handshake_parse(hal->inbox, size, packet) == 0 &&
+                   packet->kind <= HANDSHAKE_REFUSAL;
     }
     if (!answered && status < FCSL_WIRE_CLOSED) {
         (void)snprintf(error, error_size, "no handshake from the simulator within %" PRIu32 " ms", hal->open_ms);
@@ -475,8 +475,8 @@ static int hear_hello(hal_t *hal, uint64_t deadline_ns, control_packet_t *packet
 
 static int shake_hands(hal_t *hal, uint64_t deadline_ns, char *error, size_t error_size)
 {
-    control_packet_t packet;
-    if (!hal->greets && control_send_hello(&hal->wire, &hal->table, 0) != FCSL_WIRE_OK) {
+    handshake_packet_t packet;
+    if (!hal->greets && handshake_send_hello(&hal->wire, &hal->table, 0) != FCSL_WIRE_OK) {
         (void)snprintf(error, error_size, "cannot send the handshake: the other end is gone");
         return -1;
     }
@@ -487,7 +487,7 @@ static int shake_hands(hal_t *hal, uint64_t deadline_ns, char *error, size_t err
         return unheard;
     }
     hal->greets = 0;
-    if (packet.kind == CONTROL_REFUSAL) {
+    if (packet.kind == HANDSHAKE_REFUSAL) {
         (void)snprintf(error, error_size, "the simulator refused: %s", packet.text);
         return -1;
     }
@@ -499,7 +499,7 @@ static int shake_hands(hal_t *hal, uint64_t deadline_ns, char *error, size_t err
                        hal->spec);
         return -1;
     }
-    return control_differs(&packet, &hal->table, error, error_size) ? -1 : 0;
+    return handshake_differs(&packet, &hal->table, error, error_size) ? -1 : 0;
 }
 
 static int open_spec(hal_t *hal, uint64_t deadline_ns, char *error, size_t error_size)
@@ -565,7 +565,7 @@ static int make(const fcsl_wire_counters_t *of_wire, const fcsl_machine_t *machi
     const size_t sensors = fcsl_message_capacity(machine, FCSL_SENSOR_MESSAGE);
     hal_t *hal = calloc(1, sizeof *hal);
     if (hal != NULL) {
-        hal->inbox_size = sensors > CONTROL_PACKET_MAX ? sensors : CONTROL_PACKET_MAX;
+        hal->inbox_size = sensors > HANDSHAKE_PACKET_MAX ? sensors : HANDSHAKE_PACKET_MAX;
         hal->inbox = malloc(hal->inbox_size);
         hal->fields = calloc(OWN_COUNT + of_wire->field_count, sizeof *hal->fields);
     }

@@ -24,8 +24,8 @@ void presence_tell(presence_t *presence, const fcsl_wire_t *wire)
 {
     const uint64_t now_ns = fcsl_monotonic_ns();
     if (now_ns >= presence->hello_ns) {
-        presence->hello_ns = now_ns + CONTROL_ALIVE_NS;
-        (void)control_send_hello(wire, presence->table, presence->sends); /* the next one comes soon */
+        presence->hello_ns = now_ns + HANDSHAKE_ALIVE_NS;
+        (void)handshake_send_hello(wire, presence->table, presence->sends); /* the next one comes soon */
     }
 }
 
@@ -67,24 +67,24 @@ static void refuse(presence_t *presence, const char *why)
 
 int presence_hear(presence_t *presence, const uint8_t *bytes, size_t size)
 {
-    control_packet_t packet;
-    char why[CONTROL_TEXT_MAX + 1];
-    if (control_parse(bytes, size, &packet) != 0) {
+    handshake_packet_t packet;
+    char why[HANDSHAKE_TEXT_MAX + 1];
+    if (handshake_parse(bytes, size, &packet) != 0) {
         return 0;
     }
-    const int is_of_controller = control_is_leave(&packet) || (packet.kind == CONTROL_HELLO && packet.flag);
+    const int is_of_controller = handshake_is_leave(&packet) || (packet.kind == HANDSHAKE_HELLO && packet.flag);
     if (is_of_controller && !presence->expects) {
         return 1; /* from another controller; of a simulator in lock-step a refusal tells */
     }
-    if (packet.kind == CONTROL_END) {
+    if (packet.kind == HANDSHAKE_END) {
         leave(presence, "ended its run");
-    } else if (packet.kind == CONTROL_REFUSAL) {
+    } else if (packet.kind == HANDSHAKE_REFUSAL) {
         refuse(presence, packet.text);
-    } else if (packet.kind == CONTROL_HELLO && packet.flag != presence->expects) {
+    } else if (packet.kind == HANDSHAKE_HELLO && packet.flag != presence->expects) {
         refuse(presence, "it flies in lock-step; write ,free-running behind its address, too");
-    } else if (packet.kind == CONTROL_HELLO && control_differs(&packet, presence->table, why, sizeof why)) {
+    } else if (packet.kind == HANDSHAKE_HELLO && handshake_differs(&packet, presence->table, why, sizeof why)) {
         refuse(presence, why);
-    } else if (packet.kind == CONTROL_HELLO) {
+    } else if (packet.kind == HANDSHAKE_HELLO) {
         come(presence);
     }
     return 1;

@@ -7,7 +7,7 @@
 #define FCSL_PRESENCE_H
 
 #include "fcsl/fcsl_log.h"
-#include "transport/control_packet.h"
+#include "transport/handshake.h"
 
 enum { PRESENCE_TEXT_BYTES = 320 };
 

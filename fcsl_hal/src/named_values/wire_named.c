@@ -7,7 +7,7 @@
 #include <stdlib.h>
 #include <string.h>
 
-#include "transport/control_packet.h"
+#include "transport/handshake.h"
 #include "wire_named.h"
 #include "wire_named_internal.h"
 
@@ -63,7 +63,7 @@ static fcsl_wire_status_t take(void *ctx, uint8_t *bytes, size_t capacity, size_
         if (status != FCSL_WIRE_NONE) {
             return status;
         }
-        if (wire->control_size > 0u && capacity >= CONTROL_PACKET_MAX) {
+        if (wire->control_size > 0u && capacity >= HANDSHAKE_PACKET_MAX) {
             memcpy(bytes, wire->control, wire->control_size);
             *size = wire->control_size;
             wire->control_size = 0;
@@ -84,7 +84,8 @@ static fcsl_wire_status_t take_newest(void *ctx, uint8_t *bytes, size_t capacity
     named_wire_t *wire = ctx;
     const int lives = bus_peer_lives(&wire->peer); /* looked at first: what it sent is there then */
     wire->peer.met = wire->peer.met || lives;
-    if (capacity >= CONTROL_PACKET_MAX && fcsl_bus_take(wire->peer.bus, NAMED_CONTROL, bytes, size) && wire->peer.met) {
+    if (capacity >= HANDSHAKE_PACKET_MAX && fcsl_bus_take(wire->peer.bus, NAMED_CONTROL, bytes, size) &&
+        wire->peer.met) {
         return FCSL_WIRE_OK;
     }
     if (wire->peer.met && !lives) {

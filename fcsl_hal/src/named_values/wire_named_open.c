@@ -12,7 +12,7 @@
 #include "commit.h"
 #include "fcsl/fcsl_address.h"
 #include "name_space.h"
-#include "transport/control_packet.h"
+#include "transport/handshake.h"
 #include "wire_named.h"
 #include "wire_named_internal.h"
 
@@ -61,7 +61,7 @@ static named_wire_t *allocate(const fcsl_channel_table_t *table, fcsl_wire_side_
     wire->image = calloc(1, machine->size);
     wire->value = calloc(1, wire->value_bytes);
     wire->has_value = calloc((size_t)channels + 1u, 1);
-    wire->control = calloc(1, CONTROL_PACKET_MAX);
+    wire->control = calloc(1, HANDSHAKE_PACKET_MAX);
     wire->plan.inputs = calloc((size_t)channels + NAMED_CHANNELS, sizeof *wire->plan.inputs);
     wire->plan.outputs = calloc((size_t)channels + NAMED_CHANNELS, sizeof *wire->plan.outputs);
     if (wire->plan.inputs == NULL || wire->plan.outputs == NULL || wire->has_value == NULL || wire->control == NULL ||
@@ -99,14 +99,14 @@ static void fill_plan(named_wire_t *wire, const char *name_space)
     plan->outputs[plan->output_count++] = control;
     plan->outputs[plan->output_count++] = commit;
     plan->inputs[plan->input_count++] = (fcsl_bus_input_t){
-        .key = control, .bytes = CONTROL_PACKET_MAX, .depth = CONTROLS_WAITING, .fits = control_fits};
+        .key = control, .bytes = HANDSHAKE_PACKET_MAX, .depth = CONTROLS_WAITING, .fits = control_fits};
     plan->inputs[plan->input_count++] = (fcsl_bus_input_t){.key = commit,
                                                            .bytes = commit_size,
                                                            .least = commit_size,
                                                            .depth = wire->runs_free ? 1u : COMMITS_WAITING,
                                                            .fits = commit_fits,
                                                            .what = (uint64_t)theirs << 32 | wire->table->hash};
-    plan->tick_bytes = CONTROL_PACKET_MAX + commit_size + NAMED_CHANNELS * (uint64_t)ENTRY_BYTES_MAX;
+    plan->tick_bytes = HANDSHAKE_PACKET_MAX + commit_size + NAMED_CHANNELS * (uint64_t)ENTRY_BYTES_MAX;
     for (uint32_t i = 0; i < machine->channel_count; i++) {
         const fcsl_channel_t *channel = &machine->channels[i];
         const char *key = add_key(wire, &keys, name_space, channel->name);

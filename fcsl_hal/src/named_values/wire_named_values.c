@@ -41,7 +41,7 @@ static int post_commit(named_wire_t *wire, const commit_t *commit)
     return fcsl_bus_post(wire->peer.bus, NAMED_COMMIT, wire->value, commit_bytes(channels));
 }
 
-/* What the host sends was made by the codec, or by control_packet.c: its first entry says what it is. */
+/* What the host sends was made by the codec, or by handshake.c: its first entry says what it is. */
 int named_post(named_wire_t *wire, const uint8_t *bytes, size_t size)
 {
     const uint32_t id = size >= 2 ? fcsl_get_u16(bytes) : 0u;

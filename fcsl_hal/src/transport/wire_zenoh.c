@@ -12,7 +12,7 @@
 #include "fcsl/fcsl_monotonic.h"
 #include "bus_peer.h"
 #include "codec/codec_layout.h"
-#include "control_packet.h"
+#include "handshake.h"
 
 enum {
     WAITING_MAX = 8, /* messages; in lock-step there are two */

@@ -15,7 +15,7 @@ from .c_machine import HEALTH_NAMES, CMachine
 from .c_run import CError, CMessage, CRecordOptions, CSeries, load_runtime
 from .descriptor import Machine, read_machine
 from .errors import TwinError
-from .forks import FORKED, for_children, not_for_children
+from .fork_safety import FORKED, for_children, not_for_children
 from .hardware import COUNT, CSimulatedHardware
 from .library import runtime_library
 

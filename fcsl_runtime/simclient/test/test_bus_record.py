@@ -21,11 +21,11 @@ from test_bus_tools import LONG_S, TOOL, library  # noqa: F401  a fixture
 
 from simclient import AlgTwin, VarClient
 from simclient.bag import Bag
+from simclient.bus.bag_ticks import read_bag_ticks
 from simclient.bus.free_port import free_endpoint
 from simclient.bus.machine import BusMachine
 from simclient.bus.messages import RECORD_TOPICS
 from simclient.bus.reproduction import Reproduction
-from simclient.bus.tape import read_tape
 from simclient.bus.ticks import Tick
 from simclient.bus.writes import Checkpoint, Write, Written, read_checkpoint, read_writes
 from simclient.errors import BagError
@@ -270,8 +270,8 @@ def test_a_tape_of_a_bag_that_a_host_recorded(library: Path, tmp_path: Path) -> 
     run = open_run(library, None)
     try:
         with pytest.raises(BagError, match="needs the machine: --config FILE or --library FILE"):
-            read_tape(Bag(tmp_path / "bag"), None)
-        tape = read_tape(Bag(tmp_path / "bag"), run)
+            read_bag_ticks(Bag(tmp_path / "bag"), None)
+        tape = read_bag_ticks(Bag(tmp_path / "bag"), run)
         tape.check()
         ticks = list(tape.ticks())
     finally:

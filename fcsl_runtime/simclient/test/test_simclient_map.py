@@ -20,8 +20,8 @@ from simclient.bag import Bag, columns
 from simclient.bag.digest import digest
 from simclient.cli import Progress
 from simclient.replay import replay, replay_foreign
-from simclient.replay.grid import first_tick_at, first_ticks_at, nearest_ticks, place, tick_count
 from simclient.replay.mapping import read_map
+from simclient.replay.tick_alignment import first_tick_at, first_ticks_at, nearest_ticks, place, tick_count
 
 START = 100 * 10**9
 

@@ -19,8 +19,8 @@ from simclient.bag import Bag, columns
 from simclient.machine_build import build_config
 from simclient.replay import replay, replay_foreign
 from simclient.replay.foreign import ForeignRun
-from simclient.replay.grid import JUMP_NS, Oddities, screen
 from simclient.replay.reproduce import Replay
+from simclient.replay.tick_alignment import JUMP_NS, Oddities, screen
 from simclient.run import open_run
 
 START = 100 * 10**9

@@ -12,7 +12,7 @@ from pathlib import Path
 import pytest
 
 from simclient import AlgTwin, ProcessTwin, Twin, TwinError
-from simclient.forks import FORKED
+from simclient.fork_safety import FORKED
 from simclient.replay import replay
 
 

@@ -17,7 +17,7 @@
 #include "machine/fault_place.h"
 #include "stack_left.h"
 #include "record/journal.h"
-#include "substitution.h"
+#include "io_replay.h"
 #include "trace.h"
 #include "validate.h"
 
@@ -116,9 +116,9 @@ static int allocate(fcsl_run_t *run, fcsl_error_t *error)
     }
     fcsl_hardware_init(run);
     run->host.ctx = run;
-    run->host.substitute = fcsl_substitution_apply;
-    run->host.executed = fcsl_substitution_executed;
-    return fcsl_substitution_open(run, error);
+    run->host.substitute = fcsl_io_replay_apply;
+    run->host.executed = fcsl_io_replay_executed;
+    return fcsl_io_replay_open(run, error);
 }
 
 static int initialise(fcsl_run_t *run, fcsl_error_t *error)
@@ -148,7 +148,7 @@ static void release(fcsl_run_t *run)
         }
     }
     fcsl_hardware_close(run);
-    fcsl_substitution_free(run);
+    fcsl_io_replay_free(run);
     fcsl_trace_free(run);
     fcsl_journal_close(run->journal);
     free(run->layouts);

@@ -11,7 +11,7 @@
 #include "fcsl/fcsl_gate.h"
 #include "fcsl/fcsl_monotonic.h"
 #include "fcsl/fcsl_scalar.h"
-#include "substitution.h"
+#include "io_replay.h"
 #include "record/recorder.h"
 #include "run_internal.h"
 #include "trace.h"
@@ -162,7 +162,7 @@ static int step_once(fcsl_run_t *run, uint64_t tick, fcsl_error_t *error)
 {
     run->machine->step(run->data, &run->host);
     if (run->impure_count > 0) {
-        fcsl_substitution_settle(run);
+        fcsl_io_replay_settle(run);
     }
     if (fcsl_run_tick(run) == tick) {
         return fcsl_fail(error, "tick %" PRIu64 " was not completed", tick);
@@ -188,7 +188,7 @@ __attribute__((hot)) static int step_noted(fcsl_run_t *run, fcsl_error_t *error)
         return -1;
     }
     if (run->impure_count > 0) {
-        fcsl_substitution_note(run, tick);
+        fcsl_io_replay_note(run, tick);
     }
     if (timed) {
         note_new_overruns(run, tick);

@@ -1,6 +1,6 @@
 /* SPDX-License-Identifier: Apache-2.0
  *
- * The server's life: what it needs, its thread, its end. What it does: rounds.c.
+ * The server's life: what it needs, its thread, its end. What it does: event_loop.c.
  */
 #define _GNU_SOURCE
 #include "server.h"

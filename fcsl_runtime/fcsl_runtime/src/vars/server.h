@@ -22,7 +22,7 @@ struct fcsl_vars {
     listener_t listener;
     char checkpoints[FOLDER_BYTES]; /* the folder of named ones; "" for none */
     int attention; /* eventfd: ends the wait of a round, for a command that is done or for the rounds */
-    atomic_int rounds; /* who makes them: rounds.c */
+    atomic_int rounds; /* who makes them: event_loop.c */
     sem_t returned; /* ends the sleep of the server's thread while it makes none */
     int started;
     pthread_t thread;
@@ -40,7 +40,7 @@ struct fcsl_vars {
     uint64_t tick_by_ns; /* when the `tick` under way goes on, whatever subscribers have read */
 };
 
-/* rounds.c: the server's thread; what ends its wait; and what ends it. */
+/* event_loop.c: the server's thread; what ends its wait; and what ends it. */
 void *fcsl_vars_make_rounds(void *vars);
 void fcsl_vars_call(const fcsl_vars_t *vars);
 void fcsl_vars_end_rounds(fcsl_vars_t *vars);

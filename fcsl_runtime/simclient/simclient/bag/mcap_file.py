@@ -23,10 +23,10 @@ from mcap.reader import SeekingReader
 
 from ..errors import BagError
 from ..library import runtime_library
-from .ahead import ahead
 from .batch import ENTRY, Batch
 from .losses import Loss, Losses
 from .mcap_walk import CHUNK_HEAD, LOST, LOST_MARK, MAGIC, RECORD_HEAD, Gap, Record, Walk
+from .read_ahead import ahead
 from .time_order import sorted_by_time
 from .unpack import LIMIT_BYTES, TooLarge, unlz4, unzstd
 

@@ -268,31 +268,31 @@ def _record(options: argparse.Namespace) -> None:
 def _play(options: argparse.Namespace) -> int:
     from ..bag.formats import open_bag  # here, because these imports take as long as all others
     from ..replay.replaying import open_machine
+    from .bag_ticks import read_bag_ticks
     from .controller import Controller
     from .play import Player
-    from .tape import read_tape
 
     bag = open_bag(options.bag)
     with ExitStack() as opened:
         run = open_machine(options.config, options.library, None) if options.config or options.library else None
         if run is not None:
             opened.callback(run.close)
-        tape = read_tape(bag, run, options.machine)
-        tape.check()
+        ticks = read_bag_ticks(bag, run, options.machine)
+        ticks.check()
         session = opened.enter_context(Session(options.listen, listens=True))
         stop = threading.Event()
         for number in (signal.SIGINT, signal.SIGTERM):  # an exception could leave half a tick on the bus
             signal.signal(number, lambda *_: stop.set())
-        controller = Controller(session, tape.machine, options.timeout)
-        print(f"{tape.machine.prefix}: waiting for a flight computer on {options.listen}", flush=True)
+        controller = Controller(session, ticks.machine, options.timeout)
+        print(f"{ticks.machine.prefix}: waiting for a flight computer on {options.listen}", flush=True)
         if not controller.meet(stop.is_set):
             return 0
         opened.callback(controller.end)
-        print(f"{tape.machine.prefix}: playing", flush=True)
-        played = Player(tape, controller, options.speed, stop.is_set).play()
+        print(f"{ticks.machine.prefix}: playing", flush=True)
+        played = Player(ticks, controller, options.speed, stop.is_set).play()
     print(played)
-    if tape.left_out:
-        done = ", ".join(f"{count} {kind}" for kind, count in sorted(tape.left_out.items()))
+    if ticks.left_out:
+        done = ", ".join(f"{count} {kind}" for kind, count in sorted(ticks.left_out.items()))
         print(f"fcsl-bus: the host did more than sample, which is not played: {done}", file=sys.stderr)
     return 1 if played.differ else 0
 

@@ -7,8 +7,8 @@ import time
 from collections.abc import Callable
 from dataclasses import dataclass
 
+from .bag_ticks import BagTick, BagTicks
 from .controller import ALIVE_S, Controller, RunEnded
-from .tape import Tape, TapeTick
 
 
 @dataclass
@@ -42,17 +42,17 @@ class Played:
 class Player:
     """`speed` 0: as fast as it goes."""
 
-    def __init__(self, tape: Tape, controller: Controller, speed: float, stopped: Callable[[], bool]):
+    def __init__(self, ticks: BagTicks, controller: Controller, speed: float, stopped: Callable[[], bool]):
         self.played = Played()
-        self._tape, self._controller, self._speed, self._stopped = tape, controller, speed, stopped
+        self._ticks, self._controller, self._speed, self._stopped = ticks, controller, speed, stopped
 
     def play(self) -> Played:
         """From the first tick to the last, or until it is stopped. Raises BagError, BusError."""
         played, begun_s = self.played, 0.0
-        for tick in self._tape.ticks():
+        for tick in self._ticks.ticks():
             if played.ticks == 0:
                 played.begins, begun_s = tick.tick, time.monotonic()
-            if not self._is_time(begun_s + played.ticks / self._tape.machine.tick_hz / (self._speed or 1.0)):
+            if not self._is_time(begun_s + played.ticks / self._ticks.machine.tick_hz / (self._speed or 1.0)):
                 played.ended = "interrupted"
                 break
             try:
@@ -63,7 +63,7 @@ class Player:
             played.ticks += 1
             played.missing += not tick.sensors and not tick.actuators
             self._compare(tick, answer)
-        played.ended = played.ended or self._tape.stop
+        played.ended = played.ended or self._ticks.stop
         return played
 
     def _is_time(self, when_s: float) -> bool:
@@ -74,11 +74,11 @@ class Player:
                 self._controller.alive()
         return not self._stopped()
 
-    def _compare(self, tick: TapeTick, answer: dict[str, bytes]) -> None:
+    def _compare(self, tick: BagTick, answer: dict[str, bytes]) -> None:
         if not tick.actuators:
             return
         self.played.compared += 1
-        for channel in self._tape.machine.channels:
+        for channel in self._ticks.machine.channels:
             was, now = tick.actuators.get(channel.name), answer.get(channel.name)
             if was is not None and was != now:
                 self.played.differ += 1

@@ -18,11 +18,11 @@ from ..bag import Bag, field_value
 from ..descriptor import Machine
 from ..errors import BagError, MapError, did_you_mean
 from ..ros.types import definitions_of
-from .grid import Array, Grid, first_ticks_at, nearest_ticks, place, screen
-from .intake import Wish, gather, refusals, wish
 from .mapping import Entry, Expectation
 from .outputs import STATE, Outputs
 from .poses import are_rotations
+from .sample_extraction import Wish, gather, refusals, wish
+from .tick_alignment import Array, Grid, first_ticks_at, nearest_ticks, place, screen
 
 
 @dataclass(frozen=True)

@@ -13,7 +13,7 @@ from ..errors import BagError
 from ..view.picture import SUFFIXES, Line, draw_panel, new_figure, pyplot, save
 from ..view.rotation import ANGLES, euler_deg, unjoined
 from .expect import Comparison
-from .grid import Array
+from .tick_alignment import Array
 
 #: With the bag's values these are 8 curves, as many as have colours of their own.
 _MAX_ELEMENTS = 4

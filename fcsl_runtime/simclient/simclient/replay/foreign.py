@@ -15,7 +15,10 @@ from ..descriptor import Channel, Machine
 from ..errors import BagError, MapError, did_you_mean
 from ..run import Run
 from .expect import Comparison, table
-from .grid import (
+from .mapping import Entry, Map
+from .outputs import SLICE_TICKS, Outputs
+from .sample_extraction import Intake, Wish, gather, refusals, wish
+from .tick_alignment import (
     JUMP_NS,
     Array,
     Coverage,
@@ -25,9 +28,6 @@ from .grid import (
     place,
     tick_count,
 )
-from .intake import Intake, Wish, gather, refusals, wish
-from .mapping import Entry, Map
-from .outputs import SLICE_TICKS, Outputs
 
 #: More ticks mean that the stamps are wrong (for example one of zero and one of today).
 MAX_TICKS = 100_000_000

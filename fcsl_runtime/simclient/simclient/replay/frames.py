@@ -16,9 +16,9 @@ import numpy as np
 from ..bag import Bag
 from ..cli import Progress
 from ..errors import BagError, did_you_mean
-from .grid import Array, screen
-from .intake import NO_STAMP, STUCK, refusals
 from .poses import Poses, are_rotations, compose, identity, interpolate, inverse
+from .sample_extraction import NO_STAMP, STUCK, refusals
+from .tick_alignment import Array, screen
 
 TF, TF_STATIC = "/tf", "/tf_static"
 #: The types of both topics, in ROS 2 and in the oldest bags of ROS 1.

@@ -12,7 +12,7 @@ from ..bag.digest import Sums
 from ..bag.states import stretches
 from ..c_machine import TYPE_FORMATS
 from ..run import Run
-from .grid import Array
+from .tick_alignment import Array
 
 STATE, NEXT_STATE = "machine.state", "machine.next_state"
 #: Ticks between two calls of `collect` at most, and the bytes of the rows of so many ticks; at least one row.

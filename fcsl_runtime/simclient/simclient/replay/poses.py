@@ -11,7 +11,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from .grid import Array
+from .tick_alignment import Array
 
 
 class Poses(NamedTuple):

@@ -14,7 +14,7 @@ from pathlib import Path
 from typing import IO
 
 from ..errors import TwinError
-from ..forks import FORKED, for_children, not_for_children
+from ..fork_safety import FORKED, for_children, not_for_children
 from ..library import runtime_program
 from ..private_folder import PrivateFolder
 from ..vars.client import VarClient

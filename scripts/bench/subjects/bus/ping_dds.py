@@ -19,7 +19,7 @@ from rclpy.qos import QoSProfile
 from rclpy.serialization import serialize_message
 from std_msgs.msg import UInt8MultiArray
 
-from fcsl_bridge.base.polled import Polled
+from fcsl_bridge.base.polling import Polled
 
 WARM_UP = 50
 _QOS = QoSProfile(depth=10)

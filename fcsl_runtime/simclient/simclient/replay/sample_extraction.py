@@ -18,9 +18,9 @@ from ..errors import BagError, MapError
 from ..ros import frame_names
 from ..ros.reader import REASONS, Reader
 from ..ros.types import definitions_of
-from .grid import Array, Oddities, joined_rows, screen
 from .mapping import Entry
 from .poses import are_rotations
+from .tick_alignment import Array, Oddities, joined_rows, screen
 
 #: Reasons besides REASONS for which a message is not used.
 OTHER_TYPE = "type"

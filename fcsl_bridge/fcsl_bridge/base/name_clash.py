@@ -10,7 +10,7 @@ from rclpy.node import Node
 _PERIOD_S = 1.0
 
 
-class Namesake:
+class NameClash:
     """Call `look` often: it looks once a second, and logs when another node has come. The other one does the same."""
 
     def __init__(self, node: Node):

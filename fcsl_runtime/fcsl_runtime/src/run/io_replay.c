@@ -2,7 +2,7 @@
  *
  * Notes what instances with I/O left in a tick, and puts it in place in a replay.
  */
-#include "substitution.h"
+#include "io_replay.h"
 
 #include <inttypes.h>
 #include <stdlib.h>
@@ -29,7 +29,7 @@ static int is_impure(const fcsl_machine_t *machine, const fcsl_instance_t *insta
     return 0;
 }
 
-int fcsl_substitution_open(fcsl_run_t *run, fcsl_error_t *error)
+int fcsl_io_replay_open(fcsl_run_t *run, fcsl_error_t *error)
 {
     const fcsl_machine_t *machine = run->machine;
     uint32_t size = 0;
@@ -51,7 +51,7 @@ int fcsl_substitution_open(fcsl_run_t *run, fcsl_error_t *error)
     return run->left != NULL ? 0 : fcsl_fail(error, "out of memory for machine '%s'", machine->name);
 }
 
-void fcsl_substitution_free(fcsl_run_t *run)
+void fcsl_io_replay_free(fcsl_run_t *run)
 {
     free(run->impure);
     free(run->left);
@@ -103,7 +103,7 @@ int fcsl_run_substitute(fcsl_run_t *run, uint32_t instance, const void *bytes, u
 }
 
 /* C code that an instance calls may leave another floating-point mode. What follows has the right one. */
-void fcsl_substitution_executed(void *ctx, uint32_t instance)
+void fcsl_io_replay_executed(void *ctx, uint32_t instance)
 {
     fcsl_run_t *run = ctx;
     if (fcsl_fp_enter() != FCSL_FP_DEFAULT && instance < run->machine->instance_count) {
@@ -118,7 +118,7 @@ uint64_t fcsl_run_mode_changes(const fcsl_run_t *run, const char **by)
     return run->mode_changes;
 }
 
-int32_t fcsl_substitution_apply(void *ctx, uint32_t instance)
+int32_t fcsl_io_replay_apply(void *ctx, uint32_t instance)
 {
     fcsl_run_t *run = ctx;
     if (instance >= run->machine->instance_count || run->impure[instance].substituted == 0) {
@@ -135,14 +135,14 @@ uint64_t fcsl_run_impure_executes(const fcsl_run_t *run)
     return run->impure_executes;
 }
 
-void fcsl_substitution_settle(fcsl_run_t *run)
+void fcsl_io_replay_settle(fcsl_run_t *run)
 {
     for (uint32_t i = 0; i < run->machine->instance_count; i++) {
         run->impure[i].substituted = 0;
     }
 }
 
-void fcsl_substitution_note(fcsl_run_t *run, uint64_t tick)
+void fcsl_io_replay_note(fcsl_run_t *run, uint64_t tick)
 {
     const fcsl_machine_t *machine = run->machine;
     const int32_t number = fcsl_read_i32(run->data, machine->state_offset);

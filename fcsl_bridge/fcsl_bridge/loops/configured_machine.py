@@ -26,9 +26,9 @@ from ..diagnostics.machine_status import Diagnostics, Source
 from ..services.dropouts import Dropouts
 from ..services.machine_services import Allowed, MachineServices
 from ..services.parameters import MachineParameters
-from ..topics.forward import Forward
 from ..topics.machine_topics import MachineTopics
 from ..topics.mapped_topics import Outputs
+from ..topics.outbox_publisher import OutboxPublisher
 from ..topics.tf import StaticFrames
 
 
@@ -39,7 +39,7 @@ def next_bag(record: str) -> Path:
     return next(name for name in names if not os.path.lexists(name))
 
 
-class Hosted:
+class ConfiguredMachine:
     """Exists from configure to cleanup. `given`: machine parameters from the node's start. Raises BridgeError and
     TwinError, and then leaves nothing behind."""
 
@@ -62,7 +62,7 @@ class Hosted:
         self.run.attach()
         self._initial = self.run.save()
         # Outside lock-step one thread puts and publishes: it must not wait for itself.
-        self.forward = Forward(lossless=self._lossless and options["wait_for_subscribers"] > 0)
+        self.forward = OutboxPublisher(lossless=self._lossless and options["wait_for_subscribers"] > 0)
         self._stack.callback(self.forward.close)
         self.messages = RunTopics(self.run, self.forward.outbox)
         self._stack.callback(self.messages.close)

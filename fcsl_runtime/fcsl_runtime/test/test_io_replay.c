@@ -3,7 +3,7 @@
  * What an impure instance leaves is recorded and put in place in a replay; that of its pure neighbours is not. The source is
  * compiled in.
  */
-#include "run/substitution.c"
+#include "run/io_replay.c"
 
 #include "fcsl_check.h"
 
@@ -86,7 +86,7 @@ int main(void)
     for (uint32_t i = 0; i < INSTANCES; i++) {
         describe(i);
     }
-    CHECK(fcsl_substitution_open(&run, &error) == 0 && run.impure_count == 1);
+    CHECK(fcsl_io_replay_open(&run, &error) == 0 && run.impure_count == 1);
     for (uint32_t i = 0; i < INSTANCES; i++) {
         CHECK(run.impure[i].size == (i == IMPURE ? BYTES_LEFT : 0u));
         CHECK((fcsl_run_substitute(&run, i, bytes, BYTES_LEFT - 1u, &error) != 0) && run.impure[i].substituted == 0);
@@ -94,12 +94,12 @@ int main(void)
     }
     CHECK(fcsl_run_substitute(&run, INSTANCES, bytes, BYTES_LEFT, &error) != 0);
     for (uint64_t tick = 0; tick < 9; tick++) {
-        fcsl_substitution_note(&run, tick);
+        fcsl_io_replay_note(&run, tick);
     }
     CHECK(recorded == 3); /* in the ticks in which it executed */
 
     /* An execute without a substitute is counted; with one, only what the instance leaves changes. */
-    CHECK(fcsl_substitution_apply(&run, IMPURE) == 0 && fcsl_run_impure_executes(&run) == 1);
+    CHECK(fcsl_io_replay_apply(&run, IMPURE) == 0 && fcsl_run_impure_executes(&run) == 1);
     memory_t expected = memory;
     expected.instances[IMPURE].output = -1.0;
     expected.instances[IMPURE].state = -2.0;
@@ -110,11 +110,11 @@ int main(void)
     memcpy(bytes + 16, &(uint64_t){77u}, 8);
     memcpy(bytes + 24, &(uint32_t){8u}, 4);
     CHECK(fcsl_run_substitute(&run, IMPURE, bytes, BYTES_LEFT, &error) == 0);
-    CHECK(fcsl_substitution_apply(&run, IMPURE) == 1 && memcmp(&memory, &expected, sizeof memory) == 0);
-    CHECK(fcsl_substitution_apply(&run, IMPURE) == 0 && fcsl_run_impure_executes(&run) == 2); /* once */
+    CHECK(fcsl_io_replay_apply(&run, IMPURE) == 1 && memcmp(&memory, &expected, sizeof memory) == 0);
+    CHECK(fcsl_io_replay_apply(&run, IMPURE) == 0 && fcsl_run_impure_executes(&run) == 2); /* once */
     CHECK(fcsl_run_substitute(&run, IMPURE, bytes, BYTES_LEFT, &error) == 0);
-    fcsl_substitution_settle(&run); /* it did not execute in this tick */
-    CHECK(fcsl_substitution_apply(&run, IMPURE) == 0 && fcsl_run_impure_executes(&run) == 3);
-    fcsl_substitution_free(&run);
+    fcsl_io_replay_settle(&run); /* it did not execute in this tick */
+    CHECK(fcsl_io_replay_apply(&run, IMPURE) == 0 && fcsl_run_impure_executes(&run) == 3);
+    fcsl_io_replay_free(&run);
     return 0;
 }

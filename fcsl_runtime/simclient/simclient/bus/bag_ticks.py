@@ -30,7 +30,7 @@ _GAP_MAX = 10_000_000
 
 
 @dataclass
-class TapeTick:
+class BagTick:
     """Values by channel, as bytes of the bus; those of `actuators` only as far as the bag has them."""
 
     tick: int
@@ -42,8 +42,8 @@ class TapeTick:
 _Value = Callable[[bytes], bytes]
 
 
-class Tape:
-    """`left_out` are things that the host did besides, by kind; `stop` says why the tape ends before the bag does. Both
+class BagTicks:
+    """`left_out` are things that the host did besides, by kind; `stop` says why the ticks end before the bag does. Both
     are complete when `ticks` is."""
 
     def __init__(self, bag: Bag, recorded: RecordedMachine, machine: BusMachine):
@@ -57,16 +57,16 @@ class Tape:
         #: By topic, the channels in its messages.
         self._parts: dict[str, list[tuple[BusChannel, _Value]]] = {}
 
-    def ticks(self) -> Iterator[TapeTick]:
+    def ticks(self) -> Iterator[BagTick]:
         """In order and without a gap: a tick that the bag lacks has no values. Raises BagError."""
         self.left_out, self.stop, self._from_writes = Counter(), "", not self._recorded.by_bystander
-        current: TapeTick | None = None
+        current: BagTick | None = None
         for topic, data in self._messages():
             if topic in (self._recorded.checkpoint, self._recorded.lacks):
                 self._from_writes = not self._recorded.by_bystander or topic == self._recorded.checkpoint
                 continue
             tick = self._tick_of(topic, data)
-            current = current or TapeTick(tick)
+            current = current or BagTick(tick)
             if tick < current.tick:
                 self.stop = f"the bag goes back to tick {tick}, behind tick {current.tick}"
                 break
@@ -74,7 +74,7 @@ class Tape:
                 raise BagError(f"{self._bag.path}: a message of tick {tick} comes after one of tick {current.tick}")
             while current.tick < tick:
                 yield current
-                current = TapeTick(current.tick + 1)
+                current = BagTick(current.tick + 1)
             self._take(current, topic, data)
             if self.stop:  # this tick did not come
                 return
@@ -99,7 +99,7 @@ class Tape:
             raise BagError(f"{self._bag.path}: a message of `{topic}` ({len(data)} bytes) does not match its schema")
         return int.from_bytes(data[_TICK_AT:_VALUE_AT], "little")
 
-    def _take(self, current: TapeTick, topic: str, data: bytes) -> None:
+    def _take(self, current: BagTick, topic: str, data: bytes) -> None:
         if topic == self._recorded.writes:
             self._take_write(current, data)
             return
@@ -111,7 +111,7 @@ class Tape:
                 raise BagError(f"{self._bag.path}: tick {current.tick} has a value that `{channel.name}` does not have")
             (current.sensors if channel.direction == "sensor" else current.actuators)[channel.name] = value
 
-    def _take_write(self, current: TapeTick, data: bytes) -> None:
+    def _take_write(self, current: BagTick, data: bytes) -> None:
         write = self._bag.decode_own(self._recorded.writes, data, ("kind", "path", "data"))
         kind = _KINDS[write.kind] if write.kind < len(_KINDS) else f"kind {write.kind}"
         if kind not in _NOT_DONE:
@@ -132,7 +132,7 @@ def _shortened(field_bytes: bytes) -> bytes:
     return field_bytes[4::4][:count]
 
 
-def read_tape(bag: Bag, run: Run | None, wanted: str = "") -> Tape:
+def read_bag_ticks(bag: Bag, run: Run | None, wanted: str = "") -> BagTicks:
     """`run`: the machine of a bag that a host recorded; one of `fcsl-bus record` has its own. Raises BagError, BusError."""
     recorded = bag.machine(wanted, by_bystanders=True)
     if recorded.by_bystander:
@@ -142,34 +142,34 @@ def read_tape(bag: Bag, run: Run | None, wanted: str = "") -> Tape:
     return _of_host(bag, recorded, run)
 
 
-def _of_bystander(bag: Bag, recorded: RecordedMachine) -> Tape:
+def _of_bystander(bag: Bag, recorded: RecordedMachine) -> BagTicks:
     topic = topic_of(recorded.prefix[1:], DESCRIPTOR)
     data = next((data for _, _, data in bag.messages({topic})), None)
     if data is None:
         raise BagError(f"{bag.path}: nothing came of `{recorded.name}` when it was recorded")
     machine = read_machine(recorded.prefix[1:], str(bag.decode_own(topic, data, ("data",)).data))
-    tape = Tape(bag, recorded, machine)
+    ticks = BagTicks(bag, recorded, machine)
     for channel in machine.channels:
         begin = _VALUE_AT + (4 if channel.is_blob else 0)
         name = topic_of(machine.prefix, channel.name)
-        tape._parts[name] = [(channel, lambda data, begin=begin: data[begin:])]  # type: ignore[misc]
-    return tape
+        ticks._parts[name] = [(channel, lambda data, begin=begin: data[begin:])]  # type: ignore[misc]
+    return ticks
 
 
-def _of_host(bag: Bag, recorded: RecordedMachine, run: Run) -> Tape:
+def _of_host(bag: Bag, recorded: RecordedMachine, run: Run) -> BagTicks:
     if run.machine.name != recorded.name:
         raise BagError(f"{bag.path}: it records machine `{recorded.name}`, not `{run.machine.name}`")
     machine = _machine_of(run, recorded.prefix[1:])
-    tape = Tape(bag, recorded, machine)
-    tape._parts[recorded.state] = []  # of every tick
+    ticks = BagTicks(bag, recorded, machine)
+    ticks._parts[recorded.state] = []  # of every tick
     for channel, described in zip(machine.channels, run.machine.channels, strict=True):
         instance, _, name = described.field.path.partition(".outputs.")
         topic = recorded.outputs.get(instance, "")
         layout = bag.layout(topic) if channel.direction == "actuator" and topic in bag.topics else None
         if layout is not None and name in layout.leaves:
             begin, size = layout.leaves[name].offset, described.field.size
-            tape._parts.setdefault(topic, []).append((channel, _cut(begin, size, channel.is_blob)))
-    return tape
+            ticks._parts.setdefault(topic, []).append((channel, _cut(begin, size, channel.is_blob)))
+    return ticks
 
 
 def _cut(begin: int, size: int, is_blob: bool) -> _Value:

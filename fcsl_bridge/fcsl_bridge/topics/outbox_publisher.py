@@ -14,7 +14,7 @@ from simclient.ros.outbox import Outbox
 _T = TypeVar("_T")
 
 
-class Forward:
+class OutboxPublisher:
     """Everything runs in the thread that calls it. lossless: native code waits for room rather than drop a message."""
 
     def __init__(self, lossless: bool):
@@ -52,7 +52,7 @@ class Forward:
 class NativeThread:
     """Makes native calls in a thread of its own, one at a time, and publishes meanwhile what they put into the outbox."""
 
-    def __init__(self, forward: Forward):
+    def __init__(self, forward: OutboxPublisher):
         self._forward = forward
         self._pool = ThreadPoolExecutor(1)
 

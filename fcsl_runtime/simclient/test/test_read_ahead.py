@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""simclient.bag.ahead: an iterator goes on in a thread while its items are used."""
+"""simclient.bag.read_ahead: an iterator goes on in a thread while its items are used."""
 
 from __future__ import annotations
 
@@ -9,7 +9,7 @@ from collections.abc import Iterator
 
 import pytest
 
-from simclient.bag.ahead import ahead
+from simclient.bag.read_ahead import ahead
 
 
 def readers() -> int:
