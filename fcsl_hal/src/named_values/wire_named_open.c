@@ -99,7 +99,7 @@ static void fill_plan(named_wire_t *wire, const char *name_space)
     plan->outputs[plan->output_count++] = control;
     plan->outputs[plan->output_count++] = commit;
     plan->inputs[plan->input_count++] = (fcsl_bus_input_t){
-        .key = control, .bytes = HANDSHAKE_PACKET_MAX, .depth = CONTROLS_WAITING, .fits = control_fits};
+        .key = control, .bytes = HANDSHAKE_PACKET_MAX, .depth = CONTROLS_WAITING, .fits = handshake_fits};
     plan->inputs[plan->input_count++] = (fcsl_bus_input_t){.key = commit,
                                                            .bytes = commit_size,
                                                            .least = commit_size,

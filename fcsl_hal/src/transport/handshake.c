@@ -15,7 +15,7 @@ enum { VERSION = 1 };
 
 static const uint8_t MAGIC[4] = {'F', 'C', 'S', 'W'};
 
-int control_fits(uint64_t what, const uint8_t *bytes, size_t size)
+int handshake_fits(uint64_t what, const uint8_t *bytes, size_t size)
 {
     (void)what;
     return size >= HANDSHAKE_HEADER_BYTES && size <= HANDSHAKE_PACKET_MAX && memcmp(bytes, MAGIC, sizeof MAGIC) == 0 &&
@@ -25,7 +25,7 @@ int control_fits(uint64_t what, const uint8_t *bytes, size_t size)
 
 int handshake_parse(const uint8_t *bytes, size_t size, handshake_packet_t *packet)
 {
-    if (!control_fits(0, bytes, size)) {
+    if (!handshake_fits(0, bytes, size)) {
         return -1;
     }
     memset(packet, 0, sizeof *packet);

@@ -44,7 +44,7 @@ typedef struct {
 } handshake_packet_t;
 
 /* Whether the bytes are a control packet of this version: of an input of the bus, which gives it no `what`. */
-int control_fits(uint64_t what, const uint8_t *bytes, size_t size);
+int handshake_fits(uint64_t what, const uint8_t *bytes, size_t size);
 
 /* Returns 0, or -1 when the bytes are not a control packet of this version. */
 int handshake_parse(const uint8_t *bytes, size_t size, handshake_packet_t *packet);

@@ -91,7 +91,7 @@ static fcsl_wire_status_t zenoh_send(void *ctx, const uint8_t *message, size_t s
 /* Control packets, and messages of channels whose sum is right. */
 static int is_message(uint64_t what, const uint8_t *bytes, size_t size)
 {
-    return control_fits(what, bytes, size) || message_is_whole(bytes, size);
+    return handshake_fits(what, bytes, size) || message_is_whole(bytes, size);
 }
 
 /* The oldest message that fits, if there is one. What a peer sent comes before the news that it is gone. */
