@@ -19,7 +19,7 @@ extern "C" {
 
 typedef enum {
     FCSL_HAL_OK = 0,
-    FCSL_HAL_NONE = 1,    /* sample: nothing new for this tick */
+    FCSL_HAL_NONE = 1,    /* sample: no message for this tick */
     FCSL_HAL_TIMEOUT = 2, /* lock-step: the message of this tick did not come in time */
     FCSL_HAL_CLOSED = 3,  /* the other side ended the run */
     FCSL_HAL_ERROR = 4,
@@ -38,8 +38,11 @@ typedef struct fcsl_hal {
     /* Before anything else. Returns 0, or with `error` filled -1, or 1 when the peer was not found yet: then it may be called again,
      * to look on. Sets what stands below as known only now. */
     int (*open)(struct fcsl_hal *hal, char *error, size_t error_size);
-    /* Puts the sensor message of `tick` into `bytes`; `capacity` is fcsl_message_capacity(machine, FCSL_SENSOR_MESSAGE) or
-     * more. The HAL has checked what came from elsewhere: the host takes *message as it is. Sets it on FCSL_HAL_OK alone. */
+    /* Puts the sensor message of `tick` into `bytes` and returns OK; `capacity` is fcsl_message_capacity(machine, FCSL_SENSOR_MESSAGE)
+     * or more. The HAL has checked what came from elsewhere: the host takes *message as it is. Sets it on FCSL_HAL_OK alone. NONE: there
+     * is no message, since nothing is new, or since the HAL has put its samples into the channels itself: those of a board and of the
+     * ROS 2 graph, which are made for one run, do so, because their samples have an age and a stamp of their own, which no message
+     * carries. */
     fcsl_hal_status_t (*sample)(void *ctx, uint64_t tick, uint8_t *bytes, size_t capacity, fcsl_message_t *message);
     fcsl_hal_status_t (*command)(void *ctx, const fcsl_message_t *message);
     /* Called when the arm flag of the commands changes, before the command that changes it, and with 0 at the end of a run that

@@ -2,6 +2,9 @@
  *
  * Lines from one thread to another that prints them: a ring of fixed size. Who writes never waits; a line that finds no room
  * is dropped, and who reads gets a line that says how many were.
+ *
+ * `written` and `read` count lines. Each has one thread that stores it, with release and behind the line's bytes; the other loads it with
+ * acquire before it touches them. So a line is read when it is whole, and its place is used again when it has been read.
  */
 #ifndef FCSL_LOG_H
 #define FCSL_LOG_H

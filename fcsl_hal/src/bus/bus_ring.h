@@ -1,6 +1,10 @@
 /* SPDX-License-Identifier: Apache-2.0
  *
  * Messages of one thread for another one, in their order, in a ring of bytes. Neither side waits.
+ *
+ * `head` and `tail` count bytes and never wrap. Each has one thread that stores it, behind the bytes of the message, and the other
+ * loads it with acquire before it touches them: a message is read when it is whole, and its place is used again when it has been
+ * popped. Release would do for that; head is stored sequentially consistent because of bus_event.h, by which the reader sleeps.
  */
 #ifndef FCSL_BUS_RING_H
 #define FCSL_BUS_RING_H

@@ -90,7 +90,6 @@ static fcsl_hal_status_t composite_sample(void *ctx, uint64_t tick, uint8_t *byt
                                           fcsl_message_t *message)
 {
     hal_t *hal = ctx;
-    fcsl_message_t unused;
     hal->culprit = &hal->simulated;
     fcsl_hal_status_t status = hal->simulated.sample(hal->simulated.ctx, tick, bytes, capacity, message);
     if (status == FCSL_HAL_OK || status == FCSL_HAL_NONE || status == FCSL_HAL_WAITING) {
@@ -102,7 +101,7 @@ static fcsl_hal_status_t composite_sample(void *ctx, uint64_t tick, uint8_t *byt
     if (status != FCSL_HAL_OK && status != FCSL_HAL_NONE) {
         return status;
     }
-    const fcsl_hal_status_t sensed = hal->board.sample(hal->board.ctx, tick, NULL, 0, &unused);
+    const fcsl_hal_status_t sensed = hal_linux_sense(hal->board.ctx);
     if (sensed != FCSL_HAL_NONE) {
         hal->culprit = &hal->board;
         return sensed;

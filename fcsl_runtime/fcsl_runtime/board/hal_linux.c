@@ -88,14 +88,9 @@ static fcsl_hal_status_t wait_for_pace(hal_t *hal)
     return FCSL_HAL_TIMEOUT;
 }
 
-static fcsl_hal_status_t linux_sample(void *ctx, uint64_t tick, uint8_t *bytes, size_t capacity,
-                                      fcsl_message_t *message)
+fcsl_hal_status_t hal_linux_sense(void *ctx)
 {
     hal_t *hal = ctx;
-    (void)tick;
-    (void)bytes;
-    (void)capacity;
-    (void)message;
     const fcsl_hal_status_t paced = hal->plan->pacing != BOARD_NO_DEVICE ? wait_for_pace(hal) : FCSL_HAL_OK;
     if (paced != FCSL_HAL_OK) {
         return paced;
@@ -114,7 +109,17 @@ static fcsl_hal_status_t linux_sample(void *ctx, uint64_t tick, uint8_t *bytes, 
         tell_primary(hal, s);
     }
     tell_news(hal);
-    return FCSL_HAL_NONE; /* the channels have their samples already */
+    return FCSL_HAL_NONE;
+}
+
+static fcsl_hal_status_t linux_sample(void *ctx, uint64_t tick, uint8_t *bytes, size_t capacity,
+                                      fcsl_message_t *message)
+{
+    (void)tick;
+    (void)bytes;
+    (void)capacity;
+    (void)message;
+    return hal_linux_sense(ctx);
 }
 
 /* The tick is over: pins get their levels. Actuators are moved by fcsl-guard, if there is one. */

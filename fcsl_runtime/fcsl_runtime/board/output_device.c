@@ -1,6 +1,10 @@
 /* SPDX-License-Identifier: Apache-2.0
  *
- * An output device and its thread.
+ * An output device and its thread, which alone calls the driver: a driver may wait, the guard's loop may not.
+ *
+ * Values go to the thread, and reasons come back, as the newest ones alone (fcsl_latest.h): a slow device gets the last command, not a
+ * queue of old ones. `wake` is posted only when the thread had taken the values before, so it never counts further than 1 and the end.
+ * `taken` and `ended` are numbers of puts; the loop compares them with its own and sees a write that hangs.
  */
 #define _GNU_SOURCE
 #include "output_device.h"

@@ -1,6 +1,16 @@
 /* SPDX-License-Identifier: Apache-2.0
  *
- * A sensor's device and its thread.
+ * A sensor's device and its thread, which alone calls the driver: a driver may wait, a tick may not.
+ *
+ * The ring has one writer, the device's thread, and two that take the oldest sample: the step thread, to use it, and the device's
+ * thread, to make room when the ring is full, since new samples are worth more than old ones. Whoever moves `taken` on by its
+ * compare-and-exchange has it. So the step thread copies a sample first and then tries to have it: if it fails, the copy may be torn,
+ * and it goes on with the next, DEVICE_RING_SAMPLES times at most. If it succeeds, the device's thread cannot have written there: it
+ * reads the `taken` of that exchange before it does. A sample is published by the release of `written`, behind its words. The words are
+ * atomic only because a copy that is thrown away may race with them. A second thread that takes for use breaks nothing; a second writer
+ * does.
+ *
+ * Texts for people go under a lock, which the step thread only tries.
  */
 #define _GNU_SOURCE
 #include "sensor_device.h"

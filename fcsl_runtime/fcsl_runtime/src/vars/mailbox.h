@@ -2,6 +2,10 @@
  *
  * Where a command meets the step thread: one slot, looked at between ticks. The step thread takes no lock; it looks at a
  * word, acts, and wakes the server, which never waits for it: there is at most one command under way.
+ *
+ * `phase` says to whom the command belongs: FREE, and again once ANSWERED, to the server; POSTED to the step thread. Only the owner
+ * touches it, and gives it away by storing the next phase with release; the other one loads that with acquire before it reads the
+ * command. So its bytes need no atomic operations. A second server thread, or a second step thread, breaks it.
  */
 #ifndef FCSL_VARS_MAILBOX_H
 #define FCSL_VARS_MAILBOX_H
