@@ -38,6 +38,7 @@ from .extends import file_of, read_extended
 from .integrators import Integrator, read_integrator
 from .machine_model import machine_model
 from .models import ModelField, ModelTable, type_of, with_unit
+from .plan import Plan
 from .plant_only import MAX_TICK_HZ, build_plant_only
 from .plugins import model_library, model_source, source_text
 from .ros import TruthTopic
@@ -71,7 +72,7 @@ class SimConfig:
     """
 
     path: Path
-    plan: str
+    plan: Plan
     tables: dict[str, ModelTable]
     controller: str
     machine: Machine
@@ -85,9 +86,7 @@ class SimConfig:
 
     def with_seed(self, seed: int) -> SimConfig:
         """The same with another seed, without reading the file again: for many runs."""
-        lines = self.plan.split("\n")
-        lines[lines.index(plan.statement("seed", self.seed))] = plan.statement("seed", seed)
-        return replace(self, seed=seed, plan="\n".join(lines))
+        return replace(self, seed=seed, plan=self.plan.flown_with(seed, {}))
 
 
 @dataclass(frozen=True)
@@ -255,25 +254,25 @@ class _Loader:
         tables = {name: parts.instances[name].table for name in wiring.order}
         used = {table.name: table for table in tables.values() if table}
         lines = [
-            plan.library_statement("machine", lead.machine.name, lead.library),
+            plan.library_statement("machine", lead.machine.name, library=lead.library),
             *([plan.statement("delay", lead.delay_ticks)] if lead.delay_ticks else []),
             *(
-                plan.library_statement(f"companion {name} {other.delay_ticks}", other.machine.name, other.library)
+                plan.library_statement("companion", name, other.delay_ticks, other.machine.name, library=other.library)
                 for name, other in list(parts.controllers.items())[1:]
             ),
             plan.statement("seed", parts.seed),
             plan.statement("ticks", parts.ticks),
             *(
-                plan.library_statement("machine_model" if table.tick_hz else "model", name, table.library)
+                plan.library_statement("machine_model" if table.tick_hz else "model", name, library=table.library)
                 for name, table in sorted(used.items())
             ),
-            *wiring.lines,
+            *wiring.statements,
             *([plan.statement("serial_link", link)] if link else []),
             *([plan.statement("views", views)] if views else []),
         ]
         return SimConfig(
             self.file,
-            plan.document(lines),
+            Plan(tuple(lines)),
             {name: table for name, table in tables.items() if table},
             controller,
             lead.machine,

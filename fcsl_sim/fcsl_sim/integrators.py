@@ -9,6 +9,7 @@ from fcsl_compiler.api.diagnostics import Span
 from fcsl_compiler.api.json_files import ConfigReader, JsonNode
 
 from . import plan
+from .plan import Statement
 
 #: Limits of the native simulator (src/plan/plan.h).
 MAX_HZ = 1_000_000
@@ -36,7 +37,7 @@ class Integrator:
     max_step_s: float
     span: Span
 
-    def statement(self, tick_hz: int) -> str:
+    def statement(self, tick_hz: int) -> Statement:
         """The plan's statement of a group with this integrator, before a controller of this rate."""
         method = "rk4" if self.method == "ab4" and self.hz < AB4_STEPS_PER_TICK * tick_hz else self.method
         values = (self.rtol, self.atol, self.min_step_s, self.max_step_s)

@@ -27,6 +27,7 @@ from simclient.values import Value, read_part
 
 from .errors import SimError
 from .models import ModelTable, Scalar, parse_description
+from .plan import Plan
 
 _SENT = ("packets", "configurations", "datagrams", "failures", "overwritten")
 _OBSERVED = ("ticks", "dropped")
@@ -236,11 +237,11 @@ class Simulation:
     of fcsl_sim.load). A context manager.
     """
 
-    def __init__(self, plan: str, tables: Mapping[str, ModelTable]):
+    def __init__(self, plan: Plan, tables: Mapping[str, ModelTable]):
         self._handle: int | None = None
         self._lib = simulator_library()
         self._error = CError()
-        data = plan.encode()
+        data = plan.text.encode()
         self._handle = self._lib.fcsl_sim_open(data, len(data), byref(self._error))
         if not self._handle:
             raise SimError(_text(self._error))

@@ -384,8 +384,8 @@ class _Sources:
             for name, machine in machines.items()
             for channel in machine.channels
         }
-        for line in config.plan.splitlines():
-            word, *rest = line.split(" ")
+        for one in config.plan.statements:
+            word, rest = one.keyword, one.words
             if word == "link":
                 self.of_fields[f"{rest[2]}.{rest[3]}"] = f"{rest[0]}.{rest[1]}"
             elif word == "actuator":

@@ -18,6 +18,7 @@ from . import dataflow, plan
 from .dataflow import AlgebraicLoop, Link
 from .integrators import MAX_HZ, Integrator
 from .models import FIELD_TYPES, ModelField, ModelTable, type_of, with_unit
+from .plan import Statement
 from .ros import TruthTopic, read_truth
 
 MAX_SECONDS = 1e9
@@ -34,9 +35,9 @@ class Instance:
     name: str
     span: Span
     table: ModelTable | None
-    sets: list[str] = field(default_factory=list)
+    sets: list[Statement] = field(default_factory=list)
     given: dict[str, Span] = field(default_factory=dict)
-    tolerances: list[str] = field(default_factory=list)
+    tolerances: list[Statement] = field(default_factory=list)
     integrator: Integrator | None = None
     rate: Rate | None = None
 
@@ -50,8 +51,8 @@ class Rate:
     phase: int
     span: Span
 
-    def statement(self) -> str:
-        return f"{self.hz} {self.every} {self.phase}"
+    def words(self) -> tuple[int, int, int]:
+        return self.hz, self.every, self.phase
 
     def text(self) -> str:
         hz = Fraction(self.hz, self.every)
@@ -65,7 +66,7 @@ class Wiring:
     `until`: the stop condition as text; empty without one.
     """
 
-    lines: list[str]
+    statements: list[Statement]
     order: list[str]
     ros: tuple[TruthTopic, ...]
     until: str
@@ -149,7 +150,7 @@ def check_wiring(
     return Wiring([*lines, *until], order, read_truth(keys.get("ros"), reader, checker.output), condition)
 
 
-def _edge_statement(edge: _Edge, lead: str) -> str:
+def _edge_statement(edge: _Edge, lead: str) -> Statement:
     source, target = edge.source, edge.target
     if not source.instance:
         if not source.channel:
@@ -166,7 +167,7 @@ def _edge_statement(edge: _Edge, lead: str) -> str:
     return plan.statement("link", source.instance, source.path, target.instance, target.path)
 
 
-def _first_sample(edge: _Edge, lead: str) -> str:
+def _first_sample(edge: _Edge, lead: str) -> Statement:
     controller = edge.target.controller
     return plan.statement("first_sample", "-" if controller == lead else controller, edge.target.path, edge.first_ns)
 
@@ -408,7 +409,7 @@ class _Checker:
 
     # ---- groups and order ---------------------------------------------------------------------------------------------
 
-    def order(self, integrator: Integrator | None) -> tuple[list[str], list[str]]:
+    def order(self, integrator: Integrator | None) -> tuple[list[Statement], list[str]]:
         """The plan's statements of groups, instances and calls; and the instances, sources before what they feed."""
         tables = {name: instance.table for name, instance in self.instances.items() if instance.table}
         links = [self._link(edge, tables) for edge in self.edges if edge.source.instance and edge.target.instance]
@@ -429,8 +430,8 @@ class _Checker:
         for name in order:
             if name in tables:
                 rate = self.instances[name].rate
-                grid = rate.statement() if rate else "0 0 0"
-                lines.append(plan.statement("instance", name, tables[name].name, number.get(name, "-"), grid))
+                grid = rate.words() if rate else (0, 0, 0)
+                lines.append(plan.statement("instance", name, tables[name].name, number.get(name, "-"), *grid))
         return lines + [plan.statement("call", call.instance, call.kind) for call in calls], order
 
     def _fastest(self, group: Sequence[str]) -> int:
@@ -517,7 +518,7 @@ class _Checker:
 
     # ---- events and stop --------------------------------------------------------------------------------------------------
 
-    def read_events(self, node: JsonNode | None, ticks: int | None) -> list[str]:
+    def read_events(self, node: JsonNode | None, ticks: int | None) -> list[Statement]:
         lines = []
         last_ns = self.machine.time_ns(ticks - 1) if self.machine and ticks else None
         for item in self.reader.list(node, "`events`"):
@@ -545,13 +546,13 @@ class _Checker:
 
     def _event_statements(
         self, time_ns: int, instance: str, target: ModelField, scalars: Sequence[bool | int | float | str]
-    ) -> list[str]:
+    ) -> list[Statement]:
         values = [plan.bits(scalar_of(target.type).name, value) for value in scalars]
         return [plan.statement("event", time_ns, instance, target.path, i, value) for i, value in enumerate(values)]
 
-    def read_until(self, node: JsonNode | None) -> tuple[list[str], str]:
+    def read_until(self, node: JsonNode | None) -> tuple[list[Statement], str]:
         """The statements of the stop condition, and the condition as text."""
-        nothing: tuple[list[str], str] = [], ""
+        nothing: tuple[list[Statement], str] = [], ""
         if node is None or (node.kind == "object" and not node.members):
             return nothing
         keys = self.reader.object(node, "`until`", ("field",), (*_COMPARISONS, "for_s"))

@@ -262,8 +262,8 @@ def test_what_is_empty_is_as_good_as_absent(load_sim: Load) -> None:
 def test_the_command_line_replaces_values(load_sim: Load) -> None:
     config = load_sim(seed=7, duration_s=Fraction("0.5"), sets=["altimeter.parameters.sigma=0.25"])
     assert (config.seed, config.ticks) == (7, 50)
-    assert "set altimeter parameters.sigma 0 3fd0000000000000" in config.plan.splitlines()
-    assert "seed 7" in config.plan.splitlines() and "ticks 50" in config.plan.splitlines()
+    assert "set altimeter parameters.sigma 0 3fd0000000000000" in config.plan.text.splitlines()
+    assert "seed 7" in config.plan.text.splitlines() and "ticks 50" in config.plan.text.splitlines()
 
 
 def test_another_seed_is_the_same_as_if_it_had_been_loaded(load_sim: Load) -> None:

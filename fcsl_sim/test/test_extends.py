@@ -59,7 +59,7 @@ def test_objects_are_merged_and_all_else_replaces(extend: Extend, read: Load, wr
 
     assert read(path).plan == read(write_sim(same)).plan
     path.write_text(json.dumps({"extends": "ramp.sim.json", "events": []}))
-    assert "\nevent " not in read(path).plan, "an array replaces that of the base"
+    assert "\nevent " not in read(path).plan.text, "an array replaces that of the base"
 
 
 def test_null_removes(extend: Extend, read: Load, write_sim: Callable[..., Path]) -> None:
@@ -93,7 +93,7 @@ def test_paths_of_the_base_are_relative_to_the_base(extend: Extend, read: Load, 
     assert read(path).plan == plan
     shutil.copy(tmp_path / "ramp.c", tmp_path / "campaign" / "ramp.c")
     path.write_text('{"extends": "../ramp.sim.json", "models": {"ramp": {"source": "ramp.c"}}}')
-    assert read(path).plan.count("\nmodel ") == plan.count("\nmodel ")
+    assert read(path).plan.text.count("\nmodel ") == plan.text.count("\nmodel ")
     path.write_text('{"extends": "../ramp.sim.json", "models": {"ramp": {"source": "romp.c"}}}')
     (message,) = refused(read, path)
     assert message.startswith("windy.sim.json:1: E801: ") and str(tmp_path / "campaign" / "romp.c") in message

@@ -56,8 +56,8 @@ def test_an_input_has_the_value_of_the_file(load_sim: Load, open_sim: Callable[.
 
 def test_the_command_line_sets_an_input(load_sim: Load) -> None:
     config = load_sim(curve(inputs={"x": 5.0}), sets=["curve.inputs.x=7.0"])
-    assert "set curve inputs.x 0 401c000000000000" in config.plan.splitlines()
-    assert "401400000000000" not in config.plan
+    assert "set curve inputs.x 0 401c000000000000" in config.plan.text.splitlines()
+    assert "401400000000000" not in config.plan.text
     assert load_sim(curve(), sets=["curve.inputs.x=7.0"]).warnings == ()
 
 

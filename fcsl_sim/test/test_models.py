@@ -16,6 +16,7 @@ import pytest
 from fcsl_compiler.driver.toolchain import include_dirs
 from fcsl_sim import SimConfig, SimError, Simulation
 from fcsl_sim.native import describe_model
+from fcsl_sim.plan import Plan, statement
 
 TEST = Path(__file__).resolve().parent
 Open = Callable[..., Simulation]
@@ -162,7 +163,8 @@ def test_the_native_side_checks_the_plan_again(
     before: str, after: str, message: str, load_sim: Callable[..., SimConfig]
 ) -> None:
     config = load_sim()
-    assert before in config.plan
+    assert before in config.plan.text
+    lines = config.plan.text.replace(before, after, 1).splitlines()[1:-1]
     with pytest.raises(SimError) as error:
-        Simulation(config.plan.replace(before, after, 1), config.tables)
+        Simulation(Plan(tuple(statement(*line.split(" ")) for line in lines)), config.tables)
     assert message in str(error.value) and str(error.value).startswith("plan line ")

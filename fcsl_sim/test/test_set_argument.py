@@ -117,7 +117,7 @@ def test_the_command_line_takes_elements(study: Path, capsys: pytest.CaptureFixt
 
 def value(config: SimConfig, path: str, element: int) -> str:
     instance, _, rest = path.partition(".")
-    (line,) = (line for line in config.plan.splitlines() if line.startswith(f"set {instance} {rest} {element} "))
+    (line,) = (line for line in config.plan.text.splitlines() if line.startswith(f"set {instance} {rest} {element} "))
     return line.rpartition(" ")[2]
 
 

@@ -56,7 +56,7 @@ def test_it_allocates_nothing(
         config["instances"]["ball"] = {"model": "ball", "parameters": ball}
         config["events"] = [{"at_s": 0.5, "set": "ball.inputs.push", "value": 30.0}]
 
-    (tmp_path / "plan").write_text(load_sim(change).plan)
+    (tmp_path / "plan").write_text(load_sim(change).plan.text)
     done = subprocess.run([str(program), str(tmp_path / "plan")], capture_output=True, text=True, check=False)
     if done.returncode == CANNOT:
         pytest.skip("this kernel has no seccomp")

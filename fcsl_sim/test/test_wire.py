@@ -19,8 +19,10 @@ SERVE = """
 import sys
 from pathlib import Path
 from fcsl_sim import SimError, Simulation
+from fcsl_sim.plan import Plan, statement
 plan, wire, timeout_ms = sys.argv[1:]
-with Simulation(Path(plan).read_text(), {}) as sim:
+lines = Path(plan).read_text().splitlines()[1:-1]
+with Simulation(Plan(tuple(statement(*line.split(" ")) for line in lines)), {}) as sim:
     try:
         sim.listen(f"wire:{wire}", int(timeout_ms))
         print("listening", flush=True)
@@ -37,7 +39,7 @@ with Simulation(Path(plan).read_text(), {}) as sim:
 @contextmanager
 def serving(config: SimConfig, timeout_ms: int) -> Iterator[tuple[subprocess.Popen[str], str]]:
     plan = config.path.with_suffix(".plan")
-    plan.write_text(config.plan)
+    plan.write_text(config.plan.text)
     wire = f"unix:{config.path.parent / 'wire'}"
     command = [sys.executable, "-c", SERVE, str(plan), wire, str(timeout_ms)]
     process = subprocess.Popen(command, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True)

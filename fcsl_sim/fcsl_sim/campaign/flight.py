@@ -61,10 +61,6 @@ class Flights:
     def __init__(self, study: Study):
         """Raises SimError or TwinError."""
         self.study = study
-        self._lines = study.config.plan.split("\n")
-        self._seed_line = next(i for i, line in enumerate(self._lines) if line.startswith("seed "))
-        numbers = {line.rsplit(" ", 1)[0]: i for i, line in enumerate(self._lines) if line.startswith("set ")}
-        self._value_lines = [numbers[dispersed.key] for dispersed in study.parameters]
         self._base = SimRun(study.config)
         fields = [study.machine.fields[path] for path in sorted(study.paths() | {_TICK})]
         self._ranges = merged(fields)
@@ -87,13 +83,12 @@ class Flights:
 
     def config(self, case: int) -> SimConfig:
         """The simulation with the seed and the values of this case."""
-        seed, lines = self.study.seed_of(case), list(self._lines)
-        lines[self._seed_line] = plan.statement("seed", seed)
-        values = self.study.values(case)
-        for dispersed, number, value in zip(self.study.parameters, self._value_lines, values, strict=True):
-            bits = plan.bits(scalar_of(dispersed.field.type).name, value)
-            lines[number] = plan.statement(dispersed.key, bits)
-        return replace(self.study.config, seed=seed, plan="\n".join(lines))
+        seed, values = self.study.seed_of(case), self.study.values(case)
+        bits = {
+            one.target: plan.bits(scalar_of(one.field.type).name, value)
+            for one, value in zip(self.study.parameters, values, strict=True)
+        }
+        return replace(self.study.config, seed=seed, plan=self.study.config.plan.flown_with(seed, bits))
 
     def fly(self, case: int, bag: Path | None = None, watchdog: Watchdog | None = None) -> Outcome:
         """What goes wrong in a flight is its outcome. bag: records it into this new folder. watchdog: ends the process with a

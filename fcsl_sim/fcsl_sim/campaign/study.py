@@ -19,6 +19,7 @@ from ..config import SimConfig, load
 from ..element_path import name_an_element, place_of, split_path
 from ..errors import SimError
 from ..models import ModelField
+from ..plan import Target
 from ..sim_run import SimRun
 from .dispersion import (
     Choice,
@@ -49,12 +50,11 @@ _DEFAULT_TIMEOUT_S = 60.0
 
 @dataclass(frozen=True)
 class Dispersed:
-    """A parameter or input of a model, or an element of one: `instance.parameters.name[2]`. `key`: how its value begins in
-    the plan."""
+    """A parameter or input of a model, or an element of one: `instance.parameters.name[2]`. `target`: what the plan sets."""
 
     path: str
     field: ModelField
-    key: str
+    target: Target
     distribution: Distribution
 
 
@@ -137,7 +137,7 @@ class _Reader:
             run.close()
         self.sink.raise_if_failed()
         assert seed is not None and design is not None
-        print_of = hashlib.sha256("\n".join([text, str(design.count), config.plan]).encode())
+        print_of = hashlib.sha256("\n".join([text, str(design.count), config.plan.text]).encode())
         libraries = {config.library, *(table.library for table in config.tables.values())}
         libraries |= {companion.library for companion in config.companions.values()}
         for library in sorted(libraries):
@@ -168,10 +168,9 @@ class _Reader:
                 node, "`parameters` is an object from path to distribution", f'{{"plant.parameters.mass": {_EXAMPLE}}}'
             )
             return ()
-        starts = {line.rsplit(" ", 1)[0] for line in config.plan.splitlines() if line.startswith("set ")}
         found = []
         for path, member in node.members.items():
-            target = self._target(path, member.key_span, config, starts)
+            target = self._target(path, member.key_span, config)
             if target is None:
                 continue
             spread = self._distribution(member.value, path, scalar_of(target[0].type))
@@ -179,8 +178,8 @@ class _Reader:
                 found.append(Dispersed(path, *target, spread))
         return tuple(found)
 
-    def _target(self, path: str, span: Span, config: SimConfig, starts: set[str]) -> tuple[ModelField, str] | None:
-        """The field, and how the statement that sets it begins."""
+    def _target(self, path: str, span: Span, config: SimConfig) -> tuple[ModelField, Target] | None:
+        """The field, and what the plan sets of it."""
         whole, index = split_path(path)
         instance, _, rest = whole.partition(".")
         table = config.tables.get(instance)
@@ -196,12 +195,12 @@ class _Reader:
             what = f"`{whole}` is {field.type}; a study disperses scalars"
             self.sink.error("E217", what, span, help=name_an_element(whole, shape))
             return None
-        key = f"set {instance} {field.path} {place}"
-        if key not in starts:
+        target = instance, field.path, str(place)
+        if target not in config.plan.values():
             fix = f"give it one: in `{field.role}s` of `{instance}`"
             self.sink.error("E211", f"`{path}` has no value in the simulation", span, help=fix)
             return None
-        return field, key
+        return field, target
 
     def _distribution(self, node: JsonNode, path: str, scalar: Scalar) -> Distribution | None:
         keys = self.reader.object(node, f"the distribution of `{path}`", (), (*_SPREADS, "within", "weights"))

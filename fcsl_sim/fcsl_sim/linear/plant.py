@@ -121,8 +121,7 @@ class Plant:
     def is_fed_by_a_model(self, variable: Variable) -> bool:
         """Whether a connection within the plant sets this input."""
         path, _ = split_path(variable.path.partition(".")[2])
-        ends = [line.split(" ") for line in self.config.plan.splitlines() if line.startswith("link ")]
-        return any(words[3:] == [variable.instance, path] for words in ends)
+        return any(link.words[2:] == (variable.instance, path) for link in self.config.plan.of("link"))
 
     def get(self, variables: Sequence[Variable]) -> Array:
         return np.array([self._read(variable) for variable in variables])

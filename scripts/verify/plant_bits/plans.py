@@ -7,6 +7,7 @@ from functools import cache
 from pathlib import Path
 
 from fcsl_sim import load, plan
+from fcsl_sim.plan import Plan, Statement
 
 from ..shared.cases import ROOT
 from .build import MACHINE
@@ -35,23 +36,23 @@ def _bits(value: float) -> str:
     return plan.bits("f64", float(value))
 
 
-def _groups(methods: dict[str, int], times: int) -> list[str]:
+def _groups(methods: dict[str, int], times: int) -> list[Statement]:
     adaptive = [_bits(v) for v in (1e-8, 1e-8, 1e-7, 0.1)]
     return [
         plan.statement("group", m, hz * times, *([_bits(0.0)] * 4 if hz else adaptive)) for m, hz in methods.items()
     ]
 
 
-def _begin(ticks: int, models: dict[str, Path], machine: Path) -> list[str]:
+def _begin(ticks: int, models: dict[str, Path], machine: Path) -> list[Statement]:
     return [
-        plan.library_statement("machine", MACHINE, machine),
+        plan.library_statement("machine", MACHINE, library=machine),
         plan.statement("seed", 1),
         plan.statement("ticks", ticks),
-        *(plan.library_statement("model", name, library) for name, library in models.items()),
+        *(plan.library_statement("model", name, library=library) for name, library in models.items()),
     ]
 
 
-def _problem(name: str, libraries: dict[str, Path]) -> list[str]:
+def _problem(name: str, libraries: dict[str, Path]) -> list[Statement]:
     """One problem with every integrator."""
     x, times = _PROBLEMS[name]
     return [
@@ -63,7 +64,7 @@ def _problem(name: str, libraries: dict[str, Path]) -> list[str]:
     ]
 
 
-def _balls(libraries: dict[str, Path]) -> list[str]:
+def _balls(libraries: dict[str, Path]) -> list[Statement]:
     """Bouncing balls, each integrated in another way, of which noisy sensors see two; and a push on one of them by the controller."""
     methods = {m: hz for m, hz in _METHODS.items() if m != "verlet"}
     values = {"gravity": 9.81, "restitution": 0.7, "rest_speed": 0.05, "height": 0.5}
@@ -72,44 +73,42 @@ def _balls(libraries: dict[str, Path]) -> list[str]:
         *_begin(_SECONDS * 100, models, libraries[MACHINE]),
         *_groups(methods, 1),
         *(plan.statement("instance", m, "ball", i, 0, 0, 0) for i, m in enumerate(methods)),
-        "instance fast noisy_sensor - 1000 7 3",
-        "instance slow noisy_sensor - 100 1 0",
+        plan.statement("instance", "fast", "noisy_sensor", "-", "1000", "7", "3"),
+        plan.statement("instance", "slow", "noisy_sensor", "-", "100", "1", "0"),
         *(plan.statement("call", m, "stage") for m in methods),
-        "call fast update",
-        "call slow update",
+        plan.statement("call", "fast", "update"),
+        plan.statement("call", "slow", "update"),
         *(plan.statement("set", m, f"parameters.{n}", 0, _bits(v)) for m in methods for n, v in values.items()),
         *(plan.statement("set", s, "parameters.sigma", 0, _bits(0.1)) for s in ("fast", "slow")),
-        "link rk45 outputs.z fast inputs.truth",
-        "link ab4 outputs.v slow inputs.truth",
-        "sensor fast outputs.value altitude",
-        "sensor slow outputs.value velocity",
-        "actuator throttle rk4 inputs.push",
+        plan.statement("link", "rk45", "outputs.z", "fast", "inputs.truth"),
+        plan.statement("link", "ab4", "outputs.v", "slow", "inputs.truth"),
+        plan.statement("sensor", "fast", "outputs.value", "altitude"),
+        plan.statement("sensor", "slow", "outputs.value", "velocity"),
+        plan.statement("actuator", "throttle", "rk4", "inputs.push"),
         plan.statement("event", 1_234_567_891, "rk45", "inputs.push", 0, _bits(-1.5)),
     ]
 
 
 @cache
-def _of_file(name: str) -> list[str]:
+def _of_file(name: str) -> list[Statement]:
     """What `fcsl-sim` flies, but for its views."""
-    lines = load(_FILES[name]).plan.splitlines()
-    return [line for line in lines[1:-1] if not line.startswith("views ")]
+    return [one for one in load(_FILES[name]).plan.statements if one.keyword != "views"]
 
 
-def _file_plan(flight: str, libraries: dict[str, Path]) -> list[str]:
+def _file_plan(flight: str, libraries: dict[str, Path]) -> list[Statement]:
     """With the libraries of the target. A plant alone is flown beside the controller, which it does not meet."""
-    lines = []
-    for line in _of_file(flight):
-        keyword, name = line.split()[:2]
-        if keyword == "machine":
-            line = plan.library_statement("machine", MACHINE, libraries[MACHINE])
-        elif keyword == "model":
-            line = plan.library_statement("model", name, libraries[name])
-        lines.append(line)
-    return lines
+    found = []
+    for one in _of_file(flight):
+        if one.keyword == "machine":
+            one = plan.library_statement("machine", MACHINE, library=libraries[MACHINE])
+        elif one.keyword == "model":
+            one = plan.library_statement("model", one.words[0], library=libraries[one.words[0]])
+        found.append(one)
+    return found
 
 
 def plan_text(name: str, libraries: dict[str, Path]) -> str:
     """The plan of a flight, with these libraries."""
     if name in _FILES:
-        return plan.document(_file_plan(name, libraries))
-    return plan.document(_balls(libraries) if name == "balls" else _problem(name, libraries))
+        return Plan(tuple(_file_plan(name, libraries))).text
+    return Plan(tuple(_balls(libraries) if name == "balls" else _problem(name, libraries))).text

@@ -66,7 +66,7 @@ def plan_of(plant: str, folder: Path) -> str:
     }
     path = where / f"{plant}.sim.json"
     path.write_text(json.dumps(config))
-    return load(path).plan
+    return load(path).plan.text
 
 
 def compile_plants(folder: Path) -> Path:
