@@ -87,6 +87,7 @@ PACKAGES = {
                     "fcsl_address.h",
                     "fcsl_channels.h",
                     "fcsl_driver.h",
+                    "fcsl_error.h",
                     "fcsl_log.h",
                     "fcsl_monotonic.h",
                     "fcsl_plan_text.h",

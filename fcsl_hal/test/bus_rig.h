@@ -66,9 +66,9 @@ static inline const char *free_endpoint(void)
 static inline fcsl_bus_t *open_bus(const fcsl_bus_options_t *options)
 {
     fcsl_bus_t *bus = NULL;
-    char error[512] = "";
-    if (fcsl_bus_open(options, &bus, error, sizeof error) != 0) {
-        (void)fprintf(stderr, "%s\n", error);
+    fcsl_error_t error = {""};
+    if (fcsl_bus_open(options, &bus, &error) != 0) {
+        (void)fprintf(stderr, "%s\n", error.text);
         exit(1);
     }
     return bus;

@@ -278,12 +278,12 @@ static void test_what_is_dropped_is_counted(void)
 static void check_refused(const fcsl_bus_options_t *options, const char *reason)
 {
     fcsl_bus_t *bus = NULL;
-    char error[512] = "";
-    CHECK(fcsl_bus_open(options, &bus, error, sizeof error) != 0 && bus == NULL);
-    if (strstr(error, reason) == NULL) {
-        (void)fprintf(stderr, "'%s' lacks '%s'\n", error, reason);
+    fcsl_error_t error = {""};
+    CHECK(fcsl_bus_open(options, &bus, &error) != 0 && bus == NULL);
+    if (strstr(error.text, reason) == NULL) {
+        (void)fprintf(stderr, "'%s' lacks '%s'\n", error.text, reason);
     }
-    CHECK(strstr(error, reason) != NULL);
+    CHECK(strstr(error.text, reason) != NULL);
 }
 
 static void test_options(void)

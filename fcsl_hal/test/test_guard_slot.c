@@ -36,13 +36,13 @@ typedef struct {
     fcsl_machine_t machine;
     fcsl_guard_link_t link;
     int status;
-    char error[TEXT_BYTES];
+    fcsl_error_t error;
 } asker_t;
 
 static void *ask(void *argument)
 {
     asker_t *asker = argument;
-    asker->status = fcsl_guard_connect(path, &asker->machine, &asker->link, asker->error, sizeof asker->error);
+    asker->status = fcsl_guard_connect(path, &asker->machine, &asker->link, &asker->error);
     return NULL;
 }
 
@@ -183,7 +183,7 @@ static void test_one_flight_program_at_a_time(fcsl_guard_server_t *server, asker
     CHECK(join(server, &second) == FCSL_GUARD_REFUSED && second.status == -1);
     char wanted[TEXT_BYTES];
     (void)snprintf(wanted, sizeof wanted, "guard '%s' refused: process %ld has its slot", path, (long)getpid());
-    CHECK(strcmp(second.error, wanted) == 0);
+    CHECK(strcmp(second.error.text, wanted) == 0);
     CHECK(fcsl_guard_look(server) == FCSL_GUARD_NO_EVENT);
     /* The next one finds the slot empty, although the last one left a command that was not taken. */
     const fcsl_message_t message = command(&first->machine, 9, 0.75, bytes);
@@ -201,7 +201,7 @@ static void test_other_sources_are_refused(fcsl_guard_server_t *server)
 {
     asker_t other = {.machine = machine_of("another hash")};
     CHECK(join(server, &other) == FCSL_GUARD_JOINED && other.status == -1);
-    CHECK(strstr(other.error, "a machine of other sources (a hash, here another hash)") != NULL);
+    CHECK(strstr(other.error.text, "a machine of other sources (a hash, here another hash)") != NULL);
     CHECK(wait_event(server) == FCSL_GUARD_LEFT);
 }
 
@@ -234,15 +234,15 @@ static void test_the_end_of_the_guard_is_seen(fcsl_guard_server_t *server)
     CHECK(fcsl_guard_command(&asker.link, &message, 1) == 0); /* into memory that nobody reads */
     fcsl_guard_disconnect(&asker.link);
     CHECK(access(path, F_OK) != 0);
-    CHECK(fcsl_guard_connect(path, &asker.machine, &asker.link, asker.error, sizeof asker.error) == -1);
-    CHECK(strstr(asker.error, "nobody listens") != NULL);
+    CHECK(fcsl_guard_connect(path, &asker.machine, &asker.link, &asker.error) == -1);
+    CHECK(strstr(asker.error.text, "nobody listens") != NULL);
 }
 
 int main(void)
 {
     const fcsl_guard_link_t none = {0};
     uint8_t bytes[TEXT_BYTES];
-    char error[TEXT_BYTES];
+    fcsl_error_t error;
     const fcsl_machine_t machine = machine_of("a hash");
     const fcsl_message_t message = command(&machine, 1, 1.0, bytes);
     CHECK(fcsl_guard_command(&none, &message, 1) == 0 && fcsl_guard_is_gone(&none) == 0); /* without a guard */
@@ -250,9 +250,9 @@ int main(void)
     CHECK(mkdtemp(folder) != NULL);
     (void)snprintf(path, sizeof path, "%s/slot", folder);
     fcsl_guard_server_t server;
-    CHECK(fcsl_guard_listen(path, &machine, &server, error, sizeof error) == 0);
+    CHECK(fcsl_guard_listen(path, &machine, &server, &error) == 0);
     fcsl_guard_server_t other;
-    CHECK(fcsl_guard_listen(path, &machine, &other, error, sizeof error) == -1 && access(path, F_OK) == 0);
+    CHECK(fcsl_guard_listen(path, &machine, &other, &error) == -1 && access(path, F_OK) == 0);
 
     asker_t asker = {.machine = machine};
     CHECK(join(&server, &asker) == FCSL_GUARD_JOINED && asker.status == 0);

@@ -14,9 +14,9 @@ static void test_stub(void)
     uint8_t bytes[MESSAGE_BYTES] = {0};
     fcsl_message_t message = {.bytes = bytes, .size = 8};
     char line[FCSL_LOG_BYTES];
-    char error[TEXT_BYTES];
+    fcsl_error_t error;
     fcsl_hal_t hal;
-    CHECK(fcsl_hal_stub(&hal, error, sizeof error) == 0 && hal.open(&hal, error, sizeof error) == 0);
+    CHECK(fcsl_hal_stub(&hal, &error) == 0 && hal.open(&hal, &error) == 0);
     const uint64_t soon_ns = hal.now_ns(hal.ctx) + 1000000u;
     hal.wait(hal.ctx, soon_ns);
     CHECK(hal.now_ns(hal.ctx) >= soon_ns);
@@ -36,9 +36,9 @@ static void test_full_log(void)
 {
     enum { LOST = 3 };
     char line[FCSL_LOG_BYTES];
-    char error[TEXT_BYTES];
+    fcsl_error_t error;
     fcsl_hal_t hal;
-    CHECK(fcsl_hal_stub(&hal, error, sizeof error) == 0);
+    CHECK(fcsl_hal_stub(&hal, &error) == 0);
     for (int round = 0; round < 2; round++) {
         for (int i = 0; i < FCSL_LOG_LINES + LOST; i++) {
             (void)snprintf(line, sizeof line, "line %d", i);

@@ -65,8 +65,8 @@ static fcsl_mirror_t *open_mirror(const char *endpoint)
     const fcsl_mirror_options_t options = {
         .endpoint = endpoint, .name_space = "north", .descriptor = "{}", .write_bytes = WRITE_BYTES};
     fcsl_mirror_t *mirror = NULL;
-    char error[256] = "";
-    CHECK(fcsl_mirror_open(&options, &MACHINE, &mirror, error, sizeof error) == 0);
+    fcsl_error_t error = {""};
+    CHECK(fcsl_mirror_open(&options, &MACHINE, &mirror, &error) == 0);
     return mirror;
 }
 
@@ -276,14 +276,14 @@ static void check_refused(fcsl_channel_t channel, const char *name_space, const 
     static char descriptor[FCSL_BUS_MESSAGE_MAX + 2u];
     fcsl_machine_t machine = MACHINE;
     fcsl_mirror_t *mirror = NULL;
-    char error[256] = "";
+    fcsl_error_t error = {""};
     memset(descriptor, ' ', sizeof descriptor - 1u);
     const fcsl_mirror_options_t options = {
         .endpoint = endpoint, .name_space = name_space, .descriptor = endpoint[0] == 't' ? descriptor : "{}"};
     machine.channels = &channel;
     machine.channel_count = 1;
-    CHECK(fcsl_mirror_open(&options, &machine, &mirror, error, sizeof error) == -1);
-    CHECK(strstr(error, why) != NULL);
+    CHECK(fcsl_mirror_open(&options, &machine, &mirror, &error) == -1);
+    CHECK(strstr(error.text, why) != NULL);
 }
 
 int main(void)

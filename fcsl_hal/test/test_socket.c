@@ -50,10 +50,10 @@ static void check_who_sees_it_can_connect(void)
 {
     long refused = 0;
     pthread_t thread;
-    char error[256] = "";
+    fcsl_error_t error = {""};
     CHECK(pthread_create(&thread, NULL, connect_again_and_again, &refused) == 0);
     for (int i = 0; i < ROUNDS; i++) {
-        const int fd = fcsl_socket_listen(path, SOCK_STREAM, BACKLOG, error, sizeof error);
+        const int fd = fcsl_socket_listen(path, SOCK_STREAM, BACKLOG, &error);
         CHECK(fd >= 0);
         CHECK(unlink(path) == 0 && close(fd) == 0); /* the path first: nobody may see one that is closed */
     }
@@ -77,7 +77,7 @@ static int count_entries(void)
 /* Of the longest path, beside which no name fits; and no other name is left. */
 static void check_names(void)
 {
-    char error[256] = "";
+    fcsl_error_t error = {""};
     char longest[PATH_BYTES];
     const int empty = count_entries();
     memset(longest, 'x', sizeof longest);
@@ -86,17 +86,16 @@ static void check_names(void)
     longest[sizeof longest - 1] = '\0';
     const char *const paths[] = {path, longest};
     for (int i = 0; i < 2; i++) {
-        const int fd = fcsl_socket_listen(paths[i], SOCK_STREAM, BACKLOG, error, sizeof error);
+        const int fd = fcsl_socket_listen(paths[i], SOCK_STREAM, BACKLOG, &error);
         struct stat status;
         CHECK(fd >= 0 && count_entries() == empty + 1);
         CHECK(stat(paths[i], &status) == 0 && S_ISSOCK(status.st_mode) && (status.st_mode & 0777u) == 0600u);
-        const int client = fcsl_socket_connect(paths[i], SOCK_STREAM, error, sizeof error);
+        const int client = fcsl_socket_connect(paths[i], SOCK_STREAM, &error);
         CHECK(client >= 0 && close(client) == 0);
-        CHECK(fcsl_socket_listen(paths[i], SOCK_STREAM, BACKLOG, error, sizeof error) < 0);
-        CHECK(strstr(error, "in use") != NULL);
+        CHECK(fcsl_socket_listen(paths[i], SOCK_STREAM, BACKLOG, &error) < 0);
+        CHECK(strstr(error.text, "in use") != NULL);
         CHECK(close(fd) == 0);
-        const int next =
-            fcsl_socket_listen(paths[i], SOCK_STREAM, BACKLOG, error, sizeof error); /* of a dead listener */
+        const int next = fcsl_socket_listen(paths[i], SOCK_STREAM, BACKLOG, &error); /* of a dead listener */
         CHECK(next >= 0 && close(next) == 0 && unlink(paths[i]) == 0);
     }
 }

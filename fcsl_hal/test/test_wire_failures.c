@@ -60,9 +60,9 @@ static void test_no_controller(void)
 
 static void test_no_simulator(void)
 {
-    char text[TEXT_BYTES] = "";
-    CHECK(fly(&MACHINE, 50, text) == FCSL_HAL_ERROR);
-    CHECK(strstr(text, "nobody listens") != NULL);
+    fcsl_error_t text = {""};
+    CHECK(fly(&MACHINE, 50, &text) == FCSL_HAL_ERROR);
+    CHECK(strstr(text.text, "nobody listens") != NULL);
 }
 
 static void test_killed_simulator(void)
@@ -75,9 +75,9 @@ static void test_killed_simulator(void)
         simulate(external, 0, 10);
         (void)kill(getpid(), SIGKILL);
     }
-    char text[TEXT_BYTES] = "";
-    CHECK(fly(&MACHINE, WAIT_MS, text) == FCSL_HAL_ERROR);
-    CHECK(strstr(text, "went away before tick 10") != NULL);
+    fcsl_error_t text = {""};
+    CHECK(fly(&MACHINE, WAIT_MS, &text) == FCSL_HAL_ERROR);
+    CHECK(strstr(text.text, "went away before tick 10") != NULL);
     CHECK(waitpid(child, NULL, 0) == child);
     /* It could not unlink its socket: the next one replaces it. */
     CHECK(strncmp(spec, "unix:", 5) != 0 || access(path, F_OK) == 0);
@@ -124,9 +124,8 @@ static void test_mismatch_is_refused(void)
 /* Someone who connects to the simulator's place. */
 static int connect_stranger(void)
 {
-    char error[TEXT_BYTES];
-    return strncmp(spec, "tcp:", 4) == 0 ? connect_tcp()
-                                         : fcsl_socket_connect(path, SOCK_SEQPACKET, error, sizeof error);
+    fcsl_error_t error;
+    return strncmp(spec, "tcp:", 4) == 0 ? connect_tcp() : fcsl_socket_connect(path, SOCK_SEQPACKET, &error);
 }
 
 /* Something that connects and talks nonsense, or says nothing, is no controller; the real one is still served. */

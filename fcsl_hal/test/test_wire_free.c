@@ -20,11 +20,11 @@ static fcsl_channel_table_t table;
 static fcsl_wire_t open_free(fcsl_wire_side_t side)
 {
     static char address[96];
-    char error[TEXT_BYTES] = "";
+    fcsl_error_t error = {""};
     fcsl_wire_t wire;
     (void)snprintf(address, sizeof address, "%s,free-running", spec);
-    CHECK(fcsl_wire_check_named(address, error, sizeof error) == 0 && fcsl_wire_runs_free(address));
-    CHECK(fcsl_wire_open_named(address, "fleet", &table, side, 0, &wire, error, sizeof error) == 0);
+    CHECK(fcsl_wire_check_named(address, &error) == 0 && fcsl_wire_runs_free(address));
+    CHECK(fcsl_wire_open_named(address, "fleet", &table, side, 0, &wire, &error) == 0);
     return wire;
 }
 

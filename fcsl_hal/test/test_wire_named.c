@@ -205,11 +205,11 @@ static void test_a_rig(void)
 /* A simulator that ends without an answer is one that was not found: the controller looks on, and meets the next one. */
 static void look_on(void)
 {
-    char error[TEXT_BYTES] = "";
+    fcsl_error_t error = {""};
     fcsl_hal_t hal;
-    CHECK(fcsl_hal_bus(spec, "fleet", &MACHINE, WAIT_MS, WAIT_MS, &hal, error, sizeof error) == 0);
-    CHECK(hal.open(&hal, error, sizeof error) == 1 && strstr(error, "went away before it answered") != NULL);
-    CHECK(hal.open(&hal, error, sizeof error) == 0 && hal.paces);
+    CHECK(fcsl_hal_bus(spec, "fleet", &MACHINE, WAIT_MS, WAIT_MS, &hal, &error) == 0);
+    CHECK(hal.open(&hal, &error) == 1 && strstr(error.text, "went away before it answered") != NULL);
+    CHECK(hal.open(&hal, &error) == 0 && hal.paces);
     hal.close(hal.ctx);
 }
 

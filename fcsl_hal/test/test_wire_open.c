@@ -31,33 +31,33 @@ static void test_specs(void)
         {"zenoh:127.0.0.1:7447", "write zenoh:tcp/HOST:PORT in numbers"},
         {"zenoh:tcp/host:7447", "write zenoh:tcp/HOST:PORT in numbers"},
     };
-    char error[TEXT_BYTES];
+    fcsl_error_t error;
     for (size_t i = 0; i < sizeof CASES / sizeof CASES[0]; i++) {
-        CHECK(fcsl_wire_check(CASES[i].spec, error, sizeof error) != 0 && strstr(error, CASES[i].error) != NULL);
+        CHECK(fcsl_wire_check(CASES[i].spec, &error) != 0 && strstr(error.text, CASES[i].error) != NULL);
     }
-    CHECK(fcsl_wire_check("unix:w", error, sizeof error) == 0 && fcsl_wire_check("uart:/dev/x:115200", error, 1) == 0);
-    CHECK(fcsl_wire_check("udp:[::1]:7600", error, sizeof error) == 0);
+    CHECK(fcsl_wire_check("unix:w", &error) == 0 && fcsl_wire_check("uart:/dev/x:115200", NULL) == 0);
+    CHECK(fcsl_wire_check("udp:[::1]:7600", &error) == 0);
 }
 
 static void test_socket_paths(void)
 {
-    char error[TEXT_BYTES] = "";
+    fcsl_error_t error = {""};
     char longer[300];
     struct stat status;
     fcsl_external_t *second = NULL;
     fcsl_external_t *external = listen_here();
     CHECK(stat(path, &status) == 0 && (status.st_mode & 0777) == 0600);
-    CHECK(fcsl_external_open(spec, &MACHINE, &second, error, sizeof error) != 0);
-    CHECK(strstr(error, "in use") != NULL && strstr(error, path) != NULL);
-    CHECK(fcsl_socket_listen(path, SOCK_STREAM, 1, error, sizeof error) < 0 && strstr(error, "in use") != NULL);
+    CHECK(fcsl_external_open(spec, &MACHINE, &second, &error) != 0);
+    CHECK(strstr(error.text, "in use") != NULL && strstr(error.text, path) != NULL);
+    CHECK(fcsl_socket_listen(path, SOCK_STREAM, 1, &error) < 0 && strstr(error.text, "in use") != NULL);
     fcsl_external_close(external);
 
     /* A listener that takes nobody holds nobody for ever. */
-    const int listener = fcsl_socket_listen(path, SOCK_STREAM, 1, error, sizeof error);
+    const int listener = fcsl_socket_listen(path, SOCK_STREAM, 1, &error);
     CHECK(listener >= 0);
     int refused = 0;
     for (int i = 0; i < 8; i++) {
-        const int fd = fcsl_socket_connect(path, SOCK_STREAM, error, sizeof error);
+        const int fd = fcsl_socket_connect(path, SOCK_STREAM, &error);
         refused += fd < 0;
         if (fd >= 0) {
             (void)close(fd);
@@ -67,26 +67,26 @@ static void test_socket_paths(void)
 
     FILE *file = fopen(path, "w");
     CHECK(file != NULL && fclose(file) == 0);
-    CHECK(fcsl_socket_listen(path, SOCK_STREAM, 1, error, sizeof error) < 0 && strstr(error, "not a socket") != NULL);
+    CHECK(fcsl_socket_listen(path, SOCK_STREAM, 1, &error) < 0 && strstr(error.text, "not a socket") != NULL);
     CHECK(access(path, F_OK) == 0 && unlink(path) == 0);
 
     memset(longer, 'a', sizeof longer - 1);
     longer[sizeof longer - 1] = '\0';
-    CHECK(fcsl_socket_listen(longer, SOCK_STREAM, 1, error, sizeof error) < 0 && strstr(error, "too long") != NULL);
-    CHECK(fcsl_socket_listen("", SOCK_STREAM, 1, error, sizeof error) < 0 && strstr(error, "empty") != NULL);
-    CHECK(fcsl_socket_listen("/nonexistent/folder/s", SOCK_STREAM, 1, error, sizeof error) < 0);
+    CHECK(fcsl_socket_listen(longer, SOCK_STREAM, 1, &error) < 0 && strstr(error.text, "too long") != NULL);
+    CHECK(fcsl_socket_listen("", SOCK_STREAM, 1, &error) < 0 && strstr(error.text, "empty") != NULL);
+    CHECK(fcsl_socket_listen("/nonexistent/folder/s", SOCK_STREAM, 1, &error) < 0);
 }
 
 static void test_serial_device_in_use(void)
 {
     int ends[2];
     char device[64];
-    char error[TEXT_BYTES] = "";
+    fcsl_error_t error = {""};
     fcsl_external_t *second = NULL;
     CHECK(openpty(&ends[0], &ends[1], device, NULL, NULL) == 0);
     (void)snprintf(spec, sizeof spec, "uart:%s:115200", device);
     fcsl_external_t *external = listen_here();
-    CHECK(fcsl_external_open(spec, &MACHINE, &second, error, sizeof error) != 0 && strstr(error, "in use") != NULL);
+    CHECK(fcsl_external_open(spec, &MACHINE, &second, &error) != 0 && strstr(error.text, "in use") != NULL);
     fcsl_external_close(external);
     CHECK(close(ends[0]) == 0 && close(ends[1]) == 0);
 }
@@ -113,9 +113,9 @@ static void check_first_bytes(int fd)
 
 static fcsl_wire_t open_wire(fcsl_wire_side_t side)
 {
-    char error[TEXT_BYTES];
+    fcsl_error_t error;
     fcsl_wire_t wire;
-    CHECK(fcsl_wire_open(spec, side, MESSAGE_BYTES, WAIT_MS, &wire, error, sizeof error) == 0);
+    CHECK(fcsl_wire_open(spec, side, MESSAGE_BYTES, WAIT_MS, &wire, &error) == 0);
     return wire;
 }
 

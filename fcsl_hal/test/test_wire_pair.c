@@ -19,8 +19,8 @@ static uint64_t soon(void)
 
 static void open_pair(fcsl_wire_t ends[2])
 {
-    char error[256];
-    CHECK(fcsl_wire_pair(MESSAGE_MAX, ends, error, sizeof error) == 0);
+    fcsl_error_t error;
+    CHECK(fcsl_wire_pair(MESSAGE_MAX, ends, &error) == 0);
 }
 
 static void close_pair(const fcsl_wire_t ends[2])
@@ -99,9 +99,9 @@ static void test_sizes(void)
     uint8_t small[16];
     uint64_t counters[FCSL_WIRE_COUNTERS_MAX / sizeof(uint64_t)] = {0};
     fcsl_wire_t ends[2];
-    char error[256];
+    fcsl_error_t error;
     size_t length = 0;
-    CHECK(fcsl_wire_pair(sizeof large, ends, error, sizeof error) != 0 && strstr(error, "use unix:PATH") != NULL);
+    CHECK(fcsl_wire_pair(sizeof large, ends, &error) != 0 && strstr(error.text, "use unix:PATH") != NULL);
     open_pair(ends);
     CHECK(ends[0].send(ends[0].ctx, large, sizeof large) == FCSL_WIRE_ERROR);
     CHECK(strstr(ends[0].explain(ends[0].ctx), "too long for the link") != NULL);

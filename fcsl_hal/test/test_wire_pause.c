@@ -44,15 +44,15 @@ static void test_a_simulator_that_begins_another_run(void)
 /* Answers tick 0 after a pause. */
 static int answer_late(void)
 {
-    char error[TEXT_BYTES];
+    fcsl_error_t error;
     uint8_t bytes[MESSAGE_BYTES];
     data_t data;
     fcsl_hal_t hal;
     fcsl_message_t message;
     const fcsl_channel_table_t table = fcsl_channel_table(&MACHINE);
-    const int failed = named ? fcsl_hal_bus(their_spec, "fleet", &MACHINE, WAIT_MS, WAIT_MS, &hal, error, sizeof error)
-                             : fcsl_hal_wire(their_spec, &MACHINE, WAIT_MS, &hal, error, sizeof error);
-    CHECK(!failed && hal.open(&hal, error, sizeof error) == 0);
+    const int failed = named ? fcsl_hal_bus(their_spec, "fleet", &MACHINE, WAIT_MS, WAIT_MS, &hal, &error)
+                             : fcsl_hal_wire(their_spec, &MACHINE, WAIT_MS, &hal, &error);
+    CHECK(!failed && hal.open(&hal, &error) == 0);
     CHECK(sample_patiently(&hal, 0, bytes, sizeof bytes, &message) == FCSL_HAL_OK);
     for (int i = 0; i < PAUSE_MS / LOOK_MS; i++) {
         hal.alive(hal.ctx);

@@ -16,11 +16,11 @@ static int second_may_start[2]; /* a pipe */
 static fcsl_wire_t open_wire(const char *endpoint, fcsl_wire_side_t side)
 {
     char spec[96];
-    char error[TEXT_BYTES] = "";
+    fcsl_error_t error = {""};
     fcsl_wire_t wire;
     (void)snprintf(spec, sizeof spec, "zenoh:%s", endpoint);
-    if (fcsl_wire_open(spec, side, MESSAGE_MAX, LONG_MS, &wire, error, sizeof error) != 0) {
-        (void)fprintf(stderr, "%s\n", error);
+    if (fcsl_wire_open(spec, side, MESSAGE_MAX, LONG_MS, &wire, &error) != 0) {
+        (void)fprintf(stderr, "%s\n", error.text);
         exit(1);
     }
     return wire;
@@ -79,16 +79,16 @@ static void be_first_controller(const char *endpoint)
 static void be_second_controller(const char *endpoint)
 {
     char spec[96];
-    char error[TEXT_BYTES] = "";
+    fcsl_error_t error = {""};
     char byte = 0;
     fcsl_wire_t wire;
     CHECK(read(second_may_start[0], &byte, 1) == 1);
     (void)snprintf(spec, sizeof spec, "zenoh:%s", endpoint);
-    CHECK(fcsl_wire_open(spec, FCSL_WIRE_CONNECT, MESSAGE_MAX, SOON_MS, &wire, error, sizeof error) != 0);
-    if (strstr(error, "has another controller") == NULL) {
-        (void)fprintf(stderr, "%s\n", error);
+    CHECK(fcsl_wire_open(spec, FCSL_WIRE_CONNECT, MESSAGE_MAX, SOON_MS, &wire, &error) != 0);
+    if (strstr(error.text, "has another controller") == NULL) {
+        (void)fprintf(stderr, "%s\n", error.text);
     }
-    CHECK(strstr(error, "has another controller") != NULL);
+    CHECK(strstr(error.text, "has another controller") != NULL);
 }
 
 static void test_a_flight(void)

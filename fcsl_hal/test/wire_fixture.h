@@ -54,10 +54,10 @@ static inline int connect_tcp(void)
 
 static inline fcsl_external_t *listen_here(void)
 {
-    char error[TEXT_BYTES] = "";
+    fcsl_error_t error = {""};
     fcsl_external_t *external = NULL;
-    const int failed = named ? fcsl_external_open_bus(spec, "fleet", &MACHINE, &external, error, sizeof error)
-                             : fcsl_external_open(spec, &MACHINE, &external, error, sizeof error);
+    const int failed = named ? fcsl_external_open_bus(spec, "fleet", &MACHINE, &external, &error)
+                             : fcsl_external_open(spec, &MACHINE, &external, &error);
     CHECK(!failed);
     return external;
 }
@@ -88,18 +88,17 @@ static inline fcsl_hal_status_t sample_patiently(const fcsl_hal_t *hal, uint64_t
 }
 
 /* Steps a controller that answers 2 * i64 until the run ends; returns the last status. */
-static inline fcsl_hal_status_t fly(const fcsl_machine_t *machine, uint32_t timeout_ms, char *text)
+static inline fcsl_hal_status_t fly(const fcsl_machine_t *machine, uint32_t timeout_ms, fcsl_error_t *said)
 {
     fcsl_hal_t hal;
     data_t data;
     uint8_t bytes[MESSAGE_BYTES];
     const fcsl_channel_table_t table = fcsl_channel_table(machine);
     memset(&data, 0, sizeof data);
-    const int failed = named
-                           ? fcsl_hal_bus(their_spec, "fleet", machine, timeout_ms, timeout_ms, &hal, text, TEXT_BYTES)
-                           : fcsl_hal_wire(their_spec, machine, timeout_ms, &hal, text, TEXT_BYTES);
+    const int failed = named ? fcsl_hal_bus(their_spec, "fleet", machine, timeout_ms, timeout_ms, &hal, said)
+                             : fcsl_hal_wire(their_spec, machine, timeout_ms, &hal, said);
     CHECK(!failed);
-    if (hal.open(&hal, text, TEXT_BYTES) != 0) {
+    if (hal.open(&hal, said) != 0) {
         hal.close(hal.ctx);
         return FCSL_HAL_ERROR;
     }
@@ -117,7 +116,7 @@ static inline fcsl_hal_status_t fly(const fcsl_machine_t *machine, uint32_t time
             status = hal.command(hal.ctx, &message);
         }
     }
-    (void)snprintf(text, TEXT_BYTES, "%s", hal.explain(hal.ctx));
+    (void)fcsl_fail(said, "%s", hal.explain(hal.ctx));
     hal.close(hal.ctx);
     return status;
 }
@@ -129,10 +128,10 @@ static inline pid_t start_controller(const fcsl_machine_t *machine, uint32_t tim
     const pid_t child = fork();
     CHECK(child >= 0);
     if (child == 0) {
-        char got[TEXT_BYTES] = "";
-        const fcsl_hal_status_t ended = fly(machine, timeout_ms, got);
-        if (ended != status || strstr(got, text) == NULL) {
-            (void)fprintf(stderr, "the controller ended with %d: %s\n", (int)ended, got);
+        fcsl_error_t got = {""};
+        const fcsl_hal_status_t ended = fly(machine, timeout_ms, &got);
+        if (ended != status || strstr(got.text, text) == NULL) {
+            (void)fprintf(stderr, "the controller ended with %d: %s\n", (int)ended, got.text);
             _exit(1);
         }
         _exit(0);

@@ -10,6 +10,8 @@
 #include <stddef.h>
 #include <stdint.h>
 
+#include "fcsl/fcsl_error.h"
+
 #ifdef __cplusplus
 extern "C" {
 #endif
@@ -98,7 +100,7 @@ typedef struct {
 
 /* Opens a session, declares all that is in `options` and starts its threads. A session that listens opens at once, or fails;
  * others wait for one that listens. Returns 0, or -1 with `error` filled. */
-int fcsl_bus_open(const fcsl_bus_options_t *options, fcsl_bus_t **bus, char *error, size_t error_size);
+int fcsl_bus_open(const fcsl_bus_options_t *options, fcsl_bus_t **bus, fcsl_error_t *error);
 
 /* Takes a message for an output; messages leave in their order, also those of different outputs. Returns 0, or -1: refused and
  * counted. */

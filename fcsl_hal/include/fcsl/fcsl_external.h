@@ -9,6 +9,7 @@
 #ifndef FCSL_EXTERNAL_H
 #define FCSL_EXTERNAL_H
 
+#include "fcsl/fcsl_error.h"
 #include "fcsl/fcsl_hal.h"
 
 #ifdef __cplusplus
@@ -18,14 +19,14 @@ extern "C" {
 typedef struct fcsl_external fcsl_external_t;
 
 /* Waits for a controller at `spec` (fcsl_wire.h). `machine` must outlive it. Returns 0, or -1 with `error` filled. */
-int fcsl_external_open(const char *spec, const fcsl_machine_t *machine, fcsl_external_t **external, char *error,
-                       size_t error_size);
+int fcsl_external_open(const char *spec, const fcsl_machine_t *machine, fcsl_external_t **external,
+                       fcsl_error_t *error);
 /* The same on the bus, with the address and the namespace of fcsl_hal_bus. */
 int fcsl_external_open_bus(const char *address, const char *name_space, const fcsl_machine_t *machine,
-                           fcsl_external_t **external, char *error, size_t error_size);
+                           fcsl_external_t **external, fcsl_error_t *error);
 /* The same over a wire of your own, which it owns once this has returned 0. */
 int fcsl_external_over_wire(const fcsl_wire_t *wire, const fcsl_machine_t *machine, fcsl_external_t **external,
-                            char *error, size_t error_size);
+                            fcsl_error_t *error);
 
 /* Waits up to `timeout_ms` for the controller and shakes hands. A controller made for another machine is refused and ends
  * the wait with FCSL_HAL_ERROR. */

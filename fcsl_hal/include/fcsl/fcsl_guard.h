@@ -12,6 +12,7 @@
 
 #include <stdatomic.h>
 
+#include "fcsl/fcsl_error.h"
 #include "fcsl/fcsl_codec.h"
 
 #define FCSL_GUARD_MAGIC  0x47534346u /* "FCSG" */
@@ -46,8 +47,7 @@ typedef struct {
 
 /* Gets the slot of the guard that listens on `path`; waits 2 s for its answer. Refuses a guard whose machine has other sources.
  * `error` receives a message on failure. Returns 0, or -1. */
-int fcsl_guard_connect(const char *path, const fcsl_machine_t *machine, fcsl_guard_link_t *link, char *error,
-                       size_t error_size);
+int fcsl_guard_connect(const char *path, const fcsl_machine_t *machine, fcsl_guard_link_t *link, fcsl_error_t *error);
 /* Writes the command of a tick that began at `begun_ns` of the monotonic clock: it is as old as the sensors that it was computed
  * from, however long the tick took. Makes no system call. Returns 0, or -1 when the message does not fit. Without a guard it
  * does nothing. */
@@ -80,8 +80,8 @@ typedef enum {
 
 /* Makes the slot and listens on `path` (fcsl_socket_listen), which must last until fcsl_guard_unlisten. Returns 0, or -1 with
  * `error` filled; fcsl_guard_unlisten takes both back. */
-int fcsl_guard_listen(const char *path, const fcsl_machine_t *machine, fcsl_guard_server_t *server, char *error,
-                      size_t error_size);
+int fcsl_guard_listen(const char *path, const fcsl_machine_t *machine, fcsl_guard_server_t *server,
+                      fcsl_error_t *error);
 /* Whether a flight program has come or gone; at most one event per call. Does not wait. */
 fcsl_guard_event_t fcsl_guard_look(fcsl_guard_server_t *server);
 /* Copies a command that was not taken before to `bytes` (server->capacity of them), unchecked, and sets *size and *begun_ns.

@@ -9,6 +9,7 @@
 #ifndef FCSL_HAL_H
 #define FCSL_HAL_H
 
+#include "fcsl/fcsl_error.h"
 #include "fcsl/fcsl_codec.h"
 #include "fcsl/fcsl_log.h"
 #include "fcsl/fcsl_wire.h"
@@ -37,7 +38,7 @@ typedef struct fcsl_hal {
     void *ctx;
     /* Before anything else. Returns 0, or with `error` filled -1, or 1 when the peer was not found yet: then it may be called again,
      * to look on. Sets what stands below as known only now. */
-    int (*open)(struct fcsl_hal *hal, char *error, size_t error_size);
+    int (*open)(struct fcsl_hal *hal, fcsl_error_t *error);
     /* Puts the sensor message of `tick` into `bytes` and returns OK; `capacity` is fcsl_message_capacity(machine, FCSL_SENSOR_MESSAGE)
      * or more. The HAL has checked what came from elsewhere: the host takes *message as it is. Sets it on FCSL_HAL_OK alone. NONE: there
      * is no message, since nothing is new, or since the HAL has put its samples into the channels itself: those of a board and of the
@@ -82,7 +83,7 @@ typedef struct fcsl_hal {
 } fcsl_hal_t;
 
 /* Samples nothing, accepts everything. Returns 0, or -1 with `error` filled. */
-int fcsl_hal_stub(fcsl_hal_t *hal, char *error, size_t error_size);
+int fcsl_hal_stub(fcsl_hal_t *hal, fcsl_error_t *error);
 
 /* Messages over the wire that `spec` names (fcsl_wire.h); fcsl_external is the other end. A peer with another channel table or
  * tick rate is refused.
@@ -93,20 +94,20 @@ int fcsl_hal_stub(fcsl_hal_t *hal, char *error, size_t error_size);
  * A rig that sends none leaves the run to the monotonic clock: sample takes the newest message, if one has come since the last
  * tick. A rig that falls silent, or goes, ends nothing; `hal.connected` and the age of the channels tell.
  * Returns 0, or -1 with `error` filled. */
-int fcsl_hal_wire(const char *spec, const fcsl_machine_t *machine, uint32_t timeout_ms, fcsl_hal_t *hal, char *error,
-                  size_t error_size);
+int fcsl_hal_wire(const char *spec, const fcsl_machine_t *machine, uint32_t timeout_ms, fcsl_hal_t *hal,
+                  fcsl_error_t *error);
 /* The same over the bus, where each channel has a key (docs/bus.md). `address`: zenoh:tcp/HOST:PORT, where a simulator listens,
  * or zenoh-peer:tcp/HOST:PORT. With ,free-running behind it `open` waits for nobody, the monotonic clock paces the run, and sample
  * takes the newest values that anybody put; that a simulator comes or goes is logged. `name_space`: in front of the keys, or "". `open_ms`: how long to look for the simulator. */
 int fcsl_hal_bus(const char *address, const char *name_space, const fcsl_machine_t *machine, uint32_t open_ms,
-                 uint32_t timeout_ms, fcsl_hal_t *hal, char *error, size_t error_size);
+                 uint32_t timeout_ms, fcsl_hal_t *hal, fcsl_error_t *error);
 /* 0 when `address` has that form, or -1 with `error` filled. */
-int fcsl_hal_bus_check(const char *address, char *error, size_t error_size);
+int fcsl_hal_bus_check(const char *address, fcsl_error_t *error);
 /* Whether it says ,free-running. */
 int fcsl_hal_bus_runs_free(const char *address);
 /* The same over a wire of your own, which the HAL owns once this has returned 0. */
 int fcsl_hal_over_wire(const fcsl_wire_t *wire, const fcsl_machine_t *machine, uint32_t timeout_ms, fcsl_hal_t *hal,
-                       char *error, size_t error_size);
+                       fcsl_error_t *error);
 
 #ifdef __cplusplus
 }

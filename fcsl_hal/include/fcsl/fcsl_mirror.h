@@ -9,6 +9,7 @@
 #include <stddef.h>
 #include <stdint.h>
 
+#include "fcsl/fcsl_error.h"
 #include "fcsl/fcsl_machine.h"
 
 #ifdef __cplusplus
@@ -26,7 +27,7 @@ typedef struct {
 
 /* Listens. The machine's tables must outlive it. Returns 0, or -1 with `error` filled. */
 int fcsl_mirror_open(const fcsl_mirror_options_t *options, const fcsl_machine_t *machine, fcsl_mirror_t **mirror,
-                     char *error, size_t error_size);
+                     fcsl_error_t *error);
 
 /* Whether an observer takes anything. */
 int fcsl_mirror_watched(const fcsl_mirror_t *mirror);

@@ -15,6 +15,7 @@
 #include <stddef.h>
 #include <stdint.h>
 
+#include "fcsl/fcsl_error.h"
 #include "fcsl/fcsl_ros_plan.h"
 
 #ifdef __cplusplus
@@ -54,7 +55,7 @@ typedef struct fcsl_ros_reader fcsl_ros_reader_t;
 
 /* Checks that no part of the plan, which must outlive the reader, can lead outside a message or a row. Returns null where one
  * does, or without memory, with `error` filled. */
-fcsl_ros_reader_t *fcsl_ros_reader_new(const fcsl_ros_reader_plan_t *plan, char *error, size_t error_size);
+fcsl_ros_reader_t *fcsl_ros_reader_new(const fcsl_ros_reader_plan_t *plan, fcsl_error_t *error);
 void fcsl_ros_reader_free(fcsl_ros_reader_t *reader);
 const fcsl_ros_reader_plan_t *fcsl_ros_reader_plan(const fcsl_ros_reader_t *reader);
 
@@ -74,7 +75,7 @@ void fcsl_ros_read_many(fcsl_ros_reader_t *reader, const uint8_t *buffer, size_t
 typedef struct fcsl_ros_composer fcsl_ros_composer_t;
 
 /* As fcsl_ros_reader_new. */
-fcsl_ros_composer_t *fcsl_ros_composer_new(const fcsl_ros_composer_plan_t *plan, char *error, size_t error_size);
+fcsl_ros_composer_t *fcsl_ros_composer_new(const fcsl_ros_composer_plan_t *plan, fcsl_error_t *error);
 void fcsl_ros_composer_free(fcsl_ros_composer_t *composer);
 
 /* Writes the message, all of the plan's `size` bytes. Its terms read from `memories`, which the caller vouches for.

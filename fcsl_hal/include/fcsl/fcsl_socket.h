@@ -8,6 +8,8 @@
 
 #include <stddef.h>
 
+#include "fcsl/fcsl_error.h"
+
 #ifdef __cplusplus
 extern "C" {
 #endif
@@ -15,10 +17,10 @@ extern "C" {
 /* Binds and listens; `type` is SOCK_STREAM or SOCK_SEQPACKET. A path in use by a live listener, or by something that is
  * not a socket, is refused; a stale socket file is replaced. The caller unlinks `path` before closing.
  * Returns a descriptor (close-on-exec), or -1 with `error` filled. */
-int fcsl_socket_listen(const char *path, int type, int backlog, char *error, size_t error_size);
+int fcsl_socket_listen(const char *path, int type, int backlog, fcsl_error_t *error);
 
 /* Connects, without waiting for a listener that takes nobody; returns a descriptor (close-on-exec), or -1 with `error` filled. */
-int fcsl_socket_connect(const char *path, int type, char *error, size_t error_size);
+int fcsl_socket_connect(const char *path, int type, fcsl_error_t *error);
 
 #ifdef __cplusplus
 }

@@ -11,6 +11,7 @@
 #include <stddef.h>
 #include <stdint.h>
 
+#include "fcsl/fcsl_error.h"
 #include "fcsl/fcsl_machine.h"
 
 #ifdef __cplusplus
@@ -70,7 +71,7 @@ typedef enum {
 #define FCSL_WIRE_SPECS "unix:PATH, udp:HOST:PORT, tcp:HOST:PORT, uart:DEVICE:BAUD or zenoh:tcp/HOST:PORT"
 
 /* 0 when `spec` has the form of one of FCSL_WIRE_SPECS, or -1 with `error` filled. Opens nothing. */
-int fcsl_wire_check(const char *spec, char *error, size_t error_size);
+int fcsl_wire_check(const char *spec, fcsl_error_t *error);
 
 /* What the wire counts that such a `spec` names. */
 const fcsl_wire_counters_t *fcsl_wire_counters(const char *spec);
@@ -78,10 +79,10 @@ const fcsl_wire_counters_t *fcsl_wire_counters(const char *spec);
 /* Opens the wire that `spec` names, for messages of up to `message_max` bytes. FCSL_WIRE_CONNECT tries again for `timeout_ms`
  * while nobody listens: two programs may start in either order. Returns 0, or -1 with `error` filled. */
 int fcsl_wire_open(const char *spec, fcsl_wire_side_t side, size_t message_max, uint32_t timeout_ms, fcsl_wire_t *wire,
-                   char *error, size_t error_size);
+                   fcsl_error_t *error);
 
 /* Two ends within a process, joined by the link layer over a socket pair. */
-int fcsl_wire_pair(size_t message_max, fcsl_wire_t ends[2], char *error, size_t error_size);
+int fcsl_wire_pair(size_t message_max, fcsl_wire_t ends[2], fcsl_error_t *error);
 
 #ifdef __cplusplus
 }

@@ -4,6 +4,7 @@
  */
 #define _GNU_SOURCE
 #include "fcsl/fcsl_bus.h"
+#include "fcsl/fcsl_error.h"
 
 #include <signal.h>
 #include <stdio.h>
@@ -176,54 +177,54 @@ static fcsl_bus_t *create(const fcsl_bus_options_t *options)
     return bus;
 }
 
-static int declare(fcsl_bus_t *bus, const fcsl_bus_options_t *options, char *error, size_t error_size)
+static int declare(fcsl_bus_t *bus, const fcsl_bus_options_t *options, fcsl_error_t *error)
 {
     fcsl_zenoh_t *zenoh = bus->zenoh;
     int failed = 0;
     for (uint32_t i = 0; i < options->input_count && !failed; i++) {
-        failed = fcsl_zenoh_declare_input(zenoh, i, options->inputs[i].key, error, error_size);
+        failed = fcsl_zenoh_declare_input(zenoh, i, options->inputs[i].key, error->text, sizeof error->text);
     }
     if (options->strays != NULL && !failed) {
-        failed = fcsl_zenoh_declare_strays(zenoh, options->strays, error, error_size);
+        failed = fcsl_zenoh_declare_strays(zenoh, options->strays, error->text, sizeof error->text);
     }
     for (uint32_t i = 0; i < options->output_count && !failed; i++) {
         failed = fcsl_zenoh_declare_output(zenoh, i, options->outputs[i], options->observer, i < options->latched_count,
-                                           error, error_size);
+                                           error->text, sizeof error->text);
     }
     for (uint32_t i = 0; i < options->answer_count && !failed; i++) {
         const fcsl_bus_answer_t *answer = &options->answers[i];
-        failed = fcsl_zenoh_declare_answer(zenoh, answer->key, answer->bytes, answer->size, error, error_size);
+        failed =
+            fcsl_zenoh_declare_answer(zenoh, answer->key, answer->bytes, answer->size, error->text, sizeof error->text);
     }
     for (uint32_t i = 0; i < options->watched_count && !failed; i++) {
-        failed = fcsl_zenoh_watch_token(zenoh, i, options->watched[i], error, error_size);
+        failed = fcsl_zenoh_watch_token(zenoh, i, options->watched[i], error->text, sizeof error->text);
     }
     /* Last: who sees a token finds everything else. */
     for (uint32_t i = 0; i < options->token_count && !failed; i++) {
-        failed = fcsl_zenoh_declare_token(zenoh, options->tokens[i], error, error_size);
+        failed = fcsl_zenoh_declare_token(zenoh, options->tokens[i], error->text, sizeof error->text);
     }
     return failed;
 }
 
-int bus_connect(fcsl_bus_t *bus, const fcsl_bus_options_t *options, char *error, size_t error_size)
+int bus_connect(fcsl_bus_t *bus, const fcsl_bus_options_t *options, fcsl_error_t *error)
 {
     char config[BUS_CONFIG_BYTES] = "";
-    char reason[256] = "";
+    fcsl_error_t reason = {""};
     const fcsl_zenoh_events_t events = bus_events(bus);
     const int listens = options->role == FCSL_BUS_LISTEN;
-    if (options->endpoint != NULL && bus_config_write(options, config, error, error_size) != 0) {
+    if (options->endpoint != NULL && bus_config_write(options, config, error) != 0) {
         return -1;
     }
     (void)atomic_fetch_add(&bus->owners, 1); /* the callbacks, until their release */
-    if (fcsl_zenoh_open(options->config_path, config, &events, &bus->zenoh, reason, sizeof reason) != 0) {
-        (void)snprintf(error, error_size, "cannot %s %s: %s",
-                       options->config_path != NULL ? "open a session of the bus with"
-                       : listens                    ? "listen on"
-                                                    : "connect to",
-                       options->config_path != NULL ? options->config_path : options->endpoint, reason);
-        return -1;
+    if (fcsl_zenoh_open(options->config_path, config, &events, &bus->zenoh, reason.text, sizeof reason.text) != 0) {
+        return fcsl_fail(error, "cannot %s %s: %s",
+                         options->config_path != NULL ? "open a session of the bus with"
+                         : listens                    ? "listen on"
+                                                      : "connect to",
+                         options->config_path != NULL ? options->config_path : options->endpoint, reason.text);
     }
-    if (declare(bus, options, reason, sizeof reason) != 0) {
-        (void)snprintf(error, error_size, "the bus refuses a key: %s", reason);
+    if (declare(bus, options, &reason) != 0) {
+        (void)fcsl_fail(error, "the bus refuses a key: %s", reason.text);
         fcsl_zenoh_close(bus->zenoh);
         bus->zenoh = NULL;
         return -1;
@@ -244,26 +245,25 @@ static int start(fcsl_bus_t *bus)
     return 0;
 }
 
-int fcsl_bus_open(const fcsl_bus_options_t *options, fcsl_bus_t **bus, char *error, size_t error_size)
+int fcsl_bus_open(const fcsl_bus_options_t *options, fcsl_bus_t **bus, fcsl_error_t *error)
 {
     sigset_t all;
     sigset_t before;
-    if (bus_config_check(options, error, error_size) != 0) {
+    if (bus_config_check(options, error) != 0) {
         return -1;
     }
     fcsl_bus_t *self = create(options);
     if (self == NULL) {
-        (void)snprintf(error, error_size, "out of memory for the bus");
-        return -1;
+        return fcsl_fail(error, "out of memory for the bus");
     }
     self->options = *options;
     /* Signals belong to the program's own threads; Zenoh's begin here. */
     (void)sigfillset(&all);
     (void)pthread_sigmask(SIG_SETMASK, &all, &before);
     const int later = options->connects_later && options->role != FCSL_BUS_LISTEN;
-    int failed = later ? 0 : bus_connect(self, options, error, error_size);
+    int failed = later ? 0 : bus_connect(self, options, error);
     if (!failed && start(self) != 0) {
-        (void)snprintf(error, error_size, "cannot start the thread of the bus");
+        (void)fcsl_fail(error, "cannot start the thread of the bus");
         failed = -1;
     }
     (void)pthread_sigmask(SIG_SETMASK, &before, NULL);

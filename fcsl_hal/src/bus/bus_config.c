@@ -10,6 +10,7 @@
 #include <string.h>
 
 #include "bus_inbox.h"
+#include "fcsl/fcsl_error.h"
 #include "fcsl/fcsl_address.h"
 
 enum { HOST_BYTES = 64, PORT_BYTES = 8, ENDPOINT_BYTES = 96, RING_BYTES_MIN = 64 };
@@ -31,85 +32,78 @@ static const char CONFIG[] =
     "   rx: {max_message_size: %u}}}}";
 
 /* `longest`: bytes; `forbidden`: characters. */
-static int check_key(const char *what, const char *key, size_t longest, const char *forbidden, char *error,
-                     size_t error_size)
+static int check_key(const char *what, const char *key, size_t longest, const char *forbidden, fcsl_error_t *error)
 {
     const size_t size = key != NULL ? strnlen(key, longest + 1u) : 0u;
     if (size == 0 || size > longest) {
-        (void)snprintf(error, error_size, "%s of the bus has a key of %s bytes: 1 to %zu are possible", what,
-                       size == 0 ? "0" : "too many", longest);
-        return -1;
+        return fcsl_fail(error, "%s of the bus has a key of %s bytes: 1 to %zu are possible", what,
+                         size == 0 ? "0" : "too many", longest);
     }
     if (strpbrk(key, forbidden) != NULL || key[0] == '/' || key[size - 1] == '/' || strstr(key, "//") != NULL) {
-        (void)snprintf(error, error_size,
-                       "%s of the bus has the key '%s': write words with one slash between them, without %s", what, key,
-                       forbidden);
-        return -1;
+        return fcsl_fail(error, "%s of the bus has the key '%s': write words with one slash between them, without %s",
+                         what, key, forbidden);
     }
     return 0;
 }
 
-static int check_keys(const char *what, const char *const *keys, uint32_t count, size_t longest, char *error,
-                      size_t error_size)
+static int check_keys(const char *what, const char *const *keys, uint32_t count, size_t longest, fcsl_error_t *error)
 {
     if (count > FCSL_BUS_KEYS_MAX) {
-        (void)snprintf(error, error_size, "the bus has %u keys for %s; at most %u are possible", count, what,
-                       FCSL_BUS_KEYS_MAX);
+        (void)fcsl_fail(error, "the bus has %u keys for %s; at most %u are possible", count, what, FCSL_BUS_KEYS_MAX);
         return -1;
     }
     for (uint32_t i = 0; i < count; i++) {
-        if (check_key(what, keys[i], longest, "*$?#", error, error_size) != 0) {
+        if (check_key(what, keys[i], longest, "*$?#", error) != 0) {
             return -1;
         }
     }
     return 0;
 }
 
-static int check_inputs(const fcsl_bus_options_t *options, char *error, size_t error_size)
+static int check_inputs(const fcsl_bus_options_t *options, fcsl_error_t *error)
 {
     uint64_t memory = options->ring_bytes;
     if (options->input_count > FCSL_BUS_KEYS_MAX) {
-        (void)snprintf(error, error_size, "the bus has %u inputs; at most %u are possible", options->input_count,
-                       FCSL_BUS_KEYS_MAX);
+        (void)fcsl_fail(error, "the bus has %u inputs; at most %u are possible", options->input_count,
+                        FCSL_BUS_KEYS_MAX);
         return -1;
     }
     for (uint32_t i = 0; i < options->input_count; i++) {
         const fcsl_bus_input_t *input = &options->inputs[i];
-        if (check_key("an input", input->key, FCSL_BUS_KEY_MAX, "$?#", error, error_size) != 0) {
+        if (check_key("an input", input->key, FCSL_BUS_KEY_MAX, "$?#", error) != 0) {
             return -1;
         }
         if (input->bytes == 0 || input->bytes > FCSL_BUS_MESSAGE_MAX || input->depth == 0) {
-            (void)snprintf(
-                error, error_size,
+            return fcsl_fail(
+                error,
                 "input '%s' of the bus has %u bytes and depth %u: 1 to %u bytes and a depth from 1 on are possible",
                 input->key, input->bytes, input->depth, FCSL_BUS_MESSAGE_MAX);
-            return -1;
         }
         memory += inbox_memory(input->bytes, input->depth);
     }
     if (memory > FCSL_BUS_MEMORY_MAX) {
-        (void)snprintf(error, error_size, "ring and inputs of the bus take %llu bytes; at most %u are possible",
-                       (unsigned long long)memory, FCSL_BUS_MEMORY_MAX);
+        (void)fcsl_fail(error, "ring and inputs of the bus take %llu bytes; at most %u are possible",
+                        (unsigned long long)memory, FCSL_BUS_MEMORY_MAX);
         return -1;
     }
     return 0;
 }
 
-static int check_answers(const fcsl_bus_options_t *options, char *error, size_t error_size)
+static int check_answers(const fcsl_bus_options_t *options, fcsl_error_t *error)
 {
     if (options->answer_count > FCSL_BUS_KEYS_MAX) {
-        (void)snprintf(error, error_size, "the bus has %u answers; at most %u are possible", options->answer_count,
-                       FCSL_BUS_KEYS_MAX);
+        (void)fcsl_fail(error, "the bus has %u answers; at most %u are possible", options->answer_count,
+                        FCSL_BUS_KEYS_MAX);
         return -1;
     }
     for (uint32_t i = 0; i < options->answer_count; i++) {
         const fcsl_bus_answer_t *answer = &options->answers[i];
-        if (check_key("an answer", answer->key, FCSL_BUS_KEY_MAX, "*$?#", error, error_size) != 0) {
+        if (check_key("an answer", answer->key, FCSL_BUS_KEY_MAX, "*$?#", error) != 0) {
             return -1;
         }
         if (answer->size > FCSL_BUS_MESSAGE_MAX) {
-            (void)snprintf(error, error_size, "answer '%s' of the bus has %u bytes; at most %u are possible",
-                           answer->key, answer->size, FCSL_BUS_MESSAGE_MAX);
+            (void)fcsl_fail(error, "answer '%s' of the bus has %u bytes; at most %u are possible", answer->key,
+                            answer->size, FCSL_BUS_MESSAGE_MAX);
             return -1;
         }
     }
@@ -117,7 +111,7 @@ static int check_answers(const fcsl_bus_options_t *options, char *error, size_t 
 }
 
 /* The endpoint with a number for its host. */
-static int read_endpoint(const char *endpoint, char text[ENDPOINT_BYTES], char *error, size_t error_size)
+static int read_endpoint(const char *endpoint, char text[ENDPOINT_BYTES], fcsl_error_t *error)
 {
     static const char TCP[] = "tcp/";
     struct sockaddr_storage address;
@@ -127,44 +121,40 @@ static int read_endpoint(const char *endpoint, char text[ENDPOINT_BYTES], char *
     if (strncmp(endpoint, TCP, strlen(TCP)) != 0 || fcsl_address_read(endpoint + strlen(TCP), &address, &length) != 0 ||
         getnameinfo((const struct sockaddr *)&address, length, host, sizeof host, port, sizeof port,
                     NI_NUMERICHOST | NI_NUMERICSERV) != 0) {
-        (void)snprintf(error, error_size, "%s: write tcp/HOST:PORT in numbers, like tcp/127.0.0.1:7447", endpoint);
-        return -1;
+        return fcsl_fail(error, "%s: write tcp/HOST:PORT in numbers, like tcp/127.0.0.1:7447", endpoint);
     }
     const int six = address.ss_family == AF_INET6;
     (void)snprintf(text, ENDPOINT_BYTES, "'tcp/%s%s%s:%s'", six ? "[" : "", host, six ? "]" : "", port);
     return 0;
 }
 
-int bus_config_check(const fcsl_bus_options_t *options, char *error, size_t error_size)
+int bus_config_check(const fcsl_bus_options_t *options, fcsl_error_t *error)
 {
     char endpoint[ENDPOINT_BYTES];
     if ((options->endpoint == NULL) == (options->config_path == NULL)) {
-        (void)snprintf(error, error_size,
-                       "a session on the bus has an endpoint or a configuration file, one of the two");
-        return -1;
+        return fcsl_fail(error, "a session on the bus has an endpoint or a configuration file, one of the two");
     }
     if (options->ring_bytes < RING_BYTES_MIN) {
-        (void)snprintf(error, error_size, "the ring of the bus has %u bytes; %d is the least", options->ring_bytes,
-                       RING_BYTES_MIN);
+        (void)fcsl_fail(error, "the ring of the bus has %u bytes; %d is the least", options->ring_bytes,
+                        RING_BYTES_MIN);
         return -1;
     }
-    if (options->endpoint != NULL && read_endpoint(options->endpoint, endpoint, error, error_size) != 0) {
+    if (options->endpoint != NULL && read_endpoint(options->endpoint, endpoint, error) != 0) {
         return -1;
     }
-    if (check_keys("an output", options->outputs, options->output_count, FCSL_BUS_KEY_MAX, error, error_size) != 0 ||
-        check_keys("a token", options->tokens, options->token_count, FCSL_BUS_TOKEN_MAX, error, error_size) != 0 ||
-        check_keys("a watched token", options->watched, options->watched_count, FCSL_BUS_KEY_MAX, error, error_size) !=
-            0) {
+    if (check_keys("an output", options->outputs, options->output_count, FCSL_BUS_KEY_MAX, error) != 0 ||
+        check_keys("a token", options->tokens, options->token_count, FCSL_BUS_TOKEN_MAX, error) != 0 ||
+        check_keys("a watched token", options->watched, options->watched_count, FCSL_BUS_KEY_MAX, error) != 0) {
         return -1;
     }
-    return check_answers(options, error, error_size) != 0 ? -1 : check_inputs(options, error, error_size);
+    return check_answers(options, error) != 0 ? -1 : check_inputs(options, error);
 }
 
-int bus_config_write(const fcsl_bus_options_t *options, char text[BUS_CONFIG_BYTES], char *error, size_t error_size)
+int bus_config_write(const fcsl_bus_options_t *options, char text[BUS_CONFIG_BYTES], fcsl_error_t *error)
 {
     char endpoint[ENDPOINT_BYTES];
     const int listens = options->role == FCSL_BUS_LISTEN;
-    if (read_endpoint(options->endpoint, endpoint, error, error_size) != 0) {
+    if (read_endpoint(options->endpoint, endpoint, error) != 0) {
         return -1;
     }
     (void)snprintf(text, BUS_CONFIG_BYTES, CONFIG, options->role == FCSL_BUS_CLIENT ? "client" : "peer",

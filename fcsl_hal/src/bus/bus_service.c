@@ -7,7 +7,7 @@
 
 #include "fcsl/fcsl_monotonic.h"
 
-enum { LOOK_NS = 50 * FCSL_NS_PER_MS, TURN = 64, REASON_BYTES = 256 };
+enum { LOOK_NS = 50 * FCSL_NS_PER_MS, TURN = 64 };
 
 /* Puts what is in the ring, at most TURN messages: 1 when there may be more. */
 static int put_some(fcsl_bus_t *bus)
@@ -62,10 +62,10 @@ static void connect_later(fcsl_bus_t *bus)
     uint32_t output = 0;
     const uint8_t *bytes = NULL;
     size_t size = 0;
-    char reason[REASON_BYTES];
+    fcsl_error_t reason;
     const struct timespec pause = fcsl_timespec_of(LOOK_NS);
     while (bus->zenoh == NULL && !atomic_load(&bus->stopping)) { /* until the session is closed at the latest */
-        if (bus_connect(bus, &bus->options, reason, sizeof reason) != 0) {
+        if (bus_connect(bus, &bus->options, &reason) != 0) {
             (void)nanosleep(&pause, NULL);
         }
     }

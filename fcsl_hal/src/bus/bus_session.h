@@ -13,6 +13,7 @@
 #include "bus_event.h"
 #include "bus_inbox.h"
 #include "bus_ring.h"
+#include "fcsl/fcsl_error.h"
 #include "fcsl/fcsl_bus.h"
 #include "zenoh_session.h"
 
@@ -79,7 +80,7 @@ static inline void bus_tell(fcsl_bus_t *bus)
 }
 
 /* Opens Zenoh's session and declares all that is in `options`. Returns 0, or -1 with `error` filled. */
-int bus_connect(fcsl_bus_t *bus, const fcsl_bus_options_t *options, char *error, size_t error_size);
+int bus_connect(fcsl_bus_t *bus, const fcsl_bus_options_t *options, fcsl_error_t *error);
 
 /* Gives up one of the owners. */
 void bus_disown(fcsl_bus_t *bus);

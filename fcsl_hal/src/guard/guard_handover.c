@@ -4,6 +4,7 @@
  */
 #define _GNU_SOURCE
 #include "fcsl/fcsl_guard.h"
+#include "fcsl/fcsl_error.h"
 
 #include <errno.h>
 #include <fcntl.h>
@@ -26,16 +27,15 @@ typedef union {
     char bytes[CMSG_SPACE(sizeof(int))];
 } control_t;
 
-static int fail(char *error, size_t error_size, const char *what, const char *path)
+static int fail(fcsl_error_t *error, const char *what, const char *path)
 {
-    (void)snprintf(error, error_size, "%s guard '%s': %s", what, path, strerror(errno));
-    return -1;
+    return fcsl_fail(error, "%s guard '%s': %s", what, path, strerror(errno));
 }
 
 /* ---- flight program ---- */
 
 /* The guard's packet: returns the descriptor in it, or -1 with the reason. */
-static int receive_slot(int connection, const char *path, char *error, size_t error_size)
+static int receive_slot(int connection, const char *path, fcsl_error_t *error)
 {
     char answer[ANSWER_BYTES + 1] = "";
     control_t control = {0};
@@ -44,22 +44,19 @@ static int receive_slot(int connection, const char *path, char *error, size_t er
         .msg_iov = &part, .msg_iovlen = 1, .msg_control = control.bytes, .msg_controllen = sizeof control.bytes};
     const ssize_t got = recvmsg(connection, &packet, MSG_CMSG_CLOEXEC);
     if (got < 0 && errno != EAGAIN) {
-        return fail(error, error_size, "cannot get the slot of", path);
+        return fail(error, "cannot get the slot of", path);
     }
     if (got == 0) {
-        (void)snprintf(error, error_size, "guard '%s' has ended before it handed over its slot", path);
-        return -1;
+        return fcsl_fail(error, "guard '%s' has ended before it handed over its slot", path);
     }
     if (got < 0) {
-        (void)snprintf(error, error_size, "no answer of guard '%s' within %d s: is it fcsl-guard that listens there?",
-                       path, ANSWER_S);
-        return -1;
+        return fcsl_fail(error, "no answer of guard '%s' within %d s: is it fcsl-guard that listens there?", path,
+                         ANSWER_S);
     }
     const struct cmsghdr *rights = CMSG_FIRSTHDR(&packet);
     if (rights == NULL || rights->cmsg_level != SOL_SOCKET || rights->cmsg_type != SCM_RIGHTS ||
         rights->cmsg_len != CMSG_LEN(sizeof(int))) {
-        (void)snprintf(error, error_size, "guard '%s' refused: %s", path, answer);
-        return -1;
+        return fcsl_fail(error, "guard '%s' refused: %s", path, answer);
     }
     int memory = -1;
     memcpy(&memory, CMSG_DATA(rights), sizeof memory);
@@ -67,36 +64,35 @@ static int receive_slot(int connection, const char *path, char *error, size_t er
 }
 
 /* Maps the slot if it is one for this machine. */
-static int map_slot(int memory, const char *path, const fcsl_machine_t *machine, fcsl_guard_link_t *link, char *error,
-                    size_t error_size)
+static int map_slot(int memory, const char *path, const fcsl_machine_t *machine, fcsl_guard_link_t *link,
+                    fcsl_error_t *error)
 {
     struct stat status;
     const size_t bytes = fcsl_guard_slot_bytes(machine);
     if (fstat(memory, &status) != 0) {
-        return fail(error, error_size, "cannot look at the slot of", path);
+        return fail(error, "cannot look at the slot of", path);
     }
     if ((uint64_t)status.st_size < sizeof(fcsl_guard_slot_t)) {
-        (void)snprintf(error, error_size, "guard '%s' handed over something that is no slot", path);
-        return -1;
+        return fcsl_fail(error, "guard '%s' handed over something that is no slot", path);
     }
     /* All of its pages now: a step shall not fault them in. */
     void *memory_at = mmap(NULL, (size_t)status.st_size, PROT_READ | PROT_WRITE, MAP_SHARED | MAP_POPULATE, memory, 0);
     if (memory_at == MAP_FAILED) {
-        return fail(error, error_size, "cannot map the slot of", path);
+        return fail(error, "cannot map the slot of", path);
     }
     const fcsl_guard_slot_t *slot = memory_at;
     const size_t capacity = fcsl_message_capacity(machine, FCSL_ACTUATOR_MESSAGE);
     if (slot->magic != FCSL_GUARD_MAGIC || slot->layout != FCSL_GUARD_LAYOUT) {
-        (void)snprintf(error, error_size, "guard '%s' is of another version of FCSL: its slot has layout %u, not %u",
-                       path, slot->layout, FCSL_GUARD_LAYOUT);
+        (void)fcsl_fail(error, "guard '%s' is of another version of FCSL: its slot has layout %u, not %u", path,
+                        slot->layout, FCSL_GUARD_LAYOUT);
     } else if (strncmp(slot->source_hash, machine->source_hash, sizeof slot->source_hash - 1u) != 0) {
-        (void)snprintf(error, error_size,
-                       "guard '%s' has a machine of other sources (%.12s, here %.12s): start it with the library that "
-                       "flies",
-                       path, slot->source_hash, machine->source_hash);
+        (void)fcsl_fail(error,
+                        "guard '%s' has a machine of other sources (%.12s, here %.12s): start it with the library that "
+                        "flies",
+                        path, slot->source_hash, machine->source_hash);
     } else if ((uint64_t)status.st_size != bytes || slot->capacity != capacity) {
-        (void)snprintf(error, error_size, "the slot of guard '%s' has room for %llu bytes, a command needs %zu", path,
-                       (unsigned long long)slot->capacity, capacity);
+        (void)fcsl_fail(error, "the slot of guard '%s' has room for %llu bytes, a command needs %zu", path,
+                        (unsigned long long)slot->capacity, capacity);
     } else {
         *link = (fcsl_guard_link_t){.slot = memory_at, .bytes = bytes, .capacity = capacity, .connection = -1};
         return 0;
@@ -105,21 +101,20 @@ static int map_slot(int memory, const char *path, const fcsl_machine_t *machine,
     return -1;
 }
 
-int fcsl_guard_connect(const char *path, const fcsl_machine_t *machine, fcsl_guard_link_t *link, char *error,
-                       size_t error_size)
+int fcsl_guard_connect(const char *path, const fcsl_machine_t *machine, fcsl_guard_link_t *link, fcsl_error_t *error)
 {
     const struct timeval patience = {.tv_sec = ANSWER_S};
-    const int connection = fcsl_socket_connect(path, SOCK_SEQPACKET, error, error_size);
+    const int connection = fcsl_socket_connect(path, SOCK_SEQPACKET, error);
     if (connection < 0) {
         return -1;
     }
     int memory = -1;
     if (setsockopt(connection, SOL_SOCKET, SO_RCVTIMEO, &patience, sizeof patience) != 0) {
-        (void)fail(error, error_size, "cannot wait for", path);
+        (void)fail(error, "cannot wait for", path);
     } else {
-        memory = receive_slot(connection, path, error, error_size);
+        memory = receive_slot(connection, path, error);
     }
-    const int status = memory < 0 ? -1 : map_slot(memory, path, machine, link, error, error_size);
+    const int status = memory < 0 ? -1 : map_slot(memory, path, machine, link, error);
     if (memory >= 0) {
         (void)close(memory);
     }
@@ -183,22 +178,21 @@ static void clear_slot(fcsl_guard_server_t *server)
     server->taken = 0;
 }
 
-int fcsl_guard_listen(const char *path, const fcsl_machine_t *machine, fcsl_guard_server_t *server, char *error,
-                      size_t error_size)
+int fcsl_guard_listen(const char *path, const fcsl_machine_t *machine, fcsl_guard_server_t *server, fcsl_error_t *error)
 {
     *server = (fcsl_guard_server_t){.path = path, .machine = machine, .listener = -1, .client = -1, .memory = -1};
     if (make_slot(server, machine) != 0) {
-        (void)fail(error, error_size, "cannot make the slot of", path);
+        (void)fail(error, "cannot make the slot of", path);
         fcsl_guard_unlisten(server);
         return -1;
     }
-    server->listener = fcsl_socket_listen(path, SOCK_SEQPACKET, BACKLOG, error, error_size);
+    server->listener = fcsl_socket_listen(path, SOCK_SEQPACKET, BACKLOG, error);
     if (server->listener < 0) {
         fcsl_guard_unlisten(server);
         return -1;
     }
     if (fcntl(server->listener, F_SETFL, O_NONBLOCK) != 0) {
-        (void)fail(error, error_size, "cannot listen as", path);
+        (void)fail(error, "cannot listen as", path);
         fcsl_guard_unlisten(server);
         return -1;
     }

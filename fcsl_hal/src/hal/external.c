@@ -4,6 +4,7 @@
  */
 #define _GNU_SOURCE
 #include "fcsl/fcsl_external.h"
+#include "fcsl/fcsl_error.h"
 
 #include <inttypes.h>
 #include <stdio.h>
@@ -53,14 +54,14 @@ static size_t inbox_bytes(const fcsl_machine_t *machine)
 }
 
 /* Everything but the wire. Returns null with `error` filled. */
-static fcsl_external_t *create(const fcsl_machine_t *machine, const char *where, char *error, size_t error_size)
+static fcsl_external_t *create(const fcsl_machine_t *machine, const char *where, fcsl_error_t *error)
 {
     fcsl_external_t *self = calloc(1, sizeof *self);
     uint8_t *inbox = malloc(inbox_bytes(machine));
     if (self == NULL || inbox == NULL) {
         free(self);
         free(inbox);
-        (void)snprintf(error, error_size, "out of memory for the wire");
+        (void)fcsl_fail(error, "out of memory for the wire");
         return NULL;
     }
     self->table = fcsl_channel_table(machine);
@@ -77,9 +78,9 @@ static void release(fcsl_external_t *external)
 }
 
 int fcsl_external_over_wire(const fcsl_wire_t *wire, const fcsl_machine_t *machine, fcsl_external_t **external,
-                            char *error, size_t error_size)
+                            fcsl_error_t *error)
 {
-    fcsl_external_t *self = create(machine, "the wire", error, error_size);
+    fcsl_external_t *self = create(machine, "the wire", error);
     if (self == NULL) {
         return -1;
     }
@@ -88,17 +89,15 @@ int fcsl_external_over_wire(const fcsl_wire_t *wire, const fcsl_machine_t *machi
     return 0;
 }
 
-int fcsl_external_open(const char *spec, const fcsl_machine_t *machine, fcsl_external_t **external, char *error,
-                       size_t error_size)
+int fcsl_external_open(const char *spec, const fcsl_machine_t *machine, fcsl_external_t **external, fcsl_error_t *error)
 {
     const size_t sensors = fcsl_message_capacity(machine, FCSL_SENSOR_MESSAGE);
     const size_t inbox = inbox_bytes(machine);
-    fcsl_external_t *self = create(machine, spec, error, error_size);
+    fcsl_external_t *self = create(machine, spec, error);
     if (self == NULL) {
         return -1;
     }
-    if (fcsl_wire_open(spec, FCSL_WIRE_LISTEN, sensors > inbox ? sensors : inbox, 0, &self->wire, error, error_size) !=
-        0) {
+    if (fcsl_wire_open(spec, FCSL_WIRE_LISTEN, sensors > inbox ? sensors : inbox, 0, &self->wire, error) != 0) {
         release(self);
         return -1;
     }
@@ -107,9 +106,9 @@ int fcsl_external_open(const char *spec, const fcsl_machine_t *machine, fcsl_ext
 }
 
 int fcsl_external_open_bus(const char *address, const char *name_space, const fcsl_machine_t *machine,
-                           fcsl_external_t **external, char *error, size_t error_size)
+                           fcsl_external_t **external, fcsl_error_t *error)
 {
-    fcsl_external_t *self = create(machine, address, error, error_size);
+    fcsl_external_t *self = create(machine, address, error);
     if (self == NULL) {
         return -1;
     }
@@ -117,8 +116,8 @@ int fcsl_external_open_bus(const char *address, const char *name_space, const fc
     self->presence = presence_of(FCSL_WIRE_CONNECT, &self->table, &self->log);
     /* A client of another simulator, which may be started later; who listens waits for nobody. */
     const uint64_t deadline_ns = fcsl_monotonic_ns() + JOIN_MS * (uint64_t)FCSL_NS_PER_MS;
-    if (fcsl_wire_open_named(self->spec, name_space, &self->table, FCSL_WIRE_LISTEN, deadline_ns, &self->wire, error,
-                             error_size) != 0) {
+    if (fcsl_wire_open_named(self->spec, name_space, &self->table, FCSL_WIRE_LISTEN, deadline_ns, &self->wire, error) !=
+        0) {
         release(self);
         return -1;
     }

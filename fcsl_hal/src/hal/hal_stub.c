@@ -6,14 +6,14 @@
 #include <stdio.h>
 #include <stdlib.h>
 
+#include "fcsl/fcsl_error.h"
 #include "fcsl/fcsl_monotonic.h"
 #include "fcsl/fcsl_hal.h"
 
-static int stub_open(fcsl_hal_t *hal, char *error, size_t error_size)
+static int stub_open(fcsl_hal_t *hal, fcsl_error_t *error)
 {
     (void)hal;
     (void)error;
-    (void)error_size;
     return 0;
 }
 
@@ -75,12 +75,11 @@ static void stub_nothing(void *ctx)
     (void)ctx;
 }
 
-int fcsl_hal_stub(fcsl_hal_t *hal, char *error, size_t error_size)
+int fcsl_hal_stub(fcsl_hal_t *hal, fcsl_error_t *error)
 {
     fcsl_log_t *log = calloc(1, sizeof *log);
     if (log == NULL) {
-        (void)snprintf(error, error_size, "out of memory for the HAL");
-        return -1;
+        return fcsl_fail(error, "out of memory for the HAL");
     }
     *hal = (fcsl_hal_t){
         .ctx = log,

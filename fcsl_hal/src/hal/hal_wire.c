@@ -9,6 +9,7 @@
 #include <stdlib.h>
 #include <string.h>
 
+#include "fcsl/fcsl_error.h"
 #include "fcsl/fcsl_monotonic.h"
 #include "fcsl/fcsl_hal.h"
 #include "named_values/wire_named.h"
@@ -441,7 +442,7 @@ static void wire_close(void *ctx)
 /* ---- opening ------------------------------------------------------------------------------------------------------- */
 
 /* Waits for the peer's answer to the hello. A rig may still send what was for a controller before this one. */
-static int hear_hello(hal_t *hal, uint64_t deadline_ns, handshake_packet_t *packet, char *error, size_t error_size)
+static int hear_hello(hal_t *hal, uint64_t deadline_ns, handshake_packet_t *packet, fcsl_error_t *error)
 {
     fcsl_wire_status_t status = FCSL_WIRE_NONE;
     size_t size = 0;
@@ -454,63 +455,59 @@ static int hear_hello(hal_t *hal, uint64_t deadline_ns, handshake_packet_t *pack
                    packet->kind <= HANDSHAKE_REFUSAL;
     }
     if (!answered && status < FCSL_WIRE_CLOSED) {
-        (void)snprintf(error, error_size, "no handshake from the simulator within %" PRIu32 " ms", hal->open_ms);
+        (void)fcsl_fail(error, "no handshake from the simulator within %" PRIu32 " ms", hal->open_ms);
         return 1;
     }
     if (status == FCSL_WIRE_ERROR) {
-        (void)snprintf(error, error_size, "%s", hal->wire.explain(hal->wire.ctx));
-        return -1;
+        return fcsl_fail(error, "%s", hal->wire.explain(hal->wire.ctx));
     }
     if (!answered && hal->is_named) {
-        (void)snprintf(error, error_size, "the simulator on %s went away before it answered", hal->spec);
+        (void)fcsl_fail(error, "the simulator on %s went away before it answered", hal->spec);
         hal->greeted_ns = 0;
         return 1;
     }
     if (!answered) {
-        (void)snprintf(error, error_size, "the other end of the wire did not answer as a simulator does");
-        return -1;
+        return fcsl_fail(error, "the other end of the wire did not answer as a simulator does");
     }
     return 0;
 }
 
-static int shake_hands(hal_t *hal, uint64_t deadline_ns, char *error, size_t error_size)
+static int shake_hands(hal_t *hal, uint64_t deadline_ns, fcsl_error_t *error)
 {
     handshake_packet_t packet;
     if (!hal->greets && handshake_send_hello(&hal->wire, &hal->table, 0) != FCSL_WIRE_OK) {
-        (void)snprintf(error, error_size, "cannot send the handshake: the other end is gone");
-        return -1;
+        return fcsl_fail(error, "cannot send the handshake: the other end is gone");
     }
     hal->greeted_ns = hal->greets ? hal->greeted_ns : fcsl_monotonic_ns();
     hal->greets = 1;
-    const int unheard = hear_hello(hal, deadline_ns, &packet, error, error_size);
+    const int unheard = hear_hello(hal, deadline_ns, &packet, error);
     if (unheard) {
         return unheard;
     }
     hal->greets = 0;
     if (packet.kind == HANDSHAKE_REFUSAL) {
-        (void)snprintf(error, error_size, "the simulator refused: %s", packet.text);
-        return -1;
+        return fcsl_fail(error, "the simulator refused: %s", packet.text);
     }
     hal->paces = packet.flag;
     if (hal->is_named && !hal->paces) {
-        (void)snprintf(error, error_size,
-                       "the simulator on %s runs free: named values in lock-step need one that paces the run; write "
-                       ",free-running behind this address, too",
-                       hal->spec);
+        (void)fcsl_fail(error,
+                        "the simulator on %s runs free: named values in lock-step need one that paces the run; write "
+                        ",free-running behind this address, too",
+                        hal->spec);
         return -1;
     }
-    return handshake_differs(&packet, &hal->table, error, error_size) ? -1 : 0;
+    return handshake_differs(&packet, &hal->table, error->text, sizeof error->text) ? -1 : 0;
 }
 
-static int open_spec(hal_t *hal, uint64_t deadline_ns, char *error, size_t error_size)
+static int open_spec(hal_t *hal, uint64_t deadline_ns, fcsl_error_t *error)
 {
     const size_t actuators = fcsl_message_capacity(hal->table.machine, FCSL_ACTUATOR_MESSAGE);
     fcsl_wire_t wire;
     const int failed = hal->is_named ? fcsl_wire_open_named(hal->spec, hal->name_space, &hal->table, FCSL_WIRE_CONNECT,
-                                                            deadline_ns, &wire, error, error_size)
+                                                            deadline_ns, &wire, error)
                                      : fcsl_wire_open(hal->spec, FCSL_WIRE_CONNECT,
                                                       actuators > hal->inbox_size ? actuators : hal->inbox_size,
-                                                      hal->timeout_ms, &wire, error, error_size);
+                                                      hal->timeout_ms, &wire, error);
     if (failed) {
         return failed;
     }
@@ -529,15 +526,15 @@ static void begin_anew(hal_t *hal)
     }
 }
 
-static int wire_open(fcsl_hal_t *handle, char *error, size_t error_size)
+static int wire_open(fcsl_hal_t *handle, fcsl_error_t *error)
 {
     hal_t *hal = handle->ctx;
     const uint64_t deadline_ns = fcsl_monotonic_ns() + (uint64_t)hal->open_ms * FCSL_NS_PER_MS;
-    int failed = hal->has_wire ? 0 : open_spec(hal, deadline_ns, error, error_size);
+    int failed = hal->has_wire ? 0 : open_spec(hal, deadline_ns, error);
     if (hal->runs_free) {
         return failed;
     }
-    failed = failed ? failed : shake_hands(hal, deadline_ns, error, error_size);
+    failed = failed ? failed : shake_hands(hal, deadline_ns, error);
     if (failed > 0) {
         begin_anew(hal);
     }
@@ -560,7 +557,7 @@ static void fill_fields(hal_t *hal, const fcsl_wire_counters_t *of_wire)
 }
 
 static int make(const fcsl_wire_counters_t *of_wire, const fcsl_machine_t *machine, uint32_t timeout_ms,
-                fcsl_hal_t *handle, char *error, size_t error_size)
+                fcsl_hal_t *handle, fcsl_error_t *error)
 {
     const size_t sensors = fcsl_message_capacity(machine, FCSL_SENSOR_MESSAGE);
     hal_t *hal = calloc(1, sizeof *hal);
@@ -573,8 +570,7 @@ static int make(const fcsl_wire_counters_t *of_wire, const fcsl_machine_t *machi
         if (hal != NULL) {
             wire_close(hal);
         }
-        (void)snprintf(error, error_size, "out of memory for the wire, or it counts too much");
-        return -1;
+        return fcsl_fail(error, "out of memory for the wire, or it counts too much");
     }
     hal->table = fcsl_channel_table(machine);
     hal->open_ms = timeout_ms;
@@ -604,26 +600,25 @@ static int make(const fcsl_wire_counters_t *of_wire, const fcsl_machine_t *machi
     return 0;
 }
 
-int fcsl_hal_wire(const char *spec, const fcsl_machine_t *machine, uint32_t timeout_ms, fcsl_hal_t *hal, char *error,
-                  size_t error_size)
+int fcsl_hal_wire(const char *spec, const fcsl_machine_t *machine, uint32_t timeout_ms, fcsl_hal_t *hal,
+                  fcsl_error_t *error)
 {
-    if (fcsl_wire_check(spec, error, error_size) != 0) {
+    if (fcsl_wire_check(spec, error) != 0) {
         return -1;
     }
     if (strlen(spec) >= SPEC_BYTES) {
-        (void)snprintf(error, error_size, "the wire's name is too long: %d bytes are possible", SPEC_BYTES - 1);
-        return -1;
+        return fcsl_fail(error, "the wire's name is too long: %d bytes are possible", SPEC_BYTES - 1);
     }
-    if (make(fcsl_wire_counters(spec), machine, timeout_ms, hal, error, error_size) != 0) {
+    if (make(fcsl_wire_counters(spec), machine, timeout_ms, hal, error) != 0) {
         return -1;
     }
     (void)snprintf(((hal_t *)hal->ctx)->spec, SPEC_BYTES, "%s", spec);
     return 0;
 }
 
-int fcsl_hal_bus_check(const char *address, char *error, size_t error_size)
+int fcsl_hal_bus_check(const char *address, fcsl_error_t *error)
 {
-    return fcsl_wire_check_named(address, error, error_size);
+    return fcsl_wire_check_named(address, error);
 }
 
 int fcsl_hal_bus_runs_free(const char *address)
@@ -632,17 +627,15 @@ int fcsl_hal_bus_runs_free(const char *address)
 }
 
 int fcsl_hal_bus(const char *address, const char *name_space, const fcsl_machine_t *machine, uint32_t open_ms,
-                 uint32_t timeout_ms, fcsl_hal_t *hal, char *error, size_t error_size)
+                 uint32_t timeout_ms, fcsl_hal_t *hal, fcsl_error_t *error)
 {
-    if (fcsl_wire_check_named(address, error, error_size) != 0) {
+    if (fcsl_wire_check_named(address, error) != 0) {
         return -1;
     }
     if (strlen(address) >= SPEC_BYTES || strlen(name_space) >= SPEC_BYTES) {
-        (void)snprintf(error, error_size, "the address or the namespace is too long: %d bytes are possible",
-                       SPEC_BYTES - 1);
-        return -1;
+        return fcsl_fail(error, "the address or the namespace is too long: %d bytes are possible", SPEC_BYTES - 1);
     }
-    if (make(&fcsl_wire_named_counters, machine, timeout_ms, hal, error, error_size) != 0) {
+    if (make(&fcsl_wire_named_counters, machine, timeout_ms, hal, error) != 0) {
         return -1;
     }
     hal_t *self = hal->ctx;
@@ -656,9 +649,9 @@ int fcsl_hal_bus(const char *address, const char *name_space, const fcsl_machine
 }
 
 int fcsl_hal_over_wire(const fcsl_wire_t *wire, const fcsl_machine_t *machine, uint32_t timeout_ms, fcsl_hal_t *hal,
-                       char *error, size_t error_size)
+                       fcsl_error_t *error)
 {
-    if (make(wire->counters, machine, timeout_ms, hal, error, error_size) != 0) {
+    if (make(wire->counters, machine, timeout_ms, hal, error) != 0) {
         return -1;
     }
     ((hal_t *)hal->ctx)->wire = *wire;

@@ -3,6 +3,7 @@
  * A machine's channels under their keys, for observers: the session, and what a tick puts on it.
  */
 #include "fcsl/fcsl_mirror.h"
+#include "fcsl/fcsl_error.h"
 
 #include <stdio.h>
 #include <stdlib.h>
@@ -198,41 +199,37 @@ int fcsl_mirror_ready(fcsl_mirror_t *mirror)
 
 /* ---- opening and closing -------------------------------------------------------------------------------------------- */
 
-static int check(const fcsl_machine_t *machine, const char *name_space, char *error, size_t error_size)
+static int check(const fcsl_machine_t *machine, const char *name_space, fcsl_error_t *error)
 {
     static const char LONGEST[] = "@checkpoint"; /* of the names that are no channels */
     const size_t before = strlen(name_space) + strlen(machine->name) + 2u;
     for (uint32_t i = 0; i < machine->channel_count; i++) {
         const char *name = machine->channels[i].name;
         if (strcmp(name, "tick") == 0) {
-            (void)snprintf(error, error_size, "channel 'tick' cannot go over the bus: the commits have its key");
-            return -1;
+            return fcsl_fail(error, "channel 'tick' cannot go over the bus: the commits have its key");
         }
         if (before + strlen(name) > FCSL_BUS_KEY_MAX) {
-            (void)snprintf(error, error_size, "the key of channel '%.100s' is longer than %u bytes", name,
-                           FCSL_BUS_KEY_MAX);
-            return -1;
+            return fcsl_fail(error, "the key of channel '%.100s' is longer than %u bytes", name, FCSL_BUS_KEY_MAX);
         }
         if (payload_bytes(machine, i) > FCSL_BUS_MESSAGE_MAX) {
-            (void)snprintf(error, error_size, "channel '%.100s' has %u bytes; a message of the bus has at most %u",
-                           name, payload_bytes(machine, i), FCSL_BUS_MESSAGE_MAX);
+            (void)fcsl_fail(error, "channel '%.100s' has %u bytes; a message of the bus has at most %u", name,
+                            payload_bytes(machine, i), FCSL_BUS_MESSAGE_MAX);
             return -1;
         }
     }
     if (before + strlen(LONGEST) > FCSL_BUS_KEY_MAX) {
-        (void)snprintf(error, error_size, "the keys under namespace '%.100s' are longer than %u bytes", name_space,
-                       FCSL_BUS_KEY_MAX);
-        return -1;
+        return fcsl_fail(error, "the keys under namespace '%.100s' are longer than %u bytes", name_space,
+                         FCSL_BUS_KEY_MAX);
     }
     return 0;
 }
 
-static fcsl_mirror_t *allocate(const fcsl_machine_t *machine, char *error, size_t error_size)
+static fcsl_mirror_t *allocate(const fcsl_machine_t *machine, fcsl_error_t *error)
 {
     const size_t channels = machine->channel_count;
     size_t longest = commit_bytes(machine->channel_count);
     fcsl_mirror_t *mirror = calloc(1, sizeof *mirror);
-    (void)snprintf(error, error_size, "out of memory for observers");
+    (void)fcsl_fail(error, "out of memory for observers");
     if (mirror == NULL) {
         return NULL;
     }
@@ -245,7 +242,7 @@ static fcsl_mirror_t *allocate(const fcsl_machine_t *machine, char *error, size_
     mirror->stamps_ns = calloc(channels + 1u, sizeof *mirror->stamps_ns);
     mirror->value = calloc(longest, 1);
     if (mirror->fresh == NULL || mirror->ages == NULL || mirror->stamps_ns == NULL || mirror->value == NULL ||
-        payload_open(&mirror->payload, machine, error, error_size) != 0) {
+        payload_open(&mirror->payload, machine, error) != 0) {
         fcsl_mirror_close(mirror);
         return NULL;
     }
@@ -280,7 +277,7 @@ static const char *write_key(char *keys, uint32_t place, const fcsl_mirror_optio
 }
 
 static int open_session(fcsl_mirror_t *mirror, const fcsl_mirror_options_t *options, const char **outputs, char *keys,
-                        char *error, size_t error_size)
+                        fcsl_error_t *error)
 {
     const fcsl_machine_t *machine = mirror->table.machine;
     const uint32_t count = machine->channel_count + CHANNELS;
@@ -304,22 +301,22 @@ static int open_session(fcsl_mirror_t *mirror, const fcsl_mirror_options_t *opti
                                     .output_count = count,
                                     .answers = answers,
                                     .answer_count = ANSWERS};
-    return fcsl_bus_open(&bus, &mirror->bus, error, error_size);
+    return fcsl_bus_open(&bus, &mirror->bus, error);
 }
 
 int fcsl_mirror_open(const fcsl_mirror_options_t *options, const fcsl_machine_t *machine, fcsl_mirror_t **mirror,
-                     char *error, size_t error_size)
+                     fcsl_error_t *error)
 {
     const size_t count = (size_t)machine->channel_count + CHANNELS;
     int failed = -1;
-    if (check(machine, options->name_space, error, error_size) != 0) {
+    if (check(machine, options->name_space, error) != 0) {
         return -1;
     }
-    fcsl_mirror_t *self = allocate(machine, error, error_size);
+    fcsl_mirror_t *self = allocate(machine, error);
     const char **outputs = calloc(count, sizeof *outputs);
     char *keys = calloc(count + ANSWERS, FCSL_BUS_KEY_MAX + 1u);
     if (self != NULL && outputs != NULL && keys != NULL) {
-        failed = open_session(self, options, outputs, keys, error, error_size);
+        failed = open_session(self, options, outputs, keys, error);
     }
     free(keys);
     free((void *)outputs);

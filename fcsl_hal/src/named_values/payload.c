@@ -8,6 +8,7 @@
 #include <stdlib.h>
 #include <string.h>
 
+#include "fcsl/fcsl_error.h"
 #include "codec/codec_blob.h"
 #include "ros/ros_walk.h"
 
@@ -71,7 +72,7 @@ uint32_t payload_least(const fcsl_machine_t *machine, uint32_t channel)
 
 /* ---- opening and closing -------------------------------------------------------------------------------------------- */
 
-int payload_open(payload_t *payload, const fcsl_machine_t *machine, char *error, size_t error_size)
+int payload_open(payload_t *payload, const fcsl_machine_t *machine, fcsl_error_t *error)
 {
     *payload = (payload_t){.machine = machine};
     if (machine->payloads == NULL) {
@@ -87,11 +88,11 @@ int payload_open(payload_t *payload, const fcsl_machine_t *machine, char *error,
     payload->row = calloc((size_t)longest + 1u, 1);
     int failed = payload->composers == NULL || payload->readers == NULL || payload->row == NULL;
     if (failed) {
-        (void)snprintf(error, error_size, "out of memory for the messages of channels");
+        (void)fcsl_fail(error, "out of memory for the messages of channels");
     }
     for (uint32_t i = 0; i < machine->channel_count && !failed; i++) {
-        payload->composers[i] = fcsl_ros_composer_new(machine->payloads[i].composer, error, error_size);
-        payload->readers[i] = fcsl_ros_reader_new(machine->payloads[i].reader, error, error_size);
+        payload->composers[i] = fcsl_ros_composer_new(machine->payloads[i].composer, error);
+        payload->readers[i] = fcsl_ros_reader_new(machine->payloads[i].reader, error);
         failed = payload->composers[i] == NULL || payload->readers[i] == NULL;
     }
     if (failed) {

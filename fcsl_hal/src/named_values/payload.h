@@ -8,6 +8,7 @@
 
 #include <stddef.h>
 
+#include "fcsl/fcsl_error.h"
 #include "fcsl/fcsl_machine.h"
 #include "fcsl/fcsl_ros.h"
 
@@ -19,7 +20,7 @@ typedef struct {
 } payload_t;
 
 /* Returns 0, or -1 with `error` filled. */
-int payload_open(payload_t *payload, const fcsl_machine_t *machine, char *error, size_t error_size);
+int payload_open(payload_t *payload, const fcsl_machine_t *machine, fcsl_error_t *error);
 void payload_close(payload_t *payload);
 
 /* Bytes under a channel's key: that are put at most, that others may put at most, and at least. */

@@ -7,6 +7,7 @@
 #include <stdlib.h>
 #include <string.h>
 
+#include "fcsl/fcsl_error.h"
 #include "fcsl/fcsl_monotonic.h"
 #include "codec/codec_layout.h"
 #include "commit.h"
@@ -39,12 +40,12 @@ static int comes_in(const named_wire_t *wire, const fcsl_channel_t *channel)
     return channel->direction == (wire->peer.side == FCSL_WIRE_CONNECT ? FCSL_SENSOR : FCSL_ACTUATOR);
 }
 
-static named_wire_t *allocate(const fcsl_channel_table_t *table, fcsl_wire_side_t side, char *error, size_t error_size)
+static named_wire_t *allocate(const fcsl_channel_table_t *table, fcsl_wire_side_t side, fcsl_error_t *error)
 {
     const fcsl_machine_t *machine = table->machine;
     const uint32_t channels = machine->channel_count;
     named_wire_t *wire = calloc(1, sizeof *wire);
-    (void)snprintf(error, error_size, "out of memory for the bus");
+    (void)fcsl_fail(error, "out of memory for the bus");
     if (wire == NULL) {
         return NULL;
     }
@@ -66,7 +67,7 @@ static named_wire_t *allocate(const fcsl_channel_table_t *table, fcsl_wire_side_
     wire->plan.outputs = calloc((size_t)channels + NAMED_CHANNELS, sizeof *wire->plan.outputs);
     if (wire->plan.inputs == NULL || wire->plan.outputs == NULL || wire->has_value == NULL || wire->control == NULL ||
         wire->numbers == NULL || wire->keys == NULL || wire->fresh == NULL || wire->image == NULL ||
-        wire->value == NULL || payload_open(&wire->payload, machine, error, error_size) != 0) {
+        wire->value == NULL || payload_open(&wire->payload, machine, error) != 0) {
         named_free(wire);
         return NULL;
     }
@@ -149,7 +150,7 @@ static fcsl_bus_role_t role_of(const char *address, fcsl_wire_side_t side, char 
     return FCSL_BUS_CLIENT;
 }
 
-static int open_session(named_wire_t *wire, const char *address, uint64_t deadline_ns, char *error, size_t error_size)
+static int open_session(named_wire_t *wire, const char *address, uint64_t deadline_ns, fcsl_error_t *error)
 {
     const uint64_t now_ns = fcsl_monotonic_ns();
     const uint32_t wait_ms = deadline_ns > now_ns ? (uint32_t)((deadline_ns - now_ns) / FCSL_NS_PER_MS) : 0u;
@@ -172,14 +173,13 @@ static int open_session(named_wire_t *wire, const char *address, uint64_t deadli
         .strays = plan->strays,
         .watched_count = bus_peer_watched(wire->peer.side),
     };
-    if (fcsl_bus_open(&options, &wire->peer.bus, error, error_size) != 0) {
+    if (fcsl_bus_open(&options, &wire->peer.bus, error) != 0) {
         return -1;
     }
     if (wire->runs_free) {
         return 0;
     }
-    if (wire->peer.side == FCSL_WIRE_CONNECT &&
-        bus_peer_wait(&wire->peer, plan->endpoint, deadline_ns, error, error_size) != 0) {
+    if (wire->peer.side == FCSL_WIRE_CONNECT && bus_peer_wait(&wire->peer, plan->endpoint, deadline_ns, error) != 0) {
         (void)fcsl_bus_close(wire->peer.bus, NAMED_CLOSE_MS);
         return -1;
     }
@@ -189,31 +189,27 @@ static int open_session(named_wire_t *wire, const char *address, uint64_t deadli
     return 0;
 }
 
-static int check(const char *name_space, const fcsl_machine_t *machine, char *error, size_t error_size)
+static int check(const char *name_space, const fcsl_machine_t *machine, fcsl_error_t *error)
 {
     static const char LONGEST[] = "@controller"; /* of the names that are no channels */
     const size_t room = FCSL_BUS_KEY_MAX - 2u;
     if (strlen(name_space) + strlen(machine->name) + strlen(LONGEST) > room) {
-        (void)snprintf(error, error_size, "the keys under namespace '%.100s' are longer than %u bytes", name_space,
-                       FCSL_BUS_KEY_MAX);
-        return -1;
+        return fcsl_fail(error, "the keys under namespace '%.100s' are longer than %u bytes", name_space,
+                         FCSL_BUS_KEY_MAX);
     }
     for (uint32_t i = 0; i < machine->channel_count; i++) {
         const char *name = machine->channels[i].name;
         if (strcmp(name, "tick") == 0) {
-            (void)snprintf(error, error_size, "channel 'tick' cannot go over the bus: the commits have its key");
-            return -1;
+            return fcsl_fail(error, "channel 'tick' cannot go over the bus: the commits have its key");
         }
         if (strlen(name_space) + strlen(machine->name) + strlen(name) > room) {
-            (void)snprintf(error, error_size, "the key of channel '%.100s' is longer than %u bytes", name,
-                           FCSL_BUS_KEY_MAX);
-            return -1;
+            return fcsl_fail(error, "the key of channel '%.100s' is longer than %u bytes", name, FCSL_BUS_KEY_MAX);
         }
     }
     return 0;
 }
 
-int fcsl_wire_check_named(const char *address, char *error, size_t error_size)
+int fcsl_wire_check_named(const char *address, fcsl_error_t *error)
 {
     static const char TCP[] = "tcp/";
     struct sockaddr_storage there;
@@ -221,30 +217,28 @@ int fcsl_wire_check_named(const char *address, char *error, size_t error_size)
     char endpoint[NAMED_ENDPOINT_BYTES];
     (void)role_of(address, FCSL_WIRE_CONNECT, endpoint);
     if (strncmp(endpoint, TCP, strlen(TCP)) != 0 || fcsl_address_read(endpoint + strlen(TCP), &there, &length) != 0) {
-        (void)snprintf(
-            error, error_size,
+        return fcsl_fail(
+            error,
             "%s: write zenoh:tcp/HOST:PORT in numbers, like zenoh:tcp/127.0.0.1:7447, and ,free-running behind it "
             "where nobody waits for the other",
             address);
-        return -1;
     }
     return 0;
 }
 
 int fcsl_wire_open_named(const char *address, const char *name_space, const fcsl_channel_table_t *table,
-                         fcsl_wire_side_t side, uint64_t deadline_ns, fcsl_wire_t *wire, char *error, size_t error_size)
+                         fcsl_wire_side_t side, uint64_t deadline_ns, fcsl_wire_t *wire, fcsl_error_t *error)
 {
-    if (fcsl_wire_check_named(address, error, error_size) != 0 ||
-        check(name_space, table->machine, error, error_size) != 0) {
+    if (fcsl_wire_check_named(address, error) != 0 || check(name_space, table->machine, error) != 0) {
         return -1;
     }
-    named_wire_t *self = allocate(table, side, error, error_size);
+    named_wire_t *self = allocate(table, side, error);
     if (self == NULL) {
         return -1;
     }
     self->runs_free = fcsl_wire_runs_free(address);
     fill_plan(self, name_space);
-    if (open_session(self, address, deadline_ns, error, error_size) != 0) {
+    if (open_session(self, address, deadline_ns, error) != 0) {
         named_free(self);
         return 1;
     }

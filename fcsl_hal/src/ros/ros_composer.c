@@ -6,6 +6,7 @@
 #include <stdlib.h>
 #include <string.h>
 
+#include "fcsl/fcsl_error.h"
 #include "fcsl/fcsl_ros.h"
 #include "fcsl/fcsl_scalar.h"
 #include "ros_number.h"
@@ -28,15 +29,15 @@ static int plan_valid(const fcsl_ros_composer_plan_t *plan)
     return plan->stamp_offset == FCSL_ROS_NONE || (plan->size >= 8u && plan->stamp_offset <= plan->size - 8u);
 }
 
-fcsl_ros_composer_t *fcsl_ros_composer_new(const fcsl_ros_composer_plan_t *plan, char *error, size_t error_size)
+fcsl_ros_composer_t *fcsl_ros_composer_new(const fcsl_ros_composer_plan_t *plan, fcsl_error_t *error)
 {
     if (!plan_valid(plan)) {
-        (void)snprintf(error, error_size, "this plan of a message does not hold together");
+        (void)fcsl_fail(error, "this plan of a message does not hold together");
         return NULL;
     }
     fcsl_ros_composer_t *composer = malloc(sizeof *composer);
     if (composer == NULL) {
-        (void)snprintf(error, error_size, "out of memory for the plan of a message");
+        (void)fcsl_fail(error, "out of memory for the plan of a message");
         return NULL;
     }
     composer->plan = plan;

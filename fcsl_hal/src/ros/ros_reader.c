@@ -6,6 +6,7 @@
 #include <stdlib.h>
 #include <string.h>
 
+#include "fcsl/fcsl_error.h"
 #include "fcsl/fcsl_ros.h"
 #include "ros_number.h"
 #include "ros_walk.h"
@@ -88,15 +89,15 @@ static int reads_valid(const fcsl_ros_reader_plan_t *plan)
            (plan->stamp_anchor < plan->anchor_count && range_fits(plan->stamp_offset, 8u, sizes[plan->stamp_anchor]));
 }
 
-fcsl_ros_reader_t *fcsl_ros_reader_new(const fcsl_ros_reader_plan_t *plan, char *error, size_t error_size)
+fcsl_ros_reader_t *fcsl_ros_reader_new(const fcsl_ros_reader_plan_t *plan, fcsl_error_t *error)
 {
     if (!fcsl_ros_walk_valid(plan) || !values_valid(plan) || !reads_valid(plan)) {
-        (void)snprintf(error, error_size, "this plan of a message does not hold together");
+        (void)fcsl_fail(error, "this plan of a message does not hold together");
         return NULL;
     }
     fcsl_ros_reader_t *reader = calloc(1, sizeof *reader);
     if (reader == NULL) {
-        (void)snprintf(error, error_size, "out of memory for the plan of a message");
+        (void)fcsl_fail(error, "out of memory for the plan of a message");
         return NULL;
     }
     reader->plan = plan;

@@ -7,6 +7,7 @@
 
 #include <stdio.h>
 
+#include "fcsl/fcsl_error.h"
 #include "fcsl/fcsl_monotonic.h"
 
 int bus_peer_lives(const bus_peer_t *peer)
@@ -53,7 +54,7 @@ fcsl_wire_status_t bus_peer_receive(const bus_peer_t *peer, bus_take_t take, voi
     }
 }
 
-int bus_peer_wait(bus_peer_t *peer, const char *endpoint, uint64_t deadline_ns, char *error, size_t error_size)
+int bus_peer_wait(bus_peer_t *peer, const char *endpoint, uint64_t deadline_ns, fcsl_error_t *error)
 {
     while (fcsl_monotonic_ns() < deadline_ns) {
         if (listens(peer) && fcsl_bus_alive(peer->bus, BUS_CONTROLLERS) == 0) {
@@ -63,9 +64,9 @@ int bus_peer_wait(bus_peer_t *peer, const char *endpoint, uint64_t deadline_ns, 
         (void)fcsl_bus_wait(peer->bus, deadline_ns);
     }
     if (bus_peer_lives(peer) && fcsl_bus_alive(peer->bus, BUS_CONTROLLERS) > 0) {
-        (void)snprintf(error, error_size, "the simulator on %s has another controller", endpoint);
+        (void)fcsl_fail(error, "the simulator on %s has another controller", endpoint);
     } else {
-        (void)snprintf(error, error_size, "no simulator of this machine is on %s", endpoint);
+        (void)fcsl_fail(error, "no simulator of this machine is on %s", endpoint);
     }
     return -1;
 }

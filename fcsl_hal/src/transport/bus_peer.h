@@ -6,6 +6,7 @@
 #ifndef FCSL_BUS_PEER_H
 #define FCSL_BUS_PEER_H
 
+#include "fcsl/fcsl_error.h"
 #include "fcsl/fcsl_bus.h"
 #include "fcsl/fcsl_wire.h"
 
@@ -42,6 +43,6 @@ fcsl_wire_status_t bus_peer_receive(const bus_peer_t *peer, bus_take_t take, voi
 
 /* The session connects to whoever listens there: is it a simulator, and has it no other controller? Returns 0, or -1 with `error`
  * filled. */
-int bus_peer_wait(bus_peer_t *peer, const char *endpoint, uint64_t deadline_ns, char *error, size_t error_size);
+int bus_peer_wait(bus_peer_t *peer, const char *endpoint, uint64_t deadline_ns, fcsl_error_t *error);
 
 #endif /* FCSL_BUS_PEER_H */

@@ -7,6 +7,7 @@
 
 #include <sys/socket.h>
 
+#include "fcsl/fcsl_error.h"
 #include "fcsl/fcsl_cobs.h"
 #include "fcsl/fcsl_wire.h"
 
@@ -28,10 +29,9 @@ typedef struct {
 } line_t;
 
 /* Each opens one end. 0, or -1 with `error` filled; what is connected tries again until `deadline_ns`. */
-int line_open_udp(line_t *line, const char *address, fcsl_wire_side_t side, char *error, size_t error_size);
-int line_open_tcp(line_t *line, const char *address, fcsl_wire_side_t side, uint64_t deadline_ns, char *error,
-                  size_t error_size);
-int line_open_uart(line_t *line, const char *device, uint32_t baud, char *error, size_t error_size);
+int line_open_udp(line_t *line, const char *address, fcsl_wire_side_t side, fcsl_error_t *error);
+int line_open_tcp(line_t *line, const char *address, fcsl_wire_side_t side, uint64_t deadline_ns, fcsl_error_t *error);
+int line_open_uart(line_t *line, const char *device, uint32_t baud, fcsl_error_t *error);
 /* Whether a UART can run at this speed. */
 int line_has_speed(uint32_t baud);
 /* Takes the peer that waits on the listener, in place of the present one. 0, or -1 when there is none now. */

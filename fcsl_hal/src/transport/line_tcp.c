@@ -11,15 +11,16 @@
 #include <string.h>
 #include <unistd.h>
 
+#include "fcsl/fcsl_error.h"
 #include "fcsl/fcsl_monotonic.h"
 #include "fcsl/fcsl_address.h"
 #include "line.h"
 
 enum { BACKLOG = 4, RETRY_MS = 20 };
 
-static int fail(int fd, const char *what, const char *address, char *error, size_t error_size)
+static int fail(int fd, const char *what, const char *address, fcsl_error_t *error)
 {
-    (void)snprintf(error, error_size, "cannot %s tcp:%s: %s", what, address, strerror(errno));
+    (void)fcsl_fail(error, "cannot %s tcp:%s: %s", what, address, strerror(errno));
     if (fd >= 0) {
         (void)close(fd);
     }
@@ -33,14 +34,13 @@ static int set_up(int fd)
     return setsockopt(fd, IPPROTO_TCP, TCP_NODELAY, &on, sizeof on) == 0 ? line_set_nonblocking(fd) : -1;
 }
 
-static int listen_at(const struct sockaddr_storage *there, socklen_t length, const char *address, char *error,
-                     size_t error_size)
+static int listen_at(const struct sockaddr_storage *there, socklen_t length, const char *address, fcsl_error_t *error)
 {
     const int on = 1;
     const int fd = socket(there->ss_family, SOCK_STREAM | SOCK_CLOEXEC | SOCK_NONBLOCK, 0);
     if (fd < 0 || setsockopt(fd, SOL_SOCKET, SO_REUSEADDR, &on, sizeof on) != 0 ||
         bind(fd, (const struct sockaddr *)there, length) != 0 || listen(fd, BACKLOG) != 0) {
-        return fail(fd, "listen on", address, error, error_size);
+        return fail(fd, "listen on", address, error);
     }
     return fd;
 }
@@ -81,18 +81,16 @@ static int connect_once(const struct sockaddr_storage *there, socklen_t length, 
     return -1;
 }
 
-int line_open_tcp(line_t *line, const char *address, fcsl_wire_side_t side, uint64_t deadline_ns, char *error,
-                  size_t error_size)
+int line_open_tcp(line_t *line, const char *address, fcsl_wire_side_t side, uint64_t deadline_ns, fcsl_error_t *error)
 {
     struct sockaddr_storage there;
     socklen_t length = 0;
     *line = (line_t){.fd = -1, .listener = -1};
     if (fcsl_address_read(address, &there, &length) != 0) {
-        (void)snprintf(error, error_size, "tcp:%s: HOST:PORT must be numbers, like 127.0.0.1:7600", address);
-        return -1;
+        return fcsl_fail(error, "tcp:%s: HOST:PORT must be numbers, like 127.0.0.1:7600", address);
     }
     if (side == FCSL_WIRE_LISTEN) {
-        line->listener = listen_at(&there, length, address, error, error_size);
+        line->listener = listen_at(&there, length, address, error);
         return line->listener >= 0 ? 0 : -1;
     }
     int fd = connect_once(&there, length, deadline_ns);
@@ -102,7 +100,7 @@ int line_open_tcp(line_t *line, const char *address, fcsl_wire_side_t side, uint
         fd = connect_once(&there, length, deadline_ns);
     }
     if (fd < 0 || set_up(fd) != 0) {
-        return fail(fd, "connect to", address, error, error_size);
+        return fail(fd, "connect to", address, error);
     }
     line_begin(line, fd);
     return 0;

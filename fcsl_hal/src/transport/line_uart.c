@@ -11,6 +11,7 @@
 #include <termios.h>
 #include <unistd.h>
 
+#include "fcsl/fcsl_error.h"
 #include "fcsl/fcsl_monotonic.h"
 
 #include "line.h"
@@ -62,24 +63,23 @@ static int set_up(int fd, speed_t speed)
                : -1;
 }
 
-int line_open_uart(line_t *line, const char *device, uint32_t baud, char *error, size_t error_size)
+int line_open_uart(line_t *line, const char *device, uint32_t baud, fcsl_error_t *error)
 {
     const speed_t *speed = speed_of(baud);
     *line = (line_t){.fd = -1, .listener = -1, .serial = 1};
     if (speed == NULL) {
-        (void)snprintf(error, error_size, "uart:%s:%" PRIu32 ": no serial device has this speed", device, baud);
-        return -1;
+        return fcsl_fail(error, "uart:%s:%" PRIu32 ": no serial device has this speed", device, baud);
     }
     line->frame_ns = (uint64_t)FCSL_COBS_BYTES_MAX * BITS_PER_BYTE * FCSL_NS_PER_S / baud;
     /* O_NONBLOCK: opening does not wait for a carrier. */
     const int fd = open(device, O_RDWR | O_NOCTTY | O_NONBLOCK | O_CLOEXEC);
     if (fd < 0 || isatty(fd) == 0) {
-        (void)snprintf(error, error_size, fd < 0 ? "cannot open '%s': %s" : "'%s' is no serial device: %s", device,
-                       strerror(errno));
+        (void)fcsl_fail(error, fd < 0 ? "cannot open '%s': %s" : "'%s' is no serial device: %s", device,
+                        strerror(errno));
     } else if (serial_take_for_us(fd) != 0) {
-        (void)snprintf(error, error_size, "'%s' is in use by another process", device);
+        (void)fcsl_fail(error, "'%s' is in use by another process", device);
     } else if (set_up(fd, *speed) != 0) {
-        (void)snprintf(error, error_size, "cannot set '%s' to %" PRIu32 " baud: %s", device, baud, strerror(errno));
+        (void)fcsl_fail(error, "cannot set '%s' to %" PRIu32 " baud: %s", device, baud, strerror(errno));
     } else {
         line_begin(line, fd);
         return 0;

@@ -16,6 +16,7 @@
 #include <sys/eventfd.h>
 #include <unistd.h>
 
+#include "fcsl/fcsl_error.h"
 #include "fcsl/fcsl_monotonic.h"
 #include "link/link_frame.h"
 
@@ -421,8 +422,8 @@ static uint16_t new_session(fcsl_wire_side_t side)
                                     : (uint16_t)(session | 1u);
 }
 
-int fcsl_wire_over_link(const line_t *line, fcsl_wire_side_t side, size_t message_max, fcsl_wire_t *wire, char *error,
-                        size_t error_size)
+int fcsl_wire_over_link(const line_t *line, fcsl_wire_side_t side, size_t message_max, fcsl_wire_t *wire,
+                        fcsl_error_t *error)
 {
     fcsl_link_policy_t policies[FCSL_LINK_PORTS] = {[PORT] = FCSL_LINK_RELIABLE};
     const size_t most = FCSL_LINK_BUFFER - FCSL_LINK_SIZE_BYTES;
@@ -431,11 +432,11 @@ int fcsl_wire_over_link(const line_t *line, fcsl_wire_side_t side, size_t messag
         line_t owned = *line;
         line_close(&owned);
         if (message_max > most) {
-            (void)snprintf(error, error_size,
-                           "a message of the machine may have %zu bytes, and the link carries %zu: use unix:PATH",
-                           message_max, most);
+            (void)fcsl_fail(error,
+                            "a message of the machine may have %zu bytes, and the link carries %zu: use unix:PATH",
+                            message_max, most);
         } else {
-            (void)snprintf(error, error_size, "out of memory for the wire");
+            (void)fcsl_fail(error, "out of memory for the wire");
         }
         return -1;
     }
@@ -450,8 +451,7 @@ int fcsl_wire_over_link(const line_t *line, fcsl_wire_side_t side, size_t messag
             0 ||
         start(self) != 0) {
         release(self);
-        (void)snprintf(error, error_size, "cannot start the thread of the wire");
-        return -1;
+        return fcsl_fail(error, "cannot start the thread of the wire");
     }
     *wire = (fcsl_wire_t){
         .ctx = self,

@@ -14,6 +14,7 @@
 #include <sys/socket.h>
 #include <unistd.h>
 
+#include "fcsl/fcsl_error.h"
 #include "fcsl/fcsl_monotonic.h"
 #include "fcsl/fcsl_socket.h"
 
@@ -178,10 +179,10 @@ static void unix_count(void *ctx, void *values)
     memcpy(values, &((const wire_t *)ctx)->counters, sizeof(counters_t));
 }
 
-static int connect_until(wire_t *wire, uint64_t deadline_ns, char *error, size_t error_size)
+static int connect_until(wire_t *wire, uint64_t deadline_ns, fcsl_error_t *error)
 {
     for (;;) {
-        wire->fd = fcsl_socket_connect(wire->path, SOCK_SEQPACKET, error, error_size);
+        wire->fd = fcsl_socket_connect(wire->path, SOCK_SEQPACKET, error);
         if (wire->fd >= 0 || fcsl_monotonic_ns() >= deadline_ns) {
             break;
         }
@@ -189,28 +190,26 @@ static int connect_until(wire_t *wire, uint64_t deadline_ns, char *error, size_t
         (void)nanosleep(&pause, NULL);
     }
     if (wire->fd >= 0 && size_buffer(wire->fd, wire->message_max) != 0) {
-        (void)snprintf(error, error_size, "cannot make room for a message in the socket: %s", strerror(errno));
-        return -1;
+        return fcsl_fail(error, "cannot make room for a message in the socket: %s", strerror(errno));
     }
     return wire->fd >= 0 ? 0 : -1;
 }
 
 int fcsl_wire_open_unix(const char *path, fcsl_wire_side_t side, size_t message_max, uint64_t deadline_ns,
-                        fcsl_wire_t *wire, char *error, size_t error_size)
+                        fcsl_wire_t *wire, fcsl_error_t *error)
 {
     wire_t *self = calloc(1, sizeof *self);
     if (self == NULL) {
-        (void)snprintf(error, error_size, "out of memory for the wire");
-        return -1;
+        return fcsl_fail(error, "out of memory for the wire");
     }
     self->listener = -1;
     self->fd = -1;
     self->message_max = message_max;
     (void)snprintf(self->path, sizeof self->path, "%s", path); /* a longer one does not open */
     if (side == FCSL_WIRE_LISTEN) {
-        self->listener = fcsl_socket_listen(path, SOCK_SEQPACKET, BACKLOG, error, error_size);
+        self->listener = fcsl_socket_listen(path, SOCK_SEQPACKET, BACKLOG, error);
     }
-    if (side == FCSL_WIRE_LISTEN ? self->listener < 0 : connect_until(self, deadline_ns, error, error_size) != 0) {
+    if (side == FCSL_WIRE_LISTEN ? self->listener < 0 : connect_until(self, deadline_ns, error) != 0) {
         unix_close(self);
         return -1;
     }

@@ -2,12 +2,13 @@
 #ifndef FCSL_WIRE_UNIX_H
 #define FCSL_WIRE_UNIX_H
 
+#include "fcsl/fcsl_error.h"
 #include "fcsl/fcsl_wire.h"
 
 extern const fcsl_wire_counters_t fcsl_wire_unix_counters;
 
 /* Listens on `path`, or connects, trying again until `deadline_ns`. 0, or -1 with `error` filled. */
 int fcsl_wire_open_unix(const char *path, fcsl_wire_side_t side, size_t message_max, uint64_t deadline_ns,
-                        fcsl_wire_t *wire, char *error, size_t error_size);
+                        fcsl_wire_t *wire, fcsl_error_t *error);
 
 #endif /* FCSL_WIRE_UNIX_H */

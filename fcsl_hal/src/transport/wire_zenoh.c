@@ -9,6 +9,7 @@
 #include <stdlib.h>
 #include <string.h>
 
+#include "fcsl/fcsl_error.h"
 #include "fcsl/fcsl_monotonic.h"
 #include "bus_peer.h"
 #include "codec/codec_layout.h"
@@ -148,7 +149,7 @@ static void zenoh_close(void *ctx)
 
 /* ---- opening ---------------------------------------------------------------------------------------------------------- */
 
-static int open_session(wire_t *wire, const char *endpoint, uint64_t deadline_ns, char *error, size_t error_size)
+static int open_session(wire_t *wire, const char *endpoint, uint64_t deadline_ns, fcsl_error_t *error)
 {
     const int listens = wire->peer.side == FCSL_WIRE_LISTEN;
     const uint64_t now_ns = fcsl_monotonic_ns();
@@ -170,35 +171,33 @@ static int open_session(wire_t *wire, const char *endpoint, uint64_t deadline_ns
         .watched = TOKENS,
         .watched_count = bus_peer_watched(wire->peer.side),
     };
-    return fcsl_bus_open(&options, &wire->peer.bus, error, error_size);
+    return fcsl_bus_open(&options, &wire->peer.bus, error);
 }
 
 int fcsl_wire_open_zenoh(const char *endpoint, fcsl_wire_side_t side, size_t message_max, uint64_t deadline_ns,
-                         fcsl_wire_t *wire, char *error, size_t error_size)
+                         fcsl_wire_t *wire, fcsl_error_t *error)
 {
     if (message_max > FCSL_BUS_MESSAGE_MAX) {
-        (void)snprintf(error, error_size, "a message of the machine may have %zu bytes, and the bus carries %u",
-                       message_max, FCSL_BUS_MESSAGE_MAX);
-        return -1;
+        return fcsl_fail(error, "a message of the machine may have %zu bytes, and the bus carries %u", message_max,
+                         FCSL_BUS_MESSAGE_MAX);
     }
     wire_t *self = calloc(1, sizeof *self);
     uint8_t *inbox = malloc(message_max);
     if (self == NULL || inbox == NULL) {
         free(self);
         free(inbox);
-        (void)snprintf(error, error_size, "out of memory for the wire");
-        return -1;
+        return fcsl_fail(error, "out of memory for the wire");
     }
     self->peer.side = side;
     self->message_max = message_max;
     self->inbox = inbox;
     self->peer.output_count = side == FCSL_WIRE_LISTEN ? sizeof SIMULATOR_KEYS / sizeof SIMULATOR_KEYS[0]
                                                        : sizeof CONTROLLER_KEYS / sizeof CONTROLLER_KEYS[0];
-    if (open_session(self, endpoint, deadline_ns, error, error_size) != 0) {
+    if (open_session(self, endpoint, deadline_ns, error) != 0) {
         release(self);
         return -1;
     }
-    if (side == FCSL_WIRE_CONNECT && bus_peer_wait(&self->peer, endpoint, deadline_ns, error, error_size) != 0) {
+    if (side == FCSL_WIRE_CONNECT && bus_peer_wait(&self->peer, endpoint, deadline_ns, error) != 0) {
         zenoh_close(self);
         return -1;
     }

@@ -52,12 +52,12 @@ int main(void)
     data_t channels = {0};
     uint8_t select[2] = {0};
     uint8_t bytes[ROOM];
-    char error[64];
+    fcsl_error_t error;
     fcsl_message_t message;
     fcsl_hal_t hal;
     const fcsl_channel_table_t table = fcsl_channel_table(&MACHINE);
     CHECK(loopback_hal(&loopback, &MACHINE, &channels, select, &hal) == 0);
-    CHECK(hal.open(&hal, error, sizeof error) == 0);
+    CHECK(hal.open(&hal, &error) == 0);
     for (uint64_t tick = 0; tick < TICKS; tick++) {
         const fcsl_hal_status_t sampled = hal.sample(hal.ctx, tick, bytes, sizeof bytes, &message);
         CHECK(sampled == (tick == 0 ? FCSL_HAL_NONE : FCSL_HAL_OK));

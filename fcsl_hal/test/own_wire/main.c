@@ -16,15 +16,15 @@ enum { TICKS = 2000, WAIT_MS = 10000, ROOM = 1024 };
 /* Steps until the run ends; exits 0 when the simulator ended it after all ticks. */
 static int control(pipe_wire_t *pipe)
 {
-    char error[512];
+    fcsl_error_t error;
     uint8_t bytes[ROOM];
     fcsl_message_t message;
     fcsl_hal_t hal;
     data_t data = {0};
     const fcsl_wire_t wire = pipe_wire(pipe);
     const fcsl_channel_table_t table = fcsl_channel_table(&MACHINE);
-    CHECK(fcsl_hal_over_wire(&wire, &MACHINE, WAIT_MS, &hal, error, sizeof error) == 0);
-    CHECK(hal.open(&hal, error, sizeof error) == 0 && hal.paces);
+    CHECK(fcsl_hal_over_wire(&wire, &MACHINE, WAIT_MS, &hal, &error) == 0);
+    CHECK(hal.open(&hal, &error) == 0 && hal.paces);
     fcsl_hal_status_t status = FCSL_HAL_OK;
     uint64_t tick = 0;
     for (; status == FCSL_HAL_OK; tick++) {
@@ -44,14 +44,14 @@ static int control(pipe_wire_t *pipe)
 
 static void simulate(pipe_wire_t *pipe)
 {
-    char error[512];
+    fcsl_error_t error;
     uint8_t bytes[ROOM];
     fcsl_message_t message;
     data_t data = {0};
     fcsl_external_t *external = NULL;
     const fcsl_wire_t wire = pipe_wire(pipe);
     const fcsl_channel_table_t table = fcsl_channel_table(&MACHINE);
-    CHECK(fcsl_external_over_wire(&wire, &MACHINE, &external, error, sizeof error) == 0);
+    CHECK(fcsl_external_over_wire(&wire, &MACHINE, &external, &error) == 0);
     CHECK(fcsl_external_accept(external, WAIT_MS) == FCSL_HAL_OK);
     for (uint64_t tick = 0; tick < TICKS; tick++) {
         data.i64 = (int64_t)tick;

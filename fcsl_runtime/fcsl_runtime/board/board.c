@@ -7,7 +7,7 @@
 #include <stdlib.h>
 #include <string.h>
 
-#include "base/error.h"
+#include "fcsl/fcsl_error.h"
 
 static int open_sensors(board_t *board, const char *file, fcsl_error_t *error)
 {

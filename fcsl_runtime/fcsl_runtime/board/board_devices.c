@@ -12,7 +12,7 @@
 #include <string.h>
 #include <time.h>
 
-#include "base/error.h"
+#include "fcsl/fcsl_error.h"
 #include "fcsl/fcsl_monotonic.h"
 
 /* How long a sample stands for what is on a pin. */

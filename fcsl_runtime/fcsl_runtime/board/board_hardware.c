@@ -11,7 +11,7 @@
 #include <string.h>
 #include <time.h>
 
-#include "base/error.h"
+#include "fcsl/fcsl_error.h"
 #include "fcsl/fcsl_monotonic.h"
 #include "output_device.h"
 #include "register_window.h"

@@ -7,7 +7,7 @@
 #include <stdlib.h>
 #include <string.h>
 
-#include "base/error.h"
+#include "fcsl/fcsl_error.h"
 #include "fcsl/fcsl_channels.h"
 #include "fcsl/fcsl_scalar.h"
 #include "fcsl/fcsl_tick_time.h"

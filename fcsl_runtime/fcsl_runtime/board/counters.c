@@ -7,7 +7,7 @@
 #include <stdio.h>
 #include <stdlib.h>
 
-#include "base/error.h"
+#include "fcsl/fcsl_error.h"
 
 enum { PATH_BYTES = 256 };
 

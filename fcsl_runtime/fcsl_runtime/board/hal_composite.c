@@ -10,7 +10,7 @@
 #include <stdlib.h>
 #include <string.h>
 
-#include "base/error.h"
+#include "fcsl/fcsl_error.h"
 #include "fcsl/fcsl_monotonic.h"
 #include "hal_linux.h"
 
@@ -191,12 +191,12 @@ static void composite_close(void *ctx)
 }
 
 /* The simulator first: it may have to be waited for, and what devices give meanwhile would be old. */
-static int composite_open(fcsl_hal_t *handle, char *error, size_t error_size)
+static int composite_open(fcsl_hal_t *handle, fcsl_error_t *error)
 {
     hal_t *hal = handle->ctx;
-    int status = hal->simulated.open(&hal->simulated, error, error_size);
+    int status = hal->simulated.open(&hal->simulated, error);
     if (status == 0) {
-        status = hal->board.open(&hal->board, error, error_size);
+        status = hal->board.open(&hal->board, error);
     }
     handle->paces = hal->simulated.paces == FCSL_PACED_BY_SIMULATOR ? FCSL_PACED_IN_REAL_TIME : hal->simulated.paces;
     return status;

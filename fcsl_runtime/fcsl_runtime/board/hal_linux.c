@@ -7,7 +7,7 @@
 #include <stdio.h>
 #include <stdlib.h>
 
-#include "base/error.h"
+#include "fcsl/fcsl_error.h"
 #include "board.h"
 #include "board_hardware.h"
 #include "counters.h"
@@ -238,14 +238,13 @@ static void linux_close(void *ctx)
     free(hal);
 }
 
-static int linux_open(fcsl_hal_t *handle, char *error, size_t error_size)
+static int linux_open(fcsl_hal_t *handle, fcsl_error_t *error)
 {
     hal_t *hal = handle->ctx;
     fcsl_error_t reason;
     if (board_devices_start(hal->devices, hal->priority, &reason) != 0 ||
         (hal->hardware != NULL && board_hardware_start(hal->hardware, hal->priority, &reason) != 0)) {
-        (void)snprintf(error, error_size, "%s", reason.text);
-        return -1;
+        return fcsl_fail(error, "%s", reason.text);
     }
     if (hal->hardware != NULL) {
         fcsl_run_use_board(hal->run, board_hardware_table(hal->hardware));
@@ -314,7 +313,7 @@ int hal_linux(const char *file, int priority, fcsl_run_t *run, fcsl_hal_t *hal, 
     self->run = run;
     self->priority = priority;
     self->readings.topic = -1;
-    if (fcsl_hal_stub(&self->base, error->text, sizeof error->text) != 0 || open_board(self, file, error) != 0) {
+    if (fcsl_hal_stub(&self->base, error) != 0 || open_board(self, file, error) != 0) {
         linux_close(self);
         return -1;
     }

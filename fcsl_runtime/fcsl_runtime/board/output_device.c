@@ -17,7 +17,7 @@
 #include <stdlib.h>
 #include <string.h>
 
-#include "base/error.h"
+#include "fcsl/fcsl_error.h"
 #include "device_thread.h"
 #include "fcsl/fcsl_latest.h"
 #include "fcsl/fcsl_library.h"

@@ -8,7 +8,7 @@
 #include <stdlib.h>
 #include <string.h>
 
-#include "base/error.h"
+#include "fcsl/fcsl_error.h"
 #include "fcsl/fcsl_cdr.h"
 
 enum {

@@ -12,7 +12,7 @@
 #include <sys/stat.h>
 #include <unistd.h>
 
-#include "base/error.h"
+#include "fcsl/fcsl_error.h"
 
 /* Beyond the end of a plain file, which /sys has for PCI, an access would be a signal. */
 static int is_long_enough(int file, uint64_t bytes)

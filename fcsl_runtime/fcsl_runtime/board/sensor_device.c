@@ -25,7 +25,7 @@
 #include <string.h>
 #include <time.h>
 
-#include "base/error.h"
+#include "fcsl/fcsl_error.h"
 #include "fcsl/fcsl_monotonic.h"
 #include "device_thread.h"
 #include "fcsl/fcsl_library.h"

@@ -11,7 +11,7 @@ int guard_link_open(loop_t *loop, const char *path, fcsl_error_t *error)
     if (path == NULL) {
         return 0;
     }
-    if (fcsl_guard_connect(path, fcsl_run_machine(loop->run), &loop->guard, error->text, sizeof error->text) != 0) {
+    if (fcsl_guard_connect(path, fcsl_run_machine(loop->run), &loop->guard, error) != 0) {
         return -1;
     }
     loop->guard_state = GUARD_THERE;

@@ -9,7 +9,7 @@
 #include <stdlib.h>
 #include <string.h>
 
-#include "base/error.h"
+#include "fcsl/fcsl_error.h"
 #include "fcsl/fcsl_cdr.h"
 
 enum { NAME_BYTES = 512, LINE_BYTES = 384 };

@@ -68,10 +68,10 @@ static int make_named_hal(const options_t *options, fcsl_run_t *run, fcsl_hal_t 
     const uint32_t timeout_ms = (uint32_t)options->timeout_ms;
     const char *peer = options->peer;
     if (peer == NULL) {
-        return fcsl_hal_stub(hal, error->text, sizeof error->text);
+        return fcsl_hal_stub(hal, error);
     }
     if (strncmp(peer, OPTIONS_WIRE, strlen(OPTIONS_WIRE)) == 0) {
-        return fcsl_hal_wire(peer + strlen(OPTIONS_WIRE), machine, timeout_ms, hal, error->text, sizeof error->text);
+        return fcsl_hal_wire(peer + strlen(OPTIONS_WIRE), machine, timeout_ms, hal, error);
     }
     if (options_hal_is_linux(options)) {
         return hal_linux(peer + strlen(OPTIONS_LINUX), priority_of_devices(options), run, hal, error);
@@ -79,8 +79,7 @@ static int make_named_hal(const options_t *options, fcsl_run_t *run, fcsl_hal_t 
     if (options_hal_is_ros(options)) {
         return hal_ros(peer + strlen(OPTIONS_ROS), options->name_space, run, hal, error);
     }
-    return fcsl_hal_bus(peer, options->name_space, machine, timeout_ms, timeout_ms, hal, error->text,
-                        sizeof error->text);
+    return fcsl_hal_bus(peer, options->name_space, machine, timeout_ms, timeout_ms, hal, error);
 }
 
 /* Constructs the HAL; nothing is opened yet. */
@@ -156,10 +155,10 @@ static int open_hal(program_t *program, fcsl_error_t *error)
 {
     fcsl_hal_t *hal = &program->loop.hal;
     if (program->options.peer == NULL) {
-        return hal->open(hal, error->text, sizeof error->text);
+        return hal->open(hal, error);
     }
     monitor_let_signals(&program->monitor);
-    const int status = hal->open(hal, error->text, sizeof error->text);
+    const int status = hal->open(hal, error);
     monitor_block_signals(&program->monitor);
     return status;
 }

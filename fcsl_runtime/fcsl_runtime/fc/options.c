@@ -115,7 +115,7 @@ static const char *read_composite(const char *text, options_t *options)
 
 static int read_hal(const char *text, options_t *options)
 {
-    char error[ERROR_BYTES];
+    fcsl_error_t error;
     options->composite_plan[0] = '\0';
     if (strncmp(text, OPTIONS_COMPOSITE, strlen(OPTIONS_COMPOSITE)) == 0) {
         text = read_composite(text, options);
@@ -136,9 +136,9 @@ static int read_hal(const char *text, options_t *options)
                            "ros:tcp/HOST:PORT, not ",
                            text);
     }
-    const int failed = is_wire ? fcsl_wire_check(text + strlen(OPTIONS_WIRE), error, sizeof error)
-                               : fcsl_hal_bus_check(text, error, sizeof error);
-    return failed ? usage_error(is_wire ? "--hal wire: " : "--hal ", error) : 0;
+    const int failed =
+        is_wire ? fcsl_wire_check(text + strlen(OPTIONS_WIRE), &error) : fcsl_hal_bus_check(text, &error);
+    return failed ? usage_error(is_wire ? "--hal wire: " : "--hal ", error.text) : 0;
 }
 
 static int read_rate(const char *text, options_t *options)

@@ -14,7 +14,7 @@
 #include <sys/prctl.h>
 #include <sys/resource.h>
 
-#include "base/error.h"
+#include "fcsl/fcsl_error.h"
 
 /* Touched ahead of time; what a step needs is printed by the build and lies far below. */
 enum { STACK_BYTES = 512 * 1024 };

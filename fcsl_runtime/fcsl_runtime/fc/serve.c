@@ -19,15 +19,15 @@ static fcsl_vars_status_t restore(void *ctx, const void *data, const fcsl_hw_sim
     const fcsl_machine_t *machine = fcsl_run_machine(loop->run);
     uint64_t tick = 0;
     if (loop->hal.no_pause != NULL) {
-        (void)snprintf(error->text, sizeof error->text, "%s", loop->hal.no_pause);
+        (void)fcsl_fail(error, "%s", loop->hal.no_pause);
         return FCSL_VARS_REFUSED;
     }
     memcpy(&tick, (const uint8_t *)data + machine->tick_offset, sizeof tick);
     if (loop->hal.paces == FCSL_PACED_BY_SIMULATOR && tick != fcsl_run_tick(loop->run)) {
-        (void)snprintf(error->text, sizeof error->text,
-                       "the checkpoint is of tick %" PRIu64 ", and the simulator of this lock-step is at tick %" PRIu64
-                       ": only one of this very tick can be restored",
-                       tick, fcsl_run_tick(loop->run));
+        (void)fcsl_fail(error,
+                        "the checkpoint is of tick %" PRIu64 ", and the simulator of this lock-step is at tick %" PRIu64
+                        ": only one of this very tick can be restored",
+                        tick, fcsl_run_tick(loop->run));
         return FCSL_VARS_REFUSED;
     }
     const fcsl_vars_status_t status = result(fcsl_run_restore(loop->run, data, machine->size, error));
@@ -49,7 +49,7 @@ static fcsl_vars_status_t set_paused(void *ctx, int paused, fcsl_error_t *error)
 {
     loop_t *loop = ctx;
     if (paused && loop->hal.no_pause != NULL) {
-        (void)snprintf(error->text, sizeof error->text, "%s", loop->hal.no_pause);
+        (void)fcsl_fail(error, "%s", loop->hal.no_pause);
         return FCSL_VARS_REFUSED;
     }
     loop->paused = paused;
@@ -69,7 +69,7 @@ static fcsl_vars_status_t run_ticks(void *ctx, uint64_t count, fcsl_error_t *err
                 return FCSL_VARS_FAILED;
             }
             const int failed = loop->failure[0] != '\0';
-            (void)snprintf(error->text, sizeof error->text, "%.480s", failed ? loop->failure : "the run has ended");
+            (void)fcsl_fail(error, "%.480s", failed ? loop->failure : "the run has ended");
             return failed ? FCSL_VARS_FAILED : FCSL_VARS_ENDED;
         }
     }

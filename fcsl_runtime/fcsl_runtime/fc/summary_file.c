@@ -10,7 +10,7 @@
 #include <stdlib.h>
 #include <string.h>
 
-#include "base/error.h"
+#include "fcsl/fcsl_error.h"
 #include "guard_link.h"
 #include "machine/fault_place.h"
 #include "run/health_name.h"

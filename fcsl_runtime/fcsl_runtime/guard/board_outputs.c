@@ -6,7 +6,7 @@
 #include <inttypes.h>
 #include <string.h>
 
-#include "base/error.h"
+#include "fcsl/fcsl_error.h"
 #include "fcsl/fcsl_channels.h"
 #include "fcsl/fcsl_monotonic.h"
 #include "fcsl/fcsl_scalar.h"

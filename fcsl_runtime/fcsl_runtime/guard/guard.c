@@ -8,7 +8,7 @@
 #include <stdlib.h>
 #include <string.h>
 
-#include "base/error.h"
+#include "fcsl/fcsl_error.h"
 #include "fcsl/fcsl_monotonic.h"
 
 static const uint64_t SAFE_NS = 2000000000u; /* for how long safe values are waited for */

@@ -10,7 +10,7 @@
 #include <stdlib.h>
 #include <time.h>
 
-#include "base/error.h"
+#include "fcsl/fcsl_error.h"
 #include "fcsl/fcsl_monotonic.h"
 #include "fcsl/fcsl_library.h"
 #include "guard_options.h"
@@ -150,7 +150,7 @@ static int open_all(program_t *program)
     guard->server = (fcsl_guard_server_t){.listener = -1, .client = -1, .memory = -1};
     /* The slot before the devices: those of a guard that has it already are left alone. */
     if (realtime_begin(&program->realtime, &error) != 0 || open_machine(program, &error) != 0 ||
-        fcsl_guard_listen(options->slot, guard->machine, &guard->server, error.text, sizeof error.text) != 0 ||
+        fcsl_guard_listen(options->slot, guard->machine, &guard->server, &error) != 0 ||
         open_outputs(program, &error) != 0 || printing_start(&error) != 0 ||
         realtime_enter(&program->realtime, &error) != 0) {
         return complain(error.text);

@@ -9,7 +9,7 @@
 #include <string.h>
 #include <time.h>
 
-#include "base/error.h"
+#include "fcsl/fcsl_error.h"
 #include "fcsl/fcsl_monotonic.h"
 #include "fcsl/fcsl_scalar.h"
 

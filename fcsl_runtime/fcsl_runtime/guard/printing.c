@@ -14,7 +14,7 @@
 #include <stdio.h>
 #include <time.h>
 
-#include "base/error.h"
+#include "fcsl/fcsl_error.h"
 #include "fcsl/fcsl_log.h"
 #include "fcsl/fcsl_monotonic.h"
 #include "log.h"

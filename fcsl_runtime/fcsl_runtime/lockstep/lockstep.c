@@ -102,11 +102,11 @@ int fcsl_lockstep_connect(fcsl_lockstep_t *lockstep, uint32_t wait_ms, uint32_t 
         fcsl_lockstep_leave(lockstep);
     }
     if (!lockstep->looks && fcsl_hal_bus(lockstep->address, lockstep->name_space, lockstep->machine, wait_ms,
-                                         timeout_ms, hal, error->text, sizeof error->text) != 0) {
+                                         timeout_ms, hal, error) != 0) {
         return -1;
     }
     lockstep->looks = 1;
-    const int failed = hal->open(hal, error->text, sizeof error->text);
+    const int failed = hal->open(hal, error);
     if (failed < 0) {
         fcsl_lockstep_leave(lockstep);
     }

@@ -7,7 +7,7 @@
 #include <inttypes.h>
 #include <stdlib.h>
 
-#include "base/error.h"
+#include "fcsl/fcsl_error.h"
 #include "fcsl/fcsl_bus.h"
 #include "fcsl/fcsl_codec.h"
 #include "vars/json.h"

@@ -6,7 +6,7 @@
 
 #include <stdlib.h>
 
-#include "base/error.h"
+#include "fcsl/fcsl_error.h"
 #include "descriptor.h"
 #include "fcsl/fcsl_bus.h"
 #include "fcsl/fcsl_mirror.h"
@@ -56,7 +56,7 @@ static int put(void *ctx, const followed_tick_t *tick)
 
 static int listen_on(fcsl_observers_t *o, const fcsl_observers_options_t *options, fcsl_error_t *error)
 {
-    char reason[256];
+    fcsl_error_t reason;
     const fcsl_machine_t *machine = fcsl_run_machine(options->run);
     char *descriptor = fcsl_observers_descriptor(machine, error);
     if (descriptor == NULL) {
@@ -68,9 +68,9 @@ static int listen_on(fcsl_observers_t *o, const fcsl_observers_options_t *option
                                           .descriptor = descriptor,
                                           .write_bytes = write_bytes < FCSL_BUS_MESSAGE_MAX ? (uint32_t)write_bytes
                                                                                             : FCSL_BUS_MESSAGE_MAX};
-    const int failed = fcsl_mirror_open(&mirror, machine, &o->mirror, reason, sizeof reason);
+    const int failed = fcsl_mirror_open(&mirror, machine, &o->mirror, &reason);
     free(descriptor);
-    return failed ? fcsl_fail(error, "no observers: %s", reason) : 0;
+    return failed ? fcsl_fail(error, "no observers: %s", reason.text) : 0;
 }
 
 fcsl_observers_t *fcsl_observers_open(const fcsl_observers_options_t *options, const fcsl_history_t *history,

@@ -7,7 +7,7 @@
 #include <stdio.h>
 #include <string.h>
 
-#include "base/error.h"
+#include "fcsl/fcsl_error.h"
 
 int ros_key_write(char key[FCSL_BUS_KEY_MAX + 1], const char *name_space, const char *machine, const char *name,
                   fcsl_error_t *error)

@@ -11,7 +11,7 @@
 #include <string.h>
 #include <time.h>
 
-#include "base/error.h"
+#include "fcsl/fcsl_error.h"
 #include "endpoint.h"
 #include "fcsl/fcsl_ros_inlet.h"
 #include "type_hashes.h"
@@ -264,8 +264,8 @@ static int name_topics(const hal_t *hal, names_t *names, fcsl_error_t *error)
     return 0;
 }
 
-static int open_session(hal_t *hal, const names_t *names, const char **texts, fcsl_bus_input_t *inputs, char *error,
-                        size_t error_size)
+static int open_session(hal_t *hal, const names_t *names, const char **texts, fcsl_bus_input_t *inputs,
+                        fcsl_error_t *error)
 {
     const uint32_t count = hal->sensor_count + hal->output_count;
     uint32_t tick_bytes = RING_BYTES_MIN / TICKS_POSTED;
@@ -288,10 +288,10 @@ static int open_session(hal_t *hal, const names_t *names, const char **texts, fc
                                         .input_count = hal->sensor_count,
                                         .tokens = texts + count,
                                         .token_count = count};
-    return fcsl_bus_open(&options, &hal->bus, error, error_size);
+    return fcsl_bus_open(&options, &hal->bus, error);
 }
 
-static int ros_open(fcsl_hal_t *handle, char *error, size_t error_size)
+static int ros_open(fcsl_hal_t *handle, fcsl_error_t *error)
 {
     hal_t *hal = handle->ctx;
     fcsl_error_t reason;
@@ -301,11 +301,11 @@ static int ros_open(fcsl_hal_t *handle, char *error, size_t error_size)
     fcsl_bus_input_t *inputs = calloc(count, sizeof *inputs);
     int failed = -1;
     if (names == NULL || texts == NULL || inputs == NULL) {
-        (void)snprintf(error, error_size, "out of memory for the ROS 2 graph");
+        (void)fcsl_fail(error, "out of memory for the ROS 2 graph");
     } else if (name_topics(hal, names, &reason) != 0) {
-        (void)snprintf(error, error_size, "%s", reason.text);
+        (void)fcsl_fail(error, "%s", reason.text);
     } else {
-        failed = open_session(hal, names, texts, inputs, error, error_size);
+        failed = open_session(hal, names, texts, inputs, error);
     }
     free(inputs);
     free((void *)texts);
@@ -315,11 +315,11 @@ static int ros_open(fcsl_hal_t *handle, char *error, size_t error_size)
 
 static int add_sensor(hal_t *hal, const fcsl_ros_message_t *message, fcsl_error_t *error)
 {
-    char reason[256];
+    fcsl_error_t reason;
     sensor_t *sensor = &hal->sensors[hal->sensor_count++];
-    sensor->reader = fcsl_ros_reader_new(message->reader, reason, sizeof reason);
+    sensor->reader = fcsl_ros_reader_new(message->reader, &reason);
     if (sensor->reader == NULL) {
-        return fcsl_fail(error, "topic %.100s: %s", message->topic, reason);
+        return fcsl_fail(error, "topic %.100s: %s", message->topic, reason.text);
     }
     sensor->inlet = fcsl_ros_inlet_new(hal->run, sensor->reader, message->channels, message->channel_count, error);
     return sensor->inlet != NULL ? 0 : -1;
@@ -327,12 +327,12 @@ static int add_sensor(hal_t *hal, const fcsl_ros_message_t *message, fcsl_error_
 
 static int add_output(hal_t *hal, const fcsl_ros_message_t *message, fcsl_error_t *error)
 {
-    char reason[256];
+    fcsl_error_t reason;
     output_t *output = &hal->outputs[hal->output_count++];
     output->size = message->composer->size;
     output->direction = message->direction;
-    output->composer = fcsl_ros_composer_new(message->composer, reason, sizeof reason);
-    return output->composer != NULL ? 0 : fcsl_fail(error, "topic %.100s: %s", message->topic, reason);
+    output->composer = fcsl_ros_composer_new(message->composer, &reason);
+    return output->composer != NULL ? 0 : fcsl_fail(error, "topic %.100s: %s", message->topic, reason.text);
 }
 
 static int add_topics(hal_t *hal, fcsl_error_t *error)
@@ -369,7 +369,7 @@ int hal_ros(const char *endpoint, const char *name_space, fcsl_run_t *run, fcsl_
     self->run = run;
     self->endpoint = endpoint;
     self->name_space = name_space;
-    if (fcsl_hal_stub(&self->base, error->text, sizeof error->text) != 0 || add_topics(self, error) != 0) {
+    if (fcsl_hal_stub(&self->base, error) != 0 || add_topics(self, error) != 0) {
         ros_close(self);
         return -1;
     }

@@ -9,7 +9,7 @@
 #include <stdlib.h>
 #include <time.h>
 
-#include "base/error.h"
+#include "fcsl/fcsl_error.h"
 #include "observers/follower.h"
 #include "ros_topics.h"
 #include "fcsl/fcsl_tick_time.h"
@@ -134,7 +134,7 @@ static uint32_t size_ring(fcsl_ros_graph_t *g, size_t *longest)
 
 static int listen_on(fcsl_ros_graph_t *g, const char *endpoint, fcsl_error_t *error)
 {
-    char reason[256];
+    fcsl_error_t reason;
     size_t longest = 0;
     const uint32_t count = g->topics.count;
     const uint32_t ring_bytes = size_ring(g, &longest);
@@ -156,9 +156,9 @@ static int listen_on(fcsl_ros_graph_t *g, const char *endpoint, fcsl_error_t *er
                                         .latched_count = g->topics.latched_count,
                                         .tokens = keys + count,
                                         .token_count = count};
-    const int failed = fcsl_bus_open(&options, &g->bus, reason, sizeof reason);
+    const int failed = fcsl_bus_open(&options, &g->bus, &reason);
     free((void *)keys);
-    return failed ? fcsl_fail(error, "no ROS 2 graph: %s", reason) : 0;
+    return failed ? fcsl_fail(error, "no ROS 2 graph: %s", reason.text) : 0;
 }
 
 fcsl_ros_graph_t *fcsl_ros_graph_open(const fcsl_ros_graph_options_t *options, const fcsl_history_t *history,

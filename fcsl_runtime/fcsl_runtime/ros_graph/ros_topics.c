@@ -127,7 +127,7 @@ static int add_instance(ros_topics_t *topics, const fcsl_instance_t *instance, c
 static int add_mapped(ros_topics_t *topics, const fcsl_ros_message_t *message, const char *name_space,
                       fcsl_error_t *error)
 {
-    char reason[256];
+    fcsl_error_t reason;
     ros_topic_t *topic = &topics->topics[topics->count++];
     const ros_quality_t quality = {.kind = ROS_PUBLISHER,
                                    .type = message->type,
@@ -137,9 +137,9 @@ static int add_mapped(ros_topics_t *topics, const fcsl_ros_message_t *message, c
     topic->kind = ROS_MAPPED;
     topic->mapped = message;
     topic->longest = message->composer->size;
-    topic->composer = fcsl_ros_composer_new(message->composer, reason, sizeof reason);
+    topic->composer = fcsl_ros_composer_new(message->composer, &reason);
     if (topic->composer == NULL) {
-        return fcsl_fail(error, "topic %.100s: %s", message->topic, reason);
+        return fcsl_fail(error, "topic %.100s: %s", message->topic, reason.text);
     }
     if (quality.hash == NULL) {
         return fcsl_fail(error, "topic %.100s: there is no type hash of %.200s", message->topic, message->type);

@@ -8,7 +8,6 @@
 #include <stdlib.h>
 
 #include "fcsl_check.h"
-#include "base/error.c"
 
 enum { WORDS = 5, FILE_WORDS = 4 + 2 + 2 * WORDS, ROOM = FILE_WORDS + 8 };
 #define MAP "{\"lines\":1}" /* 11 bytes: padded with zeros to 16 */

@@ -138,7 +138,7 @@ static void test_random_bytes(fcsl_ros_reader_t *reader, uint8_t *page)
 static int plan_is_refused(const fcsl_ros_reader_plan_t *plan)
 {
     fcsl_error_t error = {{0}};
-    fcsl_ros_reader_t *reader = fcsl_ros_reader_new(plan, error.text, sizeof error.text);
+    fcsl_ros_reader_t *reader = fcsl_ros_reader_new(plan, &error);
     fcsl_ros_reader_free(reader);
     return reader == NULL && error.text[0] != '\0';
 }
@@ -233,7 +233,7 @@ static void test_inlet(const char *library)
     static const uint32_t channels[] = {0, 1};
     fcsl_error_t error;
     fcsl_run_t *run = fcsl_run_open(library, "fixture", &error);
-    fcsl_ros_reader_t *reader = fcsl_ros_reader_new(&plan, error.text, sizeof error.text);
+    fcsl_ros_reader_t *reader = fcsl_ros_reader_new(&plan, &error);
     CHECK(run != NULL && reader != NULL);
     CHECK(fcsl_ros_inlet_new(run, reader, channels, 2, &error) == NULL);
     CHECK(fcsl_ros_inlet_new(run, reader, channels + 1, 1, &error) == NULL);
@@ -280,7 +280,7 @@ static void test_composing(void)
                                      .memory_count = 2,
                                      .stamp_offset = 4};
     fcsl_error_t error;
-    fcsl_ros_composer_t *composer = fcsl_ros_composer_new(&plan, error.text, sizeof error.text);
+    fcsl_ros_composer_t *composer = fcsl_ros_composer_new(&plan, &error);
     CHECK(composer != NULL);
     const double number = 1.25;
     const int32_t whole[3] = {0, 0, 7};
@@ -296,14 +296,14 @@ static void test_composing(void)
     CHECK(fcsl_ros_compose(composer, memories, (int64_t)INT32_MAX * 1000000000 + 1000000000, out) == FCSL_ROS_STAMP);
     fcsl_ros_composer_free(composer);
     plan.stamp_offset = 13;
-    CHECK(fcsl_ros_composer_new(&plan, error.text, sizeof error.text) == NULL);
+    CHECK(fcsl_ros_composer_new(&plan, &error) == NULL);
     plan.stamp_offset = 4;
     plan.memory_count = 1;
-    CHECK(fcsl_ros_composer_new(&plan, error.text, sizeof error.text) == NULL);
+    CHECK(fcsl_ros_composer_new(&plan, &error) == NULL);
 
     /* Nothing but constants and a stamp: no tables at all. */
     const fcsl_ros_composer_plan_t constant = {.text = text, .size = sizeof text, .stamp_offset = 4};
-    composer = fcsl_ros_composer_new(&constant, error.text, sizeof error.text);
+    composer = fcsl_ros_composer_new(&constant, &error);
     CHECK(composer != NULL && fcsl_ros_compose(composer, NULL, 7000000000, out) == FCSL_ROS_TAKEN && out[4] == 7);
     fcsl_ros_composer_free(composer);
 }
@@ -312,7 +312,7 @@ int main(int argc, char **argv)
 {
     CHECK(argc == 2 && sizeof(row_t) == 40);
     fcsl_error_t error = {{0}};
-    fcsl_ros_reader_t *reader = fcsl_ros_reader_new(&PLAN, error.text, sizeof error.text);
+    fcsl_ros_reader_t *reader = fcsl_ros_reader_new(&PLAN, &error);
     CHECK(reader != NULL);
     uint8_t *page = guarded_page();
     test_reading(reader, page);

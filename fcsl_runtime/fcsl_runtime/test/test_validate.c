@@ -8,7 +8,6 @@
 
 #include "fcsl/fcsl_cdr.h"
 #include "fcsl_check.h"
-#include "base/error.c"
 #include "run/range.c"
 #include "messages/message.c"
 

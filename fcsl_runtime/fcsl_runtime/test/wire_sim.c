@@ -57,7 +57,7 @@ int main(int argc, char **argv)
     CHECK(run != NULL && fcsl_run_attach(run, &error) == 0);
     uint8_t *data = calloc(1, fcsl_run_machine(run)->size);
     CHECK(data != NULL);
-    CHECK(fcsl_external_open(argv[2], fcsl_run_machine(run), &external, error.text, sizeof error.text) == 0);
+    CHECK(fcsl_external_open(argv[2], fcsl_run_machine(run), &external, &error) == 0);
     CHECK(fcsl_external_accept(external, WAIT_MS) == FCSL_HAL_OK);
     const uint64_t ticks = strtoull(argv[3], NULL, 10);
     for (uint64_t tick = 0; tick < ticks; tick++) {

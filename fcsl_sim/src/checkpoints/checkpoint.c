@@ -13,7 +13,7 @@
 #include "fcsl/fcsl_mcap_writer.h"
 #include "fcsl/fcsl_scalar.h"
 #include "base/clock.h"
-#include "base/fail.h"
+#include "fcsl/fcsl_error.h"
 #include "output/publish.h"
 #include "plant_state.h"
 
@@ -132,25 +132,25 @@ size_t fcsl_sim_checkpoint(const fcsl_sim_t *sim, void *bytes)
 static int check_head(const fcsl_sim_t *sim, const uint8_t *in, size_t size, fcsl_error_t *error)
 {
     if (size < sizeof MAGIC || memcmp(in, MAGIC, sizeof MAGIC) != 0) {
-        return fcsl_sim_fail(error, "not a checkpoint of a simulation: it does not begin with FCSLSIMC");
+        return fcsl_fail(error, "not a checkpoint of a simulation: it does not begin with FCSLSIMC");
     }
     if (size < HEAD_BYTES + CRC_BYTES || fcsl_get_u64(in + AT_BYTES) != size) {
-        return fcsl_sim_fail(error, "cut short, or longer than it says");
+        return fcsl_fail(error, "cut short, or longer than it says");
     }
     if (fcsl_get_u32(in + AT_VERSION) != VERSION) {
-        return fcsl_sim_fail(error, "a checkpoint of format version %u, and this program reads version %d",
-                             fcsl_get_u32(in + AT_VERSION), VERSION);
+        return fcsl_fail(error, "a checkpoint of format version %u, and this program reads version %d",
+                         fcsl_get_u32(in + AT_VERSION), VERSION);
     }
     if (fcsl_get_u32(in + size - CRC_BYTES) != fcsl_mcap_crc32(in, size - CRC_BYTES)) {
-        return fcsl_sim_fail(error, "damaged: its CRC-32 is wrong");
+        return fcsl_fail(error, "damaged: its CRC-32 is wrong");
     }
     if (fcsl_get_u64(in + AT_LAYOUT) != layout_of(sim)) {
-        return fcsl_sim_fail(error, "of another simulation: its models, their fields, rates or integrators differ");
+        return fcsl_fail(error, "of another simulation: its models, their fields, rates or integrators differ");
     }
     const uint64_t plant = fcsl_plant_state_bytes(sim);
     if (fcsl_get_u64(in + AT_PLANT) != plant ||
         fcsl_get_u64(in + AT_MACHINE) != size - HEAD_BYTES - plant - CRC_BYTES) {
-        return fcsl_sim_fail(error, "damaged: the sizes of its parts are wrong");
+        return fcsl_fail(error, "damaged: the sizes of its parts are wrong");
     }
     return 0;
 }
@@ -258,18 +258,17 @@ int fcsl_sim_restore_checkpoint(fcsl_sim_t *sim, const void *bytes, size_t size,
     const uint8_t *in = bytes;
     uint64_t tick = 0;
     if (sim->sensed || sim->recording || sim->external) {
-        return fcsl_sim_fail(error,
-                             "a simulation is restored between two ticks, before it records, with its own machine");
+        return fcsl_fail(error, "a simulation is restored between two ticks, before it records, with its own machine");
     }
     if (sim->link) {
-        return fcsl_sim_fail(error, "a serial link cannot be restored from a checkpoint");
+        return fcsl_fail(error, "a serial link cannot be restored from a checkpoint");
     }
     if (check_head(sim, in, size, error) ||
         fcsl_run_checkpoint_tick(sim->run, in + HEAD_BYTES, (size_t)fcsl_get_u64(in + AT_MACHINE), 0, &tick, error)) {
         return -1;
     }
     if (tick > sim->plan.ticks) {
-        return fcsl_sim_fail(
+        return fcsl_fail(
             error, "of tick %" PRIu64 ", and this simulation ends at tick %" PRIu64 ": it needs a longer duration",
             tick, sim->plan.ticks);
     }
@@ -279,7 +278,7 @@ int fcsl_sim_restore_checkpoint(fcsl_sim_t *sim, const void *bytes, size_t size,
     const int possible = taken && is_possible(sim, tick);
     if (!possible || fcsl_run_restore_checkpoint(sim->run, in + HEAD_BYTES, machine, 0, error)) {
         (void)fcsl_plant_state_restore(sim, sim->before);
-        return possible ? -1 : fcsl_sim_fail(error, "damaged: its plant is at no instant of this simulation");
+        return possible ? -1 : fcsl_fail(error, "damaged: its plant is at no instant of this simulation");
     }
     sim->failed = 0;
     const int is_until = sim->plan.until != FCSL_UNTIL_NONE && sim->until_held >= sim->plan.until_ticks;

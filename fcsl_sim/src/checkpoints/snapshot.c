@@ -9,7 +9,7 @@
 #include <string.h>
 
 #include "fcsl/fcsl_scalar.h"
-#include "base/fail.h"
+#include "fcsl/fcsl_error.h"
 #include "plant_state.h"
 
 struct fcsl_sim_snapshot {
@@ -79,14 +79,14 @@ static int is_of_snapshot(const fcsl_sim_t *sim, const fcsl_sim_snapshot_t *snap
     static const char WHY[] =
         "a checkpoint holds the machine alone, not where its vehicle is nor what noise comes next";
     if (!snapshot->is) {
-        return fcsl_sim_fail(error, "%s: only what this simulation has itself saved last can be restored", WHY), 0;
+        return fcsl_fail(error, "%s: only what this simulation has itself saved last can be restored", WHY), 0;
     }
     if (!same_machine(sim->machine, snapshot->machine, data) ||
         memcmp(&snapshot->hardware, hardware, sizeof *hardware) != 0) {
-        return fcsl_sim_fail(error,
-                             "%s: only what this simulation has itself saved last, behind tick %" PRIu64
-                             ", can be restored, and this is another one",
-                             WHY, snapshot->tick),
+        return fcsl_fail(error,
+                         "%s: only what this simulation has itself saved last, behind tick %" PRIu64
+                         ", can be restored, and this is another one",
+                         WHY, snapshot->tick),
                0;
     }
     return 1;
@@ -101,5 +101,5 @@ int fcsl_sim_snapshot_restore(fcsl_sim_t *sim, const fcsl_sim_snapshot_t *snapsh
     }
     *fcsl_run_simulated_hardware(sim->run) = snapshot->hardware;
     sim->failed = fcsl_plant_state_restore(sim, snapshot->plant) != 0;
-    return sim->failed ? fcsl_sim_fail(error, "a machine does not take its state") : 0;
+    return sim->failed ? fcsl_fail(error, "a machine does not take its state") : 0;
 }

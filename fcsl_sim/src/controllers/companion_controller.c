@@ -9,7 +9,7 @@
 
 #include "base/aligned_memory.h"
 #include "base/clock.h"
-#include "base/fail.h"
+#include "fcsl/fcsl_error.h"
 
 int fcsl_companion_open(fcsl_companion_t *companion, const fcsl_plan_companion_t *plan, fcsl_error_t *error)
 {
@@ -21,7 +21,7 @@ int fcsl_companion_open(fcsl_companion_t *companion, const fcsl_plan_companion_t
     const fcsl_machine_t *machine = fcsl_run_machine(companion->run);
     companion->machine = machine;
     if (machine->tick_hz == 0) {
-        return fcsl_sim_fail(error, "plan line %u: the machine does not tick", plan->line);
+        return fcsl_fail(error, "plan line %u: the machine does not tick", plan->line);
     }
     const size_t sensors = fcsl_message_capacity(machine, FCSL_SENSOR_MESSAGE);
     const size_t actuators = fcsl_message_capacity(machine, FCSL_ACTUATOR_MESSAGE);
@@ -31,7 +31,7 @@ int fcsl_companion_open(fcsl_companion_t *companion, const fcsl_plan_companion_t
     companion->select = calloc(machine->channel_count + 1u, 1);
     if (!companion->bytes || !companion->image || !companion->select ||
         fcsl_delay_open(&companion->delay, plan->delay_ticks, companion->capacity)) {
-        return fcsl_sim_fail(error, "no memory for controller `%s`", plan->name);
+        return fcsl_fail(error, "no memory for controller `%s`", plan->name);
     }
     companion->gate = fcsl_gate(machine, companion->image);
     return 0;
@@ -81,14 +81,14 @@ int fcsl_companion_tick(fcsl_companion_t *companion, fcsl_plant_t *plant, fcsl_e
                         companion->machine->channel_count);
     if (fcsl_message_encode_sensors(channels, companion->image, companion->tick, companion->select, companion->bytes,
                                     companion->capacity, &message) != FCSL_MESSAGE_OK) {
-        return fcsl_sim_fail(error, "controller `%s`: there is no sensor message of its channels", companion->name);
+        return fcsl_fail(error, "controller `%s`: there is no sensor message of its channels", companion->name);
     }
     if (fcsl_run_sense_message(companion->run, &message, error) || fcsl_run_step(companion->run, 1, error)) {
         return -1;
     }
     if (fcsl_run_actuate_message(companion->run, companion->bytes, companion->capacity, &message) != 0) {
-        return fcsl_sim_fail(error, "controller `%s`: an actuator channel holds what its type does not have",
-                             companion->name);
+        return fcsl_fail(error, "controller `%s`: an actuator channel holds what its type does not have",
+                         companion->name);
     }
     fcsl_gate_wait(&companion->gate, now_ns, companion->image);
     if (fcsl_delay_pass(&companion->delay, channels, companion->tick, &message, &due)) {

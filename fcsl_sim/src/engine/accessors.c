@@ -4,7 +4,7 @@
  */
 #include <string.h>
 
-#include "base/fail.h"
+#include "fcsl/fcsl_error.h"
 #include "instants.h"
 
 /* ---- further controllers ------------------------------------------------------------------------------------------------ */
@@ -48,7 +48,7 @@ int fcsl_sim_write(fcsl_sim_t *sim, uint32_t instance, uint32_t offset, const vo
 {
     if (sim->sensed || instance >= sim->plant.instance_count || offset > sim->plant.instances[instance].model->size ||
         size > sim->plant.instances[instance].model->size - offset) {
-        return fcsl_sim_fail(error, "a write that is not between two ticks, or not within an instance");
+        return fcsl_fail(error, "a write that is not between two ticks, or not within an instance");
     }
     uint8_t *to = sim->plant.instances[instance].data + offset;
     if (memcmp(to, bytes, size) != 0) {

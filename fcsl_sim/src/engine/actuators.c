@@ -7,7 +7,7 @@
 #include <stdlib.h>
 #include <string.h>
 
-#include "base/fail.h"
+#include "fcsl/fcsl_error.h"
 
 static const char NAME[] = "actuators";
 static const char PREFIX[] = "outputs.";
@@ -104,12 +104,12 @@ int fcsl_actuators_build(fcsl_sim_t *sim, fcsl_error_t *error)
     }
     for (uint32_t i = 0; i < sim->plant.instance_count; i++) {
         if (strcmp(sim->plant.instances[i].name, NAME) == 0) {
-            return fcsl_sim_fail(
-                error, "model instance `%s` is named like the topic of what the actuators get: rename it", NAME);
+            return fcsl_fail(error, "model instance `%s` is named like the topic of what the actuators get: rename it",
+                             NAME);
         }
     }
     if (build_table(sim)) {
-        return fcsl_sim_fail(error, "no memory for the actuators");
+        return fcsl_fail(error, "no memory for the actuators");
     }
     fcsl_actuators_update(sim);
     return 0;

@@ -13,7 +13,7 @@
 
 #include "fcsl/fcsl_sim.h"
 #include "base/clock.h"
-#include "base/fail.h"
+#include "fcsl/fcsl_error.h"
 
 enum { STACK_BYTES = 1 << 16, TEXT_BYTES = 1024, EXIT_FAILED = 2 };
 
@@ -151,13 +151,13 @@ static int take(fcsl_error_t *error)
     }
     const stack_t alternate = {.ss_sp = stack, .ss_size = STACK_BYTES};
     if (!stack || sigaltstack(&alternate, NULL) != 0) {
-        return fcsl_sim_fail(error, "no memory for the handler of crashes");
+        return fcsl_fail(error, "no memory for the handler of crashes");
     }
     struct sigaction action = {.sa_handler = handle, .sa_flags = SA_ONSTACK};
     (void)sigemptyset(&action.sa_mask);
     for (uint32_t i = 0; i < SIGNAL_COUNT; i++) {
         if (sigaction(SIGNALS[i], &action, &previous[i]) != 0) {
-            return fcsl_sim_fail(error, "the handler of crashes cannot be installed");
+            return fcsl_fail(error, "the handler of crashes cannot be installed");
         }
     }
     watching = 1;
@@ -172,7 +172,7 @@ int fcsl_sim_watch_crashes(int watch, int json, fcsl_error_t *error)
     }
     if (!watch && watching) {
         watching = 0;
-        return give_back() == 0 ? 0 : fcsl_sim_fail(error, "the handlers before cannot be installed again");
+        return give_back() == 0 ? 0 : fcsl_fail(error, "the handlers before cannot be installed again");
     }
     return 0;
 }

@@ -7,7 +7,7 @@
 #include "fcsl/fcsl_fp_mode.h"
 #include "fcsl/fcsl_sim.h"
 #include "base/clock.h"
-#include "base/fail.h"
+#include "fcsl/fcsl_error.h"
 #include "plant/value_names.h"
 #include "simulation.h"
 
@@ -58,8 +58,7 @@ static int compute(fcsl_sim_t *sim, double *slopes, fcsl_error_t *error)
                 const uint32_t offset = instance->model->continuous_offset + k * (uint32_t)sizeof(double);
                 fcsl_sim_name_value(instance, offset, name, sizeof name);
                 fcsl_plant_enter(&sim->plant, 0, FCSL_IN_NONE);
-                return fcsl_sim_fail(error, "the derivative of %s is %g", name,
-                                     isnan(slopes[k]) ? (double)NAN : slopes[k]);
+                return fcsl_fail(error, "the derivative of %s is %g", name, isnan(slopes[k]) ? (double)NAN : slopes[k]);
             }
         }
         slopes += count;

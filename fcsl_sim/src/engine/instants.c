@@ -7,7 +7,7 @@
 
 #include "fcsl/fcsl_fp_mode.h"
 #include "base/clock.h"
-#include "base/fail.h"
+#include "fcsl/fcsl_error.h"
 #include "base/scalar_bits.h"
 
 enum { EVENT_UPDATE, EVENT_COMPANION, EVENT_TICK };
@@ -182,10 +182,10 @@ int fcsl_sim_check_fp_mode(const char *who, fcsl_error_t *error)
     if (fcsl_fp_mode() == FCSL_FP_DEFAULT) {
         return 0;
     }
-    return fcsl_sim_fail(error,
-                         "%s left another floating-point mode (rounding, or small numbers become zero): its code, or a "
-                         "library that it loaded, changed it, and bits depend on it",
-                         who);
+    return fcsl_fail(error,
+                     "%s left another floating-point mode (rounding, or small numbers become zero): its code, or a "
+                     "library that it loaded, changed it, and bits depend on it",
+                     who);
 }
 
 /* Outputs and due updates, sources before what they feed. */
@@ -199,7 +199,7 @@ static int evaluate(fcsl_sim_t *sim, fcsl_error_t *error)
                 call_output(sim, call->instance);
             }
         } else if (sim->plant.instances[call->instance].due && call_update(sim, call->instance)) {
-            return fcsl_sim_fail(error, "the event queue overflowed");
+            return fcsl_fail(error, "the event queue overflowed");
         }
         if (fcsl_sim_check_fp_mode(name, error)) {
             return -1;
@@ -227,7 +227,7 @@ int fcsl_sim_next_instant(fcsl_sim_t *sim, int *ticked, fcsl_error_t *error)
 {
     fcsl_event_t event;
     if (fcsl_event_queue_peek(&sim->queue, &event)) {
-        return fcsl_sim_fail(error, "the event queue ran empty");
+        return fcsl_fail(error, "the event queue ran empty");
     }
     const int64_t write_ns = next_write_ns(sim);
     if (advance(sim, write_ns < event.time_ns ? write_ns : event.time_ns, error) ||

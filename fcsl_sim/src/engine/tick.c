@@ -10,7 +10,7 @@
 #include "fcsl/fcsl_scalar.h"
 #include "actuators.h"
 #include "base/clock.h"
-#include "base/fail.h"
+#include "fcsl/fcsl_error.h"
 #include "base/scalar_bits.h"
 #include "instants.h"
 #include "plant/value_names.h"
@@ -24,14 +24,14 @@ int64_t fcsl_sim_sense(fcsl_sim_t *sim, uint8_t *bytes, size_t capacity, fcsl_er
 static int sense(fcsl_sim_t *sim, uint8_t *bytes, size_t capacity, fcsl_message_t *message, fcsl_error_t *error)
 {
     if (sim->status != FCSL_SIM_RUNNING) {
-        return fcsl_sim_fail(error, "the simulation is over");
+        return fcsl_fail(error, "the simulation is over");
     }
     if (sim->sensed) {
-        return fcsl_sim_fail(error, "tick %llu was sensed and waits for its actuator message",
-                             (unsigned long long)sim->tick);
+        return fcsl_fail(error, "tick %llu was sensed and waits for its actuator message",
+                         (unsigned long long)sim->tick);
     }
     if (sim->failed) {
-        return fcsl_sim_fail(error, "tick %llu has failed: the simulation cannot go on", (unsigned long long)sim->tick);
+        return fcsl_fail(error, "tick %llu has failed: the simulation cannot go on", (unsigned long long)sim->tick);
     }
     sim->failed = 1;
     for (int ticked = 0; !ticked;) { /* the next tick is in the queue, with finitely many events before it */
@@ -49,13 +49,13 @@ static int sense(fcsl_sim_t *sim, uint8_t *bytes, size_t capacity, fcsl_message_
     const fcsl_message_status_t status = fcsl_message_encode_sensors(fcsl_run_channels(sim->run), sim->image, sim->tick,
                                                                      sim->select, bytes, capacity, message);
     if (status == FCSL_MESSAGE_SHORT) {
-        return fcsl_sim_fail(error, "no room for a sensor message in %zu bytes", capacity);
+        return fcsl_fail(error, "no room for a sensor message in %zu bytes", capacity);
     }
     if (status != FCSL_MESSAGE_OK) {
-        return fcsl_sim_fail(error, "sensor message refused: %s", fcsl_message_status_text(status));
+        return fcsl_fail(error, "sensor message refused: %s", fcsl_message_status_text(status));
     }
     const char *wrong = sim->link ? fcsl_sim_link_sense(sim->link, message, bytes, capacity) : NULL;
-    return wrong ? fcsl_sim_fail(error, "tick %llu: %s", (unsigned long long)sim->tick, wrong) : 0;
+    return wrong ? fcsl_fail(error, "tick %llu: %s", (unsigned long long)sim->tick, wrong) : 0;
 }
 
 int fcsl_sim_sense_message(fcsl_sim_t *sim, uint8_t *bytes, size_t capacity, fcsl_message_t *message,
@@ -100,8 +100,8 @@ int fcsl_sim_actuate(fcsl_sim_t *sim, const uint8_t *bytes, size_t size, fcsl_er
     const fcsl_message_status_t status =
         fcsl_message_check(fcsl_run_channels(sim->run), FCSL_ACTUATOR_MESSAGE, bytes, size, &message);
     if (sim->sensed && status != FCSL_MESSAGE_OK) {
-        return fcsl_sim_fail(error, "actuator message of tick %llu refused: %s", (unsigned long long)sim->tick,
-                             fcsl_message_status_text(status));
+        return fcsl_fail(error, "actuator message of tick %llu refused: %s", (unsigned long long)sim->tick,
+                         fcsl_message_status_text(status));
     }
     return fcsl_sim_actuate_message(sim, &message, error);
 }
@@ -136,12 +136,12 @@ void fcsl_sim_hold(fcsl_sim_t *sim)
 int fcsl_sim_actuate_message(fcsl_sim_t *sim, const fcsl_message_t *message, fcsl_error_t *error)
 {
     if (!sim->sensed) {
-        return fcsl_sim_fail(error, "an actuator message for tick %llu, which was not sensed yet",
-                             (unsigned long long)sim->tick);
+        return fcsl_fail(error, "an actuator message for tick %llu, which was not sensed yet",
+                         (unsigned long long)sim->tick);
     }
     if (message->tick != sim->tick) {
-        return fcsl_sim_fail(error, "actuator message of tick %llu where that of tick %llu is due",
-                             (unsigned long long)message->tick, (unsigned long long)sim->tick);
+        return fcsl_fail(error, "actuator message of tick %llu where that of tick %llu is due",
+                         (unsigned long long)message->tick, (unsigned long long)sim->tick);
     }
     fcsl_gate_wait(&sim->gate, (uint64_t)sim->plant.time_ns,
                    sim->image); /* a link may have delivered nothing for long */
@@ -149,7 +149,7 @@ int fcsl_sim_actuate_message(fcsl_sim_t *sim, const fcsl_message_t *message, fcs
     const int is_due = fcsl_delay_pass(&sim->delay, fcsl_run_channels(sim->run), sim->tick, message, &due);
     const char *wrong = is_due && sim->link ? fcsl_sim_link_command(sim->link, &due) : NULL;
     if (wrong) {
-        return fcsl_sim_fail(error, "tick %llu: %s", (unsigned long long)sim->tick, wrong);
+        return fcsl_fail(error, "tick %llu: %s", (unsigned long long)sim->tick, wrong);
     }
     if (is_due && !sim->link) {
         fcsl_sim_take_command(sim, &due);

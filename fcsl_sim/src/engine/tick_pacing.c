@@ -11,7 +11,7 @@
 #include <time.h>
 
 #include "base/clock.h"
-#include "base/fail.h"
+#include "fcsl/fcsl_error.h"
 #include "fcsl/fcsl_monotonic.h"
 
 /* Longest wait before fcsl_sim_run returns to its caller. */
@@ -21,8 +21,8 @@ static const double FORGIVEN_NS = 100e6;
 int fcsl_sim_set_speed(fcsl_sim_t *sim, double speed, fcsl_error_t *error)
 {
     if (!isfinite(speed) || speed < 0) {
-        return fcsl_sim_fail(error, "a speed of %g: write simulated seconds per second, or 0 for as fast as possible",
-                             speed);
+        return fcsl_fail(error, "a speed of %g: write simulated seconds per second, or 0 for as fast as possible",
+                         speed);
     }
     sim->pace.speed = speed;
     fcsl_sim_pace_anew(sim);

@@ -8,7 +8,7 @@
 #include <math.h>
 
 #include "base/clock.h"
-#include "base/fail.h"
+#include "fcsl/fcsl_error.h"
 #include "group.h"
 
 /* Jumps within one nanosecond. A model that announces more never comes to an end of them. */
@@ -24,8 +24,8 @@ static int ask(fcsl_group_t *group, double t, fcsl_error_t *error)
         fcsl_plant_enter(plant, group->announcing[i], FCSL_IN_NEXT_TIME);
         const double next_s = instance->model->next_time(instance->data, t);
         if (!(next_s > t)) { /* also where it is not a number */
-            return fcsl_sim_fail(error, "`next_time` of `%s` is %.17g at %.17g s: a later time, or INFINITY is wanted",
-                                 instance->name, next_s, t);
+            return fcsl_fail(error, "`next_time` of `%s` is %.17g at %.17g s: a later time, or INFINITY is wanted",
+                             instance->name, next_s, t);
         }
         group->jump_s = next_s < group->jump_s ? next_s : group->jump_s;
     }
@@ -55,8 +55,8 @@ int fcsl_group_find_jump(fcsl_group_t *group, fcsl_error_t *error)
         group->state.since_s = group->jump_s;
         fcsl_group_restart(group);
     }
-    return fcsl_sim_fail(error, "a model announces more than %d jumps within the nanosecond of %.9f s", JUMPS_MAX,
-                         fcsl_group_time_s(group));
+    return fcsl_fail(error, "a model announces more than %d jumps within the nanosecond of %.9f s", JUMPS_MAX,
+                     fcsl_group_time_s(group));
 }
 
 int fcsl_group_jump(fcsl_group_t *group, fcsl_error_t *error)

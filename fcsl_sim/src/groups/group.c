@@ -10,7 +10,7 @@
 #include <string.h>
 
 #include "base/clock.h"
-#include "base/fail.h"
+#include "fcsl/fcsl_error.h"
 #include "plant/value_names.h"
 
 /* ---- states of models ------------------------------------------------------------------------------------------------ */
@@ -73,8 +73,8 @@ int fcsl_group_check_finite(const fcsl_group_t *group, const double *x, int64_t 
         if (!isfinite(x[i])) {
             char name[FCSL_VALUE_NAME_BYTES];
             fcsl_group_name_state(group, i, name, sizeof name);
-            return fcsl_sim_fail(error, "%s became %g at %.9f s", name, isnan(x[i]) ? (double)NAN : x[i],
-                                 (double)time_ns / FCSL_NS_PER_S);
+            return fcsl_fail(error, "%s became %g at %.9f s", name, isnan(x[i]) ? (double)NAN : x[i],
+                             (double)time_ns / FCSL_NS_PER_S);
         }
     }
     return 0;
@@ -327,7 +327,7 @@ int fcsl_group_open(fcsl_group_t *group, fcsl_plant_t *plant, fcsl_error_t *erro
     group->jump_ns = INT64_MAX;
     group->memory = calloc(4u * n + 3u * events + fcsl_integrator_memory(group->n) + 1u, sizeof(double));
     if (!group->memory) {
-        return fcsl_sim_fail(error, "no memory for the states");
+        return fcsl_fail(error, "no memory for the states");
     }
     double *at = group->memory;
     group->x = at;
@@ -373,13 +373,13 @@ static int check_second_order(const fcsl_group_t *group, uint32_t velocity, uint
     char name[FCSL_VALUE_NAME_BYTES];
     fcsl_group_name_state(group, velocity, name, sizeof name);
     if (memcmp(&dx[position], &group->x[velocity], sizeof *dx) != 0) {
-        return fcsl_sim_fail(error, "velocity Verlet: the derivative of %s is not that of a position", name);
+        return fcsl_fail(error, "velocity Verlet: the derivative of %s is not that of a position", name);
     }
     if (memcmp(&dx[velocity], &moved[velocity], sizeof *dx) != 0) {
-        return fcsl_sim_fail(error,
-                             "velocity Verlet: the derivative of %s depends on a velocity; use rk4, or another "
-                             "integrator that allows this",
-                             name);
+        return fcsl_fail(error,
+                         "velocity Verlet: the derivative of %s depends on a velocity; use rk4, or another "
+                         "integrator that allows this",
+                         name);
     }
     return 0;
 }

@@ -7,7 +7,7 @@
 #include <string.h>
 
 #include "base/clock.h"
-#include "base/fail.h"
+#include "fcsl/fcsl_error.h"
 #include "group.h"
 #include "plant/value_names.h"
 
@@ -44,13 +44,13 @@ static int too_small(const fcsl_group_t *group, double h, double error, uint32_t
     const double t = (double)group->state.time_ns / FCSL_NS_PER_S;
     fcsl_group_name_state(group, worst, name, sizeof name);
     if (isnan(error)) {
-        return fcsl_sim_fail(why, "%s has no finite value behind %.9f s, even with a step of %g s", name, t, h);
+        return fcsl_fail(why, "%s has no finite value behind %.9f s, even with a step of %g s", name, t, h);
     }
-    return fcsl_sim_fail(why,
-                         "the step underflows at %.9f s: with %g s, the smallest allowed (min_step_s), the error of %s "
-                         "is %g times its tolerance; allow larger errors (atol, rtol), or look for a jump in its "
-                         "derivative, which should be an event",
-                         t, h, name, error);
+    return fcsl_fail(why,
+                     "the step underflows at %.9f s: with %g s, the smallest allowed (min_step_s), the error of %s "
+                     "is %g times its tolerance; allow larger errors (atol, rtol), or look for a jump in its "
+                     "derivative, which should be an event",
+                     t, h, name, error);
 }
 
 /* Makes the step from the present on; x1 is its end. */
@@ -86,7 +86,7 @@ static int make_step(fcsl_group_t *group, int64_t barrier_ns, fcsl_error_t *erro
         }
         wanted_s = h * (factor < 0.9 ? factor : 0.9);
     }
-    return fcsl_sim_fail(error, "no step at %.9f s", t); /* not reached: min_step_s comes first */
+    return fcsl_fail(error, "no step at %.9f s", t); /* not reached: min_step_s comes first */
 }
 
 /* The events within the step: the first one ends it. */

@@ -6,7 +6,7 @@
 #include <string.h>
 
 #include "base/clock.h"
-#include "base/fail.h"
+#include "fcsl/fcsl_error.h"
 #include "group.h"
 
 enum { ROUNDS_MAX = 64 }; /* a step of 2^63 ns is halved 63 times */
@@ -47,8 +47,8 @@ int fcsl_group_check_events(const fcsl_group_t *group, double t, const double *v
         if (isnan(value[i])) {
             uint32_t number = 0;
             const fcsl_instance_state_t *instance = instance_of(group, i, &number);
-            return fcsl_sim_fail(error, "the function of event `%s` of `%s` is no number at %.9f s",
-                                 instance->model->events[number].name, instance->name, t);
+            return fcsl_fail(error, "the function of event `%s` of `%s` is no number at %.9f s",
+                             instance->model->events[number].name, instance->name, t);
         }
     }
     return 0;
@@ -171,11 +171,11 @@ static int check_chatter(fcsl_group_t *group, uint32_t event, fcsl_error_t *erro
     }
     uint32_t number = 0;
     const fcsl_instance_state_t *instance = instance_of(group, event, &number);
-    return fcsl_sim_fail(error,
-                         "chattering at %.9f s: event `%s` of `%s` is the last of %u in a row, each at most %u ns "
-                         "after the one before; let `reset` change a state that ends this, such as a ball at rest",
-                         (double)state->time_ns / FCSL_NS_PER_S, instance->model->events[number].name, instance->name,
-                         FCSL_CHATTER_EVENTS, FCSL_CHATTER_NS);
+    return fcsl_fail(error,
+                     "chattering at %.9f s: event `%s` of `%s` is the last of %u in a row, each at most %u ns "
+                     "after the one before; let `reset` change a state that ends this, such as a ball at rest",
+                     (double)state->time_ns / FCSL_NS_PER_S, instance->model->events[number].name, instance->name,
+                     FCSL_CHATTER_EVENTS, FCSL_CHATTER_NS);
 }
 
 static int reset(fcsl_group_t *group, uint32_t event, fcsl_error_t *error)

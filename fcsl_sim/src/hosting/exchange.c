@@ -8,7 +8,7 @@
 
 #include <string.h>
 
-#include "base/fail.h"
+#include "fcsl/fcsl_error.h"
 #include "engine/tick.h"
 #include "external_controller.h"
 #include "fcsl/fcsl_monotonic.h"
@@ -46,7 +46,7 @@ static int ask_machine(fcsl_sim_t *sim, fcsl_message_t *message, fcsl_error_t *e
         return -1;
     }
     if (fcsl_run_actuate_message(sim->run, sim->message_bytes, sim->message_capacity, message) != 0) {
-        return fcsl_sim_fail(error, "an actuator channel holds what its type does not have: there is no message of it");
+        return fcsl_fail(error, "an actuator channel holds what its type does not have: there is no message of it");
     }
     return 0;
 }

@@ -7,35 +7,34 @@
 #include <string.h>
 
 #include "fcsl/fcsl_external.h"
-#include "base/fail.h"
+#include "fcsl/fcsl_error.h"
 
 int fcsl_sim_external_failed(const fcsl_sim_t *sim, fcsl_hal_status_t status, const char *doing, fcsl_error_t *error)
 {
     const unsigned long long tick = sim->tick;
     if (status == FCSL_HAL_NONE) {
-        return fcsl_sim_fail(error, "interrupted at tick %llu", tick);
+        return fcsl_fail(error, "interrupted at tick %llu", tick);
     }
-    return fcsl_sim_fail(error, "tick %llu: %s: %s", tick, doing, fcsl_external_explain(sim->external));
+    return fcsl_fail(error, "tick %llu: %s: %s", tick, doing, fcsl_external_explain(sim->external));
 }
 
 int fcsl_sim_listen(fcsl_sim_t *sim, const char *peer, const char *name_space, uint32_t timeout_ms, fcsl_error_t *error)
 {
     static const char WIRE[] = "wire:";
     const size_t prefix = sizeof WIRE - 1u;
-    char text[sizeof error->text] = "";
     if (sim->external || sim->tick || sim->sensed || sim->recording) {
-        return fcsl_sim_fail(error, "a controller must connect before the first tick, once, and records itself");
+        return fcsl_fail(error, "a controller must connect before the first tick, once, and records itself");
     }
     if (sim->reads_fields || sim->write_count > 0) {
-        return fcsl_sim_fail(
-            error, "fields of the machine are connected: only channels reach a controller in another process");
+        return fcsl_fail(error,
+                         "fields of the machine are connected: only channels reach a controller in another process");
     }
     const int failed = strncmp(peer, WIRE, prefix) == 0
-                           ? fcsl_external_open(peer + prefix, sim->machine, &sim->external, text, sizeof text)
-                           : fcsl_external_open_bus(peer, name_space, sim->machine, &sim->external, text, sizeof text);
+                           ? fcsl_external_open(peer + prefix, sim->machine, &sim->external, error)
+                           : fcsl_external_open_bus(peer, name_space, sim->machine, &sim->external, error);
     if (failed) {
         sim->external = NULL;
-        return fcsl_sim_fail(error, "%s", text);
+        return -1;
     }
     sim->external_timeout_ms = timeout_ms;
     return 0;
@@ -44,7 +43,7 @@ int fcsl_sim_listen(fcsl_sim_t *sim, const char *peer, const char *name_space, u
 int fcsl_sim_accept(fcsl_sim_t *sim, uint32_t wait_ms, fcsl_error_t *error)
 {
     if (!sim->external || sim->tick) {
-        return fcsl_sim_fail(error, "nothing listens for a controller, or it has connected already");
+        return fcsl_fail(error, "nothing listens for a controller, or it has connected already");
     }
     if (fcsl_external_runs_free(sim->external)) {
         return 0;
@@ -54,9 +53,9 @@ int fcsl_sim_accept(fcsl_sim_t *sim, uint32_t wait_ms, fcsl_error_t *error)
         return 0;
     }
     if (status == FCSL_HAL_NONE) {
-        return fcsl_sim_fail(error, "interrupted while waiting for a controller");
+        return fcsl_fail(error, "interrupted while waiting for a controller");
     }
-    (void)fcsl_sim_fail(error, "no controller: %s", fcsl_external_explain(sim->external));
+    (void)fcsl_fail(error, "no controller: %s", fcsl_external_explain(sim->external));
     return status == FCSL_HAL_TIMEOUT ? 1 : -1;
 }
 

@@ -4,7 +4,7 @@
  */
 #define _POSIX_C_SOURCE 200809L
 #include "base/clock.h"
-#include "base/fail.h"
+#include "fcsl/fcsl_error.h"
 #include "engine/tick.h"
 #include "engine/tick_pacing.h"
 #include "external_controller.h"
@@ -15,7 +15,7 @@ static int ask(fcsl_sim_t *sim, fcsl_error_t *error)
 {
     fcsl_message_t sensors;
     if (!sim->external || fcsl_external_runs_free(sim->external)) {
-        return fcsl_sim_fail(error, "only simulations in lock-step with an external controller run together");
+        return fcsl_fail(error, "only simulations in lock-step with an external controller run together");
     }
     if (fcsl_sim_sense_message(sim, sim->message_bytes, sim->message_capacity, &sensors, error)) {
         return -1;

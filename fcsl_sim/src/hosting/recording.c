@@ -6,7 +6,7 @@
 
 #include <stdio.h>
 
-#include "base/fail.h"
+#include "fcsl/fcsl_error.h"
 #include "output/truth_messages.h"
 
 int fcsl_sim_record_truth(fcsl_sim_t *sim, const fcsl_instance_state_t *instance, const fcsl_truth_t *truth,
@@ -23,7 +23,7 @@ static int add_truth_topic(fcsl_sim_t *sim, const char *name, fcsl_truth_t *trut
     char topic[512];
     const int bytes = snprintf(topic, sizeof topic, "%s%s/sim/%s", name_space[0] ? "/" : "", name_space, name);
     if (bytes < 0 || (size_t)bytes >= sizeof topic) {
-        return fcsl_sim_fail(error, "the name of a topic is too long: /%s/sim/%s", name_space, name);
+        return fcsl_fail(error, "the name of a topic is too long: /%s/sim/%s", name_space, name);
     }
     truth->topic = fcsl_run_record_add_topic(sim->run, topic, truth->type, truth->schema, error);
     return truth->topic < 0 ? -1 : 0;
@@ -36,7 +36,7 @@ static int record_companion(const fcsl_companion_t *companion, const char *bag, 
     char path[4096];
     const int bytes = snprintf(path, sizeof path, "%s_%s", bag, companion->name);
     if (bytes < 0 || (size_t)bytes >= sizeof path) {
-        return fcsl_sim_fail(error, "the name of a bag is too long: %s_%s", bag, companion->name);
+        return fcsl_fail(error, "the name of a bag is too long: %s_%s", bag, companion->name);
     }
     const fcsl_record_options_t options = {.bag = path, .name_space = name_space, .lossless = 1};
     return fcsl_run_record(companion->run, &options, error);
@@ -45,7 +45,7 @@ static int record_companion(const fcsl_companion_t *companion, const char *bag, 
 int fcsl_sim_record(fcsl_sim_t *sim, const char *bag, const char *name_space, fcsl_error_t *error)
 {
     if (sim->sensed || sim->external) {
-        return fcsl_sim_fail(error, "recording must begin between two ticks, with the controller in this process");
+        return fcsl_fail(error, "recording must begin between two ticks, with the controller in this process");
     }
     const fcsl_record_options_t options = {.bag = bag, .name_space = name_space, .lossless = 1};
     if (fcsl_run_record(sim->run, &options, error)) {

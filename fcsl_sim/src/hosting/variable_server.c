@@ -10,7 +10,7 @@
 #include <string.h>
 
 #include "fcsl/fcsl_scalar.h"
-#include "base/fail.h"
+#include "fcsl/fcsl_error.h"
 #include "engine/tick_pacing.h"
 #include "exchange.h"
 #include "output/publish.h"
@@ -60,7 +60,7 @@ static fcsl_vars_status_t run_ticks(void *ctx, uint64_t count, fcsl_error_t *err
     }
     for (uint64_t i = 0; i < count; i++) {
         if (sim->status != FCSL_SIM_RUNNING || sim->service_failed) {
-            (void)fcsl_sim_fail(error, "the simulation is over");
+            (void)fcsl_fail(error, "the simulation is over");
             return FCSL_VARS_ENDED;
         }
         if (fcsl_sim_tick_once(sim, error)) {
@@ -98,7 +98,7 @@ int fcsl_sim_serve(fcsl_sim_t *sim, const char *address, const char *token, cons
                    fcsl_error_t *error)
 {
     if (sim->service || sim->tick || sim->sensed) {
-        return fcsl_sim_fail(error, "variables are served from before the first tick, on one address");
+        return fcsl_fail(error, "variables are served from before the first tick, on one address");
     }
     if (fcsl_sim_publish_begin(sim, error)) {
         return -1;
@@ -106,13 +106,13 @@ int fcsl_sim_serve(fcsl_sim_t *sim, const char *address, const char *token, cons
     struct fcsl_sim_service *service = calloc(1, sizeof *service);
     sim->service = service;
     if (!service) {
-        return fcsl_sim_fail(error, "no memory for the variable server");
+        return fcsl_fail(error, "no memory for the variable server");
     }
     sim->pace.paused = paused;
     service->snapshot = fcsl_sim_snapshot_open(sim);
     if (!service->snapshot) {
         fcsl_sim_end_service(sim);
-        return fcsl_sim_fail(error, "no memory for a checkpoint of the simulation");
+        return fcsl_fail(error, "no memory for a checkpoint of the simulation");
     }
     fcsl_sim_publish(sim);
     const struct fcsl_sim_published *published = sim->published;

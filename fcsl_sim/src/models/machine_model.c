@@ -8,7 +8,7 @@
 #include <string.h>
 
 #include "fcsl/fcsl_hw.h"
-#include "base/fail.h"
+#include "fcsl/fcsl_error.h"
 #include "model.h"
 
 struct fcsl_machine_model {
@@ -47,7 +47,7 @@ fcsl_machine_model_t *fcsl_machine_model_open(const char *library, const char *m
 {
     fcsl_machine_model_t *model = calloc(1, sizeof *model);
     if (!model) {
-        (void)fcsl_sim_fail(error, "no memory for the model `%s`", machine);
+        (void)fcsl_fail(error, "no memory for the model `%s`", machine);
         return NULL;
     }
     model->run = fcsl_run_open(library, machine, error);
@@ -55,10 +55,10 @@ fcsl_machine_model_t *fcsl_machine_model_open(const char *library, const char *m
     model->fields = model->run ? calloc(model->machine->field_count + 1u, sizeof *model->fields) : NULL;
     if (!model->fields || model->machine->instance_count != 1u) {
         if (model->fields) {
-            (void)fcsl_sim_fail(error, "machine `%s` has %u instances; as a model it has one", machine,
-                                model->machine->instance_count);
+            (void)fcsl_fail(error, "machine `%s` has %u instances; as a model it has one", machine,
+                            model->machine->instance_count);
         } else if (model->run) {
-            (void)fcsl_sim_fail(error, "no memory for the model `%s`", machine);
+            (void)fcsl_fail(error, "no memory for the model `%s`", machine);
         }
         fcsl_machine_model_close(model);
         return NULL;
@@ -99,7 +99,7 @@ const fcsl_model_t *fcsl_machine_model_of(const fcsl_machine_model_t *model)
 
 int fcsl_machine_model_init(const fcsl_machine_model_t *model, void *self, fcsl_error_t *error)
 {
-    return model->machine->init(self) == 0 ? 0 : fcsl_sim_fail(error, "`start` of `%s` faults", model->machine->name);
+    return model->machine->init(self) == 0 ? 0 : fcsl_fail(error, "`start` of `%s` faults", model->machine->name);
 }
 
 int fcsl_machine_model_takes(const fcsl_machine_model_t *model, const void *self)

@@ -9,7 +9,7 @@
 
 #include "fcsl/fcsl_library.h"
 #include "fcsl/fcsl_scalar.h"
-#include "base/fail.h"
+#include "fcsl/fcsl_error.h"
 
 /* A longer table counts as one without its null terminator. */
 #define MAX_MODELS_PER_LIBRARY 256
@@ -234,28 +234,28 @@ int fcsl_model_check(const fcsl_model_t *model, const char *library, fcsl_error_
 {
     const char *wrong = check_descriptor(model);
     if (wrong) {
-        return fcsl_sim_fail(error, "%s: model `%s`: %s", library, model->name, wrong);
+        return fcsl_fail(error, "%s: model `%s`: %s", library, model->name, wrong);
     }
     for (uint32_t i = 0; i < model->field_count; i++) {
         const fcsl_field_t *field = &model->fields[i];
         if (!field->path) {
-            return fcsl_sim_fail(error, "%s: model `%s`: field %u has no path", library, model->name, i);
+            return fcsl_fail(error, "%s: model `%s`: field %u has no path", library, model->name, i);
         }
         wrong = check_field(model, field);
         if (wrong) {
-            return fcsl_sim_fail(error, "%s: model `%s`: field `%s`: %s", library, model->name, field->path, wrong);
+            return fcsl_fail(error, "%s: model `%s`: field `%s`: %s", library, model->name, field->path, wrong);
         }
         if (fcsl_model_field(model, field->path) != field) {
-            return fcsl_sim_fail(error, "%s: model `%s`: field `%s` is there twice", library, model->name, field->path);
+            return fcsl_fail(error, "%s: model `%s`: field `%s` is there twice", library, model->name, field->path);
         }
         const fcsl_field_t *other = same_member(model, i);
         if (other) {
-            return fcsl_sim_fail(error, "%s: model `%s`: `%s` and `%s` have the same name in a message", library,
-                                 model->name, other->path, field->path);
+            return fcsl_fail(error, "%s: model `%s`: `%s` and `%s` have the same name in a message", library,
+                             model->name, other->path, field->path);
         }
     }
     wrong = check_places(model);
-    return wrong ? fcsl_sim_fail(error, "%s: model `%s`: %s", library, model->name, wrong) : 0;
+    return wrong ? fcsl_fail(error, "%s: model `%s`: %s", library, model->name, wrong) : 0;
 }
 
 static const fcsl_model_t *find_model(const fcsl_model_t *const *models, const char *library, const char *name,
@@ -265,8 +265,8 @@ static const fcsl_model_t *find_model(const fcsl_model_t *const *models, const c
     for (uint32_t i = 0; i < MAX_MODELS_PER_LIBRARY && models[i]; i++) {
         const fcsl_model_t *model = models[i];
         if (model->abi_version != FCSL_MODEL_ABI_VERSION) {
-            (void)fcsl_sim_fail(error, "%s: model ABI %u, this simulator has %u: compile the model again", library,
-                                model->abi_version, FCSL_MODEL_ABI_VERSION);
+            (void)fcsl_fail(error, "%s: model ABI %u, this simulator has %u: compile the model again", library,
+                            model->abi_version, FCSL_MODEL_ABI_VERSION);
             return NULL;
         }
         if (!model->name) {
@@ -278,7 +278,7 @@ static const fcsl_model_t *find_model(const fcsl_model_t *const *models, const c
         const size_t used = strlen(names);
         (void)snprintf(names + used, sizeof names - used, "%s`%s`", used ? ", " : "", model->name);
     }
-    (void)fcsl_sim_fail(error, "%s: no model `%s` in it (it has %s)", library, name, names[0] ? names : "none");
+    (void)fcsl_fail(error, "%s: no model `%s` in it (it has %s)", library, name, names[0] ? names : "none");
     return NULL;
 }
 
@@ -291,7 +291,7 @@ const fcsl_model_t *fcsl_model_load(const char *library, const char *name, void 
     const fcsl_model_t *const *models = dlsym(*handle, "fcsl_models");
     const fcsl_model_t *model = NULL;
     if (!models) {
-        (void)fcsl_sim_fail(error, "%s: not a model library (it does not export fcsl_models)", library);
+        (void)fcsl_fail(error, "%s: not a model library (it does not export fcsl_models)", library);
     } else {
         model = find_model(models, library, name, error);
     }

@@ -11,7 +11,7 @@
 #include "fcsl/fcsl_scalar.h"
 #include "base/aligned_memory.h"
 #include "base/clock.h"
-#include "base/fail.h"
+#include "fcsl/fcsl_error.h"
 #include "base/scalar_bits.h"
 #include "connections.h"
 #include "engine/actuators.h"
@@ -36,10 +36,10 @@ static int build_machine(fcsl_sim_t *sim, fcsl_error_t *error)
         return -1;
     }
     if (machine->tick_hz == 0) {
-        return fcsl_sim_fail(error, "plan line %u: the machine does not tick", plan->machine.line);
+        return fcsl_fail(error, "plan line %u: the machine does not tick", plan->machine.line);
     }
     if (plan->ticks / machine->tick_hz > FCSL_PLAN_MAX_SECONDS) {
-        return fcsl_sim_fail(error, "plan line %u: more than %u s", plan->ticks_line, FCSL_PLAN_MAX_SECONDS);
+        return fcsl_fail(error, "plan line %u: more than %u s", plan->ticks_line, FCSL_PLAN_MAX_SECONDS);
     }
     const size_t sensors = fcsl_message_capacity(machine, FCSL_SENSOR_MESSAGE);
     const size_t actuators = fcsl_message_capacity(machine, FCSL_ACTUATOR_MESSAGE);
@@ -48,7 +48,7 @@ static int build_machine(fcsl_sim_t *sim, fcsl_error_t *error)
     sim->image = fcsl_sim_allocate(machine->size, machine->align);
     sim->select = calloc(machine->channel_count + 1u, 1);
     if (!sim->message_bytes || !sim->image || !sim->select) {
-        return fcsl_sim_fail(error, "no memory for the channels");
+        return fcsl_fail(error, "no memory for the channels");
     }
     return 0;
 }
@@ -58,7 +58,7 @@ static int build_companions(fcsl_sim_t *sim, fcsl_error_t *error)
     const fcsl_plan_t *plan = &sim->plan;
     sim->companions = calloc(plan->companion_count + 1u, sizeof *sim->companions);
     if (!sim->companions || fcsl_delay_open(&sim->delay, plan->delay_ticks, sim->message_capacity)) {
-        return fcsl_sim_fail(error, "no memory for the controllers");
+        return fcsl_fail(error, "no memory for the controllers");
     }
     sim->companion_count = plan->companion_count;
     for (uint32_t i = 0; i < plan->companion_count; i++) {
@@ -76,7 +76,7 @@ static int build_models(fcsl_sim_t *sim, fcsl_error_t *error)
     sim->models = calloc(plan->model_count + 1u, sizeof *sim->models);
     sim->machine_models = calloc(plan->model_count + 1u, sizeof(fcsl_machine_model_t *));
     if (!sim->handles || !sim->models || !sim->machine_models) {
-        return fcsl_sim_fail(error, "no memory for the models");
+        return fcsl_fail(error, "no memory for the models");
     }
     for (uint32_t i = 0; i < plan->model_count; i++) {
         const fcsl_plan_library_t *from = &plan->models[i];
@@ -122,7 +122,7 @@ static int build_instance(fcsl_sim_t *sim, uint32_t index, fcsl_error_t *error)
     instance->next_update_ns = from->hz > 0 ? fcsl_grid_time_ns(from->phase, from->hz) : INT64_MAX;
     instance->data = fcsl_sim_allocate(instance->model->size, instance->model->align);
     if (!instance->data) {
-        return fcsl_sim_fail(error, "no memory for instance `%s`", from->name);
+        return fcsl_fail(error, "no memory for instance `%s`", from->name);
     }
     fcsl_noise_seed(&instance->noise, plan->seed, from->name);
     return instance->machine ? fcsl_machine_model_init(instance->machine, instance->data, error) : 0;
@@ -133,7 +133,7 @@ static int build_instances(fcsl_sim_t *sim, fcsl_error_t *error)
     const uint32_t count = sim->plan.instance_count;
     sim->plant.instances = calloc(count + 1u, sizeof *sim->plant.instances);
     if (!sim->plant.instances) {
-        return fcsl_sim_fail(error, "no memory for the instances");
+        return fcsl_fail(error, "no memory for the instances");
     }
     sim->plant.instance_count = count;
     for (uint32_t i = 0; i < count; i++) {
@@ -190,7 +190,7 @@ static int sort_events(fcsl_sim_t *sim, fcsl_error_t *error)
     const uint32_t count = sim->plan.event_count;
     timed_t *order = calloc(count + 1u, sizeof *order);
     if (!order) {
-        return fcsl_sim_fail(error, "no memory for the events");
+        return fcsl_fail(error, "no memory for the events");
     }
     for (uint32_t i = 0; i < count; i++) {
         order[i] = (timed_t){sim->plan.events[i].time_ns, i};
@@ -216,7 +216,7 @@ static int build_writes(fcsl_sim_t *sim, fcsl_error_t *error)
     sim->events = calloc(plan->event_count + 1u, sizeof *sim->events);
     sim->event_order = calloc(plan->event_count + 1u, sizeof *sim->event_order);
     if (!sim->events || !sim->event_order) {
-        return fcsl_sim_fail(error, "no memory for the events");
+        return fcsl_fail(error, "no memory for the events");
     }
     for (uint32_t i = 0; i < plan->event_count; i++) {
         if (build_write(sim, &plan->events[i], &sim->events[i], error)) {
@@ -261,7 +261,7 @@ static int build_link(fcsl_sim_t *sim, fcsl_error_t *error)
             sim->link_instance = i;
             sim->link = fcsl_sim_link_open(fcsl_run_channels(sim->run), (fcsl_serial_link_t *)(void *)instance->data,
                                            &instance->noise, fcsl_sim_take_command, sim);
-            return sim->link ? 0 : fcsl_sim_fail(error, "no memory for the serial link");
+            return sim->link ? 0 : fcsl_fail(error, "no memory for the serial link");
         }
     }
     return wanted->name ? fcsl_sim_fail_line(error, wanted->line, "no instance of " FCSL_SERIAL_LINK_NAME, wanted->name)

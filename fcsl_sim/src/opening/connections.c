@@ -7,7 +7,7 @@
 #include <stdlib.h>
 #include <string.h>
 
-#include "base/fail.h"
+#include "fcsl/fcsl_error.h"
 #include "fcsl/fcsl_channels.h"
 #include "plan_names.h"
 
@@ -30,8 +30,8 @@ static int check_pair(const fcsl_plan_link_t *link, const fcsl_field_t *from, co
     if (same_kind(from, to)) {
         return 0;
     }
-    return fcsl_sim_fail(error, "plan line %u: `%s` and `%s` differ in type, shape or unit", link->line,
-                         link->from_field, link->to_field);
+    return fcsl_fail(error, "plan line %u: `%s` and `%s` differ in type, shape or unit", link->line, link->from_field,
+                     link->to_field);
 }
 
 /* The companion of this name; null: the first controller. Returns 0, or -1. */
@@ -162,7 +162,7 @@ static int build_copies(fcsl_sim_t *sim, fcsl_error_t *error)
     sim->plant.copies =
         calloc(plan->link_count + plan->actuator_count + plan->read_count + 1u, sizeof *sim->plant.copies);
     if (!sim->plant.copies) {
-        return fcsl_sim_fail(error, "no memory for the connections");
+        return fcsl_fail(error, "no memory for the connections");
     }
     for (uint32_t i = 0; i < plan->link_count; i++) {
         if (add_copy(sim, &plan->links[i], 0, error)) {
@@ -256,7 +256,7 @@ static int build_sensors(fcsl_sim_t *sim, fcsl_error_t *error)
         is_memory = is_memory && sim->companions[i].sensors != NULL;
     }
     if (!is_memory) {
-        return fcsl_sim_fail(error, "no memory for the sensors");
+        return fcsl_fail(error, "no memory for the sensors");
     }
     for (uint32_t i = 0; i < plan->sensor_count; i++) {
         if (add_sensor(sim, &plan->sensors[i], error)) {
@@ -277,7 +277,7 @@ static int build_field_writes(fcsl_sim_t *sim, fcsl_error_t *error)
     const fcsl_plan_t *plan = &sim->plan;
     sim->writes = calloc(plan->write_count + 1u, sizeof *sim->writes);
     if (!sim->writes) {
-        return fcsl_sim_fail(error, "no memory for the connections");
+        return fcsl_fail(error, "no memory for the connections");
     }
     for (uint32_t i = 0; i < plan->write_count; i++) {
         const fcsl_plan_link_t *link = &plan->writes[i];

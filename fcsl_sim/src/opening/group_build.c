@@ -6,7 +6,7 @@
 
 #include <stdlib.h>
 
-#include "base/fail.h"
+#include "fcsl/fcsl_error.h"
 #include "plan_names.h"
 
 /* ---- calls ----------------------------------------------------------------------------------------------------------- */
@@ -16,10 +16,10 @@ static int check_call(const fcsl_sim_t *sim, const fcsl_plan_call_t *from, const
     const fcsl_model_t *model = sim->plant.instances[call->instance].model;
     const int is_there = call->kind == FCSL_CALL_UPDATE ? model->update != NULL : model->output != NULL;
     if (!is_there) {
-        return fcsl_sim_fail(error, "plan line %u: model `%s` has no such function", from->line, model->name);
+        return fcsl_fail(error, "plan line %u: model `%s` has no such function", from->line, model->name);
     }
     if (call->kind == FCSL_CALL_STAGE && sim->plant.instances[call->instance].group == FCSL_PLAN_NO_GROUP) {
-        return fcsl_sim_fail(error, "plan line %u: `%s` is in no group", from->line, from->instance);
+        return fcsl_fail(error, "plan line %u: `%s` is in no group", from->line, from->instance);
     }
     return 0;
 }
@@ -37,8 +37,8 @@ static int check_complete(const fcsl_sim_t *sim, fcsl_error_t *error)
             updates += is_here && sim->plant.calls[k].kind == FCSL_CALL_UPDATE;
         }
         if ((model->output != NULL && outputs == 0) || (model->update != NULL && updates != 1u)) {
-            return fcsl_sim_fail(error, "plan line %u: `%s` is not called as its model needs it",
-                                 sim->plan.instances[i].line, sim->plant.instances[i].name);
+            return fcsl_fail(error, "plan line %u: `%s` is not called as its model needs it",
+                             sim->plan.instances[i].line, sim->plant.instances[i].name);
         }
     }
     return 0;
@@ -49,7 +49,7 @@ static int build_calls(fcsl_sim_t *sim, fcsl_error_t *error)
     const fcsl_plan_t *plan = &sim->plan;
     sim->plant.calls = calloc(plan->call_count + 1u, sizeof *sim->plant.calls);
     if (!sim->plant.calls) {
-        return fcsl_sim_fail(error, "no memory for the order of evaluation");
+        return fcsl_fail(error, "no memory for the order of evaluation");
     }
     sim->plant.call_count = plan->call_count;
     for (uint32_t i = 0; i < plan->call_count; i++) {
@@ -87,8 +87,8 @@ static int add_members(fcsl_sim_t *sim, fcsl_group_t *group, uint32_t number, fc
             continue;
         }
         if (group->plan->method == FCSL_VERLET && model->continuous_count > 0 && !model->is_second_order) {
-            return fcsl_sim_fail(error, "plan line %u: model `%s` declares no positions and velocities for verlet",
-                                 group->plan->line, model->name);
+            return fcsl_fail(error, "plan line %u: model `%s` declares no positions and velocities for verlet",
+                             group->plan->line, model->name);
         }
         if (model->continuous_count > 0) {
             group->blocks[group->derived_count] = model->continuous_count;
@@ -203,7 +203,7 @@ static int build_group(fcsl_sim_t *sim, uint32_t number, fcsl_error_t *error)
     group->companions = calloc(sim->companion_count + 1u, sizeof *group->companions);
     if (!group->derived || !group->blocks || !group->eventful || !group->timed || !group->sampling ||
         !group->announcing || !group->companions || !group->stages || !group->outputs || !group->outer) {
-        return fcsl_sim_fail(error, "no memory for a group of models");
+        return fcsl_fail(error, "no memory for a group of models");
     }
     add_calls(sim, group, number);
     if (add_members(sim, group, number, error)) {
@@ -217,7 +217,7 @@ static int build_group(fcsl_sim_t *sim, uint32_t number, fcsl_error_t *error)
     group->crossing = calloc(group->event_count + 1u, 1);
     group->fired = calloc(group->event_count + 1u, 1);
     if (!group->crossing || !group->fired) {
-        return fcsl_sim_fail(error, "no memory for events");
+        return fcsl_fail(error, "no memory for events");
     }
     add_crossings(sim, group);
     return fcsl_group_open(group, &sim->plant, error);
@@ -233,7 +233,7 @@ static int build_tolerances(fcsl_sim_t *sim, fcsl_error_t *error)
         }
         const fcsl_instance_state_t *instance = &sim->plant.instances[index];
         if (tolerance->state >= instance->model->continuous_count) {
-            return fcsl_sim_fail(error, "plan line %u: `%s` has no such state", tolerance->line, tolerance->instance);
+            return fcsl_fail(error, "plan line %u: `%s` has no such state", tolerance->line, tolerance->instance);
         }
         sim->groups[instance->group].atol[instance->first_state + tolerance->state] = tolerance->atol;
     }
@@ -247,7 +247,7 @@ int fcsl_sim_build_groups(fcsl_sim_t *sim, fcsl_error_t *error)
     }
     sim->groups = calloc(sim->plan.group_count + 1u, sizeof *sim->groups);
     if (!sim->groups) {
-        return fcsl_sim_fail(error, "no memory for the groups of models");
+        return fcsl_fail(error, "no memory for the groups of models");
     }
     sim->group_count = sim->plan.group_count;
     for (uint32_t i = 0; i < sim->group_count; i++) {

@@ -6,7 +6,7 @@
 
 #include "fcsl/fcsl_fp_mode.h"
 #include "assembly.h"
-#include "base/fail.h"
+#include "fcsl/fcsl_error.h"
 #include "checkpoints/plant_state.h"
 #include "engine/crash_handler.h"
 #include "engine/instants.h"
@@ -27,7 +27,7 @@ static int init_models(fcsl_sim_t *sim, fcsl_error_t *error)
             return -1;
         }
         if (wrong) {
-            return fcsl_sim_fail(error, "instance `%s`: %s", instance->name, fcsl_sim_init_reason(wrong));
+            return fcsl_fail(error, "instance `%s`: %s", instance->name, fcsl_sim_init_reason(wrong));
         }
         if (fcsl_sim_check_contract(&sim->plant, i, error) || fcsl_sim_check_prototypes(&sim->plant, i, error)) {
             return -1;
@@ -53,7 +53,7 @@ static int start_models(fcsl_sim_t *sim, fcsl_error_t *error)
 static int fill_queue(fcsl_sim_t *sim, fcsl_error_t *error)
 {
     if (fcsl_event_queue_init(&sim->queue, sim->plant.instance_count + sim->companion_count + 1u)) {
-        return fcsl_sim_fail(error, "no memory for the event queue");
+        return fcsl_fail(error, "no memory for the event queue");
     }
     fcsl_sim_refill_queue(sim);
     size_t vectors = 1;
@@ -63,7 +63,7 @@ static int fill_queue(fcsl_sim_t *sim, fcsl_error_t *error)
     }
     sim->group_scratch = calloc(vectors, sizeof *sim->group_scratch);
     sim->before = malloc(fcsl_plant_state_bytes(sim) + 1u);
-    return sim->group_scratch && sim->before ? 0 : fcsl_sim_fail(error, "no memory for checkpoints");
+    return sim->group_scratch && sim->before ? 0 : fcsl_fail(error, "no memory for checkpoints");
 }
 
 static int attach(fcsl_sim_t *sim, fcsl_error_t *error)
@@ -80,7 +80,7 @@ fcsl_sim_t *fcsl_sim_open(const char *plan, size_t size, fcsl_error_t *error)
 {
     fcsl_sim_t *sim = calloc(1, sizeof *sim);
     if (!sim) {
-        (void)fcsl_sim_fail(error, "no memory for a simulation");
+        (void)fcsl_fail(error, "no memory for a simulation");
         return NULL;
     }
     fcsl_sim_is_open(&sim->plant, 1);

@@ -6,12 +6,12 @@
 
 #include <string.h>
 
-#include "base/fail.h"
+#include "fcsl/fcsl_error.h"
 #include "models/model.h"
 
 int fcsl_sim_fail_line(fcsl_error_t *error, uint32_t line, const char *what, const char *name)
 {
-    return fcsl_sim_fail(error, "plan line %u: %s `%s`", line, what, name);
+    return fcsl_fail(error, "plan line %u: %s `%s`", line, what, name);
 }
 
 int fcsl_sim_find_instance(const fcsl_plant_t *plant, uint32_t line, const char *name, uint32_t *index,
@@ -34,7 +34,7 @@ const fcsl_field_t *fcsl_sim_find_field(const fcsl_plant_t *plant, uint32_t line
     }
     const fcsl_field_t *field = fcsl_model_field(plant->instances[*index].model, path);
     if (!field) {
-        (void)fcsl_sim_fail(error, "plan line %u: instance `%s` has no field `%s`", line, name, path);
+        (void)fcsl_fail(error, "plan line %u: instance `%s` has no field `%s`", line, name, path);
     }
     return field;
 }

@@ -12,7 +12,7 @@
 #include <string.h>
 
 #include "fcsl/fcsl_sim.h"
-#include "base/fail.h"
+#include "fcsl/fcsl_error.h"
 #include "models/model.h"
 
 typedef struct {

@@ -3,16 +3,16 @@
  * The hosted machine's channels on a bus of their own (fcsl_observers.h). Its thread reads the published data; no tick waits
  * for it.
  */
-#include "base/fail.h"
+#include "fcsl/fcsl_error.h"
 #include "publish.h"
 
 int fcsl_sim_observers(fcsl_sim_t *sim, const char *endpoint, const char *name_space, fcsl_error_t *error)
 {
     if (sim->external) {
-        return fcsl_sim_fail(error, "with an external controller its channels are there: give `--observers` to it");
+        return fcsl_fail(error, "with an external controller its channels are there: give `--observers` to it");
     }
     if (sim->observers || sim->service || sim->tick || sim->sensed) {
-        return fcsl_sim_fail(error, "observers come before variables are served and before the first tick");
+        return fcsl_fail(error, "observers come before variables are served and before the first tick");
     }
     if (fcsl_sim_publish_begin(sim, error)) {
         return -1;

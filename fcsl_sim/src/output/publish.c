@@ -8,7 +8,7 @@
 #include <string.h>
 
 #include "fcsl/fcsl_journal.h"
-#include "base/fail.h"
+#include "fcsl/fcsl_error.h"
 
 enum { HISTORY_SLOTS = 64, WRITER_BYTES = 256 };
 
@@ -125,18 +125,18 @@ static int check_names(const fcsl_sim_t *sim, fcsl_error_t *error)
             taken = taken || strcmp(name, sim->machine->instances[m].name) == 0;
         }
         if (taken) {
-            return fcsl_sim_fail(error,
-                                 "model instance `%s` is named like a part of the machine: rename it, so that "
-                                 "its variables can be served",
-                                 name);
+            return fcsl_fail(error,
+                             "model instance `%s` is named like a part of the machine: rename it, so that "
+                             "its variables can be served",
+                             name);
         }
     }
     for (uint32_t m = 0; m < sim->machine->instance_count && sim->actuators && !sim->external; m++) {
         if (strcmp(sim->machine->instances[m].name, sim->actuators->as_instance.name) == 0) {
-            return fcsl_sim_fail(error,
-                                 "the machine's instance `%s` is named like what the actuators get: rename it, so that "
-                                 "variables can be served",
-                                 sim->actuators->as_instance.name);
+            return fcsl_fail(error,
+                             "the machine's instance `%s` is named like what the actuators get: rename it, so that "
+                             "variables can be served",
+                             sim->actuators->as_instance.name);
         }
     }
     return 0;
@@ -148,7 +148,7 @@ int fcsl_sim_publish_begin(fcsl_sim_t *sim, fcsl_error_t *error)
         return 0;
     }
     if (sim->tick || sim->sensed) {
-        return fcsl_sim_fail(error, "variables are served and sent from before the first tick");
+        return fcsl_fail(error, "variables are served and sent from before the first tick");
     }
     if (check_names(sim, error)) {
         return -1;
@@ -156,7 +156,7 @@ int fcsl_sim_publish_begin(fcsl_sim_t *sim, fcsl_error_t *error)
     sim->published = calloc(1, sizeof *sim->published);
     if (!sim->published || allocate(sim, sim->published)) {
         fcsl_sim_publish_end(sim);
-        return fcsl_sim_fail(error, "no memory for the published variables");
+        return fcsl_fail(error, "no memory for the published variables");
     }
     fcsl_sim_publish(sim);
     return 0;

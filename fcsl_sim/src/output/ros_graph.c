@@ -2,16 +2,16 @@
  *
  * The hosted machine in a ROS 2 graph, by a bridge (fcsl_ros_graph.h). Its thread reads the published data; no tick waits for it.
  */
-#include "base/fail.h"
+#include "fcsl/fcsl_error.h"
 #include "publish.h"
 
 int fcsl_sim_ros(fcsl_sim_t *sim, const char *endpoint, const char *name_space, fcsl_error_t *error)
 {
     if (sim->external) {
-        return fcsl_sim_fail(error, "with an external controller its topics are there: give `--ros` to it");
+        return fcsl_fail(error, "with an external controller its topics are there: give `--ros` to it");
     }
     if (sim->ros || sim->service || sim->tick || sim->sensed) {
-        return fcsl_sim_fail(error, "ROS 2 topics come before variables are served and before the first tick");
+        return fcsl_fail(error, "ROS 2 topics come before variables are served and before the first tick");
     }
     if (fcsl_sim_publish_begin(sim, error)) {
         return -1;

@@ -9,7 +9,7 @@
 
 #include "fcsl/fcsl_scalar.h"
 #include "base/clock.h"
-#include "base/fail.h"
+#include "fcsl/fcsl_error.h"
 
 enum {
     CLOCK_BYTES = 12, /* encapsulation, s, ns */
@@ -62,7 +62,7 @@ static int no_memory(topic_t *topic, fcsl_error_t *error)
 {
     free(topic->head);
     free(topic->numbers);
-    return fcsl_sim_fail(error, "no memory for a topic");
+    return fcsl_fail(error, "no memory for a topic");
 }
 
 /* Owns what the topic points to, also when it fails. */

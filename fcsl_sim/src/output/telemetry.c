@@ -2,13 +2,13 @@
  *
  * The simulation's values as UDP (fcsl_telemetry.h). The sender's thread reads the published data; no tick waits for it.
  */
-#include "base/fail.h"
+#include "fcsl/fcsl_error.h"
 #include "publish.h"
 
 int fcsl_sim_telemetry(fcsl_sim_t *sim, const char *address, const char *fields, fcsl_error_t *error)
 {
     if (sim->telemetry || sim->service || sim->tick || sim->sensed) {
-        return fcsl_sim_fail(error, "telemetry begins before variables are served and before the first tick");
+        return fcsl_fail(error, "telemetry begins before variables are served and before the first tick");
     }
     if (fcsl_sim_publish_begin(sim, error)) {
         return -1;

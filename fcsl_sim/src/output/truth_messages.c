@@ -10,7 +10,7 @@
 #include "fcsl/fcsl_cdr.h"
 #include "fcsl/fcsl_scalar.h"
 #include "base/clock.h"
-#include "base/fail.h"
+#include "fcsl/fcsl_error.h"
 #include "base/scalar_bits.h"
 #include "models/model.h"
 
@@ -146,7 +146,7 @@ static int describe(const fcsl_sim_t *sim, const fcsl_instance_state_t *instance
     truth->type = build_type(instance->model->name);
     truth->schema = build_schema(instance->model);
     if (!truth->type || !truth->schema) {
-        return fcsl_sim_fail(error, "no memory for message types");
+        return fcsl_fail(error, "no memory for message types");
     }
     truth->size = (uint32_t)fcsl_truth_write(sim->plant.time_ns, instance, sim->truth_bytes, largest);
     return 0;
@@ -162,7 +162,7 @@ int fcsl_truth_build(fcsl_sim_t *sim, fcsl_error_t *error)
     sim->truths = calloc(sim->plant.instance_count + 1u, sizeof *sim->truths);
     sim->truth_bytes = malloc(largest);
     if (!sim->truths || !sim->truth_bytes) {
-        return fcsl_sim_fail(error, "no memory for messages");
+        return fcsl_fail(error, "no memory for messages");
     }
     for (uint32_t i = 0; i < sim->plant.instance_count; i++) {
         if (describe(sim, &sim->plant.instances[i], &sim->truths[i], largest, error)) {

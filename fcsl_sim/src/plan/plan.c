@@ -9,7 +9,7 @@
 #include <string.h>
 
 #include "fcsl/fcsl_plan_text.h"
-#include "base/fail.h"
+#include "fcsl/fcsl_error.h"
 
 #define MAX_WORDS 7
 
@@ -22,7 +22,7 @@ typedef struct {
 
 static int bad(const parser_t *parser, const char *what)
 {
-    return fcsl_sim_fail(parser->error, "plan line %u: %s", parser->line, what);
+    return fcsl_fail(parser->error, "plan line %u: %s", parser->line, what);
 }
 
 /* Cuts the line into `count` words; with `rest` the last takes the rest of the line (library paths may have spaces). */
@@ -460,26 +460,26 @@ static int count_statements(const char *text, uint32_t lines, uint32_t counts[ST
     for (uint32_t i = 1; i <= lines; i++, at += strlen(at) + 1) {
         if (i == 1) {
             if (strcmp(at, "fcsl-sim-plan 2") != 0) {
-                return fcsl_sim_fail(error, "plan line 1: not `fcsl-sim-plan 2`");
+                return fcsl_fail(error, "plan line 1: not `fcsl-sim-plan 2`");
             }
             continue;
         }
         if (strcmp(at, "end") == 0) {
             if (i != lines) {
-                return fcsl_sim_fail(error, "plan line %u: text after `end`", i + 1);
+                return fcsl_fail(error, "plan line %u: text after `end`", i + 1);
             }
             return 0;
         }
         const statement_t *statement = find_statement(at);
         if (!statement) {
-            return fcsl_sim_fail(error, "plan line %u: unknown statement", i);
+            return fcsl_fail(error, "plan line %u: unknown statement", i);
         }
         const uint32_t kind = (uint32_t)(statement - statements);
         if (++counts[kind] > statement->limit) {
-            return fcsl_sim_fail(error, "plan line %u: more than %u `%s`", i, statement->limit, statement->keyword);
+            return fcsl_fail(error, "plan line %u: more than %u `%s`", i, statement->limit, statement->keyword);
         }
     }
-    return fcsl_sim_fail(error, "plan line %u: the plan has no `end`: it is truncated", lines);
+    return fcsl_fail(error, "plan line %u: the plan has no `end`: it is truncated", lines);
 }
 
 static int allocate(fcsl_plan_t *plan, const uint32_t counts[STATEMENTS], fcsl_error_t *error)
@@ -501,7 +501,7 @@ static int allocate(fcsl_plan_t *plan, const uint32_t counts[STATEMENTS], fcsl_e
     if (!plan->companions || !plan->reads || !plan->writes || !plan->models || !plan->groups || !plan->instances ||
         !plan->tolerances || !plan->calls || !plan->sets || !plan->links || !plan->sensors || !plan->first_samples ||
         !plan->actuators || !plan->events) {
-        return fcsl_sim_fail(error, "no memory for the plan");
+        return fcsl_fail(error, "no memory for the plan");
     }
     return 0;
 }
@@ -513,29 +513,29 @@ static int check_complete(const fcsl_plan_t *plan, fcsl_error_t *error)
                           : !plan->ticks_line ? "ticks"
                                               : NULL;
     if (missing) {
-        return fcsl_sim_fail(error, "the plan has no `%s`", missing);
+        return fcsl_fail(error, "the plan has no `%s`", missing);
     }
     for (uint32_t i = 0; i < plan->companion_count; i++) {
         for (uint32_t j = 0; j < i; j++) {
             if (strcmp(plan->companions[i].name, plan->companions[j].name) == 0) {
-                return fcsl_sim_fail(error, "plan line %u: a second controller `%s`", plan->companions[i].line,
-                                     plan->companions[i].name);
+                return fcsl_fail(error, "plan line %u: a second controller `%s`", plan->companions[i].line,
+                                 plan->companions[i].name);
             }
         }
     }
     for (uint32_t i = 0; i < plan->model_count; i++) {
         for (uint32_t j = 0; j < i; j++) {
             if (strcmp(plan->models[i].name, plan->models[j].name) == 0) {
-                return fcsl_sim_fail(error, "plan line %u: a second model `%s`", plan->models[i].line,
-                                     plan->models[i].name);
+                return fcsl_fail(error, "plan line %u: a second model `%s`", plan->models[i].line,
+                                 plan->models[i].name);
             }
         }
     }
     for (uint32_t i = 0; i < plan->instance_count; i++) {
         for (uint32_t j = 0; j < i; j++) {
             if (strcmp(plan->instances[i].name, plan->instances[j].name) == 0) {
-                return fcsl_sim_fail(error, "plan line %u: a second instance `%s`", plan->instances[i].line,
-                                     plan->instances[i].name);
+                return fcsl_fail(error, "plan line %u: a second instance `%s`", plan->instances[i].line,
+                                 plan->instances[i].name);
             }
         }
     }
@@ -546,11 +546,11 @@ int fcsl_plan_parse(fcsl_plan_t *plan, const char *text, size_t size, fcsl_error
 {
     *plan = (fcsl_plan_t){0};
     if (size == 0 || size > FCSL_PLAN_MAX_BYTES) {
-        return fcsl_sim_fail(error, "the plan is empty or above 4 MiB");
+        return fcsl_fail(error, "the plan is empty or above 4 MiB");
     }
     plan->text = malloc(size + 1);
     if (!plan->text) {
-        return fcsl_sim_fail(error, "no memory for the plan");
+        return fcsl_fail(error, "no memory for the plan");
     }
     memcpy(plan->text, text, size);
     plan->text[size] = '\0';
@@ -559,7 +559,7 @@ int fcsl_plan_parse(fcsl_plan_t *plan, const char *text, size_t size, fcsl_error
     uint32_t counts[STATEMENTS] = {0};
     const char *wrong = fcsl_plan_cut_lines(plan->text, size, FCSL_PLAN_MAX_LINE, &lines);
     if (wrong != NULL) {
-        return fcsl_sim_fail(error, "plan line %u: %s", lines, wrong);
+        return fcsl_fail(error, "plan line %u: %s", lines, wrong);
     }
     if (count_statements(plan->text, lines, counts, error)) {
         return -1;

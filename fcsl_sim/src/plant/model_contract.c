@@ -11,7 +11,7 @@
 
 #include "fcsl/fcsl_scalar.h"
 #include "base/aligned_memory.h"
-#include "base/fail.h"
+#include "fcsl/fcsl_error.h"
 #include "value_names.h"
 
 typedef struct {
@@ -46,8 +46,8 @@ static int check_unchanged(const trial_t *trial, const char *function, int may_w
         if (trial->before[i] != trial->after[i] && !(may_write_outputs && is_output(model, i))) {
             char name[FCSL_VALUE_NAME_BYTES];
             fcsl_sim_name_value(trial->instance, i, name, sizeof name);
-            return fcsl_sim_fail(error, "`%s` of model `%s` changes %s%s; states change in `update` and `reset`",
-                                 function, model->name, name, may_write_outputs ? ", which is no output" : "");
+            return fcsl_fail(error, "`%s` of model `%s` changes %s%s; states change in `update` and `reset`", function,
+                             model->name, name, may_write_outputs ? ", which is no output" : "");
         }
     }
     return 0;
@@ -87,10 +87,10 @@ static int check_feedthrough(const trial_t *trial, fcsl_error_t *error)
         const fcsl_field_t *field = &model->fields[i];
         if (field->role == FCSL_ROLE_OUTPUT && (field->flags & FCSL_FIELD_FEEDTHROUGH) == 0 &&
             memcmp(trial->before + field->offset, trial->after + field->offset, field->size) != 0) {
-            return fcsl_sim_fail(error,
-                                 "model `%s`: `%s` depends on an input of the same instant, and is not declared so; "
-                                 "give it the role FCSL_ROLE_FEEDTHROUGH",
-                                 model->name, field->path);
+            return fcsl_fail(error,
+                             "model `%s`: `%s` depends on an input of the same instant, and is not declared so; "
+                             "give it the role FCSL_ROLE_FEEDTHROUGH",
+                             model->name, field->path);
         }
     }
     return 0;
@@ -140,8 +140,8 @@ static int call_both(const trial_t *trial, uint8_t *self, const double *x, uint6
     for (uint32_t i = 0; i < GUARDS; i++) {
         if (memcmp(&values[n + i], &mark, sizeof mark) != 0 ||
             memcmp(&events[model->event_count + i], &mark, sizeof mark) != 0) {
-            return fcsl_sim_fail(error, "`derivative` or `event` of model `%s` writes more values than the model has",
-                                 model->name);
+            return fcsl_fail(error, "`derivative` or `event` of model `%s` writes more values than the model has",
+                             model->name);
         }
     }
     return 0;
@@ -159,12 +159,12 @@ static int check_written(const trial_t *trial, const double *first, const double
         if (is_mark && i < n) {
             char name[FCSL_VALUE_NAME_BYTES];
             fcsl_sim_name_value(trial->instance, model->continuous_offset + i * sizeof *first, name, sizeof name);
-            return fcsl_sim_fail(error, "`derivative` of model `%s` does not write dx[%u], that of %s", model->name, i,
-                                 name);
+            return fcsl_fail(error, "`derivative` of model `%s` does not write dx[%u], that of %s", model->name, i,
+                             name);
         }
         if (is_mark && i >= n + GUARDS) {
-            return fcsl_sim_fail(error, "`event` of model `%s` does not write value[%u], that of `%s`", model->name,
-                                 i - n - GUARDS, model->events[i - n - GUARDS].name);
+            return fcsl_fail(error, "`event` of model `%s` does not write value[%u], that of `%s`", model->name,
+                             i - n - GUARDS, model->events[i - n - GUARDS].name);
         }
     }
     return 0;
@@ -193,11 +193,10 @@ static int check_argument(const trial_t *trial, fcsl_error_t *error)
     for (uint32_t i = 0; i < count; i++) {
         const int is_guard = (i >= n && i < n + GUARDS) || i >= n + GUARDS + model->event_count;
         if (!is_guard && memcmp(&first[i], &second[i], sizeof *first) != 0 && !(isnan(first[i]) && isnan(second[i]))) {
-            return fcsl_sim_fail(
-                error,
-                "`%s` of model `%s` reads integrated states, or outputs, in the struct: they are older "
-                "than its argument; take the states from x",
-                i < n ? "derivative" : "event", model->name);
+            return fcsl_fail(error,
+                             "`%s` of model `%s` reads integrated states, or outputs, in the struct: they are older "
+                             "than its argument; take the states from x",
+                             i < n ? "derivative" : "event", model->name);
         }
     }
     return 0;
@@ -229,7 +228,7 @@ static int check_outputs_written(const trial_t *trial, fcsl_error_t *error)
             if (!is_written(trial, offset)) {
                 char name[FCSL_VALUE_NAME_BYTES];
                 fcsl_sim_name_value(trial->instance, offset, name, sizeof name);
-                return fcsl_sim_fail(error, "`output` of model `%s` does not write %s", model->name, name);
+                return fcsl_fail(error, "`output` of model `%s` does not write %s", model->name, name);
             }
         }
     }
@@ -272,7 +271,7 @@ int fcsl_sim_check_contract(fcsl_plant_t *plant, uint32_t index, fcsl_error_t *e
     trial.scratch =
         calloc(3u * ((size_t)model->continuous_count + model->event_count) + 4u * GUARDS + 1u, sizeof *trial.scratch);
     const int failed = !trial.before || !trial.after || !trial.scratch
-                           ? fcsl_sim_fail(error, "no memory for instance `%s`", instance->name)
+                           ? fcsl_fail(error, "no memory for instance `%s`", instance->name)
                            : try_functions(&trial, error);
     free(trial.before);
     free(trial.after);

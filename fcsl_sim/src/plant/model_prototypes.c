@@ -11,7 +11,7 @@
 #include <string.h>
 
 #include "base/aligned_memory.h"
-#include "base/fail.h"
+#include "fcsl/fcsl_error.h"
 
 enum { REASON_BYTES_MAX = 1000 };
 
@@ -112,13 +112,12 @@ int fcsl_sim_check_prototypes(fcsl_plant_t *plant, uint32_t index, fcsl_error_t 
     if (!trial.first || !trial.second) {
         free(trial.first);
         free(trial.second);
-        return fcsl_sim_fail(error, "no memory for instance `%s`", instance->name);
+        return fcsl_fail(error, "no memory for instance `%s`", instance->name);
     }
     const char *wrong = find_float(&trial);
     free(trial.first);
     free(trial.second);
-    return wrong
-               ? fcsl_sim_fail(error, "`%s` of model `%s` takes its time as a float, and fcsl_model.h says `double t`",
-                               wrong, model->name)
-               : 0;
+    return wrong ? fcsl_fail(error, "`%s` of model `%s` takes its time as a float, and fcsl_model.h says `double t`",
+                             wrong, model->name)
+                 : 0;
 }

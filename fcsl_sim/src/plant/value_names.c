@@ -8,7 +8,7 @@
 #include <stdio.h>
 
 #include "fcsl/fcsl_scalar.h"
-#include "base/fail.h"
+#include "fcsl/fcsl_error.h"
 
 /* "[2]", or "[1][2]"; "" for a scalar. */
 static void name_element(const fcsl_field_t *field, uint32_t element, char *text, size_t size)
@@ -64,8 +64,8 @@ static int check_field(const fcsl_plant_t *plant, const fcsl_instance_state_t *i
         if (!isfinite(value)) {
             char name[FCSL_VALUE_NAME_BYTES];
             fcsl_sim_name_value(instance, field->offset + (size_t)i * scalar, name, sizeof name);
-            return fcsl_sim_fail(error, "%s became %g at %.9f s", name, isnan(value) ? (double)NAN : value,
-                                 (double)plant->time_ns / 1e9);
+            return fcsl_fail(error, "%s became %g at %.9f s", name, isnan(value) ? (double)NAN : value,
+                             (double)plant->time_ns / 1e9);
         }
     }
     return 0;

@@ -138,7 +138,7 @@ TARGETS = (
         "arguments",
         Defect(
             "fcsl_runtime/fcsl_runtime/fc/options.c",
-            "fcsl_wire_check(text + strlen(OPTIONS_WIRE), error, sizeof error)",
+            "fcsl_wire_check(text + strlen(OPTIONS_WIRE), &error)",
             "0",
         ),
         longest=512,

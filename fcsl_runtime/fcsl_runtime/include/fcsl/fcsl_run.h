@@ -9,6 +9,7 @@
 #ifndef FCSL_RUN_H
 #define FCSL_RUN_H
 
+#include "fcsl/fcsl_error.h"
 #include "fcsl/fcsl_codec.h"
 #include "fcsl/fcsl_hw_sim.h"
 #include "fcsl/fcsl_machine.h"
@@ -18,11 +19,6 @@ extern "C" {
 #endif
 
 typedef struct fcsl_run fcsl_run_t;
-
-/* Every function that can fail fills this and returns a negative value (or null). */
-typedef struct {
-    char text[512];
-} fcsl_error_t;
 
 /* Loads `library` and initialises its machine named `machine` (null: the library must hold exactly one).
  * Refuses another ABI version, descriptors that do not check out, and a start() that faults. */

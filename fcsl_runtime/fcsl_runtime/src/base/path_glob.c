@@ -6,7 +6,7 @@
 
 #include <string.h>
 
-#include "error.h"
+#include "fcsl/fcsl_error.h"
 
 /* Whether all of `text` matches the glob of `length` characters. */
 static int matches(const char *glob, size_t length, const char *text)

@@ -14,7 +14,7 @@
 #include <sys/stat.h>
 #include <unistd.h>
 
-#include "error.h"
+#include "fcsl/fcsl_error.h"
 
 static int write_all(int fd, const char *bytes, size_t size)
 {

@@ -6,7 +6,8 @@
 #ifndef FCSL_MESSAGE_H
 #define FCSL_MESSAGE_H
 
-#include "base/error.h"
+#include "fcsl/fcsl_error.h"
+#include "fcsl/fcsl_machine.h"
 
 /* No message may be larger. */
 #define FCSL_MESSAGE_BYTES_MAX (1u << 20)

@@ -16,7 +16,7 @@
 #include <unistd.h>
 
 #include "fcsl/fcsl_mcap_writer.h"
-#include "base/error.h"
+#include "fcsl/fcsl_error.h"
 #include "metadata.h"
 #include "messages/type_hash.h"
 

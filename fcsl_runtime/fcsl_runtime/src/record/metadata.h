@@ -2,7 +2,9 @@
 #ifndef FCSL_METADATA_H
 #define FCSL_METADATA_H
 
-#include "base/error.h"
+#include <stdint.h>
+
+#include "fcsl/fcsl_error.h"
 
 typedef struct {
     const char *name;

@@ -6,7 +6,7 @@
 #ifndef FCSL_RECORDER_H
 #define FCSL_RECORDER_H
 
-#include "base/error.h"
+#include "fcsl/fcsl_error.h"
 #include "messages/record_messages.h"
 
 typedef struct fcsl_recorder fcsl_recorder_t;

@@ -5,7 +5,7 @@
 #include <pthread.h>
 #include <stdatomic.h>
 
-#include "base/error.h"
+#include "fcsl/fcsl_error.h"
 #include "fcsl/fcsl_bag.h"
 #include "messages/tick_messages.h"
 #include "ring.h"

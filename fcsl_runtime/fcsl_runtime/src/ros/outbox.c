@@ -5,7 +5,7 @@
 #include <stdlib.h>
 #include <string.h>
 
-#include "base/error.h"
+#include "fcsl/fcsl_error.h"
 #include "fcsl/fcsl_outbox.h"
 #include "fcsl/fcsl_scalar.h"
 #include "record/ring.h"

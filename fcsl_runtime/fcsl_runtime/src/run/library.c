@@ -15,7 +15,7 @@
 #include <sys/stat.h>
 #include <unistd.h>
 
-#include "base/error.h"
+#include "fcsl/fcsl_error.h"
 
 enum { PATH_BYTES = 4096, SEGMENTS_MAX = 128 };
 

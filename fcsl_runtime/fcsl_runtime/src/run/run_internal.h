@@ -2,7 +2,7 @@
 #ifndef FCSL_RUN_INTERNAL_H
 #define FCSL_RUN_INTERNAL_H
 
-#include "base/error.h"
+#include "fcsl/fcsl_error.h"
 #include "fcsl/fcsl_hw_sim.h"
 #include "machine/machine_struct.h"
 #include "messages/message.h"

@@ -2,7 +2,8 @@
 #ifndef FCSL_VALIDATE_H
 #define FCSL_VALIDATE_H
 
-#include "base/error.h"
+#include "fcsl/fcsl_error.h"
+#include "fcsl/fcsl_machine.h"
 
 /* Checks everything in a descriptor that a host relies on: indices and offsets in range, sizes that add up, names that are
  * there. Returns 0, or -1 naming what is wrong. */

@@ -9,7 +9,7 @@
 
 #include "base/path_glob.h"
 #include "datagram.h"
-#include "base/error.h"
+#include "fcsl/fcsl_error.h"
 #include "fcsl/fcsl_scalar.h"
 #include "fcsl/fcsl_telemetry.h"
 

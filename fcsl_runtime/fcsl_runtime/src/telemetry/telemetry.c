@@ -10,7 +10,7 @@
 #include <sys/random.h>
 #include <time.h>
 
-#include "base/error.h"
+#include "fcsl/fcsl_error.h"
 #include "fcsl/fcsl_codec.h"
 #include "sender.h"
 #include "fcsl/fcsl_tick_time.h"

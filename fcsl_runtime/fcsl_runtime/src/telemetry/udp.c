@@ -13,7 +13,7 @@
 #include <unistd.h>
 
 #include "fcsl/fcsl_address.h"
-#include "base/error.h"
+#include "fcsl/fcsl_error.h"
 
 enum { ADDRESS_BYTES = 96 };
 static const char SCHEME[] = "udp:";

@@ -20,7 +20,7 @@
 #include <unistd.h>
 
 #include "fcsl/fcsl_address.h"
-#include "base/error.h"
+#include "fcsl/fcsl_error.h"
 #include "fcsl/fcsl_socket.h"
 
 enum { BACKLOG = 64, RANDOM_BYTES = 24, SECRET_MIN = 16, HOST_BYTES = 64 };
@@ -147,7 +147,7 @@ int fcsl_listener_open(listener_t *listener, const fcsl_vars_options_t *options,
     if (options->token != NULL) {
         return fcsl_fail(error, "a token is asked for over TCP only; a Unix socket is open to its owner alone");
     }
-    listener->fd = fcsl_socket_listen(options->address, SOCK_STREAM, BACKLOG, error->text, sizeof error->text);
+    listener->fd = fcsl_socket_listen(options->address, SOCK_STREAM, BACKLOG, error);
     if (listener->fd < 0) {
         return -1;
     }

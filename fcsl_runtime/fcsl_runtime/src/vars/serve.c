@@ -12,7 +12,7 @@
 
 static fcsl_vars_status_t no_such_action(fcsl_error_t *error)
 {
-    (void)snprintf(error->text, sizeof error->text, "this host does not offer it");
+    (void)fcsl_fail(error, "this host does not offer it");
     return FCSL_VARS_REFUSED;
 }
 
@@ -54,7 +54,7 @@ static fcsl_vars_status_t feed_channel(const fcsl_vars_host_t *host, command_t *
 {
     fcsl_error_t *error = &command->error;
     if (!host->accepts_samples) {
-        (void)snprintf(error->text, sizeof error->text, "the simulation feeds the sensor channels: set a sensor model");
+        (void)fcsl_fail(error, "the simulation feeds the sensor channels: set a sensor model");
         return FCSL_VARS_REFUSED;
     }
     return result(command->kind == COMMAND_ATTACH

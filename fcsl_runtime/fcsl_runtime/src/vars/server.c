@@ -14,7 +14,7 @@
 #include <sys/stat.h>
 #include <unistd.h>
 
-#include "base/error.h"
+#include "fcsl/fcsl_error.h"
 
 enum {
     FILES_MIN = ENTRIES_MAX +
@@ -91,7 +91,7 @@ fcsl_vars_t *fcsl_vars_open(const fcsl_vars_options_t *options, const fcsl_vars_
 {
     fcsl_vars_t *vars = calloc(1, sizeof *vars);
     if (vars == NULL) {
-        (void)snprintf(error->text, sizeof error->text, "out of memory for the variable server");
+        (void)fcsl_fail(error, "out of memory for the variable server");
         return NULL;
     }
     vars->listener.fd = -1;
@@ -109,7 +109,7 @@ fcsl_vars_t *fcsl_vars_open(const fcsl_vars_options_t *options, const fcsl_vars_
     }
     vars->attention = eventfd(0, EFD_CLOEXEC | EFD_NONBLOCK);
     if (vars->attention < 0 || sem_init(&vars->returned, 0, 0) != 0 || allocate(vars, blocks, block_count) != 0) {
-        (void)snprintf(error->text, sizeof error->text, "out of memory for the variable server");
+        (void)fcsl_fail(error, "out of memory for the variable server");
         fcsl_vars_close(vars);
         return NULL;
     }
@@ -124,7 +124,7 @@ int fcsl_vars_start(fcsl_vars_t *vars, fcsl_error_t *error)
 {
     const int code = pthread_create(&vars->thread, NULL, fcsl_vars_make_rounds, vars);
     if (code != 0) {
-        (void)snprintf(error->text, sizeof error->text, "cannot start the variable server: %s", strerror(code));
+        (void)fcsl_fail(error, "cannot start the variable server: %s", strerror(code));
         return -1;
     }
     vars->started = 1;

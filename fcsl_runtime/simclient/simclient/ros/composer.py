@@ -10,6 +10,7 @@ from ctypes import byref
 
 from fcsl_compiler.api.ros import Definitions, PlanError, Source, composer_plan
 
+from ..c_run import CError
 from ..errors import MapError, TwinError
 from . import native
 
@@ -34,10 +35,10 @@ class Composer:
             raise MapError(str(error)) from None
         self._memories = (ctypes.c_void_p * plan.memory_count)()
         self._plan = native.composer_plan(plan)  # the composer keeps its address
-        library, failure = native.library(), ctypes.create_string_buffer(native.ERROR_BYTES)
-        handle = library.fcsl_ros_composer_new(byref(self._plan), failure, len(failure))
+        library, failure = native.library(), CError()
+        handle = library.fcsl_ros_composer_new(byref(self._plan), byref(failure))
         if not handle:
-            raise TwinError(failure.value.decode("utf-8", "replace"))
+            raise TwinError(failure.text.decode("utf-8", "replace"))
         self._handle, self._compose = handle, library.fcsl_ros_compose
         self._message = ctypes.create_string_buffer(len(plan.text))
         #: Messages that were not composed, because a value does not fit its field.

@@ -16,9 +16,6 @@ from fcsl_compiler.api.ros import ComposerPlan, ReaderPlan, Term
 from ..c_run import CError
 from ..library import bind_runtime, runtime_library
 
-#: Room for an error's text.
-ERROR_BYTES = 256
-
 #: fcsl_ros_status_t: the result of reading a message, or a value of it.
 REASONS = (
     "taken",
@@ -134,7 +131,7 @@ class CComposerPlan(Structure):
 
 _ERROR = POINTER(CError)
 _PROTOTYPES: dict[str, tuple[type | None, list[type]]] = {
-    "fcsl_ros_reader_new": (ptr, [POINTER(CReaderPlan), c_char_p, c_size_t]),
+    "fcsl_ros_reader_new": (ptr, [POINTER(CReaderPlan), _ERROR]),
     "fcsl_ros_reader_free": (None, [ptr]),
     "fcsl_ros_reader_end": (c_size_t, [ptr]),
     "fcsl_ros_read": (c_int, [ptr, c_char_p, c_size_t, ptr, ptr, ptr]),
@@ -144,7 +141,7 @@ _PROTOTYPES: dict[str, tuple[type | None, list[type]]] = {
     "fcsl_ros_deliver": (c_uint32, [ptr, c_char_p, c_size_t, c_int64, c_char_p]),
     "fcsl_ros_inlet_counts": (POINTER(c_uint64), [ptr]),
     "fcsl_ros_inlet_behind_ns": (c_int64, [ptr]),
-    "fcsl_ros_composer_new": (ptr, [POINTER(CComposerPlan), c_char_p, c_size_t]),
+    "fcsl_ros_composer_new": (ptr, [POINTER(CComposerPlan), _ERROR]),
     "fcsl_ros_composer_free": (None, [ptr]),
     "fcsl_ros_compose": (c_int, [ptr, POINTER(ptr), c_int64, ptr]),
     "fcsl_outbox_new": (ptr, [c_int, _ERROR]),

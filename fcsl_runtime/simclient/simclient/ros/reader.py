@@ -14,6 +14,7 @@ import numpy as np
 
 from fcsl_compiler.api.ros import Definitions, Pick, PlanError, ReaderPlan, has_stamp, reader_plan
 
+from ..c_run import CError
 from ..errors import MapError, TwinError
 from . import native
 
@@ -64,10 +65,10 @@ class Reader:
         #: Of each pick, whether it is a rotation, of which a quaternion of length zero is refused.
         self.rotations = tuple(value.rotation for value in plan.values)
         self._plan = native.reader_plan(plan)  # the reader keeps its address
-        library, failure = native.library(), ctypes.create_string_buffer(native.ERROR_BYTES)
-        handle = library.fcsl_ros_reader_new(byref(self._plan), failure, len(failure))
+        library, failure = native.library(), CError()
+        handle = library.fcsl_ros_reader_new(byref(self._plan), byref(failure))
         if not handle:
-            raise TwinError(failure.value.decode("utf-8", "replace"))
+            raise TwinError(failure.text.decode("utf-8", "replace"))
         self._handle: int = handle
         self._read, self._end = library.fcsl_ros_read, library.fcsl_ros_reader_end
         self._read_many = library.fcsl_ros_read_many

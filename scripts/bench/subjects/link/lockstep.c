@@ -92,13 +92,13 @@ static void print(double *trips_ns, int ticks, double seconds)
 
 static _Noreturn void control(const char *spec)
 {
-    char error[512];
+    fcsl_error_t error;
     uint8_t bytes[ROOM];
     fcsl_hal_t hal;
     data_t data = {0};
     const fcsl_channel_table_t table = fcsl_channel_table(&MACHINE);
-    check(fcsl_hal_wire(spec, &MACHINE, WAIT_MS, &hal, error, sizeof error) == 0, "no HAL");
-    check(hal.open(&hal, error, sizeof error) == 0, "the HAL does not open");
+    check(fcsl_hal_wire(spec, &MACHINE, WAIT_MS, &hal, &error) == 0, "no HAL");
+    check(hal.open(&hal, &error) == 0, "the HAL does not open");
     for (uint64_t tick = 0;; tick++) {
         fcsl_message_t message;
         fcsl_hal_status_t status = FCSL_HAL_WAITING;
@@ -119,7 +119,7 @@ static _Noreturn void control(const char *spec)
 
 static void over_wire(const char *spec, const char *theirs, int ticks, double *trips_ns)
 {
-    char error[512];
+    fcsl_error_t error;
     uint8_t bytes[ROOM];
     data_t data = {.gyro = {0.1, -0.2, 0.3}, .acceleration = {0.0, 0.1, -9.8}};
     fcsl_external_t *external = NULL;
@@ -128,7 +128,7 @@ static void over_wire(const char *spec, const char *theirs, int ticks, double *t
     if (child == 0) {
         control(theirs);
     }
-    check(fcsl_external_open(spec, &MACHINE, &external, error, sizeof error) == 0, error);
+    check(fcsl_external_open(spec, &MACHINE, &external, &error) == 0, error.text);
     check(fcsl_external_accept(external, WAIT_MS) == FCSL_HAL_OK, "no controller came");
     double begun = 0.0;
     for (int i = 0; i < WARM_UP + ticks; i++) {

@@ -54,7 +54,7 @@ static fcsl_vars_status_t hosted_tick(void *ctx, uint64_t count, fcsl_error_t *e
             return FCSL_VARS_NOT_PAUSED;
         }
         if (hosted.ticks == 0) {
-            (void)snprintf(error->text, sizeof error->text, "the run has ended");
+            (void)fcsl_fail(error, "the run has ended");
             return FCSL_VARS_ENDED;
         }
         hosted.ticks--;

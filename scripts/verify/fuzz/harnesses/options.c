@@ -22,7 +22,7 @@ int LLVMFuzzerTestOneInput(const uint8_t *data, size_t size)
         arguments[count++] = at;
     }
     options_t options;
-    char error[512];
+    fcsl_error_t error;
     optind = 0; /* glibc: begin anew */
     const int status = options_read(count, arguments, &options);
     FUZZ_CHECK(status >= -1 && status <= 1);
@@ -33,9 +33,9 @@ int LLVMFuzzerTestOneInput(const uint8_t *data, size_t size)
         const int is_wire = options.peer != NULL && strncmp(options.peer, OPTIONS_WIRE, prefix) == 0;
         /* A plan and a bridge are looked at when they are opened. */
         const int is_later = options_hal_is_linux(&options) || options_hal_is_ros(&options);
-        FUZZ_CHECK(options.peer == NULL || is_later ||
-                   (is_wire ? fcsl_wire_check(options.peer + prefix, error, sizeof error)
-                            : fcsl_hal_bus_check(options.peer, error, sizeof error)) == 0);
+        FUZZ_CHECK(
+            options.peer == NULL || is_later ||
+            (is_wire ? fcsl_wire_check(options.peer + prefix, &error) : fcsl_hal_bus_check(options.peer, &error)) == 0);
     }
     free(text);
     return 0;

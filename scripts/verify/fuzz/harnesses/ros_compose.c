@@ -38,7 +38,7 @@ static void apply(const fcsl_ros_composer_t *composer, uint32_t size, bytes_t *b
 int LLVMFuzzerTestOneInput(const uint8_t *data, size_t size)
 {
     bytes_t bytes = {data, size};
-    char error[64] = "";
+    fcsl_error_t error = {""};
     fcsl_ros_row_t rows[ROWS];
     fcsl_ros_term_t terms[TERMS];
     uint32_t numbers[] = {TEXT_BYTES, ROWS, TERMS, 2, 4};
@@ -63,8 +63,8 @@ int LLVMFuzzerTestOneInput(const uint8_t *data, size_t size)
     plan.stamp_offset = numbers[4];
     plan.rows = plan.row_count > 0 ? rows : NULL;
     plan.terms = plan.term_count > 0 ? terms : NULL;
-    fcsl_ros_composer_t *composer = fcsl_ros_composer_new(&plan, error, sizeof error);
-    FUZZ_CHECK((composer == NULL) == (error[0] != '\0'));
+    fcsl_ros_composer_t *composer = fcsl_ros_composer_new(&plan, &error);
+    FUZZ_CHECK((composer == NULL) == (error.text[0] != '\0'));
     if (composer != NULL) {
         apply(composer, plan.size, &bytes);
     }

@@ -59,7 +59,7 @@ int LLVMFuzzerTestOneInput(const uint8_t *data, size_t size)
     bytes_t bytes = {data, size};
     fcsl_error_t error;
     fcsl_run_t *run = fcsl_run_open_machine(fcsl_machines[0], &error);
-    fcsl_ros_reader_t *reader = fcsl_ros_reader_new(&PLAN, error.text, sizeof error.text);
+    fcsl_ros_reader_t *reader = fcsl_ros_reader_new(&PLAN, &error);
     FUZZ_CHECK(run != NULL && reader != NULL && fcsl_run_attach(run, &error) == 0);
     fcsl_ros_inlet_t *inlet = fcsl_ros_inlet_new(run, reader, channels, 1, &error);
     FUZZ_CHECK(inlet != NULL);

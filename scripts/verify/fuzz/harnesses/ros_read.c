@@ -81,11 +81,11 @@ static void read_message(fcsl_ros_reader_t *reader, uint32_t row_size, bytes_t *
 int LLVMFuzzerTestOneInput(const uint8_t *data, size_t size)
 {
     bytes_t bytes = {data, size};
-    char error[64] = "";
+    fcsl_error_t error = {""};
     plan_t p;
     open_plan(&p, &bytes);
-    fcsl_ros_reader_t *reader = fcsl_ros_reader_new(&p.plan, error, sizeof error);
-    FUZZ_CHECK((reader == NULL) == (error[0] != '\0'));
+    fcsl_ros_reader_t *reader = fcsl_ros_reader_new(&p.plan, &error);
+    FUZZ_CHECK((reader == NULL) == (error.text[0] != '\0'));
     if (reader != NULL) {
         read_message(reader, p.plan.size, &bytes);
     }

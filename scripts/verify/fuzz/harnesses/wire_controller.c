@@ -88,15 +88,15 @@ int LLVMFuzzerTestOneInput(const uint8_t *data, size_t size)
 {
     bytes_t bytes = {data, size};
     fake_wire_t fake = {0};
-    char error[512] = "";
+    fcsl_error_t error = {""};
     fcsl_hal_t handle;
     const fcsl_wire_t wire = fake_wire(&fake);
-    FUZZ_CHECK(fcsl_hal_over_wire(&wire, &MACHINE, 0, &handle, error, sizeof error) == 0);
+    FUZZ_CHECK(fcsl_hal_over_wire(&wire, &MACHINE, 0, &handle, &error) == 0);
     hal_t *hal = handle.ctx;
     fake_put_control(&fake, &bytes, &hal->table);
     /* A handshake that fails says why; the HAL is then used as if it had not. */
     fake.ends = 1;
-    FUZZ_CHECK(shake_hands(hal, UINT64_MAX, error, sizeof error) == 0 || error[0] != '\0');
+    FUZZ_CHECK(shake_hands(hal, UINT64_MAX, error, sizeof error.text) == 0 || error.text[0] != '\0');
     fake.ends = 0;
     run_operations(hal, &fake, &bytes);
     handle.close(handle.ctx);

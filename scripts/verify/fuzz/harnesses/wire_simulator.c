@@ -44,12 +44,12 @@ static void take(fcsl_external_t *external, uint64_t *tick)
 int LLVMFuzzerTestOneInput(const uint8_t *data, size_t size)
 {
     bytes_t bytes = {data, size};
-    char error[512] = "";
+    fcsl_error_t error = {""};
     fake_wire_t fake = {0};
     uint64_t tick = 0;
     fcsl_external_t *external = NULL;
     const fcsl_wire_t wire = fake_wire(&fake);
-    FUZZ_CHECK(fcsl_external_over_wire(&wire, &MACHINE, &external, error, sizeof error) == 0);
+    FUZZ_CHECK(fcsl_external_over_wire(&wire, &MACHINE, &external, &error) == 0);
     fake_put_control(&fake, &bytes, &external->table);
     FUZZ_CHECK(fcsl_external_accept(external, 0) == FCSL_HAL_OK || fcsl_external_explain(external)[0] != '\0');
     while (bytes.left > 0) {
