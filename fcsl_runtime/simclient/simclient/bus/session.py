@@ -19,8 +19,9 @@ _ENDPOINT = re.compile(r"tcp/(\[[0-9a-fA-F:.%]+\]|[\w.-]+):[0-9]{1,5}")
 _CONNECT_MS = 2000
 _DESCRIBE_S = 2.0
 _LOOK_S = 0.2
-#: A link that was lost is back within this time, or the one that listens is gone.
-_GONE_S = 1.0
+#: A link that was lost is back after so many looks, or the one that listens is gone. Looks, not time: a process that was
+#: frozen has not looked meanwhile.
+_GONE_LOOKS = 5
 #: Zenoh refuses longer ones; those of FCSL have 1 MiB at most.
 _MESSAGE_BYTES_MAX = 2 << 20
 #: Most messages, and bytes of them, that wait to be read; of more, the newest are dropped and counted.
@@ -59,7 +60,7 @@ class Session:
         self._listens = listens
         self.dropped = 0
         self._stopped = False
-        self._seen_s = time.monotonic()  # when the one that listens was seen
+        self._looks_alone = 0  # without the one that listens, one after the other
         self._zenoh = _zenoh()
         self._session = self._open()
         self._waiting: deque[Message] = deque()
@@ -163,9 +164,8 @@ class Session:
                 batch, self._waiting, self._bytes = self._waiting, deque(), 0
             yield from batch
             yield None
-            if batch or self._is_connected():
-                self._seen_s = time.monotonic()
-            elif time.monotonic() > self._seen_s + _GONE_S:
+            self._looks_alone = 0 if batch or self._is_connected() else self._looks_alone + 1
+            if self._looks_alone > _GONE_LOOKS:
                 return
 
     def receive(self, until_s: float) -> Message | None:
