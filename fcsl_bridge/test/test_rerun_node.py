@@ -13,7 +13,7 @@ from bridge_harness import MACHINE, SIM, Domain
 sys.path.insert(0, str(Path(__file__).resolve().parents[2] / "fcsl_runtime/simclient/test"))
 from rrd import read_rrd, values  # noqa: E402
 
-from fcsl_bridge.topics.live_topics import truth_layouts  # noqa: E402
+from fcsl_bridge.topics.live_subscriptions import truth_layouts  # noqa: E402
 from simclient.view.rrd import to_rerun  # noqa: E402
 
 DURATION_S = 8.0

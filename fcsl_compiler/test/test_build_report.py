@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""`fcslc build --report` against simulation, hand counts and compiled machines. scripts/verify/instructions.py compares
+"""`fcslc build --report` against simulation, hand counts and compiled machines. The check `instructions` compares
 bounds with executed instructions."""
 
 import json

@@ -24,7 +24,7 @@ from simclient.view.views import views_or_remark
 from ..base.machine_index import find_machine
 from ..base.node_main import Option, Stop, read_options, run_node
 from ..errors import BridgeError, Stopped
-from ..topics.live_topics import LiveTopics, read_state, tick_of
+from ..topics.live_subscriptions import LiveSubscriptions, read_state, tick_of
 
 OPTIONS = (
     Option("machine", str, None, "package/machine, or the path of a machine library"),
@@ -49,7 +49,7 @@ class LiveView:
 
     def __init__(self, node: Node, machine: Machine, viewer: Viewer):
         self._machine, self._viewer = machine, viewer
-        self._topics = LiveTopics(node, machine)
+        self._topics = LiveSubscriptions(node, machine)
         self._show: _Show | None = None
         self._early: list[tuple[str, bytes]] = []
         self._early_since = 0.0
@@ -125,7 +125,7 @@ class LiveView:
 class _Show:
     """One run in the viewer."""
 
-    def __init__(self, viewer: Viewer, machine: Machine, topics: LiveTopics):
+    def __init__(self, viewer: Viewer, machine: Machine, topics: LiveSubscriptions):
         self._stream = viewer.open(f"fcsl_{machine.name}")
         views, remark = views_or_remark(machine.views)
         cast = Cast(topics.prefix, list(topics.signals), machine.states, views=views, remark=remark)

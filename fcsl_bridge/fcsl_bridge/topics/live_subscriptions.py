@@ -29,7 +29,7 @@ _NS = 1_000_000_000
 _TRUTH_NAME = re.compile(r"(?P<instance>[^.]+)\.outputs\.(?P<field>.+?)(\[\d+\])?")
 
 
-class LiveTopics:
+class LiveSubscriptions:
     """Subscriptions to outputs, states and plant truth of `machine`, below the node's namespace.
 
     `layouts` and `signals` describe the messages of `drain`. The plant's are known after its first message, which is

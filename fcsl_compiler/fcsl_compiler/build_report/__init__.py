@@ -8,7 +8,7 @@ from collections.abc import Sequence
 from pathlib import Path
 
 from ..base.json_file import read_json
-from ..base.usage import UsageError
+from ..base.usage_error import UsageError
 from ..driver.passes import Compilation
 from .facts import Facts, machine_facts
 from .machine_code import MachineCode

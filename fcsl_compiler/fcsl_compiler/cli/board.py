@@ -7,7 +7,7 @@ import argparse
 from pathlib import Path
 
 from ..base.files import write_whole
-from ..base.usage import UsageError
+from ..base.usage_error import UsageError
 from ..board.board import check_board
 from ..board.plan import plan_text
 from .arguments import PLAN_SUFFIX

@@ -8,7 +8,7 @@ import shlex
 from pathlib import Path
 
 from ..base.files import write_whole
-from ..base.usage import UsageError
+from ..base.usage_error import UsageError
 from ..build_report import compiled_facts, refuse_foreign, report_text
 from ..build_report import document as cost_document
 from ..build_report.facts import Facts

@@ -9,7 +9,7 @@ from importlib import import_module
 
 from ..base.diagnostics import DiagnosticError
 from ..base.packages import PackageNotFound
-from ..base.usage import UsageError
+from ..base.usage_error import UsageError
 from ..check.verify import IrError
 from ..driver.toolchain import ToolchainError
 from .report import document, print_report

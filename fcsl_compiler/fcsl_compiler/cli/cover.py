@@ -12,7 +12,7 @@ import tempfile
 from pathlib import Path
 
 from ..base.files import write_whole
-from ..base.usage import UsageError
+from ..base.usage_error import UsageError
 from ..coverage.probe_map import CoverError
 from ..coverage.report import make_report, parse_limits, refuse_foreign
 from ..coverage.settings import COVER_DIR

@@ -7,7 +7,7 @@ import argparse
 
 from ..base.codes.pages import UnknownCode, pages, table
 from ..base.diagnostics import nearest
-from ..base.usage import UsageError
+from ..base.usage_error import UsageError
 from .function_page import function_names, function_page
 
 

@@ -8,7 +8,7 @@ from pathlib import Path
 
 from ..base.diagnostics import nearest
 from ..base.files import write_whole
-from ..base.usage import UsageError
+from ..base.usage_error import UsageError
 from ..driver.passes import compile_machine
 from ..graph import FORMATS, render
 

@@ -6,7 +6,7 @@ from __future__ import annotations
 import argparse
 
 from ..base.files import write_whole
-from ..base.usage import UsageError
+from ..base.usage_error import UsageError
 from ..driver.passes import compile_machine
 from ..emit.messages import message_texts
 from .build import compiler_files, machine_files, refuse_file

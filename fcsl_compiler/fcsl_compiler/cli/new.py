@@ -7,7 +7,7 @@ import argparse
 from pathlib import Path
 
 from ..base.files import write_whole
-from ..base.usage import UsageError
+from ..base.usage_error import UsageError
 from .scaffold import algorithm_files, machine_files
 from .scaffold_plant import plant_files
 from .scaffold_vehicle import vehicle_files

@@ -5,7 +5,7 @@ from __future__ import annotations
 
 from pathlib import Path
 
-from ..base.usage import UsageError
+from ..base.usage_error import UsageError
 from ..check.scope import LANGUAGE_NAMES
 from ..config.machine import RESERVED_INSTANCES
 from ..parse.machine_files import is_machine_name

@@ -10,7 +10,7 @@ from pathlib import Path
 
 from ..base.files import SourceError, read_regular
 from ..base.json_file import json_value
-from ..base.usage import UsageError
+from ..base.usage_error import UsageError
 from ..driver.passes import compile_machine
 from ..model.machine import Machine
 from ..model.types import Scalar

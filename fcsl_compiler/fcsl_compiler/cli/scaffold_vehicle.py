@@ -8,7 +8,7 @@ from pathlib import Path
 
 from ..base.packages import PackageNotFound, package_share
 from ..base.source import MAX_NAME
-from ..base.usage import UsageError
+from ..base.usage_error import UsageError
 
 #: What makes a vehicle: its machine, its simulations, its tests.
 _PARTS = ("fc", "sim", "test")

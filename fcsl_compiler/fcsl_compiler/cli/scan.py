@@ -7,7 +7,7 @@ import argparse
 from pathlib import Path
 
 from ..base.json_file import read_json
-from ..base.usage import UsageError
+from ..base.usage_error import UsageError
 from ..driver.library import check_machine, stack_bounds
 from ..driver.stack import bound_text
 from .report import print_extern_calls

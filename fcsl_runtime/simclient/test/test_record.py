@@ -221,9 +221,9 @@ def test_type_hashes(bag: Path) -> None:
 
 
 def declarations(text: str) -> list[str]:
-    """Fields and constants of a message text, without comments and dependencies."""
-    lines = (re.sub(r"#.*", "", line).split() for line in text.split("=" * 80)[0].splitlines())
-    return sorted(" ".join(words) for words in lines if words)
+    """Fields and constants of a message text in their order, constants first; without comments and dependencies."""
+    lines = (" ".join(re.sub(r"#.*", "", line).split()) for line in text.split("=" * 80)[0].splitlines())
+    return sorted(filter(None, lines), key=lambda line: "=" not in line)
 
 
 def test_schemas_are_those_of_fcsl_msgs(bag: Path) -> None:

@@ -1,13 +1,13 @@
 /* SPDX-License-Identifier: Apache-2.0
  *
- * Complete ros2msg texts (dependencies appended behind `===` lines) of what a recorder writes.
+ * Complete ros2msg texts (dependencies appended behind `===` lines) of what recorders and the ROS 2 graph show.
  */
 #ifndef FCSL_SCHEMA_H
 #define FCSL_SCHEMA_H
 
 #include "fcsl/fcsl_cdr.h"
 
-/* The fields of fcsl_msgs' interfaces; a test compares them with the .msg files. */
+/* The fields of fcsl_msgs' interfaces, in the order of the .msg files: simclient/test/test_record.py compares them. */
 #define FCSL_SCHEMA_MACHINE_STATE                                                                                      \
     "std_msgs/Header header\nuint64 tick\nstring state\nstring next_state\n" FCSL_SCHEMA_HEADER
 #define FCSL_SCHEMA_TRANSITION_EVENT                                                                                   \

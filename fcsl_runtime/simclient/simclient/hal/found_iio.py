@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""IIO devices of this computer. fcsl_hal/src/drivers/iio.c has the same channels."""
+"""IIO devices of this computer. fcsl_hal/src/drivers/iio/iio.c has the same channels."""
 
 from __future__ import annotations
 
