@@ -82,12 +82,12 @@ static inline void fake_put(fake_wire_t *fake, const uint8_t *bytes, size_t size
 /* The peer sends a control packet of kinds and texts of the input; its hello fits or nearly fits. */
 static inline void fake_put_control(fake_wire_t *fake, bytes_t *bytes, const fcsl_channel_table_t *table)
 {
-    uint8_t packet[CONTROL_PACKET_MAX] = {'F', 'C', 'S', 'W', 1, 0};
+    uint8_t packet[HANDSHAKE_PACKET_MAX] = {'F', 'C', 'S', 'W', 1, 0};
     packet[6] = (uint8_t)take_number(bytes, 1);
     packet[7] = (uint8_t)take_number(bytes, 1);
     fcsl_put_u32(packet + 8, table->hash);
     fcsl_put_u64(packet + 12, table->machine->tick_hz + take_number(bytes, 1) % 2u);
-    fake_put(fake, packet, CONTROL_HEADER_BYTES + (size_t)take_number(bytes, 1) % (CONTROL_TEXT_MAX + 1u));
+    fake_put(fake, packet, HANDSHAKE_HEADER_BYTES + (size_t)take_number(bytes, 1) % (HANDSHAKE_TEXT_MAX + 1u));
 }
 
 #endif /* FAKE_WIRE_H */
