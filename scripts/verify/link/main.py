@@ -86,7 +86,7 @@ def find(defect: Defect, folder: Path) -> None:
         (folder / part).mkdir(parents=True, exist_ok=True)
         for file in (HAL / part).rglob("*.[ch]"):
             copy = folder / part / file.relative_to(HAL / part)
-            copy.parent.mkdir(exist_ok=True)
+            copy.parent.mkdir(parents=True, exist_ok=True)
             copy.write_text(file.read_text())
     source = folder / "src" / defect.file
     text = source.read_text()
