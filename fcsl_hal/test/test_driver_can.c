@@ -13,7 +13,6 @@
 #include <net/if_arp.h>
 #include <netinet/in.h>
 #include <stdarg.h>
-#include <stdio.h>
 #include <sys/ioctl.h>
 #include <sys/socket.h>
 #include <sys/syscall.h>

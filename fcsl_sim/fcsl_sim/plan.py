@@ -53,6 +53,8 @@ def library_statement(keyword: str, *words: object, library: Path) -> Statement:
 
 @dataclass(frozen=True)
 class Plan:
+    """What the native simulator opens: its statements, in the order in which it reads them."""
+
     statements: tuple[Statement, ...]
 
     @property
@@ -63,9 +65,9 @@ class Plan:
     def of(self, *keywords: str) -> Iterator[Statement]:
         return (s for s in self.statements if s.keyword in keywords)
 
-    def values(self) -> dict[Target, str]:
-        """The bits that parameters and inputs begin with."""
-        return {target_of(s): s.words[-1] for s in self.of("set")}
+    def targets(self) -> set[Target]:
+        """The parameters and inputs that have a value."""
+        return {target_of(s) for s in self.of("set")}
 
     def flown_with(self, seed: int, values: Mapping[Target, str]) -> Plan:
         """With this seed, and other bits for some of `values`."""

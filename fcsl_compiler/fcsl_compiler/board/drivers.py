@@ -45,7 +45,7 @@ def known_drivers() -> dict[str, Driver]:
 
 
 def kind_of(driver: str) -> str:
-    """ "" of a driver of a library, of which nothing is known."""
+    """Of a driver that comes with FCSL; of another one nothing is known: ""."""
     known = known_drivers().get(driver)
     return known.kind if known else ""
 

@@ -51,8 +51,7 @@ static int clear_path(const char *path, int type, const struct sockaddr_un *addr
         return errno == ENOENT ? 0 : fail(-1, "cannot look at", path, error);
     }
     if (!S_ISSOCK(status.st_mode)) {
-        (void)fcsl_fail(error, "'%s' exists and is not a socket; it is left alone", path);
-        return -1;
+        return fcsl_fail(error, "'%s' exists and is not a socket; it is left alone", path);
     }
     const int probe = socket(AF_UNIX, type | SOCK_CLOEXEC | SOCK_NONBLOCK, 0);
     if (probe < 0) {
@@ -68,8 +67,7 @@ static int clear_path(const char *path, int type, const struct sockaddr_un *addr
         return 0;
     }
     if (connected != 0 && code == EACCES) {
-        (void)fcsl_fail(error, "socket '%s' belongs to another user; it is left alone", path);
-        return -1;
+        return fcsl_fail(error, "socket '%s' belongs to another user; it is left alone", path);
     }
     return fcsl_fail(error, "socket '%s' is in use by another process", path);
 }

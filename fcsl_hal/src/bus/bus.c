@@ -7,7 +7,6 @@
 #include "fcsl/fcsl_error.h"
 
 #include <signal.h>
-#include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
 

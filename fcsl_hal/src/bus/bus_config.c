@@ -49,8 +49,7 @@ static int check_key(const char *what, const char *key, size_t longest, const ch
 static int check_keys(const char *what, const char *const *keys, uint32_t count, size_t longest, fcsl_error_t *error)
 {
     if (count > FCSL_BUS_KEYS_MAX) {
-        (void)fcsl_fail(error, "the bus has %u keys for %s; at most %u are possible", count, what, FCSL_BUS_KEYS_MAX);
-        return -1;
+        return fcsl_fail(error, "the bus has %u keys for %s; at most %u are possible", count, what, FCSL_BUS_KEYS_MAX);
     }
     for (uint32_t i = 0; i < count; i++) {
         if (check_key(what, keys[i], longest, "*$?#", error) != 0) {
@@ -64,9 +63,8 @@ static int check_inputs(const fcsl_bus_options_t *options, fcsl_error_t *error)
 {
     uint64_t memory = options->ring_bytes;
     if (options->input_count > FCSL_BUS_KEYS_MAX) {
-        (void)fcsl_fail(error, "the bus has %u inputs; at most %u are possible", options->input_count,
-                        FCSL_BUS_KEYS_MAX);
-        return -1;
+        return fcsl_fail(error, "the bus has %u inputs; at most %u are possible", options->input_count,
+                         FCSL_BUS_KEYS_MAX);
     }
     for (uint32_t i = 0; i < options->input_count; i++) {
         const fcsl_bus_input_t *input = &options->inputs[i];
@@ -82,9 +80,8 @@ static int check_inputs(const fcsl_bus_options_t *options, fcsl_error_t *error)
         memory += inbox_memory(input->bytes, input->depth);
     }
     if (memory > FCSL_BUS_MEMORY_MAX) {
-        (void)fcsl_fail(error, "ring and inputs of the bus take %llu bytes; at most %u are possible",
-                        (unsigned long long)memory, FCSL_BUS_MEMORY_MAX);
-        return -1;
+        return fcsl_fail(error, "ring and inputs of the bus take %llu bytes; at most %u are possible",
+                         (unsigned long long)memory, FCSL_BUS_MEMORY_MAX);
     }
     return 0;
 }
@@ -92,9 +89,8 @@ static int check_inputs(const fcsl_bus_options_t *options, fcsl_error_t *error)
 static int check_answers(const fcsl_bus_options_t *options, fcsl_error_t *error)
 {
     if (options->answer_count > FCSL_BUS_KEYS_MAX) {
-        (void)fcsl_fail(error, "the bus has %u answers; at most %u are possible", options->answer_count,
-                        FCSL_BUS_KEYS_MAX);
-        return -1;
+        return fcsl_fail(error, "the bus has %u answers; at most %u are possible", options->answer_count,
+                         FCSL_BUS_KEYS_MAX);
     }
     for (uint32_t i = 0; i < options->answer_count; i++) {
         const fcsl_bus_answer_t *answer = &options->answers[i];
@@ -102,9 +98,8 @@ static int check_answers(const fcsl_bus_options_t *options, fcsl_error_t *error)
             return -1;
         }
         if (answer->size > FCSL_BUS_MESSAGE_MAX) {
-            (void)fcsl_fail(error, "answer '%s' of the bus has %u bytes; at most %u are possible", answer->key,
-                            answer->size, FCSL_BUS_MESSAGE_MAX);
-            return -1;
+            return fcsl_fail(error, "answer '%s' of the bus has %u bytes; at most %u are possible", answer->key,
+                             answer->size, FCSL_BUS_MESSAGE_MAX);
         }
     }
     return 0;
@@ -135,9 +130,8 @@ int bus_config_check(const fcsl_bus_options_t *options, fcsl_error_t *error)
         return fcsl_fail(error, "a session on the bus has an endpoint or a configuration file, one of the two");
     }
     if (options->ring_bytes < RING_BYTES_MIN) {
-        (void)fcsl_fail(error, "the ring of the bus has %u bytes; %d is the least", options->ring_bytes,
-                        RING_BYTES_MIN);
-        return -1;
+        return fcsl_fail(error, "the ring of the bus has %u bytes; %d is the least", options->ring_bytes,
+                         RING_BYTES_MIN);
     }
     if (options->endpoint != NULL && read_endpoint(options->endpoint, endpoint, error) != 0) {
         return -1;

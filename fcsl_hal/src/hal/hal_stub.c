@@ -3,7 +3,6 @@
  * The stub HAL: no sensors, no actuators, the monotonic clock.
  */
 #define _GNU_SOURCE
-#include <stdio.h>
 #include <stdlib.h>
 
 #include "fcsl/fcsl_error.h"

@@ -490,11 +490,10 @@ static int shake_hands(hal_t *hal, uint64_t deadline_ns, fcsl_error_t *error)
     }
     hal->paces = packet.flag;
     if (hal->is_named && !hal->paces) {
-        (void)fcsl_fail(error,
-                        "the simulator on %s runs free: named values in lock-step need one that paces the run; write "
-                        ",free-running behind this address, too",
-                        hal->spec);
-        return -1;
+        return fcsl_fail(error,
+                         "the simulator on %s runs free: named values in lock-step need one that paces the run; write "
+                         ",free-running behind this address, too",
+                         hal->spec);
     }
     return handshake_differs(&packet, &hal->table, error->text, sizeof error->text) ? -1 : 0;
 }

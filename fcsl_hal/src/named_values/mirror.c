@@ -212,9 +212,8 @@ static int check(const fcsl_machine_t *machine, const char *name_space, fcsl_err
             return fcsl_fail(error, "the key of channel '%.100s' is longer than %u bytes", name, FCSL_BUS_KEY_MAX);
         }
         if (payload_bytes(machine, i) > FCSL_BUS_MESSAGE_MAX) {
-            (void)fcsl_fail(error, "channel '%.100s' has %u bytes; a message of the bus has at most %u", name,
-                            payload_bytes(machine, i), FCSL_BUS_MESSAGE_MAX);
-            return -1;
+            return fcsl_fail(error, "channel '%.100s' has %u bytes; a message of the bus has at most %u", name,
+                             payload_bytes(machine, i), FCSL_BUS_MESSAGE_MAX);
         }
     }
     if (before + strlen(LONGEST) > FCSL_BUS_KEY_MAX) {

@@ -4,7 +4,6 @@
  */
 #include "payload.h"
 
-#include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
 

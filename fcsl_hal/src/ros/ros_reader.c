@@ -2,7 +2,6 @@
  *
  * Readers: a plan, checked, and what a message looks like through it.
  */
-#include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
 

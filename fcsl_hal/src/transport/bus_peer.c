@@ -5,8 +5,6 @@
 #define _GNU_SOURCE
 #include "bus_peer.h"
 
-#include <stdio.h>
-
 #include "fcsl/fcsl_error.h"
 #include "fcsl/fcsl_monotonic.h"
 

@@ -6,7 +6,6 @@
 #include "fcsl/fcsl_wire.h"
 #include "fcsl/fcsl_error.h"
 
-#include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
 #include <sys/un.h>
@@ -45,9 +44,8 @@ static int read_uart(const char *spec, parsed_t *parsed, fcsl_error_t *error)
     parsed->device[length] = '\0';
     parsed->baud = (uint32_t)strtoul(colon + 1, NULL, 10);
     if (!line_has_speed(parsed->baud)) {
-        (void)fcsl_fail(error, "%s: no serial device has the speed %s; write one like 57600, 115200 or 921600", spec,
-                        colon + 1);
-        return -1;
+        return fcsl_fail(error, "%s: no serial device has the speed %s; write one like 57600, 115200 or 921600", spec,
+                         colon + 1);
     }
     return 0;
 }

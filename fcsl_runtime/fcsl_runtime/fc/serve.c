@@ -3,7 +3,6 @@
  * The flight program behind the variable server: what commands do on the step thread between two ticks, and its counters.
  */
 #include <inttypes.h>
-#include <stdio.h>
 #include <string.h>
 
 #include "loop.h"

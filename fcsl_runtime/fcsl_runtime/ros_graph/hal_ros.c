@@ -6,7 +6,6 @@
 #define _GNU_SOURCE
 #include "hal_ros.h"
 
-#include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
 #include <time.h>

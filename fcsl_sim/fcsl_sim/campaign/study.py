@@ -169,8 +169,9 @@ class _Reader:
             )
             return ()
         found = []
+        settable = config.plan.targets()
         for path, member in node.members.items():
-            target = self._target(path, member.key_span, config)
+            target = self._target(path, member.key_span, config, settable)
             if target is None:
                 continue
             spread = self._distribution(member.value, path, scalar_of(target[0].type))
@@ -178,7 +179,9 @@ class _Reader:
                 found.append(Dispersed(path, *target, spread))
         return tuple(found)
 
-    def _target(self, path: str, span: Span, config: SimConfig) -> tuple[ModelField, Target] | None:
+    def _target(
+        self, path: str, span: Span, config: SimConfig, settable: set[Target]
+    ) -> tuple[ModelField, Target] | None:
         """The field, and what the plan sets of it."""
         whole, index = split_path(path)
         instance, _, rest = whole.partition(".")
@@ -196,7 +199,7 @@ class _Reader:
             self.sink.error("E217", what, span, help=name_an_element(whole, shape))
             return None
         target = instance, field.path, str(place)
-        if target not in config.plan.values():
+        if target not in settable:
             fix = f"give it one: in `{field.role}s` of `{instance}`"
             self.sink.error("E211", f"`{path}` has no value in the simulation", span, help=fix)
             return None

@@ -73,27 +73,20 @@ static const char *flaw(const fcsl_driver_t *driver)
     return NULL;
 }
 
-/* Those that come with FCSL are many: of them the names for one direction. */
-static void list_built_in(fcsl_direction_t direction, char *text, size_t size)
-{
-    size_t at = 0;
-    for (uint32_t i = 0; fcsl_drivers_built_in[i] != NULL && at < size; i++) {
-        if (fcsl_drivers_built_in[i]->direction == (uint8_t)direction) {
-            const int length =
-                snprintf(text + at, size - at, "%s%s", at > 0u ? ", " : "", fcsl_drivers_built_in[i]->name);
-            at += length > 0 ? (size_t)length : 0u;
-        }
-    }
-}
-
-static void list_drivers(const fcsl_driver_t *const *drivers, char *text, size_t size)
+/* A library's drivers with their directions. Those that come with FCSL are many: of them the names for one direction. */
+static void list_drivers(const fcsl_driver_t *const *drivers, const char *where, fcsl_direction_t direction, char *text,
+                         size_t size)
 {
     size_t at = 0;
     (void)snprintf(text, size, "none");
     for (uint32_t i = 0; i < DRIVERS_MAX && drivers[i] != NULL && at < size; i++) {
-        if (drivers[i]->name != NULL && drivers[i]->direction <= FCSL_ACTUATOR) {
-            const int length = snprintf(text + at, size - at, "%s%s (%s)", at > 0u ? ", " : "", drivers[i]->name,
-                                        DIRECTIONS[drivers[i]->direction]);
+        const fcsl_driver_t *driver = drivers[i];
+        const int listed = where != NULL ? driver->direction <= FCSL_ACTUATOR : driver->direction == (uint8_t)direction;
+        if (driver->name != NULL && listed) {
+            const char *comma = at > 0u ? ", " : "";
+            const int length = where != NULL ? snprintf(text + at, size - at, "%s%s (%s)", comma, driver->name,
+                                                        DIRECTIONS[driver->direction])
+                                             : snprintf(text + at, size - at, "%s%s", comma, driver->name);
             at += length > 0 ? (size_t)length : 0u;
         }
     }
@@ -127,11 +120,10 @@ static const fcsl_driver_t *choose(const fcsl_driver_t *const *drivers, const ch
         return driver;
     }
     char names[LIST_BYTES];
+    list_drivers(drivers, where, direction, names, sizeof names);
     if (where != NULL) {
-        list_drivers(drivers, names, sizeof names);
         (void)fcsl_fail(error, "'%.200s' holds no driver '%.60s'; it holds: %s", where, name, names);
     } else {
-        list_built_in(direction, names, sizeof names);
         (void)fcsl_fail(error, "FCSL has no driver '%.60s' for %ss; it has: %s. One of a library is LIBRARY.so:NAME",
                         name, DIRECTIONS[direction], names);
     }

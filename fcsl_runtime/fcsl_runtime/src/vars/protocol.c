@@ -6,7 +6,6 @@
 #include "commander.h"
 
 #include <inttypes.h>
-#include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
 

@@ -124,8 +124,7 @@ int fcsl_vars_start(fcsl_vars_t *vars, fcsl_error_t *error)
 {
     const int code = pthread_create(&vars->thread, NULL, fcsl_vars_make_rounds, vars);
     if (code != 0) {
-        (void)fcsl_fail(error, "cannot start the variable server: %s", strerror(code));
-        return -1;
+        return fcsl_fail(error, "cannot start the variable server: %s", strerror(code));
     }
     vars->started = 1;
     return 0;
