@@ -56,6 +56,7 @@ PACKAGES = {
             "observers": ("fcsl_observers.h",),
             "src/telemetry": ("fcsl_telemetry.h",),
             "src/vars": ("fcsl_vars.h",),
+            "src/expression": ("fcsl_expression.h",),
             "src/ros": ("fcsl_outbox.h", "fcsl_ros_inlet.h", "fcsl_topics.h"),
             "src/history": ("fcsl_histogram.h", "fcsl_history.h", "fcsl_tick_stats.h"),
             "src/run": ("fcsl_fp_mode.h", "fcsl_library.h"),

@@ -142,7 +142,7 @@ SIMULATION: dict[str, Any] = {
         {"from": "plant.velocity", "to": "controller.velocity"},
         {"from": "controller.thrust", "to": "plant.thrust"},
     ],
-    "until": {"field": "plant.outputs.landed", "equals": True, "for_s": 0.1},
+    "until": {"condition": "plant.outputs.landed", "for_s": 0.1},
 }
 #: The rows of the channels (docs/wire.md).
 TABLE = zlib.crc32(struct.pack("<" + 3 * "HBBI", 1, 0, 6, 1, 2, 0, 6, 1, 16, 1, 6, 1))

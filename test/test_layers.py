@@ -24,7 +24,20 @@ PACKAGES = {
 #: The folders of a package; "" are the modules beside the folders.
 FOLDERS: dict[str, Sequence[str]] = {
     "fcsl_compiler": (
-        *("base", "model", "parse", "check", "ros", "config", "lower", "emit", "printers", "coverage", "driver"),
+        *(
+            "base",
+            "model",
+            "expression",
+            "parse",
+            "check",
+            "ros",
+            "config",
+            "lower",
+            "emit",
+            "printers",
+            "coverage",
+            "driver",
+        ),
         *("board", "graph", "build_report", "reference", "cli", "api"),
     ),
     "simclient": (

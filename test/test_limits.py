@@ -33,7 +33,8 @@ def shown_limits(page: Path) -> dict[str, float]:
 
 
 def test_the_variable_server() -> None:
-    header = c_limits(ROOT / "fcsl_runtime/fcsl_runtime/src/vars/limits.h")
+    runtime = ROOT / "fcsl_runtime/fcsl_runtime"
+    header = c_limits(runtime / "src/vars/limits.h") | c_limits(runtime / "include/fcsl/fcsl_expression.h")
     assert len(header) > 20 and shown_limits(ROOT / "docs/protocol.md") == header
 
 

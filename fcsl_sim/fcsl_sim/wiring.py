@@ -3,15 +3,15 @@
 
 from __future__ import annotations
 
-import json
 import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from fractions import Fraction
 
 from fcsl_compiler.api.diagnostics import Span, nearest
+from fcsl_compiler.api.expressions import ExpressionError, Kind, Quantity, parse, read_unit
 from fcsl_compiler.api.json_files import ConfigReader, JsonNode
-from fcsl_compiler.api.types import Array, Type, scalar_of
+from fcsl_compiler.api.types import Type, scalar_of, shape_of
 from simclient.descriptor import Field, Machine, why_read_only
 
 from . import dataflow, plan
@@ -24,7 +24,6 @@ from .ros import TruthTopic, read_truth
 MAX_SECONDS = 1e9
 #: Of the grid on which updates with a phase lie (src/plan/plan.h).
 _MAX_GRID_HZ = 1_000_000_000
-_COMPARISONS = ("equals", "above", "below")
 
 
 @dataclass
@@ -551,30 +550,47 @@ class _Checker:
         return [plan.statement("event", time_ns, instance, target.path, i, value) for i, value in enumerate(values)]
 
     def read_until(self, node: JsonNode | None) -> tuple[list[Statement], str]:
-        """The statements of the stop condition, and the condition as text."""
+        """The statement of the stop condition, and the condition as text."""
         nothing: tuple[list[Statement], str] = [], ""
         if node is None or (node.kind == "object" and not node.members):
             return nothing
-        keys = self.reader.object(node, "`until`", ("field",), (*_COMPARISONS, "for_s"))
+        keys = self.reader.object(node, "`until`", ("condition",), ("for_s",))
         if keys is None:
             return nothing
-        text = self.reader.string(keys.get("field"), "`field`")
-        rule = "a stop condition watches an output or a state"
-        found = self._field(keys["field"], text, ("output", "state"), rule) if text is not None else None
+        text = self.reader.string(keys.get("condition"), "`condition`", "lander.outputs.landed")
         for_s = seconds(self.reader, keys.get("for_s"), "`for_s`")
-        given = [name for name in _COMPARISONS if name in keys]
-        if len(given) != 1:
-            self.sink.error("E202", "`until` has one of `equals`, `above` and `below`", first(node.span))
+        if text is None or self.machine is None or any(i.table is None for i in self.instances.values()):
             return nothing
-        if found is None or text is None:
-            return nothing
-        if isinstance(found.type, Array):
-            self.sink.error("E217", f"`{text}` is {found.type}; a stop condition compares a scalar", keys["field"].span)
-            return nothing
-        value = self.reader.value(keys[given[0]], found.type, f"`{given[0]}`")
-        if value is None or self.machine is None:
+        try:
+            parse(text, self._quantity, condition=True)
+        except ExpressionError as error:
+            self.sink.error("E208", f"`condition`: {error}", keys["condition"].span)
             return nothing
         ticks = 1 + math.ceil((for_s or 0) * self.machine.tick_hz)
-        bits = plan.bits(found.type.name, value[0])
-        condition = f"{text} {given[0]} {json.dumps(value[0])}" + (f" for {float(for_s):g} s" if for_s else "")
-        return [plan.statement("until", text.partition(".")[0], found.path, given[0], bits, ticks)], condition
+        condition = text + (f" for {float(for_s):g} s" if for_s else "")
+        return [plan.statement("until", ticks, " ".join(text.split()))], condition
+
+    def _quantity(self, path: str) -> Quantity:
+        """What `instance.outputs.name` is in an expression; an index may follow. Raises ExpressionError."""
+        name, *index = path.replace("]", "").replace(",", "[").split("[")
+        head, _, field_path = name.partition(".")
+        table = self.instances[head].table if head in self.instances else None
+        found = table.fields.get(field_path) if table else None
+        if found is None or found.role not in ("output", "state"):
+            known = [
+                f"{i.name}.{f.path}"
+                for i in self.instances.values()
+                if i.table
+                for f in i.table.of_role("output", "state")
+            ]
+            hint = nearest(name, known)
+            raise ExpressionError(f"there is no output or state `{name}` of a model{'; ' + hint if hint else ''}")
+        shape = shape_of(found.type)
+        for extent, number in zip(shape, index, strict=False):
+            if not -extent <= int(number) < extent:
+                raise ExpressionError(f"`{path}`: index {number.strip()} is not within {extent}")
+        if len(index) > len(shape):
+            raise ExpressionError(f"`{path}`: `{name}` is {found.type}")
+        scalar = scalar_of(found.type).name
+        kind = Kind.BOOL if scalar == "bool" else Kind.FLOAT if scalar in ("f32", "f64") else Kind.INTEGER
+        return Quantity(kind, shape[len(index) :], read_unit(found.unit))

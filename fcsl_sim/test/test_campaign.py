@@ -138,7 +138,7 @@ def test_one_case_again(write: Write, capsys: pytest.CaptureFixture[str]) -> Non
         ("average < 3.0", "average = {average:.9g}, not < 3.0: by {over:.3g}"),
         ("0.0 <= average <= final - 9.0", "average = {average:.9g}, not <= final - 9.0 = {low:.9g}: by {gap:.3g}"),
         ("above == 7 or not above >= 0.0", "above = 1, not == 7; `not above >= 0.0` does not hold"),
-        ("average > 0.0 and gauge.outputs.sampled and bad.outputs.y", "`bad.outputs.y` does not hold"),
+        ("average > 0.0 and gauge.outputs.sampled and isnan(bad.outputs.y)", "`isnan(bad.outputs.y)` does not hold"),
         ("sqrt(-average) > 1.0 and average == average", "sqrt(-average) = nan, not > 1.0"),
     ],
 )
@@ -430,10 +430,11 @@ def test_a_test_of_cases_names_its_study(tmp_path: Path) -> None:
     assert "is the case of a study: write @pytest.mark.fcsl_campaign" in done.stdout + done.stderr
 
 
-def test_a_power_has_the_digits_of_a_double() -> None:
+def test_a_power_has_the_digits_of_a_double(write: Write) -> None:
     """And not the 370 million that 9**9**9 has."""
-    assert Metric("9**9**9", None)(None, {}) == math.inf  # type: ignore[arg-type]
-    assert Metric("2**-2 + 2**10", None)(None, {}) == 1024.25  # type: ignore[arg-type]
+    machine = read_study(write()).machine
+    assert Metric("9**9**9", machine)(None, {}) == math.inf  # type: ignore[arg-type]
+    assert Metric("2**-2 + 2**10", machine)(None, {}) == 1024.25  # type: ignore[arg-type]
 
 
 # ---- what is refused -------------------------------------------------------------------------------------------------
@@ -472,6 +473,8 @@ def test_a_power_has_the_digits_of_a_double() -> None:
         ({"metrics": {"m": "1 +"}}, "E208: metric `m`: `1 +` is no expression"),
         ({"pass": "mean(offset) > 0"}, "E208: `pass`: `offset` is a metric, one number of a flight"),
         ({"pass": "machine.state == 'NONE'"}, "E208: `pass`: "),
+        ({"pass": "average"}, "E208: `pass`: `average` is a number, neither True nor False"),
+        ({"metrics": {"m": "gauge.outputs.value and true"}}, "E208: metric `m`: `gauge.outputs.value` is a number, neither"),
         ({"simulation": 3}, "E208: `simulation` is a string"),
         ({"sed": 1}, "E201: unknown key `sed` in a study"),
     ],

@@ -144,11 +144,11 @@ def test_a_run_in_which_until_never_holds_says_so(sim_json: Path, tmp_path: Path
     config = json.loads(sim_json.read_text())
     outcomes = {0.2: (0, "until", True), 5.0: (1, "duration", False)}
     for above, (status, end, held) in outcomes.items():
-        config["until"] = {"field": "ramp.outputs.x", "above": above, "for_s": 0.1}
+        config["until"] = {"condition": f"ramp.outputs.x > {above}", "for_s": 0.1}
         sim_json.write_text(json.dumps(config))
         done = fcsl_sim("run", sim_json, "--record", tmp_path / f"bag{above}")
         assert (done.returncode, done.stderr) == (status, "")
-        says = done.stdout.splitlines()[-1] == "until never held: ramp.outputs.x above 5.0 for 0.1 s"
+        says = done.stdout.splitlines()[-1] == "until never held: ramp.outputs.x > 5.0 for 0.1 s"
         assert says is not held and (held or f"bag: {tmp_path / f'bag{above}'}" in done.stdout)
         done = fcsl_sim("run", sim_json, "--json")
         summary = json.loads(done.stdout)

@@ -45,7 +45,7 @@ def add(*connections: tuple[str, str]) -> Callable[[dict[str, Any]], None]:
 
 
 SENSOR = "instances", "altimeter", "parameters"
-UNTIL = {"field": "ramp.outputs.x", "above": 1.0}
+UNTIL = {"condition": "ramp.outputs.x > 1.0"}
 EVENT = {"at_s": 0.1, "set": "altimeter.parameters.bias", "value": 1.0}
 
 
@@ -125,9 +125,33 @@ EVENT = {"at_s": 0.1, "set": "altimeter.parameters.bias", "value": 1.0}
             edit("events", value=[EVENT | {"set": "altimeter.outputs.value"}]),
             ["E215: an event sets a parameter or an input, not `altimeter.outputs.value`"],
         ),
-        (edit("until", value=UNTIL | {"below": 1.0}), ["E202: `until` has one of `equals`, `above` and `below`"]),
-        (edit("until", value=UNTIL | {"above": True}), ["E207: `above` is f64, not a bool"]),
-        (edit("until", value=UNTIL | {"field": "ramp.outputs.z"}), ["E216: `ramp` has no output or state `outputs.z`"]),
+        (edit("until", value=UNTIL | {"below": 1.0}), ["E201: unknown key `below` in `until`"]),
+        (
+            edit("until", value={"condition": "ramp.outputs.x"}),
+            [
+                "E208: `condition`: `ramp.outputs.x` is a number, neither True nor False; compare it: `ramp.outputs.x == …`"
+            ],
+        ),
+        (
+            edit("until", value={"condition": "ramp.outputs.z > 1"}),
+            [
+                "E208: `condition`: there is no output or state `ramp.outputs.z` of a model; did you mean `ramp.outputs.x`?"
+            ],
+        ),
+        (
+            edit("until", value={"condition": "ramp.outputs.x[0] > 1"}),
+            ["E208: `condition`: `ramp.outputs.x[0]`: `ramp.outputs.x` is f64"],
+        ),
+        (
+            edit("until", value={"condition": "ramp.parameters.rate > 1"}),
+            ["E208: `condition`: there is no output or state `ramp.parameters.rate` of a model"],
+        ),
+        (
+            edit("until", value={"condition": "open('x')"}),
+            [
+                "E208: `condition`: there is no function `open`: there are abs, min, max, sqrt, degrees, norm, isnan, isfinite"
+            ],
+        ),
         (
             edit("models", "ramp", "source", value="romp.c"),
             ["E801: the model `romp.c` cannot be used: no such file: <dir>/romp.c"],

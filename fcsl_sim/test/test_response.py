@@ -279,7 +279,7 @@ def test_a_change_of_state_ends_a_measurement(measure: Measure) -> None:
 
 
 def test_the_stop_condition_ends_a_measurement(measure: Measure) -> None:
-    held = {"field": "ramp.outputs.x", "above": 0.5, "for_s": 6.0}
+    held = {"condition": "ramp.outputs.x > 0.5", "for_s": 6.0}
     slow, fast = measure(["ramp.inputs.rate"], [], [2.0, 40.0], until=held)
     assert slow.why.startswith("the simulation has ended after") and "`until` held" in slow.why
     assert fast.loop == pytest.approx(loop_by_hand(40.0), rel=3e-4)

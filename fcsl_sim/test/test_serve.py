@@ -217,7 +217,7 @@ def test_scheduled_writes_come_again(open_sim: Callable[..., Simulation], tmp_pa
 
 def test_the_stop_condition_has_held_as_long_as_it_had(open_sim: Callable[..., Simulation], tmp_path: Path) -> None:
     def change(config: dict[str, Any]) -> None:
-        config["until"] = {"field": "ramp.outputs.x", "above": 0.2, "for_s": 0.1}
+        config["until"] = {"condition": "ramp.outputs.x > 0.2", "for_s": 0.1}
 
     with open_sim(change) as steady:
         while steady.status == "running":

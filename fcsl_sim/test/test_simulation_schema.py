@@ -40,7 +40,7 @@ RICH: dict[str, Any] = copy.deepcopy(RAMP) | {
     "integrator": {"method": "rk45", "rtol": 1e-9, "atol": 1e-9, "max_step_s": 0.1, "min_step_s": 1e-9},
     "rates": {"altimeter": 100, "velocimeter": {"hz": 50, "phase_s": 0.005}, "line": 1000},
     "events": [{"at_s": 0.5, "set": "altimeter.parameters.bias", "value": 1.0}],
-    "until": {"field": "ramp.outputs.x", "above": 5.0, "for_s": 0.1},
+    "until": {"condition": "ramp.outputs.x > 5.0", "for_s": 0.1},
     "ros": [
         {
             "output": "ramp.outputs.x",
@@ -179,7 +179,7 @@ def test_every_key_is_described() -> None:
         ({"models": {"a": {"library": "liba.so"}}}, {"models": {"a": {"library": "package://p/a"}}}),
         ({"rates": {"a": 0}}, {"rates": {"a": {"hz": 5, "phase_s": 0.02}}}),
         ({"events": [{"at_s": 1.0, "set": "a.b"}]}, {"events": [{"at_s": 1.0, "set": "a.b", "value": [1, 2]}]}),
-        ({"until": {"field": "a.b", "above": 1, "below": 2}}, {"until": {"field": "a.b", "equals": True}}),
+        ({"until": {"field": "a.b", "equals": True}}, {"until": {"condition": "a.b"}}),
         ({"instances": {"controller": {"model": "a"}}}, {"instances": {"b": {"model": "a"}}}),
         ({"extends": 1}, {"extends": "base.sim.json"}),
     ],

@@ -16,7 +16,7 @@ from fcsl_compiler.base.diagnostics import DiagnosticError
 from fcsl_compiler.base.packages import package_share
 from fcsl_compiler.parse.json_reader import ConfigReader
 from fcsl_sim import SimError
-from fcsl_sim.campaign.metric import FUNCTIONS
+from fcsl_sim.campaign.metric import RESERVED
 from fcsl_sim.campaign.study import MAX_CASES, OWN_COLUMNS, read_study
 from fcsl_sim.cli import main
 from fcsl_sim.command import SCHEMA, STUDY_SCHEMA
@@ -129,7 +129,7 @@ def test_schema_and_reader_have_the_same_keys(accepted: Accepted, monkeypatch: p
 
 def test_words_and_limits_are_those_of_the_reader() -> None:
     defs, simulation = TEXT["$defs"], json.loads(SCHEMA.read_text())["$defs"]
-    assert defs["taken"]["enum"] == [*OWN_COLUMNS, *FUNCTIONS]
+    assert defs["taken"]["enum"] == [*OWN_COLUMNS, *RESERVED]
     assert TEXT["properties"]["cases"]["maximum"] == MAX_CASES
     assert defs["distribution"]["properties"]["linear"]["prefixItems"][2]["maximum"] == MAX_CASES
     assert defs["name"] == simulation["name"]

@@ -101,7 +101,7 @@ def test_events_at_one_time_apply_in_the_order_of_the_file(open_sim: Open) -> No
 
 def test_until_counts_ticks_in_a_row(load_sim: Callable[..., SimConfig]) -> None:
     def change(config: dict[str, Any]) -> None:
-        config["until"] = {"field": "ramp.outputs.x", "above": 0.2, "for_s": 0.1}
+        config["until"] = {"condition": "ramp.outputs.x > 0.2", "for_s": 0.1}
 
     summary = run(load_sim(change))
     assert summary.end == "until"
@@ -111,12 +111,13 @@ def test_until_counts_ticks_in_a_row(load_sim: Callable[..., SimConfig]) -> None
 
 @pytest.mark.parametrize(
     ("condition", "end", "ticks"),
-    [({"above": -1}, "until", 1), ({"below": -1}, "duration", 100), ({"equals": 10_000_000}, "until", 2)],
+    [("> -1", "until", 1), ("< -1", "duration", 100), ("== 10000000", "until", 2), ("// 0 == 1", "duration", 100)],
 )
-def test_until_compares_integers_with_their_sign(
-    load_sim: Callable[..., SimConfig], condition: dict[str, int], end: str, ticks: int
+def test_until_compares_integers_with_their_sign_and_holds_nowhere_without_a_value(
+    load_sim: Callable[..., SimConfig], condition: str, end: str, ticks: int
 ) -> None:
-    summary = run(load_sim(lambda config: config.update(until={"field": "ramp.outputs.time_ns", **condition})))
+    until = {"condition": f"ramp.outputs.time_ns {condition}"}
+    summary = run(load_sim(lambda config: config.update(until=until)))
     assert (summary.end, summary.ticks) == (end, ticks)
 
 

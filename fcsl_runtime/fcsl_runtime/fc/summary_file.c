@@ -12,7 +12,7 @@
 #include "fcsl/fcsl_error.h"
 #include "guard_link.h"
 #include "machine/fault_place.h"
-#include "run/health_name.h"
+#include "machine/health_name.h"
 #include "base/replace_file.h"
 #include "vars/json.h"
 

@@ -6,7 +6,7 @@
 #include "vars/catalog.c"
 
 #include "vars/catalog_slice.c"
-#include "vars/view.c"
+#include "machine/view.c"
 
 #include "fcsl_check.h"
 

@@ -11,7 +11,8 @@
 #include "vars/json_write.c"
 #include "vars/subscription.c"
 #include "vars/value.c"
-#include "vars/view.c"
+#include "machine/enumerators.c"
+#include "machine/view.c"
 
 #include "fcsl_check.h"
 

@@ -17,6 +17,8 @@ from hypothesis import strategies as st
 from native import Client, flying
 from vars_machine import build
 
+from fcsl_compiler.api.expressions import SCALARS, ExpressionError, Kind, Quantity, evaluator, parse
+
 SHAPES = {"hold.state.p": (4, 5), "hold.state.cube": (2, 3, 4), "hold.state.line": (7,)}
 
 
@@ -388,6 +390,85 @@ def test_eval_is_pythons(client: Client, text: str) -> None:
         assert type(got) is type(expected) and bits_or_self(got) == bits_or_self(expected), (text, got, expected)
 
 
+#: What the fields are that the expressions below read.
+QUANTITIES = {
+    "hold.state.p[1, 2]": Quantity(Kind.FLOAT),
+    "hold.state.p[1]": Quantity(Kind.FLOAT, (5,)),
+    "hold.state.line": Quantity(Kind.FLOAT, (7,)),
+    "hold.inputs.u": Quantity(Kind.FLOAT, (3,)),
+    "hold.inputs.free": Quantity(Kind.FLOAT),
+    "hold.state.cube[1, 2, 3]": Quantity(Kind.INTEGER),
+    "hold.state.count": Quantity(Kind.INTEGER),
+    "hold.state.big": Quantity(Kind.INTEGER),
+    "hold.state.flag": Quantity(Kind.BOOL),
+    "machine.state": Quantity(Kind.NAME, names=("RUN", "WAIT")),
+    "hold.outputs.health": Quantity(Kind.NAME, names=("nominal", "degraded", "failed", "stale")),
+}
+words_of_expressions = st.sampled_from(
+    [
+        *QUANTITIES,
+        *("1", "0", "2.5", "1e308", "9007199254740993", "9223372036854775807", "true", "'RUN'", "'stale'", "'other'"),
+        *("+", "-", "*", "/", "//", "%", "**", "<", "<=", "==", "!=", "in", "not in", "and", "or", "not"),
+        *("(", ")", ",", "[", "]", "abs(", "min(", "max(", "sqrt(", "degrees(", "norm(", "isnan(", "isfinite("),
+    ]
+)
+leaf = st.sampled_from([*QUANTITIES, "1", "0", "0.5", "3", "1e200", "9007199254740993", "9223372036854775807", "true"])
+numeric = st.recursive(
+    leaf,
+    lambda inner: st.one_of(
+        st.builds("{} {} {}".format, inner, st.sampled_from(["+", "-", "*", "/", "//", "%", "**"]), inner),
+        st.builds("({} {} {})".format, inner, st.sampled_from(["+", "-", "*", "/", "<", "==", "and", "or"]), inner),
+        st.builds(
+            "{}({})".format, st.sampled_from(["abs", "sqrt", "degrees", "norm", "isnan", "isfinite", "-"]), inner
+        ),
+        st.builds("{}({}, {})".format, st.sampled_from(["min", "max"]), inner, inner),
+        st.builds("{} {} ({}, {})".format, inner, st.sampled_from(["in", "not in"]), inner, inner),
+        st.builds("{} in ('RUN', 'stale', {})".format, inner, inner),
+        st.builds(
+            "{} {} {} {} {}".format, inner, st.sampled_from(["<", "=="]), inner, st.sampled_from([">=", "!="]), inner
+        ),
+    ),
+    max_leaves=6,
+)
+
+
+@settings(max_examples=600)
+@given(text=numeric | st.lists(words_of_expressions, max_size=9).map(" ".join))
+@example(text="norm(hold.inputs.u - hold.inputs.free * 2) > norm(hold.state.line)")
+@example(text="machine.state == 'RUN' and not hold.state.flag and 1 / 0 > 1")
+@example(text="hold.outputs.health in ('stale', 'failed',) or machine.state not in ['WAIT']")
+@example(text="-2 ** -hold.state.flag + hold.state.flag ** 0.5")
+@example(text="norm(norm(hold.inputs.u) * hold.inputs.u)")
+def test_both_implementations_agree(client: Client, text: str) -> None:
+    """On what an expression is, and on its value: the server's in C, and the one of tests, studies and the compiler in Python."""
+    client.ok("set_state", state="RUN")
+    client.ok("set", values={"hold.state.flag": True, "hold.inputs.free": -1.5, "hold.state.big": 7})
+    values = client.ok("get", paths=[path.replace(" ", "") for path in QUANTITIES])["values"]
+
+    def find(path: str) -> Quantity:
+        if path not in QUANTITIES:
+            raise ExpressionError(f"no {path}")
+        return QUANTITIES[path]
+
+    reply = client("eval", expression=text)
+    try:
+        expected = evaluator(parse(text, find), SCALARS)(lambda node: values[node.value.replace(" ", "")])
+    except ExpressionError:
+        assert reply.get("error", {}).get("code") in ("bad_expression", "unknown_path"), (text, reply)
+        return
+    if isinstance(expected, str) and not text.strip("( )").startswith(("machine", "hold")):
+        assert not reply["ok"]  # a name by itself
+        return
+    assert reply["ok"], (text, expected, reply)
+    got = (
+        {"nan": math.nan, "inf": math.inf, "-inf": -math.inf}.get(reply["value"], reply["value"])
+        if isinstance(reply["value"], str) and isinstance(expected, float)
+        else reply["value"]
+    )
+    same = bits_or_self(got) == bits_or_self(expected) or (got != got and expected != expected)
+    assert type(got) is type(expected) and same, (text, got, expected)
+
+
 def bits_or_self(value: Any) -> Any:
     return struct.pack("<d", value) if isinstance(value, float) else value
 
@@ -404,6 +485,11 @@ def bits_or_self(value: Any) -> Any:
         ("-7 // 2", -4),
         ("-7 % 3.5", 0.0),
         (" " * 1022 + "1", 1),
+        ("hold.state.flag + hold.state.flag", 2),
+        ("machine.state in ('RUN', 'WAIT') and hold.outputs.health not in ['failed']", True),
+        ("2 ** 3 ** 2 - -2 ** 2", 516.0),
+        ("norm(hold.inputs.u * 0 - hold.inputs.free)", math.sqrt(3.0)),
+        ("degrees(0)", 0.0),
     ],
 )
 def test_expressions(client: Client, text: str, value: Any) -> None:
@@ -424,11 +510,23 @@ def test_expressions(client: Client, text: str, value: Any) -> None:
         ("1 and 2", "bad_expression", ""),
         ("'RUN' < 'WAIT'", "bad_expression", ""),
         ("1 == 'RUN'", "bad_expression", ""),
-        ("hold.state.flag + 1", "bad_expression", ""),
+        ("machine.state + 1", "bad_expression", ""),
+        ("machine.state == 'RUM'", "bad_expression", ""),
+        ("'RUN' == 'RUN'", "bad_expression", ""),
+        ("machine.state == hold.outputs.health", "bad_expression", ""),
+        ("'RUN'", "bad_expression", ""),
+        ("machine.state in 'RUN'", "bad_expression", ""),
+        ("machine.state in ('RUN')", "bad_expression", ""),
+        ("machine.state in ()", "bad_expression", ""),
+        ("norm(hold.state.count)", "bad_expression", ""),
+        ("norm(hold.state.line) > 1 and norm(hold.state.p[0] + hold.inputs.u) > 1", "bad_expression", ""),
+        ("norm(hold.inputs.u < 1)", "bad_expression", ""),
+        ("norm(hold.state.p)", "bad_expression", ""),
         ("__import__('os')", "unknown_path", None),
         ("exit()", "unknown_path", None),
         ("1 if true else 2", "bad_expression", ""),
-        ("2 ** 3", "bad_expression", ""),
+        ("(-8) ** 0.5", "bad_expression", ""),
+        ("10.0 ** 400", "bad_expression", ""),
         ("min(1)", "bad_expression", ""),
         ("sqrt(-1)", "bad_expression", ""),
         ("9223372036854775807 + 1", "bad_expression", ""),

@@ -3,47 +3,44 @@
 
 from __future__ import annotations
 
-import ast
 from collections.abc import Mapping
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
 
+from fcsl_compiler.api.expressions import Node
 from simclient.twin.trace import Columns
 
 from .metric import Metric
-
-_BOUNDS = ast.Lt | ast.LtE | ast.Gt | ast.GtE
 
 
 def shortfall(passes: Metric, columns: Columns, metrics: Mapping[str, Any]) -> str:
     """touchdown_speed = 2.31, not < 2.0: by 0.31"""
 
-    def unmet(node: ast.expr) -> list[str]:
+    def unmet(node: Node) -> list[str]:
         if bool(value(node)):
             return []
-        if isinstance(node, ast.BoolOp):
-            return [line for part in node.values for line in unmet(part)]
-        if isinstance(node, ast.Compare):
-            pairs = zip([node.left, *node.comparators], node.ops, node.comparators, strict=False)
-            return [line for pair in pairs for line in unmet_pair(*pair)]
-        return [f"`{passes.text_of(node)}` does not hold"]
+        if node.operator in ("and", "or"):
+            return [line for part in node.parts for line in unmet(part)]
+        if node.operator == "compare":
+            pairs = zip(node.parts, node.value, node.parts[1:], strict=False)
+            return [line for left, operator, right in pairs for line in unmet_pair(node, left, operator, right)]
+        return [f"`{node.text}` does not hold"]
 
-    def unmet_pair(left: ast.expr, op: ast.cmpop, right: ast.expr) -> list[str]:
-        pair = ast.Compare(left, [op], [right])
-        if bool(value(pair)):
+    def unmet_pair(chain: Node, left: Node, operator: str, right: Node) -> list[str]:
+        if bool(value(replace(chain, parts=(left, right), value=(operator,)))):
             return []
         a, b = value(left), value(right)
-        sign = ast.unparse(ast.Compare(ast.Name(""), [op], [ast.Name("")])).strip()
-        limit = passes.text_of(right) if isinstance(right, ast.Constant) else f"{passes.text_of(right)} = {_shown(b)}"
-        distance = abs(float(a) - float(b)) if isinstance(op, _BOUNDS) else 0.0
+        limit = right.text if right.operator == "literal" else f"{right.text} = {_shown(b)}"
+        distance = abs(float(a) - float(b)) if operator not in ("==", "!=") else 0.0
         by = f": by {distance:.3g}" if distance > 0.0 else ""
-        return [f"{passes.text_of(left)} = {_shown(a)}, not {sign} {limit}{by}"]
+        return [f"{left.text} = {_shown(a)}, not {operator} {limit}{by}"]
 
-    def value(node: ast.expr) -> Any:
+    def value(node: Node) -> Any:
         return passes.part(node, columns, metrics)
 
-    return "; ".join(unmet(passes.tree))
+    return "; ".join(unmet(passes.root))
 
 
 def _shown(value: Any) -> str:

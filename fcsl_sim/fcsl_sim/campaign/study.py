@@ -4,7 +4,7 @@
 from __future__ import annotations
 
 import hashlib
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from fractions import Fraction
 from pathlib import Path
@@ -33,7 +33,7 @@ from .dispersion import (
     Value,
     random_bits,
 )
-from .metric import FUNCTIONS, Metric, MetricError
+from .metric import RESERVED, Metric, MetricError
 
 MAX_CASES = 10_000_000
 #: Of the table, beside those of parameters and metrics.
@@ -131,7 +131,7 @@ class _Reader:
         run = SimRun(config)
         try:
             metrics = self._metrics(keys.get("metrics"), run.machine)
-            passes = self._expression(keys.get("pass"), "`pass`", run.machine, tuple(metrics))
+            passes = self._expression(keys.get("pass"), "`pass`", run.machine, metrics, condition=True)
             machine = run.machine
         finally:
             run.close()
@@ -349,20 +349,22 @@ class _Reader:
     def _metrics(self, node: JsonNode | None, machine: Machine) -> dict[str, Metric]:
         found: dict[str, Metric] = {}
         for name, (definition, span) in self.reader.named(node, "`metrics`").items():
-            if name in OWN_COLUMNS or name in FUNCTIONS:
+            if name in OWN_COLUMNS or name in RESERVED:
                 what = "a column of every table" if name in OWN_COLUMNS else "a function"
                 self.sink.error("E209", f"`{name}` is {what}", span, help="give the metric another name")
-            metric = self._expression(definition, f"metric `{name}`", machine, tuple(found))
+            metric = self._expression(definition, f"metric `{name}`", machine, found)
             if metric is not None:
                 found[name] = metric
         return found
 
-    def _expression(self, node: JsonNode | None, what: str, machine: Machine, names: tuple[str, ...]) -> Metric | None:
+    def _expression(
+        self, node: JsonNode | None, what: str, machine: Machine, metrics: Mapping[str, Metric], condition: bool = False
+    ) -> Metric | None:
         text = self.reader.string(node, what, "max(body.outputs.speed)")
         if text is None or node is None:
             return None
         try:
-            return Metric(text, machine, names)
+            return Metric(text, machine, metrics, condition)
         except MetricError as error:
             self.sink.error("E208", f"{what}: {error}", node.span)
             return None

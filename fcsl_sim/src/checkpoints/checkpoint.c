@@ -281,7 +281,7 @@ int fcsl_sim_restore_checkpoint(fcsl_sim_t *sim, const void *bytes, size_t size,
         return possible ? -1 : fcsl_fail(error, "damaged: its plant is at no instant of this simulation");
     }
     sim->failed = 0;
-    const int is_until = sim->plan.until != FCSL_UNTIL_NONE && sim->until_held >= sim->plan.until_ticks;
+    const int is_until = sim->until != NULL && sim->until_held >= sim->plan.until_ticks;
     sim->status = is_until ? FCSL_SIM_UNTIL : sim->tick < sim->plan.ticks ? FCSL_SIM_RUNNING : FCSL_SIM_DURATION;
     fcsl_sim_publish(sim);
     return 0;

@@ -5,6 +5,7 @@
 #ifndef FCSL_SIM_SIMULATION_H
 #define FCSL_SIM_SIMULATION_H
 
+#include "fcsl/fcsl_expression.h"
 #include "fcsl/fcsl_external.h"
 #include "fcsl/fcsl_gate.h"
 #include "fcsl/fcsl_sim.h"
@@ -91,8 +92,7 @@ struct fcsl_sim {
     fcsl_sim_link_t *link; /* between plant and controller; null: none */
     uint32_t link_instance;
     fcsl_event_queue_t queue;
-    const uint8_t *until_field;
-    uint8_t until_type;
+    fcsl_expression_t *until; /* the stop condition; null: none */
     uint64_t until_held; /* ticks in a row that the stop condition has held */
     uint64_t tick;
     double *group_scratch; /* the vectors of one group, for checkpoints */

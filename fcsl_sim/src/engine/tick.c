@@ -76,22 +76,12 @@ void fcsl_sim_take_command(void *context, const fcsl_message_t *command)
     fcsl_gate_wait(&sim->gate, (uint64_t)sim->plant.time_ns, sim->image);
 }
 
+/* Without a value, as of a division by zero, it does not hold. */
 static int until_holds(const fcsl_sim_t *sim)
 {
-    uint8_t bytes[8] = {0};
-    fcsl_scalars_export(bytes, sim->until_field, sim->until_type, 1);
-    const double value = fcsl_as_double(fcsl_get_u64(bytes), sim->until_type);
-    const double limit = fcsl_as_double(sim->plan.until_value.bits, sim->until_type);
-    switch (sim->plan.until) {
-    case FCSL_UNTIL_EQUALS:
-        return value == limit;
-    case FCSL_UNTIL_ABOVE:
-        return value > limit;
-    case FCSL_UNTIL_BELOW:
-        return value < limit;
-    default:
-        return 0;
-    }
+    fcsl_value_t value;
+    fcsl_expression_error_t error;
+    return fcsl_expression_run(sim->until, &value, &error) == 0 && value.integer != 0;
 }
 
 int fcsl_sim_actuate(fcsl_sim_t *sim, const uint8_t *bytes, size_t size, fcsl_error_t *error)
@@ -112,7 +102,7 @@ static void complete_tick(fcsl_sim_t *sim)
     fcsl_actuators_update(sim);
     sim->sensed = 0;
     sim->tick++;
-    if (sim->plan.until != FCSL_UNTIL_NONE) {
+    if (sim->until != NULL) {
         sim->until_held = until_holds(sim) ? sim->until_held + 1 : 0;
         if (sim->until_held >= sim->plan.until_ticks) {
             sim->status = FCSL_SIM_UNTIL;

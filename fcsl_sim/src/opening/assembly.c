@@ -5,6 +5,7 @@
  */
 #include "assembly.h"
 
+#include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
 
@@ -203,6 +204,39 @@ static int sort_events(fcsl_sim_t *sim, fcsl_error_t *error)
     return 0;
 }
 
+/* "lander.outputs.landed" */
+static int find_in_plant(const void *context, const char *path, fcsl_operand_t *operand, fcsl_expression_error_t *error)
+{
+    const fcsl_plant_t *plant = context;
+    const size_t length = strcspn(path, ".");
+    for (uint32_t i = 0; i < plant->instance_count && path[length] == '.'; i++) {
+        const fcsl_instance_state_t *instance = &plant->instances[i];
+        if (strlen(instance->name) == length && strncmp(instance->name, path, length) == 0) {
+            return fcsl_expression_find_field(instance->model->fields, instance->model->field_count, NULL,
+                                              instance->data, path + length + 1u, operand, error);
+        }
+    }
+    *error = (fcsl_expression_error_t){.code = "unknown_path", .hint = ""};
+    (void)snprintf(error->text, sizeof error->text, "no field '%.80s'", path);
+    return -1;
+}
+
+static int build_until(fcsl_sim_t *sim, fcsl_error_t *error)
+{
+    fcsl_expression_error_t why;
+    sim->until = malloc(sizeof *sim->until);
+    if (sim->until == NULL) {
+        return fcsl_fail(error, "no memory for the stop condition");
+    }
+    if (fcsl_expression_compile(sim->plan.until, find_in_plant, &sim->plant, sim->until, &why) != 0) {
+        return fcsl_fail(error, "plan line %u: %s at character %zu of the stop condition", sim->plan.until_line,
+                         why.text, why.at + 1u);
+    }
+    return sim->until->kind == FCSL_VALUE_BOOL
+               ? 0
+               : fcsl_fail(error, "plan line %u: the stop condition is not a bool", sim->plan.until_line);
+}
+
 static int build_writes(fcsl_sim_t *sim, fcsl_error_t *error)
 {
     const fcsl_plan_t *plan = &sim->plan;
@@ -226,22 +260,7 @@ static int build_writes(fcsl_sim_t *sim, fcsl_error_t *error)
     if (sort_events(sim, error)) {
         return -1;
     }
-    if (plan->until == FCSL_UNTIL_NONE) {
-        return 0;
-    }
-    uint32_t index = 0;
-    const fcsl_plan_set_t *until = &plan->until_value;
-    const fcsl_field_t *field =
-        fcsl_sim_find_field(&sim->plant, until->line, until->instance, until->field, &index, error);
-    if (!field) {
-        return -1;
-    }
-    if (field->count != 1) {
-        return fcsl_sim_fail_line(error, until->line, "not a scalar:", until->field);
-    }
-    sim->until_field = sim->plant.instances[index].data + field->offset;
-    sim->until_type = field->type;
-    return 0;
+    return plan->until == NULL ? 0 : build_until(sim, error);
 }
 
 /* ---- all ---------------------------------------------------------------------------------------------------------------- */
@@ -305,6 +324,7 @@ void fcsl_assembly_free(fcsl_sim_t *sim)
     free(sim->plant.copies);
     free(sim->sensors);
     free(sim->events);
+    free(sim->until);
     free(sim->event_order);
     free(sim->plant.calls);
     free(sim->writes);

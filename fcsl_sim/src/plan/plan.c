@@ -339,30 +339,14 @@ static int on_write(parser_t *parser)
 static int on_until(parser_t *parser)
 {
     fcsl_plan_t *plan = parser->plan;
-    char *const *word = parser->word;
-    if (plan->until != FCSL_UNTIL_NONE) {
+    if (plan->until != NULL) {
         return bad(parser, "a second `until`");
     }
-    plan->until_value = (fcsl_plan_set_t){.line = parser->line, .instance = word[1], .field = word[2]};
-    if (!fcsl_plan_is_name(word[1]) || !fcsl_plan_is_path(word[2])) {
-        return bad(parser, "not a name or field");
-    }
-    if (strcmp(word[3], "equals") == 0) {
-        plan->until = FCSL_UNTIL_EQUALS;
-    } else if (strcmp(word[3], "above") == 0) {
-        plan->until = FCSL_UNTIL_ABOVE;
-    } else if (strcmp(word[3], "below") == 0) {
-        plan->until = FCSL_UNTIL_BELOW;
-    } else {
-        return bad(parser, "the comparison is not `equals`, `above` or `below`");
-    }
-    if (fcsl_plan_bits(word[4], &plan->until_value.bits)) {
-        return bad(parser, "the value is not 16 hexadecimal digits");
-    }
-    if (fcsl_plan_number(word[5], FCSL_PLAN_MAX_TICKS, &plan->until_ticks) || plan->until_ticks == 0) {
-        return bad(parser, "the number of ticks is not in 1..1000000000000");
-    }
-    return 0;
+    plan->until_line = parser->line;
+    plan->until = parser->word[2];
+    return fcsl_plan_number(parser->word[1], FCSL_PLAN_MAX_TICKS, &plan->until_ticks) || plan->until_ticks == 0
+               ? bad(parser, "the number of ticks is not in 1..1000000000000")
+               : 0;
 }
 
 static int on_serial_link(parser_t *parser)
@@ -436,7 +420,7 @@ static const statement_t statements[STATEMENTS] = {
     [WRITE] = {"write", 4, 0, on_write, FCSL_PLAN_MAX_LINKS},
     [EVENT] = {"event", 6, 0, on_event, FCSL_PLAN_MAX_SETS},
     [SERIAL_LINK] = {"serial_link", 2, 0, on_serial_link, 1},
-    [UNTIL] = {"until", 6, 0, on_until, 1},
+    [UNTIL] = {"until", 3, 1, on_until, 1},
     [VIEWS] = {"views", 2, 1, on_views, 1},
 };
 

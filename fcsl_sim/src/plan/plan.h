@@ -24,7 +24,7 @@
  *   write INSTANCE FIELD MACHINE_FIELD                from, to
  *   event TIME_NS INSTANCE FIELD ELEMENT BITS
  *   serial_link INSTANCE                              between plant and controller (serial_link.h)
- *   until INSTANCE FIELD equals|above|below BITS TICKS
+ *   until TICKS EXPRESSION                            it has held so many; to the end of the line (fcsl_expression.h)
  *   views TEXT                                        to the end of the line: they replace the machine's (fcsl_run_set_views)
  *   end
  *
@@ -131,8 +131,6 @@ typedef struct {
     uint64_t time_ns;
 } fcsl_plan_first_sample_t;
 
-typedef enum { FCSL_UNTIL_NONE = 0, FCSL_UNTIL_EQUALS, FCSL_UNTIL_ABOVE, FCSL_UNTIL_BELOW } fcsl_until_t;
-
 typedef struct {
     char *text;
     fcsl_plan_library_t machine;
@@ -170,8 +168,8 @@ typedef struct {
     fcsl_plan_set_t *events;
     uint32_t event_count;
     fcsl_plan_library_t serial_link; /* its instance; name null: none */
-    fcsl_until_t until;
-    fcsl_plan_set_t until_value;
+    uint32_t until_line;
+    const char *until; /* null: none */
     uint64_t until_ticks;
     const char *views; /* null: those of the machine */
 } fcsl_plan_t;

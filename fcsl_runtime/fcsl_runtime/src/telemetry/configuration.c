@@ -6,7 +6,7 @@
 
 #include <string.h>
 
-#include "run/health_name.h"
+#include "machine/health_name.h"
 
 typedef struct {
     uint8_t *bytes; /* null: only counts */

@@ -9,7 +9,7 @@
 
 #include "fcsl/fcsl_vars.h"
 #include "limits.h"
-#include "view.h"
+#include "machine/view.h"
 
 enum { GROUP_BYTES = 2 * PATH_BYTES_MAX };
 

@@ -4,7 +4,8 @@
  */
 #include <string.h>
 
-#include "expression.h"
+#include "evaluate.h"
+#include "machine/enumerators.h"
 #include "request.h"
 #include "value.h"
 
@@ -48,8 +49,8 @@ static void put_state(const commander_t *commander, json_out_t *out, const char 
     fcsl_json_text(out, ",\"");
     fcsl_json_text(out, name);
     fcsl_json_text(out, "\":");
-    fcsl_json_quoted(out,
-                     fcsl_value_name(catalog->blocks[catalog->machine].machine, FCSL_STATE, state, text, sizeof text));
+    fcsl_json_quoted(
+        out, fcsl_enumerator_name(catalog->blocks[catalog->machine].machine, FCSL_STATE, state, text, sizeof text));
 }
 
 void fcsl_request_status(const commander_t *commander, json_out_t *out)
@@ -145,25 +146,25 @@ int fcsl_handle_get(request_t *request)
 int fcsl_handle_eval(request_t *request)
 {
     commander_t *commander = request->commander;
-    char text[EXPRESSION_BYTES_MAX];
+    char text[FCSL_EXPRESSION_BYTES_MAX];
     const uint32_t token = fcsl_json_member(&request->json, 0, "expression");
     if (token == 0 || fcsl_json_string(&request->json, token, text, sizeof text) != 0) {
         return fcsl_request_refuse(request, "bad_request", "",
                                    "eval needs an \"expression\": a string of less than %d bytes",
-                                   EXPRESSION_BYTES_MAX);
+                                   FCSL_EXPRESSION_BYTES_MAX);
     }
     if (fcsl_request_snapshot(request) != 0) {
         return -1;
     }
-    expression_error_t error;
-    expression_value_t value;
-    if (fcsl_expression_evaluate(text, &commander->catalog, commander->snapshot, &value, &error) != 0) {
+    fcsl_expression_error_t error;
+    evaluated_t evaluated;
+    if (fcsl_evaluate(text, &commander->catalog, commander->snapshot, &evaluated, &error) != 0) {
         return fcsl_request_refuse(request, error.code, error.hint, "%s at character %zu of the expression", error.text,
                                    error.at + 1u);
     }
     put_tick(commander, request->out);
     fcsl_json_text(request->out, ",\"value\":");
-    fcsl_expression_write(&value, request->out);
+    fcsl_evaluated_write(&evaluated, request->out);
     return 0;
 }
 

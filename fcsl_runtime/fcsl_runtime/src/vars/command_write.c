@@ -6,6 +6,7 @@
 #include <string.h>
 
 #include "fcsl/fcsl_scalar.h"
+#include "machine/enumerators.h"
 #include "request.h"
 #include "value.h"
 
@@ -248,7 +249,7 @@ int fcsl_handle_set_state(request_t *request)
     if (name == NULL) {
         return -1;
     }
-    const int32_t state = fcsl_value_state(machine, name);
+    const int32_t state = fcsl_enumerator_find(machine, FCSL_STATE, name, strlen(name));
     if (state == FCSL_NONE) {
         return fcsl_request_refuse(request, "unknown_state", fcsl_nearest_state(machine, name), "no state '%s'", name);
     }

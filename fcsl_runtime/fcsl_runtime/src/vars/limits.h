@@ -21,10 +21,6 @@ enum {
     PATHS_MAX = 256, /* paths of one `get` */
     WRITES_MAX = 1024, /* separate pieces of memory that one `set` writes */
     TICKS_MAX = 1000000, /* ticks of one `tick` */
-    EXPRESSION_BYTES_MAX = 1024, /* bytes of an expression, with the 0 that ends it */
-    EXPRESSION_VALUES_MAX = 256, /* values in an expression */
-    EXPRESSION_DEPTH_MAX = 32, /* levels of an expression: each parenthesis, sign and `not` is one */
-    ARGUMENTS_MAX = 8, /* arguments of a function in an expression */
     SUBSCRIPTIONS_MAX = 4, /* subscriptions of a client */
     SUBSCRIBED_MAX = 64, /* paths of a subscription */
     SAMPLE_BYTES_MAX = 16 * 1024, /* bytes of a sample */

@@ -14,24 +14,9 @@
 #include <string.h>
 
 #include "fcsl/fcsl_scalar.h"
-#include "run/health_name.h"
+#include "machine/enumerators.h"
 
 enum { NAME_BYTES = 256, NUMBER_BYTES = 64 };
-
-const char *fcsl_value_name(const fcsl_machine_t *machine, uint8_t type, int32_t value, char *text, size_t size)
-{
-    if (type == FCSL_HEALTH) {
-        return value >= 0 && value <= (int32_t)FCSL_STALE ? fcsl_health_name(value) : "?";
-    }
-    if (type == FCSL_STATE) {
-        return value >= 0 && (uint32_t)value < machine->state_count ? machine->states[value].name : "?";
-    }
-    text[0] = '\0';
-    if (value > 0 && (uint32_t)value <= machine->request_count) {
-        (void)snprintf(text, size, "tr_%s", machine->requests[value - 1]);
-    }
-    return text;
-}
 
 static void write_scalar(const target_t *target, const uint8_t *bytes, json_out_t *out)
 {
@@ -72,7 +57,7 @@ static void write_scalar(const target_t *target, const uint8_t *bytes, json_out_
         return;
     default:
         memcpy(&i32, bytes, sizeof i32);
-        fcsl_json_quoted(out, fcsl_value_name(target->machine, target->field->type, i32, text, sizeof text));
+        fcsl_json_quoted(out, fcsl_enumerator_name(target->machine, target->field->type, i32, text, sizeof text));
     }
 }
 
@@ -190,9 +175,7 @@ static const char *read_enumerator(const fcsl_machine_t *machine, const json_t *
     }
     int32_t value = FCSL_NONE;
     if (type == FCSL_HEALTH) {
-        for (int32_t i = 0; i <= (int32_t)FCSL_STALE; i++) {
-            value = strcmp(text, fcsl_health_name(i)) == 0 ? i : value;
-        }
+        value = fcsl_enumerator_find(machine, type, text, strlen(text));
     } else {
         value = request_of(machine, text);
     }
@@ -274,14 +257,4 @@ const char *fcsl_value_source(const fcsl_field_t *fields, const fcsl_field_t *fi
         return "the machine";
     }
     return field->connected_from == FCSL_NONE ? "" : fields[field->connected_from].path;
-}
-
-int32_t fcsl_value_state(const fcsl_machine_t *machine, const char *name)
-{
-    for (uint32_t i = 0; i < machine->state_count; i++) {
-        if (strcmp(machine->states[i].name, name) == 0) {
-            return (int32_t)i;
-        }
-    }
-    return FCSL_NONE;
 }

@@ -19,13 +19,7 @@ const char *fcsl_value_read(const target_t *target, const json_t *json, uint32_t
 /* The type as users write it, "f64[2][2]": of the field, or of the target's part of it. */
 void fcsl_value_type(const fcsl_field_t *field, const view_t *view, char *text, size_t size);
 
-/* Name of an enumerator of the type ("tr_GO", "nominal", "IDLE"), in `text` if it has to be made. */
-const char *fcsl_value_name(const fcsl_machine_t *machine, uint8_t type, int32_t value, char *text, size_t size);
-
 /* What one of these fields is connected from: the path of another, "the machine", or "". */
 const char *fcsl_value_source(const fcsl_field_t *fields, const fcsl_field_t *field);
-
-/* Index of a state, or FCSL_NONE. */
-int32_t fcsl_value_state(const fcsl_machine_t *machine, const char *name);
 
 #endif /* FCSL_VARS_VALUE_H */

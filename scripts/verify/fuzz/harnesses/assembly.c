@@ -201,14 +201,13 @@ static void say_fields(plan_t *plan)
 
 static void say_end(plan_t *plan)
 {
-    static const char *const comparisons[] = {"equals", "above", "below", "around"};
+    static const char *const comparisons[] = {"==", ">", "<", "in"};
     if (any(plan, 4) == 3) {
         say(plan, "serial_link %s\n", names[any(plan, INSTANCES_MAX + 1)]);
     }
     if (any(plan, 4) == 3) {
         const uint32_t i = any(plan, plan->count);
-        say(plan, "until %s %s %s %s 1\n", PICK(names, i), plan->kind[i]->output, PICK(comparisons, 1),
-            bits[any(plan, 12)]);
+        say(plan, "until 1 %s.%s %s %u\n", PICK(names, i), plan->kind[i]->output, PICK(comparisons, 1), any(plan, 12));
     }
     say(plan, "end\n");
 }

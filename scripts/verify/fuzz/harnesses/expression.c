@@ -1,21 +1,21 @@
 /* SPDX-License-Identifier: Apache-2.0
  *
- * expression.h: expressions over the fixture machine. The same text has the same value twice, and what it writes is JSON.
+ * evaluate.h: expressions over the fixture machine. The same text has the same value twice, and what it writes is JSON.
  */
-#include "vars/expression.h"
+#include "vars/evaluate.h"
 #include "hosted.h"
 
 static int evaluate(const catalog_t *catalog, const char *text, char *reply, size_t capacity)
 {
-    expression_value_t value;
-    expression_error_t error;
+    evaluated_t evaluated;
+    fcsl_expression_error_t error;
     json_out_t out;
     fcsl_json_begin(&out, reply, capacity);
-    if (fcsl_expression_evaluate(text, catalog, fcsl_run_data(hosted.run), &value, &error) != 0) {
+    if (fcsl_evaluate(text, catalog, fcsl_run_data(hosted.run), &evaluated, &error) != 0) {
         FUZZ_CHECK(error.at <= strlen(text) && error.text[0] != '\0' && error.hint != NULL && error.code[0] != '\0');
         return -1;
     }
-    fcsl_expression_write(&value, &out);
+    fcsl_evaluated_write(&evaluated, &out);
     FUZZ_CHECK(!out.overflow && out.at > 0);
     return 0;
 }
@@ -26,7 +26,7 @@ int LLVMFuzzerTestOneInput(const uint8_t *data, size_t size)
     char second[2048];
     json_token_t tokens[4];
     json_t json;
-    bytes_t bytes = {data, size < EXPRESSION_BYTES_MAX ? size : EXPRESSION_BYTES_MAX - 1u};
+    bytes_t bytes = {data, size < FCSL_EXPRESSION_BYTES_MAX ? size : FCSL_EXPRESSION_BYTES_MAX - 1u};
     char *text = take_text(&bytes);
     catalog_t catalog;
     hosted_open();

@@ -46,7 +46,7 @@ static void check_others(const fcsl_plan_t *plan)
     for (uint32_t i = 0; i < plan->event_count; i++) {
         FUZZ_CHECK(plan->events[i].time_ns <= INT64_MAX && plan->events[i].field[0] != '\0');
     }
-    FUZZ_CHECK(plan->until == FCSL_UNTIL_NONE || plan->until_ticks >= 1);
+    FUZZ_CHECK(plan->until == NULL || plan->until_ticks >= 1);
 }
 
 int LLVMFuzzerTestOneInput(const uint8_t *data, size_t size)

@@ -29,7 +29,7 @@ static const char *const plans[] = {
           "instance ball ball 0 0 0 0\ninstance sensor noisy_sensor - 1000 20 5\n"
           "set sensor parameters.sigma 0 3fb999999999999a\n" BALL "call ball output\ncall sensor update\n"
           "link ball outputs.z sensor inputs.truth\nsensor sensor outputs.value altitude\n"
-          "until ball outputs.bounces equals 00000000000000ff 3\nend\n",
+          "until 3 ball.outputs.bounces == 255\nend\n",
     BEGIN "delay 2\ncompanion second 1 hopper ./hopper.so\nmodel ball ./ball.so\nmodel problem ./problem.so\nmodel "
           "ramp ./ramp.so\n"
           "group ab4 300 " NONE "group verlet 100 " NONE "group rk4 1000 " NONE

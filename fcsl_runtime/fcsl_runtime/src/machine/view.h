@@ -2,8 +2,8 @@
  *
  * Parts of an array field: indices and slices as NumPy has them, `P[1]`, `P[-1,0]`, `P[0:3,::2]`, `P[1:][0]`.
  */
-#ifndef FCSL_VARS_VIEW_H
-#define FCSL_VARS_VIEW_H
+#ifndef FCSL_VIEW_H
+#define FCSL_VIEW_H
 
 #include <stdint.h>
 
@@ -37,4 +37,4 @@ int64_t fcsl_view_field(const view_t *view, uint32_t i);
 /* Puts the axes of `last` behind those of the view; 0, or -1 when they are too many. */
 int fcsl_view_append(view_t *view, const view_t *last);
 
-#endif /* FCSL_VARS_VIEW_H */
+#endif /* FCSL_VIEW_H */
