@@ -17,14 +17,14 @@ static void test_stub(void)
     fcsl_error_t error;
     fcsl_hal_t hal;
     CHECK(fcsl_hal_stub(&hal, &error) == 0 && hal.open(&hal, &error) == 0);
-    const uint64_t soon_ns = hal.now_ns(hal.ctx) + 1000000u;
-    hal.wait(hal.ctx, soon_ns);
-    CHECK(hal.now_ns(hal.ctx) >= soon_ns);
+    const uint64_t soon_ns = hal.clock.now_ns(hal.clock.ctx) + 1000000u;
+    hal.clock.wait(hal.clock.ctx, soon_ns);
+    CHECK(hal.clock.now_ns(hal.clock.ctx) >= soon_ns);
     CHECK(hal.arm(hal.ctx, 1) == FCSL_HAL_OK && hal.arm(hal.ctx, 0) == FCSL_HAL_OK);
-    CHECK(!hal.read_log(hal.ctx, line));
-    hal.log(hal.ctx, "armed");
-    CHECK(hal.read_log(hal.ctx, line) && strcmp(line, "armed") == 0 && !hal.read_log(hal.ctx, line));
-    CHECK(hal.sample(hal.ctx, 0, bytes, sizeof bytes, &message) == FCSL_HAL_NONE);
+    CHECK(!fcsl_log_read(hal.log, line));
+    fcsl_log_write(hal.log, "armed");
+    CHECK(fcsl_log_read(hal.log, line) && strcmp(line, "armed") == 0 && !fcsl_log_read(hal.log, line));
+    CHECK(hal.sample(hal.ctx, 0, NULL) == FCSL_HAL_OK);
     CHECK(hal.command(hal.ctx, &message) == FCSL_HAL_OK);
     CHECK(!hal.paces && !hal.serves);
     hal.interrupt(hal.ctx);
@@ -42,15 +42,15 @@ static void test_full_log(void)
     for (int round = 0; round < 2; round++) {
         for (int i = 0; i < FCSL_LOG_LINES + LOST; i++) {
             (void)snprintf(line, sizeof line, "line %d", i);
-            hal.log(hal.ctx, line);
+            fcsl_log_write(hal.log, line);
         }
         for (int i = 0; i < FCSL_LOG_LINES; i++) {
             char expected[FCSL_LOG_BYTES];
             (void)snprintf(expected, sizeof expected, "line %d", i);
-            CHECK(hal.read_log(hal.ctx, line) && strcmp(line, expected) == 0);
+            CHECK(fcsl_log_read(hal.log, line) && strcmp(line, expected) == 0);
         }
-        CHECK(hal.read_log(hal.ctx, line) && strncmp(line, "3 lines were not printed", 24) == 0);
-        CHECK(!hal.read_log(hal.ctx, line));
+        CHECK(fcsl_log_read(hal.log, line) && strncmp(line, "3 lines were not printed", 24) == 0);
+        CHECK(!fcsl_log_read(hal.log, line));
     }
     hal.close(hal.ctx);
 }

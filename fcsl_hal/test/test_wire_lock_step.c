@@ -184,8 +184,7 @@ static void *accept_one(void *argument)
 static void test_interrupt(void)
 {
     fcsl_error_t error;
-    uint8_t bytes[MESSAGE_BYTES];
-    fcsl_message_t message;
+    delivered_t delivered;
     fcsl_hal_t hal;
     pthread_t thread;
     void *accepted = NULL;
@@ -194,8 +193,8 @@ static void test_interrupt(void)
     CHECK(fcsl_hal_wire(their_spec, &MACHINE, WAIT_MS, &hal, &error) == 0 && hal.open(&hal, &error) == 0);
     CHECK(pthread_join(thread, &accepted) == 0 && accepted == external);
     CHECK(pthread_create(&thread, NULL, interrupt_soon, &hal) == 0);
-    CHECK(sample_patiently(&hal, 0, bytes, sizeof bytes, &message) == FCSL_HAL_CLOSED);
-    CHECK(sample_patiently(&hal, 0, bytes, sizeof bytes, &message) == FCSL_HAL_CLOSED);
+    CHECK(sample_patiently(&hal, 0, &delivered) == FCSL_HAL_CLOSED);
+    CHECK(sample_patiently(&hal, 0, &delivered) == FCSL_HAL_CLOSED);
     CHECK(pthread_join(thread, NULL) == 0);
     hal.close(hal.ctx);
     fcsl_external_close(external);

@@ -76,13 +76,31 @@ static inline size_t sensor_message(uint64_t tick, uint8_t *message)
     return encode_message(&MACHINE, &data, FCSL_SENSOR_MESSAGE, tick, NULL, message, MESSAGE_BYTES);
 }
 
-/* A sample, however long it takes. */
-static inline fcsl_hal_status_t sample_patiently(const fcsl_hal_t *hal, uint64_t tick, uint8_t *bytes, size_t size,
-                                                 fcsl_message_t *message)
+/* What a HAL has delivered: the last message, with bytes of its own. */
+typedef struct {
+    uint8_t bytes[MESSAGE_BYTES];
+    fcsl_message_t message;
+    int count;
+} delivered_t;
+
+static inline void deliver(void *ctx, const fcsl_message_t *message)
 {
+    delivered_t *delivered = ctx;
+    CHECK(message->size <= sizeof delivered->bytes);
+    memcpy(delivered->bytes, message->bytes, message->size);
+    delivered->message = *message;
+    delivered->message.bytes = delivered->bytes;
+    delivered->count++;
+}
+
+/* A sample, however long it takes. */
+static inline fcsl_hal_status_t sample_patiently(const fcsl_hal_t *hal, uint64_t tick, delivered_t *delivered)
+{
+    const fcsl_sink_t to = {.ctx = delivered, .sensed = deliver};
     fcsl_hal_status_t status = FCSL_HAL_WAITING;
+    delivered->count = 0;
     while (status == FCSL_HAL_WAITING) {
-        status = hal->sample(hal->ctx, tick, bytes, size, message);
+        status = hal->sample(hal->ctx, tick, &to);
     }
     return status;
 }
@@ -102,14 +120,16 @@ static inline fcsl_hal_status_t fly(const fcsl_machine_t *machine, uint32_t time
         hal.close(hal.ctx);
         return FCSL_HAL_ERROR;
     }
-    CHECK(hal.paces && hal.serves && hal.now_ns(hal.ctx) == 0);
+    CHECK(hal.paces && hal.serves && hal.clock.now_ns(hal.clock.ctx) == 0);
     fcsl_hal_status_t status = FCSL_HAL_OK;
     for (uint64_t tick = 0; status == FCSL_HAL_OK; tick++) {
+        delivered_t delivered;
         fcsl_message_t message;
-        status = sample_patiently(&hal, tick, bytes, sizeof bytes, &message);
+        status = sample_patiently(&hal, tick, &delivered);
         if (status == FCSL_HAL_OK) {
-            CHECK(message.bytes == bytes && message.tick == tick && message.kind == FCSL_SENSOR_MESSAGE);
-            CHECK(hal.now_ns(hal.ctx) == time_of(tick));
+            message = delivered.message;
+            CHECK(delivered.count == 1 && message.tick == tick && message.kind == FCSL_SENSOR_MESSAGE);
+            CHECK(hal.clock.now_ns(hal.clock.ctx) == time_of(tick));
             fcsl_message_apply(machine, &data, &message);
             data.command[0] = 2.0 * (double)data.i64;
             CHECK(fcsl_message_encode_actuators(&table, &data, tick, 1, bytes, sizeof bytes, &message) == 0);

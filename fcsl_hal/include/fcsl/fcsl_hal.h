@@ -20,11 +20,11 @@ extern "C" {
 
 typedef enum {
     FCSL_HAL_OK = 0,
-    FCSL_HAL_NONE = 1,    /* sample: no message for this tick */
+    FCSL_HAL_NONE = 1,    /* at the simulator's end (fcsl_external.h): nothing came */
     FCSL_HAL_TIMEOUT = 2, /* lock-step: the message of this tick did not come in time */
     FCSL_HAL_CLOSED = 3,  /* the other side ended the run */
     FCSL_HAL_ERROR = 4,
-    FCSL_HAL_WAITING = 5, /* lock-step: nothing has come yet, and there is time left: call again for the same tick */
+    FCSL_HAL_WAITING = 5, /* sample: nothing has come yet, and there is time left: call again for the same tick */
     FCSL_HAL_AGAIN = 6    /* the other side ended the run, and begins another one */
 } fcsl_hal_status_t;
 
@@ -34,39 +34,51 @@ typedef enum {
     FCSL_PACED_IN_REAL_TIME = 2  /* a device, each of whose samples is a tick; or a simulator that keeps real time */
 } fcsl_pacer_t;
 
+/* What ticks are due by. */
+typedef struct {
+    void *ctx;
+    uint64_t (*now_ns)(void *ctx);
+    /* Sleeps until this time of the clock, or until a signal; at once where sample waits. */
+    void (*wait)(void *ctx, uint64_t until_ns);
+} fcsl_clock_t;
+
+/* CLOCK_MONOTONIC. */
+extern const fcsl_clock_t fcsl_monotonic_clock;
+
+/* Where sample hands what was sensed: the host's run (fcsl_run_sense_message), or who stands before it. */
+typedef struct {
+    void *ctx;
+    /* A message of sensor channels that the HAL has checked. It is valid during the call. */
+    void (*sensed)(void *ctx, const fcsl_message_t *message);
+} fcsl_sink_t;
+
 typedef struct fcsl_hal {
     void *ctx;
     /* Before anything else. Returns 0, or with `error` filled -1, or 1 when the peer was not found yet: then it may be called again,
      * to look on. Sets what stands below as known only now. */
     int (*open)(struct fcsl_hal *hal, fcsl_error_t *error);
-    /* Puts the sensor message of `tick` into `bytes` and returns OK; `capacity` is fcsl_message_capacity(machine, FCSL_SENSOR_MESSAGE)
-     * or more. The HAL has checked what came from elsewhere: the host takes *message as it is. Sets it on FCSL_HAL_OK alone. NONE: there
-     * is no message, since nothing is new, or since the HAL has put its samples into the channels itself: those of a board and of the
-     * ROS 2 graph, which are made for one run, do so, because their samples have an age and a stamp of their own, which no message
-     * carries. */
-    fcsl_hal_status_t (*sample)(void *ctx, uint64_t tick, uint8_t *bytes, size_t capacity, fcsl_message_t *message);
+    /* Delivers what was sensed for `tick`; OK, also where nothing is new. Samples with an age and a stamp of their own, which no
+     * message carries, are those of a HAL that was made for one run (a board, the ROS 2 graph): it writes them into the run. The
+     * others hand `to` one message at most, with OK alone. A HAL that paces may return WAITING after a moment: call again. */
+    fcsl_hal_status_t (*sample)(void *ctx, uint64_t tick, const fcsl_sink_t *to);
     fcsl_hal_status_t (*command)(void *ctx, const fcsl_message_t *message);
     /* Called when the arm flag of the commands changes, before the command that changes it, and with 0 at the end of a run that
      * is armed. A HAL that owns actuators switches their outputs; one that hands commands on has the flag in them. */
     fcsl_hal_status_t (*arm)(void *ctx, int armed);
     /* The host makes no ticks for a while, and calls this often: a simulator waits on for its commands. */
     void (*alive)(void *ctx);
-    /* The clock of the run: monotonic, or simulated time where a simulator sends it. */
-    uint64_t (*now_ns)(void *ctx);
-    /* Sleeps until this time of that clock, or until a signal; at once where sample waits. */
-    void (*wait)(void *ctx, uint64_t until_ns);
-    /* A line for people, from the thread that samples: kept in a bounded ring (fcsl_log.h), never waited for. */
-    void (*log)(void *ctx, const char *text);
-    /* The oldest line, from another thread: 1, or 0 when there is none. */
-    int (*read_log)(void *ctx, char text[FCSL_LOG_BYTES]);
     /* Brings the counters that `fields` describe up to date; they stand at `counters`. From the thread that samples; before
      * open, too. */
     void (*count)(void *ctx);
-    /* What the last status other than OK or NONE was about, for messages; never null. */
+    /* What the last status other than OK or WAITING was about, for messages; never null. */
     const char *(*explain)(void *ctx);
     /* May be called from any thread: a waiting sample, and every later one, returns FCSL_HAL_CLOSED. */
     void (*interrupt)(void *ctx);
     void (*close)(void *ctx);
+    /* Monotonic, or simulated time where a simulator sends it. */
+    fcsl_clock_t clock;
+    /* Lines for people: written by the thread that samples, read by another (fcsl_log.h). */
+    fcsl_log_t *log;
     /* What the HAL knows of itself (age, errors, drops, the link), under `hal.` in variables and telemetry; not part of a run's
      * results. Known before open. */
     const fcsl_field_t *fields;

@@ -9,6 +9,20 @@
 #include "fcsl/fcsl_monotonic.h"
 #include "fcsl/fcsl_hal.h"
 
+static uint64_t now_ns(void *ctx)
+{
+    (void)ctx;
+    return fcsl_monotonic_ns();
+}
+
+static void wait(void *ctx, uint64_t until_ns)
+{
+    (void)ctx;
+    fcsl_monotonic_wait(until_ns);
+}
+
+const fcsl_clock_t fcsl_monotonic_clock = {.now_ns = now_ns, .wait = wait};
+
 static int stub_open(fcsl_hal_t *hal, fcsl_error_t *error)
 {
     (void)hal;
@@ -16,14 +30,12 @@ static int stub_open(fcsl_hal_t *hal, fcsl_error_t *error)
     return 0;
 }
 
-static fcsl_hal_status_t stub_sample(void *ctx, uint64_t tick, uint8_t *bytes, size_t capacity, fcsl_message_t *message)
+static fcsl_hal_status_t stub_sample(void *ctx, uint64_t tick, const fcsl_sink_t *to)
 {
     (void)ctx;
     (void)tick;
-    (void)bytes;
-    (void)capacity;
-    (void)message;
-    return FCSL_HAL_NONE;
+    (void)to;
+    return FCSL_HAL_OK;
 }
 
 static fcsl_hal_status_t stub_command(void *ctx, const fcsl_message_t *message)
@@ -38,29 +50,6 @@ static fcsl_hal_status_t stub_arm(void *ctx, int armed)
     (void)ctx;
     (void)armed;
     return FCSL_HAL_OK;
-}
-
-static uint64_t stub_now_ns(void *ctx)
-{
-    (void)ctx;
-    return fcsl_monotonic_ns();
-}
-
-static void stub_wait(void *ctx, uint64_t until_ns)
-{
-    (void)ctx;
-    fcsl_monotonic_wait(until_ns);
-}
-
-/* All that there is of it. */
-static void stub_log(void *ctx, const char *text)
-{
-    fcsl_log_write(ctx, text);
-}
-
-static int stub_read_log(void *ctx, char text[FCSL_LOG_BYTES])
-{
-    return fcsl_log_read(ctx, text);
 }
 
 static const char *stub_explain(void *ctx)
@@ -86,10 +75,8 @@ int fcsl_hal_stub(fcsl_hal_t *hal, fcsl_error_t *error)
         .sample = stub_sample,
         .command = stub_command,
         .arm = stub_arm,
-        .now_ns = stub_now_ns,
-        .wait = stub_wait,
-        .log = stub_log,
-        .read_log = stub_read_log,
+        .clock = fcsl_monotonic_clock,
+        .log = log,
         .count = stub_nothing,
         .explain = stub_explain,
         .alive = stub_nothing,

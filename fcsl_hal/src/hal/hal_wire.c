@@ -65,7 +65,9 @@ typedef struct {
     uint64_t greeted_ns; /* when; 0: nobody can answer any more */
     int is_over; /* the peer has ended the run, or is gone */
     int paces;
-    int sensed;           /* the sensor message of the tick has come */
+    int sensed;           /* the sensor message of the tick has come, and is kept in `sensors` */
+    fcsl_message_t sensors;
+    uint8_t *sensor_bytes;
     int waits;            /* for that tick, until deadline_ns */
     uint64_t deadline_ns;
     uint64_t alive_ns;    /* when the next sign of life is due */
@@ -85,16 +87,6 @@ typedef struct {
     char name_space[SPEC_BYTES];
     char text[TEXT_BYTES];
 } hal_t;
-
-static void wire_log(void *ctx, const char *text)
-{
-    fcsl_log_write(&((hal_t *)ctx)->log, text);
-}
-
-static int wire_read_log(void *ctx, char text[FCSL_LOG_BYTES])
-{
-    return fcsl_log_read(&((hal_t *)ctx)->log, text);
-}
 
 /* ---- receiving ----------------------------------------------------------------------------------------------------- */
 
@@ -134,15 +126,26 @@ static fcsl_wire_status_t receive(hal_t *hal, uint64_t deadline_ns, size_t *size
     return hal->wire.receive(hal->wire.ctx, deadline_ns, hal->inbox, hal->inbox_size, size);
 }
 
-/* Copies a sensor message out of the inbox. */
-static void take(hal_t *hal, const fcsl_message_t *heard, uint8_t *bytes, fcsl_message_t *message)
+/* Keeps a sensor message, which leaves the inbox. */
+static void keep(hal_t *hal, const fcsl_message_t *heard)
 {
-    *message = *heard;
-    memcpy(bytes, heard->bytes, heard->size);
-    message->bytes = bytes;
+    hal->sensors = *heard;
+    memcpy(hal->sensor_bytes, heard->bytes, heard->size);
+    hal->sensors.bytes = hal->sensor_bytes;
+    hal->sensed = 1;
     hal->counters.messages++;
     hal->counters.entries_skipped += heard->skipped;
     hal->counters.ticks_without = 0;
+}
+
+/* What was kept goes on; a tick without is counted. */
+static void deliver(hal_t *hal, const fcsl_sink_t *to)
+{
+    hal->counters.ticks_without += hal->sensed ? 0u : 1u;
+    if (hal->sensed) {
+        to->sensed(to->ctx, &hal->sensors);
+    }
+    hal->sensed = 0;
 }
 
 /* ---- paced by a simulator ------------------------------------------------------------------------------------------ */
@@ -173,7 +176,7 @@ static fcsl_hal_status_t timed_out(hal_t *hal, uint64_t tick)
     return FCSL_HAL_TIMEOUT;
 }
 
-/* The wire has nothing now, or never again: FCSL_HAL_OK to wait on. */
+/* The wire has nothing now, or never again: FCSL_HAL_WAITING to wait on. */
 static fcsl_hal_status_t nothing_came(hal_t *hal, fcsl_wire_status_t status, uint64_t tick)
 {
     if (atomic_load(&hal->interrupted)) {
@@ -186,7 +189,7 @@ static fcsl_hal_status_t nothing_came(hal_t *hal, fcsl_wire_status_t status, uin
         (void)snprintf(hal->text, sizeof hal->text, "the simulator went away before tick %" PRIu64, tick);
         return FCSL_HAL_ERROR;
     }
-    return status == FCSL_WIRE_ERROR ? wire_failed(hal) : FCSL_HAL_OK;
+    return status == FCSL_WIRE_ERROR ? wire_failed(hal) : FCSL_HAL_WAITING;
 }
 
 static void wait_anew(hal_t *hal)
@@ -195,9 +198,8 @@ static void wait_anew(hal_t *hal)
     hal->waits = 1;
 }
 
-/* Takes one message of the tick: FCSL_HAL_OK to go on, NONE when the tick happens now. */
-static fcsl_hal_status_t hear(hal_t *hal, uint64_t tick, size_t size, uint8_t *bytes, size_t capacity,
-                              fcsl_message_t *message)
+/* Takes one message of the tick: WAITING to go on, OK when the tick happens now. */
+static fcsl_hal_status_t hear(hal_t *hal, uint64_t tick, size_t size)
 {
     fcsl_message_t heard;
     const heard_t what = judge(hal, size, &heard);
@@ -209,51 +211,48 @@ static fcsl_hal_status_t hear(hal_t *hal, uint64_t tick, size_t size, uint8_t *b
         wait_anew(hal);
     }
     if (what == HEARD_NOTHING || what == HEARD_ALIVE) {
-        return FCSL_HAL_OK;
+        return FCSL_HAL_WAITING;
     }
     if (heard.tick > tick) {
         return too_early(hal, what == HEARD_TIME ? "time" : "sensor", heard.tick, tick);
     }
-    if (heard.tick < tick || heard.size > capacity) {
+    if (heard.tick < tick) {
         hal->counters.messages_late++;
-        return FCSL_HAL_OK;
+        return FCSL_HAL_WAITING;
     }
     if (what == HEARD_SENSORS) {
-        take(hal, &heard, bytes, message);
-        hal->sensed = 1;
-        return FCSL_HAL_OK;
+        keep(hal, &heard);
+        return FCSL_HAL_WAITING;
     }
     hal->time_ns = heard.time_ns;
-    return FCSL_HAL_NONE;
+    return FCSL_HAL_OK;
 }
 
-/* A message that came before a FCSL_HAL_WAITING stays in `bytes` and *message, which the host hands in again. */
-static fcsl_hal_status_t sample_paced(hal_t *hal, uint64_t tick, uint8_t *bytes, size_t capacity,
-                                      fcsl_message_t *message)
+static fcsl_hal_status_t sample_paced(hal_t *hal, uint64_t tick, const fcsl_sink_t *to)
 {
     const uint64_t look_ns = fcsl_monotonic_ns() + LOOK_NS;
-    fcsl_hal_status_t status = FCSL_HAL_OK;
+    fcsl_hal_status_t status = FCSL_HAL_WAITING;
     if (!hal->waits) {
         wait_anew(hal);
     }
-    while (status == FCSL_HAL_OK) { /* every turn takes a message, or waits and looks at the time */
+    while (status == FCSL_HAL_WAITING) { /* every turn takes a message, or waits and looks at the time */
         size_t size = 0;
         const fcsl_wire_status_t came =
             atomic_load(&hal->interrupted)
                 ? FCSL_WIRE_NONE
                 : receive(hal, look_ns < hal->deadline_ns ? look_ns : hal->deadline_ns, &size);
-        status = came == FCSL_WIRE_OK ? hear(hal, tick, size, bytes, capacity, message) : nothing_came(hal, came, tick);
-        if (status == FCSL_HAL_OK && fcsl_monotonic_ns() >= hal->deadline_ns) {
+        status = came == FCSL_WIRE_OK ? hear(hal, tick, size) : nothing_came(hal, came, tick);
+        if (status == FCSL_HAL_WAITING && fcsl_monotonic_ns() >= hal->deadline_ns) {
             status = timed_out(hal, tick);
-        } else if (status == FCSL_HAL_OK && fcsl_monotonic_ns() >= look_ns) {
-            return FCSL_HAL_WAITING;
+        } else if (status == FCSL_HAL_WAITING && fcsl_monotonic_ns() >= look_ns) {
+            return FCSL_HAL_WAITING; /* what has been sensed is kept */
         }
     }
-    const int sensed = hal->sensed;
     hal->waits = 0;
-    hal->sensed = 0;
-    hal->counters.ticks_without += sensed ? 0u : 1u;
-    return status == FCSL_HAL_NONE && sensed ? FCSL_HAL_OK : status;
+    if (status == FCSL_HAL_OK) {
+        deliver(hal, to);
+    }
+    return status;
 }
 
 /* A rig waits for nobody. */
@@ -275,7 +274,7 @@ static void rig_gone(hal_t *hal)
 {
     if (hal->counters.connected != 0) {
         hal->counters.connected = 0;
-        wire_log(hal, "the rig is gone");
+        fcsl_log_write(&hal->log, "the rig is gone");
     }
 }
 
@@ -296,12 +295,10 @@ static int hear_presence(hal_t *hal, fcsl_wire_status_t came, size_t size)
 }
 
 /* Free-running, one message has all that came. */
-static fcsl_hal_status_t sample_newest(hal_t *hal, uint64_t tick, uint8_t *bytes, size_t capacity,
-                                       fcsl_message_t *message)
+static fcsl_hal_status_t sample_newest(hal_t *hal, uint64_t tick, const fcsl_sink_t *to)
 {
-    int sensed = 0;
     wire_alive(hal);
-    for (int i = 0; i < MESSAGES_MAX && !(sensed && hal->runs_free); i++) {
+    for (int i = 0; i < MESSAGES_MAX && !(hal->sensed && hal->runs_free); i++) {
         size_t size = 0;
         fcsl_message_t heard;
         const fcsl_wire_status_t came = receive(hal, 0, &size);
@@ -318,25 +315,23 @@ static fcsl_hal_status_t sample_newest(hal_t *hal, uint64_t tick, uint8_t *bytes
         if (what == HEARD_END || what == HEARD_AGAIN) {
             rig_gone(hal);
         }
-        if (what == HEARD_SENSORS && heard.size <= capacity) {
-            hal->counters.messages_late += (uint64_t)sensed;
-            take(hal, &heard, bytes, message);
-            message->tick = tick; /* a rig counts its own */
-            sensed = 1;
+        if (what == HEARD_SENSORS) {
+            hal->counters.messages_late += (uint64_t)hal->sensed;
+            keep(hal, &heard);
+            hal->sensors.tick = tick; /* a rig counts its own */
         }
     }
-    hal->counters.ticks_without += sensed ? 0u : 1u;
     if (atomic_load(&hal->interrupted)) {
         return FCSL_HAL_CLOSED;
     }
-    return sensed ? FCSL_HAL_OK : FCSL_HAL_NONE;
+    deliver(hal, to);
+    return FCSL_HAL_OK;
 }
 
-static fcsl_hal_status_t wire_sample(void *ctx, uint64_t tick, uint8_t *bytes, size_t capacity, fcsl_message_t *message)
+static fcsl_hal_status_t wire_sample(void *ctx, uint64_t tick, const fcsl_sink_t *to)
 {
     hal_t *hal = ctx;
-    return hal->paces ? sample_paced(hal, tick, bytes, capacity, message)
-                      : sample_newest(hal, tick, bytes, capacity, message);
+    return hal->paces ? sample_paced(hal, tick, to) : sample_newest(hal, tick, to);
 }
 
 /* ---- commands ------------------------------------------------------------------------------------------------------ */
@@ -435,6 +430,7 @@ static void wire_close(void *ctx)
         hal->wire.close(hal->wire.ctx);
     }
     free(hal->inbox);
+    free(hal->sensor_bytes);
     free(hal->fields);
     free(hal);
 }
@@ -563,9 +559,11 @@ static int make(const fcsl_wire_counters_t *of_wire, const fcsl_machine_t *machi
     if (hal != NULL) {
         hal->inbox_size = sensors > HANDSHAKE_PACKET_MAX ? sensors : HANDSHAKE_PACKET_MAX;
         hal->inbox = malloc(hal->inbox_size);
+        hal->sensor_bytes = malloc(hal->inbox_size);
         hal->fields = calloc(OWN_COUNT + of_wire->field_count, sizeof *hal->fields);
     }
-    if (hal == NULL || hal->inbox == NULL || hal->fields == NULL || of_wire->bytes > FCSL_WIRE_COUNTERS_MAX) {
+    if (hal == NULL || hal->inbox == NULL || hal->sensor_bytes == NULL || hal->fields == NULL ||
+        of_wire->bytes > FCSL_WIRE_COUNTERS_MAX) {
         if (hal != NULL) {
             wire_close(hal);
         }
@@ -582,10 +580,8 @@ static int make(const fcsl_wire_counters_t *of_wire, const fcsl_machine_t *machi
         .command = wire_command,
         .arm = wire_arm,
         .alive = wire_alive,
-        .now_ns = wire_now_ns,
-        .wait = wire_wait,
-        .log = wire_log,
-        .read_log = wire_read_log,
+        .clock = {.ctx = hal, .now_ns = wire_now_ns, .wait = wire_wait},
+        .log = &hal->log,
         .count = wire_count,
         .explain = wire_explain,
         .interrupt = wire_interrupt,

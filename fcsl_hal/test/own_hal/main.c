@@ -45,6 +45,11 @@ static const fcsl_machine_t MACHINE = {.tick_hz = 100,
 
 enum { TICKS = 60, ROOM = 512 };
 
+static void sensed(void *ctx, const fcsl_message_t *message)
+{
+    fcsl_message_apply(&MACHINE, ctx, message);
+}
+
 int main(void)
 {
     static loopback_t loopback;
@@ -55,15 +60,13 @@ int main(void)
     fcsl_error_t error;
     fcsl_message_t message;
     fcsl_hal_t hal;
+    const fcsl_sink_t to = {.ctx = &data, .sensed = sensed};
     const fcsl_channel_table_t table = fcsl_channel_table(&MACHINE);
     CHECK(loopback_hal(&loopback, &MACHINE, &channels, select, &hal) == 0);
     CHECK(hal.open(&hal, &error) == 0);
     for (uint64_t tick = 0; tick < TICKS; tick++) {
-        const fcsl_hal_status_t sampled = hal.sample(hal.ctx, tick, bytes, sizeof bytes, &message);
-        CHECK(sampled == (tick == 0 ? FCSL_HAL_NONE : FCSL_HAL_OK));
-        if (sampled == FCSL_HAL_OK) {
-            fcsl_message_apply(&MACHINE, &data, &message);
-        }
+        data.fresh = 0;
+        CHECK(hal.sample(hal.ctx, tick, &to) == FCSL_HAL_OK && data.fresh == (tick > 0));
         data.command = 0.5 * data.measurement + 1.0;
         CHECK(fcsl_message_encode_actuators(&table, &data, tick, 1, bytes, sizeof bytes, &message) == FCSL_MESSAGE_OK);
         CHECK(hal.command(hal.ctx, &message) == FCSL_HAL_OK);

@@ -13,6 +13,11 @@
 
 enum { TICKS = 2000, WAIT_MS = 10000, ROOM = 1024 };
 
+static void sensed(void *ctx, const fcsl_message_t *message)
+{
+    fcsl_message_apply(&MACHINE, ctx, message);
+}
+
 /* Steps until the run ends; exits 0 when the simulator ended it after all ticks. */
 static int control(pipe_wire_t *pipe)
 {
@@ -22,6 +27,7 @@ static int control(pipe_wire_t *pipe)
     fcsl_hal_t hal;
     data_t data = {0};
     const fcsl_wire_t wire = pipe_wire(pipe);
+    const fcsl_sink_t to = {.ctx = &data, .sensed = sensed};
     const fcsl_channel_table_t table = fcsl_channel_table(&MACHINE);
     CHECK(fcsl_hal_over_wire(&wire, &MACHINE, WAIT_MS, &hal, &error) == 0);
     CHECK(hal.open(&hal, &error) == 0 && hal.paces);
@@ -29,10 +35,9 @@ static int control(pipe_wire_t *pipe)
     uint64_t tick = 0;
     for (; status == FCSL_HAL_OK; tick++) {
         do { /* ends at the time-out */
-            status = hal.sample(hal.ctx, tick, bytes, sizeof bytes, &message);
+            status = hal.sample(hal.ctx, tick, &to);
         } while (status == FCSL_HAL_WAITING);
         if (status == FCSL_HAL_OK) {
-            fcsl_message_apply(&MACHINE, &data, &message);
             data.command[0] = 2.0 * (double)data.i64;
             CHECK(fcsl_message_encode_actuators(&table, &data, tick, 1, bytes, sizeof bytes, &message) == 0);
             status = hal.command(hal.ctx, &message);

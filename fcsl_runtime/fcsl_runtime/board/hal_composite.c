@@ -25,6 +25,9 @@ typedef struct {
     fcsl_channel_table_t table;
     uint8_t *data; /* a struct of the machine: what the simulator sensed */
     uint8_t *select; /* by channel: it goes on to the machine */
+    uint8_t *bytes; /* of the message that goes on */
+    size_t capacity;
+    const fcsl_sink_t *to; /* of this tick's */
     fcsl_field_t *fields; /* of both */
     uint8_t *counters;
     uint64_t begun_ns; /* when tick 0 came; 0: not yet */
@@ -63,12 +66,13 @@ static fcsl_hal_status_t keep_real_time(hal_t *hal, fcsl_hal_status_t sampled)
     return now > due_ns && now - due_ns > BEHIND_NS ? fail(hal, "behind", now - due_ns) : sampled;
 }
 
-/* Takes the board's channels out of what the simulator sensed. */
-static fcsl_hal_status_t leave_to_board(hal_t *hal, uint64_t tick, uint8_t *bytes, size_t capacity,
-                                        fcsl_message_t *message)
+/* What the simulator sensed goes on without the board's channels. */
+static void leave_to_board(void *ctx, const fcsl_message_t *sensed)
 {
+    hal_t *hal = ctx;
     const fcsl_machine_t *machine = hal->table.machine;
-    fcsl_message_apply(machine, hal->data, message);
+    fcsl_message_t left;
+    fcsl_message_apply(machine, hal->data, sensed);
     for (uint32_t i = 0; i < machine->channel_count; i++) {
         const fcsl_channel_t *channel = &machine->channels[i];
         hal->select[i] = 0;
@@ -77,35 +81,40 @@ static fcsl_hal_status_t leave_to_board(hal_t *hal, uint64_t tick, uint8_t *byte
             hal->data[channel->fresh_offset] = 0;
         }
     }
-    if (fcsl_message_encode_sensors(&hal->table, hal->data, tick, hal->select, bytes, capacity, message) !=
-        FCSL_MESSAGE_OK) {
-        (void)snprintf(hal->failure, sizeof hal->failure, "the sensor message of tick %" PRIu64 " has no room", tick);
+    if (fcsl_message_encode_sensors(&hal->table, hal->data, sensed->tick, hal->select, hal->bytes, hal->capacity,
+                                    &left) == FCSL_MESSAGE_OK) {
+        hal->to->sensed(hal->to->ctx, &left);
+    } else {
+        (void)snprintf(hal->failure, sizeof hal->failure, "the sensor message of tick %" PRIu64 " has no room",
+                       sensed->tick);
         hal->failed = 1;
-        return FCSL_HAL_ERROR;
     }
-    return FCSL_HAL_OK;
 }
 
-static fcsl_hal_status_t composite_sample(void *ctx, uint64_t tick, uint8_t *bytes, size_t capacity,
-                                          fcsl_message_t *message)
+/* Lines of the board follow those of the simulator. */
+static void join_logs(hal_t *hal)
+{
+    char line[FCSL_LOG_BYTES];
+    for (int i = 0; i <= FCSL_LOG_LINES && fcsl_log_read(hal->board.log, line); i++) {
+        fcsl_log_write(hal->simulated.log, line);
+    }
+}
+
+static fcsl_hal_status_t composite_sample(void *ctx, uint64_t tick, const fcsl_sink_t *to)
 {
     hal_t *hal = ctx;
+    const fcsl_sink_t without_board = {.ctx = hal, .sensed = leave_to_board};
     hal->culprit = &hal->simulated;
-    fcsl_hal_status_t status = hal->simulated.sample(hal->simulated.ctx, tick, bytes, capacity, message);
-    if (status == FCSL_HAL_OK || status == FCSL_HAL_NONE || status == FCSL_HAL_WAITING) {
-        status = keep_real_time(hal, status);
+    hal->to = to;
+    fcsl_hal_status_t status = hal->simulated.sample(hal->simulated.ctx, tick, &without_board);
+    if (status == FCSL_HAL_OK || status == FCSL_HAL_WAITING) {
+        status = hal->failed ? FCSL_HAL_ERROR : keep_real_time(hal, status);
     }
     if (status == FCSL_HAL_OK) {
-        status = leave_to_board(hal, tick, bytes, capacity, message);
-    }
-    if (status != FCSL_HAL_OK && status != FCSL_HAL_NONE) {
-        return status;
-    }
-    const fcsl_hal_status_t sensed = hal_linux_sense(hal->board.ctx);
-    if (sensed != FCSL_HAL_NONE) {
         hal->culprit = &hal->board;
-        return sensed;
+        status = hal->board.sample(hal->board.ctx, tick, to);
     }
+    join_logs(hal);
     return status;
 }
 
@@ -131,30 +140,6 @@ static void composite_count(void *ctx)
     hal->simulated.count(hal->simulated.ctx);
     memcpy(hal->counters, hal->board.counters, hal->board.counter_bytes);
     memcpy(hal->counters + hal->board.counter_bytes, hal->simulated.counters, hal->simulated.counter_bytes);
-}
-
-static uint64_t composite_now_ns(void *ctx)
-{
-    const fcsl_hal_t *simulated = &((hal_t *)ctx)->simulated;
-    return simulated->now_ns(simulated->ctx);
-}
-
-static void composite_wait(void *ctx, uint64_t until_ns)
-{
-    const fcsl_hal_t *simulated = &((hal_t *)ctx)->simulated;
-    simulated->wait(simulated->ctx, until_ns);
-}
-
-static void composite_log(void *ctx, const char *text)
-{
-    const fcsl_hal_t *simulated = &((hal_t *)ctx)->simulated;
-    simulated->log(simulated->ctx, text);
-}
-
-static int composite_read_log(void *ctx, char text[FCSL_LOG_BYTES])
-{
-    hal_t *hal = ctx;
-    return hal->board.read_log(hal->board.ctx, text) || hal->simulated.read_log(hal->simulated.ctx, text);
 }
 
 static const char *composite_explain(void *ctx)
@@ -185,6 +170,7 @@ static void composite_close(void *ctx)
     hal->simulated.close(hal->simulated.ctx);
     free(hal->data);
     free(hal->select);
+    free(hal->bytes);
     free(hal->fields);
     free(hal->counters);
     free(hal);
@@ -210,9 +196,12 @@ static int allocate(hal_t *hal, fcsl_error_t *error)
     hal->table = fcsl_channel_table(machine);
     hal->data = aligned_alloc(align, size);
     hal->select = calloc((size_t)machine->channel_count + 1u, 1);
+    hal->capacity = fcsl_message_capacity(machine, FCSL_SENSOR_MESSAGE);
+    hal->bytes = malloc(hal->capacity);
     hal->fields = calloc((size_t)hal->board.field_count + hal->simulated.field_count + 1u, sizeof *hal->fields);
     hal->counters = calloc(1, (size_t)hal->board.counter_bytes + hal->simulated.counter_bytes + 1u);
-    if (hal->data == NULL || hal->select == NULL || hal->fields == NULL || hal->counters == NULL) {
+    if (hal->data == NULL || hal->select == NULL || hal->bytes == NULL || hal->fields == NULL ||
+        hal->counters == NULL) {
         return fcsl_fail(error, "out of memory for the HAL");
     }
     memset(hal->data, 0, size);
@@ -261,10 +250,8 @@ int hal_composite(const fcsl_hal_t *board, const fcsl_hal_t *simulated, fcsl_run
         .command = composite_command,
         .arm = composite_arm,
         .alive = composite_alive,
-        .now_ns = composite_now_ns,
-        .wait = composite_wait,
-        .log = composite_log,
-        .read_log = composite_read_log,
+        .clock = simulated->clock,
+        .log = simulated->log,
         .count = composite_count,
         .explain = composite_explain,
         .interrupt = composite_interrupt,

@@ -2,19 +2,21 @@
  *
  * The HAL of a board.
  */
+#define _GNU_SOURCE
 #include "hal_linux.h"
 
 #include <stdio.h>
 #include <stdlib.h>
 
 #include "fcsl/fcsl_error.h"
+#include "fcsl/fcsl_monotonic.h"
 #include "board.h"
 #include "board_hardware.h"
 #include "counters.h"
 #include "readings.h"
 
 typedef struct {
-    fcsl_hal_t base; /* the stub: its clock and its log */
+    fcsl_log_t log;
     fcsl_run_t *run;
     int priority; /* of the devices' threads */
     board_t *board;
@@ -50,7 +52,7 @@ static void tell_primary(hal_t *hal, uint32_t s)
                        fcsl_backend_condition_text(fcsl_frontend_condition(sensor->frontend, (uint32_t)before)));
     }
     hal->primaries[s] = primary;
-    hal->base.log(hal->base.ctx, text);
+    fcsl_log_write(&hal->log, text);
 }
 
 static void tell_news(hal_t *hal)
@@ -60,7 +62,7 @@ static void tell_news(hal_t *hal)
         news = board_hardware_news(hal->hardware);
     }
     if (news != NULL) {
-        hal->base.log(hal->base.ctx, news);
+        fcsl_log_write(&hal->log, news);
     }
 }
 
@@ -68,10 +70,10 @@ static void tell_news(hal_t *hal)
 static fcsl_hal_status_t wait_for_pace(hal_t *hal)
 {
     const board_plan_t *plan = hal->plan;
-    const uint64_t slice_ns = hal->base.now_ns(hal->base.ctx) + SLICE_NS;
+    const uint64_t slice_ns = fcsl_monotonic_ns() + SLICE_NS;
     const uint64_t end_ns = hal->paced_ns > 0u ? hal->paced_ns + plan->pace_timeout_ns : UINT64_MAX;
     const int sampled = board_devices_wait(hal->devices, slice_ns < end_ns ? slice_ns : end_ns);
-    const uint64_t now_ns = hal->base.now_ns(hal->base.ctx);
+    const uint64_t now_ns = fcsl_monotonic_ns();
     if (sampled > 0) {
         hal->paced_ns = now_ns;
         return FCSL_HAL_OK;
@@ -88,14 +90,16 @@ static fcsl_hal_status_t wait_for_pace(hal_t *hal)
     return FCSL_HAL_TIMEOUT;
 }
 
-fcsl_hal_status_t hal_linux_sense(void *ctx)
+static fcsl_hal_status_t linux_sample(void *ctx, uint64_t tick, const fcsl_sink_t *to)
 {
     hal_t *hal = ctx;
+    (void)tick;
+    (void)to;
     const fcsl_hal_status_t paced = hal->plan->pacing != BOARD_NO_DEVICE ? wait_for_pace(hal) : FCSL_HAL_OK;
     if (paced != FCSL_HAL_OK) {
         return paced;
     }
-    const uint64_t now_ns = hal->base.now_ns(hal->base.ctx);
+    const uint64_t now_ns = fcsl_monotonic_ns();
     readings_t *readings = &hal->readings;
     readings->count = board_devices_take(hal->devices, readings->kept, READINGS_MAX);
     for (uint32_t i = 0; i < readings->count; i++) {
@@ -109,17 +113,7 @@ fcsl_hal_status_t hal_linux_sense(void *ctx)
         tell_primary(hal, s);
     }
     tell_news(hal);
-    return FCSL_HAL_NONE;
-}
-
-static fcsl_hal_status_t linux_sample(void *ctx, uint64_t tick, uint8_t *bytes, size_t capacity,
-                                      fcsl_message_t *message)
-{
-    (void)tick;
-    (void)bytes;
-    (void)capacity;
-    (void)message;
-    return hal_linux_sense(ctx);
+    return FCSL_HAL_OK;
 }
 
 /* The tick is over: pins get their levels. Actuators are moved by fcsl-guard, if there is one. */
@@ -171,30 +165,6 @@ static void linux_count(void *ctx)
     }
 }
 
-static uint64_t linux_now_ns(void *ctx)
-{
-    const fcsl_hal_t *base = &((hal_t *)ctx)->base;
-    return base->now_ns(base->ctx);
-}
-
-static void linux_wait(void *ctx, uint64_t until_ns)
-{
-    const fcsl_hal_t *base = &((hal_t *)ctx)->base;
-    base->wait(base->ctx, until_ns);
-}
-
-static void linux_log(void *ctx, const char *text)
-{
-    const fcsl_hal_t *base = &((hal_t *)ctx)->base;
-    base->log(base->ctx, text);
-}
-
-static int linux_read_log(void *ctx, char text[FCSL_LOG_BYTES])
-{
-    const fcsl_hal_t *base = &((hal_t *)ctx)->base;
-    return base->read_log(base->ctx, text);
-}
-
 static const char *linux_explain(void *ctx)
 {
     return ((hal_t *)ctx)->failure.text;
@@ -208,7 +178,7 @@ static void linux_alive(void *ctx)
     if (hal->hardware != NULL) {
         board_hardware_tick(hal->hardware);
     }
-    hal->paced_ns = hal->paced_ns > 0u ? hal->base.now_ns(hal->base.ctx) : 0u;
+    hal->paced_ns = hal->paced_ns > 0u ? fcsl_monotonic_ns() : 0u;
 }
 
 static void linux_interrupt(void *ctx)
@@ -227,9 +197,6 @@ static void linux_close(void *ctx)
         board_hardware_free(hal->hardware);
     }
     const int left = board_devices_free(hal->devices) != 0;
-    if (hal->base.close != NULL) {
-        hal->base.close(hal->base.ctx);
-    }
     counters_free(&hal->counters);
     readings_free(&hal->readings);
     if (!left) { /* a thread that hangs in its driver reads the plan */
@@ -253,7 +220,7 @@ static int linux_open(fcsl_hal_t *handle, fcsl_error_t *error)
         char text[FCSL_LOG_BYTES];
         (void)snprintf(text, sizeof text, "waits for device '%.60s', which paces the loop",
                        hal->plan->devices[hal->plan->pacing].name);
-        hal->base.log(hal->base.ctx, text);
+        fcsl_log_write(&hal->log, text);
     }
     return 0;
 }
@@ -313,7 +280,7 @@ int hal_linux(const char *file, int priority, fcsl_run_t *run, fcsl_hal_t *hal, 
     self->run = run;
     self->priority = priority;
     self->readings.topic = -1;
-    if (fcsl_hal_stub(&self->base, error) != 0 || open_board(self, file, error) != 0) {
+    if (open_board(self, file, error) != 0) {
         linux_close(self);
         return -1;
     }
@@ -324,10 +291,8 @@ int hal_linux(const char *file, int priority, fcsl_run_t *run, fcsl_hal_t *hal, 
         .command = linux_command,
         .arm = linux_arm,
         .alive = linux_alive,
-        .now_ns = linux_now_ns,
-        .wait = linux_wait,
-        .log = linux_log,
-        .read_log = linux_read_log,
+        .clock = fcsl_monotonic_clock,
+        .log = &self->log,
         .count = linux_count,
         .explain = linux_explain,
         .interrupt = linux_interrupt,

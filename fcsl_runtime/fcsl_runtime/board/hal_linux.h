@@ -12,8 +12,6 @@
 /* `file`: the plan that `fcslc board` has written, for the machine of `run`; `priority`: of the devices' threads, with SCHED_FIFO (0: as any
  * thread). 0, or -1. */
 int hal_linux(const char *file, int priority, fcsl_run_t *run, fcsl_hal_t *hal, fcsl_error_t *error);
-/* What its sample does, with its `ctx`: brings the samples of the board's sensors into the channels. NONE, or what ends the flight. */
-fcsl_hal_status_t hal_linux_sense(void *ctx);
 /* After the last tick: makes pins safe. 0, or -1: one is not. */
 int hal_linux_end(const fcsl_hal_t *hal, fcsl_error_t *error);
 /* Whether a sensor of the board gives this channel of the machine its samples. */

@@ -32,13 +32,10 @@ int loop_open(loop_t *loop)
     const fcsl_machine_t *machine = fcsl_run_machine(loop->run);
     const fcsl_part_t parts[] = {{.data = fcsl_run_data(loop->run), .size = machine->size},
                                  {.data = loop->hal.counters, .size = loop->hal.counter_bytes}};
-    loop->sensor_capacity = fcsl_message_capacity(machine, FCSL_SENSOR_MESSAGE);
     loop->actuator_capacity = fcsl_message_capacity(machine, FCSL_ACTUATOR_MESSAGE);
-    loop->sensor_bytes = calloc(1, loop->sensor_capacity);
     loop->actuator_bytes = calloc(1, loop->actuator_capacity);
-    if (loop->sensor_bytes == NULL || loop->actuator_bytes == NULL ||
-        fcsl_history_open(&loop->history, parts, loop->hal.field_count > 0 ? 2 : 1, history_slots(machine->size)) !=
-            0) {
+    if (loop->actuator_bytes == NULL || fcsl_history_open(&loop->history, parts, loop->hal.field_count > 0 ? 2 : 1,
+                                                          history_slots(machine->size)) != 0) {
         return -1;
     }
     loop_publish(loop);
@@ -48,7 +45,6 @@ int loop_open(loop_t *loop)
 void loop_free(loop_t *loop)
 {
     hal_topic_close(&loop->hal_topic);
-    free(loop->sensor_bytes);
     free(loop->actuator_bytes);
     fcsl_history_free(&loop->history);
 }
@@ -87,7 +83,7 @@ static void fail(loop_t *loop, const char *text)
 /* Judges what a HAL call returned: 1 to go on, 0 when the run is over. */
 static int goes_on(loop_t *loop, fcsl_hal_status_t status)
 {
-    if (status == FCSL_HAL_OK || status == FCSL_HAL_NONE) {
+    if (status == FCSL_HAL_OK) {
         return 1;
     }
     if (status == FCSL_HAL_CLOSED || status == FCSL_HAL_AGAIN) {
@@ -108,7 +104,7 @@ static void watch_mode(loop_t *loop)
         (void)snprintf(text, sizeof text,
                        "instance `%.100s` left another floating-point mode: bits of its tick may differ in a replay",
                        by);
-        loop->hal.log(loop->hal.ctx, text);
+        fcsl_log_write(loop->hal.log, text);
     }
     loop->mode_changes = changes;
 }
@@ -168,7 +164,7 @@ static int arm(loop_t *loop, int armed)
     }
     (void)snprintf(text, sizeof text, "%s at tick %" PRIu64, armed ? "armed" : "disarmed",
                    fcsl_run_tick(loop->run) - 1u);
-    loop->hal.log(loop->hal.ctx, text);
+    fcsl_log_write(loop->hal.log, text);
     return goes_on(loop, loop->hal.arm(loop->hal.ctx, armed));
 }
 
@@ -196,27 +192,29 @@ static int act_on_sensors(loop_t *loop, uint64_t begun_ns)
     return on;
 }
 
-/* Looks for the sensors of the coming tick. */
+/* A refused message is counted by the run and changes nothing: the channel grows old instead. */
+static void sensed(void *ctx, const fcsl_message_t *message)
+{
+    fcsl_error_t error;
+    (void)fcsl_run_sense_message(((const loop_t *)ctx)->run, message, &error);
+}
+
+/* Brings the sensors of the coming tick into the run. */
 static fcsl_hal_status_t sample(loop_t *loop)
 {
-    return loop->hal.sample(loop->hal.ctx, fcsl_run_tick(loop->run), loop->sensor_bytes, loop->sensor_capacity,
-                            &loop->sensors);
+    const fcsl_sink_t to = {.ctx = loop, .sensed = sensed};
+    return loop->hal.sample(loop->hal.ctx, fcsl_run_tick(loop->run), &to);
 }
 
 /* The tick of what was sampled; 0 when the run is over. */
 static int make_tick(loop_t *loop, fcsl_hal_status_t sampled)
 {
-    fcsl_error_t error;
     if (!goes_on(loop, sampled)) {
         return 0;
     }
     const uint64_t begun_ns = fcsl_monotonic_ns();
     fcsl_tick_stats_put(&loop->stats.tick, fcsl_run_tick(loop->run));
     fcsl_tick_stats_put(&loop->stats.begun_ns, begun_ns);
-    if (sampled == FCSL_HAL_OK) {
-        /* A refused message is counted by the run and changes nothing: the channel grows old instead. */
-        (void)fcsl_run_sense_message(loop->run, &loop->sensors, &error);
-    }
     const int on = act_on_sensors(loop, begun_ns);
     fcsl_tick_stats_put(&loop->stats.begun_ns, 0);
     fcsl_histogram_add(&loop->stats.tick_time, fcsl_monotonic_ns() - begun_ns);
@@ -264,10 +262,10 @@ static void leave_clients(loop_t *loop)
 static uint64_t sleep_until(loop_t *loop, uint64_t deadline)
 {
     const fcsl_hal_t *hal = &loop->hal;
-    uint64_t now = hal->now_ns(hal->ctx);
+    uint64_t now = hal->clock.now_ns(hal->clock.ctx);
     while (now < deadline) {
-        hal->wait(hal->ctx, deadline - now > SLICE_NS ? now + SLICE_NS : deadline);
-        now = hal->now_ns(hal->ctx);
+        hal->clock.wait(hal->clock.ctx, deadline - now > SLICE_NS ? now + SLICE_NS : deadline);
+        now = hal->clock.now_ns(hal->clock.ctx);
         if (now < deadline) {
             loop_serve(loop);
         }
@@ -310,7 +308,8 @@ static int keep_time(loop_t *loop, pacing_t *pacing)
 int loop_run(loop_t *loop)
 {
     const fcsl_hal_t *hal = &loop->hal;
-    pacing_t pacing = pacing_start(loop->missed_deadline, fcsl_run_machine(loop->run)->tick_hz, hal->now_ns(hal->ctx));
+    pacing_t pacing =
+        pacing_start(loop->missed_deadline, fcsl_run_machine(loop->run)->tick_hz, hal->clock.now_ns(hal->clock.ctx));
     while (loop_may_tick(loop)) {
         if (loop->paused) {
             idle(loop);
@@ -319,7 +318,7 @@ int loop_run(loop_t *loop)
             if (!loop->paused) {
                 leave_clients(loop);
             }
-            pacing.anchor_ns = hal->now_ns(hal->ctx);
+            pacing.anchor_ns = hal->clock.now_ns(hal->clock.ctx);
             pacing.next = 0;
         } else if (!loop->realtime || hal->paces != FCSL_PACED_BY_HOST || keep_time(loop, &pacing)) {
             /* A simulator may be paused for long: clients are served while it is waited for. */

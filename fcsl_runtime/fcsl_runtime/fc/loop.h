@@ -39,9 +39,6 @@ typedef struct {
     int armed; /* the last command */
     uint64_t mode_changes; /* of the floating-point mode, that were logged */
 
-    fcsl_message_t sensors; /* the last one */
-    uint8_t *sensor_bytes; /* of the messages */
-    size_t sensor_capacity;
     uint8_t *actuator_bytes;
     size_t actuator_capacity;
     fcsl_history_t history; /* the machine struct after every tick and command, for other threads */

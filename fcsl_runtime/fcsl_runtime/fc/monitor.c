@@ -32,7 +32,7 @@ static void print_log(const monitor_t *monitor)
 {
     char text[FCSL_LOG_BYTES];
     const fcsl_hal_t *hal = &monitor->loop->hal;
-    for (int i = 0; i < FCSL_LOG_LINES + 1 && hal->read_log(hal->ctx, text); i++) {
+    for (int i = 0; i < FCSL_LOG_LINES + 1 && fcsl_log_read(hal->log, text); i++) {
         log_info("%s", text);
     }
 }

@@ -27,7 +27,8 @@ struct fcsl_lockstep {
     uint8_t *actuator_bytes;
     size_t sensor_capacity;
     size_t actuator_capacity;
-    fcsl_message_t sensors; /* of the tick that is waited for */
+    int refused; /* a sensor message of this tick: `why` */
+    fcsl_error_t why;
     uint32_t *missing; /* of each channel: ticks without a sample */
     int drops; /* some of them are not 0 */
     uint8_t *select;
@@ -164,13 +165,13 @@ void fcsl_lockstep_drop_none(fcsl_lockstep_t *lockstep)
     lockstep->drops = 0;
 }
 
-/* The sensor message without the channels that are missing in its tick. */
-static int strip(fcsl_lockstep_t *lockstep)
+/* The sensor message without the channels that are missing in its tick. 0, or -1. */
+static int strip(fcsl_lockstep_t *lockstep, const fcsl_message_t *sensed, fcsl_message_t *left)
 {
     const fcsl_machine_t *machine = lockstep->machine;
     fcsl_message_entry_t entry = {0};
     memset(lockstep->select, 0, machine->channel_count);
-    while (fcsl_message_next(machine, &lockstep->sensors, &entry)) {
+    while (fcsl_message_next(machine, sensed, &entry)) {
         lockstep->select[entry.channel] = lockstep->missing[entry.channel] == 0;
     }
     lockstep->drops = 0;
@@ -178,12 +179,21 @@ static int strip(fcsl_lockstep_t *lockstep)
         lockstep->missing[i] -= lockstep->missing[i] > 0 ? 1u : 0u;
         lockstep->drops |= lockstep->missing[i] > 0;
     }
-    fcsl_message_apply(machine, lockstep->image, &lockstep->sensors);
-    return fcsl_message_encode_sensors(fcsl_run_channels(lockstep->run), lockstep->image, lockstep->sensors.tick,
+    fcsl_message_apply(machine, lockstep->image, sensed);
+    return fcsl_message_encode_sensors(fcsl_run_channels(lockstep->run), lockstep->image, sensed->tick,
                                        lockstep->select, lockstep->sensor_bytes, lockstep->sensor_capacity,
-                                       &lockstep->sensors) == FCSL_MESSAGE_OK
+                                       left) == FCSL_MESSAGE_OK
                ? 0
-               : -1;
+               : fail(&lockstep->why, "a sensor message without its missing channels has no room");
+}
+
+/* What the simulator sensed goes into the run. */
+static void sensed(void *ctx, const fcsl_message_t *message)
+{
+    fcsl_lockstep_t *lockstep = ctx;
+    fcsl_message_t left = *message;
+    lockstep->refused = (lockstep->drops && strip(lockstep, message, &left) != 0) ||
+                        fcsl_run_sense_message(lockstep->run, &left, &lockstep->why) != 0;
 }
 
 /* ---- ticks -------------------------------------------------------------------------------------------------------------- */
@@ -202,13 +212,12 @@ static int end_of(const fcsl_lockstep_t *lockstep, fcsl_hal_status_t status, fcs
 }
 
 /* What has been sampled becomes a tick. Returns a fcsl_lockstep_status_t, or -1. */
-static int make_tick(fcsl_lockstep_t *lockstep, fcsl_hal_status_t sampled, fcsl_error_t *error)
+static int make_tick(fcsl_lockstep_t *lockstep, fcsl_error_t *error)
 {
     fcsl_run_t *run = lockstep->run;
     fcsl_message_t command;
-    if (sampled == FCSL_HAL_OK &&
-        ((lockstep->drops && strip(lockstep) != 0) || fcsl_run_sense_message(run, &lockstep->sensors, error) != 0)) {
-        return -1;
+    if (lockstep->refused) {
+        return fail(error, "%s", lockstep->why.text);
     }
     if (fcsl_run_step(run, 1, error) != 0) {
         return -1;
@@ -228,12 +237,12 @@ int fcsl_lockstep_run(fcsl_lockstep_t *lockstep, uint32_t slice_ms, fcsl_error_t
 {
     fcsl_hal_t *hal = &lockstep->hal;
     const uint64_t end_ns = fcsl_monotonic_ns() + (uint64_t)slice_ms * FCSL_NS_PER_MS;
+    const fcsl_sink_t to = {.ctx = lockstep, .sensed = sensed};
     int status = lockstep->connected ? FCSL_LOCKSTEP_RUNNING : fail(error, "no simulator is connected");
     while (status == FCSL_LOCKSTEP_RUNNING && fcsl_monotonic_ns() < end_ns) {
-        const fcsl_hal_status_t sampled = hal->sample(hal->ctx, fcsl_run_tick(lockstep->run), lockstep->sensor_bytes,
-                                                      lockstep->sensor_capacity, &lockstep->sensors);
-        if (sampled == FCSL_HAL_OK || sampled == FCSL_HAL_NONE) {
-            status = make_tick(lockstep, sampled, error);
+        const fcsl_hal_status_t sampled = hal->sample(hal->ctx, fcsl_run_tick(lockstep->run), &to);
+        if (sampled == FCSL_HAL_OK) {
+            status = make_tick(lockstep, error);
         } else if (sampled != FCSL_HAL_WAITING) {
             status = end_of(lockstep, sampled, error);
         }

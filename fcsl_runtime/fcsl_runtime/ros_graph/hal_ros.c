@@ -74,7 +74,7 @@ typedef struct {
 } output_t;
 
 typedef struct {
-    fcsl_hal_t base; /* the stub: its clock and its log */
+    fcsl_log_t log;
     fcsl_run_t *run;
     const char *endpoint;
     const char *name_space;
@@ -97,13 +97,11 @@ static int64_t ros_time_ns(void)
     return (int64_t)now.tv_sec * 1000000000 + now.tv_nsec;
 }
 
-static fcsl_hal_status_t ros_sample(void *ctx, uint64_t tick, uint8_t *bytes, size_t capacity, fcsl_message_t *message)
+static fcsl_hal_status_t ros_sample(void *ctx, uint64_t tick, const fcsl_sink_t *to)
 {
     hal_t *hal = ctx;
     (void)tick;
-    (void)bytes;
-    (void)capacity;
-    (void)message;
+    (void)to;
     hal->now_ns = ros_time_ns();
     for (uint32_t i = 0; i < hal->sensor_count; i++) {
         size_t size = 0;
@@ -111,7 +109,7 @@ static fcsl_hal_status_t ros_sample(void *ctx, uint64_t tick, uint8_t *bytes, si
             (void)fcsl_ros_deliver(hal->sensors[i].inlet, hal->message, size, hal->now_ns, NULL);
         }
     }
-    return FCSL_HAL_NONE;
+    return FCSL_HAL_OK;
 }
 
 /* The messages of outputs of one direction, from this struct of the machine. */
@@ -174,30 +172,6 @@ static void ros_count(void *ctx)
     }
 }
 
-static uint64_t ros_now_ns(void *ctx)
-{
-    const fcsl_hal_t *base = &((hal_t *)ctx)->base;
-    return base->now_ns(base->ctx);
-}
-
-static void ros_wait(void *ctx, uint64_t until_ns)
-{
-    const fcsl_hal_t *base = &((hal_t *)ctx)->base;
-    base->wait(base->ctx, until_ns);
-}
-
-static void ros_log(void *ctx, const char *text)
-{
-    const fcsl_hal_t *base = &((hal_t *)ctx)->base;
-    base->log(base->ctx, text);
-}
-
-static int ros_read_log(void *ctx, char text[FCSL_LOG_BYTES])
-{
-    const fcsl_hal_t *base = &((hal_t *)ctx)->base;
-    return base->read_log(base->ctx, text);
-}
-
 static const char *ros_explain(void *ctx)
 {
     (void)ctx;
@@ -223,9 +197,6 @@ static void ros_close(void *ctx)
     }
     for (uint32_t i = 0; i < hal->output_count; i++) {
         fcsl_ros_composer_free(hal->outputs[i].composer);
-    }
-    if (hal->base.close != NULL) {
-        hal->base.close(hal->base.ctx);
     }
     free(hal->sensors);
     free(hal->outputs);
@@ -368,7 +339,7 @@ int hal_ros(const char *endpoint, const char *name_space, fcsl_run_t *run, fcsl_
     self->run = run;
     self->endpoint = endpoint;
     self->name_space = name_space;
-    if (fcsl_hal_stub(&self->base, error) != 0 || add_topics(self, error) != 0) {
+    if (add_topics(self, error) != 0) {
         ros_close(self);
         return -1;
     }
@@ -379,10 +350,8 @@ int hal_ros(const char *endpoint, const char *name_space, fcsl_run_t *run, fcsl_
         .command = ros_command,
         .arm = ros_arm,
         .alive = ros_nothing,
-        .now_ns = ros_now_ns,
-        .wait = ros_wait,
-        .log = ros_log,
-        .read_log = ros_read_log,
+        .clock = fcsl_monotonic_clock,
+        .log = &self->log,
         .count = ros_count,
         .explain = ros_explain,
         .interrupt = ros_nothing,

@@ -90,6 +90,11 @@ static void print(double *trips_ns, int ticks, double seconds)
 
 /* ---- over a wire --------------------------------------------------------------------------------------------------- */
 
+static void sensed(void *ctx, const fcsl_message_t *message)
+{
+    fcsl_message_apply(&MACHINE, ctx, message);
+}
+
 static _Noreturn void control(const char *spec)
 {
     fcsl_error_t error;
@@ -97,18 +102,18 @@ static _Noreturn void control(const char *spec)
     fcsl_hal_t hal;
     data_t data = {0};
     const fcsl_channel_table_t table = fcsl_channel_table(&MACHINE);
+    const fcsl_sink_t to = {.ctx = &data, .sensed = sensed};
     check(fcsl_hal_wire(spec, &MACHINE, WAIT_MS, &hal, &error) == 0, "no HAL");
     check(hal.open(&hal, &error) == 0, "the HAL does not open");
     for (uint64_t tick = 0;; tick++) {
         fcsl_message_t message;
         fcsl_hal_status_t status = FCSL_HAL_WAITING;
         while (status == FCSL_HAL_WAITING) {
-            status = hal.sample(hal.ctx, tick, bytes, sizeof bytes, &message);
+            status = hal.sample(hal.ctx, tick, &to);
         }
         if (status != FCSL_HAL_OK) {
             break;
         }
-        fcsl_message_apply(&MACHINE, &data, &message);
         data.motors[0] = data.gyro[0];
         check(fcsl_message_encode_actuators(&table, &data, tick, 1, bytes, sizeof bytes, &message) == 0, "no command");
         check(hal.command(hal.ctx, &message) == FCSL_HAL_OK, "a command was not taken");
