@@ -150,7 +150,7 @@ TABLE = zlib.crc32(struct.pack("<" + 3 * "HBBI", 1, 0, 6, 1, 2, 0, 6, 1, 16, 1, 
 SOFT_M_S = 1.5
 #: What the lease of a session, its watcher and the printing of a line take, s; and a busy machine.
 NOTICED_S = 3.0
-LONG_S = 60.0
+LONG_S = 180.0
 #: States of the gate.
 ARMED, SILENT = 1, 2
 

@@ -208,24 +208,41 @@ def test_a_hal_of_topics(tmp_path: Path) -> None:
     summary = tmp_path / "summary.json"
     commands: queue.Queue[TwistStamped] = queue.Queue()
     subprocess.run(["fcslc", "build", ECHO, "-o", tmp_path], check=True)
-    options = ["--hal", f"ros:{endpoint}", "--namespace", "r1", "--summary", summary]
+    socket = tmp_path / "fc.sock"
+    options = ["--hal", f"ros:{endpoint}", "--namespace", "r1", "--summary", summary, "--socket", socket]
 
     def heard(sample: zenoh.Sample) -> None:
         commands.put(read(sample, TwistStamped))
 
-    with started("fcsl-fc", tmp_path / "libecho.so", *options) as fc, bridge(endpoint) as session:
+    with (
+        started("fcsl-fc", tmp_path / "libecho.so", *options) as fc,
+        bridge(endpoint) as session,
+        VarClient(socket) as client,
+    ):
+        counters = ["hal.messages", *client.list("hal.refused")]
         assert tokens(session) == {"r1/imu/data": ("MS", SENSOR), "r1/cmd_vel": ("MP", COMMAND)}
         everything = session.declare_subscriber("r1/cmd_vel", heard)
 
-        def send(data: bytes) -> float:
-            """The command of the tick behind that which has taken the message."""
-            session.put("r1/imu/data", data)
-            time.sleep(0.02)
+        def taken() -> int:
+            return int(sum(client.get(*counters).values()))
+
+        def command() -> float:
+            """Of a tick that is still to come."""
             commands.queue.clear()
             return float([commands.get(timeout=LONG_S) for _ in range(3)][-1].twist.linear.x)
 
+        def send(data: bytes) -> float:
+            """The command behind the tick that has taken the message."""
+            before = taken()
+            session.put("r1/imu/data", data)
+            until(lambda: taken() > before)
+            return command()
+
         now_ns = time.time_ns()
-        until(lambda: send(imu(42.0, time.time_ns())) == 42.0)
+        while taken() == 0:  # until the bridge has found it
+            session.put("r1/imu/data", imu(42.0, time.time_ns()))
+            time.sleep(0.5)
+        until(lambda: command() == 42.0)
         assert send(imu(43.0, now := time.time_ns())) == 43.0
         for bad in (
             imu(1.0, now),  # repeated

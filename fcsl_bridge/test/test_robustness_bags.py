@@ -144,7 +144,10 @@ def wait_for_end(children: Sequence[Path]) -> None:
 
 def ended(process: Process) -> int:
     """The exit status. Before the node's first line runs, Python handles SIGINT with a traceback, as if killed."""
-    status = process.process.wait(LIMIT_S)
+    try:
+        status = process.process.wait(LIMIT_S)
+    except subprocess.TimeoutExpired:
+        raise AssertionError(f"it goes on:\n{process.out}{process.err}") from None
     if "Traceback" not in process.err:
         return status
     assert str(Path(start.__file__).parent.resolve()) not in process.err, process.err

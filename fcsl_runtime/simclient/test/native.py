@@ -134,15 +134,15 @@ class Client:
 
     def __init__(self, path: Path) -> None:
         self.socket = socket.socket(socket.AF_UNIX)
-        self.socket.settimeout(10)
+        self.socket.settimeout(60)  # of a machine with much else to do
         self.socket.connect(str(path))
-        self._file = self.socket.makefile("rb")
+        self.file = self.socket.makefile("rb")
 
     def send(self, data: bytes) -> None:
         self.socket.sendall(data)
 
     def read(self) -> dict[str, Any]:
-        line = self._file.readline()
+        line = self.file.readline()
         assert line.endswith(b"\n"), f"the server closed the connection: {line!r}"
         reply: dict[str, Any] = json.loads(line)
         return reply
@@ -172,12 +172,12 @@ class Client:
     def closed(self) -> bool:
         """Waits for the server to close the connection."""
         try:
-            return self._file.readline() == b""
+            return self.file.readline() == b""
         except ConnectionResetError:
             return True
 
     def close(self) -> None:
-        self._file.close()
+        self.file.close()
         self.socket.close()
 
 

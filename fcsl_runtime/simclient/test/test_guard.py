@@ -92,11 +92,13 @@ def test_a_step_that_hangs(guard: Guard, library: Path, tmp_path: Path) -> None:
 def test_stop_in_the_middle_of_a_step(guard: Guard, library: Path, tmp_path: Path) -> None:
     """Its command comes after SIGCONT, and is as old as the sensors that it was computed from."""
     with armed_flight(guard, library, tmp_path) as (fc, client):
-        client.ok("set", values={"pilot.outputs.force": -77.0, "pilot.state.stop": True})
+        values = {"pilot.outputs.force": -77.0, "pilot.state.stop": True}
+        client.send(json.dumps({"cmd": "set", "values": values}).encode() + b"\n")  # its reply may come after SIGCONT
         os.waitid(os.P_PID, fc.process.pid, os.WSTOPPED | os.WNOWAIT)
         time.sleep(TIMEOUT_S)  # the age that the guard has to notice
         guard.wait_last(SAFE)
         fc.process.send_signal(signal.SIGCONT)
+        assert client.read()["ok"]
         wait_for(lambda: client.get("pilot.state.hang"))  # published after the command was written
         guard.stays_safe()
         assert -77.0 not in {write.values["number"] for write in guard.writes()}

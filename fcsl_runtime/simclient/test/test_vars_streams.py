@@ -32,7 +32,7 @@ class Stream:
     """Reads replies, JSON samples and binary frames off one connection, as docs/protocol.md has them."""
 
     def __init__(self, client: Client) -> None:
-        self._file = client.socket.makefile("rb")
+        self._file = client.file  # it may have read on behind the last reply
 
     def next(self) -> dict[str, Any]:
         first = self._file.read(1)
