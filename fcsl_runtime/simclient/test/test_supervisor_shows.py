@@ -6,6 +6,7 @@ from __future__ import annotations
 import io
 import json
 import math
+import shutil
 from collections.abc import Iterator
 from pathlib import Path
 from typing import Any
@@ -16,8 +17,10 @@ import pytest
 from native import flying
 from prometheus_client.parser import text_string_to_metric_families
 from supervising import Supervisor, supervising, wait_until
+from test_twin_lost_requests import BOTH, write
 from vars_machine import build
 
+from fcsl_compiler.driver.cache import build_machine
 from simclient import VarClient
 from simclient.supervisor import metrics
 from simclient.supervisor.http_error import HttpError
@@ -224,6 +227,21 @@ def test_metrics(supervisor: Supervisor, library: str) -> None:
     )
     check_histogram(found["fcsl_run_tick_time_seconds"], run["id"], stats["tick_time_ns"])
     assert value("run_lateness_seconds_count", **mine) == 0  # no tick of this run was paced by the clock
+    supervisor.ask("DELETE", f"/runs/{run['id']}")
+
+
+def test_metrics_of_lost_requests(supervisor: Supervisor, root: Path, tmp_path: Path) -> None:
+    folder = root / "craft"
+    folder.mkdir()
+    shutil.copy(build_machine(write(tmp_path)).library, folder / "craft.so")
+    run = supervisor.start("craft/craft.so", paused=True)
+    with VarClient(run["socket"]) as client:
+        client.set(BOTH)
+        client.tick(2)
+    samples = families(supervisor.get("/metrics").body)["fcsl_run_lost_requests"].samples
+    (lost,) = [sample for sample in samples if sample.labels["run"] == run["id"]]
+    assert (lost.name, lost.value) == ("fcsl_run_lost_requests_total", 2)
+    assert lost.labels["transition"] == "HOVER -> SAFE: ABORT"
     supervisor.ask("DELETE", f"/runs/{run['id']}")
 
 

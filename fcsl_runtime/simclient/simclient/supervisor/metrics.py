@@ -123,6 +123,7 @@ class _Families(Collector):
         yield _gauge("tick", "Ticks completed since tick 0.", ((s, s.stats["tick"]) for s in serving))
         for member, name, what in _COUNTERS:
             yield _counter(name, what, ((s, s.stats[member]) for s in serving if member in s.stats))
+        yield _lost_requests(serving)
         for member, name, what in _HISTOGRAMS:
             yield _histogram(name, what, ((s, s.stats[member]) for s in serving if member in s.stats))
         received = [(s, s.run.telemetry.counts) for s in live]
@@ -146,6 +147,15 @@ def _counter(name: str, what: str, rows: Iterable[tuple[Seen, float]]) -> Metric
     family = CounterMetricFamily(f"fcsl_run_{name}", what, labels=_RUN_LABELS)
     for seen, value in rows:
         family.add_metric(_labels(seen), value)
+    return family
+
+
+def _lost_requests(serving: Iterable[Seen]) -> Metric:
+    what = "Requests of a transition that lost to another transition, where some were lost."
+    family = CounterMetricFamily("fcsl_run_lost_requests", what, labels=(*_RUN_LABELS, "transition"))
+    for seen in serving:
+        for transition, count in seen.stats.get("lost_requests", {}).items():
+            family.add_metric((*_labels(seen), transition), count)
     return family
 
 
