@@ -190,6 +190,7 @@ def fly_relayed(library: Path, folder: Path, **line: Any) -> tuple[str, Line]:
         sim_side.connect(("127.0.0.1", ours))
         fc_side.bind(("127.0.0.1", theirs))
         fc_side.settimeout(60)
+        sim_side.setblocking(False)  # a write may take the error for which select() found it ready to be read
         found: list[str] = []
         flight = threading.Thread(
             target=lambda: found.append(

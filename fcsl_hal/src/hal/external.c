@@ -202,8 +202,7 @@ fcsl_hal_status_t fcsl_external_accept(fcsl_external_t *external, uint32_t timeo
             return met;
         }
     } while (fcsl_monotonic_ns() < deadline_ns);
-    (void)snprintf(external->text, sizeof external->text, "no controller on %s within %" PRIu32 " ms", external->spec,
-                   timeout_ms);
+    (void)snprintf(external->text, sizeof external->text, "no controller on %s", external->spec);
     return FCSL_HAL_TIMEOUT;
 }
 

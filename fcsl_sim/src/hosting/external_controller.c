@@ -55,7 +55,7 @@ int fcsl_sim_accept(fcsl_sim_t *sim, uint32_t wait_ms, fcsl_error_t *error)
     if (status == FCSL_HAL_NONE) {
         return fcsl_fail(error, "interrupted while waiting for a controller");
     }
-    (void)fcsl_fail(error, "no controller: %s", fcsl_external_explain(sim->external));
+    (void)fcsl_fail(error, "%s", fcsl_external_explain(sim->external));
     return status == FCSL_HAL_TIMEOUT ? 1 : -1;
 }
 
