@@ -60,7 +60,7 @@ class Plan:
     @property
     def text(self) -> str:
         """As the native simulator reads it."""
-        return "\n".join(["fcsl-sim-plan 2", *map(str, self.statements), "end", ""])
+        return "\n".join(["fcsl-sim-plan 3", *map(str, self.statements), "end", ""])
 
     def of(self, *keywords: str) -> Iterator[Statement]:
         return (s for s in self.statements if s.keyword in keywords)

@@ -571,11 +571,15 @@ class _Checker:
         return [plan.statement("until", ticks, " ".join(text.split()))], condition
 
     def _quantity(self, path: str) -> Quantity:
-        """What `instance.outputs.name` is in an expression; an index may follow. Raises ExpressionError."""
-        name, *index = path.replace("]", "").replace(",", "[").split("[")
-        head, _, field_path = name.partition(".")
+        """What `instance.outputs.name` is in an expression; indices may follow. Raises ExpressionError."""
+        head, _, name = path.partition(".")
         table = self.instances[head].table if head in self.instances else None
-        found = table.fields.get(field_path) if table else None
+        fields = table.fields if table else {}
+        index: list[int] = []
+        while name not in fields and name.endswith("]"):  # fields in an array of structs have brackets of their own
+            name, _, inside = name[:-1].rpartition("[")
+            index = [*map(int, inside.split(",")), *index]
+        found = fields.get(name)
         if found is None or found.role not in ("output", "state"):
             known = [
                 f"{i.name}.{f.path}"
@@ -583,14 +587,11 @@ class _Checker:
                 if i.table
                 for f in i.table.of_role("output", "state")
             ]
-            hint = nearest(name, known)
-            raise ExpressionError(f"there is no output or state `{name}` of a model{'; ' + hint if hint else ''}")
+            hint = nearest(f"{head}.{name}", known)
+            raise ExpressionError(f"there is no output or state `{path}` of a model{'; ' + hint if hint else ''}")
         shape = shape_of(found.type)
-        for extent, number in zip(shape, index, strict=False):
-            if not -extent <= int(number) < extent:
-                raise ExpressionError(f"`{path}`: index {number.strip()} is not within {extent}")
-        if len(index) > len(shape):
-            raise ExpressionError(f"`{path}`: `{name}` is {found.type}")
+        if len(index) > len(shape) or any(i >= extent for i, extent in zip(index, shape, strict=False)):
+            raise ExpressionError(f"`{path}`: `{head}.{name}` is {found.type}")
         scalar = scalar_of(found.type).name
         kind = Kind.BOOL if scalar == "bool" else Kind.FLOAT if scalar in ("f32", "f64") else Kind.INTEGER
         return Quantity(kind, shape[len(index) :], read_unit(found.unit))

@@ -7,6 +7,7 @@ import math
 from typing import Any
 
 import numpy as np
+import pytest
 from hypothesis import example, given, settings
 from hypothesis import strategies as st
 
@@ -64,8 +65,12 @@ def test_a_column_has_the_values_of_its_ticks(text: str) -> None:
     except ExpressionError:
         return
     (column,) = root.parts
-    with np.errstate(all="ignore"):
-        values = evaluator(column, column_arithmetic(100.0))(lambda leaf: widest(FIELDS[leaf.value][1]))
+    try:
+        with np.errstate(all="ignore"):
+            values = evaluator(column, column_arithmetic(100.0))(lambda leaf: widest(FIELDS[leaf.value][1]))
+    except ExpressionError:  # an integer does not fit, at one of the ticks
+        assert any(has_no_value(column, tick) for tick in range(TICKS))
+        return
     for tick in range(TICKS):
         try:
             expected = evaluator(column, SCALARS)(at(tick))
@@ -73,6 +78,14 @@ def test_a_column_has_the_values_of_its_ticks(text: str) -> None:
             continue  # columns have an infinity or NaN there
         got = np.broadcast_to(values, (TICKS,))[tick].item()
         assert same(got, expected), (text, tick, got, expected)
+
+
+def has_no_value(column: Node, tick: int) -> bool:
+    try:
+        evaluator(column, SCALARS)(at(tick))
+    except ExpressionError:
+        return True
+    return False
 
 
 def same(got: Any, expected: Any) -> bool:
@@ -103,3 +116,12 @@ def test_what_is_of_all_ticks() -> None:
     assert math.isnan(value("time(a.n > 1000)"))
     assert (value("any(a.n > 99)"), value("all(a.n > 99)"), value("mean(a.on)")) == (True, False, 0.5)
     assert value("max(a.n) - a.n") == 101
+
+
+def test_integers_that_do_not_fit_have_no_value() -> None:
+    """A column must not wrap where a condition has no value."""
+    large = {"a.n": np.array([1, 2**62]), "a.u": np.array([1, 2**63 + 5], np.uint64)}
+    for text in ("a.n * 4", "a.n + a.n", "-a.n - a.n - a.n", "a.u > 9"):
+        root = parse(f"last({text})", find, series=True)
+        with pytest.raises(ExpressionError, match="does not fit 64 bits"):
+            evaluator(root, column_arithmetic(100.0))(lambda leaf: widest(large[leaf.value]))

@@ -8,7 +8,7 @@
 #include "check.h"
 #include "plan/plan.h"
 
-static const char good[] = "fcsl-sim-plan 2\n"
+static const char good[] = "fcsl-sim-plan 3\n"
                            "machine hopper /path with spaces/libhopper.so\n"
                            "seed 18446744073709551615\n"
                            "ticks 100\n"
@@ -79,7 +79,7 @@ static void refuses_with(const char *from, const char *to, const char *message)
 static void names_the_line(void)
 {
     refuses("", 0, "the plan is empty or above 4 MiB");
-    refuses_with("plan 2", "plan 1", "plan line 1: not `fcsl-sim-plan 2`");
+    refuses_with("plan 2", "plan 1", "plan line 1: not `fcsl-sim-plan 3`");
     refuses_with("machine hopper", "machine 1hopper", "plan line 2: not a name");
     refuses_with("machine ", "machine\t", "plan line 2: a control character");
     refuses_with("18446744073709551615", "18446744073709551616",
@@ -120,7 +120,7 @@ static void refuses_long_lines(void)
 {
     static char text[3 * FCSL_PLAN_MAX_LINE];
     memset(text, 'a', sizeof text);
-    memcpy(text, "fcsl-sim-plan 2\n", 16);
+    memcpy(text, "fcsl-sim-plan 3\n", 16);
     refuses(text, sizeof text, "plan line 2: the line is too long");
 }
 

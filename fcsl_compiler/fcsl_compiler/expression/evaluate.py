@@ -9,13 +9,13 @@ from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from typing import Any
 
-from .tree import ExpressionError, Node
+from .tree import ExpressionError, Kind, Node
 
 #: Gives the value of a leaf: a field, a column or a metric. A vector is a list.
 Source = Callable[[Node], Any]
 Value = Callable[[Source], Any]
 
-COMPARISONS: dict[str, Callable[[Any, Any], Any]] = {
+_COMPARISONS: dict[str, Callable[[Any, Any], Any]] = {
     **{"==": operator.eq, "!=": operator.ne, "<": operator.lt, "<=": operator.le, ">": operator.gt, ">=": operator.ge},
 }
 
@@ -35,7 +35,8 @@ def evaluator(node: Node, arithmetic: Arithmetic) -> Value:
     if node.operator == "literal":
         return lambda source: node.value
     if node.operator in ("field", "column", "metric"):
-        return lambda source: source(node)
+        is_integer = node.quantity.kind is Kind.INTEGER and arithmetic.lazy
+        return (lambda source: _fits(source(node))) if is_integer else (lambda source: source(node))
     parts = [evaluator(part, arithmetic) for part in node.parts]
     if node.operator == "compare":
         return _compare(node.value, parts, arithmetic)
@@ -62,7 +63,7 @@ def _widened(part: Value, arithmetic: Arithmetic) -> Value:
 
 def _compare(operators: tuple[str, ...], parts: list[Value], arithmetic: Arithmetic) -> Value:
     first, *others = parts
-    rest = [(COMPARISONS[op], part) for op, part in zip(operators, others, strict=True)]
+    rest = [(_COMPARISONS[op], part) for op, part in zip(operators, others, strict=True)]
 
     def chain(source: Source) -> bool:
         left = first(source)
@@ -86,7 +87,7 @@ def _member(wanted: bool, parts: list[Value], arithmetic: Arithmetic) -> Value:
 
     def found(source: Source) -> Any:
         value = part(source)
-        return any(value == item(source) for item in items) is wanted
+        return (value in [item(source) for item in items]) is wanted
 
     def all_found(source: Source) -> Any:
         value = part(source)

@@ -20,10 +20,15 @@ from .units import Unit
 #: What a path is. Raises ExpressionError.
 Find = Callable[[str], Quantity]
 
+#: As fcsl_expression.h has them.
+BYTES_MAX = 1023
 VALUES_MAX = 256
+DEPTH_MAX = 32
 ARGUMENTS_MAX = 8
-#: Of the tree: each of the 32 parentheses, signs and `not` that C reads has a comparison, a sum, a product and a power at most.
-_LEVELS_MAX = 4 * 32
+VECTOR_MAX = 16
+STEPS_MAX = 1024
+#: Of the tree: each of C's levels has a comparison, a sum, a product and a power at most.
+_LEVELS_MAX = 4 * DEPTH_MAX
 
 _ARITHMETIC: dict[type[ast.operator], str] = {
     **{ast.Add: "+", ast.Sub: "-", ast.Mult: "*", ast.Div: "/", ast.FloorDiv: "//", ast.Mod: "%", ast.Pow: "**"},
@@ -32,7 +37,9 @@ _COMPARISONS: dict[type[ast.cmpop], str] = {
     **{ast.Eq: "==", ast.NotEq: "!=", ast.Lt: "<", ast.LtE: "<=", ast.Gt: ">", ast.GtE: ">="},
 }
 _MEMBERSHIP: dict[type[ast.cmpop], str] = {ast.In: "in", ast.NotIn: "not in"}
-_LITERAL = re.compile(r"(\d+(\.\d*)?|\.\d+)([eE][+-]?\d+)?|'[^'\\]*'|\"[^\"\\]*\"|True|False")
+_LITERAL = re.compile(r"0|[1-9]\d*|(\d+\.\d*|\.\d+|\d+(?=[eE]))([eE][+-]?\d+)?|'[^'\\]*'|\"[^\"\\]*\"|True|False")
+_PATH = re.compile(r"[\w.]+(\[[\d, ]+\]|\.\w+)*")
+_QUOTED = re.compile(r"'[^']*'|\"[^\"]*\"")
 _WORDS = {"true": True, "false": False}
 #: Of one value each, or of two and more.
 FUNCTIONS = ("abs", "min", "max", "sqrt", "degrees", "norm", "isnan", "isfinite")
@@ -57,26 +64,57 @@ def parse(
 
     Raises ExpressionError.
     """
+    text = text.strip()
+    _check_text(text)
     try:
-        tree = ast.parse(text.strip(), mode="eval").body
+        tree = ast.parse(text, mode="eval").body
     except (SyntaxError, ValueError, MemoryError, RecursionError) as error:
         raise ExpressionError(f"`{text}` is no expression: {error}") from None
-    checker = _Checker(text.strip(), find, series, metrics or {})
-    root = checker.root(tree)
-    return checker.need_bool(root) if condition else root
+    root = _Checker(text, find, series, metrics or {}).root(tree, condition)
+    if not series and _steps(root) > STEPS_MAX:
+        raise ExpressionError(f"`{text[:60]}…` is too long: write parts of it by themselves")
+    return root
+
+
+def _check_text(text: str) -> None:
+    """What Python would read, and C does not."""
+    if len(text.encode(errors="replace")) > BYTES_MAX:
+        raise ExpressionError(f"`{text[:60]}…` is too long: it has more than {BYTES_MAX} bytes")
+    if "#" in _QUOTED.sub("", text):
+        raise ExpressionError(f"`{text}`: an expression has no comment")
+
+
+def _parentheses(text: str) -> int:
+    """How many of them are open at most."""
+    depth = deepest = 0
+    for c in _QUOTED.sub("", text):
+        depth += (c in "([") - (c in ")]")
+        deepest = max(deepest, depth)
+    return deepest
+
+
+def _steps(node: Node) -> int:
+    """How many steps C makes of it, or some more."""
+    parts = sum(map(_steps, node.parts))
+    if node.operator == "norm":
+        return (node.parts[0].quantity.shape[0]) * (parts + 2) + 1
+    return parts + max(1, len(node.parts)) + (node.operator in ("in", "not in")) * (len(node.parts) + 2)
 
 
 class _Checker:
     def __init__(self, text: str, find: Find, series: bool, metrics: Mapping[str, Quantity]):
         self._text, self._find, self._series, self._metrics = text, find, series, metrics
         self._values = self._depth = 0
+        self._signs = self._nested = 0  # signs, `not` and `**` around a part; the most of them
         self._columns = False  # within a function of all ticks
 
-    def root(self, e: ast.expr) -> Node:
+    def root(self, e: ast.expr, condition: bool) -> Node:
         found = self._need_scalar(self.node(e))
         if found.operator == "literal" and found.quantity.kind is Kind.NAME:
             raise ExpressionError(f"`{found.text}` is a name by itself: compare it with a field")
-        return found
+        if self._nested + _parentheses(self._text) > DEPTH_MAX:
+            raise ExpressionError(f"`{self._text}` is nested too deeply")
+        return self.need_bool(found) if condition else found
 
     def node(self, e: ast.expr) -> Node:
         self._depth += 1
@@ -150,16 +188,26 @@ class _Checker:
         return self._made(e, "literal", (), Quantity(kinds[type(value)]), value)
 
     def _path(self, e: ast.expr) -> str:
-        if isinstance(e, ast.Name) and e.id not in _WORDS:
-            return e.id
-        if isinstance(e, ast.Attribute):
-            return f"{self._path(e.value)}.{e.attr}"
-        if isinstance(e, ast.Subscript):
-            index = e.slice.elts if isinstance(e.slice, ast.Tuple) else [e.slice]
-            numbers = [i.value for i in index if isinstance(i, ast.Constant) and type(i.value) is int]
-            if len(numbers) == len(index):
-                return f"{self._path(e.value)}[{', '.join(map(str, numbers))}]"
-        raise self._wrong(e)
+        whole, parts = e, []
+        while not isinstance(e, ast.Name):
+            if isinstance(e, ast.Attribute):
+                parts.append(f".{e.attr}")
+            elif isinstance(e, ast.Subscript):
+                parts.append(f"[{self._index(e)}]")
+            else:
+                raise self._wrong(whole)
+            e = e.value
+        source = self._source(whole)
+        if e.id in _WORDS or not _PATH.fullmatch(source):
+            raise self._wrong(whole)
+        return e.id + "".join(reversed(parts))
+
+    def _index(self, e: ast.Subscript) -> str:
+        index = e.slice.elts if isinstance(e.slice, ast.Tuple) else [e.slice]
+        numbers = [i.value for i in index if isinstance(i, ast.Constant) and type(i.value) is int]
+        if len(numbers) != len(index) or not index:
+            raise ExpressionError(f"`{self._source(e)}`: an index is a whole number from 0 on")
+        return ", ".join(map(str, numbers))
 
     # ---- what a part must be ---------------------------------------------------------------------------------------------
 
@@ -202,8 +250,15 @@ class _Checker:
 
     # ---- operators ------------------------------------------------------------------------------------------------------
 
+    def _deeper(self, e: ast.expr) -> Node:
+        self._signs += 1
+        self._nested = max(self._nested, self._signs)
+        found = self.node(e)
+        self._signs -= 1
+        return found
+
     def _unary(self, e: ast.UnaryOp) -> Node:
-        part = self.node(e.operand)
+        part = self._deeper(e.operand)
         if isinstance(e.op, ast.Not):
             return self._made(e, "not", (self.need_bool(part),), Quantity(Kind.BOOL))
         if isinstance(e.op, ast.Invert):
@@ -224,7 +279,8 @@ class _Checker:
             first = first.left
         left = self.node(first)
         for link in reversed(chain):
-            left = self._arithmetic(link, _ARITHMETIC[type(link.op)], left, self.node(link.right))
+            right = self._deeper(link.right) if isinstance(link.op, ast.Pow) else self.node(link.right)
+            left = self._arithmetic(link, _ARITHMETIC[type(link.op)], left, right)
         return left
 
     def _arithmetic(self, e: ast.BinOp, operator: str, left: Node, right: Node) -> Node:
@@ -312,6 +368,8 @@ class _Checker:
         if name == "norm":
             if not first.shape:
                 raise ExpressionError(f"`norm` is of a vector, and `{parts[0].text}` is a scalar: `abs`")
+            if first.shape[0] > VECTOR_MAX and not self._series:
+                raise ExpressionError(f"`{parts[0].text}` has more than {VECTOR_MAX} elements")
             return Quantity(Kind.FLOAT, (), first.unit)
         if name in ("isnan", "isfinite"):
             self._need_scalar(parts[0])

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Units as users write them, `m/s2`, `kg*m^2`, `N m`, compared by what they are made of: `m/s` times `s` is `m`.
+"""Units as users write them, `m/s2`, `kg*m^2`, `m/s²`, `N m`, compared by what they are made of: `m/s` times `s` is `m`.
 
 A unit that is not written so is one of its own. None: any unit, as a number without one has.
 """
@@ -21,9 +21,13 @@ _DERIVED = {
 _FACTOR = re.compile(r"\s*([*/·.]?)\s*(?:(1)|([^\W\d]+|[%°]\w*)(?:(?:\^|\*\*)?(-?\d+))?)")
 
 
+_SUPERSCRIPTS = str.maketrans("⁰¹²³⁴⁵⁶⁷⁸⁹⁻", "0123456789-")
+
+
 @cache
 def read(text: str) -> Unit | None:
     """None without a text."""
+    text = text.translate(_SUPERSCRIPTS)
     if not text.strip():
         return None
     powers: dict[str, Fraction] = {}

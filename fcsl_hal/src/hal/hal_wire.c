@@ -252,6 +252,7 @@ static fcsl_hal_status_t sample_paced(hal_t *hal, uint64_t tick, const fcsl_sink
     if (status == FCSL_HAL_OK) {
         deliver(hal, to);
     }
+    hal->sensed = 0;
     return status;
 }
 

@@ -27,7 +27,8 @@ typedef struct {
     uint8_t *select; /* by channel: it goes on to the machine */
     uint8_t *bytes; /* of the message that goes on */
     size_t capacity;
-    const fcsl_sink_t *to; /* of this tick's */
+    fcsl_message_t left;
+    int has_left; /* of this tick: it goes on once nothing can fail any more */
     fcsl_field_t *fields; /* of both */
     uint8_t *counters;
     uint64_t begun_ns; /* when tick 0 came; 0: not yet */
@@ -66,12 +67,11 @@ static fcsl_hal_status_t keep_real_time(hal_t *hal, fcsl_hal_status_t sampled)
     return now > due_ns && now - due_ns > BEHIND_NS ? fail(hal, "behind", now - due_ns) : sampled;
 }
 
-/* What the simulator sensed goes on without the board's channels. */
+/* Keeps what the simulator sensed, without the board's channels. */
 static void leave_to_board(void *ctx, const fcsl_message_t *sensed)
 {
     hal_t *hal = ctx;
     const fcsl_machine_t *machine = hal->table.machine;
-    fcsl_message_t left;
     fcsl_message_apply(machine, hal->data, sensed);
     for (uint32_t i = 0; i < machine->channel_count; i++) {
         const fcsl_channel_t *channel = &machine->channels[i];
@@ -82,8 +82,8 @@ static void leave_to_board(void *ctx, const fcsl_message_t *sensed)
         }
     }
     if (fcsl_message_encode_sensors(&hal->table, hal->data, sensed->tick, hal->select, hal->bytes, hal->capacity,
-                                    &left) == FCSL_MESSAGE_OK) {
-        hal->to->sensed(hal->to->ctx, &left);
+                                    &hal->left) == FCSL_MESSAGE_OK) {
+        hal->has_left = 1;
     } else {
         (void)snprintf(hal->failure, sizeof hal->failure, "the sensor message of tick %" PRIu64 " has no room",
                        sensed->tick);
@@ -105,7 +105,7 @@ static fcsl_hal_status_t composite_sample(void *ctx, uint64_t tick, const fcsl_s
     hal_t *hal = ctx;
     const fcsl_sink_t without_board = {.ctx = hal, .sensed = leave_to_board};
     hal->culprit = &hal->simulated;
-    hal->to = to;
+    hal->has_left = 0;
     fcsl_hal_status_t status = hal->simulated.sample(hal->simulated.ctx, tick, &without_board);
     if (status == FCSL_HAL_OK || status == FCSL_HAL_WAITING) {
         status = hal->failed ? FCSL_HAL_ERROR : keep_real_time(hal, status);
@@ -113,6 +113,9 @@ static fcsl_hal_status_t composite_sample(void *ctx, uint64_t tick, const fcsl_s
     if (status == FCSL_HAL_OK) {
         hal->culprit = &hal->board;
         status = hal->board.sample(hal->board.ctx, tick, to);
+    }
+    if (status == FCSL_HAL_OK && hal->has_left) {
+        to->sensed(to->ctx, &hal->left);
     }
     join_logs(hal);
     return status;

@@ -195,14 +195,17 @@ static int act_on_sensors(loop_t *loop, uint64_t begun_ns)
 /* A refused message is counted by the run and changes nothing: the channel grows old instead. */
 static void sensed(void *ctx, const fcsl_message_t *message)
 {
+    loop_t *loop = ctx;
     fcsl_error_t error;
-    (void)fcsl_run_sense_message(((const loop_t *)ctx)->run, message, &error);
+    loop->sensed_ns = fcsl_monotonic_ns();
+    (void)fcsl_run_sense_message(loop->run, message, &error);
 }
 
 /* Brings the sensors of the coming tick into the run. */
 static fcsl_hal_status_t sample(loop_t *loop)
 {
     const fcsl_sink_t to = {.ctx = loop, .sensed = sensed};
+    loop->sensed_ns = 0;
     return loop->hal.sample(loop->hal.ctx, fcsl_run_tick(loop->run), &to);
 }
 
@@ -212,7 +215,7 @@ static int make_tick(loop_t *loop, fcsl_hal_status_t sampled)
     if (!goes_on(loop, sampled)) {
         return 0;
     }
-    const uint64_t begun_ns = fcsl_monotonic_ns();
+    const uint64_t begun_ns = loop->sensed_ns > 0u ? loop->sensed_ns : fcsl_monotonic_ns();
     fcsl_tick_stats_put(&loop->stats.tick, fcsl_run_tick(loop->run));
     fcsl_tick_stats_put(&loop->stats.begun_ns, begun_ns);
     const int on = act_on_sensors(loop, begun_ns);

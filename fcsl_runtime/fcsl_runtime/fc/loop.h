@@ -39,6 +39,7 @@ typedef struct {
     int armed; /* the last command */
     uint64_t mode_changes; /* of the floating-point mode, that were logged */
 
+    uint64_t sensed_ns; /* when a message of the coming tick went into the run; 0: none has */
     uint8_t *actuator_bytes;
     size_t actuator_capacity;
     fcsl_history_t history; /* the machine struct after every tick and command, for other threads */

@@ -240,6 +240,7 @@ int fcsl_lockstep_run(fcsl_lockstep_t *lockstep, uint32_t slice_ms, fcsl_error_t
     const fcsl_sink_t to = {.ctx = lockstep, .sensed = sensed};
     int status = lockstep->connected ? FCSL_LOCKSTEP_RUNNING : fail(error, "no simulator is connected");
     while (status == FCSL_LOCKSTEP_RUNNING && fcsl_monotonic_ns() < end_ns) {
+        lockstep->refused = 0;
         const fcsl_hal_status_t sampled = hal->sample(hal->ctx, fcsl_run_tick(lockstep->run), &to);
         if (sampled == FCSL_HAL_OK) {
             status = make_tick(lockstep, error);

@@ -188,15 +188,19 @@ def test_a_reader_that_goes(endpoint: str) -> None:
 
 @pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGTERM])
 def test_an_interrupted_recording_is_complete(endpoint: str, number: signal.Signals, tmp_path: Path) -> None:
-    line = [sys.executable, str(TOOL), "record", "-c", endpoint, "-o", str(tmp_path / "bag")]
-    with subprocess.Popen(line, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True) as recorder:
-        assert recorder.stdout and "recording north/hill/rig to" in recorder.stdout.readline()
-        with pytest.raises(subprocess.TimeoutExpired):
-            recorder.wait(1.0)
-        recorder.send_signal(number)
-        out, err = recorder.communicate(timeout=LONG_S)
-    assert recorder.returncode == 0 and err == ""
-    bag = Bag(tmp_path / "bag")
+    lost, folders = True, iter(range(20))
+    while lost:  # a busy computer costs an observer ticks, which it counts: this is about a recording without
+        path = tmp_path / f"bag{next(folders)}"
+        line = [sys.executable, str(TOOL), "record", "-c", endpoint, "-o", str(path)]
+        with subprocess.Popen(line, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True) as recorder:
+            assert recorder.stdout and "recording north/hill/rig to" in recorder.stdout.readline()
+            with pytest.raises(subprocess.TimeoutExpired):
+                recorder.wait(1.0)
+            recorder.send_signal(number)
+            out, err = recorder.communicate(timeout=LONG_S)
+        lost = re.fullmatch(r"fcsl-bus: \d+ ticks and \d+ values were lost, 0 messages refused\n", err) is not None
+        assert recorder.returncode == 0 and (lost or err == "")
+    bag = Bag(path)
     text = describe(bag, "")
     assert bag.truncated == "" and "damage     none" in text
     assert bag.topics["/north/hill/rig/imu/attitude"].type == "rig_bus/msg/ImuAttitude"
@@ -211,7 +215,7 @@ def test_an_interrupted_recording_is_complete(endpoint: str, number: signal.Sign
     assert offset["value"].shape == (len(offset), 4)
     whole = set(range(ticks[0] + 1, ticks[-1]))  # it may begin and end between two messages of one tick
     assert whole <= set(offset["tick"].tolist()) <= whole | {ticks[0] - 1, ticks[0], ticks[-1], ticks[-1] + 1}
-    assert "exists already" in tool("record", "-c", endpoint, "-o", tmp_path / "bag", status=2)[1]
+    assert "exists already" in tool("record", "-c", endpoint, "-o", path, status=2)[1]
 
 
 def test_the_end_of_the_flight_ends_a_recording(library: Path, tmp_path: Path) -> None:

@@ -105,7 +105,7 @@ def test_a_condition_that_never_holds_says_what_it_read(twin: Twin) -> None:
         ("watch.outputs.table[0:1] == 1", "is not a condition"),
         ("abs(watch.outputs.table[0]) > 1", "is a vector of 3: take one of its elements, or `norm`"),
         ("1 / watch.outputs.count > 1", "cannot be evaluated: division by zero\n  watch.outputs.count = 0"),
-        ("1" + " + 1" * 300, "too long: it has more than 256 values"),
+        ("+".join("1" * 257), "too long: it has more than 256 values"),
         ("machine.state == 'SAVE'", "`machine.state` is never 'SAVE': it is one of"),
         ("machine.state in ('RUN', 'LANDED')", "is never 'LANDED': it is one of"),
         ("'good' != watch.outputs.health", "one of 'nominal', 'degraded', 'failed', 'stale'"),
@@ -126,7 +126,7 @@ def test_a_condition_that_never_holds_says_what_it_read(twin: Twin) -> None:
             "sqrt(watch.outputs.count - 1) > 0",
             "cannot be evaluated: the square root of a negative number\n  watch.outputs.count = 0",
         ),
-        ("true.x", "`true` is neither path"),
+        ("true.x", "`true.x` is neither path"),
     ],
 )
 def test_what_is_no_condition_is_refused_before_the_first_tick(twin: Twin, condition: str, reason: str) -> None:

@@ -439,6 +439,17 @@ numeric = st.recursive(
 @example(text="hold.outputs.health in ('stale', 'failed',) or machine.state not in ['WAIT']")
 @example(text="-2 ** -hold.state.flag + hold.state.flag ** 0.5")
 @example(text="norm(norm(hold.inputs.u) * hold.inputs.u)")
+@example(text="1 in (1, 1 / 0)")
+@example(text="machine.state == 'RUN' == hold.outputs.health")
+@example(text="'RUN' in (machine.state, hold.outputs.health)")
+@example(text="hold.inputs.u [0] > 1")
+@example(text="2 in[1, 2] and 00 < 1")
+@example(text="1 > 0 # why")
+@example(text="(" * 33 + "1" + ")" * 33)
+@example(text="(" * 20 + "-" * 12 + "1" + ")" * 20)
+@example(text="2 ** " * 40 + "1")
+@example(text="+".join("1" * 300))
+@example(text="hold.inputs.u[()] > 1")
 def test_both_implementations_agree(client: Client, text: str) -> None:
     """On what an expression is, and on its value: the server's in C, and the one of tests, studies and the compiler in Python."""
     client.ok("set_state", state="RUN")
@@ -453,8 +464,10 @@ def test_both_implementations_agree(client: Client, text: str) -> None:
     reply = client("eval", expression=text)
     try:
         expected = evaluator(parse(text, find), SCALARS)(lambda node: values[node.value.replace(" ", "")])
-    except ExpressionError:
-        assert reply.get("error", {}).get("code") in ("bad_expression", "unknown_path"), (text, reply)
+    except ExpressionError as error:
+        if "`degrees` is of rad" in str(error) or "one unit" in str(error):
+            return  # the server does not check units, and `degrees` has one
+        assert reply.get("error", {}).get("code") in ("bad_expression", "unknown_path", "bad_index"), (text, reply)
         return
     if isinstance(expected, str) and not text.strip("( )").startswith(("machine", "hold")):
         assert not reply["ok"]  # a name by itself
@@ -490,6 +503,10 @@ def bits_or_self(value: Any) -> Any:
         ("2 ** 3 ** 2 - -2 ** 2", 516.0),
         ("norm(hold.inputs.u * 0 - hold.inputs.free)", math.sqrt(3.0)),
         ("degrees(0)", 0.0),
+        ("2 in[1, 2]", True),
+        ("'stale' in (hold.outputs.health, source.outputs.health)", True),
+        ("norm(hold.state.line - norm(hold.state.line)) + norm(hold.state.p[0, 0:2]) * 0 > 0", True),
+        ("hold.state.line[-1] + hold.state.p[-1, -1]", 25.0),
     ],
 )
 def test_expressions(client: Client, text: str, value: Any) -> None:
@@ -522,6 +539,11 @@ def test_expressions(client: Client, text: str, value: Any) -> None:
         ("norm(hold.state.line) > 1 and norm(hold.state.p[0] + hold.inputs.u) > 1", "bad_expression", ""),
         ("norm(hold.inputs.u < 1)", "bad_expression", ""),
         ("norm(hold.state.p)", "bad_expression", ""),
+        ("hold.state.line[3:3] > 1", "bad_expression", ""),
+        ("norm(hold.state.line[3:3])", "bad_expression", ""),
+        ("norm(hold.state.p[1:1, 0]) > 0", "bad_expression", ""),
+        ("'stale' in (hold.outputs.health, machine.state)", "bad_expression", ""),
+        ("hold.state.count > 1 # why", "bad_expression", ""),
         ("__import__('os')", "unknown_path", None),
         ("exit()", "unknown_path", None),
         ("1 if true else 2", "bad_expression", ""),

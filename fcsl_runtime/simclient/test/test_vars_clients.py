@@ -174,7 +174,7 @@ def tcp(address: str) -> Client:
     host, port = address.removeprefix("tcp:").rsplit(":", 1)
     client = Client.__new__(Client)
     client.socket = socket.create_connection((host, int(port)), timeout=10)
-    client._file = client.socket.makefile("rb")
+    client.file = client.socket.makefile("rb")
     return client
 
 

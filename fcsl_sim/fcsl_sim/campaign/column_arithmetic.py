@@ -1,6 +1,7 @@
 # SPDX-License-Identifier: Apache-2.0
 """Arithmetic of expressions on columns: the values at all ticks of a flight, and what is of all ticks. As IEEE 754 has it, division
-by zero gives an infinity or NaN. Integers have 64 bits, floating numbers are doubles.
+by zero gives an infinity or NaN. Integers have 64 bits, floating numbers are doubles. An integer that does not fit is an
+ExpressionError.
 """
 
 from __future__ import annotations
@@ -11,7 +12,7 @@ from typing import Any
 
 import numpy as np
 
-from fcsl_compiler.api.expressions import Arithmetic
+from fcsl_compiler.api.expressions import Arithmetic, ExpressionError
 
 Array = np.ndarray[Any, Any]
 
@@ -19,6 +20,8 @@ Array = np.ndarray[Any, Any]
 def widest(values: Array) -> Array:
     """Numbers as 64 bits have them; bools and names as they are."""
     kind = values.dtype.kind
+    if kind == "u":
+        _check_fits(values)
     return values.astype(np.float64 if kind == "f" else np.int64) if kind in "fiu" else values
 
 
@@ -30,6 +33,23 @@ def _number(value: Any) -> Any:
 
 def _real(value: Any) -> Array:
     return np.asarray(value, np.float64)
+
+
+def _check_fits(values: Any) -> None:
+    if np.any(np.abs(values) >= 2.0**63):
+        raise ExpressionError("an integer does not fit 64 bits")
+
+
+def _of_integers(function: Callable[..., Any]) -> Callable[..., Any]:
+    """Numbers, of which integers must fit."""
+
+    def apply(*values: Any) -> Any:
+        numbers = [_number(value) for value in values]
+        if all(number.dtype.kind == "i" for number in numbers):
+            _check_fits(function(*map(_real, numbers)))
+        return function(*numbers)
+
+    return apply
 
 
 def _of_numbers(function: Callable[..., Any], convert: Callable[[Any], Any] = _number) -> Callable[..., Any]:
@@ -51,10 +71,10 @@ def _folded(join: Callable[[Any, Any], Any]) -> Callable[..., Any]:
 
 #: Of each tick by itself.
 _AT_A_TICK: dict[str, Callable[..., Any]] = {
-    **{"+": _of_numbers(np.add), "-": _of_numbers(np.subtract), "*": _of_numbers(np.multiply)},
+    **{"+": _of_integers(np.add), "-": _of_integers(np.subtract), "*": _of_integers(np.multiply)},
     **{"/": _of_numbers(np.divide), "**": _of_numbers(np.float_power)},
     **{"//": _of_numbers(np.floor_divide, _real), "%": _of_numbers(np.remainder, _real)},
-    **{"negative": _of_numbers(np.negative), "positive": _number, "abs": _of_numbers(np.abs)},
+    **{"negative": _of_integers(np.negative), "positive": _number, "abs": _of_integers(np.abs)},
     **{"sqrt": _of_numbers(np.sqrt, _real), "degrees": _of_numbers(np.degrees, _real)},
     **{"isnan": _of_numbers(np.isnan, _real), "isfinite": _of_numbers(np.isfinite, _real)},
     "norm": lambda x: np.sqrt(np.square(_real(x)).sum(axis=-1)),

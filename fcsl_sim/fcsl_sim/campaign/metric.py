@@ -55,9 +55,8 @@ class Metric:
         except ExpressionError as error:
             raise MetricError(str(error)) from None
         self.quantity: Quantity = self.root.quantity
-        if self.quantity.shape or self.quantity.kind is Kind.NAME:
-            what = f"a vector of {self.quantity.shape[0]}" if self.quantity.shape else "a name"
-            raise MetricError(f"`{text}` is {what}, not a number: take an element, `norm`, or compare it")
+        if self.quantity.kind is Kind.NAME:
+            raise MetricError(f"`{text}` is a name, not a number: compare it")
         self._arithmetic = column_arithmetic(machine.tick_hz)
         leaves = list(self.root.walk())
         self.paths = {
@@ -71,7 +70,7 @@ class Metric:
         return bool(value) if self.quantity.kind is Kind.BOOL else float(value)
 
     def part(self, node: Node, columns: Columns, metrics: Mapping[str, Any]) -> Any:
-        """The value of a part of `root` in a flight."""
+        """The value of a part of `root` in a flight. Raises MetricError where an integer does not fit."""
 
         def source(leaf: Node) -> Any:
             if leaf.operator == "metric":
@@ -79,5 +78,8 @@ class Metric:
             column = widest(columns[leaf.value])
             return column if leaf.operator == "column" else column[-1]
 
-        with np.errstate(all="ignore"):
-            return evaluator(node, self._arithmetic)(source)
+        try:
+            with np.errstate(all="ignore"):
+                return evaluator(node, self._arithmetic)(source)
+        except ExpressionError as error:
+            raise MetricError(f"`{self.text}` has no value: {error}") from None

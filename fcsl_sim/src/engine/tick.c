@@ -4,14 +4,10 @@
  */
 #include "tick.h"
 
-#include <string.h>
-
 #include "fcsl/fcsl_fp_mode.h"
-#include "fcsl/fcsl_scalar.h"
 #include "actuators.h"
 #include "base/clock.h"
 #include "fcsl/fcsl_error.h"
-#include "base/scalar_bits.h"
 #include "instants.h"
 #include "plant/value_names.h"
 
@@ -79,7 +75,7 @@ void fcsl_sim_take_command(void *context, const fcsl_message_t *command)
 /* Without a value, as of a division by zero, it does not hold. */
 static int until_holds(const fcsl_sim_t *sim)
 {
-    fcsl_value_t value;
+    fcsl_expression_value_t value;
     fcsl_expression_error_t error;
     return fcsl_expression_run(sim->until, &value, &error) == 0 && value.integer != 0;
 }

@@ -205,7 +205,8 @@ static int sort_events(fcsl_sim_t *sim, fcsl_error_t *error)
 }
 
 /* "lander.outputs.landed" */
-static int find_in_plant(const void *context, const char *path, fcsl_operand_t *operand, fcsl_expression_error_t *error)
+static int find_in_plant(const void *context, const char *path, fcsl_expression_operand_t *operand,
+                         fcsl_expression_error_t *error)
 {
     const fcsl_plant_t *plant = context;
     const size_t length = strcspn(path, ".");
@@ -232,7 +233,7 @@ static int build_until(fcsl_sim_t *sim, fcsl_error_t *error)
         return fcsl_fail(error, "plan line %u: %s at character %zu of the stop condition", sim->plan.until_line,
                          why.text, why.at + 1u);
     }
-    return sim->until->kind == FCSL_VALUE_BOOL
+    return sim->until->kind == FCSL_EXPRESSION_BOOL
                ? 0
                : fcsl_fail(error, "plan line %u: the stop condition is not a bool", sim->plan.until_line);
 }

@@ -443,8 +443,8 @@ static int count_statements(const char *text, uint32_t lines, uint32_t counts[ST
     const char *at = text;
     for (uint32_t i = 1; i <= lines; i++, at += strlen(at) + 1) {
         if (i == 1) {
-            if (strcmp(at, "fcsl-sim-plan 2") != 0) {
-                return fcsl_fail(error, "plan line 1: not `fcsl-sim-plan 2`");
+            if (strcmp(at, "fcsl-sim-plan 3") != 0) {
+                return fcsl_fail(error, "plan line 1: not `fcsl-sim-plan 3`");
             }
             continue;
         }

@@ -2,7 +2,7 @@
  *
  * The plan: the front end's input to the native simulator. Text, one statement per line, words separated by one space:
  *
- *   fcsl-sim-plan 2
+ *   fcsl-sim-plan 3
  *   machine NAME LIBRARY                              library: to the end of the line
  *   seed N
  *   ticks N                                           controller ticks at the latest

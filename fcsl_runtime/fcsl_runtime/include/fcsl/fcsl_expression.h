@@ -1,11 +1,11 @@
 /* SPDX-License-Identifier: Apache-2.0
  *
  * Expressions over fields: of the variable server's `eval`, and of a simulation's `until`. Python has a second implementation of
- * the same language (fcsl_compiler/expression), which also knows units; a test compares them (test/test_expressions.py).
+ * the same language (fcsl_compiler/expression), which also knows units; a test compares them (simclient/test/test_vars.py).
  *
  *   or-test:    and-test {"or" and-test}          and-test:  not-test {"and" not-test}
  *   not-test:   "not" not-test | comparison       comparison: sum {("<" | "<=" | ">" | ">=" | "==" | "!=") sum}
- *                                                           | sum ["not"] "in" ("(" | "[") sum {"," sum} [","] (")" | "]")
+ *                                                           | sum ["not"] "in" ("(" | "[") or-test {"," or-test} [","] (")" | "]")
  *   sum:        term {("+" | "-") term}           term:      unary {("*" | "/" | "//" | "%") unary}
  *   unary:      ("-" | "+") unary | power         power:     atom ["**" unary]
  *   atom:       number | 'name' | "name" | true | false | path | function "(" or-test {"," or-test} ")" | "(" or-test ")"
@@ -27,19 +27,24 @@ extern "C" {
 enum {
     FCSL_EXPRESSION_BYTES_MAX = 1024, /* bytes of an expression, with the 0 that ends it */
     FCSL_EXPRESSION_VALUES_MAX = 256, /* values in an expression */
-    FCSL_EXPRESSION_DEPTH_MAX = 32, /* levels of an expression: each parenthesis, sign and `not` is one */
+    FCSL_EXPRESSION_DEPTH_MAX = 32, /* levels of an expression: each parenthesis, sign, `not` and `**` is one */
     FCSL_EXPRESSION_ARGUMENTS_MAX = 8, /* arguments of a function in an expression */
     FCSL_EXPRESSION_VECTOR_MAX = 16, /* elements of a vector in an expression */
 };
 #define FCSL_EXPRESSION_STEPS_MAX 1024u
 
-typedef enum { FCSL_VALUE_BOOL, FCSL_VALUE_INTEGER, FCSL_VALUE_FLOAT, FCSL_VALUE_NAME } fcsl_value_kind_t;
+typedef enum {
+    FCSL_EXPRESSION_BOOL,
+    FCSL_EXPRESSION_INTEGER,
+    FCSL_EXPRESSION_FLOAT,
+    FCSL_EXPRESSION_NAME
+} fcsl_expression_kind_t;
 
 typedef struct {
-    fcsl_value_kind_t kind;
+    fcsl_expression_kind_t kind;
     int64_t integer; /* a bool's and a name's, too */
     double real;
-} fcsl_value_t;
+} fcsl_expression_value_t;
 
 /* What a path is: a scalar, or a vector whose elements are read one by one. The memory stays where it is. */
 typedef struct {
@@ -47,7 +52,7 @@ typedef struct {
     uint8_t type;
     uint32_t count; /* of a vector; 0: a scalar */
     const uint8_t *elements[FCSL_EXPRESSION_VECTOR_MAX];
-} fcsl_operand_t;
+} fcsl_expression_operand_t;
 
 typedef struct {
     const char *code; /* bad_expression, unknown_path or bad_index */
@@ -71,23 +76,24 @@ typedef struct {
 typedef struct {
     fcsl_expression_step_t steps[FCSL_EXPRESSION_STEPS_MAX];
     uint32_t count;
-    fcsl_value_kind_t kind;        /* of the value */
+    fcsl_expression_kind_t kind;        /* of the value */
     uint8_t type;                  /* of a name */
     const fcsl_machine_t *machine; /* of a name */
 } fcsl_expression_t;
 
 /* What `path` is; 0, or -1 with code, hint and text of `error`. */
-typedef int fcsl_expression_find_t(const void *context, const char *path, fcsl_operand_t *operand,
+typedef int fcsl_expression_find_t(const void *context, const char *path, fcsl_expression_operand_t *operand,
                                    fcsl_expression_error_t *error);
 
 /* 0, or -1 with `error`. */
 int fcsl_expression_compile(const char *text, fcsl_expression_find_t *find, const void *context,
                             fcsl_expression_t *expression, fcsl_expression_error_t *error);
 /* The value now; 0, or -1 with `error` where there is none. */
-int fcsl_expression_run(const fcsl_expression_t *expression, fcsl_value_t *value, fcsl_expression_error_t *error);
+int fcsl_expression_run(const fcsl_expression_t *expression, fcsl_expression_value_t *value,
+                        fcsl_expression_error_t *error);
 /* What `path` is among these fields of `data`: for a `find`. "outputs.position[2]" is found as "outputs.position". */
 int fcsl_expression_find_field(const fcsl_field_t *fields, uint32_t count, const fcsl_machine_t *machine,
-                               const uint8_t *data, const char *path, fcsl_operand_t *operand,
+                               const uint8_t *data, const char *path, fcsl_expression_operand_t *operand,
                                fcsl_expression_error_t *error);
 
 #ifdef __cplusplus

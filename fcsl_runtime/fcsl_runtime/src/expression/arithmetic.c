@@ -11,9 +11,9 @@ static const char ZERO[] = "division by zero";
 /* Integers up to here are doubles, too. */
 static const int64_t EXACT_MAX = INT64_C(1) << 53;
 
-double fcsl_value_as_double(const fcsl_value_t *value)
+double fcsl_expression_as_double(const fcsl_expression_value_t *value)
 {
-    return value->kind == FCSL_VALUE_FLOAT ? value->real : (double)value->integer;
+    return value->kind == FCSL_EXPRESSION_FLOAT ? value->real : (double)value->integer;
 }
 
 static const char *integer_divide(int64_t a, int64_t b, operation_t op, int64_t *result)
@@ -56,9 +56,9 @@ static void float_divide(double a, double b, double *quotient, double *rest)
     *rest = mod;
 }
 
-static const char *operate_integers(operation_t op, int64_t a, int64_t b, fcsl_value_t *result)
+static const char *operate_integers(operation_t op, int64_t a, int64_t b, fcsl_expression_value_t *result)
 {
-    result->kind = FCSL_VALUE_INTEGER;
+    result->kind = FCSL_EXPRESSION_INTEGER;
     switch (op) {
     case STEP_ADD:
         return __builtin_add_overflow(a, b, &result->integer) ? OVERFLOW : NULL;
@@ -73,7 +73,7 @@ static const char *operate_integers(operation_t op, int64_t a, int64_t b, fcsl_v
         if (a > EXACT_MAX || a < -EXACT_MAX || b > EXACT_MAX || b < -EXACT_MAX) {
             return "integers beyond 2^53 cannot be divided by /";
         }
-        result->kind = FCSL_VALUE_FLOAT;
+        result->kind = FCSL_EXPRESSION_FLOAT;
         result->real = (double)a / (double)b;
         return NULL;
     default:
@@ -81,11 +81,11 @@ static const char *operate_integers(operation_t op, int64_t a, int64_t b, fcsl_v
     }
 }
 
-static const char *operate_floats(operation_t op, double a, double b, fcsl_value_t *result)
+static const char *operate_floats(operation_t op, double a, double b, fcsl_expression_value_t *result)
 {
     double quotient = 0.0;
     double rest = 0.0;
-    result->kind = FCSL_VALUE_FLOAT;
+    result->kind = FCSL_EXPRESSION_FLOAT;
     switch (op) {
     case STEP_ADD:
         result->real = a + b;
@@ -108,43 +108,44 @@ static const char *operate_floats(operation_t op, double a, double b, fcsl_value
 }
 
 /* As Python's math.pow. */
-static const char *power(double a, double b, fcsl_value_t *result)
+static const char *power(double a, double b, fcsl_expression_value_t *result)
 {
-    *result = (fcsl_value_t){.kind = FCSL_VALUE_FLOAT, .real = pow(a, b)};
+    *result = (fcsl_expression_value_t){.kind = FCSL_EXPRESSION_FLOAT, .real = pow(a, b)};
     return isfinite(a) && isfinite(b) && !isfinite(result->real) ? "this power is no number, or too large" : NULL;
 }
 
-const char *fcsl_value_operate(operation_t op, const fcsl_value_t *a, const fcsl_value_t *b, fcsl_value_t *result)
+const char *fcsl_expression_operate(operation_t op, const fcsl_expression_value_t *a, const fcsl_expression_value_t *b,
+                                    fcsl_expression_value_t *result)
 {
     if (op == STEP_POWER) {
-        return power(fcsl_value_as_double(a), fcsl_value_as_double(b), result);
+        return power(fcsl_expression_as_double(a), fcsl_expression_as_double(b), result);
     }
-    return a->kind != FCSL_VALUE_FLOAT && b->kind != FCSL_VALUE_FLOAT
+    return a->kind != FCSL_EXPRESSION_FLOAT && b->kind != FCSL_EXPRESSION_FLOAT
                ? operate_integers(op, a->integer, b->integer, result)
-               : operate_floats(op, fcsl_value_as_double(a), fcsl_value_as_double(b), result);
+               : operate_floats(op, fcsl_expression_as_double(a), fcsl_expression_as_double(b), result);
 }
 
-const char *fcsl_value_negative(const fcsl_value_t *a, fcsl_value_t *result)
+const char *fcsl_expression_negative(const fcsl_expression_value_t *a, fcsl_expression_value_t *result)
 {
-    if (a->kind == FCSL_VALUE_FLOAT) {
-        *result = (fcsl_value_t){.kind = FCSL_VALUE_FLOAT, .real = -a->real};
+    if (a->kind == FCSL_EXPRESSION_FLOAT) {
+        *result = (fcsl_expression_value_t){.kind = FCSL_EXPRESSION_FLOAT, .real = -a->real};
         return NULL;
     }
-    result->kind = FCSL_VALUE_INTEGER;
+    result->kind = FCSL_EXPRESSION_INTEGER;
     return __builtin_sub_overflow((int64_t)0, a->integer, &result->integer) ? OVERFLOW : NULL;
 }
 
-const char *fcsl_value_sqrt(const fcsl_value_t *a, fcsl_value_t *result)
+const char *fcsl_expression_sqrt(const fcsl_expression_value_t *a, fcsl_expression_value_t *result)
 {
-    const double x = fcsl_value_as_double(a);
-    *result = (fcsl_value_t){.kind = FCSL_VALUE_FLOAT, .real = sqrt(x)};
+    const double x = fcsl_expression_as_double(a);
+    *result = (fcsl_expression_value_t){.kind = FCSL_EXPRESSION_FLOAT, .real = sqrt(x)};
     return x < 0.0 ? "the square root of a negative number" : NULL;
 }
 
 /* Every 64-bit integer and every double is a long double where it has 64 bits of mantissa or more: compared exactly. */
-static long double exact(const fcsl_value_t *value)
+static long double exact(const fcsl_expression_value_t *value)
 {
-    return value->kind == FCSL_VALUE_FLOAT ? (long double)value->real : (long double)value->integer;
+    return value->kind == FCSL_EXPRESSION_FLOAT ? (long double)value->real : (long double)value->integer;
 }
 
 static int holds_between(comparison_t op, long double a, long double b)
@@ -165,9 +166,9 @@ static int holds_between(comparison_t op, long double a, long double b)
     }
 }
 
-int fcsl_value_compare(comparison_t op, const fcsl_value_t *a, const fcsl_value_t *b)
+int fcsl_expression_compare(comparison_t op, const fcsl_expression_value_t *a, const fcsl_expression_value_t *b)
 {
-    return a->kind != FCSL_VALUE_FLOAT && b->kind != FCSL_VALUE_FLOAT
+    return a->kind != FCSL_EXPRESSION_FLOAT && b->kind != FCSL_EXPRESSION_FLOAT
                ? holds_between(op, a->integer < b->integer ? -1 : a->integer > b->integer, 0)
                : holds_between(op, exact(a), exact(b));
 }

@@ -32,7 +32,7 @@ static int fail(fcsl_expression_error_t *error, const char *code, const char *wh
 }
 
 int fcsl_expression_find_field(const fcsl_field_t *fields, uint32_t count, const fcsl_machine_t *machine,
-                               const uint8_t *data, const char *path, fcsl_operand_t *operand,
+                               const uint8_t *data, const char *path, fcsl_expression_operand_t *operand,
                                fcsl_expression_error_t *error)
 {
     const char *rest = path;
@@ -47,12 +47,13 @@ int fcsl_expression_find_field(const fcsl_field_t *fields, uint32_t count, const
     if (fcsl_view_index(&view, rest) != 0) {
         return fail(error, "bad_index", "no element", path);
     }
-    if (view.rank > 1 || (view.rank == 1 && view.axes[0].count > FCSL_EXPRESSION_VECTOR_MAX)) {
+    const uint32_t elements = fcsl_view_count(&view);
+    if (view.rank > 1 || elements == 0 || elements > FCSL_EXPRESSION_VECTOR_MAX) {
         return fail(error, "bad_expression", "name one element of", path);
     }
     *operand =
-        (fcsl_operand_t){.machine = machine, .type = field->type, .count = view.rank == 1 ? view.axes[0].count : 0};
-    for (uint32_t i = 0; i < fcsl_view_count(&view); i++) {
+        (fcsl_expression_operand_t){.machine = machine, .type = field->type, .count = view.rank == 1 ? elements : 0};
+    for (uint32_t i = 0; i < elements; i++) {
         operand->elements[i] = data + field->offset + fcsl_view_byte(&view, i);
     }
     return 0;

@@ -40,12 +40,12 @@ fcsl_expression_step_t *fcsl_parser_last(parser_t *p)
 
 int fcsl_parser_need_number(parser_t *p, const part_t *part)
 {
-    return part->kind != FCSL_VALUE_NAME ? 0 : fcsl_parser_fail(p, "a name is not a number");
+    return part->kind != FCSL_EXPRESSION_NAME ? 0 : fcsl_parser_fail(p, "a name is not a number");
 }
 
 int fcsl_parser_need_bool(parser_t *p, const part_t *part)
 {
-    return part->kind == FCSL_VALUE_BOOL && part->count == 0
+    return part->kind == FCSL_EXPRESSION_BOOL && part->count == 0
                ? 0
                : fcsl_parser_fail(p, "`and`, `or` and `not` need conditions: compare this value");
 }
@@ -74,13 +74,18 @@ static int read_right(parser_t *p, part_t *part, operation_t operation, part_rea
         fcsl_parser_same_count(p, part, &right) != 0) {
         return -1;
     }
-    const int real = part->kind == FCSL_VALUE_FLOAT || right.kind == FCSL_VALUE_FLOAT || operation == STEP_DIVIDE ||
-                     operation == STEP_POWER;
-    part->kind = real ? FCSL_VALUE_FLOAT : FCSL_VALUE_INTEGER;
+    const int real = part->kind == FCSL_EXPRESSION_FLOAT || right.kind == FCSL_EXPRESSION_FLOAT ||
+                     operation == STEP_DIVIDE || operation == STEP_POWER;
+    part->kind = real ? FCSL_EXPRESSION_FLOAT : FCSL_EXPRESSION_INTEGER;
     return fcsl_parser_emit(p, operation, -1);
 }
 
 static int read_unary(parser_t *p, part_t *part);
+
+static int read_exponent(parser_t *p, part_t *part)
+{
+    return fcsl_parser_deeper(p, part, read_unary);
+}
 
 /* `**` binds closer than a sign before it, and not as close as one behind it. */
 static int read_power(parser_t *p, part_t *part)
@@ -88,16 +93,7 @@ static int read_power(parser_t *p, part_t *part)
     if (fcsl_parser_atom(p, part) != 0) {
         return -1;
     }
-    if (!fcsl_parser_take(p, "**")) {
-        return 0;
-    }
-    if (p->depth == FCSL_EXPRESSION_DEPTH_MAX) {
-        return fcsl_parser_fail(p, "nested too deeply");
-    }
-    p->depth++;
-    const int status = read_right(p, part, STEP_POWER, read_unary);
-    p->depth--;
-    return status;
+    return fcsl_parser_take(p, "**") ? read_right(p, part, STEP_POWER, read_exponent) : 0;
 }
 
 static int read_unary(parser_t *p, part_t *part)
@@ -109,7 +105,7 @@ static int read_unary(parser_t *p, part_t *part)
     if (fcsl_parser_deeper(p, part, read_unary) != 0 || fcsl_parser_need_number(p, part) != 0) {
         return -1;
     }
-    part->kind = part->kind == FCSL_VALUE_BOOL ? FCSL_VALUE_INTEGER : part->kind;
+    part->kind = part->kind == FCSL_EXPRESSION_BOOL ? FCSL_EXPRESSION_INTEGER : part->kind;
     return fcsl_parser_emit(p, minus ? STEP_NEGATIVE : STEP_POSITIVE, 0);
 }
 
@@ -153,24 +149,33 @@ static int read_sum(parser_t *p, part_t *part)
 
 /* ---- comparisons --------------------------------------------------------------------------------------------------- */
 
+/* Names of healths are the same everywhere. */
+static int has_names_of(const part_t *a, const part_t *b)
+{
+    return a->type == b->type && (a->type == FCSL_HEALTH || a->machine == b->machine);
+}
+
 /* The number of a name in quotes, which only the field that it is compared with knows. */
-static int resolve_name(parser_t *p, const part_t *literal, const part_t *field)
+static int resolve_name(parser_t *p, part_t *literal, const part_t *field)
 {
     const int32_t number = fcsl_enumerator_find(field->machine, field->type, literal->literal, literal->length);
-    if (number == FCSL_NONE) {
+    if (number == FCSL_NONE || (literal->is_resolved && !has_names_of(literal, field))) {
         p->at = (size_t)(literal->literal - p->text);
         return fcsl_parser_fail(p, "the field never has this name");
     }
+    literal->is_resolved = 1;
+    literal->type = field->type;
+    literal->machine = field->machine;
     p->expression->steps[literal->step].with.integer = number;
     return 0;
 }
 
-static int need_comparable(parser_t *p, const part_t *left, comparison_t comparison, const part_t *right)
+static int need_comparable(parser_t *p, part_t *left, comparison_t comparison, part_t *right)
 {
     if (fcsl_parser_need_scalar(p, left) != 0 || fcsl_parser_need_scalar(p, right) != 0) {
         return -1;
     }
-    if (left->kind != FCSL_VALUE_NAME && right->kind != FCSL_VALUE_NAME) {
+    if (left->kind != FCSL_EXPRESSION_NAME && right->kind != FCSL_EXPRESSION_NAME) {
         return 0;
     }
     if (left->kind != right->kind) {
@@ -180,9 +185,7 @@ static int need_comparable(parser_t *p, const part_t *left, comparison_t compari
         return fcsl_parser_fail(p, "names have no order");
     }
     if (left->literal == NULL && right->literal == NULL) {
-        return left->type == right->type && left->machine == right->machine
-                   ? 0
-                   : fcsl_parser_fail(p, "names of different kinds cannot be compared");
+        return has_names_of(left, right) ? 0 : fcsl_parser_fail(p, "names of different kinds cannot be compared");
     }
     if (left->literal != NULL && right->literal != NULL) {
         return fcsl_parser_fail(p, "a name in quotes is compared with a field");
@@ -204,12 +207,13 @@ static int take_comparison(parser_t *p, comparison_t *comparison)
     return 0;
 }
 
-/* `in` or `not in`, when it stands here. */
+/* `in` or `not in`, when it stands here; a list may follow at once, `in[1, 2]`. */
 static int take_membership(parser_t *p, int *negated)
 {
     const size_t from = p->at;
     *negated = fcsl_parser_take_word(p, "not");
-    if (fcsl_parser_take_word(p, "in")) {
+    if (fcsl_parser_take_word(p, "in") || fcsl_parser_take(p, "in[")) {
+        p->at -= p->text[p->at - 1u] == '[' ? 1u : 0u;
         return 1;
     }
     p->at = from;
@@ -245,7 +249,7 @@ static int read_items(parser_t *p, part_t *part, int negated)
     if (items == 1 && commas == 0 && *closing == ')') {
         return fcsl_parser_fail(p, "`in` takes a list: write a comma behind a single value");
     }
-    *part = (part_t){.kind = FCSL_VALUE_BOOL};
+    *part = (part_t){.kind = FCSL_EXPRESSION_BOOL};
     if (fcsl_parser_emit(p, STEP_MEMBERS, -1) != 0) {
         return -1;
     }
@@ -285,7 +289,7 @@ static int read_comparison(parser_t *p, part_t *part)
         }
         comparison = next;
         left = right;
-        *part = (part_t){.kind = FCSL_VALUE_BOOL};
+        *part = (part_t){.kind = FCSL_EXPRESSION_BOOL};
     }
     while (first != FCSL_EXPRESSION_STEPS_MAX) {
         const uint32_t before = p->expression->steps[first].target;

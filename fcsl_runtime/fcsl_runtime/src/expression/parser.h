@@ -22,13 +22,14 @@ typedef struct {
 
 /* What a part of an expression is. */
 typedef struct {
-    fcsl_value_kind_t kind;
+    fcsl_expression_kind_t kind;
     uint32_t count;                /* of a vector; 0: a scalar */
     uint8_t type;                  /* of a name that a field has */
     const fcsl_machine_t *machine; /* the same */
     const char *literal;           /* a name in quotes: where it stands in the text; else null */
     size_t length;                 /* of the literal */
     uint32_t step;                 /* of the literal: which pushes its number, once it is known */
+    int is_resolved;               /* the number is known: that of `type` and `machine` */
 } part_t;
 
 /* Notes what is wrong, at this place; always -1. */
@@ -51,7 +52,7 @@ int fcsl_parser_same_count(parser_t *p, part_t *part, const part_t *other);
 typedef int part_reader_t(parser_t *p, part_t *part);
 part_reader_t fcsl_parser_atom;
 part_reader_t fcsl_parser_expression;
-/* What stands in a parenthesis, or behind a sign or `not`. Nothing else makes the parser call itself. */
+/* What stands in a parenthesis or list, or behind a sign, `not` or `**`. Nothing else makes the parser call itself. */
 int fcsl_parser_deeper(parser_t *p, part_t *part, part_reader_t *read);
 
 #endif /* FCSL_EXPRESSION_PARSER_H */

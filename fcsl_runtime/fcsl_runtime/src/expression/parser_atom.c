@@ -86,7 +86,7 @@ static int read_number(parser_t *p, part_t *part)
     if (is_letter(text[p->at]) || text[p->at] == '.' || (!real && text[from] == '0' && p->at - from > 1)) {
         return fcsl_parser_fail(p, "malformed number");
     }
-    part->kind = real ? FCSL_VALUE_FLOAT : FCSL_VALUE_INTEGER;
+    part->kind = real ? FCSL_EXPRESSION_FLOAT : FCSL_EXPRESSION_INTEGER;
     if (fcsl_parser_emit(p, real ? STEP_FLOAT : STEP_INTEGER, 1) != 0) {
         return -1;
     }
@@ -102,7 +102,7 @@ static int read_number(parser_t *p, part_t *part)
 static int read_name(parser_t *p, part_t *part)
 {
     const char quote = p->text[p->at++];
-    part->kind = FCSL_VALUE_NAME;
+    part->kind = FCSL_EXPRESSION_NAME;
     part->literal = p->text + p->at;
     part->step = p->expression->count;
     while (p->text[p->at] != quote) {
@@ -118,7 +118,7 @@ static int read_name(parser_t *p, part_t *part)
 
 static int read_bool(parser_t *p, part_t *part, int value)
 {
-    part->kind = FCSL_VALUE_BOOL;
+    part->kind = FCSL_EXPRESSION_BOOL;
     if (fcsl_parser_emit(p, STEP_BOOL, 1) != 0) {
         return -1;
     }
@@ -126,27 +126,27 @@ static int read_bool(parser_t *p, part_t *part, int value)
     return 0;
 }
 
-static int load(parser_t *p, const fcsl_operand_t *operand, part_t *part)
+static int load(parser_t *p, const fcsl_expression_operand_t *operand, part_t *part)
 {
     part->count = operand->count;
     part->type = operand->type;
     part->machine = operand->machine;
     switch (operand->type) {
     case FCSL_BOOL:
-        part->kind = FCSL_VALUE_BOOL;
+        part->kind = FCSL_EXPRESSION_BOOL;
         break;
     case FCSL_I32:
     case FCSL_U32:
     case FCSL_I64:
     case FCSL_U64:
-        part->kind = FCSL_VALUE_INTEGER;
+        part->kind = FCSL_EXPRESSION_INTEGER;
         break;
     case FCSL_F32:
     case FCSL_F64:
-        part->kind = FCSL_VALUE_FLOAT;
+        part->kind = FCSL_EXPRESSION_FLOAT;
         break;
     default:
-        part->kind = FCSL_VALUE_NAME;
+        part->kind = FCSL_EXPRESSION_NAME;
     }
     if (fcsl_parser_emit(p, STEP_LOAD, 1) != 0) {
         return -1;
@@ -176,7 +176,7 @@ static int read_path(parser_t *p, part_t *part)
         p->at++;
     }
     path[length] = '\0';
-    fcsl_operand_t operand;
+    fcsl_expression_operand_t operand;
     if (p->find(p->context, path, &operand, p->error) != 0) {
         p->error->at = from;
         return -1;
@@ -215,7 +215,7 @@ static int read_arguments(parser_t *p, const function_t *function, part_t *part)
     if (read_argument(p, part) != 0) {
         return -1;
     }
-    part->kind = part->kind == FCSL_VALUE_BOOL ? FCSL_VALUE_INTEGER : part->kind;
+    part->kind = part->kind == FCSL_EXPRESSION_BOOL ? FCSL_EXPRESSION_INTEGER : part->kind;
     for (; fcsl_parser_take(p, ","); count++) {
         part_t more;
         if (!function->is_of_many || count == FCSL_EXPRESSION_ARGUMENTS_MAX) {
@@ -226,7 +226,7 @@ static int read_arguments(parser_t *p, const function_t *function, part_t *part)
             fcsl_parser_emit(p, function->operation, -1) != 0) {
             return -1;
         }
-        part->kind = more.kind == FCSL_VALUE_FLOAT ? FCSL_VALUE_FLOAT : part->kind;
+        part->kind = more.kind == FCSL_EXPRESSION_FLOAT ? FCSL_EXPRESSION_FLOAT : part->kind;
     }
     if (function->is_of_many) {
         return count > 1 ? 0 : fcsl_parser_fail(p, "min and max take two values or more");
@@ -234,7 +234,7 @@ static int read_arguments(parser_t *p, const function_t *function, part_t *part)
     if (function->is_test && fcsl_parser_need_scalar(p, part) != 0) {
         return -1;
     }
-    part->kind = function->is_test ? FCSL_VALUE_BOOL : function->is_real ? FCSL_VALUE_FLOAT : part->kind;
+    part->kind = function->is_test ? FCSL_EXPRESSION_BOOL : function->is_real ? FCSL_EXPRESSION_FLOAT : part->kind;
     return fcsl_parser_emit(p, function->operation, 0);
 }
 
@@ -262,7 +262,7 @@ static int read_norm(parser_t *p, part_t *part)
         }
     }
     p->element = outer;
-    *part = (part_t){.kind = FCSL_VALUE_FLOAT};
+    *part = (part_t){.kind = FCSL_EXPRESSION_FLOAT};
     return fcsl_parser_emit(p, STEP_SQRT, 0);
 }
 
@@ -297,7 +297,8 @@ int fcsl_parser_atom(parser_t *p, part_t *part)
                : fcsl_parser_take(p, ")")                               ? 0
                                                                         : fcsl_parser_fail(p, "')' expected");
     }
-    if (++p->values > FCSL_EXPRESSION_VALUES_MAX) {
+    p->values += p->element > 0 ? 0 : 1; /* `norm` reads its argument again for each element */
+    if (p->values > FCSL_EXPRESSION_VALUES_MAX) {
         return fcsl_parser_fail(p, "too many values");
     }
     if (is_digit(c) || (c == '.' && is_digit(p->text[p->at + 1]))) {

@@ -11,7 +11,7 @@
 
 static const double DEGREES_PER_RADIAN = 180.0 / 3.14159265358979323846;
 
-static const char *load(const fcsl_expression_step_t *step, fcsl_value_t *value)
+static const char *load(const fcsl_expression_step_t *step, fcsl_expression_value_t *value)
 {
     uint64_t bits = 0;
     float f32 = 0.0f;
@@ -19,10 +19,10 @@ static const char *load(const fcsl_expression_step_t *step, fcsl_value_t *value)
     const size_t size = fcsl_scalar_size(step->type);
     memcpy(&bits, step->with.data, size); /* for types of 8 bytes; `i32` for those of 4 */
     memcpy(&i32, step->with.data, size < sizeof i32 ? 0 : sizeof i32);
-    *value = (fcsl_value_t){.kind = FCSL_VALUE_INTEGER, .integer = (int64_t)bits};
+    *value = (fcsl_expression_value_t){.kind = FCSL_EXPRESSION_INTEGER, .integer = (int64_t)bits};
     switch (step->type) {
     case FCSL_BOOL:
-        *value = (fcsl_value_t){.kind = FCSL_VALUE_BOOL, .integer = step->with.data[0] != 0};
+        *value = (fcsl_expression_value_t){.kind = FCSL_EXPRESSION_BOOL, .integer = step->with.data[0] != 0};
         return NULL;
     case FCSL_I32:
         value->integer = i32;
@@ -36,46 +36,47 @@ static const char *load(const fcsl_expression_step_t *step, fcsl_value_t *value)
         return bits <= INT64_MAX ? NULL : "this value does not fit 64 bits with a sign";
     case FCSL_F32:
         memcpy(&f32, step->with.data, sizeof f32);
-        *value = (fcsl_value_t){.kind = FCSL_VALUE_FLOAT, .real = (double)f32};
+        *value = (fcsl_expression_value_t){.kind = FCSL_EXPRESSION_FLOAT, .real = (double)f32};
         return NULL;
     case FCSL_F64:
-        value->kind = FCSL_VALUE_FLOAT;
+        value->kind = FCSL_EXPRESSION_FLOAT;
         memcpy(&value->real, step->with.data, sizeof value->real);
         return NULL;
     default:
-        *value = (fcsl_value_t){.kind = FCSL_VALUE_NAME, .integer = i32};
+        *value = (fcsl_expression_value_t){.kind = FCSL_EXPRESSION_NAME, .integer = i32};
         return NULL;
     }
 }
 
-static fcsl_value_t of_bool(int holds)
+static fcsl_expression_value_t of_bool(int holds)
 {
-    return (fcsl_value_t){.kind = FCSL_VALUE_BOOL, .integer = holds};
+    return (fcsl_expression_value_t){.kind = FCSL_EXPRESSION_BOOL, .integer = holds};
 }
 
 /* A bool counts as 1 or 0. */
-static fcsl_value_t as_number(const fcsl_value_t *value)
+static fcsl_expression_value_t as_number(const fcsl_expression_value_t *value)
 {
-    fcsl_value_t number = *value;
-    number.kind = value->kind == FCSL_VALUE_FLOAT ? FCSL_VALUE_FLOAT : FCSL_VALUE_INTEGER;
+    fcsl_expression_value_t number = *value;
+    number.kind = value->kind == FCSL_EXPRESSION_FLOAT ? FCSL_EXPRESSION_FLOAT : FCSL_EXPRESSION_INTEGER;
     return number;
 }
 
 /* As Python's min and max: the first stays where the second is not better, as NaN is not. */
-static fcsl_value_t better(operation_t operation, const fcsl_value_t *a, const fcsl_value_t *b)
+static fcsl_expression_value_t better(operation_t operation, const fcsl_expression_value_t *a,
+                                      const fcsl_expression_value_t *b)
 {
     const comparison_t comparison = operation == STEP_MINIMUM ? COMPARE_LESS : COMPARE_GREATER;
-    return as_number(fcsl_value_compare(comparison, b, a) ? b : a);
+    return as_number(fcsl_expression_compare(comparison, b, a) ? b : a);
 }
 
 /* The uppermost value becomes another. */
-static const char *change(const fcsl_expression_step_t *step, fcsl_value_t *value)
+static const char *change(const fcsl_expression_step_t *step, fcsl_expression_value_t *value)
 {
-    const fcsl_value_t before = *value;
-    const double x = fcsl_value_as_double(value);
+    const fcsl_expression_value_t before = *value;
+    const double x = fcsl_expression_as_double(value);
     switch (step->operation) {
     case STEP_NEGATIVE:
-        return fcsl_value_negative(&before, value);
+        return fcsl_expression_negative(&before, value);
     case STEP_POSITIVE:
         *value = as_number(&before);
         return NULL;
@@ -85,11 +86,12 @@ static const char *change(const fcsl_expression_step_t *step, fcsl_value_t *valu
     case STEP_ABS:
         *value = as_number(&before);
         value->real = fabs(value->real);
-        return before.kind != FCSL_VALUE_FLOAT && before.integer < 0 ? fcsl_value_negative(&before, value) : NULL;
+        return before.kind != FCSL_EXPRESSION_FLOAT && before.integer < 0 ? fcsl_expression_negative(&before, value)
+                                                                          : NULL;
     case STEP_SQRT:
-        return fcsl_value_sqrt(&before, value);
+        return fcsl_expression_sqrt(&before, value);
     case STEP_DEGREES:
-        *value = (fcsl_value_t){.kind = FCSL_VALUE_FLOAT, .real = x * DEGREES_PER_RADIAN};
+        *value = (fcsl_expression_value_t){.kind = FCSL_EXPRESSION_FLOAT, .real = x * DEGREES_PER_RADIAN};
         return NULL;
     case STEP_ISNAN:
         *value = of_bool(isnan(x) != 0);
@@ -98,34 +100,36 @@ static const char *change(const fcsl_expression_step_t *step, fcsl_value_t *valu
         *value = of_bool(isfinite(x) != 0);
         return NULL;
     default: /* STEP_SQUARE */
-        *value = (fcsl_value_t){.kind = FCSL_VALUE_FLOAT, .real = x * x};
+        *value = (fcsl_expression_value_t){.kind = FCSL_EXPRESSION_FLOAT, .real = x * x};
         return NULL;
     }
 }
 
 /* The two uppermost values become one. */
-static const char *join(const fcsl_expression_step_t *step, fcsl_value_t *left, const fcsl_value_t *right)
+static const char *join(const fcsl_expression_step_t *step, fcsl_expression_value_t *left,
+                        const fcsl_expression_value_t *right)
 {
-    const fcsl_value_t before = *left;
+    const fcsl_expression_value_t before = *left;
     switch (step->operation) {
     case STEP_COMPARE:
-        *left = of_bool(fcsl_value_compare((comparison_t)step->type, &before, right));
+        *left = of_bool(fcsl_expression_compare((comparison_t)step->type, &before, right));
         return NULL;
     case STEP_MINIMUM:
     case STEP_MAXIMUM:
         *left = better((operation_t)step->operation, &before, right);
         return NULL;
     default:
-        return fcsl_value_operate((operation_t)step->operation, &before, right, left);
+        return fcsl_expression_operate((operation_t)step->operation, &before, right, left);
     }
 }
 
 /* The next step: whether the jump is taken. */
-static uint32_t jump(const fcsl_expression_step_t *step, uint32_t next, fcsl_value_t *stack, uint32_t *height)
+static uint32_t jump(const fcsl_expression_step_t *step, uint32_t next, fcsl_expression_value_t *stack,
+                     uint32_t *height)
 {
-    fcsl_value_t *top = &stack[*height - 1u];
+    fcsl_expression_value_t *top = &stack[*height - 1u];
     if (step->operation == STEP_CHAIN) {
-        const int holds = fcsl_value_compare((comparison_t)step->type, top - 1, top);
+        const int holds = fcsl_expression_compare((comparison_t)step->type, top - 1, top);
         top[-1] = holds ? *top : of_bool(0);
         *height -= 1u;
         return holds ? next : step->target;
@@ -137,9 +141,10 @@ static uint32_t jump(const fcsl_expression_step_t *step, uint32_t next, fcsl_val
     return next;
 }
 
-int fcsl_expression_run(const fcsl_expression_t *expression, fcsl_value_t *value, fcsl_expression_error_t *error)
+int fcsl_expression_run(const fcsl_expression_t *expression, fcsl_expression_value_t *value,
+                        fcsl_expression_error_t *error)
 {
-    fcsl_value_t stack[STACK_MAX];
+    fcsl_expression_value_t stack[STACK_MAX];
     uint32_t height = 0;
     uint32_t at = 0;
     memset(stack, 0, sizeof stack[0]);
@@ -151,13 +156,13 @@ int fcsl_expression_run(const fcsl_expression_t *expression, fcsl_value_t *value
             stack[height++] = of_bool((int)step->with.integer);
             break;
         case STEP_INTEGER:
-            stack[height++] = (fcsl_value_t){.kind = FCSL_VALUE_INTEGER, .integer = step->with.integer};
+            stack[height++] = (fcsl_expression_value_t){.kind = FCSL_EXPRESSION_INTEGER, .integer = step->with.integer};
             break;
         case STEP_FLOAT:
-            stack[height++] = (fcsl_value_t){.kind = FCSL_VALUE_FLOAT, .real = step->with.real};
+            stack[height++] = (fcsl_expression_value_t){.kind = FCSL_EXPRESSION_FLOAT, .real = step->with.real};
             break;
         case STEP_NAME:
-            stack[height++] = (fcsl_value_t){.kind = FCSL_VALUE_NAME, .integer = step->with.integer};
+            stack[height++] = (fcsl_expression_value_t){.kind = FCSL_EXPRESSION_NAME, .integer = step->with.integer};
             break;
         case STEP_LOAD:
             problem = load(step, &stack[height++]);
@@ -169,7 +174,7 @@ int fcsl_expression_run(const fcsl_expression_t *expression, fcsl_value_t *value
             break;
         case STEP_MEMBER:
             height--;
-            stack[height - 1u].integer |= fcsl_value_compare(COMPARE_EQUAL, &stack[height - 2u], &stack[height]);
+            stack[height - 1u].integer |= fcsl_expression_compare(COMPARE_EQUAL, &stack[height - 2u], &stack[height]);
             break;
         case STEP_MEMBERS:
             height--;

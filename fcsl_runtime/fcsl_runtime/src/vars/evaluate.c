@@ -13,7 +13,8 @@ typedef struct {
     const uint8_t *snapshot;
 } served_t;
 
-static int find(const void *context, const char *path, fcsl_operand_t *operand, fcsl_expression_error_t *error)
+static int find(const void *context, const char *path, fcsl_expression_operand_t *operand,
+                fcsl_expression_error_t *error)
 {
     const served_t *served = context;
     target_t target;
@@ -26,12 +27,13 @@ static int find(const void *context, const char *path, fcsl_operand_t *operand, 
         return -1;
     }
     const uint32_t count = fcsl_view_count(&target.view);
-    if (target.view.rank > 1 || count > FCSL_EXPRESSION_VECTOR_MAX) {
+    if (target.view.rank > 1 || count == 0 || count > FCSL_EXPRESSION_VECTOR_MAX ||
+        (target.machine == NULL && target.field->type > FCSL_F64)) {
         error->code = "bad_expression";
         (void)snprintf(error->text, sizeof error->text, "name one element of '%.80s'", path);
         return -1;
     }
-    *operand = (fcsl_operand_t){
+    *operand = (fcsl_expression_operand_t){
         .machine = target.machine, .type = target.field->type, .count = target.view.rank == 1 ? count : 0};
     for (uint32_t i = 0; i < count; i++) {
         operand->elements[i] = served->snapshot + target.at + fcsl_view_byte(&target.view, i);
@@ -55,15 +57,15 @@ int fcsl_evaluate(const char *text, const catalog_t *catalog, const uint8_t *sna
 void fcsl_evaluated_write(const evaluated_t *evaluated, json_out_t *out)
 {
     char text[PATH_BYTES_MAX];
-    const fcsl_value_t *value = &evaluated->value;
+    const fcsl_expression_value_t *value = &evaluated->value;
     switch (value->kind) {
-    case FCSL_VALUE_BOOL:
+    case FCSL_EXPRESSION_BOOL:
         fcsl_json_text(out, value->integer ? "true" : "false");
         return;
-    case FCSL_VALUE_INTEGER:
+    case FCSL_EXPRESSION_INTEGER:
         fcsl_json_i64(out, value->integer);
         return;
-    case FCSL_VALUE_FLOAT:
+    case FCSL_EXPRESSION_FLOAT:
         fcsl_json_f64(out, value->real);
         return;
     default:

@@ -10,7 +10,7 @@
 #include "json.h"
 
 typedef struct {
-    fcsl_value_t value;
+    fcsl_expression_value_t value;
     uint8_t type;                  /* of a name */
     const fcsl_machine_t *machine; /* of a name */
 } evaluated_t;

@@ -215,7 +215,7 @@ static void say_end(plan_t *plan)
 static void say_all(plan_t *plan)
 {
     plan->count = 1u + any(plan, INSTANCES_MAX);
-    say(plan, "fcsl-sim-plan 2\nmachine hopper ./hopper.so\nseed 1\nticks %u\n", 1u + choose(plan, 99, TICKS));
+    say(plan, "fcsl-sim-plan 3\nmachine hopper ./hopper.so\nseed 1\nticks %u\n", 1u + choose(plan, 99, TICKS));
     say_others(plan);
     for (uint32_t i = 0; i < KINDS; i++) {
         const char *keyword = strcmp(kinds[i].name, "hopper") == 0 ? "machine_model" : "model";

@@ -249,7 +249,7 @@ static size_t write_plan(bytes_t *bytes, const fcsl_model_t *model, char *text)
     };
     const int updates = model->update != NULL;
     int used = snprintf(text, TEXT_BYTES,
-                        "fcsl-sim-plan 2\nmachine hopper ./hopper.so\nseed 1\nticks 9\nmodel %s plant\n%s\n"
+                        "fcsl-sim-plan 3\nmachine hopper ./hopper.so\nseed 1\nticks 9\nmodel %s plant\n%s\n"
                         "instance a %s 0 %d %d 0\ninstance b %s 0 %d %d 0\n",
                         "plant", groups[take_number(bytes, 1) % 4u], "plant", updates ? 100 : 0, updates, "plant",
                         updates ? 100 : 0, updates);

@@ -17,7 +17,7 @@ int LLVMFuzzerInitialize(int *argc, char ***argv);
 
 #define ZEROS "0000000000000000"
 #define NONE  ZEROS " " ZEROS " " ZEROS " " ZEROS "\n"
-#define BEGIN "fcsl-sim-plan 2\nmachine hopper ./hopper.so\nseed 1\nticks 20\n"
+#define BEGIN "fcsl-sim-plan 3\nmachine hopper ./hopper.so\nseed 1\nticks 20\n"
 #define BALL                                                                                                           \
     "set ball parameters.gravity 0 40239eb851eb851f\nset ball parameters.restitution 0 3fe0000000000000\n"             \
     "set ball parameters.rest_speed 0 3fb999999999999a\nset ball parameters.height 0 3f847ae147ae147b\n"               \
