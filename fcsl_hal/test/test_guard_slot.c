@@ -19,7 +19,7 @@
 #include "fcsl/fcsl_guard.h"
 #include "fcsl_check.h"
 
-enum { PATH_BYTES = 64, TEXT_BYTES = 512, TAKES = 500, SECONDS_MAX = 2 };
+enum { PATH_BYTES = 64, TEXT_BYTES = 512, TAKES = 500, SECONDS_MAX = 2, PATIENCE_S = 60 };
 
 static char folder[] = "/tmp/guard_slot.XXXXXX";
 static char path[PATH_BYTES];
@@ -161,7 +161,7 @@ static void test_torn_reads(fcsl_guard_server_t *server, asker_t *asker)
     CHECK(pthread_create(&writer, NULL, write_commands, asker) == 0);
     const time_t begun = time(NULL);
     uint64_t taken = 0;
-    while (taken < TAKES && time(NULL) - begun < SECONDS_MAX) {
+    while (taken < TAKES && time(NULL) - begun < (taken > 0 ? SECONDS_MAX : PATIENCE_S)) {
         if (fcsl_guard_take(server, bytes, &size, &time_ns)) {
             taken++;
             CHECK(size == messages[0].size &&
