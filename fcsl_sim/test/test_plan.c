@@ -79,7 +79,7 @@ static void refuses_with(const char *from, const char *to, const char *message)
 static void names_the_line(void)
 {
     refuses("", 0, "the plan is empty or above 4 MiB");
-    refuses_with("plan 2", "plan 1", "plan line 1: not `fcsl-sim-plan 3`");
+    refuses_with("plan 3", "plan 1", "plan line 1: not `fcsl-sim-plan 3`");
     refuses_with("machine hopper", "machine 1hopper", "plan line 2: not a name");
     refuses_with("machine ", "machine\t", "plan line 2: a control character");
     refuses_with("18446744073709551615", "18446744073709551616",
@@ -112,6 +112,7 @@ static void names_the_line(void)
     refuses_with("- imu", "-- imu", "plan line 16: not a name or channel");
     refuses_with("250000000", "0.25", "plan line 16: the time is not a number of nanoseconds");
     refuses_with("event 3", "event 9999999999", "plan line 18: the time is not a number of nanoseconds");
+    refuses_with("until 200", "until 0", "plan line 19: the number of ticks is not in 1..1000000000000");
     refuses_with("end\n", "end\nend\n", "plan line 21: text after `end`");
     refuses_with("end\n", "", "plan line 19: the plan has no `end`: it is truncated");
 }

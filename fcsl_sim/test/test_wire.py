@@ -114,4 +114,4 @@ def test_a_controller_that_hangs_is_an_error_with_its_tick(load_sim: Callable[..
 def test_no_controller_comes(load_sim: Callable[..., SimConfig]) -> None:
     with serving(load_sim(), 100) as (server, _):
         _, err = server.communicate(timeout=120)
-    assert server.returncode == 1 and err.startswith("error: no controller: ")
+    assert server.returncode == 1 and err.startswith("error: no controller on ")

@@ -9,10 +9,7 @@ from __future__ import annotations
 from collections.abc import Callable
 from typing import TYPE_CHECKING, Any
 
-from fcsl_compiler.api.expressions import SCALARS, ExpressionError, evaluator, parse
-
 from ..errors import TwinError
-from ..quantities import quantity
 
 if TYPE_CHECKING:
     from .host import TwinHost
@@ -39,19 +36,28 @@ class Condition:
         self._reads: dict[str, Any] = {}
 
     def _compiled(self, text: str, twin: Any) -> Callable[[], Any]:
+        from fcsl_compiler.api.expressions import SCALARS, ExpressionError, evaluator, parse  # here: few twins need it
+
+        from ..quantities import quantity
+
         machine, get = twin.machine, twin.get_value
         try:
             value = evaluator(parse(text, lambda path: quantity(path, machine), condition=True), SCALARS)
         except ExpressionError as error:
             raise TwinError(f"`{text}` is not a condition: {error}. For more give a function: lambda twin: …") from None
-        return lambda: value(lambda leaf: get(leaf.value))
+
+        def now() -> Any:
+            try:
+                return value(lambda leaf: get(leaf.value))
+            except ExpressionError as error:
+                raise TwinError(f"{self._text} cannot be evaluated: {error}{self.read()}") from None
+
+        return now
 
     def __call__(self) -> bool:
         self._twin._reads = self._reads = {}
         try:
             holds = self._holds()
-        except ExpressionError as error:
-            raise TwinError(f"{self._text} cannot be evaluated: {error}{self.read()}") from None
         finally:
             self._twin._reads = None
         if not isinstance(holds, bool) and not _is_numpy_bool(holds):
