@@ -11,7 +11,7 @@ from pathlib import Path
 
 from native import FIXTURE, WIRE_SIM, flying
 
-PROGRAM = "from simclient.cli import run_tool; from simclient.vars.link import main; run_tool('fcsl-link', main)"
+PROGRAM = "from simclient.cli import run_tool; from simclient.link.watch import main; run_tool('fcsl-link', main)"
 
 
 def fcsl_link(*arguments: str | Path) -> subprocess.CompletedProcess[str]:

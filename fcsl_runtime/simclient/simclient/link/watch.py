@@ -12,10 +12,10 @@ from collections.abc import Mapping, Sequence
 
 from fcsl_compiler.api.command_line import add_version
 
-from .client import VarClient
-from .find import VARIABLE, find_server, named_address
-from .show import table
-from .wire import VarError
+from ..vars.client import VarClient
+from ..vars.find import VARIABLE, find_server, named_address
+from ..vars.show import table
+from ..vars.wire import VarError
 
 _PREFIX = "hal.link."
 _PORT = re.compile(r"port(\d+)\.(\w+)")
