@@ -34,7 +34,7 @@ _MOVERS = {
 #: The rest of what a flight calls: hosting a machine, and messages of channels. Not under test. Recording, sockets and the bus are
 #: left out: in their place are functions that end the program, but for those that close nothing.
 _CARRIERS = (
-    *(_RUNTIME / folder for folder in ("run", "machine", "base", "history", "messages")),
+    *(_RUNTIME / folder for folder in ("run", "machine", "base", "expression", "history", "messages")),
     *(_HAL / "codec", _HAL / "link/crc16.c", _HAL / "hal/fcsl_hw.c", _HAL / "guard/gate.c"),
     *(_HAL / "named_values/payload.c", _HAL / "base/plan_text.c"),
 )
