@@ -195,7 +195,7 @@ def _await_controller(sim: Simulation, timeout_ms: int) -> None:
     deadline = time.monotonic() + timeout_ms / 1e3
     while not sim.accept(max(0, min(_ACCEPT_MS, round(1e3 * (deadline - time.monotonic()))))):
         if time.monotonic() >= deadline:
-            raise SimError(f"{sim.problem} within {timeout_ms} ms")
+            raise SimError(f"{sim.problem} within {timeout_ms / 1e3:g} s")
 
 
 def _restore(sim: Simulation, path: Path) -> None:

@@ -263,6 +263,14 @@ def test_an_interrupt_while_waiting_for_a_controller(sim_json: Path) -> None:
     assert not path.exists()
 
 
+def test_a_controller_that_never_comes(sim_json: Path) -> None:
+    """It is waited for in slices; the message has the whole time."""
+    path = sim_json.parent / "s"
+    done = fcsl_sim("run", sim_json, "--external", f"wire:unix:{path}", "--timeout", "0.5")
+    assert done.returncode == 2 and done.stderr == f"fcsl-sim: error: no controller on unix:{path} within 0.5 s\n"
+    assert not path.exists()
+
+
 @pytest.mark.parametrize(("limit_kib", "kept"), [(400, True), (16, False)])
 def test_a_full_disk_costs_no_tick_that_was_written(sim_json: Path, tmp_path: Path, limit_kib: int, kept: bool) -> None:
     """A bag without a tick is removed, so that it does not block the next run."""

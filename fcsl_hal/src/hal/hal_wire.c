@@ -145,7 +145,6 @@ static void deliver(hal_t *hal, const fcsl_sink_t *to)
     if (hal->sensed) {
         to->sensed(to->ctx, &hal->sensors);
     }
-    hal->sensed = 0;
 }
 
 /* ---- paced by a simulator ------------------------------------------------------------------------------------------ */
@@ -298,6 +297,7 @@ static int hear_presence(hal_t *hal, fcsl_wire_status_t came, size_t size)
 /* Free-running, one message has all that came. */
 static fcsl_hal_status_t sample_newest(hal_t *hal, uint64_t tick, const fcsl_sink_t *to)
 {
+    hal->sensed = 0;
     wire_alive(hal);
     for (int i = 0; i < MESSAGES_MAX && !(hal->sensed && hal->runs_free); i++) {
         size_t size = 0;

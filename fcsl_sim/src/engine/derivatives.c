@@ -54,7 +54,7 @@ static int compute(fcsl_sim_t *sim, double *slopes, fcsl_error_t *error)
         instance->model->derivative(instance->data, t, states_of(instance), slopes);
         for (uint32_t k = 0; k < count; k++) {
             if (!isfinite(slopes[k])) {
-                char name[FCSL_EXPRESSION_NAME_BYTES];
+                char name[FCSL_VALUE_NAME_BYTES];
                 const uint32_t offset = instance->model->continuous_offset + k * (uint32_t)sizeof(double);
                 fcsl_sim_name_value(instance, offset, name, sizeof name);
                 fcsl_plant_enter(&sim->plant, 0, FCSL_IN_NONE);

@@ -71,7 +71,7 @@ int fcsl_group_check_finite(const fcsl_group_t *group, const double *x, int64_t 
     }
     for (uint32_t i = 0; i < group->n; i++) {
         if (!isfinite(x[i])) {
-            char name[FCSL_EXPRESSION_NAME_BYTES];
+            char name[FCSL_VALUE_NAME_BYTES];
             fcsl_group_name_state(group, i, name, sizeof name);
             return fcsl_fail(error, "%s became %g at %.9f s", name, isnan(x[i]) ? (double)NAN : x[i],
                              (double)time_ns / FCSL_NS_PER_S);
@@ -370,7 +370,7 @@ void fcsl_group_free(fcsl_group_t *group)
 static int check_second_order(const fcsl_group_t *group, uint32_t velocity, uint32_t position, const double *dx,
                               const double *moved, fcsl_error_t *error)
 {
-    char name[FCSL_EXPRESSION_NAME_BYTES];
+    char name[FCSL_VALUE_NAME_BYTES];
     fcsl_group_name_state(group, velocity, name, sizeof name);
     if (memcmp(&dx[position], &group->x[velocity], sizeof *dx) != 0) {
         return fcsl_fail(error, "velocity Verlet: the derivative of %s is not that of a position", name);

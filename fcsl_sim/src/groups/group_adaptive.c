@@ -40,7 +40,7 @@ static int64_t length_ns(const fcsl_group_t *group, double seconds, int64_t barr
 
 static int too_small(const fcsl_group_t *group, double h, double error, uint32_t worst, fcsl_error_t *why)
 {
-    char name[FCSL_EXPRESSION_NAME_BYTES];
+    char name[FCSL_VALUE_NAME_BYTES];
     const double t = (double)group->state.time_ns / FCSL_NS_PER_S;
     fcsl_group_name_state(group, worst, name, sizeof name);
     if (isnan(error)) {

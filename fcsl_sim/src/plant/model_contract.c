@@ -44,7 +44,7 @@ static int check_unchanged(const trial_t *trial, const char *function, int may_w
     const fcsl_model_t *model = trial->instance->model;
     for (uint32_t i = 0; i < model->size; i++) {
         if (trial->before[i] != trial->after[i] && !(may_write_outputs && is_output(model, i))) {
-            char name[FCSL_EXPRESSION_NAME_BYTES];
+            char name[FCSL_VALUE_NAME_BYTES];
             fcsl_sim_name_value(trial->instance, i, name, sizeof name);
             return fcsl_fail(error, "`%s` of model `%s` changes %s%s; states change in `update` and `reset`", function,
                              model->name, name, may_write_outputs ? ", which is no output" : "");
@@ -157,7 +157,7 @@ static int check_written(const trial_t *trial, const double *first, const double
         const int is_mark =
             memcmp(&first[i], &marks[0], sizeof *first) == 0 && memcmp(&second[i], &marks[1], sizeof *second) == 0;
         if (is_mark && i < n) {
-            char name[FCSL_EXPRESSION_NAME_BYTES];
+            char name[FCSL_VALUE_NAME_BYTES];
             fcsl_sim_name_value(trial->instance, model->continuous_offset + i * sizeof *first, name, sizeof name);
             return fcsl_fail(error, "`derivative` of model `%s` does not write dx[%u], that of %s", model->name, i,
                              name);
@@ -226,7 +226,7 @@ static int check_outputs_written(const trial_t *trial, fcsl_error_t *error)
         for (uint32_t k = 0; field->role == FCSL_ROLE_OUTPUT && field->type == FCSL_F64 && k < field->count; k++) {
             const size_t offset = field->offset + (size_t)k * sizeof(double);
             if (!is_written(trial, offset)) {
-                char name[FCSL_EXPRESSION_NAME_BYTES];
+                char name[FCSL_VALUE_NAME_BYTES];
                 fcsl_sim_name_value(trial->instance, offset, name, sizeof name);
                 return fcsl_fail(error, "`output` of model `%s` does not write %s", model->name, name);
             }

@@ -62,7 +62,7 @@ static int check_field(const fcsl_plant_t *plant, const fcsl_instance_state_t *i
     for (uint32_t i = 0; i < field->count; i++) {
         const double value = value_at(instance->data + field->offset + (size_t)i * scalar, field->type);
         if (!isfinite(value)) {
-            char name[FCSL_EXPRESSION_NAME_BYTES];
+            char name[FCSL_VALUE_NAME_BYTES];
             fcsl_sim_name_value(instance, field->offset + (size_t)i * scalar, name, sizeof name);
             return fcsl_fail(error, "%s became %g at %.9f s", name, isnan(value) ? (double)NAN : value,
                              (double)plant->time_ns / 1e9);
