@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""docs/authoring.md: its machine, each change of it, and each rule are compiled and tested as printed.
+"""docs/guide/authoring.md: its machine, each change of it, and each rule are compiled and tested as printed.
 
 FCSL_UPDATE_GOLDEN=1 rewrites the reports that the page shows.
 """
@@ -21,7 +21,7 @@ from fcsl_compiler.driver.passes import compile_machine
 from fcsl_compiler.model import ops
 from fcsl_compiler.model.types import SCALARS
 
-DOC = Path(__file__).resolve().parent.parent / "docs" / "authoring.md"
+DOC = Path(__file__).resolve().parent.parent / "docs/guide/authoring.md"
 PAGE = DOC.read_text()
 BLOCK = re.compile(r"(?:<!-- (file|change): (\S+) -->\n)?```(\w+)(?: (\w+))?\n(.*?)```\n", re.DOTALL)
 BLOCKS: list[tuple[str, str, str, str, str]] = BLOCK.findall(PAGE)

@@ -399,8 +399,8 @@ def test_a_device_paces_the_loop(tmp_path: Path) -> None:
 
 
 def test_the_board_of_the_page(tmp_path: Path) -> None:
-    """docs/board.md: its first board, for a machine with its channels."""
-    page = (ROOT / "docs/board.md").read_text()
+    """docs/hardware/hal.md: its first board, for a machine with its channels."""
+    page = (ROOT / "docs/hardware/hal.md").read_text()
     example = re.search(r"^```json\n(.*?)^```$", page, re.MULTILINE | re.DOTALL)
     assert example
     channels = {"imu.gyro": "f64[3] rad/s", "imu.accel": "f64[3] m/s^2", "gps.latitude": "f64", "gps.longitude": "f64"}

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""docs/bring_up.md: its steps with the lander, run in their order. A folder stands for the lidar."""
+"""docs/hardware/hal.md: its steps with the lander, run in their order. A folder stands for the lidar."""
 
 from __future__ import annotations
 
@@ -11,7 +11,7 @@ from pathlib import Path
 from simclient.replay import replay
 
 ROOT = Path(__file__).resolve().parents[1]
-PAGE = (ROOT / "docs/bring_up.md").read_text()
+PAGE = (ROOT / "docs/hardware/hal.md").read_text()
 LIBRARY = ROOT / "install/lander/lib/lander/liblander_machines.so"
 FENCED = r"```{kind}\n(.*?)^```$"
 

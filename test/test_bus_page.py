@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""docs/bus.md: its plant, which is a Python script over Zenoh's own package, flies the lander; its source is one."""
+"""docs/reference/transports.md: its plant, which is a Python script over Zenoh's own package, flies the lander; its source is one."""
 
 from __future__ import annotations
 
@@ -18,7 +18,7 @@ LONG_S = 120
 
 def write_script(marker: str, path: Path) -> None:
     """The script of the page that has this text."""
-    scripts = re.findall(r"```python\n(.*?)```", (ROOT / "docs/bus.md").read_text(), re.DOTALL)
+    scripts = re.findall(r"```python\n(.*?)```", (ROOT / "docs/reference/transports.md").read_text(), re.DOTALL)
     (script,) = (script for script in scripts if marker in script)
     path.write_text(script)
 

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""docs/campaigns.md: its study is the example's, its test passes."""
+"""docs/guide/campaigns.md: its study is the example's, its test passes."""
 
 from __future__ import annotations
 
@@ -15,7 +15,7 @@ from fcsl_sim.campaign.metric import RESERVED
 from fcsl_sim.campaign.study import OWN_COLUMNS
 
 ROOT = Path(__file__).resolve().parents[1]
-PAGE = (ROOT / "docs/campaigns.md").read_text()
+PAGE = (ROOT / "docs/guide/campaigns.md").read_text()
 
 
 def test_its_study_is_the_example() -> None:

@@ -21,7 +21,16 @@ EXAMPLES = [
     ("files", "packages"),
     [
         ([], []),
-        (["README.md", "docs/flight.md", "scripts/demo.py", "test/test_layers.py", "fcsl_sim/README.md"], []),
+        (
+            [
+                "README.md",
+                "docs/hardware/flight_computer.md",
+                "scripts/demo.py",
+                "test/test_layers.py",
+                "fcsl_sim/README.md",
+            ],
+            [],
+        ),
         (["fcsl_compiler/test/test_tick.py"], ["fcsl_compiler"]),
         (["fcsl_bridge/fcsl_bridge/topics/qos.py"], ["fcsl_bridge"]),
         (["fcsl_runtime/simclient/test/test_fc.py"], ["simclient"]),

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""docs/drivers.md: its drivers of a winch, built and used as the page says, on a folder that is the winch."""
+"""docs/hardware/hal.md: its drivers of a winch, built and used as the page says, on a folder that is the winch."""
 
 from __future__ import annotations
 
@@ -18,7 +18,7 @@ from fcsl_compiler.base.packages import package_prefix
 from fcsl_compiler.driver.cache import build_machine
 
 ROOT = Path(__file__).resolve().parents[1]
-PAGE = (ROOT / "docs/drivers.md").read_text()
+PAGE = (ROOT / "docs/hardware/hal.md").read_text()
 BIN = package_prefix("fcsl_runtime") / "bin"
 DRIVER_READ = Path(os.environ.get("FCSL_TEST_RUNTIME", ROOT / "build/fcsl_runtime")) / "driver_read"
 #: What the page says of the machine.

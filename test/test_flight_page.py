@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""docs/flight.md: its flight with a simulator, run as it is written."""
+"""docs/hardware/flight_computer.md: its flight with a simulator, run as it is written."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ LIBRARY = "install/lander/lib/lander/liblander_machines.so"
 
 
 def test_the_flight_with_a_simulator(tmp_path: Path) -> None:
-    page = (ROOT / "docs/flight.md").read_text()
+    page = (ROOT / "docs/hardware/flight_computer.md").read_text()
     found = re.search(r"^### With a simulator\n.*?```sh\n(.*?)```", page, re.MULTILINE | re.DOTALL)
     assert found and LIBRARY in found[1]
     for folder in ("examples", "install"):

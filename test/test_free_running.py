@@ -144,7 +144,7 @@ SIMULATION: dict[str, Any] = {
     ],
     "until": {"condition": "plant.outputs.landed", "for_s": 0.1},
 }
-#: The rows of the channels (docs/wire.md).
+#: The rows of the channels (docs/reference/transports.md).
 TABLE = zlib.crc32(struct.pack("<" + 3 * "HBBI", 1, 0, 6, 1, 2, 0, 6, 1, 16, 1, 6, 1))
 #: A fall of 2 m would end with 2.5 m/s.
 SOFT_M_S = 1.5
@@ -255,7 +255,7 @@ def test_it_lands_in_whatever_order_they_start(
 
 
 def gate(path: Path) -> int:
-    """Of the simulator (docs/arming.md)."""
+    """Of the simulator (docs/hardware/arming.md)."""
     with VarClient(path) as client:
         return int(client.get_value("actuators.outputs.gate"))
 

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""docs/models.md: its models compile and are the same in each language; its package builds, its test passes."""
+"""docs/guide/simulation.md: its models compile and are the same in each language; its package builds, its test passes."""
 
 from __future__ import annotations
 
@@ -16,7 +16,7 @@ from fcsl_sim import Simulation, load
 from fcsl_sim.model_instance import ModelInstance
 
 ROOT = Path(__file__).resolve().parents[1]
-PAGE = (ROOT / "docs/models.md").read_text()
+PAGE = (ROOT / "docs/guide/simulation.md").read_text()
 FILES = dict(re.findall(r"<!-- file: (\S+) -->\n```\w+\n(.*?)```\n", PAGE, re.DOTALL))
 
 

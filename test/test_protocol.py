@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""The conversation in docs/protocol.md matches fcsl-fc's actual replies."""
+"""The conversation in docs/reference/variables.md matches fcsl-fc's actual replies."""
 
 import socket
 import subprocess
@@ -8,7 +8,7 @@ from pathlib import Path
 
 from fcsl_compiler.base.packages import package_prefix
 
-DOCUMENT = Path(__file__).resolve().parents[1] / "docs/protocol.md"
+DOCUMENT = Path(__file__).resolve().parents[1] / "docs/reference/variables.md"
 
 
 def test_conversation(tmp_path: Path) -> None:

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""`--ros`: a machine in a ROS 2 graph by zenoh-plugin-ros2dds, seen as the bridge sees it (docs/ros_graph.md).
+"""`--ros`: a machine in a ROS 2 graph by zenoh-plugin-ros2dds, seen as the bridge sees it (docs/reference/transports.md).
 
 Here a Zenoh session of Python stands for the bridge; `make interop` has the plugin itself.
 """

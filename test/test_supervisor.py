@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""docs/supervisor.md: its commands print the shown output; and a supervisor of simulations."""
+"""docs/guide/monitoring.md: its commands print the shown output; and a supervisor of simulations."""
 
 import re
 import shlex
@@ -21,7 +21,7 @@ ROOT = Path(__file__).resolve().parents[1]
 sys.path.insert(0, str(ROOT / "fcsl_runtime/simclient/test"))
 from supervising import Supervisor, end, is_gone, supervising, wait_until  # noqa: E402
 
-DOC = ROOT / "docs/supervisor.md"
+DOC = ROOT / "docs/guide/monitoring.md"
 _PATIENCE_S = 30.0
 
 

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""docs/telemetry.md: its flight, received with the page's code, prints the shown output."""
+"""docs/guide/monitoring.md: its flight, received with the page's code, prints the shown output."""
 
 import contextlib
 import io
@@ -15,7 +15,7 @@ import pytest
 import simclient
 from fcsl_compiler.base.packages import package_prefix
 
-DOC = Path(__file__).resolve().parents[1] / "docs/telemetry.md"
+DOC = Path(__file__).resolve().parents[1] / "docs/guide/monitoring.md"
 
 
 def section() -> str:

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""docs/testing.md: its files are those of the lander's tests, which run; so do its commands, and its failing test fails as shown.
+"""docs/guide/testing.md: its files are those of the lander's tests, which run; so do its commands, and its failing test fails as shown.
 
 FCSL_UPDATE_GOLDEN=1 copies the files into the page.
 """
@@ -17,7 +17,7 @@ from simclient.replay import replay
 
 ROOT = Path(__file__).resolve().parent.parent
 LANDER = ROOT / "examples/lander"
-DOC = ROOT / "docs/testing.md"
+DOC = ROOT / "docs/guide/testing.md"
 PAGE = DOC.read_text()
 BLOCK = re.compile(r"(?:<!-- (file|fails): (\S+) -->\n)?```(\w+)(?: (\w+))?\n(.*?)```\n", re.DOTALL)
 BLOCKS: list[tuple[str, str, str, str, str]] = BLOCK.findall(PAGE)

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""The tour of README.md and docs/tutorial.md runs as printed: its files, then its commands."""
+"""The tour of README.md and docs/start/tour.md runs as printed: its files, then its commands."""
 
 from __future__ import annotations
 
@@ -11,7 +11,7 @@ import pytest
 
 ROOT = Path(__file__).resolve().parent.parent
 #: The tour begins in the README and ends in the tutorial.
-PAGES = (ROOT / "README.md").read_text() + (ROOT / "docs" / "tutorial.md").read_text()
+PAGES = (ROOT / "README.md").read_text() + (ROOT / "docs/start/tour.md").read_text()
 FILE = re.compile(r"<!-- file: (\S+) -->\n```\w+\n(.*?)```\n", re.DOTALL)
 
 

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""docs/variables.md: its commands print the shown output, and its Python runs, in order, with one flight program."""
+"""docs/reference/variables.md: its commands print the shown output, and its Python runs, in order, with one flight program."""
 
 import re
 import shlex
@@ -12,7 +12,7 @@ import pytest
 
 from fcsl_compiler.base.packages import package_prefix
 
-DOC = Path(__file__).resolve().parents[1] / "docs/variables.md"
+DOC = Path(__file__).resolve().parents[1] / "docs/reference/variables.md"
 
 
 def blocks(kind: str) -> list[str]:

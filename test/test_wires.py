@@ -289,7 +289,7 @@ def test_a_lossy_link_while_time_halts(tmp_path: Path) -> None:
 
 
 def test_the_page_of_testing_names_the_digests(tmp_path: Path) -> None:
-    page = (SIM.parents[3] / "docs/testing.md").read_text()
+    page = (SIM.parents[3] / "docs/guide/testing.md").read_text()
     named = dict(re.findall(r"^- ([AB]): `(\w{64})`$", page, re.MULTILINE))
     run("fcsl-sim", "run", SIM, "--record", tmp_path / "A")
     simulate(tmp_path / "B", "halts=false", "reliable=false", "delay_s=0.02", "baud=115200")

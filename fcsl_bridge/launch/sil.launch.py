@@ -4,7 +4,7 @@
     ros2 launch fcsl_bridge sil.launch.py machine:=lander/lander_control sim:=package://lander/sim/lander.sim.json
 
 A package includes this file and gives `machine` and `sim` (examples/lander/launch). The nodes also start as plain
-executables, see docs/ros2.md.
+executables, see docs/guide/ros2.md.
 """
 
 import os

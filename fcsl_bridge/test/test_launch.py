@@ -160,7 +160,7 @@ def test_the_lander_includes_the_general_file(start: Start) -> None:
 
 
 def test_the_launch_file_of_the_documentation(domain: Domain, start: Start) -> None:
-    page = (HERE.parents[1] / "docs" / "ros2.md").read_text(encoding="utf-8")
+    page = (HERE.parents[1] / "docs/guide/ros2.md").read_text(encoding="utf-8")
     (block,) = [b for b in re.findall(r"```python\n(.*?)```", page, re.DOTALL) if "generate_launch_description" in b]
     path = domain.folder / "robot.launch.py"
     path.write_text(block)

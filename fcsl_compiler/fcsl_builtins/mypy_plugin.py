@@ -84,7 +84,7 @@ _PYTHON |= {name: "int" for name in ("i32", "i64", "u32", "u64")}
 _SCALARS = (*_PYTHON, "Health")
 _SCALAR = re.compile(r"\s*(\w+)(?!\s*\[)\b")
 _ARRAY = re.compile(r"\w+(\[[^][]*\])+")
-#: Pattern of struct names (docs/language.md). Structs are defined in the machine JSON; no Python file defines or
+#: Pattern of struct names (docs/reference/language.md). Structs are defined in the machine JSON; no Python file defines or
 #: imports them.
 _STRUCT = re.compile(r"[A-Z][A-Za-z0-9]*")
 

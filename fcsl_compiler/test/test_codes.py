@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""The table of diagnostic codes is complete and its examples behave as stated. docs/diagnostics.md is generated from
+"""The table of diagnostic codes is complete and its examples behave as stated. docs/reference/diagnostics.md is generated from
 it.
 
 FCSL_UPDATE_GOLDEN=1 rewrites the page.
@@ -32,7 +32,7 @@ from fcsl_compiler.cli import report
 from fcsl_compiler.cli.main import main
 from fcsl_compiler.driver.passes import compile_machine
 
-DOC = Path(__file__).parents[2] / "docs" / "language.md"
+DOC = Path(__file__).parents[2] / "docs/reference/language.md"
 PAGE = DOC.with_name("diagnostics.md")
 CODES = table()
 
@@ -178,7 +178,7 @@ def test_explain_an_unknown_code(word: str, capsys: pytest.CaptureFixture[str]) 
 
 
 def page() -> str:
-    """docs/diagnostics.md."""
+    """docs/reference/diagnostics.md."""
     parts = [
         "# Diagnostics",
         "<!-- generated: fcsl_compiler/test/test_codes.py -->",

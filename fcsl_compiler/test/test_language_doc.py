@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""docs/language.md agrees with the compiler's tables. FCSL_UPDATE_GOLDEN=1 rewrites its generated tables."""
+"""docs/reference/language.md agrees with the compiler's tables. FCSL_UPDATE_GOLDEN=1 rewrites its generated tables."""
 
 import json
 import os
@@ -14,7 +14,7 @@ from fcsl_compiler.cli.main import main
 from fcsl_compiler.model.effects import HARDWARE, HARDWARE_DOC
 from fcsl_compiler.model.types import SCALARS
 
-DOC = Path(__file__).parents[2] / "docs" / "language.md"
+DOC = Path(__file__).parents[2] / "docs/reference/language.md"
 
 
 def hardware() -> str:
@@ -32,7 +32,7 @@ def test_generated_tables(name: str, table: str) -> None:
     text = DOC.read_text()
     pattern = re.compile(rf"(<!-- generated: {name} [^\n]*-->\n)(.*?)(<!-- end -->)", re.DOTALL)
     match = pattern.search(text)
-    assert match, f"docs/language.md has no generated table `{name}`"
+    assert match, f"docs/reference/language.md has no generated table `{name}`"
     if os.environ.get("FCSL_UPDATE_GOLDEN"):
         DOC.write_text(text[: match.start(2)] + table + "\n" + text[match.end(2) :])
         return

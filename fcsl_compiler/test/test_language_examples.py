@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Every Python block of docs/language.md is checked: it compiles, and a line that ends in a code is rejected with this
+"""Every Python block of docs/reference/language.md is checked: it compiles, and a line that ends in a code is rejected with this
 code.
 
 A block is a whole file if a class begins on one of its lines, else the body of `execute` of the class in the block
@@ -24,7 +24,7 @@ from fcsl_compiler.parse.json_source import parse_json
 from fcsl_compiler.parse.machine_files import ParsedFile
 from fcsl_compiler.parse.python_source import parse_python
 
-TEXT = (Path(__file__).parents[2] / "docs" / "language.md").read_text()
+TEXT = (Path(__file__).parents[2] / "docs/reference/language.md").read_text()
 BLOCK = re.compile(r"^```(python|json)(?: (ports|structs|\w+\.py))?\n(.*?)^```$", re.DOTALL | re.MULTILINE)
 BLOCKS = [(m.group(1), m.group(2) or "", m.group(3)) for m in BLOCK.finditer(TEXT)]
 PORTS = next(text for _, role, text in BLOCKS if role == "ports")

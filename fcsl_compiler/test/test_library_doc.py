@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""docs/library.md is generated from the op table and the library's docstrings. FCSL_UPDATE_GOLDEN=1 rewrites it."""
+"""docs/reference/library.md is generated from the op table and the library's docstrings. FCSL_UPDATE_GOLDEN=1 rewrites it."""
 
 import ast
 import os
@@ -12,7 +12,7 @@ from fcsl_compiler.check.library_files import library_names, overloads
 from fcsl_compiler.model import ops
 from fcsl_compiler.model.types import NUMBERS
 
-PAGE = Path(__file__).parents[2] / "docs" / "library.md"
+PAGE = Path(__file__).parents[2] / "docs/reference/library.md"
 
 HEAD = """<!-- Made by fcsl_compiler/test/test_library_doc.py from the compiler's own tables. Do not edit. -->
 # Functions of the language
@@ -92,7 +92,7 @@ def file_of(name: str) -> str:
 
 
 def index() -> str:
-    """A short table of all functions for docs/language.md."""
+    """A short table of all functions for docs/reference/language.md."""
     rows: dict[str, list[str]] = {}
     for doc in ops.DOCS.values():
         rows.setdefault(doc.group, []).append(f"`{doc.call}`")

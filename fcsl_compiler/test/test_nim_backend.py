@@ -30,7 +30,7 @@ from fcsl_compiler.driver.toolchain import ToolchainError, include_dirs, math_li
 from fcsl_compiler.reference.externs import externs_of
 
 EXAMPLES = Path(__file__).parents[2] / "examples"
-PAGE = EXAMPLES.parent / "docs/nim.md"
+PAGE = EXAMPLES.parent / "docs/internals/nim.md"
 C_OF_NIM = Path(__file__).parents[1] / "cmake/fcsl_c_of_nim.cmake"
 
 

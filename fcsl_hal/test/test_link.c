@@ -1,7 +1,7 @@
 /* SPDX-License-Identifier: Apache-2.0
  *
  * Two ends of a link over a wire that loses, repeats, reorders and damages frames as drawn from a seed; and the bytes that
- * docs/link.md states.
+ * docs/reference/transports.md states.
  */
 #include <stdlib.h>
 #include <string.h>

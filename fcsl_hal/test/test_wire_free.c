@@ -1,6 +1,6 @@
 /* SPDX-License-Identifier: Apache-2.0
  *
- * Named values without lock-step (docs/bus.md, "Free-running"): what a tick makes of the values and commits that came, whoever put
+ * Named values without lock-step (docs/reference/transports.md, "Free-running"): what a tick makes of the values and commits that came, whoever put
  * them. The other end is a session that puts byte by byte.
  */
 #define _GNU_SOURCE

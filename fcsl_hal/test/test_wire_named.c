@@ -1,6 +1,6 @@
 /* SPDX-License-Identifier: Apache-2.0
  *
- * Named values as docs/bus.md defines them: the test is the simulator, byte by byte, and the controller says what does not fit.
+ * Named values as docs/reference/transports.md defines them: the test is the simulator, byte by byte, and the controller says what does not fit.
  */
 #define _GNU_SOURCE
 #include <signal.h>

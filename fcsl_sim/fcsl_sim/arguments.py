@@ -89,29 +89,29 @@ def _add_run(command: argparse.ArgumentParser) -> None:
     help_timeout = f"seconds to wait for the external controller (default {TIMEOUT_MS // 1000})"
     command.add_argument("--timeout", type=_seconds, metavar="S", help=help_timeout)
     command.add_argument("--restore", type=Path, metavar="FILE", help="go on from this checkpoint of the simulation")
-    help_save = "write a checkpoint at the end (docs/checkpoints.md), whose time --duration chooses"
+    help_save = "write a checkpoint at the end (docs/guide/recording.md), whose time --duration chooses"
     command.add_argument("--save", type=Path, metavar="FILE", help=help_save)
     command.add_argument("--json", action="store_true", help="print the summary as JSON, and nothing else")
     _add_servers(command)
 
 
 def _add_servers(command: argparse.ArgumentParser) -> None:
-    help_socket = "serve all variables (docs/protocol.md) on this Unix socket, or on tcp:HOST:PORT with --token"
+    help_socket = "serve all variables (docs/reference/variables.md) on this Unix socket, or on tcp:HOST:PORT with --token"
     command.add_argument("--socket", metavar="ADDRESS", help=help_socket)
     help_checkpoints = "folder of the checkpoint files that clients name"
     command.add_argument("--checkpoints", type=Path, metavar="DIR", help=help_checkpoints)
     command.add_argument("--token", type=Path, metavar="FILE", help="token file of a TCP server; created if absent")
     command.add_argument("--paused", action="store_true", help="start paused: only commands run ticks until `resume`")
-    help_telemetry = "send values as UDP (docs/telemetry.md) to udp:HOST:PORT, or of every N-th tick to udp:HOST:PORT/N"
+    help_telemetry = "send values as UDP (docs/guide/monitoring.md) to udp:HOST:PORT, or of every N-th tick to udp:HOST:PORT/N"
     command.add_argument("--telemetry", metavar="ADDRESS", help=help_telemetry)
     help_fields = (
         "fields to send, as path globs separated by commas (default: inputs, outputs, state, health, counters)"
     )
     command.add_argument("--telemetry-fields", metavar="GLOBS", help=help_fields)
-    help_observers = "put the values of all channels on a bus of their own (docs/bus.md), which listens there"
+    help_observers = "put the values of all channels on a bus of their own (docs/reference/transports.md), which listens there"
     command.add_argument("--observers", metavar="tcp/HOST:PORT", help=help_observers)
     help_ros = (
-        "publish the machine's ROS 2 topics and /clock through a bridge (docs/ros_graph.md), for which it listens there"
+        "publish the machine's ROS 2 topics and /clock through a bridge (docs/reference/transports.md), for which it listens there"
     )
     command.add_argument("--ros", metavar="tcp/HOST:PORT", help=help_ros)
 
@@ -127,7 +127,7 @@ def _add_plot(command: argparse.ArgumentParser) -> None:
 
 
 def _add_campaign(command: argparse.ArgumentParser) -> None:
-    command.add_argument("study", type=Path, help="*.study.json (docs/campaigns.md)")
+    command.add_argument("study", type=Path, help="*.study.json (docs/guide/campaigns.md)")
     help_output = "folder of the results; a campaign that was interrupted goes on in it (default: NAME.campaign, here)"
     command.add_argument("-o", "--output", type=Path, metavar="FOLDER", help=help_output)
     command.add_argument("--cases", type=_count, metavar="N", help="number of cases; replaces the file's")
@@ -143,7 +143,7 @@ def _add_campaign(command: argparse.ArgumentParser) -> None:
 
 
 def _add_trim(command: argparse.ArgumentParser) -> None:
-    command.add_argument("file", type=Path, help="*.trim.json (docs/design_work.md)")
+    command.add_argument("file", type=Path, help="*.trim.json (docs/guide/campaigns.md)")
     help_output = "write a simulation that extends the file's with the inputs and parameters found"
     command.add_argument("-o", "--output", type=Path, metavar="FILE", help=help_output)
     command.add_argument("--json", action="store_true", help="print one JSON object")

@@ -376,7 +376,7 @@ class Simulation:
         self._check(self._lib.fcsl_sim_write(self.handle(), number, offset, data, len(data), byref(self._error)))
 
     def checkpoint(self) -> bytes:
-        """Plant and machine between two ticks, the content of a checkpoint file (docs/checkpoints.md). Raises SimError."""
+        """Plant and machine between two ticks, the content of a checkpoint file (docs/guide/recording.md). Raises SimError."""
         room = ctypes.create_string_buffer(self._lib.fcsl_sim_checkpoint_capacity(self.handle()))
         size = self._lib.fcsl_sim_checkpoint(self.handle(), room)
         if size == 0:
@@ -460,7 +460,7 @@ class Simulation:
         self._check(self._lib.fcsl_sim_show_channels(self.handle(), outbox.handle, topic, *what, byref(self._error)))
 
     def serve(self, address: str, token: Path | None, paused: bool, checkpoints: Path | None = None) -> str:
-        """Serves all variables on a Unix socket's path or `tcp:HOST:PORT` (docs/protocol.md); only before the first
+        """Serves all variables on a Unix socket's path or `tcp:HOST:PORT` (docs/reference/variables.md); only before the first
         tick.
 
         Returns the address. `run` executes commands, and runs no ticks while paused. `checkpoints`: folder of the
@@ -472,7 +472,7 @@ class Simulation:
         return str(self._lib.fcsl_sim_address(self.handle()).decode())
 
     def telemetry(self, address: str, fields: str | None) -> None:
-        """Sends the fields that globs select (docs/telemetry.md) to `udp:HOST:PORT[/EVERY]`.
+        """Sends the fields that globs select (docs/guide/monitoring.md) to `udp:HOST:PORT[/EVERY]`.
 
         Only before the first tick and before `serve`. Raises SimError.
         """
@@ -480,13 +480,13 @@ class Simulation:
         self._check(self._lib.fcsl_sim_telemetry(self.handle(), address.encode(), chosen, byref(self._error)))
 
     def telemetry_stop(self) -> dict[str, int]:
-        """Sends the remaining packets and stops; returns the counts (docs/telemetry.md)."""
+        """Sends the remaining packets and stops; returns the counts (docs/guide/monitoring.md)."""
         counters = _Counters()
         self._lib.fcsl_sim_telemetry_stop(self.handle(), byref(counters))
         return {name: int(getattr(counters, name)) for name in _SENT}
 
     def observers(self, endpoint: str, name_space: str = "") -> None:
-        """Puts the hosted machine's channels on a bus of their own (docs/bus.md), which listens on `tcp/HOST:PORT`.
+        """Puts the hosted machine's channels on a bus of their own (docs/reference/transports.md), which listens on `tcp/HOST:PORT`.
 
         Only before the first tick and before `serve`. name_space: in front of the keys, with or without surrounding
         slashes. Raises SimError.
@@ -495,20 +495,20 @@ class Simulation:
         self._check(self._lib.fcsl_sim_observers(self.handle(), endpoint.encode(), within, byref(self._error)))
 
     def observers_stop(self) -> dict[str, int]:
-        """Puts the remaining ticks and stops; returns the counts (docs/bus.md)."""
+        """Puts the remaining ticks and stops; returns the counts (docs/reference/transports.md)."""
         counters = _Observed()
         self._lib.fcsl_sim_observers_stop(self.handle(), byref(counters))
         return {name: int(getattr(counters, name)) for name in _OBSERVED}
 
     def ros(self, endpoint: str, name_space: str = "") -> None:
         """Publishes the hosted machine's ROS 2 topics and /clock through a bridge, which connects to `tcp/HOST:PORT`
-        (docs/ros_graph.md). As `observers`.
+        (docs/reference/transports.md). As `observers`.
         """
         within = name_space.encode()
         self._check(self._lib.fcsl_sim_ros(self.handle(), endpoint.encode(), within, byref(self._error)))
 
     def ros_stop(self) -> dict[str, int]:
-        """Puts the remaining ticks and stops; returns the counts (docs/ros_graph.md)."""
+        """Puts the remaining ticks and stops; returns the counts (docs/reference/transports.md)."""
         counters = _Ros()
         self._lib.fcsl_sim_ros_stop(self.handle(), byref(counters))
         return {name: int(getattr(counters, name)) for name in _ROS}

@@ -74,7 +74,7 @@ class Summary:
 
 @dataclass(frozen=True)
 class Server:
-    """The variable server of a run (docs/protocol.md).
+    """The variable server of a run (docs/reference/variables.md).
 
     `token` is the token file for TCP; `checkpoints` the folder of checkpoint files that clients name; `paused`: only
     commands run ticks until `resume`.
@@ -88,7 +88,7 @@ class Server:
 
 @dataclass(frozen=True)
 class Sender:
-    """The telemetry address (docs/telemetry.md) and the fields to send: path globs separated by commas, or None:
+    """The telemetry address (docs/guide/monitoring.md) and the fields to send: path globs separated by commas, or None:
     default.
     """
 

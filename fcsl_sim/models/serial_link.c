@@ -1,7 +1,7 @@
 /* SPDX-License-Identifier: Apache-2.0
  *
  * A serial line between the plant and its controller, which loses and damages frames. A simulation names it as
- * `"link"` of its controller (docs/simulator.md); its rate is that of the link ticks. The simulator moves the frames.
+ * `"link"` of its controller (docs/guide/simulation.md); its rate is that of the link ticks. The simulator moves the frames.
  */
 #include "fcsl/fcsl_serial_link.h"
 

@@ -13,7 +13,7 @@ from simclient import SimTwin
 
 ROOT = Path(__file__).resolve().parents[2]
 MODELS = sorted((ROOT / "fcsl_sim/models").glob("*.c"))
-PAGE = (ROOT / "docs/model_library.md").read_text()
+PAGE = (ROOT / "docs/reference/model_library.md").read_text()
 AIRCRAFT = Path(__file__).with_name("library") / "aircraft.sim.json"
 #: Described elsewhere: a sensor of anything, in the pages of models; a line, in that of the simulator.
 ELSEWHERE = ("noisy_sensor", "serial_link")

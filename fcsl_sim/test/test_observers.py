@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Observers on a bus of their own (docs/bus.md): they see what is recorded, and frozen ones change nothing in a flight."""
+"""Observers on a bus of their own (docs/reference/transports.md): they see what is recorded, and frozen ones change nothing in a flight."""
 
 from __future__ import annotations
 

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""The gate before the actuators of a simulation. The machine and its plant are those of docs/arming.md."""
+"""The gate before the actuators of a simulation. The machine and its plant are those of docs/hardware/arming.md."""
 
 from __future__ import annotations
 
@@ -29,7 +29,7 @@ from simclient.run import open_run
 from simclient.vars.client import VarClient
 from simclient.vars.wire import VarError
 
-PAGE = (Path(__file__).resolve().parents[2] / "docs/arming.md").read_text()
+PAGE = (Path(__file__).resolve().parents[2] / "docs/hardware/arming.md").read_text()
 FILES = dict(re.findall(r"<!-- file: (\S+) -->\n```\w+\n(.*?)```\n", PAGE, re.DOTALL))
 DISARMED, ARMED, SILENT = 0, 1, 2
 #: Ticks in which the page's flight is armed.

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""A simulation's values over UDP (docs/telemetry.md): machine and models, at every speed of the simulation."""
+"""A simulation's values over UDP (docs/guide/monitoring.md): machine and models, at every speed of the simulation."""
 
 from __future__ import annotations
 

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""`make verify`: the evidence of docs/evidence.md, one line a check, three checks at a time.
+"""`make verify`: the evidence of docs/internals/evidence.md, one line a check, three checks at a time.
 
     python3 scripts/verify [--at-once 3] [--only WORDS]
     python3 scripts/verify NAME [--help]         one check alone; NAME is its folder, or fuzz_telemetry

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Where simulator and controller meet on the bus (docs/bus.md)."""
+"""Where simulator and controller meet on the bus (docs/reference/transports.md)."""
 
 from __future__ import annotations
 

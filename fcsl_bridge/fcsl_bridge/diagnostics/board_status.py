@@ -30,7 +30,7 @@ class BoardStatus:
         self._before: dict[str, Counts] = {}
 
     def look(self, counters: Mapping[str, int]) -> list[DiagnosticStatus]:
-        """`counters`: the variables under `hal.` (docs/board.md), and beside them those of a simulator's wire."""
+        """`counters`: the variables under `hal.` (docs/hardware/hal.md), and beside them those of a simulator's wire."""
         found: dict[str, dict[str, Counts]] = {"sensors": {}, "devices": {}}
         for path, value in counters.items():
             group, _, rest = path.partition(".")

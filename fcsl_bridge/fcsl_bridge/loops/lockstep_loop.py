@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Runs a machine that a simulator steps over the bus: only the commit of tick k causes tick k (docs/bus.md).
+"""Runs a machine that a simulator steps over the bus: only the commit of tick k causes tick k (docs/reference/transports.md).
 
 Native code makes the ticks, in slices; in between, the node serves its callbacks, which may write into the machine. Stamps
 are the machine's time t_k. While the node is inactive simulated time stands still: the simulator is told that this end is
@@ -26,7 +26,7 @@ from .configured_machine import ConfiguredMachine
 SLICE_MS = 50
 #: How long it looks for a simulator before that.
 _LOOK_MS = 500
-#: What the HAL counts, and means trouble (docs/hal.md).
+#: What the HAL counts, and means trouble (docs/hardware/hal.md).
 _TROUBLES = ("messages_dropped", "messages_late", "bus.wrong_size", "bus.strays", "bus.overflowed")
 
 

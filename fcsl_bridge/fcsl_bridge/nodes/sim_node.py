@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""The simulator as a ROS 2 node. It flies over the bus (docs/bus.md) with a controller, and publishes what happens:
+"""The simulator as a ROS 2 node. It flies over the bus (docs/reference/transports.md) with a controller, and publishes what happens:
 
     /clock         rosgraph_msgs/Clock               t_k; back to 0 at a reset
     sim/truth, …   see sim_topics.py                 for each vehicle, below its namespace

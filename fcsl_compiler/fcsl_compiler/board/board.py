@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Reads a board file and checks it against its machine. docs/board.md describes the file."""
+"""Reads a board file and checks it against its machine. docs/hardware/hal.md describes the file."""
 
 from __future__ import annotations
 

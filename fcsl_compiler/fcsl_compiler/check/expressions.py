@@ -77,7 +77,7 @@ class ExprChecker(CallChecker, PlaceChecker):
             return self.call(node)
         if isinstance(node, ast.List):
             return self._array(node, want)
-        what, instead = _INSTEAD.get(type(node), ("this expression", "use what docs/language.md lists"))
+        what, instead = _INSTEAD.get(type(node), ("this expression", "use what docs/reference/language.md lists"))
         self.fail("E410", f"{what} is not part of the language", self.span(node), help=instead)
 
     def _literal(self, node: ast.expr, type_: Scalar) -> ir.Const:

@@ -120,7 +120,7 @@ class BodyChecker:
             fix = "functions are pure: use the result, `x = f(…)`" if isinstance(node.value, ast.Call) else "remove it"
             self._fail("E421", "an expression whose value is not used", span, help=fix)
         else:
-            what, instead = _INSTEAD.get(type(node), ("this statement", "use what docs/language.md lists"))
+            what, instead = _INSTEAD.get(type(node), ("this statement", "use what docs/reference/language.md lists"))
             self._fail("E410", f"{what} is not part of the language", span, help=instead)
 
     # ---- assignment ------------------------------------------------------------------------------------------------

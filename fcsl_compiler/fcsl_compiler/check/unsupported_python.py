@@ -112,7 +112,7 @@ def instead_of_function(name: str, known: Collection[str]) -> str:
         or _FUNCTIONS.get(name)
         or nearest(name, list(known))
         or (f"there are {', '.join(family)}" if family else "")
-        or "docs/library.md lists what there is; anything else is a helper in this file"
+        or "docs/reference/library.md lists what there is; anything else is a helper in this file"
     )
 
 

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""What arms the actuators, how long they wait for a command, and what they get otherwise (docs/arming.md)."""
+"""What arms the actuators, how long they wait for a command, and what they get otherwise (docs/hardware/arming.md)."""
 
 from __future__ import annotations
 

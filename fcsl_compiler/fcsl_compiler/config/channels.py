@@ -25,13 +25,13 @@ _ROS_FRAME = re.compile(r"\S+")
 #: Axes of a vector; and of a rotation: target axes, source axes.
 AXES = ("enu", "ned", "flu", "frd", "enu/flu", "ned/frd", "ned/flu", "enu/frd")
 _MAX_AGE = 2**32 - 2
-#: Of the field of a channel: an entry counts its values in 16 bits (docs/wire.md), and hosts refuse a longer field.
+#: Of the field of a channel: an entry counts its values in 16 bits (docs/reference/transports.md), and hosts refuse a longer field.
 _MAX_BYTES = 2**16 - 1
 #: A sensor writes a field, an actuator reads one. A report reads one too, and nothing moves by it.
 DIRECTIONS = ("sensor", "actuator", "report")
 #: Values as they are, or a ROS 2 message of each channel.
 PAYLOADS = ("raw", "cdr")
-#: Ids from 0xFF00 on are reserved for entries of messages that are no channels (docs/wire.md).
+#: Ids from 0xFF00 on are reserved for entries of messages that are no channels (docs/reference/transports.md).
 MAX_ID = 0xFEFF
 
 

@@ -2,7 +2,7 @@
 """Lowers typed IR. Propagates constant arrays into the functions that take them as arguments.
 
 An array is *constant* if it is a whole module constant or a whole frozen parameter, transpose(…) of one, or an argument
-that is constant in a specialised function. By the rule of structural zeros (docs/language.md), matmul, matvec, sums and
+that is constant in a specialised function. By the rule of structural zeros (docs/reference/language.md), matmul, matvec, sums and
 differences of arrays omit terms with its zeros.
 """
 

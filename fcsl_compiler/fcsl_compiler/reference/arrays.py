@@ -37,7 +37,7 @@ class Array:
     """`data`: the elements. The rest belongs to the class.
 
     `zeros` is not None for a whole module constant or a whole frozen parameter: its zeros are structural
-    (docs/language.md), and these are the elements that are zero. Copies and computed arrays are not constant, except a
+    (docs/reference/language.md), and these are the elements that are zero. Copies and computed arrays are not constant, except a
     transpose.
     """
 

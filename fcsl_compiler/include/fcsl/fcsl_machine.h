@@ -155,7 +155,7 @@ typedef enum {
 
 typedef struct {
     const char *name;
-    uint16_t id; /* identifies the channel in messages (docs/wire.md); below 0xff00 */
+    uint16_t id; /* identifies the channel in messages (docs/reference/transports.md); below 0xff00 */
     uint8_t direction; /* fcsl_direction_t */
     uint32_t field; /* index into fields */
     uint32_t max_age_ticks; /* sensors: older is invalid; UINT32_MAX: never */
@@ -253,7 +253,7 @@ typedef struct {
     uint32_t channel_count;
     const fcsl_ros_message_t *ros_messages; /* one for each topic of the mapped channels */
     uint32_t ros_message_count;
-    /* What lies under the key of each channel on the bus (docs/bus.md): a message of it alone; of a blob a UInt8MultiArray without
+    /* What lies under the key of each channel on the bus (docs/reference/transports.md): a message of it alone; of a blob a UInt8MultiArray without
      * values. Null: the values as they are. */
     const fcsl_ros_message_t *payloads;
     /* The output that arms the actuators, a bool: an index into fields; FCSL_NONE: they are armed in simulation, and real ones
@@ -262,7 +262,7 @@ typedef struct {
     uint64_t command_timeout_ns; /* actuators that got no command for so long become safe; 0: never */
     const fcsl_fault_place_t *fault_places;
     uint32_t fault_place_count;
-    /* What plots and viewers show of it: the JSON of docs/language.md, compact, at most FCSL_VIEWS_BYTES_MAX bytes; or "". No
+    /* What plots and viewers show of it: the JSON of docs/reference/language.md, compact, at most FCSL_VIEWS_BYTES_MAX bytes; or "". No
      * host interprets it. */
     const char *views;
     /* About how much stack a step needs: the arrays along its deepest calls; 0: unknown. Hosts refuse a machine that does not fit. */

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Meaning of a machine: the tick, implemented from docs/language.md around the oracle's algorithms."""
+"""Meaning of a machine: the tick, implemented from docs/reference/language.md around the oracle's algorithms."""
 
 from __future__ import annotations
 

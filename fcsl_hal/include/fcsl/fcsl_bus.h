@@ -1,6 +1,6 @@
 /* SPDX-License-Identifier: Apache-2.0
  *
- * A session on the bus: messages under keys, over Zenoh (docs/bus.md). One thread, that which steps a machine, posts, takes and
+ * A session on the bus: messages under keys, over Zenoh (docs/reference/transports.md). One thread, that which steps a machine, posts, takes and
  * waits; none of these allocates, and only fcsl_bus_wait waits. Threads of the session talk to Zenoh and meet that thread in
  * memory that fcsl_bus_open allocates.
  */

@@ -1,7 +1,7 @@
 /* SPDX-License-Identifier: Apache-2.0
  *
  * Messages of channels: how samples, commands and simulated time travel between a controller and whatever surrounds it
- * (simulator process, ROS 2 node, board). docs/wire.md defines every byte.
+ * (simulator process, ROS 2 node, board). docs/reference/transports.md defines every byte.
  *
  * A message is a sequence of little-endian entries: id u16, type u8, payload. Reserved ids carry the tick, the hash of the
  * channel table, the arm flag, the time and the CRC-32; the others are ids of channels, never names. What is encoded here has

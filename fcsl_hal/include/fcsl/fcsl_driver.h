@@ -1,7 +1,7 @@
 /* SPDX-License-Identifier: Apache-2.0
  *
  * The driver ABI: the interface between a host (fcsl-fc, fcsl-guard) and the code that talks to a device, a sensor or an actuator
- * (docs/drivers.md).
+ * (docs/hardware/hal.md).
  *
  * A driver is one constant descriptor. An opened device is one flat struct that the host allocates; the driver's functions get
  * it and nothing else. Its signals, the values that are exchanged, are members of this struct. A library of drivers exports

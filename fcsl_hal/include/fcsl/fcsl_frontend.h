@@ -1,7 +1,7 @@
 /* SPDX-License-Identifier: Apache-2.0
  *
  * Frontends: what stands between the readings of several devices (backends) and one sensor of a machine. A frontend corrects each
- * reading, filters it, judges which backends are healthy, and chooses the primary one, whose values the machine gets (docs/board.md).
+ * reading, filters it, judges which backends are healthy, and chooses the primary one, whose values the machine gets (docs/hardware/hal.md).
  *
  * A frontend is a pure function of its configuration, the readings and the times of the ticks: a recorded flight gives the same bits
  * again. It allocates nothing, knows no device and no clock.

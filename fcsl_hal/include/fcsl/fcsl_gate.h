@@ -1,6 +1,6 @@
 /* SPDX-License-Identifier: Apache-2.0
  *
- * The gate before the actuators, the same in every mode. Commands go through while the machine arms them (docs/arming.md). While
+ * The gate before the actuators, the same in every mode. Commands go through while the machine arms them (docs/hardware/arming.md). While
  * it does not, and when no command has come for the machine's time-out, the actuators get their safe values.
  */
 #ifndef FCSL_GATE_H

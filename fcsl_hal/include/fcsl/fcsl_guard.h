@@ -1,6 +1,6 @@
 /* SPDX-License-Identifier: Apache-2.0
  *
- * The slot between a flight program and fcsl-guard, the process that owns the actuators (docs/guard.md): shared memory that
+ * The slot between a flight program and fcsl-guard, the process that owns the actuators (docs/hardware/arming.md): shared memory that
  * holds the newest actuator message and when its tick began.
  *
  * One writes, one reads, neither waits for the other, and there is no lock that a dying writer could leave taken. The memory

@@ -1,7 +1,7 @@
 /* SPDX-License-Identifier: Apache-2.0
  *
  * The link layer: ports with a delivery policy each over one wire that may lose, repeat, reorder and damage frames.
- * docs/link.md defines the frames and the rules.
+ * docs/reference/transports.md defines the frames and the rules.
  *
  * One end is one struct of fixed size. It has no threads, timers or clock and does no I/O: a host ticks it, carries its
  * frames and hands it those of the peer. The struct belongs to one thread at a time.
@@ -130,7 +130,7 @@ typedef struct {
     fcsl_link_port_counters_t counters;
 } fcsl_link_port_t;
 
-/* Who the peer is: docs/link.md#sessions. */
+/* Who the peer is: docs/reference/transports.md#sessions. */
 typedef struct {
     uint16_t session;
     uint16_t challenge; /* that a peer must repeat */

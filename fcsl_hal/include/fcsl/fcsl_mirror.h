@@ -1,6 +1,6 @@
 /* SPDX-License-Identifier: Apache-2.0
  *
- * The channels of a machine for observers: what they hold after a tick, put on a session of the bus that listens (docs/bus.md).
+ * The channels of a machine for observers: what they hold after a tick, put on a session of the bus that listens (docs/reference/transports.md).
  * One thread posts, and it is not the one that steps. What an observer is too slow for is dropped on its way to it.
  */
 #ifndef FCSL_MIRROR_H

@@ -1,7 +1,7 @@
 /* SPDX-License-Identifier: Apache-2.0
  *
  * A wire carries messages between a controller and a simulator or rig: send and receive, nothing else. What the messages are
- * it does not know (fcsl_codec.h makes them). docs/wire.md shows how to write one.
+ * it does not know (fcsl_codec.h makes them). docs/reference/transports.md shows how to write one.
  *
  * A message arrives whole or not at all, and messages arrive in their order. Nothing here allocates, and send never waits.
  */

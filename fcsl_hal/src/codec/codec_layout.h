@@ -1,6 +1,6 @@
 /* SPDX-License-Identifier: Apache-2.0
  *
- * Where what stands in a message (docs/wire.md).
+ * Where what stands in a message (docs/reference/transports.md).
  */
 #ifndef FCSL_CODEC_LAYOUT_H
 #define FCSL_CODEC_LAYOUT_H

@@ -1,7 +1,7 @@
 /* SPDX-License-Identifier: Apache-2.0
  *
  * Who is at the other end of a free-running one: both send hellos twice a second, and each says in its log when the other one
- * comes, goes or does not fit (docs/bus.md).
+ * comes, goes or does not fit (docs/reference/transports.md).
  */
 #ifndef FCSL_PRESENCE_H
 #define FCSL_PRESENCE_H

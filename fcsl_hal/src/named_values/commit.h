@@ -1,6 +1,6 @@
 /* SPDX-License-Identifier: Apache-2.0
  *
- * The commit of a tick (docs/bus.md): says that the values of the tick were put, and which channels have one.
+ * The commit of a tick (docs/reference/transports.md): says that the values of the tick were put, and which channels have one.
  *
  *   offset size
  *   0      8   tick

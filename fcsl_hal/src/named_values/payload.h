@@ -1,6 +1,6 @@
 /* SPDX-License-Identifier: Apache-2.0
  *
- * What lies under a channel's key on the bus (docs/bus.md): its values as they are, or a ROS 2 message of them. The machine says
+ * What lies under a channel's key on the bus (docs/reference/transports.md): its values as they are, or a ROS 2 message of them. The machine says
  * which.
  */
 #ifndef FCSL_PAYLOAD_H

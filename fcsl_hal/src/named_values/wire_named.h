@@ -1,7 +1,7 @@
 /* SPDX-License-Identifier: Apache-2.0
  *
  * The wire of named values: each channel has a key of its own on the bus, so that other programs read and write them, too
- * (docs/bus.md). What is sent as a message of channels goes as values, and a commit behind them; at the other end it is the same
+ * (docs/reference/transports.md). What is sent as a message of channels goes as values, and a commit behind them; at the other end it is the same
  * message again.
  */
 #ifndef FCSL_WIRE_NAMED_H

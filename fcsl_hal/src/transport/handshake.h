@@ -1,6 +1,6 @@
 /* SPDX-License-Identifier: Apache-2.0
  *
- * Control packets: with them two peers of a wire meet, refuse each other and part (docs/wire.md).
+ * Control packets: with them two peers of a wire meet, refuse each other and part (docs/reference/transports.md).
  *
  *   offset size
  *   0      4   magic "FCSW" (messages of channels begin with an id from 0xff00 on)

@@ -1,6 +1,6 @@
 /* SPDX-License-Identifier: Apache-2.0
  *
- * A host of a few lines with the HAL of docs/hal.md, which is included here: command = 0.5 * measurement + 1, looped back, goes
+ * A host of a few lines with the HAL of docs/hardware/hal.md, which is included here: command = 0.5 * measurement + 1, looped back, goes
  * to 2.
  */
 #include LOOPBACK_HAL

@@ -1,6 +1,6 @@
 /* SPDX-License-Identifier: Apache-2.0
  *
- * A controller and a simulator over the wire of docs/wire.md, which is included here: two pipes between two processes.
+ * A controller and a simulator over the wire of docs/reference/transports.md, which is included here: two pipes between two processes.
  */
 #include PIPE_WIRE
 

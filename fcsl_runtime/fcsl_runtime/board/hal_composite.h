@@ -1,6 +1,6 @@
 /* SPDX-License-Identifier: Apache-2.0
  *
- * The composite HAL: some sensors are a board's, all others are a simulator's, and the commands go to the simulator, too (docs/bring_up.md).
+ * The composite HAL: some sensors are a board's, all others are a simulator's, and the commands go to the simulator, too (docs/hardware/hal.md).
  * Real devices do not wait: the simulator must keep real time.
  */
 #ifndef BOARD_HAL_COMPOSITE_H

@@ -1,6 +1,6 @@
 /* SPDX-License-Identifier: Apache-2.0
  *
- * The HAL of a board: sensors are devices of this computer, read through drivers and frontends as a plan says (docs/board.md). Actuators
+ * The HAL of a board: sensors are devices of this computer, read through drivers and frontends as a plan says (docs/hardware/hal.md). Actuators
  * are fcsl-guard's: without one, commands move nothing.
  */
 #ifndef BOARD_HAL_LINUX_H

@@ -29,7 +29,8 @@ static const char SCHEMA[] =
     "uint32 sensor  # of the board, from 0\n"
     "uint32 backend  # of the sensor, from 0\n"
     "uint64 sample_ns  # monotonic\n"
-    "float64[] values  # of the quantities that its kind measures (docs/board.md); NaN: not told\n" FCSL_SCHEMA_HEADER;
+    "float64[] values  # of the quantities that its kind measures (docs/hardware/hal.md); NaN: not "
+    "told\n" FCSL_SCHEMA_HEADER;
 
 /* Those that devices give stand before those that are computed. */
 static uint32_t given_values(const fcsl_sensor_kind_info_t *kind)

@@ -1,6 +1,6 @@
 /* SPDX-License-Identifier: Apache-2.0
  *
- * The link to fcsl-guard, which takes the commands to the actuators (docs/guard.md).
+ * The link to fcsl-guard, which takes the commands to the actuators (docs/hardware/arming.md).
  */
 #ifndef FC_GUARD_LINK_H
 #define FC_GUARD_LINK_H

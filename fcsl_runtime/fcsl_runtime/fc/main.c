@@ -20,7 +20,7 @@
 #include "ros_graph/hal_ros.h"
 #include "log.h"
 
-/* Exit statuses, besides 0 (docs/flight.md). */
+/* Exit statuses, besides 0 (docs/hardware/flight_computer.md). */
 enum { EXIT_RUN = 1, EXIT_USAGE = 2, EXIT_LATE = 3, EXIT_STUCK = 4 };
 
 typedef struct {

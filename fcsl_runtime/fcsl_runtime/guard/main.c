@@ -19,7 +19,7 @@
 #include "realtime.h"
 #include "report.h"
 
-/* Exit statuses, besides 0 (docs/guard.md). */
+/* Exit statuses, besides 0 (docs/hardware/arming.md). */
 enum { EXIT_GUARD = 1, EXIT_USAGE = 2 };
 
 typedef struct {

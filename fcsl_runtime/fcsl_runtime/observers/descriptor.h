@@ -4,7 +4,7 @@
 
 #include "fcsl/fcsl_run.h"
 
-/* What an observer needs to read the machine's channels, as JSON (docs/bus.md). Freed by the caller; null with `error`. */
+/* What an observer needs to read the machine's channels, as JSON (docs/reference/transports.md). Freed by the caller; null with `error`. */
 char *fcsl_observers_descriptor(const fcsl_machine_t *machine, fcsl_error_t *error);
 
 #endif /* FCSL_OBSERVERS_DESCRIPTOR_H */

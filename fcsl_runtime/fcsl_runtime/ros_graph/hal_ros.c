@@ -1,7 +1,7 @@
 /* SPDX-License-Identifier: Apache-2.0
  *
  * Tokens are held as long as the session lives: a route of the plugin that goes and comes back sends each message several times
- * (docs/ros_graph.md).
+ * (docs/reference/transports.md).
  */
 #define _GNU_SOURCE
 #include "hal_ros.h"

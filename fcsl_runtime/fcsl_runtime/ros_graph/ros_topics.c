@@ -1,6 +1,6 @@
 /* SPDX-License-Identifier: Apache-2.0
  *
- * Names, types and quality of service are those of docs/ros2.md.
+ * Names, types and quality of service are those of docs/guide/ros2.md.
  */
 #include "ros_topics.h"
 

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Checkpoint files (docs/checkpoints.md). The runtime makes their bytes: Run.checkpoint and Run.restore_checkpoint."""
+"""Checkpoint files (docs/guide/recording.md). The runtime makes their bytes: Run.checkpoint and Run.restore_checkpoint."""
 
 from __future__ import annotations
 

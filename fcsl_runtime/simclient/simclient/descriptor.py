@@ -182,7 +182,7 @@ class Machine:
     channels: tuple[Channel, ...]
     #: What the numbers of `counters.fault_place` mean, from 1.
     fault_places: tuple[FaultPlace, ...] = ()
-    #: What plots and viewers show, as JSON text (docs/language.md, views); "" for none.
+    #: What plots and viewers show, as JSON text (docs/reference/language.md, views); "" for none.
     views: str = ""
     #: Whether it describes only the part of the machine that a telemetry sender sends.
     partial: bool = False

@@ -159,7 +159,7 @@ class Run:
         self._check(self._lib.fcsl_run_restore(self.handle(), data, len(data), byref(self._error)))
 
     def checkpoint(self) -> bytes:
-        """The run's complete state, as bytes for a file or another process (docs/checkpoints.md)."""
+        """The run's complete state, as bytes for a file or another process (docs/guide/recording.md)."""
         if self._checkpoint is None:
             self._checkpoint = ctypes.create_string_buffer(self.checkpoint_capacity)
         size = self._lib.fcsl_run_checkpoint(self.handle(), self._checkpoint)

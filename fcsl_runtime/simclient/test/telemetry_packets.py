@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""A sender of telemetry made of docs/telemetry.md alone: datagrams to test a receiver with, whose truth is known."""
+"""A sender of telemetry made of docs/guide/monitoring.md alone: datagrams to test a receiver with, whose truth is known."""
 
 from __future__ import annotations
 

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""A reader of telemetry written from docs/telemetry.md alone: plain, strict and slow. It shares nothing with the sender and
+"""A reader of telemetry written from docs/guide/monitoring.md alone: plain, strict and slow. It shares nothing with the sender and
 nothing with simclient.Telemetry."""
 
 from __future__ import annotations
@@ -14,7 +14,7 @@ from pathlib import Path
 _HEADER = struct.Struct("<4sBBHIIIIQQ")
 _FORMATS = "?iqIQfdiii"
 
-PAGE = Path(__file__).resolve().parents[3] / "docs/telemetry.md"
+PAGE = Path(__file__).resolve().parents[3] / "docs/guide/monitoring.md"
 
 
 class Malformed(Exception):
@@ -217,7 +217,7 @@ def example(language: str) -> str:
     """The page's example: the text of its block in this language."""
     part = PAGE.read_text()
     found = re.search(rf"```{language}\n(.*?)```", part[part.index("## An example") :], re.DOTALL)
-    assert found, f"docs/telemetry.md has no example in {language}"
+    assert found, f"docs/guide/monitoring.md has no example in {language}"
     return found[1]
 
 

@@ -131,7 +131,7 @@ def read(kind: str, message: bytes) -> Any:
 
 
 class Simulator:
-    """The other end of docs/bus.md, with fcsl-fc as its controller."""
+    """The other end of docs/reference/transports.md, with fcsl-fc as its controller."""
 
     def __init__(self, library: Path, folder: Path):
         endpoint = free_endpoint()

@@ -159,7 +159,7 @@ def test_a_machine_that_cannot_be_read_hides_no_other(endpoint: str) -> None:
         out, err = tool("list", "-c", endpoint, "-s", "0.1")
         served.undeclare()
     assert out.startswith("north/hill/rig: 200 Hz") and "south" not in out
-    assert err == "fcsl-bus: left out: the descriptor of south/rig is not one of docs/bus.md\n"
+    assert err == "fcsl-bus: left out: the descriptor of south/rig is not one of docs/reference/transports.md\n"
 
 
 def test_echo(endpoint: str) -> None:

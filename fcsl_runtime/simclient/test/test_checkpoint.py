@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Checkpoints: their bytes as docs/checkpoints.md has them, read here with struct and zlib; what is refused and why."""
+"""Checkpoints: their bytes as docs/guide/recording.md has them, read here with struct and zlib; what is refused and why."""
 
 from __future__ import annotations
 

@@ -401,7 +401,7 @@ def test_bad_usage(arguments: list[str], code: int, text: str, tmp_path: Path, m
 
 
 def test_the_page_says_what_each_option_does() -> None:
-    page = (Path(__file__).parents[3] / "docs/flight.md").read_text()
+    page = (Path(__file__).parents[3] / "docs/hardware/flight_computer.md").read_text()
     options = re.findall(r"^  (--[a-z-]+)", run("--help").stdout, re.MULTILINE)
     assert len(options) > 20
     assert [o for o in options if f"`{o}" not in page] == ["--help"]

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""What `fcsl-fc --telemetry` sends, read by a reader that was written from docs/telemetry.md alone."""
+"""What `fcsl-fc --telemetry` sends, read by a reader that was written from docs/guide/monitoring.md alone."""
 
 from __future__ import annotations
 

@@ -118,7 +118,7 @@ def test_commands_in_lock_step(tmp_path: Path) -> None:
     assert code == 0 and "100 ticks" in out
 
 
-# ---- a simulator written from docs/wire.md ---------------------------------------------------------------------------
+# ---- a simulator written from docs/reference/transports.md ---------------------------------------------------------------------------
 
 F64, BOOL = 6, 0
 #: The channels of the fixture machine.

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""fcsl-guard: what the actuators get, whatever becomes of the flight program. docs/guard.md names these tests."""
+"""fcsl-guard: what the actuators get, whatever becomes of the flight program. docs/hardware/arming.md names these tests."""
 
 from __future__ import annotations
 
@@ -248,7 +248,7 @@ def test_no_terminal_stops_the_guard(guard: Guard) -> None:
 
 
 def test_a_killed_guard_leaves_the_last_command(patient: Path, tmp_path: Path) -> None:
-    """The limit of it, stated in docs/guard.md: only the device or a hardware watchdog can do something then. A guard that
+    """The limit of it, stated in docs/hardware/arming.md: only the device or a hardware watchdog can do something then. A guard that
     starts again writes safe values first, and the flight program must be started again, too."""
     with guarding(patient, tmp_path) as guard, armed_flight(guard, patient, tmp_path) as (fc, _):
         guard.end(signal.SIGKILL)
@@ -280,7 +280,7 @@ def test_a_stopped_guard_knows_how_old_its_command_is(guard: Guard) -> None:
 
 
 def test_the_page_names_tests_that_there_are() -> None:
-    page = (ROOT / "docs/guard.md").read_text()
+    page = (ROOT / "docs/hardware/arming.md").read_text()
     named = set(re.findall(r"`(test_\w+)`", page))
     files = [Path(__file__).with_name(f"test_guard{name}.py") for name in ("", "_plan", "_board")]
     assert len(named) > 10 and named <= {

@@ -185,7 +185,7 @@ def test_commands_become_pulses(library: Path, tmp_path: Path, sysfs: Sysfs) -> 
 
 
 def test_kill(library: Path, tmp_path: Path, sysfs: Sysfs) -> None:
-    """Safe pulses within the time that docs/guard.md gives; the shortest of some tries, because the computer may be busy."""
+    """Safe pulses within the time that docs/hardware/arming.md gives; the shortest of some tries, because the computer may be busy."""
     took_s = []
     with guarding(library, tmp_path, servos()) as guard:
         for n in range(5):

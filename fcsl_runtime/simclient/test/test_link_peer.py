@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""The link layer in C and the one in Python, both made of docs/link.md, over a wire that loses and damages frames."""
+"""The link layer in C and the one in Python, both made of docs/reference/transports.md, over a wire that loses and damages frames."""
 
 from __future__ import annotations
 
@@ -252,6 +252,6 @@ def test_the_checksum_is_that_of_the_standard_library(native: ctypes.CDLL, data:
 def test_the_example_of_the_page() -> None:
     example = bytes.fromhex("11 05 03 02 01 00 68 69 25 B1")
     assert Frame.from_bytes(example) == Frame(Kind.LATEST, 0x0203, 1, port=5, payload=b"hi")
-    page = (HAL.parent / "docs/link.md").read_text()
+    page = (HAL.parent / "docs/reference/transports.md").read_text()
     assert example.hex(" ").upper() in page
     assert Frame(Kind.HELLO, 1, flags=Flag.CONNECTED).to_bytes()[:2] == b"\x10\x40"

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Messages of channels in C and in Python, both made of docs/wire.md: the same bytes, the same values, the same refusals."""
+"""Messages of channels in C and in Python, both made of docs/reference/transports.md: the same bytes, the same values, the same refusals."""
 
 from __future__ import annotations
 
@@ -296,9 +296,9 @@ def test_a_channel_taken_out_leaves_a_whole_message() -> None:
     assert same(left, Message(Kind.SENSORS, 9, {2: (True,)}))
 
 
-# ---- docs/wire.md ----------------------------------------------------------------------------------------------------
+# ---- docs/reference/transports.md ----------------------------------------------------------------------------------------------------
 
-PAGE = (ROOT / "docs/wire.md").read_text()
+PAGE = (ROOT / "docs/reference/transports.md").read_text()
 VECTORS, ACCEPTED, REFUSED = (json.loads(block) for block in re.findall(r"```json\n(.*?)```", PAGE, re.DOTALL))
 
 

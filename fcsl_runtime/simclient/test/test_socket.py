@@ -153,7 +153,7 @@ with flying("--socket", "tcp:127.0.0.1:0", "--token", token) as fc:
 
 @pytest.mark.skipif(os.environ.get("FCSL_VERIFY", "") in ("", "0"), reason="takes 20 s: FCSL_VERIFY=1")
 def test_clients_that_vanish_free_their_places(tmp_path: Path) -> None:
-    """One that was sent nothing, and one that is sent samples; docs/protocol.md says when."""
+    """One that was sent nothing, and one that is sent samples; docs/reference/variables.md says when."""
     alone = ["unshare", "--user", "--map-root-user", "--net"]
     if shutil.which("unshare") is None or subprocess.run([*alone, "true"], check=False).returncode != 0:
         pytest.skip("no network of one's own can be made here")

@@ -49,7 +49,7 @@ def test_a_condition_is_true_or_false(twin: Twin) -> None:
 
 
 def test_the_page_has_the_functions() -> None:
-    protocol = (ROOT / "docs" / "protocol.md").read_text()
+    protocol = (ROOT / "docs/reference/variables.md").read_text()
     (listed,) = re.findall(r"^\| functions \| (.*) \|$", protocol, re.MULTILINE)
     assert set(re.findall(r"`(\w+)\(", listed)) == set(FUNCTIONS)
 

@@ -155,7 +155,7 @@ def test_state_and_checkpoints(tell: Tell, tmp_path: Path) -> None:
 
 
 def test_a_checkpoint_is_written_as_every_other(tell: Tell, tmp_path: Path) -> None:
-    """docs/checkpoints.md, "The file": what a kill leaves is the old file or the new one, and <path>.tmp at most."""
+    """docs/guide/recording.md, "The file": what a kill leaves is the old file or the new one, and <path>.tmp at most."""
     kept = tmp_path / "kept"
     kept.mkdir()
     assert tell("save", kept / "file").startswith("tick 0, ")

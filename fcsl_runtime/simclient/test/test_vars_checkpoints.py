@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Checkpoints over the socket: the bytes of a file (docs/checkpoints.md), to the client and back or in a folder of the server's."""
+"""Checkpoints over the socket: the bytes of a file (docs/guide/recording.md), to the client and back or in a folder of the server's."""
 
 from __future__ import annotations
 

@@ -29,7 +29,7 @@ def flight(library: str, tmp_path: Path) -> Iterator[tuple[Fc, Path]]:
 
 
 class Stream:
-    """Reads replies, JSON samples and binary frames off one connection, as docs/protocol.md has them."""
+    """Reads replies, JSON samples and binary frames off one connection, as docs/reference/variables.md has them."""
 
     def __init__(self, client: Client) -> None:
         self._file = client.file  # it may have read on behind the last reply

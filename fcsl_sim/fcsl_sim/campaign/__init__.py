@@ -1,2 +1,2 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Campaigns: a simulation flown many times with dispersed parameters (docs/campaigns.md)."""
+"""Campaigns: a simulation flown many times with dispersed parameters (docs/guide/campaigns.md)."""

@@ -1,2 +1,2 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Design work on a plant: its linearisation, and its equilibria (docs/design_work.md)."""
+"""Design work on a plant: its linearisation, and its equilibria (docs/guide/campaigns.md)."""

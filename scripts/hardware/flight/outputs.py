@@ -16,7 +16,7 @@ from ..trials import Failed, expect
 from .craft import Craft
 from .process import Flight, Guard, after, in_ms, until
 
-#: command_timeout_s of the craft and the period of the guard: T and P of docs/guard.md.
+#: command_timeout_s of the craft and the period of the guard: T and P of docs/hardware/arming.md.
 _TIMEOUT_S, _PERIOD_S = 0.1, 0.002
 SAFE_AFTER_S = _TIMEOUT_S + _PERIOD_S
 #: For a guest that has one processor, of a computer that has other work.

@@ -1,9 +1,9 @@
 /* SPDX-License-Identifier: Apache-2.0
  *
  * A flight computer on a bare Cortex-M7: one compiled machine, its channels on a serial line. To a simulator it is what any
- * other controller on a wire is (docs/wire.md): it says hello, then answers each time message with an actuator message.
+ * other controller on a wire is (docs/reference/transports.md): it says hello, then answers each time message with an actuator message.
  *
- * The serial line carries COBS frames of the link layer (docs/link.md): messages travel on port 0, reliable. When the run ends,
+ * The serial line carries COBS frames of the link layer (docs/reference/transports.md): messages travel on port 0, reliable. When the run ends,
  * the hash over all fields of every tick is printed (../shared/stimulus.h), to be compared with that of the same machine in
  * another process.
  */

@@ -115,6 +115,6 @@ def run(line: Sequence[str | Path], timeout_s: float = 600.0) -> str:
 
 
 def write_facts(name: str, facts: dict[str, Any]) -> None:
-    """Figures of a check, for people and for docs/evidence.md: out/verify/<name>.json."""
+    """Figures of a check, for people and for docs/internals/evidence.md: out/verify/<name>.json."""
     OUT.mkdir(parents=True, exist_ok=True)
     (OUT / f"{name}.json").write_text(json.dumps(facts, indent=2) + "\n")

@@ -2,7 +2,7 @@
 """FCSL in a user's own colcon workspace: plain `colcon build`, without this workspace's scripts and settings.
 
 A copy of the tracked files lies under src/fcsl, beside a package that `fcslc new machine my_robot --package` wrote. The build
-takes the packages that docs/ros2.md names, writes nothing to standard error, which colcon would report as if something
+takes the packages that docs/guide/ros2.md names, writes nothing to standard error, which colcon would report as if something
 were wrong, and takes no example; then the package's tests pass. Only the tools and ROS 2 come from this workspace.
 
 A flight computer's packages, built without Zenoh in a second workspace, compile none of its crates; fcsl-fc flies there, and says

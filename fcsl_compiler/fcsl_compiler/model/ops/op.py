@@ -10,7 +10,7 @@ from ..types import Scalar
 
 @dataclass(frozen=True)
 class Doc:
-    """A function's entry in the reference (docs/library.md). No field is empty."""
+    """A function's entry in the reference (docs/reference/library.md). No field is empty."""
 
     group: str  # heading of its section
     call: str  # "atan2(y, x)"

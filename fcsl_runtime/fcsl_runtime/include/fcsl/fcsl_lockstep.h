@@ -46,7 +46,7 @@ void fcsl_lockstep_alive(fcsl_lockstep_t *lockstep);
 /* Tells the simulator that no tick is answered any more. Does nothing where none is connected. */
 void fcsl_lockstep_leave(fcsl_lockstep_t *lockstep);
 
-/* What the HAL counts under `path` (docs/hal.md), such as messages_dropped; 0 where none is connected. */
+/* What the HAL counts under `path` (docs/hardware/hal.md), such as messages_dropped; 0 where none is connected. */
 uint64_t fcsl_lockstep_count(const fcsl_lockstep_t *lockstep, const char *path);
 
 #ifdef __cplusplus

@@ -1,6 +1,6 @@
 /* SPDX-License-Identifier: Apache-2.0
  *
- * Observers: the channels of a host's machine on a bus of their own (docs/bus.md). Flight program and simulator serve them
+ * Observers: the channels of a host's machine on a bus of their own (docs/reference/transports.md). Flight program and simulator serve them
  * through this file.
  *
  * A thread reads the host's history and never meets the step thread; all memory is taken by open. Ticks that are overwritten

@@ -1,7 +1,7 @@
 /* SPDX-License-Identifier: Apache-2.0
  *
  * A host's machine in a ROS 2 graph, without a ROS 2 library: CDR messages on the keys of zenoh-plugin-ros2dds, over a session
- * of the bus of its own (docs/ros_graph.md). Flight program and simulator serve it through this file.
+ * of the bus of its own (docs/reference/transports.md). Flight program and simulator serve it through this file.
  *
  * A thread reads the host's history and never meets the step thread; all memory is taken by open. Ticks that are overwritten
  * before there is room for them on the bus are dropped whole and counted. Messages of streams are made while somebody subscribes

@@ -181,7 +181,7 @@ typedef enum {
 /* ---- checkpoints ------------------------------------------------------------------------------------------------ */
 
 /* A checkpoint is all that a run needs to go on as if it had never stopped: the machine struct and the simulated hardware,
- * and of which machine, sources, layout and tick they are (docs/checkpoints.md). Its bytes are the content of its file. */
+ * and of which machine, sources, layout and tick they are (docs/guide/recording.md). Its bytes are the content of its file. */
 
 /* Bytes of the largest checkpoint of this run. */
 size_t fcsl_run_checkpoint_capacity(const fcsl_run_t *run);
@@ -221,7 +221,7 @@ void fcsl_run_trace_end(fcsl_run_t *run, fcsl_trace_t *trace);
 
 /* ---- views ------------------------------------------------------------------------------------------------------- */
 
-/* What plots and viewers show of this run (docs/language.md): the machine's own views, or those of its host; "" for none. Bags
+/* What plots and viewers show of this run (docs/reference/language.md): the machine's own views, or those of its host; "" for none. Bags
  * and telemetry carry it. */
 const char *fcsl_run_views(const fcsl_run_t *run);
 /* Replaces the machine's views: a simulator's name its models, too. Copies the text; at most FCSL_VIEWS_BYTES_MAX bytes. Before

@@ -1,6 +1,6 @@
 /* SPDX-License-Identifier: Apache-2.0
  *
- * Telemetry: what ticks left, as datagrams of UDP to one receiver (docs/telemetry.md has the bytes). Flight program and
+ * Telemetry: what ticks left, as datagrams of UDP to one receiver (docs/guide/monitoring.md has the bytes). Flight program and
  * simulator send through this file.
  *
  * The sender has one thread of its own, which reads the host's history and never meets the step thread; all memory is taken by

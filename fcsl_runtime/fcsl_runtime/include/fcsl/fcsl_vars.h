@@ -1,6 +1,6 @@
 /* SPDX-License-Identifier: Apache-2.0
  *
- * The variable server: every value of a host by its path, over a socket (docs/protocol.md). Flight program and simulator
+ * The variable server: every value of a host by its path, over a socket (docs/reference/variables.md). Flight program and simulator
  * serve through this file.
  *
  * The server has one thread of its own. What only looks (get, eval, subscribe, state, stats) reads the host's history

@@ -1,6 +1,6 @@
 /* SPDX-License-Identifier: Apache-2.0
  *
- * The bytes of a checkpoint, as docs/checkpoints.md specifies them.
+ * The bytes of a checkpoint, as docs/guide/recording.md specifies them.
  */
 #ifndef FCSL_CHECKPOINT_H
 #define FCSL_CHECKPOINT_H

@@ -1,6 +1,6 @@
 /* SPDX-License-Identifier: Apache-2.0
  *
- * The bytes of a configuration (docs/telemetry.md, "Configuration").
+ * The bytes of a configuration (docs/guide/monitoring.md, "Configuration").
  */
 #ifndef FCSL_TELEMETRY_CONFIGURATION_H
 #define FCSL_TELEMETRY_CONFIGURATION_H

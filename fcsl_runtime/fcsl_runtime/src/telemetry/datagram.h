@@ -1,6 +1,6 @@
 /* SPDX-License-Identifier: Apache-2.0
  *
- * Packets cut into datagrams (docs/telemetry.md, "A datagram").
+ * Packets cut into datagrams (docs/guide/monitoring.md, "A datagram").
  */
 #ifndef FCSL_TELEMETRY_DATAGRAM_H
 #define FCSL_TELEMETRY_DATAGRAM_H

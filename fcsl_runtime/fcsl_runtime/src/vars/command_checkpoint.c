@@ -1,6 +1,6 @@
 /* SPDX-License-Identifier: Apache-2.0
  *
- * Checkpoints (docs/checkpoints.md): to a client and back, or to a file in the folder that the program was started with. The
+ * Checkpoints (docs/guide/recording.md): to a client and back, or to a file in the folder that the program was started with. The
  * step thread copies what is saved, and gets what a checkpoint holds; everything else is done here, on the server's thread.
  */
 #include <inttypes.h>

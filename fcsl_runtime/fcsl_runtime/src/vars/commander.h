@@ -1,6 +1,6 @@
 /* SPDX-License-Identifier: Apache-2.0
  *
- * The protocol of the variable server: one JSON object per line in, one out (docs/protocol.md).
+ * The protocol of the variable server: one JSON object per line in, one out (docs/reference/variables.md).
  */
 #ifndef FCSL_VARS_COMMANDER_H
 #define FCSL_VARS_COMMANDER_H

@@ -1,6 +1,6 @@
 /* SPDX-License-Identifier: Apache-2.0
  *
- * Every limit of the variable server that a client can meet. docs/protocol.md shows this table (test/test_limits.py).
+ * Every limit of the variable server that a client can meet. docs/reference/variables.md shows this table (test/test_limits.py).
  */
 #ifndef FCSL_VARS_LIMITS_H
 #define FCSL_VARS_LIMITS_H

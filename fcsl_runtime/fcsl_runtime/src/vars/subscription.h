@@ -1,6 +1,6 @@
 /* SPDX-License-Identifier: Apache-2.0
  *
- * Samples of chosen fields at a divided rate, in the order of ticks: JSON lines or binary frames (docs/protocol.md).
+ * Samples of chosen fields at a divided rate, in the order of ticks: JSON lines or binary frames (docs/reference/variables.md).
  */
 #ifndef FCSL_VARS_SUBSCRIPTION_H
 #define FCSL_VARS_SUBSCRIPTION_H

@@ -31,7 +31,7 @@ Array = np.ndarray[Any, Any]
 
 _OWN_PACKAGE = "fcsl_msgs/msg/"
 _CHECKPOINT_SUFFIX = "/record/checkpoint"
-#: A bystander has the machine's channels in it (docs/bus.md).
+#: A bystander has the machine's channels in it (docs/reference/transports.md).
 _DESCRIPTOR_SUFFIX = "/record/descriptor"
 #: End of the topic that says what plots and viewers show of a machine. It is no part of what the machine did.
 VIEWS_SUFFIX = "/record/views"
@@ -394,7 +394,7 @@ class Bag:
         return next((str(self.decode_own(machine.lacks, data, ("data",)).data) for _, _, data in messages), "")
 
     def views(self, machine: RecordedMachine) -> str:
-        """What plots and viewers show of the machine, as the recording host gave it: JSON (docs/language.md, views), of
+        """What plots and viewers show of the machine, as the recording host gave it: JSON (docs/reference/language.md, views), of
         which nothing has been checked but its size. "" if there is none; `notes` then say why, if it cannot be read.
         """
         topic = self.topics.get(machine.views)

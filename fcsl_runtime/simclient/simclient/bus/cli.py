@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""fcsl-bus: machines on the bus, from the command line (docs/bus.md)."""
+"""fcsl-bus: machines on the bus, from the command line (docs/reference/transports.md)."""
 
 from __future__ import annotations
 

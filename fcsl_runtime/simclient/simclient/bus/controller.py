@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""The simulator's end of named values in lock-step (docs/bus.md): meets a controller, asks it tick by tick, parts."""
+"""The simulator's end of named values in lock-step (docs/reference/transports.md): meets a controller, asks it tick by tick, parts."""
 
 from __future__ import annotations
 

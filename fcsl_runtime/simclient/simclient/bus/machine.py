@@ -166,7 +166,7 @@ def read_machine(prefix: str, text: str) -> BusMachine:
     except (ValueError, LookupError, TypeError, RecursionError) as error:
         if isinstance(error, BusError):
             raise
-        raise BusError(f"the descriptor of {prefix} is not one of docs/bus.md") from None
+        raise BusError(f"the descriptor of {prefix} is not one of docs/reference/transports.md") from None
     return machine
 
 

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""ROS 2 messages under the keys of channels (docs/bus.md), as the values that they carry, and back.
+"""ROS 2 messages under the keys of channels (docs/reference/transports.md), as the values that they carry, and back.
 
 The compiler makes the plans of these messages as it does for the machine. What executes them is loaded with the first
 message: a machine whose values lie on the bus as they are needs none of it.

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Ticks of a machine, of its values and commits on the bus (docs/bus.md).
+"""Ticks of a machine, of its values and commits on the bus (docs/reference/transports.md).
 
 Zenoh may drop any message on the way to a slow observer. A value belongs to the next commit of its direction if no
 commit between was lost; so the values of a tick count if its commit follows that of the tick before.

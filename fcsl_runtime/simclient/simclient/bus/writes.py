@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""What reproduces a machine's run, as it comes over the bus (docs/bus.md): host writes, how many there are, a checkpoint."""
+"""What reproduces a machine's run, as it comes over the bus (docs/reference/transports.md): host writes, how many there are, a checkpoint."""
 
 from __future__ import annotations
 

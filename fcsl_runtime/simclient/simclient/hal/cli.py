@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""fcsl-hal: brings up the sensors and actuators of a vehicle (docs/hal_tools.md)."""
+"""fcsl-hal: brings up the sensors and actuators of a vehicle (docs/hardware/hal.md)."""
 
 from __future__ import annotations
 
@@ -15,7 +15,7 @@ from .errors import Refused
 
 EXIT_REFUSED = 1
 _EPILOG = """\
-DRIVER is one that comes with FCSL, or LIBRARY.so:NAME (docs/drivers.md). Exit status: 0; 1 if something is not as it
+DRIVER is one that comes with FCSL, or LIBRARY.so:NAME (docs/hardware/hal.md). Exit status: 0; 1 if something is not as it
 should be: a device is missing, a calibration or a movement is refused; 2 for wrong usage or an unreadable file."""
 _MEASURED = {
     "gyro": "the offset of a gyro, from a vehicle that stands still",

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""The link layer in Python, as docs/link.md defines it: another end for tests, ground stations and rigs."""
+"""The link layer in Python, as docs/reference/transports.md defines it: another end for tests, ground stations and rigs."""
 
 from .end import End, Full, Policy
 

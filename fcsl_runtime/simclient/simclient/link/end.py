@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""One end of a link (docs/link.md): ticks, sessions, and what goes to which port. It does no I/O and has no clock."""
+"""One end of a link (docs/reference/transports.md): ticks, sessions, and what goes to which port. It does no I/O and has no clock."""
 
 from __future__ import annotations
 

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Frames of the link layer (docs/link.md#frames)."""
+"""Frames of the link layer (docs/reference/transports.md#frames)."""
 
 from __future__ import annotations
 

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Messages of channels, as docs/wire.md defines them: encodes, checks and decodes them."""
+"""Messages of channels, as docs/reference/transports.md defines them: encodes, checks and decodes them."""
 
 from __future__ import annotations
 

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""One port of a link (docs/link.md): what waits to be sent, and what arrived."""
+"""One port of a link (docs/reference/transports.md): what waits to be sent, and what arrived."""
 
 from __future__ import annotations
 

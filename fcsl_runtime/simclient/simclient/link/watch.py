@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""fcsl-link: what the link of a running flight program carries, loses and repeats (docs/link.md)."""
+"""fcsl-link: what the link of a running flight program carries, loses and repeats (docs/reference/transports.md)."""
 
 from __future__ import annotations
 

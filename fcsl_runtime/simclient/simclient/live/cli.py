@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""fcsl-view: shows a running machine's telemetry in the rerun viewer (docs/live_view.md)."""
+"""fcsl-view: shows a running machine's telemetry in the rerun viewer (docs/guide/monitoring.md)."""
 
 from __future__ import annotations
 

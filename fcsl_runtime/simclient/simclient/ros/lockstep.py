@@ -86,7 +86,7 @@ class Lockstep:
         self._library.fcsl_lockstep_leave(self._handle)
 
     def count(self, path: str) -> int:
-        """What the HAL counts under `path` (docs/hal.md); 0 while no simulator is connected."""
+        """What the HAL counts under `path` (docs/hardware/hal.md); 0 while no simulator is connected."""
         return int(self._library.fcsl_lockstep_count(self._handle, path.encode()))
 
     def close(self) -> None:

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""The routes (docs/supervisor.md). Blocking work runs on threads, never on the event loop."""
+"""The routes (docs/guide/monitoring.md). Blocking work runs on threads, never on the event loop."""
 
 from __future__ import annotations
 

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""HttpError: an error answer, with the same members as those of the variable server (docs/protocol.md)."""
+"""HttpError: an error answer, with the same members as those of the variable server (docs/reference/variables.md)."""
 
 from __future__ import annotations
 
@@ -24,7 +24,7 @@ _VAR_STATUS = {
 
 
 class HttpError(Exception):
-    """`status` is HTTP's; `code` is one of docs/supervisor.md; `hint` is the probable spelling or a remedy; it may be
+    """`status` is HTTP's; `code` is one of docs/guide/monitoring.md; `hint` is the probable spelling or a remedy; it may be
     empty.
     """
 

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Every limit of the supervisor. docs/supervisor.md shows this table (test/test_limits.py)."""
+"""Every limit of the supervisor. docs/guide/monitoring.md shows this table (test/test_limits.py)."""
 
 #: ended runs that are kept; of more the oldest are forgotten
 ENDED_RUNS = 16

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""fcsl-supervisor: starts, stops and shows flights and simulations of this computer over HTTP (docs/supervisor.md)."""
+"""fcsl-supervisor: starts, stops and shows flights and simulations of this computer over HTTP (docs/guide/monitoring.md)."""
 
 from __future__ import annotations
 
@@ -59,7 +59,7 @@ def _parser() -> argparse.ArgumentParser:
     parser = argparse.ArgumentParser(
         prog="fcsl-supervisor",
         description="Starts, stops and shows flights and simulations of this computer over HTTP.",
-        epilog="docs/supervisor.md describes its answers. All its runs end with it.",
+        epilog="docs/guide/monitoring.md describes its answers. All its runs end with it.",
     )
     add_version(parser, "simclient", __file__)
     parser.add_argument("--root", type=Path, required=True, metavar="DIR", help="folder of all files that runs may use")

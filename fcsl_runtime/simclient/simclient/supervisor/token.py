@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""The token file: the same format as the variable server's (docs/protocol.md)."""
+"""The token file: the same format as the variable server's (docs/reference/variables.md)."""
 
 from __future__ import annotations
 

@@ -1,2 +1,2 @@
 # SPDX-License-Identifier: Apache-2.0
-"""The receiver of UDP telemetry (docs/telemetry.md): `Telemetry`, and the `Window` and `Counts` that it returns."""
+"""The receiver of UDP telemetry (docs/guide/monitoring.md): `Telemetry`, and the `Window` and `Counts` that it returns."""

@@ -1,6 +1,6 @@
 # SPDX-License-Identifier: Apache-2.0
 """The configuration of a session: the sending machine, and the offset of each channel in a data packet
-(docs/telemetry.md).
+(docs/guide/monitoring.md).
 """
 
 from __future__ import annotations

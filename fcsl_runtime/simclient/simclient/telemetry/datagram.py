@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""One datagram of telemetry: a header of 40 bytes and a piece of a packet's body (docs/telemetry.md)."""
+"""One datagram of telemetry: a header of 40 bytes and a piece of a packet's body (docs/guide/monitoring.md)."""
 
 from __future__ import annotations
 

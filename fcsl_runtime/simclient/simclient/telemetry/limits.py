@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Every limit of the telemetry receiver. docs/telemetry.md shows this table (test/test_limits.py)."""
+"""Every limit of the telemetry receiver. docs/guide/monitoring.md shows this table (test/test_limits.py)."""
 
 #: bytes of a body
 BODY_BYTES_MAX = 16 << 20

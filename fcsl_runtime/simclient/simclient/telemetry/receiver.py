@@ -31,7 +31,7 @@ _BATCH = 256
 
 
 class Telemetry:
-    """The newest `window_ticks` packets of one sender (docs/telemetry.md).
+    """The newest `window_ticks` packets of one sender (docs/guide/monitoring.md).
 
     `with Telemetry(9870) as telemetry:` listens on 127.0.0.1:9870 and receives in a separate thread. Without `with`,
     `start` begins that thread, or the caller receives with `poll`. Port 0 selects any free port (`.port`). With no

@@ -221,7 +221,7 @@ class AlgTwin(Twin):
 
 
 class PyTwin(AlgTwin):
-    """The same machine in CPython, by the published rewrite (docs/language.md): bit-identical to AlgTwin at every tick.
+    """The same machine in CPython, by the published rewrite (docs/reference/language.md): bit-identical to AlgTwin at every tick.
 
     The machine is still compiled, because its descriptor and its externs are used.
 

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""The pytest mark `fcsl_campaign` and its fixture `fcsl_case`: a test of each case of a study (docs/campaigns.md).
+"""The pytest mark `fcsl_campaign` and its fixture `fcsl_case`: a test of each case of a study (docs/guide/campaigns.md).
 
 @pytest.mark.fcsl_campaign("../sim/touchdown.study.json", cases=100)
 def test_every_landing_is_soft(fcsl_case):

@@ -259,7 +259,7 @@ class Twin(TwinFaults):
     # ---- checkpoints and recording ----------------------------------------------------------------------------------
 
     def save(self) -> bytes:
-        """The whole machine and its simulated hardware: the content of a checkpoint file (docs/checkpoints.md)."""
+        """The whole machine and its simulated hardware: the content of a checkpoint file (docs/guide/recording.md)."""
         return self._checkpoint()
 
     def restore(self, checkpoint: bytes, ignore_source_hash: bool = False) -> None:

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""The values of a binary sample (docs/protocol.md)."""
+"""The values of a binary sample (docs/reference/variables.md)."""
 
 from __future__ import annotations
 

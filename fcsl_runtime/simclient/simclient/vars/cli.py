@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""fcsl-var: reads and writes the values of a running machine from the command line (docs/variables.md)."""
+"""fcsl-var: reads and writes the values of a running machine from the command line (docs/reference/variables.md)."""
 
 from __future__ import annotations
 

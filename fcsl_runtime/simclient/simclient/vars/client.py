@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""VarClient: the variable server of a flight program or a simulator, in Python (docs/protocol.md, docs/variables.md).
+"""VarClient: the variable server of a flight program or a simulator, in Python (docs/reference/variables.md, docs/reference/variables.md).
 
     with VarClient("/run/user/1000/fc.sock") as client:
         client.set({"pilot.parameters.gain": 2.5})
@@ -146,7 +146,7 @@ class VarClient(VarWire):
         return self._call("set_state", state=state)
 
     def save(self) -> bytes:
-        """The whole machine, as the content of a checkpoint file (docs/checkpoints.md), of any size."""
+        """The whole machine, as the content of a checkpoint file (docs/guide/recording.md), of any size."""
         return self._whole(self._call("save"))
 
     def save_to(self, name: str) -> dict[str, Any]:

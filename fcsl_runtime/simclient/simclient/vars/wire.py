@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""VarWire: one connection to a variable server: sends requests, receives replies and samples (docs/protocol.md)."""
+"""VarWire: one connection to a variable server: sends requests, receives replies and samples (docs/reference/variables.md)."""
 
 from __future__ import annotations
 
@@ -33,7 +33,7 @@ _STATES = ("machine.state", "machine.next_state")
 class VarError(TwinError):
     """A refusal of the server, or a failure to reach it.
 
-    `code` is one of docs/protocol.md, or of the client: `unreachable`, `closed`, `timeout`, `protocol`. `hint` is the
+    `code` is one of docs/reference/variables.md, or of the client: `unreachable`, `closed`, `timeout`, `protocol`. `hint` is the
     probable spelling, `overwritten_by` the writer of a value that cannot be set; both may be empty.
     """
 

@@ -45,7 +45,7 @@ SEEN = 10
 COMPUTERS = sized(10, 1)
 #: Ticks a second of each flight computer: the lander's 100 Hz at this speed.
 SPEED, RATE_HZ = 10, 1000
-#: Of a lander's tick there, as a message (docs/wire.md).
+#: Of a lander's tick there, as a message (docs/reference/transports.md).
 BYTES = 64
 LIMIT_S = 300
 

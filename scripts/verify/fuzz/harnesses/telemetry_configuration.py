@@ -25,7 +25,7 @@ def text_bytes(text: str) -> int:
 
 
 def told_bytes(known: Configuration) -> int:
-    """Of a configuration that says this and nothing else, by docs/telemetry.md."""
+    """Of a configuration that says this and nothing else, by docs/guide/monitoring.md."""
     machine = known.machine
     total = 4 + 8 + 4 + 8 + 4 + text_bytes(machine.source_hash) + text_bytes(machine.name)
     total += text_bytes(machine.views) + 4
