@@ -3,6 +3,7 @@
 
 from __future__ import annotations
 
+import json
 import os
 import re
 import subprocess
@@ -11,7 +12,7 @@ from pathlib import Path
 from simclient.replay import replay
 
 ROOT = Path(__file__).resolve().parents[1]
-PAGE = (ROOT / "docs/hardware/hal.md").read_text()
+(PAGE,) = re.findall(r"^## Bring-up\n(.*?)^## ", (ROOT / "docs/hardware/hal.md").read_text(), re.DOTALL | re.MULTILINE)
 LIBRARY = ROOT / "install/lander/lib/lander/liblander_machines.so"
 FENCED = r"```{kind}\n(.*?)^```$"
 
@@ -22,6 +23,14 @@ def fenced(kind: str, text: str) -> str:
     return found[1]
 
 
+def add_members(file: Path, added: dict[str, dict[str, object]]) -> None:
+    """Adds the members of the objects in `added` to those of the same name in the file."""
+    whole = json.loads(file.read_text())
+    for name, members in added.items():
+        whole[name] = whole.get(name, {}) | members
+    file.write_text(json.dumps(whole))
+
+
 def test_the_steps(tmp_path: Path) -> None:
     for folder in ("examples", "install"):
         (tmp_path / folder).symlink_to(ROOT / folder)
@@ -30,10 +39,13 @@ def test_the_steps(tmp_path: Path) -> None:
     for name, text in {"name": "lidar", "in_distance_raw": "250", "in_distance_scale": "0.01"}.items():
         (device / name).write_text(f"{text}\n")
     said = {}
-    variables, parts = fenced("sh", PAGE), re.split(r"^<!-- (step|file): (.*) -->$", PAGE, flags=re.MULTILINE)
+    variables, parts = fenced("sh", PAGE), re.split(r"^<!-- (step|file|members): (.*) -->$", PAGE, flags=re.MULTILINE)
     for kind, name, text in zip(parts[1::3], parts[2::3], parts[3::3], strict=True):
         if kind == "file":
             (tmp_path / name).write_text(fenced("json", text))
+            continue
+        if kind == "members":
+            add_members(tmp_path / name, json.loads(fenced("json", text)))
             continue
         done = subprocess.run(
             ["bash", "-uc", f"{variables}\n{fenced('sh', text)}"],

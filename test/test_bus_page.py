@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""docs/reference/transports.md: its plant, which is a Python script over Zenoh's own package, flies the lander; its source is one."""
+"""docs/reference/transports.md: the plant that it names, a Python script over Zenoh's own package, flies the lander; its source is one."""
 
 from __future__ import annotations
 
@@ -13,23 +13,18 @@ from simclient.bus.free_port import free_endpoint
 from simclient.replay import replay
 
 ROOT = Path(__file__).resolve().parents[1]
+PAGE = (ROOT / "docs/reference/transports.md").read_text()
+PLANT = ROOT / "test/bus_plant.py"
 LONG_S = 120
 
 
-def write_script(marker: str, path: Path) -> None:
-    """The script of the page that has this text."""
-    scripts = re.findall(r"```python\n(.*?)```", (ROOT / "docs/reference/transports.md").read_text(), re.DOTALL)
-    (script,) = (script for script in scripts if marker in script)
-    path.write_text(script)
-
-
 def test_the_plant_of_the_page_flies_the_lander(tmp_path: Path) -> None:
-    write_script("touchdown", tmp_path / "plant.py")
+    assert "(../../test/bus_plant.py)" in PAGE
     machine = ROOT / "examples/lander/fc/lander_control.json"
     subprocess.run(["fcslc", "build", machine, "-o", tmp_path], check=True, capture_output=True)
     library, bag = tmp_path / "liblander_control.so", tmp_path / "bag"
     place = free_endpoint()
-    line = [sys.executable, tmp_path / "plant.py", place]
+    line = [sys.executable, PLANT, place]
     with subprocess.Popen(line, stdout=subprocess.PIPE, text=True) as plant:
         options = ["--hal", f"zenoh:{place}", "--timeout-ms", "30000", "--record", bag]
         flown = subprocess.run(
@@ -43,7 +38,8 @@ def test_the_plant_of_the_page_flies_the_lander(tmp_path: Path) -> None:
 
 
 def test_the_source_of_the_page_is_one(tmp_path: Path) -> None:
-    write_script("12.5", tmp_path / "source.py")
+    (script,) = re.findall(r"```python\n(.*?)```", PAGE, re.DOTALL)
+    (tmp_path / "source.py").write_text(script)
     machine, summary = ROOT / "examples/lander/fc/lander_control.json", tmp_path / "summary.json"
     subprocess.run(["fcslc", "build", machine, "-o", tmp_path], check=True, capture_output=True)
     place = free_endpoint()

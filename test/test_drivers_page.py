@@ -18,7 +18,9 @@ from fcsl_compiler.base.packages import package_prefix
 from fcsl_compiler.driver.cache import build_machine
 
 ROOT = Path(__file__).resolve().parents[1]
-PAGE = (ROOT / "docs/hardware/hal.md").read_text()
+(PAGE,) = re.findall(
+    r"^## Writing a driver\n(.*?)^## ", (ROOT / "docs/hardware/hal.md").read_text(), re.DOTALL | re.MULTILINE
+)
 BIN = package_prefix("fcsl_runtime") / "bin"
 DRIVER_READ = Path(os.environ.get("FCSL_TEST_RUNTIME", ROOT / "build/fcsl_runtime")) / "driver_read"
 #: What the page says of the machine.
@@ -64,7 +66,7 @@ def winch(tmp_path_factory: pytest.TempPathFactory) -> Path:
     (folder / "winch.c").write_text(block("c"))
     subprocess.run(["bash", "-euc", block("sh").replace("-Wextra", "-Wextra -Werror")], cwd=folder, check=True)
     (folder / "0").mkdir()
-    for name in ("speed", "brake", "length"):
+    for name in ("command", "length"):
         (folder / "0" / name).touch()
     return folder
 
@@ -97,8 +99,7 @@ def test_the_motor(winch: Path, tmp_path: Path, started: list[subprocess.Popen[s
     started.append(guard)
 
     def winch_has(speed: int, brake: int) -> bool:
-        texts = [(winch / "0" / name).read_text() for name in ("speed", "brake")]
-        return texts == [f"{speed:8}\n", f"{brake:8}\n"]
+        return (winch / "0/command").read_text() == f"{speed:8} {brake}\n"
 
     wait_for(lambda: winch_has(0, 1))
     wait_for(slot.exists)

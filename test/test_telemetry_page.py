@@ -19,7 +19,7 @@ DOC = Path(__file__).resolve().parents[1] / "docs/guide/monitoring.md"
 
 
 def section() -> str:
-    return DOC.read_text().partition("## Receiving it in Python\n")[2].partition("\n## ")[0]
+    return DOC.read_text().partition("\n### Receiver in Python\n")[2].partition("\n### ")[0]
 
 
 def block(kind: str) -> str:
@@ -54,8 +54,8 @@ def test_the_example(flights: list[subprocess.Popen[str]], monkeypatch: pytest.M
     assert printed.getvalue() == block("text")
 
 
-def test_the_tables_name_every_count() -> None:
+def test_the_lists_name_every_count() -> None:
     from simclient.telemetry.counts import Counts
 
-    named = re.findall(r"^\| `([a-z_]+)` \|", section(), re.MULTILINE)
+    named = re.findall(r"^- `([a-z_]+)`: ", section(), re.MULTILINE)
     assert ["received", *named] == list(Counts.__dataclass_fields__)

@@ -216,7 +216,7 @@ class Port:
 def example(language: str) -> str:
     """The page's example: the text of its block in this language."""
     part = PAGE.read_text()
-    found = re.search(rf"```{language}\n(.*?)```", part[part.index("## An example") :], re.DOTALL)
+    found = re.search(rf"```{language}\n(.*?)```", part[part.index("### Example packets") :], re.DOTALL)
     assert found, f"docs/guide/monitoring.md has no example in {language}"
     return found[1]
 
@@ -224,4 +224,4 @@ def example(language: str) -> str:
 def dumps() -> list[bytes]:
     """The datagrams of the page's example."""
     blocks = re.findall(r"```\n(0000  .*?)```", PAGE.read_text(), re.DOTALL)
-    return [bytes.fromhex("".join(line[6:53] for line in block.splitlines())) for block in blocks]
+    return [bytes.fromhex("".join(line[6:41] for line in block.splitlines())) for block in blocks]
