@@ -291,7 +291,7 @@ def test_the_report_is_what_the_compiler_prints(
     monkeypatch.chdir(rover)
     config = rover / "rover.json"
     config.write_text(config.read_text().replace('"sensors.speed", "to"', '"sensors.distance", "to"'))
-    assert main(["check", "--format", "json", "rover.json"]) == 1
+    assert main(["check", "--json", "rover.json"]) == 1
     printed = json.loads(capsys.readouterr().out)
     for diagnostic in printed["diagnostics"]:
         del diagnostic["rendered"]
