@@ -203,7 +203,7 @@ def compare_bits() -> None:
     headline("6. compare: every output, state and health of every tick, bit for bit")
     digests = {}
     for name in ("in_process", "own_process", "serial_line", "ros"):
-        digests[name] = run(sys.executable, "-m", "simclient.bag", "digest", OUT / name, quiet=True).split()[0]
+        digests[name] = run("fcsl", "bag", "digest", OUT / name, quiet=True).split()[0]
         say(f"  {digests[name]}")
     if len(set(digests.values())) != 1:
         raise DemoError(f"the flights differ: {digests}")
@@ -212,9 +212,9 @@ def compare_bits() -> None:
 
 def replay_and_look() -> None:
     headline("7. replay the ROS flight into AlgTwin, and look at it")
-    run(sys.executable, "-m", "simclient.replay", OUT / "ros", "--config", CONFIG)
-    run(sys.executable, "-m", "simclient.to_rerun", OUT / "in_process", "-o", OUT / "lander.rrd")
-    run(sys.executable, "-m", "simclient.plot", OUT / "in_process", "-o", OUT / "lander.png")
+    run("fcsl", "replay", OUT / "ros", "--config", CONFIG)
+    run("fcsl", "rerun", OUT / "in_process", "-o", OUT / "lander.rrd")
+    run("fcsl", "plot", OUT / "in_process", "-o", OUT / "lander.png")
 
 
 def real_robot() -> bool:
@@ -227,14 +227,14 @@ def real_robot() -> bool:
         return False
     bag, config = OUT / "ahrs", "examples/ahrs/ahrs.json"
     map_file = "examples/ahrs/map.yaml"
-    run(sys.executable, "-m", "simclient.replay", JACKAL, "--config", config, "--map", map_file, "-o", bag)
-    run(sys.executable, "-m", "simclient.replay", bag, "--config", config)
+    run("fcsl", "replay", JACKAL, "--config", config, "--map", map_file, "-o", bag)
+    run("fcsl", "replay", bag, "--config", config)
     tilt = float(bags.columns(bags.Bag(bag), "comparison.outputs.tilt_error_rms")[1][-1])
     say(f"  tilt against the orientation that the robot recorded: {math.degrees(tilt):.2f}° RMS")
     if tilt > math.radians(1.0):
         raise DemoError("the filter disagrees with the robot's own orientation")
-    run(sys.executable, "-m", "simclient.plot", bag, "-o", OUT / "ahrs.png")
-    run(sys.executable, "-m", "simclient.to_rerun", bag, "-o", OUT / "ahrs.rrd")
+    run("fcsl", "plot", bag, "-o", OUT / "ahrs.png")
+    run("fcsl", "rerun", bag, "-o", OUT / "ahrs.rrd")
     return True
 
 

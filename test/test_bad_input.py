@@ -15,7 +15,7 @@ import pytest
 ROOT = Path(__file__).resolve().parent.parent
 LANDER = ROOT / "examples" / "lander"
 CONFIG = LANDER / "fc" / "lander_control.json"
-REPLAY = [sys.executable, "-m", "simclient.replay"]
+REPLAY = ["fcsl", "replay"]
 
 
 def refused(line: list[str | Path], folder: Path, *says: str) -> str:

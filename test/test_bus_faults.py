@@ -46,7 +46,7 @@ class Flight:
         ours = mode.replace("-peer", "")
         line = ["fcsl-sim", "run", SIM, "--duration", length_s, "--speed", speed, "--external", f"{ours}{place}"]
         self.simulator = subprocess.Popen([*line, "--timeout", "60"], stdout=subprocess.DEVNULL, stderr=subprocess.PIPE)
-        line = ["fcsl-fc", library, "--hal", f"{mode}{place}", "--timeout-ms", "60000", "--record", self.bag]
+        line = ["fcsl-fc", library, "--hal", f"{mode}{place}", "--timeout", "60", "--record", self.bag]
         self.summary = folder / "summary.json"
         self.controller = subprocess.Popen(
             [*map(str, line), "--summary", self.summary], stdout=subprocess.PIPE, stderr=subprocess.PIPE

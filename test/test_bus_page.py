@@ -26,7 +26,7 @@ def test_the_plant_of_the_page_flies_the_lander(tmp_path: Path) -> None:
     place = free_endpoint()
     line = [sys.executable, PLANT, place]
     with subprocess.Popen(line, stdout=subprocess.PIPE, text=True) as plant:
-        options = ["--hal", f"zenoh:{place}", "--timeout-ms", "30000", "--record", bag]
+        options = ["--hal", f"zenoh:{place}", "--timeout", "30", "--record", bag]
         flown = subprocess.run(
             ["fcsl-fc", library, *options], capture_output=True, text=True, timeout=LONG_S, check=False
         )

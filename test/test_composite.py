@@ -68,7 +68,7 @@ def simulated(wire: str, *options: str) -> AbstractContextManager[subprocess.Pop
 
 
 def flown(hal: str, *options: str | Path) -> AbstractContextManager[subprocess.Popen[str]]:
-    line = [FC, LIBRARY, "--machine", "lander_control", "--hal", hal, "--timeout-ms", str(LONG_S * 1000), *options]
+    line = [FC, LIBRARY, "--machine", "lander_control", "--hal", hal, "--timeout", str(LONG_S), *options]
     return running(line)
 
 

@@ -380,7 +380,7 @@ def test_one_side_in_lock_step_is_told(free: str, folder: Path, programs: contex
     bound = ({*lines} - {free}).pop()
     lines[bound] = [str(word).removesuffix(",free-running") for word in lines[bound]]
     if bound == "fcsl-fc":
-        lines[bound] += ["--timeout-ms", "30000"]
+        lines[bound] += ["--timeout", "30"]
     started = {name: start(programs, *line) for name, line in lines.items()}
     assert started[bound].ends() in (1, 2)
     assert any("free" in line and "write ,free-running behind" in line for line in started[bound].said)

@@ -11,7 +11,7 @@ from pathlib import Path
 import pytest
 
 sys.path.insert(0, str(Path(__file__).parents[1] / "scripts"))
-from verify.mutation.mutants import Equivalent, Mutant, draw, is_equivalent, with_switches
+from verify.mutation.mutants import Candidate, Equivalent, Mutant, draw, is_equivalent, with_switches
 from verify.mutation.python_points import points
 
 FILE = "some.py"
@@ -64,9 +64,9 @@ def test_every_mutant_is_what_it_says(monkeypatch: pytest.MonkeyPatch) -> None:
 
 
 def test_drawn_mutants_are_switched_one_by_one(monkeypatch: pytest.MonkeyPatch) -> None:
-    chosen = draw(points(SOURCE), 4, "1", lambda _: True)
-    assert chosen == draw(points(SOURCE), 4, "1", lambda _: True) and len(chosen) == 4
-    mutants = [Mutant(n, FILE, point) for n, point in enumerate(chosen, 1)]
+    candidates = [Candidate(FILE, point) for point in points(SOURCE)]
+    mutants = draw(candidates, 4, 1, lambda _: True)
+    assert mutants == draw(candidates, 4, 1, lambda _: True) and [m.number for m in mutants] == [1, 2, 3, 4]
     assert total_of(mutants, 0, monkeypatch) == (6, [1, 3, 4])
     for m in mutants:
         alone = total_of([Mutant(1, FILE, m.point)], 1, monkeypatch)

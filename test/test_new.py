@@ -70,7 +70,7 @@ def test_a_plant(tmp_path: Path) -> None:
     )
     checked = run("fcsl-sim", "check", "mass.sim.json", cwd=craft)
     assert checked == "mass.sim.json: ok: `craft` and plant for at most 20 s\n"
-    schema = json.loads(run("fcsl-sim", "schema", cwd=craft))
+    schema = json.loads(run("fcsl", "schema", "simulation", cwd=craft))
     jsonschema.validate(json.loads((craft / "mass.sim.json").read_text()), schema)
     assert "2 passed" in pytest_in(craft, "test/test_mass_plant.py")
     run("ruff", "check", "--select", "E,F,I", "--line-length", "120", "test", cwd=craft)

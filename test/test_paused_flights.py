@@ -43,7 +43,7 @@ def flight(library: Path, tmp_path: Path) -> Iterator[tuple[VarClient, VarClient
     place = f"zenoh:{free_endpoint()}"
     lines = (
         ["fcsl-sim", "run", SIM, "--duration", LENGTH_S, "--external", place, "--paused"],
-        ["fcsl-fc", library, "--hal", place, "--timeout-ms", "2000", "--record", tmp_path / "bag"],
+        ["fcsl-fc", library, "--hal", place, "--timeout", "2", "--record", tmp_path / "bag"],
     )
     with contextlib.ExitStack() as opened:
         found = []

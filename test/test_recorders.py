@@ -29,7 +29,6 @@ from simclient.replay import replay
 ROOT = Path(__file__).resolve().parent.parent
 SIM = ROOT / "examples/lander/sim/lander.sim.json"
 LANDER = ROOT / "examples/lander/fc/lander_control.json"
-BUS = ROOT / "fcsl_runtime/simclient/bin/fcsl-bus"
 LONG_S = 120
 #: Some seconds of the slowest recorder: several chunks, which are a second old at most.
 TICKS = 400
@@ -94,7 +93,7 @@ def bystander(bag: Path, library: Path, speed: int, limit: Callable[[], None]) -
     where, socket = free_endpoint(), bag.with_suffix(".socket")
     # Nothing waits for an observer: one that gets no processor time shall not miss most of a flight.
     simulator = ["fcsl-sim", "run", SIM, "--speed", min(speed, 4), "--observers", where, "--socket", socket, "--paused"]
-    with process(simulator), process([sys.executable, "-B", BUS, "record", "-c", where, "-o", bag], limit) as recorder:
+    with process(simulator), process(["fcsl", "bus", "record", "-c", where, "-o", bag], limit) as recorder:
         assert recorder.stdout and recorder.stdout.readline().startswith("recording ")
         with VarClient(socket) as client:
             client.resume()
@@ -102,7 +101,7 @@ def bystander(bag: Path, library: Path, speed: int, limit: Callable[[], None]) -
 
 
 RECORDERS: dict[str, Recorder] = {
-    "fcsl-fc": flight_program, "client of fcsl-fc": client, "fcsl-sim": simulator, "AlgTwin": twin, "fcsl-bus": bystander
+    "fcsl-fc": flight_program, "client of fcsl-fc": client, "fcsl-sim": simulator, "AlgTwin": twin, "fcsl bus": bystander
 }  # fmt: skip
 
 

@@ -8,7 +8,6 @@ from __future__ import annotations
 
 import multiprocessing
 import subprocess
-import sys
 from collections.abc import Iterator
 from contextlib import contextmanager
 from pathlib import Path
@@ -26,7 +25,7 @@ def run(*line: str | Path) -> str:
 
 
 def digest(bag: Path) -> str:
-    return run(sys.executable, "-m", "simclient.bag", "digest", bag).split()[0]
+    return run("fcsl", "bag", "digest", bag).split()[0]
 
 
 def in_process(bag: Path, seed: int) -> str:
@@ -100,4 +99,4 @@ def test_both_bags_replay(tmp_path: Path, library: Path) -> None:
     in_process(tmp_path / "one", 5)
     as_process(tmp_path / "two", 5, library, tmp_path)
     for bag in ("one", "two"):
-        assert "identical" in run(sys.executable, "-m", "simclient.replay", tmp_path / bag, "--library", library)
+        assert "identical" in run("fcsl", "replay", tmp_path / bag, "--library", library)

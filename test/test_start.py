@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""What users wait for at once imports only what it needs: help, errors of usage, fcsl-var, `import simclient`."""
+"""What users wait for at once imports only what it needs: help, errors of usage, fcsl var, `import simclient`."""
 
 from __future__ import annotations
 

@@ -38,7 +38,7 @@ def port(tmp_path_factory: pytest.TempPathFactory) -> Iterator[str]:
     folder = tmp_path_factory.mktemp("supervisor")
     for command in before:
         subprocess.run(["bash", "-c", command], cwd=folder, check=True)
-    given = [*shlex.split(program), "--port", "0"]
+    given = [*shlex.split(program), "--listen", "tcp:127.0.0.1:0"]
     with subprocess.Popen(given, cwd=folder, stdout=subprocess.PIPE, text=True) as process:
         assert process.stdout is not None
         said = process.stdout.readline()

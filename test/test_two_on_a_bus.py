@@ -22,7 +22,7 @@ class Pair:
     def __init__(self, role: str, place: str, sim: Path, library: Path, bag: Path, length_s: str, speed: str):
         self.bag = bag
         line = ["fcsl-fc", str(library), "--hal", f"zenoh:{place}", "--record", str(bag)]
-        self.fc_line = [*line, "--timeout-ms", "180000"]
+        self.fc_line = [*line, "--timeout", "180"]
         self.sim_line = ["fcsl-sim", "run", str(sim), "--external", f"{role}:{place}", "--speed", speed]
         self.sim_line += ["--duration", length_s]
 

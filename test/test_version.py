@@ -4,7 +4,6 @@
 from __future__ import annotations
 
 import subprocess
-import sys
 from collections.abc import Sequence
 from pathlib import Path
 from xml.etree import ElementTree
@@ -15,18 +14,22 @@ from fcsl_compiler.base.packages import package_prefix
 
 ROOT = Path(__file__).resolve().parents[1]
 PROGRAMS = {
+    "fcsl": "fcsl_compiler",
     "fcslc": "fcsl_compiler",
     "fcsl-sim": "fcsl_sim",
     "fcsl-fc": "fcsl_runtime/fcsl_runtime",
     "fcsl-guard": "fcsl_runtime/fcsl_runtime",
-    "fcsl-bus": "fcsl_runtime/simclient",
-    "fcsl-hal": "fcsl_runtime/simclient",
-    "fcsl-var": "fcsl_runtime/simclient",
-    "fcsl-link": "fcsl_runtime/simclient",
-    "fcsl-view": "fcsl_runtime/simclient",
-    "fcsl-supervisor": "fcsl_runtime/simclient",
+    "fcsl bus": "fcsl_runtime/simclient",
+    "fcsl hal": "fcsl_runtime/simclient",
+    "fcsl var": "fcsl_runtime/simclient",
+    "fcsl link": "fcsl_runtime/simclient",
+    "fcsl view": "fcsl_runtime/simclient",
+    "fcsl supervisor": "fcsl_runtime/simclient",
+    "fcsl rerun": "fcsl_runtime/simclient",
+    "fcsl replay": "fcsl_runtime/simclient",
+    "fcsl plot": "fcsl_runtime/simclient",
+    "fcsl bag": "fcsl_runtime/simclient",
 }
-MODULES = ("bag", "plot", "replay", "to_rerun")
 NODES = ("controller_node", "diagnostics_node", "rerun_node", "sim_node", "topic_count")
 
 
@@ -38,12 +41,7 @@ def check(command: Sequence[str | Path], name: str, package: str) -> None:
 
 @pytest.mark.parametrize("program", PROGRAMS)
 def test_programs(program: str) -> None:
-    check([program], program, PROGRAMS[program])
-
-
-@pytest.mark.parametrize("module", MODULES)
-def test_modules(module: str) -> None:
-    check([sys.executable, "-m", f"simclient.{module}"], f"simclient.{module}", "fcsl_runtime/simclient")
+    check(program.split(), program, PROGRAMS[program])
 
 
 @pytest.mark.parametrize("node", NODES)

@@ -13,7 +13,6 @@ import selectors
 import shutil
 import socket
 import subprocess
-import sys
 import threading
 import time
 from collections.abc import Iterator
@@ -38,7 +37,7 @@ def run(*line: str | Path, statuses: tuple[int, ...] = (0,)) -> str:
 
 
 def digest(bag: Path) -> str:
-    return run(sys.executable, "-m", "simclient.bag", "digest", bag).split()[0]
+    return run("fcsl", "bag", "digest", bag).split()[0]
 
 
 @pytest.fixture(scope="module")
@@ -59,7 +58,7 @@ def fly(ours: str, theirs: str, library: Path, bag: Path, *options: str | Path, 
     """The digest of the flight; the two programs may start in either order."""
     line = ["fcsl-sim", "run", str(sim), "--duration", LENGTH_S, "--external", ours]
     with subprocess.Popen(line, stdout=subprocess.DEVNULL, stderr=subprocess.PIPE, text=True) as simulator:
-        line = ["--hal", theirs, "--timeout-ms", "60000", "--summary", str(bag.with_suffix(".json"))]
+        line = ["--hal", theirs, "--timeout", "60", "--summary", str(bag.with_suffix(".json"))]
         run("fcsl-fc", library, *line, "--record", bag, *options)
         _, err = simulator.communicate(timeout=60)
     assert simulator.returncode in (0, 1), err  # 1: `until` did not hold in so short a flight
@@ -257,7 +256,7 @@ def test_a_serial_line_that_never_stops(library: Path, tmp_path: Path) -> None:
     begun = time.monotonic()
     hal = f"wire:uart:{os.ttyname(slave)}:115200"
     done = subprocess.run(
-        ["fcsl-fc", str(library), "--hal", hal, "--timeout-ms", "500"], capture_output=True, text=True, check=False
+        ["fcsl-fc", str(library), "--hal", hal, "--timeout", "0.5"], capture_output=True, text=True, check=False
     )
     stop.set()
     thread.join()
@@ -317,7 +316,7 @@ def test_hil_over_the_simulated_line(library: Path, tmp_path: Path) -> None:
     with subprocess.Popen(
         ["fcsl-sim", "run", str(SERIAL), "--external", f"wire:{wire}"], stdout=subprocess.DEVNULL
     ) as simulator:
-        run("fcsl-fc", library, "--hal", f"wire:{wire}", "--timeout-ms", "60000", "--record", tmp_path / "own")
+        run("fcsl-fc", library, "--hal", f"wire:{wire}", "--timeout", "60", "--record", tmp_path / "own")
         assert simulator.wait(60) == 0
     run("fcsl-sim", "run", SIM, "--record", tmp_path / "direct")
     assert digest(tmp_path / "own") == digest(tmp_path / "direct")

@@ -20,7 +20,7 @@ WHEEL_ONLY = re.compile(r"\.venv\b|site-packages|/opt/python|ros_wheels")
 #: These files set up or explain the environment; fcslc finds its own package in colcon's install layout.
 MAY_NAME_WHEELS = re.compile(
     r"^(scripts/|docs/|Makefile$|\.gitignore$|\.ci/|README\.md$|CONTRIBUTING\.md$|test/test_workspace\.py$"
-    r"|fcsl_compiler/bin/fcslc$)"
+    r"|fcsl_compiler/bin/fcslc?$)"
 )
 #: Keys that rosdep resolves to Debian packages on Ubuntu 24.04 with Jazzy, without pip. Before you add one, look it up with
 #: `rosdep resolve --os=ubuntu:noble --rosdistro jazzy KEY`.

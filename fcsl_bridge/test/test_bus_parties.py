@@ -60,7 +60,7 @@ def start(domain: Domain, party: str, speed: float = 0.0) -> Process:
         options = ["--seed", str(SEED), "--duration", DURATION, "--external", place, "--timeout", "60"]
         return domain.run(["fcsl-sim", "run", SIM, *options, *(["--speed", str(speed)] if speed else [])])
     library = build_machine(CONFIG).library
-    return domain.run(["fcsl-fc", library, "--hal", place, "--timeout-ms", "60000", "--record", bag])
+    return domain.run(["fcsl-fc", library, "--hal", place, "--timeout", "60", "--record", bag])
 
 
 @pytest.mark.parametrize("number", range(RUNS))

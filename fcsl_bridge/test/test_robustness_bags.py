@@ -8,7 +8,6 @@ import random
 import shutil
 import signal
 import subprocess
-import sys
 import time
 from collections.abc import Sequence
 from pathlib import Path
@@ -38,7 +37,7 @@ def library(tmp_path_factory: pytest.TempPathFactory) -> Path:
 
 def tool(*arguments: str | Path) -> subprocess.CompletedProcess[str]:
     return subprocess.run(
-        [sys.executable, "-m", *map(str, arguments)], capture_output=True, text=True, env=os.environ, timeout=LIMIT_S
+        ["fcsl", *map(str, arguments)], capture_output=True, text=True, env=os.environ, timeout=LIMIT_S
     )
 
 
@@ -60,10 +59,10 @@ def check_what_is_left(bag: Path, library: Path) -> int:
 
 def check_tools(bag: Path, library: Path) -> None:
     """The command-line tools report what is missing, and cut a complete bag from the rest."""
-    info = tool("simclient.bag", "info", bag)
+    info = tool("bag", "info", bag)
     assert "was not closed after" in info.stdout and "the bag is incomplete" in info.stderr
     rest = bag.with_name("rest")
-    assert "replays" in tool("simclient.bag", "cut", bag, "-o", rest).stdout
+    assert "replays" in tool("bag", "cut", bag, "-o", rest).stdout
     assert not Bag(rest).truncated and messages_for_rosbags(rest) == messages_for_rosbags(bag)
     assert replay(rest, library=str(library)).divergence is None
 

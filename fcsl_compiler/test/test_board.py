@@ -244,11 +244,11 @@ def test_command_shows_warnings(folder: Path, capsys: pytest.CaptureFixture[str]
 
 def test_command_as_document(folder: Path, capsys: pytest.CaptureFixture[str]) -> None:
     path = write_board(folder, BOARD)
-    assert main(["board", str(path), "--format", "json"]) == 0
+    assert main(["board", str(path), "--json"]) == 0
     document = json.loads(capsys.readouterr().out)
     assert document["ok"] and document["machines"][0]["output"] == str(folder / "board.plan")
     path.write_text("{")
-    assert main(["board", str(path), "--format", "json"]) == 1
+    assert main(["board", str(path), "--json"]) == 1
     assert [d["code"] for d in json.loads(capsys.readouterr().out)["diagnostics"]] == ["E101"]
 
 
@@ -256,7 +256,7 @@ def test_command_keeps_the_board(folder: Path, capsys: pytest.CaptureFixture[str
     path = write_board(folder, BOARD)
     assert main(["board", str(path), "-o", str(path)]) == 2
     assert "would replace" in capsys.readouterr().err and json.loads(path.read_text()) == BOARD
-    assert main(["board", str(folder / "none.json")]) == 1
+    assert main(["board", str(folder / "none.json")]) == 2
     assert main(["board", str(folder)]) == 1
     assert "E100" in capsys.readouterr().err
 

@@ -60,7 +60,7 @@ def accepted(folder: Path, board: Any) -> bool:
 
 def test_it_is_a_schema_and_printed(capsys: pytest.CaptureFixture[str]) -> None:
     jsonschema.Draft202012Validator.check_schema(TEXT)
-    assert main(["schema", "--board"]) == 0 and capsys.readouterr().out == board_schema()
+    assert main(["schema", "board"]) == 0 and capsys.readouterr().out == board_schema()
 
 
 def test_the_board_with_every_key_is_good(folder: Path) -> None:

@@ -161,20 +161,18 @@ def test_explain(capsys: pytest.CaptureFixture[str]) -> None:
     assert out.startswith("E402: ") and "Wrong:" in out and "self.mode is i32" in out and "self.force is f64 N" in out
     assert main(["explain"]) == 0
     out = capsys.readouterr().out
-    assert out == overview(CODES) and len(out.splitlines()) == len(CODES)
+    assert set(overview(CODES).splitlines()) < set(out.splitlines()) and "\nE804  " in out  # those of simulations too
     assert main(["explain", "e402", "W201"]) == 0
     assert "W201: " in capsys.readouterr().out
 
 
-@pytest.mark.parametrize("word", ["E4O2", "E999", "E804", "402", "", "x" * 1000])
+@pytest.mark.parametrize("word", ["E4O2", "E999", "402", "", "x" * 1000])
 def test_explain_an_unknown_code(word: str, capsys: pytest.CaptureFixture[str]) -> None:
     assert main(["explain", word]) == 2
     captured = capsys.readouterr()
     assert captured.out == "" and "there is no diagnostic" in captured.err
     if word == "E4O2":
         assert "`E402`" in captured.err
-    if word == "E804":
-        assert "`fcsl-sim explain E804`" in captured.err
 
 
 def page() -> str:
@@ -207,9 +205,7 @@ def page() -> str:
             parts.append(f"{word} ({row.kind.value}):" if word == "Wrong" else f"{word}:")
             parts.append(f"```{language}\n{text}\n```")
     parts.append("## For editors and other programs")
-    parts.append(
-        "`fcslc check` and `fcslc build` print the same as one document on stdout with `--format json` or `sarif`."
-    )
+    parts.append("`fcslc check` and `fcslc build` print the same as one document on stdout with `--json` or `--sarif`.")
     parts.append((report.__doc__ or "").split("\n\n", 1)[1].strip("\n"))
     return "\n\n".join(parts) + "\n"
 

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""`--format json|sarif`: one document on stdout with a stable schema for editors and other programs."""
+"""`--json`, `--sarif`: one document on stdout with a stable schema for editors and other programs."""
 
 import json
 import re
@@ -145,7 +145,7 @@ def folder(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
 
 
 def report(capsys: pytest.CaptureFixture[str], form: str, *arguments: str) -> tuple[int, Any]:
-    status = main([*arguments, "--format", form])
+    status = main([*arguments, f"--{form}"])
     captured = capsys.readouterr()
     document = json.loads(captured.out)
     Draft202012Validator.check_schema(SCHEMAS[form])
@@ -230,7 +230,7 @@ def test_a_failure_of_the_tool_is_in_the_document(
 
 
 def test_dumps_are_text(folder: Path, capsys: pytest.CaptureFixture[str]) -> None:
-    assert main(["build", "good/craft.json", "--dump", "verify", "--format", "json"]) == 2
+    assert main(["build", "good/craft.json", "--dump", "verify", "--json"]) == 2
     assert "--dump" in capsys.readouterr().err
 
 

@@ -17,7 +17,8 @@ from fcsl_compiler.base.diagnostics import DiagnosticError
 from fcsl_compiler.base.packages import package_share
 from fcsl_compiler.base.source import MAX_NAME
 from fcsl_compiler.cli.main import main
-from fcsl_compiler.cli.scaffold import SCHEMA, algorithm_files, machine_files
+from fcsl_compiler.cli.scaffold import algorithm_files, machine_files
+from fcsl_compiler.cli.verbs import MACHINE_SCHEMA
 from fcsl_compiler.config import views
 from fcsl_compiler.config.arming import MAX_TIMEOUT_S
 from fcsl_compiler.config.machine import MAX_TICK_HZ, RESERVED_INSTANCES
@@ -31,7 +32,7 @@ MACHINES = [
     *(p for p in sorted((ROOT / "examples").rglob("*.json")) if "states" in json.loads(p.read_text())),
     ROOT / "fcsl_compiler/test/golden/small.json",
 ]
-TEXT = json.loads(SCHEMA.read_text())
+TEXT = json.loads(MACHINE_SCHEMA.read_text())
 VALIDATOR = jsonschema.Draft202012Validator(TEXT)
 
 SENSOR = """class Sensor:
@@ -182,8 +183,8 @@ def accepted(folder: Path, config: Any) -> bool:
 
 def test_it_is_a_schema_and_installed(capsys: pytest.CaptureFixture[str]) -> None:
     jsonschema.Draft202012Validator.check_schema(TEXT)
-    assert (package_share("fcsl_compiler") / "machine.schema.json").read_text() == SCHEMA.read_text()
-    assert main(["schema"]) == 0 and capsys.readouterr().out == SCHEMA.read_text()
+    assert (package_share("fcsl_compiler") / "machine.schema.json").read_text() == MACHINE_SCHEMA.read_text()
+    assert main(["schema"]) == 0 and capsys.readouterr().out == MACHINE_SCHEMA.read_text()
 
 
 @pytest.mark.parametrize("path", MACHINES, ids=lambda p: p.stem)
@@ -198,7 +199,7 @@ def test_what_fcslc_new_writes_validates() -> None:
         assert len(machines) == 1
         VALIDATOR.validate(machines[0])
     schema = next(t for p, t in machine_files("craft", False).items() if p.name == "machine.schema.json")
-    assert schema == SCHEMA.read_text()
+    assert schema == MACHINE_SCHEMA.read_text()
 
 
 def test_the_rich_machine_is_good(folder: Path) -> None:

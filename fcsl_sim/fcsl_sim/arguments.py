@@ -10,16 +10,29 @@ from fractions import Fraction
 from math import isfinite, isnan
 from pathlib import Path
 
-from fcsl_compiler.api.command_line import add_version
+from fcsl_compiler.api.command_line import add_examples, add_version, subcommands
 
 from .external import TIMEOUT_MS
 
+_EXAMPLES = {
+    "": "run craft.sim.json --record flight",
+    "check": "craft.sim.json --set altimeter.parameters.sigma=0.8",
+    "run": "craft.sim.json --record flight --seed 7",
+    "plot": "craft.sim.json -o craft.png",
+    "campaign": "craft.study.json --cases 200",
+    "trim": "hover.trim.json -o hover.sim.json",
+    "linearise": "craft.sim.json --input engine.inputs.throttle --measure body.outputs.height -o craft.json",
+    "response": "craft.sim.json --input controller.throttle --measure body.outputs.height --plot response.png",
+    "list-models": "models --json",
+    "describe": "noisy_sensor",
+}
 _CONFIG = "*.sim.json, or package://PACKAGE/PATH below its share folder"
 
 
-def parse(arguments: Sequence[str] | None) -> argparse.Namespace:
-    """The options; `command` names the command. Wrong ones end the program with status 2."""
-    parser = _parser()
+def parse(arguments: Sequence[str] | None, program: str = "") -> argparse.Namespace:
+    """The options; `command` names the command. Wrong ones end the program with status 2. `program` is what help calls the
+    command, if not fcsl-sim COMMAND."""
+    parser = _parser(program)
     options, rest = parser.parse_known_args(arguments)
     if options.command == "plot":  # argparse takes paths behind an option for unknown ones
         options.paths += [text for text in rest if not text.startswith("-")]
@@ -29,7 +42,12 @@ def parse(arguments: Sequence[str] | None) -> argparse.Namespace:
     return options
 
 
-def _parser() -> argparse.ArgumentParser:
+def command_parser(name: str, program: str) -> argparse.ArgumentParser:
+    """That of one command."""
+    return subcommands(_parser(program))[name]
+
+
+def _parser(program: str) -> argparse.ArgumentParser:
     parser = argparse.ArgumentParser(prog="fcsl-sim", description="Flies a compiled machine against plant models.")
     add_version(parser, "fcsl_sim", __file__)
     commands = parser.add_subparsers(dest="command", required=True)
@@ -46,10 +64,10 @@ def _parser() -> argparse.ArgumentParser:
     _add_linearise(_add(commands, "linearise", "print and write the linear equations of a plant around a point"))
     _add_response(_add(commands, "response", "measure the frequency response of the loop with the compiled controller"))
     _add_model_commands(commands)
-    schema = _add(commands, "schema", "print the JSON Schema of a simulation or a study, for editors")
-    schema.add_argument("--study", action="store_true", help="that of a study")
-    why = _add(commands, "explain", "explain a diagnostic code of simulations, with an example")
-    why.add_argument("code", nargs="*", help="such as E804; none: list all")
+    if program:
+        for command in commands.choices.values():
+            command.prog = program
+    add_examples(parser, _EXAMPLES)
     return parser
 
 
@@ -61,9 +79,9 @@ def _add(
 
 def _add_flight(command: argparse.ArgumentParser) -> None:
     """What replaces members of the simulation file."""
-    command.add_argument("--seed", type=_seed, help="random seed; replaces the file's")
+    command.add_argument("--seed", type=_seed, metavar="N", help="random seed; replaces the file's")
     command.add_argument(
-        "--duration", type=_seconds, metavar="S", help="longest simulated time in s; replaces the file's"
+        "--duration", type=_seconds, metavar="SECONDS", help="longest simulated time in s; replaces the file's"
     )
     help_set = "sets a model parameter, or an element of one: altimeter.parameters.sigma=0.8 (repeatable)"
     command.add_argument("--set", action="append", default=[], metavar="PATH=VALUE", dest="sets", help=help_set)
@@ -74,7 +92,10 @@ def _add_flight(command: argparse.ArgumentParser) -> None:
 def _add_run(command: argparse.ArgumentParser) -> None:
     command.add_argument("--record", type=Path, metavar="BAG", help="new directory for the bag")
     command.add_argument(
-        "--namespace", default="", help="ROS namespace of the bag's topics, and of the keys on the bus"
+        "--namespace",
+        metavar="NAMESPACE",
+        default="",
+        help="ROS namespace of the bag's topics, and of the keys on the bus",
     )
     command.add_argument(
         "--external",
@@ -87,7 +108,7 @@ def _add_run(command: argparse.ArgumentParser) -> None:
     help_speed = "limit on simulated seconds per second: 1 for real time; 0 (default): as fast as possible"
     command.add_argument("--speed", type=_speed, default=0.0, metavar="FACTOR", help=help_speed)
     help_timeout = f"seconds to wait for the external controller (default {TIMEOUT_MS // 1000})"
-    command.add_argument("--timeout", type=_seconds, metavar="S", help=help_timeout)
+    command.add_argument("--timeout", type=_seconds, metavar="SECONDS", help=help_timeout)
     command.add_argument("--restore", type=Path, metavar="FILE", help="go on from this checkpoint of the simulation")
     help_save = "write a checkpoint at the end (docs/guide/recording.md), whose time --duration chooses"
     command.add_argument("--save", type=Path, metavar="FILE", help=help_save)
@@ -96,29 +117,33 @@ def _add_run(command: argparse.ArgumentParser) -> None:
 
 
 def _add_servers(command: argparse.ArgumentParser) -> None:
-    help_socket = "serve all variables (docs/reference/variables.md) on this Unix socket, or on tcp:HOST:PORT with --token"
+    help_socket = (
+        "serve all variables (docs/reference/variables.md) on this Unix socket, or on tcp:HOST:PORT with --token"
+    )
     command.add_argument("--socket", metavar="ADDRESS", help=help_socket)
     help_checkpoints = "folder of the checkpoint files that clients name"
     command.add_argument("--checkpoints", type=Path, metavar="DIR", help=help_checkpoints)
     command.add_argument("--token", type=Path, metavar="FILE", help="token file of a TCP server; created if absent")
     command.add_argument("--paused", action="store_true", help="start paused: only commands run ticks until `resume`")
-    help_telemetry = "send values as UDP (docs/guide/monitoring.md) to udp:HOST:PORT, or of every N-th tick to udp:HOST:PORT/N"
+    help_telemetry = (
+        "send values as UDP (docs/guide/monitoring.md) to udp:HOST:PORT, or of every N-th tick to udp:HOST:PORT/N"
+    )
     command.add_argument("--telemetry", metavar="ADDRESS", help=help_telemetry)
     help_fields = (
         "fields to send, as path globs separated by commas (default: inputs, outputs, state, health, counters)"
     )
     command.add_argument("--telemetry-fields", metavar="GLOBS", help=help_fields)
-    help_observers = "put the values of all channels on a bus of their own (docs/reference/transports.md), which listens there"
-    command.add_argument("--observers", metavar="tcp/HOST:PORT", help=help_observers)
-    help_ros = (
-        "publish the machine's ROS 2 topics and /clock through a bridge (docs/reference/transports.md), for which it listens there"
+    help_observers = (
+        "put the values of all channels on a bus of their own (docs/reference/transports.md), which listens there"
     )
+    command.add_argument("--observers", metavar="tcp/HOST:PORT", help=help_observers)
+    help_ros = "publish the machine's ROS 2 topics and /clock through a bridge (docs/reference/transports.md), for which it listens there"
     command.add_argument("--ros", metavar="tcp/HOST:PORT", help=help_ros)
 
 
 def _add_plot(command: argparse.ArgumentParser) -> None:
     command.add_argument("target", help="*.sim.json, which is run; or a bag: a directory or an .mcap file")
-    help_paths = "what to draw, a panel for each, as in python3 -m simclient.plot; none: the views of the run"
+    help_paths = "what to draw, a panel for each, as in fcsl plot; none: the views of the run"
     command.add_argument("paths", nargs="*", metavar="PATH", help=help_paths)
     help_output = "picture to write: .png, .svg or .pdf (default: the target's name with .png, here)"
     command.add_argument("-o", "--output", type=Path, metavar="FILE", help=help_output)
@@ -154,12 +179,12 @@ def _add_linearise(command: argparse.ArgumentParser) -> None:
     help_input = "an input of the plant: instance.inputs.name, or an element of it (repeatable)"
     command.add_argument("--input", action="append", default=[], metavar="PATH", dest="inputs", help=help_input)
     help_result = "an output of the plant: instance.outputs.name (repeatable)"
-    command.add_argument("--output", action="append", default=[], metavar="PATH", dest="outputs", help=help_result)
+    command.add_argument("--measure", action="append", default=[], metavar="PATH", dest="outputs", help=help_result)
     help_states = "keep the states that match, such as 'body.*'; the others are held (repeatable; default: all)"
     command.add_argument("--states", action="append", metavar="GLOB", help=help_states)
     help_at = "fly with the controller until then (s); default: the beginning"
-    command.add_argument("--at", type=_seconds, metavar="S", help=help_at)
-    command.add_argument("-o", type=Path, metavar="FILE", dest="output", help="write the matrices as JSON")
+    command.add_argument("--at", type=_seconds, metavar="SECONDS", help=help_at)
+    command.add_argument("-o", "--output", type=Path, metavar="FILE", help="write the matrices as JSON")
     command.add_argument("--json", action="store_true", help="print them as JSON")
 
 
@@ -173,8 +198,10 @@ def _add_response(command: argparse.ArgumentParser) -> None:
         "--input", action="append", default=[], metavar="PATH[=WEIGHT]", dest="inputs", help=help_input
     )
     help_result = "a value of a model or of the machine whose response is wanted (repeatable)"
-    command.add_argument("--output", action="append", default=[], metavar="PATH", dest="outputs", help=help_result)
-    command.add_argument("--at", type=_seconds, metavar="S", help="fly until then first (s); default: the beginning")
+    command.add_argument("--measure", action="append", default=[], metavar="PATH", dest="outputs", help=help_result)
+    command.add_argument(
+        "--at", type=_seconds, metavar="SECONDS", help="fly until then first (s); default: the beginning"
+    )
     help_from = "the lowest frequency (default: 1 rad/s)"
     command.add_argument("--from", type=_positive, default=1.0, metavar="RAD_S", dest="low", help=help_from)
     help_to = "the highest one (default: 0.9 of half of the ticks' frequency)"
@@ -184,7 +211,7 @@ def _add_response(command: argparse.ArgumentParser) -> None:
     command.add_argument("--amplitude", type=_positive, default=1e-3, metavar="A", help=help_amplitude)
     help_within = "two windows in a row agree if no amplitude changes by more than this part of it (default: 0.001)"
     command.add_argument("--within", type=_positive, default=1e-3, metavar="PART", help=help_within)
-    command.add_argument("-o", type=Path, metavar="FILE", dest="output", help="write the response as JSON")
+    command.add_argument("-o", "--output", type=Path, metavar="FILE", help="write the response as JSON")
     help_plot = "draw it: .png, .svg or .pdf"
     command.add_argument("--plot", type=Path, metavar="FILE", help=help_plot)
     command.add_argument("--json", action="store_true", help="print it as JSON, and nothing else")

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""The diagnostic codes that simulations add to the compiler's; `fcsl-sim explain E804` prints a row.
+"""The diagnostic codes that simulations add to the compiler's; `fcsl explain E804` prints a row.
 
 The vocabulary of a `*.sim.json` is that of a machine JSON with models in place of algorithms, and most of its
 diagnostics are the compiler's (E1xx, E2xx). The examples are members of the test simulation (test/conftest.py); the

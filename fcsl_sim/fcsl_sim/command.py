@@ -11,12 +11,10 @@ import sys
 from pathlib import Path
 from types import FrameType
 
-from fcsl_compiler.api.codes import UnknownCode, pages
 from fcsl_compiler.api.diagnostics import DiagnosticError
 from simclient.cli import missing_package
 
 from . import plot
-from .codes import SIM_CODES
 from .config import SERIAL_LINK, SimConfig, load
 from .errors import SimError
 from .external import FREE_RUNNING, TIMEOUT_MS
@@ -29,9 +27,6 @@ from .runner import Sender, Server, StateChange, Summary, Watcher, run
 EXIT_UNTIL_NOT_HELD = 1
 EXIT_BAD_INPUT = 2
 EXIT_INCOMPLETE_BAG = 1
-#: JSON Schemas of a simulation file and of a study.
-SCHEMA = Path(__file__).parent / "simulation.schema.json"
-STUDY_SCHEMA = Path(__file__).parent / "study.schema.json"
 #: How an address on the bus begins.
 _BUS = ("zenoh:", "zenoh-client:")
 
@@ -89,14 +84,6 @@ def _interrupted(options: argparse.Namespace, number: signal.Signals) -> int:
     return 128 + number
 
 
-def _explain(options: argparse.Namespace) -> int:
-    try:
-        print(pages(options.code, SIM_CODES, "fcslc explain"), end="")
-    except UnknownCode as error:
-        raise SimError(str(error)) from None
-    return 0
-
-
 def _load(options: argparse.Namespace) -> SimConfig:
     config = load(
         options.config, seed=options.seed, duration_s=options.duration, sets=options.sets, events=options.events
@@ -110,11 +97,6 @@ def _check(options: argparse.Namespace) -> int:
     config = _load(options)
     seconds = config.machine.time_ns(config.ticks) / 1e9
     print(f"{options.config}: ok: `{config.machine.name}` and {', '.join(config.tables)} for at most {seconds:g} s")
-    return 0
-
-
-def _schema(options: argparse.Namespace) -> int:
-    print((STUDY_SCHEMA if options.study else SCHEMA).read_text(encoding="utf-8"), end="")
     return 0
 
 
@@ -303,6 +285,4 @@ _COMMANDS = {
     "response": _response,
     "list-models": _list_models,
     "describe": _describe,
-    "schema": _schema,
-    "explain": _explain,
 }

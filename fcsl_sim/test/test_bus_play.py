@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""fcsl-bus play: a recorded flight's sensors, played to a flight computer, which answers as it did."""
+"""fcsl bus play: a recorded flight's sensors, played to a flight computer, which answers as it did."""
 
 from __future__ import annotations
 
@@ -24,7 +24,7 @@ from simclient.bus.cli import main
 from simclient.bus.free_port import free_endpoint
 from simclient.errors import BagError
 
-PLAY = [RECORD[0], "play"]
+PLAY = ["fcsl", "bus", "play"]
 TICKS = 1000
 #: Ticks beyond: what is still on its way to a bystander when the flight program ends may be lost.
 MORE_TICKS = 500
@@ -90,7 +90,7 @@ def bags(library: Path, tmp_path_factory: pytest.TempPathFactory) -> Path:
     """A flight in lock-step over the bus, from its first tick on: `bag` of a bystander, `own` of the flight program."""
     folder = tmp_path_factory.mktemp("flight")
     control, mirror, socket = free_endpoint(), free_endpoint(), folder / "socket"
-    line = [library, "--hal", f"zenoh:{control}", "--timeout-ms", "30000", "--observers", mirror, "--socket", socket]
+    line = [library, "--hal", f"zenoh:{control}", "--timeout", "30", "--observers", mirror, "--socket", socket]
     with contextlib.ExitStack() as opened:
         begin = lambda *words: opened.enter_context(started(*words))  # noqa: E731
         begin("fcsl-sim", "run", SIM, "--external", f"zenoh:{control}", "--speed", "10")
@@ -126,7 +126,7 @@ def playing(*arguments: str | Path) -> Iterator[tuple[subprocess.Popen[str], str
 
 
 def flown(library: Path, endpoint: str, *options: str) -> list[str | Path]:
-    return ["fcsl-fc", library, "--hal", f"zenoh:{endpoint}", "--timeout-ms", "30000", *options]
+    return ["fcsl-fc", library, "--hal", f"zenoh:{endpoint}", "--timeout", "30", *options]
 
 
 def ended(process: subprocess.Popen[str], status: int = 0) -> tuple[str, str]:

@@ -5,10 +5,8 @@ from __future__ import annotations
 
 import contextlib
 import os
-import shutil
 import signal
 import subprocess
-import sys
 import time
 from collections.abc import Callable, Iterator
 from pathlib import Path
@@ -20,7 +18,7 @@ from simclient import VarClient
 from simclient.bus.free_port import free_endpoint
 from simclient.replay import replay
 
-RECORD = [shutil.which("fcsl-bus") or "fcsl-bus", "record"]
+RECORD = ["fcsl", "bus", "record"]
 
 
 class Flight:
@@ -30,7 +28,7 @@ class Flight:
         self._opened = opened
         self.mirror, self.socket = free_endpoint(), folder / "socket"
         control = free_endpoint()
-        options = ["--hal", f"zenoh:{control}", "--timeout-ms", "30000", "--observers", self.mirror]
+        options = ["--hal", f"zenoh:{control}", "--timeout", "30", "--observers", self.mirror]
         line = [library, *options, "--socket", self.socket, "--record", folder / "own"]
         self.begin("fcsl-sim", "run", SIM, "--external", f"zenoh:{control}", "--speed", str(speed))
         self.fc = self.begin("fcsl-fc", *line)
@@ -107,7 +105,7 @@ def test_what_a_bystander_recorded_replays_bit_for_bit(flight: Flight, library: 
     # A busy machine drops values of ticks, which are not compared; the replay needs none of them.
     assert found.values > 50 and all("throttle` has" in text for text in found.missing), str(found)
     assert replay(tmp_path / "own", library=str(library)).identical
-    info = run(sys.executable, "-m", "simclient.bag", "info", tmp_path / "bag")
+    info = run("fcsl", "bag", "info", tmp_path / "bag")
     assert f"replays from the checkpoint before tick {first}" in info
     for kind in ("2 SET", "1 SET_STATE", "1 FAULT", "1 HEALTH", "1 RESTORE", " CHANNEL"):
         assert kind in info, info
@@ -138,11 +136,9 @@ def test_a_recorder_that_was_frozen_says_what_it_lacks(flight: Flight, library: 
     complete(flight.fc)
     assert "lander_control: does not reproduce the run: host writes" in said.splitlines()[-1]
     refused = subprocess.run(
-        [sys.executable, "-m", "simclient.replay", tmp_path / "bag", "--library", library],
+        ["fcsl", "replay", tmp_path / "bag", "--library", library],
         capture_output=True, text=True, timeout=LONG_S, check=False,
     )  # fmt: skip
     assert refused.returncode == 2 and len(refused.stderr.splitlines()) == 1
     assert "it does not reproduce the run of `lander_control`: host writes" in refused.stderr
-    assert "record     does not reproduce the run: host writes" in run(
-        sys.executable, "-m", "simclient.bag", "info", tmp_path / "bag"
-    )
+    assert "record     does not reproduce the run: host writes" in run("fcsl", "bag", "info", tmp_path / "bag")

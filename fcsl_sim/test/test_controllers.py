@@ -5,7 +5,6 @@ from __future__ import annotations
 
 import json
 import subprocess
-import sys
 import zlib
 from collections.abc import Callable
 from pathlib import Path
@@ -172,7 +171,7 @@ def test_another_vehicle_beside_it_changes_no_bit(integrator: dict[str, Any], hz
 
 
 def replay(bag: Path, config: Path) -> str:
-    line = [sys.executable, "-m", "simclient.replay", str(bag), "--config", str(config)]
+    line = ["fcsl", "replay", str(bag), "--config", str(config)]
     done = subprocess.run(line, capture_output=True, text=True, check=False)
     assert done.returncode == 0, done.stdout + done.stderr
     return done.stdout

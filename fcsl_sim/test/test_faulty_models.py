@@ -66,7 +66,7 @@ def test_a_model_that_hangs_is_named_and_the_bag_is_whole(write: Write, tmp_path
     message = "`update` of `bad` does not return, at 1.250000000 s"
     assert (done.returncode, done.stderr) == (2, f"fcsl-sim: error: {message}\n")
     assert json.loads(done.stdout) == {"end": "error", "error": message}
-    line = [sys.executable, "-m", "simclient.bag", "info", str(tmp_path / "bag")]
+    line = ["fcsl", "bag", "info", str(tmp_path / "bag")]
     info = subprocess.run(line, capture_output=True, text=True, check=False)
     assert info.returncode == 0, info.stdout + info.stderr
 

@@ -242,7 +242,7 @@ def test_a_start_without_derivatives_is_said(write: Write, capsys: pytest.Captur
         (["--at", "0.005"], "0.005 s is not a whole number of ticks (1/100 s)"),
         (["--input", "drag.inputs.densty"], "there is no input `drag.inputs.densty` of a model; did you mean `drag.inputs.density`?"),
         (["--input", "body.inputs.force_body[0]"], "`body.inputs.force_body[0]` is fed by another model"),
-        (["--output", "air.outputs.velocity_air_body[3]"], "there is no such element of f64[3]"),
+        (["--measure", "air.outputs.velocity_air_body[3]"], "there is no such element of f64[3]"),
         (["--states", "wing.*"], "no continuous state matches wing.*"),
     ],
 )  # fmt: skip

@@ -56,7 +56,7 @@ def run(*line: str | Path) -> str:
 
 
 def digest(bag: Path) -> str:
-    return run(sys.executable, "-m", "simclient.bag", "digest", bag).split()[0]
+    return run("fcsl", "bag", "digest", bag).split()[0]
 
 
 @contextlib.contextmanager
@@ -77,7 +77,7 @@ def test_frozen_observers_change_nothing(tmp_path: Path) -> None:
     run("fcsl-sim", "run", SIM, "--record", tmp_path / "alone")
     control, mirror = free_endpoint(), free_endpoint()
     summary, bag = tmp_path / "summary.json", tmp_path / "bag"
-    options = ["--hal", f"zenoh:{control}", "--timeout-ms", "30000", "--observers", mirror]
+    options = ["--hal", f"zenoh:{control}", "--timeout", "30", "--observers", mirror]
     with contextlib.ExitStack() as stack:
         begin = lambda *line: stack.enter_context(started(*line))  # noqa: E731
         simulator = begin("fcsl-sim", "run", SIM, "--external", f"zenoh:{control}", "--speed", str(SPEED), "--json")
@@ -106,7 +106,7 @@ def test_two_simulations_at_one_address(tmp_path: Path) -> None:
         begin = lambda *line: stack.enter_context(started(*line))  # noqa: E731
 
         def controller(name: str) -> subprocess.Popen[str]:
-            where = ["--hal", f"zenoh:{endpoint}", "--namespace", name, "--timeout-ms", str(1000 * LONG_S)]
+            where = ["--hal", f"zenoh:{endpoint}", "--namespace", name, "--timeout", str(LONG_S)]
             return begin("fcsl-fc", tmp_path / "liblander_control.so", *where, "--record", tmp_path / name)
 
         one = stack.enter_context(Simulation(config.plan, config.tables))

@@ -304,7 +304,16 @@ def test_a_vehicle_that_changes_settles_within_what_it_may_change(measure: Measu
 def test_the_command_says_what_was_not_measured(
     write: Callable[..., Path], capsys: pytest.CaptureFixture[str], tmp_path: Path
 ) -> None:
-    line = ["response", str(write(end=300)), "--input", "ramp.inputs.rate", "--output", "ramp.outputs.x", "--at", "0.2"]
+    line = [
+        "response",
+        str(write(end=300)),
+        "--input",
+        "ramp.inputs.rate",
+        "--measure",
+        "ramp.outputs.x",
+        "--at",
+        "0.2",
+    ]
     assert main([*line, "--from", "1", "--to", "60", "--points", "4", "-o", "hold.json", "--plot", "hold.png"]) == 0
     printed = capsys.readouterr().out
     lines = printed.splitlines()
@@ -326,7 +335,7 @@ def test_the_command_says_what_was_not_measured(
 def test_without_a_loop_there_are_no_figures_of_it(
     write: Callable[..., Path], capsys: pytest.CaptureFixture[str], tmp_path: Path
 ) -> None:
-    outputs = ["--output", "servo.outputs.angle", "--output", "ramp.outputs.x"]
+    outputs = ["--measure", "servo.outputs.angle", "--measure", "ramp.outputs.x"]
     line = ["response", str(write()), "--input", "servo.inputs.command", *outputs, "--to", "9", "--points", "2"]
     assert main([*line, "--plot", "servo.png"]) == 0
     _, first, _, last = capsys.readouterr().out.splitlines()
@@ -337,7 +346,7 @@ def test_without_a_loop_there_are_no_figures_of_it(
 
 
 def test_the_command(write: Callable[..., Path], capsys: pytest.CaptureFixture[str], tmp_path: Path) -> None:
-    line = ["response", str(write()), "--input", "ramp.inputs.rate", "--output", "ramp.outputs.x", "--points", "12"]
+    line = ["response", str(write()), "--input", "ramp.inputs.rate", "--measure", "ramp.outputs.x", "--points", "12"]
     assert main([*line, "-o", "hold.json", "--plot", "hold.png"]) == 0
     printed = capsys.readouterr().out
     assert "phase margin 85.3° at 8.009 rad/s, delay margin 186 ms" in printed

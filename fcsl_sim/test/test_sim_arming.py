@@ -101,7 +101,7 @@ def test_every_host_arms_alike(config: SimConfig, tmp_path: Path) -> None:
     """The flight in one process and over a wire: the same bits, the same end of the plant, and both replay."""
     alone = run(config, bag=tmp_path / "alone")
     wire, flight = f"unix:{tmp_path / 'wire'}", tmp_path / "flight"
-    line = ["fcsl-fc", str(config.library), "--hal", f"wire:{wire}", "--timeout-ms", "60000", "--record", str(flight)]
+    line = ["fcsl-fc", str(config.library), "--hal", f"wire:{wire}", "--timeout", "60", "--record", str(flight)]
     with subprocess.Popen(line, stdout=subprocess.PIPE, text=True) as controller:
         apart = run(config, external=f"wire:{wire}", timeout_ms=60_000)
         said, _ = controller.communicate(timeout=60)

@@ -12,10 +12,10 @@ from typing import Any
 import pytest
 
 import fcsl_sim
-from fcsl_compiler.base.codes.pages import explain
+from fcsl_compiler.base.codes.pages import explain, overview
 from fcsl_compiler.base.diagnostics import DiagnosticError
+from fcsl_compiler.cli.fcsl import main
 from fcsl_sim import load
-from fcsl_sim.cli import main
 from fcsl_sim.codes import SIM_CODES
 
 
@@ -46,6 +46,4 @@ def test_explain(capsys: pytest.CaptureFixture[str]) -> None:
     assert main(["explain", "E804"]) == 0
     assert capsys.readouterr().out == explain("E804", SIM_CODES)
     assert main(["explain"]) == 0
-    assert len(capsys.readouterr().out.splitlines()) == len(SIM_CODES)
-    assert main(["explain", "E402"]) == 2
-    assert "fcslc explain E402" in capsys.readouterr().err
+    assert set(overview(SIM_CODES).splitlines()) < set(capsys.readouterr().out.splitlines())  # the compiler's too

@@ -14,12 +14,12 @@ from conftest import RAMP
 
 from fcsl_compiler.base.diagnostics import DiagnosticError
 from fcsl_compiler.base.packages import package_share
+from fcsl_compiler.cli.fcsl import main
 from fcsl_compiler.cli.scaffold import machine_files
 from fcsl_compiler.parse.json_reader import ConfigReader
 from fcsl_sim import SimError, load
-from fcsl_sim.cli import main
-from fcsl_sim.command import SCHEMA
 from fcsl_sim.integrators import MAX_HZ, METHODS
+from fcsl_sim.verbs import SIMULATION_SCHEMA
 from fcsl_sim.wiring import MAX_SECONDS
 
 ROOT = Path(__file__).resolve().parents[2]
@@ -28,7 +28,7 @@ SIMULATIONS = [
     *sorted((ROOT / "examples").rglob("*.sim.json")),
     *sorted((ROOT / "scripts/interop").rglob("*.sim.json")),
 ]
-TEXT = json.loads(SCHEMA.read_text())
+TEXT = json.loads(SIMULATION_SCHEMA.read_text())
 MACHINE = json.loads((package_share("fcsl_compiler") / "machine.schema.json").read_text())
 VALIDATOR = jsonschema.Draft202012Validator(TEXT)
 #: Parts of the machine's schema, word for word.
@@ -102,8 +102,8 @@ def accepted(write_sim: Callable[..., Path], hopper: tuple[Path, str]) -> Accept
 
 def test_it_is_a_schema_and_installed(capsys: pytest.CaptureFixture[str]) -> None:
     jsonschema.Draft202012Validator.check_schema(TEXT)
-    assert main(["schema"]) == 0 and capsys.readouterr().out == SCHEMA.read_text()
-    assert (package_share("fcsl_sim") / "simulation.schema.json").read_text() == SCHEMA.read_text()
+    assert main(["schema", "simulation"]) == 0 and capsys.readouterr().out == SIMULATION_SCHEMA.read_text()
+    assert (package_share("fcsl_sim") / "simulation.schema.json").read_text() == SIMULATION_SCHEMA.read_text()
 
 
 @pytest.mark.parametrize("path", SIMULATIONS, ids=lambda p: p.name)

@@ -14,12 +14,12 @@ from test_simulation_schema import keys_of, mutants
 
 from fcsl_compiler.base.diagnostics import DiagnosticError
 from fcsl_compiler.base.packages import package_share
+from fcsl_compiler.cli.fcsl import main
 from fcsl_compiler.parse.json_reader import ConfigReader
 from fcsl_sim import SimError
 from fcsl_sim.campaign.metric import RESERVED
 from fcsl_sim.campaign.study import MAX_CASES, OWN_COLUMNS, read_study
-from fcsl_sim.cli import main
-from fcsl_sim.command import SCHEMA, STUDY_SCHEMA
+from fcsl_sim.verbs import SIMULATION_SCHEMA, STUDY_SCHEMA
 
 ROOT = Path(__file__).resolve().parents[2]
 STUDIES = sorted((ROOT / "examples").rglob("*.study.json"))
@@ -94,9 +94,9 @@ def accepted(tmp_path: Path) -> Accepted:
 
 def test_it_is_a_schema_and_installed(capsys: pytest.CaptureFixture[str]) -> None:
     jsonschema.Draft202012Validator.check_schema(TEXT)
-    assert main(["schema", "--study"]) == 0 and capsys.readouterr().out == STUDY_SCHEMA.read_text()
+    assert main(["schema", "study"]) == 0 and capsys.readouterr().out == STUDY_SCHEMA.read_text()
     assert (package_share("fcsl_sim") / "study.schema.json").read_text() == STUDY_SCHEMA.read_text()
-    assert TEXT["$id"] != json.loads(SCHEMA.read_text())["$id"]
+    assert TEXT["$id"] != json.loads(SIMULATION_SCHEMA.read_text())["$id"]
 
 
 @pytest.mark.parametrize("path", STUDIES, ids=lambda p: f"{p.parents[1].name}-{p.name}")
@@ -128,7 +128,7 @@ def test_schema_and_reader_have_the_same_keys(accepted: Accepted, monkeypatch: p
 
 
 def test_words_and_limits_are_those_of_the_reader() -> None:
-    defs, simulation = TEXT["$defs"], json.loads(SCHEMA.read_text())["$defs"]
+    defs, simulation = TEXT["$defs"], json.loads(SIMULATION_SCHEMA.read_text())["$defs"]
     assert defs["taken"]["enum"] == [*OWN_COLUMNS, *RESERVED]
     assert TEXT["properties"]["cases"]["maximum"] == MAX_CASES
     assert defs["distribution"]["properties"]["linear"]["prefixItems"][2]["maximum"] == MAX_CASES

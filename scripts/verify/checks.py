@@ -49,7 +49,7 @@ def tests(label: str, file: str, *arguments: str, **environment: str) -> Job:
 FULL_CHECKS = scaled(
     (),
     (
-        script("mutants: tests notice small changes of the C runtime and of simclient", "mutation"),
+        script("mutants: tests notice small changes of runtime, compiler and simulator", "mutation"),
         python(
             "longer tests: faults on the bus and of nodes, sockets, schemas",
             *("-m", "pytest", "-q", *_LONGER),

@@ -160,19 +160,19 @@ class SetStateVerb(Verb):
 
 
 class ReplayVerb(Verb):
-    """Replay a bag, bit for bit; the same as python3 -m simclient.replay"""
+    """Replay a bag, bit for bit; the same as fcsl replay"""
 
     def add_arguments(self, parser: argparse.ArgumentParser, cli_name: str) -> None:
-        from simclient.replay.__main__ import add_arguments
+        from simclient.replay.command import add_arguments
 
         self._parser = parser
         add_arguments(parser)
 
     def run(self, args: argparse.Namespace) -> int:
-        from simclient.cli import run_tool
-        from simclient.replay.__main__ import command
+        from simclient.cli import guarded
+        from simclient.replay.command import command
 
-        run_tool("ros2 fcsl replay", lambda _: command(self._parser, args))
+        return guarded("ros2 fcsl replay", lambda: command(self._parser, args))
 
 
 def _print(rows: Iterable[Sequence[str]]) -> None:

@@ -12,13 +12,13 @@ from typing import Any, Self
 
 
 class Command(argparse.ArgumentParser):
-    """`fill` adds the options; the rest is as of ArgumentParser. For `add_subparsers(parser_class=Command)`."""
+    """`fill` adds the options; `settings` are those of ArgumentParser. For `add_subparsers(parser_class=Command)`."""
 
     def __init__(self, *, fill: Callable[[argparse.ArgumentParser], object], **settings: Any):
-        self._fill, self._settings = fill, settings
+        self._fill, self.settings = fill, settings
 
     def filled(self) -> Self:
-        super().__init__(**self._settings)
+        super().__init__(**self.settings)
         self._fill(self)
         return self
 

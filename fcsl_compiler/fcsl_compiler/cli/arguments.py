@@ -7,19 +7,35 @@ import argparse
 from collections.abc import Sequence
 from pathlib import Path
 
+from ..base.examples import add_examples, subcommands
 from ..base.version import add_version
 from ..model.choices import BACKENDS, DEFAULT_BACKEND, DEFAULT_TARGET
 
-#: Forms of a report (report.py), results that a build prints (driver/passes.py), and how the plan of a board ends.
-FORMATS = ("text", "json", "sarif")
+#: Results that a build prints (driver/passes.py), and how the plan of a board ends.
 DUMPS = ("parse", "check", "schedule", "verify", "lower", "emit", "types")
 PLAN_SUFFIX = ".plan"
 
+_EXAMPLES = {
+    "": "check craft.json",
+    "check": "craft.json --strict",
+    "build": "craft.json -o build --report",
+    "board": "craft.board.json",
+    "explain": "E402 kf_gain",
+    "scan": "build/libcraft.so",
+    "externs": "craft.json --target board",
+    "messages": "craft.json -o msg",
+    "graph": "craft.json -o craft.svg",
+    "schema": "simulation",
+    "new": "machine craft",
+    "new machine": "craft",
+    "new algorithm": "slew",
+    "new plant": "mass --machine craft.json",
+    "new vehicle": "falcon --like quadrotor",
+    "cover": "craft.json --fail-under mcdc=100 -- python3 -m pytest test",
+}
 _TARGET_HELP = f"which of the machine's `targets` its externs are linked from (default: {DEFAULT_TARGET})"
 _STRICT_HELP = "every input without connection or channel must be listed in the `inputs` of its instance"
 _COVER_EPILOG = """\
-example: fcslc cover lander_control.json --fail-under mcdc=100 -- python3 -m pytest test
-
 Every machine that COMMAND compiles (AlgTwin.from_config, fcsl-sim) is built with coverage probes. Such a build must not
 fly, and other hosts reject it. PyTwin and existing libraries are not measured. The same without fcslc:
 python3 -m pytest --fcsl-cover.
@@ -32,10 +48,15 @@ MC/DC     conditions that decided their decision's outcome independently, both a
 """
 
 
-def parse(arguments: Sequence[str]) -> argparse.Namespace:
+def parse(arguments: Sequence[str], program: str = "fcslc") -> argparse.Namespace:
     """The options; `subcommand` names the module of the command. Wrong ones end the program with status 2."""
     own, command = _split_command(arguments)
-    return _parser().parse_args(own, argparse.Namespace(command=command))
+    return _parser(program).parse_args(own, argparse.Namespace(command=command))
+
+
+def command_parser(name: str, program: str) -> argparse.ArgumentParser:
+    """That of one command."""
+    return subcommands(_parser(program))[name]
 
 
 def _split_command(arguments: Sequence[str]) -> tuple[list[str], list[str]]:
@@ -56,12 +77,12 @@ def _split_command(arguments: Sequence[str]) -> tuple[list[str], list[str]]:
     return [word for word in words if not word.startswith("-")], []
 
 
-def _parser() -> argparse.ArgumentParser:
-    parser = argparse.ArgumentParser(prog="fcslc", description="Compiles machines (JSON and algorithms) to native C.")
+def _parser(program: str) -> argparse.ArgumentParser:
+    parser = argparse.ArgumentParser(prog=program, description="Compiles machines (JSON and algorithms) to native C.")
     add_version(parser, "fcsl_compiler", __file__)
     commands = parser.add_subparsers(required=True, metavar="COMMAND", dest="subcommand")
 
-    check = commands.add_parser("check", help="report errors; write nothing")
+    check = _add(commands, "check", "report errors; write nothing")
     check.add_argument("config", type=Path, nargs="+", help="machine JSON")
     check.add_argument("--strict", action="store_true", help=_STRICT_HELP)
     _add_format(check)
@@ -69,85 +90,108 @@ def _parser() -> argparse.ArgumentParser:
     _add_build(commands)
     _add_board(commands)
 
-    why = commands.add_parser("explain", help="explain a diagnostic code, with an example, or a function")
+    why = _add(commands, "explain", "explain a diagnostic code, with an example, or a function")
     why.add_argument("what", nargs="*", help="a code such as E402, or a function such as kf_gain; none: list all codes")
 
-    scan = commands.add_parser("scan", help="check that machine libraries call only functions allowed in a step")
+    scan = _add(commands, "scan", "check that machine libraries call only functions allowed in a step")
     scan.add_argument("library", type=Path, nargs="+", help="shared library of machines")
-    scan.add_argument("--objects", type=Path, help="folder of the machines' object files; also print stack bounds")
-    scan.add_argument("--emitted", type=Path, help="folder of the generated C; allows calls of the declared externs")
+    scan.add_argument(
+        "--objects", type=Path, metavar="FOLDER", help="folder of the machines' object files; also print stack bounds"
+    )
+    scan.add_argument(
+        "--emitted", type=Path, metavar="FOLDER", help="folder of the generated C; allows calls of the declared externs"
+    )
 
-    externs = commands.add_parser("externs", help="print the link inputs of a target, for build systems")
+    externs = _add(commands, "externs", "print the link inputs of a target, for build systems")
     externs.add_argument("config", type=Path, nargs="+", help="machine JSON")
-    externs.add_argument("--target", default=DEFAULT_TARGET, help=_TARGET_HELP)
+    externs.add_argument("--target", metavar="NAME", default=DEFAULT_TARGET, help=_TARGET_HELP)
 
-    messages = commands.add_parser("messages", help="write the ROS 2 .msg files of the instances and their structs")
+    messages = _add(commands, "messages", "write the ROS 2 .msg files of the instances and their structs")
     messages.add_argument("config", type=Path, nargs="+", help="machine JSON")
-    messages.add_argument("-o", "--output", type=Path, required=True, help="folder for the .msg files")
-    messages.add_argument("--package", help="the ROS 2 package that builds them; it must contain the machines")
     messages.add_argument(
-        "--sources", type=Path, help="write the list of input files here, one per line, for build systems"
+        "-o", "--output", type=Path, required=True, metavar="FOLDER", help="folder for the .msg files"
+    )
+    messages.add_argument(
+        "--package", metavar="PACKAGE", help="the ROS 2 package that builds them; it must contain the machines"
+    )
+    messages.add_argument(
+        "--sources",
+        type=Path,
+        metavar="FILE",
+        help="write the list of input files here, one per line, for build systems",
     )
     _add_authoring(commands)
     _add_cover(commands)
+    add_examples(parser, _EXAMPLES)
     return parser
+
+
+def _add(
+    commands: argparse._SubParsersAction[argparse.ArgumentParser], name: str, text: str
+) -> argparse.ArgumentParser:
+    """A command with its sentence."""
+    return commands.add_parser(name, help=text, description=f"{text[0].upper()}{text[1:]}.")
 
 
 def _add_build(commands: argparse._SubParsersAction[argparse.ArgumentParser]) -> None:
     """Adds the command to fcslc's parser."""
-    build = commands.add_parser("build", help="compile to a shared library, or to C only")
+    build = _add(commands, "build", "compile to a shared library, or to C only")
     build.add_argument("config", type=Path, nargs="+", help="machine JSON; several go into one library")
-    build.add_argument("-o", "--output", type=Path, help="output folder (default: build beside the first config)")
-    build.add_argument("--name", help="library name (default: the first machine's)")
+    build.add_argument(
+        "-o", "--output", type=Path, metavar="FOLDER", help="output folder (default: build beside the first config)"
+    )
+    build.add_argument("--name", metavar="NAME", help="library name (default: the first machine's)")
     build.add_argument("--c-only", action="store_true", help="write C (and Nim), header and map, do not compile them")
-    build.add_argument("--depfile", type=Path, help="write the dependencies of the C files, for make and ninja")
+    build.add_argument(
+        "--depfile", type=Path, metavar="FILE", help="write the dependencies of the C files, for make and ninja"
+    )
     build.add_argument("--backend", choices=BACKENDS, default=DEFAULT_BACKEND, help="language of the generated source")
-    build.add_argument("--target", default=DEFAULT_TARGET, help=_TARGET_HELP)
+    build.add_argument("--target", metavar="NAME", default=DEFAULT_TARGET, help=_TARGET_HELP)
     build.add_argument(
         "--instances", metavar="NAME,…", help="build a subset machine with only these instances (one config)"
     )
     build.add_argument("--strict", action="store_true", help=_STRICT_HELP)
     build.add_argument("--dump", choices=DUMPS, help="print the result of a pass, or the types of locals, and stop")
-    what = "print a resource report: order, latencies, operations, instructions, stack, sizes, load; FILE: also as JSON"
-    build.add_argument("--report", nargs="?", const="", metavar="FILE.json", help=what)
+    what = "print a resource report: order, latencies, operations, instructions, stack, sizes, load"
+    build.add_argument("--report", action="store_true", help=what)
     _add_format(build)
 
 
 def _add_board(commands: argparse._SubParsersAction[argparse.ArgumentParser]) -> None:
     """Adds the command to fcslc's parser."""
-    board = commands.add_parser("board", help="check a board against its machine, write its plan")
+    board = _add(commands, "board", "check a board against its machine, write its plan")
     board.add_argument("config", type=Path, help="board JSON")
-    board.add_argument("-o", "--output", type=Path, help=f"the plan (default: beside the board, suffix {PLAN_SUFFIX})")
+    board.add_argument(
+        "-o", "--output", type=Path, metavar="FILE", help=f"the plan (default: beside the board, suffix {PLAN_SUFFIX})"
+    )
     _add_format(board)
 
 
 def _add_authoring(commands: argparse._SubParsersAction[argparse.ArgumentParser]) -> None:
     """Adds the commands to fcslc's parser."""
-    graph = commands.add_parser("graph", help="draw dataflow and state machine")
+    graph = _add(commands, "graph", "draw dataflow and state machine")
     graph.add_argument("config", type=Path, help="machine JSON")
-    graph.add_argument("--state", help="show one state (default: all)")
-    graph.add_argument("-o", "--output", type=Path, help=".svg, .mmd (Mermaid) or .md; default: Mermaid on stdout")
+    graph.add_argument("--state", metavar="STATE", help="show one state (default: all)")
+    graph.add_argument(
+        "-o", "--output", type=Path, metavar="FILE", help=".svg, .mmd (Mermaid) or .md; default: Mermaid on stdout"
+    )
 
-    schema = commands.add_parser("schema", help="print the JSON Schema of a machine or a board, for editors")
-    schema.add_argument("--board", action="store_true", help="that of a board")
+    schema = _add(commands, "schema", "print the JSON Schema of a kind of file, for editors")
+    schema.add_argument("of", nargs="?", default="machine", help="machine (default), board, simulation or study")
 
-    new = commands.add_parser("new", help="start a machine, an algorithm, a plant or a vehicle, with a test")
+    new = _add(commands, "new", "start a machine, an algorithm, a plant or a vehicle, with a test")
     kinds = new.add_subparsers(required=True, metavar="KIND", dest="kind")
-    machine = kinds.add_parser("machine", help="a folder NAME with a machine, two algorithms and a test")
+    machine = _add(kinds, "machine", "a folder NAME with a machine, two algorithms and a test")
     machine.add_argument("name", help="lower_snake_case")
     machine.add_argument("--package", action="store_true", help="as a ROS 2 package, for colcon")
-    algorithm = kinds.add_parser(
-        "algorithm", help="NAME.py and a test of it, in the folder of a machine or in this one"
-    )
+    algorithm = _add(kinds, "algorithm", "NAME.py and a test of it, in the folder of a machine or in this one")
     algorithm.add_argument("name", help="lower_snake_case; the class has it in CamelCase")
-    plant = kinds.add_parser(
-        "plant", help="NAME.c, a model for fcsl-sim, and NAME.sim.json with a machine of this folder; with a test"
+    plant = _add(
+        kinds, "plant", "NAME.c, a model for fcsl-sim, and NAME.sim.json with a machine of this folder; with a test"
     )
     plant.add_argument("name", help="lower_snake_case; of the model")
     plant.add_argument("--machine", type=Path, metavar="FILE", help="machine JSON that the simulation flies")
-    vehicle = kinds.add_parser(
-        "vehicle", help="a package NAME with machine, simulation and tests of a vehicle that there is"
-    )
+    vehicle = _add(kinds, "vehicle", "a package NAME with machine, simulation and tests of a vehicle that there is")
     vehicle.add_argument("name", help="lower_snake_case")
     vehicle.add_argument("--like", required=True, metavar="VEHICLE", help="a package, such as quadrotor, or its folder")
 
@@ -157,12 +201,13 @@ def _add_cover(commands: argparse._SubParsersAction[argparse.ArgumentParser]) ->
     cover = commands.add_parser(
         "cover",
         help="run tests, and report which lines, branches and conditions of the algorithms they cover",
-        usage="fcslc cover [-h] [--json FILE] [--fail-under KIND=PERCENT] MACHINE.json [...] -- COMMAND ...",
+        description="Runs tests, and reports which lines, branches and conditions of the algorithms they cover.",
+        usage="%(prog)s [-h] [-o FILE] [--fail-under KIND=PERCENT] MACHINE.json [...] -- COMMAND ...",
         formatter_class=argparse.RawDescriptionHelpFormatter,
         epilog=_COVER_EPILOG,
     )
     cover.add_argument("config", type=Path, nargs="+", metavar="MACHINE.json", help="machine to report on")
-    cover.add_argument("--json", type=Path, metavar="FILE", help="also write the report to this file, as JSON")
+    cover.add_argument("-o", "--output", type=Path, metavar="FILE", help="also write the report there, as JSON")
     cover.add_argument(
         "--fail-under",
         action="append",
@@ -173,6 +218,14 @@ def _add_cover(commands: argparse._SubParsersAction[argparse.ArgumentParser]) ->
 
 
 def _add_format(command: argparse.ArgumentParser) -> None:
-    """Adds the option --format."""
-    what = "text for people (default); json or sarif: one document on stdout, for editors and other programs"
-    command.add_argument("--format", choices=FORMATS, default="text", help=what)
+    """Adds what chooses the form of a report (report.py)."""
+    forms = command.add_mutually_exclusive_group()
+    for form, what in (("json", "one JSON document"), ("sarif", "one document in SARIF 2.1.0")):
+        forms.add_argument(
+            f"--{form}",
+            action="store_const",
+            const=form,
+            default="text",
+            dest="format",
+            help=f"print {what} on stdout, for editors and other programs",
+        )

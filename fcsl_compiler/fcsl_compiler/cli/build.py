@@ -9,7 +9,7 @@ from pathlib import Path
 
 from ..base.files import write_whole
 from ..base.usage_error import UsageError
-from ..build_report import compiled_facts, refuse_foreign, report_text
+from ..build_report import compiled_facts, report_text
 from ..build_report import document as cost_document
 from ..build_report.facts import Facts
 from ..driver.library import Inspect, build_library, emit
@@ -24,8 +24,8 @@ from .report import Summary, print_extern_calls, print_report
 
 def run(options: argparse.Namespace) -> int:
     if options.dump and options.format != "text":
-        raise UsageError("--dump prints the result of a pass; it has no --format")
-    if options.dump and options.report is not None:
+        raise UsageError("--dump prints the result of a pass; it has no --json or --sarif")
+    if options.dump and options.report:
         raise UsageError("--dump stops before the compilation that --report needs; give one of them")
     if options.dump:
         until, dump = DUMPS[options.dump]
@@ -43,13 +43,16 @@ def run(options: argparse.Namespace) -> int:
     if options.name is not None and not is_machine_name(options.name):
         raise UsageError(f"--name `{options.name}` is not a valid library name: lower_snake_case, not a keyword of C")
     refuse_file(folder)
-    _check_report(options)
+    if options.report and options.c_only:
+        raise UsageError("--report needs compiled machines; remove --c-only")
+    if options.report and options.format == "sarif":
+        raise UsageError("--report does not go with --sarif, which has no place for it; write --json")
     costs: list[Facts] = []
     library = folder / f"lib{options.name or first.stem}.so"
     if options.c_only:
         compilations = emit(options.config, folder, options.strict, options.target, instances, options.backend)
     else:
-        inspect = _collect_facts(costs) if options.report is not None else lambda *_: None
+        inspect = _collect_facts(costs) if options.report else lambda *_: None
         compilations = build_library(
             options.config,
             library,
@@ -65,16 +68,15 @@ def run(options: argparse.Namespace) -> int:
         _write_depfile(options.depfile, folder / "fcsl_machines.c", compilations)
     output = folder / "fcsl_machines.c" if options.c_only else library
     made = [Summary(c.path, c.checked, output, c.stack_bound) for c in compilations]
-    if options.report:
-        write_whole(Path(options.report), cost_document(costs, toolchain()))
-    print_report(options, [d for c in compilations for d in c.sink.diagnostics], made)
+    report = cost_document(costs, toolchain()) if options.report else None
+    print_report(options, [d for c in compilations for d in c.sink.diagnostics], made, report)
     if options.format != "text":
         return 0
     print(output)
     for facts in costs:
         print(f"\n{report_text(facts)}", end="")
     for compilation in compilations:
-        if compilation.stack_bound is not None and options.report is None:  # the report contains it
+        if compilation.stack_bound is not None and not options.report:  # the report contains it
             externs = [e.name for e in compilation.checked.externs]
             print(bound_text(compilation.checked.name, compilation.stack_bound, externs))
     print_extern_calls(compilations[0].extern_calls)
@@ -90,19 +92,6 @@ def _command(options: argparse.Namespace, folder: Path) -> str:
     words += ["--backend", options.backend] if options.backend != DEFAULT_BACKEND else []
     words += ["--target", options.target] if options.target != DEFAULT_TARGET else []
     return shlex.join([*words, *(["--strict"] if options.strict else [])])
-
-
-def _check_report(options: argparse.Namespace) -> None:
-    if options.report is None:
-        return
-    if options.c_only:
-        raise UsageError("--report needs compiled machines; remove --c-only")
-    if options.report:
-        refuse_foreign(Path(options.report))
-    elif options.format != "text":
-        raise UsageError(
-            f"--report prints text, and --format {options.format} uses stdout; name a file: --report FILE.json"
-        )
 
 
 def _collect_facts(costs: list[Facts]) -> Inspect:

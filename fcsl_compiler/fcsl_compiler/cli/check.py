@@ -25,4 +25,6 @@ def run(options: argparse.Namespace) -> int:
         for machine in passed:
             print(machine.text())
     print_report(options, found, passed)
-    return 1 if len(passed) < len(options.config) else 0
+    if len(passed) == len(options.config):
+        return 0
+    return 1 if all(path.exists() for path in options.config) else 2

@@ -6,6 +6,7 @@ from __future__ import annotations
 import argparse
 import sys
 from importlib import import_module
+from pathlib import Path
 
 from ..base.diagnostics import DiagnosticError
 from ..base.packages import PackageNotFound
@@ -16,12 +17,14 @@ from .report import document, print_report
 
 
 def run_command(options: argparse.Namespace) -> int:
-    """The exit status. Imports the module of the command, which has its name."""
+    """The exit status: 0; 1 if the input has errors, or a tool failed; 2 for wrong usage, or a file that is not there. Imports the
+    module of the command, which has its name."""
     try:
         status: int = import_module(f".{options.subcommand}", __package__).run(options)
         return status
     except DiagnosticError as error:
         print_report(options, error.diagnostics)
+        return 1 if all(path.exists() for path in _named(options)) else 2
     except UsageError as error:
         print(f"fcslc: {error}", file=sys.stderr)
         return 2
@@ -31,7 +34,14 @@ def run_command(options: argparse.Namespace) -> int:
         sys.stderr.close()
     except OSError as error:
         _fail(options, f"{error.filename or ''}: {error.strerror}")
+        return 2 if isinstance(error, FileNotFoundError) else 1
     return 1
+
+
+def _named(options: argparse.Namespace) -> list[Path]:
+    """The files that the command line names."""
+    config = getattr(options, "config", [])
+    return config if isinstance(config, list) else [config]
 
 
 def _fail(options: argparse.Namespace, failure: str) -> None:

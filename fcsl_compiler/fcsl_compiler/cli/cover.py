@@ -32,8 +32,8 @@ def run(options: argparse.Namespace) -> int:
                 raise UsageError(f"cover: no such machine: {config}")
             if config.suffix != ".json":
                 raise UsageError(f"cover: `{config}` is not a machine's JSON file; name the machine that the tests run")
-        if options.json is not None:
-            refuse_foreign(options.json)
+        if options.output is not None:
+            refuse_foreign(options.output)
         with tempfile.TemporaryDirectory(prefix="fcsl-cover-") as folder:
             environment = {**os.environ, COVER_DIR: folder}
             status = _run(options.command, environment)
@@ -41,8 +41,8 @@ def run(options: argparse.Namespace) -> int:
     except CoverError as error:
         raise UsageError(f"cover: {error}") from None
     print(report.text(), end="")
-    if options.json is not None:
-        write_whole(options.json, report.to_json())
+    if options.output is not None:
+        write_whole(options.output, report.to_json())
     short = report.below(limits)
     for line in short:
         print(f"fcslc: cover: {line}")

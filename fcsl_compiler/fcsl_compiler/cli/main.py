@@ -10,13 +10,13 @@ from collections.abc import Sequence
 from .arguments import parse
 
 
-def main(arguments: Sequence[str] | None = None) -> int:
-    """Runs fcslc. Returns the exit status: 0 success, 1 an error in the program or in its environment, 2 usage error,
+def main(arguments: Sequence[str] | None = None, program: str = "fcslc") -> int:
+    """Runs fcslc, by the name that messages about usage show. Returns the exit status: 0 success, 1 an error in the program or in its environment, 2 usage error,
     130 interrupted."""
     for stream in (sys.stdout, sys.stderr):
         if isinstance(stream, io.TextIOWrapper):  # avoid exceptions for characters that it cannot show
             stream.reconfigure(errors="backslashreplace")
-    options = parse(sys.argv[1:] if arguments is None else arguments)
+    options = parse(sys.argv[1:] if arguments is None else arguments, program)
     try:
         from .command import run_command
 

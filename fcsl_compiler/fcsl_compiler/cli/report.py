@@ -13,7 +13,7 @@ The JSON is of this schema (`"version": 1`; keys are only ever added):
 `ok` is the exit status; `why` and `help` may be empty; lines and columns count characters from 1, the end column is
 exclusive; files are relative to where the compiler was started, if its arguments were; `rendered` is the text format.
 `machines` are those that compiled; `output` and `stack_bytes` are of `build`, absent where there is none. `failure` is
-there when the tool itself could not do its work (no C compiler, a full disk).
+there when the tool itself could not do its work (no C compiler, a full disk). `report` is there with `build --report`.
 """
 
 from __future__ import annotations
@@ -21,7 +21,7 @@ from __future__ import annotations
 import argparse
 import json
 import sys
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from urllib.parse import quote
@@ -56,11 +56,16 @@ def error_count(diagnostics: Sequence[Diagnostic]) -> str:
     return _count(errors, "error") if errors else ""
 
 
-def print_report(options: argparse.Namespace, found: Sequence[Diagnostic], machines: Sequence[Summary] = ()) -> None:
-    """Prints the results: text on stderr, or the requested document on stdout."""
+def print_report(
+    options: argparse.Namespace,
+    found: Sequence[Diagnostic],
+    machines: Sequence[Summary] = (),
+    report: Mapping[str, object] | None = None,
+) -> None:
+    """Prints the results: text on stderr, or the requested document on stdout, with a resource report in it if there is one."""
     form = getattr(options, "format", "text")
     if form != "text":
-        print(document(form, found, machines), end="")
+        print(document(form, found, machines, report=report), end="")
         return
     for diagnostic in found:
         print(diagnostic.render(), file=sys.stderr)
@@ -74,9 +79,16 @@ def print_extern_calls(calls: Sequence[str]) -> None:
         print(f"functions called by its externs: {', '.join(calls)}")
 
 
-def document(form: str, diagnostics: Sequence[Diagnostic], machines: Sequence[Summary] = (), failure: str = "") -> str:
-    """The report as text of this form (json or sarif), ending in a newline."""
+def document(
+    form: str,
+    diagnostics: Sequence[Diagnostic],
+    machines: Sequence[Summary] = (),
+    failure: str = "",
+    report: Mapping[str, object] | None = None,
+) -> str:
+    """The document as text of this form (json or sarif), ending in a newline."""
     content = (_sarif if form == "sarif" else _json)(diagnostics, machines, failure)
+    content |= {"report": report} if report is not None else {}
     return json.dumps(content, indent=1) + "\n"
 
 

@@ -10,9 +10,7 @@ from ..check.scope import LANGUAGE_NAMES
 from ..config.machine import RESERVED_INSTANCES
 from ..parse.machine_files import is_machine_name
 from . import scaffold_package
-
-#: JSON Schema of the machine JSON.
-SCHEMA = Path(__file__).parents[1] / "config" / "machine.schema.json"
+from .verbs import MACHINE_SCHEMA
 
 _SENSORS = '''class Sensors:
     """A source block: its outputs are written by the host, a test or a driver."""
@@ -203,7 +201,7 @@ def machine_files(name: str, package: bool) -> dict[Path, str]:
     readme = _README + (scaffold_package.README if package else "")
     texts = {
         f"{name}.json": _MACHINE,
-        "machine.schema.json": SCHEMA.read_text(),
+        "machine.schema.json": MACHINE_SCHEMA.read_text(),
         "algorithms/sensors.py": _SENSORS,
         "algorithms/controller.py": _CONTROLLER,
         f"test/test_{name}.py": _MACHINE_TEST,

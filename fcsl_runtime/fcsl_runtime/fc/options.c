@@ -35,7 +35,7 @@ static const char USAGE[] =
     "(docs/hardware/hal.md)\n"
     "                          composite:PLAN,wire:SPEC (or ,zenoh:…): these sensors, and all others from the "
     "simulator\n"
-    "  --timeout-ms N          how long to wait for the simulator's next message (default 2000)\n"
+    "  --timeout SECONDS       how long to wait for the simulator's next message (default 2)\n"
     "  --board LIBRARY.so      the board that hw_* of algorithms reach (fcsl/fcsl_hw.h); default: simulated hardware\n"
     "  --guard PATH            the actuators belong to the fcsl-guard that listens on PATH (docs/hardware/arming.md)\n"
     "  --ticks N               end after N ticks\n"
@@ -83,18 +83,19 @@ static const char USAGE[] =
     "  --namespace NS          ROS namespace of topics, and of the keys on the bus\n"
     "  --summary FILE       at the end write state, health, counters and histograms there, as JSON\n"
     "  --version            print name and version\n"
-    "  --help\n";
+    "  -h, --help\n\n"
+    "example: fcsl-fc build/libcraft.so --hal wire:udp:127.0.0.1:7600 --record flight\n";
 
 enum { ERROR_BYTES = 512 };
 
-typedef enum { TEXT, NUMBER, FLAG, WORD } kind_t;
+typedef enum { TEXT, NUMBER, SECONDS, FLAG, WORD } kind_t;
 
 /* An option of the command line: where it goes, and for numbers what it may be. */
 typedef struct {
     const char *name;
     kind_t kind;
     size_t offset; /* in options_t; of WORD: none */
-    uint64_t min;
+    uint64_t min; /* of SECONDS: in ms */
     uint64_t max;
     int (*read)(const char *text, options_t *options); /* WORD */
 } entry_t;
@@ -193,7 +194,7 @@ static int read_version(const char *text, options_t *options)
 static const entry_t ENTRIES[] = {
     {.name = "machine", .kind = TEXT, .offset = TO(machine)},
     {.name = "hal", .kind = WORD, .read = read_hal},
-    {.name = "timeout-ms", .kind = NUMBER, .offset = TO(timeout_ms), .min = 1, .max = 3600000},
+    {.name = "timeout", .kind = SECONDS, .offset = TO(timeout_ms), .min = 1, .max = 3600000},
     {.name = "board", .kind = TEXT, .offset = TO(board)},
     {.name = "guard", .kind = TEXT, .offset = TO(guard)},
     {.name = "ticks", .kind = NUMBER, .offset = TO(ticks), .min = 1, .max = INT64_MAX},
@@ -235,9 +236,11 @@ static int read_option(const entry_t *entry, const char *text, options_t *option
     case TEXT:
         memcpy(place, &text, sizeof text);
         return 0;
-    case NUMBER: {
+    case NUMBER:
+    case SECONDS: {
         uint64_t number = 0;
-        const int status = usage_number(entry->name, text, entry->min, entry->max, &number);
+        const int status = entry->kind == NUMBER ? usage_number(entry->name, text, entry->min, entry->max, &number)
+                                                 : usage_seconds(entry->name, text, entry->min, entry->max, &number);
         memcpy(place, &number, status == 0 ? sizeof number : 0u);
         return status;
     }
@@ -274,11 +277,10 @@ static int check(const options_t *options)
         return usage_error("--token needs --socket: it is the token of a TCP server", "");
     }
     if (options->timeout_ms != 0 && !has_simulator(options)) {
-        return usage_error("--timeout-ms needs --hal wire:SPEC or zenoh:…: it is how long to wait for the simulator",
-                           "");
+        return usage_error("--timeout needs --hal wire:SPEC or zenoh:…: it is how long to wait for the simulator", "");
     }
     if (options->timeout_ms != 0 && fcsl_hal_bus_runs_free(options->peer)) {
-        return usage_error("--timeout-ms does not go with ,free-running: nobody waits for the simulator", "");
+        return usage_error("--timeout does not go with ,free-running: nobody waits for the simulator", "");
     }
     if (options->name_space[0] != '\0' && options->record == NULL && options->observers == NULL &&
         options->ros == NULL &&
@@ -324,12 +326,12 @@ int options_read(int argc, char **argv, options_t *options)
     }
     *options = (options_t){.name_space = "", .cpu = OPTIONS_ANY_CPU, .realtime = 1};
     int option = 0;
-    while ((option = getopt_long(argc, argv, "", table, NULL)) != -1) {
+    while ((option = getopt_long(argc, argv, "h", table, NULL)) != -1) {
         if (option == '?') {
             (void)fputs("Try `fcsl-fc --help`.\n", stderr);
             return -1;
         }
-        const int status = read_option(&ENTRIES[option], optarg, options);
+        const int status = option == 'h' ? read_help(NULL, options) : read_option(&ENTRIES[option], optarg, options);
         if (status != 0) {
             return status;
         }

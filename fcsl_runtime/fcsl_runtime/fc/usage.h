@@ -13,6 +13,9 @@ int usage_error(const char *what, const char *which);
 /* Reads an integer of [min, max], without a sign; `max` INT64_MAX: of any size. Returns 0; -1 after an error about --`name`. */
 int usage_number(const char *name, const char *text, uint64_t min, uint64_t max, uint64_t *value);
 
+/* Reads seconds with at most three decimals as ms of [min_ms, max_ms]. Returns 0; -1 after an error about --`name`. */
+int usage_seconds(const char *name, const char *text, uint64_t min_ms, uint64_t max_ms, uint64_t *value_ms);
+
 /* Reads what getopt_long has left, the path of the machine library. Returns 0; -1 after an error. */
 int usage_library(int argc, char **argv, const char **library);
 

@@ -32,7 +32,8 @@ static const char USAGE[] =
     "  --realtime-priority N   SCHED_FIFO, 1 to 99: above that of the flight program\n"
     "  --lock-memory           no page of the program leaves memory\n"
     "  --version               print name and version\n"
-    "  --help\n";
+    "  -h, --help\n\n"
+    "example: fcsl-guard build/libcraft.so --slot /run/craft.slot --board craft.plan\n";
 
 enum { PERIOD_MS = 2, PERIOD_MS_MAX = 1000, PRIORITY_MAX = 99 };
 enum { ACTUATOR = 1, BOARD, MACHINE, SLOT, PERIOD, PRIORITY, LOCK_MEMORY, VERSION, HELP };
@@ -76,6 +77,7 @@ static int read_option(int option, const char *text, options_t *options)
         (void)puts("fcsl-guard " FCSL_VERSION);
         return 1;
     case HELP:
+    case 'h':
         (void)fputs(USAGE, stdout);
         return 1;
     default:
@@ -92,7 +94,7 @@ int options_read(int argc, char **argv, options_t *options)
         return usage_error("out of memory", "");
     }
     int option = 0;
-    while ((option = getopt_long(argc, argv, "", OPTIONS, NULL)) != -1) {
+    while ((option = getopt_long(argc, argv, "h", OPTIONS, NULL)) != -1) {
         const int status = read_option(option, optarg, options);
         if (status != 0) {
             return status;

@@ -5,10 +5,10 @@
 use. Each of these packages imports only those above it:
 
     ros     messages as bytes, and plans of what goes from a message to a machine and back
-    bag     bags of any format: `simclient.bag.Bag`, and the command `python -m simclient.bag`
-    view    pictures and 3D scenes of a run; the commands are simclient.plot and simclient.to_rerun
-    replay  runs machines on bags: `python -m simclient.replay`
-    vars    the variable server's clients, fcsl-var
+    bag     bags of any format: `simclient.bag.Bag`, and the command `fcsl bag`
+    view    pictures and 3D scenes of a run; the commands are `fcsl plot` and `fcsl rerun`
+    replay  runs machines on bags: `fcsl replay`
+    vars    the variable server's clients, fcsl var
     twin    AlgTwin, PyTwin, ProcessTwin, and the pytest plugin; SimTwin is in fcsl_sim
     telemetry  Telemetry, the receiver of UDP telemetry from flight programs and simulators
 """

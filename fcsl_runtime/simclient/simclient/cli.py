@@ -8,7 +8,7 @@ import signal
 import sys
 import time
 from collections.abc import Callable, Sequence
-from typing import NoReturn
+from importlib import import_module
 
 from .errors import BagError, BusError, MapError, TwinError, ViewError
 
@@ -24,10 +24,15 @@ _BAR_PERIOD_S = 0.2
 _BAR_WIDTH = 30
 
 
-def run_tool(name: str, main: Callable[[Sequence[str]], int]) -> NoReturn:
-    """Runs `main` with the command line's arguments and exits. Wrong input gives one message and exit code 2."""
+def run_tool(name: str, module: str, arguments: Sequence[str]) -> int:
+    """The exit status of `main` of a module of simclient."""
+    return guarded(name, lambda: import_module(f"simclient.{module}").main(arguments))
+
+
+def guarded(name: str, work: Callable[[], int]) -> int:
+    """The exit status of a tool's work. Wrong input, and a package that is missing, give one message and exit status 2."""
     try:
-        status = main(sys.argv[1:])
+        status = work()
         sys.stdout.flush()
     except (TwinError, BagError, BusError, MapError, ViewError) as error:
         print(f"{name}: error: {error}", file=sys.stderr)
@@ -45,7 +50,7 @@ def run_tool(name: str, main: Callable[[Sequence[str]], int]) -> NoReturn:
             status = EXIT_BAD_INPUT
     except KeyboardInterrupt:
         status = 128 + signal.SIGINT
-    sys.exit(status)
+    return status
 
 
 #: The names of packages that are not those of their modules.

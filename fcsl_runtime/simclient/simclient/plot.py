@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""python -m simclient.plot BAG [PATH…] -o run.png: one picture of a run (see simclient.view.picture).
+"""fcsl plot BAG [PATH…] -o run.png: one picture of a run (see simclient.view.picture).
 
 Exit code 0: written. 1: written, but the bag is incomplete. 2: bad input, nothing written.
 """
@@ -10,27 +10,30 @@ import argparse
 from collections.abc import Sequence
 from pathlib import Path
 
-from fcsl_compiler.api.command_line import add_version
+from fcsl_compiler.api.command_line import add_examples
 
-from .cli import MSG_PATH_HELP, TIME_HELP, VIEWS_HELP, completeness, run_tool
+from .cli import MSG_PATH_HELP, TIME_HELP, VIEWS_HELP, completeness
 
 _EPILOG = """\
 Each PATH is a panel; paths with commas between them share one:
-  simclient.plot flight filter.outputs.pos_z,lander.outputs.pos_z engine.outputs.throttle -o flight.png
+  fcsl plot flight filter.outputs.pos_z,lander.outputs.pos_z engine.outputs.throttle -o flight.png
 A PATH is that of a field or of an element, or a shell pattern ('*.outputs.pos_z'). That of a struct or of an array draws
 all its members. Other topics: '/imu/data:angular_velocity.x'. Without PATH, the bag's views are drawn; where it has
 none, a panel for each name and unit of outputs."""
 
 
-def main(arguments: Sequence[str]) -> int:
-    """Parses the arguments, writes the file; returns the exit code. Raises BagError and ViewError."""
+_EXAMPLES = {
+    "": "flight filter.outputs.pos_z,lander.outputs.pos_z engine.outputs.throttle -o flight.png",
+}
+
+
+def make_parser() -> argparse.ArgumentParser:
     parser = argparse.ArgumentParser(
-        prog="simclient.plot",
+        prog="fcsl plot",
         description="Draws a recorded run.",
         epilog=_EPILOG,
         formatter_class=argparse.RawDescriptionHelpFormatter,
     )
-    add_version(parser, "simclient", __file__)
     parser.add_argument("bag", help="directory, or one of its files")
     parser.add_argument("paths", nargs="*", metavar="PATH", help="what to draw: a panel for each")
     parser.add_argument("-o", "--output", required=True, help="picture to write: .png, .svg or .pdf")
@@ -40,6 +43,13 @@ def main(arguments: Sequence[str]) -> int:
     parser.add_argument("--machine", default="", help="the machine, if the bag holds several")
     parser.add_argument("--truth", default="", help="topic of the plant's truth (default: all below /<namespace>/sim/)")
     parser.add_argument("--msg-path", action="append", default=[], metavar="FOLDER", help=MSG_PATH_HELP)
+    add_examples(parser, _EXAMPLES)
+    return parser
+
+
+def main(arguments: Sequence[str]) -> int:
+    """Parses the arguments, writes the file; returns the exit code. Raises BagError and ViewError."""
+    parser = make_parser()
     options = parser.parse_intermixed_args(arguments)
     if options.paths and options.views:
         parser.error("PATH and --views both choose the panels; give one of them")
@@ -54,9 +64,11 @@ def main(arguments: Sequence[str]) -> int:
     left_out = plot(bag, options.output, options.machine, options.truth, **chosen)
     print(f"{options.output}: {Path(options.output).stat().st_size} bytes")
     if left_out:
-        print(f"left out: {', '.join(left_out)}; simclient.plot BAG PATH… chooses what is drawn")
-    return completeness("simclient.plot", bag.truncated)
+        print(f"left out: {', '.join(left_out)}; fcsl plot BAG PATH… chooses what is drawn")
+    return completeness("fcsl plot", bag.truncated)
 
 
-if __name__ == "__main__":
-    run_tool("simclient.plot", main)
+if __name__ == "__main__":  # TEMPORARY
+    from .cli import run_tool
+
+    raise SystemExit(run_tool("fcsl plot", "plot", __import__("sys").argv[1:]))

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""python -m simclient.to_rerun BAG -o run.rrd: a run for the rerun viewer (see simclient.view.rrd).
+"""fcsl rerun BAG -o run.rrd: a run for the rerun viewer (see simclient.view.rrd).
 
 Exit code 0: written. 1: written, but the bag is incomplete. 2: bad input, nothing written.
 """
@@ -10,24 +10,32 @@ import argparse
 from collections.abc import Sequence
 from pathlib import Path
 
-from fcsl_compiler.api.command_line import add_version
+from fcsl_compiler.api.command_line import add_examples
 
-from .cli import VIEWS_HELP, completeness, run_tool
+from .cli import VIEWS_HELP, completeness
+
+_EXAMPLES = {
+    "": "flight -o flight.rrd",
+}
 
 
-def main(arguments: Sequence[str]) -> int:
-    """Parses the arguments, writes the file; returns the exit code. Raises BagError."""
+def make_parser() -> argparse.ArgumentParser:
     parser = argparse.ArgumentParser(
-        prog="simclient.to_rerun",
+        prog="fcsl rerun",
         description="Converts a recorded run for rerun. The first page has the panels and the body of the run's views.",
     )
-    add_version(parser, "simclient", __file__)
     parser.add_argument("bag", help="directory, or one of its files")
     parser.add_argument("-o", "--output", required=True, help="file to write: run.rrd")
     parser.add_argument("--views", default="", metavar="FILE", help=VIEWS_HELP)
     parser.add_argument("--machine", default="", help="the machine, if the bag holds several")
     parser.add_argument("--truth", default="", help="topic of the plant's truth (default: all below /<namespace>/sim/)")
-    options = parser.parse_args(arguments)
+    add_examples(parser, _EXAMPLES)
+    return parser
+
+
+def main(arguments: Sequence[str]) -> int:
+    """Parses the arguments, writes the file; returns the exit code. Raises BagError."""
+    options = make_parser().parse_args(arguments)
     # Imported here, because the imports take a second; inside run_tool, Ctrl-C meanwhile gives no traceback.
     from .bag.formats import open_bag
     from .view.rrd import to_rerun
@@ -39,8 +47,10 @@ def main(arguments: Sequence[str]) -> int:
     print(f"{options.output}: {Path(options.output).stat().st_size} bytes; view it with: rerun {options.output}")
     if left_out:
         print(f"left out of the first page: {', '.join(left_out)}")
-    return completeness("simclient.to_rerun", bag.truncated)
+    return completeness("fcsl rerun", bag.truncated)
 
 
-if __name__ == "__main__":
-    run_tool("simclient.to_rerun", main)
+if __name__ == "__main__":  # TEMPORARY
+    from .cli import run_tool
+
+    raise SystemExit(run_tool("fcsl rerun", "to_rerun", __import__("sys").argv[1:]))

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""A vehicle for the tests of fcsl-hal: its machine and board, and devices that are files and ptys."""
+"""A vehicle for the tests of fcsl hal: its machine and board, and devices that are files and ptys."""
 
 from __future__ import annotations
 
@@ -7,7 +7,6 @@ import io
 import json
 import os
 import subprocess
-import sys
 from contextlib import redirect_stderr, redirect_stdout
 from pathlib import Path
 from typing import Any
@@ -17,10 +16,9 @@ from conftest import CFLAGS, ROOT
 
 from fcsl_compiler.board.board import check_board
 from fcsl_compiler.board.plan import plan_text
-from simclient.cli import run_tool
-from simclient.hal.cli import main
+from simclient.verbs import COMMANDS
 
-HAL = [sys.executable, str(ROOT / "fcsl_runtime/simclient/bin/fcsl-hal")]
+HAL = ["fcsl", "hal"]
 LAW = """class Law:
     inputs = {"gyro": "f64[3] rad/s", "accel": "f64[3] m/s^2", "field": "f64[3] T", "sticks": "f64[4]"}
     outputs = {"motors": "f64[2]"}
@@ -122,18 +120,17 @@ def environment(sysfs: Path, dev: Path | None = None) -> dict[str, str]:
 def run(
     sysfs: Path, *words: object, status: int | None = 0, dev: Path | None = None
 ) -> subprocess.CompletedProcess[str]:
-    """Runs fcsl-hal in this process and expects an exit status."""
-    line = ["fcsl-hal", *map(str, words)]
+    """Runs fcsl hal in this process and expects an exit status."""
+    line = list(map(str, words))
     out, err = io.StringIO(), io.StringIO()
     with pytest.MonkeyPatch.context() as patch, redirect_stdout(out), redirect_stderr(err):
-        patch.setattr(sys, "argv", line)
         for name, value in environment(sysfs, dev).items():
             patch.setenv(name, value)
-        with pytest.raises(SystemExit) as ended:
-            run_tool("fcsl-hal", main)
-    code = ended.value.code
+        try:
+            code = COMMANDS.verbs["hal"].run(line)
+        except SystemExit as ended:  # of argparse
+            code = int(ended.code or 0)
     assert status is None or code == status, f"{code}\n{out.getvalue()}{err.getvalue()}"
-    assert isinstance(code, int)
     return subprocess.CompletedProcess(line, code, out.getvalue(), err.getvalue())
 
 

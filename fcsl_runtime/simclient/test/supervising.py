@@ -18,7 +18,7 @@ from pathlib import Path
 from typing import Any
 
 ROOT = Path(__file__).resolve().parents[3]
-_START = "import sys; from simclient.cli import run_tool; from simclient.supervisor.service import main; {patch}; run_tool('fcsl-supervisor', main)"
+_START = "import sys; from simclient.cli import run_tool; {patch}; sys.exit(run_tool('fcsl supervisor', 'supervisor.service', sys.argv[1:]))"
 _PATIENCE_S = 30.0
 
 
@@ -43,12 +43,12 @@ class Answer:
 
 
 class Supervisor:
-    """A running fcsl-supervisor."""
+    """A running fcsl supervisor."""
 
     def __init__(self, root: Path, *arguments: str, patch: str = "pass", private: Path | None = None):
         """`patch` is Python that is executed before it starts; `private` is where it has its private folder."""
         environment = {**os.environ, **({"TMPDIR": str(private)} if private else {})}
-        given = arguments if "--port" in arguments else (*arguments, "--port", "0")
+        given = arguments if "--listen" in arguments else (*arguments, "--listen", "tcp:127.0.0.1:0")
         self.process = subprocess.Popen(
             [sys.executable, "-c", _START.format(patch=patch), "--root", str(root), *given],
             stdout=subprocess.PIPE,
@@ -57,7 +57,7 @@ class Supervisor:
         )
         assert self.process.stdout is not None
         said = self.process.stdout.readline()
-        found = re.match(r"fcsl-supervisor: http://(.*):(\d+)/ ", said)
+        found = re.match(r"fcsl supervisor: http://(.*):(\d+)/ ", said)
         assert found, f"{said!r}, status {self.process.wait(_PATIENCE_S)}"
         self.address, self.port = found[1].strip("[]"), int(found[2])
 

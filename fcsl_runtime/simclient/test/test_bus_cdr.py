@@ -1,6 +1,6 @@
 # SPDX-License-Identifier: Apache-2.0
 """ROS 2 messages as named values: a simulator made of rosbags and Zenoh's own package flies with fcsl-fc, and sends it what is
-none; fcsl-bus shows and records the values of them."""
+none; fcsl bus shows and records the values of them."""
 
 from __future__ import annotations
 
@@ -9,7 +9,6 @@ import math
 import queue
 import struct
 import subprocess
-import sys
 from collections.abc import Iterator, Sequence
 from pathlib import Path
 from typing import Any
@@ -33,7 +32,6 @@ from simclient.errors import BusError
 STORE = get_typestore(Stores.ROS2_JAZZY)
 T = STORE.types
 LONG_S = 60
-TOOL = Path(__file__).resolve().parents[1] / "bin/fcsl-bus"
 #: The message of std_msgs, the type in a machine, and a value of each kind.
 KINDS: tuple[tuple[str, str, Any], ...] = (
     ("Bool", "bool", True),
@@ -148,8 +146,8 @@ class Simulator:
             str(library),
             "--hal",
             f"zenoh:{endpoint}",
-            "--timeout-ms",
-            "5000",
+            "--timeout",
+            "5",
             "--summary",
             str(self.summary),
         ]
@@ -312,7 +310,7 @@ def test_a_message_that_is_none_ends_the_run(simulator: Simulator, name: str, da
     assert f"the commit of tick 1 says that channel '{name}' has a value, and what came is none" in said
 
 
-# ---- fcsl-bus ---------------------------------------------------------------------------------------------------------
+# ---- fcsl bus ---------------------------------------------------------------------------------------------------------
 
 
 @pytest.fixture(scope="module")
@@ -336,7 +334,7 @@ def machine(endpoint: str) -> BusMachine:
 
 
 def tool(*arguments: str | Path, status: int = 0) -> str:
-    line = [sys.executable, str(TOOL), *(str(a) for a in arguments)]
+    line = ["fcsl", "bus", *(str(a) for a in arguments)]
     done = subprocess.run(line, capture_output=True, text=True, timeout=LONG_S, check=False)
     assert done.returncode == status, done.stdout + done.stderr
     assert "Traceback" not in done.stderr
@@ -390,7 +388,7 @@ def test_messages_of_random_values() -> None:
 
 
 def test_a_recording_has_the_values(endpoint: str, tmp_path: Path) -> None:
-    line = [sys.executable, str(TOOL), "record", "-c", endpoint, "-o", str(tmp_path / "bag")]
+    line = ["fcsl", "bus", "record", "-c", endpoint, "-o", str(tmp_path / "bag")]
     with subprocess.Popen(line, stdout=subprocess.PIPE, text=True) as recorder:
         assert recorder.stdout and "recording echo to" in recorder.stdout.readline()
         tool("echo", "-c", endpoint, "-n", "640")  # ten ticks of it

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""fcsl-bus record: what reproduces a run, from the numbers of the host's writes; a machine that reads hardware."""
+"""fcsl bus record: what reproduces a run, from the numbers of the host's writes; a machine that reads hardware."""
 
 from __future__ import annotations
 
@@ -113,7 +113,7 @@ def test_a_machine_that_reads_hardware(tmp_path: Path) -> None:
     assert found.identical and found.values == found.ticks == end + 1 - begin, str(found)
     assert any("outputs of `probe` come from the record" in note for note in found.notes)
     whole = tmp_path / "bag"
-    with pytest.raises(BagError, match="`fcsl-bus record` made it"):
+    with pytest.raises(BagError, match="`fcsl bus record` made it"):
         Bag(whole).machine()
 
 

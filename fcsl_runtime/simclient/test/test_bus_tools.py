@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""fcsl-bus on a flight program: what it prints, puts, records and refuses."""
+"""fcsl bus on a flight program: what it prints, puts, records and refuses."""
 
 from __future__ import annotations
 
@@ -32,7 +32,6 @@ from simclient.bus.session import Session
 from simclient.bus.ticks import TickReader
 from simclient.errors import BusError
 
-TOOL = Path(__file__).resolve().parents[1] / "bin/fcsl-bus"
 LONG_S = 60
 ALGORITHM = """class Rig:
     inputs = {"packet": "u32[9]", "attitude": "f32[4]", "ready": "bool", "offset": "i32[2][2]"}
@@ -98,7 +97,7 @@ def endpoint(library: Path) -> Iterator[str]:
 
 
 def tool(*arguments: str | Path, status: int = 0) -> tuple[str, str]:
-    line = [sys.executable, str(TOOL), *(str(a) for a in arguments)]
+    line = ["fcsl", "bus", *(str(a) for a in arguments)]
     done = subprocess.run(line, capture_output=True, text=True, timeout=LONG_S, check=False)
     assert done.returncode == status, done.stdout + done.stderr
     assert "Traceback" not in done.stderr
@@ -108,7 +107,7 @@ def tool(*arguments: str | Path, status: int = 0) -> tuple[str, str]:
 def follow_to_the_end(library: Path, *arguments: str | Path) -> tuple[str, int]:
     """What a tool prints about a flight that ends a second after the tool's first line, and the ticks of the flight."""
     where = free_endpoint()
-    line = [sys.executable, str(TOOL), *(str(a) for a in arguments), "-c", where]
+    line = ["fcsl", "bus", *(str(a) for a in arguments), "-c", where]
     with flying(library, where) as fc, subprocess.Popen(line, stdout=subprocess.PIPE, text=True) as follower:
         assert follower.stdout
         first = follower.stdout.readline()
@@ -159,7 +158,7 @@ def test_a_machine_that_cannot_be_read_hides_no_other(endpoint: str) -> None:
         out, err = tool("list", "-c", endpoint, "-s", "0.1")
         served.undeclare()
     assert out.startswith("north/hill/rig: 200 Hz") and "south" not in out
-    assert err == "fcsl-bus: left out: the descriptor of south/rig is not one of docs/reference/transports.md\n"
+    assert err == "fcsl bus: left out: the descriptor of south/rig is not one of docs/reference/transports.md\n"
 
 
 def test_echo(endpoint: str) -> None:
@@ -181,7 +180,7 @@ def test_hz(endpoint: str) -> None:
 
 
 def test_a_reader_that_goes(endpoint: str) -> None:
-    line = f"{sys.executable} {TOOL} echo -c {endpoint} | head -n 3"
+    line = f"fcsl bus echo -c {endpoint} | head -n 3"
     done = subprocess.run(line, shell=True, capture_output=True, text=True, timeout=LONG_S, check=False)
     assert len(done.stdout.splitlines()) == 3 and done.stderr == ""
 
@@ -191,14 +190,14 @@ def test_an_interrupted_recording_is_complete(endpoint: str, number: signal.Sign
     lost, folders = True, iter(range(20))
     while lost:  # a busy computer costs an observer ticks, which it counts: this is about a recording without
         path = tmp_path / f"bag{next(folders)}"
-        line = [sys.executable, str(TOOL), "record", "-c", endpoint, "-o", str(path)]
+        line = ["fcsl", "bus", "record", "-c", endpoint, "-o", str(path)]
         with subprocess.Popen(line, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True) as recorder:
             assert recorder.stdout and "recording north/hill/rig to" in recorder.stdout.readline()
             with pytest.raises(subprocess.TimeoutExpired):
                 recorder.wait(1.0)
             recorder.send_signal(number)
             out, err = recorder.communicate(timeout=LONG_S)
-        lost = re.fullmatch(r"fcsl-bus: \d+ ticks and \d+ values were lost, 0 messages refused\n", err) is not None
+        lost = re.fullmatch(r"fcsl bus: \d+ ticks and \d+ values were lost, 0 messages refused\n", err) is not None
         assert recorder.returncode == 0 and (lost or err == "")
     bag = Bag(path)
     text = describe(bag, "")
@@ -273,7 +272,7 @@ def test_nobody_there(tmp_path: Path) -> None:
     )
     assert "write tcp/HOST:PORT" in tool("echo", "-c", "127.0.0.1:7447", status=2)[1]
     (tmp_path / "wrong.json").write_text("[1]")
-    with pytest.raises(BusError, match="not what `fcsl-bus list --json` prints"):
+    with pytest.raises(BusError, match="not what `fcsl bus list --json` prints"):
         _read_descriptors(tmp_path / "wrong.json")
 
 

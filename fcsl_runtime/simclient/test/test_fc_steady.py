@@ -256,7 +256,7 @@ def test_in_lock_step(kind: str, folder: Path, tmp_path: Path) -> None:
         free.bind(("127.0.0.1", 0))
         wire = f"unix:{tmp_path / 'w'}" if kind == "unix" else f"{kind}127.0.0.1:{free.getsockname()[1]}"
     with subprocess.Popen([WIRE_SIM, FIXTURE, wire, "100000", "end"], stderr=subprocess.DEVNULL) as simulator:
-        options = ("--hal", f"wire:{wire}", "--timeout-ms", "30000", "--record", str(tmp_path / "bag"))
+        options = ("--hal", f"wire:{wire}", "--timeout", "30", "--record", str(tmp_path / "bag"))
         assert Watched(folder, FIXTURE, *options, peer=True).allocations() == 0
         simulator.kill()
 
@@ -264,7 +264,7 @@ def test_in_lock_step(kind: str, folder: Path, tmp_path: Path) -> None:
 def beside_a_rig(folder: Path, library: str, hello: bytes, path: Path) -> Watched:
     """Flown beside a rig that answers the hello and says nothing else."""
     with listening(path) as listener:
-        fc = Watched(folder, library, "--hal", f"wire:unix:{path}", "--timeout-ms", "30000", peer=True)
+        fc = Watched(folder, library, "--hal", f"wire:unix:{path}", "--timeout", "30", peer=True)
         peer, _ = listener.accept()
         with peer:
             peer.settimeout(60)

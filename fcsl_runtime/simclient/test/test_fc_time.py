@@ -256,7 +256,7 @@ def test_nohup_keeps_the_hangup_away(tmp_path: Path) -> None:
 def test_signal_while_it_waits_for_the_simulator(tmp_path: Path) -> None:
     """Nobody listens yet; the default action ends it, since there is nothing to save."""
     wire = tmp_path / "wire"
-    with flying("--hal", f"wire:unix:{wire}", "--timeout-ms", "60000", "--summary", tmp_path / "end") as fc:
+    with flying("--hal", f"wire:unix:{wire}", "--timeout", "60", "--summary", tmp_path / "end") as fc:
         with socket.socket(socket.AF_UNIX, socket.SOCK_SEQPACKET) as listener:
             listener.bind(str(wire))
             listener.listen(1)

@@ -35,7 +35,7 @@ def test_same_bits_as_in_process(tmp_path: Path) -> None:
     wire, bag = tmp_path / "wire", tmp_path / "bag"
     with (
         simulator(wire, 3000, "end") as sim,
-        flying("--hal", f"wire:unix:{wire}", "--record", bag, "--timeout-ms", "10000") as fc,
+        flying("--hal", f"wire:unix:{wire}", "--record", bag, "--timeout", "10") as fc,
     ):
         code, out, err = fc.wait()
         assert sim.wait(timeout=30) == 0, sim.communicate()
@@ -60,7 +60,7 @@ def test_timeout_names_the_tick(tmp_path: Path) -> None:
     wire, bag = tmp_path / "wire", tmp_path / "bag"
     with (
         simulator(wire, 17, "hang"),
-        flying("--hal", f"wire:unix:{wire}", "--record", bag, "--timeout-ms", "400") as fc,
+        flying("--hal", f"wire:unix:{wire}", "--record", bag, "--timeout", "0.4") as fc,
     ):
         code, out, err = fc.wait()
     assert code == 1 and err == "fcsl-fc: no time message of tick 17 within 400 ms\n" and "17 ticks" in out
@@ -79,7 +79,7 @@ def test_a_simulator_that_paces_leaves_no_deadline_to_miss(tmp_path: Path) -> No
     wire = tmp_path / "wire"
     with (
         simulator(wire, 9, "end"),
-        flying("--hal", f"wire:unix:{wire}", "--timeout-ms", "20000", "--missed-deadline", "skip") as fc,
+        flying("--hal", f"wire:unix:{wire}", "--timeout", "20", "--missed-deadline", "skip") as fc,
     ):
         code, _, err = fc.wait()
     assert code == 1 and "here a simulator or a device paces them" in err
@@ -88,7 +88,7 @@ def test_a_simulator_that_paces_leaves_no_deadline_to_miss(tmp_path: Path) -> No
 @pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGTERM])
 def test_signal_while_waiting(tmp_path: Path, number: int) -> None:
     wire = tmp_path / "wire"
-    with simulator(wire, 5, "hang") as sim, flying("--hal", f"wire:unix:{wire}", "--timeout-ms", "20000") as fc:
+    with simulator(wire, 5, "hang") as sim, flying("--hal", f"wire:unix:{wire}", "--timeout", "20") as fc:
         assert sim.stdout is not None and sim.stdout.readline() == "5 ticks\n"
         begun = time.monotonic()
         code, out, err = fc.stop(number)
@@ -141,7 +141,7 @@ def listening(path: Path) -> Iterator[socket.socket]:
 
 def test_a_simulator_written_from_the_page_flies_the_controller(tmp_path: Path) -> None:
     wire, hello = tmp_path / "wire", control(HELLO, table_hash(TABLE), TICK_HZ)
-    with listening(wire) as listener, flying("--hal", f"wire:unix:{wire}", "--timeout-ms", "30000") as fc:
+    with listening(wire) as listener, flying("--hal", f"wire:unix:{wire}", "--timeout", "30") as fc:
         peer, _ = listener.accept()
         peer.settimeout(30)
         assert peer.recv(4096) == hello
@@ -164,7 +164,7 @@ def test_a_simulator_written_from_the_page_flies_the_controller(tmp_path: Path) 
 def test_a_rig_that_sends_no_time_leaves_the_clock_to_the_controller(tmp_path: Path) -> None:
     """It may fall silent and go; the controller makes its ticks, and says how old the samples are."""
     wire, variables = tmp_path / "wire", tmp_path / "fc.sock"
-    hal = ("--hal", f"wire:unix:{wire}", "--timeout-ms", "30000", "--socket", variables)
+    hal = ("--hal", f"wire:unix:{wire}", "--timeout", "30", "--socket", variables)
     with listening(wire) as listener, flying(*hal) as fc:
         peer, _ = listener.accept()
         peer.settimeout(30)
@@ -192,7 +192,7 @@ def test_a_rig_that_sends_no_time_leaves_the_clock_to_the_controller(tmp_path: P
 
 def test_a_refusal_written_from_the_page_is_told(tmp_path: Path) -> None:
     wire = tmp_path / "wire"
-    with listening(wire) as listener, flying("--hal", f"wire:unix:{wire}", "--timeout-ms", "30000") as fc:
+    with listening(wire) as listener, flying("--hal", f"wire:unix:{wire}", "--timeout", "30") as fc:
         peer, _ = listener.accept()
         peer.send(control(REFUSAL, text=b"another vehicle"))
         code, _, err = fc.wait()

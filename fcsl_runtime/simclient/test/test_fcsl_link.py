@@ -1,21 +1,18 @@
 # SPDX-License-Identifier: Apache-2.0
-"""fcsl-link beside a real flight over UDP, and beside programs without a link."""
+"""fcsl link beside a real flight over UDP, and beside programs without a link."""
 
 from __future__ import annotations
 
 import json
 import socket
 import subprocess
-import sys
 from pathlib import Path
 
 from native import FIXTURE, WIRE_SIM, flying
 
-PROGRAM = "from simclient.cli import run_tool; from simclient.link.watch import main; run_tool('fcsl-link', main)"
-
 
 def fcsl_link(*arguments: str | Path) -> subprocess.CompletedProcess[str]:
-    line = [sys.executable, "-c", PROGRAM, *map(str, arguments)]
+    line = ["fcsl", "link", *map(str, arguments)]
     return subprocess.run(line, capture_output=True, text=True, timeout=60, check=False)
 
 
@@ -26,7 +23,7 @@ def test_a_flight_over_udp(tmp_path: Path) -> None:
     variables = tmp_path / "fc.sock"
     with (
         subprocess.Popen([WIRE_SIM, FIXTURE, wire, "50", "hang"], stdout=subprocess.PIPE, text=True) as sim,
-        flying("--hal", f"wire:{wire}", "--timeout-ms", "60000", "--socket", variables),
+        flying("--hal", f"wire:{wire}", "--timeout", "60", "--socket", variables),
     ):
         assert sim.stdout is not None and sim.stdout.readline() == "50 ticks\n"
         shown = fcsl_link("--socket", variables, "--period", "0.1", "--count", "2")
@@ -44,9 +41,9 @@ def test_a_program_without_a_link(tmp_path: Path) -> None:
     with flying("--socket", tmp_path / "s") as fc:
         fc.client(tmp_path / "s")
         done = fcsl_link("--socket", tmp_path / "s", "--count", "1")
-    assert done.returncode == 1 and done.stderr.startswith("fcsl-link: this program has no link: ")
+    assert done.returncode == 1 and done.stderr.startswith("fcsl link: this program has no link: ")
 
 
 def test_no_program(tmp_path: Path) -> None:
     done = fcsl_link("--socket", tmp_path / "nothing", "--count", "1")
-    assert done.returncode == 2 and done.stderr.startswith("fcsl-link: ") and done.stderr.count("\n") == 1
+    assert done.returncode == 2 and done.stderr.startswith("fcsl link: ") and done.stderr.count("\n") == 1

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""`fcsl-hal test-actuator`: what moves, how, and that the safe pulse is the last one whatever happens."""
+"""`fcsl hal test-actuator`: what moves, how, and that the safe pulse is the last one whatever happens."""
 
 from __future__ import annotations
 

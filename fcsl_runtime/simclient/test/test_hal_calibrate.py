@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""`fcsl-hal calibrate`: what it refuses, what it finds, and that a board keeps all else."""
+"""`fcsl hal calibrate`: what it refuses, what it finds, and that a board keeps all else."""
 
 from __future__ import annotations
 

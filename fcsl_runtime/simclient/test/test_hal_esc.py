@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""`fcsl-hal calibrate esc`: maximum, minimum, and the safe value last, whatever ends it."""
+"""`fcsl hal calibrate esc`: maximum, minimum, and the safe value last, whatever ends it."""
 
 from __future__ import annotations
 

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""`fcsl-hal describe PLAN --plot FILE`: responses against SciPy's, and the picture."""
+"""`fcsl hal describe PLAN --plot FILE`: responses against SciPy's, and the picture."""
 
 from __future__ import annotations
 

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""The fits of fcsl-hal against a known truth with noise, and against SciPy's least_squares."""
+"""The fits of fcsl hal against a known truth with noise, and against SciPy's least_squares."""
 
 from __future__ import annotations
 

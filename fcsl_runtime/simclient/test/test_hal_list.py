@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""`fcsl-hal list` and `describe` on a fake sysfs."""
+"""`fcsl hal list` and `describe` on a fake sysfs."""
 
 from __future__ import annotations
 

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""`fcsl-hal monitor`: devices that come and go, values before and after their correction, the end by Ctrl-C."""
+"""`fcsl hal monitor`: devices that come and go, values before and after their correction, the end by Ctrl-C."""
 
 from __future__ import annotations
 
@@ -103,7 +103,7 @@ def test_lines_of_one_sensor(tmp_path: Path, sysfs: Path) -> None:
 
 def test_a_device_that_is_missing_at_the_end(tmp_path: Path, sysfs: Path) -> None:
     done = run(sysfs, "monitor", write_plan(tmp_path), "--seconds", "0.3", status=1)
-    assert done.stderr.splitlines()[-1].startswith("fcsl-hal: device 'spare' is not there: no IIO device")
+    assert done.stderr.splitlines()[-1].startswith("fcsl hal: device 'spare' is not there: no IIO device")
     assert "rc: no healthy device" in done.stdout
 
 

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""What `fcsl-hal` says of receivers that give nothing: which bytes arrive, and why no sample comes of them."""
+"""What `fcsl hal` says of receivers that give nothing: which bytes arrive, and why no sample comes of them."""
 
 from __future__ import annotations
 

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""fcsl-view as a program: what it serves and to whom, a viewer that does not read, and a real flight."""
+"""fcsl view as a program: what it serves and to whom, a viewer that does not read, and a real flight."""
 
 from __future__ import annotations
 
@@ -7,7 +7,6 @@ import os
 import signal
 import socket
 import subprocess
-import sys
 import time
 import urllib.request
 from collections.abc import Iterator
@@ -27,7 +26,6 @@ from simclient.telemetry.receiver import Telemetry
 from simclient.view.rrd import to_rerun
 
 LIMIT_S = 60.0
-_PROGRAM = "from simclient.cli import run_tool; from simclient.live.cli import main; run_tool('fcsl-view', main)"
 
 
 def free_pair() -> int:
@@ -67,7 +65,7 @@ def listeners(port: int) -> set[str]:
 @contextmanager
 def viewing(*options: str | Path) -> Iterator[tuple[subprocess.Popen[str], list[str]]]:
     """The program and its first lines, up to the one that says where it listens; it is ended behind the block."""
-    command = [sys.executable, "-c", _PROGRAM, *map(str, options)]
+    command = ["fcsl", "view", *map(str, options)]
     with subprocess.Popen(command, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True) as process:
         try:
             assert process.stdout is not None
@@ -83,7 +81,7 @@ def port_of(line: str) -> int:
 
 def test_page_and_data_are_for_this_computer_alone_and_end_with_the_program() -> None:
     port = free_pair()
-    with viewing("0", "--web", port) as (process, _):
+    with viewing("udp:127.0.0.1:0", "--web", port) as (process, _):
         until(lambda: answers(port) and answers(port + 1), "neither page nor data")
         with urllib.request.urlopen(f"http://127.0.0.1:{port}/", timeout=LIMIT_S) as page:
             assert page.status == 200 and b"<title>Rerun Viewer</title>" in page.read()
@@ -95,7 +93,7 @@ def test_page_and_data_are_for_this_computer_alone_and_end_with_the_program() ->
 def test_a_page_whose_port_is_taken_is_a_message() -> None:
     port = free_pair()
     for taken in (port, port + 1):
-        with socket.create_server(("127.0.0.1", taken)), viewing("0", "--web", port) as (process, _):
+        with socket.create_server(("127.0.0.1", taken)), viewing("udp:127.0.0.1:0", "--web", port) as (process, _):
             out, err = process.communicate(timeout=LIMIT_S)
         assert process.returncode == 2 and f"Address already in use ({taken})" in err and "open" not in out, out + err
 
@@ -129,15 +127,18 @@ def test_who_listens_everywhere_is_found() -> None:
 @pytest.mark.parametrize(
     ("options", "reason"),
     [
-        (["99999"], "a port is a number"),
-        (["0", "--web", "65535"], "--web takes one above 0 and the one after it"),
-        (["0", "--web", "0"], "--web takes one above 0"),
-        (["0", "--connect", "here"], "`here` is not a viewer's address; expected one like rerun+http://"),
-        (["0", "--connect", "web"], "`web` is not a viewer"),
-        (["0", "--connect", "rerun+http://127.0.0.1:x/proxy"], "is not a viewer"),
-        (["0", "--connect", "rerun+http://127.0.0.1:1/proxy"], "1/proxy: Connection refused; start it first"),
-        (["0", "--save", "/no/where/x.rrd"], "no such directory: /no/where"),
-        (["0", "--host", "300.0.0.1"], "cannot listen on 300.0.0.1:0"),
+        (["udp:127.0.0.1:99999"], "write udp:HOST:PORT"),
+        (["udp:127.0.0.1:0", "--web", "65535"], "--web takes a port above 0 and below 65535"),
+        (["udp:127.0.0.1:0", "--web", "0"], "--web takes a port above 0"),
+        (["udp:127.0.0.1:0", "--connect", "here"], "`here` is not a viewer's address; expected one like rerun+http://"),
+        (["udp:127.0.0.1:0", "--connect", "web"], "`web` is not a viewer"),
+        (["udp:127.0.0.1:0", "--connect", "rerun+http://127.0.0.1:x/proxy"], "is not a viewer"),
+        (
+            ["udp:127.0.0.1:0", "--connect", "rerun+http://127.0.0.1:1/proxy"],
+            "1/proxy: Connection refused; start it first",
+        ),
+        (["udp:127.0.0.1:0", "--save", "/no/where/x.rrd"], "no such directory: /no/where"),
+        (["udp:300.0.0.1:0"], "cannot listen on 300.0.0.1:0"),
     ],
 )
 def test_wrong_usage_is_one_message(options: list[str], reason: str) -> None:
@@ -150,13 +151,13 @@ def test_a_window_without_a_display_is_a_message() -> None:
     with pytest.MonkeyPatch.context() as patch:
         for name in ("DISPLAY", "WAYLAND_DISPLAY", "WAYLAND_SOCKET"):
             patch.delenv(name, raising=False)
-        with viewing("0") as (process, _):
+        with viewing("udp:127.0.0.1:0") as (process, _):
             _, err = process.communicate(timeout=LIMIT_S)
     assert process.returncode == 1 and "without a display, have a page" in err, err
 
 
 def test_a_real_flight_is_shown_as_its_bag_is(probe: Path, tmp_path: Path) -> None:
-    with viewing("0", "--save", tmp_path / "live.rrd") as (process, lines):
+    with viewing("udp:127.0.0.1:0", "--save", tmp_path / "live.rrd") as (process, lines):
         fly = [PROGRAM, str(probe), "--ticks", "100", "--record", str(tmp_path / "bag")]
         flight = subprocess.run(
             [*fly, "--telemetry", f"udp:127.0.0.1:{port_of(lines[0])}"], capture_output=True, text=True, timeout=LIMIT_S

@@ -75,7 +75,7 @@ def test_the_start_of_simulated_time_is_a_time(tmp_path: Path) -> None:
 
 
 def test_a_table_has_one_clock(simulated: Path, tmp_path: Path) -> None:
-    from simclient.bag.__main__ import main
+    from simclient.bag.command import main
 
     target = tmp_path / "x.csv"
     for options, first_s, rows in (((), "1700000000.000000000", 101), (("--time", "header"), "928.000000000", 101)):

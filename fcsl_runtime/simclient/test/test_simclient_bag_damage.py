@@ -6,7 +6,6 @@ from __future__ import annotations
 import os
 import resource
 import subprocess
-import sys
 from collections.abc import Callable
 from io import BytesIO
 from pathlib import Path
@@ -206,9 +205,7 @@ def test_a_bomb_takes_seconds(tmp_path: Path) -> None:
     bag.write_bytes(b"\x89MCAP0\r\n" + chunk * 240 + end)
     assert bag.stat().st_size < 2_000_000
     before = resource.getrusage(resource.RUSAGE_CHILDREN)
-    done = subprocess.run(
-        [sys.executable, "-m", "simclient.bag", "info", str(bag)], capture_output=True, text=True, env=os.environ
-    )
+    done = subprocess.run(["fcsl", "bag", "info", str(bag)], capture_output=True, text=True, env=os.environ)
     assert done.returncode == 1 and "takes the file beyond 1 GiB and 1000 times its size" in done.stdout
     assert "reading bomb.mcap: " in done.stderr
     used = resource.getrusage(resource.RUSAGE_CHILDREN)

@@ -6,7 +6,6 @@ from __future__ import annotations
 import sqlite3
 import struct
 import subprocess
-import sys
 from pathlib import Path
 
 import pytest
@@ -54,7 +53,7 @@ def test_from_a_folder(bag: Path, tmp_path: Path) -> None:
     note = f"the bag does not define its types; those of {file} are taken for custom_msgs/msg/Drive"
     assert check(bag, folder) == [note]
     assert check(bag, folder / "custom_msgs") == [note]
-    command = [sys.executable, "-m", "simclient.bag", "export", str(bag), "-o", str(tmp_path / "a.csv")]
+    command = ["fcsl", "bag", "export", str(bag), "-o", str(tmp_path / "a.csv")]
     done = subprocess.run([*command, "--msg-path", str(folder)], capture_output=True, text=True)
     assert done.returncode == 0 and "speed.value" in (tmp_path / "a.csv").read_text(), done.stderr
 

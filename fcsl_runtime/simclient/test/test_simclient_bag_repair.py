@@ -4,7 +4,6 @@
 from __future__ import annotations
 
 import subprocess
-import sys
 import time
 from pathlib import Path
 from typing import Any
@@ -57,7 +56,7 @@ def test_repair_of_a_killed_bag(killed: tuple[Path, Any]) -> None:
     before = list(Bag(bag).messages())
     told = information(bag)
     (bag / "metadata.yaml").unlink()
-    done = subprocess.run([sys.executable, "-m", "simclient.bag", "repair", str(bag)], capture_output=True, text=True)
+    done = subprocess.run(["fcsl", "bag", "repair", str(bag)], capture_output=True, text=True)
     assert f"run_0.mcap: {len(before)} messages, end rewritten\n" in done.stdout
     assert list(Bag(bag).messages()) == before and Bag(bag).truncated == ""
     with (bag / "run_0.mcap").open("rb") as stream:

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""`python -m simclient.bag`: what it says of a bag, cuts out, finds different and exports is what the bag holds."""
+"""`fcsl bag`: what it says of a bag, cuts out, finds different and exports is what the bag holds."""
 
 from __future__ import annotations
 
@@ -61,7 +61,7 @@ def fly(probe: Path, tmp_path: Path) -> Fly:
 
 
 def tool(*arguments: object) -> subprocess.CompletedProcess[str]:
-    command = [sys.executable, "-m", "simclient.bag", *map(str, arguments)]
+    command = ["fcsl", "bag", *map(str, arguments)]
     done = subprocess.run(command, capture_output=True, text=True)
     assert "Traceback" not in done.stderr, done.stderr
     return done

@@ -94,7 +94,7 @@ MISS = "law.py:6:23: mcdc: `self.b` was never False while the decision's outcome
 
 
 def test_the_command(gate: Path) -> None:
-    printed = cover("gate.json", "--json", "report.json", "--", sys.executable, "-m", "pytest", "-q", "test_gate.py")
+    printed = cover("gate.json", "-o", "report.json", "--", sys.executable, "-m", "pytest", "-q", "test_gate.py")
     assert "2 passed" in printed and MISS in printed
     assert "100.0 % (3/3)" in printed and "100.0 % (2/2)" in printed and "50.0 % (1/2)" in printed
     (machine,) = json.loads((gate / "report.json").read_text())["machines"]
@@ -125,8 +125,8 @@ def test_limits_and_the_status_of_the_command(gate: Path) -> None:
         (("gate.json", "python3", "-m", "pytest", "-q"), "no command to run; write it after `--`"),
         (("none.json", "--", "true"), "no such machine: none.json"),
         (("law.py", "--", "true"), "`law.py` is not a machine's JSON file"),
-        (("gate.json", "--json", "gate.json", "--", "true"), "`gate.json` exists and is not a coverage report"),
-        (("gate.json", "--json", ".", "--", "true"), "`.` exists and is not a coverage report"),
+        (("gate.json", "-o", "gate.json", "--", "true"), "`gate.json` exists and is not a coverage report"),
+        (("gate.json", "-o", ".", "--", "true"), "`.` exists and is not a coverage report"),
         (("gate.json", "--", "no-such-program"), "`no-such-program` does not run"),
         (("gate.json", "--fail-under", "mcdc", "--", "true"), "`mcdc` is not a coverage limit; write line=PERCENT"),
         (("gate.json", "--fail-under", "line=101", "--", "true"), "`line=101` is not a coverage limit"),

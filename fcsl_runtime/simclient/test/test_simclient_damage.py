@@ -5,7 +5,6 @@ from __future__ import annotations
 
 import random
 import subprocess
-import sys
 from io import BytesIO
 from pathlib import Path
 
@@ -86,16 +85,16 @@ def test_an_empty_last_file_is_a_recording_cut_off(bag: Path) -> None:
     assert digest(opened) == digest(bag / "run_0.mcap")
 
 
-@pytest.mark.parametrize(("tool", "suffix"), [("plot", "png"), ("to_rerun", "rrd")])
+@pytest.mark.parametrize(("tool", "suffix"), [("plot", "png"), ("rerun", "rrd")])
 def test_viewers_say_that_a_bag_is_incomplete(bag: Path, tool: str, suffix: str) -> None:
     file = bag / "run_0.mcap"
     whole = file.read_bytes()
     picture = bag.parent / f"x.{suffix}"
-    command = [sys.executable, "-m", f"simclient.{tool}", str(bag), "-o", str(picture)]
+    command = ["fcsl", tool, str(bag), "-o", str(picture)]
     file.write_bytes(whole[: len(whole) - 100])
     done = subprocess.run(command, capture_output=True, text=True)
     assert done.returncode == 1 and picture.stat().st_size > 1000
-    assert done.stderr.startswith(f"simclient.{tool}: the bag is incomplete: run_0.mcap ")
+    assert done.stderr.startswith(f"fcsl {tool}: the bag is incomplete: run_0.mcap ")
 
     picture.unlink()
     middle = bytearray(whole)

@@ -3,9 +3,9 @@
 
 from __future__ import annotations
 
+import os
 import resource
 import subprocess
-import sys
 from collections.abc import Callable
 from pathlib import Path
 
@@ -24,8 +24,9 @@ def limited(size: int) -> Callable[[], None]:
 
 
 def tool(size: int, *arguments: object) -> subprocess.CompletedProcess[str]:
-    command = [sys.executable, "-B", "-m", *map(str, arguments)]  # no compiled import is cut short for later processes
-    return subprocess.run(command, capture_output=True, text=True, timeout=120, preexec_fn=limited(size))
+    unwritten = {**os.environ, "PYTHONDONTWRITEBYTECODE": "1"}  # no compiled import is cut short for later processes
+    command = ["fcsl", *map(str, arguments)]
+    return subprocess.run(command, capture_output=True, text=True, timeout=120, env=unwritten, preexec_fn=limited(size))
 
 
 @pytest.fixture
@@ -46,30 +47,30 @@ def nothing_is_left(target: Path) -> None:
 
 
 @pytest.mark.parametrize(
-    ("module", "file"),
-    [("to_rerun", "x.rrd"), ("plot", "x.png"), ("plot", "x.svg"), ("plot", "x.pdf")]
+    ("verb", "file"),
+    [("rerun", "x.rrd"), ("plot", "x.png"), ("plot", "x.svg"), ("plot", "x.pdf")]
     + [("bag", f"x.{suffix}") for suffix in ("csv", "parquet", "npz")],
 )
-def test_a_file_is_whole_or_absent(module: str, file: str, bag: Path, tmp_path: Path) -> None:
+def test_a_file_is_whole_or_absent(verb: str, file: str, bag: Path, tmp_path: Path) -> None:
     target = tmp_path / file
-    done = tool(1000, f"simclient.{module}", *(["export"] if module == "bag" else []), bag, "-o", target)
-    is_one_error(done, f"simclient.{module}", target)
+    done = tool(1000, verb, *(["export"] if verb == "bag" else []), bag, "-o", target)
+    is_one_error(done, f"fcsl {verb}", target)
     nothing_is_left(target)
 
 
 def test_a_recording_for_rerun_without_its_end_is_noticed(bag: Path, tmp_path: Path) -> None:
     """rerun's own writer would log that, and go on. The size differs by some 2 kB from one to the next."""
     target = tmp_path / "x.rrd"
-    assert tool(1 << 30, "simclient.to_rerun", bag, "-o", target).returncode == 0
+    assert tool(1 << 30, "rerun", bag, "-o", target).returncode == 0
     size = target.stat().st_size
     target.unlink()
-    is_one_error(tool(size - 20_000, "simclient.to_rerun", bag, "-o", target), "simclient.to_rerun", target)
+    is_one_error(tool(size - 20_000, "rerun", bag, "-o", target), "fcsl rerun", target)
     nothing_is_left(target)
 
 
 def test_a_bag_is_whole_or_absent(bag: Path, probe: Path, tmp_path: Path) -> None:
     part = tmp_path / "part"
-    is_one_error(tool(1000, "simclient.bag", "cut", bag, "-o", part), "simclient.bag", part)
+    is_one_error(tool(1000, "bag", "cut", bag, "-o", part), "fcsl bag", part)
     nothing_is_left(part)
     (tmp_path / "map.yaml").write_text("channels: {imu.gyro: {topic: /imu, field: angular_velocity}}")
     foreign = write_bag(
@@ -77,8 +78,8 @@ def test_a_bag_is_whole_or_absent(bag: Path, probe: Path, tmp_path: Path) -> Non
     )
     target = tmp_path / "out"
     arguments = (foreign, "--library", probe, "--map", tmp_path / "map.yaml", "-o", target)
-    done = tool(20_000, "simclient.replay", *arguments)
+    done = tool(20_000, "replay", *arguments)
     assert (done.returncode, done.stdout) == (2, "")
-    assert done.stderr.startswith("simclient.replay: error: ") and done.stderr.count("\n") == 1
+    assert done.stderr.startswith("fcsl replay: error: ") and done.stderr.count("\n") == 1
     assert f"'{target}" in done.stderr and "File too large" in done.stderr
     nothing_is_left(target)

@@ -119,9 +119,7 @@ def write_map(tmp_path: Path) -> Callable[[str], Path]:
 
 
 def command(*arguments: str | Path) -> subprocess.CompletedProcess[str]:
-    done = subprocess.run(
-        [sys.executable, "-m", "simclient.replay", *map(str, arguments)], capture_output=True, text=True
-    )
+    done = subprocess.run(["fcsl", "replay", *map(str, arguments)], capture_output=True, text=True)
     assert "Traceback" not in done.stderr, done.stderr
     return done
 
@@ -309,7 +307,7 @@ def test_bad_files_end_the_command_with_one_message(
     chart_text = (tmp_path / "map.yaml").read_bytes()
     for arguments, reason in cases:
         done = command(*arguments)
-        assert done.returncode == 2 and reason in done.stderr and done.stderr.startswith("simclient.replay: error: ")
+        assert done.returncode == 2 and reason in done.stderr and done.stderr.startswith("fcsl replay: error: ")
     (tmp_path / "map.yaml").write_bytes(b"\xff\xfe" + chart_text)
     with pytest.raises(MapError, match="not UTF-8"):
         read_map(tmp_path / "map.yaml")

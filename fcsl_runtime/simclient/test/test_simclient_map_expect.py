@@ -6,7 +6,6 @@ from __future__ import annotations
 import json
 import math
 import subprocess
-import sys
 from collections.abc import Callable, Sequence
 from pathlib import Path
 from typing import Any
@@ -384,7 +383,7 @@ def test_the_command_says_and_draws_it(vehicle: Path, tmp_path: Path) -> None:
     expect = tmp_path / "expect.yaml"
 
     def command(*more: str | Path) -> subprocess.CompletedProcess[str]:
-        line = [sys.executable, "-m", "simclient.replay", bag, "--library", vehicle, "--map", tmp_path / "map.yaml"]
+        line = ["fcsl", "replay", bag, "--library", vehicle, "--map", tmp_path / "map.yaml"]
         done = subprocess.run([*map(str, [*line, *more])], capture_output=True, text=True)
         assert "Traceback" not in done.stderr, done.stderr
         return done

@@ -400,8 +400,7 @@ def test_another_source_hash_is_refused_unless_told(
     done = tool("replay", bag, "--library", renamed, "--ignore-source-hash")
     assert done.stdout == "30 ticks, identical\n"
     assert done.stderr == (
-        "simclient.replay: the sources differ: parameters come from the recorded checkpoint, "
-        "not from the compiled machine\n"
+        "fcsl replay: the sources differ: parameters come from the recorded checkpoint, not from the compiled machine\n"
     )
 
 
@@ -416,8 +415,8 @@ def test_recorded_parameters_that_are_compiled_otherwise_are_listed(
     done = tool("replay", "run", "--library", renamed, "--ignore-source-hash")
     assert done.returncode == 0 and done.stdout == "3 ticks, identical\n"
     assert done.stderr.splitlines()[1:] == [
-        "simclient.replay: parameters that differ: 1",
-        "simclient.replay:   echo.parameters.gain  recorded 2.5, compiled 2.0",
+        "fcsl replay: parameters that differ: 1",
+        "fcsl replay:   echo.parameters.gain  recorded 2.5, compiled 2.0",
     ]
     assert tool("replay", "run", "--library", probe).stderr == ""
 

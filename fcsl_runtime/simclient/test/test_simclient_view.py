@@ -355,7 +355,7 @@ def test_views_of_a_file_take_the_place_of_the_bags_own(
     monkeypatch.chdir(tmp_path)
     assert simclient.plot.main([str(bags / "viewed"), "--views", "my.json", "-o", "x.svg"]) == 0
     told = capsys.readouterr().out.splitlines()
-    assert told[1:] == ["left out: gone.outputs.x (not recorded); simclient.plot BAG PATH… chooses what is drawn"]
+    assert told[1:] == ["left out: gone.outputs.x (not recorded); fcsl plot BAG PATH… chooses what is drawn"]
     assert simclient.to_rerun.main([str(bags / "viewed"), "--views", "my.json", "-o", "x.rrd"]) == 0
     written, *told = capsys.readouterr().out.splitlines()
     assert written == f"x.rrd: {(tmp_path / 'x.rrd').stat().st_size} bytes; view it with: rerun x.rrd"

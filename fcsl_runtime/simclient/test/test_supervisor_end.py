@@ -60,7 +60,7 @@ def test_a_run_that_the_kernel_keeps_is_not_waited_for(
         finally:
             end([first["pid"], second["pid"]])
     said = capfd.readouterr().err
-    assert f"fcsl-supervisor: run {second['id']} was sent SIGKILL" in said and said.count("SIGKILL") == 1
+    assert f"fcsl supervisor: run {second['id']} was sent SIGKILL" in said and said.count("SIGKILL") == 1
 
 
 def test_killed_it_leaves_no_run_and_nothing_in_the_way(root: Path, private: Path) -> None:
@@ -77,7 +77,7 @@ def test_killed_it_leaves_no_run_and_nothing_in_the_way(root: Path, private: Pat
     finally:
         end([run["pid"] for run in runs])
     assert left.is_dir()
-    with supervising(root, "--port", str(port), private=private) as again:
+    with supervising(root, "--listen", f"tcp:127.0.0.1:{port}", private=private) as again:
         assert again.start(LIBRARY)["status"] == "running"
         (own,) = private.glob("fcsl-supervisor-*")
         assert own != left
@@ -92,7 +92,7 @@ def test_two_of_them_do_not_remove_each_others_sockets(root: Path, private: Path
 
 def test_a_port_that_is_taken(root: Path) -> None:
     with supervising(root) as supervisor, pytest.raises(AssertionError, match="status 2"):
-        Supervisor(root, "--port", str(supervisor.port))
+        Supervisor(root, "--listen", f"tcp:127.0.0.1:{supervisor.port}")
 
 
 def test_a_root_that_is_none(tmp_path: Path) -> None:

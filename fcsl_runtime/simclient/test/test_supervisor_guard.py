@@ -96,8 +96,8 @@ def test_a_token(root: Path, tmp_path: Path) -> None:
 
 def test_other_computers_need_a_token(root: Path, tmp_path: Path) -> None:
     with pytest.raises(AssertionError, match="status 2"):
-        supervising(root, "--address", "0.0.0.0").__enter__()
-    with supervising(root, "--address", "0.0.0.0", "--token", str(tmp_path / "token")) as supervisor:
+        supervising(root, "--listen", "tcp:0.0.0.0:0").__enter__()
+    with supervising(root, "--listen", "tcp:0.0.0.0:0", "--token", str(tmp_path / "token")) as supervisor:
         token = {"Authorization": f"Bearer {(tmp_path / 'token').read_text().strip()}"}
         assert supervisor.get("/runs", **token, Host=f"192.0.2.7:{supervisor.port}").status == 200
         assert supervisor.get("/runs", **token, Host=f"name.example:{supervisor.port}").code == "bad_host"

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""fcsl-var against the flight program: what it prints, its exit statuses, its completion, its curves."""
+"""fcsl var against the flight program: what it prints, its exit statuses, its completion, its curves."""
 
 from __future__ import annotations
 
@@ -14,7 +14,6 @@ import signal
 import socket
 import struct
 import subprocess
-import sys
 import time
 import zlib
 from collections.abc import Callable, Iterator
@@ -25,18 +24,18 @@ import pytest
 from kill_points import CannotTrace, calls_until_killed
 from native import Fc, flying
 
+from fcsl_compiler.cli.complete import SHELLS, candidates, words_of
 from simclient.vars.arguments import make_parser
 from simclient.vars.cli import main
 from simclient.vars.client import VarClient
-from simclient.vars.complete import SHELLS, complete
 from simclient.vars.find import Server, find_server, named_address, running_servers
 from simclient.vars.subscription import Sample, Subscription
 from simclient.vars.terminal_plot import Canvas, draw_panel
 from simclient.vars.value_text import read_value
 from simclient.vars.watch import _draw, _Table, _until
 from simclient.vars.wire import VarError
+from simclient.verbs import COMMANDS
 
-PROGRAM = Path(__file__).resolve().parents[1] / "bin/fcsl-var"
 Tell = Callable[..., str]
 
 
@@ -50,7 +49,7 @@ def flight(tmp_path: Path) -> Iterator[Fc]:
 
 @pytest.fixture
 def tell(flight: Fc, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]) -> Tell:
-    """Runs fcsl-var; returns its output and, when it fails, what it says, behind the status."""
+    """Runs fcsl var; returns its output and, when it fails, what it says, behind the status."""
     monkeypatch.setenv("FCSL_SOCKET", str(tmp_path / "fc"))
 
     def run(*arguments: str | Path) -> str:
@@ -70,7 +69,7 @@ def test_values(tell: Tell) -> None:
     assert said.removeprefix("0: ").startswith("tick 0  IDLE") and "paused" in said
     assert json.loads(tell("get", "sensors.outputs.gyro", "--json")) == {"sensors.outputs.gyro": [1.0, 2.5, 1e-300]}
     said = tell("set", "pilot.inputs.gyro=[1, 2, 3]")
-    assert said.splitlines()[-1] == "fcsl-var: note: pilot.inputs.gyro will be overwritten by sensors.outputs.gyro"
+    assert said.splitlines()[-1] == "fcsl var: note: pilot.inputs.gyro will be overwritten by sensors.outputs.gyro"
     assert tell("get", "pilot.inputs.gyro") == "pilot.inputs.gyro  [1.0, 2.0, 3.0] rad/s\n"
     assert tell("set", "sensors.outputs.gyro[0]=nan", "--allow-non-finite")
     assert json.loads(tell("get", "sensors.outputs.gyro[0]", "--json")) == {"sensors.outputs.gyro[0]": "nan"}
@@ -140,7 +139,7 @@ def test_state_and_checkpoints(tell: Tell, tmp_path: Path) -> None:
     whole = (tmp_path / "kept").read_bytes()
     for content in (b"{}", whole[:-1], whole[:-1] + bytes([whole[-1] ^ 1])):
         (tmp_path / "kept").write_bytes(content)
-        assert tell("restore", tmp_path / "kept").startswith("1: fcsl-var: ") and tell("state").startswith("tick 0  ")
+        assert tell("restore", tmp_path / "kept").startswith("1: fcsl var: ") and tell("state").startswith("tick 0  ")
     assert "cannot be read" in tell("restore", tmp_path / "absent")
     other = whole[:56] + b"0" * 64 + whole[120:-4]
     (tmp_path / "kept").write_bytes(other + struct.pack("<I", zlib.crc32(other)))
@@ -171,7 +170,7 @@ def test_a_checkpoint_is_written_as_every_other(tell: Tell, tmp_path: Path) -> N
         assert {path.name for path in kept.iterdir()} <= {"file", "file.tmp"}
     assert left == {b"old", new}
     said = tell("save", tmp_path / "absent" / "file")
-    assert said.startswith("1: fcsl-var: ") and "No such file" in said and str(tmp_path / "absent" / "file") in said
+    assert said.startswith("1: fcsl var: ") and "No such file" in said and str(tmp_path / "absent" / "file") in said
 
 
 @pytest.mark.parametrize(
@@ -195,7 +194,7 @@ def test_a_checkpoint_is_written_as_every_other(tell: Tell, tmp_path: Path) -> N
 )
 def test_what_is_refused(tell: Tell, arguments: list[str], status: int, said: str) -> None:
     told = tell(*arguments)
-    assert told.startswith(f"{status}: fcsl-var: ") and said in told and len(told.splitlines()) == 1
+    assert told.startswith(f"{status}: fcsl var: ") and said in told and len(told.splitlines()) == 1
 
 
 def test_wrong_usage() -> None:
@@ -205,7 +204,6 @@ def test_wrong_usage() -> None:
         ["tick", "0"],
         ["tick", "-1"],
         ["watch", "x", "--every", "0"],
-        ["completion", "fish"],
     ):
         with pytest.raises(SystemExit) as ended:
             main(arguments)
@@ -244,7 +242,7 @@ def test_a_machine_that_was_not_named_is_read_and_not_changed(
     monkeypatch.delenv("FCSL_SOCKET", raising=False)
     monkeypatch.setattr("simclient.vars.find.running_servers", lambda: [server])
     assert main(["get", "machine.tick"]) == 0
-    assert capsys.readouterr().err == f"fcsl-var: {server}\n"
+    assert capsys.readouterr().err == f"fcsl var: {server}\n"
     changing = ("set machine.tick=1", "set-state X", "tick", "pause", "resume", f"restore {tmp_path / 'none'} --remote")
     for command in changing:
         assert main(command.split()) == 2
@@ -331,30 +329,28 @@ def test_plot_of_a_ramp(tell: Tell) -> None:
 
 def test_completion_knows_every_command_and_option() -> None:
     (commands,) = [a.choices for a in make_parser()._actions if isinstance(a.choices, dict)]
-    assert sorted(complete([""])) == sorted(commands)
+    assert sorted(candidates(COMMANDS.verbs, ["var", ""])) == sorted(commands)
     for name, parser in commands.items():
         options = [
             option for action in parser.filled()._actions for option in action.option_strings if option[:2] == "--"
         ]
-        assert set(options) <= set(complete([name, "--"])), name
+        assert set(options) <= set(candidates(COMMANDS.verbs, ["var", name, "--"])), name
 
 
 def test_completion(tell: Tell, tmp_path: Path) -> None:
-    assert tell("complete", "s").split() == ["set", "state", "set-state", "save", "stats"]
-    assert tell("complete", "get", "sensors.o") == "sensors.outputs.\n"
-    assert "sensors.outputs.gyro=" in tell("complete", "set", "sensors.outputs.").split()
-    assert "IDLE" in tell("complete", "set-state", "").split()
-    assert tell("complete", "watch", "--e") == "--every\n"
-    assert tell("complete", "--v") == "--version\n" and tell("complete", "get", "--v").strip() == ""
-    assert tell("complete", "--socket", str(tmp_path / "fc"), "--json", "descr") == "describe\n"
-    assert tell("complete", "--socket", str(tmp_path / "fc"), "get", "mach") == "machine.\n"
-    assert tell("complete", "get", "--socket", str(tmp_path / "no"), "mach").strip() == ""
-    assert tell("complete", "completion", "").split() == ["bash", "zsh"]
+    def completed(*words: str | Path) -> list[str]:
+        return candidates(COMMANDS.verbs, ["var", *map(str, words)])
+
+    assert set(completed("s")) == {"set", "state", "set-state", "save", "stats"}
+    assert completed("get", "sensors.o") == ["sensors.outputs."]
+    assert "sensors.outputs.gyro=" in completed("set", "sensors.outputs.")
+    assert "IDLE" in completed("set-state", "")
+    assert completed("watch", "--e") == ["--every"] and completed("--t") == ["--token"] and not completed("--v")
+    assert completed("--socket", tmp_path / "fc", "--json", "descr") == ["describe"]
+    assert completed("--socket", tmp_path / "fc", "get", "mach") == ["machine."]
+    assert not completed("get", "--socket", tmp_path / "no", "mach") and not completed("nonsense", "x")
     for line in ("get mach", 'get "mach', "get 'mach", "--socket='{}' get mach"):
-        assert tell("complete-line", f"fcsl-var {line}".format(tmp_path / "fc")) == "machine.\n"
-    assert tell("complete-line", "fcsl-var completion ").split() == ["bash", "zsh"]
-    assert tell("complete-line") == tell("complete") and tell("complete", "nonsense").strip() == ""
-    assert tell("completion", "bash").strip() == SHELLS["bash"]
+        assert completed(*words_of(f"var {line}".format(tmp_path / "fc"))[1:]) == ["machine."]
 
 
 _RC = {
@@ -394,10 +390,9 @@ def test_completion_on_a_terminal(tell: Tell, tmp_path: Path, shell: str, typed:
         (tmp_path / name).symlink_to("fc")
     file, begin, show, bind = _RC[shell]
     (tmp_path / file).write_text(
-        f"PS1=READY; {begin}; {tell('completion', shell)}\nshow() {{ {show} > $ZDOTDIR/line; exit; }}\n{bind}\n"
+        f"PS1=READY; {begin}; {SHELLS[shell]}\nshow() {{ {show} > $ZDOTDIR/line; exit; }}\n{bind}\n"
     )
-    path = f"{PROGRAM.parent}:{os.environ['PATH']}"
-    environment = {**os.environ, "ZDOTDIR": str(tmp_path), "PATH": path, "TERM": "xterm"}
+    environment = {**os.environ, "ZDOTDIR": str(tmp_path), "TERM": "xterm"}
     command = ["zsh", "-i"] if shell == "zsh" else ["bash", "--noprofile", "--rcfile", str(tmp_path / file), "-i"]
     main_end, terminal = pty.openpty()
     running = subprocess.Popen(
@@ -411,21 +406,19 @@ def test_completion_on_a_terminal(tell: Tell, tmp_path: Path, shell: str, typed:
             with contextlib.suppress(OSError):  # the end of the terminal
                 said += os.read(main_end, 4096)
         if b"READY" in said and typed:
-            os.write(main_end, f"fcsl-var {typed}\t\x18".encode())
+            os.write(main_end, f"fcsl var {typed}\t\x18".encode())
             typed = ""
     running.kill()
     running.wait()
     os.close(main_end)
-    assert (tmp_path / "line").read_text() == f"fcsl-var {line}:\n"
+    assert (tmp_path / "line").read_text() == f"fcsl var {line}:\n"
 
 
 def test_a_terminal_is_drawn_over_and_ctrl_c_is_the_end(tell: Tell, tmp_path: Path) -> None:
     tell("resume")
     main_end, terminal = pty.openpty()
     for command in ("watch", "plot"):
-        watching = subprocess.Popen(
-            [sys.executable, PROGRAM, command, "machine.tick"], stdout=terminal, stderr=subprocess.PIPE
-        )
+        watching = subprocess.Popen(["fcsl", "var", command, "machine.tick"], stdout=terminal, stderr=subprocess.PIPE)
         seen = b""
         while seen.count(b"\x1b[J") < 3:
             seen += os.read(main_end, 1 << 16)

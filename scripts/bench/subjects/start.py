@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""How long users wait for a command line: help, an error of usage, the first output of fcsl-var, an import.
+"""How long users wait for a command line: help, an error of usage, the first output of fcsl var, an import.
 
 python3 scripts/bench start
 """
@@ -23,34 +23,36 @@ from ..harness.size import sized
 CONFIG = Path(__file__).resolve().parents[3] / "examples/lander/fc/lander_control.json"
 #: What is timed takes turns, so that a busy computer is busy for all of it.
 ROUNDS = sized(21, 1)
-GOALS_MS = {"import_simclient": 150, "fcslc_help": 80, "fcsl_var_list": 60}
+GOALS_MS = {"import_simclient": 150, "fcsl_help": 80, "fcslc_help": 80, "fcsl_var_list": 60}
 TITLES = {
     "python": "python3 that does nothing",
     "import_simclient": "import simclient",
     "import_twin": "from simclient import AlgTwin",
+    "fcsl_help": "fcsl --help",
     "fcslc_help": "fcslc --help",
     "fcslc_version": "fcslc --version",
     "fcslc_wrong": "fcslc with a wrong command",
     "fcsl_sim_help": "fcsl-sim --help",
-    "fcsl_var_help": "fcsl-var --help",
-    "fcsl_var_list": "fcsl-var list, to its first line",
+    "fcsl_var_help": "fcsl var --help",
+    "fcsl_var_list": "fcsl var list, to its first line",
 }
 
 
 def start_times(folder: Path) -> dict[str, dict[str, float]]:
     """ms from the start of a process: to its first line where it prints one, else to its end. Least, median, most."""
-    fcslc, sim, var = (_command(name) for name in ("fcslc", "fcsl-sim", "fcsl-var"))
+    fcsl, fcslc, sim = (_command(name) for name in ("fcsl", "fcslc", "fcsl-sim"))
     address = str(folder / "fc")
     lines = {
         "python": [sys.executable, "-c", "pass"],
         "import_simclient": [sys.executable, "-c", "import simclient"],
         "import_twin": [sys.executable, "-c", "from simclient import AlgTwin"],
+        "fcsl_help": [fcsl, "--help"],
         "fcslc_help": [fcslc, "--help"],
         "fcslc_version": [fcslc, "--version"],
         "fcslc_wrong": [fcslc, "nope"],
         "fcsl_sim_help": [sim, "--help"],
-        "fcsl_var_help": [var, "--help"],
-        "fcsl_var_list": [var, "--socket", address, "list"],
+        "fcsl_var_help": [fcsl, "var", "--help"],
+        "fcsl_var_list": [fcsl, "var", "--socket", address, "list"],
     }
     flight = [str(runtime_program("fcsl-fc")), str(build_machine(CONFIG).library), "--paused", "--exit-on-stdin-eof"]
     with subprocess.Popen([*flight, "--socket", address], stdin=subprocess.PIPE, stdout=subprocess.PIPE) as program:

@@ -6,7 +6,6 @@ from __future__ import annotations
 import math
 import re
 import subprocess
-import sys
 import time
 from pathlib import Path
 
@@ -84,7 +83,7 @@ def check(flight: Flight, servos: Servos) -> None:
 
 def replay(craft: Craft, bag: Path) -> str:
     words = ["--library", craft.library("craft"), "--board", craft.plan("whole")]
-    line = [sys.executable, "-m", "simclient.replay", str(bag), *map(str, words)]
+    line = ["fcsl", "replay", str(bag), *map(str, words)]
     done = subprocess.run(line, capture_output=True, text=True, timeout=_REPLAY_LIMIT_S, check=False)
     if done.returncode != 0 or "identical" not in done.stdout:
         raise Failed(f"the replay says {done.stdout} {done.stderr}")

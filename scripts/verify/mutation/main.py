@@ -1,11 +1,11 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Mutants: small changes of the C runtime and of simclient, each of which some test must notice.
+"""Mutants: small changes of the C runtime, the compiler, the simulator and simclient, each of which some test must notice.
 
-A fixed seed draws the same number of mutants of every source file (operators, boundaries, constants, results, deleted
-statements). All are compiled into one copy of the packages in out/verify/mutation, each behind a switch, so one build serves
-all. One run of all tests notes which test reaches which mutant. Then every mutant is switched on and meets the tests that reach
-it, the shortest first, until 120 s of them are spent: a test that fails, crashes or hangs kills it. A mutant that no test
-reaches has survived. equivalent.toml lists mutants that no test can notice, and why; they are not drawn.
+A seed draws mutants among all that could be made (operators, boundaries, constants, results, deleted statements). All are
+compiled into one copy of the packages in out/verify/mutation, each behind a switch, so one build serves all. One run of all
+tests notes which test reaches which mutant. Then every mutant is switched on and meets the tests that reach it, the shortest
+first, until 120 s of them are spent: a test that fails, crashes or hangs kills it. A mutant that no test reaches has survived.
+equivalent.toml lists mutants that no test can notice, and why; they are not drawn.
 
 As a control, some runs go the same way with no mutant switched on, and must pass.
 """
@@ -23,13 +23,13 @@ from concurrent.futures import ThreadPoolExecutor, as_completed
 from typing import Any
 
 from ..shared.cases import OUT, CheckFailed, write_facts
-from .mutants import Mutant, equivalents
+from .mutants import Mutant, draw, equivalents
 from .tests import Test, killer, record
-from .tree import MUTATED, Tree, drawn
+from .tree import Tree, candidates, compiles
 
-PER_FILE, SEED = 3, 1
+COUNT, SEED = 100, 1
 #: The largest share of mutants that may survive, percent.
-LIMIT_PERCENT = 5.0
+LIMIT_PERCENT = 10.0
 #: Every so manieth mutant is also run without being switched on.
 CONTROL_EVERY = 25
 #: Of the normal distribution: 95 % lie within.
@@ -47,17 +47,16 @@ def interval(survived: int, total: int) -> tuple[float, float]:
 def tested(tree: Tree, mutants: list[Mutant], tests: list[Test], workers: int) -> dict[Mutant, str | None]:
     """What killed each mutant, or None. Raises CheckFailed when a control fails."""
     environment = tree.environment()
-    mutants = random.Random(SEED).sample(
-        mutants, len(mutants)
-    )  # so that the time left, and an interrupted run, mislead nobody
+    # In any order, so that the time left, and an interrupted run, mislead nobody.
+    mutants = random.Random(SEED).sample(mutants, len(mutants))
     results: dict[Mutant, str | None] = {}
     begun = time.monotonic()
     false_alarms: list[str] = []
     pool = ThreadPoolExecutor(workers)
     try:
-        futures = {pool.submit(killer, tree, environment, tests, m.number, m.number): (m, False) for m in mutants}
+        futures = {pool.submit(killer, tree, environment, tests, m, True): (m, False) for m in mutants}
         futures |= {
-            pool.submit(killer, tree, environment, tests, m.number, 0): (m, True) for m in mutants[::CONTROL_EVERY]
+            pool.submit(killer, tree, environment, tests, m, False): (m, True) for m in mutants[::CONTROL_EVERY]
         }
         for done, future in enumerate(as_completed(futures), 1):
             (mutant, is_control), by = futures[future], future.result()
@@ -80,7 +79,7 @@ def tested(tree: Tree, mutants: list[Mutant], tests: list[Test], workers: int) -
 
 
 def facts_of(results: dict[Mutant, str | None], tests: list[Test]) -> dict[str, Any]:
-    """Counts and share of one language, and its survivors."""
+    """Counts and share of some mutants, and the survivors."""
     survivors = [m for m, by in results.items() if by is None]
     low, high = interval(len(survivors), len(results))
     return {
@@ -104,10 +103,10 @@ def facts_of(results: dict[Mutant, str | None], tests: list[Test]) -> dict[str, 
 
 
 def report(facts: dict[str, dict[str, Any]]) -> Iterable[str]:
-    for language, f in facts.items():
+    for package, f in facts.items():
         low, high = f["interval_percent"]
         yield (
-            f"{language}: {f['mutants']} mutants of {f['candidates']}, {f['killed']} killed, {f['survived']} survived: "
+            f"{package}: {f['mutants']} mutants of {f['candidates']}, {f['killed']} killed, {f['survived']} survived: "
             f"{f['survived_percent']:.1f} % (95 % interval {low:.1f} to {high:.1f})"
         )
         for s in f["survivors"]:
@@ -115,58 +114,54 @@ def report(facts: dict[str, dict[str, Any]]) -> Iterable[str]:
             yield f"    {s['file']}:{s['line']}: {s['kind']}{where}: {s['before']} → {s['after'] or 'nothing'}"
 
 
-def check(languages: list[str], per_file: int, seed: int, only: str, workers: int) -> dict[str, dict[str, Any]]:
-    """Figures by language. Raises CheckFailed."""
-    drawn_of: dict[str, list[Mutant]] = {}
-    candidates: dict[str, int] = {}
-    count = 0
-    for language in languages:
-        print(f"drawing mutants of {language} ...", flush=True)
-        found, candidates[language] = drawn(language, per_file, seed, only)
-        drawn_of[language] = [Mutant(n, file, point) for n, (file, point) in enumerate(found, count + 1)]
-        count += len(found)
-    chosen = [m for mutants in drawn_of.values() for m in mutants]
+def check(count: int, seed: int, only: str, workers: int) -> dict[str, dict[str, Any]]:
+    """Figures by package, then of all. Raises CheckFailed."""
+    every = candidates(only)
+    print(f"drawing {count} mutants of {len(every)} ...", flush=True)
+    chosen = draw(every, count, seed, compiles)
     if not chosen:
         raise CheckFailed(f"no mutant in a source that holds `{only}` in its path")
+    for m in chosen:
+        print(f"    {m}")
     tree = Tree(OUT / "mutation")
-    print(f"{len(chosen)} mutants; building them in {tree.folder} ...", flush=True)
+    print(f"building them in {tree.folder} ...", flush=True)
     tree.make(chosen)
     print("running every test once, to see what it reaches ...", flush=True)
     tests = record(tree, tree.environment(), workers)
     print(f"{len(tests)} tests pass without a mutant", flush=True)
     results = tested(tree, chosen, tests, workers)
-    return {
-        language: {"candidates": candidates[language], **facts_of({m: results[m] for m in mutants}, tests)}
-        for language, mutants in drawn_of.items()
-        if mutants
-    }
+    facts: dict[str, dict[str, Any]] = {}
+    for package in (*sorted({m.file.split("/")[0] for m in chosen}), ""):
+        of_package = {m: by for m, by in results.items() if m.file.startswith(package)}
+        possible = sum(c.file.startswith(package) for c in every)
+        facts[package or "all"] = {"candidates": possible, **facts_of(of_package, tests if package else [])}
+    return facts
 
 
 def main() -> int:
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
-    parser.add_argument("--per-file", type=int, default=PER_FILE, help="mutants of each file (default %(default)s)")
+    parser.add_argument("--count", type=int, default=COUNT, help="how many mutants (default %(default)s)")
     parser.add_argument("--seed", type=int, default=SEED, help="other mutants (default %(default)s)")
     parser.add_argument("--only", default="", metavar="WORDS", help="files whose path holds this")
-    parser.add_argument("--language", choices=list(MUTATED), help="only these files")
     parser.add_argument("--workers", type=int, default=os.cpu_count() or 1, help="tests at a time (default: all cores)")
     options = parser.parse_args()
-    languages = [options.language] if options.language else list(MUTATED)
     begun = time.monotonic()
     try:
-        facts = check(languages, options.per_file, options.seed, options.only, options.workers)
+        facts = check(options.count, options.seed, options.only, options.workers)
     except CheckFailed as error:
         print(f"mutation: {error}", file=sys.stderr)
         return 1
+    total = facts.pop("all")
     print("\n".join(report(facts)))
-    mutants, survived = (sum(f[name] for f in facts.values()) for name in ("mutants", "survived"))
-    percent = 100 * survived / mutants
+    percent, (low, high) = total["survived_percent"], total["interval_percent"]
     seconds = round(time.monotonic() - begun)
     equivalent = len(equivalents())
     print(
-        f"{survived} of {mutants} survived, {percent:.1f} % (limit {LIMIT_PERCENT:.0f}); {equivalent} known equivalents; {seconds} s"
+        f"{total['survived']} of {total['mutants']} survived, {percent:.1f} % (95 % interval {low:.1f} to {high:.1f}; "
+        f"limit {LIMIT_PERCENT:.0f}); {equivalent} known equivalents; {seconds} s"
     )
-    settings = {"per_file": options.per_file, "seed": options.seed, "only": options.only, "seconds": seconds}
-    write_facts("mutation", {**settings, "equivalent": equivalent, "survived_percent": percent, "languages": facts})
+    settings = {"count": options.count, "seed": options.seed, "only": options.only, "seconds": seconds}
+    write_facts("mutation", {**settings, "equivalent": equivalent, "survived_percent": percent, "packages": facts})
     return 0 if percent <= LIMIT_PERCENT else 1
 
 

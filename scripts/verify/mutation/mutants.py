@@ -32,6 +32,14 @@ class Point:
 
 
 @dataclass(frozen=True)
+class Candidate:
+    """A point of a file, which is relative to the workspace."""
+
+    file: str
+    point: Point
+
+
+@dataclass(frozen=True)
 class Mutant:
     """A drawn point. `file` is relative to the workspace; numbers begin with 1."""
 
@@ -63,17 +71,19 @@ def is_equivalent(point: Point, file: str, lines: Sequence[str], known: Sequence
     return any(e.file == file and e.line == here and e.after == point.after for e in known)
 
 
-def draw(points: Sequence[Point], count: int, seed: str, compiles: Callable[[Point], bool]) -> list[Point]:
-    """At most `count` points that compile and do not overlap; the same ones for the same seed, in the order of the file."""
-    order = list(points)
+def draw(candidates: Sequence[Candidate], count: int, seed: int, compiles: Callable[[Candidate], bool]) -> list[Mutant]:
+    """At most `count` mutants that compile and do not overlap, each candidate as likely as any other; the same ones for the same
+    seed and sources."""
+    order = list(candidates)
     random.Random(seed).shuffle(order)
-    chosen: list[Point] = []
-    for point in order:
+    chosen: list[Candidate] = []
+    for one in order:
         if len(chosen) == count:
             break
-        if not any(point.overlaps(other) for other in chosen) and compiles(point):
-            chosen.append(point)
-    return sorted(chosen, key=lambda p: p.begin)
+        if not any(one.file == c.file and one.point.overlaps(c.point) for c in chosen) and compiles(one):
+            chosen.append(one)
+    chosen.sort(key=lambda c: (c.file, c.point.begin))
+    return [Mutant(number, c.file, c.point) for number, c in enumerate(chosen, 1)]
 
 
 def with_switches(source: bytes, mutants: Sequence[Mutant], switch: Callable[[int], str]) -> bytes:

@@ -16,15 +16,16 @@ from pathlib import Path
 
 from ..shared.cases import CheckFailed
 from .hook.fcsl_mutants import SIZE
+from .mutants import Mutant
 from .tree import Tree
 
-PYTEST_FOLDERS = ("fcsl_hal/test", "fcsl_runtime/simclient/test")
+PYTEST_FOLDERS = ("fcsl_compiler/test", "fcsl_hal/test", "fcsl_runtime/simclient/test", "fcsl_sim/test")
 #: A recorded run may take so long, seconds.
 RECORD_LIMIT_S = 3600.0
 #: Tests in pytest are chosen, the shortest first, until they took so long when they were recorded: seconds.
 BUDGET_S = 120.0
 #: With a mutant they may take so many times as long before they count as hanging, and so much more.
-PATIENCE, START_S = 4.0, 30.0
+PATIENCE, START_S = 4.0, 120.0
 
 
 @dataclass(frozen=True)
@@ -105,21 +106,26 @@ def nearest(tests: Sequence[Test], number: int) -> tuple[list[Test], list[Test]]
     return [t for t in reaching if t.command], chosen
 
 
-def killer(tree: Tree, environment: Mapping[str, str], tests: Sequence[Test], number: int, active: int) -> str | None:
-    """What notices mutant `active` among the tests nearest to mutant `number`: a name, or None."""
-    own = {**environment, "FCSL_MUTANT": str(active)}
-    programs, chosen = nearest(tests, number)
-    for t in programs:
-        if not _passes(t.command, own, tree.folder, START_S + PATIENCE * t.seconds):
-            return t.name
-    if chosen:
+def killer(
+    tree: Tree, environment: Mapping[str, str], tests: Sequence[Test], mutant: Mutant, is_on: bool
+) -> str | None:
+    """What notices a mutant, or a control if it is not on, among the tests nearest to it: a name, or None.
+
+    Each run compiles into a cache of its own: what a mutated compiler wrote must not meet another mutant.
+    """
+    with tempfile.TemporaryDirectory(prefix="mutant-", dir=tree.folder) as folder:
+        own = {**environment, "FCSL_MUTANT": str(mutant.number if is_on else 0), "FCSL_CACHE_DIR": f"{folder}/cache"}
+        programs, chosen = nearest(tests, mutant.number)
+        for t in programs:
+            if not _passes(t.command, own, tree.folder, START_S + PATIENCE * t.seconds):
+                return t.name
+        if not chosen:
+            return None
         limit = START_S + PATIENCE * sum(t.seconds for t in chosen)
-        with tempfile.NamedTemporaryFile("w", prefix="tests-", suffix=".txt") as names:  # too many for a command line
-            names.write("\n".join(t.name for t in chosen))
-            names.flush()
-            if not _passes([*_PYTEST, "-x", "-q", f"@{names.name}"], own, tree.folder, limit):
-                return f"pytest ({len(chosen)} tests)"
-    return None
+        names = Path(folder) / "tests.txt"  # too many for a command line
+        names.write_text("\n".join(t.name for t in chosen))
+        noticed = not _passes([*_PYTEST, "-x", "-q", f"@{names}"], own, tree.folder, limit)
+        return f"pytest ({len(chosen)} tests)" if noticed else None
 
 
 def _passes(line: Sequence[str], environment: Mapping[str, str], folder: Path, limit_s: float) -> bool:

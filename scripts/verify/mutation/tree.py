@@ -8,25 +8,24 @@ import shlex
 import subprocess
 import sys
 from dataclasses import dataclass
-from functools import partial
 from pathlib import Path
 
 from fcsl_compiler.driver.toolchain import include_dirs
 
 from ..shared.cases import ROOT, CheckFailed, run
 from . import c_points, python_points
-from .mutants import Mutant, Point, draw, equivalents, is_equivalent, with_switches
+from .mutants import Candidate, Mutant, equivalents, is_equivalent, with_switches
 
 HERE = Path(__file__).resolve().parent
 HOOK = HERE / "hook"
 #: Packages that are copied and built, and the folders in which sources are mutated.
-COPIED = ("fcsl_hal", "fcsl_runtime")
+COPIED = ("fcsl_compiler", "fcsl_hal", "fcsl_runtime", "fcsl_sim")
 MUTATED = {
-    "C": ("fcsl_hal/src", "fcsl_runtime/fcsl_runtime/src", "fcsl_runtime/fcsl_runtime/fc"),
-    "Python": ("fcsl_runtime/simclient/simclient",),
+    "C": ("fcsl_hal/src", "fcsl_runtime/fcsl_runtime/src", "fcsl_runtime/fcsl_runtime/fc", "fcsl_sim/src"),
+    "Python": ("fcsl_compiler/fcsl_compiler", "fcsl_runtime/simclient/simclient", "fcsl_sim/fcsl_sim"),
 }
 _GCC = "/usr/bin/gcc"
-_RUNTIME = ROOT / "fcsl_runtime/fcsl_runtime"
+_HEADERS = ("fcsl_runtime/fcsl_runtime/include", "fcsl_hal/include", "fcsl_sim/include")
 
 
 def sources(language: str) -> list[str]:
@@ -35,29 +34,26 @@ def sources(language: str) -> list[str]:
     return [str(f.relative_to(ROOT)) for d in MUTATED[language] for f in sorted((ROOT / d).rglob(pattern))]
 
 
-def drawn(language: str, per_file: int, seed: int, only: str) -> tuple[list[tuple[str, Point]], int]:
-    """(file, point) of every mutant to test; and how many could have been drawn."""
-    found: list[tuple[str, Point]] = []
-    known, total = equivalents(), 0
-    for file in (f for f in sources(language) if only in f):
-        source = (ROOT / file).read_bytes()
-        lines = source.decode().split("\n")
-        every = c_points.points(source) if language == "C" else python_points.points(source)
-        candidates = [p for p in every if not is_equivalent(p, file, lines, known)]
-        total += len(candidates)
-        compiles = partial(_compiles_c, file, source) if language == "C" else _compiles_python
-        found += [(file, p) for p in draw(candidates, per_file, f"{seed} {file}", compiles)]
-    return found, total
+def candidates(only: str) -> list[Candidate]:
+    """What may be drawn of the files whose path holds `only`."""
+    found: list[Candidate] = []
+    known = equivalents()
+    for language in MUTATED:
+        for file in (f for f in sources(language) if only in f):
+            source = (ROOT / file).read_bytes()
+            lines = source.decode().split("\n")
+            every = c_points.points(source) if language == "C" else python_points.points(source)
+            found += [Candidate(file, p) for p in every if not is_equivalent(p, file, lines, known)]
+    return found
 
 
-def _compiles_python(_: Point) -> bool:
-    return True
-
-
-def _compiles_c(file: str, source: bytes, point: Point) -> bool:
+def compiles(candidate: Candidate) -> bool:
     """Whether types allow the mutant: the grammar does not know them."""
-    text = with_switches(source, [Mutant(1, file, point)], c_switch)
-    own = [_RUNTIME / "src", _RUNTIME / "fc", _RUNTIME / "include", ROOT / "fcsl_hal/src", ROOT / "fcsl_hal/include"]
+    if not candidate.file.endswith(".c"):
+        return True
+    file = candidate.file
+    text = with_switches((ROOT / file).read_bytes(), [Mutant(1, file, candidate.point)], c_switch)
+    own = [ROOT / d for d in (*MUTATED["C"], *_HEADERS)]
     includes = [f"-I{d}" for d in ((ROOT / file).parent, *own, *include_dirs())]
     line = [_GCC, "-fsyntax-only", "-std=c11", "-w", '-DFCSL_VERSION=""', *includes, "-x", "c", "-"]
     return subprocess.run(line, input=with_declaration(text), capture_output=True, check=False).returncode == 0

@@ -87,20 +87,20 @@ class Environment:
         self.run("new", "fcslc", "new", "machine", "hover")
         self.run("pytest", "pytest", "hover/test")
         self.run("flight", "fcsl-sim", "run", "lander/sim/lander.sim.json", "--record", "flight")
-        self.run("plot", "python3", "-m", "simclient.plot", "flight", "-o", "flight.png")
+        self.run("plot", "fcsl", "plot", "flight", "-o", "flight.png")
         if not (self.folder / "flight.png").read_bytes().startswith(b"\x89PNG"):
             raise CheckFailed("the plot is no picture")
         return self.digest("flight")
 
     def digest(self, bag: str) -> str:
-        return self.run("digest", "python3", "-m", "simclient.bag", "digest", bag).strip()
+        return self.run("digest", "fcsl", "bag", "digest", bag).strip()
 
 
 def flown_here(folder: Path) -> str:
     """The digest of the lander's flight in the workspace."""
     bag = folder / "workspace"
     run(["fcsl-sim", "run", ROOT / "examples/lander/sim/lander.sim.json", "--record", bag])
-    return run([sys.executable, "-m", "simclient.bag", "digest", bag]).strip()
+    return run(["fcsl", "bag", "digest", bag]).strip()
 
 
 def same(what: str, digest: str, expected: str) -> None:

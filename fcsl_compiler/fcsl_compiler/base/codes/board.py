@@ -226,7 +226,7 @@ BOARD_CODES: dict[str, Code] = {
     "E521": Code(
         "a signal that the driver does not have",
         "The signals of the drivers that come with FCSL are known; those of a library are looked for when the flight "
-        "program starts. `fcsl-hal describe DRIVER` lists them.",
+        "program starts. `fcsl hal describe DRIVER` lists them.",
         Kind.BOARD,
         _outputs(*_PULSES[:2], _PULSES[2].replace("pulse2", "pulse16")),
         _outputs(*_PULSES),

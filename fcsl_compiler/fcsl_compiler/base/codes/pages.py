@@ -32,16 +32,11 @@ class UnknownCode(ValueError):
     """A code that is not in the table. str() names it and suggests the nearest code."""
 
 
-def pages(codes: Sequence[str], rows: Mapping[str, Code], elsewhere: str) -> str:
-    """The pages of the given codes, or one line for every row if none are given. Raises UnknownCode.
-
-    elsewhere: the command that explains the codes of the other program.
-    """
+def pages(codes: Sequence[str], rows: Mapping[str, Code]) -> str:
+    """The pages of the given codes, or one line for every row if none are given. Raises UnknownCode."""
     for code in map(str.upper, codes):
         if code not in rows:
-            other = bool(re.fullmatch(r"[EW]\d{3}", code)) and code[1] == "8" and "E801" not in rows
-            other = other or (code in table() and rows.keys() != table().keys())
-            hint = f"`{elsewhere} {code}` explains it" if other else nearest(code[:8].replace("O", "0"), list(rows))
+            hint = nearest(code[:8].replace("O", "0"), list(rows))
             raise UnknownCode(f"there is no diagnostic `{code[:80]}`; {hint or 'without a code, `explain` lists all'}")
     return "\n".join(explain(code.upper(), rows) for code in codes) if codes else overview(rows)
 

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Bags: reads every format, describes, cuts, compares and exports. `python -m simclient.bag` is the command line."""
+"""Bags: reads every format, describes, cuts, compares and exports. `fcsl bag` is the command line."""
 
 from .bag import Array, Bag, RecordedMachine, Topic, is_made_for_a_record
 from .fields import field_value

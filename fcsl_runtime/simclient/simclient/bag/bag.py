@@ -334,7 +334,7 @@ class Bag:
     # ---- machines ------------------------------------------------------------------------------------------
 
     def machines(self, by_bystanders: bool = False) -> list[RecordedMachine]:
-        """The machines that this bag records, on request those of `fcsl-bus record`, too; empty for a bag that FCSL did
+        """The machines that this bag records, on request those of `fcsl bus record`, too; empty for a bag that FCSL did
         not record.
         """
         found = []
@@ -370,13 +370,13 @@ class Bag:
             raise BagError(f"{self.path}: damaged or cut off before the first record of a machine ({self.truncated})")
         if not machines and self.machines(by_bystanders=True):
             raise BagError(
-                f"{self.path}: `fcsl-bus record` made it: it has the values of channels, not all outputs and states of "
-                "a machine; simclient.replay runs it"
+                f"{self.path}: `fcsl bus record` made it: it has the values of channels, not all outputs and states of "
+                "a machine; `fcsl replay` runs it"
             )
         if not machines:
             raise BagError(
                 f"{self.path}: not a recording of a machine (no topic */record/checkpoint); "
-                "to run a machine on a bag that FCSL did not record, use simclient.replay with --map"
+                "to run a machine on a bag that FCSL did not record, use `fcsl replay` with --map"
             )
         chosen = [m for m in machines if not wanted or wanted in (m.name, m.prefix)]
         if len(chosen) != 1:

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Names of topics in a bag of `fcsl-bus record`."""
+"""Names of topics in a bag of `fcsl bus record`."""
 
 from __future__ import annotations
 

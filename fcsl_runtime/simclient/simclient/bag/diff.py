@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Where two bags differ: what `python -m simclient.bag diff` prints.
+"""Where two bags differ: what `fcsl bag diff` prints.
 
 Topics are compared by name. Messages of a topic are paired by tick, else by stamp, else by number. Fields are compared
 bit for bit with NaNs equal, or within tolerances. Times of recording and what viewers show (`record/views`) are not

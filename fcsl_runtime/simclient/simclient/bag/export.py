@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""A bag as a table for other programs: what `python -m simclient.bag export` writes.
+"""A bag as a table for other programs: what `fcsl bag export` writes.
 
 Columns are named `<instance>.outputs.<field>`, `<instance>.inputs.<field>` and `machine.state` for a recorded machine,
 and `<topic>:<field>` for any other topic; an array has a column per element. CSV and Parquet hold one table, ordered by

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Describes a bag as text: the output of `python -m simclient.bag info`.
+"""Describes a bag as text: the output of `fcsl bag info`.
 
 Every message is read, so the reported damage covers the whole bag and not only its index.
 """

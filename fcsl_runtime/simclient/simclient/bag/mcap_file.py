@@ -375,7 +375,7 @@ def check_begin(file: Path) -> None:
         raise BagError(f"{file}: empty; nothing was written before the recording was cut off")
     if begin[:5] != MAGIC[: len(begin)][:5]:
         other = next((name for magic, name in _OTHER_BAGS.items() if begin.startswith(magic)), "")
-        hint = f"; it looks like {other}, which simclient.bag reads, and simclient.replay with --map" if other else ""
+        hint = f"; it looks like {other}, which `fcsl bag` reads, and `fcsl replay` with --map" if other else ""
         raise BagError(f"{file}: not an MCAP file{hint}")
     if len(begin) < len(MAGIC):
         raise BagError(f"{file}: cut off after {len(begin)} bytes; nothing of the recording is left")

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""A bag as ticks of a machine's channels: one of `fcsl-bus record`, or one that a host recorded, with its machine."""
+"""A bag as ticks of a machine's channels: one of `fcsl bus record`, or one that a host recorded, with its machine."""
 
 from __future__ import annotations
 
@@ -133,7 +133,7 @@ def _shortened(field_bytes: bytes) -> bytes:
 
 
 def read_bag_ticks(bag: Bag, run: Run | None, wanted: str = "") -> BagTicks:
-    """`run`: the machine of a bag that a host recorded; one of `fcsl-bus record` has its own. Raises BagError, BusError."""
+    """`run`: the machine of a bag that a host recorded; one of `fcsl bus record` has its own. Raises BagError, BusError."""
     recorded = bag.machine(wanted, by_bystanders=True)
     if recorded.by_bystander:
         return _of_bystander(bag, recorded)

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""fcsl-bus: machines on the bus, from the command line (docs/reference/transports.md)."""
+"""fcsl bus: machines on the bus, from the command line (docs/reference/transports.md)."""
 
 from __future__ import annotations
 
@@ -17,7 +17,7 @@ from itertools import count, islice
 from pathlib import Path
 from typing import Any
 
-from fcsl_compiler.api.command_line import add_version
+from fcsl_compiler.api.command_line import add_examples
 from fcsl_compiler.api.files import read_json
 
 from ..errors import BusError, did_you_mean
@@ -34,17 +34,27 @@ listens, the flight computer is another one or gone, or for wrong usage."""
 
 
 def main(arguments: Sequence[str]) -> int:
-    options = _parser().parse_args(arguments)
+    options = make_parser().parse_args(arguments)
     run: Callable[[argparse.Namespace], int | None] = options.run
     return run(options) or 0
 
 
-def _parser() -> argparse.ArgumentParser:
+_EXAMPLES = {
+    "": "list -c tcp/127.0.0.1:7447",
+    "list": "-c tcp/127.0.0.1:7447",
+    "echo": "-c tcp/127.0.0.1:7447 throttle -n 10",
+    "hz": "-c tcp/127.0.0.1:7447",
+    "put": "-c tcp/127.0.0.1:7447 altitude 12.5",
+    "record": "-c tcp/127.0.0.1:7447 -o flight",
+    "play": "--listen tcp/127.0.0.1:7447 flight --speed 1",
+}
+
+
+def make_parser() -> argparse.ArgumentParser:
     raw = argparse.RawDescriptionHelpFormatter
     parser = argparse.ArgumentParser(
-        prog="fcsl-bus", description="Machines on the bus.", epilog=_EPILOG, formatter_class=raw
+        prog="fcsl bus", description="Machines on the bus.", epilog=_EPILOG, formatter_class=raw
     )
-    add_version(parser, "simclient", __file__)
     commands = parser.add_subparsers(metavar="COMMAND", required=True)
 
     def add(name: str, run: Callable[[argparse.Namespace], int | None], text: str) -> argparse.ArgumentParser:
@@ -87,6 +97,7 @@ def _parser() -> argparse.ArgumentParser:
     command.add_argument(
         "--timeout", type=_seconds, default=10.0, metavar="SECONDS", help="seconds for each answer (default 10)"
     )
+    add_examples(parser, _EXAMPLES)
     return parser
 
 
@@ -235,7 +246,7 @@ def _machines(session: Session) -> list[BusMachine]:
     """All that can be read; of others a line says why not."""
     machines, refused = session.machines()
     for why in refused:
-        print(f"fcsl-bus: left out: {why}", file=sys.stderr)
+        print(f"fcsl bus: left out: {why}", file=sys.stderr)
     return machines
 
 
@@ -244,7 +255,7 @@ def _read_descriptors(path: Path) -> list[BusMachine]:
         told = read_json(path)
         return [read_machine(str(machine["prefix"]), json.dumps(machine["descriptor"])) for machine in told]
     except (ValueError, LookupError, TypeError):
-        raise BusError(f"{path}: not what `fcsl-bus list --json` prints") from None
+        raise BusError(f"{path}: not what `fcsl bus list --json` prints") from None
 
 
 def _record(options: argparse.Namespace) -> None:
@@ -293,10 +304,10 @@ def _play(options: argparse.Namespace) -> int:
     print(played)
     if ticks.left_out:
         done = ", ".join(f"{count} {kind}" for kind, count in sorted(ticks.left_out.items()))
-        print(f"fcsl-bus: the host did more than sample, which is not played: {done}", file=sys.stderr)
+        print(f"fcsl bus: the host did more than sample, which is not played: {done}", file=sys.stderr)
     return 1 if played.differ else 0
 
 
 def _tell_lost(feed: Feed) -> None:
     if lost := feed.lost():
-        print(f"fcsl-bus: {lost}", file=sys.stderr)
+        print(f"fcsl bus: {lost}", file=sys.stderr)

@@ -150,9 +150,9 @@ def read_machine(prefix: str, text: str) -> BusMachine:
     try:
         told = json.loads(text)
         if told["version"] != 1:
-            raise BusError(f"{prefix} has a descriptor of version {told['version']}, and this fcsl-bus reads 1")
+            raise BusError(f"{prefix} has a descriptor of version {told['version']}, and this fcsl bus reads 1")
         if told["payload"] not in _PAYLOADS:
-            raise BusError(f"{prefix} has the payload {told['payload']!r}, and this fcsl-bus reads raw and cdr")
+            raise BusError(f"{prefix} has the payload {told['payload']!r}, and this fcsl bus reads raw and cdr")
         cdr = told["payload"] == "cdr"
         machine = BusMachine(
             prefix=prefix,

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""`fcsl-hal test-actuator`: moves one element of an output for some seconds, then makes it safe."""
+"""`fcsl hal test-actuator`: moves one element of an output for some seconds, then makes it safe."""
 
 from __future__ import annotations
 

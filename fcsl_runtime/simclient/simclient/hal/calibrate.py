@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""`fcsl-hal calibrate`: measures what corrects a device of a sensor, and writes it into the board's JSON."""
+"""`fcsl hal calibrate`: measures what corrects a device of a sensor, and writes it into the board's JSON."""
 
 from __future__ import annotations
 

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""`fcsl-hal calibrate esc`: electronic speed controllers learn the range of their pulses.
+"""`fcsl hal calibrate esc`: electronic speed controllers learn the range of their pulses.
 
 One that gets its longest pulse while it powers up, confirms it by beeps and takes the next pulse for the shortest. ArduPilot
 and PX4 do the same. Nothing is measured: the range is the board's, and the controllers keep it.

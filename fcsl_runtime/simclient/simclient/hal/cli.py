@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""fcsl-hal: brings up the sensors and actuators of a vehicle (docs/hardware/hal.md)."""
+"""fcsl hal: brings up the sensors and actuators of a vehicle (docs/hardware/hal.md)."""
 
 from __future__ import annotations
 
@@ -8,7 +8,7 @@ import math
 import sys
 from collections.abc import Callable, Sequence
 
-from fcsl_compiler.api.command_line import add_version
+from fcsl_compiler.api.command_line import add_examples
 
 from ..errors import TwinError
 from .errors import Refused
@@ -29,23 +29,37 @@ safe value last, whatever ends it. No file is changed."""
 
 
 def main(arguments: Sequence[str]) -> int:
-    options = _parser().parse_args(arguments)
+    options = make_parser().parse_args(arguments)
     run: Callable[[argparse.Namespace], None] = options.run
     try:
         run(options)
     except Refused as error:
         sys.stdout.flush()
-        print(f"fcsl-hal: {error}", file=sys.stderr)
+        print(f"fcsl hal: {error}", file=sys.stderr)
         return EXIT_REFUSED
     return 0
 
 
-def _parser() -> argparse.ArgumentParser:
+_EXAMPLES = {
+    "": "list",
+    "list": "--json",
+    "describe": "craft.plan --seconds 5",
+    "monitor": "craft.plan --seconds 10",
+    "calibrate": "gyro craft.board.json --sensor gyro",
+    "calibrate gyro": "craft.board.json --sensor gyro --seconds 10",
+    "calibrate accel": "craft.board.json --sensor accel",
+    "calibrate compass": "craft.board.json --sensor compass",
+    "calibrate rc": "craft.board.json --sensor rc",
+    "calibrate esc": "craft.plan --output motors --yes-move-it",
+    "test-actuator": "craft.plan motors[0] --command 0.1 --seconds 2 --yes-move-it",
+}
+
+
+def make_parser() -> argparse.ArgumentParser:
     raw = argparse.RawDescriptionHelpFormatter
     parser = argparse.ArgumentParser(
-        prog="fcsl-hal", description="The sensors and actuators of this computer.", epilog=_EPILOG, formatter_class=raw
+        prog="fcsl hal", description="The sensors and actuators of this computer.", epilog=_EPILOG, formatter_class=raw
     )
-    add_version(parser, "simclient", __file__)
     commands = parser.add_subparsers(metavar="COMMAND", required=True)
 
     def add(name: str, run: Callable[[argparse.Namespace], None], text: str) -> argparse.ArgumentParser:
@@ -82,6 +96,7 @@ def _parser() -> argparse.ArgumentParser:
     value.add_argument("--pulse", type=_number, metavar="US", help="of the device, between `minimum` and `maximum`")
     command.add_argument("--seconds", type=_seconds(10), required=True, metavar="N", help="at most 10")
     command.add_argument("--yes-move-it", action="store_true", help="nothing moves without it")
+    add_examples(parser, _EXAMPLES)
     return parser
 
 

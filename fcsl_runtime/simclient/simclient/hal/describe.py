@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""`fcsl-hal describe DRIVER [DEVICE]`: the signals of a driver, and what a device tells of them now."""
+"""`fcsl hal describe DRIVER [DEVICE]`: the signals of a driver, and what a device tells of them now."""
 
 from __future__ import annotations
 

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""`fcsl-hal describe board.plan`: the whole plan in words."""
+"""`fcsl hal describe board.plan`: the whole plan in words."""
 
 from __future__ import annotations
 

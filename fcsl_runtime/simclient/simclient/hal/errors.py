@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""What ends a command of fcsl-hal with exit status 1: something is not as it should be."""
+"""What ends a command of fcsl hal with exit status 1: something is not as it should be."""
 
 from __future__ import annotations
 

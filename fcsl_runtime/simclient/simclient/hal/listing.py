@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""`fcsl-hal list`: what is there, and which driver would take it."""
+"""`fcsl hal list`: what is there, and which driver would take it."""
 
 from __future__ import annotations
 

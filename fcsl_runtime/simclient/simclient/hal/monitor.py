@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""`fcsl-hal monitor`: the devices and sensors of a plan, at the tick rate of its machine, without the machine."""
+"""`fcsl hal monitor`: the devices and sensors of a plan, at the tick rate of its machine, without the machine."""
 
 from __future__ import annotations
 
@@ -87,7 +87,7 @@ def _run(
         now = time.monotonic_ns()
         for text in watch.tick(now):
             if says_news:
-                print(f"fcsl-hal: {text}", file=sys.stderr, flush=True)
+                print(f"fcsl hal: {text}", file=sys.stderr, flush=True)
         if curves is not None:
             curves.take(tick)
         if now - shown >= period_ns:

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Curves of `fcsl-hal monitor --plot`: the corrected values of sensors, of the last 10 s."""
+"""Curves of `fcsl hal monitor --plot`: the corrected values of sensors, of the last 10 s."""
 
 from __future__ import annotations
 

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Snapshots of `fcsl-hal monitor` as text: a table for a terminal, a line per sensor elsewhere."""
+"""Snapshots of `fcsl hal monitor` as text: a table for a terminal, a line per sensor elsewhere."""
 
 from __future__ import annotations
 

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""A device whose actuators fcsl-hal moves, and which gets its safe values last, whatever ends the movement.
+"""A device whose actuators fcsl hal moves, and which gets its safe values last, whatever ends the movement.
 
 Signals only set a flag, so nothing comes between the last movement and the safe values.
 """

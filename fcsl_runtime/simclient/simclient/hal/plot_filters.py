@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""`fcsl-hal describe board.plan --plot FILE`: gain and group delay of the filters of a plan, over frequency."""
+"""`fcsl hal describe board.plan --plot FILE`: gain and group delay of the filters of a plan, over frequency."""
 
 from __future__ import annotations
 

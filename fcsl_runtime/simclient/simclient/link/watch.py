@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""fcsl-link: what the link of a running flight program carries, loses and repeats (docs/reference/transports.md)."""
+"""fcsl link: what the link of a running flight program carries, loses and repeats (docs/reference/transports.md)."""
 
 from __future__ import annotations
 
@@ -10,7 +10,7 @@ import sys
 import time
 from collections.abc import Mapping, Sequence
 
-from fcsl_compiler.api.command_line import add_version
+from fcsl_compiler.api.command_line import add_examples
 
 from ..vars.client import VarClient
 from ..vars.find import VARIABLE, find_server, named_address
@@ -27,32 +27,37 @@ Rates = Mapping[str, float]
 
 
 def main(arguments: Sequence[str]) -> int:
-    chosen = _parser().parse_args(arguments)
+    chosen = make_parser().parse_args(arguments)
     try:
         address = named_address(chosen.socket) or find_server().address
         with VarClient(address, chosen.token) as client:
             _show(client, chosen.period, chosen.count, chosen.json)
     except VarError as error:
-        print(f"fcsl-link: {error}", file=sys.stderr)
+        print(f"fcsl link: {error}", file=sys.stderr)
         return EXIT_REFUSED if error.code == "no_link" else EXIT_UNREACHABLE
     except KeyboardInterrupt:
         pass  # the normal end
     return 0
 
 
-def _parser() -> argparse.ArgumentParser:
+_EXAMPLES = {
+    "": "--socket craft.sock --period 1 --count 5",
+}
+
+
+def make_parser() -> argparse.ArgumentParser:
     parser = argparse.ArgumentParser(
-        prog="fcsl-link",
+        prog="fcsl link",
         description="Shows the link of a flight program (fcsl-fc --hal wire:udp:…, tcp:… or uart:…, with --socket): "
         "messages, frames, what was lost, damaged and repeated, as totals and per second.",
         epilog=f"The program is that of --socket, else of {VARIABLE}, else the only one of this user.",
     )
-    add_version(parser, "simclient", __file__)
     parser.add_argument("--socket", metavar="ADDRESS", help="address of the program's variable server")
     parser.add_argument("--token", metavar="FILE", help="the token of a TCP server")
     parser.add_argument("--period", type=_seconds, default=1.0, metavar="S", help="between two looks (default 1)")
     parser.add_argument("--count", type=int, default=0, metavar="N", help="end after N looks; 0 (default): Ctrl-C ends")
     parser.add_argument("--json", action="store_true", help="one JSON object per look: totals and rates")
+    add_examples(parser, _EXAMPLES)
     return parser
 
 

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Live telemetry in the rerun viewer (docs/guide/monitoring.md); `cli` is the command fcsl-view."""
+"""Live telemetry in the rerun viewer (docs/guide/monitoring.md); `cli` is the command fcsl view."""
 
 #: Default port of the page for browsers; the data use the next port.
 WEB_PORT = 9090

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""fcsl-view: shows a running machine's telemetry in the rerun viewer (docs/guide/monitoring.md)."""
+"""fcsl view: shows a running machine's telemetry in the rerun viewer (docs/guide/monitoring.md)."""
 
 from __future__ import annotations
 
@@ -14,8 +14,9 @@ from collections.abc import Callable, Sequence
 from typing import TYPE_CHECKING
 from urllib.parse import urlsplit
 
-from fcsl_compiler.api.command_line import add_version
+from fcsl_compiler.api.command_line import add_examples
 
+from ..address import host_and_port
 from ..cli import VIEWS_HELP
 from ..errors import ViewError
 from ..view.views import Views, read_views
@@ -26,7 +27,7 @@ if TYPE_CHECKING:
     from .live_view import LiveView
 
 _EPILOG = """\
-Start the sender with `--telemetry udp:HOST:PORT` of fcsl-fc or fcsl-sim. Without options the viewer opens in a window
+Start the sender with `--telemetry` and the same ADDRESS. Without options the viewer opens in a window
 on this computer. Ctrl-C ends the view; a window stays open. Exit status: 0; 1 if a viewer failed or did not receive
 everything; 2 for wrong usage."""
 #: Shortest period of updates, in s; an update that takes long extends it to this multiple of its duration.
@@ -40,9 +41,13 @@ _CONNECT_S = 5.0
 
 def main(arguments: Sequence[str]) -> int:
     """Parses the arguments and shows until a signal arrives; returns the exit code. Raises TwinError and ViewError."""
-    options = _parser().parse_args(arguments)
-    if not 0 <= options.port <= 65535 or (options.web is not None and not 1 <= options.web <= 65534):
-        raise ViewError("a port is a number below 65536; --web takes one above 0 and the one after it")
+    options = make_parser().parse_args(arguments)
+    try:
+        host, port = host_and_port(options.address, "udp")
+    except ValueError as error:
+        raise ViewError(str(error)) from None
+    if options.web is not None and not 1 <= options.web <= 65534:
+        raise ViewError("--web takes a port above 0 and below 65535, and the one after it")
     if options.connect is not None:
         _demand_viewer(options.connect)
     views = read_views(options.views) if options.views else None
@@ -51,8 +56,8 @@ def main(arguments: Sequence[str]) -> int:
         signal.signal(number, lambda *_: stop.set())
     from ..telemetry.receiver import Telemetry
 
-    with Telemetry(options.port, options.host, _WINDOW_TICKS) as telemetry:
-        _say(f"waiting for telemetry on {options.host}:{telemetry.port}")
+    with Telemetry(port, host, _WINDOW_TICKS) as telemetry:
+        _say(f"waiting for telemetry on {host}:{telemetry.port}")
         well = _view(telemetry, options, views, stop)
     if not well:
         sys.stdout.flush()
@@ -116,7 +121,7 @@ def _watch(views: list[LiveView], stop: threading.Event) -> bool:
             try:
                 act(view)
             except ViewError as error:
-                print(f"fcsl-view: {error}", file=sys.stderr, flush=True)
+                print(f"fcsl view: {error}", file=sys.stderr, flush=True)
                 views.remove(view)
                 well = False
 
@@ -132,16 +137,20 @@ def _say(text: str) -> None:
     print(text, flush=True)
 
 
-def _parser() -> argparse.ArgumentParser:
+_EXAMPLES = {
+    "": "udp:127.0.0.1:7000 --save flight.rrd",
+}
+
+
+def make_parser() -> argparse.ArgumentParser:
     parser = argparse.ArgumentParser(
-        prog="fcsl-view",
+        prog="fcsl view",
         description="Shows a running machine in the rerun viewer.",
         epilog=_EPILOG,
         formatter_class=argparse.RawDescriptionHelpFormatter,
     )
-    add_version(parser, "simclient", __file__)
-    parser.add_argument("port", type=int, metavar="PORT", help="UDP port that receives telemetry; 0: any free port")
-    parser.add_argument("--host", default="127.0.0.1", help="the address to listen on (default: 127.0.0.1)")
+    what = "where telemetry is received: udp:HOST:PORT, as the sender has it; port 0: any free one"
+    parser.add_argument("address", metavar="ADDRESS", help=what)
     where = parser.add_mutually_exclusive_group()
     where.add_argument(
         "--web",
@@ -155,4 +164,5 @@ def _parser() -> argparse.ArgumentParser:
     where.add_argument("--connect", metavar="URL", help=f"sends to a running viewer: {proxy(WINDOW_PORT)}")
     parser.add_argument("--save", default="", metavar="FILE.rrd", help="writes a file; alone, no viewer is opened")
     parser.add_argument("--views", default="", metavar="FILE", help=VIEWS_HELP)
+    add_examples(parser, _EXAMPLES)
     return parser

@@ -95,7 +95,7 @@ class LiveView:
             self._leaves_out = True
             text = f"a view has at most {RECORDINGS_MAX} recordings: telemetry that needs another is left out"
             recording.note(text)
-            self._notify(f"{text}; restart fcsl-view to see it")
+            self._notify(f"{text}; restart fcsl view to see it")
         recording.pass_over(window, rows)
         self.missing += len(rows)
 

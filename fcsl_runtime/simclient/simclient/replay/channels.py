@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Compares the actuator channels in a bag of `fcsl-bus record` with those of a replayed run."""
+"""Compares the actuator channels in a bag of `fcsl bus record` with those of a replayed run."""
 
 from __future__ import annotations
 

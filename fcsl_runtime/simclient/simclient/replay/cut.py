@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Writes a part of a bag as a new bag: `python -m simclient.bag cut`.
+"""Writes a part of a bag as a new bag: `fcsl bag cut`.
 
 Messages are selected by one clock: header stamps, or log times. By header stamps, a message that has none belongs to the
 cut if it was recorded between the first and the last that are selected. All messages of a machine's first tick belong to

@@ -68,7 +68,7 @@ class Fate:
 class ForeignRun:
     """The result of a run: the grid, the use of each mapped channel's messages, and oddities of the bag.
 
-    `str` gives the report of `simclient.replay --map`.
+    `str` gives the report of `fcsl replay --map`.
     """
 
     grid: Grid

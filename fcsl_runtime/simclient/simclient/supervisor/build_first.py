@@ -7,6 +7,7 @@ python3 -P -m simclient.supervisor.build_first PROGRAM CONFIG ARGUMENT...
 from __future__ import annotations
 
 import os
+import sys
 from collections.abc import Sequence
 
 from ..cli import run_tool
@@ -21,4 +22,4 @@ def main(arguments: Sequence[str]) -> int:
 
 
 if __name__ == "__main__":
-    run_tool("fcsl-supervisor", main)
+    sys.exit(run_tool("fcsl supervisor", "supervisor.build_first", sys.argv[1:]))

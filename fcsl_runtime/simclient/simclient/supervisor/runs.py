@@ -202,7 +202,7 @@ def _end(run: Run) -> None:
     try:
         run.stop()
     except HttpError as error:
-        print(f"fcsl-supervisor: {error.message}", file=sys.stderr, flush=True)
+        print(f"fcsl supervisor: {error.message}", file=sys.stderr, flush=True)
     run.close()
 
 

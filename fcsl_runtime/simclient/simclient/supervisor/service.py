@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""fcsl-supervisor: starts, stops and shows flights and simulations of this computer over HTTP (docs/guide/monitoring.md)."""
+"""fcsl supervisor: starts, stops and shows flights and simulations of this computer over HTTP (docs/guide/monitoring.md)."""
 
 from __future__ import annotations
 
@@ -16,8 +16,9 @@ import uvicorn
 from starlette.applications import Starlette
 from starlette.concurrency import run_in_threadpool
 
-from fcsl_compiler.api.command_line import add_version
+from fcsl_compiler.api.command_line import add_examples
 
+from ..address import host_and_port
 from ..errors import TwinError
 from .app import make_app
 from .files import Root
@@ -27,65 +28,70 @@ from .runs import Runs
 from .timeouts import TimedProtocol
 from .token import read_token
 
+_DEFAULT = "tcp:127.0.0.1:7700"
 #: Time for pending requests after a signal, in s. Then all runs are ended.
 _GRACE_S = 1
 
 
 def main(arguments: Sequence[str]) -> int:
     """Serves until SIGTERM or SIGINT. Raises TwinError and OSError."""
-    chosen = _parser().parse_args(arguments)
+    chosen = make_parser().parse_args(arguments)
     for number in (signal.SIGTERM, signal.SIGINT):
         # uvicorn handles these signals while it serves and raises them again afterwards; by then it has ended as
         # requested.
         signal.signal(number, lambda *_: sys.exit(0))
     token = "" if chosen.token is None else read_token(chosen.token)
-    if not chosen.address.is_loopback and not token:
-        raise TwinError(
-            f"--address {chosen.address} is reachable from other computers, which requires a token: --token FILE"
-        )
+    address, port = chosen.listen
+    if not address.is_loopback and not token:
+        raise TwinError(f"--listen {address} is reachable from other computers, which requires a token: --token FILE")
     root = Root(chosen.root)
-    listener = _listen(chosen.address, chosen.port)
-    guard = Guard(str(chosen.address), listener.getsockname()[1], token)
+    listener = _listen(address, port)
+    guard = Guard(str(address), listener.getsockname()[1], token)
     runs = Runs(root, chosen.runs)
     try:
-        print(f"fcsl-supervisor: http://{guard.shown}/ for files below {runs.root.folder}", flush=True)
+        print(f"fcsl supervisor: http://{guard.shown}/ for files below {runs.root.folder}", flush=True)
         _serve(runs, guard, listener)
     finally:
         runs.close()
     return 0
 
 
-def _parser() -> argparse.ArgumentParser:
+_EXAMPLES = {
+    "": "--root flights --listen tcp:127.0.0.1:7700",
+}
+
+
+def make_parser() -> argparse.ArgumentParser:
     parser = argparse.ArgumentParser(
-        prog="fcsl-supervisor",
+        prog="fcsl supervisor",
         description="Starts, stops and shows flights and simulations of this computer over HTTP.",
         epilog="docs/guide/monitoring.md describes its answers. All its runs end with it.",
     )
-    add_version(parser, "simclient", __file__)
     parser.add_argument("--root", type=Path, required=True, metavar="DIR", help="folder of all files that runs may use")
-    parser.add_argument("--port", type=_port, default=7700, metavar="N", help="0: any free port (default 7700)")
     parser.add_argument(
-        "--address",
-        type=ipaddress.ip_address,
-        default="127.0.0.1",
-        help="an address other than loopback requires --token",
+        "--listen",
+        type=_address,
+        default=_DEFAULT,
+        metavar="tcp:HOST:PORT",
+        help=f"an IP address; other than loopback requires --token; port 0: any free one (default {_DEFAULT})",
     )
     parser.add_argument("--token", type=Path, metavar="FILE", help="require the token in this file; created if absent")
     parser.add_argument("--runs", type=_runs, default=8, metavar="N", help="most runs at a time (default 8)")
+    add_examples(parser, _EXAMPLES)
     return parser
 
 
-def _port(text: str) -> int:
-    return _integer(text, 0, 65535)
+def _address(text: str) -> tuple[ipaddress.IPv4Address | ipaddress.IPv6Address, int]:
+    try:
+        host, port = host_and_port(text, "tcp")
+        return ipaddress.ip_address(host), port
+    except ValueError as error:
+        raise argparse.ArgumentTypeError(str(error)) from None
 
 
 def _runs(text: str) -> int:
-    return _integer(text, 1, 64)
-
-
-def _integer(text: str, least: int, most: int) -> int:
-    if not text.isdecimal() or not least <= int(text) <= most:
-        raise argparse.ArgumentTypeError(f"{text!r} is not an integer from {least} to {most}")
+    if not text.isdecimal() or not 1 <= int(text) <= 64:
+        raise argparse.ArgumentTypeError(f"{text!r} is not an integer from 1 to 64")
     return int(text)
 
 
@@ -100,7 +106,7 @@ def _listen(address: ipaddress.IPv4Address | ipaddress.IPv6Address, port: int) -
     except OSError as error:
         listener.close()
         raise TwinError(
-            f"cannot listen on {address} port {port}: {error.strerror}; --port N, 0 takes any free port"
+            f"cannot listen on {address} port {port}: {error.strerror}; --listen tcp:HOST:0 takes any free port"
         ) from None
     return listener
 

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""What the commands of fcsl-var share: the machine that they talk to, and how they print what it says."""
+"""What the commands of fcsl var share: the machine that they talk to, and how they print what it says."""
 
 from __future__ import annotations
 
@@ -25,7 +25,7 @@ def open_client(chosen: argparse.Namespace, changes: bool = False) -> VarClient:
                 "unnamed",
                 f"which machine? {server} runs; name it with --socket or {VARIABLE}, since this command changes it",
             )
-        print(f"fcsl-var: {server}", file=sys.stderr)
+        print(f"fcsl var: {server}", file=sys.stderr)
         address = server.address
     return VarClient(address, chosen.token)
 

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""The command line of fcsl-var. It imports no command, so that help and errors of usage come at once."""
+"""The command line of fcsl var. It imports no command, so that help and errors of usage come at once."""
 
 from __future__ import annotations
 
@@ -7,18 +7,15 @@ import argparse
 from collections.abc import Callable
 from functools import partial
 
-from fcsl_compiler.api.command_line import Command, add_version
+from fcsl_compiler.api.command_line import Command, add_examples
 
 #: Adds the options of a command.
 Fill = Callable[[argparse.ArgumentParser], object]
 
-#: Shells that have a script in complete.py.
-SHELL_NAMES = ("bash", "zsh")
 _EPILOG = """\
 The machine is that of --socket (a path, or tcp:HOST:PORT with --token FILE), else of FCSL_SOCKET. Commands that only
 read otherwise take the only fcsl-fc or fcsl-sim of this user that runs with --socket, and say which. A path is a field, a part of it (p[0], p[1:3]) or, for get,
-a prefix of several (nav.outputs). Exit status: 0; 1 if the machine refuses; 2 if there is none, or for wrong usage.
-Completion of commands and paths: eval "$(fcsl-var completion bash)", or zsh"""
+a prefix of several (nav.outputs). Exit status: 0; 1 if the machine refuses; 2 if there is none, or for wrong usage."""
 
 
 def _add_common(parser: argparse.ArgumentParser) -> None:
@@ -30,25 +27,44 @@ def _add_common(parser: argparse.ArgumentParser) -> None:
     parser.add_argument("--json", action="store_true", default=absent, help=what)
 
 
+_EXAMPLES = {
+    "": "get nav.outputs --json",
+    "list": "nav.outputs",
+    "get": "nav.outputs.x machine.tick",
+    "set": "nav.parameters.gain=0.5",
+    "watch": "nav.outputs.x --every 10",
+    "plot": "nav.outputs.x --window 1000",
+    "eval": '"abs(nav.outputs.x) > 1"',
+    "tick": "100",
+    "pause": "",
+    "resume": "",
+    "state": "--json",
+    "stats": "--json",
+    "set-state": "IDLE",
+    "save": "craft.checkpoint",
+    "restore": "craft.checkpoint",
+    "describe": "nav.outputs.x",
+}
+
+
 def make_parser() -> argparse.ArgumentParser:
     parser = argparse.ArgumentParser(
-        prog="fcsl-var",
+        prog="fcsl var",
         description="The values of a running machine.",
         epilog=_EPILOG,
         formatter_class=argparse.RawDescriptionHelpFormatter,
     )
     _add_common(parser)
-    add_version(parser, "simclient", __file__)
     commands = parser.add_subparsers(metavar="COMMAND", required=True, parser_class=Command, prog=parser.prog)
     for name, run, text, fill in _COMMANDS:
         commands.add_parser(name, help=text, description=text, fill=partial(_fill, name, run, fill))
+    add_examples(parser, _EXAMPLES)
     return parser
 
 
 def _fill(name: str, run: str, fill: Fill, command: argparse.ArgumentParser) -> None:
     command.set_defaults(run=run, command=name)
-    if name != "completion":  # it talks to no machine
-        _add_common(command)
+    _add_common(command)
     fill(command)
 
 
@@ -129,11 +145,5 @@ _COMMANDS: tuple[tuple[str, str, str, Fill], ...] = (
         "read.describe",
         "describes a field; without a path, the machine",
         lambda c: c.add_argument("path", nargs="?"),
-    ),
-    (
-        "completion",
-        "complete.print_script",
-        "prints a shell script that completes commands and paths",
-        lambda c: c.add_argument("shell", choices=SHELL_NAMES),
     ),
 )

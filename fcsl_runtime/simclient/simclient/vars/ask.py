@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Commands of fcsl-var that are a request of the same name without arguments: state, stats, pause, resume."""
+"""Commands of fcsl var that are a request of the same name without arguments: state, stats, pause, resume."""
 
 from __future__ import annotations
 

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Commands of fcsl-var about checkpoints: save, restore."""
+"""Commands of fcsl var about checkpoints: save, restore."""
 
 from __future__ import annotations
 

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""fcsl-var: reads and writes the values of a running machine from the command line (docs/reference/variables.md)."""
+"""fcsl var: reads and writes the values of a running machine from the command line (docs/reference/variables.md)."""
 
 from __future__ import annotations
 
@@ -15,12 +15,6 @@ _UNREACHABLE = ("unreachable", "unnamed", "closed", "timeout", "protocol", "unau
 
 
 def main(arguments: Sequence[str]) -> int:
-    asked, *words = arguments or [""]
-    if asked in ("complete", "complete-line"):
-        from .complete import complete, words_of
-
-        print("\n".join(complete(words if asked == "complete" else words_of(" ".join(words))[1:])))
-        return 0
     return _run(make_parser().parse_args(arguments, argparse.Namespace(socket=None, token=None, json=False)))
 
 
@@ -34,6 +28,6 @@ def _run(chosen: argparse.Namespace) -> int:
     except VarError as error:
         message = str(error).replace('say "allow_non_finite": true', "say --allow-non-finite")
         message += ": name its file, --token FILE" if error.code == "unauthorized" and chosen.token is None else ""
-        print(f"fcsl-var: {message}", file=sys.stderr)
+        print(f"fcsl var: {message}", file=sys.stderr)
         return EXIT_UNREACHABLE if error.code in _UNREACHABLE else EXIT_REFUSED
     return 0

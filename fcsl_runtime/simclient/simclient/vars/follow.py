@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Commands of fcsl-var that follow a machine: watch, plot."""
+"""Commands of fcsl var that follow a machine: watch, plot."""
 
 from __future__ import annotations
 

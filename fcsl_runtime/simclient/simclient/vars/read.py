@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Commands of fcsl-var that read: list, get, eval, describe."""
+"""Commands of fcsl var that read: list, get, eval, describe."""
 
 from __future__ import annotations
 

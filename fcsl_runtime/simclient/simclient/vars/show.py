@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""How fcsl-var prints values."""
+"""How fcsl var prints values."""
 
 from __future__ import annotations
 

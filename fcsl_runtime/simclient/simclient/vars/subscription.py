@@ -37,7 +37,7 @@ class Subscription:
         self._open = True
         self._fields: list[Layout] = []
         if machine:
-            from .binary_sample import Layout  # here: most commands of fcsl-var read no samples
+            from .binary_sample import Layout  # here: most commands of fcsl var read no samples
 
             self._fields = [Layout(path, kind, now[path], machine) for path, kind in types.items()]
 

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Curves in a terminal: a panel of braille dots with a scale for each path (fcsl-var plot)."""
+"""Curves in a terminal: a panel of braille dots with a scale for each path (fcsl var plot)."""
 
 from __future__ import annotations
 

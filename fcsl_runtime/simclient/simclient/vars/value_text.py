@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Values as the command line of fcsl-var has them."""
+"""Values as the command line of fcsl var has them."""
 
 from __future__ import annotations
 

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Live output of fcsl-var: `watch` prints a table or lines, `plot` draws curves."""
+"""Live output of fcsl var: `watch` prints a table or lines, `plot` draws curves."""
 
 from __future__ import annotations
 
@@ -79,7 +79,7 @@ def _fields(client: VarClient, paths: Sequence[str]) -> list[tuple[str, Any]]:
 def _say_paused(client: VarClient) -> None:
     state = client.state()
     if state["paused"]:
-        print(f"fcsl-var: paused at tick {state['tick']}: values appear when it resumes", file=sys.stderr)
+        print(f"fcsl var: paused at tick {state['tick']}: values appear when it resumes", file=sys.stderr)
 
 
 def _until(subscription: Subscription, every: int, ticks: int | None) -> Iterator[Sample]:

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Commands of fcsl-var that change a machine: set, tick, set-state."""
+"""Commands of fcsl var that change a machine: set, tick, set-state."""
 
 from __future__ import annotations
 
@@ -20,7 +20,7 @@ def set_values(chosen: argparse.Namespace) -> None:
         reply = client.set(values, chosen.allow_non_finite)
     print_answer(chosen, without_ok(reply), lambda: status_text(reply))
     for path, writer in reply["overwritten_by"].items():
-        print(f"fcsl-var: note: {path} will be overwritten by {writer}", file=sys.stderr)
+        print(f"fcsl var: note: {path} will be overwritten by {writer}", file=sys.stderr)
 
 
 def _assignments(words: Sequence[str]) -> list[tuple[str, str]]:

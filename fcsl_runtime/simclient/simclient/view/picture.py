@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""One picture of a run: the output of `python -m simclient.plot`. panels.py chooses what is drawn.
+"""One picture of a run: the output of `fcsl plot`. panels.py chooses what is drawn.
 
 Background colours are the states of the machine. Curves have gaps where the instance did not run, and where ticks are
 missing in the bag.

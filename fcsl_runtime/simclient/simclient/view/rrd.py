@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Converts a bag for the rerun viewer: `python -m simclient.to_rerun`. scene.py defines the entities."""
+"""Converts a bag for the rerun viewer: `fcsl rerun`. scene.py defines the entities."""
 
 from __future__ import annotations
 

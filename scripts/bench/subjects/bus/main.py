@@ -167,7 +167,7 @@ def computers(folder: Path) -> dict[str, float]:
         for i in range(COMPUTERS):
             where = ["--external", f"zenoh-client:{endpoint}", "--namespace", f"c{i}"]
             simulators.append(begin("fcsl-sim", "run", SIM, *where, "--speed", SPEED, "--timeout", 60, "--json"))
-            where = ["--hal", f"zenoh:{endpoint}", "--namespace", f"c{i}", "--timeout-ms", "60000"]
+            where = ["--hal", f"zenoh:{endpoint}", "--namespace", f"c{i}", "--timeout", "60"]
             flying.append(begin("fcsl-fc", library, *where, "--summary", folder / f"c{i}.json"))
         used = 0.0
         for process in flying:

@@ -188,7 +188,7 @@ def _fly_native(place: str) -> float:
     library = build_machine(lander / "fc/lander_control.json").library
     line = ["fcsl-sim", "run", str(lander / "sim/lander.sim.json"), "--seed", "1", "--external", place, "--json"]
     with subprocess.Popen(line, stdout=subprocess.PIPE, text=True) as simulator:
-        flight = ["fcsl-fc", str(library), "--hal", place, "--timeout-ms", "20000"]
+        flight = ["fcsl-fc", str(library), "--hal", place, "--timeout", "20"]
         subprocess.run(flight, stdout=subprocess.DEVNULL, check=True, timeout=LIMIT_S)
         said = json.loads(simulator.communicate(timeout=LIMIT_S)[0])
     return float(said["ticks"] / said["wall_s"])
