@@ -24,7 +24,8 @@ def test_its_study_is_the_example() -> None:
 
 
 def test_its_test_passes(tmp_path: Path) -> None:
-    ((code),) = re.findall(r"```python\n(.*?)```\n", PAGE, re.DOTALL)
+    blocks = re.findall(r"```python\n(.*?)```\n", PAGE, re.DOTALL)
+    (code,) = (block for block in blocks if "fcsl_campaign" in block)
     study = ROOT / "examples/lander/sim/touchdown.study.json"
     (tmp_path / "test_it.py").write_text(code.replace("../sim/touchdown.study.json", str(study)))
     line = [sys.executable, "-m", "pytest", "-p", "no:cacheprovider", "-q", "-n0", "test_it.py"]

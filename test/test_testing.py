@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""docs/guide/testing.md: its files are those of the lander's tests, which run; so do its commands, and its failing test fails as shown.
+"""docs/guide/testing.md: its files and parts of files are those of the lander's tests, which run; so do its commands, and its failing test fails as shown.
 
 FCSL_UPDATE_GOLDEN=1 copies the files into the page.
 """
@@ -19,9 +19,10 @@ ROOT = Path(__file__).resolve().parent.parent
 LANDER = ROOT / "examples/lander"
 DOC = ROOT / "docs/guide/testing.md"
 PAGE = DOC.read_text()
-BLOCK = re.compile(r"(?:<!-- (file|fails): (\S+) -->\n)?```(\w+)(?: (\w+))?\n(.*?)```\n", re.DOTALL)
+BLOCK = re.compile(r"(?:<!-- (file|part|fails): (\S+) -->\n)?```(\w+)(?: (\w+))?\n(.*?)```\n", re.DOTALL)
 BLOCKS: list[tuple[str, str, str, str, str]] = BLOCK.findall(PAGE)
 FILES = {name: text for kind, name, _, _, text in BLOCKS if kind == "file"}
+PARTS = [(name, text) for kind, name, _, _, text in BLOCKS if kind == "part"]
 
 
 def block(mark: str) -> str:
@@ -52,6 +53,11 @@ def test_files_are_those_of_the_example(name: str) -> None:
         DOC.write_text(DOC.read_text().replace(FILES[name], own))
     else:
         assert own == FILES[name]
+
+
+@pytest.mark.parametrize(("name", "text"), PARTS, ids=[name for name, _ in PARTS])
+def test_parts_of_files_are_in_those_of_the_example(name: str, text: str) -> None:
+    assert text.count("\n") > 3 and f"\n{text}" in (LANDER / name).read_text()
 
 
 def test_the_first_example(lander: Path) -> None:

@@ -49,7 +49,7 @@ TABLE = [
 @pytest.fixture(scope="module")
 def folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
     path = tmp_path_factory.mktemp("arming")
-    assert sorted(FILES) == ["cart.c", "drive.json", "drive.py", "drive.sim.json"]
+    assert sorted(FILES) == ["cart.cpp", "drive.json", "drive.py", "drive.sim.json"]
     for name, text in FILES.items():
         (path / name).write_text(text)
     return path
