@@ -129,7 +129,7 @@ def test_the_commands(rover: Path) -> None:
 
 
 def test_the_coverage(rover: Path) -> None:
-    """The output of `fcslc cover` for the page's tests equals that of the page."""
+    """The output of `fcsl cover` for the page's tests equals that of the page."""
     command, shown = (text for _, _, _, mark, text in BLOCKS if mark == "cover")
     done = subprocess.run(
         ["bash", "-e", "-c", command], cwd=rover, capture_output=True, text=True, check=False, timeout=120

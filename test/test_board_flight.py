@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""A flight with the sensors of a board: `fcslc board`, `fcsl-fc --hal linux:PLAN`, replays. Folders stand for the kernel's devices here;
+"""A flight with the sensors of a board: `fcsl board`, `fcsl-fc --hal linux:PLAN`, replays. Folders stand for the kernel's devices here;
 `make hardware` has its real drivers."""
 
 from __future__ import annotations
@@ -232,7 +232,7 @@ def test_plans_that_cannot_fly(craft: Craft) -> None:
         (
             "fcsl-board-plan 1",
             "fcsl-board-plan 2",
-            "board.plan:1: not a plan, or of another version: `fcslc board board.json` writes it",
+            "board.plan:1: not a plan, or of another version: `fcsl board board.json` writes it",
         ),
         ("machine craft 100", "machine raft 100", "is for machine 'raft' at 100 Hz, and this is 'craft' at 100 Hz"),
         ("sensor imu inertial", "sensor imu internal", "board.plan:5: not a kind of sensor"),

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""`fcslc new`: its output compiles under --strict, passes its test, and builds as a package."""
+"""`fcsl new`: its output compiles under --strict, passes its test, and builds as a package."""
 
 import json
 import subprocess
@@ -65,9 +65,7 @@ def test_a_plant(tmp_path: Path) -> None:
     run("fcslc", "new", "algorithm", "slew", cwd=craft)  # its bench is no machine to fly
     *made, following = run("fcslc", "new", "plant", "mass", cwd=craft).splitlines()
     assert made == ["mass.c", "mass.sim.json", "test/test_mass_plant.py"]
-    assert (
-        following == "next: fcsl-sim plot mass.sim.json; python3 -m pytest test/test_mass_plant.py; then change mass.c"
-    )
+    assert following == "next: fcsl plot mass.sim.json; python3 -m pytest test/test_mass_plant.py; then change mass.c"
     checked = run("fcsl-sim", "check", "mass.sim.json", cwd=craft)
     assert checked == "mass.sim.json: ok: `craft` and plant for at most 20 s\n"
     schema = json.loads(run("fcsl", "schema", "simulation", cwd=craft))
@@ -84,7 +82,7 @@ def test_a_plant_without_a_machine(tmp_path: Path) -> None:
     *made, remark, following = run("fcslc", "new", "plant", "mass", cwd=tmp_path).splitlines()
     assert made == ["mass.c", "test/test_mass_plant.py"]
     assert remark == "no simulation was written: name a machine with --machine"
-    assert following.startswith("next: fcsl-sim describe mass.c; ")
+    assert following.startswith("next: fcsl describe mass.c; ")
     assert "1 passed" in pytest_in(tmp_path, "test")
 
 

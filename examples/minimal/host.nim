@@ -1,7 +1,7 @@
 # SPDX-License-Identifier: Apache-2.0
 # Hosts the machine in a Nim program:
 #
-#   fcslc build --backend nim examples/minimal/minimal.json -o out
+#   fcsl build --backend nim examples/minimal/minimal.json -o out
 #   nim c -r -d:release --path:out --passC:"-I install/fcsl_compiler/include -ffp-contract=off" \
 #     --passL:"install/fcsl_compiler/lib/libfcsl_math.a -lm" --out:out/host examples/minimal/host.nim
 import minimal

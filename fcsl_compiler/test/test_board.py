@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""`fcslc board`: what it writes. FCSL_UPDATE_GOLDEN=1 rewrites the golden plan."""
+"""`fcsl board`: what it writes. FCSL_UPDATE_GOLDEN=1 rewrites the golden plan."""
 
 import json
 import math
@@ -308,7 +308,7 @@ def test_a_board_is_no_machine(line: list[str], folder: Path, capsys: pytest.Cap
     command, *options = [str(folder / word) if word == "out" else word for word in line]
     assert main([command, str(path), *options]) == 1
     captured = capsys.readouterr().err
-    assert "error[E105]: this is a board, not a machine" in captured and f"`fcslc board {path}` checks it" in captured
+    assert "error[E105]: this is a board, not a machine" in captured and f"`fcsl board {path}` checks it" in captured
     assert not (folder / "out").exists()
 
 

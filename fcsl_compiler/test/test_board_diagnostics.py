@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""What `fcslc board` reports, and where."""
+"""What `fcsl board` reports, and where."""
 
 from collections.abc import Sequence
 from pathlib import Path

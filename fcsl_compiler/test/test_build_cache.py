@@ -418,7 +418,7 @@ def test_a_file_that_is_imported_is_part_of_the_build(place: Place) -> None:
     first = built(place.start())
     library = place.config.parent / "out" / "libcraft.so"
     compilations = build_library([place.config], library)
-    write_record(Path(f"{library}{SUFFIX}"), compilations, "fcslc build")
+    write_record(Path(f"{library}{SUFFIX}"), compilations, "fcsl build")
     check_record(library, "craft", compilations[0].build_hash)
     gains = place.config.parent / "gains.py"
     gains.write_text("GAIN = 3.0\n")

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""`fcslc build --report` against simulation, hand counts and compiled machines. The check `instructions` compares
+"""`fcsl build --report` against simulation, hand counts and compiled machines. The check `instructions` compares
 bounds with executed instructions."""
 
 import json
@@ -508,7 +508,7 @@ def test_command(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     )
     assert main(["build", str(config), "-o", out, "--report", "--json"]) == 0
     document = json.loads(capsys.readouterr().out)["report"]
-    assert (document["kind"], document["version"]) == ("fcslc build report", 1) and len(document["machines"]) == 1
+    assert (document["kind"], document["version"]) == ("fcsl build report", 1) and len(document["machines"]) == 1
     for wrong in (
         ["--report", "--c-only"],
         ["--report", "--dump", "verify"],

@@ -180,7 +180,7 @@ def page() -> str:
     parts = [
         "# Diagnostics",
         "<!-- generated: fcsl_compiler/test/test_codes.py -->",
-        "Every code that `fcslc` reports, why it is a rule, and an example; `fcslc explain E402` prints one of them.\n"
+        "Every code that `fcslc` reports, why it is a rule, and an example; `fcsl explain E402` prints one of them.\n"
         "E1xx are about files, E2xx about the machine JSON, E3xx about the module level of an algorithm, E4xx about its\n"
         "statements, E5xx about boards; a W is a warning and stops nothing.",
         "The examples are pieces of this machine:",
@@ -205,7 +205,7 @@ def page() -> str:
             parts.append(f"{word} ({row.kind.value}):" if word == "Wrong" else f"{word}:")
             parts.append(f"```{language}\n{text}\n```")
     parts.append("## For editors and other programs")
-    parts.append("`fcslc check` and `fcslc build` print the same as one document on stdout with `--json` or `--sarif`.")
+    parts.append("`fcsl check` and `fcsl build` print the same as one document on stdout with `--json` or `--sarif`.")
     parts.append((report.__doc__ or "").split("\n\n", 1)[1].strip("\n"))
     return "\n\n".join(parts) + "\n"
 

@@ -466,7 +466,7 @@ def test_a_long_chain_of_instances(tmp_path: Path) -> None:
 
 
 def check(config: Path, capsys: pytest.CaptureFixture[str]) -> str:
-    """Codes that `fcslc check` prints, in a separate folder, with recording."""
+    """Codes that `fcsl check` prints, in a separate folder, with recording."""
     with watch().on(config.parent):
         status = main(["check", str(config)])
     captured = capsys.readouterr()

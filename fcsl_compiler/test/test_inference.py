@@ -85,7 +85,7 @@ def write(folder: Path, body: str) -> Path:
     ],
 )
 def test_locals(tmp_path: Path, body: str, expected: dict[str, str]) -> None:
-    """`fcslc build --dump types`."""
+    """`fcsl build --dump types`."""
     found = dump_types(compile_machine(write(tmp_path, body), "", until="check").checked)
     lines = found.split("\n")
     first = next(n for n, line in enumerate(lines) if "execute()" in line) + 1

@@ -53,6 +53,7 @@ def _parser(program: str) -> argparse.ArgumentParser:
     commands = parser.add_subparsers(dest="command", required=True)
     check = _add(commands, "check", "check a simulation, run nothing")
     check.add_argument("config", help=_CONFIG)
+    check.add_argument("--json", action="store_true", help="print one JSON object")
     _add_flight(check)
     run = _add(commands, "run", "run a simulation to its end")
     run.add_argument("config", help=_CONFIG)

@@ -60,7 +60,7 @@ SIM_CODES: dict[str, Code] = {
     "E802": Code(
         "a controller that cannot be used",
         "The controller is a machine JSON beside the simulation or in an installed package; it is compiled as "
-        "`fcslc build` would, and the same file flies on hardware.",
+        "`fcsl build` would, and the same file flies on hardware.",
         Kind.SIMULATION,
         '"controller": {"machine": "no_such.json"}',
         '"controller": {"machine": "hopper.json"}',

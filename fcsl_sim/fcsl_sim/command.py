@@ -74,7 +74,8 @@ def run_command(options: argparse.Namespace) -> int:
 
 def _fail_as_json(options: argparse.Namespace, message: str) -> None:
     if getattr(options, "json", False):
-        show(json.dumps({"end": "error", "error": message}, indent=2))
+        check = {"ok": False} if options.command == "check" else {"end": "error"}
+        show(json.dumps({**check, "error": message}, indent=2))
 
 
 def _interrupted(options: argparse.Namespace, number: signal.Signals) -> int:
@@ -96,7 +97,11 @@ def _load(options: argparse.Namespace) -> SimConfig:
 def _check(options: argparse.Namespace) -> int:
     config = _load(options)
     seconds = config.machine.time_ns(config.ticks) / 1e9
-    print(f"{options.config}: ok: `{config.machine.name}` and {', '.join(config.tables)} for at most {seconds:g} s")
+    if options.json:
+        found = {"ok": True, "machine": config.machine.name, "models": list(config.tables), "duration_s": seconds}
+        show(json.dumps(found, indent=2))
+    else:
+        print(f"{options.config}: ok: `{config.machine.name}` and {', '.join(config.tables)} for at most {seconds:g} s")
     return 0
 
 

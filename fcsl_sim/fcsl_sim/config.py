@@ -165,7 +165,7 @@ def _refuse_machine(file: Path, root: JsonNode) -> None:
     """Raises SimError if a file is a machine JSON, by its content."""
     if root.kind == "object" and {"tick_hz", "states"} <= root.members.keys() and "models" not in root.members:
         fix = f'name a simulation whose `controller` is {{"machine": "{file.name}"}}, such as {file.stem}.sim.json'
-        raise SimError(f"{file}: this is a machine, not a simulation; {fix}; `fcslc check {file}` checks it alone")
+        raise SimError(f"{file}: this is a machine, not a simulation; {fix}; `fcsl check {file}` checks it alone")
 
 
 def _require_compiler() -> None:

@@ -136,7 +136,7 @@ class ModelInstance:
     @classmethod
     def load(cls, text: str, **noise: Callable[[int], float]) -> ModelInstance:
         """The model that `text` names: the path of a file in C or C++, which is compiled, package://PACKAGE/NAME,
-        package://PACKAGE/PATH of a file, or a name that `fcsl-sim list-models` prints. `noise` are `gaussian` and `uniform`. Raises SimError."""
+        package://PACKAGE/PATH of a file, or a name that `fcsl models` prints. `noise` are `gaussian` and `uniform`. Raises SimError."""
         table = find_model(text).table()
         return cls(table.library, table.name, **noise)
 

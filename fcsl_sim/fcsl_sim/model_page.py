@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""What `fcsl-sim list-models` and `fcsl-sim describe` print of models, for people and for programs."""
+"""What `fcsl models` and `fcsl describe` print of models, for people and for programs."""
 
 from __future__ import annotations
 
@@ -42,7 +42,7 @@ def _doc_of(model: Found) -> str:
     try:
         return model.table().doc or "(no documentation)"
     except SimError:
-        return f"cannot be used; `fcsl-sim describe {model.path}` says why"
+        return f"cannot be used; `fcsl describe {model.path}` says why"
 
 
 def describe_json(model: Found, table: ModelTable) -> dict[str, Any]:

@@ -8,7 +8,7 @@ import sys
 
 
 def show(text: str) -> None:
-    """Prints a line at once. Once its reader has gone (`fcsl-sim run … | head -1`), lines are dropped and the run goes on."""
+    """Prints a line at once. Once its reader has gone (`fcsl sim … | head -1`), lines are dropped and the run goes on."""
     try:
         print(text, flush=True)
     except BrokenPipeError:

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""`fcsl-sim plot`: the picture of a simulation that is run for it, or of a bag. simclient.view.picture draws."""
+"""`fcsl plot`: the picture of a simulation that is run for it, or of a bag. simclient.view.picture draws."""
 
 from __future__ import annotations
 

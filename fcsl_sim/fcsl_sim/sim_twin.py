@@ -38,7 +38,7 @@ _SHOWN = 3
 
 
 class SimTwin(AlgTwin):
-    """A machine with its plant, in this process: bit for bit the flight of `fcsl-sim run`.
+    """A machine with its plant, in this process: bit for bit the flight of `fcsl sim`.
 
     What a test writes into the machine is recorded; what it writes into models shows in the recorded samples alone.
     """

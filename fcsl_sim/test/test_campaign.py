@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""`fcsl-sim campaign`: what it flies, measures and writes; that nothing but the study decides it; what it survives."""
+"""`fcsl campaign`: what it flies, measures and writes; that nothing but the study decides it; what it survives."""
 
 from __future__ import annotations
 

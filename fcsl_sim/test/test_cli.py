@@ -220,7 +220,7 @@ def test_a_machine_is_no_simulation(sim_json: Path) -> None:
         result = fcsl_sim(command, str(machine))
         assert result.returncode == 2 and result.stderr == (
             f"fcsl-sim: error: {machine}: this is a machine, not a simulation; name a simulation whose `controller` is "
-            f'{{"machine": "{machine.name}"}}, such as {machine.stem}.sim.json; `fcslc check {machine}` checks it alone\n'
+            f'{{"machine": "{machine.name}"}}, such as {machine.stem}.sim.json; `fcsl check {machine}` checks it alone\n'
         )
 
 
@@ -316,7 +316,7 @@ def test_a_simulation_of_a_package(path: str, message: str) -> None:
 
 
 def test_a_reader_that_leaves_does_not_end_the_flight(sim_json: Path, tmp_path: Path) -> None:
-    """As in `fcsl-sim run … | head -1`: the rest of the lines is dropped, the bag is whole."""
+    """As in `fcsl sim … | head -1`: the rest of the lines is dropped, the bag is whole."""
     bag, read = tmp_path / "bag", os.pipe()
     os.close(read[0])
     command = [str(FCSL_SIM), "run", str(sim_json), "--record", str(bag)]

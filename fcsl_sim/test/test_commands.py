@@ -118,7 +118,7 @@ def test_a_broken_model_does_not_hide_the_others(tmp_path: Path) -> None:
     (broken,) = [model for model in listed(tmp_path) if model["name"] == "broken"]
     assert "fcsl_model_t" in broken["problem"] and "doc" not in broken
     done = fcsl_sim("list-models", tmp_path)
-    assert done.returncode == 0 and f"broken: cannot be used; `fcsl-sim describe {tmp_path}/broken.c`" in done.stdout
+    assert done.returncode == 0 and f"broken: cannot be used; `fcsl describe {tmp_path}/broken.c`" in done.stdout
     assert "noisy_sensor: " in done.stdout
 
 
@@ -190,7 +190,7 @@ def test_events_and_feed_through() -> None:
     ("model", "message"),
     [
         ("noisy_senso", "noisy_senso: no such model; did you mean `noisy_sensor`?"),
-        ("qqqqqq", "qqqqqq: no such model; `fcsl-sim list-models` lists those that there are"),
+        ("qqqqqq", "qqqqqq: no such model; `fcsl models` lists those that there are"),
         ("none.c", "none.c: no such file"),
         ("", "no such model"),
         ("package://fcsl_sim", "write package://<ros package>/<path below its share folder>"),

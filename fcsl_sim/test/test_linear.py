@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""`fcsl-sim linearise` and `trim`, against closed forms."""
+"""`fcsl linearise` and `trim`, against closed forms."""
 
 from __future__ import annotations
 

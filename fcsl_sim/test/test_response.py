@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""`fcsl-sim response`, against transfer functions by hand."""
+"""`fcsl response`, against transfer functions by hand."""
 
 from __future__ import annotations
 

@@ -1,7 +1,7 @@
 # SPDX-License-Identifier: Apache-2.0
 """`make interop`: FCSL's programs and rclpy nodes in one ROS 2 graph, by a bridge with the published zenoh-plugin-ros2dds.
 
-    fcsl-sim run … --ros ─────┐                       ┌── listener.py, on use_sim_time
+    fcsl sim … --ros ─────────┐                       ┌── listener.py, on use_sim_time
                               ├── Zenoh ── bridge ── DDS
     fcsl-fc … --hal ros: ─────┘     (127.0.0.1)       └── talker.py, which ends halfway and is started again
 

@@ -19,7 +19,7 @@ from simclient import SimTwin
 
 
 def test_the_plant_of_the_design_is_the_one_that_flies(tmp_path: Path) -> None:
-    """By the central differences of `fcsl-sim linearise`, upright."""
+    """By the central differences of `fcsl linearise`, upright."""
     values = json.loads(SIM.read_text())["instances"]["pendulum"]["parameters"] | {"position": 0.0, "angle": 0.0}
     simulation = {
         "tick_hz": HZ,

@@ -98,7 +98,7 @@ def _parse(path: Path, sink: DiagnosticSink) -> JsonNode | None:
 def _refuse_machine(path: Path, root: JsonNode, sink: DiagnosticSink) -> None:
     """Raises DiagnosticError if a file is a machine JSON, by its content."""
     if root.kind == "object" and {"tick_hz", "states"} <= root.members.keys():
-        fix = f'write a board whose `machine` is "{path.name}"; `fcslc check {path}` checks the machine alone'
+        fix = f'write a board whose `machine` is "{path.name}"; `fcsl check {path}` checks the machine alone'
         sink.error("E501", "this is a machine, not a board", root.span, help=fix)
         sink.raise_if_failed()
 

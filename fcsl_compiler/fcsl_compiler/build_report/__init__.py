@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Resource report of a machine: `fcslc build --report`."""
+"""Resource report of a machine: `fcsl build --report`."""
 
 from __future__ import annotations
 
@@ -15,7 +15,7 @@ from .text import report_text
 __all__ = ["compiled_facts", "document", "report_text"]
 
 #: Identifies the JSON file of a report.
-_KIND = "fcslc build report"
+_KIND = "fcsl build report"
 
 
 def compiled_facts(compilation: Compilation, compiled: Path, includes: Sequence[Path]) -> Facts:

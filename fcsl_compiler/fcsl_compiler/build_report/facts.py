@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""The facts of `fcslc build --report`, as JSON of a stable schema (`"version": 1`; keys are only ever added). See
+"""The facts of `fcsl build --report`, as JSON of a stable schema (`"version": 1`; keys are only ever added). See
 docs/guide/authoring.md for what each of them means; bytes, ticks and instructions are what the keys say."""
 
 from __future__ import annotations

@@ -60,7 +60,7 @@ def command_parser(name: str, program: str) -> argparse.ArgumentParser:
 
 
 def _split_command(arguments: Sequence[str]) -> tuple[list[str], list[str]]:
-    """Splits the arguments of `fcslc cover` at the first `--`: its own arguments, and the command. For other
+    """Splits the arguments of `fcsl cover` at the first `--`: its own arguments, and the command. For other
     subcommands the second part is empty.
 
     If `--` is missing, options may belong to the command. They are dropped, so that cover can report the missing

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""`fcslc board`: checks a board and writes its plan."""
+"""`fcsl board`: checks a board and writes its plan."""
 
 from __future__ import annotations
 

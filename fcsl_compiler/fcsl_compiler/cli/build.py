@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""`fcslc build`, and what other commands share with it."""
+"""`fcsl build`, and what other commands share with it."""
 
 from __future__ import annotations
 
@@ -85,7 +85,7 @@ def run(options: argparse.Namespace) -> int:
 
 def _command(options: argparse.Namespace, folder: Path) -> str:
     """A shell command that builds the same library again from any folder."""
-    words = ["fcslc", "build", *(str(path.resolve()) for path in options.config), "-o", str(folder.resolve())]
+    words = ["fcsl", "build", *(str(path.resolve()) for path in options.config), "-o", str(folder.resolve())]
     for name in ("name", "instances"):
         value = getattr(options, name)
         words += [] if value is None else [f"--{name}", value]

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""`fcslc check`: reports errors and writes nothing."""
+"""`fcsl check`: reports errors and writes nothing."""
 
 from __future__ import annotations
 

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""`fcslc cover`: runs a command and reports the coverage of a machine's algorithms."""
+"""`fcsl cover`: runs a command and reports the coverage of a machine's algorithms."""
 
 from __future__ import annotations
 
@@ -23,7 +23,7 @@ _TIDY_UP_S = 10.0
 
 def run(options: argparse.Namespace) -> int:
     if not options.command:
-        example = "fcslc cover MACHINE.json -- python3 -m pytest test"
+        example = "fcsl cover MACHINE.json -- python3 -m pytest test"
         raise UsageError(f"cover: no command to run; write it after `--`: {example}")
     try:
         limits = parse_limits(options.fail_under)

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""`fcslc explain`: the page of a diagnostic code or of a function."""
+"""`fcsl explain`: the page of a diagnostic code or of a function."""
 
 from __future__ import annotations
 

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""`fcslc externs`: the link inputs of a target, for build systems."""
+"""`fcsl externs`: the link inputs of a target, for build systems."""
 
 from __future__ import annotations
 

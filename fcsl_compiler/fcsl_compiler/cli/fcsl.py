@@ -49,7 +49,7 @@ def _run(words: list[str]) -> int:
     offered = [package.verbs[name] for package in packages if name in package.verbs]
     if not offered:
         like = get_close_matches(name, sorted({n for p in packages for n in p.verbs}), 1)
-        return _wrong(f"there is no verb `{name[:80]}`" + (f"; did you mean `{like[0]}`?" if like else ""))
+        return _wrong(f"there is no verb `{name[:80]}`{f' (did you mean `{like[0]}`?)' if like else ''}")
     return _chosen(offered, rest).run(rest)
 
 

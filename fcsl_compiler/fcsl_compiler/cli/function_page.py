@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""`fcslc explain` for a function: arguments, result, equation, order of operations, limits of the equation."""
+"""`fcsl explain` for a function: arguments, result, equation, order of operations, limits of the equation."""
 
 from __future__ import annotations
 

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""`fcslc graph`: draws dataflow and state machine."""
+"""`fcsl graph`: draws dataflow and state machine."""
 
 from __future__ import annotations
 

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""`fcslc messages`: writes the ROS 2 messages of machines."""
+"""`fcsl messages`: writes the ROS 2 messages of machines."""
 
 from __future__ import annotations
 

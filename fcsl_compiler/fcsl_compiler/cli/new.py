@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""`fcslc new`: starts a machine, an algorithm, a plant or a vehicle."""
+"""`fcsl new`: starts a machine, an algorithm, a plant or a vehicle."""
 
 from __future__ import annotations
 
@@ -39,7 +39,7 @@ def _new_plant(options: argparse.Namespace) -> int:
     _write(made.files)
     if made.remark:
         print(made.remark)
-    first = f"fcsl-sim plot {made.simulation}" if made.simulation else f"fcsl-sim describe {options.name}.c"
+    first = f"fcsl plot {made.simulation}" if made.simulation else f"fcsl describe {options.name}.c"
     print(f"next: {first}; python3 -m pytest test/test_{options.name}_plant.py; then change {options.name}.c")
     return 0
 

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Files that `fcslc new` writes. They compile with --strict, and their test passes."""
+"""Files that `fcsl new` writes. They compile with --strict, and their test passes."""
 
 from __future__ import annotations
 
@@ -127,14 +127,14 @@ _README = """# @NAME@
 Next: change `algorithms/*.py` and `@NAME@.json` step by step, with
 
 ```sh
-fcslc check --strict @NAME@.json     # errors, with reasons and corrections
+fcsl check --strict @NAME@.json     # errors, with reasons and corrections
 python3 -m pytest test          # the compiled machine, tick by tick
-fcslc graph @NAME@.json -o @NAME@.svg     # a picture of it
-fcslc new algorithm NAME        # another algorithm, with a test
-fcslc new plant NAME            # a vehicle to simulate, connected with it, with a test
+fcsl graph @NAME@.json -o @NAME@.svg     # a picture of it
+fcsl new algorithm NAME        # another algorithm, with a test
+fcsl new plant NAME            # a vehicle to simulate, connected with it, with a test
 ```
 
-With `machine.schema.json`, editors complete and check `@NAME@.json`; `fcslc schema > machine.schema.json` updates it.
+With `machine.schema.json`, editors complete and check `@NAME@.json`; `fcsl schema > machine.schema.json` updates it.
 `pyrightconfig.json` excludes `algorithms` from pyright and Pylance, which do not support the ports of algorithms. mypy supports them with
 the plugin `fcsl_builtins.mypy_plugin`.
 """

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""What `fcslc new machine NAME --package` writes besides the machine: a ROS 2 package, a simulation, launch files."""
+"""What `fcsl new machine NAME --package` writes besides the machine: a ROS 2 package, a simulation, launch files."""
 
 from __future__ import annotations
 
@@ -8,7 +8,7 @@ README = """
 `sim/` has a vehicle to fly: `cart.c` is the plant, `@NAME@.sim.json` connects it with the machine.
 
 ```sh
-fcsl-sim run sim/@NAME@.sim.json --record flight     # the simulated vehicle, recorded
+fcsl sim sim/@NAME@.sim.json --record flight     # the simulated vehicle, recorded
 ```
 
 In a colcon workspace (`src/@NAME@`), `colcon build --packages-select @NAME@` compiles the machine and generates one ROS 2 message per
@@ -174,7 +174,7 @@ SIM = Path(__file__).parents[1] / "sim" / "@NAME@.sim.json"
 
 def fly(*options):
     """The summary of a flight."""
-    line = ["fcsl-sim", "run", str(SIM), "--json", *options]
+    line = ["fcsl", "sim", str(SIM), "--json", *options]
     return json.loads(subprocess.run(line, check=True, capture_output=True, text=True).stdout)
 
 

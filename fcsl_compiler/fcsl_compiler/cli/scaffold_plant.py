@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""What `fcslc new plant NAME` writes: a plant model in C, a simulation with a machine, and a test of both."""
+"""What `fcsl new plant NAME` writes: a plant model in C, a simulation with a machine, and a test of both."""
 
 from __future__ import annotations
 
@@ -159,7 +159,7 @@ SIM = Path(__file__).parents[1] / "@NAME@.sim.json"
 
 def fly(*options):
     """The last outputs of the plant."""
-    line = ["fcsl-sim", "run", str(SIM), "--json", *options]
+    line = ["fcsl", "sim", str(SIM), "--json", *options]
     truth = json.loads(subprocess.run(line, check=True, capture_output=True, text=True).stdout)["truth"]
     return {path.removeprefix("plant.outputs."): value for path, value in truth.items()}
 
@@ -183,7 +183,7 @@ PLANT = Path(__file__).parents[1] / "@NAME@.c"
 
 
 def test_it_is_a_model():
-    line = ["fcsl-sim", "describe", str(PLANT), "--json"]
+    line = ["fcsl", "describe", str(PLANT), "--json"]
     described = json.loads(subprocess.run(line, check=True, capture_output=True, text=True).stdout)
     assert [event["name"] for event in described["events"]] == ["stop"]
     assert set(described["skeleton"]["instances"]["@NAME@"]["parameters"]) == {@PARAMETERS@}

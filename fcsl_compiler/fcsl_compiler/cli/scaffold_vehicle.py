@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""What `fcslc new vehicle NAME --like OTHER` writes: a vehicle's package under another name, to be changed by its parameters."""
+"""What `fcsl new vehicle NAME --like OTHER` writes: a vehicle's package under another name, to be changed by its parameters."""
 
 from __future__ import annotations
 
@@ -23,18 +23,18 @@ A vehicle like `{other}`, whose documentation is that of the package `{other}`. 
 
 | what | where |
 |---|---|
-| masses, rotors, wheels, wings, sensors: the plant | `parameters` and `inputs` of the instances in `sim/*.sim.json`; `fcsl-sim describe MODEL` says what they mean |
+| masses, rotors, wheels, wings, sensors: the plant | `parameters` and `inputs` of the instances in `sim/*.sim.json`; `fcsl describe MODEL` says what they mean |
 | gains, limits, what the estimator believes | `parameters` of the instances in `fc/*.json` |
 | states and what leads from one to another | `states` and `transitions` in `fc/*.json` |
 | what it must be able to do | `test/` |
 
 ```sh
-fcsl-sim check sim/{simulation}                # after every change
-fcsl-sim plot sim/{simulation}
+fcsl check sim/{simulation}                # after every change
+fcsl plot sim/{simulation}
 python3 -m pytest test                         # some numbers in it are those of `{other}`: replace them by yours
 ```
 
-Models of the plant are in the library (`fcsl-sim list-models`). In a colcon workspace (`src/{name}`) `colcon build`
+Models of the plant are in the library (`fcsl models`). In a colcon workspace (`src/{name}`) `colcon build`
 builds the machine.
 """
 

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""`fcslc scan`: checks that machine libraries call only functions allowed in a step."""
+"""`fcsl scan`: checks that machine libraries call only functions allowed in a step."""
 
 from __future__ import annotations
 
@@ -14,6 +14,9 @@ from .report import print_extern_calls
 
 
 def run(options: argparse.Namespace) -> int:
+    for library in options.library:
+        if not library.exists():
+            raise UsageError(f"{library}: no such file")
     objects = sorted(options.objects.rglob("*.o")) if options.objects else []
     maps = sorted(options.emitted.glob("*.map.json")) if options.emitted else []
     externs = sorted({name for file in maps for name in _externs_of(file)})

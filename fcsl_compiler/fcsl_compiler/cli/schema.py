@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""`fcslc schema`: the JSON Schema of a kind of file, of whatever packages of FCSL are installed."""
+"""`fcsl schema`: the JSON Schema of a kind of file, of whatever packages of FCSL are installed."""
 
 from __future__ import annotations
 

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Output of `fcslc cover` and pytest's --fcsl-cover: a table of figures, then every uncovered item with its place."""
+"""Output of `fcsl cover` and pytest's --fcsl-cover: a table of figures, then every uncovered item with its place."""
 
 from __future__ import annotations
 
@@ -16,7 +16,7 @@ from .counts import Counts, added, read_folder
 from .figures import KINDS, NAMES, FileFigures, Miss, Share, figures
 from .probe_map import CoverError
 
-_KIND = "fcslc cover"
+_KIND = "fcsl cover"
 
 
 @dataclass(frozen=True)

@@ -126,7 +126,7 @@ def build_library(
 ) -> list[Compilation]:
     """Compiles machines to one shared library and writes the C files beside it. Raises DiagnosticError, ToolchainError.
 
-    `cover`: adds execution counters for `fcslc cover` (fcsl_cover.h). `instances`: instances of a subset machine.
+    `cover`: adds execution counters for `fcsl cover` (fcsl_cover.h). `instances`: instances of a subset machine.
 
     Sets `extern_calls` of every compilation, and `stack_bound` if the C compiler reports frame sizes. Then calls
     `inspect` for each.

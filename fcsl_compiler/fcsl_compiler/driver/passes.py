@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""The compiler driver: a table of named passes. `fcslc build --dump PASS` prints the result of each."""
+"""The compiler driver: a table of named passes. `fcsl build --dump PASS` prints the result of each."""
 
 from __future__ import annotations
 

@@ -126,11 +126,11 @@ def parse_machine(path: Path, sink: DiagnosticSink) -> ParsedMachine | None:
         return None
     root = parse_json(source, sink)
     if _is_simulation(path, root):
-        fix = f"`fcsl-sim check {path}` checks it together with the machine of its `controller`"
+        fix = f"`fcsl check {path}` checks it together with the machine of its `controller`"
         sink.error("E104", "this is a simulation, not a machine", source.whole(), help=fix)
         return None
     if root is not None and root.kind == "object" and {"machine", "devices"} <= root.members.keys():
-        fix = f"`fcslc board {path}` checks it together with its machine"
+        fix = f"`fcsl board {path}` checks it together with its machine"
         sink.error("E105", "this is a board, not a machine", source.whole(), help=fix)
         return None
     _check_name(name, source, sink)

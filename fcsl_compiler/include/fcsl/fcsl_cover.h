@@ -1,6 +1,6 @@
 /* SPDX-License-Identifier: Apache-2.0
  *
- * Additional export of a machine built for coverage (`fcslc cover`): fcsl_cover_<machine>.
+ * Additional export of a machine built for coverage (`fcsl cover`): fcsl_cover_<machine>.
  *
  * The words record what has run: lines of statements, outcomes of decisions, combinations of conditions. A word is 0 or has
  * its one value, by atomic operations, so threads and processes may share the words. A host may set `words` to shared memory

@@ -473,7 +473,7 @@ static const char *check_sum(const char *text, size_t size)
     }
     return length == strlen(wanted) && memcmp(text + begin, wanted, length) == 0
                ? NULL
-               : "the plan is damaged, or edited: write it with `fcslc board board.json`";
+               : "the plan is damaged, or edited: write it with `fcsl board board.json`";
 }
 
 static int parse(board_plan_t *plan, const char *file, size_t size, fcsl_error_t *error)
@@ -493,7 +493,7 @@ static int parse(board_plan_t *plan, const char *file, size_t size, fcsl_error_t
         char *next = at + strlen(at) + 1;
         const int is_end = is_last(at);
         if (line == 1u ? strcmp(at, FIRST_LINE) != 0 : is_end != (line == lines)) {
-            wrong = line == 1u ? "not a plan, or of another version: `fcslc board board.json` writes it"
+            wrong = line == 1u ? "not a plan, or of another version: `fcsl board board.json` writes it"
                     : is_end   ? "text after `end`"
                                : "the plan has no `end`: it was cut off";
         } else if (line > 1u && !is_end) {

@@ -1,6 +1,6 @@
 /* SPDX-License-Identifier: Apache-2.0
  *
- * The plan of a board, which `fcslc board` writes: its devices, the sensors of the machine that they are, how their readings are
+ * The plan of a board, which `fcsl board` writes: its devices, the sensors of the machine that they are, how their readings are
  * corrected and judged, and what the hw_* builtins of algorithms reach. Text, one statement per line, words separated by one space:
  *
  *   fcsl-board-plan 1

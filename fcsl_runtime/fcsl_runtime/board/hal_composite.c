@@ -43,7 +43,7 @@ static fcsl_hal_status_t fail(hal_t *hal, const char *what, uint64_t by_ns)
 {
     (void)snprintf(hal->failure, sizeof hal->failure,
                    "the simulator is %.3g s %s real time at tick %" PRIu64
-                   ": beside real devices it must keep it (fcsl-sim run … --speed 1, no pause)",
+                   ": beside real devices it must keep it (fcsl sim … --speed 1, no pause)",
                    (double)by_ns / 1e9, what, fcsl_run_tick(hal->run));
     hal->failed = 1;
     return FCSL_HAL_ERROR;

@@ -9,7 +9,7 @@
 #include "fcsl/fcsl_hal.h"
 #include "fcsl/fcsl_run.h"
 
-/* `file`: the plan that `fcslc board` has written, for the machine of `run`; `priority`: of the devices' threads, with SCHED_FIFO (0: as any
+/* `file`: the plan that `fcsl board` has written, for the machine of `run`; `priority`: of the devices' threads, with SCHED_FIFO (0: as any
  * thread). 0, or -1. */
 int hal_linux(const char *file, int priority, fcsl_run_t *run, fcsl_hal_t *hal, fcsl_error_t *error);
 /* After the last tick: makes pins safe. 0, or -1: one is not. */

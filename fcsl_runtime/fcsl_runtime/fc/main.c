@@ -422,7 +422,7 @@ int main(int argc, char **argv)
     (void)signal(SIGPIPE, SIG_IGN);
     (void)signal(SIGXFSZ, SIG_IGN);
     monitor_block_signals(&program.monitor);
-    int status = EXIT_RUN;
+    int status = access(program.options.library, F_OK) == 0 ? EXIT_RUN : EXIT_USAGE;
     if (open_system(&program) == 0 && open_run(&program) == 0 && open_server(&program) == 0 &&
         open_hardware(&program) == 0 && open_guard(&program) == 0 && open_telemetry(&program) == 0 &&
         open_observers(&program) == 0 && open_ros_graph(&program) == 0 && open_record(&program) == 0 &&

@@ -31,7 +31,7 @@ static const char USAGE[] =
     "                          the same with ,free-running behind it: whatever puts values there; waits for nobody\n"
     "                          ros:tcp/HOST:PORT: the topics of the channels in a ROS 2 graph, whose bridge connects "
     "there\n"
-    "                          linux:PLAN: the sensors of this computer, as a plan of `fcslc board` says "
+    "                          linux:PLAN: the sensors of this computer, as a plan of `fcsl board` says "
     "(docs/hardware/hal.md)\n"
     "                          composite:PLAN,wire:SPEC (or ,zenoh:…): these sensors, and all others from the "
     "simulator\n"

@@ -75,7 +75,7 @@ static void test_who_is_not_counted(void)
     CHECK(fcsl_cover_attach(library, "x.so", &long_named, &error) == 0);
 }
 
-/* Without `fcslc cover` such a machine does not run. */
+/* Without `fcsl cover` such a machine does not run. */
 static void test_no_folder(void)
 {
     reload();

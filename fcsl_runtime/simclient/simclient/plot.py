@@ -36,12 +36,14 @@ def make_parser() -> argparse.ArgumentParser:
     )
     parser.add_argument("bag", help="directory, or one of its files")
     parser.add_argument("paths", nargs="*", metavar="PATH", help="what to draw: a panel for each")
-    parser.add_argument("-o", "--output", required=True, help="picture to write: .png, .svg or .pdf")
+    parser.add_argument("-o", "--output", metavar="FILE", required=True, help="picture to write: .png, .svg or .pdf")
     parser.add_argument("--against", default="", metavar="PATH", help="the horizontal axis, instead of time")
     parser.add_argument("--time", default="", choices=("header", "log"), help=TIME_HELP)
     parser.add_argument("--views", default="", metavar="FILE", help=VIEWS_HELP)
-    parser.add_argument("--machine", default="", help="the machine, if the bag holds several")
-    parser.add_argument("--truth", default="", help="topic of the plant's truth (default: all below /<namespace>/sim/)")
+    parser.add_argument("--machine", metavar="NAME", default="", help="the machine, if the bag holds several")
+    parser.add_argument(
+        "--truth", metavar="TOPIC", default="", help="topic of the plant's truth (default: all below /<namespace>/sim/)"
+    )
     parser.add_argument("--msg-path", action="append", default=[], metavar="FOLDER", help=MSG_PATH_HELP)
     add_examples(parser, _EXAMPLES)
     return parser

@@ -25,10 +25,12 @@ def make_parser() -> argparse.ArgumentParser:
         description="Converts a recorded run for rerun. The first page has the panels and the body of the run's views.",
     )
     parser.add_argument("bag", help="directory, or one of its files")
-    parser.add_argument("-o", "--output", required=True, help="file to write: run.rrd")
+    parser.add_argument("-o", "--output", metavar="FILE", required=True, help="file to write: run.rrd")
     parser.add_argument("--views", default="", metavar="FILE", help=VIEWS_HELP)
-    parser.add_argument("--machine", default="", help="the machine, if the bag holds several")
-    parser.add_argument("--truth", default="", help="topic of the plant's truth (default: all below /<namespace>/sim/)")
+    parser.add_argument("--machine", metavar="NAME", default="", help="the machine, if the bag holds several")
+    parser.add_argument(
+        "--truth", metavar="TOPIC", default="", help="topic of the plant's truth (default: all below /<namespace>/sim/)"
+    )
     add_examples(parser, _EXAMPLES)
     return parser
 

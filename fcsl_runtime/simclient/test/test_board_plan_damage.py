@@ -23,7 +23,7 @@ def test_every_flipped_bit_and_every_cut_is_found(tmp_path: Path) -> None:
         with pytest.raises(TwinError):
             read_plan(plan)
     plan.write_bytes(good.replace(b"machine craft", b"machine draft"))
-    with pytest.raises(TwinError, match="the plan is damaged, or edited: write it with `fcslc board board.json`"):
+    with pytest.raises(TwinError, match="the plan is damaged, or edited: write it with `fcsl board board.json`"):
         read_plan(plan)
     # One that is written by hand has no checksum.
     plan.write_bytes(good[: good.rindex(b"end")] + b"end\n")

@@ -10,14 +10,13 @@ import select
 import signal
 import struct
 import subprocess
-import sys
 import time
 from pathlib import Path
 from typing import Any
 
 import pytest
 from native import PROGRAM
-from test_bus_tools import LONG_S, TOOL, library  # noqa: F401  a fixture
+from test_bus_tools import LONG_S, library  # noqa: F401  a fixture
 
 from simclient import AlgTwin, VarClient
 from simclient.bag import Bag
@@ -80,7 +79,7 @@ def test_a_machine_that_reads_hardware(tmp_path: Path) -> None:
     with (
         subprocess.Popen([str(word) for word in line], stdout=pipe, stderr=pipe, text=True) as fc,
         subprocess.Popen(
-            [sys.executable, TOOL, "record", "-c", endpoint, "-o", tmp_path / "bag"],
+            ["fcsl", "bus", "record", "-c", endpoint, "-o", tmp_path / "bag"],
             stdout=pipe,
             stderr=pipe,
             text=True,

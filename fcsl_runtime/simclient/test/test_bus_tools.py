@@ -174,7 +174,7 @@ def test_echo(endpoint: str) -> None:
 
 
 def test_hz(endpoint: str) -> None:
-    (line,) = tool("hz", "-c", endpoint, "-n", "1")[0].splitlines()
+    (line,) = tool("hz", "-c", endpoint, "--seconds", "1")[0].splitlines()
     assert line.startswith("1 s  north/hill/rig/packet ")
     assert 20 < int(line.split("rig/angle ")[1].split()[0]) < 2000
 

@@ -65,7 +65,7 @@ def test_the_offset_of_a_gyro_is_written(tmp_path: Path, sysfs: Path) -> None:
     assert '{"correct": {"gyro": {"offset": [0.011, -0.022, 0.033]}}}' in said
     assert board.read_text() == before
     said = run(sysfs, *words, "--write").stdout
-    assert f"now run `fcslc board {board}`" in said
+    assert f"now run `fcsl board {board}`" in said
     assert board.read_text() == before.replace("[9, 9, 9]", "[0.011, -0.022, 0.033]")
 
 

@@ -52,7 +52,7 @@ class Calibration:
 
     def __init__(self, sysfs: Path, plan: Path, *names: str, terminal: int = subprocess.PIPE):
         self.out = sysfs / "out"
-        line = [*HAL, "calibrate", "esc", str(plan), "--output", *names, "--yes-move-it"]
+        line = [*HAL, "calibrate", "esc", str(plan), "--channels", *names, "--yes-move-it"]
         with self.out.open("w") as out:
             self.process = subprocess.Popen(
                 line, stdin=terminal, stdout=out, stderr=subprocess.PIPE, env=environment(sysfs), text=True
@@ -155,7 +155,7 @@ def test_whatever_ends_a_step_makes_it_safe(tmp_path: Path, calibrating: Callabl
 
 def test_output_that_nobody_takes_makes_it_safe(tmp_path: Path) -> None:
     plan = plan_of_log(tmp_path)
-    line = [*HAL, "calibrate", "esc", str(plan), "--output", "motors", "--yes-move-it"]
+    line = [*HAL, "calibrate", "esc", str(plan), "--channels", "motors", "--yes-move-it"]
     pipe = subprocess.PIPE
     with subprocess.Popen(line, stdin=pipe, stdout=pipe, stderr=pipe, env=environment(tmp_path), text=True) as process:
         assert process.stdin is not None and process.stdout is not None
@@ -175,7 +175,7 @@ def test_nobody_answers(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None
     with os.fdopen(reading) as answers, os.fdopen(writing, "wb", buffering=0) as user:
         monkeypatch.setattr(sys, "stdin", answers)
         user.write(b"yes\n")
-        done = run(tmp_path, "calibrate", "esc", plan, "--output", "motors", "--yes-move-it", status=1)
+        done = run(tmp_path, "calibrate", "esc", plan, "--channels", "motors", "--yes-move-it", status=1)
     assert "no Enter came for 0.1 s; then it took its safe values" in done.stderr
     assert values(tmp_path) == [*STEPS[2], 1100.0]
 
@@ -218,7 +218,7 @@ def test_a_device_that_fails(tmp_path: Path, calibrating: Callable[..., Calibrat
 
 
 def test_nothing_moves_without_the_word(tmp_path: Path) -> None:
-    done = run(tmp_path, "calibrate", "esc", plan_of_log(tmp_path), "--output", "motors", status=2)
+    done = run(tmp_path, "calibrate", "esc", plan_of_log(tmp_path), "--channels", "motors", status=2)
     assert "nothing moves without --yes-move-it. PROPELLERS OFF" in done.stderr
     assert "motors[0]  number  2000     1000     1100" in done.stderr
     assert not (tmp_path / "log").exists()
@@ -232,7 +232,7 @@ def test_a_guard_has_the_device(tmp_path: Path) -> None:
             deadline = time.monotonic() + 60.0
             while not Path(f"/proc/{guard.pid}/cmdline").read_bytes().startswith(b"fcsl-guard"):  # exec sets it late
                 assert time.monotonic() < deadline
-            done = run(tmp_path, "calibrate", "esc", plan, "--output", "motors", "--yes-move-it", status=1)
+            done = run(tmp_path, "calibrate", "esc", plan, "--channels", "motors", "--yes-move-it", status=1)
         finally:
             guard.kill()
     assert f"motors[0] must not move: fcsl-guard (process {guard.pid}) drives this device" in done.stderr
@@ -256,6 +256,6 @@ def test_wrong_usage(tmp_path: Path, names: list[str], says: str) -> None:
         *("output motors one", pulse(0, "number", *MOTOR), "output rudder two", pulse(0, "number", *MOTOR)),
         *("output spare three", pulse(0, "number", 0.0, 1.0, 1000.0, 1500.0, 2000.0, 0.0, 2000.0)),
     )
-    done = run(tmp_path, "calibrate", "esc", plan, "--yes-move-it", "--output", *names, status=2)
+    done = run(tmp_path, "calibrate", "esc", plan, "--yes-move-it", "--channels", *names, status=2)
     assert says in done.stderr
     assert not any((tmp_path / name).exists() for name in ("one", "two", "three"))

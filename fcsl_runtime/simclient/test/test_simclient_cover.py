@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Coverage from a user's side: `fcslc cover`, pytest's --fcsl-cover, processes that share or are killed, damaged files."""
+"""Coverage from a user's side: `fcsl cover`, pytest's --fcsl-cover, processes that share or are killed, damaged files."""
 
 import json
 import os

@@ -94,7 +94,7 @@ def test_a_changed_source_is_named(craft: Path, library: Path, file: str, what: 
     assert refusal(library).splitlines() == [
         f"{library}: it is older than its sources",
         f"  {what} {path} has changed",
-        f"run `fcslc build {craft} -o {library.parent}`, or open {craft} itself: it is recompiled after a change",
+        f"run `fcsl build {craft} -o {library.parent}`, or open {craft} itself: it is recompiled after a change",
     ]
     path.write_text(before)  # it is the text that counts, not its time
     load(library)

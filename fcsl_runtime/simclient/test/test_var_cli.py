@@ -17,6 +17,7 @@ import subprocess
 import time
 import zlib
 from collections.abc import Callable, Iterator
+from contextlib import ExitStack
 from pathlib import Path
 from typing import cast
 
@@ -253,6 +254,8 @@ def test_what_runs_is_found_by_its_command_line(tmp_path: Path) -> None:
     lines = {
         "1": "/opt/bin/fcsl-fc libx.so --socket a.sock --paused",
         "2": "python3 /opt/bin/fcsl-sim run x.sim.json --socket=b.sock",
+        "8": "python3 /opt/bin/fcsl sim x.sim.json --socket c.sock",
+        "9": "python3 /opt/bin/fcsl plot x.sim.json --socket c.sock",
         "3": "fcsl-fc libx.so --socket tcp:127.0.0.1:7500 --token t",
         "4": "fcsl-fc libx.so --socket gone.sock",
         "5": "fcsl-fc libx.so",
@@ -264,12 +267,13 @@ def test_what_runs_is_found_by_its_command_line(tmp_path: Path) -> None:
         (tmp_path / number / "cmdline").write_text(line.replace(" ", "\0") + "\0")
         (tmp_path / number / "cwd").symlink_to(tmp_path)
     (tmp_path / "7").mkdir()
-    with socket.socket(socket.AF_UNIX) as a, socket.socket(socket.AF_UNIX) as b:
-        a.bind(str(tmp_path / "a.sock"))
-        b.bind(str(tmp_path / "b.sock"))
+    with ExitStack() as opened:
+        for name in "abc":
+            opened.enter_context(socket.socket(socket.AF_UNIX)).bind(str(tmp_path / f"{name}.sock"))
         assert running_servers(tmp_path) == [
             Server(str(tmp_path / "a.sock"), "fcsl-fc", 1),
             Server(str(tmp_path / "b.sock"), "fcsl-sim", 2),
+            Server(str(tmp_path / "c.sock"), "fcsl-sim", 8),
             Server("tcp:127.0.0.1:7500", "fcsl-fc", 3),
         ]
 

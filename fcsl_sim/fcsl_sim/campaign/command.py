@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""`fcsl-sim campaign`: flies a study, or one of its cases."""
+"""`fcsl campaign`: flies a study, or one of its cases."""
 
 from __future__ import annotations
 

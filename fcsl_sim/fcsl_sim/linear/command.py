@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""`fcsl-sim trim`, `fcsl-sim linearise` and `fcsl-sim response`."""
+"""`fcsl trim`, `fcsl linearise` and `fcsl response`."""
 
 from __future__ import annotations
 

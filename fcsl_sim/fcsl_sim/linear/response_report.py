@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""What `fcsl-sim response` prints, writes and draws."""
+"""What `fcsl response` prints, writes and draws."""
 
 from __future__ import annotations
 

@@ -47,7 +47,7 @@ def in_a_fresh_process(script: str, config: Path, env: dict[str, str] | None = N
 def edit_to_test() -> dict[str, float]:
     """The edit loop of the lander in seconds, the best of several fresh processes.
 
-    check: of the first `fcslc check` after import. cold: from the edit of one algorithm to the end of a process that imported
+    check: of the first `fcsl check` after import. cold: from the edit of one algorithm to the end of a process that imported
     pytest, compiled and ticked. warm: from AlgTwin to its first tick, nothing changed, pytest and simclient imported.
     """
     with tempfile.TemporaryDirectory() as name:

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""A machine's library as `fcslc build` makes it, and beside it the same code with line numbers and gcc's call graphs."""
+"""A machine's library as `fcsl build` makes it, and beside it the same code with line numbers and gcc's call graphs."""
 
 from __future__ import annotations
 

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Coverage: what `fcslc cover` says of random algorithms is what clang says of their generated C.
+"""Coverage: what `fcsl cover` says of random algorithms is what clang says of their generated C.
 
 Every algorithm is compiled twice, for coverage and plain; the plain C with clang's source-based coverage and MC/DC. Both
 run the same ticks. Compared are, line by line of Python, whether it ran, and of every decision of two conditions or more
@@ -112,7 +112,7 @@ def write_trial(folder: Path, r: random.Random) -> Path:
 
 
 def by_fcslc(folder: Path, config: Path, ticks: list[int]) -> Counts:
-    """Through the interface that users have: a command under `fcslc cover`'s environment, hosted by AlgTwin."""
+    """Through the interface that users have: a command under `fcsl cover`'s environment, hosted by AlgTwin."""
     script = (
         "import sys\nfrom simclient import AlgTwin\n"
         "with AlgTwin.from_config(sys.argv[1]) as twin:\n"

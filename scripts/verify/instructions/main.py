@@ -1,6 +1,6 @@
 #!/usr/bin/env python3
 # SPDX-License-Identifier: Apache-2.0
-"""Instruction bounds of `fcslc build --report` against what is executed, in every state of every example and of generated
+"""Instruction bounds of `fcsl build --report` against what is executed, in every state of every example and of generated
 machines: no step takes more instructions than the bound, neither of the generated code alone nor with the math functions that
 it calls; and the bound of the generated code of a small example is at most 2.5 times what its costliest step takes. Generated
 machines have code behind conditions that never hold, which no compiler sees: theirs that are further off are named, and must be few. What the bound

@@ -58,7 +58,7 @@ class Flight:
 
 
 class InProcess(Flight):
-    """The controller in the simulator's process, as `fcsl-sim run` flies it."""
+    """The controller in the simulator's process, as `fcsl sim` flies it."""
 
     def __init__(self, sim: Simulation):
         super().__init__()

@@ -1,7 +1,7 @@
 # SPDX-License-Identifier: Apache-2.0
 """A campaign on a real Ray cluster, one of whose workers is killed on the way, leaves the table of one process, byte for byte.
 
-`fcsl-sim campaign --engine ray` starts a cluster with three workers on this computer. When some cases are flown, SIGKILL ends one
+`fcsl campaign --engine ray` starts a cluster with three workers on this computer. When some cases are flown, SIGKILL ends one
 of the workers. Its cases.parquet is compared with that of `--jobs 1`. Ray (pyproject.toml) is installed on first use into
 a folder of its own, out/verify/ray/packages: 70 MB to download, 190 MB on disk.
 

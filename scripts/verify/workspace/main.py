@@ -1,7 +1,7 @@
 # SPDX-License-Identifier: Apache-2.0
 """FCSL in a user's own colcon workspace: plain `colcon build`, without this workspace's scripts and settings.
 
-A copy of the tracked files lies under src/fcsl, beside a package that `fcslc new machine my_robot --package` wrote. The build
+A copy of the tracked files lies under src/fcsl, beside a package that `fcsl new machine my_robot --package` wrote. The build
 takes the packages that docs/guide/ros2.md names, writes nothing to standard error, which colcon would report as if something
 were wrong, and takes no example; then the package's tests pass. Only the tools and ROS 2 come from this workspace.
 
@@ -65,7 +65,7 @@ def check_without_zenoh(workspace: Path, sources: Path) -> None:
 def check(workspace: Path) -> list[str]:
     shutil.rmtree(workspace, ignore_errors=True)
     copy_tracked(workspace / "src/fcsl")
-    in_shell(workspace, f". {ROOT}/scripts/env.sh; cd src && fcslc new machine my_robot --package")
+    in_shell(workspace, f". {ROOT}/scripts/env.sh; cd src && fcsl new machine my_robot --package")
     print("workspace: building", flush=True)
     in_shell(workspace, "colcon build --packages-up-to fcsl_bridge my_robot")
     built = {path.name for path in (workspace / "install").iterdir() if path.is_dir()}

@@ -70,7 +70,7 @@ MACHINE_CODES: dict[str, Code] = {
     "E105": Code(
         "a board where a machine is needed",
         "A board says which devices are the sensors and actuators of a machine. The machine is a separate JSON file, "
-        "which runs unchanged on any board. `fcslc board` checks a board together with its machine.",
+        "which runs unchanged on any board. `fcsl board` checks a board together with its machine.",
         Kind.TEXT,
         "{\n"
         '  "machine": "craft.json",\n'
@@ -430,8 +430,8 @@ MACHINE_CODES: dict[str, Code] = {
         " Two machines must not define the same C function, as machine a_b with instance c and machine a with "
         "instance b_c would.",
         Kind.COMMAND,
-        "fcslc build left/craft.json right/craft.json",
-        "fcslc build left/craft.json right/tug.json",
+        "fcsl build left/craft.json right/craft.json",
+        "fcsl build left/craft.json right/tug.json",
     ),
     "E232": Code(
         "an invalid struct",
@@ -496,12 +496,12 @@ MACHINE_CODES: dict[str, Code] = {
     ),
     "E242": Code(
         "an invalid selection of instances",
-        "A subset machine (`fcslc build --instances`, `AlgTwin.from_instances`) has one or more instances of a "
+        "A subset machine (`fcsl build --instances`, `AlgTwin.from_instances`) has one or more instances of a "
         "machine, each named once. At least one state must schedule one of them; without a schedule there is no "
         "tick.",
         Kind.COMMAND,
-        "fcslc build craft.json --instances nav,nav",
-        "fcslc build craft.json --instances nav,control",
+        "fcsl build craft.json --instances nav,nav",
+        "fcsl build craft.json --instances nav,control",
     ),
     "E243": Code(
         "an instance of `always` in the schedule of a state",

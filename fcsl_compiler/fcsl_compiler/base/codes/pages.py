@@ -1,7 +1,7 @@
 # SPDX-License-Identifier: Apache-2.0
 """The pages of diagnostic codes: title, reason for the rule, a wrong example and its correction.
 
-`fcslc explain`, the SARIF report and docs/reference/diagnostics.md (generated) use the same table. Tests compile every example
+`fcsl explain`, the SARIF report and docs/reference/diagnostics.md (generated) use the same table. Tests compile every example
 and check that the table and the sources use the same codes. Rows: machine.py, ros.py, algorithm.py
 and board.py.
 """

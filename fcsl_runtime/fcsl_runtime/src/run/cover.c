@@ -145,7 +145,7 @@ int fcsl_cover_attach(void *library, const char *path, const fcsl_machine_t *mac
     const char *const folder = getenv(FCSL_COVER_DIR);
     if (folder == NULL || folder[0] == '\0') {
         return fcsl_fail(
-            error, "'%s' is built for coverage and not to be flown: run it by `fcslc cover`, or build it again", path);
+            error, "'%s' is built for coverage and not to be flown: run it by `fcsl cover`, or build it again", path);
     }
     (void)pthread_mutex_lock(&attaching);
     const int status = cover->attached != 0u ? 0 : attach(cover, folder, machine->name, error);

@@ -82,7 +82,7 @@ void *fcsl_library_open(const char *library, const char *what, fcsl_error_t *err
     if (handle == NULL) {
         const char *suffix = strrchr(library, '.');
         if (suffix != NULL && strcmp(suffix, ".json") == 0) {
-            (void)fcsl_fail(error, "'%s' is not compiled; `fcslc build %s` makes the library", library, library);
+            (void)fcsl_fail(error, "'%s' is not compiled; `fcsl build %s` makes the library", library, library);
             return NULL;
         }
         reason = dlerror();

@@ -16,6 +16,7 @@ Exit code of diff: 0 the bags are the same; 1 they differ, or one is incomplete;
 from __future__ import annotations
 
 import argparse
+import json
 from collections.abc import Callable, Sequence
 from contextlib import ExitStack
 from decimal import Decimal, InvalidOperation
@@ -42,10 +43,13 @@ _NEVER = 1 << 63
 
 
 def _info(options: argparse.Namespace) -> int:
-    from .info import describe
+    from .info import describe, facts
 
     bag = open_bag(options.bag, options.msg_path)
-    print(describe(bag, options.machine, options.time))
+    if options.json:
+        print(json.dumps(facts(bag, options.machine, options.time), indent=2))
+    else:
+        print(describe(bag, options.machine, options.time))
     return completeness("fcsl bag", bag.truncated)
 
 
@@ -174,19 +178,20 @@ def make_parser() -> argparse.ArgumentParser:
         if name != "diff":
             command.add_argument("bag", help="directory, or one of its files")
         if name not in ("diff", "repair"):
-            command.add_argument("--machine", default="", help="the machine, if the bag holds several")
+            command.add_argument("--machine", metavar="NAME", default="", help="the machine, if the bag holds several")
         if name in ("info", "cut", "export"):
             command.add_argument("--time", default="", choices=CLOCKS, help=TIME_HELP)
         if name not in ("digest", "repair"):
             command.add_argument("--msg-path", action="append", default=[], metavar="FOLDER", help=MSG_PATH_HELP)
         return command
 
-    add("info", _info, "describes a bag: topics, times, machines, states visited, writes, damage")
+    info = add("info", _info, "describes a bag: topics, times, machines, states visited, writes, damage")
+    info.add_argument("--json", action="store_true", help="print one JSON object; times in ns")
     _add_cut(add("cut", _cut, "writes a part of a bag as a new bag, complete or not at all", _CUT_LOSES))
     _add_diff(add("diff", _diff, "compares two bags field by field and shows the first difference"))
     export = add("export", _export, "writes a bag as a table", _EXPORT_NAMES)
     export.add_argument("--columns", nargs="+", metavar="NAME", help="only these columns or topics; * matches anything")
-    export.add_argument("-o", "--output", required=True, help="file to write: .csv, .parquet or .npz")
+    export.add_argument("-o", "--output", metavar="FILE", required=True, help="file to write: .csv, .parquet or .npz")
     add("digest", _digest, "prints one hash of a machine's run: equal digests mean the same bits in every tick")
     add("repair", _repair, "rewrites metadata.yaml, and the end of MCAP files whose recorder was killed", _REPAIR_KEEPS)
     add_examples(parser, _EXAMPLES)
@@ -204,23 +209,31 @@ are words."""
 
 
 def _add_cut(command: argparse.ArgumentParser) -> None:
-    command.add_argument("-o", "--output", required=True, help="bag directory to write; must not exist")
+    command.add_argument("-o", "--output", metavar="BAG", required=True, help="bag directory to write; must not exist")
     time = "in seconds, as info shows them"
     command.add_argument("--from", dest="begin", type=_seconds, metavar="SECONDS", help=f"first time, {time}")
     command.add_argument("--to", dest="end", type=_seconds, metavar="SECONDS", help=f"last time, {time}")
-    command.add_argument("--state", default="", help="only the time in which the machine was in this state")
+    command.add_argument(
+        "--state", metavar="STATE", default="", help="only the time in which the machine was in this state"
+    )
     command.add_argument("--visit", type=int, default=1, metavar="N", help="its n-th visit to that state (default 1)")
     which = command.add_mutually_exclusive_group()
-    which.add_argument("--config", default="", help="machine JSON; replays up to the cut to make its checkpoint")
-    which.add_argument("--library", default="", help="compiled machine library; likewise")
+    which.add_argument(
+        "--config", metavar="FILE", default="", help="machine JSON; replays up to the cut to make its checkpoint"
+    )
+    which.add_argument("--library", metavar="FILE", default="", help="compiled machine library; likewise")
 
 
 def _add_diff(command: argparse.ArgumentParser) -> None:
     command.add_argument("first", help="bag A")
     command.add_argument("second", help="bag B")
     command.add_argument("--topics", nargs="+", metavar="TOPIC", help="only these; * matches anything")
-    command.add_argument("--absolute", type=_not_negative, default=0.0, help="floats may differ by this much")
-    command.add_argument("--relative", type=_not_negative, default=0.0, help="and by this fraction of the larger one")
+    command.add_argument(
+        "--absolute", metavar="NUMBER", type=_not_negative, default=0.0, help="floats may differ by this much"
+    )
+    command.add_argument(
+        "--relative", metavar="NUMBER", type=_not_negative, default=0.0, help="and by this fraction of the larger one"
+    )
 
 
 def main(arguments: Sequence[str]) -> int:

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Describes a bag as text: the output of `fcsl bag info`.
+"""Describes a bag: the output of `fcsl bag info`, as facts that JSON takes and as text.
 
 Every message is read, so the reported damage covers the whole bag and not only its index.
 """
@@ -40,10 +40,10 @@ class TopicSpan:
             self.timed += 1
 
     @property
-    def hertz(self) -> str:
-        """Average rate in Hz as text; empty if it is undefined."""
+    def hertz(self) -> float | None:
+        """Average rate in Hz; None if it is undefined."""
         long = self.last_ns - self.first_ns
-        return f"{(self.timed - 1) * 1e9 / long:.2f} Hz" if long > 0 else ""
+        return (self.timed - 1) * 1e9 / long if long > 0 else None
 
 
 @dataclass
@@ -80,41 +80,88 @@ def _write_kinds(bag: Bag, topic: str) -> dict[int, str]:
     return {value: name for name, _, value in constants if isinstance(value, int)}
 
 
-def describe(bag: Bag, machine: str = "", time: str = "") -> str:
-    """The text. `machine` selects one of several machines, `time` the clock (stamps.Clock). Raises BagError."""
+def facts(bag: Bag, machine: str = "", time: str = "") -> dict[str, Any]:
+    """What `fcsl bag info --json` prints. `machine` selects one of several machines, `time` the clock (stamps.Clock). Times are in
+    ns of that clock. Raises BagError."""
     machines = [bag.machine(machine, True)] if machine else bag.machines(by_bystanders=True)
     clock = Clock(bag, bag.topics, time)
     found = _scan(bag, machines, clock)
-    lines = _head(bag, list(found.spans.values()), clock)
-    lines += ["", *_topics(bag, found.spans)]
-    for recorded in machines:
-        lines += ["", *_machine(bag, recorded, found)]
+    timed = [span for span in found.spans.values() if span.timed]
+    return {
+        "bag": str(bag.path),
+        "files": [file.name for file in bag.files],
+        "bytes": sum(file.stat().st_size for file in bag.files),
+        "messages": sum(span.count for span in found.spans.values()),
+        "clock": str(clock),
+        "first_ns": min(span.first_ns for span in timed) if timed else None,
+        "last_ns": max(span.last_ns for span in timed) if timed else None,
+        "timeless": list(clock.timeless),
+        "damage": bag.truncated,
+        "topics": [_topic(t.name, t.type or f"({t.encoding})", found.spans[t.name]) for t in bag.topics.values()],
+        "machines": [_machine(bag, recorded, found) for recorded in machines],
+    }
+
+
+def _topic(name: str, kind: str, span: TopicSpan) -> dict[str, Any]:
+    return {"topic": name, "type": kind, "messages": span.count, "hertz": span.hertz}
+
+
+def _machine(bag: Bag, machine: RecordedMachine, found: Contents) -> dict[str, Any]:
+    data, lacks = found.checkpoints.get(machine.checkpoint), bag.lacks(machine)
+    described: dict[str, Any] = {"prefix": machine.prefix, "lacks": lacks, "checkpoint": None}
+    if not lacks and data is not None:
+        wanted = ("tick", "source_hash", "layout_hash", "build_hash", "data")
+        checkpoint = bag.decode_own(machine.checkpoint, data, wanted)
+        described["checkpoint"] = {
+            "tick": checkpoint.tick,
+            "source_hash": checkpoint.source_hash,
+            "layout_hash": checkpoint.layout_hash,
+            "build_hash": checkpoint.build_hash,
+            "bytes": len(checkpoint.data),
+        }
+    described["writes"] = dict(sorted(found.writes.get(machine.writes, Counter()).items()))
+    return described if machine.by_bystander else described | _states(bag, machine)
+
+
+def _states(bag: Bag, machine: RecordedMachine) -> dict[str, Any]:
+    try:
+        return {"visits": [visit._asdict() for visit in visits(bag, machine)]}
+    except BagError as error:
+        return {"no_visits": str(error)}
+
+
+# ---- as text ---------------------------------------------------------------------------------------------------------
+
+
+def describe(bag: Bag, machine: str = "", time: str = "") -> str:
+    """The same as text. Raises BagError."""
+    found = facts(bag, machine, time)
+    topics = [
+        (t["topic"], t["type"], str(t["messages"]), "" if t["hertz"] is None else f"{t['hertz']:.2f} Hz")
+        for t in found["topics"]
+    ]
+    lines = [*_head(found), "", *_table([("topic", "type", "messages", "rate"), *topics], right=(2, 3))]
+    for recorded in found["machines"]:
+        lines += ["", *_machine_lines(recorded)]
     return "\n".join(lines)
 
 
-def _head(bag: Bag, spans: Sequence[TopicSpan], clock: Clock) -> list[str]:
-    size = sum(file.stat().st_size for file in bag.files)
+def _head(found: dict[str, Any]) -> list[str]:
     lines = [
-        f"bag        {bag.path}",
-        f"files      {', '.join(file.name for file in bag.files)} ({size / 1e6:.3f} MB)",
-        f"messages   {sum(span.count for span in spans)}",
+        f"bag        {found['bag']}",
+        f"files      {', '.join(found['files'])} ({found['bytes'] / 1e6:.3f} MB)",
+        f"messages   {found['messages']}",
     ]
-    if timed := [span for span in spans if span.timed]:
-        first, last = min(span.first_ns for span in timed), max(span.last_ns for span in timed)
+    first, last = found["first_ns"], found["last_ns"]
+    if first is not None:
         lines += [
-            f"time       {clock}",
+            f"time       {found['clock']}",
             f"duration   {seconds(last - first)} s",
             f"from       {seconds(first)} s",
             f"to         {seconds(last)} s",
         ]
-    lines += [f"timeless   {text}" for text in clock.timeless]
-    return [*lines, f"damage     {bag.truncated or 'none'}"]
-
-
-def _topics(bag: Bag, spans: dict[str, TopicSpan]) -> list[str]:
-    rows = [(t.name, t.type or f"({t.encoding})", str(spans[t.name].count), spans[t.name].hertz)
-            for t in bag.topics.values()]  # fmt: skip
-    return _table([("topic", "type", "messages", "rate"), *rows], right=(2, 3))
+    lines += [f"timeless   {text}" for text in found["timeless"]]
+    return [*lines, f"damage     {found['damage'] or 'none'}"]
 
 
 def _table(rows: Sequence[tuple[str, ...]], right: tuple[int, ...]) -> list[str]:
@@ -128,36 +175,30 @@ def _table(rows: Sequence[tuple[str, ...]], right: tuple[int, ...]) -> list[str]
     return ["  ".join(row).rstrip() for row in padded]
 
 
-def _machine(bag: Bag, machine: RecordedMachine, found: Contents) -> list[str]:
-    lines = [f"machine    {machine.prefix}"]
-    data, lacks = found.checkpoints.get(machine.checkpoint), bag.lacks(machine)
-    if lacks:
-        lines.append(f"record     does not reproduce the run: {lacks}")
-    elif data is None:
+def _machine_lines(machine: dict[str, Any]) -> list[str]:
+    checkpoint = machine["checkpoint"]
+    lines = [f"machine    {machine['prefix']}"]
+    if machine["lacks"]:
+        lines.append(f"record     does not reproduce the run: {machine['lacks']}")
+    elif checkpoint is None:
         lines.append("record     no checkpoint: shows what the machine did, but cannot be replayed")
     else:
-        wanted = ("tick", "source_hash", "layout_hash", "build_hash", "data")
-        checkpoint = bag.decode_own(machine.checkpoint, data, wanted)
         lines += [
-            f"source     {checkpoint.source_hash}",
-            f"layout     {checkpoint.layout_hash}",
-            f"build      {checkpoint.build_hash}",
-            f"record     replays from the checkpoint before tick {checkpoint.tick} ({len(checkpoint.data)} bytes)",
+            f"source     {checkpoint['source_hash']}",
+            f"layout     {checkpoint['layout_hash']}",
+            f"build      {checkpoint['build_hash']}",
+            f"record     replays from the checkpoint before tick {checkpoint['tick']} ({checkpoint['bytes']} bytes)",
         ]
-    writes = found.writes.get(machine.writes, Counter())
-    lines.append("writes     " + (", ".join(f"{count} {kind}" for kind, count in sorted(writes.items())) or "none"))
-    return lines if machine.by_bystander else lines + _states(bag, machine)
+    lines.append("writes     " + (", ".join(f"{count} {kind}" for kind, count in machine["writes"].items()) or "none"))
+    if "no_visits" in machine:
+        lines.append(f"states     {machine['no_visits']}")
+    return lines + (_visit_lines(machine["visits"]) if machine.get("visits") else [])
 
 
-def _states(bag: Bag, machine: RecordedMachine) -> list[str]:
-    try:
-        there = visits(bag, machine)
-    except BagError as error:
-        return [f"states     {error}"]
-    lines = [f"ticks      {there[0].first_tick} to {there[-1].last_tick}"]
-    rows: list[tuple[Any, ...]] = [("states", "from", "to", "ticks")]
-    rows += [(v.state, f"{seconds(v.start_ns)} s", f"{seconds(v.end_ns)} s", f"{v.first_tick} to {v.last_tick}")
-             for v in there[:_MAX_VISITS]]  # fmt: skip
+def _visit_lines(there: Sequence[dict[str, Any]]) -> list[str]:
+    rows: list[tuple[str, ...]] = [("states", "from", "to", "ticks")]
+    rows += [(v["state"], f"{seconds(v['start_ns'])} s", f"{seconds(v['end_ns'])} s",
+              f"{v['first_tick']} to {v['last_tick']}") for v in there[:_MAX_VISITS]]  # fmt: skip
     if len(there) > _MAX_VISITS:
         rows.append((f"and {len(there) - _MAX_VISITS} more visits", "", "", ""))
-    return lines + _table(rows, right=(1, 2))
+    return [f"ticks      {there[0]['first_tick']} to {there[-1]['last_tick']}", *_table(rows, right=(1, 2))]

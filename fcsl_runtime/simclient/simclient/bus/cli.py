@@ -43,7 +43,7 @@ _EXAMPLES = {
     "": "list -c tcp/127.0.0.1:7447",
     "list": "-c tcp/127.0.0.1:7447",
     "echo": "-c tcp/127.0.0.1:7447 throttle -n 10",
-    "hz": "-c tcp/127.0.0.1:7447",
+    "hz": "-c tcp/127.0.0.1:7447 --seconds 5",
     "put": "-c tcp/127.0.0.1:7447 altitude 12.5",
     "record": "-c tcp/127.0.0.1:7447 -o flight",
     "play": "--listen tcp/127.0.0.1:7447 flight --speed 1",
@@ -67,14 +67,16 @@ def make_parser() -> argparse.ArgumentParser:
         return command
 
     command = add("list", _list, "lists machines and their channels, with type, unit and measured rate")
-    command.add_argument("-s", "--seconds", type=_seconds, default=1.0, help="how long to measure (default 1)")
+    command.add_argument(
+        "-s", "--seconds", metavar="SECONDS", type=_seconds, default=1.0, help="how long to measure (default 1)"
+    )
     command.add_argument("--json", action="store_true", help="one JSON value, with the descriptors")
     command = add("echo", _echo, "prints values as they come: tick, channel, value; until Ctrl-C")
     command.add_argument("channels", nargs="*", metavar="CHANNEL", help="only these")
     command.add_argument("-n", type=_count, metavar="N", help="end after N values")
     command.add_argument("--json", action="store_true", help="one JSON object a line")
     command = add("hz", _hz, "prints the rate of each channel, every second; until Ctrl-C")
-    command.add_argument("-n", type=_count, metavar="N", help="end after N seconds")
+    command.add_argument("--seconds", type=_count, metavar="SECONDS", help="end after so many whole seconds")
     command = add("put", _put, "puts a value under a channel's key")
     command.add_argument("channel", metavar="CHANNEL")
     command.add_argument("value", metavar="VALUE", help="such as 0.5, true, '[0, 0, 9.81]'; of a blob hex digits")
@@ -224,7 +226,7 @@ def _hz(options: argparse.Namespace) -> None:
         keys = [f"{machine.prefix}/{channel.name}" for machine in machines for channel in machine.channels]
         begun = time.monotonic()
         try:
-            for second in islice(count(1), options.n):
+            for second in islice(count(1), options.seconds):
                 counts = _counted(session, begun + second)
                 if time.monotonic() < begun + second:
                     break  # who listens is gone

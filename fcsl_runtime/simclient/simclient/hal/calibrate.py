@@ -37,4 +37,4 @@ def calibrate(what: str, path: str, sensor: str, device: str | None, seconds: fl
         print(json.dumps(changes))
         return
     target.write(changes)
-    print(f"written into the backend `{name}` of sensor `{sensor}` in {path}; now run `fcslc board {path}`")
+    print(f"written into the backend `{name}` of sensor `{sensor}` in {path}; now run `fcsl board {path}`")

@@ -50,7 +50,7 @@ _EXAMPLES = {
     "calibrate accel": "craft.board.json --sensor accel",
     "calibrate compass": "craft.board.json --sensor compass",
     "calibrate rc": "craft.board.json --sensor rc",
-    "calibrate esc": "craft.plan --output motors --yes-move-it",
+    "calibrate esc": "craft.plan --channels motors --yes-move-it",
     "test-actuator": "craft.plan motors[0] --command 0.1 --seconds 2 --yes-move-it",
 }
 
@@ -70,16 +70,18 @@ def make_parser() -> argparse.ArgumentParser:
     command = add("list", _list, "lists devices and the drivers for them; opens and changes nothing")
     command.add_argument("--json", action="store_true", help="one JSON value")
     command = add("describe", _describe, "describes a driver's signals, a device's values, or a board's plan")
-    command.add_argument("what", metavar="DRIVER|PLAN", help="a driver, or the file that `fcslc board` wrote")
+    command.add_argument("what", metavar="DRIVER|PLAN", help="a driver, or the file that `fcsl board` wrote")
     command.add_argument("device", nargs="?", metavar="DEVICE", help='the text of "device" in board.json')
-    command.add_argument("--seconds", type=_seconds(60), default=2.0, metavar="N", help="wait for a sample (default 2)")
+    command.add_argument(
+        "--seconds", type=_seconds(60), default=2.0, metavar="SECONDS", help="wait for a sample (default 2)"
+    )
     shape = command.add_mutually_exclusive_group()
     shape.add_argument("--json", action="store_true", help="one JSON value")
     shape.add_argument("--plot", metavar="FILE", help="draw the filters of a PLAN: .png, .svg or .pdf")
     command = add("monitor", _monitor, "shows devices and sensors of a plan as they run; until Ctrl-C")
-    command.add_argument("plan", metavar="PLAN", help="the file that `fcslc board` wrote")
+    command.add_argument("plan", metavar="PLAN", help="the file that `fcsl board` wrote")
     command.add_argument("--sensor", metavar="NAME", help="only this one")
-    command.add_argument("--seconds", type=_seconds(1e6), metavar="N", help="end after N s")
+    command.add_argument("--seconds", type=_seconds(1e6), metavar="SECONDS", help="end after N s")
     shape = command.add_mutually_exclusive_group()
     shape.add_argument("--json", action="store_true", help="one JSON object a line")
     shape.add_argument("--plot", action="store_true", help="curves of the corrected values")
@@ -89,12 +91,12 @@ def make_parser() -> argparse.ArgumentParser:
     command = add(
         "test-actuator", _test_actuator, "moves one element of an output for some seconds, then makes it safe"
     )
-    command.add_argument("plan", metavar="PLAN", help="the file that `fcslc board` wrote")
+    command.add_argument("plan", metavar="PLAN", help="the file that `fcsl board` wrote")
     command.add_argument("element", metavar="CHANNEL[INDEX]", help="such as motors[0]; without [INDEX]: [0]")
     value = command.add_mutually_exclusive_group(required=True)
     value.add_argument("--command", type=_number, metavar="X", help="of the machine, between `low` and `high`")
     value.add_argument("--pulse", type=_number, metavar="US", help="of the device, between `minimum` and `maximum`")
-    command.add_argument("--seconds", type=_seconds(10), required=True, metavar="N", help="at most 10")
+    command.add_argument("--seconds", type=_seconds(10), required=True, metavar="SECONDS", help="at most 10")
     command.add_argument("--yes-move-it", action="store_true", help="nothing moves without it")
     add_examples(parser, _EXAMPLES)
     return parser
@@ -106,16 +108,16 @@ def _add_calibrate(command: argparse.ArgumentParser) -> None:
         kind = kinds.add_parser(what, help=text, description=f"{text}; for the board's JSON")
         kind.set_defaults(what=what)
         kind.add_argument("board", metavar="BOARD", help="board JSON")
-        kind.add_argument("--sensor", required=True, metavar="NAME")
+        kind.add_argument("--sensor", required=True, metavar="NAME", help="the one that is calibrated")
         kind.add_argument("--device", metavar="NAME", help="of the sensor's; needed if it has several")
-        kind.add_argument("--seconds", type=_seconds(3600), metavar="N", help="how long it measures")
+        kind.add_argument("--seconds", type=_seconds(3600), metavar="SECONDS", help="how long it measures")
         kind.add_argument("--write", action="store_true", help="write the values into BOARD")
     text = "electronic speed controllers of motors: they learn the ends of their outputs"
     esc = kinds.add_parser("esc", help=text, description=f"{text}. {_ESC}")
     esc.set_defaults(run=_calibrate_esc)
-    esc.add_argument("plan", metavar="PLAN", help="the file that `fcslc board` wrote")
+    esc.add_argument("plan", metavar="PLAN", help="the file that `fcsl board` wrote")
     esc.add_argument(
-        "--output",
+        "--channels",
         dest="names",
         nargs="+",
         required=True,

@@ -54,9 +54,13 @@ def make_parser() -> argparse.ArgumentParser:
     )
     parser.add_argument("--socket", metavar="ADDRESS", help="address of the program's variable server")
     parser.add_argument("--token", metavar="FILE", help="the token of a TCP server")
-    parser.add_argument("--period", type=_seconds, default=1.0, metavar="S", help="between two looks (default 1)")
-    parser.add_argument("--count", type=int, default=0, metavar="N", help="end after N looks; 0 (default): Ctrl-C ends")
-    parser.add_argument("--json", action="store_true", help="one JSON object per look: totals and rates")
+    parser.add_argument(
+        "--period", type=_seconds, default=1.0, metavar="SECONDS", help="time from one report to the next (default 1)"
+    )
+    parser.add_argument(
+        "--count", type=int, default=0, metavar="N", help="end after N reports; 0 (default): Ctrl-C ends"
+    )
+    parser.add_argument("--json", action="store_true", help="one JSON object per report: totals and rates")
     add_examples(parser, _EXAMPLES)
     return parser
 

@@ -13,8 +13,10 @@ incomplete. 2: bad input.
 from __future__ import annotations
 
 import argparse
+import json
 import sys
 from collections.abc import Sequence
+from dataclasses import asdict
 from pathlib import Path
 
 from fcsl_compiler.api.command_line import add_examples
@@ -34,9 +36,9 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     parser.formatter_class = argparse.RawDescriptionHelpFormatter
     parser.add_argument("bag", help="directory, or one of its files: .mcap, .db3, .bag (ROS 1), .zstd")
     which = parser.add_mutually_exclusive_group(required=True)
-    which.add_argument("--config", default="", help="machine JSON")
-    which.add_argument("--library", default="", help="compiled machine library")
-    parser.add_argument("--machine", default="", help="the machine, if there are several")
+    which.add_argument("--config", metavar="FILE", default="", help="machine JSON")
+    which.add_argument("--library", metavar="FILE", default="", help="compiled machine library")
+    parser.add_argument("--machine", metavar="NAME", default="", help="the machine, if there are several")
     parser.add_argument(
         "--ignore-source-hash",
         action="store_true",
@@ -44,11 +46,16 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     )
     board_help = "plan of a board: the recorded readings of its devices go through its frontends again"
     parser.add_argument("--board", default="", metavar="PLAN", help=board_help)
-    parser.add_argument("--map", default="", help="map file for a bag that FCSL did not record")
-    parser.add_argument("-o", "--output", help="with --map: bag to write")
-    parser.add_argument("--namespace", default="", help="with --map -o: ROS namespace of the topics written")
-    parser.add_argument("--expect", help="with --map: file with `expect`, in place of the map's")
-    parser.add_argument("--plot", help="with --map: picture of expected and actual values (.png, .svg, .pdf)")
+    parser.add_argument("--json", action="store_true", help="print the verdict as one JSON object; not with --map")
+    parser.add_argument("--map", metavar="FILE", default="", help="map file for a bag that FCSL did not record")
+    parser.add_argument("-o", "--output", metavar="BAG", help="with --map: bag to write")
+    parser.add_argument(
+        "--namespace", metavar="NAMESPACE", default="", help="with --map -o: ROS namespace of the topics written"
+    )
+    parser.add_argument("--expect", metavar="FILE", help="with --map: file with `expect`, in place of the map's")
+    parser.add_argument(
+        "--plot", metavar="FILE", help="with --map: picture of expected and actual values (.png, .svg, .pdf)"
+    )
     parser.add_argument(
         "--msg-path", action="append", default=[], metavar="FOLDER", help=f"with --map: {MSG_PATH_HELP}"
     )
@@ -109,11 +116,16 @@ def command(parser: argparse.ArgumentParser, options: argparse.Namespace) -> int
             parser.error(f"{'-o' if name == 'output' else '--' + name.replace('_', '-')} needs --map")
     if options.map and options.board:
         parser.error("--board needs a flight that FCSL recorded, and --map is for other bags")
+    if options.map and options.json:
+        parser.error("--json does not go with --map")
     if options.map:
         return _main_foreign(options)
     ignore = options.ignore_source_hash
     verdict = replay(options.bag, options.config, options.library, options.machine, ignore, options.board)
     for note in verdict.notes:
         print(f"fcsl replay: {note}", file=sys.stderr)
-    print(verdict)
+    if options.json:
+        print(json.dumps({"identical": verdict.identical, **asdict(verdict)}, indent=2))
+    else:
+        print(verdict)
     return 0 if verdict.identical else 1

@@ -38,7 +38,7 @@ def pytest_addoption(parser: pytest.Parser) -> None:
         default=[],
         metavar="MACHINE.json",
         help="report which lines, branches and conditions of the algorithms the tests reach: for every machine that runs, or "
-        "for those named (--fcsl-cover=MACHINE.json, once for each); as `fcslc cover` does",
+        "for those named (--fcsl-cover=MACHINE.json, once for each); as `fcsl cover` does",
     )
     group.addoption("--fcsl-cover-json", metavar="FILE", help="also write the report of --fcsl-cover to this JSON file")
     group.addoption(
@@ -89,7 +89,7 @@ class _Coverage:
                 raise pytest.UsageError(f"--fcsl-cover-json: {error}") from None
         self._report: Report | None = None
         self._failures: list[str] = []
-        # If `fcslc cover` measures this session as well, both use one folder.
+        # If `fcsl cover` measures this session as well, both use one folder.
         self._own = None if os.environ.get(COVER_DIR) else tempfile.TemporaryDirectory(prefix="fcsl-cover-")
         if self._own is not None:
             os.environ[COVER_DIR] = self._own.name

@@ -44,6 +44,17 @@ def find_server() -> Server:
     raise VarError("unreachable", f"which machine? {reason}; name its address with --socket or {VARIABLE}")
 
 
+def _program_of(arguments: list[str]) -> str | None:
+    """Which of the programs with a variable server this command line starts. A Python program has its interpreter before it."""
+    names = [Path(argument).name for argument in arguments[:3]]
+    for name, verb in zip(names[:2], names[1:], strict=False):
+        if name in _PROGRAMS:
+            return name
+        if (name, verb) == ("fcsl", "sim"):
+            return "fcsl-sim"
+    return None
+
+
 def running_servers(proc: Path = Path("/proc")) -> list[Server]:
     """This user's running programs with a variable server, by address."""
     found = []
@@ -54,8 +65,7 @@ def running_servers(proc: Path = Path("/proc")) -> list[Server]:
             if folder.stat().st_uid != os.getuid():
                 continue
             arguments = (folder / "cmdline").read_text("utf-8", "surrogateescape").split("\0")
-            # For a Python program, the interpreter is the first argument.
-            program = next((Path(a).name for a in arguments[:2] if Path(a).name in _PROGRAMS), None)
+            program = _program_of(arguments)
             if program is None:
                 continue
             address = _address_in(arguments)

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""`fcsl-sim campaign` on all cores, beside as many independent processes that fly the same cases in a loop; and its memory.
+"""`fcsl campaign` on all cores, beside as many independent processes that fly the same cases in a loop; and its memory.
 
 python3 scripts/bench campaign
 """
@@ -83,7 +83,7 @@ def _command(study: Path, cases: int, results: Path) -> list[str]:
 def _campaign(folder: Path, cases: int) -> None:
     done = subprocess.run(_command(STUDY, cases, folder / f"campaign_{cases}"), capture_output=True, text=True)
     if done.returncode:
-        raise RuntimeError(f"fcsl-sim campaign: {done.stdout}{done.stderr}")
+        raise RuntimeError(f"fcsl campaign: {done.stdout}{done.stderr}")
 
 
 def _loop(folder: Path, what: str, cases: int) -> None:
@@ -119,7 +119,7 @@ def memory(folder: Path, cases: int) -> Facts:
             fliers = max([fliers, *map(_peak_mb, _children(command.pid))])
             time.sleep(SAMPLE_S)
     if command.returncode not in (0, 1):  # 1: not every short flight has landed
-        raise RuntimeError("fcsl-sim campaign with short flights failed")
+        raise RuntimeError("fcsl campaign with short flights failed")
     return {"cases": cases, "command_mb": own, "flier_mb": fliers}
 
 
