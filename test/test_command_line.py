@@ -20,6 +20,13 @@ from fcsl_compiler.base.verb import Verb, installed
 from fcsl_compiler.cli.complete import candidates
 from fcsl_compiler.cli.fcsl import main
 
+ROOT = Path(__file__).resolve().parents[1]
+PAGES = [
+    ROOT / "README.md",
+    ROOT / "CONTRIBUTING.md",
+    *(ROOT / "docs").rglob("*.md"),
+    *(ROOT / "examples").glob("*/README.md"),
+]
 VERBS = [(name, verb) for package in installed() for name, verb in package.verbs.items()]
 PLANNED = "new check build graph explain test cover sim campaign trim linearise response fly replay bag plot rerun view var bus link "
 PLANNED += "board supervisor"
@@ -176,3 +183,17 @@ def test_json_of_a_check(tmp_path: Path) -> None:
         ["fcsl", "check", "none.sim.json", "--json"], capture_output=True, text=True, cwd=tmp_path, check=False
     )
     assert done.returncode == 2 and json.loads(done.stdout)["ok"] is False
+
+
+def test_every_page_and_scaffold_names_verbs_that_there_are() -> None:
+    known = {name for name, _ in VERBS} | {"VERB"}
+    unknown = []
+    for page in (*PAGES, *(ROOT / "fcsl_compiler/fcsl_compiler/cli").glob("*.md")):
+        text = page.read_text()
+        named = re.findall(r"(?:`|^|[|;&(] )fcsl ([a-zA-Z][a-zA-Z-]*)", text, re.M)
+        unknown += [f"{page.relative_to(ROOT)}: fcsl {verb}" for verb in named if verb not in known]
+        unknown += [
+            f"{page.relative_to(ROOT)}: {old}"
+            for old in re.findall(r"fcsl-(?:var|bus|hal|link|view|supervisor)\b|-m simclient\.\w+", text)
+        ]
+    assert unknown == []

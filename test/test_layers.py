@@ -68,7 +68,7 @@ FOLDERS: dict[str, Sequence[str]] = {
 FACE = "fcsl_compiler.api"
 USERS = ("simclient", "fcsl_sim", "fcsl_bridge")
 #: Commands, and the package's __init__, are above its folders.
-FACES = {"__main__.py", "plot.py", "to_rerun.py"}
+FACES = {"command.py", "plot.py", "to_rerun.py", "verbs.py"}
 
 
 def sources(root: Path) -> list[Path]:
@@ -248,7 +248,7 @@ def test_an_import_against_the_order_is_found(tmp_path: Path) -> None:
         "run.py": "def f():\n    from . import bag\n",
         "bag/__init__.py": "",
         "bag/files.py": "from ..errors import y\nfrom ..twin.host import z\n",
-        "bag/__main__.py": "from ..twin.host import z\n",
+        "bag/command.py": "from ..twin.host import z\n",
         "twin/__init__.py": "",
         "twin/host.py": "from simclient.bag import w\n",
     }

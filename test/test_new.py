@@ -35,7 +35,7 @@ def pytest_in(folder: Path, *arguments: object) -> str:
 def test_a_machine(tmp_path: Path) -> None:
     printed = run("fcslc", "new", "machine", "craft", cwd=tmp_path)
     assert files(tmp_path) == set(printed.splitlines()[:-1])
-    assert printed.splitlines()[-1] == "next: python3 -m pytest craft/test; then change it, as craft/README.md says"
+    assert printed.splitlines()[-1] == "next: fcsl test craft; then change it, as craft/README.md says"
     assert "ok (2 instances, 1 state)" in run("fcslc", "check", "--strict", "craft.json", cwd=tmp_path / "craft")
     assert "3 passed" in pytest_in(tmp_path, "craft/test")
     assert json.loads((tmp_path / "craft/pyrightconfig.json").read_text()) == {"ignore": ["algorithms"]}
@@ -65,7 +65,7 @@ def test_a_plant(tmp_path: Path) -> None:
     run("fcslc", "new", "algorithm", "slew", cwd=craft)  # its bench is no machine to fly
     *made, following = run("fcslc", "new", "plant", "mass", cwd=craft).splitlines()
     assert made == ["mass.c", "mass.sim.json", "test/test_mass_plant.py"]
-    assert following == "next: fcsl plot mass.sim.json; python3 -m pytest test/test_mass_plant.py; then change mass.c"
+    assert following == "next: fcsl plot mass.sim.json; fcsl test test/test_mass_plant.py; then change mass.c"
     checked = run("fcsl-sim", "check", "mass.sim.json", cwd=craft)
     assert checked == "mass.sim.json: ok: `craft` and plant for at most 20 s\n"
     schema = json.loads(run("fcsl", "schema", "simulation", cwd=craft))

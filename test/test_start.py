@@ -10,9 +10,26 @@ import pytest
 
 #: They take long to load, or load much.
 HEAVY = {"asyncio", "ctypes", "dataclasses", "inspect", "matplotlib", "numpy", "rclpy", "rosbags", "tempfile"}
-PARSER = {"base", "base.command", "base.version", "cli", "cli.arguments", "cli.main", "model", "model.choices"}
+PARSER = {
+    "base",
+    "base.command",
+    "base.examples",
+    "base.version",
+    "cli",
+    "cli.arguments",
+    "cli.main",
+    "model",
+    "model.choices",
+}
 VERSION = {
-    f"fcsl_compiler{part}" for part in ("", ".api", ".api.command_line", ".base", ".base.command", ".base.version")
+    f"fcsl_compiler{part}"
+    for part in (
+        "",
+        ".api",
+        ".api.command_line",
+        ".base",
+        *(f".base.{n}" for n in ("command", "examples", "verb", "version")),
+    )
 }
 PACKAGES = {"fcsl_compiler.api.packages", "fcsl_compiler.base.packages"}
 CLIENT = {"cli", "errors", "vars", "vars.arguments", "vars.cli"}

@@ -19,16 +19,6 @@ PROGRAMS = {
     "fcsl-sim": "fcsl_sim",
     "fcsl-fc": "fcsl_runtime/fcsl_runtime",
     "fcsl-guard": "fcsl_runtime/fcsl_runtime",
-    "fcsl bus": "fcsl_runtime/simclient",
-    "fcsl hal": "fcsl_runtime/simclient",
-    "fcsl var": "fcsl_runtime/simclient",
-    "fcsl link": "fcsl_runtime/simclient",
-    "fcsl view": "fcsl_runtime/simclient",
-    "fcsl supervisor": "fcsl_runtime/simclient",
-    "fcsl rerun": "fcsl_runtime/simclient",
-    "fcsl replay": "fcsl_runtime/simclient",
-    "fcsl plot": "fcsl_runtime/simclient",
-    "fcsl bag": "fcsl_runtime/simclient",
 }
 NODES = ("controller_node", "diagnostics_node", "rerun_node", "sim_node", "topic_count")
 

@@ -6,7 +6,6 @@ from __future__ import annotations
 import argparse
 import json
 from collections.abc import Mapping, Sequence
-from dataclasses import replace
 from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING
@@ -42,7 +41,7 @@ def _verb(verb: str, text: str, name: str = "") -> tuple[str, Verb]:
 
 def _of_simulation(verb: str, text: str) -> tuple[str, Verb]:
     """One that another package has too, for other files."""
-    return verb, replace(_verb(verb, text)[1], takes=_is_simulation)
+    return verb, _verb(verb, text)[1]._replace(takes=_is_simulation)
 
 
 def _is_simulation(arguments: Sequence[str]) -> bool:

@@ -7,8 +7,7 @@ The module that holds them is imported at each start of `fcsl`, so it imports ne
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass, field
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, NamedTuple
 
 if TYPE_CHECKING:
     from argparse import ArgumentParser
@@ -18,8 +17,7 @@ if TYPE_CHECKING:
 GROUP = "fcsl.commands"
 
 
-@dataclass(frozen=True)
-class Verb:
+class Verb(NamedTuple):
     """`fcsl VERB ARGUMENT…`. `run` gets the arguments behind the verb and returns the exit status."""
 
     group: str
@@ -33,14 +31,13 @@ class Verb:
     complete: Callable[[list[str]], list[str]] | None = None
 
 
-@dataclass(frozen=True)
-class Commands:
+class Commands(NamedTuple):
     """What one package adds. `codes` loads the diagnostic codes that `explain` knows, `schemas` has the texts that `schema`
     prints."""
 
     verbs: Mapping[str, Verb]
     codes: Callable[[], Mapping[str, Code]] = dict
-    schemas: Mapping[str, Callable[[], str]] = field(default_factory=dict)
+    schemas: Mapping[str, Callable[[], str]] = {}
 
 
 def installed() -> list[Commands]:

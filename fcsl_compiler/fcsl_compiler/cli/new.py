@@ -22,14 +22,14 @@ def _new_machine(options: argparse.Namespace) -> int:
     if Path(options.name).exists():
         raise UsageError(f"`{options.name}` exists; nothing was written")
     _write(files)
-    print(f"next: python3 -m pytest {options.name}/test; then change it, as {options.name}/README.md says")
+    print(f"next: fcsl test {options.name}; then change it, as {options.name}/README.md says")
     return 0
 
 
 def _new_algorithm(options: argparse.Namespace) -> int:
     _write(algorithm_files(options.name))
     print(
-        f"next: python3 -m pytest test/test_{options.name}.py; then change it, and name algorithms/{options.name}.py in your machine"
+        f"next: fcsl test test/test_{options.name}.py; then change it, and name algorithms/{options.name}.py in your machine"
     )
     return 0
 
@@ -40,7 +40,7 @@ def _new_plant(options: argparse.Namespace) -> int:
     if made.remark:
         print(made.remark)
     first = f"fcsl plot {made.simulation}" if made.simulation else f"fcsl describe {options.name}.c"
-    print(f"next: {first}; python3 -m pytest test/test_{options.name}_plant.py; then change {options.name}.c")
+    print(f"next: {first}; fcsl test test/test_{options.name}_plant.py; then change {options.name}.c")
     return 0
 
 
@@ -49,7 +49,7 @@ def _new_vehicle(options: argparse.Namespace) -> int:
     if Path(options.name).exists():
         raise UsageError(f"`{options.name}` exists; nothing was written")
     _write(files)
-    print(f"next: python3 -m pytest {options.name}/test; then change it, as {options.name}/README.md says")
+    print(f"next: fcsl test {options.name}; then change it, as {options.name}/README.md says")
     return 0
 
 

@@ -117,6 +117,9 @@ def test_the_command_stays_within_the_limit(twin):
     assert command(twin, -100.0, 0.0) == 10.0
 '''
 
+#: What an agent that writes code needs to know, in the folder that it works in.
+_AGENTS = Path(__file__).with_name("agents.md")
+
 _PYRIGHT = """{
   "ignore": ["algorithms"]
 }
@@ -128,7 +131,7 @@ Next: change `algorithms/*.py` and `@NAME@.json` step by step, with
 
 ```sh
 fcsl check --strict @NAME@.json     # errors, with reasons and corrections
-python3 -m pytest test          # the compiled machine, tick by tick
+fcsl test                          # the compiled machine, tick by tick
 fcsl graph @NAME@.json -o @NAME@.svg     # a picture of it
 fcsl new algorithm NAME        # another algorithm, with a test
 fcsl new plant NAME            # a vehicle to simulate, connected with it, with a test
@@ -207,6 +210,7 @@ def machine_files(name: str, package: bool) -> dict[Path, str]:
         f"test/test_{name}.py": _MACHINE_TEST,
         "pyrightconfig.json": _PYRIGHT,
         "README.md": readme,
+        "AGENTS.md": _AGENTS.read_text(encoding="utf-8"),
     }
     if package:
         texts |= scaffold_package.FILES

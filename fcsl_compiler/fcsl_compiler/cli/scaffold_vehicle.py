@@ -31,7 +31,7 @@ A vehicle like `{other}`, whose documentation is that of the package `{other}`. 
 ```sh
 fcsl check sim/{simulation}                # after every change
 fcsl plot sim/{simulation}
-python3 -m pytest test                         # some numbers in it are those of `{other}`: replace them by yours
+fcsl test                                      # some numbers in it are those of `{other}`: replace them by yours
 ```
 
 Models of the plant are in the library (`fcsl models`). In a colcon workspace (`src/{name}`) `colcon build`

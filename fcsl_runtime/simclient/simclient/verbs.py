@@ -7,7 +7,6 @@ import argparse
 import os
 import sys
 from collections.abc import Sequence
-from dataclasses import replace
 from functools import partial
 from importlib import import_module
 
@@ -52,7 +51,7 @@ COMMANDS = Commands(
             _verb("plot", _RECORDINGS, "plot", "draw a bag, or a simulation"),
             _verb("rerun", _RECORDINGS, "to_rerun", "convert a bag for the rerun viewer"),
             ("fly", Verb(_RUNNING, "run a machine as a process of its own: fcsl-fc", _fly)),
-            ("var", replace(_VAR, complete=_complete_var)),
+            ("var", _VAR._replace(complete=_complete_var)),
             _verb("view", _RUNNING, "live.cli", "show a running machine in the rerun viewer"),
             _verb("bus", _RUNNING, "bus.cli", "list, print, record and play the channels of machines on the bus"),
             _verb("link", _RUNNING, "link.watch", "show the counters of a flight program's link"),
