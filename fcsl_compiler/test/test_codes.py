@@ -105,7 +105,7 @@ def diagnose_board(folder: Path, kind: Kind, text: str) -> list[Diagnostic]:
 def command(folder: Path, line: str, capsys: pytest.CaptureFixture[str]) -> list[str]:
     """Codes that a command reports, run on example machines with the names in it."""
     program, *arguments = shlex.split(line)
-    assert program == "fcslc"
+    assert program == "fcsl"
     paths = {a: folder / a for a in arguments if a.endswith(".json")}
     for path in paths.values():
         path.parent.mkdir(parents=True, exist_ok=True)

@@ -201,7 +201,7 @@ def test_sarif(folder: Path, capsys: pytest.CaptureFixture[str]) -> None:
 @pytest.mark.parametrize("form", SCHEMAS)
 def test_a_file_that_is_not_there(folder: Path, form: str, capsys: pytest.CaptureFixture[str]) -> None:
     status, found = report(capsys, form, "check", "good/none.json")
-    assert status == 1
+    assert status == 2
     if form == "json":
         assert found["diagnostics"][0]["location"]["file"] == "good/none.json"
 

@@ -59,7 +59,7 @@ def _parser(program: str) -> argparse.ArgumentParser:
     run.add_argument("config", help=_CONFIG)
     _add_flight(run)
     _add_run(run)
-    _add_plot(_add(commands, "plot", "draw a simulation or a bag"))
+    _add_plot(_add(commands, "plot", "draw a simulation"))
     _add_campaign(_add(commands, "campaign", "fly a simulation many times, with dispersed parameters"))
     _add_trim(_add(commands, "trim", "find an equilibrium of a plant"))
     _add_linearise(_add(commands, "linearise", "print and write the linear equations of a plant around a point"))
@@ -143,10 +143,10 @@ def _add_servers(command: argparse.ArgumentParser) -> None:
 
 
 def _add_plot(command: argparse.ArgumentParser) -> None:
-    command.add_argument("target", help="*.sim.json, which is run; or a bag: a directory or an .mcap file")
-    help_paths = "what to draw, a panel for each, as in fcsl plot; none: the views of the run"
+    command.add_argument("config", help=_CONFIG)
+    help_paths = "what to draw, a panel for each, as for a bag (fcsl plot); none: the views of the run"
     command.add_argument("paths", nargs="*", metavar="PATH", help=help_paths)
-    help_output = "picture to write: .png, .svg or .pdf (default: the target's name with .png, here)"
+    help_output = "picture to write: .png, .svg or .pdf (default: the simulation's name with .png, here)"
     command.add_argument("-o", "--output", type=Path, metavar="FILE", help=help_output)
     command.add_argument("--against", default="", metavar="PATH", help="the horizontal axis, instead of time")
     _add_flight(command)

@@ -26,7 +26,6 @@ from .runner import Sender, Server, StateChange, Summary, Watcher, run
 
 EXIT_UNTIL_NOT_HELD = 1
 EXIT_BAD_INPUT = 2
-EXIT_INCOMPLETE_BAG = 1
 #: How an address on the bus begins.
 _BUS = ("zenoh:", "zenoh-client:")
 
@@ -143,17 +142,12 @@ def _response(options: argparse.Namespace) -> int:
 
 
 def _plot(options: argparse.Namespace) -> int:
-    options.config = options.target
-    given = options.sets or options.events or options.seed is not None or options.duration is not None
-    if plot.is_bag(options.target) and given:
-        raise SimError("`--seed`, `--duration`, `--set` and `--event` are of a simulation, and this is a bag")
-    picture = plot.draw(options.target, options.output, options.paths, options.against, lambda: _load(options))
-    print(f"{picture.path}: {picture.path.stat().st_size} bytes")
-    if picture.left_out:
-        print(f"left out: {', '.join(picture.left_out)}; PATHs choose what is drawn")
-    if picture.damage:
-        print(f"fcsl-sim: the bag is incomplete: {picture.damage}", file=sys.stderr)
-    return EXIT_INCOMPLETE_BAG if picture.damage else 0
+    picture = plot.picture_name(options.config, options.output)
+    left_out = plot.draw(_load(options), picture, options.paths, options.against)
+    print(f"{picture}: {picture.stat().st_size} bytes")
+    if left_out:
+        print(f"left out: {', '.join(left_out)}; PATHs choose what is drawn")
+    return 0
 
 
 def _run(options: argparse.Namespace) -> int:

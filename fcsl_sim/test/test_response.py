@@ -8,8 +8,10 @@ import json
 import math
 import re
 from collections.abc import Callable, Sequence
+from dataclasses import replace
 from fractions import Fraction
 from pathlib import Path
+from types import SimpleNamespace
 from typing import Any
 
 import numpy as np
@@ -20,6 +22,9 @@ from fcsl_compiler.base.diagnostics import DiagnosticError
 from fcsl_sim import SimError, load
 from fcsl_sim.cli import main
 from fcsl_sim.linear.response import Point, Response, margins, spaced
+from fcsl_sim.linear.response_picture import bode_figure
+from fcsl_sim.linear.response_report import Measured
+from simclient.view.picture import pyplot
 
 TICK = 0.02
 GAIN = 8.0
@@ -357,6 +362,71 @@ def test_the_command(write: Callable[..., Path], capsys: pytest.CaptureFixture[s
     assert written["responses"]["ramp.outputs.x"]["unit"] == "m"
     assert main([*line, "--json"]) == 0
     assert json.loads(capsys.readouterr().out) == written
+
+
+# ---- the picture -----------------------------------------------------------------------------------------------------
+
+#: Of k / (s (s + 1)²) with k = 0.5: the phase is -180° at 1 rad/s, where the gain is 1/4.
+LAG = [
+    Point(w, -(l := 0.5 / (1j * w * (1j * w + 1) ** 2)), 1.0 + l, (2.0 / (1j * w),), 0.0, 0.0)
+    for w in spaced(0.1, 10.0, 41)
+]
+
+
+def bode(points: Sequence[Point], outputs: Sequence[tuple[str, str]] = ()) -> Any:
+    response: Any = SimpleNamespace(
+        injections=[SimpleNamespace(path="ramp.inputs.rate", weight=1.0)], outputs=list(outputs), within=1e-3
+    )
+    figure = bode_figure(Measured(response, points), "lag.sim.json")
+    figure.canvas.draw()
+    pyplot.close(figure)
+    return figure
+
+
+def dots(axis: Any) -> list[tuple[float, float]]:
+    return [(line.get_xdata()[0], line.get_ydata()[0]) for line in axis.lines if line.get_marker() == "o"]
+
+
+def test_a_picture_marks_crossings_and_margins() -> None:
+    figure = bode(LAG, [("ramp.outputs.x", "m")])
+    gain, sensitivity, outputs, phase, _, _ = figure.axes
+    ((crossover, level),) = dots(gain)
+    ((turn, angle),) = dots(phase)
+    exact = brentq(lambda w: abs(0.5 / (1j * w * (1j * w + 1) ** 2)) - 1.0, 0.1, 1.0)
+    assert (crossover, level) == (pytest.approx(exact, rel=1e-2), 0.0)
+    assert (turn, angle) == (pytest.approx(1.0, rel=1e-2), pytest.approx(-180.0, abs=0.1))
+    assert [text.get_text() for text in gain.texts] == ["12.0 dB"] and gain.get_title("left").startswith(
+        "loop: gain margin 12.0 dB"
+    )
+    margin = math.degrees(margins(LAG).phase_margin or 0.0)
+    assert margin == pytest.approx(90.0 - 2.0 * math.degrees(math.atan(exact)), abs=0.2)
+    assert [text.get_text() for text in phase.texts] == [f"{margin:.1f}°"]
+    assert phase.get_title("left").startswith(f"phase margin {margin:.1f}° at 0.4")
+    # Sensitivity has axes of its own, as outputs have.
+    assert sensitivity.get_title("left").startswith("largest sensitivity 1.83 (5.3 dB) at 0.631")
+    legends = [[text.get_text() for text in axis.get_legend().get_texts()] for axis in (gain, sensitivity, outputs)]
+    assert legends == [["loop"], ["sensitivity"], ["ramp.outputs.x (m)"]]
+    assert figure.get_supxlabel() == ""
+
+
+def test_a_picture_says_why_nothing_was_measured() -> None:
+    points = list(LAG)
+    points[3] = points[4] = replace(LAG[3], why="the flight is over")
+    points[3], points[4] = (replace(p, omega=o.omega) for p, o in zip(points[3:5], LAG[3:5], strict=True))
+    points[20] = replace(LAG[20], source=0j)
+    figure = bode(points, [("ramp.outputs.x", "m")])
+    gain, _, outputs, *_ = figure.axes
+    shaded = [[(p.get_x(), p.get_x() + p.get_width()) for p in axis.patches] for axis in (gain, outputs)]
+    assert len(shaded[0]) == 2 and shaded[1] == shaded[0][:1]
+    (low, high), (no_loop, _) = shaded[0]
+    assert LAG[2].omega < low < LAG[3].omega and LAG[4].omega < high < LAG[5].omega < no_loop < LAG[20].omega
+    lines = [line for line in gain.lines if line.get_marker() == "."]
+    assert [len(line.get_xdata()) for line in lines] == [3, 15, 20]
+    assert figure.get_supxlabel().splitlines() == [
+        f"{LAG[3].omega:.4g} rad/s not measured: the flight is over",
+        f"{LAG[4].omega:.4g} rad/s not measured: the flight is over",
+        f"{LAG[20].omega:.4g} rad/s not measured: no loop: the source does not depend on the sine",
+    ]
 
 
 @pytest.mark.parametrize(

@@ -19,6 +19,7 @@ from hypothesis import strategies as st
 
 from fcsl_compiler.base.diagnostics import DiagnosticError
 from fcsl_sim import SimConfig, SimError, Simulation, load
+from fcsl_sim.plot import draw as draw_simulation
 from fcsl_sim.runner import run
 from simclient import bag
 from simclient.bag import Bag
@@ -28,6 +29,8 @@ from simclient.replay import replay
 from simclient.run import open_run
 from simclient.vars.client import VarClient
 from simclient.vars.wire import VarError
+from simclient.view.picture import choose, draw
+from simclient.view.recorded import RecordedRun
 
 PAGE = (Path(__file__).resolve().parents[2] / "docs/hardware/arming.md").read_text()
 FILES = dict(re.findall(r"<!-- file: (\S+) -->\n```\w+\n(.*?)```\n", PAGE, re.DOTALL))
@@ -95,6 +98,37 @@ def test_the_page_flies_and_replays(folder: Path) -> None:
     assert (wanted[:ON] == 2.0).all() and np.abs(wanted[OFF:]).min() > 0.01
     _, speed = bag.columns(flight, "/sim/plant:speed")
     assert (speed[: ON + 1] == 0.0).all() and speed[ON:OFF].max() > 0.5 and np.abs(speed[OFF + 10 :]).max() < 0.01
+
+
+def test_a_picture_has_what_passed_the_gate(config: SimConfig, tmp_path: Path) -> None:
+    """Behind each command: of the page's bag, of a picture that flies itself, and of a bag without the gate's topic."""
+    run(config, bag=tmp_path / "flight")
+    recorded = RecordedRun(Bag(tmp_path / "flight"))
+    chosen = choose(recorded, ["drive.outputs.force", "drive.outputs.brake", "plant.outputs.speed"])
+    labels = [[curve.label for curve in panel.curves] for panel in chosen.panels]
+    assert labels == [
+        ["drive.force (command)", "actuators.force (after the gate)"],
+        ["drive.brake (command)", "actuators.brake (after the gate)"],
+        ["plant.speed (plant)"],
+    ]
+    force, brake, speed = draw(recorded, chosen, "").axes
+    lines = {line.get_label(): line for axis in (force, brake) for line in axis.get_lines()}
+    passed = lines["actuators.force (after the gate)"]
+    wanted = lines["drive.force (command)"].get_ydata()
+    assert (passed.get_ydata() == np.where(np.isin(np.arange(400), range(ON, OFF)), wanted, 0.0)).all()
+    assert passed.get_drawstyle() == "steps-post" and speed.get_ylabel() == "speed, m/s"
+    default = choose(recorded)
+    assert [panel.name for panel in default.panels][:3] == ["force, N", "gate", "brake"]
+    assert default.left_out == []
+
+    drawn = tmp_path / "flown.svg"
+    assert draw_simulation(config, drawn, ["drive.outputs.force"], "") == []
+    assert "actuators.force (after the gate)" in drawn.read_text()
+
+    line = ["fcsl-fc", str(config.library), "--hal", "stub", "--ticks", "10", "--record", str(tmp_path / "alone")]
+    subprocess.run(line, check=True, timeout=60, capture_output=True)
+    alone = choose(RecordedRun(Bag(tmp_path / "alone")), ["drive.outputs.force"])
+    assert [curve.label for curve in alone.panels[0].curves] == ["drive.force"]
 
 
 def test_every_host_arms_alike(config: SimConfig, tmp_path: Path) -> None:

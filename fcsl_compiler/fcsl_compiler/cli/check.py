@@ -4,6 +4,7 @@
 from __future__ import annotations
 
 import argparse
+from os.path import lexists
 
 from ..base.diagnostics import Diagnostic, DiagnosticError
 from ..driver.passes import compile_machine
@@ -27,4 +28,4 @@ def run(options: argparse.Namespace) -> int:
     print_report(options, found, passed)
     if len(passed) == len(options.config):
         return 0
-    return 1 if all(path.exists() for path in options.config) else 2
+    return 1 if all(lexists(path) for path in options.config) else 2

@@ -6,6 +6,7 @@ from __future__ import annotations
 import argparse
 import sys
 from importlib import import_module
+from os.path import lexists
 from pathlib import Path
 
 from ..base.diagnostics import DiagnosticError
@@ -24,7 +25,7 @@ def run_command(options: argparse.Namespace) -> int:
         return status
     except DiagnosticError as error:
         print_report(options, error.diagnostics)
-        return 1 if all(path.exists() for path in _named(options)) else 2
+        return 1 if all(lexists(path) for path in _named(options)) else 2
     except UsageError as error:
         print(f"fcslc: {error}", file=sys.stderr)
         return 2

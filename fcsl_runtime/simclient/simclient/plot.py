@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""fcsl plot BAG [PATH…] -o run.png: one picture of a run (see simclient.view.picture).
+"""fcsl plot BAG [PATH…]: one picture of a run (see simclient.view.picture).
 
 Exit code 0: written. 1: written, but the bag is incomplete. 2: bad input, nothing written.
 """
@@ -19,8 +19,10 @@ Each PATH is a panel; paths with commas between them share one:
   fcsl plot flight filter.outputs.pos_z,lander.outputs.pos_z engine.outputs.throttle -o flight.png
 A PATH is that of a field or of an element, or a shell pattern ('*.outputs.pos_z'). That of a struct or of an array draws
 all its members. Other topics: '/imu/data:angular_velocity.x'. Without PATH, the bag's views are drawn; where it has
-none, a panel for each name and unit of outputs."""
+none, a panel for each name and unit of outputs that change, actuators first.
 
+Behind a command a grey band shows what its actuator got, if the bag has it (docs/hardware/arming.md): bags of fcsl sim
+do; others show the command alone."""
 
 _EXAMPLES = {
     "": "flight filter.outputs.pos_z,lander.outputs.pos_z engine.outputs.throttle -o flight.png",
@@ -36,7 +38,8 @@ def make_parser() -> argparse.ArgumentParser:
     )
     parser.add_argument("bag", help="directory, or one of its files")
     parser.add_argument("paths", nargs="*", metavar="PATH", help="what to draw: a panel for each")
-    parser.add_argument("-o", "--output", metavar="FILE", required=True, help="picture to write: .png, .svg or .pdf")
+    help_output = "picture to write: .png, .svg or .pdf (default: the bag's name with .png, here)"
+    parser.add_argument("-o", "--output", metavar="FILE", default="", help=help_output)
     parser.add_argument("--against", default="", metavar="PATH", help="the horizontal axis, instead of time")
     parser.add_argument("--time", default="", choices=("header", "log"), help=TIME_HELP)
     parser.add_argument("--views", default="", metavar="FILE", help=VIEWS_HELP)
@@ -63,11 +66,16 @@ def main(arguments: Sequence[str]) -> int:
     views = read_views(options.views) if options.views else None
     bag = open_bag(options.bag, options.msg_path)
     chosen = {"paths": options.paths, "views": views, "against": options.against, "time": options.time}
-    left_out = plot(bag, options.output, options.machine, options.truth, **chosen)
-    print(f"{options.output}: {Path(options.output).stat().st_size} bytes")
+    output = options.output or _default_output(Path(options.bag).resolve())
+    left_out = plot(bag, output, options.machine, options.truth, **chosen)
+    print(f"{output}: {Path(output).stat().st_size} bytes")
     if left_out:
         print(f"left out: {', '.join(left_out)}; fcsl plot BAG PATH… chooses what is drawn")
     return completeness("fcsl plot", bag.truncated)
+
+
+def _default_output(bag: Path) -> str:
+    return f"{bag.stem if bag.is_file() else bag.name}.png"
 
 
 if __name__ == "__main__":  # TEMPORARY

@@ -7,6 +7,7 @@ import json
 import math
 import os
 import re
+import shutil
 import signal
 import subprocess
 import sys
@@ -19,6 +20,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 from hypothesis.extra.numpy import arrays
+from PIL import Image
 from two_estimators import STEP_S, TICKS, TRACK_FROM, TRACK_UNTIL, VIEWS, fly, height, turn, write_config
 
 import simclient.plot
@@ -26,12 +28,13 @@ import simclient.to_rerun
 from simclient import BagError
 from simclient.bag import Bag
 from simclient.errors import ViewError
-from simclient.view.panels import PANELS_MAX, choose_default
+from simclient.view.gate import beside, let_through
+from simclient.view.panels import PANELS_MAX, choose_by_paths, choose_default
 from simclient.view.picture import choose, draw, plot, pyplot
-from simclient.view.recorded import RecordedRun
+from simclient.view.recorded import RecordedRun, Rows
 from simclient.view.rotation import euler_deg
 from simclient.view.series import Gaps, newest, thinned
-from simclient.view.signals import Catalogue, Signals
+from simclient.view.signals import Catalogue, Signals, units_of
 from simclient.view.styles import styles
 from simclient.view.views import CURVES_MAX, ROLES, Views, parse_views
 
@@ -172,7 +175,7 @@ def test_what_is_not_recorded_is_told_in_legend_and_text(bags: Path) -> None:
 def test_invalid_views_are_told_once_and_left_out(bags: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(Bag, "views", lambda *_: '{"panels": 7}')
     chosen = choose(RecordedRun(Bag(bags / "plain")))
-    assert len(chosen.panels) > 1 and chosen.left_out == ["the views of the run (views.panels: not a list)"]
+    assert len(chosen.panels) > 1 and "the views of the run (views.panels: not a list)" in chosen.left_out
 
 
 # ---- what a user chooses -----------------------------------------------------------------------------------------------
@@ -239,17 +242,110 @@ def test_without_views_same_names_are_compared(bags: Path) -> None:
     assert shown["pose.height, m"] == ["coarse.pose.height", "fine.pose.height", "spare.pose.height: no values"]
     wide = [name for name in shown if name.startswith("pose.q")]
     assert wide == ["pose.q (1\u00a0of\u00a02)", "pose.q (2\u00a0of\u00a02)"]
-    assert all(len(names) <= CURVES_MAX for names in shown.values()) and left_out == []
+    assert all(len(names) <= CURVES_MAX for names in shown.values())
+    still = ["coarse.noise", "coarse.pose.valid", "fine.pose.valid", "guide.force", "spare.pose.valid"]
+    assert left_out == [f"what does not change ({', '.join(still)})"]
+    assert not {"noise", "force, N"} & shown.keys()
 
 
-def test_what_can_be_compared_comes_first() -> None:
-    """Also where other instances were recorded before it, and the plant last."""
-    names = (("a", False, "one"), ("a", False, "many"), ("b", False, "many"), ("b", False, "same"), ("p", True, "same"))
-    signals = [
-        Signals(who, f"/{who}", truth, {field: 0 for of, _, field in names if of == who}, {})
-        for who, truth in (("a", False), ("b", False), ("p", True))
-    ]
-    assert [panel.title for panel in choose_default(Catalogue(signals)).panels] == ["same", "many", "one"]
+OUTPUTS = {
+    "sensors": ["height"],
+    "law": ["many", "own"],
+    "engine": ["many", "height", "throttle"],
+    "plant": ["height", "mass"],
+}
+
+
+def titles(**chosen: Any) -> tuple[list[str], list[str]]:
+    signals = [Signals(who, f"/{who}", who == "plant", dict.fromkeys(names, 0)) for who, names in OUTPUTS.items()]
+    choice = choose_default(Catalogue(signals), **chosen)
+    return [panel.title for panel in choice.panels], choice.left_out
+
+
+def test_actuators_come_first_and_then_what_can_be_compared() -> None:
+    """Where no actuator is known, what the last instance alone has is taken for one."""
+    assert titles() == (["throttle", "height", "many", "own", "mass"], [])
+    assert titles(commands={"law.outputs.own"}) == (["own", "height", "many", "throttle", "mass"], [])
+
+
+def test_what_does_not_change_is_left_out_unless_all_is_so() -> None:
+    paths = [f"{who}.outputs.{name}" for who, names in OUTPUTS.items() for name in names]
+    some = {"law.outputs.own", "law.outputs.many", "plant.outputs.mass"}
+    assert titles(constants=some) == (["throttle", "height", "many"], ["what does not change (law.own, plant.mass)"])
+    assert titles(constants=set(paths)) == titles()
+
+
+def test_values_of_models_have_units() -> None:
+    """A comment of theirs begins with the unit, or with the documentation."""
+    comments = {
+        "a": "m, height above the ground", "b": "m/s^2", "c": "1/rad, slope", "d": "rad/s^2/sqrt(Hz), noise", "e": "degC",
+        "f": "w, x, y, z", "g": "the last sample", "h": "fuel, in the tank", "i": "", "j": "N*m", "k": "m/s², up",
+    }  # fmt: skip
+    schema = "std_msgs/Header header\n" + "".join(f"float64 {name}  # {text}\n" for name, text in comments.items())
+    units = {"a": "m", "b": "m/s^2", "c": "1/rad", "d": "rad/s^2/sqrt(Hz)", "e": "degC", "j": "N*m", "k": "m/s²"}
+    assert units_of(schema) == units
+    assert units_of("float64 x # [bushel] of corn\nfloat64 y # to the valve, 0 to 1\n") == {"x": "bushel"}
+
+
+# ---- what passed the gate ----------------------------------------------------------------------------------------------
+
+
+class GatedRun:
+    """Two motors and a brake, of which the gate is open in the second half."""
+
+    def __init__(self, **got: list[float]) -> None:
+        outputs = {
+            "motor": {"left": [1.0, 2.0, 3.0, 4.0], "right": [1.0, 2.0, 5.0, 6.0]},
+            "copy": {"left": [1.0, 2.0, 3.0, 4.0]},
+        }
+        self.fields = {**outputs, "actuators": {"gate": [0.0, 2.0, 1.0, 1.0], **got}}
+        self.signals = [
+            Signals(
+                name, name, name == "actuators", dict.fromkeys(fields, 0), dict.fromkeys(fields.keys() - {"gate"}, "V")
+            )
+            for name, fields in self.fields.items()
+        ]
+        self.catalogue = Catalogue(self.signals)
+
+    def read(self, values: Any) -> dict[str, Rows]:
+        return {
+            name: Rows(np.arange(4.0), {field: np.array(numbers) for field, numbers in fields.items()})
+            for name, fields in self.fields.items()
+        }
+
+
+@pytest.mark.parametrize(
+    ("got", "channels", "commands"),
+    [
+        ({"right": [0.0, 0.0, 5.0, 6.0]}, None, {"motor.outputs.right": "right"}),
+        ({"wheel": [0.0, 0.0, 5.0, 6.0]}, None, {"motor.outputs.right": "wheel"}),
+        ({"wheel": [0.0, 0.0, 2.0, 5.0]}, None, {"motor.outputs.right": "wheel"}),  # a tick late
+        ({"wheel": [0.0, 0.0, 3.0, 4.0]}, None, {}),  # of `motor` or of `copy`
+        ({"wheel": [0.0, 0.0, 9.0, 9.0]}, None, {}),
+        ({"wheel": [0.0, 0.0, 3.0, 4.0]}, {"wheel": "copy.outputs.left"}, {"copy.outputs.left": "wheel"}),
+        ({"rear_wheel": [0.0] * 4}, {"rear.wheel": "motor.outputs.left"}, {"motor.outputs.left": "rear_wheel"}),
+    ],
+)
+def test_what_passed_the_gate_is_known_by_its_values(
+    got: dict[str, list[float]], channels: dict[str, str] | None, commands: dict[str, str]
+) -> None:
+    run: Any = GatedRun(**got)
+    found = {path: value.field for path, value in let_through(run, channels).items()}
+    assert found == commands
+
+
+def test_a_command_has_what_its_actuator_got_behind_it() -> None:
+    run: Any = GatedRun(right=[0.0, 0.0, 5.0, 6.0])
+    found = let_through(run)
+    for paths in (["motor.outputs.right"], ["motor.outputs.right,actuators.outputs.right"]):
+        (panel,) = (beside(panel, found) for panel in choose_by_paths(paths, run.catalogue).panels)
+        curves = {curve.label: (curve.role, curve.steps) for curve in panel.curves}
+        band = ("after the gate", True)
+        assert curves == {"motor.right (command)": ("command", False), "actuators.right (after the gate)": band}
+    (panel,) = (beside(panel, found) for panel in choose_by_paths(["motor.outputs.left"], run.catalogue).panels)
+    assert [curve.role for curve in panel.curves] == ["values"]
+    band, command = styles(["after the gate", "command"])
+    assert band.order < command.order and band.width > 3 * command.width and not band.dashed
 
 
 def test_wide_panels_become_several_up_to_a_limit(bags: Path) -> None:
@@ -394,11 +490,32 @@ def test_bad_input_leaves_nothing_behind(
     assert sorted(p.name for p in tmp_path.iterdir()) == ["bad.json", "there", f"there.{suffix}"]
 
 
-@pytest.mark.parametrize("tool", TOOLS)
-def test_a_file_to_write_must_be_named(tool: str, bags: Path, capsys: pytest.CaptureFixture[str]) -> None:
+def test_a_rerun_file_must_be_named(bags: Path, capsys: pytest.CaptureFixture[str]) -> None:
     with pytest.raises(SystemExit) as exited:
-        TOOLS[tool]([str(bags / "plain")])
+        simclient.to_rerun.main([str(bags / "plain")])
     assert exited.value.code == 2 and "-o/--output" in capsys.readouterr().err
+
+
+def test_a_picture_has_the_name_of_its_bag(bags: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """Of a folder, also of this one, or of a file; it is written here."""
+    monkeypatch.chdir(tmp_path)
+    for bag in (bags / "plain", bags / "plain/plain_0.mcap"):
+        assert simclient.plot.main([str(bag), "guide.outputs.height"]) == 0
+    shutil.copytree(bags / "plain", tmp_path / "here")
+    monkeypatch.chdir(tmp_path / "here")
+    assert simclient.plot.main([".", "guide.outputs.height"]) == 0
+    assert sorted(str(path.relative_to(tmp_path)) for path in tmp_path.rglob("*.png")) == [
+        "here/here.png", "plain.png", "plain_0.png"
+    ]  # fmt: skip
+
+
+def test_a_picture_is_small_and_the_same_bytes(bags: Path, tmp_path: Path) -> None:
+    for name in ("a.png", "b.png"):
+        plot(bags / "viewed", tmp_path / name)
+    written = (tmp_path / "a.png").read_bytes()
+    assert written == (tmp_path / "b.png").read_bytes()
+    with Image.open(tmp_path / "a.png") as picture:
+        assert picture.mode == "P" and picture.size[0] == 1440
 
 
 @pytest.mark.parametrize(("tool", "slow"), [("plot", "matplotlib"), ("to_rerun", "rerun")])

@@ -78,7 +78,9 @@ def run_response(options: Any) -> int:
     if options.output is not None:
         measured.write(options.output)
     if options.plot is not None and measured.points:
-        measured.draw(options.plot, config.path.name)
+        from .response_picture import draw  # imported here, because it takes a second
+
+        draw(measured, options.plot, config.path.name)
     show(json.dumps(measured.as_json(), indent=1)) if options.json else print(measured.text())
     return 0 if measured.points else EXIT_NOTHING_MEASURED
 

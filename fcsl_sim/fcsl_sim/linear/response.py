@@ -317,29 +317,35 @@ class Margins:
 
 
 def margins(points: Sequence[Point]) -> Margins:
-    """Of several crossings the one with the smallest margin counts. Between points gain (dB) and phase are linear in the logarithm
-    of the frequency. A point without a loop counts nowhere, and no crossing is sought across it. Raises SimError if all are so."""
-    runs = measured_runs(points, lambda point: point.has_loop)
-    if not runs:
+    """Of several crossings the one with the smallest margin counts. A point without a loop counts nowhere. Raises SimError if all
+    are so."""
+    with_loop = [point for point in points if point.has_loop]
+    if not with_loop:
         raise SimError("no loop was measured at any frequency")
-    found_phase: list[tuple[float, float]] = []
-    found_gain: list[tuple[float, float, float]] = []
-    for run in runs:
+    at_gain, at_phase = crossings(points)
+    crossover, phase_margin = min(at_gain, key=lambda pair: pair[1], default=(None, None))
+    phase_crossover, gain_margin = min(at_phase, key=lambda pair: abs(math.log(pair[1])), default=(None, None))
+    peak = max(with_loop, key=lambda point: abs(point.sensitivity))
+    return Margins(crossover, phase_margin, phase_crossover, gain_margin, abs(peak.sensitivity), peak.omega)
+
+
+def crossings(points: Sequence[Point]) -> tuple[list[tuple[float, float]], list[tuple[float, float]]]:
+    """Frequency (rad/s) and phase margin (rad) of each gain crossover; frequency and gain margin (a factor) of each phase
+    crossover. Between points gain (dB) and phase are linear in the logarithm of the frequency; no crossing is sought across a
+    point without a loop."""
+    at_gain: list[tuple[float, float]] = []
+    at_phase: list[tuple[float, float]] = []
+    for run in measured_runs(points, lambda point: point.has_loop):
         omega = np.log([p.omega for p in run])
         gain = np.log(np.abs([p.loop for p in run]))
         phase = np.unwrap(np.angle([p.loop for p in run]))
         for at in _crossings(omega, gain, 0.0):
             angle = _between(omega, phase, at)
-            found_phase.append((abs(math.remainder(angle - math.pi, 2 * math.pi)), math.exp(at)))
+            at_gain.append((math.exp(at), abs(math.remainder(angle - math.pi, 2 * math.pi))))
         turns = range(math.floor(phase.min() / (2 * math.pi)) - 1, math.ceil(phase.max() / (2 * math.pi)) + 2)
         for at in (at for n in turns for at in _crossings(omega, phase, (2 * n + 1) * math.pi)):
-            size = -_between(omega, gain, at)
-            found_gain.append((abs(size), size, math.exp(at)))
-    phase_margin, crossover = min(found_phase, default=(None, None))
-    _, size_, phase_crossover = min(found_gain, default=(None, None, None))
-    peak = max((p for run in runs for p in run), key=lambda p: abs(p.sensitivity))
-    gain_margin = None if size_ is None else math.exp(size_)
-    return Margins(crossover, phase_margin, phase_crossover, gain_margin, abs(peak.sensitivity), peak.omega)
+            at_phase.append((math.exp(at), math.exp(-_between(omega, gain, at))))
+    return at_gain, at_phase
 
 
 def measured_runs(points: Sequence[Point], holds: Callable[[Point], bool]) -> list[list[Point]]:

@@ -1,23 +1,18 @@
 # SPDX-License-Identifier: Apache-2.0
-"""What `fcsl response` prints, writes and draws."""
+"""What `fcsl response` prints and writes; response_picture.py draws."""
 
 from __future__ import annotations
 
 import cmath
 import json
 import math
-from collections.abc import Callable, Iterable, Sequence
-from functools import partial
+from collections.abc import Iterable, Sequence
 from pathlib import Path
 from typing import Any
 
-import numpy as np
-
 from ..errors import SimError
 from ..plot import PICTURE_SUFFIXES
-from .response import Margins, Point, Response, margins, measured_runs
-
-_BLUE, _RED, _GREY = "#2a78b5", "#c8442c", "#888888"
+from .response import Margins, Point, Response, margins
 
 
 def heading(response: Response) -> str:
@@ -39,14 +34,14 @@ def row(point: Point) -> str:
 
 def _cell(value: complex) -> str:
     """`none`: it does not depend on the sine."""
-    return f"{_decibels(value):8.2f} dB {math.degrees(cmath.phase(value)):5.0f}°" if value else f"{'none':>18}"
+    return f"{decibels(value):8.2f} dB {math.degrees(cmath.phase(value)):5.0f}°" if value else f"{'none':>18}"
 
 
 def _short(name: str) -> str:
     return name if len(name) <= 18 else f"…{name[-17:]}"
 
 
-def _decibels(value: complex) -> float:
+def decibels(value: complex) -> float:
     """Of a value that is not 0."""
     return 20.0 * math.log10(abs(value))
 
@@ -106,64 +101,30 @@ class Measured:
     def write(self, path: Path) -> None:
         path.write_text(json.dumps(self.as_json(), indent=1) + "\n")
 
-    def draw(self, path: Path, title: str) -> None:
-        """Bode diagrams of the loop with its crossings, and of sensitivity and outputs."""
-        from matplotlib.figure import Figure  # imported here, because it takes a second
-
-        figure = Figure(figsize=(11, 6), layout="constrained")
-        axes = figure.subplots(2, 2, sharex=True)
-        found = self.margins
-        if found:
-            for crossing, level, axis in (
-                (found.gain_crossover, 0.0, axes[0, 0]),
-                (found.phase_crossover, -180.0, axes[1, 0]),
-            ):
-                axis.axhline(level, color=_GREY, linewidth=0.8)
-                for other in axes[:, 0] if crossing else ():
-                    other.axvline(crossing, color=_RED, linewidth=0.8, linestyle=":")
-            self._bode(axes[:, 0], lambda point: point.loop if point.has_loop else 0j, "loop", _BLUE)
-            self._bode(axes[:, 1], lambda point: point.sensitivity if point.has_loop else 0j, "sensitivity", _RED)
-        for i, (name, unit) in enumerate(self.outputs):
-            label = f"{name} ({unit})" if unit else name
-            self._bode(axes[:, 1], partial(Point.response, output=i), label, f"C{i}")
-        for axis in axes.flat:
-            axis.grid(True, which="both", color="#dddddd", linewidth=0.5)
-        for column in (0, 1):
-            axes[0, column].set_ylabel("gain (dB)")
-            axes[1, column].set_ylabel("phase (°)")
-            axes[1, column].set_xlabel("rad/s")
-            if axes[0, column].lines:
-                axes[0, column].legend(fontsize=8)
-        figure.suptitle(f"{title}, sine at {', '.join(path for path, _ in self.inputs)}", fontsize=10)
-        figure.savefig(path, dpi=100)
-
-    def _bode(self, axes: Any, value: Callable[[Point], complex], label: str, colour: str) -> None:
-        """A line for each run of frequencies with a value, so that none leads across one without."""
-        gain, phase = axes
-        for run in measured_runs(self.asked, lambda point: point.is_settled and value(point) != 0):
-            omega, values = [point.omega for point in run], [value(point) for point in run]
-            phases = np.degrees(np.unwrap(np.angle(values)))
-            phases -= 360.0 * round((phases[0] + 90.0) / 360.0)  # begins within -270 and 90 degrees
-            gain.semilogx(omega, [_decibels(v) for v in values], ".-", color=colour, label=label)
-            phase.semilogx(omega, phases, ".-", color=colour, label=label)
-            label = "_nolegend_"
-
 
 def _margins_text(found: Margins) -> str:
-    lines = []
-    if found.phase_margin is not None and found.gain_crossover is not None:
-        lines.append(
-            f"phase margin {math.degrees(found.phase_margin):.1f}° at {found.gain_crossover:.4g} rad/s, "
-            f"delay margin {1e3 * (found.delay_margin or 0.0):.3g} ms"
-        )
-    if found.gain_margin is not None:
-        lines.append(
-            f"gain margin {_decibels(found.gain_margin):.1f} dB ({found.gain_margin:.3g}) at {found.phase_crossover:.4g} rad/s"
-        )
-    lines.append(
-        f"largest sensitivity {found.peak_sensitivity:.3g} ({_decibels(found.peak_sensitivity):.1f} dB) at {found.peak_frequency:.4g} rad/s"
+    lines = [phase_text(found) if found.gain_crossover else "", gain_text(found) if found.gain_margin else ""]
+    return "\n".join(filter(None, [*lines, peak_text(found)]))
+
+
+def phase_text(found: Margins) -> str:
+    if found.phase_margin is None or found.gain_crossover is None:
+        return "no gain crossover where it was measured"
+    return (
+        f"phase margin {math.degrees(found.phase_margin):.1f}° at {found.gain_crossover:.4g} rad/s, "
+        f"delay margin {1e3 * (found.delay_margin or 0.0):.3g} ms"
     )
-    return "\n".join(lines)
+
+
+def gain_text(found: Margins) -> str:
+    if found.gain_margin is None:
+        return "no phase crossover where it was measured"
+    return f"gain margin {decibels(found.gain_margin):.1f} dB ({found.gain_margin:.3g}) at {found.phase_crossover:.4g} rad/s"
+
+
+def peak_text(found: Margins) -> str:
+    size = f"{found.peak_sensitivity:.3g} ({decibels(found.peak_sensitivity):.1f} dB)"
+    return f"largest sensitivity {size} at {found.peak_frequency:.4g} rad/s"
 
 
 def _names(points: Iterable[Point]) -> str:

@@ -7,6 +7,7 @@ import os
 import shlex
 import subprocess
 import sys
+import tempfile
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -157,6 +158,8 @@ class Tree:
             "PYTHONPATH": f"{HOOK}{os.pathsep}{own.get('PYTHONPATH', '')}",
             "PYTHONDONTWRITEBYTECODE": "1",
             "FCSL_CACHE_DIR": str(self.folder / "cache"),
+            # pytest removes folders of earlier runs, those of others, too. Paths of sockets must be short.
+            "PYTEST_DEBUG_TEMPROOT": tempfile.mkdtemp(prefix="mutants-"),
         }
         return own
 

@@ -8,13 +8,14 @@ from __future__ import annotations
 
 import difflib
 import re
-from collections.abc import Iterable, Iterator, Mapping, Sequence
+from collections.abc import Collection, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from itertools import islice
 
 from ..errors import ViewError
 from .rotation import ANGLES
-from .signals import STATUS_FIELDS, Catalogue, Signals, Value, whole
+from .signals import GATE, STATUS_FIELDS, Catalogue, Signals, Value, whole
+from .styles import AFTER_GATE
 from .views import CURVES_MAX, PanelView
 
 #: Most panels that the curves of one wide panel are split into, of a run that chooses none, and of any picture.
@@ -23,6 +24,8 @@ PIECES_MAX, DEFAULT_PANELS, PANELS_MAX = 4, 8, 24
 ELEMENTS_MAX = 64
 _QUATERNION = (4,)
 _NEAR_MATCHES = 3
+#: Of the values that are left out.
+_NAMED = 8
 #: A comma between paths, and not between indices (`P[0, 2]`).
 _COMMA = re.compile(r",(?![^\[]*\])")
 
@@ -39,8 +42,8 @@ class Curve:
 
     @property
     def steps(self) -> bool:
-        """Whether the value jumps, so that no slope may be drawn between two samples."""
-        return self.angle is None and self.value.field in self.value.signals.steps
+        """Whether the value jumps, so that no slope may be drawn between two samples. An actuator holds what it got."""
+        return self.role == AFTER_GATE or (self.angle is None and self.value.field in self.value.signals.steps)
 
 
 @dataclass(frozen=True)
@@ -175,30 +178,45 @@ def demand(path: str, catalogue: Catalogue) -> list[Value]:
     raise ViewError(f"`{path}`: nothing of this path is recorded{hint} `fcsl bag info` lists the topics")
 
 
-def choose_default(catalogue: Catalogue) -> Choice:
+def choose_default(catalogue: Catalogue, commands: Collection[str] = (), constants: Collection[str] = ()) -> Choice:
     """The panels of a run that chooses none: one for each name and unit, with what of the plant and of instances has it.
 
-    Panels that compare the plant with instances come first, then those of several instances; DEFAULT_PANELS at most.
-    A field without a unit joins the first panel of its name.
+    First come actuators: the outputs `commands` and what the gate made of them; where none is known, what the last
+    instance alone has. Then panels that compare the plant with instances, those of several instances, those of one, and
+    the plant alone; DEFAULT_PANELS at most. A field without a unit joins the first panel of its name. A panel of
+    `constants` alone is left out, unless all are.
     """
     groups: dict[tuple[str, str], list[Value]] = {}
     outputs = [v for v in catalogue.values.values() if v.signals.part == "outputs" and v.field not in STATUS_FIELDS]
     for value in sorted(outputs, key=lambda v: not v.unit):
         same = next((key for key in groups if key[0] == value.field), None) if not value.unit else None
         groups.setdefault(same or (value.field, value.unit), []).append(value)
+    still = [values for values in groups.values() if all(value.path in constants for value in values)]
+    if len(still) == len(groups):  # better than no picture
+        still = []
     order = {id(signals): number for number, signals in enumerate(catalogue.signals)}
+    last = [signals for signals in catalogue.signals if signals.part == "outputs" and not signals.truth][-1:]
+
+    def is_actuator(values: list[Value]) -> bool:
+        if not commands and len(values) == 1 and values[0].signals in last:
+            return True
+        return any(value.path in commands or value.signals.is_gate for value in values)
 
     def rank(values: list[Value]) -> tuple[int, int]:
         sources = {value.signals.truth for value in values}
-        return 0 if len(sources) == 2 else 1 if len(values) > 1 else 2, min(order[id(v.signals)] for v in values)
+        kind = 1 if len(sources) == 2 else 4 if True in sources else 2 if len(values) > 1 else 3
+        return 0 if is_actuator(values) else kind, min(order[id(v.signals)] for v in values)
 
-    groups = dict(sorted(groups.items(), key=lambda item: rank(item[1])))
+    moving = sorted((values for values in groups.values() if values not in still), key=rank)
     chosen = Choice()
-    shown = list(groups.items())[:DEFAULT_PANELS]
-    for (name, _), values in shown:
-        chosen.add(_panel(name, _by_source(values), _PLANT))
-    if len(groups) > len(shown):
-        chosen.left_out.append(f"{len(groups) - len(shown)} more names of outputs")
+    for values in moving[:DEFAULT_PANELS]:
+        chosen.add(_panel(values[0].field, _by_source(values), _PLANT))
+    if len(moving) > DEFAULT_PANELS:
+        chosen.left_out.append(f"{len(moving) - DEFAULT_PANELS} more names of outputs")
+    if still:
+        names = sorted(label_of(value.path) for values in still for value in values)
+        more = f" and {len(names) - _NAMED} more" if len(names) > _NAMED else ""
+        chosen.left_out.append(f"what does not change ({', '.join(names[:_NAMED])}{more})")
     return chosen.limited()
 
 
@@ -211,13 +229,18 @@ def label_of(path: str, remark: str = "") -> str:
 #: What a legend says of a curve's role; nothing of an estimate.
 _REMARKS = {role: role for role in ("truth", "measured", "command")}
 #: Who chooses a plant's value by its path does not say that it is the truth: it may be that of a sensor's model.
-_PLANT = {"truth": "plant"}
+_PLANT = {"truth": "plant", AFTER_GATE: AFTER_GATE}
 
 
 def _by_source(values: Iterable[Value]) -> list[tuple[Value, str]]:
     """The plant's values first, in the style of truth."""
-    roles = [(value, "truth" if value.signals.truth else "values") for value in values]
-    return sorted(roles, key=lambda pair: pair[1] != "truth")
+    return sorted(((value, _role(value)) for value in values), key=lambda pair: pair[1] != "truth")
+
+
+def _role(value: Value) -> str:
+    if value.signals.is_gate and value.field != GATE:
+        return AFTER_GATE
+    return "truth" if value.signals.truth else "values"
 
 
 def _panel(

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""One picture of a run: the output of `fcsl plot`. panels.py chooses what is drawn.
+"""One picture of a run: the output of `fcsl plot`. panels.py chooses what is drawn, gate.py adds what actuators got.
 
 Background colours are the states of the machine. Curves have gaps where the instance did not run, and where ticks are
 missing in the bag.
@@ -9,7 +9,7 @@ from __future__ import annotations
 
 import io
 import textwrap
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from datetime import UTC, datetime
 from pathlib import Path
@@ -17,14 +17,18 @@ from typing import Any
 
 import matplotlib
 import numpy as np
+from PIL import Image
+
+from fcsl_compiler.api.ros_names import recorded_path
 
 from ..bag import Array, Bag, formats
 from ..complete_output import complete_or_absent
 from ..errors import BagError, ViewError
+from .gate import actuators, beside, let_through
 from .panels import Choice, Curve, Panel, choose_by_paths, choose_by_views, choose_default, demand, label_of
 from .recorded import RecordedRun, Rows, Span, curve
 from .series import newest, thinned
-from .signals import HEALTH
+from .signals import GATE, GATES, HEALTH
 from .styles import Style, styles
 from .views import Views
 
@@ -65,12 +69,14 @@ def plot(
     views: Views | None = None,
     against: str = "",
     time: str = "",
+    channels: Mapping[str, str] | None = None,
 ) -> list[str]:
     """Writes the picture of a run to `output` (.png, .svg or .pdf), complete or not at all.
 
     It has a panel for each of `paths`, else those of `views` or of the bag's own, else one for each name and unit.
     `against` is the path of the horizontal axis, instead of time. `time` chooses the clock of other topics
-    (bag/stamps.py); the axis names it. Returns what is left out. Raises BagError and ViewError.
+    (bag/stamps.py); the axis names it. `channels` are the paths of the outputs that actuator channels carry, by name,
+    where they are known (gate.py). Returns what is left out. Raises BagError and ViewError.
     """
     if Path(output).suffix.lower() not in SUFFIXES:
         raise BagError(f"{output}: the name of a picture ends in {', '.join(SUFFIXES)}")
@@ -78,7 +84,7 @@ def plot(
     run = RecordedRun(
         opened, machine, truth, foreign=any(path.startswith("/") for path in (*paths, against)), time=time
     )
-    chosen = choose(run, paths, views)
+    chosen = choose(run, paths, views, channels)
     duration = run.spans[-1].end_s - run.spans[0].start_s if run.spans else 0.0
     what = [run.name, f"{duration:.2f} s"] if run.machine else []
     cut = " (incomplete)" if opened.truncated else ""
@@ -96,14 +102,31 @@ def save(figure: Any, output: str | Path) -> None:
     It is drawn in memory: matplotlib's PDF writer fails a second time when it cleans up after a full disk.
     """
     drawn = io.BytesIO()
-    figure.savefig(drawn, format=Path(output).suffix[1:].lower(), dpi=_DPI)
+    kind = Path(output).suffix[1:].lower()
+    figure.savefig(drawn, format=kind, dpi=_DPI)
+    if kind == "png":
+        drawn = _with_palette(drawn)
     with complete_or_absent(output) as partial:
         partial.write_bytes(drawn.getbuffer())
 
 
-def choose(run: RecordedRun, paths: Sequence[str] = (), views: Views | None = None) -> Choice:
+def _with_palette(drawn: io.BytesIO) -> io.BytesIO:
+    """The PNG with 256 colours, which is a third of its size: a picture has few, and their mixtures at the edges of lines."""
+    smaller = io.BytesIO()
+    picture = Image.open(drawn).convert("RGB").quantize(256, dither=Image.Dither.NONE)
+    picture.save(smaller, "png", optimize=True, dpi=(_DPI, _DPI))
+    return smaller
+
+
+def choose(
+    run: RecordedRun,
+    paths: Sequence[str] = (),
+    views: Views | None = None,
+    channels: Mapping[str, str] | None = None,
+) -> Choice:
     """The panels of a picture. Raises ViewError if nothing of a run can be drawn."""
     remark = ""
+    got = let_through(run, channels)
     if views is None and not paths:
         views, remark = run.views()
     if paths:
@@ -111,7 +134,12 @@ def choose(run: RecordedRun, paths: Sequence[str] = (), views: Views | None = No
     elif views is not None and views.panels:
         chosen = choose_by_views(views.panels, run.catalogue)
     else:
-        chosen = choose_default(run.catalogue)
+        commands = {recorded_path(path) for path in channels.values()} if channels else got.keys()
+        chosen = choose_default(run.catalogue, commands, run.constants())
+    chosen.panels = [beside(panel, got) for panel in chosen.panels]
+    shown = {curve.value.path for panel in chosen.panels for curve in panel.curves}
+    unknown = (value.path for value in actuators(run) if value not in got.values() and value.path not in shown)
+    chosen.left_out += [f"{path} (its command is not known)" for path in unknown]
     chosen.left_out += filter(None, [remark])
     if not chosen.panels:
         why = f": {', '.join(chosen.left_out)}" if chosen.left_out else ""
@@ -217,12 +245,14 @@ def _draw_line(axis: Any, line: Line, style: Style) -> None:
 
 
 def _name_values(axis: Any, panel: Panel, states: Sequence[str]) -> None:
-    """Names instead of numbers on the vertical axis of healths, and of states."""
-    fields = {(c.value.signals.part, c.value.field) for c in panel.curves}
-    names = (
-        {("outputs", "health"): HEALTH, ("", "state"): states}.get(next(iter(fields)), ()) if len(fields) == 1 else ()
-    )
-    if names:
+    """Names instead of numbers on the vertical axis of healths, of states and of the gate."""
+    first = panel.curves[0].value
+    alike = all((c.value.signals.part, c.value.field) == (first.signals.part, first.field) for c in panel.curves)
+    if first.signals.is_gate and first.field == GATE and len(panel.curves) == 1:
+        names: Sequence[str] = GATES
+    else:
+        names = {("outputs", "health"): HEALTH, ("", "state"): states}.get((first.signals.part, first.field), ())
+    if names and alike:
         axis.set_yticks(range(len(names)), names)
         axis.set_ylim(-0.3, len(names) - 0.7)
 

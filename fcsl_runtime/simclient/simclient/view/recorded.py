@@ -18,7 +18,7 @@ from ..errors import BagError
 from .panels import Curve
 from .rotation import euler_deg, unjoined
 from .series import Gaps
-from .signals import FRAME_FIELDS, PARTS_OF_A_RUN, STALE, Catalogue, Signals, Value, signals_of
+from .signals import ACTUATORS, FRAME_FIELDS, PARTS_OF_A_RUN, STALE, Catalogue, Signals, Value, signals_of
 from .views import Views, views_or_remark
 
 _HEALTH, _TICK = "health", "tick"
@@ -112,6 +112,19 @@ class RecordedRun:
             topic: self._with_gaps(by_topic[topic], rows, healths[topic], fields) for topic, fields in wanted.items()
         }
 
+    def constants(self) -> set[str]:
+        """Paths of the machine's and the plant's outputs that do not change."""
+        outputs = {its.topic: its for its in self.signals if its.part == "outputs"}
+        first: dict[str, Array] = {}
+        changed = set[str]()
+        for topic, some in stacks(self.bag, outputs):
+            begin = first.setdefault(topic, some[:1])
+            for name in outputs[topic].sizes:
+                path = outputs[topic].path(name)
+                if path not in changed and np.any((some[name] != begin[name]) & (some[name] == some[name])):
+                    changed.add(path)
+        return {its.path(name) for its in outputs.values() for name in its.sizes} - changed
+
     def _states(self) -> Rows:
         """The state as its number in `states`, at the beginning and at the end of each visit."""
         t_s = np.array([t for span in self.spans for t in (span.start_s, span.end_s)])
@@ -185,10 +198,10 @@ def curve(rows: dict[str, Rows], wanted: Curve) -> tuple[Array, Array]:
 
 
 def plant_topics(bag: Bag, machine: RecordedMachine, truth: str) -> list[str]:
-    """The topics of the plant around a machine that can be shown; `truth` alone, where it is given."""
-    if truth:
-        return [bag.topic(truth).name]
+    """The topics of the plant around a machine that can be shown; where `truth` is given, it alone and what actuators got."""
     prefix = machine.prefix.rsplit("/", 1)[0] + "/sim/"
+    if truth:
+        return list(dict.fromkeys([bag.topic(truth).name, *({prefix + ACTUATORS} & bag.topics.keys())]))
     layouts = {topic: bag.layout(topic) for topic in bag.topics if topic.startswith(prefix)}
     return [topic for topic, layout in layouts.items() if layout is not None and has_stamps(layout)]
 

@@ -14,13 +14,13 @@ COLOURS = ("#1845FB", "#FF5E02", "#86C8DD", "#C849A9", "#ADAD7D", "#578DFF", "#C
 _TRUTH = ("#000000", "#5A5A5A", "#8F8F8F", "#B5B5B5")
 _TRUTH_IN_RERUN = ("#E12D46", "#FF8FA0", "#9E1029", "#FFC7CF")
 
-
+#: Role of what passed a gate: a broad band behind its command, so that one sees where it is not the command.
+AFTER_GATE = "after the gate"
+_BAND, _BAND_WIDTH = "#9AA0A6", 4.0
 #: Widths of solid lines, in points: later ones are thinner, so that lines that coincide stay visible.
 _WIDEST, _THINNEST, _THINNER = 2.0, 1.0, 0.3
 #: From the back to the front.
-_ORDER = ("measured", "estimate", "values", "command", "truth")
-
-
+_ORDER = (AFTER_GATE, "measured", "estimate", "values", "command", "truth")
 #: Paler in rerun, where they would be too dark.
 _PALER = {"#1845FB": "#3D63FF", "#656364": "#A9A7A8"}
 
@@ -38,7 +38,8 @@ class Style:
 
 
 def styles(roles: Sequence[str]) -> list[Style]:
-    """The styles of a panel's curves (8 at most), given their roles; no two have one colour."""
+    """The styles of a panel's curves, given their roles. No two have one colour, except for bands; beside them, 8 curves
+    at most."""
     found: dict[int, Style] = {}
     truths = [i for i, role in enumerate(roles) if role == "truth"][: len(_TRUTH)]
     for (colour, in_rerun), i in zip(zip(_TRUTH, _TRUTH_IN_RERUN, strict=True), truths, strict=False):
@@ -46,6 +47,9 @@ def styles(roles: Sequence[str]) -> list[Style]:
     lines, dots = 0, 0
     for i, role in enumerate(roles):
         if i in found:
+            continue
+        if role == AFTER_GATE:
+            found[i] = Style(_BAND, _BAND, _BAND_WIDTH, False, False, _ORDER.index(role) + 2)
             continue
         if role == "measured":
             dots += 1
