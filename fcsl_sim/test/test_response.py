@@ -368,7 +368,7 @@ def test_the_command(write: Callable[..., Path], capsys: pytest.CaptureFixture[s
 
 #: Of k / (s (s + 1)²) with k = 0.5: the phase is -180° at 1 rad/s, where the gain is 1/4.
 LAG = [
-    Point(w, -(l := 0.5 / (1j * w * (1j * w + 1) ** 2)), 1.0 + l, (2.0 / (1j * w),), 0.0, 0.0)
+    Point(w, -(lag := 0.5 / (1j * w * (1j * w + 1) ** 2)), 1.0 + lag, (2.0 / (1j * w),), 0.0, 0.0)
     for w in spaced(0.1, 10.0, 41)
 ]
 

@@ -5,6 +5,7 @@ from ..expression.evaluate import SCALARS, Arithmetic, evaluator
 from ..expression.parse import FUNCTIONS, SERIES_FUNCTIONS, parse
 from ..expression.tree import ExpressionError, Kind, Node, Quantity
 from ..expression.units import read as read_unit
+from ..expression.units import text as unit_text
 
 __all__ = [
     "FUNCTIONS",
@@ -18,4 +19,5 @@ __all__ = [
     "evaluator",
     "parse",
     "read_unit",
+    "unit_text",
 ]

@@ -91,7 +91,7 @@ def _parser(program: str) -> argparse.ArgumentParser:
     _add_board(commands)
 
     why = _add(commands, "explain", "explain a diagnostic code, with an example, or a function")
-    why.add_argument("what", nargs="*", help="a code such as E402, or a function such as kf_gain; none: list all codes")
+    why.add_argument("what", nargs="*", help="a code such as E402, or a function such as kf_gain; none: list all")
 
     scan = _add(commands, "scan", "check that machine libraries call only functions allowed in a step")
     scan.add_argument("library", type=Path, nargs="+", help="shared library of machines")

@@ -19,7 +19,7 @@ def run(options: argparse.Namespace) -> int:
     except UnknownCode as error:
         like = [nearest(word, function_names()) for word in options.what if not word[-1:].isdigit()]
         raise UsageError("; ".join([str(error), *filter(None, like)])) from None
-    print("\n".join(texts) if texts else pages([], codes()), end="")
+    print("\n".join(texts) if texts else f"{pages([], codes())}\nfunctions: {', '.join(function_names())}\n", end="")
     return 0
 
 

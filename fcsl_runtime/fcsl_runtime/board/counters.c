@@ -23,7 +23,7 @@ static const struct {
     {"bytes", "bytes that arrived; 0 where the driver does not tell, as of the next ones"},
     {"frames", "whole frames of its protocol among them"},
     {"rejected", "bytes among them that belong to no frame"},
-    {"why", "why no sample comes, by the numbers of board.md; 0: samples come"},
+    {"why", "why no sample comes, by the numbers of docs/hardware/hal.md; 0: samples come"},
 };
 enum { DEVICE_COUNTERS = sizeof OF_DEVICE / sizeof OF_DEVICE[0] };
 

@@ -76,9 +76,3 @@ def main(arguments: Sequence[str]) -> int:
 
 def _default_output(bag: Path) -> str:
     return f"{bag.stem if bag.is_file() else bag.name}.png"
-
-
-if __name__ == "__main__":  # TEMPORARY
-    from .cli import run_tool
-
-    raise SystemExit(run_tool("fcsl plot", "plot", __import__("sys").argv[1:]))

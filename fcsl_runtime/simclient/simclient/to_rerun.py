@@ -51,8 +51,4 @@ def main(arguments: Sequence[str]) -> int:
         print(f"left out of the first page: {', '.join(left_out)}")
     return completeness("fcsl rerun", bag.truncated)
 
-
-if __name__ == "__main__":  # TEMPORARY
-    from .cli import run_tool
-
     raise SystemExit(run_tool("fcsl rerun", "to_rerun", __import__("sys").argv[1:]))

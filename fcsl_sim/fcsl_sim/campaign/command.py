@@ -18,6 +18,7 @@ from ..output import show
 from ..watchdog import Watchdog
 from . import report
 from .flight import Flights, Outcome
+from .requirements import requirements
 from .results import Results
 from .study import Study, read_study
 from .workers import fly_in_processes
@@ -44,12 +45,12 @@ def run_campaign(options: Any) -> int:
     if results.done:
         print(f"{results.folder}: {results.done} of {study.cases} cases are there already", file=sys.stderr)
     _fly_missing(study, results, options)
-    table, picture = results.write_table(), report.draw(results)
+    table, page = results.write_table(), report.write_page(results)
     if options.json:
-        show(json.dumps(_summary(results, table, picture), indent=2))
+        show(json.dumps(_summary(results, table, page), indent=2))
     else:
         print(report.text(results))
-        print(f"{table}\n{picture}")
+        print(f"{table}\n{page}")
     return 0 if results.count("passed") == study.cases else EXIT_FAILED
 
 
@@ -108,7 +109,7 @@ def _lines(study: Study, outcome: Outcome) -> str:
     return "\n".join([*lines, f"{outcome.ticks} ticks, hash {outcome.hash}"])
 
 
-def _summary(results: Results, table: Path, picture: Path) -> dict[str, Any]:
+def _summary(results: Results, table: Path, page: Path) -> dict[str, Any]:
     passed, cases = results.count("passed"), results.study.cases
     return {
         "study": str(results.study.path),
@@ -117,8 +118,9 @@ def _summary(results: Results, table: Path, picture: Path) -> dict[str, Any]:
         "failed": results.count("failed"),
         "errors": results.count("error"),
         "confidence_95": report.wilson(passed, cases),
+        "requirements": [asdict(line) for line in requirements(results)],
         "table": str(table),
-        "report": str(picture),
+        "report": str(page),
     }
 
 

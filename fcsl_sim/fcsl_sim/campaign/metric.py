@@ -22,6 +22,7 @@ from fcsl_compiler.api.expressions import (
     Quantity,
     evaluator,
     parse,
+    unit_text,
 )
 from simclient.descriptor import Machine
 from simclient.quantities import quantity, selection
@@ -29,6 +30,8 @@ from simclient.twin.trace import Columns
 
 from .column_arithmetic import column_arithmetic, widest
 
+#: What leaves a value in its unit.
+_SAME_UNIT = ("*", "+", "-", "negative", "positive", "abs", "norm", "min", "max", "first", "last", "mean", "std", "rms")
 #: Names that no metric may have.
 RESERVED = tuple(dict.fromkeys((*FUNCTIONS, *SERIES_FUNCTIONS)))
 
@@ -38,7 +41,8 @@ class MetricError(ValueError):
 
 
 class Metric:
-    """An expression. `paths` are what it reads, `quantity` what it is; `all_ticks`: not only the last values.
+    """An expression. `paths` are what it reads, `quantity` what it is, `unit` that of its value, as fields have it, or empty;
+    `all_ticks`: not only the last values.
 
     metrics: those that it may use, by name. condition: it must be true or false. Raises MetricError.
     """
@@ -62,6 +66,7 @@ class Metric:
         self.paths = {
             selection(node.value, machine).field.path for node in leaves if node.operator in ("field", "column")
         }
+        self.unit = _unit(self.root, machine, metrics or {})
         self.all_ticks = any(node.operator == "column" for node in leaves)
 
     def __call__(self, columns: Columns, metrics: Mapping[str, Any]) -> float | bool:
@@ -69,7 +74,7 @@ class Metric:
         value = self.part(self.root, columns, metrics)
         return bool(value) if self.quantity.kind is Kind.BOOL else float(value)
 
-    def part(self, node: Node, columns: Columns, metrics: Mapping[str, Any]) -> Any:
+    def part(self, node: Node, columns: Columns | Mapping[str, Any], metrics: Mapping[str, Any]) -> Any:
         """The value of a part of `root` in a flight. Raises MetricError where an integer does not fit."""
 
         def source(leaf: Node) -> Any:
@@ -83,3 +88,19 @@ class Metric:
                 return evaluator(node, self._arithmetic)(source)
         except ExpressionError as error:
             raise MetricError(f"`{self.text}` has no value: {error}") from None
+
+
+def _unit(node: Node, machine: Machine, metrics: Mapping[str, Metric]) -> str:
+    """The unit of a part, as a path in it has it; else that of its quantity. A condition as a factor has no unit."""
+    if node.quantity.kind in (Kind.BOOL, Kind.NAME):
+        return ""
+    if node.operator == "metric":
+        return metrics[node.value].unit
+    if node.operator in ("field", "column"):
+        return selection(node.value, machine).field.unit
+    parts = [part for part in node.parts if part.quantity.kind is not Kind.BOOL]
+    if node.operator in _SAME_UNIT and (node.operator != "*" or len(parts) == 1):
+        found = next(filter(None, (_unit(part, machine, metrics) for part in parts)), "")
+        if found:
+            return found
+    return unit_text(node.quantity.unit) if node.quantity.unit else ""

@@ -1,25 +1,24 @@
 # SPDX-License-Identifier: Apache-2.0
-"""What a campaign has found: a few lines of text, and a picture."""
+"""What a campaign has found: lines of text, and a page."""
 
 from __future__ import annotations
 
 import math
+import shlex
 from pathlib import Path
 from statistics import NormalDist
-from typing import Any
 
 import numpy as np
 
 from .case_rows import written_whole
-from .results import PICTURE, Results
+from .dispersion import LatinHypercube, Random
+from .page import page
+from .requirements import Requirement, requirements
+from .results import REPORT, Results
+from .study import Study
 
 #: Of failed cases and of errors that the text names.
 _NAMED = 5
-_BINS = 40
-_PER_ROW = 3
-#: Cases in the panels of parameters.
-_DOTS = 5000
-_PASSED, _FAILED = "#2a78b5", "#c8442c"
 
 
 def wilson(passed: int, count: int, confidence: float = 0.95) -> tuple[float, float]:
@@ -34,13 +33,9 @@ def wilson(passed: int, count: int, confidence: float = 0.95) -> tuple[float, fl
 
 def text(results: Results) -> str:
     """The numbers of cases, the success with its confidence, a line for each metric, and the cases that failed."""
-    study, passed = results.study, results.count("passed")
-    low, high = wilson(passed, study.cases)
-    lines = [
-        f"{passed} of {study.cases} passed: {100 * passed / study.cases:.4g} %, with 95 % confidence within "
-        f"{100 * low:.4g} and {100 * high:.4g} %"
-    ]
-    lines += _metric_lines(results)
+    study = results.study
+    lines = [_success(results), *_metric_lines(results)]
+    lines += [_requirement_line(study, line) for line in requirements(results)]
     for verdict in ("failed", "error"):
         count = results.count(verdict)
         for case in results.cases_of(verdict, _NAMED):
@@ -53,69 +48,57 @@ def text(results: Results) -> str:
     return "\n".join(lines)
 
 
+def _success(results: Results) -> str:
+    passed, cases = results.count("passed"), results.study.cases
+    low, high = wilson(passed, cases)
+    return (
+        f"{passed} of {cases} passed: {100 * passed / cases:.4g} %, with 95 % confidence within {100 * low:.4g} and "
+        f"{100 * high:.4g} %"
+    )
+
+
+def _requirement_line(study: Study, line: Requirement) -> str:
+    """`touchdown_speed < 2.0`: failed in 3 cases, worst by 0.31 m/s in case 17: fcsl campaign …"""
+    size = "" if line.margin is None else f"{abs(line.margin):.4g} {line.unit}".strip()
+    if line.failed is None:
+        return f"`{line.text}`: no metric, so nothing is known of all cases"
+    if not line.failed:
+        return f"`{line.text}`: held in all cases" + (f", at least by {size} in case {line.case}" if size else "")
+    cases = "1 case" if line.failed == 1 else f"{line.failed} cases"
+    worst = f"worst by {size} in" if size else "the first is"
+    return f"`{line.text}`: failed in {cases}, {worst} case {line.case}: {repeat(study, line.case)}"
+
+
 def _metric_lines(results: Results) -> list[str]:
     names = list(results.study.metrics)
     width = max(map(len, names), default=0)
     lines = []
-    for name in names:
+    for name, metric in results.study.metrics.items():
         values = results.metric(name)
         values = values[~np.isnan(values)]
         if len(values):
             low, middle, high = np.percentile(values, [1, 50, 99])
             numbers = f"median {middle:.5g}, 1 to 99 %: {low:.5g} to {high:.5g}, all: {values.min():.5g} to {values.max():.5g}"
+            numbers += f", {metric.unit}" if metric.unit else ""
             lines.append(f"  {name.ljust(width)}  {numbers}")
         else:
             lines.append(f"  {name.ljust(width)}  never a number")
     return lines
 
 
-def draw(results: Results) -> Path:
-    """report.png: a histogram of each metric, and each dispersed parameter over its cases, with those that did not pass."""
-    import matplotlib
-
-    matplotlib.use("Agg")
-    from matplotlib.figure import Figure
-
-    study = results.study
-    passed = results.passed()
-    metrics = [(name, results.metric(name)) for name in study.metrics]
-    shown = np.arange(0, study.cases, max(1, study.cases // _DOTS))
-    columns = list(zip(*(study.values(int(case)) for case in shown), strict=True))
-    parameters = [(p.path, np.array(c, float)) for p, c in zip(study.parameters, columns, strict=True)]
-    panels = len(metrics) + len(parameters)
-    rows = max(1, math.ceil(panels / _PER_ROW))
-    figure = Figure(figsize=(4.2 * _PER_ROW, 0.9 + 2.7 * rows), layout="constrained")
-    low, high = wilson(int(passed.sum()), study.cases)
-    title = f"{study.path.name}: {int(passed.sum())} of {study.cases} passed, 95 % confidence {100 * low:.3g} to {100 * high:.3g} %"
-    figure.suptitle(title, fontsize=11)
-    for number, (name, values) in enumerate(metrics):
-        _histogram(figure.add_subplot(rows, _PER_ROW, number + 1), name, values, passed)
-    name, heights = metrics[0] if metrics else ("case", np.arange(study.cases))
-    for number, (path, values) in enumerate(parameters, start=len(metrics)):
-        axes = figure.add_subplot(rows, _PER_ROW, number + 1)
-        _scatter(axes, (path, values), (name, heights[shown]), passed[shown])
-    picture = results.folder / PICTURE
-    with written_whole(picture) as temporary:
-        figure.savefig(temporary, format="png", dpi=90, metadata={"Software": ""})
-    return picture
+def write_page(results: Results) -> Path:
+    """report.html (page.py)."""
+    found = requirements(results)
+    path = results.folder / REPORT
+    with written_whole(path) as temporary:
+        text = page(results, _success(results), found, [repeat(results.study, line.case) for line in found])
+        temporary.write_text(text, encoding="utf-8")
+    return path
 
 
-def _histogram(axes: Any, name: str, values: Any, passed: Any) -> None:
-    finite = np.isfinite(values)
-    if finite.any():
-        span = values[finite].min(), values[finite].max()
-        edges = np.linspace(*(span if span[0] < span[1] else (span[0] - 0.5, span[1] + 0.5)), _BINS + 1)
-        groups = [values[finite & passed], values[finite & ~passed]]
-        axes.hist(groups, edges, stacked=True, color=[_PASSED, _FAILED], label=["passed", "not passed"])
-    axes.set_xlabel(name, fontsize=8)
-    axes.set_ylabel("cases", fontsize=8)
-    axes.tick_params(labelsize=7)
-
-
-def _scatter(axes: Any, across: tuple[str, Any], up: tuple[str, Any], passed: Any) -> None:
-    (path, values), (name, heights) = across, up
-    for group, colour in ((passed, _PASSED), (~passed, _FAILED)):
-        axes.plot(values[group], heights[group], ".", color=colour, markersize=3, rasterized=True)
-    axes.set_xlabel(path, fontsize=8)
-    axes.set_ylabel(name, fontsize=8)
-    axes.tick_params(labelsize=7)
+def repeat(study: Study, case: int | None) -> str:
+    """The command that flies a case again, recorded; empty without a case."""
+    if case is None:
+        return ""
+    cases = f" --cases {study.cases}" if isinstance(study.design, Random | LatinHypercube) else ""
+    return f"fcsl campaign {shlex.quote(str(study.path))}{cases} --case {case} --record case_{case}"

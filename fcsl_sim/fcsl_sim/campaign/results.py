@@ -21,7 +21,7 @@ from .flight import Outcome
 from .study import Study
 
 #: In the folder of a campaign.
-ABOUT, ROWS, TABLE, PICTURE = "campaign.json", "cases.bin", "cases.parquet", "report.png"
+ABOUT, ROWS, TABLE, REPORT = "campaign.json", "cases.bin", "cases.parquet", "report.html"
 #: All that a campaign leaves which is killed when it begins.
 _UNFINISHED = temporary_of(Path(ABOUT)).name
 #: Of the rows; another one cannot be read.
@@ -44,7 +44,7 @@ class Results:
         self.damage: list[str] = []
         about = {"format": _FORMAT, "study": study.path.name, "cases": study.cases, "fingerprint": study.fingerprint}
         if restart and (folder / ABOUT).is_file():
-            for name in (ROWS, TABLE, PICTURE, ABOUT):
+            for name in (ROWS, TABLE, REPORT, ABOUT):
                 (folder / name).unlink(missing_ok=True)
         there = self._look(about)
         if there is False:
@@ -155,9 +155,9 @@ class Results:
         index = list(self.study.metrics).index(name)
         return np.concatenate([np.array(rows["metrics"][:, index]) for _, rows in self._rows.groups()])
 
-    def passed(self) -> np.ndarray[Any, Any]:
-        """Whether each case has passed."""
-        return np.asarray(self._verdicts == _VERDICTS.index("passed"))
+    def of(self, verdict: str) -> np.ndarray[Any, Any]:
+        """Whether each case has this verdict."""
+        return np.asarray(self._verdicts == _VERDICTS.index(verdict))
 
     def cases_of(self, verdict: str, at_most: int) -> list[int]:
         return [int(i) for i in np.flatnonzero(self._verdicts == _VERDICTS.index(verdict))[:at_most]]

@@ -1,0 +1,148 @@
+# SPDX-License-Identifier: Apache-2.0
+"""The lines of `pass`: in how many cases each did not hold, by how much, and where the limits are that it sets to metrics.
+
+`landed and touchdown_speed < 2.0` has two lines. A line is judged by the metrics of all cases. One that reads values of the
+flight itself is not, unless what it reads is written as a metric is.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import dataclass, replace
+from typing import Any
+
+import numpy as np
+
+from fcsl_compiler.api.expressions import Kind, Node
+
+from .metric import Metric, MetricError
+from .results import Results
+from .study import Study
+
+Array = np.ndarray[Any, Any]
+
+#: The operator with its sides exchanged.
+_TURNED = {"<": ">", "<=": ">=", ">": "<", ">=": "<=", "==": "==", "!=": "!="}
+
+
+@dataclass(frozen=True)
+class Requirement:
+    """`failed`: cases in which it did not hold; None: the metrics do not say. `margin`: the smallest of all cases, negative where
+    it did not hold; None: it is no comparison. `case`: that of the margin, or one that failed; None: there is none."""
+
+    text: str
+    unit: str = ""
+    failed: int | None = None
+    margin: float | None = None
+    case: int | None = None
+
+
+@dataclass(frozen=True)
+class Limit:
+    """`text`: `< 2.0`."""
+
+    value: float
+    text: str
+
+
+def requirements(results: Results) -> list[Requirement]:
+    """Each line of `pass`, over all cases that ended without an error."""
+    study = results.study
+    if study.passes is None:
+        return []
+    flown = ~results.of("error")
+    metrics = {name: _typed(metric, results.metric(name)) for name, metric in study.metrics.items()}
+    return [_judged(line, study, study.passes, metrics, flown) for line in _lines(study.passes.root)]
+
+
+def limits(study: Study) -> dict[str, list[Limit]]:
+    """Those that `pass` sets to a metric or to its absolute value, as numbers."""
+    found: dict[str, list[Limit]] = {}
+    for line in _lines(study.passes.root) if study.passes else ():
+        if line.operator != "compare":
+            continue
+        (left, right), (operator,) = line.parts, line.value
+        for side, other, way in ((left, right, operator), (right, left, _TURNED[operator])):
+            inner = side.parts[0] if side.operator == "abs" else side
+            name = _metric_of(inner, study)
+            value = _constant(other, study)
+            if name is None or value is None:
+                continue
+            text = f"{way} {other.text}"
+            if side is inner:
+                found.setdefault(name, []).append(Limit(value, text))
+            else:
+                found.setdefault(name, []).extend([Limit(value, f"abs {text}"), Limit(-value, f"abs {text}")])
+    return found
+
+
+def _lines(node: Node) -> Iterator[Node]:
+    """What `and` joins; of a chain of comparisons each."""
+    if node.operator == "and":
+        for part in node.parts:
+            yield from _lines(part)
+    elif node.operator == "compare":
+        for left, operator, right in zip(node.parts, node.value, node.parts[1:], strict=False):
+            text = f"{left.text} {operator} {right.text}"
+            yield replace(node, text=text, parts=(left, right), value=(operator,))
+    else:
+        yield node
+
+
+def _judged(line: Node, study: Study, passes: Metric, metrics: dict[str, Array], flown: Array) -> Requirement:
+    unit = ""
+    margins: Array | None = None
+    sides = [_values(part, study, passes, metrics, len(flown)) for part in line.parts]
+    if line.operator == "compare" and sides[0] is not None and sides[1] is not None:
+        left, right = sides[0], sides[1]
+        compare = {"<": np.less, "<=": np.less_equal, ">": np.greater, ">=": np.greater_equal, "==": np.equal}
+        (operator,) = line.value
+        holds = left != right if operator == "!=" else compare[operator](left, right)
+        if left.dtype.kind in "fi" and right.dtype.kind in "fi" and operator != "!=":
+            distance = right - left if operator in ("<", "<=") else left - right
+            margins = -np.abs(distance) if operator == "==" else distance
+            names = (_metric_of(part.parts[0] if part.operator == "abs" else part, study) for part in line.parts)
+            unit = next((study.metrics[name].unit for name in names if name), "")
+    else:
+        found = _values(line, study, passes, metrics, len(flown))
+        if found is None:
+            return Requirement(line.text)
+        holds = found.astype(bool)
+    failed = flown & ~holds
+    among = failed if failed.any() else flown
+    if margins is not None and np.isfinite(margins[among]).any():
+        case = int(np.nanargmin(np.where(among & np.isfinite(margins), margins, np.nan)))
+        return Requirement(line.text, unit, int(failed.sum()), float(margins[case]), case)
+    return Requirement(line.text, unit, int(failed.sum()), None, int(np.argmax(failed)) if failed.any() else None)
+
+
+def _values(node: Node, study: Study, passes: Metric, metrics: dict[str, Array], cases: int) -> Array | None:
+    """Of a part of `pass` in each case; None: it reads values of the flight."""
+    name = _metric_of(node, study)
+    if name is not None:
+        return metrics[name]
+    if any(leaf.operator in ("field", "column") for leaf in node.walk()):
+        return None
+    try:
+        return np.broadcast_to(np.asarray(passes.part(node, {}, metrics)), cases)
+    except MetricError:
+        return None
+
+
+def _metric_of(node: Node, study: Study) -> str | None:
+    """The metric that a part of `pass` is: by its name, or written like it."""
+    if node.operator == "metric":
+        return str(node.value)
+    return next((name for name, metric in study.metrics.items() if metric.text.strip() == node.text), None)
+
+
+def _constant(node: Node, study: Study) -> float | None:
+    if node.quantity.kind is Kind.NAME or any(leaf.operator in ("field", "column", "metric") for leaf in node.walk()):
+        return None
+    assert study.passes is not None
+    return float(study.passes.part(node, {}, {}))
+
+
+def _typed(metric: Metric, values: Array) -> Array:
+    """Metrics are kept as doubles; a bool is one again."""
+    return values == 1.0 if metric.quantity.kind is Kind.BOOL else values
