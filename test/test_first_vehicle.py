@@ -88,4 +88,4 @@ def test_the_lever_flies_it(said: dict[str, str]) -> None:
     assert 1.1 < max(height) < 1.35 and height[-1] < 0.2
     assert (folder / "sys/class/pwm/pwmchip0/pwm0/duty_cycle").read_text().strip() == "1000000"  # ns: at rest
     assert (folder / "flight.png").stat().st_size > 10_000
-    assert (folder / "lift.campaign/report.png").stat().st_size > 10_000
+    assert (folder / "lift.campaign/report.html").stat().st_size > 10_000

@@ -18,7 +18,7 @@ from fcsl_compiler.cli.main import main
 from fcsl_compiler.driver.passes import compile_machine
 from fcsl_compiler.graph import render
 from fcsl_compiler.graph.layout import STUB, Layout, Placed, Point, lay_out, tag_width
-from fcsl_compiler.graph.model import Box, Picture, Row, Wire, dataflow, state_machine
+from fcsl_compiler.graph.model import Box, Picture, Row, Wire, dataflow, legend, state_machine
 from fcsl_compiler.graph.svg import draw
 from fcsl_compiler.model.machine import Machine
 
@@ -76,15 +76,62 @@ def test_nothing_is_left_out(path: Path) -> None:
             assert f">{port.name}<" in svg and f">{f'{port.type} {port.unit}'.strip()}<" in svg
     wires = [w for w in pictures[0].wires if pictures[0].boxes[w.target].kind == "instance"]
     assert len(wires) == sum(c.source.instance >= 0 for c in m.connections)
-    assert sum(w.dashed for w in wires) == sum(c.delayed for c in m.connections) == svg.count("stroke-dasharray")
+    delayed = sum(w.dashed for w in wires)
+    assert delayed == sum(c.delayed for c in m.connections) == svg.count("stroke-dasharray") - (delayed > 0)
     tags = [row.tag for box in pictures[0].boxes for row in box.rows if row.tag]
     of_machine = sum(t.startswith(("machine.", "channels.")) for t in tags)
     assert of_machine == sum(c.source.instance < 0 for c in m.connections)
     fed = {(c.target.instance, c.target.field) for c in m.connections}
     inputs = [(n, p.name) for n, i in enumerate(m.instances) for p in i.algorithm.ports["inputs"]]
     assert tags.count("host") == len([i for i in inputs if i not in fed])
-    rates = {row.left: row.left_note for row in pictures[1].boxes[0].rows if row.left}
-    assert len(rates) == len(m.states[0].entries) and all("Hz" in r or "ticks" in r for r in rates.values())
+    for state in m.states:
+        boxes = [box for box in pictures[1].boxes if box.name == state.name or box.kind == "always"]
+        rates = [(row.left, row.left_note) for box in boxes for row in box.rows if row.left]
+        assert sorted(name for name, _ in rates) == sorted(m.instances[e.instance].name for e in state.entries)
+        assert all("Hz" in rate or "ticks" in rate for _, rate in rates)
+
+
+def test_what_every_state_schedules_is_listed_once() -> None:
+    picture = state_machine(machine(EXAMPLES / "lander/fc/lander_control.json"))
+    listed = {box.name: [row.left for row in box.rows if row.left] for box in picture.boxes if box.kind != "transition"}
+    always = ["sensors", "monitor", "filter", "engine"]
+    alone = {"ASCENT": ["ascent"], "COAST": ["coast"], "DESCENT": ["descent"], "SAFE": ["safe"]}
+    assert listed == {**alone, "every state": always, "*": []}
+    only = state_machine(machine(EXAMPLES / "minimal/minimal.json"))
+    assert [box.kind for box in only.boxes].count("always") == (len(only.boxes) > 1)
+
+
+def test_a_legend_has_the_signs_of_its_picture() -> None:
+    m = machine(EXAMPLES / "lander/fc/lander_control.json")
+    signs = {"instance", "channel", "machine", "wire", "dashed"}
+    assert {sign for sign, _ in legend(dataflow(m))} == signs
+    assert {sign for sign, _ in legend(dataflow(m, m.states[1]))} == signs | {"dim"}
+    states = {"state", "always", "transition", "initial"}
+    assert {sign for sign, _ in legend(state_machine(m))} == states
+    assert {sign for sign, _ in legend(state_machine(m, m.states[1]))} == states | {"strong"}
+    svg, mermaid = render(m, None, ".svg"), render(m, None, ".mmd")
+    for meaning in (
+        "connection delayed by a tick",
+        "value of the machine itself",
+        "instances that every state schedules",
+    ):
+        assert svg.count(meaning) == mermaid.count(meaning) == 1
+
+
+@pytest.mark.parametrize("path", MACHINES.values(), ids=MACHINES)
+def test_a_legend_lies_below_its_picture_and_within_the_width(path: Path) -> None:
+    root = ElementTree.fromstring(render(machine(path), None, ".svg"))
+    width, height = float(root.get("width", "0")), float(root.get("height", "0"))
+    top = 0.0
+    for picture in root:
+        *_, signs = picture
+        offset, below = (float(g.get("transform", "").split()[1].rstrip(")")) for g in (picture, signs))
+        rects = [rect for rect in signs.iter() if rect.tag.endswith("rect")]
+        assert rects and offset >= top
+        top = offset + below
+        for rect in rects:
+            left, y, wide, tall = (float(rect.get(name, "0")) for name in ("x", "y", "width", "height"))
+            assert left + wide <= width and offset + below + y + tall <= height
 
 
 def test_calls_outside_are_named() -> None:

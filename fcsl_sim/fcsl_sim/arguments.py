@@ -224,7 +224,9 @@ def _add_model_commands(commands: argparse._SubParsersAction[argparse.ArgumentPa
     listing.add_argument("folder", nargs="?", type=Path, default=Path(), metavar="FOLDER", help=help_folder)
     listing.add_argument("--json", action="store_true", help="print them as a JSON list")
     description = _add(commands, "describe", "print the fields and events of a model, and JSON to paste")
-    description.add_argument("model", help="a C or C++ file, package://PACKAGE/PATH, or a name that `fcsl models` prints")
+    description.add_argument(
+        "model", help="a C or C++ file, package://PACKAGE/PATH, or a name that `fcsl models` prints"
+    )
     description.add_argument("--json", action="store_true", help="print one JSON object")
 
 

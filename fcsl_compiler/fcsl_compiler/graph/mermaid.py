@@ -5,7 +5,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 
-from .model import Box, Picture, Row
+from .model import Box, Picture, Row, legend
 
 _ESCAPES = {"#": "#35;", '"': "#quot;", "<": "#lt;", ">": "#gt;"}
 
@@ -36,7 +36,16 @@ def _picture(picture: Picture, prefix: str) -> list[str]:
                 lines.append(f'{tags[row.tag]}(["{_quoted(row.tag)}"])')
             label = "" if row.tag_kind == "initial" else f'|"{_quoted(_entered(row))}"|'
             lines.append(f"{tags[row.tag]} -->{label} {prefix}b{n}")
-    return lines + _wires(picture, prefix)
+    return [*lines, *_wires(picture, prefix), *_legend(picture, prefix)]
+
+
+#: How Mermaid draws the signs of a legend that need words.
+_SIGNS = {"channel": "(channel)", "host": "(host)", "machine": "(machine.…)", "dashed": "⇢", "always": "every state"}
+
+
+def _legend(picture: Picture, prefix: str) -> list[str]:
+    lines = [_quoted(f"{_SIGNS[sign]}: {meaning}") for sign, meaning in legend(picture) if sign in _SIGNS]
+    return [f'{prefix}legend["{"<br/>".join(lines)}"]'] if lines else []
 
 
 def _wires(picture: Picture, prefix: str) -> list[str]:
@@ -70,7 +79,7 @@ def _shape(box: Box) -> str:
         lines.append(_quoted(box.subtitle))
     if box.calls:
         lines.append(_quoted(box.calls))
-    if box.kind == "state":
+    if box.kind in ("state", "always"):
         lines += [_quoted(f"{row.left} {row.left_note}") for row in box.rows if row.left]
         return f'("{"<br/>".join(lines)}")'
     return f'["{"<br/>".join(lines)}"]'

@@ -3,6 +3,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterable
 from dataclasses import dataclass, field
 
 from ..model import ir
@@ -24,7 +25,8 @@ class Row:
 
 @dataclass
 class Box:
-    """kind: instance, state, any (every other state), channel, transition. The last two have one row and no header."""
+    """kind: instance, state, always (what every state schedules), any (every other state), channel, transition. The last
+    three have one row and no header."""
 
     name: str
     kind: str
@@ -54,6 +56,33 @@ class Picture:
     caption: str
     boxes: list[Box] = field(default_factory=list)
     wires: list[Wire] = field(default_factory=list)
+
+
+#: What the signs of a picture mean: kinds of boxes and tags, then `wire`, `dashed`, `dim`, `strong`.
+_MEANINGS = {
+    "instance": "instance: algorithm, rate; inputs left, outputs right",
+    "channel": "channel, with its number in messages",
+    "host": "input that the host writes",
+    "machine": "value of the machine itself",
+    "wire": "connection, in the colour of its source",
+    "dashed": "connection delayed by a tick",
+    "dim": "does not run in this state",
+    "state": "state, with the instances that it schedules",
+    "always": "instances that every state schedules",
+    "transition": "transition: request, health, time; highest priority first",
+    "initial": "where the machine begins",
+    "strong": "the state of the dataflow",
+}
+
+
+def legend(picture: Picture) -> list[tuple[str, str]]:
+    """(sign, meaning) of the signs that a picture has."""
+    there = {box.kind for box in picture.boxes} | {row.tag_kind for box in picture.boxes for row in box.rows}
+    if "instance" in there:
+        there |= {"dashed" if wire.dashed else "wire" for wire in picture.wires}
+        there |= {"dim" for box in picture.boxes if box.dim}
+    there |= {"strong" for box in picture.boxes if box.strong}
+    return [(sign, meaning) for sign, meaning in _MEANINGS.items() if sign in there]
 
 
 def rate_text(entry: Entry, tick_hz: int) -> str:
@@ -98,8 +127,6 @@ def dataflow(m: Machine, state: State | None = None) -> Picture:
     place = {index: n for n, index in enumerate(instances)}
     due = {e.instance for e in state.entries} if state else set(instances)
     connections = [c for c in m.connections if c.target.instance in due]
-    if any(c.delayed for c in connections):
-        picture.caption += "; dashed: delayed by a tick"
     inputs: dict[tuple[int, str], int] = {}
     outputs: dict[tuple[int, str], int] = {}
     for index in instances:
@@ -225,21 +252,30 @@ def merged_edges(m: Machine) -> list[tuple[int, Edge]]:
 
 
 def state_machine(m: Machine, state: State | None = None) -> Picture:
-    """Picture of the states with their instances, and of the transitions. `state` is highlighted."""
+    """Picture of the states with their instances, and of the transitions. `state` is highlighted. What every state
+    schedules at the same rate is in a box of its own, behind those of the states."""
     picture = Picture(f"{m.name}: states and transitions")
+    alike = set.intersection(*(set(s.entries) for s in m.states)) if len(m.states) > 1 else set[Entry]()
+
+    def rows_of(entries: Iterable[Entry]) -> list[Row]:
+        return [Row(left=m.instances[e.instance].name, left_note=rate_text(e, m.tick_hz)) for e in entries]
+
     for index, s in enumerate(m.states):
-        rows = [Row(left=m.instances[e.instance].name, left_note=rate_text(e, m.tick_hz)) for e in s.entries]
+        rows = rows_of(e for e in s.entries if e not in alike)
         box = Box(s.name, "state", s.name, "", rows or [Row()], strong=s is state)
         if index == m.initial_state:
             box.rows[0].tag, box.rows[0].tag_kind = "initial", "initial"
         picture.boxes.append(box)
+    everywhere = [e for e in m.states[0].entries if e in alike]
+    if everywhere:
+        picture.boxes.append(Box("every state", "always", "every state", "", rows_of(everywhere)))
     entered = {m.initial_state: 1}
     merged = merged_edges(m)
-    everywhere = len(picture.boxes)
+    any_state = len(picture.boxes)
     if any(source < 0 for source, _ in merged):
         picture.boxes.append(Box("*", "any", rows=[Row(right="every other state")]))
     for source, edge in merged:
-        leaves, label = source if source >= 0 else everywhere, len(picture.boxes)
+        leaves, label = source if source >= 0 else any_state, len(picture.boxes)
         picture.boxes.append(Box("", "transition", rows=[Row(left=transition_text(m, edge))], colour_of=leaves))
         picture.wires.append(Wire(leaves, 0, label, 0))
         row = entered.get(edge.target, 0)

@@ -8,27 +8,34 @@ from collections.abc import Sequence
 from html import escape
 
 from .layout import CHAR, MARGIN, PAD, ROW, SMALL, STUB, Layout, Placed, Point, header_rows, lay_out, tag_width
-from .model import Picture, Row, Wire
+from .model import Picture, Row, Wire, legend
 
 #: Colours of wires, by source, with sufficient contrast on both backgrounds.
 _COLOURS = ("#1f77b4", "#d2691e", "#2e8b57", "#b5396b", "#7b5ea7", "#8a6d3b", "#008b8b", "#5b6b7b")
-_FILL = {"instance": "#f6f8fa", "state": "#f6f8fa", "any": "#f6f8fa", "channel": "#fdf0c8", "transition": "#e8ecf0"}
+_FILL = {
+    **{"instance": "#f6f8fa", "state": "#f6f8fa", "always": "#eef5e6", "any": "#f6f8fa"},
+    **{"channel": "#fdf0c8", "transition": "#e8ecf0"},
+}
 _TAG_FILL = {"host": "#dcebfb", "machine": "#e6e6e6", "channel": "#fdf0c8", "initial": "#d9f0dd"}
 _INK, _NOTE, _EDGE, _HEADER = "#1f2328", "#57606a", "#7d8590", "#dde3ea"
 _RADIUS = 5
+#: Of a sign in the legend; its height is ROW.
+_SIGN = 28
 
 
 def draw(pictures: Sequence[Picture]) -> str:
     """All pictures below one another, as one SVG document."""
     layouts = [lay_out(p) for p in pictures]
     width = max([*(p.width for p in layouts), *(_caption_width(p) + 2 * MARGIN for p in layouts)])
+    width = max([width, *(_sign_width(text) + 2 * MARGIN for p in pictures for _, text in legend(p))])
     out: list[str] = []
     top = 0.0
     for layout in layouts:
         out.append(f'<g transform="translate(0 {_number(top)})">')
         out += _picture(layout)
-        out.append("</g>")
-        top += layout.height + MARGIN
+        signs, height = _legend(layout.picture, width)
+        out += [f'<g transform="translate(0 {_number(layout.height)})">', *signs, "</g></g>"]
+        top += layout.height + height + MARGIN
     size = f'width="{_number(width)}" height="{_number(top)}" viewBox="0 0 {_number(width)} {_number(top)}"'
     head = f'<svg xmlns="http://www.w3.org/2000/svg" {size} font-family="DejaVu Sans Mono, Menlo, Consolas, monospace">'
     return "\n".join([head, *out, "</svg>"]) + "\n"
@@ -53,6 +60,37 @@ def _picture(layout: Layout) -> list[str]:
     return out
 
 
+def _legend(picture: Picture, width: float) -> tuple[list[str], float]:
+    """The signs of a picture with their meanings, in lines of this width, and the height of all."""
+    out: list[str] = []
+    x, y = float(MARGIN), 0.0
+    for sign, meaning in legend(picture):
+        size = _sign_width(meaning)
+        if x > MARGIN and x + size > width:
+            x, y = float(MARGIN), y + ROW
+        out.append(_rect(x, y + 2, size - PAD, ROW - 4, "#f6f8fa", 3, "none", 0))
+        out += _sign(sign, x + PAD / 2, y + ROW / 2)
+        out.append(_text(x + _SIGN + PAD, y + ROW / 2 + 3.5, meaning, _NOTE, 10))
+        x += size
+    return out, y + ROW
+
+
+def _sign_width(meaning: str) -> float:
+    return _SIGN + len(meaning) * SMALL + 3 * PAD
+
+
+def _sign(sign: str, x: float, y: float) -> list[str]:
+    if sign in ("wire", "dashed"):
+        dash = ' stroke-dasharray="5 3"' if sign == "dashed" else ""
+        end = x + _SIGN
+        line = f'<path d="M{_number(x)} {_number(y)}H{_number(end)}" fill="none" stroke="{_COLOURS[0]}" stroke-width="1.4"{dash}/>'
+        return [line, _arrow((end, y), _COLOURS[0])]
+    fill = _FILL.get(sign) or _TAG_FILL.get(sign) or _FILL["state"]
+    stroke, pen = (_INK, 2.4) if sign == "strong" else (_EDGE, 1.2)
+    box = _rect(x, y - 6, _SIGN - 2, 12, fill, 3 if sign in ("instance", "dim") else 6, stroke, pen)
+    return [f'<g opacity="0.55">{box}</g>' if sign == "dim" else box]
+
+
 def _caption_width(layout: Layout) -> float:
     return len(layout.picture.caption) * CHAR + 20
 
@@ -60,7 +98,7 @@ def _caption_width(layout: Layout) -> float:
 def _box(p: Placed) -> list[str]:
     box = p.box
     assert box is not None
-    radius = {"channel": 10, "transition": 10, "state": 8, "any": 8}.get(box.kind, 3)
+    radius = {"channel": 10, "transition": 10, "state": 8, "always": 8, "any": 8}.get(box.kind, 3)
     out = ['<g opacity="0.55">' if box.dim else "<g>"]
     stroke, width = (_INK, 2.4) if box.strong else (_EDGE, 1.2)
     out.append(_rect(p.x, p.y, p.width, p.height, _FILL[box.kind], radius, stroke, width))

@@ -159,8 +159,8 @@ def test_output_that_nobody_takes_makes_it_safe(tmp_path: Path) -> None:
     pipe = subprocess.PIPE
     with subprocess.Popen(line, stdin=pipe, stdout=pipe, stderr=pipe, env=environment(tmp_path), text=True) as process:
         assert process.stdin is not None and process.stdout is not None
-        while "1. take" not in process.stdout.readline():
-            pass
+        while "1. take" not in (said := process.stdout.readline()):
+            assert said, process.stderr and process.stderr.read()
         process.stdout.close()
         process.stdin.write("\n")
         process.stdin.flush()

@@ -257,8 +257,8 @@ def test_a_record_in_another_format_is_the_same_run(form: str, fly: Fly, probe: 
     assert replay(other, library=str(probe)).identical
     assert diff(run, open_bag(other)).same
     assert np.array_equal(*(columns(bag, "source.outputs.big")[1] for bag in (run, str(other))))
-    for module, file in (("plot", "x.png"), ("to_rerun", "x.rrd")):
-        done = subprocess.run([sys.executable, "-m", f"simclient.{module}", other, "-o", tmp_path / file])
+    for verb, file in (("plot", "x.png"), ("rerun", "x.rrd")):
+        done = subprocess.run(["fcsl", verb, other, "-o", tmp_path / file])
         assert done.returncode == 0 and (tmp_path / file).stat().st_size > 1000
 
 

@@ -42,10 +42,10 @@ Tool = Callable[..., subprocess.CompletedProcess[str]]
 
 @pytest.fixture
 def tool(tmp_path: Path) -> Tool:
-    """Runs `python -m simclient.<name>`, as a user does."""
+    """Runs `fcsl <name>`, as a user does."""
 
     def run(name: str, *arguments: str | Path) -> subprocess.CompletedProcess[str]:
-        command = [sys.executable, "-m", f"simclient.{name}", *map(str, arguments)]
+        command = ["fcsl", name, *map(str, arguments)]
         done = subprocess.run(command, capture_output=True, text=True, cwd=tmp_path)
         assert "Traceback" not in done.stderr, done.stderr
         return done

@@ -10,7 +10,6 @@ import re
 import shutil
 import signal
 import subprocess
-import sys
 from pathlib import Path
 from typing import Any
 
@@ -518,11 +517,11 @@ def test_a_picture_is_small_and_the_same_bytes(bags: Path, tmp_path: Path) -> No
         assert picture.mode == "P" and picture.size[0] == 1440
 
 
-@pytest.mark.parametrize(("tool", "slow"), [("plot", "matplotlib"), ("to_rerun", "rerun")])
+@pytest.mark.parametrize(("tool", "slow"), [("plot", "matplotlib"), ("rerun", "rerun")])
 def test_ctrl_c_while_importing_is_no_traceback(tool: str, slow: str, tmp_path: Path) -> None:
     # A library of that name that is still being imported when the signal comes.
     (tmp_path / f"{slow}.py").write_text("import time\nprint('importing', flush=True)\ntime.sleep(60)\n")
-    command = [sys.executable, "-m", f"simclient.{tool}", "absent", "-o", "x"]
+    command = ["fcsl", tool, "absent", "-o", "x"]
     path = os.pathsep.join([str(tmp_path), os.environ.get("PYTHONPATH", "")])
     with subprocess.Popen(
         command, env={**os.environ, "PYTHONPATH": path}, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True

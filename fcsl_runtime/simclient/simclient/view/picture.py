@@ -42,7 +42,10 @@ _POINTS = 4000
 #: Times beyond this are not of a run that began at 0: three years.
 _LONGEST_RUN_S = 1e8
 _DPI = 120
-_STATE_COLOURS = ("#DCEBF7", "#E3F3DC", "#FCEBD2", "#F8D9DC", "#E8E0F2", "#F4F1C9", "#E3E3E3")
+_STATE_COLOURS = (
+    *("#DCEBF7", "#E3F3DC", "#FCEBD2", "#F8D9DC", "#E8E0F2"),
+    *("#F4F1C9", "#E3E3E3", "#C9ECE9", "#E8D6C3", "#F4D0EE"),
+)
 #: A state's name is written above its band if the band has this share of the width, for each letter.
 _SHARE_PER_LETTER = 0.011
 _LABEL_LETTERS, _LABEL_LINES = 26, 3
@@ -111,9 +114,10 @@ def save(figure: Any, output: str | Path) -> None:
 
 
 def _with_palette(drawn: io.BytesIO) -> io.BytesIO:
-    """The PNG with 256 colours, which is a third of its size: a picture has few, and their mixtures at the edges of lines."""
+    """The PNG with 256 colours, which is a third of its size: a picture has few, and their mixtures at the edges of lines.
+    The octree keeps colours that few dots have."""
     smaller = io.BytesIO()
-    picture = Image.open(drawn).convert("RGB").quantize(256, dither=Image.Dither.NONE)
+    picture = Image.open(drawn).convert("RGB").quantize(256, Image.Quantize.FASTOCTREE, dither=Image.Dither.NONE)
     picture.save(smaller, "png", optimize=True, dpi=(_DPI, _DPI))
     return smaller
 
