@@ -110,15 +110,15 @@ class Background:
 
 def compile_step() -> None:
     headline("1. compile: JSON and Python to native code")
-    run("fcslc", "check", CONFIG)
-    run("fcslc", "build", CONFIG, "-o", OUT / "build")
+    run("fcsl", "check", CONFIG)
+    run("fcsl", "build", CONFIG, "-o", OUT / "build")
 
 
 def fly_in_process() -> dict[str, Any]:
     headline("2. fly: the compiled machine in the simulator, one process")
     begun = time.monotonic()
     summary: dict[str, Any] = json.loads(
-        run("fcsl-sim", "run", SIM, "--seed", SEED, "--record", OUT / "in_process", "--json", quiet=True)
+        run("fcsl", "sim", SIM, "--seed", SEED, "--record", OUT / "in_process", "--json", quiet=True)
     )
     for change in summary["transitions"]:
         say(f"  {change['time_s']:8.2f} s  {change['from_state']} → {change['to_state']}")
@@ -135,7 +135,7 @@ def fly_as_process(library: Path, sim_file: str, bag: Path) -> str:
     """The flight program in a process of its own; what the simulator printed."""
     with tempfile.TemporaryDirectory(prefix="fcsl-") as folder:
         socket = Path(folder) / "wire"
-        with Background("fcsl-sim", "run", sim_file, "--seed", SEED, "--external", f"wire:unix:{socket}") as sim:
+        with Background("fcsl", "sim", sim_file, "--seed", SEED, "--external", f"wire:unix:{socket}") as sim:
             wait_for(socket, sim)
             with Background("fcsl-fc", library, "--hal", f"wire:unix:{socket}", "--record", bag) as fc:
                 printed = sim.finish()

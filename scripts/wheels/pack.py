@@ -141,16 +141,16 @@ def requirements(groups: dict[str, Any], group: str) -> list[str]:
 
 def entry_points(staged: Path, native: list[str]) -> bytes:
     """What the packages' own setup.cfg say, packages for package://, and native programs."""
-    lines: list[str] = []
+    sections: dict[str, list[str]] = {}
     for path in sorted(staged.glob("lib/python*/site-packages/*.egg-info/entry_points.txt")):
         points = ConfigParser(delimiters="=")
         points.read(path)
         for section in points.sections():
-            lines += [f"[{section}]", *(f"{name} = {value}" for name, value in points[section].items())]
+            sections.setdefault(section, []).extend(f"{name} = {value}" for name, value in points[section].items())
     packages = sorted(p.name for p in (staged / "share/ament_index/resource_index/packages").iterdir())
-    lines += [f"[{ENTRY_POINTS}]", *(f"{package} = {PREFIX}" for package in packages)]
-    lines += ["[console_scripts]", *(f"{name} = {PREFIX}:run_native" for name in native)]
-    return "\n".join([*lines, ""]).encode()
+    sections[ENTRY_POINTS] = [f"{package} = {PREFIX}" for package in packages]
+    sections["console_scripts"] = [f"{name} = {PREFIX}:run_native" for name in native]
+    return "\n\n".join("\n".join([f"[{section}]", *lines]) for section, lines in sections.items()).encode() + b"\n"
 
 
 # ---- the wheel -------------------------------------------------------------------------------------------------------

@@ -16,7 +16,8 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from simclient.link import End, Full, Policy
-from simclient.link.frame import FRAME_MAX, Flag, Frame, FrameError, Kind, crc16
+from simclient.link.frame import FRAME_MAX, PAYLOAD_MAX, Flag, Frame, FrameError, Kind, crc16
+from simclient.link.port import QUEUE, Port
 
 HAL = Path(__file__).resolve().parents[3] / "fcsl_hal"
 LATEST, SEQUENCED, RELIABLE, BULK = 0, 3, 7, 15
@@ -170,6 +171,18 @@ def test_the_newest_counts_on_one_port_and_all_do_on_the_other(pair: tuple[Ends,
             other.take_frame(frame)
     assert [other.receive(LATEST), other.receive(LATEST)] == [b"4", None]
     assert [other.receive(SEQUENCED) for _ in range(6)] == [b"0", b"1", b"2", b"3", b"4", None]
+
+
+def test_a_queue_takes_a_message_whole_or_not() -> None:
+    port = Port(Policy.RELIABLE)
+    for number in range(QUEUE - 1):
+        port.put(bytes([number]))
+    with pytest.raises(Full):
+        port.put(bytes(PAYLOAD_MAX + 1))  # two frames, and one has room
+    port.put(b"the last")
+    with pytest.raises(Full):
+        port.put(b"one more")
+    assert port.counters["sent"] == QUEUE
 
 
 def test_both_ends_send_the_same_bytes(native: ctypes.CDLL) -> None:

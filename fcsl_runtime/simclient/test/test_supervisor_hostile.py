@@ -180,13 +180,23 @@ def test_a_body_without_a_length_is_bounded_too(supervisor: Supervisor) -> None:
         ("GET", "/runs/..%2f..%2fetc", 404, "unknown_route"),
         ("PUT", "/runs", 405, "bad_method"),
         ("DELETE", "/runs", 405, "bad_method"),
-        ("GET", "/runs?x=1", 400, "bad_request"),
+        *(("GET", f"{path}?x=1", 400, "bad_request") for path in ("/health", "/metrics", "/runs", "/runs/1")),
+        *(("GET", f"/runs/1/{part}?x=1", 400, "bad_request") for part in ("health", "channels", "values", "windows")),
+        ("GET", "/stream?x=1", 400, "bad_request"),
+        ("DELETE", "/runs/1?x=1", 400, "bad_request"),
         ("GET", "/health?" + "x" * 2000, 400, "bad_request"),
     ],
 )
 def test_routes(supervisor: Supervisor, method: str, path: str, status: int, code: str) -> None:
     answer = supervisor.ask(method, path)
     assert (answer.status, answer.code) == (status, code), answer.json
+
+
+def test_a_start_has_no_query(supervisor: Supervisor) -> None:
+    answer = supervisor.ask("POST", "/runs?x=1", b"{}", {"Content-Type": "application/json"})
+    assert (answer.status, answer.code) == (400, "bad_request") and "no parameter 'x'" in answer.json["error"][
+        "message"
+    ]
 
 
 QUERIES = [

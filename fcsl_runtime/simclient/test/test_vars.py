@@ -450,6 +450,7 @@ numeric = st.recursive(
 @example(text="2 ** " * 40 + "1")
 @example(text="+".join("1" * 300))
 @example(text="hold.inputs.u[()] > 1")
+@example(text="3515677934892722.5 // 6.555296974945231 == 536311008994691.0")
 def test_both_implementations_agree(client: Client, text: str) -> None:
     """On what an expression is, and on its value: the server's in C, and the one of tests, studies and the compiler in Python."""
     client.ok("set_state", state="RUN")
