@@ -38,7 +38,7 @@ def parse(arguments: Sequence[str] | None, program: str = "") -> argparse.Namesp
         options.paths += [text for text in rest if not text.startswith("-")]
         rest = [text for text in rest if text.startswith("-")]
     if rest:
-        parser.error(f"unrecognized arguments: {' '.join(rest)}")
+        subcommands(parser)[options.command].error(f"unrecognized arguments: {' '.join(rest)}")
     return options
 
 
@@ -51,8 +51,8 @@ def _parser(program: str) -> argparse.ArgumentParser:
     parser = argparse.ArgumentParser(prog="fcsl-sim", description="Flies a compiled machine against plant models.")
     add_version(parser, "fcsl_sim", __file__)
     commands = parser.add_subparsers(dest="command", required=True)
-    check = _add(commands, "check", "check a simulation, run nothing")
-    check.add_argument("config", help=_CONFIG)
+    check = _add(commands, "check", "check simulations and studies, run nothing")
+    check.add_argument("config", nargs="+", help=f"{_CONFIG}; or *.study.json")
     check.add_argument("--json", action="store_true", help="print one JSON object")
     _add_flight(check)
     run = _add(commands, "run", "run a simulation to its end")

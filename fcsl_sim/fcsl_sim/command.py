@@ -25,6 +25,7 @@ from .output import show
 from .runner import Sender, Server, StateChange, Summary, Watcher, run
 
 EXIT_UNTIL_NOT_HELD = 1
+EXIT_ERRORS = 1
 EXIT_BAD_INPUT = 2
 #: How an address on the bus begins.
 _BUS = ("zenoh:", "zenoh-client:")
@@ -50,6 +51,8 @@ def run_command(options: argparse.Namespace) -> int:
         print(error, file=sys.stderr)
         count = len(error.diagnostics)
         print(f"fcsl-sim: {count} error{'s' if count > 1 else ''}", file=sys.stderr)
+        # One of an argument is wrong usage.
+        return EXIT_ERRORS if all(d.span.source.path for d in error.diagnostics) else EXIT_BAD_INPUT
     except SimError as error:
         _fail_as_json(options, str(error))
         print(f"fcsl-sim: error: {error}", file=sys.stderr)
@@ -94,14 +97,26 @@ def _load(options: argparse.Namespace) -> SimConfig:
 
 
 def _check(options: argparse.Namespace) -> int:
-    config = _load(options)
-    seconds = config.machine.time_ns(config.ticks) / 1e9
-    if options.json:
-        found = {"ok": True, "machine": config.machine.name, "models": list(config.tables), "duration_s": seconds}
-        show(json.dumps(found, indent=2))
-    else:
-        print(f"{options.config}: ok: `{config.machine.name}` and {', '.join(config.tables)} for at most {seconds:g} s")
+    for file in options.config:
+        text, facts = _checked_study(file) if file.endswith(".study.json") else _checked(file, options)
+        show(json.dumps({"ok": True, **facts}, indent=2) if options.json else f"{file}: ok: {text}")
     return 0
+
+
+def _checked(file: str, options: argparse.Namespace) -> tuple[str, dict[str, object]]:
+    """What a sound simulation is, as text and as facts."""
+    config = _load(argparse.Namespace(**{**vars(options), "config": file}))
+    seconds = config.machine.time_ns(config.ticks) / 1e9
+    text = f"`{config.machine.name}` and {', '.join(config.tables)} for at most {seconds:g} s"
+    return text, {"machine": config.machine.name, "models": list(config.tables), "duration_s": seconds}
+
+
+def _checked_study(file: str) -> tuple[str, dict[str, object]]:
+    from .campaign.study import read_study
+
+    study = read_study(Path(file))
+    text = f"{study.cases} cases, metrics {', '.join(study.metrics)}"
+    return text, {"machine": study.machine.name, "cases": study.cases, "metrics": list(study.metrics)}
 
 
 def _list_models(options: argparse.Namespace) -> int:

@@ -154,16 +154,21 @@ def load(
     root = read_extended(source, sink)
     sink.raise_if_failed()
     assert root is not None
-    _refuse_machine(file, root)
+    _refuse_others(file, root)
     root = with_events(root, events, sink)
     if machine is None:
         _require_compiler()
     return _Loader(file, sink, sets, machine, backend).load(root, seed, duration_s)
 
 
-def _refuse_machine(file: Path, root: JsonNode) -> None:
-    """Raises SimError if a file is a machine JSON, by its content."""
-    if root.kind == "object" and {"tick_hz", "states"} <= root.members.keys() and "models" not in root.members:
+def _refuse_others(file: Path, root: JsonNode) -> None:
+    """Raises SimError if a file is a machine or a study, by its content."""
+    keys = root.members.keys() if root.kind == "object" else {"models"}
+    if "models" in keys:
+        return
+    if {"simulation", "design"} <= keys:
+        raise SimError(f"{file}: this is a study, not a simulation; `fcsl campaign {file}` flies it")
+    if {"tick_hz", "states"} <= keys:
         fix = f'name a simulation whose `controller` is {{"machine": "{file.name}"}}, such as {file.stem}.sim.json'
         raise SimError(f"{file}: this is a machine, not a simulation; {fix}; `fcsl check {file}` checks it alone")
 

@@ -87,7 +87,7 @@ def _named(name: str) -> Found:
     if len({model.path.resolve() for model in named}) > 1:
         raise SimError(f"{name}: there are several: {', '.join(model.text for model in named)}; name one of these")
     if not named:
-        hint = nearest(name, [model.name for model in found]) or "`fcsl models` lists those that there are"
+        hint = nearest(name, [model.name for model in found]) or "`fcsl models` lists all models"
         raise SimError(f"{name}: no such model; {hint}")
     return named[0]
 

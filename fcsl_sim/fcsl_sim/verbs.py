@@ -45,15 +45,15 @@ def _of_simulation(verb: str, text: str) -> tuple[str, Verb]:
 
 
 def _is_simulation(arguments: Sequence[str]) -> bool:
-    """Whether a file that is named there has models."""
+    """Whether a file that is named there has models, or is a study."""
     for name in (word for word in arguments if word.endswith(".json")):
-        if name.endswith(".sim.json"):
+        if name.endswith((".sim.json", ".study.json")):
             return True
         try:
             found = json.loads(Path(name).read_bytes())
         except (OSError, ValueError, RecursionError):
             continue
-        if isinstance(found, dict) and "models" in found:
+        if isinstance(found, dict) and ("models" in found or {"simulation", "design"} <= found.keys()):
             return True
     return False
 

@@ -168,7 +168,7 @@ def test_errors_of_simulation_and_machine_come_together(sim_json: Path) -> None:
     sim_json.write_text(sim_json.read_text().replace('"seed"', '"sead"'))
     (sim_json.parent / "pilot.py").write_text(PILOT.replace("self.pos_z", "self.pos_y"))
     done = fcsl_sim("check", sim_json)
-    assert done.returncode == 2 and done.stdout == ""
+    assert done.returncode == 1 and done.stdout == ""
     assert "pilot.py:13:" in done.stderr and "error[E201]: unknown key `sead`" in done.stderr
     assert "Traceback" not in done.stderr and done.stderr.endswith("fcsl-sim: 2 errors\n")
 
@@ -224,6 +224,21 @@ def test_a_machine_is_no_simulation(sim_json: Path) -> None:
         )
 
 
+def test_a_study_is_no_simulation(sim_json: Path) -> None:
+    study = sim_json.with_name("wide.study.json")
+    members = {"simulation": sim_json.name, "seed": 1, "cases": 3, "design": "monte_carlo"}
+    study.write_text(json.dumps({**members, "metrics": {"last": "machine.tick"}}))
+    done = fcsl_sim("run", study)
+    assert done.returncode == 2 and done.stderr.endswith(
+        f"this is a study, not a simulation; `fcsl campaign {study}` flies it\n"
+    )
+    done = fcsl_sim("campaign", sim_json)
+    assert done.returncode == 2 and f"this is a simulation, not a study; `fcsl sim {sim_json}` flies it" in done.stderr
+    done = fcsl_sim("check", sim_json, study)
+    assert done.returncode == 0 and f"{study}: ok: 3 cases, metrics last\n" in done.stdout
+    assert done.stdout.count(": ok: ") == 2
+
+
 def test_explain_says_what_the_check_does_with_a_circle() -> None:
     page = " ".join(explain("E803", SIM_CODES).split())
     assert "algebraic loop" in page and "break the circle" not in page
@@ -237,7 +252,7 @@ def test_no_such_file() -> None:
 def test_no_simulator_installed(sim_json: Path) -> None:
     python_path = os.pathsep.join(path for path in sys.path if path)
     done = fcsl_sim("run", sim_json, env=os.environ | {"AMENT_PREFIX_PATH": "", "PYTHONPATH": python_path})
-    assert done.returncode == 2 and "Traceback" not in done.stderr
+    assert done.returncode == 1 and "Traceback" not in done.stderr
     assert "not installed in this environment; source install/setup.bash" in done.stderr
 
 

@@ -190,7 +190,7 @@ def test_events_and_feed_through() -> None:
     ("model", "message"),
     [
         ("noisy_senso", "noisy_senso: no such model; did you mean `noisy_sensor`?"),
-        ("qqqqqq", "qqqqqq: no such model; `fcsl models` lists those that there are"),
+        ("qqqqqq", "qqqqqq: no such model; `fcsl models` lists all models"),
         ("none.c", "none.c: no such file"),
         ("", "no such model"),
         ("package://fcsl_sim", "write package://<ros package>/<path below its share folder>"),

@@ -19,7 +19,7 @@ def add_examples(parser: argparse.ArgumentParser, examples: Mapping[str, str]) -
         settings = found.settings if isinstance(found, Command) else vars(found)
         epilog = settings.get("epilog")
         settings["formatter_class"] = argparse.RawDescriptionHelpFormatter
-        settings["epilog"] = f"example: {settings['prog']} {arguments}" + (f"\n\n{epilog}" if epilog else "")
+        settings["epilog"] = f"example: {settings['prog']} {arguments}".rstrip() + (f"\n\n{epilog}" if epilog else "")
 
 
 def subcommands(parser: argparse.ArgumentParser) -> dict[str, argparse.ArgumentParser]:

@@ -191,7 +191,9 @@ def _add_authoring(commands: argparse._SubParsersAction[argparse.ArgumentParser]
     )
     plant.add_argument("name", help="lower_snake_case; of the model")
     plant.add_argument("--machine", type=Path, metavar="FILE", help="machine JSON that the simulation flies")
-    vehicle = _add(kinds, "vehicle", "a package NAME with machine, simulation and tests of a vehicle that there is")
+    vehicle = _add(
+        kinds, "vehicle", "a package NAME that begins as a copy of an existing vehicle: machine, simulation and tests"
+    )
     vehicle.add_argument("name", help="lower_snake_case")
     vehicle.add_argument("--like", required=True, metavar="VEHICLE", help="a package, such as quadrotor, or its folder")
 

@@ -17,12 +17,10 @@ from ..base.verb import Verb
 #: or = is partial.
 _BASH = """\
 _fcsl() {
-    local cur=${COMP_WORDS[COMP_CWORD]}
     COMPREPLY=($(fcsl complete-line "${COMP_LINE:0:COMP_POINT}" 2>/dev/null))
-    if [ ${#COMPREPLY[@]} -eq 0 ]; then COMPREPLY=($(compgen -f -- "$cur")); fi
     case ${COMPREPLY[0]} in *=|*.) compopt -o nospace ;; esac
 }
-complete -F _fcsl fcsl"""
+complete -o default -F _fcsl fcsl"""
 _ZSH = """\
 _fcsl() {
     local -a found

@@ -67,7 +67,7 @@ def missing_package(error: ModuleNotFoundError) -> str:
 
 
 def completeness(name: str, damage: str) -> int:
-    """Exit code of a tool that read a whole bag; prints `damage` (`Bag.truncated`) on stderr if there is any."""
+    """Exit status of a tool that read a whole bag; prints `damage` (`Bag.truncated`) on stderr if there is any."""
     if not damage:
         return 0
     print(f"{name}: the bag is incomplete: {damage}", file=sys.stderr)

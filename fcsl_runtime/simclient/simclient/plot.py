@@ -1,7 +1,7 @@
 # SPDX-License-Identifier: Apache-2.0
 """fcsl plot BAG [PATH…]: one picture of a run (see simclient.view.picture).
 
-Exit code 0: written. 1: written, but the bag is incomplete. 2: bad input, nothing written.
+Exit status 0: written. 1: written, but the bag is incomplete. 2: bad input, nothing written.
 """
 
 from __future__ import annotations

@@ -1,7 +1,7 @@
 # SPDX-License-Identifier: Apache-2.0
 """fcsl rerun BAG -o run.rrd: a run for the rerun viewer (see simclient.view.rrd).
 
-Exit code 0: written. 1: written, but the bag is incomplete. 2: bad input, nothing written.
+Exit status 0: written. 1: written, but the bag is incomplete. 2: bad input, nothing written.
 """
 
 from __future__ import annotations

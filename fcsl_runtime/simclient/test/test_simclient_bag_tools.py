@@ -366,6 +366,10 @@ def test_columns_are_chosen_by_pattern_and_gaps_stay_empty(tmp_path: Path, fly: 
     assert not any(name.startswith("source.outputs.quat") for name in names)
     done = tool("export", tmp_path / "run", "-o", out, "--columns", "ecko.outputs.sum")
     assert done.returncode == 2 and "nothing to export" in done.stderr
+    out.unlink()
+    done = tool("export", tmp_path / "run", "-o", out, "--columns", "echo.outputs.sum", "probe.outputs.none")
+    assert done.returncode == 2 and "no column or topic matches `probe.outputs.none`" in done.stderr
+    assert not out.exists()  # rather than a table without what was asked for
     done = tool("export", tmp_path / "run", "-o", tmp_path / "x.xls")
     assert done.returncode == 2 and "ends in .csv, .parquet, .npz" in done.stderr
     bag = foreign(tmp_path / "truck", [(5, 1.0), (7, 2.0), (7, 3.0)])

@@ -398,7 +398,7 @@ def test_another_source_hash_is_refused_unless_told(
     assert f"recorded  {'1' * 64}" in done.stderr and f"now       {new_hash}" in done.stderr
     assert "--ignore-source-hash" in done.stderr
     done = tool("replay", bag, "--library", renamed, "--ignore-source-hash")
-    assert done.stdout == "30 ticks, identical\n"
+    assert done.stdout == "30 ticks, identical with the recorded parameters\n"
     assert done.stderr == (
         "fcsl replay: the sources differ: parameters come from the recorded checkpoint, not from the compiled machine\n"
     )
@@ -413,7 +413,7 @@ def test_recorded_parameters_that_are_compiled_otherwise_are_listed(
         twin.record(tmp_path / "run")
         twin.tick(3)
     done = tool("replay", "run", "--library", renamed, "--ignore-source-hash")
-    assert done.returncode == 0 and done.stdout == "3 ticks, identical\n"
+    assert done.returncode == 0 and done.stdout == "3 ticks, identical with the recorded parameters\n"
     assert done.stderr.splitlines()[1:] == [
         "fcsl replay: parameters that differ: 1",
         "fcsl replay:   echo.parameters.gain  recorded 2.5, compiled 2.0",

@@ -108,6 +108,10 @@ def read_study(path: Path, cases: int | None = None) -> Study:
     root = parse_json(source, sink)
     sink.raise_if_failed()
     assert root is not None
+    if root.kind == "object" and "models" in root.members:
+        raise SimError(
+            f"{path}: this is a simulation, not a study; `fcsl sim {path}` flies it; `fcsl schema study` has a study's keys"
+        )
     return _Reader(path, sink).read(root, source.text, cases)
 
 

@@ -9,8 +9,8 @@
     fcsl bag digest BAG
     fcsl bag repair BAG
 
-Exit code of info, cut, export, digest and repair: 0 done; 1 done, but the bag is incomplete; 2 bad input, nothing written.
-Exit code of diff: 0 the bags are the same; 1 they differ, or one is incomplete; 2 bad input.
+Exit status of info, cut, export, digest and repair: 0 done; 1 done, but the bag is incomplete; 2 bad input, nothing written.
+Exit status of diff: 0 the bags are the same; 1 they differ, or one is incomplete; 2 bad input.
 """
 
 from __future__ import annotations

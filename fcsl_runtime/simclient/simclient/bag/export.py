@@ -174,6 +174,7 @@ def select(bag: Bag, patterns: Sequence[str] = (), machine: str = "", time: str 
             told += [name for name in every if whole or _matches(name, patterns)]
         if series.columns and len(series.times):
             found.series.append(series)
+    _demand_all(bag, found, patterns, prefixes)
     if not found.series:
         names = [*prefixes, *(prefix for prefix in prefixes.values())]
         hint = did_you_mean(patterns[0], names) if patterns else ""
@@ -181,6 +182,18 @@ def select(bag: Bag, patterns: Sequence[str] = (), machine: str = "", time: str 
             hint = f" but arrays of over {ELEMENTS_MAX} elements, which --columns takes by name: {', '.join(found.too_large)}"
         raise BagError(f"{bag.path}: nothing to export{hint}; it holds {', '.join(sorted(prefixes))}")
     return found
+
+
+def _demand_all(bag: Bag, found: Export, patterns: Sequence[str], prefixes: dict[str, str]) -> None:
+    """Raises BagError for a pattern beside others that selects nothing."""
+    names = [name for series in found.series for name in (series.topic, *series.columns)]
+    names += [*found.left_out, *found.too_large]
+    for pattern in patterns if found.series else ():
+        if not any(_matches(name, [pattern]) for name in names):
+            first, _, rest = pattern.partition(".")
+            near = [f"{p}{rest.removeprefix('outputs.')}" for t, p in prefixes.items() if t.rpartition("/")[2] == first]
+            hint = f"; did you mean `{near[0]}`?" if near else did_you_mean(pattern, [*prefixes, *prefixes.values()])
+            raise BagError(f"{bag.path}: no column or topic matches `{pattern}`{hint}")
 
 
 def _prefixes(bag: Bag, machine: str) -> dict[str, str]:

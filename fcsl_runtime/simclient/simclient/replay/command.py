@@ -6,7 +6,7 @@
     fcsl replay BAG --library liblander_control.so --board board.plan    # its sensors, too, from readings
     fcsl replay BAG --config ahrs.json --map map.yaml -o OUT     # a bag that FCSL did not record, of any format
 
-Exit code 0: identical (with --map: ran to the end and met the map's expectations). 1: differs, or the bag is
+Exit status 0: identical (with --map: ran to the end and met the map's expectations). 1: differs, or the bag is
 incomplete. 2: bad input.
 """
 

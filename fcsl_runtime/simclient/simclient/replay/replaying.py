@@ -148,6 +148,7 @@ def replay(
         with closing(Replay(opened, recorded, run, board)) as reproduced:
             verdict = reproduced.run(Progress("replaying", expected).at)
         verdict.notes += notes
+        verdict.other_sources = checkpoint.source_hash != run.machine.source_hash
         return verdict
     finally:
         run.close()

@@ -47,7 +47,8 @@ class Verdict:
     """The result of a replay: `divergence` is None if everything in the bag was reproduced identically.
 
     `missing` lists records that the bag lacks, so that not every tick could be compared; empty if it is complete.
-    `notes` are remarks for the user that do not affect the verdict.
+    `notes` are remarks for the user that do not affect the verdict. `other_sources`: the machine that ran is of other sources,
+    with the parameters of the record.
     """
 
     ticks: int = 0
@@ -55,6 +56,7 @@ class Verdict:
     divergence: Divergence | None = None
     missing: list[str] = field(default_factory=list)
     notes: list[str] = field(default_factory=list)
+    other_sources: bool = False
 
     @property
     def identical(self) -> bool:
@@ -67,7 +69,7 @@ class Verdict:
             return "\n".join(
                 [f"{self.ticks} ticks, identical as far as the bag goes", *(f"  {m}" for m in self.missing)]
             )
-        return f"{self.ticks} ticks, identical"
+        return f"{self.ticks} ticks, identical{' with the recorded parameters' if self.other_sources else ''}"
 
 
 class OutputComparison:

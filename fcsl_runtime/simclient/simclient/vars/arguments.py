@@ -13,8 +13,9 @@ from fcsl_compiler.api.command_line import Command, add_examples
 Fill = Callable[[argparse.ArgumentParser], object]
 
 _EPILOG = """\
-The machine is that of --socket (a path, or tcp:HOST:PORT with --token FILE), else of FCSL_SOCKET. Commands that only
-read otherwise take the only fcsl-fc or fcsl-sim of this user that runs with --socket, and say which. A path is a field, a part of it (p[0], p[1:3]) or, for get,
+The machine is that of --socket (a path, or tcp:HOST:PORT with --token FILE), else of FCSL_SOCKET. Without both, a command that
+only reads finds the flight program or simulation of this user by itself, if one alone runs with --socket. A path is a field, a part
+of it (p[0], p[1:3]) or, for get,
 a prefix of several (nav.outputs). Exit status: 0; 1 if the machine refuses; 2 if there is none, or for wrong usage."""
 
 

@@ -175,7 +175,7 @@ def demand(path: str, catalogue: Catalogue) -> list[Value]:
     last = path.rpartition(".")[2]
     near += [known for known in catalogue.values if known.rpartition(".")[2] == last and known not in near]
     hint = f"; did you mean {', '.join(near[:_NEAR_MATCHES])}?" if near else ""
-    raise ViewError(f"`{path}`: nothing of this path is recorded{hint} `fcsl bag info` lists the topics")
+    raise ViewError(f"`{path}`: nothing of this path is recorded;{hint} `fcsl bag info` lists the topics")
 
 
 def choose_default(catalogue: Catalogue, commands: Collection[str] = (), constants: Collection[str] = ()) -> Choice:
