@@ -186,8 +186,8 @@ def select(bag: Bag, patterns: Sequence[str] = (), machine: str = "", time: str 
 
 def _demand_all(bag: Bag, found: Export, patterns: Sequence[str], prefixes: dict[str, str]) -> None:
     """Raises BagError for a pattern beside others that selects nothing."""
-    names = [name for series in found.series for name in (series.topic, *series.columns)]
-    names += [*found.left_out, *found.too_large]
+    names = [*bag.topics, *found.left_out, *found.too_large]  # a topic may have no message
+    names += [name for series in found.series for name in series.columns]
     for pattern in patterns if found.series else ():
         if not any(_matches(name, [pattern]) for name in names):
             first, _, rest = pattern.partition(".")
