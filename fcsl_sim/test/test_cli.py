@@ -227,7 +227,7 @@ def test_a_machine_is_no_simulation(sim_json: Path) -> None:
 def test_a_study_is_no_simulation(sim_json: Path) -> None:
     study = sim_json.with_name("wide.study.json")
     members = {"simulation": sim_json.name, "seed": 1, "cases": 3, "design": "random"}
-    study.write_text(json.dumps({**members, "metrics": {"ticks": "machine.tick"}}))
+    study.write_text(json.dumps({**members, "metrics": {"length": "machine.tick"}}))
     done = fcsl_sim("run", study)
     assert done.returncode == 2 and done.stderr.endswith(
         f"this is a study, not a simulation; `fcsl campaign {study}` flies it\n"
@@ -236,7 +236,7 @@ def test_a_study_is_no_simulation(sim_json: Path) -> None:
     assert done.returncode == 2 and f"this is a simulation, not a study; `fcsl sim {sim_json}` flies it" in done.stderr
     done = fcsl_sim("check", sim_json, study)
     assert done.returncode == 0, done.stderr
-    assert f"{study}: ok: 3 cases, metrics ticks\n" in done.stdout
+    assert f"{study}: ok: 3 cases, metrics length\n" in done.stdout
     assert done.stdout.count(": ok: ") == 2
 
 
