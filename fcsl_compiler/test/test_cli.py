@@ -417,3 +417,12 @@ def test_explain_knows_functions(capsys: pytest.CaptureFixture[str]) -> None:
     assert "kf_predict_state(f: f64[n][n], x: f64[n], b: f64[n][m], u: f64[m]) -> f64[n]" in text
     assert main(["explain", "kf_gan"]) == 2
     assert "did you mean `kf_gain`?" in capsys.readouterr().err
+
+
+def test_a_long_compilation_says_so(
+    config: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    said = "fcslc: compiling libcraft.so ...\n"
+    assert fcslc(capsys, "build", config, "--name", "craft", "-o", tmp_path / "quick")[2].count(said) <= 1
+    monkeypatch.setattr("fcsl_compiler.cli.progress._PATIENCE_S", 0.0)
+    assert fcslc(capsys, "build", config, "--name", "craft", "-o", tmp_path / "slow")[2].count(said) == 1

@@ -180,9 +180,10 @@ def page() -> str:
     parts = [
         "# Diagnostics",
         "<!-- generated: fcsl_compiler/test/test_codes.py -->",
-        "Every code that `fcslc` reports, why it is a rule, and an example; `fcsl explain E402` prints one of them.\n"
+        "Every code of `fcsl check`, `build` and `board`, why it is a rule, and an example; `fcsl explain E402` prints one.\n"
         "E1xx are about files, E2xx about the machine JSON, E3xx about the module level of an algorithm, E4xx about its\n"
-        "statements, E5xx about boards; a W is a warning and stops nothing.",
+        "statements, E5xx about boards; a W is a warning and stops nothing. Those of simulations (E8xx, W8xx) are in\n"
+        "`fcsl explain` alone.",
         "The examples are pieces of this machine:",
         f"```json\n{EXAMPLE_MACHINE}```",
         "with `nav.py`:",

@@ -19,6 +19,7 @@ from ..driver.stack import bound_text
 from ..driver.toolchain import toolchain
 from ..model.choices import DEFAULT_BACKEND, DEFAULT_TARGET
 from ..parse.machine_files import is_machine_name
+from .progress import progress
 from .report import Summary, print_extern_calls, print_report
 
 
@@ -53,15 +54,16 @@ def run(options: argparse.Namespace) -> int:
         compilations = emit(options.config, folder, options.strict, options.target, instances, options.backend)
     else:
         inspect = _collect_facts(costs) if options.report else lambda *_: None
-        compilations = build_library(
-            options.config,
-            library,
-            options.strict,
-            options.target,
-            inspect=inspect,
-            instances=instances,
-            backend=options.backend,
-        )
+        with progress(f"fcslc: compiling {library.name} ..."):
+            compilations = build_library(
+                options.config,
+                library,
+                options.strict,
+                options.target,
+                inspect=inspect,
+                instances=instances,
+                backend=options.backend,
+            )
     record = Path(f"{folder / 'fcsl_machines' if options.c_only else library}{SUFFIX}")
     write_record(record, compilations, "" if options.c_only else _command(options, folder))
     if options.depfile:
