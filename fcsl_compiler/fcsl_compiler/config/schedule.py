@@ -182,7 +182,7 @@ def _warn_old_values(machine: Machine, sink: DiagnosticSink) -> None:
                     f"in state `{state.name}`, `{reader.name}` reads `{writer.name}`, which does not run there",
                     here[target].span,
                     why="the outputs keep old values",
-                    help=f"schedule `{writer.name}` here, or connect `{writer.name}.outputs.health`: it is then stale",
+                    help=f"schedule `{writer.name}` here, or connect `{writer.name}.health`: it is then stale",
                     notes=[(c.span, "it reads this")],
                 )
                 break
