@@ -74,6 +74,7 @@ def test_a_loop_of_no_turns(tmp_path: Path) -> None:
         ({"taps": 2000000000}, "iterations"),
         ({"taps": 20000}, "a loop of 400000000 iterations"),
         ({"skip": -(2**40)}, "beyond 2^31"),
+        ({"skip": 3 - 10_000_001}, "a loop of 10000001 iterations"),
     ],
 )
 def test_refused(tmp_path: Path, arguments: dict[str, Any], message: str) -> None:
@@ -81,3 +82,7 @@ def test_refused(tmp_path: Path, arguments: dict[str, Any], message: str) -> Non
         compile_machine(write(tmp_path, **arguments), "")
     assert {d.code for d in refused.value.diagnostics} == {"E424"}
     assert any(message in d.message for d in refused.value.diagnostics)
+
+
+def test_as_many_iterations_as_are_allowed(tmp_path: Path) -> None:
+    assert compile_machine(write(tmp_path, skip=3 - 10_000_000), "").source

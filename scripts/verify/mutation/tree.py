@@ -25,6 +25,8 @@ MUTATED = {
     "C": ("fcsl_hal/src", "fcsl_runtime/fcsl_runtime/src", "fcsl_runtime/fcsl_runtime/fc", "fcsl_sim/src"),
     "Python": ("fcsl_compiler/fcsl_compiler", "fcsl_runtime/simclient/simclient", "fcsl_sim/fcsl_sim"),
 }
+#: Programs in the language, which knows no switch.
+_DIALECT = ROOT / "fcsl_compiler/fcsl_compiler/library"
 _GCC = "/usr/bin/gcc"
 _HEADERS = ("fcsl_runtime/fcsl_runtime/include", "fcsl_hal/include", "fcsl_sim/include")
 
@@ -32,7 +34,8 @@ _HEADERS = ("fcsl_runtime/fcsl_runtime/include", "fcsl_hal/include", "fcsl_sim/i
 def sources(language: str) -> list[str]:
     """The files that may be mutated, relative to the workspace."""
     pattern = "*.c" if language == "C" else "*.py"
-    return [str(f.relative_to(ROOT)) for d in MUTATED[language] for f in sorted((ROOT / d).rglob(pattern))]
+    found = [f for d in MUTATED[language] for f in sorted((ROOT / d).rglob(pattern)) if not f.is_relative_to(_DIALECT)]
+    return [str(f.relative_to(ROOT)) for f in found]
 
 
 def candidates(only: str) -> list[Candidate]:
