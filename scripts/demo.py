@@ -171,7 +171,8 @@ def fly_over_ros(ticks: int) -> None:
     for topic, count in sorted(counts.items()):
         say(f"  {count:7d}  {topic}")
     heard = {t: c for t, c in counts.items() if t == "/clock" or t.startswith("/lander_control/")}
-    if heard.get("/clock", 0) < ticks or heard.get("/lander_control/engine", 0) < ticks:
+    # The flight does not wait for subscribers: on a busy computer one misses some. The bag misses none, see below.
+    if min(heard.get("/clock", 0), heard.get("/lander_control/engine", 0)) < ticks // 2:
         raise DemoError(f"the subscriber heard too little: {heard}")
 
 
