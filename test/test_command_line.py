@@ -197,3 +197,22 @@ def test_every_page_and_scaffold_names_verbs_that_there_are() -> None:
             for old in re.findall(r"fcsl-(?:var|bus|hal|link|view|supervisor)\b|-m simclient\.\w+", text)
         ]
     assert unknown == []
+
+
+def test_plot_goes_by_what_is_drawn(tmp_path: Path) -> None:
+    """A simulation that `--views` names is no simulation to fly."""
+    for line, says in (
+        ("plot none --views none.sim.json", "fcsl plot: error: none.sim.json"),
+        ("plot --views=none.sim.json none", "fcsl plot: error: none.sim.json"),
+        ("plot none.sim.json", "fcsl-sim: error: none.sim.json"),
+    ):
+        done = subprocess.run(["fcsl", *line.split()], capture_output=True, text=True, cwd=tmp_path, check=False)
+        assert done.returncode == 2 and done.stderr.startswith(says), done.stderr
+
+
+def test_a_reader_that_has_seen_enough() -> None:
+    for line in ("fcsl --help", "fcsl explain", "fcsl schema", "fcsl bag --help"):
+        done = subprocess.run(
+            f"set -o pipefail; {line} | true", shell=True, executable="/bin/bash", capture_output=True, text=True
+        )
+        assert done.stderr == "" and done.returncode in (0, 141), (line, done)

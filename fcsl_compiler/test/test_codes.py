@@ -170,7 +170,7 @@ def test_explain(capsys: pytest.CaptureFixture[str]) -> None:
 def test_explain_an_unknown_code(word: str, capsys: pytest.CaptureFixture[str]) -> None:
     assert main(["explain", word]) == 2
     captured = capsys.readouterr()
-    assert captured.out == "" and "there is no diagnostic" in captured.err
+    assert captured.out == "" and "there is no code or function" in captured.err
     if word == "E4O2":
         assert "`E402`" in captured.err
 

@@ -16,6 +16,8 @@ if TYPE_CHECKING:
     from fcsl_compiler.api.codes import Code
 
 _GROUP = "simulation"
+#: Options, of the bags' `plot` too, behind which another JSON file stands.
+_NAMES_A_FILE = ("--views", "-o", "--output")
 #: JSON Schemas of a simulation file and of a study.
 SIMULATION_SCHEMA = Path(__file__).parent / "simulation.schema.json"
 STUDY_SCHEMA = Path(__file__).parent / "study.schema.json"
@@ -45,8 +47,13 @@ def _of_simulation(verb: str, text: str) -> tuple[str, Verb]:
 
 
 def _is_simulation(arguments: Sequence[str]) -> bool:
-    """Whether a file that is named there has models, or is a study."""
-    for name in (word for word in arguments if word.endswith(".json")):
+    """Whether a file that is named there has models, or is a study. The file behind an option is no such file: `--views`."""
+    before = ["", *arguments]
+    for name in (
+        w for w, last in zip(arguments, before, strict=False) if w.endswith(".json") and last not in _NAMES_A_FILE
+    ):
+        if name.startswith("-"):
+            continue
         if name.endswith((".sim.json", ".study.json")):
             return True
         try:

@@ -4,6 +4,8 @@
 from __future__ import annotations
 
 import argparse
+import os
+import signal
 import sys
 from importlib import import_module
 from os.path import lexists
@@ -22,6 +24,7 @@ def run_command(options: argparse.Namespace) -> int:
     module of the command, which has its name."""
     try:
         status: int = import_module(f".{options.subcommand}", __package__).run(options)
+        sys.stdout.flush()
         return status
     except DiagnosticError as error:
         print_report(options, error.diagnostics)
@@ -32,7 +35,8 @@ def run_command(options: argparse.Namespace) -> int:
     except (ToolchainError, IrError, PackageNotFound) as error:
         _fail(options, str(error))
     except BrokenPipeError:
-        sys.stderr.close()
+        os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
+        return 128 + signal.SIGPIPE  # as of a program that the signal ends: the reader wanted no more
     except OSError as error:
         _fail(options, f"{error.filename or ''}: {error.strerror}")
         return 2 if isinstance(error, FileNotFoundError) else 1

@@ -3,6 +3,8 @@
 
 from __future__ import annotations
 
+import os
+import signal
 import sys
 from collections.abc import Sequence
 from difflib import get_close_matches
@@ -24,7 +26,12 @@ def main(arguments: Sequence[str] | None = None) -> int:
     """Exit status: that of the verb; 2 for one that there is not."""
     words = list(sys.argv[1:] if arguments is None else arguments)
     try:
-        return _run(words)
+        status = _run(words)
+        sys.stdout.flush()
+        return status
+    except BrokenPipeError:
+        os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
+        return 128 + signal.SIGPIPE  # as of a program that the signal ends: the reader wanted no more
     except KeyboardInterrupt:
         print("fcsl: interrupted", file=sys.stderr)
         return 130

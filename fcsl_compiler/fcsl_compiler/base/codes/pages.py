@@ -37,7 +37,9 @@ def pages(codes: Sequence[str], rows: Mapping[str, Code]) -> str:
     for code in map(str.upper, codes):
         if code not in rows:
             hint = nearest(code[:8].replace("O", "0"), list(rows))
-            raise UnknownCode(f"there is no diagnostic `{code[:80]}`; {hint or 'without a code, `explain` lists all'}")
+            raise UnknownCode(
+                f"there is no code or function `{code[:80]}`; {hint or 'without a code, `explain` lists all'}"
+            )
     return "\n".join(explain(code.upper(), rows) for code in codes) if codes else overview(rows)
 
 
