@@ -111,9 +111,9 @@ def test_truth_messages(open_sim: Open) -> None:
         own, *dependencies = sim.truth_schema("ramp").split("=" * 80 + "\n")
         assert own == (
             "std_msgs/Header header\n"
-            "float64 x  # m, position\n"
+            "float64 x  # [m] position\n"
             "float64 seen_rate  # rate at the update\n"
-            "int64 time_ns  # ns, of the update\n"
+            "int64 time_ns  # [ns] of the update\n"
         )
         assert [text.splitlines()[0] for text in dependencies] == [
             "MSG: std_msgs/Header",

@@ -274,16 +274,11 @@ def test_what_does_not_change_is_left_out_unless_all_is_so() -> None:
     assert titles(constants=set(paths)) == titles()
 
 
-def test_values_of_models_have_units() -> None:
-    """A comment of theirs begins with the unit, or with the documentation."""
-    comments = {
-        "a": "m, height above the ground", "b": "m/s^2", "c": "1/rad, slope", "d": "rad/s^2/sqrt(Hz), noise", "e": "degC",
-        "f": "w, x, y, z", "g": "the last sample", "h": "fuel, in the tank", "i": "", "j": "N*m", "k": "m/s², up",
-    }  # fmt: skip
-    schema = "std_msgs/Header header\n" + "".join(f"float64 {name}  # {text}\n" for name, text in comments.items())
-    units = {"a": "m", "b": "m/s^2", "c": "1/rad", "d": "rad/s^2/sqrt(Hz)", "e": "degC", "j": "N*m", "k": "m/s²"}
-    assert units_of(schema) == units
-    assert units_of("float64 x # [bushel] of corn\nfloat64 y # to the valve, 0 to 1\n") == {"x": "bushel"}
+def test_a_comment_begins_with_the_unit_in_brackets() -> None:
+    schema = (
+        "std_msgs/Header header\nfloat64 a  # [rad/s^2/sqrt(Hz)] noise\nfloat64[3] b  # [m] \nfloat64 c  # w, x, y, z\n"
+    )
+    assert units_of(schema) == {"a": "rad/s^2/sqrt(Hz)", "b": "m"}
 
 
 # ---- what passed the gate ----------------------------------------------------------------------------------------------
@@ -321,6 +316,8 @@ class GatedRun:
         ({"wheel": [0.0, 0.0, 2.0, 5.0]}, None, {"motor.outputs.right": "wheel"}),  # a tick late
         ({"wheel": [0.0, 0.0, 3.0, 4.0]}, None, {}),  # of `motor` or of `copy`
         ({"wheel": [0.0, 0.0, 9.0, 9.0]}, None, {}),
+        ({"wheel": [0.0, 0.0, 5.0, 5.0]}, None, {}),  # one value: anybody's
+        ({"right": [0.0, 0.0, 5.0, 5.0]}, None, {"motor.outputs.right": "right"}),
         ({"wheel": [0.0, 0.0, 3.0, 4.0]}, {"wheel": "copy.outputs.left"}, {"copy.outputs.left": "wheel"}),
         ({"rear_wheel": [0.0] * 4}, {"rear.wheel": "motor.outputs.left"}, {"motor.outputs.left": "rear_wheel"}),
     ],

@@ -86,8 +86,8 @@ static char *build_schema(const fcsl_model_t *model)
         if (field->rank) {
             (void)snprintf(extent, sizeof extent, "[%u]", field->count);
         }
-        used += (size_t)snprintf(text + used, capacity - used, "%s%s %s  # %s%s%s\n", ros_type(field->type), extent,
-                                 name, field->unit, field->unit[0] && field->doc[0] ? ", " : "", field->doc);
+        used += (size_t)snprintf(text + used, capacity - used, "%s%s %s  # %s%s%s%s\n", ros_type(field->type), extent,
+                                 name, field->unit[0] ? "[" : "", field->unit, field->unit[0] ? "] " : "", field->doc);
     }
     (void)snprintf(text + used, capacity - used, FCSL_SCHEMA_HEADER);
     return text;

@@ -3,7 +3,8 @@
 
 A simulation that is flown for its picture knows which output each actuator channel carries. A bag has what the
 actuators got by channel, and not the outputs. There, a channel belongs to the output that made every value which the
-channel got while the gate was open. Delays on the way do not matter.
+channel got while the gate was open. Delays on the way do not matter. Where it got one value alone, which others may have
+made too, the output must have the channel's name.
 """
 
 from __future__ import annotations
@@ -80,7 +81,7 @@ def _commands_of(run: RecordedRun, got: Sequence[Value]) -> list[Value | None]:
     for value in got:
         passed = _values(rows, value)[is_open]
         makers = [o for o in outputs if _look(o) == _look(value) and _made(_values(rows, o), passed)]
-        if len(makers) > 1:
+        if len(makers) > 1 or len(np.unique(passed)) < 2:
             makers = [o for o in makers if o.field.rpartition(".")[2] == value.field]
         found.append(makers[0] if len(makers) == 1 else None)
     return found

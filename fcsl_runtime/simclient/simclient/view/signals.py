@@ -14,13 +14,8 @@ from fcsl_compiler.api.ros_names import recorded_path
 
 from ..ros.cdr import Layout
 
-#: A declaration of a generated message. The comment begins with the unit: `# [m] …` of a machine, `# m, …` of a model.
-_DECLARATION = re.compile(r"^([\w/]+)(?:\[(\d+)\])? (\w+)(?: +# (?:\[([^\]]+)\]|([^,\n]+)))?", re.MULTILINE)
-#: What units of models are made of: a model without a unit begins its comment with a word of the documentation.
-_SYMBOLS = "m|g|s|A|K|mol|cd|rad|deg|sr|Hz|N|Pa|J|W|V|C|F|T|H|S|Ω|Ohm|bar|h"
-_UNIT_WORD = re.compile(rf"[kMGTcmµun]?(?:{_SYMBOLS})|min|d|degC|°C|°F|°|%|rpm|sqrt")
-_UNIT = re.compile(r"[\wΩ°%*/·.^() ⁻-]+")
-_WORD = re.compile(r"[A-Za-zµΩ°%]+")
+#: A declaration of a generated message, whose comment may begin with a unit: `float64 pos_z # [m] …`.
+_DECLARATION = re.compile(r"^([\w/]+)(?:\[(\d+)\])? (\w+)(?: +# \[([^\]]+)\])?", re.MULTILINE)
 #: Line before the definition of a nested message.
 _SECTION = re.compile(r"^={80}\nMSG: \w+/(\w+)\n", re.MULTILINE)
 _LAST_INDEX = re.compile(r"(.+)\[(\d{1,9})\]")
@@ -187,9 +182,9 @@ def units_of(schema: str) -> dict[str, str]:
 
     def collect(text: str, prefix: str, held: Mapping[str, str]) -> dict[str, str]:
         found: dict[str, str] = {}
-        for type_, extent, name, unit, begin in _DECLARATION.findall(text):
-            if unit or _is_unit(begin):
-                found[prefix + name] = unit or begin
+        for type_, extent, name, unit in _DECLARATION.findall(text):
+            if unit:
+                found[prefix + name] = unit
             if type_ in held:
                 # A struct never contains itself, but a damaged schema may.
                 inner = {n: t for n, t in held.items() if n != type_}
@@ -198,9 +193,3 @@ def units_of(schema: str) -> dict[str, str]:
         return found
 
     return collect(own, "", structs)
-
-
-def _is_unit(text: str) -> bool:
-    """Whether a text is a product of units: `rad/s^2/sqrt(Hz)`."""
-    words = _WORD.findall(text)
-    return bool(words and _UNIT.fullmatch(text)) and all(map(_UNIT_WORD.fullmatch, words))
