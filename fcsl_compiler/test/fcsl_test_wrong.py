@@ -558,7 +558,14 @@ ALGORITHMS: dict[str, str] = {
         "f(a: f64) -> f64", "return g(a)\n\n\ndef g(a: f64) -> f64:\n    return f(a)", call="y = f(self.x)"
     ),
     "E431 no type": helper("f(a) -> f64", "return 1.0", call="y = f(self.x)"),
-    "E431 a default": helper("f(a: f64 = 1.0) -> f64", "return a", call="y = f(self.x)"),
+    "E431 a default of several values": helper('f(a: "f64[2]" = [1.0, 2.0]) -> f64', "return a[0]", call="y = f()"),
+    "E402 a default of another type": helper("f(a: f64 = True) -> f64", "return a", call="y = f()"),
+    "E416 an unknown argument": helper("f(a: f64 = 1.0) -> f64", "return a", call="y = f(b=self.x)"),
+    "E416 arguments in another order": helper("f(a: f64, b: f64) -> f64", "return a", call="y = f(b=1.0, a=2.0)"),
+    "E418 sizes that a helper does not take": helper(
+        'f(a: "f64[n]", b: "f64[n]") -> f64', "return a[0]", call="y = f(self.w, [1.0, 2.0])"
+    ),
+    "E301 a size in capitals": helper('f(a: "f64[N]") -> f64', "return a[0]", call="y = f(self.w)"),
     "E431 no result": helper("f(a: f64)", "return a", call="y = f(self.x)"),
     "E431 nothing as result": helper("f(a: f64) -> None", "pass", call="y = f(self.x)"),
     "E431 self": helper("f(self) -> f64", "return self.x", call="y = f(self)"),

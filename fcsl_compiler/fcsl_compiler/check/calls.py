@@ -4,6 +4,7 @@
 from __future__ import annotations
 
 import ast
+from dataclasses import replace
 from typing import NoReturn
 
 from ..base.diagnostics import nearest
@@ -34,12 +35,13 @@ class CallChecker(Checker):
             return self._outside(name, outside, node, span)
         if name in self.scope.names.structs:
             return self._struct(self.scope.names.structs[name], node, span)
-        if node.keywords:
+        is_function = self.scope.functions.is_function(name)
+        if node.keywords and not (is_function and self.scope.functions.arguments(name)):
             fix = "write the values in their order, all of them"
             self.fail("E410", "arguments are given by position", self.span(node.keywords[0]), help=fix)
         if name in self.scope.types or name in self.scope.arguments or name == "self":
             self.fail("E404", f"`{name}` is a value, not a function", span)
-        if self.scope.functions.is_function(name):
+        if is_function:
             return self._function(name, node, span)
         if name in CONSTRUCTORS:
             return self._constructor(name, node, span)
@@ -199,9 +201,44 @@ class CallChecker(Checker):
         items = tuple(self.expect(given[m.name], m.type, f"`{m.name}` of `{struct}`") for m in struct.members)
         return ir.StructValue(struct, items, span)
 
+    def _given(self, name: str, node: ast.Call, span: Span) -> list[ast.expr | None]:
+        """The arguments of a call by position, None for one that has its default."""
+        arguments = self.scope.functions.arguments(name)
+        if arguments is None:
+            return list(node.args)
+        notes, names = ((arguments.at, "defined here"),), arguments.names
+        given: list[ast.expr | None] = list(node.args)
+        for keyword in node.keywords:
+            word, at = keyword.arg or "**", self.span(keyword)
+            if word not in names:
+                fix = nearest(word, names) or arguments.shown
+                self.fail("E416", f"`{name}` has no argument `{word}`", at, help=fix, notes=notes)
+            position = names.index(word)
+            if position < len(given):
+                why = "arguments are given once, in the order of the definition"
+                self.fail("E416", f"`{word}` comes too late", at, why=why, help=arguments.shown, notes=notes)
+            given += [None] * (position - len(given)) + [keyword.value]
+        missing = [a for a, value in zip(names, given, strict=False) if value is None] + list(names[len(given) :])
+        missing = [a for a in missing if a not in arguments.defaults]
+        if missing or len(given) > len(names):
+            least = len(names) - len(arguments.defaults)
+            count = f"{least} to {len(names)}" if least < len(names) else str(least)
+            what = (
+                f"not {len(given)}" if len(given) > len(names) or not node.keywords else f"without {', '.join(missing)}"
+            )
+            message = f"`{name}` takes {count} argument(s), {what}"
+            self.fail("E416", message, span, help=arguments.shown, notes=notes)
+        return given + [None] * (len(names) - len(given))
+
     def _function(self, name: str, node: ast.Call, span: Span) -> ir.Expr:
-        declared, _ = self.scope.functions.declared(name, len(node.args))
-        args = [self.raw(a, type_) for a, type_ in zip(node.args, declared, strict=True)]
+        given = self._given(name, node, span)
+        declared, _ = self.scope.functions.declared(name, len(given))
+        args = [self.raw(a, type_) for a, type_ in zip(given, declared, strict=True) if a is not None]
+        defaults = self.scope.functions.arguments(name)
+        if defaults is not None:
+            for position, (argument, a) in enumerate(zip(defaults.names, given, strict=True)):
+                if a is None:
+                    args.insert(position, replace(defaults.defaults[argument], span=span))
         signature = self.scope.functions.resolve(name, args, span)
         if signature is None:
             raise Stop

@@ -13,7 +13,7 @@ from ..model.effects import HARDWARE
 from ..model.types import SCALARS, Struct, TypeNames
 from ..parse.python_source import EDITOR_MODULES, span_of
 from .algorithm_class import METHODS, name_span, read_class
-from .constants import check_constant
+from .constants import check_constant, check_defaults
 from .declarations import Declarations
 from .externs import is_extern, read_extern
 from .library_files import library_names
@@ -204,6 +204,7 @@ def _free(declarations: Declarations, name: str, span: Span, sink: DiagnosticSin
 def _function(declarations: Declarations, node: ast.FunctionDef, sink: DiagnosticSink) -> None:
     if not is_extern(node):
         declarations.functions[node.name] = node
+        check_defaults(declarations, node, sink)
         return
     extern = read_extern(declarations, node, sink)
     if extern is None:

@@ -18,7 +18,7 @@ from .expressions import ExprChecker
 from .folding import DoesNotFit, fold
 from .inference import Inference
 from .literal_values import default_type, untyped_constant
-from .scope import ScalarConstant, Scope, Signature, StoredConstant
+from .scope import Arguments, ScalarConstant, Scope, Signature, StoredConstant
 
 
 class _NoFunctions:
@@ -33,6 +33,9 @@ class _NoFunctions:
         return []
 
     def declared(self, name: str, count: int) -> tuple[list[Type | None], Type | None]:
+        raise AssertionError(name)
+
+    def arguments(self, name: str) -> Arguments | None:
         raise AssertionError(name)
 
     def resolve(self, name: str, arguments: list[ir.Expr], span: Span) -> Signature | None:
@@ -64,7 +67,8 @@ def check_constant(
         _untyped(declarations, name, value, inference, sink)
         return
     try:
-        expr = checker.raw(value) if declared is None else checker.expect(value, declared, f"`{name}`")
+        shown = f"`{name.rpartition('.')[2]}`"  # an argument's name follows that of its helper
+        expr = checker.raw(value) if declared is None else checker.expect(value, declared, shown)
         expr = fold(expr)
     except Stop:
         return
@@ -88,6 +92,25 @@ def check_constant(
         why="module constants are folded at compile time",
         help="literals, earlier constants and operators on them are; compute the rest in `start`",
     )
+
+
+def check_defaults(declarations: Declarations, node: ast.FunctionDef, sink: DiagnosticSink) -> None:
+    """Folds the defaults of a helper's arguments into the declarations."""
+    behind = node.args.args[len(node.args.args) - len(node.args.defaults) :]
+    for argument, value in zip(behind, node.args.defaults, strict=True):
+        key = f"{node.name}.{argument.arg}"
+        if argument.annotation is None:
+            continue  # said where the function is checked
+        before = sink.errors
+        check_constant(declarations, key, argument.annotation, value, sink)
+        found = declarations.constants.pop(key, None)
+        if isinstance(found, ScalarConstant):
+            declarations.defaults[node.name, argument.arg] = found.value
+            continue
+        declarations.wrong.add(node.name)
+        if sink.errors == before:
+            at, fix = span_of(declarations.source, value), "let the caller give it"
+            sink.error("E431", f"the default of `{argument.arg}` is not one value", at, help=fix)
 
 
 def _untyped(

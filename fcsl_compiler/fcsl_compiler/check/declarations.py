@@ -24,6 +24,8 @@ class Declarations:
     classes: dict[str, AlgorithmClass] = field(default_factory=dict)
     constants: dict[str, Constant] = field(default_factory=dict)
     functions: dict[str, ast.FunctionDef] = field(default_factory=dict)
+    #: Defaults of helpers' arguments by the names of both.
+    defaults: dict[tuple[str, str], ir.Const] = field(default_factory=dict)
     externs: dict[str, ir.Extern] = field(default_factory=dict)
     #: Imported helpers by name.
     imported: dict[str, Declarations] = field(default_factory=dict)

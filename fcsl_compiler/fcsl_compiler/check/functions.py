@@ -1,8 +1,8 @@
 # SPDX-License-Identifier: Apache-2.0
 """Helpers and library functions, looked up by name. All algorithms of a machine share them.
 
-The numeric library is written in the language itself (library/*.py). Its annotations contain size variables. A library
-function is checked and compiled once for each combination of sizes that a machine uses.
+Annotations of arguments may contain size variables (`"f64[n]"`). Such a function is checked and compiled once for each
+combination of sizes that a machine uses. The numeric library is written in the language itself (library/*.py).
 """
 
 from __future__ import annotations
@@ -12,21 +12,22 @@ import re
 from collections.abc import Mapping
 from functools import cache
 
-from ..base.diagnostics import DiagnosticSink
+from ..base.diagnostics import DiagnosticSink, Note
 from ..base.source import SourceFile, Span
 from ..model import ir
 from ..model.program import Program
-from ..model.types import SCALARS, Array, Type, TypeNames
+from ..model.types import SCALARS, Type, TypeNames, element_of, shape_of
 from ..parse.python_source import span_of
-from .annotations import annotation_type, result_type
+from .annotations import annotation_text, annotation_type, result_type
 from .call_order import CallGraph, call_graph, call_order
 from .collect import collect
 from .declarations import Declarations
 from .library_files import library_files, library_names, overloads
-from .scope import LANGUAGE_NAMES, SHADOWABLE, Scope, Signature
+from .scope import LANGUAGE_NAMES, SHADOWABLE, Arguments, Scope, Signature
 from .statements import BodyChecker
 
 LIBRARY_PREFIX = "fcsl"
+_SIZE = re.compile(r"\[\s*(\w+)\s*\]")
 #: Maximum length of a chain of helper calls.
 MAX_CALLS = 64
 
@@ -93,10 +94,15 @@ class FunctionTable:
         return (arguments + [None] * count)[:count], type_of(node.returns)
 
     def _annotated(self, annotation: ast.expr | None) -> Type | None:
-        """The type of an annotation; what is wrong with it is said where the function is checked."""
+        """The type of an annotation, with size variables as 1; what is wrong with it is said where the function is
+        checked."""
         if annotation is None:
             return None
-        return result_type(self.declarations.source, annotation, self.declarations.names, DiagnosticSink())
+        names = self.declarations.names
+        sizes = {size: 1 for size in _SIZE.findall(ast.unparse(annotation)) if size.isidentifier()}
+        return result_type(
+            self.declarations.source, annotation, TypeNames({**sizes, **names.sizes}, names.structs), DiagnosticSink()
+        )
 
     def unique(self, name: str) -> str:
         """Name of a helper within the whole machine. It is unambiguous because no owner contains two consecutive
@@ -113,7 +119,7 @@ class FunctionTable:
             message, why = f"recursion: {' → '.join(chain)}", "the stack must have a bound"
             self.sink.error("E430", message, at, why=why, help=fix)
         for name in order:
-            if name in self._failed or not self._shallow(name, graph):
+            if name in self._failed or not self._shallow(name, graph) or self._size_variables(self.own[name]):
                 continue
             function = check_function(self.declarations, self.own[name], self.unique(name), {}, self, self.sink)
             if function is None:
@@ -141,21 +147,57 @@ class FunctionTable:
 
     # ---- helpers of this file --------------------------------------------------------------------------------------
 
-    def _helper(self, name: str, arguments: list[ir.Expr], span: Span) -> Signature | None:
+    def arguments(self, name: str) -> Arguments | None:
+        if name in self.declarations.imported:
+            return self._table(name).arguments(name)
+        if name not in self.own:
+            return None
         node = self.own[name]
-        at = span_of(self.declarations.source, node)
-        unique = self.unique(name)
-        if name in self._failed or unique not in self.program.helpers:
+        names = tuple(a.arg for a in node.args.args)
+        defaults = {a: v for (function, a), v in self.declarations.defaults.items() if function == name}
+        return Arguments(names, defaults, _signature(name, node), span_of(self.declarations.source, node))
+
+    def _size_variables(self, node: ast.FunctionDef) -> list[str]:
+        """The lower-case names in the sizes of a helper's arguments that are no constants: a call gives them values."""
+        texts = [annotation_text(a.annotation) or "" for a in node.args.args if a.annotation is not None]
+        sizes = dict.fromkeys(size for text in texts for size in _SIZE.findall(text))
+        return [s for s in sizes if s[0].isalpha() and s.islower() and s not in self.declarations.defined]
+
+    def _helper(self, name: str, arguments: list[ir.Expr], span: Span) -> Signature | None:
+        node, sizes = self.own[name], dict[str, int]()
+        if name in self._failed:
             return None
+        variables = self._size_variables(node)
+        if variables:
+            binding = _Binding(self.declarations.names)
+            for argument, given in zip(node.args.args, arguments, strict=True):
+                pattern = annotation_text(argument.annotation) if argument.annotation is not None else None
+                is_open = pattern is not None and not set(_SIZE.findall(pattern)).isdisjoint(variables)
+                problem = binding.unify(argument.arg, pattern, given.type) if pattern and is_open else ""
+                if problem:
+                    notes = [(span_of(self.declarations.source, node), "defined here")]
+                    fix = _signature(name, node)
+                    self.sink.error("E418", f"`{name}`: {problem}", given.span, help=fix, notes=notes)
+                    return None
+            sizes = binding.sizes
+        unique = self.unique("_".join([*map(str, sizes.values()), name]))
+        if unique not in self.program.helpers:
+            function = self._for_sizes(node, unique, sizes, span) if sizes else None
+            if function is None:
+                self._failed.add(name)
+                return None
+            self.program.helpers[unique] = function
         function = self.program.helpers[unique]
-        types = tuple(t for _, t in function.arguments)
-        if len(arguments) != len(types):
-            notes = [(at, "defined here")]
-            message = f"`{name}` takes {len(types)} argument(s), not {len(arguments)}"
-            self.sink.error("E416", message, span, help=_signature(name, node), notes=notes)
-            return None
         assert function.result
-        return Signature(unique, types, function.result, function.faults)
+        return Signature(unique, tuple(t for _, t in function.arguments), function.result, function.faults)
+
+    def _for_sizes(self, node: ast.FunctionDef, unique: str, sizes: dict[str, int], span: Span) -> ir.Function | None:
+        """A helper for these sizes. What is wrong in it is reported with the call that gave it the sizes."""
+        sink = DiagnosticSink()
+        function = check_function(self.declarations, node, unique, sizes, self, sink)
+        shown = ", ".join(f"{size} = {value}" for size, value in sizes.items())
+        self.sink.extend(sink.diagnostics, Note(span, f"called here, with {shown}"))
+        return function
 
     # ---- library ---------------------------------------------------------------------------------------------------
 
@@ -168,7 +210,7 @@ class FunctionTable:
             self.sink.error("E416", f"`{name}` takes {counts} argument(s), not {len(arguments)}", span, help=shown)
             return None
         parameters = [(a.arg, _text(a.annotation)) for a in node.args.args]
-        binding = _Binding()
+        binding = _Binding(TypeNames({}, {}))
         for (parameter, pattern), argument in zip(parameters, arguments, strict=True):
             problem = binding.unify(parameter, pattern, argument.type)
             if problem:
@@ -203,44 +245,48 @@ class FunctionTable:
 
 
 class _Binding:
-    """Sizes that match a generic signature to the types of actual arguments."""
+    """Sizes, and the type of elements, that match a generic signature to the types of actual arguments."""
 
-    def __init__(self) -> None:
+    def __init__(self, names: TypeNames) -> None:
         self.sizes: dict[str, int] = {}
         self._by: dict[str, str] = {}
+        self._names = names
 
     def unify(self, parameter: str, pattern: str, type_: Type) -> str:
         """Binds the size variables of `pattern` to the sizes of `type_`. Returns the problem, or ""."""
-        scalar, names = pattern.partition("[")[0], re.findall(r"\[(\w+)\]", pattern)
-        element = type_.element if isinstance(type_, Array) else type_
-        if not names:
-            if isinstance(type_, Array):
-                return f"{parameter} is a scalar, not {type_}"
-        else:
-            if not isinstance(type_, Array) or len(type_.shape) != len(names):
-                return f"{parameter} is {pattern}, not {type_}"
-            for name, extent in zip(names, type_.shape, strict=True):
-                problem = self._size(parameter, name, extent, type_)
-                if problem:
-                    return problem
-        if element is not SCALARS[scalar]:
+        name, extents = pattern.partition("[")[0].strip(), _SIZE.findall(pattern)
+        element, shape = element_of(type_), shape_of(type_)
+        if not extents and shape:
+            return f"{parameter} is a scalar, not {type_}"
+        if len(shape) != len(extents):
+            return f"{parameter} is {pattern}, not {type_}"
+        for text, extent in zip(extents, shape, strict=True):
+            problem = self._size(parameter, text, extent, type_)
+            if problem:
+                return problem
+        if element != (SCALARS.get(name) or self._names.structs.get(name)):
             return f"{parameter} is {pattern}, not {type_}"
         return ""
 
-    def _size(self, parameter: str, name: str, extent: int, type_: Type) -> str:
-        if name.isdigit():
-            return "" if int(name) == extent else f"{parameter} has size {name} here, not {extent} ({type_})"
-        if name not in self.sizes:
-            self.sizes[name] = extent
-            self._by[name] = parameter
+    def _size(self, parameter: str, text: str, extent: int, type_: Type) -> str:
+        fixed = int(text) if text.isdigit() else self._names.sizes.get(text)
+        if fixed is not None:
+            return "" if fixed == extent else f"{parameter} has size {text} here, not {extent} ({type_})"
+        if text not in self.sizes:
+            self.sizes[text] = extent
+            self._by[text] = parameter
             return ""
-        if self.sizes[name] == extent:
+        if self.sizes[text] == extent:
             return ""
-        return f"size {name} is {self.sizes[name]} in {self._by[name]}, but {extent} in {parameter}"
+        return f"size {text} is {self.sizes[text]} in {self._by[text]}, but {extent} in {parameter}"
 
 
 def _signature(name: str, node: ast.FunctionDef) -> str:
-    return f"{name}({', '.join(f'{a.arg}: {_text(a.annotation)}' for a in node.args.args)})"
+    defaults = [""] * (len(node.args.args) - len(node.args.defaults)) + [
+        f" = {ast.unparse(d)}" for d in node.args.defaults
+    ]
+    shown = (f"{a.arg}: {_text(a.annotation)}{d}" for a, d in zip(node.args.args, defaults, strict=True))
+    return f"{name}({', '.join(shown)})"
 
 
 def _element(annotation: ast.expr | None) -> Type:
@@ -334,11 +380,14 @@ def check_function(
 
 
 def check_plain(source: SourceFile, node: ast.FunctionDef, sink: DiagnosticSink) -> bool:
-    """Reports defaults, *args, keyword-only arguments, duplicate arguments and decorators, and then returns False."""
+    """Reports *args, keyword-only arguments, duplicate arguments and decorators, and then returns False."""
     a = node.args
-    if a.defaults or a.kwonlyargs or a.vararg or a.kwarg or a.posonlyargs:
+    if a.kwonlyargs or a.vararg or a.kwarg or a.posonlyargs:
         sink.error(
-            "E431", f"`{node.name}` has more than plain arguments", span_of(source, node), help="write `name: type`"
+            "E431",
+            f"`{node.name}` has more than plain arguments",
+            span_of(source, node),
+            help="write `name: type = default`",
         )
         return False
     twice = next((b for n, b in enumerate(a.args) if b.arg in {c.arg for c in a.args[:n]}), None)

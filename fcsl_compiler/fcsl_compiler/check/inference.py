@@ -327,7 +327,11 @@ class Inference:
                 _join(_of(member.type, node), named.get(member.name))
             return struct
         if scope.functions.is_function(name):
-            arguments, result = scope.functions.declared(name, len(node.args))
+            helper = scope.functions.arguments(name)
+            names = helper.names if helper is not None else ()
+            arguments, result = scope.functions.declared(name, max(len(node.args), len(names)))
+            for argument, type_ in zip(names, arguments, strict=False):
+                _join(_of(type_, node) if type_ is not None else None, named.get(argument))
             return self._declared(node, given, arguments, result)
         if name in CONSTRUCTORS:
             return Group(F64, node)

@@ -83,6 +83,16 @@ class Signature:
     faults: bool
 
 
+@dataclass(frozen=True)
+class Arguments:
+    """The arguments of a helper, as a call may give them. `shown`: its first line. `at`: its definition."""
+
+    names: tuple[str, ...]
+    defaults: dict[str, ir.Const]
+    shown: str
+    at: Span
+
+
 class Functions(Protocol):
     """Resolves helpers, library functions and externs. Helpers and library functions are checked on first use."""
 
@@ -93,6 +103,10 @@ class Functions(Protocol):
     def names(self) -> list[str]: ...
 
     def declared(self, name: str, count: int) -> tuple[list[Type | None], Type | None]: ...
+
+    def arguments(self, name: str) -> Arguments | None:
+        """The arguments of a helper. None for a function of the library."""
+        ...
 
     def resolve(self, name: str, arguments: list[ir.Expr], span: Span) -> Signature | None:
         """The function for these arguments. None after reporting why none matches."""

@@ -11,8 +11,8 @@ from typing import Any
 
 from .annotations import parse_type
 from .arrays import Array
-from .infer import SELF, Kind, Names, annotation_text, kind_of
-from .library import Signatures, define, execute, library, method, signature
+from .infer import REQUIRED, SELF, Kind, Names, annotation_text, kind_of
+from .library import Signatures, Sized, define, execute, library, method, signature
 from .rewrite import Rewriter
 from .runtime import runtime
 from .structs import StructType
@@ -86,6 +86,7 @@ class SourceModule:
         for name, module in imported.items():
             self.known.constants |= {n: k for n, k in module.known.constants.items() if n == name}
             self.known.literals |= module.known.literals_of(name)
+            self.known.arguments |= {n: a for n, a in module.known.arguments.items() if n == name}
         self._define(found, stubs)
         self.sizes = self._sizes()
         self.externs = {f.name: self._extern(f) for f in stubs}
@@ -96,7 +97,27 @@ class SourceModule:
             if isinstance(node, ast.Assign | ast.AnnAssign):
                 self._constant(node)
         self.known.functions |= {f.name: signature(f, self._sizes()) for f in functions}
-        self.run([define(f, self.known, {}) for f in functions if f not in stubs])
+        helpers = [f for f in functions if f not in stubs]
+        self.known.arguments |= {f.name: self._defaults(f) for f in helpers}
+        sized = [f for f in helpers if self._is_sized(f.name)]
+        self.run([define(f, self.known, {}) for f in helpers if f not in sized])
+        self.names |= {f.name: Sized(f, self.known, self.path) for f in sized}
+
+    def _is_sized(self, name: str) -> bool:
+        """Whether the sizes of a helper's arguments are those of a call."""
+        return any(isinstance(extent, str) for kind in self.known.functions[name][0] for extent in kind.shape)
+
+    def _defaults(self, node: ast.FunctionDef) -> dict[str, Any]:
+        """The arguments of a helper, each with the value of its default."""
+        found = {a.arg: REQUIRED for a in node.args.args}
+        behind = node.args.args[len(node.args.args) - len(node.args.defaults) :]
+        for argument, default in zip(behind, node.args.defaults, strict=True):
+            assert argument.annotation is not None
+            value, _ = Rewriter(self.known, {}).constant(default, kind_of(argument.annotation, self._sizes()))
+            name = f"fcsl.default {node.name} {argument.arg}"
+            self.run([ast.copy_location(ast.Assign([ast.Name(name, ast.Store())], value), default)])
+            found[argument.arg] = self.names.pop(name)
+        return found
 
     def _sizes(self) -> dict[str, int]:
         """The constants that may be sizes of arrays, as far as they are known."""

@@ -19,6 +19,8 @@ from .functions import CONVERSIONS, ON_INTEGERS, PREDICATES
 #: Sizes of an array: numbers, and names where they are not known yet (UNKNOWN: never).
 Shape = tuple[int | str, ...]
 UNKNOWN = "?"
+#: In the place of the default of an argument that has none.
+REQUIRED = object()
 
 
 @dataclass(frozen=True)
@@ -64,6 +66,8 @@ class Names:
     text: str = ""  # text of the file
     values: dict[str, Any] = field(default_factory=dict)  # of all names, as far as they are known
     parameters: Collection[str] = ()  # of an algorithm: those that an instance may freeze
+    #: Arguments of helpers by name, each with its default (REQUIRED: it has none).
+    arguments: dict[str, dict[str, Any]] = field(default_factory=dict)
     #: Makers of library functions for classes of arguments, by name (library.py).
     library: Mapping[str, Callable[..., Callable[..., Any]]] = field(default_factory=dict)
     #: Additional names in rewritten code: literals, and constants that denote literals, each with a type.
@@ -85,6 +89,11 @@ class Names:
     def is_constant(self, node: ast.expr) -> bool:
         """Whether an expression is the name of a constant."""
         return isinstance(node, ast.Name) and node.id in self.constants
+
+    def given(self, name: str, node: ast.Call) -> list[ast.expr | None]:
+        """The arguments of a call by position, None for one that has its default."""
+        named = {keyword.arg: keyword.value for keyword in node.keywords}
+        return [*node.args, *(named.get(argument) for argument in list(self.arguments.get(name, ()))[len(node.args) :])]
 
     def function(self, node: ast.Call) -> str:
         """The function that a call refers to. A library function with optional arguments has one overload per number of
@@ -360,8 +369,10 @@ class Inference:
 
     def _on_call(self, node: ast.Call) -> Seen:
         assert isinstance(node.func, ast.Name)
-        given = [self.expr(arg) for arg in node.args]
         name = self.names.function(node)
+        if name in self.names.functions:
+            return self._function(name, node)
+        given = [self.expr(arg) for arg in node.args]
         if name in self.names.members:
             members = self.names.members[name]
             for kind, seen in zip(members.values(), given, strict=False):
@@ -369,11 +380,6 @@ class Inference:
             for keyword in node.keywords:
                 self._same(_declared(members[str(keyword.arg)]), self.expr(keyword.value))
             return Seen(Node(name))
-        if name in self.names.functions:
-            wanted, result = self.names.functions[name]
-            for kind, seen in zip(wanted, given, strict=False):
-                self._same(_declared(kind), seen)
-            return _declared(_bound(result, wanted, given))
         if name in ("zeros", "eye"):
             for seen in given:
                 seen.node.index = True
@@ -390,6 +396,14 @@ class Inference:
             return Seen(Node("bool"))
         return Seen(operand.node, (), name == "sqrt" and given[0].literal)
 
+    def _function(self, name: str, node: ast.Call) -> Seen:
+        wanted, result = self.names.functions[name]
+        arguments = [None if argument is None else self.expr(argument) for argument in self.names.given(name, node)]
+        pairs = [(kind, seen) for kind, seen in zip(wanted, arguments, strict=False) if seen is not None]
+        for kind, seen in pairs:
+            self._same(_declared(kind), seen)
+        return _declared(_bound(result, pairs))
+
     def _conversion(self, name: str, given: Seen) -> Seen:
         """`f32(0.1)` is a literal of that type; `i32(3.7)` converts a literal."""
         target = CONVERSIONS[name]
@@ -404,12 +418,17 @@ def _declared(kind: Kind) -> Seen:
     return Seen(Node(kind.base, named=True), kind.shape, parts=kind.parts)
 
 
-def _bound(result: Kind, wanted: list[Kind], given: list[Seen]) -> Kind:
+def _bound(result: Kind, arguments: list[tuple[Kind, Seen]]) -> Kind:
     """The result of a function with the sizes that its arguments have."""
     sizes: dict[int | str, int | str] = {}
-    for kind, seen in zip(wanted, given, strict=False):
+    for kind, seen in arguments:
         sizes |= zip(kind.shape, seen.shape, strict=False)
-    return replace(result, shape=tuple(e if isinstance(e, int) else sizes.get(e, e) for e in result.shape))
+
+    def bound(kind: Kind) -> Kind:
+        shape = tuple(e if isinstance(e, int) else sizes.get(e, e) for e in kind.shape)
+        return replace(kind, shape=shape, parts=tuple(map(bound, kind.parts)))
+
+    return bound(result)
 
 
 def _connect(one: Node, other: Node) -> None:

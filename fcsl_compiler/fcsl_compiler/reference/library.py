@@ -59,6 +59,31 @@ def execute(body: list[ast.stmt], path: str, namespace: dict[str, Any]) -> None:
     exec(compile(tree, path, "exec"), namespace)
 
 
+class Sized:
+    """A function that is generic in the sizes of its arguments. Each combination of sizes gets a function of its own."""
+
+    def __init__(self, node: ast.FunctionDef, names: Names, path: str):
+        self._node, self._names, self._path = node, names, path
+        self._extents = [list(kind.shape) for kind in names.functions[node.name][0]]
+        self._made: dict[tuple[Any, ...], Callable[..., Any]] = {}
+
+    def __call__(self, *args: Any) -> Any:
+        shapes = tuple(arg.shape if isinstance(arg, Array) else () for arg in args)
+        if shapes not in self._made:
+            self._made[shapes] = self._for(bind_sizes(self._node.name, self._extents, shapes))
+        return self._made[shapes](*args)
+
+    def _for(self, sizes: Mapping[str, int]) -> Callable[..., Any]:
+        namespace = {**self._names.values, **sizes}
+        functions = {**self._names.functions, self._node.name: signature(self._node, sizes)}
+        names = replace(self._names, functions=functions, values=namespace, literals=dict(self._names.literals))
+        made = define(self._node, names, {size: Kind("int") for size in sizes})
+        namespace.update(names.literals)
+        execute([made], self._path, namespace)
+        function: Callable[..., Any] = namespace[self._node.name]
+        return function
+
+
 class Library:
     """All library functions. `functions` are generic; `signatures` are theirs."""
 
@@ -100,13 +125,13 @@ class Library:
         key = name, classes, plain
         if key not in self._made:
             shapes = [cls.shape if issubclass(cls, Array) else () for cls in classes]
-            sizes = _bind(name, [split_type(pattern)[1] for pattern in self._patterns(name)], shapes)
+            bind_sizes(name, [split_type(pattern)[1] for pattern in self._patterns(name)], shapes)
             try:
                 self._made[key] = self._unrolled(name, classes, plain)
             except TooLarge:
                 if plain:
                     raise
-                self._made[key] = self._with_loops(name, classes, sizes)
+                self._made[key] = self._with_loops(name, classes)
         return self._made[key]
 
     def _patterns(self, name: str) -> list[str]:
@@ -124,17 +149,13 @@ class Library:
         self._names[label] = self._function(name, classes, plain=True)
         return label
 
-    def _with_loops(self, name: str, classes: Classes, sizes: Mapping[str, int]) -> Callable[..., Any]:
+    def _with_loops(self, name: str, classes: Classes) -> Callable[..., Any]:
         """The function as it is written, for arrays that are too large."""
         if name in PRODUCTS:
             return partial(large_product, symmetric=name == "symmetric_product")
-        node, path = self._nodes[name], self._files[name]
-        namespace, known = {**self._names, **sizes}, {**self.signatures, name: signature(self._nodes[name], sizes)}
-        names = Names({}, known, text=self._texts[path], values=namespace, library=self.makers())
-        made = define(node, names, {size: Kind("int") for size in sizes})
-        namespace.update(names.literals)
-        execute([made], str(path), namespace)
-        function: Callable[..., Any] = namespace[name]
+        path = self._files[name]
+        names = Names({}, self.signatures, text=self._texts[path], values=self._names, library=self.makers())
+        function = Sized(self._nodes[name], names, str(path))
         constant = name == "transpose" and classes[0].zeros is not None
         return (lambda a: function(a).as_constant()) if constant else function
 
@@ -144,11 +165,11 @@ def library() -> Library:
     return Library()
 
 
-def _bind(name: str, extents: list[list[str]], shapes: Sequence[tuple[int, ...]]) -> dict[str, int]:
+def bind_sizes(name: str, extents: Sequence[Sequence[int | str]], shapes: Sequence[tuple[int, ...]]) -> dict[str, int]:
     """Sizes that match the declared shapes. Raises IllTyped."""
     sizes: dict[str, int] = {}
     for declared, shape in zip(extents, shapes, strict=True):
-        for extent, size in zip(declared, shape, strict=True):
+        for extent, size in zip(map(str, declared), shape, strict=True):
             if (int(extent) if extent.isdigit() else sizes.setdefault(extent, size)) != size:
                 raise IllTyped(f"{name} of arguments with shapes {shapes}")
     return sizes

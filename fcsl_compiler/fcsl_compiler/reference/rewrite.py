@@ -300,8 +300,18 @@ class Rewriter:
         if name in self.names.library:
             name = self._special(name, node.args)
         function = ast.copy_location(ast.Name(name, ast.Load()), node.func)
+        if name in self.names.arguments:
+            return ast.Call(function, self._arguments_of(name, node), [])
         named = [ast.keyword(keyword.arg, self.expr(keyword.value)) for keyword in node.keywords]
         return ast.Call(function, [self.expr(arg) for arg in node.args], named)
+
+    def _arguments_of(self, name: str, node: ast.Call) -> list[ast.expr]:
+        """All arguments of a helper, by position."""
+        defaults = self.names.arguments[name]
+        return [
+            self._named(f"fcsl.default {name} {argument}", defaults[argument]) if given is None else self.expr(given)
+            for argument, given in zip(defaults, self.names.given(name, node), strict=True)
+        ]
 
     def _special(self, name: str, args: list[ast.expr]) -> str:
         """The name of a library function for the classes of its arguments, if they are certain. It is made when it is
