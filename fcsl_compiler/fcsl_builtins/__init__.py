@@ -18,13 +18,14 @@ _FUNCTIONS = (
     # functions of scalars
     "sqrt sin cos tan asin acos atan atan2 sinh cosh tanh exp expm1 log log1p log2 log10 pow cbrt hypot floor ceil trunc round "
     "fmod copysign lerp wrap_angle isnan isinf isfinite abs min max clamp sign wrap_i32 wrap_i64 wrap_u32 wrap_u64 "
-    "sat_i32 sat_i64 sat_u32 sat_u64 wrap_add wrap_sub wrap_mul sat_add sat_sub sat_mul "
+    "sat_i32 sat_i64 sat_u32 sat_u64 where wrap_add wrap_sub wrap_mul sat_add sat_sub sat_mul "
     # array constructors, and the numeric library
     "zeros eye "
     "dot norm normalize cross3 skew outer trace diag transpose matvec matmul symmetric_product inv det lu_solve "
     "ldl_solve solve cholesky quat_mul quat_conj quat_normalize quat_rotate quat_to_dcm quat_from_axis_angle quat_turn "
     "quat_from_euler quat_to_euler quat_slerp kf_predict_state kf_predict_cov kf_gain kf_update_state kf_update_cov "
-    "kf_update_cov_joseph"
+    "kf_update_cov_joseph sum mean argmin argmax any all sort median "
+    "interp_cell interp interp2 interp3 extrapolate extrapolate2 extrapolate3"
 ).split()
 
 __all__ = ["extern", "pi", "inf", "nan", *_TYPES, *_HARDWARE, *_FUNCTIONS]
@@ -71,18 +72,17 @@ def _outside(name: str, what: str, stub: Callable[..., Any] | None = None) -> Ca
 
 def _compute(name: str, args: tuple[Any, ...]) -> Any:
     from fcsl_compiler.reference.functions import builtins
-
-    if name in builtins():
-        return builtins()[name](*args)
     from fcsl_compiler.reference.library import library
 
     functions = library().functions
     variant = f"{name}__{len(args)}"  # one overload for each number of arguments
+    if variant not in functions and name in builtins():
+        return builtins()[name](*args)
     return functions[variant if variant in functions else name](*map(_as_f64, args))
 
 
 def _as_f64(value: Any) -> Any:
-    """An argument of the library, which uses f64 only. Lists become arrays."""
+    """An argument of the library. Numbers become f64, lists arrays."""
     if isinstance(value, list):
         from fcsl_compiler.reference.arrays import array_of
         from fcsl_compiler.reference.types import SCALARS

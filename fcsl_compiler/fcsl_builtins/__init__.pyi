@@ -7,6 +7,7 @@ from collections.abc import Callable
 from typing import Any, Literal, TypeAlias, TypeVar, overload
 
 _Number = TypeVar("_Number", int, float)
+_Value = TypeVar("_Value", bool, int, float)
 _Array: TypeAlias = Any
 i32: TypeAlias = int
 i64: TypeAlias = int
@@ -127,17 +128,30 @@ def isfinite(x: float) -> bool:
 def abs(x: _Number) -> _Number:
     """|x|."""
 
+@overload
 def min(a: _Number, b: _Number, *more: _Number) -> _Number:
     """b if b < a else a."""
 
+@overload
+def min(x: _Array) -> float:
+    """min(x: T[n]) -> T: The least element."""
+
+@overload
 def max(a: _Number, b: _Number, *more: _Number) -> _Number:
     """b if b > a else a."""
+
+@overload
+def max(x: _Array) -> float:
+    """max(x: T[n]) -> T: The greatest element."""
 
 def clamp(x: _Number, low: _Number, high: _Number) -> _Number:
     """min(max(x, low), high)."""
 
 def sign(x: _Number) -> _Number:
     """1, -1, or x itself when it is zero or NaN."""
+
+def where(c: Any, a: _Value, b: _Value) -> _Value:
+    """a where c is True, else b; both are evaluated."""
 
 def wrap_i32(x: int) -> int:
     """x of any integer type, modulo 2^32, as i32."""
@@ -197,108 +211,153 @@ def hw_write_u32(address: int, value: int) -> None:
     """sets a board register or port."""
 
 def dot(a: _Array, b: _Array) -> float:
-    """dot(a: f64[n], b: f64[n]) -> f64: Σᵢ aᵢ bᵢ."""
+    """dot(a: F[n], b: F[n]) -> F: Σᵢ aᵢ bᵢ."""
 
 def norm(a: _Array) -> float:
-    """norm(a: f64[n]) -> f64: √(a·a), the Euclidean length."""
+    """norm(a: F[n]) -> F: √(a·a), the Euclidean length."""
 
 def normalize(a: _Array) -> _Array:
-    """normalize(a: f64[n]) -> f64[n]: a / ‖a‖."""
+    """normalize(a: F[n]) -> F[n]: a / ‖a‖."""
 
 def cross3(a: _Array, b: _Array) -> _Array:
-    """cross3(a: f64[3], b: f64[3]) -> f64[3]: a × b."""
+    """cross3(a: F[3], b: F[3]) -> F[3]: a × b."""
 
 def skew(v: _Array) -> _Array:
-    """skew(v: f64[3]) -> f64[3][3]: The matrix of a cross product: skew(v) w = v × w."""
+    """skew(v: F[3]) -> F[3][3]: The matrix of a cross product: skew(v) w = v × w."""
 
 def outer(a: _Array, b: _Array) -> _Array:
-    """outer(a: f64[n], b: f64[m]) -> f64[n][m]: a bᵀ."""
+    """outer(a: F[n], b: F[m]) -> F[n][m]: a bᵀ."""
 
 def trace(a: _Array) -> float:
-    """trace(a: f64[n][n]) -> f64: Σᵢ aᵢᵢ."""
+    """trace(a: F[n][n]) -> F: Σᵢ aᵢᵢ."""
 
 def diag(d: _Array) -> _Array:
-    """diag(d: f64[n]) -> f64[n][n]: The matrix with d on its diagonal and zeros elsewhere."""
+    """diag(d: F[n]) -> F[n][n]: The matrix with d on its diagonal and zeros elsewhere."""
 
 def transpose(a: _Array) -> _Array:
-    """transpose(a: f64[n][m]) -> f64[m][n]: aᵀ."""
+    """transpose(a: F[n][m]) -> F[m][n]: aᵀ."""
 
 def matvec(a: _Array, x: _Array) -> _Array:
-    """matvec(a: f64[n][m], x: f64[m]) -> f64[n]: a x."""
+    """matvec(a: F[n][m], x: F[m]) -> F[n]: a x."""
 
 def matmul(a: _Array, b: _Array) -> _Array:
-    """matmul(a: f64[n][k], b: f64[k][m]) -> f64[n][m]: a b."""
+    """matmul(a: F[n][k], b: F[k][m]) -> F[n][m]: a b."""
 
 def symmetric_product(a: _Array, b: _Array) -> _Array:
-    """symmetric_product(a: f64[n][k], b: f64[k][n]) -> f64[n][n]: a b where that is symmetric, as (F P) Fᵀ is for a symmetric P: its upper triangle, mirrored. The result is symmetric in"""
+    """symmetric_product(a: F[n][k], b: F[k][n]) -> F[n][n]: a b where that is symmetric, as (F P) Fᵀ is for a symmetric P: its upper triangle, mirrored. The result is symmetric in"""
 
 def inv(a: _Array) -> _Array:
-    """inv(a: f64[n][n]) -> f64[n][n]: a⁻¹ by Gauss-Jordan elimination with partial pivoting. To solve a system, `solve` is cheaper and more accurate."""
+    """inv(a: F[n][n]) -> F[n][n]: a⁻¹ by Gauss-Jordan elimination with partial pivoting. To solve a system, `solve` is cheaper and more accurate."""
 
 def det(a: _Array) -> float:
-    """det(a: f64[n][n]) -> f64: |a|, the determinant, by Gaussian elimination with partial pivoting."""
+    """det(a: F[n][n]) -> F: |a|, the determinant, by Gaussian elimination with partial pivoting."""
 
 def lu_solve(a: _Array, b: _Array) -> _Array:
-    """lu_solve(a: f64[n][n], b: f64[n][m]) -> f64[n][m]: x with a x = b for every column of b, by Gaussian elimination with partial pivoting."""
+    """lu_solve(a: F[n][n], b: F[n][m]) -> F[n][m]: x with a x = b for every column of b, by Gaussian elimination with partial pivoting."""
 
 def ldl_solve(a: _Array, b: _Array) -> _Array:
-    """ldl_solve(a: f64[n][n], b: f64[n][m]) -> f64[n][m]: x with a x = b for every column of b, for a symmetric and positive definite a, by elimination of one half of it without"""
+    """ldl_solve(a: F[n][n], b: F[n][m]) -> F[n][m]: x with a x = b for every column of b, for a symmetric and positive definite a, by elimination of one half of it without"""
 
 def solve(a: _Array, b: _Array) -> _Array:
-    """solve(a: f64[n][n], b: f64[n]) -> f64[n]: x with a x = b."""
+    """solve(a: F[n][n], b: F[n]) -> F[n]: x with a x = b."""
 
 def cholesky(a: _Array) -> _Array:
-    """cholesky(a: f64[n][n]) -> f64[n][n]: The lower triangular L with L Lᵀ = a, for a symmetric and positive definite a. Only its lower triangle is read."""
+    """cholesky(a: F[n][n]) -> F[n][n]: The lower triangular L with L Lᵀ = a, for a symmetric and positive definite a. Only its lower triangle is read."""
 
 def quat_mul(p: _Array, q: _Array) -> _Array:
-    """quat_mul(p: f64[4], q: f64[4]) -> f64[4]: p ⊗ q, the Hamilton product: the rotation q, then p."""
+    """quat_mul(p: F[4], q: F[4]) -> F[4]: p ⊗ q, the Hamilton product: the rotation q, then p."""
 
 def quat_conj(q: _Array) -> _Array:
-    """quat_conj(q: f64[4]) -> f64[4]: q* = (q₀, −q₁, −q₂, −q₃); the inverse of a unit quaternion."""
+    """quat_conj(q: F[4]) -> F[4]: q* = (q₀, −q₁, −q₂, −q₃); the inverse of a unit quaternion."""
 
 def quat_normalize(q: _Array) -> _Array:
-    """quat_normalize(q: f64[4]) -> f64[4]: q / ‖q‖."""
+    """quat_normalize(q: F[4]) -> F[4]: q / ‖q‖."""
 
 def quat_rotate(q: _Array, v: _Array) -> _Array:
-    """quat_rotate(q: f64[4], v: f64[3]) -> f64[3]: q v q* for a unit q: body coordinates v in the world."""
+    """quat_rotate(q: F[4], v: F[3]) -> F[3]: q v q* for a unit q: body coordinates v in the world."""
 
 def quat_to_dcm(q: _Array) -> _Array:
-    """quat_to_dcm(q: f64[4]) -> f64[3][3]: Rotation matrix body → world of a unit q: quat_to_dcm(q) v = quat_rotate(q, v)."""
+    """quat_to_dcm(q: F[4]) -> F[3][3]: Rotation matrix body → world of a unit q: quat_to_dcm(q) v = quat_rotate(q, v)."""
 
 def quat_from_axis_angle(axis: _Array, angle: float) -> _Array:
-    """quat_from_axis_angle(axis: f64[3], angle: f64) -> f64[4]: Rotation by angle (rad) about a unit axis: (cos(angle/2), axis sin(angle/2))."""
+    """quat_from_axis_angle(axis: F[3], angle: F) -> F[4]: Rotation by angle (rad) about a unit axis: (cos(angle/2), axis sin(angle/2))."""
 
 def quat_turn(q: _Array, turn: _Array) -> _Array:
-    """quat_turn(q: f64[4], turn: f64[3]) -> f64[4]: q ⊗ exp(turn / 2): the rotation q, turned further by the rotation vector turn (rad, in body axes)."""
+    """quat_turn(q: F[4], turn: F[3]) -> F[4]: q ⊗ exp(turn / 2): the rotation q, turned further by the rotation vector turn (rad, in body axes)."""
 
 def quat_from_euler(roll: float, pitch: float, yaw: float) -> _Array:
-    """quat_from_euler(roll: f64, pitch: f64, yaw: f64) -> f64[4]: ZYX Euler angles (rad): yaw about z, then pitch about the new y, then roll about the new x."""
+    """quat_from_euler(roll: F, pitch: F, yaw: F) -> F[4]: ZYX Euler angles (rad): yaw about z, then pitch about the new y, then roll about the new x."""
 
 def quat_to_euler(q: _Array) -> _Array:
-    """quat_to_euler(q: f64[4]) -> f64[3]: [roll, pitch, yaw] (rad, ZYX) of a unit q."""
+    """quat_to_euler(q: F[4]) -> F[3]: [roll, pitch, yaw] (rad, ZYX) of a unit q."""
 
 def quat_slerp(p: _Array, q: _Array, t: float) -> _Array:
-    """quat_slerp(p: f64[4], q: f64[4], t: f64) -> f64[4]: The rotation at t on the shortest way from p (t = 0) to q (t = 1), at constant rate; p and q are of unit length."""
+    """quat_slerp(p: F[4], q: F[4], t: F) -> F[4]: The rotation at t on the shortest way from p (t = 0) to q (t = 1), at constant rate; p and q are of unit length."""
 
 @overload
 def kf_predict_state(f: _Array, x: _Array) -> _Array:
-    """kf_predict_state(f: f64[n][n], x: f64[n]) -> f64[n]: x⁻ = F x."""
+    """kf_predict_state(f: F[n][n], x: F[n]) -> F[n]: x⁻ = F x."""
 
 @overload
 def kf_predict_state(f: _Array, x: _Array, b: _Array, u: _Array) -> _Array:
-    """kf_predict_state(f: f64[n][n], x: f64[n], b: f64[n][m], u: f64[m]) -> f64[n]: x⁻ = F x + B u."""
+    """kf_predict_state(f: F[n][n], x: F[n], b: F[n][m], u: F[m]) -> F[n]: x⁻ = F x + B u."""
 
 def kf_predict_cov(f: _Array, p: _Array, q: _Array) -> _Array:
-    """kf_predict_cov(f: f64[n][n], p: f64[n][n], q: f64[n][n]) -> f64[n][n]: P⁻ = F P Fᵀ + Q."""
+    """kf_predict_cov(f: F[n][n], p: F[n][n], q: F[n][n]) -> F[n][n]: P⁻ = F P Fᵀ + Q."""
 
 def kf_gain(p: _Array, h: _Array, r: _Array) -> _Array:
-    """kf_gain(p: f64[n][n], h: f64[m][n], r: f64[m][m]) -> f64[n][m]: K = P Hᵀ S⁻¹ with the innovation covariance S = H P Hᵀ + R."""
+    """kf_gain(p: F[n][n], h: F[m][n], r: F[m][m]) -> F[n][m]: K = P Hᵀ S⁻¹ with the innovation covariance S = H P Hᵀ + R."""
 
 def kf_update_state(x: _Array, k: _Array, z: _Array, h: _Array) -> _Array:
-    """kf_update_state(x: f64[n], k: f64[n][m], z: f64[m], h: f64[m][n]) -> f64[n]: x⁺ = x + K (z − H x)."""
+    """kf_update_state(x: F[n], k: F[n][m], z: F[m], h: F[m][n]) -> F[n]: x⁺ = x + K (z − H x)."""
 
 def kf_update_cov(p: _Array, k: _Array, h: _Array) -> _Array:
-    """kf_update_cov(p: f64[n][n], k: f64[n][m], h: f64[m][n]) -> f64[n][n]: P⁺ = (I − K H) P, for the K of kf_gain."""
+    """kf_update_cov(p: F[n][n], k: F[n][m], h: F[m][n]) -> F[n][n]: P⁺ = (I − K H) P, for the K of kf_gain."""
 
 def kf_update_cov_joseph(p: _Array, k: _Array, h: _Array, r: _Array) -> _Array:
-    """kf_update_cov_joseph(p: f64[n][n], k: f64[n][m], h: f64[m][n], r: f64[m][m]) -> f64[n][n]: P⁺ = (I − K H) P (I − K H)ᵀ + K R Kᵀ, for any K."""
+    """kf_update_cov_joseph(p: F[n][n], k: F[n][m], h: F[m][n], r: F[m][m]) -> F[n][n]: P⁺ = (I − K H) P (I − K H)ᵀ + K R Kᵀ, for any K."""
+
+def sum(x: _Array) -> float:
+    """sum(x: F[n]) -> F: Σᵢ xᵢ."""
+
+def mean(x: _Array) -> float:
+    """mean(x: F[n]) -> F: Σᵢ xᵢ / n."""
+
+def argmin(x: _Array) -> int:
+    """argmin(x: T[n]) -> i64: The index of the least element, of equal ones the first."""
+
+def argmax(x: _Array) -> int:
+    """argmax(x: T[n]) -> i64: The index of the greatest element, of equal ones the first."""
+
+def any(x: _Array) -> bool:
+    """any(x: bool[n]) -> bool: Whether an element is True."""
+
+def all(x: _Array) -> bool:
+    """all(x: bool[n]) -> bool: Whether every element is True."""
+
+def sort(x: _Array) -> _Array:
+    """sort(x: F[n]) -> F[n]: The elements in ascending order."""
+
+def median(x: _Array) -> float:
+    """median(x: F[n]) -> F: The middle element of sort(x), or the mean of the two."""
+
+def interp_cell(x: float, xs: _Array) -> int:
+    """interp_cell(x: F, xs: F[n]) -> i64: The i for which xᵢ ≤ x < xᵢ₊₁; 0 below all breakpoints, n − 2 above."""
+
+def extrapolate(x: float, xs: _Array, ys: _Array) -> float:
+    """extrapolate(x: F, xs: F[n], ys: F[n]) -> F: The line through the two points beside x; beyond the ends the first and the last line go on."""
+
+def interp(x: float, xs: _Array, ys: _Array) -> float:
+    """interp(x: F, xs: F[n], ys: F[n]) -> F: The line through the two points beside x; beyond the ends y₀ and yₙ₋₁."""
+
+def extrapolate2(x: float, y: float, xs: _Array, ys: _Array, zs: _Array) -> float:
+    """extrapolate2(x: F, y: F, xs: F[n], ys: F[m], zs: F[n][m]) -> F: Bilinear between the four points around (x, y); beyond the ends the outermost cells go on."""
+
+def interp2(x: float, y: float, xs: _Array, ys: _Array, zs: _Array) -> float:
+    """interp2(x: F, y: F, xs: F[n], ys: F[m], zs: F[n][m]) -> F: Bilinear between the four points around (x, y), each clamped to its breakpoints."""
+
+def extrapolate3(x: float, y: float, z: float, xs: _Array, ys: _Array, zs: _Array, ws: _Array) -> float:
+    """extrapolate3(x: F, y: F, z: F, xs: F[n], ys: F[m], zs: F[k], ws: F[n][m][k]) -> F: Trilinear between the eight points around (x, y, z); beyond the ends the outermost cells go on."""
+
+def interp3(x: float, y: float, z: float, xs: _Array, ys: _Array, zs: _Array, ws: _Array) -> float:
+    """interp3(x: F, y: F, z: F, xs: F[n], ys: F[m], zs: F[k], ws: F[n][m][k]) -> F: Trilinear between the eight points around (x, y, z), each clamped to its breakpoints."""

@@ -34,6 +34,7 @@ from collections.abc import Callable
 from typing import Any, Literal, TypeAlias, TypeVar, overload
 
 _Number = TypeVar("_Number", int, float)
+_Value = TypeVar("_Value", bool, int, float)
 _Array: TypeAlias = Any
 '''
 EXTERN = '''
@@ -55,6 +56,8 @@ def builtin(name: str, doc: str) -> str:
     """Signatures follow from the op table: generic if the function accepts integers and floats."""
     call, meaning = doc.split(": ", 1)
     names = re.findall(r"\w+", call)[1:]
+    if name == "where":
+        return function(name, "c: Any, a: _Value, b: _Value", "_Value", meaning)
     kinds = [op for op in ops.all_ops() if op.name == name]
     taken = _KINDS[" ".join(k for k in ("int", "float") if any(op.args[0].is_integer == (k == "int") for op in kinds))]
     results = {op.result for op in kinds}
@@ -63,7 +66,8 @@ def builtin(name: str, doc: str) -> str:
     if one is not None and taken == "_Number":  # a type variable links the types of argument and result
         taken = "float"
     arguments = [f"{n}: {taken}" for n in names] + ([f"*more: {taken}"] if name in ("min", "max") else [])
-    return function(name, ", ".join(arguments), result, meaning)
+    text = function(name, ", ".join(arguments), result, meaning)
+    return f"\n@overload{text}" + library_function(name) if name in library_names() else text
 
 
 def python_type(t: Type | None) -> str:
@@ -79,13 +83,14 @@ def hardware(name: str, doc: str) -> str:
 def library_function(name: str) -> str:
     """One signature, or one for each number of arguments."""
     found = [library_signature(name, node) for node in overloads(name)]
-    return found[0] if len(found) == 1 else "".join(f"\n@overload{text}" for text in found)
+    return found[0] if len(found) == 1 and name not in ops.BUILTINS else "".join(f"\n@overload{text}" for text in found)
 
 
 def library_signature(name: str, node: ast.FunctionDef) -> str:
     def hint(annotation: ast.expr | None) -> str:
         assert isinstance(annotation, ast.Constant)
-        return "_Array" if "[" in str(annotation.value) else "float"
+        text = str(annotation.value)
+        return "_Array" if "[" in text else {"bool": "bool", "i64": "int"}.get(text, "float")
 
     def written(a: ast.arg) -> str:
         assert isinstance(a.annotation, ast.Constant)
@@ -112,7 +117,7 @@ def stub() -> str:
         text += function(name, argument, "_Array", doc.split(": ", 1)[1])
     text += "".join(builtin(name, doc) for name, doc in ops.BUILTINS.items() if name not in SCALARS)
     text += "".join(hardware(name, doc) for name, doc in HARDWARE_DOC.items())
-    return text + "".join(library_function(name) for name in library_names())
+    return text + "".join(library_function(name) for name in library_names() if name not in ops.BUILTINS)
 
 
 def test_the_stub_is_the_language() -> None:

@@ -413,8 +413,8 @@ def test_explain_knows_functions(capsys: pytest.CaptureFixture[str]) -> None:
     for name in function_names():
         assert main(["explain", name]) == 0
     text = capsys.readouterr().out
-    assert "kf_gain(p: f64[n][n], h: f64[m][n], r: f64[m][m]) -> f64[n][m]" in text
-    assert "kf_predict_state(f: f64[n][n], x: f64[n], b: f64[n][m], u: f64[m]) -> f64[n]" in text
+    assert "kf_gain(p: F[n][n], h: F[m][n], r: F[m][m]) -> F[n][m]" in text
+    assert "kf_predict_state(f: F[n][n], x: F[n], b: F[n][m], u: F[m]) -> F[n]" in text
     assert main(["explain", "kf_gan"]) == 2
     assert "did you mean `kf_gain`?" in capsys.readouterr().err
 

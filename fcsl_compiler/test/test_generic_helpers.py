@@ -182,3 +182,65 @@ class Law:
     assert line in [found.span.line, *(note.span.line for note in found.notes)]
     if call.startswith("last"):
         assert found.notes[0].text == "called here, with n = 3"
+
+
+AVERAGE = '''
+"""Two sizes of one class."""
+
+
+def last(x: "f64[n]") -> f64:
+    return x[n - 1]
+
+
+class Average:
+    inputs = {"u": "f64[m]"}
+    outputs = {"y": "f64", "z": "f32"}
+    state = {"buffer": "f64[n][m]", "count": "i64"}
+
+    def execute(self):
+        for i in range(n - 1, 0, -1):
+            self.buffer[i] = self.buffer[i - 1]
+        self.buffer[0] = self.u
+        self.count = min(self.count + 1, n)
+        self.y = sum(self.buffer[n - 1]) / m + f64(self.count) + last(self.u)
+        self.z = f32(self.y) * n
+'''
+
+
+def sized(folder: Path, **entries: dict[str, int]) -> Path:
+    algorithms = {name: {"source": "average.py", "class": "Average", "sizes": s} for name, s in entries.items()}
+    return write_one_each(folder, {"average.py": AVERAGE}, algorithms)
+
+
+def test_a_class_with_two_sizes(tmp_path: Path) -> None:
+    twins, rng = Twins(sized(tmp_path, Short={"n": 2, "m": 3}, Long={"n": 5, "m": 1})), random.Random(5)
+    rows = {"short": np.zeros((2, 3)), "long": np.zeros((5, 1))}
+    for tick in range(1, 9):
+        for name in rows:
+            u = [rng.uniform(-1, 1) for _ in range(rows[name].shape[1])]
+            rows[name] = np.vstack([u, rows[name][:-1]])
+            twins.set(f"{name}.inputs.u", u)
+        twins.step()
+        for name, buffer in rows.items():
+            n, m = buffer.shape
+            y = buffer[-1].sum() / m + min(tick, n) + buffer[0, -1]
+            assert twins.native.get(f"{name}.outputs.y") == pytest.approx(y, rel=1e-12)
+            assert twins.native.get(f"{name}.outputs.z") == float(
+                np.float32(twins.native.get(f"{name}.outputs.y")) * np.float32(n)
+            )
+
+
+@pytest.mark.parametrize(
+    ("sizes", "code", "message"),
+    [
+        ({"n": 2}, "E202", "`Short` has no size `m`"),
+        ({"n": 2, "m": 3, "k": 1}, "E206", "`Average` has no size `k`"),
+        ({"n": 0, "m": 1}, "E204", "size `n` is 0"),
+        ({"n": 300, "m": 300}, "E301", "f64[300][300] holds 90000 scalars"),
+        ({}, "E301", "`m` is not an array size"),
+    ],
+)
+def test_wrong_sizes(tmp_path: Path, sizes: dict[str, int], code: str, message: str) -> None:
+    with pytest.raises(DiagnosticError) as caught:
+        build_machine(sized(tmp_path, Short=sizes))
+    assert [(d.code, d.message) for d in caught.value.diagnostics][0] == (code, message)

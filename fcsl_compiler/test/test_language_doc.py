@@ -46,17 +46,19 @@ def test_every_type_and_constructor_is_described() -> None:
 
 
 def test_files_that_share_helpers(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
-    """Blocks with file names compile together as a machine with the class of the last one."""
+    """Blocks with file names compile together as a machine with the classes of the last two."""
     files = re.findall(r"^```python (\w+\.py)\n(.*?)^```$", DOC.read_text(), re.DOTALL | re.MULTILINE)
-    assert [name for name, _ in files] == ["frames.py", "heading.py"]
+    assert [name for name, _ in files] == ["frames.py", "heading.py", "average.py"]
     for name, text in files:
         (tmp_path / name).write_text(text)
+    (algorithms,) = re.findall(r'^```json\n"algorithms": (\{"Short".*)$', DOC.read_text(), re.MULTILINE)
+    sized = json.loads(algorithms)
     machine = {
         "tick_hz": 10,
         "initial_state": "RUN",
-        "algorithms": {"Heading": {"source": "heading.py"}},
-        "instances": {"heading": {"algorithm": "Heading"}},
-        "states": {"RUN": {"schedule": {"heading": 10}}},
+        "algorithms": {"Heading": {"source": "heading.py"}, **sized},
+        "instances": {"heading": {"algorithm": "Heading"}, "short": {"algorithm": "Short"}},
+        "states": {"RUN": {"schedule": {"heading": 10, "short": 10}}},
     }
     (tmp_path / "craft.json").write_text(json.dumps(machine))
     assert main(["check", str(tmp_path / "craft.json")]) == 0

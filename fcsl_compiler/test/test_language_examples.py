@@ -16,6 +16,7 @@ import pytest
 from fcsl_compiler.base.diagnostics import DiagnosticSink
 from fcsl_compiler.base.source import SourceFile
 from fcsl_compiler.check.algorithm import check_algorithm
+from fcsl_compiler.check.algorithm_class import size_variables
 from fcsl_compiler.check.modules import Modules
 from fcsl_compiler.config.structs import read_structs
 from fcsl_compiler.model.program import Program
@@ -47,12 +48,21 @@ def refused(name: str, text: str) -> list[tuple[int, str]]:
     sink = DiagnosticSink()
     node = parse_json(SourceFile("structs", STRUCTS), sink)
     file = parsed(name, text, sink)
-    used = {name: re.findall(r"^class (\w+)", text, re.MULTILINE)}
+    open_ = (
+        {n.name for n in file.tree.body if isinstance(n, ast.ClassDef) and size_variables(n, ())}
+        if file.tree
+        else set()
+    )
+    used = {name: set(re.findall(r"^class (\w+)", text, re.MULTILINE)) - open_}
     modules = Modules(Program(read_structs(node, ConfigReader(sink))), used, sink)
     declarations = modules.load(file)
     assert declarations is not None
-    for class_ in declarations.classes.values():
-        check_algorithm(class_.name, class_, (name,), modules.table(declarations), declarations.sound, sink)
+    for node_ in declarations.tree.body:
+        if isinstance(node_, ast.ClassDef):
+            sizes = dict.fromkeys(size_variables(node_, declarations.defined), 4)
+            class_ = modules.read_sized(declarations, node_, sizes) if sizes else declarations.classes[node_.name]
+            table = modules.table(declarations)
+            check_algorithm(class_.name, class_, (name,), table, declarations.sound, sink, sizes)
     return sorted((d.span.line, d.code) for d in sink.diagnostics)
 
 

@@ -8,6 +8,7 @@ from typing import Any
 
 import numpy as np
 import pytest
+import test_arrays
 import test_kalman
 import test_linear_systems
 from fcsl_test_numbers import ROUNDING, Array, gamma, run_both, within
@@ -106,7 +107,7 @@ def random_inputs(rng: np.random.Generator) -> dict[str, Any]:
 
 
 def test_every_library_function_is_tested() -> None:
-    texts = TEXT + test_linear_systems.text(3) + test_kalman.TEXT
+    texts = TEXT + test_linear_systems.text(3) + test_kalman.TEXT + Path(test_arrays.__file__).read_text()
     for name in library_names():
         assert texts.count(f"{name}(") >= len(overloads(name)), name
 

@@ -29,9 +29,9 @@ difference. Where a row says nothing else, a NaN among the operands gives NaN.
 LIBRARY_HEAD = """
 # Numeric library
 
-These functions work on `f64`. They are written in the language itself (`fcsl_compiler/fcsl_compiler/library/`); the
-compiler checks and compiles them for each combination of sizes in use. Size variables (`n`, `m`, `k`) stand for
-constants. Sums run from left to right and start from the first product. A NaN among the elements comes out wherever it
+These functions are written in the language itself (`fcsl_compiler/fcsl_compiler/library/`); the compiler checks and
+compiles them for each combination of types and sizes in use. `F` is `f64` or `f32`, `T` any number, the same in all
+arguments. Size variables (`n`, `m`, `k`) stand for constants. Sums run from left to right and start from the first product. A NaN among the elements comes out wherever it
 enters an operation. `test_linear_systems.py` compares their accuracy with exact arithmetic, within the bounds of error
 analysis, and with NumPy, SciPy and filterpy.
 """
@@ -39,6 +39,8 @@ HEADINGS = {
     "linear_algebra": "Vectors and matrices",
     "quaternion": "Quaternions: scalar first, body → world",
     "kalman": "Kalman filter",
+    "arrays": "Sums and order of vectors",
+    "tables": "Tables",
 }
 
 
@@ -48,7 +50,7 @@ def cell(text: str) -> str:
 
 def operands(name: str) -> str:
     """Text of the types that the function takes."""
-    found = {str(op.args[0]) for op in ops.all_ops() if op.name == name}
+    found = {str(op.args[-1]) for op in ops.all_ops() if op.name == name} - {"bool"}
     kinds = {
         "every number": {str(t) for t in NUMBERS},
         "floats": {"f32", "f64"},
@@ -88,7 +90,7 @@ def sections(node: ast.FunctionDef) -> dict[str, str]:
 
 
 def file_of(name: str) -> str:
-    return Path(library()[name][0].source.name).stem
+    return Path(library()[overloads(name)[0].name][0].source.name).stem
 
 
 def index() -> str:

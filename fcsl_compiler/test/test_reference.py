@@ -12,7 +12,7 @@ import pytest
 
 from fcsl_compiler.reference.algorithm import Algorithm, SourceModule, declare_structs
 from fcsl_compiler.reference.arrays import Array, array_type
-from fcsl_compiler.reference.library import library
+from fcsl_compiler.reference.library import _WITH_LOOPS, library
 from fcsl_compiler.reference.structs import Struct
 from fcsl_compiler.reference.types import SCALARS
 from fcsl_compiler.reference.unroll import TooLarge
@@ -259,13 +259,15 @@ def packed(value: Any) -> Any:
     return type(value), ["nan" if math.isnan(n) else struct.pack("<d", n) for n in numbers]
 
 
-@pytest.mark.parametrize("name", sorted(library().functions))
+@pytest.mark.parametrize("name", sorted(n for n, f in library()._files.items() if f.stem not in _WITH_LOOPS))
 def test_a_library_function_without_loops_gives_the_bits_of_its_source(name: str) -> None:
     functions, rng = library(), random.Random(name)
     for round_ in range(60):
         sizes = {size: rng.randint(1, 4) for size in "nmk"}
         patterns = functions._patterns(name)
-        args = [argument(p, sizes, rng, constant=round_ > 9 and rng.random() < 0.5) for p in patterns]
+        args = [
+            argument(p.replace("F", "f64"), sizes, rng, constant=round_ > 9 and rng.random() < 0.5) for p in patterns
+        ]
         classes, shapes = tuple(map(type, args)), [getattr(arg, "shape", ()) for arg in args]
         loops = functions._with_loops(name, classes)(*args)
         assert packed(functions._unrolled(name, classes, plain=False)(*args)) == packed(loops), f"{shapes}: {args}"

@@ -4,11 +4,14 @@
 from __future__ import annotations
 
 import ast
+from collections.abc import Mapping
+from types import MappingProxyType
 
 from ..base.diagnostics import DiagnosticSink
 from ..base.source import Span
 from ..model import ir
 from ..model.effects import warn_fault_after_effect
+from ..model.types import TypeNames
 from ..parse.python_source import span_of
 from .algorithm_class import AlgorithmClass, name_span
 from .declarations import Declarations
@@ -17,14 +20,22 @@ from .functions import FunctionTable
 from .scope import Scope
 from .statements import BodyChecker
 
+NO_SIZES: Mapping[str, int] = MappingProxyType({})
+
 
 def check_algorithm(
-    name: str, found: AlgorithmClass, files: tuple[str, ...], table: FunctionTable, sound: bool, sink: DiagnosticSink
+    name: str,
+    found: AlgorithmClass,
+    files: tuple[str, ...],
+    table: FunctionTable,
+    sound: bool,
+    sink: DiagnosticSink,
+    sizes: Mapping[str, int] = NO_SIZES,
 ) -> ir.Algorithm:
     """Checks the methods of a class. If the class has an error, or its file is not `sound`, the result has the ports
     and an empty `execute`. Its instances and connections are then still checked in the same run.
 
-    `files`: names of the algorithm's file and of the files it imports from.
+    `files`: names of the algorithm's file and of the files it imports from. `sizes`: those that the machine JSON binds.
     """
     declarations, before = table.declarations, sink.errors
     owner = f"alg_{name}"
@@ -32,8 +43,8 @@ def check_algorithm(
         why, fix = "it is the method that runs in a tick", "def execute(self):"
         sink.error("E309", f"`{found.name}` has no `execute`", found.span, why=why, help=fix)
     requests: dict[str, Span] = {}
-    execute = _method(declarations, found, "execute", owner, table, requests, sink)
-    start = _method(declarations, found, "start", owner, table, requests, sink)
+    execute = _method(declarations, found, "execute", owner, table, requests, sink, sizes)
+    start = _method(declarations, found, "start", owner, table, requests, sink, sizes)
     complete = sound and execute is not None and sink.errors == before
     if not complete or execute is None:
         execute = ir.Function(f"{owner}__execute", "execute", (), (), None, (), (), False, (), found.span)
@@ -85,6 +96,7 @@ def _method(
     table: FunctionTable,
     requests: dict[str, Span],
     sink: DiagnosticSink,
+    sizes: Mapping[str, int],
 ) -> ir.Function | None:
     """Checks one method. Returns None if the class lacks it or after reporting an error. Adds the requests that the
     method names to `requests`."""
@@ -96,7 +108,7 @@ def _method(
         declarations.constants,
         table,
         {},
-        declarations.names,
+        TypeNames({**declarations.names.sizes, **sizes}, declarations.names.structs),
         wrong=declarations.wrong,
         uses_library=declarations.uses_library,
         algorithm=found,

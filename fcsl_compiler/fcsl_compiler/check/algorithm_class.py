@@ -7,6 +7,7 @@ from __future__ import annotations
 import ast
 import keyword
 import re
+from collections.abc import Collection
 from dataclasses import dataclass, field
 
 from ..base.diagnostics import DiagnosticSink, misspelt, nearest
@@ -17,7 +18,7 @@ from ..model.ranges import UNBOUNDED, Range, parse_range, split_range
 from ..model.ros_names import ros_field
 from ..model.types import HEALTH, REQUEST, Type, TypeNames, TypeSyntaxError
 from ..parse.python_source import span_of
-from .annotations import MAX_TYPE, annotation_type
+from .annotations import MAX_TYPE, annotation_type, sizes_in
 
 METHODS = ("start", "execute")
 
@@ -73,6 +74,13 @@ def read_class(
     for name, type_ in (("transition_request", REQUEST), ("health", HEALTH)):
         found.ports["outputs"].append(ir.Port(name, type_, "", "", source.whole()))
     return found
+
+
+def size_variables(node: ast.ClassDef, declarations: Collection[str]) -> list[str]:
+    """The lower-case names in the sizes of a class's ports that its file does not define."""
+    values = (s.value for s in node.body if isinstance(s, ast.Assign | ast.AnnAssign))
+    texts = (v.value for d in values if isinstance(d, ast.Dict) for v in d.values if isinstance(v, ast.Constant))
+    return sizes_in((str(text) for text in texts), declarations)
 
 
 class _Reader:

@@ -4,12 +4,16 @@
 from __future__ import annotations
 
 import ast
+import re
+from collections.abc import Collection, Iterable
 
 from ..base.diagnostics import DiagnosticSink
 from ..base.source import SourceFile
 from ..model.types import Type, TypeNames, TypeSyntaxError, parse_type, results_of
 from ..parse.python_source import span_of
 
+#: A size in a type.
+SIZE = re.compile(r"\[\s*(\w+)\s*\]")
 #: Maximum number of characters of a type with its unit and range.
 MAX_TYPE = 200
 
@@ -41,6 +45,12 @@ def result_type(source: SourceFile, node: ast.expr, names: TypeNames, sink: Diag
     types = [annotation_type(source, part, names, False, sink) for part in parts]
     found_types = tuple(t[0] for t in types if t is not None)
     return results_of(found_types) if len(found_types) == len(parts) else None
+
+
+def sizes_in(texts: Iterable[str], defined: Collection[str]) -> list[str]:
+    """The lower-case names in the sizes of these types that are not `defined`: size variables."""
+    found = dict.fromkeys(size for text in texts for size in SIZE.findall(text))
+    return [size for size in found if size[0].isalpha() and size.islower() and size not in defined]
 
 
 def annotation_text(node: ast.expr) -> str | None:

@@ -12,7 +12,7 @@ from ..base.source import Span
 from ..model import ir, ops
 from ..model.effects import HARDWARE, can_fault
 from ..model.literals import fit
-from ..model.types import F64, MAX_ELEMENTS, Array, Scalar, Struct
+from ..model.types import MAX_ELEMENTS, Array, Scalar, Struct
 from .algorithm_class import METHODS
 from .checker import Checker, Stop
 from .scope import CONSTRUCTORS
@@ -122,19 +122,17 @@ class CallChecker(Checker):
     def _builtin(self, name: str, node: ast.Call, span: Span) -> ir.Expr:
         arity = ops.arity_of(name)
         variadic = name in ("min", "max")
+        if variadic and len(node.args) == 1:
+            return self._function(name, node, span)  # the least or greatest element of an array
         if len(node.args) != arity and not (variadic and len(node.args) > arity):
             wanted = f"at least {arity}" if variadic else str(arity)
             self.fail(
                 "E416", f"`{name}` takes {wanted} argument(s), not {len(node.args)}", span, help=ops.BUILTINS[name]
             )
         args = [self.not_a_string(self.raw(a)) for a in node.args]
-        for arg in args:
-            if isinstance(arg.type, Array):
-                fix = f"`{name}` works on scalars; loop over the elements"
-                self.fail("E413", f"`{name}` of a {arg.type}", arg.span, help=fix)
-        result = self.apply(name, tuple(args[:arity]), span)
+        result = self.elementwise(name, tuple(args[:arity]), name, span)
         for extra in args[arity:]:
-            result = self.apply(name, (result, extra), span)
+            result = self.elementwise(name, (result, extra), name, span)
         return result
 
     def _constructor(self, name: str, node: ast.Call, span: Span) -> ir.Expr:
@@ -155,9 +153,10 @@ class CallChecker(Checker):
             self.fail("E416", f"`{name}` with {len(node.args)} argument(s)", span, help=CONSTRUCTORS[name])
         if count > MAX_ELEMENTS:
             self.fail("E417", f"an array of {count} elements", span, help=f"at most {MAX_ELEMENTS} fit")
-        one, zero = ir.Const(F64, 1.0, span), ir.Const(F64, 0.0, span)
+        type_ = self.inference.variable_type(node)
+        one, zero = ir.Const(type_, fit(1, type_), span), ir.Const(type_, fit(0, type_), span)
         items = tuple(one if name == "eye" and i % (sizes[0] + 1) == 0 else zero for i in range(count))
-        return ir.ArrayValue(Array(F64, tuple(sizes)), items, span)
+        return ir.ArrayValue(Array(type_, tuple(sizes)), items, span)
 
     def _length(self, node: ast.Call, span: Span) -> ir.Expr:
         """`len(x)`: the size of the first dimension, an integer literal."""
@@ -233,7 +232,8 @@ class CallChecker(Checker):
     def _function(self, name: str, node: ast.Call, span: Span) -> ir.Expr:
         given = self._given(name, node, span)
         declared, _ = self.scope.functions.declared(name, len(given))
-        args = [self.raw(a, type_) for a, type_ in zip(given, declared, strict=True) if a is not None]
+        wanted = [None if isinstance(type_, str) else type_ for type_ in declared]
+        args = [self.raw(a, type_) for a, type_ in zip(given, wanted, strict=True) if a is not None]
         defaults = self.scope.functions.arguments(name)
         if defaults is not None:
             for position, (argument, a) in enumerate(zip(defaults.names, given, strict=True)):
@@ -243,13 +243,13 @@ class CallChecker(Checker):
         if signature is None:
             raise Stop
         settled = tuple(self.settle(a, t) for a, t in zip(args, signature.arguments, strict=True))
-        for position, (arg, wanted) in enumerate(zip(settled, signature.arguments, strict=True)):
-            if arg.type != wanted:
-                both = [t for t in (arg.type, wanted) if isinstance(t, Scalar) and t.is_number]
-                fix = f"convert: {wanted}(…)" if len(both) == 2 else ""
+        for position, (arg, type_) in enumerate(zip(settled, signature.arguments, strict=True)):
+            if arg.type != type_:
+                both = [t for t in (arg.type, type_) if isinstance(t, Scalar) and t.is_number]
+                fix = f"convert: {type_}(…)" if len(both) == 2 else ""
                 self.fail(
                     "E402",
-                    f"argument {position + 1} of `{name}` is {wanted}, not {arg.type}",
+                    f"argument {position + 1} of `{name}` is {type_}, not {arg.type}",
                     arg.span,
                     why="types never mix implicitly" if isinstance(arg.type, Scalar) else "",
                     help=fix,

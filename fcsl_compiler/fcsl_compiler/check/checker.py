@@ -13,7 +13,7 @@ from ..base.diagnostics import DiagnosticSink, nearest
 from ..base.source import Span
 from ..model import ir, ops
 from ..model.literals import STRING_LITERAL
-from ..model.types import BOOL, F64, HEALTH, HEALTH_NAMES, REQUEST, SCALARS, Array, Results, Scalar, Type
+from ..model.types import BOOL, HEALTH, HEALTH_NAMES, REQUEST, SCALARS, Array, Results, Scalar, Type
 from ..parse.python_source import span_of
 from .folding import DoesNotFit, fold
 from .inference import Inference
@@ -111,6 +111,8 @@ class Checker:
         fix = ""
         if isinstance(have, Scalar) and isinstance(want, Scalar) and have.is_number and want.is_number:
             fix = f"convert: {want}(…)"
+        elif want is BOOL and isinstance(have, Array) and have.element is BOOL:
+            fix = "write `all(…)` or `any(…)`"
         elif want is BOOL:
             other = "0" if have not in (HEALTH, REQUEST) else '"failed"' if have == HEALTH else '""'
             fix = f"write a comparison, such as `x != {other}`"
@@ -129,7 +131,11 @@ class Checker:
         elif isinstance(have, Array) and isinstance(want, Array):
             fix = "the shapes and element types must be the same"
         elif isinstance(want, Array):
-            fix = f"write `zeros({', '.join(map(str, want.shape))})` or `[…]`" if want.element is F64 else "write `[…]`"
+            fix = (
+                f"write `zeros({', '.join(map(str, want.shape))})` or `[…]`"
+                if getattr(want.element, "is_number", False)
+                else "write `[…]`"
+            )
         why = "types never mix implicitly" if isinstance(have, Scalar) and isinstance(want, Scalar) else ""
         self.fail(
             "E402", f"{what} is {want}, not {have}", expr.span, why=why, help=fix, notes=(*notes, *self.origin(expr))
@@ -194,6 +200,10 @@ class Checker:
         """A new hidden local for this value, bound by an ir.Let."""
         self._shared += 1
         return ir.Local(value.type, f"shared.{self._shared}", value.span)
+
+    def elementwise(self, name: str, args: tuple[ir.Expr, ...], symbol: str, span: Span) -> ir.Expr:
+        """An operation, applied element by element if an operand is an array."""
+        raise NotImplementedError
 
     def raw(self, node: ast.expr, want: Type | None = None) -> ir.Expr:
         """Like `check`, but a string keeps its type STRING_LITERAL."""

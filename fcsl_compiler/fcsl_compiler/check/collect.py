@@ -33,7 +33,7 @@ IMPORTABLE = (
 
 def importable() -> list[str]:
     """All names of fcsl_builtins."""
-    return [*IMPORTABLE, *library_names()]
+    return list(dict.fromkeys((*IMPORTABLE, *library_names())))
 
 
 def collect(

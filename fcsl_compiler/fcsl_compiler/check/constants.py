@@ -32,7 +32,7 @@ class _NoFunctions:
     def names(self) -> list[str]:
         return []
 
-    def declared(self, name: str, count: int) -> tuple[list[Type | None], Type | None]:
+    def declared(self, name: str, count: int) -> tuple[list[Type | str | None], Type | str | None]:
         raise AssertionError(name)
 
     def arguments(self, name: str) -> Arguments | None:

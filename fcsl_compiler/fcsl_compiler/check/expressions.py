@@ -9,7 +9,7 @@ from ..base.source import Span
 from ..model import ir
 from ..model.effects import can_fault
 from ..model.literals import STRING_LITERAL, LiteralError
-from ..model.types import BOOL, HEALTH, REQUEST, Array, Scalar, Struct, Type, shape_of
+from ..model.types import BOOL, HEALTH, REQUEST, Array, Scalar, Struct, Type, element_of, shape_of
 from .calls import CallChecker
 from .effect_order import reaches_outside
 from .places import PlaceChecker
@@ -28,6 +28,7 @@ _BINARY = {
     ast.BitOr: "|",
     ast.BitXor: "^",
 }
+_OPERATORS = frozenset(_BINARY.values())
 _COMPARE = {ast.Lt: "<", ast.LtE: "<=", ast.Gt: ">", ast.GtE: ">=", ast.Eq: "==", ast.NotEq: "!="}
 
 _INSTEAD: dict[type[ast.AST], tuple[str, str]] = {
@@ -126,13 +127,11 @@ class ExprChecker(CallChecker, PlaceChecker):
         if not arrays:
             return self.apply(name, args, span, symbol)
         shapes = {shape_of(a.type) for a in arrays}
-        allowed = name == "neg" or (symbol in "+-" and len(arrays) == 2) or (symbol in "*/" and len(arrays) == 1)
-        if symbol == "/" and isinstance(args[-1].type, Array):
-            allowed = False
-        if not allowed:
+        if symbol in _OPERATORS and not _is_elementwise(symbol, args, max(map(len, shapes))):
             self.fail("E413", f"`{symbol}` between {args[0].type} and {args[-1].type}", span, help=_array_hint(symbol))
         if len(shapes) > 1:
-            self.fail("E413", f"`{symbol}` between {args[0].type} and {args[-1].type}", span, why="the shapes differ")
+            both = f"{arrays[0].type} and {next(a.type for a in arrays if a.type != arrays[0].type)}"
+            self.fail("E413", f"`{symbol}` between {both}", span, why="the shapes differ")
         scalars = tuple(a.type.element if isinstance(a.type, Array) else a.type for a in args)
         op = self.find(name, scalars, args, symbol, span)
         if op.faults:
@@ -194,12 +193,15 @@ class ExprChecker(CallChecker, PlaceChecker):
         for position, operator in enumerate(node.ops):
             symbol = _COMPARE[type(operator)]
             left, right = self.meet(operands[position], operands[position + 1])
-            if isinstance(left.type, Array | Struct) or isinstance(right.type, Array | Struct):
-                what = "arrays" if isinstance(left.type, Array) or isinstance(right.type, Array) else "structs"
-                self.fail("E413", f"`{symbol}` on {what}", span, help="compare their numbers")
+            parts = [element_of(t) for t in (left.type, right.type)]
+            if any(isinstance(part, Struct) for part in parts):
+                self.fail("E413", f"`{symbol}` on structs", span, help="compare their numbers")
+            if len(node.ops) > 1 and any(isinstance(t, Array) for t in (left.type, right.type)):
+                fix = "write two comparisons, and `where(first, second, False)`"
+                self.fail("E413", "a chain of comparisons on arrays", span, help=fix)
             # A chain a < b < c shares b: the type that b gets from a must also be its type for c.
             operands[position], operands[position + 1] = left, right
-            tests.append(self.apply(symbol, (left, right), span))
+            tests.append(self.elementwise(symbol, (left, right), symbol, span))
         result = tests[-1]
         for position in reversed(range(len(tests) - 1)):
             result = ir.Choose(BOOL, tests[position], result, ir.Const(BOOL, False, span), span)
@@ -273,9 +275,18 @@ class ExprChecker(CallChecker, PlaceChecker):
         return [s for row in rows for s in self._scalars(row)] if rest else list(rows)
 
 
+def _is_elementwise(symbol: str, args: tuple[ir.Expr, ...], rank: int) -> bool:
+    """Whether an operator of these operands is that of their elements. Of two matrices, `*` and `/` could mean their
+    product or quotient as well."""
+    arrays = sum(isinstance(a.type, Array) for a in args)
+    if len(args) == 1 or symbol in "+-":
+        return arrays == len(args) and symbol in "+-"
+    return symbol in "*/" and (rank == 1 or (arrays == 1 and (symbol == "*" or isinstance(args[0].type, Array))))
+
+
 def _array_hint(symbol: str) -> str:
     if symbol == "*":
-        return "write `dot(a, b)`, `matvec(A, x)` or `matmul(A, B)`; `*` multiplies by a scalar"
+        return "write `matmul(A, B)`, `matvec(A, x)` or `dot(a, b)`; `*` is elementwise for vectors only"
     if symbol == "/":
-        return "`/` divides an array by a scalar; write `solve(A, b)` for a system"
-    return "arrays have `+`, `-`, unary `-`, and `*` and `/` by a scalar"
+        return "write `solve(A, b)` for a system; `/` is elementwise for vectors only"
+    return "arrays have `+`, `-`, unary `-`, `*` and `/`; loop over the elements"

@@ -8,26 +8,24 @@ combination of sizes that a machine uses. The numeric library is written in the 
 from __future__ import annotations
 
 import ast
-import re
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from functools import cache
 
 from ..base.diagnostics import DiagnosticSink, Note
 from ..base.source import SourceFile, Span
-from ..model import ir
+from ..model import ir, ops
 from ..model.program import Program
-from ..model.types import SCALARS, Type, TypeNames, element_of, shape_of
+from ..model.types import ELEMENTS, F64, SCALARS, Scalar, Struct, Type, TypeNames, element_of, shape_of
 from ..parse.python_source import span_of
-from .annotations import annotation_text, annotation_type, result_type
+from .annotations import SIZE, annotation_text, annotation_type, result_type, sizes_in
 from .call_order import CallGraph, call_graph, call_order
 from .collect import collect
 from .declarations import Declarations
-from .library_files import library_files, library_names, overloads
+from .library_files import library_files, library_names, of_elements, overloads
 from .scope import LANGUAGE_NAMES, SHADOWABLE, Arguments, Scope, Signature
 from .statements import BodyChecker
 
 LIBRARY_PREFIX = "fcsl"
-_SIZE = re.compile(r"\[\s*(\w+)\s*\]")
 #: Maximum length of a chain of helper calls.
 MAX_CALLS = 64
 
@@ -65,7 +63,8 @@ class FunctionTable:
         self.depths: dict[str, int] = {}
 
     def is_function(self, name: str) -> bool:
-        return name in self.own or name in self.declarations.imported or name in library_names()
+        is_own = name in self.own or name in self.declarations.imported
+        return is_own or (name in library_names() and name not in ops.BUILTINS)
 
     def names(self) -> list[str]:
         """All names for which is_function is true, and the externs."""
@@ -81,15 +80,17 @@ class FunctionTable:
     def _table(self, imported: str) -> FunctionTable:
         return self._tables[self.declarations.imported[imported].owner]
 
-    def declared(self, name: str, count: int) -> tuple[list[Type | None], Type | None]:
+    def declared(self, name: str, count: int) -> tuple[list[Type | str | None], Type | str | None]:
         """Declared types of the first `count` arguments and of the result. For a library function they are scalar types
-        without array sizes."""
+        without array sizes, or names in ELEMENTS."""
         if name in self.declarations.imported:
             return self._table(name).declared(name, count)
+        type_of: Callable[[ast.expr | None], Type | str | None] = self._annotated
         if name in self.own:
-            node, type_of = self.own[name], self._annotated
+            node = self.own[name]
         else:
-            node, type_of = max(overloads(name), key=lambda node: len(node.args.args)), _element
+            found = [n for n in overloads(name) if len(n.args.args) == count]
+            node, type_of = found[0] if found else overloads(name)[0], _element
         arguments = [type_of(a.annotation) for a in node.args.args]
         return (arguments + [None] * count)[:count], type_of(node.returns)
 
@@ -99,7 +100,7 @@ class FunctionTable:
         if annotation is None:
             return None
         names = self.declarations.names
-        sizes = {size: 1 for size in _SIZE.findall(ast.unparse(annotation)) if size.isidentifier()}
+        sizes = {size: 1 for size in SIZE.findall(ast.unparse(annotation)) if size.isidentifier()}
         return result_type(
             self.declarations.source, annotation, TypeNames({**sizes, **names.sizes}, names.structs), DiagnosticSink()
         )
@@ -160,8 +161,7 @@ class FunctionTable:
     def _size_variables(self, node: ast.FunctionDef) -> list[str]:
         """The lower-case names in the sizes of a helper's arguments that are no constants: a call gives them values."""
         texts = [annotation_text(a.annotation) or "" for a in node.args.args if a.annotation is not None]
-        sizes = dict.fromkeys(size for text in texts for size in _SIZE.findall(text))
-        return [s for s in sizes if s[0].isalpha() and s.islower() and s not in self.declarations.defined]
+        return sizes_in(texts, self.declarations.defined)
 
     def _helper(self, name: str, arguments: list[ir.Expr], span: Span) -> Signature | None:
         node, sizes = self.own[name], dict[str, int]()
@@ -172,7 +172,7 @@ class FunctionTable:
             binding = _Binding(self.declarations.names)
             for argument, given in zip(node.args.args, arguments, strict=True):
                 pattern = annotation_text(argument.annotation) if argument.annotation is not None else None
-                is_open = pattern is not None and not set(_SIZE.findall(pattern)).isdisjoint(variables)
+                is_open = pattern is not None and not set(SIZE.findall(pattern)).isdisjoint(variables)
                 problem = binding.unify(argument.arg, pattern, given.type) if pattern and is_open else ""
                 if problem:
                     notes = [(span_of(self.declarations.source, node), "defined here")]
@@ -202,7 +202,7 @@ class FunctionTable:
     # ---- library ---------------------------------------------------------------------------------------------------
 
     def _library(self, name: str, arguments: list[ir.Expr], span: Span) -> Signature | None:
-        nodes = overloads(name)
+        nodes, binding = overloads(name), _Binding(TypeNames({}, {}))
         shown = " or ".join(_signature(name, node) for node in nodes)
         node = next((n for n in nodes if len(n.args.args) == len(arguments)), None)
         if node is None:
@@ -210,14 +210,14 @@ class FunctionTable:
             self.sink.error("E416", f"`{name}` takes {counts} argument(s), not {len(arguments)}", span, help=shown)
             return None
         parameters = [(a.arg, _text(a.annotation)) for a in node.args.args]
-        binding = _Binding(TypeNames({}, {}))
         for (parameter, pattern), argument in zip(parameters, arguments, strict=True):
             problem = binding.unify(parameter, pattern, argument.type)
             if problem:
                 self.sink.error("E418", f"`{name}`: {problem}", argument.span, help=shown)
                 return None
-        unique = "_".join([LIBRARY_PREFIX, node.name, *map(str, binding.sizes.values())])
-        function = self.program.functions.get(unique) or self._sized(name, node, unique, binding.sizes, span)
+        other = [str(binding.element)] if binding.element not in (None, F64) else []
+        unique = "_".join([LIBRARY_PREFIX, node.name, *other, *map(str, binding.sizes.values())])
+        function = self.program.functions.get(unique) or self._sized(name, node, unique, binding, span)
         if function is None:
             return None
         self.program.functions[unique] = function
@@ -225,17 +225,18 @@ class FunctionTable:
         return Signature(unique, tuple(t for _, t in function.arguments), function.result, function.faults)
 
     def _sized(
-        self, name: str, node: ast.FunctionDef, unique: str, sizes: dict[str, int], span: Span
+        self, name: str, node: ast.FunctionDef, unique: str, binding: _Binding, span: Span
     ) -> ir.Function | None:
         """A library function for these sizes. Returns None after reporting that they are too large: the mistake is the
         call in the user's file, whichever line of the library finds it."""
-        declarations = library()[node.name][0]
+        declarations, element = library()[node.name][0], binding.element
+        node = of_elements(node, str(element)) if element is not None else node
         if self.declarations.owner == LIBRARY_PREFIX:
             table = FunctionTable(declarations, self.program, self.sink)
-            return check_function(declarations, node, unique, sizes, table, self.sink)
+            return check_function(declarations, node, unique, binding.sizes, table, self.sink)
         sink = DiagnosticSink()
         table = FunctionTable(declarations, self.program, sink)
-        function = check_function(declarations, node, unique, sizes, table, sink)
+        function = check_function(declarations, node, unique, binding.sizes, table, sink)
         if function is None:
             found = sink.diagnostics[0]
             notes = [(found.span, "here, for arguments of these sizes")]
@@ -249,12 +250,13 @@ class _Binding:
 
     def __init__(self, names: TypeNames) -> None:
         self.sizes: dict[str, int] = {}
+        self.element: Scalar | None = None
         self._by: dict[str, str] = {}
         self._names = names
 
     def unify(self, parameter: str, pattern: str, type_: Type) -> str:
         """Binds the size variables of `pattern` to the sizes of `type_`. Returns the problem, or ""."""
-        name, extents = pattern.partition("[")[0].strip(), _SIZE.findall(pattern)
+        name, extents = pattern.partition("[")[0].strip(), SIZE.findall(pattern)
         element, shape = element_of(type_), shape_of(type_)
         if not extents and shape:
             return f"{parameter} is a scalar, not {type_}"
@@ -264,9 +266,21 @@ class _Binding:
             problem = self._size(parameter, text, extent, type_)
             if problem:
                 return problem
+        if name in ELEMENTS:
+            return self._element(parameter, name, element)
         if element != (SCALARS.get(name) or self._names.structs.get(name)):
             return f"{parameter} is {pattern}, not {type_}"
         return ""
+
+    def _element(self, parameter: str, name: str, element: Scalar | Struct) -> str:
+        if element not in ELEMENTS[name]:
+            return f"{parameter} is of {' or '.join(map(str, ELEMENTS[name]))}, not of {element}"
+        assert isinstance(element, Scalar)
+        if self.element in (None, element):
+            self.element = element
+            self._by.setdefault(name, parameter)
+            return ""
+        return f"{self._by[name]} is of {self.element}, but {parameter} of {element}"
 
     def _size(self, parameter: str, text: str, extent: int, type_: Type) -> str:
         fixed = int(text) if text.isdigit() else self._names.sizes.get(text)
@@ -289,9 +303,10 @@ def _signature(name: str, node: ast.FunctionDef) -> str:
     return f"{name}({', '.join(shown)})"
 
 
-def _element(annotation: ast.expr | None) -> Type:
-    """The scalar type in an annotation of the library."""
-    return SCALARS[_text(annotation).partition("[")[0]]
+def _element(annotation: ast.expr | None) -> Type | str:
+    """The scalar type in an annotation of the library, or its name in ELEMENTS."""
+    name = _text(annotation).partition("[")[0]
+    return name if name in ELEMENTS else SCALARS[name]
 
 
 def _text(annotation: ast.expr | None) -> str:

@@ -13,13 +13,13 @@ Inference reports no errors. Where two types conflict, the checker reports it.
 from __future__ import annotations
 
 import ast
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 
 from ..base.diagnostics import DiagnosticSink
 from ..model import ops
 from ..model.effects import HARDWARE
 from ..model.literals import STRING_LITERAL, LiteralError
-from ..model.types import BOOL, F64, I64, Results, Scalar, Struct, Type, element_of
+from ..model.types import BOOL, ELEMENTS, I64, Results, Scalar, Struct, Type, element_of
 from .annotations import annotation_type
 from .literal_values import LiteralNames, default_type
 from .scope import CONSTRUCTORS, ScalarConstant, Scope, StoredConstant
@@ -331,10 +331,11 @@ class Inference:
             names = helper.names if helper is not None else ()
             arguments, result = scope.functions.declared(name, max(len(node.args), len(names)))
             for argument, type_ in zip(names, arguments, strict=False):
-                _join(_of(type_, node) if type_ is not None else None, named.get(argument))
+                _join(_of(type_, node) if isinstance(type_, Type) else None, named.get(argument))
             return self._declared(node, given, arguments, result)
         if name in CONSTRUCTORS:
-            return Group(F64, node)
+            self._variables[node] = Group(holds_float=True)
+            return self._variables[node]
         if name == "len":
             self._variables[node] = Group()
             return self._variables[node]
@@ -343,11 +344,20 @@ class Inference:
         return self._builtin(node, name, given) if name in ops.BUILTINS else None
 
     def _declared(
-        self, node: ast.Call, given: list[Value], arguments: list[Type | None] | list[Type], result: Type | None
+        self,
+        node: ast.Call,
+        given: list[Value],
+        arguments: Sequence[Type | str | None],
+        result: Type | str | None,
     ) -> Value:
+        shared = {name: Group(holds_float=name == "F") for name in ELEMENTS}
+
+        def declared(type_: Type | str | None) -> Value:
+            return shared[type_] if isinstance(type_, str) else _of(type_, node) if type_ is not None else None
+
         for value, type_ in zip(given, arguments, strict=False):
-            _join(_of(type_, node) if type_ is not None else None, value)
-        return _of(result, node) if result is not None else None
+            _join(declared(type_), value)
+        return declared(result)
 
     def _conversion(self, node: ast.Call, name: str, given: list[Value]) -> Value:
         """A literal converted to a type of its own kind has that type, as in `f32(0.1)`. A float literal converted to
@@ -361,12 +371,14 @@ class Inference:
 
     def _builtin(self, node: ast.Call, name: str, given: list[Value]) -> Value:
         result: Value = None
-        for value in given:
+        for value in given[1:] if name == "where" else given:
             result = _join(result, value)
         if not isinstance(result, Group):
             return None
+        if name in ("min", "max") and len(given) == 1:
+            return result
         arity = ops.arity_of(name)
-        if ops.find(name, (I64,) * arity) is None:
+        if name != "where" and ops.find(name, (I64,) * arity) is None:
             result.root().holds_float = True
         if ops.is_test(name):
             return Group(BOOL, node)

@@ -18,6 +18,8 @@ def interval(expr: ir.Expr) -> Interval | None:
         return (expr.value, expr.value) if type(expr.value) is int else None
     if isinstance(expr, ir.RangeVar):
         return expr.low, expr.high
+    if isinstance(expr, ir.Local) and expr.bounds is not None:
+        return expr.bounds
     if not (isinstance(expr.type, Scalar) and expr.type.is_integer):
         return None
     whole = (expr.type.low, expr.type.high)

@@ -4,14 +4,16 @@
 from __future__ import annotations
 
 import ast
+import copy
 from functools import cache
 from pathlib import Path
 
 from ..base.diagnostics import DiagnosticSink
 from ..base.source import SourceFile
+from ..model.types import ELEMENTS
 from ..parse.python_source import parse_python
 
-_STEMS = ("linear_algebra", "quaternion", "kalman")
+_STEMS = ("linear_algebra", "quaternion", "kalman", "arrays", "tables")
 
 
 @cache
@@ -35,8 +37,22 @@ def library_definitions() -> dict[str, ast.FunctionDef]:
 
 
 def library_names() -> list[str]:
-    """Names that a program can call."""
-    return [name for name in library_definitions() if "__" not in name]
+    """Names that a program can call. `min` and `max` are builtins, too."""
+    return list(dict.fromkeys(name.partition("__")[0] for name in library_definitions()))
+
+
+@cache
+def of_elements(node: ast.FunctionDef, element: str) -> ast.FunctionDef:
+    """A library function for elements of this type, in the place of F or T."""
+    made = copy.deepcopy(node)
+    for part in ast.walk(made):
+        if isinstance(part, ast.Name) and part.id in ELEMENTS:
+            part.id = element
+    for annotation in (*(a.annotation for a in made.args.args), made.returns):
+        if isinstance(annotation, ast.Constant):
+            name, bracket, sizes = str(annotation.value).partition("[")
+            annotation.value = f"{element if name in ELEMENTS else name}{bracket}{sizes}"
+    return made
 
 
 def overloads(name: str) -> list[ast.FunctionDef]:

@@ -3,6 +3,7 @@
 
 from __future__ import annotations
 
+import ast
 import re
 from collections.abc import Collection, Mapping
 from pathlib import PurePosixPath
@@ -10,7 +11,9 @@ from pathlib import PurePosixPath
 from ..base.diagnostics import DiagnosticSink
 from ..base.source import Span
 from ..model.program import Program
+from ..model.types import TypeNames
 from ..parse.machine_files import ParsedFile
+from .algorithm_class import AlgorithmClass, read_class
 from .collect import check_imported_names, collect
 from .declarations import Declarations
 from .functions import FunctionTable
@@ -22,7 +25,7 @@ class Modules:
     """Collects each file and checks its helpers, once per file. `table` returns the functions that a file's classes can
     call."""
 
-    def __init__(self, program: Program, used: Mapping[str, Collection[str]], sink: DiagnosticSink):
+    def __init__(self, program: Program, used: dict[str, set[str]], sink: DiagnosticSink):
         """`used`: the classes that the machine uses, by name of their file."""
         self.program, self.used, self.sink = program, used, sink
         self._found: dict[str, Declarations | None] = {}  # by source name
@@ -60,6 +63,14 @@ class Modules:
 
     def table(self, declarations: Declarations) -> FunctionTable:
         return self._tables[declarations.owner]
+
+    def read_sized(self, declarations: Declarations, node: ast.ClassDef, sizes: Mapping[str, int]) -> AlgorithmClass:
+        """A class of a file with these sizes, which then counts as used."""
+        names = TypeNames({**declarations.names.sizes, **sizes}, declarations.names.structs)
+        found = read_class(declarations.source, node, names, True, self.sink)
+        declarations.classes[node.name] = found
+        self.used.setdefault(declarations.source.name, set()).add(node.name)
+        return found
 
     def warn_unused(self, filled: Collection[Span]) -> None:
         """W301 in files whose algorithms are used (helpers in other files may serve other machines), and W303 to W305.

@@ -39,7 +39,7 @@ class PlaceChecker(Checker):
                     help=f"assign `{name}` before the branch",
                     notes=((first, "assigned here, on one path only"),),
                 )
-            return ir.Local(type_, name, span)
+            return ir.Local(type_, name, span, scope.bounds.get(name))
         if name in scope.arguments:
             return ir.Local(scope.arguments[name], name, span)
         constant = scope.constants.get(name)

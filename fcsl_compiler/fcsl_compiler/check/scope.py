@@ -102,7 +102,7 @@ class Functions(Protocol):
 
     def names(self) -> list[str]: ...
 
-    def declared(self, name: str, count: int) -> tuple[list[Type | None], Type | None]: ...
+    def declared(self, name: str, count: int) -> tuple[list[Type | str | None], Type | str | None]: ...
 
     def arguments(self, name: str) -> Arguments | None:
         """The arguments of a helper. None for a function of the library."""
@@ -129,6 +129,8 @@ class Scope:
     wrong: set[str] = field(default_factory=set)  # module-level names with a reported declaration error
     types: dict[str, tuple[Type, Span]] = field(default_factory=dict)
     assigned: set[str] = field(default_factory=set)
+    single: set[str] = field(default_factory=set)  # locals that one statement assigns
+    bounds: dict[str, tuple[int, int]] = field(default_factory=dict)  # of those that are integers
     poisoned: set[str] = field(default_factory=set)
     ranges: dict[str, ir.RangeVar] = field(default_factory=dict)
     dead_ranges: set[str] = field(default_factory=set)

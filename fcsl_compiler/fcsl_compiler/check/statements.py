@@ -4,6 +4,7 @@
 from __future__ import annotations
 
 import ast
+from collections import Counter
 from typing import NoReturn
 
 from ..base.diagnostics import DiagnosticSink
@@ -55,6 +56,9 @@ class BodyChecker:
         """Checks the body of a function. A leading docstring is skipped."""
         statements = statements[1:] if _is_docstring(statements[0]) else statements
         self.expr.inference.function(statements)
+        nodes = (n for s in statements for n in ast.walk(s))
+        stores = Counter(n.id for n in nodes if isinstance(n, ast.Name) and isinstance(n.ctx, ast.Store))
+        self.scope.single = {name for name, count in stores.items() if count == 1}
         return self.body(statements)
 
     def body(self, statements: list[ast.stmt]) -> tuple[ir.Stmt, ...]:
@@ -238,7 +242,11 @@ class BodyChecker:
         return ir.Assign(place, stored, span)
 
     def _first(self, target: ast.Name, value: ir.Expr, span: Span) -> ir.Stmt:
-        return ir.Assign(self._bind(target, value.type), value, span)
+        local = self._bind(target, value.type)
+        bounds = interval(value) if local.name in self.scope.single else None
+        if bounds is not None:
+            self.scope.bounds[local.name] = bounds
+        return ir.Assign(local, value, span)
 
     def _bind(self, target: ast.Name, type_: Type) -> ir.Local:
         """Defines a new local with the given type."""

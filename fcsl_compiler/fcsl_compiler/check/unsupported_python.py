@@ -9,8 +9,6 @@ from ..base.diagnostics import nearest
 
 #: Python builtins.
 BUILTINS: dict[str, str] = {
-    "all": "compare in a bounded `for` loop, or write `a and b`",
-    "any": "compare in a bounded `for` loop, or write `a or b`",
     "bool": "write a comparison",
     "divmod": "write `a // b` and `a % b`",
     "enumerate": "write `for i in range(n):` and index the array",
@@ -25,9 +23,8 @@ BUILTINS: dict[str, str] = {
     "print": "assign it to an output: recordings show every output of every tick",
     "range": "`range` is allowed only in a `for` line",
     "reversed": "write `for i in range(n - 1, -1, -1):`",
-    "sorted": "sort in bounded `for` loops",
+    "sorted": "write `sort(x)`",
     "str": "algorithms compute with numbers; report with health, requests and outputs",
-    "sum": "add in a bounded `for` loop; the order of additions is part of the result",
     "super": "an algorithm inherits nothing",
     "tuple": "an array is written `[a, b]`",
     "zip": "write `for i in range(n):` and index both arrays",
@@ -37,7 +34,8 @@ BUILTINS: dict[str, str] = {
 _FUNCTIONS: dict[str, str] = {
     "T": "write `transpose(a)`",
     "absolute": "write `abs(x)`",
-    "amax": "compare in a bounded `for` loop",
+    "amax": "write `max(x)`",
+    "amin": "write `min(x)`",
     "append": "the size of an array is fixed: declare it whole, and count what is in use",
     "arange": "write `for i in range(n):`",
     "arccos": "write `acos(x)`",
@@ -63,8 +61,8 @@ _FUNCTIONS: dict[str, str] = {
     "int64": "write `i64(x)`",
     "isclose": "write `abs(a - b) < tolerance`",
     "maximum": "write `max(a, b)`",
-    "mean": "add in a bounded `for` loop and divide",
     "minimum": "write `min(a, b)`",
+    "multiply": "write `a * b`",
     "ones": "write `zeros(n)` and assign the elements",
     "power": "write `pow(x, y)`, or `x ** 2`",
     "rad2deg": "write `x * (180.0 / pi)`",

@@ -19,20 +19,19 @@ def function_names() -> list[str]:
 
 def function_page(name: str) -> str | None:
     """The page of a function. None if the function does not exist."""
+    library = "".join(f"\n{_library_page(name, node)}" for node in overloads(name))
     if name in ops.DOCS:
         doc = ops.DOCS[name]
-        kinds = dict.fromkeys(str(op.args[0]) for op in ops.all_ops() if op.name == name)
+        kinds = dict.fromkeys(str(op.args[-1]) for op in ops.all_ops() if op.name == name)
         lines = (doc.call, "", f"    {doc.meaning}", "", f"On: {', '.join(kinds)}.", f"Order: {doc.order}.")
-        return "\n".join(lines) + f"\nSingular: {doc.singular}.\n"
+        return "\n".join(lines) + f"\nSingular: {doc.singular}.\n{library}"
     if name in CONSTRUCTORS:
         call, _, meaning = CONSTRUCTORS[name].partition(": ")
         return f"{call}\n\n    {meaning}\n"
     if name in HARDWARE:
         arguments = ", ".join(f"{n}: {t}" for n, t in HARDWARE[name].arguments)
         return f"{name}({arguments}) -> {HARDWARE[name].result}\n\n    {HARDWARE_DOC[name]}\n"
-    if name not in library_names():
-        return None
-    return "\n".join(_library_page(name, node) for node in overloads(name))
+    return library.removeprefix("\n") or None
 
 
 def _library_page(name: str, node: ast.FunctionDef) -> str:

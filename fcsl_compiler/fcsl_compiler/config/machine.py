@@ -3,13 +3,14 @@
 
 from __future__ import annotations
 
+import ast
 from dataclasses import replace
 from pathlib import Path
 
 from ..base.diagnostics import DiagnosticSink, misspelt, nearest
 from ..base.source import Span
 from ..check.algorithm import check_algorithm
-from ..check.algorithm_class import AlgorithmClass
+from ..check.algorithm_class import AlgorithmClass, size_variables
 from ..check.declarations import Declarations
 from ..check.frozen import Freezer
 from ..check.loop_bounds import check_loops
@@ -100,7 +101,7 @@ def check_machine(parsed: ParsedMachine, sink: DiagnosticSink) -> Machine | None
 def _modules(parsed: ParsedMachine, program: Program, reader: ConfigReader) -> Modules:
     classes: dict[str, set[str]] = {}
     for a in parsed.algorithms.values():
-        if a.file is not None:
+        if a.file is not None and not a.sizes:
             classes.setdefault(a.file.source.name, set()).add(a.class_name)
     return Modules(program, classes, reader.sink)
 
@@ -111,11 +112,15 @@ def _check_algorithms(parsed: ParsedMachine, modules: Modules, reader: ConfigRea
     for name, algorithm in parsed.algorithms.items():
         declarations = modules.load(algorithm.file) if algorithm.file is not None else None
         class_ = _class_of(algorithm, declarations, reader.sink) if declarations is not None else None
+        if declarations is not None and class_ is not None and algorithm.sizes:
+            class_ = _sized(algorithm, modules, declarations, reader.sink)
         if declarations is None or class_ is None or algorithm.file is None:
             found[name] = None
             continue
         files = tuple(file.source.name for file in algorithm.file.all)
-        checked = check_algorithm(name, class_, files, modules.table(declarations), declarations.sound, reader.sink)
+        sizes = {size: value for size, (value, _) in algorithm.sizes.items()}
+        table = modules.table(declarations)
+        checked = check_algorithm(name, class_, files, table, declarations.sound, reader.sink, sizes)
         found[name] = checked if declarations.declared else None
     return found
 
@@ -131,6 +136,27 @@ def _class_of(parsed: ParsedAlgorithm, declarations: Declarations, sink: Diagnos
         message = f"`{declarations.source.name}` has no class `{name}`"
         sink.error("E206", message, parsed.class_span, help=fix)
     return None
+
+
+def _sized(
+    parsed: ParsedAlgorithm, modules: Modules, declarations: Declarations, sink: DiagnosticSink
+) -> AlgorithmClass | None:
+    """The class that an entry of `algorithms` names, with the sizes that it binds. None after reporting other sizes."""
+    name = parsed.class_name
+    node = next(n for n in declarations.tree.body if isinstance(n, ast.ClassDef) and n.name == name)
+    variables = size_variables(node, declarations.defined)
+    for size, (_, span) in parsed.sizes.items():
+        if size not in variables:
+            fix = nearest(size, variables) or (f"it has {', '.join(variables)}" if variables else "it has none")
+            sink.error("E206", f"`{name}` has no size `{size}`", span, help=fix)
+    missing = [size for size in variables if size not in parsed.sizes]
+    if missing:
+        fix = f'add `"{missing[0]}": …` to `sizes`'
+        sink.error("E202", f"`{parsed.name}` has no size `{missing[0]}`", parsed.span, help=fix)
+    if missing or len(parsed.sizes) > len(variables):
+        return None
+    sizes = {size: value for size, (value, _) in parsed.sizes.items()}
+    return modules.read_sized(declarations, node, sizes)
 
 
 def _warn_unused(

@@ -29,6 +29,7 @@ _KIND_OF = {name: Counter({kind: 1}) for kind, names in _PLAIN.items() for name 
 _KIND_OF |= {
     "clamp": Counter(compare=2),
     "sign": Counter(compare=2),
+    "where": Counter(compare=1),
     "**0": Counter(),
     "**2": Counter(multiply=1),
     "**3": Counter(multiply=2),

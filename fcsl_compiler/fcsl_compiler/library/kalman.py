@@ -8,7 +8,7 @@ Reference: R. Labbe, "Kalman and Bayesian Filters in Python", chapter 6; D. Simo
 from fcsl_builtins import eye, ldl_solve, matmul, matvec, symmetric_product, transpose
 
 
-def kf_predict_state(f: "f64[n][n]", x: "f64[n]") -> "f64[n]":
+def kf_predict_state(f: "F[n][n]", x: "F[n]") -> "F[n]":
     """x⁻ = F x.
 
     Source: Labbe, ch. 6; Simon §5.1.
@@ -18,7 +18,7 @@ def kf_predict_state(f: "f64[n][n]", x: "f64[n]") -> "f64[n]":
     return matvec(f, x)
 
 
-def kf_predict_state__4(f: "f64[n][n]", x: "f64[n]", b: "f64[n][m]", u: "f64[m]") -> "f64[n]":
+def kf_predict_state__4(f: "F[n][n]", x: "F[n]", b: "F[n][m]", u: "F[m]") -> "F[n]":
     """x⁻ = F x + B u.
 
     Source: Labbe, ch. 6; Simon §5.1.
@@ -28,7 +28,7 @@ def kf_predict_state__4(f: "f64[n][n]", x: "f64[n]", b: "f64[n][m]", u: "f64[m]"
     return matvec(f, x) + matvec(b, u)
 
 
-def kf_predict_cov(f: "f64[n][n]", p: "f64[n][n]", q: "f64[n][n]") -> "f64[n][n]":
+def kf_predict_cov(f: "F[n][n]", p: "F[n][n]", q: "F[n][n]") -> "F[n][n]":
     """P⁻ = F P Fᵀ + Q.
 
     Source: Simon §5.1.
@@ -38,7 +38,7 @@ def kf_predict_cov(f: "f64[n][n]", p: "f64[n][n]", q: "f64[n][n]") -> "f64[n][n]
     return symmetric_product(matmul(f, p), transpose(f)) + q
 
 
-def kf_gain(p: "f64[n][n]", h: "f64[m][n]", r: "f64[m][m]") -> "f64[n][m]":
+def kf_gain(p: "F[n][n]", h: "F[m][n]", r: "F[m][m]") -> "F[n][m]":
     """K = P Hᵀ S⁻¹ with the innovation covariance S = H P Hᵀ + R.
 
     Source: Simon §5.1.
@@ -50,7 +50,7 @@ def kf_gain(p: "f64[n][n]", h: "f64[m][n]", r: "f64[m][m]") -> "f64[n][m]":
     return transpose(ldl_solve(symmetric_product(matmul(h, p), transpose(h)) + r, matmul(h, p)))
 
 
-def kf_update_state(x: "f64[n]", k: "f64[n][m]", z: "f64[m]", h: "f64[m][n]") -> "f64[n]":
+def kf_update_state(x: "F[n]", k: "F[n][m]", z: "F[m]", h: "F[m][n]") -> "F[n]":
     """x⁺ = x + K (z − H x).
 
     Source: Simon §5.1.
@@ -60,7 +60,7 @@ def kf_update_state(x: "f64[n]", k: "f64[n][m]", z: "f64[m]", h: "f64[m][n]") ->
     return x + matvec(k, z - matvec(h, x))
 
 
-def kf_update_cov(p: "f64[n][n]", k: "f64[n][m]", h: "f64[m][n]") -> "f64[n][n]":
+def kf_update_cov(p: "F[n][n]", k: "F[n][m]", h: "F[m][n]") -> "F[n][n]":
     """P⁺ = (I − K H) P, for the K of kf_gain.
 
     Source: Simon §5.1.
@@ -71,7 +71,7 @@ def kf_update_cov(p: "f64[n][n]", k: "f64[n][m]", h: "f64[m][n]") -> "f64[n][n]"
     return p - symmetric_product(k, matmul(h, p))
 
 
-def kf_update_cov_joseph(p: "f64[n][n]", k: "f64[n][m]", h: "f64[m][n]", r: "f64[m][m]") -> "f64[n][n]":
+def kf_update_cov_joseph(p: "F[n][n]", k: "F[n][m]", h: "F[m][n]", r: "F[m][m]") -> "F[n][n]":
     """P⁺ = (I − K H) P (I − K H)ᵀ + K R Kᵀ, for any K.
 
     Source: Simon §5.1.

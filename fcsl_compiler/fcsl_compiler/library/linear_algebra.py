@@ -7,7 +7,7 @@ Size variables (n, m, k) denote constants; every combination in use is compiled 
 from fcsl_builtins import abs, eye, nan, sqrt, zeros
 
 
-def dot(a: "f64[n]", b: "f64[n]") -> "f64":
+def dot(a: "F[n]", b: "F[n]") -> "F":
     """Σᵢ aᵢ bᵢ.
 
     Order: products summed from left to right.
@@ -19,7 +19,7 @@ def dot(a: "f64[n]", b: "f64[n]") -> "f64":
     return total
 
 
-def norm(a: "f64[n]") -> "f64":
+def norm(a: "F[n]") -> "F":
     """√(a·a), the Euclidean length.
 
     Order: dot(a, a), then sqrt.
@@ -28,7 +28,7 @@ def norm(a: "f64[n]") -> "f64":
     return sqrt(dot(a, a))
 
 
-def normalize(a: "f64[n]") -> "f64[n]":
+def normalize(a: "F[n]") -> "F[n]":
     """a / ‖a‖.
 
     Order: norm(a), then each element divided by it.
@@ -37,7 +37,7 @@ def normalize(a: "f64[n]") -> "f64[n]":
     return a / norm(a)
 
 
-def cross3(a: "f64[3]", b: "f64[3]") -> "f64[3]":
+def cross3(a: "F[3]", b: "F[3]") -> "F[3]":
     """a × b.
 
     Order: (a₁b₂ − a₂b₁, a₂b₀ − a₀b₂, a₀b₁ − a₁b₀).
@@ -46,7 +46,7 @@ def cross3(a: "f64[3]", b: "f64[3]") -> "f64[3]":
     return [a[1] * b[2] - a[2] * b[1], a[2] * b[0] - a[0] * b[2], a[0] * b[1] - a[1] * b[0]]
 
 
-def skew(v: "f64[3]") -> "f64[3][3]":
+def skew(v: "F[3]") -> "F[3][3]":
     """The matrix of a cross product: skew(v) w = v × w.
 
     Order: exact.
@@ -55,7 +55,7 @@ def skew(v: "f64[3]") -> "f64[3][3]":
     return [[0.0, -v[2], v[1]], [v[2], 0.0, -v[0]], [-v[1], v[0], 0.0]]
 
 
-def outer(a: "f64[n]", b: "f64[m]") -> "f64[n][m]":
+def outer(a: "F[n]", b: "F[m]") -> "F[n][m]":
     """a bᵀ.
 
     Order: one product per element.
@@ -68,7 +68,7 @@ def outer(a: "f64[n]", b: "f64[m]") -> "f64[n][m]":
     return c
 
 
-def trace(a: "f64[n][n]") -> "f64":
+def trace(a: "F[n][n]") -> "F":
     """Σᵢ aᵢᵢ.
 
     Order: summed from the first row down.
@@ -80,7 +80,7 @@ def trace(a: "f64[n][n]") -> "f64":
     return total
 
 
-def diag(d: "f64[n]") -> "f64[n][n]":
+def diag(d: "F[n]") -> "F[n][n]":
     """The matrix with d on its diagonal and zeros elsewhere.
 
     Order: exact.
@@ -92,7 +92,7 @@ def diag(d: "f64[n]") -> "f64[n][n]":
     return a
 
 
-def transpose(a: "f64[n][m]") -> "f64[m][n]":
+def transpose(a: "F[n][m]") -> "F[m][n]":
     """aᵀ.
 
     Order: exact.
@@ -105,7 +105,7 @@ def transpose(a: "f64[n][m]") -> "f64[m][n]":
     return b
 
 
-def matvec(a: "f64[n][m]", x: "f64[m]") -> "f64[n]":
+def matvec(a: "F[n][m]", x: "F[m]") -> "F[n]":
     """a x.
 
     Order: each element is a dot product, from left to right, without the structural zeros of a constant argument.
@@ -120,7 +120,7 @@ def matvec(a: "f64[n][m]", x: "f64[m]") -> "f64[n]":
     return y
 
 
-def matmul(a: "f64[n][k]", b: "f64[k][m]") -> "f64[n][m]":
+def matmul(a: "F[n][k]", b: "F[k][m]") -> "F[n][m]":
     """a b.
 
     Order: each element is a sum from left to right, without the structural zeros of a constant argument; rows are
@@ -140,7 +140,7 @@ def matmul(a: "f64[n][k]", b: "f64[k][m]") -> "f64[n][m]":
     return c
 
 
-def symmetric_product(a: "f64[n][k]", b: "f64[k][n]") -> "f64[n][n]":
+def symmetric_product(a: "F[n][k]", b: "F[k][n]") -> "F[n][n]":
     """a b where that is symmetric, as (F P) Fᵀ is for a symmetric P: its upper triangle, mirrored. The result is symmetric in
     every bit, and costs little more than half of matmul's.
 
@@ -159,7 +159,7 @@ def symmetric_product(a: "f64[n][k]", b: "f64[k][n]") -> "f64[n][n]":
     return c
 
 
-def inv(a: "f64[n][n]") -> "f64[n][n]":
+def inv(a: "F[n][n]") -> "F[n][n]":
     """a⁻¹ by Gauss-Jordan elimination with partial pivoting. To solve a system, `solve` is cheaper and more accurate.
 
     Source: N. Higham, "Accuracy and Stability of Numerical Algorithms", 2nd ed., §14.4.
@@ -197,7 +197,7 @@ def inv(a: "f64[n][n]") -> "f64[n][n]":
     return right
 
 
-def det(a: "f64[n][n]") -> "f64":
+def det(a: "F[n][n]") -> "F":
     """|a|, the determinant, by Gaussian elimination with partial pivoting.
 
     Source: N. Higham, "Accuracy and Stability of Numerical Algorithms", 2nd ed., §9 and §14.6.
@@ -225,7 +225,7 @@ def det(a: "f64[n][n]") -> "f64":
     return product
 
 
-def lu_solve(a: "f64[n][n]", b: "f64[n][m]") -> "f64[n][m]":
+def lu_solve(a: "F[n][n]", b: "F[n][m]") -> "F[n][m]":
     """x with a x = b for every column of b, by Gaussian elimination with partial pivoting.
 
     Source: G. Golub, C. Van Loan, "Matrix Computations", 4th ed., §3.4.
@@ -268,7 +268,7 @@ def lu_solve(a: "f64[n][n]", b: "f64[n][m]") -> "f64[n][m]":
     return x
 
 
-def ldl_solve(a: "f64[n][n]", b: "f64[n][m]") -> "f64[n][m]":
+def ldl_solve(a: "F[n][n]", b: "F[n][m]") -> "F[n][m]":
     """x with a x = b for every column of b, for a symmetric and positive definite a, by elimination of one half of it without
     pivoting, which such a matrix does not need (a = L D Lᵀ). Only its upper triangle is read.
 
@@ -317,7 +317,7 @@ def ldl_solve(a: "f64[n][n]", b: "f64[n][m]") -> "f64[n][m]":
     return x
 
 
-def solve(a: "f64[n][n]", b: "f64[n]") -> "f64[n]":
+def solve(a: "F[n][n]", b: "F[n]") -> "F[n]":
     """x with a x = b.
 
     Order: lu_solve with b as its only column.
@@ -329,7 +329,7 @@ def solve(a: "f64[n][n]", b: "f64[n]") -> "f64[n]":
     return columns[:, 0]
 
 
-def cholesky(a: "f64[n][n]") -> "f64[n][n]":
+def cholesky(a: "F[n][n]") -> "F[n][n]":
     """The lower triangular L with L Lᵀ = a, for a symmetric and positive definite a. Only its lower triangle is read.
 
     Source: N. Higham, "Accuracy and Stability of Numerical Algorithms", 2nd ed., algorithm 10.2.

@@ -7,7 +7,7 @@ Reference: J. Solà, "Quaternion kinematics for the error-state Kalman filter", 
 from fcsl_builtins import asin, atan2, clamp, cos, cross3, dot, norm, sin
 
 
-def quat_mul(p: "f64[4]", q: "f64[4]") -> "f64[4]":
+def quat_mul(p: "F[4]", q: "F[4]") -> "F[4]":
     """p ⊗ q, the Hamilton product: the rotation q, then p.
 
     Source: Solà eq. 12.
@@ -22,7 +22,7 @@ def quat_mul(p: "f64[4]", q: "f64[4]") -> "f64[4]":
     ]
 
 
-def quat_conj(q: "f64[4]") -> "f64[4]":
+def quat_conj(q: "F[4]") -> "F[4]":
     """q* = (q₀, −q₁, −q₂, −q₃); the inverse of a unit quaternion.
 
     Source: Solà §1.2.
@@ -32,7 +32,7 @@ def quat_conj(q: "f64[4]") -> "f64[4]":
     return [q[0], -q[1], -q[2], -q[3]]
 
 
-def quat_normalize(q: "f64[4]") -> "f64[4]":
+def quat_normalize(q: "F[4]") -> "F[4]":
     """q / ‖q‖.
 
     Order: norm(q), then each element divided by it.
@@ -41,7 +41,7 @@ def quat_normalize(q: "f64[4]") -> "f64[4]":
     return q / norm(q)
 
 
-def quat_rotate(q: "f64[4]", v: "f64[3]") -> "f64[3]":
+def quat_rotate(q: "F[4]", v: "F[3]") -> "F[3]":
     """q v q* for a unit q: body coordinates v in the world.
 
     Source: Solà §2.4, with the product multiplied out.
@@ -53,7 +53,7 @@ def quat_rotate(q: "f64[4]", v: "f64[3]") -> "f64[3]":
     return v + q[0] * t + cross3(u, t)
 
 
-def quat_to_dcm(q: "f64[4]") -> "f64[3][3]":
+def quat_to_dcm(q: "F[4]") -> "F[3][3]":
     """Rotation matrix body → world of a unit q: quat_to_dcm(q) v = quat_rotate(q, v).
 
     Source: Solà eq. 115, with 1 − 2 (…) on the diagonal.
@@ -71,7 +71,7 @@ def quat_to_dcm(q: "f64[4]") -> "f64[3][3]":
     ]
 
 
-def quat_from_axis_angle(axis: "f64[3]", angle: "f64") -> "f64[4]":
+def quat_from_axis_angle(axis: "F[3]", angle: "F") -> "F[4]":
     """Rotation by angle (rad) about a unit axis: (cos(angle/2), axis sin(angle/2)).
 
     Source: Solà §2.4.
@@ -82,7 +82,7 @@ def quat_from_axis_angle(axis: "f64[3]", angle: "f64") -> "f64[4]":
     return [cos(0.5 * angle), axis[0] * s, axis[1] * s, axis[2] * s]
 
 
-def quat_turn(q: "f64[4]", turn: "f64[3]") -> "f64[4]":
+def quat_turn(q: "F[4]", turn: "F[3]") -> "F[4]":
     """q ⊗ exp(turn / 2): the rotation q, turned further by the rotation vector turn (rad, in body axes).
 
     Source: Solà §2.4.
@@ -95,7 +95,7 @@ def quat_turn(q: "f64[4]", turn: "f64[3]") -> "f64[4]":
     return quat_normalize(quat_mul(q, quat_from_axis_angle(turn / angle, angle)))
 
 
-def quat_from_euler(roll: "f64", pitch: "f64", yaw: "f64") -> "f64[4]":
+def quat_from_euler(roll: "F", pitch: "F", yaw: "F") -> "F[4]":
     """ZYX Euler angles (rad): yaw about z, then pitch about the new y, then roll about the new x.
 
     Source: the product of the three half-angle quaternions, yaw ⊗ pitch ⊗ roll, multiplied out.
@@ -116,7 +116,7 @@ def quat_from_euler(roll: "f64", pitch: "f64", yaw: "f64") -> "f64[4]":
     ]
 
 
-def quat_to_euler(q: "f64[4]") -> "f64[3]":
+def quat_to_euler(q: "F[4]") -> "F[3]":
     """[roll, pitch, yaw] (rad, ZYX) of a unit q.
 
     Source: the elements of quat_to_dcm(q) compared with those of the product of the three rotations.
@@ -135,7 +135,7 @@ def quat_to_euler(q: "f64[4]") -> "f64[3]":
     ]
 
 
-def quat_slerp(p: "f64[4]", q: "f64[4]", t: "f64") -> "f64[4]":
+def quat_slerp(p: "F[4]", q: "F[4]", t: "F") -> "F[4]":
     """The rotation at t on the shortest way from p (t = 0) to q (t = 1), at constant rate; p and q are of unit length.
 
     Source: K. Shoemake, "Animating rotation with quaternion curves", 1985; the angle as W. Kahan takes it, which keeps

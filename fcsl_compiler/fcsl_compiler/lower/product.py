@@ -8,7 +8,7 @@ from typing import cast
 
 from ..model import ir
 from ..model.ops import find
-from ..model.types import F64, I64, Array, Scalar, Type
+from ..model.types import I64, Array, Scalar, Type
 
 #: The rows of a symmetric product are written out one by one. With more rows it stays as it is in the library.
 WRITTEN_ROWS = 24
@@ -20,6 +20,7 @@ class Product:
     def __init__(self, f: ir.Function):
         self.f, self.span = f, f.span
         assert isinstance(f.result, Array)
+        self.scalar = cast(Scalar, f.result.element)
         (self.a, a_type), (self.b, b_type) = ((n, cast(Array, t)) for n, t in f.arguments)
         (self.n, self.k), self.m = a_type.shape, b_type.shape[1] if len(b_type.shape) == 2 else 1
         self.is_vector, self.types = len(b_type.shape) == 1, {self.a: a_type, self.b: b_type}
@@ -40,20 +41,20 @@ class Product:
 
     def _at(self, array: ir.Local, row: ir.Expr, column: ir.Expr) -> ir.Element:
         indices = (row, column) if len(cast(Array, array.type).shape) == 2 else (row,)
-        return ir.Element(F64, array, indices, (False,) * len(indices), self.span)
+        return ir.Element(self.scalar, array, indices, (False,) * len(indices), self.span)
 
     def number(self, value: int) -> ir.Const:
         return ir.Const(I64, value, self.span)
 
     def real(self, value: float) -> ir.Const:
-        return ir.Const(F64, value, self.span)
+        return ir.Const(self.scalar, value, self.span)
 
     def after(self, index: ir.Expr, distance: int) -> ir.Expr:
         """The index so many elements further on."""
         return self._operation(I64, "+", index, self.number(distance)) if distance else index
 
     def apply(self, name: str, *args: ir.Expr) -> ir.Apply:
-        return self._operation(F64, name, *args)
+        return self._operation(self.scalar, name, *args)
 
     def _operation(self, type_: Scalar, name: str, *args: ir.Expr) -> ir.Apply:
         op = find(name, (type_,) * len(args))

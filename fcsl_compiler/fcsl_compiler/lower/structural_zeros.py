@@ -12,7 +12,7 @@ from dataclasses import dataclass, replace
 from functools import cached_property
 
 from ..model import ir
-from ..model.types import BOOL, F64, Array, Type
+from ..model.types import BOOL, Array, Type
 from .product import WRITTEN_ROWS, Product, loop
 from .register_blocking import by_rows
 
@@ -68,7 +68,7 @@ class _Product(Product):
 
     def specialised(self, name: str) -> ir.Function:
         if self._terms() > _UNROLLED_TERMS:
-            return self.function(name, self._by_loops(), ("total", F64), ("none", BOOL))
+            return self.function(name, self._by_loops(), ("total", self.scalar), ("none", BOOL))
         locals_: list[tuple[str, Type]] = [(self.row.name, self.row.type)] if self._uses_row else []
         made = self.function(name, self._unrolled(), *locals_)
         return replace(made, arguments=tuple((n, t) for n, t in self.f.arguments if n not in self.known))
@@ -160,11 +160,11 @@ class _Product(Product):
     def _by_loops(self) -> tuple[ir.Stmt, ...]:
         """The same product as loops that test each element of a constant at run time."""
         i, p, j = (self.variable(v, 0, n) for v, n in (("i", self.n), ("p", self.k), ("j", self.m)))
-        total, none = ir.Local(F64, "total", self.span), ir.Local(BOOL, "none", self.span)
+        total, none = ir.Local(self.scalar, "total", self.span), ir.Local(BOOL, "none", self.span)
         factors = {self.a: self.element(self.a, i, p), self.b: self.element(self.b, p, j)}
         term = self.apply("*", *factors.values())
         add: tuple[ir.Stmt, ...] = (
-            self.assign(total, ir.Choose(F64, none, term, self.apply("+", total, term), self.span)),
+            self.assign(total, ir.Choose(self.scalar, none, term, self.apply("+", total, term), self.span)),
             self.assign(none, ir.Const(BOOL, False, self.span)),
         )
         for name in self.known:

@@ -29,11 +29,12 @@ class Const:
 
 @dataclass(frozen=True)
 class Local:
-    """A local variable or a helper's argument."""
+    """A local variable or a helper's argument. `bounds`: of an integer that is assigned in one place."""
 
     type: Type
     name: str
     span: Span
+    bounds: tuple[int, int] | None = field(default=None, compare=False)
 
 
 @dataclass(frozen=True)

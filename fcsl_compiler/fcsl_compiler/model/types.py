@@ -61,6 +61,8 @@ HEALTH = Scalar("Health", "int32_t", "FCSL_HEALTH", "uint8", 4)
 
 SCALARS: dict[str, Scalar] = {t.name: t for t in (BOOL, I32, I64, U32, U64, F32, F64, REQUEST, HEALTH)}
 NUMBERS: tuple[Scalar, ...] = (I32, I64, U32, U64, F32, F64)
+#: Names in the signatures of the library for a type that the arguments decide.
+ELEMENTS: dict[str, tuple[Scalar, ...]] = {"F": (F64, F32), "T": (F64, *NUMBERS[:-1])}
 INTEGERS: tuple[Scalar, ...] = (I32, I64, U32, U64)
 
 #: The first three are ordered from best to worst. The scheduler sets `stale` for an instance that has not run.
@@ -276,7 +278,10 @@ def _extent(text: str, sizes: dict[str, int]) -> int:
     elif text in sizes:
         extent = sizes[text]
     else:
-        raise TypeSyntaxError(f"`{text}` is not an array size", "a size is a positive integer or a module constant")
+        raise TypeSyntaxError(
+            f"`{text}` is not an array size",
+            "a size is a positive integer or a module constant; `sizes` of an algorithm or the call of a helper bind lower-case ones",
+        )
     if extent < 1:
         raise TypeSyntaxError("an array without elements", "every size is at least 1")
     return extent

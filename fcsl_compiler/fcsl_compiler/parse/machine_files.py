@@ -12,6 +12,7 @@ from ..base.diagnostics import DiagnosticSink
 from ..base.files import SourceError
 from ..base.source import MAX_NAME, SourceFile, Span
 from ..model.target import Target
+from ..model.types import MAX_ELEMENTS
 from .json_reader import ConfigReader
 from .json_source import JsonNode, parse_json, text_without
 from .machine_texts import package_of
@@ -88,6 +89,7 @@ class ParsedAlgorithm:
     span: Span
     class_span: Span  # span of the class name in the JSON
     file: ParsedFile | None
+    sizes: dict[str, tuple[int, Span]] = field(default_factory=dict)
 
 
 @dataclass(frozen=True)
@@ -178,14 +180,18 @@ def _check_name(name: str, source: SourceFile, sink: DiagnosticSink) -> None:
 def _parse_algorithm(
     name: str, definition: JsonNode, span: Span, files: _Files, reader: ConfigReader
 ) -> ParsedAlgorithm:
-    keys = reader.object(definition, f"algorithm `{name}`", ("source",), ("class",))
+    keys = reader.object(definition, f"algorithm `{name}`", ("source",), ("class", "sizes"))
     text = reader.string(keys.get("source"), "`source`") if keys else None
     class_node = keys.get("class") if keys else None
     class_name = reader.string(class_node, "`class`")
     class_span = class_node.span if class_node is not None else span
     if keys is None or text is None or (class_node is not None and class_name is None):
         return ParsedAlgorithm(name, name, span, class_span, None)
-    return ParsedAlgorithm(name, class_name or name, span, class_span, files.read(text, keys["source"].span))
+    sizes = {
+        key: (reader.integer(node, f"size `{key}`", 1, MAX_ELEMENTS) or 1, at)
+        for key, (node, at) in reader.named(keys.get("sizes"), f"`sizes` of `{name}`").items()
+    }
+    return ParsedAlgorithm(name, class_name or name, span, class_span, files.read(text, keys["source"].span), sizes)
 
 
 class _Files:

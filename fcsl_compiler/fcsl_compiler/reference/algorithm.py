@@ -4,9 +4,11 @@
 from __future__ import annotations
 
 import ast
+import copy
 from collections.abc import Callable, Mapping
 from contextlib import suppress
 from dataclasses import dataclass, replace
+from types import MappingProxyType
 from typing import Any
 
 from .annotations import parse_type
@@ -145,8 +147,8 @@ class SourceModule:
         self.names.update(self.known.literals)
         execute(statements, self.path, self.names)
 
-    def type(self, annotation: ast.expr) -> Type:
-        return parse_type(annotation_text(annotation), self.sizes, self.structs)
+    def type(self, annotation: ast.expr, sizes: Mapping[str, int] | None = None) -> Type:
+        return parse_type(annotation_text(annotation), {**self.sizes, **(sizes or {})}, self.structs)
 
     def _extern(self, node: ast.FunctionDef) -> Extern:
         arguments = [self.type(a.annotation) for a in node.args.args if a.annotation is not None]
@@ -162,18 +164,23 @@ class Algorithm:
     """One class of a file. `records`: types of its four records. `type`: type of `self`, which has the ports of all
     records as fields. `run(name, self)` calls start or execute."""
 
-    def __init__(self, module: SourceModule, name: str):
+    def __init__(self, module: SourceModule, name: str, sizes: Mapping[str, int] = MappingProxyType({})):
         node = next(n for n in module.tree.body if isinstance(n, ast.ClassDef) and n.name == name)
+        node = _WithSizes(sizes).visit(copy.deepcopy(node)) if sizes else node
         self.module = module
         declared = _ports(node)
         declared["outputs"]["health"] = ast.Constant("Health")
         annotations = {port: text for ports in declared.values() for port, text in ports.items()}
         self.records = {
-            record: StructType(record, {n: module.type(a) for n, a in declared[record].items()}) for record in RECORDS
+            record: StructType(record, {n: module.type(a, sizes) for n, a in declared[record].items()})
+            for record in RECORDS
         }
         self.type = StructType(name, {n: t for record in self.records.values() for n, t in record.members.items()})
         methods = [n for n in node.body if isinstance(n, ast.FunctionDef)]
-        members = {**module.known.members, SELF: {n: kind_of(a, module.sizes) for n, a in annotations.items()}}
+        members = {
+            **module.known.members,
+            SELF: {n: kind_of(a, {**module.sizes, **sizes}) for n, a in annotations.items()},
+        }
         known = replace(module.known, members=members, parameters=declared["parameters"].keys())
         #: Whether it reads or writes hardware, or calls externs.
         self.impure = bool(_called(methods) & {*HARDWARE, *module.externs})
@@ -193,6 +200,17 @@ class Algorithm:
     def run(self, name: str, self_: Any) -> None:
         """Calls start or execute. Raises Fault; other exceptions pass unchanged."""
         getattr(self_, name)()
+
+
+class _WithSizes(ast.NodeTransformer):
+    """Puts numbers in the place of the names of sizes."""
+
+    def __init__(self, sizes: Mapping[str, int]):
+        self._sizes = sizes
+
+    def visit_Name(self, node: ast.Name) -> ast.expr:
+        known = node.id in self._sizes and isinstance(node.ctx, ast.Load)
+        return ast.copy_location(ast.Constant(self._sizes[node.id]), node) if known else node
 
 
 def _called(functions: list[ast.FunctionDef]) -> set[str]:

@@ -11,10 +11,9 @@ import math
 from collections.abc import Callable, Iterator
 from typing import Any, ClassVar
 
-from .types import SCALARS, Element, Scalar
+from .types import Element, Scalar
 from .values import Fault, IllTyped, divide
 
-_F64 = SCALARS["f64"]
 _FLOATS = ("f32", "f64")
 _new = object.__new__
 
@@ -140,14 +139,21 @@ class Array:
             return self.__fcsl_type__.of([a - b if b != 0 else a for a, b in pairs])
         return self.__fcsl_type__.of([a - b for a, b in pairs])
 
-    def __mul__(self, scalar: Any) -> Array:
-        return self.__fcsl_type__.of([a * scalar for a in self.data])
+    def __mul__(self, other: Any) -> Array:
+        if isinstance(other, Array):
+            return self.__fcsl_type__.of([a * b for a, b in zip(self.data, self._beside(other), strict=True)])
+        return self.__fcsl_type__.of([a * other for a in self.data])
 
     def __rmul__(self, scalar: Any) -> Array:
         return self.__fcsl_type__.of([scalar * a for a in self.data])
 
-    def __truediv__(self, scalar: Any) -> Array:
-        return self.__fcsl_type__.of([divide(a, scalar) for a in self.data])
+    def __truediv__(self, other: Any) -> Array:
+        if isinstance(other, Array):
+            return self.__fcsl_type__.of([divide(a, b) for a, b in zip(self.data, self._beside(other), strict=True)])
+        return self.__fcsl_type__.of([divide(a, other) for a in self.data])
+
+    def __rtruediv__(self, scalar: Any) -> Array:
+        return self.__fcsl_type__.of([divide(scalar, a) for a in self.data])
 
     def __neg__(self) -> Array:
         return self.__fcsl_type__.of([-a for a in self.data])
@@ -243,9 +249,17 @@ def nested(data: list[Any], shape: tuple[int, ...]) -> Any:
     return [nested(data[i * step : (i + 1) * step], shape[1:]) for i in range(shape[0])]
 
 
-def zeros(*shape: int) -> Array:
-    return array_type(_F64, shape).of([0.0] * math.prod(shape))
+def zeros(element: Scalar, *shape: int) -> Array:
+    return array_type(element, shape).zero()
 
 
-def eye(n: int) -> Array:
-    return array_type(_F64, (n, n)).of([float(i % (n + 1) == 0) for i in range(n * n)])
+def eye(element: Scalar, n: int) -> Array:
+    return array_type(element, (n, n)).of([element.store(int(i % (n + 1) == 0)) for i in range(n * n)])
+
+
+def each(element: Scalar, function: Callable[..., Any], *args: Any) -> Array:
+    """The results of a function for the elements of arrays, beside which numbers stand for arrays of that number."""
+    (shape,) = {arg.shape for arg in args if isinstance(arg, Array)}
+    count = math.prod(shape)
+    rows = [arg.data if isinstance(arg, Array) else [arg] * count for arg in args]
+    return array_type(element, shape).of([function(*row) for row in zip(*rows, strict=True)])

@@ -31,7 +31,8 @@ def elementwise(op: type[ast.AST], arrays: Sequence[bool], type_: ArrayType) -> 
     items = [[f"{n}{i}" if whole else n for i in range(type_.count)] for n, whole in zip(names, arrays, strict=True)]
     lines = [f"[{', '.join(row)}] = {n}.data" for n, row, whole in zip(names, items, arrays, strict=True) if whole]
     if sign == "/":
-        lines.append("b = b or zero(b)")
+        divisors = items[1] if arrays[1] else ["b"]
+        lines += [f"{b} = {b} or zero({b})" for b in divisors]
     results = (f"{sign}{row[0]}" if len(row) == 1 else f"{row[0]} {sign} {row[1]}" for row in zip(*items, strict=True))
     lines.append(f"return of([{', '.join(results)}])")
     namespace: dict[str, Any] = {"of": type_.of, "zero": Zero}

@@ -6,11 +6,12 @@ from __future__ import annotations
 import ctypes
 import math
 from collections.abc import Callable, Sequence
-from functools import cache
+from functools import cache, partial
 from typing import Any
 
 from ..base.packages import package_prefix
 from .arrays import eye, zeros
+from .types import SCALARS
 from .values import F32, I64, INTEGERS, Fault, IllTyped, TypedInt, as_f32, as_f64, round_int_to_f32
 
 _UNARY = "sin cos tan asin acos atan sinh cosh tanh exp expm1 log log1p log2 log10 cbrt".split()
@@ -18,7 +19,15 @@ _BINARY = ("atan2", "pow", "hypot")
 
 #: Builtins of integers and floats. The others accept only floats.
 ON_INTEGERS = frozenset(
-    ["abs", "min", "max", "clamp", "sign", *(f"{k}_{o}" for k in ("wrap", "sat") for o in ("add", "sub", "mul"))]
+    [
+        "abs",
+        "min",
+        "max",
+        "clamp",
+        "sign",
+        "where",
+        *(f"{k}_{o}" for k in ("wrap", "sat") for o in ("add", "sub", "mul")),
+    ]
 )
 #: Builtins that convert any operand to the type they are named after.
 CONVERSIONS = {name: name for name in (*INTEGERS, "f32", "f64")}
@@ -165,6 +174,11 @@ def clamp(x: Any, low: Any, high: Any) -> Any:
     return high if high < raised else raised
 
 
+def where(c: bool, a: Any, b: Any) -> Any:
+    a, b = settle(a, b) if type(a) is not type(b) else (a, b)
+    return a if c else b
+
+
 def sign(x: Any) -> Any:
     if x > 0:
         return type(x)(1)
@@ -247,4 +261,5 @@ def builtins() -> dict[str, Any]:
     names |= {"f32": to_f32, "f64": to_f64, "round": _to_whole(round), "sqrt": sqrt, "fmod": fmod, "copysign": copysign}
     names |= {"lerp": lerp, "wrap_angle": wrap_angle}
     names |= {"abs": absolute, "min": minimum, "max": maximum, "clamp": clamp, "sign": sign}
-    return names | {"zeros": zeros, "eye": eye, "pi": math.pi, "inf": math.inf, "nan": math.nan}
+    names |= {"zeros": partial(zeros, SCALARS["f64"]), "eye": partial(eye, SCALARS["f64"]), "where": where}
+    return names | {"pi": math.pi, "inf": math.inf, "nan": math.nan}

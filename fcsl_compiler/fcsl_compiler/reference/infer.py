@@ -19,6 +19,8 @@ from .functions import CONVERSIONS, ON_INTEGERS, PREDICATES
 #: Sizes of an array: numbers, and names where they are not known yet (UNKNOWN: never).
 Shape = tuple[int | str, ...]
 UNKNOWN = "?"
+#: Bases of kinds in the library that the arguments of a call decide: floats, and all numbers.
+ELEMENTS = ("F", "T")
 #: In the place of the default of an argument that has none.
 REQUIRED = object()
 
@@ -345,8 +347,8 @@ class Inference:
         return Seen(base.node)
 
     def _on_compare(self, node: ast.Compare) -> Seen:
-        self._same(*map(self.expr, (node.left, *node.comparators)))
-        return Seen(Node("bool"))
+        operands = self._same(*map(self.expr, (node.left, *node.comparators)))
+        return Seen(Node("bool"), operands.shape)
 
     def _on_boolop(self, node: ast.BoolOp) -> Seen:
         for value in node.values:
@@ -384,25 +386,29 @@ class Inference:
             for seen in given:
                 seen.node.index = True
             sizes = [UNKNOWN if size is None else size for size in map(self.value, node.args)]
-            return Seen(Node("f64"), tuple(sizes if name == "zeros" else sizes * 2))
+            return Seen(Node(is_float=True), tuple(sizes if name == "zeros" else sizes * 2))
         if name == "len":
             self.variables.add(node)
             return Seen(Node())
         if name in CONVERSIONS:
             return self._conversion(name, given[0])
-        operand = self._same(*given)
+        operand = self._same(*(given[1:] if name == "where" else given))
         operand.node.is_float |= name not in ON_INTEGERS
-        if name in PREDICATES:
-            return Seen(Node("bool"))
-        return Seen(operand.node, (), name == "sqrt" and given[0].literal)
+        shape = max((seen.shape for seen in given), key=len)
+        return Seen(Node("bool") if name in PREDICATES else operand.node, shape, name == "sqrt" and given[0].literal)
 
     def _function(self, name: str, node: ast.Call) -> Seen:
         wanted, result = self.names.functions[name]
         arguments = [None if argument is None else self.expr(argument) for argument in self.names.given(name, node)]
         pairs = [(kind, seen) for kind, seen in zip(wanted, arguments, strict=False) if seen is not None]
+        elements = {"F": Node(is_float=True), "T": Node()}
+
+        def declared(kind: Kind) -> Seen:
+            return Seen(elements[kind.base], kind.shape) if kind.base in ELEMENTS else _declared(kind)
+
         for kind, seen in pairs:
-            self._same(_declared(kind), seen)
-        return _declared(_bound(result, pairs))
+            self._same(declared(kind), seen)
+        return declared(_bound(result, pairs))
 
     def _conversion(self, name: str, given: Seen) -> Seen:
         """`f32(0.1)` is a literal of that type; `i32(3.7)` converts a literal."""
@@ -411,7 +417,7 @@ class Inference:
             is_float = any(n.is_float for n in _reached(given.node))
             if target in ("f32", "f64") or not is_float:
                 _connect(given.node, Node(target))
-        return Seen(Node(target))
+        return Seen(Node(target), given.shape)
 
 
 def _declared(kind: Kind) -> Seen:

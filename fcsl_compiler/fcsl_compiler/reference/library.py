@@ -8,6 +8,7 @@ own: without loops (unroll.py) or, for large arrays, after the same rewrite as f
 from __future__ import annotations
 
 import ast
+import copy
 from collections.abc import Callable, Collection, Mapping, Sequence
 from dataclasses import replace
 from functools import cache, partial
@@ -16,13 +17,15 @@ from typing import Any
 
 from .annotations import split_type
 from .arrays import Array
-from .infer import SELF, Kind, Names, annotation_text, kind_of
+from .infer import ELEMENTS, SELF, Kind, Names, annotation_text, kind_of
 from .products import large_product
 from .rewrite import Rewriter
 from .runtime import runtime
 from .unroll import PRODUCTS, Classes, TooLarge, unrolled
 from .values import IllTyped
 
+#: Files whose functions are not written without loops.
+_WITH_LOOPS = ("arrays", "tables")
 #: Arguments and result of every function of a file.
 Signatures = dict[str, tuple[list[Kind], Kind]]
 
@@ -138,6 +141,8 @@ class Library:
         return [annotation_text(a.annotation) for a in self._nodes[name].args.args if a.annotation is not None]
 
     def _unrolled(self, name: str, classes: Classes, plain: bool) -> Callable[..., Any]:
+        if self._files[name].stem in _WITH_LOOPS or any(_element(cls) != "f64" for cls in classes):
+            raise TooLarge
         node, needed = unrolled(name, classes, self._nodes, self._separate, plain=plain)
         namespace = {**self._names, **needed}
         execute([node], str(self._files[name]), namespace)
@@ -154,10 +159,33 @@ class Library:
         if name in PRODUCTS:
             return partial(large_product, symmetric=name == "symmetric_product")
         path = self._files[name]
-        names = Names({}, self.signatures, text=self._texts[path], values=self._names, library=self.makers())
-        function = Sized(self._nodes[name], names, str(path))
+        patterns = [annotation_text(a.annotation) for a in self._nodes[name].args.args if a.annotation is not None]
+        elements = [_element(cls) for cls, p in zip(classes, patterns, strict=True) if split_type(p)[0] in ELEMENTS]
+        node = _of_elements(self._nodes[name], elements[0]) if elements else self._nodes[name]
+        functions = {**self.signatures, name: signature(node)}
+        names = Names({}, functions, text=self._texts[path], values=dict(self._names), library=self.makers())
+        function = Sized(node, names, str(path))
         constant = name == "transpose" and classes[0].zeros is not None
         return (lambda a: function(a).as_constant()) if constant else function
+
+
+def _element(cls: type[Any]) -> str:
+    """The type of a number, or of the elements of an array, as the language names it."""
+    if issubclass(cls, Array):
+        return cls.type.name
+    return "f64" if cls is float else cls.__name__.lower()
+
+
+def _of_elements(node: ast.FunctionDef, element: str) -> ast.FunctionDef:
+    """The function for elements of this type, in the place of F or T."""
+    made = copy.deepcopy(node)
+    for annotation in (*(a.annotation for a in made.args.args), made.returns):
+        assert isinstance(annotation, ast.Constant)
+        text = str(annotation.value)
+        name = split_type(text)[0]
+        if name in ELEMENTS:
+            annotation.value = text.replace(name, element, 1)
+    return made
 
 
 @cache

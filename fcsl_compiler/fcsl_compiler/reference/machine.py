@@ -299,8 +299,9 @@ class ReferenceMachine:
 
         found: dict[str, Algorithm] = {}
         for algorithm in self.machine.algorithms:
-            class_name = config["algorithms"][algorithm.name].get("class", algorithm.name)
-            found[algorithm.name] = Algorithm(load(paths[algorithm.source]), class_name)
+            entry = config["algorithms"][algorithm.name]
+            module, class_name = load(paths[algorithm.source]), entry.get("class", algorithm.name)
+            found[algorithm.name] = Algorithm(module, class_name, entry.get("sizes", {}))
         return found
 
     def _hardware(self, name: str) -> Callable[..., Any]:

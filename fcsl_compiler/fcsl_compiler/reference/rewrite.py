@@ -17,6 +17,7 @@ from __future__ import annotations
 
 import ast
 import copy
+import operator
 from collections.abc import Collection, Mapping
 from functools import reduce
 from typing import Any
@@ -30,6 +31,14 @@ from .types import SCALARS
 from .values import F32, INTEGERS, decimal_f32
 
 _F64 = Kind("f64")
+_COMPARED: dict[type[ast.AST], Any] = {
+    ast.Lt: operator.lt,
+    ast.LtE: operator.le,
+    ast.Gt: operator.gt,
+    ast.GtE: operator.ge,
+    ast.Eq: operator.eq,
+    ast.NotEq: operator.ne,
+}
 _CALLED = {ast.Div: "divide", ast.FloorDiv: "floor_divide", ast.Mod: "modulo"}
 
 
@@ -117,8 +126,10 @@ class Rewriter:
         assert isinstance(value, int | float)
         if base == "f64":
             return ast.Constant(float(value))
+        if isinstance(value, int):
+            return self._named(f"fcsl.f32 {value}", F32(value))
         text = self.names.text_of(node)
-        return self._named(f"fcsl.f32 {text}", F32(value) if isinstance(value, int) else decimal_f32(text))
+        return self._named(f"fcsl.f32 {text}", decimal_f32(text))
 
     # ---- expressions -----------------------------------------------------------------------------------------------
 
@@ -266,6 +277,9 @@ class Rewriter:
         return ast.BinOp(left, op, right) if name is None or nonzero else self._runtime(name, left, right)
 
     def _on_compare(self, node: ast.Compare) -> ast.expr:
+        if self.types.kind(node).rank:
+            function = self._named(f"fcsl.{type(node.ops[0]).__name__}", _COMPARED[type(node.ops[0])])
+            return self._runtime("each_bool", function, self.expr(node.left), self.expr(node.comparators[0]))
         return ast.Compare(self.expr(node.left), node.ops, [self.expr(c) for c in node.comparators])
 
     def _on_boolop(self, node: ast.BoolOp) -> ast.expr:
@@ -287,11 +301,17 @@ class Rewriter:
         name = self.names.function(node)
         if name in ("zeros", "eye"):
             type_ = self._array_type(node)
-            return node if type_ is None or name == "eye" else self._call_named(f"fcsl.zero {type_.name}", type_.zero)
+            if type_ is None or name == "eye":
+                return self._runtime(f"{name}_{self.types.kind(node).base}", *node.args)
+            return self._call_named(f"fcsl.zero {type_.name}", type_.zero)
         if name == "len":
             base = self.types.kind(node).base
             size = self._call_of(node, name)
             return size if base == PLAIN else self._runtime(f"as_{base}", size)
+        kind = self.types.kind(node)
+        if kind.rank and name not in self.names.functions and name not in self.names.members:
+            function = ast.copy_location(ast.Name(name, ast.Load()), node.func)
+            return self._runtime(f"each_{kind.base}", function, *map(self.expr, node.args))
         if name in CONVERSIONS and isinstance(node.args[0], ast.Name) and node.args[0] in self.types.variables:
             return node
         return self._call_of(node, name)

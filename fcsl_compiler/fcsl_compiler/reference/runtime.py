@@ -4,9 +4,10 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
+from functools import partial
 from typing import Any
 
-from .arrays import array_of, constant_index, copy_of
+from .arrays import array_of, constant_index, copy_of, each, eye, zeros
 from .functions import builtins
 from .structs import StructType
 from .types import SCALARS
@@ -23,6 +24,9 @@ def runtime(structs: Mapping[str, StructType]) -> dict[str, Any]:
     names: dict[str, Any] = {"divide": divide, "zero": Zero, "floor_divide": floor_divide, "modulo": modulo}
     names |= {"power": _power, "pow": builtins()["pow"], "copy": copy_of, "constant_index": constant_index}
     names |= {f"as_{name}": type_.store for name, type_ in SCALARS.items()}
+    names |= {f"zeros_{name}": partial(zeros, type_) for name, type_ in SCALARS.items()}
+    names |= {f"eye_{name}": partial(eye, type_) for name, type_ in SCALARS.items()}
+    names |= {f"each_{name}": partial(each, type_) for name, type_ in SCALARS.items()}
     names |= {f"array_{name}": array_of(type_) for name, type_ in (SCALARS | dict(structs)).items()}
     hidden = {f"fcsl.{name}": value for name, value in names.items()}
     return hidden | builtins() | {name: struct.construct for name, struct in structs.items()}

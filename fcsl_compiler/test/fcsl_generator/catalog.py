@@ -8,34 +8,43 @@ import re
 from dataclasses import dataclass
 from functools import cache
 from pathlib import Path
+from typing import Any
 
 import fcsl_compiler
 
-from .types import Array, Type
+from .types import FLOATS, NUMBERS, Array, Type
 
 #: The library is written in the language itself.
 FILES = sorted((Path(fcsl_compiler.__file__).parent / "library").glob("*.py"))
 
 
+#: What the names of element types in a signature stand for.
+ELEMENTS = {"F": FLOATS, "T": NUMBERS}
+
+
 @dataclass(frozen=True)
 class Pattern:
-    """f64, or f64[n][3] with variable (str) and fixed extents."""
+    """F, or T[n][3] with variable (str) and fixed extents. In `sizes` a name of ELEMENTS has a type."""
 
+    element: str
     extents: tuple[str | int, ...]
 
-    def bind(self, type_: Type, sizes: dict[str, int]) -> bool:
-        """Matches a type. If it matches, stores its sizes in `sizes` and returns True."""
-        shape = type_.shape if isinstance(type_, Array) else ()
-        if (type_.element if isinstance(type_, Array) else type_) != "f64" or len(shape) != len(self.extents):
+    def bind(self, type_: Type, sizes: dict[str, Any]) -> bool:
+        """Matches a type. If it matches, stores its sizes and element in `sizes` and returns True."""
+        shape, element = (type_.shape, type_.element) if isinstance(type_, Array) else ((), type_)
+        if element not in ELEMENTS.get(self.element, (self.element,)) or len(shape) != len(self.extents):
+            return False
+        if sizes.setdefault(self.element, element) != element:
             return False
         return all(
             n == extent if isinstance(extent, int) else sizes.setdefault(extent, n) == n
             for extent, n in zip(self.extents, shape, strict=True)
         )
 
-    def at(self, sizes: dict[str, int]) -> Type:
+    def at(self, sizes: dict[str, Any]) -> Type:
         shape = tuple(e if isinstance(e, int) else sizes[e] for e in self.extents)
-        return Array("f64", shape) if shape else "f64"
+        element = sizes.get(self.element, self.element)
+        return Array(element, shape) if shape else element
 
 
 @dataclass(frozen=True)
@@ -47,6 +56,11 @@ class Signature:
     @property
     def variables(self) -> list[str]:
         return sorted({e for p in (*self.args, self.result) for e in p.extents if isinstance(e, str)})
+
+    @property
+    def elements(self) -> list[str]:
+        """Those of ELEMENTS that its arguments name."""
+        return [e for e in ELEMENTS if any(p.element == e for p in self.args)]
 
 
 @cache
@@ -62,8 +76,6 @@ def library() -> tuple[Signature, ...]:
 
 
 def _pattern(node: ast.expr | None) -> Pattern:
-    assert node
-    text = node.value if isinstance(node, ast.Constant) else ast.unparse(node)
-    assert isinstance(text, str) and text.startswith("f64"), text
-    extents = re.findall(r"\[(\w+)\]", text)
-    return Pattern(tuple(int(e) if e.isdigit() else e for e in extents))
+    assert isinstance(node, ast.Constant)
+    extents = re.findall(r"\[(\w+)\]", str(node.value))
+    return Pattern(str(node.value).partition("[")[0], tuple(int(e) if e.isdigit() else e for e in extents))

@@ -6,6 +6,7 @@ from __future__ import annotations
 import math
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
+from typing import Any
 
 from . import catalog, oracle
 from . import tree as t
@@ -219,7 +220,7 @@ class Expressions:
         if type_ in FLOATS:
             options += [(6, lambda: t.Binary(type_, "/", *self._pair(type_, depth)))]
             options += [(6, lambda: self._elementary(type_, depth))]
-            options += [(12 if self.library and type_ == "f64" else 0, lambda: self._library(type_, depth))]
+            options += [(12 if self.library else 0, lambda: self._library(type_, depth))]
         else:
             options += [(8, lambda: self._bits(type_, depth)), (5, lambda: self._wrapped(type_, depth))]
         if type_ not in ("u32", "u64"):
@@ -371,10 +372,13 @@ class Expressions:
         if not fitting:
             return self.leaf(type_)
         signature = self.c.pick(fitting)
-        sizes: dict[str, int] = {}
+        sizes: dict[str, Any] = {}
         signature.result.bind(type_, sizes)
         for variable in signature.variables:
-            sizes.setdefault(variable, self.c.between(1, 4))
+            least = 2 if signature.name.startswith(("interp", "extrapolate")) else 1
+            sizes.setdefault(variable, self.c.between(least, 4))
+        for name in signature.elements:
+            sizes.setdefault(name, self.c.pick(catalog.ELEMENTS[name]))
         # Few nodes per operand, because an array has many elements.
         args = tuple(self.expr(p.at(sizes), min(depth - 1, 1), TYPED) for p in signature.args)
         return t.Call(type_, signature.name, args)
@@ -490,11 +494,42 @@ class Expressions:
                     ),
                 ),
                 (6, lambda: self.scaled(type_, depth)),
+                (14 if depth > 0 else 0, lambda: self._mapped(type_, depth)),
                 (3, lambda: t.Unary(type_, "-", self.expr(type_, depth - 1))),
             ]
-        if inner == "f64" and self.library:
+        if inner in FLOATS and self.library:
             options += [(20, lambda: self._library(type_, depth))]
         return self._one_of(options)
+
+    def _mapped(self, type_: Array, depth: int) -> t.Expr:
+        """A function of numbers on arrays, a conversion of one, a choice by a mask, or a product of vectors."""
+        inner, shape = str(type_.element), type_.shape
+
+        def array() -> t.Expr:
+            return self.expr(type_, min(depth - 1, 1))
+
+        def either() -> t.Expr:
+            return array() if self.c.chance(50) else self.expr(inner, min(depth - 1, 1), TYPED)
+
+        kind = self.c.weighted(((3, "select"), (2, "convert"), (3, "where"), (3, "float"), (3, "product")))
+        if kind == "convert":
+            source = self.c.pick(NUMBERS)
+            safe = inner in INTEGERS and self.c.chance(80)
+            return t.Call(type_, f"sat_{inner}" if safe else inner, (self.expr(Array(source, shape), 1),))
+        if kind == "where":
+            low, high = (array(), either()) if self.c.chance(50) else (either(), array())
+            mask = t.Compare(Array("bool", shape), (self.c.pick(("<", "<=", ">", ">=", "==", "!=")),), (low, high))
+            return t.Call(type_, "where", (mask, either(), either()))
+        if kind == "float" and inner in FLOATS:
+            name = self.c.pick((*_ONE_FLOAT, *oracle.ELEMENTARY_1, *_TWO_FLOATS, "abs", "lerp"))
+            count = 3 if name == "lerp" else 2 if name in _TWO_FLOATS else 1
+            return t.Call(type_, name, (array(), *(either() for _ in range(count - 1))))
+        if kind == "product" and len(shape) == 1:
+            ops = "*/" if inner in FLOATS else "*"
+            left = either() if inner in FLOATS else array()
+            return t.Binary(type_, self.c.pick(ops), left, array())
+        name = self.c.pick(("min", "max", "clamp"))
+        return t.Call(type_, name, (array(), *(either() for _ in range(2 if name == "clamp" else 1))))
 
     def scaled(self, type_: Array, depth: int) -> t.Expr:
         """Array and scalar, in either order."""

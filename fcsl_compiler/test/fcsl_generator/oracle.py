@@ -178,6 +178,19 @@ def _math() -> ctypes.CDLL:
     return ctypes.CDLL(str(package_prefix("fcsl_compiler") / "lib" / "libfcsl_math.so"))
 
 
+#: Functions of numbers that also take arrays.
+_OF_NUMBERS = frozenset(
+    (
+        *ELEMENTARY_1,
+        *ELEMENTARY_2,
+        *FLOATS,
+        *INTEGERS,
+        *(f"{k}_{i}" for k in ("wrap", "sat") for i in INTEGERS),
+        "where",
+    )
+) | frozenset("abs sqrt floor ceil trunc round wrap_angle fmod copysign lerp min max clamp sign".split())
+
+
 def elementary(name: str, type_: Type, *args: Any) -> Any:
     f = getattr(_math(), f"cr_{name}" + ("f" if type_ == "f32" else ""))
     c = ctypes.c_float if type_ == "f32" else ctypes.c_double
@@ -219,8 +232,20 @@ def wrap(target: Type, value: int) -> int:
 _ADD = {"add": lambda a, b: a + b, "sub": lambda a, b: a - b, "mul": lambda a, b: a * b}
 
 
+def mapped(function: Callable[..., Any], type_: Type, args: list[Any]) -> Any:
+    """A function of numbers, element by element. A number beside arrays is that of every element."""
+    if not isinstance(type_, Array):
+        return function(*args)
+    rows = (([a] * type_.shape[0]) if not isinstance(a, list) else a for a in args)
+    return [mapped(function, row(type_), list(r)) for r in zip(*rows, strict=True)]
+
+
 def builtin(name: str, type_: Type, args: list[Any]) -> Any:
     a = args[0]
+    if isinstance(type_, Array) and name in _OF_NUMBERS:
+        return mapped(lambda *numbers: builtin(name, type_.element, list(numbers)), type_, args)
+    if name == "where":
+        return args[1] if a else args[2]
     if name in (*INTEGERS, *FLOATS):
         return convert(name, a)
     kind, _, rest = name.partition("_")
@@ -228,7 +253,7 @@ def builtin(name: str, type_: Type, args: list[Any]) -> Any:
         return (wrap if kind == "wrap" else saturate)(type_, _ADD[rest](*args))
     if kind in ("wrap", "sat") and rest in INTEGERS:
         return (wrap if kind == "wrap" else saturate)(rest, a)
-    if name in ("min", "max"):
+    if name in ("min", "max") and len(args) > 1:
         for b in args[1:]:
             a = b if (b < a if name == "min" else b > a) else a
         return a
@@ -336,7 +361,10 @@ class Frame:
             return _power(e.type, a, b, isinstance(e.b, t.Literal) and e.b.bare and e.b.type == "i64")
         return elementwise(e.op, e.type, a, b)
 
-    def _compare(self, e: t.Compare) -> bool:
+    def _compare(self, e: t.Compare) -> Any:
+        if isinstance(e.type, Array):
+            pair = [self.value(o) for o in e.operands]
+            return mapped(lambda a, b: COMPARE[e.ops[0]](a, b), e.type, pair)
         left = self.value(e.operands[0])
         for op, operand in zip(e.ops, e.operands[1:], strict=True):
             right = self.value(operand)

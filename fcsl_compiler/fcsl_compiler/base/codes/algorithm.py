@@ -279,12 +279,12 @@ ALGORITHM_CODES: dict[str, Code] = {
     ),
     "E413": Code(
         "not an operation on arrays",
-        "Arrays of the same shape support + and -. An array and a scalar support * and /. The product of two "
-        "arrays is ambiguous, so name the operation: dot, matvec, matmul, outer, or a loop. A comparison of arrays"
-        " needs a norm and a tolerance.",
+        "Operators and functions work element by element on arrays of the same shape, * and / on vectors. The product of "
+        "two matrices is ambiguous, so name the operation: matmul, matvec, outer, or a loop. A scalar is not added to an "
+        "array. A chain of comparisons would need one truth value.",
         Kind.BODY,
-        "self.torque = self.rate * self.rate",
-        "for i in range(3):\n    self.torque[i] = self.rate[i] * self.rate[i]",
+        "self.torque = 1.0 + self.rate",
+        "self.torque = [1.0 + self.rate[0], self.rate[1], self.rate[2]]",
     ),
     "E414": Code(
         "an integer division by zero",

@@ -26,6 +26,7 @@ _CLAMP = Doc(
     "exact",
     "x NaN: NaN; a bound that is NaN does not bind; low above high: high",
 )
+_WHERE = Doc(_GROUP, "where(c, a, b)", "a where c is True, else b; both are evaluated", _EXACT, "none")
 _SIGN = Doc(_GROUP, "sign(x)", "1, -1, or x itself when it is zero or NaN", _EXACT, "none")
 _ABS = Doc(_GROUP, "abs(x)", "|x|", _EXACT, "the smallest integer of a signed type faults")
 
@@ -36,6 +37,8 @@ def operations() -> Iterator[Op]:
             yield Op(symbol, (t, t), BOOL)
         yield from _choosing(t)
         yield from _powers(t)
+    for t in (*NUMBERS, BOOL):
+        yield Op("where", (BOOL, t, t), t, doc=_WHERE)
     for t in (BOOL, REQUEST, HEALTH):
         for symbol in ("==", "!="):
             yield Op(symbol, (t, t), BOOL)

@@ -15,6 +15,9 @@ def spellings() -> Iterator[Entry]:
     for t in NUMBERS:
         yield from _choosing(t)
         yield from _powers(t)
+    for t in (*NUMBERS, BOOL):
+        helper = c_function(f"{t.c} fcsl_where_{t}(bool c, {t.c} a, {t.c} b)", "return c ? a : b;")
+        yield entry("where", (BOOL, t, t), f"fcsl_where_{t}({{0}}, {{1}}, {{2}})", helper)
     yield entry("not", (BOOL,), "(!{0})")
 
 

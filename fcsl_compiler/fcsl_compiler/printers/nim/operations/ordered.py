@@ -17,6 +17,9 @@ def spellings() -> Iterator[Entry]:
     for t in NUMBERS:
         yield from _choosing(t)
         yield from _powers(t)
+    for t in (*NUMBERS, BOOL):
+        helper = proc(f"fcsl_where_{t}", f"c: bool, a, b: {nim(t)}", nim(t), "if c: a else: b")
+        yield entry("where", (BOOL, t, t), f"fcsl_where_{t}({{0}}, {{1}}, {{2}})", helper)
     yield entry("not", (BOOL,), "(not {0})")
 
 
