@@ -19,22 +19,15 @@ function(fcsl_add_machine target)
     set(arg_BACKEND c)
   endif()
   set(options --target "${arg_TARGET}" --backend "${arg_BACKEND}")
-  set(suffix c)
-  if(arg_BACKEND STREQUAL "nim")
-    set(suffix nim.c) # what Nim makes of <stem>.nim
-  endif()
   if(arg_STRICT)
     list(APPEND options --strict)
   endif()
   set(folder "${CMAKE_CURRENT_BINARY_DIR}/${target}_c")
   set(configs "")
-  set(made "${folder}/fcsl_machines.c")
   foreach(json ${arg_UNPARSED_ARGUMENTS})
     get_filename_component(json "${json}" ABSOLUTE)
     get_filename_component(stem "${json}" NAME_WE)
     list(APPEND configs "${json}")
-    list(APPEND made "${folder}/${stem}.${suffix}" "${folder}/${stem}.h")
-    set_property(DIRECTORY APPEND PROPERTY CMAKE_CONFIGURE_DEPENDS "${json}")
     _fcsl_register_machine(${target} "${json}")
     if(arg_TARGET STREQUAL "simulation")
       file(WRITE "${CMAKE_CURRENT_BINARY_DIR}/fcsl_index/${PROJECT_NAME}.${stem}"
@@ -43,17 +36,8 @@ function(fcsl_add_machine target)
         DESTINATION share/ament_index/resource_index/fcsl_machines RENAME "${PROJECT_NAME}__${stem}")
     endif()
   endforeach()
-  add_custom_command(
-    OUTPUT ${made}
-    COMMAND ${CMAKE_COMMAND} -E env "CC=${CMAKE_C_COMPILER}"
-      "${FCSLC}" build --c-only ${options} ${configs} -o "${folder}" --depfile "${folder}/${target}.d"
-    COMMAND ${CMAKE_COMMAND} -E touch ${made}
-    DEPENDS ${configs} "${FCSLC}"
-    DEPFILE "${folder}/${target}.d"
-    COMMENT "fcslc: ${target}"
-    VERBATIM)
-  add_custom_target(${target}_c DEPENDS ${made})
-  add_library(${target} SHARED ${made})
+  fcsl_c_of_machines(${target} made ${configs} OPTIONS ${options})
+  add_library(${target} SHARED ${made} "${folder}/fcsl_machines.c")
   add_dependencies(${target} ${target}_c)
   target_include_directories(${target} PUBLIC "$<BUILD_INTERFACE:${folder}>")
   _fcsl_compile_flags(${target})
@@ -73,6 +57,39 @@ function(fcsl_add_machine target)
     VERBATIM)
   install(FILES "${folder}/fcsl_machines.sources.json" DESTINATION lib/${PROJECT_NAME} RENAME "${record}")
   install(TARGETS ${target} LIBRARY DESTINATION lib/${PROJECT_NAME} ARCHIVE DESTINATION lib/${PROJECT_NAME})
+endfunction()
+
+# fcsl_c_of_machines(<name> <sources> <machine.json> [<machine.json> ...] [OPTIONS <option of fcslc build> ...])
+#   Has fcslc make C of machines, by target <name>_c, in the build's folder <name>_c. Sets <sources> to the files of the machines;
+#   the table of them that a library exports is fcsl_machines.c, beside them.
+function(fcsl_c_of_machines name sources)
+  cmake_parse_arguments(PARSE_ARGV 2 arg "" "" "OPTIONS")
+  set(suffix c)
+  if("nim" IN_LIST arg_OPTIONS)
+    set(suffix nim.c) # what Nim makes of <stem>.nim
+  endif()
+  set(folder "${CMAKE_CURRENT_BINARY_DIR}/${name}_c")
+  set(configs "")
+  set(made "")
+  foreach(json ${arg_UNPARSED_ARGUMENTS})
+    get_filename_component(json "${json}" ABSOLUTE)
+    get_filename_component(stem "${json}" NAME_WE)
+    list(APPEND configs "${json}")
+    list(APPEND made "${folder}/${stem}.${suffix}" "${folder}/${stem}.h")
+    set_property(DIRECTORY APPEND PROPERTY CMAKE_CONFIGURE_DEPENDS "${json}")
+  endforeach()
+  set(${sources} ${made} PARENT_SCOPE)
+  list(PREPEND made "${folder}/fcsl_machines.c") # first: the file of dependencies is about it
+  add_custom_command(
+    OUTPUT ${made}
+    COMMAND ${CMAKE_COMMAND} -E env "CC=${CMAKE_C_COMPILER}"
+      "${FCSLC}" build --c-only ${arg_OPTIONS} ${configs} -o "${folder}" --depfile "${folder}/${name}.d"
+    COMMAND ${CMAKE_COMMAND} -E touch ${made}
+    DEPENDS ${configs} "${FCSLC}"
+    DEPFILE "${folder}/${name}.d"
+    COMMENT "fcslc: ${name}"
+    VERBATIM)
+  add_custom_target(${name}_c DEPENDS ${made})
 endfunction()
 
 # The flags of fcsl_compiler/driver/toolchain.py; those of the linker above do the same as there. -O3 overrides CMake's level.

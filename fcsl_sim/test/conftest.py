@@ -1,23 +1,21 @@
 # SPDX-License-Identifier: Apache-2.0
-"""A controller and simulations to test with: `hopper` is test/machines/hopper.c, written by hand against the ABI."""
+"""A controller and simulations to test with: `hopper` is test/machines/hopper.json."""
 
 from __future__ import annotations
 
 import copy
 import json
 import shutil
-import subprocess
 from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
 import pytest
 
-from fcsl_compiler.driver.toolchain import include_dirs
+from fcsl_compiler.api.build import build_machine
 from fcsl_sim import SimConfig, Simulation, load
 
 TEST = Path(__file__).resolve().parent
-CFLAGS = ["-std=c11", "-O2", "-Wall", "-Wextra", "-Werror", "-ffp-contract=off", "-fPIC", "-shared"]
 
 #: The hopper on a ramp: x' = throttle, measured without noise.
 RAMP: dict[str, Any] = {
@@ -66,12 +64,9 @@ def lander() -> Path:
 
 
 @pytest.fixture(scope="session")
-def hopper(tmp_path_factory: pytest.TempPathFactory) -> tuple[Path, str]:
+def hopper() -> tuple[Path, str]:
     """Library and machine name of the controller."""
-    library = tmp_path_factory.mktemp("hopper") / "libhopper.so"
-    includes = [f"-I{path}" for path in include_dirs()]
-    subprocess.run(["cc", *CFLAGS, *includes, str(TEST / "machines/hopper.c"), "-o", str(library)], check=True)
-    return library, "hopper"
+    return build_machine(TEST / "machines/hopper.json").library, "hopper"
 
 
 @pytest.fixture

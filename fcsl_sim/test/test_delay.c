@@ -6,7 +6,7 @@
 
 #include "check.h"
 #include "controllers/delay.h"
-#include "machines/hopper.c"
+#include "hopper.h"
 
 enum { TICKS = 50 };
 
@@ -15,7 +15,7 @@ static fcsl_message_t message_of(const fcsl_channel_table_t *table, uint64_t tic
 {
     static hopper_t hopper;
     fcsl_message_t message = {0};
-    hopper.pilot.throttle = throttle;
+    hopper.i_pilot.outputs.throttle = throttle;
     CHECK(fcsl_message_encode_actuators(table, &hopper, tick, 1, bytes, capacity, &message) == FCSL_MESSAGE_OK);
     return message;
 }
@@ -28,9 +28,8 @@ static int has_command(uint64_t tick, uint32_t gap)
 
 static void acts_once(uint32_t ticks, uint32_t gap)
 {
-    const fcsl_machine_t *machine = fcsl_machines[0];
-    const fcsl_channel_table_t table = fcsl_channel_table(machine);
-    const size_t capacity = fcsl_message_capacity(machine, FCSL_ACTUATOR_MESSAGE);
+    const fcsl_channel_table_t table = fcsl_channel_table(&hopper_machine);
+    const size_t capacity = fcsl_message_capacity(&hopper_machine, FCSL_ACTUATOR_MESSAGE);
     uint8_t bytes[1024];
     fcsl_delay_t delay;
     CHECK(capacity <= sizeof bytes && fcsl_delay_open(&delay, ticks, capacity) == 0);
@@ -43,8 +42,8 @@ static void acts_once(uint32_t ticks, uint32_t gap)
         if (acts) {
             hopper_t hopper = {0};
             CHECK(due.tick == tick - ticks);
-            fcsl_message_apply(machine, &hopper, &due);
-            CHECK(hopper.pilot.throttle == 0.5 + (double)(tick - ticks));
+            fcsl_message_apply(&hopper_machine, &hopper, &due);
+            CHECK(hopper.i_pilot.outputs.throttle == 0.5 + (double)(tick - ticks));
         }
     }
     fcsl_delay_free(&delay);

@@ -127,8 +127,8 @@ def test_a_simulated_machine_takes_commands_of_a_hosted_one(
     with served(open_sim(), tmp_path / "s") as client:
         assert client("hardware", bank="adc", number=3, value=77)["value"] == 77
         assert client("hardware", bank="adc", number=3)["value"] == 77
-        refused = client("inject", instance="pilot", what="failed")["error"]
-        assert "built without injected faults" in refused["message"]
+        refused = client("inject", instance="pilot", what="overrun")["error"]
+        assert "has no max_wcet_us" in refused["message"]
         for command, members in (("attach", {}), ("sample", {"value": 1.0})):
             refused = client(command, channel="altitude", **members)["error"]
             assert refused["code"] == "refused" and "simulation feeds the sensor channels" in refused["message"]

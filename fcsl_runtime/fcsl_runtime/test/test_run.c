@@ -178,7 +178,7 @@ static void test_set(void)
     check_refused(fcsl_run_set(run, gyro, 0, value, 0, &error), &error, "sensors.outputs.gyro");
     check_refused(fcsl_run_set(run, UINT32_MAX, 0, value, 8, &error), &error, "no field");
     check_refused(fcsl_run_set(run, field_of(run, "pilot.parameters.limit"), 0, value, 8, &error), &error, "frozen");
-    check_refused(fcsl_run_set(run, field_of(run, "pilot.outputs.force"), 0, value, 8, &error), &error,
+    check_refused(fcsl_run_set(run, field_of(run, "pilot.outputs.health"), 0, value, 4, &error), &error,
                   "cannot be set");
     const uint8_t two = 2;
     check_refused(fcsl_run_set(run, field_of(run, "sensors.outputs.armed"), 0, &two, 1, &error), &error,
@@ -327,6 +327,24 @@ static void test_overruns(void)
     close_run(run);
 }
 
+/* A descriptor without the offset; machines of fcslc have it. */
+static void test_no_injection(void)
+{
+    fcsl_error_t error;
+    fcsl_run_t *first = open_fixture();
+    fcsl_machine_t own = *fcsl_run_machine(first);
+    fcsl_instance_t instances[2];
+    CHECK(own.instance_count == 2);
+    memcpy(instances, own.instances, sizeof instances);
+    instances[1].inject_fault_offset = FCSL_NO_OFFSET;
+    own.instances = instances;
+    fcsl_run_t *run = fcsl_run_open_machine(&own, &error);
+    CHECK(run != NULL && fcsl_run_inject_fault(run, 0, &error) == 0);
+    check_refused(fcsl_run_inject_fault(run, 1, &error), &error, "built without injected faults");
+    close_run(run);
+    close_run(first);
+}
+
 static void test_time(void)
 {
     fcsl_run_t *run = open_fixture();
@@ -389,6 +407,7 @@ int main(int argc, char **argv)
     test_checkpoint();
     test_channel_messages();
     test_overruns();
+    test_no_injection();
     test_time();
     test_message();
     test_record_errors();

@@ -83,6 +83,9 @@ _LIBRARY = _load()
 #: Field numbers of the fixture machine.
 GYRO, TEMPERATURE, ARMED, COUNT = 3, 4, 5, 6
 
+#: Where its pilot faults while the count is negative.
+NEGATIVE = "algorithms/pilot.py:19:63: the value does not fit u64"
+
 
 class Refused(Exception):
     """The library's own text."""

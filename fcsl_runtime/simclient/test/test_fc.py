@@ -21,6 +21,8 @@ import pytest
 from native import FIXTURE, FIXTURE_TWIN, PROGRAM, Client, Fc, flying
 from rosbags.highlevel import AnyReader
 
+from simclient.run import open_run
+
 
 @pytest.fixture
 def path(tmp_path: Path) -> Path:
@@ -123,13 +125,13 @@ def test_describe_and_list(paused: tuple[Fc, Client]) -> None:
     machine = client.ok("describe")
     assert machine["machine"] == "fixture" and machine["tick_hz"] == 100 and machine["states"] == ["IDLE", "ACTIVE"]
     field = client.ok("describe", path="pilot.outputs.matrix[1,0]")
-    assert field["type"] == "f32[2][2]" and field["role"] == "output" and field["writable"] is False
+    assert field["type"] == "f32[2][2]" and field["role"] == "output" and field["writable"] is True
+    assert client.ok("describe", path="pilot.outputs.health")["writable"] is False
     assert client.ok("describe", path="pilot.inputs.gyro")["connected_from"] == "sensors.outputs.gyro"
     assert client.ok("describe", path="pilot.parameters.limit")["frozen"] is True
     gain, force = (client.ok("describe", path=f"pilot.{name}") for name in ("parameters.gain", "outputs.force"))
     assert (gain["minimum"], gain["maximum"]) == (-100, 100) and (force["minimum"], force["maximum"]) == ("-inf", "inf")
-    paths = client.ok("list")["paths"]
-    assert len(paths) == 33 and paths[0] == "machine.tick"
+    assert client.ok("list")["paths"] == list(open_run(Path(FIXTURE), None).machine.fields)
     assert client.ok("list", prefix="pilot.parameters.")["paths"] == ["pilot.parameters.gain", "pilot.parameters.limit"]
 
 
@@ -216,7 +218,7 @@ def test_real_time_and_pause(path: Path) -> None:
         ('{"cmd":"set","values":{"sensors.outputs.gyro":1}}', "bad_value", ""),
         ('{"cmd":"set","values":{"sensors.outputs.gyro":[1,2]}}', "bad_value", ""),
         ('{"cmd":"set","values":{"sensors.outputs.gyro":[1,2,[3]]}}', "bad_value", ""),
-        ('{"cmd":"set","values":{"pilot.outputs.force":1}}', "refused", ""),
+        ('{"cmd":"set","values":{"pilot.outputs.health":"failed"}}', "refused", ""),
         ('{"cmd":"set","values":{"pilot.parameters.limit":1}}', "refused", ""),
         ('{"cmd":"tick","count":0}', "bad_request", ""),
         ('{"cmd":"tick","count":-1}', "bad_request", ""),

@@ -110,7 +110,7 @@ def test_the_fields_that_are_sent_by_default() -> None:
     (configuration,) = set(reading.configurations)
     sensors = "outputs.gyro outputs.temperature outputs.armed outputs.count outputs.transition_request outputs.health"
     pilot = (
-        "inputs.gyro outputs.force outputs.matrix outputs.runs outputs.sign outputs.checksum outputs.saturated "
+        "inputs.gyro inputs.temperature inputs.armed inputs.count inputs.period outputs.force outputs.matrix outputs.runs outputs.sign outputs.checksum outputs.saturated "
         "outputs.transition_request outputs.health"
     )
     counters = ["counters.faults", "counters.overruns", "counters.fault_place"]

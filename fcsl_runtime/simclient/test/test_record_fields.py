@@ -84,7 +84,7 @@ def test_every_field(tmp_path: Path) -> None:
     assert topics(bag) == ALWAYS | {"sensors", "pilot"} | chosen
     opened = Bag(bag)
     assert set(columns(opened, "pilot.parameters.gain")[1]) == {2.0}
-    assert columns(opened, "channels.imu.gyro.valid")[1].tolist() == [False] * 20
+    assert columns(opened, "channels.imu.gyro.valid")[1].tolist() == [True] * 20
     assert columns(opened, "pilot.state.integral")[1].tolist() == integrals(20)
     with AnyReader([bag]) as reader:
         (channels,) = [c for c in reader.connections if c.topic == "/fixture/record/channels"]
@@ -125,7 +125,7 @@ def test_few_fields_still_reproduce(fields: str, tmp_path: Path) -> None:
     left_out = [note for note in verdict.notes if "has no outputs of" in note]
     assert bool(left_out) == (fields != "*")
     if fields.startswith("pilot"):
-        assert Bag(bag).topics["/fixture/pilot"].type == "fixture_fields/msg/FixturePilotOutputs"
+        assert Bag(bag).topics["/fixture/pilot"].type == "fcsl_runtime_fields/msg/FixturePilotOutputs"
         # Control: what is recorded is compared.
         verdict = replay(altered(bag, "/fixture/pilot", tmp_path / "altered"), library=FIXTURE)
         assert verdict.divergence is not None and verdict.divergence.path == "pilot.outputs.force"

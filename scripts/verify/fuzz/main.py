@@ -107,18 +107,28 @@ class Builder:
         rust = package_prefix("fcsl_hal") / "lib" / "libfcsl_io.a"
         self.libraries = [self.archive, rust, math_library()]
 
-    def machines(self, target: Target) -> list[Path]:
-        """Objects that define fcsl_machines."""
-        fixture = compiled(ROOT / "fcsl_runtime/fcsl_runtime/test/fixture_machine.c", self.includes)
-        if target.machines != "examples":
-            return [fixture] if target.machines else []
-        folder = FOLDER / "examples"
+    def of_machines(self, configs: Sequence[Path], folder: Path) -> list[Path]:
+        """Objects of machines, whose C is put into the folder; the last one is the table that a library exports."""
         sources: list[Path] = []
         includes = [folder, *include_dirs()]
-        for compilation in emit(list(SMALL_EXAMPLES.values()), folder):
+        for compilation in emit(configs, folder):
             sources += [folder / compilation.c_name, *compilation.target.sources]
             includes += compilation.target.include
         return [compiled(s, includes, ["-Wno-unused"]) for s in [*sources, folder / "fcsl_machines.c"]]
+
+    def machines(self, target: Target) -> list[Path]:
+        """Objects that define fcsl_machines."""
+        if target.machines == "fixture":
+            test, folder = ROOT / "fcsl_runtime/fcsl_runtime/test", FOLDER / "fixture"
+            machine, _ = self.of_machines([test / "fixture/fixture.json"], folder)
+            return [machine, compiled(test / "fixture_machine.c", [folder, *self.includes])]
+        return self.of_machines(list(SMALL_EXAMPLES.values()), FOLDER / "examples") if target.machines else []
+
+    def plugin(self, source: Path) -> list[Path]:
+        """Objects of a library that a harness loads: a machine, or a model in C."""
+        if source.suffix == ".json":
+            return self.of_machines([source], FOLDER / source.stem)
+        return [compiled(source, self.includes)]
 
     def program(self, target: Target, defect: Defect | None = None) -> Path:
         """The harness, with the seeded defect if there is one. Raises CheckFailed."""
@@ -135,7 +145,7 @@ class Builder:
         parts = [harness, *first, *self.machines(target), *self.libraries]
         for plugin in target.plugins:
             source = ROOT / plugin
-            linked(folder / f"{source.stem}.so", [compiled(source, self.includes)], ["-shared"])
+            linked(folder / f"{source.stem}.so", self.plugin(source), ["-shared"])
         return linked(output, parts, ["-fsanitize=fuzzer", "-lm", "-ldl", "-lpthread"])
 
 

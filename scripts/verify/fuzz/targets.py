@@ -36,7 +36,7 @@ _VARS = "fcsl_runtime/fcsl_runtime/src/vars"
 _SEARCHED_S = 300
 #: Libraries of the harnesses of the simulator: a machine, then models.
 _MODELS = (
-    "fcsl_sim/test/machines/hopper.c",
+    "fcsl_sim/test/machines/hopper.json",
     *(f"fcsl_sim/test/models/{name}.c" for name in ("ball", "chain", "problem", "ramp")),
     *(f"fcsl_sim/models/{name}.c" for name in ("noisy_sensor", "serial_link")),
 )
