@@ -1,6 +1,7 @@
 /* SPDX-License-Identifier: Apache-2.0
  *
- * What a tick of a machine puts on the bus for observers: values and commits, byte for byte.
+ * What a tick of a machine puts on the bus for observers: values and commits, byte for byte. The machine is by hand, because those of fcslc
+ * have no two sensors with one age and stamp, which a test here writes once.
  */
 #define _GNU_SOURCE
 #include "bus_rig.h"

@@ -1,7 +1,7 @@
 /* SPDX-License-Identifier: Apache-2.0
  *
  * The file that a machine built for coverage counts into: where it is, what it holds, which ones are refused. This program
- * itself is the library of such a machine.
+ * itself is the library of such a machine, of which only the name is read.
  */
 #include "run/cover.c"
 

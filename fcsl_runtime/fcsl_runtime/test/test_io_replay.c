@@ -1,7 +1,7 @@
 /* SPDX-License-Identifier: Apache-2.0
  *
  * What an impure instance leaves is recorded and put in place in a replay; that of its pure neighbours is not. The source is
- * compiled in.
+ * compiled in. The machine is by hand, because what an instance leaves is to be known here byte by byte.
  */
 #include "run/io_replay.c"
 

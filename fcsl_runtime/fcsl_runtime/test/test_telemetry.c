@@ -2,6 +2,7 @@
  *
  * The sender of telemetry between a history and a socket of this process: which ticks it sends, what it counts, when it sends
  * the configuration, that its thread allocates nothing, and what it refuses. The bytes are test_fc_telemetry.py's.
+ * Machine and fields are by hand, because fcslc makes no paths and fields as long as those that are refused.
  */
 #define _GNU_SOURCE
 #include <netinet/in.h>

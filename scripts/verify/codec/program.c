@@ -1,7 +1,8 @@
 /* SPDX-License-Identifier: Apache-2.0
  *
  * What main.py gives to EVA: the codec, COBS and frames of the link on any bytes of every size up to a bound. Bytes lie at the
- * end of their memory, so that a read or a write behind them is an alarm.
+ * end of their memory, so that a read or a write behind them is an alarm. The machine is by hand, because fcslc leaves no gaps
+ * between fields.
  */
 #include <stddef.h>
 

@@ -1,10 +1,9 @@
 /* SPDX-License-Identifier: Apache-2.0
  *
  * message.h: the .msg text of an instance, laid out along its outputs: a number, an array, a struct, an array of structs.
- * Input: that text. What is laid out lies in the machine's struct and in the message.
+ * Input: that text. What is laid out lies in the machine's struct and in the message. The fields
+ * are by hand: of a machine they are all that is read.
  */
-#include <math.h>
-
 #include "fuzz.h"
 #include "messages/message.h"
 
@@ -25,21 +24,14 @@ typedef struct {
 static const uint32_t THREE[] = {3};
 
 #define LEAF(path_, type_, rank_, count_, member_)                                                                     \
-    {path_,                                                                                                            \
-     FCSL_ROLE_OUTPUT,                                                                                                 \
-     type_,                                                                                                            \
-     0,                                                                                                                \
-     rank_,                                                                                                            \
-     rank_ > 0 ? THREE : NULL,                                                                                         \
-     count_,                                                                                                           \
-     offsetof(outputs_t, member_),                                                                                     \
-     sizeof(((outputs_t *)0)->member_),                                                                                \
-     0,                                                                                                                \
-     FCSL_NONE,                                                                                                        \
-     "",                                                                                                               \
-     "",                                                                                                               \
-     -(double)INFINITY,                                                                                                \
-     (double)INFINITY}
+    {.path = path_,                                                                                                    \
+     .role = FCSL_ROLE_OUTPUT,                                                                                         \
+     .type = type_,                                                                                                    \
+     .rank = rank_,                                                                                                    \
+     .shape = rank_ > 0 ? THREE : NULL,                                                                                \
+     .count = count_,                                                                                                  \
+     .offset = offsetof(outputs_t, member_),                                                                           \
+     .size = sizeof(((outputs_t *)0)->member_)}
 
 static const fcsl_field_t FIELDS[] = {
     LEAF("pilot.outputs.force", FCSL_F64, 0, 1, force),
