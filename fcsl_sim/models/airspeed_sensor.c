@@ -48,12 +48,6 @@ typedef struct {
     airspeed_sensor_outputs_t outputs;
 } airspeed_sensor_t;
 
-static sensor_losses_t losses_of(const airspeed_sensor_t *sensor)
-{
-    return (sensor_losses_t){sensor->parameters.dropout_probability, sensor->parameters.delay_samples,
-                             sensor->parameters.fault};
-}
-
 static sensor_errors_t errors_of(const airspeed_sensor_t *sensor)
 {
     return (sensor_errors_t){.scale_error = sensor->parameters.scale_error,
@@ -71,7 +65,7 @@ static const char *init(void *self, const fcsl_model_context_t *context)
     (void)context;
     const sensor_errors_t errors = errors_of(sensor);
     const char *wrong = sensor_check_errors(&errors);
-    return wrong ? wrong : sensor_check_losses(losses_of(sensor));
+    return wrong ? wrong : sensor_check_losses(SENSOR_LOSSES(sensor));
 }
 
 static double airspeed(double pressure, double density)
@@ -82,7 +76,7 @@ static double airspeed(double pressure, double density)
 static void update(void *self, const fcsl_model_context_t *context)
 {
     airspeed_sensor_t *sensor = self;
-    const sensor_losses_t losses = losses_of(sensor);
+    const sensor_losses_t losses = SENSOR_LOSSES(sensor);
     const sensor_errors_t errors = errors_of(sensor);
     const double interval = sensor_interval(&sensor->state.line, context);
     airspeed_sensor_outputs_t sample;

@@ -46,12 +46,6 @@ typedef struct {
     barometer_outputs_t outputs;
 } barometer_t;
 
-static sensor_losses_t losses_of(const barometer_t *sensor)
-{
-    return (sensor_losses_t){sensor->parameters.dropout_probability, sensor->parameters.delay_samples,
-                             sensor->parameters.fault};
-}
-
 static sensor_errors_t errors_of(const barometer_t *sensor)
 {
     return (sensor_errors_t){.bias = sensor->parameters.bias,
@@ -70,13 +64,13 @@ static const char *init(void *self, const fcsl_model_context_t *context)
     if (!(sensor->parameters.reference_pressure > 0.0)) {
         return "parameters.reference_pressure must be positive";
     }
-    return wrong ? wrong : sensor_check_losses(losses_of(sensor));
+    return wrong ? wrong : sensor_check_losses(SENSOR_LOSSES(sensor));
 }
 
 static void update(void *self, const fcsl_model_context_t *context)
 {
     barometer_t *sensor = self;
-    const sensor_losses_t losses = losses_of(sensor);
+    const sensor_losses_t losses = SENSOR_LOSSES(sensor);
     const sensor_errors_t errors = errors_of(sensor);
     const double interval = sensor_interval(&sensor->state.line, context);
     barometer_outputs_t sample;

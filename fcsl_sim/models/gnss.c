@@ -56,12 +56,6 @@ typedef struct {
     gnss_outputs_t outputs;
 } gnss_t;
 
-static sensor_losses_t losses_of(const gnss_t *gnss)
-{
-    return (sensor_losses_t){gnss->parameters.dropout_probability, gnss->parameters.delay_samples,
-                             gnss->parameters.fault};
-}
-
 static const char *init(void *self, const fcsl_model_context_t *context)
 {
     const gnss_t *gnss = self;
@@ -81,7 +75,7 @@ static const char *init(void *self, const fcsl_model_context_t *context)
     if (!(fabs(gnss->parameters.reference_latitude) < 0.5 * PI)) {
         return "parameters.reference_latitude must be between the poles, in rad";
     }
-    return sensor_check_losses(losses_of(gnss));
+    return sensor_check_losses(SENSOR_LOSSES(gnss));
 }
 
 /* Metres per radian of latitude and of longitude. */
@@ -104,7 +98,7 @@ static double wrap(double angle)
 static void update(void *self, const fcsl_model_context_t *context)
 {
     gnss_t *gnss = self;
-    const sensor_losses_t losses = losses_of(gnss);
+    const sensor_losses_t losses = SENSOR_LOSSES(gnss);
     const double interval = sensor_interval(&gnss->state.line, context);
     const double sigma[] = {gnss->parameters.horizontal_sigma, gnss->parameters.horizontal_sigma,
                             gnss->parameters.vertical_sigma};

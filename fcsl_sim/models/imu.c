@@ -105,11 +105,6 @@ static triad_t gyroscope_of(const imu_t *imu)
                      .walk_stream = GYROSCOPE_WALK};
 }
 
-static sensor_losses_t losses_of(const imu_t *imu)
-{
-    return (sensor_losses_t){imu->parameters.dropout_probability, imu->parameters.delay_samples, imu->parameters.fault};
-}
-
 static const char *init(void *self, const fcsl_model_context_t *context)
 {
     const imu_t *imu = self;
@@ -131,7 +126,7 @@ static const char *init(void *self, const fcsl_model_context_t *context)
     CHECK(gyroscope_saturation)
     CHECK(gyroscope_quantum)
 #undef CHECK
-    return sensor_check_losses(losses_of(imu));
+    return sensor_check_losses(SENSOR_LOSSES(imu));
 }
 
 /* The specific force at the place of the accelerometers. */
@@ -211,7 +206,7 @@ static void update(void *self, const fcsl_model_context_t *context)
 {
     imu_t *imu = self;
     const triad_t accelerometer = accelerometer_of(imu), gyroscope = gyroscope_of(imu);
-    const sensor_losses_t losses = losses_of(imu);
+    const sensor_losses_t losses = SENSOR_LOSSES(imu);
     const double interval = sensor_interval(&imu->state.line, context);
     double force[3];
     imu_outputs_t sample;

@@ -39,12 +39,6 @@ typedef struct {
     magnetometer_outputs_t outputs;
 } magnetometer_t;
 
-static sensor_losses_t losses_of(const magnetometer_t *sensor)
-{
-    return (sensor_losses_t){sensor->parameters.dropout_probability, sensor->parameters.delay_samples,
-                             sensor->parameters.fault};
-}
-
 static sensor_errors_t errors_of(const magnetometer_t *sensor, int axis)
 {
     return (sensor_errors_t){.bias = sensor->parameters.hard_iron_body[axis],
@@ -59,14 +53,14 @@ static const char *init(void *self, const fcsl_model_context_t *context)
     (void)context;
     const sensor_errors_t errors = errors_of(sensor, 0);
     const char *wrong = sensor_check_errors(&errors);
-    return wrong ? wrong : sensor_check_losses(losses_of(sensor));
+    return wrong ? wrong : sensor_check_losses(SENSOR_LOSSES(sensor));
 }
 
 static void update(void *self, const fcsl_model_context_t *context)
 {
     magnetometer_t *sensor = self;
     const magnetometer_t *now = sensor;
-    const sensor_losses_t losses = losses_of(sensor);
+    const sensor_losses_t losses = SENSOR_LOSSES(sensor);
     const double interval = sensor_interval(&sensor->state.line, context);
     double field[3], felt[3];
     magnetometer_outputs_t sample;

@@ -43,12 +43,6 @@ typedef struct {
     range_finder_outputs_t outputs;
 } range_finder_t;
 
-static sensor_losses_t losses_of(const range_finder_t *sensor)
-{
-    return (sensor_losses_t){sensor->parameters.dropout_probability, sensor->parameters.delay_samples,
-                             sensor->parameters.fault};
-}
-
 static sensor_errors_t errors_of(const range_finder_t *sensor)
 {
     return (sensor_errors_t){.bias = sensor->parameters.bias,
@@ -72,13 +66,13 @@ static const char *init(void *self, const fcsl_model_context_t *context)
     if (!(sensor->parameters.maximum_range > sensor->parameters.minimum_range)) {
         return "parameters.maximum_range must exceed parameters.minimum_range";
     }
-    return wrong ? wrong : sensor_check_losses(losses_of(sensor));
+    return wrong ? wrong : sensor_check_losses(SENSOR_LOSSES(sensor));
 }
 
 static void update(void *self, const fcsl_model_context_t *context)
 {
     range_finder_t *sensor = self;
-    const sensor_losses_t losses = losses_of(sensor);
+    const sensor_losses_t losses = SENSOR_LOSSES(sensor);
     const sensor_errors_t errors = errors_of(sensor);
     const double interval = sensor_interval(&sensor->state.line, context);
     double beam_ned[3], drift = 0.0; /* it has none */

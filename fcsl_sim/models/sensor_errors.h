@@ -112,6 +112,11 @@ typedef struct {
     int64_t time_ns; /* of the newest one */
 } sensor_line_t;
 
+/* Those of a sensor whose struct has them among its `parameters`. */
+#define SENSOR_LOSSES(sensor)                                                                                          \
+    ((sensor_losses_t){(sensor)->parameters.dropout_probability, (sensor)->parameters.delay_samples,                   \
+                       (sensor)->parameters.fault})
+
 static inline const char *sensor_check_losses(sensor_losses_t losses)
 {
     return !(losses.dropout_probability >= 0.0 && losses.dropout_probability <= 1.0)

@@ -53,12 +53,6 @@ typedef struct {
     wheel_odometry_outputs_t outputs;
 } wheel_odometry_t;
 
-static sensor_losses_t losses_of(const wheel_odometry_t *wheels)
-{
-    return (sensor_losses_t){wheels->parameters.dropout_probability, wheels->parameters.delay_samples,
-                             wheels->parameters.fault};
-}
-
 static const char *init(void *self, const fcsl_model_context_t *context)
 {
     const wheel_odometry_t *wheels = self;
@@ -72,7 +66,7 @@ static const char *init(void *self, const fcsl_model_context_t *context)
     if (!(wheels->parameters.tick_distance >= 0.0)) {
         return "parameters.tick_distance must not be negative";
     }
-    return sensor_check_losses(losses_of(wheels));
+    return sensor_check_losses(SENSOR_LOSSES(wheels));
 }
 
 static void derivative(const void *self, double t, const double *x, double *dx)
@@ -95,7 +89,7 @@ static void output(void *self, double t, const double *x)
 static double count(wheel_odometry_t *wheels, int wheel, double scale_error, const fcsl_model_context_t *context)
 {
     const double tick = wheels->parameters.tick_distance;
-    const double distance = sensor_feel(losses_of(wheels), wheels->state.distance[wheel]);
+    const double distance = sensor_feel(SENSOR_LOSSES(wheels), wheels->state.distance[wheel]);
     const double slipped = wheels->parameters.slip * sqrt(fabs(distance)) * sensor_gaussian(context, SENSOR_NOISE);
     wheels->state.distance[wheel] = 0.0;
     wheels->state.rolled[wheel] += distance + scale_error * distance + slipped;
@@ -132,7 +126,7 @@ static void update(void *self, const fcsl_model_context_t *context)
                                              .x = wheels->state.x,
                                              .y = wheels->state.y,
                                              .yaw = wheels->state.yaw};
-    wheels->outputs.sampled = sensor_deliver(&wheels->state.line, losses_of(wheels), context, true, &sample,
+    wheels->outputs.sampled = sensor_deliver(&wheels->state.line, SENSOR_LOSSES(wheels), context, true, &sample,
                                              &wheels->outputs, offsetof(wheel_odometry_outputs_t, sampled));
 }
 
