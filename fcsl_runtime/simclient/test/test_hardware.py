@@ -18,27 +18,29 @@ from native import PROGRAM, flying
 from rosbags.highlevel import AnyReader
 from test_simclient_replay import edited
 
+from fcsl_compiler.api.build import build_machine
 from simclient import AlgTwin, ProcessTwin, Twin, TwinError
 from simclient.replay import replay
 from simclient.run import open_run
 
 
-def build(name: str, folder: Path) -> Path:
-    """The library of test/machines/<name>.c."""
-    library = folder / f"lib{name}.so"
+def build_board(folder: Path) -> Path:
+    """The library of test/machines/board.c."""
+    library = folder / "libboard.so"
     include = ROOT / "fcsl_compiler/include"
-    source = ROOT / f"fcsl_runtime/simclient/test/machines/{name}.c"
-    subprocess.run(["cc", *CFLAGS, f"-I{include}", str(source), "-o", str(library)], check=True)
+    subprocess.run(["cc", *CFLAGS, f"-I{include}", str(MACHINES / "board.c"), "-o", str(library)], check=True)
     return library
 
 
+MACHINES = ROOT / "fcsl_runtime/simclient/test/machines"
 #: Registers of the bench: what it reads and what it writes.
 TURNS, DUTY = 0x40000024, 0xFFFFFFFF
 
 
 @pytest.fixture(scope="module")
-def bench(tmp_path_factory: pytest.TempPathFactory) -> Path:
-    return build("bench", tmp_path_factory.mktemp("bench"))
+def bench() -> Path:
+    """Its instance `io` reads hardware in every second tick; `law` computes from what it read."""
+    return build_machine(MACHINES / "bench.json").library
 
 
 def fly(twin: Twin, ticks: int = 40) -> list[float]:
@@ -215,7 +217,7 @@ def test_what_the_command_refuses(
 
 def test_a_board_is_not_simulated(bench: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setenv("FCSL_TEST_BOARD", str(tmp_path / "board.txt"))
-    board = build("board", tmp_path)
+    board = build_board(tmp_path)
     with flying("--socket", tmp_path / "s", "--paused", "--board", board, library=str(bench)) as fc:
         error = fc.client(tmp_path / "s").error("hardware", bank="gpio", number=1)
         assert error["code"] == "refused" and "hardware of a board" in error["message"]
@@ -286,12 +288,12 @@ def test_substitutes_are_checked(bench: Path) -> None:
     with pytest.raises(TwinError, match="what instance 'io' leaves has 45 bytes, not 8"):
         run.substitute(0, bytes(8))
     with pytest.raises(TwinError, match="'io.outputs.level' cannot hold this value"):
-        run.substitute(0, bytes(16) + b"\x02" + bytes(28))
+        run.substitute(0, bytes(8) + b"\x02" + bytes(36))
     run.substitute(0, b"\x07" + bytes(44))
     run.step(1)  # io is not due: nothing is kept for later
     run.step(1)
-    turns = run.machine.fields["io.state.turns"]
-    assert run.read(turns.offset, turns.size) == bytes(8)
+    volts = run.machine.fields["io.outputs.volts"]
+    assert run.read(volts.offset, volts.size) == bytes(8)
     run.close()
 
 
@@ -305,7 +307,7 @@ def fc(*arguments: str | Path, **environment: str) -> subprocess.CompletedProces
 
 
 def test_fcsl_fc_flies_on_a_board(bench: Path, tmp_path: Path) -> None:
-    board = build("board", tmp_path)
+    board = build_board(tmp_path)
     log = tmp_path / "board.txt"
     arguments = (bench, "--board", board, "--ticks", "6", "--rate", "max", "--record", tmp_path / "run")
     done = fc(*arguments, FCSL_TEST_BOARD=str(log))
@@ -318,7 +320,7 @@ def test_fcsl_fc_flies_on_a_board(bench: Path, tmp_path: Path) -> None:
 
 
 def test_boards_that_cannot_be_used(bench: Path, tmp_path: Path) -> None:
-    board = build("board", tmp_path)
+    board = build_board(tmp_path)
     for library, reason in (
         (board, f"fcsl-fc: board '{board}': no GPIO chip\n"),
         (bench, f"fcsl-fc: '{bench}' is not a board library: it lacks fcsl_board_open or fcsl_board_close\n"),

@@ -153,7 +153,10 @@ def test_rosbags_reads_our_bags(bag: Path) -> None:
 
     with AnyReader([bag]) as reader:
         topics = {c.topic: c.msgtype for c in reader.connections}
-        assert topics["/probe/echo"] == "probe/msg/ProbeEcho" and topics["/probe/state"] == "fcsl_msgs/msg/MachineState"
+        assert (
+            topics["/probe/echo"] == "simclient/msg/ProbeEcho"
+            and topics["/probe/state"] == "fcsl_msgs/msg/MachineState"
+        )
         echo = [c for c in reader.connections if c.topic == "/probe/echo"]
         messages = [reader.deserialize(data, c.msgtype) for c, _, data in reader.messages(echo)]
     assert [m.tick for m in messages[:3]] == [5, 6, 7] and len(messages) == 30  # type: ignore[attr-defined]
@@ -292,10 +295,11 @@ def test_sensor_frames_and_attachment_are_replayed(probe: Path, tmp_path: Path) 
     run = open_run(probe, None)
     run.record(tmp_path / "run", "", True)
     run.attach()
-    run.write_channels({0: struct.pack("<3d", 1, 2, 3), 2: struct.pack("<i", -4)})
+    others = {1: struct.pack("<4d", 1, 0, 0, 0), 2: struct.pack("<i", -4), 3: b"\1"}
+    run.write_channels({0: struct.pack("<3d", 1, 2, 3), **others})
     run.step(3)
-    run.write_channels({0: struct.pack("<3d", 3, 2, 1)})
-    run.step(9)  # the sample grows older than max_age_ticks: health becomes failed
+    run.write_channels({0: struct.pack("<3d", 3, 2, 1), **others})
+    run.step(9)  # the samples grow older than max_age_ticks: health becomes failed
     run.close()
     _, health = columns(tmp_path / "run", "source.outputs.health")
     assert health.tolist() == [0] * 9 + [2] * 3
@@ -388,16 +392,13 @@ def test_a_lost_checkpoint_or_whole_topic_is_said(bag: Path, probe: Path, tool: 
     assert done.returncode == 1 and "`/probe/echo` has 0 of 30 messages" in done.stdout
 
 
-def test_another_source_hash_is_refused_unless_told(
-    bag: Path, probe: Path, build_probe: Callable[..., Path], tool: Tool
-) -> None:
-    new_hash = "9" * 64
-    renamed = build_probe(f'PROBE_SOURCE_HASH="{new_hash}"')
-    done = tool("replay", bag, "--library", renamed)
-    assert done.returncode == 2 and done.stdout == ""
-    assert f"recorded  {'1' * 64}" in done.stderr and f"now       {new_hash}" in done.stderr
+def test_another_source_hash_is_refused_unless_told(bag: Path, probe: Path, renamed_probe: Path, tool: Tool) -> None:
+    old_hash, new_hash = (open_run(library, None).machine.source_hash for library in (probe, renamed_probe))
+    done = tool("replay", bag, "--library", renamed_probe)
+    assert done.returncode == 2 and done.stdout == "" and old_hash != new_hash
+    assert f"recorded  {old_hash}" in done.stderr and f"now       {new_hash}" in done.stderr
     assert "--ignore-source-hash" in done.stderr
-    done = tool("replay", bag, "--library", renamed, "--ignore-source-hash")
+    done = tool("replay", bag, "--library", renamed_probe, "--ignore-source-hash")
     assert done.stdout == "30 ticks, identical with the recorded parameters\n"
     assert done.stderr == (
         "fcsl replay: the sources differ: parameters come from the recorded checkpoint, not from the compiled machine\n"
@@ -405,14 +406,13 @@ def test_another_source_hash_is_refused_unless_told(
 
 
 def test_recorded_parameters_that_are_compiled_otherwise_are_listed(
-    probe: Path, build_probe: Callable[..., Path], tmp_path: Path, tool: Tool
+    probe: Path, renamed_probe: Path, tmp_path: Path, tool: Tool
 ) -> None:
-    renamed = build_probe(f'PROBE_SOURCE_HASH="{"9" * 64}"')
     with AlgTwin.from_library(probe) as twin:
         twin.set("echo.parameters.gain", 2.5)
         twin.record(tmp_path / "run")
         twin.tick(3)
-    done = tool("replay", "run", "--library", renamed, "--ignore-source-hash")
+    done = tool("replay", "run", "--library", renamed_probe, "--ignore-source-hash")
     assert done.returncode == 0 and done.stdout == "3 ticks, identical with the recorded parameters\n"
     assert done.stderr.splitlines()[1:] == [
         "fcsl replay: parameters that differ: 1",
@@ -434,19 +434,16 @@ def test_at_most_ten_differing_parameters_are_listed(monkeypatch: pytest.MonkeyP
     assert int(notes[1].rsplit(" ", 1)[1]) == 10 + int(notes[-1].split()[2])
 
 
-def test_another_layout_can_only_be_compared_from_tick_0(
-    probe: Path, build_probe: Callable[..., Path], tmp_path: Path
-) -> None:
-    grown = build_probe("PROBE_EXTRA_FIELD")
+def test_another_layout_can_only_be_compared_from_tick_0(probe: Path, grown_probe: Path, tmp_path: Path) -> None:
     with AlgTwin.from_library(probe) as twin:
         twin.record(tmp_path / "fresh")
         twin.tick(3)
-    verdict = replay(tmp_path / "fresh", library=str(grown))
+    verdict = replay(tmp_path / "fresh", library=str(grown_probe), ignore_source_hash=True)
     assert verdict.divergence is not None and verdict.divergence.path == "echo.outputs.extra"
     assert verdict.divergence.recorded == "not recorded" and verdict.divergence.tick == 0
     fly(probe, tmp_path / "late")
     with pytest.raises(BagError, match="starts at tick 5 from a checkpoint of another layout"):
-        replay(tmp_path / "late", library=str(grown))
+        replay(tmp_path / "late", library=str(grown_probe), ignore_source_hash=True)
 
 
 # ---- incomplete bags --------------------------------------------------------------------------------------------------

@@ -1,7 +1,8 @@
 /* SPDX-License-Identifier: Apache-2.0
  *
- * A machine written by hand against the ABI for fcsl-guard: a client of fcsl-fc sets what it commands and whether it is armed,
- * and can make its step hang, or stop the process. 100 Hz; the actuators keep a command for 0.2 s. Macros change that.
+ * A machine for fcsl-guard: a client of fcsl-fc sets what it commands and whether it is armed, and can make its step hang, or stop
+ * the process. It is by hand, because no step of a machine of fcslc does. 100 Hz; the actuators keep a command for 0.2 s. Macros
+ * change that.
  */
 #define _POSIX_C_SOURCE 200809L
 #include <math.h>
@@ -27,22 +28,20 @@ typedef struct {
 } guarded_t;
 
 #define AT(member) (uint32_t)offsetof(guarded_t, member)
-#define FIELD(path, role, type, flags, member, instance, unit)                                                         \
-    {path,                                                                                                             \
-     role,                                                                                                             \
-     type,                                                                                                             \
-     flags,                                                                                                            \
-     0,                                                                                                                \
-     NULL,                                                                                                             \
-     1,                                                                                                                \
-     AT(member),                                                                                                       \
-     (uint32_t)sizeof(((guarded_t *)0)->member),                                                                       \
-     instance,                                                                                                         \
-     FCSL_NONE,                                                                                                        \
-     unit,                                                                                                             \
-     "",                                                                                                               \
-     -(double)INFINITY,                                                                                                \
-     (double)INFINITY}
+#define FIELD(path_, role_, type_, flags_, member_, instance_, unit_)                                                  \
+    {.path = path_,                                                                                                    \
+     .role = role_,                                                                                                    \
+     .type = type_,                                                                                                    \
+     .flags = flags_,                                                                                                  \
+     .count = 1,                                                                                                       \
+     .offset = AT(member_),                                                                                            \
+     .size = (uint32_t)sizeof(((guarded_t *)0)->member_),                                                              \
+     .instance = instance_,                                                                                            \
+     .connected_from = FCSL_NONE,                                                                                      \
+     .unit = unit_,                                                                                                    \
+     .doc = "",                                                                                                        \
+     .minimum = -(double)INFINITY,                                                                                     \
+     .maximum = (double)INFINITY}
 #define W FCSL_FIELD_WRITABLE
 
 enum { GAUGE = 3, FORCE, VALVE, ARMED };
@@ -64,45 +63,63 @@ static const fcsl_field_t fields[] = {
 };
 
 static const fcsl_instance_t instances[] = {
-    {"pilot", "pilot", "guarded.c", 1, GAUGE, 11, AT(request), AT(health), AT(faults), AT(overruns), AT(fault_place),
-     FCSL_NO_OFFSET, FCSL_NO_OFFSET, 0, 1, "guarded/msg/GuardedPilot",
-     "std_msgs/Header header\nuint64 tick\nfloat64 gauge\nfloat64 force\nbool valve\nbool armed\nuint8 health\n"},
+    {.name = "pilot",
+     .algorithm = "pilot",
+     .source_file = "guarded.c",
+     .source_line = 1,
+     .first_field = GAUGE,
+     .field_count = 11,
+     .request_offset = AT(request),
+     .health_offset = AT(health),
+     .faults_offset = AT(faults),
+     .overruns_offset = AT(overruns),
+     .fault_place_offset = AT(fault_place),
+     .inject_overrun_offset = FCSL_NO_OFFSET,
+     .inject_fault_offset = FCSL_NO_OFFSET,
+     .published = 1,
+     .message_type = "guarded/msg/GuardedPilot",
+     .message_text =
+         "std_msgs/Header header\nuint64 tick\nfloat64 gauge\nfloat64 force\nbool valve\nbool armed\nuint8 health\n"},
 };
 static const fcsl_schedule_t schedule[] = {{0, 1, 0}};
 static const fcsl_state_t states[] = {{"RUN", schedule, 1}};
 
 static const double safe_force = -1.0;
 static const uint8_t safe_valve = 1;
-#define NO FCSL_NO_OFFSET
+#define NO_ROS .ros_type = "", .ros_field = "", .ros_topic = "", .ros_frame = "", .ros_child_frame = "", .ros_axes = ""
+#define ACTUATOR(name_, id_, field_, safe_)                                                                            \
+    {.name = name_,                                                                                                    \
+     .id = id_,                                                                                                        \
+     .direction = FCSL_ACTUATOR,                                                                                       \
+     .field = field_,                                                                                                  \
+     .attached_offset = FCSL_NO_OFFSET,                                                                                \
+     .fresh_offset = FCSL_NO_OFFSET,                                                                                   \
+     .valid_offset = FCSL_NO_OFFSET,                                                                                   \
+     .waiting_offset = FCSL_NO_OFFSET,                                                                                 \
+     .age_offset = FCSL_NO_OFFSET,                                                                                     \
+     .sample_age_offset = FCSL_NO_OFFSET,                                                                              \
+     .stamp_offset = FCSL_NO_OFFSET,                                                                                   \
+     NO_ROS,                                                                                                           \
+     .safe = safe_}
 static const fcsl_channel_t channels[] = {
-    {"panel.gauge",
-     1,
-     FCSL_SENSOR,
-     GAUGE,
-     5,
-     5,
-     AT(channel.attached),
-     AT(channel.fresh),
-     AT(channel.valid),
-     AT(channel.waiting),
-     AT(channel.age_ticks),
-     AT(channel.sample_age),
-     AT(channel.stamp_ns),
-     "",
-     "",
-     "",
-     "",
-     "",
-     "",
-     NULL,
-     FCSL_AS_FIELD},
-    {"cart.force", 513, FCSL_ACTUATOR, FORCE,        0, 0, NO, NO, NO, NO, NO, NO, NO, "", "", "", "",
-     "",           "",  &safe_force,   FCSL_AS_FIELD},
-    {"panel.valve", 514,          FCSL_ACTUATOR, VALVE, 0, 0, NO, NO, NO, NO, NO, NO, NO, "", "", "", "", "", "",
-     &safe_valve,   FCSL_AS_FIELD},
+    {.name = "panel.gauge",
+     .id = 1,
+     .direction = FCSL_SENSOR,
+     .field = GAUGE,
+     .max_age_ticks = 5,
+     .grace_ticks = 5,
+     .attached_offset = AT(channel.attached),
+     .fresh_offset = AT(channel.fresh),
+     .valid_offset = AT(channel.valid),
+     .waiting_offset = AT(channel.waiting),
+     .age_offset = AT(channel.age_ticks),
+     .sample_age_offset = AT(channel.sample_age),
+     .stamp_offset = AT(channel.stamp_ns),
+     NO_ROS},
+    ACTUATOR("cart.force", 513, FORCE, &safe_force),
+    ACTUATOR("panel.valve", 514, VALVE, &safe_valve),
 #ifdef TWO_FORCES
-    {"cart.other", 515, FCSL_ACTUATOR, FORCE,        0, 0, NO, NO, NO, NO, NO, NO, NO, "", "", "", "",
-     "",           "",  &safe_force,   FCSL_AS_FIELD},
+    ACTUATOR("cart.other", 515, FORCE, &safe_force),
 #endif
 };
 
