@@ -22,7 +22,7 @@ from std_msgs.msg import Float64
 
 from fcsl_bridge.topics import qos
 from fcsl_msgs.msg import MachineState
-from fcsl_msgs.srv import Save, SetState
+from fcsl_msgs.srv import Restore, Save, SetState
 from simclient import AlgTwin
 from simclient.bag import Bag
 from simclient.replay import replay
@@ -239,6 +239,27 @@ def test_actuators_are_safe_when_ticking_ends(
         robot.listener.until(lambda: robot.torque() == 1.25)
     assert robot.end(signal.SIGTERM if how == "terminate" else signal.SIGINT) == 0
     robot.listener.until(lambda: robot.torque() == -7.0)
+    assert replay(robot.bag, library=str(robot.library)).identical
+
+
+def test_an_armed_checkpoint_arms_nothing(domain: Domain, tmp_path_factory: pytest.TempPathFactory) -> None:
+    """A node that is disarmed gets one that was saved while armed: its actuators stay safe."""
+    library = rig.build(tmp_path_factory.mktemp("rig"), HZ, safe=-7.0)
+    robot = Robot(domain, library)
+    robot.listener.until(lambda: robot.torque() == 0.25)
+    disarmed, armed = "disarmed", "armed"
+    assert robot.client.call(Save, "save", file=armed).success
+    with AlgTwin.from_library(library) as twin:
+        twin.set_state("SLOW")  # where nothing arms it
+        twin.save_file(robot.bag.parent / disarmed)
+    assert robot.client.call(Restore, "restore", file=disarmed).success
+    robot.listener.until(lambda: robot.torque() == -7.0)
+    assert robot.client.call(Restore, "restore", file=armed).success
+    count = len(robot.torques)
+    robot.listener.until(lambda: len(robot.torques) >= count + 20)
+    values = {float(deserialize_message(torque, Float64).data) for torque in robot.torques[count:]}
+    assert values == {-7.0} and robot.memory("pilot.outputs.on") == [True]
+    assert robot.end() == 0
     assert replay(robot.bag, library=str(robot.library)).identical
 
 

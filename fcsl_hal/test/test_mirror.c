@@ -95,7 +95,7 @@ static void post(fcsl_mirror_t *mirror, const data_t *data, uint64_t tick)
     while (!fcsl_mirror_ready(mirror)) {
         CHECK(fcsl_monotonic_ns() < give_up_ns);
     }
-    CHECK(fcsl_mirror_post(mirror, data, tick, tick * 10u) == 0);
+    CHECK(fcsl_mirror_post(mirror, data, tick, tick * 10u, 0) == 0);
 }
 
 static void expect_commit(fcsl_bus_t *bus, uint64_t tick, uint8_t direction, uint8_t armed, uint8_t bits)
@@ -107,8 +107,8 @@ static void expect_commit(fcsl_bus_t *bus, uint64_t tick, uint8_t direction, uin
     CHECK(commit[20] == direction && commit[21] == armed && commit[24] == bits);
 }
 
-/* And what is reported, armed or not, with a commit of its own. */
-static void expect_actuators(fcsl_bus_t *bus, uint64_t tick, uint8_t armed)
+/* The commit says `armed`; what is reported, `reports`, has one of its own. */
+static void expect_commands(fcsl_bus_t *bus, uint64_t tick, uint8_t armed, uint8_t reports)
 {
     static const uint8_t values[] = {0, 0, 0, 0x3f, 0, 0, 0xc0, 0x7f}; /* 0.5, and a NaN whose sign is gone */
     uint8_t throttle[8];
@@ -117,8 +117,13 @@ static void expect_actuators(fcsl_bus_t *bus, uint64_t tick, uint8_t armed)
     expect_commit(bus, tick, FCSL_ACTUATOR, armed, 1u << THROTTLE);
     uint8_t reported = 2;
     take_one(bus, ARMED, &reported, 1);
-    CHECK(reported == armed);
+    CHECK(reported == reports);
     expect_commit(bus, tick, FCSL_REPORT, 0, 1u << ARMED);
+}
+
+static void expect_actuators(fcsl_bus_t *bus, uint64_t tick, uint8_t armed)
+{
+    expect_commands(bus, tick, armed, armed);
 }
 
 static void expect_sensors(fcsl_bus_t *bus, uint64_t tick, const uint8_t *packet, size_t size)
@@ -175,9 +180,13 @@ static void check_ticks(fcsl_mirror_t *mirror, fcsl_bus_t *bus)
     post(mirror, &data, 6); /* no sample */
     expect_commit(bus, 6, FCSL_SENSOR, 0, 0);
     expect_actuators(bus, 6, 1);
+    data.age = 4;
+    CHECK(fcsl_mirror_post(mirror, &data, 7, 70, 1) == 0); /* armed, and a new arming is required */
+    expect_commit(bus, 7, FCSL_SENSOR, 0, 0);
+    expect_commands(bus, 7, 0, 1);
     data = (data_t){.altitude = 9.0, .age = 5, .packet = {77, 'x', 'y', 'z'}, .throttle = {0.5f}, .attached = 1};
     memcpy(&data.throttle[1], &nan, sizeof nan);
-    post(mirror, &data, 9); /* 7 and 8 were dropped, and in one of them a sample came */
+    post(mirror, &data, 9); /* 8 was dropped, and in it or in this one a sample came */
     expect_sensors(bus, 9, (const uint8_t *)"xyz", 3);
     expect_actuators(bus, 9, 0);
     data.altitude = 10.0;
@@ -255,7 +264,7 @@ static void check_room_beside_writes(fcsl_mirror_t *mirror)
         posted++;
     }
     CHECK(posted == 2u * 4u - 1u || posted == 2u * 4u);
-    CHECK(fcsl_mirror_post(mirror, &data, 1, 0) == 0);
+    CHECK(fcsl_mirror_post(mirror, &data, 1, 0, 0) == 0);
 }
 
 /* Where there is room, there is room for all of a tick. */
@@ -265,7 +274,7 @@ static void check_room(fcsl_mirror_t *mirror)
     uint32_t refused = 0;
     for (uint64_t tick = 0; tick < MANY; tick++) {
         const int ready = fcsl_mirror_ready(mirror);
-        const int posted = fcsl_mirror_post(mirror, &data, tick, 0) == 0;
+        const int posted = fcsl_mirror_post(mirror, &data, tick, 0, 0) == 0;
         CHECK(posted || !ready);
         refused += !posted;
     }

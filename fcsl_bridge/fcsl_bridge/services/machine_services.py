@@ -175,10 +175,13 @@ class MachineServices:
                 f"the checkpoint is of tick {tick}, and the simulator is at tick {self._run.tick}: in lock-step only a "
                 f"checkpoint of the same tick can be restored"
             )
+        was_armed = self._run.is_armed
         if request.file:
             self._run.restore_checkpoint(content)
         else:
             self._run.restore(data)
+        if not was_armed and self._allowed.leaving_tick:  # in lock-step the simulator has the gate
+            self._run.require_arming()
         self._restored()
 
     async def _inject_fault(self, request: Any, response: Any) -> None:

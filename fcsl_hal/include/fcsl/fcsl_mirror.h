@@ -35,10 +35,11 @@ int fcsl_mirror_watched(const fcsl_mirror_t *mirror);
 /* Whether there is room for another tick. */
 int fcsl_mirror_ready(fcsl_mirror_t *mirror);
 
-/* Posts the values of a tick and its commits; `data` is the machine's struct after it. A sensor has a value where a sample came
+/* Posts the values of a tick and its commits; `data` is the machine's struct after it, which counts as disarmed with
+ * `requires_arming`. A sensor has a value where a sample came
  * since the tick that was posted before; in the first tick, and without a HAL, always. Returns 0, or -1: there is no room, and
  * commits are missing. */
-int fcsl_mirror_post(fcsl_mirror_t *mirror, const void *data, uint64_t tick, uint64_t time_ns);
+int fcsl_mirror_post(fcsl_mirror_t *mirror, const void *data, uint64_t tick, uint64_t time_ns, int requires_arming);
 
 /* Whether an observer takes the host writes. */
 int fcsl_mirror_writes_watched(const fcsl_mirror_t *mirror);

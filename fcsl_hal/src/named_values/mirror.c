@@ -108,7 +108,7 @@ static int has_reports(const fcsl_machine_t *machine)
     return 0;
 }
 
-int fcsl_mirror_post(fcsl_mirror_t *mirror, const void *data, uint64_t tick, uint64_t time_ns)
+int fcsl_mirror_post(fcsl_mirror_t *mirror, const void *data, uint64_t tick, uint64_t time_ns, int requires_arming)
 {
     const fcsl_machine_t *machine = mirror->table.machine;
     const uint8_t *bytes = data;
@@ -121,7 +121,7 @@ int fcsl_mirror_post(fcsl_mirror_t *mirror, const void *data, uint64_t tick, uin
     int failed = post_direction(mirror, &commit, bytes, time_ns);
     commit.direction = FCSL_ACTUATOR;
     commit.time_ns = 0;
-    commit.armed = fcsl_is_armed(machine, bytes);
+    commit.armed = !requires_arming && fcsl_is_armed(machine, bytes);
     failed = failed || post_direction(mirror, &commit, bytes, time_ns) != 0;
     if (!failed && has_reports(machine)) {
         commit.direction = FCSL_REPORT;

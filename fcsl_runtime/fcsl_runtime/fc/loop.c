@@ -55,7 +55,8 @@ static void publish(loop_t *loop, uint64_t time_ns)
     const fcsl_moment_t moment = {.tick = fcsl_run_tick(loop->run),
                                   .time_ns = time_ns,
                                   .paused = (uint64_t)loop->paused,
-                                  .next_write = fcsl_run_next_write(loop->run)};
+                                  .next_write = fcsl_run_next_write(loop->run),
+                                  .requires_arming = (uint64_t)fcsl_run_requires_arming(loop->run)};
     fcsl_history_publish(&loop->history, &moment);
 }
 
@@ -166,6 +167,15 @@ static int arm(loop_t *loop, int armed)
                    fcsl_run_tick(loop->run) - 1u);
     fcsl_log_write(loop->hal.log, text);
     return goes_on(loop, loop->hal.arm(loop->hal.ctx, armed));
+}
+
+void loop_require_arming(loop_t *loop)
+{
+    fcsl_run_require_arming(loop->run);
+    if (fcsl_run_requires_arming(loop->run)) {
+        fcsl_log_write(loop->hal.log,
+                       "armed in the checkpoint: actuators stay safe until the machine disarms and arms anew");
+    }
 }
 
 /* Steps, commands and publishes; 0 when the run is over. */

@@ -69,6 +69,8 @@ int loop_tick(loop_t *loop);
 void loop_publish(loop_t *loop);
 /* What the HAL's field number `field` says in a publication of the history; 0 where it is no counter. */
 uint64_t loop_hal_count(const loop_t *loop, const uint8_t *published, uint32_t field);
+/* A checkpoint was restored, and the actuators are real ones: it arms none. */
+void loop_require_arming(loop_t *loop);
 /* What the variable server asks of this loop (serve.c). */
 fcsl_vars_host_t loop_host(loop_t *loop);
 /* Answers one waiting command, if any. */

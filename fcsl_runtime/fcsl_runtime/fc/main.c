@@ -120,6 +120,9 @@ static int open_run(program_t *program)
     if (make_hal(program) != 0) {
         return -1;
     }
+    if (options->restore != NULL) {
+        loop_require_arming(loop);
+    }
     const fcsl_machine_t *machine = fcsl_run_machine(loop->run);
     program->blocks[0] = (fcsl_vars_block_t){
         .prefix = "", .fields = machine->fields, .field_count = machine->field_count, .machine = machine};

@@ -29,9 +29,13 @@ static fcsl_vars_status_t restore(void *ctx, const void *data, const fcsl_hw_sim
                         tick, fcsl_run_tick(loop->run));
         return FCSL_VARS_REFUSED;
     }
+    const int was_armed = fcsl_run_is_armed(loop->run);
     const fcsl_vars_status_t status = result(fcsl_run_restore(loop->run, data, machine->size, error));
     if (status == FCSL_VARS_OK) {
         *fcsl_run_simulated_hardware(loop->run) = *hardware;
+        if (!was_armed && loop->hal.paces != FCSL_PACED_BY_SIMULATOR) {
+            loop_require_arming(loop);
+        }
     }
     return status;
 }

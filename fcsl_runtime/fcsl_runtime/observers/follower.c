@@ -49,7 +49,10 @@ static void see(follower_t *f, const fcsl_moment_t *moment)
     if (completed == f->completed || completed == 0) {
         return;
     }
-    const followed_tick_t tick = {.publication = f->publication, .number = completed - 1u, .begun_ns = moment->time_ns};
+    const followed_tick_t tick = {.publication = f->publication,
+                                  .number = completed - 1u,
+                                  .begun_ns = moment->time_ns,
+                                  .requires_arming = moment->requires_arming != 0u};
     count(&f->dropped, dropped_before(f, completed));
     f->overtaken = 0;
     f->completed = completed;

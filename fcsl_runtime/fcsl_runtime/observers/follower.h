@@ -17,6 +17,7 @@ typedef struct {
     const uint8_t *publication; /* of the history */
     uint64_t number;
     uint64_t begun_ns; /* on the host's clock, as the host published it */
+    int requires_arming;
 } followed_tick_t;
 
 typedef struct {

@@ -86,7 +86,7 @@ static int post(fcsl_ros_graph_t *g, const followed_tick_t *tick, uint32_t count
         if (i >= g->topics.latched_count && !fcsl_bus_matched(g->bus, i)) {
             continue;
         }
-        const size_t size = ros_topics_write(&g->topics, i, tick->publication, stamp, g->message);
+        const size_t size = ros_topics_write(&g->topics, i, tick, stamp, g->message);
         if (size > 0u && fcsl_bus_post(g->bus, i, g->message, size) != 0) {
             ros_topics_unsay(&g->topics, i);
             failed = 1;
@@ -108,7 +108,8 @@ static void see(void *ctx, const fcsl_moment_t *moment, const uint8_t *publicati
     if (moment->tick == g->completed) {
         const followed_tick_t tick = {.publication = publication,
                                       .number = moment->tick > 0u ? moment->tick - 1u : 0u,
-                                      .begun_ns = moment->time_ns};
+                                      .begun_ns = moment->time_ns,
+                                      .requires_arming = moment->requires_arming != 0u};
         (void)post(g, &tick, g->topics.latched_count); /* without room the next tick tells of it */
     }
     g->completed = moment->tick;

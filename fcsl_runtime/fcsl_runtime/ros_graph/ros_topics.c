@@ -233,15 +233,16 @@ static int is_sampled(const fcsl_machine_t *machine, const fcsl_ros_message_t *m
 }
 
 /* Actuators of a disarmed machine get their safe values. A number that its field cannot hold makes no message, and is counted. */
-static size_t write_mapped(ros_topics_t *topics, const ros_topic_t *topic, const uint8_t *data, fcsl_stamp_t stamp,
-                           uint8_t *bytes)
+static size_t write_mapped(ros_topics_t *topics, const ros_topic_t *topic, const followed_tick_t *tick,
+                           fcsl_stamp_t stamp, uint8_t *bytes)
 {
+    const uint8_t *data = tick->publication;
     const fcsl_machine_t *machine = topics->machine;
     const int is_actuator = topic->mapped->direction == FCSL_ACTUATOR;
     if (topic->mapped->direction == FCSL_SENSOR && !is_sampled(machine, topic->mapped, data)) {
         return 0;
     }
-    const int is_armed = fcsl_is_armed(machine, data);
+    const int is_armed = !tick->requires_arming && fcsl_is_armed(machine, data);
     const uint8_t *memory = is_actuator && !is_armed && topics->safe != NULL ? topics->safe : data;
     if (fcsl_ros_compose(topic->composer, &memory, (int64_t)stamp.time_ns, bytes) != FCSL_ROS_TAKEN) {
         atomic_fetch_add_explicit(&topics->refused, 1, memory_order_relaxed);
@@ -250,8 +251,10 @@ static size_t write_mapped(ros_topics_t *topics, const ros_topic_t *topic, const
     return topic->longest;
 }
 
-size_t ros_topics_write(ros_topics_t *topics, uint32_t number, const uint8_t *data, fcsl_stamp_t stamp, uint8_t *bytes)
+size_t ros_topics_write(ros_topics_t *topics, uint32_t number, const followed_tick_t *tick, fcsl_stamp_t stamp,
+                        uint8_t *bytes)
 {
+    const uint8_t *data = tick->publication;
     ros_topic_t *topic = &topics->topics[number];
     switch (topic->kind) {
     case ROS_CLOCK:
@@ -260,7 +263,7 @@ size_t ros_topics_write(ros_topics_t *topics, uint32_t number, const uint8_t *da
         fcsl_layout_write(&topic->layout, data, stamp.tick, stamp.time_ns, bytes);
         return topic->layout.size;
     case ROS_MAPPED:
-        return write_mapped(topics, topic, data, stamp, bytes);
+        return write_mapped(topics, topic, tick, stamp, bytes);
     default:
         return write_tick_message(topics->machine, topic, data, stamp, bytes);
     }

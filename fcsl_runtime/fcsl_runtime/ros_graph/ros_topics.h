@@ -12,6 +12,7 @@
 #include "fcsl/fcsl_ros_graph.h"
 #include "messages/message.h"
 #include "messages/tick_messages.h"
+#include "observers/follower.h"
 
 typedef enum { ROS_TICK_MESSAGE, ROS_INSTANCE, ROS_CLOCK, ROS_MAPPED } ros_topic_kind_t;
 
@@ -42,9 +43,9 @@ typedef struct {
 int ros_topics_build(ros_topics_t *topics, const fcsl_ros_graph_options_t *options, fcsl_error_t *error);
 void ros_topics_free(ros_topics_t *topics);
 
-/* Writes a topic's message of a tick; `data` is the machine's struct after it. Returns its bytes, or 0 when there is none.
- * `bytes` has room for the topic's longest. */
-size_t ros_topics_write(ros_topics_t *topics, uint32_t number, const uint8_t *data, fcsl_stamp_t stamp, uint8_t *bytes);
+/* Writes a topic's message of a tick. Returns its bytes, or 0 when there is none. `bytes` has room for the topic's longest. */
+size_t ros_topics_write(ros_topics_t *topics, uint32_t number, const followed_tick_t *tick, fcsl_stamp_t stamp,
+                        uint8_t *bytes);
 
 /* What was written last was not put: it is written again with the next tick. */
 void ros_topics_unsay(ros_topics_t *topics, uint32_t number);

@@ -81,6 +81,32 @@ static void step(fcsl_run_t *run, uint64_t ticks)
     CHECK(fcsl_run_step(run, ticks, &error) == 0);
 }
 
+/* An armed machine whose host requires a new arming: a false that no step has seen does not count. */
+static void check_arming_anew(fcsl_run_t *run)
+{
+    const uint8_t wanted[] = {1, 1, 0, 1};
+    set_armed(run, 1);
+    fcsl_run_require_arming(run);
+    CHECK(!fcsl_run_is_armed(run));
+    set_armed(run, 0);
+    set_armed(run, 1);
+    for (int i = 0; i < 4; i++) {
+        uint8_t bytes[256];
+        fcsl_message_t message;
+        set_armed(run, wanted[i]);
+        step(run, 1);
+        CHECK(fcsl_run_actuate_message(run, bytes, sizeof bytes, &message) == 0);
+        CHECK(message.armed == (i == 3) && fcsl_run_is_armed(run) == (i == 3));
+        CHECK((fcsl_run_actuator_data(run) == fcsl_run_data(run)) == (i == 3));
+        CHECK(fcsl_run_requires_arming(run) == (i < 2));
+    }
+    set_armed(run, 0);
+    fcsl_run_require_arming(run); /* of a machine that is disarmed: it may arm in its next tick */
+    set_armed(run, 1);
+    step(run, 1);
+    CHECK(fcsl_run_is_armed(run));
+}
+
 static void check_refused(int status, const fcsl_error_t *error, const char *part)
 {
     if (status >= 0 || strstr(error->text, part) == NULL) {
@@ -138,7 +164,10 @@ static void test_armed(void)
         CHECK(armed ? got == fcsl_run_data(run)
                     : memcmp(got + force, &SAFE_FORCE, sizeof SAFE_FORCE) == 0 && got[saturated] == SAFE_SATURATED);
     }
+    check_arming_anew(run);
     CHECK(fcsl_run_actuator_data(first) == fcsl_run_data(first)); /* nothing arms it */
+    fcsl_run_require_arming(first);
+    CHECK(fcsl_run_is_armed(first) && !fcsl_run_requires_arming(first)); /* and nothing could */
     close_run(run);
     close_run(first);
 }

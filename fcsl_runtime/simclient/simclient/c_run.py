@@ -91,6 +91,8 @@ _PROTOTYPES: dict[str, tuple[type | None, list[type]]] = {
     "fcsl_run_attach_channel": (c_int, [ptr, c_uint32, _ERROR]),
     "fcsl_run_sense": (c_int, [ptr, c_char_p, c_size_t, _ERROR]),
     "fcsl_run_write_channel": (c_int, [ptr, c_uint32, c_char_p, c_uint32, c_uint32, c_int64, _ERROR]),
+    "fcsl_run_is_armed": (c_int, [ptr]),
+    "fcsl_run_require_arming": (None, [ptr]),
     "fcsl_run_actuator_data": (ptr, [ptr]),
     "fcsl_run_safe_data": (ptr, [ptr]),
     "fcsl_run_actuate": (c_int64, [ptr, ptr, c_size_t]),

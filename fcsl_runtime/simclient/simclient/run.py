@@ -191,6 +191,15 @@ class Run:
             )
         )
 
+    @property
+    def is_armed(self) -> bool:
+        """Whether the actuators get what the machine commands."""
+        return bool(self._lib.fcsl_run_is_armed(self.handle()))
+
+    def require_arming(self) -> None:
+        """After a restore into a run that was disarmed: it stays so until the machine disarms and arms anew."""
+        self._lib.fcsl_run_require_arming(self.handle())
+
     def hardware(self) -> CSimulatedHardware:
         """The simulated hardware of this run, to read and write between ticks."""
         simulated: CSimulatedHardware = self._lib.fcsl_run_simulated_hardware(self.handle()).contents

@@ -3,6 +3,7 @@
 
 from __future__ import annotations
 
+import base64
 import contextlib
 import json
 import os
@@ -122,6 +123,54 @@ def test_restart_under_a_living_guard(guard: Guard, library: Path, tmp_path: Pat
     with armed_flight(guard, library, tmp_path, "again"):
         pass
     assert guard.process.poll() is None
+
+
+REQUIRED = "armed in the checkpoint: actuators stay safe until the machine disarms and arms anew"
+
+
+def arms_anew(guard: Guard, client: Client) -> None:
+    """What is restored arms nothing, however long; the machine itself goes on as armed."""
+    guard.stays_safe()
+    assert client.get("pilot.outputs.armed") is True
+    client.set("pilot.outputs.armed", False)
+    tick = client.ok("state")["tick"]
+    wait_for(lambda: client.ok("state")["tick"] > tick + 1)
+    guard.stays_safe()
+    client.set("pilot.outputs.armed", True)
+    guard.wait_last(COMMAND)
+
+
+def test_a_program_that_begins_with_an_armed_checkpoint(guard: Guard, library: Path, tmp_path: Path) -> None:
+    with armed_flight(guard, library, tmp_path, "first") as (_, client):
+        saved = base64.b64decode(client.ok("save")["data"])
+    (tmp_path / "armed").write_bytes(saved)
+    guard.wait_last(SAFE)
+    before = guard.writes()[-1].time_s
+    path = tmp_path / "second"
+    with flying("--restore", tmp_path / "armed", "--guard", guard.slot, "--socket", path, library=str(library)) as fc:
+        client = fc.client(path)
+        arms_anew(guard, client)
+        client.close()
+        code, out, _ = fc.stop()
+    assert code == 0 and REQUIRED in out
+    after = [write.values for write in guard.writes() if write.time_s > before]
+    assert after.index(COMMAND) > 20  # the safe values of `arms_anew` came first
+
+
+def test_a_client_that_restores_an_armed_checkpoint(guard: Guard, library: Path, tmp_path: Path) -> None:
+    """Into a disarmed flight it arms nothing; an armed one goes on."""
+    with armed_flight(guard, library, tmp_path) as (fc, client):
+        armed = client.ok("save")["data"]
+        client.set("pilot.outputs.force", 1.0)
+        guard.wait_last({**COMMAND, "number": 1.0})
+        client.ok("restore", data=armed)
+        guard.wait_last(COMMAND)
+        client.set("pilot.outputs.armed", False)
+        guard.wait_last(SAFE)
+        client.ok("restore", data=armed)
+        arms_anew(guard, client)
+        _, out, _ = fc.stop()
+    assert out.count(REQUIRED) == 1
 
 
 def test_kill_in_the_middle_of_a_write(guard: Guard) -> None:

@@ -74,8 +74,15 @@ int fcsl_run_sense_message(fcsl_run_t *run, const fcsl_message_t *message, fcsl_
 int fcsl_run_write_channel(fcsl_run_t *run, uint32_t channel, const void *bytes, uint32_t size, uint32_t age_ticks,
                            int64_t stamp_ns, fcsl_error_t *error);
 uint64_t fcsl_run_messages_refused(const fcsl_run_t *run);
-/* Writes the actuator message of the last tick; returns its bytes, or -1 when `capacity` is too small. It is armed as the
- * machine's arm field says, and without one. */
+/* Whether the actuators get what the machine commands: its arm field says so, or it has none; and no arming is required. */
+int fcsl_run_is_armed(const fcsl_run_t *run);
+/* A host of real actuators has restored a checkpoint into a run that was disarmed. If the checkpoint was armed, the run stays
+ * disarmed until the arm field has been false after a step: the machine must arm anew. Changes nothing of the machine. */
+void fcsl_run_require_arming(fcsl_run_t *run);
+/* Whether that step is still to come. */
+int fcsl_run_requires_arming(const fcsl_run_t *run);
+/* Writes the actuator message of the last tick; returns its bytes, or -1 when `capacity` is too small. It is armed as
+ * fcsl_run_is_armed says. */
 int64_t fcsl_run_actuate(const fcsl_run_t *run, uint8_t *bytes, size_t capacity);
 /* The same as a message; 0, or -1. */
 int fcsl_run_actuate_message(const fcsl_run_t *run, uint8_t *bytes, size_t capacity, fcsl_message_t *message);

@@ -87,11 +87,26 @@ int fcsl_run_restore(fcsl_run_t *run, const void *bytes, uint32_t size, fcsl_err
     return 0;
 }
 
+int fcsl_run_is_armed(const fcsl_run_t *run)
+{
+    return !run->requires_arming && fcsl_is_armed(run->machine, run->data);
+}
+
+void fcsl_run_require_arming(fcsl_run_t *run)
+{
+    run->requires_arming = run->machine->arm_field != FCSL_NONE && fcsl_is_armed(run->machine, run->data);
+}
+
+int fcsl_run_requires_arming(const fcsl_run_t *run)
+{
+    return run->requires_arming;
+}
+
 int fcsl_run_actuate_message(const fcsl_run_t *run, uint8_t *bytes, size_t capacity, fcsl_message_t *message)
 {
     const uint64_t completed = fcsl_run_tick(run);
     const uint64_t tick = completed == 0 ? 0 : completed - 1u;
-    const int armed = fcsl_is_armed(run->machine, run->data);
+    const int armed = fcsl_run_is_armed(run);
     const fcsl_message_status_t status =
         fcsl_message_encode_actuators(&run->channels, run->data, tick, armed, bytes, capacity, message);
     return status == FCSL_MESSAGE_OK ? 0 : -1;
@@ -99,7 +114,7 @@ int fcsl_run_actuate_message(const fcsl_run_t *run, uint8_t *bytes, size_t capac
 
 const void *fcsl_run_actuator_data(const fcsl_run_t *run)
 {
-    return fcsl_is_armed(run->machine, run->data) ? run->data : run->safe;
+    return fcsl_run_is_armed(run) ? run->data : run->safe;
 }
 
 const void *fcsl_run_safe_data(const fcsl_run_t *run)
@@ -166,6 +181,9 @@ static int step_once(fcsl_run_t *run, uint64_t tick, fcsl_error_t *error)
     }
     if (fcsl_run_tick(run) == tick) {
         return fcsl_fail(error, "tick %" PRIu64 " was not completed", tick);
+    }
+    if (run->requires_arming) {
+        run->requires_arming = fcsl_is_armed(run->machine, run->data);
     }
     if (run->traces != NULL) {
         fcsl_trace_take(run);
