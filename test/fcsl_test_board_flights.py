@@ -37,12 +37,12 @@ def compile_driver(source: str, name: str, folder: Path) -> Path:
     return library
 
 
-def refusal(line: Sequence[str], environment: Mapping[str, str]) -> str:
+def refusal(line: Sequence[str], environment: Mapping[str, str], status: int = 1) -> str:
     """What a flight says that cannot begin."""
     done = subprocess.run(
         [*line, "--ticks", "5"], env=environment, capture_output=True, text=True, timeout=LONG_S, check=False
     )
-    assert done.returncode == 1 and done.stderr.startswith("fcsl-fc: "), done
+    assert done.returncode == status and done.stderr.startswith("fcsl-fc: "), done
     return done.stderr
 
 

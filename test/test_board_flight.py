@@ -130,9 +130,9 @@ class Craft:
         words = [PROGRAM, self.library, "--hal", f"linux:{self.plan}", *options]
         return [str(word) for word in words]
 
-    def refusal(self, *options: str) -> str:
+    def refusal(self, *options: str, status: int = 1) -> str:
         """What a flight says that cannot begin."""
-        return refusal(self.line(*options), self.environment)
+        return refusal(self.line(*options), self.environment, status)
 
 
 @pytest.fixture
@@ -226,7 +226,7 @@ def test_it_ends_while_it_waits_for_a_slow_device(craft: Craft, fly: Callable[..
 def test_plans_that_cannot_fly(craft: Craft) -> None:
     good = re.sub(r"end \w{8}\n", "end\n", craft.plan.read_text())  # as if it were written by hand
     craft.plan.rename(craft.folder / "away.plan")
-    assert f"cannot read '{craft.plan}': No such file or directory" in craft.refusal()
+    assert f"cannot read '{craft.plan}': No such file or directory" in craft.refusal(status=2)
     for old, new, reason in (
         ("end\n", "", "the plan has no `end`: it was cut off"),
         (

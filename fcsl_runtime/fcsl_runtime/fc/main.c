@@ -408,6 +408,21 @@ static int fly(program_t *program)
     return loop->deadline_missed ? EXIT_LATE : status;
 }
 
+/* What the command line names and is not there is wrong usage; the message comes from what opens it. */
+static int has_named_files(const options_t *options)
+{
+    const char *plan = options_hal_is_linux(options)       ? options->peer + strlen(OPTIONS_LINUX)
+                       : options_hal_is_composite(options) ? options->composite_plan
+                                                           : NULL;
+    const char *const named[] = {options->library, options->restore, options->board, plan};
+    for (size_t i = 0; i < sizeof named / sizeof named[0]; i++) {
+        if (named[i] != NULL && access(named[i], F_OK) != 0) {
+            return 0;
+        }
+    }
+    return 1;
+}
+
 int main(int argc, char **argv)
 {
     static program_t program;
@@ -425,7 +440,7 @@ int main(int argc, char **argv)
     (void)signal(SIGPIPE, SIG_IGN);
     (void)signal(SIGXFSZ, SIG_IGN);
     monitor_block_signals(&program.monitor);
-    int status = access(program.options.library, F_OK) == 0 ? EXIT_RUN : EXIT_USAGE;
+    int status = has_named_files(&program.options) ? EXIT_RUN : EXIT_USAGE;
     if (open_system(&program) == 0 && open_run(&program) == 0 && open_server(&program) == 0 &&
         open_hardware(&program) == 0 && open_guard(&program) == 0 && open_telemetry(&program) == 0 &&
         open_observers(&program) == 0 && open_ros_graph(&program) == 0 && open_record(&program) == 0 &&
