@@ -1,7 +1,7 @@
 # SPDX-License-Identifier: Apache-2.0
 """A simulator of the lander on the bus, which needs nothing of FCSL. docs/reference/transports.md, "Named values", has keys and bytes.
 
-`python3 bus_plant.py tcp/127.0.0.1:7447`, and `fcsl-fc liblander_control.so --hal zenoh:tcp/127.0.0.1:7447`.
+`python3 bus_plant.py tcp/127.0.0.1:7447`, and `fcsl-fc liblander_control.so --hal zenoh:tcp:127.0.0.1:7447`.
 """
 
 import queue

@@ -21,6 +21,7 @@ import zenoh
 from test_wires import LENGTH_S, SIM, digest, fly, library, reference, run
 
 from simclient.bag import Bag
+from simclient.bus.endpoint import zenoh_locator
 from simclient.bus.free_port import free_endpoint
 from simclient.replay import replay
 
@@ -147,7 +148,7 @@ class Flood:
 
     def __init__(self, place: str):
         config = zenoh.Config.from_json5('{mode: "client", scouting: {multicast: {enabled: false}}}')
-        config.insert_json5("connect/endpoints", f'["{place}"]')
+        config.insert_json5("connect/endpoints", f'["{zenoh_locator(place)}"]')
         config.insert_json5("connect/timeout_ms", "30000")
         self.put = 0
         self._over = threading.Event()

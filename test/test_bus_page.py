@@ -9,6 +9,7 @@ import subprocess
 import sys
 from pathlib import Path
 
+from simclient.bus.endpoint import zenoh_locator
 from simclient.bus.free_port import free_endpoint
 from simclient.replay import replay
 
@@ -24,7 +25,7 @@ def test_the_plant_of_the_page_flies_the_lander(tmp_path: Path) -> None:
     subprocess.run(["fcslc", "build", machine, "-o", tmp_path], check=True, capture_output=True)
     library, bag = tmp_path / "liblander_control.so", tmp_path / "bag"
     place = free_endpoint()
-    line = [sys.executable, PLANT, place]
+    line = [sys.executable, PLANT, zenoh_locator(place)]
     with subprocess.Popen(line, stdout=subprocess.PIPE, text=True) as plant:
         options = ["--hal", f"zenoh:{place}", "--timeout", "30", "--record", bag]
         flown = subprocess.run(
@@ -43,7 +44,7 @@ def test_the_source_of_the_page_is_one(tmp_path: Path) -> None:
     machine, summary = ROOT / "examples/lander/fc/lander_control.json", tmp_path / "summary.json"
     subprocess.run(["fcslc", "build", machine, "-o", tmp_path], check=True, capture_output=True)
     place = free_endpoint()
-    with subprocess.Popen([sys.executable, tmp_path / "source.py", place]) as source:
+    with subprocess.Popen([sys.executable, tmp_path / "source.py", zenoh_locator(place)]) as source:
         options = ["--hal", f"zenoh:{place},free-running", "--ticks", "300", "--summary", summary]
         try:
             subprocess.run(["fcsl-fc", tmp_path / "liblander_control.so", *options], check=True, timeout=LONG_S)

@@ -152,7 +152,7 @@ def test_a_simulator_that_is_too_fast(plan: Path, tmp_path: Path) -> None:
         ("composite:board.plan,wire:carrier pigeon", (), "--hal wire: "),
         ("composite:board.plan,wire:unix:w", ("--paused", "--socket", "s"), "real devices do not wait"),
         ("composite:board.plan,wire:unix:w", ("--restore", "c"), "--restore goes without a simulator"),
-        ("composite:board.plan,zenoh:tcp/127.0.0.1:1,free-running", (), "no simulator beside the board"),
+        ("composite:board.plan,zenoh:tcp:127.0.0.1:1,free-running", (), "no simulator beside the board"),
     ],
 )
 def test_lines_that_say_nothing(hal: str, options: tuple[str, ...], reason: str) -> None:

@@ -21,6 +21,7 @@ import pytest
 import zenoh
 from test_wires import run
 
+from simclient.bus.endpoint import zenoh_locator
 from simclient.bus.free_port import free_endpoint
 from simclient.vars.client import VarClient
 
@@ -301,7 +302,7 @@ class Source:
 
     def __init__(self, place: str):
         config = zenoh.Config.from_json5('{mode: "peer", scouting: {multicast: {enabled: false}}}')
-        config.insert_json5("listen/endpoints", f'["{place}"]')
+        config.insert_json5("listen/endpoints", f'["{zenoh_locator(place)}"]')
         self.bus = zenoh.open(config)
         self.thrust, self.armed, self.ticks = 0.0, False, [0]
         self._subscribers = [
@@ -390,7 +391,7 @@ def test_one_side_in_lock_step_is_told(free: str, folder: Path, programs: contex
 
 
 def test_a_speed_is_needed_and_no_timeout(folder: Path) -> None:
-    line = [str(word) for word in sim_line(folder, "tcp/127.0.0.1:1")]
+    line = [str(word) for word in sim_line(folder, "tcp:127.0.0.1:1")]
     slow = subprocess.run([*line, "--speed", "0"], capture_output=True, text=True, check=False)
     assert slow.returncode == 2 and "give it a speed, as with `--speed 1`" in slow.stderr
     waits = subprocess.run([*line, "--timeout", "3"], capture_output=True, text=True, check=False)

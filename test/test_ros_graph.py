@@ -31,6 +31,7 @@ from fcsl_compiler.ros.standard_messages import SUPPORTED, full_name
 from fcsl_msgs.msg import MachineState
 from simclient import VarClient
 from simclient.bag.bag import Bag
+from simclient.bus.endpoint import zenoh_locator
 from simclient.bus.free_port import free_endpoint
 
 ROOT = Path(__file__).resolve().parents[1]
@@ -62,7 +63,7 @@ def started(*line: str | Path) -> Iterator[subprocess.Popen[str]]:
 def bridge(endpoint: str) -> Iterator[zenoh.Session]:
     """It may begin before the program that listens."""
     config = zenoh.Config.from_json5('{mode: "client", scouting: {multicast: {enabled: false}}}')
-    config.insert_json5("connect/endpoints", json.dumps([endpoint]))
+    config.insert_json5("connect/endpoints", json.dumps([zenoh_locator(endpoint)]))
     config.insert_json5("connect/timeout_ms", str(LONG_S * 1000))
     config.insert_json5("connect/retry", "{period_init_ms: 20, period_max_ms: 20}")
     with zenoh.open(config) as session:

@@ -75,7 +75,7 @@ def frame_crc(data: bytes) -> bytes:
     return crc.to_bytes(2, "little")
 
 
-@pytest.mark.parametrize("kind", ["udp:", "tcp:", "zenoh:tcp/"])
+@pytest.mark.parametrize("kind", ["udp:", "tcp:", "zenoh:tcp:"])
 def test_network(kind: str, reference: str, library: Path, tmp_path: Path) -> None:
     wire = f"wire:{kind}127.0.0.1:{free_port(socket.SOCK_DGRAM if kind == 'udp:' else socket.SOCK_STREAM)}"
     assert fly(wire, wire, library, tmp_path / "bag") == reference

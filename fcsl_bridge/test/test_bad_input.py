@@ -41,7 +41,7 @@ CONTROLLER, SIMULATOR = "controller_node", "sim_node"
         (
             CONTROLLER,
             {"machine": MACHINE, "start_timeout_s": 0.5},
-            "no simulator within 0.5 s: cannot connect to tcp/127.0.0.1:",
+            "no simulator within 0.5 s: cannot connect to tcp:127.0.0.1:",
         ),
         (
             CONTROLLER,
@@ -62,7 +62,7 @@ CONTROLLER, SIMULATOR = "controller_node", "sim_node"
         (
             SIMULATOR,
             {"sim": SIM, "start_timeout_s": 0.5},
-            "no controller within 0.5 s on tcp/127.0.0.1:",
+            "no controller within 0.5 s on tcp:127.0.0.1:",
         ),
         ("topic_count", {"idle_s": -1.0}, "`idle_s` must be above zero"),
     ],

@@ -50,7 +50,7 @@ def load() -> Iterator[None]:
 
 def start(domain: Domain, party: str, speed: float = 0.0) -> Process:
     """At the address that the nodes of the domain use. A controller records into `bag`."""
-    place = f"zenoh:tcp/127.0.0.1:{7500 + domain.number}"
+    place = f"zenoh:tcp:127.0.0.1:{7500 + domain.number}"
     bag = domain.folder / "bag"
     if party == "sim_node":
         return domain.start(party, sim=SIM, seed=SEED, duration=DURATION, speed=speed, timeout_s=60.0)

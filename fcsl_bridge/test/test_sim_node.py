@@ -209,7 +209,7 @@ def test_two_simulators_at_once(domain: Domain) -> None:
     controller, sim, _ = start(domain, speed=1.0)
     sim.wait_for("waiting for a controller")
     other = domain.start("sim_node", "-r", "__node:=other", sim=SIM, seed=SEED, timeout_s=60.0)
-    assert other.finish() == 1 and "cannot listen on tcp/127.0.0.1:" in other.err
+    assert other.finish() == 1 and "cannot listen on tcp:127.0.0.1:" in other.err
     assert sim.process.poll() is None and controller.process.poll() is None
 
 

@@ -52,7 +52,7 @@ static inline int bind_free_port(uint16_t *port)
 static inline const char *endpoint_of(uint16_t port)
 {
     static char text[64];
-    (void)snprintf(text, sizeof text, "tcp/127.0.0.1:%u", port);
+    (void)snprintf(text, sizeof text, "tcp:127.0.0.1:%u", port);
     return text;
 }
 

@@ -293,14 +293,16 @@ static void test_options(void)
     const fcsl_bus_input_t malformed[] = {{.key = "t/a*", .bytes = 1, .depth = 1}};
     const fcsl_bus_input_t large[] = {{.key = "t/a", .bytes = FCSL_BUS_MESSAGE_MAX + 1u, .depth = 1}};
     const fcsl_bus_input_t many[] = {{.key = "t/a", .bytes = FCSL_BUS_MESSAGE_MAX, .depth = 1000}};
-    const fcsl_bus_options_t sound = {.endpoint = "tcp/127.0.0.1:1", .ring_bytes = RING_BYTES, .role = FCSL_BUS_CLIENT};
+    const fcsl_bus_options_t sound = {.endpoint = "tcp:127.0.0.1:1", .ring_bytes = RING_BYTES, .role = FCSL_BUS_CLIENT};
     fcsl_bus_options_t options = sound;
     options.endpoint = NULL;
     check_refused(&options, "an endpoint or a configuration file");
-    options.endpoint = "tcp/example.org:7447";
-    check_refused(&options, "write tcp/HOST:PORT in numbers, like tcp/127.0.0.1:7447");
+    options.endpoint = "tcp:example.org:7447";
+    check_refused(&options, "write tcp:HOST:PORT in numbers, like tcp:127.0.0.1:7447");
     options.endpoint = "udp/127.0.0.1:7447";
-    check_refused(&options, "udp/127.0.0.1:7447: write tcp/HOST:PORT");
+    check_refused(&options, "udp/127.0.0.1:7447: write tcp:HOST:PORT");
+    options.endpoint = "tcp127.0.0.1:7447";
+    check_refused(&options, "tcp127.0.0.1:7447: write tcp:HOST:PORT");
     options = sound;
     options.ring_bytes = 8;
     check_refused(&options, "the ring of the bus has 8 bytes");
@@ -334,12 +336,12 @@ static void test_nobody_and_somebody(void)
     const uint64_t begun_ns = fcsl_monotonic_ns();
     fcsl_bus_options_t options = {
         .role = FCSL_BUS_CLIENT, .endpoint = endpoint_of(port), .timeout_ms = 300, .ring_bytes = RING_BYTES};
-    check_refused(&options, "cannot connect to tcp/127.0.0.1:");
+    check_refused(&options, "cannot connect to tcp:127.0.0.1:");
     CHECK(fcsl_monotonic_ns() - begun_ns >= 300000000u &&
           fcsl_monotonic_ns() - begun_ns < (uint64_t)LONG_S * FCSL_NS_PER_S);
     CHECK(listen(taken, 1) == 0);
     options.role = FCSL_BUS_LISTEN;
-    check_refused(&options, "cannot listen on tcp/127.0.0.1:");
+    check_refused(&options, "cannot listen on tcp:127.0.0.1:");
     CHECK(close(taken) == 0);
 }
 

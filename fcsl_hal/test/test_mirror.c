@@ -306,7 +306,7 @@ int main(void)
     check_refused((fcsl_channel_t){.name = "tick"}, "", endpoint, "channel 'tick' cannot go over the bus");
     check_refused((fcsl_channel_t){.name = "a"}, long_name, endpoint, "longer than 255 bytes");
     check_refused((fcsl_channel_t){.name = "a"}, "a//b", endpoint, "one slash between them");
-    check_refused((fcsl_channel_t){.name = "a"}, "", "udp/127.0.0.1:7", "write tcp/HOST:PORT");
+    check_refused((fcsl_channel_t){.name = "a"}, "", "udp/127.0.0.1:7", "write tcp:HOST:PORT");
     check_refused((fcsl_channel_t){.name = "a"}, "", endpoint, "at most 1048576 are possible");
     fcsl_mirror_t *mirror = open_mirror(endpoint);
     CHECK(!fcsl_mirror_watched(mirror));

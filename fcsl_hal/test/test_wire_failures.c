@@ -201,7 +201,7 @@ int main(void)
     test_bad_controllers();
     use_port("tcp:");
     test_bad_controllers();
-    use_port("zenoh:tcp/");
+    use_port("zenoh:tcp:");
     check_alone(test_killed_simulator);
     check_alone(test_killed_controller);
     CHECK(rmdir(folder) == 0);

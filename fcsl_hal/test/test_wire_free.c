@@ -182,7 +182,7 @@ static void test_alone(void)
 int main(void)
 {
     table = fcsl_channel_table(&MACHINE);
-    use_port("zenoh:tcp/");
+    use_port("zenoh:tcp:");
     check_alone(test_commands);
     check_alone(test_samples);
     check_alone(test_alone);

@@ -104,7 +104,7 @@ static void test_every_wire(void)
     test_lock_step("udp", TICKS / 5);
     use_port("tcp:");
     test_lock_step("tcp", TICKS / 5);
-    use_port("zenoh:tcp/");
+    use_port("zenoh:tcp:");
     check_alone(test_zenoh);
     check_alone(test_named_values);
     test_serial_line();

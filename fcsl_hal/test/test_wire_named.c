@@ -239,7 +239,7 @@ static void test_bad_commits(void)
 int main(void)
 {
     named = 1;
-    use_port("zenoh:tcp/");
+    use_port("zenoh:tcp:");
     check_alone(test_value_missing);
     check_alone(test_value_too_short);
     check_alone(test_value_that_is_none);

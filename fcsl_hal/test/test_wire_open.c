@@ -28,8 +28,8 @@ static void test_specs(void)
         {"uart:/dev/ttyS0", "write uart:DEVICE:BAUD"},
         {"uart::115200", "write uart:DEVICE:BAUD"},
         {"uart:/dev/ttyS0:12345", "no serial device has the speed 12345"},
-        {"zenoh:127.0.0.1:7447", "write zenoh:tcp/HOST:PORT in numbers"},
-        {"zenoh:tcp/host:7447", "write zenoh:tcp/HOST:PORT in numbers"},
+        {"zenoh:127.0.0.1:7447", "write zenoh:tcp:HOST:PORT in numbers"},
+        {"zenoh:tcp:host:7447", "write zenoh:tcp:HOST:PORT in numbers"},
     };
     fcsl_error_t error;
     for (size_t i = 0; i < sizeof CASES / sizeof CASES[0]; i++) {

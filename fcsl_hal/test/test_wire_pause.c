@@ -99,7 +99,7 @@ int main(void)
     use_unix();
     test_all();
     named = 1;
-    use_port("zenoh:tcp/");
+    use_port("zenoh:tcp:");
     test_all();
     CHECK(rmdir(folder) == 0);
     return 0;

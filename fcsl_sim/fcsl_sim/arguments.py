@@ -102,8 +102,8 @@ def _add_run(command: argparse.ArgumentParser) -> None:
         "--external",
         metavar="PEER",
         help="the controller is another process (fcsl-fc --hal PEER): at the other end of a wire, with wire:unix:PATH, "
-        "wire:udp:HOST:PORT, wire:tcp:HOST:PORT, wire:uart:DEVICE:BAUD or wire:zenoh:tcp/HOST:PORT; or on the bus, "
-        "each channel under its key, with zenoh:tcp/HOST:PORT, or zenoh-client: where another simulation listens; with "
+        "wire:udp:HOST:PORT, wire:tcp:HOST:PORT, wire:uart:DEVICE:BAUD or wire:zenoh:tcp:HOST:PORT; or on the bus, "
+        "each channel under its key, with zenoh:tcp:HOST:PORT, or zenoh-client: where another simulation listens; with "
         ",free-running behind that, neither waits for the other",
     )
     help_speed = "limit on simulated seconds per second: 1 for real time; 0 (default): as fast as possible"
@@ -137,9 +137,9 @@ def _add_servers(command: argparse.ArgumentParser) -> None:
     help_observers = (
         "put the values of all channels on a bus of their own (docs/reference/transports.md), which listens there"
     )
-    command.add_argument("--observers", metavar="tcp/HOST:PORT", help=help_observers)
+    command.add_argument("--observers", metavar="tcp:HOST:PORT", help=help_observers)
     help_ros = "publish the machine's ROS 2 topics and /clock through a bridge (docs/reference/transports.md), for which it listens there"
-    command.add_argument("--ros", metavar="tcp/HOST:PORT", help=help_ros)
+    command.add_argument("--ros", metavar="tcp:HOST:PORT", help=help_ros)
 
 
 def _add_plot(command: argparse.ArgumentParser) -> None:

@@ -170,7 +170,7 @@ def _run(options: argparse.Namespace) -> int:
     if external is not None and not external.startswith(("wire:", *_BUS)):
         raise SimError(
             f"--external {external}: write wire:SPEC, as in wire:unix:PATH or wire:udp:127.0.0.1:7600, "
-            "or zenoh:tcp/HOST:PORT"
+            "or zenoh:tcp:HOST:PORT"
         )
     if options.socket is None and (options.paused or options.token or options.checkpoints):
         raise SimError("`--paused`, `--token` and `--checkpoints` need `--socket`: they configure the variable server")

@@ -397,7 +397,7 @@ class Simulation:
         return list(slopes)
 
     def listen(self, peer: str, timeout_ms: int, name_space: str = "") -> None:
-        """A controller can connect from now on: to `wire:SPEC` or `zenoh:tcp/HOST:PORT`, as `fcsl-fc --hal` takes it.
+        """A controller can connect from now on: to `wire:SPEC` or `zenoh:tcp:HOST:PORT`, as `fcsl-fc --hal` takes it.
         name_space: in front of the keys of the bus, with or without surrounding slashes. With `,free-running` behind an
         address of the bus nobody waits: set a speed."""
         within = name_space.strip("/").encode()
@@ -486,7 +486,7 @@ class Simulation:
         return {name: int(getattr(counters, name)) for name in _SENT}
 
     def observers(self, endpoint: str, name_space: str = "") -> None:
-        """Puts the hosted machine's channels on a bus of their own (docs/reference/transports.md), which listens on `tcp/HOST:PORT`.
+        """Puts the hosted machine's channels on a bus of their own (docs/reference/transports.md), which listens on `tcp:HOST:PORT`.
 
         Only before the first tick and before `serve`. name_space: in front of the keys, with or without surrounding
         slashes. Raises SimError.
@@ -501,7 +501,7 @@ class Simulation:
         return {name: int(getattr(counters, name)) for name in _OBSERVED}
 
     def ros(self, endpoint: str, name_space: str = "") -> None:
-        """Publishes the hosted machine's ROS 2 topics and /clock through a bridge, which connects to `tcp/HOST:PORT`
+        """Publishes the hosted machine's ROS 2 topics and /clock through a bridge, which connects to `tcp:HOST:PORT`
         (docs/reference/transports.md). As `observers`.
         """
         within = name_space.encode()

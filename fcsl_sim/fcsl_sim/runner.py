@@ -130,10 +130,10 @@ def run(
     save: Path | None = None,
 ) -> Summary:
     """Runs to the end. bag: records controller and truth into this new directory. external: the controller is another
-    process (`wire:SPEC` or `zenoh:tcp/HOST:PORT`), which records itself and answers within `timeout_ms`; with
+    process (`wire:SPEC` or `zenoh:tcp:HOST:PORT`), which records itself and answers within `timeout_ms`; with
     `,free-running` behind the address nobody waits, and a speed is needed. name_space: of the bag's topics, and of the
     keys on the bus. speed: limit on simulated seconds per second; 0: as fast as possible. observers: the machine's channels
-    are put on a bus that listens at this `tcp/HOST:PORT`. ros: likewise its ROS 2 topics, for a bridge. restore: a
+    are put on a bus that listens at this `tcp:HOST:PORT`. ros: likewise its ROS 2 topics, for a bridge. restore: a
     checkpoint file of this simulation, from which it goes on. save: the checkpoint file to write at the end. Raises SimError;
     the bag then has the ticks recorded until then, and is removed if there are none.
     """

@@ -180,7 +180,7 @@ def test_errors_of_simulation_and_machine_come_together(sim_json: Path) -> None:
             ["--external", "dds:x"],
             "fcsl-sim: error: --external dds:x: write wire:SPEC, as in wire:unix:PATH or wire:udp:127.0.0.1:7600",
         ),
-        (["--external", "zenoh:x"], "fcsl-sim: error: zenoh:x: write zenoh:tcp/HOST:PORT in numbers"),
+        (["--external", "zenoh:x"], "fcsl-sim: error: zenoh:x: write zenoh:tcp:HOST:PORT in numbers"),
         (["--record", "."], "fcsl-sim: error: .: exists already; a bag is written into a new directory"),
         (["--record", "no/such/bag"], "fcsl-sim: error: "),
         (

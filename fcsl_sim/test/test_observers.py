@@ -20,6 +20,7 @@ import pytest
 
 from fcsl_sim import SimError, Simulation, load
 from simclient import VarClient
+from simclient.bus.endpoint import zenoh_locator
 from simclient.bus.free_port import free_endpoint
 from simclient.bus.session import Session
 from simclient.bus.ticks import Lost, TickReader
@@ -81,7 +82,10 @@ def test_frozen_observers_change_nothing(tmp_path: Path) -> None:
     with contextlib.ExitStack() as stack:
         begin = lambda *line: stack.enter_context(started(*line))  # noqa: E731
         simulator = begin("fcsl-sim", "run", SIM, "--external", f"zenoh:{control}", "--speed", str(SPEED), "--json")
-        observers = [begin(sys.executable, "-c", OBSERVER, mirror, lease_ms) for lease_ms in ("1000", "1000", "600000")]
+        observers = [
+            begin(sys.executable, "-c", OBSERVER, zenoh_locator(mirror), lease_ms)
+            for lease_ms in ("1000", "1000", "600000")
+        ]
         fc = begin("fcsl-fc", tmp_path / "liblander_control.so", *options, "--record", bag, "--summary", summary)
         for observer in observers:
             assert observer.stdout and observer.stdout.readline() == "observing\n"
@@ -231,7 +235,7 @@ def test_what_is_refused(open_sim: Callable[..., Simulation], tmp_path: Path) ->
         with pytest.raises(SimError, match="observers come before"):
             first.observers(free_endpoint())
     with open_sim() as sim:
-        with pytest.raises(SimError, match="write tcp/HOST:PORT"):
+        with pytest.raises(SimError, match="write tcp:HOST:PORT"):
             sim.observers("udp/127.0.0.1:7")
         with pytest.raises(SimError, match="longer than 255 bytes"):
             sim.observers(endpoint, "n" * 250)

@@ -24,6 +24,7 @@ from pathlib import Path
 from fcsl_bridge.domain import own_domain
 from fcsl_bridge.loopback import loopback_environment
 from simclient import VarClient
+from simclient.bus.endpoint import zenoh_locator
 from simclient.bus.free_port import free_endpoint
 
 HERE = Path(__file__).resolve().parent
@@ -107,7 +108,9 @@ def fly(duration_s: float, folder: Path, domain: int) -> tuple[dict[str, dict[st
             quiet=True,
         ) as sim,
         started("fcsl-fc", folder / "libecho.so", *fc_options, env=environment) as fc,
-        started(BRIDGE, bridge_config(folder, domain, [simulated, flown]), env=of_bridge) as bridge,
+        started(
+            BRIDGE, bridge_config(folder, domain, [zenoh_locator(simulated), zenoh_locator(flown)]), env=of_bridge
+        ) as bridge,
         started(sys.executable, HERE / "listener.py", env=environment) as listener,
     ):
         if not listener.stdout or listener.stdout.readline() != "listening\n":

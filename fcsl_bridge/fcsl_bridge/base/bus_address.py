@@ -13,15 +13,15 @@ _FIRST_PORT = 7500
 _LAST_DOMAIN = 232
 
 OPTION = Option(
-    "bus", str, "", "lockstep: where the nodes meet, tcp/HOST:PORT; by default a port of 127.0.0.1 by ROS domain"
+    "bus", str, "", "lockstep: where the nodes meet, tcp:HOST:PORT; by default a port of 127.0.0.1 by ROS domain"
 )
 
 
 def endpoint(given: str) -> str:
-    """The parameter's value, or tcp/127.0.0.1:PORT, which differs from domain to domain. Raises BridgeError."""
+    """The parameter's value, or tcp:127.0.0.1:PORT, which differs from domain to domain. Raises BridgeError."""
     if given:
         return given
     text = os.environ.get("ROS_DOMAIN_ID") or "0"
     if not text.isdecimal() or int(text) > _LAST_DOMAIN:
         raise BridgeError(f"ROS_DOMAIN_ID is `{text}`; it is a number from 0 to {_LAST_DOMAIN}")
-    return f"tcp/127.0.0.1:{_FIRST_PORT + int(text)}"
+    return f"tcp:127.0.0.1:{_FIRST_PORT + int(text)}"

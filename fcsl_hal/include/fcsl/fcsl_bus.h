@@ -56,7 +56,7 @@ typedef struct {
 typedef struct {
     fcsl_bus_role_t role;
     const char
-        *endpoint;    /* "tcp/HOST:PORT", HOST a number or `localhost`; nothing else is connected to or listened on */
+        *endpoint;    /* "tcp:HOST:PORT", HOST a number or `localhost`; nothing else is connected to or listened on */
     const char
         *config_path; /* instead of an endpoint: a Zenoh configuration file, and nothing but what it says; or null */
     uint32_t timeout_ms;     /* how long fcsl_bus_open tries to connect; 0: once */

@@ -19,7 +19,7 @@ extern "C" {
 typedef struct fcsl_mirror fcsl_mirror_t;
 
 typedef struct {
-    const char *endpoint;   /* "tcp/HOST:PORT", to listen on */
+    const char *endpoint;   /* "tcp:HOST:PORT", to listen on */
     const char *name_space; /* before the keys, "" for none */
     const char *descriptor; /* the text that answers queries for @descriptor */
     uint32_t write_bytes;   /* of the longest host write */

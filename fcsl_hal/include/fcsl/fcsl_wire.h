@@ -68,7 +68,7 @@ typedef enum {
 } fcsl_wire_side_t;
 
 /* What a SPEC may be, for messages and usage texts. */
-#define FCSL_WIRE_SPECS "unix:PATH, udp:HOST:PORT, tcp:HOST:PORT, uart:DEVICE:BAUD or zenoh:tcp/HOST:PORT"
+#define FCSL_WIRE_SPECS "unix:PATH, udp:HOST:PORT, tcp:HOST:PORT, uart:DEVICE:BAUD or zenoh:tcp:HOST:PORT"
 
 /* 0 when `spec` has the form of one of FCSL_WIRE_SPECS, or -1 with `error` filled. Opens nothing. */
 int fcsl_wire_check(const char *spec, fcsl_error_t *error);

@@ -105,18 +105,23 @@ static int check_answers(const fcsl_bus_options_t *options, fcsl_error_t *error)
     return 0;
 }
 
-/* The endpoint with a number for its host. */
+int fcsl_bus_endpoint_read(const char *endpoint, struct sockaddr_storage *address, socklen_t *length)
+{
+    const int is_tcp = strncmp(endpoint, "tcp", 3) == 0 && (endpoint[3] == ':' || endpoint[3] == '/');
+    return is_tcp ? fcsl_address_read(endpoint + 4, address, length) : -1;
+}
+
+/* The endpoint as Zenoh writes it, with a number for its host. */
 static int read_endpoint(const char *endpoint, char text[ENDPOINT_BYTES], fcsl_error_t *error)
 {
-    static const char TCP[] = "tcp/";
     struct sockaddr_storage address;
     socklen_t length = 0;
     char host[HOST_BYTES];
     char port[PORT_BYTES];
-    if (strncmp(endpoint, TCP, strlen(TCP)) != 0 || fcsl_address_read(endpoint + strlen(TCP), &address, &length) != 0 ||
+    if (fcsl_bus_endpoint_read(endpoint, &address, &length) != 0 ||
         getnameinfo((const struct sockaddr *)&address, length, host, sizeof host, port, sizeof port,
                     NI_NUMERICHOST | NI_NUMERICSERV) != 0) {
-        return fcsl_fail(error, "%s: write tcp/HOST:PORT in numbers, like tcp/127.0.0.1:7447", endpoint);
+        return fcsl_fail(error, "%s: write tcp:HOST:PORT in numbers, like tcp:127.0.0.1:7447", endpoint);
     }
     const int six = address.ss_family == AF_INET6;
     (void)snprintf(text, ENDPOINT_BYTES, "'tcp/%s%s%s:%s'", six ? "[" : "", host, six ? "]" : "", port);

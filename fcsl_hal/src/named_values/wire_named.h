@@ -14,7 +14,7 @@
 
 extern const fcsl_wire_counters_t fcsl_wire_named_counters;
 
-/* 0 when `address` has the form of zenoh:tcp/HOST:PORT, zenoh-client: or zenoh-peer:, or of one of these with ,free-running behind
+/* 0 when `address` has the form of zenoh:tcp:HOST:PORT, zenoh-client: or zenoh-peer:, or of one of these with ,free-running behind
  * it; or -1 with `error` filled. */
 int fcsl_wire_check_named(const char *address, fcsl_error_t *error);
 

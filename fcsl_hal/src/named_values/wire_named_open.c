@@ -11,7 +11,7 @@
 #include "fcsl/fcsl_monotonic.h"
 #include "codec/codec_layout.h"
 #include "commit.h"
-#include "fcsl/fcsl_address.h"
+#include "bus/bus_config.h"
 #include "name_space.h"
 #include "transport/handshake.h"
 #include "wire_named.h"
@@ -211,15 +211,14 @@ static int check(const char *name_space, const fcsl_machine_t *machine, fcsl_err
 
 int fcsl_wire_check_named(const char *address, fcsl_error_t *error)
 {
-    static const char TCP[] = "tcp/";
     struct sockaddr_storage there;
     socklen_t length = 0;
     char endpoint[NAMED_ENDPOINT_BYTES];
     (void)role_of(address, FCSL_WIRE_CONNECT, endpoint);
-    if (strncmp(endpoint, TCP, strlen(TCP)) != 0 || fcsl_address_read(endpoint + strlen(TCP), &there, &length) != 0) {
+    if (fcsl_bus_endpoint_read(endpoint, &there, &length) != 0) {
         return fcsl_fail(
             error,
-            "%s: write zenoh:tcp/HOST:PORT in numbers, like zenoh:tcp/127.0.0.1:7447, and ,free-running behind it "
+            "%s: write zenoh:tcp:HOST:PORT in numbers, like zenoh:tcp:127.0.0.1:7447, and ,free-running behind it "
             "where nobody waits for the other",
             address);
     }

@@ -11,6 +11,7 @@
 #include <sys/un.h>
 
 #include "fcsl/fcsl_monotonic.h"
+#include "bus/bus_config.h"
 #include "fcsl/fcsl_address.h"
 #include "wire_link.h"
 #include "wire_unix.h"
@@ -26,7 +27,7 @@ static const char *const KINDS[] = {
 /* What a SPEC says. */
 typedef struct {
     kind_t kind;
-    const char *address; /* behind the kind: path, HOST:PORT, DEVICE:BAUD, tcp/HOST:PORT */
+    const char *address; /* behind the kind: path, HOST:PORT, DEVICE:BAUD, tcp:HOST:PORT */
     char device[DEVICE_BYTES];
     uint32_t baud;
 } parsed_t;
@@ -52,12 +53,10 @@ static int read_uart(const char *spec, parsed_t *parsed, fcsl_error_t *error)
 
 static int read_zenoh(const char *spec, const parsed_t *parsed, fcsl_error_t *error)
 {
-    static const char TCP[] = "tcp/";
     struct sockaddr_storage address;
     socklen_t length = 0;
-    if (strncmp(parsed->address, TCP, strlen(TCP)) != 0 ||
-        fcsl_address_read(parsed->address + strlen(TCP), &address, &length) != 0) {
-        return fcsl_fail(error, "%s: write zenoh:tcp/HOST:PORT in numbers, like zenoh:tcp/127.0.0.1:7447", spec);
+    if (fcsl_bus_endpoint_read(parsed->address, &address, &length) != 0) {
+        return fcsl_fail(error, "%s: write zenoh:tcp:HOST:PORT in numbers, like zenoh:tcp:127.0.0.1:7447", spec);
     }
     return 0;
 }

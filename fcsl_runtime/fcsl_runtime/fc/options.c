@@ -26,10 +26,10 @@ static const char USAGE[] =
     "one "
     "of\n"
     "                          " FCSL_WIRE_SPECS "\n"
-    "                          zenoh:tcp/HOST:PORT (or zenoh-peer:): a simulator on the bus, each channel under its "
+    "                          zenoh:tcp:HOST:PORT (or zenoh-peer:): a simulator on the bus, each channel under its "
     "key\n"
     "                          the same with ,free-running behind it: whatever puts values there; waits for nobody\n"
-    "                          ros:tcp/HOST:PORT: the topics of the channels in a ROS 2 graph, whose bridge connects "
+    "                          ros:tcp:HOST:PORT: the topics of the channels in a ROS 2 graph, whose bridge connects "
     "there\n"
     "                          linux:PLAN: the sensors of this computer, as a plan of `fcsl board` says "
     "(docs/hardware/hal.md)\n"
@@ -67,10 +67,10 @@ static const char USAGE[] =
     "udp:HOST:PORT/N\n"
     "  --telemetry-fields GLOBS  which, as path globs with commas between\n"
     "                          (default machine.*,*.inputs.*,*.outputs.*,*.counters.*)\n"
-    "  --observers tcp/HOST:PORT  put the values of all channels on a bus of their own (docs/reference/transports.md), "
+    "  --observers tcp:HOST:PORT  put the values of all channels on a bus of their own (docs/reference/transports.md), "
     "which listens "
     "there\n"
-    "  --ros tcp/HOST:PORT     publish the machine's ROS 2 topics through a bridge (docs/reference/transports.md), for "
+    "  --ros tcp:HOST:PORT     publish the machine's ROS 2 topics through a bridge (docs/reference/transports.md), for "
     "which it "
     "listens "
     "there\n"
@@ -109,7 +109,7 @@ static const char *read_composite(const char *text, options_t *options)
     const size_t length = comma != NULL ? (size_t)(comma - plan) : 0u;
     if (length == 0u || length >= sizeof options->composite_plan) {
         (void)usage_error(
-            "--hal composite:PLAN,HAL needs the plan of a board and wire:SPEC or zenoh:tcp/HOST:PORT, not ", text);
+            "--hal composite:PLAN,HAL needs the plan of a board and wire:SPEC or zenoh:tcp:HOST:PORT, not ", text);
         return NULL;
     }
     memcpy(options->composite_plan, plan, length);
@@ -136,8 +136,8 @@ static int read_hal(const char *text, options_t *options)
         return 0;
     }
     if (!is_wire && strncmp(text, "zenoh", strlen("zenoh")) != 0) {
-        return usage_error("--hal must be stub, linux:PLAN, wire:SPEC, zenoh:tcp/HOST:PORT, composite:PLAN,HAL or "
-                           "ros:tcp/HOST:PORT, not ",
+        return usage_error("--hal must be stub, linux:PLAN, wire:SPEC, zenoh:tcp:HOST:PORT, composite:PLAN,HAL or "
+                           "ros:tcp:HOST:PORT, not ",
                            text);
     }
     const int failed =

@@ -28,8 +28,8 @@ typedef struct {
     const char *checkpoints; /* folder of the checkpoints that clients name; null: none */
     const char *telemetry; /* udp:HOST:PORT[/EVERY]; null: none */
     const char *telemetry_fields; /* globs; null: as fcsl_telemetry.h says */
-    const char *observers; /* tcp/HOST:PORT to listen on; null: none */
-    const char *ros; /* tcp/HOST:PORT to listen on for a bridge to ROS 2; null: none */
+    const char *observers; /* tcp:HOST:PORT to listen on; null: none */
+    const char *ros; /* tcp:HOST:PORT to listen on for a bridge to ROS 2; null: none */
     const char *record; /* null: no recording */
     const char *record_fields; /* globs; null: as fcsl_run_record says */
     record_policy_t record_policy;

@@ -23,6 +23,7 @@ from fcsl_compiler.model.types import SCALARS, Array, Type
 from fcsl_compiler.ros.channels import standard_mapping
 from fcsl_compiler.ros.standard_messages import full_name
 from simclient.bag import Bag, rows_of
+from simclient.bus.endpoint import zenoh_locator
 from simclient.bus.free_port import free_endpoint
 from simclient.bus.machine import BusMachine, read_machine
 from simclient.bus.payload import Payload
@@ -134,7 +135,7 @@ class Simulator:
     def __init__(self, library: Path, folder: Path):
         endpoint = free_endpoint()
         config = zenoh.Config.from_json5('{mode: "peer", scouting: {multicast: {enabled: false}}}')
-        config.insert_json5("listen/endpoints", f'["{endpoint}"]')
+        config.insert_json5("listen/endpoints", f'["{zenoh_locator(endpoint)}"]')
         self.summary = folder / "summary.json"
         self._bus = zenoh.open(config)
         self._came: dict[str, queue.Queue[bytes]] = {}

@@ -25,6 +25,7 @@ from simclient.bag import Bag, rows_of
 from simclient.bag.bus_topics import topic_of
 from simclient.bag.info import describe
 from simclient.bus.cli import _read_descriptors
+from simclient.bus.endpoint import zenoh_locator
 from simclient.bus.free_port import free_endpoint
 from simclient.bus.machine import BusChannel, BusMachine, read_machine
 from simclient.bus.messages import definition_of, message_of, type_names
@@ -151,7 +152,7 @@ def test_list(endpoint: str) -> None:
 
 def test_a_machine_that_cannot_be_read_hides_no_other(endpoint: str) -> None:
     config = zenoh.Config.from_json5('{mode: "client", scouting: {multicast: {enabled: false}}}')
-    config.insert_json5("connect/endpoints", f'["{endpoint}"]')
+    config.insert_json5("connect/endpoints", f'["{zenoh_locator(endpoint)}"]')
     key = "south/rig/@descriptor"
     with zenoh.open(config) as bus:
         served = bus.declare_queryable(key, lambda query: query.reply(key, b"{}"))
@@ -270,7 +271,11 @@ def test_nobody_there(tmp_path: Path) -> None:
         f"no bus listens on {where}: start fcsl-fc or fcsl-sim with --observers"
         in tool("list", "-c", where, status=2)[1]
     )
-    assert "write tcp/HOST:PORT" in tool("echo", "-c", "127.0.0.1:7447", status=2)[1]
+    assert zenoh_locator("tcp:[::1]:7447") == zenoh_locator("tcp/[::1]:7447") == "tcp/[::1]:7447"
+    for wrong in ("udp:127.0.0.1:7447", "tcp:127.0.0.1", "tcp/127.0.0.1:7447#iface=eth0", "tcp:tcp:127.0.0.1:1"):
+        with pytest.raises(BusError, match="write tcp:HOST:PORT"):
+            zenoh_locator(wrong)
+    assert "write tcp:HOST:PORT" in tool("echo", "-c", "127.0.0.1:7447", status=2)[1]
     (tmp_path / "wrong.json").write_text("[1]")
     with pytest.raises(BusError, match="not what `fcsl bus list --json` prints"):
         _read_descriptors(tmp_path / "wrong.json")
@@ -279,7 +284,7 @@ def test_nobody_there(tmp_path: Path) -> None:
 def test_without_zenoh(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setitem(sys.modules, "zenoh", None)
     with pytest.raises(BusError, match="pip install eclipse-zenoh"):
-        Session("tcp/127.0.0.1:7447")
+        Session("tcp:127.0.0.1:7447")
 
 
 # ---- descriptors and values -------------------------------------------------------------------------------------------

@@ -365,7 +365,7 @@ def test_socket_is_private_and_not_taken_away(path: Path) -> None:
         (
             [FIXTURE, "--hal", "linux"],
             2,
-            "stub, linux:PLAN, wire:SPEC, zenoh:tcp/HOST:PORT, composite:PLAN,HAL or ros:tcp/HOST:PORT",
+            "stub, linux:PLAN, wire:SPEC, zenoh:tcp:HOST:PORT, composite:PLAN,HAL or ros:tcp:HOST:PORT",
         ),
         ([FIXTURE, "--hal", "wire:"], 2, "a wire is unix:PATH"),
         ([FIXTURE, "--rate", "fast"], 2, "realtime or max"),
@@ -378,7 +378,7 @@ def test_socket_is_private_and_not_taken_away(path: Path) -> None:
         ([FIXTURE, "--timeout", "0.05"], 2, "--timeout needs --hal wire"),
         ([FIXTURE, "--timeout", "2"], 2, "--timeout needs --hal wire"),
         (
-            [FIXTURE, "--timeout", "0.009", "--hal", "zenoh:tcp/127.0.0.1:1,free-running"],
+            [FIXTURE, "--timeout", "0.009", "--hal", "zenoh:tcp:127.0.0.1:1,free-running"],
             2,
             "nobody waits for the simulator",
         ),

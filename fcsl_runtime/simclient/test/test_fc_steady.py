@@ -27,6 +27,7 @@ from telemetry_page import Port
 from test_fc_wire import HELLO, TABLE, TICK_HZ, control, listening
 
 from fcsl_compiler.driver.cache import build_machine
+from simclient.bus.endpoint import zenoh_locator
 from simclient.bus.free_port import free_endpoint
 from simclient.bus.session import Session
 from simclient.errors import BusError
@@ -249,7 +250,7 @@ def test_every_policy(folder: Path, policy: str) -> None:
 # ---- with a peer at the other end of a wire
 
 
-@pytest.mark.parametrize("kind", ["unix", "udp:", "zenoh:tcp/"])
+@pytest.mark.parametrize("kind", ["unix", "udp:", "zenoh:tcp:"])
 def test_in_lock_step(kind: str, folder: Path, tmp_path: Path) -> None:
     """It may wait for its peer, and for nothing else."""
     with socket.socket(type=socket.SOCK_DGRAM if kind == "udp:" else socket.SOCK_STREAM) as free:
@@ -283,7 +284,9 @@ def test_beside_a_rig_that_says_nothing(folder: Path, tmp_path: Path) -> None:
 def test_free_running(folder: Path, tmp_path: Path) -> None:
     """It may not even wait for a peer. Values come at about its own rate, and their source, which reads its commands, freezes."""
     endpoint = free_endpoint()
-    with subprocess.Popen([sys.executable, "-c", SOURCE, endpoint], stdout=subprocess.PIPE, text=True) as source:
+    with subprocess.Popen(
+        [sys.executable, "-c", SOURCE, zenoh_locator(endpoint)], stdout=subprocess.PIPE, text=True
+    ) as source:
         try:
             assert source.stdout and source.stdout.readline() == "listening\n"
             options = ("--hal", f"zenoh:{endpoint},free-running", "--record", str(tmp_path / "bag"))

@@ -156,7 +156,7 @@ def process(proc: Path, number: int, folder: Path, *words: str) -> None:
         (("fcsl-guard", "lib.so", "--actuator", "motors=none"), False),
         (("fcsl-fc", "lib.so", "--hal", "linux:board.plan"), True),
         (("fcsl-fc", "lib.so", "--hal", "composite:board.plan,wire:unix:/s,x"), True),
-        (("fcsl-fc", "lib.so", "--hal", "composite:board.plan,zenoh:tcp/localhost:7447"), True),
+        (("fcsl-fc", "lib.so", "--hal", "composite:board.plan,zenoh:tcp:localhost:7447"), True),
         (("fcsl-fc", "lib.so", "--hal", "linux:missing.plan"), True),
         (("fcsl-fc", "lib.so", "--hal", "linux:pins.plan"), True),
         (("fcsl-fc", "lib.so", "--hal", "linux:inputs.plan"), False),

@@ -132,7 +132,7 @@ int fcsl_sim_slopes(fcsl_sim_t *sim, double *slopes, fcsl_error_t *error);
 
 /* ---- external controller ------------------------------------------------------------------------------------------- */
 
-/* `peer`: wire:SPEC (fcsl_wire.h) or zenoh:tcp/HOST:PORT (fcsl_hal.h), as the --hal of fcsl-fc, which can connect from now on;
+/* `peer`: wire:SPEC (fcsl_wire.h) or zenoh:tcp:HOST:PORT (fcsl_hal.h), as the --hal of fcsl-fc, which can connect from now on;
  * `name_space` stands in front of the keys of the bus. With ,free-running behind an address of the bus nobody waits: give a speed,
  * and fcsl_sim_run puts the sensors of each tick and takes the newest command, or holds the one before. */
 int fcsl_sim_listen(fcsl_sim_t *sim, const char *peer, const char *name_space, uint32_t timeout_ms,

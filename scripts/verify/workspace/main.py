@@ -57,7 +57,7 @@ def check_without_zenoh(workspace: Path, sources: Path) -> None:
         raise CheckFailed(f"without Zenoh, cargo made {crates[0]}")
     fly = f"install/fcsl_runtime/bin/fcsl-fc {package_prefix('lander')}/lib/lander/liblander_machines.so --machine lander_control"
     in_shell(workspace, f"{fly} --rate max --ticks 10")
-    refused = in_shell(workspace, f"{fly} --hal zenoh:tcp/127.0.0.1:7447 2>&1 || true")
+    refused = in_shell(workspace, f"{fly} --hal zenoh:tcp:127.0.0.1:7447 2>&1 || true")
     if "built without the bus" not in refused:
         raise CheckFailed(f"without Zenoh, fcsl-fc says of an address of the bus: {refused}")
 

@@ -19,7 +19,7 @@ extern "C" {
 typedef struct fcsl_observers fcsl_observers_t;
 
 typedef struct {
-    const char *endpoint;          /* tcp/HOST:PORT, to listen on */
+    const char *endpoint;          /* tcp:HOST:PORT, to listen on */
     const char *name_space; /* before the keys, "" for none */
     fcsl_run_t *run;        /* its machine's struct is part 0 of the history */
 } fcsl_observers_options_t;

@@ -19,7 +19,7 @@ extern "C" {
 typedef struct fcsl_ros_graph fcsl_ros_graph_t;
 
 typedef struct {
-    const char *endpoint;          /* tcp/HOST:PORT, to listen on; the bridge connects there */
+    const char *endpoint;          /* tcp:HOST:PORT, to listen on; the bridge connects there */
     const char *name_space;        /* of the topics, "" for none */
     const fcsl_machine_t *machine; /* its struct is part 0 of the history */
     const void *safe; /* the machine's struct with safe values (fcsl_run_safe_data), or null */

@@ -40,13 +40,13 @@ def main(arguments: Sequence[str]) -> int:
 
 
 _EXAMPLES = {
-    "": "list -c tcp/127.0.0.1:7447",
-    "list": "-c tcp/127.0.0.1:7447",
-    "echo": "-c tcp/127.0.0.1:7447 throttle -n 10",
-    "hz": "-c tcp/127.0.0.1:7447 --seconds 5",
-    "put": "-c tcp/127.0.0.1:7447 altitude 12.5",
-    "record": "-c tcp/127.0.0.1:7447 -o flight",
-    "play": "--listen tcp/127.0.0.1:7447 flight --speed 1",
+    "": "list -c tcp:127.0.0.1:7447",
+    "list": "-c tcp:127.0.0.1:7447",
+    "echo": "-c tcp:127.0.0.1:7447 throttle -n 10",
+    "hz": "-c tcp:127.0.0.1:7447 --seconds 5",
+    "put": "-c tcp:127.0.0.1:7447 altitude 12.5",
+    "record": "-c tcp:127.0.0.1:7447 -o flight",
+    "play": "--listen tcp:127.0.0.1:7447 flight --speed 1",
 }
 
 
@@ -60,9 +60,9 @@ def make_parser() -> argparse.ArgumentParser:
     def add(name: str, run: Callable[[argparse.Namespace], int | None], text: str) -> argparse.ArgumentParser:
         command = commands.add_parser(name, help=text, description=text)
         if name == "play":
-            command.add_argument("--listen", required=True, metavar="tcp/HOST:PORT", help="where fcsl-fc connects to")
+            command.add_argument("--listen", required=True, metavar="tcp:HOST:PORT", help="where fcsl-fc connects to")
         else:
-            command.add_argument("-c", "--connect", required=True, metavar="tcp/HOST:PORT", help="who listens")
+            command.add_argument("-c", "--connect", required=True, metavar="tcp:HOST:PORT", help="who listens")
         command.set_defaults(run=run)
         return command
 

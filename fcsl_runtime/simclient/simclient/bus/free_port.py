@@ -21,5 +21,5 @@ def free_port(kind: socket.SocketKind = socket.SOCK_STREAM) -> int:
 
 
 def free_endpoint() -> str:
-    """tcp/127.0.0.1:PORT."""
-    return f"tcp/127.0.0.1:{free_port()}"
+    """tcp:127.0.0.1:PORT."""
+    return f"tcp:127.0.0.1:{free_port()}"

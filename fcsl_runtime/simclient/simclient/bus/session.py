@@ -4,7 +4,6 @@
 from __future__ import annotations
 
 import json
-import re
 import threading
 import time
 from collections import deque
@@ -13,9 +12,9 @@ from types import TracebackType
 from typing import Any, NamedTuple
 
 from ..errors import BusError
+from .endpoint import zenoh_locator
 from .machine import BusMachine, read_machine
 
-_ENDPOINT = re.compile(r"tcp/(\[[0-9a-fA-F:.%]+\]|[\w.-]+):[0-9]{1,5}")
 _CONNECT_MS = 2000
 _DESCRIBE_S = 2.0
 _LOOK_S = 0.2
@@ -53,7 +52,7 @@ class Question:
 
 
 class Session:
-    """Connected to `endpoint` (tcp/HOST:PORT), or listening there. A context manager. Raises BusError."""
+    """Connected to `endpoint` (tcp:HOST:PORT), or listening there. A context manager. Raises BusError."""
 
     def __init__(self, endpoint: str, listens: bool = False):
         self.endpoint = endpoint
@@ -69,9 +68,8 @@ class Session:
         self._subscribers: list[Any] = []
 
     def _open(self) -> Any:
-        if not _ENDPOINT.fullmatch(self.endpoint):
-            raise BusError(f"{self.endpoint} is no endpoint: write tcp/HOST:PORT, like tcp/127.0.0.1:7447")
-        here, there = ([self.endpoint], []) if self._listens else ([], [self.endpoint])
+        locator = zenoh_locator(self.endpoint)
+        here, there = ([locator], []) if self._listens else ([], [locator])
         settings = {
             "mode": "peer" if self._listens else "client",
             "connect": {

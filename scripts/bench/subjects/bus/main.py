@@ -26,6 +26,7 @@ import zenoh
 from fcsl_bridge.domain import own_domain
 from fcsl_bridge.loopback import loopback_environment
 from fcsl_compiler.driver.cache import build_machine
+from simclient.bus.endpoint import zenoh_locator
 from simclient.bus.free_port import free_endpoint
 
 from ...harness.native import compile_program
@@ -103,7 +104,7 @@ def _ping(script: str, where: Sequence[str], env: dict[str, str]) -> dict[str, f
 
 
 def _ping_zenoh() -> dict[str, float]:
-    return _ping("ping_zenoh.py", [free_endpoint()], dict(os.environ))
+    return _ping("ping_zenoh.py", [zenoh_locator(free_endpoint())], dict(os.environ))
 
 
 def _ping_dds() -> dict[str, float]:
@@ -135,7 +136,7 @@ def step_instructions(folder: Path) -> dict[str, list[int]]:
 def _observe(endpoint: str, stack: ExitStack) -> None:
     """Takes all messages until the stack is closed; returns when some came."""
     config = zenoh.Config.from_json5('{mode: "client", scouting: {multicast: {enabled: false}}}')
-    config.insert_json5("connect/endpoints", json.dumps([endpoint]))
+    config.insert_json5("connect/endpoints", json.dumps([zenoh_locator(endpoint)]))
     config.insert_json5("connect/timeout_ms", "30000")
     came = threading.Semaphore(0)
     bus = stack.enter_context(zenoh.open(config))
@@ -161,7 +162,7 @@ def computers(folder: Path) -> dict[str, float]:
             return process
 
         config = zenoh.Config.from_json5('{mode: "peer", scouting: {multicast: {enabled: false}}}')
-        config.insert_json5("listen/endpoints", json.dumps([endpoint]))
+        config.insert_json5("listen/endpoints", json.dumps([zenoh_locator(endpoint)]))
         stack.enter_context(zenoh.open(config))
         simulators, flying = [], []
         for i in range(COMPUTERS):

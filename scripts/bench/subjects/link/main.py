@@ -80,7 +80,7 @@ def lockstep_over(program: Path, kind: str, folder: Path | None, ticks: int) -> 
     else:
         with socket.socket(type=socket.SOCK_DGRAM if kind == "udp" else socket.SOCK_STREAM) as free:
             free.bind(("127.0.0.1", 0))
-            spec = f"{'zenoh:tcp/' if kind == 'zenoh' else kind + ':'}127.0.0.1:{free.getsockname()[1]}"
+            spec = f"{'zenoh:tcp:' if kind == 'zenoh' else kind + ':'}127.0.0.1:{free.getsockname()[1]}"
     return _run(program, spec, spec, ticks)
 
 

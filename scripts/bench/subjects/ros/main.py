@@ -176,7 +176,7 @@ def lockstep() -> dict[str, Any]:
     many ticks share one publication, and with a subscriber. They take turns; medians."""
     with own_domain() as domain:
         env = environment(domain)
-        ways: dict[str, Callable[[], float]] = {"native": lambda: _fly_native(f"zenoh:tcp/127.0.0.1:{7500 + domain}")}
+        ways: dict[str, Callable[[], float]] = {"native": lambda: _fly_native(f"zenoh:tcp:127.0.0.1:{7500 + domain}")}
         ways |= {f"decimate_{n}": functools.partial(_fly, n, env) for n in LOCKSTEP_DECIMATES}
         ways["subscribed"] = lambda: _fly_subscribed(env)
         rounds = [{name: fly() for name, fly in ways.items()} for _ in range(LOCKSTEP_ROUNDS)]
