@@ -80,10 +80,15 @@ def _add(
 
 def _add_flight(command: argparse.ArgumentParser) -> None:
     """What replaces members of the simulation file."""
-    command.add_argument("--seed", type=_seed, metavar="N", help="random seed; replaces the file's")
     command.add_argument(
         "--duration", type=_seconds, metavar="SECONDS", help="longest simulated time in s; replaces the file's"
     )
+    _add_changes(command)
+
+
+def _add_changes(command: argparse.ArgumentParser) -> None:
+    """The same without the duration."""
+    command.add_argument("--seed", type=_seed, metavar="N", help="random seed; replaces the file's")
     help_set = "sets a model parameter, or an element of one: altimeter.parameters.sigma=0.8 (repeatable)"
     command.add_argument("--set", action="append", default=[], metavar="PATH=VALUE", dest="sets", help=help_set)
     help_event = 'adds an event: "14.0 altimeter.parameters.dropout=true", at 14 s (repeatable)'
@@ -203,6 +208,7 @@ def _add_response(command: argparse.ArgumentParser) -> None:
     command.add_argument(
         "--at", type=_seconds, metavar="SECONDS", help="fly until then first (s); default: the beginning"
     )
+    _add_changes(command)
     help_from = "the lowest frequency (default: 1 rad/s)"
     command.add_argument("--from", type=_positive, default=1.0, metavar="RAD_S", dest="low", help=help_from)
     help_to = "the highest one (default: 0.9 of half of the ticks' frequency)"

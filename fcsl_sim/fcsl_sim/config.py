@@ -12,6 +12,7 @@ from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field, replace
 from fractions import Fraction
 from pathlib import Path
+from typing import Any
 
 from fcsl_compiler.api.build import DEFAULT_BACKEND, ToolchainError, build_machine, toolchain
 from fcsl_compiler.api.diagnostics import (
@@ -69,6 +70,7 @@ class SimConfig:
 
     `controller` is the name of the first controller, `companions` are those beside it. `ros` lists the standard messages
     onto which truth is mapped; `until` is the stop condition as text, empty without one; `warnings` are rendered texts.
+    `arguments` are those of `load`, besides path, seed and duration: another file is read as this one was.
     """
 
     path: Path
@@ -83,6 +85,7 @@ class SimConfig:
     ros: tuple[TruthTopic, ...]
     until: str
     warnings: tuple[str, ...]
+    arguments: dict[str, Any]
 
     def with_seed(self, seed: int) -> SimConfig:
         """The same with another seed, without reading the file again: for many runs."""
@@ -158,7 +161,8 @@ def load(
     root = with_events(root, events, sink)
     if machine is None:
         _require_compiler()
-    return _Loader(file, sink, sets, machine, backend).load(root, seed, duration_s)
+    arguments = {"sets": sets, "events": events, "machine": machine, "backend": backend}
+    return _Loader(file, sink, arguments).load(root, seed, duration_s)
 
 
 def _refuse_others(file: Path, root: JsonNode) -> None:
@@ -203,15 +207,15 @@ def _plant_only(tick_hz: int) -> tuple[Path, str]:
 
 
 class _Loader:
-    def __init__(
-        self, file: Path, sink: DiagnosticSink, sets: Sequence[str], machine: tuple[Path, str] | None, backend: str
-    ):
-        self.file, self.sink, self.given_machine, self.backend = file, sink, machine, backend
+    def __init__(self, file: Path, sink: DiagnosticSink, arguments: dict[str, Any]):
+        self.file, self.sink, self.arguments = file, sink, arguments
+        self.given_machine: tuple[Path, str] | None = arguments["machine"]
+        self.backend: str = arguments["backend"]
         self.reader = ConfigReader(sink)
         self.parts = _Parts()
         self.link_node: JsonNode | None = None
         self.foreign: list[Diagnostic] = []  # diagnostics of the machine's files
-        self.settings = Settings(sets, sink)
+        self.settings = Settings(arguments["sets"], sink)
 
     def load(self, root: JsonNode, seed: int | None, duration_s: Fraction | None) -> SimConfig:
         required = ("models", "instances", "integrator", "seed", "duration")
@@ -288,6 +292,7 @@ class _Loader:
             wiring.ros,
             wiring.until,
             tuple(d.render() for d in self.sink.diagnostics if d.severity is Severity.WARNING),
+            self.arguments,
         )
 
     # ---- controller and time ------------------------------------------------------------------------------------------

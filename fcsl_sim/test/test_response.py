@@ -364,6 +364,31 @@ def test_the_command(write: Callable[..., Path], capsys: pytest.CaptureFixture[s
     assert json.loads(capsys.readouterr().out) == written
 
 
+def test_what_the_command_line_changes(write: Callable[..., Path], capsys: pytest.CaptureFixture[str]) -> None:
+    """Parameters, an event on the way, and the value of the very input to which the sine is added: at 0.95 rad the servo
+    meets its stop."""
+    line = ["response", str(write()), "--input", "servo.inputs.command", "--measure", "servo.outputs.angle", "--json"]
+    line += ["--points", "1", "--from", "15", "--to", "16", "--amplitude", "0.2", "--at", "2"]
+
+    def measured(*changes: str) -> tuple[complex, float]:
+        assert main([*line, *changes]) == 0
+        found = json.loads(capsys.readouterr().out)
+        angle = found["responses"]["servo.outputs.angle"]
+        return complex(angle["real"][0], angle["imag"][0]), found["rest"][0]
+
+    def expected(frequency: float, damping: float) -> complex:
+        s = 15j
+        return frequency**2 / (s**2 + 2.0 * damping * frequency * s + frequency**2)
+
+    fast = ("--set", "servo.parameters.natural_frequency=40", "--set", "servo.parameters.max_rate=50")
+    assert measured(*fast)[0] == pytest.approx(expected(40.0, 0.7), rel=3e-4)
+    damped = (*fast, "--event", "1.0 servo.parameters.damping=1.4", "--seed", "3")
+    assert measured(*damped)[0] == pytest.approx(expected(40.0, 1.4), rel=3e-4)
+    assert measured(*fast)[1] < 1e-3 < 0.02 < measured(*fast, "--set", "servo.inputs.command=0.95")[1]
+    assert main([*line, "--set", "servo.parameters.mass=1"]) == 2
+    assert "mass" in capsys.readouterr().err
+
+
 # ---- the picture -----------------------------------------------------------------------------------------------------
 
 #: Of k / (s (s + 1)²) with k = 0.5: the phase is -180° at 1 rad/s, where the gain is 1/4.

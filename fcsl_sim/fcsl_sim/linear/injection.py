@@ -66,6 +66,13 @@ def with_injections(config: SimConfig, inputs: Sequence[str], file: Path) -> lis
     return found
 
 
+def with_moved(sets: Sequence[str], injections: Sequence[Injection]) -> list[str]:
+    """`--set` of the simulation as those of the file with injections, where a sine's input has the value in their place."""
+    moved = {i.path.partition("[")[0]: f"{i.instance}.inputs.value" for i in injections}
+    paths = [re.match(r"[^\[=]*", text)[0] for text in sets]  # type: ignore[index]  # it matches the empty text, too
+    return [moved.get(path, path) + text[len(path) :] for path, text in zip(paths, sets, strict=True)]
+
+
 def _inject(
     config: SimConfig,
     text: str,

@@ -40,7 +40,7 @@ from ..errors import SimError
 from ..sim_run import SimRun
 from ..sim_twin import SimTwin
 from ..whole_ticks import whole_ticks
-from .injection import with_injections
+from .injection import with_injections, with_moved
 
 Array = np.ndarray[Any, Any]
 
@@ -138,7 +138,8 @@ class Response:
         with tempfile.TemporaryDirectory(prefix="fcsl-sim-response-") as folder:
             file = Path(folder) / config.path.name
             self.injections = with_injections(config, inputs, file)
-            injected = load(file)
+            arguments = {**config.arguments, "sets": with_moved(config.arguments["sets"], self.injections)}
+            injected = load(file, seed=config.seed, **arguments)
         try:
             for _ in range(2):
                 self._twins.append(SimTwin(SimRun(injected)))
