@@ -3,9 +3,11 @@
 
 from __future__ import annotations
 
+import json
 import random
 import signal
 import struct
+import threading
 import time
 from pathlib import Path
 
@@ -156,6 +158,28 @@ def test_a_stalled_subscriber_costs_no_tick(domain: Domain, library: Path) -> No
     # A publish() that waited for the subscriber would wait 100 ms, ten ticks, each time.
     assert ticks > 100 and missed < ticks, (ticks, missed)
     robot.finish()
+
+
+def test_a_count_ends_although_messages_flow_on(domain: Domain) -> None:
+    counter, source = domain.start("topic_count", topics="[/flow]"), domain.listener()
+    publisher = source.node.create_publisher(String, "/flow", qos.STREAM)
+    source.until(lambda: publisher.get_subscription_count() == 1)
+    end = threading.Event()
+
+    def flow() -> None:
+        while not end.wait(0.01):
+            publisher.publish(String(data="more"))
+
+    flowing = threading.Thread(target=flow)
+    flowing.start()
+    try:
+        time.sleep(1.0)
+        counter.signal(signal.SIGINT)
+        assert counter.finish() == 0
+    finally:
+        end.set()
+        flowing.join()
+    assert json.loads(counter.out)["/flow"] > 50
 
 
 def test_a_sensor_that_vanishes_is_told_by_its_age(domain: Domain, library: Path) -> None:

@@ -2,7 +2,7 @@
 """Counts messages as an ordinary subscriber, and prints the counts as one JSON object when it ends.
 
 Subscribes to /clock, to every topic of a machine and its simulator, and to further topics given by name; also to topics
-that appear later. Ends on SIGINT or SIGTERM, or when nothing was received for `idle_s` since the first message.
+that appear later. Ends on SIGINT or SIGTERM, at most 3 s later if messages flow on, or when nothing was received for `idle_s` since the first message.
 """
 
 from __future__ import annotations
@@ -32,8 +32,9 @@ _DISCOVERY_PERIOD_S = 0.1
 _POLL_S = 0.1
 #: Deeper than any backlog of a lock-step run: received messages are counted even after the run.
 _DEPTH = 100_000
-#: After a signal, messages that have arrived are still counted, until none was received for this long, in s.
-_DRAIN_S = 0.3
+#: After a signal, messages that have arrived are still counted, until none was received for this long, in s; where they flow
+#: on, not longer than the second one.
+_QUIET_S, _DRAIN_S = 0.3, 3.0
 
 
 class Counter:
@@ -84,11 +85,12 @@ def _matching(publishers: list[Any]) -> QoSProfile:
 
 
 def _count(counter: Counter, executor: SingleThreadedExecutor, stop: Stop, idle_s: float | None) -> None:
-    looked = 0.0
+    looked = signalled = 0.0
     while True:
         now = time.monotonic()
         quiet_s = now - counter.last if counter.last else 0.0
-        if stop.signal and (not counter.last or quiet_s > _DRAIN_S):
+        signalled = signalled or (now if stop.signal else 0.0)
+        if signalled and (not counter.last or quiet_s > _QUIET_S or now - signalled > _DRAIN_S):
             return
         if idle_s is not None and quiet_s > idle_s:
             return
