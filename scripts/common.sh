@@ -46,6 +46,12 @@ python_packages() {
     progress "$label" "${install[@]}"
 }
 
+# requirements PYTHON: what pyproject.toml and constraints.txt say of the Python packages; no comments, no settings of tools.
+requirements() {
+    "$1" -c 'import json, tomllib; print(json.dumps(tomllib.load(open("pyproject.toml", "rb"))["dependency-groups"]))'
+    sed 's/[[:space:]]*#.*//; /^$/d' constraints.txt
+}
+
 # built_of [PACKAGE ...]: the packages that a build was asked for, and the names of all Python files that an installation links.
 built_of() {
     echo "$*"

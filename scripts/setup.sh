@@ -85,7 +85,8 @@ tools_key() {
     find_python
     "$(find_python)" -VV
     ls -d "$ros" 2>/dev/null || true
-    cat pyproject.toml constraints.txt scripts/ros_wheels.sh "${cargo_manifests[@]/Cargo.toml/Cargo.lock}"
+    requirements "$(find_python)"
+    cat scripts/ros_wheels.sh "${cargo_manifests[@]/Cargo.toml/Cargo.lock}"
 }
 
 # Starts to build the crates that take longest while packages are downloaded. colcon's cargo waits for this one and finds all

@@ -263,3 +263,23 @@ def test_env_is_safe_under_strict_shells() -> None:
     result = subprocess.run(["bash", "-c", script], cwd=ROOT, capture_output=True, text=True, check=False)
     assert result.returncode == 0, result.stderr
     assert "on" in result.stdout.splitlines()[-1]
+
+
+def test_only_what_is_installed_rebuilds_the_environment(tmp_path: Path) -> None:
+    """A comment or a setting of a tool changes nothing of what `make setup` compares; a package or a pin does."""
+
+    def requirements(file: str = "", old: str = "", new: str = "") -> str:
+        for name in ("pyproject.toml", "constraints.txt"):
+            text = text_of(name)
+            assert name != file or old in text
+            (tmp_path / name).write_text(text.replace(old, new, 1) if name == file else text)
+        script = f". {ROOT}/scripts/common.sh && requirements {sys.executable}"
+        done = subprocess.run(["bash", "-ec", script], cwd=tmp_path, capture_output=True, text=True, check=True)
+        return done.stdout
+
+    today = requirements()
+    assert requirements("pyproject.toml", "# building\n", "# what builds\n") == today
+    assert requirements("pyproject.toml", "line-length = 120", "line-length = 100") == today
+    assert requirements("constraints.txt", "# Every", "# All and every") == today
+    assert requirements("pyproject.toml", '    "ninja",\n', "") != today
+    assert requirements("constraints.txt", "anyio==", "anyio==1.") != today
