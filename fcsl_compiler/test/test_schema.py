@@ -102,7 +102,7 @@ RICH: dict[str, Any] = {
     ],
     "requests": ["HOME"],
     "publish": ["sensor"],
-    "targets": {"simulation": {"sources": ["c/stub.c"], "include": ["c"], "libraries": ["m"]}},
+    "targets": {"simulation": {"sources": ["c/stub.c", "c/board.nim"], "include": ["c"], "libraries": ["m"]}},
     "channels": [
         {
             "name": "imu.rate",
@@ -167,6 +167,7 @@ def folder(tmp_path: Path) -> Path:
     (tmp_path / "craft.stl").write_text("solid\n")
     (tmp_path / "c").mkdir()
     (tmp_path / "c" / "stub.c").write_text("/* no extern is called */\n")
+    (tmp_path / "c" / "board.nim").write_text("# no extern is called\n")
     return tmp_path
 
 
