@@ -524,11 +524,17 @@ def test_all(fcsl_case):
 @pytest.mark.fcsl_campaign("broken.study.json")
 def test_errors(fcsl_case):
     pass
+
+@pytest.mark.fcsl_campaign("sweep.study.json")
+def test_swept(fcsl_case):
+    assert fcsl_case["gauge.parameters.bias"] in (0.0, 0.5)
 """
 
 
-def test_a_test_of_each_case(write: Write, tmp_path: Path) -> None:
+def test_a_test_of_each_case(write: Write, capsys: pytest.CaptureFixture[str]) -> None:
     write(parameters={"gauge.parameters.sigma": {"uniform": [-1.0, -0.5]}}).rename("broken.study.json")
+    swept = {"gauge.parameters.bias": {"choice": [0.0, 0.5]}, "gauge.parameters.sigma": {"choice": [0.1, 0.2, -1.0]}}
+    write(design="sweep", cases=None, parameters=swept).rename("sweep.study.json")
     write(cases=3)
     Path("test_cases.py").write_text(TEST_OF_CASES)
     line = [
@@ -541,13 +547,19 @@ def test_a_test_of_each_case(write: Write, tmp_path: Path) -> None:
         "-n0",
         "test_cases.py",
         "-k",
-        "each or all or case0",
+        "each or all or case0 or swept",
     ]
     done = subprocess.run(line, capture_output=True, text=True, timeout=300)
-    assert "1 failed, 8 passed" in done.stdout and "1 error" in done.stdout, done.stdout + done.stderr
+    assert "1 failed, 12 passed" in done.stdout and "3 errors" in done.stdout, done.stdout + done.stderr
     assert "FAILED test_cases.py::test_each[case4]" in done.stdout
     assert "test_errors[case0]" in done.stdout and "parameters.sigma must not be negative" in done.stdout
     assert "broken.study.json --cases 40 --case 0" in done.stdout
+    hints = re.findall(
+        "fcsl campaign .*sweep.study.json --case ([0-9]) --record case_[0-9]  # flies it alone", done.stdout
+    )
+    assert hints == ["2", "5"]
+    assert main(["campaign", "sweep.study.json", "--case", "5", "--record", "case_5"]) == 1
+    assert "must not be negative" in "".join(capsys.readouterr())
 
 
 def test_a_test_of_cases_names_its_study(tmp_path: Path) -> None:

@@ -78,6 +78,11 @@ class Flights:
         """Those of the study in a file. Raises SimError, TwinError or DiagnosticError."""
         return cls(read_study(path, cases))
 
+    @staticmethod
+    def cases_of(path: Path) -> int:
+        """How many the study in a file has. Raises as `of` does."""
+        return read_study(path).cases
+
     def close(self) -> None:
         self._base.close()
 

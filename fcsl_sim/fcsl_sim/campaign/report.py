@@ -4,14 +4,12 @@
 from __future__ import annotations
 
 import math
-import shlex
 from pathlib import Path
 from statistics import NormalDist
 
 import numpy as np
 
 from .case_rows import written_whole
-from .dispersion import LatinHypercube, Random
 from .page import page
 from .requirements import Requirement, requirements
 from .results import REPORT, Results
@@ -66,7 +64,7 @@ def _requirement_line(study: Study, line: Requirement) -> str:
         return f"`{line.text}`: held in all cases" + (f", at least by {size} in case {line.case}" if size else "")
     cases = "1 case" if line.failed == 1 else f"{line.failed} cases"
     worst = f"worst by {size} in" if size else "the first is"
-    return f"`{line.text}`: failed in {cases}, {worst} case {line.case}: {repeat(study, line.case)}"
+    return f"`{line.text}`: failed in {cases}, {worst} case {line.case}: {study.repeat(line.case)}"
 
 
 def _metric_lines(results: Results) -> list[str]:
@@ -91,14 +89,6 @@ def write_page(results: Results) -> Path:
     found = requirements(results)
     path = results.folder / REPORT
     with written_whole(path) as temporary:
-        text = page(results, _success(results), found, [repeat(results.study, line.case) for line in found])
+        text = page(results, _success(results), found, [results.study.repeat(line.case) for line in found])
         temporary.write_text(text, encoding="utf-8")
     return path
-
-
-def repeat(study: Study, case: int | None) -> str:
-    """The command that flies a case again, recorded; empty without a case."""
-    if case is None:
-        return ""
-    cases = f" --cases {study.cases}" if isinstance(study.design, Random | LatinHypercube) else ""
-    return f"fcsl campaign {shlex.quote(str(study.path))}{cases} --case {case} --record case_{case}"

@@ -4,6 +4,7 @@
 from __future__ import annotations
 
 import hashlib
+import shlex
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from fractions import Fraction
@@ -85,6 +86,13 @@ class Study:
     def values(self, case: int) -> tuple[Value, ...]:
         """Of the parameters, in their order; those of a number are rounded to it."""
         return self.design.values(case)
+
+    def repeat(self, case: int | None) -> str:
+        """The command that flies a case again, recorded; empty without a case."""
+        if case is None:
+            return ""
+        cases = f" --cases {self.cases}" if isinstance(self.design, Random | LatinHypercube) else ""
+        return f"fcsl campaign {shlex.quote(str(self.path))}{cases} --case {case} --record case_{case}"
 
     def expressions(self) -> list[Metric]:
         return [*self.metrics.values(), *([self.passes] if self.passes else [])]

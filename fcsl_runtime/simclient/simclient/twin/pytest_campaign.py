@@ -9,6 +9,7 @@ def test_every_landing_is_soft(fcsl_case):
 from __future__ import annotations
 
 from collections.abc import Iterator
+from functools import cache
 from pathlib import Path
 from typing import Any
 
@@ -59,17 +60,33 @@ def _named(node: Any) -> tuple[Path, int]:
         raise pytest.UsageError(f"{node.nodeid}: `fcsl_case` is the case of a study: write {_FORM}")
     path = Path(mark.args[0])
     found = path if path.is_absolute() or path.is_file() else node.path.parent / path
-    cases = mark.kwargs.get("cases")
-    if cases is None:
-        from fcsl_compiler.api.files import read_json  # here, because every pytest loads this file
-
-        try:
-            cases = read_json(found)["cases"]
-        except (OSError, ValueError, KeyError, TypeError):
-            raise pytest.UsageError(f"{node.nodeid}: {found} says no number of `cases`: write {_FORM}") from None
+    given = mark.kwargs.get("cases")
+    try:
+        cases = _cases_of(found) if given is None else given
+    except (OSError, ValueError, TypeError, ImportError) as error:
+        raise pytest.UsageError(f"{node.nodeid}: {found} does not say how many cases it has: {error}") from None
     if type(cases) is not int or cases < 1:
         raise pytest.UsageError(f"{node.nodeid}: cases={cases!r}: a number of at least 1 wanted")
     return found, cases
+
+
+@cache
+def _cases_of(study: Path) -> Any:
+    """As the file says; where the parameters say it, the simulator reads them."""
+    from fcsl_compiler.api.diagnostics import DiagnosticError  # here, because every pytest loads this file
+    from fcsl_compiler.api.files import read_json
+
+    keys = read_json(study)
+    try:
+        return keys["cases"] if "cases" in keys else _campaign().Flights.cases_of(study)
+    except DiagnosticError as error:
+        raise ValueError(str(error)) from None
+
+
+def _campaign() -> Any:
+    from ..simulation import simulation_part
+
+    return simulation_part("campaign", "fcsl_case")
 
 
 @pytest.fixture(scope="session")
@@ -84,16 +101,12 @@ def _fcsl_studies() -> Iterator[dict[tuple[Path, int], Any]]:
 @pytest.fixture
 def fcsl_case(request: pytest.FixtureRequest, _fcsl_studies: dict[tuple[Path, int], Any]) -> Case:
     """A case of the study of the mark `fcsl_campaign`, flown. A flight that ends with an error fails the test."""
-    path, cases = named = _named(request.node)
+    path, _ = named = _named(request.node)
     if named not in _fcsl_studies:
-        from ..simulation import simulation_part
-
         given = request.node.get_closest_marker(_MARK).kwargs.get("cases")
-        _fcsl_studies[named] = simulation_part("campaign", "fcsl_case").Flights.of(path, given)
+        _fcsl_studies[named] = _campaign().Flights.of(path, given)
     flights = _fcsl_studies[named]
     case = Case(flights.study, flights.fly(request.param))
     if case.verdict == "error":
-        pytest.fail(
-            f"{case}\nfcsl-sim campaign {path} --cases {cases} --case {case.case}  # flies it alone", pytrace=False
-        )
+        pytest.fail(f"{case}\n{flights.study.repeat(case.case)}  # flies it alone", pytrace=False)
     return case
