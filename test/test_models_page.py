@@ -51,8 +51,8 @@ def test_the_flight_prints_what_is_shown(folder: Path) -> None:
     speed = re.compile(r"in [\d.]+ s, \d+ times real time")
     done = subprocess.run(["bash", "-ec", commands], cwd=folder, capture_output=True, text=True, check=False)
     assert done.returncode == 0, done.stderr
-    checked, *flown = done.stdout.splitlines(keepends=True)
-    assert checked.startswith("rover.sim.json: ok")
+    machine, simulation, *flown = done.stdout.splitlines(keepends=True)
+    assert machine.startswith("rover.json: ok") and simulation.startswith("rover.sim.json: ok")
     assert speed.sub("", "".join(flown)) == speed.sub("", printed)
 
 

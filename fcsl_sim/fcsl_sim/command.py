@@ -46,16 +46,9 @@ def run_command(options: argparse.Namespace) -> int:
         status = _COMMANDS[options.command](options)
         sys.stdout.flush()
         return status
-    except DiagnosticError as error:
+    except (DiagnosticError, SimError) as error:
         _fail_as_json(options, str(error))
-        print(error, file=sys.stderr)
-        count = len(error.diagnostics)
-        print(f"fcsl-sim: {count} error{'s' if count > 1 else ''}", file=sys.stderr)
-        # One of an argument is wrong usage.
-        return EXIT_ERRORS if all(d.span.source.path for d in error.diagnostics) else EXIT_BAD_INPUT
-    except SimError as error:
-        _fail_as_json(options, str(error))
-        print(f"fcsl-sim: error: {error}", file=sys.stderr)
+        return _report(error)
     except ModuleNotFoundError as error:
         message = missing_package(error)
         _fail_as_json(options, message)
@@ -72,6 +65,18 @@ def run_command(options: argparse.Namespace) -> int:
     except KeyboardInterrupt:
         return _interrupted(options, signal.SIGINT)
     return EXIT_BAD_INPUT
+
+
+def _report(error: DiagnosticError | SimError) -> int:
+    """On standard error; returns the exit status."""
+    if isinstance(error, SimError):
+        print(f"fcsl-sim: error: {error}", file=sys.stderr)
+        return EXIT_BAD_INPUT
+    print(error, file=sys.stderr)
+    count = len(error.diagnostics)
+    print(f"fcsl-sim: {count} error{'s' if count > 1 else ''}", file=sys.stderr)
+    # One of an argument is wrong usage.
+    return EXIT_ERRORS if all(d.span.source.path for d in error.diagnostics) else EXIT_BAD_INPUT
 
 
 def _fail_as_json(options: argparse.Namespace, message: str) -> None:
@@ -97,10 +102,21 @@ def _load(options: argparse.Namespace) -> SimConfig:
 
 
 def _check(options: argparse.Namespace) -> int:
+    """Every file, whatever the others say. As JSON one document; what is known of a single file stands at its top, too."""
+    status, rows = 0, []
     for file in options.config:
-        text, facts = _checked_study(file) if file.endswith(".study.json") else _checked(file, options)
-        show(json.dumps({"ok": True, **facts}, indent=2) if options.json else f"{file}: ok: {text}")
-    return 0
+        try:
+            text, facts = _checked_study(file) if file.endswith(".study.json") else _checked(file, options)
+            rows.append({"file": file, "ok": True, **facts})
+            if not options.json:
+                show(f"{file}: ok: {text}")
+        except (DiagnosticError, SimError) as error:
+            rows.append({"file": file, "ok": False, "error": str(error)})
+            status = max(status, _report(error))
+    if options.json:
+        single = rows[0] if len(rows) == 1 else {}
+        show(json.dumps({**single, "ok": status == 0, "simulations": rows}, indent=2))
+    return status
 
 
 def _checked(file: str, options: argparse.Namespace) -> tuple[str, dict[str, object]]:

@@ -41,9 +41,9 @@ def _verb(verb: str, text: str, name: str = "") -> tuple[str, Verb]:
     return verb, Verb(_GROUP, text, partial(_command, name, verb), parser=partial(_parser, name, verb))
 
 
-def _of_simulation(verb: str, text: str) -> tuple[str, Verb]:
+def _of_simulation(verb: str, text: str, takes_files: bool = False) -> tuple[str, Verb]:
     """One that another package has too, for other files."""
-    return verb, _verb(verb, text)[1]._replace(takes=_is_simulation)
+    return verb, _verb(verb, text)[1]._replace(takes=_is_simulation, takes_files=takes_files)
 
 
 def _is_simulation(arguments: Sequence[str]) -> bool:
@@ -81,7 +81,7 @@ COMMANDS = Commands(
             _verb("response", "measure the frequency response of the loop with the compiled controller"),
             _verb("models", "list the models of installed packages and of a folder", "list-models"),
             _verb("describe", "print the fields and events of a model, and JSON to paste"),
-            _of_simulation("check", "check a simulation, run nothing"),
+            _of_simulation("check", "check a simulation, run nothing", takes_files=True),
             _of_simulation("plot", "draw a simulation"),
         ]
     ),

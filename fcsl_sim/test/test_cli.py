@@ -240,6 +240,51 @@ def test_a_study_is_no_simulation(sim_json: Path) -> None:
     assert done.stdout.count(": ok: ") == 2
 
 
+def fcsl_check(*words: str | Path) -> tuple[int, str, str]:
+    line = ["fcsl", "check", *map(str, words)]
+    done = subprocess.run(line, capture_output=True, text=True, check=False)
+    assert "Traceback" not in done.stderr, done.stderr
+    return done.returncode, done.stdout, done.stderr
+
+
+def test_a_check_of_machines_simulations_and_studies(sim_json: Path) -> None:
+    """Each file goes to its package, with the options that this knows; one exit status, and one document."""
+    machine = sim_json.parent / json.loads(sim_json.read_text())["controller"]["machine"]
+    study, sick, other = (sim_json.with_name(name) for name in ("wide.study.json", "sick.sim.json", "other.json"))
+    members = {"simulation": sim_json.name, "seed": 1, "cases": 3, "design": "random"}
+    study.write_text(json.dumps({**members, "metrics": {"length": "machine.tick"}}))
+    sick.write_text(sim_json.read_text().replace('"seed"', '"sead"'))
+    other.write_text(machine.read_text().replace('"tick_hz"', '"tick_herz"'))
+
+    status, out, err = fcsl_check(sim_json, machine, "--set", "altimeter.parameters.sigma=0.8", study)
+    assert (status, err) == (0, "")
+    assert [line.partition(": ok")[0] for line in out.splitlines()] == [str(f) for f in (machine, sim_json, study)]
+
+    status, out, err = fcsl_check("--json", machine, "--duration=0.5", sim_json, study)
+    found = json.loads(out)
+    assert (status, found["ok"], found["diagnostics"]) == (0, True, [])
+    assert [row["config"] for row in found["machines"]] == [str(machine)]
+    assert [(row["file"], row["ok"]) for row in found["simulations"]] == [(str(sim_json), True), (str(study), True)]
+    assert found["simulations"][0]["duration_s"] == 0.5 and found["simulations"][1]["cases"] == 3
+
+    for files, expected in (
+        ((machine, sick, sim_json), [[], [False, True]]),
+        ((other, sim_json), [["E201"], [True]]),
+        ((other, sick, study), [["E201"], [False, True]]),
+    ):
+        status, out, err = fcsl_check("--json", *files)
+        found = json.loads(out)
+        assert (status, found["ok"]) == (1, False)
+        codes = sorted(diagnostic["code"] for diagnostic in found["diagnostics"])
+        assert [codes, [row["ok"] for row in found["simulations"]]] == expected, files
+    assert fcsl_check(machine, sim_json.with_name("absent.sim.json"))[0] == 2
+    assert fcsl_check(sim_json.with_name("absent.json"), sim_json)[0] == 2
+    status, out, err = fcsl_check("--sarif", machine, sim_json)
+    assert status == 2 and "--sarif" in err and out == ""
+    status, _, err = fcsl_check("--nonsense", machine, sim_json)
+    assert status == 2 and "--nonsense" in err
+
+
 def test_explain_says_what_the_check_does_with_a_circle() -> None:
     page = " ".join(explain("E803", SIM_CODES).split())
     assert "algebraic loop" in page and "break the circle" not in page

@@ -25,6 +25,8 @@ class Verb(NamedTuple):
     run: Callable[[Sequence[str]], int]
     #: Whether these arguments are for this package, where another one has the same verb. None: for whatever nobody else takes.
     takes: Callable[[Sequence[str]], bool] | None = None
+    #: `takes` says it of a single file, too, and a line may name files of several packages.
+    takes_files: bool = False
     #: What parses the arguments; None: another program does.
     parser: Callable[[], ArgumentParser] | None = None
     #: Candidates of its own for the last of the words behind the verb, in the completion of shells.

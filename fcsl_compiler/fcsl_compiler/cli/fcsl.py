@@ -57,7 +57,14 @@ def _run(words: list[str]) -> int:
     if not offered:
         like = get_close_matches(name, sorted({n for p in packages for n in p.verbs}), 1)
         return _wrong(f"there is no verb `{name[:80]}`{f' (did you mean `{like[0]}`?)' if like else ''}")
-    return _chosen(offered, rest).run(rest)
+    chosen = _chosen(offered, rest)
+    if chosen.takes_files:
+        from .mixed_files import parts_of, run_parts
+
+        parts = parts_of(offered, rest)
+        if len(parts) > 1:
+            return run_parts(parts)
+    return chosen.run(rest)
 
 
 def _chosen(offered: Sequence[Verb], arguments: Sequence[str]) -> Verb:

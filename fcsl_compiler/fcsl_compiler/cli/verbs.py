@@ -71,7 +71,7 @@ COMMANDS = Commands(
     verbs=dict(
         [
             _verb("new", _MACHINES, "start a machine, an algorithm, a plant or a vehicle, with a test"),
-            _verb("check", _MACHINES, "report errors of machines, or of a simulation; write nothing"),
+            _verb("check", _MACHINES, "report errors of machines, simulations and studies; write nothing"),
             _verb("build", _MACHINES, "compile machines to a shared library, or to C only"),
             ("test", Verb(_MACHINES, "run the tests of a folder with pytest", _test)),
             _verb("cover", _MACHINES, "run tests, and report which lines and conditions of algorithms they cover"),
