@@ -4,12 +4,12 @@
 from __future__ import annotations
 
 import argparse
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from ..base.verb import Commands, Verb
+from ..base.verb import Commands, Verb, installed
 
 if TYPE_CHECKING:
     from ..base.codes.code import Code
@@ -47,8 +47,20 @@ def _parser(name: str) -> argparse.ArgumentParser:
     return command_parser(name, "fcsl")
 
 
-def _verb(name: str, group: str, text: str) -> tuple[str, Verb]:
-    return name, Verb(group, text, partial(_command, name), parser=partial(_parser, name))
+def _verb(
+    name: str, group: str, text: str, complete: Callable[[list[str]], list[str]] | None = None
+) -> tuple[str, Verb]:
+    return name, Verb(group, text, partial(_command, name), parser=partial(_parser, name), complete=complete)
+
+
+def _complete_explain(words: list[str]) -> list[str]:
+    from .explain import codes, function_names
+
+    return [] if words[-1].startswith("-") else [*codes(), *function_names()]
+
+
+def _complete_schema(words: list[str]) -> list[str]:
+    return [] if words[-1].startswith("-") else [kind for package in installed() for kind in package.schemas]
 
 
 def _codes() -> Mapping[str, Code]:
@@ -76,8 +88,13 @@ COMMANDS = Commands(
             ("test", Verb(_MACHINES, "run the tests of a folder with pytest", _test)),
             _verb("cover", _MACHINES, "run tests, and report which lines and conditions of algorithms they cover"),
             _verb("graph", _MACHINES, "draw dataflow and state machine"),
-            _verb("explain", _MACHINES, "explain a diagnostic code, with an example, or a function"),
-            _verb("schema", _MACHINES, "print the JSON Schema of a machine, a board, a simulation or a study"),
+            _verb("explain", _MACHINES, "explain a diagnostic code, with an example, or a function", _complete_explain),
+            _verb(
+                "schema",
+                _MACHINES,
+                "print the JSON Schema of a machine, a board, a simulation or a study",
+                _complete_schema,
+            ),
             (
                 "completion",
                 Verb("shell", "print a script that completes the command line", _completion, parser=_completion_parser),
