@@ -7,6 +7,7 @@ FCSL_UPDATE_GOLDEN=1 rewrites the reports that the page shows.
 import ast
 import json
 import os
+import platform
 import re
 import subprocess
 import sys
@@ -316,3 +317,44 @@ def test_the_message_is_what_the_compiler_prints(
     if os.environ.get("FCSL_UPDATE_GOLDEN"):
         DOC.write_text(DOC.read_text().replace(shown, printed))
     assert shown == printed, "FCSL_UPDATE_GOLDEN=1 rewrites it"
+
+
+def cost_as_shown() -> list[str]:
+    block = re.search(r"(?m)^    == rover, 100 Hz\n(?:    .*\n|\n)+", PAGE)
+    assert block
+    return [line.strip() for line in block[0].splitlines() if line.strip()]
+
+
+def cells(line: str) -> list[str]:
+    return re.split(r"\s{2,}|\s+…\s+", line.strip())
+
+
+@pytest.mark.skipif(platform.machine() != "x86_64", reason="the bounds are of x86-64")
+def test_the_cost_report(rover: Path) -> None:
+    """The page shows some lines and columns of the report, in order; of another compiler than the page's, all but the numbers."""
+    line = ["fcsl", "build", "rover.json", "--report", "-o", "out"]
+    printed = subprocess.run(line, cwd=rover, capture_output=True, text=True, check=True).stdout.splitlines()
+    compiler = subprocess.run([os.environ.get("CC", "cc"), "--version"], capture_output=True, text=True, check=True)
+    version = re.search(r"\(gcc (\d+);", PAGE)
+    assert version
+    is_pages = "Free Software Foundation" in compiler.stdout and f" {version[1]}." in compiler.stdout.splitlines()[0]
+
+    def same(text: str) -> str:
+        return " ".join(text.split()) if is_pages else re.sub(r"\d+", "#", " ".join(text.split()))
+
+    header = next(cells(line) for line in printed if line.startswith("instance "))
+    chosen: list[str] = []
+    rest = iter(printed)
+    for shown in cost_as_shown():
+        names = cells(shown)
+        if names[0] == "instance":
+            chosen = names
+            assert set(chosen) <= set(header)
+        elif chosen and names[0] == "math call":
+            chosen = []
+        if not chosen:
+            begin = same(shown.removesuffix("…"))
+            assert any(same(line)[: len(begin)] == begin for line in rest), shown
+        elif names[0] != "instance":
+            row = next(dict(zip(header, cells(line), strict=False)) for line in rest if cells(line)[0] == names[0])
+            assert [same(row[name]) for name in chosen] == list(map(same, names)), shown
