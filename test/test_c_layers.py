@@ -57,10 +57,10 @@ PACKAGES = {
             "src/telemetry": ("fcsl_telemetry.h",),
             "src/vars": ("fcsl_vars.h",),
             "src/expression": ("fcsl_expression.h",),
-            "src/ros": ("fcsl_outbox.h", "fcsl_ros_inlet.h", "fcsl_topics.h"),
+            "src/ros": ("fcsl_publish_queue.h", "fcsl_sample_input.h", "fcsl_topics.h"),
             "src/history": ("fcsl_histogram.h", "fcsl_history.h", "fcsl_tick_stats.h"),
             "src/run": ("fcsl_fp_mode.h", "fcsl_library.h"),
-            "src/record": ("fcsl_bag.h", "fcsl_journal.h", "fcsl_mcap_records.h"),
+            "src/record": ("fcsl_bag.h", "fcsl_write_queue.h", "fcsl_mcap_records.h"),
             "src/messages": ("fcsl_cdr.h",),
             "src/machine": (),
             "src/base": ("fcsl_run.h",),
@@ -70,7 +70,7 @@ PACKAGES = {
     "fcsl_hal": Package(
         {
             "src/hal": ("fcsl_external.h", "fcsl_hal.h", "fcsl_hw_sim.h"),
-            "src/named_values": ("fcsl_mirror.h",),
+            "src/named_values": ("fcsl_tick_publisher.h",),
             "src/transport": ("fcsl_wire.h",),
             "src/guard": ("fcsl_gate.h", "fcsl_guard.h"),
             "src/drivers": (),
@@ -101,7 +101,7 @@ PACKAGES = {
         {
             "include": (
                 *("fcsl_cover.h", "fcsl_exact_math.h", "fcsl_hw.h", "fcsl_machine.h", "fcsl_math.h"),
-                "fcsl_ros_plan.h",
+                "fcsl_ros_conversion.h",
             )
         },
         unchecked=("test", "math", "build"),

@@ -14,8 +14,8 @@ import pytest
 from rclpy.duration import Duration
 
 from fcsl_bridge.topics import mapped_topics
-from fcsl_bridge.topics.outbox_publisher import OutboxPublisher
-from simclient.ros.outbox import RunTopics
+from fcsl_bridge.topics.queue_publisher import QueuePublisher
+from simclient.ros.publish_queue import RunTopics
 from simclient.run import Run, open_run
 
 PILOT = """
@@ -83,8 +83,8 @@ def test_a_disarmed_machine_publishes_safe_values(
     publisher = Publisher()
     monkeypatch.setattr(mapped_topics.qos, "publisher", lambda *_: publisher)
     run = opened(tmp_path, **keys)
-    forward = OutboxPublisher(lossless=False)
-    messages = RunTopics(run, forward.outbox)
+    forward = QueuePublisher(lossless=False)
+    messages = RunTopics(run, forward.queue)
     mapped_topics.Outputs(None, run, forward, messages, ())  # type: ignore[arg-type]  # the node is for publishers only
     go = run.machine.fields["pilot.inputs.go"].index
     for on in (False, True, True, False):
@@ -109,8 +109,8 @@ def test_reports_are_published_armed_or_not(tmp_path: Path, monkeypatch: pytest.
     report = {**FORCE, "name": "other", "id": 2, "field": "pilot.outputs.other", "direction": "report"}
     report["ros"] = {**FORCE["ros"], "topic": "estimate"}
     run = opened(tmp_path, channels=[{**FORCE, "safe": -1.0}, report], arm="pilot.armed")
-    forward = OutboxPublisher(lossless=False)
-    messages = RunTopics(run, forward.outbox)
+    forward = QueuePublisher(lossless=False)
+    messages = RunTopics(run, forward.queue)
     outputs = mapped_topics.Outputs(None, run, forward, messages, ())  # type: ignore[arg-type]  # the node is for publishers only
     fields = run.machine.fields
     for on in (False, True, False):
@@ -137,8 +137,8 @@ def test_the_end_of_ticking_waits_once_for_all_actuators(
     monkeypatch.setattr(mapped_topics.qos, "publisher", lambda *_: publisher)
     other = {**FORCE, "name": "other", "id": 2, "field": "pilot.outputs.other"}
     run = opened(tmp_path, channels=[{**FORCE, "safe": -1.0}, {**other, "safe": -2.0}], **arm)
-    forward = OutboxPublisher(lossless=False)
-    messages = RunTopics(run, forward.outbox)
+    forward = QueuePublisher(lossless=False)
+    messages = RunTopics(run, forward.queue)
     outputs = mapped_topics.Outputs(None, run, forward, messages, ())  # type: ignore[arg-type]  # the node is for publishers only
     outputs.make_safe(0)
     assert publisher.values == published and publisher.waited_s <= 0.2

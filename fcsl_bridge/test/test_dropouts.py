@@ -50,7 +50,7 @@ def test_what_is_missing_in_mode_free_is_a_channel_and_not_its_topic() -> None:
         return data == b"good"
 
     waiting = SimpleNamespace(take_all=lambda: [b"old", b"good", b"bad"])
-    inlet = SimpleNamespace(deliver=deliver, counts=dict)
-    one: Any = mapped_topics._Input(cast(Any, None), cast(Any, None), cast(Any, inlet), cast(Any, waiting))
+    sample_input = SimpleNamespace(deliver=deliver, counts=dict)
+    one: Any = mapped_topics._Input(cast(Any, None), cast(Any, None), cast(Any, sample_input), cast(Any, waiting))
     one.poll(0, frozenset({"imu.gyro"}))
     assert delivered == [(b"bad", frozenset({"imu.gyro"})), (b"good", frozenset({"imu.gyro"}))]

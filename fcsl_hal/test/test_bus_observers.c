@@ -6,12 +6,12 @@
 #define _GNU_SOURCE
 #include "bus_rig.h"
 
-enum { OBSERVERS = 3, MIRROR_BYTES = 16000, MIRROR_RING = 1 << 18, TICKS_MIN = 50, TICKS_AFTER = 500 };
+enum { OBSERVERS = 3, PUBLISHED_BYTES = 16000, PUBLISHED_RING = 1 << 18, TICKS_MIN = 50, TICKS_AFTER = 500 };
 static const uint64_t LONGEST_NS = UINT64_C(5000000000); /* on a busy machine; a link that is closed can take 10 s */
 
 static const char *const TICK[] = {"t/tick"};
 static const char *const ANSWER[] = {"t/answer"};
-static const char *const MIRROR[] = {"t/mirror"};
+static const char *const PUBLISHED[] = {"t/published"};
 static const char *const OBSERVER[] = {"t/observer"};
 
 /* Answers every tick, until it is killed. */
@@ -36,7 +36,7 @@ static void answer(const char *endpoint)
 
 static void observe(const char *endpoint)
 {
-    const fcsl_bus_input_t inputs[] = {{.key = MIRROR[0], .bytes = MIRROR_BYTES, .depth = 1}};
+    const fcsl_bus_input_t inputs[] = {{.key = PUBLISHED[0], .bytes = PUBLISHED_BYTES, .depth = 1}};
     const fcsl_bus_options_t options = {.role = FCSL_BUS_CLIENT,
                                         .endpoint = endpoint,
                                         .timeout_ms = LONG_MS,
@@ -64,13 +64,13 @@ static fcsl_bus_t *open_control(const char *endpoint)
     return open_bus(&options);
 }
 
-static fcsl_bus_t *open_mirror(const char *endpoint)
+static fcsl_bus_t *open_publisher(const char *endpoint)
 {
     const fcsl_bus_options_t options = {.role = FCSL_BUS_LISTEN,
                                         .endpoint = endpoint,
                                         .observer = 1,
-                                        .ring_bytes = MIRROR_RING,
-                                        .outputs = MIRROR,
+                                        .ring_bytes = PUBLISHED_RING,
+                                        .outputs = PUBLISHED,
                                         .output_count = 1,
                                         .watched = OBSERVER,
                                         .watched_count = 1};
@@ -78,14 +78,14 @@ static fcsl_bus_t *open_mirror(const char *endpoint)
 }
 
 /* A tick there and back, and its copy for the observers; how long it took. */
-static uint64_t fly_tick(fcsl_bus_t *control, fcsl_bus_t *mirror, uint64_t tick)
+static uint64_t fly_tick(fcsl_bus_t *control, fcsl_bus_t *publisher, uint64_t tick)
 {
-    static const uint8_t copy[MIRROR_BYTES];
+    static const uint8_t copy[PUBLISHED_BYTES];
     uint64_t got = 0;
     const uint64_t begun_ns = fcsl_monotonic_ns();
     CHECK(fcsl_bus_post(control, 0, &tick, sizeof tick) == 0);
     for (int i = 0; i < 4; i++) {
-        (void)fcsl_bus_post(mirror, 0, copy, sizeof copy); /* refused when their ring is full */
+        (void)fcsl_bus_post(publisher, 0, copy, sizeof copy); /* refused when their ring is full */
     }
     take_one(control, 0, &got, sizeof got);
     CHECK(got == tick);
@@ -95,18 +95,18 @@ static uint64_t fly_tick(fcsl_bus_t *control, fcsl_bus_t *mirror, uint64_t tick)
 int main(void)
 {
     char control_endpoint[64];
-    char mirror_endpoint[64];
+    char publisher_endpoint[64];
     pid_t observers[OBSERVERS];
     (void)snprintf(control_endpoint, sizeof control_endpoint, "%s", free_endpoint());
-    (void)snprintf(mirror_endpoint, sizeof mirror_endpoint, "%s", free_endpoint());
+    (void)snprintf(publisher_endpoint, sizeof publisher_endpoint, "%s", free_endpoint());
     (void)in_process(answer, control_endpoint);
     for (int i = 0; i < OBSERVERS; i++) {
-        observers[i] = in_process(observe, mirror_endpoint);
+        observers[i] = in_process(observe, publisher_endpoint);
     }
     fcsl_bus_t *control = open_control(control_endpoint);
-    fcsl_bus_t *mirror = open_mirror(mirror_endpoint);
+    fcsl_bus_t *publisher = open_publisher(publisher_endpoint);
     WAIT_UNTIL(control, fcsl_bus_matched(control, 0));
-    WAIT_UNTIL(mirror, fcsl_bus_matched(mirror, 0) && fcsl_bus_alive(mirror, 0) == OBSERVERS);
+    WAIT_UNTIL(publisher, fcsl_bus_matched(publisher, 0) && fcsl_bus_alive(publisher, 0) == OBSERVERS);
     for (int i = 0; i < OBSERVERS; i++) {
         CHECK(kill(observers[i], SIGSTOP) == 0);
     }
@@ -115,15 +115,15 @@ int main(void)
     uint64_t longest_ns = 0;
     uint64_t after = 0;
     while (after < TICKS_AFTER) {
-        const uint64_t took_ns = fly_tick(control, mirror, tick++);
+        const uint64_t took_ns = fly_tick(control, publisher, tick++);
         longest_ns = took_ns > longest_ns ? took_ns : longest_ns;
-        after += fcsl_bus_alive(mirror, 0) == 0;
+        after += fcsl_bus_alive(publisher, 0) == 0;
     }
     (void)printf("%llu ticks while the observers were frozen, the longest %.2f ms\n",
                  (unsigned long long)(tick - after), (double)longest_ns * 1e-6);
     CHECK(tick - after >= TICKS_MIN && longest_ns < LONGEST_NS);
     CHECK(counted(control).refused == 0 && counted(control).received == tick);
     CHECK(fcsl_bus_close(control, CLOSE_MS) == 0);
-    (void)fcsl_bus_close(mirror, CLOSE_MS);
+    (void)fcsl_bus_close(publisher, CLOSE_MS);
     return 0;
 }

@@ -17,8 +17,8 @@ def split_path(path: str) -> tuple[str, tuple[int, ...]]:
     return whole, tuple(map(int, re.findall(r"\d+", brackets)))
 
 
-def place_of(index: Sequence[int], shape: Sequence[int]) -> int | None:
-    """Row-major place of an element, or of the first one of a row. None: the field has no such part."""
+def row_major_index(index: Sequence[int], shape: Sequence[int]) -> int | None:
+    """Row-major index of an element, or of the first one of a row. None: the field has no such part."""
     if len(index) > len(shape) or any(i >= extent for i, extent in zip(index, shape, strict=False)):
         return None
     return sum(i * math.prod(shape[axis + 1 :]) for axis, i in enumerate(index))

@@ -22,7 +22,7 @@ from simclient.errors import TwinError
 from simclient.library import bind
 from simclient.paths import resolve
 from simclient.ros.composer import Composer
-from simclient.ros.outbox import Outbox
+from simclient.ros.publish_queue import PublishQueue
 from simclient.values import Value, read_part
 
 from .errors import SimError
@@ -60,8 +60,8 @@ class _Commands(ctypes.Structure):
     _fields_ = [(name, c_uint64) for name in _COMMANDS]
 
 
-class _Place(ctypes.Structure):
-    """fcsl_sim_place_t"""
+class _RunningCall(ctypes.Structure):
+    """fcsl_sim_running_call_t"""
 
     _fields_ = (
         ("instance", ctypes.c_char * 256),
@@ -128,14 +128,14 @@ _PROTOTYPES: dict[str, tuple[type | None, list[type]]] = {
     "fcsl_sim_channel_data": (ptr, [ptr]),
     "fcsl_sim_sampled": (c_int, [ptr, c_uint32]),
     "fcsl_sim_truth_values": (c_uint32, [ptr, ptr, c_uint32]),
-    "fcsl_sim_truth_type": (c_char_p, [ptr, c_uint32]),
-    "fcsl_sim_truth_schema": (c_char_p, [ptr, c_uint32]),
-    "fcsl_sim_truth_message": (c_int64, [ptr, c_uint32, ptr, c_size_t]),
+    "fcsl_sim_model_message_type": (c_char_p, [ptr, c_uint32]),
+    "fcsl_sim_model_message_schema": (c_char_p, [ptr, c_uint32]),
+    "fcsl_sim_model_message": (c_int64, [ptr, c_uint32, ptr, c_size_t]),
     "fcsl_sim_companion_count": (c_uint32, [ptr]),
     "fcsl_sim_companion": (ptr, [ptr, c_uint32]),
     "fcsl_sim_companion_name": (c_char_p, [ptr, c_uint32]),
     "fcsl_sim_companion_state": (c_char_p, [ptr, c_uint32, POINTER(c_uint64)]),
-    "fcsl_sim_place": (c_int, [POINTER(_Place)]),
+    "fcsl_sim_running_call": (c_int, [POINTER(_RunningCall)]),
     "fcsl_sim_watch_crashes": (c_int, [c_int, c_int, _ERROR]),
     "fcsl_sim_describe_model": (c_int64, [c_char_p, c_char_p, ptr, c_size_t, _ERROR]),
     "fcsl_run_machine": (POINTER(CMachine), [ptr]),
@@ -186,7 +186,7 @@ def describe_model(library: Path, name: str) -> ModelTable:
 
 
 @dataclass(frozen=True)
-class Place:
+class RunningCall:
     """The function of a model that runs. `entry` is another number in each call; `time_s` that of the last instant."""
 
     instance: str
@@ -195,12 +195,12 @@ class Place:
     time_s: float
 
 
-def place() -> Place | None:
+def running_call() -> RunningCall | None:
     """What runs now in the simulation that was opened last; None: no function of a model. From any thread."""
-    at = _Place()
-    if not simulator_library().fcsl_sim_place(byref(at)):
+    at = _RunningCall()
+    if not simulator_library().fcsl_sim_running_call(byref(at)):
         return None
-    return Place(at.instance.decode("utf-8", "replace"), at.function.decode(), at.entry, at.time_ns / 1e9)
+    return RunningCall(at.instance.decode("utf-8", "replace"), at.function.decode(), at.entry, at.time_ns / 1e9)
 
 
 def watch_crashes(watch: bool, as_json: bool) -> None:
@@ -435,29 +435,29 @@ class Simulation:
         """Tells the controller that the run is over, and whether another one follows."""
         self._lib.fcsl_sim_end(self.handle(), int(another_follows))
 
-    def show_clock(self, outbox: Outbox, topic: int) -> None:
-        """Puts rosgraph_msgs/Clock into the outbox, in each tick of `run_together`, as the next three do with messages of
-        their own. `topic`: a number by which the outbox's reader knows it."""
-        self._check(self._lib.fcsl_sim_show_clock(self.handle(), outbox.handle, topic, byref(self._error)))
+    def show_clock(self, queue: PublishQueue, topic: int) -> None:
+        """Puts rosgraph_msgs/Clock into the publish queue, in each tick of `run_together`, as the next three do with messages of
+        their own. `topic`: a number by which the publish queue's reader knows it."""
+        self._check(self._lib.fcsl_sim_show_clock(self.handle(), queue.handle, topic, byref(self._error)))
 
-    def show_truth(self, outbox: Outbox, topic: int, head: bytes, every: int) -> None:
+    def show_truth(self, queue: PublishQueue, topic: int, head: bytes, every: int) -> None:
         """fcsl_msgs/PlantTruth in each n-th tick. head: its CDR up to the first value."""
-        where = (outbox.handle, topic, head, len(head), every)
+        where = (queue.handle, topic, head, len(head), every)
         self._check(self._lib.fcsl_sim_show_truth(self.handle(), *where, byref(self._error)))
 
     def show_instances(
-        self, outbox: Outbox, topic: int, composer: Composer, instances: Sequence[str], every: int
+        self, queue: PublishQueue, topic: int, composer: Composer, instances: Sequence[str], every: int
     ) -> None:
         """A message composed of the structs of instances, in each n-th tick."""
         numbers = (c_uint32 * len(instances))(*(self.instances[name] for name in instances))
         what = (composer.handle, composer.size, numbers, len(numbers), every)
-        self._check(self._lib.fcsl_sim_show_instances(self.handle(), outbox.handle, topic, *what, byref(self._error)))
+        self._check(self._lib.fcsl_sim_show_instances(self.handle(), queue.handle, topic, *what, byref(self._error)))
 
-    def show_channels(self, outbox: Outbox, topic: int, composer: Composer, channels: Sequence[int]) -> None:
+    def show_channels(self, queue: PublishQueue, topic: int, composer: Composer, channels: Sequence[int]) -> None:
         """A message composed of sensor channels, when one of these (by number) was sampled."""
         numbers = (c_uint32 * len(channels))(*channels)
         what = (composer.handle, composer.size, numbers, len(numbers))
-        self._check(self._lib.fcsl_sim_show_channels(self.handle(), outbox.handle, topic, *what, byref(self._error)))
+        self._check(self._lib.fcsl_sim_show_channels(self.handle(), queue.handle, topic, *what, byref(self._error)))
 
     def serve(self, address: str, token: Path | None, paused: bool, checkpoints: Path | None = None) -> str:
         """Serves all variables on a Unix socket's path or `tcp:HOST:PORT` (docs/reference/variables.md); only before the first
@@ -548,18 +548,18 @@ class Simulation:
         size = self._lib.fcsl_sim_truth_values(self.handle(), self._truth, len(self._truth) // 8)
         return ctypes.string_at(self._truth, 8 * size)
 
-    def truth_type(self, instance: str) -> str:
+    def model_message_type(self, instance: str) -> str:
         """ROS 2 type of the instance's outputs, for example `fcsl_sim/msg/LanderPlant`."""
-        return str(self._lib.fcsl_sim_truth_type(self.handle(), self.instances[instance]).decode())
+        return str(self._lib.fcsl_sim_model_message_type(self.handle(), self.instances[instance]).decode())
 
-    def truth_schema(self, instance: str) -> str:
+    def model_message_schema(self, instance: str) -> str:
         """Complete ros2msg text of that type."""
-        return str(self._lib.fcsl_sim_truth_schema(self.handle(), self.instances[instance]).decode())
+        return str(self._lib.fcsl_sim_model_message_schema(self.handle(), self.instances[instance]).decode())
 
-    def truth_message(self, instance: str) -> bytes:
+    def model_message(self, instance: str) -> bytes:
         """CDR of the instance's outputs at the last sensed tick."""
         index = self.instances[instance]
-        size = self._lib.fcsl_sim_truth_message(self.handle(), index, self._truth, len(self._truth))
+        size = self._lib.fcsl_sim_model_message(self.handle(), index, self._truth, len(self._truth))
         return ctypes.string_at(self._truth, self._check(size))
 
     def get(self, path: str) -> Scalar | list[Scalar]:

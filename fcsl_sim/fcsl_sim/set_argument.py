@@ -14,7 +14,7 @@ from fcsl_compiler.api.diagnostics import DiagnosticSink, SourceFile, Span
 from fcsl_compiler.api.json_files import ConfigReader, JsonNode, parse_json
 from fcsl_compiler.api.types import scalar_of, shape_of
 
-from .element_path import name_an_element, place_of, split_path
+from .element_path import name_an_element, row_major_index, split_path
 from .models import ModelField, type_of
 
 _OPTION = "--set"
@@ -71,7 +71,7 @@ def with_elements(
     """The value of a field, row-major, with its parts replaced. E217: there is no such element."""
     shape, changed = shape_of(target.type), list(scalars)
     for setting in settings:
-        at = place_of(setting.index, shape)
+        at = row_major_index(setting.index, shape)
         if at is None:
             fix = name_an_element(setting.path, shape)
             reader.sink.error("E217", f"`{setting.path}` is {target.type}", setting.span, help=fix)

@@ -16,7 +16,7 @@ from contextlib import suppress
 from types import TracebackType
 
 from .errors import SimError
-from .native import Simulation, place, watch_crashes
+from .native import Simulation, running_call, watch_crashes
 
 #: Between two looks.
 _LOOK_S = 0.25
@@ -59,7 +59,7 @@ class Watchdog:
         number, entry, looks = 0, -1, 0
         while not self._over.wait(_LOOK_S):
             number = self._signal() or number
-            at = place()
+            at = running_call()
             looks = looks + 1 if at is not None and at.entry == entry else 0
             entry = at.entry if at is not None else -1
             if at is not None and looks >= (_LOOKS_OF_SIGNAL if number else _LOOKS):

@@ -89,8 +89,8 @@ def library(tmp_path_factory: pytest.TempPathFactory) -> Path:
 def bags(library: Path, tmp_path_factory: pytest.TempPathFactory) -> Path:
     """A flight in lock-step over the bus, from its first tick on: `bag` of a bystander, `own` of the flight program."""
     folder = tmp_path_factory.mktemp("flight")
-    control, mirror, socket = free_endpoint(), free_endpoint(), folder / "socket"
-    line = [library, "--hal", f"zenoh:{control}", "--timeout", "30", "--observers", mirror, "--socket", socket]
+    control, observed, socket = free_endpoint(), free_endpoint(), folder / "socket"
+    line = [library, "--hal", f"zenoh:{control}", "--timeout", "30", "--observers", observed, "--socket", socket]
     with contextlib.ExitStack() as opened:
         begin = lambda *words: opened.enter_context(started(*words))  # noqa: E731
         begin("fcsl-sim", "run", SIM, "--external", f"zenoh:{control}", "--speed", "10")
@@ -98,7 +98,7 @@ def bags(library: Path, tmp_path_factory: pytest.TempPathFactory) -> Path:
         wait_until(socket.exists)
         with VarClient(socket) as client:
             client.pause()  # it answers when all is open, the observers' bus too
-            recorder = begin(*RECORD, "-c", mirror, "-o", folder / "bag")
+            recorder = begin(*RECORD, "-c", observed, "-o", folder / "bag")
             assert recorder.stdout and recorder.stdout.readline().startswith("recording lander_control to ")
             while not select.select([recorder.stdout], [], [], 0.05)[0]:
                 client.pause()  # once more: what is published then has the first checkpoint

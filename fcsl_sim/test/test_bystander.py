@@ -26,9 +26,9 @@ class Flight:
 
     def __init__(self, library: Path, folder: Path, opened: contextlib.ExitStack, speed: int):
         self._opened = opened
-        self.mirror, self.socket = free_endpoint(), folder / "socket"
+        self.observed, self.socket = free_endpoint(), folder / "socket"
         control = free_endpoint()
-        options = ["--hal", f"zenoh:{control}", "--timeout", "30", "--observers", self.mirror]
+        options = ["--hal", f"zenoh:{control}", "--timeout", "30", "--observers", self.observed]
         line = [library, *options, "--socket", self.socket, "--record", folder / "own"]
         self.begin("fcsl-sim", "run", SIM, "--external", f"zenoh:{control}", "--speed", str(speed))
         self.fc = self.begin("fcsl-fc", *line)
@@ -51,7 +51,7 @@ class Flight:
     def record(self, bag: Path) -> subprocess.Popen[str]:
         """A bystander, whose checkpoint has come. The flight waits while it starts."""
         with self.paused():
-            recorder = self.begin(*RECORD, "-c", self.mirror, "-o", bag)
+            recorder = self.begin(*RECORD, "-c", self.observed, "-o", bag)
             assert recorder.stdout
             assert recorder.stdout.readline() == f"recording lander_control to {bag}\n"
         assert recorder.stdout.readline().startswith("lander_control: reproduces the run from tick ")

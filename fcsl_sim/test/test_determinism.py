@@ -35,7 +35,7 @@ def digest(sim: Simulation) -> str:
         while sim.status == "running":
             sim.run(1)
             for name in sorted(sim.instances):
-                total.update(sim.truth_message(name))
+                total.update(sim.model_message(name))
             total.update(sim.machine_value("pilot.outputs.pos_z").hex().encode())
     return total.hexdigest()
 

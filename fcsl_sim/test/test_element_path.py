@@ -6,7 +6,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from fcsl_sim.element_path import place_of, split_path
+from fcsl_sim.element_path import row_major_index, split_path
 
 
 @pytest.mark.parametrize(
@@ -28,7 +28,7 @@ def test_elements_are_counted_row_by_row() -> None:
     numbers = np.arange(24).reshape(2, 3, 4)
     for size in range(4):
         for index in np.ndindex(*numbers.shape[:size]):
-            assert place_of(index, numbers.shape) == numbers[index].flat[0]
+            assert row_major_index(index, numbers.shape) == numbers[index].flat[0]
     for beyond in ((2,), (0, 3), (1, 2, 4), (0, 0, 0, 0)):
-        assert place_of(beyond, numbers.shape) is None
-    assert place_of((), ()) == 0 and place_of((0,), ()) is None
+        assert row_major_index(beyond, numbers.shape) is None
+    assert row_major_index((), ()) == 0 and row_major_index((0,), ()) is None

@@ -103,12 +103,12 @@ def test_init_refuses_a_parameter(open_sim: Open) -> None:
         open_sim(change)
 
 
-def test_truth_messages(open_sim: Open) -> None:
+def test_model_messages(open_sim: Open) -> None:
     with open_sim() as sim:
         sim.run(42)
-        assert sim.truth_type("ramp") == "fcsl_sim/msg/Ramp"
-        assert sim.truth_type("altimeter") == "fcsl_sim/msg/NoisySensor"
-        own, *dependencies = sim.truth_schema("ramp").split("=" * 80 + "\n")
+        assert sim.model_message_type("ramp") == "fcsl_sim/msg/Ramp"
+        assert sim.model_message_type("altimeter") == "fcsl_sim/msg/NoisySensor"
+        own, *dependencies = sim.model_message_schema("ramp").split("=" * 80 + "\n")
         assert own == (
             "std_msgs/Header header\n"
             "float64 x  # [m] position\n"
@@ -119,7 +119,7 @@ def test_truth_messages(open_sim: Open) -> None:
             "MSG: std_msgs/Header",
             "MSG: builtin_interfaces/Time",
         ]
-        message = sim.truth_message("ramp")
+        message = sim.model_message("ramp")
         head = struct.pack("<4B iI I B 3x", 0, 1, 0, 0, 0, 410_000_000, 1, 0)
         assert message == head + struct.pack("<ddq", sim.get("ramp.outputs.x"), 1.0, 410_000_000)
 

@@ -76,14 +76,14 @@ def test_frozen_observers_change_nothing(tmp_path: Path) -> None:
     stays open and full. A flight that waited for that one would not end in time."""
     run("fcslc", "build", MACHINE, "-o", tmp_path)
     run("fcsl-sim", "run", SIM, "--record", tmp_path / "alone")
-    control, mirror = free_endpoint(), free_endpoint()
+    control, observed = free_endpoint(), free_endpoint()
     summary, bag = tmp_path / "summary.json", tmp_path / "bag"
-    options = ["--hal", f"zenoh:{control}", "--timeout", "30", "--observers", mirror]
+    options = ["--hal", f"zenoh:{control}", "--timeout", "30", "--observers", observed]
     with contextlib.ExitStack() as stack:
         begin = lambda *line: stack.enter_context(started(*line))  # noqa: E731
         simulator = begin("fcsl-sim", "run", SIM, "--external", f"zenoh:{control}", "--speed", str(SPEED), "--json")
         observers = [
-            begin(sys.executable, "-c", OBSERVER, zenoh_locator(mirror), lease_ms)
+            begin(sys.executable, "-c", OBSERVER, zenoh_locator(observed), lease_ms)
             for lease_ms in ("1000", "1000", "600000")
         ]
         fc = begin("fcsl-fc", tmp_path / "liblander_control.so", *options, "--record", bag, "--summary", summary)

@@ -18,7 +18,7 @@ from rclpy.serialization import deserialize_message
 
 from fcsl_msgs.msg import TransitionEvent
 from simclient.errors import TwinError
-from simclient.ros.outbox import RunTopics
+from simclient.ros.publish_queue import RunTopics
 from simclient.run import open_run
 
 from ..base.machine_index import find_machine
@@ -28,7 +28,7 @@ from ..services.machine_services import Allowed, MachineServices
 from ..services.parameters import MachineParameters
 from ..topics.machine_topics import MachineTopics
 from ..topics.mapped_topics import Outputs
-from ..topics.outbox_publisher import OutboxPublisher
+from ..topics.queue_publisher import QueuePublisher
 from ..topics.tf import StaticFrames
 
 
@@ -62,9 +62,9 @@ class ConfiguredMachine:
         self.run.attach()
         self._initial = self.run.save()
         # Outside lock-step one thread puts and publishes: it must not wait for itself.
-        self.forward = OutboxPublisher(lossless=self._lossless and options["wait_for_subscribers"] > 0)
+        self.forward = QueuePublisher(lossless=self._lossless and options["wait_for_subscribers"] > 0)
         self._stack.callback(self.forward.close)
-        self.messages = RunTopics(self.run, self.forward.outbox)
+        self.messages = RunTopics(self.run, self.forward.queue)
         self._stack.callback(self.messages.close)
         self.outputs = Outputs(node, self.run, self.forward, self.messages, options["tf"] or ())
         self._stack.callback(self.outputs.close)
@@ -138,7 +138,7 @@ class ConfiguredMachine:
     def troubles(self) -> dict[str, int]:
         return {
             "records dropped": self.run.record_dropped(),
-            "messages dropped": self.forward.outbox.dropped,
+            "messages dropped": self.forward.queue.dropped,
             "hardware failures": self.run.hardware_failures(),
         }
 

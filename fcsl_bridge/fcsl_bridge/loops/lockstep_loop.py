@@ -19,7 +19,7 @@ from simclient.ros.lockstep import Lockstep
 from ..base.bus_address import endpoint
 from ..diagnostics.machine_status import Figures
 from ..errors import BridgeError
-from ..topics.outbox_publisher import NativeThread
+from ..topics.queue_publisher import NativeThread
 from .configured_machine import ConfiguredMachine
 
 #: How long native code runs before the node's callbacks are served, in ms.
@@ -39,7 +39,7 @@ class LockstepLoop:
         self._node, self._configured, self._serve_node = node, configured, serve
         self._endpoint = endpoint(options["bus"])
         where = (f"zenoh:{self._endpoint}", node.get_namespace())
-        self._lockstep = Lockstep(configured.run, configured.messages, configured.forward.outbox, *where)
+        self._lockstep = Lockstep(configured.run, configured.messages, configured.forward.queue, *where)
         self._native = NativeThread(configured.forward)
         self._start_timeout_s, self._timeout_s = options["start_timeout_s"], options["timeout_s"]
         self._timeout_ms = int(1000 * self._timeout_s)

@@ -44,7 +44,7 @@ from ..simulator.sim_progress import Progress
 from ..simulator.sim_topics import below
 from ..simulator.sim_vehicle import Vehicle
 from ..topics import qos, tf
-from ..topics.outbox_publisher import NativeThread, OutboxPublisher
+from ..topics.queue_publisher import NativeThread, QueuePublisher
 
 OPTIONS = (
     Option("sim", str, None, "the path of a *.sim.json, or package://<package>/<path below its share folder>"),
@@ -77,7 +77,7 @@ class Simulator:
         self._endpoint = endpoint(options["bus"])
         self._housekeeping = Housekeeping(node, stop)
         self._control = Control(node, self._housekeeping, options["speed"], options["paused"])
-        self._forward = OutboxPublisher(lossless=options["wait_for_subscribers"] > 0)
+        self._forward = QueuePublisher(lossless=options["wait_for_subscribers"] > 0)
         self._native = NativeThread(self._forward)
         self._vehicles: list[Vehicle] = []
         self._clock = qos.publisher(node, Clock, "/clock", qos.STREAM)
@@ -94,7 +94,7 @@ class Simulator:
             self.close()
             raise
         self._machine = self._vehicles[0].sim.machine
-        self._progress = Progress(node, self._machine, self._forward.outbox)
+        self._progress = Progress(node, self._machine, self._forward.queue)
         self._tick = 0
 
     def close(self) -> None:
@@ -143,7 +143,7 @@ class Simulator:
             self._progress.tell(self._tick, self._control, self._vehicles)
 
     def _begin_run(self) -> None:
-        self._vehicles[0].sim.show_clock(self._forward.outbox, self._clock_topic)
+        self._vehicles[0].sim.show_clock(self._forward.queue, self._clock_topic)
         for vehicle in self._vehicles:
             vehicle.topics.show(vehicle.sim)
             vehicle.listen()

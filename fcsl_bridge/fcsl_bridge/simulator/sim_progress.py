@@ -10,7 +10,7 @@ from diagnostic_msgs.msg import DiagnosticArray, DiagnosticStatus
 from rclpy.node import Node
 
 from simclient.descriptor import Machine
-from simclient.ros.outbox import Outbox
+from simclient.ros.publish_queue import PublishQueue
 
 from ..diagnostics.diagnostic_status import Figures, make_status
 from ..topics import qos
@@ -37,8 +37,8 @@ class Progress:
     """Real time counts from the first tick of a run to the last answer, without the waits for the controller and for
     subscribers."""
 
-    def __init__(self, node: Node, machine: Machine, outbox: Outbox):
-        self._outbox = outbox
+    def __init__(self, node: Node, machine: Machine, queue: PublishQueue):
+        self._queue = queue
         self._name, self._machine = node.get_fully_qualified_name()[1:], machine
         self._publisher = qos.publisher(node, DiagnosticArray, "/diagnostics", qos.EVENT)
         self._begun = self._printed = self._published = 0.0
@@ -79,7 +79,7 @@ class Progress:
             "real time factor": f"{factor:.3f}",
             "speed": control.speed,
             "tick": self._tick,
-            "messages dropped": self._outbox.dropped,
+            "messages dropped": self._queue.dropped,
         }
         level, text = verdict(control, self._tick, factor)
         message = DiagnosticArray(status=[make_status(self._name, level, text, "simulation", figures)])

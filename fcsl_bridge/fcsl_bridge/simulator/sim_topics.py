@@ -6,7 +6,7 @@
     /tf             tf2_msgs/TFMessage       poses of truth topics, of those that are chosen
     sensor topics   standard messages        the machine's mapped sensor channels, when the simulation samples one of them
 
-The simulation composes the messages in each tick, and puts them into the outbox.
+The simulation composes the messages in each tick, and puts them into the publish queue.
 """
 
 from __future__ import annotations
@@ -21,7 +21,7 @@ from simclient.ros.topics import composer_of, topics_of
 
 from ..topics import qos, tf
 from ..topics.interfaces import message_class
-from ..topics.outbox_publisher import OutboxPublisher
+from ..topics.queue_publisher import QueuePublisher
 
 
 def below(name_space: str, topic: str) -> str:
@@ -46,9 +46,9 @@ class SimTopics:
         name_space: str,
         decimate: int,
         chosen: tf.Chosen,
-        forward: OutboxPublisher,
+        forward: QueuePublisher,
     ):
-        self._decimate, self._outbox = decimate, forward.outbox
+        self._decimate, self._queue = decimate, forward.queue
         self.plant_publisher = qos.publisher(node, PlantTruth, below(name_space, "sim/truth"), qos.STREAM)
         self._plant = forward.add(self.plant_publisher)
         self._truth = []
@@ -69,10 +69,10 @@ class SimTopics:
                 self._sensors.append((forward.add(publisher), composer_of(mapped), channels))
 
     def show(self, sim: Simulation) -> None:
-        """Makes the simulation, which has made no tick, put the messages of each tick into the outbox. Keep this object as long
+        """Makes the simulation, which has made no tick, put the messages of each tick into the publish queue. Keep this object as long
         as it does."""
         for number, composer, channels in self._sensors:
-            sim.show_channels(self._outbox, number, composer, channels)
-        sim.show_truth(self._outbox, self._plant, _head(sim.truth_names()), self._decimate)
+            sim.show_channels(self._queue, number, composer, channels)
+        sim.show_truth(self._queue, self._plant, _head(sim.truth_names()), self._decimate)
         for number, composer, instances in self._truth:
-            sim.show_instances(self._outbox, number, composer, instances, self._decimate)
+            sim.show_instances(self._queue, number, composer, instances, self._decimate)

@@ -8,7 +8,7 @@ from rclpy.node import Node
 from fcsl_sim.config import SimConfig
 from fcsl_sim.native import Simulation
 
-from ..topics.outbox_publisher import OutboxPublisher
+from ..topics.queue_publisher import QueuePublisher
 from ..topics.tf import Chosen
 from .sim_topics import SimTopics
 
@@ -25,7 +25,7 @@ class Vehicle:
         chosen: Chosen,
         address: str,
         timeout_s: float,
-        forward: OutboxPublisher,
+        forward: QueuePublisher,
     ):
         self.name_space = name_space
         self._config, self._address, self._timeout_ms = config, address, int(1000 * timeout_s)

@@ -1,6 +1,6 @@
 # SPDX-License-Identifier: Apache-2.0
 """A configured machine as ROS 2 topics. The runtime makes the messages, the same that it records, at the ticks at which they are
-due, and puts them into the outbox.
+due, and puts them into the publish queue.
 
 Topics below the node's namespace, all stamped with the time of the tick (time_ns below; in lock-step the machine's own time):
     <machine>/<instance>      its generated message       each tick, or each n-th with decimation; of published instances
@@ -19,13 +19,13 @@ from rclpy.node import Node
 from rclpy.publisher import Publisher
 
 from fcsl_msgs.msg import FaultCounters, InstanceHealth, MachineState, TransitionEvent
-from simclient.ros.outbox import RunTopics
+from simclient.ros.publish_queue import RunTopics
 from simclient.run import Run
 
 from ..base.node_main import wait_for_receivers
 from . import qos
 from .interfaces import instance_class
-from .outbox_publisher import OutboxPublisher
+from .queue_publisher import QueuePublisher
 
 #: Latched topics, and their types.
 _LATCHED = {"state": MachineState, "health": InstanceHealth, "faults": FaultCounters}
@@ -46,7 +46,7 @@ class MachineTopics:
         node: Node,
         run: Run,
         decimation: int,
-        forward: OutboxPublisher,
+        forward: QueuePublisher,
         messages: RunTopics,
         transition: Callable[[bytes], None],
     ):

@@ -11,15 +11,15 @@ from typing import Any
 from rclpy.node import Node
 
 from simclient.ros import frame_names
-from simclient.ros.outbox import RunTopics
-from simclient.ros.topics import Inlet, RosTopic, composer_of, sources_of, topics_of
+from simclient.ros.publish_queue import RunTopics
+from simclient.ros.topics import RosTopic, SampleInput, composer_of, sources_of, topics_of
 from simclient.run import Run
 
 from ..base.node_main import wait_for_receivers
 from ..base.polling import Polled
 from . import qos, tf
 from .interfaces import message_class
-from .outbox_publisher import OutboxPublisher
+from .queue_publisher import QueuePublisher
 
 #: For all receivers together to have the last commands.
 _SAFE_WAIT_S = 0.2
@@ -38,17 +38,19 @@ class Inputs:
     def __init__(self, node: Node, run: Run):
         self._node = node
         topics = [topic for topic in topics_of(run.machine) if topic.direction == "sensor"]
-        ready = [(topic, Inlet(run, topic), message_class(topic.type)) for topic in topics]
-        self._inlets = [_Input(node, t, inlet, Polled(node, kind, t.name, qos.SENSOR)) for t, inlet, kind in ready]
+        ready = [(topic, SampleInput(run, topic), message_class(topic.type)) for topic in topics]
+        self._inputs = [
+            _Input(node, t, sample_input, Polled(node, kind, t.name, qos.SENSOR)) for t, sample_input, kind in ready
+        ]
 
     def poll(self, now_ns: int, missing: frozenset[str]) -> None:
         """Delivers received messages for the next tick. now_ns: ROS time. Channels in `missing` get nothing."""
-        for one in self._inlets:
+        for one in self._inputs:
             one.poll(now_ns, missing)
 
     def forget(self) -> None:
         """Drops all received messages, which are too old."""
-        for one in self._inlets:
+        for one in self._inputs:
             one.forget()
 
     def figures(self) -> dict[str, int]:
@@ -57,15 +59,15 @@ class Inputs:
 
     def troubles(self) -> dict[str, int]:
         """Numbers of refused messages, by reason; and how often a topic was found to have several publishers."""
-        for one in self._inlets:
+        for one in self._inputs:
             one.contested += one.topic.type != _SHARED and self._node.count_publishers(one.name) > 1
-        contested = {f"hal.{one.topic.name} has several publishers": one.contested for one in self._inlets}
+        contested = {f"hal.{one.topic.name} has several publishers": one.contested for one in self._inputs}
         return self._counts(lambda reason: reason not in _HARMLESS) | contested
 
     def warn_of_other_clocks(self, clock: str) -> None:
         """Logs once for each topic whose stamps are far from ROS time, which is that of `clock`, at two calls in succession:
         a clock may have been set between them."""
-        for one in self._inlets:
+        for one in self._inputs:
             one.odd = one.odd + 1 if abs(one.behind_ns) > _OTHER_CLOCK_NS else 0
             if one.odd == 2 and not one.warned:
                 one.warned = True
@@ -78,23 +80,23 @@ class Inputs:
     def _counts(self, wanted: Callable[[str], bool]) -> dict[str, int]:
         return {
             f"hal.{one.topic.name} {reason}": count
-            for one in self._inlets
+            for one in self._inputs
             for reason, count in one.counts().items()
             if wanted(reason)
         }
 
     def close(self) -> None:
-        for one in self._inlets:
+        for one in self._inputs:
             one.close()
 
 
-#: Counts of an inlet that do not indicate a problem.
+#: Counts of a sample input that do not indicate a problem.
 _HARMLESS = ("taken", "superseded")
 
 
 class _Input:
-    def __init__(self, node: Node, topic: RosTopic, inlet: Inlet, polled: Polled):
-        self._node, self.topic, self._inlet, self._polled = node, topic, inlet, polled
+    def __init__(self, node: Node, topic: RosTopic, sample_input: SampleInput, polled: Polled):
+        self._node, self.topic, self._samples, self._polled = node, topic, sample_input, polled
         self._frame_told = False
         self._superseded = self.contested = 0
         self.odd, self.warned = 0, False
@@ -107,15 +109,15 @@ class _Input:
     @property
     def behind_ns(self) -> int:
         """How far the newest stamp lay behind ROS time."""
-        return self._inlet.behind_ns
+        return self._samples.behind_ns
 
     def poll(self, now_ns: int, missing: frozenset[str]) -> None:
         waiting = self._polled.take_all()
         while waiting:
             message = waiting.pop()
-            if self._inlet.deliver(message, now_ns, missing):
+            if self._samples.deliver(message, now_ns, missing):
                 break
-            if not self._frame_told and "frame" in self._inlet.counts():
+            if not self._frame_told and "frame" in self._samples.counts():
                 self._frame_told = True
                 self._tell_frame(message)
         self._superseded += len(waiting)
@@ -130,7 +132,7 @@ class _Input:
             pass
 
     def counts(self) -> dict[str, int]:
-        counts = self._inlet.counts()
+        counts = self._samples.counts()
         return counts | {"superseded": counts.get("superseded", 0) + self._superseded}
 
     def close(self) -> None:
@@ -141,7 +143,7 @@ class Outputs:
     """Topics of actuators and reports, published at every tick: of actuators their safe values while the machine is
     disarmed. `chosen`: those whose poses go to /tf, too."""
 
-    def __init__(self, node: Node, run: Run, forward: OutboxPublisher, messages: RunTopics, chosen: Sequence[str]):
+    def __init__(self, node: Node, run: Run, forward: QueuePublisher, messages: RunTopics, chosen: Sequence[str]):
         self._node, self._run, self._messages = node, run, messages
         topics = [topic for topic in topics_of(run.machine) if topic.direction != "sensor"]
         ready = [(t, composer_of(t), message_class(t.type)) for t in topics]

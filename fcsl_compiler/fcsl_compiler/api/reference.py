@@ -4,11 +4,11 @@
 from ..driver.externs import build_externs
 from ..driver.passes import compile_machine
 from ..reference.externs import externs_of
-from ..reference.fault_places import Place
+from ..reference.fault_places import FaultRow
 from ..reference.machine import ReferenceMachine
 
 __all__ = [
-    "Place",
+    "FaultRow",
     "ReferenceMachine",
     "build_externs",
     "compile_machine",

@@ -1,30 +1,30 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Standard ROS 2 messages, and plans by which C reads and makes them."""
+"""Standard ROS 2 messages, and conversions by which C reads and makes them."""
 
-from ..ros.composer import Source, composer_plan
+from ..ros.composer import Source, composer_conversion
+from ..ros.conversion import ComposerConversion, ConversionError, ReaderConversion, Term
 from ..ros.message_fields import QUATERNION_AXES, VECTOR_AXES, Kind
-from ..ros.plan import ComposerPlan, PlanError, ReaderPlan, Term
-from ..ros.reader import Pick, has_stamp, reader_plan
+from ..ros.reader import Pick, has_stamp, reader_conversion
 from ..ros.rows import select_all
 from ..ros.standard_messages import STANDARD, Definitions, Member, full_name, short_name
 
 __all__ = [
-    "ComposerPlan",
+    "ComposerConversion",
     "Definitions",
     "Kind",
     "Member",
     "Pick",
-    "PlanError",
+    "ConversionError",
     "QUATERNION_AXES",
-    "ReaderPlan",
+    "ReaderConversion",
     "STANDARD",
     "Source",
     "Term",
     "VECTOR_AXES",
-    "composer_plan",
+    "composer_conversion",
     "full_name",
     "has_stamp",
-    "reader_plan",
+    "reader_conversion",
     "select_all",
     "short_name",
 ]

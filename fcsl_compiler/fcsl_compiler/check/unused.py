@@ -124,7 +124,7 @@ class _Uses:
         while isinstance(root, ast.Attribute | ast.Subscript) and not _is_field(root):
             root = root.value
         if isinstance(root, ast.Name):
-            if (root.lineno, root.col_offset) < _place(self.bound.get(root.id)):
+            if (root.lineno, root.col_offset) < _location(self.bound.get(root.id)):
                 self.bound[root.id] = root
             if isinstance(by.value, ast.Call) or (isinstance(by, ast.Assign) and target not in by.targets):
                 self.given.add(root.id)
@@ -139,7 +139,7 @@ def _flat(targets: Iterable[ast.expr]) -> Iterable[ast.expr]:
         yield from target.elts if isinstance(target, ast.Tuple | ast.List) else (target,)
 
 
-def _place(node: ast.Name | None) -> tuple[float, float]:
+def _location(node: ast.Name | None) -> tuple[float, float]:
     return (node.lineno, node.col_offset) if node is not None else (float("inf"), 0)
 
 

@@ -14,8 +14,8 @@ from ..model.literals import round_f32
 from ..model.machine import Channel, RosMapping, Values
 from ..model.types import REQUEST, Array, Scalar, Type, count_of, scalar_of
 from ..ros.channels import by_topic, message_of
+from ..ros.conversion import ConversionError
 from ..ros.message_fields import FieldError, Kind, Selection, numbers_text, select
-from ..ros.plan import PlanError
 from ..ros.standard_messages import SIZES, STANDARD, SUPPORTED, full_name, short_name
 
 #: Unit spellings, converted to those of the message table.
@@ -49,7 +49,7 @@ def check_channels(channels: Iterable[Channel], sink: DiagnosticSink) -> None:
     for parts in by_topic(channels):
         try:
             message_of(parts)
-        except PlanError as error:
+        except ConversionError as error:
             text = f"the message of topic `{parts[0].ros.topic}`: {error}"
             fix = "map fewer numbers to it, or give some another `topic`"
             sink.error("E241", text, _mapped(parts[0]).at("field"), help=fix)

@@ -11,7 +11,7 @@ from ..base.files import SourceError, digest
 from ..base.source import SourceFile, Span
 from .counts import Counts
 from .mcdc import MAX_CONDITIONS, Tree, conditions, outcome_with, required, shown
-from .probe_map import Decision, FileMap, Loop, Place
+from .probe_map import Decision, FileMap, Location, Loop
 
 KINDS = ("line", "branch", "mcdc")
 NAMES = {"line": "lines", "branch": "branches", "mcdc": "MC/DC"}
@@ -86,11 +86,11 @@ class _Reader:
         shares = {"line": lines, "branch": branch, "mcdc": mcdc}
         return FileFigures(self.file, self.changed, shares, tuple(misses), tuple(constants))
 
-    def _span(self, at: Place) -> Span:
+    def _span(self, at: Location) -> Span:
         return Span(self.source, *at)
 
-    def _line_of(self, at: Place) -> int:
-        """The line of the statement that contains a place."""
+    def _line_of(self, at: Location) -> int:
+        """The line of the statement that contains a location."""
         return max((line for line in self.file.lines if line <= at[0]), default=at[0])
 
     # ---- lines -----------------------------------------------------------------------------------------------------
@@ -146,7 +146,7 @@ class _Reader:
             if number not in met and number not in decision.constant:
                 yield self._of_condition(decision, number, at, set(pairs[number]))
 
-    def _of_condition(self, decision: Decision, number: int, at: Place, seen: set[bool]) -> Miss:
+    def _of_condition(self, decision: Decision, number: int, at: Location, seen: set[bool]) -> Miss:
         missing = [value for value in (True, False) if value not in seen]
         message = " and never ".join(map(str, missing))
         text = f"{self._named(at)} was never {message} while the decision's outcome depended on it"
@@ -183,7 +183,7 @@ class _Reader:
 
     def _constants(self, decision: Decision) -> list[Miss]:
         found = [self._span(decision.conditions[n]) for n in decision.constant]
-        return [Miss("constant", s, f"{self._named(_place(s))} is a constant in this machine") for s in found]
+        return [Miss("constant", s, f"{self._named(_location(s))} is a constant in this machine") for s in found]
 
     def _of_loop(self, loop: Loop) -> Iterator[Miss]:
         for offset, message in ((0, "this loop never ran an iteration"), (1, "this loop always ran an iteration")):
@@ -192,8 +192,8 @@ class _Reader:
                     "branch", replace(self._span(loop.at), end_line=loop.at[0], end_column=loop.at[1] + 3), message
                 )
 
-    def _named(self, at: Place) -> str:
-        """The Python text of a place, on one line, in quotes."""
+    def _named(self, at: Location) -> str:
+        """The Python text of a location, on one line, in quotes."""
         if self.changed:
             return f"the code at {at[0]}:{at[1]}"
         lines = [self.source.line(n) for n in range(at[0], at[2] + 1)]
@@ -202,7 +202,7 @@ class _Reader:
         return f"`{' '.join(' '.join(line.split('#')[0] for line in lines).split())}`"
 
 
-def _place(span: Span) -> Place:
+def _location(span: Span) -> Location:
     return (span.line, span.column, span.end_line, span.end_column)
 
 

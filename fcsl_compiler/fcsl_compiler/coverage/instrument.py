@@ -1,7 +1,7 @@
 # SPDX-License-Identifier: Apache-2.0
 """The coverage pass: adds probes that record which lines, outcomes and conditions of algorithms have run.
 
-It works on checked IR, where every node has its place in the Python text. It runs before frozen parameters are folded,
+It works on checked IR, where every node has its location in the Python text. It runs before frozen parameters are folded,
 so that all instances have the same conditions. Probes are calls of the functions in probes.py: a statement for a line,
 and an identity on bool for a condition or a decision. They do not read or write the machine, and its results stay
 bit-identical (test_cover.py compares them). Probes have effects, so this pass is the last.
@@ -21,7 +21,7 @@ from ..check.intervals import interval
 from ..model import ir, ops
 from ..model.machine import Instance, Machine
 from ..model.types import BOOL, I64, U64
-from .probe_map import CoverMap, Decision, FileMap, Loop, place
+from .probe_map import CoverMap, Decision, FileMap, Loop, location
 from .probes import CONDITION, DECIDED, LINE, LOOP, SOUND
 
 _COMPARISONS = frozenset(("<", "<=", ">", ">=", "==", "!="))
@@ -95,7 +95,7 @@ class _Instrumenter:
         out: list[ir.Stmt] = []
         for s in statements:
             if s.span.line not in self.file.lines:
-                self.file.lines[s.span.line] = (place(s.span), self._take(1))
+                self.file.lines[s.span.line] = (location(s.span), self._take(1))
             word = self.file.lines[s.span.line][1]
             out.append(_probe(LINE, (_number(word, s.span), self._sound(s.span)), s.span))
             if isinstance(s, ir.For) and s.body and not _always_runs(s):
@@ -104,7 +104,7 @@ class _Instrumenter:
         return tuple(out)
 
     def _loop(self, s: ir.For) -> ir.Stmt:
-        at = place(s.span)
+        at = location(s.span)
         if at not in self.file.loops:
             self.file.loops[at] = Loop(at, self._take(2))
         operator = ops.find("<" if s.step > 0 else ">", (I64, I64))
@@ -134,11 +134,11 @@ class _Instrumenter:
         return _rebuilt(e, self._expr)
 
     def _decision(self, e: ir.Expr, *, branch: bool) -> ir.Expr:
-        at = place(e.span)
+        at = location(e.span)
         if at not in self.file.decisions:
             leaves: list[Span] = []
             tree = _tree(e, leaves)
-            made = Decision(at, branch, tree, tuple(map(place, leaves)), self.map.word_count)
+            made = Decision(at, branch, tree, tuple(map(location, leaves)), self.map.word_count)
             self._take(made.words)
             self.file.decisions[at] = made
         decision = self.file.decisions[at]
@@ -217,7 +217,7 @@ def _operator(e: ir.Expr) -> str:
 
 
 def _tree(e: ir.Expr, leaves: list[Span], whole: Span | None = None) -> Any:
-    """The decision as an mcdc.Tree. Appends the places of its conditions. `whole`: the chain that e is a part of."""
+    """The decision as an mcdc.Tree. Appends the locations of its conditions. `whole`: the chain that e is a part of."""
     if isinstance(e, ir.Let):
         return _tree(e.body, leaves, whole)
     operator = _operator(e)

@@ -17,14 +17,14 @@ MAP_VERSION = 1
 MAX_WORDS = 1 << 22
 _MAX_DEPTH = 200
 
-Place = tuple[int, int, int, int]  # line, column, end line, end column, as in Span
+Location = tuple[int, int, int, int]  # line, column, end line, end column, as in Span
 
 
 class CoverError(ValueError):
     """A file without valid coverage, or a command that cannot measure it. str() names the file and the reason."""
 
 
-def place(span: Span) -> Place:
+def location(span: Span) -> Location:
     return (span.line, span.column, span.end_line, span.end_column)
 
 
@@ -37,10 +37,10 @@ class Decision:
     `slots` combinations (mcdc.Vector). A single condition needs no slots, because the outcomes are sufficient.
     """
 
-    at: Place
+    at: Location
     branch: bool
     tree: Tree
-    conditions: tuple[Place, ...]
+    conditions: tuple[Location, ...]
     word: int
     constant: tuple[int, ...] = ()  # conditions with one value in every instance
 
@@ -59,7 +59,7 @@ class Decision:
 class Loop:
     """A `for` loop that may run no iteration. Words: 1 if it ran one, 1 if it ran none."""
 
-    at: Place
+    at: Location
     word: int
 
 
@@ -71,9 +71,9 @@ class FileMap:
     path: str
     digest: str  # SHA-256 of its text
     algorithms: list[str]  # algorithms whose classes it contains
-    lines: dict[int, tuple[Place, int]] = field(default_factory=dict)  # line to its first statement and its word
-    decisions: dict[Place, Decision] = field(default_factory=dict)
-    loops: dict[Place, Loop] = field(default_factory=dict)
+    lines: dict[int, tuple[Location, int]] = field(default_factory=dict)  # line to its first statement and its word
+    decisions: dict[Location, Decision] = field(default_factory=dict)
+    loops: dict[Location, Loop] = field(default_factory=dict)
 
 
 @dataclass
@@ -126,18 +126,18 @@ def _read_file(data: Any, count: int, taken: set[int]) -> FileMap:
     algorithms = [_text(a) for a in _list(data["algorithms"])]
     made = FileMap(_text(data["name"]), _text(data["path"]), _text(data["digest"]), algorithms)
     for row in _list(data["lines"]):
-        at = _place(row[:4])
+        at = _location(row[:4])
         made.lines[at[0]] = (at, _words(row[4], 1, count, taken))
     for row in _list(data["decisions"]):
-        at, tree, places = _place(row[:4]), _tree(row[5], 0), tuple(map(_place, _list(row[6])))
-        if conditions(tree) != list(range(len(places))):
+        at, tree, locations = _location(row[:4]), _tree(row[5], 0), tuple(map(_location, _list(row[6])))
+        if conditions(tree) != list(range(len(locations))):
             raise ValueError
-        constant = tuple(_number(c, 0, len(places)) for c in _list(row[8]))
-        decision = Decision(at, bool(row[4]), tree, places, _number(row[7], 0, count), constant)
+        constant = tuple(_number(c, 0, len(locations)) for c in _list(row[8]))
+        decision = Decision(at, bool(row[4]), tree, locations, _number(row[7], 0, count), constant)
         _words(decision.word, decision.words, count, taken)
         made.decisions[at] = decision
     for row in _list(data["loops"]):
-        at = _place(row[:4])
+        at = _location(row[:4])
         made.loops[at] = Loop(at, _words(row[4], 2, count, taken))
     return made
 
@@ -169,7 +169,7 @@ def _number(value: Any, low: int, end: int) -> int:
     return value
 
 
-def _place(row: Any) -> Place:
+def _location(row: Any) -> Location:
     line, column, end_line, end_column = (_number(n, 1, 1 << 20) for n in _list(row))
     if (line, column) > (end_line, end_column):
         raise ValueError

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Place and cause of a fault: the innermost line of an algorithm's file in its traceback."""
+"""Location and cause of a fault: the innermost line of an algorithm's file in its traceback."""
 
 from __future__ import annotations
 
@@ -12,15 +12,15 @@ from ..base.source import SourceFile
 from .values import Fault
 
 #: file, line, column, cause: a row of the table fault_places of fcsl_machine.h.
-Place = tuple[str, int, int, str]
+FaultRow = tuple[str, int, int, str]
 
-INJECTED: Place = ("", 0, 0, "injected")
+INJECTED: FaultRow = ("", 0, 0, "injected")
 
 
 class FaultPlaces:
     """Finds the numbers of faults in the table `rows` of the compiled machine with the algorithm files `sources`."""
 
-    def __init__(self, rows: Sequence[Place], sources: Sequence[SourceFile]):
+    def __init__(self, rows: Sequence[FaultRow], sources: Sequence[SourceFile]):
         self._numbers = {row: number for number, row in enumerate(rows, 1)}
         self._sources = {str(Path(source.path).resolve()): source for source in sources}
 

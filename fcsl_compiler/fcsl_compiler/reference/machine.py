@@ -23,7 +23,7 @@ from typing import Any, Protocol
 from ..model.machine import Channel, Connection, Edge, Instance, Machine, PortRef, State
 from .algorithm import HARDWARE, Algorithm, Extern, SourceModule, declare_structs
 from .arrays import Array
-from .fault_places import FaultPlaces, Place
+from .fault_places import FaultPlaces, FaultRow
 from .functions import wrap
 from .memory import HEALTH, Image, Layout, Leaf, Memory, Movers, from_json, leaves
 from .structs import Struct, slot
@@ -244,7 +244,7 @@ class ReferenceMachine:
         self,
         machine: Machine,
         layout: Layout,
-        places: Sequence[Place],
+        places: Sequence[FaultRow],
         externs: Callable[[Extern], Callable[..., Any]] | None = None,
     ):
         self.machine, self.layout = machine, layout

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""The ROS 2 messages of a machine's channels, with their plans."""
+"""The ROS 2 messages of a machine's channels, with their conversions."""
 
 from __future__ import annotations
 
@@ -8,16 +8,16 @@ from dataclasses import dataclass, replace
 
 from ..model.machine import Channel, RosMapping
 from ..model.types import Scalar, Type, count_of, scalar_of
-from .composer import Source, composer_plan
-from .plan import ComposerPlan, ReaderPlan
-from .reader import Pick, reader_plan
+from .composer import Source, composer_conversion
+from .conversion import ComposerConversion, ReaderConversion
+from .reader import Pick, reader_conversion
 from .standard_messages import STANDARD, full_name
 
 #: The message of std_msgs for one scalar of a type; of arrays its …MultiArray. There is no array of bools.
 _SCALAR = {"bool": "Bool", "i32": "Int32", "i64": "Int64", "u32": "UInt32", "u64": "UInt64"}
 _SCALAR |= {"f32": "Float32", "f64": "Float64", "Health": "Int32", "TransitionRequest": "Int32"}
 _ARRAY = {**_SCALAR, "bool": "UInt8"}
-#: That of a blob: its bytes are no values of a plan.
+#: That of a blob: its bytes are no values of a conversion.
 BLOB = "std_msgs/UInt8MultiArray"
 
 
@@ -28,8 +28,8 @@ class Message:
 
     channels: tuple[Channel, ...]
     type: str  # full name
-    composer: ComposerPlan
-    reader: ReaderPlan
+    composer: ComposerConversion
+    reader: ReaderConversion
 
 
 def by_topic(channels: Iterable[Channel]) -> list[list[Channel]]:
@@ -42,7 +42,7 @@ def by_topic(channels: Iterable[Channel]) -> list[list[Channel]]:
 
 
 def message_of(channels: Sequence[Channel]) -> Message:
-    """The message of checked channels, which are parts of one. Raises PlanError where it would be too large."""
+    """The message of checked channels, which are parts of one. Raises ConversionError where it would be too large."""
     ros = channels[0].ros
     sources, picks = [], []
     for i, c in enumerate(channels):
@@ -50,8 +50,8 @@ def message_of(channels: Sequence[Channel]) -> Message:
         sources.append(Source(c.ros.field, type_, count, 0, axes=c.ros.axes, memory=i, name=c.name))
         picks.append(Pick(c.name, (c.ros.field,), type_, count, axes=c.ros.axes, null_refused=True))
     message = full_name(ros.type)
-    composer = composer_plan(STANDARD, message, sources, ros.frame, ros.child_frame)
-    reader = reader_plan(STANDARD, message, picks, ros.frame, ros.child_frame)
+    composer = composer_conversion(STANDARD, message, sources, ros.frame, ros.child_frame)
+    reader = reader_conversion(STANDARD, message, picks, ros.frame, ros.child_frame)
     return Message(tuple(channels), message, composer, reader)
 
 
@@ -62,7 +62,7 @@ def payload_of(channel: Channel) -> Message:
     """
     if channel.kind == "blob":
         blob = full_name(BLOB)
-        return Message((channel,), blob, composer_plan(STANDARD, blob, []), reader_plan(STANDARD, blob, []))
+        return Message((channel,), blob, composer_conversion(STANDARD, blob, []), reader_conversion(STANDARD, blob, []))
     ros = channel.ros if channel.ros.type else standard_mapping(channel.port.type)
     message = message_of([replace(channel, ros=ros)])
     return replace(message, reader=replace(message.reader, nan_allowed=True))

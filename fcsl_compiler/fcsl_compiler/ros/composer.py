@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""The plan of a message that is composed from memory: its bytes with every constant in place, and the numbers to fill in.
+"""The conversion of a message that is composed from memory: its bytes with every constant in place, and the numbers to fill in.
 
 Constants are frames, names, lengths of sequences, and defaults of fields without a source.
 """
@@ -11,8 +11,8 @@ from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 
 from . import axes
+from .conversion import MEMORY, NONE, WIRE, ComposerConversion, ConversionError
 from .message_fields import Kind, Piece, Selection, numbers_text
-from .plan import MEMORY, NONE, WIRE, ComposerPlan, PlanError
 from .rows import Rows, array_of, select_all
 from .standard_messages import DEFAULTS, SIZES, Default, Definitions, Member, short_name
 
@@ -53,7 +53,7 @@ class _Text:
         self._members(message, "")
         for path, text in self._strings.items():
             if text:
-                raise PlanError(f"`{short_name(message)}` has no `{path}` for `{text}`")
+                raise ConversionError(f"`{short_name(message)}` has no `{path}` for `{text}`")
 
     def element(self, piece: Piece) -> int:
         """Index of the element of its member that a piece begins with."""
@@ -96,7 +96,7 @@ class _Text:
             for i in range(count):
                 self._members(member.type, f"{path}[{i}]." if member.is_array else f"{path}.")
         else:
-            raise PlanError(f"`{path}` is a {member.type}, which cannot be composed")
+            raise ConversionError(f"`{path}` is a {member.type}, which cannot be composed")
 
     def _length(self, path: str) -> int:
         """The length of a sequence: the number of elements that sources fill."""
@@ -115,7 +115,7 @@ class _Text:
         self._align(struct.calcsize(code))
         self.data += struct.pack(f"<{len(numbers)}{code}", *numbers)
         if len(self.data) > _MAX_BYTES:
-            raise PlanError(f"a `{short_name(self._message)}` of more than {_MAX_BYTES} bytes")
+            raise ConversionError(f"a `{short_name(self._message)}` of more than {_MAX_BYTES} bytes")
 
     def _string(self, text: str) -> None:
         data = text.encode() + b"\0"
@@ -132,18 +132,18 @@ class _Text:
         self.places[path] = (len(self.data) - count * SIZES[member.type], count)
 
 
-def composer_plan(
+def composer_conversion(
     definitions: Definitions,
     message: str,
     sources: Sequence[Source],
     frame: str = "",
     child_frame: str = "",
     stamped: str = "",
-) -> ComposerPlan:
+) -> ComposerConversion:
     """`message`: full name of the type. `stamped`: where the part with header and frames is, as a prefix of paths
-    ("transforms[0]."). Raises PlanError, which names the source that does not fit and why."""
+    ("transforms[0]."). Raises ConversionError, which names the source that does not fit and why."""
     if message not in definitions:
-        raise PlanError(f"there is no definition of message type `{short_name(message)}`")
+        raise ConversionError(f"there is no definition of message type `{short_name(message)}`")
     selections = [_selection(definitions, message, source) for source in sources]
     pieces = [piece for selection in selections for piece in selection.pieces]
     strings = {f"{stamped}header.frame_id": frame, f"{stamped}child_frame_id": child_frame}
@@ -153,7 +153,7 @@ def composer_plan(
     for source, selection in zip(sources, selections, strict=True):
         places = array_of(source.memory, source.offset, MEMORY[source.type], source.count)
         rows.add(_matrix(source, selection), places, list(_targets(selection, text)))
-    return ComposerPlan(
+    return ComposerConversion(
         text=bytes(text.data),
         rows=rows.rows,
         terms=rows.terms,
@@ -165,18 +165,18 @@ def composer_plan(
 def _selection(definitions: Definitions, message: str, source: Source) -> Selection:
     try:
         return select_all(definitions, message, (source.field,), source.count)
-    except PlanError as error:
-        raise PlanError(f"`{source.name or source.field}`: {error}") from None
+    except ConversionError as error:
+        raise ConversionError(f"`{source.name or source.field}`: {error}") from None
 
 
 def _check_once(sources: Sequence[Source], selections: Sequence[Selection], text: _Text) -> None:
-    """Checks that no number of the message is filled twice. Raises PlanError."""
+    """Checks that no number of the message is filled twice. Raises ConversionError."""
     filled: dict[tuple[str, int], str] = {}
     for source, selection in zip(sources, selections, strict=True):
         numbers = [(p.path, text.element(p) + i) for p in selection.pieces for i in range(p.count)]
         for number in numbers:
             if number in filled:
-                raise PlanError(
+                raise ConversionError(
                     f"`{source.name or source.field}`: `{source.field}` is filled by `{filled[number]}`, too"
                 )
         filled |= dict.fromkeys(numbers, source.name or source.field)
@@ -188,19 +188,19 @@ def _targets(selection: Selection, text: _Text) -> Iterator[tuple[int, int]]:
         at, count = text.places[piece.path]
         first, size = text.element(piece), SIZES[piece.type]
         if first + piece.count > count:
-            raise PlanError(f"`{piece.path}` has {numbers_text(count)}, not {first + piece.count}")
+            raise ConversionError(f"`{piece.path}` has {numbers_text(count)}, not {first + piece.count}")
         for i in range(piece.count):
             yield at + (first + i) * size, WIRE[piece.type]
 
 
 def _matrix(source: Source, selection: Selection) -> axes.Matrix | None:
-    """The matrix from the numbers in memory to those of the message, None where they are the same. Raises PlanError."""
+    """The matrix from the numbers in memory to those of the message, None where they are the same. Raises ConversionError."""
     if not source.axes and selection.kind is not Kind.QUATERNION:
         return None
     try:
         matrix = axes.conversion(selection.kind, source.count, source.axes, "")
     except axes.AxesError as error:
-        raise PlanError(f"`{source.name or source.field}`: {error}") from None
+        raise ConversionError(f"`{source.name or source.field}`: {error}") from None
     if selection.kind is Kind.QUATERNION:
         return axes.product(axes.inverse(axes.permutation(axes.XYZW)), matrix)
     return matrix

@@ -16,7 +16,7 @@ VECTOR_AXES: tuple[str, ...] = ("enu", "ned", "flu", "frd")
 #: World and body axes of an orientation, which rotates vectors from the body frame to the world frame.
 QUATERNION_AXES: tuple[str, ...] = ("enu/flu", "ned/frd", "ned/flu", "enu/frd")
 
-#: Maximum index in a path. It bounds the size of a plan.
+#: Maximum index in a path. It bounds the size of a conversion.
 MAX_INDEX = 4095
 _MAX_DEPTH = 16
 #: Number of fields that a message about a missing field lists.

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""The plan that reads samples from the messages of a type: fields become values in a row of memory."""
+"""The conversion that reads samples from the messages of a type: fields become values in a row of memory."""
 
 from __future__ import annotations
 
@@ -8,8 +8,8 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 from . import axes
+from .conversion import MEMORY, NONE, SIZES, WIRE, ConversionError, Guard, ReaderConversion, Value
 from .message_fields import FieldError, Kind, Piece, Selection, numbers_text, select
-from .plan import MEMORY, NONE, SIZES, WIRE, Guard, PlanError, ReaderPlan, Value
 from .rows import Place, Rows, array_of, select_all
 from .standard_messages import GUARDS, Definitions, short_name
 from .walk import Walk
@@ -48,16 +48,16 @@ def has_stamp(definitions: Definitions, message: str) -> bool:
     return header is not None and header.type == "std_msgs/msg/Header"
 
 
-def reader_plan(
+def reader_conversion(
     definitions: Definitions, message: str, picks: Sequence[Pick], frame: str = "", child_frame: str = ""
-) -> ReaderPlan:
+) -> ReaderConversion:
     """`message`: full name of the type. `frame`, `child_frame`: required header.frame_id and child_frame_id (empty:
     any). The values stand in the order of the picks, each aligned to its scalar.
 
-    Raises PlanError, which names the pick that does not fit the message and why.
+    Raises ConversionError, which names the pick that does not fit the message and why.
     """
     if message not in definitions:
-        raise PlanError(f"there is no definition of message type `{short_name(message)}`")
+        raise ConversionError(f"there is no definition of message type `{short_name(message)}`")
     selections = [_selection(definitions, message, pick) for pick in picks]
     guards = [_guards(definitions, message, pick) for pick in picks]
     stamps = (
@@ -67,16 +67,16 @@ def reader_plan(
     wanted += [*stamps, *(piece for found in guards for piece, _ in found)]
     strings = {"header.frame_id": frame, "child_frame_id": child_frame}
     walk = Walk(definitions, message, wanted, {path: text for path, text in strings.items() if text})
-    return _plan(walk, picks, selections, guards, stamps)
+    return _conversion(walk, picks, selections, guards, stamps)
 
 
-def _plan(
+def _conversion(
     walk: Walk,
     picks: Sequence[Pick],
     selections: Sequence[Selection],
     guards: Sequence[Sequence[tuple[Piece, float]]],
     stamps: Sequence[Piece],
-) -> ReaderPlan:
+) -> ReaderConversion:
     rows, at, align = Rows(), 0, 1
     values: list[Value] = []
     all_guards: list[Guard] = []
@@ -94,7 +94,7 @@ def _plan(
         all_guards += [Guard(_places(walk, piece)[0].term(), value) for piece, value in found]
         at += size * pick.count
     stamp_anchor, stamp_offset = walk.places[stamps[0]] if stamps else (NONE, 0)
-    return ReaderPlan(
+    return ReaderConversion(
         parts=walk.parts,
         picks=walk.picks,
         names=walk.names,
@@ -121,15 +121,17 @@ def _selection(definitions: Definitions, message: str, pick: Pick) -> Selection:
     """The numbers that the pick selects, with their kind; checks the pick's own options."""
     try:
         selection = select_all(definitions, message, pick.fields, pick.count)
-    except PlanError as error:
-        raise PlanError(f"`{pick.name}`: {error}") from None
+    except ConversionError as error:
+        raise ConversionError(f"`{pick.name}`: {error}") from None
     for what, numbers in (("scale", pick.scale), ("offset", pick.offset)):
         if len(numbers) not in (0, 1, pick.count):
-            raise PlanError(f"`{pick.name}`: `{what}` has {numbers_text(len(numbers))}; it takes 1 or {pick.count}")
+            raise ConversionError(
+                f"`{pick.name}`: `{what}` has {numbers_text(len(numbers))}; it takes 1 or {pick.count}"
+            )
     if pick.order and pick.count != 4:
-        raise PlanError(f"`{pick.name}`: a quaternion has 4 numbers, not {pick.count}")
+        raise ConversionError(f"`{pick.name}`: a quaternion has 4 numbers, not {pick.count}")
     if pick.order == "wxyz" and selection.kind is Kind.QUATERNION:
-        raise PlanError(f"`{pick.name}`: a geometry_msgs/Quaternion is in the order x, y, z, w, not w, x, y, z")
+        raise ConversionError(f"`{pick.name}`: a geometry_msgs/Quaternion is in the order x, y, z, w, not w, x, y, z")
     return selection
 
 
@@ -138,7 +140,7 @@ def _is_rotation(pick: Pick, selection: Selection) -> bool:
 
 
 def _matrix(pick: Pick, selection: Selection) -> axes.Matrix | None:
-    """The matrix from the numbers of the message to those of the value, None where they are the same. Raises PlanError."""
+    """The matrix from the numbers of the message to those of the value, None where they are the same. Raises ConversionError."""
     is_quaternion = _is_rotation(pick, selection)
     if not is_quaternion and not (pick.source_axes or pick.axes or pick.rotation):
         return None
@@ -148,7 +150,7 @@ def _matrix(pick: Pick, selection: Selection) -> axes.Matrix | None:
         if pick.rotation:
             matrix = axes.product(matrix, axes.mounting(kind, pick.count, pick.rotation))
     except axes.AxesError as error:
-        raise PlanError(f"`{pick.name}`: {error}") from None
+        raise ConversionError(f"`{pick.name}`: {error}") from None
     if is_quaternion and pick.order != "wxyz":
         return axes.product(matrix, axes.permutation(axes.XYZW))
     return matrix

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""The rows of a plan: numbers of a message and of a machine, related by a change of axes."""
+"""The rows of a conversion: numbers of a message and of a machine, related by a change of axes."""
 
 from __future__ import annotations
 
@@ -7,8 +7,8 @@ from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
 from .axes import Matrix
+from .conversion import SIZES, ConversionError, Row, Term
 from .message_fields import FieldError, Kind, Selection, select
-from .plan import SIZES, PlanError, Row, Term
 from .standard_messages import Definitions
 
 
@@ -25,7 +25,7 @@ class Place:
 
 
 class Rows:
-    """Collects the rows and terms of a plan."""
+    """Collects the rows and terms of a conversion."""
 
     def __init__(self) -> None:
         self.rows: list[Row] = []
@@ -73,11 +73,11 @@ def array_of(anchor: int, offset: int, type_: int, count: int) -> list[Place]:
 
 
 def select_all(definitions: Definitions, message: str, fields: Sequence[str], count: int) -> Selection:
-    """The `count` numbers that several fields select together. A whole sequence takes all of them. Raises PlanError."""
+    """The `count` numbers that several fields select together. A whole sequence takes all of them. Raises ConversionError."""
     try:
         found = [select(definitions, message, field) for field in fields]
     except FieldError as error:
-        raise PlanError(f"{error.args[0]}; {error.args[1]}") from None
+        raise ConversionError(f"{error.args[0]}; {error.args[1]}") from None
     pieces = tuple(piece for selection in found for piece in selection.pieces)
     kind = found[0].kind if len(found) == 1 else Kind.NUMBERS
     if len(pieces) == 1 and pieces[0].count == 0:
@@ -85,7 +85,7 @@ def select_all(definitions: Definitions, message: str, fields: Sequence[str], co
     total = sum(piece.count for piece in pieces)
     if total != count or not all(piece.count for piece in pieces):
         what = ", ".join(f"`{field}`" for field in fields)
-        raise PlanError(f"{what} {'has' if len(fields) == 1 else 'have'} {total} numbers, not {count}")
+        raise ConversionError(f"{what} {'has' if len(fields) == 1 else 'have'} {total} numbers, not {count}")
     if kind is Kind.NUMBERS and count == 3 and all(piece.type.startswith("float") for piece in pieces):
         kind = Kind.VECTOR
     return Selection(kind, pieces)

@@ -1,7 +1,7 @@
 # SPDX-License-Identifier: Apache-2.0
 """The standard ROS 2 messages that a channel can be mapped to: members, units, and the values that mean "not given".
 
-Checks at build time and the plans that read and write these messages use this table. A test compares it with the
+Checks at build time and the conversions that read and write these messages use this table. A test compares it with the
 definitions that rosidl installs.
 """
 

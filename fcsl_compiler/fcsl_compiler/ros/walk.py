@@ -9,8 +9,8 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Mapping
 
+from .conversion import BLOCK, COUNT, END, NAMES, NONE, REPEAT, SEQUENCE, STRING, ConversionError, Part, SequencePick
 from .message_fields import Piece
-from .plan import BLOCK, COUNT, END, NAMES, NONE, REPEAT, SEQUENCE, STRING, Part, PlanError, SequencePick
 from .standard_messages import SIZES, Definitions, Member, short_name
 
 #: Limits of ros_walk.h.
@@ -21,10 +21,10 @@ _MAX_MEMBERS = 1 << 18
 
 
 class Walk:
-    """The parts, picks and names of a plan, and the anchor and offset of each selected piece (`places`)."""
+    """The parts, picks and names of a conversion, and the anchor and offset of each selected piece (`places`)."""
 
     def __init__(self, definitions: Definitions, message: str, pieces: Iterable[Piece], strings: Mapping[str, str]):
-        """`strings`: path of a string to its required value. Raises PlanError for a message that cannot be walked."""
+        """`strings`: path of a string to its required value. Raises ConversionError for a message that cannot be walked."""
         self.parts: list[Part] = []
         self.picks: list[SequencePick] = []
         self.names: list[bytes] = []
@@ -44,8 +44,8 @@ class Walk:
         if len(self.parts) > _MAX_PARTS or self.anchor_count > _MAX_ANCHORS or len(self.names) > _MAX_NAMES:
             raise self._error("", "has too many parts")
 
-    def _error(self, path: str, text: str) -> PlanError:
-        return PlanError(f"`{path or short_name(self._message)}` {text}")
+    def _error(self, path: str, text: str) -> ConversionError:
+        return ConversionError(f"`{path or short_name(self._message)}` {text}")
 
     def _part(self, code: int, align: int = 0, size: int = 0, first: int = NONE, count: int = 0) -> Part:
         part = Part(code, align, size, first, count)

@@ -14,13 +14,13 @@
 #include <stddef.h>
 #include <stdint.h>
 
-#include "fcsl/fcsl_ros_plan.h"
+#include "fcsl/fcsl_ros_conversion.h"
 
 #ifdef __cplusplus
 extern "C" {
 #endif
 
-/* Incremented when a struct below, in fcsl_ros_plan.h or in fcsl_hw.h changes its meaning or layout. A host rejects any other value. */
+/* Incremented when a struct below, in fcsl_ros_conversion.h or in fcsl_hw.h changes its meaning or layout. A host rejects any other value. */
 #define FCSL_ABI_VERSION 11u
 
 /* Bytes of fcsl_machine_t.views. */

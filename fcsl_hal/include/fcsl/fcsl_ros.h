@@ -1,6 +1,6 @@
 /* SPDX-License-Identifier: Apache-2.0
  *
- * Numbers picked out of ROS 2 messages and put into them, along plans (fcsl_ros_plan.h).
+ * Numbers picked out of ROS 2 messages and put into them, along conversions (fcsl_ros_conversion.h).
  *
  * A *reader* walks the CDR bytes of a message (little-endian, encapsulation included), whatever they hold: no byte is read
  * beyond the message, no loop runs longer than the message is. It fills *values*, each of one or more numbers, into a row of
@@ -16,7 +16,7 @@
 #include <stdint.h>
 
 #include "fcsl/fcsl_error.h"
-#include "fcsl/fcsl_ros_plan.h"
+#include "fcsl/fcsl_ros_conversion.h"
 
 #ifdef __cplusplus
 extern "C" {
@@ -53,11 +53,11 @@ typedef enum {
 
 typedef struct fcsl_ros_reader fcsl_ros_reader_t;
 
-/* Checks that no part of the plan, which must outlive the reader, can lead outside a message or a row. Returns null where one
+/* Checks that no part of the conversion, which must outlive the reader, can lead outside a message or a row. Returns null where one
  * does, or without memory, with `error` filled. */
-fcsl_ros_reader_t *fcsl_ros_reader_new(const fcsl_ros_reader_plan_t *plan, fcsl_error_t *error);
+fcsl_ros_reader_t *fcsl_ros_reader_new(const fcsl_ros_reader_plan_t *conversion, fcsl_error_t *error);
 void fcsl_ros_reader_free(fcsl_ros_reader_t *reader);
-const fcsl_ros_reader_plan_t *fcsl_ros_reader_plan(const fcsl_ros_reader_t *reader);
+const fcsl_ros_reader_plan_t *fcsl_ros_reader_conversion(const fcsl_ros_reader_t *reader);
 
 /* Reads one message. `row` gets the values, zeros in place of those not taken; `status` gets one fcsl_ros_status_t each;
  * `stamp_ns` gets the header's stamp, 0 for a type without one. Returns what became of the message as a whole. */
@@ -75,10 +75,10 @@ void fcsl_ros_read_many(fcsl_ros_reader_t *reader, const uint8_t *buffer, size_t
 typedef struct fcsl_ros_composer fcsl_ros_composer_t;
 
 /* As fcsl_ros_reader_new. */
-fcsl_ros_composer_t *fcsl_ros_composer_new(const fcsl_ros_composer_plan_t *plan, fcsl_error_t *error);
+fcsl_ros_composer_t *fcsl_ros_composer_new(const fcsl_ros_composer_plan_t *conversion, fcsl_error_t *error);
 void fcsl_ros_composer_free(fcsl_ros_composer_t *composer);
 
-/* Writes the message, all of the plan's `size` bytes. Its terms read from `memories`, which the caller vouches for.
+/* Writes the message, all of the conversion's `size` bytes. Its terms read from `memories`, which the caller vouches for.
  * FCSL_ROS_RANGE or _NAN: a number that its field cannot hold; FCSL_ROS_STAMP: a time that a stamp cannot hold. */
 fcsl_ros_status_t fcsl_ros_compose(const fcsl_ros_composer_t *composer, const uint8_t *const *memories, int64_t time_ns,
                                    uint8_t *cdr);

@@ -30,12 +30,12 @@ static int is_blob(const fcsl_machine_t *machine, uint32_t channel)
     return machine->channels[channel].as == FCSL_AS_BLOB;
 }
 
-/* Whether all messages of a plan have the same size. */
-static int is_fixed(const fcsl_ros_reader_plan_t *plan)
+/* Whether all messages of a conversion have the same size. */
+static int is_fixed(const fcsl_ros_reader_plan_t *conversion)
 {
     int fixed = 1;
-    for (uint32_t i = 0; i < plan->part_count && fixed; i++) {
-        fixed = plan->parts[i].code == FCSL_ROS_BLOCK;
+    for (uint32_t i = 0; i < conversion->part_count && fixed; i++) {
+        fixed = conversion->parts[i].code == FCSL_ROS_BLOCK;
     }
     return fixed;
 }
@@ -155,10 +155,10 @@ static int read_blob(const payload_t *payload, uint32_t channel, const uint8_t *
     uint32_t head = 0;
     size_t count = size;
     if (payload->composers != NULL) {
-        const fcsl_ros_composer_plan_t *plan = machine->payloads[channel].composer;
-        head = plan->size;
-        if (size < head || memcmp(bytes, plan->text, OPTIONS_AT) != 0 ||
-            memcmp(bytes + FCSL_ROS_ENCAPSULATION_BYTES, plan->text + FCSL_ROS_ENCAPSULATION_BYTES,
+        const fcsl_ros_composer_plan_t *conversion = machine->payloads[channel].composer;
+        head = conversion->size;
+        if (size < head || memcmp(bytes, conversion->text, OPTIONS_AT) != 0 ||
+            memcmp(bytes + FCSL_ROS_ENCAPSULATION_BYTES, conversion->text + FCSL_ROS_ENCAPSULATION_BYTES,
                    head - FCSL_ROS_ENCAPSULATION_BYTES - LENGTH_BYTES) != 0) {
             return -1;
         }

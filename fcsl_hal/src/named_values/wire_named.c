@@ -132,8 +132,8 @@ void named_drain(named_wire_t *wire, uint32_t first)
 
 void named_free(named_wire_t *wire)
 {
-    free(wire->plan.inputs);
-    free((void *)wire->plan.outputs);
+    free(wire->session.inputs);
+    free((void *)wire->session.outputs);
     payload_close(&wire->payload);
     free(wire->control);
     free(wire->has_value);

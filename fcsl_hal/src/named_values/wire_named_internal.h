@@ -28,7 +28,7 @@ typedef struct {
     const char *strays;
     char endpoint[NAMED_ENDPOINT_BYTES];
     uint64_t tick_bytes; /* that are posted in a tick */
-} named_plan_t;
+} named_session_t;
 
 /* Inputs and outputs of both ends; behind them the channels that come, and those that go. */
 enum { NAMED_CONTROL = 0, NAMED_COMMIT = 1, NAMED_CHANNELS = 2 };
@@ -41,7 +41,7 @@ typedef struct {
 
 typedef struct {
     bus_peer_t peer;
-    named_plan_t plan; /* the session may connect later */
+    named_session_t session; /* the session may connect later */
     const fcsl_channel_table_t *table;
     uint32_t *numbers; /* of each channel: its input or output */
     char *keys;        /* FCSL_BUS_KEY_MAX + 1 bytes each: those of the channels, and the others */

@@ -63,11 +63,11 @@ static named_wire_t *allocate(const fcsl_channel_table_t *table, fcsl_wire_side_
     wire->value = calloc(1, wire->value_bytes);
     wire->has_value = calloc((size_t)channels + 1u, 1);
     wire->control = calloc(1, HANDSHAKE_PACKET_MAX);
-    wire->plan.inputs = calloc((size_t)channels + NAMED_CHANNELS, sizeof *wire->plan.inputs);
-    wire->plan.outputs = calloc((size_t)channels + NAMED_CHANNELS, sizeof *wire->plan.outputs);
-    if (wire->plan.inputs == NULL || wire->plan.outputs == NULL || wire->has_value == NULL || wire->control == NULL ||
-        wire->numbers == NULL || wire->keys == NULL || wire->fresh == NULL || wire->image == NULL ||
-        wire->value == NULL || payload_open(&wire->payload, machine, error) != 0) {
+    wire->session.inputs = calloc((size_t)channels + NAMED_CHANNELS, sizeof *wire->session.inputs);
+    wire->session.outputs = calloc((size_t)channels + NAMED_CHANNELS, sizeof *wire->session.outputs);
+    if (wire->session.inputs == NULL || wire->session.outputs == NULL || wire->has_value == NULL ||
+        wire->control == NULL || wire->numbers == NULL || wire->keys == NULL || wire->fresh == NULL ||
+        wire->image == NULL || wire->value == NULL || payload_open(&wire->payload, machine, error) != 0) {
         named_free(wire);
         return NULL;
     }
@@ -84,47 +84,47 @@ static const char *add_key(named_wire_t *wire, uint32_t *count, const char *name
     return key;
 }
 
-static void fill_plan(named_wire_t *wire, const char *name_space)
+static void fill_session(named_wire_t *wire, const char *name_space)
 {
-    named_plan_t *plan = &wire->plan;
+    named_session_t *session = &wire->session;
     const fcsl_machine_t *machine = wire->table->machine;
     const uint32_t commit_size = (uint32_t)commit_bytes(machine->channel_count);
     const uint8_t theirs = wire->peer.side == FCSL_WIRE_LISTEN ? FCSL_ACTUATOR : FCSL_SENSOR;
     uint32_t keys = 0;
     const char *control = add_key(wire, &keys, name_space, "@control");
     const char *commit = add_key(wire, &keys, name_space, "tick");
-    plan->watched[BUS_CONTROLLERS] = add_key(wire, &keys, name_space, "@controller");
-    plan->watched[BUS_SIMULATORS] = add_key(wire, &keys, name_space, "@simulator");
-    plan->strays = add_key(wire, &keys, name_space, "**");
-    plan->token = plan->watched[wire->peer.side == FCSL_WIRE_LISTEN ? BUS_SIMULATORS : BUS_CONTROLLERS];
-    plan->outputs[plan->output_count++] = control;
-    plan->outputs[plan->output_count++] = commit;
-    plan->inputs[plan->input_count++] = (fcsl_bus_input_t){
+    session->watched[BUS_CONTROLLERS] = add_key(wire, &keys, name_space, "@controller");
+    session->watched[BUS_SIMULATORS] = add_key(wire, &keys, name_space, "@simulator");
+    session->strays = add_key(wire, &keys, name_space, "**");
+    session->token = session->watched[wire->peer.side == FCSL_WIRE_LISTEN ? BUS_SIMULATORS : BUS_CONTROLLERS];
+    session->outputs[session->output_count++] = control;
+    session->outputs[session->output_count++] = commit;
+    session->inputs[session->input_count++] = (fcsl_bus_input_t){
         .key = control, .bytes = HANDSHAKE_PACKET_MAX, .depth = CONTROLS_WAITING, .fits = handshake_fits};
-    plan->inputs[plan->input_count++] = (fcsl_bus_input_t){.key = commit,
-                                                           .bytes = commit_size,
-                                                           .least = commit_size,
-                                                           .depth = wire->runs_free ? 1u : COMMITS_WAITING,
-                                                           .fits = commit_fits,
-                                                           .what = (uint64_t)theirs << 32 | wire->table->hash};
-    plan->tick_bytes = HANDSHAKE_PACKET_MAX + commit_size + NAMED_CHANNELS * (uint64_t)ENTRY_BYTES_MAX;
+    session->inputs[session->input_count++] = (fcsl_bus_input_t){.key = commit,
+                                                                 .bytes = commit_size,
+                                                                 .least = commit_size,
+                                                                 .depth = wire->runs_free ? 1u : COMMITS_WAITING,
+                                                                 .fits = commit_fits,
+                                                                 .what = (uint64_t)theirs << 32 | wire->table->hash};
+    session->tick_bytes = HANDSHAKE_PACKET_MAX + commit_size + NAMED_CHANNELS * (uint64_t)ENTRY_BYTES_MAX;
     for (uint32_t i = 0; i < machine->channel_count; i++) {
         const fcsl_channel_t *channel = &machine->channels[i];
         const char *key = add_key(wire, &keys, name_space, channel->name);
         if (comes_in(wire, channel)) {
-            wire->numbers[i] = plan->input_count;
-            plan->inputs[plan->input_count++] = (fcsl_bus_input_t){.key = key,
-                                                                   .bytes = payload_most(machine, i),
-                                                                   .least = payload_least(machine, i),
-                                                                   .depth = 1,
-                                                                   .quiet = 1};
+            wire->numbers[i] = session->input_count;
+            session->inputs[session->input_count++] = (fcsl_bus_input_t){.key = key,
+                                                                         .bytes = payload_most(machine, i),
+                                                                         .least = payload_least(machine, i),
+                                                                         .depth = 1,
+                                                                         .quiet = 1};
         } else {
-            wire->numbers[i] = plan->output_count;
-            plan->outputs[plan->output_count++] = key;
-            plan->tick_bytes += payload_bytes(machine, i) + ENTRY_BYTES_MAX;
+            wire->numbers[i] = session->output_count;
+            session->outputs[session->output_count++] = key;
+            session->tick_bytes += payload_bytes(machine, i) + ENTRY_BYTES_MAX;
         }
     }
-    wire->input_count = plan->input_count;
+    wire->input_count = session->input_count;
     wire->peer.output_count = NAMED_CHANNELS; /* a peer need not care for every channel */
 }
 
@@ -154,23 +154,23 @@ static int open_session(named_wire_t *wire, const char *address, uint64_t deadli
 {
     const uint64_t now_ns = fcsl_monotonic_ns();
     const uint32_t wait_ms = deadline_ns > now_ns ? (uint32_t)((deadline_ns - now_ns) / FCSL_NS_PER_MS) : 0u;
-    named_plan_t *plan = &wire->plan;
-    const fcsl_bus_role_t role = role_of(address, wire->peer.side, plan->endpoint);
+    named_session_t *session = &wire->session;
+    const fcsl_bus_role_t role = role_of(address, wire->peer.side, session->endpoint);
     const fcsl_bus_options_t options = {
         .role = role,
-        .endpoint = plan->endpoint,
+        .endpoint = session->endpoint,
         .timeout_ms = wire->runs_free ? CONNECT_MS : wait_ms,
         .connects_later = wire->runs_free,
         .observer = wire->runs_free, /* who reads slowly gets the newest later, and holds up nobody */
-        .ring_bytes = (uint32_t)(TICKS_POSTED * plan->tick_bytes),
-        .outputs = plan->outputs,
-        .output_count = plan->output_count,
-        .inputs = plan->inputs,
-        .input_count = plan->input_count,
-        .tokens = &plan->token,
+        .ring_bytes = (uint32_t)(TICKS_POSTED * session->tick_bytes),
+        .outputs = session->outputs,
+        .output_count = session->output_count,
+        .inputs = session->inputs,
+        .input_count = session->input_count,
+        .tokens = &session->token,
         .token_count = 1,
-        .watched = plan->watched,
-        .strays = plan->strays,
+        .watched = session->watched,
+        .strays = session->strays,
         .watched_count = bus_peer_watched(wire->peer.side),
     };
     if (fcsl_bus_open(&options, &wire->peer.bus, error) != 0) {
@@ -179,7 +179,8 @@ static int open_session(named_wire_t *wire, const char *address, uint64_t deadli
     if (wire->runs_free) {
         return 0;
     }
-    if (wire->peer.side == FCSL_WIRE_CONNECT && bus_peer_wait(&wire->peer, plan->endpoint, deadline_ns, error) != 0) {
+    if (wire->peer.side == FCSL_WIRE_CONNECT &&
+        bus_peer_wait(&wire->peer, session->endpoint, deadline_ns, error) != 0) {
         (void)fcsl_bus_close(wire->peer.bus, NAMED_CLOSE_MS);
         return -1;
     }
@@ -236,7 +237,7 @@ int fcsl_wire_open_named(const char *address, const char *name_space, const fcsl
         return -1;
     }
     self->runs_free = fcsl_wire_runs_free(address);
-    fill_plan(self, name_space);
+    fill_session(self, name_space);
     if (open_session(self, address, deadline_ns, error) != 0) {
         named_free(self);
         return 1;

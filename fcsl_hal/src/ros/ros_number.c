@@ -1,6 +1,6 @@
 /* SPDX-License-Identifier: Apache-2.0
  *
- * Reads, converts, checks and writes numbers by the rows of a plan.
+ * Reads, converts, checks and writes numbers by the rows of a conversion.
  */
 #include "ros_number.h"
 

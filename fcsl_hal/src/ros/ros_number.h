@@ -1,6 +1,6 @@
 /* SPDX-License-Identifier: Apache-2.0
  *
- * Rows of a plan: numbers read, put through the change of axes, range-checked and written.
+ * Rows of a conversion: numbers read, put through the change of axes, range-checked and written.
  */
 #ifndef FCSL_ROS_NUMBER_H
 #define FCSL_ROS_NUMBER_H

@@ -60,7 +60,8 @@ static int same_text(const char *name, const char *text, uint32_t length)
     return strlen(name) == length && memcmp(name, text, length) == 0;
 }
 
-static fcsl_ros_status_t walk_string(const fcsl_ros_reader_plan_t *plan, const fcsl_ros_part_t *part, cursor_t *cursor)
+static fcsl_ros_status_t walk_string(const fcsl_ros_reader_plan_t *conversion, const fcsl_ros_part_t *part,
+                                     cursor_t *cursor)
 {
     const char *text = NULL;
     uint32_t length = 0;
@@ -68,11 +69,11 @@ static fcsl_ros_status_t walk_string(const fcsl_ros_reader_plan_t *plan, const f
     if (status != FCSL_ROS_TAKEN || part->first == FCSL_ROS_NONE) {
         return status;
     }
-    return same_text(plan->names[part->first], text, length) ? FCSL_ROS_TAKEN : FCSL_ROS_FRAME;
+    return same_text(conversion->names[part->first], text, length) ? FCSL_ROS_TAKEN : FCSL_ROS_FRAME;
 }
 
 /* Each string takes four bytes or more of the message, so there are no more turns than that. */
-static fcsl_ros_status_t walk_names(const fcsl_ros_reader_plan_t *plan, const fcsl_ros_part_t *part,
+static fcsl_ros_status_t walk_names(const fcsl_ros_reader_plan_t *conversion, const fcsl_ros_part_t *part,
                                     fcsl_ros_walk_t *walk, cursor_t *cursor)
 {
     uint32_t count = 0;
@@ -87,7 +88,7 @@ static fcsl_ros_status_t walk_names(const fcsl_ros_reader_plan_t *plan, const fc
             return status;
         }
         for (uint32_t name = part->first; name < part->first + part->count; name++) {
-            if (walk->found[name] == FCSL_ROS_NONE && same_text(plan->names[name], text, length)) {
+            if (walk->found[name] == FCSL_ROS_NONE && same_text(conversion->names[name], text, length)) {
                 walk->found[name] = i;
             }
         }
@@ -95,7 +96,7 @@ static fcsl_ros_status_t walk_names(const fcsl_ros_reader_plan_t *plan, const fc
     return FCSL_ROS_TAKEN;
 }
 
-static fcsl_ros_status_t walk_sequence(const fcsl_ros_reader_plan_t *plan, const fcsl_ros_part_t *part,
+static fcsl_ros_status_t walk_sequence(const fcsl_ros_reader_plan_t *conversion, const fcsl_ros_part_t *part,
                                        fcsl_ros_walk_t *walk, cursor_t *cursor)
 {
     uint32_t count = 0;
@@ -108,7 +109,7 @@ static fcsl_ros_status_t walk_sequence(const fcsl_ros_reader_plan_t *plan, const
         return FCSL_ROS_TRUNCATED;
     }
     for (uint32_t i = 0; i < part->count; i++) {
-        const fcsl_ros_pick_t *pick = &plan->picks[part->first + i];
+        const fcsl_ros_pick_t *pick = &conversion->picks[part->first + i];
         if (pick->count > 0) {
             walk->anchors[pick->anchor] = pick->count == count ? numbers : NULL;
             continue;
@@ -120,13 +121,13 @@ static fcsl_ros_status_t walk_sequence(const fcsl_ros_reader_plan_t *plan, const
 }
 
 /* Walks the parts. A turn of a loop takes at least one byte (fcsl_ros_walk_valid), so the message bounds them all. */
-static fcsl_ros_status_t walk_parts(const fcsl_ros_reader_plan_t *plan, fcsl_ros_walk_t *walk, cursor_t *cursor)
+static fcsl_ros_status_t walk_parts(const fcsl_ros_reader_plan_t *conversion, fcsl_ros_walk_t *walk, cursor_t *cursor)
 {
     uint32_t left[FCSL_ROS_DEPTH_MAX]; /* turns of the loops that the walk is in */
     uint32_t depth = 0;
     fcsl_ros_status_t status = FCSL_ROS_TAKEN;
-    for (uint32_t i = 0; i < plan->part_count && status == FCSL_ROS_TAKEN; i++) {
-        const fcsl_ros_part_t *part = &plan->parts[i];
+    for (uint32_t i = 0; i < conversion->part_count && status == FCSL_ROS_TAKEN; i++) {
+        const fcsl_ros_part_t *part = &conversion->parts[i];
         switch (part->code) {
         case FCSL_ROS_BLOCK: {
             const uint8_t *bytes = take(cursor, part->align, part->size);
@@ -137,13 +138,13 @@ static fcsl_ros_status_t walk_parts(const fcsl_ros_reader_plan_t *plan, fcsl_ros
             break;
         }
         case FCSL_ROS_STRING:
-            status = walk_string(plan, part, cursor);
+            status = walk_string(conversion, part, cursor);
             break;
         case FCSL_ROS_NAMES:
-            status = walk_names(plan, part, walk, cursor);
+            status = walk_names(conversion, part, walk, cursor);
             break;
         case FCSL_ROS_SEQUENCE:
-            status = walk_sequence(plan, part, walk, cursor);
+            status = walk_sequence(conversion, part, walk, cursor);
             break;
         case FCSL_ROS_COUNT: {
             uint32_t count = 0;
@@ -169,7 +170,7 @@ static fcsl_ros_status_t walk_parts(const fcsl_ros_reader_plan_t *plan, fcsl_ros
     return status;
 }
 
-fcsl_ros_status_t fcsl_ros_walk(const fcsl_ros_reader_plan_t *plan, fcsl_ros_walk_t *walk, const uint8_t *cdr,
+fcsl_ros_status_t fcsl_ros_walk(const fcsl_ros_reader_plan_t *conversion, fcsl_ros_walk_t *walk, const uint8_t *cdr,
                                 size_t size)
 {
     if (size < FCSL_ROS_ENCAPSULATION_BYTES) {
@@ -178,11 +179,11 @@ fcsl_ros_status_t fcsl_ros_walk(const fcsl_ros_reader_plan_t *plan, fcsl_ros_wal
     if (cdr[0] != 0 || cdr[1] != 1) {
         return FCSL_ROS_ENCODING;
     }
-    for (uint32_t i = 0; i < plan->name_count; i++) {
+    for (uint32_t i = 0; i < conversion->name_count; i++) {
         walk->found[i] = FCSL_ROS_NONE;
     }
     cursor_t cursor = {.from = cdr + FCSL_ROS_ENCAPSULATION_BYTES, .size = size - FCSL_ROS_ENCAPSULATION_BYTES};
-    const fcsl_ros_status_t status = walk_parts(plan, walk, &cursor);
+    const fcsl_ros_status_t status = walk_parts(conversion, walk, &cursor);
     walk->end = FCSL_ROS_ENCAPSULATION_BYTES + cursor.at;
     return status;
 }
@@ -197,14 +198,15 @@ static int in_range(uint32_t first, uint32_t count, uint32_t whole)
     return count <= whole && first <= whole - count;
 }
 
-static int sequence_valid(const fcsl_ros_reader_plan_t *plan, const fcsl_ros_part_t *part)
+static int sequence_valid(const fcsl_ros_reader_plan_t *conversion, const fcsl_ros_part_t *part)
 {
-    if (!is_size(part->size) || part->align != part->size || !in_range(part->first, part->count, plan->pick_count)) {
+    if (!is_size(part->size) || part->align != part->size ||
+        !in_range(part->first, part->count, conversion->pick_count)) {
         return 0;
     }
     for (uint32_t i = 0; i < part->count; i++) {
-        const fcsl_ros_pick_t *pick = &plan->picks[part->first + i];
-        if (pick->count > UINT32_MAX / 8u || (pick->name != FCSL_ROS_NONE && pick->name >= plan->name_count)) {
+        const fcsl_ros_pick_t *pick = &conversion->picks[part->first + i];
+        if (pick->count > UINT32_MAX / 8u || (pick->name != FCSL_ROS_NONE && pick->name >= conversion->name_count)) {
             return 0;
         }
     }
@@ -212,7 +214,7 @@ static int sequence_valid(const fcsl_ros_reader_plan_t *plan, const fcsl_ros_par
 }
 
 /* A part that is not of a loop; in one, where it may not be met at all, nothing can be read. */
-static int part_valid(const fcsl_ros_reader_plan_t *plan, const fcsl_ros_part_t *part, int in_loop)
+static int part_valid(const fcsl_ros_reader_plan_t *conversion, const fcsl_ros_part_t *part, int in_loop)
 {
     const int reads = (part->code == FCSL_ROS_BLOCK && part->first != FCSL_ROS_NONE) ||
                       (part->code == FCSL_ROS_SEQUENCE && part->count > 0);
@@ -223,37 +225,37 @@ static int part_valid(const fcsl_ros_reader_plan_t *plan, const fcsl_ros_part_t 
     case FCSL_ROS_BLOCK:
         return part->size > 0 && is_size(part->align);
     case FCSL_ROS_STRING:
-        return part->first == FCSL_ROS_NONE || part->first < plan->name_count;
+        return part->first == FCSL_ROS_NONE || part->first < conversion->name_count;
     case FCSL_ROS_NAMES:
-        return in_range(part->first, part->count, plan->name_count);
+        return in_range(part->first, part->count, conversion->name_count);
     case FCSL_ROS_SEQUENCE:
-        return sequence_valid(plan, part);
+        return sequence_valid(conversion, part);
     default:
         return 0;
     }
 }
 
 /* REPEAT and END point at each other, something between them takes bytes, and every REPEAT has its COUNT before it. */
-int fcsl_ros_walk_valid(const fcsl_ros_reader_plan_t *plan)
+int fcsl_ros_walk_valid(const fcsl_ros_reader_plan_t *conversion)
 {
     uint32_t repeats[FCSL_ROS_DEPTH_MAX];
     uint32_t counts_at[FCSL_ROS_DEPTH_MAX]; /* counts, at each of them */
     uint32_t counts = 0; /* loops entered: those of which only the COUNT was met, and those in `repeats` */
     uint32_t depth = 0;
-    if (plan->part_count > FCSL_ROS_PARTS_MAX || plan->name_count > FCSL_ROS_NAMES_MAX) {
+    if (conversion->part_count > FCSL_ROS_PARTS_MAX || conversion->name_count > FCSL_ROS_NAMES_MAX) {
         return 0;
     }
-    for (uint32_t i = 0; i < plan->part_count; i++) {
-        const fcsl_ros_part_t *part = &plan->parts[i];
+    for (uint32_t i = 0; i < conversion->part_count; i++) {
+        const fcsl_ros_part_t *part = &conversion->parts[i];
         if (part->code == FCSL_ROS_COUNT) {
             if (counts == FCSL_ROS_DEPTH_MAX) {
                 return 0;
             }
             counts++;
         } else if (part->code == FCSL_ROS_REPEAT) {
-            if (depth == counts || part->first <= i + 1u || part->first >= plan->part_count ||
-                plan->parts[part->first].code != FCSL_ROS_END || plan->parts[part->first].first != i ||
-                plan->parts[i + 1u].code >= FCSL_ROS_REPEAT) {
+            if (depth == counts || part->first <= i + 1u || part->first >= conversion->part_count ||
+                conversion->parts[part->first].code != FCSL_ROS_END || conversion->parts[part->first].first != i ||
+                conversion->parts[i + 1u].code >= FCSL_ROS_REPEAT) {
                 return 0;
             }
             counts_at[depth] = counts;
@@ -264,7 +266,7 @@ int fcsl_ros_walk_valid(const fcsl_ros_reader_plan_t *plan)
             }
             depth--;
             counts--;
-        } else if (!part_valid(plan, part, depth > 0)) {
+        } else if (!part_valid(conversion, part, depth > 0)) {
             return 0;
         }
     }

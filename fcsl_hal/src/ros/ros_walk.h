@@ -22,12 +22,12 @@ typedef struct {
     size_t end;                                   /* bytes that the message's type took */
 } fcsl_ros_walk_t;
 
-/* Whether the parts of a plan lead through a message: known codes, loops that nest, tables that are there. */
-int fcsl_ros_walk_valid(const fcsl_ros_reader_plan_t *plan);
+/* Whether the parts of a conversion lead through a message: known codes, loops that nest, tables that are there. */
+int fcsl_ros_walk_valid(const fcsl_ros_reader_plan_t *conversion);
 
 /* Walks all of a message. FCSL_ROS_TAKEN, or what is wrong with it. Bytes behind the message are no mistake: DDS pads to whole
  * words, and rclpy's serialize_message leaves some behind sequences that are empty. */
-fcsl_ros_status_t fcsl_ros_walk(const fcsl_ros_reader_plan_t *plan, fcsl_ros_walk_t *walk, const uint8_t *cdr,
+fcsl_ros_status_t fcsl_ros_walk(const fcsl_ros_reader_plan_t *conversion, fcsl_ros_walk_t *walk, const uint8_t *cdr,
                                 size_t size);
 
 #endif /* FCSL_ROS_WALK_H */

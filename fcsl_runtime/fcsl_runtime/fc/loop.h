@@ -9,7 +9,7 @@
 
 #include "fcsl/fcsl_guard.h"
 #include "fcsl/fcsl_hal.h"
-#include "fcsl/fcsl_journal.h"
+#include "fcsl/fcsl_write_queue.h"
 #include "fcsl/fcsl_observers.h"
 #include "fcsl/fcsl_ros_graph.h"
 #include "fcsl/fcsl_telemetry.h"

@@ -71,15 +71,15 @@ static int64_t find_signal(const fcsl_driver_t *driver, const char *name, const 
     return found;
 }
 
-static int add_entry(outputs_t *outputs, const plan_entry_t *entry, fcsl_error_t *error)
+static int add_assignment(outputs_t *outputs, const output_assignment_t *assignment, fcsl_error_t *error)
 {
-    const fcsl_channel_t *channel = &outputs->machine->channels[entry->channel];
+    const fcsl_channel_t *channel = &outputs->machine->channels[assignment->channel];
     const fcsl_field_t *field = &outputs->machine->fields[channel->field];
-    output_device_t *device = outputs_find_device(outputs, entry->driver, entry->device, error);
+    output_device_t *device = outputs_find_device(outputs, assignment->driver, assignment->device, error);
     if (device == NULL) {
         return -1;
     }
-    const int64_t signal = find_signal(output_device_driver(device), entry->signal, channel, field, error);
+    const int64_t signal = find_signal(output_device_driver(device), assignment->signal, channel, field, error);
     if (signal < 0) {
         return -1;
     }
@@ -88,10 +88,11 @@ static int add_entry(outputs_t *outputs, const plan_entry_t *entry, fcsl_error_t
     return outputs_bind(outputs, &binding, (uint32_t)signal, error);
 }
 
-int outputs_add_actuators(outputs_t *outputs, const plan_entry_t *entries, uint32_t count, fcsl_error_t *error)
+int outputs_add_actuators(outputs_t *outputs, const output_assignment_t *assignments, uint32_t count,
+                          fcsl_error_t *error)
 {
     for (uint32_t i = 0; i < count; i++) {
-        if (entries[i].driver[0] != '\0' && add_entry(outputs, &entries[i], error) != 0) {
+        if (assignments[i].driver[0] != '\0' && add_assignment(outputs, &assignments[i], error) != 0) {
             return -1;
         }
     }

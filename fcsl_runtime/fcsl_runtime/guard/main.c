@@ -26,7 +26,7 @@ typedef struct {
     options_t options;
     realtime_t realtime;
     void *library;
-    plan_entry_t *plan; /* of --actuator */
+    output_assignment_t *assignments; /* of --actuator */
     board_plan_t *board; /* of --board */
     guard_t guard;
     report_t report;
@@ -101,13 +101,13 @@ static int add_actuators(program_t *program, fcsl_error_t *error)
     const options_t *options = &program->options;
     guard_t *guard = &program->guard;
     const uint32_t count = options->actuator_count;
-    program->plan = calloc((size_t)count + 1u, sizeof *program->plan);
-    if (program->plan == NULL) {
+    program->assignments = calloc((size_t)count + 1u, sizeof *program->assignments);
+    if (program->assignments == NULL) {
         return fcsl_fail(error, "out of memory for the plan");
     }
-    return plan_read(guard->machine, options->actuators, count, program->plan, error) == 0 &&
+    return output_assignments_read(guard->machine, options->actuators, count, program->assignments, error) == 0 &&
                    outputs_open(&guard->outputs, guard->machine, count, count, error) == 0 &&
-                   outputs_add_actuators(&guard->outputs, program->plan, count, error) == 0
+                   outputs_add_actuators(&guard->outputs, program->assignments, count, error) == 0
                ? 0
                : -1;
 }
@@ -218,7 +218,7 @@ static void close_all(program_t *program)
     fcsl_guard_unlisten(&program->guard.server);
     printing_end();
     guard_free(&program->guard);
-    free(program->plan);
+    free(program->assignments);
     board_plan_free(program->board);
     options_free(&program->options);
     if (program->library != NULL) {

@@ -7,7 +7,7 @@
 
 #include "board/output_device.h"
 #include "board/output_map.h"
-#include "output_plan.h"
+#include "output_assignment.h"
 
 /* A value of the machine struct, and its place among the values of a device. */
 typedef struct {
@@ -32,8 +32,9 @@ typedef struct {
 /* No devices, and room for so many of each. 0, or -1. */
 int outputs_open(outputs_t *outputs, const fcsl_machine_t *machine, uint32_t devices, uint32_t bindings,
                  fcsl_error_t *error);
-/* Adds what the plan of --actuator says: finds drivers, opens none. 0, or -1. */
-int outputs_add_actuators(outputs_t *outputs, const plan_entry_t *entries, uint32_t count, fcsl_error_t *error);
+/* Adds what --actuator assigns: finds drivers, opens none. 0, or -1. */
+int outputs_add_actuators(outputs_t *outputs, const output_assignment_t *assignments, uint32_t count,
+                          fcsl_error_t *error);
 /* Adds what the plan of a board, read from `file`, says. Every element of every actuator channel must have a pulse. `plan` must last
  * until outputs_close. 0, or -1. */
 int outputs_add_board(outputs_t *outputs, const board_plan_t *plan, const char *file, fcsl_error_t *error);

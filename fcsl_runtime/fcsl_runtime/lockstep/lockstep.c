@@ -19,7 +19,7 @@ struct fcsl_lockstep {
     fcsl_run_t *run;
     const fcsl_machine_t *machine;
     fcsl_topics_t *topics;
-    fcsl_outbox_t *outbox;
+    fcsl_publish_queue_t *queue;
     fcsl_hal_t hal;
     int looks; /* for a simulator; it may be connected */
     int connected;
@@ -56,8 +56,8 @@ static void release(fcsl_lockstep_t *lockstep)
     free(lockstep);
 }
 
-fcsl_lockstep_t *fcsl_lockstep_new(fcsl_run_t *run, fcsl_topics_t *topics, fcsl_outbox_t *outbox, const char *address,
-                                   const char *name_space, fcsl_error_t *error)
+fcsl_lockstep_t *fcsl_lockstep_new(fcsl_run_t *run, fcsl_topics_t *topics, fcsl_publish_queue_t *queue,
+                                   const char *address, const char *name_space, fcsl_error_t *error)
 {
     const fcsl_machine_t *machine = fcsl_run_machine(run);
     fcsl_lockstep_t *lockstep = calloc(1, sizeof *lockstep);
@@ -68,7 +68,7 @@ fcsl_lockstep_t *fcsl_lockstep_new(fcsl_run_t *run, fcsl_topics_t *topics, fcsl_
     lockstep->run = run;
     lockstep->machine = machine;
     lockstep->topics = topics;
-    lockstep->outbox = outbox;
+    lockstep->queue = queue;
     lockstep->sensor_capacity = fcsl_message_capacity(machine, FCSL_SENSOR_MESSAGE);
     lockstep->actuator_capacity = fcsl_message_capacity(machine, FCSL_ACTUATOR_MESSAGE);
     lockstep->sensor_bytes = malloc(lockstep->sensor_capacity);
@@ -248,6 +248,6 @@ int fcsl_lockstep_run(fcsl_lockstep_t *lockstep, uint32_t slice_ms, fcsl_error_t
             status = end_of(lockstep, sampled, error);
         }
     }
-    fcsl_outbox_wake(lockstep->outbox);
+    fcsl_publish_queue_wake(lockstep->queue);
     return status;
 }

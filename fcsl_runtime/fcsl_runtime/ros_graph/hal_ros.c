@@ -12,7 +12,7 @@
 
 #include "fcsl/fcsl_error.h"
 #include "endpoint.h"
-#include "fcsl/fcsl_ros_inlet.h"
+#include "fcsl/fcsl_sample_input.h"
 #include "type_hashes.h"
 
 enum {
@@ -64,7 +64,7 @@ static const fcsl_field_t FIELDS[] = {
 
 typedef struct {
     fcsl_ros_reader_t *reader;
-    fcsl_ros_inlet_t *inlet;
+    fcsl_sample_input_t *input;
 } sensor_t;
 
 typedef struct {
@@ -106,7 +106,7 @@ static fcsl_hal_status_t ros_sample(void *ctx, uint64_t tick, const fcsl_sink_t 
     for (uint32_t i = 0; i < hal->sensor_count; i++) {
         size_t size = 0;
         if (fcsl_bus_take(hal->bus, i, hal->message, &size)) {
-            (void)fcsl_ros_deliver(hal->sensors[i].inlet, hal->message, size, hal->now_ns, NULL);
+            (void)fcsl_sample_input_deliver(hal->sensors[i].input, hal->message, size, hal->now_ns, NULL);
         }
     }
     return FCSL_HAL_OK;
@@ -164,7 +164,7 @@ static void ros_count(void *ctx)
     counters->messages = 0;
     memset(counters->refused, 0, sizeof counters->refused);
     for (uint32_t i = 0; i < hal->sensor_count; i++) {
-        const uint64_t *counts = fcsl_ros_inlet_counts(hal->sensors[i].inlet);
+        const uint64_t *counts = fcsl_sample_input_counts(hal->sensors[i].input);
         counters->messages += counts[FCSL_ROS_TAKEN];
         for (uint32_t status = FCSL_ROS_TAKEN + 1u; status < FCSL_ROS_STATUSES; status++) {
             counters->refused[status] += counts[status];
@@ -192,7 +192,7 @@ static void ros_close(void *ctx)
         (void)fcsl_bus_close(hal->bus, CLOSE_MS);
     }
     for (uint32_t i = 0; i < hal->sensor_count; i++) {
-        fcsl_ros_inlet_free(hal->sensors[i].inlet);
+        fcsl_sample_input_free(hal->sensors[i].input);
         fcsl_ros_reader_free(hal->sensors[i].reader);
     }
     for (uint32_t i = 0; i < hal->output_count; i++) {
@@ -291,8 +291,8 @@ static int add_sensor(hal_t *hal, const fcsl_ros_message_t *message, fcsl_error_
     if (sensor->reader == NULL) {
         return fcsl_fail(error, "topic %.100s: %s", message->topic, reason.text);
     }
-    sensor->inlet = fcsl_ros_inlet_new(hal->run, sensor->reader, message->channels, message->channel_count, error);
-    return sensor->inlet != NULL ? 0 : -1;
+    sensor->input = fcsl_sample_input_new(hal->run, sensor->reader, message->channels, message->channel_count, error);
+    return sensor->input != NULL ? 0 : -1;
 }
 
 static int add_output(hal_t *hal, const fcsl_ros_message_t *message, fcsl_error_t *error)

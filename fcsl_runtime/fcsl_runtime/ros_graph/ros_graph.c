@@ -10,7 +10,7 @@
 #include <time.h>
 
 #include "fcsl/fcsl_error.h"
-#include "observers/follower.h"
+#include "observers/history_reader.h"
 #include "ros_topics.h"
 #include "fcsl/fcsl_tick_time.h"
 
@@ -24,7 +24,7 @@ enum {
 static const uint64_t RING_BYTES = UINT64_C(4) << 20;
 
 struct fcsl_ros_graph {
-    follower_t follower;
+    history_reader_t reader;
     ros_topics_t topics;
     fcsl_bus_t *bus; /* its outputs are the topics */
     uint8_t *message; /* the longest */
@@ -43,7 +43,7 @@ static int wants_all(void *ctx)
     return 1;
 }
 
-static void pass_over_none(void *ctx)
+static void skip_none(void *ctx)
 {
     (void)ctx;
 }
@@ -68,7 +68,7 @@ static uint64_t clock_ns(clockid_t clock)
 }
 
 /* When the tick was: its own time, or that of the system's clock at which it began. */
-static uint64_t time_of(const fcsl_ros_graph_t *g, const followed_tick_t *tick)
+static uint64_t time_of(const fcsl_ros_graph_t *g, const published_tick_t *tick)
 {
     if (g->simulated) {
         return fcsl_tick_time_ns(g->topics.machine->tick_hz, tick->number);
@@ -77,7 +77,7 @@ static uint64_t time_of(const fcsl_ros_graph_t *g, const followed_tick_t *tick)
 }
 
 /* The messages of the first `count` topics. Returns 0, or -1: one found no room. */
-static int post(fcsl_ros_graph_t *g, const followed_tick_t *tick, uint32_t count)
+static int post(fcsl_ros_graph_t *g, const published_tick_t *tick, uint32_t count)
 {
     const fcsl_stamp_t stamp = {.tick = tick->number, .time_ns = time_of(g, tick)};
     int failed = 0;
@@ -95,7 +95,7 @@ static int post(fcsl_ros_graph_t *g, const followed_tick_t *tick, uint32_t count
     return failed ? -1 : 0;
 }
 
-static int put(void *ctx, const followed_tick_t *tick)
+static int put(void *ctx, const published_tick_t *tick)
 {
     fcsl_ros_graph_t *g = ctx;
     return post(g, tick, g->topics.count);
@@ -106,7 +106,7 @@ static void see(void *ctx, const fcsl_moment_t *moment, const uint8_t *publicati
 {
     fcsl_ros_graph_t *g = ctx;
     if (moment->tick == g->completed) {
-        const followed_tick_t tick = {.publication = publication,
+        const published_tick_t tick = {.publication = publication,
                                       .number = moment->tick > 0u ? moment->tick - 1u : 0u,
                                       .begun_ns = moment->time_ns,
                                       .requires_arming = moment->requires_arming != 0u};
@@ -170,10 +170,10 @@ fcsl_ros_graph_t *fcsl_ros_graph_open(const fcsl_ros_graph_options_t *options, c
         (void)fcsl_fail(error, "out of memory for the ROS 2 graph");
         return NULL;
     }
-    const follower_sink_t sink = {
-        .ctx = g, .wants = wants_all, .pass_over = pass_over_none, .ready = is_ready, .see = see, .put = put};
+    const history_reader_sink_t sink = {
+        .ctx = g, .wants = wants_all, .skip = skip_none, .ready = is_ready, .observe = see, .put = put};
     g->simulated = options->simulated;
-    if (follower_open(&g->follower, history, options->machine->tick_hz, &sink) != 0) {
+    if (history_reader_open(&g->reader, history, options->machine->tick_hz, &sink) != 0) {
         (void)fcsl_fail(error, "out of memory for the ROS 2 graph");
     } else if (ros_topics_build(&g->topics, options, error) == 0 && listen_on(g, options->endpoint, error) == 0) {
         return g;
@@ -184,13 +184,13 @@ fcsl_ros_graph_t *fcsl_ros_graph_open(const fcsl_ros_graph_options_t *options, c
 
 int fcsl_ros_graph_start(fcsl_ros_graph_t *graph, fcsl_error_t *error)
 {
-    return follower_start(&graph->follower, error);
+    return history_reader_start(&graph->reader, error);
 }
 
 void fcsl_ros_graph_stop(fcsl_ros_graph_t *graph)
 {
     if (graph != NULL) {
-        follower_stop(&graph->follower);
+        history_reader_stop(&graph->reader);
     }
 }
 
@@ -199,7 +199,7 @@ void fcsl_ros_graph_close(fcsl_ros_graph_t *graph)
     if (graph == NULL) {
         return;
     }
-    follower_close(&graph->follower);
+    history_reader_close(&graph->reader);
     if (graph->bus != NULL) {
         (void)fcsl_bus_close(graph->bus,
                              CLOSE_MS); /* a frozen bridge may hold it up: what is left of it goes on alone */
@@ -212,8 +212,8 @@ void fcsl_ros_graph_close(fcsl_ros_graph_t *graph)
 void fcsl_ros_graph_count(const fcsl_ros_graph_t *graph, fcsl_ros_graph_counters_t *counters)
 {
     *counters =
-        (fcsl_ros_graph_counters_t){.ticks = follower_ticks(&graph->follower),
-                                    .dropped = follower_dropped(&graph->follower),
+        (fcsl_ros_graph_counters_t){.ticks = history_reader_ticks(&graph->reader),
+                                    .dropped = history_reader_dropped(&graph->reader),
                                     .refused = atomic_load_explicit(&graph->topics.refused, memory_order_relaxed)};
 }
 

@@ -1,7 +1,7 @@
 /* SPDX-License-Identifier: Apache-2.0
  *
  * Reading ROS 2 messages that come from anybody: every length, random bytes, lengths of 4 billion. Each message ends where
- * its page does, and the next page cannot be read, so that one byte too many ends the test. Plans that do not hold together
+ * its page does, and the next page cannot be read, so that one byte too many ends the test. Conversions that do not hold together
  * are refused, and nothing is allocated while messages are read, delivered or composed.
  * Argument: the fixture library.
  */
@@ -11,10 +11,10 @@
 #include <unistd.h>
 
 #include "fcsl/fcsl_cdr.h"
-#include "fcsl/fcsl_ros_inlet.h"
+#include "fcsl/fcsl_sample_input.h"
 #include "fcsl_allocations.h"
 #include "fcsl_check.h"
-#include "ros_plan.h"
+#include "ros_conversion.h"
 
 enum { PAGE = 4096, MUTATIONS = 200000 };
 
@@ -135,10 +135,10 @@ static void test_random_bytes(fcsl_ros_reader_t *reader, uint8_t *page)
     CHECK(seen[FCSL_ROS_SHAPE] > 0 && seen[FCSL_ROS_RANGE] > 0);
 }
 
-static int plan_is_refused(const fcsl_ros_reader_plan_t *plan)
+static int conversion_is_refused(const fcsl_ros_reader_plan_t *conversion)
 {
     fcsl_error_t error = {{0}};
-    fcsl_ros_reader_t *reader = fcsl_ros_reader_new(plan, &error);
+    fcsl_ros_reader_t *reader = fcsl_ros_reader_new(conversion, &error);
     fcsl_ros_reader_free(reader);
     return reader == NULL && error.text[0] != '\0';
 }
@@ -147,9 +147,9 @@ static int plan_is_refused(const fcsl_ros_reader_plan_t *plan)
     do {                                                                                                               \
         memcpy(copy_of_##field, table, sizeof copy_of_##field);                                                        \
         copy_of_##field[index].member = (value);                                                                       \
-        fcsl_ros_reader_plan_t plan = PLAN;                                                                            \
-        plan.field = copy_of_##field;                                                                                  \
-        CHECK(plan_is_refused(&plan));                                                                                 \
+        fcsl_ros_reader_plan_t conversion = CONVERSION;                                                                \
+        conversion.field = copy_of_##field;                                                                            \
+        CHECK(conversion_is_refused(&conversion));                                                                     \
     } while (0)
 
 static void test_plans(void)
@@ -186,9 +186,9 @@ static void test_plans(void)
     WRONG(ROW_VALUES, values, 2, size, 9);
     WRONG(ROW_VALUES, values, 2, row_count, 3);
     WRONG(ROW_VALUES, values, 0, guard_count, 1);
-    fcsl_ros_reader_plan_t plan = PLAN;
-    plan.stamp_offset = 1;
-    CHECK(plan_is_refused(&plan));
+    fcsl_ros_reader_plan_t conversion = CONVERSION;
+    conversion.stamp_offset = 1;
+    CHECK(conversion_is_refused(&conversion));
 }
 
 static void test_many(fcsl_ros_reader_t *reader)
@@ -209,7 +209,7 @@ static void test_many(fcsl_ros_reader_t *reader)
 }
 
 /* std_msgs/Float64MultiArray, the gyro of the fixture: 3 numbers. */
-static void test_inlet(const char *library)
+static void test_sample_input(const char *library)
 {
     static const fcsl_ros_part_t parts[] = {{FCSL_ROS_BLOCK, 8, 8, 0, 0}, {FCSL_ROS_SEQUENCE, 8, 8, 0, 1}};
     static const fcsl_ros_pick_t picks[] = {{1, 3, 0, FCSL_ROS_NONE}};
@@ -218,27 +218,27 @@ static void test_inlet(const char *library)
     static const fcsl_ros_row_t rows[] = {
         {0, 1, 0, FCSL_ROS_F64, 0, 0, 0, 0}, {1, 1, 8, FCSL_ROS_F64, 0, 0, 0, 0}, {2, 1, 16, FCSL_ROS_F64, 0, 0, 0, 0}};
     static const fcsl_ros_value_t values[] = {{0, 24, 0, 3, 0, 0, 0}};
-    const fcsl_ros_reader_plan_t plan = {.parts = parts,
-                                         .picks = picks,
-                                         .values = values,
-                                         .rows = rows,
-                                         .terms = terms,
-                                         .part_count = 2,
-                                         .pick_count = 1,
-                                         .value_count = 1,
-                                         .row_count = 3,
-                                         .term_count = 3,
-                                         .anchor_count = 2,
-                                         .size = 24};
+    const fcsl_ros_reader_plan_t conversion = {.parts = parts,
+                                               .picks = picks,
+                                               .values = values,
+                                               .rows = rows,
+                                               .terms = terms,
+                                               .part_count = 2,
+                                               .pick_count = 1,
+                                               .value_count = 1,
+                                               .row_count = 3,
+                                               .term_count = 3,
+                                               .anchor_count = 2,
+                                               .size = 24};
     static const uint32_t channels[] = {0, 1};
     fcsl_error_t error;
     fcsl_run_t *run = fcsl_run_open(library, "fixture", &error);
-    fcsl_ros_reader_t *reader = fcsl_ros_reader_new(&plan, &error);
+    fcsl_ros_reader_t *reader = fcsl_ros_reader_new(&conversion, &error);
     CHECK(run != NULL && reader != NULL);
-    CHECK(fcsl_ros_inlet_new(run, reader, channels, 2, &error) == NULL);
-    CHECK(fcsl_ros_inlet_new(run, reader, channels + 1, 1, &error) == NULL);
-    fcsl_ros_inlet_t *inlet = fcsl_ros_inlet_new(run, reader, channels, 1, &error);
-    CHECK(inlet != NULL && fcsl_run_attach(run, &error) == 0);
+    CHECK(fcsl_sample_input_new(run, reader, channels, 2, &error) == NULL);
+    CHECK(fcsl_sample_input_new(run, reader, channels + 1, 1, &error) == NULL);
+    fcsl_sample_input_t *input = fcsl_sample_input_new(run, reader, channels, 1, &error);
+    CHECK(input != NULL && fcsl_run_attach(run, &error) == 0);
 
     uint8_t bytes[MESSAGE_MAX];
     counting = 1;
@@ -253,15 +253,15 @@ static void test_inlet(const char *library)
             put_double(&cdr, i + 0.5 * j);
         }
         const size_t size = fcsl_cdr_end(&cdr) - (i % 2 == 0 ? 8u : 0u);
-        CHECK(fcsl_ros_deliver(inlet, bytes, size, now_ns + 1, NULL) == i % 2);
-        CHECK(fcsl_ros_deliver(inlet, bytes, size, now_ns + 1, NULL) == 0);
+        CHECK(fcsl_sample_input_deliver(input, bytes, size, now_ns + 1, NULL) == i % 2);
+        CHECK(fcsl_sample_input_deliver(input, bytes, size, now_ns + 1, NULL) == 0);
         CHECK(fcsl_run_step(run, 1, &error) == 0);
     }
     counting = 0;
     CHECK(allocations == 0);
-    const uint64_t *counts = fcsl_ros_inlet_counts(inlet);
+    const uint64_t *counts = fcsl_sample_input_counts(input);
     CHECK(counts[FCSL_ROS_TAKEN] == 1000 && counts[FCSL_ROS_REPEATED] == 1000 && counts[FCSL_ROS_SHAPE] == 2000);
-    fcsl_ros_inlet_free(inlet);
+    fcsl_sample_input_free(input);
     fcsl_ros_reader_free(reader);
     CHECK(fcsl_run_close(run, &error) == 0);
 }
@@ -271,16 +271,16 @@ static void test_composing(void)
     static const uint8_t text[20] = {0, 1, 0, 0, 1, 2, 3, 4, 5, 6, 7, 8};
     static const fcsl_ros_term_t terms[] = {{2.0, 1, 0, FCSL_ROS_F64}, {-1.0, 0, 8, FCSL_ROS_I32}};
     static const fcsl_ros_row_t rows[] = {{0, 2, 12, FCSL_ROS_F64, 0, 0, 0, 0}};
-    fcsl_ros_composer_plan_t plan = {.text = text,
-                                     .rows = rows,
-                                     .terms = terms,
-                                     .size = sizeof text,
-                                     .row_count = 1,
-                                     .term_count = 2,
-                                     .memory_count = 2,
-                                     .stamp_offset = 4};
+    fcsl_ros_composer_plan_t conversion = {.text = text,
+                                           .rows = rows,
+                                           .terms = terms,
+                                           .size = sizeof text,
+                                           .row_count = 1,
+                                           .term_count = 2,
+                                           .memory_count = 2,
+                                           .stamp_offset = 4};
     fcsl_error_t error;
-    fcsl_ros_composer_t *composer = fcsl_ros_composer_new(&plan, &error);
+    fcsl_ros_composer_t *composer = fcsl_ros_composer_new(&conversion, &error);
     CHECK(composer != NULL);
     const double number = 1.25;
     const int32_t whole[3] = {0, 0, 7};
@@ -295,11 +295,11 @@ static void test_composing(void)
     CHECK(fcsl_ros_compose(composer, memories, -1, out) == FCSL_ROS_STAMP);
     CHECK(fcsl_ros_compose(composer, memories, (int64_t)INT32_MAX * 1000000000 + 1000000000, out) == FCSL_ROS_STAMP);
     fcsl_ros_composer_free(composer);
-    plan.stamp_offset = 13;
-    CHECK(fcsl_ros_composer_new(&plan, &error) == NULL);
-    plan.stamp_offset = 4;
-    plan.memory_count = 1;
-    CHECK(fcsl_ros_composer_new(&plan, &error) == NULL);
+    conversion.stamp_offset = 13;
+    CHECK(fcsl_ros_composer_new(&conversion, &error) == NULL);
+    conversion.stamp_offset = 4;
+    conversion.memory_count = 1;
+    CHECK(fcsl_ros_composer_new(&conversion, &error) == NULL);
 
     /* Nothing but constants and a stamp: no tables at all. */
     const fcsl_ros_composer_plan_t constant = {.text = text, .size = sizeof text, .stamp_offset = 4};
@@ -312,7 +312,7 @@ int main(int argc, char **argv)
 {
     CHECK(argc == 2 && sizeof(row_t) == 40);
     fcsl_error_t error = {{0}};
-    fcsl_ros_reader_t *reader = fcsl_ros_reader_new(&PLAN, &error);
+    fcsl_ros_reader_t *reader = fcsl_ros_reader_new(&CONVERSION, &error);
     CHECK(reader != NULL);
     uint8_t *page = guarded_page();
     test_reading(reader, page);
@@ -321,7 +321,7 @@ int main(int argc, char **argv)
     test_many(reader);
     fcsl_ros_reader_free(reader);
     test_plans();
-    test_inlet(argv[1]);
+    test_sample_input(argv[1]);
     test_composing();
     return 0;
 }

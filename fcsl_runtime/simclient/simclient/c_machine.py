@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""fcsl/fcsl_machine.h in Python: a ctypes mirror, and the names of its numbers.
+"""fcsl/fcsl_machine.h in Python: as ctypes, and the names of its numbers.
 
 This is the only Python copy of the C layout; a test compares it with the compiler's parse of the header.
 """

@@ -331,7 +331,7 @@ def test_a_stopped_guard_knows_how_old_its_command_is(guard: Guard) -> None:
 def test_the_page_names_tests_that_there_are() -> None:
     page = (ROOT / "docs/hardware/arming.md").read_text()
     named = set(re.findall(r"`(test_\w+)`", page))
-    files = [Path(__file__).with_name(f"test_guard{name}.py") for name in ("", "_plan", "_board")]
+    files = [Path(__file__).with_name(f"test_guard{name}.py") for name in ("", "_assignment", "_board")]
     assert len(named) > 10 and named <= {
         n for file in files for n in re.findall(r"^def (test_\w+)", file.read_text(), re.M)
     }

@@ -20,7 +20,7 @@ from simclient.errors import TwinError
 from simclient.machine_build import build_config
 from simclient.replay import replay
 from simclient.ros import native
-from simclient.ros.topics import Inlet, RosTopic, composer_of, reader_of, topics_of
+from simclient.ros.topics import RosTopic, SampleInput, composer_of, reader_of, topics_of
 from simclient.run import Run, open_run
 
 STORE = get_typestore(Stores.ROS2_JAZZY)
@@ -100,8 +100,8 @@ class CompiledMessage(ctypes.Structure):
         ("direction", ctypes.c_uint8),
         ("channels", ctypes.POINTER(ctypes.c_uint32)),
         ("channel_count", ctypes.c_uint32),
-        ("composer", ctypes.POINTER(native.CComposerPlan)),
-        ("reader", ctypes.POINTER(native.CReaderPlan)),
+        ("composer", ctypes.POINTER(native.CComposerConversion)),
+        ("reader", ctypes.POINTER(native.CReaderConversion)),
     ]
 
 
@@ -112,13 +112,13 @@ def compiled_messages(run: Run) -> list[CompiledMessage]:
     return [table[i] for i in range(described.ros_message_count)]
 
 
-def contents(plan: Any) -> dict[str, Any]:
-    """A plan, or a row of one of its tables, with the tables that it points to."""
+def contents(conversion: Any) -> dict[str, Any]:
+    """A conversion, or a row of one of its tables, with the tables that it points to."""
     found: dict[str, Any] = {}
-    for name, kind in plan._fields_:
-        member = getattr(plan, name)
+    for name, kind in conversion._fields_:
+        member = getattr(conversion, name)
         if hasattr(kind, "contents"):
-            count = plan.size if name == "text" else getattr(plan, f"{name[:-1]}_count")
+            count = conversion.size if name == "text" else getattr(conversion, f"{name[:-1]}_count")
             member = [member[i] for i in range(count)]
             member = [contents(row) if isinstance(row, ctypes.Structure) else row for row in member]
         elif isinstance(member, ctypes.Structure):
@@ -168,8 +168,8 @@ def test_channels_of_a_topic_share_a_message(run: Run) -> None:
     ]
 
 
-def test_the_machine_has_the_plans_of_its_topics(run: Run) -> None:
-    """The compiled plans are those that Python makes of the descriptor, where the struct is known."""
+def test_the_machine_has_the_conversions_of_its_topics(run: Run) -> None:
+    """The compiled conversions are those that Python makes of the descriptor, where the struct is known."""
     topics = topics_of(run.machine)
     compiled = compiled_messages(run)
     assert [(m.topic.decode(), m.type.decode(), m.direction) for m in compiled] == [
@@ -177,14 +177,14 @@ def test_the_machine_has_the_plans_of_its_topics(run: Run) -> None:
     ]
     for message, made in zip(compiled, topics, strict=True):
         assert [message.channels[i] for i in range(message.channel_count)] == [c.index for c in made.channels]
-        assert contents(message.reader.contents) == contents(reader_of(made)._plan)
-        assert contents(message.composer.contents) == contents(composer_of(made)._plan)
+        assert contents(message.reader.contents) == contents(reader_of(made)._conversion)
+        assert contents(message.composer.contents) == contents(composer_of(made)._conversion)
 
 
 def test_a_message_becomes_samples(run: Run) -> None:
-    inlet = Inlet(run, topic(run, "imu"))
+    sample_input = SampleInput(run, topic(run, "imu"))
     now = 5 * SECOND
-    assert inlet.deliver(imu(now - 25 * MS), now) == 2
+    assert sample_input.deliver(imu(now - 25 * MS), now) == 2
     run.step(1)
     assert value(run, "show.outputs.gyro") == [1.0, -2.0, -3.0]
     assert np.allclose(value(run, "show.outputs.attitude"), [1.0, 0.0, 0.0, 0.0], atol=1e-15)  # facing north
@@ -192,57 +192,57 @@ def test_a_message_becomes_samples(run: Run) -> None:
     assert value(run, "channels.imu.gyro.age_ticks") == 2 and value(run, "channels.imu.gyro.valid")
     run.step(2)  # no new one: it grows old, and invalid beyond max_age_ticks
     assert value(run, "channels.imu.gyro.age_ticks") == 4 and not value(run, "channels.imu.gyro.valid")
-    assert inlet.counts() == {"taken": 1}
+    assert sample_input.counts() == {"taken": 1}
 
 
 def test_each_channel_is_taken_or_not(run: Run) -> None:
-    inlet = Inlet(run, topic(run, "imu"))
-    assert inlet.deliver(imu(SECOND, measured=False), SECOND) == 1
-    assert inlet.deliver(imu(SECOND + 1, rate=math.nan), SECOND + 1) == 1
-    assert inlet.deliver(imu(SECOND + 2, rate=math.nan, measured=False), SECOND + 2) == 0
+    sample_input = SampleInput(run, topic(run, "imu"))
+    assert sample_input.deliver(imu(SECOND, measured=False), SECOND) == 1
+    assert sample_input.deliver(imu(SECOND + 1, rate=math.nan), SECOND + 1) == 1
+    assert sample_input.deliver(imu(SECOND + 2, rate=math.nan, measured=False), SECOND + 2) == 0
     run.step(1)
     assert value(run, "show.outputs.gyro") == [1.0, -2.0, -3.0] and value(run, "show.outputs.attitude") != [0.0] * 4
-    assert inlet.counts() == {"taken": 2, "nan": 2, "unmeasured": 2}
-    inlet = Inlet(run, topic(run, "/joy"))
-    assert inlet.deliver(joy(SECOND, [0.0, 0.25], [2]), SECOND) == 1
-    assert inlet.deliver(joy(SECOND + 1, [0.0], [1]), SECOND + 1) == 1
+    assert sample_input.counts() == {"taken": 2, "nan": 2, "unmeasured": 2}
+    sample_input = SampleInput(run, topic(run, "/joy"))
+    assert sample_input.deliver(joy(SECOND, [0.0, 0.25], [2]), SECOND) == 1
+    assert sample_input.deliver(joy(SECOND + 1, [0.0], [1]), SECOND + 1) == 1
     run.step(1)
     assert value(run, "show.inputs.stick") == 0.25 and value(run, "show.inputs.arm") is True
-    assert inlet.counts() == {"taken": 2, "range": 1, "shape": 1}
+    assert sample_input.counts() == {"taken": 2, "range": 1, "shape": 1}
 
 
 def test_a_quaternion_of_length_zero_is_no_rotation(run: Run) -> None:
     """Unless the message says that it has none (REP-145): then nothing was to be refused."""
-    inlet = Inlet(run, topic(run, "imu"))
-    assert inlet.deliver(imu(SECOND), SECOND) == 2
+    sample_input = SampleInput(run, topic(run, "imu"))
+    assert sample_input.deliver(imu(SECOND), SECOND) == 2
     run.step(1)
     before = value(run, "show.outputs.attitude")
-    assert inlet.deliver(imu(SECOND + 1, rate=4.0, half=0.0), SECOND + 1) == 1
-    assert inlet.deliver(imu(SECOND + 2, rate=5.0, half=-0.0), SECOND + 2) == 1
-    assert inlet.deliver(imu(SECOND + 3, rate=6.0, half=0.0, measured=False), SECOND + 3) == 1
+    assert sample_input.deliver(imu(SECOND + 1, rate=4.0, half=0.0), SECOND + 1) == 1
+    assert sample_input.deliver(imu(SECOND + 2, rate=5.0, half=-0.0), SECOND + 2) == 1
+    assert sample_input.deliver(imu(SECOND + 3, rate=6.0, half=0.0, measured=False), SECOND + 3) == 1
     run.step(1)
     assert value(run, "show.outputs.attitude") == before and value(run, "show.outputs.gyro")[0] == 6.0
-    assert inlet.counts() == {"taken": 4, "rotation": 2, "unmeasured": 1}
-    assert inlet.deliver(imu(SECOND + 4, half=1e-300), SECOND + 4) == 2  # any other length is one
+    assert sample_input.counts() == {"taken": 4, "rotation": 2, "unmeasured": 1}
+    assert sample_input.deliver(imu(SECOND + 4, half=1e-300), SECOND + 4) == 2  # any other length is one
 
 
 def test_a_missing_channel_gets_nothing_and_the_others_of_its_message_do(run: Run) -> None:
     """As in lock-step, where the frame lacks that channel alone."""
-    inlet = Inlet(run, topic(run, "/joy"))
-    assert inlet.deliver(joy(SECOND, [0.0, 0.25], [1]), SECOND, frozenset({"stick", "imu.gyro"})) == 1
+    sample_input = SampleInput(run, topic(run, "/joy"))
+    assert sample_input.deliver(joy(SECOND, [0.0, 0.25], [1]), SECOND, frozenset({"stick", "imu.gyro"})) == 1
     run.step(1)
     assert value(run, "show.inputs.stick") == 0.0 and value(run, "show.inputs.arm") is True
-    assert inlet.deliver(joy(SECOND + 1, [0.0, 0.5], [0]), SECOND + 1, frozenset({"stick", "arm"})) == 0
-    assert inlet.deliver(joy(SECOND + 1, [0.0, 0.5], [0]), SECOND + 1) == 2, (
+    assert sample_input.deliver(joy(SECOND + 1, [0.0, 0.5], [0]), SECOND + 1, frozenset({"stick", "arm"})) == 0
+    assert sample_input.deliver(joy(SECOND + 1, [0.0, 0.5], [0]), SECOND + 1) == 2, (
         "a message nothing was taken of is not known"
     )
     run.step(1)
     assert value(run, "show.inputs.stick") == 0.5 and value(run, "show.inputs.arm") is False
-    assert inlet.counts() == {"taken": 2}
+    assert sample_input.counts() == {"taken": 2}
 
 
 def test_time_of_messages(run: Run) -> None:
-    inlet = Inlet(run, topic(run, "imu"))
+    sample_input = SampleInput(run, topic(run, "imu"))
     now = 100 * SECOND
     for stamp, at, written in (
         (now + 50 * MS, now, 2),  # ahead by 50 ms: clocks are never quite equal
@@ -255,8 +255,8 @@ def test_time_of_messages(run: Run) -> None:
         (now - SECOND, now - SECOND, 2),  # the clock was set back
         (now - SECOND, now, 0),
     ):
-        assert inlet.deliver(imu(stamp), at) == written, stamp - now
-    assert inlet.counts() == {"taken": 4, "future": 1, "older": 1, "repeated": 3}
+        assert sample_input.deliver(imu(stamp), at) == written, stamp - now
+    assert sample_input.counts() == {"taken": 4, "future": 1, "older": 1, "repeated": 3}
     run.step(1)
     assert value(run, "channels.imu.gyro.age_ticks") == 0
 
@@ -265,14 +265,14 @@ def test_time_of_messages(run: Run) -> None:
     ("age_ns", "ticks"), [(0, 0), (10 * MS - 1, 0), (10 * MS, 1), (3 * SECOND, 300), (10**18, 2**32 - 1)]
 )
 def test_age_in_whole_ticks(run: Run, age_ns: int, ticks: int) -> None:
-    inlet = Inlet(run, topic(run, "imu"))
-    assert inlet.deliver(imu(SECOND), SECOND + age_ns) == 2
+    sample_input = SampleInput(run, topic(run, "imu"))
+    assert sample_input.deliver(imu(SECOND), SECOND + age_ns) == 2
     run.step(1)
     assert value(run, "channels.imu.gyro.age_ticks") == ticks
 
 
 def test_what_is_refused_changes_nothing(run: Run) -> None:
-    inlet = Inlet(run, topic(run, "imu"))
+    sample_input = SampleInput(run, topic(run, "imu"))
     before = run.save()
     good = imu(SECOND)
     bad = {
@@ -283,17 +283,17 @@ def test_what_is_refused_changes_nothing(run: Run) -> None:
         "frame": imu(SECOND, frame="imu"),
     }
     for data in (*bad.values(), b"", good[:3]):
-        assert inlet.deliver(data, SECOND) == 0
+        assert sample_input.deliver(data, SECOND) == 0
     assert run.save() == before
-    assert inlet.counts() == {"taken": 0, **dict.fromkeys(bad, 1), "truncated": 3}
+    assert sample_input.counts() == {"taken": 0, **dict.fromkeys(bad, 1), "truncated": 3}
 
 
 def test_the_record_replays_them(config: Path, run: Run, tmp_path: Path) -> None:
-    inlet = Inlet(run, topic(run, "imu"))
+    sample_input = SampleInput(run, topic(run, "imu"))
     run.record(tmp_path / "bag", "", lossless=True)
     for i in range(50):
         if i % 3:
-            inlet.deliver(imu(SECOND + i * 10 * MS, rate=float(i)), SECOND + i * 10 * MS + 15 * MS * (i % 4))
+            sample_input.deliver(imu(SECOND + i * 10 * MS, rate=float(i)), SECOND + i * 10 * MS + 15 * MS * (i % 4))
         run.step(1)
     run.record_stop()
     verdict = replay(tmp_path / "bag", config=str(config))
@@ -344,18 +344,18 @@ def test_a_topic_of_another_machine_is_refused(run: Run) -> None:
         ((replace(gyro, index=topic(run, "thrust").channels[0].index), attitude), "no sensor channel number"),
     ):
         with pytest.raises(TwinError, match=reason):
-            Inlet(run, replace(imu_topic, channels=channels))
+            SampleInput(run, replace(imu_topic, channels=channels))
 
 
 def test_a_closed_run_is_an_error(config: Path) -> None:
     library, name = build_config(config)
     run = open_run(library, name)
-    inlet = Inlet(run, topic(run, "imu"))
+    sample_input = SampleInput(run, topic(run, "imu"))
     run.close()
     with pytest.raises(TwinError, match="closed"):
-        inlet.deliver(imu(SECOND), SECOND)
+        sample_input.deliver(imu(SECOND), SECOND)
     with pytest.raises(TwinError, match="closed"):
         _ = run.address
-    assert inlet.counts() == {"taken": 0}
-    del inlet
+    assert sample_input.counts() == {"taken": 0}
+    del sample_input
     gc.collect()

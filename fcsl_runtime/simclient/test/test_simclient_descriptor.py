@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""The ctypes mirror of the machine ABI lies in memory exactly as the C compiler lays out the header."""
+"""The machine ABI as ctypes lies in memory exactly as the C compiler lays out the header."""
 
 from __future__ import annotations
 
@@ -39,12 +39,12 @@ C_CONSTANTS = {
 
 def test_layout_is_the_c_compilers(tmp_path: Path) -> None:
     lines, expected = [], []
-    for name, mirror in STRUCTS.items():
+    for name, ours in STRUCTS.items():
         lines.append(f'printf("%zu\\n", sizeof({name}));')
-        expected.append(ctypes.sizeof(mirror))
-        for member, *_ in mirror._fields_:
+        expected.append(ctypes.sizeof(ours))
+        for member, *_ in ours._fields_:
             lines.append(f'printf("%zu\\n", offsetof({name}, {member.rstrip("_")}));')
-            expected.append(getattr(mirror, member).offset)
+            expected.append(getattr(ours, member).offset)
     for name, value in C_CONSTANTS.items():
         lines.append(f'printf("%d\\n", (int){name});')
         expected.append(value)

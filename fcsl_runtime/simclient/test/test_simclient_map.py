@@ -21,7 +21,7 @@ from simclient.bag.digest import digest
 from simclient.cli import Progress
 from simclient.replay import replay, replay_foreign
 from simclient.replay.mapping import read_map
-from simclient.replay.tick_alignment import first_tick_at, first_ticks_at, nearest_ticks, place, tick_count
+from simclient.replay.tick_alignment import align, first_tick_at, first_ticks_at, nearest_ticks, tick_count
 
 START = 100 * 10**9
 
@@ -58,7 +58,7 @@ def test_placing_agrees_with_a_naive_search(stamps: list[tuple[int, str]], hz: i
     times = [time for _, _, time in samples]
     first_ns = min(times) + first * MS
     ticks = tick_count(first_ns, max(times), hz)
-    due, chosen, coverage = place(np.array(times, np.int64), first_ns, ticks, hz)
+    due, chosen, coverage = align(np.array(times, np.int64), first_ns, ticks, hz)
 
     naive: dict[int, int] = {}
     in_force, held, waiting = None, 0, 0

@@ -11,7 +11,7 @@ from pathlib import Path
 
 from fcsl_compiler.api.types import scalar_of
 from simclient.errors import TwinError
-from simclient.twin.trace import Columns, merged, places
+from simclient.twin.trace import Columns, merged, value_offsets
 
 from .. import plan
 from ..config import SimConfig
@@ -64,7 +64,7 @@ class Flights:
         self._base = SimRun(study.config)
         fields = [study.machine.fields[path] for path in sorted(study.paths() | {_TICK})]
         self._ranges = merged(fields)
-        self._at = places(fields, self._ranges)
+        self._at = value_offsets(fields, self._ranges)
         self._row_bytes = sum(size for _, size in self._ranges)
         if study.all_ticks() and study.config.ticks * self._row_bytes > _MAX_TRACE_BYTES:
             size = study.config.ticks * self._row_bytes >> 20

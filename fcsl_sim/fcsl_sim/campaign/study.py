@@ -17,7 +17,7 @@ from fcsl_compiler.api.types import Scalar, scalar_of, shape_of
 from simclient.descriptor import Machine
 
 from ..config import SimConfig, load
-from ..element_path import name_an_element, place_of, split_path
+from ..element_path import name_an_element, row_major_index, split_path
 from ..errors import SimError
 from ..models import ModelField
 from ..plan import Target
@@ -205,7 +205,7 @@ class _Reader:
             self.sink.error("E210", f"there is no parameter or input `{whole}` of a model", span, help=fix)
             return None
         shape = shape_of(field.type)
-        place = place_of(index, shape)
+        place = row_major_index(index, shape)
         if place is None or len(index) < len(shape):
             what = f"`{whole}` is {field.type}; a study disperses scalars"
             self.sink.error("E217", what, span, help=name_an_element(whole, shape))

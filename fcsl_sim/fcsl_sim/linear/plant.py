@@ -17,7 +17,7 @@ from fcsl_compiler.api.diagnostics import nearest
 from fcsl_compiler.api.types import scalar_of, shape_of
 
 from ..config import SimConfig
-from ..element_path import place_of, split_path
+from ..element_path import row_major_index, split_path
 from ..errors import SimError
 from ..models import ModelField
 from ..native import Simulation
@@ -101,7 +101,7 @@ class Plant:
         if scalar not in _FORMATS:
             raise SimError(f"`{path}` is {field.type}, no floating number")
         shape = shape_of(field.type)
-        if index and (len(index) < len(shape) or place_of(index, shape) is None):
+        if index and (len(index) < len(shape) or row_major_index(index, shape) is None):
             raise SimError(f"`{path}`: there is no such element of {field.type}")
         wanted = [index] if index or not shape else list(np.ndindex(*shape))
         size = struct.calcsize(_FORMATS[scalar])

@@ -35,7 +35,7 @@ from simclient.errors import TwinError
 from simclient.twin.trace import Trace
 
 from ..config import SimConfig, load
-from ..element_path import place_of, split_path
+from ..element_path import row_major_index, split_path
 from ..errors import SimError
 from ..sim_run import SimRun
 from ..sim_twin import SimTwin
@@ -273,7 +273,7 @@ class _Output:
         self.path = path
         self.field, self.element = split_path(path)
         field = twin.describe(self.field)
-        if len(self.element) < len(field.shape) or place_of(self.element, field.shape) is None:
+        if len(self.element) < len(field.shape) or row_major_index(self.element, field.shape) is None:
             raise SimError(
                 f"`{path}`: {self.field} is {field.type_text}; name one element of it, or itself if it is a number"
             )

@@ -14,7 +14,7 @@
 
 #include "fcsl/fcsl_external.h"
 #include "fcsl/fcsl_model.h"
-#include "fcsl/fcsl_outbox.h"
+#include "fcsl/fcsl_publish_queue.h"
 #include "fcsl/fcsl_ros.h"
 #include "fcsl/fcsl_run.h"
 #include "fcsl/fcsl_observers.h"
@@ -93,12 +93,12 @@ typedef struct {
     const char *function;
     uint64_t entry;
     int64_t time_ns; /* of the last instant */
-} fcsl_sim_place_t;
+} fcsl_sim_running_call_t;
 
 /* These two are of the simulation that was opened last, from the beginning of fcsl_sim_open on.
  *
  * From any thread: whether a function of a model runs now, and which. */
-int fcsl_sim_place(fcsl_sim_place_t *at);
+int fcsl_sim_running_call(fcsl_sim_running_call_t *at);
 /* From now on a crash within a model ends the process with status 2 and a message that names instance, function and time; with
  * `json` also as JSON on standard output. `watch` 0: no longer. Returns 0, or -1. */
 int fcsl_sim_watch_crashes(int watch, int json, fcsl_error_t *error);
@@ -157,20 +157,21 @@ void fcsl_sim_end(fcsl_sim_t *sim, int another_follows);
 
 /* ---- ROS 2 topics ------------------------------------------------------------------------------------------------------ */
 
-/* Messages of each tick of fcsl_sim_run_together, before the controller answers it, go into an outbox under the number of their
- * topic. All are added before the first tick; outbox and composers must outlive the simulation. `every`: those of every n-th tick.
+/* Messages of each tick of fcsl_sim_run_together, before the controller answers it, go into a publish queue under the number of their
+ * topic. All are added before the first tick; queue and composers must outlive the simulation. `every`: those of every n-th tick.
  * Each function returns 0, or -1. */
-int fcsl_sim_show_clock(fcsl_sim_t *sim, fcsl_outbox_t *outbox, uint32_t topic, fcsl_error_t *error);
+int fcsl_sim_show_clock(fcsl_sim_t *sim, fcsl_publish_queue_t *queue, uint32_t topic, fcsl_error_t *error);
 /* fcsl_msgs/PlantTruth: `head` is its CDR up to the first value. */
-int fcsl_sim_show_truth(fcsl_sim_t *sim, fcsl_outbox_t *outbox, uint32_t topic, const uint8_t *head, uint32_t head_size,
-                        uint32_t every, fcsl_error_t *error);
+int fcsl_sim_show_truth(fcsl_sim_t *sim, fcsl_publish_queue_t *queue, uint32_t topic, const uint8_t *head,
+                        uint32_t head_size, uint32_t every, fcsl_error_t *error);
 /* A message of `size` bytes composed of the structs of instances. */
-int fcsl_sim_show_instances(fcsl_sim_t *sim, fcsl_outbox_t *outbox, uint32_t topic, const fcsl_ros_composer_t *composer,
-                            uint32_t size, const uint32_t *instances, uint32_t count, uint32_t every,
-                            fcsl_error_t *error);
+int fcsl_sim_show_instances(fcsl_sim_t *sim, fcsl_publish_queue_t *queue, uint32_t topic,
+                            const fcsl_ros_composer_t *composer, uint32_t size, const uint32_t *instances,
+                            uint32_t count, uint32_t every, fcsl_error_t *error);
 /* A message composed of sensor channels, when one of these was sampled. */
-int fcsl_sim_show_channels(fcsl_sim_t *sim, fcsl_outbox_t *outbox, uint32_t topic, const fcsl_ros_composer_t *composer,
-                           uint32_t size, const uint32_t *channels, uint32_t count, fcsl_error_t *error);
+int fcsl_sim_show_channels(fcsl_sim_t *sim, fcsl_publish_queue_t *queue, uint32_t topic,
+                           const fcsl_ros_composer_t *composer, uint32_t size, const uint32_t *channels, uint32_t count,
+                           fcsl_error_t *error);
 
 /* ---- variable server ----------------------------------------------------------------------------------------------- */
 
@@ -226,10 +227,10 @@ const fcsl_model_t *fcsl_sim_instance_model(const fcsl_sim_t *sim, uint32_t inst
 const void *fcsl_sim_instance_data(const fcsl_sim_t *sim, uint32_t instance);
 
 /* The outputs of one instance as a generated ROS 2 message ("fcsl_sim/msg/LanderPlant"), stamped with the time of the
- * last sensed tick: type, complete ros2msg schema, CDR. truth_message returns its bytes (the same for every tick), or -1. */
-const char *fcsl_sim_truth_type(const fcsl_sim_t *sim, uint32_t instance);
-const char *fcsl_sim_truth_schema(const fcsl_sim_t *sim, uint32_t instance);
-int64_t fcsl_sim_truth_message(const fcsl_sim_t *sim, uint32_t instance, uint8_t *cdr, size_t capacity);
+ * last sensed tick: type, complete ros2msg schema, CDR. model_message returns its bytes (the same for every tick), or -1. */
+const char *fcsl_sim_model_message_type(const fcsl_sim_t *sim, uint32_t instance);
+const char *fcsl_sim_model_message_schema(const fcsl_sim_t *sim, uint32_t instance);
+int64_t fcsl_sim_model_message(const fcsl_sim_t *sim, uint32_t instance, uint8_t *cdr, size_t capacity);
 /* Every scalar output of every instance as a double, in the order of instances and fields; integers beyond 2^53 are
  * rounded. Writes at most `capacity` values; returns the total number. */
 uint32_t fcsl_sim_truth_values(const fcsl_sim_t *sim, double *values, uint32_t capacity);

@@ -43,12 +43,12 @@ void fcsl_sim_is_open(const fcsl_plant_t *plant, int is_open)
     }
 }
 
-static void look_into(const fcsl_plant_t *plant, fcsl_sim_place_t *at)
+static void look_into(const fcsl_plant_t *plant, fcsl_sim_running_call_t *at)
 {
-    const uint64_t place = atomic_load_explicit(&plant->place, memory_order_relaxed);
-    const uint32_t instance = (uint32_t)(place >> 8) & 0xffffu;
-    const uint32_t number = (uint32_t)(place & 0xffu);
-    at->entry = place;
+    const uint64_t call = atomic_load_explicit(&plant->running_call, memory_order_relaxed);
+    const uint32_t instance = (uint32_t)(call >> 8) & 0xffffu;
+    const uint32_t number = (uint32_t)(call & 0xffu);
+    at->entry = call;
     at->function = FUNCTIONS[number < sizeof FUNCTIONS / sizeof *FUNCTIONS ? number : 0];
     at->time_ns = plant->time_ns;
     const char *name =
@@ -58,9 +58,9 @@ static void look_into(const fcsl_plant_t *plant, fcsl_sim_place_t *at)
     }
 }
 
-int fcsl_sim_place(fcsl_sim_place_t *at)
+int fcsl_sim_running_call(fcsl_sim_running_call_t *at)
 {
-    *at = (fcsl_sim_place_t){.function = ""};
+    *at = (fcsl_sim_running_call_t){.function = ""};
     (void)atomic_fetch_add(&looking, 1u);
     const fcsl_plant_t *plant = atomic_load(&current);
     if (plant) {
@@ -93,7 +93,7 @@ static void put_digits(line_t *line, uint64_t value, uint32_t digits)
     put(line, at);
 }
 
-static void put_crash(line_t *line, int number, const fcsl_sim_place_t *at)
+static void put_crash(line_t *line, int number, const fcsl_sim_running_call_t *at)
 {
     put(line, "`");
     put(line, at->function);
@@ -121,8 +121,8 @@ static int give_back(void)
 
 static void handle(int number)
 {
-    fcsl_sim_place_t at;
-    if (!fcsl_sim_place(&at)) { /* no model runs: as if nobody watched */
+    fcsl_sim_running_call_t at;
+    if (!fcsl_sim_running_call(&at)) { /* no model runs: as if nobody watched */
         (void)give_back();
         (void)raise(number);
         return;

@@ -32,18 +32,18 @@ typedef struct {
     uint32_t group; /* of the instance */
 } fcsl_write_t;
 
-/* The message of what an instance puts out (truth_messages.c). */
+/* The message of what an instance puts out (model_messages.c). */
 typedef struct {
     char *type;
     char *schema;
     uint32_t size; /* bytes of the message */
     int topic;     /* in the bag */
-} fcsl_truth_t;
+} fcsl_model_message_t;
 
 /* What the actuators get (actuators.c). */
 typedef struct {
     fcsl_instance_state_t as_instance; /* for what describes, records and serves an instance of a model */
-    fcsl_truth_t truth;
+    fcsl_model_message_t message;
     fcsl_model_t model;
     fcsl_field_t *fields; /* of the gate, then one for each actuator channel in table order */
     char *texts;          /* the model's name, and the paths of the channels */
@@ -101,8 +101,8 @@ struct fcsl_sim {
     int failed; /* a tick has failed on its way: without a checkpoint there is no next one */
     fcsl_sim_status_t status;
     int recording;
-    fcsl_truth_t *truths; /* by instance */
-    uint8_t *truth_bytes; /* scratch for one message */
+    fcsl_model_message_t *model_messages; /* by instance */
+    uint8_t *model_message_bytes; /* scratch for one message */
     fcsl_external_t *external; /* null: the machine is hosted here */
     uint32_t external_timeout_ms;
     int asked; /* the sensors of the tick were sent to it */

@@ -38,7 +38,7 @@ static int ask_machine(fcsl_sim_t *sim, fcsl_message_t *message, fcsl_error_t *e
         return -1;
     }
     for (uint32_t i = 0; sim->recording && i < sim->plant.instance_count; i++) {
-        if (fcsl_sim_record_truth(sim, &sim->plant.instances[i], &sim->truths[i], error)) {
+        if (fcsl_sim_record_model_message(sim, &sim->plant.instances[i], &sim->model_messages[i], error)) {
             return -1;
         }
     }
@@ -122,7 +122,7 @@ int fcsl_sim_tick_once(fcsl_sim_t *sim, fcsl_error_t *error)
         return -1;
     }
     if (sim->recording && sim->actuators &&
-        fcsl_sim_record_truth(sim, &sim->actuators->as_instance, &sim->actuators->truth, error)) {
+        fcsl_sim_record_model_message(sim, &sim->actuators->as_instance, &sim->actuators->message, error)) {
         return -1;
     }
     fcsl_sim_publish(sim);

@@ -7,17 +7,18 @@
 #include <stdio.h>
 
 #include "fcsl/fcsl_error.h"
-#include "output/truth_messages.h"
+#include "output/model_messages.h"
 
-int fcsl_sim_record_truth(fcsl_sim_t *sim, const fcsl_instance_state_t *instance, const fcsl_truth_t *truth,
-                          fcsl_error_t *error)
+int fcsl_sim_record_model_message(fcsl_sim_t *sim, const fcsl_instance_state_t *instance,
+                                  const fcsl_model_message_t *message, fcsl_error_t *error)
 {
-    const size_t bytes = fcsl_truth_write(sim->plant.time_ns, instance, sim->truth_bytes, truth->size);
-    return fcsl_run_record_write(sim->run, truth->topic, (uint64_t)sim->plant.time_ns, sim->truth_bytes,
+    const size_t bytes =
+        fcsl_model_message_write(sim->plant.time_ns, instance, sim->model_message_bytes, message->size);
+    return fcsl_run_record_write(sim->run, message->topic, (uint64_t)sim->plant.time_ns, sim->model_message_bytes,
                                  (uint32_t)bytes, error);
 }
 
-static int add_truth_topic(fcsl_sim_t *sim, const char *name, fcsl_truth_t *truth, const char *name_space,
+static int add_model_topic(fcsl_sim_t *sim, const char *name, fcsl_model_message_t *message, const char *name_space,
                            fcsl_error_t *error)
 {
     char topic[512];
@@ -25,8 +26,8 @@ static int add_truth_topic(fcsl_sim_t *sim, const char *name, fcsl_truth_t *trut
     if (bytes < 0 || (size_t)bytes >= sizeof topic) {
         return fcsl_fail(error, "the name of a topic is too long: /%s/sim/%s", name_space, name);
     }
-    truth->topic = fcsl_run_record_add_topic(sim->run, topic, truth->type, truth->schema, error);
-    return truth->topic < 0 ? -1 : 0;
+    message->topic = fcsl_run_record_add_topic(sim->run, topic, message->type, message->schema, error);
+    return message->topic < 0 ? -1 : 0;
 }
 
 /* A companion has a bag of its own beside that of the first controller: BAG_NAME. */
@@ -53,10 +54,10 @@ int fcsl_sim_record(fcsl_sim_t *sim, const char *bag, const char *name_space, fc
     }
     int failed = 0;
     for (uint32_t i = 0; i < sim->plant.instance_count && !failed; i++) {
-        failed = add_truth_topic(sim, sim->plant.instances[i].name, &sim->truths[i], name_space, error);
+        failed = add_model_topic(sim, sim->plant.instances[i].name, &sim->model_messages[i], name_space, error);
     }
     if (!failed && sim->actuators) {
-        failed = add_truth_topic(sim, sim->actuators->as_instance.name, &sim->actuators->truth, name_space, error);
+        failed = add_model_topic(sim, sim->actuators->as_instance.name, &sim->actuators->message, name_space, error);
     }
     if (failed) {
         (void)fcsl_run_record_stop(sim->run, NULL);

@@ -19,7 +19,7 @@
 #include "engine/tick.h"
 #include "group_build.h"
 #include "models/model.h"
-#include "output/truth_messages.h"
+#include "output/model_messages.h"
 #include "plan_names.h"
 
 /* ---- machine, models, instances ---------------------------------------------------------------------------------------- */
@@ -297,12 +297,12 @@ int fcsl_assembly_build(fcsl_sim_t *sim, fcsl_error_t *error)
     if (build_writes(sim, error) || fcsl_sim_build_connections(sim, error) || fcsl_sim_build_groups(sim, error)) {
         return -1;
     }
-    return fcsl_actuators_build(sim, error) || build_link(sim, error) || fcsl_truth_build(sim, error) ? -1 : 0;
+    return fcsl_actuators_build(sim, error) || build_link(sim, error) || fcsl_model_messages_build(sim, error) ? -1 : 0;
 }
 
 void fcsl_assembly_free(fcsl_sim_t *sim)
 {
-    fcsl_truth_free(sim);
+    fcsl_model_messages_free(sim);
     fcsl_actuators_free(sim);
     fcsl_sim_link_free(sim->link);
     for (uint32_t i = 0; sim->groups && i < sim->group_count; i++) {

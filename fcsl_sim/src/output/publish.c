@@ -7,7 +7,7 @@
 #include <stdlib.h>
 #include <string.h>
 
-#include "fcsl/fcsl_journal.h"
+#include "fcsl/fcsl_write_queue.h"
 #include "fcsl/fcsl_error.h"
 
 enum { HISTORY_SLOTS = 64, WRITER_BYTES = 256 };

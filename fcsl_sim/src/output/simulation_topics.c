@@ -1,6 +1,6 @@
 /* SPDX-License-Identifier: Apache-2.0
  *
- * The ROS 2 topics of a simulation: what each tick shows, into an outbox.
+ * The ROS 2 topics of a simulation: what each tick shows, into a publish queue.
  */
 #include "simulation_topics.h"
 
@@ -32,7 +32,7 @@ typedef struct {
 } topic_t;
 
 struct fcsl_sim_topics {
-    fcsl_outbox_t *outbox;
+    fcsl_publish_queue_t *queue;
     topic_t *topics;
     uint32_t count;
     uint8_t *scratch; /* the longest message */
@@ -66,7 +66,7 @@ static int no_memory(topic_t *topic, fcsl_error_t *error)
 }
 
 /* Owns what the topic points to, also when it fails. */
-static int add(fcsl_sim_t *sim, fcsl_outbox_t *outbox, topic_t *topic, fcsl_error_t *error)
+static int add(fcsl_sim_t *sim, fcsl_publish_queue_t *queue, topic_t *topic, fcsl_error_t *error)
 {
     if (!sim->topics) {
         sim->topics = calloc(1, sizeof *sim->topics);
@@ -90,7 +90,7 @@ static int add(fcsl_sim_t *sim, fcsl_outbox_t *outbox, topic_t *topic, fcsl_erro
         all->scratch = scratch;
         all->scratch_size = topic->size;
     }
-    all->outbox = outbox;
+    all->queue = queue;
     topics[all->count++] = *topic;
     return 0;
 }
@@ -104,13 +104,13 @@ static uint32_t *copy_numbers(const uint32_t *numbers, uint32_t count)
     return copy;
 }
 
-int fcsl_sim_show_clock(fcsl_sim_t *sim, fcsl_outbox_t *outbox, uint32_t number, fcsl_error_t *error)
+int fcsl_sim_show_clock(fcsl_sim_t *sim, fcsl_publish_queue_t *queue, uint32_t number, fcsl_error_t *error)
 {
     topic_t topic = {.kind = CLOCK, .topic = number, .every = 1, .size = CLOCK_BYTES};
-    return add(sim, outbox, &topic, error);
+    return add(sim, queue, &topic, error);
 }
 
-int fcsl_sim_show_truth(fcsl_sim_t *sim, fcsl_outbox_t *outbox, uint32_t number, const uint8_t *head,
+int fcsl_sim_show_truth(fcsl_sim_t *sim, fcsl_publish_queue_t *queue, uint32_t number, const uint8_t *head,
                         uint32_t head_size, uint32_t every, fcsl_error_t *error)
 {
     const uint32_t values = fcsl_sim_truth_values(sim, NULL, 0);
@@ -124,10 +124,10 @@ int fcsl_sim_show_truth(fcsl_sim_t *sim, fcsl_outbox_t *outbox, uint32_t number,
         return no_memory(&topic, error);
     }
     memcpy(topic.head, head, head_size);
-    return add(sim, outbox, &topic, error);
+    return add(sim, queue, &topic, error);
 }
 
-int fcsl_sim_show_instances(fcsl_sim_t *sim, fcsl_outbox_t *outbox, uint32_t number,
+int fcsl_sim_show_instances(fcsl_sim_t *sim, fcsl_publish_queue_t *queue, uint32_t number,
                             const fcsl_ros_composer_t *composer, uint32_t size, const uint32_t *instances,
                             uint32_t count, uint32_t every, fcsl_error_t *error)
 {
@@ -142,11 +142,12 @@ int fcsl_sim_show_instances(fcsl_sim_t *sim, fcsl_outbox_t *outbox, uint32_t num
     for (uint32_t i = 0; valid && i < count; i++) {
         valid = instances[i] < sim->plant.instance_count;
     }
-    return valid ? add(sim, outbox, &topic, error) : no_memory(&topic, error);
+    return valid ? add(sim, queue, &topic, error) : no_memory(&topic, error);
 }
 
-int fcsl_sim_show_channels(fcsl_sim_t *sim, fcsl_outbox_t *outbox, uint32_t number, const fcsl_ros_composer_t *composer,
-                           uint32_t size, const uint32_t *channels, uint32_t count, fcsl_error_t *error)
+int fcsl_sim_show_channels(fcsl_sim_t *sim, fcsl_publish_queue_t *queue, uint32_t number,
+                           const fcsl_ros_composer_t *composer, uint32_t size, const uint32_t *channels, uint32_t count,
+                           fcsl_error_t *error)
 {
     topic_t topic = {.kind = CHANNELS,
                      .topic = number,
@@ -155,7 +156,7 @@ int fcsl_sim_show_channels(fcsl_sim_t *sim, fcsl_outbox_t *outbox, uint32_t numb
                      .size = size,
                      .numbers = copy_numbers(channels, count),
                      .count = count};
-    return topic.numbers ? add(sim, outbox, &topic, error) : no_memory(&topic, error);
+    return topic.numbers ? add(sim, queue, &topic, error) : no_memory(&topic, error);
 }
 
 /* ---- a tick --------------------------------------------------------------------------------------------------------------- */
@@ -220,10 +221,10 @@ void fcsl_sim_topics_put(fcsl_sim_t *sim)
         if (sim->tick % topic->every != 0 || !make(sim, topic, all->scratch)) {
             continue;
         }
-        uint8_t *place = fcsl_outbox_claim(all->outbox, topic->topic, topic->size, FCSL_OUTBOX_STREAM);
+        uint8_t *place = fcsl_publish_queue_claim(all->queue, topic->topic, topic->size, FCSL_PUBLISH_QUEUE_STREAM);
         if (place) {
             memcpy(place, all->scratch, topic->size);
-            fcsl_outbox_put(all->outbox);
+            fcsl_publish_queue_put(all->queue);
         }
     }
 }
@@ -231,6 +232,6 @@ void fcsl_sim_topics_put(fcsl_sim_t *sim)
 void fcsl_sim_topics_wake(const fcsl_sim_t *sim)
 {
     if (sim->topics) {
-        fcsl_outbox_wake(sim->topics->outbox);
+        fcsl_publish_queue_wake(sim->topics->queue);
     }
 }

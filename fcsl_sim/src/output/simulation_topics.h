@@ -7,9 +7,9 @@
 
 #include "engine/simulation.h"
 
-/* What the sensed tick shows, into the outbox. */
+/* What the sensed tick shows, into the publish queue. */
 void fcsl_sim_topics_put(fcsl_sim_t *sim);
-/* Who takes from the outbox looks at once. */
+/* Who takes from the publish queue looks at once. */
 void fcsl_sim_topics_wake(const fcsl_sim_t *sim);
 void fcsl_sim_topics_free(fcsl_sim_t *sim);
 

@@ -72,7 +72,7 @@ typedef struct {
     fcsl_call_t *calls;
     uint32_t call_count;
     int64_t time_ns;        /* present */
-    _Atomic uint64_t place; /* call, instance and function that run (fcsl_plant_enter) */
+    _Atomic uint64_t running_call; /* call, instance and function that run (fcsl_plant_enter) */
     uint64_t entries;       /* calls so far */
 } fcsl_plant_t;
 
@@ -98,11 +98,11 @@ static inline int fcsl_plant_copy_changed(const fcsl_copy_t *copy)
     return changed;
 }
 
-/* Tells whoever finds that a function of a model does not end, or crashes, which one it is. */
+/* Names the function for the watchdog, and for the report of a crash. */
 static inline void fcsl_plant_enter(fcsl_plant_t *plant, uint32_t instance, fcsl_function_t function)
 {
-    const uint64_t place = ++plant->entries << 24 | (uint64_t)instance << 8 | (uint64_t)function;
-    atomic_store_explicit(&plant->place, place, memory_order_relaxed);
+    const uint64_t call = ++plant->entries << 24 | (uint64_t)instance << 8 | (uint64_t)function;
+    atomic_store_explicit(&plant->running_call, call, memory_order_relaxed);
 }
 
 static inline fcsl_model_context_t fcsl_plant_context(fcsl_plant_t *plant, uint32_t instance, int64_t time_ns)

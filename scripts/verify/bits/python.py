@@ -14,7 +14,7 @@ from fcsl_compiler.driver.toolchain import toolchain
 from fcsl_compiler.reference.externs import externs_of
 from fcsl_compiler.reference.machine import Host, ReferenceMachine
 from simclient.descriptor import read_machine
-from simclient.twin.python_run import find_descriptor, layout_of, places_of
+from simclient.twin.python_run import fault_rows_of, find_descriptor, layout_of
 
 from ..shared import stimulus
 
@@ -26,7 +26,7 @@ class PythonMachine:
         built = build_machine(config)
         descriptor = find_descriptor(built.library, built.name)
         machine = read_machine(ctypes.pointer(descriptor))
-        layout, places = layout_of(descriptor, machine), places_of(machine)
+        layout, places = layout_of(descriptor, machine), fault_rows_of(machine)
         checked = compile_machine(config, toolchain(), until="schedule").checked
         externs = externs_of(build_externs(config)) if checked.externs else None
         self.reference = ReferenceMachine(checked, layout, places, externs)

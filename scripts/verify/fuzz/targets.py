@@ -188,14 +188,14 @@ TARGETS = (
     ),
     Target(
         "ros_read",
-        "ROS 2 messages along a plan, and the plan",
+        "ROS 2 messages by a conversion, and the conversion",
         "ROS 2, bags",
         Defect(f"{_HAL}/ros/ros_walk.c", "if (padding > left || size > left - padding) {", "if (size > left) {"),
         longest=1024,
     ),
     Target(
         "ros_compose",
-        "plans of ROS 2 messages to write",
+        "conversions of ROS 2 messages to write",
         "simclient",
         Defect(f"{_HAL}/ros/ros_number.c", "row->offset > size - bytes", "row->offset > size"),
         longest=512,

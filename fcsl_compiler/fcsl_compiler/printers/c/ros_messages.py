@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Generates the plans of ROS 2 messages: the tables of fcsl_ros_plan.h."""
+"""Generates the conversions of ROS 2 messages: the tables of fcsl_ros_conversion.h."""
 
 from __future__ import annotations
 
@@ -9,7 +9,7 @@ from ...model.c_names import c_literal, c_string
 from ...model.machine import Channel
 from ...model.types import F64
 from ...ros.channels import Message
-from ...ros.plan import NONE, ComposerPlan, Guard, ReaderPlan, Row, Term
+from ...ros.conversion import NONE, ComposerConversion, Guard, ReaderConversion, Row, Term
 from .writer import CWriter
 
 #: fcsl_ros_scalar_t and fcsl_ros_code_t by number.
@@ -52,51 +52,52 @@ class MessageEmitter:
                 self.w.line(f".{key} = {value},")
         return name
 
-    def _composer(self, plan: ComposerPlan, name: str, memories: Sequence[str]) -> str:
-        """The plan's memories become one: that of the machine."""
-        lines = [plan.text[i : i + _BYTES_IN_LINE] for i in range(0, len(plan.text), _BYTES_IN_LINE)]
-        terms = [_term(t, memories[t.anchor] + (f" + {t.offset}u" if t.offset else ""), 0) for t in plan.terms]
+    def _composer(self, conversion: ComposerConversion, name: str, memories: Sequence[str]) -> str:
+        """The conversion's memories become one: that of the machine."""
+        lines = [conversion.text[i : i + _BYTES_IN_LINE] for i in range(0, len(conversion.text), _BYTES_IN_LINE)]
+        terms = [_term(t, memories[t.anchor] + (f" + {t.offset}u" if t.offset else ""), 0) for t in conversion.terms]
         text = self._table("uint8_t", f"{name}_text", [", ".join(map(str, line)) for line in lines])
         members = {
             "text": text,
-            "rows": self._table("fcsl_ros_row_t", f"{name}_put", [_row(r) for r in plan.rows]),
+            "rows": self._table("fcsl_ros_row_t", f"{name}_put", [_row(r) for r in conversion.rows]),
             "terms": self._table("fcsl_ros_term_t", f"{name}_taken", terms),
-            "size": f"{len(plan.text)}u",
-            "row_count": f"{len(plan.rows)}u",
-            "term_count": f"{len(plan.terms)}u",
+            "size": f"{len(conversion.text)}u",
+            "row_count": f"{len(conversion.rows)}u",
+            "term_count": f"{len(conversion.terms)}u",
             "memory_count": "1u",
-            "stamp_offset": _index(plan.stamp_offset),
+            "stamp_offset": _index(conversion.stamp_offset),
         }
         return self._struct("fcsl_ros_composer_plan_t", f"{name}_composer", members)
 
-    def _reader(self, plan: ReaderPlan, name: str) -> str:
+    def _reader(self, conversion: ReaderConversion, name: str) -> str:
         parts = [
-            f"{{FCSL_ROS_{_CODES[p.code]}, {p.align}u, {p.size}u, {_index(p.first)}, {p.count}u}}" for p in plan.parts
+            f"{{FCSL_ROS_{_CODES[p.code]}, {p.align}u, {p.size}u, {_index(p.first)}, {p.count}u}}"
+            for p in conversion.parts
         ]
-        picks = [f"{{{p.anchor}u, {p.count}u, {p.element}u, {_index(p.name)}}}" for p in plan.picks]
+        picks = [f"{{{p.anchor}u, {p.count}u, {p.element}u, {_index(p.name)}}}" for p in conversion.picks]
         values = [
             f"{{{v.offset}u, {v.size}u, {v.first_row}u, {v.row_count}u, {v.first_guard}u, {v.guard_count}u, {int(v.rotation)}}}"
-            for v in plan.values
+            for v in conversion.values
         ]
         tables = {
             "part": ("fcsl_ros_part_t", parts),
             "pick": ("fcsl_ros_pick_t", picks),
-            "name": ("char *const", [c_string(n.decode()) for n in plan.names]),
+            "name": ("char *const", [c_string(n.decode()) for n in conversion.names]),
             "value": ("fcsl_ros_value_t", values),
-            "row": ("fcsl_ros_row_t", [_row(r) for r in plan.rows]),
-            "term": ("fcsl_ros_term_t", [_term(t, f"{t.offset}u", t.anchor) for t in plan.terms]),
-            "guard": ("fcsl_ros_guard_t", [_guard(g) for g in plan.guards]),
+            "row": ("fcsl_ros_row_t", [_row(r) for r in conversion.rows]),
+            "term": ("fcsl_ros_term_t", [_term(t, f"{t.offset}u", t.anchor) for t in conversion.terms]),
+            "guard": ("fcsl_ros_guard_t", [_guard(g) for g in conversion.guards]),
         }
         members = {}
         for what, (c_type, rows) in tables.items():
             members[f"{what}s"] = self._table(c_type, f"{name}_{what}s", rows)
             members[f"{what}_count"] = f"{len(rows)}u"
         members |= {
-            "anchor_count": f"{plan.anchor_count}u",
-            "size": f"{plan.size}u",
-            "stamp_anchor": _index(plan.stamp_anchor),
-            "stamp_offset": f"{plan.stamp_offset}u",
-            "nan_allowed": f"{int(plan.nan_allowed)}u",
+            "anchor_count": f"{conversion.anchor_count}u",
+            "size": f"{conversion.size}u",
+            "stamp_anchor": _index(conversion.stamp_anchor),
+            "stamp_offset": f"{conversion.stamp_offset}u",
+            "nan_allowed": f"{int(conversion.nan_allowed)}u",
         }
         return self._struct("fcsl_ros_reader_plan_t", f"{name}_reader", members)
 

@@ -17,7 +17,7 @@ typedef struct {
     uint64_t tick;    /* ticks completed */
     uint64_t time_ns; /* on the host's monotonic clock */
     uint64_t paused;  /* 0 or 1 */
-    uint64_t next_write; /* fcsl_run_next_write, of a host that keeps a journal */
+    uint64_t next_write; /* fcsl_run_next_write, of a host that queues its writes */
     uint64_t requires_arming; /* fcsl_run_requires_arming */
 } fcsl_moment_t;
 

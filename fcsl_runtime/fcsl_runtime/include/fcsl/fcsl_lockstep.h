@@ -1,7 +1,7 @@
 /* SPDX-License-Identifier: Apache-2.0
  *
  * A run in lock-step with a simulator on the bus, for a host that has other things to do: it runs the ticks of some ten
- * milliseconds, publishes what they left in an outbox, serves its clients, and runs the next ones. fcsl-fc has its own loop.
+ * milliseconds, publishes what they left in a publish queue, serves its clients, and runs the next ones. fcsl-fc has its own loop.
  *
  * Between two calls of fcsl_lockstep_run the run belongs to its host, which may write into it. One thread at a time.
  */
@@ -16,9 +16,9 @@ extern "C" {
 
 typedef struct fcsl_lockstep fcsl_lockstep_t;
 
-/* `address`, `name_space`: as fcsl_hal_bus takes them. `topics` may be null. Run, topics and outbox must outlive it. */
-fcsl_lockstep_t *fcsl_lockstep_new(fcsl_run_t *run, fcsl_topics_t *topics, fcsl_outbox_t *outbox, const char *address,
-                                   const char *name_space, fcsl_error_t *error);
+/* `address`, `name_space`: as fcsl_hal_bus takes them. `topics` may be null. Run, topics and queue must outlive it. */
+fcsl_lockstep_t *fcsl_lockstep_new(fcsl_run_t *run, fcsl_topics_t *topics, fcsl_publish_queue_t *queue,
+                                   const char *address, const char *name_space, fcsl_error_t *error);
 /* Leaves the simulator, too. */
 void fcsl_lockstep_free(fcsl_lockstep_t *lockstep);
 

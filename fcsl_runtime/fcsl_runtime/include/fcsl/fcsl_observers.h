@@ -5,7 +5,7 @@
  *
  * A thread reads the host's history and never meets the step thread; all memory is taken by open. Ticks that are overwritten
  * before there is room for them on the bus are dropped whole and counted; nobody waits for an observer. Who asks for them gets
- * a checkpoint and the host's writes, too (fcsl_journal.h).
+ * a checkpoint and the host's writes, too (fcsl_write_queue.h).
  */
 #ifndef FCSL_OBSERVERS_H
 #define FCSL_OBSERVERS_H

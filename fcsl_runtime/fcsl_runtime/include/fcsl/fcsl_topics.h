@@ -1,6 +1,6 @@
 /* SPDX-License-Identifier: Apache-2.0
  *
- * The ROS 2 topics of a run: after each tick, the messages that are due of them go into an outbox. They are the same bytes that a
+ * The ROS 2 topics of a run: after each tick, the messages that are due of them go into a publish queue. They are the same bytes that a
  * recording has, but for the stamp, which the host gives.
  *
  * Everything is added before the first tick. Nothing here allocates afterwards. Not thread-safe: they belong to who steps the run.
@@ -8,7 +8,7 @@
 #ifndef FCSL_TOPICS_H
 #define FCSL_TOPICS_H
 
-#include "fcsl/fcsl_outbox.h"
+#include "fcsl/fcsl_publish_queue.h"
 #include "fcsl/fcsl_ros.h"
 
 #ifdef __cplusplus
@@ -17,11 +17,11 @@ extern "C" {
 
 typedef struct fcsl_topics fcsl_topics_t;
 
-/* Run and outbox must outlive it. */
-fcsl_topics_t *fcsl_topics_new(fcsl_run_t *run, fcsl_outbox_t *outbox, fcsl_error_t *error);
+/* Run and queue must outlive it. */
+fcsl_topics_t *fcsl_topics_new(fcsl_run_t *run, fcsl_publish_queue_t *queue, fcsl_error_t *error);
 void fcsl_topics_free(fcsl_topics_t *topics);
 
-/* `topic`: its number in the outbox. */
+/* `topic`: its number in the publish queue. */
 /* The generated message of an instance, of every `every`-th tick. */
 int fcsl_topics_add_instance(fcsl_topics_t *topics, uint32_t topic, uint32_t instance, uint32_t every,
                              fcsl_error_t *error);

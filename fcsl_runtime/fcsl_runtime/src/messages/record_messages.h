@@ -1,6 +1,6 @@
 /* SPDX-License-Identifier: Apache-2.0
  *
- * What reproduces a run, as fcsl_msgs messages: a checkpoint, and what the host did. Recorder and journal write them.
+ * What reproduces a run, as fcsl_msgs messages: a checkpoint, and what the host did. Recorder and write queue make them.
  */
 #ifndef FCSL_RECORD_MESSAGES_H
 #define FCSL_RECORD_MESSAGES_H

@@ -1,6 +1,6 @@
 /* SPDX-License-Identifier: Apache-2.0
  *
- * What a tick shows as ROS 2 messages, put into an outbox.
+ * What a tick shows as ROS 2 messages, put into a publish queue.
  */
 #include "fcsl/fcsl_tick_time.h"
 #include "fcsl/fcsl_topics.h"
@@ -34,13 +34,13 @@ typedef struct {
 
 struct fcsl_topics {
     fcsl_run_t *run;
-    fcsl_outbox_t *outbox;
+    fcsl_publish_queue_t *queue;
     entry_t *entries;
     uint32_t count;
     uint8_t *scratch;
 };
 
-fcsl_topics_t *fcsl_topics_new(fcsl_run_t *run, fcsl_outbox_t *outbox, fcsl_error_t *error)
+fcsl_topics_t *fcsl_topics_new(fcsl_run_t *run, fcsl_publish_queue_t *queue, fcsl_error_t *error)
 {
     fcsl_topics_t *topics = calloc(1, sizeof *topics);
     uint8_t *scratch = malloc(FCSL_MESSAGE_BYTES_MAX);
@@ -51,7 +51,7 @@ fcsl_topics_t *fcsl_topics_new(fcsl_run_t *run, fcsl_outbox_t *outbox, fcsl_erro
         return NULL;
     }
     topics->run = run;
-    topics->outbox = outbox;
+    topics->queue = queue;
     topics->scratch = scratch;
     return topics;
 }
@@ -122,11 +122,11 @@ static void put_instance(fcsl_topics_t *topics, const entry_t *entry, uint64_t t
     if (tick % entry->every != 0) {
         return;
     }
-    uint8_t *place = fcsl_outbox_claim(topics->outbox, entry->topic, entry->size, FCSL_OUTBOX_STREAM);
+    uint8_t *place = fcsl_publish_queue_claim(topics->queue, entry->topic, entry->size, FCSL_PUBLISH_QUEUE_STREAM);
     if (place != NULL) {
         (void)fcsl_run_message(topics->run, entry->instance, place, entry->size); /* it has been so large once */
         put_stamp(place, stamp_ns);
-        fcsl_outbox_put(topics->outbox);
+        fcsl_publish_queue_put(topics->queue);
     }
 }
 
@@ -140,13 +140,13 @@ static void put_tick_message(fcsl_topics_t *topics, entry_t *entry, int64_t stam
                         memcmp(entry->said + HEAD_BYTES, topics->scratch + HEAD_BYTES, bytes - HEAD_BYTES) == 0)) {
         return;
     }
-    uint8_t *place = fcsl_outbox_claim(topics->outbox, entry->topic, bytes, FCSL_OUTBOX_CHANGE);
+    uint8_t *place = fcsl_publish_queue_claim(topics->queue, entry->topic, bytes, FCSL_PUBLISH_QUEUE_CHANGE);
     if (place != NULL) {
         memcpy(entry->said, topics->scratch, bytes);
         entry->size = bytes;
         memcpy(place, topics->scratch, bytes);
         put_stamp(place, stamp_ns);
-        fcsl_outbox_put(topics->outbox);
+        fcsl_publish_queue_put(topics->queue);
     }
 }
 
@@ -158,10 +158,10 @@ static void put_channels(fcsl_topics_t *topics, entry_t *entry, int64_t stamp_ns
         entry->refused++;
         return;
     }
-    uint8_t *place = fcsl_outbox_claim(topics->outbox, entry->topic, entry->size, FCSL_OUTBOX_STREAM);
+    uint8_t *place = fcsl_publish_queue_claim(topics->queue, entry->topic, entry->size, FCSL_PUBLISH_QUEUE_STREAM);
     if (place != NULL) {
         memcpy(place, topics->scratch, entry->size);
-        fcsl_outbox_put(topics->outbox);
+        fcsl_publish_queue_put(topics->queue);
     }
 }
 

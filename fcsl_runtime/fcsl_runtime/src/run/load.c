@@ -16,7 +16,7 @@
 #include "hardware.h"
 #include "machine/fault_place.h"
 #include "stack_left.h"
-#include "record/journal.h"
+#include "record/write_queue.h"
 #include "io_replay.h"
 #include "trace.h"
 #include "validate.h"
@@ -150,7 +150,7 @@ static void release(fcsl_run_t *run)
     fcsl_hardware_close(run);
     fcsl_io_replay_free(run);
     fcsl_trace_free(run);
-    fcsl_journal_close(run->journal);
+    fcsl_write_queue_close(run->write_queue);
     free(run->layouts);
     free(run->verdicts);
     free(run->data);

@@ -48,7 +48,7 @@ int fcsl_run_save(const fcsl_run_t *run, void *bytes, uint32_t size, fcsl_error_
     return 0;
 }
 
-/* A checkpoint comes from outside: what the machine uses as an index or a truth value must be one. */
+/* A checkpoint comes from outside: what the machine uses as an index or a boolean must be one. */
 static const char *check_checkpoint(const fcsl_machine_t *machine, const uint8_t *bytes)
 {
     for (uint32_t i = 0; i < machine->field_count; i++) {

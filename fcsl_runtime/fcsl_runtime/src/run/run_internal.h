@@ -6,7 +6,7 @@
 #include "fcsl/fcsl_hw_sim.h"
 #include "machine/machine_struct.h"
 #include "messages/message.h"
-#include "record/journal.h"
+#include "record/write_queue.h"
 #include "record/recorder.h"
 
 /* An instance with max_wcet_us before a tick, to tell a measured overrun from an injected one. */
@@ -47,7 +47,7 @@ struct fcsl_run {
     uint8_t *left;
     uint64_t messages_refused;
     fcsl_recorder_t *recorder; /* null: not recording */
-    fcsl_journal_t *journal;   /* null: none */
+    fcsl_write_queue_t *write_queue;   /* null: none */
     uint64_t record_time_ns;   /* of the coming records; FCSL_TICK_TIME: that of their tick */
     fcsl_trace_t *traces;      /* null: none */
     char *views;               /* of the host; null: those of the machine */

@@ -2,7 +2,7 @@
  *
  * What a run tells of itself: to its recorder, to whoever follows its host writes, and as messages of its last tick.
  */
-#include "record/journal.h"
+#include "record/write_queue.h"
 #include "record/recorder.h"
 #include "run_internal.h"
 
@@ -75,20 +75,20 @@ int fcsl_run_record_write(fcsl_run_t *run, int topic, uint64_t time_ns, const ui
     return fcsl_recorder_message(run->recorder, topic, time_ns, cdr, size, error);
 }
 
-fcsl_journal_t *fcsl_run_journal(fcsl_run_t *run, fcsl_error_t *error)
+fcsl_write_queue_t *fcsl_run_write_queue(fcsl_run_t *run, fcsl_error_t *error)
 {
-    if (run->journal == NULL) {
-        run->journal = fcsl_journal_open(run->machine);
+    if (run->write_queue == NULL) {
+        run->write_queue = fcsl_write_queue_open(run->machine);
     }
-    if (run->journal == NULL) {
-        (void)fcsl_fail(error, "out of memory for the journal");
+    if (run->write_queue == NULL) {
+        (void)fcsl_fail(error, "out of memory for the queue of host writes");
     }
-    return run->journal;
+    return run->write_queue;
 }
 
 uint64_t fcsl_run_next_write(fcsl_run_t *run)
 {
-    return run->journal != NULL ? fcsl_journal_next_write(run->journal) : 0;
+    return run->write_queue != NULL ? fcsl_write_queue_next_write(run->write_queue) : 0;
 }
 
 int64_t fcsl_run_message(const fcsl_run_t *run, uint32_t instance, uint8_t *cdr, size_t capacity)

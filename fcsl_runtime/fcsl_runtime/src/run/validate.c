@@ -156,16 +156,16 @@ static int check_channel(const fcsl_machine_t *machine, uint32_t index)
 }
 
 /* Whether a composer, whose memory is the struct, reads in it alone. */
-static int reads_in_struct(const fcsl_machine_t *machine, const fcsl_ros_composer_plan_t *plan)
+static int reads_in_struct(const fcsl_machine_t *machine, const fcsl_ros_composer_plan_t *conversion)
 {
-    for (uint32_t i = 0; i < plan->row_count; i++) {
-        const fcsl_ros_row_t *row = &plan->rows[i];
-        if (row->term_count > plan->term_count || row->first_term > plan->term_count - row->term_count ||
+    for (uint32_t i = 0; i < conversion->row_count; i++) {
+        const fcsl_ros_row_t *row = &conversion->rows[i];
+        if (row->term_count > conversion->term_count || row->first_term > conversion->term_count - row->term_count ||
             row->more > machine->size) {
             return 0;
         }
         for (uint32_t j = 0; j < row->term_count; j++) {
-            const fcsl_ros_term_t *term = &plan->terms[row->first_term + j];
+            const fcsl_ros_term_t *term = &conversion->terms[row->first_term + j];
             if (!in_struct(machine, term->offset, (row->more + 1u) * fcsl_ros_scalar_size(term->type), 1)) {
                 return 0;
             }
@@ -174,7 +174,7 @@ static int reads_in_struct(const fcsl_machine_t *machine, const fcsl_ros_compose
     return 1;
 }
 
-/* A message's channels are of one direction, and its numbers lie in the struct. Readers and composers check the rest of a plan. */
+/* A message's channels are of one direction, and its numbers lie in the struct. Readers and composers check the rest of a conversion. */
 static int check_ros_message(const fcsl_machine_t *machine, const fcsl_ros_message_t *message, uint32_t value_count)
 {
     if (message->topic == NULL || !is_name(message->type) || message->channels == NULL || message->channel_count == 0 ||

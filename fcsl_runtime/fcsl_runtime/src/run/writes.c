@@ -12,7 +12,7 @@
 
 #include "fcsl/fcsl_scalar.h"
 #include "range.h"
-#include "record/journal.h"
+#include "record/write_queue.h"
 #include "record/recorder.h"
 
 enum { RANGE_BYTES = 64 };
@@ -22,8 +22,8 @@ void fcsl_note_write_at(fcsl_run_t *run, uint64_t tick, const fcsl_write_t *writ
     if (run->recorder != NULL) {
         fcsl_recorder_write(run->recorder, fcsl_run_stamp(run, tick), write);
     }
-    if (fcsl_journal_is_followed(run->journal)) {
-        fcsl_journal_note(run->journal, tick, write);
+    if (fcsl_write_queue_is_enabled(run->write_queue)) {
+        fcsl_write_queue_put(run->write_queue, tick, write);
     }
 }
 

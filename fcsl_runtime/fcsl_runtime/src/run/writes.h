@@ -3,13 +3,13 @@
 #define FCSL_WRITES_H
 
 #include "messages/record_messages.h"
-#include "record/journal.h"
+#include "record/write_queue.h"
 #include "run_internal.h"
 
-/* Whether anybody is told of what the host does: a recorder, or who follows the journal. */
+/* Whether host writes are recorded or queued: a recorder, or the write queue's reader. */
 static inline int fcsl_writes_noted(const fcsl_run_t *run)
 {
-    return run->recorder != NULL || fcsl_journal_is_followed(run->journal);
+    return run->recorder != NULL || fcsl_write_queue_is_enabled(run->write_queue);
 }
 /* Tells them of a host write that `tick` is the first to see. */
 void fcsl_note_write_at(fcsl_run_t *run, uint64_t tick, const fcsl_write_t *write);

@@ -9,7 +9,7 @@ from collections import deque
 from ..vars.show import with_unit
 from ..vars.terminal_plot import draw_panel
 from .describe import show_numbers
-from .watch import Watch, places_of
+from .watch import Watch, quantity_ranges
 
 _WINDOW_S, _POINTS = 10, 500
 _TITLE_ROWS = 3  # of a panel: its title, its axis, its ticks
@@ -24,7 +24,7 @@ class Curves:
         points = min(_POINTS, watch.plan.tick_hz * _WINDOW_S)
         self._ticks: deque[int] = deque(maxlen=points)
         self._rows: dict[tuple[int, str], deque[list[float]]] = {
-            (s, p.name): deque(maxlen=points) for s in sensors for p in places_of(watch.plan.sensors[s].kind)
+            (s, p.name): deque(maxlen=points) for s in sensors for p in quantity_ranges(watch.plan.sensors[s].kind)
         }
 
     def take(self, tick: int) -> None:
@@ -33,8 +33,8 @@ class Curves:
         self._ticks.append(tick)
         for s in self._sensors:
             values = self._watch.corrected(s) or {}
-            for place in places_of(self._watch.plan.sensors[s].kind):
-                self._rows[s, place.name].append(values.get(place.name, []))
+            for quantity in quantity_ranges(self._watch.plan.sensors[s].kind):
+                self._rows[s, quantity.name].append(values.get(quantity.name, []))
 
     def lines(self, width: int, height: int) -> list[str]:
         told = {key: rows for key, rows in self._rows.items() if any(rows)}
@@ -44,7 +44,7 @@ class Curves:
         lines = []
         for (s, name), rows in told.items():
             sensor = self._watch.plan.sensors[s]
-            unit = next(p.unit for p in places_of(sensor.kind) if p.name == name)
+            unit = next(p.unit for p in quantity_ranges(sensor.kind) if p.name == name)
             title = f"{sensor.name}.{name} = {with_unit(show_numbers(rows[-1], unit=unit), unit)}"
             count = max(map(len, rows))
             curves = [[row[i] if i < len(row) else math.nan for row in rows] for i in range(count)]

@@ -26,7 +26,7 @@ Values = dict[str, list[float]]
 
 
 @dataclass(frozen=True)
-class Place:
+class QuantityRange:
     """A quantity of a kind of sensor, and where it lies in the values of a reading and of what comes out."""
 
     name: str
@@ -36,10 +36,11 @@ class Place:
     measured: bool
 
 
-def places_of(kind: str) -> list[Place]:
+def quantity_ranges(kind: str) -> list[QuantityRange]:
     ends = accumulate(quantity.count for quantity in KINDS[kind])
     return [
-        Place(q.name, q.unit or "", end - q.count, end, q.measured) for q, end in zip(KINDS[kind], ends, strict=True)
+        QuantityRange(q.name, q.unit or "", end - q.count, end, q.measured)
+        for q, end in zip(KINDS[kind], ends, strict=True)
     ]
 
 
@@ -150,10 +151,10 @@ class Watch:
 def _by_quantity(sensor: Sensor, values: list[float]) -> Values:
     """Without what is not told; without what the frontend computes, if no channel gets it."""
     found = {}
-    for place in places_of(sensor.kind):
-        told = values[place.start : place.end]
+    for quantity in quantity_ranges(sensor.kind):
+        told = values[quantity.start : quantity.end]
         while told and math.isnan(told[-1]):
             told.pop()
-        if told and (place.measured or place.name in sensor.channels):
-            found[place.name] = told
+        if told and (quantity.measured or quantity.name in sensor.channels):
+            found[quantity.name] = told
     return found

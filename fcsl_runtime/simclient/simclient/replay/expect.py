@@ -12,7 +12,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from fcsl_compiler.api.ros import Kind, PlanError, select_all
+from fcsl_compiler.api.ros import ConversionError, Kind, select_all
 
 from ..bag import Bag, field_value
 from ..descriptor import Machine
@@ -22,7 +22,7 @@ from .mapping import Entry, Expectation
 from .outputs import STATE, Outputs
 from .poses import are_rotations
 from .sample_extraction import Wish, gather, refusals, wish
-from .tick_alignment import Array, Grid, first_ticks_at, nearest_ticks, place, screen
+from .tick_alignment import Array, Grid, align, first_ticks_at, nearest_ticks, screen
 
 
 @dataclass(frozen=True)
@@ -68,30 +68,30 @@ def _target(expectation: Expectation, bag: Bag, machine: Machine) -> Target:
     entry = expectation.entry
     if entry.target == STATE:
         if expectation.compare or expectation.absolute or expectation.relative or len(entry.fields) != 1:
-            raise MapError(f"{entry.place}: states are compared as text: one `field`, no tolerance")
+            raise MapError(f"{entry.location}: states are compared as text: one `field`, no tolerance")
         try:
             bag.topic(entry.topic)
         except BagError as error:
-            raise MapError(f"{entry.place}: {error}") from None
+            raise MapError(f"{entry.location}: {error}") from None
         return Target(expectation, "state", "", None)
     outputs = [path for path, field in machine.fields.items() if field.role == "output"]
     if entry.target not in outputs:
         raise MapError(
-            f"{entry.place}: machine `{machine.name}` has no output `{entry.target}`{did_you_mean(entry.target, outputs)}"
+            f"{entry.location}: machine `{machine.name}` has no output `{entry.target}`{did_you_mean(entry.target, outputs)}"
         )
     field = machine.fields[entry.target]
     wanted = wish(bag, entry, "f64", field.count)
     definitions = definitions_of(bag.store(entry.topic).fielddefs)
     try:
         kind = select_all(definitions, wanted.topic.type, entry.fields, field.count).kind
-    except PlanError as error:
-        raise MapError(f"{entry.place}: {error}") from None
+    except ConversionError as error:
+        raise MapError(f"{entry.location}: {error}") from None
     rotation = kind is Kind.QUATERNION or bool(entry.order)
     measure = expectation.compare or ("angle" if rotation else "values")
     if measure != "values" and not rotation:
-        raise MapError(f"{entry.place}: `compare: {measure}` is for quaternions; is `quaternion: wxyz` missing?")
+        raise MapError(f"{entry.location}: `compare: {measure}` is for quaternions; is `quaternion: wxyz` missing?")
     if measure != "values" and expectation.relative:
-        raise MapError(f"{entry.place}: `rel` does not apply to an angle; give `abs` in rad")
+        raise MapError(f"{entry.location}: `rel` does not apply to an angle; give `abs` in rad")
     return Target(expectation, measure, field.unit if measure == "values" else "rad", wanted)
 
 
@@ -156,11 +156,11 @@ def _texts(bag: Bag, entry: Entry, header_time: bool) -> tuple[Array, Array, int
             text = field_value(topic, message, entry.fields[0])
             header = message.header if header_time else None
         except BagError as error:
-            raise MapError(f"{entry.place}: {error}") from None
+            raise MapError(f"{entry.location}: {error}") from None
         except AttributeError:
-            raise MapError(f"{entry.place}: `{topic.name}` [{topic.type}] has no header; use `time: log`") from None
+            raise MapError(f"{entry.location}: `{topic.name}` [{topic.type}] has no header; use `time: log`") from None
         if not isinstance(text, str):
-            raise MapError(f"{entry.place}: `{entry.fields[0]}` of `{topic.name}` is not text")
+            raise MapError(f"{entry.location}: `{entry.fields[0]}` of `{topic.name}` is not text")
         stamps.append(header.stamp.sec * 10**9 + header.stamp.nanosec if header else log_ns)
         logs.append(log_ns)
         texts.append(text)
@@ -178,7 +178,7 @@ def _aligned(times_ns: Array, grid: Grid, nearest: bool) -> tuple[Array, Array]:
         chosen = np.flatnonzero((times_ns >= grid.first_ns) & (ticks < grid.ticks))
         return ticks[chosen], chosen
     inside = np.flatnonzero(first_ticks_at(times_ns, grid.first_ns, grid.tick_hz) < grid.ticks)
-    ticks, chosen, _ = place(times_ns[inside], grid.first_ns, grid.ticks, grid.tick_hz)
+    ticks, chosen, _ = align(times_ns[inside], grid.first_ns, grid.ticks, grid.tick_hz)
     return ticks, inside[chosen]
 
 

@@ -24,8 +24,8 @@ from .tick_alignment import (
     Coverage,
     Grid,
     Oddities,
+    align,
     first_ticks_at,
-    place,
     tick_count,
 )
 
@@ -154,7 +154,7 @@ def _entries(chart: Map, machine: Machine) -> Sequence[Entry]:
     mapped = [channel for channel in sensors_of(machine).values() if channel.ros_type]
     if not mapped:
         raise MapError(f"{chart.path}: `channels: from machine`, but no sensor channel of `{machine.name}` has `ros`")
-    return [Entry(c.name, "/" + c.ros_topic.removeprefix("/"), place=chart.path) for c in mapped]
+    return [Entry(c.name, "/" + c.ros_topic.removeprefix("/"), location=chart.path) for c in mapped]
 
 
 def _completed(entry: Entry, machine: Machine, bag: Bag) -> tuple[Entry, Channel]:
@@ -163,12 +163,12 @@ def _completed(entry: Entry, machine: Machine, bag: Bag) -> tuple[Entry, Channel
     if entry.target not in sensors:
         hint, there = did_you_mean(entry.target, sensors), ", ".join(sensors) or "none"
         raise MapError(
-            f"{entry.place}: machine `{machine.name}` has no sensor channel `{entry.target}`{hint}; it has {there}"
+            f"{entry.location}: machine `{machine.name}` has no sensor channel `{entry.target}`{hint}; it has {there}"
         )
     channel = sensors[entry.target]
     if entry.timeout_ns and channel.max_age_ticks == NEVER:
         raise MapError(
-            f"{entry.place}: `timeout_ms` needs a channel that can become too old: "
+            f"{entry.location}: `timeout_ms` needs a channel that can become too old: "
             f"give `{channel.name}` a `max_age_ticks` in the machine"
         )
     axes = entry.axes or channel.ros_axes
@@ -176,12 +176,12 @@ def _completed(entry: Entry, machine: Machine, bag: Bag) -> tuple[Entry, Channel
         return replace(entry, axes=axes), channel
     if not channel.ros_type:
         raise MapError(
-            f"{entry.place}: channel `{channel.name}`: `field` is missing, and the channel has no `ros` block to take it from"
+            f"{entry.location}: channel `{channel.name}`: `field` is missing, and the channel has no `ros` block to take it from"
         )
     there_is = bag.topics[entry.topic].type if entry.topic in bag.topics else ""
     if there_is and there_is.replace("/msg/", "/") != channel.ros_type.replace("/msg/", "/"):
         raise MapError(
-            f"{entry.place}: `{entry.topic}` is {there_is}, channel `{channel.name}` takes {channel.ros_type}; give `field`"
+            f"{entry.location}: `{entry.topic}` is {there_is}, channel `{channel.name}` takes {channel.ros_type}; give `field`"
         )
     taken = replace(entry, fields=(channel.ros_field,), axes=axes)
     return replace(taken, frame=channel.ros_frame, child_frame=channel.ros_child_frame), channel
@@ -194,8 +194,10 @@ def _wishes(chart: Map, machine: Machine, bag: Bag) -> list[Wish]:
         entry, channel = _completed(entry, machine, bag)
         key = (entry.target, entry.topic)
         if key in seen:
-            raise MapError(f"{entry.place}: channel `{key[0]}` is mapped from `{key[1]}` twice; first at {seen[key]}")
-        seen[key] = entry.place
+            raise MapError(
+                f"{entry.location}: channel `{key[0]}` is mapped from `{key[1]}` twice; first at {seen[key]}"
+            )
+        seen[key] = entry.location
         wishes.append(wish(bag, entry, channel.field.type, channel.field.count, null_refused=True))
     return wishes
 
@@ -249,14 +251,14 @@ class _Delivery:
 
 
 def _delivery(
-    channel: Channel, intake: Intake, placed: tuple[Array, Array, Coverage], timeout_ns: int, grid: Grid
+    channel: Channel, intake: Intake, aligned: tuple[Array, Array, Coverage], timeout_ns: int, grid: Grid
 ) -> tuple[_Delivery, Fate]:
-    """What one channel gets; `placed` is `place` of the intake.
+    """What one channel gets; `aligned` is `align` of the intake.
 
     If `timeout_ms` ends before the machine's own max_age_ticks, the channel gets its last sample once more, with the
     first age that is too old.
     """
-    ticks, chosen, coverage = placed
+    ticks, chosen, coverage = aligned
     until = np.append(ticks[1:], grid.ticks)[: len(ticks)]
     old = ticks + channel.max_age_ticks + 1
     ages = np.zeros(len(ticks), np.int64)
@@ -294,16 +296,16 @@ def run_foreign(
     grid = _grid(chart, intakes, bag, machine.tick_hz)
     deliveries, fates = [], {}
     # By the identity of the times, which the channels of a topic share.
-    placed: dict[int, tuple[Array, Array, Coverage]] = {}
+    aligned: dict[int, tuple[Array, Array, Coverage]] = {}
     for name, channel in sensors_of(machine).items():
         if name not in intakes:
             continue
         intake = intakes[name]
         times = id(intake.times_ns)
-        if times not in placed:
-            placed[times] = place(intake.times_ns, grid.first_ns, grid.ticks, grid.tick_hz)
+        if times not in aligned:
+            aligned[times] = align(intake.times_ns, grid.first_ns, grid.ticks, grid.tick_hz)
         timeouts = [w.entry.timeout_ns for w in wishes if w.entry.target == name and w.entry.timeout_ns]
-        delivery, fates[name] = _delivery(channel, intake, placed[times], min(timeouts, default=0), grid)
+        delivery, fates[name] = _delivery(channel, intake, aligned[times], min(timeouts, default=0), grid)
         deliveries.append(delivery)
     _drive(run, deliveries, grid.ticks, outputs, record, progress)
     unmapped = [channel for name, channel in sensors_of(machine).items() if name not in fates]

@@ -87,7 +87,7 @@ class Entry:
     scale: tuple[float, ...] = ()
     offset: tuple[float, ...] = ()
     timeout_ns: int = 0
-    place: str = ""
+    location: str = ""
     frame: str = ""
     child_frame: str = ""
 
@@ -129,11 +129,11 @@ class _Reader:
     def __init__(self, path: str):
         self.path = path
 
-    def place(self, node: yaml.Node) -> str:
+    def location(self, node: yaml.Node) -> str:
         return f"{self.path}:{node.start_mark.line + 1}:{node.start_mark.column + 1}"
 
     def fail(self, node: yaml.Node, text: str) -> MapError:
-        return MapError(f"{self.place(node)}: {text}")
+        return MapError(f"{self.location(node)}: {text}")
 
     def members(self, node: yaml.Node, what: str, keys: Sequence[str] = ()) -> _Members:
         """The members of a mapping; `keys` are those allowed (empty: any)."""
@@ -233,13 +233,13 @@ def _entry(reader: _Reader, what: str, target: str, node: yaml.Node, members: _M
         scale=reader.numbers(members, "scale"),
         offset=reader.numbers(members, "offset"),
         timeout_ns=reader.milliseconds(members["timeout_ms"][1], "`timeout_ms`") if "timeout_ms" in members else 0,
-        place=reader.place(node),
+        location=reader.location(node),
     )
 
 
 def _channel_entry(reader: _Reader, channel: str, node: yaml.Node) -> Entry:
     if isinstance(node, yaml.ScalarNode):
-        return Entry(channel, reader.text(node, f"channel `{channel}`"), place=reader.place(node))
+        return Entry(channel, reader.text(node, f"channel `{channel}`"), location=reader.location(node))
     members = reader.members(node, f"channel `{channel}`", _CHANNEL_KEYS)
     return _entry(reader, "channel", channel, node, members)
 

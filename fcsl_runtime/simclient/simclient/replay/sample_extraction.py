@@ -59,12 +59,12 @@ class Wish:
 
 def wish(bag: Bag, entry: Entry, scalar: str, count: int, null_refused: bool = False) -> Wish:
     """The scalars that `entry` takes for a target of `count` scalars. `null_refused`: a quaternion of length zero is
-    none. Raises MapError with the entry's place.
+    none. Raises MapError with the entry's location.
     """
     try:
         topic = bag.topic(entry.topic)
     except BagError as error:
-        raise MapError(f"{entry.place}: {error}") from None
+        raise MapError(f"{entry.location}: {error}") from None
     pick = Pick(
         name=entry.target,
         fields=entry.fields,
@@ -245,16 +245,16 @@ def _column(bag: Bag, topic: str, wishes: Sequence[Wish]) -> _Column:
             try:
                 Reader(definitions, kind, [w.pick])
             except MapError as error:
-                raise MapError(f"{w.entry.place}: {error}") from None
+                raise MapError(f"{w.entry.location}: {error}") from None
         raise
 
 
 def _agreed(wishes: Sequence[Wish], key: str) -> str:
     """The frame that a topic's messages must have, from the channels' `ros` blocks; empty if none names one."""
-    frames = {frame: w.entry.place for w in wishes if (frame := getattr(w.entry, key))}
+    frames = {frame: w.entry.location for w in wishes if (frame := getattr(w.entry, key))}
     if len(frames) > 1:
         raise MapError(
-            f"{wishes[0].entry.place}: `{wishes[0].topic.name}` feeds channels of different frames: {', '.join(sorted(frames))}"
+            f"{wishes[0].entry.location}: `{wishes[0].topic.name}` feeds channels of different frames: {', '.join(sorted(frames))}"
         )
     return next(iter(frames), "")
 

@@ -140,7 +140,7 @@ def tick_count(first_ns: int, last_ns: int, tick_hz: int) -> int:
     return first_tick_at(last_ns, first_ns, tick_hz) + 1
 
 
-def place(times_ns: Array, first_ns: int, ticks: int, tick_hz: int) -> tuple[Array, Array, Coverage]:
+def align(times_ns: Array, first_ns: int, ticks: int, tick_hz: int) -> tuple[Array, Array, Coverage]:
     """(ticks at which a sample is delivered, index of each sample, counts).
 
     `times_ns` is sorted by topic and then by index in the topic, which decides between samples of the same time.

@@ -39,12 +39,12 @@ def with_transforms(bag: Bag, entries: Sequence[Entry], header_time: bool) -> Ba
     for name, entry in wanted.items():
         target, arrow, source = (part.strip() for part in name.removeprefix(_PREFIX).partition(_ARROW))
         if not (target and arrow and source) or target == source:
-            raise MapError(f"{entry.place}: `{name}` names no two frames; write {_PREFIX}PARENT{_ARROW}CHILD")
+            raise MapError(f"{entry.location}: `{name}` names no two frames; write {_PREFIX}PARENT{_ARROW}CHILD")
         try:
             frames = frames or Frames(bag, header_time)
             made[name] = frames.between(target.lstrip("/"), source.lstrip("/"))
         except BagError as error:
-            raise MapError(f"{entry.place}: {error}") from None
+            raise MapError(f"{entry.location}: {error}") from None
     return _BagWithTransforms(bag, made, header_time)
 
 

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Composes ROS 2 messages from memory, by a plan (fcsl_compiler.ros.composer)."""
+"""Composes ROS 2 messages from memory, by a conversion (fcsl_compiler.ros.composer)."""
 
 from __future__ import annotations
 
@@ -8,7 +8,7 @@ import weakref
 from collections.abc import Sequence
 from ctypes import byref
 
-from fcsl_compiler.api.ros import Definitions, PlanError, Source, composer_plan
+from fcsl_compiler.api.ros import ConversionError, Definitions, Source, composer_conversion
 
 from ..c_run import CError
 from ..errors import MapError, TwinError
@@ -27,20 +27,20 @@ class Composer:
         child_frame: str = "",
         stamped: str = "",
     ):
-        """`message`, `stamped`: as composer_plan takes them. Raises MapError, which names the source that does not fit and
+        """`message`, `stamped`: as composer_conversion takes them. Raises MapError, which names the source that does not fit and
         why."""
         try:
-            plan = composer_plan(definitions, message, sources, frame, child_frame, stamped)
-        except PlanError as error:
+            conversion = composer_conversion(definitions, message, sources, frame, child_frame, stamped)
+        except ConversionError as error:
             raise MapError(str(error)) from None
-        self._memories = (ctypes.c_void_p * plan.memory_count)()
-        self._plan = native.composer_plan(plan)  # the composer keeps its address
+        self._memories = (ctypes.c_void_p * conversion.memory_count)()
+        self._conversion = native.composer_conversion(conversion)  # the composer keeps its address
         library, failure = native.library(), CError()
-        handle = library.fcsl_ros_composer_new(byref(self._plan), byref(failure))
+        handle = library.fcsl_ros_composer_new(byref(self._conversion), byref(failure))
         if not handle:
             raise TwinError(failure.text.decode("utf-8", "replace"))
         self._handle, self._compose = handle, library.fcsl_ros_compose
-        self._message = ctypes.create_string_buffer(len(plan.text))
+        self._message = ctypes.create_string_buffer(len(conversion.text))
         #: Messages that were not composed, because a value does not fit its field.
         self.refused = 0
         weakref.finalize(self, library.fcsl_ros_composer_free, handle)

@@ -13,7 +13,7 @@ from ..c_run import CError
 from ..errors import TwinError
 from ..library import bind_runtime, runtime_library
 from ..run import Run
-from .outbox import Outbox, RunTopics
+from .publish_queue import PublishQueue, RunTopics
 
 _ERROR = POINTER(CError)
 _PROTOTYPES: dict[str, tuple[type | None, list[type]]] = {
@@ -40,11 +40,11 @@ def _load(path: Path) -> ctypes.CDLL:
 class Lockstep:
     """`address`: zenoh:tcp:HOST:PORT, where a simulator listens; name_space: in front of its keys. Raises TwinError."""
 
-    def __init__(self, run: Run, topics: RunTopics, outbox: Outbox, address: str, name_space: str = ""):
+    def __init__(self, run: Run, topics: RunTopics, queue: PublishQueue, address: str, name_space: str = ""):
         self._library, self._error = _load(runtime_library().with_name(_LIBRARY)), CError()
-        self._kept = (run, topics, outbox)
+        self._kept = (run, topics, queue)
         within = name_space.strip("/").encode()
-        parts = (run.handle(), topics.handle, outbox.handle)
+        parts = (run.handle(), topics.handle, queue.handle)
         self._handle = self._library.fcsl_lockstep_new(*parts, address.encode(), within, byref(self._error))
         if not self._handle:
             raise TwinError(self.problem)

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""ctypes mirror of fcsl/fcsl_ros_plan.h and fcsl_ros.h, with the same names and meaning, and plans in this form."""
+"""as ctypes: fcsl/fcsl_ros_conversion.h and fcsl_ros.h, with the same names and meaning, and conversions in this form."""
 
 from __future__ import annotations
 
@@ -11,7 +11,7 @@ from ctypes import c_void_p as ptr
 from pathlib import Path
 from typing import Any
 
-from fcsl_compiler.api.ros import ComposerPlan, ReaderPlan, Term
+from fcsl_compiler.api.ros import ComposerConversion, ReaderConversion, Term
 
 from ..c_run import CError
 from ..library import bind_runtime, runtime_library
@@ -88,7 +88,7 @@ class CValue(Structure):
     ]
 
 
-class CReaderPlan(Structure):
+class CReaderConversion(Structure):
     """fcsl_ros_reader_plan_t"""
 
     _fields_ = [
@@ -114,7 +114,7 @@ class CReaderPlan(Structure):
     ]
 
 
-class CComposerPlan(Structure):
+class CComposerConversion(Structure):
     """fcsl_ros_composer_plan_t"""
 
     _fields_ = [
@@ -131,24 +131,24 @@ class CComposerPlan(Structure):
 
 _ERROR = POINTER(CError)
 _PROTOTYPES: dict[str, tuple[type | None, list[type]]] = {
-    "fcsl_ros_reader_new": (ptr, [POINTER(CReaderPlan), _ERROR]),
+    "fcsl_ros_reader_new": (ptr, [POINTER(CReaderConversion), _ERROR]),
     "fcsl_ros_reader_free": (None, [ptr]),
     "fcsl_ros_reader_end": (c_size_t, [ptr]),
     "fcsl_ros_read": (c_int, [ptr, c_char_p, c_size_t, ptr, ptr, ptr]),
     "fcsl_ros_read_many": (None, [ptr, ptr, c_size_t, ptr, ptr, c_size_t, ptr, ptr, ptr]),
-    "fcsl_ros_inlet_new": (ptr, [ptr, ptr, POINTER(c_uint32), c_uint32, _ERROR]),
-    "fcsl_ros_inlet_free": (None, [ptr]),
-    "fcsl_ros_deliver": (c_uint32, [ptr, c_char_p, c_size_t, c_int64, c_char_p]),
-    "fcsl_ros_inlet_counts": (POINTER(c_uint64), [ptr]),
-    "fcsl_ros_inlet_behind_ns": (c_int64, [ptr]),
-    "fcsl_ros_composer_new": (ptr, [POINTER(CComposerPlan), _ERROR]),
+    "fcsl_sample_input_new": (ptr, [ptr, ptr, POINTER(c_uint32), c_uint32, _ERROR]),
+    "fcsl_sample_input_free": (None, [ptr]),
+    "fcsl_sample_input_deliver": (c_uint32, [ptr, c_char_p, c_size_t, c_int64, c_char_p]),
+    "fcsl_sample_input_counts": (POINTER(c_uint64), [ptr]),
+    "fcsl_sample_input_behind_ns": (c_int64, [ptr]),
+    "fcsl_ros_composer_new": (ptr, [POINTER(CComposerConversion), _ERROR]),
     "fcsl_ros_composer_free": (None, [ptr]),
     "fcsl_ros_compose": (c_int, [ptr, POINTER(ptr), c_int64, ptr]),
-    "fcsl_outbox_new": (ptr, [c_int, _ERROR]),
-    "fcsl_outbox_free": (None, [ptr]),
-    "fcsl_outbox_wake": (None, [ptr]),
-    "fcsl_outbox_take": (c_size_t, [ptr, c_int, ptr]),
-    "fcsl_outbox_dropped": (c_uint64, [ptr]),
+    "fcsl_publish_queue_new": (ptr, [c_int, _ERROR]),
+    "fcsl_publish_queue_free": (None, [ptr]),
+    "fcsl_publish_queue_wake": (None, [ptr]),
+    "fcsl_publish_queue_take": (c_size_t, [ptr, c_int, ptr]),
+    "fcsl_publish_queue_dropped": (c_uint64, [ptr]),
     "fcsl_topics_new": (ptr, [ptr, ptr, _ERROR]),
     "fcsl_topics_free": (None, [ptr]),
     "fcsl_topics_add_instance": (c_int, [ptr, c_uint32, c_uint32, c_uint32, _ERROR]),
@@ -166,7 +166,7 @@ def _load(path: Path) -> ctypes.CDLL:
 
 
 def library() -> ctypes.CDLL:
-    """The runtime with the prototypes of fcsl_ros.h, fcsl_ros_inlet.h, fcsl_outbox.h and fcsl_topics.h. Raises TwinError."""
+    """The runtime with the prototypes of fcsl_ros.h, fcsl_sample_input.h, fcsl_publish_queue.h and fcsl_topics.h. Raises TwinError."""
     return _load(runtime_library())
 
 
@@ -180,47 +180,48 @@ def _term(term: Term) -> tuple[float, int, int, int]:
     return term.factor, term.anchor, term.offset, term.type
 
 
-def _row_tables(plan: ReaderPlan | ComposerPlan) -> dict[str, Any]:
-    rows = [(r.first_term, r.term_count, r.offset, r.type, r.scaled, r.scale, r.bias, r.more) for r in plan.rows]
+def _row_tables(conversion: ReaderConversion | ComposerConversion) -> dict[str, Any]:
+    rows = [(r.first_term, r.term_count, r.offset, r.type, r.scaled, r.scale, r.bias, r.more) for r in conversion.rows]
     return {
         "rows": _table(CRow, rows),
-        "terms": _table(CTerm, [_term(t) for t in plan.terms]),
-        "row_count": len(plan.rows),
-        "term_count": len(plan.terms),
+        "terms": _table(CTerm, [_term(t) for t in conversion.terms]),
+        "row_count": len(conversion.rows),
+        "term_count": len(conversion.terms),
     }
 
 
-def reader_plan(plan: ReaderPlan) -> CReaderPlan:
-    """The plan as C has it."""
+def reader_conversion(conversion: ReaderConversion) -> CReaderConversion:
+    """The conversion as C has it."""
     values = [
-        (v.offset, v.size, v.first_row, v.row_count, v.first_guard, v.guard_count, v.rotation) for v in plan.values
+        (v.offset, v.size, v.first_row, v.row_count, v.first_guard, v.guard_count, v.rotation)
+        for v in conversion.values
     ]
-    return CReaderPlan(
-        parts=_table(CPart, [(p.code, p.align, p.size, p.first, p.count) for p in plan.parts]),
-        picks=_table(CPick, [(p.anchor, p.count, p.element, p.name) for p in plan.picks]),
-        names=(c_char_p * max(1, len(plan.names)))(*plan.names),
+    return CReaderConversion(
+        parts=_table(CPart, [(p.code, p.align, p.size, p.first, p.count) for p in conversion.parts]),
+        picks=_table(CPick, [(p.anchor, p.count, p.element, p.name) for p in conversion.picks]),
+        names=(c_char_p * max(1, len(conversion.names)))(*conversion.names),
         values=_table(CValue, values),
-        guards=_table(CGuard, [(CTerm(*_term(g.at)), g.value) for g in plan.guards]),
-        part_count=len(plan.parts),
-        pick_count=len(plan.picks),
-        name_count=len(plan.names),
+        guards=_table(CGuard, [(CTerm(*_term(g.at)), g.value) for g in conversion.guards]),
+        part_count=len(conversion.parts),
+        pick_count=len(conversion.picks),
+        name_count=len(conversion.names),
         value_count=len(values),
-        guard_count=len(plan.guards),
-        anchor_count=plan.anchor_count,
-        size=plan.size,
-        nan_allowed=plan.nan_allowed,
-        stamp_anchor=plan.stamp_anchor,
-        stamp_offset=plan.stamp_offset,
-        **_row_tables(plan),
+        guard_count=len(conversion.guards),
+        anchor_count=conversion.anchor_count,
+        size=conversion.size,
+        nan_allowed=conversion.nan_allowed,
+        stamp_anchor=conversion.stamp_anchor,
+        stamp_offset=conversion.stamp_offset,
+        **_row_tables(conversion),
     )
 
 
-def composer_plan(plan: ComposerPlan) -> CComposerPlan:
-    """The plan as C has it."""
-    return CComposerPlan(
-        text=(c_uint8 * len(plan.text)).from_buffer_copy(plan.text),
-        size=len(plan.text),
-        memory_count=plan.memory_count,
-        stamp_offset=plan.stamp_offset,
-        **_row_tables(plan),
+def composer_conversion(conversion: ComposerConversion) -> CComposerConversion:
+    """The conversion as C has it."""
+    return CComposerConversion(
+        text=(c_uint8 * len(conversion.text)).from_buffer_copy(conversion.text),
+        size=len(conversion.text),
+        memory_count=conversion.memory_count,
+        stamp_offset=conversion.stamp_offset,
+        **_row_tables(conversion),
     )

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Reads samples from ROS 2 messages, by a plan (fcsl_compiler.ros.reader)."""
+"""Reads samples from ROS 2 messages, by a conversion (fcsl_compiler.ros.reader)."""
 
 from __future__ import annotations
 
@@ -12,7 +12,7 @@ from typing import Any
 
 import numpy as np
 
-from fcsl_compiler.api.ros import Definitions, Pick, PlanError, ReaderPlan, has_stamp, reader_plan
+from fcsl_compiler.api.ros import ConversionError, Definitions, Pick, ReaderConversion, has_stamp, reader_conversion
 
 from ..c_run import CError
 from ..errors import MapError, TwinError
@@ -57,23 +57,25 @@ class Reader:
         Raises MapError, which names the pick that does not fit the message and why.
         """
         try:
-            plan = replace(reader_plan(definitions, message, picks, frame, child_frame), nan_allowed=nan_allowed)
-        except PlanError as error:
+            conversion = replace(
+                reader_conversion(definitions, message, picks, frame, child_frame), nan_allowed=nan_allowed
+            )
+        except ConversionError as error:
             raise MapError(str(error)) from None
         self.has_stamp = has_stamp(definitions, message)
-        self.dtype = _dtype(picks, plan)
+        self.dtype = _dtype(picks, conversion)
         #: Of each pick, whether it is a rotation, of which a quaternion of length zero is refused.
-        self.rotations = tuple(value.rotation for value in plan.values)
-        self._plan = native.reader_plan(plan)  # the reader keeps its address
+        self.rotations = tuple(value.rotation for value in conversion.values)
+        self._conversion = native.reader_conversion(conversion)  # the reader keeps its address
         library, failure = native.library(), CError()
-        handle = library.fcsl_ros_reader_new(byref(self._plan), byref(failure))
+        handle = library.fcsl_ros_reader_new(byref(self._conversion), byref(failure))
         if not handle:
             raise TwinError(failure.text.decode("utf-8", "replace"))
         self._handle: int = handle
         self._read, self._end = library.fcsl_ros_read, library.fcsl_ros_reader_end
         self._read_many = library.fcsl_ros_read_many
         self._value_count = len(picks)
-        self._row = ctypes.create_string_buffer(max(1, plan.size))
+        self._row = ctypes.create_string_buffer(max(1, conversion.size))
         self._status = ctypes.create_string_buffer(max(1, len(picks)))
         self._stamp = ctypes.c_int64()
         weakref.finalize(self, library.fcsl_ros_reader_free, handle)
@@ -112,12 +114,12 @@ class Reader:
         return Samples(values, stamps, status)
 
 
-def _dtype(picks: Sequence[Pick], plan: ReaderPlan) -> np.dtype[Any]:
+def _dtype(picks: Sequence[Pick], conversion: ReaderConversion) -> np.dtype[Any]:
     return np.dtype(
         {
             "names": [p.name for p in picks],
             "formats": [(_DTYPES[p.type], (p.count,) if p.count > 1 else ()) for p in picks],
-            "offsets": [value.offset for value in plan.values],
-            "itemsize": plan.size,
+            "offsets": [value.offset for value in conversion.values],
+            "itemsize": conversion.size,
         }
     )

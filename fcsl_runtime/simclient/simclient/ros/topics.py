@@ -71,7 +71,7 @@ def composer_of(topic: RosTopic) -> Composer:
     return Composer(STANDARD, topic.type, sources_of(topic), topic.frame, topic.child_frame)
 
 
-class Inlet:
+class SampleInput:
     """Delivers the messages of a sensor topic to a run."""
 
     def __init__(self, run: Run, topic: RosTopic):
@@ -80,11 +80,15 @@ class Inlet:
         self._names = [channel.name for channel in topic.channels]
         library, error = native.library(), CError()
         channels = (c_uint32 * len(topic.channels))(*(c.index for c in topic.channels))
-        handle = library.fcsl_ros_inlet_new(run.handle(), self._reader.handle, channels, len(channels), byref(error))
+        handle = library.fcsl_sample_input_new(run.handle(), self._reader.handle, channels, len(channels), byref(error))
         if not handle:
             raise TwinError(error.text.decode("utf-8", "replace"))
-        self._handle, self._deliver, self._counts = handle, library.fcsl_ros_deliver, library.fcsl_ros_inlet_counts
-        weakref.finalize(self, library.fcsl_ros_inlet_free, handle)
+        self._handle, self._deliver, self._counts = (
+            handle,
+            library.fcsl_sample_input_deliver,
+            library.fcsl_sample_input_counts,
+        )
+        weakref.finalize(self, library.fcsl_sample_input_free, handle)
 
     def deliver(self, cdr: bytes, now_ns: int, missing: frozenset[str] = frozenset()) -> int:
         """Writes the message's values (CDR) to its channels, for the next tick; returns the number of channels written.
@@ -105,4 +109,4 @@ class Inlet:
     def behind_ns(self) -> int:
         """How far the stamp of the newest readable message lay behind its `now_ns` (negative: ahead), in ns; 0 where it
         had no stamp."""
-        return int(native.library().fcsl_ros_inlet_behind_ns(self._handle))
+        return int(native.library().fcsl_sample_input_behind_ns(self._handle))

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Message definitions of a bag, in the form that plans need."""
+"""Message definitions of a bag, in the form that conversions need."""
 
 from __future__ import annotations
 

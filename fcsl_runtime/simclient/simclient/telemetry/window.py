@@ -7,7 +7,7 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from ..twin.trace import Array, Columns, fields_at, merged, places
+from ..twin.trace import Array, Columns, fields_at, merged, value_offsets
 from .configuration import HEAD, Configuration
 from .ring import Ring
 
@@ -29,7 +29,7 @@ class Window(Columns):
         parts = [ring.raw[rows, offset : offset + size] for offset, size in ranges]
         super().__init__(
             configuration.machine,
-            places(fields, ranges),
+            value_offsets(fields, ranges),
             sum(size for _, size in ranges),
             np.concatenate(parts, axis=1).tobytes(),
         )

@@ -20,7 +20,7 @@ from ..errors import TwinError
 from ..run import Run
 
 if TYPE_CHECKING:
-    from fcsl_compiler.api.reference import Place, ReferenceMachine
+    from fcsl_compiler.api.reference import FaultRow, ReferenceMachine
 
 
 class CHardware(Structure):
@@ -113,7 +113,7 @@ def layout_of(descriptor: CMachine, machine: Machine) -> dict[str, int]:
     return offsets
 
 
-def places_of(machine: Machine) -> list[Place]:
+def fault_rows_of(machine: Machine) -> list[FaultRow]:
     """The table of fault places in the form of the reference."""
     return [(p.file, p.line, p.column, p.cause) for p in machine.fault_places]
 
@@ -204,11 +204,11 @@ class PythonRun(Run):
     """A run of a PythonMachine. Exceptions of user code propagate out of the call that ran it."""
 
     def __init__(
-        self, library: Path, name: str, make_reference: Callable[[dict[str, int], Sequence[Place]], ReferenceMachine]
+        self, library: Path, name: str, make_reference: Callable[[dict[str, int], Sequence[FaultRow]], ReferenceMachine]
     ):
         compiled = find_descriptor(library, name)
         machine = read_machine(ctypes.pointer(compiled))
-        self._python = PythonMachine(compiled, make_reference(layout_of(compiled, machine), places_of(machine)))
+        self._python = PythonMachine(compiled, make_reference(layout_of(compiled, machine), fault_rows_of(machine)))
         super().__init__(library, name)
 
     def _open(self, library: Path, machine: str | None) -> int | None:

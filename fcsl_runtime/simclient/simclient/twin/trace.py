@@ -168,7 +168,7 @@ class Trace(Columns):
         if all(f.path != _TICK for f in fields):
             fields = [twin.machine.fields[_TICK], *fields]
         ranges = merged(fields)
-        super().__init__(twin.machine, places(fields, ranges), sum(size for _, size in ranges))
+        super().__init__(twin.machine, value_offsets(fields, ranges), sum(size for _, size in ranges))
         self._twin = twin
         self._chunks: list[bytes | bytearray] = []
         self._collected = 0
@@ -223,7 +223,7 @@ def merged(fields: Sequence[Field]) -> list[tuple[int, int]]:
     return ranges
 
 
-def places(fields: Sequence[Field], ranges: Sequence[tuple[int, int]]) -> dict[str, int]:
+def value_offsets(fields: Sequence[Field], ranges: Sequence[tuple[int, int]]) -> dict[str, int]:
     """Offset of each field in a row of these ranges."""
     begins = np.cumsum([0, *(size for _, size in ranges)])
     numbers = np.searchsorted([offset for offset, _ in ranges], [f.offset for f in fields], side="right") - 1

@@ -275,8 +275,8 @@ static void fly(fcsl_sim_t *sim)
     fcsl_error_t error = {{0}};
     for (int i = 0; i < TICKS && fcsl_sim_run(sim, 1, &error) == 1; i++) {
         (void)fcsl_sim_truth_values(sim, values, VALUES);
-        (void)fcsl_sim_truth_message(sim, 0, cdr, sizeof cdr);
-        FUZZ_CHECK(fcsl_sim_truth_schema(sim, 1)[0] != '\0');
+        (void)fcsl_sim_model_message(sim, 0, cdr, sizeof cdr);
+        FUZZ_CHECK(fcsl_sim_model_message_schema(sim, 1)[0] != '\0');
     }
     const size_t capacity = fcsl_sim_checkpoint_capacity(sim);
     void *checkpoint = malloc(capacity);

@@ -1,6 +1,6 @@
 /* SPDX-License-Identifier: Apache-2.0
  *
- * fcsl_ros.h: composing messages. Input: number of patches (1), patches of the plan (which table, then as fuzz.h says), a
+ * fcsl_ros.h: composing messages. Input: number of patches (1), patches of the conversion (which table, then as fuzz.h says), a
  * time (8), the memory that the numbers are read from. Terms read what the caller vouches for, so their places stay.
  */
 #include "fcsl/fcsl_ros.h"
@@ -55,18 +55,18 @@ int LLVMFuzzerTestOneInput(const uint8_t *data, size_t size)
             patch_words(&bytes, numbers, sizeof numbers, 1);
         }
     }
-    fcsl_ros_composer_plan_t plan = {
+    fcsl_ros_composer_plan_t conversion = {
         .text = TEXT, .rows = rows, .terms = terms, .size = numbers[0] % (TEXT_BYTES + 1u)};
-    plan.row_count = numbers[1] % (ROWS + 1u);
-    plan.term_count = numbers[2] % (TERMS + 1u);
-    plan.memory_count = numbers[3] % 3u;
-    plan.stamp_offset = numbers[4];
-    plan.rows = plan.row_count > 0 ? rows : NULL;
-    plan.terms = plan.term_count > 0 ? terms : NULL;
-    fcsl_ros_composer_t *composer = fcsl_ros_composer_new(&plan, &error);
+    conversion.row_count = numbers[1] % (ROWS + 1u);
+    conversion.term_count = numbers[2] % (TERMS + 1u);
+    conversion.memory_count = numbers[3] % 3u;
+    conversion.stamp_offset = numbers[4];
+    conversion.rows = conversion.row_count > 0 ? rows : NULL;
+    conversion.terms = conversion.term_count > 0 ? terms : NULL;
+    fcsl_ros_composer_t *composer = fcsl_ros_composer_new(&conversion, &error);
     FUZZ_CHECK((composer == NULL) == (error.text[0] != '\0'));
     if (composer != NULL) {
-        apply(composer, plan.size, &bytes);
+        apply(composer, conversion.size, &bytes);
     }
     fcsl_ros_composer_free(composer);
     return 0;

@@ -1,10 +1,10 @@
 /* SPDX-License-Identifier: Apache-2.0
  *
- * fcsl_ros_inlet.h: messages that come in while the fixture machine runs (a stamp and a gyro). Input: messages, each of the time
+ * fcsl_sample_input.h: messages that come in while the fixture machine runs (a stamp and a gyro). Input: messages, each of the time
  * since the last one in 0.1 ms (2), how (1), length (1) and bytes. Of how, bit 0 stamps it with a time close to now, bit 1
  * makes its sequence one of three numbers, bit 2 marks it as missing, bit 3 steps the machine.
  */
-#include "fcsl/fcsl_ros_inlet.h"
+#include "fcsl/fcsl_sample_input.h"
 #include "fcsl/fcsl_scalar.h"
 #include "fuzz.h"
 
@@ -19,20 +19,20 @@ static const fcsl_ros_term_t TERMS[] = {
 static const fcsl_ros_row_t ROWS[] = {
     {0, 1, 0, FCSL_ROS_F64, 0, 0, 0, 0}, {1, 1, 8, FCSL_ROS_F64, 0, 0, 0, 0}, {2, 1, 16, FCSL_ROS_F64, 0, 0, 0, 0}};
 static const fcsl_ros_value_t ROW_VALUES[] = {{0, 24, 0, 3, 0, 0, 0}};
-static const fcsl_ros_reader_plan_t PLAN = {.parts = PARTS,
-                                            .picks = PICKS,
-                                            .values = ROW_VALUES,
-                                            .rows = ROWS,
-                                            .terms = TERMS,
-                                            .part_count = 2,
-                                            .pick_count = 1,
-                                            .value_count = 1,
-                                            .row_count = 3,
-                                            .term_count = 3,
-                                            .anchor_count = 2,
-                                            .size = 24};
+static const fcsl_ros_reader_plan_t CONVERSION = {.parts = PARTS,
+                                                  .picks = PICKS,
+                                                  .values = ROW_VALUES,
+                                                  .rows = ROWS,
+                                                  .terms = TERMS,
+                                                  .part_count = 2,
+                                                  .pick_count = 1,
+                                                  .value_count = 1,
+                                                  .row_count = 3,
+                                                  .term_count = 3,
+                                                  .anchor_count = 2,
+                                                  .size = 24};
 
-static void deliver(fcsl_run_t *run, fcsl_ros_inlet_t *inlet, int64_t now_ns, bytes_t *bytes)
+static void deliver(fcsl_run_t *run, fcsl_sample_input_t *input, int64_t now_ns, bytes_t *bytes)
 {
     fcsl_error_t error;
     const uint64_t how = take_number(bytes, 1);
@@ -48,7 +48,7 @@ static void deliver(fcsl_run_t *run, fcsl_ros_inlet_t *inlet, int64_t now_ns, by
         fcsl_put_u32(message + 12, 3);
     }
     const uint8_t missing[] = {(how & 4u) != 0};
-    FUZZ_CHECK(fcsl_ros_deliver(inlet, message, size, now_ns, missing) <= 1u - missing[0]);
+    FUZZ_CHECK(fcsl_sample_input_deliver(input, message, size, now_ns, missing) <= 1u - missing[0]);
     FUZZ_CHECK((how & 8u) == 0 || fcsl_run_step(run, 1, &error) == 0);
     free(message);
 }
@@ -59,16 +59,16 @@ int LLVMFuzzerTestOneInput(const uint8_t *data, size_t size)
     bytes_t bytes = {data, size};
     fcsl_error_t error;
     fcsl_run_t *run = fcsl_run_open_machine(fcsl_machines[0], &error);
-    fcsl_ros_reader_t *reader = fcsl_ros_reader_new(&PLAN, &error);
+    fcsl_ros_reader_t *reader = fcsl_ros_reader_new(&CONVERSION, &error);
     FUZZ_CHECK(run != NULL && reader != NULL && fcsl_run_attach(run, &error) == 0);
-    fcsl_ros_inlet_t *inlet = fcsl_ros_inlet_new(run, reader, channels, 1, &error);
-    FUZZ_CHECK(inlet != NULL);
+    fcsl_sample_input_t *input = fcsl_sample_input_new(run, reader, channels, 1, &error);
+    FUZZ_CHECK(input != NULL);
     int64_t now_ns = 1000000000;
     while (bytes.left > 0) {
         now_ns += (int64_t)take_number(&bytes, 2) * 100000;
-        deliver(run, inlet, now_ns, &bytes);
+        deliver(run, input, now_ns, &bytes);
     }
-    fcsl_ros_inlet_free(inlet);
+    fcsl_sample_input_free(input);
     fcsl_ros_reader_free(reader);
     FUZZ_CHECK(fcsl_run_close(run, &error) == 0);
     return 0;

@@ -53,8 +53,8 @@ static void read_truth(const fcsl_sim_t *sim)
     double values[VALUES];
     (void)fcsl_sim_truth_values(sim, values, VALUES);
     for (uint32_t i = 0; i < fcsl_sim_instance_count(sim); i++) {
-        FUZZ_CHECK(fcsl_sim_truth_type(sim, i)[0] != '\0' && fcsl_sim_truth_schema(sim, i)[0] != '\0');
-        FUZZ_CHECK(fcsl_sim_truth_message(sim, i, cdr, sizeof cdr) <= (int64_t)sizeof cdr);
+        FUZZ_CHECK(fcsl_sim_model_message_type(sim, i)[0] != '\0' && fcsl_sim_model_message_schema(sim, i)[0] != '\0');
+        FUZZ_CHECK(fcsl_sim_model_message(sim, i, cdr, sizeof cdr) <= (int64_t)sizeof cdr);
     }
 }
 

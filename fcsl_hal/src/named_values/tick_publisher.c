@@ -2,7 +2,7 @@
  *
  * A machine's channels under their keys, for observers: the session, and what a tick puts on it.
  */
-#include "fcsl/fcsl_mirror.h"
+#include "fcsl/fcsl_tick_publisher.h"
 #include "fcsl/fcsl_error.h"
 
 #include <stdio.h>
@@ -36,7 +36,7 @@ static const uint64_t RING_BYTES = UINT64_C(4) << 20;
 /* For host writes, at least. */
 static const uint64_t WRITES_BYTES_MIN = UINT64_C(1) << 20;
 
-struct fcsl_mirror {
+struct fcsl_tick_publisher {
     fcsl_channel_table_t table;
     fcsl_bus_t *bus;
     uint8_t *fresh; /* of each channel: has a value in the tick */
@@ -62,40 +62,41 @@ static uint32_t word_at(const uint8_t *data, uint32_t offset)
 }
 
 /* Whether a sample came since the tick posted before: without one, the age would have grown by the ticks between. */
-static int is_sampled(fcsl_mirror_t *mirror, uint32_t number, const uint8_t *data, uint64_t tick)
+static int is_sampled(fcsl_tick_publisher_t *publisher, uint32_t number, const uint8_t *data, uint64_t tick)
 {
-    const fcsl_channel_t *channel = &mirror->table.machine->channels[number];
-    const uint32_t before = mirror->ages[number];
-    const int64_t stamped_ns = mirror->stamps_ns[number];
-    mirror->ages[number] = word_at(data, channel->age_offset);
-    memcpy(&mirror->stamps_ns[number], data + channel->stamp_offset, sizeof stamped_ns);
-    return !mirror->has_begun || mirror->stamps_ns[number] != stamped_ns || data[channel->attached_offset] == 0u ||
-           mirror->ages[number] == 0u ||
-           (mirror->ages[number] != UINT32_MAX && mirror->ages[number] != before + (tick - mirror->tick));
+    const fcsl_channel_t *channel = &publisher->table.machine->channels[number];
+    const uint32_t before = publisher->ages[number];
+    const int64_t stamped_ns = publisher->stamps_ns[number];
+    publisher->ages[number] = word_at(data, channel->age_offset);
+    memcpy(&publisher->stamps_ns[number], data + channel->stamp_offset, sizeof stamped_ns);
+    return !publisher->has_begun || publisher->stamps_ns[number] != stamped_ns ||
+           data[channel->attached_offset] == 0u || publisher->ages[number] == 0u ||
+           (publisher->ages[number] != UINT32_MAX && publisher->ages[number] != before + (tick - publisher->tick));
 }
 
 /* A value that its message cannot hold is none of the tick. */
-static int post_value(fcsl_mirror_t *mirror, uint32_t number, const uint8_t *data, uint64_t time_ns)
+static int post_value(fcsl_tick_publisher_t *publisher, uint32_t number, const uint8_t *data, uint64_t time_ns)
 {
     uint32_t size = 0;
-    if (payload_write(&mirror->payload, number, data, (int64_t)time_ns, mirror->value, &size) != 0) {
-        mirror->fresh[number] = 0;
+    if (payload_write(&publisher->payload, number, data, (int64_t)time_ns, publisher->value, &size) != 0) {
+        publisher->fresh[number] = 0;
         return 0;
     }
-    return fcsl_bus_post(mirror->bus, CHANNELS + number, mirror->value, size);
+    return fcsl_bus_post(publisher->bus, CHANNELS + number, publisher->value, size);
 }
 
-static int post_direction(fcsl_mirror_t *mirror, const commit_t *commit, const uint8_t *data, uint64_t time_ns)
+static int post_direction(fcsl_tick_publisher_t *publisher, const commit_t *commit, const uint8_t *data,
+                          uint64_t time_ns)
 {
-    const fcsl_machine_t *machine = mirror->table.machine;
+    const fcsl_machine_t *machine = publisher->table.machine;
     int failed = 0;
     for (uint32_t i = 0; i < machine->channel_count && !failed; i++) {
-        mirror->fresh[i] = machine->channels[i].direction == commit->direction &&
-                           (commit->direction != FCSL_SENSOR || is_sampled(mirror, i, data, commit->tick));
-        failed = mirror->fresh[i] != 0u && post_value(mirror, i, data, time_ns) != 0;
+        publisher->fresh[i] = machine->channels[i].direction == commit->direction &&
+                              (commit->direction != FCSL_SENSOR || is_sampled(publisher, i, data, commit->tick));
+        failed = publisher->fresh[i] != 0u && post_value(publisher, i, data, time_ns) != 0;
     }
-    commit_write(commit, mirror->fresh, mirror->value);
-    return failed || fcsl_bus_post(mirror->bus, COMMIT, mirror->value, commit_bytes(commit->channels)) != 0;
+    commit_write(commit, publisher->fresh, publisher->value);
+    return failed || fcsl_bus_post(publisher->bus, COMMIT, publisher->value, commit_bytes(commit->channels)) != 0;
 }
 
 static int has_reports(const fcsl_machine_t *machine)
@@ -108,93 +109,93 @@ static int has_reports(const fcsl_machine_t *machine)
     return 0;
 }
 
-int fcsl_mirror_post(fcsl_mirror_t *mirror, const void *data, uint64_t tick, uint64_t time_ns, int requires_arming)
+int fcsl_tick_publisher_post(fcsl_tick_publisher_t *publisher, const void *data, uint64_t tick, uint64_t time_ns, int requires_arming)
 {
-    const fcsl_machine_t *machine = mirror->table.machine;
+    const fcsl_machine_t *machine = publisher->table.machine;
     const uint8_t *bytes = data;
     commit_t commit = {.tick = tick,
                        .time_ns = time_ns,
-                       .table_hash = mirror->table.hash,
+                       .table_hash = publisher->table.hash,
                        .direction = FCSL_SENSOR,
                        .channels = (uint16_t)machine->channel_count};
-    mirror->room -= mirror->room > 0u;
-    int failed = post_direction(mirror, &commit, bytes, time_ns);
+    publisher->room -= publisher->room > 0u;
+    int failed = post_direction(publisher, &commit, bytes, time_ns);
     commit.direction = FCSL_ACTUATOR;
     commit.time_ns = 0;
     commit.armed = !requires_arming && fcsl_is_armed(machine, bytes);
-    failed = failed || post_direction(mirror, &commit, bytes, time_ns) != 0;
+    failed = failed || post_direction(publisher, &commit, bytes, time_ns) != 0;
     if (!failed && has_reports(machine)) {
         commit.direction = FCSL_REPORT;
         commit.armed = 0;
-        failed = post_direction(mirror, &commit, bytes, time_ns) != 0;
+        failed = post_direction(publisher, &commit, bytes, time_ns) != 0;
     }
-    mirror->tick = tick;
-    mirror->has_begun = !failed;
+    publisher->tick = tick;
+    publisher->has_begun = !failed;
     return failed ? -1 : 0;
 }
 
-void fcsl_mirror_begin(fcsl_mirror_t *mirror)
+void fcsl_tick_publisher_begin(fcsl_tick_publisher_t *publisher)
 {
-    mirror->has_begun = 0;
+    publisher->has_begun = 0;
 }
 
 /* ---- host writes ---------------------------------------------------------------------------------------------------- */
 
-int fcsl_mirror_writes_watched(const fcsl_mirror_t *mirror)
+int fcsl_tick_publisher_writes_watched(const fcsl_tick_publisher_t *publisher)
 {
-    return fcsl_bus_matched(mirror->bus, WRITES);
+    return fcsl_bus_matched(publisher->bus, WRITES);
 }
 
-static int post_from_writes_room(fcsl_mirror_t *mirror, uint32_t output, const void *bytes, size_t size)
+static int post_from_writes_room(fcsl_tick_publisher_t *publisher, uint32_t output, const void *bytes, size_t size)
 {
     const uint64_t needed = size + ENTRY_BYTES_MAX;
-    if (needed > mirror->writes_room) {
+    if (needed > publisher->writes_room) {
         return -1;
     }
-    mirror->writes_room -= needed;
-    return fcsl_bus_post(mirror->bus, output, bytes, size);
+    publisher->writes_room -= needed;
+    return fcsl_bus_post(publisher->bus, output, bytes, size);
 }
 
-int fcsl_mirror_post_write(fcsl_mirror_t *mirror, const void *bytes, size_t size)
+int fcsl_tick_publisher_post_write(fcsl_tick_publisher_t *publisher, const void *bytes, size_t size)
 {
-    return post_from_writes_room(mirror, WRITES, bytes, size);
+    return post_from_writes_room(publisher, WRITES, bytes, size);
 }
 
-int fcsl_mirror_post_written(fcsl_mirror_t *mirror, uint64_t ticks, uint64_t number)
+int fcsl_tick_publisher_post_written(fcsl_tick_publisher_t *publisher, uint64_t ticks, uint64_t number)
 {
     uint8_t bytes[WRITTEN_BYTES];
     fcsl_put_u64(bytes, ticks);
     fcsl_put_u64(bytes + 8, number);
-    return post_from_writes_room(mirror, WRITTEN, bytes, sizeof bytes);
+    return post_from_writes_room(publisher, WRITTEN, bytes, sizeof bytes);
 }
 
-int fcsl_mirror_answer_checkpoint(fcsl_mirror_t *mirror, const void *bytes, size_t size)
+int fcsl_tick_publisher_answer_checkpoint(fcsl_tick_publisher_t *publisher, const void *bytes, size_t size)
 {
-    return fcsl_bus_answer(mirror->bus, CHECKPOINT, bytes, size);
+    return fcsl_bus_answer(publisher->bus, CHECKPOINT, bytes, size);
 }
 
 /* ---- room ----------------------------------------------------------------------------------------------------------- */
 
-int fcsl_mirror_watched(const fcsl_mirror_t *mirror)
+int fcsl_tick_publisher_watched(const fcsl_tick_publisher_t *publisher)
 {
-    int watched = fcsl_bus_matched(mirror->bus, COMMIT) || fcsl_mirror_writes_watched(mirror);
-    for (uint32_t i = 0; i < mirror->table.machine->channel_count && !watched; i++) {
-        watched = fcsl_bus_matched(mirror->bus, CHANNELS + i);
+    int watched = fcsl_bus_matched(publisher->bus, COMMIT) || fcsl_tick_publisher_writes_watched(publisher);
+    for (uint32_t i = 0; i < publisher->table.machine->channel_count && !watched; i++) {
+        watched = fcsl_bus_matched(publisher->bus, CHANNELS + i);
     }
     return watched;
 }
 
 /* Once everything has left, the ring holds as many ticks as it was made for, and as many writes. */
-int fcsl_mirror_ready(fcsl_mirror_t *mirror)
+int fcsl_tick_publisher_ready(fcsl_tick_publisher_t *publisher)
 {
-    if (mirror->room == 0u || mirror->writes_room < mirror->writes_bytes / 2u) {
+    if (publisher->room == 0u || publisher->writes_room < publisher->writes_bytes / 2u) {
         fcsl_bus_counters_t now;
-        fcsl_bus_count(mirror->bus, &now);
+        fcsl_bus_count(publisher->bus, &now);
         const int empty = now.posted == now.put + now.put_failed;
-        mirror->room = empty ? mirror->ticks : 0u;
-        mirror->writes_room = empty ? mirror->writes_bytes : 0u;
+        publisher->room = empty ? publisher->ticks : 0u;
+        publisher->writes_room = empty ? publisher->writes_bytes : 0u;
     }
-    return mirror->room > 0u;
+    return publisher->room > 0u;
 }
 
 /* ---- opening and closing -------------------------------------------------------------------------------------------- */
@@ -223,50 +224,50 @@ static int check(const fcsl_machine_t *machine, const char *name_space, fcsl_err
     return 0;
 }
 
-static fcsl_mirror_t *allocate(const fcsl_machine_t *machine, fcsl_error_t *error)
+static fcsl_tick_publisher_t *allocate(const fcsl_machine_t *machine, fcsl_error_t *error)
 {
     const size_t channels = machine->channel_count;
     size_t longest = commit_bytes(machine->channel_count);
-    fcsl_mirror_t *mirror = calloc(1, sizeof *mirror);
+    fcsl_tick_publisher_t *publisher = calloc(1, sizeof *publisher);
     (void)fcsl_fail(error, "out of memory for observers");
-    if (mirror == NULL) {
+    if (publisher == NULL) {
         return NULL;
     }
     for (uint32_t i = 0; i < machine->channel_count; i++) {
         longest = payload_bytes(machine, i) > longest ? payload_bytes(machine, i) : longest;
     }
-    mirror->table = fcsl_channel_table(machine);
-    mirror->fresh = calloc(channels + 1u, 1);
-    mirror->ages = calloc(channels + 1u, sizeof *mirror->ages);
-    mirror->stamps_ns = calloc(channels + 1u, sizeof *mirror->stamps_ns);
-    mirror->value = calloc(longest, 1);
-    if (mirror->fresh == NULL || mirror->ages == NULL || mirror->stamps_ns == NULL || mirror->value == NULL ||
-        payload_open(&mirror->payload, machine, error) != 0) {
-        fcsl_mirror_close(mirror);
+    publisher->table = fcsl_channel_table(machine);
+    publisher->fresh = calloc(channels + 1u, 1);
+    publisher->ages = calloc(channels + 1u, sizeof *publisher->ages);
+    publisher->stamps_ns = calloc(channels + 1u, sizeof *publisher->stamps_ns);
+    publisher->value = calloc(longest, 1);
+    if (publisher->fresh == NULL || publisher->ages == NULL || publisher->stamps_ns == NULL ||
+        publisher->value == NULL || payload_open(&publisher->payload, machine, error) != 0) {
+        fcsl_tick_publisher_close(publisher);
         return NULL;
     }
-    return mirror;
+    return publisher;
 }
 
 /* The ring's bytes, and what it holds: ticks, and host writes. */
-static uint32_t size_ring(fcsl_mirror_t *mirror, uint32_t write_bytes)
+static uint32_t size_ring(fcsl_tick_publisher_t *publisher, uint32_t write_bytes)
 {
-    const fcsl_machine_t *machine = mirror->table.machine;
+    const fcsl_machine_t *machine = publisher->table.machine;
     uint64_t tick_bytes = 3u * (commit_bytes(machine->channel_count) + ENTRY_BYTES_MAX);
     for (uint32_t i = 0; i < machine->channel_count; i++) {
         tick_bytes += payload_bytes(machine, i) + ENTRY_BYTES_MAX;
     }
     const uint64_t ticks = RING_BYTES / tick_bytes;
-    mirror->ticks = ticks < 1u ? 1u : ticks > TICKS_POSTED ? TICKS_POSTED : (uint32_t)ticks;
+    publisher->ticks = ticks < 1u ? 1u : ticks > TICKS_POSTED ? TICKS_POSTED : (uint32_t)ticks;
     const uint64_t writes = LONG_WRITES * ((uint64_t)write_bytes + ENTRY_BYTES_MAX);
-    mirror->writes_bytes = writes < WRITES_BYTES_MIN ? WRITES_BYTES_MIN : writes;
-    const uint64_t bytes = tick_bytes * (mirror->ticks + TICKS_SPARE) + mirror->writes_bytes;
+    publisher->writes_bytes = writes < WRITES_BYTES_MIN ? WRITES_BYTES_MIN : writes;
+    const uint64_t bytes = tick_bytes * (publisher->ticks + TICKS_SPARE) + publisher->writes_bytes;
     return bytes < UINT32_MAX ? (uint32_t)bytes : UINT32_MAX; /* the bus refuses so many */
 }
 
 /* Writes a key to its place in `keys`. */
-static const char *write_key(char *keys, uint32_t place, const fcsl_mirror_options_t *options, const char *machine,
-                             const char *name)
+static const char *write_key(char *keys, uint32_t place, const fcsl_tick_publisher_options_t *options,
+                             const char *machine, const char *name)
 {
     char *key = keys + (size_t)place * (FCSL_BUS_KEY_MAX + 1u);
     const char *name_space = options->name_space;
@@ -275,10 +276,10 @@ static const char *write_key(char *keys, uint32_t place, const fcsl_mirror_optio
     return key;
 }
 
-static int open_session(fcsl_mirror_t *mirror, const fcsl_mirror_options_t *options, const char **outputs, char *keys,
-                        fcsl_error_t *error)
+static int open_session(fcsl_tick_publisher_t *publisher, const fcsl_tick_publisher_options_t *options,
+                        const char **outputs, char *keys, fcsl_error_t *error)
 {
-    const fcsl_machine_t *machine = mirror->table.machine;
+    const fcsl_machine_t *machine = publisher->table.machine;
     const uint32_t count = machine->channel_count + CHANNELS;
     const fcsl_bus_answer_t answers[ANSWERS] = {
         [DESCRIPTOR] = {.key = write_key(keys, count + DESCRIPTOR, options, machine->name, "@descriptor"),
@@ -295,23 +296,23 @@ static int open_session(fcsl_mirror_t *mirror, const fcsl_mirror_options_t *opti
     const fcsl_bus_options_t bus = {.role = FCSL_BUS_LISTEN,
                                     .endpoint = options->endpoint,
                                     .observer = 1,
-                                    .ring_bytes = size_ring(mirror, options->write_bytes),
+                                    .ring_bytes = size_ring(publisher, options->write_bytes),
                                     .outputs = outputs,
                                     .output_count = count,
                                     .answers = answers,
                                     .answer_count = ANSWERS};
-    return fcsl_bus_open(&bus, &mirror->bus, error);
+    return fcsl_bus_open(&bus, &publisher->bus, error);
 }
 
-int fcsl_mirror_open(const fcsl_mirror_options_t *options, const fcsl_machine_t *machine, fcsl_mirror_t **mirror,
-                     fcsl_error_t *error)
+int fcsl_tick_publisher_open(const fcsl_tick_publisher_options_t *options, const fcsl_machine_t *machine,
+                             fcsl_tick_publisher_t **publisher, fcsl_error_t *error)
 {
     const size_t count = (size_t)machine->channel_count + CHANNELS;
     int failed = -1;
     if (check(machine, options->name_space, error) != 0) {
         return -1;
     }
-    fcsl_mirror_t *self = allocate(machine, error);
+    fcsl_tick_publisher_t *self = allocate(machine, error);
     const char **outputs = calloc(count, sizeof *outputs);
     char *keys = calloc(count + ANSWERS, FCSL_BUS_KEY_MAX + 1u);
     if (self != NULL && outputs != NULL && keys != NULL) {
@@ -320,26 +321,26 @@ int fcsl_mirror_open(const fcsl_mirror_options_t *options, const fcsl_machine_t 
     free(keys);
     free((void *)outputs);
     if (failed) {
-        fcsl_mirror_close(self);
+        fcsl_tick_publisher_close(self);
         return -1;
     }
-    *mirror = self;
+    *publisher = self;
     return 0;
 }
 
-void fcsl_mirror_close(fcsl_mirror_t *mirror)
+void fcsl_tick_publisher_close(fcsl_tick_publisher_t *publisher)
 {
-    if (mirror == NULL) {
+    if (publisher == NULL) {
         return;
     }
-    if (mirror->bus != NULL) {
-        (void)fcsl_bus_close(mirror->bus,
+    if (publisher->bus != NULL) {
+        (void)fcsl_bus_close(publisher->bus,
                              CLOSE_MS); /* frozen observers may hold it up: what is left of it goes on alone */
     }
-    payload_close(&mirror->payload);
-    free(mirror->fresh);
-    free(mirror->ages);
-    free(mirror->stamps_ns);
-    free(mirror->value);
-    free(mirror);
+    payload_close(&publisher->payload);
+    free(publisher->fresh);
+    free(publisher->ages);
+    free(publisher->stamps_ns);
+    free(publisher->value);
+    free(publisher);
 }

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Plans of ROS 2 messages in the compiler; simclient's tests execute them."""
+"""Conversions of ROS 2 messages in the compiler; simclient's tests execute them."""
 
 import json
 from pathlib import Path
@@ -20,7 +20,7 @@ ALONE = {
 
 
 def test_a_message_of_too_many_channels(tmp_path: Path) -> None:
-    """A plan has limits; the compiler says so, and what to do, where the channels are."""
+    """A conversion has limits; the compiler says so, and what to do, where the channels are."""
     joints = range(257)
     (tmp_path / "law.py").write_text(
         "class Law:\n    outputs = {"

@@ -1,6 +1,6 @@
 /* SPDX-License-Identifier: Apache-2.0
  *
- * The journal of a run: what is noted, when, and under which numbers. And one thread writes while another follows.
+ * The queue of host writes: what is queued, when, and under which numbers. And one thread writes while another reads.
  */
 #define _GNU_SOURCE
 #include <pthread.h>
@@ -8,7 +8,7 @@
 #include <stdlib.h>
 #include <string.h>
 
-#include "fcsl/fcsl_journal.h"
+#include "fcsl/fcsl_write_queue.h"
 #include "fcsl_check.h"
 
 enum { MESSAGE_BYTES = 1 << 16, HEAD_BYTES = 28, MANY = 20000, LAST_STEPS = 8 };
@@ -28,17 +28,17 @@ static uint8_t kind_of(const uint8_t *bytes)
     return bytes[HEAD_BYTES];
 }
 
-static void expect(fcsl_journal_t *journal, uint64_t number, uint64_t tick, fcsl_write_kind_t kind)
+static void expect(fcsl_write_queue_t *queue, uint64_t number, uint64_t tick, fcsl_write_kind_t kind)
 {
     uint64_t found = 0;
-    CHECK(fcsl_journal_take(journal, UINT64_MAX, &found, message, sizeof message) > HEAD_BYTES);
+    CHECK(fcsl_write_queue_take(queue, UINT64_MAX, &found, message, sizeof message) > HEAD_BYTES);
     CHECK(found == number && tick_of(message) == tick && kind_of(message) == kind);
 }
 
-static void expect_none(fcsl_journal_t *journal)
+static void expect_none(fcsl_write_queue_t *queue)
 {
     uint64_t number = 0;
-    CHECK(fcsl_journal_take(journal, UINT64_MAX, &number, message, sizeof message) == 0);
+    CHECK(fcsl_write_queue_take(queue, UINT64_MAX, &number, message, sizeof message) == 0);
 }
 
 static void step(fcsl_run_t *run)
@@ -46,40 +46,40 @@ static void step(fcsl_run_t *run)
     CHECK(fcsl_run_step(run, 1, &error) == 0);
 }
 
-static void check_numbers(fcsl_run_t *run, fcsl_journal_t *journal)
+static void check_numbers(fcsl_run_t *run, fcsl_write_queue_t *queue)
 {
     uint64_t number = 0;
     CHECK(fcsl_run_next_write(run) == 0);
     CHECK(fcsl_run_attach(run, &error) == 0); /* nobody follows */
-    expect_none(journal);
-    fcsl_journal_follow(journal, 1);
+    expect_none(queue);
+    fcsl_write_queue_enable(queue, 1);
     CHECK(fcsl_run_set_state(run, 0, &error) == 0); /* the run does not know yet */
-    expect_none(journal);
+    expect_none(queue);
     CHECK(fcsl_run_next_write(run) == 1);
     CHECK(fcsl_run_attach(run, &error) == 0);
     CHECK(fcsl_run_set_state(run, 0, &error) == 0);
     CHECK(fcsl_run_next_write(run) == 3);
     step(run);
     CHECK(fcsl_run_set_state(run, 0, &error) == 0);
-    CHECK(fcsl_journal_take(journal, 1, &number, message, sizeof message) == 0); /* none below */
-    expect(journal, 1, 0, FCSL_WRITE_ATTACH);
-    expect(journal, 2, 0, FCSL_WRITE_SET_STATE);
-    expect(journal, 3, 1, FCSL_WRITE_SET_STATE);
-    expect_none(journal);
-    fcsl_journal_follow(journal, 0);
+    CHECK(fcsl_write_queue_take(queue, 1, &number, message, sizeof message) == 0); /* none below */
+    expect(queue, 1, 0, FCSL_WRITE_ATTACH);
+    expect(queue, 2, 0, FCSL_WRITE_SET_STATE);
+    expect(queue, 3, 1, FCSL_WRITE_SET_STATE);
+    expect_none(queue);
+    fcsl_write_queue_enable(queue, 0);
     CHECK(fcsl_run_set_state(run, 0, &error) == 0); /* still noted: the run does not know */
     CHECK(fcsl_run_next_write(run) == 0);
     CHECK(fcsl_run_set_state(run, 0, &error) == 0);
-    fcsl_journal_follow(journal, 1);
+    fcsl_write_queue_enable(queue, 1);
     CHECK(fcsl_run_next_write(run) == 6); /* a gap */
-    fcsl_journal_pass(journal);
-    expect_none(journal);
+    fcsl_write_queue_skip(queue);
+    expect_none(queue);
     CHECK(fcsl_run_set_state(run, 0, &error) == 0);
-    expect(journal, 6, 1, FCSL_WRITE_SET_STATE);
+    expect(queue, 6, 1, FCSL_WRITE_SET_STATE);
 }
 
 /* Restores fill the ring, which drops; the numbers tell how many. */
-static void check_full(fcsl_run_t *run, fcsl_journal_t *journal)
+static void check_full(fcsl_run_t *run, fcsl_write_queue_t *queue)
 {
     const uint32_t size = fcsl_run_machine(run)->size;
     uint8_t *saved = malloc(size);
@@ -91,28 +91,28 @@ static void check_full(fcsl_run_t *run, fcsl_journal_t *journal)
         CHECK(fcsl_run_restore(run, saved, size, &error) == 0);
     }
     CHECK(fcsl_run_next_write(run) == first + MANY);
-    while (fcsl_journal_take(journal, UINT64_MAX, &number, message, sizeof message) > 0) {
+    while (fcsl_write_queue_take(queue, UINT64_MAX, &number, message, sizeof message) > 0) {
         CHECK(number == first + taken && kind_of(message) == FCSL_WRITE_RESTORE);
         taken++;
     }
     CHECK(taken > 0 && taken < MANY);
     CHECK(fcsl_run_set_state(run, 0, &error) == 0);
-    expect(journal, first + MANY, fcsl_run_tick(run), FCSL_WRITE_SET_STATE);
-    CHECK(fcsl_journal_checkpoint(journal, saved, 5, message, sizeof message) > size && tick_of(message) == 5);
-    CHECK(fcsl_journal_checkpoint(journal, saved, 5, message, size) == 0); /* it does not fit */
+    expect(queue, first + MANY, fcsl_run_tick(run), FCSL_WRITE_SET_STATE);
+    CHECK(fcsl_write_queue_checkpoint(queue, saved, 5, message, sizeof message) > size && tick_of(message) == 5);
+    CHECK(fcsl_write_queue_checkpoint(queue, saved, 5, message, size) == 0); /* it does not fit */
     free(saved);
 }
 
 static atomic_int written;
 
-static void *follow(void *argument)
+static void *read_writes(void *argument)
 {
-    fcsl_journal_t *journal = argument;
+    fcsl_write_queue_t *queue = argument;
     uint64_t last = 0;
     uint64_t number = 0;
     static uint8_t bytes[MESSAGE_BYTES];
     for (int left = LAST_STEPS; left > 0; left -= atomic_load(&written) != 0) {
-        while (fcsl_journal_take(journal, UINT64_MAX, &number, bytes, sizeof bytes) > 0) {
+        while (fcsl_write_queue_take(queue, UINT64_MAX, &number, bytes, sizeof bytes) > 0) {
             CHECK(number > last && kind_of(bytes) == FCSL_WRITE_SET_STATE);
             last = number;
         }
@@ -120,11 +120,11 @@ static void *follow(void *argument)
     return (void *)(uintptr_t)last;
 }
 
-static void check_threads(fcsl_run_t *run, fcsl_journal_t *journal)
+static void check_threads(fcsl_run_t *run, fcsl_write_queue_t *queue)
 {
     pthread_t thread;
     void *last = NULL;
-    CHECK(pthread_create(&thread, NULL, follow, journal) == 0);
+    CHECK(pthread_create(&thread, NULL, read_writes, queue) == 0);
     for (int i = 0; i < MANY; i++) {
         CHECK(fcsl_run_set_state(run, 0, &error) == 0);
         step(run);
@@ -140,11 +140,11 @@ int main(int argc, char **argv)
     CHECK(argc == 2);
     fcsl_run_t *run = fcsl_run_open(argv[1], NULL, &error);
     CHECK(run != NULL && fcsl_run_next_write(run) == 0);
-    fcsl_journal_t *journal = fcsl_run_journal(run, &error);
-    CHECK(journal != NULL && fcsl_run_journal(run, &error) == journal);
-    CHECK(fcsl_journal_capacity(journal) > fcsl_run_machine(run)->size);
-    check_numbers(run, journal);
-    check_full(run, journal);
-    check_threads(run, journal);
+    fcsl_write_queue_t *queue = fcsl_run_write_queue(run, &error);
+    CHECK(queue != NULL && fcsl_run_write_queue(run, &error) == queue);
+    CHECK(fcsl_write_queue_capacity(queue) > fcsl_run_machine(run)->size);
+    check_numbers(run, queue);
+    check_full(run, queue);
+    check_threads(run, queue);
     return fcsl_run_close(run, &error);
 }

@@ -2,7 +2,7 @@
  *
  * The plant's outputs as ROS 2 messages: a type generated from each model's field table, and its CDR.
  */
-#include "truth_messages.h"
+#include "model_messages.h"
 
 #include <stdlib.h>
 #include <string.h>
@@ -112,7 +112,8 @@ static void write_scalar(fcsl_cdr_t *cdr, const uint8_t *from, uint8_t type)
     }
 }
 
-size_t fcsl_truth_write(int64_t time_ns, const fcsl_instance_state_t *instance, uint8_t *cdr_bytes, size_t capacity)
+size_t fcsl_model_message_write(int64_t time_ns, const fcsl_instance_state_t *instance, uint8_t *cdr_bytes,
+                                size_t capacity)
 {
     const fcsl_model_t *model = instance->model;
     fcsl_cdr_t cdr;
@@ -140,73 +141,73 @@ static size_t message_bytes_max(const fcsl_model_t *model)
 
 /* ---- building ------------------------------------------------------------------------------------------------------------ */
 
-static int describe(const fcsl_sim_t *sim, const fcsl_instance_state_t *instance, fcsl_truth_t *truth, size_t largest,
-                    fcsl_error_t *error)
+static int describe(const fcsl_sim_t *sim, const fcsl_instance_state_t *instance, fcsl_model_message_t *message,
+                    size_t largest, fcsl_error_t *error)
 {
-    truth->type = build_type(instance->model->name);
-    truth->schema = build_schema(instance->model);
-    if (!truth->type || !truth->schema) {
+    message->type = build_type(instance->model->name);
+    message->schema = build_schema(instance->model);
+    if (!message->type || !message->schema) {
         return fcsl_fail(error, "no memory for message types");
     }
-    truth->size = (uint32_t)fcsl_truth_write(sim->plant.time_ns, instance, sim->truth_bytes, largest);
+    message->size = (uint32_t)fcsl_model_message_write(sim->plant.time_ns, instance, sim->model_message_bytes, largest);
     return 0;
 }
 
-int fcsl_truth_build(fcsl_sim_t *sim, fcsl_error_t *error)
+int fcsl_model_messages_build(fcsl_sim_t *sim, fcsl_error_t *error)
 {
     size_t largest = sim->actuators ? message_bytes_max(&sim->actuators->model) : 0;
     for (uint32_t i = 0; i < sim->plant.instance_count; i++) {
         const size_t size = message_bytes_max(sim->plant.instances[i].model);
         largest = size > largest ? size : largest;
     }
-    sim->truths = calloc(sim->plant.instance_count + 1u, sizeof *sim->truths);
-    sim->truth_bytes = malloc(largest);
-    if (!sim->truths || !sim->truth_bytes) {
+    sim->model_messages = calloc(sim->plant.instance_count + 1u, sizeof *sim->model_messages);
+    sim->model_message_bytes = malloc(largest);
+    if (!sim->model_messages || !sim->model_message_bytes) {
         return fcsl_fail(error, "no memory for messages");
     }
     for (uint32_t i = 0; i < sim->plant.instance_count; i++) {
-        if (describe(sim, &sim->plant.instances[i], &sim->truths[i], largest, error)) {
+        if (describe(sim, &sim->plant.instances[i], &sim->model_messages[i], largest, error)) {
             return -1;
         }
     }
     fcsl_actuators_t *actuators = sim->actuators;
-    return actuators ? describe(sim, &actuators->as_instance, &actuators->truth, largest, error) : 0;
+    return actuators ? describe(sim, &actuators->as_instance, &actuators->message, largest, error) : 0;
 }
 
-static void free_texts(fcsl_truth_t *truth)
+static void free_texts(fcsl_model_message_t *message)
 {
-    free(truth->type);
-    free(truth->schema);
+    free(message->type);
+    free(message->schema);
 }
 
-void fcsl_truth_free(fcsl_sim_t *sim)
+void fcsl_model_messages_free(fcsl_sim_t *sim)
 {
-    for (uint32_t i = 0; sim->truths && i < sim->plant.instance_count; i++) {
-        free_texts(&sim->truths[i]);
+    for (uint32_t i = 0; sim->model_messages && i < sim->plant.instance_count; i++) {
+        free_texts(&sim->model_messages[i]);
     }
     if (sim->actuators) {
-        free_texts(&sim->actuators->truth);
+        free_texts(&sim->actuators->message);
     }
-    free(sim->truths);
-    free(sim->truth_bytes);
+    free(sim->model_messages);
+    free(sim->model_message_bytes);
 }
 
-const char *fcsl_sim_truth_type(const fcsl_sim_t *sim, uint32_t instance)
+const char *fcsl_sim_model_message_type(const fcsl_sim_t *sim, uint32_t instance)
 {
-    return instance < sim->plant.instance_count ? sim->truths[instance].type : NULL;
+    return instance < sim->plant.instance_count ? sim->model_messages[instance].type : NULL;
 }
 
-const char *fcsl_sim_truth_schema(const fcsl_sim_t *sim, uint32_t instance)
+const char *fcsl_sim_model_message_schema(const fcsl_sim_t *sim, uint32_t instance)
 {
-    return instance < sim->plant.instance_count ? sim->truths[instance].schema : NULL;
+    return instance < sim->plant.instance_count ? sim->model_messages[instance].schema : NULL;
 }
 
-int64_t fcsl_sim_truth_message(const fcsl_sim_t *sim, uint32_t instance, uint8_t *cdr, size_t capacity)
+int64_t fcsl_sim_model_message(const fcsl_sim_t *sim, uint32_t instance, uint8_t *cdr, size_t capacity)
 {
-    if (instance >= sim->plant.instance_count || capacity < sim->truths[instance].size) {
+    if (instance >= sim->plant.instance_count || capacity < sim->model_messages[instance].size) {
         return -1;
     }
-    return (int64_t)fcsl_truth_write(sim->plant.time_ns, &sim->plant.instances[instance], cdr, capacity);
+    return (int64_t)fcsl_model_message_write(sim->plant.time_ns, &sim->plant.instances[instance], cdr, capacity);
 }
 
 /* ---- as numbers ---------------------------------------------------------------------------------------------------------- */

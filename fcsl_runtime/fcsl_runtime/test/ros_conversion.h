@@ -1,9 +1,9 @@
 /* SPDX-License-Identifier: Apache-2.0
  *
- * A message of everything that a walk meets, and the plan that reads it; for the test and for the fuzzer.
+ * A message of everything that a walk meets, and the conversion that reads it; for the test and for the fuzzer.
  */
-#ifndef ROS_PLAN_H
-#define ROS_PLAN_H
+#ifndef ROS_CONVERSION_H
+#define ROS_CONVERSION_H
 
 #include <string.h>
 
@@ -54,7 +54,7 @@ static const fcsl_ros_value_t ROW_VALUES[VALUES] = {
     {0, 8, 0, 1, 0, 0, 0}, {8, 24, 1, 2, 0, 0, 0}, {32, 8, 3, 2, 0, 0, 0}};
 
 #define COUNT_OF(table) ((uint32_t)(sizeof(table) / sizeof(table)[0]))
-static const fcsl_ros_reader_plan_t PLAN = {
+static const fcsl_ros_reader_plan_t CONVERSION = {
     .parts = PARTS,
     .picks = PICKS,
     .names = NAMES,
@@ -122,4 +122,4 @@ static size_t make_message(uint8_t *bytes)
     return fcsl_cdr_end(&cdr);
 }
 
-#endif /* ROS_PLAN_H */
+#endif /* ROS_CONVERSION_H */

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Plans of ROS 2 messages as data, with the names, the order and the meaning of fcsl/fcsl_ros_plan.h."""
+"""Conversions of ROS 2 messages as data, with the names, the order and the meaning of fcsl/fcsl_ros_conversion.h."""
 
 from __future__ import annotations
 
@@ -35,7 +35,7 @@ SIZES = (1, 1, 1, 2, 2, 4, 4, 8, 8, 4, 8)
 BLOCK, STRING, NAMES, SEQUENCE, COUNT, REPEAT, END = range(7)
 
 
-class PlanError(ValueError):
+class ConversionError(ValueError):
     """A value that does not fit its message."""
 
 
@@ -106,7 +106,7 @@ class Value:
 
 
 @dataclass(frozen=True)
-class ReaderPlan:
+class ReaderConversion:
     """fcsl_ros_reader_plan_t"""
 
     parts: Sequence[Part]
@@ -124,7 +124,7 @@ class ReaderPlan:
 
 
 @dataclass(frozen=True)
-class ComposerPlan:
+class ComposerConversion:
     """fcsl_ros_composer_plan_t"""
 
     text: bytes

@@ -6,7 +6,7 @@
 #define _GNU_SOURCE
 #include "bus_rig.h"
 #include "fcsl/fcsl_codec.h"
-#include "fcsl/fcsl_mirror.h"
+#include "fcsl/fcsl_tick_publisher.h"
 #include "fcsl/fcsl_scalar.h"
 
 enum {
@@ -61,14 +61,14 @@ static const fcsl_machine_t MACHINE = {.name = "craft",
                                        .channel_count = CHANNELS,
                                        .arm_field = 3};
 
-static fcsl_mirror_t *open_mirror(const char *endpoint)
+static fcsl_tick_publisher_t *open_publisher(const char *endpoint)
 {
-    const fcsl_mirror_options_t options = {
+    const fcsl_tick_publisher_options_t options = {
         .endpoint = endpoint, .name_space = "north", .descriptor = "{}", .write_bytes = WRITE_BYTES};
-    fcsl_mirror_t *mirror = NULL;
+    fcsl_tick_publisher_t *publisher = NULL;
     fcsl_error_t error = {""};
-    CHECK(fcsl_mirror_open(&options, &MACHINE, &mirror, &error) == 0);
-    return mirror;
+    CHECK(fcsl_tick_publisher_open(&options, &MACHINE, &publisher, &error) == 0);
+    return publisher;
 }
 
 static fcsl_bus_t *observe(const char *endpoint)
@@ -89,13 +89,13 @@ static fcsl_bus_t *observe(const char *endpoint)
     return open_bus(&options);
 }
 
-static void post(fcsl_mirror_t *mirror, const data_t *data, uint64_t tick)
+static void post(fcsl_tick_publisher_t *publisher, const data_t *data, uint64_t tick)
 {
     const uint64_t give_up_ns = later_ns();
-    while (!fcsl_mirror_ready(mirror)) {
+    while (!fcsl_tick_publisher_ready(publisher)) {
         CHECK(fcsl_monotonic_ns() < give_up_ns);
     }
-    CHECK(fcsl_mirror_post(mirror, data, tick, tick * 10u, 0) == 0);
+    CHECK(fcsl_tick_publisher_post(publisher, data, tick, tick * 10u, 0) == 0);
 }
 
 static void expect_commit(fcsl_bus_t *bus, uint64_t tick, uint8_t direction, uint8_t armed, uint8_t bits)
@@ -139,7 +139,7 @@ static void expect_sensors(fcsl_bus_t *bus, uint64_t tick, const uint8_t *packet
 }
 
 /* Posts ticks until a message of every key has come, and takes them all. */
-static void meet(fcsl_mirror_t *mirror, fcsl_bus_t *bus)
+static void meet(fcsl_tick_publisher_t *publisher, fcsl_bus_t *bus)
 {
     enum { KEYS = WRITTEN + 1, LAST = 1000000 };
     const data_t data = {.attached = 0};
@@ -149,14 +149,15 @@ static void meet(fcsl_mirror_t *mirror, fcsl_bus_t *bus)
     const uint64_t give_up_ns = later_ns();
     for (uint64_t tick = 0; seen != (1u << KEYS) - 1u; tick++) {
         CHECK(fcsl_monotonic_ns() < give_up_ns);
-        post(mirror, &data, tick);
-        CHECK(fcsl_mirror_post_write(mirror, "w", 1) == 0 && fcsl_mirror_post_written(mirror, tick, 0) == 0);
+        post(publisher, &data, tick);
+        CHECK(fcsl_tick_publisher_post_write(publisher, "w", 1) == 0 &&
+              fcsl_tick_publisher_post_written(publisher, tick, 0) == 0);
         (void)fcsl_bus_wait(bus, fcsl_monotonic_ns() + 20000000u);
         for (uint32_t i = 0; i < KEYS; i++) {
             seen |= fcsl_bus_take(bus, i, bytes, &size) ? 1u << i : 0u;
         }
     }
-    post(mirror, &data, LAST);
+    post(publisher, &data, LAST);
     do {
         take_one(bus, CHANNELS, bytes, COMMIT_BYTES);
     } while (fcsl_get_u64(bytes) != LAST || bytes[20] != FCSL_REPORT);
@@ -164,20 +165,20 @@ static void meet(fcsl_mirror_t *mirror, fcsl_bus_t *bus)
         while (fcsl_bus_take(bus, i, bytes, &size)) {
         }
     }
-    fcsl_mirror_begin(mirror);
+    fcsl_tick_publisher_begin(publisher);
 }
 
-static void check_ticks(fcsl_mirror_t *mirror, fcsl_bus_t *bus)
+static void check_ticks(fcsl_tick_publisher_t *publisher, fcsl_bus_t *bus)
 {
     data_t data = {.altitude = 5.0, .age = 2, .packet = {2, 0x141, 0x42, 0x43}, .throttle = {0.5f}, .attached = 1};
     const uint32_t nan = 0xffc12345u;
     memcpy(&data.throttle[1], &nan, sizeof nan);
-    post(mirror, &data, 5); /* the first one: all that there is */
+    post(publisher, &data, 5); /* the first one: all that there is */
     expect_sensors(bus, 5, (const uint8_t *)"AB", 2);
     expect_actuators(bus, 5, 0);
     data.age = 3;
     data.armed = 1;
-    post(mirror, &data, 6); /* no sample */
+    post(publisher, &data, 6); /* no sample */
     expect_commit(bus, 6, FCSL_SENSOR, 0, 0);
     expect_actuators(bus, 6, 1);
     data.age = 4;
@@ -186,45 +187,45 @@ static void check_ticks(fcsl_mirror_t *mirror, fcsl_bus_t *bus)
     expect_commands(bus, 7, 0, 1);
     data = (data_t){.altitude = 9.0, .age = 5, .packet = {77, 'x', 'y', 'z'}, .throttle = {0.5f}, .attached = 1};
     memcpy(&data.throttle[1], &nan, sizeof nan);
-    post(mirror, &data, 9); /* 8 was dropped, and in it or in this one a sample came */
+    post(publisher, &data, 9); /* 8 was dropped, and in it or in this one a sample came */
     expect_sensors(bus, 9, (const uint8_t *)"xyz", 3);
     expect_actuators(bus, 9, 0);
     data.altitude = 10.0;
     data.age = 0;
     data.packet[0] = 0;
-    post(mirror, &data, 10);
+    post(publisher, &data, 10);
     expect_sensors(bus, 10, (const uint8_t *)"", 0);
     expect_actuators(bus, 10, 0);
     data.altitude = 11.0;
     data.age = UINT32_MAX;
     data.attached = 0;
-    post(mirror, &data, 11); /* nobody samples: what a host set */
+    post(publisher, &data, 11); /* nobody samples: what a host set */
     expect_sensors(bus, 11, (const uint8_t *)"", 0);
     expect_actuators(bus, 11, 0);
     data.altitude = 12.0;
     data.attached = 1;
-    fcsl_mirror_begin(mirror);
-    post(mirror, &data, 12);
+    fcsl_tick_publisher_begin(publisher);
+    post(publisher, &data, 12);
     expect_sensors(bus, 12, (const uint8_t *)"", 0);
     expect_actuators(bus, 12, 0);
     data.altitude = 13.0;
-    post(mirror, &data, 13); /* no sample ever came */
+    post(publisher, &data, 13); /* no sample ever came */
     expect_commit(bus, 13, FCSL_SENSOR, 0, 0);
     expect_actuators(bus, 13, 0);
     data.altitude = 14.0;
     data.age = 0;
-    post(mirror, &data, 14);
+    post(publisher, &data, 14);
     expect_sensors(bus, 14, (const uint8_t *)"", 0);
     expect_actuators(bus, 14, 0);
     data.altitude = 15.0;
     data.age = 1;
     data.stamp_ns = 7;
-    post(mirror, &data, 15); /* a newer sample, which is as old as the one before would be */
+    post(publisher, &data, 15); /* a newer sample, which is as old as the one before would be */
     expect_sensors(bus, 15, (const uint8_t *)"", 0);
     expect_actuators(bus, 15, 0);
 }
 
-static void check_writes(fcsl_mirror_t *mirror, fcsl_bus_t *bus)
+static void check_writes(fcsl_tick_publisher_t *publisher, fcsl_bus_t *bus)
 {
     static uint8_t bytes[LONG_BYTES];
     static uint8_t got[LONG_BYTES];
@@ -232,49 +233,49 @@ static void check_writes(fcsl_mirror_t *mirror, fcsl_bus_t *bus)
     for (size_t i = 0; i < sizeof bytes; i++) {
         bytes[i] = (uint8_t)(i * 7u);
     }
-    CHECK(fcsl_mirror_writes_watched(mirror));
+    CHECK(fcsl_tick_publisher_writes_watched(publisher));
     const uint64_t give_up_ns = later_ns();
-    while (!fcsl_mirror_ready(mirror)) {
+    while (!fcsl_tick_publisher_ready(publisher)) {
         CHECK(fcsl_monotonic_ns() < give_up_ns);
     }
-    CHECK(fcsl_mirror_post_write(mirror, "write", 5) == 0);
-    CHECK(fcsl_mirror_post_write(mirror, bytes, sizeof bytes) == 0);
-    CHECK(fcsl_mirror_post_written(mirror, 7, UINT64_C(1) << 40) == 0);
+    CHECK(fcsl_tick_publisher_post_write(publisher, "write", 5) == 0);
+    CHECK(fcsl_tick_publisher_post_write(publisher, bytes, sizeof bytes) == 0);
+    CHECK(fcsl_tick_publisher_post_written(publisher, 7, UINT64_C(1) << 40) == 0);
     take_one(bus, WRITES, got, 5);
     CHECK(memcmp(got, "write", 5) == 0);
     take_one(bus, WRITES, got, sizeof got);
     CHECK(memcmp(got, bytes, sizeof got) == 0);
     take_one(bus, WRITTEN, written, sizeof written);
     CHECK(fcsl_get_u64(written) == 7u && fcsl_get_u64(written + 8) == UINT64_C(1) << 40);
-    CHECK(fcsl_mirror_answer_checkpoint(mirror, "checkpoint", 10) == 0);
-    CHECK(fcsl_mirror_answer_checkpoint(mirror, "", FCSL_BUS_MESSAGE_MAX + 1u) == -1);
+    CHECK(fcsl_tick_publisher_answer_checkpoint(publisher, "checkpoint", 10) == 0);
+    CHECK(fcsl_tick_publisher_answer_checkpoint(publisher, "", FCSL_BUS_MESSAGE_MAX + 1u) == -1);
 }
 
 /* Writes take none of the room of ticks, however many there are. */
-static void check_room_beside_writes(fcsl_mirror_t *mirror)
+static void check_room_beside_writes(fcsl_tick_publisher_t *publisher)
 {
     static const uint8_t bytes[WRITE_BYTES / 2];
     const data_t data = {.attached = 0};
     uint32_t posted = 0;
     const uint64_t give_up_ns = later_ns();
-    while (!fcsl_mirror_ready(mirror)) {
+    while (!fcsl_tick_publisher_ready(publisher)) {
         CHECK(fcsl_monotonic_ns() < give_up_ns);
     }
-    while (fcsl_mirror_post_write(mirror, bytes, sizeof bytes) == 0) {
+    while (fcsl_tick_publisher_post_write(publisher, bytes, sizeof bytes) == 0) {
         posted++;
     }
     CHECK(posted == 2u * 4u - 1u || posted == 2u * 4u);
-    CHECK(fcsl_mirror_post(mirror, &data, 1, 0, 0) == 0);
+    CHECK(fcsl_tick_publisher_post(publisher, &data, 1, 0, 0) == 0);
 }
 
 /* Where there is room, there is room for all of a tick. */
-static void check_room(fcsl_mirror_t *mirror)
+static void check_room(fcsl_tick_publisher_t *publisher)
 {
     const data_t data = {.attached = 0, .packet = {3}};
     uint32_t refused = 0;
     for (uint64_t tick = 0; tick < MANY; tick++) {
-        const int ready = fcsl_mirror_ready(mirror);
-        const int posted = fcsl_mirror_post(mirror, &data, tick, 0, 0) == 0;
+        const int ready = fcsl_tick_publisher_ready(publisher);
+        const int posted = fcsl_tick_publisher_post(publisher, &data, tick, 0, 0) == 0;
         CHECK(posted || !ready);
         refused += !posted;
     }
@@ -285,14 +286,14 @@ static void check_refused(fcsl_channel_t channel, const char *name_space, const 
 {
     static char descriptor[FCSL_BUS_MESSAGE_MAX + 2u];
     fcsl_machine_t machine = MACHINE;
-    fcsl_mirror_t *mirror = NULL;
+    fcsl_tick_publisher_t *publisher = NULL;
     fcsl_error_t error = {""};
     memset(descriptor, ' ', sizeof descriptor - 1u);
-    const fcsl_mirror_options_t options = {
+    const fcsl_tick_publisher_options_t options = {
         .endpoint = endpoint, .name_space = name_space, .descriptor = endpoint[0] == 't' ? descriptor : "{}"};
     machine.channels = &channel;
     machine.channel_count = 1;
-    CHECK(fcsl_mirror_open(&options, &machine, &mirror, &error) == -1);
+    CHECK(fcsl_tick_publisher_open(&options, &machine, &publisher, &error) == -1);
     CHECK(strstr(error.text, why) != NULL);
 }
 
@@ -308,21 +309,21 @@ int main(void)
     check_refused((fcsl_channel_t){.name = "a"}, "a//b", endpoint, "one slash between them");
     check_refused((fcsl_channel_t){.name = "a"}, "", "udp/127.0.0.1:7", "write tcp:HOST:PORT");
     check_refused((fcsl_channel_t){.name = "a"}, "", endpoint, "at most 1048576 are possible");
-    fcsl_mirror_t *mirror = open_mirror(endpoint);
-    CHECK(!fcsl_mirror_watched(mirror));
+    fcsl_tick_publisher_t *publisher = open_publisher(endpoint);
+    CHECK(!fcsl_tick_publisher_watched(publisher));
     fcsl_bus_t *bus = observe(endpoint);
     const uint64_t give_up_ns = later_ns();
-    while (!fcsl_mirror_watched(mirror) || !fcsl_mirror_writes_watched(mirror)) {
+    while (!fcsl_tick_publisher_watched(publisher) || !fcsl_tick_publisher_writes_watched(publisher)) {
         CHECK(fcsl_monotonic_ns() < give_up_ns);
     }
-    meet(mirror, bus);
-    check_ticks(mirror, bus);
-    check_writes(mirror, bus);
-    check_room_beside_writes(mirror);
-    check_room(mirror);
+    meet(publisher, bus);
+    check_ticks(publisher, bus);
+    check_writes(publisher, bus);
+    check_room_beside_writes(publisher);
+    check_room(publisher);
     CHECK(counted(bus).wrong_size == 0 && counted(bus).deletions == 0);
     CHECK(fcsl_bus_close(bus, CLOSE_MS) == 0);
-    fcsl_mirror_close(mirror);
-    fcsl_mirror_close(NULL);
+    fcsl_tick_publisher_close(publisher);
+    fcsl_tick_publisher_close(NULL);
     return 0;
 }

@@ -3,7 +3,7 @@
  * A sink gets each tick once and in order, or its loss is counted. The source is compiled in, so that the rounds of its thread are
  * made here, one by one.
  */
-#include "../observers/follower.c"
+#include "../observers/history_reader.c"
 
 #include "fcsl_check.h"
 
@@ -21,7 +21,7 @@ typedef struct {
     uint64_t word; /* what is published: the tick's number */
     fcsl_history_t history;
     taker_t taker;
-    follower_t follower;
+    history_reader_t reader;
 } test_t;
 
 static int wants(void *ctx)
@@ -39,7 +39,7 @@ static int has_room(void *ctx)
     return ((const taker_t *)ctx)->room > 0u;
 }
 
-static int take(void *ctx, const followed_tick_t *tick)
+static int take(void *ctx, const published_tick_t *tick)
 {
     taker_t *taker = ctx;
     uint64_t word = 0;
@@ -54,15 +54,15 @@ static void begin(test_t *test)
 {
     *test = (test_t){.taker = {.wanted = 1, .room = SEEN_MAX}};
     const fcsl_part_t part = {.data = &test->word, .size = sizeof test->word};
-    const follower_sink_t sink = {
-        .ctx = &test->taker, .wants = wants, .pass_over = passes, .ready = has_room, .put = take};
+    const history_reader_sink_t sink = {
+        .ctx = &test->taker, .wants = wants, .skip = passes, .ready = has_room, .put = take};
     CHECK(fcsl_history_open(&test->history, &part, 1, SLOTS) == 0);
-    CHECK(follower_open(&test->follower, &test->history, 100, &sink) == 0);
+    CHECK(history_reader_open(&test->reader, &test->history, 100, &sink) == 0);
 }
 
 static void end(test_t *test)
 {
-    follower_close(&test->follower);
+    history_reader_close(&test->reader);
     fcsl_history_free(&test->history);
 }
 
@@ -82,9 +82,10 @@ static void test_each_tick_once(void)
     for (uint64_t tick = 0; tick < 20; tick += 5) {
         publish(&test, tick, 5);
         publish(&test, tick + 4u, 1); /* a command, after the last one */
-        CHECK(follow(&test.follower) == 1);
+        CHECK(read_history(&test.reader) == 1);
     }
-    CHECK(test.taker.count == 20 && follower_ticks(&test.follower) == 20 && follower_dropped(&test.follower) == 0);
+    CHECK(test.taker.count == 20 && history_reader_ticks(&test.reader) == 20 &&
+          history_reader_dropped(&test.reader) == 0);
     for (uint64_t i = 0; i < 20; i++) {
         CHECK(test.taker.seen[i] == i);
     }
@@ -98,18 +99,18 @@ static void test_ticks_without_room_are_counted(void)
     begin(&test);
     test.taker.room = 3;
     publish(&test, 0, 3);
-    (void)follow(&test.follower);
+    (void)read_history(&test.reader);
     publish(&test, 3, 100);
-    (void)follow(&test.follower);
+    (void)read_history(&test.reader);
     CHECK(test.taker.count == 3);
     test.taker.room = SEEN_MAX;
-    finish(&test.follower);
+    finish(&test.reader);
     CHECK(test.taker.count > 3 && test.taker.seen[test.taker.count - 1u] == 102);
     for (uint32_t i = 1; i < test.taker.count; i++) {
         CHECK(test.taker.seen[i] > test.taker.seen[i - 1u]);
     }
-    CHECK(follower_dropped(&test.follower) > 90);
-    CHECK(follower_ticks(&test.follower) + follower_dropped(&test.follower) == 103);
+    CHECK(history_reader_dropped(&test.reader) > 90);
+    CHECK(history_reader_ticks(&test.reader) + history_reader_dropped(&test.reader) == 103);
     end(&test);
 }
 
@@ -119,12 +120,12 @@ static void test_what_nobody_wants_is_not_lost(void)
     begin(&test);
     test.taker.wanted = 0;
     publish(&test, 0, 50);
-    (void)follow(&test.follower);
+    (void)read_history(&test.reader);
     CHECK(test.taker.passed == 1 && test.taker.count == 0);
     test.taker.wanted = 1;
     publish(&test, 50, 2);
-    (void)follow(&test.follower);
-    CHECK(test.taker.count == 2 && test.taker.seen[0] == 50 && follower_dropped(&test.follower) == 0);
+    (void)read_history(&test.reader);
+    CHECK(test.taker.count == 2 && test.taker.seen[0] == 50 && history_reader_dropped(&test.reader) == 0);
     end(&test);
 }
 

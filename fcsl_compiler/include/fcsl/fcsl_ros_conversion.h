@@ -1,14 +1,14 @@
 /* SPDX-License-Identifier: Apache-2.0
  *
- * Plans of ROS 2 messages that are not generated from the machine (sensor_msgs/Imu and its like): which numbers are picked out of
+ * Conversions of ROS 2 messages that are not generated from the machine (sensor_msgs/Imu and its like): which numbers are picked out of
  * them and put into them. The compiler makes them of a machine's mapped channels, and Python of other messages; fcsl_ros.h executes
  * both. Constant data.
  *
  * Each number is a *row* of the change of axes: the sum of its terms, factor * number, in their order; then, if scaled,
  * * scale + offset. A row of one term with factor 1 that is not scaled is exact: integers of 64 bits stay what they are.
  */
-#ifndef FCSL_ROS_PLAN_H
-#define FCSL_ROS_PLAN_H
+#ifndef FCSL_ROS_CONVERSION_H
+#define FCSL_ROS_CONVERSION_H
 
 #include <stdint.h>
 
@@ -136,4 +136,4 @@ typedef struct {
 }
 #endif
 
-#endif /* FCSL_ROS_PLAN_H */
+#endif /* FCSL_ROS_CONVERSION_H */

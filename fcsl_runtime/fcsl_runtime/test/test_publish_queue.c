@@ -1,18 +1,18 @@
 /* SPDX-License-Identifier: Apache-2.0
  *
- * Messages through an outbox: whole, in their order; dropped where there is no room, or waited for.
+ * Messages through a publish queue: whole, in their order; dropped where there is no room, or waited for.
  */
 #include <pthread.h>
 #include <stdlib.h>
 #include <string.h>
 
-#include "fcsl/fcsl_outbox.h"
+#include "fcsl/fcsl_publish_queue.h"
 #include "fcsl/fcsl_scalar.h"
 #include "fcsl_check.h"
 
 enum { MESSAGES = 200000, HEAD_BYTES = 8 };
 
-static uint8_t taken[FCSL_OUTBOX_TAKE_MAX];
+static uint8_t taken[FCSL_PUBLISH_QUEUE_TAKE_MAX];
 
 /* Of message number `number`: its length, and what stands in all its bytes. */
 static uint32_t length_of(uint32_t number)
@@ -20,21 +20,21 @@ static uint32_t length_of(uint32_t number)
     return 1u + number * 7u % 300u;
 }
 
-static uint8_t *claim(fcsl_outbox_t *outbox, uint32_t number)
+static uint8_t *claim(fcsl_publish_queue_t *queue, uint32_t number)
 {
-    uint8_t *place = fcsl_outbox_claim(outbox, number, length_of(number), FCSL_OUTBOX_STREAM);
+    uint8_t *place = fcsl_publish_queue_claim(queue, number, length_of(number), FCSL_PUBLISH_QUEUE_STREAM);
     if (place != NULL) {
         memset(place, (int)(number % 251u), length_of(number));
-        fcsl_outbox_put(outbox);
+        fcsl_publish_queue_put(queue);
     }
     return place;
 }
 
 /* Takes what is there, which must be whole messages of rising numbers from *next on. Returns how many. */
-static uint32_t take(fcsl_outbox_t *outbox, uint32_t *next)
+static uint32_t take(fcsl_publish_queue_t *queue, uint32_t *next)
 {
     uint32_t count = 0;
-    const size_t size = fcsl_outbox_take(outbox, 1, taken);
+    const size_t size = fcsl_publish_queue_take(queue, 1, taken);
     for (size_t at = 0; at < size; count++) {
         const uint32_t number = fcsl_get_u32(taken + at);
         const uint32_t length = fcsl_get_u32(taken + at + 4);
@@ -48,10 +48,10 @@ static uint32_t take(fcsl_outbox_t *outbox, uint32_t *next)
     return count;
 }
 
-static void *put_all(void *outbox)
+static void *put_all(void *queue)
 {
     for (uint32_t i = 0; i < MESSAGES; i++) {
-        CHECK(claim(outbox, i) != NULL);
+        CHECK(claim(queue, i) != NULL);
     }
     return NULL;
 }
@@ -62,13 +62,13 @@ static void test_who_waits_loses_nothing(void)
     pthread_t thread;
     uint32_t next = 0;
     uint32_t count = 0;
-    fcsl_outbox_t *outbox = fcsl_outbox_new(1, &error);
-    CHECK(outbox != NULL && pthread_create(&thread, NULL, put_all, outbox) == 0);
+    fcsl_publish_queue_t *queue = fcsl_publish_queue_new(1, &error);
+    CHECK(queue != NULL && pthread_create(&thread, NULL, put_all, queue) == 0);
     while (count < MESSAGES) {
-        count += take(outbox, &next);
+        count += take(queue, &next);
     }
-    CHECK(pthread_join(thread, NULL) == 0 && next == MESSAGES && fcsl_outbox_dropped(outbox) == 0);
-    fcsl_outbox_free(outbox);
+    CHECK(pthread_join(thread, NULL) == 0 && next == MESSAGES && fcsl_publish_queue_dropped(queue) == 0);
+    fcsl_publish_queue_free(queue);
 }
 
 static void test_what_finds_no_room_is_counted(void)
@@ -77,24 +77,25 @@ static void test_what_finds_no_room_is_counted(void)
     uint32_t next = 0;
     uint32_t put = 0;
     uint32_t count = 0;
-    fcsl_outbox_t *outbox = fcsl_outbox_new(0, &error);
-    CHECK(outbox != NULL);
-    while (put < MESSAGES && claim(outbox, put) != NULL) {
+    fcsl_publish_queue_t *queue = fcsl_publish_queue_new(0, &error);
+    CHECK(queue != NULL);
+    while (put < MESSAGES && claim(queue, put) != NULL) {
         put++;
     }
-    CHECK(put > 1000u && put < MESSAGES && fcsl_outbox_dropped(outbox) == 1);
+    CHECK(put > 1000u && put < MESSAGES && fcsl_publish_queue_dropped(queue) == 1);
     /* Changes find room where streams do not. */
-    uint8_t *place = fcsl_outbox_claim(outbox, put, length_of(put), FCSL_OUTBOX_CHANGE);
+    uint8_t *place = fcsl_publish_queue_claim(queue, put, length_of(put), FCSL_PUBLISH_QUEUE_CHANGE);
     CHECK(place != NULL);
     memset(place, (int)(put % 251u), length_of(put));
-    fcsl_outbox_put(outbox);
-    CHECK(fcsl_outbox_claim(outbox, 0, FCSL_OUTBOX_TAKE_MAX, FCSL_OUTBOX_CHANGE) == NULL); /* never */
+    fcsl_publish_queue_put(queue);
+    CHECK(fcsl_publish_queue_claim(queue, 0, FCSL_PUBLISH_QUEUE_TAKE_MAX, FCSL_PUBLISH_QUEUE_CHANGE) ==
+          NULL); /* never */
     for (uint32_t more = 1; more > 0;) {
-        more = take(outbox, &next);
+        more = take(queue, &next);
         count += more;
     }
-    CHECK(count == put + 1u && next == put + 1u && fcsl_outbox_dropped(outbox) == 2);
-    fcsl_outbox_free(outbox);
+    CHECK(count == put + 1u && next == put + 1u && fcsl_publish_queue_dropped(queue) == 2);
+    fcsl_publish_queue_free(queue);
 }
 
 int main(void)

@@ -1,9 +1,9 @@
 /* SPDX-License-Identifier: Apache-2.0
  *
- * One round follows the history to its end, or until the sink has no room, and naps. While no tick is wanted, it only keeps up.
+ * One round reads the history to its end, or until the sink has no room, and naps. While no tick is wanted, it only keeps up.
  */
 #define _GNU_SOURCE
-#include "follower.h"
+#include "history_reader.h"
 
 #include <stdlib.h>
 #include <string.h>
@@ -20,36 +20,36 @@ static void count(_Atomic uint64_t *number, uint64_t more)
     atomic_fetch_add_explicit(number, more, memory_order_relaxed);
 }
 
-static void nap(const follower_t *f)
+static void nap(const history_reader_t *f)
 {
-    const struct timespec time = {.tv_nsec = (long)f->nap_ns};
+    const struct timespec time = {.tv_nsec = (long)f->poll_ns};
     (void)nanosleep(&time, NULL);
 }
 
-static int at_end(const follower_t *f)
+static int at_end(const history_reader_t *f)
 {
     return f->cursor >= fcsl_history_published(f->history);
 }
 
 /* Ticks between this publication and the one seen before it, if some were overtaken. Ticks that a restore jumped over were
  * never there: at most as many as publications were lost. */
-static uint64_t dropped_before(const follower_t *f, uint64_t completed)
+static uint64_t dropped_before(const history_reader_t *f, uint64_t completed)
 {
     const uint64_t between = completed > f->completed ? completed - f->completed - 1u : 0u;
     return between < f->overtaken ? between : f->overtaken;
 }
 
 /* A publication: that of a tick is put; a command's, of the same tick once more, is not. */
-static void see(follower_t *f, const fcsl_moment_t *moment)
+static void take_publication(history_reader_t *f, const fcsl_moment_t *moment)
 {
     const uint64_t completed = moment->tick;
-    if (f->sink.see != NULL) {
-        f->sink.see(f->sink.ctx, moment, f->publication);
+    if (f->sink.observe != NULL) {
+        f->sink.observe(f->sink.ctx, moment, f->publication);
     }
     if (completed == f->completed || completed == 0) {
         return;
     }
-    const followed_tick_t tick = {.publication = f->publication,
+    const published_tick_t tick = {.publication = f->publication,
                                   .number = completed - 1u,
                                   .begun_ns = moment->time_ns,
                                   .requires_arming = moment->requires_arming != 0u};
@@ -59,20 +59,20 @@ static void see(follower_t *f, const fcsl_moment_t *moment)
     count(f->sink.put(f->sink.ctx, &tick) == 0 ? &f->ticks : &f->dropped, 1);
 }
 
-static void pass_over(follower_t *f)
+static void skip(history_reader_t *f)
 {
-    f->sink.pass_over(f->sink.ctx);
+    f->sink.skip(f->sink.ctx);
     f->cursor = fcsl_history_published(f->history);
     f->overtaken = 0;
 }
 
 /* Puts what has been published. 1 when that was all, or all that there is room for; bounded, since a host may publish faster
  * than this. */
-static int follow(follower_t *f)
+static int read_history(history_reader_t *f)
 {
     fcsl_moment_t moment;
     if (!f->sink.wants(f->sink.ctx)) {
-        pass_over(f);
+        skip(f);
         return 1;
     }
     for (uint32_t i = 0; i < 2u * f->history->slots; i++) {
@@ -89,14 +89,14 @@ static int follow(follower_t *f)
             f->cursor = cursor;
         } else {
             f->cursor++;
-            see(f, &moment);
+            take_publication(f, &moment);
         }
     }
     return 0;
 }
 
-/* Ticks that the host's last publication tells of, and that were not put. */
-static uint64_t left_behind(follower_t *f)
+/* Ticks up to the host's last publication that were not put. */
+static uint64_t left_behind(history_reader_t *f)
 {
     fcsl_moment_t last;
     const uint64_t published = fcsl_history_published(f->history);
@@ -108,22 +108,22 @@ static uint64_t left_behind(follower_t *f)
 }
 
 /* The host publishes nothing more. */
-static void finish(follower_t *f)
+static void finish(history_reader_t *f)
 {
     const uint64_t deadline_ns = fcsl_monotonic_ns() + LAST_NS;
-    (void)follow(f);
+    (void)read_history(f);
     while (!at_end(f) && fcsl_monotonic_ns() < deadline_ns) {
         nap(f);
-        (void)follow(f);
+        (void)read_history(f);
     }
     count(&f->dropped, left_behind(f));
 }
 
-static void *run(void *follower)
+static void *run(void *reader)
 {
-    follower_t *f = follower;
+    history_reader_t *f = reader;
     while (!atomic_load(&f->stop)) {
-        if (follow(f)) {
+        if (read_history(f)) {
             nap(f);
         }
     }
@@ -131,45 +131,46 @@ static void *run(void *follower)
     return NULL;
 }
 
-int follower_open(follower_t *follower, const fcsl_history_t *history, uint64_t tick_hz, const follower_sink_t *sink)
+int history_reader_open(history_reader_t *reader, const fcsl_history_t *history, uint64_t tick_hz,
+                        const history_reader_sink_t *sink)
 {
-    follower->history = history;
-    follower->sink = *sink;
-    follower->nap_ns = fcsl_history_nap_ns(history, tick_hz);
-    follower->cursor = fcsl_history_published(history);
-    follower->publication = malloc(fcsl_history_bytes(history) + 1u);
-    return follower->publication != NULL ? 0 : -1;
+    reader->history = history;
+    reader->sink = *sink;
+    reader->poll_ns = fcsl_history_nap_ns(history, tick_hz);
+    reader->cursor = fcsl_history_published(history);
+    reader->publication = malloc(fcsl_history_bytes(history) + 1u);
+    return reader->publication != NULL ? 0 : -1;
 }
 
-int follower_start(follower_t *follower, fcsl_error_t *error)
+int history_reader_start(history_reader_t *reader, fcsl_error_t *error)
 {
-    const int code = pthread_create(&follower->thread, NULL, run, follower);
-    follower->started = code == 0;
+    const int code = pthread_create(&reader->thread, NULL, run, reader);
+    reader->started = code == 0;
     return code == 0 ? 0 : fcsl_fail(error, "cannot start the thread of observers: %s", strerror(code));
 }
 
-void follower_stop(follower_t *follower)
+void history_reader_stop(history_reader_t *reader)
 {
-    if (follower->started) {
-        atomic_store(&follower->stop, 1);
-        (void)pthread_join(follower->thread, NULL);
-        follower->started = 0;
+    if (reader->started) {
+        atomic_store(&reader->stop, 1);
+        (void)pthread_join(reader->thread, NULL);
+        reader->started = 0;
     }
 }
 
-void follower_close(follower_t *follower)
+void history_reader_close(history_reader_t *reader)
 {
-    follower_stop(follower);
-    free(follower->publication);
-    follower->publication = NULL;
+    history_reader_stop(reader);
+    free(reader->publication);
+    reader->publication = NULL;
 }
 
-uint64_t follower_ticks(const follower_t *follower)
+uint64_t history_reader_ticks(const history_reader_t *reader)
 {
-    return atomic_load_explicit(&follower->ticks, memory_order_relaxed);
+    return atomic_load_explicit(&reader->ticks, memory_order_relaxed);
 }
 
-uint64_t follower_dropped(const follower_t *follower)
+uint64_t history_reader_dropped(const history_reader_t *reader)
 {
-    return atomic_load_explicit(&follower->dropped, memory_order_relaxed);
+    return atomic_load_explicit(&reader->dropped, memory_order_relaxed);
 }

@@ -1,8 +1,8 @@
 /* SPDX-License-Identifier: Apache-2.0
  *
- * Reads the plan of outputs.
+ * Reads the assignments of outputs.
  */
-#include "output_plan.h"
+#include "output_assignment.h"
 
 #include <stdio.h>
 #include <string.h>
@@ -43,9 +43,9 @@ static int find_actuator(const fcsl_machine_t *machine, const char *name, size_t
 }
 
 /* `text` behind the equals sign. */
-static int read_driver(const char *whole, const char *text, plan_entry_t *entry, fcsl_error_t *error)
+static int read_driver(const char *whole, const char *text, output_assignment_t *assignment, fcsl_error_t *error)
 {
-    entry->device = "";
+    assignment->device = "";
     if (strcmp(text, NOTHING) == 0) {
         return 0;
     }
@@ -53,48 +53,50 @@ static int read_driver(const char *whole, const char *text, plan_entry_t *entry,
     const size_t rest = strcspn(name, ":");
     const size_t length = strcspn(name, ".:");
     const size_t driver = (size_t)(name - text) + length;
-    if (length == 0u || driver >= sizeof entry->driver || rest >= sizeof entry->signal) {
+    if (length == 0u || driver >= sizeof assignment->driver || rest >= sizeof assignment->signal) {
         return fcsl_fail(error,
                          "--actuator %.200s: write CHANNEL=DRIVER[.SIGNAL][:DEVICE], where DRIVER is NAME or "
                          "LIBRARY.so:NAME, in less than 512 bytes",
                          whole);
     }
-    memcpy(entry->driver, text, driver);
+    memcpy(assignment->driver, text, driver);
     if (rest > length) {
-        memcpy(entry->signal, name + length + 1u, rest - length - 1u);
+        memcpy(assignment->signal, name + length + 1u, rest - length - 1u);
     }
-    entry->device = name[rest] == ':' ? name + rest + 1u : "";
+    assignment->device = name[rest] == ':' ? name + rest + 1u : "";
     return 0;
 }
 
-static int read_entry(const fcsl_machine_t *machine, const char *text, plan_entry_t *entry, fcsl_error_t *error)
+static int read_assignment(const fcsl_machine_t *machine, const char *text, output_assignment_t *assignment,
+                           fcsl_error_t *error)
 {
     const char *equals = strchr(text, '=');
-    memset(entry, 0, sizeof *entry);
+    memset(assignment, 0, sizeof *assignment);
     if (equals == NULL) {
         return fcsl_fail(error, "--actuator %.200s: write CHANNEL=DRIVER[.SIGNAL][:DEVICE], or CHANNEL=none", text);
     }
-    return find_actuator(machine, text, (size_t)(equals - text), &entry->channel, error) == 0
-               ? read_driver(text, equals + 1, entry, error)
+    return find_actuator(machine, text, (size_t)(equals - text), &assignment->channel, error) == 0
+               ? read_driver(text, equals + 1, assignment, error)
                : -1;
 }
 
-int plan_read(const fcsl_machine_t *machine, const char *const *texts, uint32_t count, plan_entry_t *entries,
-              fcsl_error_t *error)
+int output_assignments_read(const fcsl_machine_t *machine, const char *const *texts, uint32_t count,
+                            output_assignment_t *assignments, fcsl_error_t *error)
 {
     for (uint32_t i = 0; i < count; i++) {
-        if (read_entry(machine, texts[i], &entries[i], error) != 0) {
+        if (read_assignment(machine, texts[i], &assignments[i], error) != 0) {
             return -1;
         }
         for (uint32_t j = 0; j < i; j++) {
-            if (entries[j].channel == entries[i].channel) {
-                return fcsl_fail(error, "channel '%s' has two --actuator", machine->channels[entries[i].channel].name);
+            if (assignments[j].channel == assignments[i].channel) {
+                return fcsl_fail(error, "channel '%s' has two --actuator",
+                                 machine->channels[assignments[i].channel].name);
             }
         }
     }
     for (uint32_t i = 0; i < machine->channel_count; i++) {
         uint32_t at = 0;
-        while (at < count && entries[at].channel != i) {
+        while (at < count && assignments[at].channel != i) {
             at++;
         }
         if (machine->channels[i].direction == FCSL_ACTUATOR && at == count) {

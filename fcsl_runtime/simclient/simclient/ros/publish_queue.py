@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Python wrapper of fcsl_outbox.h and fcsl_topics.h: finished messages from the thread that steps, for one that publishes."""
+"""Python wrapper of fcsl_publish_queue.h and fcsl_topics.h: finished messages from the thread that steps, for one that publishes."""
 
 from __future__ import annotations
 
@@ -15,33 +15,33 @@ from ..run import TICK_MESSAGES, Run
 from . import native
 from .composer import Composer
 
-#: FCSL_OUTBOX_TAKE_MAX
+#: FCSL_PUBLISH_QUEUE_TAKE_MAX
 _TAKE_BYTES = 4 << 20
 #: Topic and size of a message; messages begin at multiples of 8 bytes.
 _HEAD = struct.Struct("<II")
 _ALIGNMENT = 8
 
 
-class Outbox:
+class PublishQueue:
     """The queue. One thread puts, in C; another one takes. A context manager."""
 
     def __init__(self, lossless: bool):
         """lossless: who puts waits for room; otherwise what finds none is dropped."""
         error = CError()
         self._library = native.library()
-        self._handle = self._library.fcsl_outbox_new(int(lossless), byref(error))
+        self._handle = self._library.fcsl_publish_queue_new(int(lossless), byref(error))
         if not self._handle:
             raise TwinError(error.text.decode("utf-8", "replace"))
         self._bytes = ctypes.create_string_buffer(_TAKE_BYTES)
 
     @property
     def handle(self) -> int:
-        """The fcsl_outbox_t."""
+        """The fcsl_publish_queue_t."""
         return int(self._handle)
 
     def take(self, wait: bool) -> Iterator[tuple[int, bytes]]:
         """(topic, CDR) of some of the messages, oldest first. wait: a moment, where there is none."""
-        size = self._library.fcsl_outbox_take(self._handle, int(wait), self._bytes)
+        size = self._library.fcsl_publish_queue_take(self._handle, int(wait), self._bytes)
         data = ctypes.string_at(self._bytes, size)
         at = 0
         while at < size:
@@ -52,28 +52,28 @@ class Outbox:
 
     def wake(self) -> None:
         """Ends the moment that `take` waits; from any thread."""
-        self._library.fcsl_outbox_wake(self._handle)
+        self._library.fcsl_publish_queue_wake(self._handle)
 
     @property
     def dropped(self) -> int:
         """Messages that found no room."""
-        return int(self._library.fcsl_outbox_dropped(self._handle))
+        return int(self._library.fcsl_publish_queue_dropped(self._handle))
 
     def close(self) -> None:
         """Frees it; nobody may put or take any more. Idempotent."""
         if self._handle:
-            self._library.fcsl_outbox_free(self._handle)
+            self._library.fcsl_publish_queue_free(self._handle)
             self._handle = None
 
 
 class RunTopics:
-    """The topics of a run. `topic` is a number by which the outbox's reader knows it. Everything is added before the first
+    """The topics of a run. `topic` is a number by which the publish queue's reader knows it. Everything is added before the first
     tick. Raises TwinError."""
 
-    def __init__(self, run: Run, outbox: Outbox):
+    def __init__(self, run: Run, queue: PublishQueue):
         self._library, self._error = native.library(), CError()
-        self._kept: list[object] = [run, outbox]
-        self._handle = self._library.fcsl_topics_new(run.handle(), outbox.handle, byref(self._error))
+        self._kept: list[object] = [run, queue]
+        self._handle = self._library.fcsl_topics_new(run.handle(), queue.handle, byref(self._error))
         if not self._handle:
             raise TwinError(self._error.text.decode("utf-8", "replace"))
 
@@ -110,7 +110,7 @@ class RunTopics:
         )
 
     def put(self, stamp_ns: int) -> None:
-        """Puts what the last completed tick shows into the outbox."""
+        """Puts what the last completed tick shows into the publish queue."""
         self._library.fcsl_topics_put(self._handle, stamp_ns)
 
     def put_changes(self, stamp_ns: int) -> None:
@@ -122,7 +122,7 @@ class RunTopics:
         return int(self._library.fcsl_topics_refused(self._handle, topic))
 
     def close(self) -> None:
-        """Frees it; before its run and its outbox. Idempotent."""
+        """Frees it; before its run and its publish queue. Idempotent."""
         if self._handle:
             self._library.fcsl_topics_free(self._handle)
             self._handle = None

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Finished messages on their way to the ROS graph: native code puts them into an outbox, this file publishes them."""
+"""Finished messages on their way to the ROS graph: native code puts them into a publish queue, this file publishes them."""
 
 from __future__ import annotations
 
@@ -9,20 +9,20 @@ from typing import Any, TypeVar
 
 from rclpy.publisher import Publisher
 
-from simclient.ros.outbox import Outbox
+from simclient.ros.publish_queue import PublishQueue
 
 _T = TypeVar("_T")
 
 
-class OutboxPublisher:
+class QueuePublisher:
     """Everything runs in the thread that calls it. lossless: native code waits for room rather than drop a message."""
 
     def __init__(self, lossless: bool):
-        self.outbox = Outbox(lossless)
+        self.queue = PublishQueue(lossless)
         self._publish: list[Callable[[bytes], Any]] = []
 
     def add(self, publisher: Publisher, seen: Callable[[bytes], None] | None = None) -> int:
-        """The number of the publisher's topic in the outbox. `seen` gets each of its messages, too."""
+        """The number of the publisher's topic in the publish queue. `seen` gets each of its messages, too."""
 
         def publish(data: bytes) -> None:
             publisher.publish(data)
@@ -35,7 +35,7 @@ class OutboxPublisher:
     def some(self, wait: bool) -> bool:
         """Publishes some of the messages that are there; whether there were any. wait: a moment, where there are none."""
         found = False
-        for topic, data in self.outbox.take(wait):
+        for topic, data in self.queue.take(wait):
             self._publish[topic](data)
             found = True
         return found
@@ -46,26 +46,26 @@ class OutboxPublisher:
             pass
 
     def close(self) -> None:
-        self.outbox.close()
+        self.queue.close()
 
 
 class NativeThread:
-    """Makes native calls in a thread of its own, one at a time, and publishes meanwhile what they put into the outbox."""
+    """Makes native calls in a thread of its own, one at a time, and publishes meanwhile what they put into the publish queue."""
 
-    def __init__(self, forward: OutboxPublisher):
+    def __init__(self, forward: QueuePublisher):
         self._forward = forward
         self._pool = ThreadPoolExecutor(1)
 
     def __call__(self, call: Callable[..., _T], *arguments: Any) -> _T:
         """Returns or raises what the call does."""
         future: Future[_T] = self._pool.submit(call, *arguments)
-        future.add_done_callback(lambda _: self._forward.outbox.wake())
+        future.add_done_callback(lambda _: self._forward.queue.wake())
         try:
             while not future.done():
                 self._forward.some(wait=True)
         finally:
             while not future.done():  # publishing failed, and the call may wait for room
-                list(self._forward.outbox.take(wait=True))
+                list(self._forward.queue.take(wait=True))
         return future.result()
 
     def close(self) -> None:
