@@ -253,7 +253,7 @@ static void idle(loop_t *loop)
 {
     const uint64_t deadline = fcsl_monotonic_ns() + SLICE_NS;
     if (loop->vars != NULL && loop->attends) {
-        fcsl_vars_attend(loop->vars, deadline);
+        fcsl_vars_wait_serving(loop->vars, deadline);
     } else if (loop->vars != NULL) {
         fcsl_vars_wait(loop->vars, deadline);
     } else {
@@ -266,7 +266,7 @@ static void idle(loop_t *loop)
 static void leave_clients(loop_t *loop)
 {
     if (loop->vars != NULL) {
-        fcsl_vars_leave(loop->vars);
+        fcsl_vars_stop_serving(loop->vars);
     }
 }
 

@@ -48,7 +48,7 @@ static void test_who_waits_for_the_server(void)
     const uint64_t late = (8u + UNREAD_MAX_S) * SECOND;
     char in[8] = "";
     client_t client = fresh(in);
-    client.waiting = 1;
+    client.has_command = 1;
     CHECK(fcsl_client_overdue(&client, late) == NULL);
     client = fresh(in);
     client.blocked = 1;

@@ -1,6 +1,6 @@
 /* SPDX-License-Identifier: Apache-2.0
  *
- * How many ticks a `tick` may make between two looks at the history, so that no subscriber misses one. The sources are
+ * How many ticks a `tick` may make between two readings of the history, so that no subscriber misses one. The sources are
  * compiled in.
  */
 #define _GNU_SOURCE
@@ -23,8 +23,8 @@ static const fcsl_history_t history = {.slots = SLOTS};
 
 static void subscribe(size_t client, size_t subscription, size_t bytes)
 {
-    vars.clients[client].session.subscriptions[subscription].number = 1;
-    vars.clients[client].session.subscriptions[subscription].bytes = bytes;
+    vars.clients[client].subscriptions[subscription].number = 1;
+    vars.clients[client].subscriptions[subscription].bytes = bytes;
 }
 
 static void nobody(void)
@@ -37,7 +37,7 @@ static void nobody(void)
 
 static void check_ticks(uint32_t ticks)
 {
-    CHECK(fcsl_vars_prepare_streams(&vars) == (ticks > 0) && vars.commander.ticks_at_once == ticks);
+    CHECK(fcsl_vars_prepare_streams(&vars) == (ticks > 0) && vars.protocol.ticks_at_once == ticks);
 }
 
 static void test_nobody(void)

@@ -3,7 +3,7 @@
  * The variable server: every value of a host by its path, over a socket (docs/reference/variables.md). Flight program and simulator
  * serve through this file.
  *
- * The server has one thread of its own. What only looks (get, eval, subscribe, state, stats) reads the host's history
+ * The server has one thread of its own. What only reads (get, eval, subscribe, state, stats) takes the host's history
  * and never meets the step thread; what changes something waits in one slot until the step thread takes it between two
  * ticks, at most one command at a time. Clients, bytes, replies and time are bounded, and all memory is taken by open.
  */
@@ -82,11 +82,11 @@ const char *fcsl_vars_address(const fcsl_vars_t *vars);
 void fcsl_vars_serve(fcsl_vars_t *vars);
 /* Step thread of a paused host: sleeps until a command waits, but at most until `deadline_ns` of the monotonic clock. */
 void fcsl_vars_wait(fcsl_vars_t *vars, uint64_t deadline_ns);
-/* The same, and serves clients meanwhile in place of the server's thread: to be woken for a command takes longer than
+/* The same, and serves clients meanwhile in place of the server's thread: to wake a thread for a command takes longer than
  * most commands. Then fcsl_vars_serve sends the reply, too. Not for a thread of high priority. */
-void fcsl_vars_attend(fcsl_vars_t *vars, uint64_t deadline_ns);
+void fcsl_vars_wait_serving(fcsl_vars_t *vars, uint64_t deadline_ns);
 /* Leaves clients to the server's thread again: before the host runs on, or ends. */
-void fcsl_vars_leave(fcsl_vars_t *vars);
+void fcsl_vars_stop_serving(fcsl_vars_t *vars);
 /* Any thread: ends either sleep. */
 void fcsl_vars_wake(fcsl_vars_t *vars);
 

@@ -21,7 +21,7 @@ int fcsl_client_allocate(client_t *client)
     client->out = malloc(OUT_BYTES);
     char *paths = malloc((size_t)SUBSCRIPTIONS_MAX * SUBSCRIBED_MAX * PATH_BYTES_MAX);
     for (size_t i = 0; paths != NULL && i < SUBSCRIPTIONS_MAX; i++) {
-        client->session.subscriptions[i].paths = paths + i * SUBSCRIBED_MAX * PATH_BYTES_MAX;
+        client->subscriptions[i].paths = paths + i * SUBSCRIBED_MAX * PATH_BYTES_MAX;
     }
     return client->in != NULL && client->out != NULL && paths != NULL ? 0 : -1;
 }
@@ -30,7 +30,7 @@ void fcsl_client_free(client_t *client)
 {
     free(client->in);
     free(client->out);
-    free(client->session.subscriptions[0].paths);
+    free(client->subscriptions[0].paths);
 }
 
 void fcsl_client_begin(client_t *client, int fd, int trusted, uint64_t now_ns)
@@ -38,18 +38,18 @@ void fcsl_client_begin(client_t *client, int fd, int trusted, uint64_t now_ns)
     client->fd = fd;
     client->ended = 0;
     client->closing = 0;
-    client->waiting = 0;
+    client->has_command = 0;
     client->blocked = 0;
     client->received = 0;
     client->out_from = 0;
     client->out_to = 0;
     client->unsent_since_ns = 0;
     client->unread_since_ns = now_ns;
-    client->session.trusted = trusted;
-    client->session.bad_in_a_row = 0;
-    client->session.checkpoint_number = 0;
+    client->trusted = trusted;
+    client->bad_in_a_row = 0;
+    client->checkpoint_number = 0;
     for (size_t i = 0; i < SUBSCRIPTIONS_MAX; i++) {
-        client->session.subscriptions[i].number = 0;
+        client->subscriptions[i].number = 0;
     }
 }
 
@@ -133,8 +133,8 @@ const char *fcsl_client_overdue(const client_t *client, uint64_t now_ns)
     if (client->unsent_since_ns != 0 && now_ns - client->unsent_since_ns > UNSENT_MAX_NS) {
         return "replies and samples were left unread for 5 s";
     }
-    /* Only while it is the client who keeps the server waiting. */
-    const int awaited = client->unread_since_ns != 0 && !client->waiting && !client->blocked &&
+    /* Only while the server waits for the client. */
+    const int awaited = client->unread_since_ns != 0 && !client->has_command && !client->blocked &&
                         fcsl_client_unsent(client) <= SAMPLES_BYTES_MAX;
     if (awaited && now_ns - client->unread_since_ns > UNREAD_MAX_NS &&
         memchr(client->in, '\n', client->received) == NULL) {

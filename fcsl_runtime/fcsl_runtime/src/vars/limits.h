@@ -10,7 +10,7 @@ enum {
     UNTRUSTED_MAX = 16, /* clients that have not sent the token yet: of more the oldest is dropped */
     REQUEST_BYTES_MAX = 64 * 1024, /* bytes of a request */
     REPLY_BYTES_MAX = 512 * 1024, /* bytes of a reply */
-    REQUESTS_PER_ROUND = 4, /* requests of one client before the others have their turn */
+    REQUESTS_PER_TURN = 4, /* requests of one client before the others have their turn */
     BAD_IN_A_ROW_MAX = 16, /* requests in a row that are no JSON: then the client is dropped */
     UNREAD_MAX_S = 10, /* seconds for a client's first request, and for the rest of one that it has begun */
     UNSENT_MAX_S = 5, /* seconds in which a client takes nothing of what is sent to it */

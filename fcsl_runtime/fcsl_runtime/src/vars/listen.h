@@ -1,6 +1,6 @@
 /* SPDX-License-Identifier: Apache-2.0
  *
- * Where the variable server listens, and the token that a TCP client must tell.
+ * Where the variable server listens, and the token that a TCP client must send.
  */
 #ifndef FCSL_VARS_LISTEN_H
 #define FCSL_VARS_LISTEN_H

@@ -1,6 +1,6 @@
 /* SPDX-License-Identifier: Apache-2.0
  *
- * Publications on their way to the subscriptions of all clients.
+ * Sends samples of what is published to the subscriptions of all clients.
  */
 #include "server.h"
 
@@ -9,7 +9,7 @@ static size_t bytes_of(const client_t *client)
 {
     size_t bytes = 0;
     for (size_t i = 0; client->fd >= 0 && !client->closing && i < SUBSCRIPTIONS_MAX; i++) {
-        const subscription_t *subscription = &client->session.subscriptions[i];
+        const subscription_t *subscription = &client->subscriptions[i];
         bytes += subscription->number != 0 ? subscription->bytes : 0;
     }
     return bytes;
@@ -23,7 +23,7 @@ int fcsl_vars_prepare_streams(fcsl_vars_t *vars)
         most = bytes > most ? bytes : most;
     }
     if (most == 0) {
-        vars->commander.ticks_at_once = 0;
+        vars->protocol.ticks_at_once = 0;
         vars->cursor = fcsl_history_published(vars->history);
         vars->overtaken = 0;
         return 0;
@@ -31,7 +31,7 @@ int fcsl_vars_prepare_streams(fcsl_vars_t *vars)
     /* So few that neither the history nor a client's room for samples is too small for them. */
     const size_t fit = SAMPLES_BYTES_MAX / 2u / most;
     const uint32_t slots = vars->history->slots / 2u;
-    vars->commander.ticks_at_once = fit == 0 ? 1u : fit < slots ? (uint32_t)fit : slots;
+    vars->protocol.ticks_at_once = fit == 0 ? 1u : fit < slots ? (uint32_t)fit : slots;
     return 1;
 }
 
@@ -67,7 +67,7 @@ void fcsl_vars_stream(fcsl_vars_t *vars, uint64_t now_ns)
     if (!fcsl_vars_prepare_streams(vars)) {
         return;
     }
-    /* Bounded: a host that publishes faster than this reads is caught up with in the coming round. */
+    /* Bounded: a host that publishes faster than this reads is caught up with in the next turn. */
     for (uint32_t i = 0; i < 2u * vars->history->slots; i++) {
         const fcsl_history_status_t status = fcsl_history_read(vars->history, vars->cursor, &moment, vars->sample);
         if (status == FCSL_HISTORY_COMING) {
@@ -83,8 +83,8 @@ void fcsl_vars_stream(fcsl_vars_t *vars, uint64_t now_ns)
         for (size_t c = 0; c < vars->used; c++) {
             client_t *client = &vars->clients[c];
             for (size_t s = 0; client->fd >= 0 && !client->closing && s < SUBSCRIPTIONS_MAX; s++) {
-                if (client->session.subscriptions[s].number != 0) {
-                    sample(vars, client, &client->session.subscriptions[s], &moment, now_ns);
+                if (client->subscriptions[s].number != 0) {
+                    sample(vars, client, &client->subscriptions[s], &moment, now_ns);
                 }
             }
         }

@@ -28,7 +28,7 @@ size_t fcsl_subscription_bytes(const subscription_t *subscription);
 /* Sets `due` to the first tick behind `tick` that is wanted. */
 void fcsl_subscription_begin(subscription_t *subscription, uint64_t tick);
 
-/* Looks at a publication: 1 when a sample of it is due. Counts those that were missed before it, where `overtaken`
+/* Checks a publication: 1 when a sample of it is due. Counts those that were missed before it, where `overtaken`
  * publications were: ticks that a restore jumped over never were. */
 int fcsl_subscription_due(subscription_t *subscription, uint64_t tick, uint64_t overtaken);
 

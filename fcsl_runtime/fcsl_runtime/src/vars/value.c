@@ -16,11 +16,11 @@
 #include "fcsl/fcsl_scalar.h"
 #include "machine/enumerators.h"
 
-enum { NAME_BYTES = 256, NUMBER_BYTES = 64 };
+enum { VALUE_NAME_BYTES = 256, NUMBER_BYTES = 64 };
 
 static void write_scalar(const target_t *target, const uint8_t *bytes, json_out_t *out)
 {
-    char text[NAME_BYTES];
+    char text[VALUE_NAME_BYTES];
     int32_t i32 = 0;
     uint32_t u32 = 0;
     int64_t i64 = 0;
@@ -169,7 +169,7 @@ static int32_t request_of(const fcsl_machine_t *machine, const char *text)
 static const char *read_enumerator(const fcsl_machine_t *machine, const json_t *json, uint32_t token, uint8_t type,
                                    uint8_t *bytes)
 {
-    char text[NAME_BYTES];
+    char text[VALUE_NAME_BYTES];
     if (fcsl_json_string(json, token, text, sizeof text) != 0) {
         return "expected a name";
     }

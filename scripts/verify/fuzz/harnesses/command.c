@@ -1,8 +1,8 @@
 /* SPDX-License-Identifier: Apache-2.0
  *
- * commander.h: one request line of the variable server after the other, on a machine. Each reply is one line, of JSON.
+ * protocol.h: one request line of the variable server after the other, on a machine. Each reply is one line, of JSON.
  */
-#include "vars/commander.h"
+#include "vars/protocol.h"
 #include "hosted.h"
 
 /* Short, so that a reply that does not fit is met, too. */
@@ -26,31 +26,31 @@ static void open_once(fcsl_vars_t *vars)
     static fcsl_vars_block_t block;
     block = hosted_block();
     vars->history = &hosted.history;
-    vars->commander = (commander_t){.history = &hosted.history,
-                                    .host = &vars->host,
-                                    .mailbox = &vars->mailbox,
-                                    .counters = &vars->counters,
-                                    .checkpoints = "/nonexistent", /* names are checked, and found nowhere */
-                                    .secret = ""};
-    FUZZ_CHECK(fcsl_mailbox_open(&vars->mailbox, 8u * TOKENS_MAX) == 0);
-    FUZZ_CHECK(fcsl_catalog_open(&vars->commander.catalog, &block, 1, &hosted.history) == 0);
-    FUZZ_CHECK(fcsl_commander_open(&vars->commander) == 0 && fcsl_client_allocate(&vars->clients[0]) == 0);
+    vars->protocol = (protocol_t){.history = &hosted.history,
+                                  .host = &vars->host,
+                                  .slot = &vars->slot,
+                                  .counters = &vars->counters,
+                                  .checkpoints = "/nonexistent", /* names are checked, and found nowhere */
+                                  .secret = ""};
+    FUZZ_CHECK(fcsl_slot_open(&vars->slot, 8u * TOKENS_MAX) == 0);
+    FUZZ_CHECK(fcsl_catalog_open(&vars->protocol.catalog, &block, 1, &hosted.history) == 0);
+    FUZZ_CHECK(fcsl_protocol_open(&vars->protocol) == 0 && fcsl_client_allocate(&vars->clients[0]) == 0);
 }
 
 static void serve(fcsl_vars_t *vars, const char *line, size_t length)
 {
     static char reply[REPLY_BYTES];
-    session_t *session = &vars->clients[0].session;
+    client_t *client = &vars->clients[0];
     json_out_t out;
     fcsl_json_begin(&out, reply, sizeof reply);
-    const serving_t serving = fcsl_commander_serve(&vars->commander, session, line, length, &out);
-    FUZZ_CHECK(serving == SERVED || serving == POSTED);
-    if (serving == POSTED) {
+    const serve_status_t status = fcsl_protocol_serve(&vars->protocol, client, line, length, &out);
+    FUZZ_CHECK(status == SERVE_REPLIED || status == SERVE_POSTED);
+    if (status == SERVE_POSTED) {
         fcsl_vars_serve(vars);
-        FUZZ_CHECK(fcsl_mailbox_done(&vars->mailbox));
-        vars->commander.ticks_left = 0; /* the host ends within a portion of them */
-        fcsl_commander_complete(&vars->commander);
-        fcsl_commander_finish(&vars->commander, session, &out);
+        FUZZ_CHECK(fcsl_slot_take_back(&vars->slot));
+        vars->protocol.ticks_left = 0; /* the host ends within a portion of them */
+        fcsl_protocol_complete(&vars->protocol);
+        fcsl_protocol_reply(&vars->protocol, client, &out);
     }
     check_reply(&out);
 }
@@ -60,12 +60,12 @@ int LLVMFuzzerTestOneInput(const uint8_t *data, size_t size)
     static fcsl_vars_t vars;
     bytes_t bytes = {data, size};
     hosted_open();
-    if (vars.commander.tokens == NULL) {
+    if (vars.protocol.tokens == NULL) {
         open_once(&vars);
     }
     vars.host = hosted_host(); /* of this input's run */
-    vars.commander.snapshot_of = 0;
-    vars.commander.kept.number = 0;
+    vars.protocol.snapshot_of = 0;
+    vars.protocol.checkpoint.number = 0;
     fcsl_client_begin(&vars.clients[0], -1, 1, 0);
     while (bytes.left > 0) {
         const uint8_t *newline = memchr(bytes.at, '\n', bytes.left);

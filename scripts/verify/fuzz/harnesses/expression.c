@@ -1,8 +1,8 @@
 /* SPDX-License-Identifier: Apache-2.0
  *
- * evaluate.h: expressions over the fixture machine. The same text has the same value twice, and what it writes is JSON.
+ * protocol.h: expressions over the fixture machine. The same text has the same value twice, and what it writes is JSON.
  */
-#include "vars/evaluate.h"
+#include "vars/protocol.h"
 #include "hosted.h"
 
 static int evaluate(const catalog_t *catalog, const char *text, char *reply, size_t capacity)

@@ -4,7 +4,7 @@
  * bytes; bit 7 of the client sends the piece 64 times, a length of 65535 ends the connection. Client 3 leaves its replies
  * unread.
  */
-#include "vars/server.c" /* whose memory is taken here, and whose rounds are made here, in this thread */
+#include "vars/server.c" /* whose memory is taken here, and whose loop runs here, in this thread */
 
 #include <sys/socket.h>
 
@@ -23,18 +23,18 @@ static void drain(int fd)
 static void open_connections(fcsl_vars_t *vars, int *ends)
 {
     static fcsl_vars_block_t block;
-    if (vars->commander.tokens == NULL) {
+    if (vars->protocol.tokens == NULL) {
         block = hosted_block();
         vars->history = &hosted.history;
         vars->listener.fd = -1;
-        vars->attention = -1; /* no other thread waits */
+        vars->wakeup = -1; /* no other thread waits */
         FUZZ_CHECK(allocate(vars, &block, 1) == 0);
     }
     vars->host = hosted_host(); /* of this input's run */
-    vars->commander.snapshot_of = 0;
-    vars->commander.kept.number = 0;
-    vars->commander.ticks_left = 0;
-    vars->poster = CLIENTS_MAX;
+    vars->protocol.snapshot_of = 0;
+    vars->protocol.checkpoint.number = 0;
+    vars->protocol.ticks_left = 0;
+    vars->command_client = CLIENTS_MAX;
     vars->cursor = 0;
     vars->overtaken = 0;
     vars->used = CLIENTS;
@@ -46,7 +46,7 @@ static void open_connections(fcsl_vars_t *vars, int *ends)
     }
 }
 
-/* A round of the server, and the step thread's part behind it. */
+/* A turn of the event loop, and the step thread's part behind it. */
 static void run(fcsl_vars_t *vars, size_t i, const int *ends)
 {
     client_t *client = &vars->clients[i];
@@ -58,7 +58,7 @@ static void run(fcsl_vars_t *vars, size_t i, const int *ends)
         fcsl_vars_serve_client(vars, client, entry.fd >= 0 ? entry.events : 0, now_ns);
     }
     fcsl_vars_serve(vars);
-    fcsl_vars_serve_command(vars, now_ns);
+    fcsl_vars_reply_command(vars, now_ns);
     fcsl_vars_stream(vars, now_ns);
     for (size_t c = 0; c < CLIENTS; c++) {
         FUZZ_CHECK(vars->clients[c].received <= REQUEST_BYTES_MAX + 1u);
@@ -78,11 +78,10 @@ static void close_connections(fcsl_vars_t *vars, int *ends)
         }
     }
     /* A command under way ends, whoever it was for. */
-    for (int turn = 0; turn < 1000 && (vars->commander.ticks_left > 0 || !fcsl_mailbox_is_free(&vars->mailbox));
-         turn++) {
+    for (int turn = 0; turn < 1000 && (vars->protocol.ticks_left > 0 || !fcsl_slot_is_free(&vars->slot)); turn++) {
         run(vars, 0, ends);
     }
-    FUZZ_CHECK(vars->commander.ticks_left == 0 && fcsl_mailbox_is_free(&vars->mailbox));
+    FUZZ_CHECK(vars->protocol.ticks_left == 0 && fcsl_slot_is_free(&vars->slot));
     for (size_t i = 0; i < CLIENTS; i++) {
         if (vars->clients[i].fd >= 0) {
             fcsl_vars_close_client(vars, &vars->clients[i]);

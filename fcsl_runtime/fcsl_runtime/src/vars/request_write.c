@@ -7,10 +7,10 @@
 
 #include "fcsl/fcsl_scalar.h"
 #include "machine/enumerators.h"
-#include "request.h"
+#include "protocol.h"
 #include "value.h"
 
-/* ---- who overwrites it --------------------------------------------------------------------------------------------- */
+/* ---- what overwrites it -------------------------------------------------------------------------------------------- */
 
 static int is_scheduled(const fcsl_machine_t *machine, const uint8_t *data, int32_t instance)
 {
@@ -40,7 +40,7 @@ static const fcsl_channel_t *serving_channel(const fcsl_machine_t *machine, cons
     return NULL;
 }
 
-/* Who writes the field anyway, as things stand in the publication `data`: a path, "the machine", "channel NAME",
+/* What writes the field anyway, as things stand in the publication `data`: a path, "the machine", "channel NAME",
  * "instance NAME", or "". */
 static void find_writer(const fcsl_vars_block_t *block, uint32_t index, const uint8_t *data, char *text, size_t size)
 {
@@ -63,10 +63,10 @@ static void find_writer(const fcsl_vars_block_t *block, uint32_t index, const ui
     }
 }
 
-void fcsl_write_overwritten(const commander_t *commander, json_out_t *out)
+void fcsl_write_overwritten(const protocol_t *protocol, json_out_t *out)
 {
-    const command_t *command = &commander->mailbox->command;
-    const catalog_t *catalog = &commander->catalog;
+    const command_t *command = &protocol->slot->command;
+    const catalog_t *catalog = &protocol->catalog;
     int some = 0;
     fcsl_json_raw(out, ",\"overwritten_by\":{");
     for (uint32_t i = 0; i < command->write_count; i++) {
@@ -76,7 +76,7 @@ void fcsl_write_overwritten(const commander_t *commander, json_out_t *out)
         for (uint32_t j = 0; j < i && !listed; j++) {
             listed = command->writes[j].block == write->block && command->writes[j].field == write->field;
         }
-        find_writer(&catalog->blocks[write->block], write->field, commander->snapshot + catalog->bases[write->block],
+        find_writer(&catalog->blocks[write->block], write->field, protocol->snapshot + catalog->bases[write->block],
                     text, sizeof text);
         if (!listed && text[0] != '\0') {
             const char *prefix = catalog->blocks[write->block].prefix;
@@ -101,13 +101,13 @@ static int check_writable(request_t *request, const target_t *target)
     if ((field->flags & FCSL_FIELD_WRITABLE) != 0) {
         return 0;
     }
-    const commander_t *commander = request->commander;
+    const protocol_t *protocol = request->protocol;
     const uint32_t block = target->entry->block;
     if (fcsl_request_snapshot(request) != 0) {
         return -1;
     }
-    find_writer(&commander->catalog.blocks[block], target->entry->field,
-                commander->snapshot + commander->catalog.bases[block], request->error_writer,
+    find_writer(&protocol->catalog.blocks[block], target->entry->field,
+                protocol->snapshot + protocol->catalog.bases[block], request->error_writer,
                 sizeof request->error_writer);
     return fcsl_request_refuse(request, "refused", "", "'%s' cannot be set: it is computed here", target->entry->path);
 }
@@ -115,8 +115,8 @@ static int check_writable(request_t *request, const target_t *target)
 /* Cuts what is meant into contiguous pieces of fields. */
 static int add_writes(request_t *request, const target_t *target, size_t at)
 {
-    command_t *command = &request->commander->mailbox->command;
-    const fcsl_field_t *fields = request->commander->catalog.blocks[target->entry->block].fields;
+    command_t *command = &request->protocol->slot->command;
+    const fcsl_field_t *fields = request->protocol->catalog.blocks[target->entry->block].fields;
     const uint32_t scalar = fcsl_scalar_size(target->field->type);
     const uint32_t count = fcsl_view_count(&target->view);
     write_t *write = NULL;
@@ -141,10 +141,10 @@ static int add_writes(request_t *request, const target_t *target, size_t at)
 /* The step thread writes without a second check: what it would refuse is refused here. */
 static int check_writes(request_t *request)
 {
-    const command_t *command = &request->commander->mailbox->command;
+    const command_t *command = &request->protocol->slot->command;
     for (uint32_t i = 0; i < command->write_count; i++) {
         const write_t *write = &command->writes[i];
-        const fcsl_vars_block_t *block = &request->commander->catalog.blocks[write->block];
+        const fcsl_vars_block_t *block = &request->protocol->catalog.blocks[write->block];
         const fcsl_field_t *field = &block->fields[write->field];
         fcsl_error_t error;
         if (fcsl_check_value(block->machine, field, command->bytes + write->at, write->size, &error) != 0) {
@@ -158,7 +158,7 @@ static int check_writes(request_t *request)
 /* One member of "values"; `at` moves on behind its bytes. */
 static int add_value(request_t *request, uint32_t name, int floats, size_t *at)
 {
-    command_t *command = &request->commander->mailbox->command;
+    command_t *command = &request->protocol->slot->command;
     target_t target;
     if (fcsl_request_target(request, name, &target) != 0 || check_writable(request, &target) != 0) {
         return -1;
@@ -167,7 +167,7 @@ static int add_value(request_t *request, uint32_t name, int floats, size_t *at)
     if (problem != NULL) {
         char type[NAME_BYTES];
         fcsl_value_type(target.field, &target.view, type, sizeof type);
-        return fcsl_request_refuse(request, "bad_value", "", "'%.255s' is %.64s: %s", request->commander->text, type,
+        return fcsl_request_refuse(request, "bad_value", "", "'%.255s' is %.64s: %s", request->protocol->text, type,
                                    problem);
     }
     if (add_writes(request, &target, *at) != 0) {
@@ -203,7 +203,7 @@ int fcsl_handle_set(request_t *request)
 
 command_t *fcsl_request_prepare(request_t *request, command_kind_t kind)
 {
-    command_t *command = &request->commander->mailbox->command;
+    command_t *command = &request->protocol->slot->command;
     *command =
         (command_t){.kind = kind, .writes = command->writes, .bytes = command->bytes, .hardware = command->hardware};
     return command;
@@ -221,12 +221,12 @@ int fcsl_handle_resume(request_t *request)
     return 0;
 }
 
-uint64_t fcsl_commander_portion(commander_t *commander)
+uint64_t fcsl_protocol_next_ticks(protocol_t *protocol)
 {
     static const uint64_t UNWATCHED_TICKS = 1000u;
-    const uint64_t most = commander->ticks_at_once != 0 ? commander->ticks_at_once : UNWATCHED_TICKS;
-    const uint64_t count = commander->ticks_left < most ? commander->ticks_left : most;
-    commander->ticks_left -= count;
+    const uint64_t most = protocol->ticks_at_once != 0 ? protocol->ticks_at_once : UNWATCHED_TICKS;
+    const uint64_t count = protocol->ticks_left < most ? protocol->ticks_left : most;
+    protocol->ticks_left -= count;
     return count;
 }
 
@@ -236,9 +236,9 @@ int fcsl_handle_tick(request_t *request)
     if (fcsl_request_number(request, "count", TICKS_MAX, &count) != 0) {
         return -1;
     }
-    request->commander->ticks_left = count;
-    request->commander->ticks_stopped = 0;
-    fcsl_request_prepare(request, COMMAND_TICK)->count = fcsl_commander_portion(request->commander);
+    request->protocol->ticks_left = count;
+    request->protocol->ticks_stopped = 0;
+    fcsl_request_prepare(request, COMMAND_TICK)->count = fcsl_protocol_next_ticks(request->protocol);
     return 0;
 }
 
@@ -254,7 +254,7 @@ int fcsl_handle_set_state(request_t *request)
         return fcsl_request_refuse(request, "unknown_state", fcsl_nearest_state(machine, name), "no state '%s'", name);
     }
     command_t *command = fcsl_request_prepare(request, COMMAND_SET_STATE);
-    command->block = request->commander->catalog.machine;
+    command->block = request->protocol->catalog.machine;
     command->state = state;
     return 0;
 }

@@ -10,13 +10,13 @@
 #include "base64.h"
 #include "run/checkpoint.h"
 #include "base/replace_file.h"
-#include "request.h"
+#include "protocol.h"
 
 enum { PORTION_BYTES = 360 * 1024 }; /* of one reply; a multiple of 3, so that the texts of portions can be joined */
 
-static const fcsl_machine_t *machine_of(const commander_t *commander)
+static const fcsl_machine_t *machine_of(const protocol_t *protocol)
 {
-    return commander->catalog.blocks[commander->catalog.machine].machine;
+    return protocol->catalog.blocks[protocol->catalog.machine].machine;
 }
 
 /* ---- files --------------------------------------------------------------------------------------------------------- */
@@ -37,7 +37,7 @@ static int read_name(request_t *request, char name[FILE_BYTES])
     if (fcsl_json_member(&request->json, 0, "file") == 0) {
         return 0;
     }
-    if (request->commander->checkpoints == NULL) {
+    if (request->protocol->checkpoints == NULL) {
         return fcsl_request_refuse(request, "refused", "",
                                    "this program was not told where: start it with --checkpoints DIR");
     }
@@ -55,9 +55,9 @@ static int read_name(request_t *request, char name[FILE_BYTES])
     return 0;
 }
 
-static void join(const commander_t *commander, const char *name, char path[FILE_PATH_BYTES])
+static void join(const protocol_t *protocol, const char *name, char path[FILE_PATH_BYTES])
 {
-    (void)snprintf(path, FILE_PATH_BYTES, "%s/%s", commander->checkpoints, name);
+    (void)snprintf(path, FILE_PATH_BYTES, "%s/%s", protocol->checkpoints, name);
 }
 
 /* ---- save ---------------------------------------------------------------------------------------------------------- */
@@ -69,56 +69,57 @@ int fcsl_handle_save(request_t *request)
         return -1;
     }
     command_t *command = fcsl_request_prepare(request, COMMAND_SAVE);
-    command->block = request->commander->catalog.machine;
+    command->block = request->protocol->catalog.machine;
     memcpy(command->file, name, sizeof name);
     return 0;
 }
 
-void fcsl_commander_complete(commander_t *commander)
+void fcsl_protocol_complete(protocol_t *protocol)
 {
-    command_t *command = &commander->mailbox->command;
+    command_t *command = &protocol->slot->command;
     if (command->kind != COMMAND_SAVE || command->status != FCSL_VARS_OK) {
         return;
     }
-    kept_t *kept = &commander->kept;
-    kept->size = fcsl_checkpoint_encode(machine_of(commander), command->bytes, command->hardware, kept->bytes);
-    kept->held = kept->size;
-    kept->number++;
+    checkpoint_buffer_t *checkpoint = &protocol->checkpoint;
+    checkpoint->size =
+        fcsl_checkpoint_encode(machine_of(protocol), command->bytes, command->hardware, checkpoint->bytes);
+    checkpoint->held = checkpoint->size;
+    checkpoint->number++;
     if (command->file[0] != '\0') {
         char path[FILE_PATH_BYTES];
-        join(commander, command->file, path);
-        if (fcsl_replace_file(path, kept->bytes, kept->size, &command->error) != 0) {
+        join(protocol, command->file, path);
+        if (fcsl_replace_file(path, checkpoint->bytes, checkpoint->size, &command->error) != 0) {
             command->status = FCSL_VARS_FAILED;
         }
     }
 }
 
-static void put_portion(const kept_t *kept, size_t at, json_out_t *out)
+static void put_portion(const checkpoint_buffer_t *checkpoint, size_t at, json_out_t *out)
 {
-    const size_t left = kept->size - at;
+    const size_t left = checkpoint->size - at;
     const size_t size = left < PORTION_BYTES ? left : PORTION_BYTES;
     fcsl_json_raw(out, ",\"data\":\"");
     if (out->overflow || out->capacity - out->at < BASE64_BYTES(size)) {
         out->overflow = 1;
         return;
     }
-    fcsl_base64_encode(kept->bytes + at, size, out->text + out->at);
+    fcsl_base64_encode(checkpoint->bytes + at, size, out->text + out->at);
     out->at += BASE64_BYTES(size) - 1u;
     fcsl_json_raw(out, "\"");
 }
 
 void fcsl_write_saved(request_t *request)
 {
-    const commander_t *commander = request->commander;
-    const char *name = commander->mailbox->command.file;
-    fcsl_json_raw(request->out, ",\"bytes\":%zu", commander->kept.size);
+    const protocol_t *protocol = request->protocol;
+    const char *name = protocol->slot->command.file;
+    fcsl_json_raw(request->out, ",\"bytes\":%zu", protocol->checkpoint.size);
     if (name[0] != '\0') {
         fcsl_json_raw(request->out, ",\"file\":");
         fcsl_json_quoted(request->out, name);
         return;
     }
-    request->session->checkpoint_number = commander->kept.number;
-    put_portion(&commander->kept, 0, request->out);
+    request->client->checkpoint_number = protocol->checkpoint.number;
+    put_portion(&protocol->checkpoint, 0, request->out);
 }
 
 /* ---- portions ------------------------------------------------------------------------------------------------------ */
@@ -126,19 +127,19 @@ void fcsl_write_saved(request_t *request)
 /* Whether the checkpoint that is kept is the one that this client saved or loads. */
 static int is_own(const request_t *request)
 {
-    return request->session->checkpoint_number != 0 &&
-           request->session->checkpoint_number == request->commander->kept.number;
+    return request->client->checkpoint_number != 0 &&
+           request->client->checkpoint_number == request->protocol->checkpoint.number;
 }
 
-static int is_whole(const kept_t *kept)
+static int is_whole(const checkpoint_buffer_t *checkpoint)
 {
-    return kept->size > 0 && kept->held == kept->size;
+    return checkpoint->size > 0 && checkpoint->held == checkpoint->size;
 }
 
 /* Refuses what needs the client's own; `otherwise` is what to do when it never had one. */
 static int refuse_foreign(request_t *request, const char *otherwise)
 {
-    const int had = request->session->checkpoint_number != 0;
+    const int had = request->client->checkpoint_number != 0;
     return fcsl_request_refuse(request, "refused", "save", "%s",
                                had ? "another client has saved or loaded since, and one checkpoint is kept: begin anew"
                                    : otherwise);
@@ -146,26 +147,26 @@ static int refuse_foreign(request_t *request, const char *otherwise)
 
 int fcsl_handle_saved(request_t *request)
 {
-    const kept_t *kept = &request->commander->kept;
+    const checkpoint_buffer_t *checkpoint = &request->protocol->checkpoint;
     uint64_t at = 0;
-    if (fcsl_request_number(request, "at", kept->room, &at) != 0) {
+    if (fcsl_request_number(request, "at", checkpoint->room, &at) != 0) {
         return -1;
     }
     if (!is_own(request)) {
         return refuse_foreign(request, "no checkpoint of this client is kept: save, or load one");
     }
-    if (!is_whole(kept)) {
-        return fcsl_request_refuse(request, "refused", "load", "%zu of %zu bytes have been loaded", kept->held,
-                                   kept->size);
+    if (!is_whole(checkpoint)) {
+        return fcsl_request_refuse(request, "refused", "load", "%zu of %zu bytes have been loaded", checkpoint->held,
+                                   checkpoint->size);
     }
-    if (at >= kept->size) {
-        return fcsl_request_refuse(request, "bad_request", "", "the checkpoint has %zu bytes", kept->size);
+    if (at >= checkpoint->size) {
+        return fcsl_request_refuse(request, "bad_request", "", "the checkpoint has %zu bytes", checkpoint->size);
     }
-    put_portion(kept, (size_t)at, request->out);
+    put_portion(checkpoint, (size_t)at, request->out);
     return 0;
 }
 
-/* Brings the member "data", of `most` bytes at most, into commander->incoming; returns how many, or -1 after a refusal. */
+/* Brings the member "data", of `most` bytes at most, into protocol->incoming; returns how many, or -1 after a refusal. */
 static ptrdiff_t take_data(request_t *request, size_t most)
 {
     const char *data = fcsl_request_text(request, "data", REQUEST_BYTES_MAX);
@@ -178,7 +179,7 @@ static ptrdiff_t take_data(request_t *request, size_t most)
         return fcsl_request_refuse(request, "bad_value", "",
                                    "\"data\" has %td bytes, and %zu are still to come at most", bytes, most);
     }
-    if (bytes < 0 || fcsl_base64_decode(data, length, request->commander->incoming, (size_t)bytes) != 0) {
+    if (bytes < 0 || fcsl_base64_decode(data, length, request->protocol->incoming, (size_t)bytes) != 0) {
         return fcsl_request_refuse(request, "bad_value", "", "\"data\" is not base64 text");
     }
     return bytes;
@@ -187,24 +188,24 @@ static ptrdiff_t take_data(request_t *request, size_t most)
 /* Of `bytes`, how many there will be, and `at`, how many have come. 0, or -1 after a refusal. */
 static int read_extent(request_t *request, uint64_t *size, uint64_t *at)
 {
-    const kept_t *kept = &request->commander->kept;
+    const checkpoint_buffer_t *checkpoint = &request->protocol->checkpoint;
     if (fcsl_request_number(request, "bytes", INT64_MAX, size) != 0 ||
         fcsl_request_number(request, "at", INT64_MAX, at) != 0) {
         return -1;
     }
-    return *size < kept->room
+    return *size < checkpoint->room
                ? 0
                : fcsl_request_refuse(request, "refused", "",
                                      "a checkpoint of machine '%s' has at most %zu bytes: one of %" PRIu64
                                      " is of another machine, or of another layout",
-                                     machine_of(request->commander)->name, kept->room - 1u, *size);
+                                     machine_of(request->protocol)->name, checkpoint->room - 1u, *size);
 }
 
 int fcsl_handle_load(request_t *request)
 {
-    kept_t *kept = &request->commander->kept;
+    checkpoint_buffer_t *checkpoint = &request->protocol->checkpoint;
     const int begins = fcsl_json_member(&request->json, 0, "bytes") != 0;
-    uint64_t size = kept->size;
+    uint64_t size = checkpoint->size;
     uint64_t at = 0;
     if (fcsl_request_machine(request) == NULL || read_extent(request, &size, &at) != 0) {
         return -1;
@@ -212,7 +213,7 @@ int fcsl_handle_load(request_t *request)
     if (!begins && !is_own(request)) {
         return refuse_foreign(request, "nothing of this client is being loaded: begin with \"bytes\"");
     }
-    const size_t held = begins ? 0 : kept->held;
+    const size_t held = begins ? 0 : checkpoint->held;
     if (at != held) {
         return fcsl_request_refuse(request, "bad_request", "", "%zu bytes have come, so \"at\" must %s", held,
                                    held == 0 ? "be left out" : "be that");
@@ -222,33 +223,33 @@ int fcsl_handle_load(request_t *request)
         return -1;
     }
     if (begins) { /* what another client had there is its no more */
-        request->session->checkpoint_number = ++kept->number;
-        kept->size = (size_t)size;
+        request->client->checkpoint_number = ++checkpoint->number;
+        checkpoint->size = (size_t)size;
     }
-    memcpy(kept->bytes + held, request->commander->incoming, (size_t)taken);
-    kept->held = held + (size_t)taken;
-    fcsl_json_raw(request->out, ",\"loaded\":%zu", kept->held);
+    memcpy(checkpoint->bytes + held, request->protocol->incoming, (size_t)taken);
+    checkpoint->held = held + (size_t)taken;
+    fcsl_json_raw(request->out, ",\"loaded\":%zu", checkpoint->held);
     return 0;
 }
 
 /* ---- restore ------------------------------------------------------------------------------------------------------- */
 
-/* Reads the file into commander->incoming; returns its bytes, or -1 after a refusal. */
+/* Reads the file into protocol->incoming; returns its bytes, or -1 after a refusal. */
 static ptrdiff_t take_file(request_t *request, const char *name)
 {
-    const commander_t *commander = request->commander;
+    const protocol_t *protocol = request->protocol;
     char path[FILE_PATH_BYTES];
     fcsl_error_t error;
-    join(commander, name, path);
-    const ptrdiff_t size = fcsl_checkpoint_read(path, 0, commander->incoming, commander->kept.room, &error);
+    join(protocol, name, path);
+    const ptrdiff_t size = fcsl_checkpoint_read(path, 0, protocol->incoming, protocol->checkpoint.room, &error);
     return size >= 0 ? size : fcsl_request_refuse(request, "refused", "", "%s", error.text);
 }
 
 /* What is to be restored, and how many bytes; null after a refusal. What is kept stays as it is. */
 static const uint8_t *find(request_t *request, size_t *size)
 {
-    const commander_t *commander = request->commander;
-    const kept_t *kept = &commander->kept;
+    const protocol_t *protocol = request->protocol;
+    const checkpoint_buffer_t *checkpoint = &protocol->checkpoint;
     const int has_data = fcsl_json_member(&request->json, 0, "data") != 0;
     char name[FILE_BYTES];
     if (read_name(request, name) != 0) {
@@ -259,21 +260,21 @@ static const uint8_t *find(request_t *request, size_t *size)
         return NULL;
     }
     if (has_data || name[0] != '\0') {
-        const ptrdiff_t taken = has_data ? take_data(request, kept->room) : take_file(request, name);
+        const ptrdiff_t taken = has_data ? take_data(request, checkpoint->room) : take_file(request, name);
         *size = taken >= 0 ? (size_t)taken : 0;
-        return taken >= 0 ? commander->incoming : NULL;
+        return taken >= 0 ? protocol->incoming : NULL;
     }
     if (!is_own(request)) {
         (void)refuse_foreign(request, "restore needs \"data\" or \"file\", or what was saved or loaded before");
         return NULL;
     }
-    if (!is_whole(kept)) {
-        (void)fcsl_request_refuse(request, "refused", "load", "%zu of %zu bytes have been loaded", kept->held,
-                                  kept->size);
+    if (!is_whole(checkpoint)) {
+        (void)fcsl_request_refuse(request, "refused", "load", "%zu of %zu bytes have been loaded", checkpoint->held,
+                                  checkpoint->size);
         return NULL;
     }
-    *size = kept->size;
-    return kept->bytes;
+    *size = checkpoint->size;
+    return checkpoint->bytes;
 }
 
 int fcsl_handle_restore(request_t *request)
@@ -294,7 +295,7 @@ int fcsl_handle_restore(request_t *request)
         return fcsl_request_refuse(request, "refused", "", "%s", error.text);
     }
     command_t *command = fcsl_request_prepare(request, COMMAND_RESTORE);
-    command->block = request->commander->catalog.machine;
+    command->block = request->protocol->catalog.machine;
     memcpy(command->bytes, checkpoint.data, machine->size);
     fcsl_checkpoint_hardware(&checkpoint, command->hardware);
     return 0;

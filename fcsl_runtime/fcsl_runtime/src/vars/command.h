@@ -1,14 +1,14 @@
 /* SPDX-License-Identifier: Apache-2.0
  *
- * Where a command meets the step thread: one slot, looked at between ticks. The step thread takes no lock; it looks at a
- * word, acts, and wakes the server, which never waits for it: there is at most one command under way.
+ * A command, and the one slot through which it reaches the step thread. The step thread takes no lock; between ticks it reads a
+ * word, executes, and wakes the server, which never waits for it: there is at most one command under way.
  *
- * `phase` says to whom the command belongs: FREE, and again once ANSWERED, to the server; POSTED to the step thread. Only the owner
+ * `phase` says to whom the command belongs: SLOT_FREE, and again once SLOT_DONE, to the server; SLOT_POSTED to the step thread. Only the owner
  * touches it, and gives it away by storing the next phase with release; the other one loads that with acquire before it reads the
  * command. So its bytes need no atomic operations. A second server thread, or a second step thread, breaks it.
  */
-#ifndef FCSL_VARS_MAILBOX_H
-#define FCSL_VARS_MAILBOX_H
+#ifndef FCSL_VARS_COMMAND_H
+#define FCSL_VARS_COMMAND_H
 
 #include <semaphore.h>
 #include <stdatomic.h>
@@ -72,23 +72,23 @@ typedef struct {
     command_t command;
     atomic_int phase;
     sem_t arrived;
-} mailbox_t;
+} slot_t;
 
 /* `bytes`: room for the values of a command. */
-int fcsl_mailbox_open(mailbox_t *mailbox, size_t bytes);
-void fcsl_mailbox_free(mailbox_t *mailbox);
+int fcsl_slot_open(slot_t *slot, size_t bytes);
+void fcsl_slot_free(slot_t *slot);
 
 /* Server: whether a command may be prepared; hands it over; whether it is done (and then takes the slot back). */
-int fcsl_mailbox_is_free(const mailbox_t *mailbox);
-void fcsl_mailbox_post(mailbox_t *mailbox);
-int fcsl_mailbox_done(mailbox_t *mailbox);
+int fcsl_slot_is_free(const slot_t *slot);
+void fcsl_slot_post(slot_t *slot);
+int fcsl_slot_take_back(slot_t *slot);
 
 /* Step thread: the waiting command, or null. Every command taken must be answered. */
-command_t *fcsl_mailbox_take(mailbox_t *mailbox);
-void fcsl_mailbox_answer(mailbox_t *mailbox);
+command_t *fcsl_slot_take(slot_t *slot);
+void fcsl_slot_finish(slot_t *slot);
 /* Step thread: sleeps until a command arrives, but at most until `deadline_ns` of the monotonic clock. */
-void fcsl_mailbox_wait(mailbox_t *mailbox, uint64_t deadline_ns);
+void fcsl_slot_wait(slot_t *slot, uint64_t deadline_ns);
 /* Any thread: ends that sleep. */
-void fcsl_mailbox_wake(mailbox_t *mailbox);
+void fcsl_slot_wake(slot_t *slot);
 
-#endif /* FCSL_VARS_MAILBOX_H */
+#endif /* FCSL_VARS_COMMAND_H */

@@ -5,12 +5,12 @@
 #include <inttypes.h>
 #include <string.h>
 
-#include "request.h"
+#include "protocol.h"
 #include "value.h"
 
 int fcsl_handle_list(request_t *request)
 {
-    const catalog_t *catalog = &request->commander->catalog;
+    const catalog_t *catalog = &request->protocol->catalog;
     const uint32_t token = fcsl_json_member(&request->json, 0, "prefix");
     const char *prefix = token == 0 ? "" : fcsl_request_text(request, "prefix", NAME_BYTES);
     if (prefix == NULL) {
@@ -69,7 +69,7 @@ static const char *block_prefix(const void *table, uint32_t i)
 
 static int describe_all(request_t *request)
 {
-    const catalog_t *catalog = &request->commander->catalog;
+    const catalog_t *catalog = &request->protocol->catalog;
     json_out_t *out = request->out;
     if (catalog->machine < catalog->block_count) {
         const fcsl_machine_t *machine = catalog->blocks[catalog->machine].machine;
@@ -122,7 +122,7 @@ int fcsl_handle_describe(request_t *request)
         return -1;
     }
     /* Of an array of structs the one that is named; of a slice, the first. */
-    const catalog_t *catalog = &request->commander->catalog;
+    const catalog_t *catalog = &request->protocol->catalog;
     const uint32_t block = target.entry->block;
     const uint32_t field = target.entry->field + (uint32_t)target.view.fields;
     target = fcsl_catalog_target(catalog, fcsl_catalog_field(catalog, block, field));

@@ -1,6 +1,6 @@
 /* SPDX-License-Identifier: Apache-2.0
  *
- * The variable server's end on the step thread.
+ * Executes commands on the step thread.
  */
 #define _GNU_SOURCE
 #include <stdio.h>
@@ -28,7 +28,7 @@ static void set_all(const fcsl_vars_t *vars, const command_t *command)
     for (uint32_t i = 0; i < command->write_count; i++) {
         const write_t *write = &command->writes[i];
         const uint8_t *bytes = command->bytes + write->at;
-        if (vars->commander.catalog.blocks[write->block].machine != NULL) {
+        if (vars->protocol.catalog.blocks[write->block].machine != NULL) {
             fcsl_run_set_checked(host->run, write->field, write->element, bytes, write->size);
         } else {
             host->set(host->ctx, write->block, write->field, write->element, bytes, write->size);
@@ -130,33 +130,33 @@ static fcsl_vars_status_t act(fcsl_vars_t *vars, command_t *command)
 
 void fcsl_vars_serve(fcsl_vars_t *vars)
 {
-    command_t *command = fcsl_mailbox_take(&vars->mailbox);
+    command_t *command = fcsl_slot_take(&vars->slot);
     if (command == NULL) {
         return;
     }
     if (command->kind == COMMAND_SAVE && command->file[0] != '\0') {
-        fcsl_vars_leave(vars); /* the server's thread waits for the disk */
+        fcsl_vars_stop_serving(vars); /* the server's thread waits for the disk */
     }
-    const int attends = fcsl_vars_begin_work(vars);
+    const int serves = fcsl_vars_begin_command(vars);
     command->status = act(vars, command);
     vars->host.publish(vars->host.ctx);
     command->published = fcsl_history_published(vars->history);
-    const int replies = attends && fcsl_vars_end_work(vars);
-    fcsl_mailbox_answer(&vars->mailbox);
+    const int replies = serves && fcsl_vars_end_command(vars);
+    fcsl_slot_finish(&vars->slot);
     if (replies) {
-        fcsl_vars_serve_command(vars, fcsl_monotonic_ns());
+        fcsl_vars_reply_command(vars, fcsl_monotonic_ns());
     } else {
-        fcsl_vars_call(vars);
+        fcsl_vars_wake_loop(vars);
     }
 }
 
 void fcsl_vars_wait(fcsl_vars_t *vars, uint64_t deadline_ns)
 {
-    fcsl_mailbox_wait(&vars->mailbox, deadline_ns);
+    fcsl_slot_wait(&vars->slot, deadline_ns);
 }
 
 void fcsl_vars_wake(fcsl_vars_t *vars)
 {
-    fcsl_mailbox_wake(&vars->mailbox);
-    fcsl_vars_call(vars);
+    fcsl_slot_wake(&vars->slot);
+    fcsl_vars_wake_loop(vars);
 }

@@ -5,7 +5,7 @@
 #include <inttypes.h>
 #include <string.h>
 
-#include "request.h"
+#include "protocol.h"
 
 /* Fills the paths; -1 after a refusal. */
 static int read_paths(request_t *request, subscription_t *subscription)
@@ -19,7 +19,7 @@ static int read_paths(request_t *request, subscription_t *subscription)
         if (fcsl_request_target(request, token, &subscription->targets[i]) != 0) {
             return -1;
         }
-        strcpy(subscription->paths + (size_t)i * PATH_BYTES_MAX, request->commander->text);
+        strcpy(subscription->paths + (size_t)i * PATH_BYTES_MAX, request->protocol->text);
         token = request->json.tokens[token].next;
     }
     subscription->count = count;
@@ -45,7 +45,7 @@ int fcsl_handle_subscribe(request_t *request)
     uint32_t number = 0;
     for (uint32_t i = 0; i < SUBSCRIPTIONS_MAX && subscription == NULL; i++) {
         number = i + 1u;
-        subscription = request->session->subscriptions[i].number == 0 ? &request->session->subscriptions[i] : NULL;
+        subscription = request->client->subscriptions[i].number == 0 ? &request->client->subscriptions[i] : NULL;
     }
     if (subscription == NULL) {
         return fcsl_request_refuse(request, "too_many_subscriptions", "unsubscribe",
@@ -65,9 +65,9 @@ int fcsl_handle_subscribe(request_t *request)
                                    subscription->bytes, SAMPLE_BYTES_MAX,
                                    subscription->binary ? "" : ", or ask for \"format\":\"binary\"");
     }
-    fcsl_subscription_begin(subscription, request->commander->moment.tick);
+    fcsl_subscription_begin(subscription, request->protocol->moment.tick);
     subscription->number = number;
-    fcsl_json_raw(request->out, ",\"tick\":%" PRIu64 ",\"subscription\":%" PRIu32, request->commander->moment.tick,
+    fcsl_json_raw(request->out, ",\"tick\":%" PRIu64 ",\"subscription\":%" PRIu32, request->protocol->moment.tick,
                   number);
     return 0;
 }
@@ -78,10 +78,10 @@ int fcsl_handle_unsubscribe(request_t *request)
     if (fcsl_request_number(request, "subscription", SUBSCRIPTIONS_MAX, &number) != 0) {
         return -1;
     }
-    if (number == 0 || request->session->subscriptions[number - 1u].number == 0) {
+    if (number == 0 || request->client->subscriptions[number - 1u].number == 0) {
         return fcsl_request_refuse(request, "bad_request", "", "this client has no such \"subscription\"");
     }
-    request->session->subscriptions[number - 1u].number = 0;
-    fcsl_json_raw(request->out, ",\"lost\":%" PRIu64, request->session->subscriptions[number - 1u].lost);
+    request->client->subscriptions[number - 1u].number = 0;
+    fcsl_json_raw(request->out, ",\"lost\":%" PRIu64, request->client->subscriptions[number - 1u].lost);
     return 0;
 }

@@ -6,7 +6,7 @@
 
 #include "machine/fault_place.h"
 #include "run/lost_requests.h"
-#include "request.h"
+#include "protocol.h"
 
 void fcsl_vars_number(fcsl_vars_out_t *out, const char *name, uint64_t value)
 {
@@ -90,22 +90,22 @@ static void put_fault_places(json_out_t *out, const fcsl_machine_t *machine, con
 
 int fcsl_handle_stats(request_t *request)
 {
-    const commander_t *commander = request->commander;
-    const catalog_t *catalog = &commander->catalog;
-    const service_counters_t *service = commander->counters;
+    const protocol_t *protocol = request->protocol;
+    const catalog_t *catalog = &protocol->catalog;
+    const service_counters_t *service = protocol->counters;
     json_out_t *out = request->out;
     if (fcsl_request_snapshot(request) != 0) {
         return -1;
     }
-    fcsl_request_status(commander, out);
-    if (commander->host->stats != NULL) {
-        commander->host->stats(commander->host->ctx, out);
+    fcsl_request_status(protocol, out);
+    if (protocol->host->stats != NULL) {
+        protocol->host->stats(protocol->host->ctx, out);
     }
     if (catalog->machine < catalog->block_count) {
         uint64_t faults = 0;
         uint64_t overruns = 0;
         const fcsl_machine_t *machine = catalog->blocks[catalog->machine].machine;
-        const uint8_t *data = commander->snapshot + catalog->bases[catalog->machine];
+        const uint8_t *data = protocol->snapshot + catalog->bases[catalog->machine];
         fcsl_tick_stats_faults(machine, data, &faults, &overruns);
         fcsl_vars_number(out, "faults", faults);
         fcsl_vars_number(out, "overruns", overruns);
