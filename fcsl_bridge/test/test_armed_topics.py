@@ -83,18 +83,18 @@ def test_a_disarmed_machine_publishes_safe_values(
     publisher = Publisher()
     monkeypatch.setattr(mapped_topics.qos, "publisher", lambda *_: publisher)
     run = opened(tmp_path, **keys)
-    forward = QueuePublisher(lossless=False)
-    messages = RunTopics(run, forward.queue)
-    mapped_topics.Outputs(None, run, forward, messages, ())  # type: ignore[arg-type]  # the node is for publishers only
+    queue_publisher = QueuePublisher(lossless=False)
+    messages = RunTopics(run, queue_publisher.queue)
+    mapped_topics.Outputs(None, run, queue_publisher, messages, ())  # type: ignore[arg-type]  # the node is for publishers only
     go = run.machine.fields["pilot.inputs.go"].index
     for on in (False, True, True, False):
         run.set(go, 0, bytes([on]))
         run.step(1)
         messages.put(0)
-        forward.all()
+        queue_publisher.all()
     assert publisher.values == published
     messages.close()
-    forward.close()
+    queue_publisher.close()
     run.close()
 
 
@@ -109,20 +109,20 @@ def test_reports_are_published_armed_or_not(tmp_path: Path, monkeypatch: pytest.
     report = {**FORCE, "name": "other", "id": 2, "field": "pilot.outputs.other", "direction": "report"}
     report["ros"] = {**FORCE["ros"], "topic": "estimate"}
     run = opened(tmp_path, channels=[{**FORCE, "safe": -1.0}, report], arm="pilot.armed")
-    forward = QueuePublisher(lossless=False)
-    messages = RunTopics(run, forward.queue)
-    outputs = mapped_topics.Outputs(None, run, forward, messages, ())  # type: ignore[arg-type]  # the node is for publishers only
+    queue_publisher = QueuePublisher(lossless=False)
+    messages = RunTopics(run, queue_publisher.queue)
+    outputs = mapped_topics.Outputs(None, run, queue_publisher, messages, ())  # type: ignore[arg-type]  # the node is for publishers only
     fields = run.machine.fields
     for on in (False, True, False):
         run.set(fields["pilot.inputs.go"].index, 0, bytes([on]))
         run.set(fields["pilot.outputs.other"].index, 0, struct.pack("<d", 7.0 + on))
         run.step(1)
         messages.put(0)
-        forward.all()
+        queue_publisher.all()
     outputs.make_safe(0)
     assert [p.values for p in publishers] == [[-1.0, 3.0, -1.0, -1.0], [7.0, 8.0, 7.0]]
     messages.close()
-    forward.close()
+    queue_publisher.close()
     run.close()
 
 
@@ -137,11 +137,11 @@ def test_the_end_of_ticking_waits_once_for_all_actuators(
     monkeypatch.setattr(mapped_topics.qos, "publisher", lambda *_: publisher)
     other = {**FORCE, "name": "other", "id": 2, "field": "pilot.outputs.other"}
     run = opened(tmp_path, channels=[{**FORCE, "safe": -1.0}, {**other, "safe": -2.0}], **arm)
-    forward = QueuePublisher(lossless=False)
-    messages = RunTopics(run, forward.queue)
-    outputs = mapped_topics.Outputs(None, run, forward, messages, ())  # type: ignore[arg-type]  # the node is for publishers only
+    queue_publisher = QueuePublisher(lossless=False)
+    messages = RunTopics(run, queue_publisher.queue)
+    outputs = mapped_topics.Outputs(None, run, queue_publisher, messages, ())  # type: ignore[arg-type]  # the node is for publishers only
     outputs.make_safe(0)
     assert publisher.values == published and publisher.waited_s <= 0.2
     messages.close()
-    forward.close()
+    queue_publisher.close()
     run.close()

@@ -71,17 +71,17 @@ def test_ticks_are_those_of_the_clock(domain: Domain, library: Path) -> None:
 def test_a_message_that_diagnostics_take_makes_its_ticks(monkeypatch: pytest.MonkeyPatch) -> None:
     """Whoever asks for the time takes what /clock said; a slow clock says nothing more for a second."""
     made: list[int] = []
-    clock, turns = SimpleNamespace(heard=0, wait=lambda _: None), iter(range(3))
+    clock, turns = SimpleNamespace(received=0, wait=lambda _: None), iter(range(3))
 
     def ask_for_the_time(_: ClockLoop) -> None:
-        clock.heard = 1
+        clock.received = 1
 
     def serve() -> None:
         if made or next(turns, None) is None:
             raise Stopped
 
     loop = ClockLoop.__new__(ClockLoop)
-    loop._time, loop._ticks, loop._heard, loop._serve = clock, ClockTicks(HZ, 1), 0, serve  # type: ignore[assignment]
+    loop._time, loop._ticks, loop._received, loop._serve = clock, ClockTicks(HZ, 1), 0, serve  # type: ignore[assignment]
     monkeypatch.setattr(ClockLoop, "_diagnose", ask_for_the_time)
     monkeypatch.setattr(ClockLoop, "now_ns", lambda _: NS)
     monkeypatch.setattr(ClockLoop, "_tick", lambda _, due_ns, now_ns: made.append(due_ns))

@@ -285,7 +285,7 @@ def test_a_watcher_learns_of_a_dead_controller(domain: Domain) -> None:
     sim.tick()
     client._listener.until(lambda: watcher.alive[-1:] == [1] and bool(watcher.states))
     count, paused_until_s = len(watcher.states), time.monotonic() + 5.0
-    client._listener.until(lambda: sim.sim.alive() or time.monotonic() > paused_until_s)
+    client._listener.until(lambda: sim.sim.keep_alive() or time.monotonic() > paused_until_s)
     assert watcher.alive[-1:] == [1] and not watcher.missed
     assert len(watcher.states) - count >= 5, "the state is sent again at least once a second"
     assert len({bytes(state[: state.rindex(b"\0")]) for state in watcher.states[count:]}) == 1, "the same one"

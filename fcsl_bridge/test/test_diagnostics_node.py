@@ -203,24 +203,24 @@ def test_a_sensor(primary: int, conditions: tuple[int, int], level: bytes, text:
     top, bottom = conditions
     counters = {"commands": 7, "link.port1.sent": 3, "sensors.imu.primary": primary}
     counters |= {"sensors.imu.condition.top": top, "sensors.imu.condition.bottom": bottom}
-    (status,) = BoardStatus("rover", "rover").look(counters)
+    (status,) = BoardStatus("rover", "rover").statuses(counters)
     assert (status.name, status.level, status.message) == ("rover: sensor imu", level, text)
 
 
 def test_counts_of_lost_requests_grow() -> None:
     """What was lost before the first look is old."""
     status = LostRequestStatus("rover", "rover")
-    assert status.look("RUN", {}) == []
+    assert status.statuses("RUN", {}) == []
     for lost, text in (
         ({"A -> B": 2}, "2 lost requests A -> B"),
         ({"A -> B": 2}, ""),
         ({"A -> B": 5, "A -> C": 1}, "3 lost requests A -> B; 1 lost requests A -> C"),
         ({"A -> B": 1}, ""),  # a checkpoint was restored
     ):
-        (found,) = status.look("RUN", lost)
+        (found,) = status.statuses("RUN", lost)
         assert (found.level, found.message) == ((WARN, f"RUN; {text}") if text else (OK, "RUN"))
         assert values(found) == {f"lost requests {name}": str(count) for name, count in lost.items()}
-    (found,) = LostRequestStatus("rover", "rover").look("RUN", {"A -> B": 2})
+    (found,) = LostRequestStatus("rover", "rover").statuses("RUN", {"A -> B": 2})
     assert (found.name, found.level, found.message) == ("rover", OK, "RUN")
 
 
@@ -239,7 +239,7 @@ def test_counts_of_a_device_grow() -> None:
         ((1, 60, 7, 5, 2, 80, 6, 17, 0), OK, "there"),
     ):
         counts = dict(zip(names, numbers, strict=True))
-        (status,) = board.look({f"devices.gyro.{name}": count for name, count in counts.items()})
+        (status,) = board.statuses({f"devices.gyro.{name}": count for name, count in counts.items()})
         assert (status.name, status.level, status.message) == ("rover: device gyro", level, text)
         why = text.partition("silent: ")[2]
         assert values(status) == {name: str(count) for name, count in counts.items()} | {"why": why}

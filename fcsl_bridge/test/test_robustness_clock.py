@@ -62,7 +62,7 @@ def test_a_process_that_was_held_up_does_not_take_that_for_a_set_clock() -> None
 
 def test_simulated_time_is_what_clock_said_last(monkeypatch: pytest.MonkeyPatch) -> None:
     waiting: list[bytes] = []
-    monkeypatch.setattr(ros_time, "Polled", lambda *_: SimpleNamespace(take_all=lambda: waiting))
+    monkeypatch.setattr(ros_time, "PolledSubscription", lambda *_: SimpleNamespace(take_all=lambda: waiting))
     ros = RosTime(SystemClock(), simulated=True)
     assert ros.at(time.monotonic_ns()) == 0
     waiting[:] = [struct.pack("<IiI", 0x100, 4, 0), struct.pack("<IiI", 0x100, 5, 7), b"cut"]

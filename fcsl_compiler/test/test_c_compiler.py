@@ -10,7 +10,7 @@ from pathlib import Path
 import pytest
 
 from fcsl_compiler.driver.library import build_library
-from fcsl_compiler.driver.toolchain import CXX, C, ToolchainError, _asked, _version, include_dirs, toolchain
+from fcsl_compiler.driver.toolchain import CXX, C, ToolchainError, _query, _version, include_dirs, toolchain
 
 
 @pytest.fixture
@@ -21,10 +21,10 @@ def tools(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Iterator[Path]:
     monkeypatch.setenv("PATH", str(folder))
     for name in ("CC", "CXX"):
         monkeypatch.delenv(name, raising=False)
-    _asked.cache_clear()
+    _query.cache_clear()
     _version.cache_clear()
     yield folder
-    _asked.cache_clear()
+    _query.cache_clear()
     _version.cache_clear()
 
 

@@ -424,5 +424,5 @@ def test_a_long_compilation_says_so(
 ) -> None:
     said = "fcslc: compiling libcraft.so ...\n"
     assert fcslc(capsys, "build", config, "--name", "craft", "-o", tmp_path / "quick")[2].count(said) <= 1
-    monkeypatch.setattr("fcsl_compiler.cli.progress._PATIENCE_S", 0.0)
+    monkeypatch.setattr("fcsl_compiler.cli.progress._DELAY_S", 0.0)
     assert fcslc(capsys, "build", config, "--name", "craft", "-o", tmp_path / "slow")[2].count(said) == 1

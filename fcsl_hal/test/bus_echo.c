@@ -50,7 +50,7 @@ int main(int argc, char **argv)
         while (fcsl_bus_take(bus, 0, message, &size)) {
             CHECK(fcsl_bus_post(bus, 0, message, size) == 0);
         }
-        alive = fcsl_bus_alive(bus, 0) > alive ? fcsl_bus_alive(bus, 0) : alive;
+        alive = fcsl_bus_token_count(bus, 0) > alive ? fcsl_bus_token_count(bus, 0) : alive;
         (void)fcsl_bus_wait(bus, fcsl_monotonic_ns() + LOOK_NS);
     }
     const fcsl_bus_counters_t counters = counted(bus);

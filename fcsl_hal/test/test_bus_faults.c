@@ -68,7 +68,7 @@ static void post_to_a_frozen_peer(int observer)
     const char *endpoint = free_endpoint();
     const pid_t process = in_process(live, endpoint);
     fcsl_bus_t *bus = open_client(endpoint, observer);
-    WAIT_UNTIL(bus, fcsl_bus_matched(bus, 0) && fcsl_bus_alive(bus, 0) == 1);
+    WAIT_UNTIL(bus, fcsl_bus_matched(bus, 0) && fcsl_bus_token_count(bus, 0) == 1);
     CHECK(kill(process, SIGSTOP) == 0);
     const uint64_t stopped_ns = fcsl_monotonic_ns();
     if (!observer) {
@@ -80,7 +80,7 @@ static void post_to_a_frozen_peer(int observer)
     }
     const uint64_t posted_ns = fcsl_monotonic_ns() - posting_ns;
     CHECK(posted_ns < A_WHILE_NS / 2u);
-    WAIT_UNTIL(bus, fcsl_bus_alive(bus, 0) == 0);
+    WAIT_UNTIL(bus, fcsl_bus_token_count(bus, 0) == 0);
     const uint64_t noticed_ns = fcsl_monotonic_ns() - stopped_ns;
     WAIT_UNTIL(bus, !fcsl_bus_matched(bus, 0) && fcsl_bus_peers(bus) == 0);
     CHECK(noticed_ns < A_WHILE_NS);
@@ -139,10 +139,10 @@ static void test_a_peer_that_is_killed_and_returns(void)
     const pid_t first = in_process(live, endpoint);
     const pid_t second = in_process(live_later, endpoint);
     fcsl_bus_t *bus = open_client(endpoint, 0);
-    WAIT_UNTIL(bus, fcsl_bus_matched(bus, 0) && fcsl_bus_alive(bus, 0) == 1);
+    WAIT_UNTIL(bus, fcsl_bus_matched(bus, 0) && fcsl_bus_token_count(bus, 0) == 1);
     const uint64_t killed_ns = fcsl_monotonic_ns();
     end(first, SIGKILL);
-    WAIT_UNTIL(bus, fcsl_bus_alive(bus, 0) == 0);
+    WAIT_UNTIL(bus, fcsl_bus_token_count(bus, 0) == 0);
     const uint64_t noticed_ns = fcsl_monotonic_ns() - killed_ns;
     CHECK(noticed_ns < A_WHILE_NS);
     WAIT_UNTIL(bus, !fcsl_bus_matched(bus, 0) && fcsl_bus_peers(bus) == 0);
@@ -150,7 +150,7 @@ static void test_a_peer_that_is_killed_and_returns(void)
     WAIT_UNTIL(bus, counted(bus).put == 1);
     const uint64_t started_ns = fcsl_monotonic_ns();
     CHECK(write(may_start[1], "x", 1) == 1);
-    WAIT_UNTIL(bus, fcsl_bus_matched(bus, 0) && fcsl_bus_alive(bus, 0) == 1 && fcsl_bus_peers(bus) == 1);
+    WAIT_UNTIL(bus, fcsl_bus_matched(bus, 0) && fcsl_bus_token_count(bus, 0) == 1 && fcsl_bus_peers(bus) == 1);
     (void)printf("peer killed: noticed after %.3f s; its successor found after %.2f s\n", (double)noticed_ns * 1e-9,
                  (double)(fcsl_monotonic_ns() - started_ns) * 1e-9);
     const fcsl_bus_counters_t counters = counted(bus);

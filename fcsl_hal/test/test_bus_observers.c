@@ -106,7 +106,7 @@ int main(void)
     fcsl_bus_t *control = open_control(control_endpoint);
     fcsl_bus_t *publisher = open_publisher(publisher_endpoint);
     WAIT_UNTIL(control, fcsl_bus_matched(control, 0));
-    WAIT_UNTIL(publisher, fcsl_bus_matched(publisher, 0) && fcsl_bus_alive(publisher, 0) == OBSERVERS);
+    WAIT_UNTIL(publisher, fcsl_bus_matched(publisher, 0) && fcsl_bus_token_count(publisher, 0) == OBSERVERS);
     for (int i = 0; i < OBSERVERS; i++) {
         CHECK(kill(observers[i], SIGSTOP) == 0);
     }
@@ -117,7 +117,7 @@ int main(void)
     while (after < TICKS_AFTER) {
         const uint64_t took_ns = fly_tick(control, publisher, tick++);
         longest_ns = took_ns > longest_ns ? took_ns : longest_ns;
-        after += fcsl_bus_alive(publisher, 0) == 0;
+        after += fcsl_bus_token_count(publisher, 0) == 0;
     }
     (void)printf("%llu ticks while the observers were frozen, the longest %.2f ms\n",
                  (unsigned long long)(tick - after), (double)longest_ns * 1e-6);

@@ -92,7 +92,7 @@ static void step(fcsl_bus_t *bus, uint64_t tick, int waits)
             (void)fcsl_bus_wait(bus, deadline_ns);
         }
     }
-    CHECK(got == tick && size == sizeof got && fcsl_bus_matched(bus, 0) && fcsl_bus_alive(bus, 0) == 0);
+    CHECK(got == tick && size == sizeof got && fcsl_bus_matched(bus, 0) && fcsl_bus_token_count(bus, 0) == 0);
     fcsl_bus_count(bus, &counters);
 }
 

@@ -51,7 +51,7 @@ static fcsl_guard_event_t wait_event(fcsl_guard_server_t *server)
 {
     fcsl_guard_event_t event = FCSL_GUARD_NO_EVENT;
     while (event == FCSL_GUARD_NO_EVENT) {
-        event = fcsl_guard_look(server);
+        event = fcsl_guard_poll(server);
         (void)sched_yield();
     }
     return event;
@@ -184,17 +184,17 @@ static void test_one_flight_program_at_a_time(fcsl_guard_server_t *server, asker
     char wanted[TEXT_BYTES];
     (void)snprintf(wanted, sizeof wanted, "guard '%s' refused: process %ld has its slot", path, (long)getpid());
     CHECK(strcmp(second.error.text, wanted) == 0);
-    CHECK(fcsl_guard_look(server) == FCSL_GUARD_NO_EVENT);
+    CHECK(fcsl_guard_poll(server) == FCSL_GUARD_NO_EVENT);
     /* The next one finds the slot empty, although the last one left a command that was not taken. */
     const fcsl_message_t message = command(&first->machine, 9, 0.75, bytes);
     CHECK(fcsl_guard_command(&first->link, &message, 1) == 0);
     fcsl_guard_disconnect(&first->link);
-    CHECK(fcsl_guard_look(server) == FCSL_GUARD_LEFT);
+    CHECK(fcsl_guard_poll(server) == FCSL_GUARD_LEFT);
     CHECK(join(server, &second) == FCSL_GUARD_JOINED && second.status == 0);
     CHECK(fcsl_guard_take(server, bytes, &size, &time_ns) == 0);
     test_a_command_is_taken_once(server, &second);
     fcsl_guard_disconnect(&second.link);
-    CHECK(fcsl_guard_look(server) == FCSL_GUARD_LEFT);
+    CHECK(fcsl_guard_poll(server) == FCSL_GUARD_LEFT);
 }
 
 static void test_other_sources_are_refused(fcsl_guard_server_t *server)
@@ -217,18 +217,18 @@ static void test_a_killed_program_has_left(fcsl_guard_server_t *server)
         _exit(1);
     }
     CHECK(wait_event(server) == FCSL_GUARD_JOINED && server->client_pid == child);
-    CHECK(fcsl_guard_look(server) == FCSL_GUARD_NO_EVENT);
+    CHECK(fcsl_guard_poll(server) == FCSL_GUARD_NO_EVENT);
     CHECK(kill(child, SIGKILL) == 0 && waitpid(child, NULL, 0) == child);
-    CHECK(fcsl_guard_look(server) == FCSL_GUARD_LEFT);
+    CHECK(fcsl_guard_poll(server) == FCSL_GUARD_LEFT);
 }
 
 static void test_the_end_of_the_guard_is_seen(fcsl_guard_server_t *server)
 {
     asker_t asker = {.machine = machine_of("a hash")};
     CHECK(join(server, &asker) == FCSL_GUARD_JOINED && asker.status == 0);
-    CHECK(fcsl_guard_is_gone(&asker.link) == 0);
+    CHECK(fcsl_guard_has_ended(&asker.link) == 0);
     fcsl_guard_unlisten(server);
-    CHECK(fcsl_guard_is_gone(&asker.link) == 1);
+    CHECK(fcsl_guard_has_ended(&asker.link) == 1);
     uint8_t bytes[TEXT_BYTES];
     const fcsl_message_t message = command(&asker.machine, 1, 1.0, bytes);
     CHECK(fcsl_guard_command(&asker.link, &message, 1) == 0); /* into memory that nobody reads */
@@ -245,7 +245,7 @@ int main(void)
     fcsl_error_t error;
     const fcsl_machine_t machine = machine_of("a hash");
     const fcsl_message_t message = command(&machine, 1, 1.0, bytes);
-    CHECK(fcsl_guard_command(&none, &message, 1) == 0 && fcsl_guard_is_gone(&none) == 0); /* without a guard */
+    CHECK(fcsl_guard_command(&none, &message, 1) == 0 && fcsl_guard_has_ended(&none) == 0); /* without a guard */
 
     CHECK(mkdtemp(folder) != NULL);
     (void)snprintf(path, sizeof path, "%s/slot", folder);

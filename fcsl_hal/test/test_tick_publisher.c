@@ -182,7 +182,7 @@ static void check_ticks(fcsl_tick_publisher_t *publisher, fcsl_bus_t *bus)
     expect_commit(bus, 6, FCSL_SENSOR, 0, 0);
     expect_actuators(bus, 6, 1);
     data.age = 4;
-    CHECK(fcsl_mirror_post(mirror, &data, 7, 70, 1) == 0); /* armed, and a new arming is required */
+    CHECK(fcsl_tick_publisher_post(publisher, &data, 7, 70, 1) == 0); /* armed, and a new arming is required */
     expect_commit(bus, 7, FCSL_SENSOR, 0, 0);
     expect_commands(bus, 7, 0, 1);
     data = (data_t){.altitude = 9.0, .age = 5, .packet = {77, 'x', 'y', 'z'}, .throttle = {0.5f}, .attached = 1};

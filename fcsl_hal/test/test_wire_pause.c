@@ -22,7 +22,7 @@ static void test_a_simulator_that_pauses(void)
     CHECK(fcsl_external_accept(external, WAIT_MS) == FCSL_HAL_OK);
     simulate(external, 0, 3);
     for (int i = 0; i < PAUSE_MS / LOOK_MS; i++) {
-        fcsl_external_alive(external);
+        fcsl_external_keep_alive(external);
         sleep_ms(LOOK_MS);
     }
     simulate(external, 3, 6);

@@ -105,7 +105,7 @@ _PROTOTYPES: dict[str, tuple[type | None, list[type]]] = {
     "fcsl_sim_read_log": (c_int, [ptr, c_char_p]),
     "fcsl_sim_count_commands": (None, [ptr, POINTER(_Commands)]),
     "fcsl_sim_run_together": (c_int64, [POINTER(ptr), c_uint32, c_uint64, c_uint32, POINTER(c_uint32), _ERROR]),
-    "fcsl_sim_alive": (None, [ptr]),
+    "fcsl_sim_keep_alive": (None, [ptr]),
     "fcsl_sim_end": (None, [ptr, c_int]),
     "fcsl_sim_show_clock": (c_int, [ptr, ptr, c_uint32, _ERROR]),
     "fcsl_sim_show_truth": (c_int, [ptr, ptr, c_uint32, c_char_p, c_uint32, c_uint32, _ERROR]),
@@ -427,9 +427,9 @@ class Simulation:
         self._lib.fcsl_sim_count_commands(self.handle(), byref(counters))
         return {name: int(getattr(counters, name)) for name in _COMMANDS}
 
-    def alive(self) -> None:
+    def keep_alive(self) -> None:
         """While no tick is run, called often: the controller waits on."""
-        self._lib.fcsl_sim_alive(self.handle())
+        self._lib.fcsl_sim_keep_alive(self.handle())
 
     def end(self, another_follows: bool) -> None:
         """Tells the controller that the run is over, and whether another one follows."""

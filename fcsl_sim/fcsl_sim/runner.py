@@ -250,7 +250,7 @@ def _fly(sim: Simulation, *, hosted: bool, watcher: Watcher) -> _Flight:
     changes: list[StateChange] = []
     state = sim.state
     begun = time.perf_counter()
-    told = begun
+    reported_s = begun
     while sim.status == "running":
         done = sim.run(_CHUNK_TICKS)
         if hosted and sim.state != state:
@@ -261,8 +261,8 @@ def _fly(sim: Simulation, *, hosted: bool, watcher: Watcher) -> _Flight:
         for line in sim.log():
             print(f"fcsl-sim: {line}", file=sys.stderr, flush=True)
         now = time.perf_counter()
-        if done and now - told > _PROGRESS_PERIOD_S:
-            told = now
+        if done and now - reported_s > _PROGRESS_PERIOD_S:
+            reported_s = now
             at_s, end_s = (sim.machine.time_ns(t) / 1e9 for t in (sim.tick, sim.ticks))
             print(f"simulating: {at_s:.1f} s of at most {end_s:.1f} s", file=sys.stderr, flush=True)
     return _Flight(time.perf_counter() - begun, state if hosted else None, changes)

@@ -19,11 +19,11 @@ from .errors import SimError
 from .native import Simulation, running_call, watch_crashes
 
 #: Between two looks.
-_LOOK_S = 0.25
+_POLL_S = 0.25
 #: Looks at one call after which it hangs: 10 s, of which a stopped process counts none.
-_LOOKS = 40
+_POLLS = 40
 #: After a signal.
-_LOOKS_OF_SIGNAL = 8
+_POLLS_OF_SIGNAL = 8
 _EXIT_FAILED = 2
 
 
@@ -56,13 +56,13 @@ class Watchdog:
         os.close(self._wake)
 
     def _watch(self) -> None:
-        number, entry, looks = 0, -1, 0
-        while not self._over.wait(_LOOK_S):
+        number, entry, polls = 0, -1, 0
+        while not self._over.wait(_POLL_S):
             number = self._signal() or number
             at = running_call()
-            looks = looks + 1 if at is not None and at.entry == entry else 0
+            polls = polls + 1 if at is not None and at.entry == entry else 0
             entry = at.entry if at is not None else -1
-            if at is not None and looks >= (_LOOKS_OF_SIGNAL if number else _LOOKS):
+            if at is not None and polls >= (_POLLS_OF_SIGNAL if number else _POLLS):
                 message = f"`{at.function}` of `{at.instance}` does not return, at {at.time_s:.9f} s"
                 self._end(message, number)
 

@@ -16,7 +16,7 @@ class NameClash:
     def __init__(self, node: Node):
         self._node, self._due_s, self._is_there = node, 0.0, False
 
-    def look(self) -> None:
+    def check(self) -> None:
         if time.monotonic() < self._due_s:
             return
         self._due_s = time.monotonic() + _PERIOD_S

@@ -104,7 +104,7 @@ def run_node(
         given = {_DESCRIBES_TYPES: Parameter(_DESCRIBES_TYPES, value=False)}
         own_name = name
         if called is not None:
-            own_name, parameters = _look_ahead(name, called)
+            own_name, parameters = _read_arguments(name, called)
             given = parameters | given
         node = kind(
             own_name,
@@ -136,7 +136,7 @@ def run_node(
     return 1
 
 
-def _look_ahead(name: str, called: Callable[[Node], str]) -> tuple[str, dict[str, Parameter]]:
+def _read_arguments(name: str, called: Callable[[Node], str]) -> tuple[str, dict[str, Parameter]]:
     """What the node is to be called, and its parameters, which a file may give to `name`."""
     node = Node(
         name,
@@ -266,13 +266,13 @@ def wait_for_subscribers(
     """Returns once each publisher has `count` matched subscriptions. Raises BridgeError with those that lack them, and
     what `meanwhile` raises."""
     deadline = time.monotonic() + timeout_s
-    said = False
+    reported = False
     while True:
         lacking = [p.topic_name for p in publishers if p.get_subscription_count() < count]
         if not lacking:
             return
-        if not said:
-            said = True
+        if not reported:
+            reported = True
             print(f"waiting for {count} subscribers each on {', '.join(lacking)}", flush=True)
         meanwhile()
         if time.monotonic() > deadline:

@@ -37,7 +37,7 @@ class _NeverExecuted(CallbackGroup):
         raise AssertionError("no executor runs a polled subscription")
 
 
-class Polled:
+class PolledSubscription:
     """Raw messages of one topic, taken by the owner. Not thread-safe."""
 
     def __init__(self, node: Node, kind: Any, topic: str, profile: QoSProfile):

@@ -73,15 +73,15 @@ class _LifeCycle:
         self._client = node.create_client(GetState, f"{machine.node}/get_state")
         self._answer: Any = None
 
-    def ask(self) -> None:
+    def request_state(self) -> None:
         if self._answer is None and self._client.service_is_ready():
             self._answer = self._client.call_async(GetState.Request())
 
     @property
     def is_active(self) -> bool:
         """Also of a node that has not answered."""
-        told = self._answer.result() if self._answer is not None and self._answer.done() else None
-        return told is None or told.current_state.id == State.PRIMARY_STATE_ACTIVE
+        reported = self._answer.result() if self._answer is not None and self._answer.done() else None
+        return reported is None or reported.current_state.id == State.PRIMARY_STATE_ACTIVE
 
 
 class Graph:
@@ -119,15 +119,15 @@ class Graph:
         watches: dict[Running, Watch] = {}
         cycles = {}
 
-        def look() -> bool:
+        def poll() -> bool:
             for machine in self.machines():
                 if machine not in watches:
                     watches[machine] = Watch(self._node, machine)
                     cycles[machine] = _LifeCycle(self._node, machine)
-                cycles[machine].ask()
+                cycles[machine].request_state()
             return False
 
-        self.until(look, seconds)
+        self.until(poll, seconds)
         states = {m: watch.states[-1].state if watch.states else "" for m, watch in sorted(watches.items())}
         return {
             m: state if cycles[m].is_active else " ".join((state or "-", "(inactive)")) for m, state in states.items()

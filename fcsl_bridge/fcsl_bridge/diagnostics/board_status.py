@@ -29,7 +29,7 @@ class BoardStatus:
         self._name, self._machine = name, machine
         self._before: dict[str, Counts] = {}
 
-    def look(self, counters: Mapping[str, int]) -> list[DiagnosticStatus]:
+    def statuses(self, counters: Mapping[str, int]) -> list[DiagnosticStatus]:
         """`counters`: the variables under `hal.` (docs/hardware/hal.md), and beside them those of a simulator's wire."""
         found: dict[str, dict[str, Counts]] = {"sensors": {}, "devices": {}}
         for path, value in counters.items():

@@ -20,7 +20,7 @@ class LostRequestStatus:
         self._name, self._machine = name, machine
         self._before: Mapping[str, int] | None = None
 
-    def look(self, state: str, lost: Mapping[str, int]) -> list[DiagnosticStatus]:
+    def statuses(self, state: str, lost: Mapping[str, int]) -> list[DiagnosticStatus]:
         """`lost`: by transition, without the zeros. What was lost before the first look is old."""
         before = lost if self._before is None else self._before
         self._before = lost

@@ -24,7 +24,7 @@ class ClockDrift:
         """Compares from the next call of `look` on."""
         self._clock_ns = 0
 
-    def look(self, tick: int, clock_ns: int) -> None:
+    def check(self, tick: int, clock_ns: int) -> None:
         """`clock_ns`: the time of /clock at tick `tick`, 0 before there is one. Call it often."""
         ticked_ns, went_ns = self._machine.time_ns(tick) - self._machine.time_ns(self._tick), clock_ns - self._clock_ns
         if self._clock_ns == 0 or went_ns < 0 or ticked_ns < 0:

@@ -28,11 +28,11 @@ class ClockLoop(FreeRunning):
     ):
         super().__init__(node, configured, serve, simulated=True)
         self._ticks = ClockTicks(configured.run.machine.tick_hz, options["max_ticks_per_clock"])
-        self._heard = 0  # messages of /clock whose ticks were made
+        self._received = 0  # messages of /clock whose ticks were made
 
     def _start(self) -> None:
         self._ticks.start()
-        self._heard = self._time.heard
+        self._received = self._time.received
 
     def run(self) -> None:
         """Ticks until `serve` raises."""
@@ -41,8 +41,8 @@ class ClockLoop(FreeRunning):
             self._diagnose()
             self._time.wait(SERVE_PERIOD_S)
             now_ns = self.now_ns()
-            if self._time.heard != self._heard:  # also those that were taken while diagnostics asked for the time
-                self._heard = self._time.heard
+            if self._time.received != self._received:  # also those that were taken while diagnostics asked for the time
+                self._received = self._time.received
                 for due_ns in self._ticks.until(now_ns):
                     self._tick(due_ns, now_ns)
 

@@ -62,14 +62,14 @@ class ConfiguredMachine:
         self.run.attach()
         self._initial = self.run.save()
         # Outside lock-step one thread puts and publishes: it must not wait for itself.
-        self.forward = QueuePublisher(lossless=self._lossless and options["wait_for_subscribers"] > 0)
-        self._stack.callback(self.forward.close)
-        self.messages = RunTopics(self.run, self.forward.queue)
+        self.queue_publisher = QueuePublisher(lossless=self._lossless and options["wait_for_subscribers"] > 0)
+        self._stack.callback(self.queue_publisher.close)
+        self.messages = RunTopics(self.run, self.queue_publisher.queue)
         self._stack.callback(self.messages.close)
-        self.outputs = Outputs(node, self.run, self.forward, self.messages, options["tf"] or ())
+        self.outputs = Outputs(node, self.run, self.queue_publisher, self.messages, options["tf"] or ())
         self._stack.callback(self.outputs.close)
         self._stack.callback(StaticFrames(node, self.run.machine.views).close)
-        parts = (self.forward, self.messages, self._log_transition)
+        parts = (self.queue_publisher, self.messages, self._log_transition)
         self.topics = MachineTopics(node, self.run, options["decimate"], *parts)
         self._stack.callback(self.topics.close)
         self.parameters = MachineParameters(node, self.run, given)
@@ -111,12 +111,12 @@ class ConfiguredMachine:
     def show(self, time_ns: int) -> None:
         """Publishes the results of the last completed tick, stamped time_ns."""
         self.messages.put(time_ns)
-        self.forward.all()
+        self.queue_publisher.all()
 
     def show_changes(self, time_ns: int) -> None:
         """Publishes the latched topics whose content has changed, stamped time_ns."""
         self.messages.put_changes(time_ns)
-        self.forward.all()
+        self.queue_publisher.all()
 
     def _log_transition(self, message: bytes) -> None:
         event = deserialize_message(message, TransitionEvent)
@@ -138,7 +138,7 @@ class ConfiguredMachine:
     def troubles(self) -> dict[str, int]:
         return {
             "records dropped": self.run.record_dropped(),
-            "messages dropped": self.forward.queue.dropped,
+            "messages dropped": self.queue_publisher.queue.dropped,
             "hardware failures": self.run.hardware_failures(),
         }
 

@@ -81,7 +81,7 @@ class FreeRunning:
 
     def _warn_of_no_clock(self) -> None:
         """Logs once after each start."""
-        if self._time.simulated and not self._time.heard and time.monotonic() >= self._clockless_at_s:
+        if self._time.simulated and not self._time.received and time.monotonic() >= self._clockless_at_s:
             self._clockless_at_s = math.inf
             self._node.get_logger().warning(f"no message of /clock has come within {_NO_CLOCK_S:g} s: {self._LACKS}")
 

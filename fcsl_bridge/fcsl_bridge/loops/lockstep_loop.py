@@ -25,7 +25,7 @@ from .configured_machine import ConfiguredMachine
 #: How long native code runs before the node's callbacks are served, in ms.
 SLICE_MS = 50
 #: How long it looks for a simulator before that.
-_LOOK_MS = 500
+_POLL_MS = 500
 #: What the HAL counts, and means trouble (docs/hardware/hal.md).
 _TROUBLES = ("messages_dropped", "messages_late", "bus.wrong_size", "bus.strays", "bus.overflowed")
 
@@ -39,8 +39,8 @@ class LockstepLoop:
         self._node, self._configured, self._serve_node = node, configured, serve
         self._endpoint = endpoint(options["bus"])
         where = (f"zenoh:{self._endpoint}", node.get_namespace())
-        self._lockstep = Lockstep(configured.run, configured.messages, configured.forward.queue, *where)
-        self._native = NativeThread(configured.forward)
+        self._lockstep = Lockstep(configured.run, configured.messages, configured.queue_publisher.queue, *where)
+        self._native = NativeThread(configured.queue_publisher)
         self._start_timeout_s, self._timeout_s = options["start_timeout_s"], options["timeout_s"]
         self._timeout_ms = int(1000 * self._timeout_s)
         self._running = False
@@ -68,10 +68,10 @@ class LockstepLoop:
             status = self._native(self._lockstep.run, SLICE_MS)
             self._running = status == "running"
             if status == "gone":
-                self._gone()
-        self._configured.forward.all()
+                self._disconnected()
+        self._configured.queue_publisher.all()
 
-    def _gone(self) -> None:
+    def _disconnected(self) -> None:
         """Another simulator may take the place of this one: it begins a new run."""
         self._lost = self._lockstep.problem
         self._node.get_logger().warning(f"{self._lost}; waiting for another one for {self._timeout_s} s")
@@ -80,7 +80,7 @@ class LockstepLoop:
         """Waits for a simulator, and for its new run."""
         limit_s = self._timeout_s if self._lost else self._start_timeout_s
         deadline = time.monotonic() + limit_s
-        while not self._native(self._lockstep.connect, _LOOK_MS, self._timeout_ms):
+        while not self._native(self._lockstep.connect, _POLL_MS, self._timeout_ms):
             if time.monotonic() > deadline:
                 raise BridgeError(self._lost or f"no simulator within {limit_s} s: {self._lockstep.problem}")
             self._serve()
@@ -101,7 +101,7 @@ class LockstepLoop:
 
     def rest(self) -> None:
         """While inactive: keeps the simulator waiting."""
-        self._lockstep.alive()
+        self._lockstep.keep_alive()
 
     def now_ns(self) -> int:
         """The time that a message of now is stamped with: that of the coming tick."""

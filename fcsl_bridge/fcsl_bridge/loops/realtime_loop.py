@@ -59,7 +59,7 @@ class RealtimeLoop(FreeRunning):
 
     def _diagnose(self) -> None:
         if self._drift is not None:
-            self._drift.look(self._configured.run.tick, self._stamp_ns)
+            self._drift.check(self._configured.run.tick, self._stamp_ns)
         super()._diagnose()
 
     def figures(self) -> Figures:

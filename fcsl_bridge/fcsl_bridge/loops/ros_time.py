@@ -14,7 +14,7 @@ import time
 from rclpy.node import Node
 from rosgraph_msgs.msg import Clock
 
-from ..base.polling import Polled
+from ..base.polling import PolledSubscription
 from ..topics import qos
 
 #: An offset is ignored if reading it took longer than this; a change by more than the second value is a set clock.
@@ -32,9 +32,9 @@ class RosTime:
     def __init__(self, node: Node, simulated: bool):
         self._clock = node.get_clock()
         self.simulated = simulated
-        self._simulated = Polled(node, Clock, "/clock", qos.SENSOR) if simulated else None
+        self._simulated = PolledSubscription(node, Clock, "/clock", qos.SENSOR) if simulated else None
         self._simulated_ns = self._offset_ns = 0
-        self.heard = self.malformed = 0  #: messages of /clock
+        self.received = self.malformed = 0  #: messages of /clock
         self.sets = 0  #: how often follow() detected that the system clock was set
         self.start()
 
@@ -46,13 +46,13 @@ class RosTime:
         """ROS time at that instant, in nanoseconds."""
         if self._simulated is None:
             return monotonic_ns + self._offset_ns
-        for said in self._simulated.take_all():
-            seconds, nanoseconds = _CLOCK.unpack_from(said) if len(said) >= _CLOCK.size else (-1, 0)
+        for message in self._simulated.take_all():
+            seconds, nanoseconds = _CLOCK.unpack_from(message) if len(message) >= _CLOCK.size else (-1, 0)
             if seconds < 0 or nanoseconds >= _NS:
                 self.malformed += 1
             else:
                 self._simulated_ns = seconds * _NS + nanoseconds
-                self.heard += 1
+                self.received += 1
         return self._simulated_ns
 
     def wait(self, timeout_s: float) -> None:

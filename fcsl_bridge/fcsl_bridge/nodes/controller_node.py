@@ -165,13 +165,13 @@ class ControllerNode(LifecycleNode):
     def _waiting(self) -> None:
         self._stop.check()
         assert self._configured is not None
-        self._configured.topics.say_alive()
+        self._configured.topics.keep_alive()
 
     def _end_ticking(self) -> None:
         """The actuators on topics get their safe values: no command follows."""
         ended, self._active = self._active, False
         if ended and self._configured is not None and self._mode is not None:
-            self._configured.forward.all()  # what the last ticks put; commands come before safe values
+            self._configured.queue_publisher.all()  # what the last ticks put; commands come before safe values
             self._configured.outputs.make_safe(self._mode.now_ns())
 
     def _release(self, why: str) -> None:
@@ -257,8 +257,8 @@ class ControllerNode(LifecycleNode):
         if self._configured is None or self._mode is None or self._active:
             return
         self._mode.rest()
-        self._namesake.look()
-        self._configured.topics.say_alive()
+        self._namesake.check()
+        self._configured.topics.keep_alive()
         if self._configured.diagnostics.due(active=False):
             self._configured.diagnostics.publish(self._mode.now_ns(), active=False)
 
@@ -266,8 +266,8 @@ class ControllerNode(LifecycleNode):
         self._housekeeping.serve()
         if not self._active or self._configured is None:
             raise _Inactive
-        self._namesake.look()
-        self._configured.topics.say_alive()
+        self._namesake.check()
+        self._configured.topics.keep_alive()
 
 
 def _check(options: dict[str, Any]) -> None:

@@ -48,7 +48,7 @@ class BoardWatch:
 
     def publish(self) -> None:
         try:
-            self._look()
+            self._poll()
         except VarError as error:
             if error.code not in _ABSENT:
                 raise BridgeError(str(error)) from None
@@ -58,7 +58,7 @@ class BoardWatch:
             message.header.stamp = self._node.get_clock().now().to_msg()
             self._publisher.publish(message)
 
-    def _look(self) -> None:
+    def _poll(self) -> None:
         if self._client is None:
             self._client = VarClient(self._address, self._token, _TIMEOUT_S)
         if self._flight is None:
@@ -73,7 +73,7 @@ class BoardWatch:
         board, requests = self._flight
         counters, stats = self._client.get_value("hal"), self._client.stats()
         lost = stats.get("lost_requests", {})  # a program of an older version does not tell
-        self._statuses = requests.look(stats["state"], lost) + board.look(counters)
+        self._statuses = requests.statuses(stats["state"], lost) + board.statuses(counters)
 
     def _lose(self, why: str) -> None:
         if self._client is not None:

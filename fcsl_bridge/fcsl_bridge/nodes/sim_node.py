@@ -77,31 +77,31 @@ class Simulator:
         self._endpoint = endpoint(options["bus"])
         self._housekeeping = Housekeeping(node, stop)
         self._control = Control(node, self._housekeeping, options["speed"], options["paused"])
-        self._forward = QueuePublisher(lossless=options["wait_for_subscribers"] > 0)
-        self._native = NativeThread(self._forward)
+        self._queue_publisher = QueuePublisher(lossless=options["wait_for_subscribers"] > 0)
+        self._native = NativeThread(self._queue_publisher)
         self._vehicles: list[Vehicle] = []
         self._clock = qos.publisher(node, Clock, "/clock", qos.STREAM)
-        self._clock_topic = self._forward.add(self._clock)
+        self._clock_topic = self._queue_publisher.add(self._clock)
         try:
             for name, config in configs.items():
                 # The first vehicle listens, and the others are its clients: all controllers find theirs at one address.
                 address = f"zenoh-client:{self._endpoint}" if self._vehicles else f"zenoh:{self._endpoint}"
                 # Vehicles of one simulation have the same frames: each has a tree of its own.
                 shown = tf.Chosen(tuple(options["tf"] or ()), below(name, "tf") if len(configs) > 1 else tf.TOPIC)
-                how = (options["decimate"], shown, address, options["timeout_s"], self._forward)
+                how = (options["decimate"], shown, address, options["timeout_s"], self._queue_publisher)
                 self._vehicles.append(Vehicle(node, config, name, *how))
         except BaseException:
             self.close()
             raise
         self._machine = self._vehicles[0].sim.machine
-        self._progress = Progress(node, self._machine, self._forward.queue)
+        self._progress = Progress(node, self._machine, self._queue_publisher.queue)
         self._tick = 0
 
     def close(self) -> None:
         self._native.close()
         for vehicle in reversed(self._vehicles):
             vehicle.close()
-        self._forward.close()
+        self._queue_publisher.close()
         self._housekeeping.close()
 
     def fly(self) -> int:
@@ -113,12 +113,12 @@ class Simulator:
             print(f"{self._machine.name}: waiting for a controller on {self._endpoint}", flush=True)
             self._fly_on()
         except Stopped:
-            self._forward.all()
+            self._queue_publisher.all()
             for vehicle in self._vehicles:
                 vehicle.sim.end(another_follows=False)
             print(self._progress.summary(f"interrupted at tick {self._tick}"))
             return 128 + (self._stop.signal or signal.SIGINT)
-        self._forward.all()
+        self._queue_publisher.all()
         wait_for_receivers((self._clock, *truth), _END_S)
         with suppress(Stopped):  # nothing is left to interrupt
             self._control.end()
@@ -132,18 +132,18 @@ class Simulator:
             try:
                 if not self._meet():
                     self._control.serve()
-                    self._say_alive()
+                    self._keep_alive()
                 elif ticks := self._control.allowed():
                     self._run(ticks)
                 else:
                     self._control.idle()
-                    self._say_alive()
+                    self._keep_alive()
             except Reset:
                 self._begin_again()
-            self._progress.tell(self._tick, self._control, self._vehicles)
+            self._progress.update(self._tick, self._control, self._vehicles)
 
     def _begin_run(self) -> None:
-        self._vehicles[0].sim.show_clock(self._forward.queue, self._clock_topic)
+        self._vehicles[0].sim.show_clock(self._queue_publisher.queue, self._clock_topic)
         for vehicle in self._vehicles:
             vehicle.topics.show(vehicle.sim)
             vehicle.listen()
@@ -172,14 +172,14 @@ class Simulator:
         self._tick += done
         self._control.done(done, self._tick)
 
-    def _say_alive(self) -> None:
+    def _keep_alive(self) -> None:
         """Controllers without a tick wait on."""
         for vehicle in self._vehicles:
             if vehicle.accepted:
-                vehicle.sim.alive()
+                vehicle.sim.keep_alive()
 
     def _begin_again(self) -> None:
-        self._forward.all()
+        self._queue_publisher.all()
         for vehicle in reversed(self._vehicles):
             vehicle.sim.end(another_follows=True)
             vehicle.reset()

@@ -85,7 +85,7 @@ def _matching(publishers: list[Any]) -> QoSProfile:
 
 
 def _count(counter: Counter, executor: SingleThreadedExecutor, stop: Stop, idle_s: float | None) -> None:
-    looked = signalled = 0.0
+    checked = signalled = 0.0
     while True:
         now = time.monotonic()
         quiet_s = now - counter.last if counter.last else 0.0
@@ -94,8 +94,8 @@ def _count(counter: Counter, executor: SingleThreadedExecutor, stop: Stop, idle_
             return
         if idle_s is not None and quiet_s > idle_s:
             return
-        if now - looked > _DISCOVERY_PERIOD_S and not stop.signal:
-            looked = now
+        if now - checked > _DISCOVERY_PERIOD_S and not stop.signal:
+            checked = now
             counter.join()
         executor.spin_once(timeout_sec=_POLL_S)
 

@@ -57,7 +57,7 @@ class Control:
         self._reset = False
         self._budget = self._tick = 0  # ticks allowed while paused; ticks completed
         self._stepped: Future | None = None
-        self._asked_s = -_ANSWER_S  # when somebody asked last
+        self._requested_s = -_ANSWER_S  # when somebody asked last
         group = ReentrantCallbackGroup()  # ~/step is answered later, and must not keep the others waiting
         for name, kind, callback in (
             ("pause", Trigger, self._on_pause),
@@ -135,12 +135,12 @@ class Control:
 
     def _end_step(self, problem: str) -> None:
         if self._stepped is not None:
-            self._asked_s = time.monotonic()
+            self._requested_s = time.monotonic()
             self._stepped.set_result(problem)
             self._stepped = None
 
     def _on_reset(self, request: Trigger.Request, response: Trigger.Response) -> Trigger.Response:
-        self._asked_s = time.monotonic()
+        self._requested_s = time.monotonic()
         self._reset = response.success = True
         response.message = f"a new run begins after {self._tick} ticks"
         return response
@@ -150,7 +150,7 @@ class Control:
         return SetParametersResult(successful=not problem, reason=problem)
 
     def _take_parameters(self, parameters: list[Parameter]) -> None:
-        self._asked_s = time.monotonic()
+        self._requested_s = time.monotonic()
         for parameter in parameters:
             if parameter.name == "speed":
                 self.speed, self.pace_changed = parameter.value, True
@@ -162,6 +162,6 @@ class Control:
         """Ends the simulation: answers a pending ~/step, and gives the last answers time to arrive."""
         self._end_step("the simulation is over")
         self._housekeeping.idle(SERVE_PERIOD_S)
-        until_s = self._asked_s + _ANSWER_S
+        until_s = self._requested_s + _ANSWER_S
         while time.monotonic() < until_s:
             self._housekeeping.idle(SERVE_PERIOD_S)

@@ -42,7 +42,7 @@ class Progress:
         self._name, self._machine = node.get_fully_qualified_name()[1:], machine
         self._publisher = qos.publisher(node, DiagnosticArray, "/diagnostics", qos.EVENT)
         self._begun = self._printed = self._published = 0.0
-        self._told = time.perf_counter()
+        self._updated = time.perf_counter()
         self._tick = self._published_tick = 0
 
     def begin_run(self) -> None:
@@ -50,12 +50,12 @@ class Progress:
         self._begun = 0.0
         self._tick = self._published_tick = 0
 
-    def tell(self, tick: int, control: Control, vehicles: Sequence[Vehicle]) -> None:
+    def update(self, tick: int, control: Control, vehicles: Sequence[Vehicle]) -> None:
         """Reports progress; call it often. `tick` ticks are completed."""
         now = time.perf_counter()
         if tick and not self._begun:
-            self._begun, self._printed = self._told, now  # the first ticks were made since the last call
-        self._tick, self._told = tick, now
+            self._begun, self._printed = self._updated, now  # the first ticks were made since the last call
+        self._tick, self._updated = tick, now
         if now - self._printed > _PRINT_PERIOD_S and tick and not control.paused:
             self._printed = now
             at_s, end_s = self._time_s(tick), self._time_s(max(vehicle.sim.ticks for vehicle in vehicles))
@@ -67,7 +67,7 @@ class Progress:
         """One line for the end of the run."""
         if not self._begun or self._tick < 2:
             return f"{what}: {self._tick} ticks answered"
-        wall_s, time_s = self._told - self._begun, self._time_s(self._tick)
+        wall_s, time_s = self._updated - self._begun, self._time_s(self._tick)
         speed = f"{self._tick / wall_s:.0f} ticks/s, {time_s / wall_s:.1f} times real time"
         return f"{what}: {self._tick} ticks answered, {time_s:.3f} s of flight in {wall_s:.2f} s ({speed})"
 

@@ -46,27 +46,27 @@ class SimTopics:
         name_space: str,
         decimate: int,
         chosen: tf.Chosen,
-        forward: QueuePublisher,
+        queue_publisher: QueuePublisher,
     ):
-        self._decimate, self._queue = decimate, forward.queue
+        self._decimate, self._queue = decimate, queue_publisher.queue
         self.plant_publisher = qos.publisher(node, PlantTruth, below(name_space, "sim/truth"), qos.STREAM)
-        self._plant = forward.add(self.plant_publisher)
+        self._plant = queue_publisher.add(self.plant_publisher)
         self._truth = []
         for topic in truth:
             publisher = qos.publisher(node, message_class(topic.type), below(name_space, topic.name), qos.STREAM)
-            self._truth.append((forward.add(publisher), topic.composer(), topic.instances))
+            self._truth.append((queue_publisher.add(publisher), topic.composer(), topic.instances))
         posed = [tf.Posed(t.name, t.type, t.frame, t.child_frame, t.sources) for t in truth]
         transforms = tf.broadcasts(chosen.topics, posed)
         if transforms:
             publisher = qos.publisher(node, message_class(tf.MESSAGE), chosen.tf_topic, qos.TF)
             instances = {topic.name: topic.instances for topic in truth}
-            self._truth += [(forward.add(publisher), c, instances[name]) for name, c in transforms.items()]
+            self._truth += [(queue_publisher.add(publisher), c, instances[name]) for name, c in transforms.items()]
         self._sensors = []
         for mapped in topics_of(sim.machine):
             if mapped.direction == "sensor":
                 publisher = qos.publisher(node, message_class(mapped.type), below(name_space, mapped.name), qos.STREAM)
                 channels = [channel.index for channel in mapped.channels]
-                self._sensors.append((forward.add(publisher), composer_of(mapped), channels))
+                self._sensors.append((queue_publisher.add(publisher), composer_of(mapped), channels))
 
     def show(self, sim: Simulation) -> None:
         """Makes the simulation, which has made no tick, put the messages of each tick into the publish queue. Keep this object as long

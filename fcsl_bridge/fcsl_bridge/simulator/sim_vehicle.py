@@ -25,7 +25,7 @@ class Vehicle:
         chosen: Chosen,
         address: str,
         timeout_s: float,
-        forward: QueuePublisher,
+        queue_publisher: QueuePublisher,
     ):
         self.name_space = name_space
         self._config, self._address, self._timeout_ms = config, address, int(1000 * timeout_s)
@@ -33,7 +33,7 @@ class Vehicle:
         self._keys = name_space if name_space.startswith("/") else f"{inside}/{name_space}"
         self.accepted = False
         self.sim = Simulation(config.plan, config.tables)
-        self.topics = SimTopics(node, self.sim, config.ros, name_space, decimate, chosen, forward)
+        self.topics = SimTopics(node, self.sim, config.ros, name_space, decimate, chosen, queue_publisher)
 
     def listen(self) -> None:
         """A controller can connect from now on. Raises SimError."""

@@ -16,7 +16,7 @@ from simclient.descriptor import Machine
 from simclient.ros.cdr import Layout, Leaf, fixed_layout
 from simclient.view.signals import Signals, signals_of
 
-from ..base.polling import Polled
+from ..base.polling import PolledSubscription
 from ..errors import BridgeError
 from . import qos
 from .interfaces import instance_class
@@ -39,15 +39,15 @@ class LiveSubscriptions:
     def __init__(self, node: Node, machine: Machine):
         self.layouts: dict[str, Layout] = {}
         self.signals: list[Signals] = []
-        self._outputs: list[Polled] = []
+        self._outputs: list[PolledSubscription] = []
         for instance in machine.instances:
             if instance.published:
                 kind, topic = instance_class(instance), f"{machine.name}/{instance.name}"
-                polled = Polled(node, kind, topic, qos.STREAM)
+                polled = PolledSubscription(node, kind, topic, qos.STREAM)
                 self._describe(polled.topic, instance.name, instance.message_type, instance.message_text)
                 self._outputs.append(polled)
-        self._state = Polled(node, MachineState, f"{machine.name}/state", qos.LATCHED_HISTORY)
-        self._truth = Polled(node, PlantTruth, "sim/truth", qos.STREAM)
+        self._state = PolledSubscription(node, MachineState, f"{machine.name}/state", qos.LATCHED_HISTORY)
+        self._truth = PolledSubscription(node, PlantTruth, "sim/truth", qos.STREAM)
         self.prefix = self.state_topic.rpartition("/")[0]
         self._plant: list[str] = []
 

@@ -30,7 +30,7 @@ from .queue_publisher import QueuePublisher
 #: Latched topics, and their types.
 _LATCHED = {"state": MachineState, "health": InstanceHealth, "faults": FaultCounters}
 #: Of the lease and the deadline that qos.WATCHED has, several.
-_ALIVE_PERIOD_S = 0.5
+_KEEP_ALIVE_S = 0.5
 #: For the receivers of the last messages of a run, in s.
 _END_S = 5.0
 
@@ -46,7 +46,7 @@ class MachineTopics:
         node: Node,
         run: Run,
         decimation: int,
-        forward: QueuePublisher,
+        queue_publisher: QueuePublisher,
         messages: RunTopics,
         transition: Callable[[bytes], None],
     ):
@@ -67,10 +67,10 @@ class MachineTopics:
         self._lived_s = 0.0
         self._state = b""  # the last message
         for topic, publisher in self._latched.items():
-            messages.add_tick_message(forward.add(publisher, self._keep if topic == "state" else None), topic)
-        messages.add_tick_message(forward.add(self._transitions, transition), "transitions")
+            messages.add_tick_message(queue_publisher.add(publisher, self._keep if topic == "state" else None), topic)
+        messages.add_tick_message(queue_publisher.add(self._transitions, transition), "transitions")
         for index, publisher in self._outputs:
-            messages.add_instance(forward.add(publisher), index, decimation)
+            messages.add_instance(queue_publisher.add(publisher), index, decimation)
 
     @property
     def all(self) -> list[Publisher]:
@@ -79,9 +79,9 @@ class MachineTopics:
     def _keep(self, state: bytes) -> None:
         self._state = state
 
-    def say_alive(self) -> None:
+    def keep_alive(self) -> None:
         """Sends the last state again, the same bytes; before the first one, a bare sign of life. Call it often."""
-        if time.monotonic() - self._lived_s < _ALIVE_PERIOD_S:
+        if time.monotonic() - self._lived_s < _KEEP_ALIVE_S:
             return
         self._lived_s = time.monotonic()
         if self._state:

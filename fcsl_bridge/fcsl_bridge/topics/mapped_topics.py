@@ -16,7 +16,7 @@ from simclient.ros.topics import RosTopic, SampleInput, composer_of, sources_of,
 from simclient.run import Run
 
 from ..base.node_main import wait_for_receivers
-from ..base.polling import Polled
+from ..base.polling import PolledSubscription
 from . import qos, tf
 from .interfaces import message_class
 from .queue_publisher import QueuePublisher
@@ -40,7 +40,8 @@ class Inputs:
         topics = [topic for topic in topics_of(run.machine) if topic.direction == "sensor"]
         ready = [(topic, SampleInput(run, topic), message_class(topic.type)) for topic in topics]
         self._inputs = [
-            _Input(node, t, sample_input, Polled(node, kind, t.name, qos.SENSOR)) for t, sample_input, kind in ready
+            _Input(node, t, sample_input, PolledSubscription(node, kind, t.name, qos.SENSOR))
+            for t, sample_input, kind in ready
         ]
 
     def poll(self, now_ns: int, missing: frozenset[str]) -> None:
@@ -95,9 +96,9 @@ _HARMLESS = ("taken", "superseded")
 
 
 class _Input:
-    def __init__(self, node: Node, topic: RosTopic, sample_input: SampleInput, polled: Polled):
+    def __init__(self, node: Node, topic: RosTopic, sample_input: SampleInput, polled: PolledSubscription):
         self._node, self.topic, self._samples, self._polled = node, topic, sample_input, polled
-        self._frame_told = False
+        self._frame_reported = False
         self._superseded = self.contested = 0
         self.odd, self.warned = 0, False
 
@@ -117,12 +118,12 @@ class _Input:
             message = waiting.pop()
             if self._samples.deliver(message, now_ns, missing):
                 break
-            if not self._frame_told and "frame" in self._samples.counts():
-                self._frame_told = True
-                self._tell_frame(message)
+            if not self._frame_reported and "frame" in self._samples.counts():
+                self._frame_reported = True
+                self._report_frame(message)
         self._superseded += len(waiting)
 
-    def _tell_frame(self, data: bytes) -> None:
+    def _report_frame(self, data: bytes) -> None:
         """Logs the frames of the first message that was refused for them."""
         came, wanted = frame_names.differing(data, self.topic.frame, self.topic.child_frame)
         self._node.get_logger().warning(f"{self.name}: refused: its frame is {came}, that of its channels {wanted}")
@@ -143,7 +144,9 @@ class Outputs:
     """Topics of actuators and reports, published at every tick: of actuators their safe values while the machine is
     disarmed. `chosen`: those whose poses go to /tf, too."""
 
-    def __init__(self, node: Node, run: Run, forward: QueuePublisher, messages: RunTopics, chosen: Sequence[str]):
+    def __init__(
+        self, node: Node, run: Run, queue_publisher: QueuePublisher, messages: RunTopics, chosen: Sequence[str]
+    ):
         self._node, self._run, self._messages = node, run, messages
         topics = [topic for topic in topics_of(run.machine) if topic.direction != "sensor"]
         ready = [(t, composer_of(t), message_class(t.type)) for t in topics]
@@ -151,7 +154,7 @@ class Outputs:
             (topic, composer, qos.publisher(node, kind, topic.name, qos.COMMAND)) for topic, composer, kind in ready
         ]
         self._contested = dict.fromkeys((t.name for t in topics), 0)
-        self._numbers = {topic.name: forward.add(publisher) for topic, _, publisher in self._outlets}
+        self._numbers = {topic.name: queue_publisher.add(publisher) for topic, _, publisher in self._outlets}
         for topic, composer, _ in self._outlets:
             messages.add_channels(self._numbers[topic.name], topic.direction, composer)
         directions = {topic.name: topic.direction for topic in topics}
@@ -159,7 +162,7 @@ class Outputs:
         transforms = tf.broadcasts(chosen, posed)
         self._tf = qos.publisher(node, message_class(tf.MESSAGE), tf.TOPIC, qos.TF) if transforms else None
         for name, composer in transforms.items():
-            messages.add_channels(forward.add(self._tf), directions[name], composer)
+            messages.add_channels(queue_publisher.add(self._tf), directions[name], composer)
 
     def make_safe(self, time_ns: int) -> None:
         """Publishes the safe values of a machine that something arms, stamped time_ns, and waits a moment for their

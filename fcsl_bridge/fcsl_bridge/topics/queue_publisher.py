@@ -52,20 +52,20 @@ class QueuePublisher:
 class NativeThread:
     """Makes native calls in a thread of its own, one at a time, and publishes meanwhile what they put into the publish queue."""
 
-    def __init__(self, forward: QueuePublisher):
-        self._forward = forward
+    def __init__(self, queue_publisher: QueuePublisher):
+        self._queue_publisher = queue_publisher
         self._pool = ThreadPoolExecutor(1)
 
     def __call__(self, call: Callable[..., _T], *arguments: Any) -> _T:
         """Returns or raises what the call does."""
         future: Future[_T] = self._pool.submit(call, *arguments)
-        future.add_done_callback(lambda _: self._forward.queue.wake())
+        future.add_done_callback(lambda _: self._queue_publisher.queue.wake())
         try:
             while not future.done():
-                self._forward.some(wait=True)
+                self._queue_publisher.some(wait=True)
         finally:
             while not future.done():  # publishing failed, and the call may wait for room
-                list(self._forward.queue.take(wait=True))
+                list(self._queue_publisher.queue.take(wait=True))
         return future.result()
 
     def close(self) -> None:

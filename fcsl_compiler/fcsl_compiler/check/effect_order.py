@@ -82,7 +82,7 @@ class Hoister:
         base = self.expr(e.base, out)
         assert isinstance(base, ir.Place)
         if any(map(reaches_outside, ir.children(e)[1:])):
-            self.look_up(base, out)
+            self.read_checked(base, out)
         if isinstance(e, ir.Element):
             return replace(e, base=base, indices=self._in_order(e.indices, out))
         if isinstance(e, ir.Slice):
@@ -92,7 +92,7 @@ class Hoister:
             return replace(e, base=base, subscripts=subscripts)
         return replace(e, base=base)
 
-    def look_up(self, place: ir.Place, out: list[ir.Stmt]) -> None:
+    def read_checked(self, place: ir.Place, out: list[ir.Stmt]) -> None:
         """Reads one scalar of a place that may be out of range. A fault then occurs before later subscripts are
         evaluated."""
         if not can_fault(place):

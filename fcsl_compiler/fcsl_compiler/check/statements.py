@@ -163,14 +163,14 @@ class BodyChecker:
             whole = self.expr.check(value)
             whole_is_new = reaches_outside(whole) or not isinstance(whole, ir.Place)
             if isinstance(whole.type, Array | Results) and whole_is_new:
-                whole = self._aside(whole, out)  # computed once, however many targets there are
+                whole = self._to_local(whole, out)  # computed once, however many targets there are
             values = self._rows(whole, len(targets), span)
         if (
             self._reads_a_target(targets, values)
             or any(map(reaches_outside, values))
             or (any(map(can_fault, values[1:])) and any(map(self._may_fault, targets[:-1])))
         ):
-            values = [self._aside(v, out) for v in values]
+            values = [self._to_local(v, out) for v in values]
         for target, item in zip(targets, values, strict=True):
             out.append(self._put(target, item, span))
 
@@ -182,7 +182,7 @@ class BodyChecker:
         written = {("", t.id) if isinstance(t, ast.Name) else ir.variable(self._place(t)) for t in targets}
         return any(written & ir.variables(v) for v in values)
 
-    def _aside(self, value: ir.Expr, out: list[ir.Stmt]) -> ir.Expr:
+    def _to_local(self, value: ir.Expr, out: list[ir.Stmt]) -> ir.Expr:
         """Stores a value in a hidden local."""
         self._unpacked += 1
         local = ir.Local(value.type, f"unpacked.{self._unpacked}", value.span)
@@ -354,7 +354,7 @@ class BodyChecker:
         if any(isinstance(n, ast.Call) and self.expr.is_outside(n) for part in parts for n in ast.walk(part)):
             place = self.expr.raw(base)
             if isinstance(place, ir.Place):
-                self._hoister.look_up(place, out)
+                self._hoister.read_checked(place, out)
             parts = [self._settled_index(part, out) for part in parts]
         index = parts[0] if len(parts) == 1 else ast.copy_location(ast.Tuple(parts, ast.Load()), target.slice)
         return ast.copy_location(ast.Subscript(base, index, target.ctx), target)
@@ -366,7 +366,7 @@ class BodyChecker:
         index = self.expr.check(node, I64)
         if not (reaches_outside(index) or can_fault(index)):
             return node
-        local = self._aside(index, out)
+        local = self._to_local(index, out)
         assert isinstance(local, ir.Local)
         self.scope.assigned.add(local.name)
         return ast.copy_location(ast.Name(local.name, ast.Load()), node)

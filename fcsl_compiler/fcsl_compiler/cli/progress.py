@@ -9,13 +9,13 @@ from contextlib import contextmanager
 from threading import Timer
 
 #: Whoever waits longer wants to know for what, s.
-_PATIENCE_S = 2.0
+_DELAY_S = 2.0
 
 
 @contextmanager
 def progress(text: str) -> Iterator[None]:
     """Prints a line on stderr if the block takes over two seconds."""
-    timer = Timer(_PATIENCE_S, lambda: print(text, file=sys.stderr, flush=True))
+    timer = Timer(_DELAY_S, lambda: print(text, file=sys.stderr, flush=True))
     timer.daemon = True
     timer.start()
     try:

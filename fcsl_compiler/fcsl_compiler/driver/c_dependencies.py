@@ -66,8 +66,8 @@ def c_inputs(sources: Sequence[Path], includes: Sequence[Path], root: Path, gene
     listed = os.fsdecode(b"\n".join(run_compilers([[*command, file] for file in files], language)))
     paths = [Path(word) for word in dict.fromkeys(_words(listed))]
     found = [_read(path, root) for path in paths if generated is None or not path.is_relative_to(generated)]
-    asks = any(file.content is not None and b"__has_include" in file.content for file in found)
-    return CInputs(tuple(found), _preprocessed(files, options, language) if asks else "")
+    tests_for_headers = any(file.content is not None and b"__has_include" in file.content for file in found)
+    return CInputs(tuple(found), _preprocessed(files, options, language) if tests_for_headers else "")
 
 
 def _words(rules: str) -> list[str]:

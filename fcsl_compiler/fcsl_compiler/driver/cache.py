@@ -22,10 +22,10 @@ from .toolchain import (
     LANGUAGES,
     C,
     ToolchainError,
-    ask_version,
     include_dirs,
     link_shared,
     math_library,
+    start_version_query,
     toolchain,
     unwritten,
 )
@@ -91,7 +91,7 @@ def _build_machine(config: Path, target: str, instances: Sequence[str] | None, b
 
 def _cache_key(config: Path, target: str, cover: bool, instances: Sequence[str] | None, backend: str) -> str | None:
     """Hash of all inputs of the library, computed without compiling. None if a source cannot be read."""
-    ask_version()
+    start_version_query()
     texts = read_texts(config)
     externs = _extern_parts(config, target, texts) if texts is not None else None
     if texts is None or externs is None:

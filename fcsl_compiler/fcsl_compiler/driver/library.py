@@ -17,7 +17,7 @@ from .nim import check_externs, compile_modules
 from .passes import Compilation, compile_machine
 from .stack import stack_bound, stepped_machines
 from .symbols import SymbolError, check_symbols
-from .toolchain import ToolchainError, ask_call_graphs, compile_objects, include_dirs, link_shared, math_library
+from .toolchain import ToolchainError, compile_objects, include_dirs, link_shared, math_library, start_call_graph_query
 
 
 def emit(
@@ -131,7 +131,7 @@ def build_library(
     Sets `extern_calls` of every compilation, and `stack_bound` if the C compiler reports frame sizes. Then calls
     `inspect` for each.
     """
-    ask_call_graphs()
+    start_call_graph_query()
     compilations = compile_all(configs, strict, target, cover, instances, backend)
     absent = [p for p in (output.parent, *output.parent.parents) if not p.exists()]
 

@@ -116,16 +116,16 @@ def compiler() -> list[str]:
     return C.compiler()
 
 
-def ask_version() -> None:
+def start_version_query() -> None:
     """Begins to ask the C compiler for its version: it answers while the caller does something else."""
     with suppress(OSError, ToolchainError):
-        _asked((*compiler(), "--version"))
+        _query((*compiler(), "--version"))
 
 
-def ask_call_graphs() -> None:
+def start_call_graph_query() -> None:
     """Likewise begins to ask it whether it writes call graphs."""
     with suppress(OSError, ToolchainError):
-        _asked((*compiler(), *_CALL_GRAPH_PROBE))
+        _query((*compiler(), *_CALL_GRAPH_PROBE))
 
 
 class _Answer:
@@ -149,13 +149,13 @@ class _Answer:
         return self._process.returncode, self._printed
 
 
-_asked = cache(_Answer)
+_query = cache(_Answer)
 
 
 @cache
 def _version(command: tuple[str, ...], language: Language) -> str:
     try:
-        status, printed = _asked((*command, "--version")).wait()
+        status, printed = _query((*command, "--version")).wait()
     except (OSError, subprocess.TimeoutExpired):
         raise language.absent(" ".join(command)) from None
     if status != 0:
@@ -214,7 +214,7 @@ def math_library() -> Path:
 def call_graph_flags(command: tuple[str, ...]) -> tuple[str, ...]:
     """The flags for call graphs, if this compiler has them; clang does not."""
     try:
-        status, _ = _asked((*command, *_CALL_GRAPH_PROBE)).wait()
+        status, _ = _query((*command, *_CALL_GRAPH_PROBE)).wait()
     except (OSError, subprocess.TimeoutExpired):
         return ()
     return _CALL_GRAPH_FLAGS if status == 0 else ()

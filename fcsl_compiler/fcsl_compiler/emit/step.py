@@ -160,12 +160,12 @@ class StepEmitter:
             tests.append(Binary("<=", own("age_ticks"), Literal(channel.max_age_ticks, U32)))
         young = code.Convert(code.U8, tests[0]) if tests else Literal(1, code.U8)
         tests.append(Binary("==", own("waiting"), Literal(0, code.U8)))
-        heard = code.And(tuple(tests)) if len(tests) > 1 else tests[0]
+        is_valid = code.And(tuple(tests)) if len(tests) > 1 else tests[0]
         sampled: list[Statement] = [Set(own("fresh"), Literal(0, code.U8)), Set(own("age_ticks"), own("sample_age"))]
         if channel.name in self.m.last_samples:
             sampled.append(Set(own("last_sample"), Binary("+", TICK, ONE)))
         sampled += [Set(own("waiting"), Literal(0, code.U8)), Set(own("valid"), young)]
-        older = (Update(own("age_ticks"), "+", Literal(1, U32)), Set(own("valid"), code.Convert(code.U8, heard)))
+        older = (Update(own("age_ticks"), "+", Literal(1, U32)), Set(own("valid"), code.Convert(code.U8, is_valid)))
         is_attached = Binary("!=", own("attached"), Literal(0, code.U8))
         can_age = code.And((is_attached, Binary("<", own("age_ticks"), _GREATEST_AGE)))
         is_fresh = Binary("!=", own("fresh"), Literal(0, code.U8))

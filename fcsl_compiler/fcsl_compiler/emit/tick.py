@@ -358,9 +358,9 @@ class TickEmitter:
         is_substituted = code.And((Binary("!=", substitute, code.Null()), Binary("!=", called, Literal(0, I32))))
         # The substituted record contains the effect of an injected fault.
         executed = Member(Deref(_HOST), "executed")
-        told = Do(Call(executed, (Member(Deref(_HOST), "ctx"), Literal(entry.instance, U32))))
-        tells = If(Binary("!=", executed, code.Null()), (told,))
-        return If(is_substituted, (Set(inject, Literal(0, code.U8)),), (whole, tells))
+        report = Do(Call(executed, (Member(Deref(_HOST), "ctx"), Literal(entry.instance, U32))))
+        reports = If(Binary("!=", executed, code.Null()), (report,))
+        return If(is_substituted, (Set(inject, Literal(0, code.U8)),), (whole, reports))
 
     def _verdict(self, instance: Instance) -> Statement:
         began = Name("began_ns")

@@ -22,7 +22,7 @@ class Writer(ABC):
         self.origins: list[Span | None] = []
         self.origin: Span | None = None
         self._indent = 0
-        self._said: tuple[str, int] | None = None
+        self._last_line: tuple[str, int] | None = None
 
     def line(self, text: str = "") -> None:
         self.lines.append(self.step * self._indent + text if text else "")
@@ -58,8 +58,8 @@ class Writer(ABC):
         as comments."""
         self.origin = span
         key = (span.source.name, span.line)
-        if key != self._said:
-            self._said = key
+        if key != self._last_line:
+            self._last_line = key
             for text in span.source.comments_above(span.line):
                 self.comment(text)
             self.comment(f"{span.source.name}:{span.line}: {span.source.line(span.line).strip()}")

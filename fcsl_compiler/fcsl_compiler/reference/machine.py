@@ -523,8 +523,10 @@ class ReferenceMachine:
             if self._holds(image, edge, due):
                 image.words[self._next] = edge.target
                 for number, other in state.edges[rank + 1 :]:
-                    asks = other.request >= 0 and other.request != edge.request and other.target != edge.target
-                    if asks and self._holds(image, other, due):
+                    requests_other = (
+                        other.request >= 0 and other.request != edge.request and other.target != edge.target
+                    )
+                    if requests_other and self._holds(image, other, due):
                         assert self._lost_requests is not None
                         at = self._lost_requests + number
                         image.longs[at] = image.longs[at] + 1 & _LONG

@@ -447,13 +447,13 @@ class Rewriter:
         calls = [n.func for n in ast.walk(place.slice) if isinstance(n, ast.Call)]
         if not any(isinstance(f, ast.Name) and f.id in self.outside for f in calls):
             return
-        self._aside(place.value, out)
+        self._to_local(place.value, out)
         if isinstance(place.slice, ast.Tuple):
-            place.slice.elts = [self._aside(part, out) for part in place.slice.elts]
+            place.slice.elts = [self._to_local(part, out) for part in place.slice.elts]
         else:
-            place.slice = self._aside(place.slice, out)
+            place.slice = self._to_local(place.slice, out)
 
-    def _aside(self, value: ast.expr, out: list[ast.stmt]) -> ast.expr:
+    def _to_local(self, value: ast.expr, out: list[ast.stmt]) -> ast.expr:
         """Evaluates a rewritten value on a preceding line and returns its name. Constants and slices stay in place."""
         if isinstance(value, ast.Slice | ast.Constant):
             return value

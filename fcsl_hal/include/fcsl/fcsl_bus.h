@@ -123,7 +123,7 @@ int fcsl_bus_wait(fcsl_bus_t *bus, uint64_t deadline_ns);
 int fcsl_bus_matched(const fcsl_bus_t *bus, uint32_t output);
 
 /* How many other sessions with the watched token live. One that is killed or frozen leaves within the lease (1 s). */
-uint32_t fcsl_bus_alive(const fcsl_bus_t *bus, uint32_t watched);
+uint32_t fcsl_bus_token_count(const fcsl_bus_t *bus, uint32_t watched);
 
 /* How many sessions this one is connected to. */
 uint32_t fcsl_bus_peers(const fcsl_bus_t *bus);

@@ -63,7 +63,7 @@ fcsl_external_counters_t fcsl_external_counters(const fcsl_external_t *external)
 int fcsl_external_read_log(fcsl_external_t *external, char text[FCSL_LOG_BYTES]);
 
 /* The simulator makes no ticks for a while, and calls this often: the controller waits on. */
-void fcsl_external_alive(fcsl_external_t *external);
+void fcsl_external_keep_alive(fcsl_external_t *external);
 
 /* Tells the controller that the run has ended, and whether another one follows. Nothing is sent afterwards. */
 void fcsl_external_end(fcsl_external_t *external, int another_follows);

@@ -53,7 +53,7 @@ int fcsl_guard_connect(const char *path, const fcsl_machine_t *machine, fcsl_gua
  * does nothing. */
 int fcsl_guard_command(const fcsl_guard_link_t *link, const fcsl_message_t *message, uint64_t begun_ns);
 /* Whether the guard has ended: nobody takes the commands. Does not wait. */
-int fcsl_guard_is_gone(const fcsl_guard_link_t *link);
+int fcsl_guard_has_ended(const fcsl_guard_link_t *link);
 void fcsl_guard_disconnect(fcsl_guard_link_t *link);
 
 /* ---- guard ---- */
@@ -83,7 +83,7 @@ typedef enum {
 int fcsl_guard_listen(const char *path, const fcsl_machine_t *machine, fcsl_guard_server_t *server,
                       fcsl_error_t *error);
 /* Whether a flight program has come or gone; at most one event per call. Does not wait. */
-fcsl_guard_event_t fcsl_guard_look(fcsl_guard_server_t *server);
+fcsl_guard_event_t fcsl_guard_poll(fcsl_guard_server_t *server);
 /* Copies a command that was not taken before to `bytes` (server->capacity of them), unchecked, and sets *size and *begun_ns.
  * Returns 1, or 0 when there is none, none whole, or nobody has the slot. A size that no slot can hold is 0. Does not wait. */
 int fcsl_guard_take(fcsl_guard_server_t *server, uint8_t *bytes, size_t *size, uint64_t *begun_ns);

@@ -26,7 +26,7 @@ typedef struct {
     _Atomic uint32_t written;
     _Atomic uint32_t read;
     _Atomic uint64_t dropped;
-    uint64_t dropped_told; /* of these, to who reads */
+    uint64_t dropped_reported; /* of these, to who reads */
     char lines[FCSL_LOG_LINES][FCSL_LOG_BYTES];
 } fcsl_log_t;
 

@@ -28,12 +28,12 @@ void fcsl_log_write(fcsl_log_t *log, const char *text)
 static int read_dropped(fcsl_log_t *log, char text[FCSL_LOG_BYTES])
 {
     const uint64_t dropped = atomic_load_explicit(&log->dropped, memory_order_relaxed);
-    if (dropped == log->dropped_told) {
+    if (dropped == log->dropped_reported) {
         return 0;
     }
     (void)snprintf(text, FCSL_LOG_BYTES, "%" PRIu64 " lines were not printed: whoever takes them was too slow",
-                   dropped - log->dropped_told);
-    log->dropped_told = dropped;
+                   dropped - log->dropped_reported);
+    log->dropped_reported = dropped;
     return 1;
 }
 

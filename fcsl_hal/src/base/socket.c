@@ -19,7 +19,7 @@
 #include <unistd.h>
 
 /* A program that starts holds the folder for microseconds; 2 s is for one that was stopped in between. */
-enum { LOCK_TRIES = 200, LOCK_LOOK_NS = 10000000 };
+enum { LOCK_TRIES = 200, LOCK_POLL_NS = 10000000 };
 
 static int fill_address(const char *path, struct sockaddr_un *address, fcsl_error_t *error)
 {
@@ -80,7 +80,7 @@ static int lock_folder(const char *path)
     char folder[sizeof(struct sockaddr_un)];
     (void)snprintf(folder, sizeof folder, "%s", path);
     const int fd = open(dirname(folder), O_RDONLY | O_DIRECTORY | O_CLOEXEC);
-    const struct timespec pause = {.tv_nsec = LOCK_LOOK_NS};
+    const struct timespec pause = {.tv_nsec = LOCK_POLL_NS};
     for (int i = 0; fd >= 0 && i < LOCK_TRIES && flock(fd, LOCK_EX | LOCK_NB) != 0; i++) {
         (void)nanosleep(&pause, NULL);
     }

@@ -53,9 +53,9 @@ int fcsl_bus_matched(const fcsl_bus_t *bus, uint32_t output)
     return output < bus->output_count && atomic_load(&bus->matched[output]);
 }
 
-uint32_t fcsl_bus_alive(const fcsl_bus_t *bus, uint32_t watched)
+uint32_t fcsl_bus_token_count(const fcsl_bus_t *bus, uint32_t watched)
 {
-    return watched < bus->watched_count ? atomic_load(&bus->alive[watched]) : 0u;
+    return watched < bus->watched_count ? atomic_load(&bus->token_counts[watched]) : 0u;
 }
 
 uint32_t fcsl_bus_peers(const fcsl_bus_t *bus)
@@ -111,7 +111,7 @@ void bus_disown(fcsl_bus_t *bus)
     (void)pthread_cond_destroy(&bus->ended);
     free(bus->matched);
     free(bus->inboxes);
-    free((void *)bus->alive);
+    free((void *)bus->token_counts);
     free(bus);
 }
 
@@ -125,8 +125,8 @@ static int allocate(fcsl_bus_t *bus, const fcsl_bus_options_t *options)
 {
     bus->matched = array(options->output_count, sizeof bus->matched[0]);
     bus->inboxes = array(options->input_count, sizeof bus->inboxes[0]);
-    bus->alive = array(options->watched_count, sizeof bus->alive[0]);
-    if (bus->matched == NULL || bus->inboxes == NULL || bus->alive == NULL ||
+    bus->token_counts = array(options->watched_count, sizeof bus->token_counts[0]);
+    if (bus->matched == NULL || bus->inboxes == NULL || bus->token_counts == NULL ||
         ring_open(&bus->ring, options->ring_bytes) != 0) {
         return -1;
     }

@@ -33,7 +33,7 @@ static void put(fcsl_bus_t *bus, uint32_t input, const uint8_t *bytes, size_t si
         break;
     }
     if (!bus->inboxes[input].quiet) {
-        bus_tell(bus);
+        bus_notify(bus);
     }
 }
 
@@ -55,7 +55,7 @@ static void on_matching(void *ctx, uint32_t number, int matching)
     fcsl_bus_t *bus = ctx;
     if (number < bus->output_count) {
         atomic_store(&bus->matched[number], matching);
-        bus_tell(bus);
+        bus_notify(bus);
     }
 }
 
@@ -63,8 +63,8 @@ static void on_tokens(void *ctx, uint32_t number, uint32_t count)
 {
     fcsl_bus_t *bus = ctx;
     if (number < bus->watched_count) {
-        atomic_store(&bus->alive[number], count);
-        bus_tell(bus);
+        atomic_store(&bus->token_counts[number], count);
+        bus_notify(bus);
     }
 }
 

@@ -7,7 +7,7 @@
 
 #include "fcsl/fcsl_monotonic.h"
 
-enum { LOOK_NS = 50 * FCSL_NS_PER_MS, TURN = 64 };
+enum { POLL_NS = 50 * FCSL_NS_PER_MS, TURN = 64 };
 
 /* Puts what is in the ring, at most TURN messages: 1 when there may be more. */
 static int put_some(fcsl_bus_t *bus)
@@ -27,20 +27,20 @@ static int put_some(fcsl_bus_t *bus)
 }
 
 /* Zenoh does not tell of sessions that come and go: they are looked at. */
-static void look_at_peers(fcsl_bus_t *bus, uint64_t *looked_ns)
+static void check_peers(fcsl_bus_t *bus, uint64_t *checked_ns)
 {
     const uint64_t now_ns = fcsl_monotonic_ns();
-    if (now_ns < *looked_ns + LOOK_NS) {
+    if (now_ns < *checked_ns + POLL_NS) {
         return;
     }
     const uint32_t before = atomic_load(&bus->peers);
     const uint32_t now = fcsl_zenoh_peers(bus->zenoh);
-    *looked_ns = now_ns;
+    *checked_ns = now_ns;
     if (now != before) {
         bus_count(now > before ? &bus->counters.connects : &bus->counters.disconnects,
                   now > before ? now - before : before - now);
         atomic_store(&bus->peers, now);
-        bus_tell(bus);
+        bus_notify(bus);
     }
 }
 
@@ -51,8 +51,8 @@ static void sleep_until_posted(fcsl_bus_t *bus)
     size_t size = 0;
     event_arm(&bus->posted);
     if (!ring_front(&bus->ring, &output, &bytes, &size) && !atomic_load(&bus->stopping)) {
-        const struct timespec look = fcsl_timespec_of(LOOK_NS);
-        (void)event_sleep(&bus->posted, &look);
+        const struct timespec poll = fcsl_timespec_of(POLL_NS);
+        (void)event_sleep(&bus->posted, &poll);
     }
 }
 
@@ -63,7 +63,7 @@ static void connect_later(fcsl_bus_t *bus)
     const uint8_t *bytes = NULL;
     size_t size = 0;
     fcsl_error_t reason;
-    const struct timespec pause = fcsl_timespec_of(LOOK_NS);
+    const struct timespec pause = fcsl_timespec_of(POLL_NS);
     while (bus->zenoh == NULL && !atomic_load(&bus->stopping)) { /* until the session is closed at the latest */
         if (bus_connect(bus, &bus->options, &reason) != 0) {
             (void)nanosleep(&pause, NULL);
@@ -78,14 +78,14 @@ static void connect_later(fcsl_bus_t *bus)
 /* Puts, or sleeps, until the session is closed. */
 static void serve(fcsl_bus_t *bus)
 {
-    uint64_t looked_ns = 0;
+    uint64_t checked_ns = 0;
     for (;;) { /* each turn puts, or sleeps */
         const int stopping = atomic_load(&bus->stopping); /* nothing is posted any more */
         const int more = put_some(bus);
         if (stopping && !more) {
             break;
         }
-        look_at_peers(bus, &looked_ns);
+        check_peers(bus, &checked_ns);
         if (!more) {
             sleep_until_posted(bus);
         }

@@ -50,7 +50,7 @@ struct fcsl_bus {
     uint32_t input_count;
     inbox_t *inboxes;
     uint32_t watched_count;
-    _Atomic uint32_t *alive; /* of each watched token */
+    _Atomic uint32_t *token_counts; /* of each watched token */
     _Atomic uint32_t peers;
 
     /* News for who waits: how much there was, and how much they know of. */
@@ -73,7 +73,7 @@ static inline void bus_count(_Atomic uint64_t *counter, uint64_t more)
 }
 
 /* Something that fcsl_bus_wait waits for happened. */
-static inline void bus_tell(fcsl_bus_t *bus)
+static inline void bus_notify(fcsl_bus_t *bus)
 {
     (void)atomic_fetch_add(&bus->news_count, 1);
     event_signal(&bus->news);

@@ -103,13 +103,13 @@ static int map_slot(int memory, const char *path, const fcsl_machine_t *machine,
 
 int fcsl_guard_connect(const char *path, const fcsl_machine_t *machine, fcsl_guard_link_t *link, fcsl_error_t *error)
 {
-    const struct timeval patience = {.tv_sec = ANSWER_S};
+    const struct timeval timeout = {.tv_sec = ANSWER_S};
     const int connection = fcsl_socket_connect(path, SOCK_SEQPACKET, error);
     if (connection < 0) {
         return -1;
     }
     int memory = -1;
-    if (setsockopt(connection, SOL_SOCKET, SO_RCVTIMEO, &patience, sizeof patience) != 0) {
+    if (setsockopt(connection, SOL_SOCKET, SO_RCVTIMEO, &timeout, sizeof timeout) != 0) {
         (void)fail(error, "cannot wait for", path);
     } else {
         memory = receive_slot(connection, path, error);
@@ -134,7 +134,7 @@ static int is_over(int connection)
     return got >= 0 || (errno != EAGAIN && errno != EINTR);
 }
 
-int fcsl_guard_is_gone(const fcsl_guard_link_t *link)
+int fcsl_guard_has_ended(const fcsl_guard_link_t *link)
 {
     return link->slot != NULL && is_over(link->connection);
 }
@@ -229,7 +229,7 @@ static int32_t pid_of(int connection)
     return getsockopt(connection, SOL_SOCKET, SO_PEERCRED, &peer, &size) == 0 ? peer.pid : 0;
 }
 
-fcsl_guard_event_t fcsl_guard_look(fcsl_guard_server_t *server)
+fcsl_guard_event_t fcsl_guard_poll(fcsl_guard_server_t *server)
 {
     if (server->client >= 0 && is_over(server->client)) {
         (void)close(server->client);

@@ -40,8 +40,8 @@ static void copy(const fcsl_guard_server_t *server, uint8_t *bytes, size_t *size
 {
     const fcsl_guard_slot_t *slot = server->slot;
     *begun_ns = atomic_load_explicit(&slot->begun_ns, memory_order_acquire);
-    const uint64_t said = atomic_load_explicit(&slot->size, memory_order_acquire);
-    *size = said <= server->capacity ? (size_t)said : 0u;
+    const uint64_t stored = atomic_load_explicit(&slot->size, memory_order_acquire);
+    *size = stored <= server->capacity ? (size_t)stored : 0u;
     fcsl_seqlock_load(bytes, slot->message, *size);
 }
 

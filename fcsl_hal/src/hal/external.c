@@ -22,7 +22,7 @@ enum {
     TIME_BYTES = 64,
     JOIN_MS = 10000,
     MESSAGES_MAX = 64, /* that one call takes */
-    LOOK_NS = 20 * FCSL_NS_PER_MS, /* a moment */
+    POLL_NS = 20 * FCSL_NS_PER_MS, /* a moment */
 };
 
 static const struct timespec PAUSE = {.tv_nsec = 20 * FCSL_NS_PER_MS};
@@ -38,7 +38,7 @@ struct fcsl_external {
     uint64_t ticks_without; /* since the last actuator message */
     int waits; /* for an actuator message, until deadline_ns */
     uint64_t deadline_ns;
-    uint64_t alive_ns; /* when the next sign of life is due */
+    uint64_t keep_alive_ns; /* when the next sign of life is due */
     int ended; /* the controller was told */
     uint8_t *inbox;
     size_t inbox_size;
@@ -134,8 +134,8 @@ static fcsl_hal_status_t wire_failed(fcsl_external_t *external)
 /* Waits for a message, for a short time at most. */
 static fcsl_wire_status_t receive(fcsl_external_t *external, uint64_t deadline_ns, size_t *size)
 {
-    const uint64_t look_ns = fcsl_monotonic_ns() + LOOK_NS;
-    return external->wire.receive(external->wire.ctx, look_ns < deadline_ns ? look_ns : deadline_ns, external->inbox,
+    const uint64_t poll_ns = fcsl_monotonic_ns() + POLL_NS;
+    return external->wire.receive(external->wire.ctx, poll_ns < deadline_ns ? poll_ns : deadline_ns, external->inbox,
                                   external->inbox_size, size);
 }
 
@@ -143,7 +143,7 @@ static fcsl_wire_status_t receive(fcsl_external_t *external, uint64_t deadline_n
 static int is_early(uint64_t begun_ns, uint64_t deadline_ns)
 {
     const uint64_t now_ns = fcsl_monotonic_ns();
-    return now_ns < begun_ns + LOOK_NS && now_ns < deadline_ns;
+    return now_ns < begun_ns + POLL_NS && now_ns < deadline_ns;
 }
 
 /* ---- meeting ------------------------------------------------------------------------------------------------------- */
@@ -258,7 +258,7 @@ static fcsl_hal_status_t controller_left(fcsl_external_t *external, handshake_ki
 }
 
 /* Looks at what came: OK when it is the message of `tick`, NONE when it counts for nothing, WAITING for a sign of life. */
-static fcsl_hal_status_t look_at(fcsl_external_t *external, uint64_t tick, size_t size, fcsl_message_t *message)
+static fcsl_hal_status_t check_message(fcsl_external_t *external, uint64_t tick, size_t size, fcsl_message_t *message)
 {
     handshake_packet_t packet;
     const int is_control = handshake_parse(external->inbox, size, &packet) == 0;
@@ -267,7 +267,7 @@ static fcsl_hal_status_t look_at(fcsl_external_t *external, uint64_t tick, size_
         return FCSL_HAL_NONE;
     }
     if (is_control && packet.kind != HANDSHAKE_REFUSAL) {
-        return packet.kind == HANDSHAKE_ALIVE ? FCSL_HAL_WAITING : controller_left(external, packet.kind, tick);
+        return packet.kind == HANDSHAKE_KEEP_ALIVE ? FCSL_HAL_WAITING : controller_left(external, packet.kind, tick);
     }
     if (fcsl_message_check(&external->table, FCSL_ACTUATOR_MESSAGE, external->inbox, size, message) !=
             FCSL_MESSAGE_OK ||
@@ -310,7 +310,8 @@ static fcsl_hal_status_t wait_once(fcsl_external_t *external, uint64_t tick, uin
     if (status == FCSL_WIRE_NONE && is_early(begun_ns, external->deadline_ns)) {
         return FCSL_HAL_NONE;
     }
-    const fcsl_hal_status_t seen = status == FCSL_WIRE_OK ? look_at(external, tick, size, message) : FCSL_HAL_NONE;
+    const fcsl_hal_status_t seen =
+        status == FCSL_WIRE_OK ? check_message(external, tick, size, message) : FCSL_HAL_NONE;
     if (seen == FCSL_HAL_WAITING) {
         wait_anew(external, timeout_ms);
     } else if (seen != FCSL_HAL_NONE) {
@@ -340,14 +341,14 @@ fcsl_hal_status_t fcsl_external_receive(fcsl_external_t *external, uint64_t tick
     return status;
 }
 
-void fcsl_external_alive(fcsl_external_t *external)
+void fcsl_external_keep_alive(fcsl_external_t *external)
 {
     const uint64_t now_ns = fcsl_monotonic_ns();
     if (external->runs_free) {
-        presence_tell(&external->presence, &external->wire);
-    } else if (now_ns >= external->alive_ns) {
-        external->alive_ns = now_ns + HANDSHAKE_ALIVE_NS;
-        (void)handshake_send_alive(&external->wire); /* the next one comes soon */
+        presence_send(&external->presence, &external->wire);
+    } else if (now_ns >= external->keep_alive_ns) {
+        external->keep_alive_ns = now_ns + HANDSHAKE_KEEP_ALIVE_NS;
+        (void)handshake_send_keep_alive(&external->wire); /* the next one comes soon */
     }
 }
 
@@ -367,16 +368,16 @@ static void count_take(fcsl_external_t *external, int taken)
 fcsl_hal_status_t fcsl_external_take(fcsl_external_t *external, uint64_t tick, fcsl_message_t *message)
 {
     int taken = 0;
-    fcsl_external_alive(external);
+    fcsl_external_keep_alive(external);
     for (int i = 0; i < MESSAGES_MAX && !taken; i++) { /* one message has all that came */
         size_t size = 0;
         const fcsl_wire_status_t status =
             external->wire.receive(external->wire.ctx, 0, external->inbox, external->inbox_size, &size);
         if (status == FCSL_WIRE_CLOSED) {
-            presence_gone(&external->presence);
+            presence_end(&external->presence);
         } else if (status != FCSL_WIRE_OK) {
             break;
-        } else if (!presence_hear(&external->presence, external->inbox, size)) {
+        } else if (!presence_receive(&external->presence, external->inbox, size)) {
             taken = fcsl_message_check(&external->table, FCSL_ACTUATOR_MESSAGE, external->inbox, size, message) ==
                     FCSL_MESSAGE_OK;
             external->messages_dropped += taken ? 0u : 1u;

@@ -19,7 +19,7 @@
 enum {
     TEXT_BYTES = 512,
     SPEC_BYTES = 256,
-    LOOK_NS = 20 * FCSL_NS_PER_MS, /* a wait looks as often whether it is interrupted */
+    POLL_NS = 20 * FCSL_NS_PER_MS, /* a wait looks as often whether it is interrupted */
     MESSAGES_MAX = 4096 /* that a tick takes of a rig: more than a buffer holds */
 };
 
@@ -70,7 +70,7 @@ typedef struct {
     uint8_t *sensor_bytes;
     int waits;            /* for that tick, until deadline_ns */
     uint64_t deadline_ns;
-    uint64_t alive_ns;    /* when the next sign of life is due */
+    uint64_t keep_alive_ns;    /* when the next sign of life is due */
     uint32_t open_ms; /* how long it may take to find a peer */
     uint32_t timeout_ms;
     uint64_t time_ns; /* of the last time message */
@@ -91,34 +91,34 @@ typedef struct {
 /* ---- receiving ----------------------------------------------------------------------------------------------------- */
 
 typedef enum {
-    HEARD_NOTHING, /* that counts */
-    HEARD_SENSORS,
-    HEARD_TIME,
-    HEARD_ALIVE,
-    HEARD_END, /* of the run */
-    HEARD_AGAIN /* the same, and another one follows */
-} heard_t;
+    RECEIVED_NOTHING, /* that counts */
+    RECEIVED_SENSORS,
+    RECEIVED_TIME,
+    RECEIVED_KEEP_ALIVE,
+    RECEIVED_END, /* of the run */
+    RECEIVED_AGAIN /* the same, and another one follows */
+} received_t;
 
 /* What the `size` bytes in the inbox are. */
-static heard_t judge(hal_t *hal, size_t size, fcsl_message_t *message)
+static received_t judge(hal_t *hal, size_t size, fcsl_message_t *message)
 {
     handshake_packet_t packet;
     if (fcsl_message_check(&hal->table, FCSL_SENSOR_MESSAGE, hal->inbox, size, message) == FCSL_MESSAGE_OK) {
-        return HEARD_SENSORS;
+        return RECEIVED_SENSORS;
     }
     if (fcsl_message_check(&hal->table, FCSL_TIME_MESSAGE, hal->inbox, size, message) == FCSL_MESSAGE_OK) {
-        return HEARD_TIME;
+        return RECEIVED_TIME;
     }
     const int is_control = handshake_parse(hal->inbox, size, &packet) == 0;
     if (is_control && packet.kind == HANDSHAKE_END && !handshake_is_leave(&packet)) {
         hal->is_over = 1;
-        return packet.flag ? HEARD_AGAIN : HEARD_END;
+        return packet.flag ? RECEIVED_AGAIN : RECEIVED_END;
     }
-    if (is_control && packet.kind == HANDSHAKE_ALIVE) {
-        return HEARD_ALIVE;
+    if (is_control && packet.kind == HANDSHAKE_KEEP_ALIVE) {
+        return RECEIVED_KEEP_ALIVE;
     }
     hal->counters.messages_dropped++;
-    return HEARD_NOTHING;
+    return RECEIVED_NOTHING;
 }
 
 static fcsl_wire_status_t receive(hal_t *hal, uint64_t deadline_ns, size_t *size)
@@ -127,14 +127,14 @@ static fcsl_wire_status_t receive(hal_t *hal, uint64_t deadline_ns, size_t *size
 }
 
 /* Keeps a sensor message, which leaves the inbox. */
-static void keep(hal_t *hal, const fcsl_message_t *heard)
+static void keep(hal_t *hal, const fcsl_message_t *received)
 {
-    hal->sensors = *heard;
-    memcpy(hal->sensor_bytes, heard->bytes, heard->size);
+    hal->sensors = *received;
+    memcpy(hal->sensor_bytes, received->bytes, received->size);
     hal->sensors.bytes = hal->sensor_bytes;
     hal->sensed = 1;
     hal->counters.messages++;
-    hal->counters.entries_skipped += heard->skipped;
+    hal->counters.entries_skipped += received->skipped;
     hal->counters.ticks_without = 0;
 }
 
@@ -198,38 +198,38 @@ static void wait_anew(hal_t *hal)
 }
 
 /* Takes one message of the tick: WAITING to go on, OK when the tick happens now. */
-static fcsl_hal_status_t hear(hal_t *hal, uint64_t tick, size_t size)
+static fcsl_hal_status_t take_message(hal_t *hal, uint64_t tick, size_t size)
 {
-    fcsl_message_t heard;
-    const heard_t what = judge(hal, size, &heard);
-    if (what == HEARD_END || what == HEARD_AGAIN) {
+    fcsl_message_t received;
+    const received_t what = judge(hal, size, &received);
+    if (what == RECEIVED_END || what == RECEIVED_AGAIN) {
         (void)snprintf(hal->text, sizeof hal->text, "the simulator ended the run at tick %" PRIu64, tick);
-        return what == HEARD_END ? FCSL_HAL_CLOSED : FCSL_HAL_AGAIN;
+        return what == RECEIVED_END ? FCSL_HAL_CLOSED : FCSL_HAL_AGAIN;
     }
-    if (what == HEARD_ALIVE) {
+    if (what == RECEIVED_KEEP_ALIVE) {
         wait_anew(hal);
     }
-    if (what == HEARD_NOTHING || what == HEARD_ALIVE) {
+    if (what == RECEIVED_NOTHING || what == RECEIVED_KEEP_ALIVE) {
         return FCSL_HAL_WAITING;
     }
-    if (heard.tick > tick) {
-        return too_early(hal, what == HEARD_TIME ? "time" : "sensor", heard.tick, tick);
+    if (received.tick > tick) {
+        return too_early(hal, what == RECEIVED_TIME ? "time" : "sensor", received.tick, tick);
     }
-    if (heard.tick < tick) {
+    if (received.tick < tick) {
         hal->counters.messages_late++;
         return FCSL_HAL_WAITING;
     }
-    if (what == HEARD_SENSORS) {
-        keep(hal, &heard);
+    if (what == RECEIVED_SENSORS) {
+        keep(hal, &received);
         return FCSL_HAL_WAITING;
     }
-    hal->time_ns = heard.time_ns;
+    hal->time_ns = received.time_ns;
     return FCSL_HAL_OK;
 }
 
 static fcsl_hal_status_t sample_paced(hal_t *hal, uint64_t tick, const fcsl_sink_t *to)
 {
-    const uint64_t look_ns = fcsl_monotonic_ns() + LOOK_NS;
+    const uint64_t poll_ns = fcsl_monotonic_ns() + POLL_NS;
     fcsl_hal_status_t status = FCSL_HAL_WAITING;
     if (!hal->waits) {
         wait_anew(hal);
@@ -239,11 +239,11 @@ static fcsl_hal_status_t sample_paced(hal_t *hal, uint64_t tick, const fcsl_sink
         const fcsl_wire_status_t came =
             atomic_load(&hal->interrupted)
                 ? FCSL_WIRE_NONE
-                : receive(hal, look_ns < hal->deadline_ns ? look_ns : hal->deadline_ns, &size);
-        status = came == FCSL_WIRE_OK ? hear(hal, tick, size) : nothing_came(hal, came, tick);
+                : receive(hal, poll_ns < hal->deadline_ns ? poll_ns : hal->deadline_ns, &size);
+        status = came == FCSL_WIRE_OK ? take_message(hal, tick, size) : nothing_came(hal, came, tick);
         if (status == FCSL_HAL_WAITING && fcsl_monotonic_ns() >= hal->deadline_ns) {
             status = timed_out(hal, tick);
-        } else if (status == FCSL_HAL_WAITING && fcsl_monotonic_ns() >= look_ns) {
+        } else if (status == FCSL_HAL_WAITING && fcsl_monotonic_ns() >= poll_ns) {
             return FCSL_HAL_WAITING; /* what has been sensed is kept */
         }
     }
@@ -256,21 +256,21 @@ static fcsl_hal_status_t sample_paced(hal_t *hal, uint64_t tick, const fcsl_sink
 }
 
 /* A rig waits for nobody. */
-static void wire_alive(void *ctx)
+static void wire_keep_alive(void *ctx)
 {
     hal_t *hal = ctx;
     const uint64_t now_ns = fcsl_monotonic_ns();
     if (hal->runs_free) {
-        presence_tell(&hal->presence, &hal->wire);
-    } else if (hal->paces && now_ns >= hal->alive_ns) {
-        hal->alive_ns = now_ns + HANDSHAKE_ALIVE_NS;
-        (void)handshake_send_alive(&hal->wire); /* the next one comes soon */
+        presence_send(&hal->presence, &hal->wire);
+    } else if (hal->paces && now_ns >= hal->keep_alive_ns) {
+        hal->keep_alive_ns = now_ns + HANDSHAKE_KEEP_ALIVE_NS;
+        (void)handshake_send_keep_alive(&hal->wire); /* the next one comes soon */
     }
 }
 
 /* ---- beside a rig, or free-running ----------------------------------------------------------------------------------- */
 
-static void rig_gone(hal_t *hal)
+static void rig_disconnected(hal_t *hal)
 {
     if (hal->counters.connected != 0) {
         hal->counters.connected = 0;
@@ -279,46 +279,46 @@ static void rig_gone(hal_t *hal)
 }
 
 /* What comes of a simulator that runs free, besides values: 1 where it was that. */
-static int hear_presence(hal_t *hal, fcsl_wire_status_t came, size_t size)
+static int receive_presence(hal_t *hal, fcsl_wire_status_t came, size_t size)
 {
-    int heard = 1;
+    int received = 1;
     if (!hal->runs_free) {
         return 0;
     }
     if (came == FCSL_WIRE_CLOSED) {
-        presence_gone(&hal->presence);
+        presence_end(&hal->presence);
     } else {
-        heard = came == FCSL_WIRE_OK && presence_hear(&hal->presence, hal->inbox, size);
+        received = came == FCSL_WIRE_OK && presence_receive(&hal->presence, hal->inbox, size);
     }
     hal->counters.connected = (uint64_t)hal->presence.there;
-    return heard;
+    return received;
 }
 
 /* Free-running, one message has all that came. */
 static fcsl_hal_status_t sample_newest(hal_t *hal, uint64_t tick, const fcsl_sink_t *to)
 {
     hal->sensed = 0;
-    wire_alive(hal);
+    wire_keep_alive(hal);
     for (int i = 0; i < MESSAGES_MAX && !(hal->sensed && hal->runs_free); i++) {
         size_t size = 0;
-        fcsl_message_t heard;
+        fcsl_message_t received;
         const fcsl_wire_status_t came = receive(hal, 0, &size);
-        if (hear_presence(hal, came, size)) {
+        if (receive_presence(hal, came, size)) {
             continue;
         }
         if (came == FCSL_WIRE_CLOSED) {
-            rig_gone(hal);
+            rig_disconnected(hal);
         }
         if (came != FCSL_WIRE_OK) {
             break;
         }
-        const heard_t what = judge(hal, size, &heard);
-        if (what == HEARD_END || what == HEARD_AGAIN) {
-            rig_gone(hal);
+        const received_t what = judge(hal, size, &received);
+        if (what == RECEIVED_END || what == RECEIVED_AGAIN) {
+            rig_disconnected(hal);
         }
-        if (what == HEARD_SENSORS) {
+        if (what == RECEIVED_SENSORS) {
             hal->counters.messages_late += (uint64_t)hal->sensed;
-            keep(hal, &heard);
+            keep(hal, &received);
             hal->sensors.tick = tick; /* a rig counts its own */
         }
     }
@@ -338,19 +338,19 @@ static fcsl_hal_status_t wire_sample(void *ctx, uint64_t tick, const fcsl_sink_t
 /* ---- commands ------------------------------------------------------------------------------------------------------ */
 
 /* The simulator may have ended the run after its last message: what it left is read. */
-static fcsl_hal_status_t peer_gone(hal_t *hal, uint64_t tick)
+static fcsl_hal_status_t peer_disconnected(hal_t *hal, uint64_t tick)
 {
     int ended = 0;
     int again = 0;
     for (int i = 0; i < MESSAGES_MAX && !ended; i++) {
         size_t size = 0;
-        fcsl_message_t heard;
+        fcsl_message_t received;
         if (receive(hal, 0, &size) != FCSL_WIRE_OK) {
             break;
         }
-        const heard_t what = judge(hal, size, &heard);
-        ended = what == HEARD_END || what == HEARD_AGAIN;
-        again = what == HEARD_AGAIN;
+        const received_t what = judge(hal, size, &received);
+        ended = what == RECEIVED_END || what == RECEIVED_AGAIN;
+        again = what == RECEIVED_AGAIN;
     }
     hal->counters.connected = (uint64_t)ended;
     (void)snprintf(hal->text, sizeof hal->text, "the simulator %s before actuator message of tick %" PRIu64,
@@ -371,7 +371,7 @@ static fcsl_hal_status_t wire_command(void *ctx, const fcsl_message_t *message)
         return FCSL_HAL_OK; /* its gate closes when commands stay away */
     }
     if (status == FCSL_WIRE_CLOSED) {
-        return peer_gone(hal, message->tick);
+        return peer_disconnected(hal, message->tick);
     }
     /* In lock-step no more than one message is under way: a full wire means that the peer is out of step. */
     if (status == FCSL_WIRE_NONE) {
@@ -439,15 +439,15 @@ static void wire_close(void *ctx)
 /* ---- opening ------------------------------------------------------------------------------------------------------- */
 
 /* Waits for the peer's answer to the hello. A rig may still send what was for a controller before this one. */
-static int hear_hello(hal_t *hal, uint64_t deadline_ns, handshake_packet_t *packet, fcsl_error_t *error)
+static int receive_hello(hal_t *hal, uint64_t deadline_ns, handshake_packet_t *packet, fcsl_error_t *error)
 {
     fcsl_wire_status_t status = FCSL_WIRE_NONE;
     size_t size = 0;
     int answered = 0;
     while (!answered && status < FCSL_WIRE_CLOSED && fcsl_monotonic_ns() < deadline_ns &&
            !atomic_load(&hal->interrupted)) {
-        const uint64_t look_ns = fcsl_monotonic_ns() + LOOK_NS;
-        status = receive(hal, look_ns < deadline_ns ? look_ns : deadline_ns, &size);
+        const uint64_t poll_ns = fcsl_monotonic_ns() + POLL_NS;
+        status = receive(hal, poll_ns < deadline_ns ? poll_ns : deadline_ns, &size);
         answered = status == FCSL_WIRE_OK && handshake_parse(hal->inbox, size, packet) == 0 &&
                    packet->kind <= HANDSHAKE_REFUSAL;
     }
@@ -477,9 +477,9 @@ static int shake_hands(hal_t *hal, uint64_t deadline_ns, fcsl_error_t *error)
     }
     hal->greeted_ns = hal->greets ? hal->greeted_ns : fcsl_monotonic_ns();
     hal->greets = 1;
-    const int unheard = hear_hello(hal, deadline_ns, &packet, error);
-    if (unheard) {
-        return unheard;
+    const int failed = receive_hello(hal, deadline_ns, &packet, error);
+    if (failed) {
+        return failed;
     }
     hal->greets = 0;
     if (packet.kind == HANDSHAKE_REFUSAL) {
@@ -580,7 +580,7 @@ static int make(const fcsl_wire_counters_t *of_wire, const fcsl_machine_t *machi
         .sample = wire_sample,
         .command = wire_command,
         .arm = wire_arm,
-        .alive = wire_alive,
+        .alive = wire_keep_alive,
         .clock = {.ctx = hal, .now_ns = wire_now_ns, .wait = wire_wait},
         .log = &hal->log,
         .count = wire_count,

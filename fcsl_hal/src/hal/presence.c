@@ -20,16 +20,16 @@ presence_t presence_of(fcsl_wire_side_t peer, const fcsl_channel_table_t *table,
                         .expects = !is_simulator};
 }
 
-void presence_tell(presence_t *presence, const fcsl_wire_t *wire)
+void presence_send(presence_t *presence, const fcsl_wire_t *wire)
 {
     const uint64_t now_ns = fcsl_monotonic_ns();
     if (now_ns >= presence->hello_ns) {
-        presence->hello_ns = now_ns + HANDSHAKE_ALIVE_NS;
+        presence->hello_ns = now_ns + HANDSHAKE_KEEP_ALIVE_NS;
         (void)handshake_send_hello(wire, presence->table, presence->sends); /* the next one comes soon */
     }
 }
 
-static void say(presence_t *presence, const char *what)
+static void log_peer(presence_t *presence, const char *what)
 {
     char text[FCSL_LOG_BYTES];
     (void)snprintf(text, sizeof text, "%s %s", presence->peer, what);
@@ -40,7 +40,7 @@ static void leave(presence_t *presence, const char *what)
 {
     if (presence->there) {
         presence->there = 0;
-        say(presence, what);
+        log_peer(presence, what);
     }
     presence->misfit[0] = '\0';
 }
@@ -48,7 +48,7 @@ static void leave(presence_t *presence, const char *what)
 static void come(presence_t *presence)
 {
     if (!presence->there) {
-        say(presence, presence->returns ? "is back" : "is there");
+        log_peer(presence, presence->returns ? "is back" : "is there");
         presence->there = 1;
         presence->returns = 1;
     }
@@ -61,11 +61,11 @@ static void refuse(presence_t *presence, const char *why)
     (void)snprintf(what, sizeof what, "that is there does not fit: %s", why);
     if (strcmp(what, presence->misfit) != 0) {
         memcpy(presence->misfit, what, sizeof what);
-        say(presence, what);
+        log_peer(presence, what);
     }
 }
 
-int presence_hear(presence_t *presence, const uint8_t *bytes, size_t size)
+int presence_receive(presence_t *presence, const uint8_t *bytes, size_t size)
 {
     handshake_packet_t packet;
     char why[HANDSHAKE_TEXT_MAX + 1];
@@ -90,7 +90,7 @@ int presence_hear(presence_t *presence, const uint8_t *bytes, size_t size)
     return 1;
 }
 
-void presence_gone(presence_t *presence)
+void presence_end(presence_t *presence)
 {
     leave(presence, "is gone");
 }

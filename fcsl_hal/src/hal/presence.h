@@ -26,12 +26,12 @@ typedef struct {
 presence_t presence_of(fcsl_wire_side_t peer, const fcsl_channel_table_t *table, fcsl_log_t *log);
 
 /* Sends a hello when one is due. Call it often. */
-void presence_tell(presence_t *presence, const fcsl_wire_t *wire);
+void presence_send(presence_t *presence, const fcsl_wire_t *wire);
 
 /* Looks at what came: 1 where it is a control packet. */
-int presence_hear(presence_t *presence, const uint8_t *bytes, size_t size);
+int presence_receive(presence_t *presence, const uint8_t *bytes, size_t size);
 
 /* The peer is gone. */
-void presence_gone(presence_t *presence);
+void presence_end(presence_t *presence);
 
 #endif /* FCSL_PRESENCE_H */

@@ -71,11 +71,11 @@ static fcsl_wire_status_t take(void *ctx, uint8_t *bytes, size_t capacity, size_
             return FCSL_WIRE_OK;
         }
     }
-    const fcsl_wire_status_t gone = lives ? FCSL_WIRE_NONE : bus_peer_gone(&wire->peer);
-    if (gone == FCSL_WIRE_CLOSED) {
+    const fcsl_wire_status_t status = lives ? FCSL_WIRE_NONE : bus_peer_disconnected(&wire->peer);
+    if (status == FCSL_WIRE_CLOSED) {
         named_drain(wire, NAMED_COMMIT); /* a hello may be there of the next one */
     }
-    return gone;
+    return status;
 }
 
 /* Free-running: values come from anybody, control packets from a peer that lives. */

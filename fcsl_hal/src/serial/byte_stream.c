@@ -41,7 +41,7 @@ uint32_t byte_stream_take(byte_stream_t *stream, uint8_t byte, byte_stream_judge
         if (length >= 0) {
             return 0;
         }
-        byte_stream_tell(stream, (uint32_t)-(int64_t)length);
+        byte_stream_note(stream, (uint32_t)-(int64_t)length);
         drop(stream, 1);
         stream->garbage++;
     }
@@ -55,7 +55,7 @@ void byte_stream_break(byte_stream_t *stream)
     stream->taken = 0;
 }
 
-void byte_stream_tell(byte_stream_t *stream, uint32_t why)
+void byte_stream_note(byte_stream_t *stream, uint32_t why)
 {
     stream->why = why > stream->why ? why : stream->why;
 }

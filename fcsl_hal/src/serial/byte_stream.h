@@ -32,7 +32,7 @@ uint32_t byte_stream_take(byte_stream_t *stream, uint8_t byte, byte_stream_judge
 void byte_stream_break(byte_stream_t *stream);
 
 /* Why no sample came of what was taken. */
-void byte_stream_tell(byte_stream_t *stream, uint32_t why);
+void byte_stream_note(byte_stream_t *stream, uint32_t why);
 
 /* Adds what the stream has counted to *input, and counts anew. */
 void byte_stream_report(byte_stream_t *stream, fcsl_driver_input_t *input);

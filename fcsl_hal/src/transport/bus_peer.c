@@ -10,7 +10,7 @@
 
 int bus_peer_lives(const bus_peer_t *peer)
 {
-    return fcsl_bus_alive(peer->bus, peer->side == FCSL_WIRE_LISTEN ? BUS_CONTROLLERS : BUS_SIMULATORS) > 0;
+    return fcsl_bus_token_count(peer->bus, peer->side == FCSL_WIRE_LISTEN ? BUS_CONTROLLERS : BUS_SIMULATORS) > 0;
 }
 
 /* What is sent now reaches the peer. */
@@ -29,7 +29,7 @@ int bus_peer_meet(bus_peer_t *peer)
     return peer->met;
 }
 
-fcsl_wire_status_t bus_peer_gone(bus_peer_t *peer)
+fcsl_wire_status_t bus_peer_disconnected(bus_peer_t *peer)
 {
     if (!peer->met) {
         return FCSL_WIRE_NONE;
@@ -55,13 +55,13 @@ fcsl_wire_status_t bus_peer_receive(const bus_peer_t *peer, bus_take_t take, voi
 int bus_peer_wait(bus_peer_t *peer, const char *endpoint, uint64_t deadline_ns, fcsl_error_t *error)
 {
     while (fcsl_monotonic_ns() < deadline_ns) {
-        if (listens(peer) && fcsl_bus_alive(peer->bus, BUS_CONTROLLERS) == 0) {
+        if (listens(peer) && fcsl_bus_token_count(peer->bus, BUS_CONTROLLERS) == 0) {
             peer->met = 1;
             return 0;
         }
         (void)fcsl_bus_wait(peer->bus, deadline_ns);
     }
-    if (bus_peer_lives(peer) && fcsl_bus_alive(peer->bus, BUS_CONTROLLERS) > 0) {
+    if (bus_peer_lives(peer) && fcsl_bus_token_count(peer->bus, BUS_CONTROLLERS) > 0) {
         (void)fcsl_fail(error, "the simulator on %s has another controller", endpoint);
     } else {
         (void)fcsl_fail(error, "no simulator of this machine is on %s", endpoint);

@@ -32,7 +32,7 @@ int bus_peer_lives(const bus_peer_t *peer);
 int bus_peer_meet(bus_peer_t *peer);
 
 /* What to say when nothing came, and the peer did not live before that was looked at: CLOSED once, to who listens. */
-fcsl_wire_status_t bus_peer_gone(bus_peer_t *peer);
+fcsl_wire_status_t bus_peer_disconnected(bus_peer_t *peer);
 
 /* Takes the next message, if there is one, as a wire's receive does. */
 typedef fcsl_wire_status_t (*bus_take_t)(void *ctx, uint8_t *message, size_t capacity, size_t *size);

@@ -19,7 +19,7 @@ int handshake_fits(uint64_t what, const uint8_t *bytes, size_t size)
 {
     (void)what;
     return size >= HANDSHAKE_HEADER_BYTES && size <= HANDSHAKE_PACKET_MAX && memcmp(bytes, MAGIC, sizeof MAGIC) == 0 &&
-           fcsl_get_u16(bytes + 4) == VERSION && bytes[6] >= HANDSHAKE_HELLO && bytes[6] <= HANDSHAKE_ALIVE &&
+           fcsl_get_u16(bytes + 4) == VERSION && bytes[6] >= HANDSHAKE_HELLO && bytes[6] <= HANDSHAKE_KEEP_ALIVE &&
            bytes[7] <= 1u;
 }
 
@@ -77,9 +77,9 @@ fcsl_wire_status_t handshake_send_leave(const fcsl_wire_t *wire)
     return send_packet(wire, &packet);
 }
 
-fcsl_wire_status_t handshake_send_alive(const fcsl_wire_t *wire)
+fcsl_wire_status_t handshake_send_keep_alive(const fcsl_wire_t *wire)
 {
-    const handshake_packet_t packet = {.kind = HANDSHAKE_ALIVE};
+    const handshake_packet_t packet = {.kind = HANDSHAKE_KEEP_ALIVE};
     return send_packet(wire, &packet);
 }
 

@@ -26,13 +26,13 @@ enum {
 };
 
 /* How often a party that pauses says that it is alive. */
-#define HANDSHAKE_ALIVE_NS 500000000u
+#define HANDSHAKE_KEEP_ALIVE_NS 500000000u
 
 typedef enum {
     HANDSHAKE_HELLO = 1,
     HANDSHAKE_REFUSAL = 2,
     HANDSHAKE_END = 3,   /* the run is over */
-    HANDSHAKE_ALIVE = 4, /* the sender pauses: whoever waits for it shall wait on */
+    HANDSHAKE_KEEP_ALIVE = 4, /* the sender pauses: whoever waits for it shall wait on */
 } handshake_kind_t;
 
 typedef struct {
@@ -55,7 +55,7 @@ fcsl_wire_status_t handshake_send_refusal(const fcsl_wire_t *wire, const char *t
 /* A simulator's, and a controller's: on the bus they share a key with other controllers, who pass over the latter. */
 fcsl_wire_status_t handshake_send_end(const fcsl_wire_t *wire, int another_follows);
 fcsl_wire_status_t handshake_send_leave(const fcsl_wire_t *wire);
-fcsl_wire_status_t handshake_send_alive(const fcsl_wire_t *wire);
+fcsl_wire_status_t handshake_send_keep_alive(const fcsl_wire_t *wire);
 
 static inline int handshake_is_leave(const handshake_packet_t *packet)
 {

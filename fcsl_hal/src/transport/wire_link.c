@@ -29,7 +29,7 @@ enum {
     TICK_MIN_NS = FCSL_NS_PER_MS /
         5, /* a burst of messages makes no faster ticks: they count the time to retransmission */
     CLOSE_NS = 300 * FCSL_NS_PER_MS, /* for the peer to take what was sent last */
-    LOOK_NS = FCSL_NS_PER_MS,
+    POLL_NS = FCSL_NS_PER_MS,
     TEXT_BYTES = 128
 };
 
@@ -47,7 +47,7 @@ typedef struct {
     fcsl_link_t link;
     int has_peer; /* the line is connected */
     int spoken; /* the user has sent something to this peer: until then a newer connection replaces it */
-    int gone; /* the peer went, which the user does not know yet */
+    int disconnected; /* the peer went, which the user does not know yet */
     int stop;
     uint64_t garbage;
     uint64_t failures;
@@ -105,18 +105,18 @@ static void clear(int event)
 
 typedef struct {
     uint64_t ticked_ns; /* when the last link tick was */
-    int heard; /* something came since */
-    int asked; /* the user has sent something since */
+    int received; /* something came since */
+    int is_used; /* the user has sent something since */
     int sending; /* frames of the last tick are left */
 } pump_t;
 
 /* When the next link tick is due. On a slow line the frames of the last one come first. */
 static uint64_t next_tick_ns(const wire_t *wire, const pump_t *pump)
 {
-    if (!pump->asked) {
+    if (!pump->is_used) {
         return pump->ticked_ns + wire->tick_ns;
     }
-    return pump->heard ? 0u : pump->ticked_ns + TICK_MIN_NS;
+    return pump->received ? 0u : pump->ticked_ns + TICK_MIN_NS;
 }
 
 static void tick(wire_t *wire, pump_t *pump, uint64_t now_ns)
@@ -150,15 +150,15 @@ static void read_line(wire_t *wire, pump_t *pump)
     (void)pthread_mutex_lock(&wire->lock);
     const uint64_t messages = wire->link.ports[PORT].counters.received;
     const uint64_t frames = wire->link.counters.frames_taken;
-    const int gone = line_read(&wire->line, &wire->link) != 0;
-    pump->heard = pump->heard || wire->link.counters.frames_taken != frames;
-    const int news = gone || wire->link.ports[PORT].counters.received != messages;
+    const int disconnected = line_read(&wire->line, &wire->link) != 0;
+    pump->received = pump->received || wire->link.counters.frames_taken != frames;
+    const int news = disconnected || wire->link.ports[PORT].counters.received != messages;
     wire->garbage = wire->line.decoder.garbage;
     wire->failures = wire->line.failures;
-    wire->gone = wire->gone || gone;
-    wire->has_peer = !gone;
+    wire->disconnected = wire->disconnected || disconnected;
+    wire->has_peer = !disconnected;
     (void)pthread_mutex_unlock(&wire->lock);
-    if (gone) {
+    if (disconnected) {
         line_drop(&wire->line);
     }
     if (news) {
@@ -170,8 +170,8 @@ static void read_line(wire_t *wire, pump_t *pump)
 static void accept_peer(wire_t *wire)
 {
     if (line_accept(&wire->line) != 0) {
-        const struct timespec look = {.tv_nsec = LOOK_NS};
-        (void)nanosleep(&look, NULL); /* it is still there to be accepted, perhaps when a descriptor is free */
+        const struct timespec poll = {.tv_nsec = POLL_NS};
+        (void)nanosleep(&poll, NULL); /* it is still there to be accepted, perhaps when a descriptor is free */
         return;
     }
     (void)pthread_mutex_lock(&wire->lock);
@@ -189,7 +189,7 @@ static int has_spoken(wire_t *wire)
 }
 
 /* Waits for the line, for the user, or for the time of the next tick. */
-static void attend(wire_t *wire, pump_t *pump)
+static void serve(wire_t *wire, pump_t *pump)
 {
     const line_t *line = &wire->line;
     const int listens = line->listener >= 0 && (line->fd < 0 || !has_spoken(wire));
@@ -200,14 +200,14 @@ static void attend(wire_t *wire, pump_t *pump)
         {.fd = listens ? line->listener : -1, .events = POLLIN}, /* -1 is passed over */
     };
     /* Where the line has no room, no tick is due. */
-    const uint64_t wait_ns = line->serial ? LOOK_NS : wire->tick_ns;
+    const uint64_t wait_ns = line->serial ? POLL_NS : wire->tick_ns;
     const struct timespec left = pump->sending ? fcsl_timespec_of(wait_ns) : fcsl_time_left(next_tick_ns(wire, pump));
     if (ppoll(entries, 3, &left, NULL) <= 0) {
         return;
     }
     if (entries[0].revents != 0) {
         clear(wire->wake);
-        pump->asked = 1;
+        pump->is_used = 1;
     }
     if ((entries[1].revents & (POLLIN | POLLHUP | POLLERR)) != 0) {
         read_line(wire, pump);
@@ -228,14 +228,14 @@ static int stopped(wire_t *wire)
 static void *run(void *argument)
 {
     wire_t *wire = argument;
-    pump_t pump = {.asked = 1, .heard = 1};
+    pump_t pump = {.is_used = 1, .received = 1};
     while (!stopped(wire)) {
         const uint64_t now_ns = fcsl_monotonic_ns();
         if (!pump.sending && now_ns >= next_tick_ns(wire, &pump)) {
             tick(wire, &pump, now_ns);
         }
         write_frames(wire, &pump);
-        attend(wire, &pump);
+        serve(wire, &pump);
     }
     /* The last acknowledgements. */
     tick(wire, &pump, fcsl_monotonic_ns());
@@ -260,7 +260,7 @@ static fcsl_wire_status_t link_send(void *ctx, const uint8_t *message, size_t si
 {
     wire_t *wire = ctx;
     (void)pthread_mutex_lock(&wire->lock);
-    const int closed = wire->gone || (!wire->has_peer && wire->line.listener < 0);
+    const int closed = wire->disconnected || (!wire->has_peer && wire->line.listener < 0);
     const fcsl_link_status_t status = closed ? FCSL_LINK_EMPTY
                                       : waiting(&wire->link) >= WAITING_MAX
                                           ? FCSL_LINK_FULL
@@ -294,8 +294,8 @@ static fcsl_wire_status_t take(wire_t *wire, uint8_t *message, size_t capacity, 
     }
     if (got == FCSL_LINK_OK) {
         status = FCSL_WIRE_OK;
-    } else if (wire->gone || (!wire->has_peer && wire->line.listener < 0)) {
-        wire->gone = 0;
+    } else if (wire->disconnected || (!wire->has_peer && wire->line.listener < 0)) {
+        wire->disconnected = 0;
         status = FCSL_WIRE_CLOSED;
     }
     (void)pthread_mutex_unlock(&wire->lock);
@@ -344,8 +344,8 @@ static void link_count(void *ctx, void *values)
 static int is_delivered(wire_t *wire)
 {
     (void)pthread_mutex_lock(&wire->lock);
-    const int done =
-        wire->link.ports[PORT].out.count == 0 || !fcsl_link_connected(&wire->link) || wire->gone || !wire->has_peer;
+    const int done = wire->link.ports[PORT].out.count == 0 || !fcsl_link_connected(&wire->link) || wire->disconnected ||
+                     !wire->has_peer;
     (void)pthread_mutex_unlock(&wire->lock);
     return done;
 }
@@ -366,9 +366,9 @@ static void link_close(void *ctx)
 {
     wire_t *wire = ctx;
     const uint64_t deadline_ns = fcsl_monotonic_ns() + CLOSE_NS;
-    const struct timespec look = {.tv_nsec = LOOK_NS};
+    const struct timespec poll = {.tv_nsec = POLL_NS};
     while (!is_delivered(wire) && fcsl_monotonic_ns() < deadline_ns) {
-        (void)nanosleep(&look, NULL);
+        (void)nanosleep(&poll, NULL);
     }
     (void)pthread_mutex_lock(&wire->lock);
     wire->stop = 1;

@@ -110,7 +110,7 @@ static fcsl_wire_status_t take(void *ctx, uint8_t *message, size_t capacity, siz
         }
         wire->too_large++;
     }
-    return lives ? FCSL_WIRE_NONE : bus_peer_gone(&wire->peer);
+    return lives ? FCSL_WIRE_NONE : bus_peer_disconnected(&wire->peer);
 }
 
 static fcsl_wire_status_t zenoh_receive(void *ctx, uint64_t deadline_ns, uint8_t *message, size_t capacity,

@@ -16,8 +16,8 @@
 #include "output_device.h"
 #include "register_window.h"
 
-enum { NEWS_BYTES = 512, LOOK_NS = 1000000 };
-static const uint64_t PATIENCE_NS = 100000000u; /* a write that lasts longer has failed */
+enum { NEWS_BYTES = 512, POLL_NS = 1000000 };
+static const uint64_t TIMEOUT_NS = 100000000u; /* a write that lasts longer has failed */
 static const uint64_t END_NS = 1000000000u;
 static const uint64_t NEWS_NS = 1000000000u; /* between two texts of a device */
 static const double ON = 0.5; /* the least value of a signal that is on */
@@ -28,8 +28,8 @@ typedef struct {
     uint64_t missed; /* writes, as of the last tick */
     uint64_t lost; /* how often it began to fail */
     int is_failing;
-    int is_told; /* that it fails */
-    uint64_t told_ns;
+    int is_reported; /* that it fails */
+    uint64_t reported_ns;
 } output_t;
 
 struct board_hardware {
@@ -304,7 +304,7 @@ int board_hardware_start(board_hardware_t *hardware, int priority, fcsl_error_t 
     }
     for (uint32_t d = 0; d < plan->device_count; d++) {
         if (hardware->outputs[d].device != NULL &&
-            output_device_start(hardware->outputs[d].device, priority, PATIENCE_NS, &why) != 0) {
+            output_device_start(hardware->outputs[d].device, priority, TIMEOUT_NS, &why) != 0) {
             return fcsl_fail(error, "device '%.60s': %.400s", plan->devices[d].name, why.text);
         }
     }
@@ -338,11 +338,11 @@ const char *board_hardware_news(board_hardware_t *hardware)
     const uint64_t now = fcsl_monotonic_ns();
     for (uint32_t d = 0; d < hardware->plan->device_count; d++) {
         output_t *output = &hardware->outputs[d];
-        if (output->is_failing == output->is_told || now - output->told_ns < NEWS_NS) {
+        if (output->is_failing == output->is_reported || now - output->reported_ns < NEWS_NS) {
             continue;
         }
-        output->is_told = output->is_failing;
-        output->told_ns = now;
+        output->is_reported = output->is_failing;
+        output->reported_ns = now;
         (void)snprintf(hardware->news, sizeof hardware->news, "device '%.60s' %s%s", hardware->plan->devices[d].name,
                        output->is_failing ? "fails: " : "takes its levels again",
                        output->is_failing ? reason_of(output) : "");
@@ -373,7 +373,7 @@ static uint32_t count_unsafe(board_hardware_t *hardware, int puts, uint32_t *one
 
 int board_hardware_end(board_hardware_t *hardware, fcsl_error_t *error)
 {
-    const struct timespec look = {.tv_nsec = LOOK_NS};
+    const struct timespec look = {.tv_nsec = POLL_NS};
     const uint64_t end_ns = fcsl_monotonic_ns() + END_NS;
     uint32_t one = 0;
     if (!hardware->is_started) {

@@ -151,7 +151,7 @@ static const char *composite_explain(void *ctx)
     return hal->failed ? hal->failure : hal->culprit->explain(hal->culprit->ctx);
 }
 
-static void composite_alive(void *ctx)
+static void composite_keep_alive(void *ctx)
 {
     hal_t *hal = ctx;
     hal->simulated.alive(hal->simulated.ctx);
@@ -252,7 +252,7 @@ int hal_composite(const fcsl_hal_t *board, const fcsl_hal_t *simulated, fcsl_run
         .sample = composite_sample,
         .command = composite_command,
         .arm = composite_arm,
-        .alive = composite_alive,
+        .alive = composite_keep_alive,
         .clock = simulated->clock,
         .log = simulated->log,
         .count = composite_count,

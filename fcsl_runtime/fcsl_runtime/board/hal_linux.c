@@ -171,7 +171,7 @@ static const char *linux_explain(void *ctx)
 }
 
 /* While it is paused nobody gets what is measured; the newest sample is kept for the tick that follows. */
-static void linux_alive(void *ctx)
+static void linux_keep_alive(void *ctx)
 {
     hal_t *hal = ctx;
     board_devices_discard(hal->devices);
@@ -290,7 +290,7 @@ int hal_linux(const char *file, int priority, fcsl_run_t *run, fcsl_hal_t *hal, 
         .sample = linux_sample,
         .command = linux_command,
         .arm = linux_arm,
-        .alive = linux_alive,
+        .alive = linux_keep_alive,
         .clock = fcsl_monotonic_clock,
         .log = &self->log,
         .count = linux_count,

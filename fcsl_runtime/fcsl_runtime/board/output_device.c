@@ -45,7 +45,7 @@ struct output_device {
 
     /* The loop's. */
     uint64_t awaited; /* the number of values */
-    uint64_t patience_ns;
+    uint64_t timeout_ns;
     uint64_t ended_seen;
     uint64_t since_ns; /* since when no write has ended */
     uint64_t late;
@@ -189,9 +189,9 @@ static int open_device(output_device_t *device, fcsl_error_t *error)
                                       what, why[0] != '\0' ? why : "the driver gives no reason");
 }
 
-int output_device_start(output_device_t *device, int priority, uint64_t patience_ns, fcsl_error_t *error)
+int output_device_start(output_device_t *device, int priority, uint64_t timeout_ns, fcsl_error_t *error)
 {
-    device->patience_ns = patience_ns;
+    device->timeout_ns = timeout_ns;
     if (open_device(device, error) != 0) {
         return -1;
     }
@@ -215,23 +215,23 @@ void *output_device_values(output_device_t *device)
 }
 
 /* A thread that gets no processor is as bad as a write that hangs. */
-static void look_after_write(output_device_t *device, uint64_t now_ns)
+static void check_after_write(output_device_t *device, uint64_t now_ns)
 {
     const uint64_t ended = atomic_load(&device->ended);
     if (ended == device->values.puts || ended != device->ended_seen) {
         device->ended_seen = ended;
         device->since_ns = now_ns;
-    } else if (now_ns > device->since_ns && now_ns - device->since_ns > device->patience_ns) {
+    } else if (now_ns > device->since_ns && now_ns - device->since_ns > device->timeout_ns) {
         device->late++;
         (void)fcsl_latest_take(&device->reasons); /* of a write before */
         (void)snprintf(device->reason, sizeof device->reason, "it has ended no write for %.6g ms",
-                       (double)device->patience_ns / 1e6);
+                       (double)device->timeout_ns / 1e6);
     }
 }
 
 void output_device_put(output_device_t *device, uint64_t now_ns)
 {
-    look_after_write(device, now_ns);
+    check_after_write(device, now_ns);
     if (fcsl_latest_put(&device->values)) {
         (void)sem_post(&device->wake);
     }

@@ -22,8 +22,8 @@ const fcsl_driver_t *output_device_driver(const output_device_t *device);
 int output_device_use(output_device_t *device, uint32_t signal);
 
 /* Probes and opens the device, and starts its thread with this priority of SCHED_FIFO (0: as any thread). A write that lasts for longer
- * than `patience_ns` is missed. 0, or -1: it is not open, and for output_device_free alone. */
-int output_device_start(output_device_t *device, int priority, uint64_t patience_ns, fcsl_error_t *error);
+ * than `timeout_ns` is missed. 0, or -1: it is not open, and for output_device_free alone. */
+int output_device_start(output_device_t *device, int priority, uint64_t timeout_ns, fcsl_error_t *error);
 int output_device_is_open(const output_device_t *device);
 
 /* From the loop. The place of the next values, laid out as the driver's struct: all driven signals are to be filled in. */

@@ -32,7 +32,7 @@
 #include "fcsl/fcsl_scalar.h"
 
 enum { NEWS_BYTES = 512 };
-static const uint64_t LOOK_AGAIN_NS = 500000000u; /* for a device that is not there */
+static const uint64_t RECHECK_NS = 500000000u; /* for a device that is not there */
 static const uint64_t FAILED_NS = 10000000u; /* after a read that failed, of a driver that waits */
 static const uint64_t END_NS = 1000000000u;
 static const uint64_t AHEAD_NS = 1000000u; /* a sample that is further in the future has a wrong time */
@@ -76,9 +76,9 @@ struct sensor_device {
 
     pthread_mutex_t reason_lock; /* the step thread only tries it */
     char reason[DEVICE_REASON_BYTES];
-    condition_t told;
-    uint64_t told_why;
-    uint64_t told_ns;
+    condition_t reported;
+    uint64_t reported_why;
+    uint64_t reported_ns;
     char news[NEWS_BYTES];
 };
 
@@ -247,11 +247,11 @@ static uint32_t count_input(sensor_device_t *device, int has_sample)
     atomic_fetch_add_explicit(&device->rejected, input->rejected, memory_order_relaxed);
     const uint64_t now = fcsl_monotonic_ns();
     const uint32_t why = why_of(input);
-    const uint32_t told = why > device->why_now ? why : device->why_now;
+    const uint32_t worst = why > device->why_now ? why : device->why_now;
     const int begins_anew = has_sample || now - device->since_ns >= SILENT_NS;
-    device->why_now = begins_anew ? (uint32_t)FCSL_DRIVER_NOT_TOLD : told;
+    device->why_now = begins_anew ? (uint32_t)FCSL_DRIVER_NOT_TOLD : worst;
     device->since_ns = begins_anew ? now : device->since_ns;
-    return begins_anew && !has_sample ? told : (uint32_t)FCSL_DRIVER_NOT_TOLD;
+    return begins_anew && !has_sample ? worst : (uint32_t)FCSL_DRIVER_NOT_TOLD;
 }
 
 const char *board_why_text(uint64_t why)
@@ -308,7 +308,7 @@ static uint64_t read_device(sensor_device_t *device)
         atomic_store(&device->opened, 0);
         atomic_fetch_add_explicit(&device->lost, 1, memory_order_relaxed);
         set_condition(device, DEVICE_MISSING, FCSL_DRIVER_NOT_TOLD, why);
-        return LOOK_AGAIN_NS;
+        return RECHECK_NS;
     }
     if (atomic_load(&device->condition) != DEVICE_FAILING) {
         set_condition(device, DEVICE_FAILING, FCSL_DRIVER_NOT_TOLD, why);
@@ -333,7 +333,7 @@ static uint64_t next_due(uint64_t due_ns, uint64_t period_ns)
 }
 
 /* Opens a device that was not there; one that is there and refuses is told. */
-static int look_again(sensor_device_t *device)
+static int reopen(sensor_device_t *device)
 {
     char why[DEVICE_REASON_BYTES] = "";
     const int status = open_device(device, why, sizeof why);
@@ -351,8 +351,8 @@ static void *run(void *ctx)
     sensor_device_t *device = ctx;
     uint64_t due_ns = fcsl_monotonic_ns();
     while (atomic_load(&device->over) == 0) {
-        if (!atomic_load(&device->opened) && !look_again(device)) {
-            sleep_until(device, fcsl_monotonic_ns() + LOOK_AGAIN_NS);
+        if (!atomic_load(&device->opened) && !reopen(device)) {
+            sleep_until(device, fcsl_monotonic_ns() + RECHECK_NS);
             continue;
         }
         const uint64_t wait_ns = read_device(device);
@@ -381,7 +381,7 @@ int sensor_device_start(sensor_device_t *device, int priority, fcsl_error_t *err
                          device->plan->address, why[0] != '\0' ? why : "the driver gives no reason");
     }
     set_condition(device, status == FCSL_DRIVER_OK ? DEVICE_OPEN : DEVICE_MISSING, FCSL_DRIVER_NOT_TOLD, why);
-    device->told = DEVICE_OPEN;
+    device->reported = DEVICE_OPEN;
     const int code = device_thread_start(&device->thread, priority, run, device);
     device->started = code == 0;
     return code == 0 ? 0 : fcsl_fail(error, "device '%.60s': no thread: %s", device->plan->name, strerror(code));
@@ -450,20 +450,21 @@ device_counts_t sensor_device_counts(const sensor_device_t *device)
 
 const char *sensor_device_news(sensor_device_t *device)
 {
-    static const char *const SAY[] = {[DEVICE_MISSING] = "is not there: ",
-                                      [DEVICE_OPEN] = "is there",
-                                      [DEVICE_SILENT] = "is silent: ",
-                                      [DEVICE_FAILING] = "fails: "};
+    static const char *const CONDITION_TEXTS[] = {[DEVICE_MISSING] = "is not there: ",
+                                                  [DEVICE_OPEN] = "is there",
+                                                  [DEVICE_SILENT] = "is silent: ",
+                                                  [DEVICE_FAILING] = "fails: "};
     const uint64_t now = fcsl_monotonic_ns();
-    if ((atomic_load(&device->condition) == (int)device->told && atomic_load(&device->why) == device->told_why) ||
-        now - device->told_ns < NEWS_NS || pthread_mutex_trylock(&device->reason_lock) != 0) {
+    if ((atomic_load(&device->condition) == (int)device->reported &&
+         atomic_load(&device->why) == device->reported_why) ||
+        now - device->reported_ns < NEWS_NS || pthread_mutex_trylock(&device->reason_lock) != 0) {
         return NULL;
     }
-    device->told_ns = now;
-    device->told = (condition_t)atomic_load(&device->condition);
-    device->told_why = atomic_load(&device->why);
-    (void)snprintf(device->news, sizeof device->news, "device '%.60s' %s%s", device->plan->name, SAY[device->told],
-                   device->told == DEVICE_OPEN ? "" : device->reason);
+    device->reported_ns = now;
+    device->reported = (condition_t)atomic_load(&device->condition);
+    device->reported_why = atomic_load(&device->why);
+    (void)snprintf(device->news, sizeof device->news, "device '%.60s' %s%s", device->plan->name,
+                   CONDITION_TEXTS[device->reported], device->reported == DEVICE_OPEN ? "" : device->reason);
     (void)pthread_mutex_unlock(&device->reason_lock);
     return device->news;
 }

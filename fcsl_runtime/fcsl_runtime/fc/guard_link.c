@@ -20,7 +20,7 @@ int guard_link_open(loop_t *loop, const char *path, fcsl_error_t *error)
 
 void guard_link_check(loop_t *loop)
 {
-    if (loop->guard_state == GUARD_THERE && fcsl_guard_is_gone(&loop->guard)) {
+    if (loop->guard_state == GUARD_THERE && fcsl_guard_has_ended(&loop->guard)) {
         loop->guard_state = GUARD_ENDED;
         log_error("fcsl-guard has ended: from here on the actuators get no command of this run");
     }

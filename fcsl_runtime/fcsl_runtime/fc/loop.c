@@ -252,7 +252,7 @@ int loop_may_tick(const loop_t *loop)
 static void idle(loop_t *loop)
 {
     const uint64_t deadline = fcsl_monotonic_ns() + SLICE_NS;
-    if (loop->vars != NULL && loop->attends) {
+    if (loop->vars != NULL && loop->serves_clients) {
         fcsl_vars_wait_serving(loop->vars, deadline);
     } else if (loop->vars != NULL) {
         fcsl_vars_wait(loop->vars, deadline);

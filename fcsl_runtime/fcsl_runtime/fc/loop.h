@@ -31,7 +31,7 @@ typedef struct {
     atomic_int *stop;   /* set by a signal */
     uint64_t ticks_max; /* 0: no limit */
     missed_deadline_t missed_deadline;
-    int attends; /* while paused the step thread serves clients itself */
+    int serves_clients; /* while paused the step thread serves clients itself */
     int realtime; /* ticks are in the world's time, paced by the clock or a device; else as fast as the HAL allows */
     int recording;
     hal_topic_t hal_topic;

@@ -183,7 +183,7 @@ static int open_hardware(program_t *program)
         return complain("--missed-deadline is for ticks that the clock paces; here a simulator or a device paces them");
     }
     /* Beside a rig there is but one time. */
-    loop->attends = program->options.priority == 0; /* clients shall not take the processor from others */
+    loop->serves_clients = program->options.priority == 0; /* clients shall not take the processor from others */
     loop->realtime = (program->options.realtime || loop->hal.serves) && loop->hal.paces != FCSL_PACED_BY_SIMULATOR;
     if (loop->realtime && !program->options.no_overrun_check) {
         /* Only here: in lock-step a clock would make the results depend on the computer. */
@@ -353,11 +353,11 @@ static const char *reason_of_end(const program_t *program)
 }
 
 /* A bag that cannot be closed for the reason that its recording failed for has nothing to add. */
-static int is_told(const loop_t *loop, const char *text)
+static int is_reported(const loop_t *loop, const char *text)
 {
-    const int told =
+    const int reported =
         atomic_load(&loop->record_logged) > 0 && atomic_load(&loop->record_logged) == atomic_load(&loop->record_failed);
-    return strcmp(loop->failure, text) == 0 || (told && strcmp(loop->record_failure, text) == 0);
+    return strcmp(loop->failure, text) == 0 || (reported && strcmp(loop->record_failure, text) == 0);
 }
 
 static int close_all(program_t *program)
@@ -374,7 +374,7 @@ static int close_all(program_t *program)
         loop->hal.close(loop->hal.ctx);
     }
     if (loop->run != NULL && fcsl_run_close(loop->run, &error) != 0) {
-        status = is_told(loop, error.text) ? -1 : complain(error.text);
+        status = is_reported(loop, error.text) ? -1 : complain(error.text);
     }
     guard_link_close(loop);
     loop_free(loop);

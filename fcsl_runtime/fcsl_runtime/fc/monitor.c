@@ -16,14 +16,14 @@
 
 static const uint64_t MILLISECOND_NS = 1000000u;
 /* A step thread that has not ended this long after a signal is stuck. */
-static const uint64_t PATIENCE_NS = 3000000000u;
-enum { LOOK_MS = 100, LOOKS_PER_LIMIT = 4, TEXT_BYTES = 256, PIPE_BYTES = 65536 };
+static const uint64_t TIMEOUT_NS = 3000000000u;
+enum { POLL_MS = 100, POLLS_PER_LIMIT = 4, TEXT_BYTES = 256, PIPE_BYTES = 65536 };
 
 /* A stuck step is found a quarter of the limit late at most. */
 static uint64_t period_of(const watchdog_t *watchdog)
 {
-    const uint64_t most = LOOK_MS * MILLISECOND_NS;
-    const uint64_t wanted = watchdog->limit_ns / LOOKS_PER_LIMIT;
+    const uint64_t most = POLL_MS * MILLISECOND_NS;
+    const uint64_t wanted = watchdog->limit_ns / POLLS_PER_LIMIT;
     return watchdog->limit_ns == 0 || wanted > most ? most : wanted;
 }
 
@@ -92,7 +92,7 @@ static void *run_monitor(void *argument)
         }
         if ((number > 0 || stdin_closed(monitor)) && give_up == UINT64_MAX) {
             stop(monitor);
-            give_up = now + PATIENCE_NS;
+            give_up = now + TIMEOUT_NS;
         }
         check(monitor, now);
         if (now > give_up) {

@@ -84,9 +84,9 @@ static void take_command(guard_t *guard)
 }
 
 /* A command ends with the program that gave it, and the next program begins with a closed gate. */
-static void look_at_programs(guard_t *guard)
+static void poll_programs(guard_t *guard)
 {
-    const fcsl_guard_event_t event = fcsl_guard_look(&guard->server);
+    const fcsl_guard_event_t event = fcsl_guard_poll(&guard->server);
     guard->turned_away += event == FCSL_GUARD_REFUSED;
     if (event == FCSL_GUARD_LEFT) {
         guard->gate = fcsl_gate(guard->machine, guard->data);
@@ -96,7 +96,7 @@ static void look_at_programs(guard_t *guard)
 void guard_period(guard_t *guard)
 {
     const fcsl_gate_state_t before = guard->gate.state;
-    look_at_programs(guard);
+    poll_programs(guard);
     take_command(guard);
     const uint64_t now_ns = fcsl_monotonic_ns();
     fcsl_gate_wait(&guard->gate, now_ns, guard->data);

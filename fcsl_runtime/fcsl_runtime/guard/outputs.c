@@ -13,7 +13,7 @@
 #include "fcsl/fcsl_monotonic.h"
 #include "fcsl/fcsl_scalar.h"
 
-enum { LOOK_NS = 1000000 }; /* between two looks at devices that are waited for */
+enum { POLL_NS = 1000000 }; /* between two looks at devices that are waited for */
 static const uint64_t END_NS = 1000000000u; /* for the threads to end */
 
 int outputs_open(outputs_t *outputs, const fcsl_machine_t *machine, uint32_t devices, uint32_t bindings,
@@ -81,13 +81,13 @@ static void put_device(outputs_t *outputs, output_device_t *device, const void *
     output_device_put(device, time_ns);
 }
 
-int outputs_start(outputs_t *outputs, const void *data, int priority, uint64_t patience_ns, fcsl_error_t *error)
+int outputs_start(outputs_t *outputs, const void *data, int priority, uint64_t timeout_ns, fcsl_error_t *error)
 {
     int status = 0;
     for (uint32_t i = 0; i < outputs->device_count; i++) {
         output_device_t *device = outputs->devices[i];
         fcsl_error_t why;
-        if (output_device_start(device, priority, patience_ns, &why) == 0) {
+        if (output_device_start(device, priority, timeout_ns, &why) == 0) {
             put_device(outputs, device, data, 0, fcsl_monotonic_ns()); /* the next one may take its time to open */
         } else if (status == 0) {
             *error = why;
@@ -137,14 +137,14 @@ static uint32_t count_missing(const outputs_t *outputs)
 
 uint32_t outputs_make_safe(outputs_t *outputs, const void *data, uint64_t period_ns, uint64_t limit_ns)
 {
-    const struct timespec look = {.tv_nsec = LOOK_NS};
+    const struct timespec pause = {.tv_nsec = POLL_NS};
     const uint64_t begin_ns = fcsl_monotonic_ns();
     uint64_t again_ns = begin_ns + period_ns;
     outputs_put(outputs, data, 0, begin_ns);
     await(outputs);
     uint32_t missing = count_missing(outputs);
     while (missing > 0u && fcsl_monotonic_ns() < begin_ns + limit_ns) {
-        (void)nanosleep(&look, NULL);
+        (void)nanosleep(&pause, NULL);
         missing = count_missing(outputs);
         if (missing > 0u && fcsl_monotonic_ns() >= again_ns) {
             put_safe(outputs, data);

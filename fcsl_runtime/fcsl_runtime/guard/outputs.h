@@ -44,9 +44,9 @@ output_device_t *outputs_find_device(outputs_t *outputs, const char *driver, con
 /* Drives a signal of the device with what the binding says, which lacks `to`. 0, or -1. */
 int outputs_bind(outputs_t *outputs, const output_binding_t *binding, uint32_t signal, fcsl_error_t *error);
 
-/* Opens each device, starts its thread and hands it the safe values of the machine struct `data`. A write that lasts for longer than `patience_ns` is missed. 0, or -1 with the first error; a
+/* Opens each device, starts its thread and hands it the safe values of the machine struct `data`. A write that lasts for longer than `timeout_ns` is missed. 0, or -1 with the first error; a
  * device that does not open keeps no other one from starting. */
-int outputs_start(outputs_t *outputs, const void *data, int priority, uint64_t patience_ns, fcsl_error_t *error);
+int outputs_start(outputs_t *outputs, const void *data, int priority, uint64_t timeout_ns, fcsl_error_t *error);
 /* Hands the channels of the machine struct `data` to all devices that run, and waits for none. */
 void outputs_put(outputs_t *outputs, const void *data, int armed, uint64_t now_ns);
 /* Hands over safe values as outputs_put does, and waits until all devices have taken them; all get them again every period until then.

@@ -56,10 +56,10 @@ static void report_missed(const outputs_t *outputs)
 /* Whether a counter is to be printed now. */
 static int is_due(report_count_t *count, uint64_t value, uint64_t now_ns)
 {
-    if (count->told == value || now_ns < count->next_ns) {
+    if (count->reported == value || now_ns < count->next_ns) {
         return 0;
     }
-    count->told = value;
+    count->reported = value;
     count->next_ns = now_ns + COUNT_NS;
     return 1;
 }

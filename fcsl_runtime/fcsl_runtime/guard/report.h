@@ -9,7 +9,7 @@
 
 /* A counter, as it was printed last. */
 typedef struct {
-    uint64_t told;
+    uint64_t reported;
     uint64_t next_ns; /* not printed again before */
 } report_count_t;
 

@@ -115,7 +115,7 @@ int fcsl_lockstep_connect(fcsl_lockstep_t *lockstep, uint32_t wait_ms, uint32_t 
     return failed;
 }
 
-void fcsl_lockstep_alive(fcsl_lockstep_t *lockstep)
+void fcsl_lockstep_keep_alive(fcsl_lockstep_t *lockstep)
 {
     if (lockstep->connected) {
         lockstep->hal.alive(lockstep->hal.ctx);
@@ -207,7 +207,7 @@ static int end_of(const fcsl_lockstep_t *lockstep, fcsl_hal_status_t status, fcs
         return FCSL_LOCKSTEP_AGAIN;
     default:
         (void)fail(error, "%s", lockstep->hal.explain(lockstep->hal.ctx));
-        return fcsl_lockstep_count(lockstep, "connected") ? -1 : FCSL_LOCKSTEP_GONE;
+        return fcsl_lockstep_count(lockstep, "connected") ? -1 : FCSL_LOCKSTEP_DISCONNECTED;
     }
 }
 

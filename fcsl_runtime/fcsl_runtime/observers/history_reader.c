@@ -83,7 +83,7 @@ static int read_history(history_reader_t *f)
         if (status == FCSL_HISTORY_COMING) {
             return 1;
         }
-        if (status == FCSL_HISTORY_GONE) {
+        if (status == FCSL_HISTORY_OVERWRITTEN) {
             const uint64_t cursor = fcsl_history_catch_up(f->history, f->cursor);
             f->overtaken += cursor - f->cursor;
             f->cursor = cursor;
@@ -136,7 +136,7 @@ int history_reader_open(history_reader_t *reader, const fcsl_history_t *history,
 {
     reader->history = history;
     reader->sink = *sink;
-    reader->poll_ns = fcsl_history_nap_ns(history, tick_hz);
+    reader->poll_ns = fcsl_history_poll_ns(history, tick_hz);
     reader->cursor = fcsl_history_published(history);
     reader->publication = malloc(fcsl_history_bytes(history) + 1u);
     return reader->publication != NULL ? 0 : -1;

@@ -86,9 +86,9 @@ static int add_fixed(ros_topics_t *topics, const fixed_t *fixed, const char *nam
     topic->what = fixed->what;
     topic->latched = fixed->latched;
     topic->longest = tick_message_bytes(topics->machine);
-    topic->said = malloc(topic->longest);
+    topic->last_message = malloc(topic->longest);
     topics->latched_count += fixed->latched ? 1u : 0u;
-    if (topic->said == NULL) {
+    if (topic->last_message == NULL) {
         return fcsl_fail(error, "out of memory for topics");
     }
     return ros_key_write(topic->key, name_space, topics->machine->name, fixed->name, error) != 0
@@ -185,7 +185,7 @@ void ros_topics_free(ros_topics_t *topics)
     for (uint32_t i = 0; i < topics->count; i++) {
         fcsl_layout_free(&topics->topics[i].layout);
         fcsl_ros_composer_free(topics->topics[i].composer);
-        free(topics->topics[i].said);
+        free(topics->topics[i].last_message);
     }
     free(topics->topics);
     *topics = (ros_topics_t){0};
@@ -209,12 +209,12 @@ static size_t write_tick_message(const fcsl_machine_t *machine, ros_topic_t *top
         return 0;
     }
     const uint32_t length = (uint32_t)size;
-    if (topic->latched && length == topic->said_bytes &&
-        memcmp(topic->said + HEAD_BYTES, bytes + HEAD_BYTES, length - HEAD_BYTES) == 0) {
+    if (topic->latched && length == topic->last_message_bytes &&
+        memcmp(topic->last_message + HEAD_BYTES, bytes + HEAD_BYTES, length - HEAD_BYTES) == 0) {
         return 0;
     }
-    memcpy(topic->said, bytes, length);
-    topic->said_bytes = length;
+    memcpy(topic->last_message, bytes, length);
+    topic->last_message_bytes = length;
     return length;
 }
 
@@ -233,7 +233,7 @@ static int is_sampled(const fcsl_machine_t *machine, const fcsl_ros_message_t *m
 }
 
 /* Actuators of a disarmed machine get their safe values. A number that its field cannot hold makes no message, and is counted. */
-static size_t write_mapped(ros_topics_t *topics, const ros_topic_t *topic, const followed_tick_t *tick,
+static size_t write_mapped(ros_topics_t *topics, const ros_topic_t *topic, const published_tick_t *tick,
                            fcsl_stamp_t stamp, uint8_t *bytes)
 {
     const uint8_t *data = tick->publication;
@@ -251,7 +251,7 @@ static size_t write_mapped(ros_topics_t *topics, const ros_topic_t *topic, const
     return topic->longest;
 }
 
-size_t ros_topics_write(ros_topics_t *topics, uint32_t number, const followed_tick_t *tick, fcsl_stamp_t stamp,
+size_t ros_topics_write(ros_topics_t *topics, uint32_t number, const published_tick_t *tick, fcsl_stamp_t stamp,
                         uint8_t *bytes)
 {
     const uint8_t *data = tick->publication;
@@ -271,5 +271,5 @@ size_t ros_topics_write(ros_topics_t *topics, uint32_t number, const followed_ti
 
 void ros_topics_unsay(ros_topics_t *topics, uint32_t number)
 {
-    topics->topics[number].said_bytes = 0;
+    topics->topics[number].last_message_bytes = 0;
 }

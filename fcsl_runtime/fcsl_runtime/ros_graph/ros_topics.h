@@ -24,8 +24,8 @@ typedef struct {
     const fcsl_ros_message_t *mapped; /* ROS_MAPPED */
     fcsl_ros_composer_t *composer;
     uint32_t longest;         /* bytes of the longest message */
-    uint32_t said_bytes;      /* of the last one */
-    uint8_t *said;
+    uint32_t last_message_bytes;      /* of the last one */
+    uint8_t *last_message;
     char key[FCSL_BUS_KEY_MAX + 1];
     char token[FCSL_BUS_TOKEN_MAX + 1];
 } ros_topic_t;
@@ -44,7 +44,7 @@ int ros_topics_build(ros_topics_t *topics, const fcsl_ros_graph_options_t *optio
 void ros_topics_free(ros_topics_t *topics);
 
 /* Writes a topic's message of a tick. Returns its bytes, or 0 when there is none. `bytes` has room for the topic's longest. */
-size_t ros_topics_write(ros_topics_t *topics, uint32_t number, const followed_tick_t *tick, fcsl_stamp_t stamp,
+size_t ros_topics_write(ros_topics_t *topics, uint32_t number, const published_tick_t *tick, fcsl_stamp_t stamp,
                         uint8_t *bytes);
 
 /* What was written last was not put: it is written again with the next tick. */

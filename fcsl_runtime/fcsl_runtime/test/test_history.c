@@ -195,7 +195,7 @@ static int count_torn(publisher_t publisher)
             const fcsl_history_status_t status = fcsl_history_read(&shared.history, 0, &moment, bytes);
             overtaking.loads = -1;
             overtaking.stores = -1;
-            overtaken += status == FCSL_HISTORY_GONE;
+            overtaken += status == FCSL_HISTORY_OVERWRITTEN;
             torn += status == FCSL_HISTORY_OK && !(moment.tick == 0 && is_whole(&moment, bytes));
             fcsl_history_free(&shared.history);
         }
@@ -248,7 +248,7 @@ static void test_one_thread(void)
         for (uint64_t past = 0; past <= number; past++) {
             const int kept = past + SLOTS > number;
             CHECK(fcsl_history_read(&shared.history, past, &moment, bytes) ==
-                  (kept ? FCSL_HISTORY_OK : FCSL_HISTORY_GONE));
+                  (kept ? FCSL_HISTORY_OK : FCSL_HISTORY_OVERWRITTEN));
             CHECK(!kept || (moment.tick == past && is_whole(&moment, bytes)));
             const uint64_t next = fcsl_history_catch_up(&shared.history, past);
             CHECK(next == (kept && past + SLOTS / 2 > number ? past + 1u : number + 1u - SLOTS / 2));

@@ -151,12 +151,12 @@ class Host:
     def __init__(self) -> None:
         self.answers: list[bytes] = []
         self.now_s = 0.0
-        self.asked = 0
+        self.queries = 0
         self.told = Reproduction(MACHINE, self, lambda: self.now_s)  # type: ignore[arg-type]
 
-    def ask(self, key: str) -> Question:
+    def query(self, key: str) -> Question:
         assert key == "m/@checkpoint"
-        self.asked += 1
+        self.queries += 1
         return Question(self.answers)
 
     def takes(self, *events: Any) -> list[Any]:
@@ -179,7 +179,7 @@ def tick(number: int, *writes: int, following: int) -> list[Any]:
 def test_what_is_in_a_bag_lies_in_order() -> None:
     host = Host()
     assert host.takes(Write(4, message(7)), *tick(7, 5, following=6)) == []  # writes before may be missing
-    assert host.asked == 1
+    assert host.queries == 1
     host.answers += [checkpoint(7, 5), checkpoint(9, 7)]  # the first one is of a time before
     assert host.takes(*tick(8, 6, following=7), None, None) == []
     found = host.takes(*tick(9, 7, 8, following=9), *tick(10, 9, following=10), *tick(11, following=10))

@@ -34,7 +34,9 @@ def root(tmp_path_factory: pytest.TempPathFactory) -> Path:
 
 @pytest.fixture(scope="module")
 def supervisor(root: Path) -> Iterator[Supervisor]:
-    with supervising(root, patch="from simclient.supervisor import run_status; run_status.GONE_S = 60") as supervisor:
+    with supervising(
+        root, patch="from simclient.supervisor import run_status; run_status.END_TIMEOUT_S = 60"
+    ) as supervisor:
         yield supervisor
 
 
@@ -183,7 +185,8 @@ def test_a_machine_is_compiled_first(tmp_path: Path) -> None:
 
 def test_one_that_does_not_answer_keeps_nobody_else_waiting(root: Path) -> None:
     patient = (
-        "import simclient.supervisor.runs as r, simclient.supervisor.run_status as l; r.STOP_S = 600; l.LOOK_S = 0.5"
+        "import simclient.supervisor.runs as r, simclient.supervisor.run_status as l; "
+        "r.STOP_S = 600; l.STATUS_TIMEOUT_S = 0.5"
     )
     with supervising(root, patch=patient) as supervisor:
         run = supervisor.start(LIBRARY)

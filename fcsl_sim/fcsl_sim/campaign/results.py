@@ -46,7 +46,7 @@ class Results:
         if restart and (folder / ABOUT).is_file():
             for name in (ROWS, TABLE, REPORT, ABOUT):
                 (folder / name).unlink(missing_ok=True)
-        there = self._look(about)
+        there = self._check(about)
         if there is False:
             folder.mkdir(parents=True, exist_ok=True)
             self._write_about(about)
@@ -59,7 +59,7 @@ class Results:
             self.damage.append(f"{self._rows.path}: has {self._rows.size} bytes, not {self._rows.bytes}")
         self._rows.reserve()
 
-    def _look(self, about: dict[str, Any]) -> bool | None:
+    def _check(self, about: dict[str, Any]) -> bool | None:
         """Whether the folder has results of this campaign; None: its campaign.json is damaged, so only the rows can tell."""
         folder, file = self.folder, self.folder / ABOUT
         if not folder.exists():
@@ -198,6 +198,6 @@ class Results:
         columns["ticks"] = pa.array(np.ascontiguousarray(rows["ticks"]))
         columns["hash"] = pa.array([bytes(digest).decode() for digest in rows["hash"]])
         for name, verdict in (("error", "error"), ("failed_by", "failed")):
-            said = [text if of == verdict else "" for text, of in zip(texts, verdicts, strict=True)]
-            columns[name] = pa.array(said)
+            shown = [text if of == verdict else "" for text, of in zip(texts, verdicts, strict=True)]
+            columns[name] = pa.array(shown)
         return columns

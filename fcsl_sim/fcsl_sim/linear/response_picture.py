@@ -62,10 +62,10 @@ def bode_figure(measured: Measured, title: str) -> Any:
         2, len(columns), sharex=True, squeeze=False, figsize=(_COLUMN_IN * width, _HEIGHT_IN), layout="constrained"
     )
     for column, (gain, phase) in zip(columns, axes.T, strict=True):
-        _draw_column(column, gain, phase, measured.asked)
+        _draw_column(column, gain, phase, measured.requested)
     found = measured.margins
     if found:
-        _mark_loop(axes[:, 0], measured.asked)
+        _mark_loop(axes[:, 0], measured.requested)
         axes[0, 1].plot(found.peak_frequency, decibels(found.peak_sensitivity), "o", color=_RED, zorder=4)
     figure.suptitle(f"{title}, sine at {', '.join(path for path, _ in measured.inputs)}", fontsize=10)
     reasons = {omega: why for column in columns for omega, why in column.gaps.items()}
@@ -75,7 +75,7 @@ def bode_figure(measured: Measured, title: str) -> Any:
 
 
 def _columns(measured: Measured) -> list[_Column]:
-    unsettled = {point.omega: point.why for point in measured.asked if not point.is_settled}
+    unsettled = {point.omega: point.why for point in measured.requested if not point.is_settled}
     columns = []
     if measured.margins:
         gaps = unsettled | {point.omega: _NO_LOOP for point in measured.points if not point.has_loop}

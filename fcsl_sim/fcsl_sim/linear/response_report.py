@@ -58,7 +58,7 @@ class Measured:
     def __init__(self, response: Response, points: Sequence[Point]):
         self.inputs = [(injection.path, injection.weight) for injection in response.injections]
         self.outputs, self.within = response.outputs, response.within
-        self.asked = list(points)
+        self.requested = list(points)
         #: Those that were measured.
         self.points = [point for point in points if point.is_settled]
         #: None: what the source gives does not depend on the sine, there is no loop; or nothing was measured.
@@ -73,8 +73,8 @@ class Measured:
             lines.append(f"no loop at {names} rad/s: there the source does not depend on the sine")
         if not self.points:
             lines.append("nothing was measured")
-        elif len(self.points) < len(self.asked):
-            names = _names(point for point in self.asked if not point.is_settled)
+        elif len(self.points) < len(self.requested):
+            names = _names(point for point in self.requested if not point.is_settled)
             lines.append(f"not measured at {names} rad/s: what is said above is of the other {len(self.points)}")
         return "\n".join(lines)
 
@@ -95,7 +95,9 @@ class Measured:
             "change": [point.change for point in self.points],
             "rest": [point.rest for point in self.points],
             "margins": vars(self.margins) if self.margins else None,
-            "not_measured": [{"omega": point.omega, "why": point.why} for point in self.asked if not point.is_settled],
+            "not_measured": [
+                {"omega": point.omega, "why": point.why} for point in self.requested if not point.is_settled
+            ],
         }
 
     def write(self, path: Path) -> None:

@@ -151,7 +151,7 @@ void fcsl_sim_count_commands(const fcsl_sim_t *sim, fcsl_external_counters_t *co
 int64_t fcsl_sim_run_together(fcsl_sim_t *const *sims, uint32_t count, uint64_t ticks, uint32_t slice_ms,
                               uint32_t *failed, fcsl_error_t *error);
 /* While no tick is run, called often: the controller waits on. */
-void fcsl_sim_alive(fcsl_sim_t *sim);
+void fcsl_sim_keep_alive(fcsl_sim_t *sim);
 /* Tells the controller that the run is over, and whether another one follows. */
 void fcsl_sim_end(fcsl_sim_t *sim, int another_follows);
 

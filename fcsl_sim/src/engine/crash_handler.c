@@ -25,7 +25,7 @@ static const char *const FUNCTIONS[] = {"", "init", "derivative", "output", "upd
 /* The plant of the simulation that was opened last, since the handlers are those of the process. */
 static const fcsl_plant_t *_Atomic current;
 /* Threads that look into it: it is not freed meanwhile. */
-static _Atomic uint32_t looking;
+static _Atomic uint32_t readers;
 static volatile sig_atomic_t as_json;
 static struct sigaction previous[SIGNAL_COUNT];
 static int watching;
@@ -37,13 +37,13 @@ void fcsl_sim_is_open(const fcsl_plant_t *plant, int is_open)
         atomic_store(&current, plant);
     } else {
         (void)atomic_compare_exchange_strong(&current, &before, NULL);
-        while (atomic_load(&looking) > 0) {
+        while (atomic_load(&readers) > 0) {
             (void)sched_yield();
         }
     }
 }
 
-static void look_into(const fcsl_plant_t *plant, fcsl_sim_running_call_t *at)
+static void read_call(const fcsl_plant_t *plant, fcsl_sim_running_call_t *at)
 {
     const uint64_t call = atomic_load_explicit(&plant->running_call, memory_order_relaxed);
     const uint32_t instance = (uint32_t)(call >> 8) & 0xffffu;
@@ -61,12 +61,12 @@ static void look_into(const fcsl_plant_t *plant, fcsl_sim_running_call_t *at)
 int fcsl_sim_running_call(fcsl_sim_running_call_t *at)
 {
     *at = (fcsl_sim_running_call_t){.function = ""};
-    (void)atomic_fetch_add(&looking, 1u);
+    (void)atomic_fetch_add(&readers, 1u);
     const fcsl_plant_t *plant = atomic_load(&current);
     if (plant) {
-        look_into(plant, at);
+        read_call(plant, at);
     }
-    (void)atomic_fetch_sub(&looking, 1u);
+    (void)atomic_fetch_sub(&readers, 1u);
     return at->instance[0] != '\0';
 }
 

@@ -177,7 +177,7 @@ static int call_update(fcsl_sim_t *sim, uint32_t index)
     return schedule_update(sim, index);
 }
 
-int fcsl_sim_check_fp_mode(const char *who, fcsl_error_t *error)
+int fcsl_sim_check_fp_mode(const char *caller, fcsl_error_t *error)
 {
     if (fcsl_fp_mode() == FCSL_FP_DEFAULT) {
         return 0;
@@ -185,7 +185,7 @@ int fcsl_sim_check_fp_mode(const char *who, fcsl_error_t *error)
     return fcsl_fail(error,
                      "%s left another floating-point mode (rounding, or small numbers become zero): its code, or a "
                      "library that it loaded, changed it, and bits depend on it",
-                     who);
+                     caller);
 }
 
 /* Outputs and due updates, sources before what they feed. */

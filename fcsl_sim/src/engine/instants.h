@@ -16,6 +16,6 @@ void fcsl_sim_refill_queue(fcsl_sim_t *sim);
 /* Something besides the plant itself has changed a value of an instance: its group sees it at its next step. */
 void fcsl_sim_disturb(fcsl_sim_t *sim, uint32_t instance);
 /* After a model has run: a mode that it left would change the bits of all others. */
-int fcsl_sim_check_fp_mode(const char *who, fcsl_error_t *error);
+int fcsl_sim_check_fp_mode(const char *caller, fcsl_error_t *error);
 
 #endif /* FCSL_SIM_INSTANTS_H */

@@ -105,7 +105,7 @@ struct fcsl_sim {
     uint8_t *model_message_bytes; /* scratch for one message */
     fcsl_external_t *external; /* null: the machine is hosted here */
     uint32_t external_timeout_ms;
-    int asked; /* the sensors of the tick were sent to it */
+    int awaits_answer; /* the sensors of the tick were sent to it */
     struct fcsl_sim_topics *topics; /* null: none */
     struct fcsl_sim_published *published; /* null: no variable server, telemetry, observers */
     struct fcsl_sim_service *service;     /* null: no variable server */

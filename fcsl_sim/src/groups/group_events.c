@@ -68,7 +68,7 @@ typedef struct {
 } search_t;
 
 /* Looks at one offset within the bracket, which becomes smaller. */
-static void look(search_t *search, int64_t offset_ns)
+static void try_offset(search_t *search, int64_t offset_ns)
 {
     fcsl_group_t *group = search->group;
     search->probe(group, offset_ns, group->probe);
@@ -108,12 +108,12 @@ static int64_t locate(search_t *search)
     for (int round = 0; round < ROUNDS_MAX && search->after_ns - search->before_ns > 1; round++) {
         const int64_t length_ns = search->after_ns - search->before_ns;
         const int64_t at_ns = guess(search);
-        look(search, at_ns);
+        try_offset(search, at_ns);
         if (search->after_ns - search->before_ns > 1) {
-            look(search, within(search, search->after_ns == at_ns ? at_ns - beside_ns : at_ns + beside_ns));
+            try_offset(search, within(search, search->after_ns == at_ns ? at_ns - beside_ns : at_ns + beside_ns));
         }
         if (search->after_ns - search->before_ns > 1 && search->after_ns - search->before_ns > length_ns / 2) {
-            look(search, search->before_ns + (search->after_ns - search->before_ns) / 2);
+            try_offset(search, search->before_ns + (search->after_ns - search->before_ns) / 2);
         }
         beside_ns = beside_ns < length_ns / 16 ? beside_ns * 16 : beside_ns;
     }
@@ -130,7 +130,7 @@ int64_t fcsl_group_locate(fcsl_group_t *group, int64_t from_ns, int64_t length_n
         search_t search = {group, probe, from_ns, i, 0, length_ns, group->g[i], group->g1[i]};
         if (first_ns < length_ns) { /* only what happens before the first one so far is of interest */
             search.after_ns = first_ns + 1;
-            look(&search, first_ns);
+            try_offset(&search, first_ns);
             if (search.after_ns > first_ns) {
                 continue;
             }

@@ -32,7 +32,7 @@ static int write_fields(fcsl_sim_t *sim, fcsl_error_t *error)
 }
 
 /* Exchanges the sensor message for the actuator message, which overwrites it; 0, or -1. */
-static int ask_machine(fcsl_sim_t *sim, fcsl_message_t *message, fcsl_error_t *error)
+static int step_machine(fcsl_sim_t *sim, fcsl_message_t *message, fcsl_error_t *error)
 {
     if (fcsl_run_sense_message(sim->run, message, error) || write_fields(sim, error)) {
         return -1;
@@ -51,7 +51,7 @@ static int ask_machine(fcsl_sim_t *sim, fcsl_message_t *message, fcsl_error_t *e
     return 0;
 }
 
-static int ask_external(fcsl_sim_t *sim, fcsl_message_t *message, fcsl_error_t *error)
+static int step_external(fcsl_sim_t *sim, fcsl_message_t *message, fcsl_error_t *error)
 {
     fcsl_hal_status_t status = fcsl_external_send(sim->external, message, (uint64_t)sim->plant.time_ns);
     if (status != FCSL_HAL_OK) {
@@ -85,7 +85,7 @@ static int exchange(fcsl_sim_t *sim, fcsl_message_t *message, fcsl_error_t *erro
     if (sim->external && fcsl_external_runs_free(sim->external)) {
         return exchange_newest(sim, message, error);
     }
-    if (sim->external ? ask_external(sim, message, error) : ask_machine(sim, message, error)) {
+    if (sim->external ? step_external(sim, message, error) : step_machine(sim, message, error)) {
         return -1;
     }
     return fcsl_sim_actuate_message(sim, message, error);

@@ -69,10 +69,10 @@ void fcsl_sim_count_commands(const fcsl_sim_t *sim, fcsl_external_counters_t *co
     *counters = sim->external ? fcsl_external_counters(sim->external) : (fcsl_external_counters_t){0};
 }
 
-void fcsl_sim_alive(fcsl_sim_t *sim)
+void fcsl_sim_keep_alive(fcsl_sim_t *sim)
 {
     if (sim->external && sim->status == FCSL_SIM_RUNNING) {
-        fcsl_external_alive(sim->external);
+        fcsl_external_keep_alive(sim->external);
     }
 }
 

@@ -24,7 +24,7 @@ static int ask(fcsl_sim_t *sim, fcsl_error_t *error)
     if (status != FCSL_HAL_OK) {
         return fcsl_sim_external_failed(sim, status, "cannot send the sensor message", error);
     }
-    sim->asked = 1;
+    sim->awaits_answer = 1;
     fcsl_sim_topics_put(sim);
     return 0;
 }
@@ -40,7 +40,7 @@ static int take_answer(fcsl_sim_t *sim, fcsl_error_t *error)
     if (status != FCSL_HAL_OK) {
         return fcsl_sim_external_failed(sim, status, "no actuator message from the controller", error);
     }
-    sim->asked = 0;
+    sim->awaits_answer = 0;
     if (fcsl_sim_actuate_message(sim, &command, error)) {
         return -1;
     }
@@ -55,12 +55,12 @@ static uint32_t how_many(fcsl_sim_t *const *sims, uint32_t count, int waiting)
 {
     uint32_t found = 0;
     for (uint32_t i = 0; i < count; i++) {
-        found += waiting ? sims[i]->asked != 0 : sims[i]->status == FCSL_SIM_RUNNING;
+        found += waiting ? sims[i]->awaits_answer != 0 : sims[i]->status == FCSL_SIM_RUNNING;
     }
     return found;
 }
 
-static int ask_all(fcsl_sim_t *const *sims, uint32_t count, uint32_t *failed, fcsl_error_t *error)
+static int send_sensors(fcsl_sim_t *const *sims, uint32_t count, uint32_t *failed, fcsl_error_t *error)
 {
     for (uint32_t i = 0; i < count; i++) {
         *failed = i;
@@ -72,11 +72,11 @@ static int ask_all(fcsl_sim_t *const *sims, uint32_t count, uint32_t *failed, fc
 }
 
 /* To controllers that have no tick to answer. */
-static void say_alive(fcsl_sim_t *const *sims, uint32_t count)
+static void send_keep_alive(fcsl_sim_t *const *sims, uint32_t count)
 {
     for (uint32_t i = 0; i < count; i++) {
-        if (!sims[i]->asked) {
-            fcsl_sim_alive(sims[i]);
+        if (!sims[i]->awaits_answer) {
+            fcsl_sim_keep_alive(sims[i]);
         }
     }
 }
@@ -86,12 +86,12 @@ static int take_answers(fcsl_sim_t *const *sims, uint32_t count, uint32_t *faile
 {
     for (uint32_t i = 0; i < count; i++) {
         *failed = i;
-        if (sims[i]->asked && take_answer(sims[i], error)) {
+        if (sims[i]->awaits_answer && take_answer(sims[i], error)) {
             return -1;
         }
     }
     if (how_many(sims, count, 1) > 0) {
-        say_alive(sims, count);
+        send_keep_alive(sims, count);
     }
     return 0;
 }
@@ -116,10 +116,10 @@ static int64_t run(fcsl_sim_t *const *sims, uint32_t count, uint64_t ticks, uint
            fcsl_monotonic_ns() < end_ns) {
         if (how_many(sims, count, 1) == 0) {
             if (!is_due(sims[0], end_ns)) {
-                say_alive(sims, count);
+                send_keep_alive(sims, count);
                 continue;
             }
-            if (ask_all(sims, count, failed, error)) {
+            if (send_sensors(sims, count, failed, error)) {
                 return -1;
             }
         }

@@ -10,7 +10,7 @@ int64_t fcsl_sim_run(fcsl_sim_t *sim, uint64_t ticks, fcsl_error_t *error)
     int64_t done = 0;
     while ((uint64_t)done < ticks && sim->status == FCSL_SIM_RUNNING) {
         const int32_t state = fcsl_sim_state(sim);
-        const int goes_on = fcsl_sim_attend(sim);
+        const int goes_on = fcsl_sim_serve_clients(sim);
         if (sim->service_failed) {
             *error = sim->failure;
             return -1;

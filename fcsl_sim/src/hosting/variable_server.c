@@ -139,7 +139,7 @@ const char *fcsl_sim_address(const fcsl_sim_t *sim)
     return sim->service ? fcsl_vars_address(sim->service->vars) : NULL;
 }
 
-int fcsl_sim_attend(fcsl_sim_t *sim)
+int fcsl_sim_serve_clients(fcsl_sim_t *sim)
 {
     struct fcsl_sim_service *service = sim->service;
     if (service) {
@@ -149,7 +149,7 @@ int fcsl_sim_attend(fcsl_sim_t *sim)
     if (until == 0) {
         return sim->status == FCSL_SIM_RUNNING;
     }
-    fcsl_sim_alive(sim);
+    fcsl_sim_keep_alive(sim);
     if (service) {
         fcsl_vars_wait(service->vars, until);
         fcsl_vars_serve(service->vars);

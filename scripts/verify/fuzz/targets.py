@@ -79,7 +79,7 @@ TARGETS = (
         "guard_slot",
         "the slot of fcsl-guard",
         "shared memory",
-        Defect(f"{_HAL}/guard/guard_slot.c", "said <= server->capacity ? (size_t)said : 0u", "(size_t)said"),
+        Defect(f"{_HAL}/guard/guard_slot.c", "stored <= server->capacity ? (size_t)stored : 0u", "(size_t)stored"),
         longest=512,
     ),
     Target(

@@ -294,11 +294,11 @@ int gnss_nmea_take(gnss_nmea_t *nmea, uint8_t byte, gnss_fix_t *fix)
     const sentence_t sentence = split(nmea->stream.bytes, size);
     const uint32_t kind = kind_of(&sentence);
     if (kind == 0u) {
-        byte_stream_tell(&nmea->stream, FCSL_DRIVER_OTHER_FRAMES);
+        byte_stream_note(&nmea->stream, FCSL_DRIVER_OTHER_FRAMES);
         return 0;
     }
     if (sentence.count < 2u || read_time(sentence.fields[1], &ns_of_day) != 0) {
-        byte_stream_tell(&nmea->stream, sentence.fields[1].size == 0u ? FCSL_DRIVER_NO_TIME : FCSL_DRIVER_REFUSED);
+        byte_stream_note(&nmea->stream, sentence.fields[1].size == 0u ? FCSL_DRIVER_NO_TIME : FCSL_DRIVER_REFUSED);
         return 0;
     }
     if (nmea->seen == 0u || ns_of_day != nmea->ns_of_day) { /* a new solution */
@@ -310,13 +310,13 @@ int gnss_nmea_take(gnss_nmea_t *nmea, uint8_t byte, gnss_fix_t *fix)
         nmea->has_fix = has_fix(&sentence);
     }
     if ((kind == GGA ? read_gga(&sentence, &nmea->fix) : read_rmc(&sentence, ns_of_day, &nmea->fix)) != 0) {
-        byte_stream_tell(&nmea->stream, FCSL_DRIVER_REFUSED);
+        byte_stream_note(&nmea->stream, FCSL_DRIVER_REFUSED);
         nmea->seen = 0;
         return 0;
     }
     nmea->seen |= kind;
     if (nmea->seen != BOTH) {
-        byte_stream_tell(&nmea->stream, kind == GGA ? FCSL_DRIVER_GGA_ALONE : FCSL_DRIVER_RMC_ALONE);
+        byte_stream_note(&nmea->stream, kind == GGA ? FCSL_DRIVER_GGA_ALONE : FCSL_DRIVER_RMC_ALONE);
         return 0;
     }
     nmea->seen = 0;

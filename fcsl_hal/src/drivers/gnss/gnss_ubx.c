@@ -121,11 +121,11 @@ int gnss_ubx_take(gnss_ubx_t *ubx, uint8_t byte, gnss_fix_t *fix)
         return 0;
     }
     if (bytes[2] != CLASS_NAV || bytes[3] != NUMBER_PVT) {
-        byte_stream_tell(&ubx->stream, FCSL_DRIVER_OTHER_FRAMES);
+        byte_stream_note(&ubx->stream, FCSL_DRIVER_OTHER_FRAMES);
         return 0;
     }
     if (size != PVT_BYTES + FRAME && size != PVT_BYTES_OF_7 + FRAME) {
-        byte_stream_tell(&ubx->stream, FCSL_DRIVER_REFUSED);
+        byte_stream_note(&ubx->stream, FCSL_DRIVER_REFUSED);
         return 0;
     }
     *fix = read_pvt(bytes + PAYLOAD);

@@ -13,14 +13,14 @@
 #include "fcsl/fcsl_driver.h"
 #include "gpio_chip.h"
 
-static const uint64_t LOOK_AGAIN_NS = 100000000u; /* for a chip that has gone */
+static const uint64_t RECHECK_NS = 100000000u; /* for a chip that has gone */
 
 typedef struct {
     double lines[GPIO_LINES]; /* the signals */
     uint8_t used[GPIO_LINES];
     const char *device;
     int file; /* -1: no line is claimed */
-    uint64_t look_ns; /* outputs: when a chip that has gone is looked for */
+    uint64_t poll_ns; /* outputs: when a chip that has gone is looked for */
 } gpio_t;
 
 static void keep(gpio_t *gpio, const char *device, const uint8_t *used)
@@ -101,11 +101,11 @@ static fcsl_driver_status_t open_outputs(void *self, const char *device, const u
 static fcsl_driver_status_t claim_outputs(gpio_t *gpio, char *why, size_t size)
 {
     const uint64_t now_ns = fcsl_monotonic_ns();
-    if (now_ns < gpio->look_ns) {
+    if (now_ns < gpio->poll_ns) {
         (void)snprintf(why, size, "the GPIO chip '%.100s' has gone", gpio->device);
         return FCSL_DRIVER_FAILED;
     }
-    gpio->look_ns = now_ns + LOOK_AGAIN_NS;
+    gpio->poll_ns = now_ns + RECHECK_NS;
     const fcsl_driver_status_t status = gpio_claim(gpio->device, 1, gpio->used, gpio->lines, &gpio->file, why, size);
     return status == FCSL_DRIVER_OK ? status : FCSL_DRIVER_FAILED;
 }

@@ -25,7 +25,7 @@ enum { CHANNELS = 16, TEXT_BYTES = 32, WHY_BYTES = 256, EXPORT_TRIES = 50 };
 static const double HZ = 50.0; /* of most servos */
 static const double HZ_MAX = 100000.0;
 static const uint64_t EXPORT_WAIT_NS = 10000000u; /* udev gives the files of a new channel to their group */
-static const uint64_t LOOK_AGAIN_NS = 100000000u; /* for a chip that has gone */
+static const uint64_t RECHECK_NS = 100000000u; /* for a chip that has gone */
 static const uint64_t REWRITE_NS = 1000000000u; /* of what has not changed */
 
 typedef struct {
@@ -44,7 +44,7 @@ typedef struct {
     uint64_t period_ns;
     channel_t channels[CHANNELS];
     uint8_t is_open;
-    uint64_t look_ns; /* when a chip that has gone is looked for */
+    uint64_t poll_ns; /* when a chip that has gone is looked for */
     uint64_t rewrite_ns;
     uint8_t writes_all; /* this write, what has not changed, too */
 } pwm_t;
@@ -409,7 +409,7 @@ static fcsl_driver_status_t act_on_all(pwm_t *pwm, act_t act, char *why, size_t 
         }
         if (status == FCSL_DRIVER_ABSENT) {
             close_pwm(pwm); /* it is looked for at once */
-            pwm->look_ns = 0;
+            pwm->poll_ns = 0;
             return result;
         }
     }
@@ -432,11 +432,11 @@ static fcsl_driver_status_t write_pwm(void *self, char *why, size_t size)
     pwm_t *pwm = self;
     const uint64_t now_ns = fcsl_monotonic_ns();
     if (!pwm->is_open) {
-        if (now_ns < pwm->look_ns) {
+        if (now_ns < pwm->poll_ns) {
             (void)snprintf(why, size, "the PWM chip has gone");
             return FCSL_DRIVER_FAILED;
         }
-        pwm->look_ns = now_ns + LOOK_AGAIN_NS;
+        pwm->poll_ns = now_ns + RECHECK_NS;
         if (open_chip(pwm, why, size) != FCSL_DRIVER_OK) {
             return FCSL_DRIVER_FAILED;
         }

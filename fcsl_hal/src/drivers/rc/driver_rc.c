@@ -67,7 +67,7 @@ static int take_sbus(void *self, const uint8_t *bytes, uint32_t count, uint64_t 
             continue;
         }
         if (frame.frame_lost && !frame.failsafe) {
-            byte_stream_tell(&sbus->sbus.stream, FCSL_DRIVER_REPEATED);
+            byte_stream_note(&sbus->sbus.stream, FCSL_DRIVER_REPEATED);
         } else {
             put_sticks(&frame, sbus->sticks);
             sbus->failsafe = frame.failsafe != 0;

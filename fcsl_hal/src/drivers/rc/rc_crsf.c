@@ -80,7 +80,7 @@ rc_crsf_kind_t rc_crsf_take(rc_crsf_t *crsf, uint8_t byte, rc_frame_t *frame, rc
         frame->failsafe = rc_is_empty(bytes + PAYLOAD);
         return RC_CRSF_CHANNELS;
     }
-    byte_stream_tell(&crsf->stream, FCSL_DRIVER_OTHER_FRAMES);
+    byte_stream_note(&crsf->stream, FCSL_DRIVER_OTHER_FRAMES);
     if (bytes[TYPE] == TYPE_LINK && payload_size == LINK_BYTES) {
         read_link(bytes + PAYLOAD, link);
         return RC_CRSF_LINK;

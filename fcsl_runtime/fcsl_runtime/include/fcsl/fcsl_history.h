@@ -39,7 +39,7 @@ typedef struct {
 typedef enum {
     FCSL_HISTORY_OK,
     FCSL_HISTORY_COMING, /* not published yet */
-    FCSL_HISTORY_GONE    /* overwritten */
+    FCSL_HISTORY_OVERWRITTEN    /* overwritten */
 } fcsl_history_status_t;
 
 /* Allocates room for `slots` (a power of two, at least 2) publications of these parts, whose data stay where they are.
@@ -65,9 +65,9 @@ fcsl_history_status_t fcsl_history_read(const fcsl_history_t *history, uint64_t 
 uint64_t fcsl_history_catch_up(const fcsl_history_t *history, uint64_t number);
 /* How long a reader may rest that follows ticks at this rate: an eighth of what the history holds, so that one that is kept
  * waiting is not overtaken at once; 0.05 ms to 2 ms. */
-uint64_t fcsl_history_nap_ns(const fcsl_history_t *history, uint64_t tick_hz);
+uint64_t fcsl_history_poll_ns(const fcsl_history_t *history, uint64_t tick_hz);
 /* Copies the newest: FCSL_HISTORY_OK, or FCSL_HISTORY_COMING before the first. A reader that is overtaken again and again
- * gives up after a bounded number of tries with FCSL_HISTORY_GONE. */
+ * gives up after a bounded number of tries with FCSL_HISTORY_OVERWRITTEN. */
 fcsl_history_status_t fcsl_history_latest(const fcsl_history_t *history, fcsl_moment_t *moment, uint8_t *bytes);
 
 #endif /* FCSL_HISTORY_H */

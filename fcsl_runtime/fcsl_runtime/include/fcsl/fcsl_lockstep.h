@@ -30,7 +30,7 @@ typedef enum {
     FCSL_LOCKSTEP_RUNNING = 0,
     FCSL_LOCKSTEP_ENDED = 1, /* the simulator ended the run */
     FCSL_LOCKSTEP_AGAIN = 2, /* the same, and begins another one: connect anew */
-    FCSL_LOCKSTEP_GONE = 3   /* the simulator was killed, froze, or the link is cut; `error` says at which tick */
+    FCSL_LOCKSTEP_DISCONNECTED = 3 /* the simulator was killed, froze, or the link is cut; `error` says at which tick */
 } fcsl_lockstep_status_t;
 
 /* Makes the ticks that come within about `slice_ms`. Returns a fcsl_lockstep_status_t, or -1. */
@@ -42,7 +42,7 @@ int fcsl_lockstep_drop(fcsl_lockstep_t *lockstep, uint32_t channel, uint32_t tic
 void fcsl_lockstep_drop_none(fcsl_lockstep_t *lockstep);
 
 /* While no ticks are run, called often: the simulator waits on. */
-void fcsl_lockstep_alive(fcsl_lockstep_t *lockstep);
+void fcsl_lockstep_keep_alive(fcsl_lockstep_t *lockstep);
 /* Tells the simulator that no tick is answered any more. Does nothing where none is connected. */
 void fcsl_lockstep_leave(fcsl_lockstep_t *lockstep);
 

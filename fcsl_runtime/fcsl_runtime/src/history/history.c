@@ -96,11 +96,11 @@ fcsl_history_status_t fcsl_history_read(const fcsl_history_t *history, uint64_t 
     }
     const _Atomic uint64_t *slot = slot_of(history, number);
     if (atomic_load_explicit(slot, memory_order_acquire) != sequence_of(number)) {
-        return FCSL_HISTORY_GONE;
+        return FCSL_HISTORY_OVERWRITTEN;
     }
     fcsl_seqlock_load(moment, slot + 1, sizeof *moment);
     fcsl_seqlock_load(bytes, slot + HEAD_WORDS, fcsl_history_bytes(history));
-    return fcsl_seqlock_unchanged(slot, sequence_of(number)) ? FCSL_HISTORY_OK : FCSL_HISTORY_GONE;
+    return fcsl_seqlock_unchanged(slot, sequence_of(number)) ? FCSL_HISTORY_OK : FCSL_HISTORY_OVERWRITTEN;
 }
 
 uint64_t fcsl_history_catch_up(const fcsl_history_t *history, uint64_t number)
@@ -110,12 +110,12 @@ uint64_t fcsl_history_catch_up(const fcsl_history_t *history, uint64_t number)
     return published > number + kept ? published - kept : number + 1u;
 }
 
-uint64_t fcsl_history_nap_ns(const fcsl_history_t *history, uint64_t tick_hz)
+uint64_t fcsl_history_poll_ns(const fcsl_history_t *history, uint64_t tick_hz)
 {
     const uint64_t least_ns = 50000u;
     const uint64_t most_ns = 2000000u;
-    const uint64_t nap_ns = FCSL_NS_PER_S / tick_hz * history->slots / 8u;
-    return nap_ns < least_ns ? least_ns : nap_ns > most_ns ? most_ns : nap_ns;
+    const uint64_t poll_ns = FCSL_NS_PER_S / tick_hz * history->slots / 8u;
+    return poll_ns < least_ns ? least_ns : poll_ns > most_ns ? most_ns : poll_ns;
 }
 
 fcsl_history_status_t fcsl_history_latest(const fcsl_history_t *history, fcsl_moment_t *moment, uint8_t *bytes)
@@ -129,5 +129,5 @@ fcsl_history_status_t fcsl_history_latest(const fcsl_history_t *history, fcsl_mo
             return FCSL_HISTORY_OK;
         }
     }
-    return FCSL_HISTORY_GONE;
+    return FCSL_HISTORY_OVERWRITTEN;
 }

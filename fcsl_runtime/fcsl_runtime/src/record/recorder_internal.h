@@ -58,7 +58,7 @@ struct fcsl_recorder {
     uint8_t *scratch; /* one message being built */
     size_t scratch_size;
     /* What the last messages on change said; meaningless until `told`. */
-    int told;
+    int status_written;
     uint8_t *health;
     uint64_t *faults;
     uint64_t *overruns;

@@ -73,7 +73,7 @@ static int note(fcsl_recorder_t *recorder, uint32_t topic, fcsl_tick_message_t w
 static int note_health(fcsl_recorder_t *recorder, fcsl_stamp_t stamp)
 {
     const fcsl_machine_t *machine = recorder->machine;
-    int changed = !recorder->told;
+    int changed = !recorder->status_written;
     for (uint32_t i = 0; i < machine->instance_count; i++) {
         const uint8_t health = (uint8_t)fcsl_read_i32(recorder->data, machine->instances[i].health_offset);
         changed = changed || health != recorder->health[i];
@@ -85,7 +85,7 @@ static int note_health(fcsl_recorder_t *recorder, fcsl_stamp_t stamp)
 static int note_counters(fcsl_recorder_t *recorder, fcsl_stamp_t stamp)
 {
     const fcsl_machine_t *machine = recorder->machine;
-    int changed = !recorder->told;
+    int changed = !recorder->status_written;
     for (uint32_t i = 0; i < machine->instance_count; i++) {
         const uint64_t faults = fcsl_read_u64(recorder->data, machine->instances[i].faults_offset);
         const uint64_t overruns = fcsl_read_u64(recorder->data, machine->instances[i].overruns_offset);
@@ -118,7 +118,7 @@ static int put_tick(fcsl_recorder_t *recorder, fcsl_stamp_t stamp, const uint8_t
         note_counters(recorder, stamp) != 0) {
         return -1;
     }
-    recorder->told = 1;
+    recorder->status_written = 1;
     return 0;
 }
 

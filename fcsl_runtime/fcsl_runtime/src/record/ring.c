@@ -14,7 +14,7 @@
 #include "fcsl/fcsl_monotonic.h"
 
 /* The consumer looks by itself this often, so that a producer at moderate rates never makes a system call. */
-enum { LOOK_EVERY_NS = 10000000 };
+enum { POLL_NS = 10000000 };
 enum { HUGE_PAGE_BYTES = 2 << 20 };
 _Static_assert(FCSL_RING_ALIGNMENT == 32, "the size of a record header is a power of two");
 
@@ -68,7 +68,7 @@ static void sleep_on(sem_t *semaphore)
 /* Returns early when woken; the caller looks again in any case. */
 static void nap_on(sem_t *semaphore)
 {
-    const struct timespec until = fcsl_timespec_of(fcsl_monotonic_ns() + LOOK_EVERY_NS);
+    const struct timespec until = fcsl_timespec_of(fcsl_monotonic_ns() + POLL_NS);
     (void)sem_clockwait(semaphore, CLOCK_MONOTONIC, &until);
 }
 

@@ -27,7 +27,7 @@ typedef struct {
     uint32_t every;
     uint32_t size; /* of each message; of a tick's message: of the last one */
     fcsl_tick_message_t what;
-    uint8_t *said; /* a tick's message: the last one */
+    uint8_t *last_message; /* a tick's message: the last one */
     const fcsl_ros_composer_t *composer;
     uint64_t refused;
 } entry_t;
@@ -59,7 +59,7 @@ fcsl_topics_t *fcsl_topics_new(fcsl_run_t *run, fcsl_publish_queue_t *queue, fcs
 void fcsl_topics_free(fcsl_topics_t *topics)
 {
     for (uint32_t i = 0; i < topics->count; i++) {
-        free(topics->entries[i].said);
+        free(topics->entries[i].last_message);
     }
     free(topics->entries);
     free(topics->scratch);
@@ -91,9 +91,10 @@ int fcsl_topics_add_instance(fcsl_topics_t *topics, uint32_t topic, uint32_t ins
 
 int fcsl_topics_add_tick_message(fcsl_topics_t *topics, uint32_t topic, fcsl_tick_message_t what, fcsl_error_t *error)
 {
-    const entry_t entry = {.kind = OF_TICK, .topic = topic, .what = what, .said = malloc(FCSL_MESSAGE_BYTES_MAX)};
-    if (entry.said == NULL || add(topics, &entry, error) != 0) {
-        free(entry.said);
+    const entry_t entry = {
+        .kind = OF_TICK, .topic = topic, .what = what, .last_message = malloc(FCSL_MESSAGE_BYTES_MAX)};
+    if (entry.last_message == NULL || add(topics, &entry, error) != 0) {
+        free(entry.last_message);
         return fcsl_fail(error, "out of memory for topics");
     }
     return 0;
@@ -136,13 +137,14 @@ static void put_tick_message(fcsl_topics_t *topics, entry_t *entry, int64_t stam
     const int64_t size = fcsl_run_tick_message(topics->run, entry->what, topics->scratch, FCSL_MESSAGE_BYTES_MAX);
     const uint32_t bytes = size > HEAD_BYTES ? (uint32_t)size : 0u;
     const int is_event = entry->what == FCSL_TICK_TRANSITION;
-    if (bytes == 0u || (!is_event && bytes == entry->size &&
-                        memcmp(entry->said + HEAD_BYTES, topics->scratch + HEAD_BYTES, bytes - HEAD_BYTES) == 0)) {
+    if (bytes == 0u ||
+        (!is_event && bytes == entry->size &&
+         memcmp(entry->last_message + HEAD_BYTES, topics->scratch + HEAD_BYTES, bytes - HEAD_BYTES) == 0)) {
         return;
     }
     uint8_t *place = fcsl_publish_queue_claim(topics->queue, entry->topic, bytes, FCSL_PUBLISH_QUEUE_CHANGE);
     if (place != NULL) {
-        memcpy(entry->said, topics->scratch, bytes);
+        memcpy(entry->last_message, topics->scratch, bytes);
         entry->size = bytes;
         memcpy(place, topics->scratch, bytes);
         put_stamp(place, stamp_ns);

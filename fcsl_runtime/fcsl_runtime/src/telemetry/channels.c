@@ -74,10 +74,10 @@ static int lay_out(channels_t *channels, const catalog_t *catalog, const uint8_t
                            (unsigned long long)bytes);
 }
 
-static int configure(channels_t *channels, const catalog_t *catalog, const uint8_t *chosen, const announcement_t *told,
-                     fcsl_error_t *error)
+static int configure(channels_t *channels, const catalog_t *catalog, const uint8_t *chosen,
+                     const announcement_t *announcement, fcsl_error_t *error)
 {
-    const size_t bytes = fcsl_configuration_write(told, channels->data_bytes, catalog, chosen, NULL);
+    const size_t bytes = fcsl_configuration_write(announcement, channels->data_bytes, catalog, chosen, NULL);
     if (bytes == 0 || bytes > BODY_BYTES_MAX) {
         return fcsl_fail(
             error, "the names of the chosen fields do not fit into a configuration (16 MiB in all, 65535 bytes or "
@@ -88,17 +88,17 @@ static int configure(channels_t *channels, const catalog_t *catalog, const uint8
         return fcsl_fail(error, "out of memory for telemetry");
     }
     channels->configuration_bytes = (uint32_t)bytes;
-    (void)fcsl_configuration_write(told, channels->data_bytes, catalog, chosen, channels->configuration);
+    (void)fcsl_configuration_write(announcement, channels->data_bytes, catalog, chosen, channels->configuration);
     return 0;
 }
 
-int fcsl_channels_open(channels_t *channels, const catalog_t *catalog, const char *globs, const announcement_t *told,
-                       fcsl_error_t *error)
+int fcsl_channels_open(channels_t *channels, const catalog_t *catalog, const char *globs,
+                       const announcement_t *announcement, fcsl_error_t *error)
 {
     *channels = (channels_t){0};
     uint8_t *chosen = choose(catalog, globs, error);
     const int status = chosen != NULL && lay_out(channels, catalog, chosen, error) == 0
-                           ? configure(channels, catalog, chosen, told, error)
+                           ? configure(channels, catalog, chosen, announcement, error)
                            : -1;
     free(chosen);
     return status;

@@ -31,8 +31,8 @@ typedef struct {
 
 /* Chooses channels by `globs` (null: FCSL_TELEMETRY_FIELDS) and writes the configuration. 0, or -1; freed in either case by
  * fcsl_channels_close. */
-int fcsl_channels_open(channels_t *channels, const catalog_t *catalog, const char *globs, const announcement_t *told,
-                       fcsl_error_t *error);
+int fcsl_channels_open(channels_t *channels, const catalog_t *catalog, const char *globs,
+                       const announcement_t *announcement, fcsl_error_t *error);
 void fcsl_channels_close(channels_t *channels);
 
 /* Writes the body of a data packet. */

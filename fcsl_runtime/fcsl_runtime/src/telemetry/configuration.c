@@ -79,7 +79,7 @@ static void put_channel(writer_t *writer, const catalog_t *catalog, const entry_
     put_labels(writer, block->machine, field->type);
 }
 
-size_t fcsl_configuration_write(const announcement_t *told, uint32_t data_bytes, const catalog_t *catalog,
+size_t fcsl_configuration_write(const announcement_t *announcement, uint32_t data_bytes, const catalog_t *catalog,
                                 const uint8_t *chosen, uint8_t *bytes)
 {
     writer_t writer = {.bytes = bytes};
@@ -87,14 +87,14 @@ size_t fcsl_configuration_write(const announcement_t *told, uint32_t data_bytes,
     for (uint32_t i = 0; i < catalog->count; i++) {
         count += chosen[i];
     }
-    put(&writer, told->machine->abi_version, 4);
-    put(&writer, told->machine->tick_hz, 8);
-    put(&writer, told->every, 4);
-    put(&writer, (uint64_t)told->wall_ns, 8);
+    put(&writer, announcement->machine->abi_version, 4);
+    put(&writer, announcement->machine->tick_hz, 8);
+    put(&writer, announcement->every, 4);
+    put(&writer, (uint64_t)announcement->wall_ns, 8);
     put(&writer, data_bytes, 4);
-    put_text(&writer, "", told->machine->source_hash);
-    put_text(&writer, "", told->machine->name);
-    put_text(&writer, "", told->views);
+    put_text(&writer, "", announcement->machine->source_hash);
+    put_text(&writer, "", announcement->machine->name);
+    put_text(&writer, "", announcement->views);
     put(&writer, count, 4);
     for (uint32_t i = 0; i < catalog->count; i++) {
         if (chosen[i]) {

@@ -17,7 +17,7 @@ typedef struct {
 
 /* Writes the configuration of the chosen entries (chosen[i] of entry i), or with null `bytes` only counts its bytes. Returns
  * them, or 0 when a text is too long, or its labels too many, for the 16 bits that count them. */
-size_t fcsl_configuration_write(const announcement_t *told, uint32_t data_bytes, const catalog_t *catalog,
+size_t fcsl_configuration_write(const announcement_t *announcement, uint32_t data_bytes, const catalog_t *catalog,
                                 const uint8_t *chosen, uint8_t *bytes);
 
 #endif /* FCSL_TELEMETRY_CONFIGURATION_H */

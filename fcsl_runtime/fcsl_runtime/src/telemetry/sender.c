@@ -93,7 +93,7 @@ static int follow(fcsl_telemetry_t *t)
         if (status == FCSL_HISTORY_COMING) {
             return 1;
         }
-        if (status == FCSL_HISTORY_GONE) {
+        if (status == FCSL_HISTORY_OVERWRITTEN) {
             const uint64_t cursor = fcsl_history_catch_up(t->history, t->cursor);
             t->overtaken += cursor - t->cursor;
             t->cursor = cursor;
@@ -108,7 +108,7 @@ static int follow(fcsl_telemetry_t *t)
 void *fcsl_telemetry_send(void *telemetry)
 {
     fcsl_telemetry_t *t = telemetry;
-    const struct timespec nap = {.tv_nsec = (long)t->nap_ns};
+    const struct timespec nap = {.tv_nsec = (long)t->poll_ns};
     t->resend = fcsl_resend_begin(fcsl_monotonic_ns());
     begin_configuration(t);
     for (;;) {

@@ -22,7 +22,7 @@ struct fcsl_telemetry {
     uint32_t configuration_at; /* how much of it is sent */
     packet_t data;             /* the coming one */
     uint64_t tick_hz;
-    uint64_t nap_ns;
+    uint64_t poll_ns;
     uint8_t *publication;
     uint8_t *body;
     uint64_t cursor;    /* publications looked at */

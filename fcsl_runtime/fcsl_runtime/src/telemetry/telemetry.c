@@ -53,11 +53,11 @@ static int prepare(fcsl_telemetry_t *t, const fcsl_telemetry_options_t *options,
     if (fcsl_history_latest(t->history, &moment, t->publication) != FCSL_HISTORY_OK) {
         return fcsl_fail(error, "telemetry begins behind the first publication of its host");
     }
-    const announcement_t told = {.machine = options->machine,
-                                 .views = options->views != NULL ? options->views : options->machine->views,
-                                 .every = t->udp.every,
-                                 .wall_ns = wall_of(options, moment.tick)};
-    if (fcsl_channels_open(&t->channels, &t->catalog, options->fields, &told, error) != 0) {
+    const announcement_t announcement = {.machine = options->machine,
+                                         .views = options->views != NULL ? options->views : options->machine->views,
+                                         .every = t->udp.every,
+                                         .wall_ns = wall_of(options, moment.tick)};
+    if (fcsl_channels_open(&t->channels, &t->catalog, options->fields, &announcement, error) != 0) {
         return -1;
     }
     t->body = malloc(t->channels.data_bytes);
@@ -86,7 +86,7 @@ fcsl_telemetry_t *fcsl_telemetry_open(const fcsl_telemetry_options_t *options, c
     }
     t->history = history;
     t->tick_hz = options->machine->tick_hz;
-    t->nap_ns = fcsl_history_nap_ns(history, t->tick_hz);
+    t->poll_ns = fcsl_history_poll_ns(history, t->tick_hz);
     if (fcsl_udp_open(&t->udp, options->address, error) != 0 || prepare(t, options, blocks, block_count, error) != 0) {
         fcsl_telemetry_close(t);
         return NULL;

@@ -108,7 +108,7 @@ const entry_t *fcsl_catalog_field(const catalog_t *catalog, uint32_t block, uint
 }
 
 /* The entry whose path is the first `length` bytes of `path`, a comma there as good as "][". */
-static const entry_t *look_up(const catalog_t *catalog, const char *path, size_t length)
+static const entry_t *find_entry(const catalog_t *catalog, const char *path, size_t length)
 {
     char own[2 * PATH_BYTES_MAX];
     size_t at = 0;
@@ -133,7 +133,7 @@ target_status_t fcsl_catalog_find(const catalog_t *catalog, const char *path, ta
     }
     /* The longest field whose path is followed by nothing but brackets. */
     for (;;) {
-        const entry_t *entry = look_up(catalog, path, length);
+        const entry_t *entry = find_entry(catalog, path, length);
         if (entry != NULL) {
             *target = fcsl_catalog_target(catalog, entry);
             view_t part = target->view;

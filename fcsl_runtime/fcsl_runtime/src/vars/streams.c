@@ -73,7 +73,7 @@ void fcsl_vars_stream(fcsl_vars_t *vars, uint64_t now_ns)
         if (status == FCSL_HISTORY_COMING) {
             return;
         }
-        if (status == FCSL_HISTORY_GONE) {
+        if (status == FCSL_HISTORY_OVERWRITTEN) {
             const uint64_t cursor = fcsl_history_catch_up(vars->history, vars->cursor);
             vars->overtaken += cursor - vars->cursor;
             vars->cursor = cursor;

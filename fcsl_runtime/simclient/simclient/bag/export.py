@@ -169,9 +169,9 @@ def select(bag: Bag, patterns: Sequence[str] = (), machine: str = "", time: str 
         whole = not patterns or _matches(series.topic, patterns)
         if not whole:
             series.columns = {n: c for n, c in series.columns.items() if _matches(n, patterns)}
-        for told, without in ((found.left_out, collector.left_out), (found.too_large, collector.too_large)):
+        for reported, without in ((found.left_out, collector.left_out), (found.too_large, collector.too_large)):
             every = [collector.prefix + name for name in sorted(without)]
-            told += [name for name in every if whole or _matches(name, patterns)]
+            reported += [name for name in every if whole or _matches(name, patterns)]
         if series.columns and len(series.times):
             found.series.append(series)
     _demand_all(bag, found, patterns, prefixes)

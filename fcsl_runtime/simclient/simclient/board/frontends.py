@@ -33,11 +33,11 @@ class Frontends:
     def take(self, sensor: int, backend: int, sample_ns: int, values: Iterable[float]) -> None:
         """A reading of a device, measured at `sample_ns`: the quantities that its kind measures, NaN for what it does not
         tell. Raises ValueError for more values than a reading has."""
-        told = np.asarray(values, dtype=np.float64)
-        if told.ndim != 1 or told.size > VALUES:
-            raise ValueError(f"a reading has {VALUES} values at most, not {told.size}")
+        measured = np.asarray(values, dtype=np.float64)
+        if measured.ndim != 1 or measured.size > VALUES:
+            raise ValueError(f"a reading has {VALUES} values at most, not {measured.size}")
         given = np.full(VALUES, np.nan)
-        given[: told.size] = told
+        given[: measured.size] = measured
         reading = CReading(sample_ns, backend)
         ctypes.memmove(reading.values, given.tobytes(), given.nbytes)
         self._library.board_take(self.handle, sensor, byref(reading))

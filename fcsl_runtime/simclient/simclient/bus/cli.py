@@ -197,7 +197,7 @@ def _echo(options: argparse.Namespace) -> None:
                 print(line)
         except KeyboardInterrupt:
             pass  # the normal end
-        _tell_lost(feed)
+        _report_lost(feed)
 
 
 def _lines(feed: Feed, chosen: set[tuple[str, str]], as_json: bool, with_machine: bool) -> Iterator[str]:
@@ -212,8 +212,13 @@ def _lines(feed: Feed, chosen: set[tuple[str, str]], as_json: bool, with_machine
                 continue
             value = channel.decode(data)
             if as_json:
-                told = {"tick": tick.tick, "machine": machine.prefix, "channel": channel.name, "value": jsonable(value)}
-                yield json.dumps(told)
+                entry = {
+                    "tick": tick.tick,
+                    "machine": machine.prefix,
+                    "channel": channel.name,
+                    "value": jsonable(value),
+                }
+                yield json.dumps(entry)
             else:
                 name = f"{machine.prefix}/{channel.name}" if with_machine else channel.name
                 yield f"{tick.tick}  {name}  {with_unit(show_value(value), channel.unit)}"
@@ -254,8 +259,8 @@ def _machines(session: Session) -> list[BusMachine]:
 
 def _read_descriptors(path: Path) -> list[BusMachine]:
     try:
-        told = read_json(path)
-        return [read_machine(str(machine["prefix"]), json.dumps(machine["descriptor"])) for machine in told]
+        entry = read_json(path)
+        return [read_machine(str(machine["prefix"]), json.dumps(machine["descriptor"])) for machine in entry]
     except (ValueError, LookupError, TypeError):
         raise BusError(f"{path}: not what `fcsl bus list --json` prints") from None
 
@@ -275,7 +280,7 @@ def _record(options: argparse.Namespace) -> None:
         print(f"{options.output}: {bag.messages} messages")
         for prefix, verdict in bag.verdicts.items():
             print(f"{prefix}: {verdict}")
-        _tell_lost(feed)
+        _report_lost(feed)
 
 
 def _play(options: argparse.Namespace) -> int:
@@ -310,6 +315,6 @@ def _play(options: argparse.Namespace) -> int:
     return 1 if played.differ else 0
 
 
-def _tell_lost(feed: Feed) -> None:
+def _report_lost(feed: Feed) -> None:
     if lost := feed.lost():
         print(f"fcsl bus: {lost}", file=sys.stderr)

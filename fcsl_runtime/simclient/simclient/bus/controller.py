@@ -15,9 +15,9 @@ from .session import Message, Session
 _COMMIT = struct.Struct("<QQIBBH")
 _CONTROL = struct.Struct("<4sHBBIQ")
 _MAGIC, _VERSION, _TEXT_MAX = b"FCSW", 1, 236
-_LOOK_S = 0.1
+_POLL_S = 0.1
 #: How often a party that makes no ticks says that it is alive.
-ALIVE_S = 0.5
+KEEP_ALIVE_S = 0.5
 _NS = 1_000_000_000
 _SENSORS, _ACTUATORS = 0, 1
 
@@ -26,7 +26,7 @@ class Kind(IntEnum):
     HELLO = 1
     REFUSAL = 2
     END = 3
-    ALIVE = 4
+    KEEP_ALIVE = 4
 
 
 class RunEnded(Exception):
@@ -49,8 +49,8 @@ class Controller:
     def meet(self, stopped: Callable[[], bool]) -> bool:
         """Waits for a controller, as long as it takes; false when it is stopped before."""
         while not stopped():
-            message = self._session.receive(time.monotonic() + _LOOK_S)
-            self._look_for_others()
+            message = self._session.receive(time.monotonic() + _POLL_S)
+            self._check_for_others()
             if message is None or not self._is_control(message):
                 continue
             magic, version, kind, _, table, tick_hz = _CONTROL.unpack_from(message.data)
@@ -59,7 +59,7 @@ class Controller:
                 return True
         return False
 
-    def _look_for_others(self) -> None:
+    def _check_for_others(self) -> None:
         own = f"{self._machine.prefix}/@controller/"
         others = sorted(
             token.partition("/@controller/")[0] for token in list(self._tokens) if not token.startswith(own)
@@ -84,8 +84,8 @@ class Controller:
     def end(self) -> None:
         self._control(Kind.END)
 
-    def alive(self) -> None:
-        self._control(Kind.ALIVE)
+    def keep_alive(self) -> None:
+        self._control(Kind.KEEP_ALIVE)
 
     def _control(self, kind: Kind, sends_time: bool = False, text: str = "") -> None:
         hello = kind is Kind.HELLO
@@ -98,7 +98,7 @@ class Controller:
 
     # ---- ticks -------------------------------------------------------------------------------------------------------
 
-    def ask(
+    def step(
         self, tick: int, sensors: Mapping[str, bytes], now_s: Callable[[], float] = time.monotonic
     ) -> dict[str, bytes]:
         """Puts the sensors of a tick, and waits for the actuators. Raises RunEnded."""
@@ -116,14 +116,14 @@ class Controller:
         give_up_s = time.monotonic() + self._timeout_s
         while time.monotonic() < give_up_s:
             lives = any(token.startswith(f"{self._machine.prefix}/@controller/") for token in list(self._tokens))
-            message = self._session.receive(time.monotonic() + _LOOK_S)
+            message = self._session.receive(time.monotonic() + _POLL_S)
             if message is None and not lives:
                 raise BusError(f"the flight computer is gone, at tick {tick}")
             if message is None:
                 continue
             name = message.key.rpartition("/")[2]
             if self._is_control(message):
-                if self._heard_alive(message, tick):
+                if self._is_keep_alive(message, tick):
                     give_up_s = time.monotonic() + self._timeout_s
             elif name == "tick":
                 if self._is_answer(message.data, tick):
@@ -132,7 +132,7 @@ class Controller:
                 values[name] = message.data
         raise BusError(f"the flight computer did not answer tick {tick} within {self._timeout_s:g} s")
 
-    def _heard_alive(self, message: Message, tick: int) -> bool:
+    def _is_keep_alive(self, message: Message, tick: int) -> bool:
         magic, version, kind, *_ = _CONTROL.unpack_from(message.data)
         if (magic, version) != (_MAGIC, _VERSION):
             return False
@@ -141,7 +141,7 @@ class Controller:
         if kind == Kind.REFUSAL:
             text = message.data[_CONTROL.size :].decode("utf-8", "replace")
             raise BusError(f"the flight computer refuses, at tick {tick}: {text}")
-        return bool(kind == Kind.ALIVE)
+        return bool(kind == Kind.KEEP_ALIVE)
 
     def _is_answer(self, data: bytes, tick: int) -> bool:
         if len(data) != _COMMIT.size + self._bits_bytes:

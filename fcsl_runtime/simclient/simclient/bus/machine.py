@@ -148,19 +148,19 @@ _PAYLOADS = ("raw", "cdr")
 def read_machine(prefix: str, text: str) -> BusMachine:
     """The machine that a descriptor describes. Raises BusError: anybody may answer on a bus."""
     try:
-        told = json.loads(text)
-        if told["version"] != 1:
-            raise BusError(f"{prefix} has a descriptor of version {told['version']}, and this fcsl bus reads 1")
-        if told["payload"] not in _PAYLOADS:
-            raise BusError(f"{prefix} has the payload {told['payload']!r}, and this fcsl bus reads raw and cdr")
-        cdr = told["payload"] == "cdr"
+        found = json.loads(text)
+        if found["version"] != 1:
+            raise BusError(f"{prefix} has a descriptor of version {found['version']}, and this fcsl bus reads 1")
+        if found["payload"] not in _PAYLOADS:
+            raise BusError(f"{prefix} has the payload {found['payload']!r}, and this fcsl bus reads raw and cdr")
+        cdr = found["payload"] == "cdr"
         machine = BusMachine(
             prefix=prefix,
-            name=_name(told["machine"]),
-            source_hash=_printable(told["source_hash"]),
-            table_hash=_integer(told["table_hash"], 1 << 32),
-            tick_hz=_integer(told["tick_hz"], 1 << 32, least=1),
-            channels=tuple(_read_channel(i, channel, cdr) for i, channel in enumerate(told["channels"])),
+            name=_name(found["machine"]),
+            source_hash=_printable(found["source_hash"]),
+            table_hash=_integer(found["table_hash"], 1 << 32),
+            tick_hz=_integer(found["tick_hz"], 1 << 32, least=1),
+            channels=tuple(_read_channel(i, channel, cdr) for i, channel in enumerate(found["channels"])),
             text=text,
         )
     except (ValueError, LookupError, TypeError, RecursionError) as error:
@@ -170,37 +170,37 @@ def read_machine(prefix: str, text: str) -> BusMachine:
     return machine
 
 
-def _read_channel(index: int, told: dict[str, Any], cdr: bool) -> BusChannel:
-    shape = tuple(_integer(extent, _COUNT_MAX) for extent in told["shape"])
-    words_fit = told["type"] in _FORMATS and told["as"] in _AS and told["direction"] in DIRECTION_NAMES
-    shape_fits = len(shape) == 1 if told["as"] == "blob" else len(shape) <= _RANK_MAX
+def _read_channel(index: int, found: dict[str, Any], cdr: bool) -> BusChannel:
+    shape = tuple(_integer(extent, _COUNT_MAX) for extent in found["shape"])
+    words_fit = found["type"] in _FORMATS and found["as"] in _AS and found["direction"] in DIRECTION_NAMES
+    shape_fits = len(shape) == 1 if found["as"] == "blob" else len(shape) <= _RANK_MAX
     if not words_fit or not shape_fits or math.prod(shape) > _COUNT_MAX:
         raise ValueError
     return BusChannel(
         index=index,
-        name=_name(told["name"]),
-        direction=told["direction"],
-        type=told["type"],
+        name=_name(found["name"]),
+        direction=found["direction"],
+        type=found["type"],
         shape=shape,
-        is_blob=told["as"] == "blob",
-        unit=_printable(told["unit"]),
-        doc=_printable(told["doc"]),
-        payload=_read_payload(told, math.prod(shape)) if cdr else None,
+        is_blob=found["as"] == "blob",
+        unit=_printable(found["unit"]),
+        doc=_printable(found["doc"]),
+        payload=_read_payload(found, math.prod(shape)) if cdr else None,
     )
 
 
-def _read_payload(told: dict[str, Any], count: int) -> Payload:
-    ros = {key: _printable(told["ros"][key]) for key in ("type", "field", "frame", "child_frame", "axes")}
+def _read_payload(found: dict[str, Any], count: int) -> Payload:
+    ros = {key: _printable(found["ros"][key]) for key in ("type", "field", "frame", "child_frame", "axes")}
     return Payload(
-        name=_name(told["name"]),
+        name=_name(found["name"]),
         ros_type=ros["type"],
         field=ros["field"],
         frame=ros["frame"],
         child_frame=ros["child_frame"],
         axes=ros["axes"],
-        type=told["type"],
+        type=found["type"],
         count=count,
-        is_blob=told["as"] == "blob",
+        is_blob=found["as"] == "blob",
     )
 
 

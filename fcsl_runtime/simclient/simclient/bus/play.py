@@ -8,7 +8,7 @@ from collections.abc import Callable
 from dataclasses import dataclass
 
 from .bag_ticks import BagTick, BagTicks
-from .controller import ALIVE_S, Controller, RunEnded
+from .controller import KEEP_ALIVE_S, Controller, RunEnded
 
 
 @dataclass
@@ -56,7 +56,7 @@ class Player:
                 played.ended = "interrupted"
                 break
             try:
-                answer = self._controller.ask(played.ticks, tick.sensors)
+                answer = self._controller.step(played.ticks, tick.sensors)
             except RunEnded:
                 played.ended = "the flight computer ended the run"
                 break
@@ -69,9 +69,9 @@ class Player:
     def _is_time(self, when_s: float) -> bool:
         """Waits until then, if it keeps to a time; false once it is stopped."""
         while self._speed and not self._stopped() and (left_s := when_s - time.monotonic()) > 0:
-            time.sleep(min(left_s, ALIVE_S))
-            if left_s > ALIVE_S:
-                self._controller.alive()
+            time.sleep(min(left_s, KEEP_ALIVE_S))
+            if left_s > KEEP_ALIVE_S:
+                self._controller.keep_alive()
         return not self._stopped()
 
     def _compare(self, tick: BagTick, answer: dict[str, bytes]) -> None:

@@ -36,14 +36,14 @@ _TIME_NS_MAX = (1 << 63) - 1
 class _Part:
     """A machine's part of the bag."""
 
-    def __init__(self, bag: NativeBag, machine: BusMachine, reproduction: Reproduction, tell: Callable[[str], None]):
+    def __init__(self, bag: NativeBag, machine: BusMachine, reproduction: Reproduction, report: Callable[[str], None]):
         self.reproduction = reproduction
         self.messages = 0
-        self._bag, self._machine, self._tell = bag, machine, tell
+        self._bag, self._machine, self._report = bag, machine, report
         types = type_names(machine)
         self._channels = [self._add(c.name, types[c.name], definition_of(c)) for c in machine.channels]
         self._record = {name: self._add(name, *row) for name, row in RECORD_TOPICS.items()}
-        self._is_described = self._has_told = False
+        self._is_described = self._has_reported = False
 
     def _add(self, name: str, kind: str, definition: str) -> int:
         return self._bag.add(topic_of(self._machine.prefix, name), kind, definition)
@@ -72,7 +72,7 @@ class _Part:
             self._write(self._record[WRITES], tick_of(found.message), found.message)
         elif isinstance(found, Checkpoint):
             self._write(self._record[CHECKPOINT], found.tick, found.message)
-            self._tell(f"{self._machine.prefix}: reproduces the run from tick {found.tick} on")
+            self._report(f"{self._machine.prefix}: reproduces the run from tick {found.tick} on")
         else:
             time_ns = found.tick * _NS // self._machine.tick_hz
             for channel, value in found.values:
@@ -80,18 +80,18 @@ class _Part:
 
     def _put_lacks(self) -> None:
         """Why the bag does not reproduce the run, as soon as that is known."""
-        if self.reproduction.lacks and not self._has_told:
-            self._has_told = True
-            self._tell(f"{self._machine.prefix}: {self.reproduction}")
+        if self.reproduction.lacks and not self._has_reported:
+            self._has_reported = True
+            self._report(f"{self._machine.prefix}: {self.reproduction}")
             self._write(self._record[LACKS], max(self.reproduction.last, 0), string_of(self.reproduction.lacks))
 
 
 class Recording:
     """An open bag."""
 
-    def __init__(self, bag: NativeBag, machines: Iterable[BusMachine], session: Session, tell: Callable[[str], None]):
+    def __init__(self, bag: NativeBag, machines: Iterable[BusMachine], session: Session, report: Callable[[str], None]):
         self._bag = bag
-        self._parts = {m.prefix: _Part(bag, m, Reproduction(m, session), tell) for m in machines}
+        self._parts = {m.prefix: _Part(bag, m, Reproduction(m, session), report) for m in machines}
 
     @property
     def messages(self) -> int:
@@ -118,13 +118,13 @@ class Recording:
 
 @contextmanager
 def recording(
-    folder: Path, machines: Iterable[BusMachine], session: Session, tell: Callable[[str], None]
+    folder: Path, machines: Iterable[BusMachine], session: Session, report: Callable[[str], None]
 ) -> Iterator[Recording]:
     """A bag in the new directory `folder`, complete when the block ends. After `kill -9` it has what a host's recorder
     would have left. `tell` gets what a user may want to know meanwhile. Raises BagError.
     """
     with NativeBag(folder) as bag:
-        recorded = Recording(bag, machines, session, tell)
+        recorded = Recording(bag, machines, session, report)
         bag.publish()
         yield recorded
         recorded.end()

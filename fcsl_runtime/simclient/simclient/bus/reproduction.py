@@ -56,7 +56,7 @@ class Reproduction:
             self._give_up_s = min(self._give_up_s, self._now_s() + _WAIT_S)
             self._waiting.append(event)
         if event is None or isinstance(event, Written):
-            self._ask()
+            self._query()
             if self._is_due():
                 yield from self._begin()
         if not self._begun and (self._now_s() > self._give_up_s or len(self._waiting) > _WAITING_MAX):
@@ -94,7 +94,7 @@ class Reproduction:
 
     # ---- the beginning -----------------------------------------------------------------------------------------------
 
-    def _ask(self) -> None:
+    def _query(self) -> None:
         """For a checkpoint, until there is one whose writes are all here."""
         answer = self._question.answer() if self._question is not None else None
         found = read_checkpoint(answer) if answer is not None else None
@@ -103,7 +103,7 @@ class Reproduction:
         if self._checkpoint is not None and self._checkpoint.next_write < self._oldest:
             self._checkpoint = None  # of a time before
         if self._checkpoint is None and self._expected and (self._question is None or self._question.is_over):
-            self._question = self._session.ask(self._key)
+            self._question = self._session.query(self._key)
 
     def _is_due(self) -> bool:
         """Whether everything before the checkpoint has come."""

@@ -17,10 +17,10 @@ from .machine import BusMachine, read_machine
 
 _CONNECT_MS = 2000
 _DESCRIBE_S = 2.0
-_LOOK_S = 0.2
+_POLL_S = 0.2
 #: A link that was lost is back after so many looks, or the one that listens is gone. Looks, not time: a process that was
 #: frozen has not looked meanwhile.
-_GONE_LOOKS = 5
+_DISCONNECTED_POLLS = 5
 #: Zenoh refuses longer ones; those of FCSL have 1 MiB at most.
 _MESSAGE_BYTES_MAX = 2 << 20
 #: Most messages, and bytes of them, that wait to be read; of more, the newest are dropped and counted.
@@ -59,7 +59,7 @@ class Session:
         self._listens = listens
         self.dropped = 0
         self._stopped = False
-        self._looks_alone = 0  # without the one that listens, one after the other
+        self._polls_alone = 0  # without the one that listens, one after the other
         self._zenoh = _zenoh()
         self._session = self._open()
         self._waiting: deque[Message] = deque()
@@ -117,7 +117,7 @@ class Session:
                         found[prefix] = read_machine(prefix, bytes(reply.ok.payload).decode("utf-8", "replace"))
                     except BusError as error:
                         refused[prefix] = str(error)
-            time.sleep(0 if found else _LOOK_S)
+            time.sleep(0 if found else _POLL_S)
         if not found:
             why = f"no machine is on {self.endpoint}: it is served by fcsl-fc and fcsl-sim with --observers"
             raise BusError(min(refused.values(), default=why))
@@ -126,19 +126,19 @@ class Session:
     def subscribe(self, machines: Iterable[BusMachine], *names: str) -> None:
         """`messages` brings what comes from now on: all values and commits, then what is under these names, too."""
         # On Zenoh's own thread: one thread for each subscriber would lose the order among them.
-        heard = self._zenoh.handlers.Callback(self._heard, indirect=False)
+        receive_token = self._zenoh.handlers.Callback(self._receive, indirect=False)
         for machine in machines:
             for name in ("*", *names):
                 subscriber = self._session.declare_subscriber(
-                    f"{machine.prefix}/{name}", heard, allowed_origin=self._zenoh.Locality.REMOTE
+                    f"{machine.prefix}/{name}", receive_token, allowed_origin=self._zenoh.Locality.REMOTE
                 )
                 self._subscribers.append(subscriber)
 
-    def ask(self, key: str) -> Question:
+    def query(self, key: str) -> Question:
         """Asks for what is under the key; does not wait."""
         return Question(self._session.get(key, timeout=_DESCRIBE_S), self._zenoh.ZError)
 
-    def _heard(self, sample: Any) -> None:
+    def _receive(self, sample: Any) -> None:
         """On a thread of Zenoh's."""
         if sample.kind != self._zenoh.SampleKind.PUT:
             return
@@ -157,13 +157,13 @@ class Session:
         while not self._stopped and (until_s is None or time.monotonic() < until_s):
             with self._news:
                 if not self._waiting:
-                    left_s = _LOOK_S if until_s is None else min(_LOOK_S, max(0.0, until_s - time.monotonic()))
+                    left_s = _POLL_S if until_s is None else min(_POLL_S, max(0.0, until_s - time.monotonic()))
                     self._news.wait(left_s)
                 batch, self._waiting, self._bytes = self._waiting, deque(), 0
             yield from batch
             yield None
-            self._looks_alone = 0 if batch or self._is_connected() else self._looks_alone + 1
-            if self._looks_alone > _GONE_LOOKS:
+            self._polls_alone = 0 if batch or self._is_connected() else self._polls_alone + 1
+            if self._polls_alone > _DISCONNECTED_POLLS:
                 return
 
     def receive(self, until_s: float) -> Message | None:
@@ -185,11 +185,11 @@ class Session:
         """The tokens of others under this expression, kept up to date."""
         alive: set[str] = set()
 
-        def heard(sample: Any) -> None:
+        def receive_token(sample: Any) -> None:
             change = alive.add if sample.kind == self._zenoh.SampleKind.PUT else alive.discard
             change(str(sample.key_expr))
 
-        self._subscribers.append(self._session.liveliness().declare_subscriber(key, heard, history=True))
+        self._subscribers.append(self._session.liveliness().declare_subscriber(key, receive_token, history=True))
         return alive
 
     def stop(self) -> None:

@@ -20,7 +20,7 @@ from .rounding import rounded
 SECONDS = 300.0
 #: For how long the device is at rest, and the standard deviation of an axis then, in m/s^2.
 _STILL_S, _DEVIATION_MAX = 1.0, 0.2
-_LOOK_S = 0.1
+_POLL_S = 0.1
 _SAMPLES_MIN = 5
 _SIDES = [(axis, sign) for axis in range(3) for sign in (1, -1)]
 #: Beyond those of any accelerometer that works; the offset in m/s^2.
@@ -48,15 +48,15 @@ def _collect(source: Source, seconds: float) -> dict[Side, Vector]:
     """The mean of each side. Raises Refused when the time is over."""
     sides: dict[Side, Vector] = {}
     window: deque[tuple[float, Vector]] = deque()
-    report, look = Report(), _STILL_S
+    report, next_s = Report(), _STILL_S
     print(f"put each side of the vehicle up once, in any order, and keep it still; {seconds:g} s for all", flush=True)
     for at, vector in source.vectors(seconds):
         window.append((at, vector))
         while at - window[0][0] > _STILL_S:
             window.popleft()
-        if at < look:
+        if at < next_s:
             continue
-        look = at + _LOOK_S
+        next_s = at + _POLL_S
         still = fit_still(np.array([v for _, v in window])) if len(window) >= _SAMPLES_MIN else None
         if still is None or (still.deviation > _DEVIATION_MAX).any():
             report.at(at, "it moves")

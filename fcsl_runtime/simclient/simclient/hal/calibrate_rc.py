@@ -27,7 +27,7 @@ def calibrate_rc(target: Target, seconds: float) -> Changes:
         rest = _collect(source, target, _REST_S)
         print(f"move all sticks and switches to all their ends, for {seconds:g} s", flush=True)
         moved = _collect(source, target, seconds)
-    count = min(_told(rest), _told(moved))
+    count = min(_channel_count(rest), _channel_count(moved))
     ranges = fit_ranges(rest[:, :count], moved[:, :count])
     if not any(ranges):
         raise Refused("no channel was moved")
@@ -46,7 +46,7 @@ def _collect(source: Source, target: Target, seconds: float) -> Vector:
             raise Refused("failsafe: the receiver has lost the transmitter")
         taken.append(values[target.signal("sticks")])
         if report.is_due(at):
-            array = np.array(taken)[:, : _told(np.array(taken))]
+            array = np.array(taken)[:, : _channel_count(np.array(taken))]
             ranges = zip(array.min(axis=0), array.max(axis=0), strict=True)
             report.at(at, f"{at:.0f} s: " + "  ".join(f"{low:.0f}-{high:.0f}" for low, high in ranges))
     report.end()
@@ -55,7 +55,7 @@ def _collect(source: Source, target: Target, seconds: float) -> Vector:
     return np.array(taken)
 
 
-def _told(samples: Vector) -> int:
+def _channel_count(samples: Vector) -> int:
     """How many channels, from the first one on, every sample has."""
     missing = np.isnan(samples).any(axis=0)
     return int(missing.argmax()) if missing.any() else samples.shape[1]

@@ -23,7 +23,7 @@ def describe_driver(name: str, address: str | None, seconds: float, as_json: boo
     sample, why = None, ""
     if address is not None:
         try:
-            sample = _look(driver, address, seconds)
+            sample = _read_sample(driver, address, seconds)
         except Refused as error:
             why = str(error)
     if as_json:
@@ -36,7 +36,7 @@ def describe_driver(name: str, address: str | None, seconds: float, as_json: boo
         print(f"device '{address}' is there; an actuator is not opened, because opening may change what it does")
 
 
-def _look(driver: Driver, address: str, seconds: float) -> Sample | None:
+def _read_sample(driver: Driver, address: str, seconds: float) -> Sample | None:
     """A sample of a sensor; None for an actuator that is there. Raises Refused."""
     if driver.direction == SENSOR:
         with driver.open(address, optional=[signal.name for signal in driver.signals]) as device:
@@ -79,7 +79,7 @@ def show_numbers(values: Iterable[float], digits: int = 6, unit: str = "") -> st
 
 
 def _as_json(driver: Driver, address: str | None, sample: Sample | None, why: str) -> dict[str, Any]:
-    told: dict[str, Any] = {
+    described: dict[str, Any] = {
         "driver": driver.name,
         "direction": "sensor" if driver.direction == SENSOR else "actuator",
         "waits": driver.waits,
@@ -90,5 +90,5 @@ def _as_json(driver: Driver, address: str | None, sample: Sample | None, why: st
     }
     if address is not None:
         values = None if sample is None else jsonable(sample.values)
-        told |= {"device": address, "values": values, "why": why}
-    return told
+        described |= {"device": address, "values": values, "why": why}
+    return described

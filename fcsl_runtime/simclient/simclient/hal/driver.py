@@ -117,7 +117,7 @@ class Device:
             address = ctypes.cast(self._address, ctypes.c_char_p)
             used = ctypes.addressof(self._used)
             status = self.driver.abi.open(self._state, address, used, *self._reason())
-            why = self._said()
+            why = self._why_text()
         if status != OK:
             what = "is not there" if status == ABSENT else "cannot be opened"
             raise Refused(f"device '{self.address}' of driver '{self.driver.name}' {what}: {why or _NO_REASON}")
@@ -128,7 +128,7 @@ class Device:
         self._why.value = b""
         return ctypes.addressof(self._why), REASON_BYTES
 
-    def _said(self) -> str:
+    def _why_text(self) -> str:
         return _text(self._why.value) or _NO_REASON
 
     def read(self) -> Sample | None:
@@ -138,14 +138,14 @@ class Device:
             ctypes.memset(byref(self._input), 0, ctypes.sizeof(CInput))
         status = self.driver.abi.read(self._state, byref(sample_ns), *self._reason())
         if self._input is not None:
-            told = self._input.why or (NO_FRAMES if self._input.bytes else NO_BYTES)
-            self._silence = 0 if status == OK else max(self._silence, told)
+            silence = self._input.why or (NO_FRAMES if self._input.bytes else NO_BYTES)
+            self._silence = 0 if status == OK else max(self._silence, silence)
         if status == NOTHING:
             return None
         if status != OK:
             if status == ABSENT:
                 self.close()
-            raise Refused(f"device '{self.address}' of driver '{self.driver.name}': {self._said()}")
+            raise Refused(f"device '{self.address}' of driver '{self.driver.name}': {self._why_text()}")
         return Sample(sample_ns.value, {name: [float(v) for v in values] for name, values in self._values.items()})
 
     def silence(self) -> str:
@@ -157,7 +157,7 @@ class Device:
         for name, value in values.items():
             self._values[name][0] = value
         if self.driver.abi.write(self._state, *self._reason()) != OK:
-            raise Refused(f"device '{self.address}' of driver '{self.driver.name}': {self._said()}")
+            raise Refused(f"device '{self.address}' of driver '{self.driver.name}': {self._why_text()}")
 
     def close(self) -> None:
         if self._is_open:

@@ -25,7 +25,7 @@ class _Chip:
     lines: int = 0
 
 
-def _ask(path: Path) -> _Chip:
+def _query(path: Path) -> _Chip:
     answer = bytearray(_CHIPINFO.size)
     try:
         file = os.open(dev_root() / path.name, os.O_RDONLY | os.O_NONBLOCK | os.O_CLOEXEC)
@@ -41,7 +41,7 @@ def _ask(path: Path) -> _Chip:
 
 
 def find_gpio() -> list[Found]:
-    chips = [_ask(path) for path in folders("bus/gpio/devices", "gpiochip")]
+    chips = [_query(path) for path in folders("bus/gpio/devices", "gpiochip")]
     names = {chip: [chip.label, chip.path.name] for chip in chips}
     found = []
     for chip in chips:

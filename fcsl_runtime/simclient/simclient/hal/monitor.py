@@ -42,7 +42,7 @@ def monitor(path: str, sensor: str | None, seconds: float | None, as_json: bool,
         curves = Curves(watch, sensors) if as_plot else None
         show = _shower(watch, sensors, with_hardware, curves, as_json, live, opened)
         with contextlib.suppress(KeyboardInterrupt):  # the normal end
-            _run(watch, seconds, curves, show, _REDRAW_NS if live else _LINE_NS, says_news=not live)
+            _run(watch, seconds, curves, show, _REDRAW_NS if live else _LINE_NS, shows_news=not live)
             _check(watch, sensors, with_hardware)
 
 
@@ -79,14 +79,14 @@ def _shower(
 
 
 def _run(
-    watch: Watch, seconds: float | None, curves: Curves | None, show: Show, period_ns: int, says_news: bool
+    watch: Watch, seconds: float | None, curves: Curves | None, show: Show, period_ns: int, shows_news: bool
 ) -> None:
     begun = time.monotonic_ns()
     shown = begun
     for tick in _ticks(watch.plan.tick_hz, begun, seconds):
         now = time.monotonic_ns()
         for text in watch.tick(now):
-            if says_news:
+            if shows_news:
                 print(f"fcsl hal: {text}", file=sys.stderr, flush=True)
         if curves is not None:
             curves.take(tick)

@@ -37,12 +37,12 @@ class Curves:
                 self._rows[s, quantity.name].append(values.get(quantity.name, []))
 
     def lines(self, width: int, height: int) -> list[str]:
-        told = {key: rows for key, rows in self._rows.items() if any(rows)}
-        if not told:
+        shown = {key: rows for key, rows in self._rows.items() if any(rows)}
+        if not shown:
             return ["no sensor has a healthy device yet"]
-        each = height // len(told) - _TITLE_ROWS
+        each = height // len(shown) - _TITLE_ROWS
         lines = []
-        for (s, name), rows in told.items():
+        for (s, name), rows in shown.items():
             sensor = self._watch.plan.sensors[s]
             unit = next(p.unit for p in quantity_ranges(sensor.kind) if p.name == name)
             title = f"{sensor.name}.{name} = {with_unit(show_numbers(rows[-1], unit=unit), unit)}"

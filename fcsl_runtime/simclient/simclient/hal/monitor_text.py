@@ -87,5 +87,5 @@ def _values(kind: str, values: dict[str, list[float]] | None) -> str:
         return "-"
     units = {quantity.name: quantity.unit or "" for quantity in KINDS[kind]}
     return "  ".join(
-        f"{name} {with_unit(show_numbers(told, unit=units[name]), units[name])}" for name, told in values.items()
+        f"{name} {with_unit(show_numbers(numbers, unit=units[name]), units[name])}" for name, numbers in values.items()
     )

@@ -68,9 +68,9 @@ class Watch:
             self._frontends.take(sensor, backend, sample_ns, values)
             self._raw[sensor, backend] = values
             self._last_ns[self.plan.sensors[sensor].backends[backend].device] = sample_ns
-        for one, told in zip(self.plan.inputs.values(), self._devices.inputs(), strict=True):
-            if told is not None:
-                self._last_ns[one.device] = told[0]
+        for one, given in zip(self.plan.inputs.values(), self._devices.inputs(), strict=True):
+            if given is not None:
+                self._last_ns[one.device] = given[0]
         self._frontends.tick(now_ns)
         news = self._devices.news()
         for text in news:
@@ -91,8 +91,8 @@ class Watch:
         used = {b.device for s in sensors for b in self.plan.sensors[s].backends} | {i.device for i in inputs.values()}
         devices = [self._device(d, name, now_ns) for d, name in enumerate(self._names) if name in used]
         hardware = [
-            {"name": name, "device": one.device, "signal": one.signal, "value": told[1] if told else None}
-            for (name, one), told in zip(inputs.items(), self._devices.inputs() if inputs else (), strict=True)
+            {"name": name, "device": one.device, "signal": one.signal, "value": given[1] if given else None}
+            for (name, one), given in zip(inputs.items(), self._devices.inputs() if inputs else (), strict=True)
         ]
         return {"devices": devices, "sensors": [self._sensor(s) for s in sensors], "hardware": hardware}
 
@@ -152,9 +152,9 @@ def _by_quantity(sensor: Sensor, values: list[float]) -> Values:
     """Without what is not told; without what the frontend computes, if no channel gets it."""
     found = {}
     for quantity in quantity_ranges(sensor.kind):
-        told = values[quantity.start : quantity.end]
-        while told and math.isnan(told[-1]):
-            told.pop()
-        if told and (quantity.measured or quantity.name in sensor.channels):
-            found[quantity.name] = told
+        given = values[quantity.start : quantity.end]
+        while given and math.isnan(given[-1]):
+            given.pop()
+        if given and (quantity.measured or quantity.name in sensor.channels):
+            found[quantity.name] = given
     return found

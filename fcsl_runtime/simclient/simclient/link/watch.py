@@ -77,17 +77,17 @@ def _show(client: VarClient, period_s: float, count: int, as_json: bool) -> None
     if not paths:
         text = "this program has no link: fcsl-fc has one with --hal wire:udp:…, wire:tcp:… or wire:uart:…"
         raise VarError("no_link", text)
-    before, looked = _read(client, paths), time.monotonic()
+    before, read_s = _read(client, paths), time.monotonic()
     done = 0
     while count == 0 or done < count:
-        time.sleep(max(0.0, looked + period_s - time.monotonic()))
+        time.sleep(max(0.0, read_s + period_s - time.monotonic()))
         now, at = _read(client, paths), time.monotonic()
-        rates = {name: (now[name] - before[name]) / (at - looked) for name in now}
+        rates = {name: (now[name] - before[name]) / (at - read_s) for name in now}
         if as_json:
             print(json.dumps({"total": now, "per_second": rates}), flush=True)
         else:
             print(text_of(now, rates), end="\n\n", flush=True)
-        before, looked, done = now, at, done + 1
+        before, read_s, done = now, at, done + 1
 
 
 def _read(client: VarClient, paths: Sequence[str]) -> dict[str, int]:

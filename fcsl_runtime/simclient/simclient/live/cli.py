@@ -57,7 +57,7 @@ def main(arguments: Sequence[str]) -> int:
     from ..telemetry.receiver import Telemetry
 
     with Telemetry(port, host, _WINDOW_TICKS) as telemetry:
-        _say(f"waiting for telemetry on {host}:{telemetry.port}")
+        _log(f"waiting for telemetry on {host}:{telemetry.port}")
         well = _view(telemetry, options, views, stop)
     if not well:
         sys.stdout.flush()
@@ -89,16 +89,16 @@ def _view(telemetry: Telemetry, options: argparse.Namespace, chosen: Views | Non
     from .viewer import Viewer
 
     viewers = [Viewer(connect, save, options.web or WEB_PORT) for connect, save in _places(options)]
-    views = [LiveView(telemetry, viewer, _say if viewer is viewers[0] else str, chosen) for viewer in viewers]
+    views = [LiveView(telemetry, viewer, _log if viewer is viewers[0] else str, chosen) for viewer in viewers]
     try:
         for page in [viewer.page for viewer in viewers if viewer.page]:
-            _say(f"open {page}")
+            _log(f"open {page}")
         well = _watch(list(views), stop)
     finally:
         for viewer in viewers:
             viewer.close()
     counts, view = telemetry.counts, views[0]
-    _say(
+    _log(
         f"{view.ticks} ticks in {view.recordings} recording(s), {view.missing} missing; "
         f"received {counts.received} datagrams, {counts.malformed} malformed, {counts.lost} packets lost"
     )
@@ -133,7 +133,7 @@ def _watch(views: list[LiveView], stop: threading.Event) -> bool:
     return well
 
 
-def _say(text: str) -> None:
+def _log(text: str) -> None:
     print(text, flush=True)
 
 

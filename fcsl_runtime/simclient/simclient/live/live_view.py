@@ -20,7 +20,7 @@ from .recording import PARTING_S, Recording
 from .viewer import Viewer
 
 #: A viewer that has not read the sent data after this time, in s, counts as stuck.
-_PATIENCE_S = 0.2
+_TIMEOUT_S = 0.2
 #: Most recordings of one view. Each uses memory of the viewer and a file, and any sender could cause one per packet.
 RECORDINGS_MAX = 100
 
@@ -55,7 +55,7 @@ class LiveView:
         self.viewer.check()
         if self._telemetry.session is None or time.monotonic() < self._due_s and not rest:
             return
-        if not self.taken(_PATIENCE_S):
+        if not self.taken(_TIMEOUT_S):
             if not self.behind:
                 self._notify("the viewer does not read: new telemetry is kept for it, as long as there is room")
             self.behind = True
@@ -99,9 +99,9 @@ class LiveView:
         recording.pass_over(window, rows)
         self.missing += len(rows)
 
-    def taken(self, patience_s: float) -> bool:
-        """Waits up to `patience_s` seconds; returns whether the viewer has read all data sent to it."""
-        return self._recording is None or self._recording.taken(patience_s)
+    def taken(self, timeout_s: float) -> bool:
+        """Waits up to `timeout_s` seconds; returns whether the viewer has read all data sent to it."""
+        return self._recording is None or self._recording.taken(timeout_s)
 
     def end(self) -> None:
         """Shows the remaining rows and ends the recording. Raises ViewError if the viewer does not read them."""

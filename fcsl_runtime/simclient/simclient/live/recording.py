@@ -148,13 +148,13 @@ class Recording:
         states = self._machine.states
         return "" if number < 0 else states[number] if number < len(states) else str(number)
 
-    def taken(self, patience_s: float) -> bool:
-        """Waits up to `patience_s` seconds; returns whether all data have arrived.
+    def taken(self, timeout_s: float) -> bool:
+        """Waits up to `timeout_s` seconds; returns whether all data have arrived.
 
         Raises ViewError if the viewer has ended.
         """
         try:
-            self._stream.flush(timeout_sec=patience_s)
+            self._stream.flush(timeout_sec=timeout_s)
         except RuntimeError as error:
             if "timed out" in str(error):
                 return False

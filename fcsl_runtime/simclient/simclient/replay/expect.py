@@ -22,7 +22,7 @@ from .mapping import Entry, Expectation
 from .outputs import STATE, Outputs
 from .poses import are_rotations
 from .sample_extraction import Wish, gather, refusals, wish
-from .tick_alignment import Array, Grid, align, first_ticks_at, nearest_ticks, screen
+from .tick_alignment import Array, TickGrid, align, first_ticks_at, nearest_ticks, screen
 
 
 @dataclass(frozen=True)
@@ -95,10 +95,12 @@ def _target(expectation: Expectation, bag: Bag, machine: Machine) -> Target:
     return Target(expectation, measure, field.unit if measure == "values" else "rad", wanted)
 
 
-def compare(targets: Sequence[Target], bag: Bag, outputs: Outputs, grid: Grid, header_time: bool) -> list[Comparison]:
+def compare(
+    targets: Sequence[Target], bag: Bag, outputs: Outputs, grid: TickGrid, header_time: bool
+) -> list[Comparison]:
     """Compares `outputs`, the machine's for `bag` on `grid`, with `bag`. Raises BagError."""
     wishes = [target.wish for target in targets if target.wish is not None]
-    intakes = gather(bag, wishes, header_time)[0] if wishes else {}
+    all_samples = gather(bag, wishes, header_time)[0] if wishes else {}
     found = []
     for target in targets:
         name = target.expectation.entry.target
@@ -107,9 +109,9 @@ def compare(targets: Sequence[Target], bag: Bag, outputs: Outputs, grid: Grid, h
             none = "" if len(times_ns) else f"none of its {messages} messages can be used" if messages else _NO_MESSAGE
             ours = outputs.column(name)
         else:
-            intake = intakes[name]
-            times_ns, theirs = intake.times_ns, intake.values.reshape(len(intake.times_ns), target.wish.pick.count)
-            none = "" if len(times_ns) else ", ".join(refusals(intake.refused, intake.frames)) or _NO_MESSAGE
+            samples = all_samples[name]
+            times_ns, theirs = samples.times_ns, samples.values.reshape(len(samples.times_ns), target.wish.pick.count)
+            none = "" if len(times_ns) else ", ".join(refusals(samples.refused, samples.frames)) or _NO_MESSAGE
             values = outputs.column(name)
             ours = values.reshape(len(values), -1).astype(np.float64)
         found.append(_compared(target, grid, times_ns, ours, theirs, none))
@@ -120,7 +122,7 @@ def compare(targets: Sequence[Target], bag: Bag, outputs: Outputs, grid: Grid, h
 _NO_MESSAGE = "its topic has no message"
 
 
-def _compared(target: Target, grid: Grid, times_ns: Array, ours: Array, theirs: Array, nothing: str) -> Comparison:
+def _compared(target: Target, grid: TickGrid, times_ns: Array, ours: Array, theirs: Array, nothing: str) -> Comparison:
     """The comparison of the outputs of all ticks with messages at `times_ns`."""
     behind_ns = times_ns - grid.first_ns
     inside = (behind_ns >= target.expectation.from_s * 1e9) & (behind_ns <= target.expectation.until_s * 1e9)
@@ -171,7 +173,7 @@ def _texts(bag: Bag, entry: Entry, header_time: bool) -> tuple[Array, Array, int
     return times_ns[usable], found[usable], len(texts)
 
 
-def _aligned(times_ns: Array, grid: Grid, nearest: bool) -> tuple[Array, Array]:
+def _aligned(times_ns: Array, grid: TickGrid, nearest: bool) -> tuple[Array, Array]:
     """(ticks, index of the message compared with each)."""
     if nearest:
         ticks = nearest_ticks(times_ns, grid.first_ns, grid.tick_hz)

@@ -17,13 +17,13 @@ from ..run import Run
 from .expect import Comparison, table
 from .mapping import Entry, Map
 from .outputs import SLICE_TICKS, Outputs
-from .sample_extraction import Intake, Wish, gather, refusals, wish
+from .sample_extraction import TargetSamples, Wish, gather, refusals, wish
 from .tick_alignment import (
     JUMP_NS,
     Array,
     Coverage,
-    Grid,
     Oddities,
+    TickGrid,
     align,
     first_ticks_at,
     tick_count,
@@ -71,7 +71,7 @@ class ForeignRun:
     `str` gives the report of `fcsl replay --map`.
     """
 
-    grid: Grid
+    grid: TickGrid
     header_time: bool
     fates: dict[str, Fate]
     oddities: dict[str, Oddities]
@@ -202,18 +202,18 @@ def _wishes(chart: Map, machine: Machine, bag: Bag) -> list[Wish]:
     return wishes
 
 
-def _grid(chart: Map, intakes: Mapping[str, Intake], bag: Bag, tick_hz: int) -> Grid:
+def _grid(chart: Map, all_samples: Mapping[str, TargetSamples], bag: Bag, tick_hz: int) -> TickGrid:
     """Ticks from the first sample of any channel to the tick that receives the last one.
 
     Raises MapError or BagError.
     """
-    for name, intake in intakes.items():
-        if intake.messages and not len(intake.times_ns):
+    for name, samples in all_samples.items():
+        if samples.messages and not len(samples.times_ns):
             raise MapError(
                 f"{chart.path}: channel `{name}`: no message can be used: "
-                f"{', '.join(refusals(intake.refused, intake.frames))}"
+                f"{', '.join(refusals(samples.refused, samples.frames))}"
             )
-    times = [intake.times_ns for intake in intakes.values() if len(intake.times_ns)]
+    times = [samples.times_ns for samples in all_samples.values() if len(samples.times_ns)]
     if not times:
         damage = f" ({bag.truncated})" if bag.truncated else ""
         raise BagError(f"{bag.path}: there is no message on the mapped topics{damage}")
@@ -224,7 +224,7 @@ def _grid(chart: Map, intakes: Mapping[str, Intake], bag: Bag, tick_hz: int) -> 
             f"{chart.path}: stamps from {first_ns / 1e9:.3f} s to {last_ns / 1e9:.3f} s would make {ticks} ticks; "
             "is one of them wrong? `time: log` takes the times of recording instead"
         )
-    return Grid(first_ns, ticks, tick_hz)
+    return TickGrid(first_ns, ticks, tick_hz)
 
 
 @dataclass(frozen=True)
@@ -251,9 +251,9 @@ class _Delivery:
 
 
 def _delivery(
-    channel: Channel, intake: Intake, aligned: tuple[Array, Array, Coverage], timeout_ns: int, grid: Grid
+    channel: Channel, samples: TargetSamples, aligned: tuple[Array, Array, Coverage], timeout_ns: int, grid: TickGrid
 ) -> tuple[_Delivery, Fate]:
-    """What one channel gets; `aligned` is `align` of the intake.
+    """What one channel gets; `aligned` is `align` of the samples.
 
     If `timeout_ms` ends before the machine's own max_age_ticks, the channel gets its last sample once more, with the
     first age that is too old.
@@ -264,7 +264,7 @@ def _delivery(
     ages = np.zeros(len(ticks), np.int64)
     due, rows = ticks, chosen
     if timeout_ns:
-        silent = first_ticks_at(intake.times_ns[chosen] + timeout_ns + 1, grid.first_ns, grid.tick_hz)
+        silent = first_ticks_at(samples.times_ns[chosen] + timeout_ns + 1, grid.first_ns, grid.tick_hz)
         too_late = silent < np.minimum(until, old)
         due = np.concatenate((ticks, silent[too_late]))
         order = np.argsort(due, kind="stable")
@@ -272,8 +272,8 @@ def _delivery(
         ages = np.concatenate((ages, np.full(int(too_late.sum()), channel.max_age_ticks + 1)))[order]
         old = np.minimum(old, silent)
     invalid = int(np.maximum(until - old, 0).sum())
-    delivery = _Delivery(channel, due, ages, intake.stamps_ns[rows], rows, intake.values)
-    return delivery, Fate(intake.messages, coverage, intake.refused, invalid, intake.frames)
+    delivery = _Delivery(channel, due, ages, samples.stamps_ns[rows], rows, samples.values)
+    return delivery, Fate(samples.messages, coverage, samples.refused, invalid, samples.frames)
 
 
 def run_foreign(
@@ -292,20 +292,20 @@ def run_foreign(
     machine = run.machine
     wishes = _wishes(chart, machine, bag)
     total = sum(bag.topics[topic].count for topic in {w.topic.name for w in wishes})
-    intakes, oddities = gather(bag, wishes, chart.header_time, lambda done: progress("reading", done, total))
-    grid = _grid(chart, intakes, bag, machine.tick_hz)
+    all_samples, oddities = gather(bag, wishes, chart.header_time, lambda done: progress("reading", done, total))
+    grid = _grid(chart, all_samples, bag, machine.tick_hz)
     deliveries, fates = [], {}
     # By the identity of the times, which the channels of a topic share.
     aligned: dict[int, tuple[Array, Array, Coverage]] = {}
     for name, channel in sensors_of(machine).items():
-        if name not in intakes:
+        if name not in all_samples:
             continue
-        intake = intakes[name]
-        times = id(intake.times_ns)
+        samples = all_samples[name]
+        times = id(samples.times_ns)
         if times not in aligned:
-            aligned[times] = align(intake.times_ns, grid.first_ns, grid.ticks, grid.tick_hz)
+            aligned[times] = align(samples.times_ns, grid.first_ns, grid.ticks, grid.tick_hz)
         timeouts = [w.entry.timeout_ns for w in wishes if w.entry.target == name and w.entry.timeout_ns]
-        delivery, fates[name] = _delivery(channel, intake, aligned[times], min(timeouts, default=0), grid)
+        delivery, fates[name] = _delivery(channel, samples, aligned[times], min(timeouts, default=0), grid)
         deliveries.append(delivery)
     _drive(run, deliveries, grid.ticks, outputs, record, progress)
     unmapped = [channel for name, channel in sensors_of(machine).items() if name not in fates]

@@ -82,7 +82,7 @@ def wish(bag: Bag, entry: Entry, scalar: str, count: int, null_refused: bool = F
 
 
 @dataclass(frozen=True)
-class Intake:
+class TargetSamples:
     """The samples of one target, ordered by topic and then as in the bag.
 
     `times_ns` place them on the grid, `stamps_ns` are header stamps (0 without one), `values` has a row of bytes for
@@ -99,7 +99,7 @@ class Intake:
 
 
 def refusals(refused: Mapping[str, tuple[int, int]], frames: str = "") -> list[str]:
-    """As text; messages count from 0 in their topic. `frames`: those of an intake."""
+    """As text; messages count from 0 in their topic. `frames`: those of samples."""
     return [
         f"{count} {_REFUSED[reason]} (first: message {first}{f': {frames}' if frames and reason == FRAME else ''})"
         for reason, (count, first) in refused.items()
@@ -156,8 +156,8 @@ class _Column:
             found = first_ns, f"{came}, not {wanted}"
             self.other_frames = found if self.other_frames is None else min(found, self.other_frames)
 
-    def sorted_out(self, stamped: bool) -> tuple[list[Intake], Oddities]:
-        """One intake per wish. `stamped`: samples are placed by the header stamp, where the type has one."""
+    def sorted_out(self, stamped: bool) -> tuple[list[TargetSamples], Oddities]:
+        """The samples of each wish. `stamped`: samples are placed by the header stamp, where the type has one."""
         header_time = stamped and self.reader.has_stamp
         log_ns, stamps_ns, others = (_joined(parts) for parts in (self.log_ns, self.stamps_ns, self.other))
         other = others.astype(bool)
@@ -180,7 +180,7 @@ class _Column:
             oddities = replace(oddities, headerless=len(log_ns))
         unset = readable & (times_ns == 0) & header_time
         whole = {OTHER_TYPE: other, NO_STAMP: unset, STUCK: readable & ~timed & ~unset}
-        intakes = []
+        all_samples = []
         for i, w in enumerate(self.wishes):
             judged = timed | (unread & ~other)
             found: list[int] = [] if all_read else np.flatnonzero(np.bincount(status[:, i])).tolist()
@@ -188,11 +188,11 @@ class _Column:
             refused = {reason: (int(m.sum()), int(m.argmax())) for reason, m in masks.items() if m.any()}
             taken = timed & (status[:, i] == 0)
             times, stamps, column = times_ns, stamps_ns, values[w.pick.name]
-            if not taken.all():  # usually all are used; then no copy is made, and all intakes share their times
+            if not taken.all():  # usually all are used; then no copy is made, and all share their times
                 times, stamps, column = times[taken], stamps[taken], column[taken]
             frames = self.other_frames[1] if self.other_frames else ""
-            intakes.append(Intake(times, stamps, column, len(log_ns), refused, frames))
-        return intakes, oddities
+            all_samples.append(TargetSamples(times, stamps, column, len(log_ns), refused, frames))
+        return all_samples, oddities
 
     def _order(self, log_ns: Array, stamps_ns: Array, other: Array, status: Array, values: Array) -> Array:
         """The order of the messages: by time of recording, of one time by stamp, and of one stamp by their content. So
@@ -208,8 +208,8 @@ class _Column:
 
 def gather(
     bag: Bag, wishes: Sequence[Wish], header_time: bool, progress: Callable[[int], None] = lambda done: None
-) -> tuple[dict[str, Intake], dict[str, Oddities]]:
-    """(intake by target, oddities of times by topic). `progress` receives the number of messages read.
+) -> tuple[dict[str, TargetSamples], dict[str, Oddities]]:
+    """(samples by target, oddities of times by topic). `progress` receives the number of messages read.
 
     Raises MapError for entries that do not fit their message, BagError for a bag without the definitions.
     """
@@ -224,12 +224,12 @@ def gather(
             columns[topic.name].add(batch.data, mine, topic)
         done += len(numbers)
         progress(done)
-    parts: dict[str, list[Intake]] = {}
+    parts: dict[str, list[TargetSamples]] = {}
     oddities = {}
     for name, column in columns.items():
-        intakes, oddities[name] = column.sorted_out(header_time)
-        for w, intake in zip(column.wishes, intakes, strict=True):
-            parts.setdefault(w.entry.target, []).append(intake)
+        all_samples, oddities[name] = column.sorted_out(header_time)
+        for w, target_samples in zip(column.wishes, all_samples, strict=True):
+            parts.setdefault(w.entry.target, []).append(target_samples)
     return {target: _merged(found) for target, found in parts.items()}, oddities
 
 
@@ -263,7 +263,7 @@ def _joined(parts: Sequence[Array]) -> Array:
     return np.concatenate(parts) if parts else np.empty(0, np.int64)
 
 
-def _merged(parts: Sequence[Intake]) -> Intake:
+def _merged(parts: Sequence[TargetSamples]) -> TargetSamples:
     """Merges the samples of several topics for one target; the first refused message is from the first topic with one."""
     if len(parts) == 1:
         return parts[0]
@@ -272,7 +272,7 @@ def _merged(parts: Sequence[Intake]) -> Intake:
         for reason, (count, first) in part.refused.items():
             before = refused.get(reason)
             refused[reason] = (count + before[0], before[1]) if before else (count, first)
-    return Intake(
+    return TargetSamples(
         times_ns=np.concatenate([part.times_ns for part in parts]),
         stamps_ns=np.concatenate([part.stamps_ns for part in parts]),
         values=np.concatenate([part.values for part in parts]),

@@ -30,7 +30,7 @@ def joined_rows(parts: Sequence[Array]) -> Array:
 
 
 @dataclass(frozen=True)
-class Grid:
+class TickGrid:
     """The ticks of a run: tick k is at first_ns + k * 10^9 // tick_hz."""
 
     first_ns: int

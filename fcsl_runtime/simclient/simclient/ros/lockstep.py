@@ -23,7 +23,7 @@ _PROTOTYPES: dict[str, tuple[type | None, list[type]]] = {
     "fcsl_lockstep_run": (c_int, [ptr, c_uint32, _ERROR]),
     "fcsl_lockstep_drop": (c_int, [ptr, c_uint32, c_uint32, _ERROR]),
     "fcsl_lockstep_drop_none": (None, [ptr]),
-    "fcsl_lockstep_alive": (None, [ptr]),
+    "fcsl_lockstep_keep_alive": (None, [ptr]),
     "fcsl_lockstep_leave": (None, [ptr]),
     "fcsl_lockstep_count": (c_uint64, [ptr, c_char_p]),
 }
@@ -77,9 +77,9 @@ class Lockstep:
         """Ends all dropouts."""
         self._library.fcsl_lockstep_drop_none(self._handle)
 
-    def alive(self) -> None:
+    def keep_alive(self) -> None:
         """While no ticks are run, called often: the simulator waits on."""
-        self._library.fcsl_lockstep_alive(self._handle)
+        self._library.fcsl_lockstep_keep_alive(self._handle)
 
     def leave(self) -> None:
         """Tells the simulator that no tick is answered any more."""

@@ -160,11 +160,11 @@ class _Routes:
     async def _wait(self, act: Callable[[], Run]) -> Run:
         return await anyio.to_thread.run_sync(act, limiter=self._waiting)
 
-    def _of_all(self, ask: Callable[[Run], Any]) -> Any:
+    def _of_all(self, of_run: Callable[[Run], Any]) -> Any:
         """Queries all runs in parallel, so that several without an answer cost one timeout."""
         runs = self._runs.all()
         with ThreadPoolExecutor(max_workers=max(1, len(runs))) as askers:
-            return [*askers.map(ask, runs)]
+            return [*askers.map(of_run, runs)]
 
 
 class _Guarded:
@@ -220,8 +220,8 @@ def _described(run: Run) -> dict[str, Any]:
         channels, views = list(run.telemetry.channels), _views(run.telemetry.machine.views)
     except TwinError:
         channels, views = [], None
-    told = {"log": log.lines(), "log_lines_dropped": log.lines_dropped, "channels": channels, "views": views}
-    return {**run.as_json(), **told}
+    more = {"log": log.lines(), "log_lines_dropped": log.lines_dropped, "channels": channels, "views": views}
+    return {**run.as_json(), **more}
 
 
 def _views(text: str) -> dict[str, Any] | None:

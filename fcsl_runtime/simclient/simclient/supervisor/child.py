@@ -100,13 +100,13 @@ class Child:
             if self._handle is not None:
                 signal.pidfd_send_signal(self._handle, number)
 
-    def stop(self, patience_s: float) -> bool:
-        """Terminates it, then kills it after `patience_s` seconds.
+    def stop(self, timeout_s: float) -> bool:
+        """Terminates it, then kills it after `timeout_s` seconds.
 
         Returns whether it has ended: the kernel may block it.
         """
         self.send(signal.SIGTERM)
-        if self.ended.wait(patience_s):
+        if self.ended.wait(timeout_s):
             return True
         self.send(signal.SIGKILL)
         return self.ended.wait(KILL_S)

@@ -60,11 +60,11 @@ class Guard:
         if name.lower() == "localhost":
             return True
         try:
-            asked = ipaddress.ip_address(name[1:-1] if name.startswith("[") and name.endswith("]") else name)
+            requested = ipaddress.ip_address(name[1:-1] if name.startswith("[") and name.endswith("]") else name)
         except ValueError:
             return False
         own = ipaddress.ip_address(self.address)
-        return own.is_unspecified or asked == own
+        return own.is_unspecified or requested == own
 
 
 def _follows_a_link(method: str, headers: Headers) -> bool:

@@ -32,9 +32,9 @@ STOP_S = 6.0
 #: seconds that the end of a killed process is waited for
 KILL_S = 5.0
 #: seconds for a reply of a run's variable server
-LOOK_S = 2.0
+STATUS_TIMEOUT_S = 2.0
 #: seconds from the end of a run's socket to the end of its process
-GONE_S = 1.0
+END_TIMEOUT_S = 1.0
 #: seconds between two checks after which a tick that stood still means `stalled` (two periods, if that is longer)
 STALLED_S = 2.0
 #: scalars of a window, over all paths and ticks

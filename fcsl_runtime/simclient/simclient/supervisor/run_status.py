@@ -11,7 +11,7 @@ from ..c_machine import HEALTH_NAMES
 from ..vars.client import VarClient
 from ..vars.wire import VarError
 from .http_error import HttpError, of_variables
-from .limits import GONE_S, LOOK_S, PATHS, STALLED_S
+from .limits import END_TIMEOUT_S, PATHS, STALLED_S, STATUS_TIMEOUT_S
 from .runs import Run
 from .windows import cut
 
@@ -24,7 +24,7 @@ def client_of(run: Run) -> VarClient:
     if run.status != "running":
         raise HttpError(409, "not_running", f"run {run.name} is {run.status}", f"GET /runs/{run.name}")
     try:
-        return VarClient(run.socket, timeout_s=LOOK_S)
+        return VarClient(run.socket, timeout_s=STATUS_TIMEOUT_S)
     except VarError as error:
         raise of_variables(error) from None
 
@@ -67,7 +67,7 @@ def health(run: Run) -> dict[str, Any]:
             found = _healths(client, instances)
     except (VarError, HttpError) as error:
         # A program that ends closes its socket first.
-        if error.code in ("unreachable", "closed", "not_running") and run.child.ended.wait(GONE_S):
+        if error.code in ("unreachable", "closed", "not_running") and run.child.ended.wait(END_TIMEOUT_S):
             return {"ok": False, "health": run.status}
         return {"ok": False, "health": "unresponsive", "message": error.message}
     # `stale` is normal for an instance that the active state does not schedule.

@@ -28,7 +28,7 @@ from .options import KINDS, Kind, arguments_of
 STATUSES = ("starting", "running", "stopping", "ended")
 _MEMBERS = ("kind", "file", "options")
 _BUILD_FIRST = f"{__package__}.build_first"
-_LOOK_AGAIN_S = 0.005
+_POLL_S = 0.005
 _TERMINATED = -signal.SIGTERM
 #: Prefix of the usage hint that follows an error in the command line.
 _HINT = "Try `"
@@ -189,7 +189,7 @@ def _await_telemetry(run: Run) -> None:
     """Waits for the telemetry configuration, so that the client can request windows at once."""
     deadline = time.monotonic() + FIRST_TELEMETRY_S
     while run.status == "running" and run.telemetry.session is None and time.monotonic() < deadline:
-        time.sleep(_LOOK_AGAIN_S)
+        time.sleep(_POLL_S)
 
 
 def _why_it_ended(run: Run) -> str:

@@ -35,7 +35,7 @@ class Collector:
         self._waiting: deque[Datagram] = deque()
         self._waiting_bytes = 0
         self._former: deque[int] = deque(maxlen=FORMER_MAX)
-        self._heard_s = 0.0
+        self._received_s = 0.0
 
     def take(self, raw: bytes, now_s: float) -> None:
         """Processes a datagram; `now_s` is its time of arrival in s, on a monotonic clock."""
@@ -49,7 +49,7 @@ class Collector:
         if stream is None or (datagram.session, datagram.configuration) != stream.key:
             self._take_stranger(datagram, now_s)
             return
-        self._heard_s = now_s
+        self._received_s = now_s
         if datagram.kind == CONFIGURATION:
             counts.configurations += 1
         else:
@@ -87,7 +87,7 @@ class Collector:
 
     def _silent(self, stream: Stream, now_s: float) -> bool:
         limit_s = min(max(_SILENT_PERIODS * stream.configuration.period_s, _SILENT_S_MIN), _SILENT_S_MAX)
-        return now_s - self._heard_s > limit_s
+        return now_s - self._received_s > limit_s
 
     def _wait(self, datagram: Datagram) -> None:
         self._waiting.append(datagram)
@@ -113,7 +113,7 @@ class Collector:
         self._end_session()
         self.stream = Stream(key, configuration, self._window_ticks, self._counts)
         self._counts.sessions += 1
-        self._heard_s = now_s
+        self._received_s = now_s
         if key[0] in self._former:  # it was paused while another session was shown
             self._former.remove(key[0])
         waiting, self._waiting, self._waiting_bytes = self._waiting, deque(), 0

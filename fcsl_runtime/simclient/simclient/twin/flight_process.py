@@ -21,12 +21,12 @@ from ..vars.client import VarClient
 from ..vars.wire import VarError
 
 #: A child that takes longer than this to end is killed, in s.
-_PATIENCE_S = 5.0
+_END_TIMEOUT_S = 5.0
 #: Longest start, in s, until it serves its variables: loading a machine's library may take long.
 _START_S = 60.0
 _SERVING = b"\nfcsl-fc: commands on "
 _READ_BYTES = 4096
-_SAID_BYTES = 4000
+_STDERR_BYTES = 4000
 
 
 class FlightProcess:
@@ -105,10 +105,10 @@ class FlightProcess:
 
     def _last_output(self) -> str:
         try:
-            status = self._child.wait(_PATIENCE_S)
+            status = self._child.wait(_END_TIMEOUT_S)
         except subprocess.TimeoutExpired:
             return "it closed its socket but still runs"
-        self._stderr.seek(max(0, self._stderr.seek(0, os.SEEK_END) - _SAID_BYTES))
+        self._stderr.seek(max(0, self._stderr.seek(0, os.SEEK_END) - _STDERR_BYTES))
         output = self._stderr.read().decode("utf-8", "replace").strip()
         how = f"killed by {signal.Signals(-status).name}" if status < 0 else f"status {status}"
         return f"{how}{': ' if output else ''}{output}"
@@ -128,7 +128,7 @@ class FlightProcess:
         if self._child.returncode is None:
             self._child.terminate()
             try:
-                self._child.wait(_PATIENCE_S)
+                self._child.wait(_END_TIMEOUT_S)
             except subprocess.TimeoutExpired:
                 self._child.kill()
                 self._child.wait()

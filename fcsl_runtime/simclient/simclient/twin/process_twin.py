@@ -55,8 +55,8 @@ class ProcessTwin(Twin):
             self._process = FlightProcess(library, self._described.machine.name)
         except OSError as error:
             raise TwinError(f"cannot start a flight program: {error.strerror}") from None
-        told = self._ask("describe")["build_hash"]
-        if told != self._described.machine.build_hash:
+        hosted = self._request("describe")["build_hash"]
+        if hosted != self._described.machine.build_hash:
             self.close()
             raise TwinError(f"{library}: it changed while it was opened; open it again")
 
@@ -114,7 +114,7 @@ class ProcessTwin(Twin):
         if self._listeners:
             raise TwinError("an open trace records only the ticks of tick(); leave its block before resume()")
         if not self._running:
-            stats = self._ask("stats")
+            stats = self._request("stats")
             self._do_command("resume")
             self._running = True
             self._skipped, self._ticks_skipped = stats["ticks_skipped"], 0
@@ -128,7 +128,7 @@ class ProcessTwin(Twin):
     @property
     def ticks_skipped(self) -> int:
         if self._running:
-            self._ticks_skipped = self._ask("stats")["ticks_skipped"] - self._skipped
+            self._ticks_skipped = self._request("stats")["ticks_skipped"] - self._skipped
         return self._ticks_skipped
 
     # ---- primitives -------------------------------------------------------------------------------------------------
@@ -137,7 +137,7 @@ class ProcessTwin(Twin):
     def _client(self) -> VarClient:
         return self._process.client
 
-    def _ask(self, command: str, *arguments: Any, **options: Any) -> Any:
+    def _request(self, command: str, *arguments: Any, **options: Any) -> Any:
         """Calls a method of the client. If the process has ended, the error includes its last output."""
         with self._lock:
             try:
@@ -149,14 +149,14 @@ class ProcessTwin(Twin):
         """Calls a method of the client that changes the machine."""
         with self._lock:
             self._known = None
-            return self._ask(command, *arguments, **options)
+            return self._request(command, *arguments, **options)
 
     def _step(self, ticks: int) -> int:
         with self._lock:
             if self._running:
                 raise TwinError("the twin is running by itself; call pause() before tick()")
             if ticks == 0:
-                return int(self._ask("state")["tick"])
+                return int(self._request("state")["tick"])
             if self._tap_open:
                 return self._step_for_taps(ticks)
             done = 0
@@ -215,7 +215,7 @@ class ProcessTwin(Twin):
         with self._lock:
             if self._known is not None:
                 return self._known
-            data = struct_of(self._ask("save"))
+            data = struct_of(self._request("save"))
             if not self._running:
                 self._known = data
             return data
@@ -223,13 +223,13 @@ class ProcessTwin(Twin):
     def _restore(self, data: bytes) -> None:
         with self._lock:
             self._described.restore_checkpoint(
-                self._ask("save")
+                self._request("save")
             )  # restores only the struct: the hardware keeps its state
             self._described.restore(data)
             self._do_command("restore", self._described.checkpoint())
 
     def _checkpoint(self) -> bytes:
-        checkpoint: bytes = self._ask("save")
+        checkpoint: bytes = self._request("save")
         return checkpoint
 
     def _restore_checkpoint(self, checkpoint: bytes, ignore_source_hash: bool) -> None:
@@ -281,13 +281,13 @@ class _ProcessBoard:
         self._twin = twin
 
     def read(self, bank: str, number: int) -> Any:
-        return self._twin._ask("hardware", bank, number).value
+        return self._twin._request("hardware", bank, number).value
 
     def write(self, bank: str, number: int, value: Any) -> None:
         self._twin._do_command("hardware", bank, number, value)
 
     def failures(self) -> int:
-        return int(self._twin._ask("hardware", "gpio", 0).failures)
+        return int(self._twin._request("hardware", "gpio", 0).failures)
 
 
 def _path_of(field: Field, element: int) -> str:

@@ -46,4 +46,4 @@ def without_ok(reply: dict[str, Any]) -> dict[str, Any]:
 
 def units_of(client: VarClient, paths: Sequence[str]) -> dict[str, str]:
     """The unit of each path."""
-    return {path: told["unit"] for path, told in zip(paths, client.describe_all(paths), strict=True)}
+    return {path: described["unit"] for path, described in zip(paths, client.describe_all(paths), strict=True)}

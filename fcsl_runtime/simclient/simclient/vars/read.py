@@ -38,9 +38,9 @@ def evaluate(chosen: argparse.Namespace) -> None:
 
 def describe(chosen: argparse.Namespace) -> None:
     with open_client(chosen) as client:
-        told = without_ok(client.describe(chosen.path))
+        described = without_ok(client.describe(chosen.path))
     print_answer(
         chosen,
-        told,
-        lambda: table([[name, show_value(value)] for name, value in told.items() if value not in ("", [])]),
+        described,
+        lambda: table([[name, show_value(value)] for name, value in described.items() if value not in ("", [])]),
     )

@@ -39,15 +39,15 @@ def watch(client: VarClient, paths: Sequence[str], every: int, ticks: int | None
     paths = [path for path, _ in _fields(client, paths)]
     units = units_of(client, paths)
     with client.subscribe(*paths, every=every) as subscription:
-        _say_paused(client)
+        _report_paused(client)
         samples = _until(subscription, every, ticks)
         if sys.stdout.isatty() and not as_json:
             _show_live(_Table(units), subscription, samples)
             return
         for sample in samples:
             if as_json:
-                told = {"tick": sample.tick, "lost": sample.lost, "values": jsonable(sample.values)}
-                print(json.dumps(told), flush=True)
+                entry = {"tick": sample.tick, "lost": sample.lost, "values": jsonable(sample.values)}
+                print(json.dumps(entry), flush=True)
             else:
                 shown = "  ".join(f"{p} = {with_unit(show_value(v), units[p])}" for p, v in sample.values.items())
                 print(f"{sample.tick}  {shown}", flush=True)
@@ -60,7 +60,7 @@ def plot(client: VarClient, paths: Sequence[str], every: int, ticks: int | None,
     now = {path: value for path, value in _fields(client, paths) if path in paths or _is_number(value)}
     curves = _Curves(units_of(client, list(now)), now, window)
     with client.subscribe(*now, every=every) as subscription:
-        _say_paused(client)
+        _report_paused(client)
         samples = _until(subscription, every, ticks)
         if sys.stdout.isatty():
             _show_live(curves, subscription, samples)
@@ -76,7 +76,7 @@ def _fields(client: VarClient, paths: Sequence[str]) -> list[tuple[str, Any]]:
     return [row for path, value in client.get(*paths).items() for row in flat(path, value)]
 
 
-def _say_paused(client: VarClient) -> None:
+def _report_paused(client: VarClient) -> None:
     state = client.state()
     if state["paused"]:
         print(f"fcsl var: paused at tick {state['tick']}: values appear when it resumes", file=sys.stderr)

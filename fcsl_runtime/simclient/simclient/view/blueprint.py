@@ -40,12 +40,12 @@ class Plan:
         self._cast, self._world, self._live, self._reach = cast, world, span is None, reach
         boundary = rr.TimeRangeBoundary.cursor_relative if span is None else rr.TimeRangeBoundary.absolute
         begin, end = (-_LIVE_S, 0.0) if span is None else span
-        aside = (end - begin) * _LEGEND / (1.0 - _LEGEND)
+        legend_width = (end - begin) * _LEGEND / (1.0 - _LEGEND)
 
         def sight(until: float) -> rrb.TimeAxis:
             return rrb.TimeAxis(view_range=rr.TimeRange(start=boundary(seconds=begin), end=boundary(seconds=until)))
 
-        self._sight, self._sight_with_legend = sight(end), sight(end + aside)
+        self._sight, self._sight_with_legend = sight(end), sight(end + legend_width)
 
     def blueprint(self) -> rrb.Blueprint:
         parts: dict[str, list[Signals]] = {"outputs": self._cast.instances, "plant": self._cast.plant}
@@ -111,7 +111,7 @@ class Plan:
 
     def _curves(self, panel: Panel) -> rrb.TimeSeriesView:
         """A plot of a panel, with the colours and styles of its curves, back to front."""
-        looks: dict[str, list[tuple[int, str, Style, bool]]] = {}
+        curve_styles: dict[str, list[tuple[int, str, Style, bool]]] = {}
         sizes: dict[str, int] = {}
         ordered = list(zip(panel.curves, styles([curve.role for curve in panel.curves]), strict=True))
         for curve, style in sorted(ordered, key=lambda pair: pair[1].order):
@@ -121,8 +121,12 @@ class Plan:
             else:
                 entity, size = f"{value.signals.topic}/{value.field}", max(1, value.signals.sizes[value.field])
             sizes[entity] = size
-            looks.setdefault(entity, []).append((curve.element or 0, curve.label, style, curve.steps))
-        return self._lines(panel.name, list(looks), {entity: _look(looks[entity], sizes[entity]) for entity in looks})
+            curve_styles.setdefault(entity, []).append((curve.element or 0, curve.label, style, curve.steps))
+        return self._lines(
+            panel.name,
+            list(curve_styles),
+            {entity: _series(curve_styles[entity], sizes[entity]) for entity in curve_styles},
+        )
 
     def _panels(self, signals: Signals) -> list[Any]:
         """A panel for an instance, or several: plots below each other, one or more for each unit."""
@@ -161,7 +165,7 @@ class Plan:
         )
 
 
-def _look(curves: Sequence[tuple[int, str, Style, bool]], size: int) -> list[Any]:
+def _series(curves: Sequence[tuple[int, str, Style, bool]], size: int) -> list[Any]:
     """Visualizers of one entity of `size` lines, for curves (element, label, style, steps): lines, dots, or both."""
     found: list[Any] = []
     for dots in (True, False):
@@ -170,16 +174,16 @@ def _look(curves: Sequence[tuple[int, str, Style, bool]], size: int) -> list[Any
             continue
         hidden = ("", Style("#000000", "#000000", 1.0, dots, False, 0))
         labels, its_styles = zip(*(mine.get(i, hidden) for i in range(size)), strict=True)
-        said: dict[str, Any] = {
+        common: dict[str, Any] = {
             "names": labels,
             "colors": [[*rgba(style.rerun_colour)[:3], _DOT_OPACITY if dots else 255] for style in its_styles],
             "visible_series": [i in mine for i in range(size)],
         }
         if dots:
-            found.append(rr.SeriesPoints(**said, markers=["circle"] * size, marker_sizes=[_DOT] * size))
+            found.append(rr.SeriesPoints(**common, markers=["circle"] * size, marker_sizes=[_DOT] * size))
             continue
         mode = STEP_AFTER if any(steps for *_, steps in curves) else None
         found.append(
-            rr.SeriesLines(**said, widths=[_BROADER * s.width - 0.5 for s in its_styles], interpolation_mode=mode)
+            rr.SeriesLines(**common, widths=[_BROADER * s.width - 0.5 for s in its_styles], interpolation_mode=mode)
         )
     return found

@@ -65,14 +65,14 @@ def beside(panel: Panel, got: Mapping[str, Value]) -> Panel:
 
 def _commands_of(run: RecordedRun, got: Sequence[Value]) -> list[Value | None]:
     """The output that each actuator channel carries; None where no output, or more than one, can have made its values."""
-    looks = {_look(value) for value in got}
+    kinds = {_kind_of(value) for value in got}
     outputs = [
         value
         for value in run.catalogue.values.values()
         if not value.signals.truth
         and value.signals.part == "outputs"
         and value.field not in STATUS_FIELDS
-        and _look(value) in looks
+        and _kind_of(value) in kinds
     ]
     gate = whole(got[0].signals, GATE)
     rows = run.read([gate, *got, *outputs])
@@ -80,14 +80,14 @@ def _commands_of(run: RecordedRun, got: Sequence[Value]) -> list[Value | None]:
     found = list[Value | None]()
     for value in got:
         passed = _values(rows, value)[is_open]
-        makers = [o for o in outputs if _look(o) == _look(value) and _made(_values(rows, o), passed)]
+        makers = [o for o in outputs if _kind_of(o) == _kind_of(value) and _made(_values(rows, o), passed)]
         if len(makers) > 1 or len(np.unique(passed)) < 2:
             makers = [o for o in makers if o.field.rpartition(".")[2] == value.field]
         found.append(makers[0] if len(makers) == 1 else None)
     return found
 
 
-def _look(value: Value) -> tuple[tuple[int, ...], bool]:
+def _kind_of(value: Value) -> tuple[tuple[int, ...], bool]:
     return value.shape, value.field in value.signals.steps
 
 

@@ -40,14 +40,14 @@ def send_lines(stream: rr.RecordingStream, t_s: Array, lines: Mapping[str, Array
 
 def _field(entity: str) -> pa.Field:
     """rerun's description of a column: its entity, and that it holds scalars."""
-    told = {
+    described = {
         "rerun:kind": "data",
         "rerun:entity_path": entity,
         "rerun:archetype": _SCALARS.archetype,
         "rerun:component": _SCALARS.component,
         "rerun:component_type": _SCALARS.component_type,
     }
-    return pa.field(entity, pa.list_(pa.float64()), metadata=told)
+    return pa.field(entity, pa.list_(pa.float64()), metadata=described)
 
 
 def _column(values: Array) -> pa.Array:

@@ -65,7 +65,7 @@ def _glb(data: bytes) -> Array:
     if (magic, version, kind) != (b"glTF", 2, b"JSON"):
         raise ValueError
     begin = _GLB_HEAD.size + _GLB_CHUNK.size
-    said: Any = json.loads(data[begin : begin + size])
-    numbers = {primitive["attributes"]["POSITION"] for mesh in said["meshes"] for primitive in mesh["primitives"]}
-    bounds = [said["accessors"][number][side] for number in numbers for side in ("min", "max")]
+    document: Any = json.loads(data[begin : begin + size])
+    numbers = {primitive["attributes"]["POSITION"] for mesh in document["meshes"] for primitive in mesh["primitives"]}
+    bounds = [document["accessors"][number][side] for number in numbers for side in ("min", "max")]
     return np.array(bounds, dtype=np.float64).reshape(-1, 3)

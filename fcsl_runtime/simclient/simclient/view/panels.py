@@ -250,14 +250,14 @@ def _panel(
     names have none.
     """
     units = {value.unit for value, _ in values}
-    said = sorted(units - {""})
-    in_labels = len(said) > 1 or (not title and len(units) > 1)
+    named = sorted(units - {""})
+    in_labels = len(named) > 1 or (not title and len(units) > 1)
     curves = []
     for value, role in values:
         for path, element in value.elements():
             unit = f", {value.unit}" if in_labels and value.unit else ""
             curves.append(Curve(value, element, None, role, label_of(path, remarks.get(role, "")) + unit))
-    return Panel(title, said[0] if said and not in_labels else "", tuple(curves), missing)
+    return Panel(title, named[0] if named and not in_labels else "", tuple(curves), missing)
 
 
 def _plain(path: str) -> str:

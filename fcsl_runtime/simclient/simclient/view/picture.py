@@ -235,14 +235,14 @@ def _draw_line(axis: Any, line: Line, style: Style) -> None:
     if not known.any():
         axis.plot([], [], " ", label=f"{line.label}: no values")
         return
-    look: dict[str, Any] = {"color": style.colour, "zorder": style.order}
+    options: dict[str, Any] = {"color": style.colour, "zorder": style.order}
     if style.dots:
-        axis.plot(line.x, line.values, ".", markersize=2.0, label=line.label, **look)
+        axis.plot(line.x, line.values, ".", markersize=2.0, label=line.label, **options)
         return
     if line.steps:
-        look["drawstyle"] = "steps-post"
+        options["drawstyle"] = "steps-post"
     dashes = (0, (4, 2)) if style.dashed else "-"
-    axis.plot(line.x, line.values, linewidth=style.width, linestyle=dashes, label=line.label, **look)
+    axis.plot(line.x, line.values, linewidth=style.width, linestyle=dashes, label=line.label, **options)
     alone = known & ~np.r_[False, known[:-1]] & ~np.r_[known[1:], False]  # a line would not show them
     if alone.any():
         axis.plot(line.x[alone], line.values[alone], ".", markersize=4, color=style.colour, zorder=style.order)

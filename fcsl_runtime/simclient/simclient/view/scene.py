@@ -152,8 +152,8 @@ class Scene:
         names = [f"{label}[{i}]{unit}" for i in range(size)] or [label + unit]
         colours = [rgba(COLOURS[i % len(COLOURS)]) for i in range(max(1, size))]
         mode = STEP_AFTER if name in signals.steps else None
-        look = rr.SeriesLines(names=names, colors=colours, widths=[_WIDTH] * len(names), interpolation_mode=mode)
-        self._static(f"{signals.topic}/{name}", look)
+        line_style = rr.SeriesLines(names=names, colors=colours, widths=[_WIDTH] * len(names), interpolation_mode=mode)
+        self._static(f"{signals.topic}/{name}", line_style)
 
     def _static(self, entity: str, archetype: rr.AsComponents) -> None:
         self._stream.log(entity, archetype, static=True)

@@ -118,8 +118,8 @@ class World:
             self.remarks.append(remark)
         if self._thrust:
             top = [0.0, 0.0, self.up * TOPS[self._body.shape] * self.size]
-            look = rr.Arrows3D.from_fields(origins=[top], radii=[_ARROW_RADIUS * self.size], colors=[_FORCE_COLOUR])
-            self._stream.log(f"{ATTITUDE}/thrust", look, static=True)
+            arrow = rr.Arrows3D.from_fields(origins=[top], radii=[_ARROW_RADIUS * self.size], colors=[_FORCE_COLOUR])
+            self._stream.log(f"{ATTITUDE}/thrust", arrow, static=True)
 
     # ---- data over time --------------------------------------------------------------------------------------
 
@@ -194,8 +194,8 @@ class World:
                 self._last, self._last_s = point, time
         if moments:
             radii = np.full(len(moments), _TRAIL_RADIUS * self.size)
-            looks = {"radii": radii, "colors": np.tile([*_TRAIL_COLOUR, 255], (len(moments), 1))}
-            self._send(f"{ROOT}/trail", np.array(moments), rr.LineStrips3D.columns(strips=strips, **looks))
+            options = {"radii": radii, "colors": np.tile([*_TRAIL_COLOUR, 255], (len(moments), 1))}
+            self._send(f"{ROOT}/trail", np.array(moments), rr.LineStrips3D.columns(strips=strips, **options))
 
     def _rotate(self, t_s: Array, q: Array) -> None:
         known: Array = np.asarray(np.isfinite(q).all(axis=1) & (q != 0.0).any(axis=1))

@@ -19,7 +19,7 @@ from rclpy.qos import QoSProfile
 from rclpy.serialization import serialize_message
 from std_msgs.msg import UInt8MultiArray
 
-from fcsl_bridge.base.polling import Polled
+from fcsl_bridge.base.polling import PolledSubscription
 
 WARM_UP = 50
 _QOS = QoSProfile(depth=10)
@@ -28,7 +28,7 @@ _AROUND = 20
 
 
 def pong(node: Node) -> None:
-    polled = Polled(node, UInt8MultiArray, "bench/ping", _QOS)
+    polled = PolledSubscription(node, UInt8MultiArray, "bench/ping", _QOS)
     back = node.create_publisher(UInt8MultiArray, "bench/pong", _QOS)
     print("ready", flush=True)
     threading.Thread(target=lambda: (sys.stdin.read(), os._exit(0)), daemon=True).start()
@@ -39,7 +39,7 @@ def pong(node: Node) -> None:
 
 
 def ping(node: Node, size: int, count: int) -> list[int]:
-    polled = Polled(node, UInt8MultiArray, "bench/pong", _QOS)
+    polled = PolledSubscription(node, UInt8MultiArray, "bench/pong", _QOS)
     there = node.create_publisher(UInt8MultiArray, "bench/ping", _QOS)
     while there.get_subscription_count() == 0 or node.count_publishers("bench/pong") == 0:
         time.sleep(0.05)

@@ -3,7 +3,7 @@
  * protocol.h: one request line of the variable server after the other, on a machine. Each reply is one line, of JSON.
  */
 #include "vars/protocol.h"
-#include "hosted.h"
+#include "vars_host.h"
 
 /* Short, so that a reply that does not fit is met, too. */
 enum { REPLY_BYTES = 16384 };

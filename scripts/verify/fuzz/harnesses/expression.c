@@ -3,7 +3,7 @@
  * protocol.h: expressions over the fixture machine. The same text has the same value twice, and what it writes is JSON.
  */
 #include "vars/protocol.h"
-#include "hosted.h"
+#include "vars_host.h"
 
 static int evaluate(const catalog_t *catalog, const char *text, char *reply, size_t capacity)
 {

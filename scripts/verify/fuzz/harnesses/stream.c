@@ -8,7 +8,7 @@
 
 #include <sys/socket.h>
 
-#include "hosted.h"
+#include "vars_host.h"
 
 enum { CLIENTS = 4, LENGTH_END = 0xffff, MANY = 64 };
 

@@ -2,8 +2,8 @@
  *
  * The variable server in one thread, around the fixture machine: what waits for the step thread is acted on at once.
  */
-#ifndef HOSTED_H
-#define HOSTED_H
+#ifndef VARS_HOST_H
+#define VARS_HOST_H
 
 #include "fuzz.h"
 #include "vars/server.h"
@@ -100,4 +100,4 @@ static void hosted_close(void)
     FUZZ_CHECK(fcsl_run_close(hosted.run, &error) == 0);
 }
 
-#endif /* HOSTED_H */
+#endif /* VARS_HOST_H */

@@ -9,7 +9,7 @@ from .answers import open_client, print_answer, status_text, without_ok
 from .show import flat, show_value, table
 
 
-def ask(chosen: argparse.Namespace) -> None:
+def request(chosen: argparse.Namespace) -> None:
     with open_client(chosen, changes=chosen.command in ("pause", "resume")) as client:
         reply = without_ok(getattr(client, chosen.command)())
     if chosen.command != "stats":
