@@ -12,7 +12,7 @@
 #include "fcsl/fcsl_ros_graph.h"
 #include "messages/message.h"
 #include "messages/tick_messages.h"
-#include "observers/follower.h"
+#include "observers/history_reader.h"
 
 typedef enum { ROS_TICK_MESSAGE, ROS_INSTANCE, ROS_CLOCK, ROS_MAPPED } ros_topic_kind_t;
 
