@@ -39,7 +39,8 @@ int fcsl_tick_publisher_ready(fcsl_tick_publisher_t *publisher);
  * `requires_arming`. A sensor has a value where a sample came
  * since the tick that was posted before; in the first tick, and without a HAL, always. Returns 0, or -1: there is no room, and
  * commits are missing. */
-int fcsl_tick_publisher_post(fcsl_tick_publisher_t *publisher, const void *data, uint64_t tick, uint64_t time_ns, int requires_arming);
+int fcsl_tick_publisher_post(fcsl_tick_publisher_t *publisher, const void *data, uint64_t tick, uint64_t time_ns,
+                             int requires_arming);
 
 /* Whether an observer takes the host writes. */
 int fcsl_tick_publisher_writes_watched(const fcsl_tick_publisher_t *publisher);

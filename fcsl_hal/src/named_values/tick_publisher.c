@@ -109,7 +109,8 @@ static int has_reports(const fcsl_machine_t *machine)
     return 0;
 }
 
-int fcsl_tick_publisher_post(fcsl_tick_publisher_t *publisher, const void *data, uint64_t tick, uint64_t time_ns, int requires_arming)
+int fcsl_tick_publisher_post(fcsl_tick_publisher_t *publisher, const void *data, uint64_t tick, uint64_t time_ns,
+                             int requires_arming)
 {
     const fcsl_machine_t *machine = publisher->table.machine;
     const uint8_t *bytes = data;

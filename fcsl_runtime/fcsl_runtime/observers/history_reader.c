@@ -50,9 +50,9 @@ static void take_publication(history_reader_t *f, const fcsl_moment_t *moment)
         return;
     }
     const published_tick_t tick = {.publication = f->publication,
-                                  .number = completed - 1u,
-                                  .begun_ns = moment->time_ns,
-                                  .requires_arming = moment->requires_arming != 0u};
+                                   .number = completed - 1u,
+                                   .begun_ns = moment->time_ns,
+                                   .requires_arming = moment->requires_arming != 0u};
     count(&f->dropped, dropped_before(f, completed));
     f->overtaken = 0;
     f->completed = completed;

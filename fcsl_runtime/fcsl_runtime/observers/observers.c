@@ -52,7 +52,8 @@ static int put(void *ctx, const published_tick_t *tick)
     const fcsl_observers_t *o = ctx;
     const uint64_t time_ns = fcsl_tick_time_ns(o->tick_hz, tick->number);
     return o->unwritten ? -1
-                        : fcsl_tick_publisher_post(o->publisher, tick->publication, tick->number, time_ns, tick->requires_arming);
+                        : fcsl_tick_publisher_post(o->publisher, tick->publication, tick->number, time_ns,
+                                                   tick->requires_arming);
 }
 
 static int listen_on(fcsl_observers_t *o, const fcsl_observers_options_t *options, fcsl_error_t *error)

@@ -107,9 +107,9 @@ static void see(void *ctx, const fcsl_moment_t *moment, const uint8_t *publicati
     fcsl_ros_graph_t *g = ctx;
     if (moment->tick == g->completed) {
         const published_tick_t tick = {.publication = publication,
-                                      .number = moment->tick > 0u ? moment->tick - 1u : 0u,
-                                      .begun_ns = moment->time_ns,
-                                      .requires_arming = moment->requires_arming != 0u};
+                                       .number = moment->tick > 0u ? moment->tick - 1u : 0u,
+                                       .begun_ns = moment->time_ns,
+                                       .requires_arming = moment->requires_arming != 0u};
         (void)post(g, &tick, g->topics.latched_count); /* without room the next tick tells of it */
     }
     g->completed = moment->tick;
