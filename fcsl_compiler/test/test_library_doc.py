@@ -31,9 +31,10 @@ LIBRARY_HEAD = """
 
 These functions are written in the language itself (`fcsl_compiler/fcsl_compiler/library/`); the compiler checks and
 compiles them for each combination of types and sizes in use. `F` is `f64` or `f32`, `T` any number, the same in all
-arguments. Size variables (`n`, `m`, `k`) stand for constants. Sums run from left to right and start from the first product. A NaN among the elements comes out wherever it
-enters an operation. `test_linear_systems.py` compares their accuracy with exact arithmetic, within the bounds of error
-analysis, and with NumPy, SciPy and filterpy.
+arguments. Size variables (`n`, `m`, `k`) stand for constants. Sums run from left to right and start from the first
+product. A NaN among the elements comes out wherever it enters an operation. `test_linear_systems.py` compares their
+accuracy with exact arithmetic, within the bounds of error analysis, and with NumPy, SciPy and filterpy;
+`test_arrays.py` compares those of vectors and tables.
 """
 HEADINGS = {
     "linear_algebra": "Vectors and matrices",
@@ -118,7 +119,7 @@ def functions() -> str:
             text += f"\n## {HEADINGS[stem]}\n"
         for node in overloads(name):
             parts = sections(node)
-            text += f"\n**`{signature(name, node)}`**  \n{filled(parts['Meaning'])}\n"
+            text += f"\n{filled(f'**`{signature(name, node)}`**')}  \n{filled(parts['Meaning'])}\n"
             items = [f"{word}: {parts[word]}" for word in ("Order", "Singular", "Source") if word in parts]
             text += "".join(f"- {filled(item, indent='  ')}\n" for item in items)
     return text

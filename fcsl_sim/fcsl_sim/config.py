@@ -27,7 +27,7 @@ from fcsl_compiler.api.diagnostics import (
 from fcsl_compiler.api.files import SourceError
 from fcsl_compiler.api.json_files import ConfigReader, Everything, JsonNode, SourcePathError, resolve_source
 from fcsl_compiler.api.sections import Signals, read_views
-from fcsl_compiler.api.types import Type, scalar_of
+from fcsl_compiler.api.types import Type, count_of, scalar_of
 from simclient.descriptor import Machine
 from simclient.errors import TwinError
 from simclient.run import open_run
@@ -495,12 +495,17 @@ class _Loader:
     def _read_parameters(self, instance: Instance, table: ModelTable, node: JsonNode | None) -> None:
         wanted = {f.name: f for f in table.of_role("parameter")}
         given = self._values(instance, table, "parameter", node)
-        missing = [f"`{name}` ({with_unit(f.type, f.unit)})" for name, f in wanted.items() if name not in given]
+        needed = {name: f for name, f in wanted.items() if name not in given and not f.optional}
+        missing = [f"`{name}` ({with_unit(f.type, f.unit)})" for name, f in needed.items()]
         if missing and not table.tick_hz:
             message = f"parameter {', '.join(missing)} of `{instance.name}` has no value"
-            self.sink.error("E211", message, instance.span, help="every parameter is given; nothing has a default")
+            self.sink.error(
+                "E211", message, instance.span, help="only optional ones may be left out, and are zero then"
+            )
         for name, (definition, _) in given.items():
             self._set(instance, wanted[name], definition)
+        for left_out in (f for name, f in wanted.items() if name not in given and f.optional):
+            self._set_scalars(instance, left_out, [0] * count_of(left_out.type))
 
     def _read_inputs(self, instance: Instance, table: ModelTable, node: JsonNode | None) -> None:
         """Values of inputs that no connection feeds."""
@@ -550,6 +555,11 @@ class _Loader:
             scalars: Sequence[bool | int | float | str] | None = read_table(node, target, self.reader)
         else:
             scalars = self.reader.value(node, target.type, f"{target.role} `{target.name}`")
+        self._set_scalars(instance, target, scalars)
+
+    def _set_scalars(
+        self, instance: Instance, target: ModelField, scalars: Sequence[bool | int | float | str] | None
+    ) -> None:
         elements = self.settings.take_elements(f"{instance.name}.{target.path}")
         for i, value in enumerate(with_elements(scalars, target, elements, self.reader) if scalars else ()):
             value_bits = plan.bits(scalar_of(target.type).name, value)

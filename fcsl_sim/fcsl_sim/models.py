@@ -20,7 +20,7 @@ FIELD_TYPES = tuple(_FORMATS)
 @dataclass(frozen=True)
 class ModelField:
     """One leaf of a model's struct. `role` is input, output, parameter or state; `offset` is in bytes; `feedthrough`: an
-    output that depends on an input of the same instant; `optional`: an input that may stay unconnected; `table`:
+    output that depends on an input of the same instant; `optional`: an input that may stay unconnected, a parameter that may be left out; `table`:
     a vector parameter of at most so many values."""
 
     path: str

@@ -79,12 +79,13 @@ static void update(void *self, const fcsl_model_context_t *context)
 static const fcsl_field_t fields[] = {
     FCSL_MODEL_VECTOR(magnetometer_t, FCSL_ROLE_INPUT, inputs.magnetic_field_ned, "T", "flux density"),
     FCSL_MODEL_VECTOR(magnetometer_t, FCSL_ROLE_INPUT, inputs.attitude_body_to_ned, "", "unit quaternion, w, x, y, z"),
-    FCSL_MODEL_VECTOR(magnetometer_t, FCSL_ROLE_PARAMETER, parameters.hard_iron_body, "T", "constant error"),
+    FCSL_MODEL_VECTOR(magnetometer_t, FCSL_ROLE_OPTIONAL_PARAMETER, parameters.hard_iron_body, "T", "constant error"),
     FCSL_MODEL_MATRIX(magnetometer_t, FCSL_ROLE_PARAMETER, parameters.soft_iron, "", "identity: none"),
-    FCSL_MODEL_SCALAR(magnetometer_t, FCSL_ROLE_PARAMETER, parameters.sigma, "T", "white noise of each axis"),
-    FCSL_MODEL_SCALAR(magnetometer_t, FCSL_ROLE_PARAMETER, parameters.saturation, "T",
+    FCSL_MODEL_SCALAR(magnetometer_t, FCSL_ROLE_OPTIONAL_PARAMETER, parameters.sigma, "T", "white noise of each axis"),
+    FCSL_MODEL_SCALAR(magnetometer_t, FCSL_ROLE_OPTIONAL_PARAMETER, parameters.saturation, "T",
                       "largest magnitude of an axis; 0: no limit"),
-    FCSL_MODEL_SCALAR(magnetometer_t, FCSL_ROLE_PARAMETER, parameters.quantum, "T", "step of the sample; 0: none"),
+    FCSL_MODEL_SCALAR(magnetometer_t, FCSL_ROLE_OPTIONAL_PARAMETER, parameters.quantum, "T",
+                      "step of the sample; 0: none"),
     FCSL_MODEL_VECTOR(magnetometer_t, FCSL_ROLE_OUTPUT, outputs.magnetic_field_body, "T", ""),
     SENSOR_FIELDS(magnetometer_t),
 };

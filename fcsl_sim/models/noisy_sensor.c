@@ -48,9 +48,10 @@ static void update(void *self, const fcsl_model_context_t *context)
 
 static const fcsl_field_t fields[] = {
     FCSL_MODEL_SCALAR(noisy_sensor_t, FCSL_ROLE_INPUT, inputs.truth, "", "what is measured"),
-    FCSL_MODEL_SCALAR(noisy_sensor_t, FCSL_ROLE_PARAMETER, parameters.bias, "", "constant error"),
-    FCSL_MODEL_SCALAR(noisy_sensor_t, FCSL_ROLE_PARAMETER, parameters.sigma, "", "standard deviation of the noise"),
-    FCSL_MODEL_SCALAR(noisy_sensor_t, FCSL_ROLE_PARAMETER, parameters.dropout, "", "no samples while set"),
+    FCSL_MODEL_SCALAR(noisy_sensor_t, FCSL_ROLE_OPTIONAL_PARAMETER, parameters.bias, "", "constant error"),
+    FCSL_MODEL_SCALAR(noisy_sensor_t, FCSL_ROLE_OPTIONAL_PARAMETER, parameters.sigma, "",
+                      "standard deviation of the noise"),
+    FCSL_MODEL_SCALAR(noisy_sensor_t, FCSL_ROLE_OPTIONAL_PARAMETER, parameters.dropout, "", "no samples while set"),
     FCSL_MODEL_SCALAR(noisy_sensor_t, FCSL_ROLE_OUTPUT, outputs.value, "", "the last sample"),
     FCSL_MODEL_SCALAR(noisy_sensor_t, FCSL_ROLE_OUTPUT, outputs.sampled, "", "the last update took a sample"),
 };

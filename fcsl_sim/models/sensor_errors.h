@@ -168,9 +168,10 @@ static inline bool sensor_deliver(sensor_line_t *line, sensor_losses_t losses, c
 }
 
 #define SENSOR_FIELDS(struct_)                                                                                         \
-    FCSL_MODEL_SCALAR(struct_, FCSL_ROLE_PARAMETER, parameters.dropout_probability, "", "of each sample, to be lost"), \
-        FCSL_MODEL_SCALAR(struct_, FCSL_ROLE_PARAMETER, parameters.delay_samples, "", "0 to 64"),                      \
-        FCSL_MODEL_SCALAR(struct_, FCSL_ROLE_PARAMETER, parameters.fault, "",                                          \
+    FCSL_MODEL_SCALAR(struct_, FCSL_ROLE_OPTIONAL_PARAMETER, parameters.dropout_probability, "",                       \
+                      "of each sample, to be lost"),                                                                   \
+        FCSL_MODEL_SCALAR(struct_, FCSL_ROLE_OPTIONAL_PARAMETER, parameters.delay_samples, "", "0 to 64"),             \
+        FCSL_MODEL_SCALAR(struct_, FCSL_ROLE_OPTIONAL_PARAMETER, parameters.fault, "",                                 \
                           "0: none, 1: no samples, 2: stuck at the last one, 3: dead, it measures zero"),              \
         FCSL_MODEL_SCALAR(struct_, FCSL_ROLE_OUTPUT, outputs.sampled, "", "the last update gave a sample")
 

@@ -30,7 +30,7 @@ import std/macros
 
 type
   Role* = enum
-    Input, Output, Feedthrough, Parameter, State, OptionalInput
+    Input, Output, Feedthrough, Parameter, State, OptionalInput, OptionalParameter
   States* = ptr UncheckedArray[float64]
     ## Continuous states, or their derivatives, or values of event functions.
   Context* {.importc: "fcsl_model_context_t", header: "fcsl/fcsl_model.h".} = object
@@ -141,7 +141,8 @@ proc quoted(text: string): string {.compileTime.} =
 proc row(f: Field, number: int): string {.compileTime.} =
   const roles = [("Input", "FCSL_ROLE_INPUT", "0u"), ("Output", "FCSL_ROLE_OUTPUT", "0u"),
                  ("Feedthrough", "FCSL_ROLE_OUTPUT", "FCSL_FIELD_FEEDTHROUGH"), ("Parameter", "FCSL_ROLE_PARAMETER", "0u"),
-                 ("State", "FCSL_ROLE_STATE", "0u"), ("OptionalInput", "FCSL_ROLE_INPUT", "FCSL_FIELD_OPTIONAL")]
+                 ("State", "FCSL_ROLE_STATE", "0u"), ("OptionalInput", "FCSL_ROLE_INPUT", "FCSL_FIELD_OPTIONAL"),
+                 ("OptionalParameter", "FCSL_ROLE_PARAMETER", "FCSL_FIELD_OPTIONAL")]
   var role, flags: string
   for (name, c, flag) in roles:
     if name == f.role: (role, flags) = (c, flag)

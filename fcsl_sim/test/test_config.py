@@ -71,7 +71,6 @@ EVENT = {"at_s": 0.1, "set": "altimeter.parameters.bias", "value": 1.0}
         (edit("instances", "9", value={"model": "ramp"}), ["E203: `9` is not a name"]),
         (edit("instances", "controller", value={"model": "ramp"}), ["E209: `controller` is reserved"]),
         (edit(*SENSOR, "sigmar", value=0.0), ["E210: model `noisy_sensor` has no parameter `sigmar`"]),
-        (edit(*SENSOR, "sigma", value=...), ["E211: parameter `sigma` (f64) of `altimeter` has no value"]),
         (edit(*SENSOR, "sigma", value=True), ["E207: parameter `sigma` is f64, not a bool"]),
         (edit(*SENSOR, "dropout", value=0), ["E207: parameter `dropout` is bool, not an integer"]),
         (edit("rates", "altimeter", value=...), ["E804: `altimeter` has no rate"]),
@@ -185,12 +184,12 @@ def test_everything_is_reported_in_one_run(load_sim: Load) -> None:
     def change(config: dict[str, Any]) -> None:
         config["seed"] = "one"
         config["rates"]["velocimeter"] = 7
-        del config["instances"]["altimeter"]["parameters"]["bias"]
+        config["instances"]["altimeter"]["parameters"]["bais"] = 0.0
         config["connections"][4]["from"] = "controller.trottle"
 
     with pytest.raises(DiagnosticError) as error:
         load_sim(change)
-    assert sorted(head[:4] for head in heads(error.value)) == ["E206", "E208", "E211", "E220"]
+    assert sorted(head[:4] for head in heads(error.value)) == ["E206", "E208", "E210", "E220"]
 
 
 GOLDEN = """\
@@ -281,6 +280,29 @@ def test_what_is_empty_is_as_good_as_absent(load_sim: Load) -> None:
         config["instances"] = {"ramp": {"model": "ramp", "parameters": {}}}
 
     assert [text[:13] for text in warnings(alone)] == ["warning[W801]", "warning[W802]"]
+
+
+def test_optional_parameters_are_zero(load_sim: Load) -> None:
+    """A sensor's errors may be left out; what is not optional may not."""
+
+    def without(config: dict[str, Any]) -> None:
+        for name in ("altimeter", "velocimeter"):
+            del config["instances"][name]["parameters"]
+
+    left_out, given = load_sim(without).plan.text, load_sim().plan.text
+    assert sorted(left_out.splitlines()) == sorted(given.splitlines())
+    some = load_sim(without, sets=["altimeter.parameters.sigma=0.25"]).plan.text.splitlines()
+    assert "set altimeter parameters.sigma 0 3fd0000000000000" in some
+
+    def ball(config: dict[str, Any]) -> None:
+        config["models"]["ball"] = {"source": "ball.c"}
+        config["instances"]["ball"] = {"model": "ball", "parameters": {"gravity": 1.0, "height": 2.0}}
+
+    with pytest.raises(DiagnosticError) as error:
+        load_sim(ball)
+    assert [d.message for d in error.value.diagnostics] == [
+        "parameter `restitution` (f64), `rest_speed` (f64 m/s) of `ball` has no value"
+    ]
 
 
 def test_the_command_line_replaces_values(load_sim: Load) -> None:

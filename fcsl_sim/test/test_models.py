@@ -39,7 +39,7 @@ Open = Callable[..., Simulation]
         (12, "model `broken`: it must have a derivative exactly when it has continuous states"),
         (13, "model `broken`: it has neither `output` nor `update`: nothing writes its outputs"),
         (15, "model `broken`: `outputs.x.y` and `outputs.x_y` have the same name in a message"),
-        (16, "model `broken`: field `outputs.y`: only an input is optional"),
+        (16, "model `broken`: field `outputs.y`: only an input or a parameter is optional"),
         (17, "model `broken`: field `parameters.y`: only a parameter that is a vector of doubles is a table"),
         (14, "not a model library (it does not export fcsl_models)"),
     ],

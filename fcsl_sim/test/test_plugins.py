@@ -90,7 +90,7 @@ def test_the_field_table(everything: ModelInstance) -> None:
     }
     assert all(path.startswith(field.role) for path, field in everything.fields.items())
     assert [path for path, f in everything.fields.items() if f.is_feedthrough] == ["outputs.value"]
-    assert [path for path, f in everything.fields.items() if f.is_optional] == ["inputs.count"]
+    assert [path for path, f in everything.fields.items() if f.is_optional] == ["inputs.count", "parameters.identity"]
     assert [path for path, f in everything.fields.items() if f.is_table] == ["parameters.curve"]
     assert [(e.name, e.crossing, e.doc) for e in everything.events] == [
         ("ground", "falling", "the position becomes negative"),
@@ -459,7 +459,7 @@ def test_rust_that_compiles(cargo: Callable[[str], str]) -> None:
         (
             'force: f64 = "N"',
             'force: f64 = "N", feedthrough',
-            "only `feedthrough` of an output, `optional` of an input or `table` of a parameter may follow a unit",
+            "only `feedthrough` of an output, `optional` of an input or a parameter, or `table` of a parameter may follow a unit",
         ),
         ("middle: either", "middle: sinking", "an event is falling, rising or either"),
         ("now.x.position; }", "now.x.position.sin(); }", "no method named `sin` found for type `f64`"),

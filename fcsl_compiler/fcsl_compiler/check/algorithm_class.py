@@ -8,7 +8,7 @@ import ast
 import keyword
 import re
 from collections.abc import Collection
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 
 from ..base.diagnostics import DiagnosticSink, misspelt, nearest
 from ..base.source import MAX_NAME, SourceFile, Span
@@ -16,7 +16,9 @@ from ..model import ir
 from ..model.c_names import C_KEYWORDS
 from ..model.ranges import UNBOUNDED, Range, parse_range, split_range
 from ..model.ros_names import ros_field
-from ..model.types import HEALTH, REQUEST, Type, TypeNames, TypeSyntaxError
+from ..model.types import HEALTH, REQUEST, Array, Struct, Type, TypeNames, TypeSyntaxError, element_of
+from ..parse.json_reader import ConfigReader
+from ..parse.json_values import example, read_literal
 from ..parse.python_source import span_of
 from .annotations import MAX_TYPE, annotation_type, sizes_in
 
@@ -233,7 +235,8 @@ class _Reader:
         if name == "transition_request":
             self._request(record, parsed[0], span)
             return
-        self.found.ports[record].append(ir.Port(name, parsed[0], parsed[1], doc, span, parsed[2]))
+        port = ir.Port(name, parsed[0], parsed[1], doc, span, parsed[2])
+        self.found.ports[record].append(replace(port, default=self._default(record, value, port)))
 
     def _request(self, record: str, type_: Type, span: Span) -> None:
         if record != "outputs" or type_ != REQUEST:
@@ -279,9 +282,10 @@ class _Reader:
     def _type(self, record: str, node: ast.Constant) -> tuple[Type, str, Range] | None:
         """Type, unit and range of a port. Returns None after reporting E301 or E312."""
         text = str(node.value)
-        plain, bounds, at = split_range(text) if len(text) <= MAX_TYPE else (text, None, 0)
+        plain, bounds, at = split_range(text.partition("=")[0]) if len(text) <= MAX_TYPE else (text, None, 0)
         if bounds is None:
-            parsed = annotation_type(self.source, node, self.names, True, self.sink)
+            whole = ast.copy_location(ast.Constant(plain), node) if "=" in text else node
+            parsed = annotation_type(self.source, whole, self.names, True, self.sink)
             return (*parsed, UNBOUNDED) if parsed is not None else None
         parsed = annotation_type(self.source, ast.copy_location(ast.Constant(plain), node), self.names, True, self.sink)
         if parsed is None:
@@ -296,6 +300,37 @@ class _Reader:
         except TypeSyntaxError as error:
             self.sink.error("E312", str(error.args[0]), span, help=str(error.args[1]))
             return None
+
+    def _default(self, record: str, node: ast.expr, port: ir.Port) -> tuple[bool | int | float | str, ...] | None:
+        """The value behind `=` in the type of a parameter. None without one, or after reporting it."""
+        text = str(node.value) if isinstance(node, ast.Constant) else ""
+        before, equals, value = text.partition("=")
+        if not equals:
+            return None
+        span = _part_of_string(self.source, node, text, len(before), len(text))
+        if record != "parameters":
+            why = "a parameter without a value in the machine JSON has its default; state and outputs begin at zero"
+            self.sink.error(
+                "E313", f"a default in `{record}`", span, why=why, help="remove it, or assign it in `start`"
+            )
+            return None
+        literal = read_literal(value, span)
+        if literal is None:
+            shown = "{…}" if isinstance(port.type, Struct) else example(port.type)
+            fix = f"write a value as in the machine JSON, such as `= {shown}`"
+            what = f"`{value.strip()[:40]}` is not a value" if value.strip() else "a default without a value"
+            self.sink.error("E313", what, span, help=fix)
+            return None
+        reader, element = ConfigReader(self.sink), element_of(port.type)
+        of_every = literal.kind != "array" and isinstance(port.type, Array)
+        found = reader.value(literal, element if of_every else port.type, f"the default of `{port.name}`")
+        outside = next((v for v in found or () if v not in port.range), None) if port.range != UNBOUNDED else None
+        if outside is not None:
+            message = f"the default of `{port.name}` is {outside}, outside {port.range}"
+            self.sink.error("E313", message, span, help="choose a value inside, or widen the range")
+        if found is None or outside is not None:
+            return None
+        return found * port.type.count if of_every and isinstance(port.type, Array) else found
 
 
 def name_span(source: SourceFile, node: ast.FunctionDef | ast.AsyncFunctionDef) -> Span:

@@ -20,6 +20,7 @@ from ..model import ir
 from ..model.machine import Connection, Edge, Instance, Machine, PortRef, Values
 from ..model.program import Program
 from ..model.ranges import UNBOUNDED
+from ..model.types import REQUEST, element_of
 from ..parse.json_reader import ConfigReader, Everything
 from ..parse.json_source import JsonNode
 from ..parse.machine_files import ParsedAlgorithm, ParsedMachine
@@ -237,9 +238,14 @@ def _read_parameters(
         value = reader.value(definition, port.type, f"parameter `{name}`")
         if value is not None and _within(port, definition, value, reader):
             values[name] = value
+    for name, port in ports.items():
+        if name not in given and port.default is not None:
+            values[name] = port.default
+            for word in port.default if element_of(port.type) is REQUEST else ():
+                reader.requests.setdefault(str(word), port.span)
     readable = algorithm.complete and (node is None or node.kind == "object")
     for name, port in ports.items() if readable else ():
-        if name not in given and name not in meant:
+        if name not in given and name not in meant and port.default is None:
             reader.sink.error(
                 "E211",
                 f"parameter `{name}` of `{instance}` has no value",

@@ -451,6 +451,7 @@ class Port:
     doc: str
     span: Span
     range: Range = UNBOUNDED  # of a parameter
+    default: tuple[bool | int | float | str, ...] | None = None  # of a parameter, in the order of the leaves
 
 
 @dataclass(frozen=True)

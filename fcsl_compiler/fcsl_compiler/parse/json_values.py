@@ -3,12 +3,14 @@
 
 from __future__ import annotations
 
+import json
 import math
 from typing import TYPE_CHECKING
 
+from ..base.source import Span
 from ..model.literals import LiteralError, fit
 from ..model.types import BOOL, HEALTH, HEALTH_NAMES, REQUEST, Array, Scalar, Struct, Type
-from .json_source import JsonNode, article
+from .json_source import JsonNode, Member, article
 
 if TYPE_CHECKING:
     from .json_reader import ConfigReader
@@ -83,6 +85,23 @@ def _scalar(reader: ConfigReader, node: JsonNode, type_: Scalar, what: str) -> V
     fix = "true or false" if type_ is BOOL else "an integer" if type_.is_integer else "a finite number"
     reader.sink.error("E207", f"{what} is {type_}, not {article(node.kind)}", node.span, help=f"write {fix}")
     return None
+
+
+def read_literal(text: str, span: Span) -> JsonNode | None:
+    """A value in JSON within another text, all of it at this span. None if the text is no JSON."""
+    try:
+        return _node(json.loads(text), span)
+    except (ValueError, RecursionError):
+        return None
+
+
+def _node(value: object, span: Span) -> JsonNode:
+    if isinstance(value, dict):
+        return JsonNode("object", span, {key: Member(key, span, _node(v, span)) for key, v in value.items()})
+    if isinstance(value, list):
+        return JsonNode("array", span, [_node(item, span) for item in value])
+    kinds = {bool: "bool", int: "int", float: "float", str: "string"}
+    return JsonNode(kinds.get(type(value), "null"), span, value, str(value))
 
 
 def example(type_: Scalar | Array) -> str:

@@ -5,6 +5,7 @@ from __future__ import annotations
 
 import ast
 import copy
+import json
 from collections.abc import Callable, Mapping
 from contextlib import suppress
 from dataclasses import dataclass, replace
@@ -176,6 +177,12 @@ class Algorithm:
             for record in RECORDS
         }
         self.type = StructType(name, {n: t for record in self.records.values() for n, t in record.members.items()})
+        #: Values of parameters that the machine JSON may leave out, as it would write them.
+        self.defaults = {
+            n: json.loads(annotation_text(a).partition("=")[2])
+            for n, a in declared["parameters"].items()
+            if "=" in annotation_text(a)
+        }
         methods = [n for n in node.body if isinstance(n, ast.FunctionDef)]
         members = {
             **module.known.members,

@@ -262,7 +262,8 @@ class ReferenceMachine:
         delayed = [c for c in config.get("connections", []) if c.get("delayed")]
         for instance in machine.instances:
             written = config["instances"][instance.name]
-            given = {**written.get("parameters", {}), **written.get("inputs", {})}
+            defaults = self._algorithms[instance.algorithm.name].defaults
+            given = {**defaults, **written.get("parameters", {}), **written.get("inputs", {})}
             given |= {
                 c["to"].partition(".")[2]: c["initial"] for c in delayed if c["to"].startswith(f"{instance.name}.")
             }

@@ -166,6 +166,8 @@ def from_json(type_: Type, value: Any) -> Any:
     if isinstance(type_, StructType):
         return type_.of({name: from_json(member, value[name]) for name, member in type_.members.items()})
     if isinstance(type_, ArrayType):
+        if not isinstance(value, list):  # a default of every element
+            return type_.of([from_json(type_.element, value) for _ in range(type_.count)])
         flat = [value]
         for _ in type_.shape:
             flat = [item for row in flat for item in row]

@@ -104,10 +104,12 @@ extern __attribute__((visibility("default"))) const fcsl_model_t *const fcsl_mod
 #define FCSL_FIELD_FEEDTHROUGH (1u << 4)
 /* In place of FCSL_ROLE_OUTPUT in the macros below: an output with this flag. */
 #define FCSL_ROLE_FEEDTHROUGH (FCSL_ROLE_OUTPUT | 0x80u)
-/* Flag of an input that may stay unconnected, and is zero then: a disturbance, one of several forces. */
+/* Flag of an input that may stay unconnected, and of a parameter that a simulation may leave out. Both are zero then: a
+ * disturbance, one of several forces; an error that a sensor does not have. */
 #define FCSL_FIELD_OPTIONAL (1u << 5)
-/* In place of FCSL_ROLE_INPUT in the macros below: an input with this flag. */
-#define FCSL_ROLE_OPTIONAL_INPUT (FCSL_ROLE_INPUT | 0x40u)
+/* In place of FCSL_ROLE_INPUT and FCSL_ROLE_PARAMETER in the macros below: a field with this flag. */
+#define FCSL_ROLE_OPTIONAL_INPUT     (FCSL_ROLE_INPUT | 0x40u)
+#define FCSL_ROLE_OPTIONAL_PARAMETER (FCSL_ROLE_PARAMETER | 0x80u)
 /* Flag of a parameter that is a vector of at most so many values: a simulation gives any number of them, or the column of a
  * file, and the last one fills the rest. */
 #define FCSL_FIELD_TABLE (1u << 6)
@@ -151,10 +153,10 @@ extern __attribute__((visibility("default"))) const fcsl_model_t *const fcsl_mod
      .minimum = -(double)INFINITY,                                                                                     \
      .maximum = (double)INFINITY}
 #define FCSL_MODEL_FLAGS(role_)                                                                                        \
-    ((role_) == FCSL_ROLE_FEEDTHROUGH      ? FCSL_FIELD_FEEDTHROUGH                                                    \
-     : (role_) == FCSL_ROLE_OPTIONAL_INPUT ? FCSL_FIELD_OPTIONAL                                                       \
-     : (role_) == FCSL_ROLE_TABLE          ? FCSL_FIELD_TABLE                                                          \
-                                           : 0u)
+    ((role_) == FCSL_ROLE_FEEDTHROUGH                                                 ? FCSL_FIELD_FEEDTHROUGH         \
+     : (role_) == FCSL_ROLE_OPTIONAL_INPUT || (role_) == FCSL_ROLE_OPTIONAL_PARAMETER ? FCSL_FIELD_OPTIONAL            \
+     : (role_) == FCSL_ROLE_TABLE                                                     ? FCSL_FIELD_TABLE               \
+                                                                                      : 0u)
 #define FCSL_MODEL_TYPE(member_)                                                                                       \
     _Generic((member_),                                                                                                \
         _Bool: FCSL_BOOL,                                                                                              \

@@ -113,8 +113,9 @@ static const char *check_field(const fcsl_model_t *model, const fcsl_field_t *fi
     if ((field->flags & FCSL_FIELD_FEEDTHROUGH) != 0 && (field->role != FCSL_ROLE_OUTPUT || !model->output)) {
         return "only an output that `output` writes depends on inputs of the same instant";
     }
-    if ((field->flags & FCSL_FIELD_OPTIONAL) != 0 && field->role != FCSL_ROLE_INPUT) {
-        return "only an input is optional";
+    if ((field->flags & FCSL_FIELD_OPTIONAL) != 0 && field->role != FCSL_ROLE_INPUT &&
+        field->role != FCSL_ROLE_PARAMETER) {
+        return "only an input or a parameter is optional";
     }
     if ((field->flags & FCSL_FIELD_TABLE) != 0 &&
         (field->role != FCSL_ROLE_PARAMETER || field->rank != 1 || field->type != FCSL_F64)) {

@@ -90,7 +90,7 @@ constexpr fcsl_field_t fields[] = {
     FIELD(SCALAR, INPUT, inputs.enabled, "", ""),
     FIELD(MATRIX, PARAMETER, parameters.gain, "", "two rows of three"),
     FIELD(SCALAR, PARAMETER, parameters.limit, "", ""),
-    FIELD(SCALAR, PARAMETER, parameters.identity, "", ""),
+    FIELD(SCALAR, OPTIONAL_PARAMETER, parameters.identity, "", ""),
     FIELD(VECTOR, TABLE, parameters.curve, "N", ""),
     FIELD(SCALAR, STATE, state.x.position, "m", ""),
     FIELD(SCALAR, STATE, state.x.speed, "m/s", ""),

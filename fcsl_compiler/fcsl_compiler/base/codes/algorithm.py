@@ -166,6 +166,15 @@ ALGORITHM_CODES: dict[str, Code] = {
         'class Law:\n    outputs = {"force": "f64 N in 0..10"}\n\n    def execute(self):\n        self.force = 1.0',
         'class Law:\n    outputs = {"force": "f64 N"}\n\n    def execute(self):\n        self.force = 1.0',
     ),
+    "E313": Code(
+        "an invalid default",
+        "`= 2.5` behind the type, unit and range of a parameter is its value in instances whose JSON does not give one. It "
+        "is written as in the machine JSON; of an array, one value is that of every element. Only parameters have defaults: "
+        "outputs and state begin at zero, and `start` may assign them.",
+        Kind.FILE,
+        'class Law:\n    outputs = {"force": "f64 N = 2.5"}\n\n    def execute(self):\n        self.force = 1.0',
+        'class Law:\n    outputs = {"force": "f64 N"}\n\n    def start(self):\n        self.force = 2.5\n\n    def execute(self):\n        pass',
+    ),
     "E401": Code(
         "a literal that does not fit",
         "A literal takes the type that its context requires, and must be representable in it. 3000000000 is not an"

@@ -196,6 +196,9 @@ macro_rules! __flag {
     (optional ROLE_INPUT) => {
         d::FIELD_OPTIONAL
     };
+    (optional ROLE_PARAMETER) => {
+        d::FIELD_OPTIONAL
+    };
     (table ROLE_PARAMETER) => {
         d::FIELD_TABLE
     };
@@ -203,7 +206,7 @@ macro_rules! __flag {
         compile_error!(concat!(
             "`",
             stringify!($flag),
-            "`: only `feedthrough` of an output, `optional` of an input or `table` of a parameter may follow a unit"
+            "`: only `feedthrough` of an output, `optional` of an input or a parameter, or `table` of a parameter may follow a unit"
         ))
     };
 }

@@ -20,7 +20,7 @@ fcsl_model::model! {
         /// two rows of three
         gain: [[f32; 3]; 2] = "";
         limit: u64 = "";
-        identity: i64 = "";
+        identity: i64 = "", optional;
         curve: [f64; 4] = "N", table;
     }
     second_order continuous {
