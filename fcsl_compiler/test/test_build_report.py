@@ -2,8 +2,10 @@
 """`fcsl build --report` against simulation, hand counts and compiled machines. The check `instructions` compares
 bounds with executed instructions."""
 
+import ctypes
 import json
 import random
+import subprocess
 from pathlib import Path
 from typing import Any
 
@@ -23,6 +25,7 @@ from fcsl_compiler.build_report.levelling import MOST_TICKS, levelled, load_per_
 from fcsl_compiler.build_report.objects import NotReadable, read_object
 from fcsl_compiler.build_report.paths import Unbounded
 from fcsl_compiler.build_report.schedule_facts import MOST_SLOTS, NEVER, latency, major_cycle, slots
+from fcsl_compiler.build_report.semantics import Decoder
 from fcsl_compiler.build_report.values import Flags, State, decide, greatest, minus, number, part, plus
 from fcsl_compiler.cli.main import main
 from fcsl_compiler.driver.library import build_library
@@ -330,6 +333,127 @@ def test_conditions_are_those_of_the_processor(bits: int) -> None:
         expected |= {"ne": a != b, "ae": a >= b, "a": a > b, "ge": sa >= sb, "g": sa > sb}
         assert {c: decide(c, flags) for c in expected} == expected
     assert decide("e", None) is None and plus(("rdi", 8), number(-8)) == ("rdi", 0)
+
+
+#: Targets by size in bytes, and second operands.
+_TARGETS = {1: ("%al", "%cl"), 2: ("%ax", "%cx"), 4: ("%eax", "%ecx"), 8: ("%rax", "%rcx")}
+_SIGNS = ("e", "ne", "s", "ns")
+_ORDER = ("b", "ae", "be", "a", "l", "ge", "le", "g")
+_ASKED = (*_SIGNS, *_ORDER, "o", "no", "p", "np")
+#: Instruction, sizes, and the conditions that are known after it where its operands are.
+_WIDE, _ALL = (4, 8), (1, 2, 4, 8)
+_INSTRUCTIONS: list[tuple[str, tuple[int, ...], tuple[str, ...]]] = [
+    ("cmp {b},{a}", _ALL, _SIGNS + _ORDER),
+    ("sub {b},{a}", _ALL, _SIGNS + _ORDER),
+    *((f"{name} {{b}},{{a}}", _ALL, _SIGNS + _ORDER) for name in ("test", "and", "or", "xor")),
+    ("add {b},{a}", _ALL, _SIGNS),
+    *((f"{name} {{a}}", _ALL, _SIGNS) for name in ("inc", "dec", "neg")),
+    *((f"{name} %cl,{{a}}", _WIDE, ()) for name in ("shl", "shr", "sar", "rol", "ror")),
+    *((f"{name} {{a}}", _WIDE, ()) for name in ("shl", "shr", "sar")),
+    ("imul {b},{a}", _WIDE, ()),
+    ("imul $-7,{b},{a}", _WIDE, ()),
+    ("mul {b}", _WIDE, ()),
+    ("imul {b}", _WIDE, ()),
+    # Those that leave the flags alone: the comparison before them counts.
+    ("not {a}", _ALL, _SIGNS + _ORDER),
+    *((f"cmov{c} {{b}},{{a}}", _WIDE, _SIGNS + _ORDER) for c in ("e", "ne", "b", "g", "s")),
+    *((f"{move} %cl,{{a}}", _WIDE, _SIGNS + _ORDER) for move in ("movzb", "movsb")),
+    ("lea -9(%rax,%rcx,4),{a}", _WIDE, _SIGNS + _ORDER),
+    ("cltq", (8,), _SIGNS + _ORDER),
+    ("cltd", (4,), _SIGNS + _ORDER),
+    ("cqto", (8,), _SIGNS + _ORDER),
+]
+
+
+def test_instructions_are_those_of_the_processor(tmp_path: Path) -> None:
+    """Known values and conditions after an instruction, compared with the processor that executes it: rax, rdx, and every
+    condition as `set` stores it. Where nothing is known nothing is compared, so what must be known is listed."""
+    edges = [0, 1, 2, 0x7F, 0x80, 0xFF, 0x7FFFFFFF, 1 << 31, (1 << 32) - 1, (1 << 63) - 1, 1 << 63, (1 << 64) - 1]
+    rng = random.Random(3)
+    cases: list[tuple[str, int, tuple[str, ...]]] = []
+    text = []
+    for words, sizes, known in _INSTRUCTIONS:
+        for size in sizes:
+            for turn in range(12):
+                a, b = (rng.choice([*edges, rng.getrandbits(64)]) for _ in range(2))
+                target, other = _TARGETS[size]
+                shown = words.format(a=target, b=target if turn % 4 == 3 else other)
+                cases.append((f"{shown} of {a:#x}, {b:#x}", size, known))
+                stores = "".join(f"set{c} {16 + n}(%rdi);" for n, c in enumerate(_ASKED))
+                text.append(
+                    f"f{len(cases) - 1}: movabs ${a:#x},%rax; movabs ${b:#x},%rcx; mov $5,%edx; cmp $3,%rcx; {shown};"
+                    f" mov %rax,(%rdi); mov %rdx,8(%rdi); {stores} ret\n"
+                )
+    source = tmp_path / "c.s"
+    symbols = "".join(f".globl f{n}\n.type f{n},@function\n" for n in range(len(cases)))
+    source.write_text(".text\n" + symbols + "".join(text) + '.section .note.GNU-stack,"",@progbits\n')
+    subprocess.run(["cc", "-shared", "-o", tmp_path / "c.so", source], check=True)
+    subprocess.run(["cc", "-c", "-o", tmp_path / "c.o", source], check=True)
+    code, library = read_object(tmp_path / "c.o"), ctypes.CDLL(str(tmp_path / "c.so"))
+    decoder = Decoder(code)
+    for n, (name, size, known) in enumerate(cases):
+        state, at = State(), code.functions[f"f{n}"]
+        while (i := code.instructions[at]).mnemonic != "ret":
+            effect = decoder.effect(i)
+            if effect is not None:
+                effect(state)
+            at = (at[0], at[1] + i.length)
+        out = ctypes.create_string_buffer(16 + len(_ASKED))
+        library[f"f{n}"](out)
+        for offset in (0, 8):
+            value = state.load(("rdi", offset), 8)
+            assert value is not None or size < 4, f"{name}: byte {offset} is unknown"
+            assert value in (None, number(int.from_bytes(out.raw[offset : offset + 8], "little"))), (name, offset)
+        for place, condition in enumerate(_ASKED, 16):
+            value = state.load(("rdi", place), 1)
+            assert value is not None or condition not in known, f"{name}: {condition} is unknown"
+            assert value in (None, number(out.raw[place])), (name, condition)
+
+
+@pytest.mark.parametrize(
+    ("before", "turns"),
+    [
+        ("cmp $7,%edi; jne 9f", 7),
+        ("cmpl $7,%edi; je 1f; ret", 7),
+        ("cmp $7,%rdi; jne 9f", 7),
+        ("test %edi,%edi; jne 9f; add $4,%edi", 4),
+        ("sub $3,%edi; jne 9f; add $4,%edi", 4),
+        ("and $12,%edi; jne 9f; add $4,%edi", 4),
+        ("dec %edi; jne 9f; add $4,%edi", 4),
+        ("cmp $7,%edi; mov %edi,%esi; jne 9f", 7),
+        ("xor %eax,%eax; cmp %rsi,%rdx; sete %al; jne 9f; lea 3(%rax),%edi", 4),
+        ("xor %eax,%eax; cmp %rsi,%rdx; setl %al; jge 9f; lea 3(%rax),%edi", 4),
+        ("xor %eax,%eax; cmp %rsi,%rdx; setge %al; jl 9f; lea 3(%rax),%edi", 4),
+        ("xor %eax,%eax; cmp %rsi,%rdx; setge %al; jge 9f; lea 3(%rax),%edi", 3),
+    ],
+)
+def test_a_count_that_a_condition_implies_bounds_a_loop(tmp_path: Path, before: str, turns: int) -> None:
+    """gcc uses a register that it has just compared as the number."""
+    bound = bound_of(
+        tmp_path, f'__asm__(".globl f; .type f,@function; f: {before}; 1: dec %edi; jne 1b; 9: ret");', "f"
+    )
+    assert bound - 2 * turns - 1 == sum(not word.strip().startswith("ret") for word in before.split(";"))
+
+
+@pytest.mark.parametrize(
+    "before",
+    [
+        "cmp $7,%edi; je 9f",  # any other
+        "cmp $7,%edi; jle 9f",
+        "test $7,%edi; jne 9f",  # some bits
+        "test %esi,%edi; jne 9f",
+        "cmp %esi,%edi; jne 9f",
+        "cmp $7,%edi; mov (%rsi),%edi; jne 9f",  # changed since
+        "imul %esi,%edi; jne 9f",
+    ],
+)
+def test_a_condition_that_implies_no_count_bounds_nothing(tmp_path: Path, before: str) -> None:
+    with pytest.raises(Unbounded, match="has no bound"):
+        bound_of(
+            tmp_path,
+            f'__asm__(".globl f; .type f,@function; f: mov (%r8),%edi; {before}; 1: dec %edi; jne 1b; 9: ret");',
+            "f",
+        )
 
 
 # ---- the report ----------------------------------------------------------------------------------------------------
