@@ -3,6 +3,8 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
+
 import numpy as np
 import pytest
 from scipy.optimize import least_squares
@@ -38,6 +40,21 @@ def test_minimize_finds_what_scipy_finds() -> None:
     start = np.array([1.0, 0.0])
     reference = least_squares(lambda p: model(p)[0], start, xtol=1e-12, ftol=1e-12, gtol=1e-12)
     assert np.allclose(minimize(model, start), reference.x, atol=1e-8)
+
+
+@pytest.mark.parametrize(
+    ("residual", "slope", "start", "root"),
+    [
+        (np.arctan, lambda x: 1.0 / (1.0 + x * x), 3.0, 0.0),  # each whole step overshoots by more than the last
+        (np.log, lambda x: 1.0 / x, 5.0, 1.0),  # the first whole step ends where there is no value
+    ],
+)
+def test_a_step_that_makes_it_worse_is_halved(
+    residual: Callable[[Vector], Vector], slope: Callable[[Vector], Vector], start: float, root: float
+) -> None:
+    with np.errstate(invalid="ignore"):
+        found = minimize(lambda p: (residual(p), slope(p).reshape(1, 1)), np.array([start]))
+    assert found == pytest.approx([root], abs=1e-9)
 
 
 # ---- accelerometer ---------------------------------------------------------------------------------------------------

@@ -7,16 +7,22 @@ import json
 import os
 import pty
 import select
+import shutil
 import signal
 import subprocess
 import time
 from collections.abc import Iterator
 from itertools import islice
 from pathlib import Path
-from typing import Any
+from types import SimpleNamespace
+from typing import Any, cast
 
 import pytest
 from hal_rig import HAL, Iio, environment, run, write_plan
+
+from simclient.hal.monitor_plot import Curves
+from simclient.hal.screen import Screen
+from simclient.hal.watch import Watch
 
 
 @pytest.fixture
@@ -130,6 +136,46 @@ def test_a_terminal_is_redrawn(tmp_path: Path, sysfs: Path) -> None:
     os.close(primary)
     assert "inertial (inertial): primary imu" in text and "corrected" in text
     assert "\x1b[?25l" in text and text.rstrip().endswith("\x1b[?25h")
+
+
+def test_lines_that_a_terminal_has_no_room_for_are_cut(
+    monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    """A line that the terminal wrapped would shift all that is drawn after it."""
+    monkeypatch.setattr(shutil, "get_terminal_size", lambda *_: os.terminal_size((8, 4)))
+    screen = Screen()
+    for lines, shown in (
+        (["12345678", "123456789"], ["12345678", "1234567…"]),
+        (["1", "2", "3"], ["1", "2", "3"]),
+        (["1", "2", "3", "4"], ["1", "2", "… 2 lin…"]),
+        (["1"], ["1"]),
+    ):
+        screen.draw(lines)
+        drawn = capsys.readouterr().out.removesuffix("\x1b[J").split("\r")[-1].splitlines()
+        assert [line.removesuffix("\x1b[K") for line in drawn] == shown
+
+
+def test_curves_begin_where_their_sensor_does() -> None:
+    """A sensor without a healthy device has no values, and a window has 500 ticks."""
+    field = {"n": 0}
+    sensors = [SimpleNamespace(kind="compass", name="compass")]
+    plan = SimpleNamespace(tick_hz=200, sensors=sensors)
+
+    def corrected(_: int) -> dict[str, list[float]] | None:
+        return None if field["n"] < 100 else {"field": [1.0, 2.0, 3.0]}
+
+    curves = Curves(cast("Watch", SimpleNamespace(plan=plan, corrected=corrected)), [0])
+    assert curves.lines(60, 12) == ["no sensor has a healthy device yet"]
+    for field["n"] in range(200):
+        curves.take(field["n"])
+    title, *rows = curves.lines(60, 12)
+    assert title == "compass.field = [1, 2, 3] T" and rows[-1].split() == ["0", "tick", "196"]
+    inked = {x for row in rows[:-2] for x, c in enumerate(row.split("┤")[-1].split("│")[-1]) if c not in "⠀"}
+    width = len(rows[0].split("┤")[-1])
+    assert min(inked) in (width // 2, width // 2 + 1) and max(inked) == width - 1
+    for field["n"] in range(200, 2600):
+        curves.take(field["n"])
+    assert curves.lines(60, 12)[-1].split() == ["600", "tick", "2596"]
 
 
 @pytest.mark.parametrize(

@@ -17,7 +17,7 @@ from hypothesis import strategies as st
 
 from simclient.link import End, Full, Policy
 from simclient.link.frame import FRAME_MAX, PAYLOAD_MAX, Flag, Frame, FrameError, Kind, crc16
-from simclient.link.port import QUEUE, Port
+from simclient.link.port import QUEUE, WINDOW, Port
 
 HAL = Path(__file__).resolve().parents[3] / "fcsl_hal"
 LATEST, SEQUENCED, RELIABLE, BULK = 0, 3, 7, 15
@@ -171,6 +171,33 @@ def test_the_newest_counts_on_one_port_and_all_do_on_the_other(pair: tuple[Ends,
             other.take_frame(frame)
     assert [other.receive(LATEST), other.receive(LATEST)] == [b"4", None]
     assert [other.receive(SEQUENCED) for _ in range(6)] == [b"0", b"1", b"2", b"3", b"4", None]
+
+
+@pytest.mark.parametrize("code", ["c", "python"])
+def test_no_more_than_a_window_is_under_way(code: str, native: ctypes.CDLL) -> None:
+    """16 frames; those that nothing confirms are all sent again, as often as the page says."""
+    one = CEnd(native, 1) if code == "c" else End(POLICIES, 1, RETRANSMIT_TICKS)
+    other = End(POLICIES, 2, RETRANSMIT_TICKS)
+    draw = random.Random(1)
+    for _ in range(20):
+        carry(one, other, draw, 0.0)
+        carry(other, one, draw, 0.0)
+    for number in range(40):
+        one.send(RELIABLE, bytes([number]))
+
+    def sent() -> list[int]:
+        frames.append([frame for frame in one.tick() if Frame.from_bytes(frame).kind is Kind.DATA])
+        return [Frame.from_bytes(frame).payload[0] for frame in frames[-1]]
+
+    frames: list[list[bytes]] = []
+    window = list(range(WINDOW))
+    assert [sent() for _ in range(7)] == [window, [], [], window, [], [], window]
+    for frame in frames[0][:5]:
+        other.take_frame(frame)
+    for _ in range(2):
+        for frame in other.tick():
+            one.take_frame(frame)
+    assert sent() == list(range(WINDOW, WINDOW + 5))
 
 
 def test_a_queue_takes_a_message_whole_or_not() -> None:

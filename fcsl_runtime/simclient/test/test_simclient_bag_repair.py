@@ -95,6 +95,31 @@ def test_repair_of_a_bag_with_a_bad_chunk(tmp_path: Path) -> None:
     assert opened.truncated.endswith(" (damaged before a repair)")  # a replay has to end there still
 
 
+def test_the_end_that_a_repair_writes_is_the_recorder_s(tmp_path: Path) -> None:
+    """Players go by the summary: what a file holds, and where the chunks of a time are."""
+    bag = tmp_path / "run"
+    command = [PROGRAM, FIXTURE, "--ticks", "9000", "--rate", "max", "--record", str(bag)]
+    subprocess.run(command, check=True, capture_output=True)
+    file = bag / "run_0.mcap"
+
+    def summary() -> Any:
+        with file.open("rb") as stream:
+            return make_reader(stream).get_summary()
+
+    whole, size = summary(), file.stat().st_size
+    assert len(whole.chunk_indexes) > 3 and whole.statistics.message_count > 9000
+    with file.open("r+b") as stream:
+        stream.truncate(size - 100)
+    repair(bag)
+    repaired = summary()
+    assert repaired.statistics == whole.statistics
+    assert repaired.chunk_indexes == whole.chunk_indexes
+    assert repaired.schemas == whole.schemas and repaired.channels == whole.channels
+    with file.open("rb") as stream:
+        last = list(make_reader(stream).iter_messages(starting_at=whole.statistics.message_end_time))
+    assert last and all(m.log_time == whole.statistics.message_end_time for _, _, m in last)
+
+
 @pytest.mark.parametrize(("damaged_bytes", "is_passed_over"), [(9 + 10, True), (9 + 9, False)])
 def test_damage_is_passed_over_where_a_record_has_room(
     damaged_bytes: int, is_passed_over: bool, tmp_path: Path

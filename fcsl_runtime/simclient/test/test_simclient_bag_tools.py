@@ -13,10 +13,11 @@ import subprocess
 import sys
 from collections.abc import Callable
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pytest
-from foreign_bags import ROS2_FORMATS, header, imu, make
+from foreign_bags import ROS2_FORMATS, header, imu, make, number
 from foreign_bags import write as write_foreign
 from hypothesis import example, given, settings
 from hypothesis import strategies as st
@@ -126,6 +127,31 @@ def test_bags_of_others_have_info_cuts_and_tables_too(tmp_path: Path) -> None:
     rows = list(csv.DictReader((tmp_path / "part.csv").open()))
     assert [row["time_s"] for row in rows] == [f"1700000000.{k}00000000" for k in (3, 4, 5)]
     assert [float(row["/engine/temperature:temperature"]) for row in rows] == [23.0, 24.0, 25.0]
+
+
+def test_times_of_columns_are_stamps_and_without_them_of_the_log(tmp_path: Path) -> None:
+    """Of messages of one layout, of those that are decoded one by one, and of those without a header."""
+    stamps_ns = [1_250_000_000, 1_999_999_999, 3_000_000_000, 1_700_000_000_000_000_001]
+    logs_ns = [stamp + 375_000_000 for stamp in stamps_ns]
+
+    def stamped(kind: str, frames: list[str], **more: Any) -> list[tuple[int, Any]]:
+        heads = [header(stamp, frame) for stamp, frame in zip(stamps_ns, frames, strict=True)]
+        return [(log, make(kind, header=head, **more)) for log, head in zip(logs_ns, heads, strict=True)]
+
+    one, several = [""] * 4, ["a", "ab", "", "abcdefghi"]
+    content = {
+        "/one_layout": stamped("sensor_msgs/msg/Temperature", one, temperature=3.0),
+        "/any_layout": stamped("sensor_msgs/msg/Temperature", several, temperature=3.0),
+        "/text": [(log, make("std_msgs/msg/String", data="x" * n)) for n, log in enumerate(logs_ns)],
+        "/number": [(log, number(n)) for n, log in enumerate(logs_ns)],
+    }
+    bag = Bag(write_foreign(tmp_path / "bag", content))
+    for path in ("/one_layout:temperature", "/any_layout:temperature", "/one_layout:header.stamp.nanosec"):
+        assert columns(bag, path)[0] == pytest.approx(np.array(stamps_ns) / 1e9, rel=1e-15), path
+    for path in ("/text:data", "/number:data"):
+        assert columns(bag, path)[0] == pytest.approx(np.array(logs_ns) / 1e9, rel=1e-15), path
+    assert list(columns(bag, "/any_layout:temperature")[1]) == [3.0] * 4
+    assert list(columns(bag, "/text:data")[1]) == ["", "x", "xx", "xxx"]
 
 
 # ---- cut -----------------------------------------------------------------------------------------------------------
@@ -288,18 +314,31 @@ def test_equal_runs_are_the_same_even_with_nans(fly: Fly) -> None:
     assert done.returncode == 0 and done.stdout.endswith("the bags are the same\n"), done.stdout
 
 
-def test_the_first_difference_is_found_with_values_and_context(fly: Fly) -> None:
+def test_the_first_difference_is_found_with_values_and_context(fly: Fly, tmp_path: Path) -> None:
     poke = {57: ("source.outputs.vec[1]", 0.125)}
     done = tool("diff", fly("one"), fly("two", poke), "--topics", "/car/probe/source", "/car/probe/echo")
     assert done.returncode == 1
     assert "first difference at tick 57, t = 0.570000000 s, state ACTIVE\n  /car/probe/source  vec[1]" in done.stdout
     assert "    A  0.0\n    B  0.125\n" in done.stdout
     assert "vec: 1 from t = 0.570000000 s on, by at most 0.125" in done.stdout
+    for said in (done, tool("diff", tmp_path / "two", tmp_path / "one", "--topics", "/car/probe/source")):
+        around = said.stdout.splitlines()[4:10]
+        first, second = around[0].index("A"), around[0].rindex("B")
+        assert [line[:first].split() for line in around] == [[], ["55"], ["56"], [">", "57"], ["58"], ["59"]]
+        assert all(line[at - 2 : at] == "  " and line[at] != " " for line in around for at in (first, second)), around
     alone = tool("diff", fly("three"), fly("four", poke))
     assert "/car/probe/record/writes" in alone.stdout.splitlines()[1]  # the cause comes before its effect
     assert (
         tool("diff", fly("five"), fly("six", poke), "--absolute", 0.2, "--topics", "/car/probe/source").returncode == 0
     )
+
+
+@pytest.mark.parametrize("tick", [39, 40, 41, 69, 70, 71])
+def test_the_state_of_a_difference_is_the_one_of_its_tick(tick: int, fly: Fly) -> None:
+    one = Bag(fly("one"))
+    found = str(diff(one, Bag(fly("two", {tick: ("source.outputs.vec[1]", 0.125)})), topics=["/car/probe/source"]))
+    *_, state = [s for t, s in zip(*columns(one, "machine.state"), strict=True) if round(t * 100) <= tick]
+    assert f"at tick {tick}, t = {tick / 100:.9f} s, state {state}\n" in found
 
 
 def test_missing_messages_and_topics_are_differences(fly: Fly, tmp_path: Path) -> None:

@@ -457,6 +457,14 @@ def test_curves_with_gaps_and_extremes() -> None:
         assert all(len(line) <= 60 for line in draw_panel("t", [7, 8], [values], 60, 5))
 
 
+@pytest.mark.parametrize(("width", "drawn"), [(60, 60), (30, 30), (20, 23), (3, 23)])
+def test_a_panel_is_as_wide_as_its_terminal(width: int, drawn: int) -> None:
+    """In one of fewer than 23 columns, 10 are left to the curve."""
+    title, *lines = draw_panel("a long title " * 9, [5, 7], [[1.0, -1.0]], width, 4)
+    assert len(title) == width and {len(line) for line in lines[:-1]} == {drawn}
+    assert len(lines[-1]) <= drawn and lines[-1].endswith("tick 7")
+
+
 def test_the_client_is_let_go(tell: Tell, tmp_path: Path) -> None:
     for _ in range(100):
         tell("state")

@@ -48,7 +48,7 @@ def _limits(curves: Sequence[Sequence[float]]) -> tuple[float, float]:
 def draw_panel(
     title: str, ticks: Sequence[int], curves: Sequence[Sequence[float]], width: int, height: int
 ) -> list[str]:
-    """A title, `height` rows with a scale, and an axis of ticks; every line has at most `width` characters.
+    """A title, `height` rows with a scale, and an axis of ticks; every line has at most `width` characters, or 23.
 
     A curve has a value for each of `ticks`; NaN and infinities leave a gap.
     """
