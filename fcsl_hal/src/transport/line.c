@@ -98,7 +98,6 @@ void line_write(line_t *line, const uint8_t *frame, size_t size)
     }
     line->pending_from = 0;
     line->pending_to = fcsl_cobs_encode(frame, size, line->pending);
-    flush(line);
 }
 
 /* ---- reading ------------------------------------------------------------------------------------------------------- */

@@ -45,7 +45,7 @@ void line_drop(line_t *line);
 
 /* Whether a frame may be written now. What is left of the last one is written first. */
 int line_has_room(line_t *line);
-/* Writes a frame, or as much of it as there is room for. */
+/* Takes a frame, where there is room: a datagram is sent at once, on a stream line_has_room writes it. */
 void line_write(line_t *line, const uint8_t *frame, size_t size);
 
 /* Hands what has come, in portions of bounded size, to the link. Returns 0, or -1 when the peer is gone. */
