@@ -289,6 +289,20 @@ static void test_two_drivers(void)
     driver->close(second.self);
 }
 
+/* A program without standard input gets its number for a file; it is closed, and no lock is left, all the same. */
+static void test_without_standard_input(void)
+{
+    rig_t rig;
+    const int kept = dup(STDIN_FILENO);
+    (void)close(STDIN_FILENO);
+    for (int turn = 0; turn < 2; turn++) {
+        CHECK(open_pulses(&rig, "pwmchip0", "0") == FCSL_DRIVER_OK && fcntl(STDIN_FILENO, F_GETFD) != -1);
+        driver->close(rig.self);
+        CHECK(fcntl(STDIN_FILENO, F_GETFD) == -1);
+    }
+    CHECK(kept < 0 || (dup2(kept, STDIN_FILENO) == STDIN_FILENO && close(kept) == 0));
+}
+
 /* Channels that are not there yet are exported. */
 static void test_export(void)
 {
@@ -347,6 +361,7 @@ int main(void)
     test_impossible_pulses();
     test_chips_that_refuse();
     test_two_drivers();
+    test_without_standard_input();
     test_export();
     test_a_chip_that_comes_back();
     remove_tree();

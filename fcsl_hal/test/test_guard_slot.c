@@ -190,6 +190,7 @@ static void test_one_flight_program_at_a_time(fcsl_guard_server_t *server, asker
     CHECK(fcsl_guard_command(&first->link, &message, 1) == 0);
     fcsl_guard_disconnect(&first->link);
     CHECK(fcsl_guard_poll(server) == FCSL_GUARD_LEFT);
+    CHECK(fcsl_guard_take(server, bytes, &size, &time_ns) == 0); /* nobody commands */
     CHECK(join(server, &second) == FCSL_GUARD_JOINED && second.status == 0);
     CHECK(fcsl_guard_take(server, bytes, &size, &time_ns) == 0);
     test_a_command_is_taken_once(server, &second);

@@ -297,6 +297,34 @@ static void check_refused(fcsl_channel_t channel, const char *name_space, const 
     CHECK(strstr(error.text, why) != NULL);
 }
 
+/* A plan of a message that does not hold together is found when composer or reader is made of it. */
+static void check_a_wrong_payload(const char *endpoint)
+{
+    static const uint32_t channel = 0;
+    static const uint8_t text[16];
+    static const fcsl_channel_t channels[] = {{.name = "a"}};
+    for (int is_composer = 0; is_composer < 2; is_composer++) {
+        const fcsl_ros_composer_plan_t composer = {
+            .text = text, .size = sizeof text, .stamp_offset = is_composer ? sizeof text : FCSL_ROS_NONE};
+        const fcsl_ros_reader_plan_t reader = {.size = 8, .stamp_anchor = is_composer ? FCSL_ROS_NONE : 0};
+        const fcsl_ros_message_t payload = {
+            .type = "a/A", .channels = &channel, .channel_count = 1, .composer = &composer, .reader = &reader};
+        const fcsl_machine_t machine = {.name = "craft",
+                                        .tick_hz = 1,
+                                        .size = 8,
+                                        .fields = FIELDS,
+                                        .field_count = 1,
+                                        .channels = channels,
+                                        .channel_count = 1,
+                                        .payloads = &payload};
+        const fcsl_tick_publisher_options_t options = {.endpoint = endpoint, .name_space = "", .descriptor = ""};
+        fcsl_tick_publisher_t *publisher = NULL;
+        fcsl_error_t error = {""};
+        CHECK(fcsl_tick_publisher_open(&options, &machine, &publisher, &error) == -1 && publisher == NULL);
+        CHECK(strstr(error.text, "of a message does not hold together") != NULL);
+    }
+}
+
 int main(void)
 {
     char endpoint[64];
@@ -309,6 +337,7 @@ int main(void)
     check_refused((fcsl_channel_t){.name = "a"}, "a//b", endpoint, "one slash between them");
     check_refused((fcsl_channel_t){.name = "a"}, "", "udp/127.0.0.1:7", "write tcp:HOST:PORT");
     check_refused((fcsl_channel_t){.name = "a"}, "", endpoint, "at most 1048576 are possible");
+    check_a_wrong_payload(endpoint);
     fcsl_tick_publisher_t *publisher = open_publisher(endpoint);
     CHECK(!fcsl_tick_publisher_watched(publisher));
     fcsl_bus_t *bus = observe(endpoint);

@@ -27,6 +27,11 @@ static void test_specs(void)
         {"tcp:127.0.0.1", "HOST:PORT must be numbers"},
         {"uart:/dev/ttyS0", "write uart:DEVICE:BAUD"},
         {"uart::115200", "write uart:DEVICE:BAUD"},
+        {"uart:/dev/ttyS0:", "write uart:DEVICE:BAUD"},
+        {"uart:/dev/ttyS0:x", "write uart:DEVICE:BAUD"},
+        {"uart:/dev/ttyS0:115200x", "write uart:DEVICE:BAUD"},
+        {"uart:/dev/ttyS0:00115200", "write uart:DEVICE:BAUD"}, /* 8 digits */
+        {"uart:/dev/ttyS0:4295082496", "write uart:DEVICE:BAUD"}, /* 2^32 + 115200 */
         {"uart:/dev/ttyS0:12345", "no serial device has the speed 12345"},
         {"zenoh:127.0.0.1:7447", "write zenoh:tcp:HOST:PORT in numbers"},
         {"zenoh:tcp:host:7447", "write zenoh:tcp:HOST:PORT in numbers"},
@@ -37,6 +42,16 @@ static void test_specs(void)
     }
     CHECK(fcsl_wire_check("unix:w", &error) == 0 && fcsl_wire_check("uart:/dev/x:115200", NULL) == 0);
     CHECK(fcsl_wire_check("udp:[::1]:7600", &error) == 0);
+
+    /* A device of 255 bytes has room. */
+    char longest[5 + 256 + 8];
+    for (size_t size = 255; size <= 256; size++) {
+        memcpy(longest, "uart:", 5);
+        memset(longest + 5, 'd', size);
+        memcpy(longest + 5 + size, ":115200", 8);
+        CHECK((fcsl_wire_check(longest, &error) == 0) == (size == 255));
+    }
+    CHECK(strstr(error.text, "write uart:DEVICE:BAUD") != NULL);
 }
 
 static void test_socket_paths(void)

@@ -212,7 +212,7 @@ static int hand_over(const fcsl_guard_server_t *server, int connection)
     rights->cmsg_type = SCM_RIGHTS;
     rights->cmsg_len = CMSG_LEN(sizeof(int));
     memcpy(CMSG_DATA(rights), &server->memory, sizeof server->memory);
-    return sendmsg(connection, &packet, MSG_NOSIGNAL | MSG_DONTWAIT) < 0 ? -1 : 0;
+    return sendmsg(connection, &packet, MSG_NOSIGNAL | MSG_DONTWAIT) == (ssize_t)sizeof text ? 0 : -1;
 }
 
 static void refuse(const fcsl_guard_server_t *server, int connection)
