@@ -346,6 +346,25 @@ static void test_payloads(void)
     REFUSED(machine.payloads = messages, "payload of channel 1");
     messages[1].reader = &none; /* as of a blob */
     REFUSED(machine.payloads = messages, "payload of channel 1");
+    messages[1].reader = &readers[1];
+    values[1].size--;
+
+    /* The message of a blob has room for the encapsulation and its size, at least. */
+    fcsl_ros_composer_plan_t head = {.memory_count = 1, .size = 8};
+    messages[0].composer = &head;
+    messages[0].reader = &none;
+#define BLOB                                                                                                           \
+    (fields[channels[0].field].type = FCSL_U32, fields[channels[0].field].size = 4u * fields[channels[0].field].count, \
+     channels[0].as = FCSL_AS_BLOB, machine.payloads = messages)
+    copy_good();
+    (void)BLOB;
+    CHECK(fcsl_validate(&machine, &error) == 0);
+    for (head.size = 0; head.size < 8; head.size++) {
+        REFUSED((void)BLOB, "payload of channel 0");
+    }
+    messages[0].reader = &readers[0];
+    REFUSED((void)BLOB, "payload of channel 0");
+#undef BLOB
 }
 
 int main(int argc, char **argv)

@@ -7,8 +7,10 @@ import ctypes
 import gc
 import json
 import math
+import struct
 from collections.abc import Iterator
 from dataclasses import replace
+from itertools import groupby
 from pathlib import Path
 from typing import Any
 
@@ -16,10 +18,12 @@ import numpy as np
 import pytest
 from rosbags.typesys import Stores, get_typestore
 
+from simclient.bag import Bag
 from simclient.errors import TwinError
 from simclient.machine_build import build_config
 from simclient.replay import replay
 from simclient.ros import native
+from simclient.ros.publish_queue import PublishQueue, RunTopics
 from simclient.ros.topics import RosTopic, SampleInput, composer_of, reader_of, topics_of
 from simclient.run import Run, open_run
 
@@ -314,6 +318,47 @@ def test_messages_out_of_a_machine(run: Run) -> None:
     run.write_channel(arm.index, b"\1")
     run.step(1)
     assert mode.compose([run.address], 0) is None and mode.refused == 1  # 200 is no int8
+
+
+def test_what_a_run_shows_is_its_record_with_the_stamps_of_the_host(run: Run, tmp_path: Path) -> None:
+    """Messages of an instance, of a tick, and of channels; before 1970, and until an int32 of seconds ends."""
+    stamps_ns = [-1, 0, -SECOND, -1_500_000_000, -SECOND - 1, SECOND - 1, SECOND, 7 * SECOND + 5, 2**31 * SECOND - 1]
+    show, state, health, thrust = range(3, 7)
+    queue = PublishQueue(lossless=True)
+    topics = RunTopics(run, queue)
+    topics.add_instance(show, 0, 2)
+    topics.add_tick_message(state, "state")
+    topics.add_tick_message(health, "health")
+    topics.add_channels(thrust, "actuator", composer_of(topic(run, "thrust")))
+    run.record(tmp_path / "bag", "", lossless=True)
+    topics.put_changes(stamps_ns[3])
+    shown = [(name, stamps_ns[3], data) for name, data in queue.take(wait=False)]
+    for stamp in stamps_ns:
+        run.step(1)
+        topics.put(stamp)
+        shown += [(name, stamp, data) for name, data in queue.take(wait=False)]
+    run.record_stop()
+    times = [second * SECOND + nanosecond for _, _, data in shown for second, nanosecond in [unpack(data)]]
+    assert times == [stamp for _, stamp, _ in shown]
+    assert [name for name, _, _ in shown[:2]] == [state, health]
+    recorded: dict[str, list[bytes]] = {}
+    for name, _, data in Bag(tmp_path / "bag").messages():
+        recorded.setdefault(name.rpartition("/")[2], []).append(bytes(data))
+    contents_of = {n: [data[:4] + data[12:] for name, _, data in shown if name == n] for n in range(3, 7)}
+    assert contents_of[show] == [data[:4] + data[12:] for data in recorded["show"][::2]] and len(recorded["show"]) == 9
+    for name, words in ((state, "state"), (health, "health")):  # where more than the tick has changed
+        changes = [content for content, _ in groupby(data[28:] for data in recorded[words])]
+        assert [data[20:] for data in contents_of[name]][-len(changes) :] == changes, words
+    assert topics.refused(thrust) == 4 and len(contents_of[thrust]) == len(stamps_ns) - 4  # ROS has no time before 1970
+    topics.close()
+    queue.close()
+
+
+def unpack(data: bytes) -> tuple[int, int]:
+    """Seconds and nanoseconds of a header at the beginning."""
+    second, nanosecond = struct.unpack_from("<iI", data, 4)
+    assert nanosecond < SECOND
+    return second, nanosecond
 
 
 def test_a_simulator_makes_the_topics_that_the_machine_takes(run: Run) -> None:

@@ -374,3 +374,47 @@ def test_the_flight_program_takes_paths_of_members(config: Path, tmp_path: Path)
         pose = client.get("law.outputs.best.pose")
         assert pose == {"valid": False, "position": [1.0, 5.5, 3.0], "attitude": [0.0] * 4, "level": 0}
         client.close()
+
+
+NAMES = """
+class Names:
+    outputs = {"bas": "Bas", "pose": "Pose", "poses": "PoseSet", "base": "Base[2]"}
+
+    def execute(self):
+        self.bas.n = i64(4)
+        self.base[0].x = 5.5
+        self.base[1].x = 6.5
+        self.pose.flag = True
+        self.pose.n = i64(7)
+        self.poses.pose[1].n = i64(8)
+        self.poses.base.x = 9.5
+"""
+
+
+def test_structs_whose_names_are_alike_are_told_apart(tmp_path: Path) -> None:
+    """One name begins another, or is as long: each has its own section of the message's text."""
+    (tmp_path / "names.py").write_text(NAMES)
+    structs = {
+        "Bas": {"n": "i64"},
+        "Base": {"x": "f64"},
+        "Pose": {"flag": "bool", "n": "i64"},
+        "PoseSet": {"base": "Base", "pose": "Pose[2]"},
+    }
+    config = {
+        "tick_hz": 100,
+        "initial_state": "RUN",
+        "structs": structs,
+        "algorithms": {"Names": {"source": "names.py"}},
+        "instances": {"names": {"algorithm": "Names"}},
+        "states": {"RUN": {"schedule": {"names": 100}}},
+    }
+    (tmp_path / "alike.json").write_text(json.dumps(config))
+    with AlgTwin.from_config(tmp_path / "alike.json") as twin:
+        twin.record(tmp_path / "bag", "")
+        twin.tick()
+    with AnyReader([tmp_path / "bag"]) as reader:
+        (connection,) = [c for c in reader.connections if c.topic == "/alike/names"]
+        ((_, _, data),) = reader.messages([connection])
+        seen: Any = reader.deserialize(data, connection.msgtype)
+    assert (seen.bas.n, seen.pose.flag, seen.pose.n, [one.x for one in seen.base]) == (4, True, 7, [5.5, 6.5])
+    assert (seen.poses.base.x, [one.n for one in seen.poses.pose]) == (9.5, [0, 8])

@@ -588,6 +588,23 @@ def test_levels_of_an_expression(client: Client, opening: str, inner: str, closi
     assert error["code"] == "bad_expression" and "nested too deeply" in error["message"]
 
 
+@pytest.mark.parametrize(
+    ("item", "count"),
+    [
+        ("1<2 and ", 105),
+        ("1>2 or ", 105),
+        ("not 1>2 and ", 70),
+        ("1 in(2,1)and ", 60),
+        *((f"1{operator}", 220) for operator in ("+", "-", "*", "//", "/", "%", "<", "<=", "==", "!=")),
+    ],
+)
+def test_a_chain_has_room_for_what_nests_behind_it(client: Client, item: str, count: int) -> None:
+    """An operand takes none until the end: 256 values, as deep as can be, in less than 1024 bytes."""
+    text = item * count + "1+(" * 32 + "1" + ")" * 32 + ("<99" if item.endswith(" ") else "")
+    found, expected = client.ok("eval", expression=text)["value"], eval(text)
+    assert found == expected and type(found) is type(expected)
+
+
 @pytest.mark.parametrize("letter", ["\u00e9", "\u20ac", "\U0001d11e"])
 @pytest.mark.parametrize("shift", range(4))
 def test_a_text_that_is_cut_stays_text(client: Client, letter: str, shift: int) -> None:
