@@ -178,8 +178,9 @@ class _Checker:
         self.machine = next(iter(machines.values()), None)
         self.sink = reader.sink
         self.edges: list[_Edge] = []
-        #: What feeds (instance, input): a connection, or an event. None: a connection is broken, nothing is known.
-        self._fed: set[tuple[str, str]] | None = None
+        #: What a connection or an event feeds: (instance, input). Of a file with an error it may lack some; no warnings are
+        #: shown then.
+        self._fed: set[tuple[str, str]] = set()
 
     # ---- rates --------------------------------------------------------------------------------------------------------
 
@@ -231,16 +232,13 @@ class _Checker:
     def read_connections(self, simulation: Mapping[str, JsonNode]) -> None:
         node = simulation.get("connections")
         fed: dict[tuple[str, str], Span] = {}
-        broken = False
         for item in self.reader.list(node, "`connections`"):
             keys = self.reader.object(item, "a connection", ("from", "to"), ("first_sample_s",))
             if keys is None or "from" not in keys or "to" not in keys:
-                broken = True
                 continue
             source = self._port(keys["from"], _FROM)
             target = self._port(keys["to"], _TO)
             if target is None or source is None:
-                broken = True
                 continue
             where = (target.instance or f"{target.controller}.", target.path)
             if where in fed:
@@ -258,7 +256,7 @@ class _Checker:
             if self._compatible(source, target, keys["from"], keys["to"]):
                 self.edges.append(_Edge(source, target, keys["from"].span, self._first_ns(target, keys)))
         values = {(name, path) for name, instance in self.instances.items() for path in instance.given}
-        self._fed = None if broken else set(fed) | values
+        self._fed = set(fed) | values
 
     def _first_ns(self, target: _Port, keys: Mapping[str, JsonNode]) -> int:
         node = keys.get("first_sample_s")
@@ -386,22 +384,21 @@ class _Checker:
 
     def warn_unfed(self, place: JsonNode | None) -> None:
         """After connections and events: what neither of them feeds. `place` is shown for sensor channels."""
-        fed = self._fed
-        if fed is None or place is None:
+        if place is None:
             return
         several = len(self.machines) > 1
         unfed = [
             f"`{name}.{c.name}`" if several else f"`{c.name}`"
             for name, machine in self.machines.items()
             for c in machine.channels
-            if c.direction == "sensor" and (f"{name}.", c.name) not in fed
+            if c.direction == "sensor" and (f"{name}.", c.name) not in self._fed
         ]
         if unfed:
             message = f"nothing feeds sensor channel {', '.join(unfed)}"
             self.sink.warning("W801", message, first(place.span), why="it never gets a sample")
         for instance in self.instances.values():
             inputs = instance.table.of_role("input") if instance.table else []
-            unfed = [f"`{f.name}`" for f in inputs if not f.optional and (instance.name, f.path) not in fed]
+            unfed = [f"`{f.name}`" for f in inputs if not f.optional and (instance.name, f.path) not in self._fed]
             if unfed:
                 message = f"nothing feeds input {', '.join(unfed)} of `{instance.name}`"
                 self.sink.warning("W802", message, instance.span, why="it stays zero")
@@ -533,8 +530,7 @@ class _Checker:
             if found is None:
                 continue
             instance = text.partition(".")[0]
-            if self._fed is not None:
-                self._fed.add((instance, found.path))
+            self._fed.add((instance, found.path))
             if any(e.target.instance == instance and e.target.path == found.path for e in self.edges):
                 message = f"the event sets `{text}`, which is connected: the next copy overwrites it"
                 self.sink.warning("W804", message, keys["set"].span, help="set a parameter of its source")

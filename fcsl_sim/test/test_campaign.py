@@ -12,10 +12,11 @@ import signal
 import subprocess
 import sys
 import time
-from collections.abc import Callable
+from collections.abc import Callable, Generator
+from contextlib import suppress
 from dataclasses import replace
 from pathlib import Path
-from typing import Any
+from typing import Any, cast
 
 import numpy as np
 import pyarrow.parquet as pq
@@ -24,9 +25,11 @@ from scipy import stats
 
 from fcsl_compiler.base.diagnostics import DiagnosticError
 from fcsl_sim import SimError
+from fcsl_sim.campaign.flight import Outcome
 from fcsl_sim.campaign.metric import Metric
 from fcsl_sim.campaign.report import wilson
 from fcsl_sim.campaign.study import read_study
+from fcsl_sim.campaign.workers import fly_in_processes
 from fcsl_sim.cli import main
 
 TEST = Path(__file__).resolve().parent
@@ -504,6 +507,32 @@ def test_no_process_is_left_after_ctrl_c(write: Write, tmp_path: Path) -> None:
             break
         time.sleep(0.01)
     assert not any(os.path.exists(f"/proc/{pid}") for pid in children)
+
+
+def test_no_process_is_left_when_the_outcomes_are_not_wanted_any_more(write: Write) -> None:
+    study, parent = read_study(write(cases=1_000_000), None), os.getpid()
+
+    def workers() -> set[int]:
+        children = [Path(f"/proc/{pid}") for pid in os.listdir("/proc") if pid.isdigit()]
+        found = set()
+        for child in children:
+            with suppress(OSError):
+                if f"\nPPid:\t{parent}\n" in (child / "status").read_text():
+                    found.add(int(child.name))
+        return found
+
+    before = workers()
+    outcomes = fly_in_processes(study, iter(range(1_000_000)), 2, None, lambda: None)
+    assert next(outcomes).verdict in ("passed", "failed") and len(workers() - before) == 2
+    cast("Generator[Outcome]", outcomes).close()
+    assert workers() <= before
+
+    def interrupt() -> None:
+        raise KeyboardInterrupt
+
+    with pytest.raises(KeyboardInterrupt):
+        next(fly_in_processes(study, iter(range(1_000_000)), 2, None, interrupt))
+    assert workers() <= before
 
 
 # ---- in pytest -------------------------------------------------------------------------------------------------------

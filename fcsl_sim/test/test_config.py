@@ -118,6 +118,12 @@ EVENT = {"at_s": 0.1, "set": "altimeter.parameters.bias", "value": 1.0}
             ["E208: a connection comes `from` an output or an actuator, written as a string"],
         ),
         (edit("connections", 0, "form", value="x"), ["E201: unknown key `form` in a connection"]),
+        # What a broken connection was to feed is not reported in addition.
+        (edit("connections", 2, "form", value="x"), ["E201: unknown key `form` in a connection"]),
+        (edit("connections", 2, "from", value=...), ["E202: a connection has no `from`"]),
+        (edit("connections", 2, "to", value=...), ["E202: a connection has no `to`"]),
+        (edit("connections", 2, "from", value="romp.x"), ["E206: no instance `romp`"]),
+        (edit("connections", 0, "from", value="romp.x"), ["E206: no instance `romp`"]),
         (edit("events", value=[EVENT | {"at_s": -1}]), ["E204: `at_s` is -1"]),
         (edit("events", value=[EVENT | {"value": "x"}]), ["E207: `altimeter.parameters.bias` is f64, not a string"]),
         (

@@ -203,6 +203,18 @@ def test_a_companion_continues_from_a_checkpoint(load_two: Load) -> None:
     assert rest == whole[77:]
 
 
+def test_a_checkpoint_of_other_delays_is_refused(load_two: Load) -> None:
+    """Of each controller: what is under way has its place in the checkpoint."""
+    config = load_two()
+    with Simulation(config.plan, config.tables) as sim:
+        sim.run(10)
+        saved = sim.checkpoint()
+    for name in ("one", "two"):
+        other = load_two(lambda c, name=name: c["controllers"][name].update(delay_ticks=2))
+        with Simulation(other.plan, other.tables) as sim, pytest.raises(SimError, match="of another simulation"):
+            sim.restore_checkpoint(saved)
+
+
 def test_a_checkpoint_with_impossible_registers_is_refused(load_two: Load) -> None:
     """Behind a right CRC: a register that the simulated hardware of the second controller does not count."""
     config = load_two()

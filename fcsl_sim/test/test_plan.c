@@ -2,6 +2,7 @@
  *
  * The plan parser rejects every error with its line, and handles arbitrary bytes.
  */
+#include <stdarg.h>
 #include <stdint.h>
 #include <string.h>
 
@@ -117,6 +118,183 @@ static void names_the_line(void)
     refuses_with("end\n", "", "plan line 19: the plan has no `end`: it is truncated");
 }
 
+/* Every statement, each with words of its own. */
+static const char every[] = "fcsl-sim-plan 3\n"
+                            "machine first /m/first library.so\n"
+                            "seed 77\n"
+                            "ticks 1234\n"
+                            "delay 3\n"
+                            "companion second 4 machine_two /m/second library.so\n"
+                            "model one /l/one library.so\n"
+                            "machine_model two /l/two library.so\n"
+                            "group rk45 0 3f10000000000000 3f20000000000000 3f30000000000000 3f40000000000000\n"
+                            "group verlet 250 3f50000000000000 3f60000000000000 3f70000000000000 3f80000000000000\n"
+                            "instance a one 1 1000 20 5\n"
+                            "instance b two - 500 10 2\n"
+                            "tolerance a 6 3f90000000000000\n"
+                            "call a update\n"
+                            "set a parameters.set_field 8 0000000000000009\n"
+                            "link a outputs.link_from b inputs.link_to\n"
+                            "sensor a outputs.sensor_from channel.sensor_to\n"
+                            "actuator channel.actuator_from b inputs.actuator_to\n"
+                            "companion_sensor b outputs.cs_from second channel.cs_to\n"
+                            "first_sample second channel.first 11\n"
+                            "companion_actuator second channel.ca_from a inputs.ca_to\n"
+                            "read law.outputs.read_from a inputs.read_to\n"
+                            "write b outputs.write_from law.inputs.write_to\n"
+                            "event 12 b parameters.event_field 13 000000000000000e\n"
+                            "serial_link c\n"
+                            "until 15 a.outputs.x > 1 and b.outputs.y < 2\n"
+                            "views {\"any\": \"text\"}\n"
+                            "end\n";
+
+static char written[2 * sizeof every];
+
+__attribute__((format(printf, 2, 3))) static void put(uint32_t line, const char *format, ...)
+{
+    uint32_t lines = 1;
+    const size_t size = strlen(written);
+    for (const char *at = written; *at != '\0'; at++) {
+        lines += *at == '\n';
+    }
+    CHECK(line == lines);
+    va_list arguments;
+    va_start(arguments, format);
+    CHECK(vsnprintf(written + size, sizeof written - size, format, arguments) > 0);
+    va_end(arguments);
+}
+
+static uint64_t bits_of(double value)
+{
+    uint64_t bits = 0;
+    memcpy(&bits, &value, sizeof bits);
+    return bits;
+}
+
+static void put_link(const char *keyword, const fcsl_plan_link_t *link, const char *const words[4])
+{
+    const char *const all[] = {link->companion, link->from_instance, link->from_field, link->to_instance,
+                               link->to_field};
+    uint32_t given = 0;
+    uint32_t used = 0;
+    for (size_t i = 0; i < sizeof all / sizeof all[0]; i++) {
+        given += all[i] != NULL;
+    }
+    for (size_t i = 0; i < 4; i++) {
+        used += words[i] != NULL;
+    }
+    CHECK(given == used);
+    put(link->line, "%s %s %s %s%s%s\n", keyword, words[0], words[1], words[2], words[3] != NULL ? " " : "",
+        words[3] != NULL ? words[3] : "");
+}
+
+#define LINK(keyword, link, ...) put_link(keyword, &(link), (const char *const[4]){__VA_ARGS__})
+
+static void put_set(const char *keyword, const fcsl_plan_set_t *set, const char *time)
+{
+    put(set->line, "%s %s%s %s %llu %016llx\n", keyword, time, set->instance, set->field,
+        (unsigned long long)set->element, (unsigned long long)set->bits);
+}
+
+/* Writes the plan as it was read. */
+static void put_plan(const fcsl_plan_t *p)
+{
+    static const char *const methods[] = {"euler", "rk2", "rk4", "ab4", "verlet", "rk45"};
+    static const char *const calls[] = {"output", "stage", "update"};
+    char time[32];
+    put(1, "fcsl-sim-plan 3\n");
+    put(p->machine.line, "machine %s %s\n", p->machine.name, p->machine.library);
+    put(p->seed_line, "seed %llu\n", (unsigned long long)p->seed);
+    put(p->ticks_line, "ticks %llu\ndelay %u\n", (unsigned long long)p->ticks, p->delay_ticks);
+    const fcsl_plan_companion_t *companion = p->companions;
+    put(companion->line, "companion %s %u %s %s\n", companion->name, companion->delay_ticks, companion->machine,
+        companion->library);
+    for (uint32_t i = 0; i < p->model_count; i++) {
+        put(p->models[i].line, "%s %s %s\n", p->models[i].is_machine ? "machine_model" : "model", p->models[i].name,
+            p->models[i].library);
+    }
+    for (uint32_t i = 0; i < p->group_count; i++) {
+        const fcsl_plan_group_t *group = &p->groups[i];
+        put(group->line, "group %s %llu %016llx %016llx %016llx %016llx\n", methods[group->method],
+            (unsigned long long)group->hz, (unsigned long long)bits_of(group->rtol),
+            (unsigned long long)bits_of(group->atol), (unsigned long long)bits_of(group->min_step_s),
+            (unsigned long long)bits_of(group->max_step_s));
+    }
+    for (uint32_t i = 0; i < p->instance_count; i++) {
+        const fcsl_plan_instance_t *instance = &p->instances[i];
+        (void)snprintf(time, sizeof time, "%u", instance->group);
+        put(instance->line, "instance %s %s %s %llu %llu %llu\n", instance->name, instance->model,
+            instance->group == FCSL_PLAN_NO_GROUP ? "-" : time, (unsigned long long)instance->hz,
+            (unsigned long long)instance->every, (unsigned long long)instance->phase);
+    }
+    put(p->tolerances->line, "tolerance %s %llu %016llx\n", p->tolerances->instance,
+        (unsigned long long)p->tolerances->state, (unsigned long long)bits_of(p->tolerances->atol));
+    put(p->calls->line, "call %s %s\n", p->calls->instance, calls[p->calls->kind]);
+    put_set("set", p->sets, "");
+    const fcsl_plan_link_t *sensors = p->sensors;
+    const fcsl_plan_link_t *actuators = p->actuators;
+    LINK("link", p->links[0], p->links->from_instance, p->links->from_field, p->links->to_instance, p->links->to_field);
+    LINK("sensor", sensors[0], sensors[0].from_instance, sensors[0].from_field, sensors[0].to_field);
+    LINK("actuator", actuators[0], actuators[0].from_field, actuators[0].to_instance, actuators[0].to_field);
+    LINK("companion_sensor", sensors[1], sensors[1].from_instance, sensors[1].from_field, sensors[1].companion,
+         sensors[1].to_field);
+    put(p->first_samples->line, "first_sample %s %s %llu\n", p->first_samples->companion, p->first_samples->channel,
+        (unsigned long long)p->first_samples->time_ns);
+    LINK("companion_actuator", actuators[1], actuators[1].companion, actuators[1].from_field, actuators[1].to_instance,
+         actuators[1].to_field);
+    LINK("read", p->reads[0], p->reads->from_field, p->reads->to_instance, p->reads->to_field);
+    LINK("write", p->writes[0], p->writes->from_instance, p->writes->from_field, p->writes->to_field);
+    (void)snprintf(time, sizeof time, "%llu ", (unsigned long long)p->events->time_ns);
+    put_set("event", p->events, time);
+    put(p->serial_link.line, "serial_link %s\n", p->serial_link.name);
+    put(p->until_line, "until %llu %s\nviews %s\nend\n", (unsigned long long)p->until_ticks, p->until, p->views);
+}
+
+static void keeps_every_word(void)
+{
+    fcsl_plan_t plan;
+    fcsl_error_t error = {{0}};
+    CHECK(fcsl_plan_parse(&plan, every, sizeof every - 1u, &error) == 0);
+    put_plan(&plan);
+    CHECK(strcmp(written, every) == 0);
+    fcsl_plan_free(&plan);
+}
+
+/* Whether the word from `at` on may be anything: a path, an expression or views, which end their line. */
+static int is_free(const char *at)
+{
+    return *at == '/' || *at == '{' || strncmp(at, "a.outputs.x", 11) == 0;
+}
+
+/* A word that is neither a name nor a number is refused with its line, wherever it stands. */
+static void refuses_every_wrong_word(void)
+{
+    uint32_t line = 1;
+    uint32_t words = 0;
+    for (const char *at = every; *at != '\0'; at++) {
+        line += *at == '\n';
+        if (*at != ' ' || line == 1) {
+            continue;
+        }
+        if (is_free(at + 1)) {
+            at += strcspn(at, "\n") - 1u;
+            continue;
+        }
+        char text[2 * sizeof every];
+        char begin[32];
+        fcsl_plan_t plan;
+        fcsl_error_t error = {{0}};
+        const int size =
+            snprintf(text, sizeof text, "%.*s ?%s", (int)(at - every), every, at + 1 + strcspn(at + 1, " \n"));
+        (void)snprintf(begin, sizeof begin, "plan line %u: ", line);
+        CHECK(fcsl_plan_parse(&plan, text, (size_t)size, &error) == -1);
+        CHECK(strncmp(error.text, begin, strlen(begin)) == 0);
+        fcsl_plan_free(&plan);
+        words++;
+    }
+    CHECK(words > 60);
+}
+
 static void refuses_long_lines(void)
 {
     static char text[3 * FCSL_PLAN_MAX_LINE];
@@ -175,6 +353,8 @@ static void survives_garbling(void)
 int main(void)
 {
     reads_all();
+    keeps_every_word();
+    refuses_every_wrong_word();
     names_the_line();
     refuses_long_lines();
     refuses_truncation();

@@ -535,6 +535,93 @@ def test_other_simulations_and_other_checkpoints_are_refused(tmp_path: Path) -> 
             assert other.get("machine.tick") == 0
 
 
+RK45 = {"method": "rk45", "rtol": 1e-6, "atol": 1e-9, "min_step_s": 1e-6, "max_step_s": 0.01}
+
+
+@pytest.mark.parametrize(
+    ("keys", "value", "goes_on"),
+    [
+        (("integrator", "hz"), 2000, False),
+        (("integrator", "method"), "rk2", False),
+        (("integrator",), RK45, False),
+        (("rates", "gauge"), 50, False),
+        (("rates", "gauge"), {"hz": 100, "phase_s": 0.002}, False),  # on a grid of 500 Hz
+        (("rates", "gauge"), {"hz": 500}, False),
+        (("connections", 0, "from"), "ramp.seen_rate", False),
+        (("connections", 0, "from"), "ball.z", False),
+        (("connections", 0, "to"), "ball.push", False),
+        (("connections",), [], False),
+        (("instances", "ramp", "integrator"), {"method": "rk4", "hz": 500}, False),
+        # Values come with the checkpoint.
+        (("instances", "gauge", "parameters", "bias"), 1.0, True),
+        (("seed",), 8, True),
+        (("duration",), 900.0, True),
+    ],
+)
+def test_what_makes_a_simulation_another_one(
+    keys: tuple[str | int, ...], value: object, goes_on: bool, tmp_path: Path
+) -> None:
+    _compare_layouts(PLANT, keys, value, goes_on, tmp_path)
+
+
+@pytest.mark.parametrize(
+    ("name", "value"), [("rtol", 1e-5), ("atol", 1e-8), ("min_step_s", 1e-5), ("max_step_s", 0.005)]
+)
+def test_another_tolerance_or_step_makes_another_simulation(name: str, value: float, tmp_path: Path) -> None:
+    _compare_layouts(PLANT | {"integrator": RK45}, ("integrator", name), value, False, tmp_path)
+
+
+def test_another_rate_on_the_same_grid_makes_another_simulation(tmp_path: Path) -> None:
+    """A phase of 2 ms puts 100 Hz on a grid of 500 Hz."""
+    config = PLANT | {"rates": {"gauge": {"hz": 100, "phase_s": 0.002}}}
+    _compare_layouts(config, ("rates", "gauge"), 500, False, tmp_path)
+
+
+@pytest.mark.parametrize(
+    ("text", "instead"),
+    [
+        ("seen_rate", "rate_seen"),  # a name
+        ("int64_t time_ns", "uint64_t time_ns"),  # a type
+        ("        double x;\n        double seen_rate;", "        double seen_rate;\n        double x;"),  # offsets
+        ("        int64_t time_ns;", "        int64_t time_ns;\n        double more;"),  # the size
+        (".continuous_offset = offsetof(ramp_t, state.x)", ".continuous_offset = offsetof(ramp_t, state.y)"),
+    ],
+)
+def test_another_layout_of_a_model_makes_another_simulation(text: str, instead: str, tmp_path: Path) -> None:
+    path = write(tmp_path, PLANT)
+    source = (TEST / "models/ramp.c").read_text().replace("double x;\n    } state", "double x, y;\n    } state")
+    assert text in source
+    saved = []
+    for content in (source, source.replace(text, instead)):
+        (tmp_path / "ramp.c").write_text(content)
+        with SimTwin.from_config(path) as twin:
+            for before in saved:
+                with pytest.raises(TwinError, match="of another simulation: its models, their fields"):
+                    twin.restore(before)
+            twin.tick(10)
+            saved.append(twin.save())
+
+
+def _compare_layouts(
+    config: dict[str, Any], keys: tuple[str | int, ...], value: object, goes_on: bool, folder: Path
+) -> None:
+    """Whether a checkpoint goes on in a simulation with another value."""
+    changed = copy.deepcopy(config)
+    node: Any = changed
+    for key in keys[:-1]:
+        node = node[key]
+    node[keys[-1]] = value
+    with SimTwin.from_config(write(folder, config)) as one, warnings.catch_warnings():
+        one.tick(10)
+        with SimTwin.from_config(write(folder, changed, "other.sim.json")) as other:
+            if goes_on:
+                other.restore(one.save())
+                assert other.get("machine.tick") == 10
+            else:
+                with pytest.raises(TwinError, match="of another simulation: its models, their fields, rates or integ"):
+                    other.restore(one.save())
+
+
 @pytest.fixture(scope="module")
 def damaged(tmp_path_factory: pytest.TempPathFactory) -> Iterator[tuple[SimTwin, bytes]]:
     """A twin with an adaptive integrator, and a checkpoint of it."""

@@ -122,7 +122,6 @@ void fcsl_actuators_free(fcsl_sim_t *sim)
         free(sim->actuators->texts);
         free(sim->actuators->as_instance.data);
         free(sim->actuators);
-        sim->actuators = NULL;
     }
 }
 
