@@ -63,6 +63,12 @@ def test_every_mutant_is_what_it_says(monkeypatch: pytest.MonkeyPatch) -> None:
     assert sorted(found, key=repr) == sorted(EXPECTED, key=repr)
 
 
+def test_what_only_asserts_equal_lengths_is_no_mutant() -> None:
+    source = b"def pairs(a, b):\n    return list(zip(a, b, strict={}))\n"
+    found = {flag: [p.after for p in points(source.replace(b"{}", flag))] for flag in (b"True", b"False")}
+    assert found == {b"True": ["None"], b"False": ["None", "True"]}
+
+
 def test_drawn_mutants_are_switched_one_by_one(monkeypatch: pytest.MonkeyPatch) -> None:
     candidates = [Candidate(FILE, point) for point in points(SOURCE)]
     mutants = draw(candidates, 4, 1, lambda _: True)

@@ -7,7 +7,7 @@ FCSL_UPDATE_GOLDEN=1 rewrites the examples' pictures: look at them.
 import os
 import random
 import re
-from itertools import combinations
+from itertools import combinations, permutations
 from pathlib import Path
 from xml.etree import ElementTree
 
@@ -262,6 +262,34 @@ def test_layout_of_random_pictures(seed: int) -> None:
     layout = lay_out(random_picture(seed))
     check(layout)
     assert lay_out(random_picture(seed)).paths == layout.paths
+
+
+def crossings(wires: list[tuple[float, float, float]]) -> int:
+    """Of wires from the left at one height to a vertical, and from there to the right at another: (x, from, to)."""
+    count = 0
+    for (x, begin, end), (other_x, other_begin, other_end) in permutations(wires, 2):
+        crossed = other_begin if x < other_x else other_end
+        count += min(begin, end) < crossed < max(begin, end)
+    return count
+
+
+def test_no_swap_of_neighbours_removes_a_crossing() -> None:
+    """Of the wires between two boxes with many ports."""
+    rng = random.Random(2)
+    for turn in range(400):
+        ports = rng.randint(2, 9)
+        picture = Picture(f"two {turn}")
+        for name in "ab":
+            rows = [Row(f"in_{i}", "f64", f"out_{i}", "f64") for i in range(ports)]
+            picture.boxes.append(Box(name, "instance", name, "", rows))
+        inputs = rng.sample(range(ports), ports)
+        picture.wires = [Wire(0, output, 1, row, False) for output, row in enumerate(inputs)]
+        wires = sorted((path[1][0], path[0][1], path[-1][1]) for path in lay_out(picture).paths)
+        found = crossings(wires)
+        for n in range(ports - 1):
+            left, right = wires[n : n + 2]
+            swapped = [(right[0], *left[1:]), (left[0], *right[1:])]
+            assert crossings([*wires[:n], *swapped, *wires[n + 2 :]]) >= found, (inputs, n)
 
 
 def test_a_large_machine_is_drawn_in_time() -> None:
