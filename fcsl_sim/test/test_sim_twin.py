@@ -13,7 +13,7 @@ import sys
 import time
 import warnings
 import zlib
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from pathlib import Path
 from typing import Any
 
@@ -23,7 +23,7 @@ from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 
 from fcsl_compiler.config.machine import MAX_TICK_HZ
-from fcsl_sim import plant_only
+from fcsl_sim import SimError, Simulation, plant_only
 from fcsl_sim.cli import main
 from fcsl_sim.sim_twin import SimTwin
 from simclient import AlgTwin, OverwrittenWarning, TwinError, diff
@@ -549,7 +549,6 @@ RK45 = {"method": "rk45", "rtol": 1e-6, "atol": 1e-9, "min_step_s": 1e-6, "max_s
         (("rates", "gauge"), {"hz": 500}, False),
         (("connections", 0, "from"), "ramp.seen_rate", False),
         (("connections", 0, "from"), "ball.z", False),
-        (("connections", 0, "to"), "ball.push", False),
         (("connections",), [], False),
         (("instances", "ramp", "integrator"), {"method": "rk4", "hz": 500}, False),
         # Values come with the checkpoint.
@@ -569,6 +568,25 @@ def test_what_makes_a_simulation_another_one(
 )
 def test_another_tolerance_or_step_makes_another_simulation(name: str, value: float, tmp_path: Path) -> None:
     _compare_layouts(PLANT | {"integrator": RK45}, ("integrator", name), value, False, tmp_path)
+
+
+@pytest.mark.parametrize(("end", "port"), [("from", "other_ramp.x"), ("to", "other_gauge.truth")])
+def test_another_end_of_the_same_model_makes_another_simulation(end: str, port: str, tmp_path: Path) -> None:
+    instances = {**PLANT["instances"], "other_ramp": {"model": "ramp"}}
+    instances["other_gauge"] = instances["gauge"]
+    config = PLANT | {"instances": instances, "rates": {"gauge": 100, "other_gauge": 100}}
+    _compare_layouts(config, ("connections", 0, end), port, False, tmp_path)
+
+
+def test_swapped_sensors_make_another_simulation(open_sim: Callable[..., Simulation]) -> None:
+    def swapped(config: dict[str, Any]) -> None:
+        altitude, velocity = config["connections"][2:4]
+        altitude["to"], velocity["to"] = velocity["to"], altitude["to"]
+
+    with open_sim() as one, open_sim(swapped) as other:
+        one.run(10)
+        with pytest.raises(SimError, match="of another simulation"):
+            other.restore_checkpoint(one.checkpoint())
 
 
 def test_another_rate_on_the_same_grid_makes_another_simulation(tmp_path: Path) -> None:
