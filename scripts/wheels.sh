@@ -1,6 +1,6 @@
 #!/usr/bin/env bash
-# `make wheels`: the wheel `fcsl` in out/wheels, from the packages up to fcsl_sim and their own CMake install. zig compiles them
-# anew, for any x86-64 with glibc 2.28; Rust is the workspace's.
+# `make wheels`: the wheel `fcsl` in out/wheels, from the packages up to fcsl_sim and fcsl_blocks and their own CMake install. zig
+# compiles them anew, for any x86-64 with glibc 2.28; Rust is the workspace's.
 set -euo pipefail
 cd "$(dirname "$0")/.."
 . scripts/common.sh
@@ -18,7 +18,7 @@ mkdir -p "$build/fcsl_hal"
 echo "$key" > "$build/.key"
 ln -sfn "$root/build/fcsl_hal/cargo" "$build/fcsl_hal/cargo"
 export PYTHONPATH="$root/fcsl_compiler${PYTHONPATH:+:$PYTHONPATH}" CMAKE_GENERATOR=Ninja
-progress "native parts of the wheel" colcon --log-base log/wheels build --packages-up-to fcsl_sim \
+progress "native parts of the wheel" colcon --log-base log/wheels build --packages-up-to fcsl_sim fcsl_blocks \
     --build-base "$build" --install-base "$build/install" --merge-install --cmake-args \
     -DCMAKE_BUILD_TYPE=Release -DCMAKE_C_COMPILER="$root/scripts/wheels/cc" -DCMAKE_EXE_LINKER_FLAGS=-pie -DCMAKE_SHARED_LINKER_FLAGS=-Wl,--no-undefined -DBUILD_TESTING=OFF \
     -DCMAKE_INSTALL_RPATH_USE_LINK_PATH=OFF -DAMENT_CMAKE_ENVIRONMENT_PACKAGE_GENERATION=OFF \

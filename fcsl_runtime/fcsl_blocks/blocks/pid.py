@@ -1,0 +1,73 @@
+# SPDX-License-Identifier: Apache-2.0
+"""The PID controller with two degrees of freedom."""
+
+from fcsl_builtins import clamp, isfinite
+
+
+class Pid:
+    """A PID controller with setpoint weights, filtered derivative, feedforward, saturation and anti-windup.
+
+    P = kp (b r - y)
+    I' = ki (r - y) + (u - v) / tracking_time    (the second term only with tracking_time > 0: back-calculation)
+    D = kd s / (1 + derivative_time s) (c r - y)
+    v = P + I + D + feedforward, u = clamp(v, low, high)
+
+    I is integrated by forward Euler behind u, D by backward differences. With tracking_time = 0, the integral stands still
+    while v is beyond a limit and the error would drive it further (clamping). In the first run after a break
+    (`resumed`), I is chosen so that u begins at `track`: bumpless, with D = 0. ki is inside the integral, so that a change
+    of ki makes no jump.
+
+    Source: Modelica Standard Library, Modelica.Blocks.Continuous.LimPID (weights, filtered derivative, back-calculation),
+    after K. J. Astrom and T. Hagglund, "PID Controllers", 2nd ed. (1995).
+    Limits: a tracking_time below the period acts as the period. A setpoint, measurement or feedforward that is not finite
+    is passed over: the command stays, and health is degraded.
+    """
+
+    inputs = {
+        "setpoint": "f64",  # r
+        "measured": "f64",  # y
+        "feedforward": "f64",  # added before the limits
+        "track": "f64",  # the command to begin at after a break
+        "period": "f64 s",  # machine.period
+        "resumed": "bool",  # machine.resumed
+    }
+    parameters = {
+        "kp": "f64",  # gain
+        "ki": "f64 1/s in 0.. = 0",  # integral gain
+        "kd": "f64 s in 0.. = 0",  # derivative gain
+        "b": "f64 in 0..1 = 1",  # setpoint weight of P
+        "c": "f64 in 0..1 = 0",  # setpoint weight of D; 0: no kick at a step of the setpoint
+        "derivative_time": "f64 s in 0.. = 0",  # of the filter of D
+        "tracking_time": "f64 s in 0.. = 0",  # of back-calculation; 0: clamping
+        "low": "f64 = -1e308",  # least command
+        "high": "f64 = 1e308",  # greatest command
+    }
+    outputs = {
+        "command": "f64",  # u
+        "saturated": "bool",  # v is beyond a limit
+    }
+    state = {"integral": "f64", "derivative": "f64", "last": "f64"}  # last: c r - y of the run before
+
+    def execute(self):
+        if not (isfinite(self.setpoint) and isfinite(self.measured) and isfinite(self.feedforward)):
+            self.health = "degraded"
+            return
+        error = self.setpoint - self.measured
+        weighted = self.c * self.setpoint - self.measured
+        proportional = self.kp * (self.b * self.setpoint - self.measured)
+        if self.resumed:
+            self.derivative = 0.0
+            self.integral = clamp(self.track, self.low, self.high) - proportional - self.feedforward
+        else:
+            lag = self.derivative_time + self.period
+            self.derivative = (self.derivative_time * self.derivative + self.kd * (weighted - self.last)) / lag
+        self.last = weighted
+        wanted = proportional + self.integral + self.derivative + self.feedforward
+        self.command = clamp(wanted, self.low, self.high)
+        self.saturated = self.command != wanted
+        step = self.ki * error * self.period
+        if self.tracking_time > 0.0:
+            back = min(self.period / self.tracking_time, 1.0)
+            self.integral += step + back * (self.command - wanted)
+        elif not (wanted > self.high and step > 0.0 or wanted < self.low and step < 0.0):
+            self.integral += step
