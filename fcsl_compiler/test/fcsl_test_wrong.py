@@ -345,8 +345,8 @@ ALGORITHMS: dict[str, str] = {
     "E313 no value": parameter("f64 N = two"),
     "E313 outside": parameter("f64 in 0..10 = 11"),
     "E313 nothing": parameter("f64 N ="),
-    "E207 a default of another type": parameter("i32 = 2.5"),
-    "E207 a default of another length": parameter("f64[3] = [1, 2]"),
+    "E207 a default of another type": GOOD.replace('{"k": "f64"}', '{"k": "f64", "m": "i32 = 2.5"}'),
+    "E207 a default of another length": GOOD.replace('{"k": "f64"}', '{"k": "f64", "m": "f64[3] = [1, 2]"}'),
     "E312 empty": parameter("f64 N/rad in 10..0"),
     "E312 NaN": parameter("f64 in nan..1"),
     "E312 an infinity": parameter("f64[2] in -inf..1"),
@@ -1176,6 +1176,11 @@ CONFIGS: dict[str, str] = {
     "E247 a position in seconds": body(position=["one.outputs.y", 0, 0]),
     "E203 a frame with a slash": frames(frame("/imu")),
     "E214 two rotations of a frame": frames(frame(rotation=[1, 0, 0, 0], rpy=[0, 0, 0])),
+    "E252 a constant that is not there": patch(
+        lambda c: (c.update(constants={"gain": 2}), c["instances"]["one"].update(parameters={"k": "gian * 2"}))
+    ),
+    "E252 a constant of a later one": put("constants", value={"half": "track / 2", "track": 0.4}),
+    "E252 another unit": put("constants", value={"a": {"value": 1, "unit": "m"}, "b": {"value": "a", "unit": "s"}}),
     "E251 two parents": frames(frame(), frame(parent="mast")),
     "E251 a frame in itself": frames(frame("base")),
     "E251 a loop of frames": frames(frame(), frame("base", "mast"), frame("mast", "imu"), frame("a", "imu")),

@@ -25,7 +25,14 @@ from fcsl_compiler.api.diagnostics import (
     nearest,
 )
 from fcsl_compiler.api.files import SourceError
-from fcsl_compiler.api.json_files import ConfigReader, Everything, JsonNode, SourcePathError, resolve_source
+from fcsl_compiler.api.json_files import (
+    ConfigReader,
+    Everything,
+    JsonNode,
+    SourcePathError,
+    read_constants,
+    resolve_source,
+)
 from fcsl_compiler.api.sections import Signals, read_views
 from fcsl_compiler.api.types import Type, count_of, scalar_of
 from simclient.descriptor import Machine
@@ -222,6 +229,7 @@ class _Loader:
         optional = (
             "controller",
             "controllers",
+            "constants",
             "tick_hz",
             "connections",
             "rates",
@@ -234,6 +242,9 @@ class _Loader:
         keys = self.reader.object(root, "a simulation", required, optional)
         if keys is None:
             raise DiagnosticError(self.sink.diagnostics)
+        if "constants" in keys:
+            at = file_of(keys["constants"].span)  # of a base, if that has them
+            self.reader.constants = read_constants(keys["constants"], at, self.reader)
         for key in FOR_READERS:
             self.reader.string(keys.get(key), f"`{key}`")
         parts = self.parts
@@ -554,7 +565,7 @@ class _Loader:
         if target.table:
             scalars: Sequence[bool | int | float | str] | None = read_table(node, target, self.reader)
         else:
-            scalars = self.reader.value(node, target.type, f"{target.role} `{target.name}`")
+            scalars = self.reader.value(node, target.type, f"{target.role} `{target.name}`", target.unit)
         self._set_scalars(instance, target, scalars)
 
     def _set_scalars(

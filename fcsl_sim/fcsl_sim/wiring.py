@@ -111,6 +111,7 @@ class _Edge:
 
 def seconds(reader: ConfigReader, node: JsonNode | None, what: str) -> Fraction | None:
     """A duration in s, as the exact decimal number in the file."""
+    node = reader.computed(node, what, "s") if node is not None else None
     value = reader.number(node, what, 0.0, MAX_SECONDS)
     if value is None or node is None:
         return None

@@ -288,6 +288,37 @@ def test_what_is_empty_is_as_good_as_absent(load_sim: Load) -> None:
     assert [text[:13] for text in warnings(alone)] == ["warning[W801]", "warning[W802]"]
 
 
+def test_constants(load_sim: Load, tmp_path: Path) -> None:
+    """Those of a file that the machine may name, too."""
+    (tmp_path / "rover.json").write_text('{"noise": 0.25, "height": {"value": "4 * noise", "unit": "m"}}')
+
+    def change(config: dict[str, Any]) -> None:
+        config.update(
+            constants="rover.json", duration="2 * noise", rates={"altimeter": 100, "velocimeter": "400 * noise"}
+        )
+        config["instances"]["altimeter"]["parameters"]["sigma"] = "noise"
+        config["instances"]["ball"] = {
+            "model": "ball",
+            "parameters": {"restitution": "-noise + 0.5", "height": "height"},
+        }
+        config["instances"]["ball"]["parameters"].update(gravity=1.0, rest_speed=0.0)
+        config["models"]["ball"] = {"source": "ball.c"}
+
+    loaded = load_sim(change)
+    lines = loaded.plan.text.splitlines()
+    assert "set altimeter parameters.sigma 0 3fd0000000000000" in lines and loaded.ticks == 50
+    assert "set ball parameters.restitution 0 3fd0000000000000" in lines
+    assert "set ball parameters.height 0 3ff0000000000000" in lines
+
+    def wrong(config: dict[str, Any]) -> None:
+        change(config)
+        config["instances"]["ball"]["parameters"]["gravity"] = "height"
+
+    with pytest.raises(DiagnosticError) as error:
+        load_sim(wrong)
+    assert heads(error.value) == ["E252: parameter `gravity`: its unit is m, not m/s^2"]
+
+
 def test_optional_parameters_are_zero(load_sim: Load) -> None:
     """A sensor's errors may be left out; what is not optional may not."""
 

@@ -1,6 +1,7 @@
 # SPDX-License-Identifier: Apache-2.0
 """JSON files as text with places, readers that report what is wrong in them, paths that they give."""
 
+from ..parse.constants import read_constants
 from ..parse.json_reader import ConfigReader, Everything
 from ..parse.json_source import JsonNode, Member, parse_json
 from ..parse.source_path import SourcePathError, resolve_source
@@ -12,5 +13,6 @@ __all__ = [
     "Member",
     "SourcePathError",
     "parse_json",
+    "read_constants",
     "resolve_source",
 ]

@@ -43,7 +43,7 @@ Algorithms = dict[str, ir.Algorithm | None]
 
 def check_machine(parsed: ParsedMachine, sink: DiagnosticSink) -> Machine | None:
     """Checks the machine and all its algorithms. Returns None if an error was reported, here or while parsing."""
-    reader, keys = ConfigReader(sink), parsed.keys
+    reader, keys = ConfigReader(sink, parsed.constants), parsed.keys
     program = Program(read_structs(keys.get("structs"), reader))
     tick_hz = reader.integer(keys.get("tick_hz"), "tick_hz", 1, MAX_TICK_HZ) or 0
     modules = _modules(parsed, program, reader)
@@ -88,7 +88,7 @@ def check_machine(parsed: ParsedMachine, sink: DiagnosticSink) -> Machine | None
         program,
         tuple(file.source for file in parsed.files),
         parsed.targets,
-        parsed.hashed_text,
+        "\n".join((parsed.hashed_text, *(parsed.constants.used_texts if parsed.constants is not None else ()))),
         views,
         arm=arm,
         command_timeout_ns=command_timeout_ns,
@@ -235,7 +235,7 @@ def _read_parameters(
             hint = nearest(name, list(ports)) or (f"it has {', '.join(ports)}" if ports else "it has none")
             reader.sink.error("E210", f"algorithm `{algorithm.name}` has no parameter `{name}`", span, help=hint)
             continue
-        value = reader.value(definition, port.type, f"parameter `{name}`")
+        value = reader.value(definition, port.type, f"parameter `{name}`", port.unit)
         if value is not None and _within(port, definition, value, reader):
             values[name] = value
     for name, port in ports.items():
@@ -349,7 +349,7 @@ def _with_initial_inputs(
                 fix = "remove the initial value; a `delayed` connection has its own `initial`"
                 reader.sink.error("E212", f"input `{name}` is connected", span, help=fix, notes=[(at, "here")])
             else:
-                value = reader.value(value_node, port.type, f"input `{name}`")
+                value = reader.value(value_node, port.type, f"input `{name}`", port.unit)
                 if value is not None:
                     values[name] = value
         out.append(replace(instance, inputs=values))
@@ -409,5 +409,5 @@ def _initial(keys: dict[str, JsonNode], delayed: bool, source: PortRef, item: Js
         fix = 'add `"initial": …`: the value of the input in the first tick'
         reader.sink.error("E214", "a `delayed` connection has no `initial`", item.span, help=fix)
         return ()
-    value = reader.value(given, source.type, "`initial`")
+    value = reader.value(given, source.type, "`initial`", source.unit)
     return value or ()

@@ -15,6 +15,10 @@ def read_ticks(
 ) -> int | None:
     """Number of ticks, at most `most`, of a time in s, computed exactly from its decimal text. None after reporting an
     error. `why` says what lasts a whole number of ticks."""
+    computed = reader.computed(node, f"`{key}`", "s")
+    if computed is None:
+        return None
+    node = computed
     if not node.is_number:
         reader.wrong(node, f"`{key}` is a number", "a time in s, such as 5.0")
         return None

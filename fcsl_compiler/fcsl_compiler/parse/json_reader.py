@@ -13,6 +13,7 @@ from .json_source import JsonNode, article
 
 if TYPE_CHECKING:
     from ..model.types import Type
+    from .constants import Constants
 
 #: Valid user-defined names. They become parts of C identifiers and of paths.
 _NAME = re.compile(r"[A-Za-z][A-Za-z0-9]*(_[A-Za-z0-9]+)*")
@@ -35,8 +36,9 @@ class Everything(set[str]):
 class ConfigReader:
     """Methods check one node. If it is invalid they report the error and return None or an empty value."""
 
-    def __init__(self, sink: DiagnosticSink):
-        self.sink = sink
+    def __init__(self, sink: DiagnosticSink, constants: Constants | None = None):
+        """`constants`: a string in the place of a number is an expression of them."""
+        self.sink, self.constants = sink, constants
         #: Requests that values in the JSON name, with their first use.
         self.requests: dict[str, Span] = {}
 
@@ -99,7 +101,27 @@ class ConfigReader:
             return None
         return str(node.value)
 
+    def computed(self, node: JsonNode, what: str, unit: str = "") -> JsonNode | None:
+        """The value of an expression of constants in the place of a number; any other node itself. None after reporting
+        an expression that has no value, or another unit."""
+        if node.kind != "string" or self.constants is None:
+            return node
+        from ..expression.tree import ExpressionError
+        from ..expression.units import read, text
+
+        try:
+            value, found = self.constants.evaluate(str(node.value))
+            if unit and found is not None and found != read(unit):
+                raise ExpressionError(f"its unit is {text(found)}, not {unit}")
+        except ExpressionError as error:
+            self.sink.error(
+                "E252", f"{what}: {error}", node.span, help="write a number, or an expression of `constants`"
+            )
+            return None
+        return JsonNode("int" if isinstance(value, int) else "float", node.span, value, repr(value))
+
     def integer(self, node: JsonNode | None, what: str, low: int, high: int) -> int | None:
+        node = self.computed(node, what) if node is not None else None
         if node is None:
             return None
         if node.kind != "int" or not isinstance(node.value, int):
@@ -120,6 +142,7 @@ class ConfigReader:
 
     def number(self, node: JsonNode | None, what: str, low: float, high: float) -> float | None:
         """A finite number in [low, high]."""
+        node = self.computed(node, what) if node is not None else None
         if node is None:
             return None
         if not node.is_number or not isinstance(node.value, int | float):
@@ -151,11 +174,13 @@ class ConfigReader:
             return None
         return list(names).index(text)
 
-    def value(self, node: JsonNode, type_: Type, what: str) -> tuple[bool | int | float | str, ...] | None:
-        """A literal of type `type_`, as scalars in the order of its leaves."""
+    def value(
+        self, node: JsonNode, type_: Type, what: str, unit: str = ""
+    ) -> tuple[bool | int | float | str, ...] | None:
+        """A literal of type `type_`, as scalars in the order of its leaves. `unit`: that of the field."""
         from .json_values import read_value  # here: an unchanged machine is found in the cache without its types
 
-        return read_value(self, node, type_, what)
+        return read_value(self, node, type_, what, unit)
 
     def wrong(self, node: JsonNode, message: str, fix: str) -> None:
         self.sink.error("E208", f"{message}, not {article(node.kind)}", node.span, help=f"write {fix}" if fix else "")

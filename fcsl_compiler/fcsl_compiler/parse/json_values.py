@@ -19,7 +19,7 @@ if TYPE_CHECKING:
 Value = tuple[bool | int | float | str, ...]
 
 
-def read_value(reader: ConfigReader, node: JsonNode, type_: Type, what: str) -> Value | None:
+def read_value(reader: ConfigReader, node: JsonNode, type_: Type, what: str, unit: str = "") -> Value | None:
     """A literal of type `type_`, as scalars in the order of its leaves."""
     if isinstance(type_, Struct):
         return _struct(reader, node, type_, what)
@@ -34,9 +34,9 @@ def read_value(reader: ConfigReader, node: JsonNode, type_: Type, what: str) -> 
             )
             return None
         rest: Type = Array(type_.element, type_.shape[1:]) if len(type_.shape) > 1 else type_.element
-        parts = [read_value(reader, item, rest, what) for item in node.items]
+        parts = [read_value(reader, item, rest, what, unit) for item in node.items]
         return None if any(p is None for p in parts) else tuple(v for p in parts if p is not None for v in p)
-    return _scalar(reader, node, type_, what)
+    return _scalar(reader, node, type_, what, unit)
 
 
 def _struct(reader: ConfigReader, node: JsonNode, type_: Struct, what: str) -> Value | None:
@@ -51,14 +51,21 @@ def _struct(reader: ConfigReader, node: JsonNode, type_: Struct, what: str) -> V
     complete = keys.keys() == node.members.keys() and len(keys) == len(type_.members)
     for member in type_.members:
         part = (
-            read_value(reader, keys[member.name], member.type, f"{what}.{member.name}") if member.name in keys else None
+            read_value(reader, keys[member.name], member.type, f"{what}.{member.name}", member.unit)
+            if member.name in keys
+            else None
         )
         complete &= part is not None
         values += part or ()
     return tuple(values) if complete else None
 
 
-def _scalar(reader: ConfigReader, node: JsonNode, type_: Scalar, what: str) -> Value | None:
+def _scalar(reader: ConfigReader, node: JsonNode, type_: Scalar, what: str, unit: str) -> Value | None:
+    if type_.is_number:
+        number = reader.computed(node, what, unit)
+        if number is None:
+            return None
+        node = number
     if type_ is BOOL:
         if node.kind == "bool":
             return (bool(node.value),)
@@ -72,9 +79,9 @@ def _scalar(reader: ConfigReader, node: JsonNode, type_: Scalar, what: str) -> V
         return None if word is None else (HEALTH_NAMES.index(word),)
     elif node.is_number and isinstance(node.value, int | float):
         try:
-            number = fit(node.value, type_)
-            if not isinstance(number, float) or math.isfinite(number):
-                return (number,)
+            fitting = fit(node.value, type_)
+            if not isinstance(fitting, float) or math.isfinite(fitting):
+                return (fitting,)
         except LiteralError as error:
             if type_.is_integer and node.kind == "float":
                 fix = f"write {int(node.value)}" if node.value == int(node.value) else "write an integer"

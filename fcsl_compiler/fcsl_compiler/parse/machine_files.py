@@ -13,6 +13,7 @@ from ..base.files import SourceError
 from ..base.source import MAX_NAME, SourceFile, Span
 from ..model.target import Target
 from ..model.types import MAX_ELEMENTS
+from .constants import Constants, read_constants
 from .json_reader import ConfigReader
 from .json_source import JsonNode, parse_json, text_without
 from .machine_texts import package_of
@@ -38,6 +39,7 @@ _OPTIONAL = (
         "$schema",
         "description",
         "structs",
+        "constants",
         "connections",
         "always",
         "transitions",
@@ -103,6 +105,7 @@ class ParsedMachine:
     algorithms: dict[str, ParsedAlgorithm]
     targets: dict[str, Target]
     hashed_text: str  # of the machine JSON, without `views`, which changes nothing that the machine does
+    constants: Constants | None  # None without a block of them
 
     @property
     def folder(self) -> Path:
@@ -142,6 +145,8 @@ def parse_machine(path: Path, sink: DiagnosticSink) -> ParsedMachine | None:
     keys = reader.object(root, "a machine", _REQUIRED, _OPTIONAL)
     if keys is None:
         return None
+    if "constants" in keys:
+        reader.constants = read_constants(keys["constants"], path, reader)
     for key in ("$schema", "description"):
         reader.string(keys.get(key), f"`{key}`")
     files = _Files(path, reader.sink)
@@ -151,7 +156,7 @@ def parse_machine(path: Path, sink: DiagnosticSink) -> ParsedMachine | None:
     }
     targets = read_targets(keys.get("targets"), path, reader)
     hashed_text = text_without(source, root, "views")
-    return ParsedMachine(name, source, package_of(path, name), keys, algorithms, targets, hashed_text)
+    return ParsedMachine(name, source, package_of(path, name), keys, algorithms, targets, hashed_text, reader.constants)
 
 
 def is_machine_name(name: str) -> bool:

@@ -44,6 +44,8 @@ def read_texts(config: Path) -> MachineTexts | None:
         sources = [algorithm["source"] for algorithm in keys["algorithms"].values()]
     except (OSError, SourceError, ValueError, LookupError, TypeError, AttributeError):
         return None
+    if isinstance(keys.get("constants"), str):
+        sources.append(keys["constants"])
     files = _files(config, sources) if all(isinstance(source, str) for source in sources) else {}
     return MachineTexts(text, keys, files) if files.keys() >= set(sources) else None
 

@@ -23,6 +23,7 @@ from typing import Any, Protocol
 from ..model.machine import Channel, Connection, Edge, Instance, Machine, PortRef, State
 from .algorithm import HARDWARE, Algorithm, Extern, SourceModule, declare_structs
 from .arrays import Array
+from .constants import constants_of, value_of
 from .fault_places import FaultPlaces, FaultRow
 from .functions import wrap
 from .memory import HEALTH, Image, Layout, Leaf, Memory, Movers, from_json, leaves
@@ -75,7 +76,7 @@ class _Instance:
     def __init__(self, instance: Instance, algorithm: Algorithm, given: Mapping[str, Any], reference: ReferenceMachine):
         self.name, self.algorithm, layout = instance.name, algorithm, reference.layout
         self.limit_ns, self.places = instance.max_wcet_us * 1000, reference.places
-        self.given, self.frozen = given, frozenset(instance.frozen)
+        self.given, self.frozen, self._constants = given, frozenset(instance.frozen), reference.constants
         self.self_ = self._initial()
         self.health, self.request = (
             _cell(f"{self.name}.outputs.{port}", layout, 4) for port in ("health", "transition_request")
@@ -100,7 +101,7 @@ class _Instance:
         """`self` before init: values of the JSON and zeros. Frozen parameters are constants."""
         made = self.algorithm.type.zero()
         for name, value in self.given.items():
-            stored = from_json(self.algorithm.type.members[name], value)
+            stored = from_json(self.algorithm.type.members[name], value, self._constants)
             setattr(made, slot(name), _constant(stored) if name in self.frozen else stored)
         return made
 
@@ -256,6 +257,7 @@ class ReferenceMachine:
         self._state, self._next = (_cell(f"machine.{name}", layout, 4) for name in ("state", "next_state"))
         self._current = _cell("machine.current", layout, 4)
         config = json.loads(machine.config.text)
+        self.constants = constants_of(config, Path(machine.config.path).parent)
         self._algorithms = self._load(config, externs)
         self._sensors = {c.name: _Sensor(c, layout) for c in machine.channels if c.direction == "sensor"}
         self._instances: list[_Instance] = []
@@ -302,7 +304,8 @@ class ReferenceMachine:
         for algorithm in self.machine.algorithms:
             entry = config["algorithms"][algorithm.name]
             module, class_name = load(paths[algorithm.source]), entry.get("class", algorithm.name)
-            found[algorithm.name] = Algorithm(module, class_name, entry.get("sizes", {}))
+            sizes = {n: int(value_of(size, self.constants)) for n, size in entry.get("sizes", {}).items()}
+            found[algorithm.name] = Algorithm(module, class_name, sizes)
         return found
 
     def _hardware(self, name: str) -> Callable[..., Any]:

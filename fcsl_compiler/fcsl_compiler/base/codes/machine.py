@@ -588,6 +588,17 @@ MACHINE_CODES: dict[str, Code] = {
         '"views": {"panels": [{"title": "altitude", "estimate": ["nav.outputs.altitude"]}],\n'
         '          "frames": [{"frame": "imu_link", "parent": "base_link", "rotation": [1.0, 0.0, 0.0, 0.0]}]}',
     ),
+    "E252": Code(
+        "an expression of constants that has no value",
+        "`constants` names numbers with a unit, in this file or in one that simulations name, too. Where a number is "
+        "written, a string may be an expression of them: `2 * track`. Each constant is made of those before it. Its unit is "
+        "that of the field that it becomes, if both have one.",
+        Kind.JSON,
+        '"constants": {"track": {"value": 0.45, "unit": "m"}},\n'
+        '"instances": {"nav": {"algorithm": "Nav"}, "control": {"algorithm": "Control", "parameters": {"gain": "trak / 2"}}}',
+        '"constants": {"track": {"value": 0.45, "unit": "m"}},\n'
+        '"instances": {"nav": {"algorithm": "Nav"}, "control": {"algorithm": "Control", "parameters": {"gain": "track / 2"}}}',
+    ),
     "W201": Code(
         "an algorithm without an instance",
         "The algorithm is checked, but is not part of the machine. Usually its instance was removed or never added.",

@@ -1,0 +1,111 @@
+# SPDX-License-Identifier: Apache-2.0
+"""`constants` of a configuration: names with a value and a unit, and expressions of them in the place of numbers."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+from ..base.diagnostics import nearest
+from ..base.files import SourceError
+from ..base.source import SourceFile, Span
+from ..expression.evaluate import SCALARS, evaluator
+from ..expression.parse import parse
+from ..expression.tree import ExpressionError, Kind, Node, Quantity
+from ..expression.units import Unit, read, text
+from .json_source import JsonNode, parse_json
+from .source_path import SourcePathError, resolve_source
+
+if TYPE_CHECKING:
+    from .json_reader import ConfigReader
+
+Number = int | float
+
+HELP = "write a number, or an expression of the constants before it, such as `2 * track`"
+
+
+class Constants:
+    """The constants of one file, in its order. `used`: those that a value reads, directly or by another one."""
+
+    def __init__(self) -> None:
+        self._known: dict[str, tuple[Number, str]] = {}
+        self._of: dict[str, set[str]] = {}  # by name, the constants that its own value reads
+        self.used: set[str] = set()
+
+    def add(self, name: str, expression: str | Number, unit: str) -> None:
+        """Raises ExpressionError."""
+        before = set(self.used)
+        self.used.clear()
+        value, found = self.evaluate(expression) if isinstance(expression, str) else (expression, None)
+        read_by, self.used = self.used, before
+        if unit and found is not None and found != read(unit):
+            raise ExpressionError(f"its unit is {text(found)}, not {unit}")
+        self._known[name] = value, unit or (text(found) if found is not None else "")
+        self._of[name] = read_by
+
+    def evaluate(self, expression: str) -> tuple[Number, Unit | None]:
+        """The value of an expression and its unit (None: any). Raises ExpressionError."""
+        node = parse(expression, self._find)
+        if node.quantity.kind not in (Kind.INTEGER, Kind.FLOAT) or node.quantity.shape:
+            raise ExpressionError(f"`{expression}` is no number")
+        for name in (part.value for part in node.walk() if part.operator == "field"):
+            self.used |= {name, *self._of[name]}
+        value = evaluator(node, SCALARS)(self._value)
+        assert isinstance(value, int | float)
+        return value, node.quantity.unit
+
+    @property
+    def used_texts(self) -> list[str]:
+        """The constants that values read, for a hash: those that only another file uses are not among them."""
+        return [f"{name} {self._known[name][0]!r} {self._known[name][1]}" for name in sorted(self.used)]
+
+    def _find(self, name: str) -> Quantity:
+        if name not in self._known:
+            known = list(self._known)
+            hint = nearest(name, known) or f"there are {', '.join(known)}" if known else "there are none"
+            raise ExpressionError(f"there is no constant `{name}`; {hint}")
+        value, unit = self._known[name]
+        return Quantity(Kind.INTEGER if isinstance(value, int) else Kind.FLOAT, unit=read(unit))
+
+    def _value(self, node: Node) -> Number:
+        return self._known[node.value][0]
+
+
+def read_constants(node: JsonNode | None, config: Path, reader: ConfigReader) -> Constants:
+    """The `constants` of a configuration file: an object, or the name of a file that holds one."""
+    found = Constants()
+    if node is not None and node.kind == "string":
+        node = _file(str(node.value), node.span, config, reader)
+    for name, (definition, span) in reader.named(node, "`constants`").items():
+        expression, unit = definition, ""
+        if definition.kind == "object":
+            keys = reader.object(definition, f"constant `{name}`", ("value",), ("unit",)) or {}
+            unit = reader.string(keys.get("unit"), "`unit`", "m") or ""
+            if "value" not in keys:
+                continue
+            expression = keys["value"]
+        value = expression.value
+        if isinstance(value, bool) or not isinstance(value, str | int | float):
+            reader.wrong(expression, f"constant `{name}` is a number or an expression", '0.45, or "2 * track"')
+            continue
+        try:
+            found.add(name, value, unit)
+        except ExpressionError as error:
+            reader.sink.error("E252", f"constant `{name}`: {error}", span, help=HELP)
+    return found
+
+
+def constants_file(text: str, config: Path) -> Path:
+    """The file that `constants` names. Raises SourcePathError."""
+    return resolve_source(text, config=config)
+
+
+def _file(name: str, span: Span, config: Path, reader: ConfigReader) -> JsonNode | None:
+    try:
+        path = constants_file(name, config)
+        source = SourceFile.read(path, name)
+    except (SourceError, SourcePathError) as error:
+        fix = "paths are relative to the folder of this file"
+        reader.sink.error("E100", f"cannot read `{name[:200]}`: {error}", span, help=fix)
+        return None
+    return parse_json(source, reader.sink)

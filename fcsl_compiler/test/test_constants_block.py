@@ -1,0 +1,149 @@
+# SPDX-License-Identifier: Apache-2.0
+"""`constants` of a machine JSON: expressions in the place of numbers, units, a file of their own, and what the hashes cover."""
+
+import json
+from pathlib import Path
+from typing import Any
+
+import pytest
+from fcsl_test_abi import write_machine
+from fcsl_test_twins import Twins
+
+from fcsl_compiler.base.diagnostics import DiagnosticError
+from fcsl_compiler.driver.cache import build_machine
+
+LAW = """
+class Law:
+    inputs = {"u": "f64 rad/s"}
+    parameters = {
+        "half": "f64 m",
+        "single": "f32",
+        "count": "i32",
+        "vector": "f64[3] m",
+        "pose": "Pose",
+        "word": "Health",
+        "plain": "f64",
+    }
+    outputs = {"y": "f64 m/s"}
+    state = {"last": "f64[n]"}
+
+    def execute(self):
+        self.last[0] = self.u
+        self.health = self.word
+        self.y = self.half * self.u + f64(self.single) + f64(self.count) + self.plain + self.pose.height + sum(self.vector)
+"""
+CONSTANTS = {
+    "track": {"value": 0.45, "unit": "m"},
+    "radius": {"value": "track / 3", "unit": "m"},
+    "ratio": 7,
+    "rate": {"value": 50, "unit": "Hz"},
+    "unused": 1.0,
+}
+PARAMETERS = {
+    "half": "track / 2",
+    "single": "0.1 * ratio",
+    "count": "ratio // 2 - 1",
+    "vector": ["track", "-radius", 1.0],
+    "pose": {"height": "2 * track", "valid": True},
+    "word": "degraded",
+    "plain": "track ** 2 + sqrt(4)",
+}
+
+
+def machine(folder: Path, constants: Any = CONSTANTS, **changes: Any) -> Path:
+    config = {
+        "tick_hz": 100,
+        "initial_state": "A",
+        "constants": constants,
+        "structs": {"Pose": {"height": "f64 m", "valid": "bool"}},
+        "algorithms": {"Law": {"source": "law.py", "sizes": {"n": "ratio"}}},
+        "instances": {
+            "law": {"algorithm": "Law", "parameters": {**PARAMETERS, **changes}, "inputs": {"u": "2 * ratio"}}
+        },
+        "states": {"A": {"schedule": {"law": "rate"}}, "B": {"schedule": {"law": {"every": "ratio", "phase": 1}}}},
+        "transitions": [{"from": "A", "to": "B", "after_s": "ratio / 100"}],
+    }
+    return write_machine(folder, "several", config, {"law": LAW})
+
+
+def test_expressions_stand_for_numbers(tmp_path: Path) -> None:
+    twins = Twins(machine(tmp_path))
+    twins.step()
+    at = {
+        name: twins.native.get(f"law.parameters.{name}") for name in ("half", "count", "vector", "plain", "pose.height")
+    }
+    assert at == {"half": 0.225, "count": 2, "vector": [0.45, -0.15, 1.0], "plain": 0.45**2 + 2.0, "pose.height": 0.9}
+    assert twins.native.get("law.inputs.u") == 14.0 and len(twins.native.get("law.state.last")) == 7
+    twins.step(7)
+    assert twins.native.state == "B"
+
+
+def test_a_file_of_constants(tmp_path: Path) -> None:
+    (tmp_path / "rover.json").write_text(json.dumps(CONSTANTS))
+    twins = Twins(machine(tmp_path, "rover.json"))
+    assert twins.native.get("law.parameters.half") == 0.225
+    path = machine(tmp_path, "rover.json")
+    before = build_machine(path).source_hash
+    (tmp_path / "rover.json").write_text(json.dumps({**CONSTANTS, "unused": 2.0}))
+    assert build_machine(path).source_hash == before  # another file uses it
+    (tmp_path / "rover.json").write_text(json.dumps({**CONSTANTS, "track": {"value": 0.5, "unit": "m"}}))
+    after = build_machine(path)
+    assert after.source_hash != before
+    assert Twins(path).native.get("law.parameters.half") == 0.25
+
+
+def test_without_constants_a_string_is_no_number(tmp_path: Path) -> None:
+    path = machine(tmp_path, {})
+    path.write_text(path.read_text().replace('"constants": {},', ""))
+    with pytest.raises(DiagnosticError) as caught:
+        build_machine(path)
+    assert "E252" not in {d.code for d in caught.value.diagnostics}
+    assert "parameter `half` is f64, not a string" in str(caught.value)
+
+
+@pytest.mark.parametrize(
+    ("change", "code", "message"),
+    [
+        ({"half": "trak / 2"}, "E252", "parameter `half`: there is no constant `trak`; did you mean `track`?"),
+        ({"half": "track * track"}, "E252", "parameter `half`: its unit is m2, not m"),
+        ({"vector": ["rate", 0.0, 0.0]}, "E252", "parameter `vector`: its unit is 1/s, not m"),
+        ({"count": "ratio / 2"}, "E207", "parameter `count` is i32, not a number with a point"),
+        ({"plain": "track >"}, "E252", ""),
+        ({"plain": "ratio / 0"}, "E252", ""),
+        ({"plain": "track > 1"}, "E252", "`track > 1` is no number"),
+        ({"word": "track"}, "E205", ""),
+    ],
+)
+def test_wrong_expressions(tmp_path: Path, change: dict[str, Any], code: str, message: str) -> None:
+    with pytest.raises(DiagnosticError) as caught:
+        build_machine(machine(tmp_path, **change))
+    (found,) = caught.value.diagnostics
+    assert found.code == code and message in found.message, found
+
+
+@pytest.mark.parametrize(
+    ("constants", "code", "message"),
+    [
+        ({"a": "b", "b": 1}, "E252", "constant `a`: there is no constant `b`"),
+        (
+            {"a": {"value": 1.0, "unit": "m"}, "b": {"value": "a", "unit": "s"}},
+            "E252",
+            "constant `b`: its unit is m, not s",
+        ),
+        ({"a": True}, "E208", "constant `a` is a number or an expression"),
+        ({"a": {"unit": "m"}}, "E202", "constant `a` has no `value`"),
+        ({"a b": 1}, "E203", "`a b` is not a name"),
+        ([], "E208", "`constants` is an object"),
+        ("absent.json", "E100", "cannot read `absent.json`: no such file"),
+        ("../up.json", "E100", "it would leave its folder"),
+    ],
+)
+def test_wrong_constants(tmp_path: Path, constants: Any, code: str, message: str) -> None:
+    values = {name: 1 for name in PARAMETERS if name not in ("vector", "pose", "word")}
+    path = machine(tmp_path, constants, **values, vector=[0, 0, 0], pose={"height": 0, "valid": False}, word="nominal")
+    text = path.read_text().replace('"2 * ratio"', "1").replace('"rate"', "50").replace('"ratio / 100"', "1")
+    path.write_text(text.replace('"ratio"', "3"))
+    with pytest.raises(DiagnosticError) as caught:
+        build_machine(path)
+    first = caught.value.diagnostics[0]
+    assert first.code == code and message in first.message, first
