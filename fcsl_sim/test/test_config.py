@@ -290,11 +290,11 @@ def test_what_is_empty_is_as_good_as_absent(load_sim: Load) -> None:
 
 def test_constants(load_sim: Load, tmp_path: Path) -> None:
     """Those of a file that the machine may name, too."""
-    (tmp_path / "rover.json").write_text('{"noise": 0.25, "height": {"value": "4 * noise", "unit": "m"}}')
+    (tmp_path / "rover.json").write_text('{"noise": 0.25, "hz": 50, "height": {"value": "4 * noise", "unit": "m"}}')
 
     def change(config: dict[str, Any]) -> None:
         config.update(
-            constants="rover.json", duration="2 * noise", rates={"altimeter": 100, "velocimeter": "400 * noise"}
+            constants="rover.json", duration="2 * noise", rates={"altimeter": 100, "velocimeter": "2 * hz"}
         )
         config["instances"]["altimeter"]["parameters"]["sigma"] = "noise"
         config["instances"]["ball"] = {
