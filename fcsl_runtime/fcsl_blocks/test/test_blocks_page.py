@@ -6,6 +6,7 @@ import json
 import os
 import re
 import subprocess
+import textwrap
 from concurrent.futures import ThreadPoolExecutor
 from functools import cache
 from pathlib import Path
@@ -105,7 +106,8 @@ def section(file: str, node: ast.ClassDef, text: str, costs: str) -> str:
     doc = ast.get_docstring(node) or ""
     first, _, rest = doc.partition("\n\n")
     body = ast.get_source_segment(text, node) or ""
-    made = f"\n## {node.name}\n\n`package://fcsl_blocks/{file}`: {' '.join(first.split())}\n\n"
+    opening = f"`package://fcsl_blocks/{file}`: {' '.join(first.split())}"
+    made = f"\n## {node.name}\n\n{textwrap.fill(opening, 120, break_on_hyphens=False)}\n\n"
     made += f"```text\n{rest.strip()}\n```\n\n" if rest else ""
     made += "| port | | type | default | |\n|---|---|---|---|---|\n"
     for record, role in (("inputs", "input"), ("parameters", "parameter"), ("outputs", "output")):
