@@ -51,8 +51,8 @@ class MultirotorMixer:
 
     def execute(self):
         side = -1.0 if self.z_down else 1.0
-        effect = zeros(4, n)
-        for i in range(n):
+        effect = zeros(4, len(self.low))
+        for i in range(len(self.low)):
             effect[0, i] = side * self.position[i, 1]
             effect[1, i] = -side * self.position[i, 0]
             effect[2, i] = -side * self.direction[i] * self.torque_per_thrust[i]
@@ -71,10 +71,10 @@ class MultirotorMixer:
         most = self.high / lift
         ceiling = 1e308 if self.may_raise else max(self.thrust, max(least))
         share = tilt
-        for i in range(n):
+        for i in range(len(self.low)):
             if slope[i] < 0.0:
                 share = min(share, max(0.0, (ceiling - least[i]) / -slope[i]))
-            for k in range(n):
+            for k in range(len(self.low)):
                 if slope[k] > slope[i]:
                     share = min(share, max(0.0, (most[k] - least[i]) / (slope[k] - slope[i])))
         collective = clamp(self.thrust, max(least - share * slope), min(most - share * slope))
@@ -82,7 +82,7 @@ class MultirotorMixer:
 
         yaw = (self.torque[2] / turn) * mix[2]
         rest = turn
-        for i in range(n):
+        for i in range(len(self.low)):
             if yaw[i] > 0.0:
                 rest = min(rest, max(0.0, (self.high[i] - wanted[i]) / yaw[i]))
             if yaw[i] < 0.0:
