@@ -1,12 +1,16 @@
 # SPDX-License-Identifier: Apache-2.0
 """LowPass, SecondOrderLowPass and HighPass against SciPy's discretisation of the continuous filters."""
 
+import json
 from collections.abc import Callable
+from pathlib import Path
 from typing import Any
 
 import numpy as np
 import pytest
 from scipy import signal
+
+from simclient import AlgTwin
 
 SOURCE = "low_pass.py"
 CLASSES = ["LowPass", "SecondOrderLowPass", "HighPass"]
@@ -118,6 +122,34 @@ def test_a_new_cutoff_makes_no_jump(block: Callable[..., Any], class_: str) -> N
     run(filter_, [5.0] * 100)
     filter_.set(cutoff=0.1)
     assert run(filter_, [5.0] * 3) == pytest.approx([0.0 if class_ == "HighPass" else 5.0] * 3, abs=1e-9)
+
+
+def test_the_rate_may_change_in_flight(block: Callable[..., Any], tmp_path: Path) -> None:
+    """Steps of any length are exact: the response to a step is that of the time, whatever the rates were."""
+    w = 2.0 * np.pi * 3.0
+    expected = {
+        "LowPass": lambda t: 1.0 - np.exp(-w * t),
+        "SecondOrderLowPass": lambda t: 1.0 - np.exp(-w * t) * (1.0 + w * t),
+        "HighPass": lambda t: np.exp(-w * t),
+    }
+    for class_, response in expected.items():
+        block(SOURCE, class_, cutoff=3.0, **({"damping": 1.0} if class_ == "SecondOrderLowPass" else {}))
+        path = tmp_path / "one_block.json"
+        config = json.loads(path.read_text())
+        config["states"] |= {f"AT_{rate}": {"schedule": {"block": rate}} for rate in (500, 50)}
+        path.write_text(json.dumps(config))
+        twin, ticks, found = AlgTwin.from_config(path), 0, []
+        twin.set("block.inputs.input", 0.0)
+        twin.tick(20)
+        twin.set("block.inputs.input", 1.0)
+        for state, step in (("RUN", 10), ("AT_500", 2), ("AT_50", 20)):
+            twin.set_state(state)
+            for _ in range(20 // step):
+                twin.tick(step)
+                ticks += step
+                found.append((ticks, twin.get_value("block.outputs.output")))
+        # a run takes its input as held since the one before
+        assert [v for _, v in found] == pytest.approx([response(t / 1000) for t, _ in found], abs=1e-9), class_
 
 
 def test_a_cutoff_of_zero(block: Callable[..., Any]) -> None:
