@@ -31,10 +31,10 @@ class Notch:
 
     Discretised by the bilinear transform, exact at `frequency` (prewarping). The first run after a break (`resumed`)
     gives y = u, as if u had always had this value. A change of the period, the frequency or the quality makes no
-    jump: y is made of signals that move on from their values (see the head of this file).
+    jump: y is made of signals that move on from their values (see the head of biquad.py).
 
     Source: R. Bristow-Johnson, "Cookbook formulae for audio equalizer biquad filter coefficients" (the transfer
-    function, the transform, the meaning of the quality); the form is derived at the head of this file.
+    function, the transform, the meaning of the quality); the form is derived at the head of biquad.py.
     Limits: a frequency above 0.49 of the rate of runs acts as 0.49 of it; one of 0 lets u pass. An input for which y
     would not be finite is passed over: y stays, and health is degraded. If it is the first one after a break, the next
     one takes its place.
@@ -81,7 +81,7 @@ class TrackingNotch:
 
     Discretised by the bilinear transform, exact at the centre (prewarping). The first run after a break (`resumed`)
     gives y = u, as if u had always had this value. A change of the period, the frequency or a parameter makes no jump
-    (see the head of this file). A frequency that is not finite is passed over: the filter runs on with the centre that
+    (see the head of biquad.py). A frequency that is not finite is passed over: the filter runs on with the centre that
     it had (before there was one, y = u), and health is degraded.
 
     Source: as Notch; ArduPilot, HarmonicNotchFilter (a notch at a multiple of a measured frequency, of constant quality
@@ -138,10 +138,10 @@ class BiquadLowPass:
 
     Discretised by the bilinear transform, exact at `frequency` (prewarping). The first run after a break (`resumed`)
     gives y = u, as if u had always had this value. A change of the period, the frequency or the quality makes no
-    jump: y is made of signals that move on from their values (see the head of this file).
+    jump: y is made of signals that move on from their values (see the head of biquad.py).
 
     Source: R. Bristow-Johnson, "Cookbook formulae for audio equalizer biquad filter coefficients" (the transfer
-    function, the transform, the meaning of the quality); the form is derived at the head of this file.
+    function, the transform, the meaning of the quality); the form is derived at the head of biquad.py.
     Limits: a frequency above 0.49 of the rate of runs acts as 0.49 of it; one of 0 holds y. An input for which y
     would not be finite is passed over: y stays, and health is degraded. If it is the first one after a break, the next
     one takes its place.
@@ -187,10 +187,10 @@ class BiquadHighPass:
 
     Discretised by the bilinear transform, exact at `frequency` (prewarping). The first run after a break (`resumed`)
     gives y = 0, as if u had always had this value. A change of the period, the frequency or the quality makes no
-    jump: y is made of signals that move on from their values (see the head of this file).
+    jump: y is made of signals that move on from their values (see the head of biquad.py).
 
     Source: R. Bristow-Johnson, "Cookbook formulae for audio equalizer biquad filter coefficients" (the transfer
-    function, the transform, the meaning of the quality); the form is derived at the head of this file.
+    function, the transform, the meaning of the quality); the form is derived at the head of biquad.py.
     Limits: a frequency above 0.49 of the rate of runs acts as 0.49 of it; one of 0 gives the change of u since the
     first run. An input for which y would not be finite is passed over: y stays, and health is degraded. If it is the
     first one after a break, the next one takes its place.
