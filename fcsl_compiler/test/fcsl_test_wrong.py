@@ -1181,6 +1181,9 @@ CONFIGS: dict[str, str] = {
     ),
     "E252 a constant of a later one": put("constants", value={"half": "track / 2", "track": 0.4}),
     "E252 another unit": put("constants", value={"a": {"value": 1, "unit": "m"}, "b": {"value": "a", "unit": "s"}}),
+    "E253 a file that is not there": patch(
+        lambda c: c["instances"]["one"].update(inputs={"w": {"csv": "absent.csv", "column": "w"}})
+    ),
     "E251 two parents": frames(frame(), frame(parent="mast")),
     "E251 a frame in itself": frames(frame("base")),
     "E251 a loop of frames": frames(frame(), frame("base", "mast"), frame("mast", "imu"), frame("a", "imu")),

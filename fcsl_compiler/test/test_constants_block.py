@@ -147,3 +147,71 @@ def test_wrong_constants(tmp_path: Path, constants: Any, code: str, message: str
         build_machine(path)
     first = caught.value.diagnostics[0]
     assert first.code == code and message in first.message, first
+
+
+COLUMN = """
+class Law:
+    inputs = {"u": "f64"}
+    parameters = {"xs": "f64[4]", "gains": "f32[4]"}
+    outputs = {"y": "f64"}
+
+    def execute(self):
+        self.y = interp(self.u, self.xs, [0.0, 1.0, 2.0, 3.0]) + f64(self.gains[3])
+"""
+
+
+def of_columns(folder: Path, **gains: Any) -> Path:
+    (folder / "tables").mkdir(exist_ok=True)
+    config = {
+        "tick_hz": 10,
+        "initial_state": "A",
+        "algorithms": {"Law": {"source": "law.py"}},
+        "instances": {
+            "law": {
+                "algorithm": "Law",
+                "parameters": {
+                    "xs": {"csv": "tables/gains.csv", "column": "x"},
+                    "gains": {"csv": "tables/gains.csv", "column": "gain", **gains},
+                },
+            }
+        },
+        "states": {"A": {"schedule": {"law": 10}}},
+    }
+    return write_machine(folder, "several", config, {"law": COLUMN})
+
+
+def test_columns_of_files(tmp_path: Path) -> None:
+    path = of_columns(tmp_path)
+    table = tmp_path / "tables/gains.csv"
+    table.write_text("x, gain\n0, 0.1\n1, 0.2\n\n2, 0.3\n4, 0.7\n")
+    twins = Twins(path)
+    assert twins.native.get("law.parameters.xs") == [0.0, 1.0, 2.0, 4.0]
+    twins.set("law.inputs.u", 3.0)
+    twins.step()
+    assert twins.native.get("law.outputs.y") == 2.5 + 0.699999988079071
+    before = build_machine(path).source_hash
+    table.write_text("x,gain,more\n0,0.1,1\n1,0.2,1\n2,0.3,1\n4,0.7,9\n")
+    assert build_machine(path).source_hash == before  # the same numbers
+    table.write_text("x,gain\n0,0.1\n1,0.2\n2,0.3\n5,0.7\n")
+    assert build_machine(path).source_hash != before
+    assert Twins(path).native.get("law.parameters.xs") == [0.0, 1.0, 2.0, 5.0]
+
+
+@pytest.mark.parametrize(
+    ("text", "gains", "code", "message"),
+    [
+        ("x,gain\n0,0\n1,0\n2,0\n", {}, "E207", "parameter `xs` is f64[4], not a column of 3"),
+        ("x,gain\n0,0\n1,0\n2,0\n3,0\n", {"column": "gian"}, "E253", "`tables/gains.csv` has no column `gian`"),
+        ("x,gain\n0,0\n1,0\n2,0\n3,nan\n", {}, "E253", "line 5 of `tables/gains.csv`: `nan` in column `gain`"),
+        ("", {}, "E253", "`tables/gains.csv` has no column `x`"),
+        ("x,gain\n0,0\n1,0\n2,0\n3,0\n", {"csv": "../up.csv"}, "E253", "it would leave its folder"),
+        ("x,gain\n0,0\n1,0\n2,0\n3,0\n", {"row": 1}, "E201", "unknown key `row`"),
+    ],
+)
+def test_wrong_columns(tmp_path: Path, text: str, gains: dict[str, Any], code: str, message: str) -> None:
+    path = of_columns(tmp_path, **gains)
+    (tmp_path / "tables/gains.csv").write_text(text)
+    with pytest.raises(DiagnosticError) as caught:
+        build_machine(path)
+    first = caught.value.diagnostics[0]
+    assert first.code == code and message in first.message, first

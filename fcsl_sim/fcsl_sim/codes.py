@@ -20,23 +20,6 @@ _CONNECTIONS = (
     "]"
 )
 _SENSOR = '{"model": "sensor", "parameters": {"bias": 0.0, "sigma": 0.0, "dropout": false}}'
-_WIND = (
-    '"models": {\n'
-    '  "ramp": {"source": "ramp.c"},\n'
-    '  "sensor": {"source": "package://fcsl_sim/models/noisy_sensor.c"},\n'
-    '  "wind": {"source": "package://fcsl_sim/models/wind_profile.c"}\n'
-    "},\n"
-    '"instances": {\n'
-    '  "ramp": {"model": "ramp"},\n'
-    f'  "altimeter": {_SENSOR},\n'
-    f'  "velocimeter": {_SENSOR},\n'
-    '  "wind": {\n'
-    '    "model": "wind",\n'
-    '    "inputs": {"height": 10.0},\n'
-    '    "parameters": {"height": HEIGHT, "wind_north": [2.0, 5.0], "wind_east": [0.0], "wind_down": [0.0]}\n'
-    "  }\n"
-    "}"
-)
 _MODELS = (
     '"models": {\n'
     '  "ramp": {"source": "ramp.c"},\n'
@@ -116,15 +99,6 @@ SIM_CODES: dict[str, Code] = {
         Kind.SIMULATION,
         '"integrator": {"method": "verlet", "hz": 1000}',
         '"integrator": {"method": "rk4", "hz": 1000}',
-    ),
-    "E809": Code(
-        "a table that cannot be read",
-        "A parameter that is a table has a list of numbers, or the column of a CSV file: its first line has the names of the "
-        "columns, every other line one number for each. The file lies in the folder of the simulation file or below it, or "
-        "in a package (package://…).",
-        Kind.SIMULATION,
-        _WIND.replace("HEIGHT", '{"csv": "no_such.csv", "column": "height"}'),
-        _WIND.replace("HEIGHT", "[0.0, 100.0]"),
     ),
     "W801": Code(
         "a sensor channel that nothing feeds",

@@ -293,9 +293,7 @@ def test_constants(load_sim: Load, tmp_path: Path) -> None:
     (tmp_path / "rover.json").write_text('{"noise": 0.25, "hz": 50, "height": {"value": "4 * noise", "unit": "m"}}')
 
     def change(config: dict[str, Any]) -> None:
-        config.update(
-            constants="rover.json", duration="2 * noise", rates={"altimeter": 100, "velocimeter": "2 * hz"}
-        )
+        config.update(constants="rover.json", duration="2 * noise", rates={"altimeter": 100, "velocimeter": "2 * hz"})
         config["instances"]["altimeter"]["parameters"]["sigma"] = "noise"
         config["instances"]["ball"] = {
             "model": "ball",

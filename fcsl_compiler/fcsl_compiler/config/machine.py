@@ -88,7 +88,7 @@ def check_machine(parsed: ParsedMachine, sink: DiagnosticSink) -> Machine | None
         program,
         tuple(file.source for file in parsed.files),
         parsed.targets,
-        "\n".join((parsed.hashed_text, *(parsed.constants.used_texts if parsed.constants is not None else ()))),
+        "\n".join((parsed.hashed_text, *(parsed.constants.used_texts if parsed.constants else ()), *reader.columns)),
         views,
         arm=arm,
         command_timeout_ns=command_timeout_ns,

@@ -41,6 +41,8 @@ class ConfigReader:
         self.sink, self.constants = sink, constants
         #: Requests that values in the JSON name, with their first use.
         self.requests: dict[str, Span] = {}
+        #: Columns of files that values in the JSON name, with their numbers.
+        self.columns: list[str] = []
 
     def object(
         self,

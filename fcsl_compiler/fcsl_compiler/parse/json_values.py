@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING
 
 from ..base.source import Span
 from ..model.literals import LiteralError, fit
-from ..model.types import BOOL, HEALTH, HEALTH_NAMES, REQUEST, Array, Scalar, Struct, Type
+from ..model.types import BOOL, HEALTH, HEALTH_NAMES, REQUEST, Array, Scalar, Struct, Type, scalar_of
 from .json_source import JsonNode, Member, article
 
 if TYPE_CHECKING:
@@ -24,6 +24,8 @@ def read_value(reader: ConfigReader, node: JsonNode, type_: Type, what: str, uni
     if isinstance(type_, Struct):
         return _struct(reader, node, type_, what)
     if isinstance(type_, Array):
+        if node.kind == "object" and "csv" in node.members and not isinstance(type_.element, Struct):
+            return _column(reader, node, type_, what)
         if node.kind != "array" or len(node.items) != type_.shape[0]:
             have = f"a list of {len(node.items)}" if node.kind == "array" else article(node.kind)
             reader.sink.error("E207", f"{what} is {type_}, not {have}", node.span, help=f"write {example(type_)}")
@@ -37,6 +39,24 @@ def read_value(reader: ConfigReader, node: JsonNode, type_: Type, what: str, uni
         parts = [read_value(reader, item, rest, what, unit) for item in node.items]
         return None if any(p is None for p in parts) else tuple(v for p in parts if p is not None for v in p)
     return _scalar(reader, node, type_, what, unit)
+
+
+def _column(reader: ConfigReader, node: JsonNode, type_: Array, what: str) -> Value | None:
+    """A column of a CSV file as a vector."""
+    from .csv_column import read_column
+
+    values = read_column(node, what, reader)
+    if values is None:
+        return None
+    if type_.shape != (len(values),):
+        reader.sink.error(
+            "E207", f"{what} is {type_}, not a column of {len(values)}", node.span, help="use another size"
+        )
+        return None
+    literals = [JsonNode("float", node.span, v, repr(v)) for v in values]
+    parts = [_scalar(reader, literal, scalar_of(type_), what, "") for literal in literals]
+    reader.columns.append(f"{what} {values}")
+    return None if None in parts else tuple(v for p in parts if p is not None for v in p)
 
 
 def _struct(reader: ConfigReader, node: JsonNode, type_: Struct, what: str) -> Value | None:

@@ -46,8 +46,18 @@ def read_texts(config: Path) -> MachineTexts | None:
         return None
     if isinstance(keys.get("constants"), str):
         sources.append(keys["constants"])
+    if '"csv"' in text:
+        sources += _columns(keys["instances"])
     files = _files(config, sources) if all(isinstance(source, str) for source in sources) else {}
     return MachineTexts(text, keys, files) if files.keys() >= set(sources) else None
+
+
+def _columns(node: Any) -> list[str]:
+    """The CSV files that values name."""
+    if isinstance(node, dict):
+        own = [node["csv"]] if isinstance(node.get("csv"), str) else []
+        return own + [name for value in node.values() for name in _columns(value)]
+    return [name for value in node for name in _columns(value)] if isinstance(node, list) else []
 
 
 def package_of(path: Path, name: str) -> str:

@@ -1,9 +1,10 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Constants of a machine JSON, and expressions of them in the place of numbers."""
+"""What stands in the place of numbers in a machine JSON: expressions of its constants, columns of CSV files."""
 
 from __future__ import annotations
 
 import ast
+import csv
 import json
 import math
 import operator
@@ -33,22 +34,32 @@ _FUNCTIONS: dict[str, Callable[..., Any]] = {
 }
 
 
-def constants_of(config: Mapping[str, Any], folder: Path) -> dict[str, Any]:
-    """The values of the constants of a machine JSON that the compiler has accepted."""
-    declared = config.get("constants", {})
-    if isinstance(declared, str):
-        package, slash, inside = declared.removeprefix("package://").partition("/")
-        path = package_share(package) / inside if declared.startswith("package://") and slash else folder / declared
-        declared = json.loads(path.read_text("utf-8"))
-    found: dict[str, Any] = {}
-    for name, given in declared.items():
-        found[name] = value_of(given["value"] if isinstance(given, dict) else given, found)
-    return found
+class Literals:
+    """Values of a machine JSON that the compiler has accepted; files that it names are relative to `folder`."""
 
+    def __init__(self, config: Mapping[str, Any], folder: Path):
+        self._folder = folder
+        self._constants: dict[str, Any] = {}
+        declared = config.get("constants", {})
+        if isinstance(declared, str):
+            declared = json.loads(self._path(declared).read_text("utf-8"))
+        for name, given in declared.items():
+            self._constants[name] = self.number(given["value"] if isinstance(given, dict) else given)
 
-def value_of(value: Any, constants: Mapping[str, Any]) -> Any:
-    """A number, or the value of an expression."""
-    return _value(ast.parse(value.strip(), mode="eval").body, constants) if isinstance(value, str) else value
+    def number(self, value: Any) -> Any:
+        """A number, or the value of an expression."""
+        return _value(ast.parse(value.strip(), mode="eval").body, self._constants) if isinstance(value, str) else value
+
+    def column(self, csv_file: str, column: str) -> list[float]:
+        """The numbers of a column."""
+        with self._path(csv_file).open(encoding="utf-8-sig", newline="") as stream:
+            rows = [[cell.strip() for cell in row] for row in csv.reader(stream) if any(map(str.strip, row))]
+        at = rows[0].index(column)
+        return [float(row[at]) for row in rows[1:]]
+
+    def _path(self, name: str) -> Path:
+        package, slash, inside = name.removeprefix("package://").partition("/")
+        return package_share(package) / inside if name.startswith("package://") and slash else self._folder / name
 
 
 def _value(node: ast.expr, constants: Mapping[str, Any]) -> Any:

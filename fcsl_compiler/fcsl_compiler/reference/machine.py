@@ -23,7 +23,7 @@ from typing import Any, Protocol
 from ..model.machine import Channel, Connection, Edge, Instance, Machine, PortRef, State
 from .algorithm import HARDWARE, Algorithm, Extern, SourceModule, declare_structs
 from .arrays import Array
-from .constants import constants_of, value_of
+from .constants import Literals
 from .fault_places import FaultPlaces, FaultRow
 from .functions import wrap
 from .memory import HEALTH, Image, Layout, Leaf, Memory, Movers, from_json, leaves
@@ -76,7 +76,7 @@ class _Instance:
     def __init__(self, instance: Instance, algorithm: Algorithm, given: Mapping[str, Any], reference: ReferenceMachine):
         self.name, self.algorithm, layout = instance.name, algorithm, reference.layout
         self.limit_ns, self.places = instance.max_wcet_us * 1000, reference.places
-        self.given, self.frozen, self._constants = given, frozenset(instance.frozen), reference.constants
+        self.given, self.frozen, self._literals = given, frozenset(instance.frozen), reference.literals
         self.self_ = self._initial()
         self.health, self.request = (
             _cell(f"{self.name}.outputs.{port}", layout, 4) for port in ("health", "transition_request")
@@ -101,7 +101,7 @@ class _Instance:
         """`self` before init: values of the JSON and zeros. Frozen parameters are constants."""
         made = self.algorithm.type.zero()
         for name, value in self.given.items():
-            stored = from_json(self.algorithm.type.members[name], value, self._constants)
+            stored = from_json(self.algorithm.type.members[name], value, self._literals)
             setattr(made, slot(name), _constant(stored) if name in self.frozen else stored)
         return made
 
@@ -257,7 +257,7 @@ class ReferenceMachine:
         self._state, self._next = (_cell(f"machine.{name}", layout, 4) for name in ("state", "next_state"))
         self._current = _cell("machine.current", layout, 4)
         config = json.loads(machine.config.text)
-        self.constants = constants_of(config, Path(machine.config.path).parent)
+        self.literals = Literals(config, Path(machine.config.path).parent)
         self._algorithms = self._load(config, externs)
         self._sensors = {c.name: _Sensor(c, layout) for c in machine.channels if c.direction == "sensor"}
         self._instances: list[_Instance] = []
@@ -304,7 +304,7 @@ class ReferenceMachine:
         for algorithm in self.machine.algorithms:
             entry = config["algorithms"][algorithm.name]
             module, class_name = load(paths[algorithm.source]), entry.get("class", algorithm.name)
-            sizes = {n: int(value_of(size, self.constants)) for n, size in entry.get("sizes", {}).items()}
+            sizes = {n: int(self.literals.number(size)) for n, size in entry.get("sizes", {}).items()}
             found[algorithm.name] = Algorithm(module, class_name, sizes)
         return found
 

@@ -15,7 +15,7 @@ from itertools import accumulate, product
 from typing import Any
 
 from .arrays import ArrayType
-from .constants import value_of
+from .constants import Literals
 from .structs import StructType, slot
 from .types import SCALARS, Scalar, Type
 
@@ -162,17 +162,19 @@ def _function(name: str, lines: list[str], names: dict[str, Any]) -> Callable[[A
     return function
 
 
-def from_json(type_: Type, value: Any, constants: Mapping[str, Any]) -> Any:
+def from_json(type_: Type, value: Any, literals: Literals) -> Any:
     """Converts a value of the machine JSON: nested lists for arrays, objects for structs, names for healths, expressions of
-    constants for numbers."""
+    constants for numbers, columns of files for vectors."""
     if isinstance(type_, StructType):
-        return type_.of({name: from_json(member, value[name], constants) for name, member in type_.members.items()})
+        return type_.of({name: from_json(member, value[name], literals) for name, member in type_.members.items()})
     if isinstance(type_, ArrayType):
+        if isinstance(value, dict) and "csv" in value:
+            value = literals.column(value["csv"], value["column"])
         if not isinstance(value, list):  # a default of every element
-            return type_.of([from_json(type_.element, value, constants) for _ in range(type_.count)])
+            return type_.of([from_json(type_.element, value, literals) for _ in range(type_.count)])
         flat = [value]
         for _ in type_.shape:
             flat = [item for row in flat for item in row]
-        return type_.of([from_json(type_.element, item, constants) for item in flat])
+        return type_.of([from_json(type_.element, item, literals) for item in flat])
     is_word = type_.name in ("Health", "TransitionRequest")
-    return type_.store(value if is_word else value_of(value, constants))
+    return type_.store(value if is_word else literals.number(value))

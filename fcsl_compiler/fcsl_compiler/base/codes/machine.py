@@ -599,6 +599,17 @@ MACHINE_CODES: dict[str, Code] = {
         '"constants": {"track": {"value": 0.45, "unit": "m"}},\n'
         '"instances": {"nav": {"algorithm": "Nav"}, "control": {"algorithm": "Control", "parameters": {"gain": "track / 2"}}}',
     ),
+    "E253": Code(
+        "a column that cannot be read",
+        "In the place of a list of numbers, the column of a CSV file may stand: its first line has the names of the columns, "
+        "every other line one number for each. The file lies in the folder of the file that names it or below, or in a "
+        "package (package://…).",
+        Kind.JSON,
+        '"instances": {"nav": {"algorithm": "Nav"}, "control": {"algorithm": "Control", "parameters": {"gain": 2.0},\n'
+        '              "inputs": {"rate": {"csv": "no_such.csv", "column": "rate"}}}}',
+        '"instances": {"nav": {"algorithm": "Nav"}, "control": {"algorithm": "Control", "parameters": {"gain": 2.0},\n'
+        '              "inputs": {"rate": [0.0, 0.0, 1.0]}}}',
+    ),
     "W201": Code(
         "an algorithm without an instance",
         "The algorithm is checked, but is not part of the machine. Usually its instance was removed or never added.",
