@@ -1,12 +1,16 @@
 # SPDX-License-Identifier: Apache-2.0
 """Debounce, Timer and Edge against NumPy and SciPy on random signals; breaks, delays between periods, changed rates."""
 
+import json
 from collections.abc import Callable
+from pathlib import Path
 from typing import Any
 
 import numpy as np
 import pytest
 from scipy import ndimage, signal
+
+from simclient import AlgTwin, PyTwin
 
 
 def chatter(seed: int, runs: int = 300) -> np.ndarray[Any, Any]:
@@ -106,6 +110,28 @@ def test_the_delay_of_the_timer_changes_in_flight(block: Callable[..., Any]) -> 
     assert not timer.step(condition=False)["done"] and timer.step(condition=True)["done"]
     timer.set(delay=0.02)
     assert [timer.step(condition=True)["done"] for _ in range(3)] == [False, True, True]
+
+
+@pytest.mark.parametrize("twin_class", [AlgTwin, PyTwin])
+def test_the_time_goes_on_where_the_next_state_has_another_rate(tmp_path: Path, twin_class: Any) -> None:
+    config = {
+        "tick_hz": 1000,
+        "initial_state": "SLOW",
+        "algorithms": {"Timer": {"source": "package://fcsl_blocks/logic.py"}},
+        "instances": {"timer": {"algorithm": "Timer", "parameters": {"delay": 0.05}, "inputs": {"condition": True}}},
+        "connections": [{"from": f"machine.{n}", "to": f"timer.{n}"} for n in ("period", "resumed")],
+        "states": {"SLOW": {"schedule": {"timer": 100}}, "FAST": {"schedule": {"timer": 500}}},
+        "transitions": [],
+    }
+    (tmp_path / "rates.json").write_text(json.dumps(config))
+    twin = twin_class.from_config(tmp_path / "rates.json")
+    twin.tick(30)  # runs at 0, 10 and 20 ms
+    twin.set_state("FAST")
+    done = []
+    for _ in range(15):  # runs at 30, 32, ... ms
+        twin.tick(2)
+        done.append(twin.get_value("timer.outputs.done"))
+    assert done == [False] * 10 + [True] * 5
 
 
 def test_edges_are_differences(block: Callable[..., Any]) -> None:
