@@ -20,7 +20,8 @@ class Pid:
     Source: Modelica Standard Library, Modelica.Blocks.Continuous.LimPID (weights, filtered derivative, back-calculation),
     after K. J. Astrom and T. Hagglund, "PID Controllers", 2nd ed. (1995).
     Limits: a tracking_time below the period acts as the period. A setpoint, measurement or feedforward that is not finite
-    is passed over: the command stays, and health is degraded.
+    is passed over: the command stays, and health is degraded. If it is the first one after a break, the next run begins at
+    `track`.
     """
 
     inputs = {
@@ -46,16 +47,19 @@ class Pid:
         "command": "f64",  # u
         "saturated": "bool",  # v is beyond a limit
     }
-    state = {"integral": "f64", "derivative": "f64", "last": "f64"}  # last: c r - y of the run before
+    state = {"integral": "f64", "derivative": "f64", "last": "f64", "begins": "bool"}  # last: c r - y of the run before
 
     def execute(self):
+        if self.resumed:
+            self.begins = True
         if not (isfinite(self.setpoint) and isfinite(self.measured) and isfinite(self.feedforward)):
             self.health = "degraded"
             return
         error = self.setpoint - self.measured
         weighted = self.c * self.setpoint - self.measured
         proportional = self.kp * (self.b * self.setpoint - self.measured)
-        if self.resumed:
+        if self.begins:
+            self.begins = False
             self.derivative = 0.0
             self.integral = clamp(self.track, self.low, self.high) - proportional - self.feedforward
         else:

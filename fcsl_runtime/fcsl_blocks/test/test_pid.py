@@ -107,6 +107,14 @@ def test_what_is_not_finite_is_passed_over(block: Callable[..., Any], name: str,
     assert np.isfinite(after["command"]) and after["health"] == "nominal"
 
 
+def test_a_start_waits_for_a_measurement(block: Callable[..., Any]) -> None:
+    pid = block("pid.py", "Pid", kp=1.0, ki=1.0)
+    feed(pid, setpoint=1.0)
+    pid.rest()
+    assert feed(pid, setpoint=5.0, measured=float("nan"), track=2.0)["health"] == "degraded"
+    assert feed(pid, setpoint=5.0, measured=1.0, track=2.0)["command"] == pytest.approx(2.0)
+
+
 def test_the_period_is_that_of_the_state(block: Callable[..., Any]) -> None:
     for rate in (100, 500):
         pid = block("pid.py", "Pid", rate=rate, kp=0.0, ki=1.0)
