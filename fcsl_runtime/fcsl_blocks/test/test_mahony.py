@@ -75,6 +75,8 @@ def test_without_a_field_it_aligns_the_shortest_way(block: Callable[..., Any]) -
     m = mahony(block)
     wanted = Rotation.from_rotvec([0.3, -0.4, 0.0])
     assert angle_between(attitude(feed(m, acceleration=wanted.inv().apply([0, 0, G]))), wanted) < 1e-12
+    opposite = mahony(block)
+    assert feed(opposite, acceleration=[0.0, 0.0, -G])["attitude"].tolist() == [0.0, 1.0, 0.0, 0.0]
 
 
 @pytest.mark.parametrize("degrees", [20.0, 170.0])
