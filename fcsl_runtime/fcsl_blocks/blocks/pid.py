@@ -20,8 +20,8 @@ class Pid:
     Source: Modelica Standard Library, Modelica.Blocks.Continuous.LimPID (weights, filtered derivative, back-calculation),
     after K. J. Astrom and T. Hagglund, "PID Controllers", 2nd ed. (1995).
     Limits: a tracking_time below the period acts as the period. A setpoint, measurement or feedforward that is not finite
-    is passed over: the command stays, and health is degraded. If it is the first one after a break, the next run begins at
-    `track`.
+    is passed over: the command stays, and health is degraded. If it is the first one after a break, or `track` is not
+    finite then, the next run begins at `track`.
     """
 
     inputs = {
@@ -52,7 +52,8 @@ class Pid:
     def execute(self):
         if self.resumed:
             self.begins = True
-        if not (isfinite(self.setpoint) and isfinite(self.measured) and isfinite(self.feedforward)):
+        known = isfinite(self.setpoint) and isfinite(self.measured) and isfinite(self.feedforward)
+        if not known or (self.begins and not isfinite(self.track)):
             self.health = "degraded"
             return
         error = self.setpoint - self.measured

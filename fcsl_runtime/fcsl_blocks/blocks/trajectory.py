@@ -142,8 +142,7 @@ class Quintic:
     duration are now: position, velocity and acceleration are continuous. In other runs these inputs have no effect. A
     changed period does not change the way.
 
-    Source: liba, include/a/trajpoly5.h (the coefficients in t), after L. Biagiotti and C. Melchiorri, "Trajectory Planning
-    for Automatic Machines and Robots"; the ones above are the solution of the six equations in s.
+    Source: liba, include/a/trajpoly5.h (the coefficients in t); the ones above are the solution of the six equations in s.
     Limits: none of velocity and acceleration: a short duration makes both large, and with velocities at the ends the way
     may leave the interval between them. T <= 0 is at the end at once. A run that reads an input that is not finite, or in
     which a result overflows, is passed over: outputs and time stay, and health is degraded.

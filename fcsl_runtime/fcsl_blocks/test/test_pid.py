@@ -112,6 +112,7 @@ def test_a_start_waits_for_a_measurement(block: Callable[..., Any]) -> None:
     feed(pid, setpoint=1.0)
     pid.rest()
     assert feed(pid, setpoint=5.0, measured=float("nan"), track=2.0)["health"] == "degraded"
+    assert feed(pid, setpoint=5.0, measured=1.0, track=float("nan"))["health"] == "degraded"
     assert feed(pid, setpoint=5.0, measured=1.0, track=2.0)["command"] == pytest.approx(2.0)
 
 
