@@ -95,7 +95,8 @@ class RateLoop:
     Source: PX4 Autopilot, rate_control.cpp (PI on the error, D on the measured rate, stop of the integral on saturation and
     on the ground). Back-calculation is the usual first-order tracking of the applied value.
     Limits: axes are independent; gyroscopic torque belongs to `feedforward`. A tracking_time below the period acts as the
-    period. If an input is not finite, the run is passed over: the torques stay, and health is degraded.
+    period. If an input is not finite, the run is passed over: the torques stay, health is degraded, and a
+    start waits.
     """
 
     inputs = {
@@ -123,12 +124,15 @@ class RateLoop:
     state = {
         "integral": "f64[3] N*m",
         "derivative": "f64[3] N*m",
-        "last": "f64[3] rad/s",
-    }  # last: rate of the run before
+        "last": "f64[3] rad/s",  # rate of the run before
+        "begun": "bool",  # there is a run before, since the last break
+    }
 
     def execute(self):
         error = self.target - self.rate
         if self.resumed:
+            self.begun = False
+        if not self.begun:
             integral = 0.0 * error
             derivative = 0.0 * error
         else:
@@ -146,6 +150,7 @@ class RateLoop:
         if not (all(isfinite(wanted)) and all(isfinite(integral)) and all(isfinite(self.applied))):
             self.health = "degraded"
             return
+        self.begun = True
         self.torque = clamp(wanted, -self.limit, self.limit)
         self.saturated = self.torque != wanted
         self.integral = integral

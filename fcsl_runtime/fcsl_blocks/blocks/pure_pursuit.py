@@ -23,9 +23,9 @@ class PurePursuit:
     lookahead with speed); MathWorks, "Pure Pursuit Controller" (use, lookahead). The goal is the intersection of a circle
     with a segment: |a + t (b - a) - position| = L, the greater root t.
     Limits: corners are cut, within about L. A goal behind the vehicle is reached by a wide arc, one exactly behind not at
-    all. A closed path needs a search_distance, or its end is as near as its beginning. Speeds are forward: with a negative one yaw_rate keeps the curvature, but the vehicle leaves the path. If an input
-    or a point of the path is not finite, or its length overflows, the run is passed over: outputs stay, health is
-    degraded.
+    all. A closed path needs a search_distance, or its end is as near as its beginning. Speeds are forward: with a
+    negative one yaw_rate keeps the curvature, but the vehicle leaves the path. If an input or a point of the path is not
+    finite, or its length overflows, the run is passed over: outputs stay, health is degraded, and a start waits.
     """
 
     inputs = {
@@ -55,8 +55,11 @@ class PurePursuit:
         "done": "bool",  # at the end
         "saturated": "bool",  # max_curvature is active
     }
+    state = {"begun": "bool"}  # progress is of this path, since the last break
 
     def execute(self):
+        if self.resumed or self.restart:
+            self.begun = False
         count = clamp(self.count, 0, len(self.path))
         total = 0.0
         for i in range(len(self.path) - 1):
@@ -66,7 +69,7 @@ class PurePursuit:
         # the nearest point between least and most along the path, at progress
         least = 0.0
         most = inf
-        if not (self.resumed or self.restart):
+        if self.begun:
             least = min(self.progress, total)
             most = least + self.search_distance
         start = 0.0
@@ -126,6 +129,7 @@ class PurePursuit:
         if not (all(isfinite(ahead)) and isfinite(left) and isfinite(yaw_rate) and isfinite(end) and isfinite(offset)):
             self.health = "degraded"
             return
+        self.begun = True
         self.curvature = curvature
         self.yaw_rate = yaw_rate
         self.goal = goal

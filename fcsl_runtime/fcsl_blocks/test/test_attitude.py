@@ -261,6 +261,15 @@ def test_what_is_not_finite_is_passed_over(
     assert np.isfinite(after["torque"]).all() and after["health"] == "nominal"
 
 
+def test_a_start_waits_for_finite_inputs(block: Callable[..., Any]) -> None:
+    r = loop(block, ki=[5.0] * 3, kd=[0.1] * 3)
+    for _ in range(50):
+        feed(r, target=[1.0] * 3, rate=[-3.0] * 3)
+    r.rest()
+    assert feed(r, rate=[float("nan")] * 3)["health"] == "degraded"
+    np.testing.assert_allclose(feed(r, target=[1.0] * 3)["torque"], [0.5, 0.4, 0.3])
+
+
 def test_loop_extremes(block: Callable[..., Any]) -> None:
     r = loop(block, ki=[2.0] * 3, kd=[0.1] * 3, tracking_time=0.05, limit=[2.0] * 3, derivative_time=0.01)
     rng = np.random.default_rng(4)

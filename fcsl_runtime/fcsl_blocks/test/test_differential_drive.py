@@ -263,6 +263,15 @@ def test_what_is_not_finite_is_passed_over_and_made_up_for(
         np.testing.assert_allclose(after[name], wanted[name], rtol=1e-9, atol=1e-12)
 
 
+def test_after_a_break_it_waits_for_finite_angles(block: Callable[..., Any]) -> None:
+    odo = odometry(block)
+    feed(odo)
+    odo.rest()
+    assert feed(odo, float("nan"), 5.0)["health"] == "degraded"
+    assert feed(odo, 5.0, 5.0)["position"].tolist() == [0.0, 0.0, 0.0]
+    assert feed(odo, 5.1, 5.1)["position"][0] > 0.0
+
+
 @pytest.mark.parametrize("use_speeds", [False, True])
 def test_nothing_poisons_it(block: Callable[..., Any], use_speeds: bool) -> None:
     odo = odometry(block, use_speeds=use_speeds, slip=0.01, angle_range=6.0)

@@ -218,6 +218,16 @@ def test_a_first_sample_that_is_not_finite_does_not_align(block: Callable[..., A
     assert angle_between(attitude(feed(m, [1.0, 0.0, 0.0])), Rotation.identity()) < 1e-12
 
 
+def test_after_a_break_it_waits_for_finite_samples(block: Callable[..., Any]) -> None:
+    m = mahony(block)
+    feed(m)
+    m.rest()
+    tilted = Rotation.from_rotvec([0.5, 0.0, 0.0])
+    assert feed(m, gyro=[float("nan")] * 3)["health"] == "degraded"
+    out = feed(m, gyro=[1.0] * 3, acceleration=tilted.inv().apply([0, 0, G]))
+    assert angle_between(attitude(out), tilted) < 1e-12
+
+
 def test_extremes(block: Callable[..., Any]) -> None:
     m = mahony(block)
     rng = np.random.default_rng(6)

@@ -215,6 +215,16 @@ def test_what_is_not_finite_is_passed_over(block: Callable[..., Any], name: str,
     assert f.step((2.0, 0.5))["health"] == "nominal"
 
 
+@pytest.mark.parametrize("restart", [False, True])
+def test_a_start_waits_for_finite_inputs(block: Callable[..., Any], restart: bool) -> None:
+    f = Follower(block, [[0.0, 0.0], [9.0, 0.0]], search_distance=0.5)
+    f.step((3.0, 0.0))
+    if not restart:
+        f.block.rest()
+    assert f.step((float("nan"), 0.0), restart=restart)["health"] == "degraded"
+    assert f.step((7.0, 0.0))["progress"] == 7.0
+
+
 def test_at_the_end_and_far_away(block: Callable[..., Any]) -> None:
     f = Follower(block, [[0.0, 0.0], [9.0, 0.0]], search_distance=2.0, lookahead_min=10.0)
     f.step((3.0, 0.0))
