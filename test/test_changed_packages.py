@@ -34,7 +34,10 @@ EXAMPLES = [
         (["fcsl_compiler/test/test_tick.py"], ["fcsl_compiler"]),
         (["fcsl_bridge/fcsl_bridge/topics/qos.py"], ["fcsl_bridge"]),
         (["fcsl_runtime/simclient/test/test_fc.py"], ["simclient"]),
-        (["fcsl_runtime/simclient/simclient/run.py"], sorted(["simclient", "fcsl_blocks", "fcsl_sim", "fcsl_bridge", *EXAMPLES])),
+        (
+            ["fcsl_runtime/simclient/simclient/run.py"],
+            sorted(["simclient", "fcsl_blocks", "fcsl_sim", "fcsl_bridge", *EXAMPLES]),
+        ),
         (["examples/lander/sim/lander.sim.json"], ["fcsl_bridge", "lander"]),
         (["fcsl_msgs/msg/Checkpoint.msg", "fcsl_hal/test/test_codec.c"], ["fcsl_bridge", "fcsl_hal", "fcsl_msgs"]),
         (["constraints.txt"], ALL),
