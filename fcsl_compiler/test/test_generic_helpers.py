@@ -116,6 +116,47 @@ class Law:
     twins.expect([({"law.inputs.i": i}, {"law.counters.faults": max(0, i - 1)}) for i in range(4)])
 
 
+def test_a_branch_for_other_sizes_is_not_checked(tmp_path: Path) -> None:
+    source = """
+def third(x: "f64[n]") -> f64:
+    if n > 2:
+        return x[2]
+    elif n == 2:
+        return x[1]
+    return -x[0]
+
+
+def nested(x: "f64[n]", on: bool) -> f64:
+    if on:
+        if n > 2:
+            return x[2]
+        return x[0] * 10.0
+    return 0.5
+
+
+class Law:
+    inputs = {"u": "f64[1]", "v": "f64[2]", "w": "f64[m]"}
+    outputs = {"y": "f64[4]", "z": "f64[4]"}
+
+    def execute(self):
+        self.y[0] = third(self.u)
+        self.y[1] = third(self.v)
+        self.y[2] = third(self.w)
+        self.z = [nested(self.u, True), nested(self.w, True), nested(self.u, False), nested(self.w, False)]
+        if m == 3 and self.u[0] > 0.0:
+            self.y[3] = self.w[0]
+        if m > 3:
+            self.y[3] = self.w[3]
+"""
+    entry = {"source": "law.py", "sizes": {"m": 3}}
+    twins = Twins(write_one_each(tmp_path, {"law.py": source}, {"Law": entry}))
+    for name, values in (("u", [1.0]), ("v", [2.0, 3.0]), ("w", [4.0, 5.0, 6.0])):
+        twins.set(f"law.inputs.{name}", values)
+    twins.step()
+    assert twins.native.get("law.outputs.z") == [10.0, 6.0, 0.5, 0.5]
+    assert twins.native.get("law.outputs.y") == [-1.0, 3.0, 6.0, 4.0] and twins.native.get("law.counters.faults") == 0
+
+
 def test_the_instructions_are_those_of_a_helper_for_this_size(tmp_path: Path) -> None:
     generic = """
 from fcsl_builtins import sqrt

@@ -109,6 +109,7 @@ def _method(
         table,
         {},
         TypeNames({**declarations.names.sizes, **sizes}, declarations.names.structs),
+        variables=sizes,
         wrong=declarations.wrong,
         uses_library=declarations.uses_library,
         algorithm=found,

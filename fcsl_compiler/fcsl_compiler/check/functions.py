@@ -369,6 +369,7 @@ def check_function(
         arguments,
         names,
         result,
+        sizes,
         wrong=declarations.wrong,
         uses_library=declarations.uses_library,
     )

@@ -4,7 +4,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable
+from collections.abc import Callable, Collection
 from dataclasses import dataclass, field
 from typing import Protocol
 
@@ -123,6 +123,7 @@ class Scope:
     arguments: dict[str, Type]
     names: TypeNames
     result: Type | None = None
+    variables: Collection[str] = ()  # names of sizes that a call or the machine JSON binds
     uses_library: Callable[[str], bool] = lambda name: True  # whether the file means that name of the library
     algorithm: AlgorithmClass | None = None  # the class that `self` refers to, None in helpers
     method: str = ""  # start or execute

@@ -16,6 +16,7 @@ from .annotations import annotation_type
 from .checker import Stop
 from .effect_order import Hoister, reaches_outside
 from .expressions import ExprChecker
+from .folding import fold
 from .intervals import interval, is_static
 from .library_files import library_names
 from .loop_bounds import BEYOND, MAX_BOUND, MAX_ITERATIONS, TOO_MANY, parameters_in
@@ -50,6 +51,7 @@ class BodyChecker:
         self._hoister = Hoister(scope)
         self._jumped = False
         self._unpacked = 0
+        self._for_other_sizes = False  # the rest of the function is reached with other sizes only
         self._iterations = 1  # product of the iteration counts of the enclosing loops
 
     def function(self, statements: list[ast.stmt]) -> tuple[ir.Stmt, ...]:
@@ -65,8 +67,11 @@ class BodyChecker:
         out: list[ir.Stmt] = []
         for node in statements:
             if self.scope.unreachable:
-                self.sink.error("E420", "this line is never reached", self.expr.span(node), help="remove it")
+                if not self._for_other_sizes:
+                    at = self.expr.span(node)
+                    self.sink.error("E420", "this line is never reached", at, help="remove it")
                 break
+            self._for_other_sizes = False
             made: list[ir.Stmt] = []
             requests = len(self.scope.requests)
             try:
@@ -376,6 +381,11 @@ class BodyChecker:
     def _if(self, node: ast.If, span: Span) -> ir.Stmt:
         scope = self.scope
         condition = self.expr.expect(node.test, BOOL, "the condition")
+        taken = self._taken(node, condition)
+        if taken is not None:
+            body = self.body(node.body if taken else node.orelse)
+            self._for_other_sizes = scope.unreachable
+            return ir.If(condition, body if taken else (), () if taken else body, span)
         before = set(scope.assigned)
         then = self.body(node.body)
         then_assigned, then_ended = scope.assigned, scope.unreachable
@@ -390,6 +400,13 @@ class BodyChecker:
         else:
             scope.assigned = then_assigned & else_assigned
         return ir.If(condition, then, otherwise, span)
+
+    def _taken(self, node: ast.If, condition: ir.Expr) -> bool | None:
+        """Whether a condition on size variables holds. The other branch is for other sizes: its indices may be out of range
+        here, so it is not checked. None for any other condition."""
+        names = {n.id for n in ast.walk(node.test) if isinstance(n, ast.Name)}
+        known = condition if names.isdisjoint(self.scope.variables) else fold(condition)
+        return bool(known.value) if known is not condition and isinstance(known, ir.Const) else None
 
     def _for(self, node: ast.For, span: Span) -> ir.Stmt:
         if node.orelse:
