@@ -2,6 +2,7 @@
 """`constants` of a machine JSON: expressions in the place of numbers, units, a file of their own, and what the hashes cover."""
 
 import json
+import os
 from pathlib import Path
 from typing import Any
 
@@ -215,3 +216,11 @@ def test_wrong_columns(tmp_path: Path, text: str, gains: dict[str, Any], code: s
         build_machine(path)
     first = caught.value.diagnostics[0]
     assert first.code == code and message in first.message, first
+
+
+def test_a_table_that_is_no_file(tmp_path: Path) -> None:
+    path = of_columns(tmp_path)
+    os.mkfifo(tmp_path / "tables/gains.csv")
+    with pytest.raises(DiagnosticError) as caught:
+        build_machine(path)
+    assert caught.value.diagnostics[0].message == "`tables/gains.csv` cannot be used: it is not a regular file"

@@ -50,7 +50,7 @@ def read_regular(path: Path, limit: int) -> bytes:
     with open(path, "rb", opener=open_regular) as file:
         data = file.read(limit + 1)
     if len(data) > limit:
-        raise SourceError(f"larger than {limit} bytes")
+        raise SourceError(f"it is larger than {limit} bytes")
     return data
 
 

@@ -64,7 +64,5 @@ def _rows(path: Path) -> list[tuple[int, list[str]]]:
         raise ValueError(f"no such file: {path}") from None
     except UnicodeDecodeError:
         raise ValueError("it is no text in UTF-8") from None
-    except SourceError as error:
-        raise ValueError(f"it is {error}") from None
-    except (OSError, csv.Error) as error:
+    except (SourceError, OSError, csv.Error) as error:
         raise ValueError(str(error)) from None
