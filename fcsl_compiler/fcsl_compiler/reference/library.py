@@ -159,8 +159,8 @@ class Library:
         if name in PRODUCTS:
             return partial(large_product, symmetric=name == "symmetric_product")
         path = self._files[name]
-        patterns = [annotation_text(a.annotation) for a in self._nodes[name].args.args if a.annotation is not None]
-        elements = [_element(cls) for cls, p in zip(classes, patterns, strict=True) if split_type(p)[0] in ELEMENTS]
+        pairs = zip(classes, self._patterns(name), strict=True)
+        elements = [_element(cls) for cls, pattern in pairs if split_type(pattern)[0] in ELEMENTS]
         node = _of_elements(self._nodes[name], elements[0]) if elements else self._nodes[name]
         functions = {**self.signatures, name: signature(node)}
         names = Names({}, functions, text=self._texts[path], values=dict(self._names), library=self.makers())
