@@ -561,6 +561,7 @@ ALGORITHMS: dict[str, str] = {
     "E407 a result of a helper": helper("f(a: f64) -> Health", 'return "fine"', call="health = f(self.x)"),
     "E416 arguments of a helper": helper("f(a: f64) -> f64", "return a", call="y = f(self.x, self.x)"),
     "E422 an argument is written": helper("f(a: f64) -> f64", "a = 1.0", "return a", call="y = f(self.x)"),
+    "E422 a size of a helper": helper('f(a: "f64[n]") -> f64', "n = 2", "return a[0]", call="y = f(self.w)"),
     "E422 an argument named as a builtin": helper("f(range: f64) -> f64", "return 1.0", call="y = f(self.x)"),
     "E430 recursion": helper(
         "f(a: f64) -> f64", "return g(a)\n\n\ndef g(a: f64) -> f64:\n    return f(a)", call="y = f(self.x)"

@@ -275,7 +275,8 @@ class BodyChecker:
         if name in scope.ranges:
             self._fail("E422", f"`{name}` is the variable of the loop", span, why="loop variables are read-only")
         if name in scope.constants or name in scope.names.sizes:
-            self._fail("E422", f"`{name}` is a module constant", span, help="use another name")
+            what = "a module constant" if name in scope.constants else "a size"
+            self._fail("E422", f"`{name}` is {what}", span, help="use another name")
         if (name in SHADOWABLE or name in library_names()) and not scope.uses_library(name):
             return
         if name in LANGUAGE_NAMES or name in scope.names.structs:
