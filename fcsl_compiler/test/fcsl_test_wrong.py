@@ -1249,6 +1249,20 @@ def all_cases() -> dict[str, tuple[str, dict[str, str]]]:
         )
     )
     cases["W206 what another state left"] = (kept, {"alg.py": execute("self.v = self.w")})
+    part = {
+        "tick_hz": 10,
+        "initial_state": "RUN",
+        "algorithms": {},
+        "instances": {},
+        "states": {"RUN": {"schedule": {}}},
+    }
+    for name, changes, of_outer in (
+        ("E254 two states", {"states": {"RUN": {"schedule": {}}, "STOP": {"schedule": {}}}}, {}),
+        ("E255 a struct of another unit", {"structs": {"Goal": {"place": "f64[3] m", "speed": "f64 km/h"}}}, {}),
+        ("E256 a request without a name", {"requests": ["DONE", "LOST"]}, {"requests": {"LOST": "GO"}}),
+    ):
+        outer = patch(lambda c, o=of_outer: c["instances"].update(lights={"machine": "parts/lights.json", **o}))
+        cases[name] = (outer, {"alg.py": GOOD, "parts/lights.json": json.dumps({**part, **changes}, indent=1)})
     packet = {"field": "one.inputs.n", "as": "blob"}
     mapped_packet = {**packet, "ros": {"type": "std_msgs/UInt32", "field": "data"}}
     for name, declared, item in (

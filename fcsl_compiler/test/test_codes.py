@@ -23,6 +23,7 @@ from fcsl_compiler.base.codes.examples import (
     EXAMPLE_LAMP,
     EXAMPLE_MACHINE,
     EXAMPLE_NAV,
+    EXAMPLE_PART,
     EXAMPLE_PILOT,
 )
 from fcsl_compiler.base.codes.pages import explain, overview, table
@@ -63,6 +64,7 @@ def diagnose(folder: Path, kind: Kind, text: str) -> list[Diagnostic]:
     (folder / "nav.py").write_text(EXAMPLE_NAV)
     (folder / "control.py").write_text(body(text) if kind is Kind.BODY else EXAMPLE_CONTROL)
     (folder / "pilot.py").write_text(EXAMPLE_PILOT)
+    (folder / "part.json").write_text(EXAMPLE_PART)
     (folder / "law.py").write_text(file(text))
     config = EXAMPLE_MACHINE
     if kind in (Kind.JSON, Kind.STRICT):
@@ -192,6 +194,8 @@ def page() -> str:
         f"```python\n{EXAMPLE_CONTROL}```",
         "`pilot.py`:",
         f"```python\n{EXAMPLE_PILOT}```",
+        "the part `part.json`:",
+        f"```json\n{EXAMPLE_PART}```",
         "and `lamp.py`:",
         f"```python\n{EXAMPLE_LAMP}```",
         "Those of boards (E5xx, W5xx) are pieces of this board, whose machine has channels in addition:",

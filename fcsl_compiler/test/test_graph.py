@@ -13,10 +13,12 @@ from xml.etree import ElementTree
 
 import pytest
 from test_golden import CONFIG, golden
+from test_parts import write as write_parts
 
 from fcsl_compiler.cli.main import main
 from fcsl_compiler.driver.passes import compile_machine
 from fcsl_compiler.graph import render
+from fcsl_compiler.graph.fold import fold
 from fcsl_compiler.graph.layout import STUB, Layout, Placed, Point, lay_out, tag_width
 from fcsl_compiler.graph.model import Box, Picture, Row, Wire, dataflow, legend, state_machine
 from fcsl_compiler.graph.svg import draw
@@ -139,6 +141,36 @@ def test_calls_outside_are_named() -> None:
     for suffix in (".svg", ".mmd"):
         assert "calls cpu_temp_c, hw_write_gpio" in render(m, None, suffix)
         assert "calls" not in render(machine(CONFIG), None, suffix)
+
+
+def test_a_folded_part_is_one_box(tmp_path: Path) -> None:
+    """With what leaves and enters it; wires within it are gone, and no other."""
+    machine = compile_machine(write_parts(tmp_path), "", until="schedule").checked
+    whole, folded = dataflow(machine), fold(dataflow(machine))
+    assert [box.name for box in folded.boxes] == ["body", "att", "spare", "u"]
+    att = folded.boxes[1]
+    assert att.subtitle == "2 instances"
+    assert [row.left for row in att.rows] == ["law.angle", "law.target", "law.order", "rate.pi.rate"]
+    assert [row.right for row in att.rows] == ["rate.pi.u", "rate.pi.pair.first", "", ""]
+    inside = [w for w in whole.wires if "." in whole.boxes[w.source].name and "." in whole.boxes[w.target].name]
+    assert len(folded.wires) == len(whole.wires) - len(inside) and len(inside) == 2
+    for wire in folded.wires:
+        assert (
+            folded.boxes[wire.source].rows[wire.source_row].right
+            and folded.boxes[wire.target].rows[wire.target_row].left
+        )
+    states = fold(state_machine(machine))
+    shown = {box.name: [(row.left, row.left_note) for row in box.rows if row.left] for box in states.boxes}
+    assert shown["FLY"] == [("spare", "at its own rates")]
+    assert shown["every state"] == [("att", "at its own rates"), ("body", "1000 Hz")]
+    assert all(wire.target_row < len(states.boxes[wire.target].rows) for wire in states.wires)
+    ElementTree.fromstring(draw([folded, states]))
+
+
+@pytest.mark.parametrize("path", MACHINES.values(), ids=MACHINES)
+def test_a_machine_without_parts_is_drawn_as_before(path: Path) -> None:
+    machine = compile_machine(path, "", until="schedule").checked
+    assert render(machine, None, ".svg", folded=True) == render(machine, None, ".svg")
 
 
 def test_mermaid() -> None:

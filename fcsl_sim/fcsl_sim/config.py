@@ -402,7 +402,7 @@ class _Loader:
         known: dict[str, dict[str, tuple[Type, str]]] = {i.name: {} for i in machine.instances} if machine else {}
         for f in machine.fields.values() if machine else ():
             if f.role in ("input", "output", "parameter", "state"):
-                known[f.instance][f.path.partition(".")[2]] = type_of(f.type, f.shape), f.unit
+                known[f.instance][f.path.removeprefix(f"{f.instance}.")] = type_of(f.type, f.shape), f.unit
         for name, instance in instances.items():
             fields = instance.table.fields.values() if instance.table else ()
             known[name] = {f.path: (f.type, f.unit) for f in fields}

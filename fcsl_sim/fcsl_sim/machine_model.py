@@ -25,7 +25,7 @@ def machine_model(library: Path, name: str) -> ModelTable:
     fields = {}
     for field in machine.fields.values():
         if field.role in _ROLES and field.type in FIELD_TYPES and not field.connected_from:
-            path = field.path.partition(".")[2]
+            path = field.path.removeprefix(f"{field.instance}.")
             type_ = type_of(field.type, field.shape)
             fields[path] = ModelField(path, field.role, False, False, False, type_, field.offset, field.unit, field.doc)
     return ModelTable(name, library, 0, 0, False, True, False, False, "", (), fields, machine.tick_hz)

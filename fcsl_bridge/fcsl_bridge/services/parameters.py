@@ -103,7 +103,7 @@ class MachineParameters:
         close = difflib.get_close_matches(name, self._fields, n=1, cutoff=0.5)
         if close:
             return f"; did you mean `{close[0]}`?"
-        instances = sorted({name.split(".")[0] for name in self._fields})
+        instances = sorted({field.instance for field in self._fields.values()})
         return f": machine `{machine.name}` has parameters of {', '.join(instances) or 'no instance'}"
 
     def _value(self, field: Field) -> Any:

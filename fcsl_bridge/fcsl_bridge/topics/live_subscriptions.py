@@ -42,7 +42,7 @@ class LiveSubscriptions:
         self._outputs: list[PolledSubscription] = []
         for instance in machine.instances:
             if instance.published:
-                kind, topic = instance_class(instance), f"{machine.name}/{instance.name}"
+                kind, topic = instance_class(instance), f"{machine.name}/{instance.topic}"
                 polled = PolledSubscription(node, kind, topic, qos.STREAM)
                 self._describe(polled.topic, instance.name, instance.message_type, instance.message_text)
                 self._outputs.append(polled)

@@ -61,7 +61,7 @@ class MachineTopics:
         }
         self._transitions = qos.publisher(node, TransitionEvent, f"{machine.name}/transitions", qos.EVENT)
         self._outputs = [
-            (instance.index, qos.publisher(node, kind, f"{machine.name}/{instance.name}", qos.STREAM))
+            (instance.index, qos.publisher(node, kind, f"{machine.name}/{instance.topic}", qos.STREAM))
             for instance, kind in kinds
         ]
         self._lived_s = 0.0

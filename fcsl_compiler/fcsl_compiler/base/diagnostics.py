@@ -100,6 +100,15 @@ def _output(text: str) -> list[str]:
     return [*lines[:_MAX_OUTPUT_LINES], f"({len(lines) - _MAX_OUTPUT_LINES} more lines)"]
 
 
+def _inclusions(span: Span) -> list[tuple[Span, str]]:
+    """Where the machines name the file of a span as a part, from inside out."""
+    found: list[tuple[Span, str]] = []
+    while (at := span.source.included) is not None:
+        found.append((at, f"`{span.source.part}` is a part here"))
+        span = at
+    return found
+
+
 class DiagnosticError(Exception):
     """Compilation failed. str() is the rendered text of all diagnostics."""
 
@@ -169,7 +178,7 @@ class DiagnosticSink:
         if self._count[severity] >= MAX_DIAGNOSTICS:
             return
         self._count[severity] += 1
-        places = tuple(Note(s, _printable(t)) for s, t in notes)
+        places = tuple(Note(s, _printable(t)) for s, t in [*notes, *_inclusions(span)])
         self._diagnostics.append(
             Diagnostic(severity, code, message, span, _printable(why), _printable(help_text), places, output)
         )

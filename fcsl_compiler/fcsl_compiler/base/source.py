@@ -27,11 +27,13 @@ def _lines(text: str) -> str:
 @dataclass(frozen=True)
 class SourceFile:
     """One text file. `name` is shown in messages and generated comments. `path` is where it was read, "" if it has no
-    file."""
+    file. `part`: the machine is this part of another one, and `included` is where that names it."""
 
     name: str
     text: str
     path: str = field(default="", compare=False)
+    part: str = ""
+    included: Span | None = field(default=None, compare=False)
     _starts: list[int] = field(init=False, repr=False, compare=False, hash=False)
 
     def __post_init__(self) -> None:

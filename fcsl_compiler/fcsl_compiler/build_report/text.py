@@ -3,10 +3,11 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Collection, Sequence
 
 from ..driver.stack import LEAF_BYTES
 from ..emit.operations import KINDS
+from ..model.machine import split_instance
 from .facts import Facts
 
 _MEASURED = ("own_instructions", "usual_instructions", "instructions", "code_bytes", "record_bytes", "rollback_bytes")
@@ -22,7 +23,7 @@ def report_text(facts: Facts) -> str:
     estimated = {i["name"]: estimates & set(i["math"]) for i in facts["instances"]}
     for state in facts["states"]:
         found = {name for entry in state["order"] for name in estimated[entry["instance"]]}
-        out += ["", *_state(state, sorted(found))]
+        out += ["", *_state(state, sorted(found), estimated)]
     return "\n".join(out) + "\n"
 
 
@@ -89,7 +90,7 @@ def _tick(state: Facts, estimates: list[str]) -> str:
     return text + (f" (an estimate, for {', '.join(estimates)})" if estimates else "")
 
 
-def _state(state: Facts, estimates: list[str]) -> list[str]:
+def _state(state: Facts, estimates: list[str], instances: Collection[str]) -> list[str]:
     cycle = state["major_cycle_ticks"]
     code = f", {state['code_bytes']} bytes of code" if state["code_bytes"] is not None else ""
     out = [f"state {state['name']}: {_tick(state, estimates)}{code}; it repeats every {_count(cycle, 'tick')}"]
@@ -99,7 +100,7 @@ def _state(state: Facts, estimates: list[str]) -> list[str]:
         out.append(f"  because {state['why_no_bound']}")
     out.append("  order: " + (", ".join(map(_due, state["order"])) or "nothing runs"))
     out += _load(state) if state["slots"] is not None and cycle > 1 else []
-    out += _latencies(state)
+    out += _latencies(state, instances)
     return out + _levelling(state["levelling"])
 
 
@@ -117,13 +118,13 @@ def _load(state: Facts) -> list[str]:
     return _table(rows)
 
 
-def _latencies(state: Facts) -> list[str]:
+def _latencies(state: Facts, instances: Collection[str]) -> list[str]:
     """Latencies of connections. Connections with the same latency between the same two instances share a line."""
     groups: dict[tuple[str, str, str], list[str]] = {}
     for c in state["connections"]:
-        instance, _, field = c["from"].partition(".")
+        instance, field = split_instance(c["from"], instances)
         source = c["from"] if instance in ("machine", "channels") else instance
-        target = c["to"].partition(".")[0]
+        target, _ = split_instance(c["to"], instances)
         groups.setdefault((source, target, _age(c["latency_ticks"])), []).append(field)
     rows = [[f"  {source} → {target}", age, " ".join(fields)] for (source, target, age), fields in groups.items()]
     return ["  latency, ticks", *_table(rows)] if rows else []

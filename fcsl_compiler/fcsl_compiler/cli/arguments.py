@@ -172,6 +172,7 @@ def _add_authoring(commands: argparse._SubParsersAction[argparse.ArgumentParser]
     graph = _add(commands, "graph", "draw dataflow and state machine")
     graph.add_argument("config", type=Path, help="machine JSON")
     graph.add_argument("--state", metavar="STATE", help="show one state (default: all)")
+    graph.add_argument("--fold", action="store_true", help="draw each part as one box")
     graph.add_argument(
         "-o", "--output", type=Path, metavar="FILE", help=".svg, .mmd (Mermaid) or .md; default: Mermaid on stdout"
     )

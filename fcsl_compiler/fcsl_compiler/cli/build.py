@@ -126,8 +126,11 @@ def compiler_files() -> list[Path]:
 
 
 def machine_files(compilation: Compilation) -> list[Path]:
-    """The machine JSON and its algorithm files."""
+    """The machine JSON and all files that it is made from."""
+    from ..parse.machine_texts import read_texts
     from ..parse.source_path import resolve_source
 
-    sources = compilation.checked.sources
-    return [compilation.path.resolve(), *(resolve_source(s.name, config=compilation.path).resolve() for s in sources)]
+    texts = read_texts(compilation.path)
+    names = [*(source.name for source in compilation.checked.sources), *(texts.files if texts is not None else ())]
+    files = [resolve_source(name, config=compilation.path).resolve() for name in dict.fromkeys(names)]
+    return [compilation.path.resolve(), *files]

@@ -24,7 +24,7 @@ def run(options: argparse.Namespace) -> int:
         hint = nearest(options.state, names) or f"the states are {', '.join(names)}"
         raise UsageError(f"no state `{options.state}`; {hint}")
     state = machine.states[names.index(options.state)] if options.state is not None else None
-    text = render(machine, state, suffix)
+    text = render(machine, state, suffix, options.fold)
     if output is None:
         print(text, end="")
     else:

@@ -26,6 +26,7 @@ from ..parse.json_source import JsonNode
 from ..parse.machine_files import ParsedAlgorithm, ParsedMachine
 from .arming import read_arming
 from .channels import read_channels, read_payload
+from .part_requests import bind_requests
 from .ports import PortResolver
 from .sources import SourceResolver
 from .states import read_states
@@ -44,6 +45,7 @@ Algorithms = dict[str, ir.Algorithm | None]
 def check_machine(parsed: ParsedMachine, sink: DiagnosticSink) -> Machine | None:
     """Checks the machine and all its algorithms. Returns None if an error was reported, here or while parsing."""
     reader, keys = ConfigReader(sink, parsed.constants), parsed.keys
+    reader.scopes = parsed.joined.scopes
     program = Program(read_structs(keys.get("structs"), reader))
     tick_hz = reader.integer(keys.get("tick_hz"), "tick_hz", 1, MAX_TICK_HZ) or 0
     modules = _modules(parsed, program, reader)
@@ -66,6 +68,8 @@ def check_machine(parsed: ParsedMachine, sink: DiagnosticSink) -> Machine | None
     if names:  # otherwise it was reported
         initial = reader.reference(keys.get("initial_state"), "state", names)
         requests, edges = read_transitions(keys, tick_hz, names, instances, incomplete, reader)
+    for record, path in parsed.joined.ports:
+        ports.port(path, (record,), f"one of `ports.{record}`")
     instances = _read_publish(keys.get("publish"), instances, incomplete, reader)
     views = read_views(keys.get("views"), _signals(instances, incomplete), Path(parsed.source.path), reader)
     if sink.failed or initial is None:
@@ -88,12 +92,19 @@ def check_machine(parsed: ParsedMachine, sink: DiagnosticSink) -> Machine | None
         program,
         tuple(file.source for file in parsed.files),
         parsed.targets,
-        "\n".join((parsed.hashed_text, *(parsed.constants.used_texts if parsed.constants else ()), *reader.columns)),
+        "\n".join((parsed.hashed_text, *_used_constants(parsed), *reader.columns)),
         views,
         arm=arm,
         command_timeout_ns=command_timeout_ns,
         payload=payload,
+        tree=parsed.joined.tree,
     )
+
+
+def _used_constants(parsed: ParsedMachine) -> list[str]:
+    """The constants that values of the JSON and its parts read, for a hash."""
+    parts = [(f"{file.part} ", scope.constants) for file, scope in parsed.joined.scopes.items()]
+    return [f"{part}{text}" for part, own in [("", parsed.constants), *parts] if own for text in own.used_texts]
 
 
 # ---- algorithms ----------------------------------------------------------------------------------------------------
@@ -122,6 +133,8 @@ def _check_algorithms(parsed: ParsedMachine, modules: Modules, reader: ConfigRea
         sizes = {size: value for size, (value, _) in algorithm.sizes.items()}
         table = modules.table(declarations)
         checked = check_algorithm(name, class_, files, table, declarations.sound, reader.sink, sizes)
+        if algorithm.requests is not None:
+            checked = bind_requests(checked, algorithm.requests, modules.program, reader.sink)
         found[name] = checked if declarations.declared else None
     return found
 
@@ -185,7 +198,7 @@ def _read_instances(
     """
     instances: list[Instance] = []
     incomplete: set[str] = set() if node is not None and node.kind == "object" else Everything()
-    for name, (definition, span) in reader.named(node, "`instances`").items():
+    for name, (definition, span) in reader.named(node, "`instances`", instances=bool(reader.scopes)).items():
         incomplete.add(name)
         if name in RESERVED_INSTANCES:
             reader.sink.error("E209", f"`{name}` is reserved", span, help="give the instance another name")
@@ -210,7 +223,7 @@ def _read_instances(
         execute, start = algorithm.execute, algorithm.start
         values = {n: parameters[n] for n in frozen if n in parameters}
         if values:
-            freezer = Freezer(algorithm, name, values)
+            freezer = Freezer(algorithm, name.replace(".", "__"), values)
             execute, start = freezer.function(execute), freezer.function(start) if start is not None else None
         if not check_loops(name, (execute, start), frozen, values, at, reader.sink):
             incomplete.add(name)

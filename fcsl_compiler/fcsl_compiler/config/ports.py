@@ -7,8 +7,9 @@ from __future__ import annotations
 from ..base.diagnostics import DiagnosticSink, nearest
 from ..base.source import Span
 from ..model.ir import RECORDS, Port
-from ..model.machine import Instance, PortRef
+from ..model.machine import Instance, PortRef, split_instance
 from ..model.types import Array, Struct
+from ..parse.json_reader import Everything
 from ..parse.json_source import JsonNode
 from .sources import OWNERS, SourceResolver
 
@@ -19,6 +20,7 @@ class PortResolver:
     def __init__(self, instances: list[Instance], incomplete: set[str], sources: SourceResolver, sink: DiagnosticSink):
         self.instances, self.incomplete, self._sources, self.sink = instances, incomplete, sources, sink
         self._index = {i.name: n for n, i in enumerate(instances)}
+        self._names = incomplete if isinstance(incomplete, Everything) else {*self._index, *incomplete}
 
     def source(self, node: JsonNode) -> PortRef | None:
         """The source of a connection: an output `instance.field` or a member of one, or a value of the machine or a
@@ -49,7 +51,7 @@ class PortResolver:
 
     def _record(self, node: JsonNode) -> str:
         """The record of the port at one end of a connection; "" if the port does not exist."""
-        parts = str(node.value).split(".") if node.kind == "string" else []
+        parts = self._split(str(node.value)) if node.kind == "string" else []
         index = self._index.get(parts[0]) if len(parts) > 1 else None
         ports = self.instances[index].algorithm.ports.items() if index is not None else ()
         return next((record for record, found in ports if any(p.name == parts[1] for p in found)), "")
@@ -85,13 +87,18 @@ class PortResolver:
             return None
         return self._found(instance, record, parts[1], parts[2:], node)
 
+    def _split(self, path: str) -> list[str]:
+        """The instance of a path, and what follows it."""
+        instance, rest = split_instance(path, self._names)
+        return [instance, *(rest.split(".") if rest or path.endswith(".") else [])]
+
     def _instance(self, node: JsonNode, rule: str, form: str) -> tuple[Instance | None, list[str]]:
         """The instance at the start of a path, and the parts of the path. The instance is None if an error about it was
         reported."""
         if node.kind != "string" or not isinstance(node.value, str):
             self.sink.error("E208", f"{rule}, written as a string", node.span, help=f'"{form}"')
             return None, []
-        parts = node.value.split(".")
+        parts = self._split(node.value)
         index = self._index.get(parts[0])
         if index is not None and parts[0] not in self.incomplete:
             return self.instances[index], parts

@@ -22,7 +22,7 @@ def read_states(
     reader: ConfigReader,
 ) -> list[State]:
     """All states with their entries, including those of `always`, in JSON order."""
-    everywhere = reader.named(always, "`always`")
+    everywhere = reader.named(always, "`always`", instances=True)
     shared = _entries(everywhere, tick_hz, instances, incomplete, reader)
     required = () if everywhere or (always is not None and always.kind != "object") else ("schedule",)
     states: list[State] = []
@@ -30,7 +30,7 @@ def read_states(
         optional = ("description",) if required else ("schedule", "description")
         keys = reader.object(definition, f"state `{name}`", required, optional) or {}
         reader.string(keys.get("description"), "`description`")
-        listed = reader.named(keys.get("schedule"), f"the schedule of `{name}`")
+        listed = reader.named(keys.get("schedule"), f"the schedule of `{name}`", instances=True)
         for instance in (n for n in listed if n in everywhere):
             message = f"`{instance}` is in `always`, so state `{name}` schedules it already"
             fix = "remove it here; or from `always`, and list it in every state that runs it"

@@ -15,6 +15,7 @@ from typing import Any
 from ..base.diagnostics import DiagnosticSink, nearest
 from ..base.source import Span
 from ..model.ir import RECORDS
+from ..model.machine import split_instance
 from ..model.types import (
     MAX_LEAVES,
     Array,
@@ -72,7 +73,7 @@ class Signals:
         """Type and unit of the number, the bool or the array of them that a path names. None after reporting an
         error."""
         path = str(node.value)
-        instance, _, rest = path.partition(".")
+        instance, rest = split_instance(path, self.ports)
         if instance in self.incomplete:
             return None
         if instance not in self.ports:
@@ -81,21 +82,22 @@ class Signals:
             return None
         own = self._leaves_of(instance)
         if rest.partition(".")[0] not in RECORDS:
-            meant = [leaf for leaf in own if leaf.split(".", 2)[2] == rest]
+            meant = [leaf for leaf in own if leaf.removeprefix(f"{instance}.").partition(".")[2] == rest]
             fix = f'write "{meant[0]}"' if meant else f'write "{instance}.outputs.<field>"'
             message = f"a view shows a field of {', '.join(RECORDS)}, not `{path}`"
             sink.error("E215", message, node.span, help=fix)
             return None
         found = _leaf(path, own)
         if found is None:
-            self._report(node, path, own, sink)
+            self._report(node, instance, own, sink)
         elif not (element := scalar_of(found[0])).is_number and element.name != "bool":
             message = f"`{path}` is {element}, and a view shows numbers and bools"
             sink.error("E245", message, node.span, help="remove it; states and healths are shown without a view")
             return None
         return found
 
-    def _report(self, node: JsonNode, path: str, own: Mapping[str, tuple[Type, str]], sink: DiagnosticSink) -> None:
+    def _report(self, node: JsonNode, instance: str, own: Mapping[str, tuple[Type, str]], sink: DiagnosticSink) -> None:
+        path = str(node.value)
         members = [leaf for leaf in own if leaf.startswith((f"{path}.", f"{path}["))]
         match = _INDICES.fullmatch(path)
         if members:
@@ -105,12 +107,10 @@ class Signals:
             message = f"`{match[1]}` is {own[match[1]][0]} and has no element `{match[2]}`"
             sink.error("E245", message, node.span, help="indices begin at 0")
         else:
-            fix = (
-                nearest(path, list(own))
-                or f"it has {', '.join(leaf.partition('.')[2] for leaf in list(own)[:12]) or 'no field'}"
-            )
-            instance, _, rest = path.partition(".")
-            sink.error("E216", f"`{instance}` has no field `{rest}`", node.span, help=fix)
+            known = [leaf.removeprefix(f"{instance}.") for leaf in list(own)[:12]]
+            fix = nearest(path, list(own)) or f"it has {', '.join(known) or 'no field'}"
+            message = f"`{instance}` has no field `{path.removeprefix(f'{instance}.')}`"
+            sink.error("E216", message, node.span, help=fix)
 
 
 def _leaf(path: str, own: Mapping[str, tuple[Type, str]]) -> tuple[Type, str] | None:

@@ -65,7 +65,7 @@ def _instance(instance: Instance, entries: dict[str, ir.Function]) -> Instance:
     start = entries[algorithm.start.name] if algorithm.start is not None else None
     if instance.execute.name != algorithm.execute.name:
         values = {name: instance.parameters[name] for name in instance.frozen}
-        freezer = Freezer(algorithm, instance.name, values)
+        freezer = Freezer(algorithm, instance.identifier, values)
         execute, start = freezer.function(execute), freezer.function(start) if start is not None else None
     return replace(instance, execute=execute, start=start)
 

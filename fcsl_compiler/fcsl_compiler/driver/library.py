@@ -87,7 +87,7 @@ def _distinct(compilations: list[Compilation]) -> None:
     exported: dict[str, str] = {}
     for name, c in seen.items():
         for instance in c.checked.instances:
-            symbol = f"{name}_{instance.name}"
+            symbol = f"{name}_{instance.identifier}"
             if exported.setdefault(symbol, name) != name:
                 message = f"machines `{exported[symbol]}` and `{name}` would both define `{symbol}_execute`"
                 help_text = "rename the instance, or build two libraries"

@@ -40,7 +40,7 @@ def check_collisions(machine: Machine, sink: DiagnosticSink) -> None:
         claim(instance_type(machine, instance), instance.span, f"instance `{instance.name}`")
         claim(f"message {message_name(machine, instance)}", instance.span, f"instance `{instance.name}`")
         for entry in ("init", "execute"):
-            claim(f"{machine.name}_{instance.name}_{entry}", instance.span, f"instance `{instance.name}`")
+            claim(f"{machine.name}_{instance.identifier}_{entry}", instance.span, f"instance `{instance.name}`")
         _check_constants(message_requests(machine, instance), f"`{instance.name}`", instance.span, sink)
     for channel in machine.channels:
         claim(channel_member(channel), channel.span, f"channel `{channel.name}`")

@@ -97,7 +97,7 @@ def _instance_rows(machine: Machine, index: int, instance: Instance) -> list[Fie
                         _flags(instance, record, port.name, scalar, written),
                         shape_of(leaf.type),
                         count_of(leaf.type),
-                        f"i_{instance.name}.{record}.{c_name(port.name)}{leaf_member(leaf)}",
+                        f"i_{instance.identifier}.{record}.{c_name(port.name)}{leaf_member(leaf)}",
                         scalar.c,
                         index,
                         leaf.unit,
@@ -119,7 +119,7 @@ def _instance_rows(machine: Machine, index: int, instance: Instance) -> list[Fie
         counters.append(("completed", "FCSL_BOOL", "uint8_t", "whether a run has completed since it was stale"))
     for member_of_record, abi_type, c_type, doc in counters:
         path = f"{instance.name}.counters.{member_of_record.removeprefix('counters.')}"
-        member = f"i_{instance.name}.{member_of_record}"
+        member = f"i_{instance.identifier}.{member_of_record}"
         rows.append(FieldRow(path, "COUNTER", abi_type, (), (), 1, member, c_type, index, "", doc))
     return rows
 

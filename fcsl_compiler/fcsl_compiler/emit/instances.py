@@ -100,18 +100,18 @@ def run_quiet(machine: Machine, first: Instance, record: code.Place) -> code.Do:
 
 def execute_name(machine: Machine, instance: Instance) -> str:
     """`instance`: the first of those alike for the definition that is compiled with the machine."""
-    return f"{machine.name}_{instance.name}_execute"
+    return f"{machine.name}_{instance.identifier}_execute"
 
 
 def init_name(machine: Machine, instance: Instance, first: Instance) -> str:
     """The function that fills its record at the start: of the first of those alike, if both begin with the same values."""
     # In text, 0.0 differs from -0.0.
     same = repr((instance.parameters, instance.inputs)) == repr((first.parameters, first.inputs))
-    return f"{machine.name}_{(first if same else instance).name}_init"
+    return f"{machine.name}_{(first if same else instance).identifier}_init"
 
 
 def _run_name(machine: Machine, instance: Instance) -> str:
-    return f"fcsl_run_{machine.name}_{instance.name}"
+    return f"fcsl_run_{machine.name}_{instance.identifier}"
 
 
 def _makes_requests(instance: Instance) -> bool:
@@ -130,7 +130,7 @@ class InstanceEmitter:
         """`quiet`: see status_elision.py. `first`: of those alike (identical_code_folding.py)."""
         self.m, self.i, self.quiet, self.first = machine, instance, quiet, first
         self.pointer = code.Pointer(code.Named(instance_type(machine, instance)), writable=True)
-        self.name = f"{machine.name}_{instance.name}"
+        self.name = f"{machine.name}_{instance.identifier}"
 
     def emit(self) -> Iterator[Function]:
         yield self._init()

@@ -108,7 +108,7 @@ def _tables(machine: Machine, used: set[str]) -> Iterator[code.Table]:
         if constant_name(owner, name) in used:
             yield _table(machine, owner, name, type_, values)
     for instance in machine.instances:
-        owner = f"{instance.algorithm.owner}__{instance.name}"
+        owner = f"{instance.algorithm.owner}__{instance.identifier}"
         for port in instance.algorithm.ports["parameters"]:
             if port.name in instance.frozen and constant_name(owner, port.name) in used:
                 yield _table(machine, owner, port.name, port.type, instance.parameters[port.name])

@@ -4,6 +4,8 @@ text."""
 
 from __future__ import annotations
 
+import re
+
 from ..model import ir
 from ..model.machine import Instance, Machine
 from ..model.ros_names import ros_field
@@ -15,8 +17,8 @@ _DOC_FOR_ROSIDL = str.maketrans("[]\\", "()/")
 
 
 def camel(name: str) -> str:
-    """lander_control → LanderControl."""
-    return "".join(part[:1].upper() + part[1:] for part in name.split("_"))
+    """lander_control → LanderControl, att.rate → AttRate."""
+    return "".join(part[:1].upper() + part[1:] for part in re.split("[_.]", name))
 
 
 def message_name(machine: Machine, instance: Instance) -> str:

@@ -33,7 +33,7 @@ def record_type(machine: Machine, algorithm: ir.Algorithm, record: str) -> str:
 
 
 def instance_type(machine: Machine, instance: Instance) -> str:
-    return f"{machine.name}_{instance.name}_t"
+    return f"{machine.name}_{instance.identifier}_t"
 
 
 def machine_type(machine: Machine) -> str:
@@ -55,7 +55,7 @@ def constant_name(owner: str, name: str) -> str:
 
 
 def instance_member(instance: Instance) -> str:
-    return f"i_{instance.name}"
+    return f"i_{instance.identifier}"
 
 
 def channel_member(channel: Channel) -> str:

@@ -4,6 +4,7 @@
 from __future__ import annotations
 
 from ..model.machine import Machine, State
+from .fold import fold
 from .mermaid import write
 from .model import dataflow, state_machine
 from .svg import draw
@@ -12,9 +13,11 @@ from .svg import draw
 FORMATS = {".svg": "SVG", ".mmd": "Mermaid", ".md": "Mermaid in a Markdown code block"}
 
 
-def render(machine: Machine, state: State | None, suffix: str) -> str:
-    """The text of a file with this suffix (of FORMATS): dataflow in one state or in all, then the state machine."""
+def render(machine: Machine, state: State | None, suffix: str, folded: bool = False) -> str:
+    """The text of a file with this suffix (of FORMATS): dataflow in one state or in all, then the state machine. `folded`:
+    each part is one box."""
     pictures = [dataflow(machine, state), state_machine(machine, state)]
+    pictures = list(map(fold, pictures)) if folded else pictures
     if suffix == ".svg":
         return draw(pictures)
     text = write(pictures)

@@ -47,7 +47,7 @@ class _Lowering:
         self.values: dict[tuple[str, str], Values] = {}
         self.values |= {key: values for key, (_, values) in machine.program.constants.items()}
         for i in machine.instances:
-            owner = f"{i.algorithm.owner}__{i.name}"
+            owner = f"{i.algorithm.owner}__{i.identifier}"
             self.values |= {(owner, name): i.parameters[name] for name in i.frozen if name in i.parameters}
         self.functions: dict[str, ir.Function] = dict(machine.program.functions)
         #: The functions before lowering. Specialised functions are derived from these.

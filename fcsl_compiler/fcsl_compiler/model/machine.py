@@ -3,11 +3,13 @@
 
 from __future__ import annotations
 
+from collections.abc import Collection
 from dataclasses import dataclass
 from dataclasses import field as dataclass_field
 from decimal import Decimal, localcontext
 from fractions import Fraction
 from functools import cached_property
+from typing import Any
 
 from ..base.source import SourceFile, Span
 from . import ir
@@ -46,6 +48,27 @@ class Instance:
     start: ir.Function | None
     span: Span
     published: bool = True  # as a ROS 2 message and topic
+
+    @property
+    def identifier(self) -> str:
+        """Its name in C: that of an instance of a part, `att.rate`, is `att__rate`, which no other name is."""
+        return self.name.replace(".", "__")
+
+
+def split_instance(path: str, instances: Collection[str]) -> tuple[str, str]:
+    """The instance at the start of a path, and what follows it. Names of instances of parts have dots. If there is no such
+    instance, the shortest name that begins no other one."""
+    at = -1
+    while (at := path.find(".", at + 1)) >= 0:
+        if path[:at] in instances:
+            return path[:at], path[at + 1 :]
+    if path in instances:
+        return path, ""
+    name, _, rest = path.partition(".")
+    while rest and any(known.startswith(f"{name}.") for known in instances):
+        more, _, rest = rest.partition(".")
+        name = f"{name}.{more}"
+    return name, rest
 
 
 @dataclass(frozen=True)
@@ -183,6 +206,9 @@ class Machine:
     arm: PortRef | None = None  # the bool output that arms the actuators
     command_timeout_ns: int = 0  # 0: none
     payload: str = "raw"  # of values on the bus: raw, cdr
+    tree: dict[str, Any] = dataclass_field(
+        default_factory=dict, compare=False
+    )  # of the JSON, what reference/ reads of it
 
     @property
     def structs(self) -> tuple[Struct, ...]:

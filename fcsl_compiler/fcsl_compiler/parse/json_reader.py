@@ -5,10 +5,11 @@ from __future__ import annotations
 
 import re
 from collections.abc import Sequence
+from dataclasses import dataclass, field
 from typing import TYPE_CHECKING
 
 from ..base.diagnostics import DiagnosticSink, misspelt, nearest
-from ..base.source import MAX_NAME, Span
+from ..base.source import MAX_NAME, SourceFile, Span
 from .json_source import JsonNode, article
 
 if TYPE_CHECKING:
@@ -21,6 +22,19 @@ _NAME = re.compile(r"[A-Za-z][A-Za-z0-9]*(_[A-Za-z0-9]+)*")
 
 def is_name(text: str) -> bool:
     return len(text) <= MAX_NAME and _NAME.fullmatch(text) is not None
+
+
+def _is_path(text: str) -> bool:
+    """Whether it is the name of an instance, also of one in a part."""
+    return len(text) <= MAX_NAME and all(map(is_name, text.split(".")))
+
+
+@dataclass
+class Scope:
+    """What texts in the file of a part may name: its constants, and its requests with their names in the whole machine."""
+
+    constants: Constants | None = None
+    requests: dict[str, str] = field(default_factory=dict)
 
 
 class Everything(set[str]):
@@ -39,6 +53,8 @@ class ConfigReader:
     def __init__(self, sink: DiagnosticSink, constants: Constants | None = None):
         """`constants`: a string in the place of a number is an expression of them."""
         self.sink, self.constants = sink, constants
+        #: Files of parts.
+        self.scopes: dict[SourceFile, Scope] = {}
         #: Requests that values in the JSON name, with their first use.
         self.requests: dict[str, Span] = {}
         #: Columns of files that values in the JSON name, with their numbers.
@@ -72,8 +88,9 @@ class ConfigReader:
                 self.sink.error("E202", f"{what} has no `{key}`", node.span, help=f'add `"{key}": …`')
         return values
 
-    def named(self, node: JsonNode | None, what: str) -> dict[str, tuple[JsonNode, Span]]:
-        """An object with user-defined names as keys. Invalid names are reported, but stay in the result."""
+    def named(self, node: JsonNode | None, what: str, instances: bool = False) -> dict[str, tuple[JsonNode, Span]]:
+        """An object with user-defined names as keys. Invalid names are reported, but stay in the result. `instances`: names
+        of these may have dots, behind the name of a part."""
         if node is None:
             return {}
         if node.kind != "object":
@@ -81,7 +98,7 @@ class ConfigReader:
             return {}
         found: dict[str, tuple[JsonNode, Span]] = {}
         for key, member in node.members.items():
-            if not is_name(key):
+            if not (_is_path(key) if instances else is_name(key)):
                 fix = f"letters, digits and single underscores between them, {MAX_NAME} at most; a letter first"
                 self.sink.error("E203", f"`{key}` is not a name", member.key_span, help=fix)
             found[key] = (member.value, member.key_span)
@@ -106,13 +123,14 @@ class ConfigReader:
     def computed(self, node: JsonNode, what: str, unit: str = "") -> JsonNode | None:
         """The value of an expression of constants in the place of a number; any other node itself. None after reporting
         an expression that has no value, or another unit."""
-        if node.kind != "string" or self.constants is None:
+        constants = self.scope(node).constants if self.scopes else self.constants
+        if node.kind != "string" or constants is None:
             return node
         from ..expression.tree import ExpressionError
         from ..expression.units import read, text
 
         try:
-            value, found = self.constants.evaluate(str(node.value))
+            value, found = constants.evaluate(str(node.value))
             if unit and found is not None and found != read(unit):
                 raise ExpressionError(f"its unit is {text(found)}, not {unit}")
         except ExpressionError as error:
@@ -121,6 +139,10 @@ class ConfigReader:
             )
             return None
         return JsonNode("int" if isinstance(value, int) else "float", node.span, value, repr(value))
+
+    def scope(self, node: JsonNode) -> Scope:
+        """What the text of a node may name."""
+        return self.scopes.get(node.span.source) or Scope(self.constants)
 
     def integer(self, node: JsonNode | None, what: str, low: int, high: int) -> int | None:
         node = self.computed(node, what) if node is not None else None

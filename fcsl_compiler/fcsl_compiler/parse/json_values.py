@@ -91,6 +91,7 @@ def _scalar(reader: ConfigReader, node: JsonNode, type_: Scalar, what: str, unit
             return (bool(node.value),)
     elif type_ is REQUEST:
         name = reader.string(node, what)
+        name = reader.scope(node).requests.get(name, name) if name else name
         if name:
             reader.requests.setdefault(name, node.span)
         return None if name is None else (name,)

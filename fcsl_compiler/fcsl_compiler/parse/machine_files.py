@@ -17,6 +17,7 @@ from .constants import Constants, read_constants
 from .json_reader import ConfigReader
 from .json_source import JsonNode, parse_json, text_without
 from .machine_texts import package_of
+from .parts import Joined
 from .python_source import is_ignored_module, parse_python, span_of
 from .source_path import SourcePathError, resolve_source
 from .targets import read_targets
@@ -44,6 +45,7 @@ _OPTIONAL = (
         "always",
         "transitions",
         "requests",
+        "ports",
         "publish",
         "channels",
         "bus",
@@ -92,11 +94,13 @@ class ParsedAlgorithm:
     class_span: Span  # span of the class name in the JSON
     file: ParsedFile | None
     sizes: dict[str, tuple[int, Span]] = field(default_factory=dict)
+    requests: dict[str, str] | None = None  # of an algorithm of a part: those it may make, by its names for them
 
 
 @dataclass(frozen=True)
 class ParsedMachine:
-    """Values of the machine JSON by key, its algorithms in JSON order, and its targets."""
+    """Values of the machine JSON by key, as if one file had all of its parts; its algorithms in JSON order, and its
+    targets."""
 
     name: str
     source: SourceFile
@@ -104,8 +108,9 @@ class ParsedMachine:
     keys: dict[str, JsonNode]
     algorithms: dict[str, ParsedAlgorithm]
     targets: dict[str, Target]
-    hashed_text: str  # of the machine JSON, without `views`, which changes nothing that the machine does
+    hashed_text: str  # of machine JSON and parts, without `views`, which changes nothing that the machine does
     constants: Constants | None  # None without a block of them
+    joined: Joined
 
     @property
     def folder(self) -> Path:
@@ -147,6 +152,10 @@ def parse_machine(path: Path, sink: DiagnosticSink) -> ParsedMachine | None:
         return None
     if "constants" in keys:
         reader.constants = read_constants(keys["constants"], path, reader)
+    joined = Joined(path, keys, reader)
+    if not joined.complete:
+        return None
+    keys = joined.keys
     for key in ("$schema", "description"):
         reader.string(keys.get(key), f"`{key}`")
     files = _Files(path, reader.sink)
@@ -155,8 +164,11 @@ def parse_machine(path: Path, sink: DiagnosticSink) -> ParsedMachine | None:
         for key, (definition, span) in reader.named(keys.get("algorithms"), "`algorithms`").items()
     }
     targets = read_targets(keys.get("targets"), path, reader)
-    hashed_text = text_without(source, root, "views")
-    return ParsedMachine(name, source, package_of(path, name), keys, algorithms, targets, hashed_text, reader.constants)
+    texts = {part.name: part.text for part in joined.files}
+    hashed_text = "\n".join((text_without(source, root, "views"), *texts.values()))
+    return ParsedMachine(
+        name, source, package_of(path, name), keys, algorithms, targets, hashed_text, reader.constants, joined
+    )
 
 
 def is_machine_name(name: str) -> bool:
@@ -196,7 +208,10 @@ def _parse_algorithm(
         key: (reader.integer(node, f"size `{key}`", 1, MAX_ELEMENTS) or 1, at)
         for key, (node, at) in reader.named(keys.get("sizes"), f"`sizes` of `{name}`").items()
     }
-    return ParsedAlgorithm(name, class_name or name, span, class_span, files.read(text, keys["source"].span), sizes)
+    scope = reader.scopes.get(definition.span.source)
+    requests = scope.requests if scope is not None else None
+    file = files.read(text, keys["source"].span)
+    return ParsedAlgorithm(name, class_name or name, span, class_span, file, sizes, requests)
 
 
 class _Files:

@@ -15,7 +15,7 @@ from typing import Any
 
 from ..base.files import MAX_SOURCE_BYTES, SourceError, read_regular
 from ..base.json_file import json_value
-from .source_path import SourcePathError, resolve_source
+from .source_path import SourcePathError, beside, resolve_source
 
 #: Matches an import anywhere in the text, also across lines. A false match is harmless.
 _IMPORT = re.compile(r"\bfrom[\s\\]+([A-Za-z_]\w*(?:[\s\\]*\.[\s\\]*[A-Za-z_]\w*)*)[\s\\]*\bimport\b")
@@ -41,15 +41,27 @@ def read_texts(config: Path) -> MachineTexts | None:
     try:
         text = _read(config)
         keys = json_value(text)
-        sources = [algorithm["source"] for algorithm in keys["algorithms"].values()]
-    except (OSError, SourceError, ValueError, LookupError, TypeError, AttributeError):
+        parts: dict[str, str] = {}
+        sources = _named(config, "", text, keys, parts)
+    except (OSError, SourceError, SourcePathError, ValueError, LookupError, TypeError, AttributeError, RecursionError):
         return None
-    if isinstance(keys.get("constants"), str):
-        sources.append(keys["constants"])
-    if '"csv"' in text:
-        sources += _columns(keys["instances"])
     files = _files(config, sources) if all(isinstance(source, str) for source in sources) else {}
-    return MachineTexts(text, keys, files) if files.keys() >= set(sources) else None
+    return MachineTexts(text, keys, parts | files) if files.keys() >= set(sources) else None
+
+
+def _named(config: Path, folder: str, text: str, keys: dict[str, Any], parts: dict[str, str]) -> list[str]:
+    """The files that a machine JSON of a folder names, and its parts, whose texts are added to `parts`."""
+    sources = [beside(folder, algorithm["source"]) for algorithm in keys["algorithms"].values()]
+    if isinstance(keys.get("constants"), str):
+        sources.append(beside(folder, keys["constants"]))
+    if '"csv"' in text:
+        sources += [beside(folder, name) for name in _columns(keys["instances"])]
+    for instance in keys["instances"].values() if '"machine"' in text else ():
+        if "machine" in instance and (name := beside(folder, instance["machine"])) not in parts:
+            parts[name] = _read(resolve_source(name, config=config))
+            own = json_value(parts[name])
+            sources += _named(config, name.rpartition("/")[0], parts[name], own, parts)
+    return sources
 
 
 def _columns(node: Any) -> list[str]:

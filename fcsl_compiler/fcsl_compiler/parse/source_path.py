@@ -16,6 +16,11 @@ class SourcePathError(ValueError):
     """A source path that is not allowed. str() gives the reason."""
 
 
+def beside(folder: str, text: str) -> str:
+    """What a text names that stands in a file of `folder`."""
+    return f"{folder}/{text}" if folder and not text.startswith("package://") else text
+
+
 def resolve_source(text: str, *, config: Path) -> Path:
     """The file that `text` names in the configuration file `config`. Raises SourcePathError if the path leaves the
     configuration's folder."""

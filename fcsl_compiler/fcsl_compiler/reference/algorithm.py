@@ -165,7 +165,10 @@ class Algorithm:
     """One class of a file. `records`: types of its four records. `type`: type of `self`, which has the ports of all
     records as fields. `run(name, self)` calls start or execute."""
 
-    def __init__(self, module: SourceModule, name: str, sizes: Mapping[str, int] = MappingProxyType({})):
+    def __init__(
+        self, module: SourceModule, name: str, sizes: Mapping[str, int] = MappingProxyType({}), part: str = ""
+    ):
+        self.part = part  # of the machine, whose file names it
         node = next(n for n in module.tree.body if isinstance(n, ast.ClassDef) and n.name == name)
         node = _WithSizes(sizes).visit(copy.deepcopy(node)) if sizes else node
         self.module = module

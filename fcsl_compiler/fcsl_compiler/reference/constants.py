@@ -35,10 +35,14 @@ _FUNCTIONS: dict[str, Callable[..., Any]] = {
 
 
 class Literals:
-    """Values of a machine JSON that the compiler has accepted; files that it names are relative to `folder`."""
+    """Values of a machine JSON that the compiler has accepted; files that it names are relative to `folder`. Texts with a
+    `part` are of the file of that part."""
 
     def __init__(self, config: Mapping[str, Any], folder: Path):
         self._folder = folder
+        self._parts = {
+            name: Literals(part, Path(part["path"]).parent) for name, part in config.get("parts", {}).items()
+        }
         self._constants: dict[str, Any] = {}
         declared = config.get("constants", {})
         if isinstance(declared, str):
@@ -48,11 +52,15 @@ class Literals:
 
     def number(self, value: Any) -> Any:
         """A number, or the value of an expression."""
-        return _value(ast.parse(value.strip(), mode="eval").body, self._constants) if isinstance(value, str) else value
+        if not isinstance(value, str):
+            return value
+        own = self._parts.get(getattr(value, "part", ""), self)
+        return _value(ast.parse(value.strip(), mode="eval").body, own._constants)
 
     def column(self, csv_file: str, column: str) -> list[float]:
         """The numbers of a column."""
-        with self._path(csv_file).open(encoding="utf-8-sig", newline="") as stream:
+        own = self._parts.get(getattr(csv_file, "part", ""), self)
+        with own._path(csv_file).open(encoding="utf-8-sig", newline="") as stream:
             rows = [[cell.strip() for cell in row] for row in csv.reader(stream) if any(map(str.strip, row))]
         at = rows[0].index(column)
         return [float(row[at]) for row in rows[1:]]

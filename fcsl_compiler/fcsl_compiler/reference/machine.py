@@ -27,6 +27,7 @@ from .constants import Literals
 from .fault_places import FaultPlaces, FaultRow
 from .functions import wrap
 from .memory import HEALTH, Image, Layout, Leaf, Memory, Movers, from_json, leaves
+from .part_requests import Requests
 from .structs import Struct, slot
 from .types import SCALARS, Scalar, Type
 from .values import I64, Fault
@@ -77,6 +78,8 @@ class _Instance:
         self.name, self.algorithm, layout = instance.name, algorithm, reference.layout
         self.limit_ns, self.places = instance.max_wcet_us * 1000, reference.places
         self.given, self.frozen, self._literals = given, frozenset(instance.frozen), reference.literals
+        self._requests = reference.requests[algorithm.part]
+        movers = Movers(layout, self._requests.seen) if algorithm.part else reference.movers
         self.self_ = self._initial()
         self.health, self.request = (
             _cell(f"{self.name}.outputs.{port}", layout, 4) for port in ("health", "transition_request")
@@ -91,17 +94,17 @@ class _Instance:
         written = [*own["outputs"], *own["state"]]
         if "transition_request" not in algorithm.records["outputs"].members:
             written.append(Leaf(layout[f"{self.name}.outputs.transition_request"], SCALARS["i32"], "0"))
-        self.store_inputs = reference.movers.storer(own["inputs"])
-        self.store_parameters = reference.movers.storer(own["parameters"])
-        self.store = reference.movers.storer(written)
-        self.load = self._loader(own, reference)
-        self._load_for_start = reference.movers.loader([*own["parameters"], *own["outputs"], *own["state"]])
+        self.store_inputs = movers.storer(own["inputs"])
+        self.store_parameters = movers.storer(own["parameters"])
+        self.store = movers.storer(written)
+        self.load = self._loader(own, reference, movers)
+        self._load_for_start = movers.loader([*own["parameters"], *own["outputs"], *own["state"]])
 
     def _initial(self) -> Struct:
         """`self` before init: values of the JSON and zeros. Frozen parameters are constants."""
         made = self.algorithm.type.zero()
         for name, value in self.given.items():
-            stored = from_json(self.algorithm.type.members[name], value, self._literals)
+            stored = from_json(self.algorithm.type.members[name], value, self._literals, self._requests.name)
             setattr(made, slot(name), _constant(stored) if name in self.frozen else stored)
         return made
 
@@ -109,7 +112,9 @@ class _Instance:
         for name, type_ in self.algorithm.records[record].members.items():
             yield from leaves(type_, f"s.{slot(name)}", f"{self.name}.{record}.{name}", layout)
 
-    def _loader(self, own: Mapping[str, list[Leaf]], reference: ReferenceMachine) -> Callable[[Any, Memory], None]:
+    def _loader(
+        self, own: Mapping[str, list[Leaf]], reference: ReferenceMachine, movers: Movers
+    ) -> Callable[[Any, Memory], None]:
         """Loads the ports. A connected input comes from its source. Health and request are cleared."""
         skipped = {f"s.{slot(name)}" for name in (*self.frozen, "health", "transition_request")}
         connected, given = reference.connected(self.name)
@@ -119,7 +124,7 @@ class _Instance:
         pulses = {f"s.{slot('health')}": "nominal"}
         if "transition_request" in self.algorithm.records["outputs"].members:
             pulses[f"s.{slot('transition_request')}"] = ""
-        return reference.movers.loader([*wanted, *connected], given | pulses)
+        return movers.loader([*wanted, *connected], given | pulses)
 
     def init(self, image: Image) -> None:
         self.self_ = self._initial()
@@ -256,7 +261,9 @@ class ReferenceMachine:
         self._lost_requests = _optional("machine.lost_requests", layout)
         self._state, self._next = (_cell(f"machine.{name}", layout, 4) for name in ("state", "next_state"))
         self._current = _cell("machine.current", layout, 4)
-        config = json.loads(machine.config.text)
+        config = machine.tree or json.loads(machine.config.text)
+        parts = {name: part["requests"] for name, part in config.get("parts", {}).items()}
+        self.requests = {name: Requests(machine.requests, name, {"": {}, **parts}) for name in ("", *parts)}
         self.literals = Literals(config, Path(machine.config.path).parent)
         self._algorithms = self._load(config, externs)
         self._sensors = {c.name: _Sensor(c, layout) for c in machine.channels if c.direction == "sensor"}
@@ -264,12 +271,15 @@ class ReferenceMachine:
         delayed = [c for c in config.get("connections", []) if c.get("delayed")]
         for instance in machine.instances:
             written = config["instances"][instance.name]
-            defaults = self._algorithms[instance.algorithm.name].defaults
+            algorithm = self._algorithms[instance.algorithm.name]
+            defaults = self.requests[algorithm.part].defaults(algorithm.defaults)
             given = {**defaults, **written.get("parameters", {}), **written.get("inputs", {})}
             given |= {
-                c["to"].partition(".")[2]: c["initial"] for c in delayed if c["to"].startswith(f"{instance.name}.")
+                c["to"].removeprefix(f"{instance.name}."): c["initial"]
+                for c in delayed
+                if c["to"].startswith(f"{instance.name}.")
             }
-            self._instances.append(_Instance(instance, self._algorithms[instance.algorithm.name], given, self))
+            self._instances.append(_Instance(instance, algorithm, given, self))
         self._sensors_of = [[s for s in self._sensors.values() if s.instance == i] for i in range(len(self._instances))]
         self._states = [_State(n, s, machine.edges, self._instances) for n, s in enumerate(machine.states)]
         self._delayed = [(c.target.instance, self._copies(c)) for c in machine.connections if c.delayed]
@@ -303,9 +313,9 @@ class ReferenceMachine:
         found: dict[str, Algorithm] = {}
         for algorithm in self.machine.algorithms:
             entry = config["algorithms"][algorithm.name]
-            module, class_name = load(paths[algorithm.source]), entry.get("class", algorithm.name)
+            module, class_name = load(paths[algorithm.source]), str(entry.get("class", algorithm.name))
             sizes = {n: int(self.literals.number(size)) for n, size in entry.get("sizes", {}).items()}
-            found[algorithm.name] = Algorithm(module, class_name, sizes)
+            found[algorithm.name] = Algorithm(module, class_name, sizes, getattr(entry["source"], "part", ""))
         return found
 
     def _hardware(self, name: str) -> Callable[..., Any]:

@@ -162,19 +162,22 @@ def _function(name: str, lines: list[str], names: dict[str, Any]) -> Callable[[A
     return function
 
 
-def from_json(type_: Type, value: Any, literals: Literals) -> Any:
+def from_json(type_: Type, value: Any, literals: Literals, request: Callable[[str], str]) -> Any:
     """Converts a value of the machine JSON: nested lists for arrays, objects for structs, names for healths, expressions of
-    constants for numbers, columns of files for vectors."""
+    constants for numbers, columns of files for vectors. `request`: what the algorithm calls one."""
     if isinstance(type_, StructType):
-        return type_.of({name: from_json(member, value[name], literals) for name, member in type_.members.items()})
+        return type_.of(
+            {name: from_json(member, value[name], literals, request) for name, member in type_.members.items()}
+        )
     if isinstance(type_, ArrayType):
         if isinstance(value, dict) and "csv" in value:
             value = literals.column(value["csv"], value["column"])
         if not isinstance(value, list):  # a default of every element
-            return type_.of([from_json(type_.element, value, literals) for _ in range(type_.count)])
+            return type_.of([from_json(type_.element, value, literals, request) for _ in range(type_.count)])
         flat = [value]
         for _ in type_.shape:
             flat = [item for row in flat for item in row]
-        return type_.of([from_json(type_.element, item, literals) for item in flat])
-    is_word = type_.name in ("Health", "TransitionRequest")
-    return type_.store(value if is_word else literals.number(value))
+        return type_.of([from_json(type_.element, item, literals, request) for item in flat])
+    if type_.name == "TransitionRequest":
+        return type_.store(request(value))
+    return type_.store(str(value) if type_.name == "Health" else literals.number(value))

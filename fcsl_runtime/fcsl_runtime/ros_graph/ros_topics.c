@@ -113,12 +113,14 @@ static int add_instance(ros_topics_t *topics, const fcsl_instance_t *instance, c
     ros_topic_t *topic = &topics->topics[topics->count++];
     topic->kind = ROS_INSTANCE;
     char *schema = fcsl_interface_schema(instance);
-    if (schema == NULL) {
-        return fcsl_fail(error, "out of memory for topics");
+    char *name = fcsl_interface_topic(instance);
+    int failed = schema == NULL || name == NULL ? fcsl_fail(error, "out of memory for topics") : 0;
+    if (failed == 0) {
+        failed = fcsl_layout_build(topics->machine, instance, &topic->layout, error) != 0 ||
+                 ros_key_write(topic->key, name_space, topics->machine->name, name, error) != 0 ||
+                 announce(topic, instance->message_type, schema, DEPTH_STREAM, error) != 0;
     }
-    const int failed = fcsl_layout_build(topics->machine, instance, &topic->layout, error) != 0 ||
-                       ros_key_write(topic->key, name_space, topics->machine->name, instance->name, error) != 0 ||
-                       announce(topic, instance->message_type, schema, DEPTH_STREAM, error) != 0;
+    free(name);
     free(schema);
     topic->longest = topic->layout.size;
     return failed ? -1 : 0;

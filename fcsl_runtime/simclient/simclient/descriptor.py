@@ -99,6 +99,11 @@ class Instance:
     message_text: str
     published: bool
 
+    @property
+    def topic(self) -> str:
+        """Its topic below that of the machine: `att/rate` of instance `att.rate`."""
+        return self.name.replace(".", "/")
+
 
 @dataclass(frozen=True)
 class Channel:

@@ -18,7 +18,9 @@ _PART = re.compile(r"(?:^|\.)([^.\[\]]+)|\[([^\[\]]*)\]")
 _MAX_LISTED = 12
 #: Roles of fields that may be members of a struct; their paths begin with instance, record and port.
 _PORT_ROLES = ("input", "output", "parameter", "state")
-_PORT_DEPTH = 3
+#: The parts of an instance.
+PARTS = ("inputs", "outputs", "parameters", "state", "counters")
+_OF_INSTANCE = re.compile(rf"(?!machine\.|channels\.)(.+?)\.({'|'.join(PARTS)})\.(.+)", re.DOTALL)
 
 
 @dataclass(frozen=True)
@@ -142,10 +144,17 @@ def _struct(path: str, steps: _Steps, machine: Machine) -> Part:
     below = _below(name, machine)
     if not below:
         raise _unknown(path, steps, machine)
-    if len(steps) < _PORT_DEPTH or any(f.role not in _PORT_ROLES for f in below):
+    if not split_path(name)[0] or any(f.role not in _PORT_ROLES for f in below):
         shown = ", ".join(f.path for f in below[:_MAX_LISTED]) + (", …" if len(below) > _MAX_LISTED else "")
         raise TwinError(f"`{path}` is not a field but a group of fields: {shown}")
     return _group(name, [(_split(f.path.removeprefix(name)), f) for f in below])
+
+
+def split_path(path: str) -> tuple[str, str, str]:
+    """Instance, part and field of `nav.outputs.angle`; the instance may have dots, `att.rate`. "", "" and the path if it
+    names no part of an instance."""
+    match = _OF_INSTANCE.fullmatch(path)
+    return (match[1], match[2], match[3]) if match else ("", "", path)
 
 
 def _below(name: str, machine: Machine) -> list[Field]:

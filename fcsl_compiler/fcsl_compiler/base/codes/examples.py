@@ -88,6 +88,19 @@ class Pilot:
         self.transition_request = self.on_done
 '''
 
+#: A part, `part.json`.
+EXAMPLE_PART = """\
+{
+  "tick_hz": 100,
+  "initial_state": "RUN",
+  "structs": {"Order": {"word": "TransitionRequest"}},
+  "algorithms": {"Pilot": {"source": "pilot.py"}},
+  "instances": {"pilot": {"algorithm": "Pilot", "parameters": {"on_done": "DONE"}}},
+  "states": {"RUN": {"schedule": {"pilot": 50}}},
+  "requests": ["DONE"]
+}
+"""
+
 EXAMPLE_LAMP = '''\
 class Lamp:
     """Is lit while the vehicle is armed."""

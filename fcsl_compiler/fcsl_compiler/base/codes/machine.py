@@ -610,6 +610,45 @@ MACHINE_CODES: dict[str, Code] = {
         '"instances": {"nav": {"algorithm": "Nav"}, "control": {"algorithm": "Control", "parameters": {"gain": 2.0},\n'
         '              "inputs": {"rate": [0.0, 0.0, 1.0]}}}',
     ),
+    "E254": Code(
+        "a machine that cannot be a part as it stands",
+        "A machine among the instances is a part: it has one state, no channels and no transitions, and rates in Hz. It is "
+        "scheduled as a whole, by `true`: each of its instances runs at its own rate, which divides the tick_hz of the "
+        "machine. A phase is converted to ticks of the machine. Only what its `ports` list can be named from outside.",
+        Kind.JSON,
+        '"instances": {"nav": {"algorithm": "Nav"}, "control": {"algorithm": "Control", "parameters": {"gain": 2.0}},\n'
+        '              "lights": {"machine": "part.json", "requests": {"DONE": "ABORT"}}},\n'
+        '"states": {"COAST": {"schedule": {"nav": 100, "control": 50, "lights": 50}}, "SAFE": {"schedule": {"nav": 10}}}',
+        '"instances": {"nav": {"algorithm": "Nav"}, "control": {"algorithm": "Control", "parameters": {"gain": 2.0}},\n'
+        '              "lights": {"machine": "part.json", "requests": {"DONE": "ABORT"}}},\n'
+        '"states": {"COAST": {"schedule": {"nav": 100, "control": 50, "lights": true}}, "SAFE": {"schedule": {"nav": 10}}}',
+    ),
+    "E255": Code(
+        "two structs of one name",
+        "The structs of a machine and of its parts have one table: a value may go from one to the other. Two of the same "
+        "name have the same members, types and units.",
+        Kind.JSON,
+        '"structs": {"Goal": {"position": "f64[3] m", "speed": "f64 m/s"}, "Order": {"number": "i32"}},\n'
+        '"instances": {"nav": {"algorithm": "Nav"}, "control": {"algorithm": "Control", "parameters": {"gain": 2.0}},\n'
+        '              "lights": {"machine": "part.json", "requests": {"DONE": "ABORT"}}},\n'
+        '"always": {"lights": true}',
+        '"structs": {"Goal": {"position": "f64[3] m", "speed": "f64 m/s"}, "Order": {"word": "TransitionRequest"}},\n'
+        '"instances": {"nav": {"algorithm": "Nav"}, "control": {"algorithm": "Control", "parameters": {"gain": 2.0}},\n'
+        '              "lights": {"machine": "part.json", "requests": {"DONE": "ABORT"}}},\n'
+        '"always": {"lights": true}',
+    ),
+    "E256": Code(
+        "a request of a part without a name",
+        "A part lists in `requests` all that its algorithms may request. The machine that it is in says what each is called "
+        "there, each by another name. The code of a helper cannot name one, because other algorithms call it, too.",
+        Kind.JSON,
+        '"instances": {"nav": {"algorithm": "Nav"}, "control": {"algorithm": "Control", "parameters": {"gain": 2.0}},\n'
+        '              "lights": {"machine": "part.json"}},\n'
+        '"always": {"lights": true}',
+        '"instances": {"nav": {"algorithm": "Nav"}, "control": {"algorithm": "Control", "parameters": {"gain": 2.0}},\n'
+        '              "lights": {"machine": "part.json", "requests": {"DONE": "ABORT"}}},\n'
+        '"always": {"lights": true}',
+    ),
     "W201": Code(
         "an algorithm without an instance",
         "The algorithm is checked, but is not part of the machine. Usually its instance was removed or never added.",

@@ -105,14 +105,14 @@ class DescriptorEmitter:
                 of.setdefault(row.instance, []).append(number)
         for index, i in enumerate(self.m.instances):
             own = of[index]
-            overrun = self._offset(f"i_{i.name}.counters.inject_overrun") if i.max_wcet_us else "FCSL_NO_OFFSET"
-            fault = self._offset(f"i_{i.name}.counters.inject_fault")
+            overrun = self._offset(f"i_{i.identifier}.counters.inject_overrun") if i.max_wcet_us else "FCSL_NO_OFFSET"
+            fault = self._offset(f"i_{i.identifier}.counters.inject_fault")
             rows.append(
                 f"{{{c_string(i.name)}, {c_string(i.algorithm.name)}, {c_string(i.algorithm.source)}, "
                 f"{i.algorithm.execute.span.line}u, {own[0]}u, {len(own)}u, "
-                f"{self._offset(f'i_{i.name}.outputs.transition_request')}, {self._offset(f'i_{i.name}.outputs.health')}, "
-                f"{self._offset(f'i_{i.name}.counters.faults')}, {self._offset(f'i_{i.name}.counters.overruns')}, "
-                f"{self._offset(f'i_{i.name}.counters.fault_place')}, {overrun}, {fault}, "
+                f"{self._offset(f'i_{i.identifier}.outputs.transition_request')}, {self._offset(f'i_{i.identifier}.outputs.health')}, "
+                f"{self._offset(f'i_{i.identifier}.counters.faults')}, {self._offset(f'i_{i.identifier}.counters.overruns')}, "
+                f"{self._offset(f'i_{i.identifier}.counters.fault_place')}, {overrun}, {fault}, "
                 f"{i.max_wcet_us}u, {int(i.published)}u, "
                 f"{c_string(f'{self.m.package}/msg/{message_name(self.m, i)}')}, {c_string(message_definition(self.m, i))}}}"
             )

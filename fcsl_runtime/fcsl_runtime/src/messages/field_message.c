@@ -150,17 +150,20 @@ static int put_members(builder_t *b, FILE *out, uint32_t first, uint32_t last, s
 }
 
 /* Where names begin: behind "nav.inputs.", or "channels.". */
-static size_t prefix_of(const fcsl_field_t *field)
+static size_t prefix_of(const fcsl_machine_t *machine, const fcsl_field_t *field)
 {
-    const size_t first = strcspn(field->path, ".") + 1u;
-    return field->role == FCSL_ROLE_CHANNEL ? first : first + strcspn(field->path + first, ".") + 1u;
+    if (field->instance == FCSL_NONE) {
+        return strcspn(field->path, ".") + 1u;
+    }
+    const size_t record = strlen(machine->instances[field->instance].name) + 1u;
+    return record + strcspn(field->path + record, ".") + 1u;
 }
 
 static int put_texts(builder_t *b, uint32_t count, FILE *out, FILE *structs)
 {
     b->structs = structs;
     (void)fputs("std_msgs/Header header\nuint64 tick\n", out);
-    return put_members(b, out, 0, count, prefix_of(b->leaves[0]));
+    return put_members(b, out, 0, count, prefix_of(b->machine, b->leaves[0]));
 }
 
 static int build_schema(builder_t *b, uint32_t count, char **schema)

@@ -294,6 +294,15 @@ char *fcsl_interface_schema(const fcsl_instance_t *instance)
     return asprintf(&schema, "%s%s" FCSL_SCHEMA_HEADER, instance->message_text, newline) < 0 ? NULL : schema;
 }
 
+char *fcsl_interface_topic(const fcsl_instance_t *instance)
+{
+    char *topic = strdup(instance->name);
+    for (char *dot = topic; dot != NULL && (dot = strchr(dot, '.')) != NULL;) {
+        *dot = '/';
+    }
+    return topic;
+}
+
 void fcsl_layout_free(fcsl_layout_t *layout)
 {
     free(layout->copies);

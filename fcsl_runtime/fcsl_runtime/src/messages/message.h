@@ -33,6 +33,8 @@ int fcsl_layout_open(fcsl_layout_t *layout, uint32_t count);
 int fcsl_layout_append(fcsl_layout_t *layout, const fcsl_field_t *field);
 /* The complete ros2msg text of an instance's interface; the caller frees it. Null without memory. */
 char *fcsl_interface_schema(const fcsl_instance_t *instance);
+/* Its topic below that of the machine: "att/rate" of instance "att.rate". The caller frees it. Null without memory. */
+char *fcsl_interface_topic(const fcsl_instance_t *instance);
 
 void fcsl_layout_free(fcsl_layout_t *layout);
 

@@ -72,7 +72,7 @@ static uint32_t gather(const builder_t *b, fcsl_role_t role, int32_t instance, i
 static int add_interface(builder_t *b, const fcsl_instance_t *instance)
 {
     fcsl_record_topic_t *shown = &b->shown[b->count++];
-    shown->topic = strdup(instance->name);
+    shown->topic = fcsl_interface_topic(instance);
     shown->type = strdup(instance->message_type);
     shown->schema = fcsl_interface_schema(instance);
     if (shown->topic == NULL || shown->type == NULL || shown->schema == NULL) {
@@ -109,7 +109,9 @@ static int add_instance(builder_t *b, uint32_t index)
     const fcsl_instance_t *instance = &b->machine->instances[index];
     const int package = (int)strcspn(instance->message_type, "/");
     const char *name = strrchr(instance->message_type, '/');
-    for (int i = 0; i < GROUP_COUNT; i++) {
+    char *topic = fcsl_interface_topic(instance);
+    int failed = topic == NULL ? fcsl_fail(b->error, "out of memory for messages") : 0;
+    for (int i = 0; i < GROUP_COUNT && failed == 0; i++) {
         const group_t *group = &GROUPS[i];
         int all = 0;
         const uint32_t count = gather(b, group->role, (int32_t)index, &all);
@@ -117,16 +119,15 @@ static int add_instance(builder_t *b, uint32_t index)
             continue;
         }
         if (group->role == FCSL_ROLE_OUTPUT && all) {
-            if (add_interface(b, instance) != 0) {
-                return -1;
-            }
-        } else if (add_fields(b, count, text_of("%s%s", instance->name, group->topic),
-                              text_of("%.*s_fields/msg/%s%s", package, instance->message_type,
-                                      name != NULL ? name + 1 : "", group->type)) != 0) {
-            return -1;
+            failed = add_interface(b, instance);
+        } else {
+            failed = add_fields(b, count, text_of("%s%s", topic, group->topic),
+                                text_of("%.*s_fields/msg/%s%s", package, instance->message_type,
+                                        name != NULL ? name + 1 : "", group->type));
         }
     }
-    return 0;
+    free(topic);
+    return failed;
 }
 
 static int by_path(const void *a, const void *b)

@@ -347,11 +347,12 @@ class Bag:
                     found.append(RecordedMachine(prefix.rsplit("/", 1)[-1], prefix, {}, by_bystander=True))
                 continue
             outputs = {
-                topic.name.removeprefix(prefix + "/"): topic.name
+                topic.name.removeprefix(prefix + "/").replace("/", "."): topic.name
                 for topic in self.topics.values()
                 if topic.name.startswith(prefix + "/")
-                and "/" not in topic.name.removeprefix(prefix + "/")
+                and not topic.name.startswith(prefix + "/record/")
                 and not topic.type.startswith(_OWN_PACKAGE)
+                and (topic.type.endswith("Outputs") or not is_made_for_a_record(topic))
             }
             fields = {
                 ".".join(topic.name.removeprefix(prefix + "/record/").removeprefix(prefix + "/").split("/")): topic.name

@@ -7,6 +7,7 @@ import math
 from collections.abc import Mapping
 from dataclasses import dataclass, field
 
+from ..paths import split_path
 from ..telemetry.configuration import Channel
 from ..view.scene import Cast
 from ..view.signals import Signals
@@ -19,7 +20,6 @@ _OUTPUTS = "outputs"
 #: Topic suffix, as in bags, of fields without an instance: `channels.imu.valid` is imu.valid of record/channels.
 _RECORD = "record"
 _FLOATS = ("f32", "f64")
-_PARTS = ("inputs", _OUTPUTS, "parameters", "state", "counters")
 #: Larger arrays are left out, because every element is drawn as a line.
 ELEMENTS_MAX = 1024
 #: Most characters of a machine's name, which comes from an untrusted sender.
@@ -63,7 +63,7 @@ def channels_of(
             continue  # no machine has such a channel
         elif path not in _MACHINE:
             owner, part, name = _parts(path)
-            home = f"/sim/{owner}" if owner in plant else f"{prefix}/{owner or _RECORD}"
+            home = f"/sim/{owner}" if owner in plant else f"{prefix}/{owner.replace('.', '/') or _RECORD}"
             topic = home if part == _OUTPUTS else f"{home}/{part}"
             whose = ".".join(filter(None, (owner, part))) if part != _OUTPUTS else owner
             its = topics.setdefault(topic, _Topic(whose, part != _OUTPUTS))
@@ -92,7 +92,7 @@ def channels_of(
 
 def is_health(path: str) -> bool:
     """Whether the path is the health of an instance; other fields named health are ordinary values."""
-    return path.partition(".")[2] == f"{_OUTPUTS}.health"
+    return split_path(path)[1:] == (_OUTPUTS, "health")
 
 
 def _plant(channels: Mapping[str, Channel]) -> set[str]:
@@ -104,6 +104,6 @@ def _plant(channels: Mapping[str, Channel]) -> set[str]:
 
 def _parts(path: str) -> tuple[str, str, str]:
     """Owner, part and field of `nav.outputs.angle`. A path without an instance has an empty owner."""
-    owner, _, rest = path.partition(".")
-    part, _, name = rest.partition(".")
-    return (owner, part, name) if part in _PARTS and name else ("", owner, rest or owner)
+    owner, part, name = split_path(path)
+    first, _, rest = path.partition(".")
+    return (owner, part, name) if owner else ("", first, rest or first)

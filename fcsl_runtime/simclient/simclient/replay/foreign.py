@@ -13,6 +13,7 @@ from ..bag import Bag
 from ..c_run import CSeries
 from ..descriptor import Channel, Machine
 from ..errors import BagError, MapError, did_you_mean
+from ..paths import split_path
 from ..run import Run
 from .expect import Comparison, table
 from .mapping import Entry, Map
@@ -315,7 +316,7 @@ def run_foreign(
         fates=fates,
         oddities=oddities,
         unmapped=tuple(channel.name for channel in unmapped),
-        starved=tuple(dict.fromkeys(c.field.path.partition(".")[0] for c in unmapped if c.grace_ticks != NEVER)),
+        starved=tuple(dict.fromkeys(split_path(c.field.path)[0] for c in unmapped if c.grace_ticks != NEVER)),
         notes=tuple(bag.notes),
         truncated=bag.truncated,
         digest=outputs.digest() if outputs else "",

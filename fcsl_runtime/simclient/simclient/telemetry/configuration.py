@@ -14,6 +14,7 @@ from typing import NamedTuple
 
 from ..c_machine import HEALTH_NAMES, TYPE_FORMATS, TYPE_NAMES
 from ..descriptor import Field, Machine
+from ..paths import split_path
 from .limits import BODY_BYTES_MAX, CHANNELS_MAX, PATH_CHARACTERS_MAX, RANK_MAX
 
 #: Head of a data body: tick, time_ns, overwritten.
@@ -185,19 +186,19 @@ def _labelled(kind: str, labels: Sequence[str]) -> bool:
 
 def _field(index: int, path: str, channel: Channel, offset: int) -> Field:
     """The field as in a descriptor; attributes that the configuration lacks are empty."""
-    first, _, rest = path.partition(".")
-    role = _ROLES.get(rest.partition(".")[0], "")
+    instance, part, _ = split_path(path)
+    role = _ROLES.get(part, "")
     count = math.prod(channel.shape)
     return Field(
         index=index,
         path=path,
-        role=role or ("channel" if first == "channels" else "machine"),
+        role=role or ("channel" if path.startswith("channels.") else "machine"),
         type=channel.type,
         shape=channel.shape,
         count=count,
         offset=offset,
         size=count * struct.calcsize(f"<{TYPE_FORMATS[channel.type]}"),
-        instance=first if role else "",
+        instance=instance,
         connected_from="",
         unit=channel.unit,
         doc="",

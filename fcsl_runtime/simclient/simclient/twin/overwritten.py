@@ -12,11 +12,12 @@ from pathlib import Path
 
 from ..descriptor import Field
 from ..errors import OverwrittenWarning
+from ..paths import split_path
 
 _PACKAGE = str(Path(__file__).parents[1]) + os.sep
 #: Most inputs listed in one message.
 _SHOWN = 3
-_PORT = re.compile(r"[^.]+\.inputs\.[^.\[]+")
+_PORT = re.compile(r".+?\.inputs\.[^.\[]+")
 
 
 def warn_overwritten(fields: Iterable[Field]) -> None:
@@ -39,7 +40,7 @@ def _connection(field: Field) -> tuple[str, str]:
 
 
 def _one(target: str, source: str) -> str:
-    instance, feeder = target.partition(".")[0], source.partition(".")[0]
+    instance, feeder = split_path(target)[0], split_path(source)[0] or source.partition(".")[0]
     text = f"{target} is connected from {source}, which is copied over it when `{instance}` next runs"
     if feeder in ("machine", "the machine", "channels"):
         return text

@@ -14,7 +14,7 @@ import numpy as np
 from ..c_machine import TYPE_FORMATS
 from ..descriptor import Channel, Field, Machine, why_read_only
 from ..errors import BagError, TwinError, did_you_mean
-from ..paths import Selection, resolve
+from ..paths import Selection, resolve, split_path
 from ..samples import NO_CHANNEL, SAMPLE
 from ..values import encode
 
@@ -244,7 +244,7 @@ class _Reader:
     def _set(self, write: Any, tick: int, value: bytes) -> None:
         known = self._machine.fields.get(write.path)
         if known is None:
-            is_ours = write.path.partition(".")[0] in self._instances
+            is_ours = split_path(write.path)[0] in self._instances
             self._pass_over(f"writes `{write.path}`", did_you_mean(write.path, self._machine.fields), is_ours)
         elif known.role == "parameter":
             return

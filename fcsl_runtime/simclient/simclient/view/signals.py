@@ -12,6 +12,7 @@ from itertools import product
 
 from fcsl_compiler.api.ros_names import recorded_path
 
+from ..paths import PARTS
 from ..ros.cdr import Layout
 
 #: A declaration of a generated message, whose comment may begin with a unit: `float64 pos_z # [m] …`.
@@ -60,14 +61,15 @@ class Signals:
     @property
     def owner(self) -> str:
         """The instance, or the model of the plant."""
-        return self.name.partition(".")[0]
+        return self.name.removesuffix(f".{self.part}")
 
     @property
     def part(self) -> str:
         """`outputs`, `inputs`, `parameters`, `state`, `counters`; empty for values without an instance."""
         if self.name.startswith("/") or self.name in _WITHOUT_INSTANCE:
             return ""
-        return self.name.partition(".")[2] or "outputs"
+        _, dot, last = self.name.rpartition(".")
+        return last if dot and last in PARTS else "outputs"
 
     @property
     def is_gate(self) -> bool:

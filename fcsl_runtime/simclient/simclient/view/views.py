@@ -25,7 +25,7 @@ PANELS_MAX, CURVES_MAX, FRAMES_MAX = 16, 8, 64
 _NAME_CHARACTERS_MAX = 400
 _SIZE_M, _LANDER_SIZE_M = 1.0, 3.0
 _STEP = r"[^\s.\[\]]+(?:\[[0-9]+\])*"
-_PATH = re.compile(rf"{_STEP}\.(?:inputs|outputs|parameters|state)(?:\.{_STEP})+")
+_PATH = re.compile(rf"{_STEP}(?:\.{_STEP})*?\.(?:inputs|outputs|parameters|state)(?:\.{_STEP})+")
 
 
 @dataclass(frozen=True)
