@@ -15,6 +15,7 @@ from fcsl_builtins import (
     norm,
     normalize,
     outer,
+    pi,
     quat_normalize,
 )
 
@@ -82,7 +83,7 @@ class Triad:
         v2 = unit(self.secondary_reference)
         angle = apart(w1, w2)
         known = apart(v1, v2)
-        least = min(angle, apart(w1, -w2), known, apart(v1, -v2))
+        least = min(angle, pi - angle, known, pi - known)
         usable = least >= self.failed_angle and known >= 0.0  # min keeps a NaN of angle, but passes over one of known
         mark = 0.0 if usable else nan
         if not usable:
