@@ -1,7 +1,7 @@
 # SPDX-License-Identifier: Apache-2.0
 """The PID controller with two degrees of freedom."""
 
-from fcsl_builtins import clamp, isfinite
+from fcsl_builtins import clamp, f64, isfinite, min
 
 
 class Pid:
@@ -64,15 +64,27 @@ class Pid:
             self.derivative = 0.0
             self.integral = clamp(self.track, self.low, self.high) - proportional - self.feedforward
         else:
-            lag = self.derivative_time + self.period
-            self.derivative = (self.derivative_time * self.derivative + self.kd * (weighted - self.last)) / lag
+            self.derivative = differentiated(
+                self.derivative, self.kd, weighted - self.last, self.derivative_time, self.period
+            )
         self.last = weighted
         wanted = proportional + self.integral + self.derivative + self.feedforward
         self.command = clamp(wanted, self.low, self.high)
         self.saturated = self.command != wanted
         step = self.ki * error * self.period
-        if self.tracking_time > 0.0:
-            back = min(self.period / self.tracking_time, 1.0)
-            self.integral += step + back * (self.command - wanted)
-        elif not (wanted > self.high and step > 0.0 or wanted < self.low and step < 0.0):
-            self.integral += step
+        self.integral = integrated(self.integral, step, wanted, self.low, self.high, self.tracking_time, self.period)
+
+
+def differentiated(derivative: f64, kd: f64, change: f64, time: f64, period: f64) -> f64:
+    """D of this run: of the run before, of kd, and of the change of c r - y; `time` is that of the filter."""
+    return (time * derivative + kd * change) / (time + period)
+
+
+def integrated(integral: f64, step: f64, wanted: f64, low: f64, high: f64, tracking_time: f64, period: f64) -> f64:
+    """I of the next run, with anti-windup: of this run, of ki (r - y) period, and of v."""
+    if tracking_time > 0.0:
+        back = min(period / tracking_time, 1.0)
+        return integral + (step + back * (clamp(wanted, low, high) - wanted))
+    if wanted > high and step > 0.0 or wanted < low and step < 0.0:
+        return integral
+    return integral + step
