@@ -70,8 +70,8 @@ class ControlAllocation:
         released = 0
         clipping = True  # nothing has been released
         self.optimal = False
-        for k in range(ROUNDS * len(self.low)):
-            self.rounds = k + 1
+        for done in range(ROUNDS * len(self.low)):
+            self.rounds = done + 1
             step, gradient, curvature, doubt = free_minimum(
                 self.effectiveness, wanted, self.error_weight, self.effort_weight, self.preferred, u, held
             )
@@ -108,7 +108,7 @@ class ControlAllocation:
             if most == 0.0:
                 self.optimal = isfinite(u[0])
                 break
-            held[released] = False
+            held[clamp(released, 0, len(self.low) - 1)] = False  # clamped: proof for the compiler
         self.command = u
         self.achieved = matvec(self.effectiveness, u)
         for i in range(len(self.low)):
@@ -154,7 +154,7 @@ def free_minimum(
         curvature = curvature + row * row
     step = zeros(len(u))
     for back in range(len(u)):
-        i = len(u) - 1 - back
-        if not held[i]:
-            step[i] = (target[i] - dot(triangle[i], step)) / triangle[i, i]
+        k = len(u) - 1 - back
+        if not held[k]:
+            step[k] = (target[k] - dot(triangle[k], step)) / triangle[k, k]
     return step, gradient, curvature, doubt
