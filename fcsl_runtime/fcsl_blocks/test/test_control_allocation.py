@@ -71,7 +71,7 @@ def test_it_is_the_bounded_least_squares_of_scipy(block: Callable[..., Any], n: 
     rng = np.random.default_rng(100 * n + m)
     unit = allocation(block, random_problem(rng, n, m, 0))
     at_limits = 0
-    for kind in range(30):
+    for kind in range(20):
         of = random_problem(rng, n, m, kind)
         wanted = demand(rng, of, [0.5, 1.0, 1.5, 3.0, 100.0][kind % 5])
         unit.set(**plain(of))
@@ -85,7 +85,7 @@ def test_it_is_the_bounded_least_squares_of_scipy(block: Callable[..., Any], n: 
         assert (out["command"] >= of["low"]).all() and (out["command"] <= of["high"]).all()
         assert (out["rounds"] == 1) == (not held.any())
         at_limits += int(held.sum())
-    assert at_limits > 5 * n
+    assert at_limits > 3 * n
 
 
 def test_it_is_the_trust_region_solution_of_scipy(block: Callable[..., Any]) -> None:
@@ -129,14 +129,14 @@ def test_a_demand_that_the_limits_allow_is_met(block: Callable[..., Any]) -> Non
     rng = np.random.default_rng(8)
     of = {"effectiveness": 1e5 * rng.normal(size=(3, 8)), "low": np.full(8, -1.0), "high": np.full(8, 1.0)}
     unit, failing = allocation(block, of), 0
-    for _ in range(200):
+    for _ in range(80):
         wanted = of["effectiveness"] @ rng.choice([-1.0, 1.0, 0.9], 8) * 0.9
         out = feed(unit, wanted)
         np.testing.assert_allclose(out["achieved"], wanted, atol=1e-3)
         assert out["optimal"]
         clipped = np.clip(np.linalg.pinv(of["effectiveness"]) @ wanted, -1.0, 1.0)
         failing += bool(np.abs(of["effectiveness"] @ clipped - wanted).max() > 1.0)
-    assert failing > 20
+    assert failing > 10
 
 
 def test_weights_say_which_axis_yields(block: Callable[..., Any]) -> None:
@@ -247,7 +247,7 @@ def test_extremes(block: Callable[..., Any]) -> None:
         "error_weight": [0.0, 1e6, 5e-324, 1.0, 1e-3],
         "effort_weight": [1e-6, 1e6, 1.0, 1e-3],
     }
-    for _ in range(300):
+    for _ in range(150):
         shapes = {n: (3, 4) if n == "effectiveness" else (3,) if n == "error_weight" else (4,) for n in extremes}
         of = {n: rng.choice(v, shapes[n]) for n, v in extremes.items()}
         unit.set(**plain(of))
