@@ -636,6 +636,38 @@ def test_the_deviations_after_a_reset(block: Callable[..., Any], aid: str) -> No
         np.testing.assert_allclose(out["velocity_sigma"], np.hypot([0.3, 0.4, 0.5], step / late), rtol=2e-2)
 
 
+def test_a_reset_of_the_heading_keeps_the_tilt(block: Callable[..., Any]) -> None:
+    r = Rotation.from_euler("ZYX", [0.7, -0.6, 0.9])
+    f, _ = launched(block, r, DOWN, reset_after=0.015)
+    for _ in range(3):
+        out = feed(f, **at_rest(r), **seen(heading=-2.0))
+    assert out["resets"][3] == 1
+    np.testing.assert_allclose(rotation(out).as_euler("ZYX"), [-2.0, -0.6, 0.9], atol=1e-9)
+
+
+def test_a_reset_to_a_slope_moves_along_its_normal(block: Callable[..., Any]) -> None:
+    normal = np.array([0.3, -0.4, -1.0]) / np.linalg.norm([0.3, -0.4, -1.0])
+    f, reference = launched(block, LEVEL, DOWN, reset_after=0.015)
+    plane = {"ground": 2.0, "ground_normal": normal}
+    for _ in range(3):
+        out = feed(f, **HOVER, **plane, **seen(range=80.0))
+    assert out["resets"][4] == 1
+    step = out["position"] - DOWN["first_position"]
+    np.testing.assert_allclose(step, normal * (step @ normal), atol=1e-9)
+    reference.predict([0.0] * 3, HOVER["acceleration"])
+    state = Rotation.identity(), np.concatenate([np.zeros(3), out["position"], np.zeros(6)])
+    np.testing.assert_allclose(reference.expected("range", state, ground=2.0, normal=normal), 80.0)
+
+
+def test_a_reset_of_one_element_leaves_the_others(block: Callable[..., Any]) -> None:
+    f, _ = launched(block, LEVEL, DOWN, reset_after=0.015, measured_position_sigma=[0.5, 0.0, 0.0])
+    for _ in range(3):
+        out = feed(f, **HOVER, **seen(position=[90.0, NAN, NAN]))
+    assert out["resets"][0] == 1
+    np.testing.assert_allclose(out["position"], [90.0, 6.0, -20.0], atol=1e-9)
+    np.testing.assert_allclose(out["position_sigma"], [0.5, 3.0, 4.0], rtol=1e-4)
+
+
 def native(f: Any, **inputs: Any) -> dict[str, Any]:
     """A run of the compiled twin alone; inputs stay."""
     for n, v in inputs.items():
