@@ -4,6 +4,7 @@
 from __future__ import annotations
 
 import os
+import re
 import resource
 import subprocess
 from collections.abc import Callable
@@ -191,8 +192,8 @@ def test_a_chunk_may_unpack_to_the_limit_and_not_to_more(tmp_path: Path, monkeyp
     assert len(list(open_bag(file).messages())) < 20
 
 
-def test_a_bomb_takes_seconds(tmp_path: Path) -> None:
-    """60 GB in less than 2 MB, by 240 chunks of 250 MB of records without content."""
+def bomb(bag: Path, chunks: int) -> Path:
+    """Chunks of 250 MB of records without content, in some KB each."""
     import zstandard
 
     packer = zstandard.ZstdCompressor(level=1)
@@ -201,12 +202,24 @@ def test_a_bomb_takes_seconds(tmp_path: Path) -> None:
     body = head + len(packed).to_bytes(8, "little") + packed
     chunk = b"\x06" + len(body).to_bytes(8, "little") + body
     end = b"\x0f\x04" + bytes(11) + b"\x02\x14" + bytes(27) + b"\x89MCAP0\r\n"
-    bag = tmp_path / "bomb.mcap"
-    bag.write_bytes(b"\x89MCAP0\r\n" + chunk * 240 + end)
+    bag.write_bytes(b"\x89MCAP0\r\n" + chunk * chunks + end)
+    return bag
+
+
+def test_a_bomb_takes_seconds(tmp_path: Path) -> None:
+    """60 GB in less than 2 MB."""
+    bag = bomb(tmp_path / "bomb.mcap", 240)
     assert bag.stat().st_size < 2_000_000
     before = resource.getrusage(resource.RUSAGE_CHILDREN)
     done = subprocess.run(["fcsl", "bag", "info", str(bag)], capture_output=True, text=True, env=os.environ)
     assert done.returncode == 1 and "takes the file beyond 1 GiB and 1000 times its size" in done.stdout
-    assert "reading bomb.mcap: " in done.stderr
     used = resource.getrusage(resource.RUSAGE_CHILDREN)
     assert used.ru_utime + used.ru_stime - before.ru_utime - before.ru_stime < 120
+
+
+def test_reading_for_long_shows_progress(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    monkeypatch.setattr("simclient.cli._PROGRESS_PERIOD_S", 0.0)
+    describe(Bag(bomb(tmp_path / "bomb.mcap", 3)))
+    assert re.search(r"^reading bomb.mcap: \d+ % \(\d+ of \d+\)$", capsys.readouterr().err, re.MULTILINE)
