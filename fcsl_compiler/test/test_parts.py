@@ -306,6 +306,16 @@ def test_a_tick_and_a_phase_of_constants(tmp_path: Path) -> None:
     assert machine.tick_hz == 1000 and entries["att.rate.pi"] == (20, 10)
 
 
+def test_a_part_says_what_an_input_is_that_nobody_connects(tmp_path: Path) -> None:
+    def change(craft: dict[str, Any], attitude: dict[str, Any], rate: dict[str, Any]) -> None:
+        attitude["instances"]["law"]["inputs"] = {"target": 0.75, "order": "far"}
+
+    twins = Twins(write(tmp_path, change))
+    assert twins.get("att.law.inputs.target") == 0.25 and twins.get("spare.law.inputs.target") == 0.75
+    machine = compile_machine(tmp_path / "craft.json", "", until="schedule").checked
+    assert {i.name: i.inputs for i in machine.instances}["att.law"] == {"target": (0.25,)}  # `order` is connected
+
+
 def test_a_part_is_a_machine_of_its_own(tmp_path: Path) -> None:
     write(tmp_path)
     twins = Twins(tmp_path / "parts/attitude.json")

@@ -265,6 +265,19 @@ class Joined:
         members[record] = Member(record, members[record].key_span if record in members else given.key_span, values_node)
         self._instances[port.instance] = replace(member, value=replace(member.value, value=members))
 
+    def _drop_initial(self, port: _Port) -> None:
+        """Forgets what a part's own JSON gives an input that is connected where the part is used."""
+        member = self._instances.get(port.instance)
+        inputs = member.value.get("inputs") if member is not None else None
+        own = _object(inputs).get(port.field)
+        if member is None or inputs is None or own is None or not own.key_span.source.part:
+            return
+        rest = {key: m for key, m in inputs.members.items() if key != port.field}
+        old = member.value.members["inputs"]
+        self._instances[port.instance] = replace(
+            member, value=_with_member(member.value, replace(old, value=replace(inputs, value=rest)))
+        )
+
     def _read_ports(self, file: _File) -> None:
         """Ports of a file, as paths of the whole machine."""
         node = file.keys.get("ports")
@@ -352,6 +365,8 @@ class Joined:
         if head in file.parts:
             name, _, members = rest.partition(".")
             ports = self._port(file.parts[head], head, record, name, node.span)
+            for port in ports if record == "inputs" else ():
+                self._drop_initial(port)
             return [_text(node, ".".join(filter(None, (p.instance, p.field, members)))) for p in ports]
         if not file.prefix or node.kind != "string" or head == "machine":
             return [node]
