@@ -13,7 +13,7 @@ from changed_packages import manifests, touched  # noqa: E402
 ALL = sorted(manifests(ROOT))
 EXAMPLES = [
     "ahrs", "arming", "check_cases", "glider", "inverted_pendulum", "lander", "minimal", "models", "quadrotor",
-    "rocket_landing", "satellite", "thermal_guard",
+    "rocket_landing", "rover", "satellite", "thermal_guard",
 ]  # fmt: skip
 
 

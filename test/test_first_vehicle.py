@@ -12,6 +12,7 @@ from itertools import pairwise
 from pathlib import Path
 from tempfile import TemporaryFile
 
+import numpy as np
 import pytest
 
 from simclient import bag
@@ -89,3 +90,17 @@ def test_the_lever_flies_it(said: dict[str, str]) -> None:
     assert (folder / "sys/class/pwm/pwmchip0/pwm0/duty_cycle").read_text().strip() == "1000000"  # ns: at rest
     assert (folder / "flight.png").stat().st_size > 10_000
     assert (folder / "lift.campaign/report.html").stat().st_size > 10_000
+
+
+def test_blocks_alone_fly_a_quadrotor(said: dict[str, str]) -> None:
+    recorded = bag.Bag(Path(said["folder"]) / "quad")
+    t_s, height = bag.columns(recorded, "/sim/earth:height")
+    _, q = bag.columns(recorded, "/sim/body:attitude_body_to_inertial")
+    _, position = bag.columns(recorded, "/sim/body:position_inertial")
+    tilt = np.degrees(2.0 * np.arcsin(np.hypot(q[:, 1], q[:, 2])))
+    hovers = (t_s > 7.0) & (t_s < 9.0)
+    assert np.abs(height[hovers] - 1.2).max() < 0.06 and tilt[hovers].max() < 0.5
+    assert 4.0 < tilt[(t_s > 5.0) & (t_s < 5.5)].max() < 30.0  # the blow
+    assert height[-1] == pytest.approx(0.15, abs=0.01) and tilt[-1] < 0.1
+    assert np.hypot(*position[-1, :2]) == pytest.approx(2.7, abs=0.1)
+    assert (Path(said["folder"]) / "quad.png").stat().st_size > 10_000

@@ -117,6 +117,7 @@ MACHINES = [
     "arming/arming",
     "thermal_guard/thermal_guard",
     "minimal/minimal",
+    "rover/rover",
     "zoo/rover",
     "zoo/probe",
 ]
@@ -166,7 +167,8 @@ def test_fcslc_writes_what_rosidl_builds(zoo: Path, tmp_path: Path) -> None:
     assert fcslc(["messages", *machines, "-o", str(tmp_path / "msg"), "--package", "zoo"]) == 0
     ours = {file.name: file.read_text() for file in (tmp_path / "msg").iterdir()}
     theirs = {file.name: file.read_text() for file in (zoo / "install/share/zoo/msg").glob("*.msg")}
-    assert ours.keys() == {f"{n}.msg" for n in ("RoverTrack", "RoverTarget", "RoverPose", "ProbeMixed", "ProbeQuiet")}
+    names = ("RoverTrack", "RoverSideScale", "RoverTarget", "RoverPose", "ProbeMixed", "ProbeQuiet")
+    assert ours.keys() == {f"{name}.msg" for name in names}
     assert ours.items() <= theirs.items() and theirs.keys() - ours.keys() == {"Note.msg"}
     assert "RoverTarget[4] targets # 2 x 2, row-major; row-major in the message\n" in ours["RoverTrack.msg"]
     assert "float32[6] ratio # [1/s] 2 x 3, row-major; rows, columns\n" in ours["ProbeMixed.msg"]
@@ -427,7 +429,7 @@ def test_nothing_published(tmp_path: Path) -> None:
     prepare(folder, "rover.json probe.json STRICT", "rover.json STRICT")
     edit(folder / "CMakeLists.txt", "fcsl_generate_interfaces(MSGS msg/Note.msg SRVS srv/Ask.srv DEPENDENCIES geometry_msgs)",
          "fcsl_generate_interfaces()")  # fmt: skip
-    edit(folder / "rover.json", '"publish": ["track"]', '"publish": []')
+    edit(folder / "rover.json", '"publish": ["track", "side"]', '"publish": []')
     configure(folder)
     cmake("--build", folder / "build", "--target", "install")
     assert (folder / "install/lib/zoo/libzoo_machines.so").is_file()

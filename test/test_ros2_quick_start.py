@@ -50,7 +50,7 @@ for name in messages[0].get_fields_and_field_types():
     print(f"{name}: {getattr(messages[0], name)}")
 """
 #: What a user sees before he goes on: the machine runs, and the robot's odometry arms it.
-WAIT = 'until ros2 topic echo --once /rover/controller | grep -qi "armed: true"; do :; done\n'
+WAIT = 'until ros2 topic echo --once /my_rover/controller | grep -qi "armed: true"; do :; done\n'
 
 
 def steps() -> list[tuple[str, str]]:
@@ -139,7 +139,7 @@ def commands(home: Path, bag: str) -> np.ndarray:
 
 def test_the_quick_start_runs_as_printed(home: Path) -> None:
     new, build, _, look, replay, answer = run(home)
-    assert "rover/package.xml" in new
+    assert "my_rover/package.xml" in new
     assert "1 passed" in build and "1 package finished" in build
     (line,) = re.findall(r"ros2 fcsl list +# (.*)", PAGE)
     assert look.splitlines()[:2] == [line, "RUN"] and "/cmd_vel (geometry_msgs/Twist, linear.x)" in look

@@ -146,6 +146,20 @@ BATTERY: dict[str, Any] = {
     "polarisation_time_constant": 8.0,
     "initial_charge": 0.9,
 }
+QUADROTOR = {
+    "position": [[0.2, 0.15], [-0.2, -0.15], [0.2, -0.15], [-0.2, 0.15]],
+    "direction": [1.0, 1.0, -1.0, -1.0],
+    "torque_per_thrust": 0.02,
+    "max_thrust": 5.0,
+    "time_constant": 0.05,
+}
+DRIVE = {
+    "wheel_separation": 0.5,
+    "radius_left": 0.1,
+    "radius_right": 0.12,
+    "max_wheel_speed": 8.0,
+    "time_constant": 0.2,
+}
 GIVEN = {
     "rocket_engine": ENGINE,
     "brushless_motor": MOTOR,
@@ -153,6 +167,8 @@ GIVEN = {
     "reaction_wheel": WHEEL,
     "servo": SERVO,
     "battery": BATTERY,
+    "quadrotor_thrust": QUADROTOR,
+    "differential_drive": DRIVE,
 }
 
 
@@ -167,6 +183,7 @@ def model(name: str, **changes: Any) -> ModelInstance:
     for key, value in (GIVEN[name] | changes).items():
         shape = instance.fields[f"parameters.{key}"].shape
         given = list(value) + [value[-1]] * (shape[0] - len(value)) if shape else value
+        given = np.ravel(given).tolist() if len(shape) > 1 else given
         instance.set(f"parameters.{key}", given)
     instance.init()
     return instance
@@ -265,6 +282,16 @@ REFUSED = [
     ("reaction_wheel", {"viscous_friction": -1.0}, "viscous_friction must not be negative"),
     ("reaction_wheel", {"coulomb_friction": math.nan}, "coulomb_friction must not be negative"),
     ("reaction_wheel", {"speed": -50.1}, "speed must be within max_speed"),
+    ("quadrotor_thrust", {"torque_per_thrust": -0.1}, "torque_per_thrust must not be negative"),
+    ("quadrotor_thrust", {"max_thrust": 0.0}, "max_thrust must be positive"),
+    ("quadrotor_thrust", {"time_constant": math.nan}, "time_constant must be positive"),
+    ("quadrotor_thrust", {"direction": [1.0, 1.0, -1.0, 0.0]}, "direction must be 1 or -1 for each rotor"),
+    ("quadrotor_thrust", {"thrust": [1.0, 1.0, 1.0, 5.1]}, "thrust must be within 0 and max_thrust"),
+    ("differential_drive", {"wheel_separation": 0.0}, "wheel_separation must be positive"),
+    ("differential_drive", {"radius_left": -0.1}, "radius_left must be positive"),
+    ("differential_drive", {"radius_right": 0.0}, "radius_right must be positive"),
+    ("differential_drive", {"max_wheel_speed": -1.0}, "max_wheel_speed must not be negative"),
+    ("differential_drive", {"time_constant": 0.0}, "time_constant must be positive"),
     ("servo", {"natural_frequency": 0.0}, "natural_frequency must be positive"),
     ("servo", {"damping": -0.1}, "damping must not be negative"),
     ("servo", {"max_rate": 0.0}, "max_rate must be positive"),
@@ -865,3 +892,78 @@ def test_battery_motors_and_rotors_come_to_rest_where_scipy_says(motors: int, fl
     assert [rows[name][-1] for name in names] == pytest.approx([voltage, speed, throttle * current], rel=1e-7)
     assert speed > 500.0 and current > 5.0
     assert rows["rotor0.outputs.torque_body"][-1][2] == pytest.approx(rows["rotor0.outputs.load_torque"][-1], rel=1e-6)
+
+
+# ---- rotors in one model, a vehicle on wheels -------------------------------------------------------------------------
+
+
+def test_four_rotors_follow_their_commands_with_a_lag_within_their_limits(fly: Fly) -> None:
+    command = [1.0, 2.0, 9.0, -1.0]
+    rotors = use("quadrotor_thrust", {"command": command}, thrust=[0.0, 3.0, 1.0, 2.0])
+    names = [f"rotors.outputs.{name}" for name in ("thrust", "force_body", "torque_body")]
+    rows = fly({"rotors": rotors}, {}, names, 0.3)
+    goal, start = np.array([1.0, 2.0, 5.0, 0.0]), np.array([0.0, 3.0, 1.0, 2.0])
+    expected = goal + np.exp(-rows["t"] / 0.05)[:, None] * (start - goal)
+    np.testing.assert_allclose(rows[names[0]], expected, atol=1e-9)
+    # The force of each acts at its place, and it turns the body against its own direction.
+    places = np.array([[*xy, 0.0] for xy in QUADROTOR["position"]])
+    forces = np.stack([0.0 * expected, 0.0 * expected, -expected], axis=2)
+    torque = np.cross(places, forces).sum(axis=1)
+    torque[:, 2] += 0.02 * expected @ QUADROTOR["direction"]
+    np.testing.assert_allclose(rows[names[1]], forces.sum(axis=1), atol=1e-9)
+    np.testing.assert_allclose(rows[names[2]], torque, atol=1e-9)
+
+
+def test_four_rotors_turn_a_body_as_four_rotors_do() -> None:
+    """The signs are those of `rotor`: a faster rotor to the left rolls to the right, one that turns clockwise yaws left."""
+    for i, (xy, direction) in enumerate(zip(QUADROTOR["position"], QUADROTOR["direction"], strict=True)):
+        thrust = [0.0] * 4
+        thrust[i] = 2.0
+        together = model("quadrotor_thrust", thrust=thrust)
+        together.output()
+        one = rotor_outputs({"speed": 500.0}, position_body=[*xy, 0.0], direction=direction)
+        scale = 2.0 / one["thrust"]
+        mine = np.array(together.get("outputs.torque_body"))
+        assert mine[:2] == pytest.approx(scale * one["torque_body"][:2])
+        assert np.sign(mine[2]) == np.sign(one["torque_body"][2])
+
+
+def test_a_vehicle_on_wheels_drives_its_circle(fly: Fly) -> None:
+    """SciPy's integrator, of other equations: the circle about the instantaneous centre."""
+    drive = use(
+        "differential_drive",
+        {"command_left": 3.0, "command_right": 20.0, "slip_right": 0.25},
+        x=1.0,
+        y=-2.0,
+        heading=2.5,
+    )
+    names = [
+        f"drive.outputs.{n}"
+        for n in (
+            "x",
+            "y",
+            "heading",
+            "forward_speed",
+            "yaw_rate",
+            "speed_left",
+            "speed_right",
+            "angle_left",
+            "angle_right",
+        )
+    ]
+    rows = fly({"drive": drive}, {}, names, 4.0)
+    x, y, heading, forward, yaw_rate, left, right, angle_left, angle_right = (rows[name] for name in names)
+    lag = 1.0 - np.exp(-rows["t"] / 0.2)
+    np.testing.assert_allclose(left, 3.0 * lag, atol=1e-9)
+    np.testing.assert_allclose(right, 8.0 * lag, atol=1e-9)  # its limit
+    turned = rows["t"] - 0.2 * lag
+    np.testing.assert_allclose(angle_left, 3.0 * turned, atol=1e-8)
+    np.testing.assert_allclose(angle_right, 8.0 * turned, atol=1e-8)
+    way_left, way_right = 0.1 * 3.0 * turned, 0.75 * 0.12 * 8.0 * turned
+    np.testing.assert_allclose(heading, 2.5 + (way_right - way_left) / 0.5, atol=1e-8)
+    # Both wheels have one lag, so the curvature is constant: a circle.
+    radius = 0.5 * (0.3 + 0.72) / 2.0 / (0.72 - 0.3)
+    centre = np.array([1.0 - radius * np.sin(2.5), -2.0 + radius * np.cos(2.5)])
+    np.testing.assert_allclose(x, centre[0] + radius * np.sin(heading), atol=1e-8)
+    np.testing.assert_allclose(y, centre[1] - radius * np.cos(heading), atol=1e-8)
+    np.testing.assert_allclose(forward, radius * yaw_rate, atol=1e-12)

@@ -1,0 +1,25 @@
+class Operator:
+    """Owns the wishes of who drives: they come from `cmd_vel`."""
+
+    outputs = {"speed": "f64 m/s", "yaw_rate": "f64 rad/s"}
+
+    def execute(self):
+        pass  # channels write the outputs
+
+
+class Switches:
+    """Owns what the operator switches: 0 stop, 1 by hand, 2 along the route; and the emergency stop."""
+
+    outputs = {"mode": "i32", "stop": "bool"}
+
+    def execute(self):
+        pass
+
+
+class Wheels:
+    """Owns the encoders: angles that grow forward."""
+
+    outputs = {"left": "f64 rad", "right": "f64 rad"}
+
+    def execute(self):
+        pass
