@@ -118,10 +118,26 @@ def section(file: str, node: ast.ClassDef, text: str, costs: str) -> str:
     return made + f"\n{costs}\n"
 
 
+def parts() -> str:
+    """The machines that are parts, each with its ports."""
+    made = "\n# Parts\n\nMachines to use as [parts](language.md#parts) of others.\n"
+    for path in sorted(BLOCKS.glob("*.json")):
+        part = json.loads(path.read_text())
+        made += f"\n## {path.stem}\n\n"
+        opening = f"`package://fcsl_blocks/{path.name}`: {part['description']} " + "; ".join(
+            f"`{name}` is {part['instances'][name]['algorithm']} at {rate} Hz"
+            for name, rate in part["states"]["RUN"]["schedule"].items()
+        )
+        made += textwrap.fill(f"{opening}.", 120, break_on_hyphens=False) + "\n\n| port | | of |\n|---|---|---|\n"
+        for record, listed in part["ports"].items():
+            made += "".join(f"| `{port}` | {record[:-1]} | `{field}` |\n" for port, field in listed.items())
+    return made
+
+
 def test_the_page_is_that_of_the_blocks(tmp_path: Path) -> None:
     with ThreadPoolExecutor(2) as pool:
         costs = list(pool.map(lambda c: cost(tmp_path, c[0], c[1]), classes()))
-    page = HEAD + "".join(section(*c, costs=k) for c, k in zip(classes(), costs, strict=True))
+    page = HEAD + "".join(section(*c, costs=k) for c, k in zip(classes(), costs, strict=True)) + parts()
     if os.environ.get("FCSL_UPDATE_GOLDEN"):
         PAGE.write_text(page)
     # Another compiler makes other instructions.
