@@ -1263,6 +1263,11 @@ def all_cases() -> dict[str, tuple[str, dict[str, str]]]:
     ):
         outer = patch(lambda c, o=of_outer: c["instances"].update(lights={"machine": "parts/lights.json", **o}))
         cases[name] = (outer, {"alg.py": GOOD, "parts/lights.json": json.dumps({**part, **changes}, indent=1)})
+    for name, call in (
+        ("E441 literals that do not ascend", "interp(self.x, [0.0, 2.0, 2.0], [0.0, 1.0, 2.0])"),
+        ("E441 a constant that descends", "extrapolate(self.x, FALL, [0.0, 1.0, 2.0])"),
+    ):
+        cases[name] = (good, {"alg.py": "FALL = [3.0, 2.0, 1.0]\n\n\n" + execute(f"self.y = {call}")})
     packet = {"field": "one.inputs.n", "as": "blob"}
     mapped_packet = {**packet, "ros": {"type": "std_msgs/UInt32", "field": "data"}}
     for name, declared, item in (

@@ -11,6 +11,7 @@ from ..base.diagnostics import DiagnosticSink, misspelt, nearest
 from ..base.source import Span
 from ..check.algorithm import check_algorithm
 from ..check.algorithm_class import AlgorithmClass, size_variables
+from ..check.breakpoints import check_breakpoints
 from ..check.declarations import Declarations
 from ..check.frozen import Freezer
 from ..check.loop_bounds import check_loops
@@ -72,6 +73,7 @@ def check_machine(parsed: ParsedMachine, sink: DiagnosticSink) -> Machine | None
         ports.port(path, (record,), f"one of `ports.{record}`")
     instances = _read_publish(keys.get("publish"), instances, incomplete, reader)
     views = read_views(keys.get("views"), _signals(instances, incomplete), Path(parsed.source.path), reader)
+    check_breakpoints(instances, program, sink)
     if sink.failed or initial is None:
         return None
     modules.warn_unused([c.port.declared for c in channels if c.direction == "sensor"])

@@ -15,6 +15,7 @@ from typing import Any
 from conftest import BLOCKS, OF_MACHINE, ports
 
 PAGE = Path(__file__).resolve().parents[3] / "docs/reference/blocks.md"
+EVERY_BLOCK = Path(__file__).with_name("every_block.json")
 #: Sizes of the costs in the page.
 SIZE = 4
 HEAD = f"""<!-- Made by fcsl_runtime/fcsl_blocks/test/test_blocks_page.py from the blocks and their builds. Do not edit. -->
@@ -69,24 +70,35 @@ def some_value(type_: str) -> Any:
     return value
 
 
-def cost(folder: Path, file: str, node: ast.ClassDef) -> str:
-    """Instructions, bytes and stack of a machine with this block alone."""
-    found = ports(file, node.name)
-    types = [t for record in found.values() for t in record.values()]
-    sizes = {s: SIZE for t in types for s in re.findall(r"\[([a-z]\w*)\]", t)}
-    entry: dict[str, Any] = {"source": f"package://fcsl_blocks/{file}"} | ({"sizes": sizes} if sizes else {})
-    given = {n: some_value(t) for n, t in found["parameters"].items() if "=" not in t}
-    config = {
+def machine_of(chosen: list[tuple[str, ast.ClassDef, str]]) -> dict[str, Any]:
+    """A machine with an instance of each class, named after it, in every tick."""
+    config: dict[str, Any] = {
         "tick_hz": 1000,
         "initial_state": "RUN",
-        "algorithms": {node.name: entry},
-        "instances": {"block": {"algorithm": node.name, "parameters": given}},
-        "connections": [{"from": OF_MACHINE[n], "to": f"block.{n}"} for n in found["inputs"] if n in OF_MACHINE],
-        "states": {"RUN": {"schedule": {"block": 1000}}},
-        "transitions": [],
+        "algorithms": {},
+        "instances": {},
+        "connections": [],
+        "states": {"RUN": {"schedule": {}}},
     }
+    for file, node, _ in chosen:
+        found, name = ports(file, node.name), node.name.lower()
+        types = [t for record in found.values() for t in record.values()]
+        sizes = {s: SIZE for t in types for s in re.findall(r"\[([a-z]\w*)\]", t)}
+        entry: dict[str, Any] = {"source": f"package://fcsl_blocks/{file}"} | ({"sizes": sizes} if sizes else {})
+        given = {n: some_value(t) for n, t in found["parameters"].items() if "=" not in t}
+        config["algorithms"][node.name] = entry
+        config["instances"][name] = {"algorithm": node.name, "parameters": given}
+        config["connections"] += [
+            {"from": OF_MACHINE[n], "to": f"{name}.{n}"} for n in found["inputs"] if n in OF_MACHINE
+        ]
+        config["states"]["RUN"]["schedule"][name] = 1000
+    return config
+
+
+def cost(folder: Path, file: str, node: ast.ClassDef) -> str:
+    """Instructions, bytes and stack of a machine with this block alone."""
     path = folder / f"page_{node.name.lower()}.json"
-    path.write_text(json.dumps(config))
+    path.write_text(json.dumps(machine_of([(file, node, "")])))
     line = ["fcsl", "build", "--report", "--json", str(path), "-o", str(folder / node.name)]
     done = subprocess.run(line, capture_output=True, text=True)
     assert done.returncode == 0, done.stdout + done.stderr
@@ -148,6 +160,14 @@ def test_the_page_is_that_of_the_blocks(tmp_path: Path) -> None:
         else (lambda text: re.sub(r"\d+ (?=inst|bytes)", "", text))
     )
     assert same(PAGE.read_text()) == same(page), "rewrite it with FCSL_UPDATE_GOLDEN=1"
+
+
+def test_one_machine_has_every_block() -> None:
+    """Which `make verify` proves free of run-time errors, for all values of all inputs and parameters."""
+    text = json.dumps(machine_of(classes()), indent=1) + "\n"
+    if os.environ.get("FCSL_UPDATE_GOLDEN"):
+        EVERY_BLOCK.write_text(text)
+    assert EVERY_BLOCK.read_text() == text, "rewrite it with FCSL_UPDATE_GOLDEN=1"
 
 
 def test_every_block_is_documented() -> None:

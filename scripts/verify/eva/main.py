@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""No run-time error: Frama-C's EVA on the C of every example and of generated machines, under a host that may do anything.
+"""No run-time error: Frama-C's EVA on the C of every example, of every block and of generated machines, under a host that may do anything.
 
     python3 scripts/verify eva [--machines N] [--seed S] [--jobs J] [--keep FOLDER]
 
@@ -24,7 +24,7 @@ from ..shared import cases
 from ..shared.effort import scaled
 from .control import controls
 from .run import Analysis, Subject, analyse
-from .subjects import examples, generated
+from .subjects import blocks, examples, generated
 
 #: More of one kind than this are counted, not shown.
 SHOWN = 12
@@ -37,7 +37,7 @@ def main() -> int:
         folder = Path(options.keep or scratch)
         try:
             found = _controls(folder, options.jobs)
-            subjects = [*examples(folder), *generated(folder, options.machines, options.seed)]
+            subjects = [*examples(folder), blocks(folder), *generated(folder, options.machines, options.seed)]
             rows = list(_progress(subjects, options.jobs))
         except cases.CheckFailed as failed:
             print(f"eva: {failed}", file=sys.stderr)

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""What EVA analyses: the examples and machines of the test generator, each with the world around it."""
+"""What EVA analyses: the examples, the blocks, machines of the test generator, each with the world around it."""
 
 from __future__ import annotations
 
@@ -33,6 +33,11 @@ def subject(config: Path, folder: Path, dead_helpers: bool = False, never_faults
 def examples(folder: Path) -> list[Subject]:
     chosen = {name: config for name, config in cases.EXAMPLES.items() if name not in LARGE}
     return [subject(c, folder / name, never_faults=name in NEVER_FAULTS) for name, c in chosen.items()]
+
+
+def blocks(folder: Path) -> Subject:
+    """A machine with every block of fcsl_blocks."""
+    return subject(cases.ROOT / "fcsl_runtime/fcsl_blocks/test/every_block.json", folder / "blocks")
 
 
 def generated(folder: Path, count: int, seed: int) -> list[Subject]:

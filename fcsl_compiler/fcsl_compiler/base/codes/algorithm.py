@@ -520,6 +520,15 @@ ALGORITHM_CODES: dict[str, Code] = {
         'word = "ABORT"\nself.transition_request = word',
         'word: TransitionRequest = "ABORT"\nself.transition_request = word',
     ),
+    "E441": Code(
+        "breakpoints that do not ascend",
+        "The cell of a table that holds a point is found by bisection, so breakpoints ascend: each is greater than the one "
+        "before. This is checked where they are literals, constants, or parameters with a value in the JSON. Those that a "
+        "host sets later are not.",
+        Kind.BODY,
+        "self.force = interp(self.speed, [0.0, 2.0, 1.0], [0.0, 1.0, 2.0])",
+        "self.force = interp(self.speed, [0.0, 1.0, 2.0], [0.0, 2.0, 1.0])",
+    ),
     "W301": Code(
         "a helper that is never called",
         "The helper is checked but not compiled. Unused code in a flight program costs review effort.",
