@@ -137,7 +137,9 @@ class Joined:
     def _add_algorithms(self, file: _File) -> dict[str, str]:
         """Adds the algorithms of a file. Returns their names in the whole machine: the same class of the same file is one
         algorithm."""
-        known = {self._identity(n, m.value): n for n, m in self._algorithms.items()} if file.prefix else {}
+        known: dict[tuple[Any, ...], list[str]] = {}
+        for other, entry in self._algorithms.items() if file.prefix else ():
+            known.setdefault(self._identity(other, entry.value), []).append(other)
         names: dict[str, str] = {}
         for name, member in _object(file.keys.get("algorithms")).items():
             source = member.value.get("source")
@@ -148,8 +150,9 @@ class Joined:
             members["source"] = replace(members["source"], value=_text(source, beside(file.folder, str(source.value))))
             members.setdefault("class", Member("class", member.key_span, _text(source, name)))
             node = replace(member.value, value=members)
-            same = known.get(self._identity(name, node))
-            names[name] = same or (name if name not in self._algorithms else file.prefix.replace(".", "_") + name)
+            same = known.get(self._identity(name, node), [])
+            own = name if name not in self._algorithms else file.prefix.replace(".", "_") + name
+            names[name] = name if name in same else same[0] if same else own
             self._algorithms.setdefault(names[name], Member(names[name], member.key_span, node))
         return names
 
@@ -158,9 +161,9 @@ class Joined:
         own = plain(node) if node.kind == "object" else {}
         sizes = own.get("sizes", {})
         is_own = isinstance(sizes, dict) and any(isinstance(size, str) for size in sizes.values())
-        requests = self.reader.scope(node).requests
+        renamed = {own: whole for own, whole in self.reader.scope(node).requests.items() if own != whole}
         scope = node.span.source.path if is_own else ""  # of its constants
-        return own.get("source"), own.get("class", name), str(sizes), scope, str(sorted(requests.items()))
+        return own.get("source"), own.get("class", name), str(sizes), scope, str(sorted(renamed.items()))
 
     def _connection(self, file: _File, item: JsonNode) -> list[JsonNode]:
         """A connection with paths of the whole machine. To a port that stands for several inputs there are several."""

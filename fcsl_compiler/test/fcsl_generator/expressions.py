@@ -190,7 +190,9 @@ class Expressions:
 
     def opaque(self, kind: str) -> t.Expr | None:
         """An integer that no compiler can bound. An index proven out of range would be an error, not a fault."""
-        values = [e for e in self.scope.readable() if e.type == kind and not (isinstance(e, t.Name) and e.constant)]
+        readable = [e for e in self.scope.readable() if e.type == kind]
+        # A local that one statement assigns has the bounds of what it is assigned.
+        values = [e for e in readable if not isinstance(e, t.Name) or (not e.constant and e.name.startswith("x"))]
         if not values:
             return None
         found = self.c.pick(values)
@@ -380,8 +382,23 @@ class Expressions:
         for name in signature.elements:
             sizes.setdefault(name, self.c.pick(catalog.ELEMENTS[name]))
         # Few nodes per operand, because an array has many elements.
-        args = tuple(self.expr(p.at(sizes), min(depth - 1, 1), TYPED) for p in signature.args)
-        return t.Call(type_, signature.name, args)
+        args = [self.expr(p.at(sizes), min(depth - 1, 1), TYPED) for p in signature.args]
+        if signature.name.startswith(("interp", "extrapolate")):
+            points = sum(not p.extents for p in signature.args)
+            for i in range(points, 2 * points):
+                args[i] = self._breakpoints(args[i])
+        return t.Call(type_, signature.name, tuple(args))
+
+    def _breakpoints(self, drawn: t.Expr) -> t.Expr:
+        """Literals that ascend, or values that the compiler does not know: others it refuses."""
+        type_ = drawn.type
+        assert isinstance(type_, Array)
+        if self.c.chance(60):
+            return t.Call(type_, "max", (drawn, drawn))
+        values = [float(self.c.between(-9, 3))]
+        for _ in range(type_.shape[0] - 1):
+            values.append(values[-1] + self.c.pick((1.0, 0.25, 3.0)))
+        return t.ArrayOf(type_, tuple(t.Literal(type_.element, value, False) for value in values))
 
     # ---- what reaches outside ----------------------------------------------------------------------------------------
 

@@ -31,7 +31,8 @@ static void update(void *self, const fcsl_model_context_t *context)
 static int take_field(const fcsl_field_t *from, const char *instance, fcsl_field_t *field)
 {
     const size_t length = strlen(instance);
-    if (strncmp(from->path, instance, length) != 0 || from->path[length] != '.' || from->role < FCSL_ROLE_INPUT || from->role > FCSL_ROLE_STATE || from->type > FCSL_F64 ||
+    if (strncmp(from->path, instance, length) != 0 || from->path[length] != '.' || from->role < FCSL_ROLE_INPUT ||
+        from->role > FCSL_ROLE_STATE || from->type > FCSL_F64 ||
         from->connected_from != FCSL_NONE) { /* machine.dt and the like */
         return 0;
     }
@@ -65,8 +66,8 @@ fcsl_machine_model_t *fcsl_machine_model_open(const char *library, const char *m
     }
     uint32_t count = 0;
     for (uint32_t i = 0; i < model->machine->field_count; i++) {
-        count += (uint32_t)take_field(&model->machine->fields[i], model->machine->instances[0].name,
-                                      &model->fields[count]);
+        count +=
+            (uint32_t)take_field(&model->machine->fields[i], model->machine->instances[0].name, &model->fields[count]);
     }
     model->model = (fcsl_model_t){.abi_version = FCSL_MODEL_ABI_VERSION,
                                   .name = model->machine->name,
