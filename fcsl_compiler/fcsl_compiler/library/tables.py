@@ -4,17 +4,26 @@
 Breakpoints ascend; if they do not, the result is one of those that a search finds, the same in every run.
 """
 
-from fcsl_builtins import clamp, lerp, wrap_add, wrap_sub
+from fcsl_builtins import clamp, lerp, sat_i64, wrap_add, wrap_sub
 
 
 def interp_cell(x: "F", xs: "F[n]") -> "i64":
     """The i for which xᵢ ≤ x < xᵢ₊₁; 0 below all breakpoints, n − 2 above.
 
-    Order: bisection, exact; at most ⌈log₂ n⌉ comparisons.
+    Order: bisection, exact; at most ⌈log₂ n⌉ comparisons. For n > 512 it begins with the cells around that which evenly
+    spaced breakpoints would have, so that these take four comparisons, whatever n is.
     Singular: x NaN: 0.
     """
     low = 0
     high = n - 1
+    if n > 512:
+        even = sat_i64((x - xs[0]) / (xs[n - 1] - xs[0]) * (n - 1))
+        first = clamp(wrap_sub(even, 1), 0, n - 2)
+        last = clamp(wrap_add(first, 3), 0, n - 1)
+        if xs[first] <= x:
+            low = first
+        if x < xs[last]:
+            high = last
     for _ in range(16):
         if wrap_sub(high, low) <= 1:
             break

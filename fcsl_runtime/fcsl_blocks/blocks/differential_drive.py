@@ -141,6 +141,9 @@ class DifferentialOdometry:
             self.heading = 0.0
             self.attitude = [1.0, 0.0, 0.0, 0.0]
             self.covariance = zeros(3, 3)
+            self.pose_covariance = zeros(6, 6)
+            for i in range(2, 5):
+                self.pose_covariance[i, i] = self.planar_variance
         self.since += self.period
         if self.use_speeds:
             rates = [self.left_speed, self.right_speed]

@@ -237,6 +237,15 @@ def test_odom_does_not_jump_over_a_break(block: Callable[..., Any], use_speeds: 
         assert zero["attitude"].tolist() == [1.0, 0.0, 0.0, 0.0]
 
 
+def test_a_reset_holds_also_where_the_sample_does_not(block: Callable[..., Any]) -> None:
+    odo = odometry(block, slip=0.01, planar_variance=0.5)
+    for i in range(5):
+        feed(odo, 0.1 * i, 0.2 * i)
+    lost = feed(odo, float("nan"), 1.0, reset=True)
+    assert lost["health"] == "degraded" and not lost["position"].any() and not lost["covariance"].any()
+    np.testing.assert_array_equal(lost["pose_covariance"], np.diag([0.0, 0.0, 0.5, 0.5, 0.5, 0.0]))
+
+
 @pytest.mark.parametrize("use_speeds", [False, True])
 @pytest.mark.parametrize("value", [float("nan"), float("inf")])
 def test_what_is_not_finite_is_passed_over_and_made_up_for(
