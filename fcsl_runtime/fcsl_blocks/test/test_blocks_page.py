@@ -67,6 +67,8 @@ def some_value(type_: str) -> Any:
         value = type(value)(float(low))
     for extent in reversed(extents):
         value = [value] * (int(extent) if extent.isdigit() else SIZE)
+    if len(extents) == 1 and name.startswith("f") and range_.endswith("..") | (not range_):  # breakpoints ascend
+        value = [v + i for i, v in enumerate(value)]
     return value
 
 

@@ -218,7 +218,9 @@ def test_the_period_is_that_of_the_state(block: Callable[..., Any]) -> None:
 
 
 def test_breakpoints_that_do_not_ascend(block: Callable[..., Any]) -> None:
-    unit = scheduled(block, breakpoints=[10.0, 50.0, 50.0])
+    """In the JSON they are refused (E441); a host may set them."""
+    unit = scheduled(block)
+    unit.set(breakpoints=[10.0, 50.0, 50.0])
     assert feed(unit, schedule=20.0)["health"] == "nominal"
     assert feed(unit, schedule=60.0)["health"] == "degraded"  # 0 / 0 at the end
     unit.set(breakpoints=[50.0, 10.0, 20.0])
