@@ -177,6 +177,13 @@ def test_a_vehicle(tmp_path: Path, like: object) -> None:
     assert json.loads(flown)["until_held"] is True
 
 
+def test_a_rover(tmp_path: Path) -> None:
+    """Its view shows the shape of a rover, whatever it is called; machine and simulation share the file of its geometry."""
+    run("fcslc", "new", "vehicle", "carrier", "--like", "rover", cwd=tmp_path)
+    assert '"shape": "rover"' in (tmp_path / "carrier/fc/carrier.json").read_text()
+    assert " passed" in pytest_in(tmp_path / "carrier", "test/test_rover.py")
+
+
 def test_a_package(tmp_path: Path) -> None:
     """As colcon does: configure and build, here only the machine's library, then its pytest."""
     run("fcslc", "new", "machine", "craft", "--package", cwd=tmp_path)

@@ -22,7 +22,7 @@ FLIGHTS = {
     "glider": ("sim/glider.sim.json", 15),
     "inverted_pendulum": ("sim/inverted_pendulum.sim.json", 20),
     "rocket_landing": ("sim/rocket_landing.sim.json", 30),
-    "rover": ("rover.sim.json", 42),
+    "rover": ("sim/rover.sim.json", 42),
     "satellite": ("sim/satellite.sim.json", 100),
 }
 

@@ -35,7 +35,7 @@ PICTURES = {
     "inverted_pendulum/fc/inverted_pendulum.json": "inverted_pendulum/inverted_pendulum.svg",
     "quadrotor/fc/quadrotor.json": "quadrotor/quadrotor.svg",
     "rocket_landing/fc/rocket_landing.json": "rocket_landing/rocket_landing.svg",
-    "rover/rover.json": "rover/rover.svg",
+    "rover/fc/rover.json": "rover/rover.svg",
     "satellite/fc/satellite.json": "satellite/satellite.svg",
     "thermal_guard/thermal_guard.json": "thermal_guard/thermal_guard.svg",
 }
@@ -43,7 +43,7 @@ BOXES = (
     "lander/fc/filter_alone.json",
     "quadrotor/sim/pilot.json",
     "inverted_pendulum/sim/operator.json",
-    "rover/driver.json",
+    "rover/sim/driver.json",
 )
 MACHINES = {"small": CONFIG, **{Path(p).stem: EXAMPLES / p for p in PICTURES}}
 

@@ -244,7 +244,7 @@ class _Loader:
             raise DiagnosticError(self.sink.diagnostics)
         if "constants" in keys:
             at = file_of(keys["constants"].span)  # of a base, if that has them
-            self.reader.constants = read_constants(keys["constants"], at, self.reader)
+            self.reader.constants = read_constants(keys["constants"], at, self.reader, outside=True)
         for key in FOR_READERS:
             self.reader.string(keys.get(key), f"`{key}`")
         parts = self.parts

@@ -14,7 +14,7 @@ import pytest
 from simclient import AlgTwin, SimTwin
 
 EXAMPLE = Path(__file__).resolve().parents[1]
-MACHINE, SIM = EXAMPLE / "rover.json", EXAMPLE / "rover.sim.json"
+MACHINE, SIM = EXAMPLE / "fc/rover.json", EXAMPLE / "sim/rover.sim.json"
 HZ = 100
 
 
@@ -143,7 +143,7 @@ def test_a_fault_of_an_algorithm_drives_nowhere(twin: AlgTwin) -> None:
 
 
 def test_machine_and_plant_have_one_geometry() -> None:
-    geometry = json.loads((EXAMPLE / "geometry.json").read_text())
+    geometry = json.loads((EXAMPLE / "fc/geometry.json").read_text())
     with SimTwin.from_config(SIM) as twin:
         separation = geometry["wheel_separation"]["value"]
         assert twin.get("rover.parameters.wheel_separation") == separation

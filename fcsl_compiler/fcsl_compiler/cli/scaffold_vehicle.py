@@ -95,7 +95,7 @@ def _sources(source: Path) -> list[Path]:
 
 
 def _renamed(text: str, other: str, name: str) -> str:
-    """As a name by itself or the first part of one, in lower case and in CamelCase."""
+    """As a name by itself or the first part of one, in lower case and in CamelCase. The shape of a view stays."""
     camel = {word: "".join(part.capitalize() for part in word.split("_")) for word in (other, name)}
-    text = re.sub(rf"(?<![A-Za-z0-9_]){other}(?![A-Za-z0-9])", name, text)
+    text = re.sub(rf'(?<![A-Za-z0-9_])(?<!"shape": "){other}(?![A-Za-z0-9])', name, text)
     return re.sub(rf"(?<![A-Za-z0-9_]){camel[other]}(?![a-z0-9])", camel[name], text)

@@ -71,11 +71,12 @@ class Constants:
         return self._known[node.value][0]
 
 
-def read_constants(node: JsonNode | None, config: Path, reader: ConfigReader) -> Constants:
-    """The `constants` of a configuration file: an object, or the name of a file that holds one."""
+def read_constants(node: JsonNode | None, config: Path, reader: ConfigReader, outside: bool = False) -> Constants:
+    """The `constants` of a configuration file: an object, or the name of a file that holds one, which may lie `outside` of
+    the folder."""
     found = Constants()
     if node is not None and node.kind == "string":
-        node = _file(str(node.value), node.span, config, reader)
+        node = _file(str(node.value), node.span, config, reader, outside)
     for name, (definition, span) in reader.named(node, "`constants`").items():
         expression, unit = definition, ""
         if definition.kind == "object":
@@ -95,14 +96,10 @@ def read_constants(node: JsonNode | None, config: Path, reader: ConfigReader) ->
     return found
 
 
-def constants_file(text: str, config: Path) -> Path:
-    """The file that `constants` names. Raises SourcePathError."""
-    return resolve_source(text, config=config)
-
-
-def _file(name: str, span: Span, config: Path, reader: ConfigReader) -> JsonNode | None:
+def _file(name: str, span: Span, config: Path, reader: ConfigReader, outside: bool) -> JsonNode | None:
     try:
-        path = constants_file(name, config)
+        is_beside = outside and not name.startswith("package://")
+        path = config.parent / name if is_beside else resolve_source(name, config=config)
         source = SourceFile.read(path, name)
     except (SourceError, SourcePathError) as error:
         fix = "paths are relative to the folder of this file"

@@ -37,7 +37,7 @@ EXAMPLES = SMALL_EXAMPLES | {
         ROOT / "examples/inverted_pendulum/fc/inverted_pendulum.json",
         ROOT / "examples/quadrotor/fc/quadrotor.json",
         ROOT / "examples/rocket_landing/fc/rocket_landing.json",
-        ROOT / "examples/rover/rover.json",
+        ROOT / "examples/rover/fc/rover.json",
         ROOT / "examples/satellite/fc/satellite.json",
     )
 }
