@@ -419,6 +419,10 @@ WRONG: dict[str, tuple[Change, str]] = {
         lambda craft, attitude, rate: attitude["instances"].update(outputs={"algorithm": "Law"}),
         "E209: `outputs` is reserved",
     ),
+    "a part called as a topic": (
+        lambda craft, attitude, rate: craft["instances"].update(record=craft["instances"].pop("spare")),
+        "E209: `record` is reserved",
+    ),
     "a port that is not there": (connect("body.u", "att.angel"), "E216: part `att` has no input `angel`"),
     "an instance behind the ports": (connect("body.u", "att.law.gain"), "E216: part `att` has no input `law`"),
     "an output as an input": (connect("body.u", "att.u"), "E216: part `att` has no input `u`"),

@@ -25,6 +25,7 @@ from ..model.types import REQUEST, element_of
 from ..parse.json_reader import ConfigReader, Everything
 from ..parse.json_source import JsonNode
 from ..parse.machine_files import ParsedAlgorithm, ParsedMachine
+from ..parse.parts import RESERVED_INSTANCES
 from .arming import read_arming
 from .channels import read_channels, read_payload
 from .part_requests import bind_requests
@@ -35,8 +36,6 @@ from .structs import read_structs
 from .transitions import read_transitions
 from .views import Signals, is_partial, read_views
 
-#: Names that an instance cannot have, because paths and the machine's topics use them.
-RESERVED_INSTANCES = ("machine", "channels", "state", "transitions", "health", "faults", "record")
 MAX_TICK_HZ = 1_000_000
 
 #: Checked algorithms by name, in JSON order. None: an error was reported.

@@ -28,8 +28,10 @@ _REQUIRED = ("tick_hz", "initial_state", "algorithms", "instances", "states")
 _OPTIONAL = ("$schema", "description", "structs", "constants", "connections", "requests", "ports")
 _TREE = ("structs", "constants", "algorithms", "instances", "connections")
 _RECORDS = ("inputs", "outputs", "parameters")
-#: Names that an instance of a part cannot have: paths have them behind the name of an instance.
-_RESERVED = ("inputs", "outputs", "parameters", "state", "counters")
+#: Names that an instance cannot have, because paths and the machine's topics use them.
+RESERVED_INSTANCES = ("machine", "channels", "state", "transitions", "health", "faults", "record")
+#: Those of a part: paths have these behind the name of an instance, too.
+_RESERVED = (*RESERVED_INSTANCES, "inputs", "outputs", "parameters", "counters")
 _WHOLE = "a part is scheduled as a whole, at its own rates"
 
 
@@ -39,7 +41,6 @@ class _Port:
 
     instance: str
     field: str
-    declared: JsonNode
 
 
 @dataclass
@@ -112,11 +113,13 @@ class Joined:
                 fix = "a name without dots: letters, digits and single underscores between them; a letter first"
                 self.sink.error("E203", f"`{name}` is not a name", span, help=fix)
                 continue
-            if node.get("machine") is not None:
+            is_part = node.get("machine") is not None
+            if (file.prefix or is_part) and name in _RESERVED:
+                self.sink.error("E209", f"`{name}` is reserved", span, help="give the instance another name")
+                continue
+            if is_part:
                 self._include(file, name, node, span)
                 continue
-            if file.prefix and name in _RESERVED:
-                self.sink.error("E209", f"`{name}` is reserved", span, help="give the instance another name")
             whole = _renamed(node, "algorithm", names) if file.prefix else node
             self._instances[file.prefix + name] = Member(file.prefix + name, span, whole)
         for item in _items(file.keys.get("connections")):
@@ -300,7 +303,7 @@ class Joined:
             inner = self._port(file.parts[head], head, record, name, node.span)
             found = [replace(p, field=f"{p.field}.{members}" if members else p.field) for p in inner]
         else:
-            found = [_Port(file.prefix + head, rest, node)] if text else []
+            found = [_Port(file.prefix + head, rest)] if text else []
         self.ports += [(record, _text(node, f"{p.instance}.{record}.{p.field}")) for p in found]
         return found
 
@@ -308,12 +311,11 @@ class Joined:
         """Rates of a part's instances, whose phases count the ticks of the whole machine."""
         states = _members(file.keys.get("states"))
         if len(states) != 1:
-            at = file.keys["states"].span if "states" in file.keys else file.path
-            assert isinstance(at, Span) or not states
-            if isinstance(at, Span):
+            if "states" in file.keys:
                 why = "a part has the states of the machine that it is in"
                 fix = "leave one state, or use its algorithms as instances"
-                self.sink.error("E254", f"a machine with {len(states)} states cannot be a part", at, why=why, help=fix)
+                message = f"a machine with {len(states)} states cannot be a part"
+                self.sink.error("E254", message, file.keys["states"].span, why=why, help=fix)
             return
         state, (node, _) = next(iter(states.items()))
         self.reader.reference(file.keys.get("initial_state"), "state", [state])
