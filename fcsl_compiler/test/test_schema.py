@@ -21,11 +21,11 @@ from fcsl_compiler.cli.scaffold import algorithm_files, machine_files
 from fcsl_compiler.cli.verbs import MACHINE_SCHEMA
 from fcsl_compiler.config import views
 from fcsl_compiler.config.arming import MAX_TIMEOUT_S
-from fcsl_compiler.config.machine import MAX_TICK_HZ, RESERVED_INSTANCES
 from fcsl_compiler.driver.passes import compile_machine
 from fcsl_compiler.model.machine import CHANNEL_SOURCES, MACHINE_SOURCES
 from fcsl_compiler.model.types import HEALTH_NAMES
 from fcsl_compiler.parse.json_reader import ConfigReader, is_name
+from fcsl_compiler.parse.parts import MAX_TICK_HZ, RESERVED_INSTANCES
 
 ROOT = Path(__file__).parents[2]
 MACHINES = [

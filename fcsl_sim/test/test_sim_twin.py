@@ -22,7 +22,7 @@ import pytest
 from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 
-from fcsl_compiler.config.machine import MAX_TICK_HZ
+from fcsl_compiler.parse.parts import MAX_TICK_HZ
 from fcsl_sim import SimError, Simulation, plant_only
 from fcsl_sim.cli import main
 from fcsl_sim.sim_twin import SimTwin

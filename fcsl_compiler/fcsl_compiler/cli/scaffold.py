@@ -7,8 +7,8 @@ from pathlib import Path
 
 from ..base.usage_error import UsageError
 from ..check.scope import LANGUAGE_NAMES
-from ..config.machine import RESERVED_INSTANCES
 from ..parse.machine_files import is_machine_name
+from ..parse.parts import RESERVED_INSTANCES
 from . import scaffold_package
 from .verbs import MACHINE_SCHEMA
 

@@ -25,7 +25,7 @@ from ..model.types import REQUEST, element_of
 from ..parse.json_reader import ConfigReader, Everything
 from ..parse.json_source import JsonNode
 from ..parse.machine_files import ParsedAlgorithm, ParsedMachine
-from ..parse.parts import RESERVED_INSTANCES
+from ..parse.parts import MAX_TICK_HZ, RESERVED_INSTANCES
 from .arming import read_arming
 from .channels import read_channels, read_payload
 from .part_requests import bind_requests
@@ -35,8 +35,6 @@ from .states import read_states
 from .structs import read_structs
 from .transitions import read_transitions
 from .views import Signals, is_partial, read_views
-
-MAX_TICK_HZ = 1_000_000
 
 #: Checked algorithms by name, in JSON order. None: an error was reported.
 Algorithms = dict[str, ir.Algorithm | None]
