@@ -19,9 +19,9 @@ class Pid:
 
     Source: Modelica Standard Library, Modelica.Blocks.Continuous.LimPID (weights, filtered derivative, back-calculation),
     after K. J. Astrom and T. Hagglund, "PID Controllers", 2nd ed. (1995).
-    Limits: a tracking_time below the period acts as the period. A setpoint, measurement or feedforward that is not finite
-    is passed over: the command stays, and health is degraded. If it is the first one after a break, or `track` is not
-    finite then, the next run begins at `track`.
+    Limits: a tracking_time below the period acts as the period. A setpoint, measurement or feedforward that is not finite,
+    or that makes v or I so, is passed over: the command stays, and health is degraded. If it is the first one after a break,
+    or `track` is not finite then, the next run begins at `track`.
     """
 
     inputs = {
@@ -60,19 +60,25 @@ class Pid:
         weighted = self.c * self.setpoint - self.measured
         proportional = self.kp * (self.b * self.setpoint - self.measured)
         if self.begins:
-            self.begins = False
-            self.derivative = 0.0
-            self.integral = clamp(self.track, self.low, self.high) - proportional - self.feedforward
+            derivative = 0.0
+            integral = clamp(self.track, self.low, self.high) - proportional - self.feedforward
         else:
-            self.derivative = differentiated(
+            derivative = differentiated(
                 self.derivative, self.kd, weighted - self.last, self.derivative_time, self.period
             )
-        self.last = weighted
-        wanted = proportional + self.integral + self.derivative + self.feedforward
+            integral = self.integral
+        wanted = proportional + integral + derivative + self.feedforward
+        step = self.ki * error * self.period
+        integral = integrated(integral, step, wanted, self.low, self.high, self.tracking_time, self.period)
+        if not (isfinite(wanted) and isfinite(integral) and isfinite(derivative) and isfinite(weighted)):
+            self.health = "degraded"
+            return
+        self.begins = False
         self.command = clamp(wanted, self.low, self.high)
         self.saturated = self.command != wanted
-        step = self.ki * error * self.period
-        self.integral = integrated(self.integral, step, wanted, self.low, self.high, self.tracking_time, self.period)
+        self.integral = integral
+        self.derivative = derivative
+        self.last = weighted
 
 
 def differentiated(derivative: f64, kd: f64, change: f64, time: f64, period: f64) -> f64:

@@ -122,3 +122,14 @@ def test_the_period_is_that_of_the_state(block: Callable[..., Any]) -> None:
         feed(pid)
         last = [feed(pid, setpoint=1.0)["command"] for _ in range(rate)][-1]
         assert last == pytest.approx((rate - 1) / rate)
+
+
+def test_a_step_too_large_for_a_double_is_passed_over(block: Callable[..., Any]) -> None:
+    """It left I and D at NaN before."""
+    pid = block("pid.py", "Pid", kp=1e10, ki=1.0, kd=1.0, c=1.0, low=-1.0, high=1.0)
+    given = {"measured": 0.0, "feedforward": 0.0, "track": 0.0}
+    first = pid.step(setpoint=0.0, **given)
+    lost = pid.step(setpoint=1e308, **given)
+    assert lost["health"] == "degraded" and lost["command"] == first["command"]
+    after = pid.step(setpoint=0.0, **given)
+    assert after["health"] == "nominal" and after["command"] == 0.0
