@@ -23,7 +23,7 @@ OF_ANYTHING = (*ELSEWHERE, "sine_injection", "sine_injection_vector")
 PLAIN = re.compile(
     r"attitude|vector_|scale_error|coefficient|probability|delay_samples|fault|sampled|touching|saturated|burnt_out|mach$|throttle"
     r"|lift|drag|moment$|_from_|cl[pr]|cmq|cnr|charge|cells|direction|axis|beam|points|friction$|flattening|damping|motor_reacts"
-    r"|soft_iron|decimal_year|position_body"
+    r"|soft_iron|decimal_year|position_body|slip_"
 )
 
 

@@ -1,3 +1,6 @@
+from fcsl_builtins import f64
+
+
 class Script:
     """Drives by hand from hand_s on, along the route from route_s to again_s, by hand until rest_s. The emergency stop is
     pressed from stop_s to release_s."""
