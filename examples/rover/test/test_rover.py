@@ -23,7 +23,7 @@ def drive() -> Any:
     """The whole run: by hand from 1 s on, along the route from 4 s to 32 s, by hand, emergency stop from 36 s to 38 s."""
     paths = [f"rover.outputs.{name}" for name in ("x", "y", "heading", "forward_speed", "yaw_rate", "speed_left")]
     paths += ["machine.state", "odometry.outputs.position", "odometry.outputs.heading", "odometry.outputs.covariance"]
-    paths += ["follow.outputs.cross_track", "follow.outputs.done", "mode.outputs.armed"]
+    paths += ["follow.outputs.cross_track", "follow.outputs.done", "mode.outputs.armed", "rover.inputs.command_left"]
     with SimTwin.from_config(SIM) as twin, twin.trace(*paths) as trace:
         twin.tick(42 * HZ)
     return trace
@@ -36,8 +36,8 @@ def at(t_s: float) -> int:
 def test_it_goes_through_its_states(drive: Any) -> None:
     states = drive["machine.state"]
     entered = [(k / HZ, str(states[k])) for k in range(1, len(states)) if states[k] != states[k - 1]]
-    assert [state for _, state in entered] == ["MANUAL", "FOLLOW", "MANUAL", "EMERGENCY", "STOPPED"]
-    assert [t for t, _ in entered] == pytest.approx([1.01, 4.01, 32.01, 36.01, 40.01], abs=0.021)
+    assert [state for _, state in entered] == ["STOPPED", "MANUAL", "FOLLOW", "MANUAL", "EMERGENCY", "STOPPED"]
+    assert [t for t, _ in entered] == pytest.approx([0.01, 1.01, 4.01, 32.01, 36.01, 40.01], abs=0.021)
 
 
 def test_by_hand_it_drives_the_circle_that_was_asked_for(drive: Any) -> None:
@@ -77,69 +77,108 @@ def test_the_emergency_stop_locks_until_the_switch_was_at_0(drive: Any) -> None:
     speed = np.abs(drive["rover.outputs.speed_left"])
     assert speed[at(35.9)] > 3.0 and speed[at(36.5) : at(40.0)].max() < 0.05
     assert speed[at(38.5)] < 1e-6  # released, and the lever still asks for 0.6 m/s
+    assert not drive["rover.inputs.command_left"][at(36.1) :].any()  # nor does an old command come when it unlocks
 
 
 # ---- the machine alone ------------------------------------------------------------------------------------------------
 
 
+NAN, INF = float("nan"), float("inf")
+
+
 @pytest.fixture
 def twin() -> Iterator[AlgTwin]:
+    """Unlocked, and at rest."""
     with AlgTwin.from_config(MACHINE) as opened:
         for channel in opened.channels():
             if channel.direction == "sensor":
                 opened.attach(channel.name)
+        drive_by(opened, 3, mode=0)
         yield opened
 
 
-def hands(twin: AlgTwin, ticks: int = 1, **lost: bool) -> None:
-    """What the operator and the encoders send, for some ticks, without what is lost."""
+def drive_by(twin: AlgTwin, ticks: int = 1, **sent: Any) -> None:
+    """What operator and encoders send for some ticks, in place of half a metre per second by hand; None: it is lost."""
+    usual = {"speed": 0.5, "yaw_rate": 0.0, "mode": 1, "stop": False, "left": 0.0, "right": 0.0}
+    channels = {"speed": "cmd_vel.speed", "yaw_rate": "cmd_vel.yaw_rate", "mode": "mode", "stop": "emergency_stop"}
+    channels |= {"left": "wheels.left", "right": "wheels.right"}
     for _ in range(ticks):
-        if "operator" not in lost:
-            twin.sample("cmd_vel.speed", 0.5)
-            twin.sample("cmd_vel.yaw_rate", 0.0)
-        if "switches" not in lost:
-            twin.sample("mode", 1)
-            twin.sample("emergency_stop", False)
-        if "wheels" not in lost:
-            twin.sample("wheels.left", 0.0)
-            twin.sample("wheels.right", 0.0)
+        for name, value in {**usual, **sent}.items():
+            if value is not None:
+                twin.sample(channels[name], value)
         twin.tick()
 
 
+def actuated(twin: AlgTwin) -> float:
+    """The larger command that the motors get."""
+    armed = twin.get_value("mode.outputs.armed")
+    return max(abs(twin.get_value(f"drive.outputs.{side}")) for side in ("left", "right")) if armed else 0.0
+
+
+def test_it_begins_locked() -> None:
+    with AlgTwin.from_config(MACHINE) as twin:
+        drive_by(twin, 20)
+        assert twin.state() == "EMERGENCY" and not twin.get_value("mode.outputs.armed")
+        drive_by(twin, 3, mode=0)
+        drive_by(twin, 100)
+        assert twin.state() == "MANUAL" and actuated(twin) == pytest.approx(5.0)
+
+
 def test_an_emergency_stop_disarms_in_the_same_tick(twin: AlgTwin) -> None:
-    hands(twin, 3)
-    assert twin.state() == "MANUAL" and twin.get_value("mode.outputs.armed")
-    twin.sample("emergency_stop", True)
-    twin.tick()
+    drive_by(twin, 100)
+    assert actuated(twin) == pytest.approx(5.0)
+    drive_by(twin, stop=True)
     assert not twin.get_value("mode.outputs.armed")
-    twin.tick()
+    drive_by(twin)
     assert twin.state() == "EMERGENCY"
 
 
 @pytest.mark.parametrize(
     ("lost", "patience", "state"),
-    [("operator", 50, "STOPPED"), ("switches", 50, "EMERGENCY"), ("wheels", 10, "EMERGENCY")],
+    [
+        ({"speed": None, "yaw_rate": None}, 50, "STOPPED"),
+        ({"mode": None, "stop": None}, 50, "EMERGENCY"),
+        ({"left": None, "right": None}, 10, "EMERGENCY"),
+        ({"speed": NAN}, 0, "STOPPED"),
+        ({"yaw_rate": INF}, 0, "STOPPED"),
+        ({"left": NAN}, 0, "EMERGENCY"),
+        ({"mode": 3}, 0, "STOPPED"),
+        ({"mode": -1}, 0, "STOPPED"),
+    ],
 )
-def test_what_is_lost_stops_it(twin: AlgTwin, lost: str, patience: int, state: str) -> None:
-    hands(twin, 20)
-    hands(twin, patience, **{lost: True})
+def test_what_is_lost_or_no_number_stops_it(twin: AlgTwin, lost: dict[str, Any], patience: int, state: str) -> None:
+    drive_by(twin, 100)
+    drive_by(twin, patience, **lost)
     assert twin.state() == "MANUAL"
-    hands(twin, 2, **{lost: True})
+    drive_by(twin, 2, **lost)
     assert twin.state() == state
-    hands(twin, 3)
-    assert twin.state() == ("MANUAL" if state == "STOPPED" else "EMERGENCY")  # the switch is still at 1
+    drive_by(twin, 70, **lost)
+    assert actuated(twin) < 1e-9
+    drive_by(twin, 3)
+    assert twin.state() == ("MANUAL" if state == "STOPPED" else "EMERGENCY")  # the switch is at 1
 
 
-def test_a_fault_of_an_algorithm_drives_nowhere(twin: AlgTwin) -> None:
-    hands(twin, 200)
-    assert twin.get_value("drive.outputs.left") == pytest.approx(5.0)
-    twin.fault("mode")
-    hands(twin)
-    assert twin.get_value("drive.outputs.left") == pytest.approx(
-        5.0
-    )  # it has no effect of its own, and the next run is whole
-    hands(twin, 2)
-    assert twin.state() == "MANUAL"
+def test_encoders_without_numbers_end_the_route(twin: AlgTwin) -> None:
+    drive_by(twin, 100, mode=2)
+    assert twin.state() == "FOLLOW" and actuated(twin) > 5.0
+    drive_by(twin, 3, mode=2, left=NAN, right=NAN)
+    assert twin.state() == "EMERGENCY" and actuated(twin) == 0.0
+
+
+@pytest.mark.parametrize(
+    "instance", ["mode", "command", "follow", "drive", "odometry", "operator", "switches", "wheels"]
+)
+@pytest.mark.parametrize("mode", [1, 2])
+def test_a_fault_that_lasts_brings_it_to_rest(twin: AlgTwin, instance: str, mode: int) -> None:
+    """With the lever far over, and the emergency stop pressed while `mode` cannot see it."""
+    drive_by(twin, 100, mode=mode)
+    assert actuated(twin) > 3.0
+    takes_part = (instance, mode) not in (("follow", 1), ("operator", 2))
+    for _ in range(150):
+        twin.fault(instance)
+        drive_by(twin, mode=mode, speed=-0.9, yaw_rate=1.0, stop=instance == "mode")
+        assert actuated(twin) <= 8.0 + 1e-9 or not takes_part  # 0.8 m/s, which the route may have
+    assert actuated(twin) < 1e-9 or not takes_part
 
 
 def test_machine_and_plant_have_one_geometry() -> None:

@@ -64,8 +64,8 @@ class AckermannSteering:
     about (0, 1 / c).
     Limits: no slip; the driven front wheels turn about their points of contact. Beyond 2 / traction_track of curvature,
     the inner rear wheel turns backward. A command that is not finite, or whose wheel speeds are not, is passed over:
-    outputs stay, health is degraded. In the first run after a break, the tracked values count as well, and the next run
-    begins in its place.
+    outputs stay, so it drives on, and health is degraded: a stop needs a finite command. In the first run
+    after a break, the tracked values count as well, and the next run begins in its place.
     """
 
     inputs = {
@@ -91,7 +91,7 @@ class AckermannSteering:
         "max_lateral_acceleration": "f64 m/s^2 in 0.. = 1e308",
         "max_wheel_speed": "f64 rad/s in 0.. = 1e308",  # of the driven wheels
         "use_yaw_rate": "bool = false",  # yaw_rate instead of curvature
-        "hold_speed": "f64 m/s in 0.. = 0",  # up to which the steering stays, with use_yaw_rate
+        "hold_speed": "f64 m/s in 0.. = 0",  # up to which the steering stays, with use_yaw_rate; at 0, noise at rest turns it
         "front_drive": "bool = false",  # the steered wheels are driven
     }
     outputs = {

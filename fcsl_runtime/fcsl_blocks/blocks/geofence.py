@@ -26,7 +26,7 @@ class Geofence:
     itself, `inside` may be either within a few roundings. Outside of polygon and altitudes at once, clearance is the worse of
     both distances, not the way back. floor above ceiling: always breached. Between two runs a vehicle may pass a narrow
     polygon unseen. If an input is not finite or a distance overflows, the run is passed over: outputs stay, health is
-    degraded, and a start waits.
+    degraded, and a start waits; act on the health, too. Until the first run that is not, breached and warning are true.
     """
 
     inputs = {
@@ -52,6 +52,10 @@ class Geofence:
         "warning": "bool",  # too near to the border, or outside
     }
     state = {"begun": "bool"}  # since the last break there was a run with finite inputs
+
+    def start(self):
+        self.breached = True
+        self.warning = True
 
     def execute(self):
         self.begun = self.begun and not self.resumed

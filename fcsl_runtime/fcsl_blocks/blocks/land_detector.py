@@ -117,7 +117,7 @@ class LandDetector:
         low = self.thrust <= self.min_thrust + self.contact_share * span if self.velocity_valid else minimal
 
         contact = low and still and near and (self.descending or self.maybe_landed)
-        time = self.contact_time if self.velocity_valid else self.blind_time
+        time = self.contact_time if self.velocity_valid or not self.armed else self.blind_time
         self.ground_contact, self.contact_held = debounced(
             contact or not self.armed, self.ground_contact, self.contact_held, time, 0.0, self.period
         )

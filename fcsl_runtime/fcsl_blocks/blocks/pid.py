@@ -14,8 +14,8 @@ class Pid:
 
     I is integrated by forward Euler behind u, D by backward differences. With tracking_time = 0, the integral stands still
     while v is beyond a limit and the error would drive it further (clamping). In the first run after a break
-    (`resumed`), I is chosen so that u begins at `track`: bumpless, with D = 0. ki is inside the integral, so that a change
-    of ki makes no jump.
+    (`resumed`), I is chosen so that u begins at `track`: bumpless, with D = 0. Without ki nothing would take this I back:
+    it is 0 then, and u begins at P + feedforward. ki is inside the integral, so that a change of ki makes no jump.
 
     Source: Modelica Standard Library, Modelica.Blocks.Continuous.LimPID (weights, filtered derivative, back-calculation),
     after K. J. Astrom and T. Hagglund, "PID Controllers", 2nd ed. (1995).
@@ -28,7 +28,7 @@ class Pid:
         "setpoint": "f64",  # r
         "measured": "f64",  # y
         "feedforward": "f64",  # added before the limits
-        "track": "f64",  # the command to begin at after a break
+        "track": "f64",  # the command to begin at after a break, with ki > 0
         "period": "f64 s",  # machine.period
         "resumed": "bool",  # machine.resumed
     }
@@ -61,7 +61,8 @@ class Pid:
         proportional = self.kp * (self.b * self.setpoint - self.measured)
         if self.begins:
             derivative = 0.0
-            integral = clamp(self.track, self.low, self.high) - proportional - self.feedforward
+            start = clamp(self.track, self.low, self.high) - proportional - self.feedforward
+            integral = start if self.ki > 0.0 else 0.0
         else:
             derivative = differentiated(
                 self.derivative, self.kd, weighted - self.last, self.derivative_time, self.period

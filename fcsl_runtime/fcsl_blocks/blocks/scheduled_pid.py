@@ -18,7 +18,7 @@ class ScheduledPid:
     the integral and the derivative, and what a change of kp does to P is taken from I. So P moves with b r - y alone (it is
     in velocity form), and the schedule does not disturb a loop at rest. Where v is beyond a limit, I changes only as far as
     the command needs to stay at it: of a large P, nothing is left in I. Without integral action (ki = 0), nothing would
-    remove an offset from I; there P is kp (b r - y), and jumps with kp.
+    remove an offset from I: it begins at 0, not at `track`, and there P is kp (b r - y), and jumps with kp.
 
     Source: Dyad DiscreteComponents, DiscretePIDScheduled (gains inside integral and derivative, so that a change leaves both
     parts of the command as they are); MathWorks, "Analysis of Gain-Scheduled PI Controller" (ki before the integrator and
@@ -76,7 +76,8 @@ class ScheduledPid:
         partial = self.b * self.setpoint - self.measured
         if self.begins:
             derivative = 0.0
-            integral = clamp(self.track, self.low, self.high) - kp * partial - self.feedforward
+            start = clamp(self.track, self.low, self.high) - kp * partial - self.feedforward
+            integral = start if ki > 0.0 else 0.0
         else:
             derivative = differentiated(self.derivative, kd, weighted - self.last, self.derivative_time, self.period)
             integral = self.integral

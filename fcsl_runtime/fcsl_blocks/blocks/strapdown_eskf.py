@@ -26,6 +26,7 @@ from fcsl_builtins import (
     quat_rotate,
     quat_to_dcm,
     quat_turn,
+    sat_add,
     skew,
     sqrt,
     symmetric_product,
@@ -166,10 +167,10 @@ class StrapdownEskf:
     (I - K H) P (I - K H)^T + K R K^T; then dx goes into the state, and P = G P G^T with G = I - [dtheta / 2]x. Elements with
     a sigma of 0 are not measured: so is the height of a position in the plane. An aid is rejected if innovation^T S^-1
     innovation is not below its gate: chi squared. The defaults reject one in 10^4 of the samples that fit. If an aid has been
-    rejected for reset_after, the next sample sets what it measures (position, velocity or heading), as the gain that moves
-    this alone, in Joseph's form. What may have led it away in the time T of the rejections becomes unknown by as much: the
-    velocity by (step of position) / T, the tilt by (horizontal step of velocity) / (g T) or that of position / (g T^2), at
-    most 1 rad.
+    rejected for reset_after, reset_count times in a row at least, the next sample sets what it measures (position, velocity
+    or heading), as the gain that moves this alone, in Joseph's form. What may have led it away in the
+    time T of the rejections becomes unknown by as much: the velocity by (step of position) / T, the tilt by (horizontal
+    step of velocity) / (g T) or that of position / (g T^2), at most 1 rad.
 
     The world is north, east, down and the body forward, right, down; without z_down, east, north, up and forward, left,
     up. The IMU gives integrals or rates: what is not connected is 0. The first run, and the first after a break (`resumed`),
@@ -252,6 +253,7 @@ class StrapdownEskf:
         "body_velocity_gate": "f64 in 0.. = 21.11",  # chi squared of 3 elements
         "body_velocity_arm": "f64[3] m = 0",  # of the point whose velocity it is, from the IMU, body axes
         "reset_after": "f64 s in 1e-3.. = 10",  # of rejections of an aid; 1e308: never
+        "reset_count": "u32 in 1.. = 3",  # least rejections in a row before it
     }
     outputs = {
         "attitude": "f64[4]",  # quaternion w, x, y, z, body to world
@@ -288,6 +290,7 @@ class StrapdownEskf:
         "heard": "bool",  # a heading, since it rests
         "heard_heading": "f64 rad",
         "rejecting": "f64[6] s",  # since the first rejection in a row
+        "in_row": "u32[6]",  # rejections
     }
 
     def start(self):
@@ -335,7 +338,7 @@ class StrapdownEskf:
             for i in range(AIDS):
                 if self.rejected[i]:
                     self.rejecting[i] += dt
-                    if self.rejecting[i] >= self.reset_after:
+                    if self.rejecting[i] >= self.reset_after and self.in_row[i] >= self.reset_count:
                         late[i] = self.rejecting[i]
 
             if self.position_fresh:
@@ -454,6 +457,7 @@ class StrapdownEskf:
                 elif square[i] >= 0.0:
                     self.innovation_squared[i] = square[i]
                     self.rejected[i] = not taken[i]
+                    self.in_row[i] = 0 if taken[i] else sat_add(self.in_row[i], 1)
                     if taken[i]:
                         self.rejecting[i] = 0.0
                     if not square[i] < gates[i]:
@@ -518,6 +522,7 @@ class StrapdownEskf:
             for i in range(AIDS):
                 self.rejected[i] = False
                 self.rejecting[i] = 0.0
+                self.in_row[i] = 0
 
         self.since = 0.0
         self.covariance = p

@@ -133,3 +133,10 @@ def test_a_step_too_large_for_a_double_is_passed_over(block: Callable[..., Any])
     assert lost["health"] == "degraded" and lost["command"] == first["command"]
     after = pid.step(setpoint=0.0, **given)
     assert after["health"] == "nominal" and after["command"] == 0.0
+
+
+def test_without_integral_action_the_start_leaves_no_offset(block: Callable[..., Any]) -> None:
+    pid = block("pid.py", "Pid", kp=2.0)
+    given = {"measured": 0.0, "feedforward": 0.0, "track": 5.0}
+    assert pid.step(setpoint=1.0, **given)["command"] == 2.0
+    assert pid.step(setpoint=0.0, **given)["command"] == 0.0

@@ -638,7 +638,7 @@ def test_the_deviations_after_a_reset(block: Callable[..., Any], aid: str) -> No
 
 def test_a_reset_of_the_heading_keeps_the_tilt(block: Callable[..., Any]) -> None:
     r = Rotation.from_euler("ZYX", [0.7, -0.6, 0.9])
-    f, _ = launched(block, r, DOWN, reset_after=0.015)
+    f, _ = launched(block, r, DOWN, reset_after=0.015, reset_count=2)
     for _ in range(3):
         out = feed(f, **at_rest(r), **seen(heading=-2.0))
     assert out["resets"][3] == 1
@@ -647,7 +647,7 @@ def test_a_reset_of_the_heading_keeps_the_tilt(block: Callable[..., Any]) -> Non
 
 def test_a_reset_to_a_slope_moves_along_its_normal(block: Callable[..., Any]) -> None:
     normal = np.array([0.3, -0.4, -1.0]) / np.linalg.norm([0.3, -0.4, -1.0])
-    f, reference = launched(block, LEVEL, DOWN, reset_after=0.015)
+    f, reference = launched(block, LEVEL, DOWN, reset_after=0.015, reset_count=2)
     plane = {"ground": 2.0, "ground_normal": normal}
     for _ in range(3):
         out = feed(f, **HOVER, **plane, **seen(range=80.0))
@@ -660,12 +660,25 @@ def test_a_reset_to_a_slope_moves_along_its_normal(block: Callable[..., Any]) ->
 
 
 def test_a_reset_of_one_element_leaves_the_others(block: Callable[..., Any]) -> None:
-    f, _ = launched(block, LEVEL, DOWN, reset_after=0.015, measured_position_sigma=[0.5, 0.0, 0.0])
+    f, _ = launched(block, LEVEL, DOWN, reset_after=0.015, reset_count=2, measured_position_sigma=[0.5, 0.0, 0.0])
     for _ in range(3):
         out = feed(f, **HOVER, **seen(position=[90.0, NAN, NAN]))
     assert out["resets"][0] == 1
     np.testing.assert_allclose(out["position"], [90.0, 6.0, -20.0], atol=1e-9)
     np.testing.assert_allclose(out["position_sigma"], [0.5, 3.0, 4.0], rtol=1e-4)
+
+
+def test_two_outliers_with_a_gap_between_them_reset_nothing(block: Callable[..., Any]) -> None:
+    """Time without samples is no evidence against the estimate."""
+    f, _ = launched(block, LEVEL, DOWN, reset_after=0.5)
+    for _ in range(20):
+        feed(f, **HOVER, **seen(position=DOWN["first_position"]))
+    feed(f, **HOVER, **seen(position=[500.0, 0.0, 0.0]))
+    for _ in range(100):
+        feed(f, **HOVER, position_fresh=False)
+    out = feed(f, **HOVER, **seen(position=[-900.0, 0.0, 0.0]))
+    assert out["rejected"][0] and out["resets"][0] == 0
+    np.testing.assert_allclose(out["position"], DOWN["first_position"], atol=0.5)
 
 
 def native(f: Any, **inputs: Any) -> dict[str, Any]:

@@ -5,10 +5,11 @@ class Command:
     """Owns the speeds that the rover shall have: by hand, along the route, or none.
 
     Along the route: v = min(cruise, sqrt(2 deceleration remaining), sqrt(turn_acceleration / |curvature|)), w = curvature v,
-    so that it stops at the end and turns without skidding.
+    so that it stops at the end and turns without skidding. While `mode` faults, it wants none: what that says is old.
     """
 
     inputs = {
+        "mode": "Health",
         "by_hand": "bool",
         "speed_by_hand": "f64 m/s",
         "yaw_rate_by_hand": "f64 rad/s",
@@ -26,6 +27,8 @@ class Command:
     def execute(self):
         self.speed = 0.0
         self.yaw_rate = 0.0
+        if self.mode == "failed":
+            return
         if self.follow == "nominal":
             to_end = sqrt(2.0 * self.deceleration * max(0.0, self.remaining))
             in_turn = sqrt(self.turn_acceleration / max(abs(self.curvature), 1e-3))

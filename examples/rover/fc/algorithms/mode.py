@@ -5,8 +5,9 @@ ROUTE = 2
 class Mode:
     """Owns the state of the rover, and whether its wheels are armed.
 
-    An emergency stop, lost switches or lost encoders disarm in the same tick and lock: the switch must be at 0, with
-    nothing wrong, before anything moves again. Without word from the operator, driving by hand stops.
+    It begins locked. An emergency stop, lost switches, lost or unusable encoders, and a fault of what makes the commands
+    disarm and lock: the switch must be at 0, with nothing wrong, before anything moves again. Without word from the
+    operator, driving by hand stops. The wheels are armed only while `drive` runs: its commands are then of this state.
     """
 
     inputs = {
@@ -15,27 +16,29 @@ class Mode:
         "switches": "Health",
         "operator": "Health",
         "wheels": "Health",
+        "odometry": "Health",  # not nominal: an encoder gives no number
+        "command": "Health",  # of the tick before, as that of drive
+        "drive": "Health",
     }
-    outputs = {
-        "armed": "bool",
-        "by_hand": "bool",  # the operator's speeds count, where no route does
-        "transition_request": "TransitionRequest",
-    }
+    outputs = {"armed": "bool", "by_hand": "bool", "transition_request": "TransitionRequest"}
     state = {"locked": "bool"}
 
+    def start(self):
+        self.locked = True
+
     def execute(self):
-        wrong = self.stop or self.switches == "failed" or self.wheels == "failed"
-        if wrong:
+        lost = self.switches == "failed" or self.wheels == "failed" or self.odometry != "nominal"
+        if self.stop or lost or self.command == "failed" or self.drive == "failed":
             self.locked = True
-        elif self.wanted == 0:
+        elif self.wanted == 0 and self.switches == "nominal":
             self.locked = False
-        self.by_hand = not self.locked and self.wanted != 0 and self.operator != "failed"
-        self.armed = not self.locked
+        self.by_hand = not self.locked and self.wanted == BY_HAND and self.operator == "nominal"
+        self.armed = not self.locked and self.drive == "nominal"
         if self.locked:
             self.transition_request = "EMERGENCY"
+        elif self.by_hand:
+            self.transition_request = "MANUAL"
         elif self.wanted == ROUTE:
             self.transition_request = "FOLLOW"
-        elif self.wanted == BY_HAND and self.by_hand:
-            self.transition_request = "MANUAL"
         else:
             self.transition_request = "STOP"

@@ -1,16 +1,20 @@
-class Operator:
-    """Owns the wishes of who drives: they come from `cmd_vel`."""
+from fcsl_builtins import isfinite
 
-    outputs = {"speed": "f64 m/s", "yaw_rate": "f64 rad/s"}
+
+class Operator:
+    """Owns the wishes of who drives: they come from `cmd_vel`. What is no number counts as none."""
+
+    outputs = {"speed": "f64 m/s", "yaw_rate": "f64 rad/s"}  # channels write them
 
     def execute(self):
-        pass  # channels write the outputs
+        if not (isfinite(self.speed) and isfinite(self.yaw_rate)):
+            self.health = "failed"
 
 
 class Switches:
     """Owns what the operator switches: 0 stop, 1 by hand, 2 along the route; and the emergency stop."""
 
-    outputs = {"mode": "i32", "stop": "bool"}
+    outputs = {"mode": "i32", "stop": "bool"}  # channels write them
 
     def execute(self):
         pass
