@@ -280,6 +280,34 @@ def test_parts_run_as_the_reference_runs_them(tmp_path: Path) -> None:
     assert {att for _, att, _ in visited} == {0, 1} and {spare for _, _, spare in visited} == {0, 1}
 
 
+def test_an_algorithm_of_the_machine_with_the_name_of_one_of_a_part_is_another_one(tmp_path: Path) -> None:
+    for name, number in (("one.py", 1.0), ("part/two.py", 2.0), ("three.py", 3.0)):
+        path = tmp_path / name
+        path.parent.mkdir(exist_ok=True)
+        path.write_text(
+            f'class F:\n    outputs = {{"o": "f64"}}\n\n    def execute(self):\n        self.o = {number}\n'
+        )
+    machine: dict[str, Any] = {"tick_hz": 100, "initial_state": "R"}
+    part = {**machine, "algorithms": {"F": {"source": "two.py"}}, "instances": {"s": {"algorithm": "F"}}}
+    (tmp_path / "part/part.json").write_text(json.dumps({**part, "states": {"R": {"schedule": {"s": 100}}}}))
+    machine |= {
+        "algorithms": {"F": {"source": "one.py"}, "a_F": {"source": "three.py", "class": "F"}},
+        "instances": {"a": {"machine": "part/part.json"}, "f": {"algorithm": "F"}, "g": {"algorithm": "a_F"}},
+        "states": {"R": {"schedule": {"a": True, "f": 100, "g": 100}}},
+    }
+    (tmp_path / "m.json").write_text(json.dumps(machine))
+    twins = Twins(tmp_path / "m.json")
+    twins.step()
+    assert [twins.get(f"{i}.outputs.o") for i in ("f", "a.s", "g")] == [1.0, 2.0, 3.0]
+
+
+def test_a_title_that_looks_like_a_port_stays(tmp_path: Path) -> None:
+    def change(craft: Any, attitude: Any, rate: Any) -> None:
+        craft["views"]["panels"][0]["title"] = "att.outputs.u"
+
+    assert '"title":"att.outputs.u"' in compile_machine(write(tmp_path, change), "").machine.views
+
+
 def test_requests_have_names_of_the_machine(tmp_path: Path) -> None:
     """`wound` is `far` in the part that the part is in, and STOP in the machine."""
     machine = compile_machine(write(tmp_path), "", until="schedule").checked
@@ -440,6 +468,31 @@ WRONG: dict[str, tuple[Change, str]] = {
     "a channel in a part": (
         part(connections=[{"from": "channels.target.valid", "to": "law.angle"}]),
         "E254: a part has no channels",
+    ),
+    "a port of nothing at all": (ports("inputs", more=[]), "E208: port `more` stands for nothing"),
+    "an empty port": (ports("outputs", more=""), "E208: `` is no path of a port"),
+    "a port that is an instance": (ports("outputs", more="law"), "E208: `law` is no path of a port"),
+    "parameters that are no object": (
+        instance("att", parameters=[3]),
+        "E208: `parameters` of `att` is an object from name to definition",
+    ),
+    "inputs that are no object": (instance("att", inputs=3), "E208: `inputs` of `att` is an object"),
+    "an algorithm of the machine": (
+        part(instances={**ATTITUDE["instances"], "law": {"algorithm": "Body"}}),
+        "E206: no algorithm `Body`",
+    ),
+    "members in another order": (
+        lambda craft, attitude, rate: attitude.update(structs={"Pair": {"second": "f64", "first": "f64"}}),
+        "E255: struct `Pair` has other members in another file",
+    ),
+    "connections of a machine that are no list": (
+        lambda craft, attitude, rate: craft.update(connections={}),
+        "E208: `connections` is a list, not an object",
+    ),
+    "a request without a text": (instance("att", requests={"far": ""}), "E203: `` is not a request name"),
+    "a request of a part in a part": (
+        lambda craft, attitude, rate: attitude["instances"]["rate"]["requests"].update(wound="STOP"),
+        "E256: request `STOP` is not listed",
     ),
     "requests that are no texts": (part(requests=[3]), "E208: a request is a string, not an integer"),
     "connections that are no list": (part(connections={}), "E208: `connections` is a list, not an object"),

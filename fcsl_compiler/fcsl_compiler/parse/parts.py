@@ -15,7 +15,7 @@ from ..base.diagnostics import nearest
 from ..base.files import SourceError
 from ..base.source import SourceFile, Span
 from .constants import read_constants
-from .json_reader import ConfigReader, Scope
+from .json_reader import ConfigReader, Scope, is_name
 from .json_source import JsonNode, Member, parse_json
 from .source_path import SourcePathError, beside, resolve_source
 
@@ -32,6 +32,8 @@ _RECORDS = ("inputs", "outputs", "parameters")
 RESERVED_INSTANCES = ("machine", "channels", "state", "transitions", "health", "faults", "record")
 #: Those of a part: paths have these behind the name of an instance, too.
 _RESERVED = (*RESERVED_INSTANCES, "inputs", "outputs", "parameters", "counters")
+#: Keys of views whose texts are no paths of fields.
+_NO_PATHS = ("title", "mesh", "frames")
 _WHOLE = "a part is scheduled as a whole, at its own rates"
 
 
@@ -120,9 +122,11 @@ class Joined:
             if is_part:
                 self._include(file, name, node, span)
                 continue
+            if file.prefix and _object(node).get("algorithm") is not None:
+                self.reader.reference(_object(node)["algorithm"].value, "algorithm", list(names))
             whole = _renamed(node, "algorithm", names) if file.prefix else node
             self._instances[file.prefix + name] = Member(file.prefix + name, span, whole)
-        for item in _items(file.keys.get("connections")):
+        for item in self.reader.list(file.keys.get("connections"), "`connections`"):
             self._connections += self._connection(file, item)
         self._read_ports(file)
         if file.prefix:
@@ -131,7 +135,7 @@ class Joined:
     def _add_structs(self, file: _File) -> None:
         for name, member in _object(file.keys.get("structs")).items():
             known = self._structs.setdefault(name, member)
-            if known is not member and plain(known.value) != plain(member.value):
+            if known is not member and str(plain(known.value)) != str(plain(member.value)):  # in the same order, too
                 fix = "make both equal, or rename one"
                 notes = [(known.key_span, "the other")]
                 message = f"struct `{name}` has other members in another file"
@@ -154,10 +158,15 @@ class Joined:
             members.setdefault("class", Member("class", member.key_span, _text(source, name)))
             node = replace(member.value, value=members)
             same = known.get(self._identity(name, node), [])
-            own = name if name not in self._algorithms else file.prefix.replace(".", "_") + name
-            names[name] = name if name in same else same[0] if same else own
+            names[name] = name if name in same else same[0] if same else self._free_name(file, name)
             self._algorithms.setdefault(names[name], Member(names[name], member.key_span, node))
         return names
+
+    def _free_name(self, file: _File, name: str) -> str:
+        """A name that no algorithm of the whole machine has."""
+        own = name if name not in self._algorithms else file.prefix.replace(".", "_") + name
+        numbered = (f"{own}_{n}" for n in range(2, len(self._algorithms) + 3))
+        return own if own not in self._algorithms else next(n for n in numbered if n not in self._algorithms)
 
     def _identity(self, name: str, node: JsonNode) -> tuple[Any, ...]:
         """What makes two entries of `algorithms` the same."""
@@ -193,6 +202,7 @@ class Joined:
         self._bind_requests(outer, part, keys.get("requests"), name, span)
         self._join(part)
         for record in ("parameters", "inputs"):
+            self.reader.named(keys.get(record), f"`{record}` of `{name}`")
             for key, member in _object(keys.get(record)).items():
                 for port in self._port(part, name, record, key, member.key_span):
                     self._give(port, record, member)
@@ -224,8 +234,7 @@ class Joined:
             self.reader.string(keys.get(key), f"`{key}`")
         for key in ("structs", "algorithms", "instances", "states"):
             self.reader.named(keys.get(key), f"`{key}`")
-        for key in ("connections", "requests"):
-            self.reader.list(keys.get(key), f"`{key}`")
+        self.reader.list(keys.get("requests"), "`requests`")
         tick_hz = self.reader.integer(keys.get("tick_hz"), "tick_hz", 1, MAX_TICK_HZ) or 0
         return _File(prefix, text.rpartition("/")[0], path, keys, tick_hz, (*outer.chain, path.resolve()), scope)
 
@@ -247,6 +256,13 @@ class Joined:
             if key not in own:
                 hint = nearest(key, list(own)) or (f"it has {', '.join(own)}" if own else "it makes none")
                 self.sink.error("E206", f"part `{name}` has no request `{key}`", at, help=hint)
+            elif text is not None and not (is_name(text) and text != "none"):
+                fix = "letters, digits and single underscores between them, such as START_COAST"
+                self.sink.error("E203", f"`{text}` is not a request name", node.span, help=fix)
+            elif text is not None and outer.prefix and text not in _texts(outer.keys.get("requests")):
+                fix = f'add it to the `requests` of this file: "{text}"'
+                why = "a part lists all that it makes"
+                self.sink.error("E256", f"request `{text}` is not listed", node.span, why=why, help=fix)
             elif outer.scope.requests.get(text or "", text) in found.values():
                 fix = "give each a name of its own, and each name a transition"
                 self.sink.error("E256", f"two requests of `{name}` are called `{text}`", node.span, help=fix)
@@ -291,19 +307,27 @@ class Joined:
         for record, listed in (keys or {}).items():
             for name, (paths, _) in self.reader.named(listed, f"`ports.{record}`").items():
                 items = paths.items if paths.kind == "array" and record != "outputs" else [paths]
+                if not items:
+                    message = f"port `{name}` stands for nothing"
+                    self.sink.error("E208", message, paths.span, help='write "instance.input", or remove the port')
                 found = [self._inner(file, item, record) for item in items]
                 file.ports[record][name] = [port for ports in found for port in ports]
 
     def _inner(self, file: _File, node: JsonNode, record: str) -> list[_Port]:
         """What one path of a port stands for."""
-        text = self.reader.string(node, "a port", "instance.field") or ""
+        text = self.reader.string(node, "a port", "instance.field")
+        if text is None:
+            return []
         head, _, rest = text.partition(".")
+        if not head or not rest:
+            self.sink.error("E208", f"`{text}` is no path of a port", node.span, help='write "instance.field"')
+            return []
         if head in file.parts:
             name, _, members = rest.partition(".")
             inner = self._port(file.parts[head], head, record, name, node.span)
             found = [replace(p, field=f"{p.field}.{members}" if members else p.field) for p in inner]
         else:
-            found = [_Port(file.prefix + head, rest)] if text else []
+            found = [_Port(file.prefix + head, rest)]
         self.ports += [(record, _text(node, f"{p.instance}.{record}.{p.field}")) for p in found]
         return found
 
@@ -390,7 +414,7 @@ class Joined:
         keys["instances"] = JsonNode("object", at["instances"], self._instances)
         if self._structs:
             keys["structs"] = JsonNode("object", at.get("structs", at["instances"]), self._structs)
-        if self._connections:
+        if self._connections or "connections" in keys:
             keys["connections"] = JsonNode("array", at.get("connections", at["instances"]), self._connections)
         for key, with_rates in (("always", self._scheduled), ("states", self._states)):
             if key in keys and keys[key].kind == "object":
@@ -439,7 +463,9 @@ class Joined:
         show what is behind ports."""
         if node.kind == "object":
             members = {
-                key: replace(m, value=self._with_ports(own, m.value, in_views)) if in_views or key == "field" else m
+                key: replace(m, value=self._with_ports(own, m.value, in_views))
+                if (key not in _NO_PATHS if in_views else key == "field")
+                else m
                 for key, m in node.members.items()
             }
             return replace(node, value=members)
@@ -494,6 +520,10 @@ def _members(node: JsonNode | None) -> dict[str, tuple[JsonNode, Span]]:
 
 def _items(node: JsonNode | None) -> list[JsonNode]:
     return node.items if node is not None and node.kind == "array" else []
+
+
+def _texts(node: JsonNode | None) -> list[Any]:
+    return [item.value for item in _items(node)]
 
 
 def _with_member(node: JsonNode, member: Member) -> JsonNode:
