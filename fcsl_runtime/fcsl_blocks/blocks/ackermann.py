@@ -12,19 +12,16 @@ from fcsl_builtins import (
     f64,
     hypot,
     isfinite,
-    matmul,
     max,
     min,
     outer,
-    round,
     sin,
     sqrt,
-    symmetric_product,
     tan,
-    transpose,
     wrap_angle,
     zeros,
 )
+from planar_odometry import along_arc, carried, pose_covariance, turned, twist_covariance
 
 
 def approach(target: f64, last: f64, faster: f64, slower: f64, period: f64) -> f64:
@@ -246,17 +243,15 @@ class AckermannOdometry:
             self.heading = 0.0
             self.attitude = [1.0, 0.0, 0.0, 0.0]
             self.covariance = zeros(3, 3)
-            self.pose_covariance = zeros(6, 6)
+            self.pose_covariance = pose_covariance(self.covariance, self.planar_variance)
         self.since += self.period
         radii = [self.left_radius, self.right_radius]
         if self.use_speeds:
             rates = [self.left_speed, self.right_speed]
             turns = rates * (self.since if self.begun else 0.0)
         else:
-            turns = [self.left_angle - self.last_left, self.right_angle - self.last_right]
-            if self.angle_range > 0.0:
-                turns -= self.angle_range * round(turns / self.angle_range)
-            turns = turns * (1.0 if self.begun else 0.0)
+            angles = [self.left_angle, self.right_angle]
+            turns = turned(angles, [self.last_left, self.last_right], self.angle_range) * (1.0 if self.begun else 0.0)
             rates = turns / self.since
         ways = radii * turns
 
@@ -284,25 +279,12 @@ class AckermannOdometry:
 
         forward = (ways[0] + ways[1]) / shares
         turn = curvature * forward
-        half = 0.5 * turn
-        square = half * half
-        if abs(half) < 0.01:
-            sinc = 1.0 - square / 6.0 * (1.0 - square / 20.0 * (1.0 - square / 42.0))
-            slope = -half / 3.0 * (1.0 - square / 10.0 * (1.0 - square / 28.0))  # d sinc / d half
-        else:
-            sinc = sin(half) / half
-            slope = (cos(half) - sinc) / half
-        along = [cos(self.heading + half), sin(self.heading + half)]
-        across = [-along[1], along[0]]
-        step = forward * sinc * along
+        step, straight, by_turn = along_arc(self.heading, forward, turn)
         place = self.position[0:2] + step
-        jacobian = [[1.0, 0.0, -step[1]], [0.0, 1.0, step[0]], [0.0, 0.0, 1.0]]
-        swing = (0.5 * forward) * (slope * along + sinc * across)  # d (x, y) / d turn
-        by_turn = [swing[0], swing[1], 1.0]
-        by_forward = [sinc * along[0], sinc * along[1], 0.0] + curvature * by_turn
+        by_forward = straight + curvature * by_turn
         way_variance = self.slip * (abs(ways[0]) + abs(ways[1])) / shares / shares
         turn_variance = self.steering_slip * abs(forward)
-        grown = symmetric_product(matmul(jacobian, self.covariance), transpose(jacobian))
+        grown = carried(self.covariance, step)
         grown += way_variance * outer(by_forward, by_forward) + turn_variance * outer(by_turn, by_turn)
 
         speed = (radii[0] * rates[0] + radii[1] * rates[1]) / shares
@@ -330,19 +312,8 @@ class AckermannOdometry:
         self.covariance = grown
         self.linear[0] = speed
         self.angular[2] = yaw_rate
-        for i in range(2, 5):
-            self.pose_covariance[i, i] = self.planar_variance
-        for i in range(1, 5):
-            self.twist_covariance[i, i] = self.planar_variance
-        self.pose_covariance[0:2, 0] = grown[0:2, 0]
-        self.pose_covariance[0:2, 1] = grown[0:2, 1]
-        self.pose_covariance[0:2, 5] = grown[0:2, 2]
-        self.pose_covariance[5, 0:2] = grown[2, 0:2]
-        self.pose_covariance[5, 5] = grown[2, 2]
-        self.twist_covariance[0, 0] = speed_variance
-        self.twist_covariance[0, 5] = joint
-        self.twist_covariance[5, 0] = joint
-        self.twist_covariance[5, 5] = yaw_variance
+        self.pose_covariance = pose_covariance(grown, self.planar_variance)
+        self.twist_covariance = twist_covariance(speed_variance, joint, yaw_variance, self.planar_variance)
         self.last_left = self.left_angle
         self.last_right = self.right_angle
         self.last_curvature = present

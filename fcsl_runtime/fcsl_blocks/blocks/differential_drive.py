@@ -6,16 +6,13 @@ from fcsl_builtins import (
     clamp,
     cos,
     isfinite,
-    matmul,
     max,
     outer,
-    round,
     sin,
-    symmetric_product,
-    transpose,
     wrap_angle,
     zeros,
 )
+from planar_odometry import along_arc, carried, pose_covariance, turned, twist_covariance
 
 
 class DifferentialDrive:
@@ -141,51 +138,26 @@ class DifferentialOdometry:
             self.heading = 0.0
             self.attitude = [1.0, 0.0, 0.0, 0.0]
             self.covariance = zeros(3, 3)
-            self.pose_covariance = zeros(6, 6)
-            for i in range(2, 5):
-                self.pose_covariance[i, i] = self.planar_variance
+            self.pose_covariance = pose_covariance(self.covariance, self.planar_variance)
         self.since += self.period
         if self.use_speeds:
             rates = [self.left_speed, self.right_speed]
             turns = rates * (self.since if self.begun else 0.0)
         else:
-            turns = [self.left_angle - self.last_left, self.right_angle - self.last_right]
-            if self.angle_range > 0.0:
-                turns -= self.angle_range * round(turns / self.angle_range)
-            turns = turns * (1.0 if self.begun else 0.0)
+            angles = [self.left_angle, self.right_angle]
+            turns = turned(angles, [self.last_left, self.last_right], self.angle_range) * (1.0 if self.begun else 0.0)
             rates = turns / self.since
         radii = [self.left_radius, self.right_radius]
         ways = radii * turns
         speeds = radii * rates
         forward = 0.5 * (ways[0] + ways[1])
         turn = (ways[1] - ways[0]) / self.wheel_separation
-        half = 0.5 * turn
-        square = half * half
-        if abs(half) < 0.01:
-            sinc = 1.0 - square / 6.0 * (1.0 - square / 20.0 * (1.0 - square / 42.0))
-            slope = -half / 3.0 * (1.0 - square / 10.0 * (1.0 - square / 28.0))  # d sinc / d half
-        else:
-            sinc = sin(half) / half
-            slope = (cos(half) - sinc) / half
-        along = [cos(self.heading + half), sin(self.heading + half)]
-        step = forward * sinc * along
-        # d (x, y) / d forward = sinc along; d (x, y) / d turn = forward (slope along + sinc across) / 2
-        across = [-along[1], along[0]]
-        by_turn = (0.5 * forward) * (slope * along + sinc * across)
-        jacobian = [[1.0, 0.0, -step[1]], [0.0, 1.0, step[0]], [0.0, 0.0, 1.0]]
+        step, by_forward, by_turn = along_arc(self.heading, forward, turn)
         narrow = 1.0 / self.wheel_separation
-        by_left = [
-            0.5 * sinc * along[0] - narrow * by_turn[0],
-            0.5 * sinc * along[1] - narrow * by_turn[1],
-            -narrow,
-        ]
-        by_right = [
-            0.5 * sinc * along[0] + narrow * by_turn[0],
-            0.5 * sinc * along[1] + narrow * by_turn[1],
-            narrow,
-        ]
+        by_left = 0.5 * by_forward - narrow * by_turn
+        by_right = 0.5 * by_forward + narrow * by_turn
         noise = self.slip * abs(ways)
-        grown = symmetric_product(matmul(jacobian, self.covariance), transpose(jacobian))
+        grown = carried(self.covariance, step)
         grown += noise[0] * outer(by_left, by_left) + noise[1] * outer(by_right, by_right)
         place = self.position[0:2] + step
         wheel = noise / (self.since * self.since)
@@ -206,19 +178,10 @@ class DifferentialOdometry:
         self.covariance = grown
         self.linear[0] = speed
         self.angular[2] = yaw_rate
-        for i in range(2, 5):
-            self.pose_covariance[i, i] = self.planar_variance
-        for i in range(1, 5):
-            self.twist_covariance[i, i] = self.planar_variance
-        self.pose_covariance[0:2, 0] = grown[0:2, 0]
-        self.pose_covariance[0:2, 1] = grown[0:2, 1]
-        self.pose_covariance[0:2, 5] = grown[0:2, 2]
-        self.pose_covariance[5, 0:2] = grown[2, 0:2]
-        self.pose_covariance[5, 5] = grown[2, 2]
-        self.twist_covariance[0, 0] = 0.25 * (wheel[0] + wheel[1])
-        self.twist_covariance[0, 5] = 0.5 * (wheel[1] - wheel[0]) * narrow
-        self.twist_covariance[5, 0] = self.twist_covariance[0, 5]
-        self.twist_covariance[5, 5] = yaw_variance
+        self.pose_covariance = pose_covariance(grown, self.planar_variance)
+        speed_variance = 0.25 * (wheel[0] + wheel[1])
+        joint = 0.5 * (wheel[1] - wheel[0]) * narrow
+        self.twist_covariance = twist_covariance(speed_variance, joint, yaw_variance, self.planar_variance)
         self.last_left = self.left_angle
         self.last_right = self.right_angle
         self.since = 0.0

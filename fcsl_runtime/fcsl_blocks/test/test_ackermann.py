@@ -470,11 +470,12 @@ def test_odom_does_not_jump_over_a_break(block: Callable[..., Any], use_speeds: 
 
 
 def test_a_reset_counts_beside_a_lost_sample(block: Callable[..., Any]) -> None:
-    odo = odometry(block, slip=0.01)
+    odo = odometry(block, slip=0.01, planar_variance=0.5)
     for i in range(5):
         feed(odo, i, i, 0.1)
     out = feed(odo, float("nan"), 5.0, 0.1, reset=True)
-    assert out["health"] == "degraded" and not out["position"].any() and not out["pose_covariance"].any()
+    assert out["health"] == "degraded" and not out["position"].any() and not out["covariance"].any()
+    np.testing.assert_array_equal(out["pose_covariance"], np.diag([0.0, 0.0, 0.5, 0.5, 0.5, 0.0]))
     out = feed(odo, 6.0, 6.0, 0.1)
     assert out["position"][0] == pytest.approx(2 * (L + R) / 2, rel=0.01) and out["health"] == "nominal"
 
