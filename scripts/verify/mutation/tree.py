@@ -145,7 +145,9 @@ class Tree:
             *("colcon", "build", "--base-paths", *COPIED, "--cmake-args"),
             *("-DCMAKE_BUILD_TYPE=Release", f"-DCMAKE_C_COMPILER={self.folder / 'bin/cc'}", "-DCMAKE_C_FLAGS=-w"),
         ]
-        done = subprocess.run(line, cwd=self.folder, capture_output=True, text=True, check=False)
+        # The build runs the compiler, whose switches need theirs.
+        environment = os.environ | {"PYTHONPATH": f"{HOOK}{os.pathsep}{os.environ.get('PYTHONPATH', '')}"}
+        done = subprocess.run(line, cwd=self.folder, env=environment, capture_output=True, text=True, check=False)
         if done.returncode != 0:
             logs = sorted((self.folder / "log/latest_build").glob("*/stderr.log"))
             said = "\n".join(log.read_text(errors="replace")[-2000:] for log in logs)
