@@ -12,6 +12,7 @@ import pytest
 from fcsl_test_twins import Twins
 
 from fcsl_compiler.base.diagnostics import Diagnostic, DiagnosticError
+from fcsl_compiler.base.source import Span
 from fcsl_compiler.driver.cache import build_machine
 from fcsl_compiler.driver.passes import compile_machine
 
@@ -461,9 +462,9 @@ WRONG: dict[str, tuple[Change, str]] = {
         "E207: parameter `gain` is f64, not a bool",
     ),
     "a key": (instance("att", max_wcet_us=3), "E201: unknown key `max_wcet_us` in part `att`"),
-    "a port of nothing": (ports("inputs", more="law.angel"), "E216: `att.law` has no input `angel`"),
-    "a port of an output": (ports("inputs", more="law.rate"), "E216: `att.law` has no input `rate`"),
-    "a port of nobody": (ports("outputs", more="lew.rate"), "E206: no instance `att.lew`"),
+    "a port of nothing": (ports("inputs", more="law.angel"), "E216: `law` has no input `angel`"),
+    "a port of an output": (ports("inputs", more="law.rate"), "E216: `law` has no input `rate`"),
+    "a port of nobody": (ports("outputs", more="lew.rate"), "E206: no instance `lew`"),
     "a port that is a number": (ports("outputs", more=3), "E208: a port is a string, not an integer"),
     "a channel in a part": (
         part(connections=[{"from": "channels.target.valid", "to": "law.angle"}]),
@@ -554,6 +555,284 @@ def test_what_is_wrong(tmp_path: Path, name: str) -> None:
     change, expected = WRONG[name]
     found = [f"{d.code}: {d.message}" for d in diagnose(tmp_path, change) if d.severity.value == "error"]
     assert any(text.startswith(expected) for text in found), found
+
+
+def inner_source(path: str) -> Change:
+    return lambda craft, attitude, rate: attitude["connections"][0].update({"from": path})
+
+
+def guard(craft: dict[str, Any], attitude: dict[str, Any], rate: dict[str, Any]) -> None:
+    craft["transitions"][2]["health"]["instance"] = "att"
+
+
+def no_list_of_requests(craft: dict[str, Any], attitude: dict[str, Any], rate: dict[str, Any]) -> None:
+    """`body` makes no request, so the first one is of a part."""
+    craft["connections"] = [c for c in craft["connections"] if c["from"] != "body.order"]
+    craft["algorithms"]["Body"]["source"] = "silent.py"
+    del craft["transitions"], craft["states"]["HOLD"]
+
+
+#: All that the only error says: file, text at the place, code and message, notes in the same form, correction.
+SAYS: dict[str, tuple[Change, list[str]]] = {
+    "a struct of the machine": (
+        lambda craft, attitude, rate: craft.update(structs=rate.pop("structs")),
+        [
+            'parts/rate/loop.py "Pair" E301: unknown type `Pair`',
+            'parts/rate/rate.json "Loop" an algorithm of a part',
+            'craft.json "Pair" only another file declares the struct',
+            "declare `Pair` in the `structs` of `parts/rate/rate.json`, too",
+        ],
+    ),
+    "a struct of the machine in a struct": (
+        lambda craft, attitude, rate: (
+            craft.update(structs={"Vec": {"x": "f64"}}),
+            rate["structs"].update(Box={"corner": "Vec[2]"}),
+        ),
+        [
+            'parts/rate/rate.json "Vec[2]" E232: unknown type `Vec`',
+            'craft.json "Vec" only another file declares it',
+            'parts/attitude.json "rate/rate.json" `att.rate` is a part here',
+            'craft.json "parts/attitude.json" `att` is a part here',
+            "declare `Vec` in the `structs` of this file, too",
+        ],
+    ),
+    "a request without transition": (
+        instance("att", requests={"far": "NEAR"}),
+        [
+            'parts/law.py "far" E225: no transition is requested by `NEAR`',
+            'craft.json "NEAR" `att.law` makes it: `far` of part `att` is called so here',
+            'add a transition with it, or list it: `"requests": ["NEAR"]`',
+        ],
+    ),
+    "a request of a parameter": (
+        lambda craft, attitude, rate: (
+            attitude.update(requests=["far", "near"]),
+            attitude["instances"]["law"]["parameters"].update(begin="near"),
+            craft["instances"]["att"]["requests"].update(near="NEAR"),
+            craft["instances"]["spare"]["requests"].update(near="STOP"),
+        ),
+        [
+            'parts/attitude.json "near" E225: no transition is requested by `NEAR`',
+            'craft.json "NEAR" `att` makes it: `near` of part `att` is called so here',
+            'craft.json "parts/attitude.json" `att` is a part here',
+            'add a transition with it, or list it: `"requests": ["NEAR"]`',
+        ],
+    ),
+    "a part in `always` and in a state": (
+        lambda craft, attitude, rate: craft["states"]["FLY"]["schedule"].update(att=True),
+        [
+            'craft.json "att" E243: `att` is in `always`, so state `FLY` schedules it already',
+            'craft.json "att" scheduled in every state here',
+            "remove it here; or from `always`, and list it in every state that runs it",
+        ],
+    ),
+    "a phase beyond the period": (
+        lambda craft, attitude, rate: rate["states"]["ON"]["schedule"]["pi"].update(phase=4),
+        [
+            "parts/rate/rate.json 4 E204: `phase` (ticks) is 4",
+            'parts/attitude.json "rate/rate.json" `att.rate` is a part here',
+            'craft.json "parts/attitude.json" `att` is a part here',
+            "it must be in [0, 3]",
+        ],
+    ),
+    "an instance of nobody": (
+        inner_source("lew.rate"),
+        [
+            'parts/attitude.json "lew.rate" E206: no instance `lew`',
+            'craft.json "parts/attitude.json" `att` is a part here',
+            "did you mean `law`?",
+        ],
+    ),
+    "a part of nobody": (
+        lambda craft, attitude, rate: craft["connections"][0].update({"from": "atr.u"}),
+        ['craft.json "atr.u" E206: no instance `atr`', "did you mean `att`?"],
+    ),
+    "an output of nobody": (
+        inner_source("law.rates"),
+        [
+            'parts/attitude.json "law.rates" E216: `law` has no output `rates`',
+            'craft.json "parts/attitude.json" `att` is a part here',
+            "did you mean `rate`?",
+        ],
+    ),
+    "an instance of nobody in a schedule": (
+        lambda craft, attitude, rate: attitude["states"]["RUN"]["schedule"].update(lew=250),
+        [
+            'parts/attitude.json "lew" E206: no instance `lew`',
+            'craft.json "parts/attitude.json" `att` is a part here',
+            "did you mean `law`?",
+        ],
+    ),
+    "a parameter of nobody": (
+        lambda craft, attitude, rate: rate["instances"]["pi"]["parameters"].update(kq=1),
+        [
+            'parts/rate/rate.json "kq" E210: algorithm `Loop` has no parameter `kq`',
+            'parts/attitude.json "rate/rate.json" `att.rate` is a part here',
+            'craft.json "parts/attitude.json" `att` is a part here',
+            "it has kp, ki, table, floor, least, word",
+        ],
+    ),
+    "a parameter without a value": (
+        lambda craft, attitude, rate: attitude["instances"]["law"]["parameters"].pop("begin"),
+        [
+            'parts/attitude.json {⏎    "gain": "k / 2"⏎   } E211: parameter `begin` of `law` has no value',
+            'parts/law.py "begin": "TransitionRequest" declared here',
+            'craft.json "parts/attitude.json" `att` is a part here',
+            'add `"begin": …` (TransitionRequest)',
+        ],
+    ),
+    "a value outside, by a port of another name": (
+        lambda craft, attitude, rate: (
+            attitude["ports"]["parameters"].update(slope="law.gain"),
+            craft["instances"]["att"].update(parameters={"slope": True}),
+        ),
+        ["craft.json true E207: parameter `slope` is f64, not a bool", "write a finite number"],
+    ),
+    "a port of no parameter": (
+        ports("parameters", gain="law.gian"),
+        [
+            'parts/attitude.json "law.gian" E216: `law` has no parameter `gian`',
+            'craft.json "parts/attitude.json" `att` is a part here',
+            "did you mean `gain`?",
+        ],
+    ),
+    "a port of no input": (
+        ports("inputs", angle="law.angel"),
+        [
+            'parts/attitude.json "law.angel" E216: `law` has no input `angel`',
+            'craft.json "parts/attitude.json" `att` is a part here',
+            "did you mean `angle`?",
+        ],
+    ),
+    "a connection to no port": (
+        connect("body.rate", "att"),
+        ['craft.json "att" E216: part `att` without one of its inputs', "it has angle, target, rate, order"],
+    ),
+    "a folder": (
+        instance("att", machine="parts"),
+        ['craft.json "parts" E100: cannot read the part `parts`: Is a directory', ""],
+    ),
+    "an absolute path": (
+        lambda craft, attitude, rate: attitude["algorithms"]["Law"].update(source="/etc/passwd"),
+        [
+            'parts/attitude.json "/etc/passwd" E103: `/etc/passwd` cannot be a source',
+            'craft.json "parts/attitude.json" `att` is a part here',
+            "",
+        ],
+    ),
+    "an input as a channel": (
+        lambda craft, attitude, rate: craft["channels"][0].update(field="spare.target"),
+        ['craft.json "spare.target" E254: `spare.target` is no port of a part', 'write "spare.inputs.target"'],
+    ),
+    "no port as a channel": (
+        lambda craft, attitude, rate: craft["channels"][0].update(field="spare.goal"),
+        [
+            'craft.json "spare.goal" E254: `spare.goal` is no port of a part',
+            "`spare` declares inputs.angle, inputs.target, inputs.rate, inputs.order, outputs.u, outputs.pair, outputs.first",
+        ],
+    ),
+    "an input of an instance as a channel": (
+        lambda craft, attitude, rate: craft["channels"][0].update(field="body.period"),
+        [
+            'craft.json "body.period" E215: a sensor is an output or an input, not `body.period`',
+            'write "body.inputs.period"',
+        ],
+    ),
+    "a part as a guard": (
+        guard,
+        [
+            'craft.json "att" E206: `att` is a part, not an instance',
+            "name one of its instances: att.law, att.rate.pi",
+        ],
+    ),
+}
+
+
+def said(d: Diagnostic) -> list[str]:
+    def at(span: Span) -> str:
+        return f"{span.source.name} {span.text}".replace("\n", "⏎")
+
+    return [f"{at(d.span)} {d.code}: {d.message}", *(f"{at(n.span)} {n.text}" for n in d.notes), d.help]
+
+
+@pytest.mark.parametrize("name", SAYS)
+def test_what_an_error_says(tmp_path: Path, name: str) -> None:
+    change, expected = SAYS[name]
+    assert [said(d) for d in diagnose(tmp_path, change) if d.severity.value == "error"] == [expected]
+
+
+def test_a_file_that_is_not_text_is_shown(tmp_path: Path) -> None:
+    path = write(tmp_path)
+    (tmp_path / "parts/attitude.json").write_bytes(b'{"tick_hz": \xff}')
+    with pytest.raises(DiagnosticError) as failed:
+        compile_machine(path, "")
+    assert said(failed.value.diagnostics[0]) == [
+        "parts/attitude.json \ufffd E100: cannot read the part `parts/attitude.json`: it is not UTF-8 text",
+        'craft.json "parts/attitude.json" it is a part here',
+        "remove it, or save the file as UTF-8",
+    ]
+
+
+def test_a_missing_file_is_sought_beside_the_file_of_the_part(tmp_path: Path) -> None:
+    found = diagnose(tmp_path, lambda craft, attitude, rate: attitude["algorithms"]["Law"].update(source="lew.py"))
+    assert [d.help for d in found] == [f"paths are relative to {tmp_path / 'parts'}"]
+
+
+def test_a_request_that_a_part_does_not_list_is_reported_there(tmp_path: Path) -> None:
+    """Also if another part with the same algorithm lists it."""
+
+    def change(craft: Any, attitude: Any, rate: Any) -> None:
+        mute = {
+            **rate,
+            "requests": [],
+            "algorithms": {"Mute": {**rate["algorithms"]["Loop"], "source": "rate/loop.py"}},
+        }
+        mute["instances"] = {"pi": {**rate["instances"]["pi"], "algorithm": "Mute"}}
+        mute["constants"], mute["algorithms"]["Mute"]["sizes"] = {"k": 2, "points": 2}, {"n": 2}
+        rate["algorithms"]["Loop"]["sizes"] = {"n": 2}
+        mute["instances"]["pi"]["parameters"] = {**mute["instances"]["pi"]["parameters"], "table": [0, 0]}
+        (tmp_path / "parts/mute.json").parent.mkdir(exist_ok=True)
+        (tmp_path / "parts/mute.json").write_text(json.dumps(mute))
+        craft["instances"]["mute"] = {"machine": "parts/mute.json"}
+        craft["instances"]["loop"] = {"machine": "parts/rate/rate.json", "requests": {"wound": "wound"}}
+        craft["requests"] = ["wound"]
+
+    errors = [said(d) for d in diagnose(tmp_path, change) if d.severity.value == "error"]
+    assert errors[0] == [
+        'parts/rate/loop.py "wound" E256: request `wound` is not listed',
+        'parts/mute.json "Mute" an algorithm of this part',
+        'add it to the `requests` of `parts/mute.json`: "wound"',
+    ]
+
+
+def test_requests_that_no_list_has_show_where_parts_get_them(tmp_path: Path) -> None:
+    silent = {**FILES, "silent.py": BODY.replace('"STOP" if self.rate > 0.0 else "far"', '""')}
+    (warning,) = [d for d in diagnose(tmp_path, no_list_of_requests, silent) if d.code == "W208"]
+    assert said(warning)[1:3] == [
+        'craft.json "STOP" `att.law` makes it: `far` of part `att` is called so here',
+        'craft.json "far" `spare.law` makes it: `far` of part `spare` is called so here',
+    ]
+
+
+@pytest.mark.parametrize(
+    ("change", "code", "message"),
+    [
+        (
+            lambda craft, attitude, rate: rate["algorithms"].update(
+                G={"source": "loop.py", "class": "Pi", "sizes": {"n": 3}}
+            ),
+            "W201",
+            "algorithm `G` has no instance",
+        ),
+        (
+            lambda craft, attitude, rate: attitude["states"]["RUN"]["schedule"].pop("law"),
+            "W204",
+            "no state schedules instance `law`: it never runs",
+        ),
+    ],
+)
+def test_a_warning_names_what_the_file_names(tmp_path: Path, change: Change, code: str, message: str) -> None:
+    assert [d.message for d in diagnose(tmp_path, change) if d.code == code] == [message]
 
 
 def test_a_request_in_a_helper_has_the_name_of_no_part(tmp_path: Path) -> None:

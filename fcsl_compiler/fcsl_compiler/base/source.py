@@ -118,5 +118,14 @@ class Span:
         return f"{self.source.name}:{self.line}:{self.column}"
 
     @property
+    def text(self) -> str:
+        start, end = self.source.offsets(self)
+        return self.source.text[start:end]
+
+    def local(self, name: str) -> str:
+        """The name of an instance as the file of this span writes it: in that of part `att`, `att.rate` is `rate`."""
+        return name.removeprefix(f"{self.source.part}.") if self.source.part else name
+
+    @property
     def key(self) -> tuple[str, int, int]:
         return (self.source.name, self.line, self.column)

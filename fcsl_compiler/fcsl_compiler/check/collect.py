@@ -191,7 +191,9 @@ def _free(declarations: Declarations, name: str, span: Span, sink: DiagnosticSin
         why = "CPython gives such a name another one within a class"
         sink.error("E302", f"`{name}` begins with two underscores", span, why=why, help="begin it with one")
     elif name in declarations.names.structs:
-        sink.error("E302", f"`{name}` is a struct of the machine", span, help="use another name")
+        declared = declarations.names.structs[name].span
+        notes = [(declared, "declared here")] if declared is not None else []
+        sink.error("E302", f"`{name}` is a struct of the machine", span, help="use another name", notes=notes)
     elif name in declarations.defined:
         notes = [(declarations.defined[name], "first here")]
         sink.error("E302", f"`{name}` is defined twice", span, help="use another name", notes=notes)

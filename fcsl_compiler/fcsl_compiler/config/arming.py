@@ -47,7 +47,7 @@ def _arm(node: JsonNode, ports: PortResolver, reader: ConfigReader) -> PortRef |
     if port is not None and port.type != BOOL:
         fix = f'declare an output `"armed": "bool"` in `{ports.instances[port.instance].algorithm.name}`, and name that'
         notes = [(port.declared, "declared here")] if port.field != "health" else []
-        message = f"`arm` names a bool, and `{node.value}` is {port.type}"
+        message = f"`arm` names a bool, and `{node.written}` is {port.type}"
         why = "actuators are armed or not"
         reader.sink.error("E248", message, node.span, why=why, help=fix, notes=notes)
         return None

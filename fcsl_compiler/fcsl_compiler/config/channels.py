@@ -128,11 +128,11 @@ def _kind(keys: dict[str, JsonNode], port: PortRef | None, reader: ConfigReader)
     if kind is None or port is None:
         return None
     if kind == "quaternion" and port.type not in (Array(F64, (4,)), Array(F32, (4,))):
-        message = f"a quaternion is an f64[4] or an f32[4], and `{keys['field'].value}` is {port.type}"
+        message = f"a quaternion is an f64[4] or an f32[4], and `{keys['field'].written}` is {port.type}"
         reader.sink.error("E250", message, keys["as"].span, help="remove `as`, or name another field")
         return None
     if kind == "blob" and not _holds_blob(port.type):
-        message = f"a blob is a u32[1 + N], and `{keys['field'].value}` is {port.type}"
+        message = f"a blob is a u32[1 + N], and `{keys['field'].written}` is {port.type}"
         why = "element 0 is the number of bytes, and each byte has an element behind it"
         fix = "declare it `u32[65]`, for example, for 64 bytes"
         reader.sink.error("E250", message, keys["as"].span, why=why, help=fix)
@@ -202,7 +202,7 @@ def _bound(
             node, ("outputs",), f"{'an actuator' if direction == 'actuator' else 'a report'} is an output"
         )
     if port is not None and not isinstance(element_of(port.type), Scalar):
-        fix = f"name a member: `{node.value}.…`"
+        fix = f"name a member: `{node.written}.…`"
         reader.sink.error("E217", "a channel carries a scalar or an array, not a struct", node.span, help=fix)
         return None
     if port is not None and element_of(port.type) in (HEALTH, REQUEST):
@@ -210,7 +210,7 @@ def _bound(
         reader.sink.error("E217", message, node.span, help="bind numbers and bools")
         return None
     if port is not None and (size := count_of(port.type) * scalar_of(port.type).size) > _MAX_BYTES:
-        message = f"a channel has at most {_MAX_BYTES} bytes, and `{node.value}` has {size}"
+        message = f"a channel has at most {_MAX_BYTES} bytes, and `{node.written}` has {size}"
         reader.sink.error(
             "E217",
             message,
@@ -228,7 +228,7 @@ def _bound(
         if connection is not None:
             fix = "an input has one source; remove the connection or the channel"
             notes = [(connection.span, "connected here")]
-            reader.sink.error("E213", f"two sources for `{node.value}`", node.span, help=fix, notes=notes)
+            reader.sink.error("E213", f"two sources for `{node.written}`", node.span, help=fix, notes=notes)
             return None
     else:
         algorithm = ports.instances[port.instance].algorithm
@@ -237,7 +237,7 @@ def _bound(
             fix = "bind the channel to an input, or leave the output to the channel"
             reader.sink.error(
                 "E227",
-                f"`{node.value}` is also assigned by its algorithm",
+                f"`{node.written}` is also assigned by its algorithm",
                 node.span,
                 help=fix,
                 notes=[(written, "here")],

@@ -4,6 +4,7 @@
 from __future__ import annotations
 
 import ast
+from collections.abc import Mapping
 from dataclasses import replace
 from pathlib import Path
 
@@ -28,7 +29,8 @@ from ..parse.machine_files import ParsedAlgorithm, ParsedMachine
 from ..parse.parts import MAX_TICK_HZ, RESERVED_INSTANCES
 from .arming import read_arming
 from .channels import read_channels, read_payload
-from .part_requests import bind_requests
+from .part_requests import bind_requests, check_listed
+from .part_structs import check_structs
 from .ports import PortResolver
 from .sources import SourceResolver
 from .states import read_states
@@ -52,6 +54,8 @@ def check_machine(parsed: ParsedMachine, sink: DiagnosticSink) -> Machine | None
     instances, incomplete = _read_instances(keys.get("instances"), algorithms if defined else None, reader)
     _warn_unused(parsed, algorithms, instances, incomplete, sink)
     ports = PortResolver(instances, incomplete, SourceResolver(keys.get("channels"), sink), sink)
+    if not _check_ports(parsed, ports):
+        return None
     connections = _read_connections(keys.get("connections"), ports, reader)
     channels = read_channels(keys, tick_hz, ports, connections, reader)
     payload = read_payload(keys.get("bus"), reader)
@@ -66,8 +70,6 @@ def check_machine(parsed: ParsedMachine, sink: DiagnosticSink) -> Machine | None
     if names:  # otherwise it was reported
         initial = reader.reference(keys.get("initial_state"), "state", names)
         requests, edges = read_transitions(keys, tick_hz, names, instances, incomplete, reader)
-    for record, path in parsed.joined.ports:
-        ports.port(path, (record,), f"one of `ports.{record}`")
     instances = _read_publish(keys.get("publish"), instances, incomplete, reader)
     views = read_views(keys.get("views"), _signals(instances, incomplete), Path(parsed.source.path), reader)
     check_breakpoints(instances, program, sink)
@@ -98,6 +100,14 @@ def check_machine(parsed: ParsedMachine, sink: DiagnosticSink) -> Machine | None
         payload=payload,
         tree=parsed.joined.tree,
     )
+
+
+def _check_ports(parsed: ParsedMachine, ports: PortResolver) -> bool:
+    """Whether all `ports` exist. What connects a wrong one is not to blame, so the check ends with them."""
+    before = ports.sink.errors
+    for record, path in parsed.joined.ports:
+        ports.port(path, (record,), f"one of `ports.{record}`")
+    return ports.sink.errors == before
 
 
 def _used_constants(parsed: ParsedMachine) -> list[str]:
@@ -132,6 +142,9 @@ def _check_algorithms(parsed: ParsedMachine, modules: Modules, reader: ConfigRea
         sizes = {size: value for size, (value, _) in algorithm.sizes.items()}
         table = modules.table(declarations)
         checked = check_algorithm(name, class_, files, table, declarations.sound, reader.sink, sizes)
+        if algorithm.parts:
+            check_structs(algorithm, modules.program.structs, reader)
+            check_listed(checked, algorithm.parts, reader)
         if algorithm.requests is not None:
             checked = bind_requests(checked, algorithm.requests, modules.program, reader.sink)
         found[name] = checked if declarations.declared else None
@@ -165,7 +178,7 @@ def _sized(
     missing = [size for size in variables if size not in parsed.sizes]
     if missing:
         fix = f'add `"{missing[0]}": …` to `sizes`'
-        sink.error("E202", f"`{parsed.name}` has no size `{missing[0]}`", parsed.span, help=fix)
+        sink.error("E202", f"`{parsed.written}` has no size `{missing[0]}`", parsed.span, help=fix)
     if missing or len(parsed.sizes) > len(variables):
         return None
     sizes = {size: value for size, (value, _) in parsed.sizes.items()}
@@ -182,7 +195,8 @@ def _warn_unused(
     used = {i.algorithm.name for i in instances}
     for name, algorithm in algorithms.items():
         if algorithm is not None and name not in used and not incomplete:
-            sink.warning("W201", f"algorithm `{name}` has no instance", parsed.algorithms[name].span, help="remove it")
+            entry = parsed.algorithms[name]
+            sink.warning("W201", f"algorithm `{entry.written}` has no instance", entry.span, help="remove it")
 
 
 # ---- instances -----------------------------------------------------------------------------------------------------
@@ -203,7 +217,8 @@ def _read_instances(
             reader.sink.error("E209", f"`{name}` is reserved", span, help="give the instance another name")
             continue
         optional = ("parameters", "inputs", "max_wcet_us", "frozen")
-        keys = reader.object(definition, f"instance `{name}`", ("algorithm",), optional)
+        shown = span.local(name)
+        keys = reader.object(definition, f"instance `{shown}`", ("algorithm",), optional)
         if keys is None or "algorithm" not in keys or algorithms is None:
             continue
         named = keys["algorithm"]
@@ -216,15 +231,15 @@ def _read_instances(
             continue
         incomplete.discard(name)
         at = keys["parameters"].span if "parameters" in keys else definition.span
-        parameters = _read_parameters(name, algorithm, keys.get("parameters"), at, reader)
+        parameters = _read_parameters(name, algorithm, keys, definition.span, reader)
         wcet = reader.integer(keys.get("max_wcet_us"), "max_wcet_us", 1, 1_000_000) or 0
-        frozen = _read_frozen(algorithm, keys.get("frozen"), reader)
+        frozen = _read_frozen(algorithm, keys.get("frozen"), named.written, reader)
         execute, start = algorithm.execute, algorithm.start
         values = {n: parameters[n] for n in frozen if n in parameters}
         if values:
             freezer = Freezer(algorithm, name.replace(".", "__"), values)
             execute, start = freezer.function(execute), freezer.function(start) if start is not None else None
-        if not check_loops(name, (execute, start), frozen, values, at, reader.sink):
+        if not check_loops(shown, (execute, start), frozen, values, at, reader.sink):
             incomplete.add(name)
             continue
         instances.append(Instance(name, algorithm, parameters, {}, wcet, frozen, execute, start, span))
@@ -232,40 +247,50 @@ def _read_instances(
 
 
 def _read_parameters(
-    instance: str, algorithm: ir.Algorithm, node: JsonNode | None, at: Span, reader: ConfigReader
+    instance: str, algorithm: ir.Algorithm, keys: Mapping[str, JsonNode], definition: Span, reader: ConfigReader
 ) -> dict[str, Values]:
     ports = {p.name: p for p in algorithm.ports["parameters"]}
     values: dict[str, Values] = {}
-    given = reader.named(node, f"`parameters` of `{instance}`")
+    node, shown = keys.get("parameters"), definition.local(instance)
+    at = node.span if node is not None else definition
+    given = reader.named(node, f"`parameters` of `{shown}`")
     meant: set[str] = set()  # parameters that misspelt names probably stand for
-    for name, (definition, span) in given.items():
+    for name, (value_node, span) in given.items():
         port = ports.get(name)
-        if port is None and not algorithm.complete:
-            continue  # a reported error may be the reason
+        by_port = span.source != definition.source
+        if port is None and (by_port or not algorithm.complete):
+            continue  # a reported error may be the reason; a wrong port of a part is one
         if port is None:
             meant.add(misspelt(name, [p for p in ports if p not in given]))
             hint = nearest(name, list(ports)) or (f"it has {', '.join(ports)}" if ports else "it has none")
-            reader.sink.error("E210", f"algorithm `{algorithm.name}` has no parameter `{name}`", span, help=hint)
+            message = f"algorithm `{keys['algorithm'].written}` has no parameter `{name}`"
+            reader.sink.error("E210", message, span, help=hint)
             continue
-        value = reader.value(definition, port.type, f"parameter `{name}`", port.unit)
-        if value is not None and _within(port, definition, value, reader):
+        what = f"parameter `{_key(span) if by_port else name}`"
+        value = reader.value(value_node, port.type, what, port.unit)
+        if value is not None and _within(what, port, value_node, value, reader):
             values[name] = value
     for name, port in ports.items():
         if name not in given and port.default is not None:
             values[name] = port.default
             for word in port.default if element_of(port.type) is REQUEST else ():
-                reader.requests.setdefault(str(word), port.span)
+                reader.use_request(str(word), port.span, instance)
     readable = algorithm.complete and (node is None or node.kind == "object")
     for name, port in ports.items() if readable else ():
         if name not in given and name not in meant and port.default is None:
             reader.sink.error(
                 "E211",
-                f"parameter `{name}` of `{instance}` has no value",
+                f"parameter `{name}` of `{shown}` has no value",
                 at,
                 help=f'add `"{name}": …` ({_declared(port)})',
                 notes=[(port.span, "declared here")],
             )
     return values
+
+
+def _key(span: Span) -> str:
+    """The name that stands at a span of a key: that of a port, where a value of a part's field is given by it."""
+    return span.text.strip('"')
 
 
 def _declared(port: ir.Port) -> str:
@@ -274,11 +299,11 @@ def _declared(port: ir.Port) -> str:
     return " ".join(part for part in (str(port.type), port.unit, bounds) if part)
 
 
-def _within(port: ir.Port, node: JsonNode, values: Values, reader: ConfigReader) -> bool:
+def _within(what: str, port: ir.Port, node: JsonNode, values: Values, reader: ConfigReader) -> bool:
     """Checks a value against the parameter's range. Returns False after reporting a value outside."""
     outside = next((v for v in values if v not in port.range), None) if port.range != UNBOUNDED else None
     if outside is not None:
-        message = f"parameter `{port.name}` is {outside}, outside {port.range}"
+        message = f"{what} is {outside}, outside {port.range}"
         notes = [(port.span, "its range is declared here")]
         reader.sink.error("E204", message, node.span, help="choose a value inside, or widen the range", notes=notes)
     return outside is None
@@ -314,8 +339,9 @@ def _signals(instances: list[Instance], incomplete: set[str]) -> Signals:
     return Signals(known, incomplete if isinstance(incomplete, Everything) else incomplete | wrong)
 
 
-def _read_frozen(algorithm: ir.Algorithm, node: JsonNode | None, reader: ConfigReader) -> tuple[str, ...]:
-    """Parameters to freeze: `true` (all) or a list of names. The result is in the order of the ports."""
+def _read_frozen(algorithm: ir.Algorithm, node: JsonNode | None, written: str, reader: ConfigReader) -> tuple[str, ...]:
+    """Parameters to freeze: `true` (all) or a list of names. The result is in the order of the ports. `written`: the name of
+    the algorithm in its file."""
     names = [p.name for p in algorithm.ports["parameters"]]
     if node is None or (node.kind == "bool" and not node.value):
         return ()
@@ -330,7 +356,7 @@ def _read_frozen(algorithm: ir.Algorithm, node: JsonNode | None, reader: ConfigR
         text = reader.string(item, "a frozen parameter")
         if text is not None and text not in names and algorithm.complete:
             hint = nearest(text, names) or (f"it has {', '.join(names)}" if names else "it has none")
-            reader.sink.error("E234", f"algorithm `{algorithm.name}` has no parameter `{text}`", item.span, help=hint)
+            reader.sink.error("E234", f"algorithm `{written}` has no parameter `{text}`", item.span, help=hint)
         elif text in names:
             found.add(text)
     return tuple(n for n in names if n in found)
@@ -347,21 +373,23 @@ def _with_initial_inputs(
     out: list[Instance] = []
     for index, instance in enumerate(instances):
         definition = node.get(instance.name) if node else None
-        given = reader.named(definition.get("inputs") if definition else None, f"`inputs` of `{instance.name}`")
+        shown = instance.span.local(instance.name)
+        given = reader.named(definition.get("inputs") if definition else None, f"`inputs` of `{shown}`")
         values: dict[str, Values] = {}
         for name, (value_node, span) in given.items():
             port = instance.algorithm.port("inputs", name)
+            key = _key(span) if span.source != instance.span.source else name
             if port is None and not instance.algorithm.complete:
                 continue
             if port is None:
                 hint = nearest(name, [p.name for p in instance.algorithm.ports["inputs"]])
-                reader.sink.error("E210", f"`{instance.name}` has no input `{name}`", span, help=hint)
+                reader.sink.error("E210", f"`{shown}` has no input `{name}`", span, help=hint)
             elif (index, name) in connected:
                 at = connected[index, name].span
                 fix = "remove the initial value; a `delayed` connection has its own `initial`"
-                reader.sink.error("E212", f"input `{name}` is connected", span, help=fix, notes=[(at, "here")])
+                reader.sink.error("E212", f"input `{key}` is connected", span, help=fix, notes=[(at, "here")])
             else:
-                value = reader.value(value_node, port.type, f"input `{name}`", port.unit)
+                value = reader.value(value_node, port.type, f"input `{key}`", port.unit)
                 if value is not None:
                     values[name] = value
         out.append(replace(instance, inputs=values))
@@ -389,7 +417,7 @@ def _read_connections(node: JsonNode | None, ports: PortResolver, reader: Config
                 fix = "an input has one source; remove one connection"
                 reader.sink.error(
                     "E213",
-                    f"two sources for `{keys['to'].value}`",
+                    f"two sources for `{keys['to'].written}`",
                     keys["to"].span,
                     help=fix,
                     notes=[(targets[key], "first")],

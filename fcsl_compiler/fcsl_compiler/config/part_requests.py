@@ -3,33 +3,45 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Iterable, Mapping
 from dataclasses import fields, is_dataclass, replace
 from typing import Any
 
 from ..base.diagnostics import DiagnosticSink
+from ..base.source import Span
 from ..model import ir
 from ..model.program import Program
 from ..model.types import REQUEST, element_of
+from ..parse.json_reader import ConfigReader
 
 
-def bind_requests(
-    algorithm: ir.Algorithm, names: Mapping[str, str], program: Program, sink: DiagnosticSink
-) -> ir.Algorithm:
-    """An algorithm whose requests are called as `names` says. Reports one that the part does not list, and one in a
-    helper, which other algorithms may call."""
-    defaults = [
+def check_listed(algorithm: ir.Algorithm, parts: Iterable[Span], reader: ConfigReader) -> None:
+    """Reports requests that a part does not list. `parts`: where the parts that have the algorithm name it."""
+    for at in parts:
+        for name, span in [*algorithm.requests, *_defaults(algorithm)]:
+            if name not in reader.scopes[at.source].requests:
+                fix = f'add it to the `requests` of `{at.source.name}`: "{name}"'
+                notes = [(at, "an algorithm of this part")]
+                why = "a part lists all that it makes"
+                reader.sink.error("E256", f"request `{name}` is not listed", span, why=why, help=fix, notes=notes)
+
+
+def _defaults(algorithm: ir.Algorithm) -> list[tuple[str, Span]]:
+    """Requests that are defaults of parameters."""
+    return [
         (str(word), port.span)
         for port in algorithm.ports["parameters"]
         if port.default is not None and element_of(port.type) is REQUEST
         for word in port.default
         if word
     ]
-    for name, span in [*algorithm.requests, *defaults]:
-        if name not in names:
-            fix = f'add it to the `requests` of the part: "{name}"'
-            sink.error("E256", f"request `{name}` is not listed", span, why="a part lists all that it makes", help=fix)
-    if all(names.get(name, name) == name for name, _ in [*algorithm.requests, *defaults]):
+
+
+def bind_requests(
+    algorithm: ir.Algorithm, names: Mapping[str, str], program: Program, sink: DiagnosticSink
+) -> ir.Algorithm:
+    """An algorithm whose requests are called as `names` says. Reports one in a helper, which other algorithms may call."""
+    if all(names.get(name, name) == name for name, _ in [*algorithm.requests, *_defaults(algorithm)]):
         return algorithm
     entries = [entry for entry in (algorithm.execute, algorithm.start) if entry is not None]
     for helper in (program.helpers[name] for entry in entries for name in entry.calls if name in program.helpers):

@@ -9,7 +9,7 @@ from ..base.source import Span
 from ..model.ir import RECORDS, Port
 from ..model.machine import Instance, PortRef, split_instance
 from ..model.types import Array, Struct
-from ..parse.json_reader import Everything
+from ..parse.json_reader import Everything, local_names
 from ..parse.json_source import JsonNode
 from .sources import OWNERS, SourceResolver
 
@@ -42,7 +42,7 @@ class PortResolver:
         """Reports a connection from an input to an output as one mistake. Returns whether it is one."""
         if self._record(source) != "inputs" or self._record(target) != "outputs":
             return False
-        fix = f'write "from": "{target.value}", "to": "{source.value}"'
+        fix = f'write "from": "{target.written}", "to": "{source.written}"'
         notes = [(target.span, "and `to` an output")]
         self.sink.error(
             "E215", "`from` names an input", source.span, why="data flows from outputs", help=fix, notes=notes
@@ -76,13 +76,13 @@ class PortResolver:
             fix = f'write "{parts[0]}.{known[0] if known else "<field>"}"'
             if len(parts) > 2 and parts[1] in known:
                 fix = f'a connection sets the whole input: write "{parts[0]}.{parts[1]}"'
-            self.sink.error("E215", f"{rule}, not `{node.value}`", node.span, help=fix)
+            self.sink.error("E215", f"{rule}, not `{node.written}`", node.span, help=fix)
             return None
         elsewhere = self._record(node)
         if parts[1] not in known and elsewhere not in ("", record):
             names = f"it has {', '.join(known)}" if known else f"it has no {record}"
             fix = nearest(parts[1], known) or names
-            message = f"{rule}, and `{node.value}` is of `{elsewhere}`"
+            message = f"{rule}, and `{node.written}` is of `{elsewhere}`"
             self.sink.error("E215", message, node.span, help=fix)
             return None
         return self._found(instance, record, parts[1], parts[2:], node)
@@ -93,17 +93,19 @@ class PortResolver:
         return [instance, *(rest.split(".") if rest or path.endswith(".") else [])]
 
     def _instance(self, node: JsonNode, rule: str, form: str) -> tuple[Instance | None, list[str]]:
-        """The instance at the start of a path, and the parts of the path. The instance is None if an error about it was
-        reported."""
+        """The instance at the start of a path, and the parts of the path as its file writes it. The instance is None if an
+        error about it was reported."""
         if node.kind != "string" or not isinstance(node.value, str):
             self.sink.error("E208", f"{rule}, written as a string", node.span, help=f'"{form}"')
             return None, []
-        parts = self._split(node.value)
-        index = self._index.get(parts[0])
-        if index is not None and parts[0] not in self.incomplete:
+        name, *rest = self._split(node.value)
+        parts = [node.span.local(name), *rest]
+        index = self._index.get(name)
+        if index is not None and name not in self.incomplete:
             return self.instances[index], parts
-        if parts[0] not in self.incomplete:
-            hint = nearest(parts[0], list(self._index)) or f"the instances are {', '.join(self._index) or 'none'}"
+        if name not in self.incomplete:
+            known = local_names(self._index, node.span)
+            hint = nearest(parts[0], known) or f"the instances are {', '.join(known) or 'none'}"
             self.sink.error("E206", f"no instance `{parts[0]}`", node.span, help=hint)
         return None, parts
 
@@ -113,16 +115,16 @@ class PortResolver:
         if instance is None:
             return None
         if len(parts) < 3 or parts[1] not in records:
-            known = [p.name for record in records for p in _ports(instance, record)]
-            meant = parts[-1] if parts[-1] in known else "<field>"
-            fix = f'write "{parts[0]}.{records[0]}.{meant}"'
-            self.sink.error("E215", f"{rule}, not `{node.value}`", node.span, help=fix)
+            meant = parts[-1]
+            record = next((r for r in records if any(p.name == meant for p in _ports(instance, r))), "")
+            fix = f'write "{parts[0]}.{record or records[0]}.{meant if record else "<field>"}"'
+            self.sink.error("E215", f"{rule}, not `{node.written}`", node.span, help=fix)
             return None
         return self._found(instance, parts[1], parts[2], parts[3:], node)
 
     def _found(self, instance: Instance, record: str, name: str, members: list[str], node: JsonNode) -> PortRef | None:
         """A port of an instance, or the named member of it."""
-        ports = _ports(instance, record)
+        ports, shown = _ports(instance, record), node.span.local(instance.name)
         port = next((p for p in ports if p.name == name), None)
         if port is None and not instance.algorithm.complete:
             return None
@@ -132,9 +134,9 @@ class PortResolver:
             if "[" in name:
                 hint = "a path names a whole port, not an element: declare a separate output for the element"
             what = {"inputs": "input", "outputs": "output", "parameters": "parameter"}.get(record, "field")
-            self.sink.error("E216", f"`{instance.name}` has no {what} `{name}`", node.span, help=hint)
+            self.sink.error("E216", f"`{shown}` has no {what} `{name}`", node.span, help=hint)
             return None
-        type_, unit, path = port.type, port.unit, f"{instance.name}.{name}"
+        type_, unit, path = port.type, port.unit, f"{shown}.{name}"
         for member_name in members:
             member = type_.member(member_name) if isinstance(type_, Struct) else None
             if member is None and isinstance(type_, Struct) and type_.partial:

@@ -154,7 +154,7 @@ def _warn_idle(machine: Machine, sink: DiagnosticSink) -> None:
     due = {e.instance for state in machine.states for e in state.entries}
     for index, instance in enumerate(machine.instances):
         if index not in due:
-            message = f"no state schedules instance `{instance.name}`: it never runs"
+            message = f"no state schedules instance `{instance.span.local(instance.name)}`: it never runs"
             arms = machine.arm is not None and machine.arm.instance == index
             why = "the actuators are never armed" if arms else ""
             fix = "add it to the schedule of a state, or remove it"

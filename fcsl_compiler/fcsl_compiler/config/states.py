@@ -6,7 +6,7 @@ from __future__ import annotations
 from ..base.diagnostics import nearest
 from ..base.source import Span
 from ..model.machine import Entry, State
-from ..parse.json_reader import ConfigReader
+from ..parse.json_reader import ConfigReader, local_names
 from ..parse.json_source import JsonNode
 
 #: Maximum number of ticks of a period or of a time in a state.
@@ -32,10 +32,7 @@ def read_states(
         reader.string(keys.get("description"), "`description`")
         listed = reader.named(keys.get("schedule"), f"the schedule of `{name}`", instances=True)
         for instance in (n for n in listed if n in everywhere):
-            message = f"`{instance}` is in `always`, so state `{name}` schedules it already"
-            fix = "remove it here; or from `always`, and list it in every state that runs it"
-            notes = [(everywhere[instance][1], "scheduled in every state here")]
-            reader.sink.error("E243", message, listed[instance][1], help=fix, notes=notes)
+            reader.scheduled_twice(instance, name, listed[instance][1], everywhere[instance][1])
         own = {n: rate for n, rate in listed.items() if n not in everywhere}
         entries = [*shared, *_entries(own, tick_hz, instances, incomplete, reader)]
         states.append(State(name, tuple(sorted(entries, key=lambda e: e.instance)), span))
@@ -56,8 +53,9 @@ def _entries(
     entries: list[Entry] = []
     for instance, (rate, at) in listed.items():
         if instance not in instances and instance not in incomplete:
-            hint = nearest(instance, instances) or f"the instances are {', '.join(instances) or 'none'}"
-            reader.sink.error("E206", f"no instance `{instance}`", at, help=hint)
+            name, known = at.local(instance), local_names(instances, at)
+            hint = nearest(name, known) or f"the instances are {', '.join(known) or 'none'}"
+            reader.sink.error("E206", f"no instance `{name}`", at, help=hint)
             continue
         timing = _rate(rate, tick_hz, reader) if tick_hz else None
         if timing is not None and instance not in incomplete:

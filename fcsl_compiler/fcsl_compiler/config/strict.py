@@ -29,7 +29,7 @@ def _check_open_inputs(machine: Machine, sink: DiagnosticSink) -> None:
         names = ", ".join(f"`{p.name}`" for p in open_)
         sink.error(
             "E240",
-            f"nothing feeds {'inputs' if len(open_) > 1 else 'input'} {names} of `{instance.name}`",
+            f"nothing feeds {'inputs' if len(open_) > 1 else 'input'} {names} of `{instance.span.local(instance.name)}`",
             instance.span,
             why="with --strict, inputs without connection or channel must be listed, to exclude a forgotten connection",
             help=f'connect {"them" if len(open_) > 1 else "it"}, or list what the host writes: "inputs": {{{listed}}}',

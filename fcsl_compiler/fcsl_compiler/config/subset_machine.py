@@ -9,9 +9,9 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import replace
 
-from ..base.diagnostics import DiagnosticSink, nearest
+from ..base.diagnostics import DiagnosticSink
 from ..base.source import Span
-from ..model.machine import Channel, Connection, Edge, Machine, PortRef, State
+from ..model.machine import Channel, Connection, Edge, Machine, PortRef, State, unknown_instance
 from ..model.types import leaves
 from .arming import subset_arm
 
@@ -62,8 +62,8 @@ def _is_subset(machine: Machine, names: Sequence[str], at: Span, sink: Diagnosti
         sink.error("E242", "a subset of no instances", at, help=f"name some of {', '.join(known)}")
     for name in dict.fromkeys(names):
         if name not in known:
-            hint = nearest(name, known) or f"the instances are {', '.join(known)}"
-            sink.error("E206", f"no instance `{name}`", at, help=hint)
+            message, fix = unknown_instance(name, known)
+            sink.error("E206", message, at, help=fix)
         elif names.count(name) > 1:
             sink.error("E242", f"a subset with `{name}` twice", at, help="name it once")
     return not sink.failed

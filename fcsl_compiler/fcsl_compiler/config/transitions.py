@@ -5,9 +5,9 @@ from __future__ import annotations
 
 from ..base.diagnostics import nearest
 from ..base.source import Span
-from ..model.machine import Edge, Instance
+from ..model.machine import Edge, Instance, unknown_instance
 from ..model.types import HEALTH_NAMES
-from ..parse.json_reader import ConfigReader, is_name
+from ..parse.json_reader import ConfigReader, RequestUse, is_name
 from ..parse.json_source import JsonNode
 from .states import MAX_TICKS
 from .times import read_ticks
@@ -48,27 +48,41 @@ def read_transitions(
     return requests, edges
 
 
-def _named_requests(instances: list[Instance], reader: ConfigReader) -> dict[str, Span]:
+def _named_requests(instances: list[Instance], reader: ConfigReader) -> dict[str, RequestUse]:
     """All requests that algorithms or JSON values name, with their first use."""
-    named: dict[str, Span] = {}
+    named: dict[str, RequestUse] = {}
     for instance in instances:
+        part = instance.name.rpartition(".")[0]
         for name, span in instance.algorithm.requests:
-            named.setdefault(name, span)
-    return {**named, **{n: s for n, s in reader.requests.items() if n not in named}}
+            named.setdefault(name, RequestUse(span, part, instance.name))
+    return {**named, **{name: use for name, use in reader.requests.items() if name not in named}}
+
+
+def _bindings(name: str, use: RequestUse, reader: ConfigReader) -> list[tuple[Span, str]]:
+    """Where a request of a part gets its name, from inside out."""
+    scopes = {source.part: scope for source, scope in reader.scopes.items()}
+    found, part = [], use.part
+    while part:
+        for own in (own for own, whole in scopes[part].requests.items() if whole == name):
+            text = f"`{use.instance or part}` makes it: `{own}` of part `{part}` is called so here"
+            found.append((scopes[part].named[own], text))
+        part = part.rpartition(".")[0]
+    return found
 
 
 def _own_requests(instances: list[Instance], reader: ConfigReader) -> list[str]:
     """Requests of a machine without `transitions` and `requests`, such as the fixture of a unit test: those its
     algorithms name."""
     named = _named_requests(instances, reader)
-    requests = [name for name, span in named.items() if _valid_request(name, span, reader)]
+    requests = [name for name, use in named.items() if _valid_request(name, use.span, reader)]
     if requests:
         why = "without `transitions` and `requests`, the names in algorithms are not checked"
         listed = ", ".join(f'"{name}"' for name in requests)
         names = ", ".join(f"`{name}`" for name in requests)
         message = f"no list shows whether there {'is a request' if len(requests) == 1 else 'are requests'} {names}"
-        at = next(iter(named.values()))
-        reader.sink.warning("W208", message, at, why=why, help=f'list it: `"requests": [{listed}]`')
+        at = named[requests[0]].span
+        notes = [note for name in requests for note in _bindings(name, named[name], reader)]
+        reader.sink.warning("W208", message, at, why=why, help=f'list it: `"requests": [{listed}]`', notes=notes)
     return requests
 
 
@@ -177,7 +191,7 @@ def _guard(node: JsonNode, instances: list[str], incomplete: set[str], reader: C
         return None
     if keys["instance"].kind == "string" and keys["instance"].value in incomplete:
         return None
-    instance = reader.reference(keys["instance"], "instance", instances)
+    instance = _guarded(keys["instance"], instances, reader)
     mask = 0
     for item in reader.list(keys["in"], "`in`"):
         health = reader.choice(item, "a health", HEALTH_NAMES)
@@ -188,6 +202,16 @@ def _guard(node: JsonNode, instances: list[str], incomplete: set[str], reader: C
             "E221", "a guard that is never true", keys["in"].span, help=f"list one of {', '.join(HEALTH_NAMES)}"
         )
     return (instance, mask) if instance is not None and mask else None
+
+
+def _guarded(node: JsonNode, instances: list[str], reader: ConfigReader) -> int | None:
+    """Index of the instance that a guard names."""
+    name = reader.string(node, "an instance")
+    if name is None or name in instances:
+        return instances.index(name) if name is not None else None
+    message, fix = unknown_instance(name, instances)
+    reader.sink.error("E206", message, node.span, help=fix)
+    return None
 
 
 def _check_priorities(edges: list[Edge], unranked: set[Span], states: list[str], reader: ConfigReader) -> None:
@@ -224,8 +248,9 @@ def _check_priorities(edges: list[Edge], unranked: set[Span], states: list[str],
 
 def _check_requests(instances: list[Instance], requests: list[str], readable: bool, reader: ConfigReader) -> None:
     """Checks that every request in an algorithm is declared."""
-    for name, span in _named_requests(instances, reader).items():
+    for name, use in _named_requests(instances, reader).items():
         if name not in requests and readable:
             hint = nearest(name.removeprefix("tr_"), requests)
             fix = hint or f'add a transition with it, or list it: `"requests": ["{name}"]`'
-            reader.sink.error("E225", f"no transition is requested by `{name[:40]}`", span, help=fix)
+            message = f"no transition is requested by `{name[:40]}`"
+            reader.sink.error("E225", message, use.span, help=fix, notes=_bindings(name, use, reader))

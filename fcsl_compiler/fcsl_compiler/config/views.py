@@ -8,14 +8,14 @@ from __future__ import annotations
 
 import json
 import re
-from collections.abc import Container, Mapping
+from collections.abc import Collection, Mapping
 from pathlib import Path
 from typing import Any
 
 from ..base.diagnostics import DiagnosticSink, nearest
 from ..base.source import Span
 from ..model.ir import RECORDS
-from ..model.machine import split_instance
+from ..model.machine import split_instance, unknown_instance
 from ..model.types import (
     MAX_LEAVES,
     Array,
@@ -29,7 +29,7 @@ from ..model.types import (
     scalar_of,
     shape_of,
 )
-from ..parse.json_reader import ConfigReader
+from ..parse.json_reader import ConfigReader, Everything
 from ..parse.json_source import JsonNode
 from ..parse.source_path import SourcePathError, resolve_source
 from .frames import read_frames
@@ -55,8 +55,9 @@ class Signals:
     incomplete: instances of which an error was reported. Paths of these are accepted.
     """
 
-    def __init__(self, ports: Mapping[str, Mapping[str, tuple[Type, str]]], incomplete: Container[str]):
+    def __init__(self, ports: Mapping[str, Mapping[str, tuple[Type, str]]], incomplete: Collection[str]):
         self.ports, self.incomplete = ports, incomplete
+        self._names = incomplete if isinstance(incomplete, Everything) else {*ports, *incomplete}
         self._leaves: dict[str, dict[str, tuple[Type, str]]] = {}
 
     def _leaves_of(self, instance: str) -> Mapping[str, tuple[Type, str]]:
@@ -73,12 +74,12 @@ class Signals:
         """Type and unit of the number, the bool or the array of them that a path names. None after reporting an
         error."""
         path = str(node.value)
-        instance, rest = split_instance(path, self.ports)
+        instance, rest = split_instance(path, self._names)
         if instance in self.incomplete:
             return None
         if instance not in self.ports:
-            fix = f"the instances are {', '.join(self.ports) or 'none'}"
-            sink.error("E206", f"no instance `{instance}`", node.span, help=nearest(instance, list(self.ports)) or fix)
+            message, fix = unknown_instance(instance, list(self.ports))
+            sink.error("E206", message, node.span, help=fix)
             return None
         own = self._leaves_of(instance)
         if rest.partition(".")[0] not in RECORDS:
@@ -91,7 +92,7 @@ class Signals:
         if found is None:
             self._report(node, instance, own, sink)
         elif not (element := scalar_of(found[0])).is_number and element.name != "bool":
-            message = f"`{path}` is {element}, and a view shows numbers and bools"
+            message = f"`{node.written}` is {element}, and a view shows numbers and bools"
             sink.error("E245", message, node.span, help="remove it; states and healths are shown without a view")
             return None
         return found
@@ -101,7 +102,10 @@ class Signals:
         members = [leaf for leaf in own if leaf.startswith((f"{path}.", f"{path}["))]
         match = _INDICES.fullmatch(path)
         if members:
-            message, fix = f"`{path}` is a struct, and a view shows numbers", f'name a member, such as "{members[0]}"'
+            message, fix = (
+                f"`{node.written}` is a struct, and a view shows numbers",
+                f'name a member, such as "{members[0]}"',
+            )
             sink.error("E245", message, node.span, help=fix)
         elif match is not None and match[1] in own:
             message = f"`{match[1]}` is {own[match[1]][0]} and has no element `{match[2]}`"
@@ -199,7 +203,7 @@ class _Checker:
             return 0, unit
         type_, own = found
         if unit[0] and own and own != unit[0]:
-            message = f"`{node.value}` is in {own}, and the panel in {unit[0]}"
+            message = f"`{node.written}` is in {own}, and the panel in {unit[0]}"
             notes = [(unit[1], f"in {unit[0]}")]
             self.sink.error("E247", message, node.span, help="show it in a panel of its own", notes=notes)
         return count_of(type_), unit if unit[0] or not own else (own, node.span)
@@ -210,7 +214,7 @@ class _Checker:
     def _quaternion(self, node: JsonNode, rule: str) -> bool:
         found = self.signals.find(node, self.sink)
         if found is not None and (shape_of(found[0]) != (4,) or not scalar_of(found[0]).is_float):
-            message = f"{rule}, and `{node.value}` is {found[0]}"
+            message = f"{rule}, and `{node.written}` is {found[0]}"
             self.sink.error("E245", message, node.span, help="a quaternion is an f64[4], its scalar part first")
             return False
         return found is not None
@@ -267,9 +271,9 @@ class _Checker:
             return
         if shape_of(found[0]) not in shapes or not scalar_of(found[0]).is_number:
             fix = f"name {' or '.join('an f64[3]' if shape else 'an f64' for shape in shapes)}"
-            self.sink.error("E245", f"{rule}, and `{node.value}` is {found[0]}", node.span, help=fix)
+            self.sink.error("E245", f"{rule}, and `{node.written}` is {found[0]}", node.span, help=fix)
         elif found[1] not in ("", unit):
-            message = f"`{node.value}` is in {found[1]}, and is shown in {unit}"
+            message = f"`{node.written}` is in {found[1]}, and is shown in {unit}"
             self.sink.error("E247", message, node.span, help=f"name a field in {unit}")
 
     def _mesh(self, node: JsonNode) -> str:

@@ -3,7 +3,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Collection
+from collections.abc import Collection, Sequence
 from dataclasses import dataclass
 from dataclasses import field as dataclass_field
 from decimal import Decimal, localcontext
@@ -11,6 +11,7 @@ from fractions import Fraction
 from functools import cached_property
 from typing import Any
 
+from ..base.diagnostics import nearest
 from ..base.source import SourceFile, Span
 from . import ir
 from .program import Program
@@ -69,6 +70,15 @@ def split_instance(path: str, instances: Collection[str]) -> tuple[str, str]:
         more, _, rest = rest.partition(".")
         name = f"{name}.{more}"
     return name, rest
+
+
+def unknown_instance(name: str, instances: Sequence[str]) -> tuple[str, str]:
+    """Message and correction for a name that no instance has. That of a part is the beginning of several."""
+    own = [known for known in instances if known.startswith(f"{name}.")]
+    if own:
+        return f"`{name}` is a part, not an instance", f"name one of its instances: {', '.join(own)}"
+    hint = nearest(name, instances) or f"the instances are {', '.join(instances) or 'none'}"
+    return f"no instance `{name}`", hint
 
 
 @dataclass(frozen=True)

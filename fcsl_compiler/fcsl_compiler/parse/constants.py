@@ -14,7 +14,7 @@ from ..expression.parse import parse
 from ..expression.tree import ExpressionError, Kind, Node, Quantity
 from ..expression.units import Unit, read, text
 from .json_source import JsonNode, parse_json
-from .source_path import SourcePathError, resolve_source
+from .source_path import SourcePathError, missing_file_help, resolve_source
 
 if TYPE_CHECKING:
     from .json_reader import ConfigReader
@@ -102,7 +102,7 @@ def _file(name: str, span: Span, config: Path, reader: ConfigReader, outside: bo
         path = config.parent / name if is_beside else resolve_source(name, config=config)
         source = SourceFile.read(path, name)
     except (SourceError, SourcePathError) as error:
-        fix = "paths are relative to the folder of this file"
+        fix = missing_file_help(error, span)
         reader.sink.error("E100", f"cannot read `{name[:200]}`: {error}", span, help=fix)
         return None
     return parse_json(source, reader.sink)

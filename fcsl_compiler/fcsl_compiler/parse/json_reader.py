@@ -4,7 +4,7 @@
 from __future__ import annotations
 
 import re
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 from dataclasses import dataclass, field
 from typing import TYPE_CHECKING
 
@@ -29,12 +29,31 @@ def _is_path(text: str) -> bool:
     return len(text) <= MAX_NAME and all(map(is_name, text.split(".")))
 
 
+def local_names(instances: Iterable[str], at: Span) -> list[str]:
+    """The instances and parts that connections and schedules in the file of `at` can name."""
+    prefix = f"{at.source.part}." if at.source.part else ""
+    names = (name.removeprefix(prefix).partition(".")[0] for name in instances if name.startswith(prefix))
+    return list(dict.fromkeys(names))
+
+
 @dataclass
 class Scope:
-    """What texts in the file of a part may name: its constants, and its requests with their names in the whole machine."""
+    """What texts in the file of a part may name: its constants, its requests with their names in the whole machine, and
+    its structs, those of its own parts included."""
 
     constants: Constants | None = None
     requests: dict[str, str] = field(default_factory=dict)
+    named: dict[str, Span] = field(default_factory=dict)  # where the requests get these names
+    structs: set[str] = field(default_factory=set)
+
+
+@dataclass(frozen=True)
+class RequestUse:
+    """The first use of a request: in which part, "" for none, and by which instance, "" if a value in the JSON names it."""
+
+    span: Span
+    part: str
+    instance: str = ""
 
 
 class Everything(set[str]):
@@ -55,8 +74,8 @@ class ConfigReader:
         self.sink, self.constants = sink, constants
         #: Files of parts.
         self.scopes: dict[SourceFile, Scope] = {}
-        #: Requests that values in the JSON name, with their first use.
-        self.requests: dict[str, Span] = {}
+        #: Requests that values in the JSON name.
+        self.requests: dict[str, RequestUse] = {}
         #: Columns of files that values in the JSON name, with their numbers.
         self.columns: list[str] = []
 
@@ -205,6 +224,17 @@ class ConfigReader:
         from .json_values import read_value  # here: an unchanged machine is found in the cache without its types
 
         return read_value(self, node, type_, what, unit)
+
+    def use_request(self, name: str, span: Span, instance: str = "") -> None:
+        """Notes that a value names a request. `instance`: whose default it is, if it does not stand in the JSON."""
+        part = instance.rpartition(".")[0] if instance else span.source.part
+        self.requests.setdefault(name, RequestUse(span, part, instance))
+
+    def scheduled_twice(self, instance: str, state: str, at: Span, always: Span) -> None:
+        """Reports an instance, or a part, that a state and `always` schedule."""
+        message = f"`{instance}` is in `always`, so state `{state}` schedules it already"
+        fix = "remove it here; or from `always`, and list it in every state that runs it"
+        self.sink.error("E243", message, at, help=fix, notes=[(always, "scheduled in every state here")])
 
     def wrong(self, node: JsonNode, message: str, fix: str) -> None:
         self.sink.error("E208", f"{message}, not {article(node.kind)}", node.span, help=f"write {fix}" if fix else "")

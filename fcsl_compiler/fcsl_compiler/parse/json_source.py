@@ -31,7 +31,7 @@ class JsonNode:
     kind: str
     span: Span
     value: object
-    text: str = ""  # source text of a number
+    text: str = ""  # source text of a number; of a string that parse/parts.py replaced: that of the file
 
     @property
     def members(self) -> dict[str, Member]:
@@ -46,6 +46,11 @@ class JsonNode:
     @property
     def is_number(self) -> bool:
         return self.kind in ("int", "float")
+
+    @property
+    def written(self) -> str:
+        """A string as its file has it."""
+        return self.text or str(self.value)
 
     def get(self, key: str) -> JsonNode | None:
         """Value of `key`. None if this is not an object or lacks the key."""

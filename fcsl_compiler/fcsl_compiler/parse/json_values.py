@@ -93,7 +93,7 @@ def _scalar(reader: ConfigReader, node: JsonNode, type_: Scalar, what: str, unit
         name = reader.string(node, what)
         name = reader.scope(node).requests.get(name, name) if name else name
         if name:
-            reader.requests.setdefault(name, node.span)
+            reader.use_request(name, node.span)
         return None if name is None else (name,)
     elif type_ is HEALTH:
         word = reader.choice(node, what, HEALTH_NAMES)

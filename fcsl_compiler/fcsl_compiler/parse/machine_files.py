@@ -19,7 +19,7 @@ from .json_source import JsonNode, parse_json, text_without
 from .machine_texts import package_of
 from .parts import Joined
 from .python_source import is_ignored_module, parse_python, span_of
-from .source_path import SourcePathError, resolve_source
+from .source_path import SourcePathError, missing_file_help, resolve_source
 from .targets import read_targets
 
 _STEM = re.compile(r"[a-z](_?[a-z0-9])*")
@@ -95,6 +95,12 @@ class ParsedAlgorithm:
     file: ParsedFile | None
     sizes: dict[str, tuple[int, Span]] = field(default_factory=dict)
     requests: dict[str, str] | None = None  # of an algorithm of a part: those it may make, by its names for them
+    parts: tuple[Span, ...] = ()  # where the parts that use it name it
+
+    @property
+    def written(self) -> str:
+        """Its name in the file that names it."""
+        return self.span.text.strip('"') if self.parts else self.name
 
 
 @dataclass(frozen=True)
@@ -160,7 +166,7 @@ def parse_machine(path: Path, sink: DiagnosticSink) -> ParsedMachine | None:
         reader.string(keys.get(key), f"`{key}`")
     files = _Files(path, reader.sink)
     algorithms = {
-        key: _parse_algorithm(key, definition, span, files, reader)
+        key: _parse_algorithm(key, definition, span, files, tuple(joined.users.get(key, ())), reader)
         for key, (definition, span) in reader.named(keys.get("algorithms"), "`algorithms`").items()
     }
     targets = read_targets(keys.get("targets"), path, reader)
@@ -195,7 +201,7 @@ def _check_name(name: str, source: SourceFile, sink: DiagnosticSink) -> None:
 
 
 def _parse_algorithm(
-    name: str, definition: JsonNode, span: Span, files: _Files, reader: ConfigReader
+    name: str, definition: JsonNode, span: Span, files: _Files, parts: tuple[Span, ...], reader: ConfigReader
 ) -> ParsedAlgorithm:
     keys = reader.object(definition, f"algorithm `{name}`", ("source",), ("class", "sizes"))
     text = reader.string(keys.get("source"), "`source`") if keys else None
@@ -203,7 +209,7 @@ def _parse_algorithm(
     class_name = reader.string(class_node, "`class`")
     class_span = class_node.span if class_node is not None else span
     if keys is None or text is None or (class_node is not None and class_name is None):
-        return ParsedAlgorithm(name, name, span, class_span, None)
+        return ParsedAlgorithm(name, name, span, class_span, None, parts=parts)
     sizes = {
         key: (reader.integer(node, f"size `{key}`", 1, MAX_ELEMENTS) or 1, at)
         for key, (node, at) in reader.named(keys.get("sizes"), f"`sizes` of `{name}`").items()
@@ -211,7 +217,7 @@ def _parse_algorithm(
     scope = reader.scopes.get(definition.span.source)
     requests = scope.requests if scope is not None else None
     file = files.read(text, keys["source"].span)
-    return ParsedAlgorithm(name, class_name or name, span, class_span, file, sizes, requests)
+    return ParsedAlgorithm(name, class_name or name, span, class_span, file, sizes, requests, parts)
 
 
 class _Files:
@@ -237,8 +243,7 @@ class _Files:
             self.sink.error("E103", f"`{text}` cannot be a source", at, why=str(error))
             return None
         except SourceError as error:
-            fix = f"paths are relative to {self.config.parent}" if str(error) == "no such file" else ""
-            fix = "remove it, or save the file as UTF-8" if error.span else fix
+            fix = "remove it, or save the file as UTF-8" if error.span else missing_file_help(error, at)
             self.sink.error("E100", f"cannot read `{text}`: {error}", error.span or at, help=fix)
             return None
         file = ParsedFile(source, parse_python(source, self.sink))

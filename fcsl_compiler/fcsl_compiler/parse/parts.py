@@ -6,6 +6,7 @@ Instance `rate` of part `att` becomes instance `att.rate`, and what names it is 
 
 from __future__ import annotations
 
+import re
 from collections.abc import Mapping
 from dataclasses import dataclass, field, replace
 from pathlib import Path
@@ -17,7 +18,7 @@ from ..base.source import SourceFile, Span
 from .constants import read_constants
 from .json_reader import ConfigReader, Scope, is_name
 from .json_source import JsonNode, Member, parse_json
-from .source_path import SourcePathError, beside, resolve_source
+from .source_path import SourcePathError, beside, missing_file_help, resolve_source
 
 #: Maximum depth of parts in parts, and number of all parts.
 MAX_DEPTH = 8
@@ -34,6 +35,8 @@ RESERVED_INSTANCES = ("machine", "channels", "state", "transitions", "health", "
 _RESERVED = (*RESERVED_INSTANCES, "inputs", "outputs", "parameters", "counters")
 #: Keys of views whose texts are no paths of fields.
 _NO_PATHS = ("title", "mesh", "frames")
+#: Why a part cannot use a struct of another file.
+STRUCTS = "a part is a machine of its own: it declares the structs that it uses, or one of its own parts does"
 _WHOLE = "a part is scheduled as a whole, at its own rates"
 
 
@@ -72,6 +75,7 @@ class Joined:
         self.ports: list[tuple[str, JsonNode]] = []
         self._constants: dict[str, JsonNode | None] = {}  # by part
         self._algorithms: dict[str, Member] = {}
+        self.users: dict[str, list[Span]] = {}  # by algorithm: where parts name it
         self._structs: dict[str, Member] = {}
         self._instances: dict[str, Member] = {}
         self._connections: list[JsonNode] = []
@@ -81,6 +85,7 @@ class Joined:
         has_parts = any(m.value.get("machine") is not None for m in _object(keys.get("instances")).values())
         if has_parts:
             self._join(own)
+            self._check_structs(own)
         else:
             self._read_ports(own)
         self.keys = self._whole(own) if has_parts else keys
@@ -128,6 +133,9 @@ class Joined:
             self._instances[file.prefix + name] = Member(file.prefix + name, span, whole)
         for item in self.reader.list(file.keys.get("connections"), "`connections`"):
             self._connections += self._connection(file, item)
+        file.scope.structs = set(_object(file.keys.get("structs"))).union(
+            *(p.scope.structs for p in file.parts.values())
+        )
         self._read_ports(file)
         if file.prefix:
             self._read_schedule(file)
@@ -140,6 +148,19 @@ class Joined:
                 notes = [(known.key_span, "the other")]
                 message = f"struct `{name}` has other members in another file"
                 self.sink.error("E255", message, member.key_span, help=fix, notes=notes)
+
+    def _check_structs(self, file: _File) -> None:
+        """Reports members of a part's structs whose types only other files declare."""
+        for part in file.parts.values():
+            self._check_structs(part)
+        for definition in _object(file.keys.get("structs")).values() if file.prefix else ():
+            for member in _object(definition.value).values():
+                found = re.match(r"\s*(\w+)", str(member.value.value))
+                if found and found[1] in self._structs.keys() - file.scope.structs:
+                    fix = f"declare `{found[1]}` in the `structs` of this file, too"
+                    notes = [(self._structs[found[1]].key_span, "only another file declares it")]
+                    message = f"unknown type `{found[1]}`"
+                    self.sink.error("E232", message, member.value.span, why=STRUCTS, help=fix, notes=notes)
 
     def _add_algorithms(self, file: _File) -> dict[str, str]:
         """Adds the algorithms of a file. Returns their names in the whole machine: the same class of the same file is one
@@ -160,6 +181,7 @@ class Joined:
             same = known.get(self._identity(name, node), [])
             names[name] = name if name in same else same[0] if same else self._free_name(file, name)
             self._algorithms.setdefault(names[name], Member(names[name], member.key_span, node))
+            self.users.setdefault(names[name], []).append(member.key_span)
         return names
 
     def _free_name(self, file: _File, name: str) -> str:
@@ -218,8 +240,11 @@ class Joined:
                 return None
             source = replace(SourceFile.read(path, text), part=prefix[:-1], included=at.span)
         except (SourceError, SourcePathError) as error:
-            fix = "paths are relative to the folder of this file"
-            self.sink.error("E100", f"cannot read the part `{text[:200]}`: {error}", at.span, help=fix)
+            wrong = error.span if isinstance(error, SourceError) else None
+            fix = "remove it, or save the file as UTF-8" if wrong else missing_file_help(error, at.span)
+            notes = [(at.span, "it is a part here")] if wrong else []
+            message = f"cannot read the part `{text[:200]}`: {error}"
+            self.sink.error("E100", message, wrong or at.span, help=fix, notes=notes)
             return None
         root = parse_json(source, self.sink)
         keys = self.reader.object(root, "a machine that is a part", _REQUIRED, _OPTIONAL) if root is not None else None
@@ -267,7 +292,7 @@ class Joined:
                 fix = "give each a name of its own, and each name a transition"
                 self.sink.error("E256", f"two requests of `{name}` are called `{text}`", node.span, help=fix)
             elif text is not None:
-                found[key] = outer.scope.requests.get(text, text)
+                found[key], part.scope.named[key] = outer.scope.requests.get(text, text), node.span
         missing = [request for request in own if request not in found]
         if missing and not (bound is not None and bound.kind != "object"):
             names = ", ".join(f'"{request}": "…"' for request in missing)
@@ -283,7 +308,8 @@ class Joined:
         members = dict(member.value.members)
         before = _object(members[record].value) if record in members else {}
         values = {**before, port.field: replace(given, key=port.field)}
-        values_node = JsonNode("object", given.value.span, values)
+        at = members[record].value.span if record in members else member.value.span
+        values_node = JsonNode("object", at, values)
         members[record] = Member(record, members[record].key_span if record in members else given.key_span, values_node)
         self._instances[port.instance] = replace(member, value=replace(member.value, value=members))
 
@@ -362,12 +388,15 @@ class Joined:
     def _with_phase(self, member: Member, from_hz: int, to_hz: int) -> Member:
         """A rate whose phase counts ticks of `to_hz`."""
         phase = member.value.get("phase")
-        given = self.reader.integer(phase, "`phase` (ticks)", 0, MAX_TICK_HZ)
-        if phase is None or not given or not from_hz or from_hz == to_hz:
+        if phase is None or not from_hz or from_hz == to_hz:
+            return member
+        hz = self.reader.integer(member.value.get("hz"), "a rate (Hz)", 1, MAX_TICK_HZ) or 1
+        given = self.reader.integer(phase, "`phase` (ticks)", 0, (from_hz - 1) // hz)
+        if not given:
             return member
         ticks, rest = divmod(given * to_hz, from_hz)
         if rest:
-            why = f"a phase of {given} at {from_hz} Hz is no whole number of ticks at {to_hz} Hz"
+            why = f"a phase of {given} ticks at {from_hz} Hz is no whole number of ticks at {to_hz} Hz"
             self.sink.error("E254", "a phase that the machine cannot have", phase.span, why=why, help="remove it")
         members = dict(member.value.members)
         members["phase"] = replace(members["phase"], value=JsonNode("int", phase.span, ticks, str(ticks)))
@@ -385,6 +414,9 @@ class Joined:
         hint = nearest(port, list(known)) or (f"it has {', '.join(known)}" if known else f"its `ports` list no {what}")
         if elsewhere:
             hint = f"`{port}` is one of its {elsewhere}"
+        if not port:
+            self.sink.error("E216", f"part `{name}` without one of its {record}", at, help=hint)
+            return []
         self.sink.error("E216", f"part `{name}` has no {what} `{port}`", at, help=hint)
         return []
 
@@ -430,11 +462,14 @@ class Joined:
         return keys
 
     def _states(self, own: _File, node: JsonNode) -> JsonNode:
-        members = dict(node.members)
+        members, always = dict(node.members), _object(own.keys.get("always"))
         for name, member in members.items():
             schedule = member.value.get("schedule")
             if schedule is not None and schedule.kind == "object":
                 state = dict(member.value.members)
+                for key in (key for key in schedule.members if key in own.parts and key in always):
+                    at = schedule.members[key].key_span
+                    self.reader.scheduled_twice(key, name, at, always[key].key_span)
                 state["schedule"] = replace(state["schedule"], value=self._scheduled(own, schedule))
                 members[name] = replace(member, value=replace(member.value, value=state))
         return replace(node, value=members)
@@ -475,7 +510,9 @@ class Joined:
         if node.kind != "string" or name not in own.parts or (record not in _RECORDS and in_views):
             return node
         if record not in _RECORDS:
-            fix = f'write "{name}.outputs.<port>", a port that `{name}` declares'
+            meant = [f'"{name}.{r}.{record}"' for r in _RECORDS if record in own.parts[name].ports[r]]
+            known = [f"{r}.{p}" for r in ("inputs", "outputs") for p in own.parts[name].ports[r]]
+            fix = f"write {meant[0]}" if meant else f"`{name}` declares {', '.join(known) or 'no ports'}"
             self.sink.error("E254", f"`{node.value}` is no port of a part", node.span, help=fix)
             return node
         port = port.partition("[")[0]
@@ -507,7 +544,7 @@ def plain(node: JsonNode) -> Any:
 
 
 def _text(node: JsonNode, text: str) -> JsonNode:
-    return JsonNode("string", node.span, text)
+    return JsonNode("string", node.span, text, node.written)
 
 
 def _object(node: JsonNode | None) -> dict[str, Member]:

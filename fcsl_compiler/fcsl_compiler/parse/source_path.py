@@ -7,6 +7,7 @@ import os
 from pathlib import Path
 
 from ..base.packages import PackageNotFound, package_share
+from ..base.source import Span
 
 _MAX_PATH = 1000
 _SHARE = "share files between machines through package://"
@@ -18,7 +19,13 @@ class SourcePathError(ValueError):
 
 def beside(folder: str, text: str) -> str:
     """What a text names that stands in a file of `folder`."""
-    return f"{folder}/{text}" if folder and not text.startswith("package://") else text
+    return f"{folder}/{text}" if folder and not text.startswith(("package://", "/")) else text
+
+
+def missing_file_help(error: Exception, at: Span) -> str:
+    """What a relative path at `at` is relative to, if the error is that there is no such file."""
+    relative = str(error) == "no such file" and not at.text.startswith('"package://')
+    return f"paths are relative to {Path(at.source.path).parent}" if relative else ""
 
 
 def resolve_source(text: str, *, config: Path) -> Path:
