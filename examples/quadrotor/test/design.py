@@ -46,7 +46,7 @@ def cascade(axis: int) -> dict[str, Response]:
     s = 1j * OMEGA
     controller = rate["k"][axis] + rate["ki"][axis] / s
     loops = {"rate": controller / s / (rate["lag"] * s + 1.0 + rate["c"][axis]) * np.exp(-s * DELAY)}
-    loops["attitude"] = attitude["k"][axis] / s * closed(loops["rate"])
+    loops["attitude"] = attitude["gain"][axis] / s * closed(loops["rate"])
     along = 1 - axis  # pitch moves it north, roll east
     loops["velocity"] = (position["kv"][along] + position["ki"][along] / s) / s * closed(loops["attitude"])
     loops["position"] = position["kp"][along] / s * closed(loops["velocity"])

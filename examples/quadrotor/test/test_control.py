@@ -87,7 +87,7 @@ def linear_roll(kick: float, ticks: int) -> Array:
     for _ in range(ticks):
         rates.append(state[1])
         modelled += (state[3] - modelled) * (1.0 - math.exp(-1.0 / TICK_HZ / lag))
-        error = -attitude["k"][0] * state[0] - state[1]
+        error = -attitude["gain"][0] * state[0] - state[1]
         integral += rate["ki"][0] * error / TICK_HZ
         state[3] = inertia * (rate["k"][0] * error + integral) - rate["c"][0] * modelled
         state = step @ state

@@ -40,7 +40,7 @@ def test_without_gnss_it_sinks_level_and_stops_its_motors(mission: SimTwin, kind
 
 
 def test_safe_comes_when_the_last_fix_is_too_old(mission: SimTwin) -> None:
-    mission.run_until("navigation.outputs.gnss_age == 0.0", timeout_ticks=30)
+    mission.run_until("navigation.outputs.aid_age[0] == 0.0", timeout_ticks=30)
     mission.set("receiver.parameters.fault", SILENT)
     taken = mission.run_until("machine.state == 'SAFE'", timeout_ticks=TICK_HZ)
     assert taken / TICK_HZ == pytest.approx(PATIENCE_S, abs=0.02)
@@ -71,7 +71,7 @@ def test_without_imu_the_motors_stop_within_50_ms(mission: SimTwin, kind: int) -
 def test_a_second_without_orders_ends_the_mission(fcsl: Callable[..., AlgTwin]) -> None:
     """In the monitor alone: the plant always brings orders."""
     twin = fcsl("../fc/quadrotor.json", instances=["operator", "monitor"])
-    nominal = {"imu_valid": True, "gnss_age": 0.0, "barometer_age": 0.0, "magnetometer_age": 0.0, "voltage": 12.0}
+    nominal = {"imu_valid": True, "aligned": True, "aid_age": [0.0] * 6, "voltage": 12.0}
     twin.set_many({f"monitor.inputs.{name}": value for name, value in nominal.items()})
     twin.attach("operator.order")
     twin.sample("operator.order", 2)
@@ -94,5 +94,5 @@ def test_a_low_battery_ends_the_mission(mission: SimTwin) -> None:
 def test_nothing_flies_before_the_filter_is_ready(fly: Callable[..., Simulation]) -> None:
     with fly(2, sets=["receiver.parameters.fault=1"]) as sim:
         sim.run(12 * TICK_HZ)
-        assert sim.state == "STANDBY" and not sim.machine_value("navigation.outputs.ready")
+        assert sim.state == "STANDBY" and not sim.machine_value("monitor.outputs.ready")
         assert not sim.machine_value("mixer.outputs.running")

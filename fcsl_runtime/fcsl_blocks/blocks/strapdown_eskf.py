@@ -7,6 +7,7 @@ from fcsl_builtins import (
     cross3,
     diag,
     dot,
+    exp,
     eye,
     f64,
     hypot,
@@ -35,10 +36,12 @@ from fcsl_builtins import (
     zeros,
 )
 
-# Errors: angle 0 to 2 (body axes), velocity 3, position 6, gyro bias 9, accelerometer bias 12. The state x: attitude 0
-# to 3, velocity 4, position 7, gyro bias 10, accelerometer bias 13.
-N = 15
-X = 16
+# Errors: angle 0 to 2 (body axes), velocity 3, position 6, gyro bias 9, accelerometer bias 12; of the aids: drift of the
+# position 15, bias of the height 18. The state x: attitude 0 to 3, then these from 4, 7, 10, 13, 16 and 19 on.
+N = 19
+X = 20
+MOTION = 15  # errors without those of the aids
+OF_AIDS = 4
 AIDS = 6
 POSITION = 0
 VELOCITY = 1
@@ -57,7 +60,9 @@ def sound(x: "f64[X]", p: "f64[N][N]") -> bool:
     return fine
 
 
-def integrated(x: "f64[X]", angle: "f64[3]", push: "f64[3]", gravity: f64, dt: f64) -> tuple["f64[X]", "f64[N][N]"]:
+def integrated(
+    x: "f64[X]", angle: "f64[3]", push: "f64[3]", gravity: f64, dt: f64
+) -> tuple["f64[X]", "f64[MOTION][MOTION]"]:
     """The state after a turn `angle` and a specific force with the integral `push`, and the transition of its errors."""
     q = x[0:4]
     dcm = quat_to_dcm(q)
@@ -69,7 +74,7 @@ def integrated(x: "f64[X]", angle: "f64[3]", push: "f64[3]", gravity: f64, dt: f
     made[6] += gravity * dt
     made[7:10] = x[7:10] + (0.5 * dt) * (x[4:7] + made[4:7])
 
-    f = eye(N)
+    f = eye(MOTION)
     f[0:3, 0:3] = transpose(quat_to_dcm(quat_turn([1.0, 0.0, 0.0, 0.0], angle)))
     lever = matmul(skew(force), dcm)
     f[3:6, 0:3] = -lever
@@ -80,6 +85,25 @@ def integrated(x: "f64[X]", angle: "f64[3]", push: "f64[3]", gravity: f64, dt: f
         f[i, 9 + i] = -dt
         f[6 + i, 3 + i] = dt
     return made, f
+
+
+def predicted(
+    p: "f64[N][N]", f: "f64[MOTION][MOTION]", q: "f64[MOTION]", fade: "f64[OF_AIDS]", q_aids: "f64[OF_AIDS]"
+) -> "f64[N][N]":
+    """The covariance after a period. The errors of the aids fade on their own; q, q_aids: what is added."""
+    beside = matmul(f, p[0:MOTION, MOTION:])
+    of_aids = p[MOTION:, MOTION:]
+    for i in range(OF_AIDS):
+        beside[:, i] = fade[i] * beside[:, i]
+        for j in range(OF_AIDS):
+            of_aids[i, j] *= fade[i] * fade[j]
+        of_aids[i, i] += q_aids[i]
+    after = zeros(N, N)
+    after[0:MOTION, 0:MOTION] = kf_predict_cov(f, p[0:MOTION, 0:MOTION], diag(q))
+    after[0:MOTION, MOTION:] = beside
+    after[MOTION:, 0:MOTION] = transpose(beside)
+    after[MOTION:, MOTION:] = of_aids
+    return after
 
 
 def fused(
@@ -152,14 +176,16 @@ class StrapdownEskf:
 
     q' = q (x) exp(angle), v' = v + R(q (x) exp(angle / 2)) push + g dt, p' = p + (v + v') dt / 2
 
-    The 15 errors are angle (about body axes: q_true = q (x) exp(dtheta)), velocity, position, bg and ba:
+    The 19 errors are angle (about body axes: q_true = q (x) exp(dtheta)), velocity, position, bg, ba, and those of two aids:
+    the drift b of a measured position (of GNSS, say), a Gauss-Markov process, and the bias c of a height (a barometer's):
 
-    d/dt dtheta = -w x dtheta - dbg - noise, d/dt dv = -R (f x dtheta) - R dba - noise, d/dt dp = dv, biases: random walks
+    d/dt dtheta = -w x dtheta - dbg - noise, d/dt dv = -R (f x dtheta) - R dba - noise, d/dt dp = dv,
+    d/dt b = -b / measured_position_drift_time + noise, other biases: random walks
 
     An aid that is not fresh costs nothing and changes nothing. With a the arm of the sensor, w = rate - bg, R = R(q):
 
-    position = p + R a            velocity = v + R (w x a)          (arm of the antenna)
-    height = up p_z               heading = atan2(R_10, R_00)       (the turn of body x about the world's z axis)
+    position = p + b + R a        velocity = v + R (w x a)          (arm of the antenna)
+    height = up p_z + c           heading = atan2(R_10, R_00)       (the turn of body x about the world's z axis)
     body_velocity = R^T v + w x a (wheels, Doppler, pitot; a wheeled vehicle measures 0 aside and down)
     range = (c - n.(p + R a)) / (n.R b)      (along the beam b to the plane n.y = c; n = vertical: the ground)
 
@@ -185,7 +211,10 @@ class StrapdownEskf:
     gain that sets one state. Jacobians of the aids: derived from R_true = R (I + [dtheta]x).
     Limits: flat earth that does not turn, constant gravity; coning and sculling within a period are left out. Aids are taken
     to be of this run: a delay is an error of speed times delay; keep `..._fresh` true for one run per sample. Errors of an
-    aid are white, or its sigma must cover them. No heading within 6 degrees of the vertical. Heading is observable only by
+    aid are white but for b and c, or its sigma must cover them: a drift that is taken for white noise becomes velocity, and the
+    filter claims to know the position several times better than it does. A constant part of b cannot be observed by position
+    alone. Where the errors of first_position are those of the first sample, give a first_position_sigma that is larger than
+    both: the sample itself then makes the correlation. No heading within 6 degrees of the vertical. Heading is observable only by
     its aid, or by horizontal acceleration beside position or velocity. An IMU sample that is not finite, or that makes the
     estimate so, is passed over: outputs stay, health is degraded, the next sample is taken for the whole gap. Of an aid that
     is not finite only this aid is passed over.
@@ -239,7 +268,11 @@ class StrapdownEskf:
         "position_gate": "f64 in 0.. = 21.11",  # chi squared of 3 elements
         "measured_velocity_sigma": "f64[3] m/s in 0.. = 0",  # standard deviation
         "velocity_gate": "f64 in 0.. = 21.11",  # chi squared of 3 elements
+        "measured_position_drift": "f64[3] m in 0.. = 0",  # standard deviation of b, axes of the world
+        "measured_position_drift_time": "f64 s in 1e-3.. = 100",  # correlation time of b
         "measured_height_sigma": "f64 m in 0.. = 0",  # standard deviation
+        "measured_height_walk": "f64 m/s/sqrt(Hz) in 0.. = 0",  # of its bias c; 0 with a first sigma of 0: not estimated
+        "first_height_bias_sigma": "f64 m in 0.. = 0",  # of c
         "height_gate": "f64 in 0.. = 15.14",  # chi squared of 1
         "measured_heading_sigma": "f64 rad in 0.. = 0",  # standard deviation
         "heading_gate": "f64 in 0.. = 15.14",  # chi squared of 1
@@ -261,6 +294,8 @@ class StrapdownEskf:
         "position": "f64[3] m",  # of the IMU in the world
         "gyro_bias": "f64[3] rad/s",  # of the gyroscope
         "accelerometer_bias": "f64[3] m/s^2",  # of the accelerometer
+        "position_drift": "f64[3] m",  # b: measured less true, axes of the world
+        "height_bias": "f64 m",  # c: measured less true
         "rate": "f64[3] rad/s",  # body rates less bias, mean of the period
         "specific_force": "f64[3] m/s^2",  # body axes, less bias, mean of the period
         "linear_acceleration": "f64[3] m/s^2",  # axes of the world, without gravity
@@ -269,6 +304,8 @@ class StrapdownEskf:
         "position_sigma": "f64[3] m",  # standard deviation
         "gyro_bias_sigma": "f64[3] rad/s",  # standard deviation
         "accelerometer_bias_sigma": "f64[3] m/s^2",  # standard deviation
+        "position_drift_sigma": "f64[3] m",  # standard deviation
+        "height_bias_sigma": "f64 m",  # standard deviation
         "position_innovation": "f64[3] m",  # of the last sample: measured less expected; so are the others
         "velocity_innovation": "f64[3] m/s",  # axes of the world
         "height_innovation": "f64 m",  # up
@@ -279,6 +316,7 @@ class StrapdownEskf:
         "rejected": "bool[6]",  # the last sample of the aid, in this order
         "rejections": "u32[6]",  # how many since the start; wraps
         "resets": "u32[6]",  # how often an aid set what it measures; wraps
+        "aid_age": "f64[6] s",  # since a sample of the aid was taken, or the first run
         "aligned": "bool",  # the filter runs
     }
     state = {
@@ -302,6 +340,8 @@ class StrapdownEskf:
             self.rest = 0.0
             self.since = 0.0
         self.since += self.period
+        for i in range(AIDS):
+            self.aid_age[i] += self.period
         dt = self.since
         up = -1.0 if self.z_down else 1.0
         g = self.gravity
@@ -316,19 +356,27 @@ class StrapdownEskf:
         x[7:10] = self.position
         x[10:13] = self.gyro_bias
         x[13:16] = self.accelerometer_bias
+        x[16:19] = self.position_drift
+        x[19] = self.height_bias
         p = self.covariance
 
         if self.aligned:
             turn = dt * (rate - self.gyro_bias)
             push = dt * (force - self.accelerometer_bias)
             x, f = integrated(x, turn, push, -up * g, dt)
-            q = zeros(N)
+            keep = exp(-dt / self.measured_position_drift_time)
+            x[16:19] = keep * x[16:19]
+            q = zeros(MOTION)
+            q_aids = zeros(OF_AIDS)
             for i in range(3):
                 q[i] = self.gyro_noise * self.gyro_noise * dt
                 q[3 + i] = self.accelerometer_noise * self.accelerometer_noise * dt
                 q[9 + i] = self.gyro_walk * self.gyro_walk * dt
                 q[12 + i] = self.accelerometer_walk * self.accelerometer_walk * dt
-            p = kf_predict_cov(f, p, diag(q))
+                drift = self.measured_position_drift[i]
+                q_aids[i] = drift * drift * (1.0 - keep * keep)
+            q_aids[3] = self.measured_height_walk * self.measured_height_walk * dt
+            p = predicted(p, f, q, [keep, keep, keep, 1.0], q_aids)
             if not sound(x, p):
                 self.health = "degraded"
                 return
@@ -346,9 +394,10 @@ class StrapdownEskf:
                 h = zeros(3, N)
                 h[:, 0:3] = -matmul(dcm, skew(self.antenna_arm))
                 h[:, 6:9] = eye(3)
+                h[:, 15:18] = eye(3)
                 setting = zeros(N, 3)
                 setting[6:9, :] = eye(3)
-                difference = self.measured_position - x[7:10] - matvec(dcm, self.antenna_arm)
+                difference = self.measured_position - x[7:10] - x[16:19] - matvec(dcm, self.antenna_arm)
                 square[POSITION], taken[POSITION], difference, x, p = fused(
                     x, p, h, setting, self.measured_position_sigma, difference, self.position_gate, late[POSITION], g
                 )
@@ -373,8 +422,9 @@ class StrapdownEskf:
             column = zeros(N, 1)
             if self.height_fresh:
                 row[0, 8] = up
+                row[0, 18] = 1.0
                 column[8, 0] = up
-                lacking = [self.measured_height - up * x[9]]
+                lacking = [self.measured_height - up * x[9] - x[19]]
                 square[HEIGHT], taken[HEIGHT], lacking, x, p = fused(
                     x, p, row, column, [self.measured_height_sigma], lacking, self.height_gate, late[HEIGHT], g
                 )
@@ -460,6 +510,7 @@ class StrapdownEskf:
                     self.in_row[i] = 0 if taken[i] else sat_add(self.in_row[i], 1)
                     if taken[i]:
                         self.rejecting[i] = 0.0
+                        self.aid_age[i] = 0.0
                     if not square[i] < gates[i]:
                         if taken[i]:
                             self.resets[i] += 1
@@ -501,6 +552,7 @@ class StrapdownEskf:
                 x[0:4] = quat_from_euler(roll, pitch, heading)
             x[4:7] = self.first_velocity
             x[7:10] = self.first_position
+            x[16:19] = zeros(3)
             dcm = quat_to_dcm(x[0:4])
             lean = self.first_tilt_sigma * self.first_tilt_sigma
             spread = diag([lean, lean, heading_sigma * heading_sigma])
@@ -511,6 +563,8 @@ class StrapdownEskf:
                 p[6 + i, 6 + i] = self.first_position_sigma[i] * self.first_position_sigma[i]
                 p[9 + i, 9 + i] = self.first_gyro_bias_sigma * self.first_gyro_bias_sigma
                 p[12 + i, 12 + i] = self.first_accelerometer_bias_sigma * self.first_accelerometer_bias_sigma
+                p[15 + i, 15 + i] = self.measured_position_drift[i] * self.measured_position_drift[i]
+            p[18, 18] = self.first_height_bias_sigma * self.first_height_bias_sigma
             if not given > 0.0:
                 tie = eye(N)
                 tie[0:3, 12:15] = skew(dcm[2]) * (up / g)
@@ -531,6 +585,8 @@ class StrapdownEskf:
         self.position = x[7:10]
         self.gyro_bias = x[10:13]
         self.accelerometer_bias = x[13:16]
+        self.position_drift = x[16:19]
+        self.height_bias = x[19]
         self.rate = rate - self.gyro_bias
         self.specific_force = force - self.accelerometer_bias
         self.linear_acceleration = quat_rotate(self.attitude, self.specific_force) - [0.0, 0.0, up * g]
@@ -540,3 +596,5 @@ class StrapdownEskf:
             self.position_sigma[i] = sqrt(p[6 + i, 6 + i])
             self.gyro_bias_sigma[i] = sqrt(p[9 + i, 9 + i])
             self.accelerometer_bias_sigma[i] = sqrt(p[12 + i, 12 + i])
+            self.position_drift_sigma[i] = sqrt(p[15 + i, 15 + i])
+        self.height_bias_sigma = sqrt(p[18, 18])

@@ -38,12 +38,20 @@ FIRST = {
     "first_gyro_bias_sigma": 0.01,
     "first_accelerometer_bias_sigma": 0.1,
 }
+#: Errors of aids that are no white noise.
+SLOW = {
+    "measured_position_drift": [0.4, 0.5, 0.7],
+    "measured_position_drift_time": 0.3,
+    "measured_height_walk": 0.5,
+    "first_height_bias_sigma": 2.0,
+}
+NO_SLOW = {n: np.zeros_like(v) for n, v in SLOW.items()} | {"measured_position_drift_time": 100.0}
 ZERO: dict[str, Any] = {n: 0.0 for n in ("measured_height", "measured_heading", "measured_range", "ground")}
 ZERO |= {n: [0.0] * 3 for n in ("delta_angle", "gyro", "delta_velocity", "acceleration", "ground_normal")}
 ZERO |= {f"measured_{n}": [0.0] * 3 for n in VECTORS} | {f"{n}_fresh": False for n in AIDS}
 ZERO |= {"first_attitude": [0.0] * 4, "first_heading": 0.0, "first_velocity": [0.0] * 3, "first_position": [0.0] * 3}
 #: Of the state, in the order of the errors.
-STATE = ["attitude", "velocity", "position", "gyro_bias", "accelerometer_bias"]
+STATE = ["attitude", "velocity", "position", "gyro_bias", "accelerometer_bias", "position_drift", "height_bias"]
 
 
 @pytest.fixture(scope="module")
@@ -102,12 +110,17 @@ def covariance(f: Any) -> np.ndarray[Any, Any]:
     return np.array(f.native.get_value("block.state.covariance"))
 
 
+def of_motion(p: Any) -> Any:
+    """Without the errors of the aids, which are 0 where nothing is said of them."""
+    return p[:15, :15]
+
+
 class Reference:
     """Sola's filter, sections 5.3 to 6.3: every Jacobian by central differences, gain by the inverse, (I - K H) P."""
 
     def __init__(self, r: Rotation, rest: Any, p: Any, up: float = -1.0, **parameters: Any):
         self.r, self.rest, self.p, self.up = r, np.array(rest, float), np.array(p, float), up
-        self.given = {n: np.array(v, float) for n, v in (NOISE | SIGMAS | parameters).items()}
+        self.given = {n: np.array(v, float) for n, v in (NOISE | SIGMAS | NO_SLOW | parameters).items()}
 
     def added(self, error: Any, to: Any = None) -> tuple[Rotation, Any]:
         r, rest = to or (self.r, self.rest)
@@ -119,11 +132,12 @@ class Reference:
         made[:3] += (r * Rotation.from_rotvec(turn / 2)).apply(dt * (force - rest[9:12]))
         made[2] -= self.up * G * dt
         made[3:6] += dt * (rest[:3] + made[:3]) / 2
+        made[12:15] *= np.exp(-dt / self.given["measured_position_drift_time"])
         return r * Rotation.from_rotvec(turn), made
 
     def jacobian(self, of: Callable[[Any], Any]) -> Any:
         step = 1e-5
-        return np.array([(of(step * e) - of(-step * e)) / (2 * step) for e in np.eye(15)]).T
+        return np.array([(of(step * e) - of(-step * e)) / (2 * step) for e in np.eye(19)]).T
 
     def predict(self, rate: Any, force: Any, dt: float = H) -> None:
         self.rate = np.array(rate, float)
@@ -137,6 +151,9 @@ class Reference:
         density = [self.given[n] for n in ("gyro_noise", "accelerometer_noise")]
         walks = [self.given[n] for n in ("gyro_walk", "accelerometer_walk")]
         q = np.repeat([density[0], density[1], 0.0, walks[0], walks[1]], 3) ** 2 * dt
+        drift = self.given["measured_position_drift"] ** 2
+        keep = np.exp(-2.0 * dt / self.given["measured_position_drift_time"])
+        q = np.concatenate([q, drift * (1.0 - keep), [self.given["measured_height_walk"] ** 2 * dt]])
         self.p = f @ self.p @ f.T + np.diag(q)
         self.r, self.rest = after
 
@@ -145,11 +162,11 @@ class Reference:
         w = self.rate - bg
         arm = {n: self.given.get(n, np.zeros(3)) for n in ARMS}
         if aid == "position":
-            return p + r.apply(arm["antenna_arm"])
+            return p + state[1][12:15] + r.apply(arm["antenna_arm"])
         if aid == "velocity":
             return v + r.apply(np.cross(w, arm["antenna_arm"]))
         if aid == "height":
-            return np.array([self.up * p[2]])
+            return np.array([self.up * p[2] + state[1][15]])
         if aid == "heading":
             x = r.apply([1.0, 0.0, 0.0])
             return np.array([np.arctan2(x[1], x[0])])
@@ -174,19 +191,20 @@ class Reference:
             z = (z + np.pi) % (2 * np.pi) - np.pi
         inverse = np.linalg.inv(h @ self.p @ h.T + np.diag(sigma[used] ** 2))
         k = self.p @ h.T @ inverse
-        self.p = (np.eye(15) - k @ h) @ self.p
+        self.p = (np.eye(19) - k @ h) @ self.p
         self.r, self.rest = self.added(k @ z)
-        g = np.eye(15)
+        g = np.eye(19)
         g[:3, :3] -= np.cross(np.eye(3), 0.5 * (k @ z)[:3])
         self.p = g @ self.p @ g.T
         return float(z @ inverse @ z)
 
 
-def first_covariance(r: Rotation) -> Any:
+def first_covariance(r: Rotation, parameters: Any) -> Any:
     """After a given attitude."""
-    p = np.zeros((15, 15))
+    p = np.zeros((19, 19))
     p[:3, :3] = r.inv().as_matrix() @ np.diag([0.03**2, 0.03**2, 0.1**2]) @ r.as_matrix()
-    p[3:, 3:] = np.diag(np.concatenate([[0.3, 0.4, 0.5, 2.0, 3.0, 4.0], [0.01] * 3, [0.1] * 3])) ** 2
+    slow = [*parameters["measured_position_drift"], parameters["first_height_bias_sigma"]]
+    p[3:, 3:] = np.diag(np.concatenate([[0.3, 0.4, 0.5, 2.0, 3.0, 4.0], [0.01] * 3, [0.1] * 3, slow])) ** 2
     return p
 
 
@@ -202,19 +220,22 @@ def launched(
     f = eskf(block, rate, **SIGMAS | FIRST | more)
     out = feed(f, first_attitude=quaternion(r), **launch)
     assert out["aligned"] and out["health"] == "nominal"
-    rest = np.concatenate([launch["first_velocity"], launch["first_position"], np.zeros(6)])
+    rest = np.concatenate([launch["first_velocity"], launch["first_position"], np.zeros(10)])
     up = -1.0 if more.get("z_down", True) else 1.0
-    return f, Reference(r, rest, first_covariance(r), up, **{n: v for n, v in more.items() if n != "z_down"})
+    return f, Reference(
+        r, rest, first_covariance(r, NO_SLOW | more), up, **{n: v for n, v in more.items() if n != "z_down"}
+    )
 
 
 def compare(f: Any, out: dict[str, Any], reference: Reference, rtol: float = 1e-3, atol: float = 1e-6) -> None:
     assert (rotation(out).inv() * reference.r).magnitude() < atol
-    found = np.concatenate([out[n] for n in STATE[1:]])
+    found = np.hstack([out[n] for n in STATE[1:]])
     np.testing.assert_allclose(found, reference.rest, rtol=1e-6, atol=atol)
-    p, scale = covariance(f), np.sqrt(np.diag(reference.p))
+    p, deviations = covariance(f), np.sqrt(np.diag(reference.p))
+    scale = np.where(deviations > 0.0, deviations, 1.0)
     np.testing.assert_allclose(p / np.outer(scale, scale), reference.p / np.outer(scale, scale), atol=rtol)
-    sigmas = np.concatenate([out[f"{n}_sigma"] for n in STATE])
-    np.testing.assert_allclose(sigmas, scale, rtol=rtol)
+    sigmas = np.hstack([out[f"{n}_sigma"] for n in STATE])
+    np.testing.assert_allclose(sigmas, deviations, rtol=rtol)
 
 
 def motion(i: int) -> tuple[Any, Any]:
@@ -264,7 +285,7 @@ def test_integrals_or_rates(block: Callable[..., Any]) -> None:
 
 
 def test_the_prediction_is_that_of_numeric_jacobians(block: Callable[..., Any]) -> None:
-    f, reference = launched(block)
+    f, reference = launched(block, **SLOW)
     for i in range(40):
         w, a = motion(i)
         out = feed(f, gyro=w, acceleration=a)
@@ -277,7 +298,7 @@ def test_the_prediction_is_that_of_numeric_jacobians(block: Callable[..., Any]) 
 def test_each_aid_is_that_of_numeric_jacobians(block: Callable[..., Any], aid: str, z_down: bool) -> None:
     r = START if z_down else START * Rotation.from_euler("x", -0.5)
     launch = LAUNCH | {"first_position": [5.0, 6.0, -20.0 if z_down else 20.0]}
-    f, reference = launched(block, r, launch, z_down=z_down, **ARMS)
+    f, reference = launched(block, r, launch, z_down=z_down, **ARMS | SLOW)
     rng = np.random.default_rng(AIDS.index(aid))
     for i in range(6):
         w, a = motion(i)
@@ -307,7 +328,7 @@ def test_a_slanted_beam_to_a_slope(block: Callable[..., Any]) -> None:
 
 
 def test_all_aids_in_flight(block: Callable[..., Any]) -> None:
-    f, reference = launched(block, **ARMS)
+    f, reference = launched(block, **ARMS | SLOW)
     rng = np.random.default_rng(9)
     for i in range(60):
         w, a = motion(i)
@@ -388,7 +409,7 @@ def test_tilt_and_accelerometer_bias_are_correlated(block: Callable[..., Any], z
     slope = np.array([(q.inv() * found[0]).as_rotvec() / 1e-4 for q in found[1:]]).T
     vertical = np.outer(*[r.inv().apply([0.0, 0.0, 1.0])] * 2)  # of the turn about it, heading makes the rest
     level = np.eye(3) - vertical
-    np.testing.assert_allclose(level @ p[:3, 12:] / 0.1**2, level @ slope, atol=1e-5)
+    np.testing.assert_allclose(level @ p[:3, 12:15] / 0.1**2, level @ slope, atol=1e-5)
 
 
 def test_it_waits_for_rest_and_for_a_heading(block: Callable[..., Any]) -> None:
@@ -419,7 +440,7 @@ def test_a_given_attitude_leaves_the_biases(block: Callable[..., Any]) -> None:
     out = feed(f, first_attitude=2.0 * quaternion(START), gyro=[5.0, 0.0, 0.0])
     assert out["aligned"] and (rotation(out).inv() * START).magnitude() < 1e-12
     assert out["gyro_bias"].tolist() == [0.02, 0.0, 0.0]
-    np.testing.assert_allclose(covariance(f), first_covariance(START), atol=1e-14)
+    np.testing.assert_allclose(covariance(f), first_covariance(START, NO_SLOW), atol=1e-14)
 
 
 def test_a_break_aligns_anew(block: Callable[..., Any]) -> None:
@@ -449,21 +470,28 @@ def test_what_is_not_finite_does_not_align(block: Callable[..., Any], name: str)
 # ---- consistency in simulated flight
 
 
+def root(p: Any) -> Any:
+    """R with R R^T = p, of a p that may be singular."""
+    values, vectors = np.linalg.eigh(p)
+    return vectors * np.sqrt(np.maximum(values, 0.0))
+
+
 class Flight:
     """A vehicle whose IMU and aids are what the filter takes them to be; on the compiled twin alone."""
 
     def __init__(self, f: Any, rng: np.random.Generator, **parameters: Any):
         self.f, self.rng = f, rng
         self.noise = 1.0  # of what the filter is told
-        self.model = Reference(Rotation.identity(), np.zeros(12), np.eye(15), **parameters)
+        self.model = Reference(Rotation.identity(), np.zeros(16), np.eye(19), **parameters)
         self.squares: dict[str, list[float]] = {n: [] for n in AIDS}
 
     def begin(self) -> None:
         """The truth, and an estimate that differs from it as the first covariance says."""
         self.f.rest()
         q = Rotation.from_euler("ZYX", self.rng.uniform([-3.0, -0.3, -0.3], [3.0, 0.3, 0.3]))
-        self.rest = np.concatenate([self.rng.normal(size=3), self.rng.normal(size=3) * 10.0, np.zeros(6)])
-        error = np.linalg.cholesky(first_covariance(q)) @ self.rng.normal(size=15)
+        self.rest = np.concatenate([self.rng.normal(size=3), self.rng.normal(size=3) * 10.0, np.zeros(10)])
+        self.rest[15] = self.f.native.get_value("block.outputs.height_bias")  # stays over a break
+        error = root(first_covariance(q, self.model.given)) @ self.rng.normal(size=19)
         self.set("first_attitude", quaternion(q))
         self.set("first_velocity", self.rest[:3])
         self.set("first_position", self.rest[3:6])
@@ -478,13 +506,17 @@ class Flight:
     def step(self, i: int, aids: list[str]) -> None:
         """The integrals are what the truth does in a period; the reference's equations, which SciPy's solver confirms."""
         w, a = motion(i)
-        r, bg, ba = self.r, self.rest[6:9], self.rest[9:]
+        r, bg, ba = self.r, self.rest[6:9], self.rest[9:12]
         density = np.array([self.model.given[n] for n in NOISE])[:, None]
         noise = self.noise * density * self.rng.normal(size=(4, 3)) * np.sqrt(H)
         self.set("delta_angle", H * (w + bg) + noise[0])
         self.set("delta_velocity", H * (a + ba) + noise[1])
         self.r, self.rest = self.model.moved((r, self.rest), w + bg, a + ba, H)
-        self.rest[6:] += noise[2:].ravel()
+        self.rest[6:12] += noise[2:].ravel()
+        given = self.model.given
+        left = np.sqrt(1.0 - np.exp(-2.0 * H / given["measured_position_drift_time"]))
+        self.rest[12:15] += left * given["measured_position_drift"] * self.rng.normal(size=3)
+        self.rest[15] += given["measured_height_walk"] * np.sqrt(H) * self.rng.normal()
         self.model.rate = w + self.rest[6:9]
         for aid in AIDS:
             self.set(f"{aid}_fresh", aid in aids)
@@ -500,7 +532,7 @@ class Flight:
     def error(self) -> Any:
         """Truth less estimate, in the filter's order."""
         out = {n: np.array(self.f.native.get_value(f"block.outputs.{n}")) for n in STATE}
-        rest = self.rest - np.concatenate([out[n] for n in STATE[1:]])
+        rest = self.rest - np.hstack([out[n] for n in STATE[1:]])
         return np.concatenate([(rotation(out).inv() * self.r).as_rotvec(), rest])
 
     def nees(self) -> float:
@@ -520,14 +552,14 @@ def due(i: int) -> list[str]:
 
 def test_the_estimate_is_consistent(block: Callable[..., Any]) -> None:
     """Over flights, the squares of the errors and of the innovations are those of chi squared, within 1 in 10^4."""
-    sky = flight(block, 3)
+    sky = flight(block, 3, **SLOW)
     flights, found = 20, []
     for _ in range(flights):
         sky.begin()
         for i in range(400):
             sky.step(i, due(i))
         found.append(sky.nees())
-    low, high = chi2.ppf([5e-5, 1.0 - 5e-5], 15 * flights)
+    low, high = chi2.ppf([5e-5, 1.0 - 5e-5], 19 * flights)
     assert low < sum(found) < high, sum(found) / flights
     for aid, squares in sky.squares.items():
         n = len(squares) * (3 if aid in VECTORS else 1)
@@ -555,7 +587,7 @@ def test_an_aid_alone(block: Callable[..., Any], aid: str) -> None:
     for i in range(600):
         sky.step(i, [aid] if i % 5 == 0 else [])
     p, e = covariance(sky.f), sky.error()
-    assert e @ np.linalg.solve(p, e) < chi2.ppf(1.0 - 1e-4, 15)
+    assert e[:15] @ np.linalg.solve(p[:15, :15], e[:15]) < chi2.ppf(1.0 - 1e-4, 15)
     after = np.sqrt(np.diag(p))
     model = Reference(*sky.model.added(-e, (sky.r, sky.rest)), p, **ARMS)
     model.rate = sky.model.rate
@@ -563,9 +595,49 @@ def test_an_aid_alone(block: Callable[..., Any], aid: str) -> None:
     sigma = model.sigma(aid, model.expected(aid, (model.r, model.rest)))
     assert (np.sqrt(np.diag(h @ p @ h.T)) < 0.8 * sigma).all()
     if aid in ("position", "velocity", "body_velocity"):
-        assert (after[9:11] < 0.8 * first[9:11]).all() and (after[12:] < first[12:]).all()
+        assert (after[9:11] < 0.8 * first[9:11]).all() and (after[12:15] < first[12:15]).all()
     if aid in ("velocity", "heading", "body_velocity"):
         assert (after[6:8] > first[6:8]).all()  # nothing measures where it is
+
+
+def test_a_drift_that_is_taken_for_white_noise_would_be_found(block: Callable[..., Any]) -> None:
+    """What the states of the aids are for: a filter that has none claims too much."""
+    truth = {"measured_position_drift": [2.0] * 3, "measured_position_drift_time": 50.0}
+    told = {True: truth, False: {"measured_position_sigma": np.hypot(SIGMAS["measured_position_sigma"], 2.0)}}
+    errors = {}
+    for knows, parameters in told.items():
+        f = eskf(block, **SIGMAS | FIRST | parameters)
+        sky = Flight(f, np.random.default_rng(11), **truth)
+        errors[knows] = 0.0
+        for _ in range(6):
+            sky.begin()
+            for i in range(600):
+                sky.step(i, ["position"] if i % 5 == 0 else [])
+            errors[knows] += np.square(sky.error()[6:9] / np.sqrt(np.diag(covariance(f))[6:9])).sum()
+    assert errors[True] < chi2.ppf(0.999, 18) < errors[False] / 2, errors
+
+
+def test_a_barometer_with_an_offset(block: Callable[..., Any]) -> None:
+    """The bias takes up the offset when the position knows the height; then the barometer carries the height alone."""
+    f, _ = launched(block, LEVEL, DOWN, measured_height_walk=0.01, first_height_bias_sigma=500.0)
+    for i in range(400):
+        aids = seen(height=20.0 + 300.0) | (seen(position=DOWN["first_position"]) if i % 10 == 0 else {})
+        out = feed(f, **HOVER, **aids)
+    assert out["height_bias"] == pytest.approx(300.0, abs=0.2) and out["height_bias_sigma"] < 0.3
+    assert out["position"][2] == pytest.approx(-20.0, abs=0.1) and not out["rejections"].any()
+    alone = native(f, **HOVER, **seen(height=320.0))
+    for _ in range(1000):
+        alone = native(f, **HOVER, **seen(height=320.0))
+    assert alone["position"][2] == pytest.approx(-20.0, abs=0.5) and alone["position_sigma"][2] < 0.6
+
+
+def test_ages_of_the_aids(block: Callable[..., Any]) -> None:
+    """Since a sample was taken: rejected ones and those that are not finite do not count."""
+    f, _ = launched(block, LEVEL, DOWN)
+    odd = {n: NAN * np.array(v) for n, v in FITS.items()}
+    for sample, age in ((FITS, 0.0), ({}, H), (FAR, 2 * H), (odd, 3 * H), (FITS, 0.0)):
+        out = feed(f, **HOVER, **seen(**sample))
+        np.testing.assert_allclose(out["aid_age"], age, atol=1e-12)
 
 
 # ---- gates
@@ -605,7 +677,7 @@ def test_an_outlier_is_rejected_and_what_remains_is_taken(block: Callable[..., A
         out, wanted = feed(f, **HOVER, **seen(**{aid: FAR[aid]})), feed(twin, **HOVER)
         assert out["rejected"].tolist() == [i == n for i in range(6)] and out["rejections"][n] == k + 1
         assert out["innovation_squared"][n] > 21.2 and np.abs(out[f"{aid}_innovation"]).max() > 1.0
-        assert all((out[s] == wanted[s]).all() for s in STATE) and (covariance(f) == covariance(twin)).all()
+        assert all(np.array_equal(out[s], wanted[s]) for s in STATE) and (covariance(f) == covariance(twin)).all()
     back = feed(f, **HOVER, **seen(**{aid: FITS[aid]}))
     assert not back["rejected"].any() and back["rejections"][n] == 4 and not back["resets"].any()
     for _ in range(11):  # the time begins anew with the next rejection
@@ -614,7 +686,7 @@ def test_an_outlier_is_rejected_and_what_remains_is_taken(block: Callable[..., A
     assert out["resets"][n] == 1 and out["rejections"][n] == 14 and not out["rejected"].any()
     np.testing.assert_allclose(SET[aid](out), FAR[aid], atol=1e-6)
     np.testing.assert_allclose(tilt, [0.0, 0.0, 1.0], atol=1e-4)
-    assert (np.linalg.eigvalsh(covariance(f)) > 0.0).all()
+    assert (np.linalg.eigvalsh(of_motion(covariance(f))) > 0.0).all()
     out = feed(f, **HOVER, **seen(**{aid: FAR[aid]}))
     assert not out["rejected"].any() and out["resets"][n] == 1
 
@@ -655,7 +727,7 @@ def test_a_reset_to_a_slope_moves_along_its_normal(block: Callable[..., Any]) ->
     step = out["position"] - DOWN["first_position"]
     np.testing.assert_allclose(step, normal * (step @ normal), atol=1e-9)
     reference.predict([0.0] * 3, HOVER["acceleration"])
-    state = Rotation.identity(), np.concatenate([np.zeros(3), out["position"], np.zeros(6)])
+    state = Rotation.identity(), np.concatenate([np.zeros(3), out["position"], np.zeros(10)])
     np.testing.assert_allclose(reference.expected("range", state, ground=2.0, normal=normal), 80.0)
 
 
@@ -686,7 +758,7 @@ def native(f: Any, **inputs: Any) -> dict[str, Any]:
     for n, v in inputs.items():
         f.native.set(f"block.inputs.{n}", plain(v))
     f.native.tick(f.ticks)
-    names = [*STATE, "rejected", "resets"]
+    names = [*STATE, "position_sigma", "rejected", "resets"]
     return {n: np.array(f.native.get_value(f"block.outputs.{n}")) for n in names}
 
 
@@ -708,7 +780,7 @@ def test_it_comes_back_from_a_spike(block: Callable[..., Any], aids: list[str], 
     assert out["resets"].any() and not out["rejected"].any()
     assert np.linalg.norm(out["velocity"]) < 0.3 and rotation(out).apply([0.0, 0.0, 1.0])[2] > np.cos(0.1)
     assert "position" not in aids or np.linalg.norm(out["position"] - FITS["position"]) < 0.5
-    p = covariance(f)
+    p = of_motion(covariance(f))
     assert (p == p.T).all() and (np.linalg.eigvalsh(p) > 0.0).all()
 
 
@@ -776,7 +848,9 @@ def test_an_imu_sample_that_is_not_finite_is_passed_over(block: Callable[..., An
     reference.predict(w, a)
     for _ in range(2):
         bad = feed(f, **{"gyro": w, "acceleration": a, name: [0.0, value, 0.0]}, **seen(height=20.0))
-        assert bad["health"] == "degraded" and all(np.array_equal(bad[n], before[n]) for n in bad if n != "health")
+        assert bad["health"] == "degraded" and all(
+            np.array_equal(bad[n], before[n]) for n in bad if n not in ("health", "aid_age")
+        )
     out = feed(f, gyro=w, acceleration=a)
     reference.predict(w, a, 3 * H)
     assert out["health"] == "nominal"
@@ -804,7 +878,7 @@ def test_the_periods(block: Callable[..., Any]) -> None:
             f.native.set("block.inputs.acceleration", [0.5, 0.0, -G])
             f.native.set("block.inputs.gyro", [0.1, 0.2, 0.3])
             f.native.tick(f.ticks)
-        found.append(covariance(f))
+        found.append(of_motion(covariance(f)))
     scale = np.sqrt(np.diag(found[0]))
     np.testing.assert_allclose(found[0] / np.outer(scale, scale), found[1] / np.outer(scale, scale), atol=2e-3)
 
@@ -826,7 +900,7 @@ def test_the_covariance_stays_positive_definite(block: Callable[..., Any]) -> No
         f.native.set(f"block.inputs.{n}", v)
     for _ in range(5):
         f.native.tick(f.ticks * 20_000)
-        p = covariance(f)
+        p = of_motion(covariance(f))
         scale = np.sqrt(np.diag(p))
         assert (p == p.T).all() and (np.linalg.eigvalsh(p / np.outer(scale, scale)) > 0.0).all()
     assert not any(f.native.get_value("block.outputs.rejected"))

@@ -229,7 +229,7 @@ def test_examples_run_the_same(pair_of: Callable[[Path], Pair], name: str) -> No
 
 
 def test_a_filter_of_many_states_runs_the_same(pair_of: Callable[[Path], Pair]) -> None:
-    """The quadrotor's, with 18 states: products that are too large for functions without loops."""
+    """The quadrotor's, with 19 states: products that are too large for functions without loops."""
     pair, rng = pair_of(ROOT / "examples/quadrotor/fc/quadrotor.json"), random.Random(3)
     inputs = [f for f in pair.compiled.fields() if f.writable and f.role == "output" and f.type == "f64"]
     for k in range(40):

@@ -12,8 +12,6 @@ from fcsl_builtins import (
     max,
     min,
     norm,
-    quat_conj,
-    quat_mul,
     quat_rotate,
     tan,
     zeros,
@@ -137,21 +135,6 @@ class Position:
         self.thrust = self.mass * self.gravity * self.thrust_share
 
 
-class Attitude:
-    """Attitude control on the quaternion error: rate = 2 k vec(q* (x) q_command), on the short way around."""
-
-    inputs = {"attitude": "f64[4]", "command": "f64[4]"}
-    outputs = {"rate_command": "f64[3] rad/s", "error": "f64[3] rad"}
-    parameters = {"k": "f64[3] 1/s", "limit": "f64[3] rad/s"}
-
-    def execute(self):
-        q = quat_mul(quat_conj(self.attitude), self.command)
-        side = 2.0 if q[0] >= 0.0 else -2.0
-        for i in range(3):
-            self.error[i] = side * q[1 + i]
-            self.rate_command[i] = clamp(self.k[i] * self.error[i], -self.limit[i], self.limit[i])
-
-
 class Rate:
     """Rate control with the lag of the motors in mind: poles placed by feedback of rate and of the modelled torque.
 
@@ -164,7 +147,8 @@ class Rate:
     """
 
     inputs = {
-        "rate": "f64[3] rad/s",
+        "gyro": "f64[3] rad/s",  # at the tick: the filter's rate is the mean of the period before, and later
+        "gyro_bias": "f64[3] rad/s",
         "rate_command": "f64[3] rad/s",
         "given": "f64[3] N*m",  # by the mixer, in the tick before
         "limited": "bool",
@@ -187,13 +171,14 @@ class Rate:
         if self.resumed:
             self.integral = zeros(3)
             self.modelled = zeros(3)
+        rate = self.gyro - self.gyro_bias
         self.modelled = self.modelled + (self.given - self.modelled) * (1.0 - exp(-self.dt / self.lag))
         momentum = zeros(3)
         for i in range(3):
-            momentum[i] = self.inertia[i] * self.rate[i]
-        gyroscopic = cross3(self.rate, momentum)
+            momentum[i] = self.inertia[i] * rate[i]
+        gyroscopic = cross3(rate, momentum)
         for i in range(3):
-            error = self.rate_command[i] - self.rate[i]
+            error = self.rate_command[i] - rate[i]
             if self.flying and not self.limited:
                 grown = self.integral[i] + self.ki[i] * error * self.dt
                 self.integral[i] = clamp(grown, -self.integral_limit, self.integral_limit)

@@ -1,8 +1,8 @@
-"""The attitude that points the thrust, and the heading."""
+"""The attitude that points the thrust."""
 
 from __future__ import annotations
 
-from fcsl_builtins import atan2, cos, cross3, dot, f64, quat_mul, quat_normalize, sin
+from fcsl_builtins import cos, cross3, dot, f64, quat_mul, quat_normalize, sin
 
 DOWN = [0.0, 0.0, 1.0]
 
@@ -15,8 +15,3 @@ def pointed(down_body: f64[3], yaw: f64) -> f64[4]:
     axis = cross3(DOWN, down_body)
     tilt = quat_normalize([1.0 + dot(DOWN, down_body), axis[0], axis[1], axis[2]])
     return quat_mul(tilt, [cos(0.5 * yaw), 0.0, 0.0, sin(0.5 * yaw)])
-
-
-def heading(v: f64[3]) -> f64:
-    """The direction of a vector (NED), rad from north to east."""
-    return atan2(v[1], v[0])

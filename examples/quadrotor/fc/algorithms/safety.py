@@ -1,6 +1,11 @@
 """What watches the sensors, and what ends a descent without them."""
 
-from fcsl_builtins import abs
+from fcsl_builtins import abs, max
+
+POSITION = 0  # aids of the filter
+VELOCITY = 1
+HEIGHT = 2
+HEADING = 3
 
 
 class Monitor:
@@ -11,26 +16,34 @@ class Monitor:
     | IMU, GNSS | failed: SAFE |
     | barometer, magnetometer, radio link, battery voltage | degraded: LAND |
 
-    A sensor is lost when nothing of it was used: it is silent, or the filter refuses it.
+    A sensor is lost when nothing of it was used: it is silent, or the filter refuses it. The filter is ready when it has run
+    for `settle_s` with all of them.
     """
 
     inputs = {
         "imu_valid": "bool",
-        "gnss_age": "f64 s",
-        "barometer_age": "f64 s",
-        "magnetometer_age": "f64 s",
+        "aligned": "bool",  # the filter runs
+        "aid_age": "f64[6] s",  # since a sample of the aid was taken
         "order_valid": "bool",
         "voltage": "f64 V",
         "dt": "f64 s",
     }
-    outputs = {"transition_request": "TransitionRequest"}
-    parameters = {"patience": "f64 s", "low_voltage": "f64 V", "low_s": "f64 s"}
-    state = {"low": "f64 s"}
+    outputs = {
+        "ready": "bool",  # the filter is fit to fly
+        "barometer_age": "f64 s",
+        "transition_request": "TransitionRequest",
+    }
+    parameters = {"settle_s": "f64 s", "patience": "f64 s", "low_voltage": "f64 V", "low_s": "f64 s"}
+    state = {"low": "f64 s", "settled": "f64 s"}
 
     def execute(self):
         self.low = self.low + self.dt if self.voltage < self.low_voltage else 0.0
-        old = self.barometer_age > self.patience or self.magnetometer_age > self.patience
-        if not self.imu_valid or self.gnss_age > self.patience:
+        self.barometer_age = self.aid_age[HEIGHT]
+        lost = max(self.aid_age[POSITION], self.aid_age[VELOCITY]) > self.patience
+        old = self.barometer_age > self.patience or self.aid_age[HEADING] > self.patience
+        self.settled = self.settled + self.dt if self.aligned and not (lost or old) else 0.0
+        self.ready = self.settled > self.settle_s
+        if not self.imu_valid or lost:
             self.health = "failed"
         elif old or not self.order_valid or self.low > self.low_s:
             self.health = "degraded"
