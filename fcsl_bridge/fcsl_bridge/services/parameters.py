@@ -10,7 +10,6 @@ separately. `get` returns the value in effect: an f32 after rounding, and after 
 
 from __future__ import annotations
 
-import difflib
 import math
 import struct
 from collections.abc import Mapping, Sequence
@@ -22,7 +21,7 @@ from rclpy.parameter import Parameter
 
 from simclient.c_machine import TYPE_FORMATS
 from simclient.descriptor import Field, Machine
-from simclient.errors import TwinError
+from simclient.errors import TwinError, did_you_mean
 from simclient.run import Run
 from simclient.values import INTEGER_RANGES, encode, enumerators, request_as_read, scalar_reader
 
@@ -100,9 +99,8 @@ class MachineParameters:
 
     def _hint(self, name: str) -> str:
         machine = self._run.machine
-        close = difflib.get_close_matches(name, self._fields, n=1, cutoff=0.5)
-        if close:
-            return f"; did you mean `{close[0]}`?"
+        if close := did_you_mean(name, self._fields):
+            return close
         instances = sorted({field.instance for field in self._fields.values()})
         return f": machine `{machine.name}` has parameters of {', '.join(instances) or 'no instance'}"
 

@@ -96,8 +96,21 @@ static void test_order(void)
     fcsl_catalog_free(&catalog);
 }
 
+/* A path that lacks names at a dot, as that of a part's port does, means the first field that has more there. */
+static void test_nearest(void)
+{
+    open_regular();
+    CHECK(strcmp(fcsl_catalog_nearest(&catalog, "a.x"), "a.t[0].u[0].x") == 0);
+    CHECK(strcmp(fcsl_catalog_nearest(&catalog, "a.t[1].x"), "a.t[1].u[0].x") == 0);
+    CHECK(strcmp(fcsl_catalog_nearest(&catalog, "a.t[2].u[1].y"), "a.t[2].u[1].x") == 0);
+    CHECK(strcmp(fcsl_catalog_nearest(&catalog, "zzzz"), "") == 0 &&
+          strcmp(fcsl_catalog_nearest(&catalog, "."), "") == 0);
+    fcsl_catalog_free(&catalog);
+}
+
 int main(void)
 {
+    test_nearest();
     test_regular();
     test_irregular();
     test_order();

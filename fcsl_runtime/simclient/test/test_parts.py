@@ -14,6 +14,7 @@ from rosbags.highlevel import AnyReader
 
 from simclient import AlgTwin, OverwrittenWarning, PyTwin, TwinError
 from simclient.bag import Bag, columns
+from simclient.errors import did_you_mean
 from simclient.live.channels import channels_of
 from simclient.machine_build import build_config
 from simclient.paths import split_path
@@ -110,6 +111,20 @@ def test_a_twin_names_instances_of_parts(twin: AlgTwin) -> None:
         twin.fault("att.rote")
     with pytest.raises(TwinError, match="`att.rate` is not a field but a group of fields: att.rate.inputs.target, "):
         twin.get_value("att.rate")
+
+
+def test_a_port_of_a_part_is_no_field(twin: AlgTwin) -> None:
+    with pytest.raises(TwinError, match=r"`att.outputs.torque`: .* did you mean `att.rate.outputs.torque`"):
+        twin.get_value("att.outputs.torque")
+    known = ["ate.outputs.u", "att.rate.inner.outputs.u"]
+    assert did_you_mean("att.outputs.u", known) == "; did you mean `att.rate.inner.outputs.u`?"
+
+
+def test_a_part_is_no_instance(twin: AlgTwin, config: Path) -> None:
+    with pytest.raises(TwinError, match="`att` is a part, not an instance; its instances: att.law, att.rate"):
+        twin.fault("att")
+    with pytest.raises(TwinError, match=r"`att` is a part, not an instance(.|\n)*instances: att.law, att.rate"):
+        AlgTwin.from_instances(config, ["att"])
 
 
 def test_one_instance_of_a_part_alone(config: Path) -> None:

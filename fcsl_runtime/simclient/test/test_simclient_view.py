@@ -205,7 +205,8 @@ def test_each_path_is_a_panel(bags: Path) -> None:
         ("coarse.outputs.noise[9]", r"has the elements \[0\] to \[8\]"),
         ("coarse.outputs.noise[0][1]", "a bag holds arrays flat"),
         ("guide.outputs.height[0]", "is no array"),
-        ("x*", "nothing of this path is recorded"),
+        ("x*", r"nothing of this path is recorded; `fcsl bag info`"),
+        ("fine.height", r"is recorded; did you mean fine.(\S+, ){2}\S+\? `fcsl bag info` lists the topics"),
         ("", "an empty path"),
     ],
 )

@@ -210,8 +210,29 @@ static const char *if_like(const nearest_t *nearest, const char *name)
     return 4u * nearest->edits <= 3u * longest ? nearest->name : "";
 }
 
+/* Whether a path is `path` with more names at one of its dots: "att.rate.outputs.u", the field, where "att.outputs.u" is a port
+ * of part "att". */
+static bool is_longer(const char *longer, const char *path)
+{
+    const size_t length = strlen(path);
+    const size_t longer_length = strlen(longer);
+    for (const char *dot = strchr(path, '.'); dot != NULL && longer_length > length; dot = strchr(dot + 1, '.')) {
+        const size_t head = (size_t)(dot - path) + 1;
+        const size_t tail = length - head + 1;
+        if (strncmp(longer, path, head) == 0 && strcmp(longer + longer_length - tail, dot) == 0) {
+            return true;
+        }
+    }
+    return false;
+}
+
 const char *fcsl_catalog_nearest(const catalog_t *catalog, const char *path)
 {
+    for (uint32_t i = 0; i < catalog->count; i++) {
+        if (is_longer(catalog->entries[i].path, path)) {
+            return catalog->entries[i].path;
+        }
+    }
     nearest_t nearest = {.name = "", .edits = PATH_BYTES_MAX};
     for (uint32_t i = 0; i < catalog->count; i++) {
         consider(&nearest, catalog->entries[i].path, path);

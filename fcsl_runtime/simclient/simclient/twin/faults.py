@@ -55,6 +55,9 @@ class TwinFaults(TwinHost):
     def _instance_number(self, instance: str) -> int:
         names = [i.name for i in self.machine.instances]
         if instance not in names:
+            own = [name for name in names if name.startswith(f"{instance}.")]
+            if own:
+                raise TwinError(f"`{instance}` is a part, not an instance; its instances: {', '.join(own)}")
             hint = did_you_mean(str(instance), names)
             raise TwinError(f"`{instance}` is not an instance{hint}; instances: {', '.join(names)}")
         return names.index(instance)

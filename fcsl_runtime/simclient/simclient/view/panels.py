@@ -12,7 +12,7 @@ from collections.abc import Collection, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from itertools import islice
 
-from ..errors import ViewError
+from ..errors import ViewError, longer_paths
 from .rotation import ANGLES
 from .signals import GATE, STATUS_FIELDS, Catalogue, Signals, Value, whole
 from .styles import AFTER_GATE
@@ -171,11 +171,13 @@ def demand(path: str, catalogue: Catalogue) -> list[Value]:
         raise ViewError(f"`{path}`: {whole.path} has the elements [0] to [{whole.lines - 1}]; a bag holds arrays flat")
     if whole is not None:
         raise ViewError(f"`{path}`: {whole.path} is no array")
-    near = difflib.get_close_matches(path, list(catalogue.values), n=_NEAR_MATCHES, cutoff=0.5)
+    near = longer_paths(path, catalogue.values)
+    near += difflib.get_close_matches(path, list(catalogue.values), n=_NEAR_MATCHES, cutoff=0.5)
     last = path.rpartition(".")[2]
-    near += [known for known in catalogue.values if known.rpartition(".")[2] == last and known not in near]
-    hint = f"; did you mean {', '.join(near[:_NEAR_MATCHES])}?" if near else ""
-    raise ViewError(f"`{path}`: nothing of this path is recorded;{hint} `fcsl bag info` lists the topics")
+    near += [known for known in catalogue.values if known.rpartition(".")[2] == last]
+    names = list(dict.fromkeys(near))[:_NEAR_MATCHES]
+    hint = f"did you mean {', '.join(names)}? " if names else ""
+    raise ViewError(f"`{path}`: nothing of this path is recorded; {hint}`fcsl bag info` lists the topics")
 
 
 def choose_default(catalogue: Catalogue, commands: Collection[str] = (), constants: Collection[str] = ()) -> Choice:
