@@ -256,7 +256,8 @@ def test_a_table_does_not_make_an_algorithm_fault(tmp_path: Path) -> None:
         ("self.ok = 0.0 < self.v < 1.0", "E413", "a chain of comparisons on arrays"),
         ("self.ok = self.v < 1.0", "E402", "`self.ok` is bool, not bool[2]"),
         ("self.y = where(self.v, 1.0, 2.0)", "E415", "no `where` between f64[2] and f64 and f64"),
-        ("self.y = interp(self.y, [1.0], [2.0])", "E412", ""),
+        ("self.y = interp(self.y, [1.0], [2.0])", "E418", "`interp`: xs has one breakpoint, and a table two or more"),
+        ("self.y = extrapolate2(1.0, 2.0, self.v, [2.0], [[1.0], [2.0]])", "E418", "`extrapolate2`: ys has one"),
     ],
 )
 def test_wrong(tmp_path: Path, line: str, code: str, message: str) -> None:

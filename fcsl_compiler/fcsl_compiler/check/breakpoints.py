@@ -11,7 +11,7 @@ from ..model.machine import Instance, Values
 from ..model.program import Program
 
 #: Arguments that are breakpoints, by function of library/tables.py.
-_BREAKPOINTS = {
+BREAKPOINTS = {
     "interp_cell": (1,),
     "interp": (1,),
     "extrapolate": (1,),
@@ -39,7 +39,7 @@ def _check(function: ir.Function, instance: Instance | None, program: Program, s
         callee = program.functions.get(call.function) or program.helpers.get(call.function)
         if callee is None or callee.span.source.name != _LIBRARY:
             continue
-        for position in _BREAKPOINTS.get(callee.source_name, ()):
+        for position in BREAKPOINTS.get(callee.source_name, ()):
             argument = call.args[position]
             values = _values(argument, instance, program)
             at = next((n for n, (a, b) in enumerate(zip(values, values[1:], strict=False)) if not a < b), None)  # type: ignore[operator]

@@ -15,9 +15,10 @@ from ..base.diagnostics import DiagnosticSink, Note
 from ..base.source import SourceFile, Span
 from ..model import ir, ops
 from ..model.program import Program
-from ..model.types import ELEMENTS, F64, SCALARS, Scalar, Struct, Type, TypeNames, element_of, shape_of
+from ..model.types import ELEMENTS, F64, SCALARS, Scalar, Struct, Type, TypeNames, count_of, element_of, shape_of
 from ..parse.python_source import span_of
 from .annotations import SIZE, annotation_text, annotation_type, result_type, sizes_in
+from .breakpoints import BREAKPOINTS
 from .call_order import CallGraph, call_graph, call_order
 from .collect import collect
 from .declarations import Declarations
@@ -215,6 +216,8 @@ class FunctionTable:
             if problem:
                 self.sink.error("E418", f"`{name}`: {problem}", argument.span, help=shown)
                 return None
+        if not self._has_cells(name, node, arguments):
+            return None
         other = [str(binding.element)] if binding.element not in (None, F64) else []
         unique = "_".join([LIBRARY_PREFIX, node.name, *other, *map(str, binding.sizes.values())])
         function = self.program.functions.get(unique) or self._sized(name, node, unique, binding, span)
@@ -223,6 +226,18 @@ class FunctionTable:
         self.program.functions[unique] = function
         assert function.result
         return Signature(unique, tuple(t for _, t in function.arguments), function.result, function.faults)
+
+    def _has_cells(self, name: str, node: ast.FunctionDef, arguments: list[ir.Expr]) -> bool:
+        """Whether each axis of a table has two breakpoints. Only a search among them does with less."""
+        for position in BREAKPOINTS.get(node.name, ()) if node.name != "interp_cell" else ():
+            argument = arguments[position]
+            if count_of(argument.type) < 2:
+                parameter = node.args.args[position].arg
+                message = f"`{name}`: {parameter} has one breakpoint, and a table two or more"
+                fix = "add a breakpoint, or use the only value as a constant"
+                self.sink.error("E418", message, argument.span, help=fix)
+                return False
+        return True
 
     def _sized(
         self, name: str, node: ast.FunctionDef, unique: str, binding: _Binding, span: Span
