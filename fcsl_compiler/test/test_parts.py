@@ -814,6 +814,15 @@ def test_requests_that_no_list_has_show_where_parts_get_them(tmp_path: Path) -> 
     ]
 
 
+def test_an_old_value_of_a_part_is_shown_where_the_state_is(tmp_path: Path) -> None:
+    def change(craft: Any, attitude: Any, rate: Any) -> None:
+        attitude["ports"]["outputs"]["wish"] = "law.transition_request"
+        craft["connections"][5]["from"] = "spare.wish"
+
+    (warning,) = [d for d in diagnose(tmp_path, change) if d.code == "W206"]
+    assert warning.span.text == '"HOLD"' and warning.help.startswith("schedule `spare` here, or ")
+
+
 @pytest.mark.parametrize(
     ("change", "code", "message"),
     [

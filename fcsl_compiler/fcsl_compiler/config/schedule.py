@@ -9,6 +9,7 @@ from dataclasses import replace
 
 from ..base.diagnostics import DiagnosticSink
 from ..model.machine import Connection, Machine, State, seconds
+from ..parse.json_reader import local_names
 from .arming import warn_old_arm
 from .channels import assigned_outputs
 from .dead_transitions import warn_dead_transitions
@@ -177,12 +178,14 @@ def _warn_old_values(machine: Machine, sink: DiagnosticSink) -> None:
         for state, here in zip(machine.states, entries, strict=True):
             if target in here and source not in here:
                 reads_health.add((source, target))
+                at = here[target].span if not here[target].span.source.part else state.span
+                (scheduled,) = local_names([writer.name], at)
                 sink.warning(
                     "W206",
                     f"in state `{state.name}`, `{reader.name}` reads `{writer.name}`, which does not run there",
-                    here[target].span,
+                    at,
                     why="the outputs keep old values",
-                    help=f"schedule `{writer.name}` here, or connect `{writer.name}.health`: it is then stale",
+                    help=f"schedule `{scheduled}` here, or connect `{writer.name}.health`: it is then stale",
                     notes=[(c.span, "it reads this")],
                 )
                 break
