@@ -33,7 +33,7 @@ def test_without_gnss_it_lands_upright_where_it_is(descending: SimTwin, kind: in
 
 
 def test_safe_comes_when_the_last_fix_is_too_old(descending: SimTwin) -> None:
-    descending.run_until("navigation.outputs.gnss_age == 0.0", timeout_ticks=30)
+    descending.run_until("estimate.outputs.gnss_age == 0.0", timeout_ticks=30)
     descending.set("receiver.parameters.fault", SILENT)
     taken = descending.run_until("machine.state == 'SAFE'", timeout_ticks=2 * TICK_HZ)
     assert taken / TICK_HZ == pytest.approx(parameters("monitor")["gnss_patience"], abs=0.03)
@@ -77,7 +77,7 @@ def test_without_imu_the_engine_stops(descending: SimTwin, kind: int, ticks: int
 def test_nothing_starts_before_the_filter_is_ready(standing: SimTwin) -> None:
     standing.set("receiver.parameters.fault", SILENT)
     standing.tick(9 * TICK_HZ)
-    assert standing.state() == "STANDBY" and not standing.get("navigation.outputs.ready")
+    assert standing.state() == "STANDBY" and not standing.get("estimate.outputs.ready")
     assert standing.get("actuators.outputs.throttle") == 0.0
 
 

@@ -27,7 +27,7 @@ class DelayCompensation:
     inputs = {
         "measured": "f64[n]",  # as it comes
         "measured_fresh": "bool",  # measured is a new sample
-        "rate": "f64[n] 1/s",  # derivative of what is measured, now
+        "rate": "f64[n]",  # derivative of what is measured, now
         "period": "f64 s",  # machine.period
         "resumed": "bool",  # machine.resumed
     }
@@ -40,7 +40,7 @@ class DelayCompensation:
     }
     state = {
         "newest": "u32",  # row of the memory
-        "rates": "f64[memory][n] 1/s",
+        "rates": "f64[memory][n]",
         "periods": "f64[memory] s",
     }
 
