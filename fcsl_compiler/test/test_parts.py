@@ -708,6 +708,25 @@ SAYS: dict[str, tuple[Change, list[str]]] = {
         connect("body.rate", "att"),
         ['craft.json "att" E216: part `att` without one of its inputs', "it has angle, target, rate, order"],
     ),
+    "a name behind the ports": (
+        lambda craft, attitude, rate: craft["connections"][0].update({"from": "att.law.rate"}),
+        [
+            'craft.json "att.law.rate" E216: part `att` has no output `law`',
+            "only its `ports` can be named: declare one in `parts/attitude.json`",
+        ],
+    ),
+    "a misspelt request": (
+        instance("att", requests={"fra": "STOP"}),
+        ['craft.json "fra" E206: part `att` has no request `fra`', "did you mean `far`?"],
+    ),
+    "a rate between ticks": (
+        lambda craft, attitude, rate: attitude["states"]["RUN"]["schedule"].update(law=30),
+        [
+            "parts/attitude.json 30 E220: 30 Hz does not divide the machine's tick_hz (1000)",
+            'craft.json "parts/attitude.json" `att` is a part here',
+            "the nearest rates that do are 25 and 40 Hz",
+        ],
+    ),
     "a folder": (
         instance("att", machine="parts"),
         ['craft.json "parts" E100: cannot read the part `parts`: Is a directory', ""],
@@ -812,6 +831,23 @@ def test_requests_that_no_list_has_show_where_parts_get_them(tmp_path: Path) -> 
         'craft.json "STOP" `att.law` makes it: `far` of part `att` is called so here',
         'craft.json "far" `spare.law` makes it: `far` of part `spare` is called so here',
     ]
+
+
+def test_a_struct_of_an_algorithm_of_both(tmp_path: Path) -> None:
+    """A part has an algorithm of the machine, which alone declares the struct."""
+    one = {"tick_hz": 10, "initial_state": "R", "algorithms": {"F": {"source": "f.py"}}}
+    part = {**one, "instances": {"f": {"algorithm": "F"}}, "states": {"R": {"schedule": {"f": 10}}}}
+    whole = {**one, "structs": {"P": {"x": "f64"}}, "states": {"R": {"schedule": {"f": 10, "p": True}}}}
+    whole["instances"] = {"f": {"algorithm": "F"}, "p": {"machine": "part.json"}}
+    (tmp_path / "f.py").write_text(
+        'class F:\n    outputs = {"o": "P"}\n\n    def execute(self):\n        self.o.x = 1.0\n'
+    )
+    (tmp_path / "part.json").write_text(json.dumps(part))
+    (tmp_path / "whole.json").write_text(json.dumps(whole))
+    with pytest.raises(DiagnosticError, match="unknown type `P`"):
+        compile_machine(tmp_path / "whole.json", "")
+    (tmp_path / "part.json").write_text(json.dumps({**part, "structs": whole["structs"]}))
+    assert len(compile_machine(tmp_path / "whole.json", "").machine.algorithms) == 1
 
 
 def test_an_old_value_of_a_part_is_shown_where_the_state_is(tmp_path: Path) -> None:

@@ -8,7 +8,7 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from fractions import Fraction
 
-from fcsl_compiler.api.diagnostics import Span, nearest
+from fcsl_compiler.api.diagnostics import Span, longer_paths, nearest
 from fcsl_compiler.api.expressions import ExpressionError, Kind, Quantity, parse, read_unit
 from fcsl_compiler.api.json_files import ConfigReader, JsonNode
 from fcsl_compiler.api.types import Type, scalar_of, shape_of
@@ -333,7 +333,9 @@ class _Checker:
             self.sink.error("E215", f"{end.rule}, but `{name}` is the other kind of channel", node.span)
             return None
         names = [c.name for c in machine.channels if c.direction == end.direction]
-        hint = nearest(name, names) or (f"it has {', '.join(names)}" if names else "it has none")
+        hint = nearest(name, [*names, *longer_paths(name, machine.fields)]) or (
+            f"it has {', '.join(names)}" if names else "it has none"
+        )
         message = f"machine `{machine.name}` has no {end.direction} channel `{name}`"
         self.sink.error("E206", message, node.span, help=hint)
         return None

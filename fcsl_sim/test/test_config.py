@@ -224,6 +224,7 @@ def test_a_message_shows_the_place(load_sim: Load, tmp_path: Path) -> None:
         ("from", "ramp.seen_rat", "did you mean `seen_rate`?"),
         ("from", "ramp.outputs.seen_rat", "did you mean `seen_rate`?"),
         ("to", "altimeter.sigmoid", "it has truth"),
+        ("from", "controller.pilot.throttle", "did you mean `pilot.outputs.throttle`?"),
         ("to", 1, '"instance.input" or "controller.channel"'),
     ],
 )

@@ -1,7 +1,7 @@
 # SPDX-License-Identifier: Apache-2.0
 """Diagnostics, and the places in source texts that they show."""
 
-from ..base.diagnostics import Diagnostic, DiagnosticError, DiagnosticSink, Severity, nearest
+from ..base.diagnostics import Diagnostic, DiagnosticError, DiagnosticSink, Severity, longer_paths, nearest
 from ..base.source import SourceFile, Span
 
 __all__ = [
@@ -11,5 +11,6 @@ __all__ = [
     "Severity",
     "SourceFile",
     "Span",
+    "longer_paths",
     "nearest",
 ]

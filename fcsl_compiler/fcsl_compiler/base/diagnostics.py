@@ -4,7 +4,7 @@
 from __future__ import annotations
 
 import unicodedata
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 from dataclasses import dataclass, replace
 from enum import Enum
 
@@ -214,11 +214,18 @@ class DiagnosticSink:
             raise DiagnosticError([d for d in self._diagnostics if d.severity is Severity.ERROR])
 
 
+def longer_paths(path: str, choices: Iterable[str]) -> list[str]:
+    """The choices that have more names at a dot of `path`. `att.outputs.u` is a port of part `att`; the field is
+    `att.rate.outputs.u`."""
+    ends = [(path[: n + 1], path[n:]) for n, char in enumerate(path) if char == "."]
+    return [c for c in choices if any(c.startswith(a) and c.endswith(b) and len(c) > len(path) for a, b in ends)]
+
+
 def misspelt(word: str, choices: Sequence[str]) -> str:
     """The choice that `word` probably stands for, or ""."""
     import difflib
 
-    same = next((c for c in choices if c.lower() == word.lower()), "")
+    same = next((c for c in choices if c.lower() == word.lower()), "") or next(iter(longer_paths(word, choices)), "")
     return same or next(
         iter(difflib.get_close_matches(word[:100], choices, n=1, cutoff=0.65 if len(word) != 3 else 0.5)), ""
     )

@@ -97,6 +97,7 @@ def _divisor(node: JsonNode, tick_hz: int, reader: ConfigReader) -> int | None:
         near = [r for r in (max(d for d in range(1, hz + 1) if tick_hz % d == 0),) if r]
         above = next((d for d in range(hz, tick_hz + 1) if tick_hz % d == 0), tick_hz)
         fix = f"the nearest rates that do are {near[0]} and {above} Hz"
-        reader.sink.error("E220", f"{hz} Hz does not divide tick_hz ({tick_hz})", node.span, help=fix)
+        whose = "the machine's tick_hz" if node.span.source.part else "tick_hz"
+        reader.sink.error("E220", f"{hz} Hz does not divide {whose} ({tick_hz})", node.span, help=fix)
         return None
     return tick_hz // hz

@@ -12,7 +12,7 @@ from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import Any
 
-from ..base.diagnostics import nearest
+from ..base.diagnostics import misspelt, nearest
 from ..base.files import SourceError
 from ..base.source import SourceFile, Span
 from .constants import read_constants
@@ -275,10 +275,11 @@ class Joined:
         """Gives the requests of a part names of the whole machine."""
         listed = [(self.reader.string(item, "a request"), item.span) for item in _items(part.keys.get("requests"))]
         own = {name: span for name, span in listed if name is not None}
-        found = part.scope.requests
+        found, meant = part.scope.requests, set[str]()  # `meant` by names that are misspelt
         for key, (node, at) in self.reader.named(bound, f"`requests` of `{name}`").items():
             text = self.reader.string(node, f"what `{key}` is called here", "LAND")
             if key not in own:
+                meant.add(misspelt(key, list(own)))
                 hint = nearest(key, list(own)) or (f"it has {', '.join(own)}" if own else "it makes none")
                 self.sink.error("E206", f"part `{name}` has no request `{key}`", at, help=hint)
             elif text is not None and not (is_name(text) and text != "none"):
@@ -293,7 +294,7 @@ class Joined:
                 self.sink.error("E256", f"two requests of `{name}` are called `{text}`", node.span, help=fix)
             elif text is not None:
                 found[key], part.scope.named[key] = outer.scope.requests.get(text, text), node.span
-        missing = [request for request in own if request not in found]
+        missing = [request for request in own if request not in found and request not in meant]
         if missing and not (bound is not None and bound.kind != "object"):
             names = ", ".join(f'"{request}": "…"' for request in missing)
             message = f"request `{missing[0]}` of part `{name}` has no name here"
@@ -414,6 +415,8 @@ class Joined:
         hint = nearest(port, list(known)) or (f"it has {', '.join(known)}" if known else f"its `ports` list no {what}")
         if elsewhere:
             hint = f"`{port}` is one of its {elsewhere}"
+        elif port in _object(part.keys.get("instances")) or port in ("health", "transition_request"):
+            hint = f"only its `ports` can be named: declare one in `{part.keys['instances'].span.source.name}`"
         if not port:
             self.sink.error("E216", f"part `{name}` without one of its {record}", at, help=hint)
             return []

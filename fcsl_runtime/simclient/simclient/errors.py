@@ -30,16 +30,11 @@ class MapError(ValueError):
     """An invalid map file, or a bag that lacks what the map names."""
 
 
-def longer_paths(path: str, choices: Iterable[str]) -> list[str]:
-    """The choices that have more names at a dot of `path`. `att.outputs.u` is a port of part `att`; the field is
-    `att.rate.outputs.u`."""
-    ends = [(path[: n + 1], path[n:]) for n, char in enumerate(path) if char == "."]
-    return [c for c in choices if any(c.startswith(a) and c.endswith(b) and len(c) > len(path) for a, b in ends)]
-
-
 def did_you_mean(word: str, choices: Iterable[str]) -> str:
     """'; did you mean `…`?' for the closest choice, or the empty string."""
     import difflib  # here: most runs make no mistake
+
+    from fcsl_compiler.api.diagnostics import longer_paths
 
     known = list(choices)
     close = longer_paths(word, known) or difflib.get_close_matches(word, known, n=1, cutoff=0.5)

@@ -12,7 +12,9 @@ from collections.abc import Collection, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from itertools import islice
 
-from ..errors import ViewError, longer_paths
+from fcsl_compiler.api.diagnostics import longer_paths
+
+from ..errors import ViewError
 from .rotation import ANGLES
 from .signals import GATE, STATUS_FIELDS, Catalogue, Signals, Value, whole
 from .styles import AFTER_GATE
