@@ -296,7 +296,7 @@ class _Reader:
             self.sink.error("E312", f"a range (`{bounds}`) in `{record}`", span, why=why, help="remove it")
             return None
         try:
-            return (*parsed, parse_range(bounds, parsed[0]))
+            return (*parsed, parse_range(bounds, parsed[0], self.names.numbers))
         except TypeSyntaxError as error:
             self.sink.error("E312", str(error.args[0]), span, help=str(error.args[1]))
             return None

@@ -161,6 +161,8 @@ def _name_of_module(
         declarations.constants[name] = other.constants[name]
         if name in other.names.sizes:
             declarations.names.sizes[name] = other.names.sizes[name]
+        if name in other.names.numbers:
+            declarations.names.numbers[name] = other.names.numbers[name]
 
 
 def check_imported_names(declarations: Declarations, tree: ast.Module, sink: DiagnosticSink) -> None:

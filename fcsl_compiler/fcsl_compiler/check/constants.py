@@ -77,6 +77,7 @@ def check_constant(
         return
     if isinstance(expr, ir.Const):
         declarations.constants[name] = ScalarConstant(expr)
+        _count(declarations, name, expr.value)
         declarations.wrong.discard(name)
         return
     values = _flat(expr)
@@ -127,6 +128,13 @@ def _untyped(
     declarations.wrong.discard(name)
     if isinstance(first, int):
         declarations.names.sizes[name] = first
+    _count(declarations, name, first)
+
+
+def _count(declarations: Declarations, name: str, value: object) -> None:
+    """Numbers may be bounds of ranges."""
+    if isinstance(value, int | float) and not isinstance(value, bool):
+        declarations.names.numbers[name] = value
 
 
 def _flat(expr: ir.Expr) -> tuple[bool | int | float | str, ...] | None:

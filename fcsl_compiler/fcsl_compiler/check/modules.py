@@ -6,12 +6,12 @@ from __future__ import annotations
 import ast
 import re
 from collections.abc import Collection, Mapping
+from dataclasses import replace
 from pathlib import PurePosixPath
 
 from ..base.diagnostics import DiagnosticSink
 from ..base.source import Span
 from ..model.program import Program
-from ..model.types import TypeNames
 from ..parse.machine_files import ParsedFile
 from .algorithm_class import AlgorithmClass, read_class
 from .collect import check_imported_names, collect
@@ -66,7 +66,7 @@ class Modules:
 
     def read_sized(self, declarations: Declarations, node: ast.ClassDef, sizes: Mapping[str, int]) -> AlgorithmClass:
         """A class of a file with these sizes, which then counts as used."""
-        names = TypeNames({**declarations.names.sizes, **sizes}, declarations.names.structs)
+        names = replace(declarations.names, sizes={**declarations.names.sizes, **sizes})
         found = read_class(declarations.source, node, names, True, self.sink)
         declarations.classes[node.name] = found
         self.used.setdefault(declarations.source.name, set()).add(node.name)

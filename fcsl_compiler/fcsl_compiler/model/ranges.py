@@ -5,6 +5,7 @@ from __future__ import annotations
 
 import math
 import re
+from collections.abc import Mapping
 from dataclasses import dataclass
 
 from .literals import LiteralError, fit
@@ -22,7 +23,7 @@ class Range:
 
     low: int | float = -math.inf
     high: int | float = math.inf
-    text: str = ".."  # as written
+    text: str = ".."  # as written, with the values of constants
 
     def __contains__(self, value: object) -> bool:
         return isinstance(value, int | float) and self.low <= value <= self.high
@@ -43,8 +44,8 @@ def split_range(text: str) -> tuple[str, str | None, int]:
     return text[: match.start()], match["range"], match.start("range")
 
 
-def parse_range(text: str, type_: Type) -> Range:
-    """Parses `0..10`, `0..` or `..5`. Bounds are literals of the parameter's type. Raises TypeSyntaxError."""
+def parse_range(text: str, type_: Type, constants: Mapping[str, int | float]) -> Range:
+    """Parses `0..10`, `0..`, `..5` or `-MOST..MOST`. Bounds are values of the parameter's type. Raises TypeSyntaxError."""
     example = "write it like `in 0..10`, `in 0..` or `in ..10`"
     if isinstance(element_of(type_), Struct):
         raise TypeSyntaxError(
@@ -57,12 +58,22 @@ def parse_range(text: str, type_: Type) -> Range:
         raise TypeSyntaxError(f"`{text}` is not a range", example)
     if not match["low"] and not match["high"]:
         raise TypeSyntaxError("a range without bounds", f"{example}, or remove it")
-    low = _parse_bound(match["low"], type_, -math.inf)
-    high = _parse_bound(match["high"], type_, math.inf)
+    low_text, high_text = (_valued(match[side], constants) for side in ("low", "high"))
+    low = _parse_bound(low_text, type_, -math.inf)
+    high = _parse_bound(high_text, type_, math.inf)
     if low > high:
         fix = f"write the smaller bound first: `in {match['high']}..{match['low']}`"
         raise TypeSyntaxError(f"the range `{text}` is empty", fix)
-    return Range(low, high, f"{match['low']}..{match['high']}")
+    return Range(low, high, f"{low_text}..{high_text}")
+
+
+def _valued(bound: str, constants: Mapping[str, int | float]) -> str:
+    """A bound with the value of a constant in place of its name."""
+    match = re.fullmatch(r"(?P<sign>[+-]?)(?P<name>[^\W\d]\w*)", bound)
+    if not match or match["name"] not in constants:
+        return bound
+    value = constants[match["name"]]
+    return repr(-value if match["sign"] == "-" else value)
 
 
 def _parse_bound(text: str, type_: Type, absent: float) -> int | float:
@@ -72,7 +83,10 @@ def _parse_bound(text: str, type_: Type, absent: float) -> int | float:
     if text.lstrip("+-").lower() in ("inf", "infinity"):
         raise TypeSyntaxError(f"`{text}` as a bound", "omit a missing bound: `in 0..`")
     if not re.fullmatch(_NUMBER, text):
-        raise TypeSyntaxError(f"the bound `{text}` is not a number", "write a literal, such as `0`, `-2.5` or `1e3`")
+        raise TypeSyntaxError(
+            f"the bound `{text}` is not a number",
+            "write a literal, such as `-2.5`, or the name of a numeric constant above the class",
+        )
     whole = re.fullmatch(r"[+-]?[0-9]+", text) is not None
     number: int | float = int(text) if whole else float(text)
     if math.isinf(number):

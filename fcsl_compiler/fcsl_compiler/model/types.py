@@ -208,6 +208,7 @@ class TypeNames:
 
     sizes: dict[str, int]  # named sizes: integer constants of the module, size variables of library functions
     structs: dict[str, Struct]
+    numbers: dict[str, int | float] = field(default_factory=dict)  # constants of the module, for ranges
 
 
 _TYPE = re.compile(r"\s*([A-Za-z_][A-Za-z0-9_]*)\s*((?:\[[^\[\]]*\]\s*)*)(.*?)\s*", re.DOTALL)

@@ -159,7 +159,7 @@ ALGORITHM_CODES: dict[str, Code] = {
     "E312": Code(
         "an invalid range",
         "`in 0..10` after the type (and unit) of a parameter limits its value in the JSON and the values that a "
-        "host may set. `in 0..` and `in ..10` leave one side open. Bounds are literals of the parameter's type and"
+        "host may set. `in 0..` and `in ..10` leave one side open. Bounds are literals of the parameter's type, or constants of the module, and"
         " must be exactly representable in f64. Inputs, outputs and state have no range: limit them with `clamp` "
         "where they are computed.",
         Kind.FILE,
