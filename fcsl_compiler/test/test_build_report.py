@@ -647,3 +647,36 @@ def test_without_objdump_the_report_says_what_is_missing(tmp_path: Path, monkeyp
     facts = facts_of(LANDER, tmp_path / "out")
     assert facts["struct_bytes"] is None and "install binutils" in facts["why_no_code"]
     assert "install binutils" in report_text(facts) and facts["states"][0]["connections"]
+
+
+def test_the_row_of_a_part_has_the_sums_of_its_instances(tmp_path: Path) -> None:
+    """Parts in parts, too. What an instance does not know, the part does not know either."""
+    leaf = {"tick_hz": 10, "initial_state": "A", "algorithms": {"Law": {"source": "law.py"}}}
+    leaf |= {"instances": {"one": {"algorithm": "Law"}, "two": {"algorithm": "Law"}}}
+    leaf |= {"states": {"A": {"schedule": {"one": 10, "two": 10}}}}
+    inner = {"tick_hz": 10, "initial_state": "A", "algorithms": {"Law": {"source": "law.py"}}}
+    inner |= {"instances": {"own": {"algorithm": "Law"}, "leaf": {"machine": "leaf.json"}}}
+    inner |= {"states": {"A": {"schedule": {"own": 10, "leaf": True}}}}
+    outer = {"tick_hz": 10, "initial_state": "A", "algorithms": {"Law": {"source": "law.py"}}}
+    outer |= {"instances": {"alone": {"algorithm": "Law"}, "part": {"machine": "inner.json"}}}
+    outer |= {"states": {"A": {"schedule": {"alone": 10, "part": True}}}}
+    for name, machine in (("leaf", leaf), ("inner", inner), ("outer", outer)):
+        (tmp_path / f"{name}.json").write_text(json.dumps(machine))
+    (tmp_path / "law.py").write_text(
+        'from fcsl_builtins import sin\n\n\nclass Law:\n    inputs = {"u": "f64"}\n    outputs = {"y": "f64"}\n\n'
+        "    def execute(self):\n        self.y = sin(self.u) * 2.0\n"
+    )
+    facts = facts_of(tmp_path / "outer.json", tmp_path / "build")
+    lines = report_text(facts).splitlines()
+    rows = {line.split("  ")[0]: line for line in lines if line.startswith(("alone", "part"))}
+    assert list(rows) == [
+        *("alone", "part (3 instances)", "part.own", "part.leaf (2 instances)", "part.leaf.one", "part.leaf.two")
+    ]
+    numbers = {name: [int(n) for n in line[len(name) :].split() if n.isdigit()] for name, line in rows.items()}
+    ones = [numbers[name] for name in ("part.own", "part.leaf.one", "part.leaf.two")]
+    assert numbers["part (3 instances)"] == [sum(column) for column in zip(*ones, strict=True)]
+    assert numbers["part.leaf (2 instances)"] == [sum(column) for column in zip(*ones[1:], strict=True)]
+    assert "3·sin" in rows["part (3 instances)"] and "2·sin" in rows["part.leaf (2 instances)"]
+    facts["instances"][1]["instructions"] = None
+    unknown = next(line for line in report_text(facts).splitlines() if line.startswith("part (3"))
+    assert unknown.split()[5] == "-"

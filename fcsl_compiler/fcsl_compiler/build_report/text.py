@@ -3,7 +3,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Collection, Sequence
+from collections import Counter
+from collections.abc import Collection, Iterator, Sequence
 
 from ..driver.stack import LEAF_BYTES
 from ..emit.operations import KINDS
@@ -55,16 +56,37 @@ def _instances(facts: Facts) -> list[str]:
         ]
     ]
     notes = []
+    rows += [_instance(name, of) for name, of in _with_parts(facts["instances"])]
     for i in facts["instances"]:
-        counts = i["operations"]
-        functions = " ".join(f"{n}·{name}" for name, n in counts["functions"].items())
-        measured = [_or_dash(i[k]) for k in _MEASURED]
-        rows.append([i["name"], *measured, *(str(counts[k]) for k in KINDS), functions])
         if i["why_no_bound"]:
             notes.append(f"  {i['name']}: no instruction bound: {i['why_no_bound']}")
         if i["apart"]:
             notes.append(f"  {i['name']}: not counted: {', '.join(i['apart'])}")
     return [*_table(rows), *notes]
+
+
+def _instance(name: str, of: Sequence[Facts]) -> list[str]:
+    """A row of the table: of one instance, or the sums of a part's."""
+    sums: Counter[str] = Counter()
+    functions: Counter[str] = Counter()
+    for i in of:
+        sums.update({k: i["operations"][k] for k in KINDS})
+        functions.update(i["operations"]["functions"])
+    measured = [_or_dash(None if any(i[k] is None for i in of) else sum(i[k] for i in of)) for k in _MEASURED]
+    return [name, *measured, *(str(sums[k]) for k in KINDS), " ".join(f"{n}·{name}" for name, n in functions.items())]
+
+
+def _with_parts(instances: Sequence[Facts]) -> Iterator[tuple[str, Sequence[Facts]]]:
+    """Each instance, and before the first one of a part all of the part's."""
+    seen = set()
+    for i in instances:
+        words = i["name"].split(".")
+        for part in (".".join(words[:n]) for n in range(1, len(words))):
+            if part not in seen:
+                seen.add(part)
+                of = [other for other in instances if other["name"].startswith(f"{part}.")]
+                yield f"{part} ({_count(len(of), 'instance')})", of
+        yield i["name"], [i]
 
 
 def _math(functions: list[Facts]) -> list[str]:
