@@ -786,6 +786,8 @@ OUTSIDE: dict[str, str] = {
     "    if hw_read_u32(9) == 3:\n        break",
     "loop with a target": "for i in range(2):\n    self.m[i][hw_read_u32(u32(i))] += i32(hw_read_u32(5)) // self.d",
     "typed local": "level: u32 = hw_read_u32(1)\nlevel += hw_read_u32(2) * level\nself.w = level",
+    "assertion of a call": "assert hw_read_gpio(1) and self.d < 2, 'pin'\nself.w = hw_read_u32(2)",
+    "calls around an assertion": "self.n = i32(hw_read_u32(4))\nassert self.on\nself.w = hw_read_u32(2)",
     "return": "if hw_read_gpio(1):\n    return\nself.w = hw_read_u32(2)",
 }
 

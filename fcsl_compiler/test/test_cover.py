@@ -76,6 +76,16 @@ def test_what_copies_a_bool_decides_nothing(tmp_path: Path) -> None:
     assert trial(tmp_path, "self.r = self.a\nself.z = f64(self.k)").share("branch") == (0, 0)
 
 
+def test_an_assertion_is_a_line_and_decides_nothing(tmp_path: Path) -> None:
+    """No test makes it fail that should hold. Behind one that fails nothing is reached."""
+    t = trial(tmp_path, 'assert self.x > 0.0 and self.n != 3, "text"\nself.z = 1.0')
+    assert t.share("branch") == (0, 0) and t.share("mcdc") == (0, 0) and t.share("line") == (0, 2)
+    t.tick(x=-1.0)
+    assert t.share("line") == (1, 2) and t.misses() == [("line", 3, "never executed")]
+    t.tick(x=1.0)
+    assert t.share("line") == (2, 2)
+
+
 def test_loops(tmp_path: Path) -> None:
     """A loop that may run no iteration has two branches. A loop that always or never runs has none."""
     text = "for i in range(3):\n    for j in range(i):\n        self.k = self.k + j\n        if self.a:\n            break\nfor n in range(0):\n    self.k = 0"

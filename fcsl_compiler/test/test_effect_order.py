@@ -69,7 +69,7 @@ def plainly(body: str, inputs: dict[str, Any], readings: list[int]) -> tuple[Log
     )
     try:
         names["execute"](self)
-    except (IndexError, ZeroDivisionError):
+    except (IndexError, ZeroDivisionError, AssertionError):
         return log, None
     return log, self
 

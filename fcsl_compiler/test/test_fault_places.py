@@ -41,7 +41,12 @@ FIRST = {
     "self.v = |self.v + self.v * 1": "the result does not fit i32",
     "self.i = half(|self.big + self.one)": "the result does not fit i32",
     "if |self.big + self.one > 0:\n            self.i = 0": "the result does not fit i32",
+    "|assert self.zero == 1, 'is one'": "assertion failed: is one",
+    "|assert self.b": "assertion failed",
     # Of two, the first in Python's order.
+    "assert |self.one // self.zero > 0, 'never said'": "the divisor is zero",
+    "assert self.one > 0 and |self.v[self.seven] > 0": "the index is outside [0, 3)",
+    "|assert self.zero > 0, 'first'\n        self.i = self.one // self.zero": "assertion failed: first",
     "self.i = (|self.one // self.zero) + self.v[self.seven]": "the divisor is zero",
     "self.i = |self.v[self.seven] + (self.one // self.zero)": "the index is outside [0, 3)",
     "self.i = both(|self.v[self.seven], self.one // self.zero)": "the index is outside [0, 3)",

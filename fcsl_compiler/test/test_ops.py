@@ -236,7 +236,7 @@ def test_health_compares() -> None:
 
 @pytest.mark.parametrize("spellings", [c.SPELLINGS, nim.SPELLINGS], ids=["c", "nim"])
 def test_a_printer_spells_every_operation(spellings: dict[str, Spelling]) -> None:
-    assert spellings.keys() == {op.id for op in ops.all_ops()}
+    assert spellings.keys() == {ops.assertion("").id, *(op.id for op in ops.all_ops())}
     for op in ops.all_ops():
         spelling = spellings[op.id]
         assert bool(op.faults) == ("{fault}" in spelling.text) == bool(spelling.proven), op.id

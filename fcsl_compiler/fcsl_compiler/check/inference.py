@@ -30,7 +30,7 @@ class Group:
 
     __slots__ = ("_parent", "at", "holds_float", "type")
 
-    def __init__(self, type_: Scalar | None = None, at: ast.AST | None = None, holds_float: bool = False):
+    def __init__(self, type_: Scalar | None = None, at: ast.expr | ast.stmt | None = None, holds_float: bool = False):
         self._parent: Group | None = None
         self.type, self.at, self.holds_float = type_, at, holds_float
 
@@ -139,6 +139,8 @@ class Inference:
             self._visit(node.test)
             self._body(node.body)
             self._body(node.orelse)
+        elif isinstance(node, ast.Assert):
+            self._visit(node.test)
         elif isinstance(node, ast.For):
             self._for(node)
         elif isinstance(node, ast.Return) and node.value is not None:
@@ -400,7 +402,7 @@ class Inference:
     }
 
 
-def _of(type_: Type, at: ast.AST) -> Group | Struct:
+def _of(type_: Type, at: ast.expr | ast.stmt) -> Group | Struct:
     """A value of the given type."""
     element = element_of(type_)
     return element if isinstance(element, Struct) else Group(element, at)
@@ -413,8 +415,9 @@ def _join(left: Value, right: Value) -> Value:
     return left if left is not None else right
 
 
-def _position(at: ast.AST | None) -> tuple[int, int]:
-    return (at.lineno, at.col_offset) if isinstance(at, ast.expr | ast.stmt) else (0, 0)
+def _position(at: ast.expr | ast.stmt | None) -> tuple[int, int]:
+    assert at is not None  # of a group that has a type
+    return at.lineno, at.col_offset
 
 
 def _type(group: Group) -> Scalar:

@@ -5,6 +5,7 @@ needs."""
 from __future__ import annotations
 
 from ..model import ir
+from ..model.effects import can_fault
 from ..model.ops import Op
 from ..model.types import Scalar
 
@@ -35,6 +36,22 @@ def interval(expr: ir.Expr) -> Interval | None:
         return whole  # the operation wraps
     low, high = max(bounds[0], whole[0]), min(bounds[1], whole[1])
     return (low, high) if low <= high else whole
+
+
+def always(condition: ir.Expr) -> bool:
+    """Whether a condition holds for all values within the bounds of its integers."""
+    if isinstance(condition, ir.Const):
+        return condition.value is True
+    if isinstance(condition, ir.Choose):  # `and`, `or`
+        return always(condition.then) and (always(condition.condition) or always(condition.otherwise))
+    if not isinstance(condition, ir.Apply) or len(condition.args) != 2:
+        return False
+    left, right = map(interval, condition.args)
+    if left is None or right is None or condition.fault or any(map(can_fault, condition.args)):
+        return False
+    tests = {"<": left[1] < right[0], "<=": left[1] <= right[0], ">": left[0] > right[1], ">=": left[0] >= right[1]}
+    tests["!="] = left[1] < right[0] or right[1] < left[0]
+    return tests.get(condition.op.name, False)
 
 
 def is_static(expr: ir.Expr) -> bool:

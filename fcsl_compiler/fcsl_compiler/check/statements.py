@@ -4,6 +4,7 @@
 from __future__ import annotations
 
 import ast
+import re
 from collections import Counter
 from typing import NoReturn
 
@@ -17,18 +18,20 @@ from .checker import Stop
 from .effect_order import Hoister, reaches_outside
 from .expressions import ExprChecker
 from .folding import fold
-from .intervals import interval, is_static
+from .intervals import always, interval, is_static
 from .library_files import library_names
 from .loop_bounds import BEYOND, MAX_BOUND, MAX_ITERATIONS, TOO_MANY, parameters_in
 from .scope import LANGUAGE_NAMES, SHADOWABLE, Scope
 
+#: Characters of the text of an assertion.
+MOST_TEXT = 80
+_ASSERTION = re.compile(rf"[ -~]{{1,{MOST_TEXT}}}")
 STALE = HEALTH_NAMES.index("stale")
 
 _INSTEAD: dict[type[ast.AST], tuple[str, str]] = {
     ast.While: ("`while`", "write a bounded loop: `for i in range(100):` with `if done: break`"),
     ast.Try: ("`try`", "faults are contained by the machine: health becomes failed, outputs stay as they were"),
     ast.Raise: ("`raise`", 'report with `self.health = "failed"`'),
-    ast.Assert: ("`assert`", 'report with `self.health = "failed"`'),
     ast.With: ("`with`", "an algorithm has no resources"),
     ast.FunctionDef: ("a nested function", "write it at module level"),
     ast.ClassDef: ("a class here", "define algorithms at module level"),
@@ -50,7 +53,7 @@ class BodyChecker:
         self.sink = sink
         self._hoister = Hoister(scope)
         self._jumped = False
-        self._unpacked = 0
+        self._hidden = 0
         self._for_other_sizes = False  # the rest of the function is reached with other sizes only
         self._iterations = 1  # product of the iteration counts of the enclosing loops
 
@@ -108,6 +111,8 @@ class BodyChecker:
             out.append(self._augmented(node, span, out))
         elif isinstance(node, ast.If):
             out.append(self._if(node, span))
+        elif isinstance(node, ast.Assert):
+            self._assert(node, span, out)
         elif isinstance(node, ast.For):
             out.append(self._for(node, span))
         elif isinstance(node, ast.Break | ast.Continue):
@@ -187,10 +192,10 @@ class BodyChecker:
         written = {("", t.id) if isinstance(t, ast.Name) else ir.variable(self._place(t)) for t in targets}
         return any(written & ir.variables(v) for v in values)
 
-    def _to_local(self, value: ir.Expr, out: list[ir.Stmt]) -> ir.Expr:
+    def _to_local(self, value: ir.Expr, out: list[ir.Stmt], name: str = "unpacked") -> ir.Expr:
         """Stores a value in a hidden local."""
-        self._unpacked += 1
-        local = ir.Local(value.type, f"unpacked.{self._unpacked}", value.span)
+        self._hidden += 1
+        local = ir.Local(value.type, f"{name}.{self._hidden}", value.span)
         self.scope.types[local.name] = (value.type, value.span)
         out.append(ir.Assign(local, value, value.span))
         return local
@@ -401,6 +406,19 @@ class BodyChecker:
         else:
             scope.assigned = then_assigned & else_assigned
         return ir.If(condition, then, otherwise, span)
+
+    def _assert(self, node: ast.Assert, span: Span, out: list[ir.Stmt]) -> None:
+        """A fault unless the condition holds. None if it is certain to."""
+        condition = self.expr.expect(node.test, BOOL, "the condition")
+        literal = node.msg.value if isinstance(node.msg, ast.Constant) else None
+        text = literal if isinstance(literal, str) else ""
+        if node.msg is not None and not _ASSERTION.fullmatch(text):
+            fix = f'write it as `assert …, "dry mass"`, of 1 to {MOST_TEXT} printable characters of ASCII'
+            self._fail("E410", "the text of this assertion", self.expr.span(node.msg), why="it is compiled", help=fix)
+        if not always(fold(condition)):
+            self.scope.faults = True
+            failing = ir.Apply(BOOL, ops.assertion(text), (condition,), True, span)
+            self._to_local(failing, out, "asserted")
 
     def _taken(self, node: ast.If, condition: ir.Expr) -> bool | None:
         """Whether a condition on size variables holds. The other branch is for other sizes: its indices may be out of range

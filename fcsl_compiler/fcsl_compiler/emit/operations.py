@@ -28,6 +28,7 @@ _PLAIN = {
 _KIND_OF = {name: Counter({kind: 1}) for kind, names in _PLAIN.items() for name in names}
 _KIND_OF |= {
     "clamp": Counter(compare=2),
+    "assert": Counter(branch=1),
     "sign": Counter(compare=2),
     "where": Counter(compare=1),
     "**0": Counter(),

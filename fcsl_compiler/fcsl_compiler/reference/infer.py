@@ -202,6 +202,8 @@ class Inference:
             self.expr(s.test)
             self.body(s.body)
             self.body(s.orelse)
+        elif isinstance(s, ast.Assert):
+            self.expr(s.test)
         elif isinstance(s, ast.For):
             assert isinstance(s.target, ast.Name) and isinstance(s.iter, ast.Call)
             for bound in s.iter.args:

@@ -9,6 +9,7 @@
 - Where the kinds of values are certain, what is known is not asked again: members are read and stored in their slots,
   elements in the list of the array (if the index is known to be inside), functions of the library are those for the
   sizes at hand.
+- `assert c, text` is a call.
 - `x += v` is `x = x + v`; a subscript of x that reaches outside the machine is evaluated once, before. Annotations, imports and
   the dictionaries of a class are taken out.
 """
@@ -367,6 +368,9 @@ class Rewriter:
             return self._assign(node.target, node.value)
         if isinstance(node, ast.If):
             return ast.If(self.expr(node.test), self._body(node.body), self._body(node.orelse))
+        if isinstance(node, ast.Assert):  # which `python -O` would leave out
+            text = node.msg or ast.Constant("")
+            return ast.Expr(ast.copy_location(self._runtime("require", self.expr(node.test), text), node))
         if isinstance(node, ast.For):
             return self._for(node)
         if isinstance(node, ast.Return) and node.value is not None:

@@ -5,9 +5,21 @@ from __future__ import annotations
 
 from ..types import BOOL, Scalar
 from . import convert, floats, integers, ordered
-from .op import Doc, Op, op_id
+from .op import Doc, Op, assertion, op_id
 
-__all__ = ["BUILTINS", "CONVERSIONS", "DOCS", "Doc", "Op", "all_ops", "arity_of", "find", "is_test", "op_id"]
+__all__ = [
+    "BUILTINS",
+    "CONVERSIONS",
+    "DOCS",
+    "Doc",
+    "Op",
+    "all_ops",
+    "arity_of",
+    "assertion",
+    "find",
+    "is_test",
+    "op_id",
+]
 
 _TABLE: dict[tuple[str, tuple[Scalar, ...]], Op] = {
     (op.name, op.args): op for module in (floats, ordered, convert, integers) for op in module.operations()

@@ -5,7 +5,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
-from ..types import Scalar
+from ..types import BOOL, Scalar
 
 
 @dataclass(frozen=True)
@@ -45,6 +45,11 @@ class Op:
     def id(self) -> str:
         """Unique name in IR dumps."""
         return op_id(self.name, self.args)
+
+
+def assertion(text: str) -> Op:
+    """`assert condition, text`: it faults unless its operand is true. text: "" for none."""
+    return Op("assert", (BOOL,), BOOL, (f"assertion failed: {text}" if text else "assertion failed",))
 
 
 def overflow(t: Scalar) -> str:

@@ -19,6 +19,9 @@ def spellings() -> Iterator[Entry]:
         helper = c_function(f"{t.c} fcsl_where_{t}(bool c, {t.c} a, {t.c} b)", "return c ? a : b;")
         yield entry("where", (BOOL, t, t), f"fcsl_where_{t}({{0}}, {{1}}, {{2}})", helper)
     yield entry("not", (BOOL,), "(!{0})")
+    signature = "bool fcsl_assert(bool condition, uint32_t place, uint32_t *fault)"
+    helper = c_function(signature, "if (!condition) {", "    fcsl_fault(place, fault);", "}", "return condition;")
+    yield entry("assert", (BOOL,), "fcsl_assert({0}, {place}, {fault})", helper)
 
 
 def _choosing(t: Scalar) -> Iterator[Entry]:

@@ -21,6 +21,9 @@ def spellings() -> Iterator[Entry]:
         helper = proc(f"fcsl_where_{t}", f"c: bool, a, b: {nim(t)}", nim(t), "if c: a else: b")
         yield entry("where", (BOOL, t, t), f"fcsl_where_{t}({{0}}, {{1}}, {{2}})", helper)
     yield entry("not", (BOOL,), "(not {0})")
+    lines = ("if not condition:", "  fcsl_fault(place, fault)", "condition")
+    helper = FAULT_HELPER + "\n" + proc("fcsl_assert", f"condition: bool, {FAULT}", "bool", *lines)
+    yield entry("assert", (BOOL,), "fcsl_assert({0}, {place}, {fault})", helper)
 
 
 def _choosing(t: Scalar) -> Iterator[Entry]:
