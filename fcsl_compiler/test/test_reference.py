@@ -15,7 +15,7 @@ from fcsl_compiler.reference.arrays import Array, array_type
 from fcsl_compiler.reference.library import _WITH_LOOPS, library
 from fcsl_compiler.reference.structs import Struct
 from fcsl_compiler.reference.types import SCALARS
-from fcsl_compiler.reference.unroll import TooLarge
+from fcsl_compiler.reference.unroll import TooLarge, Writer
 from fcsl_compiler.reference.values import F32, I32, I64, U32, U64, Fault, IllTyped, as_f32
 
 
@@ -288,6 +288,13 @@ def test_large_products_are_made_row_by_row() -> None:
     assert library().functions["matmul"](constant, b)[2, 3] == reduce(float.__add__, dense)
     mirrored = library().functions["symmetric_product"](a, b)
     assert mirrored[3, 2] == mirrored[2, 3] == total
+
+
+def test_a_function_without_loops_has_at_most_1500_statements() -> None:
+    writer = Writer({}, lambda name, classes: name)
+    assert len({writer.fresh() for _ in range(1500)}) == 1500
+    with pytest.raises(TooLarge):
+        writer.fresh()
 
 
 def test_structural_zeros_are_not_added() -> None:

@@ -200,6 +200,18 @@ def test_the_page_has_units_limits_and_every_value(write: Write) -> None:
     assert "http" not in page.replace("http://www.w3.org/2000/svg", "")
 
 
+@pytest.mark.parametrize(
+    ("condition", "metric"),
+    [("average < 4.2 and final < 100.0", "average"), ("average < 100.0 and above < -1.0", "above"), (None, "average")],
+)
+def test_the_page_shows_first_what_fails_most(write: Write, condition: str | None, metric: str) -> None:
+    """Without lines the first metric; against the first parameter."""
+    main(["campaign", str(write(**{"pass": condition}))])
+    data = data_of(Path("gauge.campaign/report.html").read_text())
+    names = [one["name"] for one in data["parameters"] + data["metrics"]]
+    assert (names[data["across"]], names[data["up"]]) == (next(iter(STUDY["parameters"])), metric)
+
+
 def test_each_line_of_pass_has_its_worst_case_and_how_to_repeat_it(
     write: Write, capsys: pytest.CaptureFixture[str]
 ) -> None:

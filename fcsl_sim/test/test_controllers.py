@@ -235,6 +235,27 @@ def test_a_checkpoint_with_impossible_registers_is_refused(load_two: Load) -> No
         sim.restore_checkpoint(good)
 
 
+@pytest.mark.parametrize("tick", [4, 6])
+def test_a_checkpoint_whose_controllers_are_at_different_times_is_refused(tick: int, load_two: Load) -> None:
+    """Behind a right CRC: at 90 ms the second controller, of 50 Hz, has ticked 5 times, since 80 ms."""
+    config = load_two()
+    with Simulation(config.plan, config.tables) as sim:
+        sim.run(10)
+        good = sim.checkpoint()
+        sim.run(10)
+        later = sim.checkpoint()
+        was, is_later, wrong = (n.to_bytes(8, "little") for n in (5, 10, tick))
+        at = [i for i in range(len(good) - 8) if good[i : i + 8] == was and later[i : i + 8] == is_later]
+        assert at
+        changed = bytearray(good)
+        for i in at:
+            changed[i : i + 8] = wrong
+        changed[-4:] = zlib.crc32(changed[:-4]).to_bytes(4, "little")
+        with pytest.raises(SimError, match="damaged"):
+            sim.restore_checkpoint(bytes(changed))
+        sim.restore_checkpoint(good)
+
+
 def test_sources_have_the_names_of_their_controllers(load_two: Load, tmp_path: Path) -> None:
     load_two()
     with SimTwin.from_config(tmp_path / "two.sim.json") as twin:

@@ -50,6 +50,23 @@ def test_connected_states_are_one_vector(open_sim: Open) -> None:
     assert math.log2(errors[0] / errors[1]) == pytest.approx(4.0, rel=0.05)
 
 
+def test_an_input_of_the_group_is_new_at_every_stage_beside_a_sampled_one(open_sim: Open) -> None:
+    """x' = -(x + offset), where `curve` adds the two: in its struct the sampled offset is behind x."""
+    level = {"model": "sensor", "parameters": {"bias": 0.5, "sigma": 0.0, "dropout": False}, "inputs": {"truth": 0.0}}
+    curve = {"model": "curve", "parameters": {"values": [0.0]}}
+    instances = {"level": level, "curve": curve, "body": link(rate=-1.0, x=1.0)}
+    connections = (("body.free", "curve.x"), ("level.value", "curve.offset"), ("curve.y", "body.u"))
+
+    def change(config: dict[str, Any]) -> None:
+        chained(instances, *connections)(config)
+        config["models"]["curve"] = {"source": "curve.c"}
+        config["rates"]["level"] = 100
+
+    with open_sim(change) as sim:
+        sim.run(100)
+        assert sim.get("body.outputs.free") == pytest.approx(1.5 * math.exp(-0.99) - 0.5, rel=1e-10)
+
+
 def test_feedthrough_is_evaluated_in_order_at_every_stage(open_sim: Open) -> None:
     """a -> b -> c by gains: x' of c is the product, within the same instant; names are against the order."""
     three = {"c": link(gain=2.0, rate=0.0), "b": link(gain=3.0, rate=0.0), "a": link(x=1.0, rate=0.0), "d": link()}

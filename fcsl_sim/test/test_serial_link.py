@@ -87,6 +87,14 @@ def test_where_time_passes_the_run_differs_and_repeats(parameters: dict[str, flo
     assert flown(open_sim(change)) != flown(open_sim(noisy))
 
 
+def test_bits_flip_below_a_percent_of_them(open_sim: Open) -> None:
+    """Damaged frames are sent again, and nothing is lost. A frame of n bits is damaged with 1 - (1 - p)^n; n is 200 to 450."""
+    found = counted(open_sim(line(bit_error_percent=0.05)))
+    low, high = (found["frames"] * (1 - (1 - 0.0005) ** bits) for bits in (200, 450))
+    assert low < found["corrupted"] < high and found["repeated"] > 0
+    assert (found["sensors"], found["commands"], found["lost"]) == (100, 100, 0)
+
+
 def test_a_clean_line_repeats_and_loses_nothing(open_sim: Open) -> None:
     found = counted(open_sim(line()))
     assert found == found | dict.fromkeys(("dropped", "corrupted", "repeated", "lost", "refused"), 0)

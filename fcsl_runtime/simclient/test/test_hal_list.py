@@ -6,6 +6,7 @@ from __future__ import annotations
 import json
 import os
 import pty
+import struct
 import tty
 from pathlib import Path
 
@@ -215,6 +216,31 @@ def test_describe_hardware(tmp_path: Path) -> None:
     assert [line.split()[-4:] for line in text if line.split()[:1] == ["lamps"]] == [["gpio", "17,", "gpio", "18"]]
     told = json.loads(run(tmp_path, "describe", plan, "--json").stdout)
     assert [pin["safe"] for pin in told["pins"]] == [None, False, True]
+
+
+def bits(*values: float) -> str:
+    return " ".join(struct.pack(">d", value).hex() for value in values)
+
+
+def test_describe_outputs_and_sticks(tmp_path: Path) -> None:
+    plan = tmp_path / "craft.plan"
+    lines = ["machine craft 100", "device receiver 0 sbus /dev/ttyS0", "device escs 0 pwm pwmchip0"]
+    lines += ["sensor rc rc", "health 100000000 0 1000000000", "bind sticks sticks", "backend receiver"]
+    lines += ["signal sticks sticks", f"stick 0 {bits(1000, 1500, 2000, 0)}", f"stick 3 {bits(990, 1490, 2010, 8)}"]
+    lines += ["output motors escs", f"pulse 0 us0 {bits(0, 1, 1000, 1500, 2000, 0, 900)}"]
+    lines += [f"pulse 2 us3 {bits(-1, 1, 1100, 1500, 1900, 2, 1500)}"]
+    plan.write_text("\n".join(["fcsl-board-plan 1", *lines, "end", ""]))
+    text = run(tmp_path, "describe", plan).stdout.splitlines()
+    assert [line for line in text if "stick " in line] == [
+        "     stick 0: 1000, 1500, 2000 us become -1, 0, 1",
+        "     stick 3: 990, 1490, 2010 us become -1, 0, 1, 8 us on both sides of the middle are 0",
+    ]
+    assert text[text.index("output motors → escs") :] == [
+        "output motors → escs",
+        "  motors[0] → us0: 0, 0.5, 1 become 1000, 1500, 2000; safe: 900",
+        "  motors[2] → us3: -1, 0, 1 become 1100, 1500, 1900, at most 2 per second; safe: 1500",
+    ]
+    assert [line.split() for line in text if "pwmchip0" in line] == [["escs", "pwm", "pwmchip0", "actuator", "motors"]]
 
 
 def test_signals_of_drivers_are_those_that_the_compiler_knows() -> None:

@@ -4,6 +4,7 @@
 from __future__ import annotations
 
 import os
+import random
 import resource
 import subprocess
 from collections.abc import Callable
@@ -12,8 +13,11 @@ from pathlib import Path
 import pytest
 from foreign_bags import MS, imu
 from foreign_bags import write as write_bag
+from mcap.reader import make_reader
 
 from simclient import AlgTwin
+from simclient.bag.native_bag import NativeBag
+from simclient.errors import BagError
 
 START = 100 * 10**9
 
@@ -83,3 +87,24 @@ def test_a_bag_is_whole_or_absent(bag: Path, probe: Path, tmp_path: Path) -> Non
     assert done.stderr.startswith("fcsl replay: error: ") and done.stderr.count("\n") == 1
     assert f"'{target}" in done.stderr and "File too large" in done.stderr
     nothing_is_left(target)
+
+
+def test_a_bag_whose_disk_is_full_keeps_what_was_written_and_closes_its_files(tmp_path: Path) -> None:
+    path = tmp_path / "run"
+    numbers = random.Random(1)
+    before = os.listdir("/proc/self/fd")
+    _, most = resource.getrlimit(resource.RLIMIT_FSIZE)
+    with pytest.raises(BagError, match=f"cannot write to bag '{path}': File too large"), NativeBag(path) as bag:
+        topic = bag.add("/numbers", "std_msgs/msg/UInt8MultiArray", "uint8[] data")
+        bag.publish()
+        resource.setrlimit(resource.RLIMIT_FSIZE, (5_000_000, most))
+        try:
+            for tick in range(100):
+                bag.write(topic, tick, numbers.randbytes(1_000_000))
+        finally:
+            resource.setrlimit(resource.RLIMIT_FSIZE, (most, most))
+    assert os.listdir("/proc/self/fd") == before
+    assert [file.suffix for file in sorted(path.iterdir())] == [".yaml", ".mcap"]
+    with (path / "run_0.mcap").open("rb") as file:
+        times = [message.log_time for _, _, message in make_reader(file).iter_messages()]
+    assert len(times) >= 3 and times == list(range(len(times)))

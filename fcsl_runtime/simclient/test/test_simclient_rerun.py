@@ -188,6 +188,20 @@ def test_the_first_page_has_the_panels_of_the_views_in_order(tmp_path: Path) -> 
     assert not any(entity.startswith("/m/nav/place/") for entity in rows)
 
 
+@pytest.mark.parametrize(("span", "begin_s", "end_s"), [((2.0, 9.0), 2.0, 9.0), (None, -30.0, 0.0)])
+def test_a_legend_has_three_tenths_of_its_plot_beside_the_data(
+    span: tuple[float, float] | None, begin_s: float, end_s: float
+) -> None:
+    """Of a whole run, and of the last 30 s of a live one."""
+    stage = Scene(rr.RecordingStream("test"), Cast("/m", VEHICLE, [], INSIDE, parse_views(PANELS)))
+    plan = Plan(stage.cast, stage.world, span)
+    (plot, *_), bands = time_series(plan._overview()), plan._states()
+    sights = [view.properties["TimeAxis"].view_range.as_arrow_array().to_pylist() for view in (plot, bands)]
+    with_legend, data = [(sight["start"] / 1e9, sight["end"] / 1e9) for (sight,) in sights]
+    assert data == (begin_s, end_s)
+    assert with_legend == (begin_s, pytest.approx(begin_s + (end_s - begin_s) / 0.7))
+
+
 def test_styles_and_legends_are_those_of_pictures(tmp_path: Path) -> None:
     play(tmp_path / "x.rrd", VEHICLE, [20], panels=PANELS)
     reader = RrdReader(str(tmp_path / "x.rrd"))
