@@ -11,6 +11,7 @@ from pathlib import Path
 import pytest
 
 sys.path.insert(0, str(Path(__file__).parents[1] / "scripts"))
+from verify.mutation import tests as mutation_tests
 from verify.mutation.mutants import Candidate, Equivalent, Mutant, draw, is_equivalent, with_switches
 from verify.mutation.python_points import points
 
@@ -84,3 +85,10 @@ def test_an_equivalent_is_known_by_the_text_of_its_line() -> None:
     lines = SOURCE.decode().split("\n")
     left = [p for p in points(SOURCE) if not is_equivalent(p, FILE, lines, known)]
     assert [p.after for p in points(SOURCE) if p not in left] == ["value <= limit"]
+
+
+def test_each_folder_of_tests_has_a_run_of_its_own() -> None:
+    """In one run, files of one name (test_cli.py) could not be imported, and that killed whatever was tested."""
+    names = ["fcsl_sim/test/test_cli.py::a", "fcsl_compiler/test/test_cli.py::a", "fcsl_sim/test/test_plan.py::b"]
+    parts = mutation_tests.by_folder([mutation_tests.Test(name, 1.0, frozenset()) for name in names])
+    assert [[t.name for t in part] for part in parts] == [[names[1]], [names[0], names[2]]]

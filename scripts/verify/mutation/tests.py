@@ -63,7 +63,7 @@ def _programs(tree: Tree) -> list[tuple[str, ...]]:
     """The C tests, as CTest runs them."""
     runtime = tree.folder / "build/fcsl_runtime"
     found: list[tuple[str, ...]] = []
-    for package in ("fcsl_hal", "fcsl_runtime"):
+    for package in ("fcsl_hal", "fcsl_runtime", "fcsl_sim"):
         files = sorted((tree.folder / "build" / package).glob("test_*"))
         more = (str(runtime / "libfixture.so"),) if package == "fcsl_runtime" else ()
         found += [(str(f), *more) for f in files if os.access(f, os.X_OK) and f.is_file()]
@@ -123,9 +123,17 @@ def killer(
             return None
         limit = START_S + PATIENCE * sum(t.seconds for t in chosen)
         names = Path(folder) / "tests.txt"  # too many for a command line
-        names.write_text("\n".join(t.name for t in chosen))
-        noticed = not _passes([*_PYTEST, "-x", "-q", f"@{names}"], own, tree.folder, limit)
-        return f"pytest ({len(chosen)} tests)" if noticed else None
+        for part in by_folder(chosen):
+            names.write_text("\n".join(t.name for t in part))
+            if not _passes([*_PYTEST, "-x", "-q", f"@{names}"], own, tree.folder, limit):
+                return f"pytest ({len(part)} tests of {part[0].name.split('/')[0]})"
+        return None
+
+
+def by_folder(tests: Sequence[Test]) -> list[list[Test]]:
+    """Tests of pytest by their folder: one run of several imports but one of their files of a name (conftest.py)."""
+    parts = [[t for t in tests if t.name.startswith(f"{folder}/")] for folder in PYTEST_FOLDERS]
+    return [part for part in parts if part]
 
 
 def _passes(line: Sequence[str], environment: Mapping[str, str], folder: Path, limit_s: float) -> bool:
