@@ -3,9 +3,11 @@
  * Two sessions of the bus in two processes: order, who comes late, what is dropped, what is refused.
  */
 #define _GNU_SOURCE
+#include <dirent.h>
+
 #include "bus_rig.h"
 
-enum { VALUES = 8, ROUNDS = 1000, FLOOD = 20000, DEPTH = 4, SMALL = 16 };
+enum { VALUES = 8, ROUNDS = 1000, FLOOD = 20000, DEPTH = 4, SMALL = 16, SESSIONS = 8 };
 
 static const char *const VALUE_KEYS[VALUES] = {"t/a", "t/b", "t/c", "t/d", "t/e", "t/f", "t/g", "t/h"};
 static const char *const TICK_KEY[] = {"t/tick"};
@@ -375,8 +377,42 @@ static void test_one_that_connects_later(void)
     CHECK(fcsl_bus_close(bus, CLOSE_MS) == 0 && fcsl_bus_close(listener, CLOSE_MS) == 0);
 }
 
+static int open_files(void)
+{
+    int count = 0;
+    DIR *files = opendir("/proc/self/fd");
+    CHECK(files != NULL);
+    while (readdir(files) != NULL) {
+        count++;
+    }
+    CHECK(closedir(files) == 0);
+    return count;
+}
+
+/* A session has two files of its own. Zenoh's threads stay, with what the first session opened for them. */
+static void test_closing_leaves_nothing(void)
+{
+    const fcsl_bus_input_t inputs[] = {{.key = ANSWER_KEY[0], .bytes = sizeof(uint64_t), .depth = DEPTH}};
+    int open_after_one = 0;
+    for (int round = 0; round < SESSIONS; round++) {
+        const fcsl_bus_options_t options = {.role = FCSL_BUS_LISTEN,
+                                            .endpoint = free_endpoint(),
+                                            .ring_bytes = RING_BYTES,
+                                            .inputs = inputs,
+                                            .input_count = 1};
+        CHECK(fcsl_bus_close(open_bus(&options), CLOSE_MS) == 0);
+        open_after_one = round == 0 ? open_files() : open_after_one;
+    }
+    const uint64_t deadline_ns = later_ns();
+    while (open_files() > open_after_one + SESSIONS / 2) { /* the last of its threads frees it */
+        CHECK(fcsl_monotonic_ns() < deadline_ns);
+        CHECK(usleep(1000) == 0);
+    }
+}
+
 int main(void)
 {
+    check_alone(test_closing_leaves_nothing);
     check_alone(test_values_come_before_their_tick);
     check_alone(test_a_quiet_input);
     check_alone(test_a_peer_is_as_good);

@@ -172,6 +172,24 @@ static void test_uart_begins_with_a_zero(void)
     }
 }
 
+/* ---- nobody takes what is sent ------------------------------------------------------------------------------------ */
+
+/* A message is one, however many frames it has. */
+static void test_four_messages_wait(void)
+{
+    static const uint8_t message[MESSAGE_BYTES];
+    static const size_t SIZES[] = {1, MESSAGE_BYTES};
+    use_port("tcp:");
+    for (size_t i = 0; i < sizeof SIZES / sizeof SIZES[0]; i++) {
+        const fcsl_wire_t wire = open_wire(FCSL_WIRE_LISTEN);
+        for (int count = 0; count < 4; count++) {
+            CHECK(wire.send(wire.ctx, message, SIZES[i]) == FCSL_WIRE_OK);
+        }
+        CHECK(wire.send(wire.ctx, message, SIZES[i]) == FCSL_WIRE_NONE);
+        wire.close(wire.ctx);
+    }
+}
+
 int main(void)
 {
     CHECK(mkdtemp(folder) != NULL);
@@ -181,6 +199,7 @@ int main(void)
     test_serial_device_in_use();
     test_tcp_begins_with_a_zero();
     test_uart_begins_with_a_zero();
+    test_four_messages_wait();
     CHECK(rmdir(folder) == 0);
     return 0;
 }

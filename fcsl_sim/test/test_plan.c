@@ -7,6 +7,7 @@
 #include <string.h>
 
 #include "check.h"
+#include "fcsl_allocations.h"
 #include "plan/plan.h"
 
 static const char good[] = "fcsl-sim-plan 3\n"
@@ -295,6 +296,26 @@ static void refuses_every_wrong_word(void)
     CHECK(words > 60);
 }
 
+/* Whichever of its tables finds no memory, the plan is refused. */
+static void refuses_without_memory(void)
+{
+    enum { TABLES = 14, MOST = 100 };
+    uint64_t refused = 0;
+    fcsl_plan_t plan;
+    fcsl_error_t error = {{0}};
+    for (int status = -1; status != 0; refused += status != 0) {
+        CHECK(refused < MOST);
+        failing_allocation = refused + 1u;
+        status = fcsl_plan_parse(&plan, every, sizeof every - 1u, &error);
+        failing_allocation = 0;
+        CHECK(status == 0 || strncmp(error.text, "no memory", 9) == 0);
+        fcsl_plan_free(&plan);
+    }
+#if !defined(__SANITIZE_ADDRESS__) && !defined(__SANITIZE_THREAD__)
+    CHECK(refused >= TABLES);
+#endif
+}
+
 static void refuses_long_lines(void)
 {
     static char text[3 * FCSL_PLAN_MAX_LINE];
@@ -356,6 +377,7 @@ int main(void)
     keeps_every_word();
     refuses_every_wrong_word();
     names_the_line();
+    refuses_without_memory();
     refuses_long_lines();
     refuses_truncation();
     survives_garbling();

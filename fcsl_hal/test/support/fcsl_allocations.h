@@ -1,8 +1,8 @@
 /* SPDX-License-Identifier: Apache-2.0
  *
- * For test programs; flight code does not use it. Counts what a thread allocates and frees while it says so. The program's own
- * allocator takes the place of the C library's for every library in the process; a sanitizer has an allocator of its own and
- * calls hooks instead.
+ * For test programs; flight code does not use it. Counts what a thread allocates and frees while it says so, and makes an
+ * allocation fail. The program's own allocator takes the place of the C library's for every library in the process; a sanitizer
+ * has an allocator of its own and calls hooks instead.
  */
 #ifndef FCSL_ALLOCATIONS_H
 #define FCSL_ALLOCATIONS_H
@@ -17,6 +17,8 @@
 /* Volatile: the compiler takes for granted that an allocator changes nothing it can see. */
 static COUNTED_THREADS volatile int counting;
 static COUNTED_THREADS volatile uint64_t allocations;
+/* n: the n-th allocation from now on finds no memory, unless a sanitizer has the allocator. 0: all find some. */
+__attribute__((unused)) static COUNTED_THREADS volatile uint64_t failing_allocation;
 
 #if defined(__SANITIZE_ADDRESS__) || defined(__SANITIZE_THREAD__)
 
@@ -49,28 +51,35 @@ extern void *__libc_realloc(void *old, size_t size);
 extern void *__libc_memalign(size_t alignment, size_t size);
 extern void __libc_free(void *pointer);
 
-void *malloc(size_t size)
+/* Counts an allocation; whether it finds no memory. */
+static int lacks_memory(void)
 {
     allocations += (uint64_t)counting;
-    return __libc_malloc(size);
+    if (failing_allocation == 0u) {
+        return 0;
+    }
+    failing_allocation--;
+    return failing_allocation == 0u;
+}
+
+void *malloc(size_t size)
+{
+    return lacks_memory() ? NULL : __libc_malloc(size);
 }
 
 void *calloc(size_t count, size_t size)
 {
-    allocations += (uint64_t)counting;
-    return __libc_calloc(count, size);
+    return lacks_memory() ? NULL : __libc_calloc(count, size);
 }
 
 void *realloc(void *old, size_t size)
 {
-    allocations += (uint64_t)counting;
-    return __libc_realloc(old, size);
+    return lacks_memory() ? NULL : __libc_realloc(old, size);
 }
 
 void *aligned_alloc(size_t alignment, size_t size)
 {
-    allocations += (uint64_t)counting;
-    return __libc_memalign(alignment, size);
+    return lacks_memory() ? NULL : __libc_memalign(alignment, size);
 }
 
 void free(void *pointer)
