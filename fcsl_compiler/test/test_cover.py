@@ -86,6 +86,13 @@ def test_an_assertion_is_a_line_and_decides_nothing(tmp_path: Path) -> None:
     assert t.share("line") == (2, 2)
 
 
+def test_a_coverage_build_checks_results_too(tmp_path: Path) -> None:
+    t = trial(tmp_path, "self.z = self.x", nan="fail")
+    t.tick(x=float("nan"))
+    assert t.machine.get("law.outputs.health") == "failed"
+    assert t.share("line") == (1, 1) and t.share("branch") == (0, 0)
+
+
 def test_loops(tmp_path: Path) -> None:
     """A loop that may run no iteration has two branches. A loop that always or never runs has none."""
     text = "for i in range(3):\n    for j in range(i):\n        self.k = self.k + j\n        if self.a:\n            break\nfor n in range(0):\n    self.k = 0"

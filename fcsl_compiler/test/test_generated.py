@@ -40,6 +40,23 @@ def test_machines(request: pytest.FixtureRequest) -> None:
     campaign(cases(), max(1, count - count // 3), request.config.getoption("--program-seed"))
 
 
+@pytest.mark.parametrize("backend", ["c", "nim"])
+def test_nan_fails(backend: str) -> None:
+    """Of whole machines, and of one instance alone."""
+    made, told = [], 0
+    for n, case in enumerate(machines(60)):
+        first = next(iter(case.config["instances"]))
+        instances = {
+            name: i | ({"nan": "fail"} if name == first else {}) for name, i in case.config["instances"].items()
+        }
+        some = {"instances": instances} if n % 3 == 0 else {"nan": "fail"}
+        made.append(replace(case, config=case.config | some))
+        told += "is NaN or infinite" in str(harness.by_oracle(made[-1]))
+    assert told > 4
+    found = [text for begin in range(0, 60, 10) for text in harness.check(made[begin : begin + 10], backend)]
+    assert [text for text in found if text] == []
+
+
 def test_elements_of_small_arrays_are_undone(monkeypatch: pytest.MonkeyPatch) -> None:
     """As those of large ones are, which no generated machine has."""
     monkeypatch.setattr(fault_points, "_UNDONE_BYTES", 1)

@@ -12,7 +12,7 @@ from ..base.source import Span
 from ..model import ir
 from ..model.effects import warn_fault_after_effect
 from ..model.types import TypeNames
-from ..parse.python_source import span_of
+from ..parse.python_source import assigned_fields, span_of
 from .algorithm_class import AlgorithmClass, name_span
 from .declarations import Declarations
 from .fault_points import warn_copies
@@ -68,6 +68,7 @@ def check_algorithm(
         tuple(declarations.externs.values()),
         found.requests is not None,
         complete,
+        {method: assigned_fields(node) for method, node in found.methods.items()},
     )
 
 

@@ -51,6 +51,7 @@ _MACHINE = """{
   "$schema": "machine.schema.json",
   "tick_hz": 100,
   "initial_state": "RUN",
+  "nan": "fail",
   "algorithms": {
     "Sensors": {"source": "algorithms/sensors.py"},
     "Controller": {"source": "algorithms/controller.py"}
@@ -164,6 +165,7 @@ _BENCH = """{
   "description": "A test bench: @NAME@ alone, its inputs written by test/test_@NAME@.py.",
   "tick_hz": 10,
   "initial_state": "RUN",
+  "nan": "fail",
   "algorithms": {"@CLASS@": {"source": "algorithms/@NAME@.py"}},
   "instances": {"@NAME@": {"algorithm": "@CLASS@", "parameters": {"rate": 2.0}, "inputs": {"wanted": 0.0}}},
   "connections": [{"from": "machine.dt", "to": "@NAME@.dt"}],

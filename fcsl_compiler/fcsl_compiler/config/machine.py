@@ -14,6 +14,7 @@ from ..check.algorithm import check_algorithm
 from ..check.algorithm_class import AlgorithmClass, size_variables
 from ..check.breakpoints import check_breakpoints
 from ..check.declarations import Declarations
+from ..check.finite import with_finite_results
 from ..check.frozen import Freezer
 from ..check.loop_bounds import check_loops
 from ..check.modules import Modules
@@ -38,6 +39,8 @@ from .structs import read_structs
 from .transitions import read_transitions
 from .views import Signals, is_partial, read_views
 
+#: What becomes of a NaN or an infinity in outputs and state: it is passed on, or the run fails.
+NAN = ("pass", "fail")
 #: Checked algorithms by name, in JSON order. None: an error was reported.
 Algorithms = dict[str, ir.Algorithm | None]
 
@@ -51,7 +54,8 @@ def check_machine(parsed: ParsedMachine, sink: DiagnosticSink) -> Machine | None
     modules = _modules(parsed, program, reader)
     algorithms = _check_algorithms(parsed, modules, reader)
     defined = keys["algorithms"].kind == "object" if "algorithms" in keys else False
-    instances, incomplete = _read_instances(keys.get("instances"), algorithms if defined else None, reader)
+    nan = reader.choice(keys.get("nan"), "`nan`", NAN) or NAN[0]
+    instances, incomplete = _read_instances(keys.get("instances"), algorithms if defined else None, nan, reader)
     _warn_unused(parsed, algorithms, instances, incomplete, sink)
     ports = PortResolver(instances, incomplete, SourceResolver(keys.get("channels"), sink), sink)
     if not _check_ports(parsed, ports):
@@ -203,11 +207,11 @@ def _warn_unused(
 
 
 def _read_instances(
-    node: JsonNode | None, algorithms: Algorithms | None, reader: ConfigReader
+    node: JsonNode | None, algorithms: Algorithms | None, nan: str, reader: ConfigReader
 ) -> tuple[list[Instance], set[str]]:
     """Valid instances, and the names of invalid ones (uses of these are not reported again).
 
-    `algorithms` is None if they could not be read.
+    `algorithms` is None if they could not be read. nan: of instances that do not say it.
     """
     instances: list[Instance] = []
     incomplete: set[str] = set() if node is not None and node.kind == "object" else Everything()
@@ -216,7 +220,7 @@ def _read_instances(
         if name in RESERVED_INSTANCES:
             reader.sink.error("E209", f"`{name}` is reserved", span, help="give the instance another name")
             continue
-        optional = ("parameters", "inputs", "max_wcet_us", "frozen")
+        optional = ("parameters", "inputs", "max_wcet_us", "frozen", "nan")
         shown = span.local(name)
         keys = reader.object(definition, f"instance `{shown}`", ("algorithm",), optional)
         if keys is None or "algorithm" not in keys or algorithms is None:
@@ -242,7 +246,11 @@ def _read_instances(
         if not check_loops(shown, (execute, start), frozen, values, at, reader.sink):
             incomplete.add(name)
             continue
-        instances.append(Instance(name, algorithm, parameters, {}, wcet, frozen, execute, start, span))
+        nan_fails = (reader.choice(keys.get("nan"), "`nan`", NAN) or nan) == "fail"
+        if nan_fails:
+            execute = with_finite_results(execute, algorithm)
+            start = with_finite_results(start, algorithm) if start is not None else None
+        instances.append(Instance(name, algorithm, parameters, {}, wcet, frozen, execute, start, span, True, nan_fails))
     return instances, incomplete
 
 

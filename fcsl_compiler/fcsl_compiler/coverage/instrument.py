@@ -16,6 +16,7 @@ from typing import Any
 
 from ..base.files import digest
 from ..base.source import Span
+from ..check.finite import with_finite_results
 from ..check.frozen import Freezer
 from ..check.intervals import interval
 from ..model import ir, ops
@@ -60,14 +61,18 @@ def instrument(machine: Machine, config: str) -> Covered:
 
 
 def _instance(instance: Instance, entries: dict[str, ir.Function]) -> Instance:
-    """The instance with the probed functions of its algorithm, and its frozen parameters folded again."""
+    """The instance with the probed functions of its algorithm, as its own were made of them: frozen parameters folded, results
+    checked."""
     algorithm = instance.algorithm
     execute = entries[algorithm.execute.name]
     start = entries[algorithm.start.name] if algorithm.start is not None else None
-    if instance.execute.name != algorithm.execute.name:
-        values = {name: instance.parameters[name] for name in instance.frozen}
+    values = {name: instance.parameters[name] for name in instance.frozen}
+    if values:
         freezer = Freezer(algorithm, instance.identifier, values)
         execute, start = freezer.function(execute), freezer.function(start) if start is not None else None
+    if instance.nan_fails:
+        execute = with_finite_results(execute, algorithm)
+        start = with_finite_results(start, algorithm) if start is not None else None
     return replace(instance, execute=execute, start=start)
 
 

@@ -7,7 +7,7 @@ it.
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, field
 
 from ..base.source import Span
@@ -469,6 +469,7 @@ class Algorithm:
     externs: tuple[Extern, ...] = field(default=())  # all declared externs
     makes_requests: bool = False  # declares transition_request
     complete: bool = True  # False after a reported error: then it has its ports and an empty execute
+    assigned: Mapping[str, frozenset[str]] = field(default_factory=dict)  # ports, by the method that assigns them
 
     @property
     def owner(self) -> str:

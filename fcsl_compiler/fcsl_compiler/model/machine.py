@@ -49,6 +49,7 @@ class Instance:
     start: ir.Function | None
     span: Span
     published: bool = True  # as a ROS 2 message and topic
+    nan_fails: bool = False  # a NaN or infinity that it assigns is a fault: its functions check it
 
     @property
     def identifier(self) -> str:

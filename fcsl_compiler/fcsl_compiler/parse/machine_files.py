@@ -52,6 +52,7 @@ _OPTIONAL = (
         "arm",
         "command_timeout_s",
         "start_grace_s",
+        "nan",
         "targets",
         "views",
     ),

@@ -30,6 +30,18 @@ def is_ignored_module(name: str | None) -> bool:
     return name in EDITOR_MODULES
 
 
+def assigned_fields(method: ast.FunctionDef) -> frozenset[str]:
+    """The fields of `self` that a method assigns, wholly or in part."""
+    found = set()
+    for node in ast.walk(method):
+        place: ast.AST = node if isinstance(getattr(node, "ctx", None), ast.Store) else ast.Pass()
+        while isinstance(place, ast.Attribute | ast.Subscript):
+            if isinstance(place.value, ast.Name) and place.value.id == "self" and isinstance(place, ast.Attribute):
+                found.add(place.attr)
+            place = place.value
+    return frozenset(found)
+
+
 def parse_python(source: SourceFile, sink: DiagnosticSink) -> ast.Module | None:
     """Parses the text. Returns None after reporting E110, if it is not valid Python or is nested too deeply."""
     try:

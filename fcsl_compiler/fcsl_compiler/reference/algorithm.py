@@ -6,21 +6,23 @@ from __future__ import annotations
 import ast
 import copy
 import json
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Iterator, Mapping
 from contextlib import suppress
 from dataclasses import dataclass, replace
 from types import MappingProxyType
 from typing import Any
 
+from ..parse.python_source import assigned_fields
 from .annotations import parse_type
 from .arrays import Array
+from .finite import is_finite
 from .infer import REQUIRED, SELF, Kind, Names, annotation_text, kind_of
 from .library import Signatures, Sized, define, execute, library, method, signature
 from .rewrite import Rewriter
 from .runtime import runtime
-from .structs import StructType
+from .structs import StructType, slot
 from .types import SCALARS, Type
-from .values import IllTyped
+from .values import Fault, IllTyped
 
 #: The class-level dictionaries of an algorithm.
 RECORDS = ("inputs", "parameters", "outputs", "state")
@@ -42,6 +44,16 @@ class Extern:
     name: str
     arguments: list[Type]
     result: Type | None
+
+
+@dataclass(frozen=True)
+class Result:
+    """An output or state that a method assigns, and where it is declared."""
+
+    record: str
+    name: str
+    line: int
+    offset: int  # in bytes, from 0
 
 
 def declare_structs(declared: Mapping[str, Mapping[str, str]]) -> dict[str, StructType]:
@@ -187,6 +199,8 @@ class Algorithm:
             if "=" in annotation_text(a)
         }
         methods = [n for n in node.body if isinstance(n, ast.FunctionDef)]
+        #: By method, the outputs and state that it assigns.
+        self.results = {m.name: _results(node, m) for m in methods}
         members = {
             **module.known.members,
             SELF: {n: kind_of(a, {**module.sizes, **sizes}) for n, a in annotations.items()},
@@ -206,6 +220,15 @@ class Algorithm:
         for m in methods:
             setattr(self.type.construct, m.name, getattr(cls, m.name))
         self.execute: Callable[[Any], None] = cls.execute
+
+    def check_finite(self, method: str, self_: Any) -> None:
+        """Raises Fault if a method has assigned a NaN or an infinity: `"nan": "fail"`."""
+        for result in self.results[method]:
+            if not is_finite(getattr(self_, slot(result.name))):
+                word = "output" if result.record == "outputs" else result.record
+                raise Fault(
+                    f"{word} `{result.name}` is NaN or infinite", (self.module.path, result.line, result.offset)
+                )
 
     def run(self, name: str, self_: Any) -> None:
         """Calls start or execute. Raises Fault; other exceptions pass unchanged."""
@@ -238,6 +261,23 @@ def _imports(tree: ast.Module) -> list[tuple[str, str]]:
     nodes = [n for n in tree.body if isinstance(n, ast.ImportFrom)]
     editors = ("fcsl_builtins", "typing", "__future__")
     return [(str(n.module), alias.name) for n in nodes if n.module not in editors for alias in n.names]
+
+
+def _results(node: ast.ClassDef, method: ast.FunctionDef) -> list[Result]:
+    assigned, found = assigned_fields(method), []
+    for record in ("outputs", "state"):
+        keys = [key for name, key in _keys(node) if name == record and key.value in assigned]
+        found += [Result(record, str(key.value), key.lineno, key.col_offset) for key in keys]
+    return found
+
+
+def _keys(node: ast.ClassDef) -> Iterator[tuple[str, ast.Constant]]:
+    """The names of the ports in the dictionaries of a class, with that of the dictionary."""
+    for statement in node.body:
+        if isinstance(statement, ast.Assign | ast.AnnAssign) and isinstance(statement.value, ast.Dict):
+            target = statement.target if isinstance(statement, ast.AnnAssign) else statement.targets[0]
+            assert isinstance(target, ast.Name)
+            yield from ((target.id, key) for key in statement.value.keys if isinstance(key, ast.Constant))
 
 
 def _ports(node: ast.ClassDef) -> dict[str, dict[str, ast.expr]]:

@@ -25,7 +25,10 @@ class FaultPlaces:
         self._sources = {str(Path(source.path).resolve()): source for source in sources}
 
     def number(self, fault: Fault) -> int:
-        """Number of the place where a fault was raised. Raises KeyError if the table belongs to another program."""
+        """Number of a fault's place. Raises KeyError if the table belongs to another program."""
+        if fault.place is not None:
+            path, begin, indent = fault.place
+            return self._numbers[self._row(self._sources[path], begin, indent, fault)]
         frame: TracebackType | None = None
         at = fault.__traceback__
         while at is not None:
@@ -38,8 +41,12 @@ class FaultPlaces:
         assert line is not None
         if offset is None:  # python -X no_debug_ranges: the first such fault of the line
             return next(n for p, n in self._numbers.items() if (p[0], p[1], p[3]) == (source.name, line, str(fault)))
+        return self._numbers[self._row(source, line, offset, fault)]
+
+    @staticmethod
+    def _row(source: SourceFile, line: int, offset: int, fault: Fault) -> FaultRow:
         column = len(source.line(line).encode()[:offset].decode()) + 1
-        return self._numbers[source.name, line, column, str(fault)]
+        return source.name, line, column, str(fault)
 
     @property
     def injected(self) -> int:

@@ -75,6 +75,7 @@ class _Instance:
     """One instance: its algorithm, and `self`, into which each execute loads what the memory holds."""
 
     def __init__(self, instance: Instance, algorithm: Algorithm, given: Mapping[str, Any], reference: ReferenceMachine):
+        self.nan_fails = instance.nan_fails
         self.name, self.algorithm, layout = instance.name, algorithm, reference.layout
         self.limit_ns, self.places = instance.max_wcet_us * 1000, reference.places
         self.given, self.frozen, self._literals = given, frozenset(instance.frozen), reference.literals
@@ -139,6 +140,8 @@ class _Instance:
         self._load_for_start(self.self_, image.bytes)
         try:
             self.algorithm.run("start", self.self_)
+            if self.nan_fails:
+                self.algorithm.check_finite("start", self.self_)
         except Fault as fault:
             image.naturals[self.fault_place] = self.places.number(fault)
             return False
@@ -157,6 +160,8 @@ class _Instance:
             return
         try:
             self.algorithm.execute(self_)
+            if self.nan_fails:
+                self.algorithm.check_finite("execute", self_)
         except Fault as fault:
             self._failed(image, self.places.number(fault))
             return

@@ -18,7 +18,12 @@ _strtof.argtypes, _strtof.restype = [c_char_p, c_void_p], c_float
 
 
 class Fault(Exception):
-    """A contained fault: it ends the `execute` in which it occurs. str() is its cause."""
+    """A contained fault: it ends the `execute` in which it occurs. str() is its cause. place: path of a file, line, and
+    offset in bytes; by default where it is raised."""
+
+    def __init__(self, cause: str, place: tuple[str, int, int] | None = None):
+        super().__init__(cause)
+        self.place = place
 
 
 class IllTyped(TypeError):

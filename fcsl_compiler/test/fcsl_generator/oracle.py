@@ -527,3 +527,31 @@ def call(function: t.Function, records: Records, board: Board | None = None) -> 
         Frame(constants_of(function.constants), {}, records, board).run(function.block)
     except _Return:
         pass
+
+
+def assigned(block: t.Block) -> set[str]:
+    """The fields that statements assign, wholly or in part."""
+    found: set[str] = set()
+    for s in block:
+        if isinstance(s, t.If):
+            found.update(*(assigned(part) for _, part in s.branches))
+        elif isinstance(s, t.For):
+            found |= assigned(s.block)
+        targets = [s.target] if isinstance(s, t.Assign) else s.targets if isinstance(s, t.Unpack) else []
+        for place in targets:
+            while isinstance(place, t.Index | t.Member):
+                place = place.base
+            if isinstance(place, t.Field):
+                found.add(place.name)
+    return found
+
+
+def is_finite(value: Any) -> bool:
+    """Whether no float of a value is a NaN or an infinity."""
+    if isinstance(value, float | np.floating):
+        return bool(np.isfinite(value))
+    if isinstance(value, np.ndarray):
+        return all(map(is_finite, value.flat))
+    if isinstance(value, dict):
+        return all(map(is_finite, value.values()))
+    return all(map(is_finite, value)) if isinstance(value, list | tuple) else True

@@ -68,9 +68,20 @@ class OracleMachine:
             if start is not None:
                 try:
                     oracle.call(start, self.records[name])
+                    self._check_finite(name, start)
                 except oracle.Fault as fault:
                     return [name, str(fault)]
         return []
+
+    def _check_finite(self, name: str, method: t.Function) -> None:
+        """What the method may assign is finite, where "nan" is "fail". Raises Fault."""
+        if self.config["instances"][name].get("nan", self.config.get("nan")) != "fail":
+            return
+        assigned = oracle.assigned(method.block)
+        for record, word in (("outputs", "output"), ("state", "state")):
+            for port in self._types(name, record):
+                if port in assigned and not oracle.is_finite(self.records[name][record][port]):
+                    raise oracle.Fault(f"{word} `{port}` is NaN or infinite")
 
     def _is_frozen(self, instance: str, parameter: str) -> bool:
         frozen = self.config["instances"][instance].get("frozen", [])
@@ -206,6 +217,7 @@ class OracleMachine:
             if injected == "fault":
                 raise oracle.Fault("injected")
             oracle.call(self.algorithm(name).execute, records, self.board)
+            self._check_finite(name, self.algorithm(name).execute)
             self.last_run[name] = self.tick
             self.resumes.discard(name)
         except oracle.Fault as fault:

@@ -5,7 +5,7 @@ from __future__ import annotations
 
 from ..types import BOOL, Scalar
 from . import convert, floats, integers, ordered
-from .op import Doc, Op, assertion, op_id
+from .op import Doc, Op, assertion, op_id, requirement
 
 __all__ = [
     "BUILTINS",
@@ -19,6 +19,7 @@ __all__ = [
     "find",
     "is_test",
     "op_id",
+    "requirement",
 ]
 
 _TABLE: dict[tuple[str, tuple[Scalar, ...]], Op] = {

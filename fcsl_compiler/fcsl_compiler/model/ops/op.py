@@ -47,9 +47,14 @@ class Op:
         return op_id(self.name, self.args)
 
 
+def requirement(cause: str) -> Op:
+    """It faults unless its operand is true."""
+    return Op("assert", (BOOL,), BOOL, (cause,))
+
+
 def assertion(text: str) -> Op:
-    """`assert condition, text`: it faults unless its operand is true. text: "" for none."""
-    return Op("assert", (BOOL,), BOOL, (f"assertion failed: {text}" if text else "assertion failed",))
+    """`assert condition, text`. text: "" for none."""
+    return requirement(f"assertion failed: {text}" if text else "assertion failed")
 
 
 def overflow(t: Scalar) -> str:
