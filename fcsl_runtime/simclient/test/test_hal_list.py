@@ -8,12 +8,14 @@ import os
 import pty
 import struct
 import tty
+from dataclasses import astuple
 from pathlib import Path
 
 import pytest
 from hal_rig import Iio, run, write_plan
 
 from fcsl_compiler.board.drivers import ACTUATOR, known_drivers
+from fcsl_compiler.board.filters import low_pass, notch
 from simclient.hal.driver import any_driver
 
 #: Drivers that are proposed for each serial port.
@@ -220,6 +222,50 @@ def test_describe_hardware(tmp_path: Path) -> None:
 
 def bits(*values: float) -> str:
     return " ".join(struct.pack(">d", value).hex() for value in values)
+
+
+def test_describe_every_line_of_a_sensor(tmp_path: Path) -> None:
+    plan = tmp_path / "craft.plan"
+    one, none = (1, 0, 0, 0, 1, 0, 0, 0, 1), (0, 0, 0)
+    sections = [f"section gyro {bits(*astuple(s))}" for s in (low_pass(40, 200), notch(60, 10, 200))]
+    lines = ["machine craft 100", "device imu 5000000 iio icm42688", "device air 0 i2c_air /dev/i2c-1"]
+    lines += ["sensor inertial inertial", "health 200000000 50000000 1000000000", f"limits accel {bits(-160, 160)}"]
+    lines += [f"tolerance gyro {bits(0.5)}", "bind gyro gyro", "backend imu", "signal gyro gyro", "signal accel accel"]
+    lines += [f"correct gyro {bits(*one, 1, 2, 3, 0, 0, 0.5, 25)}", *sections]
+    lines += [f"correct accel {bits(2, *one[1:], *none, *none, 0)}"]
+    lines += ["sensor barometer barometer", "health 100000000 0 2000000000", "bind pressure pressure", "backend air"]
+    lines += ["signal pressure pressure", f"correct pressure {bits(1.5, *one[1:], 20, 0, 0, 0.25, 0, 0, 15)}"]
+    lines += [f"section pressure {bits(*astuple(low_pass(10, 200)))}", "backend imu", "signal pressure temperature"]
+    lines += [f"correct pressure {bits(*one, *none, *none, 0)}"]
+    plan.write_text("\n".join(["fcsl-board-plan 1", *lines, "end", ""]))
+    text = run(tmp_path, "describe", plan).stdout.splitlines()
+    assert text[text.index("sensor inertial (inertial)") :] == [
+        "sensor inertial (inertial)",
+        "  gyro → channel gyro",
+        "  healthy: a reading younger than 0.2 s, not the same for 0.05 s; one that failed counts again after 1 s",
+        "  accel between -160 and 160 m/s^2",
+        "  gyro within 0.5 rad/s of the other devices",
+        "  1. imu",
+        "     gyro: its signal gyro",
+        "     accel: its signal accel",
+        "     gyro: offset [1, 2, 3] rad/s",
+        "     gyro: offset changes by [0, 0, 0.5] rad/s per kelvin above 25 degC",
+        "     accel: times [2, 0, 0], [0, 1, 0], [0, 0, 1]",
+        "     gyro: low-pass at 40 Hz",
+        "     gyro: notch at 60 Hz",
+        "",
+        "sensor barometer (barometer)",
+        "  pressure → channel pressure",
+        "  healthy: a reading younger than 0.1 s; one that failed counts again after 2 s",
+        "  1. air",
+        "     pressure: its signal pressure",
+        "     pressure: offset 20 Pa",
+        "     pressure: offset changes by 0.25 Pa per kelvin above 15 degC",
+        "     pressure: times 1.5",
+        "     pressure: low-pass",
+        "  2. imu",
+        "     pressure: its signal temperature",
+    ]
 
 
 def test_describe_outputs_and_sticks(tmp_path: Path) -> None:
