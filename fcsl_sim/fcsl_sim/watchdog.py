@@ -37,7 +37,6 @@ class Watchdog:
         self._over = threading.Event()
         self._thread = threading.Thread(target=self._watch, daemon=True)
         self._signalled, self._wake = os.pipe2(os.O_NONBLOCK | os.O_CLOEXEC)
-        self._before = -1
 
     def __enter__(self) -> Watchdog:
         self._before = signal.set_wakeup_fd(self._wake, warn_on_full_buffer=False)

@@ -62,6 +62,7 @@ def test_the_offset_of_a_gyro_is_written(tmp_path: Path, sysfs: Path) -> None:
     before = board.read_text()
     words = ("calibrate", "gyro", board, "--sensor", "inertial", "--device", "imu", "--seconds", "0.5")
     said = run(sysfs, *words).stdout
+    assert "keep the vehicle still for 0.5 s\n" in said
     assert '{"correct": {"gyro": {"offset": [0.011, -0.022, 0.033]}}}' in said
     assert board.read_text() == before
     said = run(sysfs, *words, "--write").stdout

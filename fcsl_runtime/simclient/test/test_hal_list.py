@@ -177,10 +177,12 @@ def test_a_device_that_is_silent(tmp_path: Path) -> None:
     os.close(secondary)
 
 
-def test_an_actuator_is_not_opened(tmp_path: Path) -> None:
-    done = run(tmp_path, "describe", "log", tmp_path / "log")
+@pytest.mark.parametrize("name", ["log", "l"])
+def test_an_actuator_is_not_opened(name: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.chdir(tmp_path)
+    done = run(tmp_path, "describe", "log", name)
     assert "is there; an actuator is not opened" in done.stdout
-    assert not (tmp_path / "log").exists()
+    assert not (tmp_path / name).exists()
 
 
 def test_describe_a_plan(tmp_path: Path) -> None:

@@ -169,6 +169,7 @@ def test_a_body_that_is_not_recorded_is_told(tmp_path: Path) -> None:
         "nav.outputs.turned (of another shape)",
         "/none/x.stl (no such file; a box takes its place)",
     ]
+    assert [c.entity_path for c in RrdReader(str(tmp_path / "x.rrd")).stream() if c.entity_path.endswith("/box")]
 
 
 PANELS = """{"panels": [
