@@ -41,7 +41,8 @@ class AttitudeLaw:
     Source: PX4 Autopilot, AttitudeControl.cpp (error, reduced attitude, weight of yaw); the weight here does not change
     `gain`. The split is that of a rotation into swing and twist about z: the twist is (e0, 0, 0, ez) normalized.
     Limits: at 180 degrees of tilt error yaw is not defined: there the whole error counts. At 180 degrees of error the way
-    is that which the signs of e give. Quaternions need not be of unit length; of length zero or not finite they give NaN.
+    is that which the signs of e give. Quaternions need not be of unit length. If one has none or is not finite, or target_rate is not, the run is passed
+    over: outputs stay, and health is degraded.
     """
 
     inputs = {
@@ -71,8 +72,11 @@ class AttitudeLaw:
             half = self.yaw_weight * atan2(whole[3], whole[0])
             if self.yaw_weight < 1.0:
                 error = quat_mul(tilt, [cos(half), 0.0, 0.0, sin(half)])
+        wanted = 2.0 * self.gain * error[1:] + quat_rotate(whole, self.target_rate)
+        if not all(isfinite(wanted)):
+            self.health = "degraded"
+            return
         self.error = 2.0 * error[1:]
-        wanted = self.gain * self.error + quat_rotate(whole, self.target_rate)
         self.command = clamp(wanted, -self.limit, self.limit)
         self.saturated = any(abs(wanted) > self.limit)
 

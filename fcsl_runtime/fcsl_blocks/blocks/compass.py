@@ -3,6 +3,8 @@
 
 from fcsl_builtins import all, atan2, cross3, hypot, isfinite, matvec, norm, pi, quat_to_dcm, wrap_angle
 
+LEAST_LEVEL = 0.01  # squared cosine of the pitch: the x axis is 84 degrees up or down, and has no heading
+
 
 class Compass:
     """The heading of the body by the magnetic field and the vertical.
@@ -17,8 +19,10 @@ class Compass:
     Source: derived; the same as turning the field level by roll and pitch ("tilt compensation"; Razor AHRS, Compass_Heading).
     Hard and soft iron as in PX4's calibration: an offset and a matrix.
     Limits: an error of the tilt turns the heading by as much as the field dips: tan(dip) times the tilt across it, 2.3 times at
-    67 degrees. A sample is passed over (fresh is false, heading stays, health is degraded) if it is not finite, if the field
-    or the body's x axis is vertical, or if `strength` is given and B differs from it by more than `strength_tolerance`,
+    67 degrees. So do the filter's own errors, and the turn within the run that the attitude is old: tan(dip) times rate times
+    period. A filter that takes the heading for independent of its tilt becomes overconfident in yaw; let its sigma be
+    hypot(noise, tan(dip) (tilt sigma + turn in a period)) at least. A sample is passed over (fresh is false, heading stays,
+    health is degraded) if it is not finite, if the field is vertical, the body's x axis within 6 degrees of it, or if `strength` is given and B differs from it by more than `strength_tolerance`,
     relative: iron or a motor is near. Iron that turns the field and keeps its strength is not found.
     """
 
@@ -55,7 +59,8 @@ class Compass:
         east = cross3(down, field)
         north = cross3(east, down)
         weak = self.strength > 0.0 and not abs(norm(field) / self.strength - 1.0) <= self.strength_tolerance
-        if weak or not (all(isfinite(north)) and hypot(east[0], north[0]) > 0.0):
+        steep = not 1.0 - down[0] * down[0] > LEAST_LEVEL
+        if weak or steep or not (all(isfinite(north)) and hypot(east[0], north[0]) > 0.0):
             self.health = "degraded"
             return
         heading = atan2(east[0], north[0]) + self.declination

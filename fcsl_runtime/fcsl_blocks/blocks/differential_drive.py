@@ -28,7 +28,8 @@ class DifferentialDrive:
 
     Source: ros2_controllers, diff_drive_controller (kinematics); REP-103 (axes, units). The one ratio instead of separate
     limits follows from left and right being linear in (v, w).
-    Limits: no slip. A limit of 0 stops the vehicle. NaN and infinities come out as NaN.
+    Limits: no slip. A limit of 0 stops the vehicle. If an input is not finite, the run is passed over: outputs stay, and
+    health is degraded.
     """
 
     inputs = {
@@ -52,6 +53,9 @@ class DifferentialDrive:
     }
 
     def execute(self):
+        if not (isfinite(self.speed) and isfinite(self.yaw_rate)):
+            self.health = "degraded"
+            return
         half = 0.5 * self.wheel_separation
         left = (self.speed - self.yaw_rate * half) / self.left_radius
         right = (self.speed + self.yaw_rate * half) / self.right_radius

@@ -22,7 +22,7 @@ class Geofence:
     ray, after W. R. Franklin's PNPOLY); ArduPilot, libraries/AC_Avoidance/AP_OABendyRuler.cpp (distance with a negative sign
     outside). Here the sign of a cross product tells on which side of the position an edge crosses the ray.
     Limits: a plane, not the globe. Where edges cross one another, the even-odd rule holds: what is enclosed twice is
-    outside. Fewer than three points enclose nothing: breached; a count below 1 counts as 1, one above n as n. On the border
+    outside. A count below 3 encloses nothing: breached, as a fence that nobody has loaded; one above n counts as n. On the border
     itself, `inside` may be either within a few roundings. Outside of polygon and altitudes at once, clearance is the worse of
     both distances, not the way back. floor above ceiling: always breached. Between two runs a vehicle may pass a narrow
     polygon unseen. If an input is not finite or a distance overflows, the run is passed over: outputs stay, health is
@@ -92,8 +92,9 @@ class Geofence:
         self.nearest = nearest
         self.vertical_distance = vertical
         self.clearance = min(self.distance, vertical)
-        self.inside = self.clearance >= 0.0
+        empty = self.count < 3
+        self.inside = self.clearance >= 0.0 and not empty
         more = self.hysteresis if self.begun else 0.0
-        self.breached = self.clearance < (more if self.breached else 0.0)
-        self.warning = self.clearance < self.warning_distance + (more if self.warning else 0.0)
+        self.breached = empty or self.clearance < (more if self.breached else 0.0)
+        self.warning = empty or self.clearance < self.warning_distance + (more if self.warning else 0.0)
         self.begun = True

@@ -1,8 +1,10 @@
 # SPDX-License-Identifier: Apache-2.0
 """Monitors of one value: range, standing still, rate of change."""
 
-from fcsl_builtins import abs, isfinite
+from fcsl_builtins import abs, clamp, isfinite
 from logic import debounced, reached
+
+GREATEST = 1.7976931348623157e308
 
 
 class RangeMonitor:
@@ -164,7 +166,8 @@ class RateMonitor:
             self.gap += self.period
             self.health = "degraded"
             return
-        self.rate = (self.value - self.last) / self.gap if self.begun else 0.0
+        rate = (self.value - self.last) / self.gap if self.begun else 0.0
+        self.rate = clamp(rate, -GREATEST, GREATEST)
         self.last = self.value
         self.gap = self.period
         self.begun = True

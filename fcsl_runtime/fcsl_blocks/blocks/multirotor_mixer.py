@@ -24,7 +24,8 @@ class MultirotorMixer:
     bounded by each pair of rotors, and b by each rotor.
     Limits: thrusts are parallel to z. Geometries that cannot command all four axes, or that need a rotor without thrust
     or with negative thrust for pure lift (an element of M3 is not above zero), have health failed; their outputs mean
-    nothing. Limits low..high that hold for no f at all are kept rotor by rotor. NaN and infinities come out as NaN.
+    nothing. Limits low..high that hold for no f at all are kept rotor by rotor. A run whose thrusts are not finite, as of
+    an input that is no number, is passed over: outputs stay, and health is degraded.
     """
 
     inputs = {
@@ -59,8 +60,7 @@ class MultirotorMixer:
             effect[3, i] = 1.0
         mix = ldl_solve(symmetric_product(effect, transpose(effect)), effect)  # rows: roll, pitch, yaw, thrust
         lift = mix[3]
-        if not (all(isfinite(lift)) and all(lift > 0.0)):
-            self.health = "failed"
+        sound = all(isfinite(lift)) and all(lift > 0.0)
 
         # shares are of the torques divided by these, which overflow nowhere
         tilt = max(1.0, abs(self.torque[0]), abs(self.torque[1]))
@@ -87,7 +87,13 @@ class MultirotorMixer:
                 rest = min(rest, max(0.0, (self.high[i] - wanted[i]) / yaw[i]))
             if yaw[i] < 0.0:
                 rest = min(rest, max(0.0, (self.low[i] - wanted[i]) / yaw[i]))
-        self.rotor_thrust = clamp(wanted + rest * yaw, self.low, self.high)
+        thrusts = clamp(wanted + rest * yaw, self.low, self.high)
+        if not sound:
+            self.health = "failed"
+        elif not all(isfinite(thrusts)):
+            self.health = "degraded"
+            return
+        self.rotor_thrust = thrusts
         applied = matvec(effect, self.rotor_thrust)
         self.applied_torque = applied[0:3]
         self.applied_thrust = applied[3]

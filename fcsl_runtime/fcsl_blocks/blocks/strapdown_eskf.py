@@ -128,8 +128,10 @@ def fused(
     innovation = difference
     r = zeros(m, m)
     column = zeros(m, 1)
+    measured = False
     for i in range(m):
         r[i, i] = sigma[i] * sigma[i]
+        measured = measured or r[i, i] > 0.0
         if r[i, i] == 0.0:
             r[i, i] = 1.0
             rows[i] = zeros(N)
@@ -137,7 +139,7 @@ def fused(
         column[i, 0] = innovation[i]
     s = symmetric_product(matmul(rows, p), transpose(rows)) + r
     square = dot(innovation, ldl_solve(s, column)[:, 0])
-    if not isfinite(square):
+    if not (measured and isfinite(square)):
         return nan, False, innovation, x, p
     k = kf_gain(p, rows, r)
     if not square < gate:
@@ -176,7 +178,7 @@ class StrapdownEskf:
 
     q' = q (x) exp(angle), v' = v + R(q (x) exp(angle / 2)) push + g dt, p' = p + (v + v') dt / 2
 
-    The 19 errors are angle (about body axes: q_true = q (x) exp(dtheta)), velocity, position, bg, ba, and those of two aids:
+    up is -1 with z_down, else 1. The 19 errors are angle (about body axes: q_true = q (x) exp(dtheta)), velocity, position, bg, ba, and those of two aids:
     the drift b of a measured position (of GNSS, say), a Gauss-Markov process, and the bias c of a height (a barometer's):
 
     d/dt dtheta = -w x dtheta - dbg - noise, d/dt dv = -R (f x dtheta) - R dba - noise, d/dt dp = dv,
@@ -187,11 +189,12 @@ class StrapdownEskf:
     position = p + b + R a        velocity = v + R (w x a)          (arm of the antenna)
     height = up p_z + c           heading = atan2(R_10, R_00)       (the turn of body x about the world's z axis)
     body_velocity = R^T v + w x a (wheels, Doppler, pitot; a wheeled vehicle measures 0 aside and down)
-    range = (c - n.(p + R a)) / (n.R b)      (along the beam b to the plane n.y = c; n = vertical: the ground)
+    range = (h - n.(p + R a)) / (n.R r)      (along the beam r to the plane n.y = h; n = vertical: the ground)
 
     Each is taken alone, in this order, in Joseph's form: K = P H^T S^-1, S = H P H^T + diag(sigma^2), dx = K innovation, P =
     (I - K H) P (I - K H)^T + K R K^T; then dx goes into the state, and P = G P G^T with G = I - [dtheta / 2]x. Elements with
-    a sigma of 0 are not measured: so is the height of a position in the plane. An aid is rejected if innovation^T S^-1
+    a sigma of 0 are not measured: so is the height of a position in the plane. An aid that is fresh and has no other sigma is
+    not used, and health is degraded. An aid is rejected if innovation^T S^-1
     innovation is not below its gate: chi squared. The defaults reject one in 10^4 of the samples that fit. If an aid has been
     rejected for reset_after, reset_count times in a row at least, the next sample sets what it measures (position, velocity
     or heading), as the gain that moves this alone, in Joseph's form. What may have led it away in the
@@ -210,7 +213,7 @@ class StrapdownEskf:
     the transition are added. PX4 Autopilot, ekf2 (range_height_control.cpp, ev_yaw_control.cpp): gates, time-outs, and the
     gain that sets one state. Jacobians of the aids: derived from R_true = R (I + [dtheta]x).
     Limits: flat earth that does not turn, constant gravity; coning and sculling within a period are left out. Aids are taken
-    to be of this run: a delay is an error of speed times delay; keep `..._fresh` true for one run per sample. Errors of an
+    to be of this run: a delay is an error of speed times delay, which DelayCompensation takes off; keep `..._fresh` true for one run per sample. Errors of an
     aid are white but for b and c, or its sigma must cover them: a drift that is taken for white noise becomes velocity, and the
     filter claims to know the position several times better than it does. A constant part of b cannot be observed by position
     alone. Where the errors of first_position are those of the first sample, give a first_position_sigma that is larger than

@@ -124,13 +124,18 @@ def test_half_turns(block: Callable[..., Any]) -> None:
 def test_law_extremes(block: Callable[..., Any]) -> None:
     a = law(block, yaw_weight=0.5, limit=[3.0] * 3)
     rng = np.random.default_rng(1)
+    before = arrays(a.step(attitude=[1.0, 0.0, 0.0, 0.0], target=[0.6, 0.8, 0.0, 0.0], target_rate=[0.0] * 3))
     for _ in range(150):
         v = rng.choice(ODD, 11)
         out = arrays(a.step(attitude=v[:4].tolist(), target=v[4:8].tolist(), target_rate=v[8:].tolist()))
         if np.isfinite(v[:8]).all() and v[:4].any() and v[4:8].any():
             assert np.isfinite(out["error"]).all()
-        elif np.isnan(v[:8]).any():
-            assert np.isnan(out["command"]).any()
+        else:
+            assert out["health"] == "degraded"
+        if out["health"] == "degraded":
+            assert all((out[n] == before[n]).all() for n in ("command", "error"))
+        assert (np.abs(out["command"]) <= 3.0).all() and np.isfinite(v).all() | (out["health"] == "degraded")
+        before = out
     assert a.native.get_value("block.counters.faults") == 0
 
 

@@ -64,6 +64,15 @@ def test_an_error_of_the_tilt_turns_it_by_the_dip(block: Callable[..., Any]) -> 
     )
 
 
+def test_no_heading_along_the_vertical(block: Callable[..., Any]) -> None:
+    c = compass(block)
+    for pitch, fresh in ((1.4, True), (1.5, False), (1.5708, False), (-1.5, False)):
+        r = Rotation.from_euler("ZYX", [0.4, pitch, 0.2])
+        out = c.step(**seen(r), attitude=r.as_quat(scalar_first=True).tolist(), attitude_valid=True)
+        assert (out["fresh"], out["health"]) == (fresh, "nominal" if fresh else "degraded")
+        assert out["heading"] == pytest.approx(0.4, abs=1e-9)
+
+
 @pytest.mark.parametrize(
     "field",
     [

@@ -89,13 +89,16 @@ def test_a_limit_of_zero_stops_it_and_limits_change_in_flight(block: Callable[..
 
 def test_drive_extremes(block: Callable[..., Any]) -> None:
     d = drive(block, max_speed=1.0, max_wheel_speed=8.0)
+    before = d.step(speed=0.1, yaw_rate=0.1)
     for v in ODD:
         for w in ODD:
             out = d.step(speed=v, yaw_rate=w)
             if np.isfinite(v) and np.isfinite(w):
                 assert abs(out["left"]) <= 8.0 and abs(out["right"]) <= 8.0
-            elif np.isnan(v) or np.isnan(w):
-                assert np.isnan(out["left"]) and np.isnan(out["right"])
+                assert out["health"] == "nominal"
+            else:
+                assert out == before | {"health": "degraded"}
+            before = out
     assert d.native.get_value("block.counters.faults") == 0
     # a break makes no difference
     before = d.step(speed=0.3, yaw_rate=0.2)

@@ -182,11 +182,13 @@ def test_after_a_break_the_hysteresis_begins_anew(block: Callable[..., Any]) -> 
 
 def test_few_points_enclose_nothing(block: Callable[..., Any]) -> None:
     f = Fence(block, SQUARE)
-    assert f.step((5.0, 0.0), count=2)["breached"] is False  # on the border
+    on_border = f.step((5.0, 0.0), count=2)
+    assert on_border["breached"] and on_border["warning"] and not on_border["inside"]
     for count, distance in ((-7, -5.0), (0, -5.0), (1, -5.0), (2, -4.0)):
         out = f.step((3.0, 4.0), count=count)
         assert out["breached"] and not out["inside"] and out["distance"] == distance
-    assert f.step((3.0, 2.0), count=3)["inside"] and not f.step((3.0, 4.0), count=3)["inside"]
+    assert f.step((0.0, 0.0), polygon=[[0.0, 0.0]] * 4, count=0)["breached"]  # nobody has loaded a fence
+    assert f.step((3.0, 2.0), polygon=SQUARE, count=3)["inside"] and not f.step((3.0, 4.0), count=3)["inside"]
     assert f.step((3.0, 4.0), count=99)["distance"] == 3.0
 
 

@@ -173,11 +173,14 @@ def test_extremes(block: Callable[..., Any], may_raise: bool) -> None:
     of = VEHICLES["odd hexa"]
     m = mixer(block, of, may_raise=may_raise)
     rng = np.random.default_rng(9)
+    before = feed(m, [0.1, 0.0, 0.0, 10.0])
     for c in [*rng.choice(ODD, (150, 4)), *([v] * 4 for v in ODD)]:
         out = feed(m, c)
         if np.isfinite(c).all():
             assert (out["rotor_thrust"] >= of["low"]).all() and (out["rotor_thrust"] <= of["high"]).all(), c
             assert 0.0 <= out["tilt_share"] <= 1.0 and 0.0 <= out["yaw_share"] <= 1.0
-        elif np.isnan(c).any():
-            assert np.isnan(out["rotor_thrust"]).all()
+        if np.isnan(c).any():
+            assert out["health"] == "degraded" and (out["rotor_thrust"] == before["rotor_thrust"]).all()
+        assert out["health"] in ("nominal", "degraded") and np.isfinite(out["rotor_thrust"]).all()
+        before = out
     assert m.native.get_value("block.counters.faults") == 0

@@ -631,6 +631,18 @@ def test_a_barometer_with_an_offset(block: Callable[..., Any]) -> None:
     assert alone["position"][2] == pytest.approx(-20.0, abs=0.5) and alone["position_sigma"][2] < 0.6
 
 
+@pytest.mark.parametrize("aid", AIDS)
+def test_an_aid_without_any_deviation_is_not_used_and_said(block: Callable[..., Any], aid: str) -> None:
+    """Not as a sample that was taken: whoever forgot the deviation sees it by health and age."""
+    none = {n: 0.0 * np.array(v) for n, v in SIGMAS.items() if n.startswith(f"measured_{aid}_sigma")}
+    f, _ = launched(block, LEVEL, DOWN, **none)
+    for k in range(3):
+        out = feed(f, **HOVER, **seen(**{aid: FAR[aid]}))
+        assert out["health"] == "degraded" and out["aid_age"][AIDS.index(aid)] == pytest.approx((k + 2) * H)
+    assert not out["rejected"].any() and not out["rejections"].any()
+    assert feed(f, **HOVER)["health"] == "nominal"
+
+
 def test_ages_of_the_aids(block: Callable[..., Any]) -> None:
     """Since a sample was taken: rejected ones and those that are not finite do not count."""
     f, _ = launched(block, LEVEL, DOWN)
@@ -826,7 +838,7 @@ def test_an_element_without_a_deviation_is_not_measured(block: Callable[..., Any
         assert out[f"{aid}_innovation"][1:].tolist() == [0.0, 0.0]
     else:
         out = feed(f, **HOVER, **seen(**{aid: FAR[aid]}))
-    assert not out["rejected"].any() and out["health"] == "nominal"
+    assert not out["rejected"].any() and out["health"] == ("nominal" if aid in VECTORS else "degraded")
     compare(f, out, reference)
 
 
