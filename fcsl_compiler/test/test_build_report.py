@@ -266,6 +266,24 @@ def test_string_instructions_from_the_next_multiple_of_8_on_are_counted(tmp_path
         assert turns - 2 * times <= bound_of(tmp_path, text, function) <= turns + 30 * times, function
 
 
+@pytest.mark.parametrize(
+    ("instruction", "register", "is_known"),
+    [("movsb", "esi", False), ("stosb", "esi", True), ("movsb", "edi", False), ("stosb", "edi", False)]
+    + [(name, "ecx", False) for name in ("movsb", "stosb")],
+)
+def test_a_string_instruction_changes_its_registers(
+    instruction: str, register: str, is_known: bool, tmp_path: Path
+) -> None:
+    """A loop of as many turns as its register says: 10 before the instruction. Of the count 0 are left, which are 2^32 turns."""
+    text = f"""__asm__(".text; .globl f; .type f,@function; f: mov $10,%esi; mov $10,%edi; mov $10,%ecx;"
+        "rep {instruction}; 1: dec %{register}; jne 1b; ret");"""
+    if is_known:
+        assert 20 < bound_of(tmp_path, text, "f") < 60
+    else:
+        with pytest.raises(Unbounded):
+            bound_of(tmp_path, text, "f")
+
+
 def test_a_count_that_depends_on_an_address_is_known_up_to_a_step() -> None:
     """(address - multiple of 8 + size) / 8, in 32 bits: one number or two, by the size."""
     for size, least, last in ((160, 19, 19), (163, 19, 20)):

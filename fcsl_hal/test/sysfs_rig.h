@@ -234,4 +234,17 @@ static inline int is_near(double value, double expected)
     return fabs(value - expected) <= 1e-12 * fabs(expected);
 }
 
+/* A program without standard input gets its number for a file of the driver, which is closed all the same. */
+static inline void check_without_standard_input(const fcsl_driver_t *driver, const char *device, const char *used)
+{
+    rig_t rig;
+    const int kept = dup(STDIN_FILENO);
+    (void)close(STDIN_FILENO);
+    CHECK(rig_open(&rig, driver, device, used) == FCSL_DRIVER_OK && fcntl(STDIN_FILENO, F_GETFD) != -1);
+    CHECK(rig_read(&rig) == FCSL_DRIVER_OK);
+    rig_close(&rig);
+    CHECK(fcntl(STDIN_FILENO, F_GETFD) == -1);
+    CHECK(kept < 0 || (dup2(kept, STDIN_FILENO) == STDIN_FILENO && close(kept) == 0));
+}
+
 #endif /* FCSL_SYSFS_RIG_H */

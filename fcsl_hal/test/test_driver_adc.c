@@ -43,6 +43,7 @@ int main(void)
     const int files = count_files();
     check_counts();
     check_names();
+    check_without_standard_input(adc, "ads1015", "counts3");
     CHECK(count_files() == files);
     remove_tree();
     return 0;

@@ -363,6 +363,7 @@ int main(void)
     check_hostile_texts();
     check_no_files();
     check_no_permission();
+    check_without_standard_input(iio, "bmp390", "pressure");
     CHECK(count_files() == files);
     remove_tree();
     return 0;

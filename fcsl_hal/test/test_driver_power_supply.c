@@ -109,6 +109,7 @@ int main(void)
     check_signs();
     check_unknown_charge();
     check_missing();
+    check_without_standard_input(supply, "BAT0", "voltage");
     CHECK(count_files() == files);
     remove_tree();
     return 0;

@@ -63,6 +63,7 @@ int main(void)
     const int files = count_files();
     check_values();
     check_names();
+    check_without_standard_input(thermal, "cpu-thermal", "value");
     CHECK(count_files() == files);
     remove_tree();
     return 0;

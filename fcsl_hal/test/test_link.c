@@ -326,6 +326,26 @@ static void test_restart_within_a_message(void)
     CHECK(fcsl_link_receive(&b, RELIABLE, received, 3, &size) == 0 && memcmp(received, "new", 3) == 0);
 }
 
+/* Of less than a header and a CRC: a right CRC does not make a frame of it. */
+static void test_short_frames(void)
+{
+    open_ends();
+    exchange(10, &NONE);
+    const uint64_t other_version = b.counters.other_version;
+    for (size_t size = 0; size < 8; size++) {
+        uint8_t frame[8] = {0};
+        const uint16_t crc = fcsl_crc16(0xFFFFu, frame, size > 2 ? size - 2 : 0);
+        if (size >= 2) {
+            frame[size - 2] = (uint8_t)crc;
+            frame[size - 1] = (uint8_t)(crc >> 8);
+        }
+        const uint64_t malformed = b.counters.malformed;
+        fcsl_link_take_frame(&b, frame, size);
+        CHECK(b.counters.malformed == malformed + 1u);
+    }
+    CHECK(b.counters.wrong_crc == 0 && b.counters.other_version == other_version);
+}
+
 /* Anything at all may arrive; it is counted, and the link goes on. */
 static void test_garbage(void)
 {
@@ -435,6 +455,7 @@ int main(void)
     test_latest();
     test_restart();
     test_restart_within_a_message();
+    test_short_frames();
     test_garbage();
     test_streams();
     return 0;

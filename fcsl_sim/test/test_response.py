@@ -427,6 +427,8 @@ def test_a_picture_marks_crossings_and_margins() -> None:
     assert margin == pytest.approx(90.0 - 2.0 * math.degrees(math.atan(exact)), abs=0.2)
     assert [text.get_text() for text in phase.texts] == [f"{margin:.1f}°"]
     assert phase.get_title("left").startswith(f"phase margin {margin:.1f}° at 0.4")
+    # Each stands at two thirds of its margin, towards the line that it is measured from.
+    assert [axis.texts[0].xy[1] for axis in (gain, phase)] == pytest.approx([-12.0 / 3, -180.0 + margin / 3], abs=0.1)
     # Sensitivity has axes of its own, as outputs have.
     assert sensitivity.get_title("left").startswith("largest sensitivity 1.83 (5.3 dB) at 0.631")
     legends = [[text.get_text() for text in axis.get_legend().get_texts()] for axis in (gain, sensitivity, outputs)]

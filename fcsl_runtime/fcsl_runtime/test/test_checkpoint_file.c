@@ -7,6 +7,7 @@
 #include <string.h>
 #include <unistd.h>
 
+#include "fcsl/fcsl_mcap_writer.h"
 #include "fcsl/fcsl_run.h"
 #include "fcsl_check.h"
 
@@ -55,6 +56,31 @@ static void test_full_of_hardware(fcsl_run_t *run)
     free(room);
 }
 
+/* Sizes that do not add up to the whole are damage, behind a right CRC, too. */
+static void test_parts_of_other_sizes(fcsl_run_t *run)
+{
+    enum { AT_STRUCT_BYTES = 40, AT_ENTRIES = 44, AT_NAME_BYTES = 52 };
+    static const size_t PARTS[] = {AT_STRUCT_BYTES, AT_ENTRIES, AT_NAME_BYTES};
+    fcsl_error_t error;
+    uint8_t *bytes = malloc(fcsl_run_checkpoint_capacity(run));
+    CHECK(bytes != NULL);
+    const size_t size = fcsl_run_checkpoint(run, bytes);
+    for (size_t i = 0; i < sizeof PARTS / sizeof PARTS[0]; i++) {
+        for (int change = -1; change <= 1; change++) {
+            bytes[PARTS[i]] = (uint8_t)(bytes[PARTS[i]] + change);
+            const uint32_t crc = fcsl_mcap_crc32(bytes, size - 4);
+            for (unsigned k = 0; k < 4; k++) {
+                bytes[size - 4 + k] = (uint8_t)(crc >> 8 * k);
+            }
+            const int failed = fcsl_run_restore_checkpoint(run, bytes, size, 0, &error);
+            CHECK((failed != 0) == (change != 0));
+            CHECK(change == 0 || strstr(error.text, "its parts have other sizes than the whole") != NULL);
+            bytes[PARTS[i]] = (uint8_t)(bytes[PARTS[i]] - change);
+        }
+    }
+    free(bytes);
+}
+
 int main(int argc, char **argv)
 {
     CHECK(argc == 2);
@@ -74,6 +100,7 @@ int main(int argc, char **argv)
     CHECK(fcsl_run_restore_file(second, argv[1], 0, &error) != 0 && strstr(error.text, "not a checkpoint") != NULL);
     CHECK(fcsl_run_restore_file(second, folder, 0, &error) != 0 && strstr(error.text, "not a regular file") != NULL);
     CHECK(fcsl_run_save_file(second, "/proc/none/checkpoint", &error) != 0 && same(steady, second));
+    test_parts_of_other_sizes(second);
     test_full_of_hardware(second);
     CHECK(fcsl_run_close(steady, &error) == 0 && fcsl_run_close(second, &error) == 0);
     CHECK(unlink(path) == 0 && rmdir(folder) == 0);

@@ -147,6 +147,24 @@ def test_a_position_of_constants_and_of_another_topic(tmp_path: Path) -> None:
     assert list(poses[0.41]) == pytest.approx([1.5, 123.0, 82.0])
 
 
+def test_a_position_of_a_topic_that_is_silent_keeps_its_newest_value(tmp_path: Path) -> None:
+    """Through batches that have nothing of it; before its first value the vehicle is hidden."""
+    stream = rr.RecordingStream("test")
+    stream.save(tmp_path / "x.rrd")
+    body = Body("lander", 3.0, ("nav.inputs.seen", "body.outputs.z", 1.5), "", "", "-z", "")
+    stage = Scene(stream, Cast("/m", VEHICLE, [], INSIDE, Views((), body)))
+    for k in range(6):
+        told = {INSIDE[0].topic: (np.array([k * STEP_S]), {"seen": np.array([3.0 * k])})}
+        if k in (1, 3):
+            told[VEHICLE[2].topic] = (np.array([k * STEP_S]), {"z": np.array([2.0 * k])})
+        stage.show(told, [])
+    stream.disconnect()
+    poses = values(read_rrd(tmp_path / "x.rrd"), "/world/vehicle", TRANSLATION)
+    assert [list(position) for _, position in poses[-5:]] == [
+        pytest.approx([3.0 * k, z, 1.5]) for k, z in enumerate((2.0, 2.0, 6.0, 6.0, 6.0), start=1)
+    ]
+
+
 def test_an_attitude_alone_stays_at_the_origin(tmp_path: Path) -> None:
     rows = play(tmp_path / "x.rrd", VEHICLE, [10], Body("satellite", 1.0, (), "nav.outputs.turned", "", "+z", ""))
     assert "/world/vehicle" not in rows and len(values(rows, "/world/vehicle/body", TURN)) == 10
