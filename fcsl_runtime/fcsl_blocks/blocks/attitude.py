@@ -40,9 +40,9 @@ class AttitudeLaw:
 
     Source: PX4 Autopilot, AttitudeControl.cpp (error, reduced attitude, weight of yaw); the weight here does not change
     `gain`. The split is that of a rotation into swing and twist about z: the twist is (e0, 0, 0, ez) normalized.
-    Limits: at 180 degrees of tilt error yaw is not defined: there the whole error counts. At 180 degrees of error the way
-    is that which the signs of e give. Quaternions need not be of unit length. If one has none or is not finite, or target_rate is not, the run is passed
-    over: outputs stay, and health is degraded.
+    Limits: at 180 degrees of tilt error yaw is not defined: there the whole error counts. At 180 degrees of error the way is
+    that which the signs of e give. Quaternions need not be of unit length. If one has none or is not finite, or target_rate is
+    not, the run is passed over: outputs stay, and health is degraded.
     """
 
     inputs = {

@@ -18,12 +18,13 @@ class Compass:
 
     Source: derived; the same as turning the field level by roll and pitch ("tilt compensation"; Razor AHRS, Compass_Heading).
     Hard and soft iron as in PX4's calibration: an offset and a matrix.
-    Limits: an error of the tilt turns the heading by as much as the field dips: tan(dip) times the tilt across it, 2.3 times at
-    67 degrees. So do the filter's own errors, and the turn within the run that the attitude is old: tan(dip) times rate times
-    period. A filter that takes the heading for independent of its tilt becomes overconfident in yaw; let its sigma be
+    Limits: an error of the tilt turns the heading by as much as the field dips: tan(dip) times the tilt across it, 2.3 times
+    at 67 degrees. So do the filter's own errors, and the turn within the run that the attitude is old: tan(dip) times rate
+    times period. A filter that takes the heading for independent of its tilt becomes overconfident in yaw; let its sigma be
     hypot(noise, tan(dip) (tilt sigma + turn in a period)) at least. A sample is passed over (fresh is false, heading stays,
-    health is degraded) if it is not finite, if the field is vertical, the body's x axis within 6 degrees of it, or if `strength` is given and B differs from it by more than `strength_tolerance`,
-    relative: iron or a motor is near. Iron that turns the field and keeps its strength is not found.
+    health is degraded) if it is not finite, if the field is vertical, the body's x axis within 6 degrees of it, or if
+    `strength` is given and B differs from it by more than `strength_tolerance`, relative: iron or a motor is near. Iron that
+    turns the field and keeps its strength is not found.
     """
 
     inputs = {

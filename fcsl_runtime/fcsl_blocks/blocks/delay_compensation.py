@@ -18,11 +18,11 @@ class DelayCompensation:
     Discrete-time Kalman Filter" (CDC 1998, abstract): extrapolation of the measurement to the present. Integrating the rate,
     in place of the difference of two estimates, keeps the corrections in between out of it.
     Limits: the error of the rate times the delay is added to the measurement, and is correlated with the filter's; noise and
-    gain of the filter are not corrected for it. Of a position with an antenna arm, rate is that of the antenna; a heading comes
-    out unwrapped. The memory is that of the fastest rate at which it runs, rounded up. `rate` of this run is that of the run before, so an acceleration a makes an
-    error of a period delay / 2. Where the memory is shorter than the delay (after a break, too: `resumed`), what it holds is
-    used, and health is degraded. A measurement whose sum is not finite is passed over: present stays, fresh is false, health
-    is degraded.
+    gain of the filter are not corrected for it. Of a position with an antenna arm, rate is that of the antenna; a heading
+    comes out unwrapped. The memory is that of the fastest rate at which it runs, rounded up. `rate` of this run is that of the
+    run before, so an acceleration a makes an error of a period delay / 2. Where the memory is shorter than the delay (after a
+    break, too: `resumed`), what it holds is used, and health is degraded. A measurement whose sum is not finite is passed
+    over: present stays, fresh is false, health is degraded.
     """
 
     inputs = {

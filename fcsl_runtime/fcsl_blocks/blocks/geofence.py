@@ -21,8 +21,8 @@ class Geofence:
     Source: PX4-Autopilot, src/modules/navigator/geofence.cpp, and ArduPilot, libraries/AP_Math/polygon.cpp (crossings of a
     ray, after W. R. Franklin's PNPOLY); ArduPilot, libraries/AC_Avoidance/AP_OABendyRuler.cpp (distance with a negative sign
     outside). Here the sign of a cross product tells on which side of the position an edge crosses the ray.
-    Limits: a plane, not the globe. Where edges cross one another, the even-odd rule holds: what is enclosed twice is
-    outside. A count below 3 encloses nothing: breached, as a fence that nobody has loaded; one above n counts as n. On the border
+    Limits: a plane, not the globe. Where edges cross one another, the even-odd rule holds: what is enclosed twice is outside.
+    A count below 3 encloses nothing: breached, as a fence that nobody has loaded; one above n counts as n. On the border
     itself, `inside` may be either within a few roundings. Outside of polygon and altitudes at once, clearance is the worse of
     both distances, not the way back. floor above ceiling: always breached. Between two runs a vehicle may pass a narrow
     polygon unseen. If an input is not finite or a distance overflows, the run is passed over: outputs stay, health is

@@ -178,8 +178,9 @@ class StrapdownEskf:
 
     q' = q (x) exp(angle), v' = v + R(q (x) exp(angle / 2)) push + g dt, p' = p + (v + v') dt / 2
 
-    up is -1 with z_down, else 1. The 19 errors are angle (about body axes: q_true = q (x) exp(dtheta)), velocity, position, bg, ba, and those of two aids:
-    the drift b of a measured position (of GNSS, say), a Gauss-Markov process, and the bias c of a height (a barometer's):
+    up is -1 with z_down, else 1. The 19 errors are angle (about body axes: q_true = q (x) exp(dtheta)), velocity, position, bg,
+    ba, and those of two aids: the drift b of a measured position (of GNSS, say), a Gauss-Markov process, and the bias c of a
+    height (a barometer's):
 
     d/dt dtheta = -w x dtheta - dbg - noise, d/dt dv = -R (f x dtheta) - R dba - noise, d/dt dp = dv,
     d/dt b = -b / measured_position_drift_time + noise, other biases: random walks
@@ -213,14 +214,14 @@ class StrapdownEskf:
     the transition are added. PX4 Autopilot, ekf2 (range_height_control.cpp, ev_yaw_control.cpp): gates, time-outs, and the
     gain that sets one state. Jacobians of the aids: derived from R_true = R (I + [dtheta]x).
     Limits: flat earth that does not turn, constant gravity; coning and sculling within a period are left out. Aids are taken
-    to be of this run: a delay is an error of speed times delay, which DelayCompensation takes off; keep `..._fresh` true for one run per sample. Errors of an
-    aid are white but for b and c, or its sigma must cover them: a drift that is taken for white noise becomes velocity, and the
-    filter claims to know the position several times better than it does. A constant part of b cannot be observed by position
-    alone. Where the errors of first_position are those of the first sample, give a first_position_sigma that is larger than
-    both: the sample itself then makes the correlation. No heading within 6 degrees of the vertical. Heading is observable only by
-    its aid, or by horizontal acceleration beside position or velocity. An IMU sample that is not finite, or that makes the
-    estimate so, is passed over: outputs stay, health is degraded, the next sample is taken for the whole gap. Of an aid that
-    is not finite only this aid is passed over.
+    to be of this run: a delay is an error of speed times delay, which DelayCompensation takes off; keep `..._fresh` true for
+    one run per sample. Errors of an aid are white but for b and c, or its sigma must cover them: a drift that is taken for
+    white noise becomes velocity, and the filter claims to know the position several times better than it does. A constant part
+    of b cannot be observed by position alone. Where the errors of first_position are those of the first sample, give a
+    first_position_sigma that is larger than both: the sample itself then makes the correlation. No heading within 6 degrees of
+    the vertical. Heading is observable only by its aid, or by horizontal acceleration beside position or velocity. An IMU
+    sample that is not finite, or that makes the estimate so, is passed over: outputs stay, health is degraded, the next sample
+    is taken for the whole gap. Of an aid that is not finite only this aid is passed over.
     """
 
     inputs = {
