@@ -108,6 +108,12 @@ def test_without_constants_a_string_is_no_number(tmp_path: Path) -> None:
         ({"half": "trak / 2"}, "E252", "parameter `half`: there is no constant `trak`; did you mean `track`?"),
         ({"half": "track * track"}, "E252", "parameter `half`: its unit is m2, not m"),
         ({"vector": ["rate", 0.0, 0.0]}, "E252", "parameter `vector`: its unit is 1/s, not m"),
+        ({"half": "2 * rate"}, "E252", "parameter `half`: its unit is 1/s, not m"),
+        ({"half": "1 / rate // 2"}, "E252", "parameter `half`: its unit is s, not m"),
+        ({"plain": "1 + ("}, "E252", "`1 + (` is no expression: `(` is not closed"),
+        ({"plain": "2 + if"}, "E252", "`2 + if` is no expression from `if` on"),
+        ({"plain": "track *"}, "E252", "`track *` is no expression: it breaks off"),
+        ({"plain": "1e308 * ratio"}, "E252", "`1e308 * ratio` overflows: it is beyond the range of f64"),
         ({"count": "ratio / 2"}, "E207", "parameter `count` is i32, not a number with a point"),
         ({"plain": "track >"}, "E252", ""),
         ({"plain": "ratio / 0"}, "E252", ""),
@@ -125,7 +131,18 @@ def test_wrong_expressions(tmp_path: Path, change: dict[str, Any], code: str, me
 @pytest.mark.parametrize(
     ("constants", "code", "message"),
     [
-        ({"a": "b", "b": 1}, "E252", "constant `a`: there is no constant `b`"),
+        ({"a": "b", "b": 1}, "E252", "constant `a`: the constant `b` is defined below: move it above"),
+        ({"a": "a"}, "E252", "constant `a`: there is no constant `a`; there are none"),
+        ({"a": "b"}, "E252", "constant `a`: there is no constant `b`"),
+        ({"if": 1}, "E203", "`if` cannot name a constant"),
+        ({"min": 1}, "E203", "`min` cannot name a constant"),
+        ({"true": 1}, "E203", "`true` cannot name a constant"),
+        ({"a": {"value": 1, "unit": "m!!"}}, "E252", "`m!!` is not a unit"),
+        (
+            {"a": {"value": 1.0, "unit": "m"}, "b": {"value": "2*a", "unit": "s"}},
+            "E252",
+            "constant `b`: its unit is m, not s",
+        ),
         (
             {"a": {"value": 1.0, "unit": "m"}, "b": {"value": "a", "unit": "s"}},
             "E252",
@@ -148,6 +165,35 @@ def test_wrong_constants(tmp_path: Path, constants: Any, code: str, message: str
         build_machine(path)
     first = caught.value.diagnostics[0]
     assert first.code == code and message in first.message, first
+
+
+def test_a_factor_of_literals_keeps_the_unit(tmp_path: Path) -> None:
+    """One without a unit that is a constant may convert."""
+    period = {"value": "ratio / (7 * rate)", "unit": "ms"}
+    twins = Twins(
+        machine(tmp_path, {**CONSTANTS, "period": period, "double": {"value": "2 * track", "unit": "m"}}, half="double")
+    )
+    assert twins.native.get("law.parameters.half") == 0.9
+
+
+@pytest.mark.parametrize("unit", ["Hz", "1/s", "s^-1", ""])
+def test_a_rate_is_in_hertz(tmp_path: Path, unit: str) -> None:
+    machine(tmp_path, {**CONSTANTS, "rate": {"value": 50, "unit": unit}})
+    build_machine(tmp_path / "several.json")
+
+
+@pytest.mark.parametrize(
+    ("rate", "code", "message"),
+    [
+        ({"value": 50, "unit": "m"}, "E252", "a rate (Hz): its unit is m, not Hz"),
+        ({"value": "100 / 2"}, "E208", "a rate (Hz) is an integer, not 50.0"),
+    ],
+)
+def test_wrong_rates(tmp_path: Path, rate: Any, code: str, message: str) -> None:
+    with pytest.raises(DiagnosticError) as caught:
+        build_machine(machine(tmp_path, {**CONSTANTS, "rate": rate}))
+    (found,) = caught.value.diagnostics
+    assert found.code == code and message in found.message, found
 
 
 COLUMN = """
@@ -204,6 +250,12 @@ def test_columns_of_files(tmp_path: Path) -> None:
         ("x,gain\n0,0\n1,0\n2,0\n", {}, "E207", "parameter `xs` is f64[4], not a column of 3"),
         ("x,gain\n0,0\n1,0\n2,0\n3,0\n", {"column": "gian"}, "E253", "`tables/gains.csv` has no column `gian`"),
         ("x,gain\n0,0\n1,0\n2,0\n3,nan\n", {}, "E253", "line 5 of `tables/gains.csv`: `nan` in column `gain`"),
+        (
+            "x,gain\n0,0\n1,0\n2,0\n3,1e99\n",
+            {},
+            "E207",
+            "line 5 of `tables/gains.csv`: parameter `gains`: the literal is",
+        ),
         ("", {}, "E253", "`tables/gains.csv` has no column `x`"),
         ("x,gain\n0,0\n1,0\n2,0\n3,0\n", {"csv": "../up.csv"}, "E253", "it would leave its folder"),
         ("x,gain\n0,0\n1,0\n2,0\n3,0\n", {"row": 1}, "E201", "unknown key `row`"),
@@ -216,6 +268,40 @@ def test_wrong_columns(tmp_path: Path, text: str, gains: dict[str, Any], code: s
         build_machine(path)
     first = caught.value.diagnostics[0]
     assert first.code == code and message in first.message, first
+
+
+def of_integers(folder: Path, type_: str, text: str) -> Path:
+    path = of_columns(folder)
+    law = folder / "law.py"
+    law.write_text(law.read_text().replace("f32[4]", f"{type_}[4]"))
+    (folder / "tables/gains.csv").write_text("x,gain\n" + "".join(f"{x},{y}\n" for x, y in enumerate(text.split())))
+    return path
+
+
+def test_a_column_of_integers(tmp_path: Path) -> None:
+    twins = Twins(of_integers(tmp_path, "i64", "3 -4.0 1e3 9007199254740993"))
+    twins.step()
+    assert twins.native.get("law.parameters.gains") == [3, -4, 1000, 9007199254740993]
+
+
+@pytest.mark.parametrize(
+    ("type_", "text", "message"),
+    [
+        ("i32", "3 4 5.5 6", "line 4 of `tables/gains.csv`: parameter `gains` is i32, not a number with a point"),
+        ("u32", "3 4 5 -6", "line 5 of `tables/gains.csv`: parameter `gains`: -6 does not fit u32"),
+        ("i32", "3e9 4 5 6", "line 2 of `tables/gains.csv`: parameter `gains`: 3000000000 does not fit i32"),
+        (
+            "i32",
+            "3 4 5 1e-9999999",
+            "line 5 of `tables/gains.csv`: parameter `gains` is i32, not a number with a point",
+        ),
+    ],
+)
+def test_no_integers(tmp_path: Path, type_: str, text: str, message: str) -> None:
+    with pytest.raises(DiagnosticError) as caught:
+        build_machine(of_integers(tmp_path, type_, text))
+    (found,) = caught.value.diagnostics
+    assert found.code == "E207" and found.message.startswith(message), found
 
 
 def test_a_table_that_is_no_file(tmp_path: Path) -> None:

@@ -50,7 +50,7 @@ def check_machine(parsed: ParsedMachine, sink: DiagnosticSink) -> Machine | None
     reader, keys = ConfigReader(sink, parsed.constants), parsed.keys
     reader.scopes = parsed.joined.scopes
     program = Program(read_structs(keys.get("structs"), reader))
-    tick_hz = reader.integer(keys.get("tick_hz"), "tick_hz", 1, MAX_TICK_HZ) or 0
+    tick_hz = reader.integer(keys.get("tick_hz"), "tick_hz", 1, MAX_TICK_HZ, "Hz") or 0
     modules = _modules(parsed, program, reader)
     algorithms = _check_algorithms(parsed, modules, reader)
     defined = keys["algorithms"].kind == "object" if "algorithms" in keys else False

@@ -90,7 +90,7 @@ def _rate(node: JsonNode, tick_hz: int, reader: ConfigReader) -> tuple[int, int]
 
 
 def _divisor(node: JsonNode, tick_hz: int, reader: ConfigReader) -> int | None:
-    hz = reader.integer(node, "a rate (Hz)", 1, tick_hz)
+    hz = reader.integer(node, "a rate (Hz)", 1, tick_hz, "Hz")
     if hz is None:
         return None
     if tick_hz % hz:

@@ -40,7 +40,7 @@ _MEMBERSHIP: dict[type[ast.cmpop], str] = {ast.In: "in", ast.NotIn: "not in"}
 _LITERAL = re.compile(r"0|[1-9]\d*|(\d+\.\d*|\.\d+|\d+(?=[eE]))([eE][+-]?\d+)?|'[^'\\]*'|\"[^\"\\]*\"|True|False")
 _PATH = re.compile(r"[\w.]+(\[[\d, ]+\]|\.\w+)*")
 _QUOTED = re.compile(r"'[^']*'|\"[^\"]*\"")
-_WORDS = {"true": True, "false": False}
+WORDS = {"true": True, "false": False}
 #: Of one value each, or of two and more.
 FUNCTIONS = ("abs", "min", "max", "sqrt", "degrees", "norm", "isnan", "isfinite")
 #: Of all ticks of a flight; `min` and `max` of one value are, too.
@@ -58,9 +58,10 @@ def parse(
     series: bool = False,
     metrics: Mapping[str, Quantity] | None = None,
     condition: bool = False,
+    pure_numbers: bool = False,
 ) -> Node:
     """find: what a path is. series: with the functions of all ticks. metrics: names of other expressions that it may read.
-    condition: it must be true or false.
+    condition: it must be true or false. pure_numbers: a factor of literals alone converts no unit, so `2 * x` has that of x.
 
     Raises ExpressionError.
     """
@@ -69,11 +70,21 @@ def parse(
     try:
         tree = ast.parse(text, mode="eval").body
     except (SyntaxError, ValueError, MemoryError, RecursionError) as error:
-        raise ExpressionError(f"`{text}` is no expression: {error}") from None
-    root = _Checker(text, find, series, metrics or {}).root(tree, condition)
+        raise ExpressionError(f"`{text}` is no expression{_unread(text, error)}") from None
+    root = _Checker(text, find, series, metrics or {}, pure_numbers).root(tree, condition)
     if not series and _steps(root) > STEPS_MAX:
         raise ExpressionError(f"`{text[:60]}…` is too long: write parts of it by themselves")
     return root
+
+
+def _unread(text: str, error: Exception) -> str:
+    """Where Python gave up."""
+    if not isinstance(error, SyntaxError) or error.lineno != 1:
+        return ""
+    rest = text[error.offset - 1 :] if error.offset else ""
+    if error.msg.endswith("was never closed"):
+        return f": `{rest[:1]}` is not closed"
+    return f" from `{rest}` on" if rest else ": it breaks off"
 
 
 def _check_text(text: str) -> None:
@@ -102,8 +113,9 @@ def _steps(node: Node) -> int:
 
 
 class _Checker:
-    def __init__(self, text: str, find: Find, series: bool, metrics: Mapping[str, Quantity]):
+    def __init__(self, text: str, find: Find, series: bool, metrics: Mapping[str, Quantity], pure_numbers: bool):
         self._text, self._find, self._series, self._metrics = text, find, series, metrics
+        self._pure_numbers = pure_numbers
         self._values = self._depth = 0
         self._signs = self._nested = 0  # signs, `not` and `**` around a part; the most of them
         self._columns = False  # within a function of all ticks
@@ -163,8 +175,8 @@ class _Checker:
     def _leaf(self, e: ast.Constant | ast.Name | ast.Attribute | ast.Subscript) -> Node:
         if isinstance(e, ast.Constant):
             return self._literal(e, e.value)
-        if isinstance(e, ast.Name) and e.id in _WORDS:
-            return self._literal(e, _WORDS[e.id])
+        if isinstance(e, ast.Name) and e.id in WORDS:
+            return self._literal(e, WORDS[e.id])
         if isinstance(e, ast.Name) and e.id in self._metrics:
             if self._columns:
                 raise ExpressionError(
@@ -198,7 +210,7 @@ class _Checker:
                 raise self._wrong(whole)
             e = e.value
         source = self._source(whole)
-        if e.id in _WORDS or not _PATH.fullmatch(source):
+        if e.id in WORDS or not _PATH.fullmatch(source):
             raise self._wrong(whole)
         return e.id + "".join(reversed(parts))
 
@@ -287,7 +299,10 @@ class _Checker:
         parts = (self._need_number(left), self._need_number(right))
         kind = Kind.FLOAT if operator in ("/", "**") else _joined(parts)
         a, b = left.quantity.unit, right.quantity.unit
-        if operator in ("+", "-", "%"):
+        if self._pure_numbers and operator in ("*", "/", "//") and (a is None) != (b is None):
+            a, b = (() if unit is None and _is_pure(part) else unit for unit, part in zip((a, b), parts, strict=True))
+            unit = units.product(a, b, 1 if operator == "*" else -1)
+        elif operator in ("+", "-", "%"):
             unit = self._same_unit(parts, f"`{operator}`")
         elif operator == "//":
             unit = None if self._same_unit(parts, "`//`") is None else ()
@@ -403,6 +418,11 @@ class _Checker:
         return self._made(
             e, name, (part,), Quantity(kept, part.quantity.shape, part.quantity.unit, part.quantity.names)
         )
+
+
+def _is_pure(node: Node) -> bool:
+    """Whether it is made of literals alone."""
+    return all(part.operator == "literal" for part in node.walk() if not part.parts)
 
 
 def _joined(parts: tuple[Node, ...]) -> Kind:

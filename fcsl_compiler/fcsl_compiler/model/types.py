@@ -254,7 +254,7 @@ def parse_type(text: str, names: TypeNames, allow_unit: bool) -> tuple[Type, str
         raise TypeSyntaxError(f"`{text.strip()}`: each size has separate brackets", f'write "{name}{split}{behind}"')
     if ".." in unit:
         raise TypeSyntaxError(f"`{unit}` is not a unit", "a range follows `in`, and only parameters have one")
-    if unit and not _UNIT.fullmatch(unit):
+    if unit and not is_unit(unit):
         raise TypeSyntaxError(f"`{unit}` is not a unit", "write it like `rad/s`, `m/s^2`, `N*m`")
     if unit and isinstance(element, Struct):
         raise TypeSyntaxError(f"a unit (`{unit}`) after a struct", "declare units at its members, in the machine JSON")
@@ -263,6 +263,10 @@ def parse_type(text: str, names: TypeNames, allow_unit: bool) -> tuple[Type, str
     array = Array(element, tuple(_extent(extent, names.sizes) for extent in extents))
     check_size(array)
     return array, unit
+
+
+def is_unit(text: str) -> bool:
+    return _UNIT.fullmatch(text) is not None
 
 
 def check_size(type_: Type) -> None:

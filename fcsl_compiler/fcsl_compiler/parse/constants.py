@@ -3,6 +3,8 @@
 
 from __future__ import annotations
 
+import keyword
+import math
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -10,7 +12,7 @@ from ..base.diagnostics import nearest
 from ..base.files import SourceError
 from ..base.source import SourceFile, Span
 from ..expression.evaluate import SCALARS, evaluator
-from ..expression.parse import parse
+from ..expression.parse import FUNCTIONS, WORDS, parse
 from ..expression.tree import ExpressionError, Kind, Node, Quantity
 from ..expression.units import Unit, read, text
 from .json_source import JsonNode, parse_json
@@ -25,12 +27,14 @@ HELP = "write a number, or an expression of the constants before it, such as `2 
 
 
 class Constants:
-    """The constants of one file, in its order. `used`: those that a value reads, directly or by another one."""
+    """The constants of one file, in its order. `used`: those that a value reads, directly or by another one. `later`: those
+    that follow."""
 
     def __init__(self) -> None:
         self._known: dict[str, tuple[Number, str]] = {}
         self._of: dict[str, set[str]] = {}  # by name, the constants that its own value reads
         self.used: set[str] = set()
+        self.later: set[str] = set()
 
     def add(self, name: str, expression: str | Number, unit: str) -> None:
         """Raises ExpressionError."""
@@ -38,20 +42,22 @@ class Constants:
         self.used.clear()
         value, found = self.evaluate(expression) if isinstance(expression, str) else (expression, None)
         read_by, self.used = self.used, before
-        if unit and found is not None and found != read(unit):
-            raise ExpressionError(f"its unit is {text(found)}, not {unit}")
         self._known[name] = value, unit or (text(found) if found is not None else "")
         self._of[name] = read_by
+        if unit and found is not None and found != read(unit):
+            raise ExpressionError(f"its unit is {text(found)}, not {unit}")
 
     def evaluate(self, expression: str) -> tuple[Number, Unit | None]:
         """The value of an expression and its unit (None: any). Raises ExpressionError."""
-        node = parse(expression, self._find)
+        node = parse(expression, self._find, pure_numbers=True)
         if node.quantity.kind not in (Kind.INTEGER, Kind.FLOAT) or node.quantity.shape:
             raise ExpressionError(f"`{expression}` is no number")
         for name in (part.value for part in node.walk() if part.operator == "field"):
             self.used |= {name, *self._of[name]}
         value = evaluator(node, SCALARS)(self._value)
         assert isinstance(value, int | float)
+        if not math.isfinite(value):
+            raise ExpressionError(f"`{expression}` overflows: it is beyond the range of f64")
         return value, node.quantity.unit
 
     @property
@@ -60,6 +66,8 @@ class Constants:
         return [f"{name} {self._known[name][0]!r} {self._known[name][1]}" for name in sorted(self.used)]
 
     def _find(self, name: str) -> Quantity:
+        if name in self.later:
+            raise ExpressionError(f"the constant `{name}` is defined below: move it above")
         if name not in self._known:
             known = list(self._known)
             hint = nearest(name, known) or f"there are {', '.join(known)}" if known else "there are none"
@@ -77,11 +85,16 @@ def read_constants(node: JsonNode | None, config: Path, reader: ConfigReader, ou
     found = Constants()
     if node is not None and node.kind == "string":
         node = _file(str(node.value), node.span, config, reader, outside)
-    for name, (definition, span) in reader.named(node, "`constants`").items():
+    definitions = reader.named(node, "`constants`")
+    found.later = set(definitions)
+    for name, (definition, span) in definitions.items():
+        found.later.discard(name)
+        if reason := _reserved(name):
+            reader.sink.error("E203", f"`{name}` cannot name a constant", span, why=reason, help="choose another name")
         expression, unit = definition, ""
         if definition.kind == "object":
             keys = reader.object(definition, f"constant `{name}`", ("value",), ("unit",)) or {}
-            unit = reader.string(keys.get("unit"), "`unit`", "m") or ""
+            unit = _unit(keys.get("unit"), reader)
             if "value" not in keys:
                 continue
             expression = keys["value"]
@@ -94,6 +107,23 @@ def read_constants(node: JsonNode | None, config: Path, reader: ConfigReader, ou
         except ExpressionError as error:
             reader.sink.error("E252", f"constant `{name}`: {error}", span, help=HELP)
     return found
+
+
+def _reserved(name: str) -> str:
+    """Why no expression could read a constant of this name."""
+    if name in FUNCTIONS:
+        return "it is a function of expressions"
+    return "it is a word of Python, whose syntax expressions have" if keyword.iskeyword(name) or name in WORDS else ""
+
+
+def _unit(node: JsonNode | None, reader: ConfigReader) -> str:
+    from ..model.types import is_unit  # here: an unchanged machine is found in the cache without its types
+
+    unit = reader.string(node, "`unit`", "m") or ""
+    if node is None or not unit or is_unit(unit):
+        return unit
+    reader.sink.error("E252", f"`{unit}` is not a unit", node.span, help="write it like `rad/s`, `m/s^2`, `N*m`")
+    return ""
 
 
 def _file(name: str, span: Span, config: Path, reader: ConfigReader, outside: bool) -> JsonNode | None:

@@ -23,6 +23,12 @@ _MAX_BYTES = 1 << 20
 def read_column(node: JsonNode, what: str, reader: ConfigReader) -> tuple[float, ...] | None:
     """The numbers of `{"csv": "wing.csv", "column": "lift"}`; the file is beside that of the node. None after reporting what
     is wrong with it."""
+    cells = read_cells(node, what, reader)
+    return None if cells is None else tuple(float(cell) for _, cell in cells)
+
+
+def read_cells(node: JsonNode, what: str, reader: ConfigReader) -> list[tuple[int, str]] | None:
+    """The same as texts, each a finite number, with the lines that they stand in."""
     keys = reader.object(node, what, ("csv", "column"))
     text = reader.string(keys.get("csv"), "`csv`") if keys else None
     column = reader.string(keys.get("column"), "`column`") if keys else None
@@ -40,18 +46,22 @@ def read_column(node: JsonNode, what: str, reader: ConfigReader) -> tuple[float,
         reader.sink.error("E253", f"`{text}` has no column `{column}`", keys["column"].span, help=hint)
         return None
     index = names.index(column)
-    values = []
+    cells = []
     for line, row in rows[1:]:
         cell = row[index] if index < len(row) else ""
-        try:
-            values.append(float(cell))
-        except ValueError:
-            values.append(math.nan)
-        if not math.isfinite(values[-1]):
+        if not _is_finite(cell):
             message = f"line {line} of `{text}`: `{cell}` in column `{column}` is no finite number"
             reader.sink.error("E253", message, node.span, help="write a number there")
             return None
-    return tuple(values)
+        cells.append((line, cell))
+    return cells
+
+
+def _is_finite(cell: str) -> bool:
+    try:
+        return math.isfinite(float(cell))
+    except ValueError:
+        return False
 
 
 def _rows(path: Path) -> list[tuple[int, list[str]]]:

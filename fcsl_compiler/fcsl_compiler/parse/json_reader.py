@@ -20,6 +20,10 @@ if TYPE_CHECKING:
 _NAME = re.compile(r"[A-Za-z][A-Za-z0-9]*(_[A-Za-z0-9]+)*")
 
 
+#: How an expression of constants is an integer.
+INTEGERS = "make it of constants that are integers; `//` divides them, `/` gives a float"
+
+
 def is_name(text: str) -> bool:
     return len(text) <= MAX_NAME and _NAME.fullmatch(text) is not None
 
@@ -163,9 +167,14 @@ class ConfigReader:
         """What the text of a node may name."""
         return self.scopes.get(node.span.source) or Scope(self.constants)
 
-    def integer(self, node: JsonNode | None, what: str, low: int, high: int) -> int | None:
-        node = self.computed(node, what) if node is not None else None
+    def integer(self, node: JsonNode | None, what: str, low: int, high: int, unit: str = "") -> int | None:
+        """`unit`: of the constants that it may be made of."""
+        given = node
+        node = self.computed(node, what, unit) if node is not None else None
         if node is None:
+            return None
+        if node.kind == "float" and given is not node:
+            self.sink.error("E208", f"{what} is an integer, not {node.value}", node.span, help=INTEGERS)
             return None
         if node.kind != "int" or not isinstance(node.value, int):
             self.wrong(node, f"{what} is an integer", "it without quotes and decimal point")

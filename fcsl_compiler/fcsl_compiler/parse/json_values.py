@@ -5,11 +5,13 @@ from __future__ import annotations
 
 import json
 import math
+from decimal import Decimal
 from typing import TYPE_CHECKING
 
 from ..base.source import Span
 from ..model.literals import LiteralError, fit
 from ..model.types import BOOL, HEALTH, HEALTH_NAMES, REQUEST, Array, Scalar, Struct, Type, scalar_of
+from .json_reader import INTEGERS
 from .json_source import JsonNode, Member, article
 
 if TYPE_CHECKING:
@@ -43,20 +45,34 @@ def read_value(reader: ConfigReader, node: JsonNode, type_: Type, what: str, uni
 
 def _column(reader: ConfigReader, node: JsonNode, type_: Array, what: str) -> Value | None:
     """A column of a CSV file as a vector."""
-    from .csv_column import read_column
+    from .csv_column import read_cells
 
-    values = read_column(node, what, reader)
-    if values is None:
+    cells = read_cells(node, what, reader)
+    if cells is None:
         return None
-    if type_.shape != (len(values),):
+    if type_.shape != (len(cells),):
         reader.sink.error(
-            "E207", f"{what} is {type_}, not a column of {len(values)}", node.span, help="use another size"
+            "E207", f"{what} is {type_}, not a column of {len(cells)}", node.span, help="use another size"
         )
         return None
-    literals = [JsonNode("float", node.span, v, repr(v)) for v in values]
-    parts = [_scalar(reader, literal, scalar_of(type_), what, "") for literal in literals]
-    reader.columns.append(f"{what} {values}")
-    return None if None in parts else tuple(v for p in parts if p is not None for v in p)
+    element = scalar_of(type_)
+    values: list[int | float] = []
+    found: list[bool | int | float | str] = []
+    for line, cell in cells:
+        values.append(_cell(cell) if element.is_integer else float(cell))
+        literal = JsonNode("int" if isinstance(values[-1], int) else "float", node.span, values[-1], cell)
+        part = _scalar(reader, literal, element, f"line {line} of `{node.members['csv'].value.value}`: {what}", "")
+        if part is None:
+            return None
+        found += part
+    reader.columns.append(f"{what} {tuple(values)}")
+    return tuple(found)
+
+
+def _cell(text: str) -> int | float:
+    """An integer where the number is one, however it is written."""
+    number = Decimal(text)
+    return int(number) if number == number.to_integral_value() else float(text)
 
 
 def _struct(reader: ConfigReader, node: JsonNode, type_: Struct, what: str) -> Value | None:
@@ -81,6 +97,7 @@ def _struct(reader: ConfigReader, node: JsonNode, type_: Struct, what: str) -> V
 
 
 def _scalar(reader: ConfigReader, node: JsonNode, type_: Scalar, what: str, unit: str) -> Value | None:
+    given = node
     if type_.is_number:
         number = reader.computed(node, what, unit)
         if number is None:
@@ -106,6 +123,7 @@ def _scalar(reader: ConfigReader, node: JsonNode, type_: Scalar, what: str, unit
         except LiteralError as error:
             if type_.is_integer and node.kind == "float":
                 fix = f"write {int(node.value)}" if node.value == int(node.value) else "write an integer"
+                fix = INTEGERS if given.kind == "string" else fix
                 reader.sink.error("E207", f"{what} is {type_}, not a number with a point", node.span, help=fix)
                 return None
             reader.sink.error("E207", f"{what}: {error.args[0]}", node.span, help=str(error.args[1]))

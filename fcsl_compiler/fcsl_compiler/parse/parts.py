@@ -80,7 +80,7 @@ class Joined:
         self._instances: dict[str, Member] = {}
         self._connections: list[JsonNode] = []
         before = self.sink.errors
-        tick_hz = reader.integer(keys.get("tick_hz"), "tick_hz", 1, MAX_TICK_HZ) or 0
+        tick_hz = reader.integer(keys.get("tick_hz"), "tick_hz", 1, MAX_TICK_HZ, "Hz") or 0
         own = _File("", "", path, keys, tick_hz, (path.resolve(),))
         has_parts = any(m.value.get("machine") is not None for m in _object(keys.get("instances")).values())
         if has_parts:
@@ -260,7 +260,7 @@ class Joined:
         for key in ("structs", "algorithms", "instances", "states"):
             self.reader.named(keys.get(key), f"`{key}`")
         self.reader.list(keys.get("requests"), "`requests`")
-        tick_hz = self.reader.integer(keys.get("tick_hz"), "tick_hz", 1, MAX_TICK_HZ) or 0
+        tick_hz = self.reader.integer(keys.get("tick_hz"), "tick_hz", 1, MAX_TICK_HZ, "Hz") or 0
         return _File(prefix, text.rpartition("/")[0], path, keys, tick_hz, (*outer.chain, path.resolve()), scope)
 
     def _why_not(self, path: Path, outer: _File) -> str:

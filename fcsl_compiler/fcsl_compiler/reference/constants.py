@@ -9,6 +9,7 @@ import json
 import math
 import operator
 from collections.abc import Callable, Mapping
+from fractions import Fraction
 from pathlib import Path
 from typing import Any
 
@@ -57,13 +58,14 @@ class Literals:
         own = self._parts.get(getattr(value, "part", ""), self)
         return _value(ast.parse(value.strip(), mode="eval").body, own._constants)
 
-    def column(self, csv_file: str, column: str) -> list[float]:
+    def column(self, csv_file: str, column: str, integers: bool = False) -> list[int] | list[float]:
         """The numbers of a column."""
         own = self._parts.get(getattr(csv_file, "part", ""), self)
         with own._path(csv_file).open(encoding="utf-8-sig", newline="") as stream:
             rows = [[cell.strip() for cell in row] for row in csv.reader(stream) if any(map(str.strip, row))]
         at = rows[0].index(column)
-        return [float(row[at]) for row in rows[1:]]
+        cells = [row[at] for row in rows[1:]]
+        return [int(Fraction(cell)) for cell in cells] if integers else [float(cell) for cell in cells]
 
     def _path(self, name: str) -> Path:
         package, slash, inside = name.removeprefix("package://").partition("/")

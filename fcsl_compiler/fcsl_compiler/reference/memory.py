@@ -18,6 +18,7 @@ from .arrays import ArrayType
 from .constants import Literals
 from .structs import StructType, slot
 from .types import SCALARS, Scalar, Type
+from .values import INTEGERS
 
 #: Offsets (bytes) of every field by its path (fcsl_machine.h), and of items that the table does not list:
 #: `machine.current`, `<instance>.inject_overrun|inject_fault`, `channels.<channel>.attached|fresh|sample_age`.
@@ -171,7 +172,7 @@ def from_json(type_: Type, value: Any, literals: Literals, request: Callable[[st
         )
     if isinstance(type_, ArrayType):
         if isinstance(value, dict) and "csv" in value:
-            value = literals.column(value["csv"], value["column"])
+            value = literals.column(value["csv"], value["column"], type_.element.name in INTEGERS)
         if not isinstance(value, list):  # a default of every element
             return type_.of([from_json(type_.element, value, literals, request) for _ in range(type_.count)])
         flat = [value]

@@ -591,13 +591,14 @@ MACHINE_CODES: dict[str, Code] = {
     "E252": Code(
         "an expression of constants that has no value",
         "`constants` names numbers with a unit, in this file or in one that simulations name, too. Where a number is "
-        "written, a string may be an expression of them: `2 * track`. Each constant is made of those before it. Its unit is "
-        "that of the field that it becomes, if both have one.",
+        "written, a string may be an expression of them: `2 * base`. Each constant is made of those before it. A unit that "
+        "follows is that which the constant declares, and that of the field that it becomes, if both have one. Literals as "
+        "factors convert no unit; a constant without a unit may.",
         Kind.JSON,
-        '"constants": {"track": {"value": 0.45, "unit": "m"}},\n'
-        '"instances": {"nav": {"algorithm": "Nav"}, "control": {"algorithm": "Control", "parameters": {"gain": "trak / 2"}}}',
-        '"constants": {"track": {"value": 0.45, "unit": "m"}},\n'
-        '"instances": {"nav": {"algorithm": "Nav"}, "control": {"algorithm": "Control", "parameters": {"gain": "track / 2"}}}',
+        '"constants": {"base": {"value": 4.0, "unit": "N*s/m"}},\n'
+        '"instances": {"nav": {"algorithm": "Nav"}, "control": {"algorithm": "Control", "parameters": {"gain": "bass / 2"}}}',
+        '"constants": {"base": {"value": 4.0, "unit": "N*s/m"}},\n'
+        '"instances": {"nav": {"algorithm": "Nav"}, "control": {"algorithm": "Control", "parameters": {"gain": "base / 2"}}}',
     ),
     "E253": Code(
         "a column that cannot be read",
