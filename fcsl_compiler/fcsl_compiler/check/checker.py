@@ -111,7 +111,7 @@ class Checker:
         fix = ""
         if isinstance(have, Scalar) and isinstance(want, Scalar) and have.is_number and want.is_number:
             fix = f"convert: {want}(…)"
-        elif want is BOOL and isinstance(have, Array) and have.element is BOOL:
+        elif want is BOOL and is_mask(have):
             fix = "write `all(…)` or `any(…)`"
         elif want is BOOL:
             other = "0" if have not in (HEALTH, REQUEST) else '"failed"' if have == HEALTH else '""'
@@ -251,6 +251,11 @@ class Checker:
         if symbol in ("<<", ">>") and isinstance(args[-1].type, Scalar) and args[-1].type.is_integer:
             args = args[:1]  # a shift count may have any integer type
         types = [a.type for a in args]
+        if len(types) == 1 and symbol in SCALARS and is_mask(types[0]):
+            fix = f"write `where(mask, {_one(SCALARS[symbol])}, {_zero(SCALARS[symbol])})`"
+            self.fail(
+                "E415", f"no `{symbol}` of {types[0]}", span, why="a bool has no arithmetic and no order", help=fix
+            )
         scalars = [t for t in types if isinstance(t, Scalar)]
         fix, why = "", ""
         if symbol == "/" and all(t.is_integer for t in scalars) and len(scalars) == 2:
@@ -278,6 +283,10 @@ class Checker:
         )
         verb = "between" if len(args) > 1 else "of"
         self.fail("E415", f"no `{symbol}` {verb} {listed}", span, why=why, help=fix, notes=tuple(notes))
+
+
+def is_mask(type_: Type) -> bool:
+    return isinstance(type_, Array) and type_.element is BOOL
 
 
 def _one(type_: Type) -> str:

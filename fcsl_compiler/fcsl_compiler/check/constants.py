@@ -11,7 +11,7 @@ from ..model import ir
 from ..model.literals import LiteralError
 from ..model.types import Array, Struct, Type
 from ..parse.python_source import span_of
-from .annotations import annotation_type
+from .annotations import annotation_text, annotation_type
 from .checker import Stop
 from .declarations import Declarations
 from .expressions import ExprChecker
@@ -102,16 +102,19 @@ def check_defaults(declarations: Declarations, node: ast.FunctionDef, sink: Diag
         key = f"{node.name}.{argument.arg}"
         if argument.annotation is None:
             continue  # said where the function is checked
-        before = sink.errors
+        type_ = annotation_text(argument.annotation) or ""
+        if "[" in type_ or type_ in declarations.names.structs:
+            at, why = span_of(declarations.source, value), "a default is one number, bool, health or request"
+            fix = f"leave it out, and give `{argument.arg}` at each call"
+            sink.error("E431", f"`{argument.arg}` is {type_} and has a default", at, why=why, help=fix)
+            declarations.wrong.add(node.name)
+            continue
         check_constant(declarations, key, argument.annotation, value, sink)
         found = declarations.constants.pop(key, None)
         if isinstance(found, ScalarConstant):
             declarations.defaults[node.name, argument.arg] = found.value
-            continue
-        declarations.wrong.add(node.name)
-        if sink.errors == before:
-            at, fix = span_of(declarations.source, value), "let the caller give it"
-            sink.error("E431", f"the default of `{argument.arg}` is not one value", at, help=fix)
+        else:
+            declarations.wrong.add(node.name)
 
 
 def _untyped(

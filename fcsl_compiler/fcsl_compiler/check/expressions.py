@@ -11,6 +11,7 @@ from ..model.effects import can_fault
 from ..model.literals import STRING_LITERAL, LiteralError
 from ..model.types import BOOL, HEALTH, REQUEST, Array, Scalar, Struct, Type, element_of, shape_of
 from .calls import CallChecker
+from .checker import is_mask
 from .effect_order import reaches_outside
 from .places import PlaceChecker
 
@@ -30,6 +31,13 @@ _BINARY = {
 }
 _OPERATORS = frozenset(_BINARY.values())
 _COMPARE = {ast.Lt: "<", ast.LtE: "<=", ast.Gt: ">", ast.GtE: ">=", ast.Eq: "==", ast.NotEq: "!="}
+#: Of arrays of bools, element by element.
+_MASKS = {
+    **dict.fromkeys(("and", "&"), "`where(a, b, False)`"),
+    **dict.fromkeys(("or", "|"), "`where(a, True, b)`"),
+    **dict.fromkeys(("not", "~"), "`where(a, False, True)`"),
+    "^": "`a != b`",
+}
 
 _INSTEAD: dict[type[ast.AST], tuple[str, str]] = {
     ast.Lambda: ("`lambda`", "write a module-level function"),
@@ -103,11 +111,13 @@ class ExprChecker(CallChecker, PlaceChecker):
     def _unary(self, node: ast.UnaryOp, want: Type | None) -> ir.Expr:
         span = self.span(node)
         if isinstance(node.op, ast.Not):
-            return self.apply("not", (self.expect(node.operand, BOOL, "the operand of `not`"),), span)
+            return self.apply("not", (self._truth(node.operand, "not"),), span)
         if isinstance(node.op, ast.UAdd):
             self.fail("E410", "unary `+` is not part of the language", span, help="leave it out")
         operand = self.not_a_string(self.raw(node.operand))
         if isinstance(node.op, ast.Invert):
+            if is_mask(operand.type):
+                self.fail("E415", f"no `~` of {operand.type}", span, help=f"write {_MASKS['~']}")
             return self.apply("~", (operand,), span)
         return self.elementwise("neg", (operand,), "-", span)
 
@@ -128,7 +138,9 @@ class ExprChecker(CallChecker, PlaceChecker):
             return self.apply(name, args, span, symbol)
         shapes = {shape_of(a.type) for a in arrays}
         if symbol in _OPERATORS and not _is_elementwise(symbol, args, max(map(len, shapes))):
-            self.fail("E413", f"`{symbol}` between {args[0].type} and {args[-1].type}", span, help=_array_hint(symbol))
+            self.fail(
+                "E413", f"`{symbol}` between {args[0].type} and {args[-1].type}", span, help=_array_hint(symbol, args)
+            )
         if len(shapes) > 1:
             both = f"{arrays[0].type} and {next(a.type for a in arrays if a.type != arrays[0].type)}"
             self.fail("E413", f"`{symbol}` between {both}", span, why="the shapes differ")
@@ -154,9 +166,9 @@ class ExprChecker(CallChecker, PlaceChecker):
 
     def _boolean(self, node: ast.BoolOp) -> ir.Expr:
         word = "and" if isinstance(node.op, ast.And) else "or"
-        operands = [self.expect(node.values[0], BOOL, f"the operand of `{word}`")]
+        operands = [self._truth(node.values[0], word)]
         with self.conditional():
-            operands += [self.expect(v, BOOL, f"the operand of `{word}`") for v in node.values[1:]]
+            operands += [self._truth(v, word) for v in node.values[1:]]
         result = operands[-1]
         for left in reversed(operands[:-1]):
             span = self.span(node)
@@ -165,6 +177,16 @@ class ExprChecker(CallChecker, PlaceChecker):
             else:
                 result = ir.Choose(BOOL, left, ir.Const(BOOL, True, span), result, span)
         return result
+
+    def _truth(self, node: ast.expr, word: str) -> ir.Expr:
+        """An operand of `and`, `or` or `not`."""
+        operand, what = self.check(node, BOOL), f"the operand of `{word}`"
+        if is_mask(operand.type):
+            fix = f"element by element, write {_MASKS[word]}; of all elements, `all(…)` or `any(…)`"
+            self.fail("E402", f"{what} is bool, not {operand.type}", operand.span, help=fix, notes=self.origin(operand))
+        if operand.type != BOOL:
+            self.mismatch(operand, BOOL, what)
+        return operand
 
     def _compare(self, node: ast.Compare) -> ir.Expr:
         span = self.span(node)
@@ -284,7 +306,9 @@ def _is_elementwise(symbol: str, args: tuple[ir.Expr, ...], rank: int) -> bool:
     return symbol in "*/" and (rank == 1 or (arrays == 1 and (symbol == "*" or isinstance(args[0].type, Array))))
 
 
-def _array_hint(symbol: str) -> str:
+def _array_hint(symbol: str, args: tuple[ir.Expr, ...]) -> str:
+    if symbol in _MASKS and any(is_mask(a.type) for a in args):
+        return f"write {_MASKS[symbol]}"
     if symbol == "*":
         return "write `matmul(A, B)`, `matvec(A, x)` or `dot(a, b)`; `*` is elementwise for vectors only"
     if symbol == "/":

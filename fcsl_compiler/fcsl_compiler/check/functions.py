@@ -15,7 +15,7 @@ from ..base.diagnostics import DiagnosticSink, Note
 from ..base.source import SourceFile, Span
 from ..model import ir, ops
 from ..model.program import Program
-from ..model.types import ELEMENTS, F64, SCALARS, Scalar, Struct, Type, TypeNames, count_of, element_of, shape_of
+from ..model.types import BOOL, ELEMENTS, F64, SCALARS, Scalar, Struct, Type, TypeNames, count_of, element_of, shape_of
 from ..parse.python_source import span_of
 from .annotations import SIZE, annotation_text, annotation_type, result_type, sizes_in
 from .breakpoints import BREAKPOINTS
@@ -208,13 +208,16 @@ class FunctionTable:
         node = next((n for n in nodes if len(n.args.args) == len(arguments)), None)
         if node is None:
             counts = " or ".join(str(len(n.args.args)) for n in nodes)
+            more = [o for o in (f"{name}2", f"{name}3") if self._takes(o, len(arguments))]
+            shown = " or ".join(_signature(o, node) for o in more for node in overloads(o)) or shown
             self.sink.error("E416", f"`{name}` takes {counts} argument(s), not {len(arguments)}", span, help=shown)
             return None
         parameters = [(a.arg, _text(a.annotation)) for a in node.args.args]
         for (parameter, pattern), argument in zip(parameters, arguments, strict=True):
             problem = binding.unify(parameter, pattern, argument.type)
             if problem:
-                self.sink.error("E418", f"`{name}`: {problem}", argument.span, help=shown)
+                fix = (_instead(name, pattern, argument.type) if len(arguments) == 1 else "") or shown
+                self.sink.error("E418", f"`{name}`: {problem}", argument.span, help=fix)
                 return None
         if not self._has_cells(name, node, arguments):
             return None
@@ -226,6 +229,9 @@ class FunctionTable:
         self.program.functions[unique] = function
         assert function.result
         return Signature(unique, tuple(t for _, t in function.arguments), function.result, function.faults)
+
+    def _takes(self, name: str, count: int) -> bool:
+        return name in library_names() and any(len(node.args.args) == count for node in overloads(name))
 
     def _has_cells(self, name: str, node: ast.FunctionDef, arguments: list[ir.Expr]) -> bool:
         """Whether each axis of a table has two breakpoints. Only a search among them does with less."""
@@ -258,6 +264,15 @@ class FunctionTable:
             fix = "use smaller arrays; for a large product, a loop over some of its rows in each tick"
             self.sink.error(found.code, f"`{name}`: {found.message}", span, why=found.why, help=fix, notes=notes)
         return function
+
+
+def _instead(name: str, pattern: str, type_: Type) -> str:
+    """What to write if the only argument is a mask instead of numbers, or a matrix instead of a vector; else ""."""
+    element, extents = pattern.partition("[")[0], SIZE.findall(pattern)
+    if len(extents) == 1 and len(shape_of(type_)) > 1 and element in (*ELEMENTS, "bool"):
+        return f"it takes one dimension, so the rows one by one: `{name}(m[i])`"
+    is_of_numbers = len(extents) == len(shape_of(type_)) == 1 and element in ELEMENTS
+    return f"write `{name}(where(mask, 1.0, 0.0))`" if is_of_numbers and element_of(type_) is BOOL else ""
 
 
 class _Binding:
