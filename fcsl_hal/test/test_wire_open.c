@@ -190,6 +190,29 @@ static void test_four_messages_wait(void)
     }
 }
 
+/* Without an answer the first frame is sent again at most every 2 ms, however long it waits. */
+static void test_an_idle_line_is_quiet(void)
+{
+    use_port("tcp:");
+    const fcsl_wire_t wire = open_wire(FCSL_WIRE_LISTEN);
+    const int peer = connect_tcp();
+    const uint64_t begun_ns = fcsl_monotonic_ns();
+    uint64_t frames = 0;
+    uint64_t waited_ns = 0;
+    while (waited_ns < 100000000u) {
+        uint8_t bytes[256];
+        struct pollfd entry = {.fd = peer, .events = POLLIN};
+        const ssize_t got = poll(&entry, 1, 10) == 1 ? read(peer, bytes, sizeof bytes) : 0;
+        for (ssize_t i = 0; i < got; i++) {
+            frames += bytes[i] == 0;
+        }
+        waited_ns = fcsl_monotonic_ns() - begun_ns;
+    }
+    CHECK(frames > 0 && frames < 4u + waited_ns / 2000000u);
+    wire.close(wire.ctx);
+    CHECK(close(peer) == 0);
+}
+
 int main(void)
 {
     CHECK(mkdtemp(folder) != NULL);
@@ -200,6 +223,7 @@ int main(void)
     test_tcp_begins_with_a_zero();
     test_uart_begins_with_a_zero();
     test_four_messages_wait();
+    test_an_idle_line_is_quiet();
     CHECK(rmdir(folder) == 0);
     return 0;
 }

@@ -15,10 +15,10 @@ from numpy.typing import NDArray
 from scipy.integrate import solve_ivp
 from scipy.special import ellipj
 
-from fcsl_sim import Simulation, load
+from fcsl_sim import SimError, Simulation, load
 
 TEST = Path(__file__).resolve().parent
-OSCILLATOR, KEPLER, ARENSTORF, PLEIADES, VAN_DER_POL, DETEST_A, DETEST_B, DETEST_B_NONLINEAR = range(8)
+OSCILLATOR, KEPLER, ARENSTORF, PLEIADES, VAN_DER_POL, DETEST_A, DETEST_B, DETEST_B_NONLINEAR, DAMPED, DOUBLED = range(10)
 Vector = NDArray[np.float64]
 Solve = Callable[..., Vector]
 
@@ -224,6 +224,16 @@ def test_verlet_keeps_energy_and_momentum(solve: Solve) -> None:
     rk4 = solve(KEPLER, perihelion(0.3), 628, method="rk4", hz=20)
     drift = np.abs(energy(rk4) - energy(rk4)[0])
     assert drift[-1] > 50 * drift[6]
+
+
+@pytest.mark.parametrize(
+    ("problem", "reason"),
+    [(DAMPED, r"state\.x\[1\] depends on a velocity; use rk4"), (DOUBLED, r"state\.x\[1\] is not that of a position")],
+)
+def test_verlet_refuses_models_that_are_not_what_they_promise(problem: int, reason: str, solve: Solve) -> None:
+    with pytest.raises(SimError, match=f"velocity Verlet: the derivative of .*{reason}"):
+        solve(problem, [1.0, 0.5], 1, p=0.1, method="verlet", hz=100)
+    solve(problem, [1.0, 0.5], 1, p=0.1, method="rk4", hz=100)
 
 
 # ---- the limits of a step ---------------------------------------------------------------------------------------------

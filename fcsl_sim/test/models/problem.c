@@ -110,6 +110,22 @@ static void slope(double t, const double *x, const double *p, double *dx)
     dx[6] = x[5] - x[6] * x[7] / r;
     dx[7] = x[5] / r;
 }
+#elif PROBLEM == 8 /* a damped oscillator, which is not what `second_order` promises */
+enum { N = 2, SECOND_ORDER = 1 };
+static void slope(double t, const double *x, const double *p, double *dx)
+{
+    (void)t;
+    dx[0] = x[1];
+    dx[1] = -x[0] - p[0] * x[1];
+}
+#elif PROBLEM == 9 /* a velocity that is half the derivative of its position */
+enum { N = 2, SECOND_ORDER = 1 };
+static void slope(double t, const double *x, const double *p, double *dx)
+{
+    (void)t, (void)p;
+    dx[0] = 2.0 * x[1];
+    dx[1] = -x[0];
+}
 #endif
 
 typedef struct {

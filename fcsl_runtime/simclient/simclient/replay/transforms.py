@@ -55,7 +55,7 @@ class _BagWithTransforms(Bag):
         self._bag = bag
         self._made = {name: _messages(name, chain, header_time) for name, chain in chains.items()}
         super().__init__(bag.path)
-        self.truncated = bag.truncated
+        self.truncated = bag.truncated  # each pass over a file finds all of its damage
         self.notes = [*bag.notes, *(note for name, chain in chains.items() for note in _notes(name, chain))]
 
     def _open(self) -> None:
@@ -69,7 +69,6 @@ class _BagWithTransforms(Bag):
         wanted = self.topics.keys() if topics is None else topics
         if others := [name for name in wanted if name not in self._made]:
             yield from self._bag.batches(others, in_order)
-            self.truncated = self._bag.truncated
         for name in wanted:
             if name in self._made:
                 yield self._made[name], {0: self.topics[name]}
