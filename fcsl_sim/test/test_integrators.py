@@ -18,7 +18,8 @@ from scipy.special import ellipj
 from fcsl_sim import SimError, Simulation, load
 
 TEST = Path(__file__).resolve().parent
-OSCILLATOR, KEPLER, ARENSTORF, PLEIADES, VAN_DER_POL, DETEST_A, DETEST_B, DETEST_B_NONLINEAR, DAMPED, DOUBLED = range(10)
+OSCILLATOR, KEPLER, ARENSTORF, PLEIADES, VAN_DER_POL, DETEST_A, DETEST_B, DETEST_B_NONLINEAR = range(8)
+DAMPED, DOUBLED = 8, 9
 Vector = NDArray[np.float64]
 Solve = Callable[..., Vector]
 
