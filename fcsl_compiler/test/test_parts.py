@@ -880,6 +880,24 @@ def test_a_warning_names_what_the_file_names(tmp_path: Path, change: Change, cod
     assert [d.message for d in diagnose(tmp_path, change) if d.code == code] == [message]
 
 
+def test_a_part_that_no_state_schedules(tmp_path: Path) -> None:
+    """One warning, at the part and not at each instance in it."""
+
+    def change(craft: Any, attitude: Any, rate: Any) -> None:
+        craft["states"]["FLY"]["schedule"].pop("spare")
+
+    (warning,) = [d for d in diagnose(tmp_path, change) if d.code == "W204"]
+    assert warning.message == "no state schedules part `spare`: none of its instances runs"
+    assert warning.span.source.name == "craft.json" and '"spare": true' in warning.help
+
+
+def test_a_part_that_the_part_around_it_does_not_schedule(tmp_path: Path) -> None:
+    found = diagnose(tmp_path, lambda craft, attitude, rate: attitude["states"]["RUN"]["schedule"].pop("rate"))
+    (warning,) = [d for d in found if d.code == "W204"]
+    assert warning.message == "no state schedules part `rate`: none of its instances runs"
+    assert warning.span.source.name.endswith("attitude.json")
+
+
 def test_a_request_in_a_helper_has_the_name_of_no_part(tmp_path: Path) -> None:
     helper = 'def word(x: f64) -> TransitionRequest:\n    return "far" if x > 0.0 else ""\n'
     law = helper + LAW.replace('self.transition_request = "far"', "self.transition_request = word(self.rate)")

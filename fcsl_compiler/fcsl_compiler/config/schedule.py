@@ -8,6 +8,7 @@ from collections import deque
 from dataclasses import replace
 
 from ..base.diagnostics import DiagnosticSink
+from ..base.source import Span
 from ..model.machine import Connection, Machine, State, seconds
 from ..parse.json_reader import local_names
 from .arming import warn_old_arm
@@ -152,14 +153,35 @@ def _warn_too_late(machine: Machine, sink: DiagnosticSink) -> None:
 
 
 def _warn_idle(machine: Machine, sink: DiagnosticSink) -> None:
-    due = {e.instance for state in machine.states for e in state.entries}
-    for index, instance in enumerate(machine.instances):
-        if index not in due:
-            message = f"no state schedules instance `{instance.span.local(instance.name)}`: it never runs"
-            arms = machine.arm is not None and machine.arm.instance == index
-            why = "the actuators are never armed" if arms else ""
-            fix = "add it to the schedule of a state, or remove it"
-            sink.warning("W204", message, instance.span, why=why, help=fix)
+    due = {machine.instances[e.instance].name for state in machine.states for e in state.entries}
+    arms = machine.instances[machine.arm.instance].name if machine.arm is not None else ""
+    parts: set[str] = set()  # that are reported
+    for instance in machine.instances:
+        if instance.name in due:
+            continue
+        part, at = _idle_part(instance.span, due)
+        if part in parts:
+            continue
+        parts |= {part} - {""}
+        never = part or instance.name
+        what = (
+            f"part `{at.local(part)}`: none of its instances runs"
+            if part
+            else f"instance `{at.local(never)}`: it never runs"
+        )
+        why = "the actuators are never armed" if f"{arms}.".startswith(f"{never}.") else ""
+        fix = f'add `"{at.local(part)}": true` to the schedule' if part else "add it to the schedule"
+        always = " or to `always`," if part and not at.source.part else ""
+        sink.warning("W204", f"no state schedules {what}", at, why=why, help=f"{fix} of a state,{always} or remove it")
+
+
+def _idle_part(at: Span, due: set[str]) -> tuple[str, Span]:
+    """The outermost part around an instance of which nothing runs, with its place. "" and that of the instance if there is
+    none."""
+    idle = ""
+    while at.source.included is not None and not any(name.startswith(f"{at.source.part}.") for name in due):
+        idle, at = at.source.part, at.source.included
+    return idle, at
 
 
 def _warn_old_values(machine: Machine, sink: DiagnosticSink) -> None:
