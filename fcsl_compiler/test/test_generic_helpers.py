@@ -225,6 +225,34 @@ class Law:
         assert found.notes[0].text == "called here, with n = 3"
 
 
+def test_what_is_wrong_for_these_sizes_names_them(tmp_path: Path) -> None:
+    """A call of the library in a helper of another file: through all calls to the machine JSON that binds the size."""
+    tools = """
+def two(x: "f64[n]") -> f64:
+    return dot(x, [1.0, 2.0])
+"""
+    law = """
+from tools import two
+
+
+class Law:
+    inputs = {"u": "f64[m]"}
+    outputs = {"y": "f64"}
+
+    def execute(self):
+        self.y = two(self.u)
+"""
+    files = {"law.py": law, "tools.py": tools}
+    with pytest.raises(DiagnosticError) as caught:
+        build_machine(write_one_each(tmp_path, files, {"Law": {"source": "law.py", "sizes": {"m": 3}}}))
+    (found,) = caught.value.diagnostics
+    assert found.code == "E418" and found.span.source.name == "tools.py"
+    assert [(note.text, note.span.text) for note in found.notes] == [
+        ("called here, with n = 3", "two(self.u)"),
+        ("with m = 3 here", '"m"'),
+    ]
+
+
 AVERAGE = '''
 """Two sizes of one class."""
 

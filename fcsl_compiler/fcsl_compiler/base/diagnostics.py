@@ -183,10 +183,10 @@ class DiagnosticSink:
             Diagnostic(severity, code, message, span, _printable(why), _printable(help_text), places, output)
         )
 
-    def extend(self, diagnostics: Sequence[Diagnostic], note: Note) -> None:
+    def extend(self, diagnostics: Sequence[Diagnostic], note: Note | None) -> None:
         """Adds diagnostics of another sink, each with one more note."""
         for d in diagnostics:
-            notes = [(n.span, n.text) for n in (*d.notes, note)]
+            notes = [(n.span, n.text) for n in (*d.notes, *([note] if note else []))]
             self._add(d.severity, d.code, d.message, d.span, d.why, d.help, notes, d.output)
 
     @property

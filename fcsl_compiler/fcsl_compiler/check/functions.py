@@ -8,6 +8,7 @@ combination of sizes that a machine uses. The numeric library is written in the 
 from __future__ import annotations
 
 import ast
+import copy
 from collections.abc import Callable, Mapping
 from functools import cache
 
@@ -63,6 +64,14 @@ class FunctionTable:
         #: For each helper, the length of the longest chain of calls that starts with it.
         self.depths: dict[str, int] = {}
 
+    def reporting_to(self, sink: DiagnosticSink) -> FunctionTable:
+        """The same table, which reports to this sink."""
+        if sink is self.sink:
+            return self
+        table = copy.copy(self)
+        table.sink = sink
+        return table
+
     def is_function(self, name: str) -> bool:
         is_own = name in self.own or name in self.declarations.imported
         return is_own or (name in library_names() and name not in ops.BUILTINS)
@@ -79,7 +88,7 @@ class FunctionTable:
         return self._library(name, arguments, span)
 
     def _table(self, imported: str) -> FunctionTable:
-        return self._tables[self.declarations.imported[imported].owner]
+        return self._tables[self.declarations.imported[imported].owner].reporting_to(self.sink)
 
     def declared(self, name: str, count: int) -> tuple[list[Type | str | None], Type | str | None]:
         """Declared types of the first `count` arguments and of the result. For a library function they are scalar types
@@ -195,7 +204,7 @@ class FunctionTable:
     def _for_sizes(self, node: ast.FunctionDef, unique: str, sizes: dict[str, int], span: Span) -> ir.Function | None:
         """A helper for these sizes. What is wrong in it is reported with the call that gave it the sizes."""
         sink = DiagnosticSink()
-        function = check_function(self.declarations, node, unique, sizes, self, sink)
+        function = check_function(self.declarations, node, unique, sizes, self.reporting_to(sink), sink)
         shown = ", ".join(f"{size} = {value}" for size, value in sizes.items())
         self.sink.extend(sink.diagnostics, Note(span, f"called here, with {shown}"))
         return function

@@ -8,7 +8,7 @@ from collections.abc import Mapping
 from dataclasses import replace
 from pathlib import Path
 
-from ..base.diagnostics import DiagnosticSink, misspelt, nearest
+from ..base.diagnostics import DiagnosticSink, Note, Severity, misspelt, nearest
 from ..base.source import Span
 from ..check.algorithm import check_algorithm
 from ..check.algorithm_class import AlgorithmClass, size_variables
@@ -144,8 +144,11 @@ def _check_algorithms(parsed: ParsedMachine, modules: Modules, reader: ConfigRea
             continue
         files = tuple(file.source.name for file in algorithm.file.all)
         sizes = {size: value for size, (value, _) in algorithm.sizes.items()}
-        table = modules.table(declarations)
-        checked = check_algorithm(name, class_, files, table, declarations.sound, reader.sink, sizes)
+        sink = DiagnosticSink() if sizes else reader.sink
+        table = modules.table(declarations).reporting_to(sink)
+        checked = check_algorithm(name, class_, files, table, declarations.sound, sink, sizes)
+        if sizes:
+            _report_sized(sink, algorithm, reader.sink)
         if algorithm.parts:
             check_structs(algorithm, modules.program.structs, reader)
             check_listed(checked, algorithm.parts, reader)
@@ -153,6 +156,14 @@ def _check_algorithms(parsed: ParsedMachine, modules: Modules, reader: ConfigRea
             checked = bind_requests(checked, algorithm.requests, modules.program, reader.sink)
         found[name] = checked if declarations.declared else None
     return found
+
+
+def _report_sized(found: DiagnosticSink, parsed: ParsedAlgorithm, sink: DiagnosticSink) -> None:
+    """Reports what is wrong in a class with the sizes of its entry."""
+    shown = ", ".join(f"{size} = {value}" for size, (value, _) in parsed.sizes.items())
+    note = Note(next(span for _, span in parsed.sizes.values()), f"with {shown} here")
+    for diagnostic in found.diagnostics:
+        sink.extend([diagnostic], note if diagnostic.severity is Severity.ERROR else None)
 
 
 def _class_of(parsed: ParsedAlgorithm, declarations: Declarations, sink: DiagnosticSink) -> AlgorithmClass | None:
