@@ -635,6 +635,16 @@ ALGORITHMS: dict[str, str] = {
     "E435 a health": GOOD + '@extern(header="a.h")\ndef f(a: Health) -> f64: ...\n',
     "E435 a request": GOOD + '@extern(header="a.h")\ndef f(a: f64) -> TransitionRequest: ...\n',
     "E435 a list of healths": GOOD + '@extern(header="a.h")\ndef f(a: "Health[2]") -> f64: ...\n',
+    **{
+        f"E435 {what}": GOOD + f'@extern(header="a.h")\ndef f({arguments}) -> f64: ...\n'
+        for what, arguments in (
+            ("a default", "a: f64 = 1.0"),
+            ("a keyword", "*, a: f64"),
+            ("arguments by place", "a: f64, /"),
+            ("any number of arguments", "*a: f64"),
+            ("any keywords", "**a: f64"),
+        )
+    },
     "W303 in a helper": "def f(a: f64) -> f64:\n    b = a\n    return a\n\n\n" + execute("self.y = f(self.x)"),
     "W304 outputs": 'class Alg:\n    outputs = {"y": "f64", "z": "f64[2]"}\n' + HEAD + "        self.y = 1.0\n",
     "W304 a request": 'class Alg:\n    outputs = {"transition_request": "TransitionRequest"}\n    state = {"n": "u32"}\n'

@@ -334,6 +334,16 @@ int main(void)
     long_name[sizeof long_name - 1u] = '\0';
     check_refused((fcsl_channel_t){.name = "tick"}, "", endpoint, "channel 'tick' cannot go over the bus");
     check_refused((fcsl_channel_t){.name = "a"}, long_name, endpoint, "longer than 255 bytes");
+    /* By a byte: namespace, machine, and what is longer of the channel and what else there is. */
+    char namespace[FCSL_BUS_KEY_MAX];
+    memset(namespace, 'n', sizeof namespace);
+    const size_t length = FCSL_BUS_KEY_MAX + 1u - strlen(MACHINE.name) - strlen("@checkpoint") - 2u;
+    namespace[length] = '\0';
+    check_refused((fcsl_channel_t){.name = "a"}, namespace, endpoint, "' are longer than 255 bytes");
+    check_refused((fcsl_channel_t){.name = "checkpoints"}, namespace, endpoint,
+                  "the key of channel 'checkpoints' is longer than 255 bytes");
+    namespace[length - 1u] = '\0';
+    check_refused((fcsl_channel_t){.name = "checkpoints"}, namespace, endpoint, "at most 1048576 are possible");
     check_refused((fcsl_channel_t){.name = "a"}, "a//b", endpoint, "one slash between them");
     check_refused((fcsl_channel_t){.name = "a"}, "", "udp/127.0.0.1:7", "write tcp:HOST:PORT");
     check_refused((fcsl_channel_t){.name = "a"}, "", endpoint, "at most 1048576 are possible");
