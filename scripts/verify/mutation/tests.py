@@ -19,7 +19,11 @@ from .hook.fcsl_mutants import SIZE
 from .mutants import Mutant
 from .tree import Tree
 
-PYTEST_FOLDERS = ("fcsl_compiler/test", "fcsl_hal/test", "fcsl_runtime/simclient/test", "fcsl_sim/test")
+#: Each has a run of its own. Of the workspace's tests, those of `fcsl new`.
+PYTEST_FOLDERS = (
+    *("fcsl_compiler/test", "fcsl_hal/test", "fcsl_runtime/simclient/test", "fcsl_sim/test"),
+    "test/test_new.py",
+)
 #: A recorded run may take so long, seconds.
 RECORD_LIMIT_S = 3600.0
 #: Tests in pytest are chosen, the shortest first, until they took so long when they were recorded: seconds.
@@ -132,7 +136,7 @@ def killer(
 
 def by_folder(tests: Sequence[Test]) -> list[list[Test]]:
     """Tests of pytest by their folder: one run of several imports but one of their files of a name (conftest.py)."""
-    parts = [[t for t in tests if t.name.startswith(f"{folder}/")] for folder in PYTEST_FOLDERS]
+    parts = [[t for t in tests if t.name.startswith(folder)] for folder in PYTEST_FOLDERS]
     return [part for part in parts if part]
 
 
