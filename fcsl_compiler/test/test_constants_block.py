@@ -167,6 +167,35 @@ def test_wrong_constants(tmp_path: Path, constants: Any, code: str, message: str
     assert first.code == code and message in first.message, first
 
 
+@pytest.mark.parametrize(
+    "constants",
+    [
+        {"track": "late", "late": 1.0},
+        {"track": {"unit": "m"}},
+        {"track": "1 +", "other": "track / 2"},
+        {"track": [1]},
+        "absent.json",
+    ],
+)
+def test_one_mistake_is_reported_once(tmp_path: Path, constants: Any) -> None:
+    if isinstance(constants, dict):
+        constants = {**constants, **{name: CONSTANTS[name] for name in ("ratio", "rate")}, "radius": 1}
+    with pytest.raises(DiagnosticError) as caught:
+        build_machine(machine(tmp_path, constants))
+    assert len(caught.value.diagnostics) == 1, caught.value
+
+
+def test_another_unit_is_converted_by_a_constant(tmp_path: Path) -> None:
+    wide = {"mm": {"value": 0.001, "unit": "m/mm"}, "wide": {"value": 400, "unit": "mm"}}
+    with pytest.raises(DiagnosticError) as caught:
+        build_machine(machine(tmp_path, {**CONSTANTS, **wide}, half="wide / 1000"))
+    (found,) = caught.value.diagnostics
+    assert "its unit is mm, not m" in found.message and "multiply by a constant" in found.help
+    assert Twins(machine(tmp_path, {**CONSTANTS, **wide}, half="wide * mm")).native.get("law.parameters.half") == 0.4
+    root = {"area": {"value": 4.0, "unit": "m"}, "root": "sqrt(area)", "again": {"value": "root * root", "unit": "m"}}
+    assert Twins(machine(tmp_path, {**CONSTANTS, **root}, half="again")).native.get("law.parameters.half") == 4.0
+
+
 def test_a_factor_of_literals_keeps_the_unit(tmp_path: Path) -> None:
     """One without a unit that is a constant may convert."""
     period = {"value": "ratio / (7 * rate)", "unit": "ms"}

@@ -15,6 +15,7 @@ from ..expression.evaluate import SCALARS, evaluator
 from ..expression.parse import FUNCTIONS, WORDS, parse
 from ..expression.tree import ExpressionError, Kind, Node, Quantity
 from ..expression.units import Unit, read, text
+from .json_reader import Everything
 from .json_source import JsonNode, parse_json
 from .source_path import SourcePathError, missing_file_help, resolve_source
 
@@ -26,15 +27,27 @@ Number = int | float
 HELP = "write a number, or an expression of the constants before it, such as `2 * track`"
 
 
+class UnitError(ExpressionError):
+    """The value of an expression has another unit than that which is needed."""
+
+    def __init__(self, found: Unit, unit: str):
+        super().__init__(f"its unit is {text(found)}, not {unit}")
+
+
+class ReportedError(ExpressionError):
+    """An expression reads a constant of which an error was reported."""
+
+
 class Constants:
     """The constants of one file, in its order. `used`: those that a value reads, directly or by another one. `later`: those
-    that follow."""
+    that follow. `wrong`: those with a reported error."""
 
     def __init__(self) -> None:
-        self._known: dict[str, tuple[Number, str]] = {}
+        self._known: dict[str, tuple[Number, Unit | None]] = {}
         self._of: dict[str, set[str]] = {}  # by name, the constants that its own value reads
         self.used: set[str] = set()
         self.later: set[str] = set()
+        self.wrong: set[str] = set()
 
     def add(self, name: str, expression: str | Number, unit: str) -> None:
         """Raises ExpressionError."""
@@ -42,10 +55,15 @@ class Constants:
         self.used.clear()
         value, found = self.evaluate(expression) if isinstance(expression, str) else (expression, None)
         read_by, self.used = self.used, before
-        self._known[name] = value, unit or (text(found) if found is not None else "")
+        self._known[name] = value, read(unit) if unit else found
         self._of[name] = read_by
-        if unit and found is not None and found != read(unit):
-            raise ExpressionError(f"its unit is {text(found)}, not {unit}")
+        _check_unit(found, unit)
+
+    def value(self, expression: str, unit: str) -> Number:
+        """Of an expression that has this unit, if it is not "". Raises ExpressionError."""
+        value, found = self.evaluate(expression)
+        _check_unit(found, unit)
+        return value
 
     def evaluate(self, expression: str) -> tuple[Number, Unit | None]:
         """The value of an expression and its unit (None: any). Raises ExpressionError."""
@@ -63,9 +81,12 @@ class Constants:
     @property
     def used_texts(self) -> list[str]:
         """The constants that values read, for a hash: those that only another file uses are not among them."""
-        return [f"{name} {self._known[name][0]!r} {self._known[name][1]}" for name in sorted(self.used)]
+        known = [(name, *self._known[name]) for name in sorted(self.used)]
+        return [f"{name} {value!r} {'' if unit is None else text(unit)}" for name, value, unit in known]
 
     def _find(self, name: str) -> Quantity:
+        if name in self.wrong and name not in self._known:
+            raise ReportedError
         if name in self.later:
             raise ExpressionError(f"the constant `{name}` is defined below: move it above")
         if name not in self._known:
@@ -73,7 +94,7 @@ class Constants:
             hint = nearest(name, known) or f"there are {', '.join(known)}" if known else "there are none"
             raise ExpressionError(f"there is no constant `{name}`; {hint}")
         value, unit = self._known[name]
-        return Quantity(Kind.INTEGER if isinstance(value, int) else Kind.FLOAT, unit=read(unit))
+        return Quantity(Kind.INTEGER if isinstance(value, int) else Kind.FLOAT, unit=unit)
 
     def _value(self, node: Node) -> Number:
         return self._known[node.value][0]
@@ -85,6 +106,7 @@ def read_constants(node: JsonNode | None, config: Path, reader: ConfigReader, ou
     found = Constants()
     if node is not None and node.kind == "string":
         node = _file(str(node.value), node.span, config, reader, outside)
+        found.wrong = Everything() if node is None or node.kind != "object" else found.wrong
     definitions = reader.named(node, "`constants`")
     found.later = set(definitions)
     for name, (definition, span) in definitions.items():
@@ -96,17 +118,33 @@ def read_constants(node: JsonNode | None, config: Path, reader: ConfigReader, ou
             keys = reader.object(definition, f"constant `{name}`", ("value",), ("unit",)) or {}
             unit = _unit(keys.get("unit"), reader)
             if "value" not in keys:
+                found.wrong.add(name)
                 continue
             expression = keys["value"]
         value = expression.value
         if isinstance(value, bool) or not isinstance(value, str | int | float):
             reader.wrong(expression, f"constant `{name}` is a number or an expression", '0.45, or "2 * track"')
+            found.wrong.add(name)
             continue
         try:
             found.add(name, value, unit)
         except ExpressionError as error:
-            reader.sink.error("E252", f"constant `{name}`: {error}", span, help=HELP)
+            found.wrong.add(name)
+            report(error, f"constant `{name}`", span, HELP, reader)
     return found
+
+
+def report(error: ExpressionError, what: str, span: Span, fix: str, reader: ConfigReader) -> None:
+    """Reports what is wrong with an expression, unless that is a constant which is reported already."""
+    if isinstance(error, UnitError):
+        fix = "to convert it, multiply by a constant of such a unit as `m/mm`, or without one"
+    if not isinstance(error, ReportedError):
+        reader.sink.error("E252", f"{what}: {error}", span, help=fix)
+
+
+def _check_unit(found: Unit | None, unit: str) -> None:
+    if unit and found is not None and found != read(unit):
+        raise UnitError(found, unit)
 
 
 def _reserved(name: str) -> str:

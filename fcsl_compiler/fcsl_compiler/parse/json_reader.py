@@ -150,16 +150,12 @@ class ConfigReader:
         if node.kind != "string" or constants is None:
             return node
         from ..expression.tree import ExpressionError
-        from ..expression.units import read, text
+        from .constants import report
 
         try:
-            value, found = constants.evaluate(str(node.value))
-            if unit and found is not None and found != read(unit):
-                raise ExpressionError(f"its unit is {text(found)}, not {unit}")
+            value = constants.value(str(node.value), unit)
         except ExpressionError as error:
-            self.sink.error(
-                "E252", f"{what}: {error}", node.span, help="write a number, or an expression of `constants`"
-            )
+            report(error, what, node.span, "write a number, or an expression of `constants`", self)
             return None
         return JsonNode("int" if isinstance(value, int) else "float", node.span, value, repr(value))
 
