@@ -15,7 +15,6 @@ from ..expression.evaluate import SCALARS, evaluator
 from ..expression.parse import FUNCTIONS, WORDS, parse
 from ..expression.tree import ExpressionError, Kind, Node, Quantity
 from ..expression.units import Unit, read, text
-from .json_reader import Everything
 from .json_source import JsonNode, parse_json
 from .source_path import SourcePathError, missing_file_help, resolve_source
 
@@ -40,7 +39,7 @@ class ReportedError(ExpressionError):
 
 class Constants:
     """The constants of one file, in its order. `used`: those that a value reads, directly or by another one. `later`: those
-    that follow. `wrong`: those with a reported error."""
+    that follow. `wrong`: those with a reported error. `is_read`: False if the file of them could not be read."""
 
     def __init__(self) -> None:
         self._known: dict[str, tuple[Number, Unit | None]] = {}
@@ -48,6 +47,7 @@ class Constants:
         self.used: set[str] = set()
         self.later: set[str] = set()
         self.wrong: set[str] = set()
+        self.is_read = True
 
     def add(self, name: str, expression: str | Number, unit: str) -> None:
         """Raises ExpressionError."""
@@ -85,7 +85,7 @@ class Constants:
         return [f"{name} {value!r} {'' if unit is None else text(unit)}" for name, value, unit in known]
 
     def _find(self, name: str) -> Quantity:
-        if name in self.wrong and name not in self._known:
+        if not self.is_read or (name in self.wrong and name not in self._known):
             raise ReportedError
         if name in self.later:
             raise ExpressionError(f"the constant `{name}` is defined below: move it above")
@@ -106,7 +106,7 @@ def read_constants(node: JsonNode | None, config: Path, reader: ConfigReader, ou
     found = Constants()
     if node is not None and node.kind == "string":
         node = _file(str(node.value), node.span, config, reader, outside)
-        found.wrong = Everything() if node is None or node.kind != "object" else found.wrong
+        found.is_read = node is not None and node.kind == "object"
     definitions = reader.named(node, "`constants`")
     found.later = set(definitions)
     for name, (definition, span) in definitions.items():

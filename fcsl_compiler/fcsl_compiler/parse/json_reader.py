@@ -20,10 +20,6 @@ if TYPE_CHECKING:
 _NAME = re.compile(r"[A-Za-z][A-Za-z0-9]*(_[A-Za-z0-9]+)*")
 
 
-#: How an expression of constants is an integer.
-INTEGERS = "make it of constants that are integers; `//` divides them, `/` gives a float"
-
-
 def is_name(text: str) -> bool:
     return len(text) <= MAX_NAME and _NAME.fullmatch(text) is not None
 
@@ -170,6 +166,8 @@ class ConfigReader:
         if node is None:
             return None
         if node.kind == "float" and given is not node:
+            from .json_values import INTEGERS
+
             self.sink.error("E208", f"{what} is an integer, not {node.value}", node.span, help=INTEGERS)
             return None
         if node.kind != "int" or not isinstance(node.value, int):

@@ -11,11 +11,13 @@ from typing import TYPE_CHECKING
 from ..base.source import Span
 from ..model.literals import LiteralError, fit
 from ..model.types import BOOL, HEALTH, HEALTH_NAMES, REQUEST, Array, Scalar, Struct, Type, scalar_of
-from .json_reader import INTEGERS
 from .json_source import JsonNode, Member, article
 
 if TYPE_CHECKING:
     from .json_reader import ConfigReader
+
+#: How an expression of constants is an integer.
+INTEGERS = "make it of constants that are integers; `//` divides them, `/` gives a float"
 
 #: Scalars in the order of a type's leaves.
 Value = tuple[bool | int | float | str, ...]
