@@ -13,11 +13,14 @@ import time
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
+from typing import TYPE_CHECKING
 
 from ..shared.cases import CheckFailed
 from .hook.fcsl_mutants import SIZE
 from .mutants import Mutant
-from .tree import Tree
+
+if TYPE_CHECKING:  # it needs the grammar of C, which `make test` does not install
+    from .tree import Tree
 
 #: Each has a run of its own. Of the workspace's tests, those of `fcsl new`.
 PYTEST_FOLDERS = (
