@@ -76,7 +76,7 @@ class Session:
                 "endpoints": there,
                 "timeout_ms": _CONNECT_MS,
                 "exit_on_failure": True,
-                "retry": {"period_init_ms": 50, "period_max_ms": 200},
+                "retry": {"period_init_ms": 50, "period_max_ms": 200, "period_increase_factor": 2},
             },
             "listen": {"endpoints": here},
             "scouting": {"multicast": {"enabled": False}, "gossip": {"enabled": False}},
