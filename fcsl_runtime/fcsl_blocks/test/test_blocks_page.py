@@ -33,9 +33,9 @@ Algorithms that every machine can use: name the file in `algorithms`, as any oth
 ```
 
 Inputs `period` and `resumed` are those of `machine`. A run with inputs that are not finite is passed over: outputs
-stay, and health is degraded. No block faults, and none hands on a NaN or an infinity while its health is nominal. Costs are those of gcc 12 at -O3 for x86-64 and sizes of
-{SIZE}: instructions of the longest way through a run, bytes of ports and state, and the stack of a machine with this
-block alone.
+stay, and health is degraded. No block faults, and none hands on a NaN or an infinity while its health is nominal.
+Costs are those of gcc 12 at -O3 for x86-64 and sizes of {SIZE}: instructions of the longest way through a run, bytes
+of ports and state, and the stack of a machine with this block alone.
 """
 
 
