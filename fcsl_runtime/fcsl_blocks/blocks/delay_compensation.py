@@ -40,26 +40,26 @@ class DelayCompensation:
         "fresh": "bool",  # present is new
     }
     state = {
-        "newest": "u32",  # row of the memory
-        "rates": "f64[memory][n]",
+        "rates": "f64[memory][n]",  # newest first
         "periods": "f64[memory] s",
     }
 
     def execute(self):
         if self.resumed:
             self.periods = zeros(memory)
-        self.newest = (self.newest + 1) % memory
-        self.rates[self.newest] = self.rate
-        self.periods[self.newest] = self.period
+        for i in range(memory - 1, 0, -1):
+            self.rates[i] = self.rates[i - 1]
+            self.periods[i] = self.periods[i - 1]
+        self.rates[0] = self.rate
+        self.periods[0] = self.period
         self.fresh = False
         if self.measured_fresh:
             left = self.delay
             present = self.measured
-            for k in range(memory):
-                row = (self.newest + (memory - k)) % memory
-                part = min(left, self.periods[row])
+            for i in range(memory):
+                part = min(left, self.periods[i])
                 if part > 0.0:
-                    present = present + part * self.rates[row]
+                    present = present + part * self.rates[i]
                     left -= part
             if left > 1e-9 * self.delay:
                 self.health = "degraded"

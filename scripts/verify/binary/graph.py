@@ -51,7 +51,8 @@ def check_graph(binary: Binary) -> Calls:
         for line in graph.read_text(errors="replace").splitlines():
             node, edge = _NODE.match(line), _EDGE.match(line)
             if node:
-                frames[node[1]] = node[2] == "static" and not int(node[3] or 0)
+                # "bounded": it pushes arguments of calls, by an amount that gcc knows.
+                frames[node[1]] = node[2] in ("static", "dynamic,bounded") and not int(node[3] or 0)
             elif edge:
                 calls.setdefault(edge[1], []).append((edge[2], edge[3]))
     known = ALLOWED | set(binary.externs)
