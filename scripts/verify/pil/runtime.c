@@ -50,12 +50,18 @@ void *memset(void *to, int value, size_t size)
     return to;
 }
 
-/* The same for memory of some alignment, under the names of the ARM run-time ABI. */
+/* The same for memory of some alignment: every name that the ARM run-time ABI has for it, since which of them a loop becomes
+ * is the compiler's choice. */
 #define MEMORY(bytes)                                                                                                  \
     void __aeabi_memcpy##bytes(void *to, const void *from, size_t size);                                               \
     void __aeabi_memcpy##bytes(void *to, const void *from, size_t size)                                                \
     {                                                                                                                  \
         copy(to, from, size);                                                                                          \
+    }                                                                                                                  \
+    void __aeabi_memmove##bytes(void *to, const void *from, size_t size);                                              \
+    void __aeabi_memmove##bytes(void *to, const void *from, size_t size)                                               \
+    {                                                                                                                  \
+        memmove(to, from, size);                                                                                       \
     }                                                                                                                  \
     void __aeabi_memset##bytes(void *to, size_t size, int value);                                                      \
     void __aeabi_memset##bytes(void *to, size_t size, int value)                                                       \
