@@ -817,6 +817,10 @@ def put(*path: str | int, value: Any) -> str:
     return patch(change)
 
 
+def required(condition: str, **keys: Any) -> str:
+    return put("requirements", value=[{"id": "R-1", "text": "It works.", "then": condition, **keys}])
+
+
 def connect(*connections: Mapping[str, Any]) -> str:
     return put("connections", value=list(connections))
 
@@ -1219,6 +1223,37 @@ CONFIGS: dict[str, str] = {
     "E253 a file that is not there": patch(
         lambda c: c["instances"]["one"].update(inputs={"w": {"csv": "absent.csv", "column": "w"}})
     ),
+    **{
+        f"E257 {what}": required(condition)
+        for what, condition in {
+            "no field": "one.outputs.z > 0.0",
+            "no instance": "tow.outputs.y > 0.0",
+            "no condition": "one.outputs.y + 1.0",
+            "units": "one.outputs.y > one.inputs.x",
+            "the same at all ticks": "1 < 2",
+            "a value of the coming tick": "machine.next_state == 'A'",
+            "no state of this name": "machine.state == 'C'",
+            "a vector": "one.outputs.v > 0.0",
+            "an index": "one.outputs.v[3] > 0.0",
+            "too many indices": "one.outputs.y[0] > 0.0",
+            "between two ticks": "held(one.outputs.y > 0.0, 0.015)",
+            "too long a window": "max_over(one.outputs.y, 100) > 0.0",
+            "no time": "held(one.outputs.y > 0.0, one.outputs.y)",
+            "a condition in the place of a value": "max_over(one.outputs.y > 0.0, 0.1) > 0.5 > once(one.outputs.y)",
+            "too few arguments": "since(one.outputs.y > 0.0)",
+            "a function of metrics": "rms(one.outputs.y) > 0.5",
+        }.items()
+    },
+    "E257 no condition of three": put("requirements", value=[{"id": "R-1", "text": "t"}]),
+    "E257 a limit and no `when`": required("one.outputs.y > 0.0", within_s=0.5),
+    "E257 the same id": put("requirements", value=[{"id": id_, "text": "t", "never": "one.outputs.y > 0.0"} for id_ in ("R-1", "R_1")]),
+    "E203 an id": required("one.outputs.y > 0.0", id="R 1"),
+    "E204 a text of a page": required("one.outputs.y > 0.0", text="t" * 201),
+    "E206 a clock": required("one.outputs.y > 0.0", clock="tow"),
+    "E205 what stale does": required("one.outputs.y > 0.0", stale="keep"),
+    "E244 a limit between ticks": required("one.outputs.y > 0.0", when="one.outputs.i > 0", within_s=0.015),
+    "E100 requirements of no file": put("requirements", value="absent.json"),
+    "E201 a key of a requirement": required("one.outputs.y > 0.0", wehn="one.outputs.i > 0"),
     "E251 two parents": frames(frame(), frame(parent="mast")),
     "E251 a frame in itself": frames(frame("base")),
     "E251 a loop of frames": frames(frame(), frame("base", "mast"), frame("mast", "imu"), frame("a", "imu")),

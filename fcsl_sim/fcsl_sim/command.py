@@ -13,6 +13,7 @@ from types import FrameType
 
 from fcsl_compiler.api.diagnostics import DiagnosticError
 from simclient.cli import missing_package
+from simclient.requirements import summary as requirement_lines
 
 from . import plot
 from .config import SERIAL_LINK, SimConfig, load
@@ -277,6 +278,8 @@ def _print_summary(config: SimConfig, summary: Summary) -> None:
     )
     for transition, count in (summary.lost_requests or {}).items():
         show(f"lost requests: {transition} {count}")
+    for line in requirement_lines(list((summary.requirements or {}).values())):
+        show(line)
     if summary.telemetry:
         counts = summary.telemetry
         show(
@@ -299,6 +302,8 @@ def _print_summary(config: SimConfig, summary: Summary) -> None:
         show(f"controller {name}: {companion['ticks']} ticks, {companion['state']}")
         for transition, count in companion["lost_requests"].items():
             show(f"controller {name}: lost requests: {transition} {count}")
+        for line in requirement_lines(list(companion["requirements"].values())):
+            show(f"controller {name}: {line}")
     if summary.bag:
         show(f"bag: {', '.join([summary.bag, *(str(c['bag']) for c in summary.companions.values())])}")
     if summary.until_held is False:

@@ -16,11 +16,12 @@ from types import TracebackType
 from fcsl_compiler.api.packages import PackageNotFound, package_prefix
 from fcsl_compiler.api.types import count_of, shape_of
 from simclient.c_machine import CMachine
-from simclient.c_run import CError
+from simclient.c_run import VERDICTS, CError
 from simclient.descriptor import Machine, read_machine
 from simclient.errors import TwinError
 from simclient.library import bind
 from simclient.paths import resolve
+from simclient.requirements import Verdict, read_verdicts
 from simclient.ros.composer import Composer
 from simclient.ros.publish_queue import PublishQueue
 from simclient.values import Value, read_part
@@ -140,6 +141,7 @@ _PROTOTYPES: dict[str, tuple[type | None, list[type]]] = {
     "fcsl_sim_describe_model": (c_int64, [c_char_p, c_char_p, ptr, c_size_t, _ERROR]),
     "fcsl_run_machine": (POINTER(CMachine), [ptr]),
     "fcsl_run_data": (ptr, [ptr]),
+    **VERDICTS,
 }
 
 #: fcsl_sim_status_t by number.
@@ -331,6 +333,10 @@ class Simulation:
         base = self._lib.fcsl_run_data(run)
         machine = read_machine(self._lib.fcsl_run_machine(run))
         return machine.lost_requests(lambda offset, size: ctypes.string_at(base + offset, size))
+
+    def verdicts(self, run: int | None = None) -> list[Verdict]:
+        """On the requirements of the hosted machine. `run`: of the controller with this fcsl_run_t."""
+        return read_verdicts(self._lib, self.hosted() if run is None else run)
 
     def run(self, ticks: int) -> int:
         """Runs up to `ticks` ticks; returns early at the end, after a change of state and after a wait. Returns ticks done."""

@@ -2,6 +2,7 @@
 """The reference, which runs a machine in CPython, and what it needs of the compiler."""
 
 from ..driver.externs import build_externs
+from ..driver.monitors import compile_monitor
 from ..driver.passes import compile_machine
 from ..reference.externs import externs_of
 from ..reference.fault_places import FaultRow
@@ -12,5 +13,6 @@ __all__ = [
     "ReferenceMachine",
     "build_externs",
     "compile_machine",
+    "compile_monitor",
     "externs_of",
 ]

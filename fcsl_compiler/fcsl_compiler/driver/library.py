@@ -14,7 +14,9 @@ from ..model.choices import DEFAULT_BACKEND, DEFAULT_TARGET
 from .backends import toolchain_of_backend
 from .externs import explained, link_inputs
 from .nim import check_externs, compile_modules
+from .monitors import compile_monitor
 from .passes import Compilation, compile_machine
+from .registry import registry
 from .stack import stack_bound, stepped_machines
 from .symbols import SymbolError, check_symbols
 from .toolchain import ToolchainError, compile_objects, include_dirs, link_shared, math_library, start_call_graph_query
@@ -28,7 +30,7 @@ def emit(
     instances: Sequence[str] | None = None,
     backend: str = DEFAULT_BACKEND,
 ) -> list[Compilation]:
-    """Writes <stem>.c, .h and .map.json of every machine, and fcsl_machines.c, into `folder`. With backend "nim" the C
+    """Writes <stem>.c, .h and .map.json of every machine and monitor, and fcsl_machines.c, into `folder`. With backend "nim" the C
     is <stem>.nim.c, which Nim makes of <stem>.nim.
 
     `instances`: instances of a subset machine. Writes nothing if a machine does not compile. Raises DiagnosticError,
@@ -57,18 +59,22 @@ def compile_all(
         compile_machine(path, found, strict=strict, target=target, cover=cover, instances=instances, backend=backend)
         for path in configs
     ]
+    for c in compilations:
+        compile_monitor(c)
     _distinct(compilations)
     return compilations
 
 
 def _write(compilations: list[Compilation], folder: Path) -> list[Path]:
     texts: dict[str, str] = {}
-    for c in compilations:
+    everything = [*compilations, *(c.monitor_code for c in compilations if c.monitor_code is not None)]
+    for c in everything:
         name = c.checked.name
         texts |= {f"{name}.h": c.header, c.source_name: c.source, f"{name}.map.json": c.map}
-    modules = {c.checked.name: c.source for c in compilations if c.backend == "nim"}
+    modules = {c.checked.name: c.source for c in everything if c.backend == "nim"}
     texts |= compile_modules(modules) if modules else {}
-    texts["fcsl_machines.c"] = _registry([c.checked.name for c in compilations])
+    watching = {c.checked.name: c.monitor for c in compilations if c.monitor is not None}
+    texts["fcsl_machines.c"] = registry([c.checked.name for c in compilations], watching)
     for file, text in texts.items():
         write_whole(folder / file, text)
     return [folder / file for file in texts]
@@ -76,7 +82,7 @@ def _write(compilations: list[Compilation], folder: Path) -> list[Path]:
 
 def _distinct(compilations: list[Compilation]) -> None:
     seen: dict[str, Compilation] = {}
-    for c in compilations:
+    for c in [*compilations, *(c.monitor_code for c in compilations if c.monitor_code is not None)]:
         name = c.checked.name
         if name in seen:
             message = f"two machines named `{name}` in one library"
@@ -92,22 +98,6 @@ def _distinct(compilations: list[Compilation]) -> None:
                 message = f"machines `{exported[symbol]}` and `{name}` would both define `{symbol}_execute`"
                 help_text = "rename the instance, or build two libraries"
                 raise DiagnosticError([Diagnostic(Severity.ERROR, "E230", message, instance.span, "", help_text)])
-
-
-def _registry(names: list[str]) -> str:
-    lines = [
-        "/* fcsl_machines.c: made by fcslc. Do not edit. */",
-        "#include <fcsl/fcsl_machine.h>",
-        "#include <stddef.h>",
-        "",
-    ]
-    lines += [f"extern const fcsl_machine_t {name}_machine;" for name in names]
-    entries = ", ".join(f"&{name}_machine" for name in names)
-    lines += [
-        "",
-        f'__attribute__((visibility("default"))) const fcsl_machine_t *const fcsl_machines[] = {{{entries}, NULL}};',
-    ]
-    return "\n".join(lines) + "\n"
 
 
 #: Called for each built machine with its object file (temporary) and the folders of its headers.

@@ -33,6 +33,9 @@ from ..printers.c.source import print_source
 from ..printers.nim.module import print_module
 from ..printers.source_map import source_map
 from ..printers.writer import Writer
+from ..requirements.monitor import Monitor, subset_of
+from ..requirements.read import read_requirements
+from ..requirements.requirement import Requirement
 from .c_dependencies import CInputs, extern_inputs
 from .dump import dump_c, dump_ir, dump_machine, dump_schedule, dump_syntax, dump_types
 
@@ -60,6 +63,9 @@ class Compilation:
     cover: bool = False  # True for a coverage build, which must not fly
     backend: str = DEFAULT_BACKEND  # language of the source (BACKENDS)
     extern_calls: tuple[str, ...] = ()  # functions called by the externs' own code, known after linking
+    requirements: list[Requirement] = field(default_factory=list)
+    monitor: Monitor | None = None  # None without requirements
+    monitor_code: Compilation | None = None  # of the monitor
 
     @property
     def source_name(self) -> str:
@@ -83,6 +89,8 @@ def _parse(c: Compilation) -> None:
 def _check(c: Compilation) -> None:
     if c.parsed is not None:
         c.machine = check_machine(c.parsed, c.sink)
+    if c.parsed is not None and c.machine is not None:
+        c.requirements = read_requirements(c.parsed, c.machine, c.sink)
     if c.strict and c.machine is not None:
         check_strict(c.machine, c.sink)
 
@@ -98,6 +106,7 @@ def _schedule(c: Compilation) -> None:
     if c.instances is not None and not c.sink.failed:
         assert c.parsed is not None
         c.machine = subset_machine(c.machine, c.instances, c.parsed.keys["instances"].span, c.sink)
+        c.requirements = subset_of(c.requirements, c.machine) if c.machine is not None else []
 
 
 def _lower(c: Compilation) -> None:

@@ -9,7 +9,7 @@ from __future__ import annotations
 
 import ast
 import re
-from collections.abc import Callable, Iterable, Mapping
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from fractions import Fraction
 
 from ..base.diagnostics import nearest
@@ -46,6 +46,12 @@ FUNCTIONS = ("abs", "min", "max", "sqrt", "degrees", "norm", "isnan", "isfinite"
 #: Of all ticks of a flight; `min` and `max` of one value are, too.
 CONDITIONS = ("any", "all", "time", "duration")
 SERIES_FUNCTIONS = ("first", "last", "min", "max", "mean", "std", "rms", *CONDITIONS)
+#: Of the ticks so far, in requirements: what each takes, `p` a condition, `x` a value, `s` a time in seconds.
+PAST_FUNCTIONS = {
+    **{"previous": "x", "rose": "p", "fell": "p", "once": "p", "since": "pp", "held": "ps", "within": "pps"},
+    **{"max_over": "xs", "min_over": "xs"},
+}
+_PAST_EXAMPLES = {"p": "a condition", "x": "a value", "s": "a time in s, such as 0.5"}
 
 _NUMBERS = (Kind.BOOL, Kind.INTEGER, Kind.FLOAT)
 _SECOND = units.read("s")
@@ -59,9 +65,10 @@ def parse(
     metrics: Mapping[str, Quantity] | None = None,
     condition: bool = False,
     pure_numbers: bool = False,
+    past: bool = False,
 ) -> Node:
     """find: what a path is. series: with the functions of all ticks. metrics: names of other expressions that it may read.
-    condition: it must be true or false. pure_numbers: a factor of literals alone converts no unit, so `2 * x` has that of x.
+    condition: it must be true or false. past: with the functions of the ticks so far. pure_numbers: a factor of literals alone converts no unit, so `2 * x` has that of x.
 
     Raises ExpressionError.
     """
@@ -71,7 +78,8 @@ def parse(
         tree = ast.parse(text, mode="eval").body
     except (SyntaxError, ValueError, MemoryError, RecursionError) as error:
         raise ExpressionError(f"`{text}` is no expression{_unread(text, error)}") from None
-    root = _Checker(text, find, series, metrics or {}, pure_numbers).root(tree, condition)
+    functions = (*FUNCTIONS, *(SERIES_FUNCTIONS if series else ()), *(PAST_FUNCTIONS if past else ()))
+    root = _Checker(text, find, series, metrics or {}, pure_numbers, tuple(dict.fromkeys(functions))).root(tree, condition)
     if not series and _steps(root) > STEPS_MAX:
         raise ExpressionError(f"`{text[:60]}…` is too long: write parts of it by themselves")
     return root
@@ -113,9 +121,17 @@ def _steps(node: Node) -> int:
 
 
 class _Checker:
-    def __init__(self, text: str, find: Find, series: bool, metrics: Mapping[str, Quantity], pure_numbers: bool):
+    def __init__(
+        self,
+        text: str,
+        find: Find,
+        series: bool,
+        metrics: Mapping[str, Quantity],
+        pure_numbers: bool,
+        functions: Sequence[str],
+    ):
         self._text, self._find, self._series, self._metrics = text, find, series, metrics
-        self._pure_numbers = pure_numbers
+        self._pure_numbers, self._functions = pure_numbers, functions
         self._values = self._depth = 0
         self._signs = self._nested = 0  # signs, `not` and `**` around a part; the most of them
         self._columns = False  # within a function of all ticks
@@ -164,10 +180,9 @@ class _Checker:
         return ast.get_source_segment(self._text, e) or ast.unparse(e)
 
     def _wrong(self, e: ast.expr) -> ExpressionError:
-        known = dict.fromkeys((*FUNCTIONS, *(SERIES_FUNCTIONS if self._series else ())))
         return ExpressionError(
             f"`{self._source(e)}` is neither path, number, name in quotes, arithmetic, comparison, and/or/not nor one of "
-            f"{', '.join(known)}"
+            f"{', '.join(self._functions)}"
         )
 
     # ---- values ---------------------------------------------------------------------------------------------------------
@@ -366,11 +381,15 @@ class _Checker:
     def _call(self, e: ast.Call, name: str) -> Node:
         if self._series and name in SERIES_FUNCTIONS and (len(e.args) == 1 or name not in FUNCTIONS):
             return self._series_call(e, name)
-        if name not in FUNCTIONS:
+        if name not in self._functions:
             if name in SERIES_FUNCTIONS:
                 raise ExpressionError(f"`{name}` is of all ticks of a flight: only metrics of a campaign have it")
-            known = dict.fromkeys((*FUNCTIONS, *(SERIES_FUNCTIONS if self._series else ())))
+            if name in PAST_FUNCTIONS:
+                raise ExpressionError(f"`{name}` is of the ticks so far: only requirements have it")
+            known = self._functions
             raise ExpressionError(f"there is no function `{name}`: there are {', '.join(known)}{_hint(name, known)}")
+        if name in PAST_FUNCTIONS:
+            return self._past_call(e, name)
         parts = tuple(self._need_number(self.node(argument)) for argument in e.args)
         many = name in ("min", "max")
         if (len(parts) < 2 or len(parts) > ARGUMENTS_MAX) if many else len(parts) != 1:
@@ -396,6 +415,35 @@ class _Checker:
                 raise ExpressionError(f"`degrees` is of rad, and `{parts[0].text}` is in {_shown(first.unit)}")
             return Quantity(Kind.FLOAT, first.shape, _DEGREE)
         return Quantity(_joined(parts), self._shape(parts), self._same_unit(parts, f"`{name}`"))
+
+    def _past_call(self, e: ast.Call, name: str) -> Node:
+        takes = PAST_FUNCTIONS[name]
+        if len(e.args) != len(takes):
+            listed = ", ".join(_PAST_EXAMPLES[kind] for kind in takes)
+            raise ExpressionError(f"`{self._source(e)}`: `{name}` takes {listed}")
+        parts = tuple(self._need_scalar(self.node(argument)) for argument, kind in zip(e.args, takes) if kind != "s")
+        for part, kind in zip(parts, takes, strict=False):
+            if kind == "p":
+                self.need_bool(part)
+            elif part.operator == "literal":
+                raise ExpressionError(f"`{part.text}` is the same at all ticks: give `{name}` a path")
+        if takes.startswith("p"):
+            quantity = Quantity(Kind.BOOL)
+        elif name == "previous":
+            quantity = parts[0].quantity
+        else:
+            self._need_number(parts[0])
+            quantity = Quantity(Kind.FLOAT, (), parts[0].quantity.unit)
+        seconds = self._seconds(e.args[-1], name) if takes.endswith("s") else None
+        return self._made(e, name, parts, quantity, seconds)
+
+    def _seconds(self, e: ast.expr, name: str) -> Fraction:
+        """A time as it is written, exactly."""
+        text = self._source(e)
+        is_number = isinstance(e, ast.Constant) and type(e.value) in (int, float)
+        if not is_number or not _LITERAL.fullmatch(text) or not Fraction(text):
+            raise ExpressionError(f"`{text}`: `{name}` takes a time in s, a positive number such as 0.5")
+        return Fraction(text)
 
     def _series_call(self, e: ast.Call, name: str) -> Node:
         if self._columns:

@@ -59,6 +59,11 @@ class Constants:
         self._of[name] = read_by
         _check_unit(found, unit)
 
+    @property
+    def known(self) -> dict[str, tuple[Number, Quantity]]:
+        """Value and quantity of each by name."""
+        return {name: (value, self._find(name)) for name, (value, _) in self._known.items() if name not in self.wrong}
+
     def value(self, expression: str, unit: str) -> Number:
         """Of an expression that has this unit, if it is not "". Raises ExpressionError."""
         value, found = self.evaluate(expression)

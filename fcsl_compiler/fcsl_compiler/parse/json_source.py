@@ -6,6 +6,7 @@ from __future__ import annotations
 
 import json
 import re
+from collections.abc import Collection
 from dataclasses import dataclass
 
 from ..base.diagnostics import DiagnosticSink
@@ -94,19 +95,20 @@ def parse_json(source: SourceFile, sink: DiagnosticSink, start: int = 0) -> Json
     return node
 
 
-def text_without(source: SourceFile, root: JsonNode, key: str) -> str:
-    """The text without a member of its root object and the comma that comes with it. The whole text without such a
-    member."""
+def text_without(source: SourceFile, root: JsonNode, keys: Collection[str]) -> str:
+    """The text without these members of its root object and the commas that come with them."""
     members = list(root.members.values())
-    at = next((n for n, member in enumerate(members) if member.key == key), None)
-    if at is None:
-        return source.text
-    start, end = source.offsets(members[at].key_span)[0], source.offsets(members[at].value.span)[1]
-    if at > 0:
-        start = source.offsets(members[at - 1].value.span)[1]
-    elif len(members) > 1:
-        end = source.offsets(members[1].key_span)[0]
-    return source.text[:start] + source.text[end:]
+    text, end = "", 0
+    is_first = True  # of those that stay
+    for at, member in enumerate(members):
+        own = source.offsets(member.key_span)[0], source.offsets(member.value.span)[1]
+        if member.key in keys:
+            text += source.text[end : own[0]] if at == 0 else ""
+        else:
+            text += source.text[own[0] : own[1]] if is_first and at else source.text[end : own[1]]
+            is_first = False
+        end = own[1]
+    return text + source.text[end:]
 
 
 class _Parser:

@@ -54,6 +54,7 @@ _OPTIONAL = (
         "start_grace_s",
         "nan",
         "targets",
+        "requirements",
         "views",
     ),
 )
@@ -115,7 +116,7 @@ class ParsedMachine:
     keys: dict[str, JsonNode]
     algorithms: dict[str, ParsedAlgorithm]
     targets: dict[str, Target]
-    hashed_text: str  # of machine JSON and parts, without `views`, which changes nothing that the machine does
+    hashed_text: str  # of machine JSON and parts, without `views` and `requirements`, which change nothing that it does
     constants: Constants | None  # None without a block of them
     joined: Joined
 
@@ -172,7 +173,7 @@ def parse_machine(path: Path, sink: DiagnosticSink) -> ParsedMachine | None:
     }
     targets = read_targets(keys.get("targets"), path, reader)
     texts = {part.name: part.text for part in joined.files}
-    hashed_text = "\n".join((text_without(source, root, "views"), *texts.values()))
+    hashed_text = "\n".join((text_without(source, root, ("views", "requirements")), *texts.values()))
     return ParsedMachine(
         name, source, package_of(path, name), keys, algorithms, targets, hashed_text, reader.constants, joined
     )

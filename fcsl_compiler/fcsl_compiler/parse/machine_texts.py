@@ -52,8 +52,7 @@ def read_texts(config: Path) -> MachineTexts | None:
 def _named(config: Path, folder: str, text: str, keys: dict[str, Any], parts: dict[str, str]) -> list[str]:
     """The files that a machine JSON of a folder names, and its parts, whose texts are added to `parts`."""
     sources = [beside(folder, algorithm["source"]) for algorithm in keys["algorithms"].values()]
-    if isinstance(keys.get("constants"), str):
-        sources.append(beside(folder, keys["constants"]))
+    sources += [beside(folder, keys[key]) for key in ("constants", "requirements") if isinstance(keys.get(key), str)]
     if '"csv"' in text:
         sources += [beside(folder, name) for name in _columns(keys["instances"])]
     for instance in keys["instances"].values() if '"machine"' in text else ():

@@ -167,3 +167,35 @@ class CMachine(Structure):
         ("step", c_void_p),
         ("force_state", c_void_p),
     ]
+
+
+class CRequirement(Structure):
+    """fcsl_requirement_t"""
+
+    _fields_ = [
+        ("id", c_char_p),
+        ("text", c_char_p),
+        ("kind", c_uint8),
+        ("assumed", c_uint8),
+        ("instance", c_uint32),
+        ("source", c_char_p),
+    ]
+
+
+class CObserved(Structure):
+    """fcsl_observed_t"""
+
+    _fields_ = [("path", c_char_p), ("input", c_char_p)]
+
+
+class CMonitor(Structure):
+    """fcsl_monitor_t"""
+
+    _fields_ = [
+        ("watched", c_char_p),
+        ("machine", POINTER(CMachine)),
+        ("observed", POINTER(CObserved)),
+        ("observed_count", c_uint32),
+        ("requirements", POINTER(CRequirement)),
+        ("requirement_count", c_uint32),
+    ]

@@ -7,7 +7,7 @@ from ctypes import POINTER, Structure, c_char, c_char_p, c_int, c_int32, c_int64
 from ctypes import c_void_p as ptr
 from pathlib import Path
 
-from .c_machine import CMachine
+from .c_machine import CMachine, CMonitor, CRequirement
 from .hardware import CSimulatedHardware
 from .library import bind_runtime
 
@@ -55,6 +55,28 @@ class CSeries(Structure):
     ]
 
 
+class CVerdict(Structure):
+    """fcsl_verdict_t"""
+
+    _fields_ = [
+        ("requirement", POINTER(CRequirement)),
+        ("status", c_uint8),
+        ("holds", c_uint8),
+        *((name, c_uint64) for name in ("evaluated", "exercised", "undefined", "faults")),
+        *((name, c_uint64) for name in ("violations", "violated_ticks", "first_tick", "last_tick")),
+    ]
+
+
+#: FCSL_VERDICT_TEXT_MAX
+VERDICT_TEXT_BYTES = 512
+
+#: What reads the verdicts of a run.
+VERDICTS: dict[str, tuple[type | None, list[type]]] = {
+    "fcsl_run_monitor": (POINTER(CMonitor), [ptr]),
+    "fcsl_run_monitor_data": (ptr, [ptr]),
+    "fcsl_run_verdict": (None, [ptr, c_uint32, POINTER(CVerdict)]),
+    "fcsl_run_verdict_text": (None, [ptr, POINTER(CVerdict), ptr]),
+}
 _ERROR = POINTER(CError)
 #: Result type and argument types of every function used here.
 _PROTOTYPES: dict[str, tuple[type | None, list[type]]] = {
@@ -102,6 +124,8 @@ _PROTOTYPES: dict[str, tuple[type | None, list[type]]] = {
     "fcsl_run_trace_rows": (c_uint64, [ptr]),
     "fcsl_run_trace_read": (c_int, [ptr, c_uint64, c_uint64, ptr, _ERROR]),
     "fcsl_run_trace_end": (None, [ptr, ptr]),
+    "fcsl_run_use_monitor": (c_int, [ptr, POINTER(CMonitor), _ERROR]),
+    **VERDICTS,
     "fcsl_run_feed_series": (c_int, [ptr, POINTER(CSeries), c_uint32, c_uint64, _ERROR]),
     "fcsl_run_feed": (c_int, [ptr, c_char_p, c_size_t, c_char_p, c_uint64, c_uint64, _ERROR]),
     "fcsl_run_record": (c_int, [ptr, POINTER(CRecordOptions), _ERROR]),

@@ -9,7 +9,7 @@ from collections.abc import Mapping, Sequence
 from ctypes import byref, c_char, c_char_p, c_int64, c_uint64
 from ctypes import c_void_p as ptr
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 from .c_machine import HEALTH_NAMES, CMachine
 from .c_run import CError, CMessage, CRecordOptions, CSeries, load_runtime
@@ -18,6 +18,9 @@ from .errors import TwinError
 from .fork_safety import FORKED, for_children, not_for_children
 from .hardware import COUNT, CSimulatedHardware
 from .library import runtime_library
+
+if TYPE_CHECKING:
+    from .requirements import Verdict
 
 #: fcsl_tick_message_t by topic.
 TICK_MESSAGES = {"state": 0, "transitions": 1, "health": 2, "faults": 3}
@@ -147,6 +150,12 @@ class Run:
         """After its next execute instance number `instance` is at least "degraded" or "failed"."""
         number = HEALTH_NAMES.index(health)
         self._check(self._lib.fcsl_run_inject_health(self.handle(), instance, number, byref(self._error)))
+
+    def verdicts(self) -> list[Verdict]:
+        """On the machine's requirements, after the ticks so far."""
+        from .requirements import read_verdicts
+
+        return read_verdicts(self._lib, self.handle())
 
     def save(self) -> bytes:
         """The whole machine struct, `machine.size` bytes."""

@@ -650,6 +650,16 @@ MACHINE_CODES: dict[str, Code] = {
         '              "lights": {"machine": "part.json", "requests": {"DONE": "ABORT"}}},\n'
         '"always": {"lights": true}',
     ),
+    "E257": Code(
+        "a requirement that cannot be evaluated",
+        "A requirement has an id, a text, and one condition: `then`, `never` or `at_end`; with `when`, only where that holds. "
+        "A condition is an expression over fields of the machine, with the functions of the ticks so far (`held`, `since`, "
+        "`within` …). Units and kinds must fit, times are whole numbers of ticks, and it must read a field.",
+        Kind.JSON,
+        '"requirements": [{"id": "NAV-1", "text": "It climbs slower than 50 m/s.", "then": "nav.outputs.speed < 50.0",\n'
+        '                  "never": "nav.outputs.speed > 50.0"}]',
+        '"requirements": [{"id": "NAV-1", "text": "It climbs slower than 50 m/s.", "then": "nav.outputs.speed < 50.0"}]',
+    ),
     "W201": Code(
         "an algorithm without an instance",
         "The algorithm is checked, but is not part of the machine. Usually its instance was removed or never added.",

@@ -13,6 +13,7 @@
 #include "fcsl/fcsl_codec.h"
 #include "fcsl/fcsl_hw_sim.h"
 #include "fcsl/fcsl_machine.h"
+#include "fcsl/fcsl_monitor.h"
 
 #ifdef __cplusplus
 extern "C" {
@@ -226,6 +227,41 @@ uint64_t fcsl_run_trace_rows(const fcsl_trace_t *trace);
 int fcsl_run_trace_read(const fcsl_trace_t *trace, uint64_t first, uint64_t count, void *rows, fcsl_error_t *error);
 void fcsl_run_trace_end(fcsl_run_t *run, fcsl_trace_t *trace);
 
+/* ---- requirements ----------------------------------------------------------------------------------------------- */
+
+typedef enum {
+    FCSL_MET = 0,
+    FCSL_VIOLATED = 1,
+    FCSL_NOT_EXERCISED = 2 /* its `when` never held, or it was never evaluated */
+} fcsl_verdict_status_t;
+
+/* A requirement of the machine, after the ticks so far. */
+typedef struct {
+    const fcsl_requirement_t *requirement;
+    uint8_t status; /* fcsl_verdict_status_t */
+    uint8_t holds; /* at its last evaluation */
+    uint64_t evaluated; /* ticks in which it was */
+    uint64_t exercised; /* of these, those in which its `when` held */
+    uint64_t undefined; /* of these, those in which its `when` compared a NaN */
+    uint64_t faults; /* ticks in which an integer overflowed, or was divided by 0: it was not evaluated */
+    uint64_t violations; /* how often a violation began; the rest only with one */
+    uint64_t violated_ticks;
+    uint64_t first_tick;
+    uint64_t last_tick;
+} fcsl_verdict_t;
+
+enum { FCSL_VERDICT_TEXT_MAX = 512 };
+
+/* Those of a library come with it; this gives a run the monitor of another machine that has the same fields. */
+int fcsl_run_use_monitor(fcsl_run_t *run, const fcsl_monitor_t *monitor, fcsl_error_t *error);
+/* The requirements of a run; null without. */
+const fcsl_monitor_t *fcsl_run_monitor(const fcsl_run_t *run);
+/* The monitor's struct, to read from; null without one. */
+const void *fcsl_run_monitor_data(const fcsl_run_t *run);
+/* `index`: of a requirement of the monitor. */
+void fcsl_run_verdict(const fcsl_run_t *run, uint32_t index, fcsl_verdict_t *verdict);
+/* "LND-4 violated 1 time, first at tick 812 (8.12 s), last at tick 815: …" */
+void fcsl_run_verdict_text(const fcsl_run_t *run, const fcsl_verdict_t *verdict, char text[FCSL_VERDICT_TEXT_MAX]);
 /* ---- views ------------------------------------------------------------------------------------------------------- */
 
 /* What plots and viewers show of this run (docs/reference/language.md): the machine's own views, or those of its host; "" for none. Bags

@@ -15,6 +15,7 @@
 #include "fcsl/fcsl_scalar.h"
 #include "hardware.h"
 #include "machine/fault_place.h"
+#include "monitor.h"
 #include "stack_left.h"
 #include "record/write_queue.h"
 #include "io_replay.h"
@@ -89,8 +90,8 @@ static int allocate(fcsl_run_t *run, fcsl_error_t *error)
     run->data = aligned_alloc(align, size);
     run->staging = aligned_alloc(align, size);
     run->layouts = calloc(machine->instance_count + 1u, sizeof *run->layouts);
-    run->verdicts = calloc(machine->instance_count + 1u, sizeof *run->verdicts);
-    if (run->data == NULL || run->staging == NULL || run->layouts == NULL || run->verdicts == NULL) {
+    run->watched = calloc(machine->instance_count + 1u, sizeof *run->watched);
+    if (run->data == NULL || run->staging == NULL || run->layouts == NULL || run->watched == NULL) {
         return fcsl_fail(error, "out of memory for machine '%s'", machine->name);
     }
     memset(run->data, 0, size);
@@ -109,7 +110,7 @@ static int allocate(fcsl_run_t *run, fcsl_error_t *error)
             return -1;
         }
         if (instance->max_wcet_us != 0) {
-            run->verdicts[run->verdict_count++] = (fcsl_verdict_t){.overruns_offset = instance->overruns_offset,
+            run->watched[run->watched_count++] = (fcsl_overrun_watch_t){.overruns_offset = instance->overruns_offset,
                                                                    .inject_offset = instance->inject_overrun_offset,
                                                                    .instance = instance->name};
         }
@@ -150,9 +151,10 @@ static void release(fcsl_run_t *run)
     fcsl_hardware_close(run);
     fcsl_io_replay_free(run);
     fcsl_trace_free(run);
+    fcsl_monitor_close(run);
     fcsl_write_queue_close(run->write_queue);
     free(run->layouts);
-    free(run->verdicts);
+    free(run->watched);
     free(run->data);
     free(run->staging);
     free(run->safe);
@@ -202,7 +204,13 @@ fcsl_run_t *fcsl_run_open(const char *library, const char *machine, fcsl_error_t
     if (run->machine != NULL && fcsl_cover_attach(run->library, library, run->machine, error) != 0) {
         run->machine = NULL;
     }
-    return begin(run, error);
+    run = begin(run, error);
+    const fcsl_monitor_t *monitor = run != NULL ? fcsl_monitor_in(run->library, run->machine->name) : NULL;
+    if (monitor != NULL && fcsl_run_use_monitor(run, monitor, error) != 0) {
+        release(run);
+        return NULL;
+    }
+    return run;
 }
 
 fcsl_run_t *fcsl_run_open_machine(const fcsl_machine_t *machine, fcsl_error_t *error)

@@ -12,6 +12,7 @@
 #include "fcsl/fcsl_monotonic.h"
 #include "fcsl/fcsl_scalar.h"
 #include "io_replay.h"
+#include "monitor.h"
 #include "record/recorder.h"
 #include "run_internal.h"
 #include "trace.h"
@@ -152,22 +153,22 @@ uint64_t fcsl_run_monotonic_ns(void *ctx)
     return fcsl_monotonic_ns();
 }
 
-static void keep_verdicts(fcsl_run_t *run)
+static void keep_overruns(fcsl_run_t *run)
 {
-    for (uint32_t i = 0; i < run->verdict_count; i++) {
-        fcsl_verdict_t *verdict = &run->verdicts[i];
-        verdict->overruns = fcsl_read_u64(run->data, verdict->overruns_offset);
-        verdict->injected = run->data[verdict->inject_offset];
+    for (uint32_t i = 0; i < run->watched_count; i++) {
+        fcsl_overrun_watch_t *watch = &run->watched[i];
+        watch->overruns = fcsl_read_u64(run->data, watch->overruns_offset);
+        watch->injected = run->data[watch->inject_offset];
     }
 }
 
 /* Overruns that the clock found in `tick`: an input of the run, so a replay injects them. */
 static void note_new_overruns(fcsl_run_t *run, uint64_t tick)
 {
-    for (uint32_t i = 0; i < run->verdict_count; i++) {
-        const fcsl_verdict_t *verdict = &run->verdicts[i];
-        if (verdict->injected == 0 && fcsl_read_u64(run->data, verdict->overruns_offset) != verdict->overruns) {
-            fcsl_note_write_at(run, tick, &(fcsl_write_t){.kind = FCSL_WRITE_OVERRUN, .path = verdict->instance});
+    for (uint32_t i = 0; i < run->watched_count; i++) {
+        const fcsl_overrun_watch_t *watch = &run->watched[i];
+        if (watch->injected == 0 && fcsl_read_u64(run->data, watch->overruns_offset) != watch->overruns) {
+            fcsl_note_write_at(run, tick, &(fcsl_write_t){.kind = FCSL_WRITE_OVERRUN, .path = watch->instance});
         }
     }
 }
@@ -185,6 +186,9 @@ static int step_once(fcsl_run_t *run, uint64_t tick, fcsl_error_t *error)
     if (run->requires_arming) {
         run->requires_arming = fcsl_is_armed(run->machine, run->data);
     }
+    if (run->monitor != NULL) {
+        fcsl_monitor_tick(run);
+    }
     if (run->traces != NULL) {
         fcsl_trace_take(run);
     }
@@ -200,7 +204,7 @@ __attribute__((hot)) static int step_noted(fcsl_run_t *run, fcsl_error_t *error)
     }
     const uint64_t tick = fcsl_run_tick(run);
     if (timed) {
-        keep_verdicts(run);
+        keep_overruns(run);
     }
     if (step_once(run, tick, error) != 0) {
         return -1;

@@ -4,6 +4,7 @@
 
 #include "fcsl/fcsl_error.h"
 #include "fcsl/fcsl_hw_sim.h"
+#include "fcsl/fcsl_monitor.h"
 #include "machine/machine_struct.h"
 #include "messages/message.h"
 #include "record/write_queue.h"
@@ -16,7 +17,7 @@ typedef struct {
     const char *instance;
     uint64_t overruns;
     uint8_t injected;
-} fcsl_verdict_t;
+} fcsl_overrun_watch_t;
 
 /* What an impure instance leaves: bytes at run->left + offset, little-endian; none for other instances. */
 typedef struct {
@@ -37,8 +38,8 @@ struct fcsl_run {
     uint64_t (*clock_ns)(void *ctx); /* null: nothing is timed */
     void *clock_ctx;
     fcsl_layout_t *layouts;   /* per instance */
-    fcsl_verdict_t *verdicts;
-    uint32_t verdict_count;
+    fcsl_overrun_watch_t *watched;
+    uint32_t watched_count;
     uint32_t impure_count;    /* instances that are */
     uint64_t impure_executes; /* that no substitute took the place of */
     uint64_t mode_changes;    /* of the floating-point mode, by such an instance */
@@ -50,6 +51,7 @@ struct fcsl_run {
     fcsl_write_queue_t *write_queue;   /* null: none */
     uint64_t record_time_ns;   /* of the coming records; FCSL_TICK_TIME: that of their tick */
     fcsl_trace_t *traces;      /* null: none */
+    struct fcsl_monitor_run *monitor; /* null: no requirements */
     char *views;               /* of the host; null: those of the machine */
 
     fcsl_hw_sim_t simulated;

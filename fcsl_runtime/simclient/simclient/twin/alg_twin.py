@@ -20,6 +20,7 @@ from .python_run import open_python_run
 from .twin import Twin
 
 if TYPE_CHECKING:
+    from ..requirements import Verdict
     from .profile import Samples
 
 #: A twin that falls further behind real time, in ns, skips the ticks beyond, as fcsl-fc does (fc/pacing.c).
@@ -182,6 +183,10 @@ class AlgTwin(Twin):
     def _sample(self, channel: int, data: bytes, age_ticks: int, stamp_ns: int) -> None:
         with self._lock:
             self._run.write_channel(channel, data, age_ticks, stamp_ns)
+
+    def _verdicts(self) -> list[Verdict]:
+        with self._lock:
+            return self._run.verdicts()
 
     def _save(self) -> bytes:
         with self._lock:

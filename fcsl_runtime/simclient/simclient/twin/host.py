@@ -20,6 +20,7 @@ from ..hardware import Hardware
 from ..paths import Part, Selection, resolve
 
 if TYPE_CHECKING:
+    from ..requirements import Verdict
     from .black_box import BlackBox
     from .profile import Samples
 
@@ -144,6 +145,10 @@ class TwinHost(ABC):
     @abstractmethod
     def _sample(self, channel: int, data: bytes, age_ticks: int, stamp_ns: int) -> None:
         """One sample of a sensor channel for the next tick."""
+
+    def _verdicts(self) -> list[Verdict]:
+        """On the machine's requirements."""
+        raise TwinError(f"{type(self).__name__} does not read requirements")
 
     @abstractmethod
     def _save(self) -> bytes:

@@ -14,7 +14,7 @@ from ctypes import c_void_p as ptr
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from ..c_machine import NO_OFFSET, CMachine
+from ..c_machine import NO_OFFSET, CMachine, CMonitor
 from ..descriptor import Machine, read_machine
 from ..errors import TwinError
 from ..run import Run
@@ -93,6 +93,20 @@ def find_descriptor(library: Path, name: str) -> CMachine:
         if pointer.contents.name == name.encode():
             return pointer.contents
     raise TwinError(f"{library}: no machine `{name}`")
+
+
+def find_monitor(library: Path, name: str) -> CMonitor | None:
+    """That of machine `name` in a compiled library, which stays loaded; None without requirements."""
+    try:
+        table = (POINTER(CMonitor) * _MACHINES_MAX).in_dll(ctypes.CDLL(str(library)), "fcsl_monitors")
+    except ValueError:  # no machine of it has any
+        return None
+    for pointer in table:
+        if not pointer:
+            break
+        if pointer.contents.watched == name.encode():
+            return pointer.contents
+    return None
 
 
 def layout_of(descriptor: CMachine, machine: Machine) -> dict[str, int]:
@@ -200,28 +214,44 @@ class PythonMachine:
             self._reference.force_state(self._memory_at(address), state)
 
 
-class PythonRun(Run):
-    """A run of a PythonMachine. Exceptions of user code propagate out of the call that ran it."""
+#: Makes a reference of offsets and fault places.
+MakeReference = Callable[[dict[str, int], Sequence["FaultRow"]], "ReferenceMachine"]
 
-    def __init__(
-        self, library: Path, name: str, make_reference: Callable[[dict[str, int], Sequence[FaultRow]], ReferenceMachine]
-    ):
-        compiled = find_descriptor(library, name)
-        machine = read_machine(ctypes.pointer(compiled))
-        self._python = PythonMachine(compiled, make_reference(layout_of(compiled, machine), fault_rows_of(machine)))
+
+def _python_machine(compiled: CMachine, make_reference: MakeReference) -> PythonMachine:
+    machine = read_machine(ctypes.pointer(compiled))
+    return PythonMachine(compiled, make_reference(layout_of(compiled, machine), fault_rows_of(machine)))
+
+
+class PythonRun(Run):
+    """A run of a PythonMachine. Exceptions of user code propagate out of the call that ran it. `make_monitor`: of the
+    machine's requirements; None without."""
+
+    def __init__(self, library: Path, name: str, make_reference: MakeReference, make_monitor: MakeReference | None):
+        self._python = _python_machine(find_descriptor(library, name), make_reference)
+        self._machines = [self._python]
         super().__init__(library, name)
+        compiled = find_monitor(library, name)
+        if make_monitor is not None and compiled is not None:
+            self._machines.append(_python_machine(compiled.machine.contents, make_monitor))
+            self._monitor = CMonitor.from_buffer_copy(compiled)
+            self._monitor.machine = ctypes.pointer(self._machines[-1].descriptor)
+            self._check(self._lib.fcsl_run_use_monitor(self.handle(), byref(self._monitor), byref(self._error)))
 
     def _open(self, library: Path, machine: str | None) -> int | None:
         handle: int | None = self._lib.fcsl_run_open_machine(byref(self._python.descriptor), byref(self._error))
         return handle
 
     def _check(self, status: int) -> None:
-        if self._python.failure is not None:
+        if any(machine.failure is not None for machine in self._machines):
             status = -1
         super()._check(status)
 
     def _failure(self) -> BaseException:
-        failure, self._python.failure = self._python.failure, None
+        failed = [machine for machine in self._machines if machine.failure is not None]
+        failure = failed[0].failure if failed else None
+        for machine in failed:
+            machine.failure = None
         return super()._failure() if failure is None else failure
 
 
@@ -234,11 +264,18 @@ def open_python_run(
     """
     from fcsl_compiler.api.build import ToolchainError, toolchain
     from fcsl_compiler.api.diagnostics import DiagnosticError
-    from fcsl_compiler.api.reference import ReferenceMachine, build_externs, compile_machine, externs_of
+    from fcsl_compiler.api.reference import ReferenceMachine, build_externs, compile_machine, compile_monitor, externs_of
 
     try:
-        checked = compile_machine(config, toolchain(), until="schedule", target=target, instances=instances).checked
+        compiled = compile_machine(config, toolchain(), until="schedule", target=target, instances=instances)
+        compile_monitor(compiled, until="schedule")
+        checked, monitor = compiled.checked, compiled.monitor_code
         externs = externs_of(build_externs(config, target)) if checked.externs else None
     except (DiagnosticError, ToolchainError) as error:
         raise TwinError(str(error)) from None
-    return PythonRun(library, name, lambda layout, places: ReferenceMachine(checked, layout, places, externs))
+    return PythonRun(
+        library,
+        name,
+        lambda layout, places: ReferenceMachine(checked, layout, places, externs),
+        None if monitor is None else lambda layout, places: ReferenceMachine(monitor.checked, layout, places, None),
+    )

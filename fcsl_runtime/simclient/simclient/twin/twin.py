@@ -31,6 +31,7 @@ from .faults import TwinFaults
 
 if TYPE_CHECKING:
     from ..bag import Bag
+    from ..requirements import Verdict
     from .snapshot import Snapshot
     from .trace import Trace
 
@@ -207,6 +208,11 @@ class Twin(TwinFaults):
         path = "machine.lost_requests"
         counts = self.get_value(path) if path in self.machine.fields else []
         return self.machine.named_lost_requests(counts) if counts else {}
+
+    @property
+    def requirements(self) -> dict[str, Verdict]:
+        """The verdicts on the machine's requirements by id, after the ticks so far (requirements.py)."""
+        return {verdict.id: verdict for verdict in self._verdicts()}
 
     def snapshot(self) -> Snapshot:
         """All current values, to compare with another snapshot (snapshot.py)."""

@@ -1,0 +1,231 @@
+# SPDX-License-Identifier: Apache-2.0
+"""Reads `requirements` of a machine JSON, or the file that it names."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+
+from ..base.diagnostics import DiagnosticSink, nearest
+from ..base.files import SourceError
+from ..base.source import SourceFile, Span
+from ..config.times import read_ticks
+from ..emit.field_table import FieldRow, field_table
+from ..expression import units
+from ..expression.parse import parse
+from ..expression.tree import ExpressionError, Kind, Node, Quantity
+from ..model.machine import Machine, seconds, split_instance, unknown_instance
+from ..model.types import HEALTH_NAMES
+from ..parse.constants import Constants
+from ..parse.json_reader import ConfigReader
+from ..parse.json_source import JsonNode, parse_json
+from ..parse.machine_files import ParsedMachine
+from ..parse.source_path import SourcePathError, missing_file_help, resolve_source
+from .requirement import KINDS, TICKS_MAX, WINDOW_MAX, Requirement, instance_name
+
+_ID = re.compile(r"[A-Za-z][A-Za-z0-9]*([-_.][A-Za-z0-9]+)*")
+_ID_MAX = 40
+_TEXT_MAX = 200
+_OPTIONAL = ("when", *KINDS, "within_s", "clock", "stale", "assume")
+#: Fields whose value at the end of a tick is that of the coming one.
+_LATER = ("machine.next_state", "machine.ticks_in_state")
+_BRACKETS = re.compile(r"\[([\d, ]+)\]")
+
+
+@dataclass(frozen=True)
+class Signal:
+    """A field of a machine, or one element or vector of it."""
+
+    row: FieldRow
+    shape: tuple[int, ...]
+
+
+class Signals:
+    """What the paths of a machine's requirements name."""
+
+    def __init__(self, machine: Machine):
+        self.machine = machine
+        self.rows = {row.path: row for row in field_table(machine)}
+
+    def find(self, path: str) -> Signal:
+        """Raises ExpressionError."""
+        row, rest = self.rows.get(path), ""
+        at = len(path)
+        while row is None and (at := path.rfind("[", 0, at)) > 0:
+            row, rest = self.rows.get(path[:at]), path[at:]
+        if row is None or _BRACKETS.sub("", rest):
+            raise ExpressionError(self._unknown(path))
+        if row.path in _LATER:
+            raise ExpressionError(f"`{row.path}` is of the coming tick, which begins when requirements have been evaluated")
+        index = [int(number) for found in _BRACKETS.findall(rest) for number in found.split(",")]
+        if len(index) > len(row.shape) or any(i >= size for i, size in zip(index, row.shape, strict=False)):
+            shape = "".join(f"[{size}]" for size in row.shape)
+            raise ExpressionError(f"`{path}`: " + (f"`{row.path}` is {shape}" if shape else f"`{row.path}` is one value"))
+        return Signal(row, row.shape[len(index) :])
+
+    def has(self, path: str) -> bool:
+        try:
+            self.find(path)
+        except ExpressionError:
+            return False
+        return True
+
+    def quantity(self, path: str) -> Quantity:
+        """Raises ExpressionError."""
+        found = self.find(path)
+        names = self.names(found.row)
+        if names:
+            return Quantity(Kind.NAME, found.shape, names=names)
+        kinds = {"FCSL_BOOL": Kind.BOOL, "FCSL_F32": Kind.FLOAT, "FCSL_F64": Kind.FLOAT}
+        kind = kinds.get(found.row.abi_type, Kind.INTEGER)
+        return Quantity(kind, found.shape, units.read(found.row.unit))
+
+    def names(self, row: FieldRow) -> tuple[str, ...]:
+        """The names of an enumeration in the order of their numbers; () of other fields."""
+        if row.abi_type == "FCSL_STATE":
+            return tuple(state.name for state in self.machine.states)
+        if row.abi_type == "FCSL_TRANSITION_REQUEST":
+            return ("", *(f"tr_{name}" for name in self.machine.requests))
+        return HEALTH_NAMES if row.abi_type == "FCSL_HEALTH" else ()
+
+    def instance(self, path: str) -> str | None:
+        """The instance whose run gives a field its value: stale, it has none. None of fields of the machine itself."""
+        row = self.find(path).row
+        return self.machine.instances[row.instance].name if row.instance >= 0 and row.role != "CHANNEL" else None
+
+    def _unknown(self, path: str) -> str:
+        instances = [i.name for i in self.machine.instances]
+        name, rest = split_instance(path, instances)
+        if name in instances and rest:
+            hint = nearest(path, [p for p in self.rows if p.startswith(f"{name}.")])
+            return f"there is no field `{path}`" + (f"; {hint}" if hint else "")
+        if path.startswith(("machine.", "channels.")):
+            hint = nearest(path, [p for p in self.rows if p.startswith(path.partition(".")[0])])
+            return f"there is no field `{path}`" + (f"; {hint}" if hint else "")
+        message, hint = unknown_instance(name, instances)
+        return f"{message}; {hint}"
+
+
+def read_requirements(parsed: ParsedMachine, machine: Machine, sink: DiagnosticSink) -> list[Requirement]:
+    """Reports what is wrong."""
+    reader = ConfigReader(sink, parsed.constants)
+    node = parsed.keys.get("requirements")
+    if node is not None and node.kind == "string":
+        node = _file(node, parsed, reader)
+    requirements = _Reader(machine, parsed.constants, reader)
+    return [found for item in reader.list(node, "`requirements`") if (found := requirements.read(item)) is not None]
+
+
+def _file(node: JsonNode, parsed: ParsedMachine, reader: ConfigReader) -> JsonNode | None:
+    """The list of a file that several machines may name."""
+    name = str(node.value)
+    try:
+        source = SourceFile.read(resolve_source(name, config=parsed.folder / parsed.source.name), name)
+    except (SourceError, SourcePathError) as error:
+        fix = missing_file_help(error, node.span)
+        reader.sink.error("E100", f"cannot read `{name[:200]}`: {error}", node.span, help=fix)
+        return None
+    root = parse_json(source, reader.sink)
+    keys = reader.object(root, "a file of requirements", ("requirements",), ("$schema", "description")) if root else None
+    return keys.get("requirements") if keys else None
+
+
+class _Reader:
+    def __init__(self, machine: Machine, constants: Constants | None, reader: ConfigReader):
+        self.machine, self.reader, self.sink = machine, reader, reader.sink
+        self.signals = Signals(machine)
+        self.constants = constants.known if constants is not None else {}
+        self._used = constants.used if constants is not None else set()
+        self._ids: dict[str, tuple[str, Span]] = {}
+
+    def read(self, node: JsonNode) -> Requirement | None:
+        keys = self.reader.object(node, "a requirement", ("id", "text"), _OPTIONAL)
+        if keys is None:
+            return None
+        before = self.sink.errors
+        id_ = self._id(keys.get("id"))
+        text = self.reader.string(keys.get("text"), "`text`", "Below 10 m it sinks slower than 2 m/s.") or ""
+        if len(text) > _TEXT_MAX:
+            self.sink.error("E204", f"`text` has {len(text)} characters", keys["text"].span, help=f"{_TEXT_MAX} at most")
+        kinds = [kind for kind in KINDS if kind in keys]
+        if len(kinds) != 1:
+            at = keys[kinds[1]].span if kinds else node.span
+            what = f"`{kinds[0]}` and `{kinds[1]}`" if kinds else "neither `then`, `never` nor `at_end`"
+            self.sink.error("E257", f"a requirement with {what}", at, help="it has one of `then`, `never`, `at_end`")
+            return None
+        kind = kinds[0]
+        if "within_s" in keys and (kind != "then" or "when" not in keys):
+            fix = '`within_s` says how long after `when` the condition `then` may take; it needs both'
+            self.sink.error("E257", "`within_s` without `when` and `then`", keys["within_s"].span, help=fix)
+        condition = self._condition(keys[kind], f"`{kind}`")
+        when = self._condition(keys["when"], "`when`") if "when" in keys else None
+        within = self._ticks(keys.get("within_s"))
+        clock = self._clock(keys.get("clock"))
+        hold = self.reader.choice(keys.get("stale"), "`stale`", ("restart", "hold")) == "hold"
+        assumed = self.reader.boolean(keys.get("assume"), "`assume`") or False
+        if condition is None or self.sink.errors != before:
+            return None
+        return Requirement(id_, text, kind, when, condition, within, clock, hold, assumed, node.span)
+
+    def _id(self, node: JsonNode | None) -> str:
+        id_ = self.reader.string(node, "`id`", "LND-7")
+        if node is None or id_ is None:
+            return ""
+        if len(id_) > _ID_MAX or not _ID.fullmatch(id_):
+            fix = f"letters and digits with `-`, `_` or `.` between them, {_ID_MAX} at most; a letter first"
+            self.sink.error("E203", f"`{id_}` is no id", node.span, help=fix)
+            return id_
+        other, at = self._ids.setdefault(instance_name(id_), (id_, node.span))
+        if at is not node.span:
+            same = "the same id" if other == id_ else f"`{other}` and `{id_}` have the same letters and digits"
+            self.sink.error("E257", f"two requirements `{id_}`", node.span, why=same, notes=[(at, "the first is here")])
+        return id_
+
+    def _condition(self, node: JsonNode, what: str) -> Node | None:
+        text = self.reader.string(node, what, "nav.outputs.height < 10.0")
+        if text is None:
+            return None
+        try:
+            quantities = {name: quantity for name, (_, quantity) in self.constants.items()}
+            found = parse(text, self.signals.quantity, metrics=quantities, condition=True, past=True)
+            found = self._bound(found)
+            if not any(part.operator == "field" for part in found.walk()):
+                raise ExpressionError(f"`{text}` is the same at all ticks: it needs a path")
+            for part in found.walk():
+                if part.operator in ("held", "within", "max_over", "min_over"):
+                    self._window(part)
+        except ExpressionError as error:
+            fix = 'write a condition, such as "held(abs(nav.outputs.speed) < 2.0, 0.5)"'
+            self.sink.error("E257", f"{what}: {error}", node.span, help=fix)
+            return None
+        return found
+
+    def _bound(self, node: Node) -> Node:
+        """With its constants as numbers."""
+        if node.operator == "metric":
+            self._used.add(node.value)
+            return replace(node, operator="literal", value=self.constants[node.value][0])
+        return replace(node, parts=tuple(self._bound(part) for part in node.parts))
+
+    def _window(self, part: Node) -> None:
+        ticks = part.value * self.machine.tick_hz
+        most = WINDOW_MAX if part.operator in ("max_over", "min_over") else TICKS_MAX
+        if ticks.denominator != 1:
+            raise ExpressionError(
+                f"`{part.text}`: {float(part.value):g} s is not a whole number of ticks at {self.machine.tick_hz} Hz"
+            )
+        if ticks > most:
+            longest = seconds(most, self.machine.tick_hz)
+            raise ExpressionError(f"`{part.text}`: a window of `{part.operator}` is at most {longest} s, {most} ticks")
+
+    def _ticks(self, node: JsonNode | None) -> int:
+        if node is None:
+            return 0
+        why = "the limit is compared with a count of ticks"
+        return read_ticks(node, "within_s", self.machine.tick_hz, TICKS_MAX, why, self.reader) or 0
+
+    def _clock(self, node: JsonNode | None) -> str | None:
+        names: Sequence[str] = [i.name for i in self.machine.instances]
+        index = self.reader.reference(node, "instance", names)
+        return None if index is None else names[index]

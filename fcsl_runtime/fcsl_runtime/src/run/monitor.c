@@ -1,0 +1,234 @@
+/* SPDX-License-Identifier: Apache-2.0
+ *
+ * Opens the monitor of a machine, steps it after each tick, and reads its verdicts.
+ */
+#define _GNU_SOURCE
+#include "monitor.h"
+
+#include <dlfcn.h>
+#include <stdio.h>
+#include <stdlib.h>
+
+#include "fcsl/fcsl_run.h"
+#include "fcsl/fcsl_scalar.h"
+#include "machine/view.h"
+
+enum {
+    MONITORS_MAX = 1024,
+    PATH_BYTES = 512,
+};
+
+/* Bytes that go from the machine's struct into that of the monitor. */
+typedef struct {
+    uint32_t from;
+    uint32_t to;
+    uint32_t size; /* of a scalar: 1, 4 or 8 */
+} copied_t;
+
+/* Where the results of a requirement are in the monitor's struct; FCSL_NO_OFFSET: it has none such. */
+typedef struct {
+    uint32_t holds;
+    uint32_t evaluated;
+    uint32_t exercised;
+    uint32_t undefined;
+    uint32_t violations;
+    uint32_t violated_ticks;
+    uint32_t first_tick;
+    uint32_t last_violated;
+} results_t;
+
+struct fcsl_monitor_run {
+    const fcsl_monitor_t *monitor;
+    fcsl_run_t *run;
+    copied_t *copied;
+    results_t *results;
+};
+
+const fcsl_monitor_t *fcsl_monitor_in(void *library, const char *machine)
+{
+    const fcsl_monitor_t *const *monitors = (const fcsl_monitor_t *const *)dlsym(library, "fcsl_monitors");
+    for (uint32_t i = 0; monitors != NULL && i < MONITORS_MAX && monitors[i] != NULL; i++) {
+        if (strcmp(monitors[i]->watched, machine) == 0) {
+            return monitors[i];
+        }
+    }
+    return NULL;
+}
+
+/* The scalar that a path names; 0 where it names none. */
+static uint32_t locate(const fcsl_machine_t *machine, const char *path, uint32_t *offset)
+{
+    for (uint32_t i = 0; i < machine->field_count; i++) {
+        const fcsl_field_t *field = &machine->fields[i];
+        const size_t length = strlen(field->path);
+        if (strncmp(path, field->path, length) != 0 || (path[length] != '\0' && path[length] != '[')) {
+            continue;
+        }
+        view_t view = fcsl_view_whole(field);
+        if (fcsl_view_index(&view, path + length) == 0 && fcsl_view_count(&view) == 1) {
+            *offset = field->offset + (uint32_t)fcsl_view_byte(&view, 0);
+            return fcsl_scalar_size(field->type);
+        }
+    }
+    return 0;
+}
+
+static uint32_t result(const fcsl_machine_t *machine, const char *instance, const char *name)
+{
+    char path[PATH_BYTES];
+    (void)snprintf(path, sizeof path, "%.200s.outputs.%s", instance, name);
+    uint32_t offset = 0;
+    return locate(machine, path, &offset) != 0 ? offset : FCSL_NO_OFFSET;
+}
+
+static int bind(struct fcsl_monitor_run *made, const fcsl_machine_t *machine, fcsl_error_t *error)
+{
+    const fcsl_monitor_t *monitor = made->monitor;
+    for (uint32_t i = 0; i < monitor->observed_count; i++) {
+        const fcsl_observed_t *observed = &monitor->observed[i];
+        copied_t *copied = &made->copied[i];
+        copied->size = locate(machine, observed->path, &copied->from);
+        if (copied->size == 0 || locate(monitor->machine, observed->input, &copied->to) != copied->size) {
+            return fcsl_fail(error, "the monitor of '%s' reads '%s', which the machine does not have", monitor->watched,
+                             observed->path);
+        }
+    }
+    for (uint32_t i = 0; i < monitor->requirement_count; i++) {
+        const char *instance = monitor->machine->instances[monitor->requirements[i].instance].name;
+        made->results[i] = (results_t){
+            .holds = result(monitor->machine, instance, "holds"),
+            .evaluated = result(monitor->machine, instance, "evaluated"),
+            .exercised = result(monitor->machine, instance, "exercised"),
+            .undefined = result(monitor->machine, instance, "undefined"),
+            .violations = result(monitor->machine, instance, "violations"),
+            .violated_ticks = result(monitor->machine, instance, "violated_ticks"),
+            .first_tick = result(monitor->machine, instance, "first_tick"),
+            .last_violated = result(monitor->machine, instance, "last_violated"),
+        };
+    }
+    return 0;
+}
+
+int fcsl_run_use_monitor(fcsl_run_t *run, const fcsl_monitor_t *monitor, fcsl_error_t *error)
+{
+    struct fcsl_monitor_run *made = calloc(1, sizeof *made);
+    if (made == NULL) {
+        return fcsl_fail(error, "out of memory");
+    }
+    fcsl_monitor_close(run);
+    run->monitor = made;
+    made->monitor = monitor;
+    made->copied = calloc(monitor->observed_count + 1u, sizeof *made->copied);
+    made->results = calloc(monitor->requirement_count + 1u, sizeof *made->results);
+    made->run = fcsl_run_open_machine(monitor->machine, error);
+    if (made->copied == NULL || made->results == NULL) {
+        return fcsl_fail(error, "out of memory for the monitor of '%s'", monitor->watched);
+    }
+    return made->run == NULL ? -1 : bind(made, run->machine, error);
+}
+
+void fcsl_monitor_close(fcsl_run_t *run)
+{
+    struct fcsl_monitor_run *made = run->monitor;
+    if (made == NULL) {
+        return;
+    }
+    fcsl_error_t unused;
+    (void)fcsl_run_close(made->run, &unused); /* it records nothing, so that nothing can fail */
+    free(made->copied);
+    free(made->results);
+    free(made);
+    run->monitor = NULL;
+}
+
+__attribute__((hot)) void fcsl_monitor_tick(fcsl_run_t *run)
+{
+    const struct fcsl_monitor_run *monitor = run->monitor;
+    uint8_t *data = monitor->run->data;
+    for (uint32_t i = 0; i < monitor->monitor->observed_count; i++) {
+        const copied_t *copied = &monitor->copied[i];
+        const uint8_t *from = run->data + copied->from;
+        uint8_t *to = data + copied->to;
+        if (copied->size == 8u) {
+            memcpy(to, from, 8);
+        } else if (copied->size == 4u) {
+            memcpy(to, from, 4);
+        } else {
+            *to = *from;
+        }
+    }
+    monitor->run->machine->step(data, &monitor->run->host);
+}
+
+const fcsl_monitor_t *fcsl_run_monitor(const fcsl_run_t *run)
+{
+    return run->monitor != NULL ? run->monitor->monitor : NULL;
+}
+
+const void *fcsl_run_monitor_data(const fcsl_run_t *run)
+{
+    return run->monitor != NULL ? run->monitor->run->data : NULL;
+}
+
+static uint64_t count_at(const uint8_t *data, uint32_t offset)
+{
+    return offset != FCSL_NO_OFFSET ? fcsl_read_u64(data, offset) : 0;
+}
+
+void fcsl_run_verdict(const fcsl_run_t *run, uint32_t index, fcsl_verdict_t *verdict)
+{
+    const struct fcsl_monitor_run *made = run->monitor;
+    const fcsl_requirement_t *requirement = &made->monitor->requirements[index];
+    const fcsl_instance_t *instance = &made->monitor->machine->instances[requirement->instance];
+    const results_t *at = &made->results[index];
+    const uint8_t *data = made->run->data;
+    *verdict = (fcsl_verdict_t){
+        .requirement = requirement,
+        .holds = data[at->holds] != 0,
+        .evaluated = count_at(data, at->evaluated),
+        .exercised = count_at(data, at->exercised),
+        .undefined = count_at(data, at->undefined),
+        .faults = fcsl_read_u64(data, instance->faults_offset),
+        .violations = count_at(data, at->violations),
+        .violated_ticks = count_at(data, at->violated_ticks),
+        .first_tick = count_at(data, at->first_tick),
+        .last_tick = count_at(data, at->last_violated),
+    };
+    const int at_end = requirement->kind == FCSL_REQUIRED_AT_END;
+    if (verdict->violations > 0 || (at_end && verdict->evaluated > 0 && !verdict->holds)) {
+        verdict->status = FCSL_VIOLATED;
+    } else {
+        verdict->status = verdict->exercised > 0 ? FCSL_MET : FCSL_NOT_EXERCISED;
+    }
+}
+
+static const char *times(uint64_t count, const char *one, const char *many)
+{
+    return count == 1 ? one : many;
+}
+
+void fcsl_run_verdict_text(const fcsl_run_t *run, const fcsl_verdict_t *verdict, char text[FCSL_VERDICT_TEXT_MAX])
+{
+    const fcsl_requirement_t *required = verdict->requirement;
+    const double hz = (double)run->machine->tick_hz;
+    const char *of = required->assumed ? "assumption " : "";
+    switch (verdict->status) {
+    case FCSL_MET:
+        (void)snprintf(text, FCSL_VERDICT_TEXT_MAX, "%s%s met, exercised in %llu %s", of, required->id,
+                       (unsigned long long)verdict->exercised, times(verdict->exercised, "tick", "ticks"));
+        return;
+    case FCSL_NOT_EXERCISED:
+        (void)snprintf(text, FCSL_VERDICT_TEXT_MAX, "%s%s not exercised: %s", of, required->id, required->text);
+        return;
+    default:
+        break;
+    }
+    if (required->kind == FCSL_REQUIRED_AT_END) {
+        (void)snprintf(text, FCSL_VERDICT_TEXT_MAX, "%s%s violated at the end: %s", of, required->id, required->text);
+        return;
+    }
+    (void)snprintf(text, FCSL_VERDICT_TEXT_MAX, "%s%s violated %llu %s, first at tick %llu (%.9g s), last at tick %llu: %s",
+                   of, required->id, (unsigned long long)verdict->violations,
+                   times(verdict->violations, "time", "times"), (unsigned long long)verdict->first_tick,
+                   (double)verdict->first_tick / hz, (unsigned long long)verdict->last_tick, required->text);
+}

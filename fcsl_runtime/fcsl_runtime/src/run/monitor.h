@@ -1,0 +1,16 @@
+/* SPDX-License-Identifier: Apache-2.0
+ *
+ * The monitor of a run: the requirements of its machine, evaluated after each tick.
+ */
+#ifndef FCSL_RUN_MONITOR_H
+#define FCSL_RUN_MONITOR_H
+
+#include "run_internal.h"
+
+/* Copies what the requirements name, and steps the monitor. */
+void fcsl_monitor_tick(fcsl_run_t *run);
+/* The monitor of the machine in a loaded library; null: it has no requirements. */
+const fcsl_monitor_t *fcsl_monitor_in(void *library, const char *machine);
+void fcsl_monitor_close(fcsl_run_t *run);
+
+#endif /* FCSL_RUN_MONITOR_H */

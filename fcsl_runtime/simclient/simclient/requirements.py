@@ -1,0 +1,127 @@
+# SPDX-License-Identifier: Apache-2.0
+"""Verdicts on the requirements of a machine (docs/guide/requirements.md), as a run has them after the ticks so far."""
+
+from __future__ import annotations
+
+import ctypes
+from collections.abc import Sequence
+from dataclasses import dataclass, field
+from enum import StrEnum
+from typing import Any
+
+from .c_run import VERDICT_TEXT_BYTES, CVerdict
+from .descriptor import Machine, read_machine
+from .values import read_part
+
+#: fcsl_required_t
+_KINDS = ("then", "never", "at_end")
+
+
+class Status(StrEnum):
+    """In the order of fcsl_verdict_status_t. A requirement whose `when` never held is not exercised: it is not met."""
+
+    MET = "met"
+    VIOLATED = "violated"
+    NOT_EXERCISED = "not exercised"
+
+
+@dataclass(frozen=True)
+class Verdict:
+    """On one requirement. Counts are of ticks: `evaluated`; of these `exercised` (`when` held) and `undefined` (`when`
+    compared a NaN); `faults`, where an integer of it overflowed. `violations` counts how often one began; the first tick of
+    all and the last one have the values that the requirement reads, by path. None without a violation."""
+
+    id: str
+    text: str
+    kind: str  # then, never, at_end
+    source: str  # its condition
+    assumed: bool  # about the environment
+    status: Status
+    holds: bool  # at the last evaluation
+    evaluated: int
+    exercised: int
+    undefined: int
+    faults: int
+    violations: int
+    violated_ticks: int
+    first_tick: int | None
+    last_tick: int | None
+    first: dict[str, Any] = field(default_factory=dict)
+    last: dict[str, Any] = field(default_factory=dict)
+    line: str = ""  # what a run prints at its end
+
+    def __str__(self) -> str:
+        return self.line
+
+
+def read_verdicts(lib: Any, handle: int) -> list[Verdict]:
+    """The verdicts of a run: `lib` is the runtime, `handle` an fcsl_run_t. [] without requirements."""
+    table = lib.fcsl_run_monitor(handle)
+    if not table:
+        return []
+    monitor = table.contents
+    machine, watched = read_machine(monitor.machine), read_machine(lib.fcsl_run_machine(handle))
+    observed = [(o.path.decode(), o.input.decode()) for o in monitor.observed[: monitor.observed_count]]
+    base = lib.fcsl_run_monitor_data(handle)
+    return [_verdict(lib, handle, i, machine, watched, observed, base) for i in range(monitor.requirement_count)]
+
+
+def _verdict(
+    lib: Any, handle: int, index: int, machine: Machine, watched: Machine, observed: list[tuple[str, str]], base: int
+) -> Verdict:
+    raw, text = CVerdict(), ctypes.create_string_buffer(VERDICT_TEXT_BYTES)
+    lib.fcsl_run_verdict(handle, index, ctypes.byref(raw))
+    lib.fcsl_run_verdict_text(handle, ctypes.byref(raw), text)
+    required = raw.requirement.contents
+    instance = f"{machine.instances[required.instance].name}."
+    begun = raw.violations > 0
+
+    def values(which: str) -> dict[str, Any]:
+        found = {}
+        for path, target in observed if begun else ():
+            result = f"{instance}outputs.{which}_{target.rpartition('.')[2]}"
+            if target.startswith(instance) and result in machine.fields:
+                value = _read(machine, result, base)
+                names = _names(path, watched)
+                found[path] = names[value] if names else value
+        return found
+
+    return Verdict(
+        id=required.id.decode(),
+        text=required.text.decode(),
+        kind=_KINDS[required.kind],
+        source=required.source.decode(),
+        assumed=bool(required.assumed),
+        status=list(Status)[raw.status],
+        holds=bool(raw.holds),
+        **{name: getattr(raw, name) for name in ("evaluated", "exercised", "undefined", "faults", "violations")},
+        violated_ticks=raw.violated_ticks,
+        first_tick=raw.first_tick if begun else None,
+        last_tick=raw.last_tick if begun else None,
+        first=values("first"),
+        last=values("last"),
+        line=text.value.decode("utf-8", "replace"),
+    )
+
+
+def _read(machine: Machine, path: str, base: int) -> Any:
+    from .paths import resolve
+
+    return read_part(resolve(path, machine), lambda offset, size: ctypes.string_at(base + offset, size), machine)
+
+
+def _names(path: str, watched: Machine) -> Sequence[str]:
+    """The names of an enumeration, which the monitor has as numbers."""
+    from .values import enumerators
+
+    field_ = watched.fields.get(path)
+    return enumerators(field_.type, watched) if field_ is not None else ()
+
+
+def summary(verdicts: list[Verdict]) -> list[str]:
+    """The lines at the end of a run: each requirement that was not met, and how many were."""
+    if not verdicts:
+        return []
+    lines = [f"requirement {verdict}" for verdict in verdicts if verdict.status is not Status.MET]
+    met = sum(verdict.status is Status.MET for verdict in verdicts)
+    return [*lines, f"requirements: {met} of {len(verdicts)} met"]
