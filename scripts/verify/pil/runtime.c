@@ -38,9 +38,14 @@ void *memcpy(void *restrict to, const void *restrict from, size_t size)
     return to;
 }
 
-void *memmove(void *to, const void *from, size_t size)
+static void move(void *to, const void *from, size_t size)
 {
     ((uintptr_t)to < (uintptr_t)from ? copy : copy_down)(to, from, size);
+}
+
+void *memmove(void *to, const void *from, size_t size)
+{
+    move(to, from, size);
     return to;
 }
 
@@ -51,7 +56,7 @@ void *memset(void *to, int value, size_t size)
 }
 
 /* The same for memory of some alignment: every name that the ARM run-time ABI has for it, since which of them a loop becomes
- * is the compiler's choice. */
+ * is the compiler's choice. None calls memcpy, memmove or memset: of such a call a compiler makes one of these. */
 #define MEMORY(bytes)                                                                                                  \
     void __aeabi_memcpy##bytes(void *to, const void *from, size_t size);                                               \
     void __aeabi_memcpy##bytes(void *to, const void *from, size_t size)                                                \
@@ -61,7 +66,7 @@ void *memset(void *to, int value, size_t size)
     void __aeabi_memmove##bytes(void *to, const void *from, size_t size);                                              \
     void __aeabi_memmove##bytes(void *to, const void *from, size_t size)                                               \
     {                                                                                                                  \
-        memmove(to, from, size);                                                                                       \
+        move(to, from, size);                                                                                          \
     }                                                                                                                  \
     void __aeabi_memset##bytes(void *to, size_t size, int value);                                                      \
     void __aeabi_memset##bytes(void *to, size_t size, int value)                                                       \
