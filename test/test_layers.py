@@ -36,6 +36,7 @@ FOLDERS: dict[str, Sequence[str]] = {
             "emit",
             "printers",
             "coverage",
+            "requirements",
             "driver",
         ),
         *("board", "graph", "build_report", "reference", "cli", "api"),

@@ -18,9 +18,11 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from ..c_machine import CMachine
+from ..errors import TwinError
 from ..run import Run
 
 if TYPE_CHECKING:
+    from ..requirements import Verdict
     from .host import Tap
     from .twin import Twin
 
@@ -41,6 +43,7 @@ class BlackBox:
     def __init__(self, twin: Twin, again: Callable[[], Twin] | None = None):
         self._twin, self._again = twin, again
         self._source: Callable[[], AbstractContextManager[Twin]] = lambda: nullcontext(twin)
+        self._verdicts: list[Verdict] | None = None  # once the twin is closed
         #: Message about missing ticks; empty if all were recorded.
         self.missing = ""
         self._open()
@@ -71,6 +74,16 @@ class BlackBox:
         """Copies the rows before the twin closes its tap."""
         self._tap = _Kept(self._tap, self._twin.machine.size)
         self._source = self._again or self._source
+        self._verdicts = self.verdicts()
+
+    def verdicts(self) -> list[Verdict]:
+        """On the machine's requirements; [] of a flight program, whose end says them."""
+        if self._verdicts is None:
+            try:
+                return self._twin._verdicts()
+            except TwinError:
+                return []
+        return self._verdicts
 
     def rows(self) -> int:
         """Ticks recorded since the beginning."""
