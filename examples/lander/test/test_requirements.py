@@ -29,7 +29,7 @@ def test_each_requirement_is_exercised_by_a_flight(fcsl_sim: Callable[..., SimTw
     assert [id_ for id_ in found[0] if all(one[id_] is Status.NOT_EXERCISED for one in found)] == []
 
 
-@pytest.mark.violates("LND-3")
+@pytest.mark.violates("LND-3", "LND-4")
 def test_a_weak_engine_violates_the_limit_of_speed(fcsl_sim: Callable[..., SimTwin]) -> None:
     """A requirement can be violated: here by an engine of half the thrust."""
     twin = fcsl_sim("../sim/lander.sim.json", seed=3, sets=["lander.parameters.max_thrust=1000.0"])
