@@ -1246,7 +1246,9 @@ CONFIGS: dict[str, str] = {
     },
     "E257 no condition of three": put("requirements", value=[{"id": "R-1", "text": "t"}]),
     "E257 a limit and no `when`": required("one.outputs.y > 0.0", within_s=0.5),
-    "E257 the same id": put("requirements", value=[{"id": id_, "text": "t", "never": "one.outputs.y > 0.0"} for id_ in ("R-1", "R_1")]),
+    "E257 the same id": put(
+        "requirements", value=[{"id": id_, "text": "t", "never": "one.outputs.y > 0.0"} for id_ in ("R-1", "R_1")]
+    ),
     "E203 an id": required("one.outputs.y > 0.0", id="R 1"),
     "E204 a text of a page": required("one.outputs.y > 0.0", text="t" * 201),
     "E206 a clock": required("one.outputs.y > 0.0", clock="tow"),

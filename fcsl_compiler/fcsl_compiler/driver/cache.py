@@ -12,7 +12,7 @@ from functools import cache
 from pathlib import Path
 from typing import NamedTuple
 
-from ..base.files import digest
+from ..base.files import MAX_SOURCE_BYTES, SourceError, digest, read_regular
 from ..coverage.settings import BUILD_NOTE, COVER_DIR
 from ..model.choices import DEFAULT_BACKEND, DEFAULT_TARGET
 from ..parse.machine_texts import MachineTexts, package_of, read_texts
@@ -49,30 +49,33 @@ def build_machine(
     target: str = DEFAULT_TARGET,
     instances: Sequence[str] | None = None,
     backend: str = DEFAULT_BACKEND,
+    requirements: Path | None = None,
 ) -> BuiltMachine:
     """The library of one machine. It is taken from the cache if config, sources, target, compiler and flags are
     unchanged.
 
-    `instances`: instances of a subset machine. If COVER_DIR is set, the result is a build for coverage, by the C
-    backend. Raises DiagnosticError (str() is the rendered text) and ToolchainError.
+    `instances`: instances of a subset machine. `requirements`: a file of those that take the place of the machine's own. If
+    COVER_DIR is set, the result is a build for coverage, by the C backend. Raises DiagnosticError (str() is the rendered text) and ToolchainError.
     """
     try:
-        return _build_machine(config, target, instances, backend)
+        return _build_machine(config, target, instances, backend, requirements)
     except OSError as error:
         raise unwritten(error, config) from None
 
 
-def _build_machine(config: Path, target: str, instances: Sequence[str] | None, backend: str) -> BuiltMachine:
+def _build_machine(
+    config: Path, target: str, instances: Sequence[str] | None, backend: str, requirements: Path | None
+) -> BuiltMachine:
     cover = bool(os.environ.get(COVER_DIR))
     if cover:
         backend = DEFAULT_BACKEND
 
     def key() -> str:
-        found = _cache_key(config, target, cover, instances, backend)
+        found = _cache_key(config, target, cover, instances, backend, requirements)
         if found is None:
             from .passes import compile_machine
 
-            compile_machine(config, toolchain(), target=target)
+            compile_machine(config, toolchain(), target=target, requirements=requirements)
             raise AssertionError("a machine without a readable source cannot have compiled")
         return found
 
@@ -80,16 +83,24 @@ def _build_machine(config: Path, target: str, instances: Sequence[str] | None, b
         from ..emit.field_table import source_hash
         from .library import build_library
 
-        machine = build_library([config], library, target=target, cover=cover, instances=instances, backend=backend)[
-            0
-        ].checked
+        (built,) = build_library(
+            [config], library, False, target, cover, instances=instances, backend=backend, requirements=requirements
+        )
+        machine = built.checked
         return {"name": machine.name, "source_hash": source_hash(machine)}
 
     built = cached("machines", key, f"lib{config.stem}.so", build, config)
     return BuiltMachine(built.library, built.facts["name"], built.facts["source_hash"])
 
 
-def _cache_key(config: Path, target: str, cover: bool, instances: Sequence[str] | None, backend: str) -> str | None:
+def _cache_key(
+    config: Path,
+    target: str,
+    cover: bool,
+    instances: Sequence[str] | None,
+    backend: str,
+    requirements: Path | None,
+) -> str | None:
     """Hash of all inputs of the library, computed without compiling. None if a source cannot be read."""
     start_version_query()
     texts = read_texts(config)
@@ -101,6 +112,11 @@ def _cache_key(config: Path, target: str, cover: bool, instances: Sequence[str] 
     parts = [name, package_of(config, config.stem), texts.text, _identity(), toolchain_of_backend(backend), *externs]
     for file in texts.files.items():
         parts += file
+    if requirements is not None:
+        try:
+            parts += ["requirements", str(requirements), read_regular(requirements, MAX_SOURCE_BYTES)]
+        except (OSError, SourceError):
+            return None
     return digest(*parts, *(() if instances is None else ("subset", *sorted(instances))))
 
 
@@ -127,7 +143,9 @@ def _identity() -> str:
     # As Python itself notices that a module is newer than its .pyc. Contents took 6 to 13 ms where this takes 4.
     package = str(Path(__file__).parents[1])  # from here on without pathlib, which is slow
     files = sorted(_python_files(package))
-    files += [f"{include_dirs()[0]}/fcsl/{name}" for name in ("fcsl_machine.h", "fcsl_monitor.h", "fcsl_hw.h", "fcsl_cover.h")]
+    files += [
+        f"{include_dirs()[0]}/fcsl/{name}" for name in ("fcsl_machine.h", "fcsl_monitor.h", "fcsl_hw.h", "fcsl_cover.h")
+    ]
     try:
         return "\n".join(_stamp(file, package) for file in (*files, str(math_library())))
     except OSError as error:

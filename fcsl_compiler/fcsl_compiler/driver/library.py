@@ -13,8 +13,8 @@ from ..base.files import write_whole
 from ..model.choices import DEFAULT_BACKEND, DEFAULT_TARGET
 from .backends import toolchain_of_backend
 from .externs import explained, link_inputs
-from .nim import check_externs, compile_modules
 from .monitors import compile_monitor
+from .nim import check_externs, compile_modules
 from .passes import Compilation, compile_machine
 from .registry import registry
 from .stack import stack_bound, stepped_machines
@@ -51,12 +51,13 @@ def compile_all(
     cover: bool = False,
     instances: Sequence[str] | None = None,
     backend: str = DEFAULT_BACKEND,
+    requirements: Path | None = None,
 ) -> list[Compilation]:
     """Compiles machines to source in memory and checks that they can share a library. Raises DiagnosticError,
     ToolchainError."""
     found = toolchain_of_backend(backend)
     compilations = [
-        compile_machine(path, found, strict=strict, target=target, cover=cover, instances=instances, backend=backend)
+        compile_machine(path, found, "emit", strict, target, cover, instances, backend, requirements)
         for path in configs
     ]
     for c in compilations:
@@ -113,16 +114,18 @@ def build_library(
     inspect: Inspect = lambda *_: None,
     instances: Sequence[str] | None = None,
     backend: str = DEFAULT_BACKEND,
+    requirements: Path | None = None,
 ) -> list[Compilation]:
     """Compiles machines to one shared library and writes the C files beside it. Raises DiagnosticError, ToolchainError.
 
     `cover`: adds execution counters for `fcsl cover` (fcsl_cover.h). `instances`: instances of a subset machine.
+    `requirements`: a file of those that take the place of the machines' own.
 
     Sets `extern_calls` of every compilation, and `stack_bound` if the C compiler reports frame sizes. Then calls
     `inspect` for each.
     """
     start_call_graph_query()
-    compilations = compile_all(configs, strict, target, cover, instances, backend)
+    compilations = compile_all(configs, strict, target, cover, instances, backend, requirements)
     absent = [p for p in (output.parent, *output.parent.parents) if not p.exists()]
 
     output.parent.mkdir(parents=True, exist_ok=True)

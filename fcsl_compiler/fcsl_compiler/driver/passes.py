@@ -63,6 +63,7 @@ class Compilation:
     cover: bool = False  # True for a coverage build, which must not fly
     backend: str = DEFAULT_BACKEND  # language of the source (BACKENDS)
     extern_calls: tuple[str, ...] = ()  # functions called by the externs' own code, known after linking
+    requirements_file: Path | None = None  # instead of the machine's own requirements
     requirements: list[Requirement] = field(default_factory=list)
     monitor: Monitor | None = None  # None without requirements
     monitor_code: Compilation | None = None  # of the monitor
@@ -90,7 +91,7 @@ def _check(c: Compilation) -> None:
     if c.parsed is not None:
         c.machine = check_machine(c.parsed, c.sink)
     if c.parsed is not None and c.machine is not None:
-        c.requirements = read_requirements(c.parsed, c.machine, c.sink)
+        c.requirements = read_requirements(c.parsed, c.machine, c.requirements_file, c.sink)
     if c.strict and c.machine is not None:
         check_strict(c.machine, c.sink)
 
@@ -172,13 +173,15 @@ def compile_machine(
     cover: bool = False,
     instances: Sequence[str] | None = None,
     backend: str = DEFAULT_BACKEND,
+    requirements: Path | None = None,
 ) -> Compilation:
     """Runs the passes up to `until` (a name of PASSES). Raises DiagnosticError if the program has an error.
 
     `cover`: the C contains probes (coverage/instrument.py); backend "c" alone has them. `instances`: instances of a
-    subset machine.
+    subset machine. `requirements`: a file of those that take the place of the machine's own.
     """
     c = Compilation(path, toolchain, strict, target, instances, cover=cover, backend=backend)
+    c.requirements_file = requirements
     for step in PASSES:
         step.run(c)
         # A syntax error in one file does not suppress errors in other files.

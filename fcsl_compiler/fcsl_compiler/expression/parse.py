@@ -79,7 +79,9 @@ def parse(
     except (SyntaxError, ValueError, MemoryError, RecursionError) as error:
         raise ExpressionError(f"`{text}` is no expression{_unread(text, error)}") from None
     functions = (*FUNCTIONS, *(SERIES_FUNCTIONS if series else ()), *(PAST_FUNCTIONS if past else ()))
-    root = _Checker(text, find, series, metrics or {}, pure_numbers, tuple(dict.fromkeys(functions))).root(tree, condition)
+    root = _Checker(text, find, series, metrics or {}, pure_numbers, tuple(dict.fromkeys(functions))).root(
+        tree, condition
+    )
     if not series and _steps(root) > STEPS_MAX:
         raise ExpressionError(f"`{text[:60]}…` is too long: write parts of it by themselves")
     return root
@@ -421,7 +423,8 @@ class _Checker:
         if len(e.args) != len(takes):
             listed = ", ".join(_PAST_EXAMPLES[kind] for kind in takes)
             raise ExpressionError(f"`{self._source(e)}`: `{name}` takes {listed}")
-        parts = tuple(self._need_scalar(self.node(argument)) for argument, kind in zip(e.args, takes) if kind != "s")
+        given = zip(e.args, takes, strict=True)
+        parts = tuple(self._need_scalar(self.node(argument)) for argument, kind in given if kind != "s")
         for part, kind in zip(parts, takes, strict=False):
             if kind == "p":
                 self.need_bool(part)

@@ -50,7 +50,9 @@ class Code:
     """`read`: the value of a field's scalar, as its type is; `past`: the name of a local that holds the value of an
     operator of the past; with `.true` and `.false` behind it, of a condition."""
 
-    def __init__(self, read: Callable[[Node, int], str], names: Callable[[Node], tuple[str, ...]], past: dict[int, str]):
+    def __init__(
+        self, read: Callable[[Node, int], str], names: Callable[[Node], tuple[str, ...]], past: dict[int, str]
+    ):
         self._read, self._names, self._past = read, names, past
 
     # ---- conditions -------------------------------------------------------------------------------------------------

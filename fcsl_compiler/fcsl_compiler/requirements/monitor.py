@@ -222,7 +222,11 @@ class _Algorithm:
                 outputs |= {f"first_{own}": types[own], f"last_{own}": types[own]}
         text = [f"class {self.class_name}:", f'    """{_comment(r.text)}"""', ""]
         for record, fields in (("inputs", types), ("outputs", outputs), ("state", state)):
-            text += [f"    {record} = {{", *[f'        "{name}": "{type_}",' for name, type_ in fields.items()], "    }"]
+            text += [
+                f"    {record} = {{",
+                *[f'        "{name}": "{type_}",' for name, type_ in fields.items()],
+                "    }",
+            ]
         text += ["    parameters = {}", "", "    def execute(self):"]
         return "\n".join([*text, *[f"        {line}" for line in lines]]) + "\n"
 

@@ -55,7 +55,9 @@ class PastWriter:
             self.lines += [f"{name}_true = {name}_was", f"{name}_false = {name}_was_not"]
             return
         kind = part.quantity.kind
-        value = code.number(part) if kind is Kind.FLOAT else code.name(part) if kind is Kind.NAME else code.integer(part)
+        value = (
+            code.number(part) if kind is Kind.FLOAT else code.name(part) if kind is Kind.NAME else code.integer(part)
+        )
         kept = self._keep(name, {Kind.FLOAT: "f64", Kind.NAME: "i32"}.get(kind, "i64"))
         self.lines += [f"{name}_now = {value}", f"{name} = {name}_now if restarted else {kept}", f"{kept} = {name}_now"]
 
@@ -133,7 +135,11 @@ class PastWriter:
         for level, array in enumerate(kept):
             self.lines += [f"    for i in range({size >> level}):", f"        {array}[i] = {none}"]
         self.lines += [f"    {last} = tick - 1"]
-        self.lines += [f"for j in range({ticks + 1}):", f"    if {last} - {ticks} + j >= tick - {ticks}:", "        break"]
+        self.lines += [
+            f"for j in range({ticks + 1}):",
+            f"    if {last} - {ticks} + j >= tick - {ticks}:",
+            "        break",
+        ]
         self.lines += [f"    {line}" for line in self._put(name, kept, f"({last} - {ticks} + j)", none, better)]
         self.lines += self._put(name, kept, "tick", code.number(node.parts[0]), better)
         self.lines += [f"{last} = tick", f"{name} = {kept[-1]}[0]"]

@@ -6,6 +6,7 @@ from __future__ import annotations
 import re
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
+from pathlib import Path
 
 from ..base.diagnostics import DiagnosticSink, nearest
 from ..base.files import SourceError
@@ -57,11 +58,15 @@ class Signals:
         if row is None or _BRACKETS.sub("", rest):
             raise ExpressionError(self._unknown(path))
         if row.path in _LATER:
-            raise ExpressionError(f"`{row.path}` is of the coming tick, which begins when requirements have been evaluated")
+            raise ExpressionError(
+                f"`{row.path}` is of the coming tick, which begins when requirements have been evaluated"
+            )
         index = [int(number) for found in _BRACKETS.findall(rest) for number in found.split(",")]
         if len(index) > len(row.shape) or any(i >= size for i, size in zip(index, row.shape, strict=False)):
             shape = "".join(f"[{size}]" for size in row.shape)
-            raise ExpressionError(f"`{path}`: " + (f"`{row.path}` is {shape}" if shape else f"`{row.path}` is one value"))
+            raise ExpressionError(
+                f"`{path}`: " + (f"`{row.path}` is {shape}" if shape else f"`{row.path}` is one value")
+            )
         return Signal(row, row.shape[len(index) :])
 
     def has(self, path: str) -> bool:
@@ -107,28 +112,47 @@ class Signals:
         return f"{message}; {hint}"
 
 
-def read_requirements(parsed: ParsedMachine, machine: Machine, sink: DiagnosticSink) -> list[Requirement]:
-    """Reports what is wrong."""
+def read_requirements(
+    parsed: ParsedMachine, machine: Machine, file: Path | None, sink: DiagnosticSink
+) -> list[Requirement]:
+    """Those of the machine JSON, or of another `file`. Reports what is wrong."""
     reader = ConfigReader(sink, parsed.constants)
     node = parsed.keys.get("requirements")
-    if node is not None and node.kind == "string":
-        node = _file(node, parsed, reader)
+    if file is not None:
+        node = _read(file, str(file), parsed.source.whole(), reader)
+    elif node is not None and node.kind == "string":
+        node = _named(node, parsed, reader)
     requirements = _Reader(machine, parsed.constants, reader)
     return [found for item in reader.list(node, "`requirements`") if (found := requirements.read(item)) is not None]
 
 
-def _file(node: JsonNode, parsed: ParsedMachine, reader: ConfigReader) -> JsonNode | None:
+def _named(node: JsonNode, parsed: ParsedMachine, reader: ConfigReader) -> JsonNode | None:
     """The list of a file that several machines may name."""
     name = str(node.value)
     try:
-        source = SourceFile.read(resolve_source(name, config=parsed.folder / parsed.source.name), name)
-    except (SourceError, SourcePathError) as error:
-        fix = missing_file_help(error, node.span)
-        reader.sink.error("E100", f"cannot read `{name[:200]}`: {error}", node.span, help=fix)
+        path = resolve_source(name, config=parsed.folder / parsed.source.name)
+    except SourcePathError as error:
+        _report_unreadable(name, node.span, error, reader)
+        return None
+    return _read(path, name, node.span, reader)
+
+
+def _read(path: Path, name: str, at: Span, reader: ConfigReader) -> JsonNode | None:
+    try:
+        source = SourceFile.read(path, name)
+    except SourceError as error:
+        _report_unreadable(name, at, error, reader)
         return None
     root = parse_json(source, reader.sink)
-    keys = reader.object(root, "a file of requirements", ("requirements",), ("$schema", "description")) if root else None
+    keys = (
+        reader.object(root, "a file of requirements", ("requirements",), ("$schema", "description")) if root else None
+    )
     return keys.get("requirements") if keys else None
+
+
+def _report_unreadable(name: str, at: Span, error: SourceError | SourcePathError, reader: ConfigReader) -> None:
+    fix = missing_file_help(error, at)
+    reader.sink.error("E100", f"cannot read `{name[:200]}`: {error}", at, help=fix)
 
 
 class _Reader:
@@ -147,7 +171,9 @@ class _Reader:
         id_ = self._id(keys.get("id"))
         text = self.reader.string(keys.get("text"), "`text`", "Below 10 m it sinks slower than 2 m/s.") or ""
         if len(text) > _TEXT_MAX:
-            self.sink.error("E204", f"`text` has {len(text)} characters", keys["text"].span, help=f"{_TEXT_MAX} at most")
+            self.sink.error(
+                "E204", f"`text` has {len(text)} characters", keys["text"].span, help=f"{_TEXT_MAX} at most"
+            )
         kinds = [kind for kind in KINDS if kind in keys]
         if len(kinds) != 1:
             at = keys[kinds[1]].span if kinds else node.span
@@ -156,7 +182,7 @@ class _Reader:
             return None
         kind = kinds[0]
         if "within_s" in keys and (kind != "then" or "when" not in keys):
-            fix = '`within_s` says how long after `when` the condition `then` may take; it needs both'
+            fix = "`within_s` says how long after `when` the condition `then` may take; it needs both"
             self.sink.error("E257", "`within_s` without `when` and `then`", keys["within_s"].span, help=fix)
         condition = self._condition(keys[kind], f"`{kind}`")
         when = self._condition(keys["when"], "`when`") if "when" in keys else None

@@ -125,6 +125,7 @@ _PROTOTYPES: dict[str, tuple[type | None, list[type]]] = {
     "fcsl_run_trace_read": (c_int, [ptr, c_uint64, c_uint64, ptr, _ERROR]),
     "fcsl_run_trace_end": (None, [ptr, ptr]),
     "fcsl_run_use_monitor": (c_int, [ptr, POINTER(CMonitor), _ERROR]),
+    "fcsl_run_judge": (None, [ptr, c_char_p, c_uint64, c_uint64]),
     **VERDICTS,
     "fcsl_run_feed_series": (c_int, [ptr, POINTER(CSeries), c_uint32, c_uint64, _ERROR]),
     "fcsl_run_feed": (c_int, [ptr, c_char_p, c_size_t, c_char_p, c_uint64, c_uint64, _ERROR]),

@@ -37,9 +37,14 @@ def check_backend(backend: str) -> None:
 
 
 def build_config(
-    path: str | Path, target: str = "simulation", instances: Sequence[str] | None = None, backend: str = "c"
+    path: str | Path,
+    target: str = "simulation",
+    instances: Sequence[str] | None = None,
+    backend: str = "c",
+    requirements: str | Path | None = None,
 ) -> tuple[Path, str]:
-    """Compiles a machine config (cached), or the subset machine of `instances`. `backend`: "c" or "nim".
+    """Compiles a machine config (cached), or the subset machine of `instances`. `backend`: "c" or "nim". `requirements`: a
+    file of those that take the place of the machine's own.
 
     Returns its library and the machine's name. Raises TwinError.
     """
@@ -48,7 +53,8 @@ def build_config(
 
     check_backend(backend)
     try:
-        built = build_machine(config, target, instances, backend)
+        own = Path(requirements) if requirements is not None else None
+        built = build_machine(config, target, instances, backend, own)
     except _refusals() as error:
         raise TwinError(str(error)) from None
     return built.library, built.name

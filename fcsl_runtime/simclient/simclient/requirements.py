@@ -9,6 +9,7 @@ from dataclasses import dataclass, field
 from enum import StrEnum
 from typing import Any
 
+from .c_machine import CMonitor
 from .c_run import VERDICT_TEXT_BYTES, CVerdict
 from .descriptor import Machine, read_machine
 from .values import read_part
@@ -64,6 +65,22 @@ def read_verdicts(lib: Any, handle: int) -> list[Verdict]:
     observed = [(o.path.decode(), o.input.decode()) for o in monitor.observed[: monitor.observed_count]]
     base = lib.fcsl_run_monitor_data(handle)
     return [_verdict(lib, handle, i, machine, watched, observed, base) for i in range(monitor.requirement_count)]
+
+
+#: The state of a requirement that only counts.
+_COUNTING = ("last_tick", "started", "violated")
+
+
+def remembering(monitor: CMonitor) -> frozenset[str]:
+    """Ids of the requirements whose verdict in a tick depends on other ticks."""
+    machine = read_machine(monitor.machine)
+    found = set()
+    for required in monitor.requirements[: monitor.requirement_count]:
+        state = f"{machine.instances[required.instance].name}.state."
+        kept = {path.removeprefix(state) for path in machine.fields if path.startswith(state)}
+        if not kept <= set(_COUNTING):
+            found.add(required.id.decode())
+    return frozenset(found)
 
 
 def _verdict(

@@ -157,6 +157,37 @@ class Run:
 
         return read_verdicts(self._lib, self.handle())
 
+    def observed(self) -> list[str]:
+        """Paths of the values that the requirements read, in the order of a row of `judge`; some occur several times."""
+        table = self._lib.fcsl_run_monitor(self.handle())
+        return [o.path.decode() for o in table.contents.observed[: table.contents.observed_count]] if table else []
+
+    def observed_by(self) -> dict[str, list[str]]:
+        """The paths that each requirement reads, by its id."""
+        table = self._lib.fcsl_run_monitor(self.handle())
+        found: dict[str, list[str]] = {}
+        for required in table.contents.requirements[: table.contents.requirement_count] if table else ():
+            own = table.contents.machine.contents.instances[required.instance].name + b"."
+            observed = table.contents.observed[: table.contents.observed_count]
+            found[required.id.decode()] = [o.path.decode() for o in observed if o.input.startswith(own)]
+        return found
+
+    def remembering_requirements(self) -> frozenset[str]:
+        """Ids of those whose verdict in a tick depends on other ticks."""
+        from .requirements import remembering
+
+        table = self._lib.fcsl_run_monitor(self.handle())
+        return remembering(table.contents) if table else frozenset()
+
+    def restart_requirements(self) -> None:
+        """Puts their memory and verdicts back to the beginning."""
+        table = self._lib.fcsl_run_monitor(self.handle())
+        self._check(self._lib.fcsl_run_use_monitor(self.handle(), table, byref(self._error)))
+
+    def judge(self, rows: bytes, row_bytes: int) -> None:
+        """Evaluates the requirements on recorded rows: the values of `observed` after a tick, one after another."""
+        self._lib.fcsl_run_judge(self.handle(), rows, row_bytes, len(rows) // row_bytes)
+
     def save(self) -> bytes:
         """The whole machine struct, `machine.size` bytes."""
         data = ctypes.create_string_buffer(self.machine.size)

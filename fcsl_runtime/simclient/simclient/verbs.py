@@ -50,6 +50,7 @@ COMMANDS = Commands(
             _verb("bag", _RECORDINGS, "bag.command", "describe, cut, compare, export, digest and repair bags"),
             _verb("plot", _RECORDINGS, "plot", "draw a bag, or a simulation"),
             _verb("rerun", _RECORDINGS, "to_rerun", "convert a bag for the rerun viewer"),
+            _verb("check-bag", _RECORDINGS, "replay.check_bag", "judge the requirements of a machine on a bag"),
             ("fly", Verb(_RUNNING, "run a machine as a process of its own: fcsl-fc", _fly)),
             ("var", _VAR._replace(complete=_complete_var)),
             _verb("view", _RUNNING, "live.cli", "show a running machine in the rerun viewer"),

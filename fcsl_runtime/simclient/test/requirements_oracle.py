@@ -42,7 +42,11 @@ class Generator:
             name = self.random.choice(("abs", "min", "max", "negative", "norm"))
             if name == "norm":
                 return ("norm", "src.outputs.v")
-            both = (self.number(depth - 1),) if name in ("abs", "negative") else (self.number(depth - 1), self.number(depth - 1))
+            both = (
+                (self.number(depth - 1),)
+                if name in ("abs", "negative")
+                else (self.number(depth - 1), self.number(depth - 1))
+            )
             return (name, *both)
         name = self.random.choice(("previous", "max_over", "min_over"))
         part = ("field", self.random.choice(NUMBERS))
@@ -76,9 +80,18 @@ class Generator:
             return ("in", ("field", "machine.state"), *(("literal", state) for state in states))
         if kind == "health":
             health = self.random.choice(("nominal", "failed", "stale"))
-            return ("compare", (self.random.choice(("==", "!=")),), ("field", "slow.outputs.health"), ("literal", health))
+            return (
+                "compare",
+                (self.random.choice(("==", "!=")),),
+                ("field", "slow.outputs.health"),
+                ("literal", health),
+            )
         if kind == "in":
-            return ("in", self.integer(0), *(("literal", n) for n in sorted({self.random.randint(0, 3) for _ in range(2)})))
+            return (
+                "in",
+                self.integer(0),
+                *(("literal", n) for n in sorted({self.random.randint(0, 3) for _ in range(2)})),
+            )
         if kind == "isnan":
             return (self.random.choice(("isnan", "isfinite")), self.number(depth - 1))
         if kind in ("and", "or"):
@@ -144,7 +157,9 @@ def written(requirement: Values) -> Values:
 def fields(f: Formula) -> set[str]:
     if f[0] in ("field", "norm"):
         return {f[1]}
-    return set().union(*(fields(part) for part in f[1:] if isinstance(part, tuple) and part and isinstance(part[0], str)))
+    return set().union(
+        *(fields(part) for part in f[1:] if isinstance(part, tuple) and part and isinstance(part[0], str))
+    )
 
 
 # ---- Kleene's logic --------------------------------------------------------------------------------------------------

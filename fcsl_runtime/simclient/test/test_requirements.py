@@ -10,14 +10,17 @@ from pathlib import Path
 from typing import Any
 
 import pytest
+from mcap.reader import make_reader
+from mcap.writer import Writer
 from requirements_oracle import Generator, Values, verdict, written
 
 from simclient import AlgTwin, PyTwin
+from simclient.replay.check_bag import main
 from simclient.requirements import Status
 from simclient.twin.twin import Twin
 
 TICK_HZ = 100
-SOURCE = '''\
+SOURCE = """\
 class Source:
     inputs = {}
     outputs = {"x": "f64", "y": "f32", "n": "i32", "u": "u64", "b": "bool", "v": "f64[3]"}
@@ -31,12 +34,12 @@ class Source:
 class Slow:
     inputs = {"x": "f64"}
     outputs = {"z": "f64"}
-    parameters = {}
+    parameters = {"limit": "f64 = 1.0"}
     state = {}
 
     def execute(self):
         self.z = 2.0 * self.x
-'''
+"""
 
 
 def machine(folder: Path, requirements: list[Values], name: str = "craft") -> Path:
@@ -69,7 +72,9 @@ def fly(twin: Twin, seed: int, ticks: int) -> list[Values]:
         twin.set("src.outputs.u", draw.randint(0, 3))
         if draw.random() < 0.3:
             twin.set("src.outputs.b", draw.random() < 0.5)
-        twin.set("src.outputs.v", [draw.choice((0.0, 1.0, math.nan, 3.0)) if draw.random() < 0.1 else 1.0 for _ in "xyz"])
+        twin.set(
+            "src.outputs.v", [draw.choice((0.0, 1.0, math.nan, 3.0)) if draw.random() < 0.1 else 1.0 for _ in "xyz"]
+        )
         if draw.random() < 0.06:
             twin.set_state(draw.choice("AB"))
         faulted = draw.random() < 0.1
@@ -78,8 +83,18 @@ def fly(twin: Twin, seed: int, ticks: int) -> list[Values]:
         twin.tick()
         state = twin.state()
         ran = twin.get_value("slow.outputs.health") == "nominal" and state == "A" and tick % 2 == 1
-        values = {path: twin.get_value(path) for path in (*paths, "slow.outputs.z", "slow.outputs.health", "src.outputs.health")}
-        left.append({**values, "src.outputs.v[1]": values["src.outputs.v"][1], "machine.state": state, "ran": {"slow"} if ran else set()})
+        values = {
+            path: twin.get_value(path)
+            for path in (*paths, "slow.outputs.z", "slow.outputs.health", "src.outputs.health")
+        }
+        left.append(
+            {
+                **values,
+                "src.outputs.v[1]": values["src.outputs.v"][1],
+                "machine.state": state,
+                "ran": {"slow"} if ran else set(),
+            }
+        )
     return left
 
 
@@ -106,3 +121,67 @@ def test_generated_formulas_equal_their_definitions(seed: int, tmp_path: Path) -
             assert got.faults == 0
     assert sum(v.violations > 0 for v in found.values()) > 10 and sum(v.undefined > 0 for v in found.values()) > 5
     assert {v.status for v in found.values()} == set(Status)
+
+
+def judged(capsys: pytest.CaptureFixture[str], bag: Path, config: Path, *more: str) -> tuple[int, dict[str, Any]]:
+    """Status and JSON of `fcsl check-bag`."""
+    status = main([str(bag), "--config", str(config), "--json", *more])
+    return status, json.loads(capsys.readouterr().out)
+
+
+def without(bag: Path, topic: str, ticks: range) -> None:
+    """Writes the bag again without the messages of a topic in these ticks."""
+    (file,) = bag.glob("*.mcap")
+    with file.open("rb") as stream:
+        kept = list(make_reader(stream).iter_messages(log_time_order=False))
+    with file.open("wb") as stream:
+        writer = Writer(stream)
+        writer.start("ros2")
+        channels: dict[str, int] = {}
+        for schema, channel, message in kept:
+            if channel.topic not in channels:
+                number = writer.register_schema(schema.name, schema.encoding, schema.data)
+                channels[channel.topic] = writer.register_channel(channel.topic, "cdr", number)
+            if channel.topic != topic or int.from_bytes(message.data[20:28], "little") not in ticks:
+                writer.add_message(channels[channel.topic], message.log_time, message.data, message.publish_time)
+        writer.finish()
+
+
+def test_a_bag_is_judged_as_the_flight_was(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    generator = Generator(7, TICK_HZ)
+    requirements = [generator.requirement(f"R-{i}") for i in range(60)]
+    path = machine(tmp_path, [written(requirement) for requirement in requirements])
+    with AlgTwin.from_config(path) as twin:
+        twin.record(tmp_path / "flight")
+        fly(twin, 7, 200)
+        twin.stop_recording()
+        flown = twin.requirements
+    status, found = judged(capsys, tmp_path / "flight", path)
+    assert status == 1 and found["ticks"] == 200
+    for id_, flew in flown.items():
+        got = found["requirements"][id_]
+        assert {k: got[k] for k in (*COUNTS, "undecided")} == {k: getattr(flew, k, "") for k in (*COUNTS, "undecided")}
+
+
+def test_ticks_and_fields_that_a_bag_lacks_are_undecided(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    requirements: list[Values] = [
+        {"id": "N", "text": "now", "then": "src.outputs.x < 1.0"},
+        {"id": "H", "text": "held", "then": "held(src.outputs.x < 1.0, 0.1)", "when": "machine.tick > 20"},
+        {"id": "Z", "text": "z stays", "then": "slow.outputs.z < 1.0"},
+        {"id": "P", "text": "a parameter", "then": "slow.outputs.z < slow.parameters.limit"},
+        {"id": "C", "text": "not recorded", "then": "slow.counters.overruns < 1"},
+    ]
+    path = machine(tmp_path, requirements)
+    with AlgTwin.from_config(path) as twin:
+        twin.record(tmp_path / "flight")
+        twin.tick(100)
+        twin.stop_recording()
+    without(tmp_path / "flight", "/craft/src", range(50, 56))
+    status, found = judged(capsys, tmp_path / "flight", path)
+    verdicts = found["requirements"]
+    assert status == 0 and found["ticks"] == 100
+    assert verdicts["Z"]["evaluated"] == 99  # `slow` is stale in tick 0
+    assert verdicts["N"]["evaluated"] == 94 and verdicts["N"]["undecided_ticks"] == 6
+    assert verdicts["H"]["evaluated"] == 50 and verdicts["H"]["undecided_ticks"] == 50  # it remembers
+    assert verdicts["P"]["status"] == "met" and verdicts["P"]["undecided"] == ""
+    assert verdicts["C"]["undecided"] == "the bag has no `slow.counters.overruns`"

@@ -258,6 +258,9 @@ int fcsl_run_use_monitor(fcsl_run_t *run, const fcsl_monitor_t *monitor, fcsl_er
 const fcsl_monitor_t *fcsl_run_monitor(const fcsl_run_t *run);
 /* The monitor's struct, to read from; null without one. */
 const void *fcsl_run_monitor_data(const fcsl_run_t *run);
+/* Evaluates the requirements on recorded values, without running the machine: `count` rows of `row_bytes`, each of which has
+ * the values of `observed` one after another, as they stood after a tick. */
+void fcsl_run_judge(fcsl_run_t *run, const uint8_t *rows, uint64_t row_bytes, uint64_t count);
 /* `index`: of a requirement of the monitor. */
 void fcsl_run_verdict(const fcsl_run_t *run, uint32_t index, fcsl_verdict_t *verdict);
 /* "LND-4 violated 1 time, first at tick 812 (8.12 s), last at tick 815: …" */

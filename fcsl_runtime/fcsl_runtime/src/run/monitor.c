@@ -9,6 +9,7 @@
 #include <stdio.h>
 #include <stdlib.h>
 
+#include "fcsl/fcsl_fp_mode.h"
 #include "fcsl/fcsl_run.h"
 #include "fcsl/fcsl_scalar.h"
 #include "machine/view.h"
@@ -158,6 +159,22 @@ __attribute__((hot)) void fcsl_monitor_tick(fcsl_run_t *run)
         }
     }
     monitor->run->machine->step(data, &monitor->run->host);
+}
+
+void fcsl_run_judge(fcsl_run_t *run, const uint8_t *rows, uint64_t row_bytes, uint64_t count)
+{
+    const struct fcsl_monitor_run *monitor = run->monitor;
+    const fcsl_fp_mode_t callers = fcsl_fp_enter();
+    for (uint64_t row = 0; row < count; row++) {
+        const uint8_t *from = rows + row * row_bytes;
+        for (uint32_t i = 0; i < monitor->monitor->observed_count; i++) {
+            const copied_t *copied = &monitor->copied[i];
+            memcpy(monitor->run->data + copied->to, from, copied->size);
+            from += copied->size;
+        }
+        monitor->run->machine->step(monitor->run->data, &monitor->run->host);
+    }
+    fcsl_fp_leave(callers);
 }
 
 const fcsl_monitor_t *fcsl_run_monitor(const fcsl_run_t *run)

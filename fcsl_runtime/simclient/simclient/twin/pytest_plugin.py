@@ -17,8 +17,8 @@ import pytest
 
 from .pytest_campaign import _fcsl_studies as _fcsl_studies
 from .pytest_campaign import add_mark as add_campaign_mark
-from .pytest_campaign import generate
 from .pytest_campaign import fcsl_case as fcsl_case
+from .pytest_campaign import generate
 from .pytest_twins import add_mark as add_violates_mark
 from .pytest_twins import add_options
 from .pytest_twins import fcsl as fcsl

@@ -264,7 +264,13 @@ def open_python_run(
     """
     from fcsl_compiler.api.build import ToolchainError, toolchain
     from fcsl_compiler.api.diagnostics import DiagnosticError
-    from fcsl_compiler.api.reference import ReferenceMachine, build_externs, compile_machine, compile_monitor, externs_of
+    from fcsl_compiler.api.reference import (
+        ReferenceMachine,
+        build_externs,
+        compile_machine,
+        compile_monitor,
+        externs_of,
+    )
 
     try:
         compiled = compile_machine(config, toolchain(), until="schedule", target=target, instances=instances)
