@@ -21,7 +21,7 @@ from simclient.descriptor import Machine, read_machine
 from simclient.errors import TwinError
 from simclient.library import bind
 from simclient.paths import resolve
-from simclient.requirements import Verdict, read_verdicts
+from simclient.requirements import Verdict, read_verdicts, read_violations
 from simclient.ros.composer import Composer
 from simclient.ros.publish_queue import PublishQueue
 from simclient.values import Value, read_part
@@ -337,6 +337,10 @@ class Simulation:
     def verdicts(self, run: int | None = None) -> list[Verdict]:
         """On the requirements of the hosted machine. `run`: of the controller with this fcsl_run_t."""
         return read_verdicts(self._lib, self.hosted() if run is None else run)
+
+    def violations(self) -> list[float]:
+        """How often each requirement of the hosted machine was violated; NaN: not exercised."""
+        return read_violations(self._lib, self.hosted())
 
     def run(self, ticks: int) -> int:
         """Runs up to `ticks` ticks; returns early at the end, after a change of state and after a wait. Returns ticks done."""

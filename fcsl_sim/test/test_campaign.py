@@ -75,6 +75,11 @@ STUDY: dict[str, Any] = {
 Write = Callable[..., Path]
 
 
+def write_files(folder: Path, files: dict[str, Any]) -> None:
+    for name, content in files.items():
+        (folder / name).write_text(content if isinstance(content, str) else json.dumps(content))
+
+
 @pytest.fixture
 def write(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Write:
     """Writes a study, changed, and its simulation into a folder, which becomes the working directory."""
@@ -230,7 +235,8 @@ def test_each_line_of_pass_has_its_worst_case_and_how_to_repeat_it(
     lines = {line["text"]: line for line in json.loads(capsys.readouterr().out)["requirements"]}
     assert list(lines) == ["average < 4.2", "gauge.outputs.value < 9", "not above == 1.0", "average - 3.0 > -9.0"]
     assert lines["average < 4.2"] == {
-        "text": "average < 4.2", "unit": "", "failed": failed, "margin": pytest.approx(margin), "case": worst
+        "text": "average < 4.2", "unit": "", "failed": failed, "margin": pytest.approx(margin), "case": worst,
+        "not_exercised": 0,
     }  # fmt: skip
     # Written as the metrics `final` and `offset` are.
     assert lines["gauge.outputs.value < 9"]["margin"] == pytest.approx(9.0 - rows["final"].max())
@@ -239,6 +245,48 @@ def test_each_line_of_pass_has_its_worst_case_and_how_to_repeat_it(
     assert (lines["not above == 1.0"]["failed"], lines["not above == 1.0"]["margin"]) == (len(ones), None)
     main(["campaign", str(path), "--case", str(worst)])
     assert f"average = {rows['average'][worst]:.9g}" in capsys.readouterr().out
+
+
+def test_requirements_of_the_machine_are_columns_and_pass(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    """A violated one fails its case, an assumption does not; one that is not exercised says so."""
+    monkeypatch.chdir(tmp_path)
+    write_files(tmp_path, {
+        "level.py": 'class Level:\n    outputs = {"x": "f64"}\n\n    def execute(self):\n        pass\n',
+        "craft.json": {
+            "tick_hz": 100, "initial_state": "RUN", "algorithms": {"Level": {"source": "level.py"}},
+            "instances": {"level": {"algorithm": "Level"}}, "states": {"RUN": {"schedule": {"level": 100}}},
+            "channels": [{"name": "x", "id": 1, "field": "level.outputs.x", "direction": "sensor"}],
+            "requirements": [
+                {"id": "C-1", "text": "The level is low.", "then": "level.outputs.x < 2.0"},
+                {"id": "C-2", "text": "It is not seen.", "when": "level.outputs.x > 99.0", "then": "level.outputs.x < 2.0"},
+                {"id": "C-3", "text": "The world is low.", "then": "level.outputs.x < 1.0", "assume": True},
+                {"id": "C-4", "text": "It ends low.", "at_end": "level.outputs.x < 2.5"},
+            ],
+        },
+        "craft.sim.json": {
+            "controller": {"machine": "craft.json"}, "seed": 1, "duration": 0.5, "integrator": {"method": "rk4", "hz": 100},
+            "models": {"sensor": {"source": "package://fcsl_sim/models/noisy_sensor.c"}},
+            "instances": {"gauge": {"model": "sensor", "parameters": {"sigma": 0.0, "dropout": False}}},
+            "connections": [{"from": "gauge.value", "to": "controller.x"}], "rates": {"gauge": 100},
+        },
+        "craft.study.json": {
+            "simulation": "craft.sim.json", "seed": 1, "design": "sweep",
+            "parameters": {"gauge.parameters.bias": {"choice": [0.5, 1.5, 2.25, 3.0]}},
+        },
+    })  # fmt: skip
+    assert main(["campaign", "craft.study.json"]) == 1
+    text = capsys.readouterr().out
+    rows = table_of("craft.campaign")
+    assert rows["verdict"].tolist() == ["passed", "passed", "failed", "failed"]
+    assert rows["requirement.C-1"].tolist() == [0.0, 0.0, 1.0, 1.0]
+    assert np.isnan(rows["requirement.C-2"]).all()
+    assert rows["requirement.C-3"].tolist() == [0.0, 1.0, 1.0, 1.0]
+    assert rows["requirement.C-4"].tolist() == [0.0, 0.0, 0.0, 1.0]
+    assert rows["failed_by"][2].startswith("requirement C-1 violated 1 time, first at tick 0 (0 s), last at tick 49")
+    assert "`C-1: The level is low.`: failed in 2 cases, the first is case 2" in text
+    assert "`C-2: It is not seen.`: not exercised" in text and "C-3: The" not in text
 
 
 def test_a_line_that_no_metric_knows_says_so(write: Write, capsys: pytest.CaptureFixture[str]) -> None:

@@ -88,7 +88,7 @@ def _fly_one(study: Study, options: Any) -> int:
         outcome = flights.fly(options.case, options.record, watchdog)
     flights.close()
     if options.json:
-        names = {"values": [p.path for p in study.parameters], "metrics": list(study.metrics)}
+        names = {"values": [p.path for p in study.parameters], "metrics": study.columns}
         found = asdict(outcome)
         for key, keys in names.items():
             found[key] = dict(zip(keys, found[key], strict=True))
@@ -105,7 +105,7 @@ def _lines(study: Study, outcome: Outcome) -> str:
         return "\n".join([*lines, outcome.error])
     if outcome.failed_by:
         lines[0] += f": {outcome.failed_by}"
-    lines += [f"  {name} = {value:.9g}" for name, value in zip(study.metrics, outcome.metrics, strict=True)]
+    lines += [f"  {name} = {value:.9g}" for name, value in zip(study.columns, outcome.metrics, strict=True)]
     return "\n".join([*lines, f"{outcome.ticks} ticks, hash {outcome.hash}"])
 
 

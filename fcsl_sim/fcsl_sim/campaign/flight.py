@@ -11,6 +11,7 @@ from pathlib import Path
 
 from fcsl_compiler.api.types import scalar_of
 from simclient.errors import TwinError
+from simclient.requirements import Status
 from simclient.twin.trace import Columns, merged, value_offsets
 
 from .. import plan
@@ -31,7 +32,8 @@ _TICK = "machine.tick"
 @dataclass(frozen=True)
 class Outcome:
     """What a case has given. `verdict` is `passed`, `failed` or `error`; `hash` is that of the last state of machine and plant, 16
-    digits; `metrics` are NaN after an error; `failed_by` says what of `pass` did not hold, and by how much."""
+    digits; `metrics` are of the study's columns, NaN after an error; `failed_by` says what of `pass` did not hold, by how much,
+    and which requirements were violated."""
 
     case: int
     seed: int
@@ -51,7 +53,7 @@ CRASHED = "a model crashed: `--case` with this number says which"
 
 def not_flown(study: Study, case: int, why: str) -> Outcome:
     """Of a case without a result."""
-    nothing = (math.nan,) * len(study.metrics)
+    nothing = (math.nan,) * len(study.columns)
     return Outcome(case, study.seed_of(case), study.values(case), "error", "error", 0, "", nothing, why)
 
 
@@ -111,10 +113,15 @@ class Flights:
                 for name, metric in self.study.metrics.items():
                     metrics[name] = metric(columns, metrics)
                 passes = self.study.passes
-                passed = passes is None or bool(passes(columns, metrics))
-                failed_by = "" if passes is None or passed else shortfall(passes, columns, metrics)
+                held = passes is None or bool(passes(columns, metrics))
+                reasons = [] if passes is None or held else [shortfall(passes, columns, metrics)]
+                violations = sim.violations()
+                verdicts = sim.verdicts() if any(n > 0.0 for n in violations) else []
+                violated = [v for v in verdicts if v.status is Status.VIOLATED and not v.assumed]
+                failed_by = "; ".join([*reasons, *(f"requirement {v}" for v in violated)])
                 digest = hashlib.sha256(sim.checkpoint()).hexdigest()[:16]
-                verdict, numbers = "passed" if passed else "failed", tuple(map(float, metrics.values()))
+                numbers = (*map(float, metrics.values()), *violations)
+                verdict = "passed" if held and not violated else "failed"
                 return Outcome(*given, verdict, sim.status, sim.tick, digest, numbers, failed_by=failed_by)
         except (SimError, TwinError, MetricError) as error:
             return not_flown(self.study, case, str(error))

@@ -157,6 +157,8 @@ def _requirements(found: Sequence[Requirement], commands: Sequence[str]) -> str:
         failed = "not known by the metrics" if line.failed is None else str(line.failed)
         margin = "" if line.margin is None else f"{line.margin:.4g} {line.unit}".strip()
         case = "" if line.case is None else str(line.case)
+        if line.not_exercised:
+            failed += f" ({line.not_exercised} not exercised)"
         mark = ' class="failed"' if line.failed else ""
         cells = (
             f'<td class="number">{failed}</td><td class="number">{escape(margin)}</td><td class="number">{case}</td>'

@@ -60,6 +60,11 @@ def _requirement_line(study: Study, line: Requirement) -> str:
     size = "" if line.margin is None else f"{abs(line.margin):.4g} {line.unit}".strip()
     if line.failed is None:
         return f"`{line.text}`: no metric, so nothing is known of all cases"
+    if line.not_exercised and not line.failed:
+        flown = study.cases - line.not_exercised
+        return f"`{line.text}`: " + (
+            f"held in {flown} cases, not exercised in the others" if flown else "not exercised"
+        )
     if not line.failed:
         return f"`{line.text}`: held in all cases" + (f", at least by {size} in case {line.case}" if size else "")
     cases = "1 case" if line.failed == 1 else f"{line.failed} cases"

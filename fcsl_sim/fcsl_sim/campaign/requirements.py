@@ -1,5 +1,6 @@
 # SPDX-License-Identifier: Apache-2.0
-"""The lines of `pass`: in how many cases each did not hold, by how much, and where the limits are that it sets to metrics.
+"""The lines of `pass` and the requirements of the machine: in how many cases each did not hold, by how much, and where the
+limits are that `pass` sets to metrics.
 
 `landed and touchdown_speed < 2.0` has two lines. A line is judged by the metrics of all cases. One that reads values of the
 flight itself is not, unless what it reads is written as a metric is.
@@ -28,13 +29,15 @@ _TURNED = {"<": ">", "<=": ">=", ">": "<", ">=": "<=", "==": "==", "!=": "!="}
 @dataclass(frozen=True)
 class Requirement:
     """`failed`: cases in which it did not hold; None: the metrics do not say. `margin`: the smallest of all cases, negative where
-    it did not hold; None: it is no comparison. `case`: that of the margin, or one that failed; None: there is none."""
+    it did not hold; None: it is no comparison. `case`: that of the margin, or one that failed; None: there is none.
+    `not_exercised`: cases that show nothing of it."""
 
     text: str
     unit: str = ""
     failed: int | None = None
     margin: float | None = None
     case: int | None = None
+    not_exercised: int = 0
 
 
 @dataclass(frozen=True)
@@ -46,13 +49,21 @@ class Limit:
 
 
 def requirements(results: Results) -> list[Requirement]:
-    """Each line of `pass`, over all cases that ended without an error."""
+    """Each line of `pass`, and each requirement of the machine that is no assumption, over all cases that ended without an
+    error."""
     study = results.study
-    if study.passes is None:
-        return []
     flown = ~results.of("error")
     metrics = {name: _typed(metric, results.metric(name)) for name, metric in study.metrics.items()}
-    return [_judged(line, study, study.passes, metrics, flown) for line in _lines(study.passes.root)]
+    passes = study.passes
+    found = [_judged(line, study, passes, metrics, flown) for line in _lines(passes.root)] if passes else []
+    for verdict in study.required.values():
+        if not verdict.assumed:
+            violations = results.metric(f"requirement.{verdict.id}")
+            failed, silent = flown & (violations > 0.0), flown & np.isnan(violations)
+            case = int(np.argmax(failed)) if failed.any() else None
+            text = f"{verdict.id}: {verdict.text}"
+            found.append(Requirement(text, "", int(failed.sum()), None, case, int(silent.sum())))
+    return found
 
 
 def limits(study: Study) -> dict[str, list[Limit]]:

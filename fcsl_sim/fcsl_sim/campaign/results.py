@@ -50,7 +50,7 @@ class Results:
         if there is False:
             folder.mkdir(parents=True, exist_ok=True)
             self._write_about(about)
-        self._rows = CaseRows(folder / ROWS, study.cases, len(study.metrics), study.fingerprint)
+        self._rows = CaseRows(folder / ROWS, study.cases, len(study.columns), study.fingerprint)
         self._verdicts = self._check_rows()
         self.done = int(np.count_nonzero(self._verdicts))
         if there is None:
@@ -151,8 +151,8 @@ class Results:
         )
 
     def metric(self, name: str) -> np.ndarray[Any, Any]:
-        """Of all cases. All must be flown."""
-        index = list(self.study.metrics).index(name)
+        """A column of the study over all cases. All must be flown."""
+        index = self.study.columns.index(name)
         return np.concatenate([np.array(rows["metrics"][:, index]) for _, rows in self._rows.groups()])
 
     def of(self, verdict: str) -> np.ndarray[Any, Any]:
@@ -189,7 +189,7 @@ class Results:
         values = list(zip(*(self.study.values(case) for case in cases), strict=True))
         for dispersed, column in zip(self.study.parameters, values, strict=True):
             columns[dispersed.path] = pa.array(column)
-        for index, name in enumerate(self.study.metrics):
+        for index, name in enumerate(self.study.columns):
             columns[name] = pa.array(np.ascontiguousarray(rows["metrics"][:, index]))
         verdicts = [_VERDICTS[number] for number in rows["verdict"]]
         texts = [bytes(text).decode("utf-8", "replace") for text in rows["text"]]

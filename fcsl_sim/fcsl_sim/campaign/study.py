@@ -15,6 +15,7 @@ from fcsl_compiler.api.files import SourceError
 from fcsl_compiler.api.json_files import ConfigReader, JsonNode, SourcePathError, parse_json, resolve_source
 from fcsl_compiler.api.types import Scalar, scalar_of, shape_of
 from simclient.descriptor import Machine
+from simclient.requirements import Verdict
 
 from ..config import SimConfig, load
 from ..element_path import name_an_element, row_major_index, split_path
@@ -61,8 +62,8 @@ class Dispersed:
 
 @dataclass(frozen=True)
 class Study:
-    """`metrics` by name; `passes` is None where every flight that ends has passed. `fingerprint` is of all that decides what
-    the cases give."""
+    """`metrics` by name; `passes` is None where every flight that ends has passed. `required`: the requirements of the machine,
+    by id, before a flight. `fingerprint` is of all that decides what the cases give."""
 
     path: Path
     config: SimConfig
@@ -72,12 +73,18 @@ class Study:
     design: Design
     metrics: dict[str, Metric]
     passes: Metric | None
+    required: dict[str, Verdict]
     timeout_s: float
     fingerprint: str
 
     @property
     def cases(self) -> int:
         return self.design.count
+
+    @property
+    def columns(self) -> list[str]:
+        """The numbers of a case: metrics, and for each requirement how often it was violated; NaN: not exercised."""
+        return [*self.metrics, *(f"requirement.{id_}" for id_ in self.required)]
 
     def seed_of(self, case: int) -> int:
         """Of the simulation's noise."""
@@ -145,6 +152,7 @@ class _Reader:
             metrics = self._metrics(keys.get("metrics"), run.machine)
             passes = self._expression(keys.get("pass"), "`pass`", run.machine, metrics, condition=True)
             machine = run.machine
+            required = {verdict.id: verdict for verdict in run.verdicts()}
         finally:
             run.close()
         self.sink.raise_if_failed()
@@ -155,7 +163,8 @@ class _Reader:
         for library in sorted(libraries):
             print_of.update(library.read_bytes())
         return Study(
-            self.path, config, machine, seed, parameters, design, metrics, passes, timeout_s, print_of.hexdigest()
+            *(self.path, config, machine, seed, parameters, design, metrics, passes, required, timeout_s),
+            print_of.hexdigest(),
         )
 
     def _simulation(self, keys: dict[str, JsonNode]) -> SimConfig:
