@@ -30,7 +30,7 @@ _OPTIONAL = ("$schema", "description", "structs", "constants", "connections", "r
 _TREE = ("structs", "constants", "algorithms", "instances", "connections")
 _RECORDS = ("inputs", "outputs", "parameters")
 #: Names that an instance cannot have, because paths and the machine's topics use them.
-RESERVED_INSTANCES = ("machine", "channels", "state", "transitions", "health", "faults", "record")
+RESERVED_INSTANCES = ("machine", "channels", "requirements", "state", "transitions", "health", "faults", "record")
 #: Those of a part: paths have these behind the name of an instance, too.
 _RESERVED = (*RESERVED_INSTANCES, "inputs", "outputs", "parameters", "counters")
 #: Keys of views whose texts are no paths of fields.

@@ -30,12 +30,18 @@ static uint32_t history_slots(uint32_t size)
 int loop_open(loop_t *loop)
 {
     const fcsl_machine_t *machine = fcsl_run_machine(loop->run);
-    const fcsl_part_t parts[] = {{.data = fcsl_run_data(loop->run), .size = machine->size},
-                                 {.data = loop->hal.counters, .size = loop->hal.counter_bytes}};
+    const fcsl_monitor_t *monitor = fcsl_run_monitor(loop->run);
+    fcsl_part_t parts[LOOP_PARTS_MAX] = {{.data = fcsl_run_data(loop->run), .size = machine->size}};
+    uint32_t count = 1;
+    if (loop->hal.field_count > 0) {
+        parts[count++] = (fcsl_part_t){.data = loop->hal.counters, .size = loop->hal.counter_bytes};
+    }
+    if (monitor != NULL) {
+        parts[count++] = (fcsl_part_t){.data = fcsl_run_monitor_data(loop->run), .size = monitor->machine->size};
+    }
     loop->actuator_capacity = fcsl_message_capacity(machine, FCSL_ACTUATOR_MESSAGE);
     loop->actuator_bytes = calloc(1, loop->actuator_capacity);
-    if (loop->actuator_bytes == NULL || fcsl_history_open(&loop->history, parts, loop->hal.field_count > 0 ? 2 : 1,
-                                                          history_slots(machine->size)) != 0) {
+    if (loop->actuator_bytes == NULL || fcsl_history_open(&loop->history, parts, count, history_slots(machine->size)) != 0) {
         return -1;
     }
     loop_publish(loop);
@@ -63,6 +69,11 @@ static void publish(loop_t *loop, uint64_t time_ns)
 void loop_publish(loop_t *loop)
 {
     publish(loop, fcsl_monotonic_ns());
+}
+
+const uint8_t *loop_monitor_data(const loop_t *loop, const uint8_t *published)
+{
+    return published + fcsl_history_part(&loop->history, loop->hal.field_count > 0 ? 2 : 1);
 }
 
 uint64_t loop_hal_count(const loop_t *loop, const uint8_t *published, uint32_t field)

@@ -27,7 +27,7 @@ typedef struct {
     options_t options;
     loop_t loop;
     fcsl_hal_t board; /* of loop.hal: hal_linux, alone or beside a simulator; ctx null: none */
-    fcsl_vars_block_t blocks[2]; /* the machine, and what the HAL knows of itself */
+    fcsl_vars_block_t blocks[LOOP_PARTS_MAX]; /* of the parts that the loop publishes */
     uint32_t block_count;
     atomic_int stop;
     realtime_t realtime;
@@ -126,9 +126,17 @@ static int open_run(program_t *program)
     const fcsl_machine_t *machine = fcsl_run_machine(loop->run);
     program->blocks[0] = (fcsl_vars_block_t){
         .prefix = "", .fields = machine->fields, .field_count = machine->field_count, .machine = machine};
-    program->blocks[1] =
-        (fcsl_vars_block_t){.prefix = "hal", .fields = loop->hal.fields, .field_count = loop->hal.field_count};
-    program->block_count = loop->hal.field_count > 0 ? 2 : 1;
+    program->block_count = 1;
+    if (loop->hal.field_count > 0) {
+        program->blocks[program->block_count++] =
+            (fcsl_vars_block_t){.prefix = "hal", .fields = loop->hal.fields, .field_count = loop->hal.field_count};
+    }
+    uint32_t verdicts = 0;
+    const fcsl_field_t *fields = fcsl_run_verdict_fields(loop->run, &verdicts);
+    if (fields != NULL) {
+        program->blocks[program->block_count++] =
+            (fcsl_vars_block_t){.prefix = "requirements", .fields = fields, .field_count = verdicts};
+    }
     loop->stop = &program->stop;
     loop->ticks_max = program->options.ticks;
     loop->missed_deadline = program->options.missed_deadline;

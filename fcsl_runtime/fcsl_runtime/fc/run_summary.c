@@ -78,14 +78,14 @@ static void report_lost_requests(const fcsl_machine_t *machine, const uint8_t *d
 }
 
 /* How many requirements were met, and a line for each of the others. */
-static void report_requirements(const fcsl_run_t *run)
+static void report_requirements(const fcsl_run_t *run, const uint8_t *data)
 {
     const fcsl_monitor_t *monitor = fcsl_run_monitor(run);
     uint32_t met = 0;
     for (uint32_t i = 0; monitor != NULL && i < monitor->requirement_count; i++) {
         fcsl_verdict_t verdict;
         char text[FCSL_VERDICT_TEXT_MAX];
-        fcsl_run_verdict(run, i, &verdict);
+        fcsl_run_verdict(run, data, i, &verdict);
         met += verdict.status == FCSL_MET;
         if (verdict.status != FCSL_MET) {
             fcsl_run_verdict_text(run, &verdict, text);
@@ -120,7 +120,7 @@ static void report_counters(const loop_t *loop, const uint8_t *data)
              fcsl_tick_stats_get(&stats->hardware_failures), fcsl_tick_stats_get(&stats->messages_refused),
              fcsl_tick_stats_get(&stats->records_dropped), clients);
     report_lost_requests(fcsl_run_machine(loop->run), data);
-    report_requirements(loop->run);
+    report_requirements(loop->run, loop_monitor_data(loop, data));
     if (loop->telemetry != NULL) {
         report_telemetry(loop->telemetry);
     }

@@ -74,7 +74,7 @@ VERDICT_TEXT_BYTES = 512
 VERDICTS: dict[str, tuple[type | None, list[type]]] = {
     "fcsl_run_monitor": (POINTER(CMonitor), [ptr]),
     "fcsl_run_monitor_data": (ptr, [ptr]),
-    "fcsl_run_verdict": (None, [ptr, c_uint32, POINTER(CVerdict)]),
+    "fcsl_run_verdict": (None, [ptr, ptr, c_uint32, POINTER(CVerdict)]),
     "fcsl_run_verdict_text": (None, [ptr, POINTER(CVerdict), ptr]),
 }
 _ERROR = POINTER(CError)

@@ -5,7 +5,7 @@ from __future__ import annotations
 
 import ctypes
 import math
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from enum import StrEnum
 from typing import Any
@@ -16,7 +16,7 @@ from .descriptor import Machine, read_machine
 from .values import read_part
 
 #: fcsl_required_t
-_KINDS = ("then", "never", "at_end")
+REQUIRED = ("then", "never", "at_end")
 
 
 class Status(StrEnum):
@@ -38,7 +38,7 @@ class Verdict:
 
     id: str
     text: str
-    kind: str  # then, never, at_end
+    kind: str  # of REQUIRED
     source: str  # its condition
     assumed: bool  # about the environment
     status: Status
@@ -71,11 +71,20 @@ def read_verdicts(lib: Any, handle: int) -> list[Verdict]:
     return [_verdict(lib, handle, i, machine, watched, observed, base) for i in range(monitor.requirement_count)]
 
 
+def of_stats(stats: Mapping[str, Mapping[str, Any]]) -> list[Verdict]:
+    """The verdicts that a flight program counts (`stats` of the variable server), without the values of a violation."""
+    found = []
+    for id_, counts in stats.items():
+        ticks = {"first_tick": None, "last_tick": None}
+        found.append(Verdict(id_, **{**ticks, **counts, "status": Status(counts["status"])}))
+    return found
+
+
 def read_violations(lib: Any, handle: int) -> list[float]:
     """How often each requirement was violated; NaN: not exercised. A hundred times faster than all of the verdicts."""
     table, raw, found = lib.fcsl_run_monitor(handle), CVerdict(), []
     for index in range(table.contents.requirement_count) if table else ():
-        lib.fcsl_run_verdict(handle, index, ctypes.byref(raw))
+        lib.fcsl_run_verdict(handle, lib.fcsl_run_monitor_data(handle), index, ctypes.byref(raw))
         violated = float(max(raw.violations, raw.status == _VIOLATED))
         found.append(math.nan if raw.status == _NOT_EXERCISED else violated)
     return found
@@ -101,7 +110,7 @@ def _verdict(
     lib: Any, handle: int, index: int, machine: Machine, watched: Machine, observed: list[tuple[str, str]], base: int
 ) -> Verdict:
     raw, text = CVerdict(), ctypes.create_string_buffer(VERDICT_TEXT_BYTES)
-    lib.fcsl_run_verdict(handle, index, ctypes.byref(raw))
+    lib.fcsl_run_verdict(handle, base, index, ctypes.byref(raw))
     lib.fcsl_run_verdict_text(handle, ctypes.byref(raw), text)
     required = raw.requirement.contents
     instance = f"{machine.instances[required.instance].name}."
@@ -120,7 +129,7 @@ def _verdict(
     return Verdict(
         id=required.id.decode(),
         text=required.text.decode(),
-        kind=_KINDS[required.kind],
+        kind=REQUIRED[required.kind],
         source=required.source.decode(),
         assumed=bool(required.assumed),
         status=list(Status)[raw.status],

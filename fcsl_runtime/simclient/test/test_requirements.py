@@ -6,6 +6,7 @@ from __future__ import annotations
 import json
 import math
 import random
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -14,7 +15,7 @@ from mcap.reader import make_reader
 from mcap.writer import Writer
 from requirements_oracle import Generator, Values, verdict, written
 
-from simclient import AlgTwin, PyTwin
+from simclient import AlgTwin, ProcessTwin, PyTwin
 from simclient.replay.check_bag import main
 from simclient.requirements import Status
 from simclient.twin.twin import Twin
@@ -121,6 +122,19 @@ def test_generated_formulas_equal_their_definitions(seed: int, tmp_path: Path) -
             assert got.faults == 0
     assert sum(v.violations > 0 for v in found.values()) > 10 and sum(v.undefined > 0 for v in found.values()) > 5
     assert {v.status for v in found.values()} == set(Status)
+
+
+def test_the_flight_program_has_the_same_verdicts(tmp_path: Path) -> None:
+    """In its statistics, as fields of the variable server, and at its end."""
+    generator = Generator(11, TICK_HZ)
+    requirements = [generator.requirement(f"R-{i}") for i in range(30)]
+    path = machine(tmp_path, [written(requirement) for requirement in requirements])
+    with AlgTwin.from_config(path) as native, ProcessTwin.from_config(path) as process:
+        fly(native, 11, 60)
+        fly(process, 11, 60)
+        flown, found = native.requirements, process.requirements
+        assert {id_: replace(v, first={}, last={}) for id_, v in flown.items()} == found
+        assert process._client.get_value("requirements.r_3.exercised") == flown["R-3"].exercised
 
 
 def judged(capsys: pytest.CaptureFixture[str], bag: Path, config: Path, *more: str) -> tuple[int, dict[str, Any]]:

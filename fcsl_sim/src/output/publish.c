@@ -85,7 +85,9 @@ static int allocate(fcsl_sim_t *sim, struct fcsl_sim_published *published)
     const uint32_t count = sim->plant.instance_count;
     published->first_model = sim->external ? 0u : 1u;
     published->instance_count = count;
-    published->count = count + published->first_model + (sim->actuators ? 1u : 0u);
+    uint32_t verdict_count = 0;
+    const fcsl_field_t *verdicts = sim->external ? NULL : fcsl_run_verdict_fields(sim->run, &verdict_count);
+    published->count = count + published->first_model + (sim->actuators ? 1u : 0u) + (verdicts ? 1u : 0u);
     published->blocks = calloc(published->count + 1u, sizeof *published->blocks);
     published->parts = calloc(published->count + 1u, sizeof *published->parts);
     published->fields = calloc(count + 1u, sizeof(fcsl_field_t *));
@@ -106,11 +108,18 @@ static int allocate(fcsl_sim_t *sim, struct fcsl_sim_published *published)
     }
     if (sim->actuators) {
         const fcsl_instance_state_t *actuators = &sim->actuators->as_instance;
-        published->blocks[published->count - 1u] = (fcsl_vars_block_t){.prefix = actuators->name,
-                                                                       .fields = actuators->model->fields,
-                                                                       .field_count = actuators->model->field_count};
-        published->parts[published->count - 1u] =
+        published->blocks[published->first_model + count] =
+            (fcsl_vars_block_t){.prefix = actuators->name,
+                                .fields = actuators->model->fields,
+                                .field_count = actuators->model->field_count};
+        published->parts[published->first_model + count] =
             (fcsl_part_t){.data = actuators->data, .size = actuators->model->size};
+    }
+    if (verdicts) {
+        published->blocks[published->count - 1u] =
+            (fcsl_vars_block_t){.prefix = "requirements", .fields = verdicts, .field_count = verdict_count};
+        published->parts[published->count - 1u] = (fcsl_part_t){
+            .data = fcsl_run_monitor_data(sim->run), .size = fcsl_run_monitor(sim->run)->machine->size};
     }
     return fcsl_history_open(&published->history, published->parts, published->count, HISTORY_SLOTS);
 }
@@ -120,7 +129,7 @@ static int check_names(const fcsl_sim_t *sim, fcsl_error_t *error)
 {
     for (uint32_t i = 0; i < sim->plant.instance_count; i++) {
         const char *name = sim->plant.instances[i].name;
-        int taken = strcmp(name, "machine") == 0 || strcmp(name, "channels") == 0;
+        int taken = strcmp(name, "machine") == 0 || strcmp(name, "channels") == 0 || strcmp(name, "requirements") == 0;
         for (uint32_t m = 0; m < sim->machine->instance_count && !sim->external; m++) {
             taken = taken || strcmp(name, sim->machine->instances[m].name) == 0;
         }

@@ -11,7 +11,8 @@
 
 struct fcsl_sim_published {
     fcsl_history_t history;
-    fcsl_vars_block_t *blocks; /* the machine, if it is hosted here, then the instances */
+    /* The machine, if it is hosted here, the instances, what the actuators get, the verdicts on the machine's requirements. */
+    fcsl_vars_block_t *blocks;
     fcsl_part_t *parts;
     uint32_t count;
     uint32_t instance_count;

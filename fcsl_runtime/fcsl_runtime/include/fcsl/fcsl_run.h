@@ -261,8 +261,10 @@ const void *fcsl_run_monitor_data(const fcsl_run_t *run);
 /* Evaluates the requirements on recorded values, without running the machine: `count` rows of `row_bytes`, each of which has
  * the values of `observed` one after another, as they stood after a tick. */
 void fcsl_run_judge(fcsl_run_t *run, const uint8_t *rows, uint64_t row_bytes, uint64_t count);
-/* `index`: of a requirement of the monitor. */
-void fcsl_run_verdict(const fcsl_run_t *run, uint32_t index, fcsl_verdict_t *verdict);
+/* What is served of that struct: `<instance>.violations` and its like, none writable; null without requirements. */
+const fcsl_field_t *fcsl_run_verdict_fields(const fcsl_run_t *run, uint32_t *count);
+/* `data`: the monitor's struct, or a copy of it; `index`: of a requirement of the monitor. */
+void fcsl_run_verdict(const fcsl_run_t *run, const void *data, uint32_t index, fcsl_verdict_t *verdict);
 /* "LND-4 violated 1 time, first at tick 812 (8.12 s), last at tick 815: …" */
 void fcsl_run_verdict_text(const fcsl_run_t *run, const fcsl_verdict_t *verdict, char text[FCSL_VERDICT_TEXT_MAX]);
 /* ---- views ------------------------------------------------------------------------------------------------------- */

@@ -43,7 +43,16 @@ struct fcsl_monitor_run {
     fcsl_run_t *run;
     copied_t *copied;
     results_t *results;
+    fcsl_field_t *fields; /* of the results, as they are served */
+    char *paths;
+    uint32_t field_count;
 };
+
+/* Results by the names under which they are served; not every requirement has all. */
+static const char *const RESULTS[] = {"holds",      "evaluated",      "exercised",  "undefined",
+                                      "violations", "violated_ticks", "first_tick", "last_violated"};
+
+enum { RESULT_COUNT = sizeof RESULTS / sizeof RESULTS[0] };
 
 const fcsl_monitor_t *fcsl_monitor_in(void *library, const char *machine)
 {
@@ -72,6 +81,34 @@ static uint32_t locate(const fcsl_machine_t *machine, const char *path, uint32_t
         }
     }
     return 0;
+}
+
+/* A field of the monitor is served under a shorter path. */
+static void serve(struct fcsl_monitor_run *made, const char *instance, const char *name, const char *path)
+{
+    const fcsl_machine_t *machine = made->monitor->machine;
+    for (uint32_t i = 0; i < machine->field_count; i++) {
+        if (strcmp(machine->fields[i].path, path) == 0) {
+            char *own = made->paths + (size_t)made->field_count * PATH_BYTES;
+            (void)snprintf(own, PATH_BYTES, "%.200s.%.100s", instance, name);
+            made->fields[made->field_count] = machine->fields[i];
+            made->fields[made->field_count].path = own;
+            made->fields[made->field_count].flags = 0;
+            made->fields[made->field_count].instance = FCSL_NONE;
+            made->field_count++;
+        }
+    }
+}
+
+static void serve_results(struct fcsl_monitor_run *made, const char *instance)
+{
+    char path[PATH_BYTES];
+    for (uint32_t i = 0; i < RESULT_COUNT; i++) {
+        (void)snprintf(path, sizeof path, "%.200s.outputs.%s", instance, RESULTS[i]);
+        serve(made, instance, strcmp(RESULTS[i], "last_violated") == 0 ? "last_tick" : RESULTS[i], path);
+    }
+    (void)snprintf(path, sizeof path, "%.200s.counters.faults", instance);
+    serve(made, instance, "faults", path);
 }
 
 static uint32_t result(const fcsl_machine_t *machine, const char *instance, const char *name)
@@ -106,6 +143,7 @@ static int bind(struct fcsl_monitor_run *made, const fcsl_machine_t *machine, fc
             .first_tick = result(monitor->machine, instance, "first_tick"),
             .last_violated = result(monitor->machine, instance, "last_violated"),
         };
+        serve_results(made, instance);
     }
     return 0;
 }
@@ -121,8 +159,11 @@ int fcsl_run_use_monitor(fcsl_run_t *run, const fcsl_monitor_t *monitor, fcsl_er
     made->monitor = monitor;
     made->copied = calloc(monitor->observed_count + 1u, sizeof *made->copied);
     made->results = calloc(monitor->requirement_count + 1u, sizeof *made->results);
+    const size_t served = (size_t)monitor->requirement_count * (RESULT_COUNT + 1u) + 1u;
+    made->fields = calloc(served, sizeof *made->fields);
+    made->paths = calloc(served, PATH_BYTES);
     made->run = fcsl_run_open_machine(monitor->machine, error);
-    if (made->copied == NULL || made->results == NULL) {
+    if (made->copied == NULL || made->results == NULL || made->fields == NULL || made->paths == NULL) {
         return fcsl_fail(error, "out of memory for the monitor of '%s'", monitor->watched);
     }
     return made->run == NULL ? -1 : bind(made, run->machine, error);
@@ -138,6 +179,8 @@ void fcsl_monitor_close(fcsl_run_t *run)
     (void)fcsl_run_close(made->run, &unused); /* it records nothing, so that nothing can fail */
     free(made->copied);
     free(made->results);
+    free(made->fields);
+    free(made->paths);
     free(made);
     run->monitor = NULL;
 }
@@ -187,18 +230,24 @@ const void *fcsl_run_monitor_data(const fcsl_run_t *run)
     return run->monitor != NULL ? run->monitor->run->data : NULL;
 }
 
+const fcsl_field_t *fcsl_run_verdict_fields(const fcsl_run_t *run, uint32_t *count)
+{
+    *count = run->monitor != NULL ? run->monitor->field_count : 0u;
+    return run->monitor != NULL ? run->monitor->fields : NULL;
+}
+
 static uint64_t count_at(const uint8_t *data, uint32_t offset)
 {
     return offset != FCSL_NO_OFFSET ? fcsl_read_u64(data, offset) : 0;
 }
 
-void fcsl_run_verdict(const fcsl_run_t *run, uint32_t index, fcsl_verdict_t *verdict)
+void fcsl_run_verdict(const fcsl_run_t *run, const void *bytes, uint32_t index, fcsl_verdict_t *verdict)
 {
+    const uint8_t *data = bytes;
     const struct fcsl_monitor_run *made = run->monitor;
     const fcsl_requirement_t *requirement = &made->monitor->requirements[index];
     const fcsl_instance_t *instance = &made->monitor->machine->instances[requirement->instance];
     const results_t *at = &made->results[index];
-    const uint8_t *data = made->run->data;
     *verdict = (fcsl_verdict_t){
         .requirement = requirement,
         .holds = data[at->holds] != 0,

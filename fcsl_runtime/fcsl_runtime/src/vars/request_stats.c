@@ -70,6 +70,56 @@ void fcsl_vars_lost_requests(fcsl_vars_out_t *out, const fcsl_machine_t *machine
     fcsl_vars_end(out);
 }
 
+static const char *const KINDS[] = {"then", "never", "at_end"};
+static const char *const STATUS[] = {"met", "violated", "not exercised"};
+
+void fcsl_vars_requirements(fcsl_vars_out_t *out, const fcsl_run_t *run, const uint8_t *data)
+{
+    const fcsl_monitor_t *monitor = fcsl_run_monitor(run);
+    fcsl_vars_begin(out, "requirements");
+    for (uint32_t i = 0; monitor != NULL && i < monitor->requirement_count; i++) {
+        fcsl_verdict_t verdict;
+        char text[FCSL_VERDICT_TEXT_MAX];
+        fcsl_run_verdict(run, data, i, &verdict);
+        fcsl_run_verdict_text(run, &verdict, text);
+        fcsl_vars_begin(out, verdict.requirement->id);
+        fcsl_json_raw(out, "\"status\":\"%s\",\"kind\":\"%s\",\"text\":", STATUS[verdict.status],
+                      KINDS[verdict.requirement->kind]);
+        fcsl_json_quoted(out, verdict.requirement->text);
+        fcsl_json_raw(out, ",\"source\":");
+        fcsl_json_quoted(out, verdict.requirement->source);
+        fcsl_json_raw(out, ",\"line\":");
+        fcsl_json_quoted(out, text);
+        fcsl_json_raw(out, ",\"assumed\":%s,\"holds\":%s", verdict.requirement->assumed ? "true" : "false",
+                      verdict.holds ? "true" : "false");
+        fcsl_vars_number(out, "evaluated", verdict.evaluated);
+        fcsl_vars_number(out, "exercised", verdict.exercised);
+        fcsl_vars_number(out, "undefined", verdict.undefined);
+        fcsl_vars_number(out, "faults", verdict.faults);
+        fcsl_vars_number(out, "violations", verdict.violations);
+        fcsl_vars_number(out, "violated_ticks", verdict.violated_ticks);
+        if (verdict.violations > 0) {
+            fcsl_vars_number(out, "first_tick", verdict.first_tick);
+            fcsl_vars_number(out, "last_tick", verdict.last_tick);
+        }
+        fcsl_vars_end(out);
+    }
+    fcsl_vars_end(out);
+}
+
+/* The block that serves the verdicts of the host's run; block_count without. */
+static uint32_t verdict_block(const protocol_t *protocol)
+{
+    const catalog_t *catalog = &protocol->catalog;
+    uint32_t unused = 0;
+    const fcsl_field_t *fields = protocol->host->run != NULL ? fcsl_run_verdict_fields(protocol->host->run, &unused) : NULL;
+    uint32_t block = 0;
+    while (block < catalog->block_count && (fields == NULL || catalog->blocks[block].fields != fields)) {
+        block++;
+    }
+    return block;
+}
+
 /* Where the instances that have faulted did so last, by their names. */
 static void put_fault_places(json_out_t *out, const fcsl_machine_t *machine, const uint8_t *data)
 {
@@ -111,6 +161,10 @@ int fcsl_handle_stats(request_t *request)
         fcsl_vars_number(out, "overruns", overruns);
         put_fault_places(out, machine, data);
         fcsl_vars_lost_requests(out, machine, data);
+    }
+    const uint32_t verdicts = verdict_block(protocol);
+    if (verdicts < catalog->block_count) {
+        fcsl_vars_requirements(out, protocol->host->run, protocol->snapshot + catalog->bases[verdicts]);
     }
     fcsl_vars_number(out, "requests", atomic_load(&service->requests));
     fcsl_vars_number(out, "requests_refused", atomic_load(&service->requests_refused));

@@ -29,6 +29,7 @@ from .process_tap import ProcessTap
 from .twin import Twin
 
 if TYPE_CHECKING:
+    from ..requirements import Verdict
     from .profile import Samples
 
 #: Ticks per request, so that Ctrl-C is handled in between.
@@ -132,6 +133,12 @@ class ProcessTwin(Twin):
         return self._ticks_skipped
 
     # ---- primitives -------------------------------------------------------------------------------------------------
+
+    def _verdicts(self) -> list[Verdict]:
+        """As the program's `stats` has them: without the values of a violation."""
+        from ..requirements import of_stats
+
+        return of_stats(self._request("stats").get("requirements", {}))
 
     @property
     def _client(self) -> VarClient:
