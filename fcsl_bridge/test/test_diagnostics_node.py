@@ -17,9 +17,11 @@ from rclpy.serialization import deserialize_message
 
 from fcsl_bridge.diagnostics.board_status import BoardStatus
 from fcsl_bridge.diagnostics.lost_request_status import LostRequestStatus
+from fcsl_bridge.diagnostics.requirement_status import RequirementStatus
 from fcsl_bridge.topics import qos
 from fcsl_compiler.base.packages import package_prefix
 from simclient import VarClient
+from simclient.requirements import Status, Verdict
 
 ROOT = Path(__file__).resolve().parents[2]
 LIBRARY = package_prefix("lander") / "lib/lander/liblander_machines.so"
@@ -45,6 +47,7 @@ BOARD = {
         }
     },
 }
+REQUIREMENTS = "one/lander_control: requirements"
 SENSOR, TOP, BOTTOM = "one/lander_control: sensor altimeter", *(f"one/lander_control: device {n}" for n in DEVICES)
 OK, WARN, ERROR, STALE = DiagnosticStatus.OK, DiagnosticStatus.WARN, DiagnosticStatus.ERROR, DiagnosticStatus.STALE
 
@@ -115,8 +118,11 @@ def test_a_flight_loses_its_lidars(domain: Domain, vehicle: Vehicle) -> None:
     node.wait_for(f"waiting for a flight program at {vehicle.socket}")
     flight = vehicle.fly_with_board()
     found = vehicle.until(lambda all_: all_[SENSOR].message == "primary top; bottom silent")
-    assert list(found) == [SENSOR, TOP, BOTTOM] and {s.hardware_id for s in found.values()} == {"lander_control"}
+    assert list(found) == [SENSOR, TOP, BOTTOM, REQUIREMENTS] and {s.hardware_id for s in found.values()} == {
+        "lander_control"
+    }
     assert found[SENSOR].level == WARN
+    assert values(found[REQUIREMENTS])["LND-1"] == "met"
     assert values(found[SENSOR]) == {"primary": "top", "condition.top": "healthy", "condition.bottom": "silent"}
     assert (found[TOP].level, found[TOP].message) == (OK, "there")
     assert list(values(found[TOP])) == [
@@ -136,7 +142,7 @@ def test_a_flight_loses_its_lidars(domain: Domain, vehicle: Vehicle) -> None:
     assert found[SENSOR].message == "primary none; top silent; bottom silent"
     flight.signal(signal.SIGKILL)
     found = vehicle.until(lambda all_: all(status.level == STALE for status in all_.values()))
-    assert list(found) == [SENSOR, TOP, BOTTOM] and str(vehicle.socket) in found[SENSOR].message
+    assert list(found) == [SENSOR, TOP, BOTTOM, REQUIREMENTS] and str(vehicle.socket) in found[SENSOR].message
     for name in DEVICES:
         vehicle.measure(name)
     vehicle.fly_with_board()
@@ -160,7 +166,7 @@ def test_a_flight_loses_a_request(domain: Domain, vehicle: Vehicle) -> None:
     """`ascent` asks for COAST in the tick in which `monitor` fails, which leads to SAFE."""
     vehicle.fly_with_board("--paused")
     domain.start("diagnostics_node", "-r", "__ns:=/one", socket=vehicle.socket)
-    assert list(vehicle.until(lambda all_: True)) == [SENSOR, TOP, BOTTOM]
+    assert list(vehicle.until(lambda all_: True)) == [SENSOR, TOP, BOTTOM, REQUIREMENTS]
     with VarClient(vehicle.socket) as client:
         client.set({"ascent.parameters.target_altitude": -1000.0})
         client.inject("monitor", "failed")
@@ -243,3 +249,29 @@ def test_counts_of_a_device_grow() -> None:
         assert (status.name, status.level, status.message) == ("rover: device gyro", level, text)
         why = text.partition("silent: ")[2]
         assert values(status) == {name: str(count) for name, count in counts.items()} | {"why": why}
+
+
+def verdict(id_: str, violations: int, holds: bool, assumed: bool = False, kind: str = "then") -> Verdict:
+    counts = dict.fromkeys(("evaluated", "exercised", "undefined", "faults", "violated_ticks"), 9)
+    status = Status.VIOLATED if violations else Status.MET
+    ticks = (3, 4) if violations else (None, None)
+    line = f"{id_} violated" if violations else f"{id_} met"
+    return Verdict(
+        id_, "It holds.", kind, "x", assumed, status, holds, **counts, violations=violations, first_tick=ticks[0],
+        last_tick=ticks[1], line=line,
+    )  # fmt: skip
+
+
+def test_requirements_are_a_status() -> None:
+    """ERROR while one is violated, WARN afterwards; an assumption is a warning. What has begun is told once."""
+    found = RequirementStatus("rover", "rover")
+    assert found.statuses([]) == []
+    (met,) = found.statuses([verdict("A", 0, True), verdict("E", 0, False, kind="at_end")])
+    assert (met.level, met.message, [v.key for v in met.values]) == (DiagnosticStatus.OK, "1 of 1 met so far", ["A"])
+    (bad,) = found.statuses([verdict("A", 1, False), verdict("B", 0, True)])
+    assert (bad.level, bad.message, bad.values[0].value) == (DiagnosticStatus.ERROR, "A violated", "violated")
+    (once,) = found.statuses([verdict("A", 1, True)])
+    (world,) = found.statuses([verdict("A", 1, False, assumed=True)])
+    assert once.level == world.level == DiagnosticStatus.WARN
+    assert found.begun([verdict("A", 1, False)]) == ["A violated"] and found.begun([verdict("A", 1, True)]) == []
+    assert found.begun([verdict("A", 2, False)]) == ["A violated"]

@@ -424,7 +424,9 @@ class _Checker:
             listed = ", ".join(_PAST_EXAMPLES[kind] for kind in takes)
             raise ExpressionError(f"`{self._source(e)}`: `{name}` takes {listed}")
         given = zip(e.args, takes, strict=True)
-        parts = tuple(self._need_scalar(self.node(argument)) for argument, kind in given if kind != "s")
+        parts = tuple(self.node(argument) for argument, kind in given if kind != "s")
+        if name != "previous":
+            parts = tuple(map(self._need_scalar, parts))
         for part, kind in zip(parts, takes, strict=False):
             if kind == "p":
                 self.need_bool(part)

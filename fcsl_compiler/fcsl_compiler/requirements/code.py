@@ -104,7 +104,14 @@ class Code:
         """The number of the name that a field has."""
         return self._past[id(node)] if id(node) in self._past else self._read(node, 0)
 
+    def _remembered(self, node: Node, element: int) -> str:
+        return f"{self._past[id(node)]}_{element}" if node.quantity.shape else self._past[id(node)]
+
     # ---- numbers ----------------------------------------------------------------------------------------------------
+
+    def scalar(self, node: Node, element: int = 0) -> str:
+        """An f64 or an i64, as its kind is."""
+        return (self.number if node.quantity.kind is Kind.FLOAT else self.integer)(node, element)
 
     def number(self, node: Node, element: int = 0) -> str:
         """An f64: of a vector its element."""
@@ -113,7 +120,7 @@ class Code:
                 return repr(float(node.value))
             return f"f64({self.integer(node, element)})"
         if id(node) in self._past:
-            return self._past[id(node)]
+            return self._remembered(node, element)
         operator = node.operator
         if operator == "literal":
             return repr(node.value)
@@ -138,7 +145,7 @@ class Code:
             truth = "True" if node.operator == "literal" and node.value else self.truth(node).true
             return f"(i64(1) if {truth} else i64(0))"
         if id(node) in self._past:
-            return self._past[id(node)]
+            return self._remembered(node, element)
         if node.operator == "literal":
             return f"i64({node.value})"
         if node.operator == "field":

@@ -141,7 +141,9 @@ class _Algorithm:
         lines.append("    self.started = False")
         lines.append("self.last_tick = tick")
         if guards:
-            lines += [f"if {' or '.join(guards)}:", "    self.started = False", "else:"]
+            lines += [f"if {' or '.join(guards)}:", "    self.started = False"]
+            lines += ["    self.asked = False"] if r.kind == "at_end" else []
+            lines += ["else:"]
             lines += [f"    {line}" for line in self._when_due(due, body)]
         else:
             lines += self._when_due(due, body)
@@ -197,9 +199,10 @@ class _Algorithm:
             lines += ["elif not when_false:", "    self.undefined += 1"]
             lines += ["wrong = when_true and not holds"]
         if r.kind == "at_end":
-            return [*lines, "self.holds = not wrong"]
+            return [*lines, f"self.asked = {'True' if when is None else 'when_true'}", "self.holds = not wrong"]
         if r.within_ticks:
-            lines += ["if not wrong or restarted:", "    self.late_from = tick"]
+            lines += ["if not wrong:", "    self.late_from = -1"]
+            lines += ["elif self.late_from < 0 or restarted:", "    self.late_from = tick"]
             lines += [f"wrong = wrong and tick - self.late_from >= {r.within_ticks}"]
         keep = [f"self.{{}}_{name.removeprefix('self.')} = {name}" for name in self.shown]
         lines += ["if wrong:"]
@@ -215,7 +218,9 @@ class _Algorithm:
         r = self.requirement
         types = {name: type_ for name, type_ in self.inputs.values()}
         outputs = {"holds": "bool", **dict.fromkeys(("evaluated", "exercised", "undefined"), "u64")}
-        if r.kind != "at_end":
+        if r.kind == "at_end":
+            outputs["asked"] = "bool"
+        else:
             outputs |= {"violations": "u64", "violated_ticks": "u64", "first_tick": "i64", "last_violated": "i64"}
             for name in self.shown:
                 own = name.removeprefix("self.")

@@ -55,11 +55,12 @@ class PastWriter:
             self.lines += [f"{name}_true = {name}_was", f"{name}_false = {name}_was_not"]
             return
         kind = part.quantity.kind
-        value = (
-            code.number(part) if kind is Kind.FLOAT else code.name(part) if kind is Kind.NAME else code.integer(part)
-        )
-        kept = self._keep(name, {Kind.FLOAT: "f64", Kind.NAME: "i32"}.get(kind, "i64"))
-        self.lines += [f"{name}_now = {value}", f"{name} = {name}_now if restarted else {kept}", f"{kept} = {name}_now"]
+        type_ = {Kind.FLOAT: "f64", Kind.NAME: "i32"}.get(kind, "i64")
+        for element in range(part.quantity.shape[0] if part.quantity.shape else 1):
+            own = f"{name}_{element}" if part.quantity.shape else name
+            value = code.name(part) if kind is Kind.NAME else code.scalar(part, element)
+            kept = self._keep(own, type_)
+            self.lines += [f"{own}_now = {value}", f"{own} = {own}_now if restarted else {kept}", f"{kept} = {own}_now"]
 
     def _before(self, part: Node, name: str, code: Code) -> None:
         """Locals `_now`, `_not`, and those of the last evaluation, `_was`, `_was_not`: the same in the first one."""

@@ -95,9 +95,10 @@ class Signals:
         return HEALTH_NAMES if row.abi_type == "FCSL_HEALTH" else ()
 
     def instance(self, path: str) -> str | None:
-        """The instance whose run gives a field its value: stale, it has none. None of fields of the machine itself."""
+        """The instance whose run gives a field its value: stale, it has none. None of fields that always have one."""
         row = self.find(path).row
-        return self.machine.instances[row.instance].name if row.instance >= 0 and row.role != "CHANNEL" else None
+        is_of_run = row.role in ("INPUT", "OUTPUT", "STATE") and row.abi_type != "FCSL_HEALTH"
+        return self.machine.instances[row.instance].name if is_of_run else None
 
     def _unknown(self, path: str) -> str:
         instances = [i.name for i in self.machine.instances]

@@ -64,11 +64,8 @@ def read_verdicts(lib: Any, handle: int) -> list[Verdict]:
     table = lib.fcsl_run_monitor(handle)
     if not table:
         return []
-    monitor = table.contents
-    machine, watched = read_machine(monitor.machine), read_machine(lib.fcsl_run_machine(handle))
-    observed = [(o.path.decode(), o.input.decode()) for o in monitor.observed[: monitor.observed_count]]
-    base = lib.fcsl_run_monitor_data(handle)
-    return [_verdict(lib, handle, i, machine, watched, observed, base) for i in range(monitor.requirement_count)]
+    monitor, base = table.contents, lib.fcsl_run_monitor_data(handle)
+    return [_verdict(lib, handle, monitor, base, index) for index in range(monitor.requirement_count)]
 
 
 def of_stats(stats: Mapping[str, Mapping[str, Any]]) -> list[Verdict]:
@@ -106,26 +103,13 @@ def remembering(monitor: CMonitor) -> frozenset[str]:
     return frozenset(found)
 
 
-def _verdict(
-    lib: Any, handle: int, index: int, machine: Machine, watched: Machine, observed: list[tuple[str, str]], base: int
-) -> Verdict:
+def _verdict(lib: Any, handle: int, monitor: CMonitor, base: int, index: int) -> Verdict:
     raw, text = CVerdict(), ctypes.create_string_buffer(VERDICT_TEXT_BYTES)
     lib.fcsl_run_verdict(handle, base, index, ctypes.byref(raw))
     lib.fcsl_run_verdict_text(handle, ctypes.byref(raw), text)
     required = raw.requirement.contents
-    instance = f"{machine.instances[required.instance].name}."
     begun = raw.violations > 0
-
-    def values(which: str) -> dict[str, Any]:
-        found = {}
-        for path, target in observed if begun else ():
-            result = f"{instance}outputs.{which}_{target.rpartition('.')[2]}"
-            if target.startswith(instance) and result in machine.fields:
-                value = _read(machine, result, base)
-                names = _names(path, watched)
-                found[path] = names[value] if names else value
-        return found
-
+    first, last = _violating(lib, handle, monitor, base, required.instance) if begun else ({}, {})
     return Verdict(
         id=required.id.decode(),
         text=required.text.decode(),
@@ -138,10 +122,26 @@ def _verdict(
         violated_ticks=raw.violated_ticks,
         first_tick=raw.first_tick if begun else None,
         last_tick=raw.last_tick if begun else None,
-        first=values("first"),
-        last=values("last"),
+        first=first,
+        last=last,
         line=text.value.decode("utf-8", "replace"),
     )
+
+
+def _violating(
+    lib: Any, handle: int, monitor: CMonitor, base: int, instance: int
+) -> tuple[dict[str, Any], dict[str, Any]]:
+    """What a requirement read in the first and in the last tick that violated it, by path."""
+    machine, watched = read_machine(monitor.machine), read_machine(lib.fcsl_run_machine(handle))
+    name, found = machine.instances[instance].name, (dict[str, Any](), dict[str, Any]())
+    for observed in monitor.observed[: monitor.observed_count]:
+        path, (owner, _, target) = observed.path.decode(), observed.input.decode().rpartition(".inputs.")
+        for values, which in zip(found, ("first", "last"), strict=True):
+            result = f"{name}.outputs.{which}_{target}"
+            if owner == name and result in machine.fields:
+                value, names = _read(machine, result, base), _names(path, watched)
+                values[path] = names[value] if names else value
+    return found
 
 
 def _read(machine: Machine, path: str, base: int) -> Any:

@@ -7,7 +7,7 @@ from __future__ import annotations
 import math
 import random
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 from typing import Any
 
 Formula = tuple[Any, ...]
@@ -18,6 +18,7 @@ UNDEFINED = None
 NUMBERS = ("src.outputs.x", "src.outputs.y", "slow.outputs.z", "src.outputs.v[1]")
 _INTEGERS = ("src.outputs.n", "src.outputs.u")
 CONDITIONS = ("src.outputs.b",)
+_CHANGE = ("-", ("field", "src.outputs.v"), ("previous", ("field", "src.outputs.v")))
 _COMPARISONS = ("<", "<=", ">", ">=", "==", "!=")
 
 
@@ -41,7 +42,7 @@ class Generator:
         if kind == "call":
             name = self.random.choice(("abs", "min", "max", "negative", "norm"))
             if name == "norm":
-                return ("norm", "src.outputs.v")
+                return ("norm", ("field", "src.outputs.v")) if self.random.random() < 0.5 else ("norm", _CHANGE)
             both = (
                 (self.number(depth - 1),)
                 if name in ("abs", "negative")
@@ -133,7 +134,7 @@ def text(f: Formula) -> str:
     if kind == "literal":
         return repr(f[1])
     if kind == "norm":
-        return f"norm({f[1]})"
+        return f"norm({text(f[1])})"
     if kind in ("+", "-", "*", "/"):
         return f"({text(f[1])} {kind} {text(f[2])})"
     if kind == "negative":
@@ -155,7 +156,7 @@ def written(requirement: Values) -> Values:
 
 
 def fields(f: Formula) -> set[str]:
-    if f[0] in ("field", "norm"):
+    if f[0] == "field":
         return {f[1]}
     return set().union(
         *(fields(part) for part in f[1:] if isinstance(part, tuple) and part and isinstance(part[0], str))
@@ -222,7 +223,7 @@ class History:
         if kind == "literal":
             return f[1]
         if kind == "norm":
-            return math.sqrt(sum(v * v for v in self.values[i][f[1]]))
+            return math.sqrt(sum(v * v for v in self.at(f[1], i)))
         if kind == "compare":
             parts = [self.at(part, i) for part in f[2:]]
             pairs = zip(f[1], parts, parts[1:], strict=False)
@@ -241,6 +242,8 @@ class History:
         if kind in ("abs", "negative"):
             return abs(a) if kind == "abs" else -a
         b = self.at(f[2], i)
+        if isinstance(a, list):
+            return [x - y for x, y in zip(a, b, strict=True)]
         if kind in ("min", "max"):
             if isinstance(a, int) and isinstance(b, int):
                 return min(a, b) if kind == "min" else max(a, b)
@@ -311,23 +314,23 @@ class Expected:
     violated_ticks: int = 0
     first_tick: int | None = None
     last_tick: int | None = None
-    late: list[bool] = field(default_factory=list)
+    asked: bool = False  # of `at_end`: in the last tick
 
 
 def verdict(requirement: Values, ticks: Sequence[Values], tick_hz: int) -> Expected:
     """`ticks`: what each tick left, and in `ran` the instances that completed a run in it."""
     kind = next(key for key in ("then", "never", "at_end") if key in requirement)
     condition, when = requirement[kind], requirement.get("when")
-    read = fields(condition) | (fields(when) if when else set()) | {f"{requirement.get('clock', 'src')}."}
+    read = {path for path in fields(condition) | (fields(when) if when else set()) if not path.endswith(".health")}
     instances = {path.partition(".")[0] for path in read} - {"machine"}
-    if "clock" not in requirement and not any(path.startswith("src.") and path != "src." for path in read):
-        instances.discard("src")
+    instances |= {requirement["clock"]} if "clock" in requirement else set()
     grace = round(requirement.get("within_s", 0.0) * tick_hz)
-    found, history, wrong_from, violated = Expected(), History(tick_hz), 0, False
+    found, history, violated = Expected(), History(tick_hz), False
+    wrong_from: int | None = None
     for tick, values in enumerate(ticks):
         stale = any(values[f"{name}.outputs.health"] == "stale" for name in instances)
         if stale and requirement.get("stale") != "hold":
-            history, violated = History(tick_hz), False
+            history, violated, found.asked = History(tick_hz), False, False
             continue
         if "clock" in requirement and requirement["clock"] not in values["ran"]:
             continue
@@ -343,11 +346,13 @@ def verdict(requirement: Values, ticks: Sequence[Values], tick_hz: int) -> Expec
         found.undefined += asked is UNDEFINED
         wrong = asked is True and not kept
         if kind == "at_end":
-            found.holds = not wrong
+            found.asked, found.holds = asked is True, not wrong
             continue
-        if not wrong or begins:
+        if not wrong:
+            wrong_from = None
+        elif wrong_from is None or begins:
             wrong_from = tick
-        wrong = wrong and tick - wrong_from >= grace
+        wrong = wrong_from is not None and tick - wrong_from >= grace
         if wrong:
             found.violations += not violated or begins
             found.violated_ticks += 1

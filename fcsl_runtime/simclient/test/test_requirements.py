@@ -120,6 +120,8 @@ def test_generated_formulas_equal_their_definitions(seed: int, tmp_path: Path) -
             shown = {count: getattr(got, count) for count in COUNTS}
             assert shown == {count: getattr(expected, count) for count in COUNTS}, (name, written(requirement))
             assert got.faults == 0
+            if got.kind == "at_end":
+                assert got.status == (("met" if expected.holds else "violated") if expected.asked else "not exercised")
     assert sum(v.violations > 0 for v in found.values()) > 10 and sum(v.undefined > 0 for v in found.values()) > 5
     assert {v.status for v in found.values()} == set(Status)
 

@@ -29,6 +29,7 @@ typedef struct {
 /* Where the results of a requirement are in the monitor's struct; FCSL_NO_OFFSET: it has none such. */
 typedef struct {
     uint32_t holds;
+    uint32_t asked;
     uint32_t evaluated;
     uint32_t exercised;
     uint32_t undefined;
@@ -135,6 +136,7 @@ static int bind(struct fcsl_monitor_run *made, const fcsl_machine_t *machine, fc
         const char *instance = monitor->machine->instances[monitor->requirements[i].instance].name;
         made->results[i] = (results_t){
             .holds = result(monitor->machine, instance, "holds"),
+            .asked = result(monitor->machine, instance, "asked"),
             .evaluated = result(monitor->machine, instance, "evaluated"),
             .exercised = result(monitor->machine, instance, "exercised"),
             .undefined = result(monitor->machine, instance, "undefined"),
@@ -260,12 +262,9 @@ void fcsl_run_verdict(const fcsl_run_t *run, const void *bytes, uint32_t index, 
         .first_tick = count_at(data, at->first_tick),
         .last_tick = count_at(data, at->last_violated),
     };
-    const int at_end = requirement->kind == FCSL_REQUIRED_AT_END;
-    if (verdict->violations > 0 || (at_end && verdict->evaluated > 0 && !verdict->holds)) {
-        verdict->status = FCSL_VIOLATED;
-    } else {
-        verdict->status = verdict->exercised > 0 ? FCSL_MET : FCSL_NOT_EXERCISED;
-    }
+    const int exercised = at->asked != FCSL_NO_OFFSET ? data[at->asked] != 0 : verdict->exercised > 0;
+    const int violated = at->asked != FCSL_NO_OFFSET ? exercised && !verdict->holds : verdict->violations > 0;
+    verdict->status = violated ? FCSL_VIOLATED : exercised ? FCSL_MET : FCSL_NOT_EXERCISED;
 }
 
 static const char *times(uint64_t count, const char *one, const char *many)
