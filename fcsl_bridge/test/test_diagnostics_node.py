@@ -171,7 +171,7 @@ def test_a_flight_loses_a_request(domain: Domain, vehicle: Vehicle) -> None:
         client.set({"ascent.parameters.target_altitude": -1000.0})
         client.inject("monitor", "failed")
         client.tick()
-    found = vehicle.until(lambda all_: len(all_) == 4)
+    found = vehicle.until(lambda all_: len(all_) == 5)
     lost = found["one/lander_control"]
     assert (lost.level, lost.message) == (WARN, "ASCENT; 1 lost requests ASCENT -> COAST: START_COAST")
     assert values(lost) == {"lost requests ASCENT -> COAST: START_COAST": "1"}
