@@ -1,0 +1,46 @@
+# SPDX-License-Identifier: Apache-2.0
+"""The rocket's requirements (fc/requirements.json) over whole flights: met, and each exercised by one of them."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+
+import pytest
+from conftest import TICK_HZ
+
+from simclient import SimTwin
+from simclient.requirements import Status
+
+#: Name → events in the middle of the flight, and parameters of the start.
+FLIGHTS: dict[str, dict[str, list[str]]] = {
+    "nominal": {},
+    "no_gnss": {"events": ["20.0 receiver.parameters.fault=1"]},
+    "no_gnss_no_range": {"events": ["20.0 receiver.parameters.fault=1", "20.0 laser.parameters.fault=1"]},
+    "no_imu": {"events": ["20.0 inertial_unit.parameters.fault=1"]},
+    "17_kg": {"sets": ["engine.parameters.propellant_mass=17.0"]},
+}
+
+
+def _verdicts(fcsl_sim: Callable[..., SimTwin], flight: str) -> dict[str, Status]:
+    twin = fcsl_sim("../sim/endless.sim.json", seed=3, **FLIGHTS[flight])
+    twin.run_until("machine.state in ('TOUCHDOWN', 'CUT')", timeout_ticks=60 * TICK_HZ)
+    twin.tick(3 * TICK_HZ)
+    return {id_: verdict.status for id_, verdict in twin.requirements.items()}
+
+
+@pytest.mark.parametrize("flight", FLIGHTS)
+def test_no_requirement_is_violated(fcsl_sim: Callable[..., SimTwin], flight: str) -> None:
+    assert Status.VIOLATED not in _verdicts(fcsl_sim, flight).values()
+
+
+def test_each_requirement_is_exercised_by_a_flight(fcsl_sim: Callable[..., SimTwin]) -> None:
+    found = [_verdicts(fcsl_sim, flight) for flight in FLIGHTS]
+    assert [id_ for id_ in found[0] if all(one[id_] is Status.NOT_EXERCISED for one in found)] == []
+
+
+@pytest.mark.violates("RKT-9")
+def test_a_weak_engine_comes_down_too_fast(fcsl_sim: Callable[..., SimTwin]) -> None:
+    """A requirement can be violated: here by an engine that loses a third of its thrust over the pad."""
+    twin = fcsl_sim("../sim/endless.sim.json", seed=3, events=["28.0 engine.parameters.max_thrust=1200.0"])
+    twin.run_until("ground.outputs.touching and machine.state == 'TERMINAL'", timeout_ticks=40 * TICK_HZ)
+    assert twin.requirements["RKT-9"].first["navigation.outputs.velocity[2]"] > 1.2
