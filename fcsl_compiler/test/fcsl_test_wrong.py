@@ -1244,6 +1244,13 @@ CONFIGS: dict[str, str] = {
             "a function of metrics": "rms(one.outputs.y) > 0.5",
         }.items()
     },
+    "E257 no condition in a list": put("requirements", value=[{"id": "R-1", "text": "t", "then": []}]),
+    "E257 one of a list": put(
+        "requirements", value=[{"id": "R-1", "text": "t", "then": ["one.outputs.y > 0.0", "two"]}]
+    ),
+    "E208 a list of what never holds": put(
+        "requirements", value=[{"id": "R-1", "text": "t", "never": ["one.outputs.y > 0.0"]}]
+    ),
     "E257 no condition of three": put("requirements", value=[{"id": "R-1", "text": "t"}]),
     "E257 a limit and no `when`": required("one.outputs.y > 0.0", within_s=0.5),
     "E257 the same id": put(

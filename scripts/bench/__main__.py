@@ -19,6 +19,7 @@ ALONE = {
     "linear": "linear.main",
     "process": "process",
     "record": "record",
+    "requirements": "requirements",
     "set_up": "set_up",
     "simulator": "simulator.main",
     "start": "start",

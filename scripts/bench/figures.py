@@ -32,6 +32,7 @@ from .subjects.link.main import link_figures, link_rows
 from .subjects.process import process_rows, process_times
 from .subjects.record import record_rows, record_times
 from .subjects.replay_map import RATES_HZ, replay_map
+from .subjects.requirements import requirement_rows, requirement_times
 from .subjects.ros.main import AXES, DECIMATE, LOCKSTEP_DECIMATES, PICTURE, lockstep, realtime
 from .subjects.set_up import set_up_rows, set_up_times
 from .subjects.simulator.main import simulator_figures, simulator_rows

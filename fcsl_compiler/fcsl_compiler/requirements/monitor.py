@@ -68,7 +68,8 @@ def make_monitor(machine: Machine, requirements: list[Requirement]) -> Monitor:
 
 
 def subset_of(requirements: list[Requirement], machine: Machine) -> list[Requirement]:
-    """Those that name only instances and channels which a subset machine has."""
+    """Those that name only instances and channels which a subset machine has, and not its state: it stays in the first one,
+    without what leads out of it."""
     signals = Signals(machine)
     names = {i.name for i in machine.instances}
 
@@ -76,7 +77,7 @@ def subset_of(requirements: list[Requirement], machine: Machine) -> list[Require
         if requirement.clock is not None and requirement.clock not in names:
             return False
         leaves = [node for root in requirement.expressions for node in root.walk() if node.operator == "field"]
-        return all(signals.has(leaf.value) for leaf in leaves)
+        return all(signals.has(leaf.value) and leaf.value != "machine.state" for leaf in leaves)
 
     return [requirement for requirement in requirements if has(requirement)]
 

@@ -210,6 +210,19 @@ class _Reader:
         return id_
 
     def _condition(self, node: JsonNode, what: str) -> Node | None:
+        """A condition, or a list of those that all hold; of `never` one alone."""
+        if node.kind != "array" or what == "`never`":
+            return self._one_condition(node, what)
+        parts = [self._one_condition(item, what) for item in node.items]
+        if not parts:
+            self.sink.error("E257", f"{what} is an empty list", node.span, help="write a condition")
+            return None
+        if None in parts or len(parts) == 1:
+            return parts[0] if len(parts) == 1 else None
+        text = " and ".join(f"({part.text})" for part in parts if part is not None)
+        return Node("and", text, Quantity(Kind.BOOL), tuple(part for part in parts if part is not None))
+
+    def _one_condition(self, node: JsonNode, what: str) -> Node | None:
         text = self.reader.string(node, what, "nav.outputs.height < 10.0")
         if text is None:
             return None

@@ -33,7 +33,7 @@ class Case:
         self.end, self.ticks, self.hash = outcome.end, outcome.ticks, outcome.hash
         self.error, self.failed_by = outcome.error, outcome.failed_by
         self.values = dict(zip((p.path for p in study.parameters), outcome.values, strict=True))
-        self.metrics = dict(zip(study.metrics, outcome.metrics, strict=True))
+        self.metrics = dict(zip(study.columns, outcome.metrics, strict=True))
 
     def __getitem__(self, name: str) -> Any:
         return self.metrics[name] if name in self.metrics else self.values[name]
