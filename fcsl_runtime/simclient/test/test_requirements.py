@@ -6,6 +6,8 @@ from __future__ import annotations
 import json
 import math
 import random
+import subprocess
+import sys
 from dataclasses import replace
 from pathlib import Path
 from typing import Any
@@ -15,9 +17,10 @@ from mcap.reader import make_reader
 from mcap.writer import Writer
 from requirements_oracle import Generator, Values, verdict, written
 
-from simclient import AlgTwin, ProcessTwin, PyTwin
+from simclient import AlgTwin, ProcessTwin, PyTwin, TwinError
 from simclient.replay.check_bag import main
 from simclient.requirements import Status
+from simclient.trace_matrix import matrix
 from simclient.twin.twin import Twin
 
 TICK_HZ = 100
@@ -201,3 +204,113 @@ def test_ticks_and_fields_that_a_bag_lacks_are_undecided(tmp_path: Path, capsys:
     assert verdicts["H"]["evaluated"] == 50 and verdicts["H"]["undecided_ticks"] == 50  # it remembers
     assert verdicts["P"]["status"] == "met" and verdicts["P"]["undecided"] == ""
     assert verdicts["C"]["undecided"] == "the bag has no `slow.counters.overruns`"
+
+
+TESTS = """\
+import pytest
+
+
+def test_low(fcsl):
+    fcsl("craft.json").tick(5)
+
+
+@pytest.mark.requirement("LOW")
+@pytest.mark.violates("LOW", "SEEN")
+def test_high(fcsl):
+    twin = fcsl("craft.json")
+    twin.set("src.outputs.x", 3.0)
+    twin.tick(2)
+    twin.close()
+
+
+def test_not_told(fcsl):
+    twin = fcsl("craft.json")
+    twin.set("src.outputs.x", 3.0)
+    twin.tick()
+
+
+@pytest.mark.violates("LOW", "NONE")
+def test_nothing_happens(fcsl):
+    fcsl("craft.json").tick()
+
+
+@pytest.mark.violates
+def test_anything(fcsl):
+    fcsl("craft.json").set("src.outputs.x", 9.0)
+
+
+def test_the_world(fcsl):
+    twin = fcsl("craft.json")
+    twin.set("src.outputs.y", 9.0)
+    twin.tick()
+"""
+CRAFT: list[Values] = [
+    {"id": "LOW", "text": "x is low.", "then": "src.outputs.x < 2.0"},
+    {"id": "SEEN", "text": "High x is not there.", "when": "src.outputs.x > 2.0", "never": "src.outputs.x > 2.5"},
+    {"id": "WORLD", "text": "The world is low.", "then": "src.outputs.y < 2.0", "assume": True},
+    {"id": "END", "text": "It ends high.", "at_end": "src.outputs.x > 100.0"},
+    {"id": "NEVER", "text": "Not asked.", "when": "src.outputs.n > 5", "then": "src.outputs.b"},
+]
+
+
+@pytest.mark.parametrize("processes", [(), ("-n", "2")], ids=["alone", "xdist"])
+def test_pytest_judges_and_traces(tmp_path: Path, processes: tuple[str, ...]) -> None:
+    """A violation fails the test that does not tell it, and a mark without violation its own; an assumption none."""
+    machine(tmp_path, CRAFT)
+    (tmp_path / "test_craft.py").write_text(TESTS)
+    line = [
+        sys.executable,
+        "-m",
+        "pytest",
+        "-q",
+        "-p",
+        "no:cacheprovider",
+        *processes,
+        "--fcsl-requirements",
+        "tests.json",
+    ]
+    done = subprocess.run(line, cwd=tmp_path, capture_output=True, text=True, check=False)
+    assert "2 failed, 4 passed" in done.stdout, done.stdout
+    assert "requirement LOW violated 1 time, first at tick 0 (0 s), last at tick 0: x is low." in done.stdout
+    assert "LOW was not violated" in done.stdout
+    assert "no machine of this test has a requirement NONE" in done.stdout
+    assert not list(tmp_path.glob("*.part"))
+    traced = ["fcsl", "trace", "craft.json", "--tests", "tests.json"]
+    for form in ("html", "csv", "json"):
+        done = subprocess.run(
+            [*traced, "-o", f"trace.{form}"], cwd=tmp_path, capture_output=True, text=True, check=False
+        )
+        assert done.returncode == 1, done.stderr
+    rows = {row["id"]: row for row in json.loads((tmp_path / "trace.json").read_text())["requirements"]}
+    assert [row["id"] for row in rows.values() if row["gaps"]][-1] == "NEVER"
+    assert rows["NEVER"]["gaps"] == ["no test exercises it"]
+    assert rows["LOW"]["gaps"] == ["2 tests that exercise it fail"]
+    assert (
+        [name.rpartition("::")[2] for name in rows["LOW"]["violating"]]
+        == ["test_high"]
+        == [name.rpartition("::")[2] for name in rows["LOW"]["named"]]
+    )
+    assert [name.rpartition("::")[2] for name in rows["SEEN"]["tests"]] == ["test_high"]
+    assert (
+        "<b>NEVER</b>" in (tmp_path / "trace.html").read_text() and "\nWORLD," in (tmp_path / "trace.csv").read_text()
+    )
+
+
+@pytest.mark.parametrize(
+    ("content", "message"),
+    [
+        (None, "No such file"),
+        ("{", "is no file of `fcsl test --fcsl-requirements`"),
+        ('{"tests": [{"test": "a", "outcome": "passed", "named": [], "machines": []}]}', "is no file of"),
+        ('{"tests": 3}', "is no file of"),
+        ("[" * 100_000, "is no file of"),
+    ],
+)
+def test_files_of_other_programs_are_not_traced(content: str | None, message: str, tmp_path: Path) -> None:
+    path = machine(tmp_path, CRAFT)
+    if content is not None:
+        (tmp_path / "tests.json").write_text(content)
+    with pytest.raises(TwinError, match=message):
+        matrix(str(path), [str(tmp_path / "tests.json")], [])
+    with pytest.raises(TwinError, match="is no folder of a finished campaign"):
+        matrix(str(path), [], [str(tmp_path)])

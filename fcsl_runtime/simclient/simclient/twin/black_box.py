@@ -76,6 +76,10 @@ class BlackBox:
         self._source = self._again or self._source
         self._verdicts = self.verdicts()
 
+    @property
+    def machine(self) -> str:
+        return self._twin.machine.name
+
     def verdicts(self) -> list[Verdict]:
         """On the machine's requirements; [] of a flight program, whose end says them."""
         if self._verdicts is None:

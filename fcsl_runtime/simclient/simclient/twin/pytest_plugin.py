@@ -19,11 +19,12 @@ from .pytest_campaign import _fcsl_studies as _fcsl_studies
 from .pytest_campaign import add_mark as add_campaign_mark
 from .pytest_campaign import fcsl_case as fcsl_case
 from .pytest_campaign import generate
-from .pytest_twins import add_mark as add_violates_mark
+from .pytest_requirements import WorkerNodes, add_option, configure
+from .pytest_requirements import pytest_runtest_call as pytest_runtest_call
+from .pytest_requirements import pytest_sessionfinish as pytest_sessionfinish
 from .pytest_twins import add_options
 from .pytest_twins import fcsl as fcsl
 from .pytest_twins import fcsl_sim as fcsl_sim
-from .pytest_twins import pytest_runtest_call as pytest_runtest_call
 from .pytest_twins import pytest_runtest_makereport as pytest_runtest_makereport
 
 if TYPE_CHECKING:
@@ -33,6 +34,7 @@ if TYPE_CHECKING:
 def pytest_addoption(parser: pytest.Parser) -> None:
     group = parser.getgroup("fcsl", "FCSL machines")
     add_options(group)
+    add_option(group)
     group.addoption(
         "--fcsl-cover",
         nargs="?",
@@ -59,7 +61,8 @@ def pytest_generate_tests(metafunc: pytest.Metafunc) -> None:
 
 def pytest_configure(config: pytest.Config) -> None:
     add_campaign_mark(config)
-    add_violates_mark(config)
+    configure(config)
+    config.pluginmanager.register(WorkerNodes(), "fcsl_requirements")
     for option in ("--fcsl-cover-json", "--fcsl-cover-fail-under"):
         if config.getoption(option) and not config.getoption("--fcsl-cover"):
             raise pytest.UsageError(f"{option} does nothing without --fcsl-cover; add it")

@@ -119,33 +119,9 @@ def fcsl_sim(request: pytest.FixtureRequest) -> Iterator[Callable[..., Any]]:
         twin.close()
 
 
-def add_mark(config: pytest.Config) -> None:
-    text = "violates(*ids): the test violates these requirements; without ids it may violate any"
-    config.addinivalue_line("markers", text)
-
-
-@pytest.hookimpl(wrapper=True)
-def pytest_runtest_call(item: pytest.Item) -> Generator[None, object, object]:
-    """Fails a test whose twins violate a requirement that it does not name, or do not violate one that it names."""
-    result = yield
-    mark = item.get_closest_marker("violates")
-    if mark is None or mark.args:
-        problems = _unexpected([box.verdicts() for box in item.stash.get(_BOXES, [])], mark.args if mark else ())
-        if problems:
-            pytest.fail("\n".join(problems), pytrace=False)
-    return result
-
-
-def _unexpected(flights: list[list[Verdict]], expected: Sequence[str]) -> list[str]:
-    """`at_end` is of a run that ends, which a test is not; an assumption is about what the test does."""
-    verdicts = [verdict for flight in flights for verdict in flight if verdict.kind != "at_end"]
-    violated = [verdict for verdict in verdicts if verdict.status == "violated"]
-    found = [f"requirement {v}" for v in violated if v.id not in expected and not v.assumed]
-    for id_ in expected:
-        if id_ not in {verdict.id for verdict in violated}:
-            known = any(verdict.id == id_ for verdict in verdicts)
-            found.append(f"{id_} was not violated" if known else f"no machine of this test has a requirement {id_}")
-    return found
+def verdicts_of(item: pytest.Item) -> list[tuple[str, list[Verdict]]]:
+    """The machine of each twin of a test, and the verdicts on its requirements so far."""
+    return [(box.machine, box.verdicts()) for box in item.stash.get(_BOXES, [])]
 
 
 @pytest.hookimpl(wrapper=True)
