@@ -140,6 +140,7 @@ SECTIONS = (
     Section("campaign", "flying campaigns beside loops of independent processes", campaign_figures, campaign_rows),
     Section("wire", "sending messages beside MAVLink 2, and damaging them", wire_figures, wire_rows),
     Section("record", "recording", record_times, record_rows),
+    Section("requirements", "judging requirements", requirement_times, requirement_rows),
     Section("twin", "ticking twins from Python", lambda _: twin_times(), twin_rows),
     Section("backends", "the backends C and Nim", backend_times, backend_rows),
     Section("checkpoint", "saving and restoring", checkpoint_times, checkpoint_rows),

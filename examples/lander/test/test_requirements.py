@@ -6,6 +6,7 @@ from __future__ import annotations
 from collections.abc import Callable
 
 import pytest
+
 from simclient import SimTwin
 from simclient.requirements import Status
 

@@ -41,7 +41,8 @@ int loop_open(loop_t *loop)
     }
     loop->actuator_capacity = fcsl_message_capacity(machine, FCSL_ACTUATOR_MESSAGE);
     loop->actuator_bytes = calloc(1, loop->actuator_capacity);
-    if (loop->actuator_bytes == NULL || fcsl_history_open(&loop->history, parts, count, history_slots(machine->size)) != 0) {
+    if (loop->actuator_bytes == NULL ||
+        fcsl_history_open(&loop->history, parts, count, history_slots(machine->size)) != 0) {
         return -1;
     }
     loop_publish(loop);

@@ -118,8 +118,8 @@ static int allocate(fcsl_sim_t *sim, struct fcsl_sim_published *published)
     if (verdicts) {
         published->blocks[published->count - 1u] =
             (fcsl_vars_block_t){.prefix = "requirements", .fields = verdicts, .field_count = verdict_count};
-        published->parts[published->count - 1u] = (fcsl_part_t){
-            .data = fcsl_run_monitor_data(sim->run), .size = fcsl_run_monitor(sim->run)->machine->size};
+        published->parts[published->count - 1u] =
+            (fcsl_part_t){.data = fcsl_run_monitor_data(sim->run), .size = fcsl_run_monitor(sim->run)->machine->size};
     }
     return fcsl_history_open(&published->history, published->parts, published->count, HISTORY_SLOTS);
 }

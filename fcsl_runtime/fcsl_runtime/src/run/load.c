@@ -110,9 +110,10 @@ static int allocate(fcsl_run_t *run, fcsl_error_t *error)
             return -1;
         }
         if (instance->max_wcet_us != 0) {
-            run->watched[run->watched_count++] = (fcsl_overrun_watch_t){.overruns_offset = instance->overruns_offset,
-                                                                   .inject_offset = instance->inject_overrun_offset,
-                                                                   .instance = instance->name};
+            run->watched[run->watched_count++] =
+                (fcsl_overrun_watch_t){.overruns_offset = instance->overruns_offset,
+                                       .inject_offset = instance->inject_overrun_offset,
+                                       .instance = instance->name};
         }
     }
     fcsl_hardware_init(run);

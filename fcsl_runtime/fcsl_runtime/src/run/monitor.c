@@ -6,6 +6,7 @@
 #include "monitor.h"
 
 #include <dlfcn.h>
+#include <inttypes.h>
 #include <stdio.h>
 #include <stdlib.h>
 
@@ -279,8 +280,8 @@ void fcsl_run_verdict_text(const fcsl_run_t *run, const fcsl_verdict_t *verdict,
     const char *of = required->assumed ? "assumption " : "";
     switch (verdict->status) {
     case FCSL_MET:
-        (void)snprintf(text, FCSL_VERDICT_TEXT_MAX, "%s%s met, exercised in %llu %s", of, required->id,
-                       (unsigned long long)verdict->exercised, times(verdict->exercised, "tick", "ticks"));
+        (void)snprintf(text, FCSL_VERDICT_TEXT_MAX, "%s%s met, exercised in %" PRIu64 " %s", of, required->id,
+                       verdict->exercised, times(verdict->exercised, "tick", "ticks"));
         return;
     case FCSL_NOT_EXERCISED:
         (void)snprintf(text, FCSL_VERDICT_TEXT_MAX, "%s%s not exercised: %s", of, required->id, required->text);
@@ -292,8 +293,8 @@ void fcsl_run_verdict_text(const fcsl_run_t *run, const fcsl_verdict_t *verdict,
         (void)snprintf(text, FCSL_VERDICT_TEXT_MAX, "%s%s violated at the end: %s", of, required->id, required->text);
         return;
     }
-    (void)snprintf(text, FCSL_VERDICT_TEXT_MAX, "%s%s violated %llu %s, first at tick %llu (%.9g s), last at tick %llu: %s",
-                   of, required->id, (unsigned long long)verdict->violations,
-                   times(verdict->violations, "time", "times"), (unsigned long long)verdict->first_tick,
-                   (double)verdict->first_tick / hz, (unsigned long long)verdict->last_tick, required->text);
+    (void)snprintf(text, FCSL_VERDICT_TEXT_MAX,
+                   "%s%s violated %" PRIu64 " %s, first at tick %" PRIu64 " (%.9g s), last at tick %" PRIu64 ": %s", of,
+                   required->id, verdict->violations, times(verdict->violations, "time", "times"), verdict->first_tick,
+                   (double)verdict->first_tick / hz, verdict->last_tick, required->text);
 }

@@ -112,7 +112,8 @@ static uint32_t verdict_block(const protocol_t *protocol)
 {
     const catalog_t *catalog = &protocol->catalog;
     uint32_t unused = 0;
-    const fcsl_field_t *fields = protocol->host->run != NULL ? fcsl_run_verdict_fields(protocol->host->run, &unused) : NULL;
+    const fcsl_field_t *fields =
+        protocol->host->run != NULL ? fcsl_run_verdict_fields(protocol->host->run, &unused) : NULL;
     uint32_t block = 0;
     while (block < catalog->block_count && (fields == NULL || catalog->blocks[block].fields != fields)) {
         block++;
