@@ -17,6 +17,7 @@ import pytest
 from native import flying
 from prometheus_client.parser import text_string_to_metric_families
 from supervising import Supervisor, supervising, wait_until
+from test_requirements import machine
 from test_twin_lost_requests import BOTH, write
 from vars_machine import build
 
@@ -242,6 +243,22 @@ def test_metrics_of_lost_requests(supervisor: Supervisor, root: Path, tmp_path: 
     (lost,) = [sample for sample in samples if sample.labels["run"] == run["id"]]
     assert (lost.name, lost.value) == ("fcsl_run_lost_requests_total", 2)
     assert lost.labels["transition"] == "HOVER -> SAFE: ABORT"
+    supervisor.ask("DELETE", f"/runs/{run['id']}")
+
+
+def test_metrics_of_requirements(supervisor: Supervisor, root: Path, tmp_path: Path) -> None:
+    folder = root / "watched"
+    folder.mkdir()
+    required = [{"id": "LOW-1", "text": "x is low.", "then": "src.outputs.x < 2.0"}]
+    shutil.copy(build_machine(machine(tmp_path, required)).library, folder / "craft.so")
+    run = supervisor.start("watched/craft.so", paused=True)
+    with VarClient(run["socket"]) as client:
+        for x in (3.0, 0.0, 3.0):
+            client.set({"src.outputs.x": x})
+            client.tick(2)
+    samples = families(supervisor.get("/metrics").body)["fcsl_run_requirement_violations"].samples
+    (found,) = [sample for sample in samples if sample.labels["run"] == run["id"]]
+    assert (found.labels["requirement"], found.value) == ("LOW-1", 2)
     supervisor.ask("DELETE", f"/runs/{run['id']}")
 
 

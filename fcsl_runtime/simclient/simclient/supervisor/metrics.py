@@ -124,6 +124,7 @@ class _Families(Collector):
         for member, name, what in _COUNTERS:
             yield _counter(name, what, ((s, s.stats[member]) for s in serving if member in s.stats))
         yield _lost_requests(serving)
+        yield _violations(serving)
         for member, name, what in _HISTOGRAMS:
             yield _histogram(name, what, ((s, s.stats[member]) for s in serving if member in s.stats))
         received = [(s, s.run.telemetry.counts) for s in live]
@@ -156,6 +157,15 @@ def _lost_requests(serving: Iterable[Seen]) -> Metric:
     for seen in serving:
         for transition, count in seen.stats.get("lost_requests", {}).items():
             family.add_metric((*_labels(seen), transition), count)
+    return family
+
+
+def _violations(serving: Iterable[Seen]) -> Metric:
+    what = "How often a violation of a requirement began."
+    family = CounterMetricFamily("fcsl_run_requirement_violations", what, labels=(*_RUN_LABELS, "requirement"))
+    for seen in serving:
+        for id_, verdict in seen.stats.get("requirements", {}).items():
+            family.add_metric((*_labels(seen), id_), verdict["violations"])
     return family
 
 
