@@ -22,6 +22,7 @@ if TYPE_CHECKING:
     from .telemetry.receiver import Telemetry
     from .twin.alg_twin import AlgTwin, PyTwin
     from .twin.process_twin import ProcessTwin
+    from .twin.search import find_violation
     from .twin.snapshot import diff
     from .twin.twin import Twin
     from .vars.client import VarClient
@@ -47,6 +48,7 @@ _HOME = {
     "VarClient": "vars.client",
     "VarError": "vars.wire",
     "diff": "twin.snapshot",
+    "find_violation": "twin.search",
 }
 
 __all__ = [
@@ -68,6 +70,7 @@ __all__ = [
     "VarClient",
     "VarError",
     "diff",
+    "find_violation",
 ]
 
 

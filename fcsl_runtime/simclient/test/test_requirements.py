@@ -21,6 +21,7 @@ from simclient import AlgTwin, ProcessTwin, PyTwin, TwinError
 from simclient.replay.check_bag import main
 from simclient.requirements import Status
 from simclient.trace_matrix import matrix
+from simclient.twin.search import find_violation
 from simclient.twin.twin import Twin
 
 TICK_HZ = 100
@@ -294,6 +295,37 @@ def test_pytest_judges_and_traces(tmp_path: Path, processes: tuple[str, ...]) ->
     assert (
         "<b>NEVER</b>" in (tmp_path / "trace.html").read_text() and "\nWORLD," in (tmp_path / "trace.csv").read_text()
     )
+
+
+SUM: list[Values] = [
+    {"id": "SUM", "text": 'The sum is "low".', "then": "held(src.outputs.x + src.outputs.y > 5.0, 0.05) == False"},
+    {"id": "WORLD", "text": "y is low.", "then": "src.outputs.y < 2.0", "assume": True},
+]
+
+
+def test_a_search_finds_the_simplest_violation_and_writes_it_as_a_test(tmp_path: Path) -> None:
+    path = machine(tmp_path, SUM)
+    found = find_violation(path, {"src.outputs.x": (0.0, 10.0), "src.outputs.y": (0.0, 1.0)}, ticks=20)
+    assert found is not None and found.verdict.id == "SUM" and found.verdict.first_tick == 5
+    assert [len(own) for own in found.inputs.values()] == [1, 1]
+    again = find_violation(path, {"src.outputs.x": (0.0, 10.0), "src.outputs.y": (0.0, 1.0)}, ticks=20)
+    assert again is not None and again.inputs == found.inputs
+    (tmp_path / "test_found.py").write_text(found.test())
+    line = [sys.executable, "-m", "pytest", "-q", "-p", "no:cacheprovider", "test_found.py"]
+    done = subprocess.run(line, cwd=tmp_path, capture_output=True, text=True, check=False)
+    assert "1 passed" in done.stdout, done.stdout
+
+
+def test_a_search_keeps_to_assumptions_and_ranges(tmp_path: Path) -> None:
+    path = machine(tmp_path, SUM)
+    ranges: dict[str, Any] = {"src.outputs.x": (0.0, 2.0), "src.outputs.y": (0.0, 10.0)}
+    assert find_violation(path, ranges, ticks=20, examples=200) is None
+    assert find_violation(path, {"src.outputs.x": [0.0, 4.9]}, ticks=20, examples=50) is None
+    assert find_violation(path, {"src.outputs.x": [0.0, 5.5]}, ticks=20) is not None
+    with pytest.raises(TwinError, match="the machine has no requirement NONE"):
+        find_violation(path, ranges, ticks=20, requirement="NONE")
+    with pytest.raises(TwinError, match="is no range"):
+        find_violation(path, {"src.outputs.x": (1.0, 0.0)}, ticks=20)
 
 
 @pytest.mark.parametrize(
