@@ -14,6 +14,7 @@ from typing import Any
 from simclient.checkpoint import read_checkpoint, write_checkpoint
 from simclient.errors import TwinError
 from simclient.requirements import Verdict
+from simclient.requirements import as_json as verdict_as_json
 
 from .config import SimConfig
 from .errors import SimError
@@ -71,7 +72,15 @@ class Summary:
     commands: dict[str, int] | None
 
     def as_json(self) -> dict[str, Any]:
-        return asdict(self)
+        shown = asdict(self)
+        shown["requirements"] = _verdicts_as_json(self.requirements)
+        for name, companion in self.companions.items():
+            shown["companions"][name]["requirements"] = _verdicts_as_json(companion["requirements"])
+        return shown
+
+
+def _verdicts_as_json(verdicts: dict[str, Verdict] | None) -> dict[str, Any] | None:
+    return None if verdicts is None else {id_: verdict_as_json(verdict) for id_, verdict in verdicts.items()}
 
 
 @dataclass(frozen=True)

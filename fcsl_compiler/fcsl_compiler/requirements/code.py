@@ -42,8 +42,25 @@ def any_of(parts: list[Truth]) -> Truth:
     return all_of([part.negated for part in parts]).negated
 
 
+#: Most parts of one chain: the language bounds the depth of a condition.
+_CHAIN_MAX = 32
+
+
 def _joined(word: str, parts: list[str]) -> str:
+    while len(parts) > _CHAIN_MAX:
+        groups = [parts[i : i + _CHAIN_MAX] for i in range(0, len(parts), _CHAIN_MAX)]
+        parts = [_joined(word, group) for group in groups]
     return parts[0] if len(parts) == 1 else "(" + f" {word} ".join(parts) + ")"
+
+
+def size(node: Node) -> int:
+    """About how many values its code reads: a comparison of two conditions needs each four times."""
+    parts = sum(map(size, node.parts))
+    if node.operator == "compare" and all(part.quantity.kind is Kind.BOOL for part in node.parts):
+        return 4 * parts
+    if node.operator in ("in", "not in"):
+        return parts + (len(node.parts) - 2) * size(node.parts[0])
+    return max(parts, 1)
 
 
 class Code:

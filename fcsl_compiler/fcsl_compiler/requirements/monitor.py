@@ -96,7 +96,7 @@ class _Algorithm:
 
     @property
     def class_name(self) -> str:
-        return "".join(part.capitalize() for part in self.requirement.instance.split("_")) + "Monitor"
+        return f"Monitor_{self.requirement.instance}"
 
     def observed(self) -> list[tuple[str, str]]:
         return [(path, f"{self.requirement.instance}.inputs.{name}") for path, (name, _) in self.inputs.items()]
@@ -138,12 +138,15 @@ class _Algorithm:
         guards = [f"{self._input(f'{name}.outputs.health', f'health_{n}')} == {_STALE}" for n, name in named]
         due = self._due()
         lines = [f"tick = {ticks} - 1"]
-        lines.append("if self.last_tick != tick - 1:")
-        lines.append("    self.started = False")
+        lines += ["if self.last_tick != tick - 1:", "    self.started = False"]
+        if r.clock is not None:
+            faults = self._input(f"{r.clock}.counters.faults", "faults")
+            lines += ["    if tick > 0:", f"        self.faults_before = {faults}"]
+            lines += [f"completed = {faults} == self.faults_before", f"self.faults_before = {faults}"]
         lines.append("self.last_tick = tick")
         if guards:
             lines += [f"if {' or '.join(guards)}:", "    self.started = False"]
-            lines += ["    self.asked = False"] if r.kind == "at_end" else []
+            lines += ["    self.asked = False"] if r.kind == "at_end" and r.clock is None else []
             lines += ["else:"]
             lines += [f"    {line}" for line in self._when_due(due, body)]
         else:
@@ -168,13 +171,7 @@ class _Algorithm:
         evaluate = ["restarted = not self.started", "self.started = True", *body]
         if not due:
             return evaluate
-        faults = self._input(f"{self.requirement.clock}.counters.faults", "faults")
-        return [
-            f"completed = {faults} == self.faults_before",
-            f"self.faults_before = {faults}",
-            f"if completed and ({' or '.join(due)}):",
-            *[f"    {line}" for line in evaluate],
-        ]
+        return [f"if completed and ({' or '.join(due)}):", *[f"    {line}" for line in evaluate]]
 
     def _due(self) -> list[str]:
         """Conditions of which one holds in a tick in which the clock's instance ran."""

@@ -22,8 +22,18 @@ from ..parse.constants import Constants
 from ..parse.json_reader import ConfigReader
 from ..parse.json_source import JsonNode, parse_json
 from ..parse.machine_files import ParsedMachine
+from ..parse.parts import RESERVED_INSTANCES
 from ..parse.source_path import SourcePathError, missing_file_help, resolve_source
-from .requirement import KINDS, TICKS_MAX, WINDOW_MAX, Requirement, instance_name
+from .code import size
+from .requirement import (
+    KINDS,
+    REQUIREMENTS_MAX,
+    TICKS_MAX,
+    VALUES_MAX,
+    WINDOW_MAX,
+    Requirement,
+    instance_name,
+)
 
 _ID = re.compile(r"[A-Za-z][A-Za-z0-9]*([-_.][A-Za-z0-9]+)*")
 _ID_MAX = 40
@@ -51,6 +61,8 @@ class Signals:
 
     def find(self, path: str) -> Signal:
         """Raises ExpressionError."""
+        if path in _LATER:
+            raise ExpressionError(f"`{path}` is of the coming tick, which begins when requirements have been evaluated")
         row, rest = self.rows.get(path), ""
         at = len(path)
         while row is None and (at := path.rfind("[", 0, at)) > 0:
@@ -103,6 +115,8 @@ class Signals:
     def _unknown(self, path: str) -> str:
         instances = [i.name for i in self.machine.instances]
         name, rest = split_instance(path, instances)
+        if name in instances and not rest:
+            return f"`{path}` is an instance: name one of its fields, such as `{path}.outputs.health`"
         if name in instances and rest:
             hint = nearest(path, [p for p in self.rows if p.startswith(f"{name}.")])
             return f"there is no field `{path}`" + (f"; {hint}" if hint else "")
@@ -120,11 +134,17 @@ def read_requirements(
     reader = ConfigReader(sink, parsed.constants)
     node = parsed.keys.get("requirements")
     if file is not None:
-        node = _read(file, str(file), parsed.source.whole(), reader)
+        at = SourceFile(str(file), "", str(file)).whole()
+        node = _read(file, str(file), at, reader, "it is relative to the working directory")
     elif node is not None and node.kind == "string":
         node = _named(node, parsed, reader)
+    items = reader.list(node, "`requirements`")
+    if len(items) > REQUIREMENTS_MAX:
+        fix = f"{REQUIREMENTS_MAX} at most"
+        sink.error("E257", f"{len(items)} requirements", items[REQUIREMENTS_MAX].span, help=fix)
+        return []
     requirements = _Reader(machine, parsed.constants, reader)
-    return [found for item in reader.list(node, "`requirements`") if (found := requirements.read(item)) is not None]
+    return [found for item in items if (found := requirements.read(item)) is not None]
 
 
 def _named(node: JsonNode, parsed: ParsedMachine, reader: ConfigReader) -> JsonNode | None:
@@ -138,11 +158,11 @@ def _named(node: JsonNode, parsed: ParsedMachine, reader: ConfigReader) -> JsonN
     return _read(path, name, node.span, reader)
 
 
-def _read(path: Path, name: str, at: Span, reader: ConfigReader) -> JsonNode | None:
+def _read(path: Path, name: str, at: Span, reader: ConfigReader, fix: str = "") -> JsonNode | None:
     try:
         source = SourceFile.read(path, name)
     except SourceError as error:
-        _report_unreadable(name, at, error, reader)
+        _report_unreadable(name, at, error, reader, fix)
         return None
     root = parse_json(source, reader.sink)
     keys = (
@@ -151,8 +171,10 @@ def _read(path: Path, name: str, at: Span, reader: ConfigReader) -> JsonNode | N
     return keys.get("requirements") if keys else None
 
 
-def _report_unreadable(name: str, at: Span, error: SourceError | SourcePathError, reader: ConfigReader) -> None:
-    fix = missing_file_help(error, at)
+def _report_unreadable(
+    name: str, at: Span, error: SourceError | SourcePathError, reader: ConfigReader, fix: str = ""
+) -> None:
+    fix = fix or missing_file_help(error, at)
     reader.sink.error("E100", f"cannot read `{name[:200]}`: {error}", at, help=fix)
 
 
@@ -203,6 +225,10 @@ class _Reader:
             fix = f"letters and digits with `-`, `_` or `.` between them, {_ID_MAX} at most; a letter first"
             self.sink.error("E203", f"`{id_}` is no id", node.span, help=fix)
             return id_
+        if instance_name(id_) in RESERVED_INSTANCES:
+            fix = f"add a number: `{id_}-1`"
+            self.sink.error("E203", f"`{id_}` is a word of paths", node.span, help=fix)
+            return id_
         other, at = self._ids.setdefault(instance_name(id_), (id_, node.span))
         if at is not node.span:
             same = "the same id" if other == id_ else f"`{other}` and `{id_}` have the same letters and digits"
@@ -220,7 +246,13 @@ class _Reader:
         if None in parts or len(parts) == 1:
             return parts[0] if len(parts) == 1 else None
         text = " and ".join(f"({part.text})" for part in parts if part is not None)
-        return Node("and", text, Quantity(Kind.BOOL), tuple(part for part in parts if part is not None))
+        found = Node("and", text, Quantity(Kind.BOOL), tuple(part for part in parts if part is not None))
+        try:
+            self._check_size(found)
+        except ExpressionError as error:
+            self.sink.error("E257", f"{what}: {error}", node.span, help="write shorter lists")
+            return None
+        return found
 
     def _one_condition(self, node: JsonNode, what: str) -> Node | None:
         text = self.reader.string(node, what, "nav.outputs.height < 10.0")
@@ -232,7 +264,10 @@ class _Reader:
             found = self._bound(found)
             if not any(part.operator == "field" for part in found.walk()):
                 raise ExpressionError(f"`{text}` is the same at all ticks: it needs a path")
+            self._check_size(found)
             for part in found.walk():
+                if part.operator in ("//", "%") and part.parts[1].operator == "literal" and not part.parts[1].value:
+                    raise ExpressionError(f"`{part.text}` divides by zero")
                 if part.operator in ("held", "within", "max_over", "min_over"):
                     self._window(part)
         except ExpressionError as error:
@@ -240,6 +275,10 @@ class _Reader:
             self.sink.error("E257", f"{what}: {error}", node.span, help=fix)
             return None
         return found
+
+    def _check_size(self, node: Node) -> None:
+        if size(node) > VALUES_MAX:
+            raise ExpressionError(f"`{node.text[:60]}…` is too long: write parts of it as requirements of their own")
 
     def _bound(self, node: Node) -> Node:
         """With its constants as numbers."""

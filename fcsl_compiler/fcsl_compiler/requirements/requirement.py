@@ -13,6 +13,9 @@ KINDS = ("then", "never", "at_end")
 
 #: Longest time of a window, in ticks. `max_over` and `min_over` keep a value for each tick of it.
 WINDOW_MAX = 4096
+#: Requirements of a machine, and values that the code of one reads.
+REQUIREMENTS_MAX = 256
+VALUES_MAX = 1024
 #: Of `held`, `within` and `within_s`, which keep ticks alone.
 TICKS_MAX = 2**40
 

@@ -30,14 +30,15 @@ static uint32_t history_slots(uint32_t size)
 int loop_open(loop_t *loop)
 {
     const fcsl_machine_t *machine = fcsl_run_machine(loop->run);
-    const fcsl_monitor_t *monitor = fcsl_run_monitor(loop->run);
+    uint32_t verdict_bytes = 0;
+    const void *verdicts = fcsl_run_gather_verdicts(loop->run, &verdict_bytes);
     fcsl_part_t parts[LOOP_PARTS_MAX] = {{.data = fcsl_run_data(loop->run), .size = machine->size}};
     uint32_t count = 1;
     if (loop->hal.field_count > 0) {
         parts[count++] = (fcsl_part_t){.data = loop->hal.counters, .size = loop->hal.counter_bytes};
     }
-    if (monitor != NULL) {
-        parts[count++] = (fcsl_part_t){.data = fcsl_run_monitor_data(loop->run), .size = monitor->machine->size};
+    if (verdicts != NULL) {
+        parts[count++] = (fcsl_part_t){.data = verdicts, .size = verdict_bytes};
     }
     loop->actuator_capacity = fcsl_message_capacity(machine, FCSL_ACTUATOR_MESSAGE);
     loop->actuator_bytes = calloc(1, loop->actuator_capacity);
@@ -58,6 +59,8 @@ void loop_free(loop_t *loop)
 
 static void publish(loop_t *loop, uint64_t time_ns)
 {
+    uint32_t verdict_bytes = 0;
+    (void)fcsl_run_gather_verdicts(loop->run, &verdict_bytes);
     loop->hal.count(loop->hal.ctx);
     const fcsl_moment_t moment = {.tick = fcsl_run_tick(loop->run),
                                   .time_ns = time_ns,
@@ -72,7 +75,7 @@ void loop_publish(loop_t *loop)
     publish(loop, fcsl_monotonic_ns());
 }
 
-const uint8_t *loop_monitor_data(const loop_t *loop, const uint8_t *published)
+const uint8_t *loop_verdicts(const loop_t *loop, const uint8_t *published)
 {
     return published + fcsl_history_part(&loop->history, loop->hal.field_count > 0 ? 2 : 1);
 }

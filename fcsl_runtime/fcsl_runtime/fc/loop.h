@@ -19,7 +19,7 @@
 
 typedef enum { GUARD_NONE, GUARD_THERE, GUARD_ENDED } guard_state_t;
 
-/* What the loop publishes: the machine, what the HAL knows of itself, the machine's monitor. */
+/* What the loop publishes: the machine, what the HAL knows of itself, the verdicts on requirements. */
 enum { LOOP_PARTS_MAX = 3 };
 
 typedef struct {
@@ -72,8 +72,8 @@ int loop_tick(loop_t *loop);
 void loop_publish(loop_t *loop);
 /* What the HAL's field number `field` says in a publication of the history; 0 where it is no counter. */
 uint64_t loop_hal_count(const loop_t *loop, const uint8_t *published, uint32_t field);
-/* The struct of the machine's monitor in what was published; meaningless without requirements. */
-const uint8_t *loop_monitor_data(const loop_t *loop, const uint8_t *published);
+/* The verdicts in what was published (fcsl_run_gather_verdicts); meaningless without requirements. */
+const uint8_t *loop_verdicts(const loop_t *loop, const uint8_t *published);
 /* A checkpoint was restored, and the actuators are real ones: it arms none. */
 void loop_require_arming(loop_t *loop);
 /* What the variable server asks of this loop (serve.c). */

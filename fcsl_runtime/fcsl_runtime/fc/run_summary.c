@@ -120,7 +120,7 @@ static void report_counters(const loop_t *loop, const uint8_t *data)
              fcsl_tick_stats_get(&stats->hardware_failures), fcsl_tick_stats_get(&stats->messages_refused),
              fcsl_tick_stats_get(&stats->records_dropped), clients);
     report_lost_requests(fcsl_run_machine(loop->run), data);
-    report_requirements(loop->run, loop_monitor_data(loop, data));
+    report_requirements(loop->run, loop_verdicts(loop, data));
     if (loop->telemetry != NULL) {
         report_telemetry(loop->telemetry);
     }

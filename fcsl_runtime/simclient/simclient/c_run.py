@@ -68,12 +68,13 @@ class CVerdict(Structure):
 
 
 #: FCSL_VERDICT_TEXT_MAX
-VERDICT_TEXT_BYTES = 512
+VERDICT_TEXT_BYTES = 1280
 
 #: What reads the verdicts of a run.
 VERDICTS: dict[str, tuple[type | None, list[type]]] = {
     "fcsl_run_monitor": (POINTER(CMonitor), [ptr]),
     "fcsl_run_monitor_data": (ptr, [ptr]),
+    "fcsl_run_gather_verdicts": (ptr, [ptr, POINTER(c_uint32)]),
     "fcsl_run_verdict": (None, [ptr, ptr, c_uint32, POINTER(CVerdict)]),
     "fcsl_run_verdict_text": (None, [ptr, POINTER(CVerdict), ptr]),
 }

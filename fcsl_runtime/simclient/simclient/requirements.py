@@ -6,8 +6,9 @@ from __future__ import annotations
 import ctypes
 import math
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, field
+from dataclasses import asdict, dataclass, field
 from enum import StrEnum
+from functools import cached_property
 from typing import Any
 
 from .c_machine import CMonitor
@@ -61,11 +62,8 @@ class Verdict:
 
 def read_verdicts(lib: Any, handle: int) -> list[Verdict]:
     """The verdicts of a run: `lib` is the runtime, `handle` an fcsl_run_t. [] without requirements."""
-    table = lib.fcsl_run_monitor(handle)
-    if not table:
-        return []
-    monitor, base = table.contents, lib.fcsl_run_monitor_data(handle)
-    return [_verdict(lib, handle, monitor, base, index) for index in range(monitor.requirement_count)]
+    reader = _Reader(lib, handle)
+    return [reader.verdict(index) for index in range(reader.count)]
 
 
 def of_stats(stats: Mapping[str, Mapping[str, Any]]) -> list[Verdict]:
@@ -79,9 +77,8 @@ def of_stats(stats: Mapping[str, Mapping[str, Any]]) -> list[Verdict]:
 
 def read_violations(lib: Any, handle: int) -> list[float]:
     """How often each requirement was violated; NaN: not exercised. A hundred times faster than all of the verdicts."""
-    table, raw, found = lib.fcsl_run_monitor(handle), CVerdict(), []
-    for index in range(table.contents.requirement_count) if table else ():
-        lib.fcsl_run_verdict(handle, lib.fcsl_run_monitor_data(handle), index, ctypes.byref(raw))
+    reader, found = _Reader(lib, handle), []
+    for raw in map(reader.raw, range(reader.count)):
         violated = float(max(raw.violations, raw.status == _VIOLATED))
         found.append(math.nan if raw.status == _NOT_EXERCISED else violated)
     return found
@@ -89,6 +86,14 @@ def read_violations(lib: Any, handle: int) -> list[float]:
 
 #: The state of a requirement that only counts.
 _COUNTING = ("last_tick", "started", "violated")
+
+
+def as_json(verdict: Verdict) -> dict[str, Any]:
+    """Its members. JSON has no NaN and no infinity: values of a violation that are such are texts."""
+    shown = asdict(verdict)
+    for values in (shown["first"], shown["last"]):
+        values |= {p: str(v) for p, v in values.items() if isinstance(v, float) and not math.isfinite(v)}
+    return shown
 
 
 def remembering(monitor: CMonitor) -> frozenset[str]:
@@ -103,45 +108,72 @@ def remembering(monitor: CMonitor) -> frozenset[str]:
     return frozenset(found)
 
 
-def _verdict(lib: Any, handle: int, monitor: CMonitor, base: int, index: int) -> Verdict:
-    raw, text = CVerdict(), ctypes.create_string_buffer(VERDICT_TEXT_BYTES)
-    lib.fcsl_run_verdict(handle, base, index, ctypes.byref(raw))
-    lib.fcsl_run_verdict_text(handle, ctypes.byref(raw), text)
-    required = raw.requirement.contents
-    begun = raw.violations > 0
-    first, last = _violating(lib, handle, monitor, base, required.instance) if begun else ({}, {})
-    return Verdict(
-        id=required.id.decode(),
-        text=required.text.decode(),
-        kind=REQUIRED[required.kind],
-        source=required.source.decode(),
-        assumed=bool(required.assumed),
-        status=list(Status)[raw.status],
-        holds=bool(raw.holds),
-        **{name: getattr(raw, name) for name in ("evaluated", "exercised", "undefined", "faults", "violations")},
-        violated_ticks=raw.violated_ticks,
-        first_tick=raw.first_tick if begun else None,
-        last_tick=raw.last_tick if begun else None,
-        first=first,
-        last=last,
-        line=text.value.decode("utf-8", "replace"),
-    )
+class _Reader:
+    """Reads the verdicts of a run. Descriptors take long to read, and only violated requirements need them."""
 
+    def __init__(self, lib: Any, handle: int):
+        self._lib, self._handle = lib, handle
+        table = lib.fcsl_run_monitor(handle)
+        self.count = table.contents.requirement_count if table else 0
+        self._rows = lib.fcsl_run_gather_verdicts(handle, ctypes.byref(ctypes.c_uint32()))
+        self._monitor = table.contents if table else None
 
-def _violating(
-    lib: Any, handle: int, monitor: CMonitor, base: int, instance: int
-) -> tuple[dict[str, Any], dict[str, Any]]:
-    """What a requirement read in the first and in the last tick that violated it, by path."""
-    machine, watched = read_machine(monitor.machine), read_machine(lib.fcsl_run_machine(handle))
-    name, found = machine.instances[instance].name, (dict[str, Any](), dict[str, Any]())
-    for observed in monitor.observed[: monitor.observed_count]:
-        path, (owner, _, target) = observed.path.decode(), observed.input.decode().rpartition(".inputs.")
-        for values, which in zip(found, ("first", "last"), strict=True):
-            result = f"{name}.outputs.{which}_{target}"
-            if owner == name and result in machine.fields:
-                value, names = _read(machine, result, base), _names(path, watched)
-                values[path] = names[value] if names else value
-    return found
+    def raw(self, index: int) -> CVerdict:
+        found = CVerdict()
+        self._lib.fcsl_run_verdict(self._handle, self._rows, index, ctypes.byref(found))
+        return found
+
+    def verdict(self, index: int) -> Verdict:
+        raw, text = self.raw(index), ctypes.create_string_buffer(VERDICT_TEXT_BYTES)
+        self._lib.fcsl_run_verdict_text(self._handle, ctypes.byref(raw), text)
+        required = raw.requirement.contents
+        begun = raw.violations > 0
+        first, last = self._violating(required.instance) if begun else ({}, {})
+        return Verdict(
+            id=required.id.decode(),
+            text=required.text.decode(),
+            kind=REQUIRED[required.kind],
+            source=required.source.decode(),
+            assumed=bool(required.assumed),
+            status=list(Status)[raw.status],
+            holds=bool(raw.holds),
+            **{name: getattr(raw, name) for name in ("evaluated", "exercised", "undefined", "faults", "violations")},
+            violated_ticks=raw.violated_ticks,
+            first_tick=raw.first_tick if begun else None,
+            last_tick=raw.last_tick if begun else None,
+            first=first,
+            last=last,
+            line=text.value.decode("utf-8", "replace"),
+        )
+
+    @cached_property
+    def _machines(self) -> tuple[Machine, Machine]:
+        """The monitor, and the machine that it watches."""
+        assert self._monitor is not None
+        return read_machine(self._monitor.machine), read_machine(self._lib.fcsl_run_machine(self._handle))
+
+    @cached_property
+    def _observed(self) -> dict[str, list[tuple[str, str]]]:
+        """By instance of the monitor: the path of a value in the machine, and the name of its input."""
+        assert self._monitor is not None
+        found: dict[str, list[tuple[str, str]]] = {}
+        for one in self._monitor.observed[: self._monitor.observed_count]:
+            owner, _, target = one.input.decode().rpartition(".inputs.")
+            found.setdefault(owner, []).append((one.path.decode(), target))
+        return found
+
+    def _violating(self, instance: int) -> tuple[dict[str, Any], dict[str, Any]]:
+        """What a requirement read in the first and in the last tick that violated it, by path."""
+        monitor, watched = self._machines
+        base = self._lib.fcsl_run_monitor_data(self._handle)
+        name, found = monitor.instances[instance].name, (dict[str, Any](), dict[str, Any]())
+        for path, target in self._observed.get(name, []):
+            for values, which in zip(found, ("first", "last"), strict=True):
+                result = f"{name}.outputs.{which}_{target}"
+                if result in monitor.fields:
+                    value, names = _read(monitor, result, base), _names(path, watched)
+                    values[path] = names[value] if names else value
+        return found
 
 
 def _read(machine: Machine, path: str, base: int) -> Any:

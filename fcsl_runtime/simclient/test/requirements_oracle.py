@@ -15,7 +15,7 @@ Values = dict[str, Any]
 #: Kleene's third value, for what compares a NaN.
 UNDEFINED = None
 
-NUMBERS = ("src.outputs.x", "src.outputs.y", "slow.outputs.z", "src.outputs.v[1]")
+NUMBERS = ("src.outputs.x", "src.outputs.y", "slow.outputs.z", "src.outputs.v[1]", "other.outputs.w")
 _INTEGERS = ("src.outputs.n", "src.outputs.u")
 CONDITIONS = ("src.outputs.b",)
 _CHANGE = ("-", ("field", "src.outputs.v"), ("previous", ("field", "src.outputs.v")))
@@ -77,7 +77,7 @@ class Generator:
         if kind == "mixed":
             return ("compare", (self.random.choice(_COMPARISONS),), self.integer(0), self.number(0))
         if kind == "state":
-            states = self.random.choice((("A",), ("B",), ("A", "B")))
+            states = self.random.choice((("A",), ("B",), ("C",), ("A", "B")))
             return ("in", ("field", "machine.state"), *(("literal", state) for state in states))
         if kind == "health":
             health = self.random.choice(("nominal", "failed", "stale"))
@@ -330,7 +330,8 @@ def verdict(requirement: Values, ticks: Sequence[Values], tick_hz: int) -> Expec
     for tick, values in enumerate(ticks):
         stale = any(values[f"{name}.outputs.health"] == "stale" for name in instances)
         if stale and requirement.get("stale") != "hold":
-            history, violated, found.asked = History(tick_hz), False, False
+            history, violated = History(tick_hz), False
+            found.asked = found.asked and "clock" in requirement
             continue
         if "clock" in requirement and requirement["clock"] not in values["ran"]:
             continue

@@ -118,8 +118,9 @@ static int allocate(fcsl_sim_t *sim, struct fcsl_sim_published *published)
     if (verdicts) {
         published->blocks[published->count - 1u] =
             (fcsl_vars_block_t){.prefix = "requirements", .fields = verdicts, .field_count = verdict_count};
-        published->parts[published->count - 1u] =
-            (fcsl_part_t){.data = fcsl_run_monitor_data(sim->run), .size = fcsl_run_monitor(sim->run)->machine->size};
+        uint32_t size = 0;
+        const void *rows = fcsl_run_gather_verdicts(sim->run, &size);
+        published->parts[published->count - 1u] = (fcsl_part_t){.data = rows, .size = size};
     }
     return fcsl_history_open(&published->history, published->parts, published->count, HISTORY_SLOTS);
 }
@@ -203,6 +204,10 @@ void fcsl_sim_publish(fcsl_sim_t *sim)
                                       .time_ns = (uint64_t)sim->plant.time_ns,
                                       .paused = (uint64_t)sim->pace.paused,
                                       .next_write = sim->external ? 0u : fcsl_run_next_write(sim->run)};
+        uint32_t verdict_bytes = 0;
+        if (!sim->external) {
+            (void)fcsl_run_gather_verdicts(sim->run, &verdict_bytes);
+        }
         fcsl_history_publish(&sim->published->history, &moment);
     }
 }

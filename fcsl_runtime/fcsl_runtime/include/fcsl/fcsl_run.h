@@ -250,7 +250,7 @@ typedef struct {
     uint64_t last_tick;
 } fcsl_verdict_t;
 
-enum { FCSL_VERDICT_TEXT_MAX = 512 };
+enum { FCSL_VERDICT_TEXT_MAX = 1280 };
 
 /* Those of a library come with it; this gives a run the monitor of another machine that has the same fields. */
 int fcsl_run_use_monitor(fcsl_run_t *run, const fcsl_monitor_t *monitor, fcsl_error_t *error);
@@ -261,10 +261,13 @@ const void *fcsl_run_monitor_data(const fcsl_run_t *run);
 /* Evaluates the requirements on recorded values, without running the machine: `count` rows of `row_bytes`, each of which has
  * the values of `observed` one after another, as they stood after a tick. */
 void fcsl_run_judge(fcsl_run_t *run, const uint8_t *rows, uint64_t row_bytes, uint64_t count);
-/* What is served of that struct: `<instance>.violations` and its like, none writable; null without requirements. */
+/* Gathers the verdicts as they are now in rows that observers may copy, of the same address and size each time; null without
+ * requirements. From the thread that steps. */
+const void *fcsl_run_gather_verdicts(fcsl_run_t *run, uint32_t *size);
+/* What is served of the rows: `<instance>.violations` and its like, none writable; null without requirements. */
 const fcsl_field_t *fcsl_run_verdict_fields(const fcsl_run_t *run, uint32_t *count);
-/* `data`: the monitor's struct, or a copy of it; `index`: of a requirement of the monitor. */
-void fcsl_run_verdict(const fcsl_run_t *run, const void *data, uint32_t index, fcsl_verdict_t *verdict);
+/* `rows`: of fcsl_run_gather_verdicts, or a copy; `index`: of a requirement of the monitor. */
+void fcsl_run_verdict(const fcsl_run_t *run, const void *rows, uint32_t index, fcsl_verdict_t *verdict);
 /* "LND-4 violated 1 time, first at tick 812 (8.12 s), last at tick 815: …" */
 void fcsl_run_verdict_text(const fcsl_run_t *run, const fcsl_verdict_t *verdict, char text[FCSL_VERDICT_TEXT_MAX]);
 /* ---- views ------------------------------------------------------------------------------------------------------- */

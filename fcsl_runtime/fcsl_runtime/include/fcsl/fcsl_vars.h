@@ -100,7 +100,7 @@ void fcsl_vars_histogram(fcsl_vars_out_t *out, const char *name, const fcsl_hist
 void fcsl_vars_tick_stats(fcsl_vars_out_t *out, const fcsl_tick_stats_t *stats);
 /* `lost_requests`: of each transition that has lost any in `data`, a machine struct. */
 void fcsl_vars_lost_requests(fcsl_vars_out_t *out, const fcsl_machine_t *machine, const uint8_t *data);
-/* `requirements`: the verdict on each by its id. `data`: the struct of the run's monitor, or a copy of it. */
+/* `requirements`: the verdict on each by its id. `data`: of fcsl_run_gather_verdicts, or a copy. */
 void fcsl_vars_requirements(fcsl_vars_out_t *out, const fcsl_run_t *run, const uint8_t *data);
 
 /* What the server itself counts. */

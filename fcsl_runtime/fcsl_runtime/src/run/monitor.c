@@ -7,6 +7,8 @@
 
 #include <dlfcn.h>
 #include <inttypes.h>
+#include <math.h>
+#include <stddef.h>
 #include <stdio.h>
 #include <stdlib.h>
 
@@ -38,23 +40,54 @@ typedef struct {
     uint32_t violated_ticks;
     uint32_t first_tick;
     uint32_t last_violated;
+    uint32_t last_tick; /* of its memory: an i64 */
 } results_t;
+
+/* The same, gathered: a window of a requirement may have many kilobytes, and observers read these alone. */
+typedef struct {
+    uint64_t evaluated;
+    uint64_t exercised;
+    uint64_t undefined;
+    uint64_t faults;
+    uint64_t violations;
+    uint64_t violated_ticks;
+    uint64_t first_tick;
+    uint64_t last_tick;
+    uint8_t holds;
+    uint8_t asked; /* whether `at_end` was asked for in the last evaluation, which did not fault */
+} row_t;
+
+typedef struct {
+    const char *name;
+    uint8_t type;
+    uint32_t offset;
+} served_t;
+
+/* What is served of a row. */
+static const served_t SERVED[] = {
+    {"holds", FCSL_BOOL, offsetof(row_t, holds)},
+    {"evaluated", FCSL_U64, offsetof(row_t, evaluated)},
+    {"exercised", FCSL_U64, offsetof(row_t, exercised)},
+    {"undefined", FCSL_U64, offsetof(row_t, undefined)},
+    {"faults", FCSL_U64, offsetof(row_t, faults)},
+    {"violations", FCSL_U64, offsetof(row_t, violations)},
+    {"violated_ticks", FCSL_U64, offsetof(row_t, violated_ticks)},
+    {"first_tick", FCSL_U64, offsetof(row_t, first_tick)},
+    {"last_tick", FCSL_U64, offsetof(row_t, last_tick)},
+};
+
+enum { SERVED_COUNT = sizeof SERVED / sizeof SERVED[0] };
 
 struct fcsl_monitor_run {
     const fcsl_monitor_t *monitor;
     fcsl_run_t *run;
     copied_t *copied;
     results_t *results;
-    fcsl_field_t *fields; /* of the results, as they are served */
+    row_t *rows; /* one for each requirement */
+    fcsl_field_t *fields; /* of the rows, as they are served */
     char *paths;
     uint32_t field_count;
 };
-
-/* Results by the names under which they are served; not every requirement has all. */
-static const char *const RESULTS[] = {"holds",      "evaluated",      "exercised",  "undefined",
-                                      "violations", "violated_ticks", "first_tick", "last_violated"};
-
-enum { RESULT_COUNT = sizeof RESULTS / sizeof RESULTS[0] };
 
 const fcsl_monitor_t *fcsl_monitor_in(void *library, const char *machine)
 {
@@ -85,32 +118,27 @@ static uint32_t locate(const fcsl_machine_t *machine, const char *path, uint32_t
     return 0;
 }
 
-/* A field of the monitor is served under a shorter path. */
-static void serve(struct fcsl_monitor_run *made, const char *instance, const char *name, const char *path)
+/* The fields of row `index`. */
+static void serve(struct fcsl_monitor_run *made, uint32_t index, const char *instance)
 {
-    const fcsl_machine_t *machine = made->monitor->machine;
-    for (uint32_t i = 0; i < machine->field_count; i++) {
-        if (strcmp(machine->fields[i].path, path) == 0) {
-            char *own = made->paths + (size_t)made->field_count * PATH_BYTES;
-            (void)snprintf(own, PATH_BYTES, "%.200s.%.100s", instance, name);
-            made->fields[made->field_count] = machine->fields[i];
-            made->fields[made->field_count].path = own;
-            made->fields[made->field_count].flags = 0;
-            made->fields[made->field_count].instance = FCSL_NONE;
-            made->field_count++;
-        }
+    for (uint32_t i = 0; i < SERVED_COUNT; i++) {
+        char *path = made->paths + (size_t)made->field_count * PATH_BYTES;
+        (void)snprintf(path, PATH_BYTES, "%.200s.%s", instance, SERVED[i].name);
+        made->fields[made->field_count++] = (fcsl_field_t){
+            .path = path,
+            .role = FCSL_ROLE_MACHINE,
+            .type = SERVED[i].type,
+            .count = 1,
+            .offset = (uint32_t)(index * sizeof(row_t)) + SERVED[i].offset,
+            .size = fcsl_scalar_size(SERVED[i].type),
+            .instance = FCSL_NONE,
+            .connected_from = FCSL_NONE,
+            .unit = "",
+            .doc = "",
+            .minimum = -INFINITY,
+            .maximum = INFINITY,
+        };
     }
-}
-
-static void serve_results(struct fcsl_monitor_run *made, const char *instance)
-{
-    char path[PATH_BYTES];
-    for (uint32_t i = 0; i < RESULT_COUNT; i++) {
-        (void)snprintf(path, sizeof path, "%.200s.outputs.%s", instance, RESULTS[i]);
-        serve(made, instance, strcmp(RESULTS[i], "last_violated") == 0 ? "last_tick" : RESULTS[i], path);
-    }
-    (void)snprintf(path, sizeof path, "%.200s.counters.faults", instance);
-    serve(made, instance, "faults", path);
 }
 
 static uint32_t result(const fcsl_machine_t *machine, const char *instance, const char *name)
@@ -119,6 +147,15 @@ static uint32_t result(const fcsl_machine_t *machine, const char *instance, cons
     (void)snprintf(path, sizeof path, "%.200s.outputs.%s", instance, name);
     uint32_t offset = 0;
     return locate(machine, path, &offset) != 0 ? offset : FCSL_NO_OFFSET;
+}
+
+/* Every monitor of fcslc keeps there in which tick it was evaluated last. */
+static uint32_t memory_of(const fcsl_machine_t *machine, const char *instance)
+{
+    char path[PATH_BYTES];
+    (void)snprintf(path, sizeof path, "%.200s.state.last_tick", instance);
+    uint32_t offset = 0;
+    return locate(machine, path, &offset) == sizeof(int64_t) ? offset : FCSL_NO_OFFSET;
 }
 
 static int bind(struct fcsl_monitor_run *made, const fcsl_machine_t *machine, fcsl_error_t *error)
@@ -145,8 +182,9 @@ static int bind(struct fcsl_monitor_run *made, const fcsl_machine_t *machine, fc
             .violated_ticks = result(monitor->machine, instance, "violated_ticks"),
             .first_tick = result(monitor->machine, instance, "first_tick"),
             .last_violated = result(monitor->machine, instance, "last_violated"),
+            .last_tick = memory_of(monitor->machine, instance),
         };
-        serve_results(made, instance);
+        serve(made, i, instance);
     }
     return 0;
 }
@@ -162,11 +200,13 @@ int fcsl_run_use_monitor(fcsl_run_t *run, const fcsl_monitor_t *monitor, fcsl_er
     made->monitor = monitor;
     made->copied = calloc(monitor->observed_count + 1u, sizeof *made->copied);
     made->results = calloc(monitor->requirement_count + 1u, sizeof *made->results);
-    const size_t served = (size_t)monitor->requirement_count * (RESULT_COUNT + 1u) + 1u;
+    const size_t served = (size_t)monitor->requirement_count * SERVED_COUNT + 1u;
+    made->rows = calloc(monitor->requirement_count + 1u, sizeof *made->rows);
     made->fields = calloc(served, sizeof *made->fields);
     made->paths = calloc(served, PATH_BYTES);
     made->run = fcsl_run_open_machine(monitor->machine, error);
-    if (made->copied == NULL || made->results == NULL || made->fields == NULL || made->paths == NULL) {
+    if (made->copied == NULL || made->results == NULL || made->rows == NULL || made->fields == NULL ||
+        made->paths == NULL) {
         return fcsl_fail(error, "out of memory for the monitor of '%s'", monitor->watched);
     }
     return made->run == NULL ? -1 : bind(made, run->machine, error);
@@ -182,6 +222,7 @@ void fcsl_monitor_close(fcsl_run_t *run)
     (void)fcsl_run_close(made->run, &unused); /* it records nothing, so that nothing can fail */
     free(made->copied);
     free(made->results);
+    free(made->rows);
     free(made->fields);
     free(made->paths);
     free(made);
@@ -244,28 +285,66 @@ static uint64_t count_at(const uint8_t *data, uint32_t offset)
     return offset != FCSL_NO_OFFSET ? fcsl_read_u64(data, offset) : 0;
 }
 
-void fcsl_run_verdict(const fcsl_run_t *run, const void *bytes, uint32_t index, fcsl_verdict_t *verdict)
+const void *fcsl_run_gather_verdicts(fcsl_run_t *run, uint32_t *size)
 {
-    const uint8_t *data = bytes;
     const struct fcsl_monitor_run *made = run->monitor;
-    const fcsl_requirement_t *requirement = &made->monitor->requirements[index];
-    const fcsl_instance_t *instance = &made->monitor->machine->instances[requirement->instance];
-    const results_t *at = &made->results[index];
+    *size = made != NULL ? (uint32_t)(made->monitor->requirement_count * sizeof(row_t)) : 0u;
+    if (made == NULL) {
+        return NULL;
+    }
+    const uint8_t *data = made->run->data;
+    for (uint32_t i = 0; i < made->monitor->requirement_count; i++) {
+        const fcsl_instance_t *instance = &made->monitor->machine->instances[made->monitor->requirements[i].instance];
+        const results_t *at = &made->results[i];
+        const int faulted = fcsl_read_i32(data, instance->health_offset) == FCSL_FAILED;
+        made->rows[i] = (row_t){
+            .evaluated = count_at(data, at->evaluated),
+            .exercised = count_at(data, at->exercised),
+            .undefined = count_at(data, at->undefined),
+            .faults = fcsl_read_u64(data, instance->faults_offset),
+            .violations = count_at(data, at->violations),
+            .violated_ticks = count_at(data, at->violated_ticks),
+            .first_tick = count_at(data, at->first_tick),
+            .last_tick = count_at(data, at->last_violated),
+            .holds = data[at->holds],
+            .asked = at->asked != FCSL_NO_OFFSET && !faulted && data[at->asked] != 0,
+        };
+    }
+    return made->rows;
+}
+
+void fcsl_run_verdict(const fcsl_run_t *run, const void *rows, uint32_t index, fcsl_verdict_t *verdict)
+{
+    const struct fcsl_monitor_run *made = run->monitor;
+    row_t row;
+    memcpy(&row, (const uint8_t *)rows + index * sizeof row, sizeof row);
     *verdict = (fcsl_verdict_t){
-        .requirement = requirement,
-        .holds = data[at->holds] != 0,
-        .evaluated = count_at(data, at->evaluated),
-        .exercised = count_at(data, at->exercised),
-        .undefined = count_at(data, at->undefined),
-        .faults = fcsl_read_u64(data, instance->faults_offset),
-        .violations = count_at(data, at->violations),
-        .violated_ticks = count_at(data, at->violated_ticks),
-        .first_tick = count_at(data, at->first_tick),
-        .last_tick = count_at(data, at->last_violated),
+        .requirement = &made->monitor->requirements[index],
+        .holds = row.holds,
+        .evaluated = row.evaluated,
+        .exercised = row.exercised,
+        .undefined = row.undefined,
+        .faults = row.faults,
+        .violations = row.violations,
+        .violated_ticks = row.violated_ticks,
+        .first_tick = row.first_tick,
+        .last_tick = row.last_tick,
     };
-    const int exercised = at->asked != FCSL_NO_OFFSET ? data[at->asked] != 0 : verdict->exercised > 0;
-    const int violated = at->asked != FCSL_NO_OFFSET ? exercised && !verdict->holds : verdict->violations > 0;
+    const int at_end = verdict->requirement->kind == FCSL_REQUIRED_AT_END;
+    const int exercised = at_end ? row.asked != 0 : row.exercised > 0;
+    const int violated = at_end ? exercised && !row.holds : row.violations > 0;
     verdict->status = violated ? FCSL_VIOLATED : exercised ? FCSL_MET : FCSL_NOT_EXERCISED;
+}
+
+void fcsl_monitor_restored(fcsl_run_t *run)
+{
+    const int64_t none = -2; /* comes before no tick: what is remembered is of another flight */
+    for (uint32_t i = 0; run->monitor != NULL && i < run->monitor->monitor->requirement_count; i++) {
+        const uint32_t at = run->monitor->results[i].last_tick;
+        if (at != FCSL_NO_OFFSET) {
+            memcpy(run->monitor->run->data + at, &none, sizeof none);
+        }
+    }
 }
 
 static const char *times(uint64_t count, const char *one, const char *many)
@@ -273,7 +352,23 @@ static const char *times(uint64_t count, const char *one, const char *many)
     return count == 1 ? one : many;
 }
 
-void fcsl_run_verdict_text(const fcsl_run_t *run, const fcsl_verdict_t *verdict, char text[FCSL_VERDICT_TEXT_MAX])
+/* Behind a verdict: ticks that say nothing of it. */
+static void add_notes(const fcsl_verdict_t *verdict, char text[FCSL_VERDICT_TEXT_MAX])
+{
+    size_t at = strlen(text);
+    if (verdict->undefined > 0 && at < FCSL_VERDICT_TEXT_MAX) {
+        (void)snprintf(text + at, FCSL_VERDICT_TEXT_MAX - at, "; undefined, because of a NaN, in %" PRIu64 " %s",
+                       verdict->undefined, times(verdict->undefined, "tick", "ticks"));
+    }
+    at = strlen(text);
+    if (verdict->faults > 0 && at < FCSL_VERDICT_TEXT_MAX) {
+        (void)snprintf(text + at, FCSL_VERDICT_TEXT_MAX - at,
+                       "; not evaluated, because of an integer beyond 64 bits or a division by 0, in %" PRIu64 " %s",
+                       verdict->faults, times(verdict->faults, "tick", "ticks"));
+    }
+}
+
+static void put_verdict(const fcsl_run_t *run, const fcsl_verdict_t *verdict, char text[FCSL_VERDICT_TEXT_MAX])
 {
     const fcsl_requirement_t *required = verdict->requirement;
     const double hz = (double)run->machine->tick_hz;
@@ -297,4 +392,10 @@ void fcsl_run_verdict_text(const fcsl_run_t *run, const fcsl_verdict_t *verdict,
                    "%s%s violated %" PRIu64 " %s, first at tick %" PRIu64 " (%.9g s), last at tick %" PRIu64 ": %s", of,
                    required->id, verdict->violations, times(verdict->violations, "time", "times"), verdict->first_tick,
                    (double)verdict->first_tick / hz, verdict->last_tick, required->text);
+}
+
+void fcsl_run_verdict_text(const fcsl_run_t *run, const fcsl_verdict_t *verdict, char text[FCSL_VERDICT_TEXT_MAX])
+{
+    put_verdict(run, verdict, text);
+    add_notes(verdict, text);
 }

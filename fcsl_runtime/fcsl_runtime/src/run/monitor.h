@@ -11,6 +11,8 @@
 void fcsl_monitor_tick(fcsl_run_t *run);
 /* The monitor of the machine in a loaded library; null: it has no requirements. */
 const fcsl_monitor_t *fcsl_monitor_in(void *library, const char *machine);
+/* The struct of the machine was replaced: what the requirements remember is of another flight. */
+void fcsl_monitor_restored(fcsl_run_t *run);
 void fcsl_monitor_close(fcsl_run_t *run);
 
 #endif /* FCSL_RUN_MONITOR_H */

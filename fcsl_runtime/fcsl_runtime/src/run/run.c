@@ -85,6 +85,7 @@ int fcsl_run_restore(fcsl_run_t *run, const void *bytes, uint32_t size, fcsl_err
     /* Recorded first: the write belongs to the tick that would have come. */
     fcsl_note_write(run, &(fcsl_write_t){.kind = FCSL_WRITE_RESTORE, .path = "", .data = run->staging, .size = size});
     memcpy(run->data, run->staging, size);
+    fcsl_monitor_restored(run);
     return 0;
 }
 

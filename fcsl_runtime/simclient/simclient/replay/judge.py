@@ -8,7 +8,7 @@ all that it reads; one that remembers is from the first such tick on.
 from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
-from dataclasses import asdict, dataclass
+from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
@@ -21,7 +21,7 @@ from ..bag.states import StateReader
 from ..descriptor import Machine
 from ..errors import BagError
 from ..paths import Selection, resolve
-from ..requirements import Status, Verdict
+from ..requirements import Status, Verdict, as_json
 from ..run import Run
 
 #: Types of one scalar; the others are enumerations.
@@ -40,15 +40,16 @@ class Judgement:
     ticks: int
 
     @property
-    def violated(self) -> bool:
-        """Whether one is that is no assumption."""
-        return any(v.status is Status.VIOLATED and not v.assumed for v in self.verdicts if v.id not in self.undecided)
+    def holds(self) -> bool:
+        """Whether one was decided, and none is violated that is no assumption."""
+        decided = [v for v in self.verdicts if v.id not in self.undecided]
+        return bool(decided) and not any(v.status is Status.VIOLATED and not v.assumed for v in decided)
 
     def as_json(self) -> dict[str, Any]:
         """The verdicts by id, each with `undecided` ("" if it counts) and `undecided_ticks`."""
         verdicts = {
             v.id: {
-                **asdict(v),
+                **as_json(v),
                 "undecided": self.undecided.get(v.id, ""),
                 "undecided_ticks": self.unknown.get(v.id, 0),
             }
@@ -210,10 +211,12 @@ def judge(bag: Bag, recorded: RecordedMachine, run: Run) -> Judgement:
     for id_, paths in run.observed_by().items():
         known, lacking = _known(ticks.ticks, [columns[path] for path in paths])
         if id_ in remembering:
-            known = known[: int(np.flatnonzero(np.diff(known) != 1)[0]) + 1] if every != len(known) else known
+            known = _from_the_start(known, int(ticks.ticks[0]))
         unknown[id_] = every - len(known)
         if lacking or not len(known):
-            undecided[id_] = lacking or "the bag has all of its values in no tick"
+            undecided[id_] = lacking or "the bag has not all of its values" + (
+                " in the first tick" if id_ in remembering else " in any tick"
+            )
         else:
             groups.setdefault(known.tobytes(), (known, []))[1].append(id_)
     found = {verdict.id: verdict for verdict in run.verdicts()}
@@ -227,6 +230,12 @@ def judge(bag: Bag, recorded: RecordedMachine, run: Run) -> Judgement:
             undecided |= dict.fromkeys(at_end, "the bag has not all of its values in the last tick")
         found |= judged
     return Judgement(list(found.values()), undecided, unknown, every)
+
+
+def _from_the_start(known: Array, first: int) -> Array:
+    """Those without a gap before them."""
+    gaps = np.flatnonzero(known != first + np.arange(len(known)))
+    return known[: gaps[0]] if len(gaps) else known
 
 
 def _known(ticks: Array, columns: Sequence[_Column | str]) -> tuple[Array, str]:

@@ -17,7 +17,7 @@ if TYPE_CHECKING:
     from ..requirements import Verdict
 
 _MARKS = (
-    "violates(*ids): the test violates these requirements; without ids it may violate any",
+    "violates(*ids): the test violates these requirements; without ids, any",
     "requirement(*ids): the test is about these requirements",
 )
 _OPTION = "--fcsl-requirements"
@@ -34,6 +34,10 @@ def configure(config: pytest.Config) -> None:
     for mark in _MARKS:
         config.addinivalue_line("markers", mark)
     config.stash[_RESULTS] = []
+    name = config.getoption(_OPTION)
+    if name and not hasattr(config, "workerinput"):
+        for part in _parts(config.invocation_params.dir / name):  # of a session that was killed
+            part.unlink()
 
 
 @pytest.hookimpl(wrapper=True)
@@ -42,43 +46,66 @@ def pytest_runtest_call(item: pytest.Item) -> Generator[None, object, object]:
     outcome = "failed"
     try:
         result = yield
-        mark = item.get_closest_marker("violates")
-        if mark is None or mark.args:
-            flights = [verdicts for _, verdicts in verdicts_of(item)]
-            problems = _unexpected(flights, mark.args if mark else ())
-            if problems:
-                pytest.fail("\n".join(problems), pytrace=False)
+        marks = list(item.iter_markers("violates"))
+        verdicts = [v for _, flight in verdicts_of(item) for v in flight]
+        problems = _unexpected(verdicts, _ids(item, "violates"), any(not mark.args for mark in marks))
+        if problems:
+            pytest.fail("\n".join(problems), pytrace=False)
         outcome = "passed"
         return result
+    except pytest.skip.Exception:
+        outcome = "skipped"
+        raise
     finally:
         if item.config.getoption(_OPTION):
-            item.config.stash[_RESULTS].append(_result(item, outcome))
+            expected = outcome == "failed" and item.get_closest_marker("xfail") is not None
+            item.config.stash[_RESULTS].append(_result(item, "xfailed" if expected else outcome))
 
 
-def _unexpected(flights: list[list[Verdict]], expected: Sequence[str]) -> list[str]:
+def _ids(item: pytest.Item, mark: str) -> list[str]:
+    """The ids of all marks of this name. Raises UsageError."""
+    marks = list(item.iter_markers(mark))
+    ids = [id_ for one in marks for id_ in one.args]
+    if any(one.kwargs for one in marks) or not all(isinstance(id_, str) for id_ in ids):
+        raise pytest.UsageError(f'{item.nodeid}: write @pytest.mark.{mark}("ID"), with one or more ids')
+    return ids
+
+
+def _unexpected(verdicts: list[Verdict], expected: Sequence[str], expects_any: bool) -> list[str]:
     """`at_end` is of a run that ends, which a test is not; an assumption is about what the test does."""
-    verdicts = [verdict for flight in flights for verdict in flight if verdict.kind != "at_end"]
-    violated = [verdict for verdict in verdicts if verdict.status == "violated"]
-    found = [f"requirement {v}" for v in violated if v.id not in expected and not v.assumed]
+    violated = [v for v in verdicts if v.status == "violated" and v.kind != "at_end"]
+    found = [f"requirement {v}" for v in violated if v.id not in expected and not v.assumed and not expects_any]
+    if expects_any and not violated:
+        found.append("no requirement was violated")
     for id_ in expected:
-        if id_ not in {verdict.id for verdict in violated}:
-            known = any(verdict.id == id_ for verdict in verdicts)
-            found.append(f"{id_} was not violated" if known else f"no machine of this test has a requirement {id_}")
+        if id_ not in {v.id for v in violated}:
+            kinds = {v.kind for v in verdicts if v.id == id_}
+            found.append(
+                f"{id_} is of the end of a run, which a test is not"
+                if "at_end" in kinds
+                else f"{id_} was not violated"
+                if kinds
+                else f"no machine of this test has a requirement {id_}"
+            )
     return found
 
 
 def _result(item: pytest.Item, outcome: str) -> dict[str, Any]:
-    named = [id_ for mark in item.iter_markers("requirement") for id_ in mark.args]
     machines: dict[str, dict[str, list[str]]] = {}
     for machine, verdicts in verdicts_of(item):
         found = machines.setdefault(machine, {"exercised": [], "violated": []})
-        found["exercised"] += [v.id for v in verdicts if v.exercised and v.id not in found["exercised"]]
+        exercised = [v.id for v in verdicts if v.status != "not exercised"]
+        found["exercised"] += [id_ for id_ in exercised if id_ not in found["exercised"]]
         found["violated"] += [v.id for v in verdicts if v.violations and v.id not in found["violated"]]
-    return {"test": item.nodeid, "outcome": outcome, "named": named, "machines": machines}
+    return {"test": item.nodeid, "outcome": outcome, "named": _ids(item, "requirement"), "machines": machines}
 
 
 def _part(target: Path, worker: str) -> Path:
     return target.with_name(f"{target.name}.{worker}.part")
+
+
+def _parts(target: Path) -> list[Path]:
+    return sorted(target.parent.glob(f"{target.name}.*.part"))
 
 
 def pytest_sessionfinish(session: pytest.Session) -> None:
@@ -95,7 +122,7 @@ def pytest_sessionfinish(session: pytest.Session) -> None:
         target = Path(config.workerinput["fcsl_requirements"])
         write_whole(_part(target, config.workerinput["workerid"]), json.dumps(tests))
         return
-    for part in sorted(target.parent.glob(f"{target.name}.*.part")):
+    for part in _parts(target):
         tests = tests + json.loads(part.read_text(encoding="utf-8"))
         part.unlink()
     try:
