@@ -101,6 +101,7 @@ PACKAGES = {
         {
             "include": (
                 *("fcsl_cover.h", "fcsl_exact_math.h", "fcsl_hw.h", "fcsl_machine.h", "fcsl_math.h"),
+                "fcsl_monitor.h",
                 "fcsl_ros_conversion.h",
             )
         },

@@ -213,5 +213,5 @@ def test_diagnostics_once_per_second(domain: Domain) -> None:
     machine, *others = arrays[-1].status
     assert machine.name == "lander_control" and machine.level == DiagnosticStatus.OK
     assert machine.message in ("ASCENT", "COAST", "DESCENT")
-    assert [s.name for s in others] == [f"lander_control: {name}" for name in instances()]
+    assert [s.name for s in others] == [f"lander_control: {name}" for name in (*instances(), "requirements")]
     assert {pair.key: pair.value for pair in others[0].values} == {"faults": "0", "overruns": "0", "fault place": ""}

@@ -1242,6 +1242,9 @@ CONFIGS: dict[str, str] = {
             "a condition in the place of a value": "max_over(one.outputs.y > 0.0, 0.1) > 0.5 > once(one.outputs.y)",
             "too few arguments": "since(one.outputs.y > 0.0)",
             "a function of metrics": "rms(one.outputs.y) > 0.5",
+            "an instance": "one > 0.0",
+            "a division by zero": "one.outputs.i // 0 < 1",
+            "too many values": "one.outputs.b == (" * 8 + "one.outputs.b" + ")" * 8,
         }.items()
     },
     "E257 no condition in a list": put("requirements", value=[{"id": "R-1", "text": "t", "then": []}]),
@@ -1255,6 +1258,11 @@ CONFIGS: dict[str, str] = {
     "E257 a limit and no `when`": required("one.outputs.y > 0.0", within_s=0.5),
     "E257 the same id": put(
         "requirements", value=[{"id": id_, "text": "t", "never": "one.outputs.y > 0.0"} for id_ in ("R-1", "R_1")]
+    ),
+    "E203 an id that is a word": required("one.outputs.y > 0.0", id="state"),
+    "E203 a text of two lines": required("one.outputs.y > 0.0", text="One.\nTwo."),
+    "E257 too many": put(
+        "requirements", value=[{"id": f"R-{i}", "text": "t", "never": "one.outputs.b"} for i in range(257)]
     ),
     "E203 an id": required("one.outputs.y > 0.0", id="R 1"),
     "E204 a text of a page": required("one.outputs.y > 0.0", text="t" * 201),

@@ -20,7 +20,7 @@ _TYPES = {f"FCSL_{name.upper()}": name for name in ("bool", "i32", "i64", "u32",
 _STALE = 3
 
 _HEAD = '''\
-"""What is required of `{name}`: made by fcslc. Do not edit."""
+"""A requirement of `{name}`: made by fcslc. Do not edit."""
 
 
 def least(a: f64, b: f64) -> f64:
@@ -40,7 +40,7 @@ class Monitor:
 
     name: str
     config: str  # <name>.json
-    source: str  # <name>.py
+    sources: dict[str, str]  # by the name of the file, one for each requirement
     observed: tuple[tuple[str, str], ...]  # path in the machine, path in the monitor
     requirements: tuple[Requirement, ...]
 
@@ -53,18 +53,18 @@ def make_monitor(machine: Machine, requirements: list[Requirement]) -> Monitor:
     """`requirements`: at least one."""
     name = monitor_name(machine.name)
     writers = [_Algorithm(requirement, machine) for requirement in requirements]
-    texts = [writer.text() for writer in writers]
+    head = _HEAD.format(name=machine.name)
+    sources = {f"{w.requirement.instance}.py": f"{head}\n\n{w.text()}" for w in writers}
     config = {
         "tick_hz": machine.tick_hz,
         "initial_state": "RUN",
-        "algorithms": {w.class_name: {"source": f"{name}.py"} for w in writers},
+        "algorithms": {w.class_name: {"source": f"{w.requirement.instance}.py"} for w in writers},
         "instances": {w.requirement.instance: {"algorithm": w.class_name} for w in writers},
         "states": {"RUN": {"schedule": {w.requirement.instance: machine.tick_hz for w in writers}}},
         "publish": [],
     }
     observed = tuple(pair for writer in writers for pair in writer.observed())
-    source = "\n\n".join([_HEAD.format(name=machine.name), *texts])
-    return Monitor(name, json.dumps(config, indent=2) + "\n", source, observed, tuple(requirements))
+    return Monitor(name, json.dumps(config, indent=2) + "\n", sources, observed, tuple(requirements))
 
 
 def subset_of(requirements: list[Requirement], machine: Machine) -> list[Requirement]:

@@ -69,10 +69,6 @@ class Signals:
             row, rest = self.rows.get(path[:at]), path[at:]
         if row is None or _BRACKETS.sub("", rest):
             raise ExpressionError(self._unknown(path))
-        if row.path in _LATER:
-            raise ExpressionError(
-                f"`{row.path}` is of the coming tick, which begins when requirements have been evaluated"
-            )
         index = [int(number) for found in _BRACKETS.findall(rest) for number in found.split(",")]
         if len(index) > len(row.shape) or any(i >= size for i, size in zip(index, row.shape, strict=False)):
             shape = "".join(f"[{size}]" for size in row.shape)
@@ -197,6 +193,9 @@ class _Reader:
             self.sink.error(
                 "E204", f"`text` has {len(text)} characters", keys["text"].span, help=f"{_TEXT_MAX} at most"
             )
+        elif "text" in keys and keys["text"].kind == "string" and not (text.strip() and text.isprintable()):
+            fix = "write a sentence of one line, without control characters"
+            self.sink.error("E203", "`text` is no sentence", keys["text"].span, help=fix)
         kinds = [kind for kind in KINDS if kind in keys]
         if len(kinds) != 1:
             at = keys[kinds[1]].span if kinds else node.span
@@ -229,7 +228,7 @@ class _Reader:
             fix = f"add a number: `{id_}-1`"
             self.sink.error("E203", f"`{id_}` is a word of paths", node.span, help=fix)
             return id_
-        other, at = self._ids.setdefault(instance_name(id_), (id_, node.span))
+        other, at = self._ids.setdefault(instance_name(id_).replace("_", ""), (id_, node.span))
         if at is not node.span:
             same = "the same id" if other == id_ else f"`{other}` and `{id_}` have the same letters and digits"
             self.sink.error("E257", f"two requirements `{id_}`", node.span, why=same, notes=[(at, "the first is here")])

@@ -12,7 +12,7 @@
 #include "log.h"
 #include "run/lost_requests.h"
 
-enum { CLIENTS_BYTES = 128, HAL_BYTES = 1024 };
+enum { CLIENTS_BYTES = 128, HAL_BYTES = 1024, REQUIREMENTS_BYTES = 1024 };
 
 static void report_times(const char *what, const fcsl_histogram_t *histogram)
 {
@@ -77,23 +77,29 @@ static void report_lost_requests(const fcsl_machine_t *machine, const uint8_t *d
     }
 }
 
-/* How many requirements were met, and a line for each of the others. */
-static void report_requirements(const fcsl_run_t *run, const uint8_t *data)
+/* A line for each violated requirement, and one that says how many were met and which were not exercised. */
+static void report_requirements(const fcsl_run_t *run, const uint8_t *verdicts)
 {
     const fcsl_monitor_t *monitor = fcsl_run_monitor(run);
+    char silent[REQUIREMENTS_BYTES] = "";
+    size_t at = 0;
     uint32_t met = 0;
     for (uint32_t i = 0; monitor != NULL && i < monitor->requirement_count; i++) {
         fcsl_verdict_t verdict;
         char text[FCSL_VERDICT_TEXT_MAX];
-        fcsl_run_verdict(run, data, i, &verdict);
+        fcsl_run_verdict(run, verdicts, i, &verdict);
         met += verdict.status == FCSL_MET;
-        if (verdict.status != FCSL_MET) {
+        if (verdict.status == FCSL_VIOLATED) {
             fcsl_run_verdict_text(run, &verdict, text);
             log_info("requirement %s", text);
+        } else if (verdict.status == FCSL_NOT_EXERCISED) {
+            const int added = snprintf(silent + at, sizeof silent - at, "%s%s",
+                                       at > 0 ? ", " : "; not exercised: ", verdict.requirement->id);
+            at += added > 0 && (size_t)added < sizeof silent - at ? (size_t)added : 0u;
         }
     }
     if (monitor != NULL) {
-        log_info("requirements: %" PRIu32 " of %" PRIu32 " met", met, monitor->requirement_count);
+        log_info("requirements: %" PRIu32 " of %" PRIu32 " met%s", met, monitor->requirement_count, silent);
     }
 }
 

@@ -190,10 +190,11 @@ def _names(path: str, watched: Machine) -> Sequence[str]:
     return enumerators(field_.type, watched) if field_ is not None else ()
 
 
-def summary(verdicts: list[Verdict]) -> list[str]:
-    """The lines at the end of a run: each requirement that was not met, and how many were."""
+def summary(verdicts: Sequence[Verdict]) -> list[str]:
+    """The lines at the end of a run: each violated requirement; how many were met, and which were not exercised."""
     if not verdicts:
         return []
-    lines = [f"requirement {verdict}" for verdict in verdicts if verdict.status is not Status.MET]
+    lines = [f"requirement {verdict}" for verdict in verdicts if verdict.status is Status.VIOLATED]
     met = sum(verdict.status is Status.MET for verdict in verdicts)
-    return [*lines, f"requirements: {met} of {len(verdicts)} met"]
+    silent = ", ".join(verdict.id for verdict in verdicts if verdict.status is Status.NOT_EXERCISED)
+    return [*lines, f"requirements: {met} of {len(verdicts)} met" + (f"; not exercised: {silent}" if silent else "")]

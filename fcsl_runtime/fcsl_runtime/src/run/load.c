@@ -15,7 +15,7 @@
 #include "fcsl/fcsl_scalar.h"
 #include "hardware.h"
 #include "machine/fault_place.h"
-#include "monitor.h"
+#include "requirements.h"
 #include "stack_left.h"
 #include "record/write_queue.h"
 #include "io_replay.h"

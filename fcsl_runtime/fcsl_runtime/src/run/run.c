@@ -12,7 +12,7 @@
 #include "fcsl/fcsl_monotonic.h"
 #include "fcsl/fcsl_scalar.h"
 #include "io_replay.h"
-#include "monitor.h"
+#include "requirements.h"
 #include "record/recorder.h"
 #include "run_internal.h"
 #include "trace.h"

@@ -3,7 +3,7 @@
  * Opens the monitor of a machine, steps it after each tick, and reads its verdicts.
  */
 #define _GNU_SOURCE
-#include "monitor.h"
+#include "requirements.h"
 
 #include <dlfcn.h>
 #include <inttypes.h>
@@ -385,7 +385,8 @@ static void put_verdict(const fcsl_run_t *run, const fcsl_verdict_t *verdict, ch
         break;
     }
     if (required->kind == FCSL_REQUIRED_AT_END) {
-        (void)snprintf(text, FCSL_VERDICT_TEXT_MAX, "%s%s violated at the end: %s", of, required->id, required->text);
+        (void)snprintf(text, FCSL_VERDICT_TEXT_MAX, "%s%s violated in the last tick: %s", of, required->id,
+                       required->text);
         return;
     }
     (void)snprintf(text, FCSL_VERDICT_TEXT_MAX,

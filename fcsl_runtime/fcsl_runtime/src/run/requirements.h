@@ -2,8 +2,8 @@
  *
  * The monitor of a run: the requirements of its machine, evaluated after each tick.
  */
-#ifndef FCSL_RUN_MONITOR_H
-#define FCSL_RUN_MONITOR_H
+#ifndef FCSL_RUN_REQUIREMENTS_H
+#define FCSL_RUN_REQUIREMENTS_H
 
 #include "run_internal.h"
 
@@ -15,4 +15,4 @@ const fcsl_monitor_t *fcsl_monitor_in(void *library, const char *machine);
 void fcsl_monitor_restored(fcsl_run_t *run);
 void fcsl_monitor_close(fcsl_run_t *run);
 
-#endif /* FCSL_RUN_MONITOR_H */
+#endif /* FCSL_RUN_REQUIREMENTS_H */
