@@ -38,7 +38,8 @@ class Generator:
         if kind == "literal":
             return ("literal", self.random.choice((0.0, 1.0, -1.5, 2.0)))
         if kind == "op":
-            return (self.random.choice("+-*/"), self.number(depth - 1), self.number(depth - 1))
+            operator, left, right = self.random.choice("+-*/"), self.number(depth - 1), self.number(depth - 1)
+            return (operator, left, right if operator != "/" or fields(right) else ("literal", 2.0))
         if kind == "call":
             name = self.random.choice(("abs", "min", "max", "negative", "norm"))
             if name == "norm":
