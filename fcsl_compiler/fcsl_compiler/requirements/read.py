@@ -265,7 +265,11 @@ class _Reader:
                 raise ExpressionError(f"`{text}` is the same at all ticks: it needs a path")
             self._check_size(found)
             for part in found.walk():
-                if part.operator in ("/", "//", "%") and part.parts[1].operator == "literal" and not part.parts[1].value:
+                if (
+                    part.operator in ("/", "//", "%")
+                    and part.parts[1].operator == "literal"
+                    and not part.parts[1].value
+                ):
                     raise ExpressionError(f"`{part.text}` divides by zero")
                 if part.operator in ("held", "within", "max_over", "min_over"):
                     self._window(part)
