@@ -82,6 +82,11 @@ class Compilation:
         assert self.machine is not None
         return self.machine
 
+    @property
+    def c_names(self) -> tuple[str, ...]:
+        """The C files of the machine and of its monitor."""
+        return (self.c_name, *((self.monitor_code.c_name,) if self.monitor_code is not None else ()))
+
 
 def _parse(c: Compilation) -> None:
     c.parsed = parse_machine(c.path, c.sink)

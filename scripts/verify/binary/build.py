@@ -67,7 +67,7 @@ def compile_lined(made: Compilation, folder: Path, output: Path, more: Target | 
     includes = [folder, *include_dirs(), *(d for t in targets for d in t.include)]
     library = output / "library.so"
     with _line_numbers():
-        sources = [folder / made.c_name, folder / "fcsl_machines.c"]
+        sources = [*(folder / name for name in made.c_names), folder / "fcsl_machines.c"]
         objects = compile_objects(sources, includes, output / "objects")
         foreign = link_inputs(targets, output / "externs", folder)
         link_shared([*objects, *foreign.files], [], library, flags=foreign.flags)

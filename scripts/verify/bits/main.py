@@ -44,7 +44,7 @@ def emit_machines(configs: list[Path], folder: Path, backend: str = DEFAULT_BACK
     made = emit(configs, folder, backend=backend)
     externs = dict.fromkeys(source for c in made for source in c.target.sources)
     includes = dict.fromkeys(d for c in made for d in c.target.include)
-    names = [c.c_name for c in made] + ["fcsl_machines.c"]
+    names = [name for c in made for name in c.c_names] + ["fcsl_machines.c"]
     return Sources((*(folder / n for n in names), *externs), (folder, *includes))
 
 

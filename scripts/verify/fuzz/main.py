@@ -112,7 +112,7 @@ class Builder:
         sources: list[Path] = []
         includes = [folder, *include_dirs()]
         for compilation in emit(configs, folder):
-            sources += [folder / compilation.c_name, *compilation.target.sources]
+            sources += [*(folder / name for name in compilation.c_names), *compilation.target.sources]
             includes += compilation.target.include
         return [compiled(s, includes, ["-Wno-unused"]) for s in [*sources, folder / "fcsl_machines.c"]]
 

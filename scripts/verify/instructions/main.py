@@ -157,7 +157,7 @@ def _steps(case: Case, code: MachineCode, compiled: Path, ticks: int, seed: int)
     scene, kinds, program = (case.folder / name for name in ("scene", "kinds", "stepped_machine"))
     scene.write_text("".join(f"{path} {n} {v!r}\n" for path, n, v in SCENES.get(case.name, ())))
     flags = ["-std=gnu11", *FLAGS[1:], "-no-pie", "-Wl,-z,now"]
-    sources = [compiled, case.sources[1], *case.externs]
+    sources = [compiled, *case.sources[1:], *case.externs]
     sources += [HERE / "stepped_machine.c", HERE / "stepped.c", SHARED / "stimulus.c"]
     compile_c(compiler(), flags, sources, [HERE, SHARED, *case.includes], program)
     starts = _starts(code, program)

@@ -136,7 +136,7 @@ def machines(build: Build) -> Row:
     sources = [HERE / "machines.c", SHARED / "stimulus.c", folder / "fcsl_machines.c"]
     includes = [SHARED, folder, *include_dirs()]
     for c in compilations:
-        sources += [folder / c.c_name, *c.target.sources]
+        sources += [*(folder / name for name in c.c_names), *c.target.sources]
         includes += c.target.include
     line = [
         "-std=c11",

@@ -71,7 +71,7 @@ def emit_case(config: Path, folder: Path) -> Case:
         compilation.checked.name,
         config,
         folder,
-        (folder / compilation.c_name, folder / "fcsl_machines.c"),
+        (*(folder / name for name in compilation.c_names), folder / "fcsl_machines.c"),
         target.sources,
         (folder, *include_dirs(), *target.include),
     )
