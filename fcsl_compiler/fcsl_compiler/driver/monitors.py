@@ -17,7 +17,7 @@ def compile_monitor(c: Compilation, until: str = "emit") -> None:
         return
     c.monitor = make_monitor(c.checked, c.requirements)
     with tempfile.TemporaryDirectory(prefix="fcsl-monitor-") as folder:
-        config = write_monitor(c.monitor, Path(folder))
+        config = _write(c.monitor, Path(folder))
         try:
             c.monitor_code = compile_machine(config, c.toolchain, until=until, backend=c.backend)
         except DiagnosticError as error:
@@ -32,7 +32,7 @@ def _explained(c: Compilation, found: Diagnostic) -> Diagnostic:
     return Diagnostic(Severity.ERROR, "E257", f"it cannot be compiled: {found.message}", span, "", fix)
 
 
-def write_monitor(monitor: Monitor, folder: Path) -> Path:
+def _write(monitor: Monitor, folder: Path) -> Path:
     """Writes its sources. Returns the machine JSON."""
     for name, text in monitor.sources.items():
         (folder / name).write_text(text, encoding="utf-8")

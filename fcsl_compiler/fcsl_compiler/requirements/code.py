@@ -64,13 +64,11 @@ def size(node: Node) -> int:
 
 
 class Code:
-    """`read`: the value of a field's scalar, as its type is; `past`: the name of a local that holds the value of an
-    operator of the past; with `.true` and `.false` behind it, of a condition."""
+    """`read`: the value of a field's scalar, as its type is; `past`: by id of a node, the name of the local that holds the
+    value of an operator of the past; of a condition, there are two, with `_true` and `_false` behind it."""
 
-    def __init__(
-        self, read: Callable[[Node, int], str], names: Callable[[Node], tuple[str, ...]], past: dict[int, str]
-    ):
-        self._read, self._names, self._past = read, names, past
+    def __init__(self, read: Callable[[Node, int], str], past: dict[int, str]):
+        self._read, self._past = read, past
 
     # ---- conditions -------------------------------------------------------------------------------------------------
 
@@ -102,7 +100,7 @@ class Code:
     def _comparison(self, a: Node, operator: str, b: Node) -> Truth:
         kinds = {a.quantity.kind, b.quantity.kind}
         if kinds == {Kind.NAME}:
-            names = self._names(a if a.operator != "literal" else b)
+            names = (a if a.operator != "literal" else b).quantity.names
             left, right = (str(names.index(n.value)) if n.operator == "literal" else self.name(n) for n in (a, b))
             return certain(f"({left} {operator} {right})")
         if kinds == {Kind.BOOL} and operator in ("==", "!="):

@@ -45,13 +45,9 @@ class Monitor:
     requirements: tuple[Requirement, ...]
 
 
-def monitor_name(machine: str) -> str:
-    return f"{machine}_requirements"
-
-
 def make_monitor(machine: Machine, requirements: list[Requirement]) -> Monitor:
     """`requirements`: at least one."""
-    name = monitor_name(machine.name)
+    name = f"{machine.name}_requirements"
     writers = [_Algorithm(requirement, machine) for requirement in requirements]
     head = _HEAD.format(name=machine.name)
     sources = {f"{w.requirement.instance}.py": f"{head}\n\n{w.text()}" for w in writers}
@@ -119,14 +115,11 @@ class _Algorithm:
             return f"f64({text})"
         return text
 
-    def _names(self, node: Node) -> tuple[str, ...]:
-        return node.quantity.names
-
     def text(self) -> str:
         r = self.requirement
         ticks = self._input("machine.tick", "ticks", "i64")  # the same bits for 10^18 ticks, and no conversion may fail
         past = PastWriter(self.machine.tick_hz)
-        code = Code(self._read, self._names, past.locals)
+        code = Code(self._read, past.locals)
         for root in r.expressions:
             past.add(root, code)
         when = code.truth(r.when) if r.when is not None else None

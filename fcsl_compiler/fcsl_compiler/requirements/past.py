@@ -1,17 +1,15 @@
 # SPDX-License-Identifier: Apache-2.0
 """The operators of the past, as statements of the language that keep what they need in `state`.
 
-Their definitions are those of docs/guide/requirements.md; with memory for a fixed number of values, and a fixed number of
+Their definitions are those of docs/guide/requirements.md; with memory for a fixed number of values, and a bounded number of
 operations in each tick.
 """
 
 from __future__ import annotations
 
+from ..expression.parse import PAST_FUNCTIONS
 from ..expression.tree import Kind, Node
 from .code import Code, Truth
-
-#: Operators that this file writes.
-_TICKS = ("held", "within", "max_over", "min_over")
 
 
 class PastWriter:
@@ -28,16 +26,13 @@ class PastWriter:
         """Writes all operators of the past in an expression, inner ones first."""
         for part in node.parts:
             self.add(part, code)
-        write = getattr(self, f"_{node.operator}", None) if node.operator in _WRITTEN else None
-        if write is None:
-            return
-        name = f"{node.operator}_{len(self.locals)}"
-        write(node, name, code)
-        self.locals[id(node)] = name
+        if node.operator in PAST_FUNCTIONS:
+            name = f"{node.operator}_{len(self.locals)}"
+            getattr(self, f"_{node.operator}")(node, name, code)
+            self.locals[id(node)] = name
 
     def _ticks(self, node: Node) -> int:
-        ticks = node.value * self._tick_hz
-        return int(ticks)
+        return int(node.value * self._tick_hz)
 
     def _keep(self, name: str, type_: str) -> str:
         self.state[name] = type_
@@ -153,6 +148,3 @@ class PastWriter:
             pair = f"{at} // {1 << level}"
             lines.append(f"{array}[{pair}] = {better}({below}[{pair} * 2], {below}[{pair} * 2 + 1])")
         return lines
-
-
-_WRITTEN = ("previous", "rose", "fell", "once", "since", *_TICKS)

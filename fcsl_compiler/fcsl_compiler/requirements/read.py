@@ -14,7 +14,7 @@ from ..base.source import SourceFile, Span
 from ..config.times import read_ticks
 from ..emit.field_table import FieldRow, field_table
 from ..expression import units
-from ..expression.parse import parse
+from ..expression.parse import PAST_FUNCTIONS, parse
 from ..expression.tree import ExpressionError, Kind, Node, Quantity
 from ..model.machine import Machine, seconds, split_instance, unknown_instance
 from ..model.types import HEALTH_NAMES
@@ -271,7 +271,7 @@ class _Reader:
                     and not part.parts[1].value
                 ):
                     raise ExpressionError(f"`{part.text}` divides by zero")
-                if part.operator in ("held", "within", "max_over", "min_over"):
+                if PAST_FUNCTIONS.get(part.operator, "").endswith("s"):
                     self._window(part)
         except ExpressionError as error:
             fix = 'write a condition, such as "held(abs(nav.outputs.speed) < 2.0, 0.5)"'

@@ -14,8 +14,7 @@ from fcsl_compiler.api.command_line import Commands, Verb
 
 from .cli import run_tool
 
-_RECORDINGS, _RUNNING, _HARDWARE = "recordings", "running machines", "hardware"
-_TESTS = "machines"
+_MACHINES, _RECORDINGS, _RUNNING, _HARDWARE = "machines", "recordings", "running machines", "hardware"
 _FLIGHT_PROGRAM = "fcsl-fc"
 
 
@@ -52,7 +51,7 @@ COMMANDS = Commands(
             _verb("plot", _RECORDINGS, "plot", "draw a bag, or a simulation"),
             _verb("rerun", _RECORDINGS, "to_rerun", "convert a bag for the rerun viewer"),
             _verb("check-bag", _RECORDINGS, "replay.check_bag", "judge the requirements of a machine on a bag"),
-            _verb("trace", _TESTS, "trace_matrix", "say which tests exercised which requirement"),
+            _verb("trace", _MACHINES, "trace_matrix", "say which tests exercised which requirement"),
             ("fly", Verb(_RUNNING, "run a machine as a process of its own: fcsl-fc", _fly)),
             ("var", _VAR._replace(complete=_complete_var)),
             _verb("view", _RUNNING, "live.cli", "show a running machine in the rerun viewer"),

@@ -207,9 +207,15 @@ int fcsl_run_use_monitor(fcsl_run_t *run, const fcsl_monitor_t *monitor, fcsl_er
     made->run = fcsl_run_open_machine(monitor->machine, error);
     if (made->copied == NULL || made->results == NULL || made->rows == NULL || made->fields == NULL ||
         made->paths == NULL) {
-        return fcsl_fail(error, "out of memory for the monitor of '%s'", monitor->watched);
+        (void)fcsl_fail(error, "out of memory for the monitor of '%s'", monitor->watched);
+        fcsl_monitor_close(run);
+        return -1;
     }
-    return made->run == NULL ? -1 : bind(made, run->machine, error);
+    if (made->run == NULL || bind(made, run->machine, error) != 0) {
+        fcsl_monitor_close(run);
+        return -1;
+    }
+    return 0;
 }
 
 void fcsl_monitor_close(fcsl_run_t *run)

@@ -188,7 +188,7 @@ class AlgTwin(Twin):
         with self._lock:
             return self._run.verdicts()
 
-    def restart_requirements(self) -> None:
+    def _restart_requirements(self) -> None:
         """Puts the verdicts on requirements, and what these remember, back to the beginning."""
         with self._lock:
             self._run.restart_requirements()

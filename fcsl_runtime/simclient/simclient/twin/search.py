@@ -149,7 +149,7 @@ def _violated(twin: AlgTwin, begin: bytes, drawn: dict[str, Segments], ticks: in
     import numpy as np
 
     twin.restore(begin)
-    twin.restart_requirements()
+    twin._restart_requirements()
     cut = {path: _cut(own, ticks) for path, own in drawn.items()}
     twin.inject({path: np.repeat([v for _, v in own], [n for n, _ in own], axis=0) for path, own in cut.items()})
     begun = [v for v in twin.requirements.values() if v.status is Status.VIOLATED and v.first_tick is not None]
