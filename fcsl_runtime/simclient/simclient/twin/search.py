@@ -3,7 +3,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Collection, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -69,16 +69,17 @@ def find_violation(
     config: str | Path,
     inputs: Mapping[str, Domain],
     ticks: int,
-    requirement: str = "",
+    requirement: str | Collection[str] = "",
     examples: int = 500,
     parameters: Mapping[str, Any] | None = None,
 ) -> Violation | None:
     """The simplest profile of host inputs and sensor channels, each constant over stretches of time, that violates a
-    requirement of the machine `config` within `ticks` (`requirement`: this one); None: none of `examples` did.
+    requirement of the machine `config` within `ticks` (`requirement`: this one, or one of these); None: none of `examples`
+    did.
 
     `inputs`: by path or channel the least and the greatest value as a tuple, or a list of choices. `parameters` are set
     first. Profiles that violate an assumption are passed over; `at_end` is not searched. The same call finds the same.
-    Needs the package `hypothesis`. Raises TwinError.
+    Needs the package `hypothesis`. Raises TwinError, also for a named requirement that no profile exercised.
     """
     from hypothesis import HealthCheck, Phase, find, settings
     from hypothesis import strategies as st
@@ -110,20 +111,29 @@ def find_violation(
         phases=[Phase.generate, Phase.shrink],
         suppress_health_check=list(HealthCheck),
     )
+    wanted = ((requirement,) if requirement else ()) if isinstance(requirement, str) else tuple(requirement)
     with AlgTwin.from_config(config) as twin:
-        if not twin.requirements or (requirement and requirement not in twin.requirements):
-            raise TwinError(f"{config}: the machine has no requirement {requirement}".rstrip())
+        known = twin.requirements
+        if not known or (unknown := [id_ for id_ in wanted if id_ not in known]):
+            raise TwinError(f"{config}: the machine has no requirement {', '.join(unknown) if known else ''}".rstrip())
+        silent = set(wanted)
         twin.set_many(parameters or {})
         begin = twin.save()
 
         def violated(drawn: dict[str, Segments]) -> bool:
-            return _violated(twin, begin, drawn, ticks, requirement) is not None
+            verdicts = _fly(twin, begin, drawn, ticks)
+            if not any(v.assumed and v.violations for v in verdicts):
+                silent.difference_update(v.id for v in verdicts if v.exercised)
+            return _violated(verdicts, wanted) is not None
 
         try:
             simplest = find(st.fixed_dictionaries(segments), violated, settings=limits)
         except NoSuchExample:
+            if silent:
+                never = f"no profile of {examples} exercised {', '.join(sorted(silent))}"
+                raise TwinError(f"{never}: give more ticks, other ranges, or more examples") from None
             return None
-        verdict = _violated(twin, begin, simplest, ticks, requirement)
+        verdict = _violated(_fly(twin, begin, simplest, ticks), wanted)
         assert verdict is not None
         every = tuple(v.id for v in twin.requirements.values() if v.violations)
         return Violation(
@@ -144,15 +154,22 @@ def _cut(segments: Segments, ticks: int) -> Segments:
     return [*found[:-1], (found[-1][0] + missing, found[-1][1])]
 
 
-def _violated(twin: AlgTwin, begin: bytes, drawn: dict[str, Segments], ticks: int, wanted: str) -> Verdict | None:
-    """The first requirement that a profile violates, unless it violates an assumption before."""
+def _fly(twin: AlgTwin, begin: bytes, drawn: dict[str, Segments], ticks: int) -> list[Verdict]:
+    """The verdicts after a profile."""
     import numpy as np
 
     twin.restore(begin)
     twin._restart_requirements()
     cut = {path: _cut(own, ticks) for path, own in drawn.items()}
     twin.inject({path: np.repeat([v for _, v in own], [n for n, _ in own], axis=0) for path, own in cut.items()})
-    begun = [v for v in twin.requirements.values() if v.status is Status.VIOLATED and v.first_tick is not None]
-    assumed = min((v.first_tick for v in begun if v.assumed and v.first_tick is not None), default=ticks)
-    found = [v for v in begun if not v.assumed and (v.first_tick or 0) < assumed and wanted in ("", v.id)]
+    return list(twin.requirements.values())
+
+
+def _violated(verdicts: list[Verdict], wanted: Collection[str]) -> Verdict | None:
+    """The first wanted requirement that is violated, unless an assumption is before."""
+    begun = [v for v in verdicts if v.status is Status.VIOLATED and v.first_tick is not None]
+    assumed = min((v.first_tick for v in begun if v.assumed and v.first_tick is not None), default=None)
+    found = [v for v in begun if not v.assumed and (not wanted or v.id in wanted)]
+    if assumed is not None:
+        found = [v for v in found if (v.first_tick or 0) < assumed]
     return min(found, key=lambda v: v.first_tick or 0, default=None)
