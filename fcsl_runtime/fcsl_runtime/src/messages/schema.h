@@ -27,6 +27,10 @@
     "uint8 IMPURE=6\nuint8 FAULT=7\nuint8 HEALTH=8\n"                                                                  \
     "std_msgs/Header header\nuint64 tick\nuint8 kind\nstring path\nuint32 element\nuint32 age_ticks\n"                 \
     "int64 stamp_ns\nuint8[] data\n" FCSL_SCHEMA_HEADER
+#define FCSL_SCHEMA_REQUIREMENT_VERDICTS                                                                               \
+    "uint8 MET=0\nuint8 VIOLATED=1\nuint8 NOT_EXERCISED=2\n"                                                           \
+    "std_msgs/Header header\nuint64 tick\nstring[] requirement\nstring[] text\nuint8[] verdict\nbool[] holds\n"        \
+    "uint64[] violations\n" FCSL_SCHEMA_HEADER
 
 /* Of other packages. */
 #define FCSL_SCHEMA_CLOCK                                                                                              \

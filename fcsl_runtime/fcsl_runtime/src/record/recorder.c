@@ -91,6 +91,21 @@ static int add_shown_topics(fcsl_recorder_t *recorder, const char *name_space, f
     return 0;
 }
 
+static int add_verdict_topic(fcsl_recorder_t *recorder, const char *name_space, fcsl_error_t *error)
+{
+    char topic[TOPIC_BYTES];
+    recorder->own_topics = FCSL_TOPIC_FIRST_SHOWN + recorder->shown_count;
+    if (recorder->monitor == NULL) {
+        return 0;
+    }
+    recorder->own_topics++;
+    topic_name(recorder->machine, name_space, "requirements", topic);
+    return fcsl_bag_add_topic(recorder->bag, topic, "fcsl_msgs/msg/RequirementVerdicts",
+                              FCSL_SCHEMA_REQUIREMENT_VERDICTS, 0, error) < 0
+               ? -1
+               : 0;
+}
+
 /* Room for the largest message the recorder itself writes. */
 static size_t scratch_bytes(const fcsl_recorder_t *recorder, const char *views)
 {
@@ -105,6 +120,7 @@ static size_t scratch_bytes(const fcsl_recorder_t *recorder, const char *views)
         const uint32_t size = recorder->shown[i].layout.size;
         largest = size > largest ? size : largest;
     }
+    bytes += recorder->monitor != NULL ? fcsl_verdicts_message_capacity(recorder->monitor) : 0;
     return bytes + largest;
 }
 
@@ -185,8 +201,8 @@ static int prepare(fcsl_recorder_t *recorder, const fcsl_record_start_t *start, 
         return -1;
     }
     if (add_fixed_topics(recorder, name_space, error) != 0 || add_shown_topics(recorder, name_space, error) != 0 ||
-        fcsl_bag_publish(recorder->bag, error) != 0 || put_views(recorder, start->views, start_ns, error) != 0 ||
-        start_writer(recorder, error) != 0) {
+        add_verdict_topic(recorder, name_space, error) != 0 || fcsl_bag_publish(recorder->bag, error) != 0 ||
+        put_views(recorder, start->views, start_ns, error) != 0 || start_writer(recorder, error) != 0) {
         fcsl_bag_abandon(recorder->bag);
         return -1;
     }
@@ -209,6 +225,7 @@ fcsl_recorder_t *fcsl_recorder_open(const fcsl_record_start_t *start, const fcsl
     }
     recorder->machine = start->machine;
     recorder->live = start->data;
+    recorder->monitor = start->monitor;
     fcsl_recorder_set_lossless(recorder, options->lossless);
     if (fcsl_record_topics_build(start->machine, fields, &recorder->shown, &recorder->shown_count, error) != 0 ||
         fcsl_recorder_choose_ranges(recorder, error) != 0 || allocate(recorder, start->views, error) != 0 ||

@@ -16,6 +16,7 @@ typedef struct {
     const fcsl_machine_t *machine;
     const uint8_t *data; /* the machine struct; it stays where it is */
     const char *views;
+    const fcsl_monitor_t *monitor; /* null: no requirements */
     fcsl_stamp_t first; /* of the initial checkpoint */
 } fcsl_record_start_t;
 
@@ -40,6 +41,8 @@ void fcsl_recorder_forced(fcsl_recorder_t *recorder, fcsl_stamp_t stamp, const f
 int fcsl_recorder_begin_tick(fcsl_recorder_t *recorder, fcsl_error_t *error);
 /* Everything that the tick just completed has to show. */
 void fcsl_recorder_tick(fcsl_recorder_t *recorder, fcsl_stamp_t stamp);
+/* The verdicts after the tick just completed, a row for each requirement. 0, or -1: there was no room. */
+int fcsl_recorder_verdicts(fcsl_recorder_t *recorder, fcsl_stamp_t stamp, const fcsl_verdict_row_t *rows);
 
 int fcsl_recorder_add_topic(fcsl_recorder_t *recorder, const char *topic, const char *type, const char *schema,
                             fcsl_error_t *error);

@@ -13,7 +13,7 @@
 
 typedef struct fcsl_recorder fcsl_recorder_t;
 
-/* Topic numbers in the bag: fixed ones, then what is shown of every tick, then added ones. */
+/* Topic numbers in the bag: fixed ones, then what is shown of every tick, then verdicts if there are any, then added ones. */
 enum {
     FCSL_TOPIC_STATE = 0,
     FCSL_TOPIC_TRANSITIONS = 1,
@@ -31,12 +31,14 @@ enum {
     FCSL_RECORD_WRITE,      /* fcsl_write_t (its `data` means nothing), then the data */
     FCSL_RECORD_FORCED,     /* two of const fcsl_state_t *: from, to */
     FCSL_RECORD_CHECKPOINT, /* the machine struct */
+    FCSL_RECORD_VERDICTS,   /* an fcsl_verdict_row_t for each requirement */
     FCSL_RECORD_MESSAGE     /* + topic: a message as it is, at the record's time */
 };
 
 struct fcsl_recorder {
     const fcsl_machine_t *machine;
     const uint8_t *live; /* the machine struct of the run */
+    const fcsl_monitor_t *monitor; /* null: no requirements */
 
     /* The thread that owns the run; the writer sees those that do not change. What a tick reads lies together. */
     _Atomic uint64_t ring_full;
@@ -54,10 +56,11 @@ struct fcsl_recorder {
     fcsl_bag_t *bag;
     fcsl_record_topic_t *shown;
     uint32_t shown_count;
+    uint32_t own_topics; /* all but added ones; the last of them is that of verdicts, if there is a monitor */
     uint8_t *data;    /* a machine struct of which the recorded ranges are those of the tick being written */
     uint8_t *scratch; /* one message being built */
     size_t scratch_size;
-    /* What the last messages on change said; meaningless until `told`. */
+    /* What the last messages on change said; meaningless until `status_written`. */
     int status_written;
     uint8_t *health;
     uint64_t *faults;

@@ -64,6 +64,18 @@ __attribute__((hot)) void fcsl_recorder_tick(fcsl_recorder_t *recorder, fcsl_sta
     recorder->stepped = 1;
 }
 
+int fcsl_recorder_verdicts(fcsl_recorder_t *recorder, fcsl_stamp_t stamp, const fcsl_verdict_row_t *rows)
+{
+    const uint32_t size = recorder->monitor->requirement_count * (uint32_t)sizeof *rows;
+    uint8_t *out = claim_tick(recorder, FCSL_RECORD_VERDICTS, stamp, size, recorder->tick_policy);
+    if (out == NULL) {
+        return -1;
+    }
+    memcpy(out, rows, size);
+    fcsl_ring_publish(&recorder->ring);
+    return 0;
+}
+
 void fcsl_recorder_checkpoint(fcsl_recorder_t *recorder, fcsl_stamp_t stamp)
 {
     const uint32_t size = recorder->machine->size;
@@ -101,8 +113,7 @@ void fcsl_recorder_forced(fcsl_recorder_t *recorder, fcsl_stamp_t stamp, const f
 int fcsl_recorder_message(fcsl_recorder_t *recorder, int topic, uint64_t time_ns, const uint8_t *cdr, uint32_t size,
                           fcsl_error_t *error)
 {
-    const uint32_t first = FCSL_TOPIC_FIRST_SHOWN + recorder->shown_count;
-    if (topic < (int)first || (uint32_t)topic >= recorder->topic_count) {
+    if (topic < (int)recorder->own_topics || (uint32_t)topic >= recorder->topic_count) {
         return fcsl_fail(error, "topic number %d was not added to this recording", topic);
     }
     if (size == 0 || size > recorder->ring.capacity / 4) {

@@ -58,6 +58,14 @@ static int put_forced(fcsl_recorder_t *recorder, fcsl_stamp_t stamp, const uint8
     return put_scratch(recorder, FCSL_TOPIC_TRANSITIONS, stamp, fcsl_cdr_end(&cdr));
 }
 
+static int put_verdicts(fcsl_recorder_t *recorder, fcsl_stamp_t stamp, const uint8_t *data)
+{
+    const fcsl_verdict_row_t *rows = (const void *)data; /* records are aligned */
+    return put_scratch(
+        recorder, recorder->own_topics - 1u, stamp,
+        fcsl_verdicts_message(recorder->monitor, rows, stamp, recorder->scratch, recorder->scratch_size));
+}
+
 /* Records one fcsl_msgs message of a tick, if there is something to say. */
 static int note(fcsl_recorder_t *recorder, uint32_t topic, fcsl_tick_message_t what, fcsl_stamp_t stamp)
 {
@@ -138,6 +146,8 @@ static int put_record(fcsl_recorder_t *recorder, const fcsl_record_t *record, co
         return put_forced(recorder, stamp, data);
     case FCSL_RECORD_CHECKPOINT:
         return put_checkpoint(recorder, stamp, data);
+    case FCSL_RECORD_VERDICTS:
+        return put_verdicts(recorder, stamp, data);
     default:
         return put(recorder, record->kind - FCSL_RECORD_MESSAGE, stamp.time_ns, data, record->size);
     }

@@ -13,49 +13,13 @@
 #include <stdlib.h>
 
 #include "fcsl/fcsl_fp_mode.h"
-#include "fcsl/fcsl_run.h"
-#include "fcsl/fcsl_scalar.h"
 #include "machine/view.h"
+#include "monitor_run.h"
 
 enum {
     MONITORS_MAX = 1024,
     PATH_BYTES = 512,
 };
-
-/* Bytes that go from the machine's struct into that of the monitor. */
-typedef struct {
-    uint32_t from;
-    uint32_t to;
-    uint32_t size; /* of a scalar: 1, 4 or 8 */
-} copied_t;
-
-/* Where the results of a requirement are in the monitor's struct; FCSL_NO_OFFSET: it has none such. */
-typedef struct {
-    uint32_t holds;
-    uint32_t asked;
-    uint32_t evaluated;
-    uint32_t exercised;
-    uint32_t undefined;
-    uint32_t violations;
-    uint32_t violated_ticks;
-    uint32_t first_tick;
-    uint32_t last_violated;
-    uint32_t last_tick; /* of its memory: an i64 */
-} results_t;
-
-/* The same, gathered: a window of a requirement may have many kilobytes, and observers read these alone. */
-typedef struct {
-    uint64_t evaluated;
-    uint64_t exercised;
-    uint64_t undefined;
-    uint64_t faults;
-    uint64_t violations;
-    uint64_t violated_ticks;
-    uint64_t first_tick;
-    uint64_t last_tick;
-    uint8_t holds;
-    uint8_t asked; /* whether `at_end` was asked for in the last evaluation, which did not fault */
-} row_t;
 
 typedef struct {
     const char *name;
@@ -65,29 +29,18 @@ typedef struct {
 
 /* What is served of a row. */
 static const served_t SERVED[] = {
-    {"holds", FCSL_BOOL, offsetof(row_t, holds)},
-    {"evaluated", FCSL_U64, offsetof(row_t, evaluated)},
-    {"exercised", FCSL_U64, offsetof(row_t, exercised)},
-    {"undefined", FCSL_U64, offsetof(row_t, undefined)},
-    {"faults", FCSL_U64, offsetof(row_t, faults)},
-    {"violations", FCSL_U64, offsetof(row_t, violations)},
-    {"violated_ticks", FCSL_U64, offsetof(row_t, violated_ticks)},
-    {"first_tick", FCSL_U64, offsetof(row_t, first_tick)},
-    {"last_tick", FCSL_U64, offsetof(row_t, last_tick)},
+    {"holds", FCSL_BOOL, offsetof(fcsl_served_row_t, holds)},
+    {"evaluated", FCSL_U64, offsetof(fcsl_served_row_t, evaluated)},
+    {"exercised", FCSL_U64, offsetof(fcsl_served_row_t, exercised)},
+    {"undefined", FCSL_U64, offsetof(fcsl_served_row_t, undefined)},
+    {"faults", FCSL_U64, offsetof(fcsl_served_row_t, faults)},
+    {"violations", FCSL_U64, offsetof(fcsl_served_row_t, violations)},
+    {"violated_ticks", FCSL_U64, offsetof(fcsl_served_row_t, violated_ticks)},
+    {"first_tick", FCSL_U64, offsetof(fcsl_served_row_t, first_tick)},
+    {"last_tick", FCSL_U64, offsetof(fcsl_served_row_t, last_tick)},
 };
 
 enum { SERVED_COUNT = sizeof SERVED / sizeof SERVED[0] };
-
-struct fcsl_monitor_run {
-    const fcsl_monitor_t *monitor;
-    fcsl_run_t *run;
-    copied_t *copied;
-    results_t *results;
-    row_t *rows; /* one for each requirement */
-    fcsl_field_t *fields; /* of the rows, as they are served */
-    char *paths;
-    uint32_t field_count;
-};
 
 const fcsl_monitor_t *fcsl_monitor_in(void *library, const char *machine)
 {
@@ -129,7 +82,7 @@ static void serve(struct fcsl_monitor_run *made, uint32_t index, const char *ins
             .role = FCSL_ROLE_MACHINE,
             .type = SERVED[i].type,
             .count = 1,
-            .offset = (uint32_t)(index * sizeof(row_t)) + SERVED[i].offset,
+            .offset = (uint32_t)(index * sizeof(fcsl_served_row_t)) + SERVED[i].offset,
             .size = fcsl_scalar_size(SERVED[i].type),
             .instance = FCSL_NONE,
             .connected_from = FCSL_NONE,
@@ -163,7 +116,7 @@ static int bind(struct fcsl_monitor_run *made, const fcsl_machine_t *machine, fc
     const fcsl_monitor_t *monitor = made->monitor;
     for (uint32_t i = 0; i < monitor->observed_count; i++) {
         const fcsl_observed_t *observed = &monitor->observed[i];
-        copied_t *copied = &made->copied[i];
+        fcsl_observed_copy_t *copied = &made->copied[i];
         copied->size = locate(machine, observed->path, &copied->from);
         if (copied->size == 0 || locate(monitor->machine, observed->input, &copied->to) != copied->size) {
             return fcsl_fail(error, "the monitor of '%s' reads '%s', which the machine does not have", monitor->watched,
@@ -172,7 +125,7 @@ static int bind(struct fcsl_monitor_run *made, const fcsl_machine_t *machine, fc
     }
     for (uint32_t i = 0; i < monitor->requirement_count; i++) {
         const char *instance = monitor->machine->instances[monitor->requirements[i].instance].name;
-        made->results[i] = (results_t){
+        made->results[i] = (fcsl_results_t){
             .holds = result(monitor->machine, instance, "holds"),
             .asked = result(monitor->machine, instance, "asked"),
             .evaluated = result(monitor->machine, instance, "evaluated"),
@@ -191,6 +144,9 @@ static int bind(struct fcsl_monitor_run *made, const fcsl_machine_t *machine, fc
 
 int fcsl_run_use_monitor(fcsl_run_t *run, const fcsl_monitor_t *monitor, fcsl_error_t *error)
 {
+    if (run->recorder != NULL) {
+        return fcsl_fail(error, "the requirements of a run are chosen before recording begins");
+    }
     struct fcsl_monitor_run *made = calloc(1, sizeof *made);
     if (made == NULL) {
         return fcsl_fail(error, "out of memory");
@@ -202,11 +158,12 @@ int fcsl_run_use_monitor(fcsl_run_t *run, const fcsl_monitor_t *monitor, fcsl_er
     made->results = calloc(monitor->requirement_count + 1u, sizeof *made->results);
     const size_t served = (size_t)monitor->requirement_count * SERVED_COUNT + 1u;
     made->rows = calloc(monitor->requirement_count + 1u, sizeof *made->rows);
+    made->noted = calloc(monitor->requirement_count + 1u, sizeof *made->noted);
     made->fields = calloc(served, sizeof *made->fields);
     made->paths = calloc(served, PATH_BYTES);
     made->run = fcsl_run_open_machine(monitor->machine, error);
-    if (made->copied == NULL || made->results == NULL || made->rows == NULL || made->fields == NULL ||
-        made->paths == NULL) {
+    if (made->copied == NULL || made->results == NULL || made->rows == NULL || made->noted == NULL ||
+        made->fields == NULL || made->paths == NULL) {
         (void)fcsl_fail(error, "out of memory for the monitor of '%s'", monitor->watched);
         fcsl_monitor_close(run);
         return -1;
@@ -229,6 +186,7 @@ void fcsl_monitor_close(fcsl_run_t *run)
     free(made->copied);
     free(made->results);
     free(made->rows);
+    free(made->noted);
     free(made->fields);
     free(made->paths);
     free(made);
@@ -240,7 +198,7 @@ __attribute__((hot)) void fcsl_monitor_tick(fcsl_run_t *run)
     const struct fcsl_monitor_run *monitor = run->monitor;
     uint8_t *data = monitor->run->data;
     for (uint32_t i = 0; i < monitor->monitor->observed_count; i++) {
-        const copied_t *copied = &monitor->copied[i];
+        const fcsl_observed_copy_t *copied = &monitor->copied[i];
         const uint8_t *from = run->data + copied->from;
         uint8_t *to = data + copied->to;
         if (copied->size == 8u) {
@@ -261,7 +219,7 @@ void fcsl_run_judge(fcsl_run_t *run, const uint8_t *rows, uint64_t row_bytes, ui
     for (uint64_t row = 0; row < count; row++) {
         const uint8_t *from = rows + row * row_bytes;
         for (uint32_t i = 0; i < monitor->monitor->observed_count; i++) {
-            const copied_t *copied = &monitor->copied[i];
+            const fcsl_observed_copy_t *copied = &monitor->copied[i];
             memcpy(monitor->run->data + copied->to, from, copied->size);
             from += copied->size;
         }
@@ -286,34 +244,28 @@ const fcsl_field_t *fcsl_run_verdict_fields(const fcsl_run_t *run, uint32_t *cou
     return run->monitor != NULL ? run->monitor->fields : NULL;
 }
 
-static uint64_t count_at(const uint8_t *data, uint32_t offset)
-{
-    return offset != FCSL_NO_OFFSET ? fcsl_read_u64(data, offset) : 0;
-}
-
 const void *fcsl_run_gather_verdicts(fcsl_run_t *run, uint32_t *size)
 {
     const struct fcsl_monitor_run *made = run->monitor;
-    *size = made != NULL ? (uint32_t)(made->monitor->requirement_count * sizeof(row_t)) : 0u;
+    *size = made != NULL ? (uint32_t)(made->monitor->requirement_count * sizeof(fcsl_served_row_t)) : 0u;
     if (made == NULL) {
         return NULL;
     }
     const uint8_t *data = made->run->data;
     for (uint32_t i = 0; i < made->monitor->requirement_count; i++) {
         const fcsl_instance_t *instance = &made->monitor->machine->instances[made->monitor->requirements[i].instance];
-        const results_t *at = &made->results[i];
-        const int faulted = fcsl_read_i32(data, instance->health_offset) == FCSL_FAILED;
-        made->rows[i] = (row_t){
-            .evaluated = count_at(data, at->evaluated),
-            .exercised = count_at(data, at->exercised),
-            .undefined = count_at(data, at->undefined),
+        const fcsl_results_t *at = &made->results[i];
+        made->rows[i] = (fcsl_served_row_t){
+            .evaluated = fcsl_result_count(data, at->evaluated),
+            .exercised = fcsl_result_count(data, at->exercised),
+            .undefined = fcsl_result_count(data, at->undefined),
             .faults = fcsl_read_u64(data, instance->faults_offset),
-            .violations = count_at(data, at->violations),
-            .violated_ticks = count_at(data, at->violated_ticks),
-            .first_tick = count_at(data, at->first_tick),
-            .last_tick = count_at(data, at->last_violated),
+            .violations = fcsl_result_count(data, at->violations),
+            .violated_ticks = fcsl_result_count(data, at->violated_ticks),
+            .first_tick = fcsl_result_count(data, at->first_tick),
+            .last_tick = fcsl_result_count(data, at->last_violated),
             .holds = data[at->holds],
-            .asked = at->asked != FCSL_NO_OFFSET && !faulted && data[at->asked] != 0,
+            .asked = fcsl_result_asked(made, data, i),
         };
     }
     return made->rows;
@@ -322,7 +274,7 @@ const void *fcsl_run_gather_verdicts(fcsl_run_t *run, uint32_t *size)
 void fcsl_run_verdict(const fcsl_run_t *run, const void *rows, uint32_t index, fcsl_verdict_t *verdict)
 {
     const struct fcsl_monitor_run *made = run->monitor;
-    row_t row;
+    fcsl_served_row_t row;
     memcpy(&row, (const uint8_t *)rows + index * sizeof row, sizeof row);
     *verdict = (fcsl_verdict_t){
         .requirement = &made->monitor->requirements[index],
@@ -336,10 +288,7 @@ void fcsl_run_verdict(const fcsl_run_t *run, const void *rows, uint32_t index, f
         .first_tick = row.first_tick,
         .last_tick = row.last_tick,
     };
-    const int at_end = verdict->requirement->kind == FCSL_REQUIRED_AT_END;
-    const int exercised = at_end ? row.asked != 0 : row.exercised > 0;
-    const int violated = at_end ? exercised && !row.holds : row.violations > 0;
-    verdict->status = violated ? FCSL_VIOLATED : exercised ? FCSL_MET : FCSL_NOT_EXERCISED;
+    verdict->status = fcsl_verdict_status(verdict->requirement, row.asked, row.holds, row.exercised, row.violations);
 }
 
 void fcsl_monitor_restored(fcsl_run_t *run)

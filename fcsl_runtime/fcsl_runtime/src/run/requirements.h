@@ -9,6 +9,10 @@
 
 /* Copies what the requirements name, and steps the monitor. */
 void fcsl_monitor_tick(fcsl_run_t *run);
+/* A recording begins: what the verdicts are then is new to it. */
+void fcsl_monitor_record(fcsl_run_t *run);
+/* Into the recording: the verdicts after tick `tick`, if one has changed since they were recorded last. */
+void fcsl_monitor_note(fcsl_run_t *run, uint64_t tick);
 /* The monitor of the machine in a loaded library; null: it has no requirements. */
 const fcsl_monitor_t *fcsl_monitor_in(void *library, const char *machine);
 /* The struct of the machine was replaced: what the requirements remember is of another flight. */

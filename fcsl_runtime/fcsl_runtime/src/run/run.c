@@ -218,6 +218,9 @@ __attribute__((hot)) static int step_noted(fcsl_run_t *run, fcsl_error_t *error)
     }
     if (run->recorder != NULL) {
         fcsl_recorder_tick(run->recorder, fcsl_run_stamp(run, tick));
+        if (run->monitor != NULL) {
+            fcsl_monitor_note(run, tick);
+        }
     }
     return 0;
 }

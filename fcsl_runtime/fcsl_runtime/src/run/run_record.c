@@ -4,6 +4,7 @@
  */
 #include "record/write_queue.h"
 #include "record/recorder.h"
+#include "requirements.h"
 #include "run_internal.h"
 
 int fcsl_run_record(fcsl_run_t *run, const fcsl_record_options_t *options, fcsl_error_t *error)
@@ -14,7 +15,9 @@ int fcsl_run_record(fcsl_run_t *run, const fcsl_record_options_t *options, fcsl_
     const fcsl_record_start_t start = {.machine = run->machine,
                                        .data = run->data,
                                        .views = fcsl_run_views(run),
+                                       .monitor = fcsl_run_monitor(run),
                                        .first = fcsl_run_stamp(run, fcsl_run_tick(run))};
+    fcsl_monitor_record(run);
     run->recorder = fcsl_recorder_open(&start, options, error);
     return run->recorder != NULL ? 0 : -1;
 }

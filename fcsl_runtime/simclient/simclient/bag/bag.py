@@ -88,6 +88,11 @@ class RecordedMachine:
         return self.prefix + "/state"
 
     @property
+    def requirements(self) -> str:
+        """Verdicts, where the machine has requirements (violations.py)."""
+        return self.prefix + "/requirements"
+
+    @property
     def topics(self) -> set[str]:
         return {self.checkpoint, self.writes, self.state, *self.outputs.values()}
 

@@ -1,7 +1,8 @@
 # SPDX-License-Identifier: Apache-2.0
 """One picture of a run: the output of `fcsl plot`. panels.py chooses what is drawn, gate.py adds what actuators got.
 
-Background colours are the states of the machine. Curves have gaps where the instance did not run, and where ticks are
+Background colours are the states of the machine; a stronger one, with the id of a requirement in the legend, is a time in
+which it was violated. Curves have gaps where the instance did not run, and where ticks are
 missing in the bag.
 """
 
@@ -22,6 +23,7 @@ from PIL import Image
 from fcsl_compiler.api.ros_names import recorded_path
 
 from ..bag import Array, Bag, formats
+from ..bag.violations import Violation
 from ..complete_output import complete_or_absent
 from ..errors import BagError, ViewError
 from .gate import actuators, beside, let_through
@@ -46,6 +48,7 @@ _STATE_COLOURS = (
     *("#DCEBF7", "#E3F3DC", "#FCEBD2", "#F8D9DC", "#E8E0F2"),
     *("#F4F1C9", "#E3E3E3", "#C9ECE9", "#E8D6C3", "#F4D0EE"),
 )
+_VIOLATION_COLOURS = ("#D62728", "#8C2D9C", "#1F5FB4", "#B05E00", "#00796B", "#5D4037")
 #: A state's name is written above its band if the band has this share of the width, for each letter.
 _SHARE_PER_LETTER = 0.011
 _LABEL_LETTERS, _LABEL_LINES = 26, 3
@@ -161,6 +164,7 @@ def draw(run: RecordedRun, chosen: Choice, title: str, against: str = "") -> Any
     if axis_curve is None and run.spans:
         spans = [replace(s, start_s=s.start_s - origin_s, end_s=s.end_s - origin_s) for s in run.spans]
         _draw_states(figure, axes, spans, run.states)
+        _draw_violations(figure, axes, run.violations, origin_s)
     across = curve(rows, axis_curve) if axis_curve else None
     for axis, panel in zip(axes, chosen.panels, strict=True):
         lines = [_line(rows, c, across, origin_s) for c in panel.curves]
@@ -277,3 +281,17 @@ def _draw_states(figure: Any, axes: Sequence[Any], spans: Sequence[Span], states
     if {span.state for span in wide} != set(states):
         patches = [Patch(facecolor=colours[state], edgecolor="#888888", label=state) for state in states]
         figure.legend(handles=patches, loc="outside lower left", ncols=8, fontsize=8, frameon=False, title="states")
+
+
+def _draw_violations(figure: Any, axes: Sequence[Any], found: Sequence[Violation], origin_s: float) -> None:
+    """A band over all panels for each violation, which has an edge, so that one of a tick is seen; ids in a legend."""
+    handles = []
+    for number, id_ in enumerate(dict.fromkeys(one.id for one in found)):
+        colour = _VIOLATION_COLOURS[number % len(_VIOLATION_COLOURS)]
+        its = [(one.start_ns * 1e-9 - origin_s, (one.end_ns - one.start_ns) * 1e-9) for one in found if one.id == id_]
+        for axis in axes:
+            across = axis.get_xaxis_transform()
+            axis.broken_barh(its, (0, 1), transform=across, facecolor=(colour, 0.25), edgecolor=colour, zorder=1)
+        handles.append(Patch(facecolor=(colour, 0.25), edgecolor=colour, label=f"{id_} violated"))
+    if handles:
+        figure.legend(handles=handles, loc="outside lower right", ncols=8, fontsize=8, frameon=False)

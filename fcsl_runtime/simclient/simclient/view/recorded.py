@@ -5,6 +5,7 @@ from __future__ import annotations
 
 from collections.abc import Iterable
 from dataclasses import dataclass
+from functools import cached_property
 from typing import Any
 
 import numpy as np
@@ -13,6 +14,7 @@ from ..bag import Array, Bag, RecordedMachine, has_stamps, stacks, stamps_s
 from ..bag.fields import field_value, leaf_names
 from ..bag.stamps import Clock
 from ..bag.states import Visit, visits
+from ..bag.violations import Violation, violations
 from ..cli import Progress
 from ..errors import BagError
 from .panels import Curve
@@ -73,6 +75,11 @@ class RecordedRun:
     @property
     def name(self) -> str:
         return self.machine.name if self.machine else ""
+
+    @cached_property
+    def violations(self) -> list[Violation]:
+        """Of the requirements of the machine."""
+        return violations(self.bag, self.machine, round(self.spans[-1].end_s * 1e9)) if self.machine else []
 
     @property
     def states(self) -> list[str]:
