@@ -195,7 +195,7 @@ def test_the_layout_has_a_plot_per_instance_and_unit(tmp_path: Path) -> None:
     assert {"nav, rad", "nav, m", "nav", "nav.inputs, rad/s", "nav.counters", "channels", "body, m"} <= plots
     kinds = views(tmp_path / "x.rrd")
     assert kinds["state"] == kinds["health"] == "StateTimeline" and "3D" not in kinds.values()
-    assert kinds["transitions and health"] == "TextLog"
+    assert kinds["events"] == "TextLog"
 
 
 VIEWS = (

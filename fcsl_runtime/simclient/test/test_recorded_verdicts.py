@@ -7,6 +7,7 @@ from pathlib import Path
 
 import pytest
 from matplotlib import pyplot
+from rrd import read_rrd, values, views
 from test_record import MESSAGES, declarations
 from test_requirements import fly, machine
 
@@ -16,6 +17,7 @@ from simclient.bag.violations import violations
 from simclient.requirements import Status, Verdict
 from simclient.view.picture import choose, draw
 from simclient.view.recorded import RecordedRun
+from simclient.view.rrd import to_rerun
 
 STATUSES = list(Status)  # in the order of the constants of fcsl_msgs/RequirementVerdicts
 
@@ -76,3 +78,18 @@ def test_a_picture_shows_when_a_requirement_was_violated(
     bands = [path.get_extents() for bars in figure.axes[0].collections for path in bars.get_paths()]
     assert begins <= {round(band.x0, 9) for band in bands}
     pyplot.close(figure)
+
+
+def test_rerun_shows_when_a_requirement_was_violated(
+    flight: tuple[Path, dict[str, Verdict], list[set[str]]], tmp_path: Path
+) -> None:
+    to_rerun(flight[0], tmp_path / "run.rrd")
+    rows = read_rrd(tmp_path / "run.rrd")
+    found = [one for one in RecordedRun(formats.opened(flight[0])).violations if one.id == "LOW.2"]
+    lane = values(rows, "/craft/requirements/LOW.2", "StateChange:state")
+    begun = [(one.start_ns / 1e9, "violated") for one in found]
+    assert [row for row in lane if row[1]] == begun and len(lane) == len(begun) + sum(one.ended for one in found)
+    log = values(rows, "/craft/requirements", "TextLog:text")
+    assert (begun[0][0], "LOW.2 violated: n is small.") in log
+    assert (found[0].end_ns / 1e9, "LOW.2 holds again") in log
+    assert views(tmp_path / "run.rrd")["requirements"] == "StateTimeline"

@@ -90,9 +90,11 @@ class Plan:
     def _states_page(self) -> rrb.Container:
         prefix = self._cast.prefix
         step = self._lines("states by number", [f"{prefix}/state/step", f"{prefix}/transitions/marker"])
-        return rrb.Vertical(
-            self._states(), step, self._health(), self._log(), row_shares=[1, 2, 3, 1.2], name="states and health"
-        )
+        lanes = [(self._states(), 1.0), (step, 2.0), (self._health(), 3.0)]
+        if self._cast.violations:
+            lanes.append((self._requirements(), 1.5))
+        views, shares = zip(*lanes, (self._log(), 1.2), strict=True)
+        return rrb.Vertical(*views, row_shares=shares, name="states and health")
 
     # ---- views -----------------------------------------------------------------------------------------------
 
@@ -141,11 +143,17 @@ class Plan:
         lanes = [f"{signals.topic}/health" for signals in self._cast.instances]
         return rrb.StateTimelineView(origin=self._cast.prefix, contents=lanes, name="health", time_view=self._sight)
 
+    def _requirements(self) -> rrb.StateTimelineView:
+        lanes = list(self._cast.lanes_of_requirements.values())
+        return rrb.StateTimelineView(
+            origin=self._cast.prefix, contents=lanes, name="requirements", time_view=self._sight
+        )
+
     def _log(self) -> rrb.TextLogView:
         prefix = self._cast.prefix
-        contents = [f"{prefix}/{log}" for log in ("transitions", "health", "telemetry")]
+        contents = [f"{prefix}/{log}" for log in ("transitions", "health", "requirements", "telemetry")]
         columns = rrb.TextLogColumns(timeline_columns=[TIMELINE], text_log_columns=["loglevel", "body"])
-        return rrb.TextLogView(origin=prefix, contents=contents, name="transitions and health", columns=columns)
+        return rrb.TextLogView(origin=prefix, contents=contents, name="events", columns=columns)
 
     def _vehicle(self) -> rrb.Spatial3DView:
         """The whole flight from the side (live: beside the vehicle) with the trail so far."""

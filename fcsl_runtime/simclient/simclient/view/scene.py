@@ -8,6 +8,8 @@ Entities have the names of the topics. Their timeline is `sim_time`, the stamps:
     /<ns>/<machine>/state                   lanes: the states; below it `step`, their numbers as a step plot
     /<ns>/<machine>/transitions             a log of changes of state; below it `marker`, a point for each on the step plot
     /<ns>/<machine>/health                  a log of instances that degrade, fail, recover
+    /<ns>/<machine>/requirements            a log of requirements that are violated, and hold again (of bags)
+    /<ns>/<machine>/requirements/<id>       a lane: violated
     /<ns>/<machine>/telemetry               a log of the receiver: sessions, gaps
     /<ns>/sim/<instance>/<output>           the plant's truth
     /world/…                                the vehicle in 3D (world.py)
@@ -26,6 +28,7 @@ import rerun as rr
 
 from ..bag import Array
 from ..bag.states import StateSample
+from ..bag.violations import Violation
 from .lines import TIMELINE, send_lines, times
 from .panels import Choice, choose_by_views, choose_default
 from .rotation import ANGLES, euler_deg, unjoined
@@ -51,7 +54,8 @@ class Cast:
     """The shown topics of a run: the machine's begin with `prefix`; `states` are in the order of their colours.
 
     `signals` are outputs of instances and the plant; `inside` are their other values: `nav.inputs`, `nav.state`.
-    `views` is what the run chooses for its pictures; `remark` says why it is not used, if it is not valid.
+    `views` is what the run chooses for its pictures; `remark` says why it is not used, if it is not valid. `violations` are
+    those of a recorded run.
     """
 
     prefix: str
@@ -60,6 +64,7 @@ class Cast:
     inside: Sequence[Signals] = ()
     views: Views | None = None
     remark: str = ""
+    violations: Sequence[Violation] = ()
 
     @cached_property
     def catalogue(self) -> Catalogue:
@@ -75,6 +80,12 @@ class Cast:
     @property
     def instances(self) -> list[Signals]:
         return [signals for signals in self.signals if not signals.truth]
+
+    @property
+    def lanes_of_requirements(self) -> dict[str, str]:
+        """The entity of each requirement that was violated, by id."""
+        ids = dict.fromkeys(one.id for one in self.violations)
+        return {id_: f"{self.prefix}/requirements/{rr.escape_entity_path_part(id_)}" for id_ in ids}
 
     @property
     def plant(self) -> list[Signals]:
@@ -144,6 +155,19 @@ class Scene:
         health = rr.StateConfiguration(values=HEALTH, colors=np.array(_HEALTH_COLOURS, dtype=np.uint32))
         for signals in self.cast.instances:
             self._static(f"{signals.topic}/health", health)
+        self._violations()
+
+    def _violations(self) -> None:
+        """Logs when requirements were violated, and when they held again."""
+        lanes, log = self.cast.lanes_of_requirements, f"{self.cast.prefix}/requirements"
+        for lane in lanes.values():
+            self._static(lane, rr.StateConfiguration(values=["violated"], colors=[_HEALTH_COLOURS[-2]]))
+        for one in self.cast.violations:
+            self._event(lanes[one.id], one.start_ns / _NS, rr.StateChange(state="violated"))
+            self._event(log, one.start_ns / _NS, rr.TextLog(f"{one.id} violated: {one.text}", level="ERROR"))
+            if one.ended:
+                self._event(lanes[one.id], one.end_ns / _NS, rr.StateChange(state=""))
+                self._event(log, one.end_ns / _NS, rr.TextLog(f"{one.id} holds again", level="INFO"))
 
     def _style_lines(self, signals: Signals, name: str, size: int) -> None:
         """How a field looks where a user draws it outside of the panels."""
