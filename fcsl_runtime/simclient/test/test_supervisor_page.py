@@ -10,13 +10,16 @@ import json
 import statistics
 from collections.abc import Iterator
 from pathlib import Path
+from shutil import copy
 from typing import Any
 
 import pytest
 from browser import CHROMIUM, Page, browsing
 from supervising import Supervisor, supervising
+from test_requirements import machine
 from vars_machine import build
 
+from fcsl_compiler.driver.cache import build_machine
 from simclient import VarClient
 
 pytestmark = pytest.mark.skipif(CHROMIUM is None, reason="no chromium here; the page is not tried in a browser")
@@ -125,6 +128,29 @@ def test_a_run_from_its_start_to_its_end(page: Page, supervisor: Supervisor, lib
     page.click("#printed summary")
     page.wait("document.querySelector('#log').innerText.includes(' ticks, ')")
     assert supervisor.get(f"/runs/{run}").json["status"] == "ended"
+
+
+def test_requirements_are_shown_with_their_verdicts(
+    page: Page, supervisor: Supervisor, root: Path, tmp_path: Path
+) -> None:
+    required = [
+        {"id": "LOW-1", "text": HOSTILE, "then": "src.outputs.x < 2.0"},
+        {"id": "LOW-2", "text": "y is low.", "then": "src.outputs.y < 2.0"},
+    ]
+    copy(build_machine(machine(tmp_path, required)).library, root / "watched.so")
+    run = supervisor.start("watched.so", paused=True)
+    with VarClient(run["socket"]) as client:
+        client.tick(3)
+        page.run(f"location.hash = '{run['id']}'")
+        cells = "[...document.querySelectorAll('#requirements tbody tr')].map((row) => [...row.cells].map((c) => c.innerText))"
+        row = ["LOW-1", "met", "3", "0", "", HOSTILE]
+        page.wait(f"JSON.stringify({cells}[0]) === JSON.stringify({json.dumps(row)})")
+        client.set({"src.outputs.x": 3.0})
+        client.tick()
+        row[1:5] = "violated", "4", "1", "3"
+        page.wait(f"JSON.stringify({cells}[0]) === JSON.stringify({json.dumps(row)})")
+        assert page.run(f"{cells}[1][1]") == "met"
+    supervisor.ask("DELETE", f"/runs/{run['id']}")
 
 
 def test_what_is_refused_is_said(page: Page) -> None:

@@ -246,7 +246,7 @@ def test_metrics_of_lost_requests(supervisor: Supervisor, root: Path, tmp_path: 
     supervisor.ask("DELETE", f"/runs/{run['id']}")
 
 
-def test_metrics_of_requirements(supervisor: Supervisor, root: Path, tmp_path: Path) -> None:
+def test_verdicts_on_requirements(supervisor: Supervisor, root: Path, tmp_path: Path) -> None:
     folder = root / "watched"
     folder.mkdir()
     required = [{"id": "LOW-1", "text": "x is low.", "then": "src.outputs.x < 2.0"}]
@@ -259,6 +259,8 @@ def test_metrics_of_requirements(supervisor: Supervisor, root: Path, tmp_path: P
     samples = families(supervisor.get("/metrics").body)["fcsl_run_requirement_violations"].samples
     (found,) = [sample for sample in samples if sample.labels["run"] == run["id"]]
     assert (found.labels["requirement"], found.value) == ("LOW-1", 2)
+    verdict = supervisor.get(f"/runs/{run['id']}/requirements").json["LOW-1"]
+    assert (verdict["status"], verdict["exercised"], verdict["first_tick"]) == ("violated", 6, 0)
     supervisor.ask("DELETE", f"/runs/{run['id']}")
 
 

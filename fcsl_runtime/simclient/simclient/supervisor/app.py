@@ -62,6 +62,7 @@ def make_app(runs: Runs, guard: Guard, lifespan: Callable[[Starlette], AbstractA
             Route("/runs/{id}", on.show),
             Route("/runs/{id}", on.stop, methods=["DELETE"]),
             Route("/runs/{id}/health", on.run_health),
+            Route("/runs/{id}/requirements", on.requirements),
             Route("/runs/{id}/channels", on.channels),
             Route("/runs/{id}/values", on.values),
             Route("/runs/{id}/windows", on.window),
@@ -121,6 +122,10 @@ class _Routes:
         request_parameters.query(request)
         found = run_status.health(self._run(request))
         return Json(found, 200 if found["ok"] else 503)
+
+    def requirements(self, request: Request) -> Response:
+        request_parameters.query(request)
+        return Json(run_status.requirements(self._run(request)))
 
     def channels(self, request: Request) -> Response:
         request_parameters.query(request)

@@ -82,6 +82,16 @@ def health(run: Run) -> dict[str, Any]:
     }
 
 
+def requirements(run: Run) -> dict[str, Any]:
+    """Verdicts so far by id, as `stats` of the variable server has them; {} without requirements. Raises HttpError."""
+    with client_of(run) as client:
+        try:
+            found: dict[str, Any] = client.stats().get("requirements", {})
+        except VarError as error:
+            raise of_variables(error) from None
+    return found
+
+
 def worst_number(name: str) -> int:
     """0 nominal, 1 degraded, 2 failed, 3 stale, as in messages; 4 anything else."""
     return HEALTH_NAMES.index(name) if name in HEALTH_NAMES else len(HEALTH_NAMES)

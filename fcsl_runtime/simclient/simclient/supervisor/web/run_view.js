@@ -5,6 +5,7 @@ import { ask } from "./api.js";
 import { numbersOf, panelsOf } from "./channels.js";
 import { Panels, element } from "./panels.js";
 import { drawStates } from "./plot.js";
+import { Requirements } from "./requirements.js";
 import { healthClass } from "./runs.js";
 import { Series } from "./series.js";
 
@@ -30,6 +31,7 @@ export class RunView {
       this.#tick();
       onChange();
     });
+    this.requirements = new Requirements($("requirements"));
     $("filter").oninput = () => this.#list();
     $("seconds").onchange = () => this.#draw();
     $("printed").ontoggle = () => this.refresh();
@@ -57,6 +59,7 @@ export class RunView {
     $("log").textContent = $("tick").textContent = $("time").textContent = "";
     $("instances").replaceChildren();
     this.panels.clear();
+    this.requirements.open(id);
     this.#list();
     this.onChange();
     if (id === null) return;
@@ -89,6 +92,7 @@ export class RunView {
       element("li", {}, `${name}: `, element("span", { className: healthClass(health), textContent: health })));
     $("instances").replaceChildren(...found);
     if (this.#numbers.length === 0 && run.status === "running") this.#describe(this.id).catch(() => {});
+    if (run.status === "running") this.requirements.refresh().catch(this.onError);
     if (run.status !== "ended" || run.status !== this.status) this.refresh();
     this.status = run.status;
     this.#rate();
