@@ -5,7 +5,7 @@ from ..ros.composer import Source, composer_conversion
 from ..ros.conversion import ComposerConversion, ConversionError, ReaderConversion, Term
 from ..ros.message_fields import QUATERNION_AXES, VECTOR_AXES, Kind
 from ..ros.reader import Pick, has_stamp, reader_conversion
-from ..ros.rows import select_all
+from ..ros.rows import scalars_of, select_all
 from ..ros.standard_messages import STANDARD, Definitions, Member, full_name, short_name
 
 __all__ = [
@@ -25,6 +25,7 @@ __all__ = [
     "full_name",
     "has_stamp",
     "reader_conversion",
+    "scalars_of",
     "select_all",
     "short_name",
 ]

@@ -11,6 +11,9 @@ from .conversion import SIZES, ConversionError, Row, Term
 from .message_fields import FieldError, Kind, Selection, select
 from .standard_messages import Definitions
 
+#: The scalar type of each type in messages; of the smaller integers it is i32.
+_SCALARS = {"bool": "bool", "uint32": "u32", "int64": "i64", "uint64": "u64", "float32": "f32", "float64": "f64"}
+
 
 @dataclass(frozen=True)
 class Place:
@@ -74,10 +77,7 @@ def array_of(anchor: int, offset: int, type_: int, count: int) -> list[Place]:
 
 def select_all(definitions: Definitions, message: str, fields: Sequence[str], count: int) -> Selection:
     """The `count` numbers that several fields select together. A whole sequence takes all of them. Raises ConversionError."""
-    try:
-        found = [select(definitions, message, field) for field in fields]
-    except FieldError as error:
-        raise ConversionError(f"{error.args[0]}; {error.args[1]}") from None
+    found = _each(definitions, message, fields)
     pieces = tuple(piece for selection in found for piece in selection.pieces)
     kind = found[0].kind if len(found) == 1 else Kind.NUMBERS
     if len(pieces) == 1 and pieces[0].count == 0:
@@ -89,3 +89,20 @@ def select_all(definitions: Definitions, message: str, fields: Sequence[str], co
     if kind is Kind.NUMBERS and count == 3 and all(piece.type.startswith("float") for piece in pieces):
         kind = Kind.VECTOR
     return Selection(kind, pieces)
+
+
+def scalars_of(definitions: Definitions, message: str, fields: Sequence[str]) -> tuple[str, int]:
+    """The scalar type that has all numbers of these fields, and how many they are. Raises ConversionError."""
+    found = _each(definitions, message, fields)
+    for field, selection in zip(fields, found, strict=True):
+        if not selection.count:
+            raise ConversionError(f"the length of `{field}` differs from message to message; take one: {field}[0]")
+    types = {_SCALARS.get(piece.type, "i32") for selection in found for piece in selection.pieces}
+    return types.pop() if len(types) == 1 else "f64", sum(selection.count for selection in found)
+
+
+def _each(definitions: Definitions, message: str, fields: Sequence[str]) -> list[Selection]:
+    try:
+        return [select(definitions, message, field) for field in fields]
+    except FieldError as error:
+        raise ConversionError(f"{error.args[0]}; {error.args[1]}") from None

@@ -15,7 +15,7 @@ from typing import Any
 import pytest
 from mcap.reader import make_reader
 from mcap.writer import Writer
-from requirements_oracle import Generator, Values, verdict, written
+from requirements_oracle import Generator, Values, fields, verdict, written
 
 from simclient import AlgTwin, ProcessTwin, PyTwin, TwinError
 from simclient.replay.check_bag import main
@@ -25,6 +25,7 @@ from simclient.twin.search import find_violation
 from simclient.twin.twin import Twin
 
 TICK_HZ = 100
+KINDS = ("when", "then", "never", "at_end")
 SOURCE = """\
 class Source:
     inputs = {}
@@ -194,6 +195,35 @@ def test_a_bag_is_judged_as_the_flight_was(tmp_path: Path, capsys: pytest.Captur
         flown = twin.requirements
     status, found = judged(capsys, tmp_path / "flight", path)
     assert status == 1 and found["ticks"] == 200
+    for id_, flew in flown.items():
+        got = found["requirements"][id_]
+        assert {k: got[k] for k in (*COUNTS, "undecided")} == {k: getattr(flew, k, "") for k in (*COUNTS, "undecided")}
+
+
+def test_a_bag_is_judged_without_the_machine_as_the_flight_was(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    """On the messages that a map names, with their types, NaNs and all."""
+    generator = Generator(3, TICK_HZ)
+    every = [generator.requirement(f"R-{i}") for i in range(150)]
+    chosen = [
+        r
+        for r in every
+        if "clock" not in r and all(f.startswith("src.") for k in KINDS if k in r for f in fields(r[k]))
+    ]
+    path = machine(tmp_path, [written(requirement) for requirement in chosen[:25]])
+    with AlgTwin.from_config(path) as twin:
+        twin.record(tmp_path / "flight")
+        fly(twin, 3, 200)
+        twin.stop_recording()
+        flown = twin.requirements
+    (tmp_path / "f.json").write_text(json.dumps({"requirements": json.loads(path.read_text())["requirements"]}))
+    values = {f"src.outputs.{name}": {"topic": "/craft/src", "field": name} for name in "xynubv"}
+    (tmp_path / "map.json").write_text(json.dumps({"time": "log", "tick_hz": TICK_HZ, "values": values}))
+    more = ["--requirements", str(tmp_path / "f.json"), "--map", str(tmp_path / "map.json"), "--json"]
+    assert main([str(tmp_path / "flight"), *more]) == 1
+    found = json.loads(capsys.readouterr().out)
+    assert found["ticks"] == 200 and len(flown) == 25
     for id_, flew in flown.items():
         got = found["requirements"][id_]
         assert {k: got[k] for k in (*COUNTS, "undecided")} == {k: getattr(flew, k, "") for k in (*COUNTS, "undecided")}

@@ -190,29 +190,21 @@ def _completed(entry: Entry, machine: Machine, bag: Bag) -> tuple[Entry, Channel
 
 def _wishes(chart: Map, machine: Machine, bag: Bag) -> list[Wish]:
     wishes: list[Wish] = []
-    seen: dict[tuple[str, str], str] = {}
     for entry in _entries(chart, machine):
         entry, channel = _completed(entry, machine, bag)
-        key = (entry.target, entry.topic)
-        if key in seen:
-            raise MapError(
-                f"{entry.location}: channel `{key[0]}` is mapped from `{key[1]}` twice; first at {seen[key]}"
-            )
-        seen[key] = entry.location
         wishes.append(wish(bag, entry, channel.field.type, channel.field.count, null_refused=True))
     return wishes
 
 
-def _grid(chart: Map, all_samples: Mapping[str, TargetSamples], bag: Bag, tick_hz: int) -> TickGrid:
-    """Ticks from the first sample of any channel to the tick that receives the last one.
+def grid_of(path: str, all_samples: Mapping[str, TargetSamples], bag: Bag, tick_hz: int) -> TickGrid:
+    """Ticks from the first sample of any target to the tick that receives the last one. `path`: the map.
 
     Raises MapError or BagError.
     """
     for name, samples in all_samples.items():
         if samples.messages and not len(samples.times_ns):
             raise MapError(
-                f"{chart.path}: channel `{name}`: no message can be used: "
-                f"{', '.join(refusals(samples.refused, samples.frames))}"
+                f"{path}: `{name}`: no message can be used: {', '.join(refusals(samples.refused, samples.frames))}"
             )
     times = [samples.times_ns for samples in all_samples.values() if len(samples.times_ns)]
     if not times:
@@ -222,7 +214,7 @@ def _grid(chart: Map, all_samples: Mapping[str, TargetSamples], bag: Bag, tick_h
     ticks = tick_count(first_ns, last_ns, tick_hz)
     if ticks > MAX_TICKS:
         raise MapError(
-            f"{chart.path}: stamps from {first_ns / 1e9:.3f} s to {last_ns / 1e9:.3f} s would make {ticks} ticks; "
+            f"{path}: stamps from {first_ns / 1e9:.3f} s to {last_ns / 1e9:.3f} s would make {ticks} ticks; "
             "is one of them wrong? `time: log` takes the times of recording instead"
         )
     return TickGrid(first_ns, ticks, tick_hz)
@@ -294,7 +286,7 @@ def run_foreign(
     wishes = _wishes(chart, machine, bag)
     total = sum(bag.topics[topic].count for topic in {w.topic.name for w in wishes})
     all_samples, oddities = gather(bag, wishes, chart.header_time, lambda done: progress("reading", done, total))
-    grid = _grid(chart, all_samples, bag, machine.tick_hz)
+    grid = grid_of(chart.path, all_samples, bag, machine.tick_hz)
     deliveries, fates = [], {}
     # By the identity of the times, which the channels of a topic share.
     aligned: dict[int, tuple[Array, Array, Coverage]] = {}

@@ -49,6 +49,7 @@ measured; quaternions of length zero or infinity. A channel without a usable mes
 from __future__ import annotations
 
 import math
+import re
 from collections.abc import Sequence
 from dataclasses import dataclass
 from decimal import Decimal, InvalidOperation
@@ -63,10 +64,13 @@ from fcsl_compiler.api.ros import QUATERNION_AXES, VECTOR_AXES
 from ..errors import MapError, did_you_mean
 
 _MAX_MAP_BYTES = 1 << 20
+#: Of a machine, too.
+_MAX_TICK_HZ = 1_000_000
 _FROM_MACHINE = "from machine"
 _SOURCE_KEYS = ("topic", "field", "axes", "from", "quaternion", "rotation", "scale", "offset")
 _CHANNEL_KEYS = (*_SOURCE_KEYS, "timeout_ms")
 _EXPECT_KEYS = (*_SOURCE_KEYS, "compare", "abs", "rel", "from_s", "until_s", "align")
+_VALUE = re.compile(r"[A-Za-z]\w*\.outputs\.[A-Za-z]\w*", re.ASCII)
 _AXES = (*VECTOR_AXES, *QUATERNION_AXES)
 
 
@@ -117,6 +121,16 @@ class Map:
     from_machine: bool
     entries: tuple[Entry, ...]
     expectations: tuple[Expectation, ...]
+
+
+@dataclass(frozen=True)
+class ValueMap:
+    """A map file of values without a machine: `entries` name what requirements read, at `tick_hz`."""
+
+    path: str
+    header_time: bool
+    tick_hz: int
+    entries: tuple[Entry, ...]
 
 
 #: Key to (key node, value node).
@@ -237,11 +251,11 @@ def _entry(reader: _Reader, what: str, target: str, node: yaml.Node, members: _M
     )
 
 
-def _channel_entry(reader: _Reader, channel: str, node: yaml.Node) -> Entry:
+def _target_entry(reader: _Reader, what: str, target: str, node: yaml.Node) -> Entry:
     if isinstance(node, yaml.ScalarNode):
-        return Entry(channel, reader.text(node, f"channel `{channel}`"), location=reader.location(node))
-    members = reader.members(node, f"channel `{channel}`", _CHANNEL_KEYS)
-    return _entry(reader, "channel", channel, node, members)
+        return Entry(target, reader.text(node, f"{what} `{target}`"), location=reader.location(node))
+    members = reader.members(node, f"{what} `{target}`", _CHANNEL_KEYS)
+    return _entry(reader, what, target, node, members)
 
 
 def _expectation(reader: _Reader, output: str, node: yaml.Node) -> Expectation:
@@ -289,7 +303,7 @@ def _compose(path: Path) -> yaml.Node:
     except (yaml.YAMLError, RecursionError) as error:
         raise MapError(f"{path}: {str(error).splitlines()[0]}") from None
     if node is None:
-        raise MapError(f"{path}: empty; a map has `channels`")
+        raise MapError(f"{path}: empty; a map has `channels` or `values`")
     return node
 
 
@@ -297,14 +311,26 @@ def _channels(reader: _Reader, node: yaml.Node) -> tuple[bool, tuple[Entry, ...]
     """Whether the machine's `ros` blocks define the entries (`from machine`), and otherwise the entries."""
     if isinstance(node, yaml.ScalarNode) and node.value == _FROM_MACHINE:
         return True, ()
+    return False, _targets(reader, "channel", node)
+
+
+def _targets(reader: _Reader, what: str, node: yaml.Node) -> tuple[Entry, ...]:
+    """The entries of `channels` or `values`, as `what` says."""
     entries = tuple(
-        _channel_entry(reader, channel, source)
-        for channel, (_, value) in reader.members(node, "`channels`").items()
+        _target_entry(reader, what, target, source)
+        for target, (_, value) in reader.members(node, f"`{what}s`").items()
         for source in reader.listed(value)
     )
     if not entries:
-        raise reader.fail(node, "`channels` maps nothing")
-    return False, entries
+        raise reader.fail(node, f"`{what}s` maps nothing")
+    seen: dict[tuple[str, str], str] = {}
+    for entry in entries:
+        first = seen.setdefault((entry.target, entry.topic), entry.location)
+        if first != entry.location:
+            raise MapError(
+                f"{entry.location}: {what} `{entry.target}` is mapped from `{entry.topic}` twice; first at {first}"
+            )
+    return entries
 
 
 def read_map(path: str | Path, only_expect: bool = False) -> Map:
@@ -315,10 +341,37 @@ def read_map(path: str | Path, only_expect: bool = False) -> Map:
     needed = "expect" if only_expect else "channels"
     if needed not in members:
         raise reader.fail(root, f"`{needed}` is missing")
-    header_time = "time" not in members or reader.choice(members["time"][1], "`time`", ("header", "log")) == "header"
+    header_time = _has_header_time(reader, members)
     from_machine, entries = _channels(reader, members["channels"][1]) if "channels" in members else (False, ())
     expectations = []
     if "expect" in members:
         outputs = reader.members(members["expect"][1], "`expect`")
         expectations = [_expectation(reader, output, node) for output, (_, node) in outputs.items()]
     return Map(str(path), header_time, from_machine, entries, tuple(expectations))
+
+
+def read_value_map(path: str | Path) -> ValueMap:
+    """Reads a map file with `values` and `tick_hz`. Raises MapError with file, line and column."""
+    reader = _Reader(str(path))
+    root = _compose(Path(path))
+    members = reader.members(root, "a map without a machine", ("time", "tick_hz", "values"))
+    for key in ("tick_hz", "values"):
+        if key not in members:
+            raise reader.fail(root, f"`{key}` is missing")
+    tick_hz = reader.number(members["tick_hz"][1], "`tick_hz`")
+    if tick_hz not in range(1, _MAX_TICK_HZ + 1):
+        raise reader.fail(members["tick_hz"][1], f"`tick_hz` must be a whole number from 1 to {_MAX_TICK_HZ}")
+    entries = _targets(reader, "value", members["values"][1])
+    for entry in entries:
+        if not entry.fields:
+            raise MapError(f"{entry.location}: value `{entry.target}`: `field` is missing")
+        if not _VALUE.fullmatch(entry.target):
+            raise MapError(
+                f"{entry.location}: `{entry.target}` is no name of a value: write <name>.outputs.<name>, as a requirement "
+                "reads it, such as `imu.outputs.gyro`"
+            )
+    return ValueMap(str(path), _has_header_time(reader, members), int(tick_hz), entries)
+
+
+def _has_header_time(reader: _Reader, members: _Members) -> bool:
+    return "time" not in members or reader.choice(members["time"][1], "`time`", ("header", "log")) == "header"

@@ -207,13 +207,18 @@ class _Column:
 
 
 def gather(
-    bag: Bag, wishes: Sequence[Wish], header_time: bool, progress: Callable[[int], None] = lambda done: None
+    bag: Bag,
+    wishes: Sequence[Wish],
+    header_time: bool,
+    progress: Callable[[int], None] = lambda done: None,
+    nan_allowed: bool = False,
 ) -> tuple[dict[str, TargetSamples], dict[str, Oddities]]:
-    """(samples by target, oddities of times by topic). `progress` receives the number of messages read.
+    """(samples by target, oddities of times by topic). `progress` receives the number of messages read. `nan_allowed`: a
+    NaN is a value, else it is refused.
 
     Raises MapError for entries that do not fit their message, BagError for a bag without the definitions.
     """
-    columns = {topic: _column(bag, topic, wishes) for topic in sorted({w.topic.name for w in wishes})}
+    columns = {topic: _column(bag, topic, wishes, nan_allowed) for topic in sorted({w.topic.name for w in wishes})}
     done = 0
     for batch, announced in bag.batches(columns.keys()):
         numbers = batch.entries["number"]
@@ -233,13 +238,14 @@ def gather(
     return {target: _merged(found) for target, found in parts.items()}, oddities
 
 
-def _column(bag: Bag, topic: str, wishes: Sequence[Wish]) -> _Column:
+def _column(bag: Bag, topic: str, wishes: Sequence[Wish], nan_allowed: bool) -> _Column:
     mine = [w for w in wishes if w.topic.name == topic]
     definitions = definitions_of(bag.store(topic).fielddefs)
     frame, child_frame = (_agreed(mine, key) for key in ("frame", "child_frame"))
     kind = mine[0].topic.type
     try:
-        return _Column(Reader(definitions, kind, [w.pick for w in mine], frame, child_frame), mine, frame, child_frame)
+        reader = Reader(definitions, kind, [w.pick for w in mine], frame, child_frame, nan_allowed=nan_allowed)
+        return _Column(reader, mine, frame, child_frame)
     except MapError:
         for w in mine:  # which of them it is
             try:
