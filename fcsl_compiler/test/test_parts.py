@@ -353,6 +353,58 @@ def test_a_part_is_a_machine_of_its_own(tmp_path: Path) -> None:
     assert twins.get("rate.pi.outputs.u") != 0.0
 
 
+RATE_REQUIREMENTS = """{"requirements": [
+    {"id": "R-1", "text": "A large integral gives a large output.", "when": "pi.state.integral > k",
+     "then": "pi.outputs.u > k * max_over(pi.inputs.rate, 0.5)", "clock": "pi"}
+]}"""
+
+
+def with_requirements(craft: dict[str, Any], attitude: dict[str, Any], rate: dict[str, Any]) -> None:
+    rate["requirements"] = "required.json"
+    attitude["requirements"] = [
+        {"id": "A-1", "text": "It is small.", "when": "machine.tick > k", "then": "rate.outputs.pair.first < 9.5"},
+        {"id": "A-2", "text": "It ends.", "at_end": "rate.pi.outputs.u - law.outputs.rate * k < 1.0"},
+    ]
+    craft["requirements"] = [{"id": "C-1", "text": "Both.", "then": "att.outputs.first == spare.rate.pi.outputs.u"}]
+
+
+def test_requirements_of_parts_are_of_the_machine(tmp_path: Path) -> None:
+    """Ids and instances have the part before them; paths are ports, or fields of its instances; constants are its own."""
+    files = {**FILES, "parts/rate/required.json": RATE_REQUIREMENTS}
+    path = write(tmp_path, with_requirements, files)
+
+    def requirements_of(path: Path) -> dict[str, tuple[list[Any], str | None]]:
+        requirements = compile_machine(path, "", until="schedule").requirements
+        nodes = {r.id: [node for root in r.expressions for node in root.walk()] for r in requirements}
+        named = {id_: [n.value for n in own if n.operator in ("field", "literal")] for id_, own in nodes.items()}
+        return {r.id: (named[r.id], r.clock) for r in requirements}
+
+    found = requirements_of(path)
+    assert list(found) == ["C-1", "att.A-1", "att.A-2", "att.rate.R-1", "spare.A-1", "spare.A-2", "spare.rate.R-1"]
+    pi = "att.rate.pi"
+    assert found["C-1"] == (["att.rate.pi.outputs.pair.first", "spare.rate.pi.outputs.u"], None)
+    assert found["att.A-1"] == (["machine.tick", 3, f"{pi}.outputs.pair.first", 9.5], None)
+    assert found["att.A-2"] == ([f"{pi}.outputs.u", "att.law.outputs.rate", 3, 1.0], None)
+    assert found["att.rate.R-1"] == ([f"{pi}.state.integral", 2, f"{pi}.outputs.u", 2, f"{pi}.inputs.rate"], pi)
+    alone = requirements_of(tmp_path / "parts/attitude.json")
+    assert alone["rate.R-1"][1] == "rate.pi" and list(alone) == ["A-1", "A-2", "rate.R-1"]
+    machine = compile_machine(path, "", until="schedule").checked
+    assert machine.hashed_text == compile_machine(write(tmp_path), "", until="schedule").checked.hashed_text
+
+
+def test_a_wrong_requirement_in_the_file_that_a_part_names(tmp_path: Path) -> None:
+    wrong = {**FILES, "parts/rate/required.json": RATE_REQUIREMENTS.replace("pi.state", "pi.stat")}
+    found = said(diagnose(tmp_path, with_requirements, wrong)[0])
+    assert found[0].startswith('parts/rate/required.json "pi.stat.integral > k" E257: `when`: there is no field')
+    assert found[1] == 'parts/attitude.json "rate/rate.json" `att.rate` is a part here'
+    (tmp_path / "parts/rate/required.json").unlink()
+    missing = said(diagnose(tmp_path, with_requirements)[0])
+    assert (
+        missing[0] == 'parts/rate/rate.json "required.json" E100: cannot read `parts/rate/required.json`: no such file'
+    )
+    assert missing[-1] == f"paths are relative to {tmp_path / 'parts/rate'}"
+
+
 def test_the_source_hash_covers_what_parts_hold(tmp_path: Path) -> None:
     def hash_of(**files: str) -> str:
         changed = {name: files.get(name.rpartition("/")[2].partition(".")[0], text) for name, text in FILES.items()}
@@ -573,6 +625,16 @@ def no_list_of_requests(craft: dict[str, Any], attitude: dict[str, Any], rate: d
 
 
 #: All that the only error says: file, text at the place, code and message, notes in the same form, correction.
+CONDITION = 'write a condition, such as "held(abs(nav.outputs.speed) < 2.0, 0.5)"'
+
+
+def required(key: str, value: str) -> Change:
+    def change(craft: dict[str, Any], attitude: dict[str, Any], rate: dict[str, Any]) -> None:
+        attitude["requirements"] = [{"id": "A", "text": "It is small.", "then": "law.outputs.rate < 9.0", key: value}]
+
+    return change
+
+
 SAYS: dict[str, tuple[Change, list[str]]] = {
     "a struct of the machine": (
         lambda craft, attitude, rate: craft.update(structs=rate.pop("structs")),
@@ -755,6 +817,49 @@ SAYS: dict[str, tuple[Change, list[str]]] = {
         [
             'craft.json "body.period" E215: a sensor is an output or an input, not `body.period`',
             'write "body.inputs.period"',
+        ],
+    ),
+    "a requirement of no field": (
+        required("then", "law.outputs.rote < 9.0"),
+        [
+            'parts/attitude.json "law.outputs.rote < 9.0" E257: `then`: there is no field `law.outputs.rote`; did you mean '
+            "`law.outputs.rate`?",
+            'craft.json "parts/attitude.json" `att` is a part here',
+            CONDITION,
+        ],
+    ),
+    "a requirement of an instance that another part has": (
+        required("then", "pi.outputs.u < 9.0"),
+        [
+            'parts/attitude.json "pi.outputs.u < 9.0" E257: `then`: no instance `pi`; the instances are law, rate.pi',
+            'craft.json "parts/attitude.json" `att` is a part here',
+            CONDITION,
+        ],
+    ),
+    "a requirement of the machine's state": (
+        required("then", "machine.state == 'FLY'"),
+        [
+            "parts/attitude.json \"machine.state == 'FLY'\" E257: `then`: `machine.state` is of the machine around a part, "
+            "which knows only its own and `machine.tick`",
+            'craft.json "parts/attitude.json" `att` is a part here',
+            CONDITION,
+        ],
+    ),
+    "a clock of a requirement": (
+        required("clock", "lew"),
+        [
+            'parts/attitude.json "lew" E206: no instance `lew`',
+            'craft.json "parts/attitude.json" `att` is a part here',
+            "did you mean `law`?",
+        ],
+    ),
+    "a requirement of no port": (
+        lambda craft, attitude, rate: craft.update(
+            requirements=[{"id": "C", "text": "It is small.", "then": "att.outputs.w < 9.0"}]
+        ),
+        [
+            'craft.json "att.outputs.w < 9.0" E257: `then`: there is no field `att.outputs.w`; did you mean `att.outputs.u`?',
+            CONDITION,
         ],
     ),
     "a part as a guard": (

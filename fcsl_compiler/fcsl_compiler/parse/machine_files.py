@@ -172,8 +172,7 @@ def parse_machine(path: Path, sink: DiagnosticSink) -> ParsedMachine | None:
         for key, (definition, span) in reader.named(keys.get("algorithms"), "`algorithms`").items()
     }
     targets = read_targets(keys.get("targets"), path, reader)
-    texts = {part.name: part.text for part in joined.files}
-    hashed_text = "\n".join((text_without(source, root, ("views", "requirements")), *texts.values()))
+    hashed_text = "\n".join((text_without(source, root, ("views", "requirements")), *joined.hashed.values()))
     return ParsedMachine(
         name, source, package_of(path, name), keys, algorithms, targets, hashed_text, reader.constants, joined
     )

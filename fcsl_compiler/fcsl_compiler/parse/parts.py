@@ -17,7 +17,7 @@ from ..base.files import SourceError
 from ..base.source import SourceFile, Span
 from .constants import read_constants
 from .json_reader import ConfigReader, Scope, is_name
-from .json_source import JsonNode, Member, parse_json
+from .json_source import JsonNode, Member, parse_json, text_without
 from .source_path import SourcePathError, beside, missing_file_help, resolve_source
 
 #: Maximum depth of parts in parts, and number of all parts.
@@ -26,7 +26,7 @@ MAX_PARTS = 1000
 MAX_TICK_HZ = 1_000_000
 
 _REQUIRED = ("tick_hz", "initial_state", "algorithms", "instances", "states")
-_OPTIONAL = ("$schema", "description", "structs", "constants", "connections", "requests", "ports")
+_OPTIONAL = ("$schema", "description", "structs", "constants", "connections", "requests", "ports", "requirements")
 _TREE = ("structs", "constants", "algorithms", "instances", "connections")
 _RECORDS = ("inputs", "outputs", "parameters")
 #: Names that an instance cannot have, because paths and the machine's topics use them.
@@ -41,7 +41,7 @@ _WHOLE = "a part is scheduled as a whole, at its own rates"
 
 
 @dataclass(frozen=True)
-class _Port:
+class Port:
     """`instance.field` of the whole machine that a part's port stands for."""
 
     instance: str
@@ -49,7 +49,7 @@ class _Port:
 
 
 @dataclass
-class _File:
+class MachineFile:
     """One machine of those that are joined, and what its own text may name."""
 
     prefix: str  # of its instances: "" of the whole machine, else "att."
@@ -59,19 +59,36 @@ class _File:
     tick_hz: int
     chain: tuple[Path, ...]  # this file and those that it is a part of
     scope: Scope = field(default_factory=Scope)
-    parts: dict[str, _File] = field(default_factory=dict)
-    ports: dict[str, dict[str, list[_Port]]] = field(default_factory=lambda: {r: {} for r in _RECORDS})
+    parts: dict[str, MachineFile] = field(default_factory=dict)
+    ports: dict[str, dict[str, list[Port]]] = field(default_factory=lambda: {r: {} for r in _RECORDS})
     #: By instance of the whole machine: its rate, and the tick_hz whose ticks its phase counts.
     schedule: dict[str, tuple[Member, int]] = field(default_factory=dict)
 
+    @property
+    def all(self) -> list[MachineFile]:
+        """This one and its parts."""
+        return [self, *(file for part in self.parts.values() for file in part.all)]
+
+    @property
+    def fields_by_port(self) -> dict[str, str]:
+        """By the path that a port of a part has in this file, the path in the whole machine of what it stands for; only ports
+        that stand for one field."""
+        return {
+            f"{name}.{record}.{port}": f"{found[0].instance}.{record}.{found[0].field}"
+            for name, part in self.parts.items()
+            for record, ports in part.ports.items()
+            for port, found in ports.items()
+            if len(found) == 1
+        }
+
 
 class Joined:
-    """A machine without parts. `keys` are as if one file had all; `files` are the machine JSONs of its parts, and
-    `ports` the ports that all declare, as (record, path)."""
+    """A machine without parts. `keys` are as if one file had all; `whole` is its own file, `hashed` by name the texts of the
+    machine JSONs of its parts, and `ports` the ports that all declare, as (record, path)."""
 
     def __init__(self, path: Path, keys: dict[str, JsonNode], reader: ConfigReader):
         self.reader, self.sink, self._config = reader, reader.sink, path
-        self.files: list[SourceFile] = []
+        self.hashed: dict[str, str] = {}
         self.ports: list[tuple[str, JsonNode]] = []
         self._constants: dict[str, JsonNode | None] = {}  # by part
         self._algorithms: dict[str, Member] = {}
@@ -81,7 +98,7 @@ class Joined:
         self._connections: list[JsonNode] = []
         before = self.sink.errors
         tick_hz = reader.integer(keys.get("tick_hz"), "tick_hz", 1, MAX_TICK_HZ, "Hz") or 0
-        own = _File("", "", path, keys, tick_hz, (path.resolve(),))
+        own = self.whole = MachineFile("", "", path, keys, tick_hz, (path.resolve(),))
         has_parts = any(m.value.get("machine") is not None for m in _object(keys.get("instances")).values())
         if has_parts:
             self._join(own)
@@ -100,7 +117,7 @@ class Joined:
     def tree(self) -> dict[str, Any]:
         """What a JSON of the whole machine would have, and of each part its folder, constants and requests, for a second
         reader. Empty for a machine without parts."""
-        if not self.files:
+        if not self.scopes:
             return {}
         parts = {}
         for source, scope in self.scopes.items():
@@ -111,7 +128,7 @@ class Joined:
 
     # ---- one file --------------------------------------------------------------------------------------------------
 
-    def _join(self, file: _File) -> None:
+    def _join(self, file: MachineFile) -> None:
         """Adds what a file has, that of its parts included."""
         self._add_structs(file)
         names = self._add_algorithms(file)
@@ -140,7 +157,7 @@ class Joined:
         if file.prefix:
             self._read_schedule(file)
 
-    def _add_structs(self, file: _File) -> None:
+    def _add_structs(self, file: MachineFile) -> None:
         for name, member in _object(file.keys.get("structs")).items():
             known = self._structs.setdefault(name, member)
             if known is not member and str(plain(known.value)) != str(plain(member.value)):  # in the same order, too
@@ -149,7 +166,7 @@ class Joined:
                 message = f"struct `{name}` has other members in another file"
                 self.sink.error("E255", message, member.key_span, help=fix, notes=notes)
 
-    def _check_structs(self, file: _File) -> None:
+    def _check_structs(self, file: MachineFile) -> None:
         """Reports members of a part's structs whose types only other files declare."""
         for part in file.parts.values():
             self._check_structs(part)
@@ -162,7 +179,7 @@ class Joined:
                     message = f"unknown type `{found[1]}`"
                     self.sink.error("E232", message, member.value.span, why=STRUCTS, help=fix, notes=notes)
 
-    def _add_algorithms(self, file: _File) -> dict[str, str]:
+    def _add_algorithms(self, file: MachineFile) -> dict[str, str]:
         """Adds the algorithms of a file. Returns their names in the whole machine: the same class of the same file is one
         algorithm."""
         known: dict[tuple[Any, ...], list[str]] = {}
@@ -184,7 +201,7 @@ class Joined:
             self.users.setdefault(names[name], []).append(member.key_span)
         return names
 
-    def _free_name(self, file: _File, name: str) -> str:
+    def _free_name(self, file: MachineFile, name: str) -> str:
         """A name that no algorithm of the whole machine has."""
         own = name if name not in self._algorithms else file.prefix.replace(".", "_") + name
         numbered = (f"{own}_{n}" for n in range(2, len(self._algorithms) + 3))
@@ -199,7 +216,7 @@ class Joined:
         scope = node.span.source.path if is_own else ""  # of its constants
         return own.get("source"), own.get("class", name), str(sizes), scope, str(sorted(renamed.items()))
 
-    def _connection(self, file: _File, item: JsonNode) -> list[JsonNode]:
+    def _connection(self, file: MachineFile, item: JsonNode) -> list[JsonNode]:
         """A connection with paths of the whole machine. To a port that stands for several inputs there are several."""
         if item.kind != "object":
             return [item]
@@ -213,12 +230,14 @@ class Joined:
 
     # ---- a part ----------------------------------------------------------------------------------------------------
 
-    def _include(self, outer: _File, name: str, node: JsonNode, span: Span) -> None:
+    def _include(self, outer: MachineFile, name: str, node: JsonNode, span: Span) -> None:
         """Joins the part that an instance names."""
         keys = self.reader.object(node, f"part `{name}`", ("machine",), ("parameters", "inputs", "requests")) or {}
         text = self.reader.string(keys.get("machine"), "`machine`", "parts/attitude_control.json")
         part = self._read(outer, name, keys["machine"], beside(outer.folder, text)) if text is not None else None
-        outer.parts[name] = part or _File(f"{outer.prefix}{name}.", "", outer.path, {}, outer.tick_hz, outer.chain)
+        outer.parts[name] = part or MachineFile(
+            f"{outer.prefix}{name}.", "", outer.path, {}, outer.tick_hz, outer.chain
+        )
         if part is None:
             return
         self._bind_requests(outer, part, keys.get("requests"), name, span)
@@ -229,7 +248,7 @@ class Joined:
                 for port in self._port(part, name, record, key, member.key_span):
                     self._give(port, record, member)
 
-    def _read(self, outer: _File, name: str, at: JsonNode, text: str) -> _File | None:
+    def _read(self, outer: MachineFile, name: str, at: JsonNode, text: str) -> MachineFile | None:
         """The file of a part. None after reporting that it cannot be one."""
         prefix = f"{outer.prefix}{name}."
         try:
@@ -248,9 +267,9 @@ class Joined:
             return None
         root = parse_json(source, self.sink)
         keys = self.reader.object(root, "a machine that is a part", _REQUIRED, _OPTIONAL) if root is not None else None
-        if keys is None:
+        if root is None or keys is None:
             return None
-        self.files.append(source)
+        self.hashed[source.name] = text_without(source, root, ("requirements",))
         scope = self.reader.scopes[source] = Scope()
         self._constants[source.part] = keys.get("constants")
         if "constants" in keys:
@@ -261,17 +280,19 @@ class Joined:
             self.reader.named(keys.get(key), f"`{key}`")
         self.reader.list(keys.get("requests"), "`requests`")
         tick_hz = self.reader.integer(keys.get("tick_hz"), "tick_hz", 1, MAX_TICK_HZ, "Hz") or 0
-        return _File(prefix, text.rpartition("/")[0], path, keys, tick_hz, (*outer.chain, path.resolve()), scope)
+        return MachineFile(prefix, text.rpartition("/")[0], path, keys, tick_hz, (*outer.chain, path.resolve()), scope)
 
-    def _why_not(self, path: Path, outer: _File) -> str:
+    def _why_not(self, path: Path, outer: MachineFile) -> str:
         """Why a file cannot be a part of another one; "" if nothing says so."""
         if path.resolve() in outer.chain:
             return "it contains itself"
-        if len(self.files) == MAX_PARTS:
+        if len(self.scopes) == MAX_PARTS:
             return f"a machine has at most {MAX_PARTS} parts"
         return f"parts are at most {MAX_DEPTH} deep" if len(outer.chain) > MAX_DEPTH else ""
 
-    def _bind_requests(self, outer: _File, part: _File, bound: JsonNode | None, name: str, span: Span) -> None:
+    def _bind_requests(
+        self, outer: MachineFile, part: MachineFile, bound: JsonNode | None, name: str, span: Span
+    ) -> None:
         """Gives the requests of a part names of the whole machine."""
         listed = [(self.reader.string(item, "a request"), item.span) for item in _items(part.keys.get("requests"))]
         own = {name: span for name, span in listed if name is not None}
@@ -301,7 +322,7 @@ class Joined:
             notes = [(own[missing[0]], "the part makes it")]
             self.sink.error("E256", message, span, help=f'add `"requests": {{{names}}}`', notes=notes)
 
-    def _give(self, port: _Port, record: str, given: Member) -> None:
+    def _give(self, port: Port, record: str, given: Member) -> None:
         """Sets the value of a parameter or an input of an instance."""
         member = self._instances.get(port.instance)
         if member is None or member.value.kind != "object":
@@ -314,7 +335,7 @@ class Joined:
         members[record] = Member(record, members[record].key_span if record in members else given.key_span, values_node)
         self._instances[port.instance] = replace(member, value=replace(member.value, value=members))
 
-    def _drop_initial(self, port: _Port) -> None:
+    def _drop_initial(self, port: Port) -> None:
         """Forgets what a part's own JSON gives an input that is connected where the part is used."""
         member = self._instances.get(port.instance)
         inputs = member.value.get("inputs") if member is not None else None
@@ -327,7 +348,7 @@ class Joined:
             member, value=_with_member(member.value, replace(old, value=replace(inputs, value=rest)))
         )
 
-    def _read_ports(self, file: _File) -> None:
+    def _read_ports(self, file: MachineFile) -> None:
         """Ports of a file, as paths of the whole machine."""
         node = file.keys.get("ports")
         keys = self.reader.object(node, "`ports`", (), _RECORDS) if node is not None else None
@@ -340,7 +361,7 @@ class Joined:
                 found = [self._inner(file, item, record) for item in items]
                 file.ports[record][name] = [port for ports in found for port in ports]
 
-    def _inner(self, file: _File, node: JsonNode, record: str) -> list[_Port]:
+    def _inner(self, file: MachineFile, node: JsonNode, record: str) -> list[Port]:
         """What one path of a port stands for."""
         text = self.reader.string(node, "a port", "instance.field")
         if text is None:
@@ -354,11 +375,11 @@ class Joined:
             inner = self._port(file.parts[head], head, record, name, node.span)
             found = [replace(p, field=f"{p.field}.{members}" if members else p.field) for p in inner]
         else:
-            found = [_Port(file.prefix + head, rest)]
+            found = [Port(file.prefix + head, rest)]
         self.ports += [(record, _text(node, f"{p.instance}.{record}.{p.field}")) for p in found]
         return found
 
-    def _read_schedule(self, file: _File) -> None:
+    def _read_schedule(self, file: MachineFile) -> None:
         """Rates of a part's instances, whose phases count the ticks of the whole machine."""
         states = _members(file.keys.get("states"))
         if len(states) != 1:
@@ -380,7 +401,7 @@ class Joined:
             else:
                 file.schedule[file.prefix + key] = Member(file.prefix + key, span, rate), file.tick_hz
 
-    def _rates_of(self, file: _File, name: str, node: JsonNode) -> dict[str, tuple[Member, int]]:
+    def _rates_of(self, file: MachineFile, name: str, node: JsonNode) -> dict[str, tuple[Member, int]]:
         """What the entry of a part in a schedule stands for."""
         if node.kind != "bool" or not node.value:
             self.sink.error("E254", f"a rate of part `{name}`", node.span, why=_WHOLE, help=f'write `"{name}": true`')
@@ -405,7 +426,7 @@ class Joined:
 
     # ---- names -----------------------------------------------------------------------------------------------------
 
-    def _port(self, part: _File, name: str, record: str, port: str, at: Span) -> list[_Port]:
+    def _port(self, part: MachineFile, name: str, record: str, port: str, at: Span) -> list[Port]:
         """What a port of a part stands for. [] after reporting that it has no such port."""
         known = part.ports[record]
         if port in known or not part.keys:
@@ -423,7 +444,7 @@ class Joined:
         self.sink.error("E216", f"part `{name}` has no {what} `{port}`", at, help=hint)
         return []
 
-    def _paths(self, file: _File, node: JsonNode, record: str) -> list[JsonNode]:
+    def _paths(self, file: MachineFile, node: JsonNode, record: str) -> list[JsonNode]:
         """What `instance.field…` of a file is in the whole machine. [] after reporting that a part has no such port."""
         head, _, rest = str(node.value).partition(".")
         if head in file.parts:
@@ -442,7 +463,7 @@ class Joined:
 
     # ---- the whole machine -----------------------------------------------------------------------------------------
 
-    def _whole(self, own: _File) -> dict[str, JsonNode]:
+    def _whole(self, own: MachineFile) -> dict[str, JsonNode]:
         keys = dict(own.keys)
         at = {key: keys[key].span for key in keys}
         keys["algorithms"] = JsonNode("object", at["algorithms"], self._algorithms)
@@ -464,7 +485,7 @@ class Joined:
                 keys[key] = self._with_ports(own, keys[key], key == "views")
         return keys
 
-    def _states(self, own: _File, node: JsonNode) -> JsonNode:
+    def _states(self, own: MachineFile, node: JsonNode) -> JsonNode:
         members, always = dict(node.members), _object(own.keys.get("always"))
         for name, member in members.items():
             schedule = member.value.get("schedule")
@@ -477,7 +498,7 @@ class Joined:
                 members[name] = replace(member, value=replace(member.value, value=state))
         return replace(node, value=members)
 
-    def _scheduled(self, own: _File, node: JsonNode) -> JsonNode:
+    def _scheduled(self, own: MachineFile, node: JsonNode) -> JsonNode:
         """A schedule in which the instances of parts stand for these."""
         found: dict[str, Member] = {}
         for key, member in node.members.items():
@@ -492,11 +513,11 @@ class Joined:
                 found[key] = member
         return replace(node, value=found)
 
-    def _published(self, own: _File, item: JsonNode) -> list[JsonNode]:
+    def _published(self, own: MachineFile, item: JsonNode) -> list[JsonNode]:
         part = own.parts.get(str(item.value))
         return [_text(item, name) for name in self._instances if name.startswith(part.prefix)] if part else [item]
 
-    def _with_ports(self, own: _File, node: JsonNode, in_views: bool) -> JsonNode:
+    def _with_ports(self, own: MachineFile, node: JsonNode, in_views: bool) -> JsonNode:
         """A value in which each text `part.record.port…` is the path of the field that the port stands for. Views may also
         show what is behind ports."""
         if node.kind == "object":

@@ -1,16 +1,15 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Reads `requirements` of a machine JSON, or the file that it names."""
+"""Reads `requirements` of a machine JSON and of its parts, or the files that they name."""
 
 from __future__ import annotations
 
 import re
-from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
 
 from ..base.diagnostics import DiagnosticSink, nearest
 from ..base.files import SourceError
-from ..base.source import SourceFile, Span
+from ..base.source import MAX_NAME, SourceFile, Span
 from ..config.times import read_ticks
 from ..emit.field_table import FieldRow, field_table
 from ..expression import units
@@ -18,12 +17,11 @@ from ..expression.parse import PAST_FUNCTIONS, parse
 from ..expression.tree import ExpressionError, Kind, Node, Quantity
 from ..model.machine import Machine, seconds, split_instance, unknown_instance
 from ..model.types import HEALTH_NAMES
-from ..parse.constants import Constants
 from ..parse.json_reader import ConfigReader
 from ..parse.json_source import JsonNode, parse_json
 from ..parse.machine_files import ParsedMachine
-from ..parse.parts import RESERVED_INSTANCES
-from ..parse.source_path import SourcePathError, missing_file_help, resolve_source
+from ..parse.parts import RESERVED_INSTANCES, MachineFile
+from ..parse.source_path import SourcePathError, beside, missing_file_help, resolve_source
 from .code import size
 from .requirement import (
     KINDS,
@@ -41,26 +39,37 @@ _TEXT_MAX = 200
 _OPTIONAL = ("when", *KINDS, "within_s", "clock", "stale", "assume")
 #: Fields whose value at the end of a tick is that of the coming one.
 _LATER = ("machine.next_state", "machine.ticks_in_state")
+#: The one field of the machine that a part's requirement can name.
+_TICK = "machine.tick"
 _BRACKETS = re.compile(r"\[([\d, ]+)\]")
 
 
 @dataclass(frozen=True)
 class Signal:
-    """A field of a machine, or one element or vector of it."""
+    """A field of a machine, or one element or vector of it. `path` is that of the whole machine."""
 
+    path: str
     row: FieldRow
     shape: tuple[int, ...]
 
 
 class Signals:
-    """What the paths of a machine's requirements name."""
+    """What the paths of a machine's requirements name, in the `file` of the machine or of a part of it."""
 
-    def __init__(self, machine: Machine):
-        self.machine = machine
-        self.rows = {row.path: row for row in field_table(machine)}
+    def __init__(self, machine: Machine, file: MachineFile | None = None):
+        self.machine, self._part = machine, file.prefix if file is not None else ""
+        rows = {row.path: row for row in field_table(machine)}
+        ports = _rows_of_ports(rows, file) if file is not None else {}
+        own = {path.removeprefix(self._part): row for path, row in rows.items() if path.startswith(self._part)}
+        tick = {_TICK: rows[_TICK]} if self._part else {}
+        self.rows = {**own, **ports, **tick}
+        #: As the file writes their names.
+        self.known = [i.name.removeprefix(self._part) for i in machine.instances if i.name.startswith(self._part)]
 
     def find(self, path: str) -> Signal:
         """Raises ExpressionError."""
+        if self._part and path.startswith(("machine.", "channels.")) and path != _TICK:
+            raise ExpressionError(f"`{path}` is of the machine around a part, which knows only its own and `{_TICK}`")
         if path in _LATER:
             raise ExpressionError(f"`{path}` is of the coming tick, which begins when requirements have been evaluated")
         row, rest = self.rows.get(path), ""
@@ -75,7 +84,7 @@ class Signals:
             raise ExpressionError(
                 f"`{path}`: " + (f"`{row.path}` is {shape}" if shape else f"`{row.path}` is one value")
             )
-        return Signal(row, row.shape[len(index) :])
+        return Signal(f"{row.path}{rest}", row, row.shape[len(index) :])
 
     def has(self, path: str) -> bool:
         try:
@@ -109,43 +118,56 @@ class Signals:
         return self.machine.instances[row.instance].name if is_of_run else None
 
     def _unknown(self, path: str) -> str:
-        instances = [i.name for i in self.machine.instances]
-        name, rest = split_instance(path, instances)
-        if name in instances and not rest:
+        name, rest = split_instance(path, self.known)
+        if name in self.known and not rest:
             return f"`{path}` is an instance: name one of its fields, such as `{path}.outputs.health`"
-        if name in instances and rest:
-            hint = nearest(path, [p for p in self.rows if p.startswith(f"{name}.")])
+        owner = path.partition(".")[0] + "."
+        if owner == "channels." or owner in path and any(known.startswith(owner) for known in self.rows):
+            hint = nearest(path, [known for known in self.rows if known.startswith(owner)])
             return f"there is no field `{path}`" + (f"; {hint}" if hint else "")
-        if path.startswith(("machine.", "channels.")):
-            hint = nearest(path, [p for p in self.rows if p.startswith(path.partition(".")[0])])
-            return f"there is no field `{path}`" + (f"; {hint}" if hint else "")
-        message, hint = unknown_instance(name, instances)
+        message, hint = unknown_instance(name, self.known)
         return f"{message}; {hint}"
+
+
+def _rows_of_ports(rows: dict[str, FieldRow], file: MachineFile) -> dict[str, FieldRow]:
+    """The fields that ports of its parts stand for, by the paths that they have in a file."""
+    return {
+        f"{port}{path.removeprefix(target)}": row
+        for port, target in file.fields_by_port.items()
+        for path, row in rows.items()
+        if path == target or path.startswith(f"{target}.")
+    }
 
 
 def read_requirements(
     parsed: ParsedMachine, machine: Machine, file: Path | None, sink: DiagnosticSink
 ) -> list[Requirement]:
-    """Those of the machine JSON, or of another `file`. Reports what is wrong."""
-    reader = ConfigReader(sink, parsed.constants)
-    node = parsed.keys.get("requirements")
+    """Those of the machine JSON and of its parts, or of another `file`. Reports what is wrong."""
+    whole, listed = parsed.joined.whole, list[tuple[MachineFile, ConfigReader, list[JsonNode]]]()
     if file is not None:
+        reader = ConfigReader(sink, parsed.constants)
         at = SourceFile(str(file), "", str(file)).whole()
         node = _read(file, str(file), at, reader, "it is relative to the working directory")
-    elif node is not None and node.kind == "string":
-        node = _named(node, parsed, reader)
-    items = reader.list(node, "`requirements`")
+        listed.append((whole, reader, reader.list(node, "`requirements`")))
+    for own in whole.all if file is None else ():
+        reader = ConfigReader(sink, own.scope.constants if own.prefix else parsed.constants)
+        node = own.keys.get("requirements")
+        if node is not None and node.kind == "string":
+            node = _named(node, own, parsed, reader)
+        listed.append((own, reader, reader.list(node, "`requirements`")))
+    items = [node for _, _, nodes in listed for node in nodes]
     if len(items) > REQUIREMENTS_MAX:
         fix = f"{REQUIREMENTS_MAX} at most"
         sink.error("E257", f"{len(items)} requirements", items[REQUIREMENTS_MAX].span, help=fix)
         return []
-    requirements = _Reader(machine, parsed.constants, reader)
-    return [found for item in items if (found := requirements.read(item)) is not None]
+    ids: dict[str, tuple[str, Span]] = {}
+    readers = [(_Reader(machine, own, reader, ids), nodes) for own, reader, nodes in listed if nodes]
+    return [found for one, nodes in readers for node in nodes if (found := one.read(node)) is not None]
 
 
-def _named(node: JsonNode, parsed: ParsedMachine, reader: ConfigReader) -> JsonNode | None:
+def _named(node: JsonNode, file: MachineFile, parsed: ParsedMachine, reader: ConfigReader) -> JsonNode | None:
     """The list of a file that several machines may name."""
-    name = str(node.value)
+    name = beside(file.folder, str(node.value))
     try:
         path = resolve_source(name, config=parsed.folder / parsed.source.name)
     except SourcePathError as error:
@@ -156,7 +178,7 @@ def _named(node: JsonNode, parsed: ParsedMachine, reader: ConfigReader) -> JsonN
 
 def _read(path: Path, name: str, at: Span, reader: ConfigReader, fix: str = "") -> JsonNode | None:
     try:
-        source = SourceFile.read(path, name)
+        source = replace(SourceFile.read(path, name), part=at.source.part, included=at.source.included)
     except SourceError as error:
         _report_unreadable(name, at, error, reader, fix)
         return None
@@ -175,12 +197,14 @@ def _report_unreadable(
 
 
 class _Reader:
-    def __init__(self, machine: Machine, constants: Constants | None, reader: ConfigReader):
+    """Reads the requirements of one file. `ids`: those of all, as the names of instances, and where they are."""
+
+    def __init__(self, machine: Machine, file: MachineFile, reader: ConfigReader, ids: dict[str, tuple[str, Span]]):
         self.machine, self.reader, self.sink = machine, reader, reader.sink
-        self.signals = Signals(machine)
+        self.signals, self._part, self._ids = Signals(machine, file), file.prefix, ids
+        constants = reader.constants
         self.constants = constants.known if constants is not None else {}
         self._used = constants.used if constants is not None else set()
-        self._ids: dict[str, tuple[str, Span]] = {}
 
     def read(self, node: JsonNode) -> Requirement | None:
         keys = self.reader.object(node, "a requirement", ("id", "text"), _OPTIONAL)
@@ -228,6 +252,10 @@ class _Reader:
             fix = f"add a number: `{id_}-1`"
             self.sink.error("E203", f"`{id_}` is a word of paths", node.span, help=fix)
             return id_
+        id_ = self._part + id_
+        if len(id_) > MAX_NAME:
+            fix = f"{MAX_NAME} at most: give it, or the parts, a shorter name"
+            self.sink.error("E203", f"`{id_}` has {len(id_)} characters", node.span, help=fix)
         other, at = self._ids.setdefault(instance_name(id_).replace("_", ""), (id_, node.span))
         if at is not node.span:
             same = "the same id" if other == id_ else f"`{other}` and `{id_}` have the same letters and digits"
@@ -284,7 +312,9 @@ class _Reader:
             raise ExpressionError(f"`{node.text[:60]}…` is too long: write parts of it as requirements of their own")
 
     def _bound(self, node: Node) -> Node:
-        """With its constants as numbers."""
+        """With its constants as numbers, and paths of the whole machine."""
+        if node.operator == "field":
+            return replace(node, value=self.signals.find(node.value).path)
         if node.operator == "metric":
             self._used.add(node.value)
             return replace(node, operator="literal", value=self.constants[node.value][0])
@@ -308,6 +338,5 @@ class _Reader:
         return read_ticks(node, "within_s", self.machine.tick_hz, TICKS_MAX, why, self.reader) or 0
 
     def _clock(self, node: JsonNode | None) -> str | None:
-        names: Sequence[str] = [i.name for i in self.machine.instances]
-        index = self.reader.reference(node, "instance", names)
-        return None if index is None else names[index]
+        index = self.reader.reference(node, "instance", self.signals.known)
+        return None if index is None else self._part + self.signals.known[index]

@@ -60,8 +60,10 @@ def test_a_body_turns_level_as_its_linear_model(tmp_path: Path) -> None:
 
 
 def test_a_large_tilt_is_taken_back(tmp_path: Path) -> None:
-    with AlgTwin.from_config(craft(tmp_path)) as twin:
+    limited = {**PARAMETERS, "rate_limit": [3, 3, 3], "torque_limit": [0.3, 0.3, 0.3]}
+    with AlgTwin.from_config(craft(tmp_path, parameters=limited)) as twin:
         attitude, rate = turned(twin, Rotation.from_euler("ZYX", [100.0, 40.0, -70.0], degrees=True), 4.0)
+        assert {id_: v.status for id_, v in twin.requirements.items()} == {"att.ATT-1": "met", "att.ATT-2": "met"}
     assert attitude.magnitude() < 1e-3 and np.abs(rate).max() < 1e-3
 
 

@@ -50,6 +50,9 @@ PART: dict[str, Any] = {
     "connections": [{"from": "law.rate", "to": "rate.target"}],
     "states": {"RUN": {"schedule": {"law": 100, "rate": 50}}},
     "ports": {"inputs": {"angle": "law.angle"}, "outputs": {"torque": "rate.torque"}},
+    "requirements": [
+        {"id": "ATT-1", "text": "The torque is small.", "never": "rate.outputs.torque > 2.0", "clock": "rate"}
+    ],
 }
 CONFIG: dict[str, Any] = {
     "tick_hz": 100,
@@ -111,6 +114,15 @@ def test_a_twin_names_instances_of_parts(twin: AlgTwin) -> None:
         twin.fault("att.rote")
     with pytest.raises(TwinError, match="`att.rate` is not a field but a group of fields: att.rate.inputs.target, "):
         twin.get_value("att.rate")
+
+
+def test_a_requirement_of_a_part_is_judged_in_the_machine(twin: AlgTwin) -> None:
+    twin.tick(20)
+    assert str(twin.requirements["att.ATT-1"]) == "att.ATT-1 met, exercised in 10 ticks"
+    twin.set("att.rate.parameters.gain", 9.0)
+    twin.tick(2)
+    path, verdict = "att.rate.outputs.torque", twin.requirements["att.ATT-1"]
+    assert verdict.first_tick == 20 and verdict.first == {path: twin.get_value(path)}
 
 
 def test_a_port_of_a_part_is_no_field(twin: AlgTwin) -> None:
