@@ -54,7 +54,7 @@ class Machine:
 
     def _hidden(self) -> list[str]:
         """Folders that the guest needs and would not see, those that hold others first."""
-        needed = (HERE.parents[1], Path(sys.prefix), self.kernel.parent, Path.cwd())
+        needed = (HERE.parents[1], Path(sys.prefix), Path(sys.base_prefix), self.kernel.parent, Path.cwd())
         found = {path.resolve() for path in needed}
         return sorted(str(path) for path in found if any(Path(own) in path.parents for own in _OWN))
 
