@@ -48,6 +48,7 @@ FOLDERS: dict[str, Sequence[str]] = {
         "bag",
         "view",
         "replay",
+        "trace",
         "vars",
         "twin",
         "telemetry",

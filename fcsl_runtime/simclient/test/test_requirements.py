@@ -20,7 +20,6 @@ from requirements_oracle import Generator, Values, fields, verdict, written
 from simclient import AlgTwin, ProcessTwin, PyTwin, TwinError
 from simclient.replay.check_bag import main
 from simclient.requirements import Status
-from simclient.trace_matrix import matrix
 from simclient.twin.search import find_violation
 from simclient.twin.twin import Twin
 
@@ -109,9 +108,11 @@ def fly(twin: Twin, seed: int, ticks: int) -> list[Values]:
                 *(f"{i}.outputs.health" for i in ("src", "slow", "other")),
             )
         }
+        acting = [f.path for f in twin.fields("requirements.") if f.path.endswith(".outputs.health")]
         left.append(
             {
                 **values,
+                "acting": {path.split(".")[1].upper().replace("_", "-"): twin.get_value(path) for path in acting},
                 "src.outputs.v[1]": values["src.outputs.v"][1],
                 "machine.state": state,
                 "ran": {"slow"} if ran else set(),
@@ -127,6 +128,9 @@ COUNTS = ("holds", "evaluated", "exercised", "undefined", "violations", "violate
 def test_generated_formulas_equal_their_definitions(seed: int, tmp_path: Path) -> None:
     generator = Generator(seed, TICK_HZ)
     requirements = [generator.requirement(f"R-{i}") for i in range(60)]
+    for requirement in requirements[::4]:
+        if "at_end" not in requirement:
+            requirement["effect"] = {"degrade": "src"}
     path = machine(tmp_path, [written(requirement) for requirement in requirements])
     opened: list[tuple[str, Any]] = [("C", AlgTwin.from_config(path)), ("CPython", PyTwin.from_config(path))]
     if seed == 0:
@@ -138,6 +142,10 @@ def test_generated_formulas_equal_their_definitions(seed: int, tmp_path: Path) -
         for requirement in requirements:
             expected = verdict(requirement, left, TICK_HZ)
             got = found[requirement["id"]]
+            if "effect" in requirement:
+                acted = [tick for tick, values in enumerate(left) if values["acting"][requirement["id"]] == "degraded"]
+                ends = (acted[0], acted[-1]) if acted else (None, None)
+                assert (len(acted), *ends) == (got.violated_ticks, got.first_tick, got.last_tick), (name, requirement)
             shown = {count: getattr(got, count) for count in COUNTS}
             assert shown == {count: getattr(expected, count) for count in COUNTS}, (name, written(requirement))
             assert got.faults == 0
@@ -390,26 +398,6 @@ def test_a_search_keeps_to_assumptions_and_ranges(tmp_path: Path) -> None:
         find_violation(path, ranges, ticks=20, requirement="NONE")
     with pytest.raises(TwinError, match="is no range"):
         find_violation(path, {"src.outputs.x": (1.0, 0.0)}, ticks=20)
-
-
-@pytest.mark.parametrize(
-    ("content", "message"),
-    [
-        (None, "No such file"),
-        ("{", "is no file of `fcsl test --fcsl-requirements`"),
-        ('{"tests": [{"test": "a", "outcome": "passed", "named": [], "machines": []}]}', "is no file of"),
-        ('{"tests": 3}', "is no file of"),
-        ("[" * 100_000, "is no file of"),
-    ],
-)
-def test_files_of_other_programs_are_not_traced(content: str | None, message: str, tmp_path: Path) -> None:
-    path = machine(tmp_path, CRAFT)
-    if content is not None:
-        (tmp_path / "tests.json").write_text(content)
-    with pytest.raises(TwinError, match=message):
-        matrix(str(path), [str(tmp_path / "tests.json")], [])
-    with pytest.raises(TwinError, match="is no folder of a finished campaign"):
-        matrix(str(path), [], [str(tmp_path)])
 
 
 def test_verdicts_on_the_edge(tmp_path: Path) -> None:

@@ -196,8 +196,10 @@ def _wishes(chart: Map, machine: Machine, bag: Bag) -> list[Wish]:
     return wishes
 
 
-def grid_of(path: str, all_samples: Mapping[str, TargetSamples], bag: Bag, tick_hz: int) -> TickGrid:
-    """Ticks from the first sample of any target to the tick that receives the last one. `path`: the map.
+def grid_of(
+    path: str, all_samples: Mapping[str, TargetSamples], bag: Bag, tick_hz: int, most: int = MAX_TICKS
+) -> TickGrid:
+    """Ticks from the first sample of any target to the tick that receives the last one, `most` of them. `path`: the map.
 
     Raises MapError or BagError.
     """
@@ -212,9 +214,9 @@ def grid_of(path: str, all_samples: Mapping[str, TargetSamples], bag: Bag, tick_
         raise BagError(f"{bag.path}: there is no message on the mapped topics{damage}")
     first_ns, last_ns = min(int(t.min()) for t in times), max(int(t.max()) for t in times)
     ticks = tick_count(first_ns, last_ns, tick_hz)
-    if ticks > MAX_TICKS:
+    if ticks > most:
         raise MapError(
-            f"{path}: stamps from {first_ns / 1e9:.3f} s to {last_ns / 1e9:.3f} s would make {ticks} ticks; "
+            f"{path}: stamps from {first_ns / 1e9:.3f} s to {last_ns / 1e9:.3f} s would make {ticks} ticks, more than {most}; "
             "is one of them wrong? `time: log` takes the times of recording instead"
         )
     return TickGrid(first_ns, ticks, tick_hz)

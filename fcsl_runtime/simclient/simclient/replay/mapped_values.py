@@ -33,6 +33,9 @@ from .sample_extraction import TargetSamples, Wish, gather, wish
 from .tick_alignment import TickGrid, align, first_ticks_at
 from .transforms import with_transforms
 
+#: They and the values in each are in memory: more than five hours at 1 kHz.
+_MAX_TICKS = 20_000_000
+
 
 def judge_mapped(bag: Bag, chart: ValueMap, requirements: str) -> Judgement:
     """The verdicts on the requirements of a file. Raises MapError, BagError or TwinError."""
@@ -44,7 +47,7 @@ def judge_mapped(bag: Bag, chart: ValueMap, requirements: str) -> Judgement:
             if not run.observed():
                 raise TwinError(f"{requirements}: it has no requirements")
             samples, _ = gather(bag, wishes, chart.header_time, nan_allowed=True)
-            grid = grid_of(chart.path, samples, bag, chart.tick_hz)
+            grid = grid_of(chart.path, samples, bag, chart.tick_hz, _MAX_TICKS)
             values = _MappedValues(samples, grid, _timeouts(chart.entries), run.machine)
             columns = {path: values.column(path) for path in set(run.observed())}
             return judge(run, values.every, columns, begins_anew=True)
