@@ -388,6 +388,35 @@ def test_a_search_finds_the_simplest_violation_and_writes_it_as_a_test(tmp_path:
     assert "1 passed" in done.stdout, done.stdout
 
 
+def test_what_a_search_found_is_repeated_with_all_that_it_set(tmp_path: Path) -> None:
+    """Vectors, NaNs and parameters; requirements with a clock, over stale instances, and with time to react."""
+    path = machine(
+        tmp_path,
+        [
+            {"id": "VEC", "text": "v is short.", "then": "norm(src.outputs.v) < 3.0"},
+            {"id": "NUM", "text": "y is finite.", "then": "isfinite(src.outputs.y)"},
+            {"id": "CLK", "text": "z is low.", "clock": "slow", "then": "slow.outputs.z < slow.parameters.limit"},
+            {"id": "LAG", "text": "u", "stale": "hold", "when": "slow.outputs.z > 3.0", "then": "slow.outputs.z > 4.0",
+             "within_s": 0.04},
+        ],
+    )  # fmt: skip
+    x = {"src.outputs.x": (0.0, 5.0)}
+    inputs: dict[str, dict[str, Any]] = {
+        "VEC": {"src.outputs.v": [[0.0, 0.0, 0.0], [1.0, 2.0, 3.0]]},
+        "NUM": {"src.outputs.y": [0.0, math.nan]},
+        "CLK": x,
+        "LAG": x,
+    }
+    for id_, domains in inputs.items():
+        limit = {"slow.parameters.limit": 7.0} if id_ == "CLK" else {"slow.parameters.limit": 99.0}
+        found = find_violation(path, domains, ticks=20, requirement=id_, parameters=limit, examples=100)
+        assert found is not None and (id_ != "CLK" or found.inputs["src.outputs.x"] == [(20, 4.0)])
+        (tmp_path / f"test_{id_}.py").write_text(found.test())
+    line = [sys.executable, "-m", "pytest", "-q", "-p", "no:cacheprovider"]
+    done = subprocess.run(line, cwd=tmp_path, capture_output=True, text=True, check=False)
+    assert "4 passed" in done.stdout, done.stdout
+
+
 def test_a_search_keeps_to_assumptions_and_ranges(tmp_path: Path) -> None:
     path = machine(tmp_path, SUM)
     ranges: dict[str, Any] = {"src.outputs.x": (0.0, 2.0), "src.outputs.y": (0.0, 10.0)}

@@ -3,6 +3,7 @@
 
 from __future__ import annotations
 
+import re
 from collections.abc import Collection, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
@@ -31,7 +32,7 @@ import pytest
 @pytest.mark.violates({marked})
 def test_{name}(fcsl):
     twin = fcsl({config!r})
-    twin.inject({{
+{parameters}    twin.inject({{
 {profile}
     }})
     assert twin.requirements["{id}"].first_tick == {tick}
@@ -44,6 +45,7 @@ class Violation:
     violates."""
 
     config: Path
+    parameters: Mapping[str, Any]
     ticks: int
     inputs: dict[str, Segments]
     verdict: Verdict
@@ -56,13 +58,19 @@ class Violation:
     def test(self) -> str:
         """A pytest test that repeats it."""
         profile = "\n".join(
-            f"        {path!r}: np.repeat({[value for _, value in own]!r}, {[n for n, _ in own]!r}),"
+            f"        {path!r}: np.repeat({_written([v for _, v in own])}, {[n for n, _ in own]}, axis=0),"
             for path, own in self.inputs.items()
         )
         name = "".join(c if c.isalnum() else "_" for c in f"violates_{self.verdict.id.lower()}")
         fields = {"id": self.verdict.id, "text": self.verdict.text.replace('"', "'").replace("\\", "/"), "name": name}
         fields["marked"] = ", ".join(f'"{id_}"' for id_ in self.violated)
+        fields["parameters"] = f"    twin.set_many({_written(dict(self.parameters))})\n" if self.parameters else ""
         return _TEST.format(**fields, config=str(self.config), profile=profile, tick=self.verdict.first_tick)
+
+
+def _written(value: Any) -> str:
+    """As Python has it, but NumPy has the names of floats that are no numbers."""
+    return re.sub(r"(?<!['\w])(nan|inf)\b", r"np.\1", repr(value))
 
 
 def find_violation(
@@ -136,9 +144,8 @@ def find_violation(
         verdict = _violated(_fly(twin, begin, simplest, ticks), wanted)
         assert verdict is not None
         every = tuple(v.id for v in twin.requirements.values() if v.violations)
-        return Violation(
-            Path(config), ticks, {path: _cut(own, ticks) for path, own in simplest.items()}, verdict, every
-        )
+        stretches = {path: _cut(own, ticks) for path, own in simplest.items()}
+        return Violation(Path(config), parameters or {}, ticks, stretches, verdict, every)
 
 
 def _cut(segments: Segments, ticks: int) -> Segments:
