@@ -821,6 +821,18 @@ def required(condition: str, **keys: Any) -> str:
     return put("requirements", value=[{"id": "R-1", "text": "It works.", "then": condition, **keys}])
 
 
+def guarded_by(condition: dict[str, str], id_: str = "R-1", source: str = "A", target: str = "B") -> str:
+    """A transition for a requirement."""
+    edge = {"from": source, "to": target, "requirement": id_, "priority": 2}
+    return patch(
+        lambda c: (
+            c.update(requirements=[{"id": "R-1", "text": "It works.", **condition}]),
+            c["transitions"][0].update(priority=1),
+            c["transitions"].append(edge),
+        )
+    )
+
+
 def connect(*connections: Mapping[str, Any]) -> str:
     return put("connections", value=list(connections))
 
@@ -1270,6 +1282,16 @@ CONFIGS: dict[str, str] = {
     "E205 what stale does": required("one.outputs.y > 0.0", stale="keep"),
     "E244 a limit between ticks": required("one.outputs.y > 0.0", when="one.outputs.i > 0", within_s=0.015),
     "E100 requirements of no file": put("requirements", value="absent.json"),
+    "E257 an effect on two": required("one.outputs.y > 0.0", effect={"fail": "one", "degrade": "two"}),
+    "E206 an effect on no instance": required("one.outputs.y > 0.0", effect={"fail": "tow"}),
+    "E257 an assumption with an effect": required("one.outputs.y > 0.0", assume=True, effect={"fail": "one"}),
+    "E257 an effect on what it reads": required(
+        "one.outputs.health in ('nominal', 'failed')", effect={"degrade": "one"}
+    ),
+    "E206 a transition by no requirement": guarded_by({"never": "one.outputs.b"}, "R-7"),
+    "E257 a transition at the end": guarded_by({"at_end": "one.outputs.b"}),
+    "E257 a transition with two guards": edge(health={"instance": "one", "in": ["failed"]}, requirement="R-1"),
+    "W209 a requirement that is not evaluated": guarded_by({"never": "one.outputs.b"}, source="B", target="A"),
     "E201 a key of a requirement": required("one.outputs.y > 0.0", wehn="one.outputs.i > 0"),
     "E251 two parents": frames(frame(), frame(parent="mast")),
     "E251 a frame in itself": frames(frame("base")),

@@ -9,6 +9,7 @@ import math
 import os
 import re
 import signal
+from collections import Counter
 from collections.abc import Sequence
 from dataclasses import replace
 from functools import cache
@@ -20,6 +21,7 @@ from fcsl_generator import tree as t
 from fcsl_generator.algorithms import Program
 from fcsl_generator.campaign import campaign, generate
 from fcsl_generator.machines import CHANNEL_SOURCES, SOURCES, Action, Case, cases
+from fcsl_generator.requirements import with_requirements
 from fcsl_generator.ticks import OracleMachine
 from fcsl_generator.types import HEALTH_NAMES, RANGE, REQUESTS, WORDS, Array, Struct
 from hypothesis import strategies as st
@@ -41,18 +43,21 @@ def test_machines(request: pytest.FixtureRequest) -> None:
 
 
 @pytest.mark.parametrize("backend", ["c", "nim"])
-def test_nan_fails(backend: str) -> None:
-    """Of whole machines, and of one instance alone."""
-    made, told = [], 0
+def test_nan_fails_and_requirements_act(backend: str) -> None:
+    """NaN fails whole machines, or one instance alone. Requirements have effects, and guard transitions."""
+    made, told, healths = [], 0, Counter[str]()
     for n, case in enumerate(machines(60)):
         first = next(iter(case.config["instances"]))
         instances = {
             name: i | ({"nan": "fail"} if name == first else {}) for name, i in case.config["instances"].items()
         }
         some = {"instances": instances} if n % 3 == 0 else {"nan": "fail"}
-        made.append(replace(case, config=case.config | some))
-        told += "is NaN or infinite" in str(harness.by_oracle(made[-1]))
-    assert told > 4
+        changed = replace(case, config=case.config | some)
+        made.append(with_requirements(changed, n) if n % 2 else changed)
+        trace = harness.by_oracle(made[-1])
+        told += "is NaN or infinite" in str(trace)
+        healths += Counter(v[0] for tick in trace for path, v in tick.items() if path.startswith("requirements."))
+    assert told > 4 and min(healths[health] for health in ("nominal", "degraded", "failed")) > 10
     found = [text for begin in range(0, 60, 10) for text in harness.check(made[begin : begin + 10], backend)]
     assert [text for text in found if text] == []
 

@@ -131,6 +131,7 @@ def machine_files(compilation: Compilation) -> list[Path]:
     from ..parse.source_path import resolve_source
 
     texts = read_texts(compilation.path)
-    names = [*(source.name for source in compilation.checked.sources), *(texts.files if texts is not None else ())]
+    own = (source.name for source in compilation.checked.sources if source not in compilation.checked.made_sources)
+    names = [*own, *(texts.files if texts is not None else ())]
     files = [resolve_source(name, config=compilation.path).resolve() for name in dict.fromkeys(names)]
     return [compilation.path.resolve(), *files]

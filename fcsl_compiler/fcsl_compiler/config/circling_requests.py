@@ -78,7 +78,7 @@ def _answers(machine: Machine, instance: int, request: int) -> list[Edge]:
         if any(entry.instance == instance for entry in state.entries):
             for edge in (e for e in machine.edges if (e.source, e.request) == (number, request)):
                 found.append(edge)
-                if edge.guard_instance < 0 and not edge.after_ticks:
+                if not edge.is_guarded and not edge.after_ticks:
                     break
     return found
 

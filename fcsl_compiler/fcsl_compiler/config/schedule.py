@@ -134,7 +134,7 @@ def _warn_too_late(machine: Machine, sink: DiagnosticSink) -> None:
     """Warns about an edge that never occurs because an earlier timed edge of its state always precedes it."""
     for index, state in enumerate(machine.states):
         leaving = [e for e in machine.edges if e.source == index]
-        sure = [e for e in leaving if e.after_ticks and e.request < 0 and e.guard_instance < 0]
+        sure = [e for e in leaving if e.after_ticks and e.request < 0 and not e.is_guarded]
         if not sure:
             continue
         last = min(sure, key=lambda e: (e.after_ticks, -e.priority))

@@ -98,7 +98,7 @@ def _valid_request(name: str, span: Span, reader: ConfigReader) -> bool:
     return False
 
 
-_EDGE_KEYS = ("from", "to", "request", "priority", "health", "after_s", "description")
+_EDGE_KEYS = ("from", "to", "request", "priority", "health", "requirement", "after_s", "description")
 
 
 def _request(item: JsonNode, requests: list[str], reader: ConfigReader) -> int | None:
@@ -137,6 +137,11 @@ def _edge(
         if guard is None:
             return []
         guard_instance, guard_mask = guard
+    requirement = reader.string(keys.get("requirement"), "`requirement`", "LND-7") or ""
+    if "health" in keys and "requirement" in keys:
+        fix = "remove `health`, and name it in a condition of the requirement"
+        reader.sink.error("E257", "a transition with `health` and `requirement`", keys["requirement"].span, help=fix)
+        return []
     after_ticks = 0
     if "after_s" in keys:
         time = read_ticks(
@@ -145,15 +150,15 @@ def _edge(
         if time is None:
             return []
         after_ticks = time
-    if request < 0 and guard_instance < 0 and not after_ticks:
-        fix = 'add `"request": "…"`, `"health": {…}` or `"after_s": …`'
-        reader.sink.error("E221", "an edge without request, health guard or time", item.span, help=fix)
+    if request < 0 and guard_instance < 0 and "requirement" not in keys and not after_ticks:
+        fix = 'add `"request": "…"`, `"health": {…}`, `"requirement": "…"` or `"after_s": …`'
+        reader.sink.error("E221", "an edge without request, guard or time", item.span, help=fix)
         return []
     priority = reader.integer(keys.get("priority"), "`priority`", -(2**31), 2**31 - 1)
     if target is None or (priority is None and "priority" in keys):
         return []
     return [
-        Edge(source, target, request, priority or 0, guard_instance, guard_mask, after_ticks, item.span)
+        Edge(source, target, request, priority or 0, guard_instance, guard_mask, after_ticks, item.span, requirement)
         for source in _sources(keys["from"], states, target, reader)
     ]
 

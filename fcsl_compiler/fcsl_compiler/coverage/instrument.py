@@ -38,11 +38,11 @@ class Covered:
 
 
 def instrument(machine: Machine, config: str) -> Covered:
-    """Adds probes to every function of every algorithm. The numeric library has none. `config`: path of the machine
+    """Adds probes to every function of every algorithm. The numeric library and requirements have none. `config`: path of the machine
     JSON."""
     files: dict[str, FileMap] = {}
     for source in machine.sources:
-        if any(source.name in a.files for a in machine.algorithms):
+        if source not in machine.made_sources and any(source.name in a.files for a in machine.algorithms):
             own = [a.name for a in machine.algorithms if a.source == source.name]  # empty for a file of helpers
             files[source.name] = FileMap(source.name, os.path.abspath(source.path), digest(source.text), own)
     found = CoverMap(machine.name, config, list(files.values()))

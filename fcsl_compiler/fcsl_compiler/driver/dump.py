@@ -45,6 +45,7 @@ def dump_machine(m: Machine) -> str:
     for e in m.edges:
         request = m.requests[e.request] if e.request >= 0 else "-"
         guard = f" while {m.instances[e.guard_instance].name} in {e.guard_mask:04b}" if e.guard_instance >= 0 else ""
+        guard += f" while {e.requirement} is violated" if e.requirement else ""
         guard += f" after {e.after_ticks} ticks" if e.after_ticks else ""
         out.append(
             f"edge {m.states[e.source].name} -> {m.states[e.target].name} on {request} priority {e.priority}{guard}"

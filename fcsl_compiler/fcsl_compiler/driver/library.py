@@ -30,7 +30,8 @@ def emit(
     instances: Sequence[str] | None = None,
     backend: str = DEFAULT_BACKEND,
 ) -> list[Compilation]:
-    """Writes <stem>.c, .h and .map.json of every machine and monitor, and fcsl_machines.c, into `folder`. With backend "nim" the C
+    """Writes <stem>.c, .h and .map.json of every machine and monitor, the algorithms of requirements that act, and
+    fcsl_machines.c, into `folder`. With backend "nim" the C
     is <stem>.nim.c, which Nim makes of <stem>.nim.
 
     `instances`: instances of a subset machine. Writes nothing if a machine does not compile. Raises DiagnosticError,
@@ -72,6 +73,7 @@ def _write(compilations: list[Compilation], folder: Path) -> list[Path]:
     for c in everything:
         name = c.checked.name
         texts |= {f"{name}.h": c.header, c.source_name: c.source, f"{name}.map.json": c.map}
+        texts |= {source.name: source.text for source in c.checked.made_sources}
     modules = {c.checked.name: c.source for c in everything if c.backend == "nim"}
     texts |= compile_modules(modules) if modules else {}
     watching = {c.checked.name: c.monitor for c in compilations if c.monitor is not None}

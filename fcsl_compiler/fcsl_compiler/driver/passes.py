@@ -9,6 +9,7 @@ from pathlib import Path
 
 from ..base.diagnostics import DiagnosticSink
 from ..base.files import digest
+from ..base.source import Span
 from ..check.verify import verify_machine
 from ..config.machine import check_machine
 from ..config.schedule import schedule
@@ -33,6 +34,7 @@ from ..printers.c.source import print_source
 from ..printers.nim.module import print_module
 from ..printers.source_map import source_map
 from ..printers.writer import Writer
+from ..requirements.effects import acting, check_effects, with_effects
 from ..requirements.monitor import Monitor, subset_of
 from ..requirements.read import read_requirements
 from ..requirements.requirement import Requirement
@@ -65,6 +67,7 @@ class Compilation:
     extern_calls: tuple[str, ...] = ()  # functions called by the externs' own code, known after linking
     requirements_file: Path | None = None  # instead of the machine's own requirements
     requirements: list[Requirement] = field(default_factory=list)
+    effects: list[Requirement] = field(default_factory=list)  # those of its own that act on the machine
     monitor: Monitor | None = None  # None without requirements
     monitor_code: Compilation | None = None  # of the monitor
 
@@ -96,9 +99,22 @@ def _check(c: Compilation) -> None:
     if c.parsed is not None:
         c.machine = check_machine(c.parsed, c.sink)
     if c.parsed is not None and c.machine is not None:
-        c.requirements = read_requirements(c.parsed, c.machine, c.requirements_file, c.sink)
+        own = read_requirements(c.parsed, c.machine, None, c.sink)
+        check_effects(own, c.machine, _guards(c.parsed), c.sink)
+        c.requirements = own
+        if c.requirements_file is not None:
+            c.requirements = read_requirements(c.parsed, c.machine, c.requirements_file, c.sink)
+        c.effects = acting(own, c.machine)
     if c.strict and c.machine is not None:
         check_strict(c.machine, c.sink)
+
+
+def _guards(parsed: ParsedMachine) -> dict[str, Span]:
+    """Where transitions name requirements, by id."""
+    named = (
+        [item.get("requirement") for item in parsed.keys["transitions"].items] if "transitions" in parsed.keys else []
+    )
+    return {str(node.value): node.span for node in named if node is not None and node.kind == "string"}
 
 
 def _verify(c: Compilation) -> None:
@@ -112,7 +128,11 @@ def _schedule(c: Compilation) -> None:
     if c.instances is not None and not c.sink.failed:
         assert c.parsed is not None
         c.machine = subset_machine(c.machine, c.instances, c.parsed.keys["instances"].span, c.sink)
-        c.requirements = subset_of(c.requirements, c.machine) if c.machine is not None else []
+        if c.machine is not None:
+            c.effects = acting(subset_of(c.effects, c.machine), c.machine)
+            c.requirements = subset_of(c.requirements, c.machine)
+    if c.machine is not None and not c.sink.failed:
+        c.machine = with_effects(c.machine, c.effects)
 
 
 def _lower(c: Compilation) -> None:

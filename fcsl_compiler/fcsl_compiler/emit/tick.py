@@ -28,6 +28,7 @@ from .names import (
     state_constant,
 )
 from .status_elision import noted_instances
+from .watched import apply_effects, copy_watched
 
 #: Maximum number of instances in one function. The time of C compilers grows faster than linearly with the size of a
 #: function.
@@ -165,7 +166,7 @@ class TickEmitter:
             body.append(code.Unused(_NOW.text))
         if any(e.instance in self.noted for e in state.entries):
             body.append(Set(Member(MACHINE, "current_"), NO_INSTANCE, volatile=True))
-        return body + self._arbitration(state)
+        return [*body, *apply_effects(self.m), *self._arbitration(state)]
 
     def _tests_due(self, state: State, entry: Entry) -> bool:
         """Whether the function of the state itself, not one of its parts, tests if this entry is due. Delayed
@@ -292,6 +293,7 @@ class TickEmitter:
     def _run(self, entry: Entry) -> list[Statement]:
         instance = self.m.instances[entry.instance]
         body = [self._copy(connection, entry) for connection in self.feeds.get(entry.instance, [])]
+        body += [copy_watched(self.m, w) for w in self.m.watched if w.instance == entry.instance]
         if entry.instance in self.noted:
             # A watchdog thread reads it while execute runs, so the compiler must not remove the store.
             body.append(Set(Member(MACHINE, "current_"), Literal(entry.instance, I32), volatile=True))

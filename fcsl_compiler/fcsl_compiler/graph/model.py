@@ -107,10 +107,10 @@ def instance_rates(m: Machine, index: int, state: State | None) -> str:
 
 
 def drawn_instances(m: Machine, state: State | None) -> list[int]:
-    """All instances; or those of one state and the sources of their inputs."""
+    """All instances but those of requirements; or those of one state and the sources of their inputs."""
     if state is None:
-        return list(range(len(m.instances)))
-    due = {e.instance for e in state.entries}
+        return [n for n in range(len(m.instances)) if n not in m.acting]
+    due = {e.instance for e in state.entries} - m.acting.keys()
     read = {c.source.instance for c in m.connections if c.target.instance in due and c.source.instance >= 0}
     return sorted(due | read)
 
@@ -125,7 +125,7 @@ def dataflow(m: Machine, state: State | None = None) -> Picture:
     picture = Picture(f"{m.name}: dataflow, {where}, tick_hz {m.tick_hz}")
     instances = drawn_instances(m, state)
     place = {index: n for n, index in enumerate(instances)}
-    due = {e.instance for e in state.entries} if state else set(instances)
+    due = {e.instance for e in state.entries} & set(instances) if state else set(instances)
     connections = [c for c in m.connections if c.target.instance in due]
     inputs: dict[tuple[int, str], int] = {}
     outputs: dict[tuple[int, str], int] = {}
@@ -227,7 +227,9 @@ def transition_text(m: Machine, edge: Edge) -> str:
     parts = []
     if edge.request >= 0:
         parts.append(m.requests[edge.request])
-    if edge.guard_instance >= 0:
+    if edge.requirement:
+        parts.append(f"requirement {edge.requirement}")
+    elif edge.guard_instance >= 0:
         words = [w for n, w in enumerate(HEALTH_NAMES) if edge.guard_mask >> n & 1]
         parts.append(f"{m.instances[edge.guard_instance].name} {' or '.join(words)}")
     text = " when ".join(parts)
@@ -251,6 +253,16 @@ def merged_edges(m: Machine) -> list[tuple[int, Edge]]:
     return merged
 
 
+def _state_row(m: Machine, entry: Entry) -> Row:
+    """An instance with its rate, or a requirement that acts."""
+    effect = m.acting.get(entry.instance)
+    if effect is None:
+        return Row(left=m.instances[entry.instance].name, left_note=rate_text(entry, m.tick_hz))
+    does = {"failed": "fails", "degraded": "degrades"}.get(HEALTH_NAMES[effect.health], "")
+    target = f" {does} {m.instances[effect.target].name}" if effect.target >= 0 else ""
+    return Row(left="requirement", left_note=effect.requirement + target)
+
+
 def state_machine(m: Machine, state: State | None = None) -> Picture:
     """Picture of the states with their instances, and of the transitions. `state` is highlighted. What every state
     schedules at the same rate is in a box of its own, behind those of the states."""
@@ -258,7 +270,7 @@ def state_machine(m: Machine, state: State | None = None) -> Picture:
     alike = set.intersection(*(set(s.entries) for s in m.states)) if len(m.states) > 1 else set[Entry]()
 
     def rows_of(entries: Iterable[Entry]) -> list[Row]:
-        return [Row(left=m.instances[e.instance].name, left_note=rate_text(e, m.tick_hz)) for e in entries]
+        return [_state_row(m, entry) for entry in entries]
 
     for index, s in enumerate(m.states):
         rows = rows_of(e for e in s.entries if e not in alike)

@@ -144,6 +144,35 @@ class Edge:
     guard_mask: int
     after_ticks: int  # minimum time of the state in ticks; 0: not timed
     span: Span
+    requirement: str = ""  # id of the one that guards it: with_effects makes a guard of it; "": none
+
+    @property
+    def is_guarded(self) -> bool:
+        return self.guard_instance >= 0 or bool(self.requirement)
+
+
+@dataclass(frozen=True)
+class Effect:
+    """A requirement that acts on the machine: it has an effect, or guards a transition. `instance` evaluates it and is
+    degraded while it is violated; the health of `target` (-1: none) is then at least `health`."""
+
+    requirement: str  # its id
+    instance: int
+    target: int
+    health: int
+
+
+@dataclass(frozen=True)
+class Watched:
+    """A scalar that an instance of `effects` reads: it is copied to an input of this type before each run."""
+
+    instance: int
+    input: str
+    type: str  # of the language
+    path: str  # of its field in the field table
+    element: int | None  # of that field; None: the field is a scalar
+    member: str  # C member expression of the field, relative to the machine struct
+    c_type: str  # of one scalar of it
 
 
 def seconds(ticks: int, tick_hz: int) -> str:
@@ -217,9 +246,22 @@ class Machine:
     arm: PortRef | None = None  # the bool output that arms the actuators
     command_timeout_ns: int = 0  # 0: none
     payload: str = "raw"  # of values on the bus: raw, cdr
+    effects: tuple[Effect, ...] = ()  # of requirements, in JSON order
+    watched: tuple[Watched, ...] = ()
     tree: dict[str, Any] = dataclass_field(
         default_factory=dict, compare=False
     )  # of the JSON, what reference/ reads of it
+
+    @cached_property
+    def acting(self) -> dict[int, Effect]:
+        """The instances that requirements become."""
+        return {effect.instance: effect for effect in self.effects}
+
+    @property
+    def made_sources(self) -> tuple[SourceFile, ...]:
+        """Those of `sources` that the compiler made."""
+        names = {self.instances[n].algorithm.source for n in self.acting}
+        return tuple(source for source in self.sources if source.name in names)
 
     @property
     def structs(self) -> tuple[Struct, ...]:

@@ -16,7 +16,7 @@ from __future__ import annotations
 
 import json
 from collections.abc import Callable, Iterator, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any, Protocol
 
@@ -357,6 +357,14 @@ class ReferenceMachine:
                 assert isinstance(type_, Scalar)
                 value = self._channel_source(source, to) if source.members else self._machine_source(source, to)
                 given[place] = _typed(value, type_)
+        for watched in self.machine.watched:
+            if names[watched.instance] == target:
+                place, type_ = f"s.{slot(watched.input)}", SCALARS[watched.type]
+                if watched.path == "machine.tick":  # it counts this one, too
+                    given[place] = _typed(lambda: self._image.longs[self._tick] + 1, type_)
+                else:
+                    leaf = Leaf(self.layout[watched.path], type_, place)
+                    found.append(replace(leaf, offset=leaf.offset + (watched.element or 0) * (leaf.end - leaf.offset)))
         return found, given
 
     def _input(self, target: PortRef) -> Type:
@@ -464,6 +472,7 @@ class ReferenceMachine:
             self._run(image, index, state.spans.get(index), tick)
         if state.scheduled:
             words[self._current] = _NONE
+        self._apply_effects(words)
         self._arbitrate(image, state, due)
         if self._ticks_in_state is not None:
             image.longs[self._ticks_in_state] = image.longs[self._ticks_in_state] + 1 & _LONG
@@ -534,6 +543,13 @@ class ReferenceMachine:
             image.longs[instance.overruns] = image.longs[instance.overruns] + 1 & _LONG
             if image.words[instance.health] == _NOMINAL:
                 image.words[instance.health] = _DEGRADED
+
+    def _apply_effects(self, words: memoryview) -> None:
+        """Worsens the healths of the instances that violated requirements act on, unless they are stale."""
+        for effect in self.machine.effects:
+            if effect.target >= 0 and words[self._instances[effect.instance].health] == _DEGRADED:
+                at = self._instances[effect.target].health
+                words[at] = max(words[at], effect.health)
 
     def _arbitrate(self, image: Image, state: _State, due: list[int]) -> None:
         """Latches the target of the true edge with the highest priority. Requests of the others for another state are

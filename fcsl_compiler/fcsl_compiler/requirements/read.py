@@ -36,7 +36,9 @@ from .requirement import (
 _ID = re.compile(r"[A-Za-z][A-Za-z0-9]*([-_.][A-Za-z0-9]+)*")
 _ID_MAX = 40
 _TEXT_MAX = 200
-_OPTIONAL = ("when", *KINDS, "within_s", "clock", "stale", "assume")
+_OPTIONAL = ("when", *KINDS, "within_s", "clock", "stale", "assume", "effect")
+#: Effects, with the health that the instance then has at best.
+_EFFECTS = {"fail": HEALTH_NAMES.index("failed"), "degrade": HEALTH_NAMES.index("degraded")}
 #: Fields whose value at the end of a tick is that of the coming one.
 _LATER = ("machine.next_state", "machine.ticks_in_state")
 #: The one field of the machine that a part's requirement can name.
@@ -116,6 +118,12 @@ class Signals:
         row = self.find(path).row
         is_of_run = row.role in ("INPUT", "OUTPUT", "STATE") and row.abi_type != "FCSL_HEALTH"
         return self.machine.instances[row.instance].name if is_of_run else None
+
+    def instances(self, requirement: Requirement) -> list[str]:
+        """Those of whose runs a requirement needs a value, or its clock."""
+        leaves = [node for root in requirement.expressions for node in root.walk() if node.operator == "field"]
+        names = [self.instance(leaf.value) for leaf in leaves]
+        return list(dict.fromkeys(name for name in (*names, requirement.clock) if name is not None))
 
     def _unknown(self, path: str) -> str:
         name, rest = split_instance(path, self.known)
@@ -236,9 +244,10 @@ class _Reader:
         clock = self._clock(keys.get("clock"))
         hold = self.reader.choice(keys.get("stale"), "`stale`", ("restart", "hold")) == "hold"
         assumed = self.reader.boolean(keys.get("assume"), "`assume`") or False
+        target, health = self._effect(keys["effect"]) if "effect" in keys else ("", 0)
         if condition is None or self.sink.errors != before:
             return None
-        return Requirement(id_, text, kind, when, condition, within, clock, hold, assumed, node.span)
+        return Requirement(id_, text, kind, when, condition, within, clock, hold, assumed, target, health, node.span)
 
     def _id(self, node: JsonNode | None) -> str:
         id_ = self.reader.string(node, "`id`", "LND-7")
@@ -330,6 +339,18 @@ class _Reader:
         if ticks > most:
             longest = seconds(most, self.machine.tick_hz)
             raise ExpressionError(f"`{part.text}`: a window of `{part.operator}` is at most {longest} s, {most} ticks")
+
+    def _effect(self, node: JsonNode) -> tuple[str, int]:
+        """The instance and its health; "" after reporting an error."""
+        keys = self.reader.object(node, "`effect`", (), tuple(_EFFECTS)) or {}
+        if node.kind == "object" and len(keys) != 1:
+            fix = 'write {"fail": "nav"} or {"degrade": "nav"}'
+            self.sink.error("E257", "an effect fails or degrades one instance", node.span, help=fix)
+        for word, named in keys.items():
+            index = self.reader.reference(named, "instance", self.signals.known)
+            if index is not None:
+                return self._part + self.signals.known[index], _EFFECTS[word]
+        return "", 0
 
     def _ticks(self, node: JsonNode | None) -> int:
         if node is None:

@@ -34,6 +34,8 @@ class Requirement:
     clock: str | None
     hold: bool
     assumed: bool
+    target: str  # the instance that a violation fails or degrades; "": none
+    health: int  # the least health that it then has
     span: Span
 
     @property

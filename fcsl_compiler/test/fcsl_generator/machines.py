@@ -43,13 +43,15 @@ class Action:
 
 @dataclass(frozen=True)
 class Case:
-    """One machine with the actions before each of its ticks. A board, if present, answers its hardware calls."""
+    """One machine with the actions before each of its ticks. A board, if present, answers its hardware calls. `acting`: its
+    requirements that act, as their oracle has them."""
 
     config: dict[str, Any]
     program: Program
     structs: tuple[Struct, ...]
     ticks: tuple[tuple[Action, ...], ...]
     board: bool = True
+    acting: tuple[Any, ...] = ()
 
     def algorithm(self, instance: str) -> t.Algorithm:
         return self.program.algorithms[self.config["instances"][instance]["algorithm"]][1]

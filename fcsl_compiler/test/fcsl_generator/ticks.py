@@ -14,6 +14,7 @@ from . import tree as t
 from .externs import Calls
 from .hardware import Board
 from .machines import Action, Case
+from .requirements import ActingOracle
 from .types import HEALTH_NAMES, Type, leaves
 
 #: Path of a leaf and its plain values, flat: one field as seen by a host.
@@ -45,6 +46,7 @@ class OracleMachine:
         #: Requests that were lost to another transition, by state and priority.
         self.lost = {(s, e["priority"]): 0 for s in self.config["states"] for e in self._edges(s)}
         self.board = Board(case.board, Calls())
+        self.acting = {one.id: ActingOracle(one) for one in case.acting}
         self.failed_start = self._init()
 
     def algorithm(self, instance: str) -> t.Algorithm:
@@ -142,9 +144,20 @@ class OracleMachine:
                     self._deliver(connection, value)
         for name in due:
             self._execute(name)
+        self._act_by_requirements(due)
         self._arbitrate(due)
         self.tick += 1
         self.ticks_in_state += 1
+
+    def _act_by_requirements(self, due: list[str]) -> None:
+        """All are evaluated before any of them acts."""
+        completed = [name for name in due if self.last_run.get(name) == self.tick]
+        for requirement in self.acting.values():
+            requirement.step(self, completed)
+        for requirement in self.acting.values():
+            if requirement.one.target and requirement.is_violated:
+                outputs = self.records[requirement.one.target]["outputs"]
+                outputs["health"] = _worse(outputs["health"], requirement.one.health)
 
     def _schedule(self, state: str) -> dict[str, Any]:
         return {**self.config.get("always", {}), **self.config["states"][state].get("schedule", {})}
@@ -257,7 +270,9 @@ class OracleMachine:
 
     def _arbitrate(self, ran: list[str]) -> None:
         true = [
-            e for e in self._edges(self.state) if self._has_lasted(e) and self._asked(e, ran) and self._holds(e, ran)
+            e
+            for e in self._edges(self.state)
+            if self._has_lasted(e) and self._asked(e, ran) and self._holds(e, ran) and self._is_violated(e)
         ]
         if true:
             self.next_state = true[0]["to"]
@@ -285,6 +300,9 @@ class OracleMachine:
         name = edge["health"]["instance"]
         health = self.records[name]["outputs"]["health"]
         return health in edge["health"]["in"] and (name in ran or health == "stale")
+
+    def _is_violated(self, edge: dict[str, Any]) -> bool:
+        return "requirement" not in edge or self.acting[edge["requirement"]].is_violated
 
     def _enter(self, state: str) -> None:
         """Only instances scheduled in both the old and the new state continue. Entering the active state again has no
@@ -334,6 +352,8 @@ class OracleMachine:
                 found[f"{name}.outputs.{word}"] = [self.records[name]["outputs"][word]]
             for counter, count in self.counters[name].items():
                 found[f"{name}.counters.{counter}"] = [count]
+        for requirement in self.acting.values():
+            found[f"{requirement.one.instance}.outputs.health"] = [requirement.health]
         for name, channel in self.channels.items():
             found[f"channels.{name}.valid"] = [channel["valid"]]
             found[f"channels.{name}.waiting"] = ["came" not in channel]

@@ -316,6 +316,18 @@ def test_the_world(fcsl):
     twin = fcsl("craft.json")
     twin.set("src.outputs.y", 9.0)
     twin.tick()
+
+
+@pytest.fixture
+def landed(fcsl):
+    twin = fcsl("craft.json")
+    yield twin
+    twin.set("src.outputs.x", 3.0)
+    twin.tick()
+
+
+def test_before_its_fixture_ends(landed):
+    landed.tick()
 """
 CRAFT: list[Values] = [
     {"id": "LOW", "text": "x is low.", "then": "src.outputs.x < 2.0"},
@@ -343,7 +355,7 @@ def test_pytest_judges_and_traces(tmp_path: Path, processes: tuple[str, ...]) ->
         "tests.json",
     ]
     done = subprocess.run(line, cwd=tmp_path, capture_output=True, text=True, check=False)
-    assert "4 failed, 4 passed, 1 skipped" in done.stdout, done.stdout
+    assert "4 failed, 5 passed, 1 skipped, 1 error" in done.stdout, done.stdout
     assert "requirement LOW violated 1 time, first at tick 0 (0 s), last at tick 0: x is low." in done.stdout
     assert "LOW was not violated" in done.stdout and "no requirement was violated" in done.stdout
     assert "END is of the end of a run, which a test is not" in done.stdout
@@ -358,7 +370,7 @@ def test_pytest_judges_and_traces(tmp_path: Path, processes: tuple[str, ...]) ->
     rows = {row["id"]: row for row in json.loads((tmp_path / "trace.json").read_text())["requirements"]}
     assert [row["id"] for row in rows.values() if row["gaps"]][-1] == "NEVER"
     assert rows["NEVER"]["gaps"] == ["no test exercises it"]
-    assert rows["LOW"]["gaps"] == ["4 tests that exercise it fail"]
+    assert rows["LOW"]["gaps"] == ["5 tests that exercise it fail"]
     names = {id_: {key: [n.rpartition("::")[2] for n in row[key]] for key in ("tests", "violating", "named")}
              for id_, row in rows.items()}  # fmt: skip
     both = {"test_high", "test_two_marks"}

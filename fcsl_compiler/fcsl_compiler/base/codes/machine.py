@@ -298,8 +298,8 @@ MACHINE_CODES: dict[str, Code] = {
     ),
     "E221": Code(
         "a transition that nothing can cause",
-        "A transition is caused by a request of an instance, by the health in its guard, by the time in its state,"
-        " or by a combination of these. Without any of them, or with a guard that lists no health, it would be "
+        "A transition is caused by a request of an instance, by its guard (a health, or a requirement that is violated), "
+        "by the time in its state, or by a combination of these. Without any of them, or with a guard that lists no health, it would be "
         "taken immediately or never. State its cause.",
         Kind.JSON,
         '"transitions": [{"from": "COAST", "to": "SAFE"}]',
@@ -654,7 +654,8 @@ MACHINE_CODES: dict[str, Code] = {
         "a requirement that cannot be evaluated",
         "A requirement has an id, a text, and one condition: `then`, `never` or `at_end`; with `when`, only where that holds. "
         "A condition is an expression over fields of the machine, with the functions of the ticks so far (`held`, `since`, "
-        "`within` …). Units and kinds must fit, times are whole numbers of ticks, and it must read a field.",
+        "`within` …). Units and kinds must fit, times are whole numbers of ticks, and it must read a field. One that acts, by an `effect` "
+        "or as the guard of a transition, is judged in each tick, and does not read what it changes.",
         Kind.JSON,
         '"requirements": [{"id": "NAV-1", "text": "It climbs slower than 50 m/s.", "then": "nav.outputs.speed < 50.0",\n'
         '                  "never": "nav.outputs.speed > 50.0"}]',
@@ -743,7 +744,8 @@ MACHINE_CODES: dict[str, Code] = {
     "W209": Code(
         "a guard on an instance that is always stale",
         "None of the states that this transition leaves schedules the instance, so the instance is stale there. A "
-        "guard with `stale` is then true in every tick, a guard without it in none.",
+        "guard with `stale` is then true in every tick, a guard without it in none. A requirement that reads the "
+        'instance is not evaluated there, unless it says `"stale": "hold"`.',
         Kind.JSON,
         '"transitions": [\n'
         '  {"from": "COAST", "to": "SAFE", "health": {"instance": "nav", "in": ["failed"]}},\n'

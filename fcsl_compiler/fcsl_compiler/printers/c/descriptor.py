@@ -33,6 +33,7 @@ def _connected(machine: Machine, rows: Collection[str]) -> dict[str, str]:
                 path = f"{c.source.record}.{c.source.path}{leaf.path}"
                 source = path if path in rows else ""
             found[target + leaf.path] = source
+    found |= {f"{machine.instances[w.instance].name}.inputs.{w.input}": w.path for w in machine.watched}
     return found
 
 
