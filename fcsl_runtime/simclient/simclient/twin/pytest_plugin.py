@@ -21,6 +21,7 @@ from .pytest_campaign import fcsl_case as fcsl_case
 from .pytest_campaign import generate
 from .pytest_requirements import WorkerNodes, add_option, configure
 from .pytest_requirements import pytest_runtest_call as pytest_runtest_call
+from .pytest_requirements import pytest_runtest_teardown as pytest_runtest_teardown
 from .pytest_requirements import pytest_sessionfinish as pytest_sessionfinish
 from .pytest_twins import add_options
 from .pytest_twins import fcsl as fcsl

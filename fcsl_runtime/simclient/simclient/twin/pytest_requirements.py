@@ -5,7 +5,7 @@
 from __future__ import annotations
 
 import json
-from collections.abc import Generator, Sequence
+from collections.abc import Generator
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -46,10 +46,7 @@ def pytest_runtest_call(item: pytest.Item) -> Generator[None, object, object]:
     outcome = "failed"
     try:
         result = yield
-        marks = list(item.iter_markers("violates"))
-        verdicts = [v for _, flight in verdicts_of(item) for v in flight]
-        problems = _unexpected(verdicts, _ids(item, "violates"), any(not mark.args for mark in marks))
-        if problems:
+        if problems := _problems(item):
             pytest.fail("\n".join(problems), pytrace=False)
         outcome = "passed"
         return result
@@ -62,6 +59,30 @@ def pytest_runtest_call(item: pytest.Item) -> Generator[None, object, object]:
             item.config.stash[_RESULTS].append(_result(item, "xfailed" if expected else outcome))
 
 
+@pytest.hookimpl(wrapper=True)
+def pytest_runtest_teardown(item: pytest.Item) -> Generator[None, object, object]:
+    """Fails a test whose fixtures violate a requirement when they end."""
+    before = set(_violated(item))
+    result = yield
+    found = [v for key, v in _violated(item).items() if key not in before]
+    if problems := _unexpected(item, found):
+        for own in item.config.stash[_RESULTS][-1:]:
+            own["outcome"] = "failed"
+        pytest.fail("\n".join(problems), pytrace=False)
+    return result
+
+
+def _violated(item: pytest.Item) -> dict[tuple[int, str], Verdict]:
+    """The violations of a test by the number of the twin and the requirement. `at_end` is of a run that ends, which a test
+    is not."""
+    flights = [flight for _, flight in verdicts_of(item)]
+    return {(n, v.id): v for n, flight in enumerate(flights) for v in flight if v.violations}
+
+
+def _expects_any(item: pytest.Item) -> bool:
+    return any(not mark.args for mark in item.iter_markers("violates"))
+
+
 def _ids(item: pytest.Item, mark: str) -> list[str]:
     """The ids of all marks of this name. Raises UsageError."""
     marks = list(item.iter_markers(mark))
@@ -71,15 +92,20 @@ def _ids(item: pytest.Item, mark: str) -> list[str]:
     return ids
 
 
-def _unexpected(verdicts: list[Verdict], expected: Sequence[str], expects_any: bool) -> list[str]:
-    """`at_end` is of a run that ends, which a test is not; an assumption is about what the test does."""
-    violated = [v for v in verdicts if v.status == "violated" and v.kind != "at_end"]
-    found = [f"requirement {v}" for v in violated if v.id not in expected and not v.assumed and not expects_any]
-    if expects_any and not violated:
+def _unexpected(item: pytest.Item, violated: list[Verdict]) -> list[str]:
+    """An assumption is about what the test does."""
+    expected, expects_any = _ids(item, "violates"), _expects_any(item)
+    return [f"requirement {v}" for v in violated if v.id not in expected and not v.assumed and not expects_any]
+
+
+def _problems(item: pytest.Item) -> list[str]:
+    violated = list(_violated(item).values())
+    found = _unexpected(item, violated)
+    if _expects_any(item) and not violated:
         found.append("no requirement was violated")
-    for id_ in expected:
+    for id_ in _ids(item, "violates"):
         if id_ not in {v.id for v in violated}:
-            kinds = {v.kind for v in verdicts if v.id == id_}
+            kinds = {v.kind for _, flight in verdicts_of(item) for v in flight if v.id == id_}
             found.append(
                 f"{id_} is of the end of a run, which a test is not"
                 if "at_end" in kinds
