@@ -79,6 +79,32 @@ def test_values_are_unknown_before_a_message_and_when_it_is_old(bag: Path, capfd
     ]
 
 
+STATES = """\
+tick_hz: 100
+values:
+  machine.state: {topic: /state, field: data, states: [IDLE, FLY, LAND]}
+"""
+
+
+@pytest.fixture
+def states(tmp_path: Path) -> Path:
+    """One every 100 ms."""
+    names = ("IDLE", "FLY", "FLY", "IDLE")
+    texts = [(START + 100 * i * MS, make("std_msgs/msg/String", data=name)) for i, name in enumerate(names)]
+    return write(tmp_path / "robot", {"/state": texts})
+
+
+def test_a_robot_has_states(states: Path, capfd: pytest.CaptureFixture[str]) -> None:
+    landing = {"id": "LAND", "text": "It lands before it idles.", "when": "rose(machine.state == 'IDLE')"}
+    landing["never"] = "previous(machine.state) == 'FLY'"
+    status, out, _ = check(capfd, states, STATES, [landing])
+    assert status == 1 and out.startswith("LAND violated 1 time, first at tick 30 (0.3 s)")
+    status, _, error = check(
+        capfd, states, STATES.replace("FLY, ", ""), [{**landing, "never": "once(machine.tick > 9)"}]
+    )
+    assert status == 2 and "map.yaml:3:18: the bag has the state `FLY`, which `states` lacks" in error
+
+
 @pytest.mark.parametrize(
     ("chart", "message"),
     [
@@ -100,6 +126,12 @@ def test_values_are_unknown_before_a_message_and_when_it_is_old(bag: Path, capfd
             "map.yaml:5:24: value `mode.outputs.number`: `field` is m",
         ),
         (MAP + "channels: {}", "unknown key `channels`"),
+        (
+            MAP.replace("mode.outputs.number", "machine.state"),
+            "map.yaml:5:18: value `machine.state`: `states` is missing",
+        ),
+        (MAP + STATES[STATES.index("  machine") :].replace("/state", "/mode"), ":6:18: `data` of `/mode` is not text"),
+        (STATES.replace("FLY", "to fly"), "map.yaml:3:18: `machine.state` is no name of a value: `to fly` is not"),
     ],
     ids=lambda text: "map" if "\n" in text else text,
 )
@@ -113,7 +145,6 @@ def test_a_wrong_map_is_refused(chart: str, message: str, bag: Path, capfd: pyte
     [
         ("imu.outputs.giro[0] < 1.0", "there is no field `imu.outputs.giro[0]`"),
         ("imu.outputs.gyro < 1.0", "f.json:1:"),
-        ("machine.state == 'FLY'", "f.json:1:"),
     ],
 )
 def test_a_requirement_that_does_not_fit_the_map_is_refused(

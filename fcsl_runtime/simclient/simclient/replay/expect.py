@@ -14,15 +14,16 @@ import numpy as np
 
 from fcsl_compiler.api.ros import ConversionError, Kind, select_all
 
-from ..bag import Bag, field_value
+from ..bag import Bag
 from ..descriptor import Machine
 from ..errors import BagError, MapError, did_you_mean
 from ..ros.types import definitions_of
-from .mapping import Entry, Expectation
-from .outputs import STATE, Outputs
+from .mapping import STATE, Expectation
+from .outputs import Outputs
 from .poses import are_rotations
 from .sample_extraction import Wish, gather, refusals, wish
-from .tick_alignment import Array, TickGrid, align, first_ticks_at, nearest_ticks, screen
+from .text_field import texts_of
+from .tick_alignment import Array, TickGrid, align, first_ticks_at, nearest_ticks
 
 
 @dataclass(frozen=True)
@@ -105,7 +106,7 @@ def compare(
     for target in targets:
         name = target.expectation.entry.target
         if target.wish is None:
-            times_ns, theirs, messages = _texts(bag, target.expectation.entry, header_time)
+            times_ns, theirs, messages = texts_of(bag, target.expectation.entry, header_time)
             none = "" if len(times_ns) else f"none of its {messages} messages can be used" if messages else _NO_MESSAGE
             ours = outputs.column(name)
         else:
@@ -146,31 +147,6 @@ def _compared(target: Target, grid: TickGrid, times_ns: Array, ours: Array, thei
 def _turned(target: Target, theirs: Array) -> Array:
     """Which messages can be compared: quaternions that are no rotation cannot."""
     return are_rotations(theirs) if target.measure in ("angle", "tilt") else np.ones(len(theirs), bool)
-
-
-def _texts(bag: Bag, entry: Entry, header_time: bool) -> tuple[Array, Array, int]:
-    """(times in ns, texts) of a field that is a string, and the number of messages."""
-    topic = bag.topic(entry.topic)
-    stamps, logs, texts = [], [], []
-    for _, log_ns, data in bag.messages({entry.topic}):
-        message = bag.decode(entry.topic, data)
-        try:
-            text = field_value(topic, message, entry.fields[0])
-            header = message.header if header_time else None
-        except BagError as error:
-            raise MapError(f"{entry.location}: {error}") from None
-        except AttributeError:
-            raise MapError(f"{entry.location}: `{topic.name}` [{topic.type}] has no header; use `time: log`") from None
-        if not isinstance(text, str):
-            raise MapError(f"{entry.location}: `{entry.fields[0]}` of `{topic.name}` is not text")
-        stamps.append(header.stamp.sec * 10**9 + header.stamp.nanosec if header else log_ns)
-        logs.append(log_ns)
-        texts.append(text)
-    times_ns, log_times, found = np.array(stamps, np.int64), np.array(logs, np.int64), np.array(texts, dtype=np.str_)
-    order = np.lexsort((found, times_ns, log_times))
-    times_ns, log_times, found = times_ns[order], log_times[order], found[order]
-    usable, _ = screen(times_ns, log_times, header_time)
-    return times_ns[usable], found[usable], len(texts)
 
 
 def _aligned(times_ns: Array, grid: TickGrid, nearest: bool) -> tuple[Array, Array]:

@@ -28,8 +28,9 @@ from ..ros.types import definitions_of
 from ..run import Run, open_run
 from .foreign import grid_of
 from .judge import Column, Judgement, judge
-from .mapping import Entry, ValueMap
+from .mapping import STATE, Entry, ValueMap
 from .sample_extraction import TargetSamples, Wish, gather, wish
+from .text_field import texts_of
 from .tick_alignment import TickGrid, align, first_ticks_at
 from .transforms import with_transforms
 
@@ -40,13 +41,16 @@ _MAX_TICKS = 20_000_000
 def judge_mapped(bag: Bag, chart: ValueMap, requirements: str) -> Judgement:
     """The verdicts on the requirements of a file. Raises MapError, BagError or TwinError."""
     bag = with_transforms(bag, chart.entries, chart.header_time)
-    wishes = [_wish(bag, entry) for entry in chart.entries]
+    wishes = [_wish(bag, entry) for entry in chart.entries if entry.target != STATE]
+    states = [entry for entry in chart.entries if entry.target == STATE]
     with tempfile.TemporaryDirectory(prefix="fcsl-values-") as folder:
-        config = _write_machine(Path(folder), chart.tick_hz, wishes)
+        config = _write_machine(Path(folder), chart, wishes)
         with closing(_open(config, chart, requirements)) as run:
             if not run.observed():
                 raise TwinError(f"{requirements}: it has no requirements")
             samples, _ = gather(bag, wishes, chart.header_time, nan_allowed=True)
+            for entry in states:
+                samples[STATE] = _states(bag, entry, chart.header_time)
             grid = grid_of(chart.path, samples, bag, chart.tick_hz, _MAX_TICKS)
             values = _MappedValues(samples, grid, _timeouts(chart.entries), run.machine)
             columns = {path: values.column(path) for path in set(run.observed())}
@@ -64,6 +68,17 @@ def _wish(bag: Bag, entry: Entry) -> Wish:
     return wish(bag, entry, "f64" if changed else type_, count)
 
 
+def _states(bag: Bag, entry: Entry, header_time: bool) -> TargetSamples:
+    """Their numbers."""
+    times_ns, texts, messages = texts_of(bag, entry, header_time)
+    found, which = np.unique(texts, return_inverse=True)
+    for text in map(str, found):
+        if text not in entry.states:
+            raise MapError(f"{entry.location}: the bag has the state `{text}`, which `states` lacks")
+    numbers = np.array([entry.states.index(str(text)) for text in found], np.int32)
+    return TargetSamples(times_ns, times_ns, numbers[which], messages, {})
+
+
 def _timeouts(entries: Sequence[Entry]) -> dict[str, int]:
     """The shortest of each value, in ns."""
     found: dict[str, int] = {}
@@ -73,24 +88,27 @@ def _timeouts(entries: Sequence[Entry]) -> dict[str, int]:
     return found
 
 
-def _write_machine(folder: Path, tick_hz: int, wishes: Sequence[Wish]) -> Path:
+def _write_machine(folder: Path, chart: ValueMap, wishes: Sequence[Wish]) -> Path:
     """A machine that has these values as outputs and does nothing, so that a monitor can name them."""
     outputs: dict[str, dict[str, str]] = {}
     for one in wishes:
         instance, _, name = one.entry.target.split(".")
         type_ = one.pick.type if one.pick.count == 1 else f"{one.pick.type}[{one.pick.count}]"
         outputs.setdefault(instance, {})[name] = type_
+    if not outputs:
+        outputs["bag"] = {"read": "bool"}  # a machine has an instance
     classes = [
         f"class Of_{instance}:\n    outputs = {own!r}\n\n    def execute(self):\n        pass\n"
         for instance, own in outputs.items()
     ]
     (folder / "values.py").write_text("\n\n".join(classes), encoding="utf-8")
+    states = next((entry.states for entry in chart.entries if entry.target == STATE), ("RUN",))
     config = {
-        "tick_hz": tick_hz,
-        "initial_state": "RUN",
+        "tick_hz": chart.tick_hz,
+        "initial_state": states[0],
         "algorithms": {f"Of_{instance}": {"source": "values.py"} for instance in outputs},
         "instances": {instance: {"algorithm": f"Of_{instance}"} for instance in outputs},
-        "states": {"RUN": {"schedule": dict.fromkeys(outputs, tick_hz)}},
+        "states": {state: {"schedule": dict.fromkeys(outputs, chart.tick_hz)} for state in states},
     }
     path = folder / "bag.json"
     path.write_text(json.dumps(config), encoding="utf-8")
@@ -104,7 +122,9 @@ def _open(config: Path, chart: ValueMap, requirements: str) -> Run:
         found = error.diagnostics[0]
         if found.span.source.name == requirements:
             raise TwinError(str(error)) from None
-        wrong = [e for e in chart.entries if any(part in found.message for part in e.target.split(".outputs."))]
+        wrong = [
+            e for e in chart.entries if any(part in found.message for part in (*e.target.split(".outputs."), *e.states))
+        ]
         at = (wrong or chart.entries)[0]
         raise MapError(f"{at.location}: `{at.target}` is no name of a value: {found.message}") from None
     except ToolchainError as error:

@@ -33,6 +33,9 @@
 
 A channel may be fed by several topics: give it a list of such entries (the shortest timeout_ms counts).
 
+Without a machine (`fcsl check-bag` without --config) a map has `tick_hz` and `values` in place of `channels`, by the paths
+that requirements read: imu.outputs.gyro; machine.state, whose field is text, with the list `states`.
+
 The topic `tf:odom->base_link` is the pose of frame base_link in frame odom, composed from the bag's /tf and /tf_static: a
 geometry_msgs/TransformStamped, with the fields transform.translation and transform.rotation. It has a message at each
 time at which a transform between the two frames is in /tf. The other transforms are interpolated at that time, as tf2
@@ -51,7 +54,7 @@ from __future__ import annotations
 import math
 import re
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from decimal import Decimal, InvalidOperation
 from pathlib import Path
 from typing import Any
@@ -63,12 +66,15 @@ from fcsl_compiler.api.ros import QUATERNION_AXES, VECTOR_AXES
 
 from ..errors import MapError, did_you_mean
 
+#: The state of a machine, or of a robot: a target whose field is text.
+STATE = "machine.state"
 _MAX_MAP_BYTES = 1 << 20
 #: Of a machine, too.
 _MAX_TICK_HZ = 1_000_000
 _FROM_MACHINE = "from machine"
 _SOURCE_KEYS = ("topic", "field", "axes", "from", "quaternion", "rotation", "scale", "offset")
 _CHANNEL_KEYS = (*_SOURCE_KEYS, "timeout_ms")
+_STATE_KEYS = ("topic", "field", "timeout_ms", "states")
 _EXPECT_KEYS = (*_SOURCE_KEYS, "compare", "abs", "rel", "from_s", "until_s", "align")
 _VALUE = re.compile(r"[A-Za-z]\w*\.outputs\.[A-Za-z]\w*", re.ASCII)
 _AXES = (*VECTOR_AXES, *QUATERNION_AXES)
@@ -94,6 +100,7 @@ class Entry:
     location: str = ""
     frame: str = ""
     child_frame: str = ""
+    states: tuple[str, ...] = ()
 
 
 @dataclass(frozen=True)
@@ -254,8 +261,19 @@ def _entry(reader: _Reader, what: str, target: str, node: yaml.Node, members: _M
 def _target_entry(reader: _Reader, what: str, target: str, node: yaml.Node) -> Entry:
     if isinstance(node, yaml.ScalarNode):
         return Entry(target, reader.text(node, f"{what} `{target}`"), location=reader.location(node))
+    if what == "value" and target == STATE:
+        return _state_entry(reader, node)
     members = reader.members(node, f"{what} `{target}`", _CHANNEL_KEYS)
     return _entry(reader, what, target, node, members)
+
+
+def _state_entry(reader: _Reader, node: yaml.Node) -> Entry:
+    """Of a field that is text: which ones there are, in `states`."""
+    members = reader.members(node, f"value `{STATE}`", _STATE_KEYS)
+    if "states" not in members:
+        raise reader.fail(node, f"value `{STATE}`: `states` is missing: the texts that the field may have")
+    states = tuple(reader.text(n, "a state") for n in reader.listed(members["states"][1]))
+    return replace(_entry(reader, "value", STATE, node, members), states=tuple(dict.fromkeys(states)))
 
 
 def _expectation(reader: _Reader, output: str, node: yaml.Node) -> Expectation:
@@ -362,10 +380,12 @@ def read_value_map(path: str | Path) -> ValueMap:
     if tick_hz not in range(1, _MAX_TICK_HZ + 1):
         raise reader.fail(members["tick_hz"][1], f"`tick_hz` must be a whole number from 1 to {_MAX_TICK_HZ}")
     entries = _targets(reader, "value", members["values"][1])
+    for entry in [entry for entry in entries if entry.target == STATE][1:]:
+        raise MapError(f"{entry.location}: `{STATE}` comes from one topic")
     for entry in entries:
         if not entry.fields:
             raise MapError(f"{entry.location}: value `{entry.target}`: `field` is missing")
-        if not _VALUE.fullmatch(entry.target):
+        if entry.target != STATE and not _VALUE.fullmatch(entry.target):
             raise MapError(
                 f"{entry.location}: `{entry.target}` is no name of a value: write <name>.outputs.<name>, as a requirement "
                 "reads it, such as `imu.outputs.gyro`"

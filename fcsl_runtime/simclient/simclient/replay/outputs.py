@@ -12,9 +12,10 @@ from ..bag.digest import Sums
 from ..bag.states import stretches
 from ..c_machine import TYPE_FORMATS
 from ..run import Run
+from .mapping import STATE
 from .tick_alignment import Array
 
-STATE, NEXT_STATE = "machine.state", "machine.next_state"
+NEXT_STATE = "machine.next_state"
 #: Ticks between two calls of `collect` at most, and the bytes of the rows of so many ticks; at least one row.
 SLICE_TICKS, _SLICE_BYTES = 20_000, 8 << 20
 
