@@ -70,16 +70,21 @@ def test_every_example_has_a_picture() -> None:
 
 @pytest.mark.parametrize("path", MACHINES.values(), ids=MACHINES)
 def test_nothing_is_left_out(path: Path) -> None:
-    """In both formats: instances, ports, units, channels, sources, rates, states, requests, guards."""
+    """In both formats: instances, ports, units, channels, sources, rates, states, requests, guards. Requirements that act
+    are in the picture of the states alone."""
     m = machine(path)
+    own = [i for n, i in enumerate(m.instances) if n not in m.acting]
     pictures = [dataflow(m), state_machine(m)]
     svg, mermaid = render(m, None, ".svg"), render(m, None, ".mmd")
-    words = [i.name for i in m.instances] + [s.name for s in m.states] + [c.name for c in m.channels]
+    words = [i.name for i in own] + [s.name for s in m.states] + [c.name for c in m.channels]
     words += [m.requests[e.request] for e in m.edges if e.request >= 0] + ["initial"]
-    words += [f"{m.instances[e.guard_instance].name} failed" for e in m.edges if e.guard_instance >= 0]
+    guarded = [e for e in m.edges if e.guard_instance >= 0]
+    words += [f"requirement {e.requirement}" for e in guarded if e.requirement]
+    words += [f"{m.instances[e.guard_instance].name} failed" for e in guarded if not e.requirement]
+    words += [effect.requirement for effect in m.effects]
     for word in words:
         assert word in svg and word in mermaid, word
-    for i in m.instances:
+    for i in own:
         for port in i.algorithm.ports["inputs"]:
             assert f">{port.name}<" in svg and f">{f'{port.type} {port.unit}'.strip()}<" in svg
     wires = [w for w in pictures[0].wires if pictures[0].boxes[w.target].kind == "instance"]
@@ -90,12 +95,14 @@ def test_nothing_is_left_out(path: Path) -> None:
     of_machine = sum(t.startswith(("machine.", "channels.")) for t in tags)
     assert of_machine == sum(c.source.instance < 0 for c in m.connections)
     fed = {(c.target.instance, c.target.field) for c in m.connections}
-    inputs = [(n, p.name) for n, i in enumerate(m.instances) for p in i.algorithm.ports["inputs"]]
+    inputs = [(n, p.name) for n, i in enumerate(own) for p in i.algorithm.ports["inputs"]]
     assert tags.count("host") == len([i for i in inputs if i not in fed])
     for state in m.states:
         boxes = [box for box in pictures[1].boxes if box.name == state.name or box.kind == "always"]
-        rates = [(row.left, row.left_note) for box in boxes for row in box.rows if row.left]
-        assert sorted(name for name, _ in rates) == sorted(m.instances[e.instance].name for e in state.entries)
+        rows = [(row.left, row.left_note) for box in boxes for row in box.rows if row.left]
+        rates = [row for row in rows if row[0] != "requirement"]
+        due = [e.instance for e in state.entries if e.instance not in m.acting]
+        assert sorted(name for name, _ in rates) == sorted(m.instances[n].name for n in due)
         assert all("Hz" in rate or "ticks" in rate for _, rate in rates)
 
 
