@@ -1244,6 +1244,7 @@ CONFIGS: dict[str, str] = {
             "units": "one.outputs.y > one.inputs.x",
             "the same at all ticks": "1 < 2",
             "a value of the coming tick": "machine.next_state == 'A'",
+            "a value of a receiver": "machine.elapsed < 0.1",
             "no state of this name": "machine.state == 'C'",
             "a vector": "one.outputs.v > 0.0",
             "an index": "one.outputs.v[3] > 0.0",
@@ -1259,6 +1260,12 @@ CONFIGS: dict[str, str] = {
             "too many values": "one.outputs.b == (" * 8 + "one.outputs.b" + ")" * 8,
         }.items()
     },
+    "E257 a value of a receiver of a channel": patch(
+        lambda c: c.update(
+            channels=[{"name": "v.a", "id": 1, "field": "one.inputs.x", "direction": "sensor"}],
+            requirements=[{"id": "R-1", "text": "t", "never": "channels.v.a.fresh"}],
+        )
+    ),
     "E257 no condition in a list": put("requirements", value=[{"id": "R-1", "text": "t", "then": []}]),
     "E257 one of a list": put(
         "requirements", value=[{"id": "R-1", "text": "t", "then": ["one.outputs.y > 0.0", "two"]}]

@@ -112,6 +112,19 @@ def test_c_only_and_depfile(config: Path, tmp_path: Path, capsys: pytest.Capture
     assert str(config) in needs and str(config.parent / "alg.py") in needs and "emit/machine.py" in needs
 
 
+def test_the_monitor_goes_with_the_requirements(
+    config: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    text = config.read_text()
+    required = {**json.loads(text), "requirements": [{"id": "A", "text": "y.", "then": "one.outputs.y < 1.0"}]}
+    (tmp_path / "out").mkdir()
+    (tmp_path / "out" / "craft_requirements.json").write_text("the user's")
+    for content, count in ((json.dumps(required), 4), (text, 1)):
+        config.write_text(content)
+        assert fcslc(capsys, "build", config, "-o", tmp_path / "out", "--c-only")[0] == 0
+        assert len([name for name in files(tmp_path / "out") if name.startswith("craft_requirements.")]) == count
+
+
 def test_map_leads_to_the_python_lines(config: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     fcslc(capsys, "build", config, "-o", tmp_path, "--c-only")
     found = json.loads((tmp_path / "craft.map.json").read_text())

@@ -80,6 +80,11 @@ def _write(compilations: list[Compilation], folder: Path) -> list[Path]:
     texts["fcsl_machines.c"] = registry([c.checked.name for c in compilations], watching)
     for file, text in texts.items():
         write_whole(folder / file, text)
+    for c in compilations:
+        for suffix in ("c", "h", "map.json", "nim", "nim.c"):  # the monitor of requirements that it no longer has
+            old = f"{c.checked.name}_requirements.{suffix}"
+            if c.monitor is None and old not in texts:
+                (folder / old).unlink(missing_ok=True)
     return [folder / file for file in texts]
 
 

@@ -15,7 +15,7 @@ from ..emit.field_table import FieldRow, field_table
 from ..expression import units
 from ..expression.parse import PAST_FUNCTIONS, parse
 from ..expression.tree import ExpressionError, Kind, Node, Quantity
-from ..model.machine import Machine, seconds, split_instance, unknown_instance
+from ..model.machine import MACHINE_SOURCES, Machine, seconds, split_instance, unknown_instance
 from ..model.types import HEALTH_NAMES
 from ..parse.json_reader import ConfigReader
 from ..parse.json_source import JsonNode, parse_json
@@ -43,6 +43,8 @@ _EFFECTS = {"fail": HEALTH_NAMES.index("failed"), "degrade": HEALTH_NAMES.index(
 _LATER = ("machine.next_state", "machine.ticks_in_state")
 #: The one field of the machine that a part's requirement can name.
 _TICK = "machine.tick"
+#: Values that depend on the input to which they are connected.
+_CONNECTED = tuple(f"machine.{name}" for name in MACHINE_SOURCES)
 _BRACKETS = re.compile(r"\[([\d, ]+)\]")
 
 
@@ -130,6 +132,9 @@ class Signals:
         if name in self.known and not rest:
             return f"`{path}` is an instance: name one of its fields, such as `{path}.outputs.health`"
         owner = path.partition(".")[0] + "."
+        channel, _, member = path.rpartition(".")
+        if path in _CONNECTED or member == "fresh" and f"{channel}.valid" in self.rows:
+            return f"`{path}` is a value of connections: connect it to an input, and name that"
         if owner == "channels." or owner in path and any(known.startswith(owner) for known in self.rows):
             hint = nearest(path, [known for known in self.rows if known.startswith(owner)])
             return f"there is no field `{path}`" + (f"; {hint}" if hint else "")
